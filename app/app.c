@@ -1,0 +1,160 @@
+// Shared by the subcommands: messages and exit codes, numbers of options, progress and Ctrl-C, the
+// bundled model.
+#include "app.h"
+
+#include <errno.h>
+#include <math.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+// ---- messages
+
+// Whether the caller can mend it by giving other input.
+static bool is_bad_input(sonde_status status) {
+  return status != SONDE_MEMORY && status != SONDE_CONVERGENCE && status != SONDE_DEVICE &&
+         status != SONDE_CANCELLED;
+}
+
+int app_fail(const char *verb, const sonde_error *error) {
+  app_progress_end();
+  const char *text = error->message[0] ? error->message : sonde_status_text(error->status);
+  fprintf(stderr, "sonde %s: %s\n", verb, text);
+  return is_bad_input(error->status) ? APP_BAD_INPUT : APP_FAILED;
+}
+
+int app_usage_error(const char *verb, const char *format, ...) {
+  va_list arguments;
+  va_start(arguments, format);
+  fprintf(stderr, "sonde %s: ", verb);
+  vfprintf(stderr, format, arguments);
+  fprintf(stderr, "\ntry: sonde %s --help\n", verb);
+  va_end(arguments);
+  return APP_BAD_INPUT;
+}
+
+// ---- numbers
+
+bool app_parse_real(const char *verb, const char *option, const char *text, double low, double high,
+                    double *value) {
+  const char *end = text;
+  double number = text ? sonde_parse_real(text, &end) : 0.0;
+  bool good = text && end != text && *end == 0 && isfinite(number);
+  if (good && number >= low && number <= high) {
+    *value = number;
+    return true;
+  }
+  app_usage_error(verb, "%s expects a number from %g to %g, got '%s'", option, low, high,
+                  text ? text : "nothing");
+  return false;
+}
+
+bool app_parse_integer(const char *verb, const char *option, const char *text, long low, long high,
+                       long *value) {
+  char *end = NULL;
+  errno = 0;
+  long number = text ? strtol(text, &end, 10) : 0;
+  bool good = text && end != text && *end == 0 && errno == 0;
+  if (good && number >= low && number <= high) {
+    *value = number;
+    return true;
+  }
+  app_usage_error(verb, "%s expects a whole number from %ld to %ld, got '%s'", option, low, high,
+                  text ? text : "nothing");
+  return false;
+}
+
+// ---- Ctrl-C and progress
+
+static volatile sig_atomic_t interrupted;
+
+static void on_interrupt(int number) {
+  (void)number;
+  interrupted = 1;
+}
+
+void app_catch_interrupt(void) {
+  struct sigaction action;
+  memset(&action, 0, sizeof action);
+  action.sa_handler = on_interrupt;
+  action.sa_flags = (int)SA_RESETHAND; // the second one acts as usual
+  sigemptyset(&action.sa_mask);
+  sigaction(SIGINT, &action, NULL);
+  sigaction(SIGTERM, &action, NULL);
+}
+
+bool app_interrupted(void) { return interrupted != 0; }
+
+typedef struct progress_line {
+  bool terminal, shown;
+  int percent;
+} progress_line;
+
+static progress_line line;
+
+static bool report(double fraction, const char *what, void *user) {
+  progress_line *p = user;
+  enum { BAR = 30 };
+  int percent = fraction > 0 ? (int)(100.0 * fmin(fraction, 1.0)) : 0;
+  if (p->terminal && (percent != p->percent || !p->shown)) {
+    static const char FULL[] = "##############################";
+    int full = percent * BAR / 100;
+    fprintf(stderr, "\r\033[K[%.*s%*s] %3d %% %s", full, FULL, BAR - full, "", percent,
+            what ? what : "");
+    fflush(stderr);
+    p->percent = percent;
+    p->shown = true;
+  }
+  return !interrupted;
+}
+
+sonde_progress app_progress(void) {
+  app_catch_interrupt();
+  line = (progress_line){isatty(STDERR_FILENO) == 1, false, -1};
+  return (sonde_progress){report, &line};
+}
+
+void app_progress_end(void) {
+  if (line.shown) fprintf(stderr, "\r\033[K");
+  line.shown = false;
+}
+
+// ---- bundled model
+
+#define MODEL_UNDER_PREFIX "share/sonde/thigh.sonde"
+
+// Directory two levels above the program: the build or install prefix; false when unknown.
+static bool own_prefix(char *path, size_t size) {
+  ssize_t length = readlink("/proc/self/exe", path, size - 1);
+  if (length <= 0) return false;
+  path[length] = 0;
+  for (int up = 0; up < 2; ++up) {
+    char *slash = strrchr(path, '/');
+    if (!slash) return false;
+    *slash = 0;
+  }
+  return true;
+}
+
+static bool is_readable(const char *path) { return access(path, R_OK) == 0; }
+
+bool app_bundled_model(char *path, size_t size, char *searched, size_t searched_size) {
+  const char *chosen = getenv("SONDE_MODEL");
+  if (chosen && chosen[0]) { // what the user asks for is not replaced by something else
+    snprintf(path, size, "%s", chosen);
+    snprintf(searched, searched_size, "%s (from SONDE_MODEL)", chosen);
+    return is_readable(path);
+  }
+  char prefix[4096] = "";
+  if (own_prefix(prefix, sizeof prefix)) {
+    snprintf(path, size, "%.3000s/%s", prefix, MODEL_UNDER_PREFIX);
+    if (is_readable(path)) return true;
+  }
+  snprintf(searched, searched_size, "%.3000s/%s, %s/%s", prefix, MODEL_UNDER_PREFIX,
+           SONDE_INSTALL_PREFIX, MODEL_UNDER_PREFIX);
+  snprintf(path, size, "%s/%s", SONDE_INSTALL_PREFIX, MODEL_UNDER_PREFIX);
+  return is_readable(path);
+}

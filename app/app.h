@@ -1,0 +1,54 @@
+// Shared by the subcommands of the program sonde. Uses the public headers only.
+#ifndef SONDE_APP_H
+#define SONDE_APP_H
+
+#include "sonde/sonde.h"
+
+// Exit codes of every command.
+enum { APP_OK = 0, APP_FAILED = 1, APP_BAD_INPUT = 2 };
+
+// Every command gets its own verb as argv[0] and its arguments after it.
+int cmd_run(int argc, char **argv);
+int cmd_fit(int argc, char **argv);
+int cmd_predict(int argc, char **argv);
+int cmd_measure(int argc, char **argv);
+int cmd_press(int argc, char **argv);
+int cmd_replay(int argc, char **argv);
+int cmd_bench(int argc, char **argv);
+int cmd_devices(int argc, char **argv);
+
+// Prints "sonde <verb>: <message>" on stderr and returns the exit code that fits the status.
+int app_fail(const char *verb, const sonde_error *error);
+// The same for a wrong command line; always APP_BAD_INPUT.
+int app_usage_error(const char *verb, const char *format, ...)
+    __attribute__((format(printf, 2, 3)));
+// Parses a real number of an option within [low, high]; false after printing what was expected.
+bool app_parse_real(const char *verb, const char *option, const char *text, double low, double high,
+                    double *value);
+bool app_parse_integer(const char *verb, const char *option, const char *text, long low, long high,
+                       long *value);
+
+// Progress on a terminal (stderr), silent in a pipe; Ctrl-C cancels.
+sonde_progress app_progress(void);
+void app_progress_end(void);
+
+// From here on the first Ctrl-C (or SIGTERM) only sets a flag, the second one ends the program.
+void app_catch_interrupt(void);
+bool app_interrupted(void);
+
+// Path of the bundled model, found beside the program, in the source tree or in the install tree.
+// false when there is none; then *searched names the places.
+bool app_bundled_model(char *path, size_t size, char *searched, size_t searched_size);
+
+// Minimal JSON object writer on stdout: keys in call order, numbers with up to 9 digits, NaN as
+// null.
+void app_json_begin(void);
+void app_json_object(const char *key); // nested
+void app_json_close(void);             // closes the innermost object
+void app_json_real(const char *key, double value);
+void app_json_integer(const char *key, long long value);
+void app_json_bool(const char *key, bool value);
+void app_json_text(const char *key, const char *value);
+void app_json_end(void);
+
+#endif

@@ -1,0 +1,235 @@
+// sonde fit: measurements, sites and surfaces in, thigh model out.
+// parse:       options into texts, then into definitions.
+// load_inputs: tables and surfaces.
+// fit_model:   build, estimate, set the parameters, save.
+#include "fit_common.h"
+
+#include <stdlib.h>
+#include <unistd.h>
+
+static const char VERB[] = "fit";
+static const char HELP[] =
+    "usage: sonde fit MEASUREMENTS.csv --surface SKIN.ply --sites SITES.csv -o MODEL [options]\n"
+    "\n"
+    "Estimates the normal springs f(x) = x/(a x + b) of every site (stage 1: every curve by "
+    "itself;\n"
+    "stage 2: one pair per site and one uniform edge stiffness, neighbours held still), carries "
+    "them\n"
+    "over the refined skin and writes a thigh model. Files are in mm and N.\n"
+    "\n"
+    "  --surface FILE    skin, closed, outward: .ply, .obj or .stl\n"
+    "  --sites FILE      site,x_mm,y_mm,z_mm,nx..nz,ux..uz,vx..vz[,fat_mm]\n"
+    "  -o FILE           model file to write\n"
+    "  --stages 1|2      last stage; default 2. With 1 the model has one pair per site, no edges\n"
+    "                    in the estimation and the law's default edge stiffness\n"
+    "  --femur FILE      default: femur.ply beside the skin\n"
+    "  --fat FILE        skin/fat interface; default: fat_skin_interface.ply beside the skin\n"
+    "  --muscle FILE     fat/muscle interface; default: muscle_surface.ply beside the skin\n"
+    "  --name TEXT       name in the model file; default thigh\n"
+    "  --provenance TEXT where the data come from, kept in the model file\n"
+    "  --weights KIND    absolute (default) or relative to each probe's mean force\n"
+    "  --loss KIND       squares (default), huber or student\n"
+    "  --pretension      estimate an edge pre-tension too\n"
+    "  --cold-start      start stage 2 from generic values instead of stage 1\n"
+    "  --fine-mm L       longest skin edge near footprints; default 3\n"
+    "  --json            one JSON object instead of the table\n"
+    "  --help            this text\n";
+
+typedef struct fit_arguments {
+  const char *measurements, *surface, *sites, *output, *femur, *fat, *muscle, *name, *provenance;
+  const char *stages, *weights, *loss, *fine_mm;
+  bool json, help, pretension, cold_start;
+} fit_arguments;
+
+typedef struct fit_inputs {
+  sonde_site_table sites;
+  sonde_measurements measurements;
+  sonde_mesh skin, femur, fat, muscle;
+} fit_inputs;
+
+static bool parse_arguments(int argc, char **argv, fit_arguments *a) {
+  const app_option options[] = {{"--surface", &a->surface, NULL},
+                                {"--sites", &a->sites, NULL},
+                                {"-o", &a->output, NULL},
+                                {"--output", &a->output, NULL},
+                                {"--stages", &a->stages, NULL},
+                                {"--femur", &a->femur, NULL},
+                                {"--fat", &a->fat, NULL},
+                                {"--muscle", &a->muscle, NULL},
+                                {"--name", &a->name, NULL},
+                                {"--provenance", &a->provenance, NULL},
+                                {"--weights", &a->weights, NULL},
+                                {"--loss", &a->loss, NULL},
+                                {"--fine-mm", &a->fine_mm, NULL},
+                                {"--pretension", NULL, &a->pretension},
+                                {"--cold-start", NULL, &a->cold_start},
+                                {"--json", NULL, &a->json},
+                                {"--help", NULL, &a->help}};
+  if (!app_take_options(VERB, argc, argv, options, sizeof options / sizeof *options,
+                        &a->measurements))
+    return false;
+  if (a->help) return true;
+  return app_require(VERB, "MEASUREMENTS.csv", a->measurements) &&
+         app_require(VERB, "--surface", a->surface) && app_require(VERB, "--sites", a->sites) &&
+         app_require(VERB, "-o MODEL", a->output);
+}
+
+static bool parse_fit(const fit_arguments *a, sonde_fit_def *def, double *fine_mm) {
+  static const char *const WEIGHTS[] = {"absolute", "relative", NULL};
+  static const char *const LOSSES[] = {"squares", "huber", "student", NULL};
+  int weights = 0, loss = 0;
+  long stages = 2;
+  if (a->stages && !app_parse_integer(VERB, "--stages", a->stages, 1, 2, &stages)) return false;
+  if (a->weights && !app_parse_word(VERB, "--weights", a->weights, WEIGHTS, &weights)) return false;
+  if (a->loss && !app_parse_word(VERB, "--loss", a->loss, LOSSES, &loss)) return false;
+  if (a->fine_mm && !app_parse_real(VERB, "--fine-mm", a->fine_mm, 0.5, 50, fine_mm)) return false;
+  *def = sonde_fit_def_default();
+  def->stages = (uint32_t)stages;
+  def->weights = (sonde_fit_weights)weights;
+  def->loss = (sonde_fit_loss)loss;
+  def->fit_pretension = a->pretension;
+  def->cold_start = a->cold_start;
+  return true;
+}
+
+// Loads an optional surface: the named one, else the usual name beside the skin when it exists.
+static sonde_status load_layer(const char *named, const char *skin, const char *usual,
+                               sonde_mesh *mesh, sonde_error *error) {
+  char path[4096];
+  if (!named) {
+    const char *slash = strrchr(skin, '/');
+    int folder = slash ? (int)(slash - skin) + 1 : 0;
+    snprintf(path, sizeof path, "%.*s%s", folder, skin, usual);
+    bool present = access(path, R_OK) == 0;
+    fprintf(stderr, "sonde fit: %s %s\n", present ? "using" : "no", path);
+    if (!present) return SONDE_OK;
+  }
+  return sonde_mesh_load(named ? named : path, 1e-3, mesh, error);
+}
+
+static sonde_status load_inputs(const fit_arguments *a, fit_inputs *in, sonde_error *error) {
+  sonde_status status = sonde_site_table_load(a->sites, &in->sites, error);
+  if (!status)
+    status = sonde_measurements_load(a->measurements, &in->sites, &in->measurements, error);
+  if (!status) status = sonde_mesh_load(a->surface, 1e-3, &in->skin, error);
+  if (!status) status = load_layer(a->femur, a->surface, "femur.ply", &in->femur, error);
+  if (!status) status = load_layer(a->fat, a->surface, "fat_skin_interface.ply", &in->fat, error);
+  if (!status) status = load_layer(a->muscle, a->surface, "muscle_surface.ply", &in->muscle, error);
+  return status;
+}
+
+static void clear_inputs(fit_inputs *in) {
+  sonde_site_table_clear(&in->sites);
+  sonde_measurements_clear(&in->measurements);
+  sonde_mesh_clear(&in->skin);
+  sonde_mesh_clear(&in->femur);
+  sonde_mesh_clear(&in->fat);
+  sonde_mesh_clear(&in->muscle);
+}
+
+static const sonde_mesh *given(const sonde_mesh *mesh) { return mesh->vertex_count ? mesh : NULL; }
+
+static sonde_status build_model(const fit_arguments *a, const fit_inputs *in, double fine_mm,
+                                sonde_model **model, sonde_error *error) {
+  sonde_model_def def = sonde_model_def_default();
+  char provenance[256];
+  const char *slash = strrchr(a->measurements, '/');
+  snprintf(provenance, sizeof provenance, "fitted by sonde %s to %.100s", sonde_version(),
+           slash ? slash + 1 : a->measurements);
+  def.provenance = a->provenance ? a->provenance : provenance;
+  if (a->name) def.name = a->name;
+  def.skin = &in->skin;
+  def.femur = given(&in->femur);
+  def.fat_interface = given(&in->fat);
+  def.muscle_interface = given(&in->muscle);
+  def.sites = in->sites.sites;
+  def.site_count = in->sites.count;
+  def.data = in->measurements.data;
+  def.datum_count = in->measurements.count;
+  def.fine_edge_m = 1e-3 * fine_mm;
+  return sonde_model_build(&def, model, error);
+}
+
+static sonde_status fit_model(const fit_arguments *a, const fit_inputs *in,
+                              const sonde_fit_def *def, double fine_mm, sonde_fit_result *result,
+                              sonde_error *error) {
+  sonde_model *model = NULL;
+  sonde_progress progress = app_progress();
+  sonde_status status = build_model(a, in, fine_mm, &model, error);
+  if (!status)
+    status = sonde_fit(model, &in->sites, &in->measurements, def, &progress, result, error);
+  app_progress_end();
+  if (!status)
+    status =
+        sonde_model_set_parameters(model, &result->law, result->sites, result->site_count, error);
+  if (!status) status = sonde_model_save(model, a->output, error);
+  sonde_model_destroy(model);
+  return status;
+}
+
+static void print_json(const fit_arguments *a, const sonde_fit_result *r, double seconds) {
+  bool second = r->stage2.all.count > 0;
+  app_json_begin();
+  app_json_report(second ? "simplified" : "independent", second ? &r->stage2 : &r->stage1);
+  app_json_object("stage1");
+  app_json_report("independent", &r->stage1);
+  app_json_integer("parameters", r->stage1_parameters);
+  app_json_close();
+  if (second) {
+    app_json_object("stage2");
+    app_json_report("simplified", &r->stage2);
+    app_json_integer("parameters", r->parameters);
+    app_json_integer("iterations", r->iterations);
+    app_json_bool("converged", r->converged);
+    app_json_close();
+  }
+  app_json_integer("parameters", r->parameters);
+  app_json_text("model", a->output);
+  app_json_real("edge_stiffness_n_m", r->law.edge_stiffness_n_m);
+  app_json_real("edge_pretension_n", r->law.edge_pretension_n);
+  app_json_real("seconds", seconds);
+  app_json_end();
+}
+
+static void print_table(const fit_arguments *a, const sonde_fit_result *r, double seconds) {
+  char title[128];
+  snprintf(title, sizeof title, "stage 1, every curve by itself: %u parameters",
+           r->stage1_parameters);
+  app_print_report(title, &r->stage1);
+  if (r->stage2.all.count > 0) {
+    snprintf(title, sizeof title, "stage 2, simplified interaction: %u parameters", r->parameters);
+    app_print_report(title, &r->stage2);
+    printf("edge stiffness %.3f N/m (ln sd %.3f), pre-tension %.3g N, %u iterations\n",
+           r->law.edge_stiffness_n_m, r->edge_sd_log, r->law.edge_pretension_n, r->iterations);
+  }
+  printf("wrote %s in %.2f s\n", a->output, seconds);
+}
+
+int cmd_fit(int argc, char **argv) {
+  fit_arguments arguments = {0};
+  sonde_fit_def def;
+  double fine_mm = 3.0, start = app_seconds();
+  if (!parse_arguments(argc, argv, &arguments)) return APP_BAD_INPUT;
+  if (arguments.help) {
+    fputs(HELP, stdout);
+    return APP_OK;
+  }
+  if (!parse_fit(&arguments, &def, &fine_mm)) return APP_BAD_INPUT;
+  fit_inputs inputs = {0};
+  sonde_fit_result result = {0};
+  sonde_error error = {0};
+  sonde_status status = load_inputs(&arguments, &inputs, &error);
+  if (!status) status = fit_model(&arguments, &inputs, &def, fine_mm, &result, &error);
+  int code = APP_OK;
+  if (status)
+    code = app_fail(VERB, &error);
+  else if (arguments.json)
+    print_json(&arguments, &result, app_seconds() - start);
+  else
+    print_table(&arguments, &result, app_seconds() - start);
+  if (!status && !result.converged)
+    fprintf(stderr, "sonde fit: stage 2 reached its iteration limit before it converged\n");
+  sonde_fit_result_clear(&result);
+  clear_inputs(&inputs);
+  return code;
+}

@@ -1,0 +1,238 @@
+// sonde press: settles a probe at a site to a force or a depth and reports what is felt and seen.
+// find_depth: regula falsi on the settled force.
+// look:       interior, vessels and picture of the settled state.
+#include "app.h"
+
+#include <getopt.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char HELP[] =
+    "usage: sonde press [MODEL] --site K --probe NAME|FILE (--force-n F | --depth-mm D) [options]\n"
+    "\n"
+    "Presses a probe on the thigh until everything is at rest and reports the force, the\n"
+    "penetration and the state of the vein and the artery below it.\n"
+    "\n"
+    "  --site K          number of the site to press at\n"
+    "  --probe NAME      point, linear, square, sphere, or a mesh file (mm); default linear\n"
+    "  --force-n F       press until the settled force is F newtons (0.01 to 200)\n"
+    "  --depth-mm D      press D millimetres below the rest skin (-10 to 60)\n"
+    "  --case NAME       healthy, partial_mural, acute_occlusive, subacute_occlusive,\n"
+    "                    chronic_occlusive; default healthy\n"
+    "  --image PNG       write the echographic image of the settled state (512 x 512)\n"
+    "  --json            print one JSON object\n"
+    "  --help            this text\n"
+    "MODEL defaults to the bundled thigh.\n";
+
+typedef struct options {
+  char model[1024];
+  long site;
+  const char *probe, *pathology, *image;
+  double force_n, depth_m; // NaN when not asked for
+  bool json;
+} options;
+
+typedef struct press {
+  sonde_model *model;
+  sonde_state *state;
+  sonde_probe probe;
+  const sonde_site *site;
+  sonde_pathology pathology;
+  sonde_pose pose;
+  double depth_m, force_n;
+  sonde_settle_result settled;
+  uint32_t steps;
+  double vein, artery, vein_short_m; // NaN when not under the probe
+} press;
+
+static const double RESIDUAL = 1e-9;
+static const double DEEPEST_M = 0.06;
+
+// Returns -1 to go on, else the exit code.
+static int read_options(int argc, char **argv, options *o) {
+  static const struct option LONG[] = {{"site", required_argument, NULL, 's'},
+                                       {"probe", required_argument, NULL, 'p'},
+                                       {"force-n", required_argument, NULL, 'f'},
+                                       {"depth-mm", required_argument, NULL, 'd'},
+                                       {"case", required_argument, NULL, 'c'},
+                                       {"image", required_argument, NULL, 'i'},
+                                       {"json", no_argument, NULL, 'j'},
+                                       {"help", no_argument, NULL, 'h'},
+                                       {NULL, 0, NULL, 0}};
+  double mm = 0;
+  for (int c; (c = getopt_long(argc, argv, "", LONG, NULL)) != -1;) switch (c) {
+    case 's':
+      if (!app_parse_integer("press", "--site", optarg, 0, 1000000, &o->site)) return APP_BAD_INPUT;
+      break;
+    case 'p': o->probe = optarg; break;
+    case 'f':
+      if (!app_parse_real("press", "--force-n", optarg, 0.01, 200, &o->force_n))
+        return APP_BAD_INPUT;
+      break;
+    case 'd':
+      if (!app_parse_real("press", "--depth-mm", optarg, -10, 60, &mm)) return APP_BAD_INPUT;
+      o->depth_m = mm * 1e-3;
+      break;
+    case 'c': o->pathology = optarg; break;
+    case 'i': o->image = optarg; break;
+    case 'j': o->json = true; break;
+    case 'h': fputs(HELP, stdout); return APP_OK;
+    default: return APP_BAD_INPUT;
+    }
+  if (argc - optind > 1)
+    return app_usage_error("press", "one model expected, '%s' is too much", argv[optind + 1]);
+  if (isnan(o->force_n) == isnan(o->depth_m))
+    return app_usage_error("press", "give either --force-n or --depth-mm");
+  if (o->site < 0) return app_usage_error("press", "--site is missing");
+  char searched[1024];
+  if (optind < argc)
+    snprintf(o->model, sizeof o->model, "%s", argv[optind]);
+  else if (!app_bundled_model(o->model, sizeof o->model, searched, sizeof searched))
+    return app_usage_error("press", "no bundled model found (looked at %s)", searched);
+  return -1;
+}
+
+static void settle(press *p, double depth_m) {
+  p->depth_m = depth_m;
+  p->pose = sonde_site_pose(p->site, depth_m);
+  p->settled = sonde_settle(p->state, &p->probe, p->pose, RESIDUAL, 400);
+  p->steps += p->settled.iterations;
+  sonde_vec3 f = sonde_state_contact(p->state)->force_n, n = p->site->normal;
+  p->force_n = f.x * n.x + f.y * n.y + f.z * n.z;
+}
+
+static bool report(const sonde_progress *progress, const press *p, double target) {
+  double fraction = target > 0 ? fmin(p->force_n / target, 1) : 0;
+  return !progress->report || progress->report(fraction, "pressing", progress->user);
+}
+
+// The settled force grows with depth: step out to a bracket, then Illinois regula falsi.
+static sonde_status find_depth(press *p, double target, sonde_error *error) {
+  sonde_progress progress = app_progress();
+  double low = 0, low_f = -target, high = 0.002, high_f;
+  for (;; high += 0.002) {
+    settle(p, high);
+    high_f = p->force_n - target;
+    if (!report(&progress, p, target)) return SONDE_CANCELLED;
+    if (high_f >= 0 || high >= DEEPEST_M) break;
+    low = high;
+    low_f = high_f;
+  }
+  for (int k = 0; k < 60 && fabs(p->force_n - target) > 1e-5 * target && high_f >= 0; ++k) {
+    double depth = low - low_f * (high - low) / (high_f - low_f);
+    settle(p, depth);
+    double f = p->force_n - target;
+    if (f < 0)
+      low = depth, low_f = f, high_f *= k % 3 == 2 ? 0.5 : 1;
+    else
+      high = depth, high_f = f, low_f *= k % 3 == 2 ? 0.5 : 1;
+  }
+  if (fabs(p->force_n - target) <= 1e-3 * target && p->settled.converged) return SONDE_OK;
+  error->status = SONDE_CONVERGENCE;
+  snprintf(error->message, sizeof error->message,
+           "%g N was not reached: %g N at %g mm, residual %.2g", target, p->force_n,
+           p->depth_m * 1e3, p->settled.residual);
+  return SONDE_CONVERGENCE;
+}
+
+static sonde_status look(press *p, const char *image_path, sonde_error *error) {
+  sonde_interior *interior = NULL;
+  sonde_echo *echo = NULL;
+  sonde_image image = {0};
+  sonde_status status = sonde_interior_create(p->model, &interior, error);
+  if (status) goto done;
+  sonde_interior_update(interior,
+                        &(sonde_interior_input){sonde_state_positions(p->state),
+                                                sonde_state_contact_forces(p->state), p->pose,
+                                                &p->pathology, -1, sonde_state_tick(p->state)});
+  sonde_vessel_state vessel;
+  p->vein = p->artery = p->vein_short_m = NAN;
+  if (sonde_interior_vessel_at_plane(interior, 0, p->pose, &vessel)) {
+    p->vein = vessel.area_ratio;
+    p->vein_short_m = 2 * vessel.half_short_m;
+  }
+  if (sonde_interior_vessel_at_plane(interior, 1, p->pose, &vessel)) p->artery = vessel.area_ratio;
+  if (!image_path) goto done;
+  sonde_echo_settings settings = sonde_echo_settings_default();
+  status = sonde_echo_create(interior, &(sonde_echo_def){0}, &echo, error);
+  if (!status) status = sonde_image_create(512, 512, &image, error);
+  if (status) goto done;
+  sonde_echo_render(echo, p->pose, 2 * p->probe.half_x_m, &p->pathology, &settings, &image);
+  status = sonde_image_save_png(&image, image_path, error);
+done:
+  sonde_image_clear(&image);
+  sonde_echo_destroy(echo);
+  sonde_interior_destroy(interior);
+  return status;
+}
+
+static void print(const press *p, const options *o) {
+  if (o->json) {
+    app_json_begin();
+    app_json_real("force_n", p->force_n);
+    app_json_real("penetration_mm", p->depth_m * 1e3);
+    app_json_real("reaction_n", p->settled.reaction_n);
+    app_json_real("contact_n", p->settled.contact_n);
+    app_json_real("vein_area_ratio", p->vein);
+    app_json_real("artery_area_ratio", p->artery);
+    app_json_real("vein_short_mm", p->vein_short_m * 1e3);
+    app_json_real("residual", p->settled.residual);
+    app_json_integer("steps", p->steps);
+    app_json_text("case", p->pathology.name);
+    app_json_text("probe", p->probe.name);
+    app_json_integer("site", o->site);
+    app_json_end();
+    return;
+  }
+  printf("site %ld, probe %s, case %s\n", o->site, p->probe.name, p->pathology.name);
+  printf("force         %8.3f N\n", p->force_n);
+  printf("penetration   %8.2f mm\n", p->depth_m * 1e3);
+  printf("residual      %8.1e of the contact force (%u steps)\n", p->settled.residual, p->steps);
+  if (isnan(p->vein))
+    printf("vein          not under the probe\n");
+  else
+    printf("vein area     %8.1f %% of rest, %.1f mm front to back\n", p->vein * 100,
+           p->vein_short_m * 1e3);
+  if (!isnan(p->artery)) printf("artery area   %8.1f %% of rest\n", p->artery * 100);
+  if (o->image) printf("image         %s\n", o->image);
+}
+
+static sonde_status prepare(press *p, const options *o, sonde_error *error) {
+  sonde_status status = sonde_pathology_preset(o->pathology, &p->pathology, error);
+  if (!status) status = sonde_probe_create(o->probe, &p->probe, error);
+  if (!status) status = sonde_model_load(o->model, &p->model, error);
+  if (status) return status;
+  p->site = sonde_model_site(p->model, (uint32_t)o->site);
+  if (!p->site) {
+    error->status = SONDE_NOT_FOUND;
+    snprintf(error->message, sizeof error->message, "%.400s: no site %ld, the model has %u sites",
+             o->model, o->site, p->model->site_count);
+    return SONDE_NOT_FOUND;
+  }
+  return sonde_state_create(p->model, NULL, &p->state, error);
+}
+
+int cmd_press(int argc, char **argv) {
+  options o = {
+      .site = -1, .probe = "linear", .pathology = "healthy", .force_n = NAN, .depth_m = NAN};
+  int code = read_options(argc, argv, &o);
+  if (code >= 0) return code;
+  press p = {0};
+  sonde_error error = {0};
+  sonde_status status = prepare(&p, &o, &error);
+  if (!status && !isnan(o.force_n)) {
+    status = find_depth(&p, o.force_n, &error);
+    app_progress_end();
+  } else if (!status) {
+    for (double d = fmin(0.002, o.depth_m); d < o.depth_m; d += 0.002) settle(&p, d);
+    settle(&p, o.depth_m);
+  }
+  if (!status) status = look(&p, o.image, &error);
+  if (!status) print(&p, &o);
+  sonde_state_destroy(p.state);
+  sonde_probe_clear(&p.probe);
+  sonde_model_destroy(p.model);
+  return status ? app_fail("press", &error) : APP_OK;
+}

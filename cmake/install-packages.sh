@@ -1,0 +1,97 @@
+#!/usr/bin/env bash
+# install-packages.sh GROUP...: sees to it that the Debian packages of the groups "build" and "test"
+# are there. Installs what is missing as root or through sudo; otherwise prints the one command
+# that would and exits with 2. Asks nothing and touches nothing when everything is there.
+set -euo pipefail
+
+missing=()
+
+has() { command -v "$1" >/dev/null 2>&1; }
+installed() {
+  has dpkg-query && [[ $(dpkg-query -W -f='${Status}' "$1" 2>/dev/null) == *"ok installed" ]]
+}
+need_command() { has "$1" || missing+=("$2"); }
+# A library counts as there when pkg-config knows it, so that one from elsewhere is respected.
+need_library() {
+  if has pkg-config && [[ $1 != - ]] && pkg-config --exists "$1"; then return; fi
+  installed "$2" || missing+=("$2")
+}
+
+build_packages() {
+  { has gcc && has g++ && has make && installed libc6-dev; } || missing+=(build-essential)
+  need_command cmake cmake
+  need_command ninja ninja-build
+  need_command pkg-config pkg-config
+  need_library - libcivetweb-dev # ships no .pc file
+  need_library libcjson libcjson-dev
+  need_library libpng libpng-dev
+  need_library zlib zlib1g-dev
+  need_command node nodejs
+  if ! has npm; then missing+=(npm ca-certificates); fi
+}
+
+test_packages() {
+  need_library cmocka libcmocka-dev
+  need_command clang clang
+  if has clang; then
+    local runtime
+    runtime=$(clang -print-file-name=libclang_rt.asan-x86_64.a)
+    [[ -e $runtime || $(uname -m) != x86_64 ]] || missing+=(libclang-rt-14-dev)
+  else
+    missing+=(libclang-rt-14-dev)
+  fi
+  has chromium || has google-chrome || missing+=(chromium)
+  need_command mandoc mandoc
+}
+
+check_node() {
+  local major
+  major=$(node --version | sed 's/^v\([0-9]*\).*/\1/')
+  if ((major < 18)); then
+    echo "node $(node --version) is too old: the page is built with node 18 or newer" >&2
+    exit 2
+  fi
+}
+
+as_root() { # no prompt when nobody can answer it
+  if [[ $(id -u) == 0 ]]; then "$@"
+  elif [[ -t 0 ]]; then sudo "$@"
+  else sudo -n "$@"; fi
+}
+
+may_be_root() {
+  [[ $(id -u) == 0 ]] && return 0
+  has sudo || return 1
+  [[ -t 0 ]] || sudo -n true 2>/dev/null
+}
+
+install_missing() {
+  local command="apt-get install --no-install-recommends -y ${missing[*]}"
+  if ! has apt-get; then
+    echo "missing: ${missing[*]} (Debian 12 package names; there is no apt-get here)" >&2
+    exit 2
+  fi
+  if ! may_be_root; then
+    echo "packages are missing; as root, run:" >&2
+    echo "  apt-get update && $command" >&2
+    exit 2
+  fi
+  echo "== packages: installing ${missing[*]}"
+  local apt=(as_root env DEBIAN_FRONTEND=noninteractive apt-get -q)
+  "${apt[@]}" update || { sleep 5; "${apt[@]}" update; }
+  "${apt[@]}" install --no-install-recommends -y "${missing[@]}"
+}
+
+for group in "$@"; do
+  case $group in
+  build) build_packages ;;
+  test) test_packages ;;
+  *) echo "install-packages.sh: unknown group '$group', expected build or test" >&2; exit 2 ;;
+  esac
+done
+if ((${#missing[@]})); then
+  install_missing
+else
+  echo "== packages: all there ($*)"
+fi
+check_node

@@ -1,0 +1,13 @@
+# The bundled thigh: fitted from data/thigh by the program that was just built, and again whenever
+# the data or the program change.
+set(SONDE_BUNDLED_MODEL ${PROJECT_BINARY_DIR}/share/sonde/thigh.sonde)
+set(thigh_data ${PROJECT_SOURCE_DIR}/data/thigh)
+add_custom_command(
+  OUTPUT ${SONDE_BUNDLED_MODEL}
+  COMMAND ${CMAKE_COMMAND} -E make_directory ${PROJECT_BINARY_DIR}/share/sonde
+  COMMAND sonde fit ${thigh_data}/indentation.csv --surface ${thigh_data}/skin.ply
+    --sites ${thigh_data}/sites.csv -o ${SONDE_BUNDLED_MODEL}
+  DEPENDS sonde ${thigh_data}/indentation.csv ${thigh_data}/skin.ply ${thigh_data}/sites.csv
+    ${thigh_data}/femur.ply ${thigh_data}/fat_skin_interface.ply ${thigh_data}/muscle_surface.ply
+  COMMENT "Fitting the bundled thigh" USES_TERMINAL VERBATIM)
+add_custom_target(thigh ALL DEPENDS ${SONDE_BUNDLED_MODEL})

@@ -1,0 +1,81 @@
+/**
+ * @file echo.h
+ * The echographic image of the deformed thigh: scan lines, speckle that belongs to the tissue,
+ * attenuation, bone echo and shadow, log compression, scan conversion.
+ */
+#ifndef SONDE_ECHO_H
+#define SONDE_ECHO_H
+
+#include "sonde/interior.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/** What the operator sets on the scanner. */
+typedef struct sonde_echo_settings {
+  double frequency_hz;     /**< 1-12 MHz; default 7.5 MHz */
+  double depth_m;          /**< imaged depth, 20-150 mm; default 70 mm */
+  double gain_db;          /**< overall gain, -30..30; default 0 */
+  double dynamic_range_db; /**< 30-90; default 60 */
+  double focus_m;          /**< default 25 mm */
+  double tgc_db_per_m;     /**< time-gain compensation on top of the default, default 0 */
+} sonde_echo_settings;
+
+SONDE_API sonde_echo_settings sonde_echo_settings_default(void);
+/** Clamps every field into its range and replaces NaN by the default. @thread any */
+SONDE_API sonde_echo_settings sonde_echo_settings_clamp(sonde_echo_settings settings);
+
+/** Slope of the time-gain compensation that belongs to tgc_db_per_m = 0 (round trip through mean
+ *  soft tissue); set tgc_db_per_m to its negative to switch compensation off. @thread any */
+SONDE_API double sonde_echo_default_tgc_db_per_m(double frequency_hz);
+
+/** Grey image, row 0 at the probe, column 0 at negative x of the probe frame. */
+typedef struct sonde_image {
+  uint32_t width, height;
+  double width_m, height_m; /**< physical size of the picture; square pixels */
+  uint64_t tick;            /**< of the state it shows */
+  uint8_t *pixels;          /**< [height*width] owned by the image */
+} sonde_image;
+
+SONDE_API sonde_status sonde_image_create(uint32_t width, uint32_t height, sonde_image *image,
+                                          sonde_error *error);
+SONDE_API void sonde_image_clear(sonde_image *image);
+/** Writes an 8-bit grey PNG atomically. @thread owner */
+SONDE_API sonde_status sonde_image_save_png(const sonde_image *image, const char *path,
+                                            sonde_error *error);
+
+typedef struct sonde_echo sonde_echo;
+
+/** Options fixed at creation; zero selects the default. */
+typedef struct sonde_echo_def {
+  uint32_t line_count;      /**< default 192 */
+  uint32_t sample_count;    /**< per line, default 1024 */
+  double scatterers_per_m3; /**< default: enough for developed speckle */
+  uint64_t seed;
+  bool plain;             /**< tissue without septa and bundles, for measurements */
+} sonde_echo_def;
+
+/** @param interior borrowed, its updates feed the images @thread owner */
+SONDE_API sonde_status sonde_echo_create(const sonde_interior *interior, const sonde_echo_def *def,
+                                         sonde_echo **echo, sonde_error *error);
+SONDE_API void sonde_echo_destroy(sonde_echo *echo);
+
+/**
+ * Renders the image plane (x-z) of the probe from the interior's current state. Lines above air
+ * (no contact) stay dark with reverberation at the face.
+ * @param aperture_m lateral width of the array, e.g. 2*probe->half_x_m
+ * @thread one at a time per echo, not while the interior updates; no allocation
+ */
+SONDE_API void sonde_echo_render(sonde_echo *echo, sonde_pose world_from_probe, double aperture_m,
+                                 const sonde_pathology *pathology,
+                                 const sonde_echo_settings *settings, sonde_image *image);
+
+/** Envelope before log compression of the last render: [sample_count*line_count], sample-major. */
+SONDE_API const float *sonde_echo_envelope(const sonde_echo *echo, uint32_t *lines,
+                                           uint32_t *samples);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,143 @@
+/**
+ * @file exam.h
+ * Cases, sessions (one trainee, one thigh, one probe), recording and replay.
+ */
+#ifndef SONDE_EXAM_H
+#define SONDE_EXAM_H
+
+#include "sonde/echo.h"
+#include "sonde/haptics.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/** What changes a session besides the probe's pose; applied at the start of a tick. */
+typedef struct sonde_session_controls {
+  uint32_t probe; /**< index into the session's probes */
+  sonde_pathology pathology;
+  sonde_echo_settings echo;
+  bool stop;       /**< emergency stop pressed (latched until resume) */
+  uint32_t resume; /**< counts resumes */
+} sonde_session_controls;
+
+typedef struct sonde_session_def {
+  const sonde_model *model;       /**< borrowed */
+  const char *model_path;         /**< written into the recording; may be NULL */
+  const char *const *probe_names; /**< NULL-terminated; NULL: all built-in */
+  sonde_world_def world;
+  sonde_safety_limits limits;
+  sonde_session_controls controls;    /**< at the start */
+  uint32_t image_width, image_height; /**< default 512 x 512 */
+  uint32_t ticks_per_image;           /**< lockstep: an image every so many ticks; real time: the
+                                           surface is offered to the image thread as often; default 20 */
+  const char *record_path;            /**< NULL: no recording; format: docs/recording.md */
+} sonde_session_def;
+
+/** Healthy vein, first probe, default limits and world. @thread any */
+SONDE_API sonde_session_def sonde_session_def_default(void);
+
+/** Everything a viewer shows of one tick; copied as a whole through a mailbox. */
+typedef struct sonde_snapshot {
+  uint64_t tick;
+  double time_s;
+  sonde_pose world_from_probe;
+  uint32_t probe;
+  sonde_vec3 force_n;          /**< of the tissue on the probe */
+  sonde_vec3 rendered_force_n; /**< after the limits */
+  double force_normal_n;       /**< along the probe's axis, > 0 when pressed */
+  double penetration_m;        /**< of the face's centre below the rest skin, along the axis;
+                                    negative above the skin */
+  double contact_volume_m3, contact_area_m2;
+  double vein_area_ratio, artery_area_ratio; /**< at the image plane; NaN when not in view */
+  double vein_short_m;                       /**< AP diameter */
+  uint32_t awake_nodes, solver_iterations, flags;
+  sonde_fault fault;
+} sonde_snapshot;
+
+typedef struct sonde_session sonde_session;
+
+/** Builds world, interior, echo and recorder.
+ *  @param device moved into the session and zeroed; on failure it stays the caller's
+ *  @param[out] session released by sonde_session_destroy()
+ *  @return SONDE_ARGUMENT, SONDE_NOT_FOUND (a probe), SONDE_IO (the recording), SONDE_MEMORY
+ *  @thread owner */
+SONDE_API sonde_status sonde_session_create(const sonde_session_def *def, sonde_device *device,
+                                            sonde_session **session, sonde_error *error);
+/** Stops the threads, closes the recording, frees; NULL is ignored. A session without a single tick
+ *  leaves no recording.
+ *  @return SONDE_IO when the recording could not be written or the disk was too slow for it
+ *  @thread owner */
+SONDE_API sonde_status sonde_session_destroy(sonde_session *session, sonde_error *error);
+
+/** One tick in lockstep: device, world, limits, recorder; every ticks_per_image-th tick also the
+ *  inside and the image. @thread owner, only while no loop runs */
+SONDE_API void sonde_session_tick(sonde_session *session);
+/** Starts the tick thread (one tick per world.dt_s), the image thread and the recorder's thread;
+ *  a running session stays as it is. @thread owner */
+SONDE_API sonde_status sonde_session_start(sonde_session *session, sonde_error *error);
+/** Joins them; ticks go on in lockstep or after another start. @thread owner */
+SONDE_API void sonde_session_stop(sonde_session *session);
+
+/** New controls, taken over at the next tick; never waits. Values out of range are clamped, those
+ *  that are not finite and unknown probes keep what was set. @thread any one thread */
+SONDE_API void sonde_session_control(sonde_session *session,
+                                     const sonde_session_controls *controls);
+/** The controls set last, after clamping. @thread any */
+SONDE_API sonde_session_controls sonde_session_controls_now(const sonde_session *session);
+/** For sonde_device_page_goal(). @thread any */
+SONDE_API sonde_device *sonde_session_device(sonde_session *session);
+SONDE_API uint32_t sonde_session_probe_count(const sonde_session *session);
+SONDE_API const sonde_probe *sonde_session_probe(const sonde_session *session, uint32_t index);
+SONDE_API const sonde_model *sonde_session_model(const sonde_session *session);
+
+/** Newest finished frame: snapshot, skin and image of one and the same tick. */
+typedef struct sonde_frame {
+  sonde_snapshot snapshot;
+  const float *skin_m;   /**< [nodes*3] deformed positions */
+  const uint8_t *pixels; /**< [height*width] */
+  uint32_t width, height;
+  double width_m, height_m;
+} sonde_frame;
+/** Newest frame since the last call, false when nothing is new; the pointers stay valid until the
+ *  next call. @thread one reader */
+SONDE_API bool sonde_session_frame(sonde_session *session, sonde_frame *frame);
+
+/** Ticks and images so far. @thread any */
+SONDE_API uint64_t sonde_session_ticks(const sonde_session *session);
+SONDE_API uint64_t sonde_session_images(const sonde_session *session);
+/** State hash now; 0 while the loop runs. @thread owner */
+SONDE_API uint64_t sonde_session_hash(const sonde_session *session);
+/** Counters of the running loop, or of the last one. @thread owner and any one other while the
+ *  session runs */
+SONDE_API sonde_loop_stats sonde_session_loop(const sonde_session *session);
+
+/** Result of playing a recording again. */
+typedef struct sonde_replay_result {
+  uint64_t ticks;
+  uint64_t recorded_hash, hash;
+  bool same;
+  char model_path[512];
+} sonde_replay_result;
+
+/** Plays the recorded inputs in lockstep on `model` (checked against the recorded checksum).
+ *  @return SONDE_MISMATCH for another model or probe, FORMAT/CHECKSUM/VERSION for an unusable file,
+ *    CANCELLED; a different hash is SONDE_OK with result->same false
+ *  @thread owner */
+SONDE_API sonde_status sonde_replay_run(const char *path, const sonde_model *model,
+                                        const sonde_progress *progress, sonde_replay_result *result,
+                                        sonde_error *error);
+/** Path and checksum of the model that a recording was made on; checks the whole file.
+ *  @param model_path [size] receives the path, cut to size; either output may be NULL
+ *  @thread owner */
+SONDE_API sonde_status sonde_replay_inspect(const char *path, char *model_path, size_t size,
+                                            uint64_t *model_checksum, sonde_error *error);
+
+/** Pose of a probe that looks into the tissue at a site: origin on the rest skin moved by depth
+ *  along -normal, z = -normal, x = the site's u. @thread any */
+SONDE_API sonde_pose sonde_site_pose(const sonde_site *site, double depth_m);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

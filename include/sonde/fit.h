@@ -1,0 +1,248 @@
+/**
+ * @file fit.h
+ * Measurement and site tables, error statistics, estimation stages 1 and 2, prediction of the
+ * measurements by a model, and the virtual robot. Formulas: docs/fit.md, physics.md 2f.
+ */
+#ifndef SONDE_FIT_H
+#define SONDE_FIT_H
+
+#include "sonde/tissue.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ---- tables ------------------------------------------------------------------------------ */
+
+/** Measured sites; arrays are released by sonde_site_table_clear(). */
+typedef struct sonde_site_table {
+  uint32_t count;
+  sonde_site *sites;   /**< [count] k0 and xm are 0: not fitted */
+  double *fat_depth_m; /**< [count] fat thickness; NaN where the file has none */
+} sonde_site_table;
+
+/** Force against penetration, one row per robot step; released by sonde_measurements_clear(). */
+typedef struct sonde_measurements {
+  uint32_t count;
+  sonde_datum *data;      /**< [count] */
+  sonde_vec3 *position_m; /**< [count] of the site */
+  sonde_vec3 *normal;     /**< [count] outward, unit */
+} sonde_measurements;
+
+/**
+ * Reads `site,x_mm,y_mm,z_mm,nx,ny,nz,ux,uy,uz,vx,vy,vz[,fat_mm]`. Columns are found by name in any
+ * order, others are ignored; '#' starts a comment line; CRLF is accepted. Normals are made unit, u
+ * and v orthonormal to them.
+ * @return SONDE_FORMAT naming file, line, column and what was expected; SONDE_IO
+ * @thread owner
+ */
+SONDE_API sonde_status sonde_site_table_load(const char *path, sonde_site_table *table,
+                                             sonde_error *error);
+/** Writes the same columns atomically. @thread owner */
+SONDE_API sonde_status sonde_site_table_save(const char *path, const sonde_site_table *table,
+                                             sonde_error *error);
+SONDE_API void sonde_site_table_clear(sonde_site_table *table);
+
+/**
+ * Reads `site,probe,x_mm,y_mm,z_mm,nx,ny,nz,penetration_mm,force_n` under the same rules. Probes
+ * must be built-in names. Rejects NaN, negative penetrations and repeated (site, probe,
+ * penetration).
+ * @param sites NULL, or the sites that may occur: a missing one is SONDE_FORMAT, one that lies
+ *   elsewhere (more than 5 mm away) is SONDE_MISMATCH
+ * @thread owner
+ */
+SONDE_API sonde_status sonde_measurements_load(const char *path, const sonde_site_table *sites,
+                                               sonde_measurements *measurements,
+                                               sonde_error *error);
+/** Writes the same columns atomically: 4 decimals of mm and N, 6 of normals. @thread owner */
+SONDE_API sonde_status sonde_measurements_save(const char *path,
+                                               const sonde_measurements *measurements,
+                                               sonde_error *error);
+SONDE_API void sonde_measurements_clear(sonde_measurements *measurements);
+
+/* ---- error statistics -------------------------------------------------------------------- */
+
+/** Of the error e = model - measurement; rows whose model value is not finite are left out. */
+typedef struct sonde_error_statistics {
+  uint32_t count;
+  double mae_n;        /**< mean |e| */
+  double sd_n;         /**< standard deviation of e about its mean (divided by count) */
+  double rmse_n;       /**< sqrt(mean e^2) */
+  double mean_force_n; /**< of the measurements */
+  double mae_percent;  /**< 100 mae / mean force */
+  double bias_n;       /**< mean e */
+  double sd_abs_n;     /**< standard deviation of |e| */
+  double median_abs_n; /**< of |e| */
+  double p95_abs_n;    /**< 95th percentile of |e|, linear between ranks */
+  double max_abs_n;
+} sonde_error_statistics;
+
+enum { SONDE_FIT_PROBES = 8 };
+
+/** The statistics per probe (in order of first appearance) and pooled. */
+typedef struct sonde_error_report {
+  sonde_error_statistics all;
+  uint32_t probe_count;
+  char probe[SONDE_FIT_PROBES][24];
+  sonde_error_statistics probes[SONDE_FIT_PROBES];
+  uint32_t left_out; /**< rows without a finite model value */
+} sonde_error_report;
+
+/** Compares model forces with measured ones. @thread any */
+SONDE_API sonde_status sonde_error_statistics_of(const double *model_n, const double *measured_n,
+                                                 uint32_t count, sonde_error_statistics *statistics,
+                                                 sonde_error *error);
+/** The same per probe. @param model_n [count] @return ARGUMENT when there are too many probes */
+SONDE_API sonde_status sonde_error_report_of(const sonde_datum *data, const double *model_n,
+                                             uint32_t count, sonde_error_report *report,
+                                             sonde_error *error);
+
+/* ---- estimation -------------------------------------------------------------------------- */
+
+typedef enum sonde_fit_weights {
+  SONDE_WEIGHTS_ABSOLUTE, /**< residuals in newtons */
+  SONDE_WEIGHTS_RELATIVE, /**< divided by the probe's mean force */
+} sonde_fit_weights;
+
+typedef enum sonde_fit_loss {
+  SONDE_LOSS_SQUARES,
+  SONDE_LOSS_HUBER,   /**< quadratic up to loss_scale, then straight */
+  SONDE_LOSS_STUDENT, /**< ln(1 + r^2/(nu scale^2)), nu = 3 */
+} sonde_fit_loss;
+
+typedef struct sonde_fit_def {
+  uint32_t stages;           /**< 1 or 2; default 2 */
+  sonde_fit_weights weights; /**< default absolute */
+  sonde_fit_loss loss;       /**< default squares */
+  double loss_scale;         /**< N, or a fraction with relative weights; default 0.5 / 0.05 */
+  uint32_t max_iterations;   /**< default 400 */
+  bool fit_pretension;       /**< also estimate T0 >= 0 (stage 2); default false */
+  bool cold_start;           /**< stage 2 from one generic start instead of stage 1 */
+} sonde_fit_def;
+
+SONDE_API sonde_fit_def sonde_fit_def_default(void);
+
+/** Eq. (1) of one site and probe: F = A k0 s/(1 - s/xm), A the nominal footprint area. */
+typedef struct sonde_curve_fit {
+  uint32_t site;
+  char probe[24];
+  uint32_t count;
+  double k0_n_m3, xm_m;
+  double mae_n;
+  uint32_t iterations;
+  bool converged;
+} sonde_curve_fit;
+
+/**
+ * Fits eq. (1) to one curve: log parameters (ln k0, ln(xm - s_max/guard)), closed-form linear
+ * start, Levenberg-Marquardt. physics.md 2f.1.
+ * @param area_m2 footprint area
+ * @param start NULL for the closed-form start, else (k0, xm)
+ * @return ARGUMENT with fewer than 3 points or no positive penetration
+ * @thread any
+ */
+SONDE_API sonde_status sonde_fit_curve(const double *penetration_m, const double *force_n,
+                                       uint32_t count, double area_m2, double guard,
+                                       const sonde_fit_def *def, const double start[2],
+                                       sonde_curve_fit *fit, sonde_error *error);
+
+/** What an estimation found; released by sonde_fit_result_clear(). */
+typedef struct sonde_fit_result {
+  uint32_t curve_count;
+  sonde_curve_fit *curves; /**< stage 1, [curve_count] by site, then probe */
+  uint32_t site_count;
+  sonde_site *sites;          /**< [site_count] input sites with k0 and xm of the last stage */
+  sonde_surface_law law;      /**< the model's law with the estimated edge stiffness */
+  uint32_t stage1_parameters; /**< 2 per curve */
+  uint32_t parameters;        /**< of the last stage: 2 per measured site + 1 (+1 with T0) */
+  sonde_error_report stage1;  /**< interaction "independent" */
+  sonde_error_report stage2;  /**< interaction "simplified"; zero counts when stages == 1 */
+  double *model_n;            /**< [measurements.count] forces of the last stage */
+  uint32_t iterations;        /**< of stage 2 */
+  bool converged;
+  double cost, start_cost; /**< stage 2: half the sum of losses at its end and its start */
+  double edge_sd_log;      /**< standard deviation of ln k_s (Schur complement); 0 if none */
+} sonde_fit_result;
+
+/**
+ * Stage 1 per curve, then one (k0, xm) per site for all its probes: without edges (stages == 1) or
+ * with the simplified interaction and one uniform edge stiffness (stages == 2).
+ * @param model gives the refined skin, its normals and the law (guard, compression); unchanged
+ * @return CANCELLED by progress; ARGUMENT for a probe without rectangular footprint or a curve of
+ *   fewer than 3 points
+ * @thread owner
+ */
+SONDE_API sonde_status sonde_fit(const sonde_model *model, const sonde_site_table *sites,
+                                 const sonde_measurements *measurements, const sonde_fit_def *def,
+                                 const sonde_progress *progress, sonde_fit_result *result,
+                                 sonde_error *error);
+SONDE_API void sonde_fit_result_clear(sonde_fit_result *result);
+
+/* ---- prediction -------------------------------------------------------------------------- */
+
+typedef enum sonde_interaction {
+  SONDE_INTERACTION_SIMPLIFIED, /**< neighbours of the footprint stay at rest */
+  SONDE_INTERACTION_FULL,       /**< static equilibrium of the whole surface */
+} sonde_interaction;
+
+typedef struct sonde_predict_def {
+  sonde_interaction interaction;
+  double relative_residual; /**< of the equilibrium; default 1e-6 */
+  uint32_t max_iterations;  /**< Newton iterations per depth; default 200 */
+  uint32_t threads;         /**< 0: one per online core */
+} sonde_predict_def;
+
+SONDE_API sonde_predict_def sonde_predict_def_default(void);
+
+/**
+ * The model's force for each measurement, footprint bonded. The result does not depend on the
+ * number of threads.
+ * @param predicted_n [count] NaN where the equilibrium was not found
+ * @return CANCELLED by progress
+ * @thread owner
+ */
+SONDE_API sonde_status sonde_predict(const sonde_model *model, const sonde_site_table *sites,
+                                     const sonde_measurements *measurements,
+                                     const sonde_predict_def *def, const sonde_progress *progress,
+                                     double *predicted_n, sonde_error *error);
+
+/* ---- virtual robot ----------------------------------------------------------------------- */
+
+typedef enum sonde_robot_contact {
+  SONDE_ROBOT_AUTO,   /**< bonded for rectangular probes, else probe */
+  SONDE_ROBOT_BONDED, /**< the footprint's skin moves rigidly, as in the experiment */
+  SONDE_ROBOT_PROBE,  /**< the convex body is pressed in */
+} sonde_robot_contact;
+
+typedef struct sonde_robot_def {
+  const char *probe; /**< name or mesh file */
+  sonde_robot_contact contact;
+  double step_m;        /**< default 2 mm */
+  double limit_n;       /**< the first row above it is the last; default 40 N */
+  double depth_limit_m; /**< default 30 mm */
+  double noise_force_n; /**< standard deviations of the sensors; default 0 */
+  double noise_penetration_m;
+  uint64_t seed;
+  double relative_residual; /**< default 1e-6 */
+  uint32_t max_iterations;  /**< default 200 */
+  uint32_t threads;         /**< 0: one per online core */
+} sonde_robot_def;
+
+SONDE_API sonde_robot_def sonde_robot_def_default(void);
+
+/**
+ * Presses the model at every site, step by step, until the force passes the limit, the depth limit
+ * is reached or no equilibrium is found.
+ * @param[out] measurements finished sites in table order, also when CANCELLED
+ * @param[out] stopped sites that ended without an equilibrium; may be NULL
+ * @thread owner
+ */
+SONDE_API sonde_status sonde_robot_run(const sonde_model *model, const sonde_site_table *sites,
+                                       const sonde_robot_def *def, const sonde_progress *progress,
+                                       sonde_measurements *measurements, uint32_t *stopped,
+                                       sonde_error *error);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

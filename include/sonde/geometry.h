@@ -1,0 +1,274 @@
+/**
+ * @file geometry.h
+ * Triangle meshes and their files, adjacency, areas, refinement, closest points, convex probes,
+ * distance between convex bodies (GJK) and the exact clipped interpenetration volume.
+ */
+#ifndef SONDE_GEOMETRY_H
+#define SONDE_GEOMETRY_H
+
+#include "sonde/base.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/** Triangle mesh; arrays are owned by the mesh and released by sonde_mesh_clear(). */
+typedef struct sonde_mesh {
+  uint32_t vertex_count;
+  uint32_t face_count;
+  sonde_vec3 *vertices; /**< [vertex_count] m */
+  uint32_t (*faces)[3]; /**< [face_count] counter-clockwise seen from outside */
+} sonde_mesh;
+
+/** Allocates arrays of the given sizes (zeroed). @thread owner */
+SONDE_API sonde_status sonde_mesh_create(sonde_mesh *mesh, uint32_t vertices, uint32_t faces,
+                                         sonde_error *error);
+/** Releases the arrays and zeroes the struct; NULL and empty meshes are ignored. @thread owner */
+SONDE_API void sonde_mesh_clear(sonde_mesh *mesh);
+/** Deep copy. @thread owner */
+SONDE_API sonde_status sonde_mesh_copy(const sonde_mesh *mesh, sonde_mesh *copy,
+                                       sonde_error *error);
+
+/**
+ * Reads .ply (ascii, binary little/big endian), .obj or .stl (ascii, binary; vertices welded).
+ * Polygons are split into triangle fans (meant for convex ones). Triangles of an .stl that welding
+ * leaves with two equal corners are dropped.
+ * @param metres_per_unit scale of the file's coordinates; 1e-3 for millimetres
+ * @return SONDE_FORMAT with file, line and what was expected; SONDE_IO when it cannot be opened
+ * @thread owner
+ */
+SONDE_API sonde_status sonde_mesh_load(const char *path, double metres_per_unit, sonde_mesh *mesh,
+                                       sonde_error *error);
+/**
+ * Writes .ply or .obj (ascii, 17 significant digits) or .stl (binary, single precision), by
+ * extension, atomically, whatever locale is set. @thread owner
+ */
+SONDE_API sonde_status sonde_mesh_save(const char *path, double metres_per_unit,
+                                       const sonde_mesh *mesh, sonde_error *error);
+
+/** Facts about a mesh. */
+typedef struct sonde_mesh_report {
+  bool closed;  /**< every edge has exactly two faces with opposite direction */
+  bool outward; /**< closed and the enclosed volume is positive */
+  uint32_t edge_count;
+  uint32_t boundary_edges;
+  uint32_t duplicate_or_degenerate_faces;
+  double area_m2;
+  double volume_m3; /**< signed; meaningful when closed */
+  double shortest_edge_m, longest_edge_m, mean_edge_m;
+  double smallest_angle_rad;
+} sonde_mesh_report;
+
+/** Measures the mesh. @return SONDE_MESH when a face names a missing vertex. @thread owner */
+SONDE_API sonde_status sonde_mesh_inspect(const sonde_mesh *mesh, sonde_mesh_report *report,
+                                          sonde_error *error);
+
+/** Mass, centre and inertia of the solid that a closed mesh bounds, uniform density. */
+typedef struct sonde_mass {
+  double mass_kg;
+  sonde_vec3 centre_m;
+  sonde_mat3 inertia_kg_m2; /**< about the centre */
+} sonde_mass;
+
+/** Exact polyhedral integrals (divergence theorem). @return SONDE_MESH when not closed. */
+SONDE_API sonde_status sonde_mesh_mass(const sonde_mesh *mesh, double density_kg_m3,
+                                       sonde_mass *mass, sonde_error *error);
+
+/** Edges, neighbours and weights of a triangle surface. Released by sonde_topology_clear(). */
+typedef struct sonde_topology {
+  uint32_t vertex_count, edge_count;
+  uint32_t (*edges)[2];      /**< [edge_count], first < second, sorted lexicographically */
+  uint32_t *start;           /**< [vertex_count+1] rows of the two lists below */
+  uint32_t *neighbour;       /**< [2*edge_count] neighbour vertices, ascending per row */
+  uint32_t *neighbour_edge;  /**< [2*edge_count] edge to that neighbour */
+  uint32_t *face_start;      /**< [vertex_count+1] rows of faces around a vertex */
+  uint32_t *face_list;       /**< faces around each vertex, ascending */
+  uint32_t (*edge_faces)[2]; /**< [edge_count] the faces beside; UINT32_MAX where none */
+} sonde_topology;
+
+SONDE_API sonde_status sonde_topology_build(const sonde_mesh *mesh, sonde_topology *topology,
+                                            sonde_error *error);
+SONDE_API void sonde_topology_clear(sonde_topology *topology);
+
+/** Area-weighted outward vertex normals, unit. @param normals [vertex_count] @thread any */
+SONDE_API void sonde_mesh_normals(const sonde_mesh *mesh, sonde_vec3 *normals);
+/** A third of the adjacent face areas per vertex; sums to the mesh area. @thread any */
+SONDE_API void sonde_mesh_areas(const sonde_mesh *mesh, double *areas_m2);
+
+/**
+ * Refines where `target` asks for shorter edges, without hanging vertices. An edge is halved while
+ * it is longer than 1.35 times the target at its middle: halving a shorter one would overshoot.
+ * The closure halves longest edges first, so that no angle falls below half the smallest angle
+ * given (Rosenberg and Stenger 1975). New vertices are pushed onto the smooth surface that the
+ * vertex normals describe (edges of PN triangles); edges sharper than 45 degrees stay sharp.
+ * Before that, the slivers around a vertex with more than 24 faces (the centre of a flat cap) are
+ * replaced by rings of faces that grow towards the centre as far as `target` allows. Vertices of
+ * `mesh` keep their index and place.
+ * @param target returns the wanted edge length (m) at a point, more than 0
+ * @param[out] refined owned by the caller
+ * @return SONDE_ARGUMENT for a target that is not positive or asks for more than 2 million
+ *         vertices; SONDE_MESH when an edge has more than two faces
+ * @thread owner
+ */
+SONDE_API sonde_status sonde_mesh_refine(const sonde_mesh *mesh,
+                                         double (*target)(sonde_vec3 point, void *user), void *user,
+                                         sonde_mesh *refined, sonde_error *error);
+
+/** Spatial index over a mesh for closest points, rays and inside tests. Keeps a copy of the mesh.
+ */
+typedef struct sonde_surface_index sonde_surface_index;
+
+SONDE_API sonde_status sonde_surface_index_create(const sonde_mesh *mesh,
+                                                  sonde_surface_index **index, sonde_error *error);
+SONDE_API void sonde_surface_index_destroy(sonde_surface_index *index);
+
+/** A point on a mesh. */
+typedef struct sonde_surface_point {
+  uint32_t face;
+  double weight[3]; /**< barycentric, of the face's three vertices */
+  sonde_vec3 point_m;
+  double distance_m; /**< from the query, >= 0 */
+} sonde_surface_point;
+
+/** Closest point of the surface. @thread any (read only) */
+SONDE_API sonde_surface_point sonde_surface_closest(const sonde_surface_index *index,
+                                                    sonde_vec3 query);
+/** First hit of a ray, from either side; `direction` has any length. False when it misses within
+    max_distance_m. @thread any (read only) */
+SONDE_API bool sonde_surface_raycast(const sonde_surface_index *index, sonde_vec3 origin,
+                                     sonde_vec3 direction, double max_distance_m,
+                                     sonde_surface_point *hit);
+/** Whether a point lies inside a closed mesh; points on the surface do not. By the angle-weighted
+    normal of the closest feature (Baerentzen and Aanaes 2005). @thread any (read only) */
+SONDE_API bool sonde_surface_inside(const sonde_surface_index *index, sonde_vec3 query);
+
+/**
+ * Area of the mesh vertex cells (a third of each face) covered by the rectangle |u|<=hu, |v|<=hv
+ * around `centre`, seen along the normal: exact clipping of each face's cell share. Faces whose
+ * normal turns away from `normal`, or farther than `reach_m` along it, do not count.
+ * @param covered_m2 [vertex_count] receives the covered area per vertex (sum = covered area)
+ * @thread owner
+ */
+SONDE_API void sonde_mesh_footprint(const sonde_mesh *mesh, sonde_vec3 centre, sonde_vec3 normal,
+                                    sonde_vec3 u, sonde_vec3 v, double hu_m, double hv_m,
+                                    double reach_m, double *covered_m2);
+
+/* ---- convex bodies ---------------------------------------------------------------------- */
+
+/** A closed convex polyhedron with its face planes. Released by sonde_convex_clear(). */
+typedef struct sonde_convex {
+  sonde_mesh hull;          /**< triangulated, closed, outward */
+  uint32_t plane_count;     /**< distinct face planes (coplanar triangles merged) */
+  sonde_vec3 *plane_normal; /**< [plane_count] unit, outward */
+  double *plane_offset_m;   /**< [plane_count] n.x <= offset inside */
+  sonde_topology topology;  /**< of the hull, for hill climbing support */
+  double radius_m;          /**< bounding sphere about the origin */
+} sonde_convex;
+
+/** Builds from a closed convex mesh. @return SONDE_MESH when it is open or a vertex stands out of a
+    face plane by more than 1e-8 of the extent. @thread owner */
+SONDE_API sonde_status sonde_convex_create(const sonde_mesh *mesh, sonde_convex *convex,
+                                           sonde_error *error);
+/** Convex hull of a point cloud (>= 4 points not in one plane, else SONDE_MESH). Orientation is
+    decided exactly on a grid of 2^39 steps across the cloud. @thread owner */
+SONDE_API sonde_status sonde_convex_hull(const sonde_vec3 *points, uint32_t count,
+                                         sonde_convex *convex, sonde_error *error);
+SONDE_API void sonde_convex_clear(sonde_convex *convex);
+
+/** Farthest vertex along a direction, climbing from `start` (0 when unknown). @thread tick */
+SONDE_API uint32_t sonde_convex_support(const sonde_convex *convex, sonde_vec3 direction,
+                                        uint32_t start);
+
+/** Simplex kept between calls; zero it before the first. */
+typedef struct sonde_gjk_cache {
+  uint32_t count;
+  uint32_t a[4], b[4];
+} sonde_gjk_cache;
+
+/** Distance between two convex bodies. */
+typedef struct sonde_gjk_result {
+  double distance_m;    /**< 0 when they touch or overlap */
+  sonde_vec3 point_a_m; /**< closest points, world */
+  sonde_vec3 point_b_m;
+  uint32_t iterations;
+  uint32_t support_calls; /**< work counter: dot products evaluated for supports */
+  bool overlap;
+} sonde_gjk_result;
+
+/**
+ * GJK distance with warm start. Result within 1e-9 m of the exact distance; closer than 1e-10 m
+ * counts as touching. Cold, it looks once at every vertex (linear time) and then climbs; with a
+ * cache from a nearby pose it only climbs. Gilbert, Johnson and Keerthi 1988.
+ * @param cache may be NULL
+ * @thread tick (no allocation)
+ */
+SONDE_API sonde_gjk_result sonde_gjk_distance(const sonde_convex *a, sonde_pose world_from_a,
+                                              const sonde_convex *b, sonde_pose world_from_b,
+                                              sonde_gjk_cache *cache);
+
+/** What one triangle contributes to the interpenetration of a convex body with a surface. */
+typedef struct sonde_clip_result {
+  double volume_m3;       /**< of the columns along `direction` over the clipped triangle */
+  double share_m3[3];     /**< the same volume split by the vertices' shape functions */
+  sonde_vec3 gradient[3]; /**< dV/dx of the three vertices (m^2): integral of phi_i n dA */
+  double area_m2;         /**< clipped area */
+  double push_m3[3];      /**< the shares without the points that are nearer to a side wall of the
+                               body than to their column's end: what presses along the columns */
+  double overlap_m2[6];   /**< integral of phi_i phi_j over that part seen along the columns:
+                               00 11 22 01 12 20; the change of push i per height of vertex j */
+  double depth_max_m;     /**< deepest column */
+} sonde_clip_result;
+
+/**
+ * Clips one skin triangle by a convex body and integrates the columns between skin and body.
+ * Inside tissue lies below the triangle (opposite its outward normal); from each clipped skin
+ * point a column runs along `direction` (unit, into the tissue) until it leaves the body. Volume,
+ * shares and gradient are exact for the piecewise linear depth. physics.md 2c. Summed over a
+ * surface the volume is that of body and tissue together, and the gradient its derivative, when no
+ * column enters the body through its surface below the skin: choose `direction` so that the body
+ * does not narrow against it there (the beam axis of a box).
+ * @param planes_n,planes_d the body's planes in the frame of the triangle's points
+ * @param corners three vertices, counter-clockwise from outside
+ * @param wall_factor where a column is longer than this times the distance to a steep plane, the
+ *        point does not push (push_m3, overlap_m2); large values let every point push
+ * @return false when nothing is clipped (result zeroed)
+ * @thread tick (no allocation)
+ */
+SONDE_API bool sonde_clip_triangle(const sonde_vec3 *planes_n, const double *planes_d,
+                                   uint32_t plane_count, const sonde_vec3 corners[3],
+                                   sonde_vec3 direction, double wall_factor,
+                                   sonde_clip_result *result);
+
+/* ---- probes ------------------------------------------------------------------------------ */
+
+/**
+ * A probe: rigid convex body in its own frame. Origin at the centre of the contact face, x lateral
+ * (across the image), y elevational, z the beam axis pointing INTO the tissue; the body fills z<0.
+ */
+typedef struct sonde_probe {
+  char name[64];
+  sonde_convex body;
+  double half_x_m, half_y_m; /**< half extent of the contact face */
+  bool rectangular;          /**< the footprint is the full rectangle (point, linear, square) */
+} sonde_probe;
+
+/** Names of the built-in probes, NULL-terminated: point, linear, square, sphere. @thread any */
+SONDE_API const char *const *sonde_probe_names(void);
+
+/**
+ * Builds a probe by name, or from a mesh file (path with .ply/.obj/.stl, mm; the convex hull is
+ * used, leaving out detail below 0.05 mm; +z of the file points into the tissue and the file's
+ * lowest-z end is the handle). The file's highest z becomes 0 and the middle of the vertices within
+ * 1 mm of it the origin; their box gives the half extents.
+ * point 6x6 mm, linear 60x12 mm, square 24x24 mm (flat boxes), sphere radius 15 mm.
+ * @return SONDE_NOT_FOUND for an unknown name, listing the known ones
+ * @thread owner
+ */
+SONDE_API sonde_status sonde_probe_create(const char *name_or_path, sonde_probe *probe,
+                                          sonde_error *error);
+SONDE_API void sonde_probe_clear(sonde_probe *probe);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

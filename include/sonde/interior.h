@@ -1,0 +1,115 @@
+/**
+ * @file interior.h
+ * From surface motion to the inside: a divergence-free displacement field, the stress under the
+ * probe, the vein, the artery and the thrombus.
+ */
+#ifndef SONDE_INTERIOR_H
+#define SONDE_INTERIOR_H
+
+#include "sonde/world.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/** Tissue at a point of the rest thigh. */
+typedef enum sonde_label {
+  SONDE_LABEL_OUTSIDE,
+  SONDE_LABEL_SKIN,
+  SONDE_LABEL_FAT,
+  SONDE_LABEL_MUSCLE,
+  SONDE_LABEL_BONE,
+  SONDE_LABEL_VEIN_WALL,
+  SONDE_LABEL_VEIN,
+  SONDE_LABEL_THROMBUS,
+  SONDE_LABEL_ARTERY_WALL,
+  SONDE_LABEL_ARTERY,
+  SONDE_LABEL_COUNT
+} sonde_label;
+
+/** State of the vein that a case prescribes. */
+typedef struct sonde_pathology {
+  char name[32];
+  double venous_pressure_pa; /**< lumen pressure; 10 mmHg supine */
+  double arterial_pressure_pa;
+  double thrombus_fraction;              /**< solid share of the rest lumen, 0..1 */
+  double thrombus_modulus_pa;            /**< Young's modulus of the solid */
+  double thrombus_from_m, thrombus_to_m; /**< extent along the leg (model z); all when equal */
+  double lumen_scale;                    /**< rest radius relative to the healthy vein */
+  double echogenicity; /**< backscatter of the thrombus relative to muscle, 0..1 */
+} sonde_pathology;
+
+/** Preset names, NULL-terminated: healthy, partial_mural, acute_occlusive, subacute_occlusive,
+ *  chronic_occlusive. @thread any */
+SONDE_API const char *const *sonde_pathology_names(void);
+/** Preset by name; '-' and ' ' count as '_', and unique first words (e.g. "chronic") are accepted.
+ *  @return SONDE_NOT_FOUND listing the known names */
+SONDE_API sonde_status sonde_pathology_preset(const char *name, sonde_pathology *pathology,
+                                              sonde_error *error);
+
+/** Normal stresses (Pa, compression positive) below a uniformly loaded rectangle on an
+ *  incompressible half space: lateral x, axial y, normal z (physics.md 2g, superposed corners).
+ *  @param half_x,half_y rectangle @param x,y,z point, z > 0 depth */
+SONDE_API sonde_vec3 sonde_rectangle_stress(double pressure_pa, double half_x_m, double half_y_m,
+                                            double x_m, double y_m, double z_m);
+
+/** Area of the vein relative to its rest area at an effective outside pressure (Pa), for a lumen
+ *  pressure and thrombus (tube law, docs/interior.md). Monotone, > 0. @thread any */
+SONDE_API double sonde_vein_area_ratio(const sonde_pathology *pathology, double outside_pa);
+SONDE_API double sonde_artery_area_ratio(const sonde_pathology *pathology, double outside_pa);
+
+/** Cross-section of a vessel at one station of its centre line. */
+typedef struct sonde_vessel_state {
+  sonde_vec3 rest_centre_m;
+  sonde_vec3 centre_m;  /**< deformed */
+  sonde_vec3 axis;      /**< unit, along the vessel */
+  sonde_vec3 flat_axis; /**< unit: direction of the short diameter (towards the probe) */
+  double rest_radius_m;
+  double outside_pa;                /**< effective pressure on the wall */
+  double area_ratio;                /**< current / rest, dynamic */
+  double half_short_m, half_long_m; /**< semi-axes of the ellipse */
+} sonde_vessel_state;
+
+typedef struct sonde_interior sonde_interior;
+
+/** Builds the column map, the factored surface Laplacian and the vessels' stations.
+ *  @param model borrowed @thread owner */
+SONDE_API sonde_status sonde_interior_create(const sonde_model *model, sonde_interior **interior,
+                                             sonde_error *error);
+SONDE_API void sonde_interior_destroy(sonde_interior *interior);
+
+/** What one update reads; all borrowed for the call. */
+typedef struct sonde_interior_input {
+  const sonde_vec3 *positions_m;      /**< [nodes] deformed skin */
+  const sonde_vec3 *contact_forces_n; /**< [nodes] of the probe on the skin */
+  sonde_pose world_from_probe;
+  const sonde_pathology *pathology;
+  double dt_s; /**< since the last update; < 0: vessels in equilibrium */
+  uint64_t tick;
+} sonde_interior_input;
+
+/** New surface state: solves the field, the stress at the vessels and their areas.
+ *  @thread one thread at a time per interior; no allocation */
+SONDE_API void sonde_interior_update(sonde_interior *interior, const sonde_interior_input *input);
+
+/** Displacement (m) of the rest point, zero outside and in bone. After an update. @thread any */
+SONDE_API sonde_vec3 sonde_interior_displacement(const sonde_interior *interior, sonde_vec3 rest_m);
+/** Rest point that is now at `point` (fixed-point inversion). @thread any */
+SONDE_API sonde_vec3 sonde_interior_rest_point(const sonde_interior *interior, sonde_vec3 point_m);
+/** Static tissue label and depth below the skin of a rest point. @thread any */
+SONDE_API sonde_label sonde_interior_label(const sonde_interior *interior, sonde_vec3 rest_m,
+                                           double *depth_m);
+/** Stations of the vein (0) or artery (1). */
+SONDE_API const sonde_vessel_state *sonde_interior_vessel(const sonde_interior *interior, int which,
+                                                          uint32_t *count);
+/** State of the vein (0) or artery (1) where the probe's image plane cuts it; false when it does
+ *  not pass within 40 mm of the beam axis. */
+SONDE_API bool sonde_interior_vessel_at_plane(const sonde_interior *interior, int which,
+                                              sonde_pose world_from_probe,
+                                              sonde_vessel_state *state);
+SONDE_API uint64_t sonde_interior_tick(const sonde_interior *interior);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

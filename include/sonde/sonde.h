@@ -1,0 +1,20 @@
+/**
+ * @file sonde.h
+ * The whole public interface of libsonde.
+ */
+#ifndef SONDE_SONDE_H
+#define SONDE_SONDE_H
+
+#include "sonde/base.h"
+#include "sonde/geometry.h"
+#include "sonde/sparse.h"
+#include "sonde/tissue.h"
+#include "sonde/world.h"
+#include "sonde/fit.h"
+#include "sonde/interior.h"
+#include "sonde/echo.h"
+#include "sonde/haptics.h"
+#include "sonde/exam.h"
+#include "sonde/stream.h"
+
+#endif

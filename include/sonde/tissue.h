@@ -1,0 +1,149 @@
+/**
+ * @file tissue.h
+ * The thigh model (constant once built) and its file; the two-layer tissue: surface masses,
+ * spring-dampers, nonlinear normal springs f(x)=x/(ax+b), shear springs between neighbours.
+ *
+ * Notation of the paper in brackets. Normal spring per unit area, with indentation s along the
+ * inward rest normal: p(s) = k0 s/(1 - s/xm)   [f = x/(a x + b), b = 1/k0, a = -1/(k0 xm)].
+ */
+#ifndef SONDE_TISSUE_H
+#define SONDE_TISSUE_H
+
+#include "sonde/geometry.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/** Uniform parameters of the surface layer and of the material's damping. */
+typedef struct sonde_surface_law {
+  double edge_stiffness_n_m;        /**< k_s of a surface spring */
+  double edge_damping_s;            /**< damper = this time times the stiffness */
+  double edge_compression;          /**< chi in [0,1]: share of the stiffness left when shortened */
+  double edge_pretension_n;         /**< T0 >= 0 */
+  double tangential_stiffness_n_m3; /**< g_t per area: (I - NN^T) spring to the rest position */
+  double shear_stiffness_n_m;       /**< G of the shear springs between neighbours (0: none) */
+  double shear_limit;               /**< slope gm at which a shear spring becomes rigid */
+  double normal_damping_s;          /**< damper of normal and tangential springs = time x k0 */
+  double surface_density_kg_m2;     /**< lumped mass per skin area */
+  double guard;                     /**< theta: straight continuation of p(s) beyond theta*xm */
+} sonde_surface_law;
+
+/** Defaults with all documented values; see docs/tissue.md. @thread any */
+SONDE_API sonde_surface_law sonde_surface_law_default(void);
+
+/** A measured site. */
+typedef struct sonde_site {
+  uint32_t id;
+  sonde_vec3 position_m;
+  sonde_vec3 normal; /**< outward, unit */
+  sonde_vec3 u, v;   /**< footprint axes: u around the leg, v along it */
+  double k0_n_m3;    /**< fitted, per area */
+  double xm_m;       /**< fitted asymptote */
+} sonde_site;
+
+/** One measured point: force against penetration. */
+typedef struct sonde_datum {
+  uint32_t site; /**< site id */
+  char probe[24];
+  double penetration_m;
+  double force_n;
+} sonde_datum;
+
+/** Vessel along the leg: centre line in the rest thigh with a circular lumen. */
+typedef struct sonde_vessel_point {
+  sonde_vec3 centre_m;
+  double radius_m;
+  double depth_m; /**< of the centre below the skin */
+} sonde_vessel_point;
+
+enum { SONDE_VESSEL_POINTS = 64 };
+
+typedef struct sonde_vessel {
+  uint32_t count;
+  sonde_vessel_point point[SONDE_VESSEL_POINTS];
+} sonde_vessel;
+
+/**
+ * The thigh: everything that does not move. Built by sonde_model_build() or read from a file;
+ * read-only afterwards and safe to share between threads. Arrays belong to the model.
+ */
+typedef struct sonde_model {
+  char name[64];
+  char provenance[256]; /**< e.g. that the data are synthetic */
+  sonde_mesh surface;   /**< skin at rest, refined */
+  sonde_topology topology;
+  sonde_mesh femur; /**< closed */
+  sonde_surface_law law;
+  sonde_vec3 *normal;     /**< [nodes] outward rest normals */
+  double *area_m2;        /**< [nodes] */
+  double *mass_kg;        /**< [nodes] */
+  double *k0_n_m3;        /**< [nodes] per area */
+  double *xm_m;           /**< [nodes] */
+  double *fat_depth_m;    /**< [nodes] depth of the skin/fat interface below the skin */
+  double *muscle_depth_m; /**< [nodes] depth of the fat/muscle interface */
+  double *bone_depth_m;   /**< [nodes] distance to the femur */
+  double *edge_rest_m;    /**< [edges] */
+  double *edge_dual_m;    /**< [edges] dual length w of the shear springs, >= 0 */
+  uint32_t site_count;
+  sonde_site *sites;
+  uint32_t datum_count;
+  sonde_datum *data;         /**< the measurements it was fitted to */
+  sonde_vessel vein, artery; /**< femoral vessels */
+  uint64_t checksum;         /**< of the file's content; 0 before it is saved or loaded */
+} sonde_model;
+
+/** What a model is built from; zero means default where a default is named. */
+typedef struct sonde_model_def {
+  const char *name;
+  const char *provenance;
+  const sonde_mesh *skin;             /**< closed, outward, m */
+  const sonde_mesh *fat_interface;    /**< skin/fat; NULL: 1.8 mm below the skin */
+  const sonde_mesh *muscle_interface; /**< fat/muscle; NULL: 12 mm below the skin */
+  const sonde_mesh *femur;            /**< NULL: a cylinder of 14 mm along the long axis */
+  const sonde_site *sites;
+  uint32_t site_count;
+  const sonde_datum *data;
+  uint32_t datum_count;
+  double fine_edge_m;  /**< near footprints; default 3 mm */
+  double fine_reach_m; /**< how far from a site's footprint; default 15 mm beyond 30 x 6 mm */
+  sonde_surface_law law;
+} sonde_model_def;
+
+/** Def with defaults. @thread any */
+SONDE_API sonde_model_def sonde_model_def_default(void);
+
+/**
+ * Refines the skin, measures layers, interpolates the sites' (ln k0, ln xm) over the surface,
+ * places the femoral vessels. Sites without fitted values (k0 == 0) get 1.8e5 N/m^3 and 50 mm.
+ * @param[out] model owned by the caller; sonde_model_destroy()
+ * @thread owner
+ */
+SONDE_API sonde_status sonde_model_build(const sonde_model_def *def, sonde_model **model,
+                                         sonde_error *error);
+/** Re-interpolates site parameters and the law over an existing model. @thread owner */
+SONDE_API sonde_status sonde_model_set_parameters(sonde_model *model, const sonde_surface_law *law,
+                                                  const sonde_site *sites, uint32_t count,
+                                                  sonde_error *error);
+SONDE_API void sonde_model_destroy(sonde_model *model);
+
+/** Reads a model file; CHECKSUM when a byte is wrong, VERSION, FORMAT. @thread owner */
+SONDE_API sonde_status sonde_model_load(const char *path, sonde_model **model, sonde_error *error);
+/** Writes a model file atomically; sets model->checksum. Format: docs/model_file.md. */
+SONDE_API sonde_status sonde_model_save(sonde_model *model, const char *path, sonde_error *error);
+
+/** The site with that id, NULL when absent. @thread any */
+SONDE_API const sonde_site *sonde_model_site(const sonde_model *model, uint32_t id);
+
+/** Pressure of a normal spring and its slope at indentation s, guard included (eq. (1), 2a). */
+SONDE_API double sonde_normal_pressure(double k0_n_m3, double xm_m, double guard, double s_m,
+                                       double *slope_n_m3);
+/** Energy per area of the same spring. @thread any */
+SONDE_API double sonde_normal_energy(double k0_n_m3, double xm_m, double guard, double s_m);
+/** Force of a shear spring of dual length w at slope g = ds/L; *slope = dq/dg. @thread any */
+SONDE_API double sonde_shear_force(double shear_n_m, double limit, double g, double *slope);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,144 @@
+/**
+ * @file world.h
+ * One tick of the scene: contact of a convex probe with the deformable skin, the implicit step,
+ * the wrench on the probe.
+ */
+#ifndef SONDE_WORLD_H
+#define SONDE_WORLD_H
+
+#include "sonde/sparse.h"
+#include "sonde/tissue.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum { SONDE_MAX_REGIONS = 8 };
+
+/** How the force kappa V + mu dV/dt of eq. (2) is spread over the touched nodes (2c). */
+typedef enum sonde_contact_law {
+  SONDE_CONTACT_SHARED, /**< each node carries the law on its own share of the volume */
+  SONDE_CONTACT_LUMPED, /**< one force per region, spread by projected nodal area (the paper) */
+} sonde_contact_law;
+
+/** Options of a world; all validated at creation. */
+typedef struct sonde_world_def {
+  double dt_s;                /**< step; default 1e-3 */
+  double implicitness;        /**< lambda in [0,1]; default 1 (backward Euler) */
+  uint32_t newton_iterations; /**< >= 1; default 1 */
+  sonde_pcg_options pcg;      /**< default relative 1e-4, at most 200 iterations */
+  sonde_contact_law contact_law;
+  double contact_stiffness_n_m3; /**< kappa; default 1e8 */
+  double contact_damping_n_s_m3; /**< mu; default 1e5 */
+  double sleep_displacement_m;   /**< nodes whose unbalanced force would move them less sleep;
+                                      0 keeps all awake; default 1e-6 */
+} sonde_world_def;
+
+SONDE_API sonde_world_def sonde_world_def_default(void);
+
+/** A connected patch of skin inside the probe. */
+typedef struct sonde_contact_region {
+  double volume_m3;
+  double volume_rate_m3_s;
+  double area_m2;       /**< clipped skin area */
+  double force_n;       /**< max(0, kappa V + mu dV/dt) */
+  sonde_vec3 direction; /**< k: unit, from the tissue to the probe */
+  sonde_vec3 centre_m;  /**< force-weighted centre, world */
+  double depth_max_m;   /**< deepest residual interpenetration */
+  uint32_t node_count;
+} sonde_contact_region;
+
+/** Bits of sonde_state.flags; physical trouble is flagged and counted, never fatal. */
+enum {
+  SONDE_FLAG_NON_FINITE = 1u << 0,    /**< state was restored to rest, force is zero */
+  SONDE_FLAG_NOT_CONVERGED = 1u << 1, /**< linear solver hit its iteration limit */
+  SONDE_FLAG_CONTACT_FULL = 1u << 2,  /**< more contacts than the fixed capacity */
+};
+
+/** Time spent per stage of the last step, seconds. */
+typedef struct sonde_stage_times {
+  double contact_s, assembly_s, solve_s, update_s;
+} sonde_stage_times;
+
+/** What one tick leaves behind for readers. */
+typedef struct sonde_contact {
+  uint32_t region_count;
+  sonde_contact_region region[SONDE_MAX_REGIONS];
+  sonde_vec3 force_n;    /**< on the probe, world */
+  sonde_vec3 torque_n_m; /**< on the probe about its origin, world */
+  sonde_vec3 reaction_n; /**< sum of the tissue's anchors (normal and tangential springs) */
+  double volume_m3, area_m2;
+} sonde_contact;
+
+/** Everything that moves. Opaque arrays are reached by the functions below. */
+typedef struct sonde_state sonde_state;
+
+/** Rest state of a model. @param model borrowed, must outlive the state @thread owner */
+SONDE_API sonde_status sonde_state_create(const sonde_model *model, const sonde_world_def *def,
+                                          sonde_state **state, sonde_error *error);
+SONDE_API void sonde_state_destroy(sonde_state *state);
+/** Back to rest, tick 0, no probe history. @thread owner of the state */
+SONDE_API void sonde_state_reset(sonde_state *state);
+
+/**
+ * Advances one step with the probe at world_from_probe (its pose at the end of the step; the
+ * velocity follows from the previous pose). NULL probe: nothing touches.
+ * @thread tick (no allocation, no locks, no I/O)
+ */
+SONDE_API void sonde_step(sonde_state *state, const sonde_probe *probe,
+                          sonde_pose world_from_probe);
+
+/** Result of a search for static equilibrium. */
+typedef struct sonde_settle_result {
+  bool converged;
+  uint32_t iterations; /**< Newton iterations */
+  double residual;     /**< |unbalanced force| / |contact force| */
+  double contact_n;    /**< |force on the probe| */
+  double reaction_n;   /**< |tissue reaction| */
+} sonde_settle_result;
+
+/**
+ * Static equilibrium with the probe held still: Newton with line search on the total energy, all
+ * nodes awake, velocities zeroed.
+ * @param relative_residual e.g. 1e-9
+ * @thread owner of the state
+ */
+SONDE_API sonde_settle_result sonde_settle(sonde_state *state, const sonde_probe *probe,
+                                           sonde_pose world_from_probe, double relative_residual,
+                                           uint32_t max_iterations);
+
+/**
+ * Static equilibrium with prescribed nodes (a bonded footprint): the listed nodes are held at the
+ * given positions, all others are free.
+ * @param force_n receives the sum of the forces that hold them (on the holder)
+ * @thread owner of the state
+ */
+SONDE_API sonde_settle_result sonde_settle_bonded(sonde_state *state, const uint32_t *nodes,
+                                                  const sonde_vec3 *positions_m, uint32_t count,
+                                                  double relative_residual, uint32_t max_iterations,
+                                                  sonde_vec3 *force_n);
+
+SONDE_API const sonde_model *sonde_state_model(const sonde_state *state);
+SONDE_API const sonde_world_def *sonde_state_def(const sonde_state *state);
+SONDE_API uint64_t sonde_state_tick(const sonde_state *state);
+SONDE_API double sonde_state_time(const sonde_state *state);
+SONDE_API const sonde_vec3 *sonde_state_positions(const sonde_state *state);  /**< [nodes] m */
+SONDE_API const sonde_vec3 *sonde_state_velocities(const sonde_state *state); /**< [nodes] m/s */
+/** Overwrites the motion (tests, snapshots); wakes every node. Either may be NULL. */
+SONDE_API void sonde_state_set(sonde_state *state, const sonde_vec3 *positions,
+                               const sonde_vec3 *velocities);
+SONDE_API const sonde_contact *sonde_state_contact(const sonde_state *state);
+/** Force of the probe on each node at the last step, world (N). [nodes] */
+SONDE_API const sonde_vec3 *sonde_state_contact_forces(const sonde_state *state);
+SONDE_API sonde_pcg_result sonde_state_solver(const sonde_state *state);
+SONDE_API uint32_t sonde_state_awake(const sonde_state *state);
+SONDE_API uint32_t sonde_state_flags(const sonde_state *state);
+SONDE_API uint64_t sonde_state_flag_count(const sonde_state *state);
+SONDE_API sonde_stage_times sonde_state_times(const sonde_state *state);
+/** Hash of positions, velocities and tick: equal runs have equal hashes. @thread owner */
+SONDE_API uint64_t sonde_state_hash(const sonde_state *state);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

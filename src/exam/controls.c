@@ -1,0 +1,65 @@
+// Controls of a session: cleaning, and sharing with readers that must not wait.
+// keep_real:                  a number in a range, or the one before when it is not a number.
+// clean_pathology:            every member of a pathology usable.
+// sonde_controls_clean:       the same for all controls.
+// sonde_shared_controls_set:  one writer.
+// sonde_shared_controls_get:  readers try again while a write is under way.
+#include "exam/session.h"
+
+#include "base/base.h"
+#include "base/maths.h"
+
+#include <string.h>
+
+static double keep_real(double wanted, double before, double low, double high) {
+  return isfinite(wanted) ? clamp(wanted, low, high) : before;
+}
+
+// Ranges are physiological with a wide margin; 1e5 Pa is 750 mmHg.
+static sonde_pathology clean_pathology(sonde_pathology p, const sonde_pathology *before) {
+  p.name[sizeof p.name - 1] = 0;
+  p.venous_pressure_pa = keep_real(p.venous_pressure_pa, before->venous_pressure_pa, 0.0, 1e5);
+  p.arterial_pressure_pa =
+      keep_real(p.arterial_pressure_pa, before->arterial_pressure_pa, 0.0, 1e5);
+  p.thrombus_fraction = keep_real(p.thrombus_fraction, before->thrombus_fraction, 0.0, 1.0);
+  p.thrombus_modulus_pa = keep_real(p.thrombus_modulus_pa, before->thrombus_modulus_pa, 0.0, 1e8);
+  p.thrombus_from_m = keep_real(p.thrombus_from_m, before->thrombus_from_m, -10.0, 10.0);
+  p.thrombus_to_m = keep_real(p.thrombus_to_m, before->thrombus_to_m, -10.0, 10.0);
+  p.lumen_scale = keep_real(p.lumen_scale, before->lumen_scale, 0.1, 3.0);
+  p.echogenicity = keep_real(p.echogenicity, before->echogenicity, 0.0, 1.0);
+  return p;
+}
+
+sonde_session_controls sonde_controls_clean(const sonde_session_controls *wanted,
+                                            const sonde_session_controls *before,
+                                            uint32_t probe_count) {
+  SONDE_ASSERT(before->probe < probe_count);
+  sonde_session_controls controls = *wanted;
+  if (controls.probe >= probe_count) controls.probe = before->probe;
+  controls.pathology = clean_pathology(wanted->pathology, &before->pathology);
+  controls.echo = sonde_echo_settings_clamp(wanted->echo);
+  return controls;
+}
+
+void sonde_shared_controls_set(sonde_shared_controls *shared, const sonde_session_controls *value) {
+  uint64_t words[SONDE_CONTROL_WORDS] = {0};
+  memcpy(words, value, sizeof *value);
+  unsigned sequence = atomic_load_explicit(&shared->sequence, memory_order_relaxed);
+  SONDE_ASSERT(sequence % 2 == 0);
+  atomic_store(&shared->sequence, sequence + 1);
+  for (size_t i = 0; i < SONDE_CONTROL_WORDS; ++i) atomic_store(&shared->word[i], words[i]);
+  atomic_store(&shared->sequence, sequence + 2);
+}
+
+sonde_session_controls sonde_shared_controls_get(const sonde_shared_controls *shared) {
+  uint64_t words[SONDE_CONTROL_WORDS] = {0};
+  unsigned before, after;
+  do {
+    before = atomic_load(&shared->sequence);
+    for (size_t i = 0; i < SONDE_CONTROL_WORDS; ++i) words[i] = atomic_load(&shared->word[i]);
+    after = atomic_load(&shared->sequence);
+  } while (before != after || before % 2);
+  sonde_session_controls value;
+  memcpy(&value, words, sizeof value);
+  return value;
+}

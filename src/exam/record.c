@@ -1,0 +1,175 @@
+// Writing a recording: a text header, fixed-size records, an end with hash and CRC-32.
+// emit:             bytes to the file and into the CRC.
+// put_tick, put_controls: one record as bytes.
+// json_*, header_json: the header line.
+// sonde_recorder_*: the interface.
+#include "exam/record.h"
+
+#include "base/base.h"
+#include "exam/bytes.h"
+
+#include <cjson/cJSON.h>
+#include <zlib.h>
+
+struct sonde_recorder {
+  sonde_file *file;
+  uLong crc;
+  uint64_t ticks;
+};
+
+static void emit(sonde_recorder *recorder, const void *bytes, size_t count) {
+  sonde_file_write(recorder->file, bytes, count);
+  recorder->crc = crc32_z(recorder->crc, bytes, count);
+}
+
+static void put_tick(byte_writer *w, const sonde_record *record) {
+  sonde_pose pose = record->sample.world_from_probe;
+  const double numbers[7] = {pose.position.x, pose.position.y, pose.position.z, pose.rotation.w,
+                             pose.rotation.x, pose.rotation.y, pose.rotation.z};
+  put_u32(w, SONDE_RECORD_TICK);
+  put_u32(w, record->sample.present ? 1 : 0);
+  put_u64(w, record->tick);
+  put_u32(w, record->sample.buttons);
+  put_u32(w, 0);
+  for (int i = 0; i < 7; ++i) put_real(w, numbers[i]);
+}
+
+static void put_controls(byte_writer *w, const sonde_record *record) {
+  const sonde_session_controls *c = &record->controls;
+  const sonde_pathology *p = &c->pathology;
+  const sonde_echo_settings *e = &c->echo;
+  const double numbers[14] = {e->frequency_hz,
+                              e->depth_m,
+                              e->gain_db,
+                              e->dynamic_range_db,
+                              e->focus_m,
+                              e->tgc_db_per_m,
+                              p->venous_pressure_pa,
+                              p->arterial_pressure_pa,
+                              p->thrombus_fraction,
+                              p->thrombus_modulus_pa,
+                              p->thrombus_from_m,
+                              p->thrombus_to_m,
+                              p->lumen_scale,
+                              p->echogenicity};
+  put_u32(w, SONDE_RECORD_CONTROLS);
+  put_u32(w, c->probe);
+  put_u64(w, record->tick);
+  put_u32(w, c->stop ? 1 : 0);
+  put_u32(w, c->resume);
+  for (int i = 0; i < 14; ++i) put_real(w, numbers[i]);
+  memcpy(w->at, p->name, sizeof p->name);
+  w->at += sizeof p->name;
+}
+
+void sonde_recorder_write(sonde_recorder *recorder, const sonde_record *record) {
+  unsigned char bytes[SONDE_RECORD_CONTROLS_BYTES];
+  byte_writer w = {bytes};
+  if (record->tag == SONDE_RECORD_TICK) {
+    put_tick(&w, record);
+    SONDE_ASSERT(w.at == bytes + SONDE_RECORD_TICK_BYTES);
+    recorder->ticks++;
+  } else {
+    put_controls(&w, record);
+    SONDE_ASSERT(w.at == bytes + SONDE_RECORD_CONTROLS_BYTES);
+  }
+  emit(recorder, bytes, (size_t)(w.at - bytes));
+}
+
+// 64-bit numbers do not fit a JSON number.
+static void json_hex(cJSON *object, const char *key, uint64_t value) {
+  char text[17];
+  snprintf(text, sizeof text, "%016llx", (unsigned long long)value);
+  cJSON_AddStringToObject(object, key, text);
+}
+
+static void json_world(cJSON *root, const sonde_world_def *def) {
+  cJSON *world = cJSON_AddObjectToObject(root, "world");
+  cJSON_AddNumberToObject(world, "dt_s", def->dt_s);
+  cJSON_AddNumberToObject(world, "implicitness", def->implicitness);
+  cJSON_AddNumberToObject(world, "newton_iterations", def->newton_iterations);
+  cJSON_AddNumberToObject(world, "pcg_relative", def->pcg.relative_residual);
+  cJSON_AddNumberToObject(world, "pcg_absolute", def->pcg.absolute_residual);
+  cJSON_AddNumberToObject(world, "pcg_iterations", def->pcg.max_iterations);
+  cJSON_AddNumberToObject(world, "contact_law", (double)def->contact_law);
+  cJSON_AddNumberToObject(world, "contact_stiffness_n_m3", def->contact_stiffness_n_m3);
+  cJSON_AddNumberToObject(world, "contact_damping_n_s_m3", def->contact_damping_n_s_m3);
+  cJSON_AddNumberToObject(world, "sleep_displacement_m", def->sleep_displacement_m);
+}
+
+static char *header_json(const sonde_record_head *head) {
+  cJSON *root = cJSON_CreateObject();
+  cJSON *model = cJSON_AddObjectToObject(root, "model");
+  bool fits = head->model_path && strlen(head->model_path) < SONDE_RECORD_PATH_BYTES;
+  cJSON_AddStringToObject(model, "path", fits ? head->model_path : "");
+  cJSON_AddStringToObject(model, "name", head->model_name);
+  json_hex(model, "checksum", head->model_checksum);
+  cJSON *probes = cJSON_AddArrayToObject(root, "probes");
+  for (uint32_t i = 0; i < head->probe_count; ++i) {
+    cJSON *probe = cJSON_CreateObject();
+    cJSON_AddStringToObject(probe, "name", head->probe_names[i]);
+    json_hex(probe, "hash", sonde_probe_hash(&head->probes[i]));
+    cJSON_AddItemToArray(probes, probe);
+  }
+  json_world(root, &head->world);
+  char *text = cJSON_PrintUnformatted(root);
+  cJSON_Delete(root);
+  return text;
+}
+
+uint64_t sonde_probe_hash(const sonde_probe *probe) {
+  const sonde_mesh *hull = &probe->body.hull;
+  SONDE_ASSERT(hull->vertex_count > 0);
+  uint64_t hash = sonde_hash(0, hull->vertices, hull->vertex_count * sizeof *hull->vertices);
+  return sonde_hash(hash, hull->faces, hull->face_count * sizeof *hull->faces);
+}
+
+sonde_status sonde_recorder_create(const char *path, const sonde_record_head *head,
+                                   sonde_recorder **out, sonde_error *error) {
+  *out = NULL;
+  sonde_status status = SONDE_OK;
+  char *json = header_json(head);
+  sonde_recorder *recorder = SONDE_NEW(sonde_recorder, 1);
+  if (!json || !recorder) {
+    status = sonde_fail_memory(error);
+    goto done;
+  }
+  status = sonde_file_create(path, &recorder->file, error);
+  if (status) goto done;
+  char magic[40];
+  snprintf(magic, sizeof magic, "%s %d\n", SONDE_RECORD_MAGIC, SONDE_RECORD_VERSION);
+  emit(recorder, magic, strlen(magic));
+  emit(recorder, json, strlen(json));
+  emit(recorder, "\n", 1);
+  *out = recorder;
+  recorder = NULL;
+done:
+  cJSON_free(json);
+  sonde_free(recorder);
+  return status;
+}
+
+sonde_status sonde_recorder_close(sonde_recorder *recorder, uint64_t hash, uint64_t lost,
+                                  sonde_error *error) {
+  unsigned char bytes[SONDE_RECORD_END_BYTES];
+  byte_writer w = {bytes};
+  put_u32(&w, SONDE_RECORD_END);
+  put_u32(&w, 0);
+  put_u64(&w, recorder->ticks);
+  put_u64(&w, hash);
+  put_u64(&w, lost);
+  emit(recorder, bytes, (size_t)(w.at - bytes));
+  put_u32(&w, (uint32_t)recorder->crc);
+  put_u32(&w, 0);
+  SONDE_ASSERT(w.at == bytes + SONDE_RECORD_END_BYTES);
+  sonde_file_write(recorder->file, w.at - 8, 8);
+  sonde_status status = sonde_file_commit(recorder->file, error);
+  sonde_free(recorder);
+  return status;
+}
+
+void sonde_recorder_discard(sonde_recorder *recorder) {
+  if (!recorder) return;
+  sonde_file_discard(recorder->file);
+  sonde_free(recorder);
+}

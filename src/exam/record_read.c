@@ -1,0 +1,264 @@
+// Reading a recording: everything is checked before the first record is handed out.
+// text_of, real_of, hash_of:         members of the header that must be there.
+// read_model, read_probes, read_world: parts of the header.
+// read_magic, read_header, read_end: the three parts of the file.
+// decode_tick, decode_controls:      one record.
+// check_records:                     walks all of them.
+#include "exam/record.h"
+
+#include "base/base.h"
+#include "exam/bytes.h"
+#include "haptics/motion.h"
+
+#include <cjson/cJSON.h>
+#include <stdlib.h>
+#include <zlib.h>
+
+// What is being read, for sentences.
+typedef struct source {
+  const char *path;
+  sonde_recording *recording;
+  sonde_error *error;
+} source;
+
+static sonde_status fail_header(const source *s, const char *what) {
+  return sonde_fail(s->error, SONDE_FORMAT, "%s:2: the header has no usable \"%s\"", s->path, what);
+}
+
+static sonde_status text_of(const source *s, const cJSON *object, const char *key, char *text,
+                            size_t size) {
+  const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, key);
+  if (!cJSON_IsString(item) || strlen(item->valuestring) >= size) return fail_header(s, key);
+  snprintf(text, size, "%s", item->valuestring);
+  return SONDE_OK;
+}
+
+static sonde_status real_of(const source *s, const cJSON *object, const char *key, double *value) {
+  const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, key);
+  if (!cJSON_IsNumber(item)) return fail_header(s, key);
+  *value = item->valuedouble;
+  return SONDE_OK;
+}
+
+static sonde_status count_of(const source *s, const cJSON *object, const char *key,
+                             uint32_t *value) {
+  double real = 0.0;
+  sonde_status status = real_of(s, object, key, &real);
+  if (status) return status;
+  if (!(real >= 0.0 && real <= 4294967295.0)) return fail_header(s, key);
+  *value = (uint32_t)real;
+  return SONDE_OK;
+}
+
+static sonde_status hash_of(const source *s, const cJSON *object, const char *key,
+                            uint64_t *value) {
+  char text[17], *end = NULL;
+  sonde_status status = text_of(s, object, key, text, sizeof text);
+  if (status) return status;
+  *value = strtoull(text, &end, 16);
+  return end == text || *end ? fail_header(s, key) : SONDE_OK;
+}
+
+static sonde_status read_model(const source *s, const cJSON *root) {
+  sonde_recording *r = s->recording;
+  const cJSON *model = cJSON_GetObjectItemCaseSensitive(root, "model");
+  sonde_status status = text_of(s, model, "path", r->model_path, sizeof r->model_path);
+  if (!status) status = text_of(s, model, "name", r->model_name, sizeof r->model_name);
+  if (!status) status = hash_of(s, model, "checksum", &r->model_checksum);
+  return status;
+}
+
+static sonde_status read_probes(const source *s, const cJSON *root) {
+  sonde_recording *r = s->recording;
+  const cJSON *probes = cJSON_GetObjectItemCaseSensitive(root, "probes");
+  int count = cJSON_GetArraySize(probes);
+  if (!cJSON_IsArray(probes) || count < 1) return fail_header(s, "probes");
+  r->probe_names = sonde_calloc((size_t)count, sizeof *r->probe_names);
+  r->probe_hashes = SONDE_NEW(uint64_t, (size_t)count);
+  if (!r->probe_names || !r->probe_hashes) return sonde_fail_memory(s->error);
+  sonde_status status = SONDE_OK;
+  const cJSON *probe;
+  cJSON_ArrayForEach(probe, probes) {
+    uint32_t i = r->probe_count++;
+    if (!status) status = text_of(s, probe, "name", r->probe_names[i], sizeof r->probe_names[i]);
+    if (!status) status = hash_of(s, probe, "hash", &r->probe_hashes[i]);
+  }
+  return status;
+}
+
+static sonde_status read_world(const source *s, const cJSON *root) {
+  const cJSON *world = cJSON_GetObjectItemCaseSensitive(root, "world");
+  sonde_world_def def = sonde_world_def_default();
+  uint32_t law = 0;
+  const struct {
+    const char *key;
+    double *value;
+  } reals[] = {{"dt_s", &def.dt_s},
+               {"implicitness", &def.implicitness},
+               {"pcg_relative", &def.pcg.relative_residual},
+               {"pcg_absolute", &def.pcg.absolute_residual},
+               {"contact_stiffness_n_m3", &def.contact_stiffness_n_m3},
+               {"contact_damping_n_s_m3", &def.contact_damping_n_s_m3},
+               {"sleep_displacement_m", &def.sleep_displacement_m}};
+  sonde_status status = SONDE_OK;
+  for (size_t i = 0; i < SONDE_COUNT_OF(reals) && !status; ++i)
+    status = real_of(s, world, reals[i].key, reals[i].value);
+  if (!status) status = count_of(s, world, "newton_iterations", &def.newton_iterations);
+  if (!status) status = count_of(s, world, "pcg_iterations", &def.pcg.max_iterations);
+  if (!status) status = count_of(s, world, "contact_law", &law);
+  if (!status && law > SONDE_CONTACT_LUMPED) status = fail_header(s, "contact_law");
+  def.contact_law = (sonde_contact_law)law;
+  s->recording->world = def;
+  return status;
+}
+
+// Leaves recording->at at the second line.
+static sonde_status read_magic(const source *s) {
+  sonde_recording *r = s->recording;
+  size_t length = strlen(SONDE_RECORD_MAGIC);
+  bool named = r->end > length && memcmp(r->bytes, SONDE_RECORD_MAGIC " ", length + 1) == 0;
+  char *end = r->bytes;
+  long version = named ? strtol(r->bytes + length + 1, &end, 10) : 0;
+  if (!named || *end != '\n')
+    return sonde_fail(s->error, SONDE_FORMAT, "%s:1: not a recording, expected \"%s %d\"", s->path,
+                      SONDE_RECORD_MAGIC, SONDE_RECORD_VERSION);
+  if (version != SONDE_RECORD_VERSION)
+    return sonde_fail(s->error, SONDE_VERSION, "%s:1: version %ld of a recording, expected %d",
+                      s->path, version, SONDE_RECORD_VERSION);
+  r->at = (size_t)(end + 1 - r->bytes);
+  return SONDE_OK;
+}
+
+static sonde_status read_header(const source *s) {
+  sonde_recording *r = s->recording;
+  const char *line = r->bytes + r->at;
+  const char *end = memchr(line, '\n', r->end - r->at);
+  if (!end) return sonde_fail(s->error, SONDE_FORMAT, "%s:2: the header does not end", s->path);
+  cJSON *root = cJSON_ParseWithLength(line, (size_t)(end - line));
+  if (!root)
+    return sonde_fail(s->error, SONDE_FORMAT, "%s:2: the header is not a JSON object", s->path);
+  sonde_status status = read_model(s, root);
+  if (!status) status = read_probes(s, root);
+  if (!status) status = read_world(s, root);
+  cJSON_Delete(root);
+  r->at = (size_t)(end + 1 - r->bytes);
+  return status;
+}
+
+// The last bytes; afterwards recording->end is the end of the records.
+static sonde_status read_end(const source *s) {
+  sonde_recording *r = s->recording;
+  size_t start = r->end < SONDE_RECORD_END_BYTES ? 0 : r->end - SONDE_RECORD_END_BYTES;
+  byte_reader reader = {(const unsigned char *)r->bytes + start};
+  if (start < r->at || get_u32(&reader) != SONDE_RECORD_END || get_u32(&reader) != 0)
+    return sonde_fail(s->error, SONDE_FORMAT,
+                      "%s: the recording has no end: it was cut off or not finished", s->path);
+  r->ticks = get_u64(&reader);
+  r->hash = get_u64(&reader);
+  r->lost = get_u64(&reader);
+  uint32_t expected = get_u32(&reader);
+  uint32_t crc = (uint32_t)crc32_z(0, (const unsigned char *)r->bytes, r->end - 8);
+  if (crc != expected)
+    return sonde_fail(s->error, SONDE_CHECKSUM,
+                      "%s: the recording is damaged: its CRC-32 is %08x, expected %08x", s->path,
+                      crc, expected);
+  r->end = start;
+  return SONDE_OK;
+}
+
+static void decode_tick(byte_reader *reader, sonde_record *record) {
+  record->sample.present = get_u32(reader) & 1;
+  record->tick = get_u64(reader);
+  record->sample.buttons = get_u32(reader);
+  (void)get_u32(reader);
+  double n[7];
+  for (int i = 0; i < 7; ++i) n[i] = get_real(reader);
+  record->sample.world_from_probe = (sonde_pose){{n[0], n[1], n[2]}, {n[3], n[4], n[5], n[6]}};
+}
+
+static void decode_controls(byte_reader *reader, sonde_record *record) {
+  sonde_session_controls *c = &record->controls;
+  c->probe = get_u32(reader);
+  record->tick = get_u64(reader);
+  c->stop = get_u32(reader) & 1;
+  c->resume = get_u32(reader);
+  double n[14];
+  for (int i = 0; i < 14; ++i) n[i] = get_real(reader);
+  c->echo = (sonde_echo_settings){n[0], n[1], n[2], n[3], n[4], n[5]};
+  c->pathology = (sonde_pathology){"", n[6], n[7], n[8], n[9], n[10], n[11], n[12], n[13]};
+  memcpy(c->pathology.name, reader->at, sizeof c->pathology.name);
+  c->pathology.name[sizeof c->pathology.name - 1] = 0;
+}
+
+bool sonde_recording_next(sonde_recording *r, sonde_record *record) {
+  SONDE_ASSERT(r->at <= r->end);
+  *record = (sonde_record){0};
+  if (r->end - r->at < SONDE_RECORD_TICK_BYTES) return false;
+  byte_reader reader = {(const unsigned char *)r->bytes + r->at};
+  record->tag = get_u32(&reader);
+  size_t bytes =
+      record->tag == SONDE_RECORD_TICK ? SONDE_RECORD_TICK_BYTES : SONDE_RECORD_CONTROLS_BYTES;
+  if (r->end - r->at < bytes) return false;
+  if (record->tag == SONDE_RECORD_TICK)
+    decode_tick(&reader, record);
+  else if (record->tag == SONDE_RECORD_CONTROLS)
+    decode_controls(&reader, record);
+  else
+    return false;
+  r->at += bytes;
+  return true;
+}
+
+// What is wrong with a record, NULL when nothing is.
+static const char *fault_of(const sonde_recording *r, const sonde_record *record, uint64_t tick) {
+  if (record->tick != tick) return "is out of order";
+  if (record->tag == SONDE_RECORD_CONTROLS)
+    return record->controls.probe < r->probe_count ? NULL : "names a missing probe";
+  return sonde_pose_usable(record->sample.world_from_probe) ? NULL : "has a pose that is not one";
+}
+
+static sonde_status check_records(const source *s) {
+  sonde_recording *r = s->recording;
+  size_t start = r->at;
+  uint64_t tick = 0;
+  sonde_record record;
+  if (r->lost)
+    return sonde_fail(s->error, SONDE_FORMAT,
+                      "%s: %llu records were lost while it was written (the disk was too slow): it "
+                      "cannot be replayed",
+                      s->path, (unsigned long long)r->lost);
+  while (sonde_recording_next(r, &record)) {
+    const char *fault = fault_of(r, &record, tick);
+    if (fault)
+      return sonde_fail(s->error, SONDE_FORMAT, "%s: the record of tick %llu %s", s->path,
+                        (unsigned long long)tick, fault);
+    tick += record.tag == SONDE_RECORD_TICK;
+  }
+  if (r->at != r->end || tick != r->ticks)
+    return sonde_fail(s->error, SONDE_FORMAT,
+                      "%s: %llu whole ticks and %zu bytes more, expected %llu ticks", s->path,
+                      (unsigned long long)tick, r->end - r->at, (unsigned long long)r->ticks);
+  r->at = start;
+  return SONDE_OK;
+}
+
+sonde_status sonde_recording_load(const char *path, sonde_recording *recording,
+                                  sonde_error *error) {
+  SONDE_ASSERT(path != NULL && recording != NULL);
+  *recording = (sonde_recording){0};
+  source s = {path, recording, error};
+  sonde_status status = sonde_file_load(path, &recording->bytes, &recording->end, error);
+  if (!status) status = read_magic(&s);
+  if (!status) status = read_end(&s);
+  if (!status) status = read_header(&s);
+  if (!status) status = check_records(&s);
+  if (status) sonde_recording_clear(recording);
+  return status;
+}
+
+void sonde_recording_clear(sonde_recording *recording) {
+  sonde_free(recording->bytes);
+  sonde_free(recording->probe_names);
+  sonde_free(recording->probe_hashes);
+  *recording = (sonde_recording){0};
+}

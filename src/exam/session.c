@@ -1,0 +1,227 @@
+// Life of a session.
+// check:           the definition.
+// create_probes, create_boxes, create_recording: parts of a session, in this order.
+// release:         frees whatever exists.
+// sonde_session_*: the interface; ticks are in session_hot.c, threads in session_threads.c.
+#include "exam/session.h"
+
+#include "base/base.h"
+#include "base/maths.h"
+#include "haptics/motion.h"
+
+enum { RING_RECORDS = 8192 }; // 8 s of ticks while the disk does not answer
+
+sonde_session_def sonde_session_def_default(void) {
+  sonde_session_def def = {.world = sonde_world_def_default(),
+                           .limits = sonde_safety_limits_default(),
+                           .image_width = 512,
+                           .image_height = 512,
+                           .ticks_per_image = 20};
+  def.controls.echo = sonde_echo_settings_default();
+  sonde_status status = sonde_pathology_preset("healthy", &def.controls.pathology, NULL);
+  SONDE_ASSERT(status == SONDE_OK);
+  return def;
+}
+
+static const char *const *probe_names(const sonde_session_def *def) {
+  return def->probe_names ? def->probe_names : sonde_probe_names();
+}
+
+static sonde_status check(const sonde_session_def *def, const sonde_device *device,
+                          sonde_error *error) {
+  uint32_t probes = 0;
+  while (probe_names(def)[probes]) probes++;
+  if (!def->model) return sonde_fail(error, SONDE_ARGUMENT, "session: no model");
+  if (!device || !device->read || !device->write)
+    return sonde_fail(error, SONDE_ARGUMENT, "session: no device");
+  if (def->controls.probe >= probes)
+    return sonde_fail(error, SONDE_ARGUMENT, "session: probe %u of %u, expected less",
+                      def->controls.probe, probes);
+  if (def->image_width < 16 || def->image_width > 4096 || def->image_height < 16 ||
+      def->image_height > 4096)
+    return sonde_fail(error, SONDE_ARGUMENT, "session: image of %u x %u, expected 16 to 4096 each",
+                      def->image_width, def->image_height);
+  if (def->ticks_per_image == 0)
+    return sonde_fail(error, SONDE_ARGUMENT, "session: 0 ticks per image, expected 1 or more");
+  return SONDE_OK;
+}
+
+static sonde_status create_probes(sonde_session *session, const char *const *names,
+                                  sonde_error *error) {
+  uint32_t count = 0;
+  while (names[count]) count++;
+  session->probes = SONDE_NEW(sonde_probe, count);
+  if (!session->probes) return sonde_fail_memory(error);
+  sonde_status status = SONDE_OK;
+  for (uint32_t i = 0; i < count && !status; ++i) {
+    status = sonde_probe_create(names[i], &session->probes[i], error);
+    if (!status) session->probe_count = i + 1;
+  }
+  return status;
+}
+
+// Offset of the next array in a mailbox slot.
+static size_t place(size_t *end, size_t bytes) {
+  size_t at = (*end + SONDE_MAILBOX_ALIGN - 1) / SONDE_MAILBOX_ALIGN * SONDE_MAILBOX_ALIGN;
+  *end = at + bytes;
+  return at;
+}
+
+static sonde_status create_boxes(sonde_session *session, sonde_error *error) {
+  size_t vectors = session->nodes * sizeof(sonde_vec3);
+  size_t surface_end = sizeof(sonde_surface_slot), frame_end = sizeof(sonde_frame);
+  session->positions_at = place(&surface_end, vectors);
+  session->forces_at = place(&surface_end, vectors);
+  session->skin_at = place(&frame_end, 3 * session->nodes * sizeof(float));
+  session->pixels_at = place(&frame_end, (size_t)session->image_width * session->image_height);
+  sonde_status status =
+      sonde_mailbox_create(sizeof(sonde_session_controls), &session->control_box, error);
+  if (!status) status = sonde_mailbox_create(surface_end, &session->surface_box, error);
+  if (!status) status = sonde_mailbox_create(frame_end, &session->frame_box, error);
+  return status;
+}
+
+static sonde_status create_recording(sonde_session *session, const sonde_session_def *def,
+                                     sonde_error *error) {
+  if (!def->record_path) return SONDE_OK;
+  sonde_status status =
+      sonde_ring_create(sizeof(sonde_record), RING_RECORDS, &session->records, error);
+  if (status) return status;
+  sonde_record_head head = {.model_path = def->model_path,
+                            .model_name = def->model->name,
+                            .model_checksum = def->model->checksum,
+                            .world = *sonde_state_def(session->state),
+                            .probe_count = session->probe_count,
+                            .probes = session->probes,
+                            .probe_names = probe_names(def)};
+  status = sonde_recorder_create(def->record_path, &head, &session->recorder, error);
+  if (status) return status;
+  sonde_record first = {.tag = SONDE_RECORD_CONTROLS};
+  first.controls = session->controls;
+  sonde_recorder_write(session->recorder, &first);
+  return SONDE_OK;
+}
+
+static sonde_status create_parts(sonde_session *session, const sonde_session_def *def,
+                                 sonde_error *error) {
+  sonde_status status = create_probes(session, probe_names(def), error);
+  if (!status) status = sonde_state_create(def->model, &def->world, &session->state, error);
+  if (!status)
+    status = sonde_surface_index_create(&def->model->surface, &session->rest_skin, error);
+  if (!status) status = sonde_interior_create(def->model, &session->interior, error);
+  if (!status)
+    status = sonde_echo_create(session->interior, &(sonde_echo_def){0}, &session->echo, error);
+  if (!status) status = create_boxes(session, error);
+  if (status) return status;
+  session->controls =
+      sonde_controls_clean(&def->controls, &session->controls, session->probe_count);
+  sonde_shared_controls_set(&session->requested, &session->controls);
+  if (session->controls.stop) sonde_safety_trip(&session->safety, SONDE_FAULT_STOPPED);
+  return create_recording(session, def, error);
+}
+
+static void release(sonde_session *session) {
+  sonde_recorder_discard(session->recorder);
+  sonde_ring_destroy(session->records);
+  sonde_mailbox_destroy(session->control_box);
+  sonde_mailbox_destroy(session->surface_box);
+  sonde_mailbox_destroy(session->frame_box);
+  sonde_echo_destroy(session->echo);
+  sonde_interior_destroy(session->interior);
+  sonde_surface_index_destroy(session->rest_skin);
+  sonde_state_destroy(session->state);
+  for (uint32_t i = 0; i < session->probe_count; ++i) sonde_probe_clear(&session->probes[i]);
+  sonde_free(session->probes);
+  sonde_free(session);
+}
+
+sonde_status sonde_session_create(const sonde_session_def *def, sonde_device *device,
+                                  sonde_session **out, sonde_error *error) {
+  SONDE_ASSERT(def != NULL && out != NULL);
+  *out = NULL;
+  sonde_status status = check(def, device, error);
+  if (status) return status;
+  sonde_session *session = SONDE_NEW(sonde_session, 1);
+  if (!session) return sonde_fail_memory(error);
+  session->model = def->model;
+  session->nodes = def->model->surface.vertex_count;
+  session->dt_s = def->world.dt_s;
+  session->ticks_per_image = def->ticks_per_image;
+  session->image_width = def->image_width;
+  session->image_height = def->image_height;
+  session->sample.world_from_probe.rotation = quat_identity();
+  session->controls.echo = sonde_echo_settings_default();
+  sonde_safety_init(&session->safety, &def->limits);
+  status = sonde_pathology_preset("healthy", &session->controls.pathology, error);
+  if (!status) status = create_parts(session, def, error);
+  if (status) {
+    release(session);
+    return status;
+  }
+  session->device = *device;
+  *device = (sonde_device){0};
+  *out = session;
+  return SONDE_OK;
+}
+
+// A session without a single tick leaves no file (and an older one as it was).
+static sonde_status close_recording(sonde_session *session, sonde_error *error) {
+  if (!session->recorder || sonde_session_ticks(session) == 0) return SONDE_OK;
+  uint64_t lost = atomic_load(&session->lost_records);
+  sonde_recorder *recorder = session->recorder;
+  session->recorder = NULL;
+  sonde_status status =
+      sonde_recorder_close(recorder, sonde_state_hash(session->state), lost, error);
+  if (!status && lost)
+    status = sonde_fail(error, SONDE_IO,
+                        "the disk was too slow: the recording lacks %llu records and cannot be "
+                        "replayed",
+                        (unsigned long long)lost);
+  return status;
+}
+
+sonde_status sonde_session_destroy(sonde_session *session, sonde_error *error) {
+  if (!session) return SONDE_OK;
+  sonde_session_stop(session);
+  sonde_status status = close_recording(session, error);
+  if (session->device.destroy) session->device.destroy(session->device.self);
+  release(session);
+  return status;
+}
+
+void sonde_session_control(sonde_session *session, const sonde_session_controls *controls) {
+  SONDE_ASSERT(controls != NULL);
+  sonde_session_controls before = sonde_shared_controls_get(&session->requested);
+  sonde_session_controls clean = sonde_controls_clean(controls, &before, session->probe_count);
+  *(sonde_session_controls *)sonde_mailbox_write_slot(session->control_box) = clean;
+  sonde_mailbox_publish(session->control_box);
+  if (clean.stop) atomic_store_explicit(&session->stop_pressed, true, memory_order_release);
+  sonde_shared_controls_set(&session->requested, &clean);
+}
+
+sonde_session_controls sonde_session_controls_now(const sonde_session *session) {
+  return sonde_shared_controls_get(&session->requested);
+}
+
+sonde_device *sonde_session_device(sonde_session *session) { return &session->device; }
+
+uint32_t sonde_session_probe_count(const sonde_session *session) { return session->probe_count; }
+
+const sonde_probe *sonde_session_probe(const sonde_session *session, uint32_t index) {
+  SONDE_ASSERT(index < session->probe_count);
+  return &session->probes[index];
+}
+
+const sonde_model *sonde_session_model(const sonde_session *session) { return session->model; }
+
+uint64_t sonde_session_ticks(const sonde_session *session) {
+  return atomic_load_explicit(&session->ticks, memory_order_acquire);
+}
+
+uint64_t sonde_session_images(const sonde_session *session) {
+  return atomic_load_explicit(&session->images, memory_order_acquire);
+}
+
+uint64_t sonde_session_hash(const sonde_session *session) {
+  return atomic_load(&session->loop) ? 0 : sonde_state_hash(session->state);
+}

@@ -1,0 +1,97 @@
+// Inside of a session: who owns what, and what crosses the threads.
+//
+//   owner ---- controls mailbox ----> tick ---- surface mailbox ----> image ---- frame mailbox -->
+//   reader
+//                                      \------- record ring --------> recorder thread
+#ifndef SONDE_SRC_SESSION_H
+#define SONDE_SRC_SESSION_H
+
+#include "sonde/exam.h"
+
+#include "base/mailbox.h"
+#include "base/ring.h"
+#include "exam/record.h"
+
+#include <pthread.h>
+#include <stdatomic.h>
+
+// Controls that any thread may read while one thread writes: a sequence counter around words.
+enum { SONDE_CONTROL_WORDS = (sizeof(sonde_session_controls) + 7) / 8 };
+typedef struct sonde_shared_controls {
+  atomic_uint sequence; // odd while being written
+  _Atomic uint64_t word[SONDE_CONTROL_WORDS];
+} sonde_shared_controls;
+
+void sonde_shared_controls_set(sonde_shared_controls *shared, const sonde_session_controls *value);
+sonde_session_controls sonde_shared_controls_get(const sonde_shared_controls *shared);
+// `wanted` with every member usable: clamped, or from `before` where it is not.
+sonde_session_controls sonde_controls_clean(const sonde_session_controls *wanted,
+                                            const sonde_session_controls *before,
+                                            uint32_t probe_count);
+
+// What the image of one tick is made from; in a mailbox slot, followed by the two arrays.
+typedef struct sonde_surface_slot {
+  sonde_snapshot snapshot;
+  sonde_session_controls controls;
+} sonde_surface_slot;
+
+struct sonde_session {
+  // set up once
+  const sonde_model *model;
+  sonde_device device;
+  uint32_t probe_count;
+  sonde_probe *probes; // [probe_count]
+  double dt_s;
+  uint32_t ticks_per_image;
+  uint32_t image_width, image_height;
+  size_t nodes;
+  size_t positions_at, forces_at, skin_at, pixels_at; // offsets inside mailbox slots
+
+  // tick
+  sonde_state *state;
+  sonde_safety safety;
+  sonde_session_controls controls; // in force
+  sonde_device_sample sample;      // last used
+  bool realtime;
+  double last_tick_s; // clock of the previous real-time tick, 0 before the first
+  _Atomic uint64_t ticks;
+  _Atomic uint64_t lost_records;
+
+  // image
+  sonde_surface_index *rest_skin;
+  sonde_interior *interior;
+  sonde_echo *echo;
+  sonde_pathology shown_pathology;
+  bool shown; // an image was made
+  uint64_t shown_tick;
+  _Atomic uint64_t images;
+
+  // recorder; NULL without a recording
+  sonde_recorder *recorder;
+
+  // between threads
+  sonde_shared_controls requested;
+  atomic_bool stop_pressed;
+  sonde_mailbox *control_box; // sonde_session_controls
+  sonde_mailbox *surface_box; // sonde_surface_slot + arrays
+  sonde_mailbox *frame_box;   // sonde_frame + arrays
+  sonde_ring *records;        // sonde_record; NULL without a recording
+
+  // real time
+  _Atomic(sonde_loop *) loop;
+  sonde_loop_stats loop_stats; // of the last loop
+  pthread_t image_thread, record_thread;
+  bool image_running, record_running;
+  atomic_bool stop_image, stop_record;
+};
+
+// One tick, lockstep and real time alike (hot).
+void sonde_session_step(sonde_session *session);
+// Body of the loop's tick (hot).
+void sonde_session_realtime_tick(void *session);
+// Turns the newest surface, if there is one, into a frame. Image thread or lockstep.
+bool sonde_session_show(sonde_session *session);
+// Moves everything in the ring to the file. Recorder thread or lockstep.
+void sonde_session_drain(sonde_session *session);
+
+#endif

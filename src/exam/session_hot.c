@@ -1,0 +1,114 @@
+// One tick of a session. Nothing here or below it allocates, locks, prints or waits.
+// push:            a record into the ring; a full ring is counted.
+// take_controls:   newest controls come into force, with their stop and resume.
+// read_device:     pose of this tick, exactly as the world and the recording get it.
+// fill_snapshot:   what viewers are told about this tick.
+// offer_surface:   the surface and its snapshot into the mailbox of the image thread.
+// sonde_session_step, sonde_session_realtime_tick: the tick.
+#include "exam/session.h"
+
+#include "base/base.h"
+#include "base/clock.h"
+#include "base/maths.h"
+#include "haptics/motion.h"
+
+#include <string.h>
+
+static void push(sonde_session *session, const sonde_record *record) {
+  if (!session->records || sonde_ring_push(session->records, record)) return;
+  uint64_t lost = atomic_load_explicit(&session->lost_records, memory_order_relaxed);
+  atomic_store_explicit(&session->lost_records, lost + 1, memory_order_relaxed);
+}
+
+// A stop that newer controls have taken back before any tick saw it still trips.
+static void take_controls(sonde_session *session, uint64_t tick) {
+  if (atomic_exchange_explicit(&session->stop_pressed, false, memory_order_acquire))
+    sonde_safety_trip(&session->safety, SONDE_FAULT_STOPPED);
+  const sonde_session_controls *newest = sonde_mailbox_read(session->control_box);
+  if (!newest) return;
+  bool resume = newest->resume != session->controls.resume;
+  session->controls = *newest;
+  SONDE_ASSERT(session->controls.probe < session->probe_count);
+  if (resume && !newest->stop) sonde_safety_resume(&session->safety);
+  sonde_record record = {.tag = SONDE_RECORD_CONTROLS, .tick = tick};
+  record.controls = session->controls;
+  push(session, &record);
+}
+
+// A pose that is not one counts as an absent device; the probe then stays where it was.
+static void read_device(sonde_session *session, uint64_t tick) {
+  sonde_device_sample sample = session->sample;
+  session->device.read(session->device.self, tick, &sample);
+  if (sonde_pose_usable(sample.world_from_probe)) {
+    sample.world_from_probe.rotation = q_unit(sample.world_from_probe.rotation);
+  } else {
+    sample.world_from_probe = session->sample.world_from_probe;
+    sample.present = false;
+  }
+  if (!sample.present) sonde_safety_trip(&session->safety, SONDE_FAULT_DEVICE_LOST);
+  session->sample = sample;
+  sonde_record record = {.tag = SONDE_RECORD_TICK, .tick = tick};
+  record.sample = sample;
+  push(session, &record);
+}
+
+static void fill_snapshot(const sonde_session *session, sonde_snapshot *snapshot) {
+  const sonde_contact *contact = sonde_state_contact(session->state);
+  sonde_pose pose = session->sample.world_from_probe;
+  sonde_vec3 axis = q_rotate(pose.rotation, vec3(0, 0, 1));
+  *snapshot = (sonde_snapshot){
+      .tick = sonde_state_tick(session->state),
+      .time_s = sonde_state_time(session->state),
+      .world_from_probe = pose,
+      .probe = session->controls.probe,
+      .force_n = contact->force_n,
+      .rendered_force_n = session->safety.force_n,
+      .force_normal_n = -v_dot(contact->force_n, axis),
+      .penetration_m = (double)NAN,
+      .contact_volume_m3 = contact->volume_m3,
+      .contact_area_m2 = contact->area_m2,
+      .vein_area_ratio = (double)NAN,
+      .artery_area_ratio = (double)NAN,
+      .vein_short_m = (double)NAN,
+      .awake_nodes = sonde_state_awake(session->state),
+      .solver_iterations = sonde_state_solver(session->state).iterations,
+      .flags = sonde_state_flags(session->state),
+      .fault = session->safety.fault,
+  };
+}
+
+static void offer_surface(sonde_session *session) {
+  unsigned char *slot = sonde_mailbox_write_slot(session->surface_box);
+  sonde_surface_slot *head = (sonde_surface_slot *)(void *)slot;
+  fill_snapshot(session, &head->snapshot);
+  head->controls = session->controls;
+  size_t bytes = session->nodes * sizeof(sonde_vec3);
+  memcpy(slot + session->positions_at, sonde_state_positions(session->state), bytes);
+  memcpy(slot + session->forces_at, sonde_state_contact_forces(session->state), bytes);
+  sonde_mailbox_publish(session->surface_box);
+}
+
+void sonde_session_step(sonde_session *session) {
+  uint64_t tick = atomic_load_explicit(&session->ticks, memory_order_relaxed);
+  take_controls(session, tick);
+  read_device(session, tick);
+  const sonde_probe *probe = &session->probes[session->controls.probe];
+  sonde_step(session->state, probe, session->sample.world_from_probe);
+  if (sonde_state_flags(session->state) & SONDE_FLAG_NON_FINITE)
+    sonde_safety_trip(&session->safety, SONDE_FAULT_NON_FINITE);
+  const sonde_contact *contact = sonde_state_contact(session->state);
+  sonde_safety_apply(&session->safety, contact->force_n, contact->torque_n_m, session->dt_s);
+  session->device.write(session->device.self, session->safety.force_n, session->safety.torque_n_m);
+  if ((tick + 1) % session->ticks_per_image == 0) offer_surface(session);
+  SONDE_ASSERT(sonde_state_tick(session->state) == tick + 1);
+  atomic_store_explicit(&session->ticks, tick + 1, memory_order_release);
+}
+
+void sonde_session_realtime_tick(void *user) {
+  sonde_session *session = user;
+  double now_s = sonde_clock_now();
+  if (session->last_tick_s > 0.0 && now_s - session->last_tick_s > session->safety.limits.stale_s)
+    sonde_safety_trip(&session->safety, SONDE_FAULT_STALE);
+  session->last_tick_s = now_s;
+  sonde_session_step(session);
+}

@@ -1,0 +1,105 @@
+// From the newest surface to a frame: skin, inside, vessels, image, all of one tick.
+// penetration:        depth of the probe's face below the rest skin.
+// update_interior:    the inside and the vessels at this surface.
+// read_vessels:       what the image plane cuts.
+// fill_frame:         everything into one slot.
+// sonde_session_show: one image.
+#include "exam/session.h"
+
+#include "base/base.h"
+#include "base/maths.h"
+
+#include <string.h>
+
+// Along the axis from well outside: the first crossing is the skin above the probe's face, whether
+// the face is above or below it. Beside the thigh the signed closest distance takes over.
+static double penetration(const sonde_session *session, sonde_pose pose) {
+  const double back_m = 0.15, reach_m = 0.3;
+  sonde_vec3 axis = q_rotate(pose.rotation, vec3(0, 0, 1));
+  sonde_vec3 outside = v_madd(pose.position, -back_m, axis);
+  sonde_surface_point hit;
+  bool clear = !sonde_surface_inside(session->rest_skin, outside);
+  if (clear && sonde_surface_raycast(session->rest_skin, outside, axis, reach_m, &hit))
+    return back_m - v_dot(v_sub(hit.point_m, outside), axis);
+  double distance = sonde_surface_closest(session->rest_skin, pose.position).distance_m;
+  return sonde_surface_inside(session->rest_skin, pose.position) ? distance : -distance;
+}
+
+static void update_interior(sonde_session *session, const unsigned char *slot) {
+  const sonde_surface_slot *head = (const void *)slot;
+  const sonde_pathology *pathology = &head->controls.pathology;
+  // another vein, not the same one in motion: it starts in equilibrium
+  bool same =
+      session->shown && memcmp(&session->shown_pathology, pathology, sizeof *pathology) == 0;
+  double since_s = (double)(head->snapshot.tick - session->shown_tick) * session->dt_s;
+  sonde_interior_input input = {
+      .positions_m = (const void *)(slot + session->positions_at),
+      .contact_forces_n = (const void *)(slot + session->forces_at),
+      .world_from_probe = head->snapshot.world_from_probe,
+      .pathology = pathology,
+      .dt_s = same ? since_s : -1.0,
+      .tick = head->snapshot.tick,
+  };
+  sonde_interior_update(session->interior, &input);
+  session->shown = true;
+  session->shown_tick = head->snapshot.tick;
+  session->shown_pathology = *pathology;
+}
+
+static void read_vessels(const sonde_session *session, sonde_snapshot *snapshot) {
+  sonde_vessel_state vein, artery;
+  sonde_pose pose = snapshot->world_from_probe;
+  if (sonde_interior_vessel_at_plane(session->interior, 0, pose, &vein)) {
+    snapshot->vein_area_ratio = vein.area_ratio;
+    snapshot->vein_short_m = 2.0 * vein.half_short_m;
+  }
+  if (sonde_interior_vessel_at_plane(session->interior, 1, pose, &artery))
+    snapshot->artery_area_ratio = artery.area_ratio;
+}
+
+static void fill_frame(sonde_session *session, const unsigned char *slot, unsigned char *out) {
+  const sonde_surface_slot *head = (const void *)slot;
+  const sonde_vec3 *positions_m = (const void *)(slot + session->positions_at);
+  float *skin_m = (float *)(void *)(out + session->skin_at);
+  for (size_t i = 0; i < session->nodes; ++i) {
+    skin_m[3 * i] = (float)positions_m[i].x;
+    skin_m[3 * i + 1] = (float)positions_m[i].y;
+    skin_m[3 * i + 2] = (float)positions_m[i].z;
+  }
+  sonde_image image = {.width = session->image_width,
+                       .height = session->image_height,
+                       .pixels = out + session->pixels_at};
+  double aperture_m = 2.0 * session->probes[head->snapshot.probe].half_x_m;
+  sonde_echo_render(session->echo, head->snapshot.world_from_probe, aperture_m,
+                    &head->controls.pathology, &head->controls.echo, &image);
+  SONDE_ASSERT(sonde_interior_tick(session->interior) == head->snapshot.tick);
+  sonde_frame *frame = (sonde_frame *)(void *)out;
+  *frame = (sonde_frame){.snapshot = head->snapshot,
+                         .skin_m = skin_m,
+                         .pixels = image.pixels,
+                         .width = image.width,
+                         .height = image.height,
+                         .width_m = image.width_m,
+                         .height_m = image.height_m};
+  frame->snapshot.penetration_m = penetration(session, head->snapshot.world_from_probe);
+  read_vessels(session, &frame->snapshot);
+}
+
+bool sonde_session_show(sonde_session *session) {
+  const unsigned char *slot = sonde_mailbox_read(session->surface_box);
+  if (!slot) return false;
+  update_interior(session, slot);
+  fill_frame(session, slot, sonde_mailbox_write_slot(session->frame_box));
+  sonde_mailbox_publish(session->frame_box);
+  uint64_t images = atomic_load_explicit(&session->images, memory_order_relaxed);
+  atomic_store_explicit(&session->images, images + 1, memory_order_release);
+  return true;
+}
+
+bool sonde_session_frame(sonde_session *session, sonde_frame *frame) {
+  const sonde_frame *newest = sonde_mailbox_read(session->frame_box);
+  if (!newest) return false;
+  SONDE_ASSERT(newest->width == session->image_width && newest->pixels != NULL);
+  *frame = *newest;
+  return true;
+}

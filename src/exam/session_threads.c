@@ -1,0 +1,86 @@
+// The threads of a session in real time, and the lockstep tick.
+// image_main, record_main: look for work every millisecond (every five), so that the tick never
+//                          has to wake anyone.
+// sonde_session_drain:     ring to file.
+// sonde_session_start/stop/tick: the interface.
+#include "exam/session.h"
+
+#include "base/base.h"
+#include "base/clock.h"
+
+#include <string.h>
+
+static void *image_main(void *argument) {
+  sonde_session *session = argument;
+  while (!atomic_load_explicit(&session->stop_image, memory_order_acquire))
+    if (!sonde_session_show(session)) sonde_clock_sleep_until(sonde_clock_now() + 1e-3);
+  return NULL;
+}
+
+void sonde_session_drain(sonde_session *session) {
+  sonde_record record;
+  if (!session->recorder) return;
+  while (sonde_ring_pop(session->records, &record))
+    sonde_recorder_write(session->recorder, &record);
+}
+
+static void *record_main(void *argument) {
+  sonde_session *session = argument;
+  while (!atomic_load_explicit(&session->stop_record, memory_order_acquire)) {
+    sonde_session_drain(session);
+    sonde_clock_sleep_until(sonde_clock_now() + 5e-3);
+  }
+  return NULL;
+}
+
+static sonde_status launch(pthread_t *thread, void *(*body)(void *), sonde_session *session,
+                           bool *running, sonde_error *error) {
+  int failure = pthread_create(thread, NULL, body, session);
+  *running = failure == 0;
+  if (failure)
+    return sonde_fail(error, SONDE_MEMORY, "session: a thread could not be started: %s",
+                      strerror(failure));
+  return SONDE_OK;
+}
+
+sonde_status sonde_session_start(sonde_session *session, sonde_error *error) {
+  SONDE_ASSERT(session != NULL);
+  if (atomic_load(&session->loop)) return SONDE_OK;
+  atomic_store(&session->stop_image, false);
+  atomic_store(&session->stop_record, false);
+  session->last_tick_s = 0.0;
+  sonde_loop *loop = NULL;
+  sonde_status status =
+      launch(&session->image_thread, image_main, session, &session->image_running, error);
+  if (!status && session->recorder)
+    status = launch(&session->record_thread, record_main, session, &session->record_running, error);
+  if (!status)
+    status = sonde_loop_start(session->dt_s, sonde_session_realtime_tick, session, &loop, error);
+  atomic_store(&session->loop, loop);
+  if (status) sonde_session_stop(session);
+  return status;
+}
+
+// In the order of the flow: tick, then those who live on what it left behind.
+void sonde_session_stop(sonde_session *session) {
+  sonde_loop *loop = atomic_exchange(&session->loop, NULL);
+  if (loop) sonde_loop_stop(loop, &session->loop_stats);
+  atomic_store(&session->stop_image, true);
+  atomic_store(&session->stop_record, true);
+  if (session->image_running) pthread_join(session->image_thread, NULL);
+  if (session->record_running) pthread_join(session->record_thread, NULL);
+  session->image_running = session->record_running = false;
+  sonde_session_drain(session);
+}
+
+void sonde_session_tick(sonde_session *session) {
+  SONDE_ASSERT(!atomic_load(&session->loop));
+  sonde_session_step(session);
+  sonde_session_drain(session);
+  sonde_session_show(session);
+}
+
+sonde_loop_stats sonde_session_loop(const sonde_session *session) {
+  sonde_loop *loop = atomic_load(&session->loop);
+  return loop ? sonde_loop_read(loop) : session->loop_stats;
+}

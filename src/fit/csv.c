@@ -1,0 +1,149 @@
+// take_line: cuts the next line off the text, without its line end.
+// split: cuts a line into trimmed cells.
+// next_content: the next line that is neither empty nor a comment.
+// read_header: names of the columns, all different.
+#include "fit/csv.h"
+
+#include <math.h>
+#include <string.h>
+
+static char *take_line(sonde_csv *csv) {
+  if (csv->cursor >= csv->end) return NULL;
+  char *line = csv->cursor;
+  char *stop = memchr(line, '\n', (size_t)(csv->end - line));
+  if (!stop) stop = csv->end;
+  csv->cursor = stop < csv->end ? stop + 1 : csv->end;
+  *stop = 0;
+  if (stop > line && stop[-1] == '\r') stop[-1] = 0;
+  ++csv->line;
+  return line;
+}
+
+static bool is_blank(char c) { return c == ' ' || c == '\t'; }
+
+static char *trim(char *cell) {
+  while (is_blank(*cell)) ++cell;
+  size_t length = strlen(cell);
+  while (length && is_blank(cell[length - 1])) cell[--length] = 0;
+  return cell;
+}
+
+// Returns the number of cells, of which at most CSV_COLUMNS are stored.
+static uint32_t split(char *line, const char **cells) {
+  uint32_t count = 0;
+  for (char *start = line; start; ++count) {
+    char *comma = strchr(start, ',');
+    if (comma) *comma = 0;
+    if (count < CSV_COLUMNS) cells[count] = trim(start);
+    start = comma ? comma + 1 : NULL;
+  }
+  SONDE_ASSERT(count > 0);
+  return count;
+}
+
+static char *next_content(sonde_csv *csv) {
+  char *line = take_line(csv);
+  while (line) {
+    const char *first = line + strspn(line, " \t");
+    if (*first && *first != '#') return line;
+    line = take_line(csv);
+  }
+  return NULL;
+}
+
+static sonde_status read_header(sonde_csv *csv, sonde_error *error) {
+  char *line = next_content(csv);
+  if (!line)
+    return sonde_fail(error, SONDE_FORMAT, "%s: is empty, expected a header line with column names",
+                      csv->path);
+  uint32_t count = split(line, csv->name);
+  if (count > CSV_COLUMNS)
+    return sonde_fail(error, SONDE_FORMAT, "%s:%u: %u columns, expected at most %d", csv->path,
+                      csv->line, count, CSV_COLUMNS);
+  csv->column_count = count;
+  for (uint32_t i = 0; i < count; ++i)
+    if (sonde_csv_column(csv, csv->name[i]) != i && csv->name[i][0])
+      return sonde_fail(error, SONDE_FORMAT, "%s:%u: column '%s' appears twice, expected it once",
+                        csv->path, csv->line, csv->name[i]);
+  return SONDE_OK;
+}
+
+sonde_status sonde_csv_open(sonde_csv *csv, const char *path, sonde_error *error) {
+  *csv = (sonde_csv){.path = path};
+  size_t bytes;
+  sonde_status status = sonde_file_load(path, &csv->text, &bytes, error);
+  if (status) return status;
+  csv->cursor = csv->text;
+  csv->end = csv->text + bytes;
+  if (memchr(csv->text, 0, bytes))
+    return sonde_fail(error, SONDE_FORMAT, "%s: contains a zero byte, expected text", path);
+  if (bytes >= 3 && !memcmp(csv->text, "\xEF\xBB\xBF", 3)) csv->cursor += 3;
+  return read_header(csv, error);
+}
+
+void sonde_csv_close(sonde_csv *csv) {
+  sonde_free(csv->text);
+  *csv = (sonde_csv){0};
+}
+
+uint32_t sonde_csv_column(const sonde_csv *csv, const char *name) {
+  for (uint32_t i = 0; i < csv->column_count; ++i)
+    if (!strcmp(csv->name[i], name)) return i;
+  return UINT32_MAX;
+}
+
+sonde_status sonde_csv_require(const sonde_csv *csv, const char *const *names, uint32_t count,
+                               uint32_t *columns, sonde_error *error) {
+  for (uint32_t i = 0; i < count; ++i) {
+    columns[i] = sonde_csv_column(csv, names[i]);
+    if (columns[i] == UINT32_MAX)
+      return sonde_fail(error, SONDE_FORMAT, "%s:%u: column '%s' is missing from the header",
+                        csv->path, csv->line, names[i]);
+  }
+  return SONDE_OK;
+}
+
+sonde_status sonde_csv_next(sonde_csv *csv, bool *found, sonde_error *error) {
+  char *line = next_content(csv);
+  *found = line != NULL;
+  if (!line) return SONDE_OK;
+  uint32_t count = split(line, csv->cell);
+  if (count != csv->column_count)
+    return sonde_fail(error, SONDE_FORMAT, "%s:%u: %u cells, expected %u as in the header",
+                      csv->path, csv->line, count, csv->column_count);
+  return SONDE_OK;
+}
+
+sonde_status sonde_csv_real(const sonde_csv *csv, uint32_t column, double *value,
+                            sonde_error *error) {
+  SONDE_ASSERT(column < csv->column_count);
+  const char *text = csv->cell[column], *end;
+  *value = sonde_parse_real(text, &end);
+  if (end == text || *end)
+    return sonde_fail(error, SONDE_FORMAT, "%s:%u: column %s: expected a number, found '%.40s'",
+                      csv->path, csv->line, csv->name[column], text);
+  if (!isfinite(*value))
+    return sonde_fail(error, SONDE_FORMAT,
+                      "%s:%u: column %s: expected a finite number, found '%.40s'", csv->path,
+                      csv->line, csv->name[column], text);
+  return SONDE_OK;
+}
+
+sonde_status sonde_csv_index(const sonde_csv *csv, uint32_t column, uint32_t *value,
+                             sonde_error *error) {
+  SONDE_ASSERT(column < csv->column_count);
+  const char *text = csv->cell[column], *end;
+  double real = sonde_parse_real(text, &end);
+  if (end == text || *end || !(real >= 0 && real <= 1e9) || floor(real) < real)
+    return sonde_fail(error, SONDE_FORMAT,
+                      "%s:%u: column %s: expected a whole number >= 0, found '%.40s'", csv->path,
+                      csv->line, csv->name[column], text);
+  *value = (uint32_t)real;
+  return SONDE_OK;
+}
+
+uint32_t sonde_csv_lines_left(const sonde_csv *csv) {
+  uint32_t lines = 1;
+  for (const char *c = csv->cursor; c < csv->end; ++c) lines += *c == '\n';
+  return lines;
+}

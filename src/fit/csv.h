@@ -1,0 +1,38 @@
+// Comma separated text with a header line: cells by column name, errors with file, line and column.
+#ifndef SONDE_SRC_FIT_CSV_H
+#define SONDE_SRC_FIT_CSV_H
+
+#include "base/base.h"
+
+enum { CSV_COLUMNS = 64 };
+
+// One open table. Names and cells point into text.
+typedef struct sonde_csv {
+  const char *path;
+  char *text, *cursor, *end;
+  uint32_t line; // of the row in cells, 1-based
+  uint32_t column_count;
+  const char *name[CSV_COLUMNS];
+  const char *cell[CSV_COLUMNS];
+} sonde_csv;
+
+// Loads the file and reads the header line. Close also after a failure.
+sonde_status sonde_csv_open(sonde_csv *csv, const char *path, sonde_error *error);
+void sonde_csv_close(sonde_csv *csv);
+// Column of a name; UINT32_MAX when there is none.
+uint32_t sonde_csv_column(const sonde_csv *csv, const char *name);
+// Finds every name of a list; FORMAT names the first missing one.
+sonde_status sonde_csv_require(const sonde_csv *csv, const char *const *names, uint32_t count,
+                               uint32_t *columns, sonde_error *error);
+// Reads the next row; *found is false at the end.
+sonde_status sonde_csv_next(sonde_csv *csv, bool *found, sonde_error *error);
+// Finite real number of the current row.
+sonde_status sonde_csv_real(const sonde_csv *csv, uint32_t column, double *value,
+                            sonde_error *error);
+// Whole number from 0 to 10^9.
+sonde_status sonde_csv_index(const sonde_csv *csv, uint32_t column, uint32_t *value,
+                             sonde_error *error);
+// Number of data rows from the cursor on, at most (empty and comment lines included).
+uint32_t sonde_csv_lines_left(const sonde_csv *csv);
+
+#endif

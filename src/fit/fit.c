@@ -1,0 +1,249 @@
+// fit_curves:     stage 1, eq. (1) for every curve by itself.
+// start_sites:    geometric means of a site's curves.
+// fit_sites:      arrow Levenberg-Marquardt over all sites, without edges, then with them.
+// finish:         site parameters, forces and error report of the last stage.
+#include "fit/arrow.h"
+#include "fit/fit_inside.h"
+#include "fit/law.h"
+#include "fit/simplified.h"
+
+#include "base/maths.h"
+
+#include <string.h>
+
+static const double COLD_K0 = 1.8e5, COLD_ABOVE_M = 0.02;
+static const double EDGE_START_N_M = 50.0, TENSION_START_N = 1e-3;
+static const double LN_EDGE_LOW = -11.5, LN_EDGE_HIGH = 18.4; // 1e-5 .. 1e8 N/m
+static const double LN_TENSION_LOW = -13.8, LN_TENSION_HIGH = 6.9;
+
+sonde_fit_def sonde_fit_def_default(void) {
+  return (sonde_fit_def){.stages = 2, .max_iterations = 400};
+}
+
+static sonde_status check_def(const sonde_fit_def *def, sonde_error *error) {
+  if (def->stages < 1 || def->stages > 2)
+    return sonde_fail(error, SONDE_ARGUMENT, "stages is %u, expected 1 or 2", def->stages);
+  if ((unsigned)def->weights > SONDE_WEIGHTS_RELATIVE || (unsigned)def->loss > SONDE_LOSS_STUDENT)
+    return sonde_fail(error, SONDE_ARGUMENT, "unknown weights or loss");
+  if (!(def->loss_scale >= 0) || def->max_iterations < 1)
+    return sonde_fail(error, SONDE_ARGUMENT,
+                      "loss_scale is %g and max_iterations %u, expected >= 0 and >= 1",
+                      def->loss_scale, def->max_iterations);
+  return SONDE_OK;
+}
+
+// ---- stage 1 ------------------------------------------------------------------------------
+
+typedef struct curve_buffer {
+  double *depth_m, *force_n;
+} curve_buffer;
+
+static sonde_status fit_one_curve(const sonde_model *model, const sonde_site_table *sites,
+                                  const sonde_measurements *m, const sonde_fit_plan *plan,
+                                  const sonde_fit_def *def, uint32_t c, curve_buffer buffer,
+                                  sonde_fit_result *result, sonde_error *error) {
+  uint32_t first = plan->curve_start[c], count = plan->curve_start[c + 1] - first;
+  uint32_t probe = plan->curve_probe[c];
+  for (uint32_t k = 0; k < count; ++k) {
+    const sonde_datum *d = &m->data[plan->row[first + k]];
+    buffer.depth_m[k] = d->penetration_m;
+    buffer.force_n[k] = d->force_n;
+  }
+  double area_m2 = 4.0 * plan->half_u_m[probe] * plan->half_v_m[probe];
+  sonde_curve_fit *fit = &result->curves[c];
+  sonde_fit_def scaled = *def;
+  if (def->weights == SONDE_WEIGHTS_RELATIVE) scaled.loss_scale *= plan->mean_force_n[probe];
+  sonde_error inner;
+  sonde_status status = sonde_fit_curve(buffer.depth_m, buffer.force_n, count, area_m2,
+                                        model->law.guard, &scaled, NULL, fit, &inner);
+  fit->site = sites->sites[plan->curve_site[c]].id;
+  snprintf(fit->probe, sizeof fit->probe, "%s", plan->probe[probe]);
+  if (status)
+    return sonde_fail(error, status, "site %u, probe %s: %s", fit->site, fit->probe, inner.message);
+  for (uint32_t k = 0; k < count; ++k) {
+    double by_xm;
+    double p = sonde_law_pressure(fit->k0_n_m3, fit->xm_m, buffer.depth_m[k], &by_xm);
+    result->model_n[plan->row[first + k]] = area_m2 * p;
+  }
+  return SONDE_OK;
+}
+
+static sonde_status fit_curves(const sonde_model *model, const sonde_site_table *sites,
+                               const sonde_measurements *m, const sonde_fit_plan *plan,
+                               const sonde_fit_def *def, sonde_fit_result *result,
+                               sonde_error *error) {
+  curve_buffer buffer = {SONDE_NEW(double, m->count), SONDE_NEW(double, m->count)};
+  result->curves = SONDE_NEW(sonde_curve_fit, plan->curve_count);
+  sonde_status status = SONDE_OK;
+  if (!buffer.depth_m || !buffer.force_n || !result->curves) status = sonde_fail_memory(error);
+  for (uint32_t c = 0; c < plan->curve_count && !status; ++c)
+    status = fit_one_curve(model, sites, m, plan, def, c, buffer, result, error);
+  result->curve_count = plan->curve_count;
+  result->stage1_parameters = 2 * plan->curve_count;
+  if (!status)
+    status = sonde_error_report_of(m->data, result->model_n, m->count, &result->stage1, error);
+  sonde_free(buffer.depth_m);
+  sonde_free(buffer.force_n);
+  return status;
+}
+
+// ---- stage 2 ------------------------------------------------------------------------------
+
+static void start_sites(const sonde_fit_plan *plan, const sonde_fit_result *result,
+                        const double *floor_m, bool cold, double (*theta)[2]) {
+  for (uint32_t s = 0, c = 0; s < plan->site_count; ++s) {
+    double ln_k0 = 0.0, ln_xm = 0.0, curves = 0.0;
+    for (; c < plan->curve_count && plan->curve_site[c] == plan->site_index[s]; ++c, ++curves) {
+      ln_k0 += log(result->curves[c].k0_n_m3);
+      ln_xm += log(result->curves[c].xm_m);
+    }
+    SONDE_ASSERT(curves > 0);
+    double xm_m = cold ? floor_m[s] + COLD_ABOVE_M : exp(ln_xm / curves);
+    sonde_law_log(cold ? COLD_K0 : exp(ln_k0 / curves), xm_m, floor_m[s], theta[s]);
+  }
+}
+
+static sonde_arrow_problem arrow_problem(const sonde_site_problem *p, const sonde_fit_def *def,
+                                         const sonde_progress *progress) {
+  return (sonde_arrow_problem){.block_count = p->plan->site_count,
+                               .border_count = p->edges ? (p->tension ? 2u : 1u) : 0u,
+                               .row_start = p->plan->site_start,
+                               .row = sonde_site_row,
+                               .user = p,
+                               .low = {LAW_LOW[0], LAW_LOW[1]},
+                               .high = {LAW_HIGH[0], LAW_HIGH[1]},
+                               .border_low = {LN_EDGE_LOW, LN_TENSION_LOW},
+                               .border_high = {LN_EDGE_HIGH, LN_TENSION_HIGH},
+                               .loss = def->loss,
+                               .loss_scale = def->loss_scale,
+                               .max_iterations = def->max_iterations,
+                               .progress = progress};
+}
+
+// Sites without edges first: its solution is the model of stage 1 and the start of stage 2.
+static sonde_status fit_sites(sonde_site_problem *p, const sonde_fit_def *def,
+                              const sonde_progress *progress, double (*theta)[2], double *border,
+                              sonde_arrow_result *found, sonde_error *error) {
+  sonde_status status = SONDE_OK;
+  if (!def->cold_start || def->stages == 1) {
+    sonde_arrow_problem problem = arrow_problem(p, def, NULL);
+    status = sonde_arrow_minimise(&problem, theta, border, found, error);
+  }
+  if (status || def->stages == 1) return status;
+  p->edges = true;
+  p->tension = def->fit_pretension;
+  sonde_arrow_problem problem = arrow_problem(p, def, progress);
+  status = sonde_arrow_minimise(&problem, theta, border, found, error);
+  if (!status && found->cancelled)
+    status = sonde_fail(error, SONDE_CANCELLED, "the fit was cancelled; nothing is kept");
+  return status;
+}
+
+// ---- results ------------------------------------------------------------------------------
+
+// Sites without measurements get the geometric mean of the others.
+static void set_sites(const sonde_fit_plan *plan, const double *floor_m, const double (*theta)[2],
+                      sonde_site *sites, uint32_t count) {
+  double ln_k0 = 0.0, ln_xm = 0.0;
+  for (uint32_t i = 0; i < count; ++i) sites[i].k0_n_m3 = sites[i].xm_m = 0.0;
+  for (uint32_t s = 0; s < plan->site_count; ++s) {
+    sonde_law law = sonde_law_of(theta[s], floor_m[s]);
+    sites[plan->site_index[s]].k0_n_m3 = law.k0_n_m3;
+    sites[plan->site_index[s]].xm_m = law.xm_m;
+    ln_k0 += theta[s][0] / plan->site_count;
+    ln_xm += log(law.xm_m) / plan->site_count;
+  }
+  uint32_t filled = 0;
+  for (uint32_t i = 0; i < count; ++i) {
+    if (sites[i].k0_n_m3 > 0) continue;
+    sites[i].k0_n_m3 = exp(ln_k0);
+    sites[i].xm_m = exp(ln_xm);
+    ++filled;
+  }
+  if (filled)
+    sonde_log(SONDE_LOG_WARNING, "%u sites have no measurement and get the mean parameters",
+              filled);
+}
+
+static sonde_status finish(const sonde_site_problem *p, const double (*theta)[2],
+                           const double *border, const sonde_arrow_result *found,
+                           sonde_fit_result *result, sonde_error *error) {
+  const sonde_fit_plan *plan = p->plan;
+  set_sites(plan, p->floor_m, theta, result->sites, result->site_count);
+  result->parameters = result->stage1_parameters;
+  if (!p->edges) return SONDE_OK;
+  result->parameters = 2 * plan->site_count + (p->tension ? 2 : 1);
+  result->law.edge_stiffness_n_m = exp(border[0]);
+  if (p->tension) result->law.edge_pretension_n = exp(border[1]);
+  result->iterations = found->iterations;
+  result->converged = found->converged;
+  result->cost = found->cost;
+  result->start_cost = found->start_cost;
+  if (plan->row_count > result->parameters) {
+    double variance = 2.0 * found->cost / (plan->row_count - result->parameters);
+    result->edge_sd_log = sqrt(variance * found->border_variance[0]);
+  }
+  for (uint32_t s = 0; s < plan->site_count; ++s)
+    for (uint32_t r = plan->site_start[s]; r < plan->site_start[s + 1]; ++r) {
+      double jacobian[4];
+      result->model_n[plan->row[r]] = sonde_site_force(p, s, r, theta[s], border, jacobian);
+    }
+  return sonde_error_report_of(p->m->data, result->model_n, p->m->count, &result->stage2, error);
+}
+
+static sonde_status fit_model(const sonde_model *model, const sonde_site_table *sites,
+                              sonde_site_problem *p, const sonde_fit_def *def,
+                              const sonde_progress *progress, sonde_fit_result *result,
+                              sonde_error *error) {
+  double border[ARROW_BORDER] = {log(EDGE_START_N_M), log(TENSION_START_N)};
+  sonde_arrow_result found = {0};
+  double(*theta)[2] = sonde_calloc(p->plan->site_count, sizeof *theta);
+  sonde_status status = theta ? SONDE_OK : sonde_fail_memory(error);
+  if (!status) status = sonde_site_problem_create(model, sites, def, p, error);
+  if (!status) start_sites(p->plan, result, p->floor_m, def->cold_start, theta);
+  if (!status) status = fit_sites(p, def, progress, theta, border, &found, error);
+  if (!status) status = finish(p, (const double(*)[2])theta, border, &found, result, error);
+  sonde_free(theta);
+  return status;
+}
+
+static sonde_status allocate_result(const sonde_model *model, const sonde_site_table *sites,
+                                    const sonde_measurements *m, sonde_fit_result *result,
+                                    sonde_error *error) {
+  *result = (sonde_fit_result){.law = model->law, .site_count = sites->count, .converged = true};
+  result->sites = SONDE_NEW(sonde_site, sites->count);
+  result->model_n = SONDE_NEW(double, m->count);
+  if (!result->sites || !result->model_n) return sonde_fail_memory(error);
+  memcpy(result->sites, sites->sites, sites->count * sizeof *result->sites);
+  return SONDE_OK;
+}
+
+sonde_status sonde_fit(const sonde_model *model, const sonde_site_table *sites,
+                       const sonde_measurements *measurements, const sonde_fit_def *def,
+                       const sonde_progress *progress, sonde_fit_result *result,
+                       sonde_error *error) {
+  *result = (sonde_fit_result){0};
+  sonde_status status = check_def(def, error);
+  if (status) return status;
+  sonde_fit_def full = *def;
+  if (!(full.loss_scale > 0)) full.loss_scale = full.weights == SONDE_WEIGHTS_RELATIVE ? 0.05 : 0.5;
+  sonde_fit_plan plan;
+  status = sonde_fit_plan_create(sites, measurements, &plan, error);
+  if (status) return status;
+  sonde_site_problem problem = {.plan = &plan, .m = measurements};
+  status = allocate_result(model, sites, measurements, result, error);
+  if (!status) status = fit_curves(model, sites, measurements, &plan, &full, result, error);
+  if (!status) status = fit_model(model, sites, &problem, &full, progress, result, error);
+  sonde_site_problem_clear(&problem);
+  sonde_fit_plan_clear(&plan);
+  if (status) sonde_fit_result_clear(result);
+  return status;
+}
+
+void sonde_fit_result_clear(sonde_fit_result *result) {
+  if (!result) return;
+  sonde_free(result->curves);
+  sonde_free(result->sites);
+  sonde_free(result->model_n);
+  *result = (sonde_fit_result){0};
+}

@@ -1,0 +1,127 @@
+// add_probes: the distinct probes, their footprints and mean forces.
+// sort_rows: row order (site index, probe, penetration).
+// cut: marks where curves and sites begin.
+#include "fit/fit_inside.h"
+
+#include <math.h>
+#include <string.h>
+
+typedef struct sort_key {
+  uint32_t site, probe, row;
+  double depth_m;
+} sort_key;
+
+static int compare_keys(const void *a, const void *b) {
+  const sort_key *p = a, *q = b;
+  if (p->site != q->site) return p->site < q->site ? -1 : 1;
+  if (p->probe != q->probe) return p->probe < q->probe ? -1 : 1;
+  int depth = (p->depth_m > q->depth_m) - (p->depth_m < q->depth_m);
+  return depth ? depth : (p->row > q->row) - (p->row < q->row);
+}
+
+static sonde_status add_probe_sizes(sonde_fit_plan *plan, sonde_error *error) {
+  for (uint32_t p = 0; p < plan->probe_count; ++p) {
+    sonde_probe probe;
+    sonde_status status = sonde_probe_create(plan->probe[p], &probe, error);
+    if (status) return status;
+    plan->half_u_m[p] = probe.half_x_m;
+    plan->half_v_m[p] = probe.half_y_m;
+    bool rectangular = probe.rectangular;
+    sonde_probe_clear(&probe);
+    if (!rectangular)
+      return sonde_fail(error, SONDE_ARGUMENT,
+                        "probe '%s' has no rectangular footprint, expected one that has",
+                        plan->probe[p]);
+  }
+  return SONDE_OK;
+}
+
+// Fills keys and the probes' mean forces.
+static sonde_status make_keys(const sonde_site_table *sites, const sonde_measurements *m,
+                              sonde_fit_plan *plan, sort_key *keys, sonde_error *error) {
+  uint32_t rows_of[SONDE_FIT_PROBES] = {0};
+  for (uint32_t i = 0; i < m->count; ++i) {
+    const sonde_datum *d = &m->data[i];
+    uint32_t site = sonde_site_find(sites, d->site);
+    uint32_t probe = sonde_probe_index(plan->probe, &plan->probe_count, d->probe);
+    if (site == UINT32_MAX)
+      return sonde_fail(error, SONDE_MISMATCH, "measurement %u: site %u is not in the site table",
+                        i, d->site);
+    if (probe == UINT32_MAX)
+      return sonde_fail(error, SONDE_ARGUMENT, "more than %d probes in one set of measurements",
+                        SONDE_FIT_PROBES);
+    keys[i] = (sort_key){site, probe, i, d->penetration_m};
+    plan->mean_force_n[probe] += d->force_n;
+    ++rows_of[probe];
+  }
+  for (uint32_t p = 0; p < plan->probe_count; ++p) plan->mean_force_n[p] /= rows_of[p];
+  return SONDE_OK;
+}
+
+static void cut(sonde_fit_plan *plan, const sort_key *keys) {
+  uint32_t curve = UINT32_MAX, site = UINT32_MAX; // wrap to 0 at the first row
+  for (uint32_t r = 0; r < plan->row_count; ++r) {
+    bool new_site = r == 0 || keys[r].site != keys[r - 1].site;
+    if (new_site) {
+      plan->site_start[++site] = r;
+      plan->site_index[site] = keys[r].site;
+    }
+    if (new_site || keys[r].probe != keys[r - 1].probe) {
+      plan->curve_start[++curve] = r;
+      plan->curve_site[curve] = keys[r].site;
+      plan->curve_probe[curve] = keys[r].probe;
+    }
+    plan->row[r] = keys[r].row;
+    plan->row_probe[r] = keys[r].probe;
+    plan->row_curve[r] = curve;
+    plan->site_deepest_m[site] = fmax(plan->site_deepest_m[site], keys[r].depth_m);
+  }
+  plan->curve_count = curve + 1;
+  plan->site_count = site + 1;
+  plan->curve_start[plan->curve_count] = plan->site_start[plan->site_count] = plan->row_count;
+}
+
+static bool allocate(sonde_fit_plan *plan, uint32_t rows) {
+  plan->row_count = rows;
+  plan->row = SONDE_NEW(uint32_t, rows);
+  plan->row_probe = SONDE_NEW(uint32_t, rows);
+  plan->row_curve = SONDE_NEW(uint32_t, rows);
+  plan->curve_start = SONDE_NEW(uint32_t, rows + 1);
+  plan->curve_site = SONDE_NEW(uint32_t, rows);
+  plan->curve_probe = SONDE_NEW(uint32_t, rows);
+  plan->site_start = SONDE_NEW(uint32_t, rows + 1);
+  plan->site_index = SONDE_NEW(uint32_t, rows);
+  plan->site_deepest_m = SONDE_NEW(double, rows);
+  return plan->row && plan->row_probe && plan->row_curve && plan->curve_start && plan->curve_site &&
+         plan->curve_probe && plan->site_start && plan->site_index && plan->site_deepest_m;
+}
+
+sonde_status sonde_fit_plan_create(const sonde_site_table *sites, const sonde_measurements *m,
+                                   sonde_fit_plan *plan, sonde_error *error) {
+  *plan = (sonde_fit_plan){0};
+  if (!m->count) return sonde_fail(error, SONDE_ARGUMENT, "no measurements, expected at least one");
+  sort_key *keys = SONDE_NEW(sort_key, m->count);
+  sonde_status status = keys && allocate(plan, m->count) ? SONDE_OK : sonde_fail_memory(error);
+  if (!status) status = make_keys(sites, m, plan, keys, error);
+  if (!status) status = add_probe_sizes(plan, error);
+  if (!status) {
+    qsort(keys, m->count, sizeof *keys, compare_keys);
+    cut(plan, keys);
+  }
+  sonde_free(keys);
+  if (status) sonde_fit_plan_clear(plan);
+  return status;
+}
+
+void sonde_fit_plan_clear(sonde_fit_plan *plan) {
+  sonde_free(plan->row);
+  sonde_free(plan->row_probe);
+  sonde_free(plan->row_curve);
+  sonde_free(plan->curve_start);
+  sonde_free(plan->curve_site);
+  sonde_free(plan->curve_probe);
+  sonde_free(plan->site_start);
+  sonde_free(plan->site_index);
+  sonde_free(plan->site_deepest_m);
+  *plan = (sonde_fit_plan){0};
+}

@@ -1,0 +1,90 @@
+// predict_simplified: closed formula per row.
+// predict_full_curve: equilibrium per depth, each from the one before.
+// sonde_predict: curves in parallel.
+#include "base/maths.h"
+#include "fit/fit_inside.h"
+#include "fit/parallel.h"
+#include "fit/press.h"
+
+sonde_predict_def sonde_predict_def_default(void) {
+  return (sonde_predict_def){.relative_residual = 1e-6, .max_iterations = 200};
+}
+
+typedef struct prediction {
+  const sonde_model *model;
+  const sonde_site_table *sites;
+  const sonde_measurements *m;
+  const sonde_fit_plan *plan;
+  sonde_press *crew; // NULL: simplified
+  double *predicted_n;
+} prediction;
+
+static void predict_simplified(const prediction *p, uint32_t curve,
+                               const sonde_footprint *footprint) {
+  const sonde_fit_plan *plan = p->plan;
+  for (uint32_t r = plan->curve_start[curve]; r < plan->curve_start[curve + 1]; ++r) {
+    uint32_t row = plan->row[r];
+    p->predicted_n[row] = sonde_footprint_force(footprint, p->model, p->m->data[row].penetration_m);
+  }
+}
+
+// A depth without equilibrium leaves the rest of the curve NaN.
+static sonde_status predict_full(const prediction *p, sonde_press *press, uint32_t curve,
+                                 const sonde_footprint *footprint, const atomic_bool *stop,
+                                 sonde_error *error) {
+  const sonde_fit_plan *plan = p->plan;
+  const sonde_site *site = &p->sites->sites[plan->curve_site[curve]];
+  sonde_state_reset(press->state);
+  double force_n = 0.0;
+  for (uint32_t r = plan->curve_start[curve]; r < plan->curve_start[curve + 1]; ++r) {
+    if (atomic_load(stop)) return sonde_fail(error, SONDE_CANCELLED, "cancelled");
+    uint32_t row = plan->row[r];
+    if (!isnan(force_n))
+      force_n = sonde_press_bonded(press, site, footprint, p->m->data[row].penetration_m);
+    p->predicted_n[row] = force_n;
+  }
+  return SONDE_OK;
+}
+
+static sonde_status predict_curve(void *user, uint32_t worker, uint32_t curve,
+                                  const atomic_bool *stop, sonde_error *error) {
+  const prediction *p = user;
+  const sonde_fit_plan *plan = p->plan;
+  uint32_t probe = plan->curve_probe[curve];
+  sonde_footprint footprint;
+  sonde_status status = sonde_footprint_create(p->model, &p->sites->sites[plan->curve_site[curve]],
+                                               plan->half_u_m[probe], plan->half_v_m[probe],
+                                               SONDE_COVERAGE_CLIPPED, &footprint, error);
+  if (status) return status;
+  if (p->crew)
+    status = predict_full(p, &p->crew[worker], curve, &footprint, stop, error);
+  else
+    predict_simplified(p, curve, &footprint);
+  sonde_footprint_clear(&footprint);
+  return status;
+}
+
+sonde_status sonde_predict(const sonde_model *model, const sonde_site_table *sites,
+                           const sonde_measurements *measurements, const sonde_predict_def *def,
+                           const sonde_progress *progress, double *predicted_n,
+                           sonde_error *error) {
+  if (!(def->relative_residual > 0) || def->max_iterations < 1)
+    return sonde_fail(error, SONDE_ARGUMENT,
+                      "relative_residual is %g and max_iterations %u, expected > 0 and >= 1",
+                      def->relative_residual, def->max_iterations);
+  sonde_fit_plan plan;
+  sonde_status status = sonde_fit_plan_create(sites, measurements, &plan, error);
+  if (status) return status;
+  prediction p = {model, sites, measurements, &plan, NULL, predicted_n};
+  uint32_t workers = sonde_parallel_workers(def->threads, plan.curve_count);
+  for (uint32_t i = 0; i < measurements->count; ++i) predicted_n[i] = NAN;
+  if (def->interaction == SONDE_INTERACTION_FULL)
+    status = sonde_press_crew_create(model, def->relative_residual, def->max_iterations, workers,
+                                     &p.crew, error);
+  if (!status)
+    status = sonde_parallel_run(plan.curve_count, workers, predict_curve, &p, progress,
+                                "predicting", error);
+  sonde_press_crew_destroy(p.crew, workers);
+  sonde_fit_plan_clear(&plan);
+  return status;
+}

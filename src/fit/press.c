@@ -1,0 +1,74 @@
+// probe_pose: beam axis against the normal, image plane along u.
+// sonde_press_bonded: prescribed footprint. sonde_press_probe: convex body.
+#include "fit/press.h"
+
+#include "base/maths.h"
+
+sonde_status sonde_press_create(const sonde_model *model, double relative_residual,
+                                uint32_t max_iterations, sonde_press *press, sonde_error *error) {
+  *press = (sonde_press){
+      .model = model, .relative_residual = relative_residual, .max_iterations = max_iterations};
+  sonde_world_def def = sonde_world_def_default();
+  def.sleep_displacement_m = 0;
+  press->position_m = SONDE_NEW(sonde_vec3, model->surface.vertex_count);
+  sonde_status status = press->position_m ? SONDE_OK : sonde_fail_memory(error);
+  if (!status) status = sonde_state_create(model, &def, &press->state, error);
+  if (status) sonde_press_clear(press);
+  return status;
+}
+
+void sonde_press_clear(sonde_press *press) {
+  if (press->state) sonde_state_destroy(press->state);
+  sonde_free(press->position_m);
+  *press = (sonde_press){0};
+}
+
+sonde_status sonde_press_crew_create(const sonde_model *model, double relative_residual,
+                                     uint32_t max_iterations, uint32_t workers, sonde_press **crew,
+                                     sonde_error *error) {
+  *crew = SONDE_NEW(sonde_press, workers);
+  if (!*crew) return sonde_fail_memory(error);
+  for (uint32_t w = 0; w < workers; ++w) {
+    sonde_status status =
+        sonde_press_create(model, relative_residual, max_iterations, &(*crew)[w], error);
+    if (status) {
+      sonde_press_crew_destroy(*crew, workers);
+      *crew = NULL;
+      return status;
+    }
+  }
+  return SONDE_OK;
+}
+
+void sonde_press_crew_destroy(sonde_press *crew, uint32_t workers) {
+  for (uint32_t w = 0; crew && w < workers; ++w) sonde_press_clear(&crew[w]);
+  sonde_free(crew);
+}
+
+double sonde_press_bonded(sonde_press *press, const sonde_site *site,
+                          const sonde_footprint *footprint, double depth_m) {
+  SONDE_ASSERT(depth_m >= 0 && footprint->held_count > 0);
+  const sonde_vec3 *rest = press->model->surface.vertices;
+  for (uint32_t h = 0; h < footprint->held_count; ++h)
+    press->position_m[h] = v_madd(rest[footprint->held[h]], -depth_m, site->normal);
+  sonde_vec3 force_n = vec3(0, 0, 0);
+  sonde_settle_result result =
+      sonde_settle_bonded(press->state, footprint->held, press->position_m, footprint->held_count,
+                          press->relative_residual, press->max_iterations, &force_n);
+  return result.converged ? v_dot(force_n, site->normal) : NAN;
+}
+
+static sonde_pose probe_pose(const sonde_site *site, double depth_m) {
+  sonde_vec3 z = v_neg(site->normal), x = site->u, y = v_cross(z, x);
+  return (sonde_pose){v_madd(site->position_m, -depth_m, site->normal),
+                      q_from_matrix(m_columns(x, y, z))};
+}
+
+double sonde_press_probe(sonde_press *press, const sonde_site *site, const sonde_probe *probe,
+                         double depth_m) {
+  SONDE_ASSERT(depth_m >= 0);
+  sonde_settle_result result = sonde_settle(press->state, probe, probe_pose(site, depth_m),
+                                            press->relative_residual, press->max_iterations);
+  if (!result.converged) return NAN;
+  return v_dot(sonde_state_contact(press->state)->force_n, site->normal);
+}

@@ -1,0 +1,376 @@
+// Volume between a skin triangle and the far side of a convex body, exactly.
+//
+// All is done in barycentric coordinates of the triangle, where every plane of the body is a linear
+// function given by its values at the three corners. The triangle is clipped by the body's planes
+// to a convex polygon. At a point of it the column along `direction` ends at the first plane that
+// it leaves, so its length is the minimum of linear functions t_j = (d_j - n_j.x)/(n_j.direction)
+// over the planes with n_j.direction > 0. The polygon is split until one plane is the minimum on
+// each piece: as all t_j are linear, it is enough to compare them at the corners of a piece. On a
+// piece, t times a shape function is quadratic and the rule of the three edge middles is exact.
+//
+// With the triangle's area vector N (|N| its area, along its outward normal):
+//   volume   = (-N . direction) x mean over the triangle of t, 0 outside the polygon
+//   gradient = N x mean of phi_i (Hadamard: a surface moved by dx sweeps the volume dx . n dA)
+//
+//   clip_triangle    polygon of the part inside the body
+//   cut              one linear function against a polygon
+//   far_planes       the planes that can end a column of this polygon
+//   lowest_plane     the plane that undercuts the present one most at a corner of a piece
+//   split_pieces     pieces with one lowest plane each
+//   near_walls       the steep planes beside the polygon
+//   add_piece        integrals over a piece
+//   push_piece       integrals over its part that is nearer to the column's end than to a wall
+#include "geometry/internal.h"
+
+// Capacities. A triangle that more planes cut or end than fit here is treated as if the planes
+// beyond were absent (volume too large by what they would cut off); a triangle of the size of the
+// body's faces meets a handful.
+enum { MAX_CORNERS = 96, MAX_FAR = 192, MAX_WALLS = 16, ARENA_CORNERS = 1024, MAX_PIECES = 96 };
+
+// Barycentric coordinates of corners 1 and 2; corner 0 has the rest.
+typedef struct corner {
+  double u, v;
+} corner;
+
+// Linear function over the triangle by its values at the three corners.
+typedef struct linear {
+  double at[3];
+} linear;
+
+// The body's planes and the skin triangle, with a ball around the triangle: one product with the
+// ball's centre tells most planes from those that may matter.
+typedef struct scene {
+  const sonde_vec3 *n;
+  const double *d;
+  uint32_t planes;
+  const sonde_vec3 *x; // [3]
+  sonde_vec3 direction, centre;
+  double radius;
+} scene;
+
+static scene make_scene(const sonde_vec3 *n, const double *d, uint32_t planes,
+                        const sonde_vec3 x[3], sonde_vec3 direction) {
+  sonde_vec3 centre = v_scale(v_add(x[0], v_add(x[1], x[2])), 1.0 / 3.0);
+  double radius2 = 0;
+  for (int k = 0; k < 3; ++k) radius2 = fmax(radius2, v_norm2(v_sub(x[k], centre)));
+  // A little larger than the ball, to be safe from rounding.
+  double radius = 1.000001 * sqrt(radius2);
+  return (scene){n, d, planes, x, direction, centre, radius};
+}
+
+// Depth of the ball's centre below a plane; of the corners by below_plane.
+static double centre_depth(const scene *s, uint32_t j) {
+  return s->d[j] - v_dot(s->n[j], s->centre);
+}
+
+// scale times the depth below a plane as a function over the triangle.
+static linear below_plane(const scene *s, uint32_t j, double scale) {
+  linear f;
+  for (int k = 0; k < 3; ++k) f.at[k] = scale * (s->d[j] - v_dot(s->n[j], s->x[k]));
+  return f;
+}
+
+static double value(const linear *f, corner p) {
+  return f->at[0] * (1 - p.u - p.v) + f->at[1] * p.u + f->at[2] * p.v;
+}
+
+// Keeps the part of the polygon where f <= 0.
+static uint32_t cut(const corner *in, uint32_t count, const linear *f, corner *out) {
+  SONDE_ASSERT(in != out && count > 0);
+  uint32_t kept = 0;
+  double at_p = value(f, in[0]);
+  for (uint32_t k = 0; k < count; ++k) {
+    corner p = in[k], q = in[k + 1 < count ? k + 1 : 0];
+    double at_q = value(f, q);
+    if (at_p <= 0) out[kept++] = p;
+    if ((at_p < 0 && at_q > 0) || (at_p > 0 && at_q < 0)) {
+      double s = at_p / (at_p - at_q);
+      out[kept++] = (corner){p.u + s * (q.u - p.u), p.v + s * (q.v - p.v)};
+    }
+    at_p = at_q;
+  }
+  return kept;
+}
+
+// Polygon of the triangle inside all planes; 0 when there is none.
+static uint32_t clip_triangle(const scene *s, corner *polygon) {
+  corner other[MAX_CORNERS];
+  corner *from = polygon, *to = other;
+  uint32_t count = 3;
+  from[0] = (corner){0, 0};
+  from[1] = (corner){1, 0};
+  from[2] = (corner){0, 1};
+  for (uint32_t j = 0; j < s->planes; ++j) {
+    if (centre_depth(s, j) >= s->radius) continue;
+    linear f = below_plane(s, j, -1);
+    if (f.at[0] <= 0 && f.at[1] <= 0 && f.at[2] <= 0) continue;
+    if (f.at[0] >= 0 && f.at[1] >= 0 && f.at[2] >= 0) return 0;
+    if (count + 1 >= MAX_CORNERS) continue;
+    count = cut(from, count, &f, to);
+    if (count < 3) return 0;
+    corner *swap = from;
+    from = to;
+    to = swap;
+  }
+  SONDE_ASSERT(count <= MAX_CORNERS);
+  for (uint32_t k = 0; k < count && from != polygon; ++k) polygon[k] = from[k];
+  return count;
+}
+
+// ---- column ends --------------------------------------------------------------------------
+
+typedef struct columns {
+  uint32_t count;
+  linear length[MAX_FAR]; // of the column, if this plane were the only one
+} columns;
+
+static void range(const linear *f, const corner *polygon, uint32_t count, double *low,
+                  double *high) {
+  *low = *high = value(f, polygon[0]);
+  for (uint32_t k = 1; k < count; ++k) {
+    double t = value(f, polygon[k]);
+    *low = t < *low ? t : *low;
+    *high = t > *high ? t : *high;
+  }
+}
+
+// Collects the planes whose column is somewhere shorter than the least of all longest columns:
+// the others end nowhere first. Drops what a later, lower bound has made superfluous when full.
+static void far_planes(const scene *s, const corner *polygon, uint32_t count, columns *far) {
+  double least[MAX_FAR], bound = INFINITY;
+  far->count = 0;
+  for (uint32_t j = 0; j < s->planes; ++j) {
+    double along = v_dot(s->n[j], s->direction), low, high;
+    if (along <= 1e-9) continue;
+    // No column in the ball ends sooner at this plane than one of the bound's length.
+    if (centre_depth(s, j) - s->radius >= bound * along) continue;
+    linear t = below_plane(s, j, 1 / along);
+    range(&t, polygon, count, &low, &high);
+    if (low >= bound) continue;
+    bound = high < bound ? high : bound;
+    if (far->count == MAX_FAR) {
+      uint32_t kept = 0;
+      for (uint32_t k = 0; k < MAX_FAR; ++k) {
+        if (least[k] > bound) continue;
+        least[kept] = least[k];
+        far->length[kept++] = far->length[k];
+      }
+      far->count = kept;
+    }
+    if (far->count == MAX_FAR) continue;
+    least[far->count] = low;
+    far->length[far->count++] = t;
+  }
+  uint32_t kept = 0;
+  for (uint32_t k = 0; k < far->count; ++k)
+    if (least[k] <= bound) far->length[kept++] = far->length[k];
+  far->count = kept;
+}
+
+// Walls: planes steeper than 60 degrees to the columns that come near the polygon.
+typedef struct walls {
+  uint32_t count;
+  linear distance[MAX_WALLS];
+} walls;
+
+static void near_walls(const scene *s, const corner *polygon, uint32_t count, double deepest,
+                       double factor, walls *side) {
+  side->count = 0;
+  for (uint32_t j = 0; j < s->planes && side->count < MAX_WALLS; ++j) {
+    if (fabs(v_dot(s->n[j], s->direction)) > 0.5) continue;
+    if (factor * (centre_depth(s, j) - s->radius) >= deepest) continue;
+    linear f = below_plane(s, j, factor);
+    double low, high;
+    range(&f, polygon, count, &low, &high);
+    if (low < deepest) side->distance[side->count++] = f;
+  }
+}
+
+// Longest column over a polygon.
+static double longest(const columns *far, const corner *polygon, uint32_t count) {
+  double deepest = INFINITY, low, high;
+  for (uint32_t j = 0; j < far->count; ++j) {
+    range(&far->length[j], polygon, count, &low, &high);
+    deepest = high < deepest ? high : deepest;
+  }
+  return deepest;
+}
+
+// ---- pieces -------------------------------------------------------------------------------
+
+// Polygons of the pieces still to be done, one behind the other.
+typedef struct pieces {
+  corner corners[ARENA_CORNERS];
+  uint32_t used, count;
+  uint32_t size[MAX_PIECES], plane[MAX_PIECES];
+} pieces;
+
+// Integrals over the triangle as means: its area counts as 1.
+typedef struct integrals {
+  double phi[3], t_phi[3], area, deepest;
+  double push[3], phi_phi[6]; // over the part that is nearer to its column's end than to a wall
+} integrals;
+
+// The plane that lies lowest below `plane` at a corner; `plane` itself when none does.
+static uint32_t lowest_plane(const columns *far, uint32_t plane, const corner *polygon,
+                             uint32_t count, double slack) {
+  SONDE_ASSERT(plane < far->count && count <= MAX_CORNERS);
+  uint32_t best = plane;
+  double deepest = slack;
+  double present[MAX_CORNERS];
+  for (uint32_t k = 0; k < count; ++k) present[k] = value(&far->length[plane], polygon[k]);
+  for (uint32_t j = 0; j < far->count; ++j)
+    for (uint32_t k = 0; k < count; ++k) {
+      double below = present[k] - value(&far->length[j], polygon[k]);
+      if (below > deepest) {
+        deepest = below;
+        best = j;
+      }
+    }
+  return best;
+}
+
+// Adds the sub-triangle: weight is twice its area in barycentric coordinates, so that the whole
+// triangle weighs 1.
+static void add_triangle(const linear *t, const corner p[3], integrals *sum) {
+  double weight = (p[1].u - p[0].u) * (p[2].v - p[0].v) - (p[1].v - p[0].v) * (p[2].u - p[0].u);
+  double third = weight / 3;
+  for (int k = 0; k < 3; ++k) {
+    corner q = p[(k + 1) % 3];
+    corner middle = {0.5 * (p[k].u + q.u), 0.5 * (p[k].v + q.v)};
+    double length = third * value(t, middle), rest = 1 - middle.u - middle.v;
+    sum->phi[0] += third * rest;
+    sum->phi[1] += third * middle.u;
+    sum->phi[2] += third * middle.v;
+    sum->t_phi[0] += length * rest;
+    sum->t_phi[1] += length * middle.u;
+    sum->t_phi[2] += length * middle.v;
+  }
+  sum->area += weight;
+}
+
+// The same over a sub-triangle of the pushing part.
+static void add_push(const linear *t, const corner p[3], integrals *sum) {
+  double weight = (p[1].u - p[0].u) * (p[2].v - p[0].v) - (p[1].v - p[0].v) * (p[2].u - p[0].u);
+  double third = weight / 3;
+  for (int k = 0; k < 3; ++k) {
+    corner q = p[(k + 1) % 3];
+    corner middle = {0.5 * (p[k].u + q.u), 0.5 * (p[k].v + q.v)};
+    double length = third * value(t, middle);
+    double phi[3] = {1 - middle.u - middle.v, middle.u, middle.v};
+    for (int i = 0; i < 3; ++i) {
+      sum->push[i] += length * phi[i];
+      sum->phi_phi[i] += third * phi[i] * phi[i];
+      sum->phi_phi[3 + i] += third * phi[i] * phi[(i + 1) % 3];
+    }
+  }
+}
+
+// Cuts off what lies nearer to a wall than to the end of its column and integrates the rest.
+static void push_piece(const linear *t, const walls *side, const corner *piece, uint32_t count,
+                       integrals *sum) {
+  corner a[MAX_CORNERS], b[MAX_CORNERS];
+  const corner *from = piece;
+  corner *to = a;
+  for (uint32_t j = 0; j < side->count && count >= 3; ++j) {
+    linear excess;
+    for (int k = 0; k < 3; ++k) excess.at[k] = t->at[k] - side->distance[j].at[k];
+    if (count + 1 >= MAX_CORNERS) break;
+    count = cut(from, count, &excess, to);
+    from = to;
+    to = to == a ? b : a;
+  }
+  for (uint32_t k = 2; k < count; ++k) add_push(t, (corner[3]){from[0], from[k - 1], from[k]}, sum);
+}
+
+static void add_piece(const linear *t, const corner *polygon, uint32_t count, integrals *sum) {
+  for (uint32_t k = 0; k < count; ++k) {
+    double length = value(t, polygon[k]);
+    sum->deepest = length > sum->deepest ? length : sum->deepest;
+  }
+  for (uint32_t k = 2; k < count; ++k)
+    add_triangle(t, (corner[3]){polygon[0], polygon[k - 1], polygon[k]}, sum);
+}
+
+// Replaces the top piece by the part where `lower` is not below its plane and, on top of it, the
+// part where it is. False when there is no room.
+static bool split_top(pieces *stack, const columns *far, uint32_t lower) {
+  uint32_t top = stack->count - 1, size = stack->size[top], plane = stack->plane[top];
+  corner *base = stack->corners + stack->used - size;
+  if (stack->count == MAX_PIECES || size + 2 > MAX_CORNERS) return false;
+  if (stack->used + size + 4 > ARENA_CORNERS) return false;
+  linear more, less;
+  for (int k = 0; k < 3; ++k) {
+    less.at[k] = far->length[lower].at[k] - far->length[plane].at[k];
+    more.at[k] = -less.at[k];
+  }
+  corner old[MAX_CORNERS];
+  for (uint32_t k = 0; k < size; ++k) old[k] = base[k];
+  uint32_t above = cut(old, size, &more, base);
+  if (above < 3) above = 0;
+  uint32_t below = cut(old, size, &less, base + above);
+  SONDE_ASSERT(above + below <= size + 4);
+  if (above) {
+    stack->size[top] = above;
+    stack->count++;
+  }
+  stack->size[stack->count - 1] = below;
+  stack->plane[stack->count - 1] = lower;
+  stack->used += above + below - size;
+  return true;
+}
+
+static void split_pieces(const columns *far, const walls *side, const corner *polygon,
+                         uint32_t count, integrals *sum) {
+  pieces stack;
+  SONDE_ASSERT(far->count > 0 && count >= 3);
+  double slack = 0;
+  for (uint32_t k = 0; k < count; ++k) {
+    stack.corners[k] = polygon[k];
+    slack = fmax(slack, 1e-12 * fabs(value(&far->length[0], polygon[k])));
+  }
+  stack.used = stack.size[0] = count;
+  stack.plane[0] = 0;
+  stack.count = 1;
+  while (stack.count) {
+    uint32_t top = stack.count - 1, size = stack.size[top], plane = stack.plane[top];
+    const corner *piece = stack.corners + stack.used - size;
+    uint32_t lower = lowest_plane(far, plane, piece, size, slack);
+    if (lower != plane && split_top(&stack, far, lower)) continue;
+    add_piece(&far->length[plane], piece, size, sum);
+    push_piece(&far->length[plane], side, piece, size, sum);
+    stack.used -= size;
+    stack.count--;
+  }
+}
+
+bool sonde_clip_triangle(const sonde_vec3 *planes_n, const double *planes_d, uint32_t plane_count,
+                         const sonde_vec3 corners[3], sonde_vec3 direction, double wall_factor,
+                         sonde_clip_result *result) {
+  corner polygon[MAX_CORNERS];
+  columns far;
+  *result = (sonde_clip_result){0};
+  scene s = make_scene(planes_n, planes_d, plane_count, corners, direction);
+  uint32_t count = clip_triangle(&s, polygon);
+  if (!count) return false;
+  far_planes(&s, polygon, count, &far);
+  if (!far.count) return false;
+  walls side;
+  near_walls(&s, polygon, count, longest(&far, polygon, count), wall_factor, &side);
+  integrals sum = {0};
+  split_pieces(&far, &side, polygon, count, &sum);
+  if (!(sum.area > 0)) return false;
+  sonde_vec3 area =
+      v_scale(v_cross(v_sub(corners[1], corners[0]), v_sub(corners[2], corners[0])), 0.5);
+  double facing = -v_dot(area, direction);
+  for (int k = 0; k < 3; ++k) {
+    result->share_m3[k] = facing * sum.t_phi[k];
+    result->push_m3[k] = facing * sum.push[k];
+    result->gradient[k] = v_scale(area, sum.phi[k]);
+    result->volume_m3 += result->share_m3[k];
+  }
+  for (int k = 0; k < 6; ++k) result->overlap_m2[k] = facing * sum.phi_phi[k];
+  result->area_m2 = v_norm(area) * sum.area;
+  result->depth_max_m = sum.deepest;
+  return true;
+}

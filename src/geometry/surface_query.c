@@ -1,0 +1,206 @@
+// Queries of the surface index; they allocate nothing.
+//
+//   closest_on_triangle   closest point by the Voronoi regions of corner, side and face
+//   sonde_surface_closest branch and bound over the tree
+//   hit_triangle          ray against triangle, both sides
+//   sonde_surface_inside  sign against the pseudo-normal of the closest feature
+#include "geometry/surface.h"
+
+// Sets weights so that all but those of the closest corner or side are exactly 0.
+static void closest_on_triangle(sonde_vec3 p, sonde_vec3 a, sonde_vec3 b, sonde_vec3 c,
+                                double w[3]) {
+  sonde_vec3 ab = v_sub(b, a), ac = v_sub(c, a), ap = v_sub(p, a);
+  double d1 = v_dot(ab, ap), d2 = v_dot(ac, ap);
+  w[0] = w[1] = w[2] = 0;
+  if (d1 <= 0 && d2 <= 0) {
+    w[0] = 1;
+    return;
+  }
+  sonde_vec3 bp = v_sub(p, b), cp = v_sub(p, c);
+  double d3 = v_dot(ab, bp), d4 = v_dot(ac, bp), d5 = v_dot(ab, cp), d6 = v_dot(ac, cp);
+  if (d3 >= 0 && d4 <= d3) {
+    w[1] = 1;
+    return;
+  }
+  if (d6 >= 0 && d5 <= d6) {
+    w[2] = 1;
+    return;
+  }
+  double va = d3 * d6 - d5 * d4, vb = d5 * d2 - d1 * d6, vc = d1 * d4 - d3 * d2;
+  if (vc <= 0 && d1 >= 0 && d3 <= 0) {
+    w[1] = d1 / (d1 - d3);
+    w[0] = 1 - w[1];
+  } else if (vb <= 0 && d2 >= 0 && d6 <= 0) {
+    w[2] = d2 / (d2 - d6);
+    w[0] = 1 - w[2];
+  } else if (va <= 0 && d4 >= d3 && d5 >= d6) {
+    w[2] = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+    w[1] = 1 - w[2];
+  } else {
+    w[1] = vb / (va + vb + vc);
+    w[2] = vc / (va + vb + vc);
+    w[0] = 1 - w[1] - w[2];
+  }
+}
+
+static sonde_vec3 weighted(const sonde_mesh *mesh, uint32_t face, const double w[3]) {
+  const uint32_t *v = mesh->faces[face];
+  sonde_vec3 p = v_scale(mesh->vertices[v[0]], w[0]);
+  p = v_madd(p, w[1], mesh->vertices[v[1]]);
+  return v_madd(p, w[2], mesh->vertices[v[2]]);
+}
+
+static double box_distance2(const surface_node *node, sonde_vec3 p) {
+  double x = fmax(fmax(node->low.x - p.x, p.x - node->high.x), 0);
+  double y = fmax(fmax(node->low.y - p.y, p.y - node->high.y), 0);
+  double z = fmax(fmax(node->low.z - p.z, p.z - node->high.z), 0);
+  return x * x + y * y + z * z;
+}
+
+static void closest_in_leaf(const sonde_surface_index *index, const surface_node *node,
+                            sonde_vec3 query, sonde_surface_point *best, double *best2) {
+  SONDE_ASSERT(node->count > 0);
+  for (uint32_t i = node->first; i < node->first + node->count; ++i) {
+    sonde_surface_point trial = {.face = index->order[i]};
+    const uint32_t *v = index->mesh.faces[trial.face];
+    const sonde_vec3 *x = index->mesh.vertices;
+    closest_on_triangle(query, x[v[0]], x[v[1]], x[v[2]], trial.weight);
+    trial.point_m = weighted(&index->mesh, trial.face, trial.weight);
+    double d2 = v_norm2(v_sub(query, trial.point_m));
+    if (d2 < *best2) {
+      *best2 = d2;
+      *best = trial;
+    }
+  }
+}
+
+sonde_surface_point sonde_surface_closest(const sonde_surface_index *index, sonde_vec3 query) {
+  SONDE_ASSERT(index != NULL && index->node_count > 0);
+  uint32_t stack[SURFACE_STACK], depth = 0;
+  double bound[SURFACE_STACK], best2 = INFINITY;
+  sonde_surface_point best = {0};
+  stack[depth] = 0;
+  bound[depth++] = box_distance2(&index->nodes[0], query);
+  while (depth) {
+    uint32_t at = stack[--depth];
+    if (bound[depth] >= best2) continue;
+    const surface_node *node = &index->nodes[at];
+    if (node->count) {
+      closest_in_leaf(index, node, query, &best, &best2);
+      continue;
+    }
+    SONDE_ASSERT(depth + 2 <= SURFACE_STACK);
+    uint32_t near = at + 1, far = node->first;
+    double d_near = box_distance2(&index->nodes[near], query);
+    double d_far = box_distance2(&index->nodes[far], query);
+    bool swap = d_far < d_near;
+    stack[depth] = swap ? near : far;
+    bound[depth++] = swap ? d_near : d_far;
+    stack[depth] = swap ? far : near;
+    bound[depth++] = swap ? d_far : d_near;
+  }
+  best.distance_m = sqrt(best2);
+  return best;
+}
+
+// ---- rays ---------------------------------------------------------------------------------
+
+typedef struct ray {
+  sonde_vec3 origin, direction, inverse;
+} ray;
+
+static void narrow(double origin, double inverse, double low, double high, double *enter,
+                   double *leave) {
+  double a = (low - origin) * inverse, b = (high - origin) * inverse;
+  // A ray inside a slab's plane gives 0 * inf = NaN, which fmin and fmax pass over.
+  *enter = fmax(*enter, fmin(a, b));
+  *leave = fmin(*leave, fmax(a, b));
+}
+
+static bool enters_box(const surface_node *node, const ray *r, double reach) {
+  double enter = 0, leave = reach;
+  narrow(r->origin.x, r->inverse.x, node->low.x, node->high.x, &enter, &leave);
+  narrow(r->origin.y, r->inverse.y, node->low.y, node->high.y, &enter, &leave);
+  narrow(r->origin.z, r->inverse.z, node->low.z, node->high.z, &enter, &leave);
+  return enter <= leave * (1 + 1e-12) + 1e-12;
+}
+
+// Solves origin + t direction = a + u (b - a) + v (c - a); sides count as hit within rounding.
+static bool hit_triangle(const ray *r, sonde_vec3 a, sonde_vec3 b, sonde_vec3 c, double *t,
+                         double w[3]) {
+  const double slack = 1e-12;
+  sonde_vec3 ab = v_sub(b, a), ac = v_sub(c, a), from = v_sub(r->origin, a);
+  sonde_vec3 h = v_cross(r->direction, ac), q = v_cross(from, ab);
+  double det = v_dot(ab, h);
+  if (fabs(det) <= 1e-14 * v_norm(ab) * v_norm(ac)) return false;
+  w[1] = v_dot(from, h) / det;
+  w[2] = v_dot(r->direction, q) / det;
+  w[0] = 1 - w[1] - w[2];
+  *t = v_dot(ac, q) / det;
+  return w[0] >= -slack && w[1] >= -slack && w[2] >= -slack;
+}
+
+static void hit_leaf(const sonde_surface_index *index, const surface_node *node, const ray *r,
+                     sonde_surface_point *hit, bool *found) {
+  for (uint32_t i = node->first; i < node->first + node->count; ++i) {
+    sonde_surface_point trial = {.face = index->order[i]};
+    const uint32_t *v = index->mesh.faces[trial.face];
+    const sonde_vec3 *x = index->mesh.vertices;
+    if (!hit_triangle(r, x[v[0]], x[v[1]], x[v[2]], &trial.distance_m, trial.weight)) continue;
+    if (trial.distance_m < 0 || trial.distance_m > hit->distance_m) continue;
+    if (*found && trial.distance_m == hit->distance_m && trial.face > hit->face) continue;
+    *hit = trial;
+    *found = true;
+  }
+}
+
+bool sonde_surface_raycast(const sonde_surface_index *index, sonde_vec3 origin,
+                           sonde_vec3 direction, double max_distance_m, sonde_surface_point *hit) {
+  SONDE_ASSERT(index != NULL && index->node_count > 0);
+  double length = v_norm(direction);
+  sonde_surface_point best = {.distance_m = max_distance_m};
+  *hit = (sonde_surface_point){0};
+  if (!(length > 0)) return false;
+  ray r = {.origin = origin, .direction = v_scale(direction, 1.0 / length)};
+  r.inverse = vec3(1 / r.direction.x, 1 / r.direction.y, 1 / r.direction.z);
+  uint32_t stack[SURFACE_STACK], depth = 0;
+  bool found = false;
+  stack[depth++] = 0;
+  while (depth) {
+    uint32_t at = stack[--depth];
+    const surface_node *node = &index->nodes[at];
+    if (!enters_box(node, &r, best.distance_m)) continue;
+    if (node->count) {
+      hit_leaf(index, node, &r, &best, &found);
+      continue;
+    }
+    SONDE_ASSERT(depth + 2 <= SURFACE_STACK);
+    stack[depth++] = node->first;
+    stack[depth++] = at + 1;
+  }
+  if (!found) return false;
+  best.point_m = v_madd(origin, best.distance_m, r.direction);
+  *hit = best;
+  return true;
+}
+
+// ---- inside -------------------------------------------------------------------------------
+
+// Normal of the corner, side or face that the point lies on. With angle weights at corners the sign
+// of (query - closest) . normal is right for every closed surface (Baerentzen and Aanaes 2005).
+static sonde_vec3 feature_normal(const sonde_surface_index *index,
+                                 const sonde_surface_point *point) {
+  const double *w = point->weight;
+  for (int k = 0; k < 3; ++k) {
+    if (w[k] == 1) return index->vertex_normal[index->mesh.faces[point->face][k]];
+    if (w[k] == 0 && w[(k + 1) % 3] > 0 && w[(k + 2) % 3] > 0)
+      return index->side_normal[point->face][(k + 1) % 3];
+  }
+  return index->face_normal[point->face];
+}
+
+bool sonde_surface_inside(const sonde_surface_index *index, sonde_vec3 query) {
+  SONDE_ASSERT(index != NULL);
+  sonde_surface_point closest = sonde_surface_closest(index, query);
+  return v_dot(v_sub(query, closest.point_m), feature_normal(index, &closest)) < 0;
+}

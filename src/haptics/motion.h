@@ -1,0 +1,18 @@
+// Small motions of poses for the devices; hot.
+#ifndef SONDE_SRC_MOTION_H
+#define SONDE_SRC_MOTION_H
+
+#include "base/maths.h"
+
+// Every number finite and the quaternion long enough to be a rotation.
+bool sonde_pose_usable(sonde_pose pose);
+// Angle of the rotation that takes a to b along the short arc, 0..pi.
+double sonde_quat_angle(sonde_quat a, sonde_quat b);
+// Along the short arc from a (t = 0) to b (t = 1).
+sonde_quat sonde_quat_slerp(sonde_quat a, sonde_quat b, double t);
+// From a towards b by a share t of the way, position straight and rotation along the short arc.
+sonde_pose sonde_pose_blend(sonde_pose a, sonde_pose b, double t);
+// From a towards b by at most `reach_m` and `turn_rad`; arrives exactly.
+sonde_pose sonde_pose_approach(sonde_pose a, sonde_pose b, double reach_m, double turn_rad);
+
+#endif

@@ -1,0 +1,245 @@
+// The column table: built once from the rest skin and the femur.
+//
+// sonde_columns_create  all of the below
+// find_axis             femur axis and radius from the moments of its surface
+// find_extent           rows of the table between the leg's ends
+// cast_columns          skin point of every column
+// slope_columns         derivatives of R, outward flux vectors
+// store_field           the constant half of the evaluation's table
+// factor_surface        five-point Laplacian of the skin in (theta, s), zero at both ends
+#include "base/base.h"
+#include "interior/interior.h"
+
+enum { THETA_COUNT = 128, S_COUNT_MAX = 256 };
+
+static const double row_step_m = 3e-3;
+static const double end_margin_m = 2.5e-3; // rays near a cap would hit the cap
+
+static sonde_vec3 face_centre(const sonde_mesh *mesh, uint32_t f) {
+  const uint32_t *v = mesh->faces[f];
+  sonde_vec3 sum = v_add(v_add(mesh->vertices[v[0]], mesh->vertices[v[1]]), mesh->vertices[v[2]]);
+  return v_scale(sum, 1.0 / 3);
+}
+
+static double face_area(const sonde_mesh *mesh, uint32_t f) {
+  const uint32_t *v = mesh->faces[f];
+  sonde_vec3 a = mesh->vertices[v[0]];
+  return 0.5 * v_norm(v_cross(v_sub(mesh->vertices[v[1]], a), v_sub(mesh->vertices[v[2]], a)));
+}
+
+static double signed_volume(const sonde_mesh *mesh, sonde_vec3 origin) {
+  double sum = 0;
+  for (uint32_t f = 0; f < mesh->face_count; ++f) {
+    const uint32_t *v = mesh->faces[f];
+    sum += v_dot(v_sub(mesh->vertices[v[0]], origin),
+                 v_cross(v_sub(mesh->vertices[v[1]], origin), v_sub(mesh->vertices[v[2]], origin)));
+  }
+  return sum / 6;
+}
+
+// Largest principal direction of the surface's second moments, by power iteration.
+static sonde_vec3 principal_direction(const sonde_mesh *mesh, sonde_vec3 centre) {
+  sonde_mat3 moment = m_zero();
+  for (uint32_t f = 0; f < mesh->face_count; ++f)
+    moment = m_add(moment, m_rank1(v_sub(face_centre(mesh, f), centre), face_area(mesh, f), 0));
+  sonde_vec3 axis = v_unit(vec3(0.1, 0.1, 1), vec3(0, 0, 1));
+  for (int i = 0; i < 200; ++i) axis = v_unit(m_mul_v(moment, axis), axis);
+  return axis.z < 0 ? v_neg(axis) : axis;
+}
+
+static sonde_status find_axis(sonde_interior *in, sonde_error *error) {
+  const sonde_mesh *femur = &in->model->femur;
+  double area = 0, low = INFINITY, high = -INFINITY;
+  sonde_vec3 centre = vec3(0, 0, 0);
+  for (uint32_t f = 0; f < femur->face_count; ++f) {
+    centre = v_madd(centre, face_area(femur, f), face_centre(femur, f));
+    area += face_area(femur, f);
+  }
+  if (!(area > 0)) return sonde_fail(error, SONDE_MESH, "the model's femur has no surface");
+  in->origin = v_scale(centre, 1 / area);
+  in->axis = principal_direction(femur, in->origin);
+  for (uint32_t v = 0; v < femur->vertex_count; ++v) {
+    double s = v_dot(v_sub(femur->vertices[v], in->origin), in->axis);
+    low = fmin(low, s), high = fmax(high, s);
+  }
+  double volume = fabs(signed_volume(femur, in->origin));
+  if (!(high > low) || !(volume > 0))
+    return sonde_fail(error, SONDE_MESH, "the model's femur encloses no volume");
+  in->bone_radius_m = sqrt(volume / (SONDE_PI * (high - low)));
+  sonde_vec3 across = fabs(in->axis.x) < 0.9 ? vec3(1, 0, 0) : vec3(0, 1, 0);
+  in->e1 = v_unit(v_madd(across, -v_dot(across, in->axis), in->axis), across);
+  in->e2 = v_cross(in->axis, in->e1);
+  return SONDE_OK;
+}
+
+static sonde_status find_extent(sonde_interior *in, sonde_error *error) {
+  const sonde_mesh *skin = &in->model->surface;
+  double low = INFINITY, high = -INFINITY;
+  for (uint32_t v = 0; v < skin->vertex_count; ++v) {
+    double s = v_dot(v_sub(skin->vertices[v], in->origin), in->axis);
+    low = fmin(low, s), high = fmax(high, s);
+  }
+  if (!(high - low > 4 * end_margin_m))
+    return sonde_fail(error, SONDE_MESH, "the skin is shorter than %g m along the femur",
+                      4 * end_margin_m);
+  double length = high - low - 2 * end_margin_m;
+  uint32_t rows = (uint32_t)ceil(length / row_step_m) + 1;
+  rows = rows < 4 ? 4 : rows > S_COUNT_MAX ? (uint32_t)S_COUNT_MAX : rows;
+  in->s_low_m = low, in->s_high_m = high;
+  in->s_first_m = low + end_margin_m;
+  in->s_step_m = length / (rows - 1);
+  in->s_count = rows;
+  in->theta_count = THETA_COUNT;
+  in->theta_step = 2 * SONDE_PI / THETA_COUNT;
+  return SONDE_OK;
+}
+
+static sonde_vec3 spoke(const sonde_interior *in, double theta) {
+  return v_add(v_scale(in->e1, cos(theta)), v_scale(in->e2, sin(theta)));
+}
+
+static sonde_status cast_columns(sonde_interior *in, sonde_error *error) {
+  for (uint32_t j = 0; j < in->s_count; ++j) {
+    double s = in->s_first_m + in->s_step_m * j;
+    for (uint32_t i = 0; i < in->theta_count; ++i) {
+      sonde_column *c = &in->column[j * in->theta_count + i];
+      sonde_surface_point hit;
+      sonde_vec3 from = v_madd(in->origin, s, in->axis);
+      if (!sonde_surface_raycast(in->skin, from, spoke(in, i * in->theta_step), 1.0, &hit))
+        return sonde_fail(error, SONDE_MESH, "no skin above the femur at %.4f m, angle %.3f", s,
+                          i * in->theta_step);
+      for (int k = 0; k < 3; ++k) {
+        c->node[k] = in->model->surface.faces[hit.face][k];
+        c->weight[k] = hit.weight[k];
+      }
+      c->rest_m = hit.point_m;
+      c->radius_m = v_distance(hit.point_m, from);
+      if (!(c->radius_m > in->bone_radius_m * 1.05))
+        return sonde_fail(error, SONDE_MESH, "the femur reaches the skin at %.4f m", s);
+    }
+  }
+  return SONDE_OK;
+}
+
+static void slope_columns(sonde_interior *in) {
+  uint32_t n = in->theta_count;
+  for (uint32_t j = 0; j < in->s_count; ++j) {
+    uint32_t below = j > 0 ? j - 1 : 0, above = j + 1 < in->s_count ? j + 1 : j;
+    for (uint32_t i = 0; i < n; ++i) {
+      sonde_column *c = &in->column[j * n + i];
+      double next = in->column[j * n + (i + 1) % n].radius_m;
+      double last = in->column[j * n + (i + n - 1) % n].radius_m;
+      c->slope_theta = (next - last) / (2 * in->theta_step);
+      c->slope_s = (in->column[above * n + i].radius_m - in->column[below * n + i].radius_m) /
+                   ((above - below) * in->s_step_m);
+      sonde_vec3 e = spoke(in, i * in->theta_step);
+      c->round = v_cross(in->axis, e);
+      sonde_vec3 flux = v_scale(e, c->radius_m);
+      flux = v_madd(flux, -c->slope_theta, c->round);
+      c->flux_normal = v_madd(flux, -c->radius_m * c->slope_s, in->axis);
+    }
+  }
+}
+
+static double at_column(const sonde_column *c, const double *per_node) {
+  double sum = 0;
+  for (int k = 0; k < 3; ++k) sum += c->weight[k] * per_node[c->node[k]];
+  return sum;
+}
+
+static void store_field(sonde_interior *in) {
+  for (uint32_t k = 0; k < in->theta_count * in->s_count; ++k) {
+    const sonde_column *c = &in->column[k];
+    sonde_column_field *f = &in->field[k];
+    f->radius_m = (float)c->radius_m;
+    f->slope_theta_m = (float)c->slope_theta;
+    f->slope_s = (float)c->slope_s;
+    f->fat_m = (float)at_column(c, in->model->fat_depth_m);
+    f->muscle_m = (float)at_column(c, in->model->muscle_depth_m);
+    f->cosine = (float)(c->radius_m / v_norm(c->flux_normal));
+  }
+}
+
+// Conductances of the edges to the next column around and along.
+static double around(const sonde_interior *in, uint32_t i, uint32_t j) {
+  uint32_t n = in->theta_count;
+  double r = 0.5 * (in->column[j * n + i].radius_m + in->column[j * n + (i + 1) % n].radius_m);
+  return in->s_step_m / (r * in->theta_step);
+}
+static double along(const sonde_interior *in, uint32_t i, uint32_t j) {
+  uint32_t n = in->theta_count, up = j + 1 < in->s_count ? j + 1 : j;
+  double r = 0.5 * (in->column[j * n + i].radius_m + in->column[up * n + i].radius_m);
+  return r * in->theta_step / in->s_step_m;
+}
+
+// One row of the matrix with ascending columns; beyond the ends the potential is zero.
+static uint32_t fill_row(const sonde_interior *in, uint32_t i, uint32_t j, uint32_t *column,
+                         double *value) {
+  uint32_t n = in->theta_count, count = 0;
+  double down = along(in, i, j > 0 ? j - 1 : 0), up = along(in, i, j);
+  double left = around(in, (i + n - 1) % n, j), right = around(in, i, j);
+  uint32_t at[3] = {j * n + (i + n - 1) % n, j * n + i, j * n + (i + 1) % n};
+  double of[3] = {-left, down + up + left + right, -right};
+  if (j > 0) column[count] = (j - 1) * n + i, value[count++] = -down;
+  for (int k = 0; k < 3; ++k) { // ascending although the circle wraps
+    uint32_t place = count + (uint32_t)k;
+    column[place] = at[k], value[place] = of[k];
+    for (; place > count && column[place] < column[place - 1]; --place) {
+      uint32_t c = column[place];
+      double v = value[place];
+      column[place] = column[place - 1], value[place] = value[place - 1];
+      column[place - 1] = c, value[place - 1] = v;
+    }
+  }
+  count += 3;
+  if (j + 1 < in->s_count) column[count] = (j + 1) * n + i, value[count++] = -up;
+  return count;
+}
+
+static sonde_status factor_surface(sonde_interior *in, sonde_error *error) {
+  sonde_status status = SONDE_OK;
+  uint32_t count = in->theta_count * in->s_count, filled = 0;
+  uint32_t *start = SONDE_NEW(uint32_t, count + 1),
+           *column = SONDE_NEW(uint32_t, 5 * (size_t)count);
+  double *value = SONDE_NEW(double, 5 * (size_t)count);
+  sonde_vec3 *points = SONDE_NEW(sonde_vec3, count);
+  if (!start || !column || !value || !points) {
+    status = sonde_fail_memory(error);
+    goto done;
+  }
+  for (uint32_t k = 0; k < count; ++k) {
+    filled +=
+        fill_row(in, k % in->theta_count, k / in->theta_count, column + filled, value + filled);
+    start[k + 1] = filled;
+    points[k] = in->column[k].rest_m;
+  }
+  status = sonde_ldl_create(count, start, column, value, points, &in->ldl, error);
+  if (status != SONDE_OK) goto done;
+  in->scratch = SONDE_NEW(double, sonde_ldl_scratch(in->ldl, 1));
+  if (in->scratch == NULL) status = sonde_fail_memory(error);
+done:
+  sonde_free(start);
+  sonde_free(column);
+  sonde_free(value);
+  sonde_free(points);
+  return status;
+}
+
+sonde_status sonde_columns_create(sonde_interior *in, sonde_error *error) {
+  SONDE_ASSERT(in->model != NULL && in->skin == NULL);
+  sonde_status status = sonde_surface_index_create(&in->model->surface, &in->skin, error);
+  if (status == SONDE_OK) status = find_axis(in, error);
+  if (status == SONDE_OK) status = find_extent(in, error);
+  if (status != SONDE_OK) return status;
+  size_t count = (size_t)in->theta_count * in->s_count;
+  in->column = SONDE_NEW(sonde_column, count);
+  in->field = SONDE_NEW(sonde_column_field, count);
+  in->potential = SONDE_NEW(double, count);
+  if (!in->column || !in->field || !in->potential)
+    return sonde_fail_memory(error);
+  status = cast_columns(in, error);
+  if (status != SONDE_OK) return status;
+  slope_columns(in);
+  store_field(in);
+  return factor_surface(in, error);
+}

@@ -1,0 +1,223 @@
+// The displacement field: one solve per update, closed evaluation anywhere.
+//
+// With p(theta, s, zeta) the column map, J = H r its volume density and U a field without
+// divergence in (theta, s, zeta), u = (1/J) (U^zeta dp/dzeta + U^theta dp/dtheta + U^s dp/ds) has
+// no divergence in space, whatever the shape of the leg. Two such fields are added:
+// - inflow: U^zeta = g W, U^i = g' V^i with d_i V^i = -W. g = 1 - 3 z^2 + 2 z^3.
+// - slide: U^i = g S^i + g'/2 V'^i, U^zeta = -(z - 3/2 z^2 + z^4/2) D, with S^i = H R t^i the skin's
+//   motion along itself, D = d_i S^i, d_i V'^i = D: what follows the skin below it comes back
+//   at mid-depth. V + V'/2 = -grad Phi takes one solve.
+// At the skin the first carries the flux through it and the second what is left, which is
+// tangential; at the bone both vanish.
+//
+// sonde_interior_solve         reads the skin, solves for Phi, stores the fluxes
+// sonde_interior_field         displacement at a point
+// sonde_interior_displacement  the same, zero outside and in bone
+// sonde_interior_invert        rest point by iteration
+// sonde_interior_locate        column coordinates and layers
+// sonde_interior_label         tissue
+#include "base/base.h"
+#include "interior/interior.h"
+
+#include <string.h>
+
+static const double inversion_tolerance_m = 1e-7;
+
+// ---- update -------------------------------------------------------------------------------
+
+static void read_skin(sonde_interior *in, const sonde_vec3 *positions) {
+  uint32_t count = in->theta_count * in->s_count;
+  for (uint32_t k = 0; k < count; ++k) {
+    const sonde_column *c = &in->column[k];
+    sonde_vec3 now = vec3(0, 0, 0);
+    for (int v = 0; v < 3; ++v) now = v_madd(now, c->weight[v], positions[c->node[v]]);
+    sonde_vec3 move = v_sub(now, c->rest_m);
+    double height = c->radius_m - in->bone_radius_m;
+    in->field[k].inflow = (float)-v_dot(move, c->flux_normal);
+    in->field[k].slide_theta = (float)(height * v_dot(move, c->round));
+    in->field[k].slide_s = (float)(height * c->radius_m * v_dot(move, in->axis));
+  }
+}
+
+// Divergence of the slide, and the source of the potential.
+static void spread_slide(sonde_interior *in) {
+  uint32_t n = in->theta_count;
+  double cell = in->theta_step * in->s_step_m;
+  for (uint32_t j = 0; j < in->s_count; ++j) {
+    uint32_t below = j > 0 ? j - 1 : 0, above = j + 1 < in->s_count ? j + 1 : j;
+    double ds = (above - below) * in->s_step_m;
+    const sonde_column_field *row = in->field + j * n;
+    for (uint32_t i = 0; i < n; ++i) {
+      double a = row[(i + 1) % n].slide_theta - row[(i + n - 1) % n].slide_theta;
+      double b = in->field[above * n + i].slide_s - in->field[below * n + i].slide_s;
+      double spread = a / (2 * in->theta_step) + b / ds;
+      in->field[j * n + i].spread = (float)spread;
+      in->potential[j * n + i] = (0.5 * spread - row[i].inflow) * cell;
+    }
+  }
+}
+
+// V at i+1/2 and j+1/2 from the potential; zero potential beyond both ends.
+static void store_fluxes(sonde_interior *in) {
+  uint32_t n = in->theta_count;
+  for (uint32_t j = 0; j < in->s_count; ++j)
+    for (uint32_t i = 0; i < n; ++i) {
+      uint32_t k = j * n + i, right = j * n + (i + 1) % n, up = k + n;
+      bool last = j + 1 == in->s_count;
+      double phi = in->potential[k], beyond = last ? 0 : in->potential[up];
+      double ra = 0.5 * (in->column[k].radius_m + in->column[right].radius_m);
+      double rb = 0.5 * (in->column[k].radius_m + in->column[last ? k : up].radius_m);
+      in->field[k].flux_theta = (float)((phi - in->potential[right]) / (ra * in->theta_step));
+      in->field[k].flux_s = (float)((phi - beyond) * rb / in->s_step_m);
+    }
+}
+
+void sonde_interior_solve(sonde_interior *in, const sonde_vec3 *positions) {
+  SONDE_ASSERT(positions != NULL && in->ldl != NULL);
+  read_skin(in, positions);
+  spread_slide(in);
+  sonde_ldl_solve(in->ldl, 1, in->potential, in->scratch);
+  store_fluxes(in);
+}
+
+// ---- evaluation ---------------------------------------------------------------------------
+
+typedef struct polar {
+  double theta, s, r;
+  sonde_vec3 e, round; // unit vectors outward and around
+} polar;
+
+static polar to_polar(const sonde_interior *in, sonde_vec3 p) {
+  sonde_vec3 d = v_sub(p, in->origin);
+  double x = v_dot(d, in->e1), y = v_dot(d, in->e2);
+  polar q = {.s = v_dot(d, in->axis), .r = sqrt(x * x + y * y)};
+  q.theta = atan2(y, x);
+  double cosine = q.r > 0 ? x / q.r : 1, sine = q.r > 0 ? y / q.r : 0;
+  q.e = v_add(v_scale(in->e1, cosine), v_scale(in->e2, sine));
+  q.round = v_sub(v_scale(in->e2, cosine), v_scale(in->e1, sine));
+  return q;
+}
+
+// Four columns around a point of the table and the bilinear weights.
+typedef struct stencil {
+  const sonde_column_field *f[4];
+  float w[4];
+} stencil;
+
+static stencil stencil_at(const sonde_interior *in, double i, double j) {
+  uint32_t n = in->theta_count;
+  double last = in->s_count - 1;
+  j = clamp(j, 0, last);
+  double fi = floor(i), fj = fmin(floor(j), last - 1);
+  float a = (float)(i - fi), b = (float)(j - fj);
+  uint32_t i0 = (uint32_t)((int64_t)fi + 2 * (int64_t)n) % n, i1 = (i0 + 1) % n;
+  const sonde_column_field *row = in->field + (size_t)fj * n;
+  return (stencil){{row + i0, row + i1, row + n + i0, row + n + i1},
+                   {(1 - a) * (1 - b), a * (1 - b), (1 - a) * b, a * b}};
+}
+
+#define BLEND(st, member)                                                                          \
+  ((double)((st).w[0] * (st).f[0]->member + (st).w[1] * (st).f[1]->member +                        \
+            (st).w[2] * (st).f[2]->member + (st).w[3] * (st).f[3]->member))
+
+sonde_vec3 sonde_interior_field(const sonde_interior *in, sonde_vec3 rest) {
+  polar q = to_polar(in, rest);
+  double i = q.theta / in->theta_step, j = (q.s - in->s_first_m) / in->s_step_m;
+  stencil at = stencil_at(in, i, j);
+  stencil mid_i = stencil_at(in, i - 0.5, j), mid_j = stencil_at(in, i, j - 0.5);
+  double radius = BLEND(at, radius_m), height = radius - in->bone_radius_m;
+  double z = clamp((radius - q.r) / height, 0, 1), r = radius - z * height;
+  double rest_part = 1 - z;
+  double g = rest_part * rest_part * (1 + 2 * z), slope = -6 * z * rest_part;
+  double back = z * (1 - 1.5 * z + 0.5 * z * z * z);
+  double down = g * BLEND(at, inflow) - back * BLEND(at, spread);
+  double turn = slope * BLEND(mid_i, flux_theta) + g * BLEND(at, slide_theta);
+  double shift = slope * BLEND(mid_j, flux_s) + g * BLEND(at, slide_s);
+  double density = 1 / (height * r);
+  double out = -down / r +
+               density * rest_part * (turn * BLEND(at, slope_theta_m) + shift * BLEND(at, slope_s));
+  sonde_vec3 u = v_scale(q.e, out);
+  u = v_madd(u, density * turn * r, q.round);
+  return v_madd(u, density * shift, in->axis);
+}
+
+bool sonde_interior_locate(const sonde_interior *in, sonde_vec3 rest, sonde_column_point *at) {
+  polar q = to_polar(in, rest);
+  stencil st = stencil_at(in, q.theta / in->theta_step, (q.s - in->s_first_m) / in->s_step_m);
+  at->theta = q.theta, at->s = q.s, at->r = q.r;
+  at->radius_m = BLEND(st, radius_m);
+  at->depth_m = (at->radius_m - q.r) * BLEND(st, cosine);
+  at->fat_m = BLEND(st, fat_m), at->muscle_m = BLEND(st, muscle_m);
+  return q.s >= in->s_low_m && q.s <= in->s_high_m;
+}
+
+sonde_vec3 sonde_interior_displacement(const sonde_interior *in, sonde_vec3 rest) {
+  SONDE_ASSERT(in != NULL);
+  sonde_column_point at;
+  if (!in->ready || !sonde_interior_locate(in, rest, &at)) return vec3(0, 0, 0);
+  if (at.depth_m < 0 || at.r <= in->bone_radius_m) return vec3(0, 0, 0);
+  return sonde_interior_field(in, rest);
+}
+
+// Fixed point q <- q - (q + u(q) - p). Where the map contracts strongly the plain step would
+// oscillate; a step that does not shrink the mismatch is halved.
+sonde_vec3 sonde_interior_invert(const sonde_interior *in, sonde_vec3 point, sonde_vec3 guess,
+                                 int iterations, double *error_m) {
+  sonde_vec3 q = guess, best = guess;
+  double damping = 1, least = INFINITY;
+  for (int i = 0; i < iterations; ++i) {
+    sonde_vec3 miss = v_sub(v_add(q, sonde_interior_field(in, q)), point);
+    double size = v_norm(miss);
+    if (size < least)
+      least = size, best = q;
+    else
+      damping *= 0.5;
+    if (size < inversion_tolerance_m) break;
+    q = v_madd(q, -damping, miss);
+  }
+  if (error_m != NULL) *error_m = least;
+  return best;
+}
+
+sonde_vec3 sonde_interior_rest_point(const sonde_interior *in, sonde_vec3 point) {
+  SONDE_ASSERT(in != NULL);
+  if (!in->ready) return point;
+  sonde_vec3 rest = sonde_interior_invert(in, point, point, 40, NULL);
+  sonde_column_point at;
+  bool within = sonde_interior_locate(in, rest, &at);
+  return within && at.depth_m >= -1e-6 ? rest : point;
+}
+
+// Vessel label of a rest point, LABEL_COUNT when it lies in none.
+static sonde_label vessel_label(const sonde_interior *in, sonde_vec3 rest, double s) {
+  static const double wall_m[2] = {0.7e-3, 0.9e-3};
+  for (int which = 0; which < 2; ++which) {
+    sonde_vessel_state v;
+    if (!sonde_vessel_at(in, which, s, &v)) continue;
+    sonde_vec3 d = v_sub(rest, v.rest_centre_m);
+    d = v_madd(d, -v_dot(d, v.axis), v.axis);
+    double r = v_norm(d);
+    if (r > v.rest_radius_m + wall_m[which]) continue;
+    if (r > v.rest_radius_m) return which ? SONDE_LABEL_ARTERY_WALL : SONDE_LABEL_VEIN_WALL;
+    if (which == 1) return SONDE_LABEL_ARTERY;
+    double z = rest.z, part = in->pathology.thrombus_fraction;
+    bool clot = sonde_pathology_clot(&in->pathology, z);
+    // A mural clot fills the deep side of the lumen up to the chord that bounds its share.
+    return clot && -v_dot(d, v.flat_axis) > v.rest_radius_m * (1 - 2 * part) ? SONDE_LABEL_THROMBUS
+                                                                             : SONDE_LABEL_VEIN;
+  }
+  return SONDE_LABEL_COUNT;
+}
+
+sonde_label sonde_interior_label(const sonde_interior *in, sonde_vec3 rest, double *depth_m) {
+  SONDE_ASSERT(in != NULL);
+  sonde_column_point at;
+  bool within = sonde_interior_locate(in, rest, &at);
+  if (depth_m != NULL) *depth_m = at.depth_m;
+  if (!within || at.depth_m < 0) return SONDE_LABEL_OUTSIDE;
+  if (at.r <= in->bone_radius_m) return SONDE_LABEL_BONE;
+  sonde_label vessel = vessel_label(in, rest, at.s);
+  if (vessel != SONDE_LABEL_COUNT) return vessel;
+  if (at.depth_m < at.fat_m) return SONDE_LABEL_SKIN;
+  return at.depth_m < at.muscle_m ? SONDE_LABEL_FAT : SONDE_LABEL_MUSCLE;
+}

@@ -1,0 +1,44 @@
+// Life of an interior.
+//
+// sonde_interior_create   column table, stations, rest state
+// sonde_interior_destroy
+#include "base/base.h"
+#include "interior/interior.h"
+
+static sonde_status check_model(const sonde_model *model, sonde_error *error) {
+  if (model == NULL || model->surface.face_count == 0)
+    return sonde_fail(error, SONDE_ARGUMENT, "expected a model with a skin");
+  if (model->fat_depth_m == NULL || model->muscle_depth_m == NULL)
+    return sonde_fail(error, SONDE_ARGUMENT, "expected a model with layer depths per node");
+  return SONDE_OK;
+}
+
+sonde_status sonde_interior_create(const sonde_model *model, sonde_interior **interior,
+                                   sonde_error *error) {
+  SONDE_ASSERT(interior != NULL);
+  *interior = NULL;
+  sonde_status status = check_model(model, error);
+  if (status != SONDE_OK) return status;
+  sonde_interior *made = SONDE_NEW(sonde_interior, 1);
+  if (made == NULL) return sonde_fail_memory(error);
+  made->model = model;
+  status = sonde_pathology_preset("healthy", &made->pathology, error);
+  if (status == SONDE_OK) status = sonde_columns_create(made, error);
+  if (status == SONDE_OK) status = sonde_stations_create(made, error);
+  if (status == SONDE_OK)
+    *interior = made;
+  else
+    sonde_interior_destroy(made);
+  return status;
+}
+
+void sonde_interior_destroy(sonde_interior *interior) {
+  if (interior == NULL) return;
+  sonde_surface_index_destroy(interior->skin);
+  sonde_ldl_destroy(interior->ldl);
+  sonde_free(interior->column);
+  sonde_free(interior->field);
+  sonde_free(interior->potential);
+  sonde_free(interior->scratch);
+  sonde_free(interior);
+}

@@ -1,0 +1,102 @@
+// Inside of the interior room: the column table, the vessels' stations, what an update leaves.
+//
+// Columns run from the femur's axis straight out to the skin. A point has coordinates
+// (theta, s, zeta): angle about the axis, position along it, depth fraction 0 (skin) .. 1 (bone).
+#ifndef SONDE_SRC_INTERIOR_H
+#define SONDE_SRC_INTERIOR_H
+
+#include "base/maths.h"
+#include "sonde/interior.h"
+
+enum { SONDE_STATIONS = 160 };
+
+// Constant facts of one column of the table.
+typedef struct sonde_column {
+  uint32_t node[3]; // skin triangle under the column
+  double weight[3];
+  sonde_vec3 rest_m;      // skin point
+  sonde_vec3 round;       // unit, around the axis
+  sonde_vec3 flux_normal; // (dq/dtheta) x (dq/ds), outward: m per rad
+  double radius_m;        // R: axis to skin
+  double slope_theta, slope_s;
+} sonde_column;
+
+// What the evaluation reads per column; single precision keeps the table in the cache.
+// theta fluxes live at i+1/2, s fluxes at j+1/2.
+typedef struct sonde_column_field {
+  float radius_m, slope_theta_m, slope_s; // R and its derivatives
+  float inflow;                           // W: volume entering per dtheta ds
+  float flux_theta, flux_s;               // V
+  float slide_theta, slide_s;             // S = H R t: the skin's motion along itself
+  float spread;                           // D: divergence of S
+  float fat_m, muscle_m, cosine;          // layer depths; cosine between column and skin normal
+} sonde_column_field;
+
+// Where a point lies in the column table.
+typedef struct sonde_column_point {
+  double theta, s, r;
+  double radius_m, depth_m; // of the column's skin; depth along the skin normal, < 0 outside
+  double fat_m, muscle_m;
+} sonde_column_point;
+
+// A vessel's constant station.
+typedef struct sonde_station {
+  sonde_vec3 rest_m, axis;
+  double s_m; // along the femur's axis, ascending
+  double radius_m, depth_m;
+  double tissue_m; // from the skin to the bone
+} sonde_station;
+
+struct sonde_interior {
+  const sonde_model *model;
+  sonde_surface_index *skin;
+  sonde_vec3 origin, axis, e1, e2; // femur axis and the directions of theta = 0 and pi/2
+  double bone_radius_m;
+  double s_first_m, s_step_m, s_low_m, s_high_m; // table rows; ends of the leg
+  double theta_step;
+  uint32_t theta_count, s_count;
+  sonde_column *column;      // [s_count*theta_count] theta fastest
+  sonde_column_field *field; // same shape
+  sonde_ldl *ldl;
+  double *potential, *scratch;
+  uint32_t station_count[2];
+  sonde_station station[2][SONDE_STATIONS];
+  sonde_vessel_state state[2][SONDE_STATIONS];
+  sonde_pathology pathology;
+  bool ready; // an update has happened
+  uint64_t tick;
+};
+
+// Displacement anywhere; outside the skin it continues with the skin's. @thread any
+sonde_vec3 sonde_interior_field(const sonde_interior *interior, sonde_vec3 rest_m);
+// Inversion of the field from a first guess; *error_m receives the last correction. @thread any
+sonde_vec3 sonde_interior_invert(const sonde_interior *interior, sonde_vec3 point_m,
+                                 sonde_vec3 guess_m, int iterations, double *error_m);
+// Column coordinates and layers of a rest point; false beyond the leg's ends. @thread any
+bool sonde_interior_locate(const sonde_interior *interior, sonde_vec3 rest_m,
+                           sonde_column_point *at);
+
+// State of a vessel interpolated at axial position s. @thread any
+bool sonde_vessel_at(const sonde_interior *interior, int which, double s_m,
+                     sonde_vessel_state *state);
+// Where the wall carries a point given relative to the centre of the undisturbed cross-section
+// (rest + field): area-preserving, fading out with distance. @thread any
+void sonde_vessel_carry(const sonde_vessel_state *state, double *short_m, double *long_m);
+
+// Stages of an update.
+void sonde_interior_solve(sonde_interior *interior, const sonde_vec3 *positions_m);
+void sonde_interior_vessels(sonde_interior *interior, const sonde_interior_input *input);
+
+// Stages of a creation.
+sonde_status sonde_columns_create(sonde_interior *interior, sonde_error *error);
+sonde_status sonde_stations_create(sonde_interior *interior, sonde_error *error);
+
+// Ellipse of the vein (0) or artery (1) with that area ratio: half axes over the rest radius.
+void sonde_vessel_shape(int which, const sonde_pathology *pathology, bool clot, double ratio,
+                        double *half_short, double *half_long);
+// Radius of the vein at rest relative to the healthy one at 10 mmHg.
+double sonde_vein_rest_scale(const sonde_pathology *pathology, bool clot);
+// True where a thrombus lies.
+bool sonde_pathology_clot(const sonde_pathology *pathology, double z_m);
+
+#endif

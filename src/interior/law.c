@@ -1,0 +1,104 @@
+// Area and shape of the vessels at an effective outside pressure. Laws and constants:
+// docs/interior.md; calibrated on shared/data/vein_compression.
+//
+// sonde_rectangle_stress   stress below a loaded rectangle (superposed corners)
+// sonde_vein_area_ratio    tube law of the open part, compression law of the solid part
+// sonde_artery_area_ratio  exponential law
+// sonde_vessel_shape       semi-axes of the ellipse
+// open_area                inverse of the cubic tube law with the tail of touching walls
+// solid_ratio              area of a clot
+#include "base/base.h"
+#include "interior/interior.h"
+
+static const double contact_area = 0.06;          // of the stress-free area: walls begin to touch
+static const double reference_pa = 1333.22387415; // 10 mmHg: the pressure the model's radii hold at
+
+// Stress below the corner of a rectangle a x b (signed sides) at depth z, over the pressure.
+static sonde_vec3 corner_stress(double a, double b, double z) {
+  double ra = a * a + z * z, rb = b * b + z * z, r = sqrt(a * a + b * b + z * z);
+  double angle = atan2(a * b, z * r), turn = a * b * z / r;
+  return v_scale(vec3(angle - turn / ra, angle - turn / rb, angle + turn * (1 / ra + 1 / rb)),
+                 1 / (2 * SONDE_PI));
+}
+
+sonde_vec3 sonde_rectangle_stress(double pressure_pa, double half_x_m, double half_y_m, double x_m,
+                                  double y_m, double z_m) {
+  SONDE_ASSERT(half_x_m > 0 && half_y_m > 0 && z_m > 0);
+  sonde_vec3 sum = vec3(0, 0, 0);
+  for (int sx = -1; sx <= 1; sx += 2)
+    for (int sy = -1; sy <= 1; sy += 2)
+      sum = v_add(sum, corner_stress(half_x_m + sx * x_m, half_y_m + sy * y_m, z_m));
+  return v_scale(sum, pressure_pa);
+}
+
+// Transmural pressure (Pa) of an open vein with area a over the stress-free one, and its slope.
+static double tube_pressure(double a, double *slope) {
+  *slope = 1e3 * ((3 * 1.688 * a - 2 * 5.746) * a + 12.547);
+  return 1e3 * (((1.688 * a - 5.746) * a + 12.547) * a - 8.248);
+}
+
+// Area over the stress-free one. The cubic rises everywhere; Newton converges from above and below
+// because its slope stays within a factor of two over the range.
+static double open_area(double transmural_pa) {
+  double slope, low = tube_pressure(contact_area, &slope);
+  if (transmural_pa < low)
+    return contact_area * exp((transmural_pa - low) / (slope * contact_area));
+  double a = 1;
+  for (int i = 0; i < 24; ++i) {
+    double excess = tube_pressure(a, &slope) - transmural_pa;
+    a -= excess / slope;
+    if (fabs(excess) < 1e-6) break;
+  }
+  return a;
+}
+
+// A clot keeps its volume; the tissue that is squeezed out along the vessel stretches it.
+static double solid_ratio(double modulus_pa, double outside_pa) {
+  double e = outside_pa > 0 ? outside_pa * 1e-3 : 0;
+  double k = 0.0431 * pow(fmax(modulus_pa, 1e3) / 24e3, -0.13);
+  return 1 / (1 + k * e / (1 + 0.0558 * e));
+}
+
+double sonde_vein_area_ratio(const sonde_pathology *pathology, double outside_pa) {
+  SONDE_ASSERT(pathology != NULL && isfinite(outside_pa));
+  double solid = clamp(pathology->thrombus_fraction, 0, 1), ratio = 0;
+  if (solid < 1) {
+    double rest = open_area(pathology->venous_pressure_pa);
+    ratio += (1 - solid) * open_area(pathology->venous_pressure_pa - outside_pa) / rest;
+  }
+  if (solid > 0) ratio += solid * solid_ratio(pathology->thrombus_modulus_pa, outside_pa);
+  return ratio;
+}
+
+double sonde_artery_area_ratio(const sonde_pathology *pathology, double outside_pa) {
+  SONDE_ASSERT(pathology != NULL && isfinite(outside_pa));
+  double relative = 12665.6 / fmax(pathology->arterial_pressure_pa, 1e3);
+  double e = outside_pa > 0 ? outside_pa * 1e-3 * relative : 0;
+  return exp(-(0.0185 + 0.0030 * e) * e);
+}
+
+double sonde_vein_rest_scale(const sonde_pathology *pathology, bool clot) {
+  double scale = clot ? pathology->lumen_scale : 1.0;
+  if (clot && pathology->thrombus_fraction >= 1) return scale;
+  return scale * sqrt(open_area(pathology->venous_pressure_pa) / open_area(reference_pa));
+}
+
+void sonde_vessel_shape(int which, const sonde_pathology *pathology, bool clot, double ratio,
+                        double *half_short, double *half_long) {
+  double lost = clamp(1 - ratio, -1, 1), widening = (0.294 + 0.153 * lost) * lost;
+  if (which == 1) {
+    widening = 0.33 * lost;
+  } else if (clot) {
+    double solid = clamp(pathology->thrombus_fraction, 0, 1);
+    double c = 0.83 * pow(fmax(pathology->thrombus_modulus_pa, 1e3) / 24e3, -0.47);
+    widening = (1 - solid) * widening + solid * c * lost;
+  }
+  *half_long = 1 + widening;
+  *half_short = fmax(ratio, 1e-4) / *half_long;
+}
+
+bool sonde_pathology_clot(const sonde_pathology *pathology, double z_m) {
+  if (!(pathology->thrombus_fraction > 0)) return false;
+  if (!(pathology->thrombus_to_m > pathology->thrombus_from_m)) return true;
+  return z_m >= pathology->thrombus_from_m && z_m <= pathology->thrombus_to_m;
+}

@@ -1,0 +1,69 @@
+// Presets of the vein's state and their names.
+//
+// sonde_pathology_names   list of names
+// sonde_pathology_preset  by name, lenient in separators and abbreviation
+#include "base/base.h"
+#include "interior/interior.h"
+
+#include <ctype.h>
+#include <string.h>
+
+enum { VENOUS_MMHG = 10, ARTERIAL_MMHG = 95 };
+
+static const char *const names[] = {
+    "healthy", "partial_mural", "acute_occlusive", "subacute_occlusive", "chronic_occlusive", NULL};
+
+static const sonde_pathology presets[] = {
+    {.name = "healthy", .lumen_scale = 1.0},
+    {.name = "partial_mural",
+     .thrombus_fraction = 0.45,
+     .thrombus_modulus_pa = 12e3,
+     .lumen_scale = 1.05,
+     .echogenicity = 0.45},
+    {.name = "acute_occlusive",
+     .thrombus_fraction = 1.0,
+     .thrombus_modulus_pa = 6e3,
+     .lumen_scale = 1.2,
+     .echogenicity = 0.25},
+    {.name = "subacute_occlusive",
+     .thrombus_fraction = 1.0,
+     .thrombus_modulus_pa = 24e3,
+     .lumen_scale = 1.0,
+     .echogenicity = 0.5},
+    {.name = "chronic_occlusive",
+     .thrombus_fraction = 1.0,
+     .thrombus_modulus_pa = 45e3,
+     .lumen_scale = 0.85,
+     .echogenicity = 0.95},
+};
+
+const char *const *sonde_pathology_names(void) { return names; }
+
+// Same letters, '-' and ' ' read as '_'. *whole tells whether `name` was spelt to its end.
+static bool matches(const char *text, const char *name, bool *whole) {
+  size_t i = 0;
+  for (; text[i] != 0; ++i) {
+    char c = text[i] == '-' || text[i] == ' ' ? '_' : (char)tolower((unsigned char)text[i]);
+    if (c != name[i]) return false;
+  }
+  *whole = name[i] == 0;
+  return i > 0 && (*whole || name[i] == '_');
+}
+
+sonde_status sonde_pathology_preset(const char *name, sonde_pathology *pathology,
+                                    sonde_error *error) {
+  SONDE_ASSERT(pathology != NULL);
+  SONDE_ASSERT(SONDE_COUNT_OF(presets) + 1 == SONDE_COUNT_OF(names));
+  for (size_t i = 0; name != NULL && i < SONDE_COUNT_OF(presets); ++i) {
+    bool whole;
+    if (!matches(name, presets[i].name, &whole)) continue;
+    *pathology = presets[i];
+    pathology->venous_pressure_pa = VENOUS_MMHG * SONDE_PA_PER_MMHG;
+    pathology->arterial_pressure_pa = ARTERIAL_MMHG * SONDE_PA_PER_MMHG;
+    return SONDE_OK;
+  }
+  return sonde_fail(error, SONDE_NOT_FOUND,
+                    "unknown case '%s'; expected healthy, partial_mural, acute_occlusive, "
+                    "subacute_occlusive or chronic_occlusive",
+                    name != NULL ? name : "");
+}

@@ -1,0 +1,97 @@
+// Stations of the vessels: the model's centre lines cut into equal pieces.
+//
+// sonde_stations_create  both vessels
+// resample               points at equal arc length, ascending along the femur's axis
+// place_station          facts of one station
+#include "base/base.h"
+#include "interior/interior.h"
+
+static const double spacing_m = 5e-3;
+
+static double line_length(const sonde_vessel *line) {
+  double sum = 0;
+  for (uint32_t i = 1; i < line->count; ++i)
+    sum += v_distance(line->point[i].centre_m, line->point[i - 1].centre_m);
+  return sum;
+}
+
+static sonde_vessel_point point_at(const sonde_vessel *line, double arc) {
+  for (uint32_t i = 1; i < line->count; ++i) {
+    const sonde_vessel_point *a = &line->point[i - 1], *b = &line->point[i];
+    double piece = v_distance(a->centre_m, b->centre_m);
+    if (arc > piece && i + 1 < line->count) {
+      arc -= piece;
+      continue;
+    }
+    double t = piece > 0 ? clamp(arc / piece, 0, 1) : 0;
+    return (sonde_vessel_point){v_lerp(a->centre_m, b->centre_m, t),
+                                a->radius_m + t * (b->radius_m - a->radius_m),
+                                a->depth_m + t * (b->depth_m - a->depth_m)};
+  }
+  return line->point[0];
+}
+
+static void place_station(const sonde_interior *in, sonde_station *station) {
+  sonde_column_point at;
+  (void)sonde_interior_locate(in, station->rest_m, &at);
+  station->s_m = at.s;
+  station->tissue_m = at.radius_m - in->bone_radius_m;
+  if (!(station->depth_m > 0)) station->depth_m = at.depth_m;
+}
+
+static sonde_status resample(sonde_interior *in, int which, const sonde_vessel *line,
+                             sonde_error *error) {
+  if (line->count < 2) return SONDE_OK; // a leg without this vessel
+  SONDE_ASSERT(line->count <= SONDE_VESSEL_POINTS);
+  double length = line_length(line);
+  uint32_t count = (uint32_t)fmax(2, ceil(length / spacing_m) + 1);
+  if (count > SONDE_STATIONS) count = SONDE_STATIONS;
+  sonde_vec3 along = v_sub(line->point[line->count - 1].centre_m, line->point[0].centre_m);
+  bool backward = v_dot(along, in->axis) < 0;
+  sonde_station *station = in->station[which];
+  for (uint32_t i = 0; i < count; ++i) {
+    double arc = length * (backward ? count - 1 - i : i) / (count - 1);
+    sonde_vessel_point p = point_at(line, arc);
+    if (!(p.radius_m > 0) || !v_finite(p.centre_m))
+      return sonde_fail(error, SONDE_ARGUMENT, "vessel %d has a point without radius", which);
+    station[i].rest_m = p.centre_m;
+    station[i].radius_m = p.radius_m;
+    station[i].depth_m = p.depth_m;
+    place_station(in, &station[i]);
+    if (i > 0 && !(station[i].s_m > station[i - 1].s_m))
+      return sonde_fail(error, SONDE_ARGUMENT, "vessel %d turns back along the leg", which);
+  }
+  for (uint32_t i = 0; i < count; ++i) {
+    uint32_t a = i > 0 ? i - 1 : 0, b = i + 1 < count ? i + 1 : i;
+    station[i].axis = v_unit(v_sub(station[b].rest_m, station[a].rest_m), in->axis);
+  }
+  in->station_count[which] = count;
+  return SONDE_OK;
+}
+
+static void rest_state(sonde_interior *in, int which) {
+  for (uint32_t i = 0; i < in->station_count[which]; ++i) {
+    const sonde_station *station = &in->station[which][i];
+    double r = station->radius_m;
+    sonde_column_point at;
+    (void)sonde_interior_locate(in, station->rest_m, &at);
+    sonde_vec3 out = v_add(v_scale(in->e1, cos(at.theta)), v_scale(in->e2, sin(at.theta)));
+    out = v_madd(out, -v_dot(out, station->axis), station->axis);
+    in->state[which][i] = (sonde_vessel_state){.rest_centre_m = station->rest_m,
+                                               .centre_m = station->rest_m,
+                                               .axis = station->axis,
+                                               .flat_axis = v_unit(out, in->e1),
+                                               .rest_radius_m = r,
+                                               .area_ratio = 1,
+                                               .half_short_m = r,
+                                               .half_long_m = r};
+  }
+}
+
+sonde_status sonde_stations_create(sonde_interior *in, sonde_error *error) {
+  sonde_status status = resample(in, 0, &in->model->vein, error);
+  if (status == SONDE_OK) status = resample(in, 1, &in->model->artery, error);
+  if (status != SONDE_OK) return status;
+  for (int which = 0; which < 2; ++which) rest_state(in, which);
+  return SONDE_OK;
+}

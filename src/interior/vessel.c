@@ -1,0 +1,207 @@
+// Vessels under the probe: load on the skin -> stress at the vessel -> area -> ellipse.
+//
+// sonde_interior_update           field, then vessels
+// sonde_interior_vessels          all stations of both vessels
+// measure_load                    equivalent uniform rectangle of the contact forces
+// outside_pressure                effective pressure on the wall
+// update_station                  dynamics and shape
+// sonde_vessel_at                 state between stations
+// sonde_vessel_carry              where the moving wall takes the tissue around it
+// sonde_interior_vessel_at_plane  where the image plane cuts
+#include "base/base.h"
+#include "interior/interior.h"
+
+static const double relaxation_s = 0.1;    // emptying of a vein segment (physics.md 2g)
+static const double skin_spread_m = 2e-3;  // the skin widens the loaded patch on every side
+static const double least_half_m = 1.5e-3; // a point probe still has a face
+static const double least_depth_m = 3e-3;
+static const double bone_start = 0.30, bone_rise = 1.75; // rigid base, docs/interior.md
+static const double carry_reach = 3.0; // rest radii over which the wall's motion fades
+static const double plane_reach_m = 40e-3;
+
+// Equivalent load of a probe on the skin, in the probe frame.
+typedef struct load {
+  double force_n;
+  sonde_vec3 centre_m; // rest skin under the force's centre, world
+  double half_x_m, half_y_m, pressure_pa;
+  sonde_vec3 x, y, beam; // probe axes, world
+} load;
+
+static load measure_load(const sonde_model *model, const sonde_interior_input *input) {
+  sonde_mat3 r = q_matrix(input->world_from_probe.rotation);
+  load l = {.x = vec3(r.m[0][0], r.m[1][0], r.m[2][0]),
+            .y = vec3(r.m[0][1], r.m[1][1], r.m[2][1]),
+            .beam = vec3(r.m[0][2], r.m[1][2], r.m[2][2])};
+  double mx = 0, my = 0, mxx = 0, myy = 0;
+  sonde_vec3 centre = vec3(0, 0, 0);
+  for (uint32_t i = 0; i < model->surface.vertex_count; ++i) {
+    double f = v_dot(input->contact_forces_n[i], l.beam);
+    if (!(f > 0)) continue;
+    sonde_vec3 d = v_sub(input->positions_m[i], input->world_from_probe.position);
+    double x = v_dot(d, l.x), y = v_dot(d, l.y);
+    l.force_n += f;
+    mx += f * x, my += f * y, mxx += f * x * x, myy += f * y * y;
+    centre = v_madd(centre, f, model->surface.vertices[i]);
+  }
+  if (!(l.force_n > 1e-6)) return (load){.x = l.x, .y = l.y, .beam = l.beam};
+  double s = 1 / l.force_n;
+  l.centre_m = v_scale(centre, s);
+  double half_x = sqrt(3 * fmax(0, mxx * s - mx * s * mx * s));
+  double half_y = sqrt(3 * fmax(0, myy * s - my * s * my * s));
+  l.half_x_m = fmax(half_x, least_half_m) + skin_spread_m;
+  l.half_y_m = fmax(half_y, least_half_m) + skin_spread_m;
+  l.pressure_pa = l.force_n / (4 * l.half_x_m * l.half_y_m);
+  return l;
+}
+
+// Depth of a rest point below the rest skin against the beam.
+static double depth_along_beam(const sonde_interior *in, const sonde_station *station,
+                               sonde_vec3 beam) {
+  sonde_surface_point hit;
+  if (!sonde_surface_raycast(in->skin, station->rest_m, v_neg(beam), 0.1, &hit))
+    return station->depth_m;
+  return v_distance(hit.point_m, station->rest_m);
+}
+
+// (4 s2 - s_axial)/3 with s2 the mean normal stress in the vessel's cross-section.
+static double outside_pressure(const sonde_interior *in, const sonde_station *station,
+                               const load *l) {
+  sonde_vec3 d = v_sub(station->rest_m, l->centre_m);
+  if (!(l->force_n > 0) || v_norm2(d) > 0.12 * 0.12) return 0;
+  double z = fmax(depth_along_beam(in, station, l->beam), least_depth_m);
+  sonde_vec3 s = sonde_rectangle_stress(l->pressure_pa, l->half_x_m, l->half_y_m, v_dot(d, l->x),
+                                        v_dot(d, l->y), z);
+  sonde_vec3 a =
+      vec3(v_dot(station->axis, l->x), v_dot(station->axis, l->y), v_dot(station->axis, l->beam));
+  double axial = a.x * a.x * s.x + a.y * a.y * s.y + a.z * a.z * s.z;
+  double across = 0.5 * (s.x + s.y + s.z - axial);
+  double base = 1 + bone_rise * fmax(0, fmin(z / station->tissue_m, 1) - bone_start);
+  return fmax(0, base * (4 * across - axial) / 3);
+}
+
+static void update_station(sonde_interior *in, int which, uint32_t i, const load *l,
+                           const sonde_interior_input *input) {
+  const sonde_station *station = &in->station[which][i];
+  const sonde_pathology *p = input->pathology;
+  sonde_vessel_state *v = &in->state[which][i];
+  bool clot = which == 0 && sonde_pathology_clot(p, station->rest_m.z);
+  sonde_pathology local = *p;
+  if (!clot) local.thrombus_fraction = 0;
+  double scale = which == 0 ? sonde_vein_rest_scale(&local, clot) : 1;
+  double outside = outside_pressure(in, station, l);
+  double goal = which == 0 ? sonde_vein_area_ratio(&local, outside)
+                           : sonde_artery_area_ratio(&local, outside);
+  double blend = input->dt_s < 0 || !in->ready ? 1 : 1 - exp(-input->dt_s / relaxation_s);
+  v->outside_pa = outside;
+  v->area_ratio += (goal - v->area_ratio) * blend;
+  v->rest_radius_m = station->radius_m * scale;
+  double half_short, half_long;
+  sonde_vessel_shape(which, &local, clot, v->area_ratio, &half_short, &half_long);
+  v->half_short_m = half_short * v->rest_radius_m;
+  v->half_long_m = half_long * v->rest_radius_m;
+  v->rest_centre_m = station->rest_m;
+  v->centre_m = v_add(station->rest_m, sonde_interior_field(in, station->rest_m));
+}
+
+void sonde_interior_vessels(sonde_interior *in, const sonde_interior_input *input) {
+  load l = measure_load(in->model, input);
+  for (int which = 0; which < 2; ++which) {
+    uint32_t count = in->station_count[which];
+    sonde_vessel_state *v = in->state[which];
+    for (uint32_t i = 0; i < count; ++i) update_station(in, which, i, &l, input);
+    for (uint32_t i = 0; i < count; ++i) {
+      uint32_t a = i > 0 ? i - 1 : 0, b = i + 1 < count ? i + 1 : i;
+      v[i].axis = v_unit(v_sub(v[b].centre_m, v[a].centre_m), in->station[which][i].axis);
+      sonde_vec3 up = v_madd(v_neg(l.beam), v_dot(l.beam, v[i].axis), v[i].axis);
+      if (v_norm2(up) > 1e-4) v[i].flat_axis = v_unit(up, v[i].flat_axis);
+    }
+  }
+}
+
+void sonde_interior_update(sonde_interior *in, const sonde_interior_input *input) {
+  SONDE_ASSERT(in != NULL && input != NULL && input->pathology != NULL);
+  SONDE_ASSERT(input->positions_m != NULL && input->contact_forces_n != NULL);
+  in->pathology = *input->pathology;
+  sonde_interior_solve(in, input->positions_m);
+  sonde_interior_vessels(in, input);
+  in->tick = input->tick;
+  in->ready = true;
+}
+
+// ---- reading ------------------------------------------------------------------------------
+
+const sonde_vessel_state *sonde_interior_vessel(const sonde_interior *in, int which,
+                                                uint32_t *count) {
+  SONDE_ASSERT(in != NULL && (which == 0 || which == 1) && count != NULL);
+  *count = in->station_count[which];
+  return in->state[which];
+}
+
+static sonde_vessel_state blend_states(const sonde_vessel_state *a, const sonde_vessel_state *b,
+                                       double t) {
+  sonde_vessel_state v = *a;
+  v.rest_centre_m = v_lerp(a->rest_centre_m, b->rest_centre_m, t);
+  v.centre_m = v_lerp(a->centre_m, b->centre_m, t);
+  v.axis = v_unit(v_lerp(a->axis, b->axis, t), a->axis);
+  v.flat_axis = v_lerp(a->flat_axis, b->flat_axis, t);
+  v.flat_axis = v_unit(v_madd(v.flat_axis, -v_dot(v.flat_axis, v.axis), v.axis), a->flat_axis);
+  v.rest_radius_m += t * (b->rest_radius_m - a->rest_radius_m);
+  v.outside_pa += t * (b->outside_pa - a->outside_pa);
+  v.area_ratio += t * (b->area_ratio - a->area_ratio);
+  v.half_short_m += t * (b->half_short_m - a->half_short_m);
+  v.half_long_m += t * (b->half_long_m - a->half_long_m);
+  return v;
+}
+
+bool sonde_vessel_at(const sonde_interior *in, int which, double s, sonde_vessel_state *state) {
+  uint32_t count = in->station_count[which];
+  const sonde_station *station = in->station[which];
+  if (count < 2 || s < station[0].s_m || s > station[count - 1].s_m) return false;
+  double guess = (s - station[0].s_m) / (station[count - 1].s_m - station[0].s_m) * (count - 1);
+  uint32_t i = (uint32_t)fmin(floor(guess), count - 2);
+  while (i > 0 && station[i].s_m > s) --i;
+  while (i + 2 < count && station[i + 1].s_m < s) ++i;
+  double t = (s - station[i].s_m) / (station[i + 1].s_m - station[i].s_m);
+  *state = blend_states(&in->state[which][i], &in->state[which][i + 1], clamp(t, 0, 1));
+  return true;
+}
+
+// Outside the lumen circles become ellipses of half axes m - c and m + c whose area is that of the
+// circle less what the lumen lost; both the loss and c fade out.
+void sonde_vessel_carry(const sonde_vessel_state *v, double *short_m, double *long_m) {
+  double rest = v->rest_radius_m, x = *short_m, y = *long_m, r = sqrt(x * x + y * y);
+  if (r <= rest) {
+    *short_m = x * v->half_short_m / rest;
+    *long_m = y * v->half_long_m / rest;
+    return;
+  }
+  double t = (r / rest - 1) / carry_reach;
+  if (t >= 1) return;
+  double fade = (1 - t) * (1 - t) * (1 + 2 * t);
+  double c = 0.5 * (v->half_long_m - v->half_short_m) * fade;
+  double area = r * r - rest * rest * (1 - v->area_ratio) * fade;
+  double mean = sqrt(area + c * c);
+  *short_m = x / r * (mean - c);
+  *long_m = y / r * (mean + c);
+}
+
+// The image plane is y = 0 of the probe frame.
+bool sonde_interior_vessel_at_plane(const sonde_interior *in, int which, sonde_pose probe,
+                                    sonde_vessel_state *state) {
+  SONDE_ASSERT(in != NULL && (which == 0 || which == 1) && state != NULL);
+  const sonde_vessel_state *v = in->state[which];
+  double nearest = plane_reach_m;
+  bool found = false;
+  for (uint32_t i = 0; i + 1 < in->station_count[which]; ++i) {
+    sonde_vec3 a = pose_apply_inverse(probe, v[i].centre_m);
+    sonde_vec3 b = pose_apply_inverse(probe, v[i + 1].centre_m);
+    if ((a.y > 0) == (b.y > 0)) continue;
+    double t = a.y / (a.y - b.y), x = fabs(a.x + t * (b.x - a.x));
+    if (x > nearest) continue;
+    nearest = x, found = true;
+    *state = blend_states(&v[i], &v[i + 1], t);
+  }
+  return found;
+}
+
+uint64_t sonde_interior_tick(const sonde_interior *in) { return in->tick; }

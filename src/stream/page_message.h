@@ -1,0 +1,90 @@
+// Messages of the page: binary and JSON to the browser, JSON commands from it.
+// docs/page_protocol.md is the reference; millimetres, decibels and megahertz exist only in these
+// two files.
+#ifndef SONDE_SRC_STREAM_PAGE_MESSAGE_H
+#define SONDE_SRC_STREAM_PAGE_MESSAGE_H
+
+#include "base/base.h"
+#include "sonde/exam.h"
+
+enum {
+  PAGE_VERSION = 1,
+  PAGE_HEADER_BYTES = 16,
+  PAGE_MESH_FIXED_BYTES = 24,   // header and counts, before the points
+  PAGE_FRAME_FIXED_BYTES = 140, // header and snapshot, before the displacements
+  PAGE_COMMAND_BYTES = 4096,    // longest message accepted from a browser
+  PAGE_COMMAND_DEPTH = 3,       // deepest nesting accepted
+};
+
+typedef enum page_type { PAGE_MESH = 1, PAGE_LINE = 2, PAGE_FRAME = 3 } page_type;
+
+// Identity of a static mesh or line.
+typedef enum page_part {
+  PAGE_SKIN = 0,
+  PAGE_FEMUR = 1,
+  PAGE_VEIN = 2,
+  PAGE_ARTERY = 3,
+  PAGE_PROBE = 16 // plus the probe's index
+} page_part;
+
+// Length of one unit of a displacement in a frame; 16 bits reach +-65 mm.
+#define PAGE_QUANTUM_M 2e-6
+
+// Each encoder returns the size of the whole message and writes it only when it fits `capacity`.
+size_t page_encode_mesh(const sonde_mesh *mesh, uint32_t part, unsigned char *bytes,
+                        size_t capacity);
+size_t page_encode_line(const sonde_vessel *vessel, uint32_t part, unsigned char *bytes,
+                        size_t capacity);
+// `rest` are the rest positions of the skin that the frame's displacements refer to.
+size_t page_encode_frame(const sonde_frame *frame, const sonde_mesh *rest, uint32_t sequence,
+                         unsigned char *bytes, size_t capacity);
+
+// Growing text; a failed allocation is remembered in `failed`.
+typedef struct page_text {
+  char *text;
+  size_t count, capacity;
+  bool failed;
+} page_text;
+
+void page_text_clear(page_text *text);
+
+// What the hello message says; all borrowed.
+typedef struct page_hello {
+  const sonde_model *model;
+  const sonde_probe *const *probes;
+  uint32_t probe_count;
+  double force_limit_n;
+  bool controls; // this client may move the probe
+} page_hello;
+
+void page_write_hello(page_text *text, const page_hello *hello);
+void page_write_controls(page_text *text, const sonde_session_controls *controls,
+                         const char *probe_name, bool client_controls);
+// `kind` is "error" or another message type with one text.
+void page_write_note(page_text *text, const char *kind, const char *sentence);
+void page_write_pong(page_text *text, uint32_t id);
+
+typedef enum page_command_type {
+  PAGE_COMMAND_GOAL,
+  PAGE_COMMAND_CONTROLS,
+  PAGE_COMMAND_STOP,
+  PAGE_COMMAND_RESUME,
+  PAGE_COMMAND_ACK,
+  PAGE_COMMAND_PING
+} page_command_type;
+
+// A validated command in SI units. NaN or an empty name: leave that control as it is.
+typedef struct page_command {
+  page_command_type type;
+  sonde_pose goal;
+  char probe[64], pathology[32];
+  double gain_db, depth_m, frequency_hz, dynamic_range_db, focus_m, tgc_db_per_m;
+  uint32_t id; // of the acknowledged frame or of the ping
+} page_command;
+
+// Parses one message of `count` bytes (need not end in 0). On failure the sentence for the client
+// is in error->message; it never repeats the client's own text. @thread any
+sonde_status page_parse_command(const char *bytes, size_t count, page_command *command,
+                                sonde_error *error);
+
+#endif

@@ -1,0 +1,178 @@
+// JSON commands from the page: everything is bounded and checked before it reaches the session.
+//
+// check_shape   size, printable bytes and nesting, before the JSON parser sees the text
+// read_real     a finite number within a range, or absent
+// read_name     a short plain name, or absent
+// read_vector   an array of finite numbers
+// parse_*       one command each
+#include "stream/page_message.h"
+
+#include "base/maths.h"
+
+#include <cjson/cJSON.h>
+#include <string.h>
+
+static const double REACH_MM = 2000; // farthest goal from the model's origin
+
+// Depth of nesting counted outside of strings, so that the recursive parser stays shallow.
+static bool shallow(const char *bytes, size_t count) {
+  int depth = 0;
+  bool quoted = false;
+  for (size_t i = 0; i < count; ++i) {
+    char c = bytes[i];
+    if (quoted) {
+      if (c == '\\')
+        ++i;
+      else if (c == '"')
+        quoted = false;
+    } else if (c == '"') {
+      quoted = true;
+    } else if (c == '{' || c == '[') {
+      if (++depth > PAGE_COMMAND_DEPTH) return false;
+    } else if (c == '}' || c == ']') {
+      --depth;
+    }
+  }
+  return true;
+}
+
+static sonde_status check_shape(const char *bytes, size_t count, sonde_error *error) {
+  if (count == 0 || count > PAGE_COMMAND_BYTES)
+    return sonde_fail(error, SONDE_FORMAT, "a message must have 1 to %d bytes, not %zu",
+                      PAGE_COMMAND_BYTES, count);
+  if (memchr(bytes, 0, count))
+    return sonde_fail(error, SONDE_FORMAT, "a message must not contain a zero byte");
+  if (!shallow(bytes, count))
+    return sonde_fail(error, SONDE_FORMAT, "a message must not nest deeper than %d levels",
+                      PAGE_COMMAND_DEPTH);
+  return SONDE_OK;
+}
+
+// Leaves *value as it is when the key is absent.
+static sonde_status read_real(const cJSON *object, const char *key, double low, double high,
+                              double *value, sonde_error *error) {
+  const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, key);
+  if (!item) return SONDE_OK;
+  if (!cJSON_IsNumber(item) || !isfinite(item->valuedouble) || item->valuedouble < low ||
+      item->valuedouble > high)
+    return sonde_fail(error, SONDE_ARGUMENT, "\"%s\" must be a number from %g to %g", key, low,
+                      high);
+  *value = item->valuedouble;
+  return SONDE_OK;
+}
+
+static sonde_status read_name(const cJSON *object, const char *key, char *name, size_t size,
+                              sonde_error *error) {
+  const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, key);
+  if (!item) return SONDE_OK;
+  if (!cJSON_IsString(item) || !item->valuestring[0] || strlen(item->valuestring) >= size)
+    return sonde_fail(error, SONDE_ARGUMENT, "\"%s\" must be a name of 1 to %zu characters", key,
+                      size - 1);
+  snprintf(name, size, "%s", item->valuestring);
+  return SONDE_OK;
+}
+
+static sonde_status read_vector(const cJSON *object, const char *key, int count, double limit,
+                                double *values, sonde_error *error) {
+  const cJSON *array = cJSON_GetObjectItemCaseSensitive(object, key);
+  if (!cJSON_IsArray(array) || cJSON_GetArraySize(array) != count)
+    return sonde_fail(error, SONDE_ARGUMENT, "\"%s\" must be an array of %d numbers", key, count);
+  int i = 0;
+  for (const cJSON *item = array->child; item; item = item->next, ++i) {
+    SONDE_ASSERT(i < count);
+    double value = item->valuedouble;
+    if (!cJSON_IsNumber(item) || !isfinite(value) || fabs(value) > limit)
+      return sonde_fail(error, SONDE_ARGUMENT, "\"%s\" must hold numbers from -%g to %g", key,
+                        limit, limit);
+    values[i] = value;
+  }
+  return SONDE_OK;
+}
+
+static sonde_status read_id(const cJSON *object, const char *key, uint32_t *id,
+                            sonde_error *error) {
+  double value = -1;
+  sonde_status status = read_real(object, key, 0, UINT32_MAX, &value, error);
+  if (status) return status;
+  if (value < 0 || value != floor(value))
+    return sonde_fail(error, SONDE_ARGUMENT, "\"%s\" must be a whole number", key);
+  *id = (uint32_t)value;
+  return SONDE_OK;
+}
+
+static sonde_status parse_goal(const cJSON *root, page_command *command, sonde_error *error) {
+  double p[3], q[4];
+  sonde_status status = read_vector(root, "position_mm", 3, REACH_MM, p, error);
+  if (!status) status = read_vector(root, "rotation", 4, 2, q, error);
+  if (status) return status;
+  double norm2 = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+  if (norm2 < 0.25 || norm2 > 4)
+    return sonde_fail(error, SONDE_ARGUMENT, "\"rotation\" must be a unit quaternion w, x, y, z");
+  command->goal.position = v_scale(vec3(p[0], p[1], p[2]), 1e-3);
+  command->goal.rotation = q_unit((sonde_quat){q[0], q[1], q[2], q[3]});
+  return SONDE_OK;
+}
+
+typedef struct control_field {
+  const char *key;
+  double low, high, si; // range in the page's unit, factor to SI
+  double *target;
+} control_field;
+
+static sonde_status parse_controls(const cJSON *root, page_command *command, sonde_error *error) {
+  const control_field fields[] = {
+      {"gain_db", -30, 30, 1, &command->gain_db},
+      {"depth_mm", 20, 150, 1e-3, &command->depth_m},
+      {"frequency_mhz", 1, 12, 1e6, &command->frequency_hz},
+      {"dynamic_range_db", 30, 90, 1, &command->dynamic_range_db},
+      {"focus_mm", 5, 150, 1e-3, &command->focus_m},
+      {"tgc_db_per_cm", -10, 10, 1e2, &command->tgc_db_per_m},
+  };
+  for (size_t i = 0; i < SONDE_COUNT_OF(fields); ++i) {
+    double value = (double)NAN;
+    sonde_status status =
+        read_real(root, fields[i].key, fields[i].low, fields[i].high, &value, error);
+    if (status) return status;
+    *fields[i].target = value * fields[i].si;
+  }
+  sonde_status status = read_name(root, "probe", command->probe, sizeof command->probe, error);
+  if (status) return status;
+  return read_name(root, "case", command->pathology, sizeof command->pathology, error);
+}
+
+static sonde_status parse_object(const cJSON *root, page_command *command, sonde_error *error) {
+  static const char *const TYPES[] = {"goal", "controls", "stop", "resume", "ack", "ping"};
+  const cJSON *type = cJSON_GetObjectItemCaseSensitive(root, "type");
+  if (!cJSON_IsObject(root) || !cJSON_IsString(type))
+    return sonde_fail(error, SONDE_FORMAT, "a message must be an object with a \"type\"");
+  size_t which = 0;
+  while (which < SONDE_COUNT_OF(TYPES) && strcmp(type->valuestring, TYPES[which]) != 0) ++which;
+  command->type = (page_command_type)which;
+  switch (which) {
+  case PAGE_COMMAND_GOAL: return parse_goal(root, command, error);
+  case PAGE_COMMAND_CONTROLS: return parse_controls(root, command, error);
+  case PAGE_COMMAND_STOP:
+  case PAGE_COMMAND_RESUME: return SONDE_OK;
+  case PAGE_COMMAND_ACK: return read_id(root, "frame", &command->id, error);
+  case PAGE_COMMAND_PING: return read_id(root, "id", &command->id, error);
+  default:
+    return sonde_fail(error, SONDE_NOT_FOUND,
+                      "\"type\" must be goal, controls, stop, resume, ack or ping");
+  }
+}
+
+sonde_status page_parse_command(const char *bytes, size_t count, page_command *command,
+                                sonde_error *error) {
+  SONDE_ASSERT(bytes && command);
+  *command = (page_command){0};
+  sonde_status status = check_shape(bytes, count, error);
+  if (status) return status;
+  char text[PAGE_COMMAND_BYTES + 1];
+  memcpy(text, bytes, count);
+  text[count] = 0;
+  cJSON *root = cJSON_ParseWithOpts(text, NULL, 1);
+  if (!root) return sonde_fail(error, SONDE_FORMAT, "a message must be one JSON object");
+  status = parse_object(root, command, error);
+  cJSON_Delete(root);
+  return status;
+}

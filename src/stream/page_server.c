@@ -1,0 +1,246 @@
+// The page's server: start, the pump of frames, commands, stop.
+//
+// pump_once, pump_run    newest frame of the source -> encoded -> `latest`
+// apply_*                what a command changes
+// bind_problem           why a port cannot be opened, in words
+// start_http             civetweb on the loopback address
+// page_server_start, sonde_page_stop
+#include "stream/page_server.h"
+
+#include "base/clock.h"
+
+#include <arpa/inet.h>
+#include <errno.h>
+#include <math.h>
+#include <string.h>
+#include <unistd.h>
+
+static bool anyone_waits(sonde_page_server *server) {
+  bool waits = false;
+  pthread_mutex_lock(&server->lock);
+  for (int i = 0; i < PAGE_CLIENTS; ++i)
+    if (page_client_wants_frame(&server->client[i])) waits = true;
+  pthread_mutex_unlock(&server->lock);
+  return waits;
+}
+
+static bool pump_once(sonde_page_server *server) {
+  sonde_frame frame;
+  if (!anyone_waits(server) || !server->source.frame(server->source.self, &frame)) return false;
+  const sonde_mesh *rest = &server->source.model->surface;
+  page_buffer *spare = &server->spare;
+  size_t size = page_encode_frame(&frame, rest, server->sequence + 1, NULL, 0);
+  if (!page_buffer_reserve(spare, size)) return false;
+  spare->size =
+      page_encode_frame(&frame, rest, server->sequence + 1, spare->bytes, spare->capacity);
+  pthread_mutex_lock(&server->lock);
+  page_buffer newest = *spare;
+  *spare = server->latest;
+  server->latest = newest;
+  ++server->sequence;
+  pthread_cond_broadcast(&server->news);
+  pthread_mutex_unlock(&server->lock);
+  return true;
+}
+
+static void *pump_run(void *argument) {
+  sonde_page_server *server = argument;
+  for (;;) {
+    pthread_mutex_lock(&server->lock);
+    bool stopping = server->stopping;
+    pthread_mutex_unlock(&server->lock);
+    if (stopping) return NULL;
+    double pause_s = pump_once(server) ? 0.002 : 0.005;
+    sonde_clock_sleep_until(sonde_clock_now() + pause_s);
+  }
+}
+
+static bool find_probe(const sonde_page_server *server, const char *name, uint32_t *probe) {
+  for (uint32_t i = 0; i < server->source.probe_count; ++i) {
+    if (strcmp(server->source.probes[i]->name, name) != 0) continue;
+    *probe = i;
+    return true;
+  }
+  return false;
+}
+
+static void take(double value, double *target) {
+  if (!isnan(value)) *target = value;
+}
+
+static void apply_controls(sonde_page_server *server, page_client *client,
+                           const page_command *command) {
+  sonde_session_controls next = server->controls;
+  if (command->probe[0] && !find_probe(server, command->probe, &next.probe)) {
+    page_client_note(client, "there is no probe of that name");
+    return;
+  }
+  if (command->pathology[0] && sonde_pathology_preset(command->pathology, &next.pathology, NULL)) {
+    page_client_note(client, "there is no case of that name");
+    return;
+  }
+  take(command->gain_db, &next.echo.gain_db);
+  take(command->depth_m, &next.echo.depth_m);
+  take(command->frequency_hz, &next.echo.frequency_hz);
+  take(command->dynamic_range_db, &next.echo.dynamic_range_db);
+  take(command->focus_m, &next.echo.focus_m);
+  take(command->tgc_db_per_m, &next.echo.tgc_db_per_m);
+  next.echo = sonde_echo_settings_clamp(next.echo);
+  server->controls = next;
+}
+
+// Anyone may stop; only the client that controls may do the rest.
+void page_command_apply(sonde_page_server *server, page_client *client,
+                        const page_command *command) {
+  const page_source *source = &server->source;
+  if (command->type != PAGE_COMMAND_STOP && !page_client_controls(client)) {
+    page_client_note(client, "another page controls the probe; this one only watches");
+    return;
+  }
+  if (command->type == PAGE_COMMAND_GOAL) {
+    source->goal(source->self, command->goal);
+    return;
+  }
+  if (command->type == PAGE_COMMAND_CONTROLS) {
+    apply_controls(server, client, command);
+  } else if (command->type == PAGE_COMMAND_STOP) {
+    server->controls.stop = true;
+  } else {
+    SONDE_ASSERT(command->type == PAGE_COMMAND_RESUME);
+    server->controls.stop = false;
+    ++server->controls.resume;
+  }
+  ++server->controls_serial;
+  source->control(source->self, &server->controls);
+}
+
+// errno of an attempt to open the port, 0 when it works.
+static int bind_problem(uint16_t port) {
+  struct sockaddr_in address = {.sin_family = AF_INET, .sin_port = htons(port)};
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  int probe = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  if (probe < 0) return errno;
+  int reuse = 1, problem = 0;
+  setsockopt(probe, SOL_SOCKET, SO_REUSEADDR, &reuse, sizeof reuse);
+  if (bind(probe, (struct sockaddr *)&address, sizeof address) != 0 || listen(probe, 1) != 0)
+    problem = errno;
+  close(probe);
+  return problem;
+}
+
+static sonde_status port_failure(uint16_t port, sonde_error *error) {
+  int problem = bind_problem(port);
+  if (problem == EADDRINUSE)
+    return sonde_fail(error, SONDE_PORT,
+                      "port %u on 127.0.0.1 is in use by another program; expected a free port, "
+                      "or 0 for any free one",
+                      (unsigned)port);
+  if (problem)
+    return sonde_fail(error, SONDE_PORT, "port %u on 127.0.0.1 cannot be opened: %s",
+                      (unsigned)port, strerror(problem));
+  return sonde_fail(error, SONDE_PORT, "the page's server could not be started on port %u",
+                    (unsigned)port);
+}
+
+static int swallow_message(const struct mg_connection *connection, const char *message) {
+  (void)connection;
+  (void)message;
+  return 1; // the library never prints; what matters is told by port_failure()
+}
+
+static void initialise_civetweb(void) { mg_init_library(0); }
+
+static sonde_status start_http(sonde_page_server *server, uint16_t port, sonde_error *error) {
+  static pthread_once_t once = PTHREAD_ONCE_INIT;
+  pthread_once(&once, initialise_civetweb);
+  char address[32];
+  snprintf(address, sizeof address, "127.0.0.1:%u", (unsigned)port);
+  const char *options[] = {"listening_ports",
+                           address,
+                           "num_threads",
+                           "10",
+                           "request_timeout_ms",
+                           "5000",
+                           "websocket_timeout_ms",
+                           "10000",
+                           "enable_websocket_ping_pong",
+                           "yes",
+                           "enable_keep_alive",
+                           "no",
+                           "enable_directory_listing",
+                           "no",
+                           "tcp_nodelay",
+                           "1",
+                           "access_control_allow_origin",
+                           "",
+                           NULL};
+  struct mg_callbacks callbacks = {.begin_request = page_http_request,
+                                   .log_message = swallow_message};
+  server->http = mg_start(&callbacks, server, options);
+  if (!server->http) return port_failure(port, error);
+  struct mg_server_port opened = {0};
+  int count = mg_get_server_ports(server->http, 1, &opened);
+  SONDE_ASSERT(count == 1 && opened.port > 0);
+  server->port = (uint16_t)opened.port;
+  mg_set_websocket_handler(server->http, "/ws", page_client_connect, page_client_ready,
+                           page_client_data, page_client_close, server);
+  return SONDE_OK;
+}
+
+sonde_status page_server_start(const sonde_page_def *def, const page_source *source,
+                               sonde_page_server **server_out, sonde_error *error) {
+  SONDE_ASSERT(def && source && server_out && source->model && source->frame && source->goal);
+  *server_out = NULL;
+  sonde_page_server *server = SONDE_NEW(sonde_page_server, 1);
+  if (!server) return sonde_fail_memory(error);
+  server->source = *source;
+  server->controls = source->controls_now(source->self);
+  server->controls_serial = 1;
+  if (def->data_directory)
+    snprintf(server->data_directory, sizeof server->data_directory, "%s", def->data_directory);
+  pthread_mutex_init(&server->lock, NULL);
+  pthread_cond_init(&server->news, NULL);
+  sonde_status status = start_http(server, def->port, error);
+  if (!status) {
+    server->pump_runs = pthread_create(&server->pump, NULL, pump_run, server) == 0;
+    if (!server->pump_runs) status = sonde_fail(error, SONDE_MEMORY, "a thread could not start");
+  }
+  if (status)
+    sonde_page_stop(server);
+  else
+    *server_out = server;
+  return status;
+}
+
+uint16_t sonde_page_port(const sonde_page_server *server) {
+  SONDE_ASSERT(server);
+  return server->port;
+}
+
+uint32_t sonde_page_clients(const sonde_page_server *server) {
+  SONDE_ASSERT(server);
+  pthread_mutex_t *lock = (pthread_mutex_t *)&server->lock; // the lock itself is not state
+  uint32_t count = 0;
+  pthread_mutex_lock(lock);
+  for (int i = 0; i < PAGE_CLIENTS; ++i)
+    if (server->client[i].connection) ++count;
+  pthread_mutex_unlock(lock);
+  return count;
+}
+
+void sonde_page_stop(sonde_page_server *server) {
+  if (!server) return;
+  pthread_mutex_lock(&server->lock);
+  server->stopping = true;
+  pthread_cond_broadcast(&server->news);
+  pthread_mutex_unlock(&server->lock);
+  if (server->pump_runs) pthread_join(server->pump, NULL);
+  if (server->http) mg_stop(server->http); // runs the close handlers, which join the senders
+  for (int i = 0; i < PAGE_CLIENTS; ++i) sonde_free(server->client[i].out.bytes);
+  sonde_free(server->latest.bytes);
+  sonde_free(server->spare.bytes);
+  pthread_cond_destroy(&server->news);
+  pthread_mutex_destroy(&server->lock);
+  if (server->release) server->release(server->source.self);
+  sonde_free(server);
+}

@@ -1,0 +1,274 @@
+// Building, changing and releasing the thigh model.
+// target_edge: wanted edge length near the sites' footprints.
+// derive:      everything that follows from mesh and law.
+// build:       refine, derive, measure layers, interpolate, place vessels.
+#include "tissue/model.h"
+
+#include "base/base.h"
+#include "base/maths.h"
+
+#include <string.h>
+
+enum { DEFAULT_K0 = 180000 }; // N/m^3
+static const double DEFAULT_XM_M = 0.05;
+static const double FOOTPRINT_U_M = 0.030, FOOTPRINT_V_M = 0.006;
+
+sonde_surface_law sonde_surface_law_default(void) {
+  return (sonde_surface_law){.edge_stiffness_n_m = 50,
+                             .edge_damping_s = 1e-3,
+                             .edge_compression = 0.05,
+                             .edge_pretension_n = 0,
+                             .tangential_stiffness_n_m3 = 1e5,
+                             .shear_stiffness_n_m = 0,
+                             .shear_limit = 1.0,
+                             .normal_damping_s = 0.02,
+                             .surface_density_kg_m2 = 20,
+                             .guard = 0.999};
+}
+
+sonde_model_def sonde_model_def_default(void) {
+  return (sonde_model_def){.name = "thigh",
+                           .provenance = "",
+                           .fine_edge_m = 0.003,
+                           .fine_reach_m = 0.015,
+                           .law = sonde_surface_law_default()};
+}
+
+static sonde_status check_law(const sonde_surface_law *law, sonde_error *error) {
+  const struct {
+    const char *name;
+    double value, low, high;
+  } range[] = {{"edge_stiffness_n_m", law->edge_stiffness_n_m, 0, 1e7},
+               {"edge_damping_s", law->edge_damping_s, 0, 10},
+               {"edge_compression", law->edge_compression, 0, 1},
+               {"edge_pretension_n", law->edge_pretension_n, 0, 1e3},
+               {"tangential_stiffness_n_m3", law->tangential_stiffness_n_m3, 0, 1e10},
+               {"shear_stiffness_n_m", law->shear_stiffness_n_m, 0, 1e7},
+               {"shear_limit", law->shear_limit, 1e-3, 1e3},
+               {"normal_damping_s", law->normal_damping_s, 0, 100},
+               {"surface_density_kg_m2", law->surface_density_kg_m2, 1e-3, 1e4},
+               {"guard", law->guard, 0.5, 0.99999}};
+  for (size_t k = 0; k < SONDE_COUNT_OF(range); ++k)
+    if (!(range[k].value >= range[k].low && range[k].value <= range[k].high))
+      return sonde_fail(error, SONDE_ARGUMENT, "%s is %g, expected %g to %g", range[k].name,
+                        range[k].value, range[k].low, range[k].high);
+  return SONDE_OK;
+}
+
+sonde_status sonde_model_allocate_nodes(sonde_model *model, sonde_error *error) {
+  uint32_t n = model->surface.vertex_count;
+  double **array[] = {&model->area_m2,     &model->mass_kg,     &model->k0_n_m3,
+                      &model->xm_m,        &model->fat_depth_m, &model->muscle_depth_m,
+                      &model->bone_depth_m};
+  bool ok = true;
+  for (size_t k = 0; k < SONDE_COUNT_OF(array); ++k)
+    ok &= (*array[k] = SONDE_NEW(double, n)) != NULL;
+  model->normal = SONDE_NEW(sonde_vec3, n);
+  return ok && model->normal ? SONDE_OK : sonde_fail_memory(error);
+}
+
+// Half the cotangent of the angle at `apex` opposite the edge ab.
+static double half_cotangent(sonde_vec3 apex, sonde_vec3 a, sonde_vec3 b) {
+  sonde_vec3 p = v_sub(a, apex), q = v_sub(b, apex);
+  double sine = v_norm(v_cross(p, q));
+  return sine > 0 ? 0.5 * v_dot(p, q) / sine : 0;
+}
+
+// Dual length of an edge: cotangent weight times its length, not below zero.
+static double dual_length(const sonde_model *model, uint32_t e) {
+  const sonde_mesh *mesh = &model->surface;
+  const uint32_t *pair = model->topology.edges[e];
+  double weight = 0;
+  for (int side = 0; side < 2; ++side) {
+    uint32_t f = model->topology.edge_faces[e][side];
+    if (f == UINT32_MAX) continue;
+    const uint32_t *v = mesh->faces[f];
+    uint32_t apex = v[0] + v[1] + v[2] - pair[0] - pair[1];
+    weight +=
+        half_cotangent(mesh->vertices[apex], mesh->vertices[pair[0]], mesh->vertices[pair[1]]);
+  }
+  return weight > 0 ? weight * model->edge_rest_m[e] : 0;
+}
+
+sonde_status sonde_model_derive(sonde_model *model, sonde_error *error) {
+  sonde_status status = check_law(&model->law, error);
+  if (!status) status = sonde_topology_build(&model->surface, &model->topology, error);
+  if (status) return status;
+  uint32_t n = model->surface.vertex_count, edges = model->topology.edge_count;
+  model->edge_rest_m = SONDE_NEW(double, edges);
+  model->edge_dual_m = SONDE_NEW(double, edges);
+  if (!model->edge_rest_m || !model->edge_dual_m) return sonde_fail_memory(error);
+  sonde_mesh_normals(&model->surface, model->normal);
+  sonde_mesh_areas(&model->surface, model->area_m2);
+  for (uint32_t i = 0; i < n; ++i)
+    model->mass_kg[i] = model->law.surface_density_kg_m2 * model->area_m2[i];
+  for (uint32_t e = 0; e < edges; ++e) {
+    const uint32_t *pair = model->topology.edges[e];
+    model->edge_rest_m[e] =
+        v_distance(model->surface.vertices[pair[0]], model->surface.vertices[pair[1]]);
+    if (!(model->edge_rest_m[e] > 1e-7))
+      return sonde_fail(error, SONDE_MESH, "the skin has an edge of zero length at vertex %u",
+                        pair[0]);
+    model->edge_dual_m[e] = dual_length(model, e);
+  }
+  return SONDE_OK;
+}
+
+static double outside(double value, double limit) {
+  double excess = fabs(value) - limit;
+  return excess > 0 ? excess : 0;
+}
+
+// Edges become fine within fine_reach_m of a site's largest footprint.
+static double target_edge(sonde_vec3 point, void *user) {
+  const sonde_model_def *def = user;
+  for (uint32_t k = 0; k < def->site_count; ++k) {
+    const sonde_site *site = &def->sites[k];
+    sonde_vec3 d = v_sub(point, site->position_m);
+    double du = outside(v_dot(d, site->u), FOOTPRINT_U_M);
+    double dv = outside(v_dot(d, site->v), FOOTPRINT_V_M);
+    double dn = outside(v_dot(d, site->normal), 0.02);
+    if (du * du + dv * dv + dn * dn <= def->fine_reach_m * def->fine_reach_m)
+      return def->fine_edge_m;
+  }
+  return 1e9;
+}
+
+static sonde_status check_skin(const sonde_mesh *skin, sonde_error *error) {
+  sonde_mesh_report report;
+  sonde_status status = sonde_mesh_inspect(skin, &report, error);
+  if (status) return status;
+  if (!report.closed)
+    return sonde_fail(error, SONDE_MESH, "the skin is not closed: %u open edges",
+                      report.boundary_edges);
+  if (!report.outward)
+    return sonde_fail(error, SONDE_MESH, "the skin's faces point inward, expected outward");
+  if (report.duplicate_or_degenerate_faces)
+    return sonde_fail(error, SONDE_MESH, "the skin has %u duplicate or degenerate faces",
+                      report.duplicate_or_degenerate_faces);
+  return SONDE_OK;
+}
+
+static sonde_status copy_sites(sonde_model *model, const sonde_model_def *def, sonde_error *error) {
+  model->sites = SONDE_NEW(sonde_site, def->site_count);
+  model->data = SONDE_NEW(sonde_datum, def->datum_count);
+  if (!model->sites || !model->data) return sonde_fail_memory(error);
+  model->site_count = def->site_count;
+  model->datum_count = def->datum_count;
+  for (uint32_t k = 0; k < def->site_count; ++k) {
+    model->sites[k] = def->sites[k];
+    if (model->sites[k].k0_n_m3 > 0) continue;
+    model->sites[k].k0_n_m3 = DEFAULT_K0;
+    model->sites[k].xm_m = DEFAULT_XM_M;
+  }
+  if (def->datum_count) memcpy(model->data, def->data, def->datum_count * sizeof *model->data);
+  return SONDE_OK;
+}
+
+// A straight rod along the examined leg, used when no femur is given.
+static sonde_status default_femur(sonde_model *model, sonde_error *error) {
+  enum { SIDES = 24 };
+  const double radius_m = 0.014;
+  sonde_leg_axis axis = sonde_model_axis(model);
+  double low = 0, high = 0;
+  for (uint32_t i = 0; i < model->surface.vertex_count; ++i) {
+    double along = v_dot(v_sub(model->surface.vertices[i], axis.origin), axis.direction);
+    low = fmin(low, along);
+    high = fmax(high, along);
+  }
+  sonde_status status = sonde_mesh_create(&model->femur, 2 * SIDES + 2, 4 * SIDES, error);
+  if (status) return status;
+  sonde_vec3 p = v_unit(v_cross(axis.direction, vec3(1, 0.1, 0)), vec3(0, 1, 0));
+  sonde_vec3 q = v_cross(axis.direction, p);
+  sonde_vec3 end[2] = {v_madd(axis.origin, low, axis.direction),
+                       v_madd(axis.origin, high, axis.direction)};
+  for (uint32_t k = 0; k < SIDES; ++k) {
+    double angle = 2 * SONDE_PI * k / SIDES;
+    sonde_vec3 r = v_add(v_scale(p, radius_m * cos(angle)), v_scale(q, radius_m * sin(angle)));
+    uint32_t next = (k + 1) % SIDES, f = 4 * k;
+    for (uint32_t side = 0; side < 2; ++side)
+      model->femur.vertices[2 * k + side] = v_add(end[side], r);
+    const uint32_t face[4][3] = {{2 * k, 2 * next, 2 * k + 1},
+                                 {2 * next, 2 * next + 1, 2 * k + 1},
+                                 {2 * SIDES, 2 * next, 2 * k},
+                                 {2 * SIDES + 1, 2 * k + 1, 2 * next + 1}};
+    memcpy(model->femur.faces[f], face, sizeof face);
+  }
+  model->femur.vertices[2 * SIDES] = end[0];
+  model->femur.vertices[2 * SIDES + 1] = end[1];
+  return SONDE_OK;
+}
+
+static sonde_status fill(sonde_model *model, const sonde_model_def *def, sonde_error *error) {
+  snprintf(model->name, sizeof model->name, "%s", def->name ? def->name : "thigh");
+  snprintf(model->provenance, sizeof model->provenance, "%s",
+           def->provenance ? def->provenance : "");
+  model->law = def->law;
+  sonde_status status = check_skin(def->skin, error);
+  if (!status) status = copy_sites(model, def, error);
+  if (!status)
+    status =
+        sonde_mesh_refine(def->skin, target_edge, (void *)(uintptr_t)def, &model->surface, error);
+  if (!status) status = sonde_model_allocate_nodes(model, error);
+  if (!status) status = sonde_model_derive(model, error);
+  if (!status)
+    status = def->femur ? sonde_mesh_copy(def->femur, &model->femur, error)
+                        : default_femur(model, error);
+  if (!status)
+    status = sonde_model_measure_layers(model, def->fat_interface, def->muscle_interface, error);
+  if (!status) status = sonde_model_interpolate(model, error);
+  if (!status) status = sonde_model_place_vessels(model, error);
+  return status;
+}
+
+sonde_status sonde_model_build(const sonde_model_def *def, sonde_model **out, sonde_error *error) {
+  *out = NULL;
+  if (!def->skin || !def->sites || def->site_count == 0)
+    return sonde_fail(error, SONDE_ARGUMENT, "a model needs a skin and at least one site");
+  if (!(def->fine_edge_m > 1e-4) || !(def->fine_reach_m >= 0))
+    return sonde_fail(error, SONDE_ARGUMENT, "fine_edge_m is %g, expected more than 0.1 mm",
+                      def->fine_edge_m);
+  sonde_model *model = SONDE_NEW(sonde_model, 1);
+  if (!model) return sonde_fail_memory(error);
+  sonde_status status = fill(model, def, error);
+  if (status) {
+    sonde_model_destroy(model);
+    return status;
+  }
+  *out = model;
+  return SONDE_OK;
+}
+
+sonde_status sonde_model_set_parameters(sonde_model *model, const sonde_surface_law *law,
+                                        const sonde_site *sites, uint32_t count,
+                                        sonde_error *error) {
+  if (count != model->site_count)
+    return sonde_fail(error, SONDE_ARGUMENT, "%u sites given, expected %u", count,
+                      model->site_count);
+  sonde_status status = check_law(law, error);
+  if (status) return status;
+  model->law = *law;
+  memcpy(model->sites, sites, count * sizeof *sites);
+  for (uint32_t i = 0; i < model->surface.vertex_count; ++i)
+    model->mass_kg[i] = law->surface_density_kg_m2 * model->area_m2[i];
+  return sonde_model_interpolate(model, error);
+}
+
+void sonde_model_destroy(sonde_model *model) {
+  if (!model) return;
+  void *arrays[] = {model->normal,       model->area_m2,        model->mass_kg,
+                    model->k0_n_m3,      model->xm_m,           model->fat_depth_m,
+                    model->bone_depth_m, model->muscle_depth_m, model->edge_rest_m,
+                    model->edge_dual_m,  model->sites,          model->data};
+  for (size_t k = 0; k < SONDE_COUNT_OF(arrays); ++k) sonde_free(arrays[k]);
+  sonde_topology_clear(&model->topology);
+  sonde_mesh_clear(&model->surface);
+  sonde_mesh_clear(&model->femur);
+  sonde_free(model);
+}
+
+const sonde_site *sonde_model_site(const sonde_model *model, uint32_t id) {
+  for (uint32_t k = 0; k < model->site_count; ++k)
+    if (model->sites[k].id == id) return &model->sites[k];
+  return NULL;
+}

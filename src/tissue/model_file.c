@@ -1,0 +1,445 @@
+// The model file (docs/model_file.md): a line of magic, a JSON header that names every array, the
+// arrays in little-endian binary, and a CRC-32 of all that precedes it.
+// writer: collects arrays into one blob and their descriptions into the header.
+// reader: checks magic and CRC first, then takes the arrays by name with their expected shape.
+#include "tissue/model.h"
+
+#include "base/base.h"
+
+#include <cjson/cJSON.h>
+#include <string.h>
+#include <zlib.h>
+
+#define MAGIC "SONDE-MODEL "
+enum { FORMAT_VERSION = 1, MAX_PROBES = 16 };
+
+_Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the model file is little-endian");
+
+/* ---- writer ------------------------------------------------------------------------------- */
+
+typedef struct writer {
+  cJSON *arrays;
+  char *blob;
+  size_t used, room;
+  bool failed;
+} writer;
+
+static void put(writer *w, const char *name, const char *type, const char *unit, uint32_t rows,
+                uint32_t columns, const void *bytes) {
+  size_t count = (size_t)rows * columns * (strcmp(type, "f64") == 0 ? 8 : 4);
+  if (w->used + count > w->room) {
+    size_t room = 2 * (w->used + count) + 4096;
+    char *blob = sonde_realloc(w->blob, w->used, room);
+    w->blob = blob;
+    w->room = blob ? room : 0;
+    if (!blob) w->failed = true;
+  }
+  cJSON *entry = cJSON_CreateObject();
+  if (w->failed || !entry || !cJSON_AddItemToArray(w->arrays, entry)) {
+    w->failed = true;
+    return;
+  }
+  const int shape[2] = {(int)rows, (int)columns};
+  bool ok = cJSON_AddStringToObject(entry, "name", name) &&
+            cJSON_AddStringToObject(entry, "type", type) &&
+            cJSON_AddStringToObject(entry, "unit", unit) &&
+            cJSON_AddItemToObject(entry, "shape", cJSON_CreateIntArray(shape, 2)) &&
+            cJSON_AddNumberToObject(entry, "offset", (double)w->used);
+  w->failed |= !ok;
+  if (count) memcpy(w->blob + w->used, bytes, count);
+  w->used += count;
+}
+
+static void put_mesh(writer *w, const char *vertices, const char *faces, const sonde_mesh *mesh) {
+  put(w, vertices, "f64", "m", mesh->vertex_count, 3, mesh->vertices);
+  put(w, faces, "u32", "1", mesh->face_count, 3, mesh->faces);
+}
+
+static void put_nodes(writer *w, const sonde_model *model) {
+  uint32_t n = model->surface.vertex_count;
+  put(w, "node_k0", "f64", "N/m^3", n, 1, model->k0_n_m3);
+  put(w, "node_xm", "f64", "m", n, 1, model->xm_m);
+  put(w, "node_fat_depth", "f64", "m", n, 1, model->fat_depth_m);
+  put(w, "node_muscle_depth", "f64", "m", n, 1, model->muscle_depth_m);
+  put(w, "node_bone_depth", "f64", "m", n, 1, model->bone_depth_m);
+}
+
+static void put_sites(writer *w, const sonde_model *model) {
+  uint32_t n = model->site_count;
+  uint32_t *id = SONDE_NEW(uint32_t, n);
+  double(*row)[14] = sonde_calloc(n, sizeof *row);
+  if (id && row) {
+    for (uint32_t k = 0; k < n; ++k) {
+      const sonde_site *s = &model->sites[k];
+      id[k] = s->id;
+      memcpy(&row[k][0], &s->position_m, 24);
+      memcpy(&row[k][3], &s->normal, 24);
+      memcpy(&row[k][6], &s->u, 24);
+      memcpy(&row[k][9], &s->v, 24);
+      row[k][12] = s->k0_n_m3;
+      row[k][13] = s->xm_m;
+    }
+    put(w, "site_id", "u32", "1", n, 1, id);
+    put(w, "site", "f64", "position m, normal, u, v, k0 N/m^3, xm m", n, 14, row);
+  } else {
+    w->failed = true;
+  }
+  sonde_free(id);
+  sonde_free(row);
+}
+
+// Index of a probe name in the header's list, added when it is new.
+static uint32_t probe_index(cJSON *names, const char *probe) {
+  int count = cJSON_GetArraySize(names);
+  for (int k = 0; k < count; ++k)
+    if (strcmp(cJSON_GetArrayItem(names, k)->valuestring, probe) == 0) return (uint32_t)k;
+  cJSON_AddItemToArray(names, cJSON_CreateString(probe));
+  return (uint32_t)count;
+}
+
+static void put_data(writer *w, cJSON *names, const sonde_model *model) {
+  uint32_t n = model->datum_count;
+  uint32_t(*key)[2] = sonde_calloc(n, sizeof *key);
+  double(*value)[2] = sonde_calloc(n, sizeof *value);
+  if (key && value) {
+    for (uint32_t k = 0; k < n; ++k) {
+      key[k][0] = model->data[k].site;
+      key[k][1] = probe_index(names, model->data[k].probe);
+      value[k][0] = model->data[k].penetration_m;
+      value[k][1] = model->data[k].force_n;
+    }
+    put(w, "datum_key", "u32", "site, probe", n, 2, key);
+    put(w, "datum", "f64", "penetration m, force N", n, 2, value);
+  } else {
+    w->failed = true;
+  }
+  sonde_free(key);
+  sonde_free(value);
+}
+
+static void put_vessel(writer *w, const char *name, const sonde_vessel *vessel) {
+  double row[SONDE_VESSEL_POINTS][5];
+  for (uint32_t k = 0; k < vessel->count; ++k) {
+    const sonde_vessel_point *p = &vessel->point[k];
+    memcpy(row[k], &p->centre_m, 24);
+    row[k][3] = p->radius_m;
+    row[k][4] = p->depth_m;
+  }
+  put(w, name, "f64", "centre m, radius m, depth m", vessel->count, 5, row);
+}
+
+// Fields of the law in file order.
+static double *law_field(sonde_surface_law *law, int index, const char **name) {
+  double *field[] = {&law->edge_stiffness_n_m,
+                     &law->edge_damping_s,
+                     &law->edge_compression,
+                     &law->edge_pretension_n,
+                     &law->tangential_stiffness_n_m3,
+                     &law->shear_stiffness_n_m,
+                     &law->shear_limit,
+                     &law->normal_damping_s,
+                     &law->surface_density_kg_m2,
+                     &law->guard};
+  static const char *const NAME[] = {"edge_stiffness_n_m",
+                                     "edge_damping_s",
+                                     "edge_compression",
+                                     "edge_pretension_n",
+                                     "tangential_stiffness_n_m3",
+                                     "shear_stiffness_n_m",
+                                     "shear_limit",
+                                     "normal_damping_s",
+                                     "surface_density_kg_m2",
+                                     "guard"};
+  if (index >= (int)SONDE_COUNT_OF(field)) return NULL;
+  *name = NAME[index];
+  return field[index];
+}
+
+static cJSON *make_header(writer *w, const sonde_model *model) {
+  cJSON *header = cJSON_CreateObject();
+  cJSON *law = header ? cJSON_AddObjectToObject(header, "law") : NULL;
+  cJSON *names = header ? cJSON_AddArrayToObject(header, "probes") : NULL;
+  w->arrays = header ? cJSON_AddArrayToObject(header, "arrays") : NULL;
+  if (!law || !names || !w->arrays) {
+    cJSON_Delete(header);
+    return NULL;
+  }
+  cJSON_AddStringToObject(header, "name", model->name);
+  cJSON_AddStringToObject(header, "provenance", model->provenance);
+  cJSON_AddStringToObject(header, "written_by", "sonde " SONDE_VERSION_STRING);
+  sonde_surface_law copy = model->law;
+  const char *name;
+  for (int k = 0; law_field(&copy, k, &name); ++k)
+    cJSON_AddNumberToObject(law, name, *law_field(&copy, k, &name));
+  put_mesh(w, "surface_vertices", "surface_faces", &model->surface);
+  put_mesh(w, "femur_vertices", "femur_faces", &model->femur);
+  put_nodes(w, model);
+  put_sites(w, model);
+  put_data(w, names, model);
+  put_vessel(w, "vein", &model->vein);
+  put_vessel(w, "artery", &model->artery);
+  return header;
+}
+
+static sonde_status write_parts(const char *path, const char *text, const writer *w,
+                                uint64_t *checksum, sonde_error *error) {
+  char magic[64];
+  int length =
+      snprintf(magic, sizeof magic, MAGIC "%d %zu %zu\n", FORMAT_VERSION, strlen(text), w->used);
+  sonde_file *file;
+  sonde_status status = sonde_file_create(path, &file, error);
+  if (status) return status;
+  uLong crc = crc32(0, (const Bytef *)magic, (uInt)length);
+  crc = crc32(crc, (const Bytef *)text, (uInt)strlen(text));
+  crc = crc32_z(crc, (const Bytef *)w->blob, w->used);
+  uint32_t tail = (uint32_t)crc;
+  sonde_file_write(file, magic, (size_t)length);
+  sonde_file_write(file, text, strlen(text));
+  sonde_file_write(file, w->blob, w->used);
+  sonde_file_write(file, &tail, sizeof tail);
+  *checksum = sonde_hash(sonde_hash(sonde_hash(0, magic, (size_t)length), text, strlen(text)),
+                         w->blob, w->used);
+  return sonde_file_commit(file, error);
+}
+
+sonde_status sonde_model_save(sonde_model *model, const char *path, sonde_error *error) {
+  writer w = {0};
+  cJSON *header = make_header(&w, model);
+  char *text = header && !w.failed ? cJSON_Print(header) : NULL;
+  sonde_status status =
+      text ? write_parts(path, text, &w, &model->checksum, error) : sonde_fail_memory(error);
+  cJSON_free(text);
+  cJSON_Delete(header);
+  sonde_free(w.blob);
+  return status;
+}
+
+/* ---- reader ------------------------------------------------------------------------------- */
+
+typedef struct reader {
+  const char *path;
+  const cJSON *header;
+  const char *blob;
+  size_t size;
+  sonde_error *error;
+} reader;
+
+// Bytes of a named array with `columns` columns; NULL after setting the error.
+static const void *take(const reader *r, const char *name, const char *type, uint32_t columns,
+                        uint32_t *rows) {
+  const cJSON *entry = NULL;
+  cJSON_ArrayForEach(entry, cJSON_GetObjectItem(r->header, "arrays")) {
+    const char *found = cJSON_GetStringValue(cJSON_GetObjectItem(entry, "name"));
+    if (found && strcmp(found, name) == 0) break;
+  }
+  const cJSON *shape = cJSON_GetObjectItem(entry, "shape");
+  const char *kind = cJSON_GetStringValue(cJSON_GetObjectItem(entry, "type"));
+  double height = cJSON_GetNumberValue(cJSON_GetArrayItem(shape, 0));
+  double width = cJSON_GetNumberValue(cJSON_GetArrayItem(shape, 1));
+  double offset = cJSON_GetNumberValue(cJSON_GetObjectItem(entry, "offset"));
+  size_t item = strcmp(type, "f64") == 0 ? 8 : 4;
+  bool ok = entry && kind && strcmp(kind, type) == 0 && width == (double)columns && height >= 0 &&
+            height < 1e8 && offset >= 0 &&
+            offset + height * width * (double)item <= (double)r->size;
+  if (!ok) {
+    sonde_fail(r->error, SONDE_FORMAT, "%s: array '%s' is missing or not %s [n][%u]", r->path, name,
+               type, columns);
+    return NULL;
+  }
+  *rows = (uint32_t)height;
+  return r->blob + (size_t)offset;
+}
+
+static bool take_mesh(const reader *r, const char *vertices, const char *faces, sonde_mesh *mesh) {
+  uint32_t v, f;
+  const void *xyz = take(r, vertices, "f64", 3, &v);
+  const void *abc = xyz ? take(r, faces, "u32", 3, &f) : NULL;
+  if (!abc || sonde_mesh_create(mesh, v, f, r->error)) return false;
+  memcpy(mesh->vertices, xyz, (size_t)v * 24);
+  memcpy(mesh->faces, abc, (size_t)f * 12);
+  for (uint32_t k = 0; k < f; ++k)
+    for (int c = 0; c < 3; ++c)
+      if (mesh->faces[k][c] >= v) {
+        sonde_fail(r->error, SONDE_FORMAT, "%s: face %u of '%s' names vertex %u of %u", r->path, k,
+                   faces, mesh->faces[k][c], v);
+        return false;
+      }
+  return true;
+}
+
+static bool take_nodes(const reader *r, sonde_model *model) {
+  const struct {
+    const char *name;
+    double *to;
+  } array[] = {{"node_k0", model->k0_n_m3},
+               {"node_xm", model->xm_m},
+               {"node_fat_depth", model->fat_depth_m},
+               {"node_muscle_depth", model->muscle_depth_m},
+               {"node_bone_depth", model->bone_depth_m}};
+  uint32_t n = model->surface.vertex_count;
+  for (size_t k = 0; k < SONDE_COUNT_OF(array); ++k) {
+    uint32_t rows;
+    const void *from = take(r, array[k].name, "f64", 1, &rows);
+    if (from && rows != n)
+      sonde_fail(r->error, SONDE_FORMAT, "%s: array '%s' has %u rows, expected %u", r->path,
+                 array[k].name, rows, n);
+    if (!from || rows != n) return false;
+    memcpy(array[k].to, from, (size_t)n * 8);
+  }
+  for (uint32_t i = 0; i < n; ++i)
+    if (!(model->k0_n_m3[i] > 0) || !(model->xm_m[i] > 0)) {
+      sonde_fail(r->error, SONDE_FORMAT, "%s: node %u has k0 %g and xm %g, expected positive",
+                 r->path, i, model->k0_n_m3[i], model->xm_m[i]);
+      return false;
+    }
+  return true;
+}
+
+static bool take_sites(const reader *r, sonde_model *model) {
+  uint32_t n, m;
+  const char *id = take(r, "site_id", "u32", 1, &n);
+  const char *row = id ? take(r, "site", "f64", 14, &m) : NULL;
+  if (!row) return false;
+  model->sites = SONDE_NEW(sonde_site, n);
+  if (!model->sites || n != m) {
+    sonde_fail(r->error, SONDE_FORMAT, "%s: %u site ids for %u sites", r->path, n, m);
+    return false;
+  }
+  model->site_count = n;
+  for (uint32_t k = 0; k < n; ++k, id += 4, row += 14 * 8) {
+    sonde_site *s = &model->sites[k];
+    memcpy(&s->id, id, 4);
+    memcpy(&s->position_m, row, 24);
+    memcpy(&s->normal, row + 24, 24);
+    memcpy(&s->u, row + 48, 24);
+    memcpy(&s->v, row + 72, 24);
+    memcpy(&s->k0_n_m3, row + 96, 8);
+    memcpy(&s->xm_m, row + 104, 8);
+  }
+  return true;
+}
+
+static bool take_data(const reader *r, sonde_model *model) {
+  uint32_t n, m;
+  const char *key = take(r, "datum_key", "u32", 2, &n);
+  const char *value = key ? take(r, "datum", "f64", 2, &m) : NULL;
+  if (!value || n != m) return false;
+  const cJSON *names = cJSON_GetObjectItem(r->header, "probes");
+  model->data = SONDE_NEW(sonde_datum, n);
+  if (!model->data) return false;
+  model->datum_count = n;
+  for (uint32_t k = 0; k < n; ++k, key += 8, value += 16) {
+    sonde_datum *d = &model->data[k];
+    uint32_t probe;
+    memcpy(&d->site, key, 4);
+    memcpy(&probe, key + 4, 4);
+    memcpy(&d->penetration_m, value, 8);
+    memcpy(&d->force_n, value + 8, 8);
+    const char *name = cJSON_GetStringValue(cJSON_GetArrayItem(names, (int)(probe & 0xffff)));
+    snprintf(d->probe, sizeof d->probe, "%s", name ? name : "?");
+  }
+  return true;
+}
+
+static bool take_vessel(const reader *r, const char *name, sonde_vessel *vessel) {
+  uint32_t n;
+  const char *row = take(r, name, "f64", 5, &n);
+  if (!row || n > SONDE_VESSEL_POINTS) return false;
+  vessel->count = n;
+  for (uint32_t k = 0; k < n; ++k, row += 40) {
+    sonde_vessel_point *p = &vessel->point[k];
+    memcpy(&p->centre_m, row, 24);
+    memcpy(&p->radius_m, row + 24, 8);
+    memcpy(&p->depth_m, row + 32, 8);
+  }
+  return true;
+}
+
+static bool take_law(const reader *r, sonde_surface_law *law) {
+  const cJSON *object = cJSON_GetObjectItem(r->header, "law");
+  const char *name;
+  double *field;
+  for (int k = 0; (field = law_field(law, k, &name)) != NULL; ++k) {
+    const cJSON *item = cJSON_GetObjectItem(object, name);
+    if (!cJSON_IsNumber(item)) {
+      sonde_fail(r->error, SONDE_FORMAT, "%s: law.%s is missing, expected a number", r->path, name);
+      return false;
+    }
+    *field = item->valuedouble;
+  }
+  return true;
+}
+
+static void take_text(const reader *r, const char *key, char *to, size_t size) {
+  const char *text = cJSON_GetStringValue(cJSON_GetObjectItem(r->header, key));
+  snprintf(to, size, "%s", text ? text : "");
+}
+
+static sonde_status read_model(const reader *r, sonde_model *model) {
+  sonde_fail(r->error, SONDE_FORMAT, "%s: its arrays do not belong together", r->path);
+  take_text(r, "name", model->name, sizeof model->name);
+  take_text(r, "provenance", model->provenance, sizeof model->provenance);
+  if (!take_law(r, &model->law) ||
+      !take_mesh(r, "surface_vertices", "surface_faces", &model->surface) ||
+      !take_mesh(r, "femur_vertices", "femur_faces", &model->femur))
+    return SONDE_FORMAT;
+  sonde_status status = sonde_model_allocate_nodes(model, r->error);
+  if (status) return status;
+  if (!take_nodes(r, model) || !take_sites(r, model) || !take_data(r, model) ||
+      !take_vessel(r, "vein", &model->vein) || !take_vessel(r, "artery", &model->artery))
+    return SONDE_FORMAT;
+  return sonde_model_derive(model, r->error);
+}
+
+// Splits magic, header and arrays; checks sizes, version and CRC before anything is believed.
+static sonde_status split(const char *path, const char *bytes, size_t count, size_t *text,
+                          size_t *blob, size_t *start, sonde_error *error) {
+  int version = 0, used = 0;
+  if (count < 32 || strncmp(bytes, MAGIC, strlen(MAGIC)) != 0)
+    return sonde_fail(error, SONDE_FORMAT, "%s: is not a Sonde model, expected '%s' at its start",
+                      path, MAGIC);
+  uint32_t stored, crc = (uint32_t)crc32_z(0, (const Bytef *)bytes, count - 4);
+  memcpy(&stored, bytes + count - 4, 4);
+  if (crc != stored)
+    return sonde_fail(error, SONDE_CHECKSUM,
+                      "%s: is damaged or truncated: CRC-32 is %08x, expected %08x", path, crc,
+                      stored);
+  if (sscanf(bytes + strlen(MAGIC), "%d %zu %zu%n", &version, text, blob, &used) != 3)
+    return sonde_fail(error, SONDE_FORMAT, "%s:1: expected a version and two sizes", path);
+  if (version != FORMAT_VERSION)
+    return sonde_fail(error, SONDE_VERSION, "%s: has format version %d, expected %d", path, version,
+                      FORMAT_VERSION);
+  *start = strlen(MAGIC) + (size_t)used + 1;
+  if (*text > count || *blob > count || *start + *text + *blob + 4 != count)
+    return sonde_fail(error, SONDE_FORMAT, "%s:1: the sizes do not add up to the file's %zu bytes",
+                      path, count);
+  return SONDE_OK;
+}
+
+sonde_status sonde_model_load(const char *path, sonde_model **out, sonde_error *error) {
+  *out = NULL;
+  char *bytes = NULL;
+  size_t count = 0, text = 0, blob = 0, start = 0;
+  sonde_error scratch = {0};
+  cJSON *header = NULL;
+  sonde_model *model = SONDE_NEW(sonde_model, 1);
+  sonde_status status =
+      model ? sonde_file_load(path, &bytes, &count, error) : sonde_fail_memory(error);
+  if (!status) status = split(path, bytes, count, &text, &blob, &start, error);
+  if (!status) {
+    header = cJSON_ParseWithLength(bytes + start, text);
+    reader r = {path, header, bytes + start + text, blob, &scratch};
+    status = header ? read_model(&r, model)
+                    : sonde_fail(&scratch, SONDE_FORMAT, "%s:2: the header is not JSON", path);
+    if (status && error) *error = scratch;
+  }
+  if (!status) {
+    model->checksum = sonde_hash(0, bytes, count - 4);
+    *out = model;
+    model = NULL;
+  }
+  cJSON_Delete(header);
+  sonde_free(bytes);
+  sonde_model_destroy(model);
+  return status;
+}

@@ -1,0 +1,88 @@
+// Reading, resetting and waking the moving state. No allocation: callable on the tick path.
+#include "world/state.h"
+
+#include "base/base.h"
+#include "base/maths.h"
+
+#include <string.h>
+
+void sonde_state_wake_all(sonde_state *state) {
+  uint32_t n = state->model->surface.vertex_count;
+  memset(state->awake, 1, n);
+  memset(state->calm, 0, n);
+  sonde_state_list_awake(state);
+}
+
+void sonde_state_list_awake(sonde_state *state) {
+  const sonde_topology *topology = &state->model->topology;
+  state->row_count = state->edge_count = state->pair_count = 0;
+  for (uint32_t i = 0; i < topology->vertex_count; ++i) {
+    state->rows[state->row_count] = i;
+    state->row_count += state->awake[i];
+  }
+  for (uint32_t e = 0; e < topology->edge_count; ++e) {
+    uint8_t a = state->awake[topology->edges[e][0]], b = state->awake[topology->edges[e][1]];
+    state->edges[state->edge_count] = e;
+    state->edge_count += a | b;
+    state->pairs[state->pair_count] = e;
+    state->pair_count += a & b;
+  }
+}
+
+void sonde_state_reset(sonde_state *state) {
+  uint32_t n = state->model->surface.vertex_count;
+  memcpy(state->position, state->model->surface.vertices, n * sizeof *state->position);
+  memset(state->velocity, 0, n * sizeof *state->velocity);
+  memset(state->increment, 0, n * sizeof *state->increment);
+  memset(state->contact_force, 0, n * sizeof *state->contact_force);
+  memset(state->push_n, 0, n * sizeof *state->push_n);
+  memset(state->share_m3, 0, n * sizeof *state->share_m3);
+  memset(state->push_m3, 0, n * sizeof *state->push_m3);
+  memset(state->lift, 0, n * sizeof *state->lift);
+  memset(state->has_pair, 0, state->model->topology.edge_count);
+  memset(state->pushed, 0, n);
+  memset(state->gradient, 0, n * sizeof *state->gradient);
+  memset(state->awake, state->def.sleep_displacement_m > 0 ? 0 : 1, n);
+  memset(state->calm, SONDE_CALM_TICKS, n);
+  state->tick = 0;
+  state->touched_count = state->touched_edge_count = 0;
+  state->has_probe_pose = false;
+  state->wall_factor = 1e6;
+  state->solver = (sonde_pcg_result){.converged = true};
+  state->flags = 0;
+  state->times = (sonde_stage_times){0};
+  sonde_contact_clear(state);
+  sonde_state_list_awake(state);
+}
+
+const sonde_model *sonde_state_model(const sonde_state *state) { return state->model; }
+const sonde_world_def *sonde_state_def(const sonde_state *state) { return &state->def; }
+uint64_t sonde_state_tick(const sonde_state *state) { return state->tick; }
+double sonde_state_time(const sonde_state *state) { return (double)state->tick * state->def.dt_s; }
+const sonde_vec3 *sonde_state_positions(const sonde_state *state) { return state->position; }
+const sonde_vec3 *sonde_state_velocities(const sonde_state *state) { return state->velocity; }
+const sonde_contact *sonde_state_contact(const sonde_state *state) { return &state->contact; }
+const sonde_vec3 *sonde_state_contact_forces(const sonde_state *state) {
+  return state->contact_force;
+}
+sonde_pcg_result sonde_state_solver(const sonde_state *state) { return state->solver; }
+uint32_t sonde_state_awake(const sonde_state *state) { return state->row_count; }
+uint32_t sonde_state_flags(const sonde_state *state) { return state->flags; }
+uint64_t sonde_state_flag_count(const sonde_state *state) { return state->flag_count; }
+sonde_stage_times sonde_state_times(const sonde_state *state) { return state->times; }
+
+void sonde_state_set(sonde_state *state, const sonde_vec3 *positions,
+                     const sonde_vec3 *velocities) {
+  size_t bytes = state->model->surface.vertex_count * sizeof *state->position;
+  if (positions) memcpy(state->position, positions, bytes);
+  if (velocities) memcpy(state->velocity, velocities, bytes);
+  memset(state->increment, 0, bytes);
+  sonde_state_wake_all(state);
+}
+
+uint64_t sonde_state_hash(const sonde_state *state) {
+  size_t bytes = state->model->surface.vertex_count * sizeof *state->position;
+  uint64_t hash = sonde_hash(0, &state->tick, sizeof state->tick);
+  hash = sonde_hash(hash, state->position, bytes);
+  return sonde_hash(hash, state->velocity, bytes);
+}

@@ -1,0 +1,161 @@
+// Creation and release of the moving state; cold.
+// carve:       lays all arrays out in one block; measured and placed by the same code.
+// order_faces: sorts faces along a Morton curve for the contact boxes.
+#include "world/state.h"
+
+#include "base/base.h"
+#include "base/maths.h"
+
+#include <string.h>
+
+sonde_world_def sonde_world_def_default(void) {
+  return (sonde_world_def){.dt_s = 1e-3,
+                           .implicitness = 1,
+                           .newton_iterations = 1,
+                           .pcg = {1e-4, 1e-12, 200},
+                           .contact_law = SONDE_CONTACT_SHARED,
+                           .contact_stiffness_n_m3 = 1e8,
+                           .contact_damping_n_s_m3 = 1e5,
+                           .sleep_displacement_m = 1e-6};
+}
+
+static sonde_status check(const sonde_world_def *def, sonde_error *error) {
+  const struct {
+    const char *name;
+    double value, low, high;
+  } range[] = {{"dt_s", def->dt_s, 1e-7, 1},
+               {"implicitness", def->implicitness, 0, 1},
+               {"newton_iterations", def->newton_iterations, 1, 100},
+               {"pcg.relative_residual", def->pcg.relative_residual, 0, 0.5},
+               {"pcg.absolute_residual", def->pcg.absolute_residual, 0, 1},
+               {"pcg.max_iterations", def->pcg.max_iterations, 1, 1e6},
+               {"contact_law", def->contact_law, 0, SONDE_CONTACT_LUMPED},
+               {"contact_stiffness_n_m3", def->contact_stiffness_n_m3, 0, 1e12},
+               {"contact_damping_n_s_m3", def->contact_damping_n_s_m3, 0, 1e10},
+               {"sleep_displacement_m", def->sleep_displacement_m, 0, 1e-3}};
+  for (size_t k = 0; k < SONDE_COUNT_OF(range); ++k)
+    if (!(range[k].value >= range[k].low && range[k].value <= range[k].high))
+      return sonde_fail(error, SONDE_ARGUMENT, "%s is %g, expected %g to %g", range[k].name,
+                        range[k].value, range[k].low, range[k].high);
+  return SONDE_OK;
+}
+
+static void *carve_array(char *base, size_t *offset, size_t count, size_t size) {
+  void *place = base ? base + *offset : NULL;
+  *offset += (count * size + 63) & ~(size_t)63;
+  return place;
+}
+
+#define CARVE(field, count) (s->field = carve_array(base, &offset, (count), sizeof *s->field))
+
+static size_t carve(sonde_state *s, char *base) {
+  size_t offset = 0;
+  uint32_t n = s->model->surface.vertex_count, edges = s->model->topology.edge_count;
+  CARVE(position, n), CARVE(velocity, n), CARVE(increment, n);
+  CARVE(calm, n), CARVE(awake, n), CARVE(rows, n);
+  CARVE(edges, edges), CARVE(pairs, edges);
+  CARVE(face_order, s->model->surface.face_count), CARVE(boxes, s->block_count);
+  CARVE(touched, n), CARVE(parent, n), CARVE(share_m3, n), CARVE(push_m3, n), CARVE(lift, n),
+      CARVE(overlap, n), CARVE(gradient, n);
+  CARVE(face_edges, s->model->surface.face_count), CARVE(pair_overlap, edges);
+  CARVE(has_pair, edges);
+  CARVE(touched_edges, edges), CARVE(change, n), CARVE(pushed, n);
+  CARVE(push_n, n), CARVE(contact_force, n), CARVE(lumped, n), CARVE(lumped_rows, n);
+  CARVE(plane_normal, SONDE_MAX_PLANES), CARVE(plane_offset, SONDE_MAX_PLANES);
+  CARVE(force, n), CARVE(product, n), CARVE(right, n), CARVE(trial, n);
+  CARVE(scratch.r, n), CARVE(scratch.z, n), CARVE(scratch.p, n), CARVE(scratch.q, n);
+  return offset;
+}
+
+static uint64_t spread_bits(uint64_t x) {
+  x &= 0x1fffff;
+  x = (x | x << 32) & 0x1f00000000ffffu;
+  x = (x | x << 16) & 0x1f0000ff0000ffu;
+  x = (x | x << 8) & 0x100f00f00f00f00fu;
+  x = (x | x << 4) & 0x10c30c30c30c30c3u;
+  return (x | x << 2) & 0x1249249249249249u;
+}
+
+typedef struct keyed_face {
+  uint64_t key;
+  uint32_t face;
+} keyed_face;
+
+static int by_key(const void *a, const void *b) {
+  const keyed_face *x = a, *y = b;
+  if (x->key != y->key) return x->key < y->key ? -1 : 1;
+  return x->face < y->face ? -1 : 1;
+}
+
+static sonde_status order_faces(sonde_state *state, sonde_error *error) {
+  const sonde_mesh *mesh = &state->model->surface;
+  keyed_face *list = SONDE_NEW(keyed_face, mesh->face_count);
+  if (!list) return sonde_fail_memory(error);
+  for (uint32_t f = 0; f < mesh->face_count; ++f) {
+    sonde_vec3 c = vec3(0, 0, 0);
+    for (int k = 0; k < 3; ++k) c = v_madd(c, 1.0 / 3, mesh->vertices[mesh->faces[f][k]]);
+    uint64_t key = 0;
+    const double at[3] = {c.x, c.y, c.z};
+    for (int k = 0; k < 3; ++k)
+      key |= spread_bits((uint64_t)clamp((at[k] + 10) * 1e4, 0, 2e6)) << k;
+    list[f] = (keyed_face){key, f};
+  }
+  qsort(list, mesh->face_count, sizeof *list, by_key);
+  for (uint32_t f = 0; f < mesh->face_count; ++f) state->face_order[f] = list[f].face;
+  sonde_free(list);
+  return SONDE_OK;
+}
+
+// Edges 01, 12, 20 of every face.
+static void list_face_edges(sonde_state *state) {
+  const sonde_topology *topology = &state->model->topology;
+  for (uint32_t e = 0; e < topology->edge_count; ++e)
+    for (int side = 0; side < 2; ++side) {
+      uint32_t f = topology->edge_faces[e][side];
+      if (f == UINT32_MAX) continue;
+      const uint32_t *v = state->model->surface.faces[f];
+      for (int k = 0; k < 3; ++k) {
+        uint32_t a = v[k], b = v[(k + 1) % 3], low = a < b ? a : b;
+        if (low == topology->edges[e][0] && a + b - low == topology->edges[e][1])
+          state->face_edges[f][k] = e;
+      }
+    }
+}
+
+sonde_status sonde_state_create(const sonde_model *model, const sonde_world_def *def,
+                                sonde_state **out, sonde_error *error) {
+  *out = NULL;
+  sonde_world_def fallback = sonde_world_def_default();
+  if (!def) def = &fallback;
+  sonde_status status = check(def, error);
+  if (status) return status;
+  sonde_state *state = SONDE_NEW(sonde_state, 1);
+  if (!state) return sonde_fail_memory(error);
+  state->model = model;
+  state->def = *def;
+  state->block_count =
+      (model->surface.face_count + SONDE_FACES_PER_BLOCK - 1) / SONDE_FACES_PER_BLOCK;
+  state->plane_capacity = SONDE_MAX_PLANES;
+  state->block = sonde_calloc(1, carve(state, NULL));
+  if (state->block) carve(state, state->block);
+  status = state->block ? order_faces(state, error) : sonde_fail_memory(error);
+  if (!status)
+    status = sonde_block_matrix_create(model->surface.vertex_count, model->topology.edge_count,
+                                       (const uint32_t(*)[2])model->topology.edges, &state->matrix,
+                                       error);
+  if (status) {
+    sonde_state_destroy(state);
+    return status;
+  }
+  list_face_edges(state);
+  sonde_state_reset(state);
+  *out = state;
+  return SONDE_OK;
+}
+
+void sonde_state_destroy(sonde_state *state) {
+  if (!state) return;
+  sonde_block_matrix_destroy(state->matrix);
+  sonde_free(state->block);
+  sonde_free(state);
+}

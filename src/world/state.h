@@ -1,0 +1,113 @@
+// Inside of the moving state: arrays by the stage that writes them, one block of memory.
+#ifndef SONDE_SRC_STATE_H
+#define SONDE_SRC_STATE_H
+
+#include "sonde/world.h"
+
+enum { SONDE_FACES_PER_BLOCK = 32, SONDE_REFIT_PERIOD = 16 };
+
+// Axis-aligned box of a run of SONDE_FACES_PER_BLOCK faces in face_order.
+typedef struct sonde_box {
+  sonde_vec3 low, high;
+} sonde_box;
+
+struct sonde_state {
+  const sonde_model *model;
+  sonde_world_def def;
+  void *block; // all arrays below
+
+  // motion, written by the update
+  uint64_t tick;
+  sonde_vec3 *position;  // [nodes] m
+  sonde_vec3 *velocity;  // [nodes] m/s
+  sonde_vec3 *increment; // [nodes] dv of the last step, the solver's warm start
+  sonde_pose probe_pose; // of the last step
+  bool has_probe_pose;
+
+  // sleeping, written at the start and the end of a step
+  uint8_t *calm;   // [nodes] ticks since the node last moved; asleep at SONDE_CALM_TICKS
+  uint8_t *awake;  // [nodes]
+  uint32_t *rows;  // [nodes] awake nodes, ascending
+  uint32_t *edges; // [edges] with at least one awake end
+  uint32_t *pairs; // [edges] with both ends awake
+  uint32_t row_count, edge_count, pair_count;
+
+  // contact
+  uint32_t *face_order; // [faces] sorted along a space-filling curve
+  sonde_box *boxes;     // [blocks]
+  uint32_t block_count;
+  uint32_t *touched; // [nodes] nodes with a share of the volume, ascending
+  uint32_t touched_count;
+  double wall_factor;        // see sonde_clip_triangle()
+  uint32_t *parent;          // [nodes] union-find over touched nodes
+  double *share_m3;          // [nodes] V_i
+  double *push_m3;           // [nodes] the part of V_i that presses along the columns
+  sonde_vec3 *lift;          // [nodes] that part times n/(n.e), e against the columns
+  sonde_mat3 *overlap;       // [nodes] its derivative by the node's own position
+  uint32_t (*face_edges)[3]; // [faces] edges 01, 12, 20
+  sonde_mat3 *pair_overlap;  // [edges] and by the neighbour's (symmetric)
+  uint8_t *has_pair;         // [edges] pair_overlap is in use
+  uint32_t *touched_edges;   // [edges] edges with an overlap
+  uint32_t touched_edge_count;
+  sonde_vec3 *change;        // [nodes] scratch of advance
+  sonde_vec3 inward;         // direction of the columns: the beam axis of the probe
+  sonde_vec3 *gradient;      // [nodes] g_i = dV/dx_i
+  uint8_t *pushed;           // [nodes] the push is positive: its terms are in the matrix
+  double *push_n;            // [nodes] size of the probe's push on the node
+  sonde_vec3 *contact_force; // [nodes] of the probe on the node
+  sonde_vec3 *lumped;        // [nodes] w_i k of lumped regions, packed per region
+  uint32_t *lumped_rows;     // [nodes]
+  sonde_rank_one term[SONDE_MAX_REGIONS];
+  uint32_t term_count;
+  sonde_vec3 *plane_normal; // [max planes] of the probe in the world frame
+  double *plane_offset;
+  uint32_t plane_capacity;
+  sonde_contact contact;
+
+  // assembly and solve
+  sonde_block_matrix *matrix;
+  sonde_vec3 *force;   // [nodes] tissue forces
+  sonde_vec3 *product; // [nodes] K v0
+  sonde_vec3 *right;   // [nodes] right-hand side
+  sonde_vec3 *trial;   // [nodes] positions kept for a rejected step
+  sonde_pcg_scratch scratch;
+  sonde_pcg_result solver;
+
+  uint32_t flags;
+  uint64_t flag_count;
+  sonde_stage_times times;
+};
+
+enum { SONDE_CALM_TICKS = 20, SONDE_MAX_PLANES = 4096 };
+
+// Wakes every node. @thread tick
+void sonde_state_wake_all(sonde_state *state);
+// Lists of awake rows, edges and pairs from awake[]. @thread tick
+void sonde_state_list_awake(sonde_state *state);
+
+// How a contact law enters the linear system at a step of size h (0: static): scales of K and C.
+typedef struct sonde_contact_scales {
+  double damping, stiffness;
+} sonde_contact_scales;
+
+// Finds the skin inside the probe at the current positions: shares, gradients, touched nodes,
+// regions, and wakes the touched. @thread tick
+void sonde_contact_detect(sonde_state *state, const sonde_probe *probe, sonde_pose pose);
+// Rigid motion of the probe during the step: the point x moves at velocity + spin x (x - origin).
+typedef struct sonde_motion {
+  sonde_vec3 origin, velocity, spin;
+} sonde_motion;
+
+// Pushes of eq. (2) from the detected volumes, contact_force[], and their terms in the matrix
+// (diagonal blocks or rank-one terms) and in product[] (K v). @thread tick
+void sonde_contact_apply(sonde_state *state, const sonde_motion *probe,
+                         const sonde_contact_scales *scales);
+// Pushes at the end of the step by the same linearisation, from node displacements
+// dx = h (v + lambda dv) and velocity changes dv, both scaled by lambda. @thread tick
+void sonde_contact_advance(sonde_state *state, double lambda, double h);
+// Force and torque on the probe, forces and centres of the regions from the pushes. @thread tick
+void sonde_contact_wrench(sonde_state *state, sonde_vec3 origin);
+// No probe: no contact. @thread tick
+void sonde_contact_clear(sonde_state *state);
+
+#endif

@@ -1,0 +1,42 @@
+#!/usr/bin/env bash
+# Help, unknown words, and the manual: every option of --help stands in the manual page and back.
+man=$(cd "$(dirname "${BASH_SOURCE[0]}")/../../docs/man" && pwd)
+source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
+declare -A options=(
+  [run]="--port --headless --seconds --record --json"
+  [fit]="--surface --sites --stages -o --json"
+  [predict]="--measurements --sites --interaction --json"
+  [measure]="--sites --probe --step-mm --limit-n -o --json"
+  [press]="--site --probe --force-n --depth-mm --image --case --json"
+  [replay]="--json"
+  [bench]="--scene --json"
+  [devices]="--json"
+)
+
+listed() { grep -oE -- '(^|[^a-zA-Z0-9-])--[a-z][a-z-]*' | grep -oE -- '--[a-z-]+' | sort -u; }
+
+run --help
+((status == 0)) || wrong "sonde --help: exit $status"
+cp "$out" "$work/help"
+for verb in "${!options[@]}"; do
+  checks=$((checks + 1))
+  grep -qw "$verb" "$work/help" || wrong "sonde --help does not list $verb"
+  run "$verb" --help
+  ((status == 0)) || wrong "sonde $verb --help: exit $status"
+  [[ -s $out && ! -s $err ]] || wrong "sonde $verb --help: belongs on stdout alone"
+  for option in ${options[$verb]}; do
+    grep -qE -- "(^|[^a-z-])$option([^a-z-]|$)" "$out" || wrong "sonde $verb --help misses $option"
+  done
+  # In mdoc "Fl -seconds" is --seconds.
+  there=$(sed 's/Fl -\([a-z]\)/ --\1/g' "$man/sonde-$verb.1" | listed)
+  here=$(listed <"$out")
+  [[ $here == "$there" ]] ||
+    wrong "sonde $verb: --help and manual differ: $(diff <(echo "$here") <(echo "$there") | grep '^[<>]' | tr '\n' ' ')"
+  rejects 'frobnicate' "$verb" --frobnicate
+done
+rejects "did you mean 'press'" pres
+rejects 'unknown command' somethingelse
+rejects 'usage'
+run --version
+[[ $status == 0 && $(<"$out") =~ ^sonde\ [0-9]+\.[0-9]+\.[0-9]+$ ]] || wrong "sonde --version"
+finish

@@ -1,0 +1,44 @@
+#!/usr/bin/env bash
+# consumer.sh SOURCE BUILD: installs the build tree under a temporary prefix and uses it as somebody
+# else would: by pkg-config and by find_package, shared and static, from C and C++; then runs the
+# installed program away from the source tree.
+set -euo pipefail
+source_dir=$1 build=$2
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+prefix=$work/prefix
+
+cmake --install "$build" --prefix "$prefix" >"$work/install.log" || { cat "$work/install.log"; exit 1; }
+pc=$(find "$prefix" -name sonde.pc)
+export PKG_CONFIG_PATH
+PKG_CONFIG_PATH=$(dirname "$pc")
+libdir=$(pkg-config --variable=libdir sonde)
+cd "$work"
+
+# shellcheck disable=SC2046 # the flags are words
+{
+  echo "-- pkg-config, shared"
+  cc -Wall -Wextra -Werror "$source_dir/main.c" -o pc_shared $(pkg-config --cflags --libs sonde) -lm
+  LD_LIBRARY_PATH=$libdir ./pc_shared
+  readelf -d pc_shared | grep -q 'NEEDED.*libsonde\.so\.[0-9]' || { echo "not linked shared"; exit 1; }
+  echo "-- pkg-config, static"
+  cc "$source_dir/main.c" -o pc_static $(pkg-config --cflags sonde) -Wl,-Bstatic -L"$libdir" -lsonde \
+    -Wl,-Bdynamic $(pkg-config --static --libs sonde | sed 's/-lsonde//')
+  if readelf -d pc_static | grep -q 'NEEDED.*libsonde'; then echo "not linked static"; exit 1; fi
+  ./pc_static
+}
+[[ $(pkg-config --modversion sonde) == "$(./pc_static | sed 's/^libsonde \([^:]*\):.*/\1/')" ]]
+
+echo "-- find_package"
+cmake -S "$source_dir" -B cm -G Ninja -DCMAKE_PREFIX_PATH="$prefix" >cm.log 2>&1 || { cat cm.log; exit 1; }
+cmake --build cm >cm.log 2>&1 || { cat cm.log; exit 1; }
+cm/consumer_static
+cm/consumer_shared
+cm/consumer_cxx
+
+echo "-- installed program"
+cd /
+env -u SONDE_MODEL "$prefix/bin/sonde" press --site 27 --probe linear --depth-mm 3 --json \
+  >"$work/press.json"
+grep -q '"force_n"' "$work/press.json"
+[[ -s $prefix/share/man/man1/sonde.1 ]]

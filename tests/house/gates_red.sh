@@ -1,0 +1,94 @@
+#!/usr/bin/env bash
+# gates_red.sh HOUSE CC NM OBJDUMP: every gate of the house goes red on a small tree that breaks its rule,
+# and is green on the same tree without the fault.
+set -euo pipefail
+house=$1 cc=$2 nm=$3 objdump=$4
+tree=$(mktemp -d)
+trap 'rm -rf "$tree"' EXIT
+wrong=0
+
+fresh() { # a tree that keeps every rule
+  rm -rf "${tree:?}"/*
+  mkdir -p "$tree"/src/{base,world,stream} "$tree"/include/sonde "$tree"/app "$tree"/tests/house
+  echo 'SONDE_API int sonde_one(int a);' >"$tree/include/sonde/base.h"
+  echo '#include "sonde/base.h"' >"$tree/include/sonde/world.h"
+  printf '#include "base/base.h"\nint sonde_step(int a) {\n  SONDE_ASSERT(a);\n  return a;\n}\n' \
+    >"$tree/src/world/step_hot.c"
+  echo '#include "sonde/base.h"' >"$tree/src/base/base.h"
+  echo '#include "sonde/world.h"' >"$tree/app/main.c"
+  : >"$tree/tests/house/hot_objects.txt"
+}
+compile() { # ROOM FILE TEXT: the object where the gate looks for it
+  local object=$tree/build/src/$1/CMakeFiles/sonde_$1.dir/$2.o
+  mkdir -p "$(dirname "$object")"
+  printf '%s\n' "$3" | "$cc" -O2 -x c -c -o "$object" -
+}
+library() { printf '%s\n' "$1" | "$cc" -x c -shared -fPIC -nostdlib -o "$tree/lib.so" -; }
+
+expect() { # green|red WHAT COMMAND...
+  local colour=$1 what=$2 got=green
+  shift 2
+  "$@" >/dev/null 2>&1 || got=red
+  if [[ $got != "$colour" ]]; then
+    echo "$what: expected $colour, got $got"
+    wrong=$((wrong + 1))
+  fi
+}
+
+includes=("$house/includes.sh" "$tree") sizes=("$house/sizes.sh" "$tree")
+hot=("$house/hot_symbols.sh" "$tree" "$tree/build" "$objdump")
+api=("$house/api.sh" "$tree" "$tree/lib.so" "$nm")
+
+fresh
+expect green "includes, clean tree" "${includes[@]}"
+expect green "sizes, clean tree" "${sizes[@]}"
+echo '#include "stream/x.h"' >>"$tree/src/world/step_hot.c"
+expect red "a room that includes a lower room" "${includes[@]}"
+fresh; echo '#include "sonde/stream.h"' >>"$tree/include/sonde/world.h"
+expect red "a public header that includes a lower one" "${includes[@]}"
+fresh; echo '#include "base/base.h"' >>"$tree/app/main.c"
+expect red "an app file that looks inside" "${includes[@]}"
+
+fresh
+{ echo 'int long_one(int a) {'; for i in {1..79}; do echo "  a += $i;"; done; echo '}'; } \
+  >>"$tree/app/main.c"
+expect red "a function of 81 lines" "${sizes[@]}"
+fresh; for _ in {1..801}; do echo '//'; done >"$tree/app/long.c"
+expect red "a file of 801 lines" "${sizes[@]}"
+fresh; for _ in {1..251}; do echo '//'; done >"$tree/app/long.h"
+expect red "a header of 251 lines" "${sizes[@]}"
+fresh; sed -i /ASSERT/d "$tree/src/world/step_hot.c"
+expect red "no asserts" "${sizes[@]}"
+
+fresh
+compile world step_hot.c 'double sin(double); double f(double a) { return sin(a); }'
+expect green "hot object that only computes" "${hot[@]}"
+for call in 'void *malloc(unsigned long); void *f(void) { return malloc(8); }' \
+  'int printf(const char *, ...); void f(int a) { printf("%d %d", a, a); }' \
+  'int pthread_mutex_lock(void *); void f(void *a) { pthread_mutex_lock(a); }' \
+  'void free(void *); void g(void (*)(void *)); void f(void) { g(free); }' \
+  'void sonde_nowhere(void); void f(void) { sonde_nowhere(); }'; do
+  compile world step_hot.c "$call"
+  expect red "hot object: $call" "${hot[@]}"
+done
+compile world step_hot.c 'int sonde_far(int); int f(int a) { return 1 + sonde_far(a); }'
+compile base far.c 'static __attribute__((noinline)) int near(int a) { return a * a; }
+  int sonde_far(int a) { return near(a) + 1; }'
+expect green "hot object that calls what computes" "${hot[@]}"
+compile base far.c 'int puts(const char *); static __attribute__((noinline)) int near(int a) {
+    puts("x"); return a; } int sonde_far(int a) { return near(a) + 1; }'
+expect red "hot object that calls what prints further on" "${hot[@]}"
+echo 'src/base/far.c puts' >"$tree/tests/house/hot_objects.txt"
+expect green "the same with an exception" "${hot[@]}"
+rm -r "$tree/build"
+expect red "hot object that was not built" "${hot[@]}"
+
+fresh; library 'int sonde_one(int a) { return a; }'
+expect green "library that keeps to its headers" "${api[@]}"
+library 'int sonde_one(int a) { return a; } int helper(int a) { return a; }'
+expect red "library that exports more" "${api[@]}"
+library 'int sonde_other(int a) { return a; }'
+expect red "library that lacks a declared function" "${api[@]}"
+
+echo "$wrong gates of the wrong colour"
+((wrong == 0))

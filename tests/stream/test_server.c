@@ -1,0 +1,397 @@
+// The page's server against polite, slow and hostile clients. A synthetic source stands in for the
+// session: it counts what reaches it.
+#include "stream/ws_client.h"
+
+#include "base/clock.h"
+#include "stream/page_server.h"
+
+#include <math.h>
+#include <stdatomic.h>
+
+enum { NODES = 3, WIDTH = 256, HEIGHT = 256 };
+
+typedef struct synthetic {
+  sonde_vec3 points[NODES];
+  uint32_t faces[1][3];
+  float skin[3 * NODES];
+  uint8_t pixels[WIDTH * HEIGHT];
+  sonde_model model;
+  sonde_probe probe[2];
+  const sonde_probe *probes[2];
+  atomic_uint frames, goals, controls;
+  sonde_pose goal;
+  sonde_session_controls last;
+} synthetic;
+
+static bool next_frame(void *self, sonde_frame *frame) {
+  synthetic *s = self;
+  *frame = (sonde_frame){.skin_m = s->skin,
+                         .pixels = s->pixels,
+                         .width = WIDTH,
+                         .height = HEIGHT,
+                         .width_m = 0.06,
+                         .height_m = 0.07};
+  frame->snapshot.tick = atomic_fetch_add(&s->frames, 1) + 1;
+  return true;
+}
+static void note_goal(void *self, sonde_pose pose) {
+  synthetic *s = self;
+  s->goal = pose;
+  atomic_fetch_add(&s->goals, 1);
+}
+static void note_controls(void *self, const sonde_session_controls *controls) {
+  synthetic *s = self;
+  s->last = *controls;
+  atomic_fetch_add(&s->controls, 1);
+}
+static sonde_session_controls first_controls(void *self) {
+  (void)self;
+  sonde_session_controls controls = {.echo = sonde_echo_settings_default()};
+  assert_int_equal(sonde_pathology_preset("healthy", &controls.pathology, NULL), SONDE_OK);
+  return controls;
+}
+
+typedef struct fixture {
+  synthetic source;
+  sonde_page_server *server;
+  uint16_t port;
+} fixture;
+
+static int set_up(void **state) {
+  fixture *f = SONDE_NEW(fixture, 1);
+  synthetic *s = &f->source;
+  s->faces[0][1] = 1;
+  s->faces[0][2] = 2;
+  s->model.surface = (sonde_mesh){NODES, 1, s->points, s->faces};
+  snprintf(s->model.name, sizeof s->model.name, "Test thigh");
+  snprintf(s->probe[0].name, sizeof s->probe[0].name, "point");
+  snprintf(s->probe[1].name, sizeof s->probe[1].name, "linear");
+  for (int i = 0; i < 2; ++i) s->probes[i] = &s->probe[i];
+  page_source source = {s,         &s->model,     s->probes,     2, 40, next_frame,
+                        note_goal, note_controls, first_controls};
+  sonde_page_def def = {0};
+  if (page_server_start(&def, &source, &f->server, NULL)) return -1;
+  f->port = sonde_page_port(f->server);
+  *state = f;
+  return 0;
+}
+
+static int tear_down(void **state) {
+  fixture *f = *state;
+  sonde_page_stop(f->server);
+  sonde_free(f);
+  return 0;
+}
+
+// True as soon as *counter reaches the value, false after five seconds.
+static bool reaches(atomic_uint *counter, unsigned value) {
+  double end_s = sonde_clock_now() + 5;
+  while (atomic_load(counter) < value && sonde_clock_now() < end_s) usleep(2000);
+  return atomic_load(counter) >= value;
+}
+
+static void wait_for_clients(fixture *f, uint32_t count) {
+  double end_s = sonde_clock_now() + 5;
+  while (sonde_page_clients(f->server) != count && sonde_clock_now() < end_s) usleep(2000);
+  assert_int_equal(sonde_page_clients(f->server), count);
+}
+
+// ---- who may come in --------------------------------------------------------------------------
+
+static int get(uint16_t port, const char *method, const char *path, const char *host, char *head) {
+  char request[256];
+  snprintf(request, sizeof request, "%s %s HTTP/1.1\r\nHost: %s\r\n\r\n", method, path, host);
+  int s = tcp_connect(port, 0);
+  int code = http_head(s, request, head, 2048);
+  close(s);
+  return code;
+}
+
+static void files_come_with_strict_headers(void **state) {
+  fixture *f = *state;
+  char host[32], head[2048];
+  snprintf(host, sizeof host, "localhost:%u", (unsigned)f->port);
+  assert_int_equal(get(f->port, "GET", "/", host, head), 200);
+  assert_non_null(strstr(head, "X-Content-Type-Options: nosniff"));
+  assert_non_null(strstr(head, "default-src 'none'; script-src 'self'"));
+  assert_null(strstr(head, "unsafe"));
+  assert_int_equal(get(f->port, "HEAD", "/index.html", host, head), 200);
+  assert_int_equal(get(f->port, "GET", "/etc/passwd", host, head), 404);
+  assert_int_equal(get(f->port, "GET", "/../../../../etc/passwd", host, head) / 100, 4);
+  assert_int_equal(get(f->port, "GET", "/%2e%2e/%2e%2e/etc/passwd", host, head) / 100, 4);
+  assert_int_equal(get(f->port, "POST", "/", host, head), 405);
+  assert_int_equal(get(f->port, "GET", "/ws", host, head), 426);
+}
+
+static void foreign_hosts_are_refused(void **state) {
+  fixture *f = *state;
+  char head[2048], other_port[32];
+  snprintf(other_port, sizeof other_port, "127.0.0.1:%u", f->port + 1u);
+  assert_int_equal(get(f->port, "GET", "/", "evil.example", head), 403);
+  assert_int_equal(get(f->port, "GET", "/", other_port, head), 403);
+  assert_int_equal(ws_open_as(f->port, "evil.example", NULL, 0), -1);
+}
+
+static void only_this_page_may_open_the_socket(void **state) {
+  fixture *f = *state;
+  char host[32], origin[64];
+  snprintf(host, sizeof host, "127.0.0.1:%u", (unsigned)f->port);
+  snprintf(origin, sizeof origin, "https://127.0.0.1:%u", (unsigned)f->port);
+  static const char *const FOREIGN[] = {"http://evil.example",
+                                        "null",
+                                        "",
+                                        "file://",
+                                        "http://127.0.0.1",
+                                        "http://127.0.0.1.evil.example:80"};
+  for (size_t i = 0; i < SONDE_COUNT_OF(FOREIGN); ++i)
+    assert_int_equal(ws_open_as(f->port, host, FOREIGN[i], 0), -1);
+  assert_int_equal(ws_open_as(f->port, host, origin, 0), -1); // https is another origin
+  assert_int_equal(sonde_page_clients(f->server), 0);
+  snprintf(origin, sizeof origin, "http://localhost:%u", (unsigned)f->port);
+  int s = ws_open_as(f->port, host, origin, 0);
+  assert_true(s >= 0);
+  close(s);
+}
+
+static void the_server_listens_on_the_loopback_address_only(void **state) {
+  fixture *f = *state;
+  int s = socket(AF_INET, SOCK_STREAM, 0), reuse = 0;
+  struct sockaddr_in address = {.sin_family = AF_INET, .sin_port = htons(f->port)};
+  // Another loopback address is free for others, so the server did not bind to every address.
+  assert_int_equal(inet_pton(AF_INET, "127.0.0.2", &address.sin_addr), 1);
+  setsockopt(s, SOL_SOCKET, SO_REUSEADDR, &reuse, sizeof reuse);
+  assert_int_equal(bind(s, (struct sockaddr *)&address, sizeof address), 0);
+  close(s);
+}
+
+static void a_used_port_is_named(void **state) {
+  fixture *f = *state;
+  page_source source = {&f->source, &f->source.model, f->source.probes, 2, 40, next_frame,
+                        note_goal,  note_controls,    first_controls};
+  sonde_page_def def = {.port = f->port};
+  sonde_page_server *second = NULL;
+  sonde_error error = {0};
+  assert_int_equal(page_server_start(&def, &source, &second, &error), SONDE_PORT);
+  assert_null(second);
+  char number[16];
+  snprintf(number, sizeof number, "%u", (unsigned)f->port);
+  assert_non_null(strstr(error.message, number));
+  assert_non_null(strstr(error.message, "in use"));
+}
+
+// ---- what a client may do ---------------------------------------------------------------------
+
+static void a_client_is_greeted_and_may_move_the_probe(void **state) {
+  fixture *f = *state;
+  int s = ws_open(f->port);
+  assert_true(s >= 0);
+  assert_true(ws_expect(s, "\"type\":\"hello\""));
+  assert_true(ws_expect(s, "\"type\":\"controls\""));
+  ws_say(s, "{\"type\":\"goal\",\"position_mm\":[1,2,3],\"rotation\":[1,0,0,0]}");
+  assert_true(reaches(&f->source.goals, 1));
+  ws_say(s, "{\"type\":\"controls\",\"probe\":\"linear\",\"case\":\"chronic_occlusive\","
+            "\"gain_db\":6}");
+  assert_true(reaches(&f->source.controls, 1));
+  assert_true(ws_expect(s, "\"probe\":\"linear\",\"case\":\"chronic_occlusive\""));
+  ws_say(s, "{\"type\":\"ping\",\"id\":42}");
+  assert_true(ws_expect(s, "{\"type\":\"pong\",\"id\":42}"));
+  close(s);
+  wait_for_clients(f, 0);
+  assert_float_equal(f->source.goal.position.y, 0.002, 1e-9);
+  assert_int_equal(f->source.last.probe, 1);
+  assert_float_equal(f->source.last.echo.gain_db, 6, 1e-9);
+}
+
+static void stop_latches_until_resume(void **state) {
+  fixture *f = *state;
+  int s = ws_open(f->port);
+  ws_say(s, "{\"type\":\"stop\"}");
+  assert_true(ws_expect(s, "\"stop\":true"));
+  ws_say(s, "{\"type\":\"controls\",\"gain_db\":1}");
+  assert_true(reaches(&f->source.controls, 2));
+  assert_true(f->source.last.stop); // other controls do not release it
+  ws_say(s, "{\"type\":\"resume\"}");
+  assert_true(ws_expect(s, "\"stop\":false"));
+  close(s);
+  wait_for_clients(f, 0);
+  assert_int_equal(f->source.last.resume, 1);
+}
+
+static void bad_messages_are_answered_and_ignored(void **state) {
+  fixture *f = *state;
+  int s = ws_open(f->port);
+  ws_say(s, "{\"type\":\"goal\",\"position_mm\":[1,2,1e999],\"rotation\":[1,0,0,0]}");
+  assert_true(ws_expect(s, "\"type\":\"error\""));
+  ws_say(s, "}{");
+  assert_true(ws_expect(s, "one JSON object"));
+  ws_say(s, "{\"type\":\"controls\",\"probe\":\"banana\"}");
+  assert_true(ws_expect(s, "no probe of that name"));
+  ws_say(s, "{\"type\":\"controls\",\"case\":\"banana\"}");
+  assert_true(ws_expect(s, "no case of that name"));
+  ws_say(s, "{\"type\":\"ping\",\"id\":1}"); // and the connection still works
+  assert_true(ws_expect(s, "pong"));
+  assert_int_equal(atomic_load(&f->source.goals), 0);
+  close(s);
+}
+
+static void oversized_binary_and_fragmented_messages_end_the_connection(void **state) {
+  fixture *f = *state;
+  static char big[20000];
+  memset(big, 'x', sizeof big);
+  const struct {
+    unsigned first;
+    size_t count;
+  } rude[] = {{0x81, sizeof big}, {0x82, 10}, {0x01, 10}, {0x80, 10}};
+  for (size_t i = 0; i < SONDE_COUNT_OF(rude); ++i) {
+    int s = ws_open(f->port);
+    assert_true(s >= 0);
+    ws_send_frame(s, rude[i].first, big, rude[i].count);
+    assert_false(ws_expect(s, "this text is never sent"));
+    close(s);
+    wait_for_clients(f, 0);
+  }
+}
+
+static void the_first_client_controls_and_the_others_watch(void **state) {
+  fixture *f = *state;
+  int first = ws_open(f->port);
+  assert_true(ws_expect(first, "\"type\":\"controls\",\"controls\":true"));
+  int second = ws_open(f->port);
+  assert_true(ws_expect(second, "\"type\":\"controls\",\"controls\":false"));
+  ws_say(second, "{\"type\":\"goal\",\"position_mm\":[1,2,3],\"rotation\":[1,0,0,0]}");
+  assert_true(ws_expect(second, "only watches"));
+  assert_int_equal(atomic_load(&f->source.goals), 0);
+  ws_say(second, "{\"type\":\"stop\"}"); // anyone may stop
+  assert_true(ws_expect(second, "\"stop\":true"));
+  close(first); // the next in line takes over
+  assert_true(ws_expect(second, "\"type\":\"controls\",\"controls\":true"));
+  close(second);
+}
+
+static void a_fifth_client_is_turned_away(void **state) {
+  fixture *f = *state;
+  int s[PAGE_CLIENTS];
+  for (int i = 0; i < PAGE_CLIENTS; ++i) {
+    s[i] = ws_open(f->port);
+    assert_true(s[i] >= 0);
+    wait_for_clients(f, (uint32_t)i + 1);
+  }
+  assert_int_equal(ws_open(f->port), -1);
+  close(s[1]);
+  wait_for_clients(f, PAGE_CLIENTS - 1);
+  s[1] = ws_open(f->port);
+  assert_true(s[1] >= 0);
+  for (int i = 0; i < PAGE_CLIENTS; ++i) close(s[i]);
+}
+
+// ---- frames -----------------------------------------------------------------------------------
+
+// Sequence of the next frame, 0 when none comes any more.
+static uint32_t next_sequence(int s, uint64_t *tick) {
+  for (;;) {
+    int opcode;
+    size_t count;
+    unsigned char *data = ws_read(s, &opcode, &count);
+    if (!data) return 0;
+    bool frame = opcode == 2 && data[6] == PAGE_FRAME;
+    uint32_t sequence = data[8] | (uint32_t)data[9] << 8 | (uint32_t)data[10] << 16;
+    *tick = data[16] | (uint64_t)data[17] << 8 | (uint64_t)data[18] << 16;
+    free(data);
+    if (frame) return sequence;
+  }
+}
+
+static void acknowledge_frame(int s, uint32_t sequence) {
+  char text[64];
+  snprintf(text, sizeof text, "{\"type\":\"ack\",\"frame\":%u}", sequence);
+  ws_say(s, text);
+}
+
+static void a_silent_client_gets_two_frames_and_then_the_newest(void **state) {
+  fixture *f = *state;
+  int s = ws_open(f->port);
+  struct timeval patience = {.tv_usec = 400000};
+  uint64_t tick = 0, last_tick = 0;
+  uint32_t first = next_sequence(s, &last_tick), second = next_sequence(s, &tick);
+  assert_true(first > 0 && second > first);
+  setsockopt(s, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+  assert_int_equal(next_sequence(s, &tick), 0); // no third one without an acknowledgement
+  unsigned before = atomic_load(&f->source.frames);
+  acknowledge_frame(s, second);
+  uint32_t third = next_sequence(s, &tick);
+  assert_true(third > second);
+  assert_true(tick + 2 >= before);    // what was missed is not sent later
+  acknowledge_frame(s, third + 1000); // acknowledging the future buys nothing
+  assert_true(next_sequence(s, &tick) > 0);
+  assert_int_equal(next_sequence(s, &tick), 0);
+  close(s);
+}
+
+static void frames_flow_while_they_are_acknowledged(void **state) {
+  fixture *f = *state;
+  int s = ws_open(f->port);
+  uint64_t tick = 0, before = 0;
+  for (int i = 0; i < 100; ++i) {
+    uint32_t sequence = next_sequence(s, &tick);
+    assert_true(sequence > 0 && tick > before);
+    before = tick;
+    acknowledge_frame(s, sequence);
+  }
+  close(s);
+}
+
+static void a_client_that_does_not_read_holds_up_nobody(void **state) {
+  fixture *f = *state;
+  char host[32];
+  snprintf(host, sizeof host, "127.0.0.1:%u", (unsigned)f->port);
+  int stuck = ws_open_as(f->port, host, NULL, 2048);
+  for (uint32_t i = 1; i < 2000; i += 100) acknowledge_frame(stuck, i); // asks, never reads
+  wait_for_clients(f, 1);
+  int s = ws_open(f->port);
+  uint64_t tick;
+  double start_s = sonde_clock_now();
+  for (int i = 0; i < 50; ++i) acknowledge_frame(s, next_sequence(s, &tick));
+  assert_true(sonde_clock_now() - start_s < 4);
+  // Each client has one buffer of one frame, whatever it does.
+  size_t frame_bytes = PAGE_FRAME_FIXED_BYTES + 6 * NODES + WIDTH * HEIGHT;
+  pthread_mutex_lock(&f->server->lock);
+  for (int i = 0; i < PAGE_CLIENTS; ++i)
+    assert_true(f->server->client[i].out.capacity <= frame_bytes);
+  pthread_mutex_unlock(&f->server->lock);
+  close(s);
+  close(stuck);
+}
+
+static void a_flood_is_slowed_down_and_then_cut(void **state) {
+  fixture *f = *state;
+  int s = ws_open(f->port);
+  for (int i = 0; i < 900; ++i) ws_say(s, "{\"type\":\"stop\"}");
+  assert_true(ws_expect(s, "too many messages"));
+  assert_in_range(atomic_load(&f->source.controls), PAGE_BURST - 1, 890);
+  for (int i = 0; i < 6000; ++i) ws_say(s, "{\"type\":\"stop\"}");
+  wait_for_clients(f, 0);
+  close(s);
+}
+
+#define SERVER_TEST(name) cmocka_unit_test_setup_teardown(name, set_up, tear_down)
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      SERVER_TEST(files_come_with_strict_headers),
+      SERVER_TEST(foreign_hosts_are_refused),
+      SERVER_TEST(only_this_page_may_open_the_socket),
+      SERVER_TEST(the_server_listens_on_the_loopback_address_only),
+      SERVER_TEST(a_used_port_is_named),
+      SERVER_TEST(a_client_is_greeted_and_may_move_the_probe),
+      SERVER_TEST(stop_latches_until_resume),
+      SERVER_TEST(bad_messages_are_answered_and_ignored),
+      SERVER_TEST(oversized_binary_and_fragmented_messages_end_the_connection),
+      SERVER_TEST(the_first_client_controls_and_the_others_watch),
+      SERVER_TEST(a_fifth_client_is_turned_away),
+      SERVER_TEST(a_silent_client_gets_two_frames_and_then_the_newest),
+      SERVER_TEST(frames_flow_while_they_are_acknowledged),
+      SERVER_TEST(a_client_that_does_not_read_holds_up_nobody),
+      SERVER_TEST(a_flood_is_slowed_down_and_then_cut),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,92 @@
+// The WebSocket: connects, says when the connection is lost and tries again.
+
+import { decode, type Frame, type Line, type Mesh, type Quat, type TextMessage, type Vec3 } from "./protocol";
+
+export interface ConnectionEvents {
+  text(message: TextMessage): void;
+  geometry(part: Mesh | Line): void;
+  frame(frame: Frame): void;
+  state(connected: boolean, retryInS: number): void;
+}
+
+export type EchoKey = "gain_db" | "depth_mm" | "frequency_mhz" | "dynamic_range_db" | "focus_mm";
+
+export class Connection {
+  /** smoothed round trip of a ping, ms */
+  latency_ms = NaN;
+  private socket: WebSocket | null = null;
+  private retry = 0;
+  private pingId = 0;
+  private pingSent = 0;
+
+  constructor(private readonly events: ConnectionEvents) {
+    this.open();
+    window.setInterval(() => this.ping(), 1000);
+  }
+
+  goal(position_mm: Vec3, rotation: Quat): void {
+    this.send({ type: "goal", position_mm, rotation });
+  }
+  probe(probe: string): void {
+    this.send({ type: "controls", probe });
+  }
+  pathology(name: string): void {
+    this.send({ type: "controls", case: name });
+  }
+  echo(key: EchoKey, value: number): void {
+    this.send({ type: "controls", [key]: value });
+  }
+  stop(): void {
+    this.send({ type: "stop" });
+  }
+  resume(): void {
+    this.send({ type: "resume" });
+  }
+  ack(sequence: number): void {
+    this.send({ type: "ack", frame: sequence });
+  }
+
+  private send(message: object): void {
+    if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(message));
+  }
+
+  private ping(): void {
+    this.pingSent = performance.now();
+    this.send({ type: "ping", id: ++this.pingId });
+  }
+
+  private open(): void {
+    const socket = new WebSocket(`ws://${location.host}/ws`);
+    socket.binaryType = "arraybuffer";
+    socket.onopen = () => {
+      this.retry = 0;
+      this.events.state(true, 0);
+    };
+    socket.onmessage = (event: MessageEvent<string | ArrayBuffer>) => this.receive(event.data);
+    socket.onclose = () => this.closed();
+    this.socket = socket;
+  }
+
+  private closed(): void {
+    this.latency_ms = NaN;
+    const wait_s = Math.min(4, 0.5 * 2 ** this.retry++);
+    this.events.state(false, wait_s);
+    window.setTimeout(() => this.open(), wait_s * 1000);
+  }
+
+  private receive(data: string | ArrayBuffer): void {
+    if (typeof data === "string") {
+      const message = JSON.parse(data) as TextMessage;
+      if (message.type !== "pong") this.events.text(message);
+      else if (message.id === this.pingId) this.measure(performance.now() - this.pingSent);
+      return;
+    }
+    const message = decode(data);
+    if (message.kind === "frame") this.events.frame(message);
+    else this.events.geometry(message);
+  }
+
+  private measure(ms: number): void {
+    this.latency_ms = Number.isNaN(this.latency_ms) ? ms : 0.7 * this.latency_ms + 0.3 * ms;
+  }
+}

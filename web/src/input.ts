@@ -1,0 +1,169 @@
+// Mouse, touch and keys -> the operator's hold of the probe.
+
+import * as THREE from "three";
+import { add, length, sub, type Hold } from "./pose";
+import type { Site, Vec3 } from "./protocol";
+import type { ThighScene } from "./scene";
+
+const FAR_MM = 30;      // a click farther than this lifts the probe first
+const SITE_MM = 4;      // a click this near to a site goes to the site
+const LIFTED_MM = -8;
+const STEP_RAD = (5 * Math.PI) / 180;
+const SPACE_MM_S = 8;   // progressive press
+
+export interface InputActions {
+  moved(): void;
+  probe(index: number): void;
+  nextCase(): void;
+  freeze(): void;
+  seeThrough(): void;
+  reset(): void;
+  stop(): void;
+  help(): void;
+  sites(): readonly Site[];
+}
+
+type Drag = { kind: "slide" | "press"; x: number; y: number; moved: boolean } | null;
+
+export class Input {
+  enabled = true;
+  private drag: Drag = null;
+  private space = 0;
+  private last_s = 0;
+
+  constructor(
+    private readonly canvas: HTMLCanvasElement,
+    private readonly scene: ThighScene,
+    private readonly hold: Hold,
+    private readonly actions: InputActions,
+  ) {
+    canvas.addEventListener("pointerdown", (e) => this.down(e), { capture: true });
+    canvas.addEventListener("pointermove", (e) => this.move(e));
+    canvas.addEventListener("pointerup", (e) => this.up(e));
+    canvas.addEventListener("pointercancel", () => (this.drag = null));
+    canvas.addEventListener("pointerleave", () => this.scene.hover(null, null));
+    canvas.addEventListener("contextmenu", (e) => e.preventDefault());
+    canvas.addEventListener("wheel", (e) => this.wheel(e), { passive: false });
+    window.addEventListener("keydown", (e) => this.key(e));
+    window.addEventListener("keyup", (e) => e.code === "Space" && (this.space = 0));
+    window.addEventListener("blur", () => (this.space = 0));
+  }
+
+  private down(e: PointerEvent): void {
+    this.canvas.focus();
+    const left = e.button === 0 && !e.altKey;
+    const point = left && this.enabled ? this.scene.pick(e.clientX, e.clientY) : null;
+    // Beside the thigh, and with Alt, the left button turns the view.
+    this.scene.orbit.mouseButtons.LEFT = e.button === 0 && !point ? THREE.MOUSE.ROTATE : null;
+    if (!this.enabled) return;
+    if (e.button === 2) this.drag = { kind: "press", x: e.clientX, y: e.clientY, moved: false };
+    if (!point) return;
+    this.drag = { kind: "slide", x: e.clientX, y: e.clientY, moved: false };
+    this.canvas.setPointerCapture(e.pointerId);
+    if (length(sub(point, this.hold.point)) > FAR_MM) this.hold.setDepth(LIFTED_MM);
+    this.place(point);
+  }
+
+  private move(e: PointerEvent): void {
+    const point = e.buttons === 0 || this.drag?.kind === "slide" ? this.scene.pick(e.clientX, e.clientY) : null;
+    this.canvas.classList.toggle("over", point !== null);
+    this.scene.hover(e.buttons === 0 ? point : null, point && this.scene.skin ? this.scene.skin.normalAt(point) : null);
+    if (!this.drag) return;
+    if (Math.hypot(e.clientX - this.drag.x, e.clientY - this.drag.y) > 3) this.drag.moved = true;
+    if (this.drag.kind === "slide" && point && this.drag.moved) this.place(point);
+    if (this.drag.kind === "press") {
+      this.press((e.clientY - this.drag.y) * 0.15);
+      this.drag.y = e.clientY;
+    }
+  }
+
+  private up(e: PointerEvent): void {
+    const drag = this.drag;
+    this.drag = null;
+    if (!drag || drag.kind !== "slide" || drag.moved) return;
+    const point = this.scene.pick(e.clientX, e.clientY);
+    const site = point && this.actions.sites().find((s) => length(sub(s.position_mm, point)) < SITE_MM);
+    if (!site) return;
+    this.hold.atSite(site);
+    this.actions.moved();
+  }
+
+  private place(point: Vec3): void {
+    if (!this.scene.skin) return;
+    this.hold.at(point, this.scene.skin.normalAt(point));
+    this.actions.moved();
+  }
+
+  private press(by_mm: number): void {
+    if (!this.enabled) return;
+    this.hold.setDepth(this.hold.depth_mm + by_mm);
+    this.actions.moved();
+  }
+
+  private wheel(e: WheelEvent): void {
+    e.preventDefault();
+    const delta = e.deltaY || e.deltaX; // Shift turns the wheel sideways
+    const notches = Math.max(-3, Math.min(3, delta / (e.deltaMode === 0 ? 100 : 3)));
+    if (e.ctrlKey) this.scene.zoom(1.1 ** notches);
+    else this.press(-notches * (e.shiftKey ? 5 : 1));
+  }
+
+  /** Slides along the skin in the plane of the face. */
+  private slide(x_mm: number, y_mm: number): void {
+    const [x, y] = this.hold.axes();
+    const wanted = add(add(this.hold.point, x, x_mm), y, y_mm);
+    const point = this.scene.project(wanted, this.hold.normal);
+    if (point) this.place(point);
+  }
+
+  private turn(change: Partial<Pick<Hold, "rotation" | "tiltX" | "tiltY">>): void {
+    for (const [axis, by] of Object.entries(change) as ["rotation" | "tiltX" | "tiltY", number][]) {
+      const limit = axis === "rotation" ? Math.PI : Math.PI / 4;
+      this.hold[axis] = Math.max(-limit, Math.min(limit, this.hold[axis] + by));
+    }
+    this.actions.moved();
+  }
+
+  private key(e: KeyboardEvent): void {
+    if (e.key === "Escape" && !document.querySelector("dialog[open]")) return this.actions.stop();
+    const inField = e.target instanceof HTMLInputElement || document.querySelector("dialog[open]") !== null;
+    if (inField || e.ctrlKey || e.metaKey || e.altKey) return;
+    const step = e.shiftKey ? 5 : 1;
+    const keys: Record<string, () => void> = {
+      ArrowUp: () => this.press(step),
+      ArrowDown: () => this.press(-step),
+      KeyW: () => this.press(step),
+      KeyS: () => this.press(-step),
+      KeyA: () => this.slide(-2 * step, 0),
+      KeyD: () => this.slide(2 * step, 0),
+      ArrowLeft: () => this.slide(0, 2 * step),
+      ArrowRight: () => this.slide(0, -2 * step),
+      KeyQ: () => this.turn({ rotation: -STEP_RAD }),
+      KeyE: () => this.turn({ rotation: STEP_RAD }),
+      KeyT: () => this.turn({ tiltY: STEP_RAD }),
+      KeyG: () => this.turn({ tiltY: -STEP_RAD }),
+      KeyY: () => this.turn({ tiltX: STEP_RAD }),
+      KeyH: () => this.turn({ tiltX: -STEP_RAD }),
+      Space: () => (this.space = e.shiftKey ? -1 : 1),
+      KeyC: () => this.actions.nextCase(),
+      KeyF: () => this.actions.freeze(),
+      KeyX: () => this.actions.seeThrough(),
+      KeyR: () => this.actions.reset(),
+    };
+    const digit = /^Digit([1-9])$/.exec(e.code);
+    const action = e.key === "?" ? () => this.actions.help() : keys[e.code];
+    const watching = ["KeyF", "KeyX"].includes(e.code) || e.key === "?";
+    if (!action && !digit) return;
+    e.preventDefault();
+    if (!this.enabled && !watching) return;
+    if (digit && e.key !== "?") this.actions.probe(Number(digit[1]) - 1);
+    else action?.();
+  }
+
+  /** Called once per animation frame. */
+  tick(now_s: number): void {
+    const dt_s = Math.min(0.1, now_s - this.last_s);
+    this.last_s = now_s;
+    if (this.space !== 0) this.press(this.space * SPACE_MM_S * dt_s);
+  }
+}

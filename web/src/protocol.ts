@@ -1,0 +1,214 @@
+// Messages of docs/page_protocol.md: types, decoding of the binary ones. Lengths are mm.
+
+export type Vec3 = [number, number, number];
+/** w, x, y, z */
+export type Quat = [number, number, number, number];
+
+export interface ProbeInfo {
+  name: string;
+  half_x_mm: number;
+  half_y_mm: number;
+  rectangular: boolean;
+}
+
+export interface Site {
+  id: number;
+  position_mm: Vec3;
+  normal: Vec3;
+  u: Vec3;
+  v: Vec3;
+  /** per probe: [penetration mm, force N] */
+  curves: Record<string, [number, number][]>;
+}
+
+export interface Hello {
+  type: "hello";
+  version: number;
+  program: string;
+  model: string;
+  provenance: string;
+  nodes: number;
+  faces: number;
+  force_limit_n: number;
+  controls: boolean;
+  probes: ProbeInfo[];
+  cases: string[];
+  faults: string[];
+  sites: Site[];
+}
+
+export interface Controls {
+  type: "controls";
+  controls: boolean;
+  probe: string;
+  case: string;
+  stop: boolean;
+  gain_db: number;
+  depth_mm: number;
+  frequency_mhz: number;
+  dynamic_range_db: number;
+  focus_mm: number;
+  tgc_db_per_cm: number;
+}
+
+export type TextMessage =
+  | Hello
+  | Controls
+  | { type: "error"; message: string }
+  | { type: "pong"; id: number };
+
+export interface Mesh {
+  kind: "mesh";
+  part: number;
+  points: Float32Array;
+  faces: Uint32Array;
+}
+
+export interface Line {
+  kind: "line";
+  part: number;
+  /** x, y, z, radius */
+  points: Float32Array;
+}
+
+export interface Snapshot {
+  tick: number;
+  time_s: number;
+  probe: number;
+  fault: number;
+  flags: number;
+  iterations: number;
+  awake: number;
+  position_mm: Vec3;
+  rotation: Quat;
+  force_n: Vec3;
+  rendered_force_n: Vec3;
+  force_normal_n: number;
+  penetration_mm: number;
+  contact_area_mm2: number;
+  /** NaN when the vessel is not in view */
+  vein_area_ratio: number;
+  artery_area_ratio: number;
+  vein_short_mm: number;
+}
+
+export interface Frame {
+  kind: "frame";
+  sequence: number;
+  snapshot: Snapshot;
+  /** displacement of each node in units of quantum_mm */
+  displacements: Int16Array;
+  quantum_mm: number;
+  width: number;
+  height: number;
+  width_mm: number;
+  height_mm: number;
+  pixels: Uint8Array;
+}
+
+export const PART = { skin: 0, femur: 1, vein: 2, artery: 3, probe: 16 } as const;
+export const VERSION = 1;
+
+const HEADER = 16;
+const MESH_FIXED = 24;
+const FRAME_FIXED = 140;
+const MAGIC = 0x45444e53; // "SNDE", little-endian
+
+/** Reads one value after the other. */
+class Cursor {
+  constructor(
+    private readonly view: DataView,
+    private at: number,
+  ) {}
+  u16(): number {
+    this.at += 2;
+    return this.view.getUint16(this.at - 2, true);
+  }
+  u32(): number {
+    this.at += 4;
+    return this.view.getUint32(this.at - 4, true);
+  }
+  u64(): number {
+    const low = this.u32();
+    return low + this.u32() * 4294967296;
+  }
+  f32(): number {
+    this.at += 4;
+    return this.view.getFloat32(this.at - 4, true);
+  }
+  f64(): number {
+    this.at += 8;
+    return this.view.getFloat64(this.at - 8, true);
+  }
+  vec3(): Vec3 {
+    return [this.f32(), this.f32(), this.f32()];
+  }
+  quat(): Quat {
+    return [this.f32(), this.f32(), this.f32(), this.f32()];
+  }
+}
+
+function decodeFrame(bytes: ArrayBuffer, sequence: number): Frame {
+  const c = new Cursor(new DataView(bytes), HEADER);
+  const tick = c.u64();
+  const time_s = c.f64();
+  const nodes = c.u32();
+  const width = c.u16();
+  const height = c.u16();
+  const snapshot: Snapshot = {
+    tick,
+    time_s,
+    probe: c.u16(),
+    fault: c.u16(),
+    flags: c.u16(),
+    iterations: c.u16(),
+    awake: c.u32(),
+    position_mm: c.vec3(),
+    rotation: c.quat(),
+    force_n: c.vec3(),
+    rendered_force_n: c.vec3(),
+    force_normal_n: c.f32(),
+    penetration_mm: c.f32(),
+    contact_area_mm2: c.f32(),
+    vein_area_ratio: c.f32(),
+    artery_area_ratio: c.f32(),
+    vein_short_mm: c.f32(),
+  };
+  const width_mm = c.f32();
+  const height_mm = c.f32();
+  const quantum_mm = c.f32();
+  return {
+    kind: "frame",
+    sequence,
+    snapshot,
+    displacements: new Int16Array(bytes, FRAME_FIXED, nodes * 3),
+    quantum_mm,
+    width,
+    height,
+    width_mm,
+    height_mm,
+    pixels: new Uint8Array(bytes, FRAME_FIXED + nodes * 6, width * height),
+  };
+}
+
+/** Decodes a binary message; throws with a sentence when it is not one of ours. */
+export function decode(bytes: ArrayBuffer): Mesh | Line | Frame {
+  const c = new Cursor(new DataView(bytes), 0);
+  if (bytes.byteLength < HEADER || c.u32() !== MAGIC) throw new Error("not a Sonde message");
+  const version = c.u16();
+  if (version !== VERSION) throw new Error(`protocol version ${version} is not ${VERSION}`);
+  const type = c.u16();
+  const id = c.u32();
+  if (c.u32() !== bytes.byteLength) throw new Error("a message was cut");
+  if (type === 3) return decodeFrame(bytes, id);
+  const count = c.u32();
+  const faces = c.u32();
+  if (type === 2) return { kind: "line", part: id, points: new Float32Array(bytes, MESH_FIXED, count * 4) };
+  if (type !== 1) throw new Error(`unknown message type ${type}`);
+  return {
+    kind: "mesh",
+    part: id,
+    points: new Float32Array(bytes, MESH_FIXED, count * 3),
+    faces: new Uint32Array(bytes, MESH_FIXED + count * 12, faces * 3),
+  };
+}

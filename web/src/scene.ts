@@ -1,0 +1,422 @@
+// The thigh, the vessels, the femur and the probe in three dimensions. Draws only when something
+// changed. Scene units are mm, axes those of the model.
+
+import * as THREE from "three";
+import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import { nextRange, SHADES, SHADE_TABLE } from "./colour";
+import { Skin } from "./pose";
+import { PART, type Frame, type Line, type Mesh, type ProbeInfo, type Quat, type Site, type Vec3 } from "./protocol";
+
+const COLOUR = { vein: 0x5b8def, artery: 0xe0604d, bone: 0xe7dfcb, probe: 0xd3dae2, mark: 0x5cc8c2 };
+const CALM_ALPHA = 0.4; // of see-through skin at rest; displaced skin is up to MOVED_ALPHA
+const MOVED_ALPHA = 0.86;
+const BEHIND_MM = 46; // how much of a probe's body is drawn: a hand's breadth, not the whole handle
+
+/** Skin: vertex colours with alpha; more opaque where it is seen at a grazing angle, like glass. */
+function skinMaterial(): THREE.MeshStandardMaterial {
+  const material = new THREE.MeshStandardMaterial({ vertexColors: true, roughness: 0.78, metalness: 0 });
+  material.onBeforeCompile = (shader) => {
+    shader.fragmentShader = shader.fragmentShader.replace(
+      "#include <opaque_fragment>",
+      `#ifndef OPAQUE
+        float facing = abs(dot(normal, normalize(vViewPosition)));
+        diffuseColor.a = mix(1.0, diffuseColor.a, smoothstep(0.0, 0.75, facing));
+      #endif
+      #include <opaque_fragment>`,
+    );
+  };
+  return material;
+}
+
+/** The two cut ends of the thigh: flat, calm, not part of the skin. */
+function endMaterial(): THREE.MeshBasicMaterial {
+  return new THREE.MeshBasicMaterial({ color: 0x2b333e, transparent: true, opacity: 0.5, depthWrite: false });
+}
+
+/** Splits the faces into the skin and the flat ends across the leg (z is the leg's axis). */
+function splitEnds(mesh: Mesh): { skin: number[]; ends: number[] } {
+  let [low, high] = [Infinity, -Infinity];
+  for (let i = 2; i < mesh.points.length; i += 3) {
+    low = Math.min(low, mesh.points[i]!);
+    high = Math.max(high, mesh.points[i]!);
+  }
+  const skin: number[] = [];
+  const ends: number[] = [];
+  for (let f = 0; f < mesh.faces.length; f += 3) {
+    const face = [mesh.faces[f]!, mesh.faces[f + 1]!, mesh.faces[f + 2]!];
+    const z = face.map((v) => mesh.points[3 * v + 2]!);
+    const flat = z.every((h) => h < low + 0.5) || z.every((h) => h > high - 0.5);
+    (flat ? ends : skin).push(...face);
+  }
+  return { skin, ends };
+}
+
+interface SiteDot {
+  node: number;
+  rest: THREE.Vector3;
+}
+
+export class ThighScene {
+  skin: Skin | null = null;
+  rangeChanged: (range_mm: number) => void = () => undefined;
+  readonly orbit: OrbitControls;
+  private readonly renderer: THREE.WebGLRenderer;
+  private readonly scene = new THREE.Scene();
+  private readonly camera = new THREE.PerspectiveCamera(27, 1, 10, 3000);
+  private readonly skinMaterial = skinMaterial();
+  private readonly inside = new THREE.Group();
+  private readonly probe = new THREE.Group();
+  private readonly probeBodies = new Map<number, THREE.Object3D>();
+  private readonly ring: THREE.Mesh;
+  private readonly plane: THREE.Mesh<THREE.PlaneGeometry, THREE.MeshBasicMaterial>;
+  private readonly ray = new THREE.Raycaster();
+  private texture: THREE.DataTexture | null = null;
+  private surface: THREE.Mesh<THREE.BufferGeometry, THREE.MeshStandardMaterial> | null = null;
+  private readonly ends = new THREE.Mesh(new THREE.BufferGeometry(), endMaterial());
+  private restMesh: THREE.Mesh | null = null; // never drawn: the rays meet the resting skin
+  private dots: THREE.InstancedMesh | null = null;
+  private dotInfo: SiteDot[] = [];
+  private range_mm = 10;
+  private through = true;
+  private dirty = true;
+
+  constructor(
+    private readonly canvas: HTMLCanvasElement,
+    private readonly low: boolean,
+  ) {
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !low, alpha: true, powerPreference: "high-performance" });
+    this.renderer.setPixelRatio(low ? 1 : Math.min(2, window.devicePixelRatio));
+    this.ring = new THREE.Mesh(
+      new THREE.RingGeometry(4.2, 5, 40),
+      new THREE.MeshBasicMaterial({ color: COLOUR.mark, transparent: true, opacity: 0.8, side: THREE.DoubleSide, depthTest: false }),
+    );
+    this.ring.visible = false;
+    this.ring.renderOrder = 5;
+    this.plane = new THREE.Mesh(
+      new THREE.PlaneGeometry(1, 1),
+      new THREE.MeshBasicMaterial({ transparent: true, opacity: 0.92, side: THREE.DoubleSide, depthWrite: false }),
+    );
+    this.plane.visible = false;
+    this.plane.rotation.set(Math.PI / 2, 0, 0);
+    this.probe.add(this.plane);
+    this.scene.add(this.inside, this.probe, this.ring);
+    this.addLights();
+    this.camera.up.set(0, 1, 0);
+    this.orbit = new OrbitControls(this.camera, canvas);
+    this.configureOrbit();
+    this.home();
+    new ResizeObserver(() => this.resize()).observe(canvas);
+    this.resize();
+    this.seeThrough(true);
+  }
+
+  private addLights(): void {
+    this.scene.add(new THREE.HemisphereLight(0xdfe8f5, 0x3a3632, 1.7));
+    const key = new THREE.DirectionalLight(0xfff3e4, 2.4);
+    key.position.set(260, 420, -160);
+    const rim = new THREE.DirectionalLight(0x86a8d8, 0.9);
+    rim.position.set(-300, 120, 300);
+    this.scene.add(key, rim);
+  }
+
+  private configureOrbit(): void {
+    this.orbit.enableDamping = false;
+    this.orbit.enableZoom = false; // the wheel presses; Ctrl + wheel zooms (input.ts)
+    this.orbit.mouseButtons = { LEFT: null, MIDDLE: THREE.MOUSE.ROTATE, RIGHT: null };
+    this.orbit.touches = { ONE: null, TWO: THREE.TOUCH.DOLLY_ROTATE };
+    this.orbit.minDistance = 220;
+    this.orbit.maxDistance = 1400;
+    this.orbit.addEventListener("change", () => (this.dirty = true));
+  }
+
+  /** Medial and anterior, the leg lying across the picture, the knee to the left. */
+  home(): void {
+    this.orbit.target.set(12, -8, 142);
+    const away = new THREE.Vector3(0.74, 0.52, -0.43).normalize();
+    this.camera.position.copy(this.orbit.target).addScaledVector(away, 560);
+    this.orbit.update();
+    this.dirty = true;
+  }
+
+  zoom(factor: number): void {
+    const offset = this.camera.position.clone().sub(this.orbit.target);
+    offset.setLength(Math.min(1400, Math.max(220, offset.length() * factor)));
+    this.camera.position.copy(this.orbit.target).add(offset);
+    this.orbit.update();
+    this.dirty = true;
+  }
+
+  private resize(): void {
+    const { clientWidth: w, clientHeight: h } = this.canvas;
+    if (w === 0 || h === 0) return;
+    this.renderer.setSize(w, h, false);
+    this.camera.aspect = w / h;
+    this.camera.updateProjectionMatrix();
+    this.dirty = true;
+  }
+
+  seeThrough(on: boolean): void {
+    this.through = on;
+    this.skinMaterial.transparent = on;
+    this.skinMaterial.depthWrite = !on;
+    this.ends.material.opacity = on ? 0.45 : 1;
+    this.ends.material.depthWrite = !on;
+    this.skinMaterial.needsUpdate = true;
+    this.inside.visible = on;
+    this.plane.visible = on && this.texture !== null;
+    this.dirty = true;
+  }
+
+  get isThrough(): boolean {
+    return this.through;
+  }
+
+  // ---- geometry --------------------------------------------------------------------------------
+
+  setPart(part: Mesh | Line): void {
+    if (part.kind === "line") this.setVessel(part);
+    else if (part.part === PART.skin) this.setSkin(part);
+    else if (part.part === PART.femur) this.setFemur(part);
+    else this.setProbeBody(part);
+    this.dirty = true;
+  }
+
+  private static geometry(mesh: Mesh): THREE.BufferGeometry {
+    const g = new THREE.BufferGeometry();
+    g.setAttribute("position", new THREE.BufferAttribute(mesh.points.slice(), 3));
+    g.setIndex(new THREE.BufferAttribute(mesh.faces.slice(), 1));
+    g.computeVertexNormals();
+    return g;
+  }
+
+  private setSkin(mesh: Mesh): void {
+    this.skin = new Skin(mesh.points.slice(), mesh.faces);
+    this.restMesh = new THREE.Mesh(ThighScene.geometry(mesh));
+    const g = ThighScene.geometry(mesh);
+    const colours = new Float32Array((mesh.points.length / 3) * 4).fill(CALM_ALPHA);
+    for (let i = 0; i < colours.length; i += 4) colours.set(SHADE_TABLE.subarray(0, 3), i);
+    g.setAttribute("color", new THREE.BufferAttribute(colours, 4));
+    this.surface?.geometry.dispose();
+    this.surface?.removeFromParent();
+    this.surface = new THREE.Mesh(g, this.skinMaterial);
+    this.surface.frustumCulled = false;
+    this.surface.renderOrder = 2;
+    const { skin, ends } = splitEnds(mesh); // the ends share the points, not the normals
+    g.setIndex(skin);
+    this.ends.geometry.setAttribute("position", g.getAttribute("position"));
+    this.ends.geometry.setIndex(ends);
+    this.ends.renderOrder = 1;
+    this.scene.add(this.surface, this.ends);
+  }
+
+  private replaceInside(name: string, object: THREE.Object3D): void {
+    this.inside.getObjectByName(name)?.removeFromParent();
+    object.name = name;
+    this.inside.add(object);
+  }
+
+  private setFemur(mesh: Mesh): void {
+    const material = new THREE.MeshStandardMaterial({ color: COLOUR.bone, roughness: 0.9 });
+    this.replaceInside("femur", new THREE.Mesh(ThighScene.geometry(mesh), material));
+  }
+
+  private setVessel(line: Line): void {
+    const points: THREE.Vector3[] = [];
+    let radius = 0;
+    for (let i = 0; i < line.points.length; i += 4) {
+      points.push(new THREE.Vector3(line.points[i], line.points[i + 1], line.points[i + 2]));
+      radius += line.points[i + 3]!;
+    }
+    if (points.length < 2) return;
+    const tube = new THREE.TubeGeometry(new THREE.CatmullRomCurve3(points), 96, radius / points.length, 16);
+    const colour = line.part === PART.vein ? COLOUR.vein : COLOUR.artery;
+    const material = new THREE.MeshStandardMaterial({ color: colour, roughness: 0.55, emissive: colour, emissiveIntensity: 0.25 });
+    this.replaceInside(line.part === PART.vein ? "vein" : "artery", new THREE.Mesh(tube, material));
+  }
+
+  private setProbeBody(mesh: Mesh): void {
+    const points = mesh.points.slice();
+    for (let i = 2; i < points.length; i += 3) points[i] = Math.max(points[i]!, -BEHIND_MM);
+    const g = ThighScene.geometry({ ...mesh, points }).toNonIndexed();
+    g.computeVertexNormals();
+    const round = mesh.faces.length > 3 * 60;
+    const material = new THREE.MeshStandardMaterial({
+      color: COLOUR.probe, roughness: 0.5, transparent: true, opacity: 0.62, flatShading: !round,
+    });
+    const body = new THREE.Mesh(g, material);
+    body.renderOrder = 3;
+    if (!round) {
+      const edge = new THREE.LineBasicMaterial({ color: 0xffffff, transparent: true, opacity: 0.5 });
+      body.add(new THREE.LineSegments(new THREE.EdgesGeometry(g, 20), edge));
+    }
+    body.visible = false;
+    this.probeBodies.get(mesh.part - PART.probe)?.removeFromParent();
+    this.probeBodies.set(mesh.part - PART.probe, body);
+    this.probe.add(body);
+  }
+
+  /** The coloured mark of each probe: the image's left side. */
+  setProbes(probes: readonly ProbeInfo[]): void {
+    probes.forEach((info, i) => {
+      const mark = new THREE.Mesh(new THREE.SphereGeometry(1.6, 16, 12), new THREE.MeshBasicMaterial({ color: COLOUR.mark }));
+      mark.position.set(-info.half_x_mm, 0, -Math.min(10, 4 * info.half_y_mm));
+      this.probeBodies.get(i)?.add(mark);
+    });
+  }
+
+  setSites(sites: readonly Site[]): void {
+    const skin = this.skin;
+    if (!skin) return;
+    this.dots?.removeFromParent();
+    const material = new THREE.MeshBasicMaterial({ color: 0xc9d4e2, transparent: true, opacity: 0.55 });
+    this.dots = new THREE.InstancedMesh(new THREE.SphereGeometry(0.95, 10, 8), material, sites.length);
+    this.dots.frustumCulled = false;
+    this.dots.renderOrder = 4;
+    this.dotInfo = sites.map((site) => ({ node: this.nearestNode(site.position_mm), rest: new THREE.Vector3(...site.position_mm) }));
+    this.scene.add(this.dots);
+    this.moveDots(null);
+  }
+
+  private nearestNode(p: Vec3): number {
+    const points = this.skin!.points;
+    let best = 0;
+    let best2 = Infinity;
+    for (let i = 0; i < points.length; i += 3) {
+      const d2 = (points[i]! - p[0]) ** 2 + (points[i + 1]! - p[1]) ** 2 + (points[i + 2]! - p[2]) ** 2;
+      if (d2 < best2) [best, best2] = [i / 3, d2];
+    }
+    return best;
+  }
+
+  private moveDots(frame: Frame | null): void {
+    if (!this.dots) return;
+    const m = new THREE.Matrix4();
+    const p = new THREE.Vector3();
+    this.dotInfo.forEach((dot, i) => {
+      p.copy(dot.rest);
+      const q = frame?.quantum_mm ?? 0;
+      const d = frame?.displacements;
+      if (d) p.add(new THREE.Vector3(d[3 * dot.node]! * q, d[3 * dot.node + 1]! * q, d[3 * dot.node + 2]! * q));
+      this.dots!.setMatrixAt(i, m.setPosition(p));
+    });
+    this.dots.instanceMatrix.needsUpdate = true;
+  }
+
+  // ---- a frame ---------------------------------------------------------------------------------
+
+  show(frame: Frame): void {
+    this.deform(frame);
+    this.moveDots(frame);
+    this.placeProbe(frame.snapshot.probe, frame.snapshot.position_mm, frame.snapshot.rotation);
+    this.placeImage(frame);
+    this.dirty = true;
+  }
+
+  private deform(frame: Frame): void {
+    if (!this.surface || !this.skin) return;
+    const rest = this.skin.points;
+    const d = frame.displacements;
+    const position = this.surface.geometry.getAttribute("position") as THREE.BufferAttribute;
+    const colour = this.surface.geometry.getAttribute("color") as THREE.BufferAttribute;
+    const out = position.array as Float32Array;
+    const rgba = colour.array as Float32Array;
+    const shade = ((SHADES - 1) * frame.quantum_mm) / this.range_mm;
+    const alpha = (MOVED_ALPHA - CALM_ALPHA) / (SHADES - 1);
+    let largest2 = 0;
+    for (let i = 0, c = 0; i < out.length; i += 3, c += 4) {
+      const [x, y, z] = [d[i]!, d[i + 1]!, d[i + 2]!];
+      out[i] = rest[i]! + x * frame.quantum_mm;
+      out[i + 1] = rest[i + 1]! + y * frame.quantum_mm;
+      out[i + 2] = rest[i + 2]! + z * frame.quantum_mm;
+      const size2 = x * x + y * y + z * z;
+      if (size2 > largest2) largest2 = size2;
+      const k = Math.min(SHADES - 1, Math.round(Math.sqrt(size2) * shade));
+      rgba[c] = SHADE_TABLE[3 * k]!;
+      rgba[c + 1] = SHADE_TABLE[3 * k + 1]!;
+      rgba[c + 2] = SHADE_TABLE[3 * k + 2]!;
+      rgba[c + 3] = CALM_ALPHA + alpha * k;
+    }
+    position.needsUpdate = colour.needsUpdate = true;
+    this.surface.geometry.computeVertexNormals();
+    this.setRange(nextRange(this.range_mm, Math.sqrt(largest2) * frame.quantum_mm));
+  }
+
+  private setRange(range_mm: number): void {
+    if (range_mm === this.range_mm) return;
+    this.range_mm = range_mm;
+    this.rangeChanged(range_mm);
+  }
+
+  private placeProbe(index: number, p: Vec3, q: Quat): void {
+    for (const [i, body] of this.probeBodies) body.visible = i === index;
+    this.probe.position.set(...p);
+    this.probe.quaternion.set(q[1], q[2], q[3], q[0]);
+  }
+
+  /** The echo image where it is taken: below the probe, x to the right, z down. */
+  private placeImage(frame: Frame): void {
+    if (!this.through) return;
+    if (!this.texture || this.texture.image.width !== frame.width || this.texture.image.height !== frame.height) {
+      this.texture?.dispose();
+      this.texture = new THREE.DataTexture(new Uint8Array(4 * frame.width * frame.height), frame.width, frame.height);
+      this.texture.colorSpace = THREE.SRGBColorSpace;
+      this.texture.minFilter = this.texture.magFilter = THREE.LinearFilter;
+      this.plane.material.map = this.texture;
+      this.plane.material.needsUpdate = true;
+    }
+    const rgba = this.texture.image.data as unknown as Uint8Array;
+    const grey = frame.pixels;
+    for (let i = 0; i < grey.length; ++i) {
+      const g = grey[i]!;
+      rgba[4 * i] = rgba[4 * i + 1] = rgba[4 * i + 2] = g;
+      rgba[4 * i + 3] = 210;
+    }
+    this.texture.needsUpdate = true;
+    this.plane.visible = true;
+    this.plane.scale.set(frame.width_mm, frame.height_mm, 1);
+    this.plane.position.set(0, 0, frame.height_mm / 2);
+  }
+
+  // ---- pointing --------------------------------------------------------------------------------
+
+  /** Point of the resting skin under the pointer. */
+  pick(clientX: number, clientY: number): Vec3 | null {
+    const box = this.canvas.getBoundingClientRect();
+    const x = ((clientX - box.left) / box.width) * 2 - 1;
+    const y = 1 - ((clientY - box.top) / box.height) * 2;
+    this.ray.setFromCamera(new THREE.Vector2(x, y), this.camera);
+    return this.cast();
+  }
+
+  /** Point of the resting skin below a point, along the inward normal. */
+  project(p: Vec3, normal: Vec3): Vec3 | null {
+    const n = new THREE.Vector3(...normal);
+    this.ray.set(new THREE.Vector3(...p).addScaledVector(n, 40), n.negate());
+    return this.cast();
+  }
+
+  private cast(): Vec3 | null {
+    const hit = this.restMesh ? this.ray.intersectObject(this.restMesh, false)[0] : undefined;
+    return hit ? [hit.point.x, hit.point.y, hit.point.z] : null;
+  }
+
+  hover(p: Vec3 | null, normal: Vec3 | null): void {
+    if (!p && !this.ring.visible) return;
+    this.ring.visible = p !== null && normal !== null;
+    if (p && normal) {
+      this.ring.position.set(...p);
+      this.ring.lookAt(p[0] + normal[0], p[1] + normal[1], p[2] + normal[2]);
+    }
+    this.dirty = true;
+  }
+
+  render(): void {
+    if (!this.dirty) return;
+    this.dirty = false;
+    this.renderer.render(this.scene, this.camera);
+  }
+
+  get quality(): "low" | "high" {
+    return this.low ? "low" : "high";
+  }
+}
