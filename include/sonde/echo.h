@@ -53,7 +53,7 @@ typedef struct sonde_echo_def {
   uint32_t sample_count;    /**< per line, default 1024 */
   double scatterers_per_m3; /**< default: enough for developed speckle */
   uint64_t seed;
-  bool plain;             /**< tissue without septa and bundles, for measurements */
+  bool plain; /**< tissue without septa and bundles, for measurements */
 } sonde_echo_def;
 
 /** @param interior borrowed, its updates feed the images @thread owner */

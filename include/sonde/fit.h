@@ -154,11 +154,11 @@ typedef struct sonde_fit_result {
   sonde_site *sites;          /**< [site_count] input sites with k0 and xm of the last stage */
   sonde_surface_law law;      /**< the model's law with the estimated edge stiffness */
   uint32_t stage1_parameters; /**< 2 per curve */
-  uint32_t parameters;        /**< of the last stage: 2 per measured site + 1 (+1 with T0) */
-  sonde_error_report stage1;  /**< interaction "independent" */
-  sonde_error_report stage2;  /**< interaction "simplified"; zero counts when stages == 1 */
-  double *model_n;            /**< [measurements.count] forces of the last stage */
-  uint32_t iterations;        /**< of stage 2 */
+  uint32_t parameters; /**< stage 1: as above; stage 2: 2 per measured site + 1 (+1 with T0) */
+  sonde_error_report stage1; /**< interaction "independent" */
+  sonde_error_report stage2; /**< interaction "simplified"; zero counts when stages == 1 */
+  double *model_n;           /**< [measurements.count] forces of the last stage */
+  uint32_t iterations;       /**< of stage 2 */
   bool converged;
   double cost, start_cost; /**< stage 2: half the sum of losses at its end and its start */
   double edge_sd_log;      /**< standard deviation of ln k_s (Schur complement); 0 if none */

@@ -19,7 +19,6 @@ typedef struct sonde_mesh {
   sonde_vec3 *vertices; /**< [vertex_count] m */
   uint32_t (*faces)[3]; /**< [face_count] counter-clockwise seen from outside */
 } sonde_mesh;
-
 /** Allocates arrays of the given sizes (zeroed). @thread owner */
 SONDE_API sonde_status sonde_mesh_create(sonde_mesh *mesh, uint32_t vertices, uint32_t faces,
                                          sonde_error *error);
@@ -31,18 +30,14 @@ SONDE_API sonde_status sonde_mesh_copy(const sonde_mesh *mesh, sonde_mesh *copy,
 
 /**
  * Reads .ply (ascii, binary little/big endian), .obj or .stl (ascii, binary; vertices welded).
- * Polygons are split into triangle fans (meant for convex ones). Triangles of an .stl that welding
- * leaves with two equal corners are dropped.
+ * Polygons are split into fans (meant for convex ones); .stl triangles with equal corners dropped.
  * @param metres_per_unit scale of the file's coordinates; 1e-3 for millimetres
  * @return SONDE_FORMAT with file, line and what was expected; SONDE_IO when it cannot be opened
  * @thread owner
  */
 SONDE_API sonde_status sonde_mesh_load(const char *path, double metres_per_unit, sonde_mesh *mesh,
                                        sonde_error *error);
-/**
- * Writes .ply or .obj (ascii, 17 significant digits) or .stl (binary, single precision), by
- * extension, atomically, whatever locale is set. @thread owner
- */
+/** Writes .ply or .obj (ascii) or .stl (binary), by extension, atomically. @thread owner */
 SONDE_API sonde_status sonde_mesh_save(const char *path, double metres_per_unit,
                                        const sonde_mesh *mesh, sonde_error *error);
 
@@ -58,7 +53,6 @@ typedef struct sonde_mesh_report {
   double shortest_edge_m, longest_edge_m, mean_edge_m;
   double smallest_angle_rad;
 } sonde_mesh_report;
-
 /** Measures the mesh. @return SONDE_MESH when a face names a missing vertex. @thread owner */
 SONDE_API sonde_status sonde_mesh_inspect(const sonde_mesh *mesh, sonde_mesh_report *report,
                                           sonde_error *error);
@@ -69,7 +63,6 @@ typedef struct sonde_mass {
   sonde_vec3 centre_m;
   sonde_mat3 inertia_kg_m2; /**< about the centre */
 } sonde_mass;
-
 /** Exact polyhedral integrals (divergence theorem). @return SONDE_MESH when not closed. */
 SONDE_API sonde_status sonde_mesh_mass(const sonde_mesh *mesh, double density_kg_m3,
                                        sonde_mass *mass, sonde_error *error);
@@ -85,7 +78,6 @@ typedef struct sonde_topology {
   uint32_t *face_list;       /**< faces around each vertex, ascending */
   uint32_t (*edge_faces)[2]; /**< [edge_count] the faces beside; UINT32_MAX where none */
 } sonde_topology;
-
 SONDE_API sonde_status sonde_topology_build(const sonde_mesh *mesh, sonde_topology *topology,
                                             sonde_error *error);
 SONDE_API void sonde_topology_clear(sonde_topology *topology);
@@ -98,16 +90,13 @@ SONDE_API void sonde_mesh_areas(const sonde_mesh *mesh, double *areas_m2);
 /**
  * Refines where `target` asks for shorter edges, without hanging vertices. An edge is halved while
  * it is longer than 1.35 times the target at its middle: halving a shorter one would overshoot.
- * The closure halves longest edges first, so that no angle falls below half the smallest angle
- * given (Rosenberg and Stenger 1975). New vertices are pushed onto the smooth surface that the
- * vertex normals describe (edges of PN triangles); edges sharper than 45 degrees stay sharp.
- * Before that, the slivers around a vertex with more than 24 faces (the centre of a flat cap) are
- * replaced by rings of faces that grow towards the centre as far as `target` allows. Vertices of
- * `mesh` keep their index and place.
+ * Longest edges go first, so that no angle falls below half the smallest given; slivers around a
+ * vertex with more than 24 faces (a flat cap's centre) are first replaced by rings of faces. New
+ * vertices lie on the smooth surface of the vertex normals (PN-triangle edges); creases above 45
+ * degrees stay sharp. Vertices of `mesh` keep index and place. docs/geometry.md.
  * @param target returns the wanted edge length (m) at a point, more than 0
- * @param[out] refined owned by the caller
- * @return SONDE_ARGUMENT for a target that is not positive or asks for more than 2 million
- *         vertices; SONDE_MESH when an edge has more than two faces
+ * @return SONDE_ARGUMENT for a target that is not positive or asks for over 2 million vertices;
+ *         SONDE_MESH when an edge has more than two faces
  * @thread owner
  */
 SONDE_API sonde_status sonde_mesh_refine(const sonde_mesh *mesh,
@@ -129,17 +118,14 @@ typedef struct sonde_surface_point {
   sonde_vec3 point_m;
   double distance_m; /**< from the query, >= 0 */
 } sonde_surface_point;
-
 /** Closest point of the surface. @thread any (read only) */
 SONDE_API sonde_surface_point sonde_surface_closest(const sonde_surface_index *index,
                                                     sonde_vec3 query);
-/** First hit of a ray, from either side; `direction` has any length. False when it misses within
-    max_distance_m. @thread any (read only) */
+/** First hit of a ray, from either side; false when it misses within max_distance_m. @thread any */
 SONDE_API bool sonde_surface_raycast(const sonde_surface_index *index, sonde_vec3 origin,
                                      sonde_vec3 direction, double max_distance_m,
                                      sonde_surface_point *hit);
-/** Whether a point lies inside a closed mesh; points on the surface do not. By the angle-weighted
-    normal of the closest feature (Baerentzen and Aanaes 2005). @thread any (read only) */
+/** Whether a point lies inside a closed mesh; points on its surface do not. @thread any */
 SONDE_API bool sonde_surface_inside(const sonde_surface_index *index, sonde_vec3 query);
 
 /**
@@ -164,13 +150,10 @@ typedef struct sonde_convex {
   sonde_topology topology;  /**< of the hull, for hill climbing support */
   double radius_m;          /**< bounding sphere about the origin */
 } sonde_convex;
-
-/** Builds from a closed convex mesh. @return SONDE_MESH when it is open or a vertex stands out of a
-    face plane by more than 1e-8 of the extent. @thread owner */
+/** Builds from a closed convex mesh. @return SONDE_MESH when it is open or not convex (1e-8). */
 SONDE_API sonde_status sonde_convex_create(const sonde_mesh *mesh, sonde_convex *convex,
                                            sonde_error *error);
-/** Convex hull of a point cloud (>= 4 points not in one plane, else SONDE_MESH). Orientation is
-    decided exactly on a grid of 2^39 steps across the cloud. @thread owner */
+/** Convex hull of a point cloud (>= 4 points not in one plane, else SONDE_MESH). @thread owner */
 SONDE_API sonde_status sonde_convex_hull(const sonde_vec3 *points, uint32_t count,
                                          sonde_convex *convex, sonde_error *error);
 SONDE_API void sonde_convex_clear(sonde_convex *convex);
@@ -184,7 +167,6 @@ typedef struct sonde_gjk_cache {
   uint32_t count;
   uint32_t a[4], b[4];
 } sonde_gjk_cache;
-
 /** Distance between two convex bodies. */
 typedef struct sonde_gjk_result {
   double distance_m;    /**< 0 when they touch or overlap */
@@ -194,12 +176,9 @@ typedef struct sonde_gjk_result {
   uint32_t support_calls; /**< work counter: dot products evaluated for supports */
   bool overlap;
 } sonde_gjk_result;
-
 /**
- * GJK distance with warm start. Result within 1e-9 m of the exact distance; closer than 1e-10 m
- * counts as touching. Cold, it looks once at every vertex (linear time) and then climbs; with a
- * cache from a nearby pose it only climbs. Gilbert, Johnson and Keerthi 1988.
- * @param cache may be NULL
+ * GJK distance with warm start (`cache` may be NULL). Within 1e-9 m of the exact distance; closer
+ * than 1e-10 m counts as touching. Without cache linear time. Gilbert, Johnson and Keerthi 1988.
  * @thread tick (no allocation)
  */
 SONDE_API sonde_gjk_result sonde_gjk_distance(const sonde_convex *a, sonde_pose world_from_a,
@@ -212,32 +191,23 @@ typedef struct sonde_clip_result {
   double share_m3[3];     /**< the same volume split by the vertices' shape functions */
   sonde_vec3 gradient[3]; /**< dV/dx of the three vertices (m^2): integral of phi_i n dA */
   double area_m2;         /**< clipped area */
-  double push_m3[3];      /**< the shares without the points that are nearer to a side wall of the
-                               body than to their column's end: what presses along the columns */
-  double overlap_m2[6];   /**< integral of phi_i phi_j over that part seen along the columns:
-                               00 11 22 01 12 20; the change of push i per height of vertex j */
   double depth_max_m;     /**< deepest column */
 } sonde_clip_result;
-
 /**
  * Clips one skin triangle by a convex body and integrates the columns between skin and body.
  * Inside tissue lies below the triangle (opposite its outward normal); from each clipped skin
  * point a column runs along `direction` (unit, into the tissue) until it leaves the body. Volume,
  * shares and gradient are exact for the piecewise linear depth. physics.md 2c. Summed over a
- * surface the volume is that of body and tissue together, and the gradient its derivative, when no
- * column enters the body through its surface below the skin: choose `direction` so that the body
- * does not narrow against it there (the beam axis of a box).
+ * surface they are the common volume and its derivative when no column enters the body below the
+ * skin: for a box, along its beam axis.
  * @param planes_n,planes_d the body's planes in the frame of the triangle's points
  * @param corners three vertices, counter-clockwise from outside
- * @param wall_factor where a column is longer than this times the distance to a steep plane, the
- *        point does not push (push_m3, overlap_m2); large values let every point push
  * @return false when nothing is clipped (result zeroed)
  * @thread tick (no allocation)
  */
 SONDE_API bool sonde_clip_triangle(const sonde_vec3 *planes_n, const double *planes_d,
                                    uint32_t plane_count, const sonde_vec3 corners[3],
-                                   sonde_vec3 direction, double wall_factor,
-                                   sonde_clip_result *result);
+                                   sonde_vec3 direction, sonde_clip_result *result);
 
 /* ---- probes ------------------------------------------------------------------------------ */
 
@@ -251,7 +221,6 @@ typedef struct sonde_probe {
   double half_x_m, half_y_m; /**< half extent of the contact face */
   bool rectangular;          /**< the footprint is the full rectangle (point, linear, square) */
 } sonde_probe;
-
 /** Names of the built-in probes, NULL-terminated: point, linear, square, sphere. @thread any */
 SONDE_API const char *const *sonde_probe_names(void);
 

@@ -17,7 +17,7 @@ typedef struct sonde_page_def {
   uint16_t port;              /**< 0: any free port */
   const char *data_directory; /**< serve the page from here instead of memory (development) */
   const char *model_path;     /**< for recordings and titles; may be NULL */
-  double force_limit_n;        /**< shown on the page; 0: sonde_safety_limits_default() */
+  double force_limit_n;       /**< shown on the page; 0: sonde_safety_limits_default() */
 } sonde_page_def;
 
 /** Serves the embedded page and one WebSocket (/ws) for a session: sends model, frames and images

@@ -15,10 +15,12 @@ extern "C" {
 
 enum { SONDE_MAX_REGIONS = 8 };
 
-/** How the force kappa V + mu dV/dt of eq. (2) is spread over the touched nodes (2c). */
+/** How contact pushes (physics.md 2c). */
 typedef enum sonde_contact_law {
-  SONDE_CONTACT_SHARED, /**< each node carries the law on its own share of the volume */
-  SONDE_CONTACT_LUMPED, /**< one force per region, spread by projected nodal area (the paper) */
+  SONDE_CONTACT_FOUNDATION, /**< pressure kappa*depth + mu*rate at points of the skin, along the
+                                 probe's nearest face: follows the probe's shape */
+  SONDE_CONTACT_VOLUME, /**< eq. (2): one force kappa V + mu dV/dt per region along its direction,
+                             spread by projected nodal area */
 } sonde_contact_law;
 
 /** Options of a world; all validated at creation. */
@@ -28,7 +30,7 @@ typedef struct sonde_world_def {
   uint32_t newton_iterations; /**< >= 1; default 1 */
   sonde_pcg_options pcg;      /**< default relative 1e-4, at most 200 iterations */
   sonde_contact_law contact_law;
-  double contact_stiffness_n_m3; /**< kappa; default 1e8 */
+  double contact_stiffness_n_m3; /**< kappa; default 5e8 */
   double contact_damping_n_s_m3; /**< mu; default 1e5 */
   double sleep_displacement_m;   /**< nodes whose unbalanced force would move them less sleep;
                                       0 keeps all awake; default 1e-6 */
@@ -41,7 +43,7 @@ typedef struct sonde_contact_region {
   double volume_m3;
   double volume_rate_m3_s;
   double area_m2;       /**< clipped skin area */
-  double force_n;       /**< max(0, kappa V + mu dV/dt) */
+  double force_n;       /**< along the direction */
   sonde_vec3 direction; /**< k: unit, from the tissue to the probe */
   sonde_vec3 centre_m;  /**< force-weighted centre, world */
   double depth_max_m;   /**< deepest residual interpenetration */

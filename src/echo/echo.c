@@ -17,7 +17,7 @@ enum {
   POOL_ROOM = SONDE_POOL + MOST_PER_CELL
 };
 
-static const double default_density_m3 = 16e9;
+static const double default_density_m3 = 32e9;
 static const double cell_size_m = 2e-3;
 
 sonde_echo_settings sonde_echo_settings_default(void) {

@@ -106,7 +106,7 @@ static sonde_status read_world(const source *s, const cJSON *root) {
   if (!status) status = count_of(s, world, "newton_iterations", &def.newton_iterations);
   if (!status) status = count_of(s, world, "pcg_iterations", &def.pcg.max_iterations);
   if (!status) status = count_of(s, world, "contact_law", &law);
-  if (!status && law > SONDE_CONTACT_LUMPED) status = fail_header(s, "contact_law");
+  if (!status && law > SONDE_CONTACT_VOLUME) status = fail_header(s, "contact_law");
   def.contact_law = (sonde_contact_law)law;
   s->recording->world = def;
   return status;

@@ -19,6 +19,7 @@ static const double OPTIMALITY = 1e-9, STALLED_OPTIMALITY = 1e-5, STEP_SMALL = 1
 
 double sonde_loss(sonde_fit_loss loss, double scale, double residual, double *weight) {
   double size = fabs(residual);
+  SONDE_ASSERT(loss == SONDE_LOSS_SQUARES || scale > 0);
   *weight = 1.0;
   switch (loss) {
   case SONDE_LOSS_SQUARES: break;
@@ -59,6 +60,7 @@ double sonde_arrow_assemble(const sonde_arrow_problem *problem, const double (*t
   double cost = 0.0;
   if (normal) *normal = (sonde_arrow_border){0};
   for (uint32_t b = 0; b < problem->block_count; ++b) {
+    SONDE_ASSERT(problem->row_start[b] <= problem->row_start[b + 1]);
     if (blocks) blocks[b] = (sonde_arrow_block){0};
     for (uint32_t r = problem->row_start[b]; r < problem->row_start[b + 1]; ++r) {
       double residual, weight, jacobian[2 + ARROW_BORDER] = {0};
@@ -124,6 +126,7 @@ static bool solve_border(const double s[ARROW_BORDER][ARROW_BORDER], const doubl
 bool sonde_arrow_solve(const sonde_arrow_block *blocks, uint32_t block_count,
                        const sonde_arrow_border *normal, uint32_t border_count, double damping,
                        double (*step)[2], double *border_step) {
+  SONDE_ASSERT(border_count <= ARROW_BORDER && damping >= 0);
   double s[ARROW_BORDER][ARROW_BORDER] = {{0}}, rhs[ARROW_BORDER] = {0};
   for (uint32_t k = 0; k < border_count; ++k) {
     memcpy(s[k], normal->d[k], sizeof s[k]);
@@ -133,8 +136,8 @@ bool sonde_arrow_solve(const sonde_arrow_block *blocks, uint32_t block_count,
   if (!reduce(blocks, block_count, border_count, damping, s, rhs)) return false;
   if (!solve_border((const double(*)[ARROW_BORDER])s, rhs, border_count, border_step)) return false;
   for (uint32_t b = 0; b < block_count; ++b) {
-    double inverse[3], right[2];
-    invert_block(blocks[b].h, damping, inverse);
+    double inverse[3] = {0}, right[2];
+    if (!invert_block(blocks[b].h, damping, inverse)) return false;
     for (int i = 0; i < 2; ++i) {
       right[i] = -blocks[b].g[i];
       for (uint32_t k = 0; k < border_count; ++k) right[i] -= blocks[b].c[i][k] * border_step[k];
@@ -195,6 +198,7 @@ typedef struct workspace {
 } workspace;
 
 static double limited(double value, double step, double low, double high) {
+  SONDE_ASSERT(low <= high && isfinite(step));
   return clamp(value + clamp(step, -LONGEST_STEP, LONGEST_STEP), low, high);
 }
 
@@ -262,6 +266,7 @@ static void minimise(const sonde_arrow_problem *problem, double (*theta)[2], dou
     result->cost =
         sonde_arrow_assemble(problem, (const double(*)[2])theta, border, w->blocks, &w->normal);
     if (!result->iterations) result->start_cost = result->cost;
+    SONDE_ASSERT(isfinite(result->cost) && result->cost >= 0);
     hold_bounds(problem, (const double(*)[2])theta, border, w->blocks, &w->normal);
     if (optimality(problem, w->blocks, &w->normal, result->cost) < OPTIMALITY)
       result->converged = true;
@@ -277,6 +282,8 @@ static void minimise(const sonde_arrow_problem *problem, double (*theta)[2], dou
 
 sonde_status sonde_arrow_minimise(const sonde_arrow_problem *problem, double (*theta)[2],
                                   double *border, sonde_arrow_result *result, sonde_error *error) {
+  SONDE_ASSERT(problem->row && problem->row_start && problem->block_count > 0);
+  SONDE_ASSERT(problem->max_iterations > 0);
   *result = (sonde_arrow_result){0};
   workspace w = {.blocks = SONDE_NEW(sonde_arrow_block, problem->block_count),
                  .step = sonde_calloc(problem->block_count, sizeof *w.step),

@@ -10,6 +10,7 @@
 static char *take_line(sonde_csv *csv) {
   if (csv->cursor >= csv->end) return NULL;
   char *line = csv->cursor;
+  SONDE_ASSERT(*csv->end == 0);
   char *stop = memchr(line, '\n', (size_t)(csv->end - line));
   if (!stop) stop = csv->end;
   csv->cursor = stop < csv->end ? stop + 1 : csv->end;

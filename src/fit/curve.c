@@ -16,10 +16,12 @@ double sonde_law_pressure(double k0, double xm_m, double s_m, double *by_xm) {
 
 sonde_law sonde_law_of(const double theta[2], double floor_m) {
   double above = exp(theta[1]);
+  SONDE_ASSERT(above > 0 && floor_m > 0);
   return (sonde_law){exp(theta[0]), floor_m + above, above};
 }
 
 void sonde_law_log(double k0, double xm_m, double floor_m, double theta[2]) {
+  SONDE_ASSERT(k0 > 0 && xm_m > 0);
   theta[0] = clamp(log(k0), LAW_LOW[0], LAW_HIGH[0]);
   theta[1] = clamp(log(fmax(xm_m - floor_m, 1e-12)), LAW_LOW[1], LAW_HIGH[1]);
 }
@@ -52,15 +54,22 @@ static void linear_start(const curve_data *c, uint32_t count, double deepest_m, 
   }
   double determinant = ff * qq - fq * fq;
   double b = (xf * qq - xq * fq) / determinant, a = (xq * ff - xf * fq) / determinant;
+  SONDE_ASSERT(xx > 0);
   bool usable = determinant > 1e-12 * ff * qq && b > 0 && a < 0 && -b / a > 1.0005 * c->floor_m;
   *k0 = usable ? 1.0 / (b * c->area_m2) : fmax(0.5 * xf / xx, 1e-3) / c->area_m2;
   *xm_m = usable ? -b / a : 2.0 * deepest_m;
 }
 
-static sonde_status check_curve(const double *depth_m, uint32_t count, double area_m2,
-                                double *deepest_m, sonde_error *error) {
+static sonde_status check_curve(const double *depth_m, const double *force_n, uint32_t count,
+                                double area_m2, double *deepest_m, sonde_error *error) {
   *deepest_m = 0.0;
-  for (uint32_t i = 0; i < count; ++i) *deepest_m = fmax(*deepest_m, depth_m[i]);
+  for (uint32_t i = 0; i < count; ++i) {
+    if (!(depth_m[i] >= 0 && depth_m[i] <= 1 && fabs(force_n[i]) <= 1e6))
+      return sonde_fail(error, SONDE_ARGUMENT,
+                        "point %u: %g m and %g N, expected 0 to 1 m and at most 1e6 N", i,
+                        depth_m[i], force_n[i]);
+    *deepest_m = fmax(*deepest_m, depth_m[i]);
+  }
   if (count < 3)
     return sonde_fail(error, SONDE_ARGUMENT, "a curve of %u points, expected at least 3", count);
   if (!(*deepest_m > 0) || !(area_m2 > 0))
@@ -89,7 +98,7 @@ sonde_status sonde_fit_curve(const double *penetration_m, const double *force_n,
                              const double start[2], sonde_curve_fit *fit, sonde_error *error) {
   *fit = (sonde_curve_fit){0};
   double deepest_m;
-  sonde_status status = check_curve(penetration_m, count, area_m2, &deepest_m, error);
+  sonde_status status = check_curve(penetration_m, force_n, count, area_m2, &deepest_m, error);
   if (status) return status;
   SONDE_ASSERT(guard > 0 && guard <= 1);
   curve_data data = {penetration_m, force_n, area_m2, deepest_m / guard};

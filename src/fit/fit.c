@@ -44,6 +44,7 @@ static sonde_status fit_one_curve(const sonde_model *model, const sonde_site_tab
                                   sonde_fit_result *result, sonde_error *error) {
   uint32_t first = plan->curve_start[c], count = plan->curve_start[c + 1] - first;
   uint32_t probe = plan->curve_probe[c];
+  SONDE_ASSERT(c < plan->curve_count && count > 0);
   for (uint32_t k = 0; k < count; ++k) {
     const sonde_datum *d = &m->data[plan->row[first + k]];
     buffer.depth_m[k] = d->penetration_m;
@@ -170,6 +171,7 @@ static sonde_status finish(const sonde_site_problem *p, const double (*theta)[2]
                            sonde_fit_result *result, sonde_error *error) {
   const sonde_fit_plan *plan = p->plan;
   set_sites(plan, p->floor_m, theta, result->sites, result->site_count);
+  SONDE_ASSERT(result->site_count >= plan->site_count);
   result->parameters = result->stage1_parameters;
   if (!p->edges) return SONDE_OK;
   result->parameters = 2 * plan->site_count + (p->tension ? 2 : 1);

@@ -14,6 +14,7 @@ static uint32_t mark_held(const sonde_model *model, const double *covered_m2, ui
   uint32_t count = 0, most = 0;
   double largest = 0.0;
   for (uint32_t i = 0; i < model->surface.vertex_count; ++i) {
+    SONDE_ASSERT(model->area_m2[i] > 0);
     double share = covered_m2[i] / model->area_m2[i];
     if (share > 0.5) held[count++] = i;
     if (share > largest) {
@@ -95,6 +96,7 @@ static void shrink_all(const sonde_model *model, sonde_footprint *f) {
 sonde_status sonde_footprint_create(const sonde_model *model, const sonde_site *site,
                                     double half_u_m, double half_v_m, sonde_coverage coverage,
                                     sonde_footprint *f, sonde_error *error) {
+  SONDE_ASSERT(half_u_m > 0 && half_v_m > 0);
   *f = (sonde_footprint){0};
   bool *is_held = SONDE_NEW(bool, model->surface.vertex_count);
   sonde_status status = is_held && allocate(model, f) ? SONDE_OK : sonde_fail_memory(error);
@@ -132,6 +134,7 @@ void sonde_footprint_clear(sonde_footprint *f) {
 
 void sonde_footprint_edges(const sonde_footprint *f, double x, double compression,
                            double *per_stiffness_m, double *per_tension) {
+  SONDE_ASSERT(x >= 0 && compression >= 0 && compression <= 1);
   double stretch_sum = 0.0, direction_sum = 0.0;
   for (uint32_t e = 0; e < f->edge_count; ++e) {
     double rest = f->rest_m[e], rise = f->rise_m[e];

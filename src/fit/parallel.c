@@ -54,6 +54,7 @@ static void *worker_main(void *argument) {
     if (!status) atomic_fetch_add(&p->done, 1);
   }
   pthread_mutex_lock(&p->mutex);
+  SONDE_ASSERT(p->running > 0);
   --p->running;
   pthread_cond_signal(&p->changed);
   pthread_mutex_unlock(&p->mutex);

@@ -50,11 +50,18 @@ static sonde_status make_keys(const sonde_site_table *sites, const sonde_measure
     if (probe == UINT32_MAX)
       return sonde_fail(error, SONDE_ARGUMENT, "more than %d probes in one set of measurements",
                         SONDE_FIT_PROBES);
+    if (!(d->penetration_m >= 0 && d->penetration_m <= 1 && fabs(d->force_n) <= 1e6))
+      return sonde_fail(error, SONDE_ARGUMENT,
+                        "measurement %u: %g m and %g N, expected 0 to 1 m and at most 1e6 N", i,
+                        d->penetration_m, d->force_n);
     keys[i] = (sort_key){site, probe, i, d->penetration_m};
     plan->mean_force_n[probe] += d->force_n;
     ++rows_of[probe];
   }
-  for (uint32_t p = 0; p < plan->probe_count; ++p) plan->mean_force_n[p] /= rows_of[p];
+  for (uint32_t p = 0; p < plan->probe_count; ++p) {
+    SONDE_ASSERT(rows_of[p] > 0);
+    plan->mean_force_n[p] /= rows_of[p];
+  }
   return SONDE_OK;
 }
 
@@ -77,6 +84,7 @@ static void cut(sonde_fit_plan *plan, const sort_key *keys) {
     plan->site_deepest_m[site] = fmax(plan->site_deepest_m[site], keys[r].depth_m);
   }
   plan->curve_count = curve + 1;
+  SONDE_ASSERT(plan->curve_count <= plan->row_count && curve >= site);
   plan->site_count = site + 1;
   plan->curve_start[plan->curve_count] = plan->site_start[plan->site_count] = plan->row_count;
 }

@@ -50,6 +50,7 @@ static sonde_status predict_curve(void *user, uint32_t worker, uint32_t curve,
                                   const atomic_bool *stop, sonde_error *error) {
   const prediction *p = user;
   const sonde_fit_plan *plan = p->plan;
+  SONDE_ASSERT(curve < plan->curve_count);
   uint32_t probe = plan->curve_probe[curve];
   sonde_footprint footprint;
   sonde_status status = sonde_footprint_create(p->model, &p->sites->sites[plan->curve_site[curve]],

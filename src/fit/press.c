@@ -48,6 +48,7 @@ void sonde_press_crew_destroy(sonde_press *crew, uint32_t workers) {
 double sonde_press_bonded(sonde_press *press, const sonde_site *site,
                           const sonde_footprint *footprint, double depth_m) {
   SONDE_ASSERT(depth_m >= 0 && footprint->held_count > 0);
+  SONDE_ASSERT(footprint->held_count <= press->model->surface.vertex_count);
   const sonde_vec3 *rest = press->model->surface.vertices;
   for (uint32_t h = 0; h < footprint->held_count; ++h)
     press->position_m[h] = v_madd(rest[footprint->held[h]], -depth_m, site->normal);

@@ -55,6 +55,7 @@ static sonde_status check_def(const sonde_robot_def *def, sonde_error *error) {
 }
 
 static void add_noise(const sonde_robot_def *def, uint32_t step, sonde_datum *datum) {
+  SONDE_ASSERT(step < MAX_STEPS);
   uint64_t counter = 2u * ((uint64_t)datum->site * MAX_STEPS + step);
   double depth = def->noise_penetration_m * sonde_random_normal(def->seed, counter);
   datum->penetration_m = fmax(0.0, datum->penetration_m + depth);
@@ -73,6 +74,7 @@ static sonde_status press_steps(robot *r, sonde_press *press, uint32_t index,
                                 const sonde_footprint *footprint, const atomic_bool *stop,
                                 sonde_error *error) {
   const sonde_site *site = &r->sites->sites[index];
+  SONDE_ASSERT(index < r->sites->count && !r->done[index]);
   sonde_datum *rows = &r->row[(size_t)index * r->step_limit];
   sonde_state_reset(press->state);
   for (uint32_t step = 0; step < r->step_limit; ++step) {

@@ -20,6 +20,7 @@ static double normal_force(const sonde_footprint *f, sonde_law law, double x, do
 
 double sonde_site_force(const sonde_site_problem *p, uint32_t block, uint32_t row,
                         const double theta[2], const double *border, double jacobian[4]) {
+  SONDE_ASSERT(block < p->plan->site_count && row < p->plan->row_count);
   sonde_law law = sonde_law_of(theta, p->floor_m[block]);
   double x = p->m->data[p->plan->row[row]].penetration_m, by_xm;
   double normal = normal_force(&p->footprint[p->plan->row_curve[row]], law, x, &by_xm);
@@ -71,6 +72,7 @@ sonde_status sonde_site_problem_create(const sonde_model *model, const sonde_sit
     double x = p->m->data[plan->row[r]].penetration_m;
     sonde_footprint_edges(&p->footprint[plan->row_curve[r]], x, model->law.edge_compression,
                           &p->per_stiffness_m[r], &p->per_tension[r]);
+    SONDE_ASSERT(x >= 0);
     p->weight[r] = relative ? 1.0 / plan->mean_force_n[plan->row_probe[r]] : 1.0;
   }
   for (uint32_t s = 0; s < plan->site_count; ++s)

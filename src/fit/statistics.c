@@ -33,6 +33,7 @@ static void summarise(double *errors, uint32_t count, double force_sum_n,
                       sonde_error_statistics *s) {
   *s = (sonde_error_statistics){.count = count};
   if (!count) return;
+  SONDE_ASSERT(isfinite(force_sum_n));
   spread(errors, count, &s->bias_n, &s->sd_n);
   double squares = 0.0;
   for (uint32_t i = 0; i < count; ++i) {
@@ -99,6 +100,7 @@ sonde_status sonde_error_report_of(const sonde_datum *data, const double *model_
   pick(data, model_n, count, NULL, scratch, &report->all);
   for (uint32_t p = 0; p < report->probe_count; ++p)
     pick(data, model_n, count, report->probe[p], scratch, &report->probes[p]);
+  SONDE_ASSERT(report->all.count <= count);
   report->left_out = count - report->all.count;
   sonde_free(scratch);
   return SONDE_OK;

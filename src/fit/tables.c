@@ -10,6 +10,7 @@
 
 static const double METRES_PER_MM = 1e-3;
 static const double SITE_TOLERANCE_M = 5e-3;
+static const double FORCE_LIMIT_N = 1e6, DEPTH_LIMIT_M = 1.0; // beyond: not a measurement
 
 // ---- sites --------------------------------------------------------------------------------
 
@@ -40,6 +41,7 @@ static sonde_status read_direction(const sonde_csv *csv, const uint32_t *columns
         csv->line, csv->name[columns[0]], csv->name[columns[2]], n ? " across the normal" : "",
         length > 1e-9 ? "one along the normal" : "the zero vector");
   *vector = v_unit(across, across);
+  SONDE_ASSERT(v_finite(*vector));
   return SONDE_OK;
 }
 
@@ -181,6 +183,7 @@ static sonde_status load_row(const sonde_csv *csv, const uint32_t *columns,
                              const sonde_site_table *sites, uint32_t row, sonde_measurements *m,
                              sonde_error *error) {
   sonde_datum *datum = &m->data[row];
+  SONDE_ASSERT(row == m->count);
   sonde_status status = sonde_csv_index(csv, columns[ROW_SITE], &datum->site, error);
   if (!status) status = read_probe(csv, columns[ROW_PROBE], datum->probe, error);
   if (!status) status = read_vector(csv, columns + ROW_X, &m->position_m[row], error);
@@ -190,10 +193,15 @@ static sonde_status load_row(const sonde_csv *csv, const uint32_t *columns,
   if (status) return status;
   m->position_m[row] = v_scale(m->position_m[row], METRES_PER_MM);
   datum->penetration_m *= METRES_PER_MM;
-  if (datum->penetration_m < 0)
+  if (datum->penetration_m < 0 || datum->penetration_m > DEPTH_LIMIT_M)
     return sonde_fail(error, SONDE_FORMAT,
-                      "%s:%u: column penetration_mm: expected a depth >= 0, found '%.40s'",
+                      "%s:%u: column penetration_mm: expected a depth >= 0 and <= 1000, found "
+                      "'%.40s'",
                       csv->path, csv->line, csv->cell[columns[ROW_DEPTH]]);
+  if (fabs(datum->force_n) > FORCE_LIMIT_N)
+    return sonde_fail(error, SONDE_FORMAT,
+                      "%s:%u: column force_n: expected a force of at most 1e6 N, found '%.40s'",
+                      csv->path, csv->line, csv->cell[columns[ROW_FORCE]]);
   return check_site(csv, sites, datum->site, m->position_m[row], error);
 }
 

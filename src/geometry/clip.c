@@ -17,15 +17,13 @@
 //   far_planes       the planes that can end a column of this polygon
 //   lowest_plane     the plane that undercuts the present one most at a corner of a piece
 //   split_pieces     pieces with one lowest plane each
-//   near_walls       the steep planes beside the polygon
 //   add_piece        integrals over a piece
-//   push_piece       integrals over its part that is nearer to the column's end than to a wall
 #include "geometry/internal.h"
 
 // Capacities. A triangle that more planes cut or end than fit here is treated as if the planes
 // beyond were absent (volume too large by what they would cut off); a triangle of the size of the
 // body's faces meets a handful.
-enum { MAX_CORNERS = 96, MAX_FAR = 192, MAX_WALLS = 16, ARENA_CORNERS = 1024, MAX_PIECES = 96 };
+enum { MAX_CORNERS = 96, MAX_FAR = 192, ARENA_CORNERS = 1024, MAX_PIECES = 96 };
 
 // Barycentric coordinates of corners 1 and 2; corner 0 has the rest.
 typedef struct corner {
@@ -167,35 +165,6 @@ static void far_planes(const scene *s, const corner *polygon, uint32_t count, co
   far->count = kept;
 }
 
-// Walls: planes steeper than 60 degrees to the columns that come near the polygon.
-typedef struct walls {
-  uint32_t count;
-  linear distance[MAX_WALLS];
-} walls;
-
-static void near_walls(const scene *s, const corner *polygon, uint32_t count, double deepest,
-                       double factor, walls *side) {
-  side->count = 0;
-  for (uint32_t j = 0; j < s->planes && side->count < MAX_WALLS; ++j) {
-    if (fabs(v_dot(s->n[j], s->direction)) > 0.5) continue;
-    if (factor * (centre_depth(s, j) - s->radius) >= deepest) continue;
-    linear f = below_plane(s, j, factor);
-    double low, high;
-    range(&f, polygon, count, &low, &high);
-    if (low < deepest) side->distance[side->count++] = f;
-  }
-}
-
-// Longest column over a polygon.
-static double longest(const columns *far, const corner *polygon, uint32_t count) {
-  double deepest = INFINITY, low, high;
-  for (uint32_t j = 0; j < far->count; ++j) {
-    range(&far->length[j], polygon, count, &low, &high);
-    deepest = high < deepest ? high : deepest;
-  }
-  return deepest;
-}
-
 // ---- pieces -------------------------------------------------------------------------------
 
 // Polygons of the pieces still to be done, one behind the other.
@@ -208,7 +177,6 @@ typedef struct pieces {
 // Integrals over the triangle as means: its area counts as 1.
 typedef struct integrals {
   double phi[3], t_phi[3], area, deepest;
-  double push[3], phi_phi[6]; // over the part that is nearer to its column's end than to a wall
 } integrals;
 
 // The plane that lies lowest below `plane` at a corner; `plane` itself when none does.
@@ -249,40 +217,6 @@ static void add_triangle(const linear *t, const corner p[3], integrals *sum) {
   sum->area += weight;
 }
 
-// The same over a sub-triangle of the pushing part.
-static void add_push(const linear *t, const corner p[3], integrals *sum) {
-  double weight = (p[1].u - p[0].u) * (p[2].v - p[0].v) - (p[1].v - p[0].v) * (p[2].u - p[0].u);
-  double third = weight / 3;
-  for (int k = 0; k < 3; ++k) {
-    corner q = p[(k + 1) % 3];
-    corner middle = {0.5 * (p[k].u + q.u), 0.5 * (p[k].v + q.v)};
-    double length = third * value(t, middle);
-    double phi[3] = {1 - middle.u - middle.v, middle.u, middle.v};
-    for (int i = 0; i < 3; ++i) {
-      sum->push[i] += length * phi[i];
-      sum->phi_phi[i] += third * phi[i] * phi[i];
-      sum->phi_phi[3 + i] += third * phi[i] * phi[(i + 1) % 3];
-    }
-  }
-}
-
-// Cuts off what lies nearer to a wall than to the end of its column and integrates the rest.
-static void push_piece(const linear *t, const walls *side, const corner *piece, uint32_t count,
-                       integrals *sum) {
-  corner a[MAX_CORNERS], b[MAX_CORNERS];
-  const corner *from = piece;
-  corner *to = a;
-  for (uint32_t j = 0; j < side->count && count >= 3; ++j) {
-    linear excess;
-    for (int k = 0; k < 3; ++k) excess.at[k] = t->at[k] - side->distance[j].at[k];
-    if (count + 1 >= MAX_CORNERS) break;
-    count = cut(from, count, &excess, to);
-    from = to;
-    to = to == a ? b : a;
-  }
-  for (uint32_t k = 2; k < count; ++k) add_push(t, (corner[3]){from[0], from[k - 1], from[k]}, sum);
-}
-
 static void add_piece(const linear *t, const corner *polygon, uint32_t count, integrals *sum) {
   for (uint32_t k = 0; k < count; ++k) {
     double length = value(t, polygon[k]);
@@ -320,8 +254,8 @@ static bool split_top(pieces *stack, const columns *far, uint32_t lower) {
   return true;
 }
 
-static void split_pieces(const columns *far, const walls *side, const corner *polygon,
-                         uint32_t count, integrals *sum) {
+static void split_pieces(const columns *far, const corner *polygon, uint32_t count,
+                         integrals *sum) {
   pieces stack;
   SONDE_ASSERT(far->count > 0 && count >= 3);
   double slack = 0;
@@ -338,14 +272,13 @@ static void split_pieces(const columns *far, const walls *side, const corner *po
     uint32_t lower = lowest_plane(far, plane, piece, size, slack);
     if (lower != plane && split_top(&stack, far, lower)) continue;
     add_piece(&far->length[plane], piece, size, sum);
-    push_piece(&far->length[plane], side, piece, size, sum);
     stack.used -= size;
     stack.count--;
   }
 }
 
 bool sonde_clip_triangle(const sonde_vec3 *planes_n, const double *planes_d, uint32_t plane_count,
-                         const sonde_vec3 corners[3], sonde_vec3 direction, double wall_factor,
+                         const sonde_vec3 corners[3], sonde_vec3 direction,
                          sonde_clip_result *result) {
   corner polygon[MAX_CORNERS];
   columns far;
@@ -355,21 +288,17 @@ bool sonde_clip_triangle(const sonde_vec3 *planes_n, const double *planes_d, uin
   if (!count) return false;
   far_planes(&s, polygon, count, &far);
   if (!far.count) return false;
-  walls side;
-  near_walls(&s, polygon, count, longest(&far, polygon, count), wall_factor, &side);
   integrals sum = {0};
-  split_pieces(&far, &side, polygon, count, &sum);
+  split_pieces(&far, polygon, count, &sum);
   if (!(sum.area > 0)) return false;
   sonde_vec3 area =
       v_scale(v_cross(v_sub(corners[1], corners[0]), v_sub(corners[2], corners[0])), 0.5);
   double facing = -v_dot(area, direction);
   for (int k = 0; k < 3; ++k) {
     result->share_m3[k] = facing * sum.t_phi[k];
-    result->push_m3[k] = facing * sum.push[k];
     result->gradient[k] = v_scale(area, sum.phi[k]);
     result->volume_m3 += result->share_m3[k];
   }
-  for (int k = 0; k < 6; ++k) result->overlap_m2[k] = facing * sum.phi_phi[k];
   result->area_m2 = v_norm(area) * sum.area;
   result->depth_max_m = sum.deepest;
   return true;

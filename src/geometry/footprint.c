@@ -18,13 +18,15 @@ typedef struct frame {
   double hu, hv, reach;
 } frame;
 
-// Dual vectors of (u, v, normal): a point's u and v coordinates do not change along the normal.
+// The axes as they are seen along the normal, then the vectors dual to them.
 static frame footprint_frame(sonde_vec3 centre, sonde_vec3 normal, sonde_vec3 u, sonde_vec3 v) {
   frame f = {.centre = centre, .normal = v_unit(normal, vec3(0, 0, 1))};
+  u = v_unit(v_madd(u, -v_dot(u, f.normal), f.normal), u);
+  v = v_unit(v_madd(v, -v_dot(v, f.normal), f.normal), v);
   double det = v_dot(u, v_cross(v, f.normal));
   SONDE_ASSERT(fabs(det) > 1e-6);
-  f.along_u = v_scale(v_cross(v, f.normal), v_norm(u) / det);
-  f.along_v = v_scale(v_cross(f.normal, u), v_norm(v) / det);
+  f.along_u = v_scale(v_cross(v, f.normal), 1 / det);
+  f.along_v = v_scale(v_cross(f.normal, u), 1 / det);
   return f;
 }
 

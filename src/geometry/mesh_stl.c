@@ -35,7 +35,10 @@ static uint32_t weld(stl *file, sonde_vec3 point) {
   sonde_mesh *mesh = &file->builder->mesh;
   point = v_add(point, vec3(0, 0, 0)); // -0 becomes 0
   sonde_vec3 scaled = v_scale(point, file->builder->scale);
-  size_t slot = (size_t)sonde_hash(0, &point, sizeof point) & (file->table_size - 1);
+  uint64_t hash = sonde_hash(0, &point, sizeof point);
+  hash ^= hash >> 32; // the low bits alone hardly depend on the high bits of the coordinates
+  hash ^= hash >> 15;
+  size_t slot = (size_t)hash & (file->table_size - 1);
   for (; file->table[slot]; slot = (slot + 1) & (file->table_size - 1)) {
     sonde_vec3 known = mesh->vertices[file->table[slot] - 1];
     if (known.x == scaled.x && known.y == scaled.y && known.z == scaled.z)

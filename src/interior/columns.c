@@ -235,8 +235,7 @@ sonde_status sonde_columns_create(sonde_interior *in, sonde_error *error) {
   in->column = SONDE_NEW(sonde_column, count);
   in->field = SONDE_NEW(sonde_column_field, count);
   in->potential = SONDE_NEW(double, count);
-  if (!in->column || !in->field || !in->potential)
-    return sonde_fail_memory(error);
+  if (!in->column || !in->field || !in->potential) return sonde_fail_memory(error);
   status = cast_columns(in, error);
   if (status != SONDE_OK) return status;
   slope_columns(in);

@@ -4,7 +4,8 @@
 // divergence in (theta, s, zeta), u = (1/J) (U^zeta dp/dzeta + U^theta dp/dtheta + U^s dp/ds) has
 // no divergence in space, whatever the shape of the leg. Two such fields are added:
 // - inflow: U^zeta = g W, U^i = g' V^i with d_i V^i = -W. g = 1 - 3 z^2 + 2 z^3.
-// - slide: U^i = g S^i + g'/2 V'^i, U^zeta = -(z - 3/2 z^2 + z^4/2) D, with S^i = H R t^i the skin's
+// - slide: U^i = g S^i + g'/2 V'^i, U^zeta = -(z - 3/2 z^2 + z^4/2) D, with S^i = H R t^i the
+// skin's
 //   motion along itself, D = d_i S^i, d_i V'^i = D: what follows the skin below it comes back
 //   at mid-depth. V + V'/2 = -grad Phi takes one solve.
 // At the skin the first carries the flux through it and the second what is left, which is

@@ -2,7 +2,7 @@
 //
 // sonde_interior_update           field, then vessels
 // sonde_interior_vessels          all stations of both vessels
-// measure_load                    equivalent uniform rectangle of the contact forces
+// measure_load, half_side         equivalent uniform rectangle of the contact forces
 // outside_pressure                effective pressure on the wall
 // update_station                  dynamics and shape
 // sonde_vessel_at                 state between stations
@@ -13,7 +13,9 @@
 
 static const double relaxation_s = 0.1;    // emptying of a vein segment (physics.md 2g)
 static const double skin_spread_m = 2e-3;  // the skin widens the loaded patch on every side
+static const double reach_share = 0.65;    // of the way from the moment's side to the reach's
 static const double least_half_m = 1.5e-3; // a point probe still has a face
+static const double least_share = 0.03;    // of the largest nodal force: belongs to the contact
 static const double least_depth_m = 3e-3;
 static const double bone_start = 0.30, bone_rise = 1.75; // rigid base, docs/interior.md
 static const double carry_reach = 3.0; // rest radii over which the wall's motion fades
@@ -27,29 +29,50 @@ typedef struct load {
   sonde_vec3 x, y, beam; // probe axes, world
 } load;
 
+// Sums over the loaded nodes, probe frame.
+typedef struct sums {
+  double force, x, y, xx, yy;
+  double low_x, high_x, low_y, high_y; // extent of the nodes that carry a share
+} sums;
+
+static void add_node(sums *t, double f, double x, double y, double least) {
+  t->force += f;
+  t->x += f * x, t->y += f * y, t->xx += f * x * x, t->yy += f * y * y;
+  if (f < least) return;
+  t->low_x = fmin(t->low_x, x), t->high_x = fmax(t->high_x, x);
+  t->low_y = fmin(t->low_y, y), t->high_y = fmax(t->high_y, y);
+}
+
+// Half side of the uniform strip that stands for the load: between the one with the same second
+// moment and the reach of the contact. The moment alone takes the peak under the middle of a flat
+// face on a round leg at its full sharpness; the stiff skin evens it out (docs/interior.md).
+static double half_side(double moment, double low, double high) {
+  double half = sqrt(3 * fmax(0, moment)), reach = 0.5 * fmax(0, high - low);
+  return fmax(half + reach_share * fmax(reach - half, 0), least_half_m) + skin_spread_m;
+}
+
 static load measure_load(const sonde_model *model, const sonde_interior_input *input) {
   sonde_mat3 r = q_matrix(input->world_from_probe.rotation);
   load l = {.x = vec3(r.m[0][0], r.m[1][0], r.m[2][0]),
             .y = vec3(r.m[0][1], r.m[1][1], r.m[2][1]),
             .beam = vec3(r.m[0][2], r.m[1][2], r.m[2][2])};
-  double mx = 0, my = 0, mxx = 0, myy = 0;
-  sonde_vec3 centre = vec3(0, 0, 0);
+  sums t = {.low_x = INFINITY, .high_x = -INFINITY, .low_y = INFINITY, .high_y = -INFINITY};
+  double largest = 0;
+  for (uint32_t i = 0; i < model->surface.vertex_count; ++i)
+    largest = fmax(largest, v_dot(input->contact_forces_n[i], l.beam));
   for (uint32_t i = 0; i < model->surface.vertex_count; ++i) {
     double f = v_dot(input->contact_forces_n[i], l.beam);
     if (!(f > 0)) continue;
     sonde_vec3 d = v_sub(input->positions_m[i], input->world_from_probe.position);
-    double x = v_dot(d, l.x), y = v_dot(d, l.y);
-    l.force_n += f;
-    mx += f * x, my += f * y, mxx += f * x * x, myy += f * y * y;
-    centre = v_madd(centre, f, model->surface.vertices[i]);
+    add_node(&t, f, v_dot(d, l.x), v_dot(d, l.y), least_share * largest);
+    l.centre_m = v_madd(l.centre_m, f, model->surface.vertices[i]);
   }
-  if (!(l.force_n > 1e-6)) return (load){.x = l.x, .y = l.y, .beam = l.beam};
-  double s = 1 / l.force_n;
-  l.centre_m = v_scale(centre, s);
-  double half_x = sqrt(3 * fmax(0, mxx * s - mx * s * mx * s));
-  double half_y = sqrt(3 * fmax(0, myy * s - my * s * my * s));
-  l.half_x_m = fmax(half_x, least_half_m) + skin_spread_m;
-  l.half_y_m = fmax(half_y, least_half_m) + skin_spread_m;
+  if (!(t.force > 1e-6)) return (load){.x = l.x, .y = l.y, .beam = l.beam};
+  double s = 1 / t.force;
+  l.force_n = t.force;
+  l.centre_m = v_scale(l.centre_m, s);
+  l.half_x_m = half_side(t.xx * s - t.x * s * t.x * s, t.low_x, t.high_x);
+  l.half_y_m = half_side(t.yy * s - t.y * s * t.y * s, t.low_y, t.high_y);
   l.pressure_pa = l.force_n / (4 * l.half_x_m * l.half_y_m);
   return l;
 }

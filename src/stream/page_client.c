@@ -38,7 +38,7 @@ bool page_buffer_reserve(page_buffer *buffer, size_t capacity) {
 }
 
 void page_client_note(page_client *client, const char *sentence) {
-  snprintf(client->note, sizeof client->note, "%s", sentence);
+  snprintf(client->note, sizeof client->note, "%.*s", (int)sizeof client->note - 1, sentence);
   client->note_due = true;
 }
 

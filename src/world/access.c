@@ -37,17 +37,12 @@ void sonde_state_reset(sonde_state *state) {
   memset(state->contact_force, 0, n * sizeof *state->contact_force);
   memset(state->push_n, 0, n * sizeof *state->push_n);
   memset(state->share_m3, 0, n * sizeof *state->share_m3);
-  memset(state->push_m3, 0, n * sizeof *state->push_m3);
-  memset(state->lift, 0, n * sizeof *state->lift);
-  memset(state->has_pair, 0, state->model->topology.edge_count);
-  memset(state->pushed, 0, n);
   memset(state->gradient, 0, n * sizeof *state->gradient);
   memset(state->awake, state->def.sleep_displacement_m > 0 ? 0 : 1, n);
   memset(state->calm, SONDE_CALM_TICKS, n);
   state->tick = 0;
-  state->touched_count = state->touched_edge_count = 0;
+  state->touched_count = state->touched_face_count = 0;
   state->has_probe_pose = false;
-  state->wall_factor = 1e6;
   state->solver = (sonde_pcg_result){.converged = true};
   state->flags = 0;
   state->times = (sonde_stage_times){0};

@@ -1,13 +1,15 @@
 // Contact of the convex probe with the deformed skin (physics.md 2c), every step.
 // refit:    boxes of runs of faces; far ones in turn, near ones each step.
 // detect:   clips candidate faces, gathers V_i and g_i per node, joins regions by union-find.
-// apply:    regions, pushes of eq. (2), terms of the implicit matrix.
+// apply:    regions, pushes of the chosen law, terms of the implicit matrix.
 // advance:  the pushes at the end of the step by the same linearisation.
 // wrench:   force and torque on the probe, region by region.
 #include "world/state.h"
 
 #include "base/base.h"
 #include "base/maths.h"
+
+static const double STEEP_WEIGHT = 4;
 
 static sonde_vec3 v_min(sonde_vec3 a, sonde_vec3 b) {
   return vec3(a.x < b.x ? a.x : b.x, a.y < b.y ? a.y : b.y, a.z < b.z ? a.z : b.z);
@@ -63,55 +65,28 @@ static void touch(sonde_state *state, uint32_t i) {
   const sonde_vec3 *g = &state->gradient[i];
   if (state->share_m3[i] != 0 || g->x != 0 || g->y != 0 || g->z != 0) return;
   state->parent[i] = i;
-  state->overlap[i] = m_zero();
   state->touched[state->touched_count++] = i;
 }
 
-static void touch_pair(sonde_state *state, uint32_t e) {
-  if (state->has_pair[e]) return;
-  state->has_pair[e] = 1;
-  state->pair_overlap[e] = m_zero();
-  state->touched_edges[state->touched_edge_count++] = e;
-}
-
-// Adds one clipped face. With m = n/(n.e), e against the columns, the energy kappa/2 times the
-// integral of t^2 over the footprint has the gradient kappa V_i m per node and, to first order in
-// t, the Hessian kappa (integral phi_i phi_j) m m^T.
-static void add_face(sonde_state *state, uint32_t face, const sonde_vec3 corners[3],
-                     const sonde_clip_result *clip) {
-  const uint32_t *v = state->model->surface.faces[face];
-  sonde_vec3 area = v_cross(v_sub(corners[1], corners[0]), v_sub(corners[2], corners[0]));
-  double facing = -v_dot(area, state->inward);
-  // Faces that turn away or stand on edge carry volume but cannot push.
-  sonde_vec3 m = facing > 0.05 * v_norm(area) ? v_neg(state->inward) : vec3(0, 0, 0);
-  for (int k = 0; k < 3; ++k) {
-    touch(state, v[k]);
-    touch_pair(state, state->face_edges[face][k]);
-  }
-  for (int k = 0; k < 3; ++k) {
-    uint32_t i = v[k], e = state->face_edges[face][k];
-    state->share_m3[i] += clip->share_m3[k];
-    state->gradient[i] = v_add(state->gradient[i], clip->gradient[k]);
-    state->push_m3[i] += clip->push_m3[k];
-    state->lift[i] = v_madd(state->lift[i], clip->push_m3[k], m);
-    state->overlap[i] = m_add(state->overlap[i], m_rank1(m, clip->overlap_m2[k], 0));
-    state->pair_overlap[e] = m_add(state->pair_overlap[e], m_rank1(m, clip->overlap_m2[3 + k], 0));
-  }
-  join(state, v[0], v[1]);
-  join(state, v[1], v[2]);
-  state->contact.area_m2 += clip->area_m2;
-  state->contact.volume_m3 += clip->volume_m3;
-}
-
-static void clip_face(sonde_state *state, uint32_t face, uint32_t planes) {
+static void clip_face(sonde_state *state, uint32_t face) {
   const uint32_t *v = state->model->surface.faces[face];
   const sonde_vec3 corners[3] = {state->position[v[0]], state->position[v[1]],
                                  state->position[v[2]]};
   sonde_clip_result clip;
-  if (!sonde_clip_triangle(state->plane_normal, state->plane_offset, planes, corners, state->inward,
-                           state->wall_factor, &clip))
+  if (!sonde_clip_triangle(state->plane_normal, state->plane_offset, state->plane_count, corners,
+                           state->inward, &clip))
     return;
-  if (clip.area_m2 > 0) add_face(state, face, corners, &clip);
+  if (!(clip.area_m2 > 0)) return;
+  for (int k = 0; k < 3; ++k) touch(state, v[k]);
+  for (int k = 0; k < 3; ++k) {
+    state->share_m3[v[k]] += clip.share_m3[k];
+    state->gradient[v[k]] = v_add(state->gradient[v[k]], clip.gradient[k]);
+  }
+  join(state, v[0], v[1]);
+  join(state, v[1], v[2]);
+  state->touched_faces[state->touched_face_count++] = face;
+  state->contact.area_m2 += clip.area_m2;
+  state->contact.volume_m3 += clip.volume_m3;
 }
 
 // Planes of the probe in the world frame and its box.
@@ -119,9 +94,12 @@ static sonde_box place_probe(sonde_state *state, const sonde_probe *probe, sonde
   const sonde_convex *body = &probe->body;
   SONDE_ASSERT(body->plane_count <= state->plane_capacity);
   sonde_mat3 r = q_matrix(pose.rotation);
+  state->inward = m_mul_v(r, vec3(0, 0, 1));
+  state->plane_count = body->plane_count;
   for (uint32_t k = 0; k < body->plane_count; ++k) {
     state->plane_normal[k] = m_mul_v(r, body->plane_normal[k]);
     state->plane_offset[k] = body->plane_offset_m[k] + v_dot(state->plane_normal[k], pose.position);
+    state->plane_weight[k] = body->plane_normal[k].z > 0.5 ? 1 : STEEP_WEIGHT;
   }
   sonde_box box = {vec3(INFINITY, INFINITY, INFINITY), vec3(-INFINITY, -INFINITY, -INFINITY)};
   for (uint32_t k = 0; k < body->hull.vertex_count; ++k) {
@@ -135,13 +113,10 @@ static sonde_box place_probe(sonde_state *state, const sonde_probe *probe, sonde
 static void forget(sonde_state *state) {
   for (uint32_t k = 0; k < state->touched_count; ++k) {
     uint32_t i = state->touched[k];
-    state->share_m3[i] = state->push_m3[i] = state->push_n[i] = 0;
-    state->pushed[i] = 0;
-    state->gradient[i] = state->lift[i] = state->contact_force[i] = vec3(0, 0, 0);
+    state->share_m3[i] = state->push_n[i] = 0;
+    state->gradient[i] = state->contact_force[i] = vec3(0, 0, 0);
   }
-  for (uint32_t k = 0; k < state->touched_edge_count; ++k)
-    state->has_pair[state->touched_edges[k]] = 0;
-  state->touched_count = state->touched_edge_count = 0;
+  state->touched_count = state->touched_face_count = 0;
   state->term_count = 0;
   state->contact = (sonde_contact){0};
 }
@@ -163,42 +138,26 @@ static void sort_touched(sonde_state *state) {
     }
 }
 
-static void clip_block(sonde_state *state, uint32_t block, const sonde_box *box, uint32_t planes) {
+static void clip_block(sonde_state *state, uint32_t block, const sonde_box *box) {
   uint32_t end = (block + 1) * SONDE_FACES_PER_BLOCK;
   if (end > state->model->surface.face_count) end = state->model->surface.face_count;
   for (uint32_t k = block * SONDE_FACES_PER_BLOCK; k < end; ++k) {
     sonde_box face = face_box(state, state->face_order[k]);
-    if (overlap(&face, box)) clip_face(state, state->face_order[k], planes);
+    if (overlap(&face, box)) clip_face(state, state->face_order[k]);
   }
 }
 
-// Skin beside the probe's walls does not press on its face: points deeper than three times their
-// distance to a wall are left out. Where the skin lies so deep in the probe on average that this
-// would let it through, every point presses again.
-static void choose_wall_factor(sonde_state *state, const sonde_probe *probe) {
-  double deepest = 0, width = fmin(probe->half_x_m, probe->half_y_m);
-  for (uint32_t r = 0; r < state->contact.region_count; ++r)
-    deepest = fmax(deepest, state->contact.region[r].depth_max_m);
-  if (deepest > 0.5 * width)
-    state->wall_factor = 1e6;
-  else if (deepest < 0.25 * width)
-    state->wall_factor = 3;
-}
-
 void sonde_contact_detect(sonde_state *state, const sonde_probe *probe, sonde_pose pose) {
-  if (probe) choose_wall_factor(state, probe);
   forget(state);
   sonde_box box = {vec3(INFINITY, INFINITY, INFINITY), vec3(-INFINITY, -INFINITY, -INFINITY)};
   if (probe) box = place_probe(state, probe, pose);
-  // A node moves less than 1 mm per tick: far boxes may be SONDE_REFIT_PERIOD ticks old.
-  sonde_box near = probe ? grown(box, 2e-3 * SONDE_REFIT_PERIOD) : box;
-  state->inward = q_rotate(pose.rotation, vec3(0, 0, 1));
+  // A node moves less than 1 mm per tick: boxes farther than that times the period may be old.
+  sonde_box near = probe ? grown(box, 1e-3 * SONDE_REFIT_PERIOD) : box;
   uint32_t turn = (uint32_t)(state->tick % SONDE_REFIT_PERIOD);
   for (uint32_t b = 0; b < state->block_count; ++b) {
     bool close = overlap(&state->boxes[b], &near);
     if (close || b % SONDE_REFIT_PERIOD == turn) refit(state, b);
-    if (close && overlap(&state->boxes[b], &box))
-      clip_block(state, b, &box, probe->body.plane_count);
+    if (close && overlap(&state->boxes[b], &box)) clip_block(state, b, &box);
   }
   sort_touched(state);
   for (uint32_t k = 0; k < state->touched_count; ++k) {
@@ -264,68 +223,82 @@ static void sum_regions(sonde_state *state, const sonde_motion *probe) {
   }
 }
 
-static double projected_area(const sonde_state *state, uint32_t i,
-                             const sonde_contact_region *region) {
-  double area = v_dot(state->gradient[i], region->direction);
-  return area > 0 ? area : 0;
+// Depth of a point inside the probe: the least weighted distance to a plane, t = weight (d - n.x),
+// and its gradient -weight n in *slope. Planes steeper than 60 degrees to the beam count four times
+// farther: a probe that sinks in deeper than it is wide still pushes back along its face.
+// False outside.
+static bool depth_at(const sonde_state *state, sonde_vec3 x, double *depth, sonde_vec3 *slope) {
+  double least = INFINITY;
+  uint32_t best = 0;
+  for (uint32_t k = 0; k < state->plane_count; ++k) {
+    double t = state->plane_weight[k] * (state->plane_offset[k] - v_dot(state->plane_normal[k], x));
+    if (t <= 0) return false;
+    if (t < least) least = t, best = k;
+  }
+  *depth = least;
+  *slope = v_scale(state->plane_normal[best], -state->plane_weight[best]);
+  return true;
 }
 
-// The force on the node is along `direction` (against the probe's push); push counts along the
-// columns.
-static void set_force(sonde_state *state, uint32_t i, sonde_vec3 force) {
-  double push = v_dot(force, state->inward);
-  state->push_n[i] = push > 0 ? push : 0;
-  state->contact_force[i] = push > 0 ? force : vec3(0, 0, 0);
+// Integration points of a face: the centres of its four congruent parts, each a quarter of the rest
+// area. With the rest area as measure the elastic pushes have the energy kappa/2 sum A t^2, whose
+// Hessian kappa A (grad t)(grad t)^T is exact.
+enum { POINTS = 4 };
+static const double POINT[POINTS][3] = {{1.0 / 3, 1.0 / 3, 1.0 / 3},
+                                        {2.0 / 3, 1.0 / 6, 1.0 / 6},
+                                        {1.0 / 6, 2.0 / 3, 1.0 / 6},
+                                        {1.0 / 6, 1.0 / 6, 2.0 / 3}};
+
+static sonde_vec3 blend(const sonde_vec3 *field, const uint32_t *v, const double *weight) {
+  sonde_vec3 sum = v_scale(field[v[0]], weight[0]);
+  return v_madd(v_madd(sum, weight[1], field[v[1]]), weight[2], field[v[2]]);
 }
 
-// Direction in which a node is pushed, scaled to 1 along the columns.
-static sonde_vec3 push_direction(const sonde_state *state, uint32_t i) {
-  return state->push_m3[i] > 0 ? v_scale(state->lift[i], 1 / state->push_m3[i]) : vec3(0, 0, 0);
+// The push acts against the slope of the depth: out of the probe.
+static void spread_push(sonde_state *state, const uint32_t *v, const double *weight,
+                        sonde_vec3 slope, double push) {
+  for (int k = 0; k < 3; ++k)
+    state->contact_force[v[k]] = v_madd(state->contact_force[v[k]], -push * weight[k], slope);
 }
 
-static double damped_area(const sonde_state *state, uint32_t i) {
-  double area = -v_dot(state->gradient[i], state->inward);
-  return area > 0 ? area : 0;
+static void add_point_terms(sonde_state *state, uint32_t face, const double *weight,
+                            sonde_vec3 slope, double stiffness, double scale) {
+  const uint32_t *v = state->model->surface.faces[face];
+  double speed = v_dot(slope, blend(state->velocity, v, weight));
+  for (int k = 0; k < 3; ++k) {
+    uint32_t i = v[k], j = v[(k + 1) % 3], e = state->face_edges[face][k];
+    state->matrix->diagonal[i] =
+        m_add(state->matrix->diagonal[i], m_rank1(slope, scale * weight[k] * weight[k], 0));
+    state->matrix->upper[e] =
+        m_add(state->matrix->upper[e], m_rank1(slope, scale * weight[k] * weight[(k + 1) % 3], 0));
+    state->product[i] = v_madd(state->product[i], stiffness * weight[k] * speed, slope);
+    SONDE_ASSERT(i != j);
+  }
 }
 
-// Eq. (2) on the node's own share: (kappa V_i + mu dV_i/dt) along its direction, never a pull.
-static void apply_node(sonde_state *state, uint32_t i, const sonde_motion *probe,
-                       const sonde_contact_scales *scales) {
-  double kappa = state->def.contact_stiffness_n_m3, mu = state->def.contact_damping_n_s_m3;
-  sonde_vec3 d = push_direction(state, i);
-  double area = damped_area(state, i);
-  double rate = area * v_dot(d, relative_velocity(state, i, probe));
-  double push = d.x != 0 || d.y != 0 || d.z != 0 ? kappa * state->push_m3[i] + mu * rate : 0;
-  state->pushed[i] = push > 0;
-  set_force(state, i, v_scale(d, push > 0 ? -push : 0));
-  if (!state->pushed[i]) return;
-  sonde_mat3 stiffness = m_scale(state->overlap[i], kappa);
-  sonde_mat3 damping = m_rank1(d, mu * area, 0);
-  state->matrix->diagonal[i] =
-      m_add(state->matrix->diagonal[i],
-            m_add(m_scale(stiffness, scales->stiffness), m_scale(damping, scales->damping)));
-  state->product[i] = v_add(state->product[i], m_mul_v(stiffness, state->velocity[i]));
+// Pressure kappa t + mu dt/dt at one point, never a pull; dt/dt = slope . relative velocity.
+static void press_point(sonde_state *state, uint32_t face, const double *weight,
+                        const sonde_motion *probe, const sonde_contact_scales *scales) {
+  const uint32_t *v = state->model->surface.faces[face];
+  sonde_vec3 x = blend(state->position, v, weight), slope;
+  double depth, area = state->face_area_m2[face] / POINTS;
+  if (!depth_at(state, x, &depth, &slope)) return;
+  double kappa = state->def.contact_stiffness_n_m3 * area;
+  double mu = state->def.contact_damping_n_s_m3 * area;
+  sonde_vec3 carried = v_add(probe->velocity, v_cross(probe->spin, v_sub(x, probe->origin)));
+  double rate = v_dot(slope, v_sub(blend(state->velocity, v, weight), carried));
+  double push = kappa * depth + mu * rate;
+  if (!(push > 0)) return;
+  spread_push(state, v, weight, slope, push);
+  add_point_terms(state, face, weight, slope, kappa,
+                  scales->stiffness * kappa + scales->damping * mu);
 }
 
-// Terms of a pair of neighbours under the probe.
-static void apply_pair(sonde_state *state, uint32_t e, const sonde_contact_scales *scales) {
-  uint32_t i = state->model->topology.edges[e][0], j = state->model->topology.edges[e][1];
-  if (!state->pushed[i] || !state->pushed[j]) return;
-  sonde_mat3 stiffness = m_scale(state->pair_overlap[e], state->def.contact_stiffness_n_m3);
-  state->matrix->upper[e] = m_add(state->matrix->upper[e], m_scale(stiffness, scales->stiffness));
-  state->product[i] = v_add(state->product[i], m_mul_v(stiffness, state->velocity[j]));
-  state->product[j] = v_add(state->product[j], m_mul_v(stiffness, state->velocity[i]));
-}
-
-// Each node carries eq. (2) on its own share V_i. The shares add up to the volume, so that the
-// force along the columns is eq. (2) of the whole volume wherever no node is clamped; without
-// damping the forces have an energy (see add_face).
-static void apply_shared(sonde_state *state, const sonde_motion *probe,
-                         const sonde_contact_scales *scales) {
-  for (uint32_t k = 0; k < state->touched_count; ++k)
-    apply_node(state, state->touched[k], probe, scales);
-  for (uint32_t k = 0; k < state->touched_edge_count; ++k)
-    apply_pair(state, state->touched_edges[k], scales);
+static void apply_foundation(sonde_state *state, const sonde_motion *probe,
+                             const sonde_contact_scales *scales) {
+  for (uint32_t k = 0; k < state->touched_face_count; ++k)
+    for (int q = 0; q < POINTS; ++q)
+      press_point(state, state->touched_faces[k], POINT[q], probe, scales);
 }
 
 // Packs w_i k of one region behind the ones before; returns sum w_i k.v_i.
@@ -363,7 +336,7 @@ static void apply_lumped(sonde_state *state, const sonde_contact_scales *scales)
     for (uint32_t k = 0; k < term->count; ++k) {
       uint32_t i = term->rows[k];
       double weight = v_dot(term->g[k], region->direction);
-      set_force(state, i, v_scale(region->direction, -weight * push));
+      state->contact_force[i] = v_scale(region->direction, -weight * push);
       state->product[i] = v_madd(state->product[i], kappa * region->area_m2 * speed, term->g[k]);
     }
   }
@@ -373,38 +346,36 @@ void sonde_contact_apply(sonde_state *state, const sonde_motion *probe,
                          const sonde_contact_scales *scales) {
   number_regions(state);
   sum_regions(state, probe);
-  if (state->def.contact_law == SONDE_CONTACT_LUMPED)
+  if (state->def.contact_law == SONDE_CONTACT_VOLUME)
     apply_lumped(state, scales);
   else
-    apply_shared(state, probe, scales);
+    apply_foundation(state, probe, scales);
 }
 
-// lambda dx of a node: what the scheme's force evaluation sees of the step.
-static sonde_vec3 seen_move(const sonde_state *state, uint32_t i, double lambda, double h) {
-  return v_scale(v_madd(state->velocity[i], lambda, state->increment[i]), lambda * h);
+// The same point at the end of the step: the linearised push with the step's own moves.
+static void advance_point(sonde_state *state, uint32_t face, const double *weight,
+                          const sonde_motion *probe, double lambda, double h) {
+  const uint32_t *v = state->model->surface.faces[face];
+  sonde_vec3 x = blend(state->position, v, weight), slope;
+  double depth, area = state->face_area_m2[face] / POINTS;
+  if (!depth_at(state, x, &depth, &slope)) return;
+  double kappa = state->def.contact_stiffness_n_m3 * area;
+  double mu = state->def.contact_damping_n_s_m3 * area;
+  sonde_vec3 carried = v_add(probe->velocity, v_cross(probe->spin, v_sub(x, probe->origin)));
+  sonde_vec3 v0 = blend(state->velocity, v, weight), dv = blend(state->increment, v, weight);
+  double push = kappa * depth + mu * v_dot(slope, v_sub(v0, carried));
+  if (!(push > 0)) return;
+  push += lambda * v_dot(slope, v_madd(v_scale(v_madd(v0, lambda, dv), kappa * h), mu, dv));
+  if (push > 0) spread_push(state, v, weight, slope, push);
 }
 
-static void advance_shared(sonde_state *state, double lambda, double h) {
-  double kappa = state->def.contact_stiffness_n_m3, mu = state->def.contact_damping_n_s_m3;
-  for (uint32_t k = 0; k < state->touched_count; ++k) {
-    uint32_t i = state->touched[k];
-    sonde_vec3 d = push_direction(state, i);
-    double damping = mu * damped_area(state, i) * lambda * v_dot(d, state->increment[i]);
-    sonde_vec3 elastic = m_mul_v(state->overlap[i], seen_move(state, i, lambda, h));
-    state->change[i] = v_madd(v_scale(elastic, kappa), damping, d);
-  }
-  for (uint32_t k = 0; k < state->touched_edge_count; ++k) {
-    uint32_t e = state->touched_edges[k];
-    uint32_t i = state->model->topology.edges[e][0], j = state->model->topology.edges[e][1];
-    if (!state->pushed[i] || !state->pushed[j]) continue;
-    sonde_mat3 stiffness = m_scale(state->pair_overlap[e], kappa);
-    state->change[i] = v_add(state->change[i], m_mul_v(stiffness, seen_move(state, j, lambda, h)));
-    state->change[j] = v_add(state->change[j], m_mul_v(stiffness, seen_move(state, i, lambda, h)));
-  }
-  for (uint32_t k = 0; k < state->touched_count; ++k) {
-    uint32_t i = state->touched[k];
-    if (state->pushed[i]) set_force(state, i, v_sub(state->contact_force[i], state->change[i]));
-  }
+static void advance_foundation(sonde_state *state, const sonde_motion *probe, double lambda,
+                               double h) {
+  for (uint32_t k = 0; k < state->touched_count; ++k)
+    state->contact_force[state->touched[k]] = vec3(0, 0, 0);
+  for (uint32_t k = 0; k < state->touched_face_count; ++k)
+    for (int q = 0; q < POINTS; ++q)
+      advance_point(state, state->touched_faces[k], POINT[q], probe, lambda, h);
 }
 
 // Linear change of the lumped force when its weighted point moves by dx at dv.
@@ -428,15 +399,15 @@ static void advance_lumped(sonde_state *state, double lambda, double h) {
     push += push_change(state, region->area_m2, dx, dv, lambda);
     if (push < 0) push = 0;
     for (uint32_t k = 0; k < term->count; ++k)
-      set_force(state, term->rows[k], v_scale(term->g[k], -push));
+      state->contact_force[term->rows[k]] = v_scale(term->g[k], -push);
   }
 }
 
-void sonde_contact_advance(sonde_state *state, double lambda, double h) {
-  if (state->def.contact_law == SONDE_CONTACT_LUMPED)
+void sonde_contact_advance(sonde_state *state, const sonde_motion *probe, double lambda, double h) {
+  if (state->def.contact_law == SONDE_CONTACT_VOLUME)
     advance_lumped(state, lambda, h);
   else
-    advance_shared(state, lambda, h);
+    advance_foundation(state, probe, lambda, h);
 }
 
 void sonde_contact_wrench(sonde_state *state, sonde_vec3 origin) {
@@ -448,9 +419,12 @@ void sonde_contact_wrench(sonde_state *state, sonde_vec3 origin) {
     sonde_vec3 f = state->contact_force[i], arm = v_sub(state->position[i], origin);
     contact->force_n = v_sub(contact->force_n, f);
     contact->torque_n_m = v_sub(contact->torque_n_m, v_cross(arm, f));
-    region->force_n += state->push_n[i];
-    region->centre_m = v_madd(region->centre_m, state->push_n[i], state->position[i]);
-    double area = projected_area(state, i, region);
+    double push = -v_dot(f, region->direction);
+    if (!(push > 0)) push = 0;
+    state->push_n[i] = push;
+    region->force_n += push;
+    region->centre_m = v_madd(region->centre_m, push, state->position[i]);
+    double area = v_dot(state->gradient[i], region->direction);
     double depth = area > 0 ? state->share_m3[i] / area : 0;
     if (depth > region->depth_max_m) region->depth_max_m = depth;
   }

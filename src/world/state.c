@@ -13,8 +13,8 @@ sonde_world_def sonde_world_def_default(void) {
                            .implicitness = 1,
                            .newton_iterations = 1,
                            .pcg = {1e-4, 1e-12, 200},
-                           .contact_law = SONDE_CONTACT_SHARED,
-                           .contact_stiffness_n_m3 = 1e8,
+                           .contact_law = SONDE_CONTACT_FOUNDATION,
+                           .contact_stiffness_n_m3 = 5e8,
                            .contact_damping_n_s_m3 = 1e5,
                            .sleep_displacement_m = 1e-6};
 }
@@ -29,7 +29,7 @@ static sonde_status check(const sonde_world_def *def, sonde_error *error) {
                {"pcg.relative_residual", def->pcg.relative_residual, 0, 0.5},
                {"pcg.absolute_residual", def->pcg.absolute_residual, 0, 1},
                {"pcg.max_iterations", def->pcg.max_iterations, 1, 1e6},
-               {"contact_law", def->contact_law, 0, SONDE_CONTACT_LUMPED},
+               {"contact_law", def->contact_law, 0, SONDE_CONTACT_VOLUME},
                {"contact_stiffness_n_m3", def->contact_stiffness_n_m3, 0, 1e12},
                {"contact_damping_n_s_m3", def->contact_damping_n_s_m3, 0, 1e10},
                {"sleep_displacement_m", def->sleep_displacement_m, 0, 1e-3}};
@@ -51,16 +51,15 @@ static void *carve_array(char *base, size_t *offset, size_t count, size_t size) 
 static size_t carve(sonde_state *s, char *base) {
   size_t offset = 0;
   uint32_t n = s->model->surface.vertex_count, edges = s->model->topology.edge_count;
+  uint32_t faces = s->model->surface.face_count;
   CARVE(position, n), CARVE(velocity, n), CARVE(increment, n);
   CARVE(calm, n), CARVE(awake, n), CARVE(rows, n);
   CARVE(edges, edges), CARVE(pairs, edges);
-  CARVE(face_order, s->model->surface.face_count), CARVE(boxes, s->block_count);
-  CARVE(touched, n), CARVE(parent, n), CARVE(share_m3, n), CARVE(push_m3, n), CARVE(lift, n),
-      CARVE(overlap, n), CARVE(gradient, n);
-  CARVE(face_edges, s->model->surface.face_count), CARVE(pair_overlap, edges);
-  CARVE(has_pair, edges);
-  CARVE(touched_edges, edges), CARVE(change, n), CARVE(pushed, n);
+  CARVE(face_order, faces), CARVE(boxes, s->block_count);
+  CARVE(touched, n), CARVE(parent, n), CARVE(share_m3, n), CARVE(gradient, n);
+  CARVE(face_edges, faces), CARVE(face_area_m2, faces), CARVE(touched_faces, faces);
   CARVE(push_n, n), CARVE(contact_force, n), CARVE(lumped, n), CARVE(lumped_rows, n);
+  CARVE(plane_weight, SONDE_MAX_PLANES);
   CARVE(plane_normal, SONDE_MAX_PLANES), CARVE(plane_offset, SONDE_MAX_PLANES);
   CARVE(force, n), CARVE(product, n), CARVE(right, n), CARVE(trial, n);
   CARVE(scratch.r, n), CARVE(scratch.z, n), CARVE(scratch.p, n), CARVE(scratch.q, n);
@@ -106,9 +105,16 @@ static sonde_status order_faces(sonde_state *state, sonde_error *error) {
   return SONDE_OK;
 }
 
-// Edges 01, 12, 20 of every face.
-static void list_face_edges(sonde_state *state) {
+// Edges 01, 12, 20 and rest area of every face.
+static void measure_faces(sonde_state *state) {
   const sonde_topology *topology = &state->model->topology;
+  const sonde_mesh *mesh = &state->model->surface;
+  for (uint32_t f = 0; f < mesh->face_count; ++f) {
+    const uint32_t *v = mesh->faces[f];
+    sonde_vec3 a = v_sub(mesh->vertices[v[1]], mesh->vertices[v[0]]);
+    sonde_vec3 b = v_sub(mesh->vertices[v[2]], mesh->vertices[v[0]]);
+    state->face_area_m2[f] = 0.5 * v_norm(v_cross(a, b));
+  }
   for (uint32_t e = 0; e < topology->edge_count; ++e)
     for (int side = 0; side < 2; ++side) {
       uint32_t f = topology->edge_faces[e][side];
@@ -147,7 +153,7 @@ sonde_status sonde_state_create(const sonde_model *model, const sonde_world_def 
     sonde_state_destroy(state);
     return status;
   }
-  list_face_edges(state);
+  measure_faces(state);
   sonde_state_reset(state);
   *out = state;
   return SONDE_OK;

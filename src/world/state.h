@@ -4,7 +4,7 @@
 
 #include "sonde/world.h"
 
-enum { SONDE_FACES_PER_BLOCK = 32, SONDE_REFIT_PERIOD = 16 };
+enum { SONDE_FACES_PER_BLOCK = 32, SONDE_REFIT_PERIOD = 8 };
 
 // Axis-aligned box of a run of SONDE_FACES_PER_BLOCK faces in face_order.
 typedef struct sonde_box {
@@ -38,21 +38,14 @@ struct sonde_state {
   uint32_t block_count;
   uint32_t *touched; // [nodes] nodes with a share of the volume, ascending
   uint32_t touched_count;
-  double wall_factor;        // see sonde_clip_triangle()
   uint32_t *parent;          // [nodes] union-find over touched nodes
   double *share_m3;          // [nodes] V_i
-  double *push_m3;           // [nodes] the part of V_i that presses along the columns
-  sonde_vec3 *lift;          // [nodes] that part times n/(n.e), e against the columns
-  sonde_mat3 *overlap;       // [nodes] its derivative by the node's own position
   uint32_t (*face_edges)[3]; // [faces] edges 01, 12, 20
-  sonde_mat3 *pair_overlap;  // [edges] and by the neighbour's (symmetric)
-  uint8_t *has_pair;         // [edges] pair_overlap is in use
-  uint32_t *touched_edges;   // [edges] edges with an overlap
-  uint32_t touched_edge_count;
-  sonde_vec3 *change;        // [nodes] scratch of advance
+  double *face_area_m2;      // [faces] at rest
+  uint32_t *touched_faces;   // [faces] faces inside the probe, in the order they were found
+  uint32_t touched_face_count;
   sonde_vec3 inward;         // direction of the columns: the beam axis of the probe
   sonde_vec3 *gradient;      // [nodes] g_i = dV/dx_i
-  uint8_t *pushed;           // [nodes] the push is positive: its terms are in the matrix
   double *push_n;            // [nodes] size of the probe's push on the node
   sonde_vec3 *contact_force; // [nodes] of the probe on the node
   sonde_vec3 *lumped;        // [nodes] w_i k of lumped regions, packed per region
@@ -61,6 +54,8 @@ struct sonde_state {
   uint32_t term_count;
   sonde_vec3 *plane_normal; // [max planes] of the probe in the world frame
   double *plane_offset;
+  double *plane_weight; // of its distance in the depth: see depth_at()
+  uint32_t plane_count;
   uint32_t plane_capacity;
   sonde_contact contact;
 
@@ -104,7 +99,7 @@ void sonde_contact_apply(sonde_state *state, const sonde_motion *probe,
                          const sonde_contact_scales *scales);
 // Pushes at the end of the step by the same linearisation, from node displacements
 // dx = h (v + lambda dv) and velocity changes dv, both scaled by lambda. @thread tick
-void sonde_contact_advance(sonde_state *state, double lambda, double h);
+void sonde_contact_advance(sonde_state *state, const sonde_motion *probe, double lambda, double h);
 // Force and torque on the probe, forces and centres of the regions from the pushes. @thread tick
 void sonde_contact_wrench(sonde_state *state, sonde_vec3 origin);
 // No probe: no contact. @thread tick

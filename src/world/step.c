@@ -190,7 +190,7 @@ void sonde_step(sonde_state *state, const sonde_probe *probe, sonde_pose pose) {
   double solved = sonde_clock_now();
   // Newton's later iterations have already evaluated the contact where the scheme wants it.
   if (state->def.newton_iterations == 1)
-    sonde_contact_advance(state, state->def.implicitness, state->def.dt_s);
+    sonde_contact_advance(state, &motion, state->def.implicitness, state->def.dt_s);
   sonde_contact_wrench(state, pose.position);
   bool finite = update(state) && v_finite(state->contact.force_n);
   finish(state, probe, pose, finite);

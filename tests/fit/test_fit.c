@@ -188,6 +188,10 @@ static void refuses_what_it_cannot_fit(void **state) {
   assert_int_equal(sonde_fit(p.model, &p.sites, &m, &def, NULL, &r, &error), SONDE_ARGUMENT);
   assert_says(&error, "'sphere' has no rectangular footprint");
   snprintf(m.data[3].probe, sizeof m.data[3].probe, "point");
+  m.data[3].force_n = NAN;
+  assert_int_equal(sonde_fit(p.model, &p.sites, &m, &def, NULL, &r, &error), SONDE_ARGUMENT);
+  assert_says(&error, "measurement 3");
+  m.data[3].force_n = 1;
   m.data[3].site = 99;
   assert_int_equal(sonde_fit(p.model, &p.sites, &m, &def, NULL, &r, &error), SONDE_MISMATCH);
   assert_says(&error, "site 99");

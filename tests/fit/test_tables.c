@@ -51,6 +51,8 @@ static const bad_file BAD_MEASUREMENTS[] = {
      {":3:", "penetration_mm", "finite"}},
     {HEADER "0,point,0,0,0,0,0,1,2,inf\n", SONDE_FORMAT, {":2:", "force_n", "finite"}},
     {HEADER "0,point,0,0,0,0,0,1,-2,1\n", SONDE_FORMAT, {":2:", "penetration_mm", ">= 0"}},
+    {HEADER "0,point,0,0,0,0,0,1,2,1e300\n", SONDE_FORMAT, {":2:", "force_n", "1e6 N"}},
+    {HEADER "0,point,0,0,0,0,0,1,1e9,1\n", SONDE_FORMAT, {":2:", "penetration_mm", "1000"}},
     {HEADER "0,point,0,0,0,0,0,0,2,1\n", SONDE_FORMAT, {":2:", "nx..nz", "zero vector"}},
     {HEADER "0,spoon,0,0,0,0,0,1,2,1\n", SONDE_FORMAT, {":2:", "'spoon'", "linear"}},
     {HEADER "1.5,point,0,0,0,0,0,1,2,1\n", SONDE_FORMAT, {":2:", "column site", "whole number"}},

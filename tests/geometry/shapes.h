@@ -100,6 +100,25 @@ static inline sonde_mesh shape_sphere(uint32_t n, double radius) {
   return mesh;
 }
 
+static inline double shape_segment_distance(sonde_vec3 p, sonde_vec3 a, sonde_vec3 b) {
+  sonde_vec3 u = v_sub(b, a);
+  double t = clamp(v_dot(v_sub(p, a), u) / v_norm2(u), 0, 1);
+  return v_distance(p, v_madd(a, t, u));
+}
+
+// Distance of a point from a triangle: its plane where the foot lies inside, else its sides.
+static inline double shape_triangle_distance(sonde_vec3 p, const sonde_vec3 t[3]) {
+  sonde_vec3 n = v_cross(v_sub(t[1], t[0]), v_sub(t[2], t[0]));
+  bool inside = true;
+  double best = INFINITY;
+  for (int k = 0; k < 3; ++k) {
+    sonde_vec3 side = v_sub(t[(k + 1) % 3], t[k]);
+    if (v_dot(v_cross(n, side), v_sub(p, t[k])) < 0) inside = false;
+    best = fmin(best, shape_segment_distance(p, t[k], t[(k + 1) % 3]));
+  }
+  return inside ? fabs(v_dot(n, v_sub(p, t[0]))) / v_norm(n) : best;
+}
+
 static inline void shape_move(sonde_mesh *mesh, sonde_pose pose) {
   for (uint32_t v = 0; v < mesh->vertex_count; ++v)
     mesh->vertices[v] = pose_apply(pose, mesh->vertices[v]);

@@ -47,9 +47,8 @@ static total clip_all(const sonde_mesh *patch, const sonde_convex *body, sonde_p
     for (int k = 0; k < 3; ++k)
       corner[k] = pose_apply_inverse(pose, patch->vertices[patch->faces[f][k]]);
     sonde_clip_result result;
-    bool hit =
-        sonde_clip_triangle(body->plane_normal, body->plane_offset_m, body->plane_count, corner,
-                            q_rotate(q_conj(pose.rotation), direction), 1e6, &result);
+    bool hit = sonde_clip_triangle(body->plane_normal, body->plane_offset_m, body->plane_count,
+                                   corner, q_rotate(q_conj(pose.rotation), direction), &result);
     if (!hit) {
       assert_true(result.volume_m3 == 0 && result.area_m2 == 0);
       continue;
@@ -274,7 +273,7 @@ static void test_submerged(void **state) {
   sonde_vec3 flipped[3] = {corner[0], corner[2], corner[1]};
   sonde_clip_result result;
   assert_true(sonde_clip_triangle(body.plane_normal, body.plane_offset_m, body.plane_count, flipped,
-                                  vec3(0, 0, 1), 1e6, &result));
+                                  vec3(0, 0, 1), &result));
   sonde_vec3 area =
       v_scale(v_cross(v_sub(flipped[1], flipped[0]), v_sub(flipped[2], flipped[0])), 0.5);
   for (int k = 0; k < 3; ++k)
@@ -286,84 +285,12 @@ static void test_submerged(void **state) {
   sonde_convex_clear(&body);
 }
 
-// Away from walls every point pushes, and `overlap` is the derivative of the pushes: raising a
-// corner against the columns lengthens them by its shape function.
-static void test_push_derivative(void **state) {
-  (void)state;
-  sonde_convex body = probe_body("square");
-  sonde_vec3 corner[3] = {{0, 0, -0.003}, {1e-3, 3e-3, -0.0025}, {2e-3, 0, -0.004}};
-  sonde_vec3 along = {0, 0, 1};
-  sonde_clip_result at, raised;
-  static const int pair[3][3] = {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}};
-  assert_true(sonde_clip_triangle(body.plane_normal, body.plane_offset_m, body.plane_count, corner,
-                                  along, 3, &at));
-  for (int j = 0; j < 3; ++j) {
-    sonde_vec3 keep = corner[j];
-    corner[j].z -= 1e-4;
-    sonde_clip_triangle(body.plane_normal, body.plane_offset_m, body.plane_count, corner, along, 3,
-                        &raised);
-    corner[j] = keep;
-    for (int i = 0; i < 3; ++i) {
-      assert_near(at.push_m3[i], at.share_m3[i], 1e-22);
-      double slope = (raised.push_m3[i] - at.push_m3[i]) / 1e-4;
-      assert_near(slope, at.overlap_m2[pair[i][j]], 1e-16);
-    }
-  }
-  sonde_convex_clear(&body);
-}
-
-// An upright box at depth h: what is nearer to a side than h / factor does not push.
-static void test_push_walls(void **state) {
-  (void)state;
-  sonde_mesh patch = make_patch(19, 0.03, flat);
-  sonde_convex body = probe_body("square");
-  sonde_pose pose = pressing(1e-3, 2e-3, -3e-3, 0);
-  double push = 0, seen = 0, h = 3e-3, factor = 3, side = 24e-3 - 2 * h / factor;
-  for (uint32_t f = 0; f < patch.face_count; ++f) {
-    sonde_vec3 corner[3];
-    for (int k = 0; k < 3; ++k)
-      corner[k] = pose_apply_inverse(pose, patch.vertices[patch.faces[f][k]]);
-    sonde_clip_result r;
-    sonde_clip_triangle(body.plane_normal, body.plane_offset_m, body.plane_count, corner,
-                        vec3(0, 0, 1), factor, &r);
-    push += r.push_m3[0] + r.push_m3[1] + r.push_m3[2];
-    for (int k = 0; k < 3; ++k) seen += r.overlap_m2[k] + 2 * r.overlap_m2[3 + k];
-  }
-  assert_near(push, side * side * h, 1e-14);
-  assert_near(seen, side * side, 1e-12);
-  sonde_mesh_clear(&patch);
-  sonde_convex_clear(&body);
-}
-
-// Work grows in proportion to the number of faces.
-static void test_linear_cost(void **state) {
-  (void)state;
-  sonde_convex body = probe_body("sphere");
-  sonde_mesh patches[2] = {make_patch(20, 0.012, bumpy), make_patch(80, 0.012, bumpy)};
-  double best[2] = {1, 1};
-  for (int repeat = 0; repeat < 30; ++repeat)
-    for (int k = 0; k < 2; ++k) {
-      double start = shape_seconds();
-      clip_all(&patches[k], &body, pressing(0, 0, -8e-3, 0), down, NULL);
-      best[k] = fmin(best[k], shape_seconds() - start);
-    }
-  double faces[2] = {patches[0].face_count, patches[1].face_count};
-  double slope = log(best[1] / best[0]) / log(faces[1] / faces[0]);
-  print_message("clip with %u planes: %.2f us per face coarse, %.2f us fine, slope %.2f\n",
-                body.plane_count, best[0] / faces[0] * 1e6, best[1] / faces[1] * 1e6, slope);
-  assert_true(slope < 1.2);
-  for (int k = 0; k < 2; ++k) sonde_mesh_clear(&patches[k]);
-  sonde_convex_clear(&body);
-}
-
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_box_upright),          cmocka_unit_test(test_box_tilted),
       cmocka_unit_test(test_sphere_cap),           cmocka_unit_test(test_mesh_independent),
       cmocka_unit_test(test_bumpy_against_voxels), cmocka_unit_test(test_gradient),
       cmocka_unit_test(test_body_motion),          cmocka_unit_test(test_submerged),
-      cmocka_unit_test(test_push_derivative),      cmocka_unit_test(test_push_walls),
-      cmocka_unit_test(test_linear_cost),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

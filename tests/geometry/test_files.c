@@ -223,6 +223,33 @@ static void test_stl_ascii(void **state) {
   expect_text_failure("a.stl", "solid a\n", ":2:", "endsolid");
 }
 
+// Symmetric bodies come with zeros of both signs; they are one coordinate.
+static void test_stl_zeros(void **state) {
+  (void)state;
+  sonde_mesh ball = shape_sphere(8, 1), back;
+  FILE *file = fopen(file_path("a.stl"), "w");
+  assert_non_null(file);
+  fprintf(file, "solid zeros\n");
+  for (uint32_t f = 0; f < ball.face_count; ++f) {
+    fprintf(file, "facet normal 0 0 0\nouter loop\n");
+    for (int k = 0; k < 3; ++k) {
+      sonde_vec3 p = ball.vertices[ball.faces[f][k]];
+      double x[3] = {p.x, p.y, p.z};
+      fprintf(file, "vertex");
+      for (int c = 0; c < 3; ++c) fprintf(file, " %.17g", x[c] == 0 && f % 2 ? -0.0 : x[c]);
+      fprintf(file, "\n");
+    }
+    fprintf(file, "endloop\nendfacet\n");
+  }
+  fprintf(file, "endsolid\n");
+  fclose(file);
+  assert_ok(sonde_mesh_load(file_path("a.stl"), 1, &back, &shape_error));
+  assert_int_equal(back.vertex_count, ball.vertex_count);
+  assert_true(shape_report(&back).outward);
+  sonde_mesh_clear(&back);
+  sonde_mesh_clear(&ball);
+}
+
 // ---- damage -------------------------------------------------------------------------------
 
 #define HEAD                                                                                       \
@@ -346,11 +373,11 @@ static void test_speed(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_round_trip),    cmocka_unit_test(test_foreign_locale),
-      cmocka_unit_test(test_dialects),      cmocka_unit_test(test_stl_ascii),
-      cmocka_unit_test(test_damaged_text),  cmocka_unit_test(test_truncated_binary),
-      cmocka_unit_test(test_flipped_bytes), cmocka_unit_test(test_bad_arguments),
-      cmocka_unit_test(test_speed),
+      cmocka_unit_test(test_round_trip),       cmocka_unit_test(test_foreign_locale),
+      cmocka_unit_test(test_dialects),         cmocka_unit_test(test_stl_ascii),
+      cmocka_unit_test(test_stl_zeros),        cmocka_unit_test(test_damaged_text),
+      cmocka_unit_test(test_truncated_binary), cmocka_unit_test(test_flipped_bytes),
+      cmocka_unit_test(test_bad_arguments),    cmocka_unit_test(test_speed),
   };
   return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -14,24 +14,6 @@ static double edge_edge(sonde_vec3 p, sonde_vec3 q, sonde_vec3 r, sonde_vec3 s) 
   return v_norm(v_sub(v_madd(d, t, u), v_scale(w, k)));
 }
 
-static double point_segment(sonde_vec3 p, sonde_vec3 a, sonde_vec3 b) {
-  sonde_vec3 u = v_sub(b, a);
-  double t = clamp(v_dot(v_sub(p, a), u) / v_norm2(u), 0, 1);
-  return v_distance(p, v_madd(a, t, u));
-}
-
-static double point_triangle(sonde_vec3 p, const sonde_vec3 t[3]) {
-  sonde_vec3 n = v_cross(v_sub(t[1], t[0]), v_sub(t[2], t[0]));
-  bool inside = true;
-  double best = INFINITY;
-  for (int k = 0; k < 3; ++k) {
-    sonde_vec3 side = v_sub(t[(k + 1) % 3], t[k]);
-    if (v_dot(v_cross(n, side), v_sub(p, t[k])) < 0) inside = false;
-    best = fmin(best, point_segment(p, t[k], t[(k + 1) % 3]));
-  }
-  return inside ? fabs(v_dot(n, v_sub(p, t[0]))) / v_norm(n) : best;
-}
-
 static void face_points(const sonde_mesh *mesh, uint32_t f, sonde_vec3 t[3]) {
   for (int k = 0; k < 3; ++k) t[k] = mesh->vertices[mesh->faces[f][k]];
 }
@@ -45,7 +27,7 @@ static double feature_distance(const sonde_mesh *a, const sonde_mesh *b) {
       face_points(a, f, s);
       face_points(b, g, t);
       for (int i = 0; i < 3; ++i) {
-        best = fmin(best, fmin(point_triangle(s[i], t), point_triangle(t[i], s)));
+        best = fmin(best, fmin(shape_triangle_distance(s[i], t), shape_triangle_distance(t[i], s)));
         for (int j = 0; j < 3; ++j)
           best = fmin(best, edge_edge(s[i], s[(i + 1) % 3], t[j], t[(j + 1) % 3]));
       }
@@ -192,6 +174,31 @@ static void test_parallel_and_touching(void **state) {
   sonde_mesh_clear(&box);
 }
 
+// Bodies round enough that the search does not end by itself: every answer carries its proof, a
+// direction along which the bodies are as far apart as the points.
+static void test_round_bodies(void **state) {
+  (void)state;
+  uint64_t seed = 77;
+  sonde_mesh ball = shape_sphere(48, 0.02);
+  sonde_convex body = shape_convex(&ball);
+  double worst = 0;
+  for (int k = 0; k < 200; ++k) {
+    sonde_pose pa = {shape_point(&seed, 0.01), shape_rotation(&seed)};
+    sonde_vec3 way = v_scale(shape_direction(&seed), shape_uniform(&seed, 0.041, 0.1));
+    sonde_pose pb = {v_add(pa.position, way), shape_rotation(&seed)};
+    sonde_gjk_result r = sonde_gjk_distance(&body, pa, &body, pb, NULL);
+    sonde_mesh ma = placed(&body, pa), mb = placed(&body, pb);
+    sonde_vec3 n = v_unit(v_sub(r.point_b_m, r.point_a_m), vec3(0, 0, 0));
+    worst = fmax(worst, r.distance_m - gap_along(&ma, &mb, n));
+    sonde_mesh_clear(&ma);
+    sonde_mesh_clear(&mb);
+  }
+  print_message("largest distance minus proven lower bound: %.2g m\n", worst);
+  assert_true(worst < 1e-9);
+  sonde_convex_clear(&body);
+  sonde_mesh_clear(&ball);
+}
+
 // Swapping the bodies mirrors the answer; moving both together does not change it.
 static void test_symmetry(void **state) {
   (void)state;
@@ -291,9 +298,9 @@ static void test_cost(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_random_pairs), cmocka_unit_test(test_parallel_and_touching),
-      cmocka_unit_test(test_symmetry),     cmocka_unit_test(test_foreign_cache),
-      cmocka_unit_test(test_cost),
+      cmocka_unit_test(test_random_pairs),  cmocka_unit_test(test_parallel_and_touching),
+      cmocka_unit_test(test_round_bodies),  cmocka_unit_test(test_symmetry),
+      cmocka_unit_test(test_foreign_cache), cmocka_unit_test(test_cost),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -208,6 +208,10 @@ static void test_footprint_oblique(void **state) {
   double same = footprint_sum(&box, vec3(0, 0, 0.05), v_scale(n, 3), v_scale(u, 2), vec3(0, 0.1, 0),
                               0.006, 0.008, NULL);
   assert_near(same, sum, 1e-15);
+  // So do axes that lean along the line of sight.
+  same = footprint_sum(&box, vec3(0, 0, 0.05), n, v_madd(u, 0.4, n), v_madd(vec3(0, 1, 0), -0.3, n),
+                       0.006, 0.008, NULL);
+  assert_near(same, sum, 1e-15);
   // The far side of the box looks away and does not count.
   assert_near(footprint_sum(&box, vec3(0, 0, -0.05), n, u, vec3(0, 1, 0), 0.006, 0.008, NULL), 0,
               0);
@@ -233,11 +237,12 @@ static void test_footprint_additive(void **state) {
 
 // ---- memory -------------------------------------------------------------------------------
 
-static long allowed, live;
+// The allocation with this number fails, all others succeed.
+static long failing, count, live;
 
 static void *count_down(size_t size, void *user) {
   (void)user;
-  if (allowed-- <= 0) return NULL;
+  if (count++ == failing) return NULL;
   ++live;
   return malloc(size);
 }
@@ -254,20 +259,43 @@ static double coarse(sonde_vec3 point, void *user) {
   return 0.5;
 }
 
-// Everything in the room that allocates, over one mesh.
-static sonde_status build_all(const sonde_mesh *box, sonde_error *error) {
-  sonde_mesh refined = {0};
-  sonde_convex convex = {0}, hull = {0};
+// Two pointed caps of slivers.
+static sonde_mesh make_spindle(void) {
+  enum { SIDES = 30 };
+  sonde_mesh mesh;
+  assert_ok(sonde_mesh_create(&mesh, SIDES + 2, 2 * SIDES, &shape_error));
+  for (uint32_t k = 0; k < SIDES; ++k) {
+    uint32_t next = (k + 1) % SIDES;
+    mesh.vertices[k] = vec3(cos(tau * k / SIDES), sin(tau * k / SIDES), 0);
+    memcpy(mesh.faces[2 * k], (uint32_t[3]){k, next, SIDES}, sizeof mesh.faces[0]);
+    memcpy(mesh.faces[2 * k + 1], (uint32_t[3]){next, k, SIDES + 1}, sizeof mesh.faces[0]);
+  }
+  mesh.vertices[SIDES] = vec3(0, 0, 1);
+  mesh.vertices[SIDES + 1] = vec3(0, 0, -1);
+  return mesh;
+}
+
+// Everything in the room that allocates.
+static sonde_status build_all(const sonde_mesh *spindle, const char *const files[2],
+                              sonde_error *error) {
+  sonde_mesh refined = {0}, loaded[2] = {{0}};
+  sonde_convex convex = {0};
   sonde_surface_index *index = NULL;
   sonde_probe probe = {0};
-  sonde_status status = sonde_mesh_refine(box, coarse, NULL, &refined, error);
-  if (!status) status = sonde_convex_create(box, &convex, error);
-  if (!status) status = sonde_convex_hull(box->vertices, box->vertex_count, &hull, error);
+  sonde_mass mass;
+  sonde_status status = sonde_mesh_refine(spindle, coarse, NULL, &refined, error);
+  if (!status) status = sonde_convex_create(spindle, &convex, error);
   if (!status) status = sonde_surface_index_create(&refined, &index, error);
+  if (!status) status = sonde_mesh_mass(&refined, 1, &mass, error);
   if (!status) status = sonde_probe_create("sphere", &probe, error);
+  for (int k = 0; k < 2; ++k)
+    if (!status) status = sonde_mesh_load(files[k], 1, &loaded[k], error);
+  sonde_probe_clear(&probe);
+  if (!status) status = sonde_probe_create(files[1], &probe, error);
   sonde_mesh_clear(&refined);
+  sonde_mesh_clear(&loaded[0]);
+  sonde_mesh_clear(&loaded[1]);
   sonde_convex_clear(&convex);
-  sonde_convex_clear(&hull);
   sonde_surface_index_destroy(index);
   sonde_probe_clear(&probe);
   return status;
@@ -276,22 +304,28 @@ static sonde_status build_all(const sonde_mesh *box, sonde_error *error) {
 // Whichever allocation fails, the answer is SONDE_MEMORY and nothing leaks.
 static void test_no_memory(void **state) {
   (void)state;
-  sonde_mesh box = shape_box(1, 1, 1);
+  sonde_mesh spindle = make_spindle();
+  char ply[] = "/tmp/sonde_mesh_XXXXXX.ply", stl[] = "/tmp/sonde_mesh_XXXXXX.stl";
+  close(mkstemps(ply, 4));
+  close(mkstemps(stl, 4));
+  assert_ok(sonde_mesh_save(ply, 1, &spindle, &shape_error));
+  assert_ok(sonde_mesh_save(stl, 1, &spindle, &shape_error));
   sonde_set_allocator(&(sonde_allocator){count_down, release, NULL});
-  sonde_status status = SONDE_MEMORY;
-  long tries = 0;
-  for (; status == SONDE_MEMORY; ++tries) {
+  bool failed = true;
+  for (failing = 0; failed; ++failing) {
     sonde_error error = {0};
-    live = 0;
-    allowed = tries;
-    status = build_all(&box, &error);
-    if (status != SONDE_OK && status != SONDE_MEMORY) fail_msg("%s", error.message);
+    live = count = 0;
+    sonde_status status = build_all(&spindle, (const char *const[2]){ply, stl}, &error);
+    failed = failing < count;
+    if (status != (failed ? SONDE_MEMORY : SONDE_OK))
+      fail_msg("allocation %ld: %s %s", failing, sonde_status_text(status), error.message);
     assert_int_equal(live, 0);
   }
   sonde_set_allocator(NULL);
-  assert_int_equal(status, SONDE_OK);
-  assert_true(tries > 60);
-  sonde_mesh_clear(&box);
+  assert_true(failing > 60);
+  unlink(ply);
+  unlink(stl);
+  sonde_mesh_clear(&spindle);
 }
 
 int main(void) {

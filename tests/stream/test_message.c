@@ -278,7 +278,7 @@ static void check_accepted(const page_command *c) {
   assert_true(c->type <= PAGE_COMMAND_PING);
   if (c->type == PAGE_COMMAND_GOAL) {
     const sonde_quat q = c->goal.rotation;
-    assert_float_equal(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z, 1, 1e-9);
+    assert_true(fabs(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z - 1) < 1e-9);
     assert_true(fabs(c->goal.position.x) <= 2 && fabs(c->goal.position.y) <= 2);
   } else if (c->type == PAGE_COMMAND_CONTROLS) {
     assert_true(isnan(c->gain_db) || fabs(c->gain_db) <= 30);

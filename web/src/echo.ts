@@ -13,13 +13,17 @@ function context(canvas: HTMLCanvasElement): CanvasRenderingContext2D {
 }
 
 export class EchoView {
-  frozen = false;
+  private frozen = false;
   private readonly image: CanvasRenderingContext2D;
   private readonly marks: CanvasRenderingContext2D;
   private data: ImageData | null = null;
   private controls: Controls | null = null;
   private width_mm = 60;
   private height_mm = 70;
+
+  get isFrozen(): boolean {
+    return this.frozen;
+  }
 
   constructor(
     private readonly box: HTMLElement,
@@ -52,10 +56,20 @@ export class EchoView {
 
   set(controls: Controls): void {
     this.controls = controls;
+    if (!this.frozen) this.caption(controls);
+    this.layout();
+  }
+
+  /** A frozen picture keeps its caption. */
+  freeze(frozen: boolean): void {
+    this.frozen = frozen;
+    if (!frozen && this.controls) this.set(this.controls);
+  }
+
+  private caption(controls: Controls): void {
     this.text.textContent =
       `${label(controls.probe)} probe, ${label(controls.case).toLowerCase()}\n` +
       `${controls.frequency_mhz.toFixed(1)} MHz, gain ${controls.gain_db.toFixed(0)} dB, range ${controls.dynamic_range_db.toFixed(0)} dB`;
-    this.layout();
   }
 
   /** Largest picture with its true proportions beside the ruler. */

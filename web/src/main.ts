@@ -6,7 +6,7 @@ import { EchoView, label } from "./echo";
 import { Input } from "./input";
 import { Chips, fillHelp, find, Readouts, Sliders } from "./panel";
 import { ForcePlot } from "./plot";
-import { Hold, nearestSite, type Pose } from "./pose";
+import { add, Hold, nearestSite, rotate, type Pose } from "./pose";
 import { VERSION, type Controls, type Frame, type Hello, type Snapshot, type TextMessage } from "./protocol";
 import { ThighScene } from "./scene";
 
@@ -41,7 +41,9 @@ class App {
   private goalDue = false;
   private curveKey = "";
   private started = false;
-  private rates = { at_s: 0, tick: 0, frames: 0, ticks_s: 0, images_s: 0 };
+  private rates = { at_s: 0, tick: 0, frames: 0 };
+  private rates_s = 0; // when they were last computed
+  private shown_s = 0; // when the last frame was drawn
 
   constructor() {
     this.connection = new Connection({
@@ -103,7 +105,7 @@ class App {
     if (hello.version !== VERSION) return this.say("this page belongs to another version: reload it");
     this.hello = hello;
     this.started = false;
-    find("model").textContent = `${hello.model}. ${hello.provenance}`;
+    find("model").textContent = `${label(hello.model)}: ${hello.provenance}`;
     find("model").title = hello.provenance;
     find("about").textContent =
       `Sonde ${hello.program}. Trains and simulates; not a medical device. ` + `${hello.nodes} skin nodes. ${hello.provenance}`;
@@ -214,8 +216,8 @@ class App {
   }
 
   private freeze(): void {
-    this.echo.frozen = !this.echo.frozen;
-    find("frozen").hidden = !this.echo.frozen;
+    this.echo.freeze(!this.echo.isFrozen);
+    find("frozen").hidden = !this.echo.isFrozen;
   }
 
   private toggleThrough(): void {
@@ -230,7 +232,7 @@ class App {
     const useful = near !== null && near.distance_mm < NEAR_MM;
     const points = useful ? (near.site.curves[probe] ?? []) : [];
     const where = near ? `site ${near.site.id}${near.distance_mm >= 0.5 ? `, ${near.distance_mm.toFixed(0)} mm away` : ""}` : "";
-    const none = useful ? `no curve was measured with the ${label(probe).toLowerCase()} probe` : "no measured site nearby";
+    const none = useful ? `not measured with the ${label(probe).toLowerCase()} probe` : "no measured site nearby";
     find("plot-site").textContent = points.length ? `${label(probe)} probe, ${where}` : none;
     find("key-measured").hidden = points.length === 0;
     const key = points.length ? `${near!.site.id} ${probe}` : "";
@@ -257,9 +259,10 @@ class App {
     const frame = this.pending;
     this.pending = null;
     if (frame) this.show(frame);
+    if (frame) this.shown_s = now_s;
     this.scene.render();
     if (frame) this.connection.ack(frame.sequence);
-    if (now_s - this.rates.at_s > 1) this.showRates(now_s);
+    if (now_s - this.rates_s > 1) this.showRates(now_s);
   }
 
   private show(frame: Frame): void {
@@ -270,8 +273,18 @@ class App {
     this.scene.show(frame);
     this.echo.show(frame);
     this.readouts.show(s);
+    if (!this.controls?.controls) this.follow(s);
     if (s.penetration_mm > -1) this.plot.add(s.penetration_mm, Math.max(0, s.force_normal_n));
     this.showFault(s.fault);
+  }
+
+  /** A watching page takes over the hold that it sees, so that nothing jumps when it may control. */
+  private follow(s: Snapshot): void {
+    const z = rotate(s.rotation, [0, 0, 1]);
+    this.hold.at(add(s.position_mm, z, -s.penetration_mm), [-z[0], -z[1], -z[2]]);
+    this.hold.setDepth(s.penetration_mm);
+    this.moved();
+    this.goalDue = false;
   }
 
   private shownFault = -1;
@@ -290,14 +303,17 @@ class App {
 
   private showRates(now_s: number): void {
     const r = this.rates;
-    const dt_s = now_s - r.at_s;
     const tick = this.snapshot?.tick ?? 0;
-    r.ticks_s = Math.max(0, tick - r.tick) / dt_s;
-    r.images_s = (this.frames - r.frames) / dt_s;
-    Object.assign(r, { at_s: now_s, tick, frames: this.frames });
+    const first = r.tick === 0;
+    const dt_s = Math.max(0.001, this.shown_s - r.at_s);
+    const ticks_s = Math.max(0, tick - r.tick) / dt_s;
+    const images_s = (this.frames - r.frames) / dt_s;
+    this.rates = { at_s: this.shown_s, tick, frames: this.frames };
+    this.rates_s = now_s;
+    if (first && this.connected) return;
     const latency = Number.isNaN(this.connection.latency_ms) ? "" : `, ${this.connection.latency_ms.toFixed(0)} ms`;
     find("status").textContent = this.connected
-      ? `${r.ticks_s.toFixed(0)} steps/s, ${r.images_s.toFixed(0)} images/s${latency}`
+      ? `${ticks_s.toFixed(0)} steps/s, ${images_s.toFixed(0)} images/s${latency}`
       : "not connected";
   }
 }

@@ -175,7 +175,7 @@ export class Readouts {
     this.forceFill.style.width = `${Math.min(100, 100 * share)}%`;
     this.forceFill.style.background = share > 0.95 ? "var(--danger)" : share > 0.75 ? "var(--warn)" : "var(--accent)";
     const deep = s.penetration_mm;
-    if (deep >= 0) Readouts.number(this.penetration, deep.toFixed(1), "mm");
+    if (deep > -0.05) Readouts.number(this.penetration, Math.abs(deep).toFixed(1), "mm");
     else Readouts.number(this.penetration, (-deep).toFixed(1), "mm above");
     this.setGauge(this.vein, s.vein_area_ratio);
     this.setGauge(this.artery, s.artery_area_ratio);
@@ -194,7 +194,7 @@ const KEYS: [string, string][] = [
   ["F, X", "freeze the image, see through the skin"],
   ["R", "lift and return above site 27"],
   ["Esc", "emergency stop; Resume continues"],
-  ["Drag beside the thigh, middle drag, Alt + drag", "turn the view; Ctrl + wheel zooms"],
+  ["Drag beside the thigh", "turn the view; also middle drag or Alt + drag. Ctrl + wheel zooms"],
 ];
 
 export function fillHelp(box: HTMLElement): void {

@@ -3,6 +3,7 @@
 import uPlot from "uplot";
 
 const TRACE_POINTS = 900;
+const MOST = { mm: 50, n: 60 }; // a point beyond stays at the edge
 const INK = { grid: "#1c232d", axis: "#8491a1", measured: "#8fa0b5", live: "#5cc8c2" };
 
 export interface Curve {
@@ -80,7 +81,7 @@ export class ForcePlot {
     c.restore();
     c.fillStyle = "#ffffff";
     c.beginPath();
-    c.arc(Math.max(u.bbox.left, x(last)), y(last), 4.5 * devicePixelRatio, 0, 2 * Math.PI);
+    c.arc(Math.max(u.bbox.left, x(last)), Math.max(u.bbox.top, y(last)), 4.5 * devicePixelRatio, 0, 2 * Math.PI);
     c.fill();
   }
 
@@ -96,13 +97,16 @@ export class ForcePlot {
     else this.trace[this.trace.length - 1] = [penetration_mm, force_n];
     if (this.trace.length > TRACE_POINTS) this.trace.shift();
     if (!moved) return;
-    this.fit(penetration_mm, force_n);
-    this.plot.redraw(false, true);
+    if (this.fit(penetration_mm, force_n)) this.plot.setData(this.plot.data, true);
+    else this.plot.redraw(false, false);
   }
 
-  private fit(x: number, y: number): void {
-    this.topX = Math.max(this.topX, 5 * Math.ceil((x + 1) / 5));
-    this.topY = Math.max(this.topY, 10 * Math.ceil((y + 1) / 10));
+  /** Makes room for a point; true when the axes changed. */
+  private fit(x: number, y: number): boolean {
+    const [oldX, oldY] = [this.topX, this.topY];
+    this.topX = Math.min(MOST.mm, Math.max(oldX, 5 * Math.ceil((x + 1) / 5)));
+    this.topY = Math.min(MOST.n, Math.max(oldY, 10 * Math.ceil((y + 1) / 10)));
+    return this.topX !== oldX || this.topY !== oldY;
   }
 
   measured(curve: Curve): void {
@@ -110,6 +114,7 @@ export class ForcePlot {
     this.topY = 10;
     this.fit(Math.max(0, ...curve.penetration_mm), Math.max(0, ...curve.force_n));
     for (const p of this.trace) this.fit(p[0], p[1]);
-    this.plot.setData([[0, ...curve.penetration_mm], [0, ...curve.force_n]], true);
+    const none = curve.force_n.length === 0;
+    this.plot.setData([[0, ...curve.penetration_mm], [none ? null : 0, ...curve.force_n]], true);
   }
 }

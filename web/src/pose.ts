@@ -32,6 +32,13 @@ function quaternion(x: Vec3, y: Vec3, z: Vec3): Quat {
   return [q[0] / n, q[1] / n, q[2] / n, q[3] / n];
 }
 
+/** v turned by the quaternion q. */
+export function rotate(q: Quat, v: Vec3): Vec3 {
+  const u: Vec3 = [q[1], q[2], q[3]];
+  const t = cross(u, v);
+  return add(add(v, t, 2 * q[0]), cross(u, t), 2);
+}
+
 /** v turned about the unit axis k. */
 function turn(v: Vec3, k: Vec3, angle: number): Vec3 {
   const c = Math.cos(angle);

@@ -3,6 +3,7 @@
 
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import { toCreasedNormals } from "three/examples/jsm/utils/BufferGeometryUtils.js";
 import { nextRange, SHADES, SHADE_TABLE } from "./colour";
 import { Skin } from "./pose";
 import { PART, type Frame, type Line, type Mesh, type ProbeInfo, type Quat, type Site, type Vec3 } from "./protocol";
@@ -10,6 +11,7 @@ import { PART, type Frame, type Line, type Mesh, type ProbeInfo, type Quat, type
 const COLOUR = { vein: 0x5b8def, artery: 0xe0604d, bone: 0xe7dfcb, probe: 0xd3dae2, mark: 0x5cc8c2 };
 const CALM_ALPHA = 0.4; // of see-through skin at rest; displaced skin is up to MOVED_ALPHA
 const MOVED_ALPHA = 0.86;
+const CREASE_RAD = 0.6; // sharper edges are drawn sharp
 const BEHIND_MM = 46; // how much of a probe's body is drawn: a hand's breadth, not the whole handle
 
 /** Skin: vertex colours with alpha; more opaque where it is seen at a grazing angle, like glass. */
@@ -97,6 +99,7 @@ export class ThighScene {
       new THREE.MeshBasicMaterial({ transparent: true, opacity: 0.92, side: THREE.DoubleSide, depthWrite: false }),
     );
     this.plane.visible = false;
+    this.plane.renderOrder = 2.5; // after the skin, so that it shows through at full brightness
     this.plane.rotation.set(Math.PI / 2, 0, 0);
     this.probe.add(this.plane);
     this.scene.add(this.inside, this.probe, this.ring);
@@ -217,7 +220,7 @@ export class ThighScene {
 
   private setFemur(mesh: Mesh): void {
     const material = new THREE.MeshStandardMaterial({ color: COLOUR.bone, roughness: 0.9 });
-    this.replaceInside("femur", new THREE.Mesh(ThighScene.geometry(mesh), material));
+    this.replaceInside("femur", new THREE.Mesh(toCreasedNormals(ThighScene.geometry(mesh), CREASE_RAD), material));
   }
 
   private setVessel(line: Line): void {
@@ -237,12 +240,9 @@ export class ThighScene {
   private setProbeBody(mesh: Mesh): void {
     const points = mesh.points.slice();
     for (let i = 2; i < points.length; i += 3) points[i] = Math.max(points[i]!, -BEHIND_MM);
-    const g = ThighScene.geometry({ ...mesh, points }).toNonIndexed();
-    g.computeVertexNormals();
+    const g = toCreasedNormals(ThighScene.geometry({ ...mesh, points }), CREASE_RAD);
     const round = mesh.faces.length > 3 * 60;
-    const material = new THREE.MeshStandardMaterial({
-      color: COLOUR.probe, roughness: 0.5, transparent: true, opacity: 0.62, flatShading: !round,
-    });
+    const material = new THREE.MeshStandardMaterial({ color: COLOUR.probe, roughness: 0.5, transparent: true, opacity: 0.5 });
     const body = new THREE.Mesh(g, material);
     body.renderOrder = 3;
     if (!round) {
@@ -369,7 +369,7 @@ export class ThighScene {
     for (let i = 0; i < grey.length; ++i) {
       const g = grey[i]!;
       rgba[4 * i] = rgba[4 * i + 1] = rgba[4 * i + 2] = g;
-      rgba[4 * i + 3] = 210;
+      rgba[4 * i + 3] = Math.min(230, 40 + 3 * g); // what is black in the image lets the vessels through
     }
     this.texture.needsUpdate = true;
     this.plane.visible = true;

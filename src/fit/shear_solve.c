@@ -1,0 +1,199 @@
+// assemble:  residual of every place and the matrix of the free ones at indentations s.
+// factor:    orders and analyses at the first use on a patch, else numbers only.
+// search:    shortens a Newton step until the energy falls at its end.
+// sonde_patch_settle: Newton. sonde_patch_force: force and its adjoint derivatives.
+#include "fit/shear.h"
+
+#include "base/maths.h"
+
+#include <string.h>
+
+enum { SHORTENINGS = 40 };
+static const double NEGLIGIBLE_N = 1e-13;
+
+static void add_edge(const sonde_patch *p, const sonde_patch_law *law, uint32_t e, const double *s,
+                     double *residual, double *value) {
+  uint32_t a = p->edge[e][0], b = p->edge[e][1];
+  double slope, rest = p->rest_m[e], dual = p->dual_m[e];
+  double q = dual * sonde_shear_force(law->shear_n_m, law->limit, (s[a] - s[b]) / rest, &slope);
+  double stiffness = dual * slope / rest;
+  residual[a] += q;
+  residual[b] -= q;
+  if (a < p->free_count) value[p->diagonal[a]] += stiffness;
+  if (b < p->free_count) value[p->diagonal[b]] += stiffness;
+  if (p->entry[e][0] == UINT32_MAX) return;
+  value[p->entry[e][0]] = -stiffness;
+  value[p->entry[e][1]] = -stiffness;
+}
+
+// R_i = A p(s_i) + sum w q. Returns |R| over the free places; *load_n is the force of the held ones.
+static double assemble(const sonde_patch_solver *solver, const sonde_patch_law *law,
+                       const double *s, double *load_n) {
+  const sonde_patch *p = solver->patch;
+  double *residual = solver->residual, *value = solver->value;
+  memset(value, 0, p->row_start[p->free_count] * sizeof *value);
+  for (uint32_t i = 0; i < p->place_count; ++i) {
+    uint32_t node = p->node[i];
+    double slope;
+    residual[i] = p->area_m2[i] * sonde_normal_pressure(law->k0_n_m3[node], law->xm_m[node],
+                                                        law->guard, s[i], &slope);
+    if (i < p->free_count) value[p->diagonal[i]] = p->area_m2[i] * slope;
+  }
+  for (uint32_t e = 0; e < p->edge_count; ++e) add_edge(p, law, e, s, residual, value);
+  double sum = 0, load = 0;
+  for (uint32_t i = 0; i < p->free_count; ++i) sum += residual[i] * residual[i];
+  for (uint32_t i = p->free_count; i < p->place_count; ++i) load += residual[i] * p->cosine[i];
+  *load_n = load;
+  return sqrt(sum);
+}
+
+static sonde_status factor(sonde_patch_solver *solver, sonde_error *error) {
+  const sonde_patch *p = solver->patch;
+  if (solver->ldl) return sonde_ldl_refactor(solver->ldl, solver->value, error);
+  sonde_status status = sonde_ldl_create(p->free_count, p->row_start, p->column, solver->value,
+                                         p->point_m, &solver->ldl, error);
+  SONDE_ASSERT(status || sonde_ldl_scratch(solver->ldl, 1) <= p->place_count);
+  return status;
+}
+
+static double along_step(const sonde_patch_solver *solver) {
+  double sum = 0;
+  for (uint32_t i = 0; i < solver->patch->free_count; ++i)
+    sum += solver->residual[i] * solver->step[i];
+  return sum;
+}
+
+// The energy is convex: it is lower at the end of a step when it still falls there. Near the
+// solution, where that is a matter of rounding, a smaller residual counts too.
+static bool search(sonde_patch_solver *solver, const sonde_patch_law *law, double *s,
+                   double *residual, double *load_n) {
+  const sonde_patch *p = solver->patch;
+  double start = -along_step(solver), share = 1.0;
+  SONDE_ASSERT(p && start >= 0);
+  for (int k = 0; k < SHORTENINGS; ++k) {
+    memcpy(solver->trial, s, p->place_count * sizeof *s);
+    for (uint32_t i = 0; i < p->free_count; ++i) solver->trial[i] += share * solver->step[i];
+    double next = assemble(solver, law, solver->trial, load_n), end = along_step(solver);
+    if (isfinite(next) && (end <= 0 || next < *residual)) {
+      memcpy(s, solver->trial, p->free_count * sizeof *s);
+      *residual = next;
+      return true;
+    }
+    share *= isfinite(end) ? clamp(start / (start + end), 0.1, 0.7) : 0.1;
+  }
+  return false;
+}
+
+sonde_status sonde_patch_settle(sonde_patch_solver *solver, const sonde_patch_law *law,
+                                double depth_m, double relative, uint32_t max_iterations,
+                                double *s_m, sonde_error *error) {
+  const sonde_patch *p = solver->patch;
+  SONDE_ASSERT(p && depth_m >= 0 && relative > 0);
+  for (uint32_t i = p->free_count; i < p->place_count; ++i) s_m[i] = depth_m * p->cosine[i];
+  double load_n, residual = assemble(solver, law, s_m, &load_n);
+  for (uint32_t k = 0; k < max_iterations; ++k) {
+    if (residual <= relative * fabs(load_n) || residual <= NEGLIGIBLE_N) return SONDE_OK;
+    sonde_status status = factor(solver, error);
+    if (status) return status;
+    for (uint32_t i = 0; i < p->free_count; ++i) solver->step[i] = -solver->residual[i];
+    sonde_ldl_solve(solver->ldl, 1, solver->step, solver->scratch);
+    if (!search(solver, law, s_m, &residual, &load_n)) break;
+  }
+  if (residual <= relative * fabs(load_n) || residual <= NEGLIGIBLE_N) return SONDE_OK;
+  return sonde_fail(error, SONDE_CONVERGENCE,
+                    "no equilibrium at a depth of %.1f mm: residual %.3g N of %.3g N",
+                    depth_m * 1e3, residual, load_n);
+}
+
+// mu: cosines on the held places; on the free ones minus the solution of K lambda = K_fh c, so that
+// dF/dtheta = sum mu_i dR_i/dtheta.
+static sonde_status adjoint(sonde_patch_solver *solver, const sonde_patch_law *law,
+                            const double *s, double *mu, sonde_error *error) {
+  const sonde_patch *p = solver->patch;
+  sonde_status status = factor(solver, error);
+  if (status) return status;
+  memcpy(mu, p->cosine, p->place_count * sizeof *mu);
+  for (uint32_t e = 0; e < p->edge_count; ++e) {
+    uint32_t a = p->edge[e][0], b = p->edge[e][1];
+    if ((a < p->free_count) == (b < p->free_count)) continue;
+    double slope, rest = p->rest_m[e];
+    (void)sonde_shear_force(law->shear_n_m, law->limit, (s[a] - s[b]) / rest, &slope);
+    uint32_t in = a < p->free_count ? a : b, out = a < p->free_count ? b : a;
+    mu[in] += p->dual_m[e] * slope / rest * p->cosine[out];
+  }
+  sonde_ldl_solve(solver->ldl, 1, mu, solver->scratch);
+  return SONDE_OK;
+}
+
+// p(s; k0, xm) = k0 xm f(s/xm), so k0 dp/dk0 = p and xm dp/dxm = p - s p', straight part included;
+// the same holds for q(g; G, gm).
+static void differentiate(const sonde_patch *p, const sonde_patch_law *law, const double *s,
+                          const double *mu, sonde_patch_gradient *gradient) {
+  gradient->by_ln_shear = gradient->by_ln_limit = 0;
+  for (uint32_t i = 0; i < p->place_count; ++i) {
+    uint32_t node = p->node[i];
+    double slope, scale = mu[i] * p->area_m2[i];
+    double pressure =
+        sonde_normal_pressure(law->k0_n_m3[node], law->xm_m[node], law->guard, s[i], &slope);
+    gradient->by_ln_k0[i] = scale * pressure;
+    gradient->by_ln_xm[i] = scale * (pressure - s[i] * slope);
+  }
+  for (uint32_t e = 0; e < p->edge_count; ++e) {
+    uint32_t a = p->edge[e][0], b = p->edge[e][1];
+    double slope, g = (s[a] - s[b]) / p->rest_m[e], scale = p->dual_m[e] * (mu[a] - mu[b]);
+    double q = sonde_shear_force(law->shear_n_m, law->limit, g, &slope);
+    gradient->by_ln_shear += scale * q;
+    gradient->by_ln_limit += scale * (q - g * slope);
+  }
+}
+
+sonde_status sonde_patch_force(sonde_patch_solver *solver, const sonde_patch_law *law,
+                               double depth_m, const double *s_m, double *force_n,
+                               sonde_patch_gradient *gradient, sonde_error *error) {
+  const sonde_patch *p = solver->patch;
+  (void)assemble(solver, law, s_m, force_n);
+  *force_n += law->tangential_n_m3 * p->sliding_m2 * depth_m;
+  if (!gradient) return SONDE_OK;
+  sonde_status status = adjoint(solver, law, s_m, solver->multiplier, error);
+  if (!status) differentiate(p, law, s_m, solver->multiplier, gradient);
+  return status;
+}
+
+sonde_status sonde_patch_solver_create(const sonde_patch *patches, uint32_t count,
+                                       sonde_patch_solver *solver, sonde_error *error) {
+  size_t places = 0, entries = 0;
+  for (uint32_t k = 0; k < count; ++k) {
+    const sonde_patch *p = &patches[k];
+    if (p->place_count > places) places = p->place_count;
+    if (p->row_start[p->free_count] > entries) entries = p->row_start[p->free_count];
+  }
+  SONDE_ASSERT(places > 0 && entries > 0);
+  *solver = (sonde_patch_solver){.residual = SONDE_NEW(double, places),
+                                 .step = SONDE_NEW(double, places),
+                                 .trial = SONDE_NEW(double, places),
+                                 .multiplier = SONDE_NEW(double, places),
+                                 .value = SONDE_NEW(double, entries),
+                                 .scratch = SONDE_NEW(double, places)};
+  if (solver->residual && solver->step && solver->trial && solver->multiplier && solver->value &&
+      solver->scratch)
+    return SONDE_OK;
+  sonde_patch_solver_clear(solver);
+  return sonde_fail_memory(error);
+}
+
+void sonde_patch_solver_use(sonde_patch_solver *solver, const sonde_patch *patch) {
+  if (solver->ldl) sonde_ldl_destroy(solver->ldl);
+  solver->ldl = NULL;
+  solver->patch = patch;
+}
+
+void sonde_patch_solver_clear(sonde_patch_solver *solver) {
+  if (solver->ldl) sonde_ldl_destroy(solver->ldl);
+  sonde_free(solver->residual);
+  sonde_free(solver->step);
+  sonde_free(solver->trial);
+  sonde_free(solver->multiplier);
+  sonde_free(solver->value);
+  sonde_free(solver->scratch);
+  *solver = (sonde_patch_solver){0};
+}

@@ -1,0 +1,300 @@
+// The picture: speckle statistics, attenuation, contrast, shadow, motion with the tissue, air,
+// determinism, PNG.
+#include "interior/tube.h"
+#include "sonde/echo.h"
+
+#include <png.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+static const double leg_radius = 0.08;
+
+typedef struct bench {
+  tube leg;
+  sonde_interior *interior;
+  sonde_echo *echo;
+  sonde_image image;
+  sonde_pathology pathology;
+  sonde_echo_settings settings;
+  sonde_pose pose;
+  sonde_vec3 *forces;
+} bench;
+
+static void look(bench *b, const sonde_vec3 *positions) {
+  const sonde_vec3 *p = positions ? positions : b->leg.model.surface.vertices;
+  sonde_interior_update(b->interior,
+                        &(sonde_interior_input){p, b->forces, b->pose, &b->pathology, -1, 1});
+  sonde_echo_render(b->echo, b->pose, 0.04, &b->pathology, &b->settings, &b->image);
+}
+
+static bench bench_create(double radius, double bone, double fat_m, bool plain, bool vessels) {
+  bench b = {.leg = tube_create(radius, bone, 0.3, fat_m, 160, 60)};
+  if (!vessels) b.leg.model.vein.count = b.leg.model.artery.count = 0;
+  sonde_echo_def def = {.plain = plain, .seed = 5};
+  assert_int_equal(sonde_interior_create(&b.leg.model, &b.interior, NULL), SONDE_OK);
+  assert_int_equal(sonde_echo_create(b.interior, &def, &b.echo, NULL), SONDE_OK);
+  assert_int_equal(sonde_image_create(512, 512, &b.image, NULL), SONDE_OK);
+  assert_int_equal(sonde_pathology_preset("healthy", &b.pathology, NULL), SONDE_OK);
+  b.settings = sonde_echo_settings_default();
+  b.pose = tube_pose(radius - 3e-3, 0.15);
+  b.forces = SONDE_NEW(sonde_vec3, b.leg.model.surface.vertex_count);
+  return b;
+}
+
+static void bench_clear(bench *b) {
+  sonde_echo_destroy(b->echo);
+  sonde_interior_destroy(b->interior);
+  sonde_image_clear(&b->image);
+  tube_clear(&b->leg);
+  sonde_free(b->forces);
+}
+
+// Mean and deviation of the envelope over a block of lines and samples.
+static double block(const bench *b, double depth0, double depth1, double *deviation) {
+  uint32_t lines, samples, count = 0;
+  const float *e = sonde_echo_envelope(b->echo, &lines, &samples);
+  uint32_t n0 = (uint32_t)(depth0 / b->settings.depth_m * samples);
+  uint32_t n1 = (uint32_t)(depth1 / b->settings.depth_m * samples);
+  double sum = 0, square = 0;
+  for (uint32_t n = n0; n < n1; ++n)
+    for (uint32_t l = 8; l + 8 < lines; ++l) {
+      double v = e[n * lines + l];
+      sum += v, square += v * v, ++count;
+    }
+  sum /= count;
+  if (deviation) *deviation = sqrt(fmax(0, square / count - sum * sum));
+  return sum;
+}
+
+// Fully developed speckle has a Rayleigh envelope: mean over deviation sqrt(pi/(4 - pi)) = 1.913.
+static void speckle_is_fully_developed(void **state) {
+  (void)state;
+  bench b = bench_create(0.2, 0.014, 2.5e-3, true, false);
+  b.settings.tgc_db_per_m =
+      2 * 100 * 7.5 - sonde_echo_default_tgc_db_per_m(7.5e6); // exactly the muscle's loss
+  double snr = 0;
+  int rois = 0;
+  for (int k = 0; k < 3; ++k) {
+    b.pose.position.z = 0.12 + 0.02 * k;
+    look(&b, NULL);
+    for (double d = 0.012; d < 0.045; d += 0.004, ++rois) {
+      double deviation, mean = block(&b, d, d + 0.004, &deviation);
+      snr += mean / deviation;
+    }
+  }
+  print_message("speckle SNR %.3f over %d regions\n", snr / rois, rois);
+  assert_true(fabs(snr / rois - 1.913) < 0.1);
+  bench_clear(&b);
+}
+
+// Without compensation the echo falls by 2 alpha f z: the depth of -40 dB follows the frequency.
+static void attenuation_follows_the_frequency(void **state) {
+  (void)state;
+  bench b = bench_create(0.4, 0.014, 2.5e-3, true, false);
+  b.settings.depth_m = 0.15;
+  for (double mhz = 2; mhz <= 10; mhz += 2) {
+    b.settings.frequency_hz = mhz * 1e6;
+    b.settings.depth_m = fmin(0.15, 0.30 / mhz);
+    b.settings.tgc_db_per_m = -sonde_echo_default_tgc_db_per_m(mhz * 1e6);
+    look(&b, NULL);
+    double alpha = 100, expected = 40 / (2 * alpha * mhz); // m, beyond the start
+    // Straight line through the logarithm of the mean envelope between 8 mm and the noise.
+    double start = 0.008, step = 0.15 * expected, sx = 0, sy = 0, sxx = 0, sxy = 0;
+    int count = 0;
+    for (double d = start; d + step < b.settings.depth_m && count < 6; d += step, ++count) {
+      double x = d + step / 2, y = 20 * log10(block(&b, d, d + step, NULL));
+      sx += x, sy += y, sxx += x * x, sxy += x * y;
+    }
+    double slope = (count * sxy - sx * sy) / (count * sxx - sx * sx);
+    print_message("%g MHz: -40 dB after %.1f mm, expected %.1f mm\n", mhz, -40e3 / slope,
+                  1e3 * expected);
+    assert_true(count >= 3);
+    assert_true(fabs(-40 / slope / expected - 1) < 0.1);
+  }
+  bench_clear(&b);
+}
+
+static double grey(const bench *b, double x_m, double z_m, double half_m) {
+  double pixel = b->image.height_m / b->image.height, sum = 0;
+  int count = 0;
+  for (double z = z_m - half_m; z <= z_m + half_m; z += pixel)
+    for (double x = x_m - half_m; x <= x_m + half_m; x += pixel, ++count) {
+      int column = (int)(x / pixel + 0.5 * b->image.width), row = (int)(z / pixel);
+      sum += b->image.pixels[row * (int)b->image.width + column];
+    }
+  return sum / count;
+}
+
+static void lumen_is_dark_bone_shadows(void **state) {
+  (void)state;
+  bench b = bench_create(leg_radius, 0.014, 0.012, false, true);
+  b.settings.depth_m = 0.08;
+  look(&b, NULL);
+  double muscle = grey(&b, -0.014, 0.025, 0.003), vein = grey(&b, 0, 0.015, 0.0025);
+  double artery = grey(&b, 0.011, 0.015, 0.002), shadow = grey(&b, 0, 0.073, 0.003);
+  print_message("muscle %.0f vein %.1f artery %.1f shadow %.1f\n", muscle, vein, artery, shadow);
+  assert_true(muscle > 55 && muscle < 95);
+  assert_true(vein < 15 && artery < 15);
+  assert_true(shadow < 0.35 * muscle);
+  // The cortex is the brightest thing below the fascia: at 80 - 14 - 3 = 63 mm.
+  double cortex = 0;
+  for (double z = 0.0615; z < 0.0645; z += 1e-4) cortex = fmax(cortex, grey(&b, 0, z, 2e-4));
+  assert_true(cortex > 150);
+  sonde_pathology_preset("chronic_occlusive", &b.pathology, NULL);
+  look(&b, NULL);
+  double clot = grey(&b, 0, 0.015, 0.002);
+  print_message("chronic clot %.0f\n", clot);
+  assert_true(clot > 0.5 * muscle);
+  bench_clear(&b);
+}
+
+// Probe and leg moved together by any rigid step show the same picture up to the table's grid;
+// tissue moved under a resting probe by whole samples shifts the picture by as many.
+static void speckle_belongs_to_the_tissue(void **state) {
+  (void)state;
+  bench b = bench_create(0.2, 0.014, 2.5e-3, true, false);
+  look(&b, NULL);
+  uint32_t lines, samples;
+  const float *e = sonde_echo_envelope(b.echo, &lines, &samples);
+  float *before = SONDE_NEW(float, (size_t)lines *samples);
+  memcpy(before, e, sizeof(float) * lines * samples);
+  double step = b.settings.depth_m / (samples - 1);
+  b.pose.position.y -= 8 * step; // towards the tissue: everything comes 8 samples nearer
+  look(&b, NULL);
+  double ab = 0, aa = 0, bb = 0, sa = 0, sb = 0;
+  uint32_t count = 0;
+  for (uint32_t n = 200; n < 500; ++n)
+    for (uint32_t l = 20; l + 20 < lines; ++l, ++count) {
+      double u = log(1e-9 + before[(n + 8) * lines + l]), v = log(1e-9 + e[n * lines + l]);
+      sa += u, sb += v, ab += u * v, aa += u * u, bb += v * v;
+    }
+  double cov = ab - sa * sb / count, va = aa - sa * sa / count, vb = bb - sb * sb / count;
+  double likeness = cov / sqrt(va * vb);
+  print_message("likeness after a shift by 8 samples: %.4f\n", likeness);
+  assert_true(likeness > 0.98);
+  sonde_free(before);
+  bench_clear(&b);
+}
+
+// Displacement of the picture between two states by the peak of the block's correlation, samples.
+static double track(const float *a, const float *b, uint32_t lines, uint32_t n0, uint32_t l0) {
+  double best[64];
+  int top = 0;
+  for (int shift = -20; shift <= 20; ++shift) {
+    double ab = 0, aa = 0, bb = 0;
+    for (uint32_t n = n0; n < n0 + 60; ++n)
+      for (uint32_t l = l0; l < l0 + 20; ++l) {
+        double u = a[n * lines + l], v = b[((int)n + shift) * (int)lines + (int)l];
+        ab += u * v, aa += u * u, bb += v * v;
+      }
+    best[shift + 20] = ab / sqrt(aa * bb);
+    if (best[shift + 20] > best[top]) top = shift + 20;
+  }
+  double left = best[top > 0 ? top - 1 : 0], right = best[top < 40 ? top + 1 : 40];
+  return top - 20 + 0.5 * (left - right) / (left - 2 * best[top] + right);
+}
+
+static void tracked_motion_is_the_field(void **state) {
+  (void)state;
+  bench b = bench_create(leg_radius, 0.014, 2.5e-3, true, false);
+  b.settings.depth_m = 0.06;
+  look(&b, NULL);
+  uint32_t lines, samples, n = b.leg.model.surface.vertex_count;
+  const float *e = sonde_echo_envelope(b.echo, &lines, &samples);
+  float *before = SONDE_NEW(float, (size_t)lines *samples);
+  memcpy(before, e, sizeof(float) * lines * samples);
+  sonde_vec3 *moved = SONDE_NEW(sonde_vec3, n);
+  for (uint32_t i = 0; i < n; ++i) { // wide shallow dent: strains below 2 %
+    sonde_vec3 q = b.leg.model.surface.vertices[i];
+    double w = q.y > 0 ? 0.4e-3 * exp(-(q.x * q.x + (q.z - 0.15) * (q.z - 0.15)) / 2 / 0.0016) : 0;
+    moved[i] = v_madd(q, -w, vec3(0, 1, 0));
+  }
+  look(&b, moved);
+  double step = b.settings.depth_m / (samples - 1), error[64];
+  int count = 0;
+  for (uint32_t n0 = 200; n0 < 700; n0 += 100)
+    for (uint32_t l0 = 30; l0 + 50 < lines; l0 += 30, ++count) {
+      double x = ((l0 + 9.5) / (lines - 1) - 0.5) * 0.04;
+      sonde_vec3 rest = pose_apply(b.pose, vec3(x, 0, (n0 + 29.5) * step));
+      double truth = -sonde_interior_displacement(b.interior, rest).y / step;
+      error[count] = fabs(track(before, e, lines, n0, l0) - truth);
+    }
+  for (int i = 0; i < count; ++i)
+    for (int j = i; j > 0 && error[j] < error[j - 1]; --j) {
+      double swap = error[j];
+      error[j] = error[j - 1], error[j - 1] = swap;
+    }
+  double pixel = b.image.height_m / b.image.height;
+  print_message("tracked motion: median error %.3f px of %d blocks\n",
+                error[count / 2] * step / pixel, count);
+  assert_true(error[count / 2] * step / pixel < 0.1);
+  sonde_free(before);
+  sonde_free(moved);
+  bench_clear(&b);
+}
+
+static void air_stays_dark(void **state) {
+  (void)state;
+  bench b = bench_create(leg_radius, 0.014, 0.012, false, true);
+  b.pose = tube_pose(leg_radius + 0.01, 0.15);
+  look(&b, NULL);
+  assert_true(grey(&b, 0, 0.04, 0.01) < 2);
+  assert_true(grey(&b, 0, 0.06, 0.008) < 2);
+  double bands = 0;
+  for (double z = 5e-4; z < 6e-3; z += 1e-4) bands = fmax(bands, grey(&b, 0, z, 1.5e-4));
+  assert_true(bands > 100); // reverberation at the face
+  bench_clear(&b);
+}
+
+static void same_state_same_pixels_and_png(void **state) {
+  (void)state;
+  bench b = bench_create(leg_radius, 0.014, 0.012, false, true);
+  bench c = bench_create(leg_radius, 0.014, 0.012, false, true);
+  look(&b, NULL);
+  look(&c, NULL);
+  assert_memory_equal(b.image.pixels, c.image.pixels, 512 * 512);
+  assert_int_equal(b.image.tick, 1);
+  char path[] = "/tmp/sonde_echo_XXXXXX.png";
+  int handle = mkstemps(path, 4);
+  assert_true(handle >= 0);
+  close(handle);
+  assert_int_equal(sonde_image_save_png(&b.image, path, NULL), SONDE_OK);
+  png_image png = {.version = PNG_IMAGE_VERSION};
+  assert_true(png_image_begin_read_from_file(&png, path));
+  png.format = PNG_FORMAT_GRAY;
+  assert_int_equal(png.width, 512);
+  uint8_t *back = SONDE_NEW(uint8_t, 512 * 512);
+  assert_true(png_image_finish_read(&png, NULL, back, 0, NULL));
+  assert_memory_equal(back, b.image.pixels, 512 * 512);
+  unlink(path);
+  sonde_free(back);
+  sonde_error error;
+  assert_int_equal(sonde_image_save_png(&b.image, "/nowhere/x.png", &error), SONDE_IO);
+  bench_clear(&b);
+  bench_clear(&c);
+}
+
+static void settings_are_clamped(void **state) {
+  (void)state;
+  sonde_echo_settings s = {NAN, 1, -99, 5, NAN, INFINITY};
+  s = sonde_echo_settings_clamp(s);
+  sonde_echo_settings d = sonde_echo_settings_default();
+  assert_true(s.frequency_hz == d.frequency_hz && s.depth_m == 0.15 && s.gain_db == -30);
+  assert_true(s.dynamic_range_db == 30 && s.focus_m == d.focus_m && isfinite(s.tgc_db_per_m));
+  sonde_image image;
+  assert_int_equal(sonde_image_create(0, 5, &image, NULL), SONDE_ARGUMENT);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(speckle_is_fully_developed),
+      cmocka_unit_test(attenuation_follows_the_frequency),
+      cmocka_unit_test(lumen_is_dark_bone_shadows),
+      cmocka_unit_test(speckle_belongs_to_the_tissue),
+      cmocka_unit_test(tracked_motion_is_the_field),
+      cmocka_unit_test(air_stays_dark),
+      cmocka_unit_test(same_state_same_pixels_and_png),
+      cmocka_unit_test(settings_are_clamped),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}

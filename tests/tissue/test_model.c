@@ -1,0 +1,186 @@
+// Building, saving and loading the model.
+#include "../fixture.h"
+
+#include <unistd.h>
+
+static const char *const FILE_NAME = "test_model.sonde";
+
+static void mass_is_density_times_area(void **state) {
+  (void)state;
+  sonde_model *model = fixture_model(3, NULL);
+  sonde_mesh_report report;
+  assert_int_equal(sonde_mesh_inspect(&model->surface, &report, NULL), SONDE_OK);
+  double mass = 0;
+  for (uint32_t i = 0; i < model->surface.vertex_count; ++i) mass += model->mass_kg[i];
+  assert_near(mass, model->law.surface_density_kg_m2 * report.area_m2, 1e-12 * mass);
+  sonde_model_destroy(model);
+}
+
+static void layers_are_ordered(void **state) {
+  (void)state;
+  sonde_model *model = fixture_model(3, NULL);
+  for (uint32_t i = 0; i < model->surface.vertex_count; ++i) {
+    assert_true(model->fat_depth_m[i] > 0);
+    assert_true(model->muscle_depth_m[i] >= model->fat_depth_m[i]);
+    assert_true(model->bone_depth_m[i] > model->muscle_depth_m[i]);
+  }
+  sonde_model_destroy(model);
+}
+
+// The default femur is closed and outward, and the nearest node sees it at radius minus 14 mm.
+static void default_femur_is_a_rod(void **state) {
+  (void)state;
+  sonde_model *model = fixture_model(3, NULL);
+  sonde_mesh_report report;
+  assert_int_equal(sonde_mesh_inspect(&model->femur, &report, NULL), SONDE_OK);
+  assert_true(report.closed && report.outward);
+  assert_near(model->bone_depth_m[0], FIXTURE_RADIUS_M - 0.014, 3e-4);
+  sonde_model_destroy(model);
+}
+
+static void vein_passes_below_the_site(void **state) {
+  (void)state;
+  sonde_model *model = fixture_model(4, NULL);
+  double nearest = INFINITY, depth = 0;
+  for (uint32_t k = 0; k < model->vein.count; ++k) {
+    sonde_vec3 c = model->vein.point[k].centre_m;
+    if (fabs(c.z) < nearest) nearest = fabs(c.z), depth = FIXTURE_RADIUS_M - v_norm(c);
+  }
+  assert_true(model->vein.count > 2 && model->artery.count == model->vein.count);
+  assert_near(depth, 0.018, 4e-4);
+  for (uint32_t k = 0; k < model->vein.count; ++k) {
+    double gap = v_distance(model->vein.point[k].centre_m, model->artery.point[k].centre_m);
+    assert_true(gap > model->vein.point[k].radius_m + model->artery.point[k].radius_m);
+  }
+  sonde_model_destroy(model);
+}
+
+// Kriging returns the sites' own values at the sites and stays near their range between them.
+static void parameters_pass_through_the_sites(void **state) {
+  (void)state;
+  sonde_mesh skin = fixture_sphere(4, FIXTURE_RADIUS_M);
+  sonde_site sites[3] = {fixture_site(), fixture_site(), fixture_site()};
+  const uint32_t node[3] = {0, 1, 2};
+  const double k0[3] = {1e5, 2e5, 4e5}, xm[3] = {0.03, 0.05, 0.04};
+  for (uint32_t k = 0; k < 3; ++k) {
+    sites[k].id = k;
+    sites[k].position_m = skin.vertices[node[k]];
+    sites[k].k0_n_m3 = k0[k];
+    sites[k].xm_m = xm[k];
+  }
+  sonde_model_def def = sonde_model_def_default();
+  def.skin = &skin;
+  def.sites = sites;
+  def.site_count = 3;
+  def.fine_edge_m = 1;
+  sonde_model *model;
+  assert_int_equal(sonde_model_build(&def, &model, NULL), SONDE_OK);
+  for (uint32_t k = 0; k < 3; ++k) {
+    assert_near(model->k0_n_m3[node[k]], k0[k], 1e-4 * k0[k]);
+    assert_near(model->xm_m[node[k]], xm[k], 1e-4 * xm[k]);
+  }
+  for (uint32_t i = 0; i < model->surface.vertex_count; ++i)
+    assert_true(model->k0_n_m3[i] > 0.5e5 && model->k0_n_m3[i] < 8e5);
+  sonde_model_destroy(model);
+  sonde_mesh_clear(&skin);
+}
+
+static void file_returns_the_same_model(void **state) {
+  (void)state;
+  sonde_model *a = fixture_model(3, NULL), *b;
+  static const sonde_datum data[2] = {{0, "linear", 0.002, 1.25}, {0, "point", 0.004, 0.5}};
+  a->data = SONDE_NEW(sonde_datum, 2);
+  memcpy(a->data, data, sizeof data);
+  a->datum_count = 2;
+  assert_int_equal(sonde_model_save(a, FILE_NAME, NULL), SONDE_OK);
+  assert_int_equal(sonde_model_load(FILE_NAME, &b, NULL), SONDE_OK);
+  size_t n = a->surface.vertex_count;
+  assert_memory_equal(a->surface.vertices, b->surface.vertices, n * sizeof(sonde_vec3));
+  assert_memory_equal(a->normal, b->normal, n * sizeof(sonde_vec3));
+  assert_memory_equal(a->k0_n_m3, b->k0_n_m3, n * sizeof(double));
+  assert_memory_equal(a->bone_depth_m, b->bone_depth_m, n * sizeof(double));
+  assert_memory_equal(a->edge_dual_m, b->edge_dual_m, a->topology.edge_count * sizeof(double));
+  assert_memory_equal(&a->law, &b->law, sizeof a->law);
+  assert_memory_equal(a->data, b->data, sizeof data);
+  assert_memory_equal(&a->vein.point[1], &b->vein.point[1], sizeof a->vein.point[1]);
+  assert_string_equal(a->name, b->name);
+  assert_int_equal(a->checksum, b->checksum);
+  assert_int_not_equal(a->checksum, 0);
+  unlink(FILE_NAME);
+  sonde_model_destroy(a);
+  sonde_model_destroy(b);
+}
+
+static void write_bytes(const char *bytes, size_t count) {
+  FILE *file = fopen(FILE_NAME, "wb");
+  assert_non_null(file);
+  assert_int_equal(fwrite(bytes, 1, count, file), count);
+  fclose(file);
+}
+
+// Any flipped byte and any cut is refused with a sentence that names the file.
+static void damage_is_refused(void **state) {
+  (void)state;
+  sonde_model *model = fixture_model(1, NULL), *loaded;
+  assert_int_equal(sonde_model_save(model, FILE_NAME, NULL), SONDE_OK);
+  char *bytes;
+  size_t count;
+  assert_int_equal(sonde_file_load(FILE_NAME, &bytes, &count, NULL), SONDE_OK);
+  for (size_t k = 0; k < count; k += 1 + k / 40) {
+    sonde_error error = {0};
+    bytes[k] ^= 0x10;
+    write_bytes(bytes, count);
+    assert_int_not_equal(sonde_model_load(FILE_NAME, &loaded, &error), SONDE_OK);
+    assert_null(loaded);
+    assert_non_null(strstr(error.message, FILE_NAME));
+    bytes[k] ^= 0x10;
+  }
+  for (size_t cut = 0; cut < count; cut += count / 23) {
+    write_bytes(bytes, cut);
+    assert_int_not_equal(sonde_model_load(FILE_NAME, &loaded, NULL), SONDE_OK);
+  }
+  sonde_free(bytes);
+  unlink(FILE_NAME);
+  sonde_model_destroy(model);
+}
+
+static void open_skin_is_refused(void **state) {
+  (void)state;
+  sonde_mesh skin = fixture_sphere(2, FIXTURE_RADIUS_M);
+  skin.face_count--;
+  sonde_site site = fixture_site();
+  sonde_model_def def = sonde_model_def_default();
+  def.skin = &skin;
+  def.sites = &site;
+  def.site_count = 1;
+  sonde_model *model;
+  sonde_error error;
+  assert_int_equal(sonde_model_build(&def, &model, &error), SONDE_MESH);
+  assert_non_null(strstr(error.message, "open edges"));
+  sonde_mesh_clear(&skin);
+}
+
+static void bad_law_is_refused(void **state) {
+  (void)state;
+  sonde_model *model = fixture_model(1, NULL);
+  sonde_surface_law law = model->law;
+  law.edge_compression = 1.5;
+  sonde_error error;
+  assert_int_equal(sonde_model_set_parameters(model, &law, model->sites, 1, &error),
+                   SONDE_ARGUMENT);
+  assert_non_null(strstr(error.message, "edge_compression"));
+  sonde_model_destroy(model);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {cmocka_unit_test(mass_is_density_times_area),
+                                     cmocka_unit_test(layers_are_ordered),
+                                     cmocka_unit_test(default_femur_is_a_rod),
+                                     cmocka_unit_test(vein_passes_below_the_site),
+                                     cmocka_unit_test(parameters_pass_through_the_sites),
+                                     cmocka_unit_test(file_returns_the_same_model),
+                                     cmocka_unit_test(damage_is_refused),
+                                     cmocka_unit_test(open_skin_is_refused),
+                                     cmocka_unit_test(bad_law_is_refused)};
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
