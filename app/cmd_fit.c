@@ -13,15 +13,17 @@ static const char HELP[] =
     "\n"
     "Estimates the normal springs f(x) = x/(a x + b) of every site (stage 1: every curve by "
     "itself;\n"
-    "stage 2: one pair per site and one uniform edge stiffness, neighbours held still), carries "
-    "them\n"
-    "over the refined skin and writes a thigh model. Files are in mm and N.\n"
+    "stage 2: one pair per site and one uniform edge stiffness, neighbours held still; stage 3: "
+    "refit\n"
+    "with shear between neighbours on the equilibrium of the whole skin), carries them over the\n"
+    "refined skin and writes a thigh model. Files are in mm and N.\n"
     "\n"
     "  --surface FILE    skin, closed, outward: .ply, .obj or .stl\n"
     "  --sites FILE      site,x_mm,y_mm,z_mm,nx..nz,ux..uz,vx..vz[,fat_mm]\n"
     "  -o FILE           model file to write\n"
-    "  --stages 1|2      last stage; default 2. With 1 the model has one pair per site, no edges\n"
-    "                    in the estimation and the law's default edge stiffness\n"
+    "  --stages 1|2|3    last stage; default 2. With 1 the model has one pair per site, no edges\n"
+    "                    in the estimation and the law's default edge stiffness. Only 3 gives a\n"
+    "                    model whose forces follow the measurements when it moves freely\n"
     "  --femur FILE      default: femur.ply beside the skin\n"
     "  --fat FILE        skin/fat interface; default: fat_skin_interface.ply beside the skin\n"
     "  --muscle FILE     fat/muscle interface; default: muscle_surface.ply beside the skin\n"
@@ -79,7 +81,7 @@ static bool parse_fit(const fit_arguments *a, sonde_fit_def *def, double *fine_m
   static const char *const LOSSES[] = {"squares", "huber", "student", NULL};
   int weights = 0, loss = 0;
   long stages = 2;
-  if (a->stages && !app_parse_integer(VERB, "--stages", a->stages, 1, 2, &stages)) return false;
+  if (a->stages && !app_parse_integer(VERB, "--stages", a->stages, 1, 3, &stages)) return false;
   if (a->weights && !app_parse_word(VERB, "--weights", a->weights, WEIGHTS, &weights)) return false;
   if (a->loss && !app_parse_word(VERB, "--loss", a->loss, LOSSES, &loss)) return false;
   if (a->fine_mm && !app_parse_real(VERB, "--fine-mm", a->fine_mm, 0.5, 50, fine_mm)) return false;
@@ -167,26 +169,45 @@ static sonde_status fit_model(const fit_arguments *a, const fit_inputs *in,
   return status;
 }
 
-static void print_json(const fit_arguments *a, const sonde_fit_result *r, double seconds) {
-  bool second = r->stage2.all.count > 0;
-  app_json_begin();
-  app_json_report(second ? "simplified" : "independent", second ? &r->stage2 : &r->stage1);
+static void print_json_stages(const sonde_fit_result *r) {
   app_json_object("stage1");
   app_json_report("independent", &r->stage1);
   app_json_integer("parameters", r->stage1_parameters);
   app_json_close();
-  if (second) {
+  if (r->stage2.all.count > 0) {
     app_json_object("stage2");
     app_json_report("simplified", &r->stage2);
+    app_json_integer("parameters", r->stage2_parameters);
+    app_json_integer("iterations", r->stage2_iterations);
+    app_json_bool("converged", r->stage2_converged);
+    app_json_real("edge_stiffness_n_m", r->stage2_edge_n_m);
+    app_json_close();
+  }
+  if (r->stage3.all.count > 0) {
+    app_json_object("stage3");
+    app_json_report("full", &r->stage3);
     app_json_integer("parameters", r->parameters);
     app_json_integer("iterations", r->iterations);
     app_json_bool("converged", r->converged);
     app_json_close();
   }
+}
+
+static void print_json(const fit_arguments *a, const sonde_fit_result *r, double seconds) {
+  app_json_begin();
+  if (r->stage3.all.count > 0)
+    app_json_report("full", &r->stage3);
+  else if (r->stage2.all.count > 0)
+    app_json_report("simplified", &r->stage2);
+  else
+    app_json_report("independent", &r->stage1);
+  print_json_stages(r);
   app_json_integer("parameters", r->parameters);
   app_json_text("model", a->output);
   app_json_real("edge_stiffness_n_m", r->law.edge_stiffness_n_m);
   app_json_real("edge_pretension_n", r->law.edge_pretension_n);
+  app_json_real("shear_stiffness_n_m", r->law.shear_stiffness_n_m);
+  app_json_real("shear_limit", r->law.shear_limit);
   app_json_real("seconds", seconds);
   app_json_end();
 }
@@ -197,10 +218,20 @@ static void print_table(const fit_arguments *a, const sonde_fit_result *r, doubl
            r->stage1_parameters);
   app_print_report(title, &r->stage1);
   if (r->stage2.all.count > 0) {
-    snprintf(title, sizeof title, "stage 2, simplified interaction: %u parameters", r->parameters);
+    snprintf(title, sizeof title, "stage 2, simplified interaction: %u parameters",
+             r->stage2_parameters);
     app_print_report(title, &r->stage2);
-    printf("edge stiffness %.3f N/m (ln sd %.3f), pre-tension %.3g N, %u iterations\n",
-           r->law.edge_stiffness_n_m, r->edge_sd_log, r->law.edge_pretension_n, r->iterations);
+    printf("edge stiffness %.3f N/m (ln sd %.3f), %u iterations\n", r->stage2_edge_n_m,
+           r->edge_sd_log, r->stage2_iterations);
+  }
+  if (r->stage3.all.count > 0) {
+    snprintf(title, sizeof title, "stage 3, full equilibrium: %u parameters", r->parameters);
+    app_print_report(title, &r->stage3);
+    printf("shear stiffness %.3f N/m, limit %.3f, edges kept at %.3g N/m, %u iterations\n",
+           r->law.shear_stiffness_n_m, r->law.shear_limit, r->law.edge_stiffness_n_m,
+           r->iterations);
+  } else if (r->law.edge_pretension_n > 0) {
+    printf("pre-tension %.3g N\n", r->law.edge_pretension_n);
   }
   printf("wrote %s in %.2f s\n", a->output, seconds);
 }
@@ -228,7 +259,7 @@ int cmd_fit(int argc, char **argv) {
   else
     print_table(&arguments, &result, app_seconds() - start);
   if (!status && !result.converged)
-    fprintf(stderr, "sonde fit: stage 2 reached its iteration limit before it converged\n");
+    fprintf(stderr, "sonde fit: the last stage reached its iteration limit before it converged\n");
   sonde_fit_result_clear(&result);
   clear_inputs(&inputs);
   return code;

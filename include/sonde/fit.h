@@ -1,7 +1,7 @@
 /**
  * @file fit.h
- * Measurement and site tables, error statistics, estimation stages 1 and 2, prediction of the
- * measurements by a model, and the virtual robot. Formulas: docs/fit.md, physics.md 2f.
+ * Measurement and site tables, error statistics, estimation in up to three stages, prediction of
+ * the measurements by a model, and the virtual robot. Formulas: docs/fit.md, physics.md 2f.
  */
 #ifndef SONDE_FIT_H
 #define SONDE_FIT_H
@@ -111,13 +111,15 @@ typedef enum sonde_fit_loss {
 } sonde_fit_loss;
 
 typedef struct sonde_fit_def {
-  uint32_t stages;           /**< 1 or 2; default 2 */
+  uint32_t stages;           /**< 1, 2 or 3; default 2 */
   sonde_fit_weights weights; /**< default absolute */
   sonde_fit_loss loss;       /**< default squares */
   double loss_scale;         /**< N, or a fraction with relative weights; default 0.5 / 0.05 */
   uint32_t max_iterations;   /**< default 400 */
   bool fit_pretension;       /**< also estimate T0 >= 0 (stage 2); default false */
   bool cold_start;           /**< stage 2 from one generic start instead of stage 1 */
+  double kept_edge_n_m;      /**< edge stiffness of a stage 3 model; default 10 */
+  uint32_t threads;          /**< of stage 3; 0 (default): one per online core */
 } sonde_fit_def;
 
 SONDE_API sonde_fit_def sonde_fit_def_default(void);
@@ -152,21 +154,29 @@ typedef struct sonde_fit_result {
   sonde_curve_fit *curves; /**< stage 1, [curve_count] by site, then probe */
   uint32_t site_count;
   sonde_site *sites;          /**< [site_count] input sites with k0 and xm of the last stage */
-  sonde_surface_law law;      /**< the model's law with the estimated edge stiffness */
+  sonde_surface_law law;      /**< the model's law with what the last stage estimated */
   uint32_t stage1_parameters; /**< 2 per curve */
-  uint32_t parameters; /**< stage 1: as above; stage 2: 2 per measured site + 1 (+1 with T0) */
-  sonde_error_report stage1; /**< interaction "independent" */
-  sonde_error_report stage2; /**< interaction "simplified"; zero counts when stages == 1 */
-  double *model_n;           /**< [measurements.count] forces of the last stage */
-  uint32_t iterations;       /**< of stage 2 */
-  bool converged;
-  double cost, start_cost; /**< stage 2: half the sum of losses at its end and its start */
-  double edge_sd_log;      /**< standard deviation of ln k_s (Schur complement); 0 if none */
+  uint32_t stage2_parameters; /**< 2 per measured site + 1 (+1 with T0); 0 without stage 2 */
+  uint32_t parameters;        /**< of the last stage; stage 3: 2 per site + 2 */
+  sonde_error_report stage1;  /**< interaction "independent" */
+  sonde_error_report stage2;  /**< interaction "simplified"; zero counts when stages == 1 */
+  sonde_error_report stage3;  /**< interaction "full"; zero counts when stages < 3 */
+  double *model_n;            /**< [measurements.count] forces of the last stage */
+  uint32_t iterations;        /**< of the last stage */
+  bool converged;             /**< the last stage */
+  double cost, start_cost;    /**< half the sum of losses at its end and its start */
+  uint32_t stage2_iterations;
+  bool stage2_converged;
+  double stage2_edge_n_m; /**< k_s of stage 2; the law of stage 3 keeps kept_edge_n_m instead */
+  double edge_sd_log;     /**< standard deviation of ln k_s (Schur complement); 0 if none */
 } sonde_fit_result;
 
 /**
  * Stage 1 per curve, then one (k0, xm) per site for all its probes: without edges (stages == 1) or
- * with the simplified interaction and one uniform edge stiffness (stages == 2).
+ * with the simplified interaction and one uniform edge stiffness (stages == 2). With stages == 3
+ * also the refit on the full static equilibrium: shear springs of uniform G and limit, site
+ * parameters spread by the model's interpolation and kept smooth, residuals relative to the
+ * probe's mean force; surface springs, kept weak, are left out (estimation.md, variant A).
  * @param model gives the refined skin, its normals and the law (guard, compression); unchanged
  * @return CANCELLED by progress; ARGUMENT for a probe without rectangular footprint or a curve of
  *   fewer than 3 points

@@ -197,7 +197,10 @@ static void cross_levels(sonde_echo *echo, uint32_t row, uint32_t l) {
   static const interface *const kinds[] = {&skin_top, &skin_base,   &fascia,
                                            &cortex,   &vessel_wall, &vessel_wall};
   uint32_t left = l > 0 ? l - 1 : l, right = l + 1 < echo->lines ? l + 1 : l;
+  bool lumen = wall_distance(echo->row, echo->lines, l, 0) < 0 ||
+               wall_distance(echo->row, echo->lines, l, 1) < 0;
   for (int which = 0; which < 6; ++which) {
+    if (lumen && (which == 1 || which == 2)) continue; // layers end at a vessel
     float before = level_at(echo, echo->last_row, which, l),
           now = level_at(echo, echo->row, which, l);
     if ((before < 0) == (now < 0)) continue;

@@ -7,6 +7,7 @@
 //
 // sonde_echo_scatter  all cubes that the slab touches
 // collect_cells       distinct cubes along the plane, from the coarse rest points
+// collect_quad        those of one coarse quad
 // base_map, wall_map  affine maps of a cube
 // splat               scatterers of one map into the grid
 #include "base/base.h"
@@ -15,9 +16,9 @@
 
 #include <string.h>
 
-enum { SLICES = 5 };
+enum { SLICES = 5, MOST_PIECES = 12 };
 
-static const double sampling_m = 1.1e-3; // of the slab when looking for cubes
+static const double sampling_m = 1.2e-3; // of the slab when looking for cubes
 
 // p = origin + axis[0] x + axis[1] y + axis[2] z for x, y, z in +-1/2, probe frame.
 typedef struct map {
@@ -47,31 +48,28 @@ static void visit_cell(sonde_echo *echo, sonde_vec3 rest) {
   cell[0] = a, cell[1] = b, cell[2] = c;
 }
 
-// Rest point of the plane's point (u, v) in node units.
-static sonde_vec3 plane_rest(const sonde_echo *echo, double u, double v) {
-  uint32_t i = (uint32_t)fmin(u, SONDE_PLANE_COLUMNS - 2),
-           j = (uint32_t)fmin(v, SONDE_PLANE_ROWS - 2);
-  const sonde_vec3 *n = echo->rest + j * SONDE_PLANE_COLUMNS + i;
-  double a = u - i, b = v - j;
-  return v_lerp(v_lerp(n[0], n[1], a),
-                v_lerp(n[SONDE_PLANE_COLUMNS], n[SONDE_PLANE_COLUMNS + 1], a), b);
+// A quad of the coarse plane in rest coordinates: as many samples as its longest side asks for.
+static void collect_quad(sonde_echo *echo, const sonde_vec3 *n, sonde_vec3 side) {
+  const sonde_vec3 *low = n + SONDE_PLANE_COLUMNS;
+  double longest = fmax(fmax(v_distance(n[0], n[1]), v_distance(low[0], low[1])),
+                        fmax(v_distance(n[0], low[0]), v_distance(n[1], low[1])));
+  int pieces = (int)clamp(ceil(longest / sampling_m), 1, MOST_PIECES);
+  for (int j = 0; j < pieces; ++j)
+    for (int i = 0; i < pieces; ++i) {
+      double a = (i + 0.5) / pieces, b = (j + 0.5) / pieces;
+      sonde_vec3 rest = v_lerp(v_lerp(n[0], n[1], a), v_lerp(low[0], low[1], a), b);
+      for (int k = 0; k < SLICES; ++k)
+        visit_cell(echo, v_madd(rest, sonde_elevation_half_m * (2.0 * k / (SLICES - 1) - 1), side));
+    }
 }
 
 static void collect_cells(sonde_echo *echo) {
-  const frame *f = &echo->frame;
   memset(echo->cell_set, 0, SONDE_CELL_SET * sizeof *echo->cell_set);
   echo->cell_count = 0;
-  int nx = (int)ceil(f->aperture_m / sampling_m), nz = (int)ceil(f->depth_m / sampling_m);
-  sonde_vec3 side = q_rotate(f->probe.rotation, vec3(0, 1, 0));
-  for (int j = 0; j <= nz; ++j)
-    for (int i = 0; i <= nx; ++i) {
-      sonde_vec3 rest = plane_rest(echo, (double)i / nx * (SONDE_PLANE_COLUMNS - 1),
-                                   (double)j / nz * (SONDE_PLANE_ROWS - 1));
-      for (int k = 0; k < SLICES; ++k) {
-        double y = sonde_elevation_half_m * (2.0 * k / (SLICES - 1) - 1);
-        visit_cell(echo, v_madd(rest, y, side));
-      }
-    }
+  sonde_vec3 side = q_rotate(echo->frame.probe.rotation, vec3(0, 1, 0));
+  for (uint32_t j = 0; j + 1 < SONDE_PLANE_ROWS; ++j)
+    for (uint32_t i = 0; i + 1 < SONDE_PLANE_COLUMNS; ++i)
+      collect_quad(echo, echo->rest + j * SONDE_PLANE_COLUMNS + i, side);
 }
 
 // ---- maps ---------------------------------------------------------------------------------

@@ -1,10 +1,12 @@
 // fit_curves:     stage 1, eq. (1) for every curve by itself.
 // start_sites:    geometric means of a site's curves.
 // fit_sites:      arrow Levenberg-Marquardt over all sites, without edges, then with them.
-// finish:         site parameters, forces and error report of the last stage.
+// finish:         site parameters, forces and error report of stage 1 or 2.
+// refit_sites:    stage 3, on the full equilibrium.
 #include "fit/arrow.h"
 #include "fit/fit_inside.h"
 #include "fit/law.h"
+#include "fit/refit.h"
 #include "fit/simplified.h"
 
 #include "base/maths.h"
@@ -14,15 +16,20 @@
 static const double COLD_K0 = 1.8e5, COLD_ABOVE_M = 0.02;
 static const double EDGE_START_N_M = 50.0, TENSION_START_N = 1e-3;
 static const double LN_EDGE_LOW = -11.5, LN_EDGE_HIGH = 18.4; // 1e-5 .. 1e8 N/m
+static const double KEPT_EDGE_N_M = 10.0; // stage 3: enough to carry tangential motion
+static const double PATCH_REACH_M = 0.05; // of the skin around a footprint
 static const double LN_TENSION_LOW = -13.8, LN_TENSION_HIGH = 6.9;
 
 sonde_fit_def sonde_fit_def_default(void) {
-  return (sonde_fit_def){.stages = 2, .max_iterations = 400};
+  return (sonde_fit_def){.stages = 2, .max_iterations = 400, .kept_edge_n_m = KEPT_EDGE_N_M};
 }
 
 static sonde_status check_def(const sonde_fit_def *def, sonde_error *error) {
-  if (def->stages < 1 || def->stages > 2)
-    return sonde_fail(error, SONDE_ARGUMENT, "stages is %u, expected 1 or 2", def->stages);
+  if (def->stages < 1 || def->stages > 3)
+    return sonde_fail(error, SONDE_ARGUMENT, "stages is %u, expected 1, 2 or 3", def->stages);
+  if (!(def->kept_edge_n_m >= 0))
+    return sonde_fail(error, SONDE_ARGUMENT, "kept_edge_n_m is %g, expected >= 0",
+                      def->kept_edge_n_m);
   if ((unsigned)def->weights > SONDE_WEIGHTS_RELATIVE || (unsigned)def->loss > SONDE_LOSS_STUDENT)
     return sonde_fail(error, SONDE_ARGUMENT, "unknown weights or loss");
   if (!(def->loss_scale >= 0) || def->max_iterations < 1)
@@ -174,11 +181,11 @@ static sonde_status finish(const sonde_site_problem *p, const double (*theta)[2]
   SONDE_ASSERT(result->site_count >= plan->site_count);
   result->parameters = result->stage1_parameters;
   if (!p->edges) return SONDE_OK;
-  result->parameters = 2 * plan->site_count + (p->tension ? 2 : 1);
-  result->law.edge_stiffness_n_m = exp(border[0]);
+  result->parameters = result->stage2_parameters = 2 * plan->site_count + (p->tension ? 2 : 1);
+  result->law.edge_stiffness_n_m = result->stage2_edge_n_m = exp(border[0]);
   if (p->tension) result->law.edge_pretension_n = exp(border[1]);
-  result->iterations = found->iterations;
-  result->converged = found->converged;
+  result->iterations = result->stage2_iterations = found->iterations;
+  result->converged = result->stage2_converged = found->converged;
   result->cost = found->cost;
   result->start_cost = found->start_cost;
   if (plan->row_count > result->parameters) {
@@ -209,6 +216,50 @@ static sonde_status fit_model(const sonde_model *model, const sonde_site_table *
   return status;
 }
 
+// ---- stage 3 ------------------------------------------------------------------------------
+
+static void set_refitted(const sonde_fit_def *def, const double *theta,
+                         const sonde_refit_result *found, sonde_fit_result *result) {
+  uint32_t count = result->site_count;
+  for (uint32_t s = 0; s < count; ++s) {
+    result->sites[s].k0_n_m3 = exp(theta[s]);
+    result->sites[s].xm_m = exp(theta[count + s]);
+  }
+  result->law.shear_stiffness_n_m = exp(theta[2 * count]);
+  result->law.shear_limit = exp(theta[2 * count + 1]);
+  result->law.edge_stiffness_n_m = def->kept_edge_n_m;
+  result->law.edge_pretension_n = 0;
+  result->parameters = 2 * count + 2;
+  result->iterations = found->iterations;
+  result->converged = found->converged;
+  result->cost = found->cost;
+  result->start_cost = found->start_cost;
+}
+
+static sonde_status refit_sites(const sonde_model *model, const sonde_site_table *sites,
+                                const sonde_measurements *m, const sonde_fit_plan *plan,
+                                const sonde_fit_def *def, const sonde_progress *progress,
+                                sonde_fit_result *result, sonde_error *error) {
+  sonde_refit *refit = NULL;
+  sonde_refit_result found = {0};
+  double *theta = SONDE_NEW(double, 2 * (size_t)sites->count + 2);
+  double *force_n = SONDE_NEW(double, plan->row_count);
+  sonde_status status = theta && force_n ? SONDE_OK : sonde_fail_memory(error);
+  if (!status)
+    status = sonde_refit_create(model, sites, m, plan, def, PATCH_REACH_M, false, &refit, error);
+  if (!status) sonde_refit_start(refit, result->curves, theta);
+  if (!status) status = sonde_refit_minimise(refit, theta, force_n, progress, &found, error);
+  if (!status) {
+    set_refitted(def, theta, &found, result);
+    for (uint32_t r = 0; r < plan->row_count; ++r) result->model_n[plan->row[r]] = force_n[r];
+    status = sonde_error_report_of(m->data, result->model_n, m->count, &result->stage3, error);
+  }
+  sonde_refit_destroy(refit);
+  sonde_free(theta);
+  sonde_free(force_n);
+  return status;
+}
+
 static sonde_status allocate_result(const sonde_model *model, const sonde_site_table *sites,
                                     const sonde_measurements *m, sonde_fit_result *result,
                                     sonde_error *error) {
@@ -236,6 +287,8 @@ sonde_status sonde_fit(const sonde_model *model, const sonde_site_table *sites,
   status = allocate_result(model, sites, measurements, result, error);
   if (!status) status = fit_curves(model, sites, measurements, &plan, &full, result, error);
   if (!status) status = fit_model(model, sites, &problem, &full, progress, result, error);
+  if (!status && full.stages == 3)
+    status = refit_sites(model, sites, measurements, &plan, &full, progress, result, error);
   sonde_site_problem_clear(&problem);
   sonde_fit_plan_clear(&plan);
   if (status) sonde_fit_result_clear(result);

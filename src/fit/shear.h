@@ -14,7 +14,7 @@ typedef struct sonde_patch {
   uint32_t free_count, held_count, place_count; // place_count = free + held + 1
   uint32_t *node;                               // [place_count] surface node
   double *area_m2;                              // [place_count]
-  double *cosine;   // [place_count] rest normal . site normal for held places, else 0
+  double *cosine;    // [place_count] rest normal . site normal for held places, else 0
   double sliding_m2; // sum of A (1 - cosine^2): how far the footprint drags tangential springs
   uint32_t edge_count;
   uint32_t (*edge)[2]; // places
@@ -37,11 +37,13 @@ typedef struct sonde_patch_law {
   double shear_n_m, limit, guard, tangential_n_m3;
 } sonde_patch_law;
 
-// Scratch of one worker, large enough for any patch of a list.
+// Scratch of one worker, large enough for any patch of a list. Systems are solved by conjugate
+// gradients with the factor of an earlier matrix, which is renewed when that takes too long.
 typedef struct sonde_patch_solver {
   const sonde_patch *patch;
-  sonde_ldl *ldl; // of patch; NULL before its first factorisation
+  sonde_ldl *ldl; // of a matrix of patch; NULL before its first factorisation
   double *residual, *step, *trial, *multiplier, *value, *scratch;
+  double *right, *preconditioned, *direction, *product;
 } sonde_patch_solver;
 
 sonde_status sonde_patch_solver_create(const sonde_patch *patches, uint32_t count,

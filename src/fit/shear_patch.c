@@ -20,8 +20,8 @@ static bool within_reach(const sonde_model *model, const sonde_footprint *f, uin
 static double extent(const sonde_model *model, const sonde_footprint *f) {
   double far = 0;
   for (uint32_t h = 0; h < f->held_count; ++h)
-    far = fmax(far, v_distance(model->surface.vertices[f->held[h]],
-                               model->surface.vertices[f->held[0]]));
+    far = fmax(
+        far, v_distance(model->surface.vertices[f->held[h]], model->surface.vertices[f->held[0]]));
   return far;
 }
 
@@ -161,14 +161,13 @@ sonde_status sonde_patch_create(const sonde_model *model, const sonde_footprint 
   *patch = (sonde_patch){0};
   uint32_t nodes = model->surface.vertex_count;
   uint32_t *place = SONDE_NEW(uint32_t, nodes);
-  sonde_status status =
-      place && allocate_nodes(patch, nodes) ? SONDE_OK : sonde_fail_memory(error);
+  sonde_status status = place && allocate_nodes(patch, nodes) ? SONDE_OK : sonde_fail_memory(error);
   if (status) goto done;
   choose_nodes(model, footprint, normal, reach_m, place, patch);
   shrink_nodes(patch, nodes);
   if (!patch->free_count) {
-    status = sonde_fail(error, SONDE_ARGUMENT, "no free node within %g m of the footprint",
-                        reach_m);
+    status =
+        sonde_fail(error, SONDE_ARGUMENT, "no free node within %g m of the footprint", reach_m);
     goto done;
   }
   if (!allocate_edges(patch, count_edges(model, place))) {

@@ -1,5 +1,6 @@
 // assemble:  residual of every place and the matrix of the free ones at indentations s.
 // factor:    orders and analyses at the first use on a patch, else numbers only.
+// solve:     conjugate gradients preconditioned by the kept factor; a new factor when it is slow.
 // search:    shortens a Newton step until the energy falls at its end.
 // sonde_patch_settle: Newton. sonde_patch_force: force and its adjoint derivatives.
 #include "fit/shear.h"
@@ -8,7 +9,8 @@
 
 #include <string.h>
 
-enum { SHORTENINGS = 40 };
+enum { SHORTENINGS = 40, GRADIENT_STEPS = 12 };
+static const double NEWTON_ACCURACY = 1e-4, ADJOINT_ACCURACY = 1e-9;
 static const double NEGLIGIBLE_N = 1e-13;
 
 static void add_edge(const sonde_patch *p, const sonde_patch_law *law, uint32_t e, const double *s,
@@ -26,7 +28,8 @@ static void add_edge(const sonde_patch *p, const sonde_patch_law *law, uint32_t 
   value[p->entry[e][1]] = -stiffness;
 }
 
-// R_i = A p(s_i) + sum w q. Returns |R| over the free places; *load_n is the force of the held ones.
+// R_i = A p(s_i) + sum w q. Returns |R| over the free places; *load_n is the force of the held
+// ones.
 static double assemble(const sonde_patch_solver *solver, const sonde_patch_law *law,
                        const double *s, double *load_n) {
   const sonde_patch *p = solver->patch;
@@ -53,6 +56,58 @@ static sonde_status factor(sonde_patch_solver *solver, sonde_error *error) {
   sonde_status status = sonde_ldl_create(p->free_count, p->row_start, p->column, solver->value,
                                          p->point_m, &solver->ldl, error);
   SONDE_ASSERT(status || sonde_ldl_scratch(solver->ldl, 1) <= p->place_count);
+  return status;
+}
+
+static void multiply(const sonde_patch_solver *solver, const double *x, double *y) {
+  const sonde_patch *p = solver->patch;
+  for (uint32_t i = 0; i < p->free_count; ++i) {
+    double sum = 0;
+    for (uint32_t k = p->row_start[i]; k < p->row_start[i + 1]; ++k)
+      sum += solver->value[k] * x[p->column[k]];
+    y[i] = sum;
+  }
+}
+
+static double dot(const double *a, const double *b, uint32_t n) {
+  double sum = 0;
+  for (uint32_t i = 0; i < n; ++i) sum += a[i] * b[i];
+  return sum;
+}
+
+// x arrives as right-hand side and leaves as solution; false, with x unchanged, when the kept
+// factor is too far from the matrix.
+static bool solve_by_gradients(sonde_patch_solver *solver, double *x, double accuracy) {
+  uint32_t n = solver->patch->free_count;
+  double *r = solver->right, *z = solver->preconditioned, *d = solver->direction;
+  double *sum = solver->trial, goal = accuracy * accuracy * dot(x, x, n), before = 1;
+  memcpy(r, x, n * sizeof *r);
+  memset(sum, 0, n * sizeof *sum);
+  memset(d, 0, n * sizeof *d);
+  for (int k = 0; k < GRADIENT_STEPS; ++k) {
+    memcpy(z, r, n * sizeof *z);
+    sonde_ldl_solve(solver->ldl, 1, z, solver->scratch);
+    double rz = dot(r, z, n), keep = k ? rz / before : 0;
+    for (uint32_t i = 0; i < n; ++i) d[i] = z[i] + keep * d[i];
+    multiply(solver, d, solver->product);
+    double curvature = dot(d, solver->product, n);
+    if (!(curvature > 0)) return false;
+    double length = rz / curvature;
+    for (uint32_t i = 0; i < n; ++i) sum[i] += length * d[i];
+    for (uint32_t i = 0; i < n; ++i) r[i] -= length * solver->product[i];
+    before = rz;
+    if (dot(r, r, n) > goal) continue;
+    memcpy(x, sum, n * sizeof *x);
+    return true;
+  }
+  return false;
+}
+
+static sonde_status solve(sonde_patch_solver *solver, double *x, double accuracy,
+                          sonde_error *error) {
+  if (solver->ldl && solve_by_gradients(solver, x, accuracy)) return SONDE_OK;
+  sonde_status status = factor(solver, error);
+  if (!status) sonde_ldl_solve(solver->ldl, 1, x, solver->scratch);
   return status;
 }
 
@@ -93,10 +148,9 @@ sonde_status sonde_patch_settle(sonde_patch_solver *solver, const sonde_patch_la
   double load_n, residual = assemble(solver, law, s_m, &load_n);
   for (uint32_t k = 0; k < max_iterations; ++k) {
     if (residual <= relative * fabs(load_n) || residual <= NEGLIGIBLE_N) return SONDE_OK;
-    sonde_status status = factor(solver, error);
-    if (status) return status;
     for (uint32_t i = 0; i < p->free_count; ++i) solver->step[i] = -solver->residual[i];
-    sonde_ldl_solve(solver->ldl, 1, solver->step, solver->scratch);
+    sonde_status status = solve(solver, solver->step, NEWTON_ACCURACY, error);
+    if (status) return status;
     if (!search(solver, law, s_m, &residual, &load_n)) break;
   }
   if (residual <= relative * fabs(load_n) || residual <= NEGLIGIBLE_N) return SONDE_OK;
@@ -107,11 +161,9 @@ sonde_status sonde_patch_settle(sonde_patch_solver *solver, const sonde_patch_la
 
 // mu: cosines on the held places; on the free ones minus the solution of K lambda = K_fh c, so that
 // dF/dtheta = sum mu_i dR_i/dtheta.
-static sonde_status adjoint(sonde_patch_solver *solver, const sonde_patch_law *law,
-                            const double *s, double *mu, sonde_error *error) {
+static sonde_status adjoint(sonde_patch_solver *solver, const sonde_patch_law *law, const double *s,
+                            double *mu, sonde_error *error) {
   const sonde_patch *p = solver->patch;
-  sonde_status status = factor(solver, error);
-  if (status) return status;
   memcpy(mu, p->cosine, p->place_count * sizeof *mu);
   for (uint32_t e = 0; e < p->edge_count; ++e) {
     uint32_t a = p->edge[e][0], b = p->edge[e][1];
@@ -121,8 +173,7 @@ static sonde_status adjoint(sonde_patch_solver *solver, const sonde_patch_law *l
     uint32_t in = a < p->free_count ? a : b, out = a < p->free_count ? b : a;
     mu[in] += p->dual_m[e] * slope / rest * p->cosine[out];
   }
-  sonde_ldl_solve(solver->ldl, 1, mu, solver->scratch);
-  return SONDE_OK;
+  return solve(solver, mu, ADJOINT_ACCURACY, error);
 }
 
 // p(s; k0, xm) = k0 xm f(s/xm), so k0 dp/dk0 = p and xm dp/dxm = p - s p', straight part included;
@@ -173,9 +224,14 @@ sonde_status sonde_patch_solver_create(const sonde_patch *patches, uint32_t coun
                                  .trial = SONDE_NEW(double, places),
                                  .multiplier = SONDE_NEW(double, places),
                                  .value = SONDE_NEW(double, entries),
-                                 .scratch = SONDE_NEW(double, places)};
+                                 .scratch = SONDE_NEW(double, places),
+                                 .right = SONDE_NEW(double, places),
+                                 .preconditioned = SONDE_NEW(double, places),
+                                 .direction = SONDE_NEW(double, places),
+                                 .product = SONDE_NEW(double, places)};
   if (solver->residual && solver->step && solver->trial && solver->multiplier && solver->value &&
-      solver->scratch)
+      solver->scratch && solver->right && solver->preconditioned && solver->direction &&
+      solver->product)
     return SONDE_OK;
   sonde_patch_solver_clear(solver);
   return sonde_fail_memory(error);
@@ -195,5 +251,9 @@ void sonde_patch_solver_clear(sonde_patch_solver *solver) {
   sonde_free(solver->multiplier);
   sonde_free(solver->value);
   sonde_free(solver->scratch);
+  sonde_free(solver->right);
+  sonde_free(solver->preconditioned);
+  sonde_free(solver->direction);
+  sonde_free(solver->product);
   *solver = (sonde_patch_solver){0};
 }

@@ -23,6 +23,9 @@
 #include <string.h>
 
 static const double inversion_tolerance_m = 1e-7;
+// Beyond this area strain the skin's gathering under a probe is not followed by the depth: springs
+// alone let it crumple, and squeezed-out tissue would lift a vessel out of the leg.
+static const double most_slide_strain = 0.10;
 
 // ---- update -------------------------------------------------------------------------------
 
@@ -51,7 +54,9 @@ static void spread_slide(sonde_interior *in) {
     for (uint32_t i = 0; i < n; ++i) {
       double a = row[(i + 1) % n].slide_theta - row[(i + n - 1) % n].slide_theta;
       double b = in->field[above * n + i].slide_s - in->field[below * n + i].slide_s;
-      double spread = a / (2 * in->theta_step) + b / ds;
+      const sonde_column *c = &in->column[j * n + i];
+      double bound = most_slide_strain * (c->radius_m - in->bone_radius_m) * c->radius_m;
+      double spread = clamp(a / (2 * in->theta_step) + b / ds, -bound, bound);
       in->field[j * n + i].spread = (float)spread;
       in->potential[j * n + i] = (0.5 * spread - row[i].inflow) * cell;
     }

@@ -3,10 +3,12 @@
 // sonde_stations_create  both vessels
 // resample               points at equal arc length, ascending along the femur's axis
 // place_station          facts of one station
+// raise_fascia           keeps the vessels below the fat
 #include "base/base.h"
 #include "interior/interior.h"
 
 static const double spacing_m = 5e-3;
+static const double clearance_m = 1.5e-3, bump_radius_m = 20e-3;
 
 static double line_length(const sonde_vessel *line) {
   double sum = 0;
@@ -69,6 +71,24 @@ static sonde_status resample(sonde_interior *in, int which, const sonde_vessel *
   return SONDE_OK;
 }
 
+// The fascia passes above the vessels, as it does in a thigh: the fat is thinner there. `clearance`
+// leaves room for a dilated vein and its wall.
+static void raise_fascia(sonde_interior *in, int which) {
+  for (uint32_t j = 0; j < in->s_count; ++j)
+    for (uint32_t i = 0; i < in->theta_count; ++i) {
+      sonde_vessel_state v;
+      sonde_column_point at;
+      double s = in->s_first_m + in->s_step_m * j, theta = i * in->theta_step;
+      if (!sonde_vessel_at(in, which, s, &v)) continue;
+      (void)sonde_interior_locate(in, v.rest_centre_m, &at);
+      double turn = remainder(theta - at.theta, 2 * SONDE_PI), y = at.r * turn;
+      double limit = at.depth_m - 1.2 * v.rest_radius_m - clearance_m + y * y / (2 * bump_radius_m);
+      sonde_column_field *f = &in->field[j * in->theta_count + i];
+      limit = fmax(limit, f->fat_m);
+      if (limit < f->muscle_m) f->muscle_m = (float)limit;
+    }
+}
+
 static void rest_state(sonde_interior *in, int which) {
   for (uint32_t i = 0; i < in->station_count[which]; ++i) {
     const sonde_station *station = &in->station[which][i];
@@ -93,5 +113,6 @@ sonde_status sonde_stations_create(sonde_interior *in, sonde_error *error) {
   if (status == SONDE_OK) status = resample(in, 1, &in->model->artery, error);
   if (status != SONDE_OK) return status;
   for (int which = 0; which < 2; ++which) rest_state(in, which);
+  for (int which = 0; which < 2; ++which) raise_fascia(in, which);
   return SONDE_OK;
 }

@@ -1,11 +1,13 @@
 // Building, changing and releasing the thigh model.
 // target_edge: wanted edge length near the sites' footprints.
+// order_vertices: numbering along a space-filling curve.
 // derive:      everything that follows from mesh and law.
 // build:       refine, derive, measure layers, interpolate, place vessels.
 #include "tissue/model.h"
 
 #include "base/base.h"
 #include "base/maths.h"
+#include "base/morton.h"
 
 #include <string.h>
 
@@ -18,7 +20,7 @@ sonde_surface_law sonde_surface_law_default(void) {
                              .edge_damping_s = 1e-3,
                              .edge_compression = 0.05,
                              .edge_pretension_n = 0,
-                             .tangential_stiffness_n_m3 = 1e5,
+                             .tangential_stiffness_n_m3 = 2e5,
                              .shear_stiffness_n_m = 0,
                              .shear_limit = 1.0,
                              .normal_damping_s = 0.02,
@@ -199,6 +201,30 @@ static sonde_status default_femur(sonde_model *model, sonde_error *error) {
   return SONDE_OK;
 }
 
+// Numbers the vertices along a space-filling curve, so that neighbours lie together in memory.
+static sonde_status order_vertices(sonde_mesh *mesh, sonde_error *error) {
+  uint32_t n = mesh->vertex_count;
+  sonde_keyed *list = SONDE_NEW(sonde_keyed, n);
+  uint32_t *place = SONDE_NEW(uint32_t, n);
+  sonde_vec3 *old = SONDE_NEW(sonde_vec3, n);
+  sonde_status status = list && place && old ? SONDE_OK : sonde_fail_memory(error);
+  if (status) goto done;
+  for (uint32_t i = 0; i < n; ++i) list[i] = (sonde_keyed){sonde_morton_key(mesh->vertices[i]), i};
+  qsort(list, n, sizeof *list, sonde_keyed_compare);
+  memcpy(old, mesh->vertices, n * sizeof *old);
+  for (uint32_t k = 0; k < n; ++k) {
+    place[list[k].index] = k;
+    mesh->vertices[k] = old[list[k].index];
+  }
+  for (uint32_t f = 0; f < mesh->face_count; ++f)
+    for (int k = 0; k < 3; ++k) mesh->faces[f][k] = place[mesh->faces[f][k]];
+done:
+  sonde_free(list);
+  sonde_free(place);
+  sonde_free(old);
+  return status;
+}
+
 static sonde_status fill(sonde_model *model, const sonde_model_def *def, sonde_error *error) {
   snprintf(model->name, sizeof model->name, "%s", def->name ? def->name : "thigh");
   snprintf(model->provenance, sizeof model->provenance, "%s",
@@ -209,6 +235,7 @@ static sonde_status fill(sonde_model *model, const sonde_model_def *def, sonde_e
   if (!status)
     status =
         sonde_mesh_refine(def->skin, target_edge, (void *)(uintptr_t)def, &model->surface, error);
+  if (!status) status = order_vertices(&model->surface, error);
   if (!status) status = sonde_model_allocate_nodes(model, error);
   if (!status) status = sonde_model_derive(model, error);
   if (!status)

@@ -5,14 +5,22 @@
 #include "sonde/sparse.h"
 #include "sonde/tissue.h"
 
-// The part of the mesh that takes part in an evaluation; NULL lists mean all.
-// Edges are those with at least one row among `rows`; the others' ends are held.
+// The part of the mesh that takes part in an evaluation; a NULL part means all.
+// Edges are those with at least one row among `rows`; their other ends, in `rim`, are held.
 typedef struct sonde_tissue_part {
   const uint32_t *rows;
   uint32_t row_count;
+  const uint32_t *rim;
+  uint32_t rim_count;
   const uint32_t *edges;
   uint32_t edge_count;
 } sonde_tissue_part;
+
+// Scratch of an evaluation, per node.
+typedef struct sonde_tissue_node {
+  double indentation_m, rate_m_s; // s = N.(X - x) and its rate
+  double shear_n_m;               // sum of the shear springs' stiffnesses at the node
+} sonde_tissue_node;
 
 // A x = b of the implicit step (physics.md 2b): A = mass_scale*M + damping_scale*C +
 // stiffness_scale*K, and the product K v0 for the right-hand side. Scales of zero leave terms out.
@@ -22,12 +30,13 @@ typedef struct sonde_tissue_scales {
 
 // Fills force[] (elastic and damping forces of the tissue on its nodes), stiffness_velocity[]
 // (K v) and the matrix. All rows of the part are overwritten; rows outside are untouched in
-// `matrix` and zeroed where an active edge ends in `force`.
+// `matrix`' upper blocks; `scratch` has one entry per node.
 // @thread tick (no allocation)
 void sonde_tissue_linearise(const sonde_model *model, const sonde_tissue_part *part,
                             const sonde_vec3 *position, const sonde_vec3 *velocity,
                             const sonde_tissue_scales *scales, sonde_vec3 *force,
-                            sonde_vec3 *stiffness_velocity, sonde_block_matrix *matrix);
+                            sonde_vec3 *stiffness_velocity, sonde_block_matrix *matrix,
+                            sonde_tissue_node *scratch);
 
 // Total elastic energy of all springs (J); tests and line searches.
 double sonde_tissue_energy(const sonde_model *model, const sonde_vec3 *position);

@@ -13,19 +13,29 @@ void sonde_state_wake_all(sonde_state *state) {
   sonde_state_list_awake(state);
 }
 
+static void add_rim(sonde_state *state, uint32_t i) {
+  if (state->awake[i] || state->in_rim[i]) return;
+  state->in_rim[i] = 1;
+  state->rim[state->rim_count++] = i;
+}
+
 void sonde_state_list_awake(sonde_state *state) {
   const sonde_topology *topology = &state->model->topology;
-  state->row_count = state->edge_count = state->pair_count = 0;
+  for (uint32_t k = 0; k < state->rim_count; ++k) state->in_rim[state->rim[k]] = 0;
+  state->row_count = state->edge_count = state->pair_count = state->rim_count = 0;
   for (uint32_t i = 0; i < topology->vertex_count; ++i) {
     state->rows[state->row_count] = i;
     state->row_count += state->awake[i];
   }
   for (uint32_t e = 0; e < topology->edge_count; ++e) {
-    uint8_t a = state->awake[topology->edges[e][0]], b = state->awake[topology->edges[e][1]];
-    state->edges[state->edge_count] = e;
-    state->edge_count += a | b;
-    state->pairs[state->pair_count] = e;
-    state->pair_count += a & b;
+    uint32_t i = topology->edges[e][0], j = topology->edges[e][1];
+    uint8_t a = state->awake[i], b = state->awake[j];
+    if (!(a | b)) continue;
+    state->edges[state->edge_count++] = e;
+    if (a & b)
+      state->pairs[state->pair_count++] = e;
+    else
+      add_rim(state, a ? j : i);
   }
 }
 

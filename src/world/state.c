@@ -5,6 +5,8 @@
 
 #include "base/base.h"
 #include "base/maths.h"
+#include "base/morton.h"
+#include "tissue/two_layer.h"
 
 #include <string.h>
 
@@ -12,11 +14,11 @@ sonde_world_def sonde_world_def_default(void) {
   return (sonde_world_def){.dt_s = 1e-3,
                            .implicitness = 1,
                            .newton_iterations = 1,
-                           .pcg = {1e-4, 1e-12, 200},
+                           .pcg = {1e-3, 1e-12, 200},
                            .contact_law = SONDE_CONTACT_FOUNDATION,
                            .contact_stiffness_n_m3 = 5e8,
                            .contact_damping_n_s_m3 = 1e5,
-                           .sleep_displacement_m = 1e-6};
+                           .sleep_displacement_m = 5e-6};
 }
 
 static sonde_status check(const sonde_world_def *def, sonde_error *error) {
@@ -54,53 +56,29 @@ static size_t carve(sonde_state *s, char *base) {
   uint32_t faces = s->model->surface.face_count;
   CARVE(position, n), CARVE(velocity, n), CARVE(increment, n);
   CARVE(calm, n), CARVE(awake, n), CARVE(rows, n);
-  CARVE(edges, edges), CARVE(pairs, edges);
+  CARVE(edges, edges), CARVE(pairs, edges), CARVE(rim, n), CARVE(in_rim, n);
   CARVE(face_order, faces), CARVE(boxes, s->block_count);
   CARVE(touched, n), CARVE(parent, n), CARVE(share_m3, n), CARVE(gradient, n);
   CARVE(face_edges, faces), CARVE(face_area_m2, faces), CARVE(touched_faces, faces);
   CARVE(push_n, n), CARVE(contact_force, n), CARVE(lumped, n), CARVE(lumped_rows, n);
   CARVE(plane_weight, SONDE_MAX_PLANES);
   CARVE(plane_normal, SONDE_MAX_PLANES), CARVE(plane_offset, SONDE_MAX_PLANES);
-  CARVE(force, n), CARVE(product, n), CARVE(right, n), CARVE(trial, n);
+  CARVE(force, n), CARVE(product, n), CARVE(right, n), CARVE(trial, n), CARVE(scratch_nodes, n);
   CARVE(scratch.r, n), CARVE(scratch.z, n), CARVE(scratch.p, n), CARVE(scratch.q, n);
   return offset;
 }
 
-static uint64_t spread_bits(uint64_t x) {
-  x &= 0x1fffff;
-  x = (x | x << 32) & 0x1f00000000ffffu;
-  x = (x | x << 16) & 0x1f0000ff0000ffu;
-  x = (x | x << 8) & 0x100f00f00f00f00fu;
-  x = (x | x << 4) & 0x10c30c30c30c30c3u;
-  return (x | x << 2) & 0x1249249249249249u;
-}
-
-typedef struct keyed_face {
-  uint64_t key;
-  uint32_t face;
-} keyed_face;
-
-static int by_key(const void *a, const void *b) {
-  const keyed_face *x = a, *y = b;
-  if (x->key != y->key) return x->key < y->key ? -1 : 1;
-  return x->face < y->face ? -1 : 1;
-}
-
 static sonde_status order_faces(sonde_state *state, sonde_error *error) {
   const sonde_mesh *mesh = &state->model->surface;
-  keyed_face *list = SONDE_NEW(keyed_face, mesh->face_count);
+  sonde_keyed *list = SONDE_NEW(sonde_keyed, mesh->face_count);
   if (!list) return sonde_fail_memory(error);
   for (uint32_t f = 0; f < mesh->face_count; ++f) {
     sonde_vec3 c = vec3(0, 0, 0);
     for (int k = 0; k < 3; ++k) c = v_madd(c, 1.0 / 3, mesh->vertices[mesh->faces[f][k]]);
-    uint64_t key = 0;
-    const double at[3] = {c.x, c.y, c.z};
-    for (int k = 0; k < 3; ++k)
-      key |= spread_bits((uint64_t)clamp((at[k] + 10) * 1e4, 0, 2e6)) << k;
-    list[f] = (keyed_face){key, f};
+    list[f] = (sonde_keyed){sonde_morton_key(c), f};
   }
-  qsort(list, mesh->face_count, sizeof *list, by_key);
-  for (uint32_t f = 0; f < mesh->face_count; ++f) state->face_order[f] = list[f].face;
+  qsort(list, mesh->face_count, sizeof *list, sonde_keyed_compare);
+  for (uint32_t f = 0; f < mesh->face_count; ++f) state->face_order[f] = list[f].index;
   sonde_free(list);
   return SONDE_OK;
 }

@@ -30,7 +30,9 @@ struct sonde_state {
   uint32_t *rows;  // [nodes] awake nodes, ascending
   uint32_t *edges; // [edges] with at least one awake end
   uint32_t *pairs; // [edges] with both ends awake
-  uint32_t row_count, edge_count, pair_count;
+  uint32_t *rim;   // [nodes] sleeping ends of `edges`
+  uint8_t *in_rim; // [nodes]
+  uint32_t row_count, edge_count, pair_count, rim_count;
 
   // contact
   uint32_t *face_order; // [faces] sorted along a space-filling curve
@@ -61,10 +63,11 @@ struct sonde_state {
 
   // assembly and solve
   sonde_block_matrix *matrix;
-  sonde_vec3 *force;   // [nodes] tissue forces
-  sonde_vec3 *product; // [nodes] K v0
-  sonde_vec3 *right;   // [nodes] right-hand side
-  sonde_vec3 *trial;   // [nodes] positions kept for a rejected step
+  sonde_vec3 *force;                       // [nodes] tissue forces
+  sonde_vec3 *product;                     // [nodes] K v0
+  struct sonde_tissue_node *scratch_nodes; // [nodes]
+  sonde_vec3 *right;                       // [nodes] right-hand side
+  sonde_vec3 *trial;                       // [nodes] positions kept for a rejected step
   sonde_pcg_scratch scratch;
   sonde_pcg_result solver;
 

@@ -32,9 +32,10 @@ static sonde_motion probe_motion(const sonde_state *state, sonde_pose pose) {
 static void assemble(sonde_state *state, const sonde_probe *probe, const sonde_motion *motion) {
   double h = state->def.dt_s, lambda = state->def.implicitness;
   sonde_tissue_scales scales = {1, lambda * h, lambda * lambda * h * h};
-  sonde_tissue_part part = {state->rows, state->row_count, state->edges, state->edge_count};
+  sonde_tissue_part part = {state->rows,      state->row_count, state->rim,
+                            state->rim_count, state->edges,     state->edge_count};
   sonde_tissue_linearise(state->model, &part, state->position, state->velocity, &scales,
-                         state->force, state->product, state->matrix);
+                         state->force, state->product, state->matrix, state->scratch_nodes);
   sonde_contact_scales contact = {scales.damping, scales.stiffness};
   if (probe) sonde_contact_apply(state, motion, &contact);
   sonde_vec3 reaction = vec3(0, 0, 0);

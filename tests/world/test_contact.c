@@ -134,9 +134,9 @@ static void settled_reaction_equals_contact(void **state) {
   clear(&b);
 }
 
-// The volume law holds the probe as well: with the probe held, the tissue carries on average what the
-// probe feels (the law's region changes from step to step, which makes it hum), and the force is of
-// the size that the foundation gives.
+// The volume law holds the probe as well: with the probe held, the tissue carries on average what
+// the probe feels (the law's region changes from step to step, which makes it hum), and the force
+// is of the size that the foundation gives.
 static void volume_law_holds_the_probe(void **state) {
   (void)state;
   double force[2] = {0}, reaction[2] = {0};

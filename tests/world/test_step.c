@@ -46,12 +46,13 @@ static void lambda_zero_is_explicit_euler(void **state) {
   sonde_world_def def = exact_def(1e-4, 0);
   bench b = make(2, NULL, &def);
   sonde_vec3 x[66], v[66], force[66], product[66];
+  sonde_tissue_node scratch[66];
   shake(&b, x, v, 1e-3, 0.1);
   sonde_block_matrix *matrix;
   sonde_block_matrix_create(b.n, b.model->topology.edge_count,
                             (const uint32_t(*)[2])b.model->topology.edges, &matrix, NULL);
   const sonde_tissue_scales scales = {1, 0, 0};
-  sonde_tissue_linearise(b.model, NULL, x, v, &scales, force, product, matrix);
+  sonde_tissue_linearise(b.model, NULL, x, v, &scales, force, product, matrix, scratch);
   free_step(&b);
   for (uint32_t i = 0; i < b.n; ++i) {
     sonde_vec3 x1 = v_madd(x[i], def.dt_s, v[i]);
@@ -108,6 +109,7 @@ static void equals_equation_4(void **state) {
     bench b = make(1, NULL, &def);
     assert_int_equal(b.n, SMALL);
     sonde_vec3 x[SMALL], v[SMALL], force[SMALL], product[SMALL];
+    sonde_tissue_node scratch[SMALL];
     static double k_dense[DOF][DOF], c_dense[DOF][DOF], a[2 * DOF][2 * DOF + 1];
     double dy[2 * DOF];
     shake(&b, x, v, 1e-3, 0.1);
@@ -115,10 +117,10 @@ static void equals_equation_4(void **state) {
     sonde_block_matrix_create(b.n, b.model->topology.edge_count,
                               (const uint32_t(*)[2])b.model->topology.edges, &matrix, NULL);
     sonde_tissue_linearise(b.model, NULL, x, v, &(sonde_tissue_scales){0, 1, 0}, force, product,
-                           matrix);
+                           matrix, scratch);
     dense(matrix, c_dense);
     sonde_tissue_linearise(b.model, NULL, x, v, &(sonde_tissue_scales){0, 0, 1}, force, product,
-                           matrix);
+                           matrix, scratch);
     dense(matrix, k_dense);
     memset(a, 0, sizeof a);
     for (int r = 0; r < DOF; ++r) {
@@ -154,7 +156,7 @@ static sonde_surface_law single_law(double damping_s) {
   return law;
 }
 
-// Position of node 0 (at +x) after `steps`, started `start` below the rest skin.
+// Indentation of the node at +x after `steps`, started `start` below the rest skin.
 static double swing(double dt, double lambda, double damping_s, double start, uint32_t steps) {
   sonde_surface_law law = single_law(damping_s);
   sonde_world_def def = exact_def(dt, lambda);
@@ -162,10 +164,12 @@ static double swing(double dt, double lambda, double damping_s, double start, ui
   bench b = make(0, &law, &def);
   sonde_vec3 x[6];
   memcpy(x, b.model->surface.vertices, sizeof x);
-  x[0].x -= start;
+  uint32_t top = 0;
+  while (x[top].x < 0.99 * FIXTURE_RADIUS_M) top++;
+  x[top].x -= start;
   sonde_state_set(b.state, x, NULL);
   for (uint32_t k = 0; k < steps; ++k) free_step(&b);
-  double s = FIXTURE_RADIUS_M - sonde_state_positions(b.state)[0].x;
+  double s = FIXTURE_RADIUS_M - sonde_state_positions(b.state)[top].x;
   clear(&b);
   return s;
 }
@@ -225,7 +229,7 @@ static uint64_t press_hash(double sleep, uint32_t *awake, sonde_vec3 *position) 
 static void repeated_runs_are_identical(void **state) {
   (void)state;
   uint32_t awake;
-  assert_true(press_hash(1e-6, &awake, NULL) == press_hash(1e-6, &awake, NULL));
+  assert_true(press_hash(5e-6, &awake, NULL) == press_hash(5e-6, &awake, NULL));
 }
 
 // Sleeping leaves nodes out and changes positions by micrometres only.
@@ -233,13 +237,13 @@ static void sleeping_is_harmless(void **state) {
   (void)state;
   static sonde_vec3 asleep[1026], awake[1026];
   uint32_t few, all;
-  press_hash(1e-6, &few, asleep);
+  press_hash(5e-6, &few, asleep);
   press_hash(0, &all, awake);
   assert_int_equal(all, 1026);
   assert_true(few < 700 && few > 3);
   double worst = 0;
   for (int i = 0; i < 1026; ++i) worst = fmax(worst, v_distance(asleep[i], awake[i]));
-  assert_true(worst < 1e-5);
+  assert_true(worst < 5e-5);
   assert_true(worst > 0);
 }
 

@@ -1,0 +1,249 @@
+// spread:          node fields from site parameters.
+// settle_datum:    equilibrium of one row, from its last one or from the depth before.
+// work_on_curve:   all depths of a curve, with adjoint gradients carried to the sites.
+// sonde_refit_forces: all curves in parallel.
+// sonde_refit_start: nominal area enlarged by a rim of surrounding skin.
+#include "fit/refit.h"
+#include "fit/parallel.h"
+#include "fit/refit_inside.h"
+#include "fit/site_field.h"
+
+#include "base/maths.h"
+
+#include <string.h>
+
+enum { NEWTON_LIMIT = 60 };
+static const double RELATIVE_RESIDUAL = 1e-8;
+static const double PULL_ALONG_M = 0.010; // width of the rim that a footprint pulls along
+static const double LEAST_ROOM = 1.3;     // start of xm over the deepest datum
+
+uint32_t sonde_refit_parameters(const sonde_refit *r) { return 2 * r->sites->count + 2; }
+
+static void spread(sonde_refit *r, const double *theta) {
+  uint32_t count = r->sites->count;
+  for (uint32_t i = 0; i < r->model->surface.vertex_count; ++i) {
+    const double *basis = &r->basis[(size_t)i * count];
+    double ln_k = 0, ln_x = 0;
+    for (uint32_t s = 0; s < count; ++s) {
+      ln_k += basis[s] * theta[s];
+      ln_x += basis[s] * theta[count + s];
+    }
+    r->k0_n_m3[i] = exp(ln_k);
+    r->xm_m[i] = exp(ln_x);
+  }
+}
+
+// Starts from the row's own last equilibrium; else, and again when that fails, from the depth
+// before, grown in proportion. s_m keeps the outcome.
+static sonde_status settle_datum(const sonde_refit *r, sonde_patch_solver *solver,
+                                 const sonde_patch_law *law, uint32_t row, double depth_m,
+                                 const double *before_m, double before_depth_m, double *s_m,
+                                 sonde_error *error) {
+  uint32_t places = solver->patch->place_count;
+  if (r->settled[row]) {
+    sonde_status status =
+        sonde_patch_settle(solver, law, depth_m, RELATIVE_RESIDUAL, NEWTON_LIMIT, s_m, error);
+    if (!status) return SONDE_OK;
+  }
+  double growth = before_depth_m > 0 ? depth_m / before_depth_m : 0;
+  for (uint32_t i = 0; i < places; ++i) s_m[i] = before_m && growth > 0 ? growth * before_m[i] : 0;
+  sonde_status status =
+      sonde_patch_settle(solver, law, depth_m, RELATIVE_RESIDUAL, NEWTON_LIMIT, s_m, error);
+  r->settled[row] = !status;
+  return status;
+}
+
+static void carry_to_sites(const sonde_refit *r, const sonde_patch *patch,
+                           const sonde_patch_gradient *gradient, double *row) {
+  uint32_t count = r->sites->count;
+  memset(row, 0, sonde_refit_parameters(r) * sizeof *row);
+  for (uint32_t i = 0; i < patch->place_count; ++i) {
+    const double *basis = &r->basis[(size_t)patch->node[i] * count];
+    double by_k = gradient->by_ln_k0[i], by_x = gradient->by_ln_xm[i];
+    for (uint32_t s = 0; s < count; ++s) {
+      row[s] += basis[s] * by_k;
+      row[count + s] += basis[s] * by_x;
+    }
+  }
+  row[2 * count] = gradient->by_ln_shear;
+  row[2 * count + 1] = gradient->by_ln_limit;
+}
+
+typedef struct evaluation {
+  sonde_refit *refit;
+  sonde_patch_law law;
+  double *force_n, *jacobian;
+} evaluation;
+
+static sonde_status work_on_curve(void *user, uint32_t worker, uint32_t curve,
+                                  const atomic_bool *stop, sonde_error *error) {
+  const evaluation *at = user;
+  sonde_refit *r = at->refit;
+  const sonde_patch *patch = &r->patch[curve];
+  sonde_patch_solver *solver = &r->crew[worker].solver;
+  sonde_patch_gradient *gradient = &r->crew[worker].gradient;
+  uint32_t parameters = sonde_refit_parameters(r);
+  double *before = NULL, before_depth = 0;
+  sonde_status status = SONDE_OK;
+  sonde_patch_solver_use(solver, patch);
+  for (uint32_t k = r->plan->curve_start[curve]; k < r->plan->curve_start[curve + 1]; ++k) {
+    if (atomic_load(stop)) return sonde_fail(error, SONDE_CANCELLED, "cancelled");
+    double depth = r->m->data[r->plan->row[k]].penetration_m;
+    double *s = r->indentation_m + r->first_place[k];
+    sonde_error inner;
+    status = settle_datum(r, solver, &at->law, k, depth, before, before_depth, s, &inner);
+    if (!status)
+      status = sonde_patch_force(solver, &at->law, depth, s, &at->force_n[k],
+                                 at->jacobian ? gradient : NULL, &inner);
+    if (status)
+      return sonde_fail(error, status, "site %u, probe %s: %s",
+                        r->sites->sites[r->plan->curve_site[curve]].id,
+                        r->plan->probe[r->plan->curve_probe[curve]], inner.message);
+    if (at->jacobian) carry_to_sites(r, patch, gradient, at->jacobian + (size_t)k * parameters);
+    before = s;
+    before_depth = depth;
+  }
+  return SONDE_OK;
+}
+
+sonde_status sonde_refit_forces(sonde_refit *r, const double *theta, double *force_n,
+                                double *jacobian, const sonde_progress *progress,
+                                sonde_error *error) {
+  uint32_t count = r->sites->count;
+  spread(r, theta);
+  const sonde_surface_law *law = &r->model->law;
+  evaluation at = {r,
+                   {r->k0_n_m3, r->xm_m, exp(theta[2 * count]), exp(theta[2 * count + 1]),
+                    law->guard, law->tangential_stiffness_n_m3},
+                   force_n,
+                   jacobian};
+  return sonde_parallel_run(r->plan->curve_count, r->workers, work_on_curve, &at, progress,
+                            "stage 3", error);
+}
+
+// A footprint of area A and perimeter P works like one of area A + P l + pi l^2 (estimation.md 1).
+void sonde_refit_start(const sonde_refit *r, const sonde_curve_fit *curves, double *theta) {
+  const sonde_fit_plan *plan = r->plan;
+  double ln_k0 = 0, ln_xm = 0, deepest = 0, l = PULL_ALONG_M;
+  for (uint32_t c = 0; c < plan->curve_count; ++c) {
+    double hu = plan->half_u_m[plan->curve_probe[c]], hv = plan->half_v_m[plan->curve_probe[c]];
+    double area = 4 * hu * hv, wide = area + 4 * (hu + hv) * l + SONDE_PI * l * l;
+    ln_k0 += log(curves[c].k0_n_m3 * area / wide) / plan->curve_count;
+    ln_xm += log(curves[c].xm_m) / plan->curve_count;
+  }
+  for (uint32_t s = 0; s < plan->site_count; ++s) deepest = fmax(deepest, plan->site_deepest_m[s]);
+  ln_xm = fmax(ln_xm, log(LEAST_ROOM * deepest));
+  SONDE_ASSERT(isfinite(ln_k0) && isfinite(ln_xm));
+  for (uint32_t s = 0; s < r->sites->count; ++s) {
+    theta[s] = ln_k0;
+    theta[r->sites->count + s] = ln_xm;
+  }
+  theta[2 * r->sites->count] = ln_k0 + 2 * log(l);
+  theta[2 * r->sites->count + 1] = 0;
+}
+
+// ---- creation -----------------------------------------------------------------------------
+
+static sonde_status create_patches(sonde_refit *r, double reach_m, bool hold_rim,
+                                   sonde_error *error) {
+  const sonde_fit_plan *plan = r->plan;
+  sonde_status status = SONDE_OK;
+  for (uint32_t c = 0; c < plan->curve_count && !status; ++c) {
+    const sonde_site *site = &r->sites->sites[plan->curve_site[c]];
+    uint32_t probe = plan->curve_probe[c];
+    sonde_footprint footprint;
+    status = sonde_footprint_create(r->model, site, plan->half_u_m[probe], plan->half_v_m[probe],
+                                    SONDE_COVERAGE_CLIPPED, &footprint, error);
+    if (status) break;
+    status = sonde_patch_create(r->model, &footprint, site->normal, reach_m, hold_rim, &r->patch[c],
+                                error);
+    sonde_footprint_clear(&footprint);
+  }
+  return status;
+}
+
+static sonde_status create_starts(sonde_refit *r, sonde_error *error) {
+  const sonde_fit_plan *plan = r->plan;
+  size_t places = 0;
+  for (uint32_t k = 0; k < plan->row_count; ++k) {
+    r->first_place[k] = places;
+    places += r->patch[plan->row_curve[k]].place_count;
+  }
+  r->indentation_m = SONDE_NEW(double, places);
+  return r->indentation_m ? SONDE_OK : sonde_fail_memory(error);
+}
+
+static sonde_status create_crew(sonde_refit *r, uint32_t threads, sonde_error *error) {
+  uint32_t curves = r->plan->curve_count, places = 0;
+  r->workers = sonde_parallel_workers(threads, curves);
+  r->crew = SONDE_NEW(sonde_refit_worker, r->workers);
+  if (!r->crew) return sonde_fail_memory(error);
+  for (uint32_t c = 0; c < curves; ++c)
+    if (r->patch[c].place_count > places) places = r->patch[c].place_count;
+  for (uint32_t w = 0; w < r->workers; ++w) {
+    sonde_status status = sonde_patch_solver_create(r->patch, curves, &r->crew[w].solver, error);
+    if (status) return status;
+    r->crew[w].gradient.by_ln_k0 = SONDE_NEW(double, places);
+    r->crew[w].gradient.by_ln_xm = SONDE_NEW(double, places);
+    if (!r->crew[w].gradient.by_ln_k0 || !r->crew[w].gradient.by_ln_xm)
+      return sonde_fail_memory(error);
+  }
+  return SONDE_OK;
+}
+
+static bool allocate(sonde_refit *r) {
+  size_t nodes = r->model->surface.vertex_count, count = r->sites->count;
+  r->patch = SONDE_NEW(sonde_patch, r->plan->curve_count);
+  r->basis = SONDE_NEW(double, nodes *count);
+  r->roughness = SONDE_NEW(double, count *count);
+  r->k0_n_m3 = SONDE_NEW(double, nodes);
+  r->xm_m = SONDE_NEW(double, nodes);
+  r->first_place = SONDE_NEW(size_t, r->plan->row_count);
+  r->settled = SONDE_NEW(uint8_t, r->plan->row_count);
+  return r->patch && r->basis && r->roughness && r->k0_n_m3 && r->xm_m && r->first_place &&
+         r->settled;
+}
+
+sonde_status sonde_refit_create(const sonde_model *model, const sonde_site_table *sites,
+                                const sonde_measurements *m, const sonde_fit_plan *plan,
+                                const sonde_fit_def *def, double reach_m, bool hold_rim,
+                                sonde_refit **refit, sonde_error *error) {
+  sonde_refit *r = *refit = SONDE_NEW(sonde_refit, 1);
+  if (!r) return sonde_fail_memory(error);
+  *r = (sonde_refit){.model = model, .sites = sites, .m = m, .plan = plan, .def = def};
+  sonde_status status = allocate(r) ? SONDE_OK : sonde_fail_memory(error);
+  for (uint32_t k = 0; k < plan->probe_count && !status; ++k)
+    if (!(plan->mean_force_n[k] > 0))
+      status = sonde_fail(error, SONDE_ARGUMENT,
+                          "probe %s has a mean force of %g N, expected > 0 for stage 3",
+                          plan->probe[k], plan->mean_force_n[k]);
+  if (!status) status = sonde_site_basis(model, sites, r->basis, error);
+  if (!status) status = sonde_site_roughness(sites, r->roughness, error);
+  if (!status) status = create_patches(r, reach_m, hold_rim, error);
+  if (!status) status = create_starts(r, error);
+  if (!status) status = create_crew(r, def->threads, error);
+  if (!status) return SONDE_OK;
+  sonde_refit_destroy(r);
+  *refit = NULL;
+  return status;
+}
+
+void sonde_refit_destroy(sonde_refit *r) {
+  if (!r) return;
+  for (uint32_t c = 0; r->patch && c < r->plan->curve_count; ++c) sonde_patch_clear(&r->patch[c]);
+  for (uint32_t w = 0; r->crew && w < r->workers; ++w) {
+    sonde_patch_solver_clear(&r->crew[w].solver);
+    sonde_free(r->crew[w].gradient.by_ln_k0);
+    sonde_free(r->crew[w].gradient.by_ln_xm);
+  }
+  sonde_free(r->crew);
+  sonde_free(r->patch);
+  sonde_free(r->basis);
+  sonde_free(r->roughness);
+  sonde_free(r->k0_n_m3);
+  sonde_free(r->xm_m);
+  sonde_free(r->first_place);
+  sonde_free(r->settled);
+  sonde_free(r->indentation_m);
+  sonde_free(r);
+}

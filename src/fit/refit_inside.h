@@ -1,0 +1,30 @@
+// The state of stage 3, shared by its model (refit.c) and its minimisation (refit_minimise.c).
+#ifndef SONDE_SRC_FIT_REFIT_INSIDE_H
+#define SONDE_SRC_FIT_REFIT_INSIDE_H
+
+#include "fit/refit.h"
+
+typedef struct sonde_refit_worker {
+  sonde_patch_solver solver;
+  sonde_patch_gradient gradient;
+} sonde_refit_worker;
+
+struct sonde_refit {
+  const sonde_model *model;
+  const sonde_site_table *sites;
+  const sonde_measurements *m;
+  const sonde_fit_plan *plan;
+  const sonde_fit_def *def;
+  sonde_patch *patch;    // [curve_count]
+  double *basis;         // [nodes * site_count]
+  double *roughness;     // [site_count * site_count]
+  double *k0_n_m3;       // [nodes]
+  double *xm_m;          // [nodes]
+  size_t *first_place;   // [row_count] where a row's equilibrium begins
+  uint8_t *settled;      // [row_count] its equilibrium is a start for the next call
+  double *indentation_m; // equilibria of all rows
+  uint32_t workers;
+  sonde_refit_worker *crew;
+};
+
+#endif

@@ -1,0 +1,219 @@
+// add_data / add_prior: cost and normal equations of measurements and of smoothness.
+// solve:     Cholesky of the damped normal matrix.
+// evaluate:  forces, derivatives and cost at a set of parameters.
+// sonde_refit_minimise: Levenberg-Marquardt with Marquardt's scaling.
+#include "fit/arrow.h"
+#include "fit/refit_inside.h"
+
+#include "base/maths.h"
+
+#include <string.h>
+
+static const double DATA_SD = 0.02;      // of the probe's mean force: what the model class leaves
+static const double ROUGHNESS_SD = 0.02; // of ln k0 and ln xm per site spacing
+static const double LONGEST_STEP = 0.7;  // of a logarithm
+static const double ENOUGH = 1e-4;       // relative fall of the cost that counts as none
+static const double DAMPING_START = 1e-3, DAMPING_LEAST = 1e-9, DAMPING_MOST = 1e9;
+enum { MOST_ITERATIONS = 40 };
+
+typedef struct workspace {
+  uint32_t n, rows;
+  double *force_n, *jacobian;             // at the trial
+  double *matrix, *gradient;              // normal equations at the accepted point
+  double *factor, *step, *trial, *scaled; // scaled: a weighted row
+} workspace;
+
+static double loss_scale(const sonde_refit *r, double mean_n) {
+  double scale = r->def->loss_scale;
+  return r->def->weights == SONDE_WEIGHTS_RELATIVE ? scale : scale / mean_n;
+}
+
+// Lower triangle of weight * row row^T and the gradient. Entries that are 0 are skipped.
+static void add_row(workspace *w, const double *row, double residual, double weight) {
+  for (uint32_t a = 0; a < w->n; ++a) {
+    double scaled = weight * row[a];
+    if (fpclassify(scaled) == FP_ZERO) continue;
+    w->gradient[a] += scaled * residual;
+    for (uint32_t b = 0; b <= a; ++b) w->matrix[(size_t)a * w->n + b] += scaled * row[b];
+  }
+}
+
+static double add_data(const sonde_refit *r, workspace *w, bool normal) {
+  double cost = 0;
+  for (uint32_t k = 0; k < w->rows; ++k) {
+    double mean_n = r->plan->mean_force_n[r->plan->row_probe[k]], weight;
+    double error = (w->force_n[k] - r->m->data[r->plan->row[k]].force_n) / mean_n;
+    cost += sonde_loss(r->def->loss, loss_scale(r, mean_n), error, &weight) / (DATA_SD * DATA_SD);
+    SONDE_ASSERT(mean_n > 0);
+    if (normal)
+      add_row(w, w->jacobian + (size_t)k * w->n, error * mean_n,
+              weight / (mean_n * mean_n * DATA_SD * DATA_SD));
+  }
+  return cost;
+}
+
+static double add_prior(const sonde_refit *r, workspace *w, const double *theta, bool normal) {
+  uint32_t count = r->sites->count;
+  double cost = 0, weight = 1 / (ROUGHNESS_SD * ROUGHNESS_SD);
+  for (uint32_t field = 0; field < 2; ++field)
+    for (uint32_t s = 0; s < count; ++s) {
+      const double *rough = &r->roughness[(size_t)s * count];
+      double residual = 0;
+      for (uint32_t t = 0; t < count; ++t) residual += rough[t] * theta[field * count + t];
+      cost += 0.5 * weight * residual * residual;
+      if (!normal) continue;
+      memset(w->scaled, 0, w->n * sizeof *w->scaled);
+      memcpy(w->scaled + field * count, rough, count * sizeof *rough);
+      add_row(w, w->scaled, residual, weight);
+    }
+  return cost;
+}
+
+// Forces and cost at theta; fills the normal equations, which the caller wants after acceptance.
+static double assemble(const sonde_refit *r, workspace *w, const double *theta, bool normal) {
+  if (normal) {
+    memset(w->matrix, 0, (size_t)w->n * w->n * sizeof *w->matrix);
+    memset(w->gradient, 0, w->n * sizeof *w->gradient);
+  }
+  double data = add_data(r, w, normal);
+  return data + add_prior(r, w, theta, normal);
+}
+
+// Step of (H + damping diag H) d = -g by Cholesky in the lower triangle.
+static bool solve(workspace *w, double damping) {
+  uint32_t n = w->n;
+  double *a = w->factor, *x = w->step;
+  memcpy(a, w->matrix, (size_t)n * n * sizeof *a);
+  for (uint32_t j = 0; j < n; ++j) a[(size_t)j * n + j] *= 1 + damping;
+  for (uint32_t i = 0; i < n; ++i) {
+    for (uint32_t j = 0; j <= i; ++j) {
+      double sum = a[(size_t)i * n + j];
+      for (uint32_t k = 0; k < j; ++k) sum -= a[(size_t)i * n + k] * a[(size_t)j * n + k];
+      if (i == j && !(sum > 0)) return false;
+      a[(size_t)i * n + j] = i == j ? sqrt(sum) : sum / a[(size_t)j * n + j];
+    }
+  }
+  for (uint32_t i = 0; i < n; ++i) {
+    x[i] = -w->gradient[i];
+    for (uint32_t k = 0; k < i; ++k) x[i] -= a[(size_t)i * n + k] * x[k];
+    x[i] /= a[(size_t)i * n + i];
+  }
+  for (uint32_t i = n; i-- > 0;) {
+    for (uint32_t k = i + 1; k < n; ++k) x[i] -= a[(size_t)k * n + i] * x[k];
+    x[i] /= a[(size_t)i * n + i];
+  }
+  return true;
+}
+
+static double longest(const double *x, uint32_t n) {
+  double most = 0;
+  for (uint32_t i = 0; i < n; ++i) most = fmax(most, fabs(x[i]));
+  return most;
+}
+
+static bool allocate(workspace *w) {
+  size_t n = w->n;
+  w->force_n = SONDE_NEW(double, w->rows);
+  w->jacobian = SONDE_NEW(double, w->rows *n);
+  w->matrix = SONDE_NEW(double, n *n);
+  w->factor = SONDE_NEW(double, n *n);
+  w->gradient = SONDE_NEW(double, n);
+  w->step = SONDE_NEW(double, n);
+  w->trial = SONDE_NEW(double, n);
+  w->scaled = SONDE_NEW(double, n);
+  return w->force_n && w->jacobian && w->matrix && w->factor && w->gradient && w->step &&
+         w->trial && w->scaled;
+}
+
+static void release(workspace *w) {
+  sonde_free(w->force_n);
+  sonde_free(w->jacobian);
+  sonde_free(w->matrix);
+  sonde_free(w->factor);
+  sonde_free(w->gradient);
+  sonde_free(w->step);
+  sonde_free(w->trial);
+  sonde_free(w->scaled);
+}
+
+// Tells the caller about the iteration too.
+typedef struct stepwise {
+  const sonde_progress *outer;
+  uint32_t evaluation;
+  double cost;
+} stepwise;
+
+static bool report_step(double fraction, const char *what, void *user) {
+  const stepwise *at = user;
+  char text[96];
+  snprintf(text, sizeof text, "%s, evaluation %u, cost %.0f", what, at->evaluation, at->cost);
+  return sonde_progress_report(at->outer, fraction, text);
+}
+
+// Cost at the trial; infinite where an equilibrium is not found.
+static sonde_status try_point(sonde_refit *r, workspace *w, stepwise *at, double *cost,
+                              sonde_error *error) {
+  const sonde_progress inner = {report_step, at};
+  at->evaluation++;
+  sonde_status status = sonde_refit_forces(r, w->trial, w->force_n, w->jacobian, &inner, error);
+  *cost = status ? INFINITY : assemble(r, w, w->trial, false);
+  return status == SONDE_CONVERGENCE ? SONDE_OK : status;
+}
+
+static void accept(const sonde_refit *r, workspace *w, double *theta, double *force_n) {
+  memcpy(theta, w->trial, w->n * sizeof *theta);
+  memcpy(force_n, w->force_n, w->rows * sizeof *force_n);
+  (void)assemble(r, w, theta, true);
+}
+
+static sonde_status iterate(sonde_refit *r, workspace *w, double *theta, double *force_n,
+                            stepwise *at, sonde_refit_result *result, sonde_error *error) {
+  double damping = DAMPING_START;
+  uint32_t limit =
+      r->def->max_iterations < MOST_ITERATIONS ? r->def->max_iterations : (uint32_t)MOST_ITERATIONS;
+  while (result->iterations < limit && damping < DAMPING_MOST) {
+    if (!solve(w, damping)) {
+      damping *= 10;
+      continue;
+    }
+    double size = longest(w->step, w->n), share = size > LONGEST_STEP ? LONGEST_STEP / size : 1;
+    for (uint32_t i = 0; i < w->n; ++i) w->trial[i] = theta[i] + share * w->step[i];
+    double cost;
+    sonde_status status = try_point(r, w, at, &cost, error);
+    if (status) return status;
+    result->iterations++;
+    if (!(cost < result->cost)) {
+      result->converged = size < 1e-6;
+      if (result->converged) break;
+      damping = fmax(10 * damping, 1e-6);
+      continue;
+    }
+    double fall = result->cost - cost;
+    result->cost = at->cost = cost;
+    accept(r, w, theta, force_n);
+    damping = fmax(0.1 * damping, DAMPING_LEAST);
+    result->converged = share >= 1 && fall <= ENOUGH * cost;
+    if (result->converged) break;
+  }
+  return SONDE_OK;
+}
+
+sonde_status sonde_refit_minimise(sonde_refit *r, double *theta, double *force_n,
+                                  const sonde_progress *progress, sonde_refit_result *result,
+                                  sonde_error *error) {
+  *result = (sonde_refit_result){0};
+  workspace w = {.n = sonde_refit_parameters(r), .rows = r->plan->row_count};
+  stepwise at = {.outer = progress};
+  sonde_status status = allocate(&w) ? SONDE_OK : sonde_fail_memory(error);
+  if (status) goto done;
+  memcpy(w.trial, theta, w.n * sizeof *theta);
+  status = try_point(r, &w, &at, &result->cost, error);
+  if (!status && !isfinite(result->cost)) status = SONDE_CONVERGENCE; // error says where
+  if (status) goto done;
+  accept(r, &w, theta, force_n);
+  result->start_cost = at.cost = result->cost;
+  status = iterate(r, &w, theta, force_n, &at, result, error);
+done:
+  release(&w);
+  return status;
+}
