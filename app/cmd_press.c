@@ -47,7 +47,7 @@ typedef struct press {
   double vein, artery, vein_short_m; // NaN when not under the probe
 } press;
 
-static const double RESIDUAL = 1e-9;
+static const double COARSE = 1e-6, RESIDUAL = 1e-9; // relative residual on the way and at the end
 static const double DEEPEST_M = 0.06;
 
 // Returns -1 to go on, else the exit code.
@@ -94,10 +94,10 @@ static int read_options(int argc, char **argv, options *o) {
   return -1;
 }
 
-static void settle(press *p, double depth_m) {
+static void settle(press *p, double depth_m, double residual) {
   p->depth_m = depth_m;
   p->pose = sonde_site_pose(p->site, depth_m);
-  p->settled = sonde_settle(p->state, &p->probe, p->pose, RESIDUAL, 400);
+  p->settled = sonde_settle(p->state, &p->probe, p->pose, residual, 400);
   p->steps += p->settled.iterations;
   sonde_vec3 f = sonde_state_contact(p->state)->force_n, n = p->site->normal;
   p->force_n = f.x * n.x + f.y * n.y + f.z * n.z;
@@ -113,23 +113,24 @@ static sonde_status find_depth(press *p, double target, sonde_error *error) {
   sonde_progress progress = app_progress();
   double low = 0, low_f = -target, high = 0.002, high_f;
   for (;; high += 0.002) {
-    settle(p, high);
+    settle(p, high, COARSE);
     high_f = p->force_n - target;
     if (!report(&progress, p, target)) return SONDE_CANCELLED;
     if (high_f >= 0 || high >= DEEPEST_M) break;
     low = high;
     low_f = high_f;
   }
-  for (int k = 0; k < 60 && fabs(p->force_n - target) > 1e-5 * target && high_f >= 0; ++k) {
+  for (int k = 0; k < 60 && fabs(p->force_n - target) > 1e-4 * target && high_f >= 0; ++k) {
     double depth = low - low_f * (high - low) / (high_f - low_f);
-    settle(p, depth);
+    settle(p, depth, COARSE);
     double f = p->force_n - target;
     if (f < 0)
       low = depth, low_f = f, high_f *= k % 3 == 2 ? 0.5 : 1;
     else
       high = depth, high_f = f, low_f *= k % 3 == 2 ? 0.5 : 1;
   }
-  if (fabs(p->force_n - target) <= 1e-3 * target && p->settled.converged) return SONDE_OK;
+  settle(p, p->depth_m, RESIDUAL);
+  if (fabs(p->force_n - target) <= 5e-3 * target && p->settled.converged) return SONDE_OK;
   error->status = SONDE_CONVERGENCE;
   snprintf(error->message, sizeof error->message,
            "%g N was not reached: %g N at %g mm, residual %.2g", target, p->force_n,
@@ -146,7 +147,8 @@ static sonde_status look(press *p, const char *image_path, sonde_error *error) {
   sonde_interior_update(interior,
                         &(sonde_interior_input){sonde_state_positions(p->state),
                                                 sonde_state_contact_forces(p->state), p->pose,
-                                                &p->pathology, -1, sonde_state_tick(p->state)});
+                                                &p->pathology, -1, sonde_state_tick(p->state),
+                                      p->probe.half_x_m, p->probe.half_y_m});
   sonde_vessel_state vessel;
   p->vein = p->artery = p->vein_short_m = NAN;
   if (sonde_interior_vessel_at_plane(interior, 0, p->pose, &vessel)) {
@@ -226,8 +228,8 @@ int cmd_press(int argc, char **argv) {
     status = find_depth(&p, o.force_n, &error);
     app_progress_end();
   } else if (!status) {
-    for (double d = fmin(0.002, o.depth_m); d < o.depth_m; d += 0.002) settle(&p, d);
-    settle(&p, o.depth_m);
+    for (double d = fmin(0.002, o.depth_m); d < o.depth_m; d += 0.002) settle(&p, d, COARSE);
+    settle(&p, o.depth_m, RESIDUAL);
   }
   if (!status) status = look(&p, o.image, &error);
   if (!status) print(&p, &o);

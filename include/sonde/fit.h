@@ -118,7 +118,7 @@ typedef struct sonde_fit_def {
   uint32_t max_iterations;   /**< default 400 */
   bool fit_pretension;       /**< also estimate T0 >= 0 (stage 2); default false */
   bool cold_start;           /**< stage 2 from one generic start instead of stage 1 */
-  double kept_edge_n_m;      /**< edge stiffness of a stage 3 model; default 10 */
+  double kept_edge_n_m;      /**< edge stiffness of a stage 3 model; default 5 */
   uint32_t threads;          /**< of stage 3; 0 (default): one per online core */
 } sonde_fit_def;
 

@@ -103,7 +103,9 @@ static sonde_status read_all(FILE *stream, const char *path, char **bytes, size_
     used += fread(buffer + used, 1, room - used, stream);
     SONDE_ASSERT(used <= room);
     if (used < room) break;
-    buffer = sonde_realloc(buffer, room, 2 * room + 1);
+    char *grown = sonde_realloc(buffer, room, 2 * room + 1);
+    if (!grown) sonde_free(buffer);
+    buffer = grown;
     room *= 2;
   }
   if (!buffer) return sonde_fail_memory(error);

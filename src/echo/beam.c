@@ -26,6 +26,7 @@ typedef struct kernel {
 
 // Gaussian taps; energy of the kernel folded with the splat's triangle is one per unit length.
 static kernel gaussian(double sigma) {
+  SONDE_ASSERT(sigma > 0);
   kernel k = {.half = (int)ceil(2.6 * sigma)};
   if (k.half > SONDE_MAX_TAPS) k.half = SONDE_MAX_TAPS;
   if (k.half < 1) k.half = 1;

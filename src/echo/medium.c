@@ -34,6 +34,7 @@ static const interface skin_top = {18, 0.5f, 0.3f}, skin_base = {10, 0.3f, 0.2f}
                        cortex = {36, 0.4f, 0.02f};
 
 static void interpolate_row(sonde_echo *echo, uint32_t row) {
+  SONDE_ASSERT(row < SONDE_MEDIUM_ROWS);
   const uint32_t count = SONDE_PLANE_COLUMNS * SONDE_PLANE_ROWS, lines = echo->lines;
   float y = (float)row * (SONDE_PLANE_ROWS - 1) / (SONDE_MEDIUM_ROWS - 1);
   uint32_t j = (uint32_t)y < SONDE_PLANE_ROWS - 2 ? (uint32_t)y : SONDE_PLANE_ROWS - 2;
@@ -159,6 +160,7 @@ static tissue tissue_at(const sonde_echo *echo, const float *row, uint32_t l) {
 }
 
 static void record(sonde_echo *echo, uint32_t l, float depth_m, float amplitude) {
+  SONDE_ASSERT(l < echo->lines);
   uint32_t n = echo->echo_count[l];
   if (n >= SONDE_MAX_ECHOES || amplitude <= 0) return;
   echo->echoes[l * SONDE_MAX_ECHOES + n] = (specular){depth_m, amplitude};

@@ -32,6 +32,7 @@ static inline float decibels(float amplitude) {
 }
 
 static void compress(sonde_echo *echo) {
+  SONDE_ASSERT(echo->frame.settings.dynamic_range_db > 0);
   const sonde_echo_settings *s = &echo->frame.settings;
   float range = (float)s->dynamic_range_db, scale = 255 / range;
   float offset = (float)s->gain_db - white_db + range;

@@ -49,6 +49,7 @@ static void store_node(sonde_echo *echo, uint32_t node, sonde_vec3 point, double
 }
 
 void sonde_echo_plane(sonde_echo *echo) {
+  SONDE_ASSERT(echo->frame.pathology != NULL && echo->frame.depth_m > 0);
   const frame *f = &echo->frame;
   double dx = f->aperture_m / (SONDE_PLANE_COLUMNS - 1), dz = f->depth_m / (SONDE_PLANE_ROWS - 1);
   sonde_vec3 down = q_rotate(f->probe.rotation, vec3(0, 0, dz));

@@ -183,6 +183,7 @@ static void lay(sonde_echo *echo, const batch *in, uint32_t count, float turns) 
 }
 
 static void splat(sonde_echo *echo, const map *world, uint32_t from, uint32_t count) {
+  SONDE_ASSERT(from + count <= SONDE_POOL + echo->per_cell);
   const frame *f = &echo->frame;
   float m[4][3]; // probe frame, in units of lines, elevation halves, samples
   const float unit[3] = {(float)(1 / f->pitch_m), (float)(1 / sonde_elevation_half_m),

@@ -39,6 +39,8 @@ static void update_interior(sonde_session *session, const unsigned char *slot) {
       .pathology = pathology,
       .dt_s = same ? since_s : -1.0,
       .tick = head->snapshot.tick,
+      .face_half_x_m = session->probes[head->snapshot.probe].half_x_m,
+      .face_half_y_m = session->probes[head->snapshot.probe].half_y_m,
   };
   sonde_interior_update(session->interior, &input);
   session->shown = true;

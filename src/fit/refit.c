@@ -13,7 +13,7 @@
 #include <string.h>
 
 enum { NEWTON_LIMIT = 60 };
-static const double RELATIVE_RESIDUAL = 1e-8;
+static const double RELATIVE_RESIDUAL = 1e-7;
 static const double PULL_ALONG_M = 0.010; // width of the rim that a footprint pulls along
 static const double LEAST_ROOM = 1.3;     // start of xm over the deepest datum
 

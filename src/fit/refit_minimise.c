@@ -13,6 +13,7 @@ static const double DATA_SD = 0.02;      // of the probe's mean force: what the 
 static const double ROUGHNESS_SD = 0.02; // of ln k0 and ln xm per site spacing
 static const double LONGEST_STEP = 0.7;  // of a logarithm
 static const double ENOUGH = 1e-4;       // relative fall of the cost that counts as none
+static const double NOTHING = 1e-5;      // fall of an exact fit
 static const double DAMPING_START = 1e-3, DAMPING_LEAST = 1e-9, DAMPING_MOST = 1e9;
 enum { MOST_ITERATIONS = 40 };
 
@@ -192,7 +193,7 @@ static sonde_status iterate(sonde_refit *r, workspace *w, double *theta, double 
     result->cost = at->cost = cost;
     accept(r, w, theta, force_n);
     damping = fmax(0.1 * damping, DAMPING_LEAST);
-    result->converged = share >= 1 && fall <= ENOUGH * cost;
+    result->converged = share >= 1 && fall <= ENOUGH * cost + NOTHING;
     if (result->converged) break;
   }
   return SONDE_OK;

@@ -9,8 +9,8 @@
 
 #include <string.h>
 
-enum { SHORTENINGS = 40, GRADIENT_STEPS = 12 };
-static const double NEWTON_ACCURACY = 1e-4, ADJOINT_ACCURACY = 1e-9;
+enum { SHORTENINGS = 40, GRADIENT_STEPS = 8 };
+static const double NEWTON_ACCURACY = 1e-2, ADJOINT_ACCURACY = 1e-7;
 static const double NEGLIGIBLE_N = 1e-13;
 
 static void add_edge(const sonde_patch *p, const sonde_patch_law *law, uint32_t e, const double *s,

@@ -197,6 +197,7 @@ static uint32_t fill_row(const sonde_interior *in, uint32_t i, uint32_t j, uint3
 }
 
 static sonde_status factor_surface(sonde_interior *in, sonde_error *error) {
+  SONDE_ASSERT(in->ldl == NULL && in->s_count >= 4);
   sonde_status status = SONDE_OK;
   uint32_t count = in->theta_count * in->s_count, filled = 0;
   uint32_t *start = SONDE_NEW(uint32_t, count + 1),

@@ -25,7 +25,7 @@
 static const double inversion_tolerance_m = 1e-7;
 // Beyond this area strain the skin's gathering under a probe is not followed by the depth: springs
 // alone let it crumple, and squeezed-out tissue would lift a vessel out of the leg.
-static const double most_slide_strain = 0.10;
+static const double most_slide_strain = 0.05;
 
 // ---- update -------------------------------------------------------------------------------
 
@@ -111,6 +111,7 @@ typedef struct stencil {
 } stencil;
 
 static stencil stencil_at(const sonde_interior *in, double i, double j) {
+  SONDE_ASSERT(isfinite(i) && isfinite(j) && in->s_count >= 2);
   uint32_t n = in->theta_count;
   double last = in->s_count - 1;
   j = clamp(j, 0, last);

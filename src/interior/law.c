@@ -40,6 +40,7 @@ static double tube_pressure(double a, double *slope) {
 // Area over the stress-free one. The cubic rises everywhere; Newton converges from above and below
 // because its slope stays within a factor of two over the range.
 static double open_area(double transmural_pa) {
+  SONDE_ASSERT(isfinite(transmural_pa));
   double slope, low = tube_pressure(contact_area, &slope);
   if (transmural_pa < low)
     return contact_area * exp((transmural_pa - low) / (slope * contact_area));
@@ -85,6 +86,7 @@ double sonde_vein_rest_scale(const sonde_pathology *pathology, bool clot) {
 
 void sonde_vessel_shape(int which, const sonde_pathology *pathology, bool clot, double ratio,
                         double *half_short, double *half_long) {
+  SONDE_ASSERT(ratio > 0 && half_short != NULL && half_long != NULL);
   double lost = clamp(1 - ratio, -1, 1), widening = (0.294 + 0.153 * lost) * lost;
   if (which == 1) {
     widening = 0.33 * lost;

@@ -18,6 +18,7 @@ static double line_length(const sonde_vessel *line) {
 }
 
 static sonde_vessel_point point_at(const sonde_vessel *line, double arc) {
+  SONDE_ASSERT(line->count >= 2 && arc >= 0);
   for (uint32_t i = 1; i < line->count; ++i) {
     const sonde_vessel_point *a = &line->point[i - 1], *b = &line->point[i];
     double piece = v_distance(a->centre_m, b->centre_m);

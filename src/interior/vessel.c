@@ -45,10 +45,12 @@ static void add_node(sums *t, double f, double x, double y, double least) {
 
 // Half side of the uniform strip that stands for the load: between the one with the same second
 // moment and the reach of the contact. The moment alone takes the peak under the middle of a flat
-// face on a round leg at its full sharpness; the stiff skin evens it out (docs/interior.md).
-static double half_side(double moment, double low, double high) {
+// face on a round leg at its full sharpness; the stiff skin evens it out (docs/interior.md). Nodes just
+// outside the face carry a share too: the strip is never wider than the face.
+static double half_side(double moment, double low, double high, double face) {
   double half = sqrt(3 * fmax(0, moment)), reach = 0.5 * fmax(0, high - low);
-  return fmax(half + reach_share * fmax(reach - half, 0), least_half_m) + skin_spread_m;
+  half = fmax(half + reach_share * fmax(reach - half, 0), least_half_m);
+  return (face > 0 ? fmin(half, face) : half) + skin_spread_m;
 }
 
 static load measure_load(const sonde_model *model, const sonde_interior_input *input) {
@@ -71,8 +73,10 @@ static load measure_load(const sonde_model *model, const sonde_interior_input *i
   double s = 1 / t.force;
   l.force_n = t.force;
   l.centre_m = v_scale(l.centre_m, s);
-  l.half_x_m = half_side(t.xx * s - t.x * s * t.x * s, t.low_x, t.high_x);
-  l.half_y_m = half_side(t.yy * s - t.y * s * t.y * s, t.low_y, t.high_y);
+  l.half_x_m = half_side(t.xx * s - t.x * s * t.x * s, t.low_x, t.high_x,
+                         input->face_half_x_m);
+  l.half_y_m = half_side(t.yy * s - t.y * s * t.y * s, t.low_y, t.high_y,
+                         input->face_half_y_m);
   l.pressure_pa = l.force_n / (4 * l.half_x_m * l.half_y_m);
   return l;
 }
@@ -177,6 +181,7 @@ static sonde_vessel_state blend_states(const sonde_vessel_state *a, const sonde_
 }
 
 bool sonde_vessel_at(const sonde_interior *in, int which, double s, sonde_vessel_state *state) {
+  SONDE_ASSERT(which == 0 || which == 1);
   uint32_t count = in->station_count[which];
   const sonde_station *station = in->station[which];
   if (count < 2 || s < station[0].s_m || s > station[count - 1].s_m) return false;
@@ -192,6 +197,7 @@ bool sonde_vessel_at(const sonde_interior *in, int which, double s, sonde_vessel
 // Outside the lumen circles become ellipses of half axes m - c and m + c whose area is that of the
 // circle less what the lumen lost; both the loss and c fade out.
 void sonde_vessel_carry(const sonde_vessel_state *v, double *short_m, double *long_m) {
+  SONDE_ASSERT(v->rest_radius_m > 0 && v->half_short_m > 0);
   double rest = v->rest_radius_m, x = *short_m, y = *long_m, r = sqrt(x * x + y * y);
   if (r <= rest) {
     *short_m = x * v->half_short_m / rest;

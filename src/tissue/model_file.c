@@ -5,6 +5,7 @@
 #include "tissue/model.h"
 
 #include "base/base.h"
+#include "base/maths.h"
 
 #include <cjson/cJSON.h>
 #include <string.h>
@@ -30,6 +31,7 @@ static void put(writer *w, const char *name, const char *type, const char *unit,
   if (w->used + count > w->room) {
     size_t room = 2 * (w->used + count) + 4096;
     char *blob = sonde_realloc(w->blob, w->used, room);
+    if (!blob) sonde_free(w->blob);
     w->blob = blob;
     w->room = blob ? room : 0;
     if (!blob) w->failed = true;
@@ -286,12 +288,6 @@ static bool take_nodes(const reader *r, sonde_model *model) {
     if (!from || rows != n) return false;
     memcpy(array[k].to, from, (size_t)n * 8);
   }
-  for (uint32_t i = 0; i < n; ++i)
-    if (!(model->k0_n_m3[i] > 0) || !(model->xm_m[i] > 0)) {
-      sonde_fail(r->error, SONDE_FORMAT, "%s: node %u has k0 %g and xm %g, expected positive",
-                 r->path, i, model->k0_n_m3[i], model->xm_m[i]);
-      return false;
-    }
   return true;
 }
 
@@ -375,6 +371,51 @@ static void take_text(const reader *r, const char *key, char *to, size_t size) {
   snprintf(to, size, "%s", text ? text : "");
 }
 
+// Every number of the model is finite and the sizes are positive: a file may be whole and yet
+// wrong.
+static bool finite_numbers(const reader *r, const char *name, const double *values, size_t count,
+                           double low) {
+  for (size_t k = 0; k < count; ++k)
+    if (!isfinite(values[k]) || values[k] < low) {
+      sonde_fail(r->error, SONDE_FORMAT, "%s: %s[%zu] is %g, expected a finite number from %g",
+                 r->path, name, k, values[k], low);
+      return false;
+    }
+  return true;
+}
+
+static bool check_vessel(const reader *r, const char *name, const sonde_vessel *vessel) {
+  for (uint32_t k = 0; k < vessel->count; ++k) {
+    const sonde_vessel_point *p = &vessel->point[k];
+    if (!finite_numbers(r, name, &p->centre_m.x, 3, -100) ||
+        !finite_numbers(r, name, &p->radius_m, 1, 1e-6) ||
+        !finite_numbers(r, name, &p->depth_m, 1, 0))
+      return false;
+  }
+  return true;
+}
+
+static bool check_numbers(const reader *r, const sonde_model *model) {
+  size_t n = model->surface.vertex_count;
+  bool ok = finite_numbers(r, "surface_vertices", &model->surface.vertices[0].x, 3 * n, -100) &&
+            finite_numbers(r, "femur_vertices", &model->femur.vertices[0].x,
+                           3 * (size_t)model->femur.vertex_count, -100) &&
+            finite_numbers(r, "node_k0", model->k0_n_m3, n, 1e-6) &&
+            finite_numbers(r, "node_xm", model->xm_m, n, 1e-6) &&
+            finite_numbers(r, "node_fat_depth", model->fat_depth_m, n, 0) &&
+            finite_numbers(r, "node_muscle_depth", model->muscle_depth_m, n, 0) &&
+            finite_numbers(r, "node_bone_depth", model->bone_depth_m, n, 0);
+  for (uint32_t k = 0; ok && k < model->site_count; ++k) {
+    const sonde_site *site = &model->sites[k];
+    ok = finite_numbers(r, "site", &site->position_m.x, 12, -100) &&
+         finite_numbers(r, "site", &site->k0_n_m3, 1, 1e-6) &&
+         finite_numbers(r, "site", &site->xm_m, 1, 1e-6);
+  }
+  for (uint32_t k = 0; ok && k < model->datum_count; ++k)
+    ok = finite_numbers(r, "datum", &model->data[k].penetration_m, 2, -1e6);
+  return ok && check_vessel(r, "vein", &model->vein) && check_vessel(r, "artery", &model->artery);
+}
+
 static sonde_status read_model(const reader *r, sonde_model *model) {
   sonde_fail(r->error, SONDE_FORMAT, "%s: its arrays do not belong together", r->path);
   take_text(r, "name", model->name, sizeof model->name);
@@ -388,7 +429,12 @@ static sonde_status read_model(const reader *r, sonde_model *model) {
   if (!take_nodes(r, model) || !take_sites(r, model) || !take_data(r, model) ||
       !take_vessel(r, "vein", &model->vein) || !take_vessel(r, "artery", &model->artery))
     return SONDE_FORMAT;
-  return sonde_model_derive(model, r->error);
+  if (!check_numbers(r, model)) return SONDE_FORMAT;
+  sonde_mesh_report report;
+  status = sonde_mesh_inspect(&model->surface, &report, r->error);
+  if (!status && !report.closed)
+    status = sonde_fail(r->error, SONDE_MESH, "%s: the skin is not closed", r->path);
+  return status ? status : sonde_model_derive(model, r->error);
 }
 
 // Splits magic, header and arrays; checks sizes, version and CRC before anything is believed.

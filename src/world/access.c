@@ -23,6 +23,7 @@ void sonde_state_list_awake(sonde_state *state) {
   const sonde_topology *topology = &state->model->topology;
   for (uint32_t k = 0; k < state->rim_count; ++k) state->in_rim[state->rim[k]] = 0;
   state->row_count = state->edge_count = state->pair_count = state->rim_count = 0;
+  state->lists_stale = false;
   for (uint32_t i = 0; i < topology->vertex_count; ++i) {
     state->rows[state->row_count] = i;
     state->row_count += state->awake[i];

@@ -161,6 +161,7 @@ void sonde_contact_detect(sonde_state *state, const sonde_probe *probe, sonde_po
   }
   sort_touched(state);
   for (uint32_t k = 0; k < state->touched_count; ++k) {
+    state->lists_stale |= !state->awake[state->touched[k]];
     state->awake[state->touched[k]] = 1;
     state->calm[state->touched[k]] = 0;
   }

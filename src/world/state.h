@@ -33,6 +33,7 @@ struct sonde_state {
   uint32_t *rim;   // [nodes] sleeping ends of `edges`
   uint8_t *in_rim; // [nodes]
   uint32_t row_count, edge_count, pair_count, rim_count;
+  bool lists_stale; // awake[] changed since the lists were made
 
   // contact
   uint32_t *face_order; // [faces] sorted along a space-filling curve

@@ -180,7 +180,7 @@ void sonde_step(sonde_state *state, const sonde_probe *probe, sonde_pose pose) {
   if (!v_finite(pose.position)) probe = NULL;
   sonde_motion motion = probe_motion(state, pose);
   sonde_contact_detect(state, probe, pose);
-  sonde_state_list_awake(state);
+  if (state->lists_stale) sonde_state_list_awake(state);
   double detected = sonde_clock_now();
   assemble(state, probe, &motion);
   first_right_side(state);

@@ -93,6 +93,7 @@ static void file_returns_the_same_model(void **state) {
   (void)state;
   sonde_model *a = fixture_model(3, NULL), *b;
   static const sonde_datum data[2] = {{0, "linear", 0.002, 1.25}, {0, "point", 0.004, 0.5}};
+  sonde_free(a->data);
   a->data = SONDE_NEW(sonde_datum, 2);
   memcpy(a->data, data, sizeof data);
   a->datum_count = 2;

@@ -1,0 +1,58 @@
+// The state hash of fixed scenes is the same number with gcc and clang, in debug and release. The
+// scenes use square roots and divisions only, which IEEE 754 defines to the last bit.
+#include "../fixture.h"
+
+#include <inttypes.h>
+
+typedef struct scene {
+  const char *probe;
+  double lambda;
+  sonde_contact_law law;
+  double shear_n_m;
+  uint64_t hash;
+} scene;
+
+static const scene SCENES[] = {
+    {"point", 1.0, SONDE_CONTACT_FOUNDATION, 0, 0xd6bb0e84e8b16aa3u},
+    {"linear", 0.5, SONDE_CONTACT_FOUNDATION, 15, 0x6365eca42ab9dad9u},
+    {"square", 1.0, SONDE_CONTACT_VOLUME, 0, 0xf28b4dd7b4fc1ee2u},
+};
+
+static uint64_t run(const scene *s) {
+  sonde_surface_law law = sonde_surface_law_default();
+  law.shear_stiffness_n_m = s->shear_n_m;
+  sonde_world_def def = sonde_world_def_default();
+  def.implicitness = s->lambda;
+  def.contact_law = s->law;
+  sonde_model *model = fixture_model(4, &law);
+  sonde_state *state;
+  sonde_probe probe;
+  assert_int_equal(sonde_state_create(model, &def, &state, NULL), SONDE_OK);
+  assert_int_equal(sonde_probe_create(s->probe, &probe, NULL), SONDE_OK);
+  for (int k = 0; k < 250; ++k) {
+    sonde_pose pose = fixture_pose(k < 150 ? 6e-5 * k - 0.001 : 0.008);
+    pose.position.y = k < 150 ? 0 : 1e-4 * (k - 150);
+    sonde_step(state, &probe, pose);
+  }
+  assert_true(v_norm(sonde_state_contact(state)->force_n) > 0.1);
+  uint64_t hash = sonde_state_hash(state);
+  sonde_probe_clear(&probe);
+  sonde_state_destroy(state);
+  sonde_model_destroy(model);
+  return hash;
+}
+
+static void hashes_are_golden(void **state) {
+  (void)state;
+  for (size_t k = 0; k < SONDE_COUNT_OF(SCENES); ++k) {
+    uint64_t hash = run(&SCENES[k]);
+    if (hash != SCENES[k].hash)
+      fail_msg("scene %zu: hash is 0x%016" PRIx64 "u, expected 0x%016" PRIx64 "u", k, hash,
+               SCENES[k].hash);
+  }
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {cmocka_unit_test(hashes_are_golden)};
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
