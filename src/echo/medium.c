@@ -227,12 +227,14 @@ static void mark_air(sonde_echo *echo) {
   }
 }
 
-// The aperture looks past small obstacles: what a line has lost mixes with its neighbours'.
+// The aperture looks past small obstacles: what a line has lost mixes with its neighbours'. Lines in
+// air send nothing and take no part.
 static void blur_loss(sonde_echo *echo) {
   float *loss = echo->loss_db, last = loss[0];
   for (uint32_t l = 1; l + 1 < echo->lines; ++l) {
-    float here = loss[l];
-    loss[l] += 0.15f * (last - 2 * here + loss[l + 1]);
+    float here = loss[l], left = echo->air[l - 1] ? here : last;
+    float right = echo->air[l + 1] ? here : loss[l + 1];
+    loss[l] += 0.15f * (left - 2 * here + right);
     last = here;
   }
 }

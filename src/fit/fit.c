@@ -17,7 +17,7 @@ static const double COLD_K0 = 1.8e5, COLD_ABOVE_M = 0.02;
 static const double EDGE_START_N_M = 50.0, TENSION_START_N = 1e-3;
 static const double LN_EDGE_LOW = -11.5, LN_EDGE_HIGH = 18.4; // 1e-5 .. 1e8 N/m
 static const double KEPT_EDGE_N_M = 5.0;  // stage 3: carries tangential motion, adds 1 % of force
-static const double PATCH_REACH_M = 0.07; // of the skin around a footprint
+static const double PATCH_REACH_M = 0.06; // of the skin around a footprint
 static const double LN_TENSION_LOW = -13.8, LN_TENSION_HIGH = 6.9;
 
 sonde_fit_def sonde_fit_def_default(void) {

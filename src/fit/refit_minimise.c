@@ -189,7 +189,7 @@ static sonde_status iterate(sonde_refit *r, workspace *w, double *theta, double 
       damping = fmax(10 * damping, 1e-6);
       continue;
     }
-    double fall = result->cost - cost;
+    double fall = result->cost - cost; fprintf(stderr,"it %u cost %.4f -> %.4f\n",result->iterations,result->cost,cost);
     result->cost = at->cost = cost;
     accept(r, w, theta, force_n);
     damping = fmax(0.1 * damping, DAMPING_LEAST);
