@@ -12,8 +12,6 @@
 extern "C" {
 #endif
 
-/* ---- tables ------------------------------------------------------------------------------ */
-
 /** Measured sites; arrays are released by sonde_site_table_clear(). */
 typedef struct sonde_site_table {
   uint32_t count;
@@ -59,8 +57,6 @@ SONDE_API sonde_status sonde_measurements_save(const char *path,
                                                const sonde_measurements *measurements,
                                                sonde_error *error);
 SONDE_API void sonde_measurements_clear(sonde_measurements *measurements);
-
-/* ---- error statistics -------------------------------------------------------------------- */
 
 /** Of the error e = model - measurement; rows whose model value is not finite are left out. */
 typedef struct sonde_error_statistics {
@@ -153,30 +149,26 @@ typedef struct sonde_fit_result {
   uint32_t curve_count;
   sonde_curve_fit *curves; /**< stage 1, [curve_count] by site, then probe */
   uint32_t site_count;
-  sonde_site *sites;          /**< [site_count] input sites with k0 and xm of the last stage */
-  sonde_surface_law law;      /**< the model's law with what the last stage estimated */
-  uint32_t stage1_parameters; /**< 2 per curve */
-  uint32_t stage2_parameters; /**< 2 per measured site + 1 (+1 with T0); 0 without stage 2 */
-  uint32_t parameters;        /**< of the last stage; stage 3: 2 per site + 2 */
-  sonde_error_report stage1;  /**< interaction "independent" */
-  sonde_error_report stage2;  /**< interaction "simplified"; zero counts when stages == 1 */
-  sonde_error_report stage3;  /**< interaction "full"; zero counts when stages < 3 */
-  double *model_n;            /**< [measurements.count] forces of the last stage */
-  uint32_t iterations;        /**< of the last stage */
-  bool converged;             /**< the last stage */
-  double cost, start_cost;    /**< half the sum of losses at its end and its start */
-  uint32_t stage2_iterations;
-  bool stage2_converged;
-  double stage2_edge_n_m; /**< k_s of stage 2; the law of stage 3 keeps kept_edge_n_m instead */
-  double edge_sd_log;     /**< standard deviation of ln k_s (Schur complement); 0 if none */
+  sonde_site *sites;     /**< [site_count] input sites with k0 and xm of the last stage */
+  sonde_surface_law law; /**< the model's law with what the last stage estimated */
+  uint32_t stage1_parameters, stage2_parameters; /**< 2 per curve; 2 per site + k_s (+ T0) */
+  uint32_t parameters;                           /**< of the last stage; stage 3: 2 per site + 2 */
+  sonde_error_report stage1;                     /**< interaction "independent" */
+  sonde_error_report stage2; /**< interaction "simplified"; zero counts when stages == 1 */
+  sonde_error_report stage3; /**< interaction "full"; zero counts when stages < 3 */
+  double *model_n;           /**< [measurements.count] forces of the last stage */
+  uint32_t iterations, stage2_iterations; /**< of the last stage, of stage 2 */
+  bool converged, stage2_converged;
+  double cost, start_cost; /**< half the sum of losses at the last stage's end and start */
+  double stage2_edge_n_m;  /**< k_s of stage 2; the law of stage 3 has kept_edge_n_m */
+  double edge_sd_log;      /**< standard deviation of ln k_s (Schur complement); 0 if none */
 } sonde_fit_result;
 
 /**
- * Stage 1 per curve, then one (k0, xm) per site for all its probes: without edges (stages == 1) or
- * with the simplified interaction and one uniform edge stiffness (stages == 2). With stages == 3
- * also the refit on the full static equilibrium: shear springs of uniform G and limit, site
- * parameters spread by the model's interpolation and kept smooth, residuals relative to the
- * probe's mean force; surface springs, kept weak, are left out (estimation.md, variant A).
+ * Stage 1 per curve; then one (k0, xm) per site for all its probes, without edges (stages == 1) or
+ * with the simplified interaction and a uniform edge stiffness (2); then the refit on the full
+ * equilibrium with uniform shear springs, smooth site parameters, residuals relative to the probe's
+ * mean force and without surface springs, which the law keeps weak (3). Formulas: docs/fit.md.
  * @param model gives the refined skin, its normals and the law (guard, compression); unchanged
  * @return CANCELLED by progress; ARGUMENT for a probe without rectangular footprint or a curve of
  *   fewer than 3 points

@@ -28,7 +28,7 @@ typedef struct sonde_world_def {
   double dt_s;                /**< step; default 1e-3 */
   double implicitness;        /**< lambda in [0,1]; default 1 (backward Euler) */
   uint32_t newton_iterations; /**< >= 1; default 1 */
-  sonde_pcg_options pcg;      /**< default relative 1e-3, at most 200 iterations */
+  sonde_pcg_options pcg;      /**< default relative 5e-3, at most 200 iterations */
   sonde_contact_law contact_law;
   double contact_stiffness_n_m3; /**< kappa; default 5e8 */
   double contact_damping_n_s_m3; /**< mu; default 1e5 */

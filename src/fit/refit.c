@@ -21,6 +21,7 @@ uint32_t sonde_refit_parameters(const sonde_refit *r) { return 2 * r->sites->cou
 
 static void spread(sonde_refit *r, const double *theta) {
   uint32_t count = r->sites->count;
+  SONDE_ASSERT(count > 0);
   for (uint32_t i = 0; i < r->model->surface.vertex_count; ++i) {
     const double *basis = &r->basis[(size_t)i * count];
     double ln_k = 0, ln_x = 0;
@@ -40,6 +41,7 @@ static sonde_status settle_datum(const sonde_refit *r, sonde_patch_solver *solve
                                  const double *before_m, double before_depth_m, double *s_m,
                                  sonde_error *error) {
   uint32_t places = solver->patch->place_count;
+  SONDE_ASSERT(row < r->plan->row_count && depth_m >= before_depth_m);
   if (r->settled[row]) {
     sonde_status status =
         sonde_patch_settle(solver, law, depth_m, RELATIVE_RESIDUAL, NEWTON_LIMIT, s_m, error);
@@ -58,6 +60,7 @@ static void carry_to_sites(const sonde_refit *r, const sonde_patch *patch,
   uint32_t count = r->sites->count;
   memset(row, 0, sonde_refit_parameters(r) * sizeof *row);
   for (uint32_t i = 0; i < patch->place_count; ++i) {
+    SONDE_ASSERT(patch->node[i] < r->model->surface.vertex_count);
     const double *basis = &r->basis[(size_t)patch->node[i] * count];
     double by_k = gradient->by_ln_k0[i], by_x = gradient->by_ln_xm[i];
     for (uint32_t s = 0; s < count; ++s) {
@@ -79,6 +82,7 @@ static sonde_status work_on_curve(void *user, uint32_t worker, uint32_t curve,
                                   const atomic_bool *stop, sonde_error *error) {
   const evaluation *at = user;
   sonde_refit *r = at->refit;
+  SONDE_ASSERT(curve < r->plan->curve_count && worker < r->workers);
   const sonde_patch *patch = &r->patch[curve];
   sonde_patch_solver *solver = &r->crew[worker].solver;
   sonde_patch_gradient *gradient = &r->crew[worker].gradient;

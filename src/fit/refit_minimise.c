@@ -12,7 +12,7 @@
 static const double DATA_SD = 0.02;      // of the probe's mean force: what the model class leaves
 static const double ROUGHNESS_SD = 0.02; // of ln k0 and ln xm per site spacing
 static const double LONGEST_STEP = 0.7;  // of a logarithm
-static const double ENOUGH = 1e-4;       // relative fall of the cost that counts as none
+static const double ENOUGH = 1e-3;       // relative fall of the cost that counts as none
 static const double NOTHING = 1e-5;      // fall of an exact fit
 static const double DAMPING_START = 1e-3, DAMPING_LEAST = 1e-9, DAMPING_MOST = 1e9;
 enum { MOST_ITERATIONS = 40 };
@@ -83,6 +83,7 @@ static double assemble(const sonde_refit *r, workspace *w, const double *theta, 
 // Step of (H + damping diag H) d = -g by Cholesky in the lower triangle.
 static bool solve(workspace *w, double damping) {
   uint32_t n = w->n;
+  SONDE_ASSERT(n > 2 && damping >= 0);
   double *a = w->factor, *x = w->step;
   memcpy(a, w->matrix, (size_t)n * n * sizeof *a);
   for (uint32_t j = 0; j < n; ++j) a[(size_t)j * n + j] *= 1 + damping;
@@ -170,6 +171,7 @@ static void accept(const sonde_refit *r, workspace *w, double *theta, double *fo
 static sonde_status iterate(sonde_refit *r, workspace *w, double *theta, double *force_n,
                             stepwise *at, sonde_refit_result *result, sonde_error *error) {
   double damping = DAMPING_START;
+  SONDE_ASSERT(isfinite(result->cost) && r->def->max_iterations > 0);
   uint32_t limit =
       r->def->max_iterations < MOST_ITERATIONS ? r->def->max_iterations : (uint32_t)MOST_ITERATIONS;
   while (result->iterations < limit && damping < DAMPING_MOST) {
@@ -189,7 +191,7 @@ static sonde_status iterate(sonde_refit *r, workspace *w, double *theta, double 
       damping = fmax(10 * damping, 1e-6);
       continue;
     }
-    double fall = result->cost - cost; fprintf(stderr,"it %u cost %.4f -> %.4f\n",result->iterations,result->cost,cost);
+    double fall = result->cost - cost;
     result->cost = at->cost = cost;
     accept(r, w, theta, force_n);
     damping = fmax(0.1 * damping, DAMPING_LEAST);
@@ -203,6 +205,7 @@ sonde_status sonde_refit_minimise(sonde_refit *r, double *theta, double *force_n
                                   const sonde_progress *progress, sonde_refit_result *result,
                                   sonde_error *error) {
   *result = (sonde_refit_result){0};
+  SONDE_ASSERT(r->plan->row_count > 0);
   workspace w = {.n = sonde_refit_parameters(r), .rows = r->plan->row_count};
   stepwise at = {.outer = progress};
   sonde_status status = allocate(&w) ? SONDE_OK : sonde_fail_memory(error);

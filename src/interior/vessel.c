@@ -12,7 +12,7 @@
 #include "interior/interior.h"
 
 static const double relaxation_s = 0.1;    // emptying of a vein segment (physics.md 2g)
-static const double skin_spread_m = 2e-3;  // the skin widens the loaded patch on every side
+static const double skin_spread_m = 1.8e-3; // the skin widens the loaded patch by its thickness
 static const double reach_share = 0.65;    // of the way from the moment's side to the reach's
 static const double least_half_m = 1.5e-3; // a point probe still has a face
 static const double least_share = 0.03;    // of the largest nodal force: belongs to the contact

@@ -14,7 +14,7 @@ sonde_world_def sonde_world_def_default(void) {
   return (sonde_world_def){.dt_s = 1e-3,
                            .implicitness = 1,
                            .newton_iterations = 1,
-                           .pcg = {1e-3, 1e-12, 200},
+                           .pcg = {5e-3, 1e-12, 200},
                            .contact_law = SONDE_CONTACT_FOUNDATION,
                            .contact_stiffness_n_m3 = 5e8,
                            .contact_damping_n_s_m3 = 1e5,

@@ -13,9 +13,9 @@ typedef struct scene {
 } scene;
 
 static const scene SCENES[] = {
-    {"point", 1.0, SONDE_CONTACT_FOUNDATION, 0, 0xd6bb0e84e8b16aa3u},
-    {"linear", 0.5, SONDE_CONTACT_FOUNDATION, 15, 0x6365eca42ab9dad9u},
-    {"square", 1.0, SONDE_CONTACT_VOLUME, 0, 0xf28b4dd7b4fc1ee2u},
+    {"point", 1.0, SONDE_CONTACT_FOUNDATION, 0, 0xd025615a42bff6c3u},
+    {"linear", 0.5, SONDE_CONTACT_FOUNDATION, 15, 0x71b0db10f848aba7u},
+    {"square", 1.0, SONDE_CONTACT_VOLUME, 0, 0xe437bdf6163cc897u},
 };
 
 static uint64_t run(const scene *s) {
