@@ -6,7 +6,9 @@ add_custom_command(
   OUTPUT ${SONDE_BUNDLED_MODEL}
   COMMAND ${CMAKE_COMMAND} -E make_directory ${PROJECT_BINARY_DIR}/share/sonde
   COMMAND sonde fit ${thigh_data}/indentation.csv --surface ${thigh_data}/skin.ply
-    --sites ${thigh_data}/sites.csv -o ${SONDE_BUNDLED_MODEL}
+    --sites ${thigh_data}/sites.csv --stages 3 --name "Thigh A (synthetic)"
+    --provenance "Computed by finite elements (CalculiX), not measured on a person; fitted in three stages to data/thigh/indentation.csv"
+    -o ${SONDE_BUNDLED_MODEL}
   DEPENDS sonde ${thigh_data}/indentation.csv ${thigh_data}/skin.ply ${thigh_data}/sites.csv
     ${thigh_data}/femur.ply ${thigh_data}/fat_skin_interface.ply ${thigh_data}/muscle_surface.ply
   COMMENT "Fitting the bundled thigh" USES_TERMINAL VERBATIM)

@@ -89,7 +89,7 @@ SONDE_API void sonde_mesh_areas(const sonde_mesh *mesh, double *areas_m2);
 
 /**
  * Refines where `target` asks for shorter edges, without hanging vertices. An edge is halved while
- * it is longer than 1.35 times the target at its middle: halving a shorter one would overshoot.
+ * it is longer than 1.42 times the target at its middle: halving a shorter one would overshoot.
  * Longest edges go first, so that no angle falls below half the smallest given; slivers around a
  * vertex with more than 24 faces (a flat cap's centre) are first replaced by rings of faces. New
  * vertices lie on the smooth surface of the vertex normals (PN-triangle edges); creases above 45

@@ -1,6 +1,6 @@
 // Local refinement of a triangle surface by longest-edge closure.
 //
-// A pass marks every edge longer than 1.35 times the wanted length at its middle. While a face has
+// A pass marks every edge longer than 1.42 times the wanted length at its middle. While a face has
 // a marked edge but its longest edge is not marked, that one is marked too: every face can then be
 // cut without bad angles and without hanging vertices. A face with three marks is split 1:4 into
 // similar faces, with two or one it is bisected at its longest edge first. Bisecting at the longest
@@ -17,7 +17,7 @@
 
 #include <string.h>
 
-#define OVERSHOOT 1.35    // an edge is halved only when it is longer than this times the target
+#define OVERSHOOT 1.42    // an edge is halved only when it is longer than this times the target
 #define CREASE_COSINE 0.7 // faces that meet at more than about 45 degrees form a crease
 enum { MAX_PASSES = 40, MAX_VERTICES = 2000000 };
 

@@ -175,9 +175,9 @@ static void refuses_what_it_cannot_fit(void **state) {
   const sonde_progress progress = {stop_at_once, NULL};
   assert_int_equal(sonde_fit(p.model, &p.sites, &m, &def, &progress, &r, &error), SONDE_CANCELLED);
   assert_null(r.sites);
-  def.stages = 3;
+  def.stages = 4;
   assert_int_equal(sonde_fit(p.model, &p.sites, &m, &def, NULL, &r, &error), SONDE_ARGUMENT);
-  assert_says(&error, "stages is 3");
+  assert_says(&error, "stages is 4");
   def.stages = 2;
   uint32_t all = m.count;
   m.count = STEPS + 2; // the second curve has two points
