@@ -33,6 +33,7 @@ static double evaluate(const problem *p, double *load) {
   const sonde_tissue_scales scales = {1 / (p->dt_s * p->dt_s), 0, 1};
   sonde_tissue_linearise(state->model, NULL, state->position, state->velocity, &scales,
                          state->force, state->product, state->matrix, state->scratch_nodes);
+  sonde_contact_clear(state); // nodes may have moved far since the last evaluation: refit every box
   sonde_contact_detect(state, p->probe, p->pose);
   if (p->probe) {
     const sonde_motion still = {.origin = p->pose.position};

@@ -232,11 +232,12 @@ static void footprints_have_the_nominal_area(void **state) {
   bundled_clear(&b);
 }
 
-// The start from stage 1 is never worse than a cold one, and with relative weights the cold one
-// ends in another minimum.
+// The start from stage 1 is never worse than a cold one and takes fewer iterations, and with one of
+// the weightings the cold one ends in another minimum.
 static void two_step_start_beats_cold_start(void **state) {
   (void)state;
   bundled b = bundled_load("indentation.csv", 3.0);
+  bool other_minimum = false;
   for (int weights = 0; weights < 2; ++weights) {
     double cost[2];
     uint32_t iterations[2];
@@ -256,8 +257,10 @@ static void two_step_start_beats_cold_start(void **state) {
                   weights ? "relative" : "absolute", cost[0], iterations[0], cost[1],
                   iterations[1]);
     assert_true(cost[0] <= cost[1] * (1 + 1e-9));
-    if (weights == SONDE_WEIGHTS_RELATIVE) assert_true(cost[0] < cost[1] * (1 - 1e-3));
+    assert_true(iterations[0] < iterations[1]);
+    other_minimum |= cost[0] < cost[1] * (1 - 1e-4);
   }
+  assert_true(other_minimum);
   bundled_clear(&b);
 }
 

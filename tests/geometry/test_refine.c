@@ -119,11 +119,11 @@ static void test_fans(void **state) {
 static void test_overshoot(void **state) {
   (void)state;
   sonde_mesh box = shape_box(0.01, 0.01, 0.01), same;
-  wish w = {{0, 0, 0}, 1, 0.02 * sqrt(2.0) / 1.34, 1};
+  wish w = {{0, 0, 0}, 1, 0.02 * sqrt(2.0) / 1.41, 1};
   assert_ok(sonde_mesh_refine(&box, wanted, &w, &same, &shape_error));
   assert_int_equal(same.vertex_count, box.vertex_count);
   sonde_mesh_clear(&same);
-  w.fine = 0.02 * sqrt(2.0) / 1.36;
+  w.fine = 0.02 * sqrt(2.0) / 1.43;
   assert_ok(sonde_mesh_refine(&box, wanted, &w, &same, &shape_error));
   assert_true(same.vertex_count > box.vertex_count);
   sonde_mesh_clear(&same);
