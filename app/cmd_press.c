@@ -148,7 +148,7 @@ static sonde_status look(press *p, const char *image_path, sonde_error *error) {
                         &(sonde_interior_input){sonde_state_positions(p->state),
                                                 sonde_state_contact_forces(p->state), p->pose,
                                                 &p->pathology, -1, sonde_state_tick(p->state),
-                                      p->probe.half_x_m, p->probe.half_y_m});
+                                                p->probe.half_x_m, p->probe.half_y_m});
   sonde_vessel_state vessel;
   p->vein = p->artery = p->vein_short_m = NAN;
   if (sonde_interior_vessel_at_plane(interior, 0, p->pose, &vessel)) {

@@ -1,7 +1,7 @@
 /**
  * @file fit.h
  * Measurement and site tables, error statistics, estimation in up to three stages, prediction of
- * the measurements by a model, and the virtual robot. Formulas: docs/fit.md, physics.md 2f.
+ * the measurements by a model, and the virtual robot. Formulas: docs/fit.md.
  */
 #ifndef SONDE_FIT_H
 #define SONDE_FIT_H
@@ -133,7 +133,7 @@ typedef struct sonde_curve_fit {
 
 /**
  * Fits eq. (1) to one curve: log parameters (ln k0, ln(xm - s_max/guard)), closed-form linear
- * start, Levenberg-Marquardt. physics.md 2f.1.
+ * start, Levenberg-Marquardt. docs/fit.md.
  * @param area_m2 footprint area
  * @param start NULL for the closed-form start, else (k0, xm)
  * @return ARGUMENT with fewer than 3 points or no positive penetration

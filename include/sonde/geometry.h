@@ -197,7 +197,7 @@ typedef struct sonde_clip_result {
  * Clips one skin triangle by a convex body and integrates the columns between skin and body.
  * Inside tissue lies below the triangle (opposite its outward normal); from each clipped skin
  * point a column runs along `direction` (unit, into the tissue) until it leaves the body. Volume,
- * shares and gradient are exact for the piecewise linear depth. physics.md 2c. Summed over a
+ * shares and gradient are exact for the piecewise linear depth. docs/world.md. Summed over a
  * surface they are the common volume and its derivative when no column enters the body below the
  * skin: for a box, along its beam axis.
  * @param planes_n,planes_d the body's planes in the frame of the triangle's points

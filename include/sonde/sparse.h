@@ -76,7 +76,7 @@ typedef struct sonde_pcg_scratch {
 
 /**
  * Block-Jacobi preconditioned conjugate gradients, warm-started from x. The diagonal must have been
- * inverted. Deterministic: sums run in list order. Press et al. 1992; physics.md 2b.
+ * inverted. Deterministic: sums run in list order. Press et al. 1992; docs/world.md.
  * @thread tick (no allocation)
  */
 SONDE_API sonde_pcg_result sonde_pcg_solve(const sonde_block_matrix *matrix,

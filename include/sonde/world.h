@@ -15,7 +15,7 @@ extern "C" {
 
 enum { SONDE_MAX_REGIONS = 8 };
 
-/** How contact pushes (physics.md 2c). */
+/** How contact pushes (docs/world.md). */
 typedef enum sonde_contact_law {
   SONDE_CONTACT_FOUNDATION, /**< pressure kappa*depth + mu*rate at points of the skin, along the
                                  probe's nearest face: follows the probe's shape */
@@ -32,8 +32,8 @@ typedef struct sonde_world_def {
   sonde_contact_law contact_law;
   double contact_stiffness_n_m3; /**< kappa; default 5e8 */
   double contact_damping_n_s_m3; /**< mu; default 1e5 */
-  double sleep_displacement_m; /**< a node slower than this per 10 ms for 20 steps sleeps until a
-                                    neighbour moves; 0 keeps all awake; default 5e-6 */
+  double sleep_displacement_m;   /**< a node slower than this per 10 ms for 20 steps sleeps until a
+                                      neighbour moves; 0 keeps all awake; default 5e-6 */
 } sonde_world_def;
 
 SONDE_API sonde_world_def sonde_world_def_default(void);

@@ -227,8 +227,8 @@ static void mark_air(sonde_echo *echo) {
   }
 }
 
-// The aperture looks past small obstacles: what a line has lost mixes with its neighbours'. Lines in
-// air send nothing and take no part.
+// The aperture looks past small obstacles: what a line has lost mixes with its neighbours'. Lines
+// in air send nothing and take no part.
 static void blur_loss(sonde_echo *echo) {
   float *loss = echo->loss_db, last = loss[0];
   for (uint32_t l = 1; l + 1 < echo->lines; ++l) {

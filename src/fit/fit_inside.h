@@ -66,7 +66,7 @@ void sonde_footprint_clear(sonde_footprint *footprint);
 
 // Force along the normal of the edges at depth x for unit stiffness, and of a unit pre-tension.
 // psi(x) = (l - L)(x + h)/l, l = sqrt(L^2 + 2 h x + x^2), h the rise: with h = 0 it is
-// (sqrt(L^2 + x^2) - L) x/sqrt(L^2 + x^2) of physics.md 2f.2. Shortened edges keep the share
+// (sqrt(L^2 + x^2) - L) x/sqrt(L^2 + x^2) of docs/fit.md. Shortened edges keep the share
 // compression.
 void sonde_footprint_edges(const sonde_footprint *footprint, double x, double compression,
                            double *per_stiffness_m, double *per_tension);

@@ -125,7 +125,7 @@ sonde_status sonde_refit_forces(sonde_refit *r, const double *theta, double *for
                             "stage 3", error);
 }
 
-// A footprint of area A and perimeter P works like one of area A + P l + pi l^2 (estimation.md 1).
+// A footprint of area A and perimeter P works like one of area A + P l + pi l^2 (docs/fit.md).
 void sonde_refit_start(const sonde_refit *r, const sonde_curve_fit *curves, double *theta) {
   const sonde_fit_plan *plan = r->plan;
   double ln_k0 = 0, ln_xm = 0, deepest = 0, l = PULL_ALONG_M;

@@ -1,6 +1,6 @@
 // Static equilibrium of the skin with normal springs and shear springs only: one unknown per node,
 // the indentation s along the inward rest normal. Energy = sum A U(s) + sum L w W(|s_i - s_j|/L),
-// convex (estimation.md, variant A). It is the full model without surface springs: there the
+// convex (docs/fit.md). It is the full model without surface springs: there the
 // tangential motion of free nodes decouples and stays zero.
 #ifndef SONDE_SRC_FIT_SHEAR_H
 #define SONDE_SRC_FIT_SHEAR_H

@@ -23,7 +23,7 @@
 // Capacities. A triangle that more planes cut or end than fit here is treated as if the planes
 // beyond were absent (volume too large by what they would cut off); a triangle of the size of the
 // body's faces meets a handful.
-enum { MAX_CORNERS = 96, MAX_FAR = 192, ARENA_CORNERS = 1024, MAX_PIECES = 96 };
+enum { MAX_CORNERS = 96, MAX_FAR = 192, ARENA_CORNERS = 1024, MAX_PIECES = 96, MAX_SPLITS = 256 };
 
 // Barycentric coordinates of corners 1 and 2; corner 0 has the rest.
 typedef struct corner {
@@ -266,11 +266,13 @@ static void split_pieces(const columns *far, const corner *polygon, uint32_t cou
   stack.used = stack.size[0] = count;
   stack.plane[0] = 0;
   stack.count = 1;
+  // Where two planes are equal within rounding, each may look lower than the other for ever.
+  uint32_t splits = 0;
   while (stack.count) {
     uint32_t top = stack.count - 1, size = stack.size[top], plane = stack.plane[top];
     const corner *piece = stack.corners + stack.used - size;
     uint32_t lower = lowest_plane(far, plane, piece, size, slack);
-    if (lower != plane && split_top(&stack, far, lower)) continue;
+    if (lower != plane && splits++ < MAX_SPLITS && split_top(&stack, far, lower)) continue;
     add_piece(&far->length[plane], piece, size, sum);
     stack.used -= size;
     stack.count--;

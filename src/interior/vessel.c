@@ -11,11 +11,11 @@
 #include "base/base.h"
 #include "interior/interior.h"
 
-static const double relaxation_s = 0.1;    // emptying of a vein segment (physics.md 2g)
+static const double relaxation_s = 0.1;     // emptying of a vein segment (docs/interior.md)
 static const double skin_spread_m = 1.8e-3; // the skin widens the loaded patch by its thickness
-static const double reach_share = 0.65;    // of the way from the moment's side to the reach's
-static const double least_half_m = 1.5e-3; // a point probe still has a face
-static const double least_share = 0.03;    // of the largest nodal force: belongs to the contact
+static const double reach_share = 0.65;     // of the way from the moment's side to the reach's
+static const double least_half_m = 1.5e-3;  // a point probe still has a face
+static const double least_share = 0.03;     // of the largest nodal force: belongs to the contact
 static const double least_depth_m = 3e-3;
 static const double bone_start = 0.30, bone_rise = 1.75; // rigid base, docs/interior.md
 static const double carry_reach = 3.0; // rest radii over which the wall's motion fades
@@ -45,8 +45,8 @@ static void add_node(sums *t, double f, double x, double y, double least) {
 
 // Half side of the uniform strip that stands for the load: between the one with the same second
 // moment and the reach of the contact. The moment alone takes the peak under the middle of a flat
-// face on a round leg at its full sharpness; the stiff skin evens it out (docs/interior.md). Nodes just
-// outside the face carry a share too: the strip is never wider than the face.
+// face on a round leg at its full sharpness; the stiff skin evens it out (docs/interior.md). Nodes
+// just outside the face carry a share too: the strip is never wider than the face.
 static double half_side(double moment, double low, double high, double face) {
   double half = sqrt(3 * fmax(0, moment)), reach = 0.5 * fmax(0, high - low);
   half = fmax(half + reach_share * fmax(reach - half, 0), least_half_m);
@@ -73,10 +73,8 @@ static load measure_load(const sonde_model *model, const sonde_interior_input *i
   double s = 1 / t.force;
   l.force_n = t.force;
   l.centre_m = v_scale(l.centre_m, s);
-  l.half_x_m = half_side(t.xx * s - t.x * s * t.x * s, t.low_x, t.high_x,
-                         input->face_half_x_m);
-  l.half_y_m = half_side(t.yy * s - t.y * s * t.y * s, t.low_y, t.high_y,
-                         input->face_half_y_m);
+  l.half_x_m = half_side(t.xx * s - t.x * s * t.x * s, t.low_x, t.high_x, input->face_half_x_m);
+  l.half_y_m = half_side(t.yy * s - t.y * s * t.y * s, t.low_y, t.high_y, input->face_half_y_m);
   l.pressure_pa = l.force_n / (4 * l.half_x_m * l.half_y_m);
   return l;
 }

@@ -29,7 +29,7 @@ double sonde_normal_energy(double k0_n_m3, double xm_m, double guard, double s_m
   return k0_n_m3 * xm_m * xm_m * (-x - log1p(-x)) + over * (pressure + 0.5 * slope * over);
 }
 
-// q = G g/(1 - |g|/gm), odd in g, straight beyond 0.95 gm (estimation.md, variant A).
+// q = G g/(1 - |g|/gm), odd in g, straight beyond 0.95 gm (docs/fit.md).
 double sonde_shear_force(double shear_n_m, double limit, double g, double *slope) {
   double magnitude = fabs(g);
   double force = sonde_normal_pressure(shear_n_m, limit, 0.95, magnitude, slope);

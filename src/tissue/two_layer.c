@@ -1,4 +1,4 @@
-// Hot evaluation of the two-layer tissue (physics.md 2a), one pass over edges and one over nodes.
+// Hot evaluation of the two-layer tissue (docs/tissue.md), one pass over edges and one over nodes.
 // begin_node: clears a node's sums, its indentation and rate.
 // add_edge:   surface spring-damper: force, projected stiffness, damping block.
 // add_shear:  spring between the normal indentations of two neighbours.

@@ -22,7 +22,7 @@ typedef struct sonde_tissue_node {
   double shear_n_m;               // sum of the shear springs' stiffnesses at the node
 } sonde_tissue_node;
 
-// A x = b of the implicit step (physics.md 2b): A = mass_scale*M + damping_scale*C +
+// A x = b of the implicit step (docs/world.md): A = mass_scale*M + damping_scale*C +
 // stiffness_scale*K, and the product K v0 for the right-hand side. Scales of zero leave terms out.
 typedef struct sonde_tissue_scales {
   double mass, damping, stiffness;

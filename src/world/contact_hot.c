@@ -1,4 +1,4 @@
-// Contact of the convex probe with the deformed skin (physics.md 2c), every step.
+// Contact of the convex probe with the deformed skin (docs/world.md), every step.
 // refit:    boxes of runs of faces; far ones in turn, near ones each step.
 // detect:   clips candidate faces, gathers V_i and g_i per node, joins regions by union-find.
 // apply:    regions, pushes of the chosen law, terms of the implicit matrix.

@@ -1,4 +1,4 @@
-// One implicit step (physics.md 2b, equation (*)) and the sleeping of nodes at rest.
+// One implicit step (docs/world.md) and the sleeping of nodes at rest.
 // assemble:  tissue, contact and right-hand side at a state.
 // solve:     warm-started PCG over the awake rows.
 // update:    positions and velocities, with the bound that keeps s below x_m.

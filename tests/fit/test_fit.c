@@ -29,7 +29,7 @@ static double plate_edge_force(const sonde_model *model, const sonde_site *site,
   return sum;
 }
 
-// Curves of both probes at four sites of the plate, from physics.md 2f.2.
+// Curves of both probes at four sites of the plate.
 static sonde_measurements plate_data(const sonde_model *model, const sonde_site_table *sites,
                                      double edge_n_m) {
   sonde_measurements m;

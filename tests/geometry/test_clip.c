@@ -1,4 +1,5 @@
 // Laws of the clipped interpenetration volume.
+#include "base/random.h"
 #include "geometry/shapes.h"
 
 // A skin patch: z = shape(x, y) over a square grid, outward normal +z; tissue below.
@@ -285,12 +286,66 @@ static void test_submerged(void **state) {
   sonde_convex_clear(&body);
 }
 
+// Steep faces beside a body of many planes, where columns end on nearly equal planes: every clip
+// ends, its volume is finite and its shares add up.
+static void test_steep_faces_end(void **state) {
+  (void)state;
+  sonde_convex body = probe_body("sphere");
+  uint64_t count = 0;
+  for (uint64_t k = 0; k < 300000; ++k) {
+    sonde_vec3 corner[3], middle = {0, 0, -0.015};
+    double angle = 6.2831853 * sonde_random_uniform(1, 8 * k);
+    double height = -0.001 - 0.028 * sonde_random_uniform(2, 8 * k);
+    double reach = sqrt(fmax(0, 0.015 * 0.015 - (height + 0.015) * (height + 0.015)));
+    for (uint64_t c = 0; c < 3; ++c) {
+      double r = reach * (0.9 + 0.15 * sonde_random_uniform(3, 8 * k + c));
+      double turn = angle + 0.2 * (sonde_random_uniform(4, 8 * k + c) - 0.5);
+      double z = height + 0.006 * (sonde_random_uniform(5, 8 * k + c) - 0.5);
+      corner[c] = vec3(r * cos(turn), r * sin(turn), z);
+    }
+    assert_true(v_distance(corner[0], middle) < 0.03);
+    sonde_clip_result r;
+    count += sonde_clip_triangle(body.plane_normal, body.plane_offset_m, body.plane_count, corner,
+                                 vec3(0, 0, 1), &r);
+    assert_true(isfinite(r.volume_m3) && isfinite(r.depth_max_m));
+    double sum = r.share_m3[0] + r.share_m3[1] + r.share_m3[2];
+    assert_near(sum, r.volume_m3, 1e-6 * fabs(r.volume_m3) + 1e-20);
+  }
+  assert_true(count > 50000);
+  sonde_convex_clear(&body);
+}
+
+// A face for which two columns' ends are equal within rounding: the search for the lower one must
+// end.
+static void test_equal_planes_end(void **state) {
+  (void)state;
+  static const sonde_pose pose = {
+      {0x1.5c5ddb7b491c2p-5, 0x1.4a082543a6ea2p-5, 0x1.1c3bf74f5c052p-3},
+      {-0x1.1eb830cdd6442p-2, 0x1.3a30b5809e893p-2, 0x1.5806001b1d75ap-1, -0x1.39f1b8902d3a5p-1}};
+  static const sonde_vec3 corner[3] = {
+      {0x1.c6c2a58c1d0e9p-5, 0x1.3fa7bab1eeda6p-5, 0x1.34a731152707fp-3},
+      {0x1.c607d73eaf65ep-5, 0x1.3190f3dc2b903p-5, 0x1.2fb4db623edeep-3},
+      {0x1.b411ea34728efp-5, 0x1.4a06079a21338p-5, 0x1.367e97b1a05ep-3}};
+  sonde_convex body = probe_body("sphere");
+  sonde_mat3 r = q_matrix(pose.rotation);
+  for (uint32_t k = 0; k < body.plane_count; ++k) {
+    body.plane_normal[k] = m_mul_v(r, body.plane_normal[k]);
+    body.plane_offset_m[k] += v_dot(body.plane_normal[k], pose.position);
+  }
+  sonde_clip_result result;
+  assert_true(sonde_clip_triangle(body.plane_normal, body.plane_offset_m, body.plane_count, corner,
+                                  m_mul_v(r, vec3(0, 0, 1)), &result));
+  assert_true(isfinite(result.volume_m3));
+  sonde_convex_clear(&body);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_box_upright),          cmocka_unit_test(test_box_tilted),
       cmocka_unit_test(test_sphere_cap),           cmocka_unit_test(test_mesh_independent),
       cmocka_unit_test(test_bumpy_against_voxels), cmocka_unit_test(test_gradient),
       cmocka_unit_test(test_body_motion),          cmocka_unit_test(test_submerged),
+      cmocka_unit_test(test_steep_faces_end),      cmocka_unit_test(test_equal_planes_end),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

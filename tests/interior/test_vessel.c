@@ -39,7 +39,7 @@ static void rectangle_equals_integrated_point_loads(void **state) {
     sonde_vec3 s = sonde_rectangle_stress(1, a, b, points[k][0], points[k][1], z);
     assert_true(fabs(s.x - xx) < 1e-4 && fabs(s.y - yy) < 1e-4 && fabs(s.z - zz) < 1e-4);
   }
-  // Published shares for 40 x 10 mm at 10/20/30/40 mm (physics.md 2g).
+  // Published shares for 40 x 10 mm at 10/20/30/40 mm.
   double normal[] = {0.54, 0.27, 0.155, 0.098}, mean[] = {0.26, 0.11, 0.058, 0.035};
   for (int i = 0; i < 4; ++i) {
     sonde_vec3 s = sonde_rectangle_stress(1, 0.02, 0.005, 0, 0, 0.01 * (i + 1));
@@ -181,8 +181,8 @@ static sonde_interior *loaded(const tube *t, double force, const char *name, dou
       if (pass == 0) ++touched;
       load[i] = vec3(0, -force / touched, 0);
     }
-  sonde_interior_update(in,
-                        &(sonde_interior_input){t->model.surface.vertices, load, pose, &p, dt, 1, 0, 0});
+  sonde_interior_update(
+      in, &(sonde_interior_input){t->model.surface.vertices, load, pose, &p, dt, 1, 0, 0});
   if (dt < 0) return in;
   sonde_free(load);
   return in;
