@@ -280,9 +280,12 @@ static void print_table(const bench *b, double error_ratio) {
   for (size_t k = 0; k < 4; ++k)
     printf("  %-9s median %8.4f ms   p99 %8.4f ms\n", STAGES[k].name,
            quantile(b, STAGES[k].offset, 0.5) * 1e3, quantile(b, STAGES[k].offset, 0.99) * 1e3);
-  printf("  iterations %.1f   awake nodes %.0f   relative error %.2g\n",
-         mean_count(b, offsetof(sample, iterations)), mean_count(b, offsetof(sample, awake)),
-         error_ratio);
+  printf("  iterations %.1f   awake nodes %.0f   relative error ",
+         mean_count(b, offsetof(sample, iterations)), mean_count(b, offsetof(sample, awake)));
+  if (isnan(error_ratio))
+    printf("not measured\n");
+  else
+    printf("%.2g\n", error_ratio);
 }
 
 int cmd_bench(int argc, char **argv) {

@@ -12,7 +12,7 @@
 #include <zlib.h>
 
 #define MAGIC "SONDE-MODEL "
-enum { FORMAT_VERSION = 1, MAX_PROBES = 16 };
+enum { FORMAT_VERSION = 1 };
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the model file is little-endian");
 

@@ -277,22 +277,34 @@ static void add_point_terms(sonde_state *state, uint32_t face, const double *wei
   }
 }
 
-// Pressure kappa t + mu dt/dt at one point, never a pull; dt/dt = slope . relative velocity.
+// A point of a face inside the probe: pressure kappa t + mu dt/dt times its area, never a pull,
+// with dt/dt = slope . relative velocity.
+typedef struct pressed_point {
+  sonde_vec3 slope;
+  double push_n, stiffness_n_m, damping_n_s_m;
+} pressed_point;
+
+static bool pressed_at(const sonde_state *state, uint32_t face, const double *weight,
+                       const sonde_motion *probe, pressed_point *at) {
+  const uint32_t *v = state->model->surface.faces[face];
+  sonde_vec3 x = blend(state->position, v, weight);
+  double depth, area = state->face_area_m2[face] / POINTS;
+  if (!depth_at(state, x, &depth, &at->slope)) return false;
+  at->stiffness_n_m = state->def.contact_stiffness_n_m3 * area;
+  at->damping_n_s_m = state->def.contact_damping_n_s_m3 * area;
+  sonde_vec3 carried = v_add(probe->velocity, v_cross(probe->spin, v_sub(x, probe->origin)));
+  double rate = v_dot(at->slope, v_sub(blend(state->velocity, v, weight), carried));
+  at->push_n = at->stiffness_n_m * depth + at->damping_n_s_m * rate;
+  return at->push_n > 0;
+}
+
 static void press_point(sonde_state *state, uint32_t face, const double *weight,
                         const sonde_motion *probe, const sonde_contact_scales *scales) {
-  const uint32_t *v = state->model->surface.faces[face];
-  sonde_vec3 x = blend(state->position, v, weight), slope;
-  double depth, area = state->face_area_m2[face] / POINTS;
-  if (!depth_at(state, x, &depth, &slope)) return;
-  double kappa = state->def.contact_stiffness_n_m3 * area;
-  double mu = state->def.contact_damping_n_s_m3 * area;
-  sonde_vec3 carried = v_add(probe->velocity, v_cross(probe->spin, v_sub(x, probe->origin)));
-  double rate = v_dot(slope, v_sub(blend(state->velocity, v, weight), carried));
-  double push = kappa * depth + mu * rate;
-  if (!(push > 0)) return;
-  spread_push(state, v, weight, slope, push);
-  add_point_terms(state, face, weight, slope, kappa,
-                  scales->stiffness * kappa + scales->damping * mu);
+  pressed_point at;
+  if (!pressed_at(state, face, weight, probe, &at)) return;
+  spread_push(state, state->model->surface.faces[face], weight, at.slope, at.push_n);
+  add_point_terms(state, face, weight, at.slope, at.stiffness_n_m,
+                  scales->stiffness * at.stiffness_n_m + scales->damping * at.damping_n_s_m);
 }
 
 static void apply_foundation(sonde_state *state, const sonde_motion *probe,
@@ -357,17 +369,12 @@ void sonde_contact_apply(sonde_state *state, const sonde_motion *probe,
 static void advance_point(sonde_state *state, uint32_t face, const double *weight,
                           const sonde_motion *probe, double lambda, double h) {
   const uint32_t *v = state->model->surface.faces[face];
-  sonde_vec3 x = blend(state->position, v, weight), slope;
-  double depth, area = state->face_area_m2[face] / POINTS;
-  if (!depth_at(state, x, &depth, &slope)) return;
-  double kappa = state->def.contact_stiffness_n_m3 * area;
-  double mu = state->def.contact_damping_n_s_m3 * area;
-  sonde_vec3 carried = v_add(probe->velocity, v_cross(probe->spin, v_sub(x, probe->origin)));
+  pressed_point at;
+  if (!pressed_at(state, face, weight, probe, &at)) return;
   sonde_vec3 v0 = blend(state->velocity, v, weight), dv = blend(state->increment, v, weight);
-  double push = kappa * depth + mu * v_dot(slope, v_sub(v0, carried));
-  if (!(push > 0)) return;
-  push += lambda * v_dot(slope, v_madd(v_scale(v_madd(v0, lambda, dv), kappa * h), mu, dv));
-  if (push > 0) spread_push(state, v, weight, slope, push);
+  sonde_vec3 elastic = v_scale(v_madd(v0, lambda, dv), at.stiffness_n_m * h);
+  double push = at.push_n + lambda * v_dot(at.slope, v_madd(elastic, at.damping_n_s_m, dv));
+  if (push > 0) spread_push(state, v, weight, at.slope, push);
 }
 
 static void advance_foundation(sonde_state *state, const sonde_motion *probe, double lambda,
