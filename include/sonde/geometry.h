@@ -211,6 +211,9 @@ SONDE_API bool sonde_clip_triangle(const sonde_vec3 *planes_n, const double *pla
 
 /* ---- probes ------------------------------------------------------------------------------ */
 
+/** A probe with more planes is refused; the contact keeps room for that many. */
+enum { SONDE_MAX_PROBE_PLANES = 4096 };
+
 /**
  * A probe: rigid convex body in its own frame. Origin at the centre of the contact face, x lateral
  * (across the image), y elevational, z the beam axis pointing INTO the tissue; the body fills z<0.

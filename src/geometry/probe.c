@@ -130,6 +130,9 @@ static sonde_status make_from_file(const char *path, sonde_probe *probe, sonde_e
     if (status)
       sonde_fail(error, status, "%s: no probe can be made of it: %s", path, cause.message);
   }
+  if (!status && probe->body.plane_count > SONDE_MAX_PROBE_PLANES)
+    status = sonde_fail(error, SONDE_MESH, "%s: its hull has %u planes, expected at most %d", path,
+                        probe->body.plane_count, SONDE_MAX_PROBE_PLANES);
   sonde_mesh_clear(&mesh);
   return status;
 }

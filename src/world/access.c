@@ -46,7 +46,6 @@ void sonde_state_reset(sonde_state *state) {
   memset(state->velocity, 0, n * sizeof *state->velocity);
   memset(state->increment, 0, n * sizeof *state->increment);
   memset(state->contact_force, 0, n * sizeof *state->contact_force);
-  memset(state->push_n, 0, n * sizeof *state->push_n);
   memset(state->share_m3, 0, n * sizeof *state->share_m3);
   memset(state->gradient, 0, n * sizeof *state->gradient);
   memset(state->awake, state->def.sleep_displacement_m > 0 ? 0 : 1, n);

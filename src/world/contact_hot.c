@@ -92,7 +92,7 @@ static void clip_face(sonde_state *state, uint32_t face) {
 // Planes of the probe in the world frame and its box.
 static sonde_box place_probe(sonde_state *state, const sonde_probe *probe, sonde_pose pose) {
   const sonde_convex *body = &probe->body;
-  SONDE_ASSERT(body->plane_count <= state->plane_capacity);
+  SONDE_ASSERT(body->plane_count <= SONDE_MAX_PROBE_PLANES);
   sonde_mat3 r = q_matrix(pose.rotation);
   state->inward = m_mul_v(r, vec3(0, 0, 1));
   state->plane_count = body->plane_count;
@@ -113,7 +113,7 @@ static sonde_box place_probe(sonde_state *state, const sonde_probe *probe, sonde
 static void forget(sonde_state *state) {
   for (uint32_t k = 0; k < state->touched_count; ++k) {
     uint32_t i = state->touched[k];
-    state->share_m3[i] = state->push_n[i] = 0;
+    state->share_m3[i] = 0;
     state->gradient[i] = state->contact_force[i] = vec3(0, 0, 0);
   }
   state->touched_count = state->touched_face_count = 0;
@@ -267,13 +267,12 @@ static void add_point_terms(sonde_state *state, uint32_t face, const double *wei
   const uint32_t *v = state->model->surface.faces[face];
   double speed = v_dot(slope, blend(state->velocity, v, weight));
   for (int k = 0; k < 3; ++k) {
-    uint32_t i = v[k], j = v[(k + 1) % 3], e = state->face_edges[face][k];
+    uint32_t i = v[k], e = state->face_edges[face][k];
     state->matrix->diagonal[i] =
         m_add(state->matrix->diagonal[i], m_rank1(slope, scale * weight[k] * weight[k], 0));
     state->matrix->upper[e] =
         m_add(state->matrix->upper[e], m_rank1(slope, scale * weight[k] * weight[(k + 1) % 3], 0));
     state->product[i] = v_madd(state->product[i], stiffness * weight[k] * speed, slope);
-    SONDE_ASSERT(i != j);
   }
 }
 
@@ -429,7 +428,6 @@ void sonde_contact_wrench(sonde_state *state, sonde_vec3 origin) {
     contact->torque_n_m = v_sub(contact->torque_n_m, v_cross(arm, f));
     double push = -v_dot(f, region->direction);
     if (!(push > 0)) push = 0;
-    state->push_n[i] = push;
     region->force_n += push;
     region->centre_m = v_madd(region->centre_m, push, state->position[i]);
     double area = v_dot(state->gradient[i], region->direction);

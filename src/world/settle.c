@@ -58,15 +58,12 @@ static double evaluate(const problem *p, double *load) {
 // From the kept positions along the solution, each node at most 95 % of the gap to its asymptote
 // and 5 mm.
 static void move(sonde_state *state, double share) {
-  const sonde_model *model = state->model;
   for (uint32_t r = 0; r < state->row_count; ++r) {
     uint32_t i = state->rows[r];
-    sonde_vec3 d = v_scale(state->increment[i], share), n = model->normal[i];
+    sonde_vec3 d = v_scale(state->increment[i], share);
     double size = v_norm(d);
     if (size > 5e-3) d = v_scale(d, 5e-3 / size);
-    double s = v_dot(n, v_sub(model->surface.vertices[i], state->trial[i]));
-    double gap = 0.95 * (model->xm_m[i] - s), advance = -v_dot(n, d);
-    if (advance > 0 && advance > gap) d = v_madd(d, advance - (gap > 0 ? gap : 0), n);
+    d = sonde_bounded_move(state->model, i, state->trial[i], d);
     state->position[i] = v_add(state->trial[i], d);
   }
 }

@@ -60,9 +60,9 @@ static size_t carve(sonde_state *s, char *base) {
   CARVE(face_order, faces), CARVE(boxes, s->block_count);
   CARVE(touched, n), CARVE(parent, n), CARVE(share_m3, n), CARVE(gradient, n);
   CARVE(face_edges, faces), CARVE(face_area_m2, faces), CARVE(touched_faces, faces);
-  CARVE(push_n, n), CARVE(contact_force, n), CARVE(lumped, n), CARVE(lumped_rows, n);
-  CARVE(plane_weight, SONDE_MAX_PLANES);
-  CARVE(plane_normal, SONDE_MAX_PLANES), CARVE(plane_offset, SONDE_MAX_PLANES);
+  CARVE(contact_force, n), CARVE(lumped, n), CARVE(lumped_rows, n);
+  CARVE(plane_weight, SONDE_MAX_PROBE_PLANES);
+  CARVE(plane_normal, SONDE_MAX_PROBE_PLANES), CARVE(plane_offset, SONDE_MAX_PROBE_PLANES);
   CARVE(force, n), CARVE(product, n), CARVE(right, n), CARVE(trial, n), CARVE(scratch_nodes, n);
   CARVE(scratch.r, n), CARVE(scratch.z, n), CARVE(scratch.p, n), CARVE(scratch.q, n);
   return offset;
@@ -119,7 +119,6 @@ sonde_status sonde_state_create(const sonde_model *model, const sonde_world_def 
   state->def = *def;
   state->block_count =
       (model->surface.face_count + SONDE_FACES_PER_BLOCK - 1) / SONDE_FACES_PER_BLOCK;
-  state->plane_capacity = SONDE_MAX_PLANES;
   state->block = sonde_calloc(1, carve(state, NULL));
   if (state->block) carve(state, state->block);
   status = state->block ? order_faces(state, error) : sonde_fail_memory(error);

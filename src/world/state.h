@@ -49,7 +49,6 @@ struct sonde_state {
   uint32_t touched_face_count;
   sonde_vec3 inward;         // direction of the columns: the beam axis of the probe
   sonde_vec3 *gradient;      // [nodes] g_i = dV/dx_i
-  double *push_n;            // [nodes] size of the probe's push on the node
   sonde_vec3 *contact_force; // [nodes] of the probe on the node
   sonde_vec3 *lumped;        // [nodes] w_i k of lumped regions, packed per region
   uint32_t *lumped_rows;     // [nodes]
@@ -59,7 +58,6 @@ struct sonde_state {
   double *plane_offset;
   double *plane_weight; // of its distance in the depth: see depth_at()
   uint32_t plane_count;
-  uint32_t plane_capacity;
   sonde_contact contact;
 
   // assembly and solve
@@ -77,12 +75,16 @@ struct sonde_state {
   sonde_stage_times times;
 };
 
-enum { SONDE_CALM_TICKS = 20, SONDE_MAX_PLANES = 4096 };
+enum { SONDE_CALM_TICKS = 20 };
 
 // Wakes every node. @thread tick
 void sonde_state_wake_all(sonde_state *state);
 // Lists of awake rows, edges and pairs from awake[]. @thread tick
 void sonde_state_list_awake(sonde_state *state);
+
+// A node's move from a place, kept to 95 % of the gap between its indentation and x_m. @thread tick
+sonde_vec3 sonde_bounded_move(const sonde_model *model, uint32_t i, sonde_vec3 from,
+                              sonde_vec3 move);
 
 // How a contact law enters the linear system at a step of size h (0: static): scales of K and C.
 typedef struct sonde_contact_scales {

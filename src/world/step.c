@@ -63,8 +63,8 @@ static void first_right_side(sonde_state *state) {
 }
 
 // Keeps the indentation below x_m: at most 95 % of the remaining gap per step.
-static sonde_vec3 bounded_move(const sonde_model *model, uint32_t i, sonde_vec3 from,
-                               sonde_vec3 move) {
+sonde_vec3 sonde_bounded_move(const sonde_model *model, uint32_t i, sonde_vec3 from,
+                              sonde_vec3 move) {
   sonde_vec3 n = model->normal[i];
   double advance = -v_dot(n, move);
   if (!(advance > 0)) return move;
@@ -83,7 +83,7 @@ static bool update(sonde_state *state) {
     uint32_t i = state->rows[r];
     sonde_vec3 dv = state->increment[i], v0 = state->velocity[i];
     sonde_vec3 move = v_scale(v_madd(v0, lambda, dv), h);
-    sonde_vec3 bounded = bounded_move(state->model, i, state->position[i], move);
+    sonde_vec3 bounded = sonde_bounded_move(state->model, i, state->position[i], move);
     state->velocity[i] = v_madd(v_add(v0, dv), 1 / h, v_sub(bounded, move));
     state->position[i] = v_add(state->position[i], bounded);
     sum += v_norm2(state->position[i]) + v_norm2(state->velocity[i]);
