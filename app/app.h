@@ -12,6 +12,7 @@ int cmd_run(int argc, char **argv);
 int cmd_fit(int argc, char **argv);
 int cmd_predict(int argc, char **argv);
 int cmd_measure(int argc, char **argv);
+int cmd_identify(int argc, char **argv);
 int cmd_press(int argc, char **argv);
 int cmd_replay(int argc, char **argv);
 int cmd_bench(int argc, char **argv);

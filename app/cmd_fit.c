@@ -39,7 +39,7 @@ static const char HELP[] =
 
 typedef struct fit_arguments {
   const char *measurements, *surface, *sites, *output, *femur, *fat, *muscle, *name, *provenance;
-  const char *stages, *weights, *loss, *fine_mm;
+  const char *stages, *weights, *loss, *fine_mm, *exponent;
   bool json, help, pretension, cold_start;
 } fit_arguments;
 
@@ -63,6 +63,7 @@ static bool parse_arguments(int argc, char **argv, fit_arguments *a) {
                                 {"--weights", &a->weights, NULL},
                                 {"--loss", &a->loss, NULL},
                                 {"--fine-mm", &a->fine_mm, NULL},
+                                {"--exponent", &a->exponent, NULL},
                                 {"--pretension", NULL, &a->pretension},
                                 {"--cold-start", NULL, &a->cold_start},
                                 {"--json", NULL, &a->json},
@@ -86,6 +87,10 @@ static bool parse_fit(const fit_arguments *a, sonde_fit_def *def, double *fine_m
   if (a->loss && !app_parse_word(VERB, "--loss", a->loss, LOSSES, &loss)) return false;
   if (a->fine_mm && !app_parse_real(VERB, "--fine-mm", a->fine_mm, 0.5, 50, fine_mm)) return false;
   *def = sonde_fit_def_default();
+  long exponent = (long)def->normal_exponent;
+  if (a->exponent && !app_parse_integer(VERB, "--exponent", a->exponent, 1, 3, &exponent))
+    return false;
+  def->normal_exponent = (double)exponent;
   def->stages = (uint32_t)stages;
   def->weights = (sonde_fit_weights)weights;
   def->loss = (sonde_fit_loss)loss;

@@ -21,6 +21,8 @@ static const char HELP[] =
     "  --depth-mm D      press D millimetres below the rest skin (-10 to 60)\n"
     "  --case NAME       healthy, partial_mural, acute_occlusive, subacute_occlusive,\n"
     "                    chronic_occlusive; default healthy\n"
+    "  --preset FILE     damping, stiffness and friction (sonde-identify(1)); a settled probe\n"
+    "                    feels the stiffness only\n"
     "  --image PNG       write the echographic image of the settled state (512 x 512)\n"
     "  --json            print one JSON object\n"
     "  --help            this text\n"
@@ -29,7 +31,7 @@ static const char HELP[] =
 typedef struct options {
   char model[1024];
   long site;
-  const char *probe, *pathology, *image;
+  const char *probe, *pathology, *image, *preset;
   double force_n, depth_m; // NaN when not asked for
   bool json;
 } options;
@@ -52,15 +54,12 @@ static const double DEEPEST_M = 0.06;
 
 // Returns -1 to go on, else the exit code.
 static int read_options(int argc, char **argv, options *o) {
-  static const struct option LONG[] = {{"site", required_argument, NULL, 's'},
-                                       {"probe", required_argument, NULL, 'p'},
-                                       {"force-n", required_argument, NULL, 'f'},
-                                       {"depth-mm", required_argument, NULL, 'd'},
-                                       {"case", required_argument, NULL, 'c'},
-                                       {"image", required_argument, NULL, 'i'},
-                                       {"json", no_argument, NULL, 'j'},
-                                       {"help", no_argument, NULL, 'h'},
-                                       {NULL, 0, NULL, 0}};
+  static const struct option LONG[] = {
+      {"site", required_argument, NULL, 's'},    {"probe", required_argument, NULL, 'p'},
+      {"force-n", required_argument, NULL, 'f'}, {"depth-mm", required_argument, NULL, 'd'},
+      {"case", required_argument, NULL, 'c'},    {"image", required_argument, NULL, 'i'},
+      {"preset", required_argument, NULL, 'P'},  {"json", no_argument, NULL, 'j'},
+      {"help", no_argument, NULL, 'h'},          {NULL, 0, NULL, 0}};
   double mm = 0;
   for (int c; (c = getopt_long(argc, argv, "", LONG, NULL)) != -1;) switch (c) {
     case 's':
@@ -77,6 +76,7 @@ static int read_options(int argc, char **argv, options *o) {
       break;
     case 'c': o->pathology = optarg; break;
     case 'i': o->image = optarg; break;
+    case 'P': o->preset = optarg; break;
     case 'j': o->json = true; break;
     case 'h': fputs(HELP, stdout); return APP_OK;
     default: return APP_BAD_INPUT;
@@ -202,7 +202,10 @@ static void print(const press *p, const options *o) {
 }
 
 static sonde_status prepare(press *p, const options *o, sonde_error *error) {
+  sonde_preset preset = sonde_preset_default();
+  sonde_world_def world = sonde_world_def_default();
   sonde_status status = sonde_pathology_preset(o->pathology, &p->pathology, error);
+  if (!status && o->preset) status = sonde_preset_load(o->preset, &preset, error);
   if (!status) status = sonde_probe_create(o->probe, &p->probe, error);
   if (!status) status = sonde_model_load(o->model, &p->model, error);
   if (status) return status;
@@ -213,7 +216,8 @@ static sonde_status prepare(press *p, const options *o, sonde_error *error) {
              o->model, o->site, p->model->site_count);
     return SONDE_NOT_FOUND;
   }
-  return sonde_state_create(p->model, NULL, &p->state, error);
+  status = sonde_preset_apply(&preset, p->model, &world, error);
+  return status ? status : sonde_state_create(p->model, &world, &p->state, error);
 }
 
 int cmd_press(int argc, char **argv) {

@@ -31,13 +31,14 @@ static const char help[] =
     "  --probe NAME    point, linear, square, sphere or a mesh file (default linear)\n"
     "  --case NAME     healthy, partial_mural, acute_occlusive, subacute_occlusive,\n"
     "                  chronic_occlusive (default healthy)\n"
+    "  --preset FILE   damping, stiffness and friction (sonde-identify(1)); not with --record\n"
     "  --json          headless: print one JSON object at the end\n"
     "  --help          this text\n";
 
 enum { FIRST_SITE = 27, MAX_PROBES = 16 };
 
 typedef struct settings {
-  const char *model, *record, *probe, *pathology;
+  const char *model, *record, *probe, *pathology, *preset;
   long port;
   double seconds;
   bool headless, lockstep, json, help, timed;
@@ -62,18 +63,24 @@ static bool parse_option(int option, settings *s) {
   case 'h': s->help = true; return true;
   case 'r': s->record = optarg; return true;
   case 'P': s->probe = optarg; return true;
+  case 'e': s->preset = optarg; return true;
   default: s->pathology = optarg; return true;
   }
 }
 
 // 0 when the command line is good.
 static int parse(int argc, char **argv, settings *s) {
-  static const struct option options[] = {
-      {"port", required_argument, NULL, 'p'},   {"seconds", required_argument, NULL, 's'},
-      {"headless", no_argument, NULL, 'H'},     {"lockstep", no_argument, NULL, 'l'},
-      {"json", no_argument, NULL, 'j'},         {"help", no_argument, NULL, 'h'},
-      {"record", required_argument, NULL, 'r'}, {"probe", required_argument, NULL, 'P'},
-      {"case", required_argument, NULL, 'c'},   {NULL, 0, NULL, 0}};
+  static const struct option options[] = {{"port", required_argument, NULL, 'p'},
+                                          {"seconds", required_argument, NULL, 's'},
+                                          {"headless", no_argument, NULL, 'H'},
+                                          {"lockstep", no_argument, NULL, 'l'},
+                                          {"json", no_argument, NULL, 'j'},
+                                          {"help", no_argument, NULL, 'h'},
+                                          {"record", required_argument, NULL, 'r'},
+                                          {"probe", required_argument, NULL, 'P'},
+                                          {"case", required_argument, NULL, 'c'},
+                                          {"preset", required_argument, NULL, 'e'},
+                                          {NULL, 0, NULL, 0}};
   int option;
   opterr = 0;
   while ((option = getopt_long(argc, argv, ":h", options, NULL)) != -1) {
@@ -86,6 +93,8 @@ static int parse(int argc, char **argv, settings *s) {
   if (optind < argc) return app_usage_error("run", "unexpected argument '%s'", argv[optind]);
   if ((s->timed || s->lockstep || s->json) && !s->headless)
     return app_usage_error("run", "--seconds, --lockstep and --json need --headless");
+  if (s->preset && s->record) // a recording names the model file, whose law it would replay with
+    return app_usage_error("run", "--record keeps no preset: give one of --preset and --record");
   return APP_OK;
 }
 
@@ -154,9 +163,8 @@ static sonde_status create_device(const settings *s, const sonde_model *model, d
   return status;
 }
 
-static sonde_status create_session(const settings *s, const sonde_model *model,
-                                   const char *model_path, sonde_session **session,
-                                   sonde_error *error) {
+static sonde_status create_session(const settings *s, sonde_model *model, const char *model_path,
+                                   sonde_session **session, sonde_error *error) {
   const char *names[MAX_PROBES];
   sonde_session_def def = sonde_session_def_default();
   def.model = model;
@@ -164,7 +172,10 @@ static sonde_status create_session(const settings *s, const sonde_model *model,
   def.record_path = s->record;
   def.probe_names = names;
   def.controls.probe = choose_probes(s->probe, names);
+  sonde_preset preset = sonde_preset_default();
   sonde_status status = sonde_pathology_preset(s->pathology, &def.controls.pathology, error);
+  if (!status && s->preset) status = sonde_preset_load(s->preset, &preset, error);
+  if (!status) status = sonde_preset_apply(&preset, model, &def.world, error);
   sonde_device device = {0};
   if (!status) status = create_device(s, model, def.world.dt_s, &device, error);
   if (!status) status = sonde_session_create(&def, &device, session, error);
@@ -294,7 +305,7 @@ static void print_summary(const settings *s, const summary *seen) {
 }
 
 // The session from beginning to end; errors of the recording come at the end.
-static int simulate(const settings *s, const sonde_model *model, const char *model_path) {
+static int simulate(const settings *s, sonde_model *model, const char *model_path) {
   sonde_error error = {0};
   sonde_session *session = NULL;
   summary seen = {0};

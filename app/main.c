@@ -20,6 +20,7 @@ static const command COMMANDS[] = {
     {"fit", cmd_fit, "fit a thigh to measurements and write a model file"},
     {"predict", cmd_predict, "compare a model's forces with measurements"},
     {"measure", cmd_measure, "press a model at its sites with the virtual robot"},
+    {"identify", cmd_identify, "find damping and friction from records of a moving probe"},
     {"press", cmd_press, "press once, settle, report force, penetration and vessels"},
     {"replay", cmd_replay, "play a recording again and compare the state hash"},
     {"bench", cmd_bench, "time the simulation's stages"},

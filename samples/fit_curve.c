@@ -22,7 +22,7 @@ int main(void) {
          fit.xm_m * 1e3, fit.mae_n);
   for (int i = 0; i < COUNT; ++i) {
     double slope;
-    double pressure = sonde_normal_pressure(fit.k0_n_m3, fit.xm_m, guard, depth_m[i], &slope);
+    double pressure = sonde_normal_pressure(1, fit.k0_n_m3, fit.xm_m, guard, depth_m[i], &slope);
     printf("%4.1f mm: measured %.4f N, fitted %.4f N\n", depth_m[i] * 1e3, force_n[i],
            pressure * area_m2);
   }

@@ -1,7 +1,7 @@
 /**
  * @file fit.h
  * Measurement and site tables, error statistics, estimation in up to three stages, prediction of
- * the measurements by a model, and the virtual robot. Formulas: docs/fit.md.
+ * the measurements by a model. Formulas: docs/fit.md.
  */
 #ifndef SONDE_FIT_H
 #define SONDE_FIT_H
@@ -25,6 +25,7 @@ typedef struct sonde_measurements {
   sonde_datum *data;      /**< [count] */
   sonde_vec3 *position_m; /**< [count] of the site */
   sonde_vec3 *normal;     /**< [count] outward, unit */
+  char remark[160];       /**< saved as a first line '# ...' when not empty; not read back */
 } sonde_measurements;
 
 /**
@@ -40,11 +41,18 @@ SONDE_API sonde_status sonde_site_table_load(const char *path, sonde_site_table 
 SONDE_API sonde_status sonde_site_table_save(const char *path, const sonde_site_table *table,
                                              sonde_error *error);
 SONDE_API void sonde_site_table_clear(sonde_site_table *table);
+/**
+ * Whether every site lies within tolerance_m (e.g. 5 mm) of the model's skin, with a normal at most
+ * 30 degrees off the skin's. @return MISMATCH naming the first that does not @thread any
+ */
+SONDE_API sonde_status sonde_sites_check_on_surface(const sonde_model *model,
+                                                    const sonde_site_table *sites,
+                                                    double tolerance_m, sonde_error *error);
 
 /**
  * Reads `site,probe,x_mm,y_mm,z_mm,nx,ny,nz,penetration_mm,force_n` under the same rules. Probes
- * must be built-in names. Rejects NaN, negative penetrations and repeated (site, probe,
- * penetration).
+ * must be built-in names or rect:AxB. Rejects NaN, negative penetrations, repeated (site, probe,
+ * penetration) and a negative mean force; rows may stand in any order.
  * @param sites NULL, or the sites that may occur: a missing one is SONDE_FORMAT, one that lies
  *   elsewhere (more than 5 mm away) is SONDE_MISMATCH
  * @thread owner
@@ -114,7 +122,8 @@ typedef struct sonde_fit_def {
   uint32_t max_iterations;   /**< default 400 */
   bool fit_pretension;       /**< also estimate T0 >= 0 (stage 2); default false */
   bool cold_start;           /**< stage 2 from one generic start instead of stage 1 */
-  double kept_edge_n_m;      /**< edge stiffness of a stage 3 model; default 5 */
+  double kept_edge_n_m;      /**< edge stiffness of a stage 3 model; default 0.1 */
+  double normal_exponent;    /**< of the normal springs of stage 3: 1, 2 (default) or 3 */
   uint32_t threads;          /**< of stage 3; 0 (default): one per online core */
 } sonde_fit_def;
 
@@ -207,42 +216,6 @@ SONDE_API sonde_status sonde_predict(const sonde_model *model, const sonde_site_
                                      const sonde_measurements *measurements,
                                      const sonde_predict_def *def, const sonde_progress *progress,
                                      double *predicted_n, sonde_error *error);
-
-/* ---- virtual robot ----------------------------------------------------------------------- */
-
-typedef enum sonde_robot_contact {
-  SONDE_ROBOT_AUTO,   /**< bonded for rectangular probes, else probe */
-  SONDE_ROBOT_BONDED, /**< the footprint's skin moves rigidly, as in the experiment */
-  SONDE_ROBOT_PROBE,  /**< the convex body is pressed in */
-} sonde_robot_contact;
-
-typedef struct sonde_robot_def {
-  const char *probe; /**< name or mesh file */
-  sonde_robot_contact contact;
-  double step_m;        /**< default 2 mm */
-  double limit_n;       /**< the first row above it is the last; default 40 N */
-  double depth_limit_m; /**< default 30 mm */
-  double noise_force_n; /**< standard deviations of the sensors; default 0 */
-  double noise_penetration_m;
-  uint64_t seed;
-  double relative_residual; /**< default 1e-6 */
-  uint32_t max_iterations;  /**< default 200 */
-  uint32_t threads;         /**< 0: one per online core */
-} sonde_robot_def;
-
-SONDE_API sonde_robot_def sonde_robot_def_default(void);
-
-/**
- * Presses the model at every site, step by step, until the force passes the limit, the depth limit
- * is reached or no equilibrium is found.
- * @param[out] measurements finished sites in table order, also when CANCELLED
- * @param[out] stopped sites that ended without an equilibrium; may be NULL
- * @thread owner
- */
-SONDE_API sonde_status sonde_robot_run(const sonde_model *model, const sonde_site_table *sites,
-                                       const sonde_robot_def *def, const sonde_progress *progress,
-                                       sonde_measurements *measurements, uint32_t *stopped,
-                                       sonde_error *error);
 
 #ifdef __cplusplus
 }

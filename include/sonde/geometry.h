@@ -222,7 +222,7 @@ typedef struct sonde_probe {
   char name[64];
   sonde_convex body;
   double half_x_m, half_y_m; /**< half extent of the contact face */
-  bool rectangular;          /**< the footprint is the full rectangle (point, linear, square) */
+  bool rectangular;          /**< the footprint is the full rectangle (point, linear, square, rect:AxB) */
 } sonde_probe;
 /** Names of the built-in probes, NULL-terminated: point, linear, square, sphere. @thread any */
 SONDE_API const char *const *sonde_probe_names(void);
@@ -232,7 +232,8 @@ SONDE_API const char *const *sonde_probe_names(void);
  * used, leaving out detail below 0.05 mm; +z of the file points into the tissue and the file's
  * lowest-z end is the handle). The file's highest z becomes 0 and the middle of the vertices within
  * 1 mm of it the origin; their box gives the half extents.
- * point 6x6 mm, linear 60x12 mm, square 24x24 mm (flat boxes), sphere radius 15 mm.
+ * point 6x6 mm, linear 60x12 mm, square 24x24 mm, rect:AxB with sides A (x) and B (y) from 0.1 to
+ * 200 mm (flat boxes); sphere radius 15 mm.
  * @return SONDE_NOT_FOUND for an unknown name, listing the known ones
  * @thread owner
  */

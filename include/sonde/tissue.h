@@ -1,10 +1,11 @@
 /**
  * @file tissue.h
  * The thigh model (constant once built) and its file; the two-layer tissue: surface masses,
- * spring-dampers, nonlinear normal springs f(x)=x/(ax+b), shear springs between neighbours.
+ * spring-dampers, nonlinear normal springs f(x)=x/(ax+b), a shear layer.
  *
  * Notation of the paper in brackets. Normal spring per unit area, with indentation s along the
- * inward rest normal: p(s) = k0 s/(1 - s/xm)   [f = x/(a x + b), b = 1/k0, a = -1/(k0 xm)].
+ * inward rest normal: p(s) = k0 s/(1 - (s/xm)^n); n = 1 is the paper's eq. (1)
+ * [f = x/(a x + b), b = 1/k0, a = -1/(k0 xm)].
  */
 #ifndef SONDE_TISSUE_H
 #define SONDE_TISSUE_H
@@ -22,8 +23,9 @@ typedef struct sonde_surface_law {
   double edge_compression;          /**< chi in [0,1]: share of the stiffness left when shortened */
   double edge_pretension_n;         /**< T0 >= 0 */
   double tangential_stiffness_n_m3; /**< g_t per area: (I - NN^T) spring to the rest position */
-  double shear_stiffness_n_m;       /**< G of the shear springs between neighbours (0: none) */
-  double shear_limit;               /**< slope gm at which a shear spring becomes rigid */
+  double shear_stiffness_n_m;       /**< G of the shear layer (0: none) */
+  double shear_limit;               /**< slope gm of the skin at which the layer becomes rigid */
+  double normal_exponent;           /**< n of the normal springs: 1 (the paper's), 2 or 3 */
   double normal_damping_s;          /**< damper of normal and tangential springs = time x k0 */
   double surface_density_kg_m2;     /**< lumped mass per skin area */
   double guard;                     /**< theta: straight continuation of p(s) beyond theta*xm */
@@ -75,16 +77,18 @@ typedef struct sonde_model {
   sonde_topology topology;
   sonde_mesh femur; /**< closed */
   sonde_surface_law law;
-  sonde_vec3 *normal;     /**< [nodes] outward rest normals */
-  double *area_m2;        /**< [nodes] */
-  double *mass_kg;        /**< [nodes] */
-  double *k0_n_m3;        /**< [nodes] per area */
-  double *xm_m;           /**< [nodes] */
-  double *fat_depth_m;    /**< [nodes] depth of the skin/fat interface below the skin */
-  double *muscle_depth_m; /**< [nodes] depth of the fat/muscle interface */
-  double *bone_depth_m;   /**< [nodes] distance to the femur */
-  double *edge_rest_m;    /**< [edges] */
-  double *edge_dual_m;    /**< [edges] dual length w of the shear springs, >= 0 */
+  sonde_vec3 *normal;               /**< [nodes] outward rest normals */
+  double *area_m2;                  /**< [nodes] */
+  double *mass_kg;                  /**< [nodes] */
+  double *k0_n_m3;                  /**< [nodes] per area */
+  double *xm_m;                     /**< [nodes] */
+  double *fat_depth_m;              /**< [nodes] depth of the skin/fat interface below the skin */
+  double *muscle_depth_m;           /**< [nodes] depth of the fat/muscle interface */
+  double *bone_depth_m;             /**< [nodes] distance to the femur */
+  double *edge_rest_m;              /**< [edges] */
+  double *face_area_m2;             /**< [faces] */
+  double (*face_half_cotangent)[3]; /**< [faces] of the angle at each corner */
+  uint32_t (*face_edge)[3];         /**< [faces] edge opposite each corner */
   uint32_t site_count;
   sonde_site *sites;
   uint32_t datum_count;
@@ -135,13 +139,16 @@ SONDE_API sonde_status sonde_model_save(sonde_model *model, const char *path, so
 /** The site with that id, NULL when absent. @thread any */
 SONDE_API const sonde_site *sonde_model_site(const sonde_model *model, uint32_t id);
 
-/** Pressure of a normal spring and its slope at indentation s, guard included (eq. (1), 2a). */
-SONDE_API double sonde_normal_pressure(double k0_n_m3, double xm_m, double guard, double s_m,
-                                       double *slope_n_m3);
+/** Pressure of a normal spring of exponent n and its slope at indentation s, guard included. */
+SONDE_API double sonde_normal_pressure(double exponent, double k0_n_m3, double xm_m, double guard,
+                                       double s_m, double *slope_n_m3);
 /** Energy per area of the same spring. @thread any */
-SONDE_API double sonde_normal_energy(double k0_n_m3, double xm_m, double guard, double s_m);
-/** Force of a shear spring of dual length w at slope g = ds/L; *slope = dq/dg. @thread any */
+SONDE_API double sonde_normal_energy(double exponent, double k0_n_m3, double xm_m, double guard,
+                                     double s_m);
+/** Force per length of the shear layer at slope g = |grad s| >= 0; *slope = dq/dg. */
 SONDE_API double sonde_shear_force(double shear_n_m, double limit, double g, double *slope);
+/** Energy per area of the shear layer. @thread any */
+SONDE_API double sonde_shear_energy(double shear_n_m, double limit, double g);
 
 #ifdef __cplusplus
 }

@@ -23,6 +23,22 @@ typedef enum sonde_contact_law {
                              spread by projected nodal area */
 } sonde_contact_law;
 
+/**
+ * Friction of the probe on the skin (docs/world.md): Coulomb with bonds that stick, the coefficient
+ * falling from mu_static to mu_kinetic with the slip speed (Stribeck) and towards mu_gel with the
+ * gel film. mu_static = 0: none, whatever the rest.
+ */
+typedef struct sonde_friction {
+  double mu_static, mu_kinetic; /**< of dry skin, 0 <= mu_kinetic <= mu_static; default 0 */
+  double stribeck_speed_m_s;    /**< default 0.01 */
+  double gel_film;              /**< thickness over the one that lubricates by 1/e; default 0 */
+  double mu_gel;                /**< of a full film; default 0.05 */
+} sonde_friction;
+
+/** mu_gel + (mu_dry - mu_gel) e^-film, mu_dry = mu_kinetic + (mu_static - mu_kinetic) e^-(v/vs)^2;
+ * 0 when mu_static is 0. @thread any (tick) */
+SONDE_API double sonde_friction_coefficient(const sonde_friction *friction, double slip_m_s);
+
 /** Options of a world; all validated at creation. */
 typedef struct sonde_world_def {
   double dt_s;                /**< step; default 1e-3 */
@@ -34,6 +50,7 @@ typedef struct sonde_world_def {
   double contact_damping_n_s_m3; /**< mu; default 1e5 */
   double sleep_displacement_m;   /**< a node slower than this per 10 ms for 20 steps sleeps until a
                                       neighbour moves; 0 keeps all awake; default 5e-6 */
+  sonde_friction friction;       /**< default none */
 } sonde_world_def;
 
 SONDE_API sonde_world_def sonde_world_def_default(void);
@@ -101,7 +118,7 @@ typedef struct sonde_settle_result {
 
 /**
  * Static equilibrium with the probe held still: Newton with line search on the total energy, all
- * nodes awake, velocities zeroed.
+ * nodes awake, velocities zeroed, without friction.
  * @param relative_residual e.g. 1e-9
  * @thread owner of the state
  */
@@ -119,6 +136,11 @@ SONDE_API sonde_settle_result sonde_settle_bonded(sonde_state *state, const uint
                                                   const sonde_vec3 *positions_m, uint32_t count,
                                                   double relative_residual, uint32_t max_iterations,
                                                   sonde_vec3 *force_n);
+
+/** Changes the friction from the next step on. @return ARGUMENT naming the value out of range
+ * @thread owner, between steps */
+SONDE_API sonde_status sonde_state_set_friction(sonde_state *state, const sonde_friction *friction,
+                                                sonde_error *error);
 
 SONDE_API const sonde_model *sonde_state_model(const sonde_state *state);
 SONDE_API const sonde_world_def *sonde_state_def(const sonde_state *state);

@@ -16,12 +16,13 @@
 static const double COLD_K0 = 1.8e5, COLD_ABOVE_M = 0.02;
 static const double EDGE_START_N_M = 50.0, TENSION_START_N = 1e-3;
 static const double LN_EDGE_LOW = -11.5, LN_EDGE_HIGH = 18.4; // 1e-5 .. 1e8 N/m
-static const double KEPT_EDGE_N_M = 5.0;  // stage 3: carries tangential motion, adds 1 % of force
-static const double PATCH_REACH_M = 0.06; // of the skin around a footprint
+static const double KEPT_EDGE_N_M = 0.1;
+static const double PATCH_REACH_M = 0.05; // of the skin around a footprint
 static const double LN_TENSION_LOW = -13.8, LN_TENSION_HIGH = 6.9;
 
 sonde_fit_def sonde_fit_def_default(void) {
-  return (sonde_fit_def){.stages = 2, .max_iterations = 400, .kept_edge_n_m = KEPT_EDGE_N_M};
+  return (sonde_fit_def){
+      .stages = 2, .max_iterations = 400, .kept_edge_n_m = KEPT_EDGE_N_M, .normal_exponent = 2};
 }
 
 static sonde_status check_def(const sonde_fit_def *def, sonde_error *error) {
@@ -227,6 +228,7 @@ static void set_refitted(const sonde_fit_def *def, const double *theta,
   }
   result->law.shear_stiffness_n_m = exp(theta[2 * count]);
   result->law.shear_limit = exp(theta[2 * count + 1]);
+  result->law.normal_exponent = def->normal_exponent;
   result->law.edge_stiffness_n_m = def->kept_edge_n_m;
   result->law.edge_pretension_n = 0;
   result->parameters = 2 * count + 2;
@@ -246,7 +248,7 @@ static sonde_status refit_sites(const sonde_model *model, const sonde_site_table
   double *force_n = SONDE_NEW(double, plan->row_count);
   sonde_status status = theta && force_n ? SONDE_OK : sonde_fail_memory(error);
   if (!status)
-    status = sonde_refit_create(model, sites, m, plan, def, PATCH_REACH_M, false, &refit, error);
+    status = sonde_refit_create(model, sites, m, plan, def, PATCH_REACH_M, &refit, error);
   if (!status) sonde_refit_start(refit, result->curves, theta);
   if (!status) status = sonde_refit_minimise(refit, theta, force_n, progress, &found, error);
   if (!status) {
@@ -267,6 +269,7 @@ static sonde_status allocate_result(const sonde_model *model, const sonde_site_t
   result->sites = SONDE_NEW(sonde_site, sites->count);
   result->model_n = SONDE_NEW(double, m->count);
   if (!result->sites || !result->model_n) return sonde_fail_memory(error);
+  for (uint32_t i = 0; i < m->count; ++i) result->model_n[i] = NAN;
   memcpy(result->sites, sites->sites, sites->count * sizeof *result->sites);
   return SONDE_OK;
 }

@@ -25,16 +25,26 @@ typedef struct sonde_fit_plan {
   uint32_t *row_probe; // [row_count] of the sorted rows
   uint32_t *row_curve; // [row_count]
   uint32_t curve_count;
-  uint32_t *curve_start;  // [curve_count + 1] sorted rows
-  uint32_t *curve_site;   // [curve_count] site index
-  uint32_t *curve_probe;  // [curve_count]
-  uint32_t site_count;    // measured sites
-  uint32_t *site_start;   // [site_count + 1] sorted rows
-  uint32_t *site_index;   // [site_count] index into the site table
-  double *site_deepest_m; // [site_count] largest penetration
+  uint32_t *curve_start;                   // [curve_count + 1] sorted rows
+  uint32_t *curve_site;                    // [curve_count] site index
+  uint32_t *curve_probe;                   // [curve_count]
+  uint32_t site_count;                     // measured sites
+  uint32_t *site_start;                    // [site_count + 1] sorted rows
+  uint32_t *site_index;                    // [site_count] index into the site table
+  double *site_deepest_m;                  // [site_count] largest penetration
+  uint32_t unsorted_rows;                  // that stood before a shallower one of their curve
+  uint32_t excluded_curves, excluded_rows; // left out: row_count + excluded_rows measurements
 } sonde_fit_plan;
 
-// Sorts and checks the measurements. @return ARGUMENT for a probe without rectangular footprint
+enum { SONDE_FIT_LEAST_STEPS = 3 }; // positive penetrations of a curve that can be fitted
+
+// Sorts and checks the measurements for a prediction: every row counts.
+// @return ARGUMENT for a probe without rectangular footprint
+sonde_status sonde_fit_plan_create_all(const sonde_site_table *sites, const sonde_measurements *m,
+                                       sonde_fit_plan *plan, sonde_error *error);
+// The same for a fit: curves of fewer than SONDE_FIT_LEAST_STEPS steps or without a positive mean
+// force are left out and counted, with one warning per reason; so is said when one probe is left.
+// @return ARGUMENT also when no curve remains
 sonde_status sonde_fit_plan_create(const sonde_site_table *sites, const sonde_measurements *m,
                                    sonde_fit_plan *plan, sonde_error *error);
 void sonde_fit_plan_clear(sonde_fit_plan *plan);

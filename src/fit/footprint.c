@@ -152,8 +152,8 @@ double sonde_footprint_force(const sonde_footprint *f, const sonde_model *model,
   double force = 0.0, per_stiffness, per_tension;
   for (uint32_t k = 0; k < f->node_count; ++k) {
     uint32_t i = f->node[k];
-    double pressure = sonde_normal_pressure(model->k0_n_m3[i], model->xm_m[i], law->guard,
-                                            x * f->cosine[k], NULL);
+    double pressure = sonde_normal_pressure(law->normal_exponent, model->k0_n_m3[i], model->xm_m[i],
+                                            law->guard, x * f->cosine[k], NULL);
     force += f->weight_m2[k] * f->cosine[k] * pressure;
   }
   sonde_footprint_edges(f, x, law->edge_compression, &per_stiffness, &per_tension);

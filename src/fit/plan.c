@@ -1,6 +1,8 @@
 // add_probes: the distinct probes, their footprints and mean forces.
 // sort_rows: row order (site index, probe, penetration).
 // cut: marks where curves and sites begin.
+// arrange: all of this, for the rows that are not left out.
+// mark_unfit: curves that no fit can use; excluded and warned about.
 #include "fit/fit_inside.h"
 
 #include <math.h>
@@ -36,11 +38,13 @@ static sonde_status add_probe_sizes(sonde_fit_plan *plan, sonde_error *error) {
   return SONDE_OK;
 }
 
-// Fills keys and the probes' mean forces.
+// Fills keys and the probes' mean forces; left_out may be NULL.
 static sonde_status make_keys(const sonde_site_table *sites, const sonde_measurements *m,
-                              sonde_fit_plan *plan, sort_key *keys, sonde_error *error) {
+                              const bool *left_out, sonde_fit_plan *plan, sort_key *keys,
+                              sonde_error *error) {
   uint32_t rows_of[SONDE_FIT_PROBES] = {0};
   for (uint32_t i = 0; i < m->count; ++i) {
+    if (left_out && left_out[i]) continue;
     const sonde_datum *d = &m->data[i];
     uint32_t site = sonde_site_find(sites, d->site);
     uint32_t probe = sonde_probe_index(plan->probe, &plan->probe_count, d->probe);
@@ -54,7 +58,7 @@ static sonde_status make_keys(const sonde_site_table *sites, const sonde_measure
       return sonde_fail(error, SONDE_ARGUMENT,
                         "measurement %u: %g m and %g N, expected 0 to 1 m and at most 1e6 N", i,
                         d->penetration_m, d->force_n);
-    keys[i] = (sort_key){site, probe, i, d->penetration_m};
+    keys[plan->row_count++] = (sort_key){site, probe, i, d->penetration_m};
     plan->mean_force_n[probe] += d->force_n;
     ++rows_of[probe];
   }
@@ -77,6 +81,8 @@ static void cut(sonde_fit_plan *plan, const sort_key *keys) {
       plan->curve_start[++curve] = r;
       plan->curve_site[curve] = keys[r].site;
       plan->curve_probe[curve] = keys[r].probe;
+    } else {
+      plan->unsorted_rows += keys[r].row < keys[r - 1].row;
     }
     plan->row[r] = keys[r].row;
     plan->row_probe[r] = keys[r].probe;
@@ -90,7 +96,6 @@ static void cut(sonde_fit_plan *plan, const sort_key *keys) {
 }
 
 static bool allocate(sonde_fit_plan *plan, uint32_t rows) {
-  plan->row_count = rows;
   plan->row = SONDE_NEW(uint32_t, rows);
   plan->row_probe = SONDE_NEW(uint32_t, rows);
   plan->row_curve = SONDE_NEW(uint32_t, rows);
@@ -104,20 +109,112 @@ static bool allocate(sonde_fit_plan *plan, uint32_t rows) {
          plan->curve_probe && plan->site_start && plan->site_index && plan->site_deepest_m;
 }
 
-sonde_status sonde_fit_plan_create(const sonde_site_table *sites, const sonde_measurements *m,
-                                   sonde_fit_plan *plan, sonde_error *error) {
+static sonde_status arrange(const sonde_site_table *sites, const sonde_measurements *m,
+                            const bool *left_out, sonde_fit_plan *plan, sonde_error *error) {
   *plan = (sonde_fit_plan){0};
   if (!m->count) return sonde_fail(error, SONDE_ARGUMENT, "no measurements, expected at least one");
   sort_key *keys = SONDE_NEW(sort_key, m->count);
   sonde_status status = keys && allocate(plan, m->count) ? SONDE_OK : sonde_fail_memory(error);
-  if (!status) status = make_keys(sites, m, plan, keys, error);
+  if (!status) status = make_keys(sites, m, left_out, plan, keys, error);
   if (!status) status = add_probe_sizes(plan, error);
   if (!status) {
-    qsort(keys, m->count, sizeof *keys, compare_keys);
+    qsort(keys, plan->row_count, sizeof *keys, compare_keys);
     cut(plan, keys);
   }
   sonde_free(keys);
   if (status) sonde_fit_plan_clear(plan);
+  return status;
+}
+
+sonde_status sonde_fit_plan_create_all(const sonde_site_table *sites, const sonde_measurements *m,
+                                       sonde_fit_plan *plan, sonde_error *error) {
+  sonde_status status = arrange(sites, m, NULL, plan, error);
+  if (!status && plan->unsorted_rows)
+    sonde_log(SONDE_LOG_INFO, "%u measurements stood out of order of penetration and were sorted",
+              plan->unsorted_rows);
+  return status;
+}
+
+// ---- what a fit leaves out ----------------------------------------------------------------
+
+typedef enum reason { FIT, TOO_SHORT, NO_FORCE, REASONS } reason;
+
+static reason judge(const sonde_measurements *m, const sonde_fit_plan *plan, uint32_t curve) {
+  uint32_t steps = 0;
+  double force_n = 0;
+  SONDE_ASSERT(curve < plan->curve_count);
+  for (uint32_t r = plan->curve_start[curve]; r < plan->curve_start[curve + 1]; ++r) {
+    const sonde_datum *d = &m->data[plan->row[r]];
+    steps += d->penetration_m > 0;
+    force_n += d->force_n;
+  }
+  if (steps < SONDE_FIT_LEAST_STEPS) return TOO_SHORT;
+  return force_n > 0 ? FIT : NO_FORCE;
+}
+
+static void warn(reason why, uint32_t curves, uint32_t rows, const sonde_datum *first) {
+  if (!curves) return;
+  char text[64] = "their mean force is not positive";
+  if (why == TOO_SHORT) snprintf(text, sizeof text, "fewer than %d steps", SONDE_FIT_LEAST_STEPS);
+  sonde_log(SONDE_LOG_WARNING,
+            "%u curves (%u rows) are left out: %s; the first is site %u, probe %s", curves, rows,
+            text, first->site, first->probe);
+}
+
+// Marks the rows of unfit curves; the counts go to `excluded`.
+static void mark_unfit(const sonde_measurements *m, const sonde_fit_plan *plan, bool *left_out,
+                       sonde_fit_plan *excluded) {
+  uint32_t curves[REASONS] = {0}, rows[REASONS] = {0};
+  const sonde_datum *first[REASONS] = {NULL};
+  for (uint32_t c = 0; c < plan->curve_count; ++c) {
+    reason why = judge(m, plan, c);
+    uint32_t start = plan->curve_start[c], end = plan->curve_start[c + 1];
+    if (!curves[why]++) first[why] = &m->data[plan->row[start]];
+    rows[why] += end - start;
+    for (uint32_t r = start; r < end && why != FIT; ++r) left_out[plan->row[r]] = true;
+  }
+  for (int why = TOO_SHORT; why < REASONS; ++why) {
+    warn((reason)why, curves[why], rows[why], first[why]);
+    excluded->excluded_curves += curves[why];
+    excluded->excluded_rows += rows[why];
+  }
+}
+
+// Arranges again without the marked rows.
+static sonde_status exclude(const sonde_site_table *sites, const sonde_measurements *m,
+                            const bool *left_out, const sonde_fit_plan *excluded,
+                            sonde_fit_plan *plan, sonde_error *error) {
+  SONDE_ASSERT(excluded->excluded_rows <= m->count);
+  sonde_fit_plan_clear(plan);
+  if (excluded->excluded_rows == m->count)
+    return sonde_fail(error, SONDE_ARGUMENT,
+                      "none of the %u curves can be fitted, expected at least one of %d steps with "
+                      "a positive mean force",
+                      excluded->excluded_curves, SONDE_FIT_LEAST_STEPS);
+  sonde_status status = arrange(sites, m, left_out, plan, error);
+  plan->excluded_curves = excluded->excluded_curves;
+  plan->excluded_rows = excluded->excluded_rows;
+  return status;
+}
+
+sonde_status sonde_fit_plan_create(const sonde_site_table *sites, const sonde_measurements *m,
+                                   sonde_fit_plan *plan, sonde_error *error) {
+  sonde_status status = sonde_fit_plan_create_all(sites, m, plan, error);
+  if (status) return status;
+  sonde_fit_plan excluded = {0};
+  bool *left_out = SONDE_NEW(bool, m->count);
+  if (left_out) {
+    mark_unfit(m, plan, left_out, &excluded);
+    if (excluded.excluded_rows) status = exclude(sites, m, left_out, &excluded, plan, error);
+  } else {
+    status = sonde_fail_memory(error);
+  }
+  sonde_free(left_out);
+  if (status) sonde_fit_plan_clear(plan);
+  if (!status && plan->probe_count == 1)
+    sonde_log(SONDE_LOG_WARNING,
+              "one probe only (%s): edge stiffness and local springs are not told apart",
+              plan->probe[0]);
   return status;
 }
 

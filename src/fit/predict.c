@@ -15,7 +15,7 @@ typedef struct prediction {
   const sonde_site_table *sites;
   const sonde_measurements *m;
   const sonde_fit_plan *plan;
-  sonde_press *crew; // NULL: simplified
+  const sonde_predict_def *def;
   double *predicted_n;
 } prediction;
 
@@ -29,40 +29,45 @@ static void predict_simplified(const prediction *p, uint32_t curve,
 }
 
 // A depth without equilibrium leaves the rest of the curve NaN.
-static sonde_status predict_full(const prediction *p, sonde_press *press, uint32_t curve,
-                                 const sonde_footprint *footprint, const atomic_bool *stop,
+static sonde_status predict_full(const prediction *p, uint32_t curve, const atomic_bool *stop,
                                  sonde_error *error) {
   const sonde_fit_plan *plan = p->plan;
-  const sonde_site *site = &p->sites->sites[plan->curve_site[curve]];
-  sonde_state_reset(press->state);
+  uint32_t probe = plan->curve_probe[curve];
+  sonde_bonded bonded;
+  sonde_status status = sonde_bonded_create(
+      p->model, &p->sites->sites[plan->curve_site[curve]], plan->half_u_m[probe],
+      plan->half_v_m[probe], p->def->relative_residual, p->def->max_iterations, &bonded, error);
+  if (status) return status;
   double force_n = 0.0;
   for (uint32_t r = plan->curve_start[curve]; r < plan->curve_start[curve + 1]; ++r) {
-    if (atomic_load(stop)) return sonde_fail(error, SONDE_CANCELLED, "cancelled");
+    if (atomic_load(stop)) {
+      status = sonde_fail(error, SONDE_CANCELLED, "cancelled");
+      break;
+    }
     uint32_t row = plan->row[r];
-    if (!isnan(force_n))
-      force_n = sonde_press_bonded(press, site, footprint, p->m->data[row].penetration_m);
+    if (!isnan(force_n)) force_n = sonde_bonded_force(&bonded, p->m->data[row].penetration_m);
     p->predicted_n[row] = force_n;
   }
-  return SONDE_OK;
+  sonde_bonded_clear(&bonded);
+  return status;
 }
 
 static sonde_status predict_curve(void *user, uint32_t worker, uint32_t curve,
                                   const atomic_bool *stop, sonde_error *error) {
+  (void)worker;
   const prediction *p = user;
   const sonde_fit_plan *plan = p->plan;
   SONDE_ASSERT(curve < plan->curve_count);
+  if (p->def->interaction == SONDE_INTERACTION_FULL) return predict_full(p, curve, stop, error);
   uint32_t probe = plan->curve_probe[curve];
   sonde_footprint footprint;
   sonde_status status = sonde_footprint_create(p->model, &p->sites->sites[plan->curve_site[curve]],
                                                plan->half_u_m[probe], plan->half_v_m[probe],
                                                SONDE_COVERAGE_CLIPPED, &footprint, error);
   if (status) return status;
-  if (p->crew)
-    status = predict_full(p, &p->crew[worker], curve, &footprint, stop, error);
-  else
-    predict_simplified(p, curve, &footprint);
+  predict_simplified(p, curve, &footprint);
   sonde_footprint_clear(&footprint);
-  return status;
+  return SONDE_OK;
 }
 
 sonde_status sonde_predict(const sonde_model *model, const sonde_site_table *sites,
@@ -74,18 +79,14 @@ sonde_status sonde_predict(const sonde_model *model, const sonde_site_table *sit
                       "relative_residual is %g and max_iterations %u, expected > 0 and >= 1",
                       def->relative_residual, def->max_iterations);
   sonde_fit_plan plan;
-  sonde_status status = sonde_fit_plan_create(sites, measurements, &plan, error);
+  sonde_status status = sonde_fit_plan_create_all(sites, measurements, &plan, error);
   if (status) return status;
-  prediction p = {model, sites, measurements, &plan, NULL, predicted_n};
+  prediction p = {model, sites, measurements, &plan, def, predicted_n};
   uint32_t workers = sonde_parallel_workers(def->threads, plan.curve_count);
   for (uint32_t i = 0; i < measurements->count; ++i) predicted_n[i] = NAN;
-  if (def->interaction == SONDE_INTERACTION_FULL)
-    status = sonde_press_crew_create(model, def->relative_residual, def->max_iterations, workers,
-                                     &p.crew, error);
   if (!status)
     status = sonde_parallel_run(plan.curve_count, workers, predict_curve, &p, progress,
                                 "predicting", error);
-  sonde_press_crew_destroy(p.crew, workers);
   sonde_fit_plan_clear(&plan);
   return status;
 }

@@ -1,5 +1,5 @@
 // probe_pose: beam axis against the normal, image plane along u.
-// sonde_press_bonded: prescribed footprint. sonde_press_probe: convex body.
+// sonde_bonded_*:      prescribed footprint. sonde_press_probe: convex body.
 #include "fit/press.h"
 
 #include "base/maths.h"
@@ -45,18 +45,64 @@ void sonde_press_crew_destroy(sonde_press *crew, uint32_t workers) {
   sonde_free(crew);
 }
 
-double sonde_press_bonded(sonde_press *press, const sonde_site *site,
-                          const sonde_footprint *footprint, double depth_m) {
-  SONDE_ASSERT(depth_m >= 0 && footprint->held_count > 0);
-  SONDE_ASSERT(footprint->held_count <= press->model->surface.vertex_count);
-  const sonde_vec3 *rest = press->model->surface.vertices;
-  for (uint32_t h = 0; h < footprint->held_count; ++h)
-    press->position_m[h] = v_madd(rest[footprint->held[h]], -depth_m, site->normal);
+static sonde_status hold_cut(const sonde_model *model, const sonde_site *site, double half_u_m,
+                             double half_v_m, sonde_bonded *b, sonde_error *error) {
+  sonde_cut cut;
+  sonde_status status = sonde_cut_create(model, site, half_u_m, half_v_m, INFINITY, &cut, error);
+  if (!status) status = sonde_cut_model(model, &cut, &b->cut_model, error);
+  if (!status) b->held = SONDE_NEW(uint32_t, cut.held_count);
+  if (!status && !b->held) status = sonde_fail_memory(error);
+  for (uint32_t v = 0; v < cut.vertex_count && !status; ++v)
+    if (cut.held[v]) b->held[b->held_count++] = v;
+  sonde_cut_clear(&cut);
+  return status;
+}
+
+static sonde_status hold_nodes(const sonde_model *model, const sonde_site *site, double half_u_m,
+                               double half_v_m, sonde_bonded *b, sonde_error *error) {
+  sonde_footprint footprint;
+  sonde_status status = sonde_footprint_create(model, site, half_u_m, half_v_m,
+                                               SONDE_COVERAGE_CLIPPED, &footprint, error);
+  if (status) return status;
+  b->held = footprint.held;
+  b->held_count = footprint.held_count;
+  footprint.held = NULL;
+  sonde_footprint_clear(&footprint);
+  return SONDE_OK;
+}
+
+sonde_status sonde_bonded_create(const sonde_model *model, const sonde_site *site, double half_u_m,
+                                 double half_v_m, double relative_residual, uint32_t max_iterations,
+                                 sonde_bonded *b, sonde_error *error) {
+  *b = (sonde_bonded){.normal = site->normal};
+  bool cut = model->law.shear_stiffness_n_m > 0;
+  sonde_status status = cut ? hold_cut(model, site, half_u_m, half_v_m, b, error)
+                            : hold_nodes(model, site, half_u_m, half_v_m, b, error);
+  if (!status)
+    status = sonde_press_create(cut ? b->cut_model : model, relative_residual, max_iterations,
+                                &b->press, error);
+  if (status) sonde_bonded_clear(b);
+  return status;
+}
+
+void sonde_bonded_clear(sonde_bonded *b) {
+  sonde_press_clear(&b->press);
+  sonde_model_destroy(b->cut_model);
+  sonde_free(b->held);
+  *b = (sonde_bonded){0};
+}
+
+double sonde_bonded_force(sonde_bonded *b, double depth_m) {
+  SONDE_ASSERT(depth_m >= 0 && b->held_count > 0);
+  SONDE_ASSERT(b->held_count <= b->press.model->surface.vertex_count);
+  const sonde_vec3 *rest = b->press.model->surface.vertices;
+  for (uint32_t h = 0; h < b->held_count; ++h)
+    b->press.position_m[h] = v_madd(rest[b->held[h]], -depth_m, b->normal);
   sonde_vec3 force_n = vec3(0, 0, 0);
   sonde_settle_result result =
-      sonde_settle_bonded(press->state, footprint->held, press->position_m, footprint->held_count,
-                          press->relative_residual, press->max_iterations, &force_n);
-  return result.converged ? v_dot(force_n, site->normal) : NAN;
+      sonde_settle_bonded(b->press.state, b->held, b->press.position_m, b->held_count,
+                          b->press.relative_residual, b->press.max_iterations, &force_n);
+  return result.converged ? v_dot(force_n, b->normal) : NAN;
 }
 
 static sonde_pose probe_pose(const sonde_site *site, double depth_m) {

@@ -2,6 +2,7 @@
 #ifndef SONDE_SRC_FIT_PRESS_H
 #define SONDE_SRC_FIT_PRESS_H
 
+#include "fit/cut.h"
 #include "fit/fit_inside.h"
 #include "sonde/world.h"
 
@@ -24,11 +25,27 @@ sonde_status sonde_press_crew_create(const sonde_model *model, double relative_r
                                      sonde_error *error);
 void sonde_press_crew_destroy(sonde_press *crew, uint32_t workers);
 
+// A footprint bonded to the skin at a site. With a shear layer the skin is cut along the
+// footprint's sides, so that the forces do not depend on where the sides fall between the nodes;
+// without one (the paper's model) the nodes under it are held.
+typedef struct sonde_bonded {
+  sonde_press press; // on the cut model, or on the model itself
+  sonde_model *cut_model;
+  uint32_t *held;
+  uint32_t held_count;
+  sonde_vec3 normal;
+} sonde_bonded;
+
+sonde_status sonde_bonded_create(const sonde_model *model, const sonde_site *site, double half_u_m,
+                                 double half_v_m, double relative_residual, uint32_t max_iterations,
+                                 sonde_bonded *bonded, sonde_error *error);
+void sonde_bonded_clear(sonde_bonded *bonded);
 // Force along the normal with the held nodes moved by -depth normal, all others free; starts from
-// the state's present positions. NaN when no equilibrium is found.
-double sonde_press_bonded(sonde_press *press, const sonde_site *site,
-                          const sonde_footprint *footprint, double depth_m);
-// The same with the convex body, its face's centre at the site moved by -depth normal.
+// the last equilibrium. NaN when none is found.
+double sonde_bonded_force(sonde_bonded *bonded, double depth_m);
+
+// Force along the normal with the convex body's face centred at the site moved by -depth normal;
+// starts from the state's present positions. NaN when no equilibrium is found.
 double sonde_press_probe(sonde_press *press, const sonde_site *site, const sonde_probe *probe,
                          double depth_m);
 

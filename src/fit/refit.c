@@ -13,11 +13,16 @@
 #include <string.h>
 
 enum { NEWTON_LIMIT = 60 };
-static const double RELATIVE_RESIDUAL = 1e-7;
+static const double RELATIVE_RESIDUAL = 1e-6;
 static const double PULL_ALONG_M = 0.010; // width of the rim that a footprint pulls along
 static const double LEAST_ROOM = 1.3;     // start of xm over the deepest datum
 
 uint32_t sonde_refit_parameters(const sonde_refit *r) { return 2 * r->sites->count + 2; }
+
+bool sonde_refit_uses(const sonde_refit *r, uint32_t row) {
+  uint32_t curve = r->plan->row_curve[row];
+  return (r->plan->curve_start[curve + 1] - 1 - row) % r->stride == 0;
+}
 
 static void spread(sonde_refit *r, const double *theta) {
   uint32_t count = r->sites->count;
@@ -29,28 +34,27 @@ static void spread(sonde_refit *r, const double *theta) {
       ln_k += basis[s] * theta[s];
       ln_x += basis[s] * theta[count + s];
     }
-    r->k0_n_m3[i] = exp(ln_k);
-    r->xm_m[i] = exp(ln_x);
+    r->ln_k0[i] = ln_k;
+    r->ln_xm[i] = ln_x;
   }
 }
 
 // Starts from the row's own last equilibrium; else, and again when that fails, from the depth
 // before, grown in proportion. s_m keeps the outcome.
-static sonde_status settle_datum(const sonde_refit *r, sonde_patch_solver *solver,
-                                 const sonde_patch_law *law, uint32_t row, double depth_m,
-                                 const double *before_m, double before_depth_m, double *s_m,
-                                 sonde_error *error) {
+static sonde_status settle_datum(const sonde_refit *r, sonde_patch_solver *solver, uint32_t row,
+                                 double depth_m, const double *before_m, double before_depth_m,
+                                 double *s_m, sonde_error *error) {
   uint32_t places = solver->patch->place_count;
   SONDE_ASSERT(row < r->plan->row_count && depth_m >= before_depth_m);
   if (r->settled[row]) {
     sonde_status status =
-        sonde_patch_settle(solver, law, depth_m, RELATIVE_RESIDUAL, NEWTON_LIMIT, s_m, error);
+        sonde_patch_settle(solver, depth_m, RELATIVE_RESIDUAL, NEWTON_LIMIT, s_m, error);
     if (!status) return SONDE_OK;
   }
   double growth = before_depth_m > 0 ? depth_m / before_depth_m : 0;
   for (uint32_t i = 0; i < places; ++i) s_m[i] = before_m && growth > 0 ? growth * before_m[i] : 0;
   sonde_status status =
-      sonde_patch_settle(solver, law, depth_m, RELATIVE_RESIDUAL, NEWTON_LIMIT, s_m, error);
+      sonde_patch_settle(solver, depth_m, RELATIVE_RESIDUAL, NEWTON_LIMIT, s_m, error);
   r->settled[row] = !status;
   return status;
 }
@@ -59,15 +63,17 @@ static void carry_to_sites(const sonde_refit *r, const sonde_patch *patch,
                            const sonde_patch_gradient *gradient, double *row) {
   uint32_t count = r->sites->count;
   memset(row, 0, sonde_refit_parameters(r) * sizeof *row);
-  for (uint32_t i = 0; i < patch->place_count; ++i) {
-    SONDE_ASSERT(patch->node[i] < r->model->surface.vertex_count);
-    const double *basis = &r->basis[(size_t)patch->node[i] * count];
-    double by_k = gradient->by_ln_k0[i], by_x = gradient->by_ln_xm[i];
-    for (uint32_t s = 0; s < count; ++s) {
-      row[s] += basis[s] * by_k;
-      row[count + s] += basis[s] * by_x;
+  for (uint32_t i = 0; i < patch->place_count; ++i)
+    for (int k = 0; k < 2; ++k) {
+      double part = k ? patch->share[i] : 1 - patch->share[i];
+      if (!(part > 0)) continue;
+      const double *basis = &r->basis[(size_t)patch->parent[i][k] * count];
+      double by_k = part * gradient->by_ln_k0[i], by_x = part * gradient->by_ln_xm[i];
+      for (uint32_t s = 0; s < count; ++s) {
+        row[s] += basis[s] * by_k;
+        row[count + s] += basis[s] * by_x;
+      }
     }
-  }
   row[2 * count] = gradient->by_ln_shear;
   row[2 * count + 1] = gradient->by_ln_limit;
 }
@@ -89,16 +95,17 @@ static sonde_status work_on_curve(void *user, uint32_t worker, uint32_t curve,
   uint32_t parameters = sonde_refit_parameters(r);
   double *before = NULL, before_depth = 0;
   sonde_status status = SONDE_OK;
-  sonde_patch_solver_use(solver, patch);
+  sonde_patch_solver_use(solver, patch, &at->law);
   for (uint32_t k = r->plan->curve_start[curve]; k < r->plan->curve_start[curve + 1]; ++k) {
+    if (!sonde_refit_uses(r, k)) continue;
     if (atomic_load(stop)) return sonde_fail(error, SONDE_CANCELLED, "cancelled");
     double depth = r->m->data[r->plan->row[k]].penetration_m;
     double *s = r->indentation_m + r->first_place[k];
     sonde_error inner;
-    status = settle_datum(r, solver, &at->law, k, depth, before, before_depth, s, &inner);
+    status = settle_datum(r, solver, k, depth, before, before_depth, s, &inner);
     if (!status)
-      status = sonde_patch_force(solver, &at->law, depth, s, &at->force_n[k],
-                                 at->jacobian ? gradient : NULL, &inner);
+      status = sonde_patch_force(solver, depth, s, &at->force_n[k], at->jacobian ? gradient : NULL,
+                                 &inner);
     if (status)
       return sonde_fail(error, status, "site %u, probe %s: %s",
                         r->sites->sites[r->plan->curve_site[curve]].id,
@@ -117,8 +124,8 @@ sonde_status sonde_refit_forces(sonde_refit *r, const double *theta, double *for
   spread(r, theta);
   const sonde_surface_law *law = &r->model->law;
   evaluation at = {r,
-                   {r->k0_n_m3, r->xm_m, exp(theta[2 * count]), exp(theta[2 * count + 1]),
-                    law->guard, law->tangential_stiffness_n_m3},
+                   {r->ln_k0, r->ln_xm, r->def->normal_exponent, exp(theta[2 * count]),
+                    exp(theta[2 * count + 1]), law->guard, law->tangential_stiffness_n_m3},
                    force_n,
                    jacobian};
   return sonde_parallel_run(r->plan->curve_count, r->workers, work_on_curve, &at, progress,
@@ -148,20 +155,14 @@ void sonde_refit_start(const sonde_refit *r, const sonde_curve_fit *curves, doub
 
 // ---- creation -----------------------------------------------------------------------------
 
-static sonde_status create_patches(sonde_refit *r, double reach_m, bool hold_rim,
-                                   sonde_error *error) {
+static sonde_status create_patches(sonde_refit *r, double reach_m, sonde_error *error) {
   const sonde_fit_plan *plan = r->plan;
   sonde_status status = SONDE_OK;
   for (uint32_t c = 0; c < plan->curve_count && !status; ++c) {
     const sonde_site *site = &r->sites->sites[plan->curve_site[c]];
     uint32_t probe = plan->curve_probe[c];
-    sonde_footprint footprint;
-    status = sonde_footprint_create(r->model, site, plan->half_u_m[probe], plan->half_v_m[probe],
-                                    SONDE_COVERAGE_CLIPPED, &footprint, error);
-    if (status) break;
-    status = sonde_patch_create(r->model, &footprint, site->normal, reach_m, hold_rim, &r->patch[c],
-                                error);
-    sonde_footprint_clear(&footprint);
+    status = sonde_patch_create(r->model, site, plan->half_u_m[probe], plan->half_v_m[probe],
+                                reach_m, &r->patch[c], error);
   }
   return status;
 }
@@ -200,21 +201,21 @@ static bool allocate(sonde_refit *r) {
   r->patch = SONDE_NEW(sonde_patch, r->plan->curve_count);
   r->basis = SONDE_NEW(double, nodes *count);
   r->roughness = SONDE_NEW(double, count *count);
-  r->k0_n_m3 = SONDE_NEW(double, nodes);
-  r->xm_m = SONDE_NEW(double, nodes);
+  r->ln_k0 = SONDE_NEW(double, nodes);
+  r->ln_xm = SONDE_NEW(double, nodes);
   r->first_place = SONDE_NEW(size_t, r->plan->row_count);
   r->settled = SONDE_NEW(uint8_t, r->plan->row_count);
-  return r->patch && r->basis && r->roughness && r->k0_n_m3 && r->xm_m && r->first_place &&
+  return r->patch && r->basis && r->roughness && r->ln_k0 && r->ln_xm && r->first_place &&
          r->settled;
 }
 
 sonde_status sonde_refit_create(const sonde_model *model, const sonde_site_table *sites,
                                 const sonde_measurements *m, const sonde_fit_plan *plan,
-                                const sonde_fit_def *def, double reach_m, bool hold_rim,
-                                sonde_refit **refit, sonde_error *error) {
+                                const sonde_fit_def *def, double reach_m, sonde_refit **refit,
+                                sonde_error *error) {
   sonde_refit *r = *refit = SONDE_NEW(sonde_refit, 1);
   if (!r) return sonde_fail_memory(error);
-  *r = (sonde_refit){.model = model, .sites = sites, .m = m, .plan = plan, .def = def};
+  *r = (sonde_refit){.model = model, .sites = sites, .m = m, .plan = plan, .def = def, .stride = 1};
   sonde_status status = allocate(r) ? SONDE_OK : sonde_fail_memory(error);
   for (uint32_t k = 0; k < plan->probe_count && !status; ++k)
     if (!(plan->mean_force_n[k] > 0))
@@ -223,7 +224,7 @@ sonde_status sonde_refit_create(const sonde_model *model, const sonde_site_table
                           plan->probe[k], plan->mean_force_n[k]);
   if (!status) status = sonde_site_basis(model, sites, r->basis, error);
   if (!status) status = sonde_site_roughness(sites, r->roughness, error);
-  if (!status) status = create_patches(r, reach_m, hold_rim, error);
+  if (!status) status = create_patches(r, reach_m, error);
   if (!status) status = create_starts(r, error);
   if (!status) status = create_crew(r, def->threads, error);
   if (!status) return SONDE_OK;
@@ -244,8 +245,8 @@ void sonde_refit_destroy(sonde_refit *r) {
   sonde_free(r->patch);
   sonde_free(r->basis);
   sonde_free(r->roughness);
-  sonde_free(r->k0_n_m3);
-  sonde_free(r->xm_m);
+  sonde_free(r->ln_k0);
+  sonde_free(r->ln_xm);
   sonde_free(r->first_place);
   sonde_free(r->settled);
   sonde_free(r->indentation_m);

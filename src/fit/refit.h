@@ -9,8 +9,8 @@ typedef struct sonde_refit sonde_refit;
 // Everything that does not change during the refit. Borrows all arguments.
 sonde_status sonde_refit_create(const sonde_model *model, const sonde_site_table *sites,
                                 const sonde_measurements *m, const sonde_fit_plan *plan,
-                                const sonde_fit_def *def, double reach_m, bool hold_rim,
-                                sonde_refit **refit, sonde_error *error);
+                                const sonde_fit_def *def, double reach_m, sonde_refit **refit,
+                                sonde_error *error);
 void sonde_refit_destroy(sonde_refit *refit);
 
 // Parameters: ln k0 per site, ln xm per site, ln G, ln gm.

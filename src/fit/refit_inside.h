@@ -18,13 +18,16 @@ struct sonde_refit {
   sonde_patch *patch;    // [curve_count]
   double *basis;         // [nodes * site_count]
   double *roughness;     // [site_count * site_count]
-  double *k0_n_m3;       // [nodes]
-  double *xm_m;          // [nodes]
+  double *ln_k0;         // [nodes]
+  double *ln_xm;         // [nodes]
   size_t *first_place;   // [row_count] where a row's equilibrium begins
   uint8_t *settled;      // [row_count] its equilibrium is a start for the next call
   double *indentation_m; // equilibria of all rows
   uint32_t workers;
   sonde_refit_worker *crew;
+  uint32_t stride; // every so many rows of a curve, counted from its last, take part
 };
+
+bool sonde_refit_uses(const sonde_refit *refit, uint32_t row);
 
 #endif

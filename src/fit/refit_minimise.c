@@ -10,12 +10,12 @@
 #include <string.h>
 
 static const double DATA_SD = 0.02;      // of the probe's mean force: what the model class leaves
-static const double ROUGHNESS_SD = 0.02; // of ln k0 and ln xm per site spacing
+static const double ROUGHNESS_SD = 0.03; // of ln k0 and ln xm per site spacing
 static const double LONGEST_STEP = 0.7;  // of a logarithm
 static const double ENOUGH = 1e-3;       // relative fall of the cost that counts as none
 static const double NOTHING = 1e-5;      // fall of an exact fit
 static const double DAMPING_START = 1e-3, DAMPING_LEAST = 1e-9, DAMPING_MOST = 1e9;
-enum { MOST_ITERATIONS = 40 };
+enum { MOST_ITERATIONS = 40, COARSE_STRIDE = 4 };
 
 typedef struct workspace {
   uint32_t n, rows;
@@ -42,6 +42,7 @@ static void add_row(workspace *w, const double *row, double residual, double wei
 static double add_data(const sonde_refit *r, workspace *w, bool normal) {
   double cost = 0;
   for (uint32_t k = 0; k < w->rows; ++k) {
+    if (!sonde_refit_uses(r, k)) continue;
     double mean_n = r->plan->mean_force_n[r->plan->row_probe[k]], weight;
     double error = (w->force_n[k] - r->m->data[r->plan->row[k]].force_n) / mean_n;
     cost += sonde_loss(r->def->loss, loss_scale(r, mean_n), error, &weight) / (DATA_SD * DATA_SD);
@@ -201,6 +202,23 @@ static sonde_status iterate(sonde_refit *r, workspace *w, double *theta, double 
   return SONDE_OK;
 }
 
+// Levenberg-Marquardt on every stride-th depth, from and to theta.
+static sonde_status descend(sonde_refit *r, workspace *w, uint32_t stride, double *theta,
+                            double *force_n, stepwise *at, sonde_refit_result *result,
+                            sonde_error *error) {
+  uint32_t before = result->iterations;
+  r->stride = stride;
+  memcpy(w->trial, theta, w->n * sizeof *theta);
+  sonde_status status = try_point(r, w, at, &result->cost, error);
+  if (!status && !isfinite(result->cost)) status = SONDE_CONVERGENCE; // error says where
+  if (status) return status;
+  accept(r, w, theta, force_n);
+  at->cost = result->cost;
+  if (!before) result->start_cost = result->cost;
+  return iterate(r, w, theta, force_n, at, result, error);
+}
+
+// The way from the generic start to the neighbourhood of the optimum needs few depths.
 sonde_status sonde_refit_minimise(sonde_refit *r, double *theta, double *force_n,
                                   const sonde_progress *progress, sonde_refit_result *result,
                                   sonde_error *error) {
@@ -209,15 +227,8 @@ sonde_status sonde_refit_minimise(sonde_refit *r, double *theta, double *force_n
   workspace w = {.n = sonde_refit_parameters(r), .rows = r->plan->row_count};
   stepwise at = {.outer = progress};
   sonde_status status = allocate(&w) ? SONDE_OK : sonde_fail_memory(error);
-  if (status) goto done;
-  memcpy(w.trial, theta, w.n * sizeof *theta);
-  status = try_point(r, &w, &at, &result->cost, error);
-  if (!status && !isfinite(result->cost)) status = SONDE_CONVERGENCE; // error says where
-  if (status) goto done;
-  accept(r, &w, theta, force_n);
-  result->start_cost = at.cost = result->cost;
-  status = iterate(r, &w, theta, force_n, &at, result, error);
-done:
+  if (!status) status = descend(r, &w, COARSE_STRIDE, theta, force_n, &at, result, error);
+  if (!status) status = descend(r, &w, 1, theta, force_n, &at, result, error);
   release(&w);
   return status;
 }

@@ -1,102 +1,104 @@
-// choose_nodes: held nodes, and the free ones within reach of them.
-// add_edges:    edges inside the patch; those that leave it when the rim is held.
-// build_rows:   pattern of the free places' matrix, ascending columns.
-// find_entries: where each edge adds to it.
+// order_places:  free nodes first, then the held vertices.
+// add_faces:     areas and cotangents of the cut faces.
+// build_rows:    pattern of the free places' matrix, ascending columns.
+// find_entries:  where each face adds to it.
 #include "fit/shear.h"
 
 #include "base/maths.h"
 
+#include <stdlib.h>
+#include <string.h>
+
 enum { NOWHERE = UINT32_MAX };
+// Normal springs of a strip this wide stand for the skin beyond the rim: a dent that dies away over
+// a length l meets there what an endless skin would offer, k0 l per length.
+static const double RIM_WIDTH_M = 0.009;
 
-static bool within_reach(const sonde_model *model, const sonde_footprint *f, uint32_t node,
-                         double reach_m) {
-  const sonde_vec3 *x = model->surface.vertices;
-  for (uint32_t h = 0; h < f->held_count; ++h)
-    if (v_norm2(v_sub(x[node], x[f->held[h]])) <= reach_m * reach_m) return true;
-  return false;
+static bool allocate_places(sonde_patch *p, const sonde_cut *cut) {
+  size_t places = cut->vertex_count;
+  p->parent = sonde_calloc(places, sizeof *p->parent);
+  p->share = SONDE_NEW(double, places);
+  p->area_m2 = SONDE_NEW(double, places);
+  p->cosine = SONDE_NEW(double, places);
+  p->face = SONDE_NEW(sonde_patch_face, cut->face_count);
+  p->point_m = SONDE_NEW(sonde_vec3, p->free_count);
+  p->row_start = SONDE_NEW(uint32_t, p->free_count + 1);
+  p->diagonal = SONDE_NEW(uint32_t, p->free_count);
+  return p->parent && p->share && p->area_m2 && p->cosine && p->face && p->point_m &&
+         p->row_start && p->diagonal;
 }
 
-// Half the size of the footprint, seen from its first held node.
-static double extent(const sonde_model *model, const sonde_footprint *f) {
-  double far = 0;
-  for (uint32_t h = 0; h < f->held_count; ++h)
-    far = fmax(
-        far, v_distance(model->surface.vertices[f->held[h]], model->surface.vertices[f->held[0]]));
-  return far;
-}
-
-// place[node] is set for every node of the patch, NOWHERE for the others.
-static void choose_nodes(const sonde_model *model, const sonde_footprint *f, sonde_vec3 normal,
-                         double reach_m, uint32_t *place, sonde_patch *p) {
-  uint32_t nodes = model->surface.vertex_count;
-  sonde_vec3 first = model->surface.vertices[f->held[0]];
-  double far_m = extent(model, f) + reach_m;
-  for (uint32_t i = 0; i < nodes; ++i) place[i] = NOWHERE;
-  for (uint32_t h = 0; h < f->held_count; ++h) place[f->held[h]] = 0;
-  for (uint32_t i = 0; i < nodes; ++i) {
-    if (place[i] != NOWHERE) continue;
-    if (v_distance(model->surface.vertices[i], first) > far_m) continue;
-    if (!within_reach(model, f, i, reach_m)) continue;
-    place[i] = p->free_count;
-    p->node[p->free_count++] = i;
+// Vertices that are nodes come in ascending order, so free places ascend with nodes.
+static void order_places(const sonde_model *model, const sonde_cut *cut, sonde_vec3 normal,
+                         uint32_t *place, sonde_patch *p) {
+  uint32_t free = 0, held = p->free_count;
+  for (uint32_t v = 0; v < cut->vertex_count; ++v) {
+    uint32_t at = place[v] = cut->held[v] ? held++ : free++;
+    memcpy(p->parent[at], cut->parent[v], sizeof p->parent[at]);
+    p->share[at] = cut->share[v];
+    p->area_m2[at] = RIM_WIDTH_M * cut->rim_m[v];
+    if (cut->held[v])
+      p->cosine[at] = v_dot(sonde_cut_normal(model, cut, v), normal);
+    else
+      p->point_m[at] = model->surface.vertices[cut->parent[v][0]];
   }
-  p->held_count = f->held_count;
-  p->place_count = p->free_count + p->held_count + 1;
-  SONDE_ASSERT(p->place_count <= nodes + 1);
-  for (uint32_t h = 0; h < f->held_count; ++h) {
-    uint32_t at = p->free_count + h, node = f->held[h];
-    place[node] = at;
-    p->node[at] = node;
-    p->cosine[at] = v_dot(model->normal[node], normal);
-    p->sliding_m2 += model->area_m2[node] * (1 - p->cosine[at] * p->cosine[at]);
-  }
-  p->node[p->place_count - 1] = f->held[0];
-  for (uint32_t k = 0; k + 1 < p->place_count; ++k) p->area_m2[k] = model->area_m2[p->node[k]];
-  for (uint32_t k = 0; k < p->free_count; ++k) p->point_m[k] = model->surface.vertices[p->node[k]];
+  SONDE_ASSERT(free == p->free_count && held == p->place_count);
 }
 
-static void add_edges(const sonde_model *model, const uint32_t *place, bool hold_rim,
-                      sonde_patch *p) {
-  for (uint32_t e = 0; e < model->topology.edge_count; ++e) {
-    uint32_t a = place[model->topology.edges[e][0]], b = place[model->topology.edges[e][1]];
-    if (a == NOWHERE && b == NOWHERE) continue;
-    if ((a == NOWHERE || b == NOWHERE) && !hold_rim) continue;
-    uint32_t k = p->edge_count++;
-    p->edge[k][0] = a == NOWHERE ? p->place_count - 1 : a;
-    p->edge[k][1] = b == NOWHERE ? p->place_count - 1 : b;
-    p->rest_m[k] = model->edge_rest_m[e];
-    p->dual_m[k] = model->edge_dual_m[e];
-    SONDE_ASSERT(p->rest_m[k] > 0 && p->dual_m[k] >= 0);
+static void add_face(const sonde_model *model, const sonde_cut *cut, uint32_t f,
+                     const uint32_t *place, sonde_patch *p) {
+  sonde_patch_face *face = &p->face[p->face_count++];
+  sonde_vec3 x[3];
+  for (int k = 0; k < 3; ++k) {
+    x[k] = sonde_cut_point(model, cut, cut->face[f][k]);
+    face->place[k] = place[cut->face[f][k]];
+  }
+  double twice = v_norm(v_cross(v_sub(x[1], x[0]), v_sub(x[2], x[0])));
+  SONDE_ASSERT(twice > 0);
+  face->area_m2 = 0.5 * twice;
+  for (int k = 0; k < 3; ++k) {
+    sonde_vec3 a = v_sub(x[(k + 1) % 3], x[k]), b = v_sub(x[(k + 2) % 3], x[k]);
+    face->half_cotangent[k] = 0.5 * v_dot(a, b) / twice;
+    p->area_m2[face->place[k]] += face->area_m2 / 3;
   }
 }
 
-// Neighbours come in ascending node order and free places ascend with nodes: columns ascend.
-static void build_rows(const sonde_model *model, const uint32_t *place, sonde_patch *p) {
-  const sonde_topology *t = &model->topology;
-  uint32_t count = 0;
-  for (uint32_t r = 0; r < p->free_count; ++r) {
-    uint32_t node = p->node[r];
-    bool own = false;
-    p->row_start[r] = count;
-    for (uint32_t k = t->start[node]; k < t->start[node + 1]; ++k) {
-      uint32_t other = place[t->neighbour[k]];
-      if (other == NOWHERE || other >= p->free_count) continue;
-      if (!own && other > r) {
-        p->diagonal[r] = count;
-        p->column[count++] = r;
-        own = true;
-      }
-      SONDE_ASSERT(count == p->row_start[r] || p->column[count - 1] < other);
-      p->column[count++] = other;
+static int compare(const void *a, const void *b) {
+  uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
+  return (x > y) - (x < y);
+}
+
+// Pairs (row, column) of all faces and the diagonal, sorted, each once.
+static sonde_status build_rows(sonde_patch *p, sonde_error *error) {
+  uint64_t *pair = SONDE_NEW(uint64_t, 6 * (size_t)p->face_count + p->free_count);
+  if (!pair) return sonde_fail_memory(error);
+  size_t count = 0;
+  for (uint32_t r = 0; r < p->free_count; ++r) pair[count++] = (uint64_t)r << 32 | r;
+  for (uint32_t f = 0; f < p->face_count; ++f)
+    for (int k = 0; k < 6; ++k) {
+      uint32_t a = p->face[f].place[k % 3], b = p->face[f].place[(k + 1 + k / 3) % 3];
+      if (a < p->free_count && b < p->free_count) pair[count++] = (uint64_t)a << 32 | b;
     }
-    if (own) continue;
-    p->diagonal[r] = count;
-    p->column[count++] = r;
+  qsort(pair, count, sizeof *pair, compare);
+  p->column = SONDE_NEW(uint32_t, count);
+  if (!p->column) {
+    sonde_free(pair);
+    return sonde_fail_memory(error);
   }
-  p->row_start[p->free_count] = count;
+  uint32_t kept = 0;
+  for (size_t k = 0; k < count; ++k) {
+    if (k && pair[k] == pair[k - 1]) continue;
+    uint32_t row = (uint32_t)(pair[k] >> 32), column = (uint32_t)pair[k];
+    if (row == column) p->diagonal[row] = kept;
+    p->column[kept++] = column;
+    p->row_start[row + 1] = kept;
+  }
+  sonde_free(pair);
+  return SONDE_OK;
 }
 
 static uint32_t entry_of(const sonde_patch *p, uint32_t row, uint32_t column) {
+  if (row >= p->free_count || column >= p->free_count) return NOWHERE;
   uint32_t k = p->row_start[row];
   while (k < p->row_start[row + 1] && p->column[k] != column) ++k;
   SONDE_ASSERT(k < p->row_start[row + 1]);
@@ -104,96 +106,60 @@ static uint32_t entry_of(const sonde_patch *p, uint32_t row, uint32_t column) {
 }
 
 static void find_entries(sonde_patch *p) {
-  for (uint32_t e = 0; e < p->edge_count; ++e) {
-    uint32_t a = p->edge[e][0], b = p->edge[e][1];
-    bool both = a < p->free_count && b < p->free_count;
-    p->entry[e][0] = both ? entry_of(p, a, b) : NOWHERE;
-    p->entry[e][1] = both ? entry_of(p, b, a) : NOWHERE;
+  for (uint32_t f = 0; f < p->face_count; ++f)
+    for (int k = 0; k < 3; ++k) {
+      uint32_t a = p->face[f].place[(k + 1) % 3], b = p->face[f].place[(k + 2) % 3];
+      p->face[f].entry[k][0] = entry_of(p, a, b);
+      p->face[f].entry[k][1] = entry_of(p, b, a);
+    }
+}
+
+static sonde_status fill(const sonde_model *model, const sonde_cut *cut, const sonde_site *site,
+                         sonde_patch *p, sonde_error *error) {
+  uint32_t *place = SONDE_NEW(uint32_t, cut->vertex_count);
+  if (!place || !allocate_places(p, cut)) {
+    sonde_free(place);
+    return sonde_fail_memory(error);
   }
+  order_places(model, cut, site->normal, place, p);
+  for (uint32_t f = 0; f < cut->face_count; ++f) add_face(model, cut, f, place, p);
+  for (uint32_t k = p->free_count; k < p->place_count; ++k)
+    p->sliding_m2 += p->area_m2[k] * (1 - p->cosine[k] * p->cosine[k]);
+  sonde_free(place);
+  sonde_status status = build_rows(p, error);
+  if (!status) find_entries(p);
+  return status;
 }
 
-// Places of the patch are not known yet: room for `nodes` of them.
-static bool allocate_nodes(sonde_patch *p, uint32_t nodes) {
-  p->node = SONDE_NEW(uint32_t, nodes + 1);
-  p->area_m2 = SONDE_NEW(double, nodes + 1);
-  p->cosine = SONDE_NEW(double, nodes + 1);
-  p->point_m = SONDE_NEW(sonde_vec3, nodes);
-  return p->node && p->area_m2 && p->cosine && p->point_m;
-}
-
-static bool allocate_edges(sonde_patch *p, uint32_t edges) {
-  p->edge = sonde_calloc(edges, sizeof *p->edge);
-  p->entry = sonde_calloc(edges, sizeof *p->entry);
-  p->rest_m = SONDE_NEW(double, edges);
-  p->dual_m = SONDE_NEW(double, edges);
-  p->row_start = SONDE_NEW(uint32_t, p->free_count + 1);
-  p->diagonal = SONDE_NEW(uint32_t, p->free_count);
-  p->column = SONDE_NEW(uint32_t, p->free_count + 2 * (size_t)edges);
-  return p->edge && p->entry && p->rest_m && p->dual_m && p->row_start && p->diagonal && p->column;
-}
-
-static uint32_t count_edges(const sonde_model *model, const uint32_t *place) {
-  uint32_t count = 0;
-  for (uint32_t e = 0; e < model->topology.edge_count; ++e) {
-    const uint32_t *pair = model->topology.edges[e];
-    count += place[pair[0]] != NOWHERE || place[pair[1]] != NOWHERE;
-  }
-  return count;
-}
-
-// Gives back what the nodes outside the patch took.
-static void shrink_nodes(sonde_patch *p, uint32_t nodes) {
-  size_t room = (size_t)nodes + 1, count = p->place_count;
-  void *node = sonde_realloc(p->node, room * sizeof *p->node, count * sizeof *p->node);
-  void *area = sonde_realloc(p->area_m2, room * sizeof *p->area_m2, count * sizeof *p->area_m2);
-  void *cosine = sonde_realloc(p->cosine, room * sizeof *p->cosine, count * sizeof *p->cosine);
-  if (node) p->node = node;
-  if (area) p->area_m2 = area;
-  if (cosine) p->cosine = cosine;
-  void *point = sonde_realloc(p->point_m, nodes * sizeof *p->point_m, count * sizeof *p->point_m);
-  if (point) p->point_m = point;
-}
-
-sonde_status sonde_patch_create(const sonde_model *model, const sonde_footprint *footprint,
-                                sonde_vec3 normal, double reach_m, bool hold_rim,
-                                sonde_patch *patch, sonde_error *error) {
-  SONDE_ASSERT(footprint->held_count > 0 && reach_m > 0);
+sonde_status sonde_patch_create(const sonde_model *model, const sonde_site *site, double half_u_m,
+                                double half_v_m, double reach_m, sonde_patch *patch,
+                                sonde_error *error) {
   *patch = (sonde_patch){0};
-  uint32_t nodes = model->surface.vertex_count;
-  uint32_t *place = SONDE_NEW(uint32_t, nodes);
-  sonde_status status = place && allocate_nodes(patch, nodes) ? SONDE_OK : sonde_fail_memory(error);
-  if (status) goto done;
-  choose_nodes(model, footprint, normal, reach_m, place, patch);
-  shrink_nodes(patch, nodes);
-  if (!patch->free_count) {
+  sonde_cut cut;
+  sonde_status status = sonde_cut_create(model, site, half_u_m, half_v_m, reach_m, &cut, error);
+  if (status) return status;
+  patch->place_count = cut.vertex_count;
+  patch->free_count = cut.vertex_count - cut.held_count;
+  patch->coarse = cut.coarse;
+  if (!patch->free_count)
     status =
         sonde_fail(error, SONDE_ARGUMENT, "no free node within %g m of the footprint", reach_m);
-    goto done;
-  }
-  if (!allocate_edges(patch, count_edges(model, place))) {
-    status = sonde_fail_memory(error);
-    goto done;
-  }
-  add_edges(model, place, hold_rim, patch);
-  build_rows(model, place, patch);
-  find_entries(patch);
-done:
-  sonde_free(place);
+  else
+    status = fill(model, &cut, site, patch, error);
+  sonde_cut_clear(&cut);
   if (status) sonde_patch_clear(patch);
   return status;
 }
 
 void sonde_patch_clear(sonde_patch *p) {
-  sonde_free(p->node);
+  sonde_free(p->parent);
+  sonde_free(p->share);
   sonde_free(p->area_m2);
   sonde_free(p->cosine);
-  sonde_free(p->edge);
-  sonde_free(p->rest_m);
-  sonde_free(p->dual_m);
+  sonde_free(p->face);
   sonde_free(p->row_start);
   sonde_free(p->column);
   sonde_free(p->diagonal);
-  sonde_free(p->entry);
   sonde_free(p->point_m);
   *p = (sonde_patch){0};
 }

@@ -1,3 +1,4 @@
+// face_slope: gradient of s over a face. face_modulus: secant modulus of the shear layer there.
 // assemble:  residual of every place and the matrix of the free ones at indentations s.
 // factor:    orders and analyses at the first use on a patch, else numbers only.
 // solve:     conjugate gradients preconditioned by the kept factor; a new factor when it is slow.
@@ -10,39 +11,63 @@
 #include <string.h>
 
 enum { SHORTENINGS = 40, GRADIENT_STEPS = 8 };
-static const double NEWTON_ACCURACY = 1e-2, ADJOINT_ACCURACY = 1e-7;
+static const double NEWTON_ACCURACY = 1e-2, ADJOINT_ACCURACY = 1e-6;
 static const double NEGLIGIBLE_N = 1e-13;
 
-static void add_edge(const sonde_patch *p, const sonde_patch_law *law, uint32_t e, const double *s,
-                     double *residual, double *value) {
-  uint32_t a = p->edge[e][0], b = p->edge[e][1];
-  double slope, rest = p->rest_m[e], dual = p->dual_m[e];
-  double q = dual * sonde_shear_force(law->shear_n_m, law->limit, (s[a] - s[b]) / rest, &slope);
-  double stiffness = dual * slope / rest;
-  residual[a] += q;
-  residual[b] -= q;
-  if (a < p->free_count) value[p->diagonal[a]] += stiffness;
-  if (b < p->free_count) value[p->diagonal[b]] += stiffness;
-  if (p->entry[e][0] == UINT32_MAX) return;
-  value[p->entry[e][0]] = -stiffness;
-  value[p->entry[e][1]] = -stiffness;
+// Slope of a face and its gradient: flux[k] = half the cotangent Laplacian of s at corner k, so
+// that A |grad s|^2 = sum s flux.
+static double face_slope(const sonde_patch_face *face, const double *s, double flux[3]) {
+  double d[3], sum = 0;
+  for (int k = 0; k < 3; ++k) {
+    d[k] = s[face->place[(k + 1) % 3]] - s[face->place[(k + 2) % 3]]; // across corner k
+    sum += face->half_cotangent[k] * d[k] * d[k];
+  }
+  for (int k = 0; k < 3; ++k)
+    flux[k] = face->half_cotangent[(k + 2) % 3] * d[(k + 2) % 3] -
+              face->half_cotangent[(k + 1) % 3] * d[(k + 1) % 3];
+  return sqrt(fmax(sum, 0) / face->area_m2);
 }
 
-// R_i = A p(s_i) + sum w q. Returns |R| over the free places; *load_n is the force of the held
-// ones.
-static double assemble(const sonde_patch_solver *solver, const sonde_patch_law *law,
-                       const double *s, double *load_n) {
+// Secant modulus q/g and the factor of the rank-one part (q' - q/g)/(g^2 A) of a face's stiffness.
+static double face_modulus(const sonde_patch_law *law, const sonde_patch_face *face, double g,
+                           double *beyond) {
+  double slope, q = sonde_shear_force(law->shear_n_m, law->limit, g, &slope);
+  *beyond = 0;
+  if (g < 1e-9) return slope;
+  *beyond = (slope - q / g) / (g * g * face->area_m2);
+  return q / g;
+}
+
+static void add_face(const sonde_patch *p, const sonde_patch_law *law, const sonde_patch_face *face,
+                     const double *s, double *residual, double *value) {
+  double flux[3], beyond, modulus = face_modulus(law, face, face_slope(face, s, flux), &beyond);
+  for (int k = 0; k < 3; ++k) {
+    uint32_t at = face->place[k], a = (uint32_t)(k + 1) % 3, b = (uint32_t)(k + 2) % 3;
+    residual[at] += modulus * flux[k];
+    if (at < p->free_count)
+      value[p->diagonal[at]] += modulus * (face->half_cotangent[a] + face->half_cotangent[b]) +
+                                beyond * flux[k] * flux[k];
+    if (face->entry[k][0] == UINT32_MAX) continue;
+    double pair = beyond * flux[a] * flux[b] - modulus * face->half_cotangent[k];
+    value[face->entry[k][0]] += pair;
+    value[face->entry[k][1]] += pair;
+  }
+}
+
+// R_i = A p(s_i) + shear. Returns |R| over the free places; *load_n is the force of the held ones.
+static double assemble(const sonde_patch_solver *solver, const double *s, double *load_n) {
   const sonde_patch *p = solver->patch;
   double *residual = solver->residual, *value = solver->value;
   memset(value, 0, p->row_start[p->free_count] * sizeof *value);
   for (uint32_t i = 0; i < p->place_count; ++i) {
-    uint32_t node = p->node[i];
     double slope;
-    residual[i] = p->area_m2[i] * sonde_normal_pressure(law->k0_n_m3[node], law->xm_m[node],
-                                                        law->guard, s[i], &slope);
+    residual[i] =
+        p->area_m2[i] * sonde_normal_pressure(solver->law.exponent, solver->k0_n_m3[i],
+                                              solver->xm_m[i], solver->law.guard, s[i], &slope);
     if (i < p->free_count) value[p->diagonal[i]] = p->area_m2[i] * slope;
   }
-  for (uint32_t e = 0; e < p->edge_count; ++e) add_edge(p, law, e, s, residual, value);
+  for (uint32_t f = 0; f < p->face_count; ++f)
+    add_face(p, &solver->law, &p->face[f], s, residual, value);
   double sum = 0, load = 0;
   for (uint32_t i = 0; i < p->free_count; ++i) sum += residual[i] * residual[i];
   for (uint32_t i = p->free_count; i < p->place_count; ++i) load += residual[i] * p->cosine[i];
@@ -120,15 +145,14 @@ static double along_step(const sonde_patch_solver *solver) {
 
 // The energy is convex: it is lower at the end of a step when it still falls there. Near the
 // solution, where that is a matter of rounding, a smaller residual counts too.
-static bool search(sonde_patch_solver *solver, const sonde_patch_law *law, double *s,
-                   double *residual, double *load_n) {
+static bool search(sonde_patch_solver *solver, double *s, double *residual, double *load_n) {
   const sonde_patch *p = solver->patch;
   double start = -along_step(solver), share = 1.0;
   SONDE_ASSERT(p && start >= 0);
   for (int k = 0; k < SHORTENINGS; ++k) {
     memcpy(solver->trial, s, p->place_count * sizeof *s);
     for (uint32_t i = 0; i < p->free_count; ++i) solver->trial[i] += share * solver->step[i];
-    double next = assemble(solver, law, solver->trial, load_n), end = along_step(solver);
+    double next = assemble(solver, solver->trial, load_n), end = along_step(solver);
     if (isfinite(next) && (end <= 0 || next < *residual)) {
       memcpy(s, solver->trial, p->free_count * sizeof *s);
       *residual = next;
@@ -139,19 +163,18 @@ static bool search(sonde_patch_solver *solver, const sonde_patch_law *law, doubl
   return false;
 }
 
-sonde_status sonde_patch_settle(sonde_patch_solver *solver, const sonde_patch_law *law,
-                                double depth_m, double relative, uint32_t max_iterations,
-                                double *s_m, sonde_error *error) {
+sonde_status sonde_patch_settle(sonde_patch_solver *solver, double depth_m, double relative,
+                                uint32_t max_iterations, double *s_m, sonde_error *error) {
   const sonde_patch *p = solver->patch;
   SONDE_ASSERT(p && depth_m >= 0 && relative > 0);
   for (uint32_t i = p->free_count; i < p->place_count; ++i) s_m[i] = depth_m * p->cosine[i];
-  double load_n, residual = assemble(solver, law, s_m, &load_n);
+  double load_n, residual = assemble(solver, s_m, &load_n);
   for (uint32_t k = 0; k < max_iterations; ++k) {
     if (residual <= relative * fabs(load_n) || residual <= NEGLIGIBLE_N) return SONDE_OK;
     for (uint32_t i = 0; i < p->free_count; ++i) solver->step[i] = -solver->residual[i];
     sonde_status status = solve(solver, solver->step, NEWTON_ACCURACY, error);
     if (status) return status;
-    if (!search(solver, law, s_m, &residual, &load_n)) break;
+    if (!search(solver, s_m, &residual, &load_n)) break;
   }
   if (residual <= relative * fabs(load_n) || residual <= NEGLIGIBLE_N) return SONDE_OK;
   return sonde_fail(error, SONDE_CONVERGENCE,
@@ -161,52 +184,58 @@ sonde_status sonde_patch_settle(sonde_patch_solver *solver, const sonde_patch_la
 
 // mu: cosines on the held places; on the free ones minus the solution of K lambda = K_fh c, so that
 // dF/dtheta = sum mu_i dR_i/dtheta.
-static sonde_status adjoint(sonde_patch_solver *solver, const sonde_patch_law *law, const double *s,
-                            double *mu, sonde_error *error) {
+static sonde_status adjoint(sonde_patch_solver *solver, const double *s, double *mu,
+                            sonde_error *error) {
   const sonde_patch *p = solver->patch;
   memcpy(mu, p->cosine, p->place_count * sizeof *mu);
-  for (uint32_t e = 0; e < p->edge_count; ++e) {
-    uint32_t a = p->edge[e][0], b = p->edge[e][1];
-    if ((a < p->free_count) == (b < p->free_count)) continue;
-    double slope, rest = p->rest_m[e];
-    (void)sonde_shear_force(law->shear_n_m, law->limit, (s[a] - s[b]) / rest, &slope);
-    uint32_t in = a < p->free_count ? a : b, out = a < p->free_count ? b : a;
-    mu[in] += p->dual_m[e] * slope / rest * p->cosine[out];
+  for (uint32_t f = 0; f < p->face_count; ++f) {
+    const sonde_patch_face *face = &p->face[f];
+    double flux[3], beyond;
+    double modulus = face_modulus(&solver->law, face, face_slope(face, s, flux), &beyond);
+    for (int k = 0; k < 3; ++k) {
+      int ends[2] = {(k + 1) % 3, (k + 2) % 3};
+      uint32_t a = face->place[ends[0]], b = face->place[ends[1]];
+      if ((a < p->free_count) == (b < p->free_count)) continue;
+      uint32_t in = a < p->free_count ? a : b, out = a < p->free_count ? b : a;
+      double pair = beyond * flux[ends[0]] * flux[ends[1]] - modulus * face->half_cotangent[k];
+      mu[in] -= pair * p->cosine[out];
+    }
   }
   return solve(solver, mu, ADJOINT_ACCURACY, error);
 }
 
 // p(s; k0, xm) = k0 xm f(s/xm), so k0 dp/dk0 = p and xm dp/dxm = p - s p', straight part included;
 // the same holds for q(g; G, gm).
-static void differentiate(const sonde_patch *p, const sonde_patch_law *law, const double *s,
-                          const double *mu, sonde_patch_gradient *gradient) {
+static void differentiate(const sonde_patch_solver *solver, const double *s, const double *mu,
+                          sonde_patch_gradient *gradient) {
+  const sonde_patch *p = solver->patch;
   gradient->by_ln_shear = gradient->by_ln_limit = 0;
   for (uint32_t i = 0; i < p->place_count; ++i) {
-    uint32_t node = p->node[i];
     double slope, scale = mu[i] * p->area_m2[i];
-    double pressure =
-        sonde_normal_pressure(law->k0_n_m3[node], law->xm_m[node], law->guard, s[i], &slope);
+    double pressure = sonde_normal_pressure(solver->law.exponent, solver->k0_n_m3[i],
+                                            solver->xm_m[i], solver->law.guard, s[i], &slope);
     gradient->by_ln_k0[i] = scale * pressure;
     gradient->by_ln_xm[i] = scale * (pressure - s[i] * slope);
   }
-  for (uint32_t e = 0; e < p->edge_count; ++e) {
-    uint32_t a = p->edge[e][0], b = p->edge[e][1];
-    double slope, g = (s[a] - s[b]) / p->rest_m[e], scale = p->dual_m[e] * (mu[a] - mu[b]);
-    double q = sonde_shear_force(law->shear_n_m, law->limit, g, &slope);
-    gradient->by_ln_shear += scale * q;
-    gradient->by_ln_limit += scale * (q - g * slope);
+  for (uint32_t f = 0; f < p->face_count; ++f) {
+    const sonde_patch_face *face = &p->face[f];
+    double flux[3], g = face_slope(face, s, flux), slope, along = 0;
+    if (g < 1e-9) continue;
+    double q = sonde_shear_force(solver->law.shear_n_m, solver->law.limit, g, &slope);
+    for (int k = 0; k < 3; ++k) along += mu[face->place[k]] * flux[k];
+    gradient->by_ln_shear += along * q / g;
+    gradient->by_ln_limit += along * (q - g * slope) / g;
   }
 }
 
-sonde_status sonde_patch_force(sonde_patch_solver *solver, const sonde_patch_law *law,
-                               double depth_m, const double *s_m, double *force_n,
-                               sonde_patch_gradient *gradient, sonde_error *error) {
-  const sonde_patch *p = solver->patch;
-  (void)assemble(solver, law, s_m, force_n);
-  *force_n += law->tangential_n_m3 * p->sliding_m2 * depth_m;
+sonde_status sonde_patch_force(sonde_patch_solver *solver, double depth_m, const double *s_m,
+                               double *force_n, sonde_patch_gradient *gradient,
+                               sonde_error *error) {
+  (void)assemble(solver, s_m, force_n);
+  *force_n += solver->law.tangential_n_m3 * solver->patch->sliding_m2 * depth_m;
   if (!gradient) return SONDE_OK;
-  sonde_status status = adjoint(solver, law, s_m, solver->multiplier, error);
-  if (!status) differentiate(p, law, s_m, solver->multiplier, gradient);
+  sonde_status status = adjoint(solver, s_m, solver->multiplier, error);
+  if (!status) differentiate(solver, s_m, solver->multiplier, gradient);
   return status;
 }
 
@@ -219,7 +248,9 @@ sonde_status sonde_patch_solver_create(const sonde_patch *patches, uint32_t coun
     if (p->row_start[p->free_count] > entries) entries = p->row_start[p->free_count];
   }
   SONDE_ASSERT(places > 0 && entries > 0);
-  *solver = (sonde_patch_solver){.residual = SONDE_NEW(double, places),
+  *solver = (sonde_patch_solver){.k0_n_m3 = SONDE_NEW(double, places),
+                                 .xm_m = SONDE_NEW(double, places),
+                                 .residual = SONDE_NEW(double, places),
                                  .step = SONDE_NEW(double, places),
                                  .trial = SONDE_NEW(double, places),
                                  .multiplier = SONDE_NEW(double, places),
@@ -229,22 +260,32 @@ sonde_status sonde_patch_solver_create(const sonde_patch *patches, uint32_t coun
                                  .preconditioned = SONDE_NEW(double, places),
                                  .direction = SONDE_NEW(double, places),
                                  .product = SONDE_NEW(double, places)};
-  if (solver->residual && solver->step && solver->trial && solver->multiplier && solver->value &&
-      solver->scratch && solver->right && solver->preconditioned && solver->direction &&
-      solver->product)
+  if (solver->k0_n_m3 && solver->xm_m && solver->residual && solver->step && solver->trial &&
+      solver->multiplier && solver->value && solver->scratch && solver->right &&
+      solver->preconditioned && solver->direction && solver->product)
     return SONDE_OK;
   sonde_patch_solver_clear(solver);
   return sonde_fail_memory(error);
 }
 
-void sonde_patch_solver_use(sonde_patch_solver *solver, const sonde_patch *patch) {
+void sonde_patch_solver_use(sonde_patch_solver *solver, const sonde_patch *patch,
+                            const sonde_patch_law *law) {
   if (solver->ldl) sonde_ldl_destroy(solver->ldl);
   solver->ldl = NULL;
   solver->patch = patch;
+  solver->law = *law;
+  for (uint32_t i = 0; i < patch->place_count; ++i) {
+    const uint32_t *of = patch->parent[i];
+    double t = patch->share[i];
+    solver->k0_n_m3[i] = exp((1 - t) * law->ln_k0[of[0]] + t * law->ln_k0[of[1]]);
+    solver->xm_m[i] = exp((1 - t) * law->ln_xm[of[0]] + t * law->ln_xm[of[1]]);
+  }
 }
 
 void sonde_patch_solver_clear(sonde_patch_solver *solver) {
   if (solver->ldl) sonde_ldl_destroy(solver->ldl);
+  sonde_free(solver->k0_n_m3);
+  sonde_free(solver->xm_m);
   sonde_free(solver->residual);
   sonde_free(solver->step);
   sonde_free(solver->trial);

@@ -2,14 +2,18 @@
 // load_row / load_rows: rows of the measurement file, checked one by one.
 // check_site: a row's site exists and lies where the site file says.
 // check_repeats: no (site, probe, penetration) occurs twice.
+// check_sign: on the whole the forces press.
+// place_on_surface / fail_off: how far a site is from the skin and its normal, and the sentence.
 #include "base/maths.h"
 #include "fit/csv.h"
 #include "fit/fit_inside.h"
+#include "geometry/internal.h"
 
 #include <string.h>
 
 static const double METRES_PER_MM = 1e-3;
 static const double SITE_TOLERANCE_M = 5e-3;
+static const double NORMAL_TOLERANCE_RAD = SONDE_PI / 6;      // measured normals are smoothed ones
 static const double FORCE_LIMIT_N = 1e6, DEPTH_LIMIT_M = 1.0; // beyond: not a measurement
 
 // ---- sites --------------------------------------------------------------------------------
@@ -140,25 +144,83 @@ void sonde_site_table_clear(sonde_site_table *table) {
   *table = (sonde_site_table){0};
 }
 
+// Distance from the skin and angle to its normal at the closest point.
+static void place_on_surface(const sonde_model *model, const sonde_surface_index *index,
+                             const sonde_site *site, double *distance_m, double *angle_rad) {
+  sonde_surface_point at = sonde_surface_closest(index, site->position_m);
+  const uint32_t *v = model->surface.faces[at.face];
+  sonde_vec3 normal = vec3(0, 0, 0);
+  for (int k = 0; k < 3; ++k) normal = v_madd(normal, at.weight[k], model->normal[v[k]]);
+  *distance_m = at.distance_m;
+  *angle_rad = atan2(v_norm(v_cross(normal, site->normal)), v_dot(normal, site->normal));
+  SONDE_ASSERT(*angle_rad >= 0 && *angle_rad <= SONDE_PI);
+}
+
+static bool is_off(double distance_m, double angle_rad, double tolerance_m) {
+  return !(distance_m <= tolerance_m && angle_rad <= NORMAL_TOLERANCE_RAD);
+}
+
+static sonde_status fail_off(const sonde_site *site, double distance_m, double angle_rad,
+                             double tolerance_m, uint32_t off, uint32_t count, sonde_error *error) {
+  if (!(distance_m <= tolerance_m))
+    return sonde_fail(
+        error, SONDE_MISMATCH,
+        "site %u lies %.1f mm from the skin, expected at most %.1f mm; %u of %u sites "
+        "do not fit: do sites and surface belong together, both in mm?",
+        site->id, distance_m * 1e3, tolerance_m * 1e3, off, count);
+  return sonde_fail(error, SONDE_MISMATCH,
+                    "site %u: its normal is %.0f degrees off the skin's%s, expected at most %.0f; "
+                    "%u of %u sites do not fit",
+                    site->id, angle_rad * 180 / SONDE_PI,
+                    angle_rad > SONDE_PI / 2 ? " and points inward" : "",
+                    NORMAL_TOLERANCE_RAD * 180 / SONDE_PI, off, count);
+}
+
+sonde_status sonde_sites_check_on_surface(const sonde_model *model, const sonde_site_table *sites,
+                                          double tolerance_m, sonde_error *error) {
+  sonde_surface_index *index = NULL;
+  sonde_status status = sonde_surface_index_create(&model->surface, &index, error);
+  if (status) return status;
+  uint32_t off = 0, first = 0;
+  double distance_m = 0, angle_rad = 0;
+  for (uint32_t i = 0; i < sites->count; ++i) {
+    place_on_surface(model, index, &sites->sites[i], &distance_m, &angle_rad);
+    if (is_off(distance_m, angle_rad, tolerance_m) && !off++) first = i;
+  }
+  if (off) {
+    const sonde_site *site = &sites->sites[first];
+    place_on_surface(model, index, site, &distance_m, &angle_rad);
+    status = fail_off(site, distance_m, angle_rad, tolerance_m, off, sites->count, error);
+  }
+  sonde_surface_index_destroy(index);
+  return status;
+}
+
 // ---- measurements -------------------------------------------------------------------------
 
 enum { ROW_SITE, ROW_PROBE, ROW_X, ROW_N = 5, ROW_DEPTH = 8, ROW_FORCE, ROW_COLUMNS };
 static const char *const ROW_NAMES[ROW_COLUMNS] = {
     "site", "probe", "x_mm", "y_mm", "z_mm", "nx", "ny", "nz", "penetration_mm", "force_n"};
 
+// Built-in names and rectangles; a table cannot name a mesh file.
 static sonde_status read_probe(const sonde_csv *csv, uint32_t column, char name[24],
                                sonde_error *error) {
   char known[160] = "";
+  const char *found = csv->cell[column];
+  double half_x_m, half_y_m;
+  bool good = sonde_probe_rectangle(found, &half_x_m, &half_y_m) && strlen(found) < 24;
   for (const char *const *p = sonde_probe_names(); *p; ++p) {
-    if (!strcmp(*p, csv->cell[column])) {
-      snprintf(name, 24, "%s", *p);
-      return SONDE_OK;
-    }
+    good |= strcmp(*p, found) == 0;
     size_t used = strlen(known);
-    snprintf(known + used, sizeof known - used, "%s%s", used ? ", " : "", *p);
+    snprintf(known + used, sizeof known - used, "%s, ", *p);
   }
-  return sonde_fail(error, SONDE_FORMAT, "%s:%u: column probe: unknown probe '%.40s', expected %s",
-                    csv->path, csv->line, csv->cell[column], known);
+  if (!good)
+    return sonde_fail(error, SONDE_FORMAT,
+                      "%s:%u: column probe: unknown probe '%.40s', expected %sor rect:AxB (sides "
+                      "in mm, at most 23 characters)",
+                      csv->path, csv->line, found, known);
+  snprintf(name, 24, "%s", found);
+  return SONDE_OK;
 }
 
 static sonde_status check_site(const sonde_csv *csv, const sonde_site_table *sites, uint32_t id,
@@ -239,6 +301,18 @@ static sonde_status check_repeats(const char *path, row_key *keys, uint32_t coun
   return SONDE_OK;
 }
 
+// Single negative forces are noise; a negative mean is the other sign convention.
+static sonde_status check_sign(const char *path, const sonde_measurements *m, sonde_error *error) {
+  double sum_n = 0;
+  SONDE_ASSERT(m->count > 0);
+  for (uint32_t i = 0; i < m->count; ++i) sum_n += m->data[i].force_n;
+  if (sum_n >= 0) return SONDE_OK;
+  return sonde_fail(error, SONDE_FORMAT,
+                    "%s: column force_n: the mean is %.3g N, expected forces that push the probe "
+                    "out, > 0; is the sign reversed?",
+                    path, sum_n / m->count);
+}
+
 static sonde_status load_rows(sonde_csv *csv, const sonde_site_table *sites, row_key *keys,
                               sonde_measurements *m, sonde_error *error) {
   uint32_t columns[ROW_COLUMNS];
@@ -255,7 +329,8 @@ static sonde_status load_rows(sonde_csv *csv, const sonde_site_table *sites, row
   if (!m->count)
     return sonde_fail(error, SONDE_FORMAT, "%s: has no rows, expected at least one measurement",
                       csv->path);
-  return check_repeats(csv->path, keys, m->count, error);
+  status = check_repeats(csv->path, keys, m->count, error);
+  return status ? status : check_sign(csv->path, m, error);
 }
 
 sonde_status sonde_measurements_create(sonde_measurements *m, uint32_t room, sonde_error *error) {
@@ -292,6 +367,7 @@ sonde_status sonde_measurements_save(const char *path, const sonde_measurements 
   sonde_file *file;
   sonde_status status = sonde_file_create(path, &file, error);
   if (status) return status;
+  if (m->remark[0]) sonde_file_printf(file, "# %.*s\n", (int)strcspn(m->remark, "\r\n"), m->remark);
   for (int i = 0; i < ROW_COLUMNS; ++i)
     sonde_file_printf(file, "%s%s", ROW_NAMES[i], i + 1 < ROW_COLUMNS ? "," : "\n");
   for (uint32_t i = 0; i < m->count; ++i) {

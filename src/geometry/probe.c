@@ -1,6 +1,7 @@
 // Probes: built-in boxes and the sphere, and convex hulls of mesh files.
 //
 //   make_box       flat probes; the contact face is z = 0
+//   sonde_probe_rectangle  sides of the box that a name rect:AxB asks for
 //   make_sphere    geodesic sphere with the volume of the true one; a vertex is the deepest point
 //   make_from_file hull of a file's vertices, moved so that its contact end is the origin
 #include "geometry/internal.h"
@@ -10,7 +11,9 @@
 
 enum { SPHERE_SUBDIVISION = 4 }; // 20 * 4^2 = 320 faces
 #define SPHERE_RADIUS_M 15e-3
-#define CONTACT_BAND_M 1e-3   // vertices this near the contact end belong to the contact face
+#define CONTACT_BAND_M 1e-3 // vertices this near the contact end belong to the contact face
+#define RECT_LENGTH_M 60e-3
+#define RECT_SIDE_MAX_MM 200.0
 #define FILE_TOLERANCE_M 5e-5 // detail of a mesh file that the hull may leave out
 
 typedef struct box_shape {
@@ -36,6 +39,33 @@ static sonde_status make_box(const box_shape *shape, sonde_probe *probe, sonde_e
   probe->half_y_m = shape->half_y_m;
   probe->rectangular = true;
   return sonde_convex_hull(corners, 8, &probe->body, error);
+}
+
+// Reads one side in mm from *text and moves behind it; false outside 0.1 to 200 mm.
+static bool read_side(const char **text, double *half_m) {
+  const char *end;
+  double side_mm = sonde_parse_real(*text, &end);
+  bool good = end != *text && side_mm >= 0.1 && side_mm <= RECT_SIDE_MAX_MM;
+  *half_m = side_mm * 0.5e-3;
+  *text = end;
+  return good;
+}
+
+bool sonde_probe_rectangle(const char *name, double *half_x_m, double *half_y_m) {
+  SONDE_ASSERT(name != NULL && half_x_m != NULL && half_y_m != NULL);
+  if (strncmp(name, "rect:", 5) != 0) return false;
+  const char *text = name + 5;
+  return read_side(&text, half_x_m) && *text++ == 'x' && read_side(&text, half_y_m) && !*text;
+}
+
+static sonde_status make_rectangle(const char *name, sonde_probe *probe, sonde_error *error) {
+  box_shape shape = {.name = name, .length_m = RECT_LENGTH_M};
+  if (!sonde_probe_rectangle(name, &shape.half_x_m, &shape.half_y_m))
+    return sonde_fail(error, SONDE_NOT_FOUND,
+                      "probe \"%.40s\": expected rect:AxB with sides from 0.1 to %g mm, such as "
+                      "rect:24x24",
+                      name, RECT_SIDE_MAX_MM);
+  return make_box(&shape, probe, error);
 }
 
 // ---- sphere -------------------------------------------------------------------------------
@@ -156,7 +186,8 @@ static void set_name(sonde_probe *probe, const char *name, bool path) {
 sonde_status sonde_probe_create(const char *name_or_path, sonde_probe *probe, sonde_error *error) {
   SONDE_ASSERT(name_or_path != NULL && probe != NULL);
   *probe = (sonde_probe){0};
-  bool path = is_path(name_or_path);
+  bool rectangle = !strncmp(name_or_path, "rect:", 5);
+  bool path = !rectangle && is_path(name_or_path);
   const box_shape *box = NULL;
   for (size_t k = 0; k < SONDE_COUNT_OF(boxes); ++k)
     if (!strcmp(name_or_path, boxes[k].name)) box = &boxes[k];
@@ -165,12 +196,14 @@ sonde_status sonde_probe_create(const char *name_or_path, sonde_probe *probe, so
     status = make_box(box, probe, error);
   else if (!strcmp(name_or_path, "sphere"))
     status = make_sphere(probe, error);
+  else if (rectangle)
+    status = make_rectangle(name_or_path, probe, error);
   else if (path)
     status = make_from_file(name_or_path, probe, error);
   else
     status = sonde_fail(error, SONDE_NOT_FOUND,
-                        "no probe is called \"%.40s\"; known are point, linear, square, sphere and "
-                        "mesh files (.ply, .obj, .stl)",
+                        "no probe is called \"%.40s\"; known are point, linear, square, sphere, "
+                        "rect:AxB (sides in mm) and mesh files (.ply, .obj, .stl)",
                         name_or_path);
   if (status)
     sonde_probe_clear(probe);

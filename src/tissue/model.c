@@ -20,9 +20,10 @@ sonde_surface_law sonde_surface_law_default(void) {
                              .edge_damping_s = 1e-3,
                              .edge_compression = 0.05,
                              .edge_pretension_n = 0,
-                             .tangential_stiffness_n_m3 = 2e5,
+                             .tangential_stiffness_n_m3 = 1e6,
                              .shear_stiffness_n_m = 0,
                              .shear_limit = 1.0,
+                             .normal_exponent = 1,
                              .normal_damping_s = 0.02,
                              .surface_density_kg_m2 = 20,
                              .guard = 0.999};
@@ -49,11 +50,15 @@ static sonde_status check_law(const sonde_surface_law *law, sonde_error *error) 
                {"shear_limit", law->shear_limit, 1e-3, 1e3},
                {"normal_damping_s", law->normal_damping_s, 0, 100},
                {"surface_density_kg_m2", law->surface_density_kg_m2, 1e-3, 1e4},
+               {"normal_exponent", law->normal_exponent, 1, 3},
                {"guard", law->guard, 0.5, 0.99999}};
   for (size_t k = 0; k < SONDE_COUNT_OF(range); ++k)
     if (!(range[k].value >= range[k].low && range[k].value <= range[k].high))
       return sonde_fail(error, SONDE_ARGUMENT, "%s is %g, expected %g to %g", range[k].name,
                         range[k].value, range[k].low, range[k].high);
+  if (law->normal_exponent != floor(law->normal_exponent))
+    return sonde_fail(error, SONDE_ARGUMENT, "normal_exponent is %g, expected 1, 2 or 3",
+                      law->normal_exponent);
   return SONDE_OK;
 }
 
@@ -76,20 +81,35 @@ static double half_cotangent(sonde_vec3 apex, sonde_vec3 a, sonde_vec3 b) {
   return sine > 0 ? 0.5 * v_dot(p, q) / sine : 0;
 }
 
-// Dual length of an edge: cotangent weight times its length, not below zero.
-static double dual_length(const sonde_model *model, uint32_t e) {
+static uint32_t edge_between(const sonde_topology *t, uint32_t a, uint32_t b) {
+  uint32_t k = t->start[a];
+  while (k < t->start[a + 1] && t->neighbour[k] != b) ++k;
+  SONDE_ASSERT(k < t->start[a + 1]);
+  return t->neighbour_edge[k];
+}
+
+// Area, half cotangents and edges of every face.
+static sonde_status derive_faces(sonde_model *model, sonde_error *error) {
   const sonde_mesh *mesh = &model->surface;
-  const uint32_t *pair = model->topology.edges[e];
-  double weight = 0;
-  for (int side = 0; side < 2; ++side) {
-    uint32_t f = model->topology.edge_faces[e][side];
-    if (f == UINT32_MAX) continue;
+  model->face_area_m2 = SONDE_NEW(double, mesh->face_count);
+  model->face_half_cotangent = sonde_calloc(mesh->face_count, sizeof *model->face_half_cotangent);
+  model->face_edge = sonde_calloc(mesh->face_count, sizeof *model->face_edge);
+  if (!model->face_area_m2 || !model->face_half_cotangent || !model->face_edge)
+    return sonde_fail_memory(error);
+  for (uint32_t f = 0; f < mesh->face_count; ++f) {
     const uint32_t *v = mesh->faces[f];
-    uint32_t apex = v[0] + v[1] + v[2] - pair[0] - pair[1];
-    weight +=
-        half_cotangent(mesh->vertices[apex], mesh->vertices[pair[0]], mesh->vertices[pair[1]]);
+    const sonde_vec3 *x = mesh->vertices;
+    model->face_area_m2[f] =
+        0.5 * v_norm(v_cross(v_sub(x[v[1]], x[v[0]]), v_sub(x[v[2]], x[v[0]])));
+    if (!(model->face_area_m2[f] > 0))
+      return sonde_fail(error, SONDE_MESH, "face %u of the skin has no area", f);
+    for (int k = 0; k < 3; ++k) {
+      uint32_t a = v[(k + 1) % 3], b = v[(k + 2) % 3];
+      model->face_half_cotangent[f][k] = half_cotangent(x[v[k]], x[a], x[b]);
+      model->face_edge[f][k] = edge_between(&model->topology, a, b);
+    }
   }
-  return weight > 0 ? weight * model->edge_rest_m[e] : 0;
+  return SONDE_OK;
 }
 
 sonde_status sonde_model_derive(sonde_model *model, sonde_error *error) {
@@ -98,8 +118,7 @@ sonde_status sonde_model_derive(sonde_model *model, sonde_error *error) {
   if (status) return status;
   uint32_t n = model->surface.vertex_count, edges = model->topology.edge_count;
   model->edge_rest_m = SONDE_NEW(double, edges);
-  model->edge_dual_m = SONDE_NEW(double, edges);
-  if (!model->edge_rest_m || !model->edge_dual_m) return sonde_fail_memory(error);
+  if (!model->edge_rest_m) return sonde_fail_memory(error);
   sonde_mesh_normals(&model->surface, model->normal);
   sonde_mesh_areas(&model->surface, model->area_m2);
   for (uint32_t i = 0; i < n; ++i)
@@ -111,9 +130,8 @@ sonde_status sonde_model_derive(sonde_model *model, sonde_error *error) {
     if (!(model->edge_rest_m[e] > 1e-7))
       return sonde_fail(error, SONDE_MESH, "the skin has an edge of zero length at vertex %u",
                         pair[0]);
-    model->edge_dual_m[e] = dual_length(model, e);
   }
-  return SONDE_OK;
+  return derive_faces(model, error);
 }
 
 static double outside(double value, double limit) {
@@ -283,10 +301,20 @@ sonde_status sonde_model_set_parameters(sonde_model *model, const sonde_surface_
 
 void sonde_model_destroy(sonde_model *model) {
   if (!model) return;
-  void *arrays[] = {model->normal,       model->area_m2,        model->mass_kg,
-                    model->k0_n_m3,      model->xm_m,           model->fat_depth_m,
-                    model->bone_depth_m, model->muscle_depth_m, model->edge_rest_m,
-                    model->edge_dual_m,  model->sites,          model->data};
+  void *arrays[] = {model->normal,
+                    model->area_m2,
+                    model->mass_kg,
+                    model->k0_n_m3,
+                    model->xm_m,
+                    model->fat_depth_m,
+                    model->bone_depth_m,
+                    model->muscle_depth_m,
+                    model->edge_rest_m,
+                    model->face_area_m2,
+                    model->face_half_cotangent,
+                    model->face_edge,
+                    model->sites,
+                    model->data};
   for (size_t k = 0; k < SONDE_COUNT_OF(arrays); ++k) sonde_free(arrays[k]);
   sonde_topology_clear(&model->topology);
   sonde_mesh_clear(&model->surface);

@@ -6,7 +6,7 @@
 
 // Allocates the per-node arrays for model->surface.vertex_count nodes.
 sonde_status sonde_model_allocate_nodes(sonde_model *model, sonde_error *error);
-// Topology, normals, areas, masses, rest lengths and dual lengths from surface and law.
+// Topology, normals, areas, masses, rest lengths, areas and cotangents from surface and law.
 sonde_status sonde_model_derive(sonde_model *model, sonde_error *error);
 // Depths of the interfaces and of the bone below every node.
 sonde_status sonde_model_measure_layers(sonde_model *model, const sonde_mesh *fat,

@@ -12,7 +12,7 @@
 #include <zlib.h>
 
 #define MAGIC "SONDE-MODEL "
-enum { FORMAT_VERSION = 1 };
+enum { FORMAT_VERSION = 2 };
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the model file is little-endian");
 
@@ -141,7 +141,8 @@ static double *law_field(sonde_surface_law *law, int index, const char **name) {
                      &law->shear_limit,
                      &law->normal_damping_s,
                      &law->surface_density_kg_m2,
-                     &law->guard};
+                     &law->guard,
+                     &law->normal_exponent};
   static const char *const NAME[] = {"edge_stiffness_n_m",
                                      "edge_damping_s",
                                      "edge_compression",
@@ -151,7 +152,8 @@ static double *law_field(sonde_surface_law *law, int index, const char **name) {
                                      "shear_limit",
                                      "normal_damping_s",
                                      "surface_density_kg_m2",
-                                     "guard"};
+                                     "guard",
+                                     "normal_exponent"};
   if (index >= (int)SONDE_COUNT_OF(field)) return NULL;
   *name = NAME[index];
   return field[index];

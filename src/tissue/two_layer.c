@@ -1,7 +1,8 @@
-// Hot evaluation of the two-layer tissue (docs/tissue.md), one pass over edges and one over nodes.
+// Hot evaluation of the two-layer tissue (docs/tissue.md): passes over edges, faces and nodes.
 // begin_node: clears a node's sums, its indentation and rate.
 // add_edge:   surface spring-damper: force, projected stiffness, damping block.
-// add_shear:  spring between the normal indentations of two neighbours.
+// face_slope: gradient of the indentation over a face.
+// add_shear:  the shear layer of one face.
 // add_anchor: normal spring of eq. (1), tangential spring and their dampers at one node.
 // linearise:  assembles force, K v and the matrix of the implicit step.
 #include "tissue/two_layer.h"
@@ -31,12 +32,12 @@ typedef struct evaluation {
   sonde_tissue_node *node;
 } evaluation;
 
-static void begin_node(const evaluation *at, uint32_t i) {
+static void begin_node(const evaluation *at, uint32_t i, bool is_row) {
   sonde_vec3 n = at->model->normal[i];
   at->force[i] = at->stiffness_velocity[i] = vec3(0, 0, 0);
   at->matrix->diagonal[i] = m_zero();
   at->node[i] = (sonde_tissue_node){v_dot(n, v_sub(at->model->surface.vertices[i], at->x[i])),
-                                    -v_dot(n, at->v[i]), 0};
+                                    -v_dot(n, at->v[i]), 0, is_row};
 }
 
 static inline void add_block(sonde_mat3 *m, const sonde_mat3 *block) {
@@ -71,29 +72,56 @@ static void add_edge(const evaluation *at, uint32_t e, uint32_t i, uint32_t j) {
   at->matrix->upper[e] = m_scale(block, -1.0);
 }
 
-// Energy L w W(|s_i - s_j|/L) gives forces w q on +N_i and -N_j; the diagonal parts s N N^T are
-// summed as numbers and added with the anchors.
-static void add_shear(const evaluation *at, uint32_t e, uint32_t i, uint32_t j) {
+// |grad s| over a face; flux[k] is half the cotangent Laplacian of s at corner k, so that
+// A |grad s|^2 = sum s flux.
+static inline double face_slope(const double half_cotangent[3], double area_m2, const double s[3],
+                                double flux[3]) {
+  double sum = 0, across[3];
+  for (int k = 0; k < 3; ++k) {
+    double d = s[(k + 1) % 3] - s[(k + 2) % 3];
+    across[k] = half_cotangent[k] * d;
+    sum += across[k] * d;
+  }
+  for (int k = 0; k < 3; ++k) flux[k] = across[(k + 2) % 3] - across[(k + 1) % 3];
+  return sqrt(sum > 0 ? sum / area_m2 : 0);
+}
+
+// Energy A W(|grad s|): forces m flux_k along N_k with the secant modulus m = q/g, and the
+// stiffness m L + (q' - m)/(g^2 A) flux flux^T between the indentations, L half the cotangent
+// Laplacian. The diagonal parts are summed as numbers and added with the anchors.
+static void add_shear(const evaluation *at, uint32_t f) {
   const sonde_model *model = at->model;
-  double rest = model->edge_rest_m[e], dual = model->edge_dual_m[e], slope;
-  sonde_tissue_node *a = &at->node[i], *b = &at->node[j];
-  double g = (a->indentation_m - b->indentation_m) / rest;
-  double q =
-      dual * sonde_shear_force(model->law.shear_stiffness_n_m, model->law.shear_limit, g, &slope);
-  double stiffness = dual * slope / rest, kv = stiffness * (a->rate_m_s - b->rate_m_s);
-  sonde_vec3 ni = model->normal[i], nj = model->normal[j];
-  at->force[i] = v_madd(at->force[i], q, ni);
-  at->force[j] = v_madd(at->force[j], -q, nj);
-  at->stiffness_velocity[i] = v_madd(at->stiffness_velocity[i], -kv, ni);
-  at->stiffness_velocity[j] = v_madd(at->stiffness_velocity[j], kv, nj);
-  double scaled = at->scale.stiffness * stiffness;
-  a->shear_n_m += scaled;
-  b->shear_n_m += scaled;
-  const double row[3] = {-scaled * ni.x, -scaled * ni.y, -scaled * ni.z};
-  for (int r = 0; r < 3; ++r) {
-    at->matrix->upper[e].m[r][0] += row[r] * nj.x;
-    at->matrix->upper[e].m[r][1] += row[r] * nj.y;
-    at->matrix->upper[e].m[r][2] += row[r] * nj.z;
+  const uint32_t *v = model->surface.faces[f];
+  const double *half = model->face_half_cotangent[f];
+  double area = model->face_area_m2[f], slope, flux[3], s[3], rate[3], along = 0;
+  for (int k = 0; k < 3; ++k)
+    s[k] = at->node[v[k]].indentation_m, rate[k] = at->node[v[k]].rate_m_s;
+  double g = face_slope(half, area, s, flux);
+  double q = sonde_shear_force(model->law.shear_stiffness_n_m, model->law.shear_limit, g, &slope);
+  double modulus = g > 1e-9 ? q / g : slope;
+  double beyond = g > 1e-9 ? (slope - modulus) / (g * g * area) : 0;
+  for (int k = 0; k < 3; ++k) along += flux[k] * rate[k];
+  for (int k = 0; k < 3; ++k) {
+    int a = (k + 1) % 3, b = (k + 2) % 3;
+    sonde_vec3 n = model->normal[v[k]];
+    at->force[v[k]] = v_madd(at->force[v[k]], modulus * flux[k], n);
+    double spread = half[b] * (rate[k] - rate[a]) + half[a] * (rate[k] - rate[b]);
+    double kv = modulus * spread + beyond * along * flux[k];
+    at->stiffness_velocity[v[k]] = v_madd(at->stiffness_velocity[v[k]], -kv, n);
+    at->node[v[k]].shear_n_m +=
+        at->scale.stiffness * (modulus * (half[a] + half[b]) + beyond * flux[k] * flux[k]);
+    if (!at->node[v[a]].is_row && !at->node[v[b]].is_row) continue;
+    double pair = at->scale.stiffness * (beyond * flux[a] * flux[b] - modulus * half[k]);
+    bool forward = v[a] < v[b];
+    sonde_vec3 first = v_scale(model->normal[forward ? v[a] : v[b]], pair);
+    sonde_vec3 second = model->normal[forward ? v[b] : v[a]];
+    const double row[3] = {first.x, first.y, first.z};
+    sonde_mat3 *block = &at->matrix->upper[model->face_edge[f][k]];
+    for (int r = 0; r < 3; ++r) {
+      block->m[r][0] += row[r] * second.x;
+      block->m[r][1] += row[r] * second.y;
+      block->m[r][2] += row[r] * second.z;
+    }
   }
 }
 
@@ -105,7 +133,8 @@ static void add_anchor(const evaluation *at, uint32_t i) {
   sonde_vec3 u = v_sub(at->x[i], model->surface.vertices[i]);
   double s = at->node[i].indentation_m, rate = -at->node[i].rate_m_s;
   double area = model->area_m2[i], slope;
-  double pressure = sonde_normal_pressure(model->k0_n_m3[i], model->xm_m[i], law->guard, s, &slope);
+  double pressure = sonde_normal_pressure(law->normal_exponent, model->k0_n_m3[i], model->xm_m[i],
+                                          law->guard, s, &slope);
   double normal_damper = law->normal_damping_s * model->k0_n_m3[i] * area;
   double tangent = law->tangential_stiffness_n_m3 * area;
   double tangent_damper = law->normal_damping_s * tangent;
@@ -133,15 +162,15 @@ void sonde_tissue_linearise(const sonde_model *model, const sonde_tissue_part *p
   const uint32_t *rows = part ? part->rows : NULL, *edges = part ? part->edges : NULL;
   uint32_t row_count = part ? part->row_count : matrix->row_count;
   uint32_t edge_count = part ? part->edge_count : matrix->pair_count;
-  for (uint32_t r = 0; r < row_count; ++r) begin_node(&at, rows ? rows[r] : r);
-  for (uint32_t r = 0; part && r < part->rim_count; ++r) begin_node(&at, part->rim[r]);
-  bool shear = model->law.shear_stiffness_n_m > 0;
+  for (uint32_t r = 0; r < row_count; ++r) begin_node(&at, rows ? rows[r] : r, true);
+  for (uint32_t r = 0; part && r < part->rim_count; ++r) begin_node(&at, part->rim[r], false);
   for (uint32_t k = 0; k < edge_count; ++k) {
     uint32_t e = edges ? edges[k] : k;
-    uint32_t i = model->topology.edges[e][0], j = model->topology.edges[e][1];
-    add_edge(&at, e, i, j);
-    if (shear) add_shear(&at, e, i, j);
+    add_edge(&at, e, model->topology.edges[e][0], model->topology.edges[e][1]);
   }
+  uint32_t face_count = part ? part->face_count : model->surface.face_count;
+  if (!(model->law.shear_stiffness_n_m > 0)) face_count = 0;
+  for (uint32_t k = 0; k < face_count; ++k) add_shear(&at, part ? part->faces[k] : k);
   for (uint32_t r = 0; r < row_count; ++r) add_anchor(&at, rows ? rows[r] : r);
 }
 
@@ -151,6 +180,17 @@ static double edge_energy(const sonde_surface_law *law, double length, double re
   return law->edge_pretension_n * stretch + 0.5 * t.slope * stretch * stretch;
 }
 
+static double shear_energy(const sonde_model *model, const sonde_vec3 *position, uint32_t f) {
+  double s[3], flux[3];
+  for (int k = 0; k < 3; ++k) {
+    uint32_t i = model->surface.faces[f][k];
+    s[k] = v_dot(model->normal[i], v_sub(model->surface.vertices[i], position[i]));
+  }
+  double area = model->face_area_m2[f];
+  double g = face_slope(model->face_half_cotangent[f], area, s, flux);
+  return area * sonde_shear_energy(model->law.shear_stiffness_n_m, model->law.shear_limit, g);
+}
+
 double sonde_tissue_energy(const sonde_model *model, const sonde_vec3 *position) {
   const sonde_surface_law *law = &model->law;
   double energy = 0;
@@ -158,19 +198,16 @@ double sonde_tissue_energy(const sonde_model *model, const sonde_vec3 *position)
     sonde_vec3 u = v_sub(position[i], model->surface.vertices[i]);
     double s = -v_dot(model->normal[i], u);
     double area = model->area_m2[i];
-    energy += area * sonde_normal_energy(model->k0_n_m3[i], model->xm_m[i], law->guard, s);
+    energy += area * sonde_normal_energy(law->normal_exponent, model->k0_n_m3[i], model->xm_m[i],
+                                         law->guard, s);
     energy += 0.5 * law->tangential_stiffness_n_m3 * area * (v_norm2(u) - s * s);
   }
   for (uint32_t e = 0; e < model->topology.edge_count; ++e) {
-    uint32_t i = model->topology.edges[e][0], j = model->topology.edges[e][1];
-    double rest = model->edge_rest_m[e];
-    energy += edge_energy(law, v_distance(position[i], position[j]), rest);
-    if (law->shear_stiffness_n_m <= 0) continue;
-    double si = v_dot(model->normal[i], v_sub(model->surface.vertices[i], position[i]));
-    double sj = v_dot(model->normal[j], v_sub(model->surface.vertices[j], position[j]));
-    double g = (si - sj) / rest;
-    energy += rest * model->edge_dual_m[e] *
-              sonde_normal_energy(law->shear_stiffness_n_m, law->shear_limit, 0.95, fabs(g));
+    const uint32_t *pair = model->topology.edges[e];
+    energy +=
+        edge_energy(law, v_distance(position[pair[0]], position[pair[1]]), model->edge_rest_m[e]);
   }
+  for (uint32_t f = 0; f < model->surface.face_count && law->shear_stiffness_n_m > 0; ++f)
+    energy += shear_energy(model, position, f);
   return energy;
 }

@@ -14,12 +14,15 @@ typedef struct sonde_tissue_part {
   uint32_t rim_count;
   const uint32_t *edges;
   uint32_t edge_count;
+  const uint32_t *faces; // with at least one row among their corners
+  uint32_t face_count;
 } sonde_tissue_part;
 
 // Scratch of an evaluation, per node.
 typedef struct sonde_tissue_node {
   double indentation_m, rate_m_s; // s = N.(X - x) and its rate
-  double shear_n_m;               // sum of the shear springs' stiffnesses at the node
+  double shear_n_m;               // the shear layer's stiffness at the node, scaled
+  bool is_row;                    // of the evaluated part
 } sonde_tissue_node;
 
 // A x = b of the implicit step (docs/world.md): A = mass_scale*M + damping_scale*C +

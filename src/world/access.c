@@ -22,7 +22,8 @@ static void add_rim(sonde_state *state, uint32_t i) {
 void sonde_state_list_awake(sonde_state *state) {
   const sonde_topology *topology = &state->model->topology;
   for (uint32_t k = 0; k < state->rim_count; ++k) state->in_rim[state->rim[k]] = 0;
-  state->row_count = state->edge_count = state->pair_count = state->rim_count = 0;
+  state->row_count = state->edge_count = state->pair_count = 0;
+  state->face_count = state->rim_count = 0;
   state->lists_stale = false;
   for (uint32_t i = 0; i < topology->vertex_count; ++i) {
     state->rows[state->row_count] = i;
@@ -37,6 +38,12 @@ void sonde_state_list_awake(sonde_state *state) {
       state->pairs[state->pair_count++] = e;
     else
       add_rim(state, a ? j : i);
+  }
+  const sonde_mesh *skin = &state->model->surface;
+  for (uint32_t f = 0; f < skin->face_count; ++f) {
+    const uint32_t *v = skin->faces[f];
+    state->faces[state->face_count] = f;
+    state->face_count += state->awake[v[0]] | state->awake[v[1]] | state->awake[v[2]];
   }
 }
 

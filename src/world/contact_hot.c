@@ -123,6 +123,7 @@ static void forget(sonde_state *state) {
 
 void sonde_contact_clear(sonde_state *state) {
   forget(state);
+  sonde_friction_release(state);
   for (uint32_t b = 0; b < state->block_count; ++b) refit(state, b);
 }
 

@@ -18,7 +18,24 @@ sonde_world_def sonde_world_def_default(void) {
                            .contact_law = SONDE_CONTACT_FOUNDATION,
                            .contact_stiffness_n_m3 = 5e8,
                            .contact_damping_n_s_m3 = 1e5,
-                           .sleep_displacement_m = 5e-6};
+                           .sleep_displacement_m = 5e-6,
+                           .friction = {.stribeck_speed_m_s = 0.01, .mu_gel = 0.05}};
+}
+
+static sonde_status check_friction(const sonde_friction *f, sonde_error *error) {
+  const struct {
+    const char *name;
+    double value, low, high;
+  } range[] = {{"friction.mu_static", f->mu_static, 0, 5},
+               {"friction.mu_kinetic", f->mu_kinetic, 0, f->mu_static},
+               {"friction.stribeck_speed_m_s", f->stribeck_speed_m_s, 1e-5, 10},
+               {"friction.gel_film", f->gel_film, 0, 100},
+               {"friction.mu_gel", f->mu_gel, 0, 5}};
+  for (size_t k = 0; k < SONDE_COUNT_OF(range); ++k)
+    if (!(range[k].value >= range[k].low && range[k].value <= range[k].high))
+      return sonde_fail(error, SONDE_ARGUMENT, "%s is %g, expected %g to %g", range[k].name,
+                        range[k].value, range[k].low, range[k].high);
+  return SONDE_OK;
 }
 
 static sonde_status check(const sonde_world_def *def, sonde_error *error) {
@@ -39,6 +56,15 @@ static sonde_status check(const sonde_world_def *def, sonde_error *error) {
     if (!(range[k].value >= range[k].low && range[k].value <= range[k].high))
       return sonde_fail(error, SONDE_ARGUMENT, "%s is %g, expected %g to %g", range[k].name,
                         range[k].value, range[k].low, range[k].high);
+  return check_friction(&def->friction, error);
+}
+
+sonde_status sonde_state_set_friction(sonde_state *state, const sonde_friction *friction,
+                                      sonde_error *error) {
+  sonde_status status = check_friction(friction, error);
+  if (status) return status;
+  state->def.friction = *friction;
+  state->mu = sonde_friction_coefficient(friction, 0);
   return SONDE_OK;
 }
 
@@ -56,11 +82,12 @@ static size_t carve(sonde_state *s, char *base) {
   uint32_t faces = s->model->surface.face_count;
   CARVE(position, n), CARVE(velocity, n), CARVE(increment, n);
   CARVE(calm, n), CARVE(awake, n), CARVE(rows, n);
-  CARVE(edges, edges), CARVE(pairs, edges), CARVE(rim, n), CARVE(in_rim, n);
+  CARVE(edges, edges), CARVE(pairs, edges), CARVE(faces, faces), CARVE(rim, n), CARVE(in_rim, n);
   CARVE(face_order, faces), CARVE(boxes, s->block_count);
   CARVE(touched, n), CARVE(parent, n), CARVE(share_m3, n), CARVE(gradient, n);
   CARVE(face_edges, faces), CARVE(face_area_m2, faces), CARVE(touched_faces, faces);
   CARVE(contact_force, n), CARVE(lumped, n), CARVE(lumped_rows, n);
+  CARVE(bond_m, n), CARVE(grip_n, n), CARVE(grip_tick, n);
   CARVE(plane_weight, SONDE_MAX_PROBE_PLANES);
   CARVE(plane_normal, SONDE_MAX_PROBE_PLANES), CARVE(plane_offset, SONDE_MAX_PROBE_PLANES);
   CARVE(force, n), CARVE(product, n), CARVE(right, n), CARVE(trial, n), CARVE(scratch_nodes, n);

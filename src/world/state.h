@@ -30,9 +30,10 @@ struct sonde_state {
   uint32_t *rows;  // [nodes] awake nodes, ascending
   uint32_t *edges; // [edges] with at least one awake end
   uint32_t *pairs; // [edges] with both ends awake
+  uint32_t *faces; // [faces] with at least one awake corner
   uint32_t *rim;   // [nodes] sleeping ends of `edges`
   uint8_t *in_rim; // [nodes]
-  uint32_t row_count, edge_count, pair_count, rim_count;
+  uint32_t row_count, edge_count, pair_count, face_count, rim_count;
   bool lists_stale; // awake[] changed since the lists were made
 
   // contact
@@ -59,6 +60,12 @@ struct sonde_state {
   double *plane_weight; // of its distance in the depth: see depth_at()
   uint32_t plane_count;
   sonde_contact contact;
+
+  // friction, written at the end of a step
+  sonde_vec3 *bond_m;  // [nodes] deflection of the node's bond with the probe
+  sonde_vec3 *grip_n;  // [nodes] normal push on the node
+  uint64_t *grip_tick; // [nodes] tick of both
+  double mu;           // coefficient of the next step
 
   // assembly and solve
   sonde_block_matrix *matrix;
@@ -108,6 +115,15 @@ void sonde_contact_apply(sonde_state *state, const sonde_motion *probe,
 void sonde_contact_advance(sonde_state *state, const sonde_motion *probe, double lambda, double h);
 // Force and torque on the probe, forces and centres of the regions from the pushes. @thread tick
 void sonde_contact_wrench(sonde_state *state, sonde_vec3 origin);
+// Forces of the bonds at the start of a step, or at a point that the nodes reach after moving for
+// moved_s at their velocities, and their terms in the matrix and in product[]. @thread tick
+void sonde_friction_apply(sonde_state *state, const sonde_motion *probe,
+                          const sonde_contact_scales *scales, double moved_s);
+// Bonds, normal pushes and the coefficient at the end of the step; adds friction to
+// contact_force[]. @thread tick
+void sonde_friction_advance(sonde_state *state, const sonde_motion *probe);
+// Forgets all bonds. @thread tick
+void sonde_friction_release(sonde_state *state);
 // No probe: no contact. @thread tick
 void sonde_contact_clear(sonde_state *state);
 

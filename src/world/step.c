@@ -28,12 +28,14 @@ static sonde_motion probe_motion(const sonde_state *state, sonde_pose pose) {
   return motion;
 }
 
-// Forces and matrix at (position, velocity); the reaction is the sum of the tissue's own forces.
-static void assemble(sonde_state *state, const sonde_probe *probe, const sonde_motion *motion) {
+// Forces and matrix at (position, velocity), which the nodes have reached after moving for moved_s
+// at that velocity; the reaction is the sum of the tissue's own forces.
+static void assemble(sonde_state *state, const sonde_probe *probe, const sonde_motion *motion,
+                     double moved_s) {
   double h = state->def.dt_s, lambda = state->def.implicitness;
   sonde_tissue_scales scales = {1, lambda * h, lambda * lambda * h * h};
-  sonde_tissue_part part = {state->rows,      state->row_count, state->rim,
-                            state->rim_count, state->edges,     state->edge_count};
+  sonde_tissue_part part = {state->rows,  state->row_count,  state->rim,   state->rim_count,
+                            state->edges, state->edge_count, state->faces, state->face_count};
   sonde_tissue_linearise(state->model, &part, state->position, state->velocity, &scales,
                          state->force, state->product, state->matrix, state->scratch_nodes);
   sonde_contact_scales contact = {scales.damping, scales.stiffness};
@@ -42,6 +44,7 @@ static void assemble(sonde_state *state, const sonde_probe *probe, const sonde_m
   for (uint32_t r = 0; r < state->row_count; ++r)
     reaction = v_add(reaction, state->force[state->rows[r]]);
   state->contact.reaction_n = reaction;
+  if (probe) sonde_friction_apply(state, motion, &contact, moved_s);
 }
 
 static void solve(sonde_state *state) {
@@ -137,7 +140,7 @@ static void newton_correction(sonde_state *state, const sonde_probe *probe, sond
     state->velocity[i] = v_madd(v0, lambda, dv);
   }
   sonde_contact_detect(state, probe, pose);
-  assemble(state, probe, motion);
+  assemble(state, probe, motion, lambda * h);
   for (uint32_t r = 0; r < state->row_count; ++r) {
     uint32_t i = state->rows[r];
     sonde_vec3 dv = state->increment[i];
@@ -182,7 +185,7 @@ void sonde_step(sonde_state *state, const sonde_probe *probe, sonde_pose pose) {
   sonde_contact_detect(state, probe, pose);
   if (state->lists_stale) sonde_state_list_awake(state);
   double detected = sonde_clock_now();
-  assemble(state, probe, &motion);
+  assemble(state, probe, &motion, 0);
   first_right_side(state);
   double assembled = sonde_clock_now();
   solve(state);
@@ -192,6 +195,7 @@ void sonde_step(sonde_state *state, const sonde_probe *probe, sonde_pose pose) {
   // Newton's later iterations have already evaluated the contact where the scheme wants it.
   if (state->def.newton_iterations == 1)
     sonde_contact_advance(state, &motion, state->def.implicitness, state->def.dt_s);
+  if (probe) sonde_friction_advance(state, &motion);
   sonde_contact_wrench(state, pose.position);
   bool finite = update(state) && v_finite(state->contact.force_n);
   finish(state, probe, pose, finite);

@@ -27,6 +27,38 @@ rejects 'nowhere\.csv' fit nowhere.csv "${fit[@]}"
 rejects 'empty\.csv' fit "$in/empty.csv" "${fit[@]}"
 rejects 'empty\.csv' measure "$MODEL" --sites "$in/empty.csv" --probe linear --step-mm 2 --limit-n 10 \
   -o out.csv
+
+# Tables whose text is right and whose content is not.
+awk -F, -v OFS=, '/^#/ { print; next } ++n > 1 { $NF = -$NF } { print }' "$DATA/indentation.csv" >"$in/sign.csv"
+rejects 'sign\.csv.*force_n.*sign' fit "$in/sign.csv" "${fit[@]}"
+{ cat "$DATA/indentation.csv"; sed -n 12p "$DATA/indentation.csv"; } >"$in/twice.csv"
+rejects 'twice\.csv:1830: repeats line 12' fit "$in/twice.csv" "${fit[@]}"
+sed 's/linear/rect:60/' "$DATA/indentation.csv" >"$in/probe.csv"
+rejects 'probe\.csv:2: column probe.*rect:AxB' fit "$in/probe.csv" "${fit[@]}"
+awk -F, '/^#/ || !n++ || $9 < 5' "$DATA/indentation.csv" >"$in/few.csv"
+rejects 'none of the 128 curves' fit "$in/few.csv" "${fit[@]}"
+awk -F, -v OFS=, '/^#/ { print; next } ++n == 8 { $2 += 30 } { print }' "$DATA/sites.csv" >"$in/off.csv"
+rejects 'site 6 lies .* mm from the skin' measure "$MODEL" --sites "$in/off.csv" --probe linear -o out.csv
+awk -F, -v OFS=, '/^#/ { print; next } ++n == 8 { $5 = -$5; $6 = -$6; $7 = -$7 } { print }' \
+  "$DATA/sites.csv" >"$in/inward.csv"
+rejects 'site 6: .*inward' measure "$MODEL" --sites "$in/inward.csv" --probe linear -o out.csv
+
+# Places of sites.
+place=(measure "$MODEL" --probe linear -o out.csv)
+rejects 'one of --sites' "${place[@]}"
+rejects 'one of --sites' "${place[@]}" --sites "$DATA/sites.csv" --bounds 0:90,80:200
+rejects 'grid' "${place[@]}" --sites "$DATA/sites.csv" --grid 8x8
+rejects 'grid expects' "${place[@]}" --bounds 0:90,80:200 --grid 8
+rejects 'bounds expects' "${place[@]}" --bounds 0:90
+rejects 'no skin' "${place[@]}" --bounds 0:90,80:2000
+rejects 'rising' "${place[@]}" --bounds 90:0,80:200
+rejects 'nowhere' "${place[@]}" --painted nowhere.csv
+printf 'x_mm,y_mm,z_mm\n500,0,100\n500,50,100\n500,0,150\n' >"$in/region.csv"
+rejects 'region\.csv: point 0 lies' "${place[@]}" --painted "$in/region.csv"
+rejects 'quantum|quantise' "${place[@]}" --sites "$DATA/sites.csv" --quantise-mm 3
+rejects 'rect:24x24' measure "$MODEL" --sites "$DATA/sites.csv" --probe rect:24 -o out.csv
+rejects 'missing/' measure "$MODEL" --bounds 0:90,80:200 --save-sites missing/sites.csv
+
 rejects 'nan\.csv' predict "$MODEL" --measurements "$in/nan.csv" --sites "$DATA/sites.csv"
 
 # Model files: one flipped byte anywhere, a short file, another kind of file.
@@ -72,6 +104,21 @@ rejects 'missing/' fit "$DATA/indentation.csv" --surface "$in/skin.ply" --sites 
 # Recordings.
 rejects 'skin\.ply' replay "$in/skin.ply"
 rejects 'nowhere\.rec' replay nowhere.rec
+
+# Records and presets of sonde identify.
+columns=time_s,penetration_mm,slide_mm,normal_n
+printf '%s\n0,0,0,0\n' $columns >"$in/lacks.csv"
+rejects "lacks\\.csv:1.*tangential_n" identify "$MODEL" --ramp-hold "$in/lacks.csv" -o p.json
+printf '%s,tangential_n\n0,0,0,0,0\n0,0,0,0,0\n' $columns >"$in/still.csv"
+rejects 'still\.csv:3.*time_s' identify "$MODEL" --slide "$in/still.csv" -o p.json
+printf '%s,tangential_n\n0,0,0,0,0\n1,0,0,0,0\n' $columns >"$in/few.csv"
+rejects 'too short' identify "$MODEL" --ramp-hold "$in/few.csv" -o p.json
+rejects 'ramp-hold' identify "$MODEL" -o p.json
+rejects 'ramp-hold, slide' identify "$MODEL" --simulate tap --site 27 -o out.csv
+rejects 'no site 9999' identify "$MODEL" --simulate slide --site 9999 -o out.csv
+printf '{"format": "sonde-preset", "version": 1,\n"mu_static": -1}' >"$in/odd.json"
+rejects 'odd\.json:2: mu_static' press "$MODEL" --site 27 --depth-mm 2 --preset "$in/odd.json"
+rejects 'odd\.json:2: mu_static' run "$MODEL" --headless --seconds 1 --preset "$in/odd.json"
 
 # A port that another program holds.
 coproc HOLDER { "$HOLD_PORT"; }

@@ -27,6 +27,15 @@ gives "$press vein_area_ratio>=0.7" press "$MODEL" --site 27 --probe linear --fo
 gives "$press penetration_mm>=4.999 penetration_mm<=5.001" press "$MODEL" --site 27 --probe point \
   --depth-mm 5 --json
 
+gives "samples:integer samples>=400 normal_max_n:number" identify "$MODEL" --simulate ramp-hold \
+  --site 27 --probe point --depth-mm 4 --speed-mm-s 40 --hold-s 0.05 --noise-n 0.05 --noise-mm 0.05 \
+  -o ramp.csv --json
+ramp="damping.normal_damping_ms.value:number damping.normal_damping_ms.value>=15"
+ramp+=" damping.normal_damping_ms.value<=25 damping.stiffness_scale.value>=0.95"
+gives "$ramp damping.stiffness_scale.value<=1.05 damping.samples>=400" identify "$MODEL" \
+  --ramp-hold ramp.csv -o preset.json --json
+gives "$press" press "$MODEL" --site 27 --probe point --depth-mm 3 --preset preset.json --json
+
 gives "ticks:integer ticks>=1 deadline_misses:integer images:integer images>=1 hash:text" \
   run "$MODEL" --headless --seconds 1 --record a.rec --json
 [[ -s a.rec ]] || wrong "sonde run recorded nothing"

@@ -2,6 +2,7 @@
 // spread of site parameters, their roughness, and recovery of known parameters.
 #include "fit_test.h"
 
+#include "base/maths.h"
 #include "fit/press.h"
 #include "fit/refit.h"
 #include "fit/site_field.h"
@@ -16,6 +17,7 @@ static bundled shear_thigh(double fine_mm) {
   law.edge_stiffness_n_m = 0;
   law.shear_stiffness_n_m = 18;
   law.shear_limit = 0.9;
+  law.normal_exponent = 2;
   for (uint32_t s = 0; s < b.sites.count; ++s) {
     b.sites.sites[s].k0_n_m3 = 1.6e5 * (1 + 0.3 * sin(1.0 + s));
     b.sites.sites[s].xm_m = 0.042 + 0.006 * cos(2.0 * s);
@@ -26,18 +28,31 @@ static bundled shear_thigh(double fine_mm) {
   return b;
 }
 
-static sonde_patch_law law_of(const sonde_model *model) {
-  const sonde_surface_law *law = &model->law;
-  return (sonde_patch_law){model->k0_n_m3,   model->xm_m, law->shear_stiffness_n_m,
-                           law->shear_limit, law->guard,  law->tangential_stiffness_n_m3};
+// Logarithms of the model's fields, which a patch reads.
+typedef struct fields {
+  double *ln_k0, *ln_xm;
+} fields;
+
+static fields fields_of(const sonde_model *model) {
+  uint32_t n = model->surface.vertex_count;
+  fields f = {SONDE_NEW(double, n), SONDE_NEW(double, n)};
+  for (uint32_t i = 0; i < n; ++i) {
+    f.ln_k0[i] = log(model->k0_n_m3[i]);
+    f.ln_xm[i] = log(model->xm_m[i]);
+  }
+  return f;
 }
 
-static sonde_footprint footprint_of(const bundled *b, uint32_t site, int probe) {
-  sonde_footprint f;
-  assert_ok(sonde_footprint_create(b->model, &b->sites.sites[site], HALF_U[probe], HALF_V[probe],
-                                   SONDE_COVERAGE_CLIPPED, &f, NULL),
-            NULL);
-  return f;
+static void fields_clear(fields *f) {
+  sonde_free(f->ln_k0);
+  sonde_free(f->ln_xm);
+}
+
+static sonde_patch_law law_of(const sonde_model *model, const fields *f) {
+  const sonde_surface_law *law = &model->law;
+  return (sonde_patch_law){
+      f->ln_k0,         f->ln_xm,   law->normal_exponent,          law->shear_stiffness_n_m,
+      law->shear_limit, law->guard, law->tangential_stiffness_n_m3};
 }
 
 typedef struct bench {
@@ -46,26 +61,22 @@ typedef struct bench {
   double *s_m;
 } bench;
 
-static void bench_create(bench *t, const bundled *b, uint32_t site, int probe, double reach_m,
-                         bool hold) {
+static void bench_create(bench *t, const bundled *b, uint32_t site, int probe, double reach_m) {
   sonde_error error;
-  sonde_footprint f = footprint_of(b, site, probe);
-  assert_ok(sonde_patch_create(b->model, &f, b->sites.sites[site].normal, reach_m, hold, &t->patch,
-                               &error),
+  assert_ok(sonde_patch_create(b->model, &b->sites.sites[site], HALF_U[probe], HALF_V[probe],
+                               reach_m, &t->patch, &error),
             &error);
   assert_ok(sonde_patch_solver_create(&t->patch, 1, &t->solver, &error), &error);
-  sonde_patch_solver_use(&t->solver, &t->patch);
   t->s_m = SONDE_NEW(double, t->patch.place_count);
-  sonde_footprint_clear(&f);
 }
 
 static double bench_force(bench *t, const sonde_patch_law *law, double depth_m,
                           sonde_patch_gradient *gradient) {
   double force_n;
   sonde_error error;
-  assert_ok(sonde_patch_settle(&t->solver, law, depth_m, 1e-12, 100, t->s_m, &error), &error);
-  assert_ok(sonde_patch_force(&t->solver, law, depth_m, t->s_m, &force_n, gradient, &error),
-            &error);
+  sonde_patch_solver_use(&t->solver, &t->patch, law);
+  assert_ok(sonde_patch_settle(&t->solver, depth_m, 1e-12, 100, t->s_m, &error), &error);
+  assert_ok(sonde_patch_force(&t->solver, depth_m, t->s_m, &force_n, gradient, &error), &error);
   return force_n;
 }
 
@@ -75,61 +86,120 @@ static void bench_clear(bench *t) {
   sonde_free(t->s_m);
 }
 
-// Tangential springs stay on: they add a term in closed form. The 60 mm patch of the fit, too.
-static void scalar_equals_full_model_without_surface_springs(void **state) {
+// The dynamic model at rest gives the forces of the fit: without surface springs to rounding, with
+// the weak ones that a fitted model keeps within 0.1 %, and on the fit's 50 mm patch too.
+static void scalar_equals_full_model(void **state) {
   (void)state;
   bundled b = shear_thigh(4.0);
-  sonde_patch_law law = law_of(b.model);
-  sonde_press press;
-  assert_ok(sonde_press_create(b.model, 1e-7, 400, &press, NULL), NULL);
-  double worst_whole = 0, worst_patch = 0;
+  fields f = fields_of(b.model);
+  sonde_patch_law law = law_of(b.model, &f);
+  double worst_whole = 0, worst_patch = 0, worst_edges = 0,
+         kept = sonde_fit_def_default().kept_edge_n_m;
   for (int probe = 0; probe < 2; ++probe) {
     uint32_t site = probe ? 27 : 12;
-    sonde_footprint f = footprint_of(&b, site, probe);
     bench whole, patch;
-    bench_create(&whole, &b, site, probe, 1.0, false);
-    bench_create(&patch, &b, site, probe, 0.06, false);
-    assert_int_equal(whole.patch.place_count, b.model->surface.vertex_count + 1);
+    sonde_bonded bonded[2];
+    bench_create(&whole, &b, site, probe, 1.0);
+    bench_create(&patch, &b, site, probe, 0.05);
+    assert_true(whole.patch.free_count < b.model->surface.vertex_count);
     assert_true(patch.patch.place_count < b.model->surface.vertex_count / 2);
-    sonde_state_reset(press.state);
+    for (int edges = 0; edges < 2; ++edges) {
+      b.model->law.edge_stiffness_n_m = edges ? kept : 0;
+      assert_ok(sonde_bonded_create(b.model, &b.sites.sites[site], HALF_U[probe], HALF_V[probe],
+                                    1e-7, 400, &bonded[edges], NULL),
+                NULL);
+    }
     for (double depth = 0.005; depth < 0.021; depth += 0.005) {
-      double full = sonde_press_bonded(&press, &b.sites.sites[site], &f, depth);
+      double full = sonde_bonded_force(&bonded[0], depth);
       assert_true(isfinite(full));
       worst_whole = fmax(worst_whole, fabs(bench_force(&whole, &law, depth, NULL) / full - 1));
       worst_patch = fmax(worst_patch, fabs(bench_force(&patch, &law, depth, NULL) / full - 1));
+      worst_edges = fmax(worst_edges, fabs(sonde_bonded_force(&bonded[1], depth) / full - 1));
     }
     bench_clear(&whole);
     bench_clear(&patch);
-    sonde_footprint_clear(&f);
+    for (int edges = 0; edges < 2; ++edges) sonde_bonded_clear(&bonded[edges]);
   }
-  sonde_press_clear(&press);
-  print_message("scalar against full: whole skin %.2g, patch %.2g\n", worst_whole, worst_patch);
+  print_message("scalar against full: whole skin %.2g, patch %.2g; kept edges %.2g\n", worst_whole,
+                worst_patch, worst_edges);
   assert_true(worst_whole < 1e-5);
   assert_true(worst_patch < 1e-3);
+  assert_true(worst_edges < 1e-3);
+  fields_clear(&f);
   bundled_clear(&b);
 }
 
-// What lies beyond 60 mm hardly matters, held or cut off, at 30 mm depth; at 10 mm it does.
+// A footprint's force hardly depends on where its sides fall between the nodes: meshes of 3 and
+// 2 mm agree, which they do not when whole nodes are held.
+static void force_does_not_depend_on_the_mesh(void **state) {
+  (void)state;
+  double force[2][2];
+  for (int fine = 0; fine < 2; ++fine) {
+    bundled b = shear_thigh(fine ? 2.0 : 3.0);
+    fields f = fields_of(b.model);
+    sonde_patch_law law = law_of(b.model, &f);
+    for (int probe = 0; probe < 2; ++probe) {
+      bench t;
+      bench_create(&t, &b, 35, probe, 0.05);
+      assert_false(t.patch.coarse);
+      for (double depth = 0.004; depth < 0.017; depth += 0.004)
+        force[fine][probe] = bench_force(&t, &law, depth, NULL);
+      bench_clear(&t);
+    }
+    fields_clear(&f);
+    bundled_clear(&b);
+  }
+  double point = force[1][0] / force[0][0] - 1, linear = force[1][1] / force[0][1] - 1;
+  print_message("2 mm against 3 mm: point %.2g, linear %.2g\n", point, linear);
+  assert_true(fabs(point) < 0.04 && fabs(linear) < 0.01);
+}
+
+// The cut keeps the area of the skin, and the held faces are the footprint along the skin.
+static void cut_faces_are_the_footprint(void **state) {
+  (void)state;
+  bundled b = shear_thigh(3.0);
+  for (int probe = 0; probe < 2; ++probe) {
+    sonde_cut cut;
+    assert_ok(sonde_cut_create(b.model, &b.sites.sites[27], HALF_U[probe], HALF_V[probe], INFINITY,
+                               &cut, NULL),
+              NULL);
+    double held = 0, all = 0, skin = 0, nominal = 4 * HALF_U[probe] * HALF_V[probe];
+    for (uint32_t f = 0; f < cut.face_count; ++f) {
+      const uint32_t *v = cut.face[f];
+      sonde_vec3 x[3];
+      for (int k = 0; k < 3; ++k) x[k] = sonde_cut_point(b.model, &cut, v[k]);
+      double area = 0.5 * v_norm(v_cross(v_sub(x[1], x[0]), v_sub(x[2], x[0])));
+      all += area;
+      if (cut.held[v[0]] && cut.held[v[1]] && cut.held[v[2]]) held += area;
+    }
+    for (uint32_t i = 0; i < b.model->surface.vertex_count; ++i) skin += b.model->area_m2[i];
+    print_message("held area %.2f of %.2f mm2\n", held * 1e6, nominal * 1e6);
+    assert_near(all / skin, 1, 1e-9);
+    assert_near(held / nominal, 1, probe ? 0.02 : 0.12); // corners are cut straight
+    sonde_cut_clear(&cut);
+  }
+  bundled_clear(&b);
+}
+
+// What lies beyond the patch hardly matters at 30 mm depth; beyond 10 mm it does.
 static void rim_does_not_matter(void **state) {
   (void)state;
   bundled b = shear_thigh(4.0);
-  sonde_patch_law law = law_of(b.model);
-  double difference[2];
-  for (int near = 0; near < 2; ++near) {
-    double force[2], reach_m = near ? 0.01 : 0.06;
-    for (int hold = 0; hold < 2; ++hold) {
-      bench t;
-      bench_create(&t, &b, 35, 1, reach_m, hold);
-      for (double depth = 0.01; depth < 0.031; depth += 0.01)
-        force[hold] = bench_force(&t, &law, depth, NULL);
-      bench_clear(&t);
-    }
-    assert_true(force[1] > force[0]);
-    difference[near] = force[1] / force[0] - 1;
+  fields f = fields_of(b.model);
+  sonde_patch_law law = law_of(b.model, &f);
+  double force[3];
+  const double reach_m[3] = {1.0, 0.05, 0.01};
+  for (int k = 0; k < 3; ++k) {
+    bench t;
+    bench_create(&t, &b, 35, 1, reach_m[k]);
+    for (double depth = 0.01; depth < 0.031; depth += 0.01)
+      force[k] = bench_force(&t, &law, depth, NULL);
+    bench_clear(&t);
   }
-  print_message("held against cut rim: %.2g at 60 mm, %.2g at 10 mm\n", difference[0],
-                difference[1]);
-  assert_true(difference[0] < 3e-3 && difference[1] > 0.02);
+  print_message("cut rim: %.2g at 50 mm, %.2g at 10 mm\n", 1 - force[1] / force[0],
+                1 - force[2] / force[0]);
+  assert_true(fabs(1 - force[1] / force[0]) < 3e-3 && 1 - force[2] / force[0] > 0.02);
+  fields_clear(&f);
   bundled_clear(&b);
 }
 
@@ -137,31 +207,34 @@ static void rim_does_not_matter(void **state) {
 static double force_along(bench *t, const bundled *b, double h, const double direction[4],
                           double depth_m) {
   uint32_t n = b->model->surface.vertex_count;
-  double *k0 = SONDE_NEW(double, n), *xm = SONDE_NEW(double, n);
+  fields f = fields_of(b->model);
   for (uint32_t i = 0; i < n; ++i) {
-    k0[i] = b->model->k0_n_m3[i] * exp(h * direction[0] * sin(0.7 * i));
-    xm[i] = b->model->xm_m[i] * exp(h * direction[1] * cos(0.4 * i));
+    f.ln_k0[i] += h * direction[0] * sin(0.7 * i);
+    f.ln_xm[i] += h * direction[1] * cos(0.4 * i);
   }
-  sonde_patch_law law = law_of(b->model);
-  law.k0_n_m3 = k0;
-  law.xm_m = xm;
+  sonde_patch_law law = law_of(b->model, &f);
   law.shear_n_m *= exp(h * direction[2]);
   law.limit *= exp(h * direction[3]);
   double force_n = bench_force(t, &law, depth_m, NULL);
-  sonde_free(k0);
-  sonde_free(xm);
+  fields_clear(&f);
   return force_n;
 }
 
 static double by_adjoint(bench *t, const bundled *b, const double direction[4], double depth_m) {
   uint32_t n = t->patch.place_count;
   sonde_patch_gradient g = {SONDE_NEW(double, n), SONDE_NEW(double, n), 0, 0};
-  sonde_patch_law law = law_of(b->model);
+  fields f = fields_of(b->model);
+  sonde_patch_law law = law_of(b->model, &f);
   (void)bench_force(t, &law, depth_m, &g);
+  fields_clear(&f);
   double sum = direction[2] * g.by_ln_shear + direction[3] * g.by_ln_limit;
   for (uint32_t k = 0; k < n; ++k) {
-    sum += direction[0] * sin(0.7 * t->patch.node[k]) * g.by_ln_k0[k];
-    sum += direction[1] * cos(0.4 * t->patch.node[k]) * g.by_ln_xm[k];
+    const uint32_t *of = t->patch.parent[k];
+    double share = t->patch.share[k];
+    sum +=
+        direction[0] * g.by_ln_k0[k] * ((1 - share) * sin(0.7 * of[0]) + share * sin(0.7 * of[1]));
+    sum +=
+        direction[1] * g.by_ln_xm[k] * ((1 - share) * cos(0.4 * of[0]) + share * cos(0.4 * of[1]));
   }
   sonde_free(g.by_ln_k0);
   sonde_free(g.by_ln_xm);
@@ -175,7 +248,7 @@ static void adjoint_equals_finite_differences(void **state) {
       {1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}, {0.4, -0.6, 0.8, -0.3}};
   for (int probe = 0; probe < 2; ++probe) {
     bench t;
-    bench_create(&t, &b, 20, probe, 0.05, false);
+    bench_create(&t, &b, 20, probe, 0.05);
     for (double depth = 0.008; depth < 0.025; depth += 0.008)
       for (int d = 0; d < 5; ++d) {
         double adjoint = by_adjoint(&t, &b, direction[d], depth), h = 1e-4;
@@ -183,7 +256,7 @@ static void adjoint_equals_finite_differences(void **state) {
                              force_along(&t, &b, -h, direction[d], depth)) /
                             (2 * h);
         double scale = fmax(fabs(difference), 1e-3 * force_along(&t, &b, 0, direction[d], depth));
-        assert_near(adjoint / scale, difference / scale, 1e-5);
+        assert_near(adjoint / scale, difference / scale, 1e-4);
       }
     bench_clear(&t);
   }
@@ -271,8 +344,8 @@ static void recovery_create(recovery *r) {
   r->def = sonde_fit_def_default();
   assert_ok(sonde_fit_plan_create(&r->b.sites, &r->b.m, &r->plan, &error), &error);
   r->force_n = SONDE_NEW(double, r->b.m.count);
-  assert_ok(sonde_refit_create(r->b.model, &r->b.sites, &r->b.m, &r->plan, &r->def, 0.06, false,
-                               &r->refit, &error),
+  assert_ok(sonde_refit_create(r->b.model, &r->b.sites, &r->b.m, &r->plan, &r->def, 0.05, &r->refit,
+                               &error),
             &error);
   for (uint32_t s = 0; s < KEPT; ++s) {
     r->truth[s] = log(1.5e5) + 0.08 * (s % 3) - 0.05 * (s / 3);
@@ -337,7 +410,7 @@ static void site_jacobian_equals_finite_differences(void **state) {
       double slope = (ahead[row] - behind[row]) / (2 * h);
       worst = fmax(worst, fabs(slope - jacobian[(size_t)row * n + some[k]]) / r.force_n[row]);
     }
-    assert_true(worst < 3e-4);
+    assert_true(worst < 1e-3);
   }
   sonde_free(jacobian);
   sonde_free(ahead);
@@ -371,7 +444,9 @@ static void progress_cancels_stage_3(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(scalar_equals_full_model_without_surface_springs),
+      cmocka_unit_test(scalar_equals_full_model),
+      cmocka_unit_test(force_does_not_depend_on_the_mesh),
+      cmocka_unit_test(cut_faces_are_the_footprint),
       cmocka_unit_test(rim_does_not_matter),
       cmocka_unit_test(adjoint_equals_finite_differences),
       cmocka_unit_test(basis_is_the_models_interpolation),

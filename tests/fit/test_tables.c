@@ -1,6 +1,9 @@
 // Site and measurement files: what is read, what is refused and how it is said.
 #include "fit_test.h"
 
+#include "base/base.h"
+#include "fit/fit_inside.h"
+
 #define HEADER "site,probe,x_mm,y_mm,z_mm,nx,ny,nz,penetration_mm,force_n\n"
 #define SITE_HEADER "site,x_mm,y_mm,z_mm,nx,ny,nz,ux,uy,uz,vx,vy,vz,fat_mm\n"
 
@@ -25,6 +28,134 @@ static void reads_columns_in_any_order(void **state) {
   assert_near(m.position_m[0].x, 10e-3, 1e-17);
   assert_near(m.position_m[0].z, 30e-3, 1e-17);
   assert_near(m.normal[0].z, 1.0, 0);
+  sonde_measurements_clear(&m);
+}
+
+// Any order of rows and single negative forces are as good as others; rectangles are probes.
+static void reads_rows_in_any_order(void **state) {
+  (void)state;
+  const char *path = write_temporary(HEADER "1,rect:24x7.5,0,0,0,0,0,1,4,3\n"
+                                            "0,point,0,0,0,0,0,1,2,-0.02\n"
+                                            "1,rect:24x7.5,0,0,0,0,0,1,2,1\n");
+  sonde_measurements m;
+  sonde_error error;
+  assert_ok(sonde_measurements_load(path, NULL, &m, &error), &error);
+  assert_int_equal(m.count, 3);
+  assert_string_equal(m.data[0].probe, "rect:24x7.5");
+  assert_near(m.data[1].force_n, -0.02, 0);
+  snprintf(m.remark, sizeof m.remark, "first\nsecond,line");
+  assert_ok(sonde_measurements_save(path, &m, &error), &error);
+  sonde_measurements_clear(&m);
+  assert_ok(sonde_measurements_load(path, NULL, &m, &error), &error);
+  assert_int_equal(m.count, 3);
+  assert_int_equal(m.remark[0], 0);
+  sonde_measurements_clear(&m);
+}
+
+// ---- what a fit leaves out ----------------------------------------------------------------
+
+typedef struct remarks {
+  uint32_t infos, warnings;
+  char last[2][256]; // of each level
+} remarks;
+
+static void keep_remark(sonde_log_level level, const char *message, void *user) {
+  remarks *r = user;
+  ++*(level == SONDE_LOG_INFO ? &r->infos : &r->warnings);
+  snprintf(r->last[level == SONDE_LOG_WARNING], sizeof r->last[0], "%s", message);
+}
+
+// Loads a table for sites 0..3 at the origin and plans a fit.
+static sonde_status plan_of(const char *text, remarks *r, sonde_measurements *m,
+                            sonde_fit_plan *plan, sonde_error *error) {
+  static sonde_site site[4] = {{.id = 0}, {.id = 1}, {.id = 2}, {.id = 3}};
+  static double fat_m[4];
+  const sonde_site_table sites = {4, site, fat_m};
+  *r = (remarks){0};
+  assert_ok(sonde_measurements_load(write_temporary(text), &sites, m, error), error);
+  sonde_set_log(keep_remark, r);
+  sonde_status status = sonde_fit_plan_create(&sites, m, plan, error);
+  sonde_set_log(NULL, NULL);
+  return status;
+}
+
+#define AT(site, probe, mm, n) #site "," #probe ",0,0,0,0,0,1," #mm "," #n "\n"
+#define CURVE(site, probe) AT(site, probe, 2, 1) AT(site, probe, 4, 3) AT(site, probe, 6, 6)
+
+static void short_curves_are_left_out_and_counted(void **state) {
+  (void)state;
+  remarks r;
+  sonde_measurements m;
+  sonde_fit_plan plan;
+  sonde_error error;
+  const char *text = HEADER AT(2, point, 2, 1) CURVE(0, point) CURVE(1, linear) AT(2, point, 4, 3)
+      AT(3, square, 0, 0) AT(3, square, 2, 1) AT(3, square, 4, 1);
+  assert_ok(plan_of(text, &r, &m, &plan, &error), &error);
+  assert_int_equal(plan.excluded_curves, 2);
+  assert_int_equal(plan.excluded_rows, 5);
+  assert_int_equal(plan.row_count, 6);
+  assert_int_equal(plan.curve_count, 2);
+  assert_int_equal(plan.site_count, 2);
+  assert_int_equal(plan.probe_count, 2); // the square went with its only curve
+  assert_near(plan.mean_force_n[0], 10.0 / 3, 1e-12);
+  assert_int_equal(r.warnings, 1);
+  assert_non_null(strstr(r.last[1], "2 curves (5 rows)"));
+  assert_non_null(strstr(r.last[1], "site 2, probe point"));
+  for (uint32_t k = 0; k < plan.row_count; ++k) assert_true(m.data[plan.row[k]].site < 2);
+  sonde_fit_plan_clear(&plan);
+  sonde_measurements_clear(&m);
+}
+
+static void curves_without_force_are_left_out(void **state) {
+  (void)state;
+  remarks r;
+  sonde_measurements m;
+  sonde_fit_plan plan;
+  sonde_error error;
+  const char *text = HEADER CURVE(0, point) CURVE(0, linear) AT(1, point, 2, -1)
+      AT(1, point, 4, 0.5) AT(1, point, 6, 0.5);
+  assert_ok(plan_of(text, &r, &m, &plan, &error), &error);
+  assert_int_equal(plan.excluded_rows, 3);
+  assert_non_null(strstr(r.last[1], "not positive"));
+  sonde_fit_plan_clear(&plan);
+  sonde_measurements_clear(&m);
+}
+
+static void nothing_left_is_an_error(void **state) {
+  (void)state;
+  remarks r;
+  sonde_measurements m;
+  sonde_fit_plan plan;
+  sonde_error error;
+  const char *text = HEADER AT(0, point, 2, 1) AT(1, point, 2, 1) AT(1, point, 4, 1);
+  assert_int_equal(plan_of(text, &r, &m, &plan, &error), SONDE_ARGUMENT);
+  assert_says(&error, "none of the 2 curves");
+  assert_null(plan.row);
+  sonde_measurements_clear(&m);
+}
+
+static void order_and_a_lone_probe_are_remarked(void **state) {
+  (void)state;
+  remarks r;
+  sonde_measurements m;
+  sonde_fit_plan plan;
+  sonde_error error;
+  const char *text = HEADER AT(0, point, 6, 6) AT(1, point, 2, 1) AT(0, point, 4, 3)
+      AT(1, point, 4, 2) AT(0, point, 2, 1) AT(1, point, 6, 4);
+  assert_ok(plan_of(text, &r, &m, &plan, &error), &error);
+  assert_int_equal(plan.unsorted_rows, 2);
+  assert_int_equal(plan.excluded_rows, 0);
+  assert_int_equal(r.infos, 1);
+  assert_non_null(strstr(r.last[0], "2 measurements"));
+  assert_int_equal(r.warnings, 1);
+  assert_non_null(strstr(r.last[1], "one probe only (point)"));
+  for (uint32_t k = 1; k < 3; ++k)
+    assert_true(m.data[plan.row[k]].penetration_m > m.data[plan.row[k - 1]].penetration_m);
+  sonde_fit_plan_clear(&plan);
+  sonde_measurements_clear(&m);
+  assert_ok(plan_of(HEADER CURVE(0, point) CURVE(0, linear), &r, &m, &plan, &error), &error);
+  assert_int_equal(r.infos + r.warnings, 0);
+  sonde_fit_plan_clear(&plan);
   sonde_measurements_clear(&m);
 }
 
@@ -62,6 +193,13 @@ static const bad_file BAD_MEASUREMENTS[] = {
      {":4:", "repeats line 2", "penetration_mm 2"}},
     {HEADER "9,point,0,0,0,0,0,1,2,1\n", SONDE_FORMAT, {":2:", "site 9", "not in the sites file"}},
     {HEADER "0,point,40,0,0,0,0,1,2,1\n", SONDE_MISMATCH, {":2:", "40.0 mm", "x_mm"}},
+    {HEADER "0,rect:24,0,0,0,0,0,1,2,1\n", SONDE_FORMAT, {":2:", "'rect:24'", "rect:AxB"}},
+    {HEADER "0,rect:24.000000000x24.00000000,0,0,0,0,0,1,2,1\n",
+     SONDE_FORMAT,
+     {":2:", "23", "rect"}},
+    {HEADER "0,point,0,0,0,0,0,1,2,-1\n0,point,0,0,0,0,0,1,4,-3\n",
+     SONDE_FORMAT,
+     {"force_n", "mean is -2 N", "sign"}},
 };
 
 static void refuses_bad_measurements(void **state) {
@@ -197,6 +335,11 @@ static int remove_temporary(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(reads_columns_in_any_order),
+      cmocka_unit_test(reads_rows_in_any_order),
+      cmocka_unit_test(short_curves_are_left_out_and_counted),
+      cmocka_unit_test(curves_without_force_are_left_out),
+      cmocka_unit_test(nothing_left_is_an_error),
+      cmocka_unit_test(order_and_a_lone_probe_are_remarked),
       cmocka_unit_test(refuses_bad_measurements),
       cmocka_unit_test(refuses_bad_sites),
       cmocka_unit_test(refuses_absent_files),

@@ -161,6 +161,33 @@ static void test_probes(void **state) {
   assert_null(sonde_probe_names()[4]);
 }
 
+// rect:AxB is a box of those sides; the built-in square is one of them.
+static void test_rectangle_probe(void **state) {
+  (void)state;
+  sonde_probe square = make_probe("square"), same = make_probe("rect:24x24");
+  assert_true(same.rectangular);
+  assert_near(same.half_x_m, square.half_x_m, 1e-15);
+  assert_near(same.half_y_m, square.half_y_m, 1e-15);
+  sonde_mass big, small;
+  assert_ok(sonde_mesh_mass(&square.body.hull, 1, &big, &shape_error));
+  assert_ok(sonde_mesh_mass(&same.body.hull, 1, &small, &shape_error));
+  assert_near(small.mass_kg / big.mass_kg, 1, 1e-12);
+  sonde_probe odd = make_probe("rect:40x7.5");
+  assert_near(odd.half_x_m, 20e-3, 1e-15);
+  assert_near(odd.half_y_m, 3.75e-3, 1e-15);
+  assert_string_equal(odd.name, "rect:40x7.5");
+  sonde_probe_clear(&square);
+  sonde_probe_clear(&same);
+  sonde_probe_clear(&odd);
+  const char *const bad[] = {"rect:",      "rect:24",      "rect:24x",    "rect:0x24",
+                             "rect:24x-1", "rect:24x24mm", "rect:24x1e9", "rect:nanx3"};
+  for (size_t k = 0; k < sizeof bad / sizeof *bad; ++k) {
+    sonde_error error;
+    assert_int_equal(sonde_probe_create(bad[k], &same, &error), SONDE_NOT_FOUND);
+    assert_non_null(strstr(error.message, "rect:24x24"));
+  }
+}
+
 static void test_sphere_probe(void **state) {
   (void)state;
   sonde_probe p = make_probe("sphere");
@@ -255,11 +282,12 @@ static void test_real_probe(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_random_hulls), cmocka_unit_test(test_grid_hulls),
-      cmocka_unit_test(test_flat_points),  cmocka_unit_test(test_not_convex),
-      cmocka_unit_test(test_support),      cmocka_unit_test(test_probes),
-      cmocka_unit_test(test_sphere_probe), cmocka_unit_test(test_unknown_probe),
-      cmocka_unit_test(test_file_probe),   cmocka_unit_test(test_real_probe),
+      cmocka_unit_test(test_random_hulls),  cmocka_unit_test(test_grid_hulls),
+      cmocka_unit_test(test_flat_points),   cmocka_unit_test(test_not_convex),
+      cmocka_unit_test(test_support),       cmocka_unit_test(test_probes),
+      cmocka_unit_test(test_sphere_probe),  cmocka_unit_test(test_rectangle_probe),
+      cmocka_unit_test(test_unknown_probe), cmocka_unit_test(test_file_probe),
+      cmocka_unit_test(test_real_probe),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

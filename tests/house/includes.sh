@@ -3,7 +3,7 @@
 # include public headers only.
 set -euo pipefail
 root=$1
-rooms=(base geometry sparse tissue world fit interior echo haptics exam stream)
+rooms=(base geometry sparse tissue world fit robot identify report interior echo haptics exam stream)
 bad=0
 
 rank() {

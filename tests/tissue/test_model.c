@@ -104,7 +104,8 @@ static void file_returns_the_same_model(void **state) {
   assert_memory_equal(a->normal, b->normal, n * sizeof(sonde_vec3));
   assert_memory_equal(a->k0_n_m3, b->k0_n_m3, n * sizeof(double));
   assert_memory_equal(a->bone_depth_m, b->bone_depth_m, n * sizeof(double));
-  assert_memory_equal(a->edge_dual_m, b->edge_dual_m, a->topology.edge_count * sizeof(double));
+  assert_memory_equal(a->face_half_cotangent, b->face_half_cotangent,
+                      a->surface.face_count * sizeof *a->face_half_cotangent);
   assert_memory_equal(&a->law, &b->law, sizeof a->law);
   assert_memory_equal(a->data, b->data, sizeof data);
   assert_memory_equal(&a->vein.point[1], &b->vein.point[1], sizeof a->vein.point[1]);

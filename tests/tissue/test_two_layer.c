@@ -181,12 +181,20 @@ static void part_equals_whole(void **state) {
     if (fmax(b.model->surface.vertices[p[0]].x, b.model->surface.vertices[p[1]].x) >= 0.02)
       edges[edge_count++] = e;
   }
+  uint32_t faces[256], face_count = 0;
+  for (uint32_t f = 0; f < b.model->surface.face_count; ++f) {
+    const uint32_t *v = b.model->surface.faces[f];
+    const sonde_vec3 *x = b.model->surface.vertices;
+    assert_true(face_count < SONDE_COUNT_OF(faces));
+    if (fmax(x[v[0]].x, fmax(x[v[1]].x, x[v[2]].x)) >= 0.02) faces[face_count++] = f;
+  }
   evaluate(&b, 1, 1, 1);
   sonde_vec3 whole[66];
   sonde_mat3 diagonal[66];
   memcpy(whole, b.force, sizeof whole);
   memcpy(diagonal, b.matrix->diagonal, sizeof diagonal);
-  const sonde_tissue_part part = {rows, row_count, rim, rim_count, edges, edge_count};
+  const sonde_tissue_part part = {rows,  row_count,  rim,   rim_count,
+                                  edges, edge_count, faces, face_count};
   const sonde_tissue_scales scales = {1, 1, 1};
   sonde_tissue_linearise(b.model, &part, b.x, b.v, &scales, b.force, b.product, b.matrix,
                          b.scratch);

@@ -1,0 +1,307 @@
+// Levenberg-Marquardt over forward simulations.
+// simulate:     one parameter vector on one record, an item of the parallel loop.
+// simulate_all: several vectors on all records.
+// weigh:        Huber weights about the scale of the residuals.
+// normal_equations, solve_small: at most four unknowns.
+// descend:      a damped step, tried and accepted or refused.
+// judge:        covariance and sensitivities at the end.
+//
+// A weak prior of one standard deviation PRIOR about the start keeps a parameter that the records
+// do not hold where it was; its interval then says so.
+#include "identify/inverse.h"
+
+#include "base/maths.h"
+#include "fit/parallel.h"
+
+#include <string.h>
+
+enum { P = SONDE_INVERSE_PARAMETERS, VECTORS = P + 1 };
+
+static const double PRIOR = 2.0;   // e-folds
+static const double LONGEST = 0.5; // step, e-folds
+
+typedef struct workspace {
+  sonde_inverse *in;
+  sonde_drive *drive;        // [records]
+  uint32_t *first;           // [records + 1] residuals before each record
+  double *residual[VECTORS]; // [residuals] per parameter vector
+  double theta[VECTORS][P];
+  double start[P];
+  double *weight; // [residuals]
+  uint32_t residuals;
+  double noise; // robust scale of the residuals
+} workspace;
+
+static sonde_status simulate(void *user, uint32_t worker, uint32_t item, const atomic_bool *stop,
+                             sonde_error *error) {
+  (void)worker;
+  workspace *w = user;
+  uint32_t r = item % w->in->record_count, vector = item / w->in->record_count;
+  const sonde_motion_record *record = &w->in->records[r];
+  sonde_surface_law law = w->in->model->law;
+  sonde_world_def def = w->in->options->world;
+  double scale = 1;
+  w->in->apply(w->theta[vector], &law, &def, &scale);
+  sonde_model model;
+  double *force = SONDE_NEW(double, 2 * (size_t)record->count);
+  sonde_status status = sonde_model_borrow(w->in->model, scale, &model, error);
+  if (!status && !force) status = sonde_fail_memory(error);
+  if (!status) {
+    model.law = law;
+    sonde_law_scale(&model.law, scale);
+    status = sonde_drive_run(&w->drive[r], &model, &def, stop, NULL, force, force + record->count,
+                             error);
+  }
+  if (!status)
+    w->in->compare(record, &w->drive[r], force, force + record->count,
+                   w->residual[vector] + w->first[r]);
+  sonde_model_return(&model);
+  sonde_free(force);
+  return status;
+}
+
+// Vectors `from` to `to` (exclusive) of theta.
+typedef struct batch {
+  workspace *w;
+  uint32_t from;
+} batch;
+
+static sonde_status simulate_item(void *user, uint32_t worker, uint32_t item,
+                                  const atomic_bool *stop, sonde_error *error) {
+  const batch *b = user;
+  return simulate(b->w, worker, item + b->from * b->w->in->record_count, stop, error);
+}
+
+static sonde_status simulate_all(workspace *w, uint32_t from, uint32_t to, const char *what,
+                                 sonde_error *error) {
+  SONDE_ASSERT(from < to && to <= VECTORS);
+  uint32_t items = (to - from) * w->in->record_count;
+  batch b = {w, from};
+  w->in->simulations += items;
+  return sonde_parallel_run(items, sonde_parallel_workers(w->in->options->threads, items),
+                            simulate_item, &b, w->in->progress, what, error);
+}
+
+static int compare_reals(const void *a, const void *b) {
+  double x = *(const double *)a, y = *(const double *)b;
+  return (x > y) - (x < y);
+}
+
+// Scale from the median of |r| (samples that do not count are 0); beyond 2.5 of it a residual
+// counts as that much only.
+static void weigh(workspace *w) {
+  for (uint32_t k = 0; k < w->residuals; ++k) w->weight[k] = fabs(w->residual[0][k]);
+  qsort(w->weight, w->residuals, sizeof *w->weight, compare_reals);
+  uint32_t first = 0;
+  while (first + 1 < w->residuals && !(w->weight[first] > 0)) ++first;
+  w->noise = fmax(1e-9, w->weight[first + (w->residuals - first) / 2] / 0.67449);
+  double most = 2.5 * w->noise;
+  for (uint32_t k = 0; k < w->residuals; ++k) {
+    double size = fabs(w->residual[0][k]);
+    w->weight[k] = size > most ? most / size : 1;
+  }
+}
+
+// Huber's loss in units of the scale squared, plus the prior.
+static double loss(const workspace *w, uint32_t vector) {
+  double sum = 0, most = 2.5;
+  for (uint32_t k = 0; k < w->residuals; ++k) {
+    double x = fabs(w->residual[vector][k]) / w->noise;
+    sum += x > most ? most * (x - 0.5 * most) : 0.5 * x * x;
+  }
+  for (uint32_t p = 0; p < w->in->parameter_count; ++p) {
+    double away = (w->theta[vector][p] - w->start[p]) / PRIOR;
+    sum += 0.5 * away * away;
+  }
+  return sum;
+}
+
+typedef struct normal_equations {
+  double a[P][P], b[P];
+} normal_equations;
+
+static double slope_of(const workspace *w, uint32_t p, uint32_t k) {
+  return (w->residual[1 + p][k] - w->residual[0][k]) / (w->theta[1 + p][p] - w->theta[0][p]);
+}
+
+static void build(const workspace *w, normal_equations *e) {
+  uint32_t n = w->in->parameter_count;
+  *e = (normal_equations){0};
+  for (uint32_t k = 0; k < w->residuals; ++k) {
+    double j[P], weight = w->weight[k] / (w->noise * w->noise);
+    for (uint32_t p = 0; p < n; ++p) j[p] = slope_of(w, p, k);
+    for (uint32_t p = 0; p < n; ++p) {
+      e->b[p] -= weight * j[p] * w->residual[0][k];
+      for (uint32_t q = 0; q < n; ++q) e->a[p][q] += weight * j[p] * j[q];
+    }
+  }
+  for (uint32_t p = 0; p < n; ++p) {
+    e->a[p][p] += 1 / (PRIOR * PRIOR);
+    e->b[p] -= (w->theta[0][p] - w->start[p]) / (PRIOR * PRIOR);
+  }
+}
+
+// Gauss-Jordan of the positive definite a + damping diag(a): x = inverse b, and the inverse.
+static void solve_small(const normal_equations *e, uint32_t n, double damping, double *x,
+                        double inverse[P][P]) {
+  double m[P][2 * P] = {{0}};
+  for (uint32_t p = 0; p < n; ++p) {
+    for (uint32_t q = 0; q < n; ++q) m[p][q] = e->a[p][q] * (p == q ? 1 + damping : 1);
+    m[p][n + p] = 1;
+  }
+  for (uint32_t p = 0; p < n; ++p) {
+    double pivot = m[p][p];
+    SONDE_ASSERT(pivot > 0);
+    for (uint32_t q = 0; q < 2 * n; ++q) m[p][q] /= pivot;
+    for (uint32_t r = 0; r < n; ++r) {
+      double factor = m[r][p];
+      for (uint32_t q = 0; r != p && q < 2 * n; ++q) m[r][q] -= factor * m[p][q];
+    }
+  }
+  for (uint32_t p = 0; p < n; ++p) {
+    x[p] = 0;
+    for (uint32_t q = 0; q < n; ++q) {
+      x[p] += m[p][n + q] * e->b[q];
+      if (inverse) inverse[p][q] = m[p][n + q];
+    }
+  }
+}
+
+// Vector 1 + p differs from vector 0 in parameter p, away from a bound.
+static sonde_status differentiate(workspace *w, sonde_error *error) {
+  for (uint32_t p = 0; p < w->in->parameter_count; ++p) {
+    memcpy(w->theta[1 + p], w->theta[0], sizeof w->theta[0]);
+    bool up = w->theta[0][p] + w->in->step[p] <= w->in->high[p];
+    w->theta[1 + p][p] += up ? w->in->step[p] : -w->in->step[p];
+  }
+  return simulate_all(w, 1, 1 + w->in->parameter_count, "sensitivities", error);
+}
+
+static void swap_vectors(workspace *w, uint32_t a, uint32_t b) {
+  double theta[P], *residual = w->residual[a];
+  memcpy(theta, w->theta[a], sizeof theta);
+  memcpy(w->theta[a], w->theta[b], sizeof theta);
+  memcpy(w->theta[b], theta, sizeof theta);
+  w->residual[a] = w->residual[b];
+  w->residual[b] = residual;
+}
+
+// The trial takes the place of the first derivative vector, which is made anew afterwards.
+static sonde_status descend(workspace *w, double *damping, bool *done, bool *stale,
+                            sonde_error *error) {
+  normal_equations e;
+  build(w, &e);
+  double before = loss(w, 0);
+  for (int tries = 0; tries < 4; ++tries) {
+    double step[P], trial[P], way = 0, gain = 0;
+    solve_small(&e, w->in->parameter_count, *damping, step, NULL);
+    memcpy(trial, w->theta[0], sizeof trial);
+    for (uint32_t p = 0; p < w->in->parameter_count; ++p) {
+      double to = w->theta[0][p] + clamp(step[p], -LONGEST, LONGEST);
+      trial[p] = clamp(to, w->in->low[p], w->in->high[p]);
+      way = fmax(way, fabs(trial[p] - w->theta[0][p]) / w->in->step[p]);
+      gain += 0.5 * e.b[p] * (trial[p] - w->theta[0][p]);
+    }
+    // Nothing to gain but what noise gives: the derivatives stay those of theta[0].
+    *done = way < 0.05 || gain < 0.05;
+    if (*done) return SONDE_OK;
+    memcpy(w->theta[1], trial, sizeof trial);
+    *stale = true;
+    sonde_status status = simulate_all(w, 1, 2, "trial", error);
+    if (status) return status;
+    if (loss(w, 1) < before) {
+      *done = before - loss(w, 1) < 0.05;
+      *damping *= 0.1;
+      swap_vectors(w, 0, 1);
+      return SONDE_OK;
+    }
+    *damping = fmax(10 * *damping, 0.1);
+  }
+  *done = true; // no better point within the noise of the forward model
+  return SONDE_OK;
+}
+
+static void judge(workspace *w) {
+  sonde_inverse *in = w->in;
+  normal_equations e;
+  double unused[P], sum = 0;
+  weigh(w);
+  build(w, &e);
+  solve_small(&e, in->parameter_count, 0, unused, in->covariance);
+  for (uint32_t p = 0; p < in->parameter_count; ++p) {
+    double squares = 0;
+    for (uint32_t k = 0; k < w->residuals; ++k) squares += slope_of(w, p, k) * slope_of(w, p, k);
+    in->sensitivity[p] = sqrt(squares / w->residuals);
+  }
+  for (uint32_t k = 0; k < w->residuals; ++k) sum += w->residual[0][k] * w->residual[0][k];
+  in->rms = sqrt(sum / w->residuals);
+}
+
+static sonde_status prepare(workspace *w, sonde_error *error) {
+  sonde_inverse *in = w->in;
+  w->drive = SONDE_NEW(sonde_drive, in->record_count);
+  w->first = SONDE_NEW(uint32_t, in->record_count + 1);
+  if (!w->drive || !w->first) return sonde_fail_memory(error);
+  in->samples = 0;
+  for (uint32_t r = 0; r < in->record_count; ++r) {
+    sonde_status status = sonde_drive_from_record(in->model, &in->records[r], &w->drive[r], error);
+    if (status) return status;
+    w->first[r + 1] = w->first[r] + in->count(&in->records[r], &w->drive[r]);
+    in->samples += in->records[r].count;
+  }
+  w->residuals = w->first[in->record_count];
+  if (w->residuals <= in->parameter_count)
+    return sonde_fail(error, SONDE_ARGUMENT, "the records give %u values for %u parameters",
+                      w->residuals, in->parameter_count);
+  w->weight = SONDE_NEW(double, w->residuals);
+  bool ok = w->weight != NULL;
+  for (uint32_t v = 0; v <= in->parameter_count; ++v) {
+    w->residual[v] = SONDE_NEW(double, w->residuals);
+    ok &= w->residual[v] != NULL;
+  }
+  memcpy(w->theta[0], in->theta, sizeof in->theta);
+  memcpy(w->start, in->theta, sizeof in->theta);
+  return ok ? SONDE_OK : sonde_fail_memory(error);
+}
+
+static void clear(workspace *w) {
+  for (uint32_t r = 0; w->drive && r < w->in->record_count; ++r) sonde_drive_clear(&w->drive[r]);
+  for (uint32_t v = 0; v < VECTORS; ++v) sonde_free(w->residual[v]);
+  sonde_free(w->drive);
+  sonde_free(w->first);
+  sonde_free(w->weight);
+}
+
+sonde_status sonde_inverse_solve(sonde_inverse *in, sonde_error *error) {
+  SONDE_ASSERT(in->parameter_count >= 1 && in->parameter_count <= P && in->record_count > 0);
+  workspace w = {.in = in};
+  double damping = 1e-3;
+  sonde_status status = prepare(&w, error);
+  if (!status) status = simulate_all(&w, 0, 1, "first simulation", error);
+  bool stale = true;
+  for (in->converged = false; !status; in->iterations++) {
+    if (stale) status = differentiate(&w, error);
+    if (status || in->converged || in->iterations >= in->options->max_iterations) break;
+    weigh(&w);
+    stale = false;
+    status = descend(&w, &damping, &in->converged, &stale, error);
+  }
+  if (!status) {
+    judge(&w);
+    memcpy(in->theta, w.theta[0], sizeof in->theta);
+    if (!in->converged && in->options->max_iterations > 0)
+      status = sonde_fail(error, SONDE_CONVERGENCE,
+                          "no end after %u iterations, RMS of the residuals %g", in->iterations,
+                          in->rms);
+  }
+  clear(&w);
+  return status;
+}
+
+sonde_estimate sonde_inverse_estimate(const sonde_inverse *in, uint32_t p) {
+  SONDE_ASSERT(p < in->parameter_count);
+  const double normal_95 = 1.959964;
+  double sd = sqrt(in->covariance[p][p]), value = exp(in->theta[p]);
+  return (sonde_estimate){value, value * exp(-normal_95 * sd), value * exp(normal_95 * sd), sd,
+                          normal_95 * sd < log(1.5)};
+}

@@ -1,0 +1,228 @@
+// check:        ranges of a protocol.
+// find_depth:   depth of a static force, by settling deeper and deeper.
+// plan_ramps:   knots of ramp-and-hold. plan_slides: knots of the slide.
+// sample:       the plan driven over the model, sensors with noise.
+#include "base/maths.h"
+#include "base/random.h"
+#include "fit/press.h"
+#include "identify/forward.h"
+
+#include <string.h>
+
+enum {
+  MOST_ROUNDS = 8, // to and fro at one speed
+  MOST_KNOTS = 5 * SONDE_PROTOCOL_SPEEDS * MOST_ROUNDS + 8,
+  MOST_SAMPLES = 1000000
+};
+static const double LEAD_M = 1e-3;       // the probe waits this far above the skin
+static const double APPROACH_M_S = 0.05; // speed of pressing in and out around a slide
+static const double DEEPEST_M = 0.06;
+
+sonde_protocol sonde_protocol_default(sonde_protocol_kind kind) {
+  sonde_protocol p = {.kind = kind,
+                      .probe = "linear",
+                      .axis = 'u',
+                      .depth_m = 0.012,
+                      .speed_m_s = {0.02, 0.04, 0.08},
+                      .speed_count = 3,
+                      .hold_s = 0.2,
+                      .slide_m = 0.012,
+                      .rate_hz = 1000,
+                      .seed = 1};
+  if (kind == SONDE_PROTOCOL_RAMP_HOLD) return p;
+  const double speeds[] = {0.01, 0.02, 0.06};
+  memcpy(p.speed_m_s, speeds, sizeof speeds);
+  p.speed_count = 3;
+  p.depth_m = 0.005;
+  return p;
+}
+
+static sonde_status check(const sonde_protocol *p, double dt_s, sonde_error *error) {
+  const struct {
+    const char *name;
+    double value, low, high;
+  } range[] = {{"depth_m", p->depth_m, 1e-4, DEEPEST_M},
+               {"force_n", p->force_n, 0, 200},
+               {"speed_count", p->speed_count, 1, SONDE_PROTOCOL_SPEEDS},
+               {"hold_s", p->hold_s, 0.02, 60},
+               {"slide_m", p->slide_m, 1e-3, 0.1},
+               {"rate_hz", p->rate_hz, 50, 1 / dt_s + 1e-6},
+               {"noise_force_n", p->noise_force_n, 0, 100},
+               {"noise_position_m", p->noise_position_m, 0, 0.01}};
+  for (size_t k = 0; k < SONDE_COUNT_OF(range); ++k)
+    if (!(range[k].value >= range[k].low && range[k].value <= range[k].high))
+      return sonde_fail(error, SONDE_ARGUMENT, "%s is %g, expected %g to %g", range[k].name,
+                        range[k].value, range[k].low, range[k].high);
+  for (uint32_t k = 0; k < p->speed_count; ++k)
+    if (!(p->speed_m_s[k] >= 1e-3 && p->speed_m_s[k] <= 1))
+      return sonde_fail(error, SONDE_ARGUMENT, "speed %g m/s, expected 0.001 to 1",
+                        p->speed_m_s[k]);
+  return SONDE_OK;
+}
+
+// Steps of 2 mm to a bracket, then bisection to 10 um; the force grows with depth.
+static sonde_status find_depth(const sonde_model *model, const sonde_drive *drive, double force_n,
+                               double *depth_m, sonde_error *error) {
+  sonde_press press;
+  sonde_status status = sonde_press_create(model, 1e-6, 300, &press, error);
+  if (status) return status;
+  double low = 0, high = 0, reached = 0;
+  while (reached < force_n && high < DEEPEST_M) {
+    low = high;
+    high += 2e-3;
+    reached = sonde_press_probe(&press, drive->site, &drive->probe, high);
+    if (isnan(reached)) break;
+  }
+  bool found = reached >= force_n;
+  while (found && high - low > 1e-5) {
+    double middle = 0.5 * (low + high);
+    double f = sonde_press_probe(&press, drive->site, &drive->probe, middle);
+    if (f < force_n)
+      low = middle;
+    else
+      high = middle;
+  }
+  *depth_m = high;
+  sonde_press_clear(&press);
+  return found ? SONDE_OK
+               : sonde_fail(error, SONDE_CONVERGENCE, "%g N was not reached: %g N at %g mm",
+                            force_n, reached, high * 1e3);
+}
+
+// Both coordinates get a knot at the same time.
+typedef struct plan {
+  double time_s, penetration_m, slide_m;
+  sonde_track *penetration, *slide;
+} plan;
+
+static void put_knot(plan *p) {
+  sonde_track *tracks[] = {p->penetration, p->slide};
+  const double value[] = {p->penetration_m, p->slide_m};
+  for (int k = 0; k < 2; ++k) {
+    tracks[k]->time_s[tracks[k]->count] = p->time_s;
+    tracks[k]->value[tracks[k]->count++] = value[k];
+  }
+}
+
+static void move_to(plan *p, double penetration_m, double slide_m, double speed_m_s) {
+  double way = fabs(penetration_m - p->penetration_m) + fabs(slide_m - p->slide_m);
+  p->time_s += way / speed_m_s;
+  p->penetration_m = penetration_m;
+  p->slide_m = slide_m;
+  put_knot(p);
+}
+
+static void wait(plan *p, double seconds) {
+  p->time_s += seconds;
+  put_knot(p);
+}
+
+static void plan_ramps(const sonde_protocol *protocol, double depth_m, plan *p) {
+  for (uint32_t k = 0; k < protocol->speed_count; ++k) {
+    wait(p, 0.1);
+    move_to(p, depth_m, 0, protocol->speed_m_s[k]);
+    wait(p, protocol->hold_s);
+    move_to(p, -LEAD_M, 0, protocol->speed_m_s[k]);
+    wait(p, 0.2);
+  }
+}
+
+// As many moves to and fro as take the time of the slowest speed's: the noise weighs the same.
+static uint32_t rounds_of(const sonde_protocol *protocol, double speed_m_s) {
+  double slowest = speed_m_s;
+  for (uint32_t k = 0; k < protocol->speed_count; ++k)
+    slowest = fmin(slowest, protocol->speed_m_s[k]);
+  return (uint32_t)clamp(speed_m_s / slowest + 0.5, 1, MOST_ROUNDS);
+}
+
+static void plan_slides(const sonde_protocol *protocol, double depth_m, plan *p) {
+  wait(p, 0.1);
+  move_to(p, depth_m, 0, APPROACH_M_S);
+  wait(p, protocol->hold_s);
+  for (uint32_t k = 0; k < protocol->speed_count; ++k)
+    for (uint32_t round = rounds_of(protocol, protocol->speed_m_s[k]); round > 0; --round) {
+      move_to(p, depth_m, protocol->slide_m, protocol->speed_m_s[k]);
+      wait(p, protocol->hold_s);
+      move_to(p, depth_m, 0, protocol->speed_m_s[k]);
+      wait(p, protocol->hold_s);
+    }
+  move_to(p, -LEAD_M, 0, APPROACH_M_S);
+}
+
+static sonde_status make_plan(const sonde_model *model, const sonde_protocol *protocol,
+                              sonde_drive *drive, sonde_error *error) {
+  double depth_m = protocol->depth_m;
+  sonde_status status = SONDE_OK;
+  if (protocol->force_n > 0) status = find_depth(model, drive, protocol->force_n, &depth_m, error);
+  if (!status) status = sonde_track_create(MOST_KNOTS, &drive->penetration, error);
+  if (!status) status = sonde_track_create(MOST_KNOTS, &drive->slide, error);
+  if (status) return status;
+  plan p = {0, -LEAD_M, 0, &drive->penetration, &drive->slide};
+  put_knot(&p);
+  if (protocol->kind == SONDE_PROTOCOL_SLIDE)
+    plan_slides(protocol, depth_m, &p);
+  else
+    plan_ramps(protocol, depth_m, &p);
+  SONDE_ASSERT(drive->slide.count <= MOST_KNOTS);
+  double samples = floor(p.time_s * protocol->rate_hz) + 1;
+  if (samples > MOST_SAMPLES)
+    return sonde_fail(error, SONDE_ARGUMENT, "the protocol takes %g s: %g samples, at most %d",
+                      p.time_s, samples, MOST_SAMPLES);
+  drive->count = (uint32_t)samples;
+  sonde_free(drive->time_s);
+  drive->time_s = SONDE_NEW(double, drive->count);
+  if (!drive->time_s) return sonde_fail_memory(error);
+  for (uint32_t k = 0; k < drive->count; ++k) drive->time_s[k] = k / protocol->rate_hz;
+  return SONDE_OK;
+}
+
+static void add_noise(const sonde_protocol *p, uint32_t k, sonde_motion_sample *sample) {
+  uint64_t counter = 4 * (uint64_t)k;
+  sample->penetration_m += p->noise_position_m * sonde_random_normal(p->seed, counter);
+  sample->slide_m += p->noise_position_m * sonde_random_normal(p->seed, counter + 1);
+  sample->normal_n += p->noise_force_n * sonde_random_normal(p->seed, counter + 2);
+  sample->tangential_n += p->noise_force_n * sonde_random_normal(p->seed, counter + 3);
+}
+
+static sonde_status sample(const sonde_model *model, const sonde_world_def *def,
+                           const sonde_protocol *protocol, const sonde_drive *drive,
+                           const sonde_progress *progress, sonde_motion_record *record,
+                           sonde_error *error) {
+  double *force = SONDE_NEW(double, 2 * (size_t)drive->count);
+  record->samples = SONDE_NEW(sonde_motion_sample, drive->count);
+  sonde_status status = force && record->samples ? SONDE_OK : sonde_fail_memory(error);
+  if (!status)
+    status = sonde_drive_run(drive, model, def, NULL, progress, force, force + drive->count, error);
+  for (uint32_t k = 0; !status && k < drive->count; ++k) {
+    double t = drive->time_s[k];
+    record->samples[k] =
+        (sonde_motion_sample){t, sonde_track_at(&drive->penetration, t),
+                              sonde_track_at(&drive->slide, t), force[k], force[drive->count + k]};
+    add_noise(protocol, k, &record->samples[k]);
+  }
+  record->count = drive->count;
+  sonde_free(force);
+  return status;
+}
+
+sonde_status sonde_protocol_run(const sonde_model *model, const sonde_world_def *def,
+                                const sonde_protocol *protocol, const sonde_progress *progress,
+                                sonde_motion_record *record, sonde_error *error) {
+  sonde_world_def world = def ? *def : sonde_identify_world();
+  *record = (sonde_motion_record){.protocol = protocol->kind,
+                                  .site = protocol->site,
+                                  .axis = protocol->axis,
+                                  .gel_film = world.friction.gel_film,
+                                  .synthetic = true};
+  snprintf(record->probe, sizeof record->probe, "%s", protocol->probe);
+  sonde_status status = check(protocol, world.dt_s, error);
+  if (status) return status;
+  sonde_drive drive;
+  status =
+      sonde_drive_create(model, protocol->site, protocol->probe, protocol->axis, 2, &drive, error);
+  if (!status) status = make_plan(model, protocol, &drive, error);
+  if (!status) status = sample(model, &world, protocol, &drive, progress, record, error);
+  sonde_drive_clear(&drive);
+  if (status) sonde_motion_record_clear(record);
+  return status;
+}

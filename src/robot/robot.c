@@ -1,0 +1,257 @@
+// measure_site: step by step at one site until a stop rule holds.
+// read_sensors: noise, then quantisation; depends only on (seed, site, step).
+// repeats:      whether a reading's penetration was recorded before.
+// gather:       what is kept, in table order.
+// sonde_robot_run: sites in parallel.
+#include "base/maths.h"
+#include "base/random.h"
+#include "fit/fit_inside.h"
+#include "fit/parallel.h"
+#include "fit/press.h"
+#include "sonde/robot.h"
+
+#include <string.h>
+
+enum { MAX_STEPS = 4096 };
+static const double SITE_TOLERANCE_M = 5e-3; // of the skin
+static const double SAME_DEPTH_M = 1e-7;     // tables have four decimals of mm
+
+sonde_robot_def sonde_robot_def_default(void) {
+  return (sonde_robot_def){.probe = "linear",
+                           .step_m = 2e-3,
+                           .limit_n = 40,
+                           .depth_limit_m = 30e-3,
+                           .relative_residual = 1e-6,
+                           .max_iterations = 200};
+}
+
+typedef struct robot {
+  const sonde_model *model;
+  const sonde_site_table *sites;
+  const sonde_robot_def *def;
+  sonde_probe probe;
+  bool bonded;
+  uint32_t step_limit;
+  sonde_press *crew;
+  sonde_datum *row;          // [sites * step_limit]
+  sonde_robot_visit *visits; // [sites]
+} robot;
+
+static sonde_status check_def(const sonde_robot_def *def, sonde_error *error) {
+  const struct {
+    const char *name;
+    double value, low, high;
+  } range[] = {{"step_m", def->step_m, 1e-5, 0.1},
+               {"limit_n", def->limit_n, 0, 1e4},
+               {"depth_limit_m", def->depth_limit_m, def->step_m, 0.2},
+               {"noise_force_n", def->noise_force_n, 0, 1e3},
+               {"noise_penetration_m", def->noise_penetration_m, 0, 0.1},
+               {"quantum_force_n", def->quantum_force_n, 0, 1e3},
+               {"quantum_penetration_m", def->quantum_penetration_m, 0, def->step_m},
+               {"relative_residual", def->relative_residual, 1e-14, 0.1},
+               {"max_iterations", def->max_iterations, 1, 1e6}};
+  for (size_t k = 0; k < SONDE_COUNT_OF(range); ++k)
+    if (!(range[k].value >= range[k].low && range[k].value <= range[k].high))
+      return sonde_fail(error, SONDE_ARGUMENT, "%s is %g, expected %g to %g", range[k].name,
+                        range[k].value, range[k].low, range[k].high);
+  if (def->depth_limit_m / def->step_m > MAX_STEPS)
+    return sonde_fail(error, SONDE_ARGUMENT, "more than %d steps per site", MAX_STEPS);
+  return SONDE_OK;
+}
+
+static double quantised(double value, double quantum) {
+  return quantum > 0 ? quantum * round(value / quantum) : value;
+}
+
+static void read_sensors(const sonde_robot_def *def, uint32_t step, sonde_datum *datum) {
+  SONDE_ASSERT(step < MAX_STEPS);
+  uint64_t counter = 2u * ((uint64_t)datum->site * MAX_STEPS + step);
+  double depth =
+      datum->penetration_m + def->noise_penetration_m * sonde_random_normal(def->seed, counter);
+  double force = datum->force_n + def->noise_force_n * sonde_random_normal(def->seed, counter + 1);
+  datum->penetration_m = fmax(0.0, quantised(depth, def->quantum_penetration_m));
+  datum->force_n = quantised(force, def->quantum_force_n);
+}
+
+static bool repeats(const sonde_datum *rows, uint32_t count) {
+  for (uint32_t k = 0; k < count; ++k)
+    if (fabs(rows[k].penetration_m - rows[count].penetration_m) < SAME_DEPTH_M) return true;
+  return false;
+}
+
+// The probe's column: its name without folders, fit for a table.
+static void probe_label(const char *name, char label[24]) {
+  const char *slash = strrchr(name, '/');
+  snprintf(label, 24, "%.23s", slash ? slash + 1 : name);
+  for (char *c = label; *c; ++c)
+    if (*c == ',' || *c == '#' || *c == ' ') *c = '_';
+}
+
+static double press_once(robot *r, sonde_press *press, uint32_t index, sonde_bonded *bonded,
+                         double depth_m) {
+  const sonde_site *site = &r->sites->sites[index];
+  sonde_robot_visit *visit = &r->visits[index];
+  if (r->bonded) return sonde_bonded_force(bonded, depth_m);
+  double force_n = sonde_press_probe(press, site, &r->probe, depth_m);
+  if (!isnan(force_n))
+    visit->area_m2 = fmax(visit->area_m2, sonde_state_contact(press->state)->area_m2);
+  return force_n;
+}
+
+static sonde_status press_steps(robot *r, sonde_press *press, uint32_t index, sonde_bonded *bonded,
+                                const atomic_bool *stop, sonde_error *error) {
+  sonde_robot_visit *visit = &r->visits[index];
+  SONDE_ASSERT(index < r->sites->count && visit->end == SONDE_ROBOT_NOT_REACHED);
+  sonde_datum *rows = &r->row[(size_t)index * r->step_limit];
+  sonde_state_reset(press->state);
+  for (uint32_t step = 0; step < r->step_limit; ++step) {
+    if (atomic_load(stop)) return sonde_fail(error, SONDE_CANCELLED, "cancelled");
+    double depth_m = (step + 1) * r->def->step_m;
+    double force_n = press_once(r, press, index, bonded, depth_m);
+    if (isnan(force_n)) {
+      visit->end = SONDE_ROBOT_NO_EQUILIBRIUM;
+      return SONDE_OK;
+    }
+    sonde_datum *datum = &rows[visit->rows];
+    *datum = (sonde_datum){.site = visit->site, .penetration_m = depth_m, .force_n = force_n};
+    probe_label(r->probe.name, datum->probe);
+    read_sensors(r->def, step, datum);
+    visit->depth_m = depth_m;
+    visit->force_n = force_n;
+    if (!repeats(rows, visit->rows)) ++visit->rows;
+    if (fmax(force_n, datum->force_n) > r->def->limit_n) {
+      visit->end = SONDE_ROBOT_FORCE_LIMIT;
+      return SONDE_OK;
+    }
+  }
+  visit->end = SONDE_ROBOT_DEPTH_LIMIT;
+  return SONDE_OK;
+}
+
+static sonde_status measure_site(void *user, uint32_t worker, uint32_t index,
+                                 const atomic_bool *stop, sonde_error *error) {
+  robot *r = user;
+  const sonde_site *site = &r->sites->sites[index];
+  sonde_footprint footprint = {0};
+  sonde_bonded bonded = {0};
+  sonde_status status = SONDE_OK;
+  if (r->bonded)
+    status = sonde_footprint_create(r->model, site, r->probe.half_x_m, r->probe.half_y_m,
+                                    SONDE_COVERAGE_CLIPPED, &footprint, error);
+  if (r->bonded && !status)
+    status = sonde_bonded_create(r->model, site, r->probe.half_x_m, r->probe.half_y_m,
+                                 r->def->relative_residual, r->def->max_iterations, &bonded, error);
+  for (uint32_t k = 0; k < footprint.node_count && !status; ++k)
+    r->visits[index].area_m2 += footprint.weight_m2[k];
+  if (!status) status = press_steps(r, &r->crew[worker], index, &bonded, stop, error);
+  sonde_footprint_clear(&footprint);
+  sonde_bonded_clear(&bonded);
+  return status;
+}
+
+// Drops the rows of sites under way that are too few; returns the number of rows that are kept.
+static uint32_t keep(robot *r, bool cancelled, sonde_measurements *m) {
+  uint32_t rows = 0, whole = 0, parts = 0;
+  for (uint32_t i = 0; i < r->sites->count; ++i) {
+    sonde_robot_visit *visit = &r->visits[i];
+    bool under_way = visit->end == SONDE_ROBOT_NOT_REACHED;
+    SONDE_ASSERT(cancelled || !under_way);
+    if (under_way && visit->rows < SONDE_ROBOT_LEAST_ROWS) visit->rows = 0;
+    rows += visit->rows;
+    whole += !under_way;
+    parts += under_way && visit->rows;
+  }
+  if (cancelled)
+    snprintf(m->remark, sizeof m->remark,
+             "partial: cancelled after %u of %u sites; the last steps of %u sites are missing",
+             whole, r->sites->count, parts);
+  return rows;
+}
+
+static sonde_status gather(robot *r, bool cancelled, sonde_measurements *m, sonde_error *error) {
+  sonde_measurements kept = {0};
+  uint32_t rows = keep(r, cancelled, &kept);
+  sonde_status status = sonde_measurements_create(m, rows, error);
+  if (status) return status;
+  memcpy(m->remark, kept.remark, sizeof m->remark);
+  for (uint32_t i = 0; i < r->sites->count; ++i) {
+    for (uint32_t k = 0; k < r->visits[i].rows; ++k, ++m->count) {
+      m->data[m->count] = r->row[(size_t)i * r->step_limit + k];
+      m->position_m[m->count] = r->sites->sites[i].position_m;
+      m->normal[m->count] = r->sites->sites[i].normal;
+    }
+  }
+  SONDE_ASSERT(m->count == rows);
+  return SONDE_OK;
+}
+
+static sonde_status choose_probe(robot *r, sonde_error *error) {
+  sonde_robot_contact contact = r->def->contact;
+  sonde_status status = sonde_probe_create(r->def->probe, &r->probe, error);
+  if (status) return status;
+  if (contact == SONDE_ROBOT_BONDED && !r->probe.rectangular)
+    return sonde_fail(error, SONDE_ARGUMENT,
+                      "probe '%s' has no rectangular footprint to bond, expected contact 'probe'",
+                      r->def->probe);
+  if (r->probe.rectangular && strlen(r->probe.name) > 23)
+    return sonde_fail(error, SONDE_ARGUMENT, "probe '%s': expected a name of at most 23 characters",
+                      r->def->probe);
+  r->bonded = r->probe.rectangular && contact != SONDE_ROBOT_PROBE;
+  return SONDE_OK;
+}
+
+static sonde_status allocate_rows(robot *r, sonde_error *error) {
+  uint32_t sites = r->sites->count;
+  r->step_limit = (uint32_t)floor(r->def->depth_limit_m / r->def->step_m * (1 + 1e-12));
+  SONDE_ASSERT(r->step_limit >= 1);
+  r->row = SONDE_NEW(sonde_datum, (size_t)sites * r->step_limit);
+  r->visits = SONDE_NEW(sonde_robot_visit, sites);
+  if (!r->row || !r->visits) return sonde_fail_memory(error);
+  for (uint32_t i = 0; i < sites; ++i) r->visits[i].site = r->sites->sites[i].id;
+  return SONDE_OK;
+}
+
+static void clear_robot(robot *r, uint32_t workers) {
+  sonde_press_crew_destroy(r->crew, workers);
+  sonde_probe_clear(&r->probe);
+  sonde_free(r->row);
+  sonde_free(r->visits);
+}
+
+void sonde_robot_log_clear(sonde_robot_log *log) {
+  if (!log) return;
+  sonde_free(log->visits);
+  *log = (sonde_robot_log){0};
+}
+
+sonde_status sonde_robot_run(const sonde_model *model, const sonde_site_table *sites,
+                             const sonde_robot_def *def, const sonde_progress *progress,
+                             sonde_measurements *measurements, sonde_robot_log *log,
+                             sonde_error *error) {
+  *measurements = (sonde_measurements){0};
+  if (log) *log = (sonde_robot_log){0};
+  sonde_status status = check_def(def, error);
+  if (!status) status = sonde_sites_check_on_surface(model, sites, SITE_TOLERANCE_M, error);
+  if (status) return status;
+  robot r = {.model = model, .sites = sites, .def = def};
+  uint32_t workers = sonde_parallel_workers(def->threads, sites->count);
+  status = choose_probe(&r, error);
+  if (!status) status = allocate_rows(&r, error);
+  if (!status)
+    status = sonde_press_crew_create(model, def->relative_residual, def->max_iterations, workers,
+                                     &r.crew, error);
+  if (!status)
+    status =
+        sonde_parallel_run(sites->count, workers, measure_site, &r, progress, "measuring", error);
+  bool cancelled = status == SONDE_CANCELLED;
+  if (!status || cancelled) {
+    sonde_status gathered = gather(&r, cancelled, measurements, cancelled ? NULL : error);
+    if (gathered) status = gathered;
+    if (log && !gathered) {
+      *log = (sonde_robot_log){sites->count, r.visits};
+      r.visits = NULL;
+    }
+  }
+  clear_robot(&r, workers);
+  return status;
+}

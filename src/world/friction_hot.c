@@ -1,0 +1,127 @@
+// Friction of the probe on the skin, every step (docs/world.md).
+// sonde_friction_coefficient: Stribeck curve and gel film.
+// bond_of:      a node's bond at the start of a step: stiffness, direction, limit.
+// apply:        forces and matrix terms: a spring while the bond sticks, a constant force when not.
+// advance_node: return mapping at the end of the step: the bond is cut back to its limit.
+// advance:      bonds of all touched nodes and the coefficient that their slip leaves.
+//
+// Every touched node has a bond with the probe: the tangential way b that the node has gone
+// relative to the probe, less what slipped. Its force is -P mu_s b/d for |b| up to d mu/mu_s and
+// never more than mu P, with P the normal push and d the way before slip. The law is linear in P,
+// so that b is not upset when the push changes. P and mu are those of the end of the step before.
+#include "world/state.h"
+
+#include "base/base.h"
+#include "base/maths.h"
+
+static const double BOND_M = 1e-4; // d
+
+double sonde_friction_coefficient(const sonde_friction *friction, double slip_m_s) {
+  if (!(friction->mu_static > 0)) return 0;
+  double x = slip_m_s / friction->stribeck_speed_m_s;
+  double dry = friction->mu_kinetic + (friction->mu_static - friction->mu_kinetic) * exp(-x * x);
+  return friction->mu_gel + (dry - friction->mu_gel) * exp(-friction->gel_film);
+}
+
+static bool is_on(const sonde_state *state) { return state->def.friction.mu_static > 0; }
+
+void sonde_friction_release(sonde_state *state) {
+  state->mu = sonde_friction_coefficient(&state->def.friction, 0);
+  for (uint32_t i = 0; i < state->model->surface.vertex_count; ++i)
+    state->bond_m[i] = state->grip_n[i] = vec3(0, 0, 0);
+}
+
+typedef struct bond {
+  sonde_vec3 normal;    // along which the probe pushes
+  sonde_vec3 way_m;     // b, across the normal
+  double stiffness_n_m; // P mu_s/d
+  double limit_m;       // d mu/mu_s
+} bond;
+
+static sonde_vec3 across(sonde_vec3 a, sonde_vec3 n) { return v_madd(a, -v_dot(a, n), n); }
+
+// Way of the probe's point at a node during the step.
+static sonde_vec3 carried_way(const sonde_state *state, uint32_t i, const sonde_motion *probe) {
+  sonde_vec3 arm = v_sub(state->position[i], probe->origin);
+  return v_scale(v_add(probe->velocity, v_cross(probe->spin, arm)), state->def.dt_s);
+}
+
+// False for a node that the probe did not push in the step before.
+static bool bond_of(const sonde_state *state, uint32_t i, const sonde_motion *probe,
+                    sonde_vec3 moved, bond *at) {
+  double push = v_norm(state->grip_n[i]);
+  if (state->grip_tick[i] != state->tick || !(push > 0)) return false;
+  double most = sonde_friction_coefficient(&state->def.friction, 0);
+  at->normal = v_scale(state->grip_n[i], 1 / push);
+  sonde_vec3 way = v_sub(v_add(state->bond_m[i], moved), carried_way(state, i, probe));
+  at->way_m = across(way, at->normal);
+  at->stiffness_n_m = push * most / BOND_M;
+  at->limit_m = BOND_M * state->mu / most;
+  return most > 0;
+}
+
+// Sticking: -k b. Slipping: -k limit b/|b|, whose slope is k limit/|b| across b and 0 along it.
+static void apply_bond(sonde_state *state, uint32_t i, const bond *at,
+                       const sonde_contact_scales *scales) {
+  double length = v_norm(at->way_m);
+  bool slips = length > at->limit_m;
+  double stiffness = slips ? at->stiffness_n_m * at->limit_m / length : at->stiffness_n_m;
+  sonde_vec3 v = across(state->velocity[i], at->normal);
+  double scaled = scales->stiffness * stiffness;
+  sonde_mat3 block = m_rank1(at->normal, -scaled, scaled);
+  if (slips) {
+    sonde_vec3 along = v_scale(at->way_m, 1 / length);
+    block = m_add(block, m_rank1(along, -scaled, 0));
+    v = across(v, along);
+  }
+  state->force[i] = v_madd(state->force[i], -stiffness, at->way_m);
+  state->product[i] = v_madd(state->product[i], stiffness, v);
+  state->matrix->diagonal[i] = m_add(state->matrix->diagonal[i], block);
+}
+
+void sonde_friction_apply(sonde_state *state, const sonde_motion *probe,
+                          const sonde_contact_scales *scales, double moved_s) {
+  if (!is_on(state)) return;
+  SONDE_ASSERT(moved_s >= 0);
+  for (uint32_t k = 0; k < state->touched_count; ++k) {
+    uint32_t i = state->touched[k];
+    bond at;
+    if (bond_of(state, i, probe, v_scale(state->velocity[i], moved_s), &at))
+      apply_bond(state, i, &at, scales);
+  }
+}
+
+// Returns the way that slipped.
+static double advance_node(sonde_state *state, uint32_t i, const sonde_motion *probe) {
+  double h = state->def.dt_s, slip = 0;
+  sonde_vec3 v = v_madd(state->velocity[i], state->def.implicitness, state->increment[i]);
+  bond at;
+  bool held = bond_of(state, i, probe, v_scale(v, h), &at);
+  state->grip_n[i] = state->contact_force[i];
+  state->grip_tick[i] = state->tick + 1;
+  state->bond_m[i] = vec3(0, 0, 0);
+  if (!held) return 0;
+  double length = v_norm(at.way_m);
+  if (length > at.limit_m) {
+    slip = length - at.limit_m;
+    at.way_m = v_scale(at.way_m, at.limit_m / length);
+  }
+  SONDE_ASSERT(v_norm(at.way_m) <= BOND_M * (1 + 1e-9));
+  state->bond_m[i] = at.way_m;
+  state->contact_force[i] = v_madd(state->contact_force[i], -at.stiffness_n_m, at.way_m);
+  return slip;
+}
+
+// One coefficient for the whole patch, from its mean slip speed weighted by the push.
+void sonde_friction_advance(sonde_state *state, const sonde_motion *probe) {
+  if (!is_on(state)) return;
+  double sum = 0, push = 0;
+  for (uint32_t k = 0; k < state->touched_count; ++k) {
+    uint32_t i = state->touched[k];
+    double slip = advance_node(state, i, probe), weight = v_norm(state->grip_n[i]);
+    sum += weight * slip;
+    push += weight;
+  }
+  double speed = push > 0 ? sum / (push * state->def.dt_s) : 0;
+  state->mu = sonde_friction_coefficient(&state->def.friction, speed);
+}
