@@ -3,6 +3,7 @@
 // load_inputs: tables and surfaces.
 // fit_model:   build, estimate, set the parameters, save.
 #include "fit_common.h"
+#include "fit_report.h"
 
 #include <stdlib.h>
 #include <unistd.h>
@@ -33,13 +34,23 @@ static const char HELP[] =
     "  --loss KIND       squares (default), huber or student\n"
     "  --pretension      estimate an edge pre-tension too\n"
     "  --cold-start      start stage 2 from generic values instead of stage 1\n"
+    "  --exponent N      of the normal springs k0 x/(1 - (x/xm)^N) in stage 3: 1, 2 (default) or "
+    "3\n"
+    "  --smoothness SD   of ln k0 and ln xm per site spacing in stage 3; default: by leaving "
+    "sites\n"
+    "                    out one by one\n"
+    "  --hold-out KIND   sites (eight parts in turn), probe (each in turn) or depth (the deepest\n"
+    "                    quarter): refit without them and print the error on them\n"
+    "  --report DIR      write DIR/index.html with figures, tables and intervals\n"
     "  --fine-mm L       longest skin edge near footprints; default 3\n"
     "  --json            one JSON object instead of the table\n"
     "  --help            this text\n";
 
+static const char *const HOLD_OUTS[] = {"sites", "probe", "depth", NULL};
+
 typedef struct fit_arguments {
   const char *measurements, *surface, *sites, *output, *femur, *fat, *muscle, *name, *provenance;
-  const char *stages, *weights, *loss, *fine_mm, *exponent;
+  const char *stages, *weights, *loss, *fine_mm, *exponent, *report, *hold_out, *smoothness;
   bool json, help, pretension, cold_start;
 } fit_arguments;
 
@@ -64,6 +75,9 @@ static bool parse_arguments(int argc, char **argv, fit_arguments *a) {
                                 {"--loss", &a->loss, NULL},
                                 {"--fine-mm", &a->fine_mm, NULL},
                                 {"--exponent", &a->exponent, NULL},
+                                {"--smoothness", &a->smoothness, NULL},
+                                {"--report", &a->report, NULL},
+                                {"--hold-out", &a->hold_out, NULL},
                                 {"--pretension", NULL, &a->pretension},
                                 {"--cold-start", NULL, &a->cold_start},
                                 {"--json", NULL, &a->json},
@@ -90,6 +104,17 @@ static bool parse_fit(const fit_arguments *a, sonde_fit_def *def, double *fine_m
   long exponent = (long)def->normal_exponent;
   if (a->exponent && !app_parse_integer(VERB, "--exponent", a->exponent, 1, 3, &exponent))
     return false;
+  if (a->smoothness &&
+      !app_parse_real(VERB, "--smoothness", a->smoothness, 1e-4, 10, &def->smoothness_sd))
+    return false;
+  if (a->hold_out) {
+    int kind;
+    if (!app_parse_word(VERB, "--hold-out", a->hold_out, HOLD_OUTS, &kind)) return false;
+    if (stages < 3) {
+      app_usage_error(VERB, "--hold-out needs --stages 3");
+      return false;
+    }
+  }
   def->normal_exponent = (double)exponent;
   def->stages = (uint32_t)stages;
   def->weights = (sonde_fit_weights)weights;
@@ -157,9 +182,48 @@ static sonde_status build_model(const fit_arguments *a, const fit_inputs *in, do
   return sonde_model_build(&def, model, error);
 }
 
+static sonde_status leave_out(const fit_arguments *a, const fit_inputs *in,
+                              const sonde_model *model, const sonde_fit_def *def,
+                              const sonde_fit_result *result, sonde_error_report *report,
+                              sonde_error *error) {
+  int kind;
+  sonde_progress progress = app_progress();
+  if (!app_parse_word(VERB, "--hold-out", a->hold_out, HOLD_OUTS, &kind)) return SONDE_ARGUMENT;
+  double *predicted_n = calloc(in->measurements.count, sizeof *predicted_n);
+  if (!predicted_n) return SONDE_MEMORY;
+  sonde_status status = sonde_fit_hold_out(model, &in->sites, &in->measurements, def, result,
+                                           (sonde_hold_out)kind, &progress, predicted_n, error);
+  if (!status)
+    status = sonde_error_report_of(in->measurements.data, predicted_n, in->measurements.count,
+                                   report, error);
+  app_progress_end();
+  free(predicted_n);
+  return status;
+}
+
+static sonde_status write_report(const fit_arguments *a, const fit_inputs *in,
+                                 const sonde_model *model, const sonde_fit_result *result,
+                                 const sonde_error_report *hold_out, sonde_error *error) {
+  char name[64], command[512];
+  snprintf(name, sizeof name, "%s, refitted", a->hold_out ? a->hold_out : "");
+  snprintf(command, sizeof command, "sonde fit %s --surface %s --sites %s --stages %s",
+           a->measurements, a->surface, a->sites, a->stages ? a->stages : "2");
+  const fit_findings findings = {.model = model,
+                                 .sites = &in->sites,
+                                 .data = &in->measurements,
+                                 .result = result,
+                                 .command_line = command,
+                                 .hold_out_name = name,
+                                 .hold_out = a->hold_out ? hold_out : NULL};
+  sonde_progress progress = app_progress();
+  sonde_status status = fit_report_write(&findings, a->report, &progress, error);
+  app_progress_end();
+  return status;
+}
+
 static sonde_status fit_model(const fit_arguments *a, const fit_inputs *in,
                               const sonde_fit_def *def, double fine_mm, sonde_fit_result *result,
-                              sonde_error *error) {
+                              sonde_error_report *hold_out, sonde_error *error) {
   sonde_model *model = NULL;
   sonde_progress progress = app_progress();
   sonde_status status = build_model(a, in, fine_mm, &model, error);
@@ -170,8 +234,23 @@ static sonde_status fit_model(const fit_arguments *a, const fit_inputs *in,
     status =
         sonde_model_set_parameters(model, &result->law, result->sites, result->site_count, error);
   if (!status) status = sonde_model_save(model, a->output, error);
+  if (!status && a->hold_out) status = leave_out(a, in, model, def, result, hold_out, error);
+  if (!status && a->report) status = write_report(a, in, model, result, hold_out, error);
   sonde_model_destroy(model);
   return status;
+}
+
+static void print_json_confidence(const sonde_fit_confidence *c) {
+  app_json_real("smoothness_sd", c->smoothness_sd);
+  app_json_real("ln_shear_sd", c->ln_shear_sd);
+  app_json_real("ln_limit_sd", c->ln_limit_sd);
+  app_json_real("shear_bootstrap_low_n_m", c->shear_95[0]);
+  app_json_real("shear_bootstrap_high_n_m", c->shear_95[1]);
+  app_json_real("limit_bootstrap_low", c->limit_95[0]);
+  app_json_real("limit_bootstrap_high", c->limit_95[1]);
+  app_json_object("one_site_out");
+  app_json_report("full", &c->one_out);
+  app_json_close();
 }
 
 static void print_json_stages(const sonde_fit_result *r) {
@@ -194,11 +273,13 @@ static void print_json_stages(const sonde_fit_result *r) {
     app_json_integer("parameters", r->parameters);
     app_json_integer("iterations", r->iterations);
     app_json_bool("converged", r->converged);
+    print_json_confidence(&r->confidence);
     app_json_close();
   }
 }
 
-static void print_json(const fit_arguments *a, const sonde_fit_result *r, double seconds) {
+static void print_json(const fit_arguments *a, const sonde_fit_result *r,
+                       const sonde_error_report *hold_out, double seconds) {
   app_json_begin();
   if (r->stage3.all.count > 0)
     app_json_report("full", &r->stage3);
@@ -207,6 +288,12 @@ static void print_json(const fit_arguments *a, const sonde_fit_result *r, double
   else
     app_json_report("independent", &r->stage1);
   print_json_stages(r);
+  if (a->hold_out) {
+    app_json_object("hold_out");
+    app_json_text("kind", a->hold_out);
+    app_json_report("full", hold_out);
+    app_json_close();
+  }
   app_json_integer("parameters", r->parameters);
   app_json_text("model", a->output);
   app_json_real("edge_stiffness_n_m", r->law.edge_stiffness_n_m);
@@ -217,7 +304,8 @@ static void print_json(const fit_arguments *a, const sonde_fit_result *r, double
   app_json_end();
 }
 
-static void print_table(const fit_arguments *a, const sonde_fit_result *r, double seconds) {
+static void print_table(const fit_arguments *a, const sonde_fit_result *r,
+                        const sonde_error_report *hold_out, double seconds) {
   char title[128];
   snprintf(title, sizeof title, "stage 1, every curve by itself: %u parameters",
            r->stage1_parameters);
@@ -232,11 +320,21 @@ static void print_table(const fit_arguments *a, const sonde_fit_result *r, doubl
   if (r->stage3.all.count > 0) {
     snprintf(title, sizeof title, "stage 3, full equilibrium: %u parameters", r->parameters);
     app_print_report(title, &r->stage3);
+    const sonde_fit_confidence *c = &r->confidence;
+    for (uint32_t k = 0; k < c->tried_count; ++k)
+      printf("%s%g: %.2f %%", k ? ", " : "sites left out, by smoothness: ", c->tried_sd[k],
+             c->tried_percent[k]);
+    if (c->tried_count) printf("\n");
+    app_print_report("one site left out (linearised)", &c->one_out);
     printf("shear stiffness %.3f N/m, limit %.3f, edges kept at %.3g N/m, %u iterations\n",
            r->law.shear_stiffness_n_m, r->law.shear_limit, r->law.edge_stiffness_n_m,
            r->iterations);
   } else if (r->law.edge_pretension_n > 0) {
     printf("pre-tension %.3g N\n", r->law.edge_pretension_n);
+  }
+  if (a->hold_out) {
+    snprintf(title, sizeof title, "left out and predicted by a refit: %s", a->hold_out);
+    app_print_report(title, hold_out);
   }
   printf("wrote %s in %.2f s\n", a->output, seconds);
 }
@@ -253,16 +351,17 @@ int cmd_fit(int argc, char **argv) {
   if (!parse_fit(&arguments, &def, &fine_mm)) return APP_BAD_INPUT;
   fit_inputs inputs = {0};
   sonde_fit_result result = {0};
+  sonde_error_report hold_out = {0};
   sonde_error error = {0};
   sonde_status status = load_inputs(&arguments, &inputs, &error);
-  if (!status) status = fit_model(&arguments, &inputs, &def, fine_mm, &result, &error);
+  if (!status) status = fit_model(&arguments, &inputs, &def, fine_mm, &result, &hold_out, &error);
   int code = APP_OK;
   if (status)
     code = app_fail(VERB, &error);
   else if (arguments.json)
-    print_json(&arguments, &result, app_seconds() - start);
+    print_json(&arguments, &result, &hold_out, app_seconds() - start);
   else
-    print_table(&arguments, &result, app_seconds() - start);
+    print_table(&arguments, &result, &hold_out, app_seconds() - start);
   if (!status && !result.converged)
     fprintf(stderr, "sonde fit: the last stage reached its iteration limit before it converged\n");
   sonde_fit_result_clear(&result);

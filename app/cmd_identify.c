@@ -39,7 +39,7 @@ static const char HELP[] =
     "  --speed-mm-s V     one speed instead of 20, 40, 80 (ramp-hold) or 10, 20, 60 (slide)\n"
     "  --axis A           u around the leg (default) or v along it\n"
     "  --slide-mm L       length of a slide; default 12\n"
-    "  --hold-s T         hold and pause; default 0.2\n"
+    "  --hold-s T         hold and pause; default 0.2 (ramp-hold), 0.1 (slide)\n"
     "  --rate-hz R        samples per second; default 1000\n"
     "  --noise-n S        standard deviation of the force sensors; default 0\n"
     "  --noise-mm S       standard deviation of the position sensors; default 0\n"

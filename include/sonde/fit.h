@@ -92,11 +92,11 @@ typedef struct sonde_error_report {
   uint32_t left_out; /**< rows without a finite model value */
 } sonde_error_report;
 
-/** Compares model forces with measured ones. @thread any */
+/** Compares model forces [count] with measured ones. @thread any */
 SONDE_API sonde_status sonde_error_statistics_of(const double *model_n, const double *measured_n,
                                                  uint32_t count, sonde_error_statistics *statistics,
                                                  sonde_error *error);
-/** The same per probe. @param model_n [count] @return ARGUMENT when there are too many probes */
+/** The same per probe. @return ARGUMENT when there are too many probes */
 SONDE_API sonde_status sonde_error_report_of(const sonde_datum *data, const double *model_n,
                                              uint32_t count, sonde_error_report *report,
                                              sonde_error *error);
@@ -124,6 +124,7 @@ typedef struct sonde_fit_def {
   bool cold_start;           /**< stage 2 from one generic start instead of stage 1 */
   double kept_edge_n_m;      /**< edge stiffness of a stage 3 model; default 0.1 */
   double normal_exponent;    /**< of the normal springs of stage 3: 1, 2 (default) or 3 */
+  double smoothness_sd;      /**< of ln k0 and ln xm per site spacing; 0 (default): by leave-out */
   uint32_t threads;          /**< of stage 3; 0 (default): one per online core */
 } sonde_fit_def;
 
@@ -141,17 +142,30 @@ typedef struct sonde_curve_fit {
 } sonde_curve_fit;
 
 /**
- * Fits eq. (1) to one curve: log parameters (ln k0, ln(xm - s_max/guard)), closed-form linear
- * start, Levenberg-Marquardt. docs/fit.md.
- * @param area_m2 footprint area
+ * Fits eq. (1) to one curve by Levenberg-Marquardt in logarithms. docs/fit.md.
  * @param start NULL for the closed-form start, else (k0, xm)
- * @return ARGUMENT with fewer than 3 points or no positive penetration
- * @thread any
+ * @return ARGUMENT with fewer than 3 points or no positive penetration @thread any
  */
 SONDE_API sonde_status sonde_fit_curve(const double *penetration_m, const double *force_n,
                                        uint32_t count, double area_m2, double guard,
                                        const sonde_fit_def *def, const double start[2],
                                        sonde_curve_fit *fit, sonde_error *error);
+
+enum { SONDE_FIT_TRIED = 7 };
+
+/** How far stage 3 is to be trusted; intervals are estimate +- 1.96 sd in the logarithms. */
+typedef struct sonde_fit_confidence {
+  double smoothness_sd; /**< of ln k0 and ln xm per site spacing, chosen by leaving sites out */
+  uint32_t tried_count; /**< 0 when the smoothness was given */
+  double tried_sd[SONDE_FIT_TRIED], tried_percent[SONDE_FIT_TRIED]; /**< error of sites left out */
+  double *ln_k0_sd, *ln_xm_sd;                                      /**< [site_count] */
+  double ln_shear_sd, ln_limit_sd;
+  double correlation[4][4];        /**< of ln G, ln gm, mean ln k0, mean ln xm */
+  double shear_95[2], limit_95[2]; /**< bootstrap over sites, N/m and slope */
+  double *band_n;                  /**< [measurements.count] half width of the force's 95 % band */
+  double *one_out_n; /**< [measurements.count] force with its site left out (linearised) */
+  sonde_error_report one_out;
+} sonde_fit_confidence;
 
 /** What an estimation found; released by sonde_fit_result_clear(). */
 typedef struct sonde_fit_result {
@@ -171,13 +185,15 @@ typedef struct sonde_fit_result {
   double cost, start_cost; /**< half the sum of losses at the last stage's end and start */
   double stage2_edge_n_m;  /**< k_s of stage 2; the law of stage 3 has kept_edge_n_m */
   double edge_sd_log;      /**< standard deviation of ln k_s (Schur complement); 0 if none */
+  double *stage_n[3];      /**< [measurements.count] forces of each stage; NULL when not run */
+  double seconds[3];       /**< wall time of each stage */
+  sonde_fit_confidence confidence; /**< of stage 3; NULL arrays before */
 } sonde_fit_result;
 
 /**
  * Stage 1 per curve; then one (k0, xm) per site for all its probes, without edges (stages == 1) or
  * with the simplified interaction and a uniform edge stiffness (2); then the refit on the full
- * equilibrium with uniform shear springs, smooth site parameters, residuals relative to the probe's
- * mean force and without surface springs, which the law keeps weak (3). Formulas: docs/fit.md.
+ * equilibrium with a uniform shear layer and smooth site parameters (3). Formulas: docs/fit.md.
  * @param model gives the refined skin, its normals and the law (guard, compression); unchanged
  * @return CANCELLED by progress; ARGUMENT for a probe without rectangular footprint or a curve of
  *   fewer than 3 points
@@ -188,6 +204,23 @@ SONDE_API sonde_status sonde_fit(const sonde_model *model, const sonde_site_tabl
                                  const sonde_progress *progress, sonde_fit_result *result,
                                  sonde_error *error);
 SONDE_API void sonde_fit_result_clear(sonde_fit_result *result);
+
+typedef enum sonde_hold_out {
+  SONDE_HOLD_OUT_SITES, /**< eight scattered parts of the sites in turn */
+  SONDE_HOLD_OUT_PROBE, /**< each probe in turn */
+  SONDE_HOLD_OUT_DEPTH, /**< the deepest quarter of every curve */
+} sonde_hold_out;
+
+/**
+ * Refits stage 3 without a part of the measurements, each part in turn, and predicts that part.
+ * @param result of sonde_fit() with stages == 3 on the same arguments
+ * @param predicted_n [count] NaN for rows that are never left out @thread owner
+ */
+SONDE_API sonde_status sonde_fit_hold_out(const sonde_model *model, const sonde_site_table *sites,
+                                          const sonde_measurements *measurements,
+                                          const sonde_fit_def *def, const sonde_fit_result *result,
+                                          sonde_hold_out kind, const sonde_progress *progress,
+                                          double *predicted_n, sonde_error *error);
 
 /* ---- prediction -------------------------------------------------------------------------- */
 
@@ -206,11 +239,9 @@ typedef struct sonde_predict_def {
 SONDE_API sonde_predict_def sonde_predict_def_default(void);
 
 /**
- * The model's force for each measurement, footprint bonded. The result does not depend on the
- * number of threads.
+ * The model's force for each measurement, footprint bonded; the same for any number of threads.
  * @param predicted_n [count] NaN where the equilibrium was not found
- * @return CANCELLED by progress
- * @thread owner
+ * @return CANCELLED by progress @thread owner
  */
 SONDE_API sonde_status sonde_predict(const sonde_model *model, const sonde_site_table *sites,
                                      const sonde_measurements *measurements,

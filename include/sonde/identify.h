@@ -52,9 +52,9 @@ typedef struct sonde_protocol {
   double force_n;    /**< > 0: presses to this static force instead */
   double speed_m_s[SONDE_PROTOCOL_SPEEDS]; /**< default 20, 40, 80 mm/s; slide 10, 20, 60 */
   uint32_t speed_count;
-  double hold_s;                          /**< hold, and pause between moves; default 0.2 */
-  double slide_m;                         /**< length of a move; default 12 mm */
-  double rate_hz;                         /**< of the samples; default 1000 */
+  double hold_s;  /**< hold, and pause between moves; default 0.2, slide 0.1 */
+  double slide_m; /**< length of a move; default 12 mm */
+  double rate_hz; /**< of the samples; default 1000 */
   double noise_force_n, noise_position_m; /**< standard deviations of the sensors; default 0 */
   uint64_t seed;
 } sonde_protocol;

@@ -3,6 +3,7 @@
 // fit_sites:      arrow Levenberg-Marquardt over all sites, without edges, then with them.
 // finish:         site parameters, forces and error report of stage 1 or 2.
 // refit_sites:    stage 3, on the full equilibrium.
+#include "base/clock.h"
 #include "fit/arrow.h"
 #include "fit/fit_inside.h"
 #include "fit/law.h"
@@ -17,7 +18,6 @@ static const double COLD_K0 = 1.8e5, COLD_ABOVE_M = 0.02;
 static const double EDGE_START_N_M = 50.0, TENSION_START_N = 1e-3;
 static const double LN_EDGE_LOW = -11.5, LN_EDGE_HIGH = 18.4; // 1e-5 .. 1e8 N/m
 static const double KEPT_EDGE_N_M = 0.1;
-static const double PATCH_REACH_M = 0.05; // of the skin around a footprint
 static const double LN_TENSION_LOW = -13.8, LN_TENSION_HIGH = 6.9;
 
 sonde_fit_def sonde_fit_def_default(void) {
@@ -248,8 +248,9 @@ static sonde_status refit_sites(const sonde_model *model, const sonde_site_table
   double *force_n = SONDE_NEW(double, plan->row_count);
   sonde_status status = theta && force_n ? SONDE_OK : sonde_fail_memory(error);
   if (!status)
-    status = sonde_refit_create(model, sites, m, plan, def, PATCH_REACH_M, &refit, error);
+    status = sonde_refit_create(model, sites, m, plan, def, REFIT_REACH_M, &refit, error);
   if (!status) sonde_refit_start(refit, result->curves, theta);
+  if (!status) sonde_refit_want_confidence(refit, &result->confidence);
   if (!status) status = sonde_refit_minimise(refit, theta, force_n, progress, &found, error);
   if (!status) {
     set_refitted(def, theta, &found, result);
@@ -274,6 +275,19 @@ static sonde_status allocate_result(const sonde_model *model, const sonde_site_t
   return SONDE_OK;
 }
 
+// Keeps a stage's forces and time.
+static sonde_status end_stage(sonde_fit_result *result, int stage, uint32_t count, double *start,
+                              sonde_error *error) {
+  double now = sonde_clock_now();
+  SONDE_ASSERT(stage >= 0 && stage < 3 && now >= *start);
+  result->seconds[stage] = now - *start;
+  *start = now;
+  double *copy = result->stage_n[stage] = SONDE_NEW(double, count);
+  if (!copy) return sonde_fail_memory(error);
+  memcpy(copy, result->model_n, count * sizeof *copy);
+  return SONDE_OK;
+}
+
 sonde_status sonde_fit(const sonde_model *model, const sonde_site_table *sites,
                        const sonde_measurements *measurements, const sonde_fit_def *def,
                        const sonde_progress *progress, sonde_fit_result *result,
@@ -288,10 +302,15 @@ sonde_status sonde_fit(const sonde_model *model, const sonde_site_table *sites,
   if (status) return status;
   sonde_site_problem problem = {.plan = &plan, .m = measurements};
   status = allocate_result(model, sites, measurements, result, error);
+  double start = sonde_clock_now();
   if (!status) status = fit_curves(model, sites, measurements, &plan, &full, result, error);
+  if (!status) status = end_stage(result, 0, measurements->count, &start, error);
   if (!status) status = fit_model(model, sites, &problem, &full, progress, result, error);
+  if (!status && full.stages > 1) status = end_stage(result, 1, measurements->count, &start, error);
   if (!status && full.stages == 3)
     status = refit_sites(model, sites, measurements, &plan, &full, progress, result, error);
+  if (!status && full.stages == 3)
+    status = end_stage(result, 2, measurements->count, &start, error);
   sonde_site_problem_clear(&problem);
   sonde_fit_plan_clear(&plan);
   if (status) sonde_fit_result_clear(result);
@@ -300,6 +319,11 @@ sonde_status sonde_fit(const sonde_model *model, const sonde_site_table *sites,
 
 void sonde_fit_result_clear(sonde_fit_result *result) {
   if (!result) return;
+  for (int k = 0; k < 3; ++k) sonde_free(result->stage_n[k]);
+  sonde_free(result->confidence.ln_k0_sd);
+  sonde_free(result->confidence.ln_xm_sd);
+  sonde_free(result->confidence.band_n);
+  sonde_free(result->confidence.one_out_n);
   sonde_free(result->curves);
   sonde_free(result->sites);
   sonde_free(result->model_n);

@@ -13,7 +13,9 @@
 #include <string.h>
 
 enum { NEWTON_LIMIT = 60 };
-static const double RELATIVE_RESIDUAL = 1e-6;
+// While the minimisation is under way, and for the forces that are reported.
+static const double ROUGH_RESIDUAL = 1e-4, FINE_RESIDUAL = 1e-7;
+static const double ROUGH_ADJOINT = 1e-3, FINE_ADJOINT = 1e-6;
 static const double PULL_ALONG_M = 0.010; // width of the rim that a footprint pulls along
 static const double LEAST_ROOM = 1.3;     // start of xm over the deepest datum
 
@@ -21,6 +23,7 @@ uint32_t sonde_refit_parameters(const sonde_refit *r) { return 2 * r->sites->cou
 
 bool sonde_refit_uses(const sonde_refit *r, uint32_t row) {
   uint32_t curve = r->plan->row_curve[row];
+  if (r->left_out && r->left_out[row]) return false;
   return (r->plan->curve_start[curve + 1] - 1 - row) % r->stride == 0;
 }
 
@@ -47,14 +50,14 @@ static sonde_status settle_datum(const sonde_refit *r, sonde_patch_solver *solve
   uint32_t places = solver->patch->place_count;
   SONDE_ASSERT(row < r->plan->row_count && depth_m >= before_depth_m);
   if (r->settled[row]) {
-    sonde_status status =
-        sonde_patch_settle(solver, depth_m, RELATIVE_RESIDUAL, NEWTON_LIMIT, s_m, error);
+    sonde_status status = sonde_patch_settle(
+        solver, depth_m, r->rough ? ROUGH_RESIDUAL : FINE_RESIDUAL, NEWTON_LIMIT, s_m, error);
     if (!status) return SONDE_OK;
   }
   double growth = before_depth_m > 0 ? depth_m / before_depth_m : 0;
   for (uint32_t i = 0; i < places; ++i) s_m[i] = before_m && growth > 0 ? growth * before_m[i] : 0;
-  sonde_status status =
-      sonde_patch_settle(solver, depth_m, RELATIVE_RESIDUAL, NEWTON_LIMIT, s_m, error);
+  sonde_status status = sonde_patch_settle(
+      solver, depth_m, r->rough ? ROUGH_RESIDUAL : FINE_RESIDUAL, NEWTON_LIMIT, s_m, error);
   r->settled[row] = !status;
   return status;
 }
@@ -95,6 +98,7 @@ static sonde_status work_on_curve(void *user, uint32_t worker, uint32_t curve,
   uint32_t parameters = sonde_refit_parameters(r);
   double *before = NULL, before_depth = 0;
   sonde_status status = SONDE_OK;
+  solver->adjoint_accuracy = r->rough ? ROUGH_ADJOINT : FINE_ADJOINT;
   sonde_patch_solver_use(solver, patch, &at->law);
   for (uint32_t k = r->plan->curve_start[curve]; k < r->plan->curve_start[curve + 1]; ++k) {
     if (!sonde_refit_uses(r, k)) continue;
@@ -130,6 +134,10 @@ sonde_status sonde_refit_forces(sonde_refit *r, const double *theta, double *for
                    jacobian};
   return sonde_parallel_run(r->plan->curve_count, r->workers, work_on_curve, &at, progress,
                             "stage 3", error);
+}
+
+void sonde_refit_want_confidence(sonde_refit *r, sonde_fit_confidence *confidence) {
+  r->confidence = confidence;
 }
 
 // A footprint of area A and perimeter P works like one of area A + P l + pi l^2 (docs/fit.md).
@@ -215,7 +223,13 @@ sonde_status sonde_refit_create(const sonde_model *model, const sonde_site_table
                                 sonde_error *error) {
   sonde_refit *r = *refit = SONDE_NEW(sonde_refit, 1);
   if (!r) return sonde_fail_memory(error);
-  *r = (sonde_refit){.model = model, .sites = sites, .m = m, .plan = plan, .def = def, .stride = 1};
+  *r = (sonde_refit){.model = model,
+                     .sites = sites,
+                     .m = m,
+                     .plan = plan,
+                     .def = def,
+                     .stride = 1,
+                     .smoothness_sd = 1};
   sonde_status status = allocate(r) ? SONDE_OK : sonde_fail_memory(error);
   for (uint32_t k = 0; k < plan->probe_count && !status; ++k)
     if (!(plan->mean_force_n[k] > 0))

@@ -6,6 +6,9 @@
 
 typedef struct sonde_refit sonde_refit;
 
+// Of the skin around a footprint that takes part.
+#define REFIT_REACH_M 0.05
+
 // Everything that does not change during the refit. Borrows all arguments.
 sonde_status sonde_refit_create(const sonde_model *model, const sonde_site_table *sites,
                                 const sonde_measurements *m, const sonde_fit_plan *plan,
@@ -33,6 +36,9 @@ typedef struct sonde_refit_result {
 sonde_status sonde_refit_minimise(sonde_refit *refit, double *theta, double *force_n,
                                   const sonde_progress *progress, sonde_refit_result *result,
                                   sonde_error *error);
+
+// Where the minimisation puts what is known about its result; NULL: not wanted.
+void sonde_refit_want_confidence(sonde_refit *refit, sonde_fit_confidence *confidence);
 
 // Generic start from the curves of stage 1.
 void sonde_refit_start(const sonde_refit *refit, const sonde_curve_fit *curves, double *theta);

@@ -25,8 +25,32 @@ struct sonde_refit {
   double *indentation_m; // equilibria of all rows
   uint32_t workers;
   sonde_refit_worker *crew;
+  double smoothness_sd;             // of ln k0 and ln xm per site spacing
+  sonde_fit_confidence *confidence; // NULL: not wanted
+  const bool *left_out;             // [row_count] rows that only get a force; NULL: none
+  bool rough;                       // equilibria need not be exact
   uint32_t stride; // every so many rows of a curve, counted from its last, take part
 };
+
+// Standard deviation of a relative error: what the model class leaves.
+#define REFIT_DATA_SD 0.02
+
+// Of the minimisation.
+typedef struct workspace {
+  uint32_t n, rows;
+  double *force_n, *jacobian;             // at the trial
+  double *kept_jacobian;                  // [rows * n] at the accepted point
+  double *matrix, *gradient;              // normal equations at the accepted point
+  double *factor, *step, *trial, *scaled; // scaled: a weighted row
+} workspace;
+
+// Tries several smoothnesses on the linearised problem at theta, sites left out one by one, and
+// keeps the best one in r.
+sonde_status sonde_refit_choose_smoothness(sonde_refit *r, workspace *w, const double *theta,
+                                           const double *force_n, sonde_error *error);
+// Fills r->confidence at the optimum theta.
+sonde_status sonde_refit_confidence(sonde_refit *r, workspace *w, const double *theta,
+                                    const double *force_n, sonde_error *error);
 
 bool sonde_refit_uses(const sonde_refit *refit, uint32_t row);
 

@@ -3,40 +3,28 @@
 // evaluate:  forces, derivatives and cost at a set of parameters.
 // sonde_refit_minimise: Levenberg-Marquardt with Marquardt's scaling.
 #include "fit/arrow.h"
+#include "fit/dense.h"
 #include "fit/refit_inside.h"
 
 #include "base/maths.h"
 
 #include <string.h>
 
-static const double DATA_SD = 0.02;      // of the probe's mean force: what the model class leaves
-static const double ROUGHNESS_SD = 0.03; // of ln k0 and ln xm per site spacing
-static const double LONGEST_STEP = 0.7;  // of a logarithm
-static const double ENOUGH = 1e-3;       // relative fall of the cost that counts as none
-static const double NOTHING = 1e-5;      // fall of an exact fit
-static const double DAMPING_START = 1e-3, DAMPING_LEAST = 1e-9, DAMPING_MOST = 1e9;
+static const double SMOOTHNESS_START = 0.03;
+static const double LONGEST_STEP = 0.7; // of a logarithm
+static const double ENOUGH = 1e-3;      // relative fall of the cost that counts as none
+static const double NOTHING = 1e-5;     // fall of an exact fit
+static const double DAMPING_START = 0.1, DAMPING_LEAST = 1e-9, DAMPING_MOST = 1e9;
 enum { MOST_ITERATIONS = 40, COARSE_STRIDE = 4 };
-
-typedef struct workspace {
-  uint32_t n, rows;
-  double *force_n, *jacobian;             // at the trial
-  double *matrix, *gradient;              // normal equations at the accepted point
-  double *factor, *step, *trial, *scaled; // scaled: a weighted row
-} workspace;
 
 static double loss_scale(const sonde_refit *r, double mean_n) {
   double scale = r->def->loss_scale;
   return r->def->weights == SONDE_WEIGHTS_RELATIVE ? scale : scale / mean_n;
 }
 
-// Lower triangle of weight * row row^T and the gradient. Entries that are 0 are skipped.
 static void add_row(workspace *w, const double *row, double residual, double weight) {
-  for (uint32_t a = 0; a < w->n; ++a) {
-    double scaled = weight * row[a];
-    if (fpclassify(scaled) == FP_ZERO) continue;
-    w->gradient[a] += scaled * residual;
-    for (uint32_t b = 0; b <= a; ++b) w->matrix[(size_t)a * w->n + b] += scaled * row[b];
-  }
+  sonde_add_outer(w->matrix, w->n, row, weight);
+  for (uint32_t a = 0; a < w->n; ++a) w->gradient[a] += weight * row[a] * residual;
 }
 
 static double add_data(const sonde_refit *r, workspace *w, bool normal) {
@@ -45,18 +33,19 @@ static double add_data(const sonde_refit *r, workspace *w, bool normal) {
     if (!sonde_refit_uses(r, k)) continue;
     double mean_n = r->plan->mean_force_n[r->plan->row_probe[k]], weight;
     double error = (w->force_n[k] - r->m->data[r->plan->row[k]].force_n) / mean_n;
-    cost += sonde_loss(r->def->loss, loss_scale(r, mean_n), error, &weight) / (DATA_SD * DATA_SD);
+    cost += sonde_loss(r->def->loss, loss_scale(r, mean_n), error, &weight) /
+            (REFIT_DATA_SD * REFIT_DATA_SD);
     SONDE_ASSERT(mean_n > 0);
     if (normal)
       add_row(w, w->jacobian + (size_t)k * w->n, error * mean_n,
-              weight / (mean_n * mean_n * DATA_SD * DATA_SD));
+              weight / (mean_n * mean_n * REFIT_DATA_SD * REFIT_DATA_SD));
   }
   return cost;
 }
 
 static double add_prior(const sonde_refit *r, workspace *w, const double *theta, bool normal) {
   uint32_t count = r->sites->count;
-  double cost = 0, weight = 1 / (ROUGHNESS_SD * ROUGHNESS_SD);
+  double cost = 0, weight = 1 / (r->smoothness_sd * r->smoothness_sd);
   for (uint32_t field = 0; field < 2; ++field)
     for (uint32_t s = 0; s < count; ++s) {
       const double *rough = &r->roughness[(size_t)s * count];
@@ -88,23 +77,9 @@ static bool solve(workspace *w, double damping) {
   double *a = w->factor, *x = w->step;
   memcpy(a, w->matrix, (size_t)n * n * sizeof *a);
   for (uint32_t j = 0; j < n; ++j) a[(size_t)j * n + j] *= 1 + damping;
-  for (uint32_t i = 0; i < n; ++i) {
-    for (uint32_t j = 0; j <= i; ++j) {
-      double sum = a[(size_t)i * n + j];
-      for (uint32_t k = 0; k < j; ++k) sum -= a[(size_t)i * n + k] * a[(size_t)j * n + k];
-      if (i == j && !(sum > 0)) return false;
-      a[(size_t)i * n + j] = i == j ? sqrt(sum) : sum / a[(size_t)j * n + j];
-    }
-  }
-  for (uint32_t i = 0; i < n; ++i) {
-    x[i] = -w->gradient[i];
-    for (uint32_t k = 0; k < i; ++k) x[i] -= a[(size_t)i * n + k] * x[k];
-    x[i] /= a[(size_t)i * n + i];
-  }
-  for (uint32_t i = n; i-- > 0;) {
-    for (uint32_t k = i + 1; k < n; ++k) x[i] -= a[(size_t)k * n + i] * x[k];
-    x[i] /= a[(size_t)i * n + i];
-  }
+  if (!sonde_cholesky(a, n)) return false;
+  for (uint32_t i = 0; i < n; ++i) x[i] = -w->gradient[i];
+  sonde_cholesky_solve(a, n, x);
   return true;
 }
 
@@ -118,19 +93,21 @@ static bool allocate(workspace *w) {
   size_t n = w->n;
   w->force_n = SONDE_NEW(double, w->rows);
   w->jacobian = SONDE_NEW(double, w->rows *n);
+  w->kept_jacobian = SONDE_NEW(double, w->rows *n);
   w->matrix = SONDE_NEW(double, n *n);
   w->factor = SONDE_NEW(double, n *n);
   w->gradient = SONDE_NEW(double, n);
   w->step = SONDE_NEW(double, n);
   w->trial = SONDE_NEW(double, n);
   w->scaled = SONDE_NEW(double, n);
-  return w->force_n && w->jacobian && w->matrix && w->factor && w->gradient && w->step &&
-         w->trial && w->scaled;
+  return w->force_n && w->jacobian && w->kept_jacobian && w->matrix && w->factor && w->gradient &&
+         w->step && w->trial && w->scaled;
 }
 
 static void release(workspace *w) {
   sonde_free(w->force_n);
   sonde_free(w->jacobian);
+  sonde_free(w->kept_jacobian);
   sonde_free(w->matrix);
   sonde_free(w->factor);
   sonde_free(w->gradient);
@@ -167,6 +144,9 @@ static void accept(const sonde_refit *r, workspace *w, double *theta, double *fo
   memcpy(theta, w->trial, w->n * sizeof *theta);
   memcpy(force_n, w->force_n, w->rows * sizeof *force_n);
   (void)assemble(r, w, theta, true);
+  double *swap = w->kept_jacobian;
+  w->kept_jacobian = w->jacobian;
+  w->jacobian = swap;
 }
 
 static sonde_status iterate(sonde_refit *r, workspace *w, double *theta, double *force_n,
@@ -187,7 +167,8 @@ static sonde_status iterate(sonde_refit *r, workspace *w, double *theta, double 
     if (status) return status;
     result->iterations++;
     if (!(cost < result->cost)) {
-      result->converged = size < 1e-6;
+      bool level = share >= 1 && cost - result->cost <= ENOUGH * result->cost + NOTHING;
+      result->converged = size < 1e-6 || level;
       if (result->converged) break;
       damping = fmax(10 * damping, 1e-6);
       continue;
@@ -218,7 +199,8 @@ static sonde_status descend(sonde_refit *r, workspace *w, uint32_t stride, doubl
   return iterate(r, w, theta, force_n, at, result, error);
 }
 
-// The way from the generic start to the neighbourhood of the optimum needs few depths.
+// The way from the generic start to the neighbourhood of the optimum needs few depths. The
+// smoothness is then chosen and the end found again with it.
 sonde_status sonde_refit_minimise(sonde_refit *r, double *theta, double *force_n,
                                   const sonde_progress *progress, sonde_refit_result *result,
                                   sonde_error *error) {
@@ -226,9 +208,20 @@ sonde_status sonde_refit_minimise(sonde_refit *r, double *theta, double *force_n
   SONDE_ASSERT(r->plan->row_count > 0);
   workspace w = {.n = sonde_refit_parameters(r), .rows = r->plan->row_count};
   stepwise at = {.outer = progress};
+  bool given = r->def->smoothness_sd > 0;
+  r->smoothness_sd = given ? r->def->smoothness_sd : SMOOTHNESS_START;
   sonde_status status = allocate(&w) ? SONDE_OK : sonde_fail_memory(error);
+  r->rough = true;
   if (!status) status = descend(r, &w, COARSE_STRIDE, theta, force_n, &at, result, error);
+  if (!status && !given) status = sonde_refit_choose_smoothness(r, &w, theta, force_n, error);
   if (!status) status = descend(r, &w, 1, theta, force_n, &at, result, error);
+  r->rough = false;
+  if (!status) {
+    memcpy(w.trial, theta, w.n * sizeof *theta);
+    status = try_point(r, &w, &at, &result->cost, error);
+    if (!status) accept(r, &w, theta, force_n);
+  }
+  if (!status && r->confidence) status = sonde_refit_confidence(r, &w, theta, force_n, error);
   release(&w);
   return status;
 }

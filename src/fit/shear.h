@@ -49,7 +49,8 @@ typedef struct sonde_patch_law {
 typedef struct sonde_patch_solver {
   const sonde_patch *patch;
   sonde_patch_law law;
-  sonde_ldl *ldl;         // of a matrix of patch; NULL before its first factorisation
+  double adjoint_accuracy; // relative, of the gradients; 1e-6 from creation
+  sonde_ldl *ldl;          // of a matrix of patch; NULL before its first factorisation
   double *k0_n_m3, *xm_m; // of the places
   double *residual, *step, *trial, *multiplier, *value, *scratch;
   double *right, *preconditioned, *direction, *product;

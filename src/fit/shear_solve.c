@@ -11,7 +11,7 @@
 #include <string.h>
 
 enum { SHORTENINGS = 40, GRADIENT_STEPS = 8 };
-static const double NEWTON_ACCURACY = 1e-2, ADJOINT_ACCURACY = 1e-6;
+static const double NEWTON_ACCURACY = 1e-2;
 static const double NEGLIGIBLE_N = 1e-13;
 
 // Slope of a face and its gradient: flux[k] = half the cotangent Laplacian of s at corner k, so
@@ -201,7 +201,7 @@ static sonde_status adjoint(sonde_patch_solver *solver, const double *s, double 
       mu[in] -= pair * p->cosine[out];
     }
   }
-  return solve(solver, mu, ADJOINT_ACCURACY, error);
+  return solve(solver, mu, solver->adjoint_accuracy, error);
 }
 
 // p(s; k0, xm) = k0 xm f(s/xm), so k0 dp/dk0 = p and xm dp/dxm = p - s p', straight part included;
@@ -248,7 +248,8 @@ sonde_status sonde_patch_solver_create(const sonde_patch *patches, uint32_t coun
     if (p->row_start[p->free_count] > entries) entries = p->row_start[p->free_count];
   }
   SONDE_ASSERT(places > 0 && entries > 0);
-  *solver = (sonde_patch_solver){.k0_n_m3 = SONDE_NEW(double, places),
+  *solver = (sonde_patch_solver){.adjoint_accuracy = 1e-6,
+                                 .k0_n_m3 = SONDE_NEW(double, places),
                                  .xm_m = SONDE_NEW(double, places),
                                  .residual = SONDE_NEW(double, places),
                                  .step = SONDE_NEW(double, places),

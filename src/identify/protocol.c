@@ -32,8 +32,8 @@ sonde_protocol sonde_protocol_default(sonde_protocol_kind kind) {
   if (kind == SONDE_PROTOCOL_RAMP_HOLD) return p;
   const double speeds[] = {0.01, 0.02, 0.06};
   memcpy(p.speed_m_s, speeds, sizeof speeds);
-  p.speed_count = 3;
   p.depth_m = 0.005;
+  p.hold_s = 0.1;
   return p;
 }
 

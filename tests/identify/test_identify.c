@@ -53,6 +53,7 @@ static void friction_comes_back(void **unused) {
     sonde_protocol p = sonde_protocol_default(SONDE_PROTOCOL_SLIDE);
     p.depth_m = 6e-3; // deeper, the skin piles up before the ends of the probe
     p.slide_m = 6e-3;
+    p.hold_s = 0.05;
     p.speed_m_s[0] = 0.01;
     p.speed_m_s[1] = 0.02;
     p.speed_m_s[2] = 0.06;
@@ -62,7 +63,8 @@ static void friction_comes_back(void **unused) {
     sonde_error error = {0};
     assert_ok(sonde_identify_friction(model, &record, 1, NULL, NULL, &found, &error), &error);
     assert_near(found.mu_kinetic.value, truth[k].mu_kinetic, 0.05 * truth[k].mu_kinetic);
-    assert_near(found.mu_static.value, truth[k].mu_static, 0.05 * truth[k].mu_static);
+    // Without a fall from mu_s to mu_k the rise towards rest is a guess.
+    assert_near(found.mu_static.value, truth[k].mu_static, (k ? 0.1 : 0.05) * truth[k].mu_static);
     assert_true(found.mu_kinetic.identified);
     sonde_motion_record_clear(&record);
     sonde_model_destroy(model);

@@ -1,0 +1,256 @@
+// settle_stage2:  what the simplified interaction's parameters give when neighbours may move.
+// linear_springs: the best linear law for every curve, the claim that the paper rejects.
+// add_*:          the report's tables.
+// fit_report_write: all of it.
+#include "fit_report.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+enum { STAGES = 5, HOLDOUTS = 2 * SONDE_FIT_PROBES, NOTES = 4 };
+
+typedef struct builder {
+  const fit_findings *in;
+  sonde_fit_report report;
+  sonde_report_stage stage[STAGES];
+  sonde_report_parameter parameter[8];
+  sonde_report_holdout holdout[HOLDOUTS];
+  sonde_report_timing timing[3];
+  sonde_report_site *site;
+  double correlation[16];
+  double *stage2_full_n, *linear_n;
+  const char *note[NOTES];
+  char date[32], text[NOTES][256];
+} builder;
+
+static void add_stage(builder *b, const char *name, uint32_t parameters, const double *model_n,
+                      bool is_main) {
+  if (!model_n) return;
+  b->stage[b->report.stage_count++] = (sonde_report_stage){name, parameters, model_n, is_main};
+}
+
+// The least squares line F = k x through the origin for every (site, probe).
+static void linear_springs(const sonde_measurements *m, double *linear_n) {
+  for (uint32_t i = 0; i < m->count; ++i) {
+    double xf = 0, xx = 0;
+    for (uint32_t k = 0; k < m->count; ++k) {
+      if (m->data[k].site != m->data[i].site || strcmp(m->data[k].probe, m->data[i].probe) != 0)
+        continue;
+      xf += m->data[k].penetration_m * m->data[k].force_n;
+      xx += m->data[k].penetration_m * m->data[k].penetration_m;
+    }
+    linear_n[i] = xx > 0 ? xf / xx * m->data[i].penetration_m : NAN;
+  }
+}
+
+static sonde_report_interval around(double value, double ln_sd) {
+  sonde_report_interval i = sonde_report_value(value);
+  i.lower = value * exp(-1.96 * ln_sd);
+  i.upper = value * exp(1.96 * ln_sd);
+  return i;
+}
+
+static void add_parameters(builder *b) {
+  const sonde_fit_result *r = b->in->result;
+  const sonde_fit_confidence *c = &r->confidence;
+  uint32_t count = 0;
+  b->parameter[count++] = (sonde_report_parameter){"edge stiffness of stage 2", "N/m",
+                                                   around(r->stage2_edge_n_m, r->edge_sd_log),
+                                                   "simplified interaction"};
+  if (c->band_n) {
+    sonde_report_interval g = around(r->law.shear_stiffness_n_m, c->ln_shear_sd);
+    sonde_report_interval gm = around(r->law.shear_limit, c->ln_limit_sd);
+    g.bootstrap_lower = c->shear_95[0], g.bootstrap_upper = c->shear_95[1];
+    gm.bootstrap_lower = c->limit_95[0], gm.bootstrap_upper = c->limit_95[1];
+    b->parameter[count++] =
+        (sonde_report_parameter){"shear stiffness G", "N/m", g, "bootstrap over sites, linearised"};
+    b->parameter[count++] = (sonde_report_parameter){"shear limit gm", "slope", gm, NULL};
+    b->parameter[count++] = (sonde_report_parameter){
+        "exponent of the normal springs", "", sonde_report_value(r->law.normal_exponent), "chosen"};
+    b->parameter[count++] = (sonde_report_parameter){
+        "tangential stiffness", "N/m3", sonde_report_value(r->law.tangential_stiffness_n_m3),
+        "chosen: these data do not determine it"};
+    b->parameter[count++] =
+        (sonde_report_parameter){"smoothness of ln k0 and ln xm per site spacing", "",
+                                 sonde_report_value(c->smoothness_sd), "by leaving sites out"};
+  }
+  b->report.parameters = b->parameter;
+  b->report.parameter_count = count;
+}
+
+static void add_sites(builder *b) {
+  const sonde_fit_result *r = b->in->result;
+  const sonde_fit_confidence *c = &r->confidence;
+  if (!c->band_n) return;
+  for (uint32_t s = 0; s < r->site_count; ++s)
+    b->site[s] = (sonde_report_site){r->sites[s].id, around(r->sites[s].k0_n_m3, c->ln_k0_sd[s]),
+                                     around(r->sites[s].xm_m, c->ln_xm_sd[s])};
+  b->report.site_parameters = b->site;
+  b->report.site_parameter_count = r->site_count;
+  static const char *const NAMES[] = {"ln G", "ln gm", "mean ln k0", "mean ln xm"};
+  for (int k = 0; k < 16; ++k) b->correlation[k] = c->correlation[k / 4][k % 4];
+  b->report.correlation_names = NAMES;
+  b->report.correlation = b->correlation;
+  b->report.correlation_count = 4;
+  b->report.band_n = c->band_n;
+}
+
+static void add_holdout(builder *b, const char *what, const sonde_error_report *out) {
+  const sonde_error_report *seen = &b->in->result->stage3;
+  for (uint32_t p = 0; p < out->probe_count && b->report.holdout_count < HOLDOUTS; ++p) {
+    if (!out->probes[p].count) continue;
+    double training = NAN;
+    for (uint32_t q = 0; q < seen->probe_count; ++q)
+      if (!strcmp(seen->probe[q], out->probe[p])) training = seen->probes[q].mae_percent;
+    b->holdout[b->report.holdout_count++] = (sonde_report_holdout){what,
+                                                                   out->probe[p],
+                                                                   out->probes[p].mae_n,
+                                                                   out->probes[p].sd_n,
+                                                                   out->probes[p].mae_percent,
+                                                                   training};
+  }
+  b->report.holdouts = b->holdout;
+}
+
+static void add_timings(builder *b) {
+  static const char *const NAMES[] = {"stage 1", "stage 2", "stage 3"};
+  for (uint32_t k = 0; k < 3; ++k)
+    if (b->in->result->stage_n[k])
+      b->timing[b->report.timing_count++] =
+          (sonde_report_timing){NAMES[k], b->in->result->seconds[k]};
+  b->report.timings = b->timing;
+}
+
+static void add_notes(builder *b) {
+  const sonde_fit_confidence *c = &b->in->result->confidence;
+  uint32_t count = 0;
+  if (c->tried_count) {
+    int used = snprintf(b->text[count], sizeof b->text[0],
+                        "Error of sites left out one by one (linearised), by smoothness:");
+    for (uint32_t k = 0; k < c->tried_count && used > 0 && (size_t)used < sizeof b->text[0]; ++k)
+      used += snprintf(b->text[count] + used, sizeof b->text[0] - (size_t)used, " %g: %.2f %%%s",
+                       c->tried_sd[k], c->tried_percent[k], k + 1 < c->tried_count ? "," : ".");
+    b->note[count] = b->text[count];
+    ++count;
+  }
+  if (b->in->data->remark[0]) b->note[count++] = b->in->data->remark;
+  b->report.notes = b->note;
+  b->report.note_count = count;
+}
+
+// Settling the whole set takes minutes: a sample of the sites tells enough.
+enum { SAMPLE = 8, SAMPLE_FIRST = 3 };
+
+static sonde_status predict_sample(const sonde_model *model, const fit_findings *in,
+                                   const sonde_progress *progress, double *full_n,
+                                   sonde_error *error) {
+  const sonde_measurements *m = in->data;
+  sonde_measurements some = *m;
+  some.data = calloc(m->count, sizeof *some.data);
+  uint32_t *row = calloc(m->count, sizeof *row);
+  double *some_n = calloc(m->count, sizeof *some_n);
+  sonde_status status = some.data && row && some_n ? SONDE_OK : SONDE_MEMORY;
+  some.count = 0;
+  for (uint32_t i = 0; i < m->count && !status; ++i) {
+    uint32_t s = 0;
+    while (s < in->sites->count && in->sites->sites[s].id != m->data[i].site) ++s;
+    full_n[i] = NAN;
+    if (s % SAMPLE != SAMPLE_FIRST % in->sites->count) continue;
+    row[some.count] = i;
+    some.data[some.count++] = m->data[i];
+  }
+  sonde_predict_def def = sonde_predict_def_default();
+  def.interaction = SONDE_INTERACTION_FULL;
+  def.relative_residual = 1e-4;
+  if (!status && some.count)
+    status = sonde_predict(model, in->sites, &some, &def, progress, some_n, error);
+  for (uint32_t k = 0; k < some.count && !status; ++k) full_n[row[k]] = some_n[k];
+  free(some.data);
+  free(row);
+  free(some_n);
+  return status;
+}
+
+// Forces of the stage 2 parameters on the equilibrium of the whole skin.
+static sonde_status settle_stage2(const fit_findings *in, const sonde_progress *progress,
+                                  double *full_n, sonde_error *error) {
+  sonde_fit_def def = sonde_fit_def_default();
+  sonde_fit_result stage2;
+  sonde_model *model = NULL;
+  sonde_model_def md = sonde_model_def_default();
+  md.skin = &in->model->surface;
+  md.sites = in->sites->sites;
+  md.site_count = in->sites->count;
+  md.fine_edge_m = 1; // the skin is refined already
+  md.law.normal_exponent = 1;
+  sonde_status status = sonde_model_build(&md, &model, error);
+  if (status) return status;
+  status = sonde_fit(model, in->sites, in->data, &def, NULL, &stage2, error);
+  if (!status) {
+    status = sonde_model_set_parameters(model, &stage2.law, stage2.sites, stage2.site_count, error);
+    if (!status) status = predict_sample(model, in, progress, full_n, error);
+    sonde_fit_result_clear(&stage2);
+  }
+  sonde_model_destroy(model);
+  return status;
+}
+
+static void add_stages(builder *b) {
+  const sonde_fit_result *r = b->in->result;
+  bool three = r->stage_n[2] != NULL;
+  b->report.stages = b->stage;
+  add_stage(b, "linear springs, curve by curve", r->stage1_parameters / 2, b->linear_n, false);
+  add_stage(b, "stage 1, eq. (1) curve by curve", r->stage1_parameters, r->stage_n[0],
+            !r->stage_n[1]);
+  add_stage(b, "stage 2 in its simplified interaction (the paper)", r->stage2_parameters,
+            r->stage_n[1], !three);
+  add_stage(b, "stage 2's parameters in the full model (every eighth site)", r->stage2_parameters,
+            b->stage2_full_n, false);
+  add_stage(b, "stage 3, full model", r->parameters, r->stage_n[2], three);
+}
+
+sonde_status fit_report_write(const fit_findings *in, const char *directory,
+                              const sonde_progress *progress, sonde_error *error) {
+  builder *b = calloc(1, sizeof *b);
+  double *full_n = calloc(in->data->count, sizeof *full_n);
+  double *linear_n = calloc(in->data->count, sizeof *linear_n);
+  sonde_report_site *site = calloc(in->result->site_count, sizeof *site);
+  sonde_status status = SONDE_MEMORY;
+  if (!b || !full_n || !linear_n || !site) goto done;
+  *b = (builder){.in = in, .linear_n = linear_n, .site = site};
+  b->report = (sonde_fit_report){.title = "Estimation report",
+                                 .provenance = in->model->provenance,
+                                 .command_line = in->command_line,
+                                 .version = sonde_version(),
+                                 .model = in->model,
+                                 .sites = in->sites,
+                                 .data = in->data};
+  time_t now = time(NULL);
+  struct tm parts;
+  if (gmtime_r(&now, &parts) && strftime(b->date, sizeof b->date, "%Y-%m-%d %H:%M UTC", &parts))
+    b->report.date = b->date;
+  linear_springs(in->data, linear_n);
+  status = SONDE_OK;
+  if (in->result->stage_n[1]) {
+    b->stage2_full_n = full_n;
+    status = settle_stage2(in, progress, full_n, error);
+  }
+  add_stages(b);
+  add_parameters(b);
+  add_sites(b);
+  if (in->result->confidence.one_out_n)
+    add_holdout(b, "one site at a time (linearised)", &in->result->confidence.one_out);
+  if (in->hold_out) add_holdout(b, in->hold_out_name, in->hold_out);
+  add_timings(b);
+  add_notes(b);
+  if (!status) status = sonde_fit_report_write(&b->report, directory, error);
+done:
+  free(b);
+  free(full_n);
+  free(linear_n);
+  free(site);
+  return status;
+}
