@@ -12,7 +12,7 @@
 extern "C" {
 #endif
 
-/** Measured sites; arrays are released by sonde_site_table_clear(). */
+/** Measured sites. */
 typedef struct sonde_site_table {
   uint32_t count;
   sonde_site *sites;   /**< [count] k0 and xm are 0: not fitted */
@@ -85,10 +85,9 @@ enum { SONDE_FIT_PROBES = 8 };
 
 /** The statistics per probe (in order of first appearance) and pooled. */
 typedef struct sonde_error_report {
-  sonde_error_statistics all;
+  sonde_error_statistics all, probes[SONDE_FIT_PROBES];
   uint32_t probe_count;
   char probe[SONDE_FIT_PROBES][24];
-  sonde_error_statistics probes[SONDE_FIT_PROBES];
   uint32_t left_out; /**< rows without a finite model value */
 } sonde_error_report;
 
@@ -134,10 +133,8 @@ SONDE_API sonde_fit_def sonde_fit_def_default(void);
 typedef struct sonde_curve_fit {
   uint32_t site;
   char probe[24];
-  uint32_t count;
-  double k0_n_m3, xm_m;
-  double mae_n;
-  uint32_t iterations;
+  uint32_t count, iterations;
+  double k0_n_m3, xm_m, mae_n;
   bool converged;
 } sonde_curve_fit;
 
@@ -152,7 +149,6 @@ SONDE_API sonde_status sonde_fit_curve(const double *penetration_m, const double
                                        sonde_curve_fit *fit, sonde_error *error);
 
 enum { SONDE_FIT_TRIED = 7 };
-
 /** How far stage 3 is to be trusted; intervals are estimate +- 1.96 sd in the logarithms. */
 typedef struct sonde_fit_confidence {
   double smoothness_sd; /**< of ln k0 and ln xm per site spacing, chosen by leaving sites out */
@@ -167,7 +163,7 @@ typedef struct sonde_fit_confidence {
   sonde_error_report one_out;
 } sonde_fit_confidence;
 
-/** What an estimation found; released by sonde_fit_result_clear(). */
+/** What an estimation found. */
 typedef struct sonde_fit_result {
   uint32_t curve_count;
   sonde_curve_fit *curves; /**< stage 1, [curve_count] by site, then probe */

@@ -3,6 +3,7 @@
 // step_without:    where the linearised optimum goes without one site.
 // sonde_refit_choose_smoothness: the prior whose left-out sites are predicted best.
 // sandwich:        covariance from the residuals themselves.
+// add_prior_spread: what the smoothness adds to it.
 // bootstrap:       linearised refits with sites drawn again.
 // sonde_refit_confidence: all of it at the optimum.
 #include "fit/dense.h"
@@ -22,7 +23,7 @@ static const double NORMAL_95 = 1.959964;
 static const double *weighted_row(const sonde_refit *r, workspace *w, uint32_t k,
                                   const double *force_n, double *residual) {
   const sonde_fit_plan *plan = r->plan;
-  double scale = 1 / (REFIT_DATA_SD * plan->mean_force_n[plan->row_probe[k]]);
+  double scale = 1 / sonde_refit_sd_n(r, k);
   SONDE_ASSERT(k < w->rows && scale > 0);
   for (uint32_t a = 0; a < w->n; ++a) w->scaled[a] = scale * w->kept_jacobian[(size_t)k * w->n + a];
   *residual = scale * (force_n[k] - r->m->data[plan->row[k]].force_n);
@@ -153,12 +154,11 @@ done:
   return status;
 }
 
-// Covariance H^-1 (sum r^2/(1 - h) J J^T) H^-1: the spread of the residuals as they are, whatever
+// Covariance H^-1 (sum r^2/(1 - h)^2 J J^T) H^-1: the spread of the residuals as they are, whatever
 // their standard deviations were assumed to be; h is the leverage. factor: Cholesky of H.
 static void sandwich(const sonde_refit *r, workspace *w, const double *force_n, linear *l,
                      double *covariance) {
   uint32_t n = l->n;
-  memset(l->data, 0, (size_t)n * n * sizeof *l->data);
   for (uint32_t k = 0; k < w->rows; ++k) {
     if (!sonde_refit_uses(r, k)) continue;
     double residual, leverage = 0;
@@ -167,8 +167,23 @@ static void sandwich(const sonde_refit *r, workspace *w, const double *force_n, 
     sonde_cholesky_solve(l->factor, n, l->step);
     for (uint32_t a = 0; a < n; ++a) leverage += row[a] * l->step[a];
     SONDE_ASSERT(leverage >= 0);
-    sonde_add_outer(covariance, n, l->step, residual * residual / fmax(1 - leverage, 0.05));
+    double room = fmax(1 - leverage, 0.2);
+    sonde_add_outer(covariance, n, l->step, residual * residual / (room * room));
   }
+}
+
+// The smoothness holds the fields only as far as it is true: its own spread counts too.
+static void add_prior_spread(const sonde_refit *r, linear *l, double *covariance) {
+  uint32_t count = r->sites->count, n = l->n;
+  double weight = 1 / (r->smoothness_sd * r->smoothness_sd);
+  SONDE_ASSERT(2 * count < n && isfinite(weight));
+  for (uint32_t field = 0; field < 2; ++field)
+    for (uint32_t s = 0; s < count; ++s) {
+      memset(l->step, 0, n * sizeof *l->step);
+      memcpy(l->step + field * count, &r->roughness[(size_t)s * count], count * sizeof *l->step);
+      sonde_cholesky_solve(l->factor, n, l->step);
+      sonde_add_outer(covariance, n, l->step, weight);
+    }
 }
 
 static double lower(const double *a, uint32_t n, uint32_t i, uint32_t j) {
@@ -291,6 +306,7 @@ sonde_status sonde_refit_confidence(sonde_refit *r, workspace *w, const double *
     goto done;
   }
   sandwich(r, w, force_n, &l, covariance);
+  add_prior_spread(r, &l, covariance);
   fill(r, w, covariance, c);
   bootstrap(r, w, theta, force_n, &l, c);
   status = sonde_error_report_of(r->m->data, c->one_out_n, r->m->count, &c->one_out, error);

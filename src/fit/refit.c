@@ -1,3 +1,4 @@
+// sonde_refit_sd_n: how much a row counts.
 // spread:          node fields from site parameters.
 // settle_datum:    equilibrium of one row, from its last one or from the depth before.
 // work_on_curve:   all depths of a curve, with adjoint gradients carried to the sites.
@@ -16,6 +17,7 @@ enum { NEWTON_LIMIT = 60 };
 // While the minimisation is under way, and for the forces that are reported.
 static const double ROUGH_RESIDUAL = 1e-4, FINE_RESIDUAL = 1e-7;
 static const double ROUGH_ADJOINT = 1e-3, FINE_ADJOINT = 1e-6;
+static const double DATA_SD = 0.02, MEAN_SHARE = 0.4;
 static const double PULL_ALONG_M = 0.010; // width of the rim that a footprint pulls along
 static const double LEAST_ROOM = 1.3;     // start of xm over the deepest datum
 
@@ -25,6 +27,13 @@ bool sonde_refit_uses(const sonde_refit *r, uint32_t row) {
   uint32_t curve = r->plan->row_curve[row];
   if (r->left_out && r->left_out[row]) return false;
   return (r->plan->curve_start[curve + 1] - 1 - row) % r->stride == 0;
+}
+
+double sonde_refit_sd_n(const sonde_refit *r, uint32_t row) {
+  double mean_n = r->plan->mean_force_n[r->plan->row_probe[row]];
+  double force_n = r->m->data[r->plan->row[row]].force_n;
+  SONDE_ASSERT(mean_n > 0);
+  return DATA_SD * (MEAN_SHARE * mean_n + (1 - MEAN_SHARE) * fmax(force_n, 0));
 }
 
 static void spread(sonde_refit *r, const double *theta) {

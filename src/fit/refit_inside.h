@@ -32,8 +32,10 @@ struct sonde_refit {
   uint32_t stride; // every so many rows of a curve, counted from its last, take part
 };
 
-// Standard deviation of a relative error: what the model class leaves.
-#define REFIT_DATA_SD 0.02
+// Standard deviation of a row's error: what the model class leaves, 2 % of a force between the
+// row's own and its probe's mean. The part of the mean keeps sensor noise at small depths in
+// bounds.
+double sonde_refit_sd_n(const sonde_refit *refit, uint32_t row);
 
 // Of the minimisation.
 typedef struct workspace {

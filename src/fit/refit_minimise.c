@@ -11,15 +11,17 @@
 #include <string.h>
 
 static const double SMOOTHNESS_START = 0.03;
-static const double LONGEST_STEP = 0.7; // of a logarithm
-static const double ENOUGH = 1e-3;      // relative fall of the cost that counts as none
-static const double NOTHING = 1e-5;     // fall of an exact fit
+static const double LONGEST_STEP = 0.7;   // of a logarithm
+static const double ENOUGH = 1e-3;        // relative fall of the cost that counts as none
+static const double NOTHING = 1e-5;       // fall of an exact fit
+static const double SMALL_DAMPING = 1e-3; // a nearly full Gauss-Newton step
 static const double DAMPING_START = 0.1, DAMPING_LEAST = 1e-9, DAMPING_MOST = 1e9;
 enum { MOST_ITERATIONS = 40, COARSE_STRIDE = 4 };
 
-static double loss_scale(const sonde_refit *r, double mean_n) {
-  double scale = r->def->loss_scale;
-  return r->def->weights == SONDE_WEIGHTS_RELATIVE ? scale : scale / mean_n;
+// Scale of a robust loss in newtons.
+static double loss_scale(const sonde_refit *r, uint32_t row) {
+  double mean_n = r->plan->mean_force_n[r->plan->row_probe[row]], scale = r->def->loss_scale;
+  return r->def->weights == SONDE_WEIGHTS_RELATIVE ? scale * mean_n : scale;
 }
 
 static void add_row(workspace *w, const double *row, double residual, double weight) {
@@ -31,14 +33,10 @@ static double add_data(const sonde_refit *r, workspace *w, bool normal) {
   double cost = 0;
   for (uint32_t k = 0; k < w->rows; ++k) {
     if (!sonde_refit_uses(r, k)) continue;
-    double mean_n = r->plan->mean_force_n[r->plan->row_probe[k]], weight;
-    double error = (w->force_n[k] - r->m->data[r->plan->row[k]].force_n) / mean_n;
-    cost += sonde_loss(r->def->loss, loss_scale(r, mean_n), error, &weight) /
-            (REFIT_DATA_SD * REFIT_DATA_SD);
-    SONDE_ASSERT(mean_n > 0);
-    if (normal)
-      add_row(w, w->jacobian + (size_t)k * w->n, error * mean_n,
-              weight / (mean_n * mean_n * REFIT_DATA_SD * REFIT_DATA_SD));
+    double sd_n = sonde_refit_sd_n(r, k), weight;
+    double error_n = w->force_n[k] - r->m->data[r->plan->row[k]].force_n;
+    cost += sonde_loss(r->def->loss, loss_scale(r, k) / sd_n, error_n / sd_n, &weight);
+    if (normal) add_row(w, w->jacobian + (size_t)k * w->n, error_n, weight / (sd_n * sd_n));
   }
   return cost;
 }
@@ -167,7 +165,8 @@ static sonde_status iterate(sonde_refit *r, workspace *w, double *theta, double 
     if (status) return status;
     result->iterations++;
     if (!(cost < result->cost)) {
-      bool level = share >= 1 && cost - result->cost <= ENOUGH * result->cost + NOTHING;
+      bool level = share >= 1 && damping <= SMALL_DAMPING &&
+                   cost - result->cost <= ENOUGH * result->cost + NOTHING;
       result->converged = size < 1e-6 || level;
       if (result->converged) break;
       damping = fmax(10 * damping, 1e-6);

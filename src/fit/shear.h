@@ -51,7 +51,7 @@ typedef struct sonde_patch_solver {
   sonde_patch_law law;
   double adjoint_accuracy; // relative, of the gradients; 1e-6 from creation
   sonde_ldl *ldl;          // of a matrix of patch; NULL before its first factorisation
-  double *k0_n_m3, *xm_m; // of the places
+  double *k0_n_m3, *xm_m;  // of the places
   double *residual, *step, *trial, *multiplier, *value, *scratch;
   double *right, *preconditioned, *direction, *product;
 } sonde_patch_solver;

@@ -2,6 +2,7 @@
 // the independence of the result of the number of threads.
 #include "fit_test.h"
 
+#include "base/random.h"
 #include "fit_plate.h"
 
 static sonde_fit_result refit(const bundled *b, uint32_t threads) {
@@ -51,10 +52,116 @@ static void threads_do_not_change_the_result(void **state) {
   bundled_clear(&b);
 }
 
+// Nine neighbouring sites of the 8 x 8 with their rows.
+static void keep_nine_sites(bundled *b) {
+  uint32_t kept = 0, rows = 0;
+  for (uint32_t s = 0; s < b->sites.count; ++s)
+    if (s / 8 >= 2 && s / 8 <= 4 && s % 8 >= 2 && s % 8 <= 4)
+      b->sites.sites[kept++] = b->sites.sites[s];
+  b->sites.count = kept;
+  for (uint32_t r = 0; r < b->m.count; ++r)
+    for (uint32_t s = 0; s < kept; ++s)
+      if (b->m.data[r].site == b->sites.sites[s].id) b->m.data[rows++] = b->m.data[r];
+  b->m.count = rows;
+}
+
+// Sensor errors of 0.1 N and 0.1 mm.
+static void add_noise(sonde_measurements *m, const sonde_datum *exact, uint64_t seed) {
+  for (uint32_t k = 0; k < m->count; ++k) {
+    m->data[k] = exact[k];
+    m->data[k].force_n += 0.1 * sonde_random_normal(seed, 2 * (uint64_t)k);
+    m->data[k].penetration_m += 1e-4 * sonde_random_normal(seed, 2 * (uint64_t)k + 1);
+  }
+}
+
+static uint32_t covered(const sonde_fit_result *r, const sonde_fit_result *truth) {
+  uint32_t in = 0;
+  const sonde_fit_confidence *c = &r->confidence;
+  for (uint32_t s = 0; s < r->site_count; ++s) {
+    double k = log(r->sites[s].k0_n_m3 / truth->sites[s].k0_n_m3);
+    double x = log(r->sites[s].xm_m / truth->sites[s].xm_m);
+    in += fabs(k) < 1.96 * c->ln_k0_sd[s];
+    in += fabs(x) < 1.96 * c->ln_xm_sd[s];
+  }
+  double g = log(r->law.shear_stiffness_n_m / truth->law.shear_stiffness_n_m);
+  double gm = log(r->law.shear_limit / truth->law.shear_limit);
+  return in + (fabs(g) < 1.96 * c->ln_shear_sd) + (fabs(gm) < 1.96 * c->ln_limit_sd);
+}
+
+// What a model measures of itself, with noise, leads back to its parameters as often as the
+// intervals say.
+static void intervals_cover_the_truth(void **state) {
+  (void)state;
+  const char *wanted = getenv("SONDE_TEST_RUNS");
+  uint32_t runs = wanted ? (uint32_t)atoi(wanted) : 12, in = 0, all = 0;
+  bundled b = bundled_load("indentation.csv", 6.0);
+  keep_nine_sites(&b);
+  sonde_fit_def def = sonde_fit_def_default();
+  def.stages = 3;
+  def.smoothness_sd = 0.1;
+  sonde_fit_result truth, again;
+  sonde_error error;
+  assert_ok(sonde_fit(b.model, &b.sites, &b.m, &def, NULL, &truth, &error), &error);
+  for (uint32_t k = 0; k < b.m.count; ++k) b.m.data[k].force_n = truth.model_n[k];
+  sonde_datum *exact = SONDE_NEW(sonde_datum, b.m.count);
+  memcpy(exact, b.m.data, b.m.count * sizeof *exact);
+  for (uint32_t run = 0; run < runs; ++run) {
+    add_noise(&b.m, exact, 100 + run);
+    assert_ok(sonde_fit(b.model, &b.sites, &b.m, &def, NULL, &again, &error), &error);
+    in += covered(&again, &truth);
+    all += again.parameters;
+    sonde_fit_result_clear(&again);
+  }
+  print_message("95 %% intervals cover %.1f %% of %u parameters in %u runs\n", 100.0 * in / all,
+                all, runs);
+  assert_true(in >= 0.90 * all && in <= 0.995 * all);
+  sonde_fit_result_clear(&truth);
+  sonde_free(exact);
+  bundled_clear(&b);
+}
+
+// Every row is left out once, and is then predicted worse than when it was seen; leaving sites out
+// in the linearised problem says nearly the same. By depth only the deep rows are left out.
+static void hold_out_predicts_what_was_not_seen(void **state) {
+  (void)state;
+  bundled b = bundled_load("indentation.csv", 6.0);
+  keep_nine_sites(&b);
+  sonde_fit_def def = sonde_fit_def_default();
+  def.stages = 3;
+  sonde_fit_result result;
+  sonde_error error;
+  assert_ok(sonde_fit(b.model, &b.sites, &b.m, &def, NULL, &result, &error), &error);
+  double *out_n = SONDE_NEW(double, b.m.count);
+  sonde_error_report out;
+  assert_ok(sonde_fit_hold_out(b.model, &b.sites, &b.m, &def, &result, SONDE_HOLD_OUT_SITES, NULL,
+                               out_n, &error),
+            &error);
+  assert_ok(sonde_error_report_of(b.m.data, out_n, b.m.count, &out, &error), &error);
+  print_message("seen %.2f %%, left out %.2f %%, linearised %.2f %%\n",
+                result.stage3.all.mae_percent, out.all.mae_percent,
+                result.confidence.one_out.all.mae_percent);
+  assert_int_equal(out.left_out, 0);
+  assert_true(out.all.mae_percent > result.stage3.all.mae_percent);
+  assert_true(out.all.mae_percent < 12);
+  assert_near(result.confidence.one_out.all.mae_percent / out.all.mae_percent, 1, 0.5);
+  assert_ok(sonde_fit_hold_out(b.model, &b.sites, &b.m, &def, &result, SONDE_HOLD_OUT_DEPTH, NULL,
+                               out_n, &error),
+            &error);
+  for (uint32_t k = 0; k < b.m.count; ++k)
+    if (b.m.data[k].penetration_m < 0.015) assert_true(isnan(out_n[k]));
+  assert_ok(sonde_error_report_of(b.m.data, out_n, b.m.count, &out, &error), &error);
+  assert_true(out.all.count > b.m.count / 8 && out.all.mae_percent < 20);
+  sonde_free(out_n);
+  sonde_fit_result_clear(&result);
+  bundled_clear(&b);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(bundled_measurements_are_followed),
       cmocka_unit_test(threads_do_not_change_the_result),
+      cmocka_unit_test(intervals_cover_the_truth),
+      cmocka_unit_test(hold_out_predicts_what_was_not_seen),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
