@@ -93,7 +93,13 @@ static int help_of(const char *verb) {
   return found->run(2, arguments);
 }
 
+static void print_remark(sonde_log_level level, const char *message, void *user) {
+  (void)user;
+  if (level >= SONDE_LOG_WARNING) fprintf(stderr, "sonde: %s\n", message);
+}
+
 int main(int argc, char **argv) {
+  sonde_set_log(print_remark, NULL);
   if (argc < 2) {
     print_help(stderr);
     return APP_BAD_INPUT;

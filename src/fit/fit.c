@@ -17,6 +17,7 @@
 static const double COLD_K0 = 1.8e5, COLD_ABOVE_M = 0.02;
 static const double EDGE_START_N_M = 50.0, TENSION_START_N = 1e-3;
 static const double LN_EDGE_LOW = -11.5, LN_EDGE_HIGH = 18.4; // 1e-5 .. 1e8 N/m
+static const double SITE_TOLERANCE_M = 5e-3;
 static const double KEPT_EDGE_N_M = 0.1;
 static const double LN_TENSION_LOW = -13.8, LN_TENSION_HIGH = 6.9;
 
@@ -297,6 +298,8 @@ sonde_status sonde_fit(const sonde_model *model, const sonde_site_table *sites,
   if (status) return status;
   sonde_fit_def full = *def;
   if (!(full.loss_scale > 0)) full.loss_scale = full.weights == SONDE_WEIGHTS_RELATIVE ? 0.05 : 0.5;
+  status = sonde_sites_check_on_surface(model, sites, SITE_TOLERANCE_M, error);
+  if (status) return status;
   sonde_fit_plan plan;
   status = sonde_fit_plan_create(sites, measurements, &plan, error);
   if (status) return status;
