@@ -3,6 +3,7 @@
 // keep_nodes:    nodes within reach of them, with whole faces.
 // cut_vertex:    the point where a side crosses an edge, made once per edge.
 // add_face:      a face whole, or its parts inside and outside.
+// is_coarse:     whether the mesh can carry the footprint.
 // add_rim:       lengths of the border beyond which the skin is left out.
 #include "fit/cut.h"
 
@@ -64,8 +65,8 @@ static void mark_inside(cutter *c) {
       nearest = i;
     }
   }
-  c->cut->coarse = c->inside_count == 0;
-  if (!c->cut->coarse || nearest == NOWHERE) return;
+  c->cut->single = c->inside_count == 0;
+  if (!c->cut->single || nearest == NOWHERE) return;
   c->inside[nearest] = true;
   c->inside_count = 1;
 }
@@ -161,7 +162,7 @@ static void add_face(cutter *c, const uint32_t node[3]) {
     if (v[k] == NOWHERE) return;
     within += c->inside[node[k]];
   }
-  if (within == 0 || within == 3 || c->cut->coarse) {
+  if (within == 0 || within == 3 || c->cut->single) {
     put_face(c->cut, v[0], v[1], v[2]);
     return;
   }
@@ -173,6 +174,17 @@ static void add_face(cutter *c, const uint32_t node[3]) {
   uint32_t q = alone_in ? cut_vertex(c, node[a], node[d]) : cut_vertex(c, node[d], node[a]);
   put_face(c->cut, v[a], p, q);
   put_quadrilateral(c, p, v[b], v[d], q);
+}
+
+static bool is_coarse(const cutter *c) {
+  const sonde_topology *t = &c->model->topology;
+  double sum = 0, count = 0;
+  for (uint32_t e = 0; e < t->edge_count; ++e) {
+    if (!c->inside[t->edges[e][0]] && !c->inside[t->edges[e][1]]) continue;
+    sum += c->model->edge_rest_m[e];
+    ++count;
+  }
+  return sum > 0.75 * 2 * fmin(c->half_u_m, c->half_v_m) * count;
 }
 
 static bool is_kept(const cutter *c, uint32_t face) {
@@ -223,6 +235,7 @@ static void fill(cutter *c) {
   for (uint32_t f = 0; f < skin->face_count; ++f) add_face(c, skin->faces[f]);
   for (uint32_t v = 0; v < cut->vertex_count; ++v) cut->held_count += cut->held[v];
   add_rim(c);
+  cut->coarse = is_coarse(c);
 }
 
 sonde_status sonde_cut_create(const sonde_model *model, const sonde_site *site, double half_u_m,

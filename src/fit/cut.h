@@ -16,7 +16,8 @@ typedef struct sonde_cut {
   uint32_t held_count;
   uint32_t face_count;
   uint32_t (*face)[3]; // [face_count]
-  bool coarse;         // no node lies under the footprint: the nearest one stands for it
+  bool single;         // no node lies under the footprint: the nearest one stands for it
+  bool coarse;         // edges there are longer than three quarters of its narrow side
 } sonde_cut;
 
 // Cuts the faces within reach of the footprint; reach_m = INFINITY keeps the whole skin. The sides

@@ -181,6 +181,13 @@ static sonde_status create_patches(sonde_refit *r, double reach_m, sonde_error *
     status = sonde_patch_create(r->model, site, plan->half_u_m[probe], plan->half_v_m[probe],
                                 reach_m, &r->patch[c], error);
   }
+  uint32_t coarse = 0;
+  for (uint32_t c = 0; c < plan->curve_count && !status; ++c) coarse += r->patch[c].coarse;
+  if (coarse)
+    sonde_log(SONDE_LOG_WARNING,
+              "the mesh is too coarse for %u of %u footprints, expected edges of at most half "
+              "their narrow side",
+              coarse, plan->curve_count);
   return status;
 }
 

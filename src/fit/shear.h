@@ -29,7 +29,7 @@ typedef struct sonde_patch {
   uint32_t *row_start, *column; // matrix of the free places, full pattern
   uint32_t *diagonal;           // [free_count] entry
   sonde_vec3 *point_m;          // [free_count]
-  bool coarse;                  // the mesh has no node under the footprint
+  bool coarse;                  // the mesh is too coarse for the footprint
 } sonde_patch;
 
 // Nodes within reach of the footprint; the skin beyond is cut off.

@@ -154,6 +154,19 @@ static void force_does_not_depend_on_the_mesh(void **state) {
   assert_true(fabs(point) < 0.04 && fabs(linear) < 0.01);
 }
 
+// A 6 mm point on a mesh of 8 mm is named as too coarse; a 12 mm wide pad there is not.
+static void coarse_meshes_are_named(void **state) {
+  (void)state;
+  bundled b = shear_thigh(8.0);
+  for (int probe = 0; probe < 2; ++probe) {
+    bench t;
+    bench_create(&t, &b, 27, probe, 0.05);
+    assert_int_equal(t.patch.coarse, !probe);
+    bench_clear(&t);
+  }
+  bundled_clear(&b);
+}
+
 // The cut keeps the area of the skin, and the held faces are the footprint along the skin.
 static void cut_faces_are_the_footprint(void **state) {
   (void)state;
@@ -446,6 +459,7 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(scalar_equals_full_model),
       cmocka_unit_test(force_does_not_depend_on_the_mesh),
+      cmocka_unit_test(coarse_meshes_are_named),
       cmocka_unit_test(cut_faces_are_the_footprint),
       cmocka_unit_test(rim_does_not_matter),
       cmocka_unit_test(adjoint_equals_finite_differences),
