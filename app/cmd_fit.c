@@ -1,7 +1,8 @@
 // sonde fit: measurements, sites and surfaces in, thigh model out.
 // parse:       options into texts, then into definitions.
 // load_inputs: tables and surfaces.
-// fit_model:   build, estimate, set the parameters, save.
+// fit_model:   build, estimate, set the parameters, save, look at the result from other sides.
+#include "fit_checks.h"
 #include "fit_common.h"
 #include "fit_report.h"
 
@@ -41,7 +42,12 @@ static const char HELP[] =
     "                    out one by one\n"
     "  --hold-out KIND   sites (eight parts in turn), probe (each in turn) or depth (the deepest\n"
     "                    quarter): refit without them and print the error on them\n"
-    "  --report DIR      write DIR/index.html with figures, tables and intervals\n"
+    "  --profile         likelihood of the shear stiffness: all else refitted at nine values\n"
+    "  --identifiability what each probe alone and all together would determine\n"
+    "  --starts N        refit from N random points and count how many end in the same optimum\n"
+    "  --seed S          of the random points; default 1\n"
+    "  --report DIR      write DIR/index.html with figures, tables and intervals; after stage 3\n"
+    "                    with --profile and --identifiability\n"
     "  --fine-mm L       longest skin edge near footprints; default 3\n"
     "  --json            one JSON object instead of the table\n"
     "  --help            this text\n";
@@ -51,8 +57,17 @@ static const char *const HOLD_OUTS[] = {"sites", "probe", "depth", NULL};
 typedef struct fit_arguments {
   const char *measurements, *surface, *sites, *output, *femur, *fat, *muscle, *name, *provenance;
   const char *stages, *weights, *loss, *fine_mm, *exponent, *report, *hold_out, *smoothness;
-  bool json, help, pretension, cold_start;
+  const char *starts, *seed;
+  bool json, help, pretension, cold_start, profile, identify;
+  char command_line[1024]; // as typed
 } fit_arguments;
+
+// All that was found.
+typedef struct fit_outcome {
+  sonde_fit_result result;
+  sonde_error_report hold_out;
+  fit_checks checks;
+} fit_outcome;
 
 typedef struct fit_inputs {
   sonde_site_table sites;
@@ -78,6 +93,10 @@ static bool parse_arguments(int argc, char **argv, fit_arguments *a) {
                                 {"--smoothness", &a->smoothness, NULL},
                                 {"--report", &a->report, NULL},
                                 {"--hold-out", &a->hold_out, NULL},
+                                {"--starts", &a->starts, NULL},
+                                {"--seed", &a->seed, NULL},
+                                {"--profile", NULL, &a->profile},
+                                {"--identifiability", NULL, &a->identify},
                                 {"--pretension", NULL, &a->pretension},
                                 {"--cold-start", NULL, &a->cold_start},
                                 {"--json", NULL, &a->json},
@@ -91,7 +110,39 @@ static bool parse_arguments(int argc, char **argv, fit_arguments *a) {
          app_require(VERB, "-o MODEL", a->output);
 }
 
-static bool parse_fit(const fit_arguments *a, sonde_fit_def *def, double *fine_mm) {
+// Arguments with blanks are put in quotes.
+static void keep_command_line(int argc, char **argv, fit_arguments *a) {
+  size_t used = (size_t)snprintf(a->command_line, sizeof a->command_line, "sonde fit");
+  for (int k = 1; k < argc && used < sizeof a->command_line; ++k) {
+    const char *quote = strpbrk(argv[k], " \t'") || !argv[k][0] ? "\"" : "";
+    used += (size_t)snprintf(a->command_line + used, sizeof a->command_line - used, " %s%s%s",
+                             quote, argv[k], quote);
+  }
+}
+
+static bool parse_checks(const fit_arguments *a, long stages, fit_checks *checks) {
+  long starts = 0, seed = 1;
+  if (a->starts && !app_parse_integer(VERB, "--starts", a->starts, 1, 10000, &starts)) return false;
+  if (a->seed && !app_parse_integer(VERB, "--seed", a->seed, 0, 2147483647, &seed)) return false;
+  const char *late = a->hold_out   ? "--hold-out"
+                     : a->profile  ? "--profile"
+                     : a->identify ? "--identifiability"
+                     : a->starts   ? "--starts"
+                                   : NULL;
+  if (late && stages < 3) {
+    app_usage_error(VERB, "%s needs --stages 3", late);
+    return false;
+  }
+  bool reported = a->report && stages == 3;
+  *checks = (fit_checks){.profile = a->profile || reported,
+                         .identify = a->identify || reported,
+                         .starts = (uint32_t)starts,
+                         .seed = (uint64_t)seed};
+  return true;
+}
+
+static bool parse_fit(const fit_arguments *a, sonde_fit_def *def, double *fine_mm,
+                      fit_checks *checks) {
   static const char *const WEIGHTS[] = {"absolute", "relative", NULL};
   static const char *const LOSSES[] = {"squares", "huber", "student", NULL};
   int weights = 0, loss = 0;
@@ -110,10 +161,6 @@ static bool parse_fit(const fit_arguments *a, sonde_fit_def *def, double *fine_m
   if (a->hold_out) {
     int kind;
     if (!app_parse_word(VERB, "--hold-out", a->hold_out, HOLD_OUTS, &kind)) return false;
-    if (stages < 3) {
-      app_usage_error(VERB, "--hold-out needs --stages 3");
-      return false;
-    }
   }
   def->normal_exponent = (double)exponent;
   def->stages = (uint32_t)stages;
@@ -121,7 +168,7 @@ static bool parse_fit(const fit_arguments *a, sonde_fit_def *def, double *fine_m
   def->loss = (sonde_fit_loss)loss;
   def->fit_pretension = a->pretension;
   def->cold_start = a->cold_start;
-  return true;
+  return parse_checks(a, stages, checks);
 }
 
 // Loads an optional surface: the named one, else the usual name beside the skin when it exists.
@@ -202,19 +249,18 @@ static sonde_status leave_out(const fit_arguments *a, const fit_inputs *in,
 }
 
 static sonde_status write_report(const fit_arguments *a, const fit_inputs *in,
-                                 const sonde_model *model, const sonde_fit_result *result,
-                                 const sonde_error_report *hold_out, sonde_error *error) {
-  char name[64], command[512];
+                                 const sonde_model *model, const fit_outcome *out,
+                                 sonde_error *error) {
+  char name[64];
   snprintf(name, sizeof name, "%s, refitted", a->hold_out ? a->hold_out : "");
-  snprintf(command, sizeof command, "sonde fit %s --surface %s --sites %s --stages %s",
-           a->measurements, a->surface, a->sites, a->stages ? a->stages : "2");
   const fit_findings findings = {.model = model,
                                  .sites = &in->sites,
                                  .data = &in->measurements,
-                                 .result = result,
-                                 .command_line = command,
+                                 .result = &out->result,
+                                 .command_line = a->command_line,
                                  .hold_out_name = name,
-                                 .hold_out = a->hold_out ? hold_out : NULL};
+                                 .hold_out = a->hold_out ? &out->hold_out : NULL,
+                                 .checks = &out->checks};
   sonde_progress progress = app_progress();
   sonde_status status = fit_report_write(&findings, a->report, &progress, error);
   app_progress_end();
@@ -222,9 +268,10 @@ static sonde_status write_report(const fit_arguments *a, const fit_inputs *in,
 }
 
 static sonde_status fit_model(const fit_arguments *a, const fit_inputs *in,
-                              const sonde_fit_def *def, double fine_mm, sonde_fit_result *result,
-                              sonde_error_report *hold_out, sonde_error *error) {
+                              const sonde_fit_def *def, double fine_mm, fit_outcome *out,
+                              sonde_error *error) {
   sonde_model *model = NULL;
+  sonde_fit_result *result = &out->result;
   sonde_progress progress = app_progress();
   sonde_status status = build_model(a, in, fine_mm, &model, error);
   if (!status)
@@ -234,8 +281,12 @@ static sonde_status fit_model(const fit_arguments *a, const fit_inputs *in,
     status =
         sonde_model_set_parameters(model, &result->law, result->sites, result->site_count, error);
   if (!status) status = sonde_model_save(model, a->output, error);
-  if (!status && a->hold_out) status = leave_out(a, in, model, def, result, hold_out, error);
-  if (!status && a->report) status = write_report(a, in, model, result, hold_out, error);
+  if (!status && a->hold_out) status = leave_out(a, in, model, def, result, &out->hold_out, error);
+  if (!status)
+    status = fit_checks_run(&out->checks, model, &in->sites, &in->measurements, def, result,
+                            &progress, error);
+  app_progress_end();
+  if (!status && a->report) status = write_report(a, in, model, out, error);
   sonde_model_destroy(model);
   return status;
 }
@@ -278,8 +329,8 @@ static void print_json_stages(const sonde_fit_result *r) {
   }
 }
 
-static void print_json(const fit_arguments *a, const sonde_fit_result *r,
-                       const sonde_error_report *hold_out, double seconds) {
+static void print_json(const fit_arguments *a, const fit_outcome *out, double seconds) {
+  const sonde_fit_result *r = &out->result;
   app_json_begin();
   if (r->stage3.all.count > 0)
     app_json_report("full", &r->stage3);
@@ -291,9 +342,10 @@ static void print_json(const fit_arguments *a, const sonde_fit_result *r,
   if (a->hold_out) {
     app_json_object("hold_out");
     app_json_text("kind", a->hold_out);
-    app_json_report("full", hold_out);
+    app_json_report("full", &out->hold_out);
     app_json_close();
   }
+  fit_checks_print_json(&out->checks);
   app_json_integer("parameters", r->parameters);
   app_json_text("model", a->output);
   app_json_real("edge_stiffness_n_m", r->law.edge_stiffness_n_m);
@@ -304,8 +356,8 @@ static void print_json(const fit_arguments *a, const sonde_fit_result *r,
   app_json_end();
 }
 
-static void print_table(const fit_arguments *a, const sonde_fit_result *r,
-                        const sonde_error_report *hold_out, double seconds) {
+static void print_table(const fit_arguments *a, const fit_outcome *out, double seconds) {
+  const sonde_fit_result *r = &out->result;
   char title[128];
   snprintf(title, sizeof title, "stage 1, every curve by itself: %u parameters",
            r->stage1_parameters);
@@ -334,8 +386,9 @@ static void print_table(const fit_arguments *a, const sonde_fit_result *r,
   }
   if (a->hold_out) {
     snprintf(title, sizeof title, "left out and predicted by a refit: %s", a->hold_out);
-    app_print_report(title, hold_out);
+    app_print_report(title, &out->hold_out);
   }
+  fit_checks_print(&out->checks);
   printf("wrote %s in %.2f s\n", a->output, seconds);
 }
 
@@ -348,23 +401,23 @@ int cmd_fit(int argc, char **argv) {
     fputs(HELP, stdout);
     return APP_OK;
   }
-  if (!parse_fit(&arguments, &def, &fine_mm)) return APP_BAD_INPUT;
+  fit_outcome out = {0};
+  if (!parse_fit(&arguments, &def, &fine_mm, &out.checks)) return APP_BAD_INPUT;
+  keep_command_line(argc, argv, &arguments);
   fit_inputs inputs = {0};
-  sonde_fit_result result = {0};
-  sonde_error_report hold_out = {0};
   sonde_error error = {0};
   sonde_status status = load_inputs(&arguments, &inputs, &error);
-  if (!status) status = fit_model(&arguments, &inputs, &def, fine_mm, &result, &hold_out, &error);
+  if (!status) status = fit_model(&arguments, &inputs, &def, fine_mm, &out, &error);
   int code = APP_OK;
   if (status)
     code = app_fail(VERB, &error);
   else if (arguments.json)
-    print_json(&arguments, &result, &hold_out, app_seconds() - start);
+    print_json(&arguments, &out, app_seconds() - start);
   else
-    print_table(&arguments, &result, &hold_out, app_seconds() - start);
-  if (!status && !result.converged)
+    print_table(&arguments, &out, app_seconds() - start);
+  if (!status && !out.result.converged)
     fprintf(stderr, "sonde fit: the last stage reached its iteration limit before it converged\n");
-  sonde_fit_result_clear(&result);
+  sonde_fit_result_clear(&out.result);
   clear_inputs(&inputs);
   return code;
 }

@@ -19,6 +19,9 @@ typedef struct builder {
   sonde_report_parameter parameter[8];
   sonde_report_holdout holdout[HOLDOUTS];
   sonde_report_timing timing[3];
+  sonde_report_profile profile;
+  sonde_report_identifiability determined[4 * (SONDE_FIT_PROBES + 1)];
+  char part_name[SONDE_FIT_PROBES + 1][40];
   sonde_report_site *site;
   double correlation[16];
   double *stage2_full_n, *linear_n;
@@ -98,6 +101,36 @@ static void add_sites(builder *b) {
   b->report.band_n = c->band_n;
 }
 
+static void add_profile(builder *b) {
+  const sonde_fit_profile *p = &b->in->checks->shear;
+  if (!p->count) return;
+  b->profile = (sonde_report_profile){.name = "shear stiffness G",
+                                      .unit = "N/m",
+                                      .count = p->count,
+                                      .x = p->shear_n_m,
+                                      .rise = p->rise,
+                                      .quadratic = p->quadratic,
+                                      .estimate = p->estimate_n_m,
+                                      .threshold = p->threshold};
+  b->report.profiles = &b->profile;
+  b->report.profile_count = 1;
+}
+
+// Rows of one parameter stand together.
+static void add_identifiability(builder *b) {
+  static const char *const NAMES[] = {"shear stiffness G", "shear limit gm",
+                                      "k0, mean of the sites", "xm, mean of the sites"};
+  const sonde_fit_identifiability *parts = &b->in->checks->parts;
+  uint32_t count = 0;
+  for (uint32_t p = 0; p < parts->count; ++p) fit_checks_name(&parts->part[p], b->part_name[p]);
+  for (int k = 0; k < 4; ++k)
+    for (uint32_t p = 0; p < parts->count; ++p)
+      b->determined[count++] =
+          (sonde_report_identifiability){NAMES[k], b->part_name[p], parts->part[p].ln_sd[k]};
+  b->report.identifiability = b->determined;
+  b->report.identifiability_count = count;
+}
+
 static void add_holdout(builder *b, const char *what, const sonde_error_report *out) {
   const sonde_error_report *seen = &b->in->result->stage3;
   for (uint32_t p = 0; p < out->probe_count && b->report.holdout_count < HOLDOUTS; ++p) {
@@ -133,6 +166,21 @@ static void add_notes(builder *b) {
     for (uint32_t k = 0; k < c->tried_count && used > 0 && (size_t)used < sizeof b->text[0]; ++k)
       used += snprintf(b->text[count] + used, sizeof b->text[0] - (size_t)used, " %g: %.2f %%%s",
                        c->tried_sd[k], c->tried_percent[k], k + 1 < c->tried_count ? "," : ".");
+    b->note[count] = b->text[count];
+    ++count;
+  }
+  const sonde_fit_identifiability *parts = &b->in->checks->parts;
+  if (parts->count > 1) {
+    int used = snprintf(b->text[count], sizeof b->text[0],
+                        "Correlation of ln G with mean ln k0, and condition of the correlations of "
+                        "G, gm, k0 and xm:");
+    for (uint32_t k = 0; k < parts->count && used > 0 && (size_t)used < sizeof b->text[0]; ++k) {
+      char name[40];
+      fit_checks_name(&parts->part[k], name);
+      used += snprintf(b->text[count] + used, sizeof b->text[0] - (size_t)used, " %s %+.2f, %.3g%s",
+                       name, parts->part[k].correlation[0][2], parts->part[k].condition,
+                       k + 1 < parts->count ? ";" : ".");
+    }
     b->note[count] = b->text[count];
     ++count;
   }
@@ -177,23 +225,19 @@ static sonde_status predict_sample(const sonde_model *model, const fit_findings 
 // Forces of the stage 2 parameters on the equilibrium of the whole skin.
 static sonde_status settle_stage2(const fit_findings *in, const sonde_progress *progress,
                                   double *full_n, sonde_error *error) {
-  sonde_fit_def def = sonde_fit_def_default();
-  sonde_fit_result stage2;
+  const sonde_fit_result *r = in->result;
   sonde_model *model = NULL;
   sonde_model_def md = sonde_model_def_default();
   md.skin = &in->model->surface;
   md.sites = in->sites->sites;
   md.site_count = in->sites->count;
   md.fine_edge_m = 1; // the skin is refined already
-  md.law.normal_exponent = 1;
   sonde_status status = sonde_model_build(&md, &model, error);
-  if (status) return status;
-  status = sonde_fit(model, in->sites, in->data, &def, NULL, &stage2, error);
-  if (!status) {
-    status = sonde_model_set_parameters(model, &stage2.law, stage2.sites, stage2.site_count, error);
-    if (!status) status = predict_sample(model, in, progress, full_n, error);
-    sonde_fit_result_clear(&stage2);
-  }
+  bool three = r->stage2_sites != NULL;
+  if (!status)
+    status = sonde_model_set_parameters(model, three ? &r->stage2_law : &r->law,
+                                        three ? r->stage2_sites : r->sites, r->site_count, error);
+  if (!status) status = predict_sample(model, in, progress, full_n, error);
   sonde_model_destroy(model);
   return status;
 }
@@ -244,6 +288,8 @@ sonde_status fit_report_write(const fit_findings *in, const char *directory,
   if (in->result->confidence.one_out_n)
     add_holdout(b, "one site at a time (linearised)", &in->result->confidence.one_out);
   if (in->hold_out) add_holdout(b, in->hold_out_name, in->hold_out);
+  add_profile(b);
+  add_identifiability(b);
   add_timings(b);
   add_notes(b);
   if (!status) status = sonde_fit_report_write(&b->report, directory, error);

@@ -2,7 +2,7 @@
 #ifndef SONDE_APP_FIT_REPORT_H
 #define SONDE_APP_FIT_REPORT_H
 
-#include "sonde/sonde.h"
+#include "fit_checks.h"
 
 typedef struct fit_findings {
   const sonde_model *model; // with the last stage's parameters
@@ -12,6 +12,7 @@ typedef struct fit_findings {
   const char *command_line;
   const char *hold_out_name;          // NULL: none
   const sonde_error_report *hold_out; // NULL: none
+  const fit_checks *checks;
 } fit_findings;
 
 // Settles the models of stage 2 and 3 in full, fits linear springs, and writes the page.

@@ -178,11 +178,14 @@ typedef struct sonde_fit_result {
   double *model_n;           /**< [measurements.count] forces of the last stage */
   uint32_t iterations, stage2_iterations; /**< of the last stage, of stage 2 */
   bool converged, stage2_converged;
-  double cost, start_cost; /**< half the sum of losses at the last stage's end and start */
-  double stage2_edge_n_m;  /**< k_s of stage 2; the law of stage 3 has kept_edge_n_m */
-  double edge_sd_log;      /**< standard deviation of ln k_s (Schur complement); 0 if none */
-  double *stage_n[3];      /**< [measurements.count] forces of each stage; NULL when not run */
-  double seconds[3];       /**< wall time of each stage */
+  double cost, start_cost;  /**< half the sum of losses at the last stage's end and start; the start
+                                 of stage 3 counts every fourth depth only, its end all */
+  sonde_site *stage2_sites; /**< [site_count] with k0 and xm of stage 2; NULL when stages < 3 */
+  sonde_surface_law stage2_law; /**< of stage 2, without shear layer */
+  double stage2_edge_n_m;       /**< k_s of stage 2; the law of stage 3 has kept_edge_n_m */
+  double edge_sd_log;           /**< standard deviation of ln k_s (Schur complement); 0 if none */
+  double *stage_n[3];           /**< [measurements.count] forces of each stage; NULL when not run */
+  double seconds[3];            /**< wall time of each stage */
   sonde_fit_confidence confidence; /**< of stage 3; NULL arrays before */
 } sonde_fit_result;
 
@@ -200,23 +203,6 @@ SONDE_API sonde_status sonde_fit(const sonde_model *model, const sonde_site_tabl
                                  const sonde_progress *progress, sonde_fit_result *result,
                                  sonde_error *error);
 SONDE_API void sonde_fit_result_clear(sonde_fit_result *result);
-
-typedef enum sonde_hold_out {
-  SONDE_HOLD_OUT_SITES, /**< eight scattered parts of the sites in turn */
-  SONDE_HOLD_OUT_PROBE, /**< each probe in turn */
-  SONDE_HOLD_OUT_DEPTH, /**< the deepest quarter of every curve */
-} sonde_hold_out;
-
-/**
- * Refits stage 3 without a part of the measurements, each part in turn, and predicts that part.
- * @param result of sonde_fit() with stages == 3 on the same arguments
- * @param predicted_n [count] NaN for rows that are never left out @thread owner
- */
-SONDE_API sonde_status sonde_fit_hold_out(const sonde_model *model, const sonde_site_table *sites,
-                                          const sonde_measurements *measurements,
-                                          const sonde_fit_def *def, const sonde_fit_result *result,
-                                          sonde_hold_out kind, const sonde_progress *progress,
-                                          double *predicted_n, sonde_error *error);
 
 /* ---- prediction -------------------------------------------------------------------------- */
 

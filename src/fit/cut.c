@@ -71,14 +71,17 @@ static void mark_inside(cutter *c) {
   c->inside_count = 1;
 }
 
+static bool is_kept(const cutter *c, uint32_t face) {
+  const uint32_t *v = c->model->surface.faces[face];
+  return c->vertex_of[v[0]] != NOWHERE && c->vertex_of[v[1]] != NOWHERE &&
+         c->vertex_of[v[2]] != NOWHERE;
+}
+
 // Nodes of faces that are kept whole, in order; others would hang free.
 static void number_nodes(cutter *c) {
   const sonde_mesh *skin = &c->model->surface;
-  for (uint32_t f = 0; f < skin->face_count; ++f) {
-    bool whole = true;
-    for (int k = 0; k < 3; ++k) whole = whole && c->vertex_of[skin->faces[f][k]] != NOWHERE;
-    for (int k = 0; k < 3 && whole; ++k) c->vertex_of[skin->faces[f][k]] = KEPT;
-  }
+  for (uint32_t f = 0; f < skin->face_count; ++f)
+    for (int k = 0; k < 3 && is_kept(c, f); ++k) c->vertex_of[skin->faces[f][k]] = KEPT;
   for (uint32_t i = 0; i < skin->vertex_count; ++i)
     c->vertex_of[i] = c->vertex_of[i] == KEPT ? c->cut->node_count++ : NOWHERE;
 }
@@ -117,15 +120,10 @@ static double leaving_share(const cutter *c, uint32_t in, uint32_t out) {
   return clamp(share, LEAST_SHARE, MOST_SHARE);
 }
 
-static uint32_t edge_between(const sonde_topology *t, uint32_t a, uint32_t b) {
-  uint32_t k = t->start[a];
-  while (k < t->start[a + 1] && t->neighbour[k] != b) ++k;
-  SONDE_ASSERT(k < t->start[a + 1]);
-  return t->neighbour_edge[k];
-}
-
-static uint32_t cut_vertex(cutter *c, uint32_t in, uint32_t out) {
-  uint32_t edge = edge_between(&c->model->topology, in, out);
+static uint32_t cut_vertex(cutter *c, uint32_t edge) {
+  const uint32_t *end = c->model->topology.edges[edge];
+  uint32_t in = c->inside[end[0]] ? end[0] : end[1], out = c->inside[end[0]] ? end[1] : end[0];
+  SONDE_ASSERT(c->inside[in] && !c->inside[out]);
   if (c->on_edge[edge] != NOWHERE) return c->on_edge[edge];
   sonde_cut *cut = c->cut;
   uint32_t at = cut->vertex_count++;
@@ -155,11 +153,12 @@ static void put_quadrilateral(const cutter *c, uint32_t p, uint32_t b, uint32_t 
     put_face(c->cut, b, d, q);
 }
 
-static void add_face(cutter *c, const uint32_t node[3]) {
+static void add_face(cutter *c, uint32_t face) {
+  const uint32_t *node = c->model->surface.faces[face], *edge = c->model->face_edge[face];
   uint32_t v[3], within = 0, first = 0;
+  if (!is_kept(c, face)) return;
   for (int k = 0; k < 3; ++k) {
     v[k] = c->vertex_of[node[k]];
-    if (v[k] == NOWHERE) return;
     within += c->inside[node[k]];
   }
   if (within == 0 || within == 3 || c->cut->single) {
@@ -169,9 +168,7 @@ static void add_face(cutter *c, const uint32_t node[3]) {
   // first: the corner that is alone on its side; the others follow in order.
   while (c->inside[node[first]] != (within == 1)) ++first;
   uint32_t a = first, b = (first + 1) % 3, d = (first + 2) % 3;
-  bool alone_in = within == 1;
-  uint32_t p = alone_in ? cut_vertex(c, node[a], node[b]) : cut_vertex(c, node[b], node[a]);
-  uint32_t q = alone_in ? cut_vertex(c, node[a], node[d]) : cut_vertex(c, node[d], node[a]);
+  uint32_t p = cut_vertex(c, edge[d]), q = cut_vertex(c, edge[b]); // edges ab and ad
   put_face(c->cut, v[a], p, q);
   put_quadrilateral(c, p, v[b], v[d], q);
 }
@@ -185,12 +182,6 @@ static bool is_coarse(const cutter *c) {
     ++count;
   }
   return sum > 0.75 * 2 * fmin(c->half_u_m, c->half_v_m) * count;
-}
-
-static bool is_kept(const cutter *c, uint32_t face) {
-  const uint32_t *v = c->model->surface.faces[face];
-  return c->vertex_of[v[0]] != NOWHERE && c->vertex_of[v[1]] != NOWHERE &&
-         c->vertex_of[v[2]] != NOWHERE;
 }
 
 static void add_rim(cutter *c) {
@@ -232,7 +223,7 @@ static void fill(cutter *c) {
     cut->parent[v][0] = cut->parent[v][1] = i;
     cut->held[v] = c->inside[i];
   }
-  for (uint32_t f = 0; f < skin->face_count; ++f) add_face(c, skin->faces[f]);
+  for (uint32_t f = 0; f < skin->face_count; ++f) add_face(c, f);
   for (uint32_t v = 0; v < cut->vertex_count; ++v) cut->held_count += cut->held[v];
   add_rim(c);
   cut->coarse = is_coarse(c);

@@ -17,13 +17,18 @@
 static const double COLD_K0 = 1.8e5, COLD_ABOVE_M = 0.02;
 static const double EDGE_START_N_M = 50.0, TENSION_START_N = 1e-3;
 static const double LN_EDGE_LOW = -11.5, LN_EDGE_HIGH = 18.4; // 1e-5 .. 1e8 N/m
-static const double SITE_TOLERANCE_M = 5e-3;
 static const double KEPT_EDGE_N_M = 0.1;
 static const double LN_TENSION_LOW = -13.8, LN_TENSION_HIGH = 6.9;
 
 sonde_fit_def sonde_fit_def_default(void) {
   return (sonde_fit_def){
       .stages = 2, .max_iterations = 400, .kept_edge_n_m = KEPT_EDGE_N_M, .normal_exponent = 2};
+}
+
+sonde_fit_def sonde_fit_def_complete(const sonde_fit_def *def) {
+  sonde_fit_def full = *def;
+  if (!(full.loss_scale > 0)) full.loss_scale = full.weights == SONDE_WEIGHTS_RELATIVE ? 0.05 : 0.5;
+  return full;
 }
 
 static sonde_status check_def(const sonde_fit_def *def, sonde_error *error) {
@@ -239,6 +244,17 @@ static void set_refitted(const sonde_fit_def *def, const double *theta,
   result->start_cost = found->start_cost;
 }
 
+static sonde_status keep_stage2(sonde_fit_result *result, sonde_error *error) {
+  SONDE_ASSERT(result->stage2_parameters > 0 && !result->stage2_sites);
+  result->stage2_law = result->law;
+  result->stage2_law.normal_exponent = 1;
+  result->stage2_law.shear_stiffness_n_m = 0;
+  result->stage2_sites = SONDE_NEW(sonde_site, result->site_count);
+  if (!result->stage2_sites) return sonde_fail_memory(error);
+  memcpy(result->stage2_sites, result->sites, result->site_count * sizeof *result->sites);
+  return SONDE_OK;
+}
+
 static sonde_status refit_sites(const sonde_model *model, const sonde_site_table *sites,
                                 const sonde_measurements *m, const sonde_fit_plan *plan,
                                 const sonde_fit_def *def, const sonde_progress *progress,
@@ -296,9 +312,8 @@ sonde_status sonde_fit(const sonde_model *model, const sonde_site_table *sites,
   *result = (sonde_fit_result){0};
   sonde_status status = check_def(def, error);
   if (status) return status;
-  sonde_fit_def full = *def;
-  if (!(full.loss_scale > 0)) full.loss_scale = full.weights == SONDE_WEIGHTS_RELATIVE ? 0.05 : 0.5;
-  status = sonde_sites_check_on_surface(model, sites, SITE_TOLERANCE_M, error);
+  const sonde_fit_def full = sonde_fit_def_complete(def);
+  status = sonde_sites_check_on_surface(model, sites, SONDE_SITE_TOLERANCE_M, error);
   if (status) return status;
   sonde_fit_plan plan;
   status = sonde_fit_plan_create(sites, measurements, &plan, error);
@@ -310,6 +325,7 @@ sonde_status sonde_fit(const sonde_model *model, const sonde_site_table *sites,
   if (!status) status = end_stage(result, 0, measurements->count, &start, error);
   if (!status) status = fit_model(model, sites, &problem, &full, progress, result, error);
   if (!status && full.stages > 1) status = end_stage(result, 1, measurements->count, &start, error);
+  if (!status && full.stages == 3) status = keep_stage2(result, error);
   if (!status && full.stages == 3)
     status = refit_sites(model, sites, measurements, &plan, &full, progress, result, error);
   if (!status && full.stages == 3)
@@ -329,6 +345,7 @@ void sonde_fit_result_clear(sonde_fit_result *result) {
   sonde_free(result->confidence.one_out_n);
   sonde_free(result->curves);
   sonde_free(result->sites);
+  sonde_free(result->stage2_sites);
   sonde_free(result->model_n);
   *result = (sonde_fit_result){0};
 }

@@ -5,6 +5,12 @@
 #include "base/base.h"
 #include "sonde/fit.h"
 
+// How far a site may lie from the skin.
+#define SONDE_SITE_TOLERANCE_M 5e-3
+
+// The def with its loss scale filled in.
+sonde_fit_def sonde_fit_def_complete(const sonde_fit_def *def);
+
 // Index of a site id in the table; UINT32_MAX when absent.
 uint32_t sonde_site_find(const sonde_site_table *table, uint32_t id);
 // Empty table with room for some rows; count stays 0.
@@ -73,6 +79,9 @@ sonde_status sonde_footprint_create(const sonde_model *model, const sonde_site *
                                     double half_u_m, double half_v_m, sonde_coverage coverage,
                                     sonde_footprint *footprint, sonde_error *error);
 void sonde_footprint_clear(sonde_footprint *footprint);
+// Area of the skin under the rectangle.
+sonde_status sonde_footprint_area(const sonde_model *model, const sonde_site *site, double half_u_m,
+                                  double half_v_m, double *area_m2, sonde_error *error);
 
 // Force along the normal of the edges at depth x for unit stiffness, and of a unit pre-tension.
 // psi(x) = (l - L)(x + h)/l, l = sqrt(L^2 + 2 h x + x^2), h the rise: with h = 0 it is

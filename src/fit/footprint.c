@@ -121,6 +121,18 @@ done:
   return status;
 }
 
+sonde_status sonde_footprint_area(const sonde_model *model, const sonde_site *site, double half_u_m,
+                                  double half_v_m, double *area_m2, sonde_error *error) {
+  double *covered_m2 = SONDE_NEW(double, model->surface.vertex_count);
+  if (!covered_m2) return sonde_fail_memory(error);
+  sonde_mesh_footprint(&model->surface, site->position_m, site->normal, site->u, site->v, half_u_m,
+                       half_v_m, REACH_M, covered_m2);
+  *area_m2 = 0;
+  for (uint32_t i = 0; i < model->surface.vertex_count; ++i) *area_m2 += covered_m2[i];
+  sonde_free(covered_m2);
+  return SONDE_OK;
+}
+
 void sonde_footprint_clear(sonde_footprint *f) {
   sonde_free(f->node);
   sonde_free(f->weight_m2);

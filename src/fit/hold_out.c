@@ -1,8 +1,9 @@
 // fold_of:       which part of the measurements a row belongs to.
+// start:         parameters at which a refit begins.
 // run_fold:      refit without that part, then its forces.
 // sonde_fit_hold_out: all parts in turn.
-#include "fit/refit.h"
-#include "fit/refit_inside.h"
+#include "fit/again.h"
+#include "sonde/fit_confidence.h"
 
 #include "base/maths.h"
 
@@ -31,40 +32,31 @@ static uint32_t fold_of(const sonde_refit *r, sonde_hold_out kind, uint32_t row)
   return deep ? 0 : UINT32_MAX;
 }
 
-static void start(const sonde_refit *r, const sonde_fit_result *result, sonde_hold_out kind,
-                  double *theta) {
-  uint32_t count = r->sites->count;
-  if (kind == SONDE_HOLD_OUT_PROBE) {
-    sonde_refit_start(r, result->curves, theta);
-    return;
-  }
-  SONDE_ASSERT(result->site_count == count);
-  for (uint32_t s = 0; s < count; ++s) {
-    theta[s] = log(result->sites[s].k0_n_m3);
-    theta[count + s] = log(result->sites[s].xm_m);
-  }
-  theta[2 * count] = log(result->law.shear_stiffness_n_m);
-  theta[2 * count + 1] = log(result->law.shear_limit);
+// A refit without a probe starts far from the result, and so needs the way on few depths.
+static void start(sonde_again *a, const sonde_fit_result *result, sonde_hold_out kind) {
+  a->refit->near = kind != SONDE_HOLD_OUT_PROBE;
+  if (a->refit->near)
+    memcpy(a->theta, a->optimum, a->parameters * sizeof *a->theta);
+  else
+    sonde_refit_start(a->refit, result->curves, a->theta);
 }
 
-typedef struct fold_scratch {
-  bool *left_out;
-  double *theta, *force_n;
-} fold_scratch;
-
-static sonde_status run_fold(sonde_refit *r, const sonde_fit_result *result, sonde_hold_out kind,
-                             uint32_t fold, fold_scratch *s, const sonde_progress *progress,
-                             double *predicted_n, sonde_error *error) {
-  for (uint32_t k = 0; k < r->plan->row_count; ++k) s->left_out[k] = fold_of(r, kind, k) == fold;
-  start(r, result, kind, s->theta);
+static sonde_status run_fold(sonde_again *a, const sonde_fit_result *result, sonde_hold_out kind,
+                             uint32_t fold, const sonde_progress *progress, double *predicted_n,
+                             sonde_error *error) {
+  sonde_refit *r = a->refit;
+  uint32_t rows = a->plan.row_count;
+  SONDE_ASSERT(fold < fold_count(&a->plan, kind));
+  for (uint32_t k = 0; k < rows; ++k) a->left_out[k] = fold_of(r, kind, k) == fold;
+  start(a, result, kind);
   sonde_refit_result found;
-  r->left_out = s->left_out;
-  sonde_status status = sonde_refit_minimise(r, s->theta, s->force_n, progress, &found, error);
-  r->left_out = NULL;
+  r->left_out = a->left_out;
+  sonde_status status = sonde_again_run(a, progress, &found, error);
+  for (uint32_t k = 0; k < rows; ++k) a->left_out[k] = !a->left_out[k]; // now only that part
   r->stride = 1;
-  if (!status) status = sonde_refit_forces(r, s->theta, s->force_n, NULL, progress, error);
-  for (uint32_t k = 0; k < r->plan->row_count && !status; ++k)
-    if (s->left_out[k]) predicted_n[r->plan->row[k]] = s->force_n[k];
+  if (!status) status = sonde_refit_forces(r, a->theta, a->force_n, NULL, progress, error);
+  for (uint32_t k = 0; k < rows && !status; ++k)
+    if (!a->left_out[k]) predicted_n[a->plan.row[k]] = a->force_n[k];
   return status;
 }
 
@@ -74,29 +66,14 @@ sonde_status sonde_fit_hold_out(const sonde_model *model, const sonde_site_table
                                 const sonde_progress *progress, double *predicted_n,
                                 sonde_error *error) {
   for (uint32_t i = 0; i < m->count; ++i) predicted_n[i] = NAN;
-  if (!(result->law.shear_stiffness_n_m > 0))
-    return sonde_fail(error, SONDE_ARGUMENT, "hold-out needs the result of stage 3");
-  sonde_fit_def fixed = *def;
-  fixed.smoothness_sd = result->confidence.smoothness_sd;
-  if (!(fixed.loss_scale > 0)) fixed.loss_scale = 0.05;
-  sonde_fit_plan plan;
-  sonde_status status = sonde_fit_plan_create(sites, m, &plan, error);
+  sonde_again again;
+  sonde_status status = sonde_again_create(model, sites, m, def, result, &again, error);
   if (status) return status;
-  sonde_refit *refit = NULL;
-  fold_scratch s = {SONDE_NEW(bool, plan.row_count),
-                    SONDE_NEW(double, 2 * (size_t)sites->count + 2),
-                    SONDE_NEW(double, plan.row_count)};
-  if (!s.left_out || !s.theta || !s.force_n) status = sonde_fail_memory(error);
-  if (!status && kind == SONDE_HOLD_OUT_PROBE && plan.probe_count < 2)
+  if (kind == SONDE_HOLD_OUT_PROBE && again.plan.probe_count < 2)
     status = sonde_fail(error, SONDE_ARGUMENT, "one probe only: none can be left out");
-  if (!status)
-    status = sonde_refit_create(model, sites, m, &plan, &fixed, REFIT_REACH_M, &refit, error);
-  for (uint32_t fold = 0; !status && fold < fold_count(&plan, kind); ++fold)
-    status = run_fold(refit, result, kind, fold, &s, progress, predicted_n, error);
-  sonde_refit_destroy(refit);
-  sonde_fit_plan_clear(&plan);
-  sonde_free(s.left_out);
-  sonde_free(s.theta);
-  sonde_free(s.force_n);
+  uint32_t folds = fold_count(&again.plan, kind);
+  for (uint32_t fold = 0; !status && fold < folds; ++fold)
+    status = run_fold(&again, result, kind, fold, progress, predicted_n, error);
+  sonde_again_clear(&again);
   return status;
 }

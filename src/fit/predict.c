@@ -79,14 +79,14 @@ sonde_status sonde_predict(const sonde_model *model, const sonde_site_table *sit
                       "relative_residual is %g and max_iterations %u, expected > 0 and >= 1",
                       def->relative_residual, def->max_iterations);
   sonde_fit_plan plan;
-  sonde_status status = sonde_fit_plan_create_all(sites, measurements, &plan, error);
+  sonde_status status = sonde_sites_check_on_surface(model, sites, SONDE_SITE_TOLERANCE_M, error);
+  if (!status) status = sonde_fit_plan_create_all(sites, measurements, &plan, error);
   if (status) return status;
   prediction p = {model, sites, measurements, &plan, def, predicted_n};
   uint32_t workers = sonde_parallel_workers(def->threads, plan.curve_count);
   for (uint32_t i = 0; i < measurements->count; ++i) predicted_n[i] = NAN;
-  if (!status)
-    status = sonde_parallel_run(plan.curve_count, workers, predict_curve, &p, progress,
-                                "predicting", error);
+  status = sonde_parallel_run(plan.curve_count, workers, predict_curve, &p, progress, "predicting",
+                              error);
   sonde_fit_plan_clear(&plan);
   return status;
 }

@@ -14,8 +14,9 @@
 #include <string.h>
 
 enum { NEWTON_LIMIT = 60 };
-// While the minimisation is under way, and for the forces that are reported.
-static const double ROUGH_RESIDUAL = 1e-4, FINE_RESIDUAL = 1e-7;
+// While the minimisation is under way, and otherwise. A force with derivatives errs with the square
+// of the residual only (shear.h).
+static const double ROUGH_RESIDUAL = 3e-4, FINE_RESIDUAL = 1e-7;
 static const double ROUGH_ADJOINT = 1e-3, FINE_ADJOINT = 1e-6;
 static const double DATA_SD = 0.02, MEAN_SHARE = 0.4;
 static const double PULL_ALONG_M = 0.010; // width of the rim that a footprint pulls along
@@ -51,22 +52,34 @@ static void spread(sonde_refit *r, const double *theta) {
   }
 }
 
+// The depth before on the same curve.
+typedef struct depth_before {
+  const double *s_m; // NULL at the first
+  double depth_m;
+  bool has_motion; // the solver knows how free places move with depth
+} depth_before;
+
+static void start_from(const depth_before *before, const sonde_patch_solver *solver, double depth_m,
+                       double *s_m) {
+  double growth = before->depth_m > 0 ? depth_m / before->depth_m : 0;
+  for (uint32_t i = 0; i < solver->patch->place_count; ++i)
+    if (before->s_m && before->has_motion)
+      s_m[i] = before->s_m[i] + (depth_m - before->depth_m) * solver->multiplier[i];
+    else
+      s_m[i] = before->s_m ? growth * before->s_m[i] : 0;
+}
+
 // Starts from the row's own last equilibrium; else, and again when that fails, from the depth
-// before, grown in proportion. s_m keeps the outcome.
+// before. s_m keeps the outcome.
 static sonde_status settle_datum(const sonde_refit *r, sonde_patch_solver *solver, uint32_t row,
-                                 double depth_m, const double *before_m, double before_depth_m,
+                                 bool rough, double depth_m, const depth_before *before,
                                  double *s_m, sonde_error *error) {
-  uint32_t places = solver->patch->place_count;
-  SONDE_ASSERT(row < r->plan->row_count && depth_m >= before_depth_m);
-  if (r->settled[row]) {
-    sonde_status status = sonde_patch_settle(
-        solver, depth_m, r->rough ? ROUGH_RESIDUAL : FINE_RESIDUAL, NEWTON_LIMIT, s_m, error);
-    if (!status) return SONDE_OK;
-  }
-  double growth = before_depth_m > 0 ? depth_m / before_depth_m : 0;
-  for (uint32_t i = 0; i < places; ++i) s_m[i] = before_m && growth > 0 ? growth * before_m[i] : 0;
-  sonde_status status = sonde_patch_settle(
-      solver, depth_m, r->rough ? ROUGH_RESIDUAL : FINE_RESIDUAL, NEWTON_LIMIT, s_m, error);
+  double accuracy = rough ? ROUGH_RESIDUAL : FINE_RESIDUAL;
+  SONDE_ASSERT(row < r->plan->row_count && depth_m >= before->depth_m);
+  if (r->settled[row] && !sonde_patch_settle(solver, depth_m, accuracy, NEWTON_LIMIT, s_m, error))
+    return SONDE_OK;
+  start_from(before, solver, depth_m, s_m);
+  sonde_status status = sonde_patch_settle(solver, depth_m, accuracy, NEWTON_LIMIT, s_m, error);
   r->settled[row] = !status;
   return status;
 }
@@ -105,9 +118,10 @@ static sonde_status work_on_curve(void *user, uint32_t worker, uint32_t curve,
   sonde_patch_solver *solver = &r->crew[worker].solver;
   sonde_patch_gradient *gradient = &r->crew[worker].gradient;
   uint32_t parameters = sonde_refit_parameters(r);
-  double *before = NULL, before_depth = 0;
+  depth_before before = {0};
+  bool rough = r->rough && at->jacobian;
   sonde_status status = SONDE_OK;
-  solver->adjoint_accuracy = r->rough ? ROUGH_ADJOINT : FINE_ADJOINT;
+  solver->adjoint_accuracy = rough ? ROUGH_ADJOINT : FINE_ADJOINT;
   sonde_patch_solver_use(solver, patch, &at->law);
   for (uint32_t k = r->plan->curve_start[curve]; k < r->plan->curve_start[curve + 1]; ++k) {
     if (!sonde_refit_uses(r, k)) continue;
@@ -115,7 +129,7 @@ static sonde_status work_on_curve(void *user, uint32_t worker, uint32_t curve,
     double depth = r->m->data[r->plan->row[k]].penetration_m;
     double *s = r->indentation_m + r->first_place[k];
     sonde_error inner;
-    status = settle_datum(r, solver, k, depth, before, before_depth, s, &inner);
+    status = settle_datum(r, solver, k, rough, depth, &before, s, &inner);
     if (!status)
       status = sonde_patch_force(solver, depth, s, &at->force_n[k], at->jacobian ? gradient : NULL,
                                  &inner);
@@ -124,8 +138,7 @@ static sonde_status work_on_curve(void *user, uint32_t worker, uint32_t curve,
                         r->sites->sites[r->plan->curve_site[curve]].id,
                         r->plan->probe[r->plan->curve_probe[curve]], inner.message);
     if (at->jacobian) carry_to_sites(r, patch, gradient, at->jacobian + (size_t)k * parameters);
-    before = s;
-    before_depth = depth;
+    before = (depth_before){s, depth, at->jacobian != NULL};
   }
   return SONDE_OK;
 }
@@ -144,6 +157,8 @@ sonde_status sonde_refit_forces(sonde_refit *r, const double *theta, double *for
   return sonde_parallel_run(r->plan->curve_count, r->workers, work_on_curve, &at, progress,
                             "stage 3", error);
 }
+
+void sonde_refit_forget(sonde_refit *r) { memset(r->settled, 0, r->plan->row_count); }
 
 void sonde_refit_want_confidence(sonde_refit *r, sonde_fit_confidence *confidence) {
   r->confidence = confidence;

@@ -40,6 +40,9 @@ sonde_status sonde_refit_minimise(sonde_refit *refit, double *theta, double *for
 // Where the minimisation puts what is known about its result; NULL: not wanted.
 void sonde_refit_want_confidence(sonde_refit *refit, sonde_fit_confidence *confidence);
 
+// The next equilibria start afresh.
+void sonde_refit_forget(sonde_refit *refit);
+
 // Generic start from the curves of stage 1.
 void sonde_refit_start(const sonde_refit *refit, const sonde_curve_fit *curves, double *theta);
 

@@ -4,6 +4,8 @@
 
 #include "fit/refit.h"
 
+typedef struct sonde_normal sonde_normal;
+
 typedef struct sonde_refit_worker {
   sonde_patch_solver solver;
   sonde_patch_gradient gradient;
@@ -27,9 +29,13 @@ struct sonde_refit {
   sonde_refit_worker *crew;
   double smoothness_sd;             // of ln k0 and ln xm per site spacing
   sonde_fit_confidence *confidence; // NULL: not wanted
-  const bool *left_out;             // [row_count] rows that only get a force; NULL: none
-  bool rough;                       // equilibria need not be exact
-  uint32_t stride; // every so many rows of a curve, counted from its last, take part
+  const bool *left_out;             // [row_count] rows that do not take part; NULL: none
+  const bool *fixed;                // [parameters] that keep their start; NULL: none
+  sonde_normal *curvature; // receives the normal equations at the optimum; NULL: not wanted
+  double enough;           // relative fall of the cost that is not worth a step; 0: default
+  bool near;               // the start is near the optimum: no minimisation on few depths before
+  bool rough;              // equilibria need not be exact
+  uint32_t stride;         // every so many rows of a curve, counted from its last, take part
 };
 
 // Standard deviation of a row's error: what the model class leaves, 2 % of a force between the
@@ -37,21 +43,51 @@ struct sonde_refit {
 // bounds.
 double sonde_refit_sd_n(const sonde_refit *refit, uint32_t row);
 
+// Normal equations of a least squares problem, lower triangle.
+struct sonde_normal {
+  uint32_t n;
+  double *matrix, *gradient; // [n * n], [n]
+};
+
+bool sonde_normal_create(sonde_normal *normal, uint32_t n);
+void sonde_normal_free(sonde_normal *normal);
+void sonde_normal_clear(sonde_normal *normal); // all zero
+void sonde_normal_copy(const sonde_normal *from, sonde_normal *to);
+// Adds `times` another one.
+void sonde_normal_add(const sonde_normal *other, double times, sonde_normal *normal);
+void sonde_normal_add_row(sonde_normal *normal, const double *row, double residual, double weight);
+// The minimiser of the quadratic: Cholesky in factor [n * n], step [n]; damping scales the diagonal
+// by 1 + damping. False: not positive definite.
+bool sonde_normal_solve(const sonde_normal *normal, double damping, double *factor, double *step);
+
+// Error of a row in newtons, its weight in the normal equations (robust loss included), its loss.
+typedef struct sonde_refit_row {
+  double error_n, weight, loss;
+} sonde_refit_row;
+sonde_refit_row sonde_refit_weigh(const sonde_refit *refit, uint32_t row, double force_n);
+// Adds rows [first, end) that take part; returns their loss. normal NULL: the loss alone.
+double sonde_refit_add_rows(const sonde_refit *refit, uint32_t first, uint32_t end,
+                            const double *force_n, const double *jacobian, sonde_normal *normal);
+// The same for the smoothness at a standard deviation; row [n] is scratch.
+double sonde_refit_add_prior(const sonde_refit *refit, const double *theta, double sd, double *row,
+                             sonde_normal *normal);
+
 // Of the minimisation.
-typedef struct workspace {
+typedef struct sonde_refit_workspace {
   uint32_t n, rows;
-  double *force_n, *jacobian;             // at the trial
-  double *kept_jacobian;                  // [rows * n] at the accepted point
-  double *matrix, *gradient;              // normal equations at the accepted point
-  double *factor, *step, *trial, *scaled; // scaled: a weighted row
-} workspace;
+  double *force_n, *jacobian;           // at the trial
+  double *kept_jacobian;                // [rows * n] at the accepted point
+  sonde_normal normal;                  // at the accepted point
+  double *factor, *step, *trial, *line; // line: scratch of one row
+} sonde_refit_workspace;
 
 // Tries several smoothnesses on the linearised problem at theta, sites left out one by one, and
 // keeps the best one in r.
-sonde_status sonde_refit_choose_smoothness(sonde_refit *r, workspace *w, const double *theta,
-                                           const double *force_n, sonde_error *error);
+sonde_status sonde_refit_choose_smoothness(sonde_refit *r, sonde_refit_workspace *w,
+                                           const double *theta, const double *force_n,
+                                           sonde_error *error);
 // Fills r->confidence at the optimum theta.
-sonde_status sonde_refit_confidence(sonde_refit *r, workspace *w, const double *theta,
+sonde_status sonde_refit_confidence(sonde_refit *r, sonde_refit_workspace *w, const double *theta,
                                     const double *force_n, sonde_error *error);
 
 bool sonde_refit_uses(const sonde_refit *refit, uint32_t row);

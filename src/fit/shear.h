@@ -50,6 +50,8 @@ typedef struct sonde_patch_solver {
   const sonde_patch *patch;
   sonde_patch_law law;
   double adjoint_accuracy; // relative, of the gradients; 1e-6 from creation
+  const double *settled_m; // indentations to which residual, value and load_n belong
+  double load_n;           // force of the held places there
   sonde_ldl *ldl;          // of a matrix of patch; NULL before its first factorisation
   double *k0_n_m3, *xm_m;  // of the places
   double *residual, *step, *trial, *multiplier, *value, *scratch;
@@ -74,7 +76,9 @@ typedef struct sonde_patch_gradient {
   double by_ln_shear, by_ln_limit;
 } sonde_patch_gradient;
 
-// Force along the site's normal at an equilibrium; gradient (may be NULL) by one adjoint solve.
+// Force along the site's normal where sonde_patch_settle() has just ended. gradient (may be NULL):
+// by one adjoint solve, which also takes the first order of the remaining residual out of the force
+// and leaves the free places' motion per depth in solver->multiplier.
 sonde_status sonde_patch_force(sonde_patch_solver *solver, double depth_m, const double *s_m,
                                double *force_n, sonde_patch_gradient *gradient, sonde_error *error);
 

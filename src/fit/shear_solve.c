@@ -10,7 +10,7 @@
 
 #include <string.h>
 
-enum { SHORTENINGS = 40, GRADIENT_STEPS = 8 };
+enum { SHORTENINGS = 40, GRADIENT_STEPS = 5 };
 static const double NEWTON_ACCURACY = 1e-2;
 static const double NEGLIGIBLE_N = 1e-13;
 
@@ -128,12 +128,16 @@ static bool solve_by_gradients(sonde_patch_solver *solver, double *x, double acc
   return false;
 }
 
-static sonde_status solve(sonde_patch_solver *solver, double *x, double accuracy,
-                          sonde_error *error) {
-  if (solver->ldl && solve_by_gradients(solver, x, accuracy)) return SONDE_OK;
+static sonde_status solve_directly(sonde_patch_solver *solver, double *x, sonde_error *error) {
   sonde_status status = factor(solver, error);
   if (!status) sonde_ldl_solve(solver->ldl, 1, x, solver->scratch);
   return status;
+}
+
+static sonde_status solve(sonde_patch_solver *solver, double *x, double accuracy,
+                          sonde_error *error) {
+  if (solver->ldl && solve_by_gradients(solver, x, accuracy)) return SONDE_OK;
+  return solve_directly(solver, x, error);
 }
 
 static double along_step(const sonde_patch_solver *solver) {
@@ -163,33 +167,44 @@ static bool search(sonde_patch_solver *solver, double *s, double *residual, doub
   return false;
 }
 
+static bool is_small(const sonde_patch_solver *solver, double residual, double relative) {
+  return residual <= relative * fabs(solver->load_n) || residual <= NEGLIGIBLE_N;
+}
+
 sonde_status sonde_patch_settle(sonde_patch_solver *solver, double depth_m, double relative,
                                 uint32_t max_iterations, double *s_m, sonde_error *error) {
   const sonde_patch *p = solver->patch;
   SONDE_ASSERT(p && depth_m >= 0 && relative > 0);
   for (uint32_t i = p->free_count; i < p->place_count; ++i) s_m[i] = depth_m * p->cosine[i];
-  double load_n, residual = assemble(solver, s_m, &load_n);
+  double residual = assemble(solver, s_m, &solver->load_n);
+  solver->settled_m = s_m;
   for (uint32_t k = 0; k < max_iterations; ++k) {
-    if (residual <= relative * fabs(load_n) || residual <= NEGLIGIBLE_N) return SONDE_OK;
+    if (is_small(solver, residual, relative)) return SONDE_OK;
     for (uint32_t i = 0; i < p->free_count; ++i) solver->step[i] = -solver->residual[i];
-    sonde_status status = solve(solver, solver->step, NEWTON_ACCURACY, error);
+    // The factor of another depth would cost more in conjugate gradients than a new one.
+    sonde_status status = k ? solve(solver, solver->step, NEWTON_ACCURACY, error)
+                            : solve_directly(solver, solver->step, error);
     if (status) return status;
-    if (!search(solver, s_m, &residual, &load_n)) break;
+    if (!search(solver, s_m, &residual, &solver->load_n)) break;
   }
-  if (residual <= relative * fabs(load_n) || residual <= NEGLIGIBLE_N) return SONDE_OK;
+  residual = assemble(solver, s_m, &solver->load_n);
+  if (is_small(solver, residual, relative)) return SONDE_OK;
   return sonde_fail(error, SONDE_CONVERGENCE,
                     "no equilibrium at a depth of %.1f mm: residual %.3g N of %.3g N",
-                    depth_m * 1e3, residual, load_n);
+                    depth_m * 1e3, residual, solver->load_n);
 }
 
 // mu: cosines on the held places; on the free ones minus the solution of K lambda = K_fh c, so that
-// dF/dtheta = sum mu_i dR_i/dtheta.
+// dF/dtheta = sum mu_i dR_i/dtheta. A footprint that moves by c moves the free places by mu.
 static sonde_status adjoint(sonde_patch_solver *solver, const double *s, double *mu,
                             sonde_error *error) {
   const sonde_patch *p = solver->patch;
   memcpy(mu, p->cosine, p->place_count * sizeof *mu);
   for (uint32_t f = 0; f < p->face_count; ++f) {
     const sonde_patch_face *face = &p->face[f];
+    int held = 0;
+    for (int k = 0; k < 3; ++k) held += face->place[k] >= p->free_count;
+    if (held == 0 || held == 3) continue;
     double flux[3], beyond;
     double modulus = face_modulus(&solver->law, face, face_slope(face, s, flux), &beyond);
     for (int k = 0; k < 3; ++k) {
@@ -231,12 +246,15 @@ static void differentiate(const sonde_patch_solver *solver, const double *s, con
 sonde_status sonde_patch_force(sonde_patch_solver *solver, double depth_m, const double *s_m,
                                double *force_n, sonde_patch_gradient *gradient,
                                sonde_error *error) {
-  (void)assemble(solver, s_m, force_n);
-  *force_n += solver->law.tangential_n_m3 * solver->patch->sliding_m2 * depth_m;
+  SONDE_ASSERT(solver->settled_m == s_m);
+  *force_n = solver->load_n + solver->law.tangential_n_m3 * solver->patch->sliding_m2 * depth_m;
   if (!gradient) return SONDE_OK;
   sonde_status status = adjoint(solver, s_m, solver->multiplier, error);
-  if (!status) differentiate(solver, s_m, solver->multiplier, gradient);
-  return status;
+  if (status) return status;
+  // The last Newton step would change the force by c K_hf ds = -mu K ds = mu R.
+  *force_n += dot(solver->multiplier, solver->residual, solver->patch->free_count);
+  differentiate(solver, s_m, solver->multiplier, gradient);
+  return SONDE_OK;
 }
 
 sonde_status sonde_patch_solver_create(const sonde_patch *patches, uint32_t count,
@@ -273,6 +291,7 @@ void sonde_patch_solver_use(sonde_patch_solver *solver, const sonde_patch *patch
                             const sonde_patch_law *law) {
   if (solver->ldl) sonde_ldl_destroy(solver->ldl);
   solver->ldl = NULL;
+  solver->settled_m = NULL;
   solver->patch = patch;
   solver->law = *law;
   for (uint32_t i = 0; i < patch->place_count; ++i) {

@@ -5,6 +5,7 @@
 #include "fit/site_field.h"
 
 #include "base/maths.h"
+#include "base/order.h"
 #include "tissue/model.h"
 
 #include <math.h>
@@ -44,11 +45,6 @@ sonde_status sonde_site_basis(const sonde_model *model, const sonde_site_table *
   return status;
 }
 
-static int compare(const void *a, const void *b) {
-  double x = *(const double *)a, y = *(const double *)b;
-  return (x > y) - (x < y);
-}
-
 static double spacing(const sonde_site_table *sites, double *nearest) {
   for (uint32_t s = 0; s < sites->count; ++s) {
     nearest[s] = INFINITY;
@@ -57,7 +53,7 @@ static double spacing(const sonde_site_table *sites, double *nearest) {
         nearest[s] =
             fmin(nearest[s], v_distance(sites->sites[s].position_m, sites->sites[t].position_m));
   }
-  qsort(nearest, sites->count, sizeof *nearest, compare);
+  qsort(nearest, sites->count, sizeof *nearest, sonde_compare_reals);
   return nearest[sites->count / 2];
 }
 

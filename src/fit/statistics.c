@@ -1,23 +1,10 @@
 // moments: bias, MAE, RMSE, deviations of the finite rows.
-// rank: value at a fraction of the sorted |e|, linear between ranks.
 // sonde_error_report_of: the same per probe, by picking that probe's rows.
 #include "base/maths.h"
+#include "base/order.h"
 #include "fit/fit_inside.h"
 
 #include <string.h>
-
-static int compare_reals(const void *a, const void *b) {
-  double x = *(const double *)a, y = *(const double *)b;
-  return (x > y) - (x < y);
-}
-
-static double rank(const double *sorted, uint32_t count, double fraction) {
-  SONDE_ASSERT(count > 0);
-  double place = fraction * (count - 1);
-  uint32_t below = (uint32_t)place;
-  if (below + 1 >= count) return sorted[count - 1];
-  return sorted[below] + (place - below) * (sorted[below + 1] - sorted[below]);
-}
 
 // Mean and deviation about it, two passes.
 static void spread(const double *values, uint32_t count, double *mean, double *sd) {
@@ -44,9 +31,9 @@ static void summarise(double *errors, uint32_t count, double force_sum_n,
   spread(errors, count, &s->mae_n, &s->sd_abs_n);
   s->mean_force_n = force_sum_n / count;
   s->mae_percent = s->mean_force_n > 0 ? 100.0 * s->mae_n / s->mean_force_n : NAN;
-  qsort(errors, count, sizeof *errors, compare_reals);
-  s->median_abs_n = rank(errors, count, 0.5);
-  s->p95_abs_n = rank(errors, count, 0.95);
+  qsort(errors, count, sizeof *errors, sonde_compare_reals);
+  s->median_abs_n = sonde_percentile(errors, count, 0.5);
+  s->p95_abs_n = sonde_percentile(errors, count, 0.95);
   s->max_abs_n = errors[count - 1];
 }
 

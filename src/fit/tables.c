@@ -12,7 +12,6 @@
 #include <string.h>
 
 static const double METRES_PER_MM = 1e-3;
-static const double SITE_TOLERANCE_M = 5e-3;
 static const double NORMAL_TOLERANCE_RAD = SONDE_PI / 6;      // measured normals are smoothed ones
 static const double FORCE_LIMIT_N = 1e6, DEPTH_LIMIT_M = 1.0; // beyond: not a measurement
 
@@ -233,11 +232,11 @@ static sonde_status check_site(const sonde_csv *csv, const sonde_site_table *sit
                       "%u sites",
                       csv->path, csv->line, id, sites->count);
   double away_m = v_distance(position_m, sites->sites[index].position_m);
-  if (!(away_m <= SITE_TOLERANCE_M))
+  if (!(away_m <= SONDE_SITE_TOLERANCE_M))
     return sonde_fail(error, SONDE_MISMATCH,
                       "%s:%u: columns x_mm..z_mm: site %u lies %.1f mm from where the sites file "
                       "has it, expected at most %.0f mm",
-                      csv->path, csv->line, id, away_m * 1e3, SITE_TOLERANCE_M * 1e3);
+                      csv->path, csv->line, id, away_m * 1e3, SONDE_SITE_TOLERANCE_M * 1e3);
   return SONDE_OK;
 }
 

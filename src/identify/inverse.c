@@ -11,6 +11,7 @@
 #include "identify/inverse.h"
 
 #include "base/maths.h"
+#include "base/order.h"
 #include "fit/parallel.h"
 
 #include <string.h>
@@ -82,16 +83,11 @@ static sonde_status simulate_all(workspace *w, uint32_t from, uint32_t to, const
                             simulate_item, &b, w->in->progress, what, error);
 }
 
-static int compare_reals(const void *a, const void *b) {
-  double x = *(const double *)a, y = *(const double *)b;
-  return (x > y) - (x < y);
-}
-
 // Scale from the median of |r| (samples that do not count are 0); beyond 2.5 of it a residual
 // counts as that much only.
 static void weigh(workspace *w) {
   for (uint32_t k = 0; k < w->residuals; ++k) w->weight[k] = fabs(w->residual[0][k]);
-  qsort(w->weight, w->residuals, sizeof *w->weight, compare_reals);
+  qsort(w->weight, w->residuals, sizeof *w->weight, sonde_compare_reals);
   uint32_t first = 0;
   while (first + 1 < w->residuals && !(w->weight[first] > 0)) ++first;
   w->noise = fmax(1e-9, w->weight[first + (w->residuals - first) / 2] / 0.67449);

@@ -4,6 +4,7 @@
 #include "identify/summary.h"
 
 #include "base/maths.h"
+#include "base/order.h"
 
 static const double SHORTEST_M = 1e-3; // a ramp goes at least this far
 enum { GRID = 16, ROUNDS = 4, FEWEST = 20 };
@@ -16,14 +17,9 @@ sonde_span sonde_span_between(const sonde_motion_record *record, double start_s,
   return span;
 }
 
-static int compare_reals(const void *a, const void *b) {
-  double x = *(const double *)a, y = *(const double *)b;
-  return (x > y) - (x < y);
-}
-
 double sonde_median(double *values, uint32_t count) {
   SONDE_ASSERT(count > 0);
-  qsort(values, count, sizeof *values, compare_reals);
+  qsort(values, count, sizeof *values, sonde_compare_reals);
   return 0.5 * (values[(count - 1) / 2] + values[count / 2]);
 }
 

@@ -7,6 +7,7 @@
 #include "identify/track.h"
 
 #include "base/maths.h"
+#include "base/order.h"
 
 #include <string.h>
 
@@ -71,11 +72,6 @@ static double misfit(const pieces *p, uint32_t from, uint32_t to, line *fitted) 
   return fmax(0, vv - slope * tv);
 }
 
-static int compare_reals(const void *a, const void *b) {
-  double x = *(const double *)a, y = *(const double *)b;
-  return (x > y) - (x < y);
-}
-
 // Median of |v[k-1] - 2 v[k] + v[k+1]|: 0.6745 sqrt(6) standard deviations of white noise; corners
 // are too few to move it. At least a micrometre.
 static sonde_status noise_of(const double *value, size_t stride, uint32_t count, double *noise,
@@ -85,7 +81,7 @@ static sonde_status noise_of(const double *value, size_t stride, uint32_t count,
   if (!bend) return sonde_fail_memory(error);
   for (uint32_t k = 0; k + 2 < count; ++k)
     bend[k] = fabs(value[k * stride] - 2 * value[(k + 1) * stride] + value[(k + 2) * stride]);
-  qsort(bend, count - 2, sizeof *bend, compare_reals);
+  qsort(bend, count - 2, sizeof *bend, sonde_compare_reals);
   *noise = fmax(1e-6, bend[(count - 2) / 2] / (0.67449 * sqrt(6.0)));
   sonde_free(bend);
   return SONDE_OK;

@@ -30,10 +30,9 @@ typedef struct histogram {
 // Width after Freedman and Diaconis; the middle 99 % of the errors, zero in sight.
 static void bars_of(const double *sorted, uint32_t count, histogram *h) {
   SONDE_ASSERT(count > 0 && sorted[0] <= sorted[count - 1]);
-  double low = fmin(sonde_view_percentile(sorted, count, 0.005), 0);
-  double high = fmax(sonde_view_percentile(sorted, count, 0.995), 0);
-  double quartiles =
-      sonde_view_percentile(sorted, count, 0.75) - sonde_view_percentile(sorted, count, 0.25);
+  double low = fmin(sonde_percentile(sorted, count, 0.005), 0);
+  double high = fmax(sonde_percentile(sorted, count, 0.995), 0);
+  double quartiles = sonde_percentile(sorted, count, 0.75) - sonde_percentile(sorted, count, 0.25);
   double width = fmax(2 * quartiles / cbrt(count), (high - low) / (BARS - 4));
   *h = (histogram){.total = count, .step_n = sonde_nice_step(fmax(width, 1e-12))};
   h->first = (long)floor(low / h->step_n);
@@ -273,7 +272,7 @@ static uint32_t running_median(const sonde_report_view *view, uint32_t probe, fi
     }
     qsort(view->scratch[2], used, sizeof(double), sonde_compare_reals);
     x[made] = sum / used;
-    y[made++] = sonde_view_percentile(view->scratch[2], used, 0.5);
+    y[made++] = sonde_percentile(view->scratch[2], used, 0.5);
   }
   return made;
 }

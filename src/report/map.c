@@ -223,8 +223,8 @@ static sonde_axis range_of(const sonde_model *model, const camera *c, const doub
       scratch[used++] = values[i];
   if (!used) return sonde_axis_tight(0, 1, 6);
   qsort(scratch, used, sizeof *scratch, sonde_compare_reals);
-  return sonde_axis_tight(sonde_view_percentile(scratch, used, 0.01),
-                          sonde_view_percentile(scratch, used, 0.99), 6);
+  return sonde_axis_tight(sonde_percentile(scratch, used, 0.01),
+                          sonde_percentile(scratch, used, 0.99), 6);
 }
 
 // What one map shows: values per node or per site, in the unit of the key.

@@ -172,19 +172,6 @@ void sonde_view_close(sonde_report_view *view) {
 
 // ---- groups of rows -----------------------------------------------------------------------------
 
-int sonde_compare_reals(const void *a, const void *b) {
-  double x = *(const double *)a, y = *(const double *)b;
-  return (x > y) - (x < y);
-}
-
-double sonde_view_percentile(const double *sorted, uint32_t count, double fraction) {
-  SONDE_ASSERT(count > 0 && fraction >= 0 && fraction <= 1);
-  double place = fraction * (count - 1);
-  uint32_t below = (uint32_t)place;
-  if (below + 1 >= count) return sorted[count - 1];
-  return sorted[below] + (place - below) * (sorted[below + 1] - sorted[below]);
-}
-
 bool sonde_view_picks(const sonde_report_view *view, sonde_report_pick pick, uint32_t row) {
   SONDE_ASSERT(row < view->rows);
   return (pick.probe == SONDE_ALL || view->row_probe[row] == pick.probe) &&
@@ -207,8 +194,8 @@ static void relative_spread(const double *model_n, const double *force_n, uint32
   for (uint32_t i = 0; i < count; ++i)
     if (force_n[i] > 0) scratch[used++] = 100 * (model_n[i] / force_n[i] - 1);
   qsort(scratch, used, sizeof *scratch, sonde_compare_reals);
-  group->low_percent = used ? sonde_view_percentile(scratch, used, 0.25) : NAN;
-  group->high_percent = used ? sonde_view_percentile(scratch, used, 0.75) : NAN;
+  group->low_percent = used ? sonde_percentile(scratch, used, 0.25) : NAN;
+  group->high_percent = used ? sonde_percentile(scratch, used, 0.75) : NAN;
 }
 
 bool sonde_view_group(sonde_report_view *view, const double *model_n, sonde_report_pick pick,

@@ -3,6 +3,7 @@
 #ifndef SONDE_SRC_REPORT_VIEW_H
 #define SONDE_SRC_REPORT_VIEW_H
 
+#include "base/order.h"
 #include "report/chart.h"
 #include "sonde/report.h"
 
@@ -63,8 +64,6 @@ bool sonde_view_group(sonde_report_view *view, const double *model_n, sonde_repo
 // The picked rows' error model - measurement into out, ascending; returns their number.
 uint32_t sonde_view_errors(sonde_report_view *view, sonde_report_pick pick, double *out);
 uint32_t sonde_view_bin(const sonde_report_view *view, double depth_m);
-double sonde_view_percentile(const double *sorted, uint32_t count, double fraction);
-int sonde_compare_reals(const void *a, const void *b);
 
 // ---- html.c: the page -------------------------------------------------------------------------
 

@@ -13,8 +13,7 @@
 #include <string.h>
 
 enum { MAX_STEPS = 4096 };
-static const double SITE_TOLERANCE_M = 5e-3; // of the skin
-static const double SAME_DEPTH_M = 1e-7;     // tables have four decimals of mm
+static const double SAME_DEPTH_M = 1e-7; // tables have four decimals of mm
 
 sonde_robot_def sonde_robot_def_default(void) {
   return (sonde_robot_def){.probe = "linear",
@@ -32,7 +31,7 @@ typedef struct robot {
   sonde_probe probe;
   bool bonded;
   uint32_t step_limit;
-  sonde_press *crew;
+  sonde_press *crew;         // [workers] of a body; NULL for a bonded footprint
   sonde_datum *row;          // [sites * step_limit]
   sonde_robot_visit *visits; // [sites]
 } robot;
@@ -103,7 +102,7 @@ static sonde_status press_steps(robot *r, sonde_press *press, uint32_t index, so
   sonde_robot_visit *visit = &r->visits[index];
   SONDE_ASSERT(index < r->sites->count && visit->end == SONDE_ROBOT_NOT_REACHED);
   sonde_datum *rows = &r->row[(size_t)index * r->step_limit];
-  sonde_state_reset(press->state);
+  if (!r->bonded) sonde_state_reset(press->state);
   for (uint32_t step = 0; step < r->step_limit; ++step) {
     if (atomic_load(stop)) return sonde_fail(error, SONDE_CANCELLED, "cancelled");
     double depth_m = (step + 1) * r->def->step_m;
@@ -132,19 +131,16 @@ static sonde_status measure_site(void *user, uint32_t worker, uint32_t index,
                                  const atomic_bool *stop, sonde_error *error) {
   robot *r = user;
   const sonde_site *site = &r->sites->sites[index];
-  sonde_footprint footprint = {0};
   sonde_bonded bonded = {0};
   sonde_status status = SONDE_OK;
   if (r->bonded)
-    status = sonde_footprint_create(r->model, site, r->probe.half_x_m, r->probe.half_y_m,
-                                    SONDE_COVERAGE_CLIPPED, &footprint, error);
+    status = sonde_footprint_area(r->model, site, r->probe.half_x_m, r->probe.half_y_m,
+                                  &r->visits[index].area_m2, error);
   if (r->bonded && !status)
     status = sonde_bonded_create(r->model, site, r->probe.half_x_m, r->probe.half_y_m,
                                  r->def->relative_residual, r->def->max_iterations, &bonded, error);
-  for (uint32_t k = 0; k < footprint.node_count && !status; ++k)
-    r->visits[index].area_m2 += footprint.weight_m2[k];
-  if (!status) status = press_steps(r, &r->crew[worker], index, &bonded, stop, error);
-  sonde_footprint_clear(&footprint);
+  sonde_press *press = r->bonded ? NULL : &r->crew[worker];
+  if (!status) status = press_steps(r, press, index, &bonded, stop, error);
   sonde_bonded_clear(&bonded);
   return status;
 }
@@ -231,13 +227,13 @@ sonde_status sonde_robot_run(const sonde_model *model, const sonde_site_table *s
   *measurements = (sonde_measurements){0};
   if (log) *log = (sonde_robot_log){0};
   sonde_status status = check_def(def, error);
-  if (!status) status = sonde_sites_check_on_surface(model, sites, SITE_TOLERANCE_M, error);
+  if (!status) status = sonde_sites_check_on_surface(model, sites, SONDE_SITE_TOLERANCE_M, error);
   if (status) return status;
   robot r = {.model = model, .sites = sites, .def = def};
   uint32_t workers = sonde_parallel_workers(def->threads, sites->count);
   status = choose_probe(&r, error);
   if (!status) status = allocate_rows(&r, error);
-  if (!status)
+  if (!status && !r.bonded)
     status = sonde_press_crew_create(model, def->relative_residual, def->max_iterations, workers,
                                      &r.crew, error);
   if (!status)

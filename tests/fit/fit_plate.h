@@ -89,6 +89,20 @@ static inline bundled bundled_load(const char *measurements, double fine_mm) {
   return b;
 }
 
+// Nine neighbouring sites of the 8 x 8 (18..20, 26..28, 34..36) with their rows.
+static inline void keep_nine_sites(bundled *b) {
+  uint32_t kept = 0, rows = 0;
+  for (uint32_t s = 0; s < b->sites.count; ++s)
+    if (s / 8 >= 2 && s / 8 <= 4 && s % 8 >= 2 && s % 8 <= 4)
+      b->sites.sites[kept++] = b->sites.sites[s];
+  b->sites.count = kept;
+  assert_int_equal(kept, 9);
+  for (uint32_t r = 0; r < b->m.count; ++r)
+    for (uint32_t s = 0; s < kept; ++s)
+      if (b->m.data[r].site == b->sites.sites[s].id) b->m.data[rows++] = b->m.data[r];
+  b->m.count = rows;
+}
+
 static inline void bundled_clear(bundled *b) {
   sonde_site_table_clear(&b->sites);
   sonde_measurements_clear(&b->m);

@@ -30,6 +30,13 @@ static inline const char *write_temporary(const char *text) {
   return path;
 }
 
+// Group teardown: the file goes.
+static inline int remove_temporary(void **state) {
+  (void)state;
+  unlink(write_temporary(""));
+  return 0;
+}
+
 #define assert_near(a, b, tolerance)                                                               \
   do {                                                                                             \
     double near_a = (a), near_b = (b), near_t = (tolerance);                                       \

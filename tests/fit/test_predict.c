@@ -2,6 +2,8 @@
 // counts.
 #include "fit_test.h"
 
+#include "base/maths.h"
+
 #include "fit/press.h"
 #include "fit_thigh.h"
 
@@ -99,10 +101,26 @@ static void full_is_softer_than_simplified(void **state) {
   bundled_clear(&b);
 }
 
+static void sites_off_the_skin_are_refused(void **state) {
+  (void)state;
+  bundled b = soft_thigh();
+  sonde_predict_def def = sonde_predict_def_default();
+  sonde_error error;
+  double *predicted_n = SONDE_NEW(double, b.m.count);
+  sonde_site *site = &b.sites.sites[7];
+  site->position_m = v_madd(site->position_m, 0.02, site->normal);
+  assert_int_equal(sonde_predict(b.model, &b.sites, &b.m, &def, NULL, predicted_n, &error),
+                   SONDE_MISMATCH);
+  assert_says(&error, "site 7");
+  sonde_free(predicted_n);
+  bundled_clear(&b);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(simplified_equals_full_with_pinned_neighbours),
       cmocka_unit_test(full_is_softer_than_simplified),
+      cmocka_unit_test(sites_off_the_skin_are_refused),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

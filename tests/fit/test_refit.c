@@ -2,6 +2,8 @@
 // the independence of the result of the number of threads.
 #include "fit_test.h"
 
+#include "sonde/fit_confidence.h"
+
 #include "base/random.h"
 #include "fit_plate.h"
 
@@ -50,19 +52,6 @@ static void threads_do_not_change_the_result(void **state) {
   sonde_fit_result_clear(&one);
   sonde_fit_result_clear(&three);
   bundled_clear(&b);
-}
-
-// Nine neighbouring sites of the 8 x 8 with their rows.
-static void keep_nine_sites(bundled *b) {
-  uint32_t kept = 0, rows = 0;
-  for (uint32_t s = 0; s < b->sites.count; ++s)
-    if (s / 8 >= 2 && s / 8 <= 4 && s % 8 >= 2 && s % 8 <= 4)
-      b->sites.sites[kept++] = b->sites.sites[s];
-  b->sites.count = kept;
-  for (uint32_t r = 0; r < b->m.count; ++r)
-    for (uint32_t s = 0; s < kept; ++s)
-      if (b->m.data[r].site == b->sites.sites[s].id) b->m.data[rows++] = b->m.data[r];
-  b->m.count = rows;
 }
 
 // Sensor errors of 0.1 N and 0.1 mm.

@@ -276,6 +276,45 @@ static void adjoint_equals_finite_differences(void **state) {
   bundled_clear(&b);
 }
 
+// Ended early, the force with derivatives errs with the square of the residual, the one without
+// with the residual; and the adjoint is the motion of the free skin per depth.
+static void adjoint_corrects_the_force(void **state) {
+  (void)state;
+  bundled b = shear_thigh(4.0);
+  fields f = fields_of(b.model);
+  sonde_patch_law law = law_of(b.model, &f);
+  for (int probe = 0; probe < 2; ++probe) {
+    bench t;
+    bench_create(&t, &b, 20, probe, 0.05);
+    uint32_t n = t.patch.place_count;
+    sonde_patch_gradient g = {SONDE_NEW(double, n), SONDE_NEW(double, n), 0, 0};
+    double exact = bench_force(&t, &law, 0.012, &g), moved = 0, most = 0, plain, corrected;
+    double *before = SONDE_NEW(double, n), *motion = SONDE_NEW(double, n);
+    memcpy(before, t.s_m, n * sizeof *before);
+    memcpy(motion, t.solver.multiplier, n * sizeof *motion);
+    (void)bench_force(&t, &law, 0.01201, NULL);
+    for (uint32_t k = 0; k < t.patch.free_count; ++k) {
+      moved = fmax(moved, fabs((t.s_m[k] - before[k]) / 1e-5 - motion[k]));
+      most = fmax(most, motion[k]);
+    }
+    assert_true(most > 0.5 && moved < 0.01);
+    for (uint32_t k = 0; k < t.patch.free_count; ++k) t.s_m[k] = 0.98 * before[k];
+    assert_ok(sonde_patch_settle(&t.solver, 0.012, 1, 1, t.s_m, NULL), NULL); // stays there
+    assert_ok(sonde_patch_force(&t.solver, 0.012, t.s_m, &plain, NULL, NULL), NULL);
+    assert_ok(sonde_patch_force(&t.solver, 0.012, t.s_m, &corrected, &g, NULL), NULL);
+    print_message("2 %% off the equilibrium: force off by %.2g, corrected %.2g\n",
+                  plain / exact - 1, corrected / exact - 1);
+    assert_true(fabs(corrected / exact - 1) < 0.1 * fabs(plain / exact - 1));
+    sonde_free(g.by_ln_k0);
+    sonde_free(g.by_ln_xm);
+    sonde_free(before);
+    sonde_free(motion);
+    bench_clear(&t);
+  }
+  fields_clear(&f);
+  bundled_clear(&b);
+}
+
 static void basis_is_the_models_interpolation(void **state) {
   (void)state;
   bundled b = shear_thigh(8.0);
@@ -325,20 +364,6 @@ static void roughness_spares_planes(void **state) {
 // ---- recovery -----------------------------------------------------------------------------
 
 enum { KEPT = 9 };
-
-// Nine neighbouring sites with their rows: sites 18..20, 26..28, 34..36 of the 8 x 8.
-static void keep_nine_sites(bundled *b) {
-  uint32_t kept = 0, rows = 0;
-  for (uint32_t s = 0; s < b->sites.count; ++s)
-    if (s / 8 >= 2 && s / 8 <= 4 && s % 8 >= 2 && s % 8 <= 4)
-      b->sites.sites[kept++] = b->sites.sites[s];
-  b->sites.count = kept;
-  assert_int_equal(kept, KEPT);
-  for (uint32_t r = 0; r < b->m.count; ++r)
-    for (uint32_t s = 0; s < kept; ++s)
-      if (b->m.data[r].site == b->sites.sites[s].id) b->m.data[rows++] = b->m.data[r];
-  b->m.count = rows;
-}
 
 typedef struct recovery {
   bundled b;
@@ -463,6 +488,7 @@ int main(void) {
       cmocka_unit_test(cut_faces_are_the_footprint),
       cmocka_unit_test(rim_does_not_matter),
       cmocka_unit_test(adjoint_equals_finite_differences),
+      cmocka_unit_test(adjoint_corrects_the_force),
       cmocka_unit_test(basis_is_the_models_interpolation),
       cmocka_unit_test(roughness_spares_planes),
       cmocka_unit_test(known_parameters_are_recovered),

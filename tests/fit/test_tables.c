@@ -326,12 +326,6 @@ static void unwritable_place_leaves_nothing(void **state) {
   assert_says(&error, "/nowhere/a.csv");
 }
 
-static int remove_temporary(void **state) {
-  (void)state;
-  unlink(write_temporary(""));
-  return 0;
-}
-
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(reads_columns_in_any_order),

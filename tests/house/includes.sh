@@ -3,7 +3,7 @@
 # include public headers only.
 set -euo pipefail
 root=$1
-rooms=(base geometry sparse tissue world fit robot identify report interior echo haptics exam stream)
+rooms=(base geometry contact sparse tissue world scene fit robot identify report interior echo haptics exam stream)
 bad=0
 
 rank() {
@@ -27,7 +27,7 @@ check_room_file() { # FILE RANK
   while read -r include; do
     case $include in
     *..*) complain "$1" "$include" "no way up the tree" ;;
-    sonde/*) target=${include#sonde/} target=${target%.h} ;;
+    sonde/*) target=${include#sonde/} target=${target%.h} target=${target%%_*} ;; # a room's second header
     */*) target=${include%%/*} ;;
     *) [[ -e $(dirname "$1")/$include ]] || complain "$1" "$include" "not in the same directory"
       continue ;;
@@ -56,7 +56,8 @@ for i in "${!rooms[@]}"; do
   while read -r file; do
     check_room_file "$file" "$i"
     files=$((files + 1))
-  done < <(find "$root/src/${rooms[i]}" "$root/include/sonde/${rooms[i]}.h" -name '*.[ch]' 2>/dev/null)
+  done < <(find "$root/src/${rooms[i]}" "$root/include/sonde/${rooms[i]}.h" \
+    "$root/include/sonde/${rooms[i]}_"*.h -name '*.[ch]' 2>/dev/null)
 done
 while read -r file; do
   check_outsider "$file"

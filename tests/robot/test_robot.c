@@ -370,12 +370,6 @@ static void refuses_bad_orders(void **state) {
   bundled_clear(&b);
 }
 
-static int remove_temporary(void **state) {
-  (void)state;
-  unlink(write_temporary(""));
-  return 0;
-}
-
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(stops_one_step_after_the_limit),

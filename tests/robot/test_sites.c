@@ -270,12 +270,6 @@ static void sites_off_the_skin_are_named(void **state) {
   sonde_model_destroy(model);
 }
 
-static int remove_temporary(void **state) {
-  (void)state;
-  unlink(write_temporary(""));
-  return 0;
-}
-
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(cylinder_sites_are_where_they_must_be),

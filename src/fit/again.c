@@ -1,0 +1,88 @@
+// allocate / optimum_of: arrays, the result's parameters.
+// sonde_again_create: both and the refit. sonde_again_run: the refit from theta.
+// sonde_again_factor / sonde_again_spread: variances from the curvature at its end.
+#include "fit/again.h"
+#include "fit/dense.h"
+
+#include "base/maths.h"
+
+#include <string.h>
+
+static bool allocate(sonde_again *a, uint32_t sites) {
+  a->parameters = 2 * sites + 2;
+  a->optimum = SONDE_NEW(double, a->parameters);
+  a->theta = SONDE_NEW(double, a->parameters);
+  a->step = SONDE_NEW(double, a->parameters);
+  a->force_n = SONDE_NEW(double, a->plan.row_count);
+  a->left_out = SONDE_NEW(bool, a->plan.row_count);
+  a->factor = SONDE_NEW(double, (size_t)a->parameters * a->parameters);
+  return sonde_normal_create(&a->curvature, a->parameters) && a->optimum && a->theta && a->step &&
+         a->force_n && a->left_out && a->factor;
+}
+
+static void optimum_of(const sonde_fit_result *result, double *theta) {
+  uint32_t count = result->site_count;
+  for (uint32_t s = 0; s < count; ++s) {
+    theta[s] = log(result->sites[s].k0_n_m3);
+    theta[count + s] = log(result->sites[s].xm_m);
+  }
+  theta[2 * count] = log(result->law.shear_stiffness_n_m);
+  theta[2 * count + 1] = log(result->law.shear_limit);
+}
+
+sonde_status sonde_again_create(const sonde_model *model, const sonde_site_table *sites,
+                                const sonde_measurements *m, const sonde_fit_def *def,
+                                const sonde_fit_result *result, sonde_again *a,
+                                sonde_error *error) {
+  *a = (sonde_again){.def = sonde_fit_def_complete(def)};
+  if (!(result->law.shear_stiffness_n_m > 0) || !(result->confidence.smoothness_sd > 0))
+    return sonde_fail(error, SONDE_ARGUMENT, "expected the result of stage 3");
+  SONDE_ASSERT(result->site_count == sites->count);
+  a->def.smoothness_sd = result->confidence.smoothness_sd;
+  sonde_status status = sonde_fit_plan_create(sites, m, &a->plan, error);
+  if (status) return status;
+  if (!allocate(a, sites->count)) status = sonde_fail_memory(error);
+  if (!status)
+    status =
+        sonde_refit_create(model, sites, m, &a->plan, &a->def, REFIT_REACH_M, &a->refit, error);
+  if (!status) {
+    optimum_of(result, a->optimum);
+    memcpy(a->theta, a->optimum, a->parameters * sizeof *a->theta);
+    return SONDE_OK;
+  }
+  sonde_again_clear(a);
+  return status;
+}
+
+void sonde_again_clear(sonde_again *a) {
+  sonde_refit_destroy(a->refit);
+  sonde_fit_plan_clear(&a->plan);
+  sonde_normal_free(&a->curvature);
+  sonde_free(a->optimum);
+  sonde_free(a->theta);
+  sonde_free(a->step);
+  sonde_free(a->force_n);
+  sonde_free(a->left_out);
+  sonde_free(a->factor);
+  *a = (sonde_again){0};
+}
+
+sonde_status sonde_again_run(sonde_again *a, const sonde_progress *progress,
+                             sonde_refit_result *found, sonde_error *error) {
+  a->refit->curvature = &a->curvature;
+  return sonde_refit_minimise(a->refit, a->theta, a->force_n, progress, found, error);
+}
+
+bool sonde_again_factor(sonde_again *a) {
+  memcpy(a->factor, a->curvature.matrix, (size_t)a->parameters * a->parameters * sizeof *a->factor);
+  return sonde_cholesky(a->factor, a->parameters);
+}
+
+double sonde_again_spread(sonde_again *a, const double *row) {
+  double variance = 0;
+  memcpy(a->step, row, a->parameters * sizeof *row);
+  sonde_cholesky_solve(a->factor, a->parameters, a->step);
+  for (uint32_t k = 0; k < a->parameters; ++k) variance += row[k] * a->step[k];
+  SONDE_ASSERT(variance >= 0);
+  return variance;
+}

@@ -1,0 +1,110 @@
+// condition_of:  by Jacobi rotations.
+// describe:      deviations and correlations of the four figures.
+// look_at:       the curvature of one probe's rows.
+// sonde_fit_identify: every probe, then all.
+#include "fit/again.h"
+#include "sonde/fit_confidence.h"
+
+#include "base/maths.h"
+
+#include <string.h>
+
+enum { FIGURES = 4, SWEEPS = 30 };
+
+// One rotation that clears entry (p, q) of a symmetric matrix.
+static void rotate(double m[FIGURES][FIGURES], int p, int q) {
+  double angle = 0.5 * atan2(2 * m[p][q], m[q][q] - m[p][p]), c = cos(angle), s = sin(angle);
+  SONDE_ASSERT(p < q && q < FIGURES);
+  for (int k = 0; k < FIGURES; ++k) {
+    double a = m[k][p], b = m[k][q];
+    m[k][p] = c * a - s * b;
+    m[k][q] = s * a + c * b;
+  }
+  for (int k = 0; k < FIGURES; ++k) {
+    double a = m[p][k], b = m[q][k];
+    m[p][k] = c * a - s * b;
+    m[q][k] = s * a + c * b;
+  }
+}
+
+// Largest over smallest eigenvalue.
+static double condition_of(const double matrix[FIGURES][FIGURES]) {
+  double m[FIGURES][FIGURES], least = INFINITY, most = 0;
+  memcpy(m, matrix, sizeof m);
+  for (int sweep = 0; sweep < SWEEPS; ++sweep)
+    for (int p = 0; p < FIGURES; ++p)
+      for (int q = p + 1; q < FIGURES; ++q) rotate(m, p, q);
+  for (int k = 0; k < FIGURES; ++k) {
+    least = fmin(least, m[k][k]);
+    most = fmax(most, m[k][k]);
+  }
+  return least > 0 ? most / least : INFINITY;
+}
+
+// The combination of parameters that is figure k: ln G, ln gm, mean ln k0, mean ln xm.
+static void row_of(uint32_t n, int k, double *row) {
+  uint32_t sites = (n - 2) / 2;
+  memset(row, 0, n * sizeof *row);
+  if (k < 2)
+    row[n - 2 + (uint32_t)k] = 1;
+  else
+    for (uint32_t s = 0; s < sites; ++s) row[(k == 3 ? sites : 0) + s] = 1.0 / sites;
+}
+
+// Deviations and correlations from the curvature.
+static void describe(sonde_again *a, double *row, sonde_fit_part *part) {
+  uint32_t n = a->parameters;
+  double spread[FIGURES][FIGURES];
+  bool known = sonde_again_factor(a);
+  for (int k = 0; k < FIGURES; ++k) {
+    row_of(n, k, row);
+    part->ln_sd[k] = known ? sqrt(sonde_again_spread(a, row)) : INFINITY;
+    for (int j = 0; j < FIGURES && known; ++j) {
+      double with = 0;
+      row_of(n, j, row);
+      for (uint32_t i = 0; i < n; ++i) with += row[i] * a->step[i];
+      spread[k][j] = with;
+    }
+  }
+  for (int k = 0; k < FIGURES; ++k)
+    for (int j = 0; j < FIGURES; ++j)
+      part->correlation[k][j] = known ? spread[k][j] / (part->ln_sd[k] * part->ln_sd[j]) : NAN;
+  part->condition = known ? condition_of((const double(*)[FIGURES])part->correlation) : INFINITY;
+}
+
+// probe == probe_count: all. The curvature is taken at the common optimum, before any step: there
+// the information of the probes adds up.
+static sonde_status look_at(sonde_again *a, uint32_t probe, const sonde_progress *progress,
+                            double *row, sonde_fit_part *part, sonde_error *error) {
+  bool all = probe == a->plan.probe_count;
+  SONDE_ASSERT(probe <= a->plan.probe_count);
+  for (uint32_t k = 0; k < a->plan.row_count; ++k)
+    a->left_out[k] = !all && a->plan.row_probe[k] != probe;
+  if (!all) snprintf(part->probe, sizeof part->probe, "%s", a->plan.probe[probe]);
+  a->refit->left_out = a->left_out;
+  a->refit->near = true;
+  a->refit->enough = INFINITY; // any promise ends the refit where it begins
+  sonde_refit_result found;
+  sonde_status status = sonde_again_run(a, progress, &found, error);
+  if (!status) describe(a, row, part);
+  return status;
+}
+
+sonde_status sonde_fit_identify(const sonde_model *model, const sonde_site_table *sites,
+                                const sonde_measurements *measurements, const sonde_fit_def *def,
+                                const sonde_fit_result *result, const sonde_progress *progress,
+                                sonde_fit_identifiability *identifiability, sonde_error *error) {
+  sonde_again again;
+  *identifiability = (sonde_fit_identifiability){0};
+  sonde_status status = sonde_again_create(model, sites, measurements, def, result, &again, error);
+  if (status) return status;
+  double *row = SONDE_NEW(double, again.parameters);
+  if (!row) status = sonde_fail_memory(error);
+  uint32_t first = again.plan.probe_count > 1 ? 0 : again.plan.probe_count;
+  for (uint32_t p = first; p <= again.plan.probe_count && !status; ++p)
+    status =
+        look_at(&again, p, progress, row, &identifiability->part[identifiability->count++], error);
+  sonde_free(row);
+  sonde_again_clear(&again);
+  return status;
+}

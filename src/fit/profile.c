@@ -1,0 +1,119 @@
+// run_at:    the least cost with ln G held at a value.
+// walk:      from the optimum to one side, each value from the one before.
+// end_of:    where the rise crosses the threshold.
+// sonde_fit_profile_shear: optimum, both sides, interval.
+#include "fit/again.h"
+#include "sonde/fit_confidence.h"
+
+#include "base/maths.h"
+
+#include <string.h>
+
+enum { MIDDLE = SONDE_FIT_PROFILE / 2 };
+static const double CHI2_95 = 3.841458820694124; // one degree of freedom
+// Distances in standard deviations of ln G; the ends of the interval lie between the values.
+static const double DISTANCE[MIDDLE] = {0.75, 1.5, 2.25, 3};
+static const double ENOUGH = 2e-5; // rises of a few in a cost of many hundreds are asked for
+
+typedef struct profiler {
+  sonde_again *again;
+  const sonde_progress *progress;
+  bool *fixed;
+  double *optimum, *along; // [parameters] and their change per ln G with all else refitted
+  double cost, sd;
+} profiler;
+
+static sonde_status run_at(profiler *p, double ln_shear, double *cost, sonde_error *error) {
+  uint32_t n = p->again->parameters;
+  double move = ln_shear - p->again->theta[n - 2];
+  for (uint32_t k = 0; k < n; ++k) p->again->theta[k] += move * p->along[k];
+  p->again->theta[n - 2] = ln_shear;
+  sonde_refit_result found;
+  sonde_status status = sonde_again_run(p->again, p->progress, &found, error);
+  *cost = found.cost;
+  return status;
+}
+
+static sonde_status walk(profiler *p, int side, sonde_fit_profile *profile, sonde_error *error) {
+  uint32_t n = p->again->parameters;
+  sonde_status status = SONDE_OK;
+  memcpy(p->again->theta, p->optimum, n * sizeof *p->optimum);
+  for (int k = 0; k < MIDDLE && !status; ++k) {
+    double ln_shear = p->optimum[n - 2] + side * DISTANCE[k] * p->sd, cost;
+    status = run_at(p, ln_shear, &cost, error);
+    int at = MIDDLE + side * (k + 1);
+    SONDE_ASSERT(at >= 0 && at < SONDE_FIT_PROFILE);
+    profile->shear_n_m[at] = exp(ln_shear);
+    profile->rise[at] = 2 * (cost - p->cost);
+    profile->quadratic[at] = profile->variance * DISTANCE[k] * DISTANCE[k];
+  }
+  return status;
+}
+
+// The root of the rise is nearly straight in ln G.
+static double end_of(const sonde_fit_profile *p, int side) {
+  double goal = sqrt(p->threshold);
+  for (int k = 0; k < MIDDLE; ++k) {
+    int in = MIDDLE + side * k, out = in + side;
+    double inner = sqrt(fmax(p->rise[in], 0)), outer = sqrt(fmax(p->rise[out], 0));
+    if (!(outer >= goal)) continue;
+    double share = (goal - inner) / (outer - inner);
+    return p->shear_n_m[in] * pow(p->shear_n_m[out] / p->shear_n_m[in], share);
+  }
+  return NAN;
+}
+
+// The optimum again, to the accuracy that differences of costs need, and the curvature there.
+static sonde_status begin(profiler *p, sonde_fit_profile *profile, sonde_error *error) {
+  sonde_again *a = p->again;
+  uint32_t n = a->parameters, rows = a->plan.row_count;
+  sonde_refit_result found;
+  a->refit->near = true;
+  a->refit->enough = ENOUGH;
+  sonde_status status = sonde_again_run(a, p->progress, &found, error);
+  if (status) return status;
+  if (!sonde_again_factor(a))
+    return sonde_fail(error, SONDE_CONVERGENCE, "the parameters are not determined by the data");
+  memcpy(p->optimum, a->theta, n * sizeof *p->optimum);
+  p->along[n - 2] = 1;
+  double variance = sonde_again_spread(a, p->along);
+  for (uint32_t k = 0; k < n; ++k) p->along[k] = a->step[k] / variance;
+  p->cost = found.cost;
+  profile->count = SONDE_FIT_PROFILE;
+  profile->variance = 2 * found.cost / (rows > n ? rows - n : 1);
+  profile->threshold = CHI2_95 * profile->variance;
+  p->sd = sqrt(variance * profile->variance);
+  profile->estimate_n_m = profile->shear_n_m[MIDDLE] = exp(a->theta[n - 2]);
+  return SONDE_OK;
+}
+
+sonde_status sonde_fit_profile_shear(const sonde_model *model, const sonde_site_table *sites,
+                                     const sonde_measurements *measurements,
+                                     const sonde_fit_def *def, const sonde_fit_result *result,
+                                     const sonde_progress *progress, sonde_fit_profile *profile,
+                                     sonde_error *error) {
+  sonde_again again;
+  *profile = (sonde_fit_profile){0};
+  sonde_status status = sonde_again_create(model, sites, measurements, def, result, &again, error);
+  if (status) return status;
+  profiler p = {.again = &again,
+                .progress = progress,
+                .fixed = SONDE_NEW(bool, again.parameters),
+                .optimum = SONDE_NEW(double, again.parameters),
+                .along = SONDE_NEW(double, again.parameters)};
+  if (!p.fixed || !p.optimum || !p.along) status = sonde_fail_memory(error);
+  if (!status) status = begin(&p, profile, error);
+  if (!status) {
+    p.fixed[again.parameters - 2] = true;
+    again.refit->fixed = p.fixed;
+    status = walk(&p, 1, profile, error);
+  }
+  if (!status) status = walk(&p, -1, profile, error);
+  if (!status)
+    for (int k = 0; k < 2; ++k) profile->interval_95[k] = end_of(profile, k ? 1 : -1);
+  sonde_free(p.fixed);
+  sonde_free(p.optimum);
+  sonde_free(p.along);
+  sonde_again_clear(&again);
+  return status;
+}

@@ -1,0 +1,106 @@
+// sonde_normal_*:        lower triangle and gradient of a quadratic.
+// loss_scale:            of a robust loss.
+// sonde_refit_weigh:     what one measurement counts.
+// sonde_refit_add_rows / sonde_refit_add_prior: measurements and smoothness.
+#include "fit/arrow.h"
+#include "fit/dense.h"
+#include "fit/refit_inside.h"
+
+#include "base/maths.h"
+
+#include <string.h>
+
+bool sonde_normal_create(sonde_normal *normal, uint32_t n) {
+  *normal = (sonde_normal){n, SONDE_NEW(double, (size_t)n *n), SONDE_NEW(double, n)};
+  return normal->matrix && normal->gradient;
+}
+
+void sonde_normal_free(sonde_normal *normal) {
+  sonde_free(normal->matrix);
+  sonde_free(normal->gradient);
+  *normal = (sonde_normal){0};
+}
+
+void sonde_normal_clear(sonde_normal *normal) {
+  memset(normal->matrix, 0, (size_t)normal->n * normal->n * sizeof *normal->matrix);
+  memset(normal->gradient, 0, normal->n * sizeof *normal->gradient);
+}
+
+void sonde_normal_copy(const sonde_normal *from, sonde_normal *to) {
+  SONDE_ASSERT(from->n == to->n);
+  memcpy(to->matrix, from->matrix, (size_t)from->n * from->n * sizeof *from->matrix);
+  memcpy(to->gradient, from->gradient, from->n * sizeof *from->gradient);
+}
+
+void sonde_normal_add(const sonde_normal *other, double times, sonde_normal *normal) {
+  SONDE_ASSERT(other->n == normal->n);
+  uint32_t n = normal->n;
+  for (uint32_t i = 0; i < n; ++i) {
+    const double *from = other->matrix + (size_t)i * n;
+    double *to = normal->matrix + (size_t)i * n;
+    for (uint32_t j = 0; j <= i; ++j) to[j] += times * from[j];
+    normal->gradient[i] += times * other->gradient[i];
+  }
+}
+
+void sonde_normal_add_row(sonde_normal *normal, const double *row, double residual, double weight) {
+  sonde_add_outer(normal->matrix, normal->n, row, weight);
+  for (uint32_t a = 0; a < normal->n; ++a) normal->gradient[a] += weight * row[a] * residual;
+}
+
+bool sonde_normal_solve(const sonde_normal *normal, double damping, double *factor, double *step) {
+  uint32_t n = normal->n;
+  SONDE_ASSERT(n > 0 && damping >= 0);
+  memcpy(factor, normal->matrix, (size_t)n * n * sizeof *factor);
+  for (uint32_t j = 0; j < n; ++j) factor[(size_t)j * n + j] *= 1 + damping;
+  if (!sonde_cholesky(factor, n)) return false;
+  for (uint32_t i = 0; i < n; ++i) step[i] = -normal->gradient[i];
+  sonde_cholesky_solve(factor, n, step);
+  return true;
+}
+
+// In newtons.
+static double loss_scale(const sonde_refit *r, uint32_t row) {
+  double mean_n = r->plan->mean_force_n[r->plan->row_probe[row]], scale = r->def->loss_scale;
+  return r->def->weights == SONDE_WEIGHTS_RELATIVE ? scale * mean_n : scale;
+}
+
+sonde_refit_row sonde_refit_weigh(const sonde_refit *r, uint32_t row, double force_n) {
+  double sd_n = sonde_refit_sd_n(r, row), weight;
+  SONDE_ASSERT(row < r->plan->row_count && sd_n > 0);
+  double error_n = force_n - r->m->data[r->plan->row[row]].force_n;
+  double loss = sonde_loss(r->def->loss, loss_scale(r, row) / sd_n, error_n / sd_n, &weight);
+  return (sonde_refit_row){error_n, weight / (sd_n * sd_n), loss};
+}
+
+double sonde_refit_add_rows(const sonde_refit *r, uint32_t first, uint32_t end,
+                            const double *force_n, const double *jacobian, sonde_normal *normal) {
+  double loss = 0;
+  for (uint32_t k = first; k < end; ++k) {
+    if (!sonde_refit_uses(r, k)) continue;
+    sonde_refit_row row = sonde_refit_weigh(r, k, force_n[k]);
+    loss += row.loss;
+    if (normal)
+      sonde_normal_add_row(normal, jacobian + (size_t)k * normal->n, row.error_n, row.weight);
+  }
+  return loss;
+}
+
+double sonde_refit_add_prior(const sonde_refit *r, const double *theta, double sd, double *row,
+                             sonde_normal *normal) {
+  uint32_t count = r->sites->count, n = sonde_refit_parameters(r);
+  double cost = 0, weight = 1 / (sd * sd);
+  SONDE_ASSERT(isfinite(weight) && (!normal || normal->n == n));
+  for (uint32_t field = 0; field < 2; ++field)
+    for (uint32_t s = 0; s < count; ++s) {
+      const double *rough = &r->roughness[(size_t)s * count];
+      double residual = 0;
+      for (uint32_t t = 0; t < count; ++t) residual += rough[t] * theta[field * count + t];
+      cost += 0.5 * weight * residual * residual;
+      if (!normal) continue;
+      memset(row, 0, n * sizeof *row);
+      memcpy(row + field * count, rough, count * sizeof *rough);
+      sonde_normal_add_row(normal, row, residual, weight);
+    }
+  return cost;
+}
