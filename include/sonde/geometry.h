@@ -222,7 +222,8 @@ typedef struct sonde_probe {
   char name[64];
   sonde_convex body;
   double half_x_m, half_y_m; /**< half extent of the contact face */
-  bool rectangular;          /**< the footprint is the full rectangle (point, linear, square, rect:AxB) */
+  double ball_radius_m;      /**< > 0: pushes as a ball about (0, 0, -radius); 0: as the body */
+  bool rectangular; /**< the footprint is the full rectangle (point, linear, square, rect:AxB) */
 } sonde_probe;
 /** Names of the built-in probes, NULL-terminated: point, linear, square, sphere. @thread any */
 SONDE_API const char *const *sonde_probe_names(void);
@@ -233,7 +234,7 @@ SONDE_API const char *const *sonde_probe_names(void);
  * lowest-z end is the handle). The file's highest z becomes 0 and the middle of the vertices within
  * 1 mm of it the origin; their box gives the half extents.
  * point 6x6 mm, linear 60x12 mm, square 24x24 mm, rect:AxB with sides A (x) and B (y) from 0.1 to
- * 200 mm (flat boxes); sphere radius 15 mm.
+ * 200 mm (flat boxes); sphere radius 15 mm, ball:R a true ball of radius R, 1 to 200 mm.
  * @return SONDE_NOT_FOUND for an unknown name, listing the known ones
  * @thread owner
  */

@@ -14,6 +14,7 @@
 //
 //   clip_triangle    polygon of the part inside the body
 //   cut              one linear function against a polygon
+//   cut_thin         the same where rounding rules
 //   far_planes       the planes that can end a column of this polygon
 //   lowest_plane     the plane that undercuts the present one most at a corner of a piece
 //   split_pieces     pieces with one lowest plane each
@@ -72,21 +73,52 @@ static double value(const linear *f, corner p) {
   return f->at[0] * (1 - p.u - p.v) + f->at[1] * p.u + f->at[2] * p.v;
 }
 
-// Keeps the part of the polygon where f <= 0.
-static uint32_t cut(const corner *in, uint32_t count, const linear *f, corner *out) {
-  SONDE_ASSERT(in != out && count > 0);
-  uint32_t kept = 0;
-  double at_p = value(f, in[0]);
-  for (uint32_t k = 0; k < count; ++k) {
-    corner p = in[k], q = in[k + 1 < count ? k + 1 : 0];
-    double at_q = value(f, q);
-    if (at_p <= 0) out[kept++] = p;
-    if ((at_p < 0 && at_q > 0) || (at_p > 0 && at_q < 0)) {
-      double s = at_p / (at_p - at_q);
-      out[kept++] = (corner){p.u + s * (q.u - p.u), p.v + s * (q.v - p.v)};
-    }
-    at_p = at_q;
+// Crossing of the side from p to q, where f has the values at_p and at_q of different sign.
+static corner crossing(corner p, corner q, double at_p, double at_q) {
+  double s = at_p / (at_p - at_q);
+  return (corner){p.u + s * (q.u - p.u), p.v + s * (q.v - p.v)};
+}
+
+// The cut of a polygon so thin that rounding makes f change its sign more than twice around it:
+// only the run of kept corners around the lowest one stays.
+static uint32_t cut_thin(const corner *in, uint32_t count, const double *at, corner *out) {
+  uint32_t first = 0, kept = 0;
+  for (uint32_t k = 1; k < count; ++k)
+    if (at[k] < at[first]) first = k;
+  for (uint32_t steps = 1; steps < count; ++steps) {
+    uint32_t before = first ? first - 1 : count - 1;
+    if (at[before] > 0) break;
+    first = before;
   }
+  uint32_t before = first ? first - 1 : count - 1, k = first;
+  if (at[before] > 0 && at[first] < 0)
+    out[kept++] = crossing(in[before], in[first], at[before], at[first]);
+  while (kept <= count && at[k] <= 0) {
+    uint32_t next = k + 1 < count ? k + 1 : 0;
+    out[kept++] = in[k];
+    if (at[k] < 0 && at[next] > 0) out[kept++] = crossing(in[k], in[next], at[k], at[next]);
+    k = next;
+  }
+  SONDE_ASSERT(kept <= count + 1);
+  return kept;
+}
+
+// Keeps the part of the polygon where f <= 0: at most count + 1 corners.
+static uint32_t cut(const corner *in, uint32_t count, const linear *f, corner *out) {
+  SONDE_ASSERT(in != out && count > 0 && count < MAX_CORNERS);
+  double at[MAX_CORNERS];
+  uint32_t kept = 0, changes = 0;
+  for (uint32_t k = 0; k < count; ++k) at[k] = value(f, in[k]);
+  for (uint32_t k = 0; k < count; ++k)
+    changes += (at[k] > 0) != (at[k + 1 < count ? k + 1 : 0] > 0);
+  if (changes > 2) return cut_thin(in, count, at, out);
+  for (uint32_t k = 0; k < count; ++k) {
+    uint32_t next = k + 1 < count ? k + 1 : 0;
+    if (at[k] <= 0) out[kept++] = in[k];
+    if ((at[k] < 0 && at[next] > 0) || (at[k] > 0 && at[next] < 0))
+      out[kept++] = crossing(in[k], in[next], at[k], at[next]);
+  }
+  SONDE_ASSERT(kept <= count + 1);
   return kept;
 }
 
@@ -232,7 +264,7 @@ static bool split_top(pieces *stack, const columns *far, uint32_t lower) {
   uint32_t top = stack->count - 1, size = stack->size[top], plane = stack->plane[top];
   corner *base = stack->corners + stack->used - size;
   if (stack->count == MAX_PIECES || size + 2 > MAX_CORNERS) return false;
-  if (stack->used + size + 4 > ARENA_CORNERS) return false;
+  if (stack->used + size + 2 > ARENA_CORNERS) return false;
   linear more, less;
   for (int k = 0; k < 3; ++k) {
     less.at[k] = far->length[lower].at[k] - far->length[plane].at[k];
@@ -243,7 +275,6 @@ static bool split_top(pieces *stack, const columns *far, uint32_t lower) {
   uint32_t above = cut(old, size, &more, base);
   if (above < 3) above = 0;
   uint32_t below = cut(old, size, &less, base + above);
-  SONDE_ASSERT(above + below <= size + 4);
   if (above) {
     stack->size[top] = above;
     stack->count++;

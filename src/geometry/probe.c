@@ -103,7 +103,7 @@ static uint32_t sphere_points(sonde_vec3 *points) {
   return count;
 }
 
-static sonde_status make_sphere(sonde_probe *probe, sonde_error *error) {
+static sonde_status make_sphere(double radius_m, sonde_probe *probe, sonde_error *error) {
   enum { PER_FACE = (SPHERE_SUBDIVISION + 1) * (SPHERE_SUBDIVISION + 2) / 2 };
   sonde_vec3 points[20 * PER_FACE];
   sonde_convex unit = {0};
@@ -114,7 +114,7 @@ static sonde_status make_sphere(sonde_probe *probe, sonde_error *error) {
   sonde_status status = sonde_convex_hull_within(points, count, 1e-9, &unit, error);
   if (!status) status = sonde_mesh_inspect(&unit.hull, &report, error);
   if (!status) {
-    double radius = SPHERE_RADIUS_M * cbrt(4 * SONDE_PI / 3 / report.volume_m3);
+    double radius = radius_m * cbrt(4 * SONDE_PI / 3 / report.volume_m3);
     for (uint32_t k = 0; k < unit.hull.vertex_count; ++k) {
       sonde_vec3 p = unit.hull.vertices[k];
       points[k] = v_scale(vec3(p.x, p.y, p.z - 1), radius);
@@ -122,10 +122,23 @@ static sonde_status make_sphere(sonde_probe *probe, sonde_error *error) {
     status = sonde_convex_hull(points, unit.hull.vertex_count, &probe->body, error);
   }
   sonde_convex_clear(&unit);
-  double band = CONTACT_BAND_M;
-  probe->half_x_m = probe->half_y_m = sqrt(2 * SPHERE_RADIUS_M * band - band * band);
+  double band = fmin(CONTACT_BAND_M, radius_m);
+  probe->half_x_m = probe->half_y_m = sqrt(2 * radius_m * band - band * band);
   probe->rectangular = false;
   return status;
+}
+
+// The radius in mm behind "ball:"; its polyhedron has the ball's volume.
+static sonde_status make_ball(const char *name, sonde_probe *probe, sonde_error *error) {
+  const char *end;
+  double radius_mm = sonde_parse_real(name + 5, &end);
+  if (end == name + 5 || *end || !(radius_mm >= 1 && radius_mm <= 200))
+    return sonde_fail(error, SONDE_NOT_FOUND,
+                      "probe \"%.40s\": expected ball:R with a radius from 1 to 200 mm, such as "
+                      "ball:30",
+                      name);
+  probe->ball_radius_m = radius_mm * 1e-3;
+  return make_sphere(probe->ball_radius_m, probe, error);
 }
 
 // ---- files --------------------------------------------------------------------------------
@@ -195,7 +208,9 @@ sonde_status sonde_probe_create(const char *name_or_path, sonde_probe *probe, so
   if (box)
     status = make_box(box, probe, error);
   else if (!strcmp(name_or_path, "sphere"))
-    status = make_sphere(probe, error);
+    status = make_sphere(SPHERE_RADIUS_M, probe, error);
+  else if (!strncmp(name_or_path, "ball:", 5))
+    status = make_ball(name_or_path, probe, error);
   else if (rectangle)
     status = make_rectangle(name_or_path, probe, error);
   else if (path)
@@ -203,7 +218,7 @@ sonde_status sonde_probe_create(const char *name_or_path, sonde_probe *probe, so
   else
     status = sonde_fail(error, SONDE_NOT_FOUND,
                         "no probe is called \"%.40s\"; known are point, linear, square, sphere, "
-                        "rect:AxB (sides in mm) and mesh files (.ply, .obj, .stl)",
+                        "rect:AxB, ball:R (mm) and mesh files (.ply, .obj, .stl)",
                         name_or_path);
   if (status)
     sonde_probe_clear(probe);

@@ -2,7 +2,7 @@
 //
 //   closest_on_triangle   closest point by the Voronoi regions of corner, side and face
 //   sonde_surface_closest branch and bound over the tree
-//   hit_triangle          ray against triangle, both sides
+//   hit_triangle          ray against triangle, both sides, watertight
 //   sonde_surface_inside  sign against the pseudo-normal of the closest feature
 #include "geometry/surface.h"
 
@@ -105,14 +105,43 @@ sonde_surface_point sonde_surface_closest(const sonde_surface_index *index, sond
 
 // ---- rays ---------------------------------------------------------------------------------
 
+// The shear takes the direction to the axis z, its largest component, and leaves the cross-section
+// in x and y.
 typedef struct ray {
   sonde_vec3 origin, direction, inverse;
+  int x, y, z; // axes in turned order
+  double shear_x, shear_y, scale;
 } ray;
 
+static double along(sonde_vec3 p, int axis) { return axis == 0 ? p.x : axis == 1 ? p.y : p.z; }
+
+static ray make_ray(sonde_vec3 origin, sonde_vec3 direction) {
+  ray r = {.origin = origin, .direction = direction};
+  r.inverse = vec3(1 / direction.x, 1 / direction.y, 1 / direction.z);
+  double x = fabs(direction.x), y = fabs(direction.y), z = fabs(direction.z);
+  r.z = x >= y && x >= z ? 0 : y >= z ? 1 : 2;
+  r.x = (r.z + 1) % 3;
+  r.y = (r.z + 2) % 3;
+  r.scale = 1 / along(direction, r.z);
+  r.shear_x = along(direction, r.x) * r.scale;
+  r.shear_y = along(direction, r.y) * r.scale;
+  return r;
+}
+
+static sonde_vec3 sheared(const ray *r, sonde_vec3 p) {
+  sonde_vec3 from = v_sub(p, r->origin);
+  double z = along(from, r->z);
+  return vec3(along(from, r->x) - r->shear_x * z, along(from, r->y) - r->shear_y * z, z * r->scale);
+}
+
+// The stretch of the ray between two planes; a ray along them is between them or it is not.
 static void narrow(double origin, double inverse, double low, double high, double *enter,
                    double *leave) {
+  if (isinf(inverse)) {
+    if (origin < low || origin > high) *leave = -INFINITY;
+    return;
+  }
   double a = (low - origin) * inverse, b = (high - origin) * inverse;
-  // A ray inside a slab's plane gives 0 * inf = NaN, which fmin and fmax pass over.
   *enter = fmax(*enter, fmin(a, b));
   *leave = fmin(*leave, fmax(a, b));
 }
@@ -125,19 +154,21 @@ static bool enters_box(const surface_node *node, const ray *r, double reach) {
   return enter <= leave * (1 + 1e-12) + 1e-12;
 }
 
-// Solves origin + t direction = a + u (b - a) + v (c - a); sides count as hit within rounding.
+// Sheared so, the ray is the axis x = y = 0 and a side's sign is that of one cross product, which
+// two faces that share the side compute alike but for the sign: no ray slips between them. A ray on
+// a side or corner hits (Woop, Benthin and Wald 2013).
 static bool hit_triangle(const ray *r, sonde_vec3 a, sonde_vec3 b, sonde_vec3 c, double *t,
                          double w[3]) {
-  const double slack = 1e-12;
-  sonde_vec3 ab = v_sub(b, a), ac = v_sub(c, a), from = v_sub(r->origin, a);
-  sonde_vec3 h = v_cross(r->direction, ac), q = v_cross(from, ab);
-  double det = v_dot(ab, h);
-  if (fabs(det) <= 1e-14 * v_norm(ab) * v_norm(ac)) return false;
-  w[1] = v_dot(from, h) / det;
-  w[2] = v_dot(r->direction, q) / det;
-  w[0] = 1 - w[1] - w[2];
-  *t = v_dot(ac, q) / det;
-  return w[0] >= -slack && w[1] >= -slack && w[2] >= -slack;
+  sonde_vec3 p = sheared(r, a), q = sheared(r, b), s = sheared(r, c);
+  double on_a = s.x * q.y - s.y * q.x, on_b = p.x * s.y - p.y * s.x, on_c = q.x * p.y - q.y * p.x;
+  bool negative = on_a < 0 || on_b < 0 || on_c<0, positive = on_a> 0 || on_b > 0 || on_c > 0;
+  double sum = on_a + on_b + on_c;
+  if (negative == positive || sum == 0) return false;
+  w[0] = on_a / sum;
+  w[1] = on_b / sum;
+  w[2] = on_c / sum;
+  *t = w[0] * p.z + w[1] * q.z + w[2] * s.z;
+  return true;
 }
 
 static void hit_leaf(const sonde_surface_index *index, const surface_node *node, const ray *r,
@@ -161,8 +192,7 @@ bool sonde_surface_raycast(const sonde_surface_index *index, sonde_vec3 origin,
   sonde_surface_point best = {.distance_m = max_distance_m};
   *hit = (sonde_surface_point){0};
   if (!(length > 0)) return false;
-  ray r = {.origin = origin, .direction = v_scale(direction, 1.0 / length)};
-  r.inverse = vec3(1 / r.direction.x, 1 / r.direction.y, 1 / r.direction.z);
+  ray r = make_ray(origin, v_scale(direction, 1.0 / length));
   uint32_t stack[SURFACE_STACK], depth = 0;
   bool found = false;
   stack[depth++] = 0;

@@ -339,6 +339,55 @@ static void test_equal_planes_end(void **state) {
   sonde_convex_clear(&body);
 }
 
+// Columns of a face beside the ball that end on several planes which meet within rounding: pieces
+// so thin that a cut changes its sign more than twice around them. The volume is that of a fine
+// grid of columns.
+static void test_thin_pieces(void **state) {
+  (void)state;
+  static const sonde_vec3 direction = {-0x1.fea5ffe958f8fp-1, 0x1.c3b4fcd23116p-7,
+                                       -0x1.240318e1cd3ap-4};
+  static const sonde_vec3 corner[3] = {
+      {0x1.ee2f5a6778d42p-5, 0x1.194285c4135c1p-7, 0x1.6fb4626246d45p-4},
+      {0x1.ef3a24cc4a9c1p-5, 0x1.49e82c0b26c6p-12, 0x1.8148f5436211ap-4},
+      {0x1.d99b6155b8296p-5, -0x1.d697a4ed336e6p-10, 0x1.8e4429a2133a3p-4}};
+  static const sonde_vec3 normal[] = {
+      {-0x1.631475eedb251p-1, 0x1.3779e5c38c3adp-1, 0x1.8b3204981737p-2},
+      {-0x1.b5a5ba269febap-2, -0x1.210e9bd23cf69p-2, 0x1.b7bd90b232dcap-1},
+      {-0x1.72bf1d88ad9cep-1, -0x1.bfe5d7c800e95p-3, 0x1.4ee460e628f19p-1},
+      {-0x1.971b515046976p-1, 0x1.302aee2d9a2e6p-2, 0x1.0eb34429d8da9p-1},
+      {-0x1.9a668454d2171p-1, 0x1.f8761bb9f832p-4, 0x1.2b90a4833022ep-1},
+      {-0x1.5aa8f5cfc0f15p-1, 0x1.9cb880aa83b68p-2, 0x1.3b417efaf8a37p-1},
+      {-0x1.60c4536b451c5p-1, 0x1.4a6248e638974p-4, 0x1.70c60cc0f2abp-1},
+      {-0x1.37b52d2369fdp-1, 0x1.6a55ba3a61af9p-3, 0x1.8bf35b51cf47bp-1},
+      {-0x1.3468b83bb9187p-1, 0x1.677c3cd7ca275p-2, 0x1.6f0af61c8e7dap-1}};
+  static const double offset[] = {-0x1.278b72b738c7p-9, 0x1.c5e9b6fd88359p-5, 0x1.1fd9bdb25e962p-6,
+                                  0x1.2e5b11c84097ap-9, 0x1.a850eb005a87dp-8, 0x1.24671d35cd8b7p-6,
+                                  0x1.a30223d5cd75p-6,  0x1.2429847a30a92p-5, 0x1.01f80f9954698p-5};
+  enum { PLANES = SONDE_COUNT_OF(offset), CELLS = 600 };
+  sonde_clip_result result;
+  assert_true(sonde_clip_triangle(normal, offset, PLANES, corner, direction, &result));
+  double sum = 0;
+  for (int cell = 0; cell < CELLS * CELLS; ++cell) {
+    // Middles of the upright cells of the triangle's grid and of the turned ones between them.
+    double u = (cell / CELLS + 1 / 3.0) / CELLS, v = (cell % CELLS + 1 / 3.0) / CELLS;
+    if (u + v > 1) {
+      u = 1 - u;
+      v = 1 - v;
+    }
+    sonde_vec3 p = v_madd(v_scale(corner[0], 1 - u - v), u, corner[1]);
+    double length = INFINITY;
+    p = v_madd(p, v, corner[2]);
+    for (int k = 0; k < PLANES; ++k) {
+      double depth = offset[k] - v_dot(normal[k], p), along = v_dot(normal[k], direction);
+      if (along > 1e-9 || depth <= 0) length = fmin(length, depth <= 0 ? 0 : depth / along);
+    }
+    sum += length / (CELLS * CELLS);
+  }
+  sonde_vec3 area = v_cross(v_sub(corner[1], corner[0]), v_sub(corner[2], corner[0]));
+  double volume = -0.5 * v_dot(area, direction) * sum;
+  assert_near(result.volume_m3, volume, 0.01 * fabs(volume));
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_box_upright),          cmocka_unit_test(test_box_tilted),
@@ -346,6 +395,7 @@ int main(void) {
       cmocka_unit_test(test_bumpy_against_voxels), cmocka_unit_test(test_gradient),
       cmocka_unit_test(test_body_motion),          cmocka_unit_test(test_submerged),
       cmocka_unit_test(test_steep_faces_end),      cmocka_unit_test(test_equal_planes_end),
+      cmocka_unit_test(test_thin_pieces),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -78,6 +78,53 @@ static void test_raycast(void **state) {
   sonde_surface_index_destroy(index);
 }
 
+// Rays from afar aimed at points of edges between faces that look at them: none slips between the
+// faces, however small these are beside the distance. Returns how many do.
+static uint32_t escapes(const sonde_mesh *mesh, double distance) {
+  uint64_t seed = 31;
+  uint32_t missed = 0, count = 0;
+  sonde_topology topology;
+  assert_ok(sonde_topology_build(mesh, &topology, &shape_error));
+  sonde_surface_index *index = make_index(mesh);
+  for (uint32_t e = 0; e < topology.edge_count; ++e)
+    for (int k = 0; k < 40; ++k) {
+      sonde_vec3 a = mesh->vertices[topology.edges[e][0]], b = mesh->vertices[topology.edges[e][1]];
+      sonde_vec3 aim = v_lerp(a, b, k % 4 ? shape_uniform(&seed, 0, 1) : 0);
+      sonde_vec3 way = shape_direction(&seed);
+      if (v_dot(way, v_unit(aim, way)) < 0.6) continue;
+      sonde_vec3 from = v_madd(aim, distance, way);
+      sonde_surface_point hit;
+      ++count;
+      missed += !sonde_surface_raycast(index, from, v_neg(way), 2 * distance, &hit);
+    }
+  assert_true(count > 1000);
+  sonde_surface_index_destroy(index);
+  sonde_topology_clear(&topology);
+  return missed;
+}
+
+static void test_raycast_edges(void **state) {
+  (void)state;
+  sonde_mesh ball = shape_sphere(10, 1);
+  for (double distance = 0.5; distance < 1e9; distance *= 30)
+    assert_int_equal(escapes(&ball, distance), 0);
+  // Along the axes, through corners that end the boxes of the tree.
+  sonde_surface_index *index = make_index(&ball);
+  for (uint32_t v = 0; v < ball.vertex_count; ++v) {
+    sonde_vec3 p = ball.vertices[v];
+    const double at[3] = {p.x, p.y, p.z};
+    for (int k = 0; k < 3; ++k) {
+      if (fabs(at[k]) < 0.3) continue;
+      sonde_vec3 way = vec3(k == 0 ? at[k] : 0, k == 1 ? at[k] : 0, k == 2 ? at[k] : 0);
+      sonde_surface_point hit;
+      assert_true(sonde_surface_raycast(index, v_add(p, way), v_neg(way), 2, &hit));
+      assert_near(hit.distance_m, fabs(at[k]), 1e-14);
+    }
+  }
+  sonde_surface_index_destroy(index);
+  sonde_mesh_clear(&ball);
+}
+
 // Inside, by the solid angle of the surface seen from the point: 4 pi inside, 0 outside.
 static double solid_angle(const sonde_mesh *mesh, sonde_vec3 q) {
   double sum = 0;
@@ -193,10 +240,10 @@ static void test_faults(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_closest),      cmocka_unit_test(test_raycast),
-      cmocka_unit_test(test_inside),       cmocka_unit_test(test_box_symmetry),
-      cmocka_unit_test(test_inside_sharp), cmocka_unit_test(test_speed),
-      cmocka_unit_test(test_faults),
+      cmocka_unit_test(test_closest),       cmocka_unit_test(test_raycast),
+      cmocka_unit_test(test_raycast_edges), cmocka_unit_test(test_inside),
+      cmocka_unit_test(test_box_symmetry),  cmocka_unit_test(test_inside_sharp),
+      cmocka_unit_test(test_speed),         cmocka_unit_test(test_faults),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
