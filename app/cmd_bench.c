@@ -1,6 +1,7 @@
 // sonde bench: steps per second of the dynamics on named scenes, with the error against the same
 // scene solved to the end (every node awake, residual 1e-10) at the same time step.
 #include "app.h"
+#include "bench_ellipsoid.h"
 
 #include <getopt.h>
 #include <math.h>
@@ -18,7 +19,18 @@ static const char HELP[] =
     "  --scene NAME   press  linear probe to 20 mm at the central site in 0.4 s, hold (default)\n"
     "                 point  the same with the point probe\n"
     "                 slide  press to 12 mm, then slide 40 mm along the leg\n"
-    "  --seconds S    simulated time, 0.05 to 60; default 1\n"
+    "                 ellipsoid  the scene that engines are compared on: a ball of 30 mm pressed\n"
+    "                        20 mm into a soft ellipsoid in 0.1 s, held to 0.3 s, slid to 0.5 s;\n"
+    "                        no model is read\n"
+    "  --nodes N      of the ellipsoid, 42 to 1000000; default 7842\n"
+    "  --stiffness K  of its surface springs, 1 to 1e6 N/m; default 200\n"
+    "  --size S       of the ellipsoid, 0.5 to 20; default 1: 0.20 x 0.08 x 0.08 m\n"
+    "  --engine NAME  fast (default) or double\n"
+    "  --newton N     Newton iterations of a step; default 2, ellipsoid 1\n"
+    "  --reference-newton N  of the converged run; default as --newton\n"
+    "  --sleep-um D   a node slower than this per 10 ms may sleep, 0 to 1000; default 5\n"
+    "  --tolerance R  of the linear solver, 1e-12 to 0.5; default 5e-3\n"
+    "  --seconds S    simulated time, 0.05 to 60; default 1, ellipsoid 0.5\n"
     "  --dt-ms H      time step, 0.1 to 20; default 1\n"
     "  --repeat N     timed runs, the fastest median is reported; default 3\n"
     "  --csv FILE     write one row per step: time, total and per-stage milliseconds, iterations\n"
@@ -31,12 +43,19 @@ typedef struct scene {
   double depth_m, slide_m;
 } scene;
 
-static const scene SCENES[] = {
-    {"press", "linear", 0.020, 0}, {"point", "point", 0.020, 0}, {"slide", "linear", 0.012, 0.040}};
+static const scene SCENES[] = {{"press", "linear", 0.020, 0},
+                               {"point", "point", 0.020, 0},
+                               {"slide", "linear", 0.012, 0.040},
+                               {"ellipsoid", "ball:30", 0, 0}};
 
 typedef struct options {
   char model[1024];
   const scene *scene;
+  bench_ellipsoid ellipsoid;
+  sonde_engine engine;
+  long newton, newton_reference;
+  double tolerance;
+  double sleep_um;
   double seconds, dt_s;
   long repeat;
   const char *csv;
@@ -63,44 +82,83 @@ static const scene *find_scene(const char *name) {
   return NULL;
 }
 
-static int read_options(int argc, char **argv, options *o) {
-  static const struct option LONG[] = {{"scene", required_argument, NULL, 's'},
-                                       {"seconds", required_argument, NULL, 't'},
-                                       {"dt-ms", required_argument, NULL, 'd'},
-                                       {"repeat", required_argument, NULL, 'r'},
-                                       {"csv", required_argument, NULL, 'c'},
-                                       {"no-reference", no_argument, NULL, 'n'},
-                                       {"json", no_argument, NULL, 'j'},
-                                       {"help", no_argument, NULL, 'h'},
-                                       {NULL, 0, NULL, 0}};
+static bool is_ellipsoid(const options *o) { return strcmp(o->scene->name, "ellipsoid") == 0; }
+
+static int read_scene(options *o, const char *name) {
+  o->scene = find_scene(name);
+  if (o->scene) return -1;
+  return app_usage_error("bench", "unknown scene '%s', expected press, point, slide or ellipsoid",
+                         name);
+}
+
+static int read_engine(options *o, const char *name) {
+  o->engine = strcmp(name, "fast") == 0 ? SONDE_ENGINE_FAST : SONDE_ENGINE_DOUBLE;
+  if (o->engine == SONDE_ENGINE_FAST || strcmp(name, "double") == 0) return -1;
+  return app_usage_error("bench", "unknown engine '%s', expected fast or double", name);
+}
+
+static const struct option LONG[] = {{"scene", required_argument, NULL, 's'},
+                                     {"nodes", required_argument, NULL, 'N'},
+                                     {"stiffness", required_argument, NULL, 'K'},
+                                     {"size", required_argument, NULL, 'S'},
+                                     {"engine", required_argument, NULL, 'e'},
+                                     {"newton", required_argument, NULL, 'i'},
+                                     {"reference-newton", required_argument, NULL, 'I'},
+                                     {"sleep-um", required_argument, NULL, 'u'},
+                                     {"tolerance", required_argument, NULL, 'T'},
+                                     {"seconds", required_argument, NULL, 't'},
+                                     {"dt-ms", required_argument, NULL, 'd'},
+                                     {"repeat", required_argument, NULL, 'r'},
+                                     {"csv", required_argument, NULL, 'c'},
+                                     {"no-reference", no_argument, NULL, 'n'},
+                                     {"json", no_argument, NULL, 'j'},
+                                     {"help", no_argument, NULL, 'h'},
+                                     {NULL, 0, NULL, 0}};
+
+// One option with a number; false after printing what was expected.
+static bool read_number(options *o, int option, const char *text) {
   double ms;
-  for (int c; (c = getopt_long(argc, argv, "", LONG, NULL)) != -1;) switch (c) {
-    case 's':
-      o->scene = find_scene(optarg);
-      if (!o->scene)
-        return app_usage_error("bench", "unknown scene '%s', expected press, point or slide",
-                               optarg);
-      break;
-    case 't':
-      if (!app_parse_real("bench", "--seconds", optarg, 0.05, 60, &o->seconds))
-        return APP_BAD_INPUT;
-      break;
-    case 'd':
-      if (!app_parse_real("bench", "--dt-ms", optarg, 0.1, 20, &ms)) return APP_BAD_INPUT;
-      o->dt_s = ms * 1e-3;
-      break;
-    case 'r':
-      if (!app_parse_integer("bench", "--repeat", optarg, 1, 1000, &o->repeat))
-        return APP_BAD_INPUT;
-      break;
-    case 'c': o->csv = optarg; break;
-    case 'n': o->reference = false; break;
-    case 'j': o->json = true; break;
-    case 'h': fputs(HELP, stdout); return APP_OK;
-    default: return APP_BAD_INPUT;
-    }
-  if (argc - optind > 1)
-    return app_usage_error("bench", "one model expected, '%s' is too much", argv[optind + 1]);
+  bool ok = true;
+  switch (option) {
+  case 'N': return app_parse_integer("bench", "--nodes", text, 42, 1000000, &o->ellipsoid.nodes);
+  case 'K': return app_parse_real("bench", "--stiffness", text, 1, 1e6, &o->ellipsoid.stiffness);
+  case 'S': return app_parse_real("bench", "--size", text, 0.5, 20, &o->ellipsoid.size);
+  case 'i': return app_parse_integer("bench", "--newton", text, 0, 100, &o->newton);
+  case 'I':
+    return app_parse_integer("bench", "--reference-newton", text, 1, 100, &o->newton_reference);
+  case 'u': return app_parse_real("bench", "--sleep-um", text, 0, 1000, &o->sleep_um);
+  case 'T': return app_parse_real("bench", "--tolerance", text, 1e-12, 0.5, &o->tolerance);
+  case 't': return app_parse_real("bench", "--seconds", text, 0.05, 60, &o->seconds);
+  case 'r': return app_parse_integer("bench", "--repeat", text, 1, 1000, &o->repeat);
+  default:
+    ok = app_parse_real("bench", "--dt-ms", text, 0.1, 20, &ms);
+    if (ok) o->dt_s = ms * 1e-3;
+    return ok;
+  }
+}
+
+static int read_option(options *o, int option) {
+  switch (option) {
+  case 's': return read_scene(o, optarg);
+  case 'e': return read_engine(o, optarg);
+  case 'c': o->csv = optarg; return -1;
+  case 'n': o->reference = false; return -1;
+  case 'j': o->json = true; return -1;
+  case 'h': fputs(HELP, stdout); return APP_OK;
+  case '?': return APP_BAD_INPUT;
+  default: return read_number(o, option, optarg) ? -1 : APP_BAD_INPUT;
+  }
+}
+
+static int read_options(int argc, char **argv, options *o) {
+  for (int c, code; (c = getopt_long(argc, argv, "", LONG, NULL)) != -1;) {
+    code = read_option(o, c);
+    if (code >= 0) return code;
+  }
+  if (!(o->seconds > 0)) o->seconds = is_ellipsoid(o) ? 0.5 : 1;
+  if (argc - optind > (is_ellipsoid(o) ? 0 : 1))
+    return app_usage_error("bench", "'%s' is too much", argv[argc - 1]);
+  if (is_ellipsoid(o)) return -1;
   char searched[1024];
   if (optind < argc)
     snprintf(o->model, sizeof o->model, "%s", argv[optind]);
@@ -117,6 +175,7 @@ static double smooth(double x) {
 // Pose of the scene at a time: 2 mm above the skin, down to depth in 0.4 s, then the slide.
 static sonde_pose pose_at(const bench *b, double time_s) {
   const scene *s = b->o->scene;
+  if (is_ellipsoid(b->o)) return bench_ellipsoid_pose(&b->o->ellipsoid, time_s);
   double depth = -0.002 + (s->depth_m + 0.002) * smooth(time_s / 0.4);
   double slide = s->slide_m * smooth((time_s - 0.4) / 0.5);
   sonde_pose pose = sonde_site_pose(b->site, depth);
@@ -132,14 +191,18 @@ static double now(void) {
   return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-// Runs the scene from rest; fills samples when given.
-static void run(const bench *b, sonde_state *state, sample *samples) {
+// Runs the scene from rest; fills samples when given, and keeps the positions at the time of
+// comparison: 0.3 s for the ellipsoid, else the end.
+static void run(const bench *b, sonde_state *state, sample *samples, sonde_vec3 *kept) {
+  uint32_t compared = is_ellipsoid(b->o) ? (uint32_t)(0.3 / b->o->dt_s + 0.5) : b->steps;
   sonde_state_reset(state);
   for (uint32_t k = 0; k < b->steps; ++k) {
     sonde_pose pose = pose_at(b, (k + 1) * b->o->dt_s);
     double start = now();
     sonde_step(state, &b->probe, pose);
     double total = now() - start;
+    if (kept && k + 1 == compared)
+      memcpy(kept, sonde_state_positions(state), b->model->surface.vertex_count * sizeof *kept);
     if (!samples) continue;
     sonde_stage_times t = sonde_state_times(state);
     samples[k] = (sample){total,
@@ -192,33 +255,54 @@ static double relative_error(const sonde_model *model, const sonde_vec3 *x, cons
   return size > 0 ? sqrt(difference / size) : NAN;
 }
 
-static sonde_status measure(bench *b, double *error_ratio, sonde_error *error) {
-  sonde_world_def def = sonde_world_def_default();
-  def.dt_s = b->o->dt_s;
-  sonde_state *state = NULL, *reference = NULL;
-  sonde_status status = sonde_state_create(b->model, &def, &state, error);
-  def.sleep_displacement_m = 0;
-  def.pcg = (sonde_pcg_options){1e-10, 1e-16, 5000};
-  if (!status) status = sonde_state_create(b->model, &def, &reference, error);
+// The world that is timed, or the one solved to the end that it is compared with.
+static sonde_world_def world_of(const options *o, bool reference) {
+  sonde_world_def def =
+      is_ellipsoid(o) ? bench_ellipsoid_world(o->dt_s) : sonde_world_def_default();
+  def.dt_s = o->dt_s;
+  if (o->newton >= 0) def.newton_iterations = (uint32_t)o->newton;
+  def.engine = reference ? SONDE_ENGINE_DOUBLE : o->engine;
+  if (!reference) def.pcg.relative_residual = o->tolerance;
+  if (reference) def.pcg = (sonde_pcg_options){1e-10, 1e-16, 5000};
+  if (reference && o->newton_reference) def.newton_iterations = (uint32_t)o->newton_reference;
+  def.sleep_displacement_m = reference ? 0 : o->sleep_um * 1e-6;
+  return def;
+}
+
+// Timed runs; the samples of the one with the smallest median stay. Returns false without memory.
+static bool time_runs(bench *b, sonde_state *state, sonde_vec3 *kept) {
   sample *scratch = calloc(b->steps, sizeof *scratch);
   double best = INFINITY;
-  for (long r = 0; !status && scratch && r < b->o->repeat; ++r) {
-    run(b, state, scratch);
-    sample *kept = b->samples;
+  for (long r = 0; scratch && r < b->o->repeat; ++r) {
+    run(b, state, scratch, kept);
+    sample *other = b->samples;
     b->samples = scratch;
     double median = quantile(b, offsetof(sample, total_s), 0.5);
     if (median < best)
-      best = median, scratch = kept;
+      best = median, scratch = other;
     else
-      b->samples = kept;
+      b->samples = other;
   }
-  *error_ratio = NAN;
-  if (!status && b->o->reference) {
-    run(b, reference, NULL);
-    *error_ratio =
-        relative_error(b->model, sonde_state_positions(state), sonde_state_positions(reference));
-  }
+  bool done = scratch != NULL;
   free(scratch);
+  return done;
+}
+
+static sonde_status measure(bench *b, double *error_ratio, sonde_error *error) {
+  sonde_world_def def = world_of(b->o, false), exact = world_of(b->o, true);
+  sonde_state *state = NULL, *reference = NULL;
+  sonde_status status = sonde_state_create(b->model, &def, &state, error);
+  if (!status) status = sonde_state_create(b->model, &exact, &reference, error);
+  size_t nodes = b->model->surface.vertex_count;
+  sonde_vec3 *kept = calloc(2 * nodes, sizeof *kept);
+  *error_ratio = NAN;
+  bool done = !status && kept && time_runs(b, state, kept);
+  if (done && b->o->reference) {
+    run(b, reference, NULL, kept + nodes);
+    *error_ratio = relative_error(b->model, kept, kept + nodes);
+  }
+  if (!status && !done) status = SONDE_MEMORY;
+  free(kept);
   sonde_state_destroy(state);
   sonde_state_destroy(reference);
   return status;
@@ -288,15 +372,28 @@ static void print_table(const bench *b, double error_ratio) {
     printf("%.2g\n", error_ratio);
 }
 
+static sonde_status load(const options *o, sonde_model **model, sonde_error *error) {
+  return is_ellipsoid(o) ? bench_ellipsoid_build(&o->ellipsoid, model, error)
+                         : sonde_model_load(o->model, model, error);
+}
+
 int cmd_bench(int argc, char **argv) {
-  options o = {.scene = &SCENES[0], .seconds = 1, .dt_s = 1e-3, .repeat = 3, .reference = true};
+  options o = {.scene = &SCENES[0],
+               .ellipsoid = {7842, 200, 1},
+               .engine = SONDE_ENGINE_FAST,
+               .newton = -1,
+               .tolerance = 5e-3,
+               .sleep_um = 5,
+               .dt_s = 1e-3,
+               .repeat = 3,
+               .reference = true};
   int code = read_options(argc, argv, &o);
   if (code >= 0) return code;
   bench b = {.o = &o, .steps = (uint32_t)(o.seconds / o.dt_s + 0.5)};
   sonde_error error = {0};
   sonde_model *model = NULL;
   double error_ratio = NAN;
-  sonde_status status = sonde_model_load(o.model, &model, &error);
+  sonde_status status = load(&o, &model, &error);
   if (!status) status = sonde_probe_create(o.scene->probe, &b.probe, &error);
   b.samples = calloc(b.steps, sizeof *b.samples);
   if (!status && b.samples) {

@@ -86,6 +86,8 @@ typedef struct sonde_model {
   double *muscle_depth_m;           /**< [nodes] depth of the fat/muscle interface */
   double *bone_depth_m;             /**< [nodes] distance to the femur */
   double *edge_rest_m;              /**< [edges] */
+  double *edge_share;               /**< [edges] share of the surface spring that the edge carries:
+                                         1/2 on the lips of a cut; NULL: all of it everywhere */
   double *face_area_m2;             /**< [faces] */
   double (*face_half_cotangent)[3]; /**< [faces] of the angle at each corner */
   uint32_t (*face_edge)[3];         /**< [faces] edge opposite each corner */
@@ -135,6 +137,38 @@ SONDE_API void sonde_model_destroy(sonde_model *model);
 SONDE_API sonde_status sonde_model_load(const char *path, sonde_model **model, sonde_error *error);
 /** Writes a model file atomically; sets model->checksum. Format: docs/model_file.md. */
 SONDE_API sonde_status sonde_model_save(sonde_model *model, const char *path, sonde_error *error);
+
+/** What a cut did. Nodes and faces that were there keep their numbers. */
+typedef struct sonde_cut_map {
+  uint32_t node_count;  /**< before the cut */
+  uint32_t added;       /**< nodes after it: node_count + added */
+  uint32_t *origin;     /**< [added] node that node_count + k was split from */
+  uint32_t *way;        /**< [way_count] nodes (before the cut) that it runs through, in order */
+  uint32_t way_count;   /**< a closed way does not repeat its first node */
+  uint32_t split_edges; /**< edges that became two */
+  bool closed;          /**< it goes round and frees a flap */
+  double length_m;      /**< at rest */
+  uint64_t work;        /**< edges that the search for the way looked at */
+} sonde_cut_map;
+
+/**
+ * Cuts the skin along a path: nodes on the way are split, each copy keeps the faces of its side and
+ * their share of area and mass; edges on the way become two with half the spring each. Rest
+ * positions, normals, k0, xm and all totals stay. The ends of the path inside the skin are tips and
+ * are not split; a path that ends where it began frees a flap; crossing an earlier cut is allowed.
+ * The way follows the mesh's edges, within about half an edge of the path. docs/cutting.md.
+ * @param position_m [nodes] where the nodes are now; NULL: at rest
+ * @param path_m [count] 2 to 1,024 points on the skin at position_m, m
+ * @param[out] cut a new model, owned by the caller; `model` stays as it is
+ * @param[out] map NULL, or zeroed and filled; sonde_cut_map_clear()
+ * @return ARGUMENT for a path that leaves the skin, crosses itself, is too short or cuts nothing
+ * @thread owner
+ */
+SONDE_API sonde_status sonde_model_cut(const sonde_model *model, const sonde_vec3 *position_m,
+                                       const sonde_vec3 *path_m, uint32_t count, sonde_model **cut,
+                                       sonde_cut_map *map, sonde_error *error);
+/** Releases the lists and zeroes the struct. @thread owner */
+SONDE_API void sonde_cut_map_clear(sonde_cut_map *map);
 
 /** The site with that id, NULL when absent. @thread any */
 SONDE_API const sonde_site *sonde_model_site(const sonde_model *model, uint32_t id);

@@ -21,7 +21,15 @@ typedef enum sonde_contact_law {
                                  probe's nearest face: follows the probe's shape */
   SONDE_CONTACT_VOLUME, /**< eq. (2): one force kappa V + mu dV/dt per region along its direction,
                              spread by projected nodal area */
+  SONDE_CONTACT_NODES,  /**< the pressure of the foundation at the nodes, times their area: cheaper,
+                             coarser at the probe's rim */
 } sonde_contact_law;
+
+/** How a step is computed (docs/world.md). */
+typedef enum sonde_engine {
+  SONDE_ENGINE_DOUBLE, /**< double precision, every option */
+  SONDE_ENGINE_FAST,   /**< single precision in vectors of 16; implicitness 1, not VOLUME */
+} sonde_engine;
 
 /**
  * Friction of the probe on the skin (docs/world.md): Coulomb with bonds that stick, the coefficient
@@ -43,7 +51,9 @@ SONDE_API double sonde_friction_coefficient(const sonde_friction *friction, doub
 typedef struct sonde_world_def {
   double dt_s;                /**< step; default 1e-3 */
   double implicitness;        /**< lambda in [0,1]; default 1 (backward Euler) */
-  uint32_t newton_iterations; /**< >= 1; default 1 */
+  uint32_t newton_iterations; /**< from the last step's change of velocity; default 2. 0: eq. (4) as
+                                   in the paper, linearised at the start of the step (DOUBLE) */
+  sonde_engine engine;        /**< default DOUBLE */
   sonde_pcg_options pcg;      /**< default relative 5e-3, at most 200 iterations */
   sonde_contact_law contact_law;
   double contact_stiffness_n_m3; /**< kappa; default 5e8 */
@@ -141,6 +151,20 @@ SONDE_API sonde_settle_result sonde_settle_bonded(sonde_state *state, const uint
  * @thread owner, between steps */
 SONDE_API sonde_status sonde_state_set_friction(sonde_state *state, const sonde_friction *friction,
                                                 sonde_error *error);
+
+/**
+ * Cuts the skin between two steps (sonde_model_cut) along a path on the skin as it is now. The new
+ * state goes on where the old one is: positions, velocities, contact memory, tick, probe; mass,
+ * momentum and energy are equal. Both stay as they are when the cut fails.
+ * @param before stays as it is; no longer needed afterwards, nor is its model
+ * @param[out] model,after new, owned by the caller; `after` borrows `model`
+ * @param[out] map NULL, or filled; sonde_cut_map_clear()
+ * @return ARGUMENT as sonde_model_cut, MEMORY
+ * @thread owner, between steps
+ */
+SONDE_API sonde_status sonde_state_cut(const sonde_state *before, const sonde_vec3 *path_m,
+                                       uint32_t count, sonde_model **model, sonde_state **after,
+                                       sonde_cut_map *map, sonde_error *error);
 
 SONDE_API const sonde_model *sonde_state_model(const sonde_state *state);
 SONDE_API const sonde_world_def *sonde_state_def(const sonde_state *state);

@@ -301,20 +301,11 @@ sonde_status sonde_model_set_parameters(sonde_model *model, const sonde_surface_
 
 void sonde_model_destroy(sonde_model *model) {
   if (!model) return;
-  void *arrays[] = {model->normal,
-                    model->area_m2,
-                    model->mass_kg,
-                    model->k0_n_m3,
-                    model->xm_m,
-                    model->fat_depth_m,
-                    model->bone_depth_m,
-                    model->muscle_depth_m,
-                    model->edge_rest_m,
-                    model->face_area_m2,
-                    model->face_half_cotangent,
-                    model->face_edge,
-                    model->sites,
-                    model->data};
+  void *arrays[] = {model->normal,       model->area_m2,        model->mass_kg,
+                    model->k0_n_m3,      model->xm_m,           model->fat_depth_m,
+                    model->bone_depth_m, model->muscle_depth_m, model->edge_rest_m,
+                    model->edge_share,   model->face_area_m2,   model->face_half_cotangent,
+                    model->face_edge,    model->sites,          model->data};
   for (size_t k = 0; k < SONDE_COUNT_OF(arrays); ++k) sonde_free(arrays[k]);
   sonde_topology_clear(&model->topology);
   sonde_mesh_clear(&model->surface);

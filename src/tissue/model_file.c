@@ -2,6 +2,7 @@
 // arrays in little-endian binary, and a CRC-32 of all that precedes it.
 // writer: collects arrays into one blob and their descriptions into the header.
 // reader: checks magic and CRC first, then takes the arrays by name with their expected shape.
+#include "tissue/live_cut.h"
 #include "tissue/model.h"
 
 #include "base/base.h"
@@ -64,6 +65,13 @@ static void put_nodes(writer *w, const sonde_model *model) {
   put(w, "node_fat_depth", "f64", "m", n, 1, model->fat_depth_m);
   put(w, "node_muscle_depth", "f64", "m", n, 1, model->muscle_depth_m);
   put(w, "node_bone_depth", "f64", "m", n, 1, model->bone_depth_m);
+}
+
+// What cannot be derived again from a skin with lips.
+static void put_cuts(writer *w, const sonde_model *model) {
+  if (!model->edge_share) return;
+  put(w, "node_normal", "f64", "1", model->surface.vertex_count, 3, model->normal);
+  put(w, "edge_share", "f64", "1", model->topology.edge_count, 1, model->edge_share);
 }
 
 static void put_sites(writer *w, const sonde_model *model) {
@@ -178,6 +186,7 @@ static cJSON *make_header(writer *w, const sonde_model *model) {
   put_mesh(w, "surface_vertices", "surface_faces", &model->surface);
   put_mesh(w, "femur_vertices", "femur_faces", &model->femur);
   put_nodes(w, model);
+  put_cuts(w, model);
   put_sites(w, model);
   put_data(w, names, model);
   put_vessel(w, "vein", &model->vein);
@@ -228,14 +237,19 @@ typedef struct reader {
   sonde_error *error;
 } reader;
 
-// Bytes of a named array with `columns` columns; NULL after setting the error.
-static const void *take(const reader *r, const char *name, const char *type, uint32_t columns,
-                        uint32_t *rows) {
+static const cJSON *find_array(const reader *r, const char *name) {
   const cJSON *entry = NULL;
   cJSON_ArrayForEach(entry, cJSON_GetObjectItem(r->header, "arrays")) {
     const char *found = cJSON_GetStringValue(cJSON_GetObjectItem(entry, "name"));
-    if (found && strcmp(found, name) == 0) break;
+    if (found && strcmp(found, name) == 0) return entry;
   }
+  return NULL;
+}
+
+// Bytes of a named array with `columns` columns; NULL after setting the error.
+static const void *take(const reader *r, const char *name, const char *type, uint32_t columns,
+                        uint32_t *rows) {
+  const cJSON *entry = find_array(r, name);
   const cJSON *shape = cJSON_GetObjectItem(entry, "shape");
   const char *kind = cJSON_GetStringValue(cJSON_GetObjectItem(entry, "type"));
   double height = cJSON_GetNumberValue(cJSON_GetArrayItem(shape, 0));
@@ -418,6 +432,44 @@ static bool check_numbers(const reader *r, const sonde_model *model) {
   return ok && check_vessel(r, "vein", &model->vein) && check_vessel(r, "artery", &model->artery);
 }
 
+// A cut skin brings the normals that it had when it was whole and the edges' shares of the springs.
+static bool take_cuts(const reader *r, sonde_model *model) {
+  uint32_t n = model->surface.vertex_count, edges = model->topology.edge_count, rows[2];
+  const char *normal = take(r, "node_normal", "f64", 3, &rows[0]);
+  const char *share = normal ? take(r, "edge_share", "f64", 1, &rows[1]) : NULL;
+  if (!share) return false;
+  model->edge_share = SONDE_NEW(double, edges);
+  if (!model->edge_share || rows[0] != n || rows[1] != edges) {
+    sonde_fail(r->error, SONDE_FORMAT, "%s: %u normals and %u shares, expected %u and %u", r->path,
+               rows[0], rows[1], n, edges);
+    return false;
+  }
+  memcpy(model->normal, normal, n * sizeof *model->normal);
+  memcpy(model->edge_share, share, edges * sizeof *model->edge_share);
+  for (uint32_t i = 0; i < n; ++i)
+    if (!(fabs(v_norm(model->normal[i]) - 1) < 1e-9)) {
+      sonde_fail(r->error, SONDE_FORMAT, "%s: node_normal[%u] is not of unit length", r->path, i);
+      return false;
+    }
+  for (uint32_t e = 0; e < edges; ++e)
+    if (!(model->edge_share[e] > 0 && model->edge_share[e] <= 1)) {
+      sonde_fail(r->error, SONDE_FORMAT, "%s: edge_share[%u] is %g, expected more than 0 to 1",
+                 r->path, e, model->edge_share[e]);
+      return false;
+    }
+  return true;
+}
+
+// The skin encloses the thigh; a cut one when its lips are put together.
+static sonde_status check_closed(const reader *r, const sonde_model *model, bool is_cut) {
+  bool closes = true;
+  sonde_mesh_report report = {0};
+  sonde_status status = is_cut ? sonde_skin_closes(model, &closes, r->error)
+                               : sonde_mesh_inspect(&model->surface, &report, r->error);
+  if (status || (closes && (is_cut || report.closed))) return status;
+  return sonde_fail(r->error, SONDE_MESH, "%s: the skin is not closed", r->path);
+}
+
 static sonde_status read_model(const reader *r, sonde_model *model) {
   sonde_fail(r->error, SONDE_FORMAT, "%s: its arrays do not belong together", r->path);
   take_text(r, "name", model->name, sizeof model->name);
@@ -432,11 +484,12 @@ static sonde_status read_model(const reader *r, sonde_model *model) {
       !take_vessel(r, "vein", &model->vein) || !take_vessel(r, "artery", &model->artery))
     return SONDE_FORMAT;
   if (!check_numbers(r, model)) return SONDE_FORMAT;
-  sonde_mesh_report report;
-  status = sonde_mesh_inspect(&model->surface, &report, r->error);
-  if (!status && !report.closed)
-    status = sonde_fail(r->error, SONDE_MESH, "%s: the skin is not closed", r->path);
-  return status ? status : sonde_model_derive(model, r->error);
+  bool is_cut = find_array(r, "edge_share") != NULL;
+  if (!is_cut) status = check_closed(r, model, false);
+  if (!status) status = sonde_model_derive(model, r->error);
+  if (!status && is_cut) status = check_closed(r, model, true);
+  if (!status && is_cut && !take_cuts(r, model)) status = SONDE_FORMAT;
+  return status;
 }
 
 // Splits magic, header and arrays; checks sizes, version and CRC before anything is believed.

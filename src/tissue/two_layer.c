@@ -16,11 +16,17 @@ typedef struct tension {
   double slope; // d force / d length
 } tension;
 
-static inline tension edge_tension(const sonde_surface_law *law, double length, double rest) {
+static inline tension edge_tension(const sonde_surface_law *law, double share, double length,
+                                   double rest) {
   double stretch = length - rest;
-  double stiffness = law->edge_stiffness_n_m;
+  double stiffness = share * law->edge_stiffness_n_m;
   if (stretch < 0) stiffness *= law->edge_compression;
-  return (tension){law->edge_pretension_n + stiffness * stretch, stiffness};
+  return (tension){share * law->edge_pretension_n + stiffness * stretch, stiffness};
+}
+
+// What a cut left of the edge's spring.
+static inline double share_of(const sonde_model *model, uint32_t e) {
+  return model->edge_share ? model->edge_share[e] : 1;
 }
 
 typedef struct evaluation {
@@ -56,8 +62,9 @@ static void add_edge(const evaluation *at, uint32_t e, uint32_t i, uint32_t j) {
   if (length < shortest) length = shortest;
   double inverse = 1.0 / length;
   sonde_vec3 n = v_scale(d, inverse);
-  tension t = edge_tension(law, length, rest);
-  double damper = law->edge_damping_s * law->edge_stiffness_n_m;
+  double share = share_of(at->model, e);
+  tension t = edge_tension(law, share, length, rest);
+  double damper = share * law->edge_damping_s * law->edge_stiffness_n_m;
   double lateral = t.force > 0 ? t.force * inverse : 0, along = t.slope - lateral;
   double closing = v_dot(n, w), pull = t.force + damper * closing;
   at->force[i] = v_madd(at->force[i], pull, n);
@@ -174,10 +181,10 @@ void sonde_tissue_linearise(const sonde_model *model, const sonde_tissue_part *p
   for (uint32_t r = 0; r < row_count; ++r) add_anchor(&at, rows ? rows[r] : r);
 }
 
-static double edge_energy(const sonde_surface_law *law, double length, double rest) {
-  tension t = edge_tension(law, length, rest);
+static double edge_energy(const sonde_surface_law *law, double share, double length, double rest) {
+  tension t = edge_tension(law, share, length, rest);
   double stretch = length - rest;
-  return law->edge_pretension_n * stretch + 0.5 * t.slope * stretch * stretch;
+  return share * law->edge_pretension_n * stretch + 0.5 * t.slope * stretch * stretch;
 }
 
 static double shear_energy(const sonde_model *model, const sonde_vec3 *position, uint32_t f) {
@@ -204,8 +211,8 @@ double sonde_tissue_energy(const sonde_model *model, const sonde_vec3 *position)
   }
   for (uint32_t e = 0; e < model->topology.edge_count; ++e) {
     const uint32_t *pair = model->topology.edges[e];
-    energy +=
-        edge_energy(law, v_distance(position[pair[0]], position[pair[1]]), model->edge_rest_m[e]);
+    energy += edge_energy(law, share_of(model, e), v_distance(position[pair[0]], position[pair[1]]),
+                          model->edge_rest_m[e]);
   }
   for (uint32_t f = 0; f < model->surface.face_count && law->shear_stiffness_n_m > 0; ++f)
     energy += shear_energy(model, position, f);

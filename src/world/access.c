@@ -1,4 +1,5 @@
 // Reading, resetting and waking the moving state. No allocation: callable on the tick path.
+#include "world/lanes.h"
 #include "world/state.h"
 
 #include "base/base.h"
@@ -6,10 +7,17 @@
 
 #include <string.h>
 
+void sonde_state_publish(const sonde_state *state) {
+  if (state->lanes && !state->lanes->stale)
+    sonde_lanes_publish(state->lanes, state->model->surface.vertices, state->position,
+                        state->velocity);
+}
+
 void sonde_state_wake_all(sonde_state *state) {
   uint32_t n = state->model->surface.vertex_count;
   memset(state->awake, 1, n);
   memset(state->calm, 0, n);
+  if (state->lanes) state->lanes->stale = true;
   sonde_state_list_awake(state);
 }
 
@@ -39,8 +47,10 @@ void sonde_state_list_awake(sonde_state *state) {
     else
       add_rim(state, a ? j : i);
   }
+  // Faces are for the shear layer only.
   const sonde_mesh *skin = &state->model->surface;
-  for (uint32_t f = 0; f < skin->face_count; ++f) {
+  uint32_t face_count = state->model->law.shear_stiffness_n_m > 0 ? skin->face_count : 0;
+  for (uint32_t f = 0; f < face_count; ++f) {
     const uint32_t *v = skin->faces[f];
     state->faces[state->face_count] = f;
     state->face_count += state->awake[v[0]] | state->awake[v[1]] | state->awake[v[2]];
@@ -50,6 +60,7 @@ void sonde_state_list_awake(sonde_state *state) {
 void sonde_state_reset(sonde_state *state) {
   uint32_t n = state->model->surface.vertex_count;
   memcpy(state->position, state->model->surface.vertices, n * sizeof *state->position);
+  memcpy(state->probed, state->model->surface.vertices, n * sizeof *state->probed);
   memset(state->velocity, 0, n * sizeof *state->velocity);
   memset(state->increment, 0, n * sizeof *state->increment);
   memset(state->contact_force, 0, n * sizeof *state->contact_force);
@@ -65,14 +76,23 @@ void sonde_state_reset(sonde_state *state) {
   state->times = (sonde_stage_times){0};
   sonde_contact_clear(state);
   sonde_state_list_awake(state);
+  if (state->lanes)
+    sonde_lanes_import(state->lanes, state->position, state->position, state->velocity,
+                       !(state->def.sleep_displacement_m > 0));
 }
 
 const sonde_model *sonde_state_model(const sonde_state *state) { return state->model; }
 const sonde_world_def *sonde_state_def(const sonde_state *state) { return &state->def; }
 uint64_t sonde_state_tick(const sonde_state *state) { return state->tick; }
 double sonde_state_time(const sonde_state *state) { return (double)state->tick * state->def.dt_s; }
-const sonde_vec3 *sonde_state_positions(const sonde_state *state) { return state->position; }
-const sonde_vec3 *sonde_state_velocities(const sonde_state *state) { return state->velocity; }
+const sonde_vec3 *sonde_state_positions(const sonde_state *state) {
+  sonde_state_publish(state);
+  return state->position;
+}
+const sonde_vec3 *sonde_state_velocities(const sonde_state *state) {
+  sonde_state_publish(state);
+  return state->velocity;
+}
 const sonde_contact *sonde_state_contact(const sonde_state *state) { return &state->contact; }
 const sonde_vec3 *sonde_state_contact_forces(const sonde_state *state) {
   return state->contact_force;
@@ -86,14 +106,17 @@ sonde_stage_times sonde_state_times(const sonde_state *state) { return state->ti
 void sonde_state_set(sonde_state *state, const sonde_vec3 *positions,
                      const sonde_vec3 *velocities) {
   size_t bytes = state->model->surface.vertex_count * sizeof *state->position;
+  sonde_state_publish(state);
   if (positions) memcpy(state->position, positions, bytes);
   if (velocities) memcpy(state->velocity, velocities, bytes);
   memset(state->increment, 0, bytes);
+  memcpy(state->probed, state->position, bytes);
   sonde_state_wake_all(state);
 }
 
 uint64_t sonde_state_hash(const sonde_state *state) {
   size_t bytes = state->model->surface.vertex_count * sizeof *state->position;
+  sonde_state_publish(state);
   uint64_t hash = sonde_hash(0, &state->tick, sizeof state->tick);
   hash = sonde_hash(hash, state->position, bytes);
   return sonde_hash(hash, state->velocity, bytes);

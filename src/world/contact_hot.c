@@ -28,7 +28,7 @@ static sonde_box grown(sonde_box box, double margin) {
 
 static sonde_box face_box(const sonde_state *state, uint32_t face) {
   const uint32_t *v = state->model->surface.faces[face];
-  sonde_vec3 a = state->position[v[0]], b = state->position[v[1]], c = state->position[v[2]];
+  sonde_vec3 a = state->probed[v[0]], b = state->probed[v[1]], c = state->probed[v[2]];
   return (sonde_box){v_min(v_min(a, b), c), v_max(v_max(a, b), c)};
 }
 
@@ -53,7 +53,7 @@ static uint32_t root(sonde_state *state, uint32_t i) {
 }
 
 // The smaller index becomes the root: regions are numbered by their first node.
-static void join(sonde_state *state, uint32_t a, uint32_t b) {
+void sonde_contact_join(sonde_state *state, uint32_t a, uint32_t b) {
   uint32_t x = root(state, a), y = root(state, b);
   if (x < y)
     state->parent[y] = x;
@@ -70,8 +70,7 @@ static void touch(sonde_state *state, uint32_t i) {
 
 static void clip_face(sonde_state *state, uint32_t face) {
   const uint32_t *v = state->model->surface.faces[face];
-  const sonde_vec3 corners[3] = {state->position[v[0]], state->position[v[1]],
-                                 state->position[v[2]]};
+  const sonde_vec3 corners[3] = {state->probed[v[0]], state->probed[v[1]], state->probed[v[2]]};
   sonde_clip_result clip;
   if (!sonde_clip_triangle(state->plane_normal, state->plane_offset, state->plane_count, corners,
                            state->inward, &clip))
@@ -82,32 +81,38 @@ static void clip_face(sonde_state *state, uint32_t face) {
     state->share_m3[v[k]] += clip.share_m3[k];
     state->gradient[v[k]] = v_add(state->gradient[v[k]], clip.gradient[k]);
   }
-  join(state, v[0], v[1]);
-  join(state, v[1], v[2]);
+  sonde_contact_join(state, v[0], v[1]);
+  sonde_contact_join(state, v[1], v[2]);
   state->touched_faces[state->touched_face_count++] = face;
   state->contact.area_m2 += clip.area_m2;
   state->contact.volume_m3 += clip.volume_m3;
 }
 
-// Planes of the probe in the world frame and its box.
-static sonde_box place_probe(sonde_state *state, const sonde_probe *probe, sonde_pose pose) {
+sonde_box sonde_contact_box(const sonde_probe *probe, sonde_pose pose) {
+  sonde_mat3 r = q_matrix(pose.rotation);
+  sonde_box box = {vec3(INFINITY, INFINITY, INFINITY), vec3(-INFINITY, -INFINITY, -INFINITY)};
+  for (uint32_t k = 0; k < probe->body.hull.vertex_count; ++k) {
+    sonde_vec3 p = v_add(m_mul_v(r, probe->body.hull.vertices[k]), pose.position);
+    box.low = v_min(box.low, p);
+    box.high = v_max(box.high, p);
+  }
+  return box;
+}
+
+// Planes of the probe in the world frame.
+static void place_probe(sonde_state *state, const sonde_probe *probe, sonde_pose pose) {
   const sonde_convex *body = &probe->body;
   SONDE_ASSERT(body->plane_count <= SONDE_MAX_PROBE_PLANES);
   sonde_mat3 r = q_matrix(pose.rotation);
   state->inward = m_mul_v(r, vec3(0, 0, 1));
   state->plane_count = body->plane_count;
+  state->ball_radius = state->def.contact_law == SONDE_CONTACT_NODES ? probe->ball_radius_m : 0;
+  state->ball_centre = v_madd(pose.position, -probe->ball_radius_m, state->inward);
   for (uint32_t k = 0; k < body->plane_count; ++k) {
     state->plane_normal[k] = m_mul_v(r, body->plane_normal[k]);
     state->plane_offset[k] = body->plane_offset_m[k] + v_dot(state->plane_normal[k], pose.position);
     state->plane_weight[k] = body->plane_normal[k].z > 0.5 ? 1 : STEEP_WEIGHT;
   }
-  sonde_box box = {vec3(INFINITY, INFINITY, INFINITY), vec3(-INFINITY, -INFINITY, -INFINITY)};
-  for (uint32_t k = 0; k < body->hull.vertex_count; ++k) {
-    sonde_vec3 p = v_add(m_mul_v(r, body->hull.vertices[k]), pose.position);
-    box.low = v_min(box.low, p);
-    box.high = v_max(box.high, p);
-  }
-  return box;
 }
 
 static void forget(sonde_state *state) {
@@ -151,11 +156,16 @@ static void clip_block(sonde_state *state, uint32_t block, const sonde_box *box)
 void sonde_contact_detect(sonde_state *state, const sonde_probe *probe, sonde_pose pose) {
   forget(state);
   sonde_box box = {vec3(INFINITY, INFINITY, INFINITY), vec3(-INFINITY, -INFINITY, -INFINITY)};
-  if (probe) box = place_probe(state, probe, pose);
+  if (probe) {
+    box = sonde_contact_box(probe, pose);
+    place_probe(state, probe, pose);
+  }
+  if (probe && state->def.contact_law == SONDE_CONTACT_NODES) sonde_nodes_detect(state, &box);
   // A node moves less than 1 mm per tick: boxes farther than that times the period may be old.
   sonde_box near = probe ? grown(box, 1e-3 * SONDE_REFIT_PERIOD) : box;
   uint32_t turn = (uint32_t)(state->tick % SONDE_REFIT_PERIOD);
-  for (uint32_t b = 0; b < state->block_count; ++b) {
+  uint32_t blocks = state->def.contact_law == SONDE_CONTACT_NODES ? 0 : state->block_count;
+  for (uint32_t b = 0; b < blocks; ++b) {
     bool close = overlap(&state->boxes[b], &near);
     if (close || b % SONDE_REFIT_PERIOD == turn) refit(state, b);
     if (close && overlap(&state->boxes[b], &box)) clip_block(state, b, &box);
@@ -201,7 +211,7 @@ static uint32_t region_of(const sonde_state *state, uint32_t i) {
 // Velocity of a node relative to the probe's point at the same place.
 static sonde_vec3 relative_velocity(const sonde_state *state, uint32_t i,
                                     const sonde_motion *probe) {
-  sonde_vec3 arm = v_sub(state->position[i], probe->origin);
+  sonde_vec3 arm = v_sub(state->probed[i], probe->origin);
   sonde_vec3 carried = v_add(probe->velocity, v_cross(probe->spin, arm));
   return v_sub(state->velocity[i], carried);
 }
@@ -229,7 +239,13 @@ static void sum_regions(sonde_state *state, const sonde_motion *probe) {
 // and its gradient -weight n in *slope. Planes steeper than 60 degrees to the beam count four times
 // farther: a probe that sinks in deeper than it is wide still pushes back along its face.
 // False outside.
-static bool depth_at(const sonde_state *state, sonde_vec3 x, double *depth, sonde_vec3 *slope) {
+bool sonde_contact_depth(const sonde_state *state, sonde_vec3 x, double *depth, sonde_vec3 *slope) {
+  if (state->ball_radius > 0) {
+    sonde_vec3 d = v_sub(state->ball_centre, x);
+    *depth = state->ball_radius - v_norm(d);
+    *slope = v_unit(d, state->inward);
+    return *depth > 0;
+  }
   double least = INFINITY;
   uint32_t best = 0;
   for (uint32_t k = 0; k < state->plane_count; ++k) {
@@ -264,16 +280,14 @@ static void spread_push(sonde_state *state, const uint32_t *v, const double *wei
 }
 
 static void add_point_terms(sonde_state *state, uint32_t face, const double *weight,
-                            sonde_vec3 slope, double stiffness, double scale) {
+                            sonde_vec3 slope, double scale) {
   const uint32_t *v = state->model->surface.faces[face];
-  double speed = v_dot(slope, blend(state->velocity, v, weight));
   for (int k = 0; k < 3; ++k) {
-    uint32_t i = v[k], e = state->face_edges[face][k];
+    uint32_t i = v[k], e = state->model->face_edge[face][(k + 2) % 3]; // of k and k + 1
     state->matrix->diagonal[i] =
         m_add(state->matrix->diagonal[i], m_rank1(slope, scale * weight[k] * weight[k], 0));
     state->matrix->upper[e] =
         m_add(state->matrix->upper[e], m_rank1(slope, scale * weight[k] * weight[(k + 1) % 3], 0));
-    state->product[i] = v_madd(state->product[i], stiffness * weight[k] * speed, slope);
   }
 }
 
@@ -287,9 +301,9 @@ typedef struct pressed_point {
 static bool pressed_at(const sonde_state *state, uint32_t face, const double *weight,
                        const sonde_motion *probe, pressed_point *at) {
   const uint32_t *v = state->model->surface.faces[face];
-  sonde_vec3 x = blend(state->position, v, weight);
-  double depth, area = state->face_area_m2[face] / POINTS;
-  if (!depth_at(state, x, &depth, &at->slope)) return false;
+  sonde_vec3 x = blend(state->probed, v, weight);
+  double depth, area = state->model->face_area_m2[face] / POINTS;
+  if (!sonde_contact_depth(state, x, &depth, &at->slope)) return false;
   at->stiffness_n_m = state->def.contact_stiffness_n_m3 * area;
   at->damping_n_s_m = state->def.contact_damping_n_s_m3 * area;
   sonde_vec3 carried = v_add(probe->velocity, v_cross(probe->spin, v_sub(x, probe->origin)));
@@ -303,7 +317,7 @@ static void press_point(sonde_state *state, uint32_t face, const double *weight,
   pressed_point at;
   if (!pressed_at(state, face, weight, probe, &at)) return;
   spread_push(state, state->model->surface.faces[face], weight, at.slope, at.push_n);
-  add_point_terms(state, face, weight, at.slope, at.stiffness_n_m,
+  add_point_terms(state, face, weight, at.slope,
                   scales->stiffness * at.stiffness_n_m + scales->damping * at.damping_n_s_m);
 }
 
@@ -314,10 +328,9 @@ static void apply_foundation(sonde_state *state, const sonde_motion *probe,
       press_point(state, state->touched_faces[k], POINT[q], probe, scales);
 }
 
-// Packs w_i k of one region behind the ones before; returns sum w_i k.v_i.
-static double pack_region(sonde_state *state, uint32_t r, uint32_t *used, sonde_rank_one *term) {
+// Packs w_i k of one region behind the ones before.
+static void pack_region(sonde_state *state, uint32_t r, uint32_t *used, sonde_rank_one *term) {
   const sonde_contact_region *region = &state->contact.region[r];
-  double speed = 0;
   term->count = 0;
   term->rows = state->lumped_rows + *used;
   term->g = state->lumped + *used;
@@ -327,11 +340,9 @@ static double pack_region(sonde_state *state, uint32_t r, uint32_t *used, sonde_
     double weight = v_dot(state->gradient[i], region->direction) / region->area_m2;
     state->lumped_rows[*used] = i;
     state->lumped[*used] = v_scale(region->direction, weight);
-    speed += v_dot(state->lumped[*used], state->velocity[i]);
     (*used)++;
     term->count++;
   }
-  return speed;
 }
 
 // One force per region spread by projected area w_i = g_i.k / A; the Jacobian is the rank-one term
@@ -344,13 +355,12 @@ static void apply_lumped(sonde_state *state, const sonde_contact_scales *scales)
     double push = kappa * region->volume_m3 + mu * region->volume_rate_m3_s;
     if (!(push > 0) || !(region->area_m2 > 0)) continue;
     sonde_rank_one *term = &state->term[state->term_count++];
-    double speed = pack_region(state, r, &used, term);
+    pack_region(state, r, &used, term);
     term->scale = region->area_m2 * (scales->stiffness * kappa + scales->damping * mu);
     for (uint32_t k = 0; k < term->count; ++k) {
       uint32_t i = term->rows[k];
       double weight = v_dot(term->g[k], region->direction);
       state->contact_force[i] = v_scale(region->direction, -weight * push);
-      state->product[i] = v_madd(state->product[i], kappa * region->area_m2 * speed, term->g[k]);
     }
   }
 }
@@ -361,6 +371,8 @@ void sonde_contact_apply(sonde_state *state, const sonde_motion *probe,
   sum_regions(state, probe);
   if (state->def.contact_law == SONDE_CONTACT_VOLUME)
     apply_lumped(state, scales);
+  else if (state->def.contact_law == SONDE_CONTACT_NODES)
+    sonde_nodes_apply(state, probe, scales);
   else
     apply_foundation(state, probe, scales);
 }
@@ -371,9 +383,8 @@ static void advance_point(sonde_state *state, uint32_t face, const double *weigh
   const uint32_t *v = state->model->surface.faces[face];
   pressed_point at;
   if (!pressed_at(state, face, weight, probe, &at)) return;
-  sonde_vec3 v0 = blend(state->velocity, v, weight), dv = blend(state->increment, v, weight);
-  sonde_vec3 elastic = v_scale(v_madd(v0, lambda, dv), at.stiffness_n_m * h);
-  double push = at.push_n + lambda * v_dot(at.slope, v_madd(elastic, at.damping_n_s_m, dv));
+  double along = lambda * v_dot(at.slope, blend(state->increment, v, weight));
+  double push = at.push_n + along * (lambda * h * at.stiffness_n_m + at.damping_n_s_m);
   if (push > 0) spread_push(state, v, weight, at.slope, push);
 }
 
@@ -386,25 +397,23 @@ static void advance_foundation(sonde_state *state, const sonde_motion *probe, do
       advance_point(state, state->touched_faces[k], POINT[q], probe, lambda, h);
 }
 
-// Linear change of the lumped force when its weighted point moves by dx at dv.
-static double push_change(const sonde_state *state, double area, double dx, double dv,
-                          double lambda) {
-  return area * lambda *
-         (state->def.contact_stiffness_n_m3 * dx + state->def.contact_damping_n_s_m3 * dv);
+// Linear change of the lumped force when its weighted point changes its velocity by lambda dv.
+static double push_change(const sonde_state *state, double area, double dv, double lambda,
+                          double h) {
+  return area * lambda * dv *
+         (state->def.contact_stiffness_n_m3 * lambda * h + state->def.contact_damping_n_s_m3);
 }
 
 static void advance_lumped(sonde_state *state, double lambda, double h) {
   for (uint32_t t = 0; t < state->term_count; ++t) {
     const sonde_rank_one *term = &state->term[t];
     const sonde_contact_region *region = &state->contact.region[region_of(state, term->rows[0])];
-    double dx = 0, dv = 0, push = 0;
+    double dv = 0, push = 0;
     for (uint32_t k = 0; k < term->count; ++k) {
-      double change = v_dot(term->g[k], state->increment[term->rows[k]]);
-      dv += change;
-      dx += h * (v_dot(term->g[k], state->velocity[term->rows[k]]) + lambda * change);
+      dv += v_dot(term->g[k], state->increment[term->rows[k]]);
       push -= v_dot(region->direction, state->contact_force[term->rows[k]]);
     }
-    push += push_change(state, region->area_m2, dx, dv, lambda);
+    push += push_change(state, region->area_m2, dv, lambda, h);
     if (push < 0) push = 0;
     for (uint32_t k = 0; k < term->count; ++k)
       state->contact_force[term->rows[k]] = v_scale(term->g[k], -push);
@@ -414,6 +423,8 @@ static void advance_lumped(sonde_state *state, double lambda, double h) {
 void sonde_contact_advance(sonde_state *state, const sonde_motion *probe, double lambda, double h) {
   if (state->def.contact_law == SONDE_CONTACT_VOLUME)
     advance_lumped(state, lambda, h);
+  else if (state->def.contact_law == SONDE_CONTACT_NODES)
+    sonde_nodes_advance(state, probe, lambda, h);
   else
     advance_foundation(state, probe, lambda, h);
 }
@@ -424,13 +435,13 @@ void sonde_contact_wrench(sonde_state *state, sonde_vec3 origin) {
   for (uint32_t k = 0; k < state->touched_count; ++k) {
     uint32_t i = state->touched[k];
     sonde_contact_region *region = &contact->region[region_of(state, i)];
-    sonde_vec3 f = state->contact_force[i], arm = v_sub(state->position[i], origin);
+    sonde_vec3 f = state->contact_force[i], arm = v_sub(state->probed[i], origin);
     contact->force_n = v_sub(contact->force_n, f);
     contact->torque_n_m = v_sub(contact->torque_n_m, v_cross(arm, f));
     double push = -v_dot(f, region->direction);
     if (!(push > 0)) push = 0;
     region->force_n += push;
-    region->centre_m = v_madd(region->centre_m, push, state->position[i]);
+    region->centre_m = v_madd(region->centre_m, push, state->probed[i]);
     double area = v_dot(state->gradient[i], region->direction);
     double depth = area > 0 ? state->share_m3[i] / area : 0;
     if (depth > region->depth_max_m) region->depth_max_m = depth;

@@ -33,6 +33,8 @@ static double evaluate(const problem *p, double *load) {
   const sonde_tissue_scales scales = {1 / (p->dt_s * p->dt_s), 0, 1};
   sonde_tissue_linearise(state->model, NULL, state->position, state->velocity, &scales,
                          state->force, state->product, state->matrix, state->scratch_nodes);
+  memcpy(state->probed, state->position,
+         state->model->surface.vertex_count * sizeof *state->probed);
   sonde_contact_clear(state); // nodes may have moved far since the last evaluation: refit every box
   sonde_contact_detect(state, p->probe, p->pose);
   if (p->probe) {
@@ -171,6 +173,7 @@ static void quieten(sonde_state *state) {
 sonde_settle_result sonde_settle(sonde_state *state, const sonde_probe *probe, sonde_pose pose,
                                  double relative_residual, uint32_t max_iterations) {
   SONDE_ASSERT(probe && v_finite(pose.position));
+  sonde_state_publish(state);
   quieten(state);
   sonde_state_wake_all(state);
   problem p = {state, probe, pose, 0.02, NULL, 0};
@@ -185,6 +188,7 @@ sonde_settle_result sonde_settle_bonded(sonde_state *state, const uint32_t *node
                                         const sonde_vec3 *positions_m, uint32_t count,
                                         double relative_residual, uint32_t max_iterations,
                                         sonde_vec3 *force_n) {
+  sonde_state_publish(state);
   quieten(state);
   sonde_state_wake_all(state);
   for (uint32_t k = 0; k < count; ++k) {

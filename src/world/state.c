@@ -1,6 +1,7 @@
 // Creation and release of the moving state; cold.
 // carve:       lays all arrays out in one block; measured and placed by the same code.
 // order_faces: sorts faces along a Morton curve for the contact boxes.
+#include "world/lanes.h"
 #include "world/state.h"
 
 #include "base/base.h"
@@ -13,7 +14,7 @@
 sonde_world_def sonde_world_def_default(void) {
   return (sonde_world_def){.dt_s = 1e-3,
                            .implicitness = 1,
-                           .newton_iterations = 1,
+                           .newton_iterations = 2,
                            .pcg = {5e-3, 1e-12, 200},
                            .contact_law = SONDE_CONTACT_FOUNDATION,
                            .contact_stiffness_n_m3 = 5e8,
@@ -39,16 +40,18 @@ static sonde_status check_friction(const sonde_friction *f, sonde_error *error) 
 }
 
 static sonde_status check(const sonde_world_def *def, sonde_error *error) {
+  bool fast = def->engine == SONDE_ENGINE_FAST;
   const struct {
     const char *name;
     double value, low, high;
   } range[] = {{"dt_s", def->dt_s, 1e-7, 1},
                {"implicitness", def->implicitness, 0, 1},
-               {"newton_iterations", def->newton_iterations, 1, 100},
+               {"newton_iterations", def->newton_iterations, fast ? 1 : 0, 100},
                {"pcg.relative_residual", def->pcg.relative_residual, 0, 0.5},
                {"pcg.absolute_residual", def->pcg.absolute_residual, 0, 1},
                {"pcg.max_iterations", def->pcg.max_iterations, 1, 1e6},
-               {"contact_law", def->contact_law, 0, SONDE_CONTACT_VOLUME},
+               {"contact_law", def->contact_law, 0, SONDE_CONTACT_NODES},
+               {"engine", def->engine, 0, SONDE_ENGINE_FAST},
                {"contact_stiffness_n_m3", def->contact_stiffness_n_m3, 0, 1e12},
                {"contact_damping_n_s_m3", def->contact_damping_n_s_m3, 0, 1e10},
                {"sleep_displacement_m", def->sleep_displacement_m, 0, 1e-3}};
@@ -56,6 +59,13 @@ static sonde_status check(const sonde_world_def *def, sonde_error *error) {
     if (!(range[k].value >= range[k].low && range[k].value <= range[k].high))
       return sonde_fail(error, SONDE_ARGUMENT, "%s is %g, expected %g to %g", range[k].name,
                         range[k].value, range[k].low, range[k].high);
+  if (def->engine == SONDE_ENGINE_FAST &&
+      (def->implicitness != 1 || def->contact_law == SONDE_CONTACT_VOLUME))
+    return sonde_fail(
+        error, SONDE_ARGUMENT,
+        "the fast engine wants implicitness 1 (it is %g) and a contact law other than "
+        "VOLUME",
+        def->implicitness);
   return check_friction(&def->friction, error);
 }
 
@@ -80,12 +90,12 @@ static size_t carve(sonde_state *s, char *base) {
   size_t offset = 0;
   uint32_t n = s->model->surface.vertex_count, edges = s->model->topology.edge_count;
   uint32_t faces = s->model->surface.face_count;
-  CARVE(position, n), CARVE(velocity, n), CARVE(increment, n);
+  CARVE(position, n), CARVE(velocity, n), CARVE(increment, n), CARVE(probed, n);
   CARVE(calm, n), CARVE(awake, n), CARVE(rows, n);
   CARVE(edges, edges), CARVE(pairs, edges), CARVE(faces, faces), CARVE(rim, n), CARVE(in_rim, n);
   CARVE(face_order, faces), CARVE(boxes, s->block_count);
   CARVE(touched, n), CARVE(parent, n), CARVE(share_m3, n), CARVE(gradient, n);
-  CARVE(face_edges, faces), CARVE(face_area_m2, faces), CARVE(touched_faces, faces);
+  CARVE(touched_faces, faces);
   CARVE(contact_force, n), CARVE(lumped, n), CARVE(lumped_rows, n);
   CARVE(bond_m, n), CARVE(grip_n, n), CARVE(grip_tick, n);
   CARVE(plane_weight, SONDE_MAX_PROBE_PLANES);
@@ -110,31 +120,9 @@ static sonde_status order_faces(sonde_state *state, sonde_error *error) {
   return SONDE_OK;
 }
 
-// Edges 01, 12, 20 and rest area of every face.
-static void measure_faces(sonde_state *state) {
-  const sonde_topology *topology = &state->model->topology;
-  const sonde_mesh *mesh = &state->model->surface;
-  for (uint32_t f = 0; f < mesh->face_count; ++f) {
-    const uint32_t *v = mesh->faces[f];
-    sonde_vec3 a = v_sub(mesh->vertices[v[1]], mesh->vertices[v[0]]);
-    sonde_vec3 b = v_sub(mesh->vertices[v[2]], mesh->vertices[v[0]]);
-    state->face_area_m2[f] = 0.5 * v_norm(v_cross(a, b));
-  }
-  for (uint32_t e = 0; e < topology->edge_count; ++e)
-    for (int side = 0; side < 2; ++side) {
-      uint32_t f = topology->edge_faces[e][side];
-      if (f == UINT32_MAX) continue;
-      const uint32_t *v = state->model->surface.faces[f];
-      for (int k = 0; k < 3; ++k) {
-        uint32_t a = v[k], b = v[(k + 1) % 3], low = a < b ? a : b;
-        if (low == topology->edges[e][0] && a + b - low == topology->edges[e][1])
-          state->face_edges[f][k] = e;
-      }
-    }
-}
-
-sonde_status sonde_state_create(const sonde_model *model, const sonde_world_def *def,
-                                sonde_state **out, sonde_error *error) {
+sonde_status sonde_state_create_ordered(const sonde_model *model, const sonde_world_def *def,
+                                        const uint32_t *face_order, sonde_state **out,
+                                        sonde_error *error) {
   *out = NULL;
   sonde_world_def fallback = sonde_world_def_default();
   if (!def) def = &fallback;
@@ -148,23 +136,34 @@ sonde_status sonde_state_create(const sonde_model *model, const sonde_world_def 
       (model->surface.face_count + SONDE_FACES_PER_BLOCK - 1) / SONDE_FACES_PER_BLOCK;
   state->block = sonde_calloc(1, carve(state, NULL));
   if (state->block) carve(state, state->block);
-  status = state->block ? order_faces(state, error) : sonde_fail_memory(error);
+  status = state->block ? SONDE_OK : sonde_fail_memory(error);
+  if (!status && face_order)
+    memcpy(state->face_order, face_order, model->surface.face_count * sizeof *face_order);
+  else if (!status)
+    status = order_faces(state, error);
   if (!status)
     status = sonde_block_matrix_create(model->surface.vertex_count, model->topology.edge_count,
                                        (const uint32_t(*)[2])model->topology.edges, &state->matrix,
                                        error);
+  if (!status && def->engine == SONDE_ENGINE_FAST)
+    status = sonde_lanes_create(model, def, &state->lanes, error);
   if (status) {
     sonde_state_destroy(state);
     return status;
   }
-  measure_faces(state);
   sonde_state_reset(state);
   *out = state;
   return SONDE_OK;
 }
 
+sonde_status sonde_state_create(const sonde_model *model, const sonde_world_def *def,
+                                sonde_state **state, sonde_error *error) {
+  return sonde_state_create_ordered(model, def, NULL, state, error);
+}
+
 void sonde_state_destroy(sonde_state *state) {
   if (!state) return;
+  sonde_lanes_destroy(state->lanes);
   sonde_block_matrix_destroy(state->matrix);
   sonde_free(state->block);
   sonde_free(state);

@@ -14,13 +14,15 @@ typedef struct sonde_box {
 struct sonde_state {
   const sonde_model *model;
   sonde_world_def def;
-  void *block; // all arrays below
+  struct sonde_lanes *lanes; // of the fast engine, else NULL
+  void *block;               // all arrays below
 
   // motion, written by the update
   uint64_t tick;
   sonde_vec3 *position;  // [nodes] m
   sonde_vec3 *velocity;  // [nodes] m/s
   sonde_vec3 *increment; // [nodes] dv of the last step, the solver's warm start
+  sonde_vec3 *probed; // [nodes] m, where contact is evaluated: x + lambda h v before the solution
   sonde_pose probe_pose; // of the last step
   bool has_probe_pose;
 
@@ -42,11 +44,9 @@ struct sonde_state {
   uint32_t block_count;
   uint32_t *touched; // [nodes] nodes with a share of the volume, ascending
   uint32_t touched_count;
-  uint32_t *parent;          // [nodes] union-find over touched nodes
-  double *share_m3;          // [nodes] V_i
-  uint32_t (*face_edges)[3]; // [faces] edges 01, 12, 20
-  double *face_area_m2;      // [faces] at rest
-  uint32_t *touched_faces;   // [faces] faces inside the probe, in the order they were found
+  uint32_t *parent;        // [nodes] union-find over touched nodes
+  double *share_m3;        // [nodes] V_i
+  uint32_t *touched_faces; // [faces] faces inside the probe, in the order they were found
   uint32_t touched_face_count;
   sonde_vec3 inward;         // direction of the columns: the beam axis of the probe
   sonde_vec3 *gradient;      // [nodes] g_i = dV/dx_i
@@ -59,6 +59,8 @@ struct sonde_state {
   double *plane_offset;
   double *plane_weight; // of its distance in the depth: see depth_at()
   uint32_t plane_count;
+  sonde_vec3 ball_centre; // of a ball
+  double ball_radius;     // > 0 for a ball
   sonde_contact contact;
 
   // friction, written at the end of a step
@@ -82,8 +84,14 @@ struct sonde_state {
   sonde_stage_times times;
 };
 
-enum { SONDE_CALM_TICKS = 20 };
+enum { SONDE_CALM_TICKS = 20, SONDE_TRIAL_PERIOD = 32 };
 
+// sonde_state_create() with the order of the faces known, NULL: found here.
+sonde_status sonde_state_create_ordered(const sonde_model *model, const sonde_world_def *def,
+                                        const uint32_t *face_order, sonde_state **state,
+                                        sonde_error *error);
+// Brings position[] and velocity[] up to date with the fast engine. @thread tick
+void sonde_state_publish(const sonde_state *state);
 // Wakes every node. @thread tick
 void sonde_state_wake_all(sonde_state *state);
 // Lists of awake rows, edges and pairs from awake[]. @thread tick
@@ -98,7 +106,7 @@ typedef struct sonde_contact_scales {
   double damping, stiffness;
 } sonde_contact_scales;
 
-// Finds the skin inside the probe at the current positions: shares, gradients, touched nodes,
+// Finds the skin inside the probe at probed[]: shares, gradients, touched nodes,
 // regions, and wakes the touched. @thread tick
 void sonde_contact_detect(sonde_state *state, const sonde_probe *probe, sonde_pose pose);
 // Rigid motion of the probe during the step: the point x moves at velocity + spin x (x - origin).
@@ -106,13 +114,28 @@ typedef struct sonde_motion {
   sonde_vec3 origin, velocity, spin;
 } sonde_motion;
 
-// Pushes of eq. (2) from the detected volumes, contact_force[], and their terms in the matrix
-// (diagonal blocks or rank-one terms) and in product[] (K v). @thread tick
+// Pushes at probed[] from the detected volumes, contact_force[], and their terms in the matrix
+// (diagonal blocks or rank-one terms). @thread tick
 void sonde_contact_apply(sonde_state *state, const sonde_motion *probe,
                          const sonde_contact_scales *scales);
-// Pushes at the end of the step by the same linearisation, from node displacements
-// dx = h (v + lambda dv) and velocity changes dv, both scaled by lambda. @thread tick
+// Pushes at the end of the step by the same linearisation: from probed[] the nodes go on by
+// lambda^2 h dv at velocities changed by lambda dv. @thread tick
 void sonde_contact_advance(sonde_state *state, const sonde_motion *probe, double lambda, double h);
+// Box of the probe in the world. @thread tick
+sonde_box sonde_contact_box(const sonde_probe *probe, sonde_pose pose);
+// Depth of a point inside the probe and its gradient; false outside. @thread tick
+bool sonde_contact_depth(const sonde_state *state, sonde_vec3 x, double *depth, sonde_vec3 *slope);
+// The law at the nodes: touched nodes whose point is inside `box`, their pushes, and their pushes
+// at the end of the step. @thread tick
+void sonde_nodes_detect(sonde_state *state, const sonde_box *box);
+void sonde_nodes_apply(sonde_state *state, const sonde_motion *probe,
+                       const sonde_contact_scales *scales);
+void sonde_nodes_advance(sonde_state *state, const sonde_motion *probe, double lambda, double h);
+// Joins the regions of two touched nodes. @thread tick
+void sonde_contact_join(sonde_state *state, uint32_t a, uint32_t b);
+// One step of the fast engine; false when something is not finite. @thread tick
+bool sonde_lane_step(sonde_state *state, const sonde_probe *probe, sonde_pose pose,
+                     const sonde_motion *motion);
 // Force and torque on the probe, forces and centres of the regions from the pushes. @thread tick
 void sonde_contact_wrench(sonde_state *state, sonde_vec3 origin);
 // Forces of the bonds at the start of a step, or at a point that the nodes reach after moving for

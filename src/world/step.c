@@ -50,8 +50,10 @@ static void assemble(sonde_state *state, const sonde_probe *probe, const sonde_m
 static void solve(sonde_state *state) {
   sonde_active_set active = {state->rows, state->row_count, state->pairs, state->pair_count};
   sonde_block_invert_diagonal(state->matrix, &active);
+  uint32_t before = state->solver.iterations;
   state->solver = sonde_pcg_solve(state->matrix, &active, state->term, state->term_count,
                                   state->right, state->increment, &state->scratch, &state->def.pcg);
+  state->solver.iterations += before;
   if (!state->solver.converged) state->flags |= SONDE_FLAG_NOT_CONVERGED;
 }
 
@@ -121,25 +123,46 @@ static void rest(sonde_state *state) {
     } else if (state->share_m3[i] == 0 && ++state->calm[i] >= SONDE_CALM_TICKS) {
       state->awake[i] = 0;
       state->velocity[i] = state->increment[i] = vec3(0, 0, 0);
+      state->probed[i] = state->position[i];
       changed = true;
     }
   }
   if (changed) sonde_state_list_awake(state);
 }
 
-// Later Newton iterations: the residual h F - M dv at the point x0 + lambda dx, v0 + lambda dv that
-// the scheme evaluates forces at; the start of the step is kept in trial[] and right[].
-static void newton_correction(sonde_state *state, const sonde_probe *probe, sonde_pose pose,
-                              const sonde_motion *motion) {
-  double h = state->def.dt_s, lambda = state->def.implicitness;
+// Contact where the nodes go when their velocities change by `share` of the increment at hand, and
+// the lists of awake rows with the nodes that it wakes.
+static void touch(sonde_state *state, const sonde_probe *probe, sonde_pose pose, double share) {
+  double moved_s = state->def.implicitness * state->def.dt_s;
   for (uint32_t r = 0; r < state->row_count; ++r) {
     uint32_t i = state->rows[r];
-    sonde_vec3 dv = state->increment[i], v0 = state->velocity[i];
-    state->trial[i] = state->position[i];
-    state->position[i] = v_madd(state->position[i], lambda * h, v_madd(v0, lambda, dv));
-    state->velocity[i] = v_madd(v0, lambda, dv);
+    sonde_vec3 v = v_madd(state->velocity[i], share, state->increment[i]);
+    state->probed[i] = v_madd(state->position[i], moved_s, v);
   }
   sonde_contact_detect(state, probe, pose);
+  if (state->lists_stale) sonde_state_list_awake(state);
+}
+
+static void add_times(sonde_state *state, double contact_s, double assembly_s, double solve_s) {
+  state->times.contact_s += contact_s;
+  state->times.assembly_s += assembly_s;
+  state->times.solve_s += solve_s;
+}
+
+// One Newton iteration from the increment dv at hand: the residual h F - M dv at the point
+// x0 + lambda dx, v0 + lambda dv that the scheme evaluates forces at. trial[] keeps the start of
+// the step, then dv until the solution is added to it.
+static void newton(sonde_state *state, const sonde_probe *probe, sonde_pose pose,
+                   const sonde_motion *motion) {
+  double h = state->def.dt_s, lambda = state->def.implicitness, start = sonde_clock_now();
+  touch(state, probe, pose, lambda);
+  for (uint32_t r = 0; r < state->row_count; ++r) {
+    uint32_t i = state->rows[r];
+    state->trial[i] = state->position[i];
+    state->position[i] = state->probed[i];
+    state->velocity[i] = v_madd(state->velocity[i], lambda, state->increment[i]);
+  }
+  double detected = sonde_clock_now();
   assemble(state, probe, motion, lambda * h);
   for (uint32_t r = 0; r < state->row_count; ++r) {
     uint32_t i = state->rows[r];
@@ -147,15 +170,32 @@ static void newton_correction(sonde_state *state, const sonde_probe *probe, sond
     sonde_vec3 f = v_add(state->force[i], state->contact_force[i]);
     state->right[i] = v_madd(v_scale(f, h), -state->model->mass_kg[i], dv);
     state->position[i] = state->trial[i];
-    state->velocity[i] = v_madd(state->velocity[i], -lambda, dv);
     state->trial[i] = dv;
     state->increment[i] = vec3(0, 0, 0);
   }
+  double assembled = sonde_clock_now();
   solve(state);
+  sonde_contact_advance(state, motion, lambda, h);
   for (uint32_t r = 0; r < state->row_count; ++r) {
     uint32_t i = state->rows[r];
+    state->velocity[i] = v_madd(state->velocity[i], -lambda, state->trial[i]);
     state->increment[i] = v_add(state->increment[i], state->trial[i]);
   }
+  add_times(state, detected - start, assembled - detected, sonde_clock_now() - assembled);
+}
+
+// Eq. (4) as the paper has it: one linearisation at the start of the step.
+static void linear_step(sonde_state *state, const sonde_probe *probe, sonde_pose pose,
+                        const sonde_motion *motion) {
+  double start = sonde_clock_now();
+  touch(state, probe, pose, 0);
+  double detected = sonde_clock_now();
+  assemble(state, probe, motion, 0);
+  first_right_side(state);
+  double assembled = sonde_clock_now();
+  solve(state);
+  sonde_contact_advance(state, motion, state->def.implicitness, state->def.dt_s);
+  add_times(state, detected - start, assembled - detected, sonde_clock_now() - assembled);
 }
 
 static void recover(sonde_state *state) {
@@ -167,39 +207,39 @@ static void recover(sonde_state *state) {
 }
 
 static void finish(sonde_state *state, const sonde_probe *probe, sonde_pose pose, bool finite) {
-  if (finite)
-    rest(state);
-  else
+  if (!finite)
     recover(state);
+  else if (!state->lanes)
+    rest(state);
   state->tick++;
   state->flag_count += state->flags != 0;
   state->probe_pose = pose;
   state->has_probe_pose = probe != NULL;
 }
 
-void sonde_step(sonde_state *state, const sonde_probe *probe, sonde_pose pose) {
-  double start = sonde_clock_now();
-  state->flags = 0;
-  if (!v_finite(pose.position)) probe = NULL;
-  sonde_motion motion = probe_motion(state, pose);
-  sonde_contact_detect(state, probe, pose);
-  if (state->lists_stale) sonde_state_list_awake(state);
-  double detected = sonde_clock_now();
-  assemble(state, probe, &motion, 0);
-  first_right_side(state);
-  double assembled = sonde_clock_now();
-  solve(state);
-  for (uint32_t k = 1; k < state->def.newton_iterations; ++k)
-    newton_correction(state, probe, pose, &motion);
+static void double_step(sonde_state *state, const sonde_probe *probe, sonde_pose pose,
+                        const sonde_motion *motion) {
+  state->solver = (sonde_pcg_result){0};
+  // What the probe touched may have bounced: its change of velocity says nothing about the next.
+  for (uint32_t k = 0; k < state->touched_count; ++k)
+    state->increment[state->touched[k]] = vec3(0, 0, 0);
+  if (state->def.newton_iterations == 0) linear_step(state, probe, pose, motion);
+  for (uint32_t k = 0; k < state->def.newton_iterations; ++k) newton(state, probe, pose, motion);
   double solved = sonde_clock_now();
-  // Newton's later iterations have already evaluated the contact where the scheme wants it.
-  if (state->def.newton_iterations == 1)
-    sonde_contact_advance(state, &motion, state->def.implicitness, state->def.dt_s);
-  if (probe) sonde_friction_advance(state, &motion);
+  if (probe) sonde_friction_advance(state, motion);
   sonde_contact_wrench(state, pose.position);
   bool finite = update(state) && v_finite(state->contact.force_n);
   finish(state, probe, pose, finite);
-  double end = sonde_clock_now();
-  state->times =
-      (sonde_stage_times){detected - start, assembled - detected, solved - assembled, end - solved};
+  state->times.update_s = sonde_clock_now() - solved;
+}
+
+void sonde_step(sonde_state *state, const sonde_probe *probe, sonde_pose pose) {
+  state->flags = 0;
+  state->times = (sonde_stage_times){0};
+  if (!v_finite(pose.position)) probe = NULL;
+  sonde_motion motion = probe_motion(state, pose);
+  if (!state->lanes)
+    double_step(state, probe, pose, &motion);
+  else
+    finish(state, probe, pose, sonde_lane_step(state, probe, pose, &motion));
 }

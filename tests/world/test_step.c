@@ -6,6 +6,7 @@ static sonde_world_def exact_def(double dt, double lambda) {
   sonde_world_def def = sonde_world_def_default();
   def.dt_s = dt;
   def.implicitness = lambda;
+  def.newton_iterations = 0;
   def.pcg = (sonde_pcg_options){1e-14, 1e-300, 5000};
   def.sleep_displacement_m = 0;
   return def;

@@ -1,0 +1,168 @@
+// The comparison scene: a geodesic ellipsoid of N = 10 f^2 + 2 nodes, total mass 5 kg (times
+// size^2), radial springs of 5e5 N/m^3 per area, surface springs of the stiffness asked for, a ball
+// of 30 mm. corners:    vertices and faces of the icosahedron. face_points: points of one
+// subdivided face; shared ones repeat. weld:       the same points once.
+#include "bench_ellipsoid.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double RADII_M[3] = {0.10, 0.04, 0.04};
+static const double RADIAL_N_M3 = 5e5, MASS_KG = 5, CONTACT_N_M3 = 2e7;
+
+static void corners(double v[12][3], int faces[20][3]) {
+  double height = 1 / sqrt(5.0), ring = 2 / sqrt(5.0), turn = 4 * atan(1.0) / 5;
+  memset(v, 0, 12 * sizeof *v);
+  v[0][2] = 1, v[11][2] = -1;
+  for (int k = 0; k < 5; ++k) {
+    for (int low = 0; low < 2; ++low) {
+      double *p = v[1 + k + 5 * low], angle = turn * (2 * k + low);
+      p[0] = ring * cos(angle), p[1] = ring * sin(angle), p[2] = low ? -height : height;
+    }
+    int a = 1 + k, b = 1 + (k + 1) % 5, c = 6 + k, d = 6 + (k + 1) % 5;
+    const int four[4][3] = {{0, a, b}, {a, c, b}, {b, c, d}, {11, d, c}};
+    memcpy(faces[4 * k], four, sizeof four);
+  }
+}
+
+typedef struct point {
+  double at[3];
+  uint32_t place; // in the list with repetitions
+} point;
+
+static int by_place(const void *a, const void *b) {
+  const point *p = a, *q = b;
+  for (int c = 0; c < 3; ++c)
+    if (fabs(p->at[c] - q->at[c]) > 1e-9) return p->at[c] < q->at[c] ? -1 : 1;
+  return 0;
+}
+
+static uint32_t row_start(uint32_t f, uint32_t i) { return i * (f + 1) - i * (i - 1) / 2; }
+
+static void face_points(double v[12][3], const int face[3], uint32_t f, point *out) {
+  for (uint32_t i = 0; i <= f; ++i)
+    for (uint32_t j = 0; i + j <= f; ++j, ++out) {
+      double size = 0;
+      for (int c = 0; c < 3; ++c) {
+        out->at[c] = (f - i - j) * v[face[0]][c] + i * v[face[1]][c] + j * v[face[2]][c];
+        size += out->at[c] * out->at[c];
+      }
+      for (int c = 0; c < 3; ++c) out->at[c] /= sqrt(size);
+    }
+}
+
+// Numbers equal points alike; returns how many differ.
+static uint32_t weld(point *points, uint32_t count, uint32_t *number, sonde_vec3 *vertices) {
+  uint32_t used = 0;
+  qsort(points, count, sizeof *points, by_place);
+  for (uint32_t k = 0; k < count; ++k) {
+    if (k == 0 || by_place(&points[k - 1], &points[k]) != 0) {
+      vertices[used] = (sonde_vec3){points[k].at[0], points[k].at[1], points[k].at[2]};
+      used++;
+    }
+    number[points[k].place] = used - 1;
+  }
+  return used;
+}
+
+static void connect(uint32_t f, const uint32_t *number, sonde_mesh *mesh) {
+  uint32_t out = 0, per_face = (f + 1) * (f + 2) / 2;
+  for (uint32_t face = 0; face < 20; ++face)
+    for (uint32_t i = 0; i < f; ++i)
+      for (uint32_t j = 0; i + j < f; ++j) {
+        const uint32_t *n = number + face * per_face;
+        uint32_t a = n[row_start(f, i) + j], b = n[row_start(f, i + 1) + j];
+        uint32_t c = n[row_start(f, i) + j + 1];
+        memcpy(mesh->faces[out++], ((uint32_t[3]){a, b, c}), sizeof *mesh->faces);
+        if (i + j + 1 == f) continue;
+        uint32_t d = n[row_start(f, i + 1) + j + 1];
+        memcpy(mesh->faces[out++], ((uint32_t[3]){b, d, c}), sizeof *mesh->faces);
+      }
+}
+
+static sonde_status geodesic(uint32_t f, double size, sonde_mesh *mesh, sonde_error *error) {
+  uint32_t per_face = (f + 1) * (f + 2) / 2, count = 20 * per_face;
+  double v[12][3];
+  int faces[20][3];
+  sonde_status status = sonde_mesh_create(mesh, 10 * f * f + 2, 20 * f * f, error);
+  point *points = malloc(count * sizeof *points);
+  uint32_t *number = malloc(count * sizeof *number);
+  sonde_vec3 *vertices = malloc(count * sizeof *vertices);
+  if (!status && points && number && vertices) {
+    corners(v, faces);
+    for (uint32_t k = 0; k < 20; ++k) face_points(v, faces[k], f, points + k * per_face);
+    for (uint32_t k = 0; k < count; ++k) points[k].place = k;
+    uint32_t used = weld(points, count, number, vertices);
+    if (used == mesh->vertex_count) {
+      for (uint32_t k = 0; k < used; ++k)
+        mesh->vertices[k] =
+            (sonde_vec3){size * RADII_M[0] * vertices[k].x, size * RADII_M[1] * vertices[k].y,
+                         size * RADII_M[2] * vertices[k].z};
+      connect(f, number, mesh);
+    }
+  }
+  free(points);
+  free(number);
+  free(vertices);
+  return status;
+}
+
+// Springs act along the radii, as if fixed to an inner ellipsoid of 0.6 of the size.
+static void point_along_radii(sonde_model *model) {
+  for (uint32_t i = 0; i < model->surface.vertex_count; ++i) {
+    sonde_vec3 x = model->surface.vertices[i];
+    double r = sqrt(x.x * x.x + x.y * x.y + x.z * x.z);
+    model->normal[i] = (sonde_vec3){x.x / r, x.y / r, x.z / r};
+  }
+}
+
+sonde_status bench_ellipsoid_build(const bench_ellipsoid *def, sonde_model **model,
+                                   sonde_error *error) {
+  uint32_t f = (uint32_t)(sqrt((double)(def->nodes - 2) / 10) + 0.5);
+  sonde_mesh mesh = {0};
+  sonde_mesh_report report;
+  sonde_status status = geodesic(f > 1 ? f : 1, def->size, &mesh, error);
+  if (!status) status = sonde_mesh_inspect(&mesh, &report, error);
+  sonde_site site = {.position_m = {0, 0, def->size * RADII_M[2]},
+                     .normal = {0, 0, 1},
+                     .u = {0, 1, 0},
+                     .v = {-1, 0, 0},
+                     .k0_n_m3 = RADIAL_N_M3,
+                     .xm_m = 1e3};
+  sonde_model_def build = sonde_model_def_default();
+  build.name = "ellipsoid";
+  build.provenance = "synthetic: comparison scene";
+  build.skin = &mesh;
+  build.sites = &site;
+  build.site_count = 1;
+  build.fine_edge_m = 1;
+  build.law.edge_stiffness_n_m = def->stiffness;
+  build.law.edge_compression = 1;
+  build.law.tangential_stiffness_n_m3 = 1e6;
+  build.law.normal_damping_s = 5e-3;
+  if (!status) {
+    build.law.surface_density_kg_m2 = MASS_KG * def->size * def->size / report.area_m2;
+    status = sonde_model_build(&build, model, error);
+  }
+  if (!status) point_along_radii(*model);
+  sonde_mesh_clear(&mesh);
+  return status;
+}
+
+sonde_world_def bench_ellipsoid_world(double dt_s) {
+  sonde_world_def def = sonde_world_def_default();
+  def.dt_s = dt_s;
+  def.contact_law = SONDE_CONTACT_NODES;
+  def.contact_stiffness_n_m3 = CONTACT_N_M3;
+  def.contact_damping_n_s_m3 = 0;
+  def.newton_iterations = 1;
+  return def;
+}
+
+sonde_pose bench_ellipsoid_pose(const bench_ellipsoid *def, double time_s) {
+  double depth = 0.02 * (time_s < 0.1 ? time_s / 0.1 : 1);
+  double way = time_s > 0.3 ? 0.1 * (time_s - 0.3) : 0;
+  // The beam axis z of the probe points down: half a turn about x.
+  return (sonde_pose){{way, 0, def->size * RADII_M[2] - depth}, {0, 1, 0, 0}};
+}

@@ -1,0 +1,285 @@
+// sonde cut: cuts the skin of a model along a path and writes the cut model.
+//
+// read_triple    "x,y,z" in millimetres
+// read_file      a path from a CSV file
+// site_line      a straight path beside a site, laid onto the skin
+// press          force on a settled probe at the site
+// print          what the cut did
+#include "fit_common.h"
+
+#include <math.h>
+#include <stdarg.h>
+
+static const char VERB[] = "cut";
+static const char HELP[] =
+    "usage: sonde cut [MODEL] (--line A:B | --path FILE | --site K --length-mm L) -o FILE\n"
+    "\n"
+    "Cuts the skin along a path and writes the model with the cut. The skin opens along edges of\n"
+    "the mesh near the path; mass, area and stiffness stay. MODEL defaults to the bundled thigh.\n"
+    "\n"
+    "  --line A:B       from A to B on the skin at rest, each x,y,z in mm\n"
+    "  --path FILE      CSV with x_mm,y_mm,z_mm, 2 to 1024 points on the skin at rest\n"
+    "  --site K         a straight cut beside site K ...\n"
+    "  --length-mm L    ... of this length (5 to 200) ...\n"
+    "  --offset-mm O    ... O away from the site (-60 to 60; default 15) ...\n"
+    "  --turn-deg T     ... at this angle: 0 around the leg, 90 along it; default 0\n"
+    "  --depth-mm D     with --site: press at the site before and after, D below the skin (0.1 to "
+    "30)\n"
+    "  --probe NAME     with --depth-mm: the probe; default linear\n"
+    "  -o FILE          the cut model\n"
+    "  --json           print one JSON object\n"
+    "  --help           this text\n";
+
+enum { MOST_POINTS = 1024 };
+
+typedef struct arguments {
+  const char *model, *line, *path, *site, *length, *offset, *turn, *depth, *probe, *output;
+  bool json, help;
+  long site_id;
+  double length_m, offset_m, turn_rad, depth_m; // depth NaN: no press
+  char found[1024];
+} arguments;
+
+typedef struct work {
+  sonde_model *model, *cut;
+  sonde_cut_map map;
+  const sonde_site *site;
+  sonde_vec3 path[MOST_POINTS];
+  uint32_t count;
+  double before_n, after_n, seconds;
+} work;
+
+static bool parse_numbers(arguments *a) {
+  double mm = 15, degrees = 0;
+  if (a->site && (!app_parse_integer(VERB, "--site", a->site, 0, 1000000, &a->site_id) ||
+                  !app_require(VERB, "--length-mm", a->length)))
+    return false;
+  if (a->length && !app_parse_real(VERB, "--length-mm", a->length, 5, 200, &a->length_m))
+    return false;
+  if (a->offset && !app_parse_real(VERB, "--offset-mm", a->offset, -60, 60, &mm)) return false;
+  if (a->turn && !app_parse_real(VERB, "--turn-deg", a->turn, -360, 360, &degrees)) return false;
+  a->depth_m = NAN;
+  if (a->depth && !app_parse_real(VERB, "--depth-mm", a->depth, 0.1, 30, &a->depth_m)) return false;
+  a->length_m *= 1e-3;
+  a->offset_m = mm * 1e-3;
+  a->depth_m *= 1e-3;
+  a->turn_rad = degrees * 3.14159265358979323846 / 180;
+  return true;
+}
+
+// Returns -1 to go on, else the exit code.
+static int read_arguments(int argc, char **argv, arguments *a) {
+  const app_option options[] = {
+      {"--line", &a->line, NULL},        {"--path", &a->path, NULL},
+      {"--site", &a->site, NULL},        {"--length-mm", &a->length, NULL},
+      {"--offset-mm", &a->offset, NULL}, {"--turn-deg", &a->turn, NULL},
+      {"--depth-mm", &a->depth, NULL},   {"--probe", &a->probe, NULL},
+      {"-o", &a->output, NULL},          {"--json", NULL, &a->json},
+      {"--help", NULL, &a->help}};
+  if (!app_take_options(VERB, argc, argv, options, sizeof options / sizeof *options, &a->model))
+    return APP_BAD_INPUT;
+  if (a->help) {
+    fputs(HELP, stdout);
+    return APP_OK;
+  }
+  int ways = (a->line != NULL) + (a->path != NULL) + (a->site != NULL);
+  if (ways != 1)
+    return app_usage_error(VERB, "expected one of --line, --path and --site, got %d", ways);
+  if (!a->site && (a->length || a->offset || a->turn || a->depth || a->probe))
+    return app_usage_error(VERB, "--length-mm, --offset-mm, --turn-deg, --depth-mm and --probe "
+                                 "belong to --site");
+  if (!app_require(VERB, "-o", a->output) || !parse_numbers(a)) return APP_BAD_INPUT;
+  char searched[1024];
+  if (!a->model && !app_bundled_model(a->found, sizeof a->found, searched, sizeof searched))
+    return app_usage_error(VERB, "no bundled model found (looked at %s)", searched);
+  if (!a->model) a->model = a->found;
+  if (!a->probe) a->probe = "linear";
+  return -1;
+}
+
+static sonde_status fail(sonde_error *error, sonde_status status, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+static sonde_status fail(sonde_error *error, sonde_status status, const char *format, ...) {
+  va_list list;
+  va_start(list, format);
+  vsnprintf(error->message, sizeof error->message, format, list);
+  va_end(list);
+  return error->status = status;
+}
+
+// "x,y,z" in mm up to a character of `last` or the end; NULL when it is not that.
+static const char *read_triple(const char *text, const char *last, sonde_vec3 *point) {
+  double mm[3];
+  for (int k = 0; k < 3; ++k) {
+    const char *end;
+    mm[k] = sonde_parse_real(text, &end);
+    if (end == text || !isfinite(mm[k])) return NULL;
+    if (k < 2 ? *end != ',' : !strchr(last, *end)) return NULL;
+    text = k < 2 ? end + 1 : end;
+  }
+  *point = (sonde_vec3){mm[0] * 1e-3, mm[1] * 1e-3, mm[2] * 1e-3};
+  return text;
+}
+
+static sonde_status read_line(const char *text, work *w, sonde_error *error) {
+  const char *next = read_triple(text, ":", &w->path[0]);
+  if (next) next = *next == ':' ? read_triple(next + 1, "", &w->path[1]) : NULL;
+  w->count = 2;
+  if (next) return SONDE_OK;
+  return fail(error, SONDE_ARGUMENT, "--line expects x,y,z:x,y,z in mm, got '%.80s'", text);
+}
+
+static sonde_status read_file(const char *path, work *w, sonde_error *error) {
+  char *bytes = NULL;
+  size_t size;
+  sonde_status status = sonde_file_load(path, &bytes, &size, error);
+  bool header = false;
+  int number = 0;
+  for (char *line = bytes, *next; !status && line && *line; line = next) {
+    char *end = line + strcspn(line, "\r\n");
+    next = end + strspn(end, "\r") + (end[strspn(end, "\r")] == '\n');
+    *end = *end ? '\n' : *end;
+    number++;
+    if (line == end || *line == '#') continue;
+    if (!header) {
+      header = strncmp(line, "x_mm,y_mm,z_mm", 14) == 0 && line + 14 == end;
+      if (!header)
+        status = fail(error, SONDE_FORMAT, "%.300s:%d: expected the header x_mm,y_mm,z_mm", path,
+                      number);
+      continue;
+    }
+    if (w->count == MOST_POINTS)
+      status = fail(error, SONDE_FORMAT, "%.300s:%d: expected at most %d points", path, number,
+                    MOST_POINTS);
+    else if (!read_triple(line, "\n", &w->path[w->count++]))
+      status = fail(error, SONDE_FORMAT, "%.300s:%d: expected three numbers", path, number);
+  }
+  sonde_free(bytes);
+  return status;
+}
+
+static sonde_vec3 along(sonde_vec3 from, double a, sonde_vec3 u, double b, sonde_vec3 v) {
+  return (sonde_vec3){from.x + a * u.x + b * v.x, from.y + a * u.y + b * v.y,
+                      from.z + a * u.z + b * v.z};
+}
+
+// 33 points on the tangent plane of the site, each moved to the skin below it.
+static sonde_status site_line(const arguments *a, work *w, sonde_error *error) {
+  enum { POINTS = 33 };
+  const sonde_site *s = w->site;
+  sonde_surface_index *skin;
+  sonde_status status = sonde_surface_index_create(&w->model->surface, &skin, error);
+  if (status) return status;
+  double c = cos(a->turn_rad), d = sin(a->turn_rad);
+  sonde_vec3 inward = {-s->normal.x, -s->normal.y, -s->normal.z};
+  for (w->count = 0; !status && w->count < POINTS; ++w->count) {
+    double t = a->length_m * (w->count / (POINTS - 1.0) - 0.5), o = a->offset_m;
+    sonde_vec3 on_plane = along(s->position_m, t * c - o * d, s->u, t * d + o * c, s->v);
+    sonde_vec3 above = along(on_plane, 0.02, s->normal, 0, s->normal);
+    sonde_surface_point hit;
+    if (sonde_surface_raycast(skin, above, inward, 0.1, &hit))
+      w->path[w->count] = hit.point_m;
+    else
+      status = fail(error, SONDE_ARGUMENT, "the cut leaves the skin %.1f mm beside site %ld",
+                    sqrt(t * t + o * o) * 1e3, a->site_id);
+  }
+  sonde_surface_index_destroy(skin);
+  return status;
+}
+
+static sonde_status press(const arguments *a, const work *w, const sonde_model *model,
+                          double *force_n, sonde_error *error) {
+  sonde_probe probe = {0};
+  sonde_state *state = NULL;
+  sonde_status status = sonde_probe_create(a->probe, &probe, error);
+  if (!status) status = sonde_state_create(model, NULL, &state, error);
+  if (!status) {
+    for (double d = 2e-3; d < a->depth_m; d += 2e-3)
+      sonde_settle(state, &probe, sonde_site_pose(w->site, d), 1e-6, 400);
+    sonde_settle_result r =
+        sonde_settle(state, &probe, sonde_site_pose(w->site, a->depth_m), 1e-9, 400);
+    *force_n = r.contact_n;
+    if (!r.converged)
+      status = fail(error, SONDE_CONVERGENCE, "the probe did not come to rest: residual %.2g",
+                    r.residual);
+  }
+  sonde_state_destroy(state);
+  sonde_probe_clear(&probe);
+  return status;
+}
+
+static double sum(const double *values, uint32_t count) {
+  double total = 0;
+  for (uint32_t i = 0; i < count; ++i) total += values[i];
+  return total;
+}
+
+static void print(const arguments *a, const work *w) {
+  uint32_t nodes = w->model->surface.vertex_count, after = w->cut->surface.vertex_count;
+  double mass = sum(w->model->mass_kg, nodes), mass_after = sum(w->cut->mass_kg, after);
+  if (a->json) {
+    app_json_begin();
+    app_json_integer("nodes_before", nodes);
+    app_json_integer("nodes", after);
+    app_json_integer("split_edges", w->map.split_edges);
+    app_json_real("length_mm", w->map.length_m * 1e3);
+    app_json_bool("closed", w->map.closed);
+    app_json_real("mass_kg", mass_after);
+    app_json_real("mass_change", mass_after / mass - 1);
+    app_json_real("cut_ms", w->seconds * 1e3);
+    app_json_real("force_before_n", w->before_n);
+    app_json_real("force_after_n", w->after_n);
+    app_json_text("model", a->output);
+    app_json_end();
+    return;
+  }
+  printf("cut           %8.1f mm along %u edges%s, in %.1f ms\n", w->map.length_m * 1e3,
+         w->map.split_edges, w->map.closed ? ", closed" : "", w->seconds * 1e3);
+  printf("nodes         %8u, were %u\n", after, nodes);
+  printf("mass          %8.4f kg, changed by %.1g of it\n", mass_after, mass_after / mass - 1);
+  if (a->depth)
+    printf("force         %8.3f N at %g mm, was %.3f N\n", w->after_n, a->depth_m * 1e3,
+           w->before_n);
+  printf("model         %s\n", a->output);
+}
+
+static sonde_status find_path(const arguments *a, work *w, sonde_error *error) {
+  if (a->line) return read_line(a->line, w, error);
+  if (a->path) return read_file(a->path, w, error);
+  w->site = sonde_model_site(w->model, (uint32_t)a->site_id);
+  if (w->site) return site_line(a, w, error);
+  return fail(error, SONDE_NOT_FOUND, "%.400s: no site %ld, the model has %u sites", a->model,
+              a->site_id, w->model->site_count);
+}
+
+static sonde_status cut(const arguments *a, work *w, sonde_error *error) {
+  sonde_status status = sonde_model_load(a->model, &w->model, error);
+  if (!status) status = find_path(a, w, error);
+  if (status) return status;
+  double start = app_seconds();
+  status = sonde_model_cut(w->model, NULL, w->path, w->count, &w->cut, &w->map, error);
+  w->seconds = app_seconds() - start;
+  w->before_n = w->after_n = NAN;
+  if (!status && a->depth) status = press(a, w, w->model, &w->before_n, error);
+  if (!status && a->depth) status = press(a, w, w->cut, &w->after_n, error);
+  if (status) return status;
+  size_t used = strlen(w->cut->provenance);
+  snprintf(w->cut->provenance + used, sizeof w->cut->provenance - used, "%scut along %.1f mm",
+           used ? "; " : "", w->map.length_m * 1e3);
+  return sonde_model_save(w->cut, a->output, error);
+}
+
+int cmd_cut(int argc, char **argv) {
+  arguments a = {0};
+  int code = read_arguments(argc, argv, &a);
+  if (code >= 0) return code;
+  static work w;
+  w = (work){0};
+  sonde_error error = {0};
+  sonde_status status = cut(&a, &w, &error);
+  if (!status) print(&a, &w);
+  sonde_cut_map_clear(&w.map);
+  sonde_model_destroy(w.cut);
+  sonde_model_destroy(w.model);
+  return status ? app_fail(VERB, &error) : APP_OK;
+}

@@ -1,0 +1,325 @@
+// One step of the fast engine (docs/world.md): Newton's method on
+//   M (v1 - v0) = h F(x0 + h v1, v1)
+// from v1 = v0, its linear systems by conjugate gradients in single precision.
+// list:      slices that take part.
+// publish:   positions and velocities in double precision, for the contact.
+// couple:    pushes and blocks of the contact, found in double precision, into the slices.
+// solve:     conjugate gradients.
+// rest:      slices that stopped moving fall asleep, movers wake their neighbours.
+#include "world/lanes.h"
+#include "world/state.h"
+
+#include "base/base.h"
+#include "base/clock.h"
+#include "base/maths.h"
+
+#include <string.h>
+
+static void list_awake(sonde_lanes *lanes) {
+  lanes->awake_count = lanes->face_list_count = 0;
+  for (uint32_t s = 0; s < lanes->slice_count; ++s) {
+    lanes->awake[lanes->awake_count] = s;
+    lanes->awake_count += lanes->is_awake[s];
+  }
+  if (!(lanes->law.shear > 0)) return;
+  memset(lanes->face_marked, 0, lanes->face_slice_count);
+  for (uint32_t a = 0; a < lanes->awake_count; ++a) {
+    const sonde_slice_model *fixed = &lanes->model[lanes->awake[a]];
+    for (uint32_t k = 0; k < fixed->face_count; ++k)
+      lanes->face_marked[lanes->face_near[fixed->first_face + k]] = 1;
+  }
+  for (uint32_t f = 0; f < lanes->face_slice_count; ++f) {
+    lanes->faces[lanes->face_list_count] = f;
+    lanes->face_list_count += lanes->face_marked[f];
+  }
+}
+
+// Where the nodes of the slices that the contact looks at are evaluated, and their velocities.
+static void publish_evaluated(sonde_state *state) {
+  const sonde_lanes *lanes = state->lanes;
+  float h = lanes->law.dt;
+  for (uint32_t k = 0; k < lanes->near_probe_count; ++k) {
+    uint32_t s = lanes->near_probe[k], first = s * SONDE_LANES;
+    const sonde_slice *at = &lanes->slice[s];
+    for (uint32_t l = 0; l < lanes->model[s].used; ++l) {
+      sonde_vec3 v = sonde_lane_vector(at->ve, l), u = sonde_lane_vector(at->u, l);
+      state->velocity[first + l] = v;
+      state->position[first + l] = v_add(state->model->surface.vertices[first + l], u);
+      state->probed[first + l] = v_madd(state->position[first + l], (double)h, v);
+    }
+  }
+}
+
+// Slices that the contact looks at: those in the probe's box for the law at the nodes, all awake
+// ones for the other, which keeps boxes of faces.
+static void find_near(sonde_state *state, const sonde_probe *probe, sonde_pose pose) {
+  sonde_lanes *lanes = state->lanes;
+  lanes->near_probe_count = 0;
+  if (state->def.contact_law != SONDE_CONTACT_NODES) {
+    memcpy(lanes->near_probe, lanes->awake, lanes->awake_count * sizeof *lanes->awake);
+    lanes->near_probe_count = lanes->awake_count;
+  } else if (probe) {
+    sonde_box box = sonde_contact_box(probe, pose);
+    const float low[3] = {(float)box.low.x, (float)box.low.y, (float)box.low.z};
+    const float high[3] = {(float)box.high.x, (float)box.high.y, (float)box.high.z};
+    lanes->kernels->near(lanes, low, high);
+  }
+}
+
+static void wake(sonde_lanes *lanes, uint32_t s) {
+  lanes->is_awake[s] = 1;
+  lanes->calm[s] = 0;
+}
+
+// Wakes the slices that the probe touches; true when one slept.
+static bool wake_touched(sonde_state *state) {
+  bool woke = false;
+  for (uint32_t k = 0; k < state->touched_count; ++k) {
+    uint32_t s = state->touched[k] / SONDE_LANES;
+    woke |= !state->lanes->is_awake[s];
+    wake(state->lanes, s);
+  }
+  return woke;
+}
+
+// Clears what the contact adds to, and lists the edges whose blocks it fills.
+static void clear_touched(sonde_state *state) {
+  sonde_lanes *lanes = state->lanes;
+  lanes->pair_count = 0;
+  lanes->stamp++;
+  for (uint32_t k = 0; k < state->touched_count; ++k) {
+    uint32_t i = state->touched[k];
+    state->matrix->diagonal[i] = m_zero();
+    state->force[i] = state->product[i] = vec3(0, 0, 0);
+  }
+  for (uint32_t k = 0; k < state->touched_face_count; ++k)
+    for (int e = 0; e < 3; ++e) {
+      uint32_t edge = state->model->face_edge[state->touched_faces[k]][e];
+      if (lanes->pair_stamp[edge] == lanes->stamp) continue;
+      lanes->pair_stamp[edge] = lanes->stamp;
+      SONDE_ASSERT(lanes->pair_count < state->model->topology.edge_count);
+      lanes->pair_edge[lanes->pair_count++] = edge;
+      state->matrix->upper[edge] = m_zero();
+    }
+}
+
+static void couple(sonde_state *state) {
+  SONDE_ASSERT(state->touched_count <= state->lanes->node_count);
+  for (uint32_t k = 0; k < state->touched_count; ++k) {
+    uint32_t i = state->touched[k], l = i % SONDE_LANES;
+    sonde_slice *at = &state->lanes->slice[i / SONDE_LANES];
+    const double(*d)[3] = (const double(*)[3])state->matrix->diagonal[i].m;
+    sonde_vec3 f = v_add(state->contact_force[i], state->force[i]);
+    at->r[0][l] += (float)f.x, at->r[1][l] += (float)f.y, at->r[2][l] += (float)f.z;
+    at->diagonal[0][l] += (float)d[0][0], at->diagonal[1][l] += (float)d[0][1];
+    at->diagonal[2][l] += (float)d[0][2], at->diagonal[3][l] += (float)d[1][1];
+    at->diagonal[4][l] += (float)d[1][2], at->diagonal[5][l] += (float)d[2][2];
+  }
+}
+
+static sonde_vec3 direction_of(const sonde_slice *slices, uint32_t i) {
+  return sonde_lane_vector(slices[i / SONDE_LANES].z, i % SONDE_LANES);
+}
+
+static void add_to_product(sonde_slice *slices, uint32_t i, sonde_vec3 a) {
+  sonde_slice *at = &slices[i / SONDE_LANES];
+  uint32_t l = i % SONDE_LANES;
+  at->w[0][l] += (float)a.x, at->w[1][l] += (float)a.y, at->w[2][l] += (float)a.z;
+}
+
+// w = A z with the contact's blocks; returns z.w.
+static double multiply(sonde_state *state) {
+  sonde_lanes *lanes = state->lanes;
+  double sum = lanes->kernels->multiply(lanes);
+  for (uint32_t k = 0; k < lanes->pair_count; ++k) {
+    uint32_t e = lanes->pair_edge[k], i = state->model->topology.edges[e][0];
+    uint32_t j = state->model->topology.edges[e][1];
+    const sonde_mat3 *block = &state->matrix->upper[e];
+    sonde_vec3 pi = direction_of(lanes->slice, i), pj = direction_of(lanes->slice, j);
+    sonde_vec3 qi = m_mul_v(*block, pj);
+    add_to_product(lanes->slice, i, qi);
+    add_to_product(lanes->slice, j, m_mul_v(m_transpose(*block), pi));
+    sum += 2 * v_dot(pi, qi);
+  }
+  return sum;
+}
+
+// Nothing to solve: the nodes go on as they are.
+static void keep_velocities(sonde_lanes *lanes) {
+  for (uint32_t a = 0; a < lanes->awake_count; ++a) {
+    sonde_slice *at = &lanes->slice[lanes->awake[a]];
+    for (int c = 0; c < 3; ++c) at->x[c] = (sonde_lane){0};
+  }
+}
+
+static void solve(sonde_state *state) {
+  sonde_lanes *lanes = state->lanes;
+  const sonde_pcg_options *options = &state->def.pcg;
+  double sums[3], next[2], alpha = 0, beta = 0;
+  lanes->kernels->begin(lanes, sums);
+  sonde_pcg_result result = {.reference = sqrt(sums[2]), .residual = sqrt(sums[1])};
+  double target = fmax(options->relative_residual * result.reference, options->absolute_residual);
+  while (result.residual > target && result.iterations < options->max_iterations) {
+    double curvature = multiply(state);
+    if (result.iterations > 0) curvature -= beta * sums[0] / alpha;
+    if (!(curvature > 0)) break;
+    alpha = sums[0] / curvature;
+    lanes->kernels->advance(lanes, (float)alpha, (float)beta, next);
+    beta = next[0] / sums[0];
+    sums[0] = next[0];
+    result.residual = sqrt(next[1]);
+    result.iterations++;
+  }
+  if (result.iterations == 0) keep_velocities(lanes);
+  result.converged = result.residual <= target;
+  if (!result.converged) state->flags |= SONDE_FLAG_NOT_CONVERGED;
+  result.iterations += state->solver.iterations;
+  state->solver = result;
+}
+
+// The solution of touched nodes, for the pushes at the end of the step.
+static void publish_increments(sonde_state *state, bool clear) {
+  for (uint32_t k = 0; k < state->touched_count; ++k) {
+    uint32_t i = state->touched[k], l = i % SONDE_LANES;
+    const sonde_slice *at = &state->lanes->slice[i / SONDE_LANES];
+    sonde_vec3 x = sonde_lane_vector(at->x, l);
+    state->increment[i] = clear ? vec3(0, 0, 0) : x;
+    if (clear) state->velocity[i] = v_add(state->velocity[i], x);
+  }
+}
+
+// One Newton iteration: forces and matrix where the nodes are expected, solution, pushes after it.
+static void iterate(sonde_state *state, const sonde_probe *probe, sonde_pose pose,
+                    const sonde_motion *motion) {
+  sonde_lanes *lanes = state->lanes;
+  double h = state->def.dt_s, start = sonde_clock_now();
+  const sonde_contact_scales scales = {h, h * h};
+  find_near(state, probe, pose);
+  publish_evaluated(state);
+  sonde_contact_detect(state, probe, pose);
+  if (wake_touched(state)) list_awake(lanes);
+  clear_touched(state);
+  double detected = sonde_clock_now();
+  lanes->kernels->evaluate(lanes);
+  lanes->kernels->shear(lanes);
+  lanes->kernels->linearise(lanes);
+  if (probe) {
+    sonde_contact_apply(state, motion, &scales);
+    sonde_friction_apply(state, motion, &scales, h);
+    couple(state);
+  }
+  double assembled = sonde_clock_now();
+  solve(state);
+  publish_increments(state, false);
+  sonde_contact_advance(state, motion, 1, h);
+  publish_increments(state, true);
+  lanes->kernels->accept(lanes);
+  state->times.contact_s += detected - start;
+  state->times.assembly_s += assembled - detected;
+  state->times.solve_s += sonde_clock_now() - assembled;
+}
+
+static void fall_asleep(sonde_state *state, uint32_t s) {
+  sonde_lanes *lanes = state->lanes;
+  SONDE_ASSERT(lanes->is_awake[s]);
+  sonde_slice *at = &lanes->slice[s];
+  lanes->is_awake[s] = 0;
+  lanes->speed2[s] = 0;
+  lanes->published[s] = 1;
+  for (int c = 0; c < 3; ++c) at->v[c] = at->ve[c] = at->z[c] = (sonde_lane){0};
+  for (uint32_t l = 0; l < lanes->model[s].used; ++l) {
+    uint32_t i = s * SONDE_LANES + l;
+    float *record = lanes->record + (size_t)i * SONDE_RECORD;
+    float *direction = lanes->direction + (size_t)i * SONDE_DIRECTION;
+    float indentation = 0;
+    for (int c = 0; c < 3; ++c) {
+      record[c] = at->u[c][l];
+      record[3 + c] = direction[c] = 0;
+      indentation -= lanes->model[s].normal[c][l] * at->u[c][l];
+    }
+    direction[3] = 0;
+    record[6] = indentation;
+    state->velocity[i] = vec3(0, 0, 0);
+    state->position[i] = state->probed[i] =
+        v_add(state->model->surface.vertices[i], sonde_lane_vector(at->u, l));
+  }
+}
+
+static bool has_waking_neighbour(const sonde_lanes *lanes, uint32_t s) {
+  const uint32_t *near = lanes->near + lanes->model[s].first_near;
+  for (uint32_t k = 0; k < lanes->model[s].near_count; ++k)
+    if (lanes->is_awake[near[k]]) return true;
+  return false;
+}
+
+static void wake_neighbours(sonde_lanes *lanes, uint32_t s) {
+  const uint32_t *near = lanes->near + lanes->model[s].first_near;
+  for (uint32_t k = 0; k < lanes->model[s].near_count; ++k)
+    if (!lanes->is_awake[near[k]]) wake(lanes, near[k]);
+}
+
+// Slices at the border of the waking ones are tried for one step in turn: their neighbours may have
+// crept away from the place where they found balance.
+static void try_sleepers(sonde_state *state) {
+  sonde_lanes *lanes = state->lanes;
+  uint32_t turn = (uint32_t)(state->tick % SONDE_TRIAL_PERIOD);
+  for (uint32_t s = turn; s < lanes->slice_count; s += SONDE_TRIAL_PERIOD)
+    if (!lanes->is_awake[s] && has_waking_neighbour(lanes, s)) {
+      lanes->is_awake[s] = 1;
+      lanes->calm[s] = SONDE_CALM_TICKS - 1;
+    }
+}
+
+// A slice sleeps when for SONDE_CALM_TICKS its nodes were slow and their unbalanced forces could
+// not move them by more than the sleep displacement: the anchors alone would stop them earlier.
+static void rest(sonde_state *state) {
+  sonde_lanes *lanes = state->lanes;
+  float way = (float)state->def.sleep_displacement_m, still = way / 10e-3f;
+  if (!(way > 0)) return;
+  for (uint32_t k = 0; k < state->touched_count; ++k)
+    lanes->calm[state->touched[k] / SONDE_LANES] = 0;
+  for (uint32_t a = 0; a < lanes->awake_count; ++a) {
+    uint32_t s = lanes->awake[a];
+    if (lanes->speed2[s] > 4 * still * still) wake_neighbours(lanes, s);
+    if (lanes->speed2[s] > still * still || lanes->unrest2[s] > way * way)
+      lanes->calm[s] = 0;
+    else if (++lanes->calm[s] >= SONDE_CALM_TICKS)
+      fall_asleep(state, s);
+  }
+  try_sleepers(state);
+}
+
+// What the probe touched may have bounced: its change of velocity says nothing about the next.
+static void hold_touched(sonde_state *state) {
+  for (uint32_t k = 0; k < state->touched_count; ++k) {
+    uint32_t l = state->touched[k] % SONDE_LANES;
+    sonde_slice *at = &state->lanes->slice[state->touched[k] / SONDE_LANES];
+    for (int c = 0; c < 3; ++c) at->ve[c][l] = at->v[c][l];
+  }
+}
+
+bool sonde_lane_step(sonde_state *state, const sonde_probe *probe, sonde_pose pose,
+                     const sonde_motion *motion) {
+  sonde_lanes *lanes = state->lanes;
+  SONDE_ASSERT(lanes->node_count == state->model->surface.vertex_count);
+  if (lanes->stale)
+    sonde_lanes_import(lanes, state->model->surface.vertices, state->position, state->velocity,
+                       true);
+  state->times = (sonde_stage_times){0};
+  state->solver = (sonde_pcg_result){0};
+  list_awake(lanes);
+  hold_touched(state);
+  for (uint32_t k = 0; k < state->def.newton_iterations; ++k) iterate(state, probe, pose, motion);
+  double solved = sonde_clock_now();
+  if (probe) sonde_friction_advance(state, motion);
+  sonde_contact_wrench(state, pose.position);
+  state->contact.reaction_n = lanes->reaction_n;
+  double size = lanes->kernels->update(lanes);
+  bool finite = isfinite(size) && v_finite(state->contact.force_n);
+  if (finite) rest(state);
+  state->row_count = 0;
+  for (uint32_t a = 0; a < lanes->awake_count; ++a)
+    state->row_count += lanes->model[lanes->awake[a]].used;
+  state->times.update_s = sonde_clock_now() - solved;
+  return finite;
+}

@@ -1,0 +1,325 @@
+// Laying out a model for the fast engine; cold.
+// carve:       all arrays in one block; measured and placed by the same code.
+// fill_slots:  neighbours of every row, padded to the slice's largest number.
+// fill_faces:  faces in slices of 16, and which corner each slot reads.
+// list_near:   slices that share an edge, and slices of faces that touch a slice.
+#include "world/lanes.h"
+
+#include "base/base.h"
+#include "base/maths.h"
+
+#include <string.h>
+
+static void *carve_array(char *base, size_t *offset, size_t count, size_t size) {
+  void *place = base ? base + *offset : NULL;
+  *offset += (count * size + 63) & ~(size_t)63;
+  return place;
+}
+
+#define CARVE(field, count) (l->field = carve_array(base, &offset, (count), sizeof *l->field))
+
+static size_t carve(sonde_lanes *l, uint32_t edges, char *base) {
+  size_t offset = 0, rows = (size_t)l->slice_count * SONDE_LANES;
+  CARVE(model, l->slice_count), CARVE(slice, l->slice_count);
+  CARVE(slot, l->slot_count), CARVE(tangent, l->slot_count);
+  // One more slice of faces stays zero: what slots without a face read.
+  CARVE(face, l->face_slice_count), CARVE(face_value, l->face_slice_count + 1);
+  CARVE(near, l->near_total), CARVE(face_near, l->face_total);
+  CARVE(record, rows * SONDE_RECORD), CARVE(direction, rows * SONDE_DIRECTION);
+  CARVE(awake, l->slice_count), CARVE(faces, l->face_slice_count);
+  CARVE(is_awake, l->slice_count), CARVE(calm, l->slice_count);
+  CARVE(face_marked, l->face_slice_count), CARVE(speed2, l->slice_count);
+  CARVE(way2, l->slice_count), CARVE(unrest2, l->slice_count), CARVE(published, l->slice_count);
+  CARVE(near_probe, l->slice_count);
+  CARVE(pair_edge, edges), CARVE(pair_stamp, edges);
+  return offset;
+}
+
+static uint32_t valence(const sonde_topology *t, uint32_t i) {
+  return i < t->vertex_count ? t->start[i + 1] - t->start[i] : 0;
+}
+
+static uint32_t count_slots(const sonde_topology *t, uint32_t slice) {
+  uint32_t most = 0;
+  for (uint32_t l = 0; l < SONDE_LANES; ++l) {
+    uint32_t here = valence(t, slice * SONDE_LANES + l);
+    if (here > most) most = here;
+  }
+  return most;
+}
+
+static void fill_row(sonde_lanes *lanes, const sonde_model *model, uint32_t i) {
+  const sonde_topology *t = &model->topology;
+  uint32_t s = i / SONDE_LANES, l = i % SONDE_LANES;
+  const sonde_slice_model *fixed = &lanes->model[s];
+  int32_t nothing = (int32_t)(lanes->face_slice_count * SONDE_FACE_STRIDE);
+  for (uint32_t k = 0; k < fixed->slot_count; ++k) {
+    sonde_slot *slot = &lanes->slot[fixed->first_slot + k];
+    bool used = k < valence(t, i);
+    uint32_t j = used ? t->neighbour[t->start[i] + k] : i;
+    sonde_vec3 d = vec3(1, 0, 0);
+    double length = 1, share = used;
+    if (used && model->edge_share) share = model->edge_share[t->neighbour_edge[t->start[i] + k]];
+    if (used) {
+      d = v_sub(model->surface.vertices[j], model->surface.vertices[i]);
+      length = model->edge_rest_m[t->neighbour_edge[t->start[i] + k]];
+    }
+    slot->node[l] = (int32_t)j;
+    slot->corner[l] = slot->opposite_a[l] = slot->opposite_b[l] = nothing;
+    slot->rest[0][l] = (float)d.x, slot->rest[1][l] = (float)d.y, slot->rest[2][l] = (float)d.z;
+    slot->length[l] = (float)length;
+    slot->share[l] = (float)share;
+    slot->whole = (l == 0 || slot->whole) && share == 1;
+  }
+}
+
+static void fill_slice(sonde_lanes *lanes, const sonde_model *model, uint32_t s) {
+  uint32_t n = model->surface.vertex_count;
+  sonde_slice_model *fixed = &lanes->model[s];
+  for (uint32_t l = 0; l < SONDE_LANES; ++l) {
+    uint32_t i = s * SONDE_LANES + l;
+    fixed->k0[l] = fixed->area[l] = 0;
+    fixed->xm[l] = fixed->limit[l] = fixed->mass[l] = 1;
+    for (int c = 0; c < 3; ++c) fixed->place[c][l] = 1e30f; // in no box
+    if (i >= n) continue;
+    sonde_vec3 normal = model->normal[i];
+    fixed->normal[0][l] = (float)normal.x;
+    fixed->normal[1][l] = (float)normal.y;
+    fixed->normal[2][l] = (float)normal.z;
+    fixed->area[l] = (float)model->area_m2[i];
+    fixed->k0[l] = (float)model->k0_n_m3[i];
+    fixed->xm[l] = (float)model->xm_m[i];
+    fixed->limit[l] = (float)(model->law.guard * model->xm_m[i]);
+    fixed->mass[l] = (float)model->mass_kg[i];
+    double tangent = model->law.tangential_stiffness_n_m3, k0 = model->k0_n_m3[i];
+    fixed->yield[l] = (float)(1 / (model->area_m2[i] * (tangent > 0 ? fmin(tangent, k0) : k0)));
+    sonde_vec3 x = model->surface.vertices[i];
+    const double at[3] = {x.x, x.y, x.z};
+    for (int c = 0; c < 3; ++c) {
+      float p = fixed->place[c][l] = (float)at[c];
+      fixed->low[c] = l == 0 || p < fixed->low[c] ? p : fixed->low[c];
+      fixed->high[c] = l == 0 || p > fixed->high[c] ? p : fixed->high[c];
+    }
+    fixed->used = l + 1;
+  }
+}
+
+static sonde_slot *slot_of(sonde_lanes *lanes, const sonde_topology *t, uint32_t i, uint32_t j) {
+  uint32_t k = 0;
+  while (k < valence(t, i) && t->neighbour[t->start[i] + k] != j) ++k;
+  SONDE_ASSERT(k < valence(t, i));
+  return &lanes->slot[lanes->model[i / SONDE_LANES].first_slot + k];
+}
+
+static void fill_face(sonde_lanes *lanes, const sonde_model *model, uint32_t f) {
+  const uint32_t *v = model->surface.faces[f];
+  SONDE_ASSERT(f / SONDE_LANES < lanes->face_slice_count);
+  uint32_t lane = f % SONDE_LANES;
+  sonde_face_slice *face = &lanes->face[f / SONDE_LANES];
+  face->area[lane] = (float)model->face_area_m2[f];
+  for (uint32_t k = 0; k < 3; ++k) {
+    uint32_t i = v[k], j = v[(k + 1) % 3], opposite = (k + 2) % 3;
+    int32_t first = (int32_t)(f / SONDE_LANES * SONDE_FACE_STRIDE + lane);
+    face->node[k][lane] = (int32_t)i;
+    face->half_cotangent[k][lane] = (float)model->face_half_cotangent[f][k];
+    slot_of(lanes, &model->topology, i, j)->corner[i % SONDE_LANES] =
+        first + (int32_t)(k * SONDE_LANES);
+    int32_t across = first + (int32_t)(opposite * SONDE_LANES);
+    slot_of(lanes, &model->topology, i, j)->opposite_a[i % SONDE_LANES] = across;
+    slot_of(lanes, &model->topology, j, i)->opposite_b[j % SONDE_LANES] = across;
+  }
+}
+
+static void fill_faces(sonde_lanes *lanes, const sonde_model *model) {
+  for (uint32_t s = 0; s < lanes->face_slice_count; ++s)
+    for (int l = 0; l < SONDE_LANES; ++l) lanes->face[s].area[l] = 1;
+  for (uint32_t f = 0; f < model->surface.face_count; ++f) fill_face(lanes, model, f);
+}
+
+// Adds value to the list that starts at first unless it is there; returns the new count.
+static uint32_t add_once(uint32_t *list, uint32_t count, uint32_t value) {
+  for (uint32_t k = 0; k < count; ++k)
+    if (list[k] == value) return count;
+  list[count] = value;
+  return count + 1;
+}
+
+// Lists of one slice at the ends of `near` and `faces`, which may be NULL for counting: then the
+// scratch lists are used.
+static void list_near(sonde_lanes *lanes, const sonde_model *model, uint32_t s, uint32_t *near,
+                      uint32_t *faces) {
+  const sonde_topology *t = &model->topology;
+  sonde_slice_model *fixed = &lanes->model[s];
+  fixed->near_count = fixed->face_count = 0;
+  for (uint32_t i = s * SONDE_LANES; i < s * SONDE_LANES + fixed->used; ++i) {
+    for (uint32_t k = t->start[i]; k < t->start[i + 1]; ++k)
+      if (t->neighbour[k] / SONDE_LANES != s)
+        fixed->near_count = add_once(near, fixed->near_count, t->neighbour[k] / SONDE_LANES);
+    for (uint32_t k = t->face_start[i]; k < t->face_start[i + 1]; ++k)
+      fixed->face_count = add_once(faces, fixed->face_count, t->face_list[k] / SONDE_LANES);
+  }
+}
+
+static sonde_lane_law law_of(const sonde_surface_law *law, const sonde_world_def *def) {
+  double h = def->dt_s;
+  return (sonde_lane_law){.edge_stiffness = (float)law->edge_stiffness_n_m,
+                          .edge_damper = (float)(law->edge_damping_s * law->edge_stiffness_n_m),
+                          .edge_compression = (float)law->edge_compression,
+                          .edge_pretension = (float)law->edge_pretension_n,
+                          .tangential = (float)law->tangential_stiffness_n_m3,
+                          .normal_damping_s = (float)law->normal_damping_s,
+                          .shear = (float)law->shear_stiffness_n_m,
+                          .shear_limit = (float)law->shear_limit,
+                          .exponent = (int)law->normal_exponent,
+                          .dt = (float)h,
+                          .stiffness_scale = (float)(h * h),
+                          .damping_scale = (float)h};
+}
+
+// Sizes that need a pass over the mesh: slots and lists per slice.
+static sonde_status measure(sonde_lanes *lanes, const sonde_model *model, sonde_slice_model *sizes,
+                            sonde_error *error) {
+  const sonde_topology *t = &model->topology;
+  uint32_t most = 0;
+  for (uint32_t i = 0; i < t->vertex_count; ++i) {
+    uint32_t faces = t->face_start[i + 1] - t->face_start[i];
+    most = valence(t, i) > most ? valence(t, i) : most;
+    most = faces > most ? faces : most;
+  }
+  uint32_t *scratch = SONDE_NEW(uint32_t, 2 * (size_t)most * SONDE_LANES + 2);
+  if (!scratch) return sonde_fail_memory(error);
+  lanes->model = sizes;
+  for (uint32_t s = 0; s < lanes->slice_count; ++s) {
+    uint32_t left = t->vertex_count - s * SONDE_LANES;
+    sizes[s].used = left < SONDE_LANES ? left : SONDE_LANES;
+    sizes[s].first_slot = lanes->slot_count;
+    sizes[s].slot_count = count_slots(t, s);
+    list_near(lanes, model, s, scratch, scratch + (size_t)most * SONDE_LANES + 1);
+    sizes[s].first_near = lanes->near_total;
+    sizes[s].first_face = lanes->face_total;
+    lanes->slot_count += sizes[s].slot_count;
+    lanes->near_total += sizes[s].near_count;
+    lanes->face_total += sizes[s].face_count;
+  }
+  sonde_free(scratch);
+  return SONDE_OK;
+}
+
+static void fill(sonde_lanes *lanes, const sonde_model *model, const sonde_slice_model *sizes) {
+  memcpy(lanes->model, sizes, lanes->slice_count * sizeof *sizes);
+  for (uint32_t s = 0; s < lanes->slice_count; ++s) {
+    const sonde_slice_model *fixed = &lanes->model[s];
+    fill_slice(lanes, model, s);
+    list_near(lanes, model, s, lanes->near + fixed->first_near,
+              lanes->face_near + fixed->first_face);
+    for (uint32_t l = 0; l < SONDE_LANES; ++l) fill_row(lanes, model, s * SONDE_LANES + l);
+  }
+  fill_faces(lanes, model);
+}
+
+// The block starts at a multiple of 64, as vectors need.
+static sonde_status place(sonde_lanes *lanes, uint32_t edges, sonde_error *error) {
+  size_t bytes = carve(lanes, edges, NULL);
+  lanes->block = sonde_calloc(1, bytes + 63);
+  if (!lanes->block) return sonde_fail_memory(error);
+  carve(lanes, edges, (char *)(((uintptr_t)lanes->block + 63) & ~(uintptr_t)63));
+  SONDE_ASSERT(((uintptr_t)lanes->slice & 63) == 0);
+  return SONDE_OK;
+}
+
+sonde_status sonde_lanes_create(const sonde_model *model, const sonde_world_def *def,
+                                sonde_lanes **out, sonde_error *error) {
+  *out = NULL;
+  uint32_t n = model->surface.vertex_count, faces = model->surface.face_count;
+  uint32_t slices = (n + SONDE_LANES - 1) / SONDE_LANES;
+  sonde_lanes *lanes = SONDE_NEW(sonde_lanes, 1);
+  char *room = sonde_calloc(slices + 1, sizeof(sonde_slice_model));
+  sonde_slice_model *sizes = (sonde_slice_model *)(((uintptr_t)room + 63) & ~(uintptr_t)63);
+  sonde_status status = lanes && room ? SONDE_OK : sonde_fail_memory(error);
+  if (!status) {
+    lanes->slice_count = slices;
+    lanes->face_slice_count = (faces + SONDE_LANES - 1) / SONDE_LANES;
+    lanes->node_count = n;
+    lanes->law = law_of(&model->law, def);
+    lanes->kernels = sonde_lane_kernels_find(NULL);
+    status = measure(lanes, model, sizes, error);
+  }
+  if (!status) status = place(lanes, model->topology.edge_count, error);
+  if (!status) {
+    fill(lanes, model, sizes);
+    *out = lanes;
+  } else {
+    sonde_lanes_destroy(lanes);
+  }
+  sonde_free(room);
+  return status;
+}
+
+void sonde_lanes_destroy(sonde_lanes *lanes) {
+  if (!lanes) return;
+  sonde_free(lanes->block);
+  sonde_free(lanes);
+}
+
+static void import_slice(sonde_lanes *lanes, uint32_t s, const sonde_vec3 *rest,
+                         const sonde_vec3 *position, const sonde_vec3 *velocity) {
+  sonde_slice *at = &lanes->slice[s];
+  SONDE_ASSERT(s < lanes->slice_count);
+  memset(at, 0, sizeof *at);
+  lanes->speed2[s] = lanes->way2[s] = 0;
+  for (uint32_t l = 0; l < lanes->model[s].used; ++l) {
+    uint32_t i = s * SONDE_LANES + l;
+    sonde_vec3 u = v_sub(position[i], rest[i]), v = velocity[i];
+    float *record = lanes->record + (size_t)i * SONDE_RECORD;
+    const double motion[6] = {u.x, u.y, u.z, v.x, v.y, v.z};
+    record[6] = 0;
+    for (int c = 0; c < 3; ++c) {
+      record[c] = at->u[c][l] = at->ue[c][l] = (float)motion[c];
+      record[3 + c] = at->v[c][l] = at->ve[c][l] = (float)motion[3 + c];
+      record[6] -= lanes->model[s].normal[c][l] * record[c];
+    }
+    lanes->speed2[s] = fmaxf(lanes->speed2[s], (float)v_norm2(v));
+    lanes->way2[s] = fmaxf(lanes->way2[s], (float)v_norm2(u));
+  }
+}
+
+void sonde_lanes_import(sonde_lanes *lanes, const sonde_vec3 *rest, const sonde_vec3 *position,
+                        const sonde_vec3 *velocity, bool awake) {
+  size_t rows = (size_t)lanes->slice_count * SONDE_LANES;
+  memset(lanes->direction, 0, rows * SONDE_DIRECTION * sizeof *lanes->direction);
+  for (uint32_t s = 0; s < lanes->slice_count; ++s) {
+    import_slice(lanes, s, rest, position, velocity);
+    lanes->is_awake[s] = awake;
+    lanes->calm[s] = 0;
+    lanes->published[s] = 1;
+  }
+  lanes->stale = false;
+}
+
+void sonde_lanes_publish(sonde_lanes *lanes, const sonde_vec3 *rest, sonde_vec3 *position,
+                         sonde_vec3 *velocity) {
+  for (uint32_t s = 0; s < lanes->slice_count; ++s) {
+    if (lanes->published[s]) continue;
+    const sonde_slice *at = &lanes->slice[s];
+    for (uint32_t l = 0; l < lanes->model[s].used; ++l) {
+      uint32_t i = s * SONDE_LANES + l;
+      position[i] = v_add(rest[i], sonde_lane_vector(at->u, l));
+      velocity[i] = sonde_lane_vector(at->v, l);
+    }
+    lanes->published[s] = 1;
+  }
+}
+
+const sonde_lane_kernels *sonde_lane_kernels_find(const char *name) {
+  const sonde_lane_kernels *known[] = {
+#ifdef __x86_64__
+      __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq")
+          ? &sonde_lane_kernels_avx512
+          : NULL,
+      __builtin_cpu_supports("avx2") ? &sonde_lane_kernels_avx2 : NULL,
+#endif
+      &sonde_lane_kernels_base};
+  for (size_t k = 0; k < SONDE_COUNT_OF(known); ++k)
+    if (known[k] && (!name || strcmp(name, known[k]->name) == 0)) return known[k];
+  return NULL;
+}

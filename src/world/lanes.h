@@ -1,0 +1,142 @@
+// The fast engine's data: nodes in slices of 16 along the space-filling curve of the model's
+// numbering, everything in single precision, one vector of 16 lanes per quantity and slice.
+// Displacements are relative to the rest positions, so that a float resolves 1 nm.
+#ifndef SONDE_SRC_LANES_H
+#define SONDE_SRC_LANES_H
+
+#include "sonde/world.h"
+
+enum { SONDE_LANES = 16, SONDE_RECORD = 8, SONDE_DIRECTION = 4 };
+
+typedef float sonde_lane __attribute__((vector_size(64)));
+typedef int32_t sonde_lane_index __attribute__((vector_size(64)));
+
+// One neighbour of each row of a slice; rows with fewer neighbours have share 0 there.
+typedef struct sonde_slot {
+  sonde_lane_index node;       // the neighbour
+  sonde_lane_index corner;     // this row's corner of the face to the left of the edge
+  sonde_lane_index opposite_a; // corners opposite the edge, whose coupling the edge carries
+  sonde_lane_index opposite_b;
+  sonde_lane rest[3]; // X_j - X_i
+  sonde_lane length;  // at rest
+  sonde_lane share;   // of a spring: 1, 0 for padding
+  uint32_t whole;     // all shares are 1
+} sonde_slot;
+
+// The edge's block of the matrix: -(along n n^T + lateral I) + shear N_i N_j^T.
+typedef struct sonde_slot_tangent {
+  sonde_lane n[3], along, lateral, shear;
+} sonde_slot_tangent;
+
+typedef struct sonde_slice_model {
+  sonde_lane normal[3], place[3], area, k0, xm, limit, mass, yield;
+  uint32_t first_slot, slot_count;
+  uint32_t first_near, near_count; // slices that share an edge with this one
+  uint32_t first_face, face_count; // slices of faces with a corner in this one
+  uint32_t used;                   // rows that are nodes, from the front
+  float low[3], high[3];           // box at rest
+} sonde_slice_model;
+
+typedef struct sonde_slice {
+  sonde_lane u[3], v[3];   // at the start of the step: displacement, velocity
+  sonde_lane ue[3], ve[3]; // where forces are evaluated; ve starts at v + the last step's change
+  sonde_lane r[3];         // residual; force before
+  sonde_lane diagonal[6], inverse[6];      // xx xy xz yy yz zz
+  sonde_lane x[3], z[3], w[3], p[3], q[3]; // of the conjugate gradients
+} sonde_slice;
+
+typedef struct sonde_face_slice {
+  sonde_lane_index node[3];
+  sonde_lane half_cotangent[3], area;
+  float stiff; // unused lanes have area 1 and cotangents 0
+} sonde_face_slice;
+
+// Per corner of 16 faces: force along N, share of the diagonal, coupling of the edge opposite.
+typedef struct sonde_face_value {
+  sonde_lane force[3], diagonal[3], coupling[3];
+} sonde_face_value;
+enum { SONDE_FACE_STRIDE = 9 * SONDE_LANES };
+
+// Numbers of the law and of the step, in single precision.
+typedef struct sonde_lane_law {
+  float edge_stiffness, edge_damper, edge_compression, edge_pretension;
+  float tangential, normal_damping_s;
+  float shear, shear_limit;
+  int exponent;
+  float dt, stiffness_scale, damping_scale;
+} sonde_lane_law;
+
+typedef struct sonde_lanes sonde_lanes;
+
+// Kernels of one instruction set; every set gives the same bits.
+typedef struct sonde_lane_kernels {
+  const char *name;
+  void (*evaluate)(sonde_lanes *lanes);  // ue = u + h ve, records; indentations for the shear layer
+  void (*shear)(sonde_lanes *lanes);     // faces' forces and couplings
+  void (*linearise)(sonde_lanes *lanes); // forces in b, matrix; reaction
+  // r = h F - M (ve - v), inverse diagonals, z = D^-1 r; r.z, r.r, (h F)^2
+  void (*begin)(sonde_lanes *lanes, double sums[3]);
+  double (*multiply)(sonde_lanes *lanes); // w = A z, returns z.w
+  // p = z + beta p, q = w + beta q, x += alpha p, r -= alpha q, z = D^-1 r; r.z, r.r
+  void (*advance)(sonde_lanes *lanes, float alpha, float beta, double sums[2]);
+  void (*accept)(sonde_lanes *lanes);   // ve += x
+  double (*update)(sonde_lanes *lanes); // u, v at the end, ve for the next; not finite: NaN
+  // Slices with a node in the box, or all awake ones for NULL: `near_probe`
+  void (*near)(sonde_lanes *lanes, const float low[3], const float high[3]);
+} sonde_lane_kernels;
+
+struct sonde_lanes {
+  void *block;
+  uint32_t node_count, slice_count, face_slice_count, slot_count, near_total, face_total;
+  sonde_lane_law law;
+  const sonde_lane_kernels *kernels;
+  sonde_slice_model *model;
+  sonde_slice *slice;
+  sonde_slot *slot;
+  sonde_slot_tangent *tangent;
+  sonde_face_slice *face;
+  sonde_face_value *face_value;
+  uint32_t *near, *face_near;
+  float *record;           // [rows][8] ue, ve, indentation of every row, for the neighbours
+  float *direction;        // [rows][4] z and N.z of every row
+  uint32_t *awake, *faces; // lists of slices that take part
+  uint32_t awake_count, face_list_count;
+  uint8_t *is_awake, *calm, *face_marked;
+  float *speed2;  // [slices] largest square of a node's speed
+  float *way2;    // [slices] and displacement
+  float *unrest2; // [slices] largest square of unbalanced force over the anchors' stiffness: no
+                  // node is farther from its equilibrium
+  uint8_t *published;   // [slices] the doubles of the state are up to date
+  uint32_t *near_probe; // slices that the contact looks at
+  uint32_t near_probe_count;
+  sonde_vec3 reaction_n;
+  uint32_t *pair_edge;  // edges whose blocks the contact fills
+  uint32_t *pair_stamp; // [edges]
+  uint32_t pair_count, stamp;
+  bool stale; // the doubles of the state are newer
+};
+
+// The numbers of one lane.
+static inline sonde_vec3 sonde_lane_vector(const sonde_lane a[3], uint32_t lane) {
+  return (sonde_vec3){(double)a[0][lane], (double)a[1][lane], (double)a[2][lane]};
+}
+
+// Lays out the model; NULL where memory is out.
+sonde_status sonde_lanes_create(const sonde_model *model, const sonde_world_def *def,
+                                sonde_lanes **lanes, sonde_error *error);
+void sonde_lanes_destroy(sonde_lanes *lanes);
+// Takes over displacements and velocities from doubles; wakes every slice, or none.
+void sonde_lanes_import(sonde_lanes *lanes, const sonde_vec3 *rest, const sonde_vec3 *position,
+                        const sonde_vec3 *velocity, bool awake);
+// Writes positions and velocities that are not up to date as doubles. @thread tick
+void sonde_lanes_publish(sonde_lanes *lanes, const sonde_vec3 *rest, sonde_vec3 *position,
+                         sonde_vec3 *velocity);
+// The widest kernels that this processor runs, or those called `name` (NULL: widest).
+const sonde_lane_kernels *sonde_lane_kernels_find(const char *name);
+extern const sonde_lane_kernels sonde_lane_kernels_base;
+#ifdef __x86_64__
+extern const sonde_lane_kernels sonde_lane_kernels_avx2;
+extern const sonde_lane_kernels sonde_lane_kernels_avx512;
+#endif
+
+#endif

@@ -1,0 +1,205 @@
+// Vectors of 16 floats in the instructions of one set: selections, roots, and the turning of
+// records into vectors. Every operation is one IEEE operation per lane: all sets give the same
+// bits.
+#ifndef SONDE_SRC_LANES_VECTOR_H
+#define SONDE_SRC_LANES_VECTOR_H
+
+#include "world/lanes.h"
+
+#if defined(__AVX512F__) || defined(__AVX2__) || defined(__SSE2__)
+#include <immintrin.h>
+#endif
+
+#define INLINE static inline __attribute__((always_inline))
+typedef double lane_double __attribute__((vector_size(128)));
+
+INLINE sonde_lane all(float a) { return a - (sonde_lane){0}; }
+
+INLINE sonde_lane pick(sonde_lane_index mask, sonde_lane yes, sonde_lane no) {
+  return (sonde_lane)((mask & (sonde_lane_index)yes) | (~mask & (sonde_lane_index)no));
+}
+INLINE sonde_lane larger(sonde_lane a, sonde_lane b) { return pick(a > b, a, b); }
+INLINE sonde_lane smaller(sonde_lane a, sonde_lane b) { return pick(a < b, a, b); }
+
+INLINE sonde_lane root(sonde_lane a) {
+#if defined(__AVX512F__)
+  return (sonde_lane)_mm512_sqrt_ps((__m512)a);
+#elif defined(__AVX2__)
+  union {
+    sonde_lane whole;
+    __m256 part[2];
+  } v = {a};
+  for (int k = 0; k < 2; ++k) v.part[k] = _mm256_sqrt_ps(v.part[k]);
+  return v.whole;
+#elif defined(__SSE2__)
+  union {
+    sonde_lane whole;
+    __m128 part[4];
+  } v = {a};
+  for (int k = 0; k < 4; ++k) v.part[k] = _mm_sqrt_ps(v.part[k]);
+  return v.whole;
+#else
+  for (int k = 0; k < SONDE_LANES; ++k) a[k] = __builtin_sqrtf(a[k]);
+  return a;
+#endif
+}
+
+// base[index * stride + offset] for each lane.
+INLINE sonde_lane gather(const float *base, sonde_lane_index index) {
+#if defined(__AVX512F__)
+  return (sonde_lane)_mm512_i32gather_ps((__m512i)index, base, 4);
+#elif defined(__AVX2__)
+  union {
+    sonde_lane_index whole;
+    __m256i part[2];
+  } at = {index};
+  union {
+    __m256 part[2];
+    sonde_lane whole;
+  } v;
+  for (int k = 0; k < 2; ++k) v.part[k] = _mm256_i32gather_ps(base, at.part[k], 4);
+  return v.whole;
+#else
+  sonde_lane v;
+  for (int k = 0; k < SONDE_LANES; ++k) v[k] = base[index[k]];
+  return v;
+#endif
+}
+
+// Columns of four rows of four numbers each, per 128 bits: out[c] = the c-th numbers.
+#if defined(__AVX512F__)
+INLINE void turn4(const __m512 row[4], __m512 out[4]) {
+  __m512d low01 = _mm512_castps_pd(_mm512_unpacklo_ps(row[0], row[1]));
+  __m512d low23 = _mm512_castps_pd(_mm512_unpacklo_ps(row[2], row[3]));
+  __m512d high01 = _mm512_castps_pd(_mm512_unpackhi_ps(row[0], row[1]));
+  __m512d high23 = _mm512_castps_pd(_mm512_unpackhi_ps(row[2], row[3]));
+  out[0] = _mm512_castpd_ps(_mm512_unpacklo_pd(low01, low23));
+  out[1] = _mm512_castpd_ps(_mm512_unpackhi_pd(low01, low23));
+  out[2] = _mm512_castpd_ps(_mm512_unpacklo_pd(high01, high23));
+  out[3] = _mm512_castpd_ps(_mm512_unpackhi_pd(high01, high23));
+}
+// Rows k, k+4, k+8 and k+12 of the list side by side.
+INLINE __m512 rows4(const float *base, const int32_t *node, int k) {
+  __m512 z = _mm512_castps128_ps512(_mm_load_ps(base + (size_t)node[k] * SONDE_DIRECTION));
+  z = _mm512_insertf32x4(z, _mm_load_ps(base + (size_t)node[k + 4] * SONDE_DIRECTION), 1);
+  z = _mm512_insertf32x4(z, _mm_load_ps(base + (size_t)node[k + 8] * SONDE_DIRECTION), 2);
+  return _mm512_insertf32x4(z, _mm_load_ps(base + (size_t)node[k + 12] * SONDE_DIRECTION), 3);
+}
+INLINE __m512 rows8(const float *base, const int32_t *node, int k) {
+  __m512 z = _mm512_castps256_ps512(_mm256_load_ps(base + (size_t)node[k] * SONDE_RECORD));
+  return _mm512_insertf32x8(z, _mm256_load_ps(base + (size_t)node[k + 4] * SONDE_RECORD), 1);
+}
+#elif defined(__AVX2__)
+INLINE void turn4(const __m256 row[4], __m256 out[4]) {
+  __m256d low01 = _mm256_castps_pd(_mm256_unpacklo_ps(row[0], row[1]));
+  __m256d low23 = _mm256_castps_pd(_mm256_unpacklo_ps(row[2], row[3]));
+  __m256d high01 = _mm256_castps_pd(_mm256_unpackhi_ps(row[0], row[1]));
+  __m256d high23 = _mm256_castps_pd(_mm256_unpackhi_ps(row[2], row[3]));
+  out[0] = _mm256_castpd_ps(_mm256_unpacklo_pd(low01, low23));
+  out[1] = _mm256_castpd_ps(_mm256_unpackhi_pd(low01, low23));
+  out[2] = _mm256_castpd_ps(_mm256_unpacklo_pd(high01, high23));
+  out[3] = _mm256_castpd_ps(_mm256_unpackhi_pd(high01, high23));
+}
+INLINE __m256 rows4(const float *base, const int32_t *node, int k) {
+  __m256 z = _mm256_castps128_ps256(_mm_load_ps(base + (size_t)node[k] * SONDE_DIRECTION));
+  return _mm256_insertf128_ps(z, _mm_load_ps(base + (size_t)node[k + 4] * SONDE_DIRECTION), 1);
+}
+#endif
+
+// The four numbers of a direction at 16 nodes: loads of whole records, turned in registers, cost a
+// fraction of gathers.
+INLINE void read_directions(const float *base, const sonde_lane_index *nodes, sonde_lane out[4]) {
+  const int32_t *node = (const int32_t *)nodes;
+#if defined(__AVX512F__)
+  __m512 row[4], column[4];
+  for (int k = 0; k < 4; ++k) row[k] = rows4(base, node, k);
+  turn4(row, column);
+  for (int c = 0; c < 4; ++c) out[c] = (sonde_lane)column[c];
+#elif defined(__AVX2__)
+  for (int half = 0; half < 2; ++half) {
+    __m256 row[4], column[4];
+    for (int k = 0; k < 4; ++k) row[k] = rows4(base, node + 8 * half, k);
+    turn4(row, column);
+    for (int c = 0; c < 4; ++c) ((__m256 *)&out[c])[half] = column[c];
+  }
+#else
+  for (int c = 0; c < 4; ++c)
+    for (int l = 0; l < SONDE_LANES; ++l) out[c][l] = base[node[l] * SONDE_DIRECTION + c];
+#endif
+}
+
+// The first six numbers of a record at 16 nodes.
+INLINE void read_records(const float *base, const sonde_lane_index *nodes, sonde_lane out[6]) {
+  const int32_t *node = (const int32_t *)nodes;
+#if defined(__AVX512F__)
+  __m512 row[8], column[8];
+  for (int k = 0; k < 4; ++k) {
+    row[k] = rows8(base, node, k);
+    row[4 + k] = rows8(base, node, 8 + k);
+  }
+  turn4(row, column);
+  turn4(row + 4, column + 4);
+  for (int c = 0; c < 4; ++c) {
+    out[c] = (sonde_lane)_mm512_shuffle_f32x4(column[c], column[4 + c], 0x88);
+    if (c < 2) out[4 + c] = (sonde_lane)_mm512_shuffle_f32x4(column[c], column[4 + c], 0xdd);
+  }
+#elif defined(__AVX2__)
+  for (int half = 0; half < 2; ++half) {
+    __m256 row[8], column[8];
+    for (int k = 0; k < 8; ++k)
+      row[k] = _mm256_load_ps(base + (size_t)node[8 * half + k] * SONDE_RECORD);
+    turn4(row, column);
+    turn4(row + 4, column + 4);
+    for (int c = 0; c < 4; ++c) {
+      ((__m256 *)&out[c])[half] = _mm256_permute2f128_ps(column[c], column[4 + c], 0x20);
+      if (c < 2)
+        ((__m256 *)&out[4 + c])[half] = _mm256_permute2f128_ps(column[c], column[4 + c], 0x31);
+    }
+  }
+#else
+  for (int c = 0; c < 6; ++c)
+    for (int l = 0; l < SONDE_LANES; ++l) out[c][l] = base[node[l] * SONDE_RECORD + c];
+#endif
+}
+
+// Four numbers per lane to consecutive records of `stride` numbers.
+INLINE void write_records(float *base, int stride, const sonde_lane in[4]) {
+#if defined(__AVX512F__)
+  __m512 row[4], column[4];
+  for (int c = 0; c < 4; ++c) column[c] = (__m512)in[c];
+  turn4(column, row);
+  for (int k = 0; k < 4; ++k) {
+    _mm_store_ps(base + k * stride, _mm512_castps512_ps128(row[k]));
+    _mm_store_ps(base + (4 + k) * stride, _mm512_extractf32x4_ps(row[k], 1));
+    _mm_store_ps(base + (8 + k) * stride, _mm512_extractf32x4_ps(row[k], 2));
+    _mm_store_ps(base + (12 + k) * stride, _mm512_extractf32x4_ps(row[k], 3));
+  }
+#elif defined(__AVX2__)
+  for (int half = 0; half < 2; ++half) {
+    __m256 row[4], column[4];
+    for (int c = 0; c < 4; ++c) column[c] = ((const __m256 *)&in[c])[half];
+    turn4(column, row);
+    for (int k = 0; k < 4; ++k) {
+      _mm_store_ps(base + (8 * half + k) * stride, _mm256_castps256_ps128(row[k]));
+      _mm_store_ps(base + (8 * half + 4 + k) * stride, _mm256_extractf128_ps(row[k], 1));
+    }
+  }
+#else
+  for (int l = 0; l < SONDE_LANES; ++l)
+    for (int c = 0; c < 4; ++c) base[l * stride + c] = in[c][l];
+#endif
+}
+
+// Adds the lanes of a sum in one order.
+INLINE double total(lane_double a) {
+  double sum = 0;
+  for (int k = 0; k < SONDE_LANES; ++k) sum += a[k];
+  return sum;
+}
+INLINE lane_double widen(sonde_lane a) { return __builtin_convertvector(a, lane_double); }
+
+INLINE sonde_lane dot(const sonde_lane a[3], const sonde_lane b[3]) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+#endif

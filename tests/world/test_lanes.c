@@ -1,0 +1,195 @@
+// Laws of the fast engine: the same bits from every instruction set, the double engine's motion
+// within single precision, equilibrium, sleeping, and what it refuses.
+#include "../fixture.h"
+#include "world/lanes.h"
+#include "world/state.h"
+
+typedef struct scene {
+  sonde_model *model;
+  sonde_state *state;
+  sonde_probe probe;
+  uint32_t n;
+} scene;
+
+static sonde_world_def fast_def(void) {
+  sonde_world_def def = sonde_world_def_default();
+  def.engine = SONDE_ENGINE_FAST;
+  return def;
+}
+
+static scene make(int levels, const char *probe, const sonde_world_def *def) {
+  sonde_surface_law law = sonde_surface_law_default();
+  law.shear_stiffness_n_m = 15;
+  law.normal_exponent = 2;
+  scene s = {.model = fixture_model(levels, &law)};
+  s.n = s.model->surface.vertex_count;
+  assert_int_equal(sonde_state_create(s.model, def, &s.state, NULL), SONDE_OK);
+  assert_int_equal(sonde_probe_create(probe, &s.probe, NULL), SONDE_OK);
+  return s;
+}
+
+static void clear(scene *s) {
+  sonde_state_destroy(s->state);
+  sonde_model_destroy(s->model);
+  sonde_probe_clear(&s->probe);
+}
+
+// Down to 8 mm in 0.15 s, then along the skin.
+static void play(scene *s, int steps) {
+  for (int k = 0; k < steps; ++k) {
+    sonde_pose pose = fixture_pose(k < 150 ? 6e-5 * k - 0.001 : 0.008);
+    pose.position.y = k < 150 ? 0 : 1e-4 * (k - 150);
+    sonde_step(s->state, &s->probe, pose);
+  }
+}
+
+static uint64_t hash_with(const char *kernels, const sonde_world_def *def) {
+  scene s = make(4, "point", def);
+  s.state->lanes->kernels = sonde_lane_kernels_find(kernels);
+  uint64_t hash = 0;
+  if (s.state->lanes->kernels) {
+    play(&s, 250);
+    assert_true(v_norm(sonde_state_contact(s.state)->force_n) > 0.1);
+    hash = sonde_state_hash(s.state);
+  }
+  clear(&s);
+  return hash;
+}
+
+static void instruction_sets_agree_to_the_bit(void **state) {
+  (void)state;
+  const sonde_contact_law laws[] = {SONDE_CONTACT_FOUNDATION, SONDE_CONTACT_NODES};
+  for (size_t k = 0; k < SONDE_COUNT_OF(laws); ++k) {
+    sonde_world_def def = fast_def();
+    def.contact_law = laws[k];
+    uint64_t base = hash_with("base", &def);
+    assert_true(base != 0);
+    const char *wider[] = {"avx2", "avx512"};
+    for (size_t w = 0; w < SONDE_COUNT_OF(wider); ++w) {
+      uint64_t hash = hash_with(wider[w], &def);
+      if (hash == 0)
+        print_message("this processor has no %s: skipped\n", wider[w]);
+      else
+        assert_true(hash == base);
+    }
+  }
+}
+
+static double farthest(const scene *a, const scene *b) {
+  const sonde_vec3 *x = sonde_state_positions(a->state), *y = sonde_state_positions(b->state);
+  double most = 0;
+  for (uint32_t i = 0; i < a->n; ++i) most = fmax(most, v_distance(x[i], y[i]));
+  return most;
+}
+
+// Both solved to the end of Newton's method: what differs is the precision.
+static void follows_the_double_engine(void **state) {
+  (void)state;
+  const sonde_contact_law laws[] = {SONDE_CONTACT_FOUNDATION, SONDE_CONTACT_NODES};
+  const char *probes[] = {"point", "linear", "ball:20"};
+  for (size_t k = 0; k < 6; ++k) {
+    sonde_world_def def = sonde_world_def_default();
+    def.newton_iterations = 8;
+    def.pcg = (sonde_pcg_options){1e-6, 1e-12, 500};
+    def.sleep_displacement_m = 0;
+    def.contact_law = laws[k % 2];
+    def.friction.mu_static = k % 2 ? 0.4 : 0;
+    def.friction.mu_kinetic = k % 2 ? 0.3 : 0;
+    scene precise = make(4, probes[k / 2], &def);
+    def.engine = SONDE_ENGINE_FAST;
+    scene fast = make(4, probes[k / 2], &def);
+    play(&precise, 140);
+    play(&fast, 140);
+    double load = v_norm(sonde_state_contact(precise.state)->force_n);
+    sonde_vec3 f = v_sub(sonde_state_contact(fast.state)->force_n,
+                         sonde_state_contact(precise.state)->force_n);
+    assert_true(load > 0.1);
+    assert_near(v_norm(f), 0, 1e-3 * load);
+    assert_near(farthest(&fast, &precise), 0, 2e-6);
+    clear(&precise);
+    clear(&fast);
+  }
+}
+
+// At rest under the probe the reaction of the tissue is the force on the probe.
+static void rests_in_equilibrium(void **state) {
+  (void)state;
+  sonde_world_def def = fast_def();
+  def.sleep_displacement_m = 0;
+  def.pcg.relative_residual = 1e-4;
+  scene s = make(4, "linear", &def);
+  for (int k = 0; k < 3000; ++k)
+    sonde_step(s.state, &s.probe, fixture_pose(fmin(0.006, -0.001 + 4e-5 * k)));
+  const sonde_contact *contact = sonde_state_contact(s.state);
+  double force = v_norm(contact->force_n);
+  assert_true(force > 0.5);
+  assert_near(v_distance(contact->force_n, contact->reaction_n), 0, 1e-4 * force);
+  sonde_settle_result still = sonde_settle(s.state, &s.probe, fixture_pose(0.006), 1e-9, 200);
+  assert_true(still.converged);
+  assert_near(still.contact_n, force, 1e-3 * force);
+  // The settled state is where the fast engine stays.
+  for (int k = 0; k < 50; ++k) sonde_step(s.state, &s.probe, fixture_pose(0.006));
+  assert_near(v_norm(sonde_state_contact(s.state)->force_n), still.contact_n, 1e-3 * force);
+  clear(&s);
+}
+
+static void sleeping_is_harmless_and_ends(void **state) {
+  (void)state;
+  sonde_world_def def = fast_def();
+  scene dozing = make(4, "point", &def);
+  def.sleep_displacement_m = 0;
+  scene awake = make(4, "point", &def);
+  play(&dozing, 150);
+  play(&awake, 150);
+  assert_true(sonde_state_awake(dozing.state) < dozing.n);
+  assert_int_equal(sonde_state_awake(awake.state), awake.n);
+  assert_true(farthest(&dozing, &awake) < 5e-5);
+  for (int k = 0; k < 3000; ++k) sonde_step(dozing.state, NULL, fixture_pose(0));
+  assert_int_equal(sonde_state_awake(dozing.state), 0);
+  const sonde_vec3 *x = sonde_state_positions(dozing.state);
+  for (uint32_t i = 0; i < dozing.n; ++i)
+    assert_true(v_distance(x[i], dozing.model->surface.vertices[i]) < 5e-5);
+  clear(&dozing);
+  clear(&awake);
+}
+
+static void trouble_is_flagged_and_survived(void **state) {
+  (void)state;
+  sonde_world_def def = fast_def();
+  scene s = make(2, "point", &def);
+  sonde_vec3 v[66] = {{0}};
+  v[3].y = NAN;
+  sonde_state_set(s.state, NULL, v);
+  sonde_step(s.state, NULL, fixture_pose(0));
+  assert_true(sonde_state_flags(s.state) & SONDE_FLAG_NON_FINITE);
+  sonde_step(s.state, NULL, fixture_pose(0));
+  assert_int_equal(sonde_state_flags(s.state), 0);
+  assert_memory_equal(sonde_state_positions(s.state), s.model->surface.vertices,
+                      s.n * sizeof(sonde_vec3));
+  clear(&s);
+}
+
+static void refuses_what_it_cannot_do(void **state) {
+  (void)state;
+  sonde_model *model = fixture_model(2, NULL);
+  sonde_state *none;
+  sonde_world_def def = fast_def();
+  def.implicitness = 0.5;
+  assert_int_equal(sonde_state_create(model, &def, &none, NULL), SONDE_ARGUMENT);
+  def = fast_def();
+  def.contact_law = SONDE_CONTACT_VOLUME;
+  assert_int_equal(sonde_state_create(model, &def, &none, NULL), SONDE_ARGUMENT);
+  sonde_model_destroy(model);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(instruction_sets_agree_to_the_bit),
+      cmocka_unit_test(follows_the_double_engine),
+      cmocka_unit_test(rests_in_equilibrium),
+      cmocka_unit_test(sleeping_is_harmless_and_ends),
+      cmocka_unit_test(trouble_is_flagged_and_survived),
+      cmocka_unit_test(refuses_what_it_cannot_do),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
