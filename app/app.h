@@ -14,8 +14,10 @@ int cmd_predict(int argc, char **argv);
 int cmd_measure(int argc, char **argv);
 int cmd_identify(int argc, char **argv);
 int cmd_press(int argc, char **argv);
+int cmd_cut(int argc, char **argv);
 int cmd_replay(int argc, char **argv);
 int cmd_bench(int argc, char **argv);
+int cmd_simulate(int argc, char **argv);
 int cmd_devices(int argc, char **argv);
 
 // Prints "sonde <verb>: <message>" on stderr and returns the exit code that fits the status.

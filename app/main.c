@@ -22,6 +22,8 @@ static const command COMMANDS[] = {
     {"measure", cmd_measure, "press a model at its sites with the virtual robot"},
     {"identify", cmd_identify, "find damping and friction from records of a moving probe"},
     {"press", cmd_press, "press once, settle, report force, penetration and vessels"},
+    {"cut", cmd_cut, "cut the skin along a path and write the cut model"},
+    {"simulate", cmd_simulate, "simulate a scene of several bodies"},
     {"replay", cmd_replay, "play a recording again and compare the state hash"},
     {"bench", cmd_bench, "time the simulation's stages"},
     {"devices", cmd_devices, "list the input devices of this machine"},

@@ -25,6 +25,7 @@ build_packages() {
   need_library - libcivetweb-dev # ships no .pc file
   need_library libcjson libcjson-dev
   need_library libpng libpng-dev
+  need_library yaml-0.1 libyaml-dev
   need_library zlib zlib1g-dev
   need_command node nodejs
   if ! has npm; then missing+=(npm ca-certificates); fi
@@ -32,6 +33,7 @@ build_packages() {
 
 test_packages() {
   need_library cmocka libcmocka-dev
+  need_library ccd libccd-dev
   need_command clang clang
   if has clang; then
     local runtime

@@ -7,10 +7,13 @@
 
 #include "sonde/base.h"
 #include "sonde/geometry.h"
+#include "sonde/contact.h"
 #include "sonde/sparse.h"
 #include "sonde/tissue.h"
 #include "sonde/world.h"
+#include "sonde/scene.h"
 #include "sonde/fit.h"
+#include "sonde/fit_confidence.h"
 #include "sonde/robot.h"
 #include "sonde/identify.h"
 #include "sonde/report.h"

@@ -120,6 +120,30 @@ printf '{"format": "sonde-preset", "version": 1,\n"mu_static": -1}' >"$in/odd.js
 rejects 'odd\.json:2: mu_static' press "$MODEL" --site 27 --depth-mm 2 --preset "$in/odd.json"
 rejects 'odd\.json:2: mu_static' run "$MODEL" --headless --seconds 1 --preset "$in/odd.json"
 
+# Cuts.
+printf 'x_mm,y_mm,z_mm\n500,0,100\n500,50,100\n' >"$in/off_skin.csv"
+rejects 'point 0 of the cut.*nearest node' cut "$MODEL" --path "$in/off_skin.csv" -o cut.sonde
+printf 'x_mm,y_mm\n500,0\n' >"$in/two.csv"
+rejects 'two\.csv:1: expected the header' cut "$MODEL" --path "$in/two.csv" -o cut.sonde
+printf 'x_mm,y_mm,z_mm\n1,2\n' >"$in/few_numbers.csv"
+rejects 'few_numbers\.csv:2: expected three' cut "$MODEL" --path "$in/few_numbers.csv" -o cut.sonde
+rejects 'x,y,z:x,y,z' cut "$MODEL" --line 1,2,3 -o cut.sonde
+rejects 'one of --line' cut "$MODEL" -o cut.sonde
+rejects 'length-mm is missing' cut "$MODEL" --site 27 -o cut.sonde
+rejects 'no site 9999' cut "$MODEL" --site 9999 --length-mm 40 -o cut.sonde
+rejects '2 or more' cut "$MODEL" --line 0,0,0:0,0,0 -o cut.sonde
+
+# Scenes.
+printf 'sonde_scene: 1\nbodies:\n- {name: a, shape: {sphere_mm: 5}, mass_kg: -1}\n' >"$in/light.yaml"
+rejects 'light\.yaml:3: mass_kg' simulate "$in/light.yaml" -o sim
+printf 'sonde_scene: 1\nbodies:\n- {name: a, shape: {mesh: {file: gone.ply}}, mass_kg: 1}\n' \
+  >"$in/gone.yaml"
+rejects 'gone\.yaml:3:.*gone\.ply' simulate "$in/gone.yaml" -o sim
+rejects 'nowhere\.yaml' simulate "$in/nowhere.yaml" -o sim
+rejects 'DIR is missing' simulate "$DATA/../scenes/stack.yaml"
+rejects 'either --steps or --seconds' simulate "$DATA/../scenes/stack.yaml" -o sim --steps 1 \
+  --seconds 1
+
 # A port that another program holds.
 coproc HOLDER { "$HOLD_PORT"; }
 read -r port <&"${HOLDER[0]}"

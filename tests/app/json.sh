@@ -36,11 +36,28 @@ gives "$ramp damping.stiffness_scale.value<=1.05 damping.samples>=400" identify 
   --ramp-hold ramp.csv -o preset.json --json
 gives "$press" press "$MODEL" --site 27 --probe point --depth-mm 3 --preset preset.json --json
 
+cut="nodes:integer nodes_before:integer split_edges>=5 length_mm>=30 closed:bool mass_change<=1e-12"
+cut+=" mass_change>=-1e-12 force_before_n>=0.5 force_after_n>=0.5"
+gives "$cut" cut "$MODEL" --site 27 --length-mm 40 --depth-mm 4 -o cut.sonde --json
+gives "$press" press cut.sonde --site 27 --depth-mm 4 --image cut.png --json
+
 gives "ticks:integer ticks>=1 deadline_misses:integer images:integer images>=1 hash:text" \
   run "$MODEL" --headless --seconds 1 --record a.rec --json
 [[ -s a.rec ]] || wrong "sonde run recorded nothing"
 gives "" replay a.rec --json
 gives "" devices --json
+
+# A run in two parts ends as one in one, in all files.
+simulate="steps:integer steps>=40 steps<=40 time_s:number hash:text flagged_steps<=0 ms_per_step:number"
+for scene in stack four_kinds; do
+  file=$DATA/../scenes/$scene.yaml
+  gives "$simulate" simulate "$file" -o whole_$scene --steps 40 --every 5 --json
+  gives "steps>=25 steps<=25" simulate "$file" -o parts_$scene --steps 25 --every 5 --json
+  gives "$simulate" simulate "$file" -o parts_$scene --steps 40 --every 5 --resume --json
+  diff -r whole_$scene parts_$scene >/dev/null || wrong "$scene: a resumed run differs"
+done
+gives "$simulate" simulate "$DATA/../scenes/thigh_drop.yaml" -o drop --steps 40 --every 40 --json
+grep -q 'frames/thigh_000000040.vtp' drop/scene.pvd || wrong "scene.pvd misses the last frame"
 bench="scene:text nodes:integer dt_s:number steps_per_s:number step_ms.median:number step_ms.p99:number"
 bench+=" step_ms.max:number iterations:number relative_error:number stages_ms:object nodes>=4000"
 gives "$bench" bench "$MODEL" --json

@@ -1,0 +1,340 @@
+// sonde simulate: runs a scene of several bodies and writes its motion.
+// resume:       goes on from the snapshot; tables lose the rows beyond it.
+// write_frame:  surfaces of all bodies, rows of the tables, the series file, then the snapshot.
+// run:          steps until the end or Ctrl-C.
+#include "app.h"
+
+#include <errno.h>
+#include <getopt.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+static const char VERB[] = "simulate";
+static const char HELP[] =
+    "usage: sonde simulate SCENE -o DIR [options]\n"
+    "\n"
+    "Simulates a scene of several bodies (docs/scene.md) and writes, into DIR, the surfaces as\n"
+    "VTK files (open scene.pvd in ParaView), bodies.csv, contacts.csv and a snapshot.\n"
+    "\n"
+    "  -o, --output DIR  directory to write to; made when absent\n"
+    "  --steps N         simulate N steps\n"
+    "  --seconds S       simulate S seconds; default: duration_s of the scene\n"
+    "  --every K         write every K-th step; default: 60 frames per second of the scene\n"
+    "  --no-frames       write no VTK files\n"
+    "  --resume          go on from the snapshot in DIR; the result is the same, bit by bit\n"
+    "  --json            print one JSON object\n"
+    "  --help            this text\n"
+    "Ctrl-C keeps what is finished; --resume goes on from there.\n";
+
+typedef struct arguments {
+  const char *scene, *directory;
+  long steps, every; // 0: not given
+  double seconds;    // 0: not given
+  bool resume, json, help, no_frames;
+} arguments;
+
+typedef struct simulation {
+  arguments a;
+  sonde_scene *scene;
+  sonde_scene_state *state;
+  uint64_t steps, every, start; // steps in all, and where this run began
+  FILE *bodies, *contacts;
+  double seconds;
+  uint64_t solver_iterations, most_points;
+  bool cancelled;
+} simulation;
+
+static bool read_option(int option, arguments *a) {
+  switch (option) {
+  case 'o': a->directory = optarg; return true;
+  case 's': return app_parse_integer(VERB, "--steps", optarg, 1, 2000000000, &a->steps);
+  case 'S': return app_parse_real(VERB, "--seconds", optarg, 1e-9, 1e6, &a->seconds);
+  case 'e': return app_parse_integer(VERB, "--every", optarg, 1, 2000000000, &a->every);
+  case 'n': return a->no_frames = true;
+  case 'r': return a->resume = true;
+  case 'j': return a->json = true;
+  case 'h': return a->help = true;
+  default: return false;
+  }
+}
+
+static bool read_arguments(int argc, char **argv, arguments *a) {
+  static const struct option LONG[] = {{"output", required_argument, NULL, 'o'},
+                                       {"steps", required_argument, NULL, 's'},
+                                       {"seconds", required_argument, NULL, 'S'},
+                                       {"every", required_argument, NULL, 'e'},
+                                       {"no-frames", no_argument, NULL, 'n'},
+                                       {"resume", no_argument, NULL, 'r'},
+                                       {"json", no_argument, NULL, 'j'},
+                                       {"help", no_argument, NULL, 'h'},
+                                       {NULL, 0, NULL, 0}};
+  for (int c; (c = getopt_long(argc, argv, "o:", LONG, NULL)) != -1;)
+    if (!read_option(c, a)) return false;
+  if (a->help) return true;
+  if (argc - optind != 1) {
+    app_usage_error(VERB, "one scene expected, got %d", argc - optind);
+    return false;
+  }
+  a->scene = argv[optind];
+  if (!a->directory) app_usage_error(VERB, "-o DIR is missing");
+  if (a->steps && a->seconds > 0) {
+    app_usage_error(VERB, "give either --steps or --seconds");
+    return false;
+  }
+  return a->directory != NULL;
+}
+
+static void path_of(const simulation *s, const char *name, char *path, size_t size) {
+  snprintf(path, size, "%s/%s", s->a.directory, name);
+}
+
+static sonde_status fail(sonde_error *error, sonde_status status, const char *path,
+                         const char *what) {
+  error->status = status;
+  snprintf(error->message, sizeof error->message, "%.300s: %s", path, what);
+  return status;
+}
+
+static sonde_status make_directory(const char *path, sonde_error *error) {
+  struct stat facts;
+  if (mkdir(path, 0777) == 0) return SONDE_OK;
+  if (errno == EEXIST && stat(path, &facts) == 0 && S_ISDIR(facts.st_mode)) return SONDE_OK;
+  return fail(error, SONDE_IO, path, strerror(errno == EEXIST ? ENOTDIR : errno));
+}
+
+// ---- tables
+
+static const char BODIES_HEAD[] =
+    "step,time_s,body,x_m,y_m,z_m,vx_m_s,vy_m_s,vz_m_s,wx_rad_s,wy_rad_s,wz_rad_s,px_kg_m_s,"
+    "py_kg_m_s,pz_kg_m_s,lx_kg_m2_s,ly_kg_m2_s,lz_kg_m2_s,kinetic_j,elastic_j,gravity_j\n";
+static const char CONTACTS_HEAD[] =
+    "step,time_s,a,b,fx_n,fy_n,fz_n,tx_n_m,ty_n_m,tz_n_m,normal_n,friction_n,volume_m3,area_m2,"
+    "depth_m,energy_j,regions\n";
+
+static double norm(sonde_vec3 v) { return sqrt(v.x * v.x + v.y * v.y + v.z * v.z); }
+
+static void put_vector(FILE *table, sonde_vec3 v) {
+  fprintf(table, ",%.12g,%.12g,%.12g", v.x, v.y, v.z);
+}
+
+static void put_rows(simulation *s) {
+  unsigned long long step = sonde_scene_tick(s->state);
+  double time_s = sonde_scene_time(s->state);
+  for (uint32_t b = 0; b < sonde_scene_body_count(s->scene); ++b) {
+    sonde_body_measure m = sonde_scene_measure(s->state, b);
+    fprintf(s->bodies, "%llu,%.12g,%s", step, time_s, sonde_scene_body(s->scene, b).name);
+    put_vector(s->bodies, m.centre_m);
+    put_vector(s->bodies, m.velocity_m_s);
+    put_vector(s->bodies, m.spin_rad_s);
+    put_vector(s->bodies, m.momentum_kg_m_s);
+    put_vector(s->bodies, m.angular_kg_m2_s);
+    fprintf(s->bodies, ",%.12g,%.12g,%.12g\n", m.kinetic_j, m.elastic_j, m.gravity_j);
+  }
+  for (uint32_t t = 0; t < sonde_scene_pair_count(s->scene); ++t) {
+    sonde_scene_pair pair = sonde_scene_pair_at(s->scene, t);
+    sonde_pair_measure m = sonde_scene_pair_measure(s->state, t);
+    fprintf(s->contacts, "%llu,%.12g,%s,%s", step, time_s, sonde_scene_body(s->scene, pair.a).name,
+            sonde_scene_body(s->scene, pair.b).name);
+    put_vector(s->contacts, m.force_n);
+    put_vector(s->contacts, m.torque_n_m);
+    fprintf(s->contacts, ",%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%u\n", m.normal_n,
+            norm(m.friction_n), m.volume_m3, m.area_m2, m.depth_m, m.energy_j, m.region_count);
+  }
+}
+
+// Where the rows of later steps begin; -1 when the table is none of ours.
+static long keep_until(FILE *table, const char *head, uint64_t step) {
+  char line[1024];
+  if (!fgets(line, sizeof line, table) || strcmp(line, head) != 0) return -1;
+  long end = ftell(table);
+  while (fgets(line, sizeof line, table)) {
+    bool whole = strchr(line, '\n') != NULL;
+    if (!whole || strtoull(line, NULL, 10) > step) break;
+    end = ftell(table);
+  }
+  return end;
+}
+
+// A new table, or the old one without the rows of steps that will be made again.
+static sonde_status open_table(const simulation *s, const char *name, const char *head,
+                               FILE **table, sonde_error *error) {
+  char path[1100];
+  path_of(s, name, path, sizeof path);
+  *table = fopen(path, s->a.resume ? "r+" : "w");
+  if (!*table) return fail(error, SONDE_IO, path, strerror(errno));
+  if (!s->a.resume)
+    return fputs(head, *table) < 0 ? fail(error, SONDE_IO, path, strerror(errno)) : SONDE_OK;
+  long end = keep_until(*table, head, s->start);
+  if (end < 0) return fail(error, SONDE_FORMAT, path, "not a table of sonde simulate");
+  if (ftruncate(fileno(*table), end) != 0 || fseek(*table, end, SEEK_SET) != 0)
+    return fail(error, SONDE_IO, path, strerror(errno));
+  return SONDE_OK;
+}
+
+// ---- frames
+
+static void frame_name(const simulation *s, uint32_t body, uint64_t step, char *name, size_t size) {
+  snprintf(name, size, "frames/%s_%09llu.vtp", sonde_scene_body(s->scene, body).name,
+           (unsigned long long)step);
+}
+
+// Lists every frame up to this step; ParaView plays them by time.
+static sonde_status save_series(const simulation *s, sonde_error *error) {
+  char path[1100], name[128];
+  path_of(s, "scene.pvd", path, sizeof path);
+  sonde_file *file = NULL;
+  sonde_status status = sonde_file_create(path, &file, error);
+  if (status) return status;
+  double dt = sonde_scene_get_step(s->scene).dt_s;
+  uint64_t last = sonde_scene_tick(s->state);
+  sonde_file_printf(file, "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\">\n"
+                          "<Collection>\n");
+  for (uint64_t k = 0; k <= last; k = k < last && k + s->every > last ? last : k + s->every)
+    for (uint32_t b = 0; b < sonde_scene_body_count(s->scene); ++b) {
+      frame_name(s, b, k, name, sizeof name);
+      sonde_file_printf(file, "<DataSet timestep=\"%.9g\" part=\"%u\" name=\"%s\" file=\"%s\"/>\n",
+                        (double)k * dt, b, sonde_scene_body(s->scene, b).name, name);
+    }
+  sonde_file_printf(file, "</Collection>\n</VTKFile>\n");
+  return sonde_file_commit(file, error);
+}
+
+static sonde_status save_surfaces(const simulation *s, sonde_error *error) {
+  char path[1300], name[128];
+  sonde_status status = SONDE_OK;
+  for (uint32_t b = 0; b < sonde_scene_body_count(s->scene) && !status; ++b) {
+    frame_name(s, b, sonde_scene_tick(s->state), name, sizeof name);
+    path_of(s, name, path, sizeof path);
+    status = sonde_scene_save_vtp(s->state, b, path, error);
+  }
+  return status ? status : save_series(s, error);
+}
+
+static sonde_status save_snapshot(const simulation *s, sonde_error *error) {
+  char path[1100];
+  path_of(s, "state.snapshot", path, sizeof path);
+  return sonde_scene_state_save(s->state, path, error);
+}
+
+// The snapshot goes last: what it claims to be finished is on disk.
+static sonde_status write_frame(simulation *s, sonde_error *error) {
+  sonde_status status = s->a.no_frames ? SONDE_OK : save_surfaces(s, error);
+  if (status) return status;
+  put_rows(s);
+  if (fflush(s->bodies) != 0 || fflush(s->contacts) != 0)
+    return fail(error, SONDE_IO, s->a.directory, strerror(errno));
+  return save_snapshot(s, error);
+}
+
+// ---- run
+
+static double now_s(void) {
+  struct timespec t;
+  clock_gettime(CLOCK_MONOTONIC, &t);
+  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static sonde_status prepare(simulation *s, sonde_error *error) {
+  char thigh[1024], searched[1024], path[1100];
+  bool bundled = app_bundled_model(thigh, sizeof thigh, searched, sizeof searched);
+  sonde_status status = sonde_scene_load(s->a.scene, bundled ? thigh : NULL, &s->scene, error);
+  if (!status) status = sonde_scene_state_create(s->scene, &s->state, error);
+  if (status) return status;
+  double dt = sonde_scene_get_step(s->scene).dt_s;
+  double seconds = s->a.seconds > 0 ? s->a.seconds : sonde_scene_duration(s->scene);
+  s->steps = s->a.steps ? (uint64_t)s->a.steps : (uint64_t)ceil(seconds / dt - 1e-9);
+  s->every = s->a.every ? (uint64_t)s->a.every : (uint64_t)fmax(1, round(1 / (60 * dt)));
+  path_of(s, "state.snapshot", path, sizeof path);
+  if (s->a.resume) status = sonde_scene_state_load(s->state, path, error);
+  s->start = sonde_scene_tick(s->state);
+  if (!status) status = make_directory(s->a.directory, error);
+  path_of(s, "frames", path, sizeof path);
+  if (!status && !s->a.no_frames) status = make_directory(path, error);
+  if (!status) status = open_table(s, "bodies.csv", BODIES_HEAD, &s->bodies, error);
+  if (!status) status = open_table(s, "contacts.csv", CONTACTS_HEAD, &s->contacts, error);
+  return status;
+}
+
+static sonde_status run(simulation *s, sonde_error *error) {
+  sonde_progress progress = app_progress();
+  sonde_status status = s->a.resume ? SONDE_OK : write_frame(s, error);
+  while (!status && sonde_scene_tick(s->state) < s->steps) {
+    double begin = now_s();
+    sonde_scene_advance(s->state);
+    s->seconds += now_s() - begin;
+    sonde_scene_report report = sonde_scene_last(s->state);
+    s->solver_iterations += report.solver_iterations;
+    if (report.touch_points > s->most_points) s->most_points = report.touch_points;
+    uint64_t done = sonde_scene_tick(s->state);
+    s->cancelled = !progress.report((double)done / (double)s->steps, "simulating", progress.user);
+    if (done % s->every == 0 || done == s->steps) status = write_frame(s, error);
+    if (s->cancelled) break;
+  }
+  app_progress_end();
+  return status;
+}
+
+static void print_json(const simulation *s, double steps) {
+  app_json_begin();
+  app_json_text("title", sonde_scene_title(s->scene));
+  app_json_integer("bodies", sonde_scene_body_count(s->scene));
+  app_json_integer("steps", (long long)sonde_scene_tick(s->state));
+  app_json_real("time_s", sonde_scene_time(s->state));
+  app_json_real("ms_per_step", steps > 0 ? 1e3 * s->seconds / steps : NAN);
+  app_json_real("solver_iterations_per_step",
+                steps > 0 ? (double)s->solver_iterations / steps : NAN);
+  app_json_integer("most_contact_points", (long long)s->most_points);
+  app_json_integer("flagged_steps", (long long)sonde_scene_flag_count(s->state));
+  app_json_integer("flags", sonde_scene_all_flags(s->state));
+  char hash[24];
+  snprintf(hash, sizeof hash, "%016llx", (unsigned long long)sonde_scene_hash(s->state));
+  app_json_text("hash", hash);
+  app_json_bool("cancelled", s->cancelled);
+  app_json_end();
+}
+
+static void print_summary(const simulation *s) {
+  double steps = (double)(sonde_scene_tick(s->state) - s->start);
+  if (s->a.json) {
+    print_json(s, steps);
+    return;
+  }
+  printf("steps         %8llu (%.6g s)\n", (unsigned long long)sonde_scene_tick(s->state),
+         sonde_scene_time(s->state));
+  if (steps > 0) {
+    printf("step          %8.3f ms\n", 1e3 * s->seconds / steps);
+    printf("iterations    %8.1f per step\n", (double)s->solver_iterations / steps);
+  }
+  printf("flagged steps %8llu\n", (unsigned long long)sonde_scene_flag_count(s->state));
+  printf("hash          %016llx\n", (unsigned long long)sonde_scene_hash(s->state));
+  printf("written to    %s\n", s->a.directory);
+}
+
+// A cancelled run ends with a snapshot only, so that tables and frames keep their rhythm.
+int cmd_simulate(int argc, char **argv) {
+  simulation s = {0};
+  sonde_error error = {0};
+  if (!read_arguments(argc, argv, &s.a)) return APP_BAD_INPUT;
+  if (s.a.help) {
+    fputs(HELP, stdout);
+    return APP_OK;
+  }
+  sonde_status status = prepare(&s, &error);
+  if (!status) status = run(&s, &error);
+  if (!status && s.cancelled) status = save_snapshot(&s, &error);
+  if (!status) print_summary(&s);
+  if (!status && s.cancelled)
+    fprintf(stderr, "sonde simulate: cancelled at step %llu of %llu; --resume goes on\n",
+            (unsigned long long)sonde_scene_tick(s.state), (unsigned long long)s.steps);
+  if (s.bodies) fclose(s.bodies);
+  if (s.contacts) fclose(s.contacts);
+  sonde_scene_state_destroy(s.state);
+  sonde_scene_destroy(s.scene);
+  if (status) return app_fail(VERB, &error);
+  return s.cancelled ? APP_FAILED : APP_OK;
+}

@@ -1,0 +1,119 @@
+// Inside of a scene: what a file compiles to. Constant once loaded, but for the step's options.
+#ifndef SONDE_SRC_SCENE_SCENE_H
+#define SONDE_SRC_SCENE_SCENE_H
+
+#include "sonde/scene.h"
+
+#include "scene/yaml.h"
+
+// A spring-damper between two nodes: force (stiffness * (length - rest) + damper * rate) along it.
+typedef struct sonde_spring {
+  double rest_m, stiffness_n_m, damper_n_s_m;
+} sonde_spring;
+
+// How a body meets others.
+typedef struct sonde_material {
+  char name[64];
+  double stiffness_n_m3, damping_s; // damper per volume = time * stiffness
+  double mu_static, mu_kinetic;
+} sonde_material;
+
+// Poses of the body's frame at times, ascending.
+typedef struct sonde_path {
+  uint32_t count;
+  double *time_s;
+  sonde_pose *pose;
+} sonde_path;
+
+typedef struct sonde_body {
+  char name[64];
+  sonde_body_kind kind;
+  sonde_body_motion motion;
+  sonde_place place; // in the file
+  sonde_material material;
+  sonde_mesh surface;     // rigid: about the centre; else vertices where they start
+  bool closed;            // and without flaws: it may touch others
+  uint32_t *surface_node; // [surface vertices] the node of each; NULL: they are the nodes
+  sonde_mass mass;        // rigid: in the body's frame; else mass and centre only
+  sonde_pose start;       // of the body's frame
+  sonde_vec3 velocity_m_s, spin_rad_s;
+  sonde_path path;
+  uint32_t first_slot, slot_count;
+
+  // deformable
+  uint32_t node_count, spring_count;
+  sonde_vec3 *node;     // [nodes] where they start
+  double *node_mass_kg; // [nodes]
+  uint8_t *held;        // [nodes]
+  sonde_vec3 *load_n;   // [nodes] constant force
+  uint32_t (*pairs)[2]; // [springs] first < second
+  sonde_spring *spring; // [springs]
+  double bulk_n_m5;     // pressure per change of volume; 0: none
+  double rest_volume_m3;
+  uint32_t first_pair;
+  sonde_model *model; // two-layer
+} sonde_body;
+
+typedef struct sonde_touch {
+  uint32_t a, b; // bodies
+  sonde_touch_law law;
+  double stiffness, damping;
+  double mu_static, mu_kinetic, stribeck_m_s, bond_m, bond_damping_s;
+  int bond_side; // 0: bonds live on the vertices of a, 1: of b
+} sonde_touch;
+
+struct sonde_scene {
+  char title[128];
+  sonde_vec3 gravity_m_s2;
+  double duration_s;
+  sonde_scene_step step;
+  uint32_t body_count, touch_count, material_count;
+  sonde_body *bodies;
+  sonde_touch *touches;
+  sonde_material *materials;
+  uint32_t slot_count, pair_count;
+  uint32_t (*pairs)[2]; // [pair_count] slots
+  uint64_t checksum;
+};
+
+static inline bool sonde_body_is_rigid(const sonde_body *body) {
+  return body->kind == SONDE_BODY_RIGID;
+}
+// Pose of the body's frame at a time; the path's ends hold.
+sonde_pose sonde_path_pose(const sonde_path *path, double time_s);
+
+// What reading needs besides the text.
+typedef struct sonde_scene_source {
+  sonde_reader *reader;
+  char directory[512]; // with the final slash, or empty
+  const char *thigh;
+} sonde_scene_source;
+
+// Reads one entry of `bodies`; errors go to the reader.
+void sonde_read_body(const sonde_scene_source *source, sonde_place at, const sonde_scene *scene,
+                     sonde_body *body);
+void sonde_body_clear(sonde_body *body);
+// Reads `shape` into a mesh (about the body's frame, m).
+void sonde_read_shape(const sonde_scene_source *source, sonde_place at, sonde_mesh *mesh);
+// Path of a file named in the scene.
+void sonde_source_path(const sonde_scene_source *source, const char *name, char *path, size_t size);
+
+// Nodes, springs, masses and surface of a lattice (entry `lattice` of a body).
+void sonde_read_lattice(const sonde_scene_source *source, sonde_place at, sonde_body *body);
+// Springs of a surface from its edges (entry `springs`).
+void sonde_read_springs(const sonde_scene_source *source, sonde_place at, sonde_body *body);
+
+// First flaw of a mesh that has to bound a solid; SONDE_MESH with the reason.
+sonde_status sonde_mesh_check_solid(const sonde_mesh *mesh, sonde_error *error);
+// First triangle without area; SONDE_MESH with its number.
+sonde_status sonde_mesh_check_areas(const sonde_mesh *mesh, sonde_error *error);
+
+// Primitives about the origin; edges no longer than edge_m where it is > 0.
+sonde_status sonde_shape_box(sonde_vec3 size_m, double edge_m, sonde_mesh *mesh,
+                             sonde_error *error);
+sonde_status sonde_shape_ellipsoid(sonde_vec3 radii_m, double edge_m, sonde_mesh *mesh,
+                                   sonde_error *error);
+sonde_status sonde_shape_cylinder(double radius_m, double length_m, double edge_m, sonde_mesh *mesh,
+                                  sonde_error *error);
+
+#endif

@@ -1,0 +1,431 @@
+// A scene's motion: memory, start, measures.
+// carve:        places arrays one after another in a block.
+// lay_kept:     arrays that a step hands to the next.
+// lay_arrays:   all other arrays.
+// make_contact: trees, overlaps, the sweep and the table of pairs.
+// make_solver:  the matrix and the rows and pairs that may move.
+// reset:        the start of the scene.
+// measure_*:    a body's motion as one.
+#include "scene/state.h"
+
+#include "base/base.h"
+#include "base/maths.h"
+
+#include <string.h>
+
+enum { POINTS_MOST = 32768, PIECES_MOST = 65536 };
+
+// Counts bytes while block is NULL, else hands out aligned parts of it.
+typedef struct carver {
+  char *block;
+  size_t used;
+} carver;
+
+static void *carve(carver *c, size_t count, size_t size) {
+  size_t at = (c->used + 15u) & ~(size_t)15u;
+  c->used = at + count * size;
+  return c->block ? c->block + at : NULL;
+}
+
+static void lay_kept(const sonde_scene_state *state, carver *c, sonde_kept *kept) {
+  const sonde_scene *scene = state->scene;
+  kept->head = carve(c, 1, sizeof *kept->head);
+  kept->position = carve(c, scene->slot_count, sizeof(sonde_vec3));
+  kept->velocity = carve(c, scene->slot_count, sizeof(sonde_vec3));
+  kept->increment = carve(c, scene->slot_count, sizeof(sonde_vec3));
+  kept->rotation = carve(c, scene->body_count, sizeof(sonde_quat));
+  kept->hint = carve(c, scene->touch_count, sizeof(sonde_vec3));
+  kept->bond = carve(c, state->bond_count, sizeof(sonde_vec3));
+  kept->slip = carve(c, state->bond_count, sizeof(double));
+}
+
+static sonde_status make_kept(const sonde_scene_state *state, sonde_kept *kept,
+                              sonde_error *error) {
+  carver c = {0};
+  lay_kept(state, &c, kept);
+  kept->bytes = c.used;
+  kept->block = c.block = sonde_calloc(1, c.used);
+  if (!kept->block) return sonde_fail_memory(error);
+  c.used = 0;
+  lay_kept(state, &c, kept);
+  SONDE_ASSERT(c.used == kept->bytes);
+  return SONDE_OK;
+}
+
+static void lay_slots(sonde_scene_state *s, carver *c) {
+  size_t slots = s->scene->slot_count, vec = sizeof(sonde_vec3);
+  sonde_vec3 **const all[] = {
+      &s->stage_position,  &s->stage_velocity, &s->force,     &s->product,   &s->contact_force,
+      &s->contact_product, &s->right,          &s->change,    &s->move,      &s->gain,
+      &s->mean_velocity,   &s->scratch.r,      &s->scratch.z, &s->scratch.p, &s->scratch.q};
+  for (size_t k = 0; k < SONDE_COUNT_OF(all); ++k) *all[k] = carve(c, slots, vec);
+  s->plain_diagonal = carve(c, slots, sizeof(sonde_mat3));
+  s->active_rows = carve(c, slots, sizeof(uint32_t));
+  s->active_pairs = carve(c, s->scene->pair_count, sizeof(uint32_t));
+  uint32_t most = 0;
+  for (uint32_t b = 0; b < s->scene->body_count; ++b)
+    if (s->scene->bodies[b].model && s->scene->bodies[b].node_count > most)
+      most = s->scene->bodies[b].node_count;
+  s->tissue_nodes = carve(c, most, sizeof *s->tissue_nodes);
+}
+
+static void lay_arrays(sonde_scene_state *s, carver *c) {
+  const sonde_scene *scene = s->scene;
+  size_t bodies = scene->body_count, touches = scene->touch_count;
+  lay_slots(s, c);
+  s->stage_rotation = carve(c, bodies, sizeof(sonde_quat));
+  s->surface = carve(c, s->surface_count, sizeof(sonde_vec3));
+  s->surface_first = carve(c, bodies, sizeof(uint32_t));
+  s->bond_first = carve(c, touches, sizeof(uint32_t));
+  s->inertia = carve(c, bodies, sizeof *s->inertia);
+  s->reach_m = carve(c, bodies, sizeof(double));
+  s->body_inverse = carve(c, bodies, sizeof(sonde_mat3));
+  s->island = carve(c, bodies, sizeof(uint32_t));
+  s->loose = carve(c, bodies, sizeof(bool));
+  s->tree = carve(c, bodies, sizeof(sonde_face_tree *));
+  s->overlap = carve(c, touches, sizeof(sonde_overlap *));
+  s->touch_of = carve(c, bodies * bodies, sizeof(uint32_t));
+  s->near = carve(c, s->near_capacity, sizeof *s->near);
+  s->bounds = carve(c, bodies, sizeof(sonde_bounds));
+  s->pushes = carve(c, s->push_capacity, sizeof(sonde_push));
+  s->grips = carve(c, s->grip_capacity, sizeof(sonde_grip));
+  s->terms = carve(c, s->term_capacity, sizeof(sonde_rank_one));
+  s->rows = carve(c, s->row_capacity, sizeof(uint32_t));
+  s->g = carve(c, s->row_capacity, sizeof(sonde_vec3));
+  s->bond_load = carve(c, s->bond_count, sizeof(double));
+  s->slip_sum = carve(c, s->bond_count, sizeof(double));
+  s->bond_sum = carve(c, s->bond_count, sizeof(sonde_vec3));
+  s->pair = carve(c, touches, sizeof(sonde_pair_measure));
+}
+
+// Room for contact: columns with a push and two tangents each, regions over all vertices twice.
+static void size_arrays(sonde_scene_state *s) {
+  const sonde_scene *scene = s->scene;
+  uint32_t points = 0, bulk = 0;
+  for (uint32_t b = 0; b < scene->body_count; ++b) {
+    s->surface_count += scene->bodies[b].surface.vertex_count;
+    bulk += scene->bodies[b].node_count;
+  }
+  for (uint32_t t = 0; t < scene->touch_count; ++t) {
+    const sonde_body *a = &scene->bodies[scene->touches[t].a];
+    const sonde_body *b = &scene->bodies[scene->touches[t].b];
+    uint32_t here = 16 * (a->surface.face_count + b->surface.face_count);
+    if (here > POINTS_MOST) here = POINTS_MOST;
+    points = points + here < POINTS_MOST ? points + here : POINTS_MOST;
+    s->bond_count += (scene->touches[t].bond_side ? b : a)->surface.vertex_count;
+  }
+  if (scene->touch_count && points < 2048) points = 2048;
+  s->grip_capacity = points;
+  s->push_capacity = points + 64 * scene->touch_count;
+  s->term_capacity = s->push_capacity + 2 * points + scene->body_count;
+  s->row_capacity = bulk + 3 * 8 * points + 2 * s->surface_count + 4 * s->push_capacity;
+  s->near_capacity = scene->body_count * (scene->body_count - 1) / 2;
+}
+
+static sonde_overlap_config overlap_config(const sonde_scene *scene, const sonde_touch *touch) {
+  uint32_t faces =
+      scene->bodies[touch->a].surface.face_count + scene->bodies[touch->b].surface.face_count;
+  bool large_faces = sonde_body_is_rigid(&scene->bodies[touch->a]) &&
+                     sonde_body_is_rigid(&scene->bodies[touch->b]);
+  sonde_overlap_config config = {.points_per_piece = 1};
+  if (touch->law == SONDE_TOUCH_FOUNDATION && large_faces) config.points_per_piece = 3;
+  config.max_pieces = 16 * faces < 4096 ? 4096 : 16 * faces;
+  if (config.max_pieces > PIECES_MOST) config.max_pieces = PIECES_MOST;
+  config.max_points = 2 * config.max_pieces;
+  return config;
+}
+
+static sonde_status make_tree(sonde_scene_state *state, uint32_t b, sonde_error *error) {
+  SONDE_ASSERT(b < state->scene->body_count);
+  if (state->tree[b]) return SONDE_OK;
+  sonde_vec3 *surface = state->surface + state->surface_first[b];
+  sonde_mesh mesh = state->scene->bodies[b].surface;
+  sonde_surface_at(state, b, state->now.position, state->now.rotation, surface);
+  mesh.vertices = surface;
+  return sonde_face_tree_create(&mesh, &state->tree[b], error);
+}
+
+static sonde_status make_contact(sonde_scene_state *state, sonde_error *error) {
+  const sonde_scene *scene = state->scene;
+  uint32_t n = scene->body_count;
+  sonde_status status = sonde_sweep_create(n, &state->sweep, error);
+  for (uint32_t b = 0; b < n; ++b) // beyond everything, so that it meets nothing
+    state->bounds[b] = (sonde_bounds){{1e9 + 10 * b, 1e9, 1e9}, {1e9 + 10 * b + 1, 1e9, 1e9}};
+  for (uint32_t t = 0; t < scene->touch_count && !status; ++t) {
+    const sonde_touch *touch = &scene->touches[t];
+    sonde_overlap_config config = overlap_config(scene, touch);
+    status = make_tree(state, touch->a, error);
+    if (!status) status = make_tree(state, touch->b, error);
+    if (!status)
+      status = sonde_overlap_create(state->tree[touch->a], state->tree[touch->b], &config,
+                                    &state->overlap[t], error);
+    state->touch_of[touch->a * n + touch->b] = state->touch_of[touch->b * n + touch->a] = t + 1;
+  }
+  return status;
+}
+
+static bool is_active(const sonde_body *body, uint32_t slot) {
+  if (body->motion != SONDE_BODY_FREE) return false;
+  return sonde_body_is_rigid(body) || !body->held[slot];
+}
+
+static sonde_status make_solver(sonde_scene_state *state, sonde_error *error) {
+  const sonde_scene *scene = state->scene;
+  sonde_status status =
+      sonde_block_matrix_create(scene->slot_count, scene->pair_count,
+                                (const uint32_t(*)[2])scene->pairs, &state->matrix, error);
+  if (status) return status;
+  for (uint32_t b = 0; b < scene->body_count; ++b) {
+    const sonde_body *body = &scene->bodies[b];
+    state->loose[b] = body->motion == SONDE_BODY_FREE && !body->model;
+    for (uint32_t k = 0; k < body->node_count; ++k) state->loose[b] &= !body->held[k];
+    for (uint32_t k = 0; k < body->slot_count; ++k)
+      if (is_active(body, k)) state->active_rows[state->active_row_count++] = body->first_slot + k;
+    uint32_t end = b + 1 < scene->body_count ? body[1].first_pair : scene->pair_count;
+    for (uint32_t e = body->first_pair; e < end; ++e)
+      if (is_active(body, scene->pairs[e][0] - body->first_slot) &&
+          is_active(body, scene->pairs[e][1] - body->first_slot))
+        state->active_pairs[state->active_pair_count++] = e;
+  }
+  return SONDE_OK;
+}
+
+static sonde_mat3 inverse_symmetric(sonde_mat3 a) {
+  sonde_vec3 r[3];
+  for (int i = 0; i < 3; ++i) r[i] = vec3(a.m[i][0], a.m[i][1], a.m[i][2]);
+  double determinant = v_dot(r[0], v_cross(r[1], r[2]));
+  SONDE_ASSERT(determinant > 0);
+  sonde_mat3 inverse = m_columns(v_cross(r[1], r[2]), v_cross(r[2], r[0]), v_cross(r[0], r[1]));
+  return m_scale(inverse, 1 / determinant);
+}
+
+static void number_arrays(sonde_scene_state *state) {
+  const sonde_scene *scene = state->scene;
+  uint32_t surface = 0, bond = 0;
+  for (uint32_t b = 0; b < scene->body_count; ++b) {
+    const sonde_body *body = &scene->bodies[b];
+    state->surface_first[b] = surface;
+    surface += body->surface.vertex_count;
+    if (!sonde_body_is_rigid(body)) continue;
+    state->body_inverse[b] = inverse_symmetric(body->mass.inertia_kg_m2);
+    for (uint32_t i = 0; i < body->surface.vertex_count; ++i)
+      state->reach_m[b] = fmax(state->reach_m[b], v_norm(body->surface.vertices[i]));
+  }
+  for (uint32_t t = 0; t < scene->touch_count; ++t) {
+    const sonde_touch *touch = &scene->touches[t];
+    state->bond_first[t] = bond;
+    bond += scene->bodies[touch->bond_side ? touch->b : touch->a].surface.vertex_count;
+  }
+  SONDE_ASSERT(surface == state->surface_count && bond == state->bond_count);
+}
+
+static sonde_status allocate(sonde_scene_state *state, sonde_error *error) {
+  size_arrays(state);
+  sonde_kept *const kept[] = {&state->now, &state->undo, &state->saved, &state->whole};
+  for (size_t k = 0; k < SONDE_COUNT_OF(kept); ++k) {
+    sonde_status status = make_kept(state, kept[k], error);
+    if (status) return status;
+  }
+  carver c = {0};
+  lay_arrays(state, &c);
+  state->block = c.block = sonde_calloc(1, c.used);
+  if (!state->block) return sonde_fail_memory(error);
+  c.used = 0;
+  lay_arrays(state, &c);
+  number_arrays(state);
+  return SONDE_OK;
+}
+
+sonde_status sonde_scene_state_create(const sonde_scene *scene, sonde_scene_state **out,
+                                      sonde_error *error) {
+  SONDE_ASSERT(scene && out);
+  *out = NULL;
+  sonde_scene_state *state = SONDE_NEW(sonde_scene_state, 1);
+  if (!state) return sonde_fail_memory(error);
+  state->scene = scene;
+  sonde_status status = allocate(state, error);
+  if (!status) {
+    sonde_scene_state_reset(state);
+    status = make_contact(state, error);
+  }
+  if (!status) status = make_solver(state, error);
+  if (status)
+    sonde_scene_state_destroy(state);
+  else
+    *out = state;
+  return status;
+}
+
+void sonde_scene_state_destroy(sonde_scene_state *state) {
+  if (!state) return;
+  for (uint32_t b = 0; state->block && b < state->scene->body_count; ++b)
+    sonde_face_tree_destroy(state->tree[b]);
+  for (uint32_t t = 0; state->block && t < state->scene->touch_count; ++t)
+    sonde_overlap_destroy(state->overlap[t]);
+  sonde_sweep_destroy(state->sweep);
+  sonde_block_matrix_destroy(state->matrix);
+  sonde_free(state->now.block);
+  sonde_free(state->undo.block);
+  sonde_free(state->saved.block);
+  sonde_free(state->whole.block);
+  sonde_free(state->block);
+  sonde_free(state);
+}
+
+static void reset_rigid(sonde_scene_state *state, uint32_t b) {
+  SONDE_ASSERT(state->scene->bodies[b].slot_count == 2);
+  const sonde_body *body = &state->scene->bodies[b];
+  uint32_t s = body->first_slot;
+  state->now.position[s] = pose_apply(body->start, body->mass.centre_m);
+  state->now.rotation[b] = body->start.rotation;
+  if (body->motion != SONDE_BODY_FREE) return;
+  state->now.velocity[s] = body->velocity_m_s;
+  state->now.velocity[s + 1] = body->spin_rad_s;
+}
+
+void sonde_scene_state_reset(sonde_scene_state *state) {
+  memset(state->now.block, 0, state->now.bytes);
+  state->report = (sonde_scene_report){0};
+  for (uint32_t t = 0; t < state->scene->touch_count; ++t) state->pair[t] = (sonde_pair_measure){0};
+  for (uint32_t b = 0; b < state->scene->body_count; ++b) {
+    const sonde_body *body = &state->scene->bodies[b];
+    state->now.rotation[b] = quat_identity();
+    if (sonde_body_is_rigid(body)) {
+      reset_rigid(state, b);
+      continue;
+    }
+    for (uint32_t i = 0; i < body->node_count; ++i) {
+      sonde_vec3 arm = v_sub(body->node[i], body->mass.centre_m);
+      state->now.position[body->first_slot + i] = body->node[i];
+      if (is_active(body, i))
+        state->now.velocity[body->first_slot + i] =
+            v_add(body->velocity_m_s, v_cross(body->spin_rad_s, arm));
+    }
+  }
+}
+
+// ---- readers
+
+sonde_scene_report sonde_scene_last(const sonde_scene_state *state) { return state->report; }
+uint64_t sonde_scene_flag_count(const sonde_scene_state *state) {
+  return state->now.head->flag_count;
+}
+uint32_t sonde_scene_all_flags(const sonde_scene_state *state) {
+  return state->now.head->all_flags;
+}
+uint64_t sonde_scene_tick(const sonde_scene_state *state) { return state->now.head->tick; }
+double sonde_scene_time(const sonde_scene_state *state) { return state->now.head->time_s; }
+
+uint64_t sonde_scene_hash(const sonde_scene_state *state) {
+  return sonde_hash(0, state->now.block, state->now.bytes);
+}
+
+const sonde_vec3 *sonde_scene_nodes(const sonde_scene_state *state, uint32_t b) {
+  SONDE_ASSERT(b < state->scene->body_count);
+  const sonde_body *body = &state->scene->bodies[b];
+  return sonde_body_is_rigid(body) ? NULL : state->now.position + body->first_slot;
+}
+
+const sonde_vec3 *sonde_scene_node_velocities(const sonde_scene_state *state, uint32_t b) {
+  SONDE_ASSERT(b < state->scene->body_count);
+  const sonde_body *body = &state->scene->bodies[b];
+  return sonde_body_is_rigid(body) ? NULL : state->now.velocity + body->first_slot;
+}
+
+void sonde_scene_set_nodes(sonde_scene_state *state, uint32_t b, const sonde_vec3 *positions,
+                           const sonde_vec3 *velocities) {
+  SONDE_ASSERT(b < state->scene->body_count);
+  const sonde_body *body = &state->scene->bodies[b];
+  size_t bytes = body->node_count * sizeof(sonde_vec3);
+  if (positions) memcpy(state->now.position + body->first_slot, positions, bytes);
+  if (velocities) memcpy(state->now.velocity + body->first_slot, velocities, bytes);
+}
+
+void sonde_scene_surface(const sonde_scene_state *state, uint32_t b, sonde_vec3 *vertices) {
+  SONDE_ASSERT(b < state->scene->body_count);
+  sonde_surface_at(state, b, state->now.position, state->now.rotation, vertices);
+}
+
+sonde_pair_measure sonde_scene_pair_measure(const sonde_scene_state *state, uint32_t pair) {
+  SONDE_ASSERT(pair < state->scene->touch_count);
+  return state->pair[pair];
+}
+
+static void measure_rigid(const sonde_scene_state *state, uint32_t b, sonde_body_measure *m) {
+  const sonde_body *body = &state->scene->bodies[b];
+  m->centre_m = state->now.position[body->first_slot];
+  m->velocity_m_s = state->now.velocity[body->first_slot];
+  m->spin_rad_s = state->now.velocity[body->first_slot + 1];
+  m->rotation = state->now.rotation[b];
+  sonde_vec3 angular =
+      m_mul_v(sonde_inertia_world(body->mass.inertia_kg_m2, m->rotation), m->spin_rad_s);
+  m->momentum_kg_m_s = v_scale(m->velocity_m_s, body->mass.mass_kg);
+  m->angular_kg_m2_s = v_add(angular, v_cross(m->centre_m, m->momentum_kg_m_s));
+  m->kinetic_j = 0.5 * (v_dot(m->velocity_m_s, m->momentum_kg_m_s) + v_dot(m->spin_rad_s, angular));
+}
+
+static void measure_nodes(const sonde_scene_state *state, uint32_t b, sonde_body_measure *m) {
+  const sonde_body *body = &state->scene->bodies[b];
+  const sonde_vec3 *x = state->now.position + body->first_slot;
+  const sonde_vec3 *v = state->now.velocity + body->first_slot;
+  sonde_vec3 sum = vec3(0, 0, 0);
+  for (uint32_t i = 0; i < body->node_count; ++i) {
+    sonde_vec3 p = v_scale(v[i], body->node_mass_kg[i]);
+    sum = v_madd(sum, body->node_mass_kg[i], x[i]);
+    m->momentum_kg_m_s = v_add(m->momentum_kg_m_s, p);
+    m->angular_kg_m2_s = v_add(m->angular_kg_m2_s, v_cross(x[i], p));
+    m->kinetic_j += 0.5 * v_dot(v[i], p);
+  }
+  m->centre_m = v_scale(sum, 1 / body->mass.mass_kg);
+  m->velocity_m_s = v_scale(m->momentum_kg_m_s, 1 / body->mass.mass_kg);
+  m->rotation = quat_identity();
+  m->elastic_j = body->model ? sonde_tissue_energy(body->model, x) : sonde_network_energy(body, x);
+}
+
+sonde_body_measure sonde_scene_measure(const sonde_scene_state *state, uint32_t b) {
+  SONDE_ASSERT(b < state->scene->body_count);
+  const sonde_body *body = &state->scene->bodies[b];
+  sonde_body_measure m = {0};
+  if (sonde_body_is_rigid(body))
+    measure_rigid(state, b, &m);
+  else
+    measure_nodes(state, b, &m);
+  if (body->motion == SONDE_BODY_FREE)
+    m.gravity_j = -body->mass.mass_kg * v_dot(state->scene->gravity_m_s2, m.centre_m);
+  return m;
+}
+
+// ---- facts about the scene
+
+uint32_t sonde_scene_body_count(const sonde_scene *scene) { return scene->body_count; }
+const char *sonde_scene_title(const sonde_scene *scene) { return scene->title; }
+double sonde_scene_duration(const sonde_scene *scene) { return scene->duration_s; }
+uint64_t sonde_scene_checksum(const sonde_scene *scene) { return scene->checksum; }
+uint32_t sonde_scene_pair_count(const sonde_scene *scene) { return scene->touch_count; }
+sonde_scene_step sonde_scene_get_step(const sonde_scene *scene) { return scene->step; }
+
+sonde_body_info sonde_scene_body(const sonde_scene *scene, uint32_t b) {
+  SONDE_ASSERT(b < scene->body_count);
+  const sonde_body *body = &scene->bodies[b];
+  uint32_t springs = body->model ? body->model->topology.edge_count : body->spring_count;
+  return (sonde_body_info){.name = body->name,
+                           .kind = body->kind,
+                           .motion = body->motion,
+                           .node_count = body->node_count,
+                           .spring_count = springs,
+                           .surface = &body->surface,
+                           .mass = body->mass};
+}
+
+uint32_t sonde_scene_find(const sonde_scene *scene, const char *name) {
+  for (uint32_t b = 0; b < scene->body_count; ++b)
+    if (strcmp(scene->bodies[b].name, name) == 0) return b;
+  return UINT32_MAX;
+}
+
+sonde_scene_pair sonde_scene_pair_at(const sonde_scene *scene, uint32_t pair) {
+  SONDE_ASSERT(pair < scene->touch_count);
+  const sonde_touch *t = &scene->touches[pair];
+  return (sonde_scene_pair){t->a,       t->b,         t->law,       t->stiffness,
+                            t->damping, t->mu_static, t->mu_kinetic};
+}

@@ -1,0 +1,175 @@
+// Inside of a scene's motion: arrays over slots (docs/scene.md). A node of a deformable body is one
+// slot; a rigid body has two: its centre with its velocity, and its spin.
+#ifndef SONDE_SRC_SCENE_STATE_H
+#define SONDE_SRC_SCENE_STATE_H
+
+#include "scene/scene.h"
+#include "sonde/contact.h"
+#include "tissue/two_layer.h"
+
+// What a step hands to the next, in one block: copied for substeps, written by snapshots.
+typedef struct sonde_kept_head {
+  uint64_t tick, flag_count;
+  double time_s;
+  uint32_t all_flags;
+  uint32_t level; // substeps of dt/2^level
+} sonde_kept_head;
+
+typedef struct sonde_kept {
+  void *block;
+  size_t bytes;
+  sonde_kept_head *head;
+  sonde_vec3 *position;  // [slots] m; 0 for spins
+  sonde_vec3 *velocity;  // [slots] m/s, rad/s
+  sonde_vec3 *increment; // [slots] of the last step: the solver's start
+  sonde_quat *rotation;  // [bodies] world from the body's axes
+  sonde_vec3 *hint;      // [touches] last direction out of a into b
+  sonde_vec3 *bond;      // [bonds] way since the bond began, per vertex of a touch's bond side
+  double *slip;          // [bonds] m/s by which it slipped in the last step
+} sonde_kept;
+
+// A push of one body on another along generalised coordinates: a quantity u (depth of a column or
+// volume of a region) grows at the rate sum g.v, and the force on the slots is -f g.
+typedef struct sonde_push {
+  uint32_t touch, first_row, row_count;
+  double value, end_value;  // u at the evaluation and at the end of the step
+  double newtons;           // |sum of g on one side|: f times this is the push in N
+  double stiffness, damper; // df/du, df/d(du/dt); both 0 where nothing pushes
+  double force, end_force;  // f at the evaluation and at the end of the step
+  bool dropped;             // would have pulled at the end of the step
+} sonde_push;
+
+// Where friction acts: a column of a contact.
+typedef struct sonde_grip {
+  uint32_t touch, push;
+  double share;                 // of the push: N per unit of its f
+  uint32_t slot_count, slot[6]; // what moves the point
+  double weight[6];             // + on a, - on b; of a rigid body on its centre
+  sonde_vec3 arm[2];            // from the centre to the point, rigid sides
+  uint32_t bond[3];             // the bonds of the face on the bond side
+  double bond_weight[3];
+  sonde_vec3 point[2];          // on a and on b, world
+  sonde_vec3 normal;            // out of a into b
+  sonde_vec3 way;               // b of the point at the start of the step, across
+  double mu, stiffness, damper; // coefficient now; of the bond at the evaluation
+  sonde_vec3 force, end_force;  // of friction on a
+  uint32_t term_count;          // tangents that resist: 2 sticking, 1 slipping
+  sonde_vec3 tangent[2];
+} sonde_grip;
+
+typedef struct sonde_inertia {
+  sonde_mat3 start;   // world, at the start of the step
+  sonde_vec3 angular; // angular momentum then
+} sonde_inertia;
+
+struct sonde_scene_state {
+  const sonde_scene *scene;
+  sonde_kept now, undo;    // undo: the start of a step, kept for one that fails
+  sonde_kept saved, whole; // of step doubling: the start, and the single step's end
+  void *block;             // all arrays below
+  uint32_t bond_count, surface_count;
+
+  // the point at which forces are evaluated
+  sonde_vec3 *stage_position, *stage_velocity; // [slots]
+  sonde_quat *stage_rotation;                  // [bodies]
+  sonde_vec3 *surface;                         // [surface vertices]
+  uint32_t *surface_first;                     // [bodies]
+  uint32_t *bond_first;                        // [touches]
+  sonde_inertia *inertia;                      // [bodies]
+  double *reach_m;                             // [bodies] of a rigid body's vertices
+  sonde_mat3 *body_inverse;                    // [bodies] inverse inertia in the body's frame
+
+  // contact
+  sonde_face_tree **tree;  // [bodies], NULL for what never touches
+  sonde_overlap **overlap; // [touches]
+  sonde_sweep *sweep;
+  uint32_t *touch_of; // [bodies^2] touch + 1
+  uint32_t (*near)[2];
+  uint32_t near_capacity;
+  sonde_bounds *bounds;  // [bodies]
+  sonde_push *pushes;    // [push_capacity]
+  sonde_grip *grips;     // [grip_capacity]
+  sonde_rank_one *terms; // [term_capacity]
+  uint32_t *rows;        // [row_capacity] pool
+  sonde_vec3 *g;         // [row_capacity] pool
+  uint32_t push_count, grip_count, term_count, row_count, bulk_terms;
+  uint32_t push_capacity, grip_capacity, term_capacity, row_capacity;
+  double *bond_load;        // [bonds] scratch
+  double *slip_sum;         // [bonds] scratch
+  sonde_vec3 *bond_sum;     // [bonds] scratch
+  sonde_pair_measure *pair; // [touches]
+
+  // assembly and solve
+  sonde_block_matrix *matrix;
+  sonde_mat3 *plain_diagonal;                  // [slots]
+  sonde_vec3 *force, *product;                 // [slots] of the bodies themselves
+  sonde_vec3 *contact_force, *contact_product; // [slots]
+  sonde_vec3 *right, *change, *move, *gain;    // [slots]
+  sonde_vec3 *mean_velocity;                   // [slots] scratch
+  uint32_t *active_rows, *active_pairs;
+  uint32_t active_row_count, active_pair_count;
+  uint32_t *island; // [bodies]
+  bool *loose;      // [bodies] nothing outside holds it
+  sonde_pcg_scratch scratch;
+  sonde_tissue_node *tissue_nodes;
+  sonde_scene_report report;
+};
+
+// Turns by spin * time (exponential map).
+sonde_quat sonde_quat_turn(sonde_quat rotation, sonde_vec3 spin, double time_s);
+// R I R^T.
+sonde_mat3 sonde_inertia_world(sonde_mat3 inertia, sonde_quat rotation);
+// Orientation after turning for time_s at the spin that the angular momentum has there; *spin
+// receives it.
+sonde_quat sonde_rigid_turn(const sonde_scene_state *state, uint32_t body, sonde_quat from,
+                            sonde_vec3 angular, double time_s, sonde_vec3 *spin);
+// Velocities of driven bodies over a step, inertias and angular momenta at its start. @thread tick
+void sonde_rigid_begin(sonde_scene_state *state, double h);
+// Stage at the start of the step. @thread tick
+void sonde_stage_start(sonde_scene_state *state);
+// Stage lambda of a step with the increments dv. @thread tick
+void sonde_stage_at(sonde_scene_state *state, const sonde_vec3 *dv, double h);
+// End of the step. False when something is not finite. @thread tick
+bool sonde_stage_finish(sonde_scene_state *state, const sonde_vec3 *dv, double h);
+// Vertices of a body's surface at given positions and rotations. @thread tick
+void sonde_surface_at(const sonde_scene_state *state, uint32_t body, const sonde_vec3 *position,
+                      const sonde_quat *rotation, sonde_vec3 *vertices);
+
+// Forces, matrix (mass, damping, stiffness scaled) and K v of a body of springs. @thread tick
+void sonde_network_linearise(sonde_scene_state *state, uint32_t body,
+                             const sonde_tissue_scales *scales);
+double sonde_network_energy(const sonde_body *body, const sonde_vec3 *position);
+double sonde_network_volume(const sonde_body *body, const sonde_vec3 *position);
+
+// Contacts at the stage: pushes and grips. @thread tick
+void sonde_touch_find(sonde_scene_state *state);
+// Forces at the stage, which the bodies reached after moving for moved_s. @thread tick
+void sonde_touch_evaluate(sonde_scene_state *state, double moved_s);
+// Sums forces and K v over the slots and lists the terms of the matrix. @thread tick
+void sonde_touch_gather(sonde_scene_state *state, const sonde_tissue_scales *scales);
+// Forces at the end of the step from the moves since the evaluation; how many pushes would pull
+// and were dropped. @thread tick
+uint32_t sonde_touch_predict(sonde_scene_state *state);
+// Measures and bonds at the end of the step. @thread tick
+void sonde_touch_finish(sonde_scene_state *state, double h);
+
+// Friction of a grip at the stage / at the end of the step. @thread tick
+void sonde_grip_begin(sonde_scene_state *state, sonde_grip *grip);
+void sonde_grip_evaluate(sonde_scene_state *state, sonde_grip *grip, double moved_s);
+void sonde_grip_predict(sonde_scene_state *state, sonde_grip *grip);
+void sonde_bonds_advance(sonde_scene_state *state, double h);
+// Relative velocity of a grip's points, a less b, for a field over the slots.
+sonde_vec3 sonde_grip_slip(const sonde_scene_state *state, const sonde_grip *grip,
+                           const sonde_vec3 *field);
+// Adds a force on a's point and its opposite on b's to a field over the slots.
+void sonde_grip_spread(const sonde_scene_state *state, const sonde_grip *grip, sonde_vec3 force,
+                       sonde_vec3 *field);
+// Rows of a push along `direction` on a and against it on b; false when the pool is full.
+bool sonde_grip_rows(sonde_scene_state *state, const sonde_grip *grip, sonde_vec3 direction,
+                     uint32_t *first, uint32_t *count);
+
+// One step of size h. @thread tick
+void sonde_step_once(sonde_scene_state *state, double h);
+void sonde_kept_copy(sonde_kept *to, const sonde_kept *from);
+
+#endif

@@ -1,0 +1,84 @@
+// A step of the scene, whole or in substeps chosen by step doubling (docs/scene.md).
+// difference:  largest distance between two states' places.
+// try_double:  one step of h against two of h/2.
+// adaptive:    steps of dt/2^level, finer where the error asks for it, coarser where it allows it.
+#include "scene/state.h"
+
+#include "base/base.h"
+#include "base/maths.h"
+
+#include <string.h>
+
+void sonde_kept_copy(sonde_kept *to, const sonde_kept *from) {
+  SONDE_ASSERT(to->bytes == from->bytes);
+  memcpy(to->block, from->block, to->bytes);
+}
+
+// Vertices of rigid bodies move with centre and rotation: their reach times the turn.
+static double difference(const sonde_scene_state *state) {
+  const sonde_kept *a = &state->now, *b = &state->whole;
+  double most = 0;
+  for (uint32_t i = 0; i < state->scene->slot_count; ++i)
+    most = fmax(most, v_distance(a->position[i], b->position[i]));
+  for (uint32_t k = 0; k < state->scene->body_count; ++k) {
+    const sonde_body *body = &state->scene->bodies[k];
+    if (!sonde_body_is_rigid(body)) continue;
+    sonde_quat turn = q_mul(a->rotation[k], q_conj(b->rotation[k]));
+    most = fmax(most, 2 * v_norm(vec3(turn.x, turn.y, turn.z)) * state->reach_m[k]);
+  }
+  return most;
+}
+
+// Leaves the finer of the two results; returns how far the coarser one is from it, over 2^p - 1.
+static double try_double(sonde_scene_state *state, double h) {
+  SONDE_ASSERT(h > 0);
+  double order_factor = state->scene->step.lambda == 0.5 ? 3 : 1;
+  sonde_kept_copy(&state->saved, &state->now);
+  sonde_step_once(state, h);
+  sonde_kept_copy(&state->whole, &state->now);
+  sonde_kept_copy(&state->now, &state->saved);
+  sonde_step_once(state, 0.5 * h);
+  sonde_step_once(state, 0.5 * h);
+  return difference(state) / order_factor;
+}
+
+static void adaptive(sonde_scene_state *state) {
+  const sonde_scene_step *step = &state->scene->step;
+  double tolerance = step->substep_tolerance_m, worst = 0;
+  uint32_t finest = 1u << step->substep_halvings, done = 0;
+  uint32_t level = state->now.head->level;
+  if (level > step->substep_halvings) level = step->substep_halvings;
+  while (done < finest) {
+    uint32_t size = finest >> level;
+    double error = try_double(state, step->dt_s * size / finest);
+    if (error > tolerance && level < step->substep_halvings) {
+      sonde_kept_copy(&state->now, &state->saved);
+      state->report.rejected++;
+      ++level;
+      continue;
+    }
+    if (error > tolerance) state->report.flags |= SONDE_SCENE_SUBSTEP_LIMIT;
+    worst = fmax(worst, error);
+    state->report.substeps += 2;
+    done += size;
+    bool aligned = level > 0 && done % (2 * size) == 0;
+    if (error < 0.2 * tolerance && aligned) --level;
+  }
+  state->now.head->level = level;
+  state->report.error_m = worst;
+}
+
+void sonde_scene_advance(sonde_scene_state *state) {
+  const sonde_scene_step *step = &state->scene->step;
+  state->report = (sonde_scene_report){0};
+  double start = state->now.head->time_s;
+  if (step->substep_tolerance_m > 0)
+    adaptive(state);
+  else
+    sonde_step_once(state, step->dt_s);
+  sonde_kept_head *head = state->now.head;
+  head->time_s = start + step->dt_s;
+  head->tick++;
+  head->all_flags |= state->report.flags;
+  head->flag_count += state->report.flags != 0;
+}

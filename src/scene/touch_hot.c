@@ -1,0 +1,445 @@
+// Contact between any two bodies, every step (docs/scene.md).
+// near_pairs:    bodies whose boxes overlap.
+// lever:         how a body's slots move a point of its surface.
+// grip_*:        rows, relative velocity and forces of a column's two points.
+// meet:          one point for the friction of both bodies.
+// add_column:    a column: its grip, and under the foundation law its push.
+// add_rows:      one side of a volume's gradient as rows of slots.
+// add_region:    a region's push under the volume laws; share_out gives it to the columns.
+// find_touch:    pushes and grips of one pair of bodies.
+// gather_*:      forces, K v and matrix terms over the slots.
+// predict:       forces at the end of the step; drops pushes that would pull.
+// measure_*:     what readers see of a pair.
+// keep_hint:     the direction that the next search starts with.
+#include "scene/state.h"
+
+#include "base/base.h"
+#include "base/maths.h"
+
+#include <string.h>
+
+static const sonde_body *body_of(const sonde_scene_state *state, uint32_t b) {
+  return &state->scene->bodies[b];
+}
+
+static bool is_still(const sonde_body *body) { return body->motion == SONDE_BODY_FIXED; }
+
+// Fits the trees of what moves; a resting body's tree was fitted when the state was made.
+static uint32_t near_pairs(sonde_scene_state *state) {
+  uint32_t count = state->scene->body_count;
+  for (uint32_t b = 0; b < count; ++b) {
+    sonde_vec3 *surface = state->surface + state->surface_first[b];
+    if (!state->tree[b]) continue;
+    if (!is_still(body_of(state, b))) {
+      sonde_surface_at(state, b, state->stage_position, state->stage_rotation, surface);
+      sonde_face_tree_refit(state->tree[b], surface);
+    }
+    state->bounds[b] = sonde_face_tree_bounds(state->tree[b]);
+  }
+  uint32_t found = sonde_sweep_pairs(state->sweep, state->bounds, count, state->near,
+                                     state->near_capacity, NULL);
+  SONDE_ASSERT(found <= state->near_capacity);
+  return found;
+}
+
+// How the slots of a body move a point of a face: a rigid body's centre and spin, or three nodes.
+static uint32_t lever(const sonde_scene_state *state, uint32_t b, uint32_t face,
+                      const double weight[3], double sign, sonde_grip *grip, int side) {
+  SONDE_ASSERT(grip->slot_count <= 3 && face < state->scene->bodies[b].surface.face_count);
+  const sonde_body *body = body_of(state, b);
+  const uint32_t *vertex = body->surface.faces[face];
+  const sonde_vec3 *surface = state->surface + state->surface_first[b];
+  sonde_vec3 point = vec3(0, 0, 0);
+  for (int k = 0; k < 3; ++k) point = v_madd(point, weight[k], surface[vertex[k]]);
+  grip->point[side] = point;
+  uint32_t first = grip->slot_count;
+  if (sonde_body_is_rigid(body)) {
+    grip->slot[first] = body->first_slot;
+    grip->weight[first] = sign;
+    grip->arm[side] = v_sub(point, state->stage_position[body->first_slot]);
+    return first + 1;
+  }
+  for (uint32_t k = 0; k < 3; ++k) {
+    uint32_t node = body->surface_node ? body->surface_node[vertex[k]] : vertex[k];
+    grip->slot[first + k] = body->first_slot + node;
+    grip->weight[first + k] = sign * weight[k];
+  }
+  return first + 3;
+}
+
+static bool rigid_side(const sonde_scene_state *state, const sonde_grip *grip, int side) {
+  const sonde_touch *touch = &state->scene->touches[grip->touch];
+  return sonde_body_is_rigid(body_of(state, side ? touch->b : touch->a));
+}
+
+// Slots of the two sides: [0, split) move a, the others b.
+static uint32_t split_of(const sonde_scene_state *state, const sonde_grip *grip) {
+  return rigid_side(state, grip, 0) ? 1 : 3;
+}
+
+bool sonde_grip_rows(sonde_scene_state *state, const sonde_grip *grip, sonde_vec3 direction,
+                     uint32_t *first, uint32_t *count) {
+  uint32_t split = split_of(state, grip), at = *first = state->row_count;
+  *count = 0;
+  if (at + 8 > state->row_capacity) {
+    state->report.flags |= SONDE_SCENE_CONTACT_FULL;
+    return false;
+  }
+  for (uint32_t k = 0; k < grip->slot_count; ++k) {
+    int side = k >= split;
+    state->rows[at] = grip->slot[k];
+    state->g[at++] = v_scale(direction, grip->weight[k]);
+    if (!rigid_side(state, grip, side)) continue;
+    state->rows[at] = grip->slot[k] + 1;
+    state->g[at++] = v_scale(v_cross(grip->arm[side], direction), grip->weight[k]);
+  }
+  *count = at - *first;
+  state->row_count = at;
+  return true;
+}
+
+sonde_vec3 sonde_grip_slip(const sonde_scene_state *state, const sonde_grip *grip,
+                           const sonde_vec3 *field) {
+  uint32_t split = split_of(state, grip);
+  sonde_vec3 slip = vec3(0, 0, 0);
+  for (uint32_t k = 0; k < grip->slot_count; ++k) {
+    int side = k >= split;
+    sonde_vec3 v = field[grip->slot[k]];
+    if (rigid_side(state, grip, side))
+      v = v_add(v, v_cross(field[grip->slot[k] + 1], grip->arm[side]));
+    slip = v_madd(slip, grip->weight[k], v);
+  }
+  return slip;
+}
+
+void sonde_grip_spread(const sonde_scene_state *state, const sonde_grip *grip, sonde_vec3 force,
+                       sonde_vec3 *field) {
+  uint32_t split = split_of(state, grip);
+  for (uint32_t k = 0; k < grip->slot_count; ++k) {
+    int side = k >= split;
+    uint32_t s = grip->slot[k];
+    field[s] = v_madd(field[s], grip->weight[k], force);
+    if (rigid_side(state, grip, side))
+      field[s + 1] = v_madd(field[s + 1], grip->weight[k], v_cross(grip->arm[side], force));
+  }
+}
+
+static sonde_push *new_push(sonde_scene_state *state, uint32_t t) {
+  if (state->push_count == state->push_capacity) {
+    state->report.flags |= SONDE_SCENE_CONTACT_FULL;
+    return NULL;
+  }
+  sonde_push *push = &state->pushes[state->push_count++];
+  *push = (sonde_push){.touch = t, .first_row = state->row_count, .newtons = 1};
+  return push;
+}
+
+// The two ends of a column lie a depth apart, and forces across it would turn the bodies. A rigid
+// body is held at the other's end instead, two of them half way; two deformable ones keep the
+// couple of the friction with the depth.
+static void meet(const sonde_scene_state *state, const sonde_touch *touch, sonde_grip *grip) {
+  bool rigid[2] = {rigid_side(state, grip, 0), rigid_side(state, grip, 1)};
+  sonde_vec3 middle = v_lerp(grip->point[0], grip->point[1], 0.5);
+  const uint32_t body[2] = {touch->a, touch->b};
+  sonde_vec3 other[2] = {grip->point[1], grip->point[0]};
+  for (int s = 0; s < 2; ++s) {
+    if (!rigid[s]) continue;
+    grip->point[s] = rigid[!s] ? middle : other[s];
+    uint32_t centre = body_of(state, body[s])->first_slot;
+    grip->arm[s] = v_sub(grip->point[s], state->stage_position[centre]);
+  }
+}
+
+// @param push of the point's region; UINT32_MAX: the column pushes by itself
+static void add_column(sonde_scene_state *state, uint32_t t, const sonde_overlap_region *region,
+                       const sonde_overlap_point *point, uint32_t region_push) {
+  const sonde_touch *touch = &state->scene->touches[t];
+  if (state->grip_count == state->grip_capacity) {
+    state->report.flags |= SONDE_SCENE_CONTACT_FULL;
+    return;
+  }
+  sonde_grip *grip = &state->grips[state->grip_count];
+  memset(grip, 0, sizeof *grip);
+  grip->touch = t;
+  grip->normal = region->direction;
+  grip->slot_count = lever(state, touch->a, point->face_a, point->weight_a, 1, grip, 0);
+  grip->slot_count = lever(state, touch->b, point->face_b, point->weight_b, -1, grip, 1);
+  meet(state, touch, grip);
+  uint32_t side = touch->bond_side ? touch->b : touch->a;
+  uint32_t face = touch->bond_side ? point->face_b : point->face_a;
+  for (int k = 0; k < 3; ++k) {
+    grip->bond[k] = state->bond_first[t] + body_of(state, side)->surface.faces[face][k];
+    grip->bond_weight[k] = touch->bond_side ? point->weight_b[k] : point->weight_a[k];
+  }
+  grip->push = region_push;
+  grip->share = region_push == UINT32_MAX ? 1 : point->area_m2;
+  if (region_push == UINT32_MAX) {
+    sonde_push *push = new_push(state, t);
+    if (!push || !sonde_grip_rows(state, grip, grip->normal, &push->first_row, &push->row_count))
+      return;
+    push->value = point->depth_m;
+    push->stiffness = touch->stiffness * point->area_m2;
+    push->damper = touch->damping * point->area_m2;
+    grip->push = state->push_count - 1;
+  }
+  state->grip_count++;
+}
+
+// Rows of the volume's gradient on one side; eq. (2) keeps only its part along the direction.
+// @param scale 1 for the energy law, 1/area for eq. (2)
+static bool add_rows(sonde_scene_state *state, uint32_t b, const sonde_overlap_entry *entries,
+                     uint32_t count, const sonde_vec3 *along, double scale) {
+  SONDE_ASSERT(scale > 0);
+  const sonde_body *body = body_of(state, b);
+  const sonde_vec3 *surface = state->surface + state->surface_first[b];
+  bool rigid = sonde_body_is_rigid(body);
+  if (state->row_count + (rigid ? 2 : count) > state->row_capacity) {
+    state->report.flags |= SONDE_SCENE_CONTACT_FULL;
+    return false;
+  }
+  sonde_vec3 force = vec3(0, 0, 0), torque = force;
+  for (uint32_t e = 0; e < count; ++e) {
+    sonde_vec3 g = v_scale(entries[e].gradient_m2, scale);
+    if (along) g = v_scale(*along, v_dot(g, *along));
+    uint32_t vertex = entries[e].vertex;
+    if (rigid) {
+      sonde_vec3 arm = v_sub(surface[vertex], state->stage_position[body->first_slot]);
+      force = v_add(force, g);
+      torque = v_add(torque, v_cross(arm, g));
+      continue;
+    }
+    uint32_t node = body->surface_node ? body->surface_node[vertex] : vertex;
+    state->rows[state->row_count] = body->first_slot + node;
+    state->g[state->row_count++] = g;
+  }
+  if (rigid) {
+    state->rows[state->row_count] = body->first_slot;
+    state->g[state->row_count++] = force;
+    state->rows[state->row_count] = body->first_slot + 1;
+    state->g[state->row_count++] = torque;
+  }
+  return true;
+}
+
+// Energy law: u = V and g = dV/dx. Eq. (2): F = kappa V along the direction, shared by projected
+// area; with u = V/area and stiffness kappa * area its slope is the rank-one one of docs/scene.md.
+static uint32_t add_region(sonde_scene_state *state, uint32_t t, const sonde_overlap_result *found,
+                           const sonde_overlap_region *region) {
+  const sonde_touch *touch = &state->scene->touches[t];
+  bool energy = touch->law == SONDE_TOUCH_ENERGY;
+  double area = region->area_m2;
+  sonde_push *push = area > 0 ? new_push(state, t) : NULL;
+  if (!push) return UINT32_MAX;
+  if (energy) push->newtons = area;
+  push->value = energy ? region->volume_m3 : region->volume_m3 / area;
+  push->stiffness = energy ? touch->stiffness : touch->stiffness * area;
+  push->damper = energy ? touch->damping : touch->damping * area;
+  const sonde_vec3 *along = energy ? NULL : &region->direction;
+  const uint32_t bodies[2] = {touch->a, touch->b};
+  for (int s = 0; s < 2; ++s)
+    if (!add_rows(state, bodies[s], found->entries[s] + region->first_entry[s],
+                  region->entry_count[s], along, energy ? 1 : 1 / area)) {
+      push->stiffness = push->damper = 0;
+      break;
+    }
+  push->row_count = state->row_count - push->first_row;
+  return state->push_count - 1;
+}
+
+// A region's push is shared out over its columns by their area, in newtons per unit of f.
+static void share_out(sonde_scene_state *state, uint32_t first, double newtons) {
+  double area = 0;
+  for (uint32_t k = first; k < state->grip_count; ++k) area += state->grips[k].share;
+  for (uint32_t k = first; k < state->grip_count; ++k)
+    state->grips[k].share *= area > 0 ? newtons / area : 0;
+}
+
+static void find_touch(sonde_scene_state *state, uint32_t t) {
+  const sonde_touch *touch = &state->scene->touches[t];
+  sonde_pair_measure *pair = &state->pair[t];
+  if (!sonde_overlap_compute(state->overlap[t], state->tree[touch->a], state->tree[touch->b],
+                             state->now.hint[t]))
+    return;
+  const sonde_overlap_result *found = sonde_overlap_get(state->overlap[t]);
+  if (found->flags) state->report.flags |= SONDE_SCENE_CONTACT_FULL;
+  pair->volume_m3 = found->volume_m3;
+  pair->region_count = found->region_count;
+  pair->point_count = found->point_count;
+  for (uint32_t r = 0; r < found->region_count; ++r) {
+    const sonde_overlap_region *region = &found->regions[r];
+    uint32_t push = UINT32_MAX, before = state->grip_count;
+    pair->area_m2 += region->area_m2;
+    if (region->depth_m > pair->depth_m) pair->depth_m = region->depth_m;
+    if (touch->law != SONDE_TOUCH_FOUNDATION) {
+      push = add_region(state, t, found, region);
+      if (push == UINT32_MAX) continue;
+    }
+    for (uint32_t k = 0; k < region->point_count; ++k)
+      add_column(state, t, region, &found->points[region->first_point + k], push);
+    if (push != UINT32_MAX) share_out(state, before, state->pushes[push].newtons);
+  }
+}
+
+void sonde_touch_find(sonde_scene_state *state) {
+  const sonde_scene *scene = state->scene;
+  state->push_count = state->grip_count = 0;
+  if (!scene->touch_count) return;
+  memset(state->pair, 0, scene->touch_count * sizeof *state->pair);
+  uint32_t count = near_pairs(state);
+  for (uint32_t k = 0; k < count; ++k) {
+    uint32_t t = state->touch_of[state->near[k][0] * scene->body_count + state->near[k][1]];
+    if (t) find_touch(state, t - 1);
+  }
+  state->report.touch_points = state->grip_count;
+  for (uint32_t k = 0; k < state->grip_count; ++k) sonde_grip_begin(state, &state->grips[k]);
+}
+
+static double along_rows(const sonde_scene_state *state, const sonde_push *push,
+                         const sonde_vec3 *field) {
+  double sum = 0;
+  for (uint32_t k = push->first_row; k < push->first_row + push->row_count; ++k)
+    sum += v_dot(state->g[k], field[state->rows[k]]);
+  return sum;
+}
+
+void sonde_touch_evaluate(sonde_scene_state *state, double moved_s) {
+  SONDE_ASSERT(moved_s >= 0);
+  for (uint32_t k = 0; k < state->push_count; ++k) {
+    sonde_push *push = &state->pushes[k];
+    double rate = along_rows(state, push, state->stage_velocity);
+    push->force = push->stiffness * push->value + push->damper * rate;
+    push->dropped = !(push->force > 0);
+    if (push->dropped) push->force = 0; // damping never pulls
+    push->end_force = push->force;
+    push->end_value = push->value;
+  }
+  for (uint32_t k = 0; k < state->grip_count; ++k)
+    sonde_grip_evaluate(state, &state->grips[k], moved_s);
+}
+
+static void add_term(sonde_scene_state *state, double scale, uint32_t first, uint32_t count) {
+  SONDE_ASSERT(first + count <= state->row_capacity);
+  if (!(scale > 0)) return;
+  if (state->term_count == state->term_capacity) {
+    state->report.flags |= SONDE_SCENE_CONTACT_FULL;
+    return;
+  }
+  state->terms[state->term_count++] =
+      (sonde_rank_one){scale, count, state->rows + first, state->g + first};
+}
+
+static void gather_push(sonde_scene_state *state, const sonde_push *push,
+                        const sonde_tissue_scales *scales) {
+  if (push->dropped) return;
+  double kv = push->stiffness * along_rows(state, push, state->stage_velocity);
+  for (uint32_t k = push->first_row; k < push->first_row + push->row_count; ++k) {
+    uint32_t s = state->rows[k];
+    state->contact_force[s] = v_madd(state->contact_force[s], -push->force, state->g[k]);
+    state->contact_product[s] = v_madd(state->contact_product[s], kv, state->g[k]);
+  }
+  add_term(state, scales->damping * push->damper + scales->stiffness * push->stiffness,
+           push->first_row, push->row_count);
+}
+
+// Bonds resist along their tangents.
+static void gather_grip(sonde_scene_state *state, const sonde_grip *grip,
+                        const sonde_tissue_scales *scales) {
+  if (!grip->term_count || state->pushes[grip->push].dropped) return;
+  sonde_grip_spread(state, grip, grip->force, state->contact_force);
+  sonde_vec3 slip = sonde_grip_slip(state, grip, state->stage_velocity);
+  double scale = scales->damping * grip->damper + scales->stiffness * grip->stiffness;
+  for (uint32_t k = 0; k < grip->term_count; ++k) {
+    sonde_vec3 t = grip->tangent[k];
+    uint32_t first, count;
+    sonde_grip_spread(state, grip, v_scale(t, grip->stiffness * v_dot(slip, t)),
+                      state->contact_product);
+    if (scale > 0 && sonde_grip_rows(state, grip, t, &first, &count))
+      add_term(state, scale, first, count);
+  }
+}
+
+void sonde_touch_gather(sonde_scene_state *state, const sonde_tissue_scales *scales) {
+  size_t bytes = state->scene->slot_count * sizeof(sonde_vec3);
+  memset(state->contact_force, 0, bytes);
+  memset(state->contact_product, 0, bytes);
+  state->term_count = state->bulk_terms;
+  uint32_t rows = state->row_count;
+  for (uint32_t k = 0; k < state->push_count; ++k) gather_push(state, &state->pushes[k], scales);
+  for (uint32_t k = 0; k < state->grip_count; ++k) gather_grip(state, &state->grips[k], scales);
+  state->row_count = rows; // rows of tangents are made anew by the next gathering
+}
+
+uint32_t sonde_touch_predict(sonde_scene_state *state) {
+  uint32_t dropped = 0;
+  for (uint32_t k = 0; k < state->push_count; ++k) {
+    sonde_push *push = &state->pushes[k];
+    double way = along_rows(state, push, state->move);
+    push->end_value = push->value + way;
+    if (push->dropped) continue;
+    push->end_force =
+        push->force + push->stiffness * way + push->damper * along_rows(state, push, state->gain);
+    if (push->end_force >= 0) continue;
+    push->dropped = true;
+    push->end_force = 0;
+    ++dropped;
+  }
+  for (uint32_t k = 0; k < state->grip_count; ++k) sonde_grip_predict(state, &state->grips[k]);
+  return dropped;
+}
+
+// Forces and torques about the world's origin, from the rows of a's and b's slots.
+static void measure_push(sonde_scene_state *state, const sonde_push *push) {
+  const sonde_touch *touch = &state->scene->touches[push->touch];
+  sonde_pair_measure *pair = &state->pair[push->touch];
+  const sonde_body *a = body_of(state, touch->a), *b = body_of(state, touch->b);
+  pair->normal_n += push->end_force * push->newtons;
+  if (push->end_value > 0)
+    pair->energy_j += 0.5 * push->stiffness * push->end_value * push->end_value;
+  for (uint32_t k = push->first_row; k < push->first_row + push->row_count; ++k) {
+    uint32_t s = state->rows[k];
+    sonde_vec3 force = v_scale(state->g[k], -push->end_force);
+    bool of_a = s >= a->first_slot && s - a->first_slot < a->slot_count;
+    const sonde_body *body = of_a ? a : b;
+    sonde_vec3 *torque = of_a ? &pair->torque_n_m : &pair->torque_b_n_m;
+    if (sonde_body_is_rigid(body) && s == body->first_slot + 1) {
+      *torque = v_add(*torque, force);
+      continue;
+    }
+    *torque = v_add(*torque, v_cross(state->stage_position[s], force));
+    if (of_a) pair->force_n = v_add(pair->force_n, force);
+  }
+}
+
+static void measure_grip(sonde_scene_state *state, const sonde_grip *grip) {
+  if (state->pushes[grip->push].dropped) return;
+  sonde_pair_measure *pair = &state->pair[grip->touch];
+  sonde_vec3 f = grip->end_force;
+  pair->friction_n = v_add(pair->friction_n, f);
+  pair->torque_n_m = v_add(pair->torque_n_m, v_cross(grip->point[0], f));
+  pair->torque_b_n_m = v_sub(pair->torque_b_n_m, v_cross(grip->point[1], f));
+}
+
+// The direction of the largest region is where the next search starts.
+static void keep_hint(sonde_scene_state *state, uint32_t t) {
+  state->now.hint[t] = vec3(0, 0, 0);
+  if (!state->pair[t].region_count) return;
+  const sonde_overlap_result *found = sonde_overlap_get(state->overlap[t]);
+  double most = 0;
+  for (uint32_t r = 0; r < found->region_count; ++r)
+    if (found->regions[r].volume_m3 > most) {
+      most = found->regions[r].volume_m3;
+      state->now.hint[t] = found->regions[r].direction;
+    }
+}
+
+void sonde_touch_finish(sonde_scene_state *state, double h) {
+  SONDE_ASSERT(h > 0);
+  for (uint32_t k = 0; k < state->push_count; ++k) measure_push(state, &state->pushes[k]);
+  for (uint32_t k = 0; k < state->grip_count; ++k) measure_grip(state, &state->grips[k]);
+  for (uint32_t t = 0; t < state->scene->touch_count; ++t) {
+    sonde_pair_measure *pair = &state->pair[t];
+    pair->force_n = v_add(pair->force_n, pair->friction_n);
+    keep_hint(state, t);
+  }
+  sonde_bonds_advance(state, h);
+}
