@@ -28,8 +28,8 @@ static const char HELP[] =
     "  --engine NAME  fast (default) or double\n"
     "  --newton N     Newton iterations of a step; default 2, ellipsoid 1\n"
     "  --reference-newton N  of the converged run; default as --newton\n"
-    "  --sleep-um D   a node slower than this per 10 ms may sleep, 0 to 1000; default 5\n"
-    "  --tolerance R  of the linear solver, 1e-12 to 0.5; default 5e-3\n"
+    "  --sleep-um D   a node slower than this per 10 ms may sleep, 0 to 1000; default 20\n"
+    "  --tolerance R  of the linear solver, 1e-12 to 0.5; default 2e-2\n"
     "  --seconds S    simulated time, 0.05 to 60; default 1, ellipsoid 0.5\n"
     "  --dt-ms H      time step, 0.1 to 20; default 1\n"
     "  --repeat N     timed runs, the fastest median is reported; default 3\n"
@@ -382,8 +382,8 @@ int cmd_bench(int argc, char **argv) {
                .ellipsoid = {7842, 200, 1},
                .engine = SONDE_ENGINE_FAST,
                .newton = -1,
-               .tolerance = 5e-3,
-               .sleep_um = 5,
+               .tolerance = 2e-2,
+               .sleep_um = 20,
                .dt_s = 1e-3,
                .repeat = 3,
                .reference = true};

@@ -94,6 +94,7 @@ static void json_world(cJSON *root, const sonde_world_def *def) {
   cJSON_AddNumberToObject(world, "contact_law", (double)def->contact_law);
   cJSON_AddNumberToObject(world, "contact_stiffness_n_m3", def->contact_stiffness_n_m3);
   cJSON_AddNumberToObject(world, "contact_damping_n_s_m3", def->contact_damping_n_s_m3);
+  cJSON_AddNumberToObject(world, "engine", (double)def->engine);
   cJSON_AddNumberToObject(world, "sleep_displacement_m", def->sleep_displacement_m);
 }
 

@@ -89,7 +89,7 @@ static sonde_status read_probes(const source *s, const cJSON *root) {
 static sonde_status read_world(const source *s, const cJSON *root) {
   const cJSON *world = cJSON_GetObjectItemCaseSensitive(root, "world");
   sonde_world_def def = sonde_world_def_default();
-  uint32_t law = 0;
+  uint32_t law = 0, engine = 0;
   const struct {
     const char *key;
     double *value;
@@ -106,8 +106,11 @@ static sonde_status read_world(const source *s, const cJSON *root) {
   if (!status) status = count_of(s, world, "newton_iterations", &def.newton_iterations);
   if (!status) status = count_of(s, world, "pcg_iterations", &def.pcg.max_iterations);
   if (!status) status = count_of(s, world, "contact_law", &law);
-  if (!status && law > SONDE_CONTACT_VOLUME) status = fail_header(s, "contact_law");
+  if (!status) status = count_of(s, world, "engine", &engine);
+  if (!status && law > SONDE_CONTACT_NODES) status = fail_header(s, "contact_law");
+  if (!status && engine > SONDE_ENGINE_FAST) status = fail_header(s, "engine");
   def.contact_law = (sonde_contact_law)law;
+  def.engine = (sonde_engine)engine;
   s->recording->world = def;
   return status;
 }

@@ -17,6 +17,9 @@ sonde_session_def sonde_session_def_default(void) {
                            .image_width = 512,
                            .image_height = 512,
                            .ticks_per_image = 20};
+  def.world.engine = SONDE_ENGINE_FAST;
+  def.world.pcg.relative_residual = 2e-2;
+  def.world.sleep_displacement_m = 20e-6;
   def.controls.echo = sonde_echo_settings_default();
   sonde_status status = sonde_pathology_preset("healthy", &def.controls.pathology, NULL);
   SONDE_ASSERT(status == SONDE_OK);

@@ -4,6 +4,7 @@
 // apply:    regions, pushes of the chosen law, terms of the implicit matrix.
 // advance:  the pushes at the end of the step by the same linearisation.
 // wrench:   force and torque on the probe, region by region.
+#include "world/lanes.h"
 #include "world/state.h"
 
 #include "base/base.h"
@@ -144,12 +145,29 @@ static void sort_touched(sonde_state *state) {
     }
 }
 
+void sonde_contact_clip(sonde_state *state, uint32_t first, uint32_t end, const sonde_box *box) {
+  SONDE_ASSERT(end <= state->model->surface.face_count);
+  for (uint32_t k = first; k < end; ++k) {
+    sonde_box face = face_box(state, state->face_order[k]);
+    if (overlap(&face, box)) clip_face(state, state->face_order[k]);
+  }
+}
+
 static void clip_block(sonde_state *state, uint32_t block, const sonde_box *box) {
   uint32_t end = (block + 1) * SONDE_FACES_PER_BLOCK;
   if (end > state->model->surface.face_count) end = state->model->surface.face_count;
-  for (uint32_t k = block * SONDE_FACES_PER_BLOCK; k < end; ++k) {
-    sonde_box face = face_box(state, state->face_order[k]);
-    if (overlap(&face, box)) clip_face(state, state->face_order[k]);
+  sonde_contact_clip(state, block * SONDE_FACES_PER_BLOCK, end, box);
+}
+
+// Boxes of runs of faces: a node moves less than 1 mm per tick, so that those farther from the
+// probe than that times the period may be old.
+static void search_blocks(sonde_state *state, const sonde_probe *probe, const sonde_box *box) {
+  sonde_box near = probe ? grown(*box, 1e-3 * SONDE_REFIT_PERIOD) : *box;
+  uint32_t turn = (uint32_t)(state->tick % SONDE_REFIT_PERIOD);
+  for (uint32_t b = 0; b < state->block_count; ++b) {
+    bool close = overlap(&state->boxes[b], &near);
+    if (close || b % SONDE_REFIT_PERIOD == turn) refit(state, b);
+    if (close && overlap(&state->boxes[b], box)) clip_block(state, b, box);
   }
 }
 
@@ -160,15 +178,12 @@ void sonde_contact_detect(sonde_state *state, const sonde_probe *probe, sonde_po
     box = sonde_contact_box(probe, pose);
     place_probe(state, probe, pose);
   }
-  if (probe && state->def.contact_law == SONDE_CONTACT_NODES) sonde_nodes_detect(state, &box);
-  // A node moves less than 1 mm per tick: boxes farther than that times the period may be old.
-  sonde_box near = probe ? grown(box, 1e-3 * SONDE_REFIT_PERIOD) : box;
-  uint32_t turn = (uint32_t)(state->tick % SONDE_REFIT_PERIOD);
-  uint32_t blocks = state->def.contact_law == SONDE_CONTACT_NODES ? 0 : state->block_count;
-  for (uint32_t b = 0; b < blocks; ++b) {
-    bool close = overlap(&state->boxes[b], &near);
-    if (close || b % SONDE_REFIT_PERIOD == turn) refit(state, b);
-    if (close && overlap(&state->boxes[b], &box)) clip_block(state, b, &box);
+  if (state->def.contact_law == SONDE_CONTACT_NODES) {
+    if (probe) sonde_nodes_detect(state, &box);
+  } else if (state->lanes && !state->lanes->stale) {
+    if (probe) sonde_lanes_detect(state, &box);
+  } else {
+    search_blocks(state, probe, &box);
   }
   sort_touched(state);
   for (uint32_t k = 0; k < state->touched_count; ++k) {
@@ -235,16 +250,22 @@ static void sum_regions(sonde_state *state, const sonde_motion *probe) {
   }
 }
 
+// The sides of a turned box face backwards by rounding.
+static bool pushes_forward(const sonde_state *state, sonde_vec3 slope) {
+  return v_dot(slope, state->inward) <= 1e-9;
+}
+
 // Depth of a point inside the probe: the least weighted distance to a plane, t = weight (d - n.x),
 // and its gradient -weight n in *slope. Planes steeper than 60 degrees to the beam count four times
 // farther: a probe that sinks in deeper than it is wide still pushes back along its face.
-// False outside.
+// False outside, and where the nearest surface faces backwards: skin gets there only when a narrow
+// probe slips through between nodes, and a push from there would draw the probe deeper.
 bool sonde_contact_depth(const sonde_state *state, sonde_vec3 x, double *depth, sonde_vec3 *slope) {
   if (state->ball_radius > 0) {
     sonde_vec3 d = v_sub(state->ball_centre, x);
     *depth = state->ball_radius - v_norm(d);
-    *slope = v_unit(d, state->inward);
-    return *depth > 0;
+    *slope = v_unit(d, v_scale(state->inward, -1));
+    return *depth > 0 && pushes_forward(state, *slope);
   }
   double least = INFINITY;
   uint32_t best = 0;
@@ -255,7 +276,7 @@ bool sonde_contact_depth(const sonde_state *state, sonde_vec3 x, double *depth, 
   }
   *depth = least;
   *slope = v_scale(state->plane_normal[best], -state->plane_weight[best]);
-  return true;
+  return pushes_forward(state, *slope);
 }
 
 // Integration points of a face: the centres of its four congruent parts, each a quarter of the rest

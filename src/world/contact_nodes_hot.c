@@ -32,7 +32,7 @@ static void touch_range(sonde_state *state, const sonde_box *box, uint32_t first
 }
 
 void sonde_nodes_detect(sonde_state *state, const sonde_box *box) {
-  const sonde_lanes *lanes = state->lanes;
+  const sonde_lanes *lanes = state->lanes && !state->lanes->stale ? state->lanes : NULL;
   if (!lanes) touch_range(state, box, 0, state->model->surface.vertex_count);
   for (uint32_t k = 0; lanes && k < lanes->near_probe_count; ++k) {
     uint32_t s = lanes->near_probe[k];

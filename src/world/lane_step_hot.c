@@ -50,19 +50,44 @@ static void publish_evaluated(sonde_state *state) {
   }
 }
 
-// Slices that the contact looks at: those in the probe's box for the law at the nodes, all awake
-// ones for the other, which keeps boxes of faces.
+// Slices that the contact looks at: with a node in the probe's box, which for pushes on faces grows
+// by one and a half of their edges, so that all corners of a face that meets the probe are among
+// them.
 static void find_near(sonde_state *state, const sonde_probe *probe, sonde_pose pose) {
   sonde_lanes *lanes = state->lanes;
   lanes->near_probe_count = 0;
-  if (state->def.contact_law != SONDE_CONTACT_NODES) {
-    memcpy(lanes->near_probe, lanes->awake, lanes->awake_count * sizeof *lanes->awake);
-    lanes->near_probe_count = lanes->awake_count;
-  } else if (probe) {
-    sonde_box box = sonde_contact_box(probe, pose);
-    const float low[3] = {(float)box.low.x, (float)box.low.y, (float)box.low.z};
-    const float high[3] = {(float)box.high.x, (float)box.high.y, (float)box.high.z};
-    lanes->kernels->near(lanes, low, high);
+  if (!probe) return;
+  sonde_box box = sonde_contact_box(probe, pose);
+  const float low[3] = {(float)box.low.x, (float)box.low.y, (float)box.low.z};
+  const float high[3] = {(float)box.high.x, (float)box.high.y, (float)box.high.z};
+  lanes->kernels->near(lanes, low, high, state->def.contact_law == SONDE_CONTACT_NODES ? 0 : 1.5f);
+}
+
+// Slices of faces with a corner in those slices.
+static void mark_near_faces(sonde_lanes *lanes) {
+  memset(lanes->face_marked, 0, lanes->face_slice_count);
+  memset(lanes->is_near, 0, lanes->slice_count);
+  for (uint32_t k = 0; k < lanes->near_probe_count; ++k) {
+    const sonde_slice_model *fixed = &lanes->model[lanes->near_probe[k]];
+    lanes->is_near[lanes->near_probe[k]] = 1;
+    for (uint32_t f = 0; f < fixed->face_count; ++f)
+      lanes->face_marked[lanes->face_near[fixed->first_face + f]] = 1;
+  }
+}
+
+void sonde_lanes_detect(sonde_state *state, const sonde_box *box) {
+  sonde_lanes *lanes = state->lanes;
+  uint32_t faces = state->model->surface.face_count;
+  mark_near_faces(lanes);
+  for (uint32_t k = 0; k < faces; ++k) {
+    if (!lanes->face_marked[k / SONDE_LANES]) {
+      k |= SONDE_LANES - 1;
+      continue;
+    }
+    const uint32_t *v = state->model->surface.faces[lanes->face_order[k]];
+    if (lanes->is_near[v[0] / SONDE_LANES] && lanes->is_near[v[1] / SONDE_LANES] &&
+        lanes->is_near[v[2] / SONDE_LANES])
+      sonde_contact_clip(state, k, k + 1, box);
   }
 }
 

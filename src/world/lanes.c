@@ -28,7 +28,8 @@ static size_t carve(sonde_lanes *l, uint32_t edges, char *base) {
   CARVE(record, rows * SONDE_RECORD), CARVE(direction, rows * SONDE_DIRECTION);
   CARVE(awake, l->slice_count), CARVE(faces, l->face_slice_count);
   CARVE(is_awake, l->slice_count), CARVE(calm, l->slice_count);
-  CARVE(face_marked, l->face_slice_count), CARVE(speed2, l->slice_count);
+  CARVE(face_marked, l->face_slice_count), CARVE(is_near, l->slice_count),
+      CARVE(speed2, l->slice_count);
   CARVE(way2, l->slice_count), CARVE(unrest2, l->slice_count), CARVE(published, l->slice_count);
   CARVE(near_probe, l->slice_count);
   CARVE(pair_edge, edges), CARVE(pair_stamp, edges);
@@ -100,6 +101,9 @@ static void fill_slice(sonde_lanes *lanes, const sonde_model *model, uint32_t s)
       fixed->low[c] = l == 0 || p < fixed->low[c] ? p : fixed->low[c];
       fixed->high[c] = l == 0 || p > fixed->high[c] ? p : fixed->high[c];
     }
+    const sonde_topology *t = &model->topology;
+    for (uint32_t k = t->start[i]; k < t->start[i + 1]; ++k)
+      fixed->reach = fmaxf(fixed->reach, (float)model->edge_rest_m[t->neighbour_edge[k]]);
     fixed->used = l + 1;
   }
 }
@@ -111,15 +115,15 @@ static sonde_slot *slot_of(sonde_lanes *lanes, const sonde_topology *t, uint32_t
   return &lanes->slot[lanes->model[i / SONDE_LANES].first_slot + k];
 }
 
-static void fill_face(sonde_lanes *lanes, const sonde_model *model, uint32_t f) {
+static void fill_face(sonde_lanes *lanes, const sonde_model *model, uint32_t at) {
+  uint32_t f = lanes->face_order[at], lane = at % SONDE_LANES;
   const uint32_t *v = model->surface.faces[f];
-  SONDE_ASSERT(f / SONDE_LANES < lanes->face_slice_count);
-  uint32_t lane = f % SONDE_LANES;
-  sonde_face_slice *face = &lanes->face[f / SONDE_LANES];
+  SONDE_ASSERT(at / SONDE_LANES < lanes->face_slice_count);
+  sonde_face_slice *face = &lanes->face[at / SONDE_LANES];
   face->area[lane] = (float)model->face_area_m2[f];
   for (uint32_t k = 0; k < 3; ++k) {
     uint32_t i = v[k], j = v[(k + 1) % 3], opposite = (k + 2) % 3;
-    int32_t first = (int32_t)(f / SONDE_LANES * SONDE_FACE_STRIDE + lane);
+    int32_t first = (int32_t)(at / SONDE_LANES * SONDE_FACE_STRIDE + lane);
     face->node[k][lane] = (int32_t)i;
     face->half_cotangent[k][lane] = (float)model->face_half_cotangent[f][k];
     slot_of(lanes, &model->topology, i, j)->corner[i % SONDE_LANES] =
@@ -133,7 +137,7 @@ static void fill_face(sonde_lanes *lanes, const sonde_model *model, uint32_t f) 
 static void fill_faces(sonde_lanes *lanes, const sonde_model *model) {
   for (uint32_t s = 0; s < lanes->face_slice_count; ++s)
     for (int l = 0; l < SONDE_LANES; ++l) lanes->face[s].area[l] = 1;
-  for (uint32_t f = 0; f < model->surface.face_count; ++f) fill_face(lanes, model, f);
+  for (uint32_t k = 0; k < model->surface.face_count; ++k) fill_face(lanes, model, k);
 }
 
 // Adds value to the list that starts at first unless it is there; returns the new count.
@@ -146,8 +150,8 @@ static uint32_t add_once(uint32_t *list, uint32_t count, uint32_t value) {
 
 // Lists of one slice at the ends of `near` and `faces`, which may be NULL for counting: then the
 // scratch lists are used.
-static void list_near(sonde_lanes *lanes, const sonde_model *model, uint32_t s, uint32_t *near,
-                      uint32_t *faces) {
+static void list_near(sonde_lanes *lanes, const sonde_model *model, const uint32_t *place,
+                      uint32_t s, uint32_t *near, uint32_t *faces) {
   const sonde_topology *t = &model->topology;
   sonde_slice_model *fixed = &lanes->model[s];
   fixed->near_count = fixed->face_count = 0;
@@ -156,7 +160,7 @@ static void list_near(sonde_lanes *lanes, const sonde_model *model, uint32_t s, 
       if (t->neighbour[k] / SONDE_LANES != s)
         fixed->near_count = add_once(near, fixed->near_count, t->neighbour[k] / SONDE_LANES);
     for (uint32_t k = t->face_start[i]; k < t->face_start[i + 1]; ++k)
-      fixed->face_count = add_once(faces, fixed->face_count, t->face_list[k] / SONDE_LANES);
+      fixed->face_count = add_once(faces, fixed->face_count, place[t->face_list[k]] / SONDE_LANES);
   }
 }
 
@@ -177,8 +181,8 @@ static sonde_lane_law law_of(const sonde_surface_law *law, const sonde_world_def
 }
 
 // Sizes that need a pass over the mesh: slots and lists per slice.
-static sonde_status measure(sonde_lanes *lanes, const sonde_model *model, sonde_slice_model *sizes,
-                            sonde_error *error) {
+static sonde_status measure(sonde_lanes *lanes, const sonde_model *model, const uint32_t *place,
+                            sonde_slice_model *sizes, sonde_error *error) {
   const sonde_topology *t = &model->topology;
   uint32_t most = 0;
   for (uint32_t i = 0; i < t->vertex_count; ++i) {
@@ -194,7 +198,7 @@ static sonde_status measure(sonde_lanes *lanes, const sonde_model *model, sonde_
     sizes[s].used = left < SONDE_LANES ? left : SONDE_LANES;
     sizes[s].first_slot = lanes->slot_count;
     sizes[s].slot_count = count_slots(t, s);
-    list_near(lanes, model, s, scratch, scratch + (size_t)most * SONDE_LANES + 1);
+    list_near(lanes, model, place, s, scratch, scratch + (size_t)most * SONDE_LANES + 1);
     sizes[s].first_near = lanes->near_total;
     sizes[s].first_face = lanes->face_total;
     lanes->slot_count += sizes[s].slot_count;
@@ -205,12 +209,13 @@ static sonde_status measure(sonde_lanes *lanes, const sonde_model *model, sonde_
   return SONDE_OK;
 }
 
-static void fill(sonde_lanes *lanes, const sonde_model *model, const sonde_slice_model *sizes) {
+static void fill(sonde_lanes *lanes, const sonde_model *model, const uint32_t *place,
+                 const sonde_slice_model *sizes) {
   memcpy(lanes->model, sizes, lanes->slice_count * sizeof *sizes);
   for (uint32_t s = 0; s < lanes->slice_count; ++s) {
     const sonde_slice_model *fixed = &lanes->model[s];
     fill_slice(lanes, model, s);
-    list_near(lanes, model, s, lanes->near + fixed->first_near,
+    list_near(lanes, model, place, s, lanes->near + fixed->first_near,
               lanes->face_near + fixed->first_face);
     for (uint32_t l = 0; l < SONDE_LANES; ++l) fill_row(lanes, model, s * SONDE_LANES + l);
   }
@@ -218,7 +223,7 @@ static void fill(sonde_lanes *lanes, const sonde_model *model, const sonde_slice
 }
 
 // The block starts at a multiple of 64, as vectors need.
-static sonde_status place(sonde_lanes *lanes, uint32_t edges, sonde_error *error) {
+static sonde_status allocate(sonde_lanes *lanes, uint32_t edges, sonde_error *error) {
   size_t bytes = carve(lanes, edges, NULL);
   lanes->block = sonde_calloc(1, bytes + 63);
   if (!lanes->block) return sonde_fail_memory(error);
@@ -228,30 +233,34 @@ static sonde_status place(sonde_lanes *lanes, uint32_t edges, sonde_error *error
 }
 
 sonde_status sonde_lanes_create(const sonde_model *model, const sonde_world_def *def,
-                                sonde_lanes **out, sonde_error *error) {
+                                const uint32_t *face_order, sonde_lanes **out, sonde_error *error) {
   *out = NULL;
   uint32_t n = model->surface.vertex_count, faces = model->surface.face_count;
   uint32_t slices = (n + SONDE_LANES - 1) / SONDE_LANES;
   sonde_lanes *lanes = SONDE_NEW(sonde_lanes, 1);
   char *room = sonde_calloc(slices + 1, sizeof(sonde_slice_model));
   sonde_slice_model *sizes = (sonde_slice_model *)(((uintptr_t)room + 63) & ~(uintptr_t)63);
-  sonde_status status = lanes && room ? SONDE_OK : sonde_fail_memory(error);
+  uint32_t *place = SONDE_NEW(uint32_t, faces);
+  sonde_status status = lanes && room && place ? SONDE_OK : sonde_fail_memory(error);
+  for (uint32_t k = 0; !status && k < faces; ++k) place[face_order[k]] = k;
   if (!status) {
     lanes->slice_count = slices;
     lanes->face_slice_count = (faces + SONDE_LANES - 1) / SONDE_LANES;
     lanes->node_count = n;
+    lanes->face_order = face_order;
     lanes->law = law_of(&model->law, def);
     lanes->kernels = sonde_lane_kernels_find(NULL);
-    status = measure(lanes, model, sizes, error);
+    status = measure(lanes, model, place, sizes, error);
   }
-  if (!status) status = place(lanes, model->topology.edge_count, error);
+  if (!status) status = allocate(lanes, model->topology.edge_count, error);
   if (!status) {
-    fill(lanes, model, sizes);
+    fill(lanes, model, place, sizes);
     *out = lanes;
   } else {
     sonde_lanes_destroy(lanes);
   }
   sonde_free(room);
+  sonde_free(place);
   return status;
 }
 

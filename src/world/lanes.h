@@ -35,6 +35,7 @@ typedef struct sonde_slice_model {
   uint32_t first_face, face_count; // slices of faces with a corner in this one
   uint32_t used;                   // rows that are nodes, from the front
   float low[3], high[3];           // box at rest
+  float reach;                     // longest edge at a node, at rest
 } sonde_slice_model;
 
 typedef struct sonde_slice {
@@ -81,13 +82,14 @@ typedef struct sonde_lane_kernels {
   void (*advance)(sonde_lanes *lanes, float alpha, float beta, double sums[2]);
   void (*accept)(sonde_lanes *lanes);   // ve += x
   double (*update)(sonde_lanes *lanes); // u, v at the end, ve for the next; not finite: NaN
-  // Slices with a node in the box, or all awake ones for NULL: `near_probe`
-  void (*near)(sonde_lanes *lanes, const float low[3], const float high[3]);
+  // near_probe: slices with a node in the box, which grows by `edges` times their reach
+  void (*near)(sonde_lanes *lanes, const float low[3], const float high[3], float edges);
 } sonde_lane_kernels;
 
 struct sonde_lanes {
   void *block;
   uint32_t node_count, slice_count, face_slice_count, slot_count, near_total, face_total;
+  const uint32_t *face_order; // [faces] of the state: slices of faces follow it
   sonde_lane_law law;
   const sonde_lane_kernels *kernels;
   sonde_slice_model *model;
@@ -101,12 +103,12 @@ struct sonde_lanes {
   float *direction;        // [rows][4] z and N.z of every row
   uint32_t *awake, *faces; // lists of slices that take part
   uint32_t awake_count, face_list_count;
-  uint8_t *is_awake, *calm, *face_marked;
-  float *speed2;  // [slices] largest square of a node's speed
-  float *way2;    // [slices] and displacement
-  float *unrest2; // [slices] largest square of unbalanced force over the anchors' stiffness: no
-                  // node is farther from its equilibrium
-  uint8_t *published;   // [slices] the doubles of the state are up to date
+  uint8_t *is_awake, *calm, *face_marked, *is_near;
+  float *speed2;      // [slices] largest square of a node's speed
+  float *way2;        // [slices] and displacement
+  float *unrest2;     // [slices] largest square of unbalanced force over the anchors' stiffness: no
+                      // node is farther from its equilibrium
+  uint8_t *published; // [slices] the doubles of the state are up to date
   uint32_t *near_probe; // slices that the contact looks at
   uint32_t near_probe_count;
   sonde_vec3 reaction_n;
@@ -122,8 +124,10 @@ static inline sonde_vec3 sonde_lane_vector(const sonde_lane a[3], uint32_t lane)
 }
 
 // Lays out the model; NULL where memory is out.
+// face_order: faces along a space-filling curve, borrowed; slices of faces follow it.
 sonde_status sonde_lanes_create(const sonde_model *model, const sonde_world_def *def,
-                                sonde_lanes **lanes, sonde_error *error);
+                                const uint32_t *face_order, sonde_lanes **lanes,
+                                sonde_error *error);
 void sonde_lanes_destroy(sonde_lanes *lanes);
 // Takes over displacements and velocities from doubles; wakes every slice, or none.
 void sonde_lanes_import(sonde_lanes *lanes, const sonde_vec3 *rest, const sonde_vec3 *position,

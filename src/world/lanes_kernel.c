@@ -337,28 +337,28 @@ static double update(sonde_lanes *lanes) {
 
 // Whether a node of the slice is inside the box where it is evaluated.
 INLINE bool reaches(const sonde_slice_model *fixed, const sonde_slice *at, float h,
-                    const float low[3], const float high[3]) {
+                    const float low[3], const float high[3], float margin) {
   sonde_lane_index inside = (sonde_lane_index){0} == (sonde_lane_index){0};
   for (int c = 0; c < 3; ++c) {
     sonde_lane x = fixed->place[c] + (at->u[c] + h * at->ve[c]);
-    inside &= (x >= low[c]) & (x <= high[c]);
+    inside &= (x >= low[c] - margin) & (x <= high[c] + margin);
   }
   int any = 0;
   for (int l = 0; l < SONDE_LANES; ++l) any |= inside[l];
   return any != 0;
 }
 
-static void near(sonde_lanes *lanes, const float low[3], const float high[3]) {
+static void near(sonde_lanes *lanes, const float low[3], const float high[3], float edges) {
   float h = lanes->law.dt;
   uint32_t count = 0;
   for (uint32_t s = 0; s < lanes->slice_count; ++s) {
     const sonde_slice_model *fixed = &lanes->model[s];
-    float margin =
-        __builtin_sqrtf(lanes->way2[s]) + 3 * h * __builtin_sqrtf(lanes->speed2[s]) + 1e-4f;
+    float margin = edges * fixed->reach, way = margin + 1e-4f;
+    way += __builtin_sqrtf(lanes->way2[s]) + 3 * h * __builtin_sqrtf(lanes->speed2[s]);
     bool apart = false;
     for (int c = 0; c < 3; ++c)
-      apart |= fixed->low[c] - margin > high[c] || fixed->high[c] + margin < low[c];
-    if (apart || !reaches(fixed, &lanes->slice[s], h, low, high)) continue;
+      apart |= fixed->low[c] - way > high[c] || fixed->high[c] + way < low[c];
+    if (apart || !reaches(fixed, &lanes->slice[s], h, low, high, margin)) continue;
     lanes->near_probe[count++] = s;
   }
   SONDE_ASSERT(count <= lanes->slice_count);

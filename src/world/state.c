@@ -146,7 +146,7 @@ sonde_status sonde_state_create_ordered(const sonde_model *model, const sonde_wo
                                        (const uint32_t(*)[2])model->topology.edges, &state->matrix,
                                        error);
   if (!status && def->engine == SONDE_ENGINE_FAST)
-    status = sonde_lanes_create(model, def, &state->lanes, error);
+    status = sonde_lanes_create(model, def, state->face_order, &state->lanes, error);
   if (status) {
     sonde_state_destroy(state);
     return status;
