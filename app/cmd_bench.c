@@ -28,8 +28,9 @@ static const char HELP[] =
     "  --engine NAME  fast (default) or double\n"
     "  --newton N     Newton iterations of a step; default 2, ellipsoid 1\n"
     "  --reference-newton N  of the converged run; default as --newton\n"
-    "  --sleep-um D   a node slower than this per 10 ms may sleep, 0 to 1000; default 20\n"
-    "  --tolerance R  of the linear solver, 1e-12 to 0.5; default 2e-2\n"
+    "  --sleep-um D   nodes nearer than this to balance may sleep, 0 to 1000; default 20\n"
+    "  --tolerance R  of the linear solver, 1e-12 to 0.5; default 2e-2,\n"
+    "                 ellipsoid 0.1\n"
     "  --seconds S    simulated time, 0.05 to 60; default 1, ellipsoid 0.5\n"
     "  --dt-ms H      time step, 0.1 to 20; default 1\n"
     "  --repeat N     timed runs, the fastest median is reported; default 3\n"
@@ -65,6 +66,7 @@ typedef struct options {
 typedef struct sample {
   double total_s, contact_s, assembly_s, solve_s, update_s;
   uint32_t iterations, awake;
+  double bytes;
 } sample;
 
 typedef struct bench {
@@ -155,6 +157,7 @@ static int read_options(int argc, char **argv, options *o) {
     code = read_option(o, c);
     if (code >= 0) return code;
   }
+  if (!(o->tolerance > 0)) o->tolerance = is_ellipsoid(o) ? 0.1 : 2e-2;
   if (!(o->seconds > 0)) o->seconds = is_ellipsoid(o) ? 0.5 : 1;
   if (argc - optind > (is_ellipsoid(o) ? 0 : 1))
     return app_usage_error("bench", "'%s' is too much", argv[argc - 1]);
@@ -211,7 +214,8 @@ static void run(const bench *b, sonde_state *state, sample *samples, sonde_vec3 
                           t.solve_s,
                           t.update_s,
                           sonde_state_solver(state).iterations,
-                          sonde_state_awake(state)};
+                          sonde_state_awake(state),
+                          (double)sonde_state_bytes_moved(state)};
   }
 }
 
@@ -262,6 +266,7 @@ static sonde_world_def world_of(const options *o, bool reference) {
   def.dt_s = o->dt_s;
   if (o->newton >= 0) def.newton_iterations = (uint32_t)o->newton;
   def.engine = reference ? SONDE_ENGINE_DOUBLE : o->engine;
+  def.pcg.max_iterations = 5000;
   if (!reference) def.pcg.relative_residual = o->tolerance;
   if (reference) def.pcg = (sonde_pcg_options){1e-10, 1e-16, 5000};
   if (reference && o->newton_reference) def.newton_iterations = (uint32_t)o->newton_reference;
@@ -323,6 +328,26 @@ static sonde_status write_csv(const bench *b, sonde_error *error) {
   return sonde_file_commit(file, error);
 }
 
+// Bytes per second when a block of that size is read over and over: what memory could give at best.
+static double bandwidth(double bytes) {
+  size_t count = (size_t)(bytes / sizeof(uint64_t)) + 1;
+  uint64_t *block = calloc(count, sizeof *block), sum = 0;
+  if (!block) return NAN;
+  for (size_t k = 0; k < count; ++k) block[k] = k;
+  size_t rounds = (size_t)(2e8 / (double)(count * sizeof *block)) + 1;
+  double best = INFINITY;
+  for (int attempt = 0; attempt < 5; ++attempt) {
+    double start = now();
+    for (size_t r = 0; r < rounds; ++r) {
+      for (size_t k = 0; k < count; ++k) sum += block[k];
+      __asm__ volatile("" : "+r"(sum) : : "memory");
+    }
+    best = fmin(best, (now() - start) / (double)rounds);
+  }
+  free(block);
+  return (double)(count * sizeof *block) / best;
+}
+
 static const struct {
   const char *name;
   size_t offset;
@@ -331,8 +356,16 @@ static const struct {
               {"solve", offsetof(sample, solve_s)},
               {"update", offsetof(sample, update_s)}};
 
+// Time of a step over the time that moving its bytes takes at the measured bandwidth.
+static double floor_ratio(const bench *b, double *bytes) {
+  *bytes = quantile(b, offsetof(sample, bytes), 0.5);
+  if (!(*bytes > 0)) return NAN;
+  return quantile(b, offsetof(sample, total_s), 0.5) * bandwidth(*bytes) / *bytes;
+}
+
 static void print_json(const bench *b, double error_ratio) {
   size_t total = offsetof(sample, total_s);
+  double bytes, ratio = floor_ratio(b, &bytes);
   app_json_begin();
   app_json_text("scene", b->o->scene->name);
   app_json_integer("nodes", b->model->surface.vertex_count);
@@ -346,6 +379,8 @@ static void print_json(const bench *b, double error_ratio) {
   app_json_close();
   app_json_real("iterations", mean_count(b, offsetof(sample, iterations)));
   app_json_real("awake_nodes", mean_count(b, offsetof(sample, awake)));
+  app_json_real("bytes_moved", bytes);
+  app_json_real("floor_ratio", ratio);
   app_json_real("relative_error", error_ratio);
   app_json_object("stages_ms");
   for (size_t k = 0; k < 4; ++k)
@@ -356,6 +391,7 @@ static void print_json(const bench *b, double error_ratio) {
 
 static void print_table(const bench *b, double error_ratio) {
   size_t total = offsetof(sample, total_s);
+  double bytes, ratio = floor_ratio(b, &bytes);
   printf("scene %s: %u nodes, dt %g ms, %u steps, one core\n", b->o->scene->name,
          b->model->surface.vertex_count, b->o->dt_s * 1e3, b->steps);
   printf("  step      median %8.4f ms   p99 %8.4f ms   max %8.4f ms   %8.0f steps/s\n",
@@ -364,6 +400,8 @@ static void print_table(const bench *b, double error_ratio) {
   for (size_t k = 0; k < 4; ++k)
     printf("  %-9s median %8.4f ms   p99 %8.4f ms\n", STAGES[k].name,
            quantile(b, STAGES[k].offset, 0.5) * 1e3, quantile(b, STAGES[k].offset, 0.99) * 1e3);
+  if (bytes > 0)
+    printf("  moved     %.2f MB, %.1f times what reading them takes\n", bytes * 1e-6, ratio);
   printf("  iterations %.1f   awake nodes %.0f   relative error ",
          mean_count(b, offsetof(sample, iterations)), mean_count(b, offsetof(sample, awake)));
   if (isnan(error_ratio))
@@ -382,7 +420,7 @@ int cmd_bench(int argc, char **argv) {
                .ellipsoid = {7842, 200, 1},
                .engine = SONDE_ENGINE_FAST,
                .newton = -1,
-               .tolerance = 2e-2,
+               .tolerance = 0,
                .sleep_um = 20,
                .dt_s = 1e-3,
                .repeat = 3,

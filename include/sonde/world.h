@@ -183,6 +183,9 @@ SONDE_API uint32_t sonde_state_awake(const sonde_state *state);
 SONDE_API uint32_t sonde_state_flags(const sonde_state *state);
 SONDE_API uint64_t sonde_state_flag_count(const sonde_state *state);
 SONDE_API sonde_stage_times sonde_state_times(const sonde_state *state);
+/** Bytes that the fast engine's kernels read and wrote in the last step, at the least; 0 for
+ * DOUBLE. */
+SONDE_API uint64_t sonde_state_bytes_moved(const sonde_state *state);
 /** Hash of positions, velocities and tick: equal runs have equal hashes. @thread owner */
 SONDE_API uint64_t sonde_state_hash(const sonde_state *state);
 

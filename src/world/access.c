@@ -114,6 +114,10 @@ void sonde_state_set(sonde_state *state, const sonde_vec3 *positions,
   sonde_state_wake_all(state);
 }
 
+uint64_t sonde_state_bytes_moved(const sonde_state *state) {
+  return state->lanes ? state->lanes->bytes_moved : 0;
+}
+
 uint64_t sonde_state_hash(const sonde_state *state) {
   size_t bytes = state->model->surface.vertex_count * sizeof *state->position;
   sonde_state_publish(state);

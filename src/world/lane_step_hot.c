@@ -16,10 +16,11 @@
 #include <string.h>
 
 static void list_awake(sonde_lanes *lanes) {
-  lanes->awake_count = lanes->face_list_count = 0;
+  lanes->awake_count = lanes->face_list_count = lanes->slot_total = 0;
   for (uint32_t s = 0; s < lanes->slice_count; ++s) {
     lanes->awake[lanes->awake_count] = s;
     lanes->awake_count += lanes->is_awake[s];
+    lanes->slot_total += lanes->is_awake[s] ? lanes->model[s].slot_count : 0;
   }
   if (!(lanes->law.shear > 0)) return;
   memset(lanes->face_marked, 0, lanes->face_slice_count);
@@ -177,7 +178,26 @@ static void keep_velocities(sonde_lanes *lanes) {
   }
 }
 
-static void solve(sonde_state *state) {
+// Vectors that the kernels read and write at least once, per slice and per slot: those of one
+// evaluation (evaluate, linearise, begin) and of one iteration (multiply, advance). Records of
+// neighbours count once per slot; faces of the shear layer and the contact do not count.
+enum {
+  EVALUATED_PER_SLICE = 66,
+  EVALUATED_PER_SLOT = 18,
+  ITERATED_PER_SLICE = 55,
+  ITERATED_PER_SLOT = 10,
+  UPDATED_PER_SLICE = 18
+};
+
+static void count_bytes(sonde_lanes *lanes, uint64_t evaluations, uint64_t iterations) {
+  uint64_t slices = lanes->awake_count, slots = lanes->slot_total;
+  lanes->bytes_moved += sizeof(sonde_lane) *
+                        (evaluations * (EVALUATED_PER_SLICE * slices + EVALUATED_PER_SLOT * slots) +
+                         iterations * (ITERATED_PER_SLICE * slices + ITERATED_PER_SLOT * slots));
+}
+
+// False when there was nothing left to solve.
+static bool solve(sonde_state *state) {
   sonde_lanes *lanes = state->lanes;
   const sonde_pcg_options *options = &state->def.pcg;
   double sums[3], next[2], alpha = 0, beta = 0;
@@ -198,8 +218,11 @@ static void solve(sonde_state *state) {
   if (result.iterations == 0) keep_velocities(lanes);
   result.converged = result.residual <= target;
   if (!result.converged) state->flags |= SONDE_FLAG_NOT_CONVERGED;
+  bool solved = result.iterations > 0;
+  count_bytes(lanes, 1, result.iterations);
   result.iterations += state->solver.iterations;
   state->solver = result;
+  return solved;
 }
 
 // The solution of touched nodes, for the pushes at the end of the step.
@@ -214,7 +237,8 @@ static void publish_increments(sonde_state *state, bool clear) {
 }
 
 // One Newton iteration: forces and matrix where the nodes are expected, solution, pushes after it.
-static void iterate(sonde_state *state, const sonde_probe *probe, sonde_pose pose,
+// False when the nodes already were where they should be.
+static bool iterate(sonde_state *state, const sonde_probe *probe, sonde_pose pose,
                     const sonde_motion *motion) {
   sonde_lanes *lanes = state->lanes;
   double h = state->def.dt_s, start = sonde_clock_now();
@@ -234,7 +258,7 @@ static void iterate(sonde_state *state, const sonde_probe *probe, sonde_pose pos
     couple(state);
   }
   double assembled = sonde_clock_now();
-  solve(state);
+  bool solved = solve(state);
   publish_increments(state, false);
   sonde_contact_advance(state, motion, 1, h);
   publish_increments(state, true);
@@ -242,6 +266,7 @@ static void iterate(sonde_state *state, const sonde_probe *probe, sonde_pose pos
   state->times.contact_s += detected - start;
   state->times.assembly_s += assembled - detected;
   state->times.solve_s += sonde_clock_now() - assembled;
+  return solved;
 }
 
 static void fall_asleep(sonde_state *state, uint32_t s) {
@@ -332,6 +357,7 @@ bool sonde_lane_step(sonde_state *state, const sonde_probe *probe, sonde_pose po
                        true);
   state->times = (sonde_stage_times){0};
   state->solver = (sonde_pcg_result){0};
+  lanes->bytes_moved = 0;
   list_awake(lanes);
   hold_touched(state);
   for (uint32_t k = 0; k < state->def.newton_iterations; ++k) iterate(state, probe, pose, motion);
@@ -340,6 +366,7 @@ bool sonde_lane_step(sonde_state *state, const sonde_probe *probe, sonde_pose po
   sonde_contact_wrench(state, pose.position);
   state->contact.reaction_n = lanes->reaction_n;
   double size = lanes->kernels->update(lanes);
+  lanes->bytes_moved += sizeof(sonde_lane) * UPDATED_PER_SLICE * lanes->awake_count;
   bool finite = isfinite(size) && v_finite(state->contact.force_n);
   if (finite) rest(state);
   state->row_count = 0;

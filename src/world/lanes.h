@@ -115,7 +115,9 @@ struct sonde_lanes {
   uint32_t *pair_edge;  // edges whose blocks the contact fills
   uint32_t *pair_stamp; // [edges]
   uint32_t pair_count, stamp;
-  bool stale; // the doubles of the state are newer
+  uint32_t slot_total;  // of the waking slices
+  uint64_t bytes_moved; // by the last step, see count_bytes()
+  bool stale;           // the doubles of the state are newer
 };
 
 // The numbers of one lane.
