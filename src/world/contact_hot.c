@@ -145,18 +145,13 @@ static void sort_touched(sonde_state *state) {
     }
 }
 
-void sonde_contact_clip(sonde_state *state, uint32_t first, uint32_t end, const sonde_box *box) {
-  SONDE_ASSERT(end <= state->model->surface.face_count);
+static void clip_block(sonde_state *state, uint32_t block, const sonde_box *box) {
+  uint32_t first = block * SONDE_FACES_PER_BLOCK, end = first + SONDE_FACES_PER_BLOCK;
+  if (end > state->model->surface.face_count) end = state->model->surface.face_count;
   for (uint32_t k = first; k < end; ++k) {
     sonde_box face = face_box(state, state->face_order[k]);
     if (overlap(&face, box)) clip_face(state, state->face_order[k]);
   }
-}
-
-static void clip_block(sonde_state *state, uint32_t block, const sonde_box *box) {
-  uint32_t end = (block + 1) * SONDE_FACES_PER_BLOCK;
-  if (end > state->model->surface.face_count) end = state->model->surface.face_count;
-  sonde_contact_clip(state, block * SONDE_FACES_PER_BLOCK, end, box);
 }
 
 // Boxes of runs of faces: a node moves less than 1 mm per tick, so that those farther from the
@@ -291,6 +286,37 @@ static const double POINT[POINTS][3] = {{1.0 / 3, 1.0 / 3, 1.0 / 3},
 static sonde_vec3 blend(const sonde_vec3 *field, const uint32_t *v, const double *weight) {
   sonde_vec3 sum = v_scale(field[v[0]], weight[0]);
   return v_madd(v_madd(sum, weight[1], field[v[1]]), weight[2], field[v[2]]);
+}
+
+// A face by its points: shares and gradients by the same quadrature as the pushes, instead of the
+// exact clip.
+static void sample_face(sonde_state *state, uint32_t face) {
+  const uint32_t *v = state->model->surface.faces[face];
+  double area = state->model->face_area_m2[face] / POINTS, depth;
+  uint32_t inside = 0;
+  for (int q = 0; q < POINTS; ++q) {
+    sonde_vec3 slope;
+    if (!sonde_contact_depth(state, blend(state->probed, v, POINT[q]), &depth, &slope)) continue;
+    if (inside++ == 0)
+      for (int k = 0; k < 3; ++k) touch(state, v[k]);
+    sonde_vec3 outward = v_scale(v_unit(slope, state->inward), area);
+    for (int k = 0; k < 3; ++k) {
+      state->share_m3[v[k]] += POINT[q][k] * area * depth;
+      state->gradient[v[k]] = v_madd(state->gradient[v[k]], POINT[q][k], outward);
+    }
+    state->contact.area_m2 += area;
+    state->contact.volume_m3 += area * depth;
+  }
+  if (inside == 0) return;
+  sonde_contact_join(state, v[0], v[1]);
+  sonde_contact_join(state, v[1], v[2]);
+  SONDE_ASSERT(state->touched_face_count < state->model->surface.face_count);
+  state->touched_faces[state->touched_face_count++] = face;
+}
+
+void sonde_contact_sample(sonde_state *state, uint32_t face, const sonde_box *box) {
+  sonde_box own = face_box(state, face);
+  if (overlap(&own, box)) sample_face(state, face);
 }
 
 // The push acts against the slope of the depth: out of the probe.

@@ -88,7 +88,7 @@ void sonde_lanes_detect(sonde_state *state, const sonde_box *box) {
     const uint32_t *v = state->model->surface.faces[lanes->face_order[k]];
     if (lanes->is_near[v[0] / SONDE_LANES] && lanes->is_near[v[1] / SONDE_LANES] &&
         lanes->is_near[v[2] / SONDE_LANES])
-      sonde_contact_clip(state, k, k + 1, box);
+      sonde_contact_sample(state, lanes->face_order[k], box);
   }
 }
 

@@ -131,9 +131,9 @@ void sonde_nodes_detect(sonde_state *state, const sonde_box *box);
 void sonde_nodes_apply(sonde_state *state, const sonde_motion *probe,
                        const sonde_contact_scales *scales);
 void sonde_nodes_advance(sonde_state *state, const sonde_motion *probe, double lambda, double h);
-// Clips the faces of a run of face_order that meet the box; all faces near the probe for the fast
+// A face whose box meets the probe's, by its integration points; all such faces for the fast
 // engine. @thread tick
-void sonde_contact_clip(sonde_state *state, uint32_t first, uint32_t end, const sonde_box *box);
+void sonde_contact_sample(sonde_state *state, uint32_t face, const sonde_box *box);
 void sonde_lanes_detect(sonde_state *state, const sonde_box *box);
 // Joins the regions of two touched nodes. @thread tick
 void sonde_contact_join(sonde_state *state, uint32_t a, uint32_t b);
