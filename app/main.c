@@ -24,6 +24,8 @@ static const command COMMANDS[] = {
     {"press", cmd_press, "press once, settle, report force, penetration and vessels"},
     {"cut", cmd_cut, "cut the skin along a path and write the cut model"},
     {"simulate", cmd_simulate, "simulate a scene of several bodies"},
+    {"reconstruct", cmd_reconstruct, "make a volume from tracked image frames"},
+    {"slice", cmd_slice, "make a picture at any pose from tracked frames or a volume"},
     {"replay", cmd_replay, "play a recording again and compare the state hash"},
     {"bench", cmd_bench, "time the simulation's stages"},
     {"devices", cmd_devices, "list the input devices of this machine"},
@@ -72,7 +74,7 @@ static const char *suggestion(const char *word) {
 static void print_help(FILE *stream) {
   fprintf(stream, "usage: sonde COMMAND [OPTIONS]\n\ncommands:\n");
   for (int i = 0; i < COMMAND_COUNT; ++i)
-    fprintf(stream, "  %-8s  %s\n", COMMANDS[i].verb, COMMANDS[i].summary);
+    fprintf(stream, "  %-11s  %s\n", COMMANDS[i].verb, COMMANDS[i].summary);
   fprintf(stream, "\nsonde COMMAND --help tells the options of a command; sonde --version the "
                   "version.\nExit codes: 0 success, 1 failure, 2 bad input.\n");
 }

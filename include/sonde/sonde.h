@@ -19,6 +19,7 @@
 #include "sonde/report.h"
 #include "sonde/interior.h"
 #include "sonde/echo.h"
+#include "sonde/echo_frames.h"
 #include "sonde/haptics.h"
 #include "sonde/exam.h"
 #include "sonde/stream.h"

@@ -1,0 +1,235 @@
+/**
+ * @file echo_frames.h
+ * Tracked image sequences: reading and writing them, an image at any pose between their frames,
+ * a volume from them, and how like two images are.
+ *
+ * Memory holds metres; the files hold millimetres. Pixel (u, v) means the centre of the pixel in
+ * column u and row v; u grows towards the marked side of the probe, v away from the probe (MF).
+ */
+#ifndef SONDE_ECHO_FRAMES_H
+#define SONDE_ECHO_FRAMES_H
+
+#include "sonde/echo.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/** Affine map a_from_b: p_a = M p_b + t, the rows of [M | t]. */
+typedef struct sonde_affine {
+  double m[3][4];
+} sonde_affine;
+
+/** A named text of a sequence or of one of its frames; one line each. */
+typedef struct sonde_field {
+  char *key, *value;
+} sonde_field;
+
+typedef struct sonde_tracked_frame {
+  sonde_field *fields;
+  uint32_t field_count, field_room;
+  bool used;                     /**< has a pose and takes part; false until located */
+  sonde_affine world_from_pixel; /**< pixel (u, v, 0) -> m */
+} sonde_tracked_frame;
+
+/** Frames of one size; owns everything it points to. */
+typedef struct sonde_sequence {
+  uint32_t width, height, count;
+  char orientation[4]; /**< of the file: MF, UF, MN, UN, a third letter A; pixels are always MF */
+  uint32_t clip[4];    /**< part of every frame that is used: column, row, width, height */
+  sonde_tracked_frame file;    /**< fields of the whole file; no pose */
+  sonde_tracked_frame *frames; /**< [count] */
+  uint8_t *pixels;             /**< [count*height*width] */
+} sonde_sequence;
+
+/** Frame number that means the whole file. */
+#define SONDE_WHOLE_FILE UINT32_MAX
+
+/** Black frames without fields. @thread owner */
+SONDE_API sonde_status sonde_sequence_create(uint32_t width, uint32_t height, uint32_t count,
+                                             sonde_sequence *sequence, sonde_error *error);
+SONDE_API void sonde_sequence_clear(sonde_sequence *sequence);
+/** Sets or replaces a field; key and value are copied. @param frame or SONDE_WHOLE_FILE */
+SONDE_API sonde_status sonde_sequence_set(sonde_sequence *sequence, uint32_t frame, const char *key,
+                                          const char *value, sonde_error *error);
+/** Sets "<name>Transform" to 16 numbers in mm and its status to OK. @param a_from_b in mm */
+SONDE_API sonde_status sonde_sequence_set_transform(sonde_sequence *sequence, uint32_t frame,
+                                                    const char *name, const sonde_affine *a_from_b,
+                                                    sonde_error *error);
+/** Value of a field or NULL; borrowed. @thread any */
+SONDE_API const char *sonde_sequence_get(const sonde_sequence *sequence, uint32_t frame,
+                                         const char *key);
+
+/**
+ * Reads a MetaImage (.igs.mha) or NRRD (.igs.nrrd, .seq.nrrd) sequence of 8-bit grey frames, raw or
+ * compressed, pixels in the same file. Frames whose status is INVALID are kept.
+ * @return SONDE_FORMAT with file, line and what was expected
+ * @thread owner
+ */
+SONDE_API sonde_status sonde_sequence_load(const char *path, sonde_sequence *sequence,
+                                           sonde_error *error);
+/**
+ * Writes by the name's end: .mha, .seq.nrrd (four axes, as Slicer wants) or .nrrd (three, as IGSIO
+ * writes). Equal sequences give equal bytes. @thread owner
+ */
+SONDE_API sonde_status sonde_sequence_save(const char *path, const sonde_sequence *sequence,
+                                           bool compressed, sonde_error *error);
+
+/** Transforms that hold for every frame. */
+typedef struct sonde_calibration {
+  uint32_t count;
+  struct {
+    char from[32], to[32];
+    sonde_affine to_from_from; /**< in mm, as in the file; from Image: mm from pixel */
+  } transforms[16];
+  bool has_clip;
+  uint32_t clip[4];
+} sonde_calibration;
+
+/** Reads the Transform elements and the clip rectangle of a PLUS configuration (XML).
+ *  @thread owner */
+SONDE_API sonde_status sonde_calibration_load(const char *path, sonde_calibration *calibration,
+                                              sonde_error *error);
+
+/** What sonde_sequence_locate() found. */
+typedef struct sonde_located {
+  uint32_t used, invalid, missing; /**< frames: with pose; status INVALID; without a way */
+  char world[32];                  /**< the frame of reference that the poses are in */
+} sonde_located;
+
+/**
+ * Gives every frame its pose by joining its transforms and the calibration's (either way round)
+ * from Image to `world`; NULL takes the first of Reference, Tracker, World, Probe that is reached.
+ * Frames whose image or needed transform is not OK are not used and counted.
+ * @return SONDE_MISMATCH when no frame has a pose, SONDE_FORMAT for a transform without inverse
+ * @thread owner
+ */
+SONDE_API sonde_status sonde_sequence_locate(sonde_sequence *sequence,
+                                             const sonde_calibration *calibration,
+                                             const char *world, sonde_located *located,
+                                             sonde_error *error);
+
+/** 8-bit volume; owns its voxels. */
+typedef struct sonde_volume {
+  uint32_t size[3];
+  sonde_affine world_from_voxel; /**< voxel centre (i, j, k) -> m */
+  uint8_t *voxels;               /**< [size[2]*size[1]*size[0]], i runs fastest */
+} sonde_volume;
+
+SONDE_API sonde_status sonde_volume_create(const uint32_t size[3], sonde_volume *volume,
+                                           sonde_error *error);
+SONDE_API void sonde_volume_clear(sonde_volume *volume);
+/** MetaImage or NRRD with three axes, 8 bits. @thread owner */
+SONDE_API sonde_status sonde_volume_load(const char *path, sonde_volume *volume,
+                                         sonde_error *error);
+/** By the name's end, .mha or .nrrd. @thread owner */
+SONDE_API sonde_status sonde_volume_save(const char *path, const sonde_volume *volume,
+                                         bool compressed, sonde_error *error);
+
+typedef enum sonde_reconstruct_method {
+  SONDE_RECONSTRUCT_LINEAR, /**< a pixel is shared among the eight voxels around it */
+  SONDE_RECONSTRUCT_NEAREST /**< a pixel goes to the nearest voxel */
+} sonde_reconstruct_method;
+
+typedef struct sonde_reconstruct_options {
+  double spacing_m; /**< default 0.5 mm */
+  sonde_reconstruct_method method;
+  double hole_fill_m;   /**< longest gap that is bridged, 0: none; default 3 mm */
+  uint64_t most_voxels; /**< default 2^28; five bytes of work memory each */
+} sonde_reconstruct_options;
+
+SONDE_API sonde_reconstruct_options sonde_reconstruct_options_default(void);
+
+typedef struct sonde_reconstruct_report {
+  uint32_t frames;
+  uint64_t voxels, touched, bridged; /**< all; holding a pixel; filled as holes */
+} sonde_reconstruct_report;
+
+/**
+ * Volume of all used frames on a grid along the world's axes; voxels that no frame reaches are 0.
+ * @return SONDE_ARGUMENT naming the spacing that would fit when the grid is too large
+ * @thread owner
+ */
+SONDE_API sonde_status sonde_reconstruct(const sonde_sequence *sequence,
+                                         const sonde_reconstruct_options *options,
+                                         sonde_volume *volume, sonde_reconstruct_report *report,
+                                         const sonde_progress *progress, sonde_error *error);
+
+/** Pixel (u, v, 0) -> m for a picture of the probe's x-z plane, see docs/frames.md. @thread any */
+SONDE_API sonde_affine sonde_slice_plane(sonde_pose world_from_probe, const sonde_image *image);
+
+typedef enum sonde_slice_method {
+  SONDE_SLICE_BRACKET, /**< between the nearest frames on both sides, weighted by distance */
+  SONDE_SLICE_NEAREST  /**< the nearest frame alone */
+} sonde_slice_method;
+
+typedef struct sonde_slicer_options {
+  sonde_slice_method method;
+  bool along_sweep;  /**< join frames pixel to pixel instead of across, see below */
+  double gap_m;      /**< frames further apart are not joined; default 10 mm */
+  double reach_m;    /**< how far a frame speaks for itself with none beyond; default 1 mm */
+  uint32_t left_out; /**< frame that is not used, SONDE_WHOLE_FILE: none (default) */
+  uint32_t threads;  /**< 0 (default): all cores; results do not depend on it */
+} sonde_slicer_options;
+
+SONDE_API sonde_slicer_options sonde_slicer_options_default(void);
+
+typedef struct sonde_slicer sonde_slicer;
+
+/** @param sequence borrowed, located @thread owner */
+SONDE_API sonde_status sonde_slicer_create(const sonde_sequence *sequence,
+                                           const sonde_slicer_options *options,
+                                           sonde_slicer **slicer, sonde_error *error);
+SONDE_API void sonde_slicer_destroy(sonde_slicer *slicer);
+/**
+ * Fills an image straight from the frames: each pixel lies between the planes of two frames and
+ * takes their values where a line through it meets them, weighted by the distance to the other.
+ * The line lies half way between their normals; along the sweep it runs from a pixel of one frame
+ * to the same pixel of the other.
+ * @param known [height*width] 1 where frames reach, else 0 (and the pixel is black); may be NULL
+ * @return pixels that frames reach
+ * @thread one at a time per slicer
+ */
+SONDE_API uint64_t sonde_slicer_render(sonde_slicer *slicer, const sonde_affine *world_from_pixel,
+                                       sonde_image *image, uint8_t *known);
+
+/** The same from a volume, trilinear or nearest voxel. @thread any, one per image */
+SONDE_API uint64_t sonde_volume_slice(const sonde_volume *volume, bool nearest,
+                                      const sonde_affine *world_from_pixel, sonde_image *image,
+                                      uint8_t *known);
+
+/** How like two images are, over the known pixels. */
+typedef struct sonde_likeness {
+  uint64_t count;
+  double rms_grey, mae_grey, psnr_db, ncc;
+  double ssim; /**< windows of 7 x 7 whose pixels are all known; NaN without one */
+} sonde_likeness;
+
+/** @param known [height*width] or NULL for all @thread any */
+SONDE_API sonde_status sonde_image_likeness(const uint8_t *a, const uint8_t *b,
+                                            const uint8_t *known, uint32_t width, uint32_t height,
+                                            sonde_likeness *likeness, sonde_error *error);
+
+/** Every frame with a neighbour on both sides made again from the others. */
+typedef struct sonde_left_out {
+  uint32_t frames;
+  /** Pooled rms; means of the other measures over the frames. Between the frames on both sides,
+   *  from the nearest frame alone, mean of the frames before and after without their poses. */
+  sonde_likeness bracket, nearest, neighbours;
+} sonde_left_out;
+
+/**
+ * Compares over the pixels that all three ways reach and that some frame shows brighter than black.
+ * @return SONDE_MISMATCH when fewer than three frames are used
+ * @thread owner
+ */
+SONDE_API sonde_status sonde_sequence_leave_one_out(const sonde_sequence *sequence,
+                                                    const sonde_slicer_options *options,
+                                                    sonde_left_out *result,
+                                                    const sonde_progress *progress,
+                                                    sonde_error *error);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,319 @@
+// Sequences in memory and their files.
+//
+// sonde_sequence_create, sonde_sequence_clear
+// find_field, owner_of         where a text stands
+// sonde_sequence_set           one text
+// check_text                   what a file can hold
+// read_geometry                sizes, and which axis runs over the frames
+// read_orientation             MF and its relatives
+// split_frame_key              "Seq_Frame0012_Name" -> 12, "Name"
+// read_fields                  entries of the header -> texts
+// gather_list_first            frames that run fastest -> one after the other
+// mirror                       between the file's orientation and MF
+// sonde_sequence_load, sonde_sequence_save
+#include "echo/frames.h"
+
+#include <string.h>
+
+static size_t pixel_count(const sonde_sequence *s) {
+  return (size_t)s->width * s->height * s->count;
+}
+
+sonde_status sonde_sequence_create(uint32_t width, uint32_t height, uint32_t count,
+                                   sonde_sequence *s, sonde_error *error) {
+  SONDE_ASSERT(s != NULL);
+  *s = (sonde_sequence){0};
+  if (width > SONDE_SIDE_MAX || height > SONDE_SIDE_MAX || count < 1 || count > SONDE_FRAMES_MAX)
+    return sonde_fail(error, SONDE_ARGUMENT,
+                      "%u frames of %u x %u pixels; expected 1 to %d frames of at most %d x %d",
+                      count, width, height, SONDE_FRAMES_MAX, SONDE_SIDE_MAX, SONDE_SIDE_MAX);
+  *s = (sonde_sequence){.width = width, .height = height, .count = count};
+  snprintf(s->orientation, sizeof s->orientation, "MFA");
+  s->clip[2] = width, s->clip[3] = height;
+  s->frames = SONDE_NEW(sonde_tracked_frame, count);
+  s->pixels = SONDE_NEW(uint8_t, pixel_count(s));
+  if (s->frames && s->pixels) return SONDE_OK;
+  sonde_sequence_clear(s);
+  return sonde_fail_memory(error);
+}
+
+static void clear_fields(sonde_tracked_frame *frame) {
+  for (uint32_t i = 0; i < frame->field_count; ++i) sonde_free(frame->fields[i].key);
+  sonde_free(frame->fields);
+}
+
+void sonde_sequence_clear(sonde_sequence *s) {
+  if (!s) return;
+  clear_fields(&s->file);
+  for (uint32_t i = 0; s->frames && i < s->count; ++i) clear_fields(&s->frames[i]);
+  sonde_free(s->frames);
+  sonde_free(s->pixels);
+  *s = (sonde_sequence){0};
+}
+
+static sonde_tracked_frame *owner_of(const sonde_sequence *s, uint32_t frame) {
+  SONDE_ASSERT(frame == SONDE_WHOLE_FILE || frame < s->count);
+  return frame == SONDE_WHOLE_FILE ? (sonde_tracked_frame *)(uintptr_t)&s->file : &s->frames[frame];
+}
+
+static sonde_field *find_field(const sonde_tracked_frame *owner, const char *key) {
+  for (uint32_t i = 0; i < owner->field_count; ++i)
+    if (strcmp(owner->fields[i].key, key) == 0) return &owner->fields[i];
+  return NULL;
+}
+
+const char *sonde_sequence_get(const sonde_sequence *s, uint32_t frame, const char *key) {
+  SONDE_ASSERT(s != NULL && key != NULL);
+  const sonde_field *field = find_field(owner_of(s, frame), key);
+  return field ? field->value : NULL;
+}
+
+static bool grow(sonde_tracked_frame *owner) {
+  if (owner->field_count < owner->field_room) return true;
+  uint32_t room = owner->field_room ? 2 * owner->field_room : 8;
+  void *grown = sonde_realloc(owner->fields, owner->field_room * sizeof *owner->fields,
+                              room * sizeof *owner->fields);
+  if (!grown) return false;
+  owner->fields = grown;
+  owner->field_room = room;
+  return true;
+}
+
+static sonde_status check_text(const char *text, const char *forbidden, sonde_error *error) {
+  size_t length = strlen(text);
+  bool good = length <= SONDE_VALUE_MAX / 2 && text[strcspn(text, forbidden)] == 0;
+  for (size_t i = 0; i < length; ++i) good &= (unsigned char)text[i] >= 32 || text[i] == '\t';
+  if (length) good &= !strchr(" \t", text[0]) && !strchr(" \t", text[length - 1]);
+  if (good) return SONDE_OK;
+  return sonde_fail(error, SONDE_ARGUMENT,
+                    "field '%.60s': expected one line without blanks at its ends%s%s", text,
+                    *forbidden ? " and without any of " : "", forbidden);
+}
+
+sonde_status sonde_sequence_set(sonde_sequence *s, uint32_t frame, const char *key,
+                                const char *value, sonde_error *error) {
+  SONDE_ASSERT(s != NULL && key != NULL && value != NULL);
+  sonde_tracked_frame *owner = owner_of(s, frame);
+  sonde_status status = check_text(key, "=:", error);
+  if (!status) status = check_text(value, "", error);
+  if (status) return status;
+  if (!*key || sonde_metaimage_owns(key) || sonde_nrrd_owns(key))
+    return sonde_fail(error, SONDE_ARGUMENT, "field '%.60s': that name describes the pixels", key);
+  sonde_field *field = find_field(owner, key);
+  if (!field && owner->field_count == SONDE_FIELDS_MAX)
+    return sonde_fail(error, SONDE_ARGUMENT, "field '%.60s': expected at most %d fields", key,
+                      SONDE_FIELDS_MAX);
+  size_t key_bytes = strlen(key) + 1, value_bytes = strlen(value) + 1;
+  char *text = SONDE_NEW(char, key_bytes + value_bytes);
+  if (!text || (!field && !grow(owner))) {
+    sonde_free(text);
+    return sonde_fail_memory(error);
+  }
+  memcpy(text, key, key_bytes);
+  memcpy(text + key_bytes, value, value_bytes);
+  if (field) sonde_free(field->key);
+  if (!field) field = &owner->fields[owner->field_count++];
+  *field = (sonde_field){text, text + key_bytes};
+  return SONDE_OK;
+}
+
+sonde_status sonde_sequence_set_transform(sonde_sequence *s, uint32_t frame, const char *name,
+                                          const sonde_affine *a, sonde_error *error) {
+  SONDE_ASSERT(s != NULL && name != NULL && a != NULL);
+  char key[96], value[512];
+  int used = 0;
+  for (int i = 0; i < 3; ++i)
+    for (int k = 0; k < 4; ++k)
+      used += snprintf(value + used, sizeof value - (size_t)used, "%.12g ", a->m[i][k]);
+  snprintf(value + used, sizeof value - (size_t)used, "0 0 0 1");
+  snprintf(key, sizeof key, "%.70sTransform", name);
+  sonde_status status = sonde_sequence_set(s, frame, key, value, error);
+  snprintf(key, sizeof key, "%.70sTransformStatus", name);
+  return status ? status : sonde_sequence_set(s, frame, key, "OK", error);
+}
+
+// Width, height, frames; *first tells that the frames run fastest.
+static sonde_status read_geometry(const sonde_header *h, uint32_t size[3], bool *first,
+                                  sonde_error *error) {
+  int last = (int)h->dimension - 1, list = h->list_axis < 0 ? last : h->list_axis;
+  SONDE_ASSERT(last >= 2 && last < 4 && list <= last);
+  *first = list == 0;
+  const uint32_t *spatial = h->size + (*first ? 1 : 0);
+  size[0] = spatial[0], size[1] = spatial[1], size[2] = h->size[list];
+  if ((list != 0 && list != last) || (h->dimension == 4 && spatial[2] != 1))
+    return sonde_fail(error, SONDE_FORMAT,
+                      "%.200s: expected the frames on the first or the last axis and single slices "
+                      "(domain domain [domain of size 1] list)",
+                      h->path);
+  return SONDE_OK;
+}
+
+static sonde_status read_orientation(const sonde_header *h, sonde_sequence *s, sonde_error *error) {
+  static const char *const known[] = {"MF", "MFA", "UF", "UFA", "MN", "MNA",
+                                      "UN", "UNA", "XX", "XXX", NULL};
+  const char *key = h->nrrd ? "ultrasound image orientation" : "UltrasoundImageOrientation";
+  const sonde_header_entry *e = sonde_header_find(h, key);
+  sonde_status status = sonde_header_only(h, key, false, known, error);
+  snprintf(s->orientation, sizeof s->orientation, "%s", e && !status ? e->value : "");
+  return status;
+}
+
+// False when the key is not one of a frame; *number may then hold anything.
+static bool split_frame_key(const char *key, uint64_t *number, const char **name) {
+  static const char prefix[] = "Seq_Frame";
+  if (strncmp(key, prefix, sizeof prefix - 1) != 0) return false;
+  const char *digits = key + sizeof prefix - 1;
+  size_t length = strspn(digits, "0123456789");
+  if (length < 1 || length > 9 || digits[length] != '_' || !digits[length + 1]) return false;
+  *number = 0;
+  for (size_t i = 0; i < length; ++i) *number = 10 * *number + (uint64_t)(digits[i] - '0');
+  *name = digits + length + 1;
+  return true;
+}
+
+// Numbers of a transform; those of an INVALID one may be anything.
+static sonde_status check_transform(const sonde_header *h, const sonde_header_entry *e,
+                                    sonde_error *error) {
+  sonde_affine affine;
+  if (!sonde_text_ends(e->key, "Transform") || sonde_text_affine(e->value, &affine))
+    return SONDE_OK;
+  for (uint32_t i = 0; i < h->entry_count; ++i) {
+    const sonde_header_entry *other = &h->entries[i];
+    size_t length = strlen(e->key);
+    if (strncmp(other->key, e->key, length) == 0 && strcmp(other->key + length, "Status") == 0 &&
+        strcmp(other->value, "OK") != 0)
+      return SONDE_OK;
+  }
+  return sonde_fail(error, SONDE_FORMAT,
+                    "%.200s:%u: %.60s: expected 16 finite numbers, the last four 0 0 0 1, found "
+                    "'%.80s'",
+                    h->path, e->line, e->key, e->value);
+}
+
+static sonde_status read_field(const sonde_header *h, const sonde_header_entry *e,
+                               sonde_sequence *s, sonde_error *error) {
+  uint64_t number = 0;
+  const char *key = e->key;
+  bool framed = split_frame_key(e->key, &number, &key);
+  if (framed && number >= s->count)
+    return sonde_fail(error, SONDE_FORMAT, "%.200s:%u: %.60s: expected frames 0 to %u", h->path,
+                      e->line, e->key, s->count - 1);
+  if (!framed && (h->nrrd ? sonde_nrrd_owns(key) : sonde_metaimage_owns(key))) return SONDE_OK;
+  if (!framed && strcmp(key, "ultrasound image type") == 0) key = "UltrasoundImageType";
+  uint32_t frame = framed ? (uint32_t)number : SONDE_WHOLE_FILE;
+  if (find_field(owner_of(s, frame), key))
+    return sonde_fail(error, SONDE_FORMAT, "%.200s:%u: %.60s: stands twice, expected once", h->path,
+                      e->line, e->key);
+  sonde_error cause = {0};
+  sonde_status status = sonde_sequence_set(s, frame, key, e->value, &cause);
+  if (status == SONDE_ARGUMENT)
+    status = sonde_fail(error, SONDE_FORMAT, "%.200s:%u: %.200s", h->path, e->line, cause.message);
+  else if (status)
+    status = sonde_fail_memory(error);
+  return status ? status : check_transform(h, e, error);
+}
+
+static sonde_status gather_list_first(sonde_sequence *s, sonde_error *error) {
+  uint8_t *sorted = SONDE_NEW(uint8_t, pixel_count(s));
+  if (!sorted) return sonde_fail_memory(error);
+  size_t pixels = (size_t)s->width * s->height;
+  for (size_t p = 0; p < pixels; ++p)
+    for (uint32_t i = 0; i < s->count; ++i) sorted[i * pixels + p] = s->pixels[p * s->count + i];
+  sonde_free(s->pixels);
+  s->pixels = sorted;
+  return SONDE_OK;
+}
+
+// Its own inverse: U mirrors columns, N mirrors rows.
+static void mirror(const sonde_sequence *s, uint8_t *pixels) {
+  bool columns = s->orientation[0] == 'U', rows = s->orientation[1] == 'N';
+  uint32_t width = s->width, height = s->height;
+  for (uint32_t i = 0; i < s->count && (columns || rows); ++i, pixels += (size_t)width * height)
+    for (uint32_t v = 0; v < (rows ? (height + 1) / 2 : height); ++v) {
+      uint8_t *a = pixels + (size_t)v * width;
+      uint8_t *b = rows ? pixels + (size_t)(height - 1 - v) * width : a;
+      for (uint32_t u = 0; u < (columns && a == b ? width / 2 : width); ++u) {
+        uint32_t other = columns ? width - 1 - u : u;
+        uint8_t kept = a[u];
+        a[u] = b[other];
+        b[other] = kept;
+      }
+    }
+}
+
+static sonde_status read_sequence(const sonde_header *h, sonde_sequence *s, sonde_error *error) {
+  uint32_t size[3];
+  bool first;
+  sonde_status status = read_geometry(h, size, &first, error);
+  if (status) return status;
+  size_t expected = (size_t)size[0] * size[1] * size[2];
+  if (size[0] > SONDE_SIDE_MAX || size[1] > SONDE_SIDE_MAX || size[2] < 1)
+    return sonde_fail(error, SONDE_FORMAT,
+                      "%.200s: %u frames of %u x %u pixels, expected at least one frame of at most "
+                      "%d x %d",
+                      h->path, size[2], size[0], size[1], SONDE_SIDE_MAX, SONDE_SIDE_MAX);
+  uint8_t *pixels; // first, so that a lying header costs no memory
+  status = sonde_pixels_read(h, expected, &pixels, error);
+  if (status) return status;
+  *s = (sonde_sequence){.width = size[0],
+                        .height = size[1],
+                        .count = size[2],
+                        .pixels = pixels,
+                        .clip = {0, 0, size[0], size[1]}};
+  s->frames = SONDE_NEW(sonde_tracked_frame, s->count);
+  if (!s->frames) return sonde_fail_memory(error);
+  status = read_orientation(h, s, error);
+  if (!status && first) status = gather_list_first(s, error);
+  if (!status) mirror(s, s->pixels);
+  for (uint32_t i = 0; i < h->entry_count && !status; ++i)
+    status = read_field(h, &h->entries[i], s, error);
+  return status;
+}
+
+sonde_status sonde_sequence_load(const char *path, sonde_sequence *s, sonde_error *error) {
+  SONDE_ASSERT(path != NULL && s != NULL);
+  *s = (sonde_sequence){0};
+  sonde_header header;
+  sonde_status status = sonde_header_load(path, &header, error);
+  if (status) return status;
+  status = read_sequence(&header, s, error);
+  sonde_header_clear(&header);
+  if (status) sonde_sequence_clear(s);
+  return status;
+}
+
+static void write_header(sonde_file *file, const char *path, const sonde_sequence *s,
+                         bool compressed, size_t packed_count) {
+  if (sonde_text_ends(path, ".mha"))
+    sonde_metaimage_write_sequence(file, s, compressed ? packed_count : 0);
+  else
+    sonde_nrrd_write_sequence(file, s, compressed, sonde_text_ends(path, ".seq.nrrd"));
+}
+
+sonde_status sonde_sequence_save(const char *path, const sonde_sequence *s, bool compressed,
+                                 sonde_error *error) {
+  SONDE_ASSERT(path != NULL && s != NULL && s->frames != NULL);
+  bool mha = sonde_text_ends(path, ".mha");
+  if (!mha && !sonde_text_ends(path, ".nrrd"))
+    return sonde_fail(error, SONDE_ARGUMENT, "%.200s: expected a name that ends in .mha or .nrrd",
+                      path);
+  size_t count = pixel_count(s), packed_count = 0;
+  uint8_t *packed = NULL, *turned = SONDE_NEW(uint8_t, count);
+  sonde_file *file = NULL;
+  sonde_status status = turned ? SONDE_OK : sonde_fail_memory(error);
+  if (status) return status;
+  if (count) memcpy(turned, s->pixels, count);
+  mirror(s, turned);
+  if (compressed)
+    status = sonde_pixels_pack(turned, count, mha ? SONDE_PACKING_ZLIB : SONDE_PACKING_GZIP,
+                               &packed, &packed_count, error);
+  if (!status) status = sonde_file_create(path, &file, error);
+  if (!status) {
+    write_header(file, path, s, compressed, packed_count);
+    sonde_file_write(file, compressed ? packed : turned, compressed ? packed_count : count);
+    status = sonde_file_commit(file, error);
+  }
+  sonde_free(packed);
+  sonde_free(turned);
+  return status;
+}

@@ -1,0 +1,319 @@
+// From the transforms of a frame and the calibration to its pose.
+//
+// attribute                 value of name="..." inside an XML element
+// read_transform, read_clip elements of a PLUS configuration
+// sonde_calibration_load
+// split_name                "ProbeToTracker" -> Probe, Tracker
+// add_edge                  one transform into the graph
+// frame_edges               transforms of a frame and whether they may be used
+// reach                     spreads from Image over the edges, either way round
+// choose_world              the first of the usual names that is reached
+// sonde_sequence_locate
+#include "echo/frames.h"
+
+#include <string.h>
+
+enum { NAME_MAX_BYTES = 32, NAMES_MAX = 24, EDGES_MAX = 40 };
+
+typedef struct edge {
+  uint32_t from, to;
+  sonde_affine there, back; // mm
+} edge;
+
+typedef struct graph {
+  char names[NAMES_MAX][NAME_MAX_BYTES];
+  uint32_t name_count, edge_count;
+  edge edges[EDGES_MAX];
+  bool reached[NAMES_MAX];
+  sonde_affine from_image[NAMES_MAX]; // that name from Image
+} graph;
+
+static bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
+
+// Copies the value into text; false when the attribute is missing or too long.
+static bool attribute(const char *element, const char *end, const char *name, char *text,
+                      size_t size) {
+  size_t length = strlen(name);
+  for (const char *at = element; at + length + 2 < end; ++at) {
+    if (!is_blank(at[0]) || strncmp(at + 1, name, length) != 0) continue;
+    const char *value = at + 1 + length;
+    while (value < end && is_blank(*value)) ++value;
+    if (value + 1 >= end || *value++ != '=') continue;
+    while (value < end && is_blank(*value)) ++value;
+    if (value >= end || (*value != '"' && *value != '\'')) continue;
+    const char *stop = memchr(value + 1, *value, (size_t)(end - value - 1));
+    if (!stop || (size_t)(stop - value) > size) return false;
+    memcpy(text, value + 1, (size_t)(stop - value - 1));
+    text[stop - value - 1] = 0;
+    return true;
+  }
+  return false;
+}
+
+static uint32_t line_of(const char *bytes, const char *at) {
+  uint32_t line = 1;
+  for (; bytes < at; ++bytes) line += *bytes == '\n';
+  return line;
+}
+
+static sonde_status read_transform(const char *path, const char *bytes, const char *element,
+                                   const char *end, sonde_calibration *c, sonde_error *error) {
+  char matrix[1024];
+  uint32_t line = line_of(bytes, element);
+  if (c->count == SONDE_COUNT_OF(c->transforms))
+    return sonde_fail(error, SONDE_FORMAT, "%.200s:%u: expected at most %zu transforms", path, line,
+                      SONDE_COUNT_OF(c->transforms));
+  bool good = attribute(element, end, "From", c->transforms[c->count].from, NAME_MAX_BYTES) &&
+              attribute(element, end, "To", c->transforms[c->count].to, NAME_MAX_BYTES) &&
+              attribute(element, end, "Matrix", matrix, sizeof matrix) &&
+              sonde_text_affine(matrix, &c->transforms[c->count].to_from_from);
+  if (!good)
+    return sonde_fail(
+        error, SONDE_FORMAT,
+        "%.200s:%u: Transform: expected From, To and Matrix of 16 finite numbers that "
+        "end in 0 0 0 1",
+        path, line);
+  ++c->count;
+  return SONDE_OK;
+}
+
+static sonde_status read_clip(const char *path, const char *bytes, const char *element,
+                              const char *end, sonde_calibration *c, sonde_error *error) {
+  char origin[64], size[64];
+  double v[4];
+  if (!attribute(element, end, "ClipRectangleOrigin", origin, sizeof origin) ||
+      !attribute(element, end, "ClipRectangleSize", size, sizeof size))
+    return SONDE_OK;
+  bool good = sonde_text_reals(origin, 2, v) && sonde_text_reals(size, 2, v + 2);
+  for (int k = 0; k < 4 && good; ++k) {
+    good = v[k] >= (k > 1) && v[k] <= SONDE_SIDE_MAX && floor(v[k]) == v[k];
+    if (good) c->clip[k] = (uint32_t)v[k];
+  }
+  c->has_clip = good;
+  if (good) return SONDE_OK;
+  return sonde_fail(error, SONDE_FORMAT,
+                    "%.200s:%u: ClipRectangleOrigin and ClipRectangleSize: expected two whole "
+                    "numbers of pixels each",
+                    path, line_of(bytes, element));
+}
+
+// Only elements that begin with these names matter; comments are skipped.
+static sonde_status read_elements(const char *path, const char *bytes, const char *stop,
+                                  sonde_calibration *c, sonde_error *error) {
+  sonde_status status = SONDE_OK;
+  for (const char *at = bytes; !status && (at = memchr(at, '<', (size_t)(stop - at))) != NULL;) {
+    bool comment = strncmp(at, "<!--", 4) == 0;
+    const char *end = comment ? strstr(at, "-->") : memchr(at, '>', (size_t)(stop - at));
+    if (!end)
+      return sonde_fail(error, SONDE_FORMAT, "%.200s:%u: the file ends inside an element", path,
+                        line_of(bytes, at));
+    if (strncmp(at, "<Transform", 10) == 0 && is_blank(at[10]))
+      status = read_transform(path, bytes, at, end, c, error);
+    if (strncmp(at, "<VolumeReconstruction", 21) == 0 && is_blank(at[21]))
+      status = read_clip(path, bytes, at, end, c, error);
+    at = end;
+  }
+  return status;
+}
+
+sonde_status sonde_calibration_load(const char *path, sonde_calibration *c, sonde_error *error) {
+  SONDE_ASSERT(path != NULL && c != NULL);
+  *c = (sonde_calibration){0};
+  char *bytes;
+  size_t count;
+  sonde_status status = sonde_file_load(path, &bytes, &count, error);
+  if (status) return status;
+  status = read_elements(path, bytes, bytes + count, c, error);
+  if (!status && c->count == 0)
+    status = sonde_fail(error, SONDE_FORMAT,
+                        "%.200s: expected at least one <Transform From To Matrix>", path);
+  sonde_free(bytes);
+  return status;
+}
+
+// The first "To" behind the first letter and before a capital divides: "ToolToProbe".
+static bool split_name(const char *key, size_t length, char *from, char *to) {
+  for (size_t i = 1; i + 2 < length; ++i) {
+    if (key[i] != 'T' || key[i + 1] != 'o' || key[i + 2] < 'A' || key[i + 2] > 'Z') continue;
+    size_t rest = length - i - 2;
+    if (i >= NAME_MAX_BYTES || rest >= NAME_MAX_BYTES) return false;
+    memcpy(from, key, i);
+    memcpy(to, key + i + 2, rest);
+    from[i] = to[rest] = 0;
+    return true;
+  }
+  return false;
+}
+
+// NAMES_MAX when there is no room for another.
+static uint32_t name_index(graph *g, const char *name) {
+  for (uint32_t i = 0; i < g->name_count; ++i)
+    if (strcmp(g->names[i], name) == 0) return i;
+  if (g->name_count == NAMES_MAX) return NAMES_MAX;
+  snprintf(g->names[g->name_count], NAME_MAX_BYTES, "%.31s", name);
+  return g->name_count++;
+}
+
+static sonde_status add_edge(graph *g, const char *from, const char *to, const sonde_affine *there,
+                             sonde_error *error) {
+  edge e = {.from = name_index(g, from), .to = name_index(g, to), .there = *there};
+  if (e.from == NAMES_MAX || e.to == NAMES_MAX || g->edge_count == EDGES_MAX)
+    return sonde_fail(error, SONDE_FORMAT,
+                      "expected at most %d coordinate frames and %d transforms", NAMES_MAX,
+                      EDGES_MAX);
+  if (!affine_inverse(there, &e.back))
+    return sonde_fail(error, SONDE_FORMAT, "%sTo%sTransform has no inverse", from, to);
+  g->edges[g->edge_count++] = e;
+  return SONDE_OK;
+}
+
+// Edges of the frame; with `all` also those whose status is not OK.
+static sonde_status frame_edges(const sonde_sequence *s, uint32_t frame, bool all, graph *g,
+                                sonde_error *error) {
+  const sonde_tracked_frame *f = frame == SONDE_WHOLE_FILE ? &s->file : &s->frames[frame];
+  for (uint32_t i = 0; i < f->field_count; ++i) {
+    const char *key = f->fields[i].key;
+    char from[NAME_MAX_BYTES], to[NAME_MAX_BYTES], status_key[128];
+    sonde_affine there;
+    if (!sonde_text_ends(key, "Transform") || !split_name(key, strlen(key) - 9, from, to)) continue;
+    snprintf(status_key, sizeof status_key, "%.100sStatus", key);
+    const char *word = sonde_sequence_get(s, frame, status_key);
+    if (!all && word && strcmp(word, "OK") != 0) continue;
+    if (!sonde_text_affine(f->fields[i].value, &there)) {
+      if (all)
+        there = affine_identity(); // only asked whether there is a way
+      else
+        continue;
+    }
+    sonde_affine inverse;
+    if (all && !affine_inverse(&there, &inverse)) there = affine_identity();
+    sonde_status status = add_edge(g, from, to, &there, error);
+    if (status) return status;
+  }
+  return SONDE_OK;
+}
+
+static void reach(graph *g) {
+  uint32_t image = name_index(g, "Image");
+  memset(g->reached, 0, sizeof g->reached);
+  if (image == NAMES_MAX) return;
+  g->reached[image] = true;
+  g->from_image[image] = affine_identity();
+  for (bool changed = true; changed;) {
+    changed = false;
+    for (uint32_t i = 0; i < g->edge_count; ++i) {
+      const edge *e = &g->edges[i];
+      if (g->reached[e->from] == g->reached[e->to]) continue;
+      uint32_t old = g->reached[e->from] ? e->from : e->to, new = old == e->from ? e->to : e->from;
+      g->from_image[new] = affine_mul(old == e->from ? &e->there : &e->back, &g->from_image[old]);
+      g->reached[new] = changed = true;
+    }
+  }
+}
+
+// All that holds for a frame, spread from Image; edges of the calibration come first.
+static sonde_status frame_graph(const sonde_sequence *s, const sonde_calibration *c, uint32_t frame,
+                                bool all, graph *g, sonde_error *error) {
+  *g = (graph){0};
+  sonde_status status = SONDE_OK;
+  for (uint32_t i = 0; c && i < c->count && !status; ++i)
+    status = add_edge(g, c->transforms[i].from, c->transforms[i].to, &c->transforms[i].to_from_from,
+                      error);
+  if (!status) status = frame_edges(s, SONDE_WHOLE_FILE, all, g, error);
+  if (!status) status = frame_edges(s, frame, all, g, error);
+  if (!status) reach(g);
+  return status;
+}
+
+// Index of the name when it is reached, else NAMES_MAX.
+static uint32_t reached_name(const graph *g, const char *name) {
+  for (uint32_t i = 0; i < g->name_count; ++i)
+    if (g->reached[i] && strcmp(g->names[i], name) == 0) return i;
+  return NAMES_MAX;
+}
+
+static sonde_status choose_world(const sonde_sequence *s, const sonde_calibration *c,
+                                 sonde_located *located, sonde_error *error) {
+  static const char *const usual[] = {"Reference", "Tracker", "World", "Probe"};
+  graph *g = SONDE_NEW(graph, 1);
+  sonde_status status = g ? SONDE_OK : sonde_fail_memory(error);
+  for (size_t k = 0; k < SONDE_COUNT_OF(usual) && !status && !located->world[0]; ++k)
+    for (uint32_t i = 0; i < s->count && !status && !located->world[0]; ++i) {
+      status = frame_graph(s, c, i, true, g, error);
+      if (!status && reached_name(g, usual[k]) != NAMES_MAX)
+        snprintf(located->world, sizeof located->world, "%s", usual[k]);
+    }
+  sonde_free(g);
+  if (!status && !located->world[0])
+    status = sonde_fail(error, SONDE_MISMATCH,
+                        "no transforms lead from Image to Reference, Tracker, World or Probe; is "
+                        "the calibration (ImageToProbe) missing?");
+  return status;
+}
+
+static bool image_is_good(const sonde_sequence *s, uint32_t frame) {
+  const char *status = sonde_sequence_get(s, frame, "ImageStatus");
+  if (!status) status = sonde_sequence_get(s, frame, "Status");
+  return !status || strcmp(status, "OK") == 0;
+}
+
+static sonde_status locate_frame(sonde_sequence *s, const sonde_calibration *c, uint32_t frame,
+                                 graph *g, sonde_located *located, sonde_error *error) {
+  sonde_status status = frame_graph(s, c, frame, false, g, error);
+  if (status) return status;
+  sonde_tracked_frame *f = &s->frames[frame];
+  uint32_t world = reached_name(g, located->world);
+  f->used = world != NAMES_MAX && image_is_good(s, frame);
+  if (f->used) {
+    f->world_from_pixel = affine_scale(g->from_image[world], 1e-3);
+    ++located->used;
+    return SONDE_OK;
+  }
+  status = world == NAMES_MAX ? frame_graph(s, c, frame, true, g, error) : SONDE_OK;
+  bool way = world != NAMES_MAX || reached_name(g, located->world) != NAMES_MAX;
+  ++*(way ? &located->invalid : &located->missing);
+  return status;
+}
+
+static sonde_status apply_clip(sonde_sequence *s, const uint32_t clip[4], sonde_error *error) {
+  if (clip[2] < 1 || clip[3] < 1 || clip[0] > s->width || clip[2] > s->width - clip[0] ||
+      clip[1] > s->height || clip[3] > s->height - clip[1])
+    return sonde_fail(error, SONDE_MISMATCH,
+                      "clip rectangle of %u x %u pixels at (%u, %u): expected one within frames of "
+                      "%u x %u",
+                      clip[2], clip[3], clip[0], clip[1], s->width, s->height);
+  memcpy(s->clip, clip, sizeof s->clip);
+  return SONDE_OK;
+}
+
+sonde_status sonde_sequence_locate(sonde_sequence *s, const sonde_calibration *c, const char *world,
+                                   sonde_located *out, sonde_error *error) {
+  SONDE_ASSERT(s != NULL && s->frames != NULL);
+  sonde_located located = {0};
+  sonde_status status = SONDE_OK;
+  for (uint32_t i = 0; i < s->count; ++i) s->frames[i].used = false;
+  if (c && c->has_clip) status = apply_clip(s, c->clip, error);
+  if (status) return status;
+  if (world)
+    snprintf(located.world, sizeof located.world, "%.31s", world);
+  else
+    status = choose_world(s, c, &located, error);
+  if (status) return status;
+  graph *g = SONDE_NEW(graph, 1);
+  if (!g) return sonde_fail_memory(error);
+  sonde_error cause = {0};
+  for (uint32_t i = 0; i < s->count && !status; ++i) {
+    status = locate_frame(s, c, i, g, &located, &cause);
+    if (status) sonde_fail(error, status, "frame %u: %.300s", i, cause.message);
+  }
+  sonde_free(g);
+  SONDE_ASSERT(status || located.used + located.invalid + located.missing == s->count);
+  if (!status && !located.used)
+    status =
+        sonde_fail(error, SONDE_MISMATCH,
+                   "none of %u frames has a pose in %s: %u INVALID, %u without transforms that "
+                   "lead there from Image",
+                   s->count, located.world, located.invalid, located.missing);
+  if (out) *out = located;
+  return status;
+}

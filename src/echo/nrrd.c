@@ -1,0 +1,241 @@
+// NRRD: a magic line, "field: value" and "key:=value" lines, an empty line, then the pixels.
+//
+// read_lines                 header into entries
+// check_words                fields that only have one meaning here
+// read_sizes                 dimension, sizes, and which axis runs over the frames
+// read_vector, read_grid     directions and origin of a volume
+// sonde_nrrd_write_sequence  three axes as IGSIO writes, or four as Slicer wants
+// sonde_nrrd_write_volume
+#include "echo/frames.h"
+
+#include <string.h>
+
+static const char *const OWNED[] = {"dimension",
+                                    "type",
+                                    "encoding",
+                                    "endian",
+                                    "kinds",
+                                    "sizes",
+                                    "space",
+                                    "space dimension",
+                                    "space directions",
+                                    "space origin",
+                                    "space units",
+                                    "spacings",
+                                    "labels",
+                                    "centers",
+                                    "centerings",
+                                    "units",
+                                    "thicknesses",
+                                    "axis mins",
+                                    "axis maxs",
+                                    "content",
+                                    "number",
+                                    "measurement frame",
+                                    "data file",
+                                    "datafile",
+                                    "line skip",
+                                    "lineskip",
+                                    "byte skip",
+                                    "byteskip",
+                                    "ultrasound image orientation",
+                                    "DataNodeClassName",
+                                    "axis 0 index type",
+                                    "axis 0 index values",
+                                    "axis 3 index type",
+                                    "axis 3 index values"};
+
+bool sonde_nrrd_owns(const char *key) {
+  for (size_t i = 0; i < SONDE_COUNT_OF(OWNED); ++i)
+    if (strcmp(OWNED[i], key) == 0) return true;
+  return false;
+}
+
+// The first of ": " and ":=" divides a line.
+static char *divide(char *line, size_t *length) {
+  char *field = strstr(line, ":"), *key = strstr(line, ":=");
+  *length = field && field == key ? 2 : 1;
+  return field;
+}
+
+static sonde_status read_lines(sonde_header *h, sonde_error *error) {
+  char *line;
+  sonde_status status = sonde_header_line(h, &line, error);
+  if (status) return status;
+  if (strlen(line) != 8 || memcmp(line, "NRRD000", 7) != 0 || line[7] < '1' || line[7] > '5')
+    return sonde_fail(error, SONDE_VERSION,
+                      "%.200s:1: expected NRRD0001 to NRRD0005, found '%.20s'", h->path, line);
+  for (;;) {
+    status = sonde_header_line(h, &line, error);
+    if (status) return status;
+    if (!line)
+      return sonde_fail(error, SONDE_FORMAT,
+                        "%.200s:%u: the file ends inside the header, expected an empty line",
+                        h->path, h->lines);
+    if (!*line) return SONDE_OK;
+    if (*line == '#') continue;
+    size_t length;
+    char *middle = divide(line, &length);
+    if (!middle)
+      return sonde_fail(error, SONDE_FORMAT,
+                        "%.200s:%u: expected 'field: value' or 'key:=value', found '%.60s'",
+                        h->path, h->lines, line);
+    *middle = 0;
+    status = sonde_header_add(h, line, middle + length, error);
+    if (status) return status;
+  }
+}
+
+static sonde_status check_words(sonde_header *h, sonde_error *error) {
+  static const struct {
+    const char *key;
+    bool required;
+    const char *words[6];
+  } rules[] = {{"type", true, {"unsigned char", "uchar", "uint8", "uint8_t"}},
+               {"dimension", true, {"3", "4"}},
+               {"encoding", true, {"raw", "gzip", "gz"}},
+               {"sizes", true, {NULL}},
+               {"line skip", false, {"0"}},
+               {"byte skip", false, {"0"}}};
+  sonde_status status = SONDE_OK;
+  for (size_t i = 0; i < SONDE_COUNT_OF(rules) && !status; ++i)
+    if (rules[i].words[0] || !sonde_header_find(h, rules[i].key))
+      status = sonde_header_only(h, rules[i].key, rules[i].required, rules[i].words, error);
+  const sonde_header_entry *apart = sonde_header_find(h, "data file");
+  if (!apart) apart = sonde_header_find(h, "datafile");
+  if (!status && apart)
+    status = sonde_fail(error, SONDE_FORMAT,
+                        "%.200s:%u: data file: the pixels are expected in the same file", h->path,
+                        apart->line);
+  return status;
+}
+
+static int list_axis(const sonde_header *h) {
+  const sonde_header_entry *e = sonde_header_find(h, "kinds");
+  const char *text = e ? e->value : "";
+  for (int axis = 0; *text; ++axis) {
+    text += strspn(text, " \t");
+    size_t length = strcspn(text, " \t");
+    if (length == 4 && (memcmp(text, "list", 4) == 0 || memcmp(text, "time", 4) == 0)) return axis;
+    text += length;
+  }
+  return -1;
+}
+
+static sonde_status read_sizes(sonde_header *h, sonde_error *error) {
+  h->dimension = (uint32_t)(sonde_header_find(h, "dimension")->value[0] - '0');
+  h->list_axis = list_axis(h);
+  if (h->list_axis >= (int)h->dimension)
+    return sonde_fail(error, SONDE_FORMAT, "%.200s:%u: kinds: expected %u words, one per axis",
+                      h->path, sonde_header_find(h, "kinds")->line, h->dimension);
+  h->packed = h->count - h->data;
+  h->packing = strcmp(sonde_header_find(h, "encoding")->value, "raw") == 0 ? SONDE_PACKING_RAW
+                                                                           : SONDE_PACKING_GZIP;
+  return sonde_header_whole(h, sonde_header_find(h, "sizes"), h->dimension, 1, SONDE_FRAMES_MAX,
+                            h->size, error);
+}
+
+// "(a,b,c)"; moves on; false when it is something else.
+static bool read_vector(const char **text, double v[3]) {
+  const char *at = *text + strspn(*text, " \t");
+  for (int k = 0; k < 3; ++k) {
+    if (*at++ != (k ? ',' : '(')) return false;
+    const char *end;
+    v[k] = sonde_parse_real(at, &end);
+    if (end == at || !isfinite(v[k]) || fabs(v[k]) > 1e12) return false;
+    at = end;
+  }
+  *text = at + 1;
+  return *at == ')';
+}
+
+static sonde_status read_grid(sonde_header *h, sonde_error *error) {
+  const sonde_header_entry *axes = sonde_header_find(h, "space directions");
+  const sonde_header_entry *origin = sonde_header_find(h, "space origin");
+  if (h->dimension != 3 || h->list_axis >= 0) return SONDE_OK;
+  double v[3], spacing[3] = {1, 1, 1};
+  sonde_status status = axes ? SONDE_OK : sonde_header_reals(h, "spacings", 3, spacing, error);
+  const char *text = axes ? axes->value : "";
+  for (int k = 0; k < 3 && !status; ++k) {
+    if (axes && !read_vector(&text, v))
+      return sonde_fail(error, SONDE_FORMAT,
+                        "%.200s:%u: space directions: expected three (x,y,z), found '%.60s'",
+                        h->path, axes->line, axes->value);
+    for (int i = 0; i < 3; ++i) h->mm_from_voxel.m[i][k] = axes ? v[i] : spacing[k] * (i == k);
+  }
+  text = origin ? origin->value : "";
+  if (!status && origin && !read_vector(&text, v))
+    return sonde_fail(error, SONDE_FORMAT,
+                      "%.200s:%u: space origin: expected (x,y,z), found '%.60s'", h->path,
+                      origin->line, origin->value);
+  for (int i = 0; i < 3 && origin; ++i) h->mm_from_voxel.m[i][3] = v[i];
+  return status;
+}
+
+sonde_status sonde_nrrd_parse(sonde_header *h, sonde_error *error) {
+  sonde_status status = read_lines(h, error);
+  if (!status) status = check_words(h, error);
+  if (!status) status = read_sizes(h, error);
+  return status ? status : read_grid(h, error);
+}
+
+// File-wide names are words with spaces here.
+static const char *key_here(const char *key) {
+  return strcmp(key, "UltrasoundImageType") == 0 ? "ultrasound image type" : key;
+}
+
+static void write_start(sonde_file *file, int dimension, bool packed) {
+  sonde_file_printf(file,
+                    "NRRD0004\n# Complete NRRD file format specification at:\n"
+                    "# http://teem.sourceforge.net/nrrd/format.html\ntype: uint8\ndimension: %d\n"
+                    "encoding: %s\nendian: little\n",
+                    dimension, packed ? "gzip" : "raw");
+}
+
+static void write_axes(sonde_file *file, const sonde_sequence *s, bool four) {
+  if (!four) {
+    sonde_file_printf(file,
+                      "kinds: domain domain list\nsizes: %u %u %u\nspace dimension: 2\n"
+                      "space directions: (1,0) (0,1) none\nspace origin: (0,0)\n",
+                      s->width, s->height, s->count);
+    return;
+  }
+  sonde_file_printf(file,
+                    "kinds: domain domain domain list\nlabels: \"x\" \"y\" \"z\" \"frame\"\n"
+                    "sizes: %u %u 1 %u\nspace dimension: 3\n"
+                    "space directions: (1,0,0) (0,1,0) (0,0,1) none\nspace origin: (0,0,0)\n"
+                    "DataNodeClassName:=vtkMRMLScalarVolumeNode\naxis 3 index type:=numeric\n"
+                    "axis 3 index values:=",
+                    s->width, s->height, s->count);
+  for (uint32_t i = 0; i < s->count; ++i) sonde_file_printf(file, i ? " %u" : "%u", i);
+  sonde_file_printf(file, "\n");
+}
+
+void sonde_nrrd_write_sequence(sonde_file *file, const sonde_sequence *s, bool packed,
+                               bool four_axes) {
+  SONDE_ASSERT(file != NULL && s != NULL);
+  write_start(file, four_axes ? 4 : 3, packed);
+  write_axes(file, s, four_axes);
+  if (s->orientation[0])
+    sonde_file_printf(file, "ultrasound image orientation:=%s\n", s->orientation);
+  for (uint32_t i = 0; i < s->file.field_count; ++i)
+    sonde_file_printf(file, "%s:=%s\n", key_here(s->file.fields[i].key), s->file.fields[i].value);
+  for (uint32_t i = 0; i < s->count; ++i)
+    for (uint32_t k = 0; k < s->frames[i].field_count; ++k)
+      sonde_file_printf(file, "Seq_Frame%04u_%s:=%s\n", i, s->frames[i].fields[k].key,
+                        s->frames[i].fields[k].value);
+  sonde_file_printf(file, "\n");
+}
+
+void sonde_nrrd_write_volume(sonde_file *file, const sonde_volume *v, bool packed) {
+  SONDE_ASSERT(file != NULL && v != NULL);
+  write_start(file, 3, packed);
+  sonde_file_printf(file, "sizes: %u %u %u\nspace dimension: 3\nspace directions:", v->size[0],
+                    v->size[1], v->size[2]);
+  for (int k = 0; k < 4; ++k) {
+    sonde_vec3 mm = v_scale(affine_column(&v->world_from_voxel, k), 1e3);
+    sonde_file_printf(file, "%s (%.12g,%.12g,%.12g)", k == 3 ? "\nspace origin:" : "", mm.x, mm.y,
+                      mm.z);
+  }
+  sonde_file_printf(file, "\nkinds: domain domain domain\n\n");
+}

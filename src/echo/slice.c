@@ -1,0 +1,181 @@
+// Creating a slicer and rendering with it.
+//
+// plane_of                      map from the world onto a frame
+// make_rooms                    scratch of the workers
+// fill_planes                   all used frames, normals to one side
+// sonde_slicer_create, sonde_slicer_destroy
+// prepare                       the forms of every plane for a picture
+// block_row                     one row of blocks, for the workers
+// sonde_slicer_render
+// sonde_slice_plane             picture of a probe's pose
+// sonde_volume_slice
+#include "echo/slice.h"
+#include "fit/parallel.h"
+
+#include <string.h>
+
+sonde_slicer_options sonde_slicer_options_default(void) {
+  return (sonde_slicer_options){.gap_m = 10e-3, .reach_m = 1e-3, .left_out = SONDE_WHOLE_FILE};
+}
+
+static sonde_status plane_of(const sonde_sequence *s, uint32_t frame, sonde_vec3 *previous,
+                             slice_plane *plane, sonde_error *error) {
+  const sonde_affine *a = &s->frames[frame].world_from_pixel;
+  sonde_vec3 u = affine_column(a, 0), v = affine_column(a, 1);
+  sonde_vec3 n = v_unit(v_cross(u, v), vec3(0, 0, 0));
+  if (v_dot(n, *previous) < 0) n = v_neg(n); // one side for the whole sweep
+  sonde_affine world_from_local = affine_columns(u, v, n, affine_column(a, 3));
+  if (!affine_inverse(&world_from_local, &plane->local_from_world))
+    return sonde_fail(error, SONDE_ARGUMENT,
+                      "frame %u: its columns and rows run the same way, expected a plane", frame);
+  *previous = plane->normal = n;
+  plane->world_from_pixel = *a;
+  plane->pixel_m[0] = v_norm(u), plane->pixel_m[1] = v_norm(v);
+  plane->pixels = s->pixels + (size_t)frame * s->width * s->height;
+  return SONDE_OK;
+}
+
+static sonde_status fill_planes(const sonde_sequence *s, sonde_slicer *slicer, sonde_error *error) {
+  sonde_vec3 previous = vec3(0, 0, 0);
+  for (uint32_t i = 0; i < s->count; ++i) {
+    if (!s->frames[i].used || i == slicer->options.left_out) continue;
+    sonde_status status = plane_of(s, i, &previous, &slicer->planes[slicer->count], error);
+    if (status) return status;
+    ++slicer->count;
+  }
+  if (slicer->count) return SONDE_OK;
+  return sonde_fail(error, SONDE_MISMATCH, "no frame with a pose is left to slice");
+}
+
+static sonde_status check_sequence(const sonde_sequence *s, const sonde_slicer_options *o,
+                                   sonde_error *error) {
+  if (s->clip[2] < 2 || s->clip[3] < 2)
+    return sonde_fail(error, SONDE_ARGUMENT,
+                      "frames of %u x %u used pixels, expected at least 2 x 2", s->clip[2],
+                      s->clip[3]);
+  if (!(o->gap_m > 0) || !(o->reach_m >= 0))
+    return sonde_fail(error, SONDE_ARGUMENT, "gap %g m and reach %g m: expected > 0 and >= 0",
+                      o->gap_m, o->reach_m);
+  return SONDE_OK;
+}
+
+static bool make_rooms(sonde_slicer *slicer, uint32_t count) {
+  slicer->every = SONDE_NEW(const slice_plane *, count);
+  slicer->rooms = SONDE_NEW(slice_room, slicer->workers);
+  if (!slicer->every || !slicer->rooms) return false;
+  for (uint32_t i = 0; i < count; ++i) slicer->every[i] = &slicer->planes[i];
+  for (uint32_t k = 0; k < slicer->workers; ++k) {
+    slice_room *room = &slicer->rooms[k];
+    room->candidates = SONDE_NEW(slice_candidate, count);
+    room->block = SONDE_NEW(const slice_plane *, count);
+    room->tile = SONDE_NEW(const slice_plane *, count);
+    if (!room->candidates || !room->block || !room->tile) return false;
+  }
+  return true;
+}
+
+sonde_status sonde_slicer_create(const sonde_sequence *s, const sonde_slicer_options *options,
+                                 sonde_slicer **out, sonde_error *error) {
+  SONDE_ASSERT(s != NULL && out != NULL && s->frames != NULL);
+  *out = NULL;
+  sonde_slicer_options o = options ? *options : sonde_slicer_options_default();
+  sonde_status status = check_sequence(s, &o, error);
+  if (status) return status;
+  sonde_slicer *slicer = SONDE_NEW(sonde_slicer, 1);
+  if (!slicer) return sonde_fail_memory(error);
+  slicer->options = o;
+  slicer->width = s->width;
+  slicer->workers = sonde_parallel_workers(o.threads, 64);
+  for (int k = 0; k < 2; ++k) {
+    slicer->low[k] = (float)s->clip[k];
+    slicer->high[k] = (float)(s->clip[k] + s->clip[2 + k] - 1);
+  }
+  slicer->planes = SONDE_NEW(slice_plane, s->count);
+  slicer->reached = SONDE_NEW(uint64_t, slicer->workers);
+  bool enough = slicer->planes && slicer->reached && make_rooms(slicer, s->count);
+  status = enough ? fill_planes(s, slicer, error) : sonde_fail_memory(error);
+  if (status) sonde_slicer_destroy(slicer);
+  *out = status ? NULL : slicer;
+  return status;
+}
+
+void sonde_slicer_destroy(sonde_slicer *slicer) {
+  if (!slicer) return;
+  sonde_free(slicer->planes);
+  for (uint32_t k = 0; slicer->rooms && k < slicer->workers; ++k) {
+    sonde_free(slicer->rooms[k].candidates);
+    sonde_free(slicer->rooms[k].block);
+    sonde_free(slicer->rooms[k].tile);
+  }
+  sonde_free(slicer->rooms);
+  sonde_free(slicer->every);
+  sonde_free(slicer->reached);
+  sonde_free(slicer);
+}
+
+static void prepare(sonde_slicer *slicer, const sonde_affine *world_from_pixel) {
+  for (uint32_t i = 0; i < slicer->count; ++i) {
+    slice_plane *plane = &slicer->planes[i];
+    sonde_affine local = affine_mul(&plane->local_from_world, world_from_pixel);
+    double *forms[3] = {plane->forms.u, plane->forms.v, plane->forms.d};
+    for (int k = 0; k < 3; ++k) {
+      forms[k][0] = local.m[k][3];
+      forms[k][1] = local.m[k][0];
+      forms[k][2] = local.m[k][1];
+    }
+  }
+}
+
+static sonde_status block_row(void *user, uint32_t worker, uint32_t item, const atomic_bool *stop,
+                              sonde_error *error) {
+  sonde_slicer *slicer = user;
+  (void)stop, (void)error;
+  for (uint32_t column = 0; column < slicer->image->width; column += SLICE_BLOCK)
+    slicer->reached[worker] +=
+        sonde_slice_block(slicer, column, item * SLICE_BLOCK, &slicer->rooms[worker]);
+  return SONDE_OK;
+}
+
+uint64_t sonde_slicer_render(sonde_slicer *slicer, const sonde_affine *world_from_pixel,
+                             sonde_image *image, uint8_t *known) {
+  SONDE_ASSERT(slicer != NULL && world_from_pixel != NULL && image != NULL && image->pixels);
+  slicer->image = image;
+  slicer->known = known;
+  memset(slicer->reached, 0, slicer->workers * sizeof *slicer->reached);
+  prepare(slicer, world_from_pixel);
+  uint32_t rows = (image->height + SLICE_BLOCK - 1) / SLICE_BLOCK;
+  uint32_t workers = slicer->workers < rows ? slicer->workers : rows;
+  if (workers > 1)
+    (void)sonde_parallel_run(rows, workers, block_row, slicer, NULL, "slice", NULL);
+  else
+    for (uint32_t row = 0; row < rows; ++row) (void)block_row(slicer, 0, row, NULL, NULL);
+  uint64_t reached = 0;
+  for (uint32_t k = 0; k < slicer->workers; ++k) reached += slicer->reached[k];
+  SONDE_ASSERT(reached <= (uint64_t)image->width * image->height);
+  return reached;
+}
+
+sonde_affine sonde_slice_plane(sonde_pose probe, const sonde_image *image) {
+  SONDE_ASSERT(image != NULL && image->width > 0 && image->height > 0);
+  double dx = image->width_m / image->width, dz = image->height_m / image->height;
+  sonde_vec3 x = q_rotate(probe.rotation, vec3(1, 0, 0));
+  sonde_vec3 y = q_rotate(probe.rotation, vec3(0, 1, 0));
+  sonde_vec3 z = q_rotate(probe.rotation, vec3(0, 0, 1));
+  sonde_vec3 corner = v_madd(v_madd(probe.position, 0.5 * (dx - image->width_m), x), 0.5 * dz, z);
+  return affine_columns(v_scale(x, dx), v_scale(z, dz), v_neg(y), corner);
+}
+
+uint64_t sonde_volume_slice(const sonde_volume *volume, bool nearest,
+                            const sonde_affine *world_from_pixel, sonde_image *image,
+                            uint8_t *known) {
+  SONDE_ASSERT(volume != NULL && volume->voxels != NULL && image != NULL && image->pixels);
+  sonde_affine voxel_from_world, voxel_from_pixel;
+  size_t pixels = (size_t)image->width * image->height;
+  if (!affine_inverse(&volume->world_from_voxel, &voxel_from_world)) {
+    memset(image->pixels, 0, pixels);
+    if (known) memset(known, 0, pixels);
+    return 0;
+  }
+  voxel_from_pixel = affine_mul(&voxel_from_world, world_from_pixel);
+  return sonde_slice_voxels(volume, nearest, &voxel_from_pixel, image, known);
+}

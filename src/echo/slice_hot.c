@@ -1,0 +1,359 @@
+// Pixels of a picture from the frames around them, and from a volume.
+//
+// A picture is cut into blocks and those into tiles. Over a tile the distance d to a plane is
+// linear, so its bounds are known from the tile's centre. A plane that covers the whole tile on one
+// side hides every plane of that side that lies behind its far bound; what is left are two or three
+// candidates.
+//
+// Between plane i (d_i >= 0) and plane j (d_j < 0) the pixel p lies on a line that meets both.
+// Weights in proportion to the distance of the other plane make the mean of the two points p
+// itself, whatever the line's direction: a field that is linear in space comes out exactly, however
+// the planes are tilted. The direction is n_i + n_j, half way between the normals, so that both
+// distances shrink alike. Along the sweep it is the way from where a pixel lies in frame i to where
+// the same pixel lies in frame j: what moves with the probe (gain over depth, near field,
+// persistence of the scanner) then meets itself; where that way grazes the planes or leaves a
+// frame, the normals serve again. In local coordinates (u, v, d) of a frame the direction is (e_u,
+// e_v, e_d), and the line meets the frame at u - d e_u / e_d.
+//
+// span              range of a form over the tile
+// covers, touches   a plane and the tile
+// gather            planes that may be nearest in a rectangle
+// nearest_of_row    for each pixel of a row the nearest candidate on either side
+// sweep_way         from a pixel to the same pixel of the other frame
+// normal_shift      half way between two normals
+// is_steep          a way that does not graze the plane
+// blend             pair constants of two planes
+// sample            bilinear
+// sample_foot       a frame straight below a pixel
+// foot, follow      where a line through a pixel meets a frame
+// between           two frames and their weights
+// value_at          one pixel
+// fill_tile
+// sonde_slice_block
+// trilinear         eight voxels
+// sonde_slice_voxels
+#include "echo/slice.h"
+
+#include <string.h>
+
+static const float SLACK = 1e-3f; // of a pixel: rounding at the frame's edge
+
+// What a row of a tile found: distance and candidate on both sides, -1 for none.
+typedef struct row_pick {
+  float up_d[SLICE_TILE], down_d[SLICE_TILE];
+  int32_t up[SLICE_TILE], down[SLICE_TILE];
+} row_pick;
+
+// Directions of the line that joins two planes, in the local coordinates of each: columns and rows
+// per metre of distance, or the way linear in the pixel (1, u, v) of the upper frame.
+typedef struct pair {
+  int32_t up, down;
+  bool along_sweep;
+  float up_shift[2], down_shift[2];   // half way between the normals: constant
+  float up_way[3][3], down_way[3][3]; // along the sweep
+} pair;
+
+typedef struct bounds {
+  double low, high;
+} bounds;
+
+typedef struct rectangle {
+  uint32_t column, row, wide, high; // pixels of the picture
+} rectangle;
+
+static inline bounds span(const double form[3], const rectangle *r) {
+  double wide = r->wide - 1, high = r->high - 1;
+  double centre = form[0] + form[1] * (r->column + 0.5 * wide) + form[2] * (r->row + 0.5 * high);
+  double reach = 0.5 * (fabs(form[1]) * wide + fabs(form[2]) * high);
+  return (bounds){centre - reach, centre + reach};
+}
+
+static inline bool covers(const sonde_slicer *s, bounds u, bounds v) {
+  return u.low >= s->low[0] && u.high <= s->high[0] && v.low >= s->low[1] && v.high <= s->high[1];
+}
+
+static inline bool touches(const sonde_slicer *s, bounds u, bounds v) {
+  return u.high >= s->low[0] - SLACK && u.low <= s->high[0] + SLACK &&
+         v.high >= s->low[1] - SLACK && v.low <= s->high[1] + SLACK;
+}
+
+static void start_at(const double form[3], const rectangle *r, float out[3]) {
+  out[0] = (float)(form[0] + form[1] * r->column + form[2] * r->row);
+  out[1] = (float)form[1];
+  out[2] = (float)form[2];
+}
+
+// Planes that may be nearest somewhere in a rectangle, out of `count` candidates; may work in
+// place.
+static uint32_t gather(const sonde_slicer *s, const rectangle *r, const slice_plane *const *from,
+                       uint32_t count, const slice_plane **out) {
+  double front = (double)INFINITY, back = -front; // far bounds of the nearest covering planes
+  for (uint32_t i = 0; i < count; ++i) {
+    const slice_forms *f = &from[i]->forms;
+    bounds d = span(f->d, r);
+    if (!((d.low >= 0 && d.high < front) || (d.high < 0 && d.low > back))) continue;
+    if (!covers(s, span(f->u, r), span(f->v, r))) continue;
+    if (d.low >= 0)
+      front = d.high;
+    else
+      back = d.low;
+  }
+  uint32_t found = 0;
+  for (uint32_t i = 0; i < count; ++i) {
+    const slice_forms *f = &from[i]->forms;
+    bounds d = span(f->d, r);
+    if (!((d.high >= 0 && d.low <= front) || (d.low < 0 && d.high >= back))) continue;
+    if (touches(s, span(f->u, r), span(f->v, r))) out[found++] = from[i];
+  }
+  return found;
+}
+
+// Without branches, so that the compiler takes four pixels at a time.
+static void nearest_of_row(const sonde_slicer *s, const slice_candidate *room, uint32_t count,
+                           uint32_t row, row_pick *pick) {
+  for (int x = 0; x < SLICE_TILE; ++x) {
+    pick->up_d[x] = INFINITY, pick->down_d[x] = -INFINITY;
+    pick->up[x] = pick->down[x] = -1;
+  }
+  float u0 = s->low[0] - SLACK, u1 = s->high[0] + SLACK;
+  float v0 = s->low[1] - SLACK, v1 = s->high[1] + SLACK;
+  for (uint32_t k = 0; k < count; ++k) {
+    const slice_candidate *c = &room[k];
+    float u = c->u[0] + (float)row * c->u[2], v = c->v[0] + (float)row * c->v[2];
+    float d = c->d[0] + (float)row * c->d[2], us = c->u[1], vs = c->v[1], ds = c->d[1];
+    for (int x = 0; x < SLICE_TILE; ++x) {
+      float fx = (float)x, ux = u + fx * us, vx = v + fx * vs, dx = d + fx * ds;
+      int inside = (ux >= u0) & (ux <= u1) & (vx >= v0) & (vx <= v1);
+      int up = inside & (dx >= 0) & (dx < pick->up_d[x]);
+      int down = inside & (dx < 0) & (dx > pick->down_d[x]);
+      pick->up_d[x] = up ? dx : pick->up_d[x];
+      pick->up[x] = up ? (int32_t)k : pick->up[x];
+      pick->down_d[x] = down ? dx : pick->down_d[x];
+      pick->down[x] = down ? (int32_t)k : pick->down[x];
+    }
+  }
+}
+
+// Way from a pixel of plane a to the same pixel of plane b, in local coordinates of a.
+static void sweep_way(const slice_plane *a, const slice_plane *b, float way[3][3]) {
+  sonde_affine to = affine_mul(&a->local_from_world, &b->world_from_pixel);
+  for (int k = 0; k < 3; ++k) {
+    way[k][0] = (float)to.m[k][3];
+    way[k][1] = (float)(to.m[k][0] - (k == 0));
+    way[k][2] = (float)(to.m[k][1] - (k == 1));
+  }
+}
+
+// Half way between the two normals, in local coordinates of a: its own normal moves nothing. Planes
+// that stand across each other are met at their feet.
+static void normal_shift(const slice_plane *a, const slice_plane *b, float shift[2]) {
+  double c = v_dot(a->normal, b->normal);
+  for (int k = 0; k < 2; ++k) {
+    const double *r = a->local_from_world.m[k];
+    double along = r[0] * b->normal.x + r[1] * b->normal.y + r[2] * b->normal.z;
+    shift[k] = c > 0 ? (float)(along / (1 + c)) : 0;
+  }
+}
+
+// The way leaves to that side of the plane, at most 60 degrees off its normal.
+static bool is_steep(const slice_plane *plane, float way[3][3], float u, float v, float side) {
+  float e[3];
+  for (int k = 0; k < 3; ++k) e[k] = way[k][0] + u * way[k][1] + v * way[k][2];
+  double across = hypot(e[0] * plane->pixel_m[0], e[1] * plane->pixel_m[1]);
+  return across < 1.7 * (double)(side * e[2]);
+}
+
+static void blend(const sonde_slicer *s, const slice_candidate *room, int32_t up, int32_t down,
+                  pair *p) {
+  const slice_plane *a = room[up].plane, *b = room[down].plane;
+  p->up = up, p->down = down;
+  p->along_sweep = s->options.along_sweep;
+  normal_shift(a, b, p->up_shift);
+  normal_shift(b, a, p->down_shift);
+  if (!p->along_sweep) return;
+  sweep_way(a, b, p->up_way);
+  sweep_way(b, a, p->down_way);
+  for (int corner = 0; corner < 4 && p->along_sweep; ++corner) {
+    float u = corner & 1 ? s->high[0] : s->low[0], v = corner & 2 ? s->high[1] : s->low[1];
+    p->along_sweep = is_steep(a, p->up_way, u, v, 1) && is_steep(b, p->down_way, u, v, -1);
+  }
+}
+
+static inline float limit(float x, float low, float high) {
+  return x < low ? low : (x > high ? high : x);
+}
+
+static inline float sample(const sonde_slicer *s, const uint8_t *pixels, float u, float v) {
+  u = limit(u, s->low[0], s->high[0]);
+  v = limit(v, s->low[1], s->high[1]);
+  uint32_t iu = (uint32_t)limit(u, s->low[0], s->high[0] - 1);
+  uint32_t iv = (uint32_t)limit(v, s->low[1], s->high[1] - 1);
+  float a = u - (float)iu, b = v - (float)iv;
+  const uint8_t *p = pixels + (size_t)iv * s->width + iu, *q = p + s->width;
+  float top = (float)p[0] + a * (float)(p[1] - p[0]), low = (float)q[0] + a * (float)(q[1] - q[0]);
+  return top + b * (low - top);
+}
+
+// A frame at pixel (x, y) of the tile, straight below it.
+static inline float sample_foot(const sonde_slicer *s, const slice_candidate *c, float x, float y) {
+  return sample(s, c->plane->pixels, c->u[0] + y * c->u[2] + x * c->u[1],
+                c->v[0] + y * c->v[2] + x * c->v[1]);
+}
+
+static inline bool is_inside(const sonde_slicer *s, const float at[2]) {
+  return at[0] >= s->low[0] - SLACK && at[0] <= s->high[0] + SLACK && at[1] >= s->low[1] - SLACK &&
+         at[1] <= s->high[1] + SLACK;
+}
+
+// Pixel of a frame at (x, y) of the tile.
+static inline void foot(const slice_candidate *c, float x, float y, float at[2]) {
+  at[0] = c->u[0] + y * c->u[2] + x * c->u[1];
+  at[1] = c->v[0] + y * c->v[2] + x * c->v[1];
+}
+
+// Moves a foot to where the way of pixel (u, v) meets the frame.
+static inline void follow(float way[3][3], float u, float v, float d, float at[2]) {
+  float t = d / (way[2][0] + u * way[2][1] + v * way[2][2]);
+  at[0] -= t * (way[0][0] + u * way[0][1] + v * way[0][2]);
+  at[1] -= t * (way[1][0] + u * way[1][1] + v * way[1][2]);
+}
+
+// Mean of both frames, each weighted by the distance a or b of the other; negative when the line
+// passes a frame by.
+static inline float between(const sonde_slicer *s, const slice_candidate *room, pair *p, float x,
+                            float y, float a, float b) {
+  const slice_candidate *up = &room[p->up], *down = &room[p->down];
+  float m[2], n[2];
+  bool met = false;
+  if (p->along_sweep) {
+    foot(up, x, y, m);
+    foot(down, x, y, n);
+    float u = m[0], v = m[1]; // one line for both
+    follow(p->up_way, u, v, a, m);
+    follow(p->down_way, u, v, -b, n);
+    met = is_inside(s, m) && is_inside(s, n);
+  }
+  if (!met) {
+    foot(up, x, y, m);
+    foot(down, x, y, n);
+    for (int k = 0; k < 2; ++k) m[k] -= a * p->up_shift[k], n[k] += b * p->down_shift[k];
+    if (!is_inside(s, m) || !is_inside(s, n)) return -1;
+  }
+  float near = sample(s, up->plane->pixels, m[0], m[1]);
+  float far = sample(s, down->plane->pixels, n[0], n[1]);
+  return near + (far - near) * (a / (a + b));
+}
+
+// Negative when no frame reaches the pixel.
+static inline float value_at(const sonde_slicer *s, const slice_candidate *room,
+                             const row_pick *pick, int x, float y, pair *p) {
+  int32_t up = pick->up[x], down = pick->down[x];
+  float a = pick->up_d[x], b = -pick->down_d[x];
+  if (up >= 0 && down >= 0 && a + b <= (float)s->options.gap_m) {
+    if (s->options.method == SONDE_SLICE_NEAREST)
+      return a <= b ? sample_foot(s, &room[up], (float)x, y)
+                    : sample_foot(s, &room[down], (float)x, y);
+    if (p->up != up || p->down != down) blend(s, room, up, down, p);
+    float value = between(s, room, p, (float)x, y, a, b);
+    if (value >= 0) return value;
+  }
+  bool first = up >= 0 && (down < 0 || a <= b);
+  if ((first ? a : b) <= (float)s->options.reach_m && (first || down >= 0))
+    return sample_foot(s, &room[first ? up : down], (float)x, y);
+  return -1;
+}
+
+static uint64_t fill_tile(const sonde_slicer *s, const rectangle *r, const slice_candidate *room,
+                          uint32_t count) {
+  uint64_t reached = 0;
+  pair p = {.up = -1};
+  row_pick pick;
+  for (uint32_t y = 0; y < r->high; ++y) {
+    nearest_of_row(s, room, count, y, &pick);
+    size_t at = (size_t)(r->row + y) * s->image->width + r->column;
+    uint8_t *out = s->image->pixels + at, *known = s->known ? s->known + at : NULL;
+    for (uint32_t x = 0; x < r->wide; ++x) {
+      float value = value_at(s, room, &pick, (int)x, (float)y, &p);
+      out[x] = value > 0 ? (uint8_t)(value + 0.5f) : 0;
+      if (known) known[x] = value >= 0;
+      reached += value >= 0;
+    }
+  }
+  return reached;
+}
+
+static inline uint32_t at_most(uint32_t a, uint32_t b) { return a < b ? a : b; }
+
+// Planes of the block first, then of each tile in it.
+uint64_t sonde_slice_block(const sonde_slicer *s, uint32_t column, uint32_t row, slice_room *room) {
+  SONDE_ASSERT(s->image != NULL && column < s->image->width && row < s->image->height);
+  rectangle block = {column, row, at_most(SLICE_BLOCK, s->image->width - column),
+                     at_most(SLICE_BLOCK, s->image->height - row)};
+  uint32_t all = gather(s, &block, s->every, s->count, room->block);
+  uint64_t reached = 0;
+  for (uint32_t y = 0; y < block.high; y += SLICE_TILE)
+    for (uint32_t x = 0; x < block.wide; x += SLICE_TILE) {
+      rectangle tile = {column + x, row + y, at_most(SLICE_TILE, block.wide - x),
+                        at_most(SLICE_TILE, block.high - y)};
+      uint32_t count = gather(s, &tile, room->block, all, room->tile);
+      for (uint32_t i = 0; i < count; ++i) {
+        slice_candidate *c = &room->candidates[i];
+        c->plane = room->tile[i];
+        start_at(c->plane->forms.u, &tile, c->u);
+        start_at(c->plane->forms.v, &tile, c->v);
+        start_at(c->plane->forms.d, &tile, c->d);
+      }
+      reached += fill_tile(s, &tile, room->candidates, count);
+    }
+  return reached;
+}
+
+static inline float trilinear(const sonde_volume *v, const float at[3]) {
+  uint32_t index[3];
+  float t[3];
+  for (int k = 0; k < 3; ++k) {
+    uint32_t last = v->size[k] > 1 ? v->size[k] - 2 : 0;
+    float x = limit(at[k], 0, (float)(v->size[k] - 1));
+    index[k] = (uint32_t)x < last ? (uint32_t)x : last;
+    t[k] = x - (float)index[k];
+  }
+  size_t dx = v->size[0] > 1, dy = v->size[1] > 1 ? v->size[0] : 0;
+  size_t dz = v->size[2] > 1 ? (size_t)v->size[0] * v->size[1] : 0;
+  const uint8_t *p = v->voxels + ((size_t)index[2] * v->size[1] + index[1]) * v->size[0] + index[0];
+  float plane[2];
+  for (int k = 0; k < 2; ++k, p += dz) {
+    float top = (float)p[0] + t[0] * (float)(p[dx] - p[0]);
+    float low = (float)p[dy] + t[0] * (float)(p[dy + dx] - p[dy]);
+    plane[k] = top + t[1] * (low - top);
+  }
+  return plane[0] + t[2] * (plane[1] - plane[0]);
+}
+
+static inline float nearest_voxel(const sonde_volume *v, const float at[3]) {
+  size_t index[3];
+  for (int k = 0; k < 3; ++k) index[k] = (size_t)(limit(at[k], 0, (float)(v->size[k] - 1)) + 0.5f);
+  return (float)v->voxels[(index[2] * v->size[1] + index[1]) * v->size[0] + index[0]];
+}
+
+uint64_t sonde_slice_voxels(const sonde_volume *v, bool nearest, const sonde_affine *a,
+                            sonde_image *image, uint8_t *known) {
+  SONDE_ASSERT(v->size[0] > 0 && v->size[1] > 0 && v->size[2] > 0);
+  uint64_t reached = 0;
+  for (uint32_t row = 0; row < image->height; ++row) {
+    float start[3], at[3];
+    for (int k = 0; k < 3; ++k) start[k] = (float)(a->m[k][3] + row * a->m[k][1]);
+    size_t line = (size_t)row * image->width;
+    for (uint32_t x = 0; x < image->width; ++x) {
+      bool inside = true;
+      for (int k = 0; k < 3; ++k) {
+        at[k] = start[k] + (float)x * (float)a->m[k][0];
+        inside &= at[k] >= -SLACK && at[k] <= (float)(v->size[k] - 1) + SLACK;
+      }
+      float value = !inside ? 0 : nearest ? nearest_voxel(v, at) : trilinear(v, at);
+      image->pixels[line + x] = (uint8_t)(value + 0.5f);
+      if (known) known[line + x] = inside;
+      reached += inside;
+    }
+  }
+  return reached;
+}
