@@ -10,6 +10,12 @@
 #include <immintrin.h>
 #endif
 
+// Without optimisation gcc's intrinsics are macros whose masks it then warns about.
+#if defined(__GNUC__) && !defined(__clang__) && !defined(__OPTIMIZE__)
+#pragma GCC diagnostic ignored "-Wsign-conversion"
+#pragma GCC diagnostic ignored "-Wconversion"
+#endif
+
 #define INLINE static inline __attribute__((always_inline))
 typedef double lane_double __attribute__((vector_size(128)));
 
