@@ -38,10 +38,12 @@ SONDE_API sonde_surface_law sonde_surface_law_default(void);
 typedef struct sonde_site {
   uint32_t id;
   sonde_vec3 position_m;
-  sonde_vec3 normal; /**< outward, unit */
-  sonde_vec3 u, v;   /**< footprint axes: u around the leg, v along it */
-  double k0_n_m3;    /**< fitted, per area */
-  double xm_m;       /**< fitted asymptote */
+  sonde_vec3 normal;  /**< outward, unit */
+  sonde_vec3 u, v;    /**< footprint axes: u around the leg, v along it */
+  double k0_n_m3;     /**< fitted, per area */
+  double xm_m;        /**< fitted asymptote */
+  double shear_share; /**< fitted G over the law's; 0 counts as 1 */
+  double limit_share; /**< fitted gm over the law's; 0 counts as 1 */
 } sonde_site;
 
 /** One measured point: force against penetration. */
@@ -82,6 +84,8 @@ typedef struct sonde_model {
   double *mass_kg;                  /**< [nodes] */
   double *k0_n_m3;                  /**< [nodes] per area */
   double *xm_m;                     /**< [nodes] */
+  double *shear_share;              /**< [nodes] G here over the law's; a face takes the mean */
+  double *limit_share;              /**< [nodes] gm here over the law's; likewise */
   double *fat_depth_m;              /**< [nodes] depth of the skin/fat interface below the skin */
   double *muscle_depth_m;           /**< [nodes] depth of the fat/muscle interface */
   double *bone_depth_m;             /**< [nodes] distance to the femur */

@@ -14,6 +14,8 @@ static void fill(const sonde_model *model, const sonde_cut *cut, sonde_model *to
     to->normal[v] = sonde_cut_normal(model, cut, v);
     to->k0_n_m3[v] = between(model->k0_n_m3, parent, cut->share[v]);
     to->xm_m[v] = between(model->xm_m, parent, cut->share[v]);
+    to->shear_share[v] = between(model->shear_share, parent, cut->share[v]);
+    to->limit_share[v] = between(model->limit_share, parent, cut->share[v]);
     to->fat_depth_m[v] = model->fat_depth_m[near];
     to->muscle_depth_m[v] = model->muscle_depth_m[near];
     to->bone_depth_m[v] = model->bone_depth_m[near];

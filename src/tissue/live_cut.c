@@ -164,6 +164,8 @@ static void copy_nodes(const sonde_model *model, const sonde_cut_map *map, sonde
   copy_vectors(map, model->normal, cut->normal);
   copy_field(map, model->k0_n_m3, cut->k0_n_m3);
   copy_field(map, model->xm_m, cut->xm_m);
+  copy_field(map, model->shear_share, cut->shear_share);
+  copy_field(map, model->limit_share, cut->limit_share);
   copy_field(map, model->fat_depth_m, cut->fat_depth_m);
   copy_field(map, model->muscle_depth_m, cut->muscle_depth_m);
   copy_field(map, model->bone_depth_m, cut->bone_depth_m);

@@ -64,12 +64,13 @@ static sonde_status check_law(const sonde_surface_law *law, sonde_error *error) 
 
 sonde_status sonde_model_allocate_nodes(sonde_model *model, sonde_error *error) {
   uint32_t n = model->surface.vertex_count;
-  double **array[] = {&model->area_m2,     &model->mass_kg,     &model->k0_n_m3,
-                      &model->xm_m,        &model->fat_depth_m, &model->muscle_depth_m,
-                      &model->bone_depth_m};
+  double **array[] = {&model->area_m2,      &model->mass_kg,     &model->k0_n_m3,
+                      &model->xm_m,         &model->fat_depth_m, &model->muscle_depth_m,
+                      &model->bone_depth_m, &model->shear_share, &model->limit_share};
   bool ok = true;
   for (size_t k = 0; k < SONDE_COUNT_OF(array); ++k)
     ok &= (*array[k] = SONDE_NEW(double, n)) != NULL;
+  for (uint32_t i = 0; i < n && ok; ++i) model->shear_share[i] = model->limit_share[i] = 1;
   model->normal = SONDE_NEW(sonde_vec3, n);
   return ok && model->normal ? SONDE_OK : sonde_fail_memory(error);
 }
@@ -305,7 +306,8 @@ void sonde_model_destroy(sonde_model *model) {
                     model->k0_n_m3,      model->xm_m,           model->fat_depth_m,
                     model->bone_depth_m, model->muscle_depth_m, model->edge_rest_m,
                     model->edge_share,   model->face_area_m2,   model->face_half_cotangent,
-                    model->face_edge,    model->sites,          model->data};
+                    model->face_edge,    model->sites,          model->data,
+                    model->shear_share,  model->limit_share};
   for (size_t k = 0; k < SONDE_COUNT_OF(arrays); ++k) sonde_free(arrays[k]);
   sonde_topology_clear(&model->topology);
   sonde_mesh_clear(&model->surface);

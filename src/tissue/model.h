@@ -11,7 +11,7 @@ sonde_status sonde_model_derive(sonde_model *model, sonde_error *error);
 // Depths of the interfaces and of the bone below every node.
 sonde_status sonde_model_measure_layers(sonde_model *model, const sonde_mesh *fat,
                                         const sonde_mesh *muscle, sonde_error *error);
-// ln k0 and ln xm of the sites carried to every node by kriging.
+// The sites' parameters carried to every node by kriging of their logarithms.
 sonde_status sonde_model_interpolate(sonde_model *model, sonde_error *error);
 // Femoral vein and artery below the examined area.
 sonde_status sonde_model_place_vessels(sonde_model *model, sonde_error *error);

@@ -13,7 +13,7 @@
 #include <zlib.h>
 
 #define MAGIC "SONDE-MODEL "
-enum { FORMAT_VERSION = 2 };
+enum { FORMAT_VERSION = 3, OLDEST_VERSION = 2 };
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the model file is little-endian");
 
@@ -62,6 +62,8 @@ static void put_nodes(writer *w, const sonde_model *model) {
   uint32_t n = model->surface.vertex_count;
   put(w, "node_k0", "f64", "N/m^3", n, 1, model->k0_n_m3);
   put(w, "node_xm", "f64", "m", n, 1, model->xm_m);
+  put(w, "node_shear_share", "f64", "1", n, 1, model->shear_share);
+  put(w, "node_limit_share", "f64", "1", n, 1, model->limit_share);
   put(w, "node_fat_depth", "f64", "m", n, 1, model->fat_depth_m);
   put(w, "node_muscle_depth", "f64", "m", n, 1, model->muscle_depth_m);
   put(w, "node_bone_depth", "f64", "m", n, 1, model->bone_depth_m);
@@ -78,7 +80,8 @@ static void put_sites(writer *w, const sonde_model *model) {
   uint32_t n = model->site_count;
   uint32_t *id = SONDE_NEW(uint32_t, n);
   double(*row)[14] = sonde_calloc(n, sizeof *row);
-  if (id && row) {
+  double(*share)[2] = sonde_calloc(n, sizeof *share);
+  if (id && row && share) {
     for (uint32_t k = 0; k < n; ++k) {
       const sonde_site *s = &model->sites[k];
       id[k] = s->id;
@@ -88,14 +91,18 @@ static void put_sites(writer *w, const sonde_model *model) {
       memcpy(&row[k][9], &s->v, 24);
       row[k][12] = s->k0_n_m3;
       row[k][13] = s->xm_m;
+      share[k][0] = s->shear_share;
+      share[k][1] = s->limit_share;
     }
     put(w, "site_id", "u32", "1", n, 1, id);
     put(w, "site", "f64", "position m, normal, u, v, k0 N/m^3, xm m", n, 14, row);
+    put(w, "site_share", "f64", "of G, of gm", n, 2, share);
   } else {
     w->failed = true;
   }
   sonde_free(id);
   sonde_free(row);
+  sonde_free(share);
 }
 
 // Index of a probe name in the header's list, added when it is new.
@@ -307,6 +314,29 @@ static bool take_nodes(const reader *r, sonde_model *model) {
   return true;
 }
 
+// What files before the fields of the shear layer lack; the shares stay as they are then.
+static bool take_shares(const reader *r, sonde_model *model) {
+  uint32_t n = model->surface.vertex_count, m = model->site_count, rows[3];
+  if (!find_array(r, "node_shear_share")) return true;
+  const char *shear = take(r, "node_shear_share", "f64", 1, &rows[0]);
+  const char *limit = shear ? take(r, "node_limit_share", "f64", 1, &rows[1]) : NULL;
+  const char *site = limit ? take(r, "site_share", "f64", 2, &rows[2]) : NULL;
+  if (!site) return false;
+  if (rows[0] != n || rows[1] != n || rows[2] != m) {
+    sonde_fail(r->error, SONDE_FORMAT,
+               "%s: shares of %u, %u nodes and %u sites, expected %u and %u", r->path, rows[0],
+               rows[1], rows[2], n, m);
+    return false;
+  }
+  memcpy(model->shear_share, shear, (size_t)n * 8);
+  memcpy(model->limit_share, limit, (size_t)n * 8);
+  for (uint32_t k = 0; k < m; ++k, site += 16) {
+    memcpy(&model->sites[k].shear_share, site, 8);
+    memcpy(&model->sites[k].limit_share, site + 8, 8);
+  }
+  return true;
+}
+
 static bool take_sites(const reader *r, sonde_model *model) {
   uint32_t n, m;
   const char *id = take(r, "site_id", "u32", 1, &n);
@@ -418,6 +448,8 @@ static bool check_numbers(const reader *r, const sonde_model *model) {
                            3 * (size_t)model->femur.vertex_count, -100) &&
             finite_numbers(r, "node_k0", model->k0_n_m3, n, 1e-6) &&
             finite_numbers(r, "node_xm", model->xm_m, n, 1e-6) &&
+            finite_numbers(r, "node_shear_share", model->shear_share, n, 1e-6) &&
+            finite_numbers(r, "node_limit_share", model->limit_share, n, 1e-6) &&
             finite_numbers(r, "node_fat_depth", model->fat_depth_m, n, 0) &&
             finite_numbers(r, "node_muscle_depth", model->muscle_depth_m, n, 0) &&
             finite_numbers(r, "node_bone_depth", model->bone_depth_m, n, 0);
@@ -425,7 +457,8 @@ static bool check_numbers(const reader *r, const sonde_model *model) {
     const sonde_site *site = &model->sites[k];
     ok = finite_numbers(r, "site", &site->position_m.x, 12, -100) &&
          finite_numbers(r, "site", &site->k0_n_m3, 1, 1e-6) &&
-         finite_numbers(r, "site", &site->xm_m, 1, 1e-6);
+         finite_numbers(r, "site", &site->xm_m, 1, 1e-6) &&
+         finite_numbers(r, "site_share", &site->shear_share, 2, 0);
   }
   for (uint32_t k = 0; ok && k < model->datum_count; ++k)
     ok = finite_numbers(r, "datum", &model->data[k].penetration_m, 2, -1e6);
@@ -480,8 +513,9 @@ static sonde_status read_model(const reader *r, sonde_model *model) {
     return SONDE_FORMAT;
   sonde_status status = sonde_model_allocate_nodes(model, r->error);
   if (status) return status;
-  if (!take_nodes(r, model) || !take_sites(r, model) || !take_data(r, model) ||
-      !take_vessel(r, "vein", &model->vein) || !take_vessel(r, "artery", &model->artery))
+  if (!take_nodes(r, model) || !take_sites(r, model) || !take_shares(r, model) ||
+      !take_data(r, model) || !take_vessel(r, "vein", &model->vein) ||
+      !take_vessel(r, "artery", &model->artery))
     return SONDE_FORMAT;
   if (!check_numbers(r, model)) return SONDE_FORMAT;
   bool is_cut = find_array(r, "edge_share") != NULL;
@@ -507,9 +541,9 @@ static sonde_status split(const char *path, const char *bytes, size_t count, siz
                       stored);
   if (sscanf(bytes + strlen(MAGIC), "%d %zu %zu%n", &version, text, blob, &used) != 3)
     return sonde_fail(error, SONDE_FORMAT, "%s:1: expected a version and two sizes", path);
-  if (version != FORMAT_VERSION)
-    return sonde_fail(error, SONDE_VERSION, "%s: has format version %d, expected %d", path, version,
-                      FORMAT_VERSION);
+  if (version < OLDEST_VERSION || version > FORMAT_VERSION)
+    return sonde_fail(error, SONDE_VERSION, "%s: has format version %d, expected %d to %d", path,
+                      version, OLDEST_VERSION, FORMAT_VERSION);
   *start = strlen(MAGIC) + (size_t)used + 1;
   if (*text > count || *blob > count || *start + *text + *blob + 4 != count)
     return sonde_fail(error, SONDE_FORMAT, "%s:1: the sizes do not add up to the file's %zu bytes",

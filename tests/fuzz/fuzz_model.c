@@ -24,7 +24,7 @@ static void make_valid(void) {
   sonde_error error = {SONDE_OK, "", ""};
   sonde_mesh skin;
   make_skin(&skin, &error);
-  sonde_site site = {1, {0.08, 0, 0.1}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, 2e5, 0.05};
+  sonde_site site = {1, {0.08, 0, 0.1}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, 2e5, 0.05, 1.2, 0.9};
   sonde_model_def def = sonde_model_def_default();
   def.name = "box";
   def.provenance = "made for the fuzzer";
