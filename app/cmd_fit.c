@@ -37,6 +37,8 @@ static const char HELP[] =
     "  --cold-start      start stage 2 from generic values instead of stage 1\n"
     "  --exponent N      of the normal springs k0 x/(1 - (x/xm)^N) in stage 3: 1, 2 (default) or "
     "3\n"
+    "  --uniform-shear   one shear stiffness and limit for the whole skin in stage 3; default: a\n"
+    "                    field like k0 and xm\n"
     "  --smoothness SD   of ln k0 and ln xm per site spacing in stage 3; default: by leaving "
     "sites\n"
     "                    out one by one\n"
@@ -58,7 +60,7 @@ typedef struct fit_arguments {
   const char *measurements, *surface, *sites, *output, *femur, *fat, *muscle, *name, *provenance;
   const char *stages, *weights, *loss, *fine_mm, *exponent, *report, *hold_out, *smoothness;
   const char *starts, *seed;
-  bool json, help, pretension, cold_start, profile, identify;
+  bool json, help, pretension, cold_start, profile, identify, uniform_shear;
   char command_line[1024]; // as typed
 } fit_arguments;
 
@@ -91,6 +93,7 @@ static bool parse_arguments(int argc, char **argv, fit_arguments *a) {
                                 {"--fine-mm", &a->fine_mm, NULL},
                                 {"--exponent", &a->exponent, NULL},
                                 {"--smoothness", &a->smoothness, NULL},
+                                {"--uniform-shear", NULL, &a->uniform_shear},
                                 {"--report", &a->report, NULL},
                                 {"--hold-out", &a->hold_out, NULL},
                                 {"--starts", &a->starts, NULL},
@@ -163,6 +166,7 @@ static bool parse_fit(const fit_arguments *a, sonde_fit_def *def, double *fine_m
     if (!app_parse_word(VERB, "--hold-out", a->hold_out, HOLD_OUTS, &kind)) return false;
   }
   def->normal_exponent = (double)exponent;
+  def->uniform_shear = a->uniform_shear;
   def->stages = (uint32_t)stages;
   def->weights = (sonde_fit_weights)weights;
   def->loss = (sonde_fit_loss)loss;
@@ -293,6 +297,7 @@ static sonde_status fit_model(const fit_arguments *a, const fit_inputs *in,
 
 static void print_json_confidence(const sonde_fit_confidence *c) {
   app_json_real("smoothness_sd", c->smoothness_sd);
+  app_json_real("shear_smoothness_sd", c->shear_smoothness_sd);
   app_json_real("ln_shear_sd", c->ln_shear_sd);
   app_json_real("ln_limit_sd", c->ln_limit_sd);
   app_json_real("shear_bootstrap_low_n_m", c->shear_95[0]);

@@ -79,6 +79,9 @@ static void add_parameters(builder *b) {
     b->parameter[count++] =
         (sonde_report_parameter){"smoothness of ln k0 and ln xm per site spacing", "",
                                  sonde_report_value(c->smoothness_sd), "by leaving sites out"};
+    b->parameter[count++] = (sonde_report_parameter){
+        "smoothness of ln G and ln gm per site spacing", "",
+        sonde_report_value(c->shear_smoothness_sd), "by leaving sites out"};
   }
   b->report.parameters = b->parameter;
   b->report.parameter_count = count;
@@ -89,8 +92,11 @@ static void add_sites(builder *b) {
   const sonde_fit_confidence *c = &r->confidence;
   if (!c->band_n) return;
   for (uint32_t s = 0; s < r->site_count; ++s)
-    b->site[s] = (sonde_report_site){r->sites[s].id, around(r->sites[s].k0_n_m3, c->ln_k0_sd[s]),
-                                     around(r->sites[s].xm_m, c->ln_xm_sd[s])};
+    b->site[s] = (sonde_report_site){
+        r->sites[s].id, around(r->sites[s].k0_n_m3, c->ln_k0_sd[s]),
+        around(r->sites[s].xm_m, c->ln_xm_sd[s]),
+        around(r->law.shear_stiffness_n_m * r->sites[s].shear_share, c->ln_site_shear_sd[s]),
+        around(r->law.shear_limit * r->sites[s].limit_share, c->ln_site_limit_sd[s])};
   b->report.site_parameters = b->site;
   b->report.site_parameter_count = r->site_count;
   static const char *const NAMES[] = {"ln G", "ln gm", "mean ln k0", "mean ln xm"};

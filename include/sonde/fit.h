@@ -114,17 +114,20 @@ typedef enum sonde_fit_loss {
 } sonde_fit_loss;
 
 typedef struct sonde_fit_def {
-  uint32_t stages;           /**< 1, 2 or 3; default 2 */
-  sonde_fit_weights weights; /**< default absolute */
-  sonde_fit_loss loss;       /**< default squares */
-  double loss_scale;         /**< N, or a fraction with relative weights; default 0.5 / 0.05 */
-  uint32_t max_iterations;   /**< default 400 */
-  bool fit_pretension;       /**< also estimate T0 >= 0 (stage 2); default false */
-  bool cold_start;           /**< stage 2 from one generic start instead of stage 1 */
-  double kept_edge_n_m;      /**< edge stiffness of a stage 3 model; default 0.1 */
-  double normal_exponent;    /**< of the normal springs of stage 3: 1, 2 (default) or 3 */
-  double smoothness_sd;      /**< of ln k0 and ln xm per site spacing; 0 (default): by leave-out */
-  uint32_t threads;          /**< of stage 3; 0 (default): one per online core */
+  uint32_t stages;            /**< 1, 2 or 3; default 2 */
+  sonde_fit_weights weights;  /**< default absolute */
+  sonde_fit_loss loss;        /**< default squares */
+  double loss_scale;          /**< N, or a fraction with relative weights; default 0.5 / 0.05 */
+  uint32_t max_iterations;    /**< default 400 */
+  bool fit_pretension;        /**< also estimate T0 >= 0 (stage 2); default false */
+  bool cold_start;            /**< stage 2 from one generic start instead of stage 1 */
+  double kept_edge_n_m;       /**< edge stiffness of a stage 3 model; default 0.1 */
+  double normal_exponent;     /**< of the normal springs of stage 3: 1, 2 (default) or 3 */
+  double smoothness_sd;       /**< of ln k0 and ln xm per site spacing; 0 (default): by leave-out */
+  double shear_smoothness_sd; /**< of ln G and ln gm; 0 (default): by leave-out, or the same when
+                                   smoothness_sd is given */
+  bool uniform_shear;         /**< one G and gm for the whole skin; default false */
+  uint32_t threads;           /**< of stage 3; 0 (default): one per online core */
 } sonde_fit_def;
 
 SONDE_API sonde_fit_def sonde_fit_def_default(void);
@@ -152,13 +155,15 @@ enum { SONDE_FIT_TRIED = 7 };
 /** How far stage 3 is to be trusted; intervals are estimate +- 1.96 sd in the logarithms. */
 typedef struct sonde_fit_confidence {
   double smoothness_sd; /**< of ln k0 and ln xm per site spacing, chosen by leaving sites out */
-  uint32_t tried_count; /**< 0 when the smoothness was given */
+  double shear_smoothness_sd; /**< of ln G and ln gm, likewise */
+  uint32_t tried_count;       /**< 0 when the smoothness was given */
   double tried_sd[SONDE_FIT_TRIED], tried_percent[SONDE_FIT_TRIED]; /**< error of sites left out */
   double *ln_k0_sd, *ln_xm_sd;                                      /**< [site_count] */
-  double ln_shear_sd, ln_limit_sd;
-  double correlation[4][4];        /**< of ln G, ln gm, mean ln k0, mean ln xm */
-  double shear_95[2], limit_95[2]; /**< bootstrap over sites, N/m and slope */
-  double *band_n;                  /**< [measurements.count] half width of the force's 95 % band */
+  double *ln_site_shear_sd, *ln_site_limit_sd; /**< [site_count] of G and gm there */
+  double ln_shear_sd, ln_limit_sd;             /**< of the leg's */
+  double correlation[4][4];                    /**< of ln G, ln gm, mean ln k0, mean ln xm */
+  double shear_95[2], limit_95[2];             /**< bootstrap over sites, N/m and slope */
+  double *band_n;    /**< [measurements.count] half width of the force's 95 % band */
   double *one_out_n; /**< [measurements.count] force with its site left out (linearised) */
   sonde_error_report one_out;
 } sonde_fit_confidence;
@@ -171,8 +176,9 @@ typedef struct sonde_fit_result {
   sonde_site *sites;     /**< [site_count] input sites with k0 and xm of the last stage */
   sonde_surface_law law; /**< the model's law with what the last stage estimated */
   uint32_t stage1_parameters, stage2_parameters; /**< 2 per curve; 2 per site + k_s (+ T0) */
-  uint32_t parameters;                           /**< of the last stage; stage 3: 2 per site + 2 */
-  sonde_error_report stage1;                     /**< interaction "independent" */
+  uint32_t
+      parameters; /**< of the last stage; stage 3: 4 per site (2 with a uniform shear layer) + 2 */
+  sonde_error_report stage1; /**< interaction "independent" */
   sonde_error_report stage2; /**< interaction "simplified"; zero counts when stages == 1 */
   sonde_error_report stage3; /**< interaction "full"; zero counts when stages < 3 */
   double *model_n;           /**< [measurements.count] forces of the last stage */

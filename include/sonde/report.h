@@ -43,6 +43,7 @@ typedef struct sonde_report_parameter {
 typedef struct sonde_report_site {
   uint32_t site; /**< id */
   sonde_report_interval k0_n_m3, xm_m;
+  sonde_report_interval shear_n_m, shear_limit; /**< shown when positive */
 } sonde_report_site;
 
 /** Profile likelihood of one parameter. */

@@ -8,8 +8,8 @@
 
 #include <string.h>
 
-static bool allocate(sonde_again *a, uint32_t sites) {
-  a->parameters = 2 * sites + 2;
+static bool allocate(sonde_again *a) {
+  a->parameters = sonde_refit_parameters(a->refit);
   a->optimum = SONDE_NEW(double, a->parameters);
   a->theta = SONDE_NEW(double, a->parameters);
   a->step = SONDE_NEW(double, a->parameters);
@@ -20,14 +20,17 @@ static bool allocate(sonde_again *a, uint32_t sites) {
          a->force_n && a->left_out && a->factor;
 }
 
-static void optimum_of(const sonde_fit_result *result, double *theta) {
-  uint32_t count = result->site_count;
+static void optimum_of(const sonde_again *a, const sonde_fit_result *result, double *theta) {
+  uint32_t count = result->site_count, n = a->parameters;
   for (uint32_t s = 0; s < count; ++s) {
     theta[s] = log(result->sites[s].k0_n_m3);
     theta[count + s] = log(result->sites[s].xm_m);
+    if (a->refit->fields == 2) continue;
+    theta[2 * count + s] = log(result->sites[s].shear_share);
+    theta[3 * count + s] = log(result->sites[s].limit_share);
   }
-  theta[2 * count] = log(result->law.shear_stiffness_n_m);
-  theta[2 * count + 1] = log(result->law.shear_limit);
+  theta[n - 2] = log(result->law.shear_stiffness_n_m);
+  theta[n - 1] = log(result->law.shear_limit);
 }
 
 sonde_status sonde_again_create(const sonde_model *model, const sonde_site_table *sites,
@@ -39,14 +42,13 @@ sonde_status sonde_again_create(const sonde_model *model, const sonde_site_table
     return sonde_fail(error, SONDE_ARGUMENT, "expected the result of stage 3");
   SONDE_ASSERT(result->site_count == sites->count);
   a->def.smoothness_sd = result->confidence.smoothness_sd;
+  a->def.shear_smoothness_sd = result->confidence.shear_smoothness_sd;
   sonde_status status = sonde_fit_plan_create(sites, m, &a->plan, error);
   if (status) return status;
-  if (!allocate(a, sites->count)) status = sonde_fail_memory(error);
-  if (!status)
-    status =
-        sonde_refit_create(model, sites, m, &a->plan, &a->def, REFIT_REACH_M, &a->refit, error);
+  status = sonde_refit_create(model, sites, m, &a->plan, &a->def, REFIT_REACH_M, &a->refit, error);
+  if (!status && !allocate(a)) status = sonde_fail_memory(error);
   if (!status) {
-    optimum_of(result, a->optimum);
+    optimum_of(a, result, a->optimum);
     memcpy(a->theta, a->optimum, a->parameters * sizeof *a->theta);
     return SONDE_OK;
   }

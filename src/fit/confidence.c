@@ -1,5 +1,6 @@
 // linear:           normal equations by site, of all, with a prior.
-// leave_out:        where the linearised optimum goes without one site, site by site.
+// without_site:     errors of a site's rows at the linearised optimum without them.
+// leave_out:        the same site by site.
 // sonde_refit_choose_smoothness: the prior whose left-out sites are predicted best.
 // sandwich:         covariance from the residuals themselves.
 // add_prior_spread: what the smoothness adds to it.
@@ -26,15 +27,33 @@ typedef struct linear {
   sonde_normal whole; // with a prior
   sonde_normal part;  // of some sites, with a prior
   double *factor, *step;
+  double *forward; // [most_rows * n] of one site
+  double *within;  // [most_rows^2] of one site
+  double *error_n; // [most_rows] of one site
 } linear;
 
-static bool linear_create(linear *l, uint32_t n, uint32_t sites) {
+static uint32_t most_rows(const sonde_fit_plan *plan) {
+  uint32_t most = 1;
+  for (uint32_t s = 0; s < plan->site_count; ++s) {
+    uint32_t rows = plan->site_start[s + 1] - plan->site_start[s];
+    if (rows > most) most = rows;
+  }
+  return most;
+}
+
+static bool linear_create(linear *l, uint32_t n, const sonde_fit_plan *plan) {
+  uint32_t sites = plan->site_count;
+  size_t rows = most_rows(plan);
   *l = (linear){.n = n, .site_count = sites};
+  l->forward = SONDE_NEW(double, rows *n);
+  l->within = SONDE_NEW(double, rows *rows);
+  l->error_n = SONDE_NEW(double, rows);
   l->site = SONDE_NEW(sonde_normal, sites);
   l->factor = SONDE_NEW(double, (size_t)n *n);
   l->step = SONDE_NEW(double, n);
-  bool ok = l->site && l->factor && l->step && sonde_normal_create(&l->data, n) &&
-            sonde_normal_create(&l->whole, n) && sonde_normal_create(&l->part, n);
+  bool ok = l->forward && l->within && l->error_n && l->site && l->factor && l->step &&
+            sonde_normal_create(&l->data, n) && sonde_normal_create(&l->whole, n) &&
+            sonde_normal_create(&l->part, n);
   for (uint32_t s = 0; s < sites && ok; ++s) ok = sonde_normal_create(&l->site[s], n);
   return ok;
 }
@@ -47,6 +66,9 @@ static void linear_clear(linear *l) {
   sonde_free(l->site);
   sonde_free(l->factor);
   sonde_free(l->step);
+  sonde_free(l->forward);
+  sonde_free(l->within);
+  sonde_free(l->error_n);
 }
 
 static void add_sites(const sonde_refit *r, const sonde_refit_workspace *w, const double *force_n,
@@ -59,30 +81,81 @@ static void add_sites(const sonde_refit *r, const sonde_refit_workspace *w, cons
 }
 
 static void with_prior(const sonde_refit *r, sonde_refit_workspace *w, const double *theta,
-                       double sd, linear *l) {
+                       sonde_smoothness smoothness, linear *l) {
   sonde_normal_copy(&l->data, &l->whole);
-  (void)sonde_refit_add_prior(r, theta, sd, w->line, &l->whole);
+  (void)sonde_refit_add_prior(r, theta, smoothness, w->line, &l->whole);
+}
+
+// Rows of a site that take part.
+static uint32_t used_rows(const sonde_refit *r, uint32_t site) {
+  uint32_t count = 0;
+  for (uint32_t k = r->plan->site_start[site]; k < r->plan->site_start[site + 1]; ++k)
+    count += sonde_refit_uses(r, k);
+  return count;
+}
+
+// Row `at` of the site's own system W^-1 - S and of its right-hand side.
+static void add_own_row(const linear *l, const double *slope, sonde_refit_row row, uint32_t at,
+                        uint32_t rows) {
+  uint32_t n = l->n;
+  double *forward = &l->forward[(size_t)at * n];
+  l->error_n[at] = row.error_n;
+  for (uint32_t a = 0; a < n; ++a) l->error_n[at] += slope[a] * l->step[a];
+  memcpy(forward, slope, n * sizeof *forward);
+  sonde_cholesky_forward(l->factor, n, forward);
+  for (uint32_t j = 0; j <= at; ++j) {
+    double sum = j == at ? 1 / row.weight : 0;
+    for (uint32_t a = 0; a < n; ++a) sum -= forward[a] * l->forward[(size_t)j * n + a];
+    l->within[(size_t)at * rows + j] = sum;
+  }
+}
+
+// Let e = r + J d be the errors after the full step d, S = J H^-1 J^T and W the weights of a site's
+// rows: the step without them leaves the errors (1 - S W)^-1 e = W^-1 (W^-1 - S)^-1 e there, by
+// Woodbury's formula. l->error_n receives them in the order of the rows that take part.
+static bool without_site(const sonde_refit *r, const sonde_refit_workspace *w,
+                         const double *force_n, uint32_t site, linear *l) {
+  uint32_t rows = used_rows(r, site), at = 0;
+  const uint32_t *start = r->plan->site_start + site;
+  if (rows == 0) return true;
+  for (uint32_t k = start[0]; k < start[1]; ++k)
+    if (sonde_refit_uses(r, k))
+      add_own_row(l, &w->kept_jacobian[(size_t)k * l->n], sonde_refit_weigh(r, k, force_n[k]), at++,
+                  rows);
+  SONDE_ASSERT(at == rows);
+  if (!sonde_cholesky(l->within, rows)) return false;
+  sonde_cholesky_solve(l->within, rows, l->error_n);
+  at = 0;
+  for (uint32_t k = start[0]; k < start[1]; ++k)
+    if (sonde_refit_uses(r, k)) l->error_n[at++] /= sonde_refit_weigh(r, k, force_n[k]).weight;
+  return true;
 }
 
 // Mean error of the left-out sites in percent; their forces go to one_out_n by sorted row.
-static double leave_out(const sonde_refit *r, sonde_refit_workspace *w, const double *force_n,
+static double leave_out(const sonde_refit *r, const sonde_refit_workspace *w, const double *force_n,
                         linear *l, double *one_out_n) {
   double sum = 0, count = 0;
+  if (!sonde_normal_solve(&l->whole, 0, l->factor, l->step)) return INFINITY;
   for (uint32_t s = 0; s < l->site_count; ++s) {
-    sonde_normal_copy(&l->whole, &l->part);
-    sonde_normal_add(&l->site[s], -1, &l->part);
-    if (!sonde_normal_solve(&l->part, 0, l->factor, l->step)) return INFINITY;
+    uint32_t at = 0;
+    if (!without_site(r, w, force_n, s, l)) return INFINITY;
     for (uint32_t k = r->plan->site_start[s]; k < r->plan->site_start[s + 1]; ++k) {
       if (!sonde_refit_uses(r, k)) continue;
-      const double *row = &w->kept_jacobian[(size_t)k * w->n];
-      double change = 0, mean_n = r->plan->mean_force_n[r->plan->row_probe[k]];
-      for (uint32_t a = 0; a < w->n; ++a) change += row[a] * l->step[a];
-      one_out_n[k] = force_n[k] + change;
-      sum += fabs(one_out_n[k] - r->m->data[r->plan->row[k]].force_n) / mean_n;
+      one_out_n[k] = r->m->data[r->plan->row[k]].force_n + l->error_n[at];
+      sum += fabs(l->error_n[at++]) / r->plan->mean_force_n[r->plan->row_probe[k]];
       ++count;
     }
   }
   return 100 * sum / count;
+}
+
+// Which of the two standard deviations is varied.
+enum { BOTH, SHEAR_ONLY, NORMAL_ONLY, PASSES };
+
+static sonde_smoothness varied(sonde_smoothness s, int pass, double sd) {
+  if (pass != SHEAR_ONLY) s.normal_sd = sd;
+  if (pass != NORMAL_ONLY) s.shear_sd = sd;
+  return s;
 }
 
 sonde_status sonde_refit_choose_smoothness(sonde_refit *r, sonde_refit_workspace *w,
@@ -90,20 +163,25 @@ sonde_status sonde_refit_choose_smoothness(sonde_refit *r, sonde_refit_workspace
                                            sonde_error *error) {
   linear l;
   double *one_out_n = SONDE_NEW(double, w->rows), least = INFINITY;
-  bool ok = linear_create(&l, w->n, r->plan->site_count) && one_out_n;
+  sonde_smoothness best = r->smoothness;
+  bool ok = linear_create(&l, w->n, r->plan) && one_out_n;
   sonde_status status = ok ? SONDE_OK : sonde_fail_memory(error);
   if (status) goto done;
   add_sites(r, w, force_n, &l);
-  for (int k = 0; k < SONDE_FIT_TRIED; ++k) {
-    with_prior(r, w, theta, TRIED_SD[k], &l);
-    double percent = leave_out(r, w, force_n, &l, one_out_n);
-    if (percent < least) r->smoothness_sd = TRIED_SD[k];
-    least = fmin(least, percent);
-    if (!r->confidence) continue;
-    r->confidence->tried_count = SONDE_FIT_TRIED;
-    r->confidence->tried_sd[k] = TRIED_SD[k];
-    r->confidence->tried_percent[k] = percent;
-  }
+  for (int pass = 0; pass < (r->fields > 2 ? PASSES : SHEAR_ONLY); ++pass)
+    for (int k = 0; k < SONDE_FIT_TRIED; ++k) {
+      sonde_smoothness trial = varied(r->smoothness, pass, TRIED_SD[k]);
+      with_prior(r, w, theta, trial, &l);
+      double percent = leave_out(r, w, force_n, &l, one_out_n);
+      if (pass == BOTH && r->confidence) {
+        r->confidence->tried_count = SONDE_FIT_TRIED;
+        r->confidence->tried_sd[k] = TRIED_SD[k];
+        r->confidence->tried_percent[k] = percent;
+      }
+      if (percent < least) best = trial;
+      least = fmin(least, percent);
+      if (k == SONDE_FIT_TRIED - 1) r->smoothness = best;
+    }
 done:
   linear_clear(&l);
   sonde_free(one_out_n);
@@ -129,18 +207,14 @@ static void sandwich(const sonde_refit *r, const sonde_refit_workspace *w, const
   }
 }
 
-// The smoothness holds the fields only as far as it is true: its own spread counts too.
+// The prior holds the fields only as far as it is true: its own spread counts too.
 static void add_prior_spread(const sonde_refit *r, linear *l, double *covariance) {
-  uint32_t count = r->sites->count, n = l->n;
-  double weight = 1 / (r->smoothness_sd * r->smoothness_sd);
-  SONDE_ASSERT(2 * count < n && isfinite(weight));
-  for (uint32_t field = 0; field < 2; ++field)
-    for (uint32_t s = 0; s < count; ++s) {
-      memset(l->step, 0, n * sizeof *l->step);
-      memcpy(l->step + field * count, &r->roughness[(size_t)s * count], count * sizeof *l->step);
-      sonde_cholesky_solve(l->factor, n, l->step);
-      sonde_add_outer(covariance, n, l->step, weight);
-    }
+  for (uint32_t k = 0; k < sonde_refit_prior_rows(r); ++k) {
+    double weight = sonde_refit_prior_row(r, r->smoothness, k, l->step);
+    SONDE_ASSERT(isfinite(weight));
+    sonde_cholesky_solve(l->factor, l->n, l->step);
+    sonde_add_outer(covariance, l->n, l->step, weight);
+  }
 }
 
 static double lower(const double *a, uint32_t n, uint32_t i, uint32_t j) {
@@ -158,13 +232,20 @@ static double variance_of(const double *covariance, uint32_t n, const double *ro
   return fmax(sum, 0);
 }
 
-static void correlate(const double *covariance, uint32_t n, uint32_t sites,
-                      double correlation[4][4]) {
+// Parameter k as a part of ln G, ln gm, mean ln k0 or mean ln xm; -1: of none.
+static int figure_of(const sonde_refit *r, uint32_t k) {
+  uint32_t sites = r->sites->count, n = sonde_refit_parameters(r);
+  if (k >= n - 2) return (int)(k - (n - 2));
+  return k < sites ? 2 : k < 2 * sites ? 3 : -1;
+}
+
+static void correlate(const sonde_refit *r, const double *covariance, double correlation[4][4]) {
   double c[4][4] = {{0}};
+  uint32_t n = sonde_refit_parameters(r), sites = r->sites->count;
   for (uint32_t i = 0; i < n; ++i)
     for (uint32_t j = 0; j < n; ++j) {
-      uint32_t a = i < sites ? 2 : i < 2 * sites ? 3 : i - 2 * sites;
-      uint32_t b = j < sites ? 2 : j < 2 * sites ? 3 : j - 2 * sites;
+      int a = figure_of(r, i), b = figure_of(r, j);
+      if (a < 0 || b < 0) continue;
       double share = (a > 1 ? 1.0 / sites : 1) * (b > 1 ? 1.0 / sites : 1);
       c[a][b] += share * lower(covariance, n, i, j);
     }
@@ -181,7 +262,7 @@ static bool draw_sites(const sonde_refit *r, sonde_refit_workspace *w, const dou
     uint64_t number = sonde_random_bits(BOOTSTRAP_SEED, (uint64_t)draw * sites + s);
     sonde_normal_add(&l->site[number % sites], 1, &l->part);
   }
-  (void)sonde_refit_add_prior(r, theta, r->smoothness_sd, w->line, &l->part);
+  (void)sonde_refit_add_prior(r, theta, r->smoothness, w->line, &l->part);
   if (!sonde_normal_solve(&l->part, 0, l->factor, l->step)) return false;
   out[0] = theta[n - 2] + l->step[n - 2];
   out[1] = theta[n - 1] + l->step[n - 1];
@@ -211,10 +292,17 @@ static void fill(const sonde_refit *r, sonde_refit_workspace *w, const double *c
   for (uint32_t s = 0; s < sites; ++s) {
     c->ln_k0_sd[s] = sqrt(lower(covariance, n, s, s));
     c->ln_xm_sd[s] = sqrt(lower(covariance, n, sites + s, sites + s));
+    for (uint32_t k = 0; k < 2; ++k) {
+      double *to = k ? c->ln_site_limit_sd : c->ln_site_shear_sd;
+      memset(w->line, 0, n * sizeof *w->line);
+      w->line[n - 2 + k] = 1;
+      if (r->fields > 2) w->line[(2 + k) * sites + s] = 1;
+      to[s] = sqrt(variance_of(covariance, n, w->line));
+    }
   }
   c->ln_shear_sd = sqrt(lower(covariance, n, n - 2, n - 2));
   c->ln_limit_sd = sqrt(lower(covariance, n, n - 1, n - 1));
-  correlate(covariance, n, sites, c->correlation);
+  correlate(r, covariance, c->correlation);
   for (uint32_t k = 0; k < w->rows; ++k)
     c->band_n[r->plan->row[k]] =
         NORMAL_95 * sqrt(variance_of(covariance, n, &w->kept_jacobian[(size_t)k * n]));
@@ -223,27 +311,30 @@ static void fill(const sonde_refit *r, sonde_refit_workspace *w, const double *c
 static bool allocate(const sonde_refit *r, sonde_fit_confidence *c) {
   c->ln_k0_sd = SONDE_NEW(double, r->sites->count);
   c->ln_xm_sd = SONDE_NEW(double, r->sites->count);
+  c->ln_site_shear_sd = SONDE_NEW(double, r->sites->count);
+  c->ln_site_limit_sd = SONDE_NEW(double, r->sites->count);
   c->band_n = SONDE_NEW(double, r->m->count);
   c->one_out_n = SONDE_NEW(double, r->m->count);
   for (uint32_t k = 0; c->one_out_n && c->band_n && k < r->m->count; ++k)
     c->one_out_n[k] = c->band_n[k] = NAN;
-  return c->ln_k0_sd && c->ln_xm_sd && c->band_n && c->one_out_n;
+  return c->ln_k0_sd && c->ln_xm_sd && c->ln_site_shear_sd && c->ln_site_limit_sd && c->band_n &&
+         c->one_out_n;
 }
 
 sonde_status sonde_refit_confidence(sonde_refit *r, sonde_refit_workspace *w, const double *theta,
                                     const double *force_n, sonde_error *error) {
   sonde_fit_confidence *c = r->confidence;
   linear l;
-  c->smoothness_sd = r->smoothness_sd;
+  c->smoothness_sd = r->smoothness.normal_sd;
+  c->shear_smoothness_sd = r->smoothness.shear_sd;
   double *covariance = SONDE_NEW(double, (size_t)w->n * w->n);
   double *one_out_n = SONDE_NEW(double, w->rows);
-  bool ok =
-      linear_create(&l, w->n, r->plan->site_count) && covariance && one_out_n && allocate(r, c);
+  bool ok = linear_create(&l, w->n, r->plan) && covariance && one_out_n && allocate(r, c);
   sonde_status status = ok ? SONDE_OK : sonde_fail_memory(error);
   if (status) goto done;
   for (uint32_t k = 0; k < w->rows; ++k) one_out_n[k] = NAN;
   add_sites(r, w, force_n, &l);
-  with_prior(r, w, theta, r->smoothness_sd, &l);
+  with_prior(r, w, theta, r->smoothness, &l);
   (void)leave_out(r, w, force_n, &l, one_out_n);
   for (uint32_t k = 0; k < w->rows; ++k) c->one_out_n[r->plan->row[k]] = one_out_n[k];
   bootstrap(r, w, theta, &l, c);

@@ -1,4 +1,4 @@
-// sonde_cholesky: factor by rows. sonde_cholesky_solve: forward, then backward.
+// sonde_cholesky: factor by rows. sonde_cholesky_forward, _solve: forward, then backward.
 #include "fit/dense.h"
 
 #include "base/base.h"
@@ -20,12 +20,16 @@ bool sonde_cholesky(double *a, uint32_t n) {
   return true;
 }
 
-void sonde_cholesky_solve(const double *factor, uint32_t n, double *x) {
+void sonde_cholesky_forward(const double *factor, uint32_t n, double *x) {
   SONDE_ASSERT(n > 0);
   for (uint32_t i = 0; i < n; ++i) {
     for (uint32_t k = 0; k < i; ++k) x[i] -= factor[(size_t)i * n + k] * x[k];
     x[i] /= factor[(size_t)i * n + i];
   }
+}
+
+void sonde_cholesky_solve(const double *factor, uint32_t n, double *x) {
+  sonde_cholesky_forward(factor, n, x);
   for (uint32_t i = n; i-- > 0;) {
     for (uint32_t k = i + 1; k < n; ++k) x[i] -= factor[(size_t)k * n + i] * x[k];
     x[i] /= factor[(size_t)i * n + i];

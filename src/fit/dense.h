@@ -8,6 +8,8 @@
 // Cholesky factor in the lower triangle of a [n * n], in place. @return false: not positive
 // definite
 bool sonde_cholesky(double *a, uint32_t n);
+// Solves L x = b in place.
+void sonde_cholesky_forward(const double *factor, uint32_t n, double *x);
 // Solves L L^T x = b in place.
 void sonde_cholesky_solve(const double *factor, uint32_t n, double *x);
 // Adds weight * row row^T to the lower triangle; entries that are 0 are skipped.

@@ -227,17 +227,20 @@ static sonde_status fit_model(const sonde_model *model, const sonde_site_table *
 
 static void set_refitted(const sonde_fit_def *def, const double *theta,
                          const sonde_refit_result *found, sonde_fit_result *result) {
-  uint32_t count = result->site_count;
+  uint32_t count = result->site_count, fields = def->uniform_shear ? 2 : 4, n = fields * count + 2;
   for (uint32_t s = 0; s < count; ++s) {
-    result->sites[s].k0_n_m3 = exp(theta[s]);
-    result->sites[s].xm_m = exp(theta[count + s]);
+    sonde_site *site = &result->sites[s];
+    site->k0_n_m3 = exp(theta[s]);
+    site->xm_m = exp(theta[count + s]);
+    site->shear_share = fields > 2 ? exp(theta[2 * count + s]) : 1;
+    site->limit_share = fields > 2 ? exp(theta[3 * count + s]) : 1;
   }
-  result->law.shear_stiffness_n_m = exp(theta[2 * count]);
-  result->law.shear_limit = exp(theta[2 * count + 1]);
+  result->law.shear_stiffness_n_m = exp(theta[n - 2]);
+  result->law.shear_limit = exp(theta[n - 1]);
   result->law.normal_exponent = def->normal_exponent;
   result->law.edge_stiffness_n_m = def->kept_edge_n_m;
   result->law.edge_pretension_n = 0;
-  result->parameters = 2 * count + 2;
+  result->parameters = n;
   result->iterations = found->iterations;
   result->converged = found->converged;
   result->cost = found->cost;
@@ -261,7 +264,7 @@ static sonde_status refit_sites(const sonde_model *model, const sonde_site_table
                                 sonde_fit_result *result, sonde_error *error) {
   sonde_refit *refit = NULL;
   sonde_refit_result found = {0};
-  double *theta = SONDE_NEW(double, 2 * (size_t)sites->count + 2);
+  double *theta = SONDE_NEW(double, 4 * (size_t)sites->count + 2);
   double *force_n = SONDE_NEW(double, plan->row_count);
   sonde_status status = theta && force_n ? SONDE_OK : sonde_fail_memory(error);
   if (!status)
@@ -341,6 +344,8 @@ void sonde_fit_result_clear(sonde_fit_result *result) {
   for (int k = 0; k < 3; ++k) sonde_free(result->stage_n[k]);
   sonde_free(result->confidence.ln_k0_sd);
   sonde_free(result->confidence.ln_xm_sd);
+  sonde_free(result->confidence.ln_site_shear_sd);
+  sonde_free(result->confidence.ln_site_limit_sd);
   sonde_free(result->confidence.band_n);
   sonde_free(result->confidence.one_out_n);
   sonde_free(result->curves);

@@ -42,8 +42,8 @@ static double condition_of(const double matrix[FIGURES][FIGURES]) {
 }
 
 // The combination of parameters that is figure k: ln G, ln gm, mean ln k0, mean ln xm.
-static void row_of(uint32_t n, int k, double *row) {
-  uint32_t sites = (n - 2) / 2;
+static void row_of(const sonde_again *a, int k, double *row) {
+  uint32_t n = a->parameters, sites = a->refit->sites->count;
   memset(row, 0, n * sizeof *row);
   if (k < 2)
     row[n - 2 + (uint32_t)k] = 1;
@@ -57,11 +57,11 @@ static void describe(sonde_again *a, double *row, sonde_fit_part *part) {
   double spread[FIGURES][FIGURES];
   bool known = sonde_again_factor(a);
   for (int k = 0; k < FIGURES; ++k) {
-    row_of(n, k, row);
+    row_of(a, k, row);
     part->ln_sd[k] = known ? sqrt(sonde_again_spread(a, row)) : INFINITY;
     for (int j = 0; j < FIGURES && known; ++j) {
       double with = 0;
-      row_of(n, j, row);
+      row_of(a, j, row);
       for (uint32_t i = 0; i < n; ++i) with += row[i] * a->step[i];
       spread[k][j] = with;
     }

@@ -22,7 +22,7 @@ static const double DATA_SD = 0.02, MEAN_SHARE = 0.4;
 static const double PULL_ALONG_M = 0.010; // width of the rim that a footprint pulls along
 static const double LEAST_ROOM = 1.3;     // start of xm over the deepest datum
 
-uint32_t sonde_refit_parameters(const sonde_refit *r) { return 2 * r->sites->count + 2; }
+uint32_t sonde_refit_parameters(const sonde_refit *r) { return r->fields * r->sites->count + 2; }
 
 bool sonde_refit_uses(const sonde_refit *r, uint32_t row) {
   uint32_t curve = r->plan->row_curve[row];
@@ -42,13 +42,11 @@ static void spread(sonde_refit *r, const double *theta) {
   SONDE_ASSERT(count > 0);
   for (uint32_t i = 0; i < r->model->surface.vertex_count; ++i) {
     const double *basis = &r->basis[(size_t)i * count];
-    double ln_k = 0, ln_x = 0;
-    for (uint32_t s = 0; s < count; ++s) {
-      ln_k += basis[s] * theta[s];
-      ln_x += basis[s] * theta[count + s];
+    for (uint32_t f = 0; f < r->fields; ++f) {
+      double ln = 0;
+      for (uint32_t k = 0; k < count; ++k) ln += basis[k] * theta[f * count + k];
+      r->field[f][i] = ln;
     }
-    r->ln_k0[i] = ln_k;
-    r->ln_xm[i] = ln_x;
   }
 }
 
@@ -93,14 +91,13 @@ static void carry_to_sites(const sonde_refit *r, const sonde_patch *patch,
       double part = k ? patch->share[i] : 1 - patch->share[i];
       if (!(part > 0)) continue;
       const double *basis = &r->basis[(size_t)patch->parent[i][k] * count];
-      double by_k = part * gradient->by_ln_k0[i], by_x = part * gradient->by_ln_xm[i];
-      for (uint32_t s = 0; s < count; ++s) {
-        row[s] += basis[s] * by_k;
-        row[count + s] += basis[s] * by_x;
+      for (uint32_t f = 0; f < r->fields; ++f) {
+        double by = part * gradient->by_place[f][i];
+        for (uint32_t s = 0; s < count; ++s) row[f * count + s] += basis[s] * by;
       }
     }
-  row[2 * count] = gradient->by_ln_shear;
-  row[2 * count + 1] = gradient->by_ln_limit;
+  row[r->fields * count] = gradient->by_ln_shear;
+  row[r->fields * count + 1] = gradient->by_ln_limit;
 }
 
 typedef struct evaluation {
@@ -146,12 +143,19 @@ static sonde_status work_on_curve(void *user, uint32_t worker, uint32_t curve,
 sonde_status sonde_refit_forces(sonde_refit *r, const double *theta, double *force_n,
                                 double *jacobian, const sonde_progress *progress,
                                 sonde_error *error) {
-  uint32_t count = r->sites->count;
+  const double *shear = theta + r->fields * r->sites->count;
   spread(r, theta);
   const sonde_surface_law *law = &r->model->law;
   evaluation at = {r,
-                   {r->ln_k0, r->ln_xm, r->def->normal_exponent, exp(theta[2 * count]),
-                    exp(theta[2 * count + 1]), law->guard, law->tangential_stiffness_n_m3},
+                   {.ln_k0 = r->field[0],
+                    .ln_xm = r->field[1],
+                    .ln_shear = r->field[2],
+                    .ln_limit = r->field[3],
+                    .exponent = r->def->normal_exponent,
+                    .shear_n_m = exp(shear[0]),
+                    .limit = exp(shear[1]),
+                    .guard = law->guard,
+                    .tangential_n_m3 = law->tangential_stiffness_n_m3},
                    force_n,
                    jacobian};
   return sonde_parallel_run(r->plan->curve_count, r->workers, work_on_curve, &at, progress,
@@ -177,12 +181,10 @@ void sonde_refit_start(const sonde_refit *r, const sonde_curve_fit *curves, doub
   for (uint32_t s = 0; s < plan->site_count; ++s) deepest = fmax(deepest, plan->site_deepest_m[s]);
   ln_xm = fmax(ln_xm, log(LEAST_ROOM * deepest));
   SONDE_ASSERT(isfinite(ln_k0) && isfinite(ln_xm));
-  for (uint32_t s = 0; s < r->sites->count; ++s) {
-    theta[s] = ln_k0;
-    theta[r->sites->count + s] = ln_xm;
-  }
-  theta[2 * r->sites->count] = ln_k0 + 2 * log(l);
-  theta[2 * r->sites->count + 1] = 0;
+  uint32_t count = r->sites->count, n = sonde_refit_parameters(r);
+  for (uint32_t k = 0; k < n - 2; ++k) theta[k] = k < count ? ln_k0 : k < 2 * count ? ln_xm : 0;
+  theta[n - 2] = ln_k0 + 2 * log(l);
+  theta[n - 1] = 0;
 }
 
 // ---- creation -----------------------------------------------------------------------------
@@ -227,10 +229,9 @@ static sonde_status create_crew(sonde_refit *r, uint32_t threads, sonde_error *e
   for (uint32_t w = 0; w < r->workers; ++w) {
     sonde_status status = sonde_patch_solver_create(r->patch, curves, &r->crew[w].solver, error);
     if (status) return status;
-    r->crew[w].gradient.by_ln_k0 = SONDE_NEW(double, places);
-    r->crew[w].gradient.by_ln_xm = SONDE_NEW(double, places);
-    if (!r->crew[w].gradient.by_ln_k0 || !r->crew[w].gradient.by_ln_xm)
-      return sonde_fail_memory(error);
+    for (int f = 0; f < 4; ++f)
+      if (!(r->crew[w].gradient.by_place[f] = SONDE_NEW(double, places)))
+        return sonde_fail_memory(error);
   }
   return SONDE_OK;
 }
@@ -240,12 +241,11 @@ static bool allocate(sonde_refit *r) {
   r->patch = SONDE_NEW(sonde_patch, r->plan->curve_count);
   r->basis = SONDE_NEW(double, nodes *count);
   r->roughness = SONDE_NEW(double, count *count);
-  r->ln_k0 = SONDE_NEW(double, nodes);
-  r->ln_xm = SONDE_NEW(double, nodes);
+  bool ok = true;
+  for (uint32_t f = 0; f < r->fields; ++f) ok &= (r->field[f] = SONDE_NEW(double, nodes)) != NULL;
   r->first_place = SONDE_NEW(size_t, r->plan->row_count);
   r->settled = SONDE_NEW(uint8_t, r->plan->row_count);
-  return r->patch && r->basis && r->roughness && r->ln_k0 && r->ln_xm && r->first_place &&
-         r->settled;
+  return ok && r->patch && r->basis && r->roughness && r->first_place && r->settled;
 }
 
 sonde_status sonde_refit_create(const sonde_model *model, const sonde_site_table *sites,
@@ -260,7 +260,8 @@ sonde_status sonde_refit_create(const sonde_model *model, const sonde_site_table
                      .plan = plan,
                      .def = def,
                      .stride = 1,
-                     .smoothness_sd = 1};
+                     .fields = def->uniform_shear ? 2 : 4,
+                     .smoothness = {1, 1}};
   sonde_status status = allocate(r) ? SONDE_OK : sonde_fail_memory(error);
   for (uint32_t k = 0; k < plan->probe_count && !status; ++k)
     if (!(plan->mean_force_n[k] > 0))
@@ -283,15 +284,13 @@ void sonde_refit_destroy(sonde_refit *r) {
   for (uint32_t c = 0; r->patch && c < r->plan->curve_count; ++c) sonde_patch_clear(&r->patch[c]);
   for (uint32_t w = 0; r->crew && w < r->workers; ++w) {
     sonde_patch_solver_clear(&r->crew[w].solver);
-    sonde_free(r->crew[w].gradient.by_ln_k0);
-    sonde_free(r->crew[w].gradient.by_ln_xm);
+    for (int f = 0; f < 4; ++f) sonde_free(r->crew[w].gradient.by_place[f]);
   }
   sonde_free(r->crew);
   sonde_free(r->patch);
   sonde_free(r->basis);
   sonde_free(r->roughness);
-  sonde_free(r->ln_k0);
-  sonde_free(r->ln_xm);
+  for (int f = 0; f < 4; ++f) sonde_free(r->field[f]);
   sonde_free(r->first_place);
   sonde_free(r->settled);
   sonde_free(r->indentation_m);

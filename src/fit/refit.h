@@ -16,7 +16,8 @@ sonde_status sonde_refit_create(const sonde_model *model, const sonde_site_table
                                 sonde_error *error);
 void sonde_refit_destroy(sonde_refit *refit);
 
-// Parameters: ln k0 per site, ln xm per site, ln G, ln gm.
+// Parameters: fields of one number per site (ln k0, ln xm, ln shares of G and gm; the last two only
+// when the shear layer may vary), then ln G, ln gm.
 uint32_t sonde_refit_parameters(const sonde_refit *refit);
 
 // Forces of the sorted rows; jacobian [rows * parameters] may be NULL. Equilibria start from those

@@ -6,6 +6,11 @@
 
 typedef struct sonde_normal sonde_normal;
 
+// Standard deviations of the sites' logarithms per site spacing: of k0 and xm, of G and gm.
+typedef struct sonde_smoothness {
+  double normal_sd, shear_sd;
+} sonde_smoothness;
+
 typedef struct sonde_refit_worker {
   sonde_patch_solver solver;
   sonde_patch_gradient gradient;
@@ -20,14 +25,14 @@ struct sonde_refit {
   sonde_patch *patch;    // [curve_count]
   double *basis;         // [nodes * site_count]
   double *roughness;     // [site_count * site_count]
-  double *ln_k0;         // [nodes]
-  double *ln_xm;         // [nodes]
+  uint32_t fields;       // 4, or 2 with a uniform shear layer
+  double *field[4];      // [nodes] of each
   size_t *first_place;   // [row_count] where a row's equilibrium begins
   uint8_t *settled;      // [row_count] its equilibrium is a start for the next call
   double *indentation_m; // equilibria of all rows
   uint32_t workers;
   sonde_refit_worker *crew;
-  double smoothness_sd;             // of ln k0 and ln xm per site spacing
+  sonde_smoothness smoothness;
   sonde_fit_confidence *confidence; // NULL: not wanted
   const bool *left_out;             // [row_count] rows that do not take part; NULL: none
   const bool *fixed;                // [parameters] that keep their start; NULL: none
@@ -68,9 +73,14 @@ sonde_refit_row sonde_refit_weigh(const sonde_refit *refit, uint32_t row, double
 // Adds rows [first, end) that take part; returns their loss. normal NULL: the loss alone.
 double sonde_refit_add_rows(const sonde_refit *refit, uint32_t first, uint32_t end,
                             const double *force_n, const double *jacobian, sonde_normal *normal);
-// The same for the smoothness at a standard deviation; row [n] is scratch.
-double sonde_refit_add_prior(const sonde_refit *refit, const double *theta, double sd, double *row,
-                             sonde_normal *normal);
+// What is known beforehand, one equation after another: each site follows its neighbours, its share
+// of the shear layer is near 1, and the shares' mean is 1.
+uint32_t sonde_refit_prior_rows(const sonde_refit *refit);
+// Row [n] of equation k; returns its weight.
+double sonde_refit_prior_row(const sonde_refit *refit, sonde_smoothness s, uint32_t k, double *row);
+// Adds all of them; returns their cost. row [n] is scratch.
+double sonde_refit_add_prior(const sonde_refit *refit, const double *theta, sonde_smoothness s,
+                             double *row, sonde_normal *normal);
 
 // Of the minimisation.
 typedef struct sonde_refit_workspace {

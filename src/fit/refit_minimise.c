@@ -27,7 +27,7 @@ static const stage COARSE = {4, 1, 1e-2}, WHOLE = {1, 1e-3, 1e-4};
 // Cost at theta with the trial's forces.
 static double cost_of(const sonde_refit *r, sonde_refit_workspace *w, const double *theta) {
   return sonde_refit_add_rows(r, 0, w->rows, w->force_n, NULL, NULL) +
-         sonde_refit_add_prior(r, theta, r->smoothness_sd, w->line, NULL);
+         sonde_refit_add_prior(r, theta, r->smoothness, w->line, NULL);
 }
 
 // A fixed parameter gets an equation of its own, whose solution is no step.
@@ -110,7 +110,7 @@ static void accept(const sonde_refit *r, sonde_refit_workspace *w, double *theta
   memcpy(force_n, w->force_n, w->rows * sizeof *force_n);
   sonde_normal_clear(&w->normal);
   sonde_refit_add_rows(r, 0, w->rows, w->force_n, w->jacobian, &w->normal);
-  sonde_refit_add_prior(r, theta, r->smoothness_sd, w->line, &w->normal);
+  sonde_refit_add_prior(r, theta, r->smoothness, w->line, &w->normal);
   fix(r, &w->normal);
   double *swap = w->kept_jacobian;
   w->kept_jacobian = w->jacobian;
@@ -178,7 +178,10 @@ sonde_status sonde_refit_minimise(sonde_refit *r, double *theta, double *force_n
   sonde_refit_workspace w = {.n = sonde_refit_parameters(r), .rows = r->plan->row_count};
   stepwise at = {.outer = progress};
   bool given = r->def->smoothness_sd > 0;
-  r->smoothness_sd = given ? r->def->smoothness_sd : SMOOTHNESS_START;
+  double start_sd = given ? r->def->smoothness_sd : SMOOTHNESS_START;
+  double shear_sd =
+      given && r->def->shear_smoothness_sd > 0 ? r->def->shear_smoothness_sd : start_sd;
+  r->smoothness = (sonde_smoothness){start_sd, shear_sd};
   sonde_status status = allocate(&w) ? SONDE_OK : sonde_fail_memory(error);
   r->rough = true;
   if (!status && !r->near) status = descend(r, &w, COARSE, theta, force_n, &at, result, error);

@@ -1,7 +1,7 @@
 // sonde_normal_*:        lower triangle and gradient of a quadratic.
 // loss_scale:            of a robust loss.
 // sonde_refit_weigh:     what one measurement counts.
-// sonde_refit_add_rows / sonde_refit_add_prior: measurements and smoothness.
+// sonde_refit_add_rows / sonde_refit_prior_row, _add_prior: measurements and what is known before.
 #include "fit/arrow.h"
 #include "fit/dense.h"
 #include "fit/refit_inside.h"
@@ -9,6 +9,11 @@
 #include "base/maths.h"
 
 #include <string.h>
+
+// Of the logarithm of a site's share of the shear layer: a leg varies by so much around its mean.
+static const double SHARE_SD = 0.3;
+// Of the mean of these logarithms: nothing, so that G and gm are the leg's geometric means.
+static const double MEAN_SD = 3e-3;
 
 bool sonde_normal_create(sonde_normal *normal, uint32_t n) {
   *normal = (sonde_normal){n, SONDE_NEW(double, (size_t)n *n), SONDE_NEW(double, n)};
@@ -86,21 +91,40 @@ double sonde_refit_add_rows(const sonde_refit *r, uint32_t first, uint32_t end,
   return loss;
 }
 
-double sonde_refit_add_prior(const sonde_refit *r, const double *theta, double sd, double *row,
-                             sonde_normal *normal) {
-  uint32_t count = r->sites->count, n = sonde_refit_parameters(r);
-  double cost = 0, weight = 1 / (sd * sd);
-  SONDE_ASSERT(isfinite(weight) && (!normal || normal->n == n));
-  for (uint32_t field = 0; field < 2; ++field)
-    for (uint32_t s = 0; s < count; ++s) {
-      const double *rough = &r->roughness[(size_t)s * count];
-      double residual = 0;
-      for (uint32_t t = 0; t < count; ++t) residual += rough[t] * theta[field * count + t];
-      cost += 0.5 * weight * residual * residual;
-      if (!normal) continue;
-      memset(row, 0, n * sizeof *row);
-      memcpy(row + field * count, rough, count * sizeof *rough);
-      sonde_normal_add_row(normal, row, residual, weight);
-    }
+uint32_t sonde_refit_prior_rows(const sonde_refit *r) {
+  uint32_t shares = r->fields - 2;
+  return r->fields * r->sites->count + shares * (r->sites->count + 1);
+}
+
+double sonde_refit_prior_row(const sonde_refit *r, sonde_smoothness s, uint32_t k, double *row) {
+  uint32_t count = r->sites->count, field = k / count, at = k % count;
+  SONDE_ASSERT(k < sonde_refit_prior_rows(r));
+  memset(row, 0, sonde_refit_parameters(r) * sizeof *row);
+  uint32_t last = sonde_refit_prior_rows(r) - k; // the means of the shares come last
+  if (r->fields > 2 && last <= r->fields - 2) {
+    for (uint32_t t = 0; t < count; ++t) row[(r->fields - last) * count + t] = 1.0 / count;
+    return 1 / (MEAN_SD * MEAN_SD);
+  }
+  if (field >= r->fields) {
+    row[(field - r->fields + 2) * count + at] = 1;
+    return 1 / (SHARE_SD * SHARE_SD);
+  }
+  double sd = field < 2 ? s.normal_sd : s.shear_sd;
+  memcpy(row + field * count, &r->roughness[(size_t)at * count], count * sizeof *row);
+  return 1 / (sd * sd);
+}
+
+double sonde_refit_add_prior(const sonde_refit *r, const double *theta, sonde_smoothness s,
+                             double *row, sonde_normal *normal) {
+  uint32_t n = sonde_refit_parameters(r);
+  double cost = 0;
+  SONDE_ASSERT(!normal || normal->n == n);
+  for (uint32_t k = 0; k < sonde_refit_prior_rows(r); ++k) {
+    double weight = sonde_refit_prior_row(r, s, k, row), residual = 0;
+    for (uint32_t t = 0; t < n; ++t) residual += row[t] * theta[t];
+    cost += 0.5 * weight * residual * residual;
+    if (normal) sonde_normal_add_row(normal, row, residual, weight);
+  }
+  SONDE_ASSERT(isfinite(cost));
   return cost;
 }

@@ -38,9 +38,9 @@ sonde_status sonde_patch_create(const sonde_model *model, const sonde_site *site
                                 sonde_error *error);
 void sonde_patch_clear(sonde_patch *patch);
 
-// Parameters of an equilibrium; logarithms of k0 and xm per surface node.
+// Parameters of an equilibrium; logarithms of k0, xm and the shares of G and gm per surface node.
 typedef struct sonde_patch_law {
-  const double *ln_k0, *ln_xm;
+  const double *ln_k0, *ln_xm, *ln_shear, *ln_limit; // the last two NULL: uniform
   double exponent, shear_n_m, limit, guard, tangential_n_m3;
 } sonde_patch_law;
 
@@ -53,7 +53,7 @@ typedef struct sonde_patch_solver {
   const double *settled_m; // indentations to which residual, value and load_n belong
   double load_n;           // force of the held places there
   sonde_ldl *ldl;          // of a matrix of patch; NULL before its first factorisation
-  double *k0_n_m3, *xm_m;  // of the places
+  double *k0_n_m3, *xm_m, *shear_share, *limit_share; // of the places
   double *residual, *step, *trial, *multiplier, *value, *scratch;
   double *right, *preconditioned, *direction, *product;
 } sonde_patch_solver;
@@ -72,8 +72,8 @@ sonde_status sonde_patch_settle(sonde_patch_solver *solver, double depth_m, doub
 
 // Derivatives of the force.
 typedef struct sonde_patch_gradient {
-  double *by_ln_k0, *by_ln_xm; // [place_count]
-  double by_ln_shear, by_ln_limit;
+  double *by_place[4];             // [place_count] by ln k0, ln xm, ln shares of G and gm there
+  double by_ln_shear, by_ln_limit; // of the whole skin
 } sonde_patch_gradient;
 
 // Force along the site's normal where sonde_patch_settle() has just ended. gradient (may be NULL):

@@ -1,4 +1,4 @@
-// face_slope: gradient of s over a face. face_modulus: secant modulus of the shear layer there.
+// face_slope: gradient of s over a face. law_of_face, face_modulus: the shear layer there.
 // assemble:  residual of every place and the matrix of the free ones at indentations s.
 // factor:    orders and analyses at the first use on a patch, else numbers only.
 // solve:     conjugate gradients preconditioned by the kept factor; a new factor when it is slow.
@@ -28,19 +28,34 @@ static double face_slope(const sonde_patch_face *face, const double *s, double f
   return sqrt(fmax(sum, 0) / face->area_m2);
 }
 
+typedef struct face_law {
+  double shear_n_m, limit;
+} face_law;
+
+static double sum_of(const double *field, const uint32_t place[3]) {
+  return field[place[0]] + field[place[1]] + field[place[2]];
+}
+
+// As the model's two layers have it.
+static face_law law_of_face(const sonde_patch_solver *solver, const sonde_patch_face *face) {
+  return (face_law){solver->law.shear_n_m * sum_of(solver->shear_share, face->place) / 3,
+                    solver->law.limit * sum_of(solver->limit_share, face->place) / 3};
+}
+
 // Secant modulus q/g and the factor of the rank-one part (q' - q/g)/(g^2 A) of a face's stiffness.
-static double face_modulus(const sonde_patch_law *law, const sonde_patch_face *face, double g,
-                           double *beyond) {
-  double slope, q = sonde_shear_force(law->shear_n_m, law->limit, g, &slope);
+static double face_modulus(face_law law, const sonde_patch_face *face, double g, double *beyond) {
+  double slope, q = sonde_shear_force(law.shear_n_m, law.limit, g, &slope);
   *beyond = 0;
   if (g < 1e-9) return slope;
   *beyond = (slope - q / g) / (g * g * face->area_m2);
   return q / g;
 }
 
-static void add_face(const sonde_patch *p, const sonde_patch_law *law, const sonde_patch_face *face,
+static void add_face(const sonde_patch_solver *solver, const sonde_patch_face *face,
                      const double *s, double *residual, double *value) {
-  double flux[3], beyond, modulus = face_modulus(law, face, face_slope(face, s, flux), &beyond);
+  const sonde_patch *p = solver->patch;
+  double flux[3], beyond, g = face_slope(face, s, flux);
+  double modulus = face_modulus(law_of_face(solver, face), face, g, &beyond);
   for (int k = 0; k < 3; ++k) {
     uint32_t at = face->place[k], a = (uint32_t)(k + 1) % 3, b = (uint32_t)(k + 2) % 3;
     residual[at] += modulus * flux[k];
@@ -66,8 +81,7 @@ static double assemble(const sonde_patch_solver *solver, const double *s, double
                                               solver->xm_m[i], solver->law.guard, s[i], &slope);
     if (i < p->free_count) value[p->diagonal[i]] = p->area_m2[i] * slope;
   }
-  for (uint32_t f = 0; f < p->face_count; ++f)
-    add_face(p, &solver->law, &p->face[f], s, residual, value);
+  for (uint32_t f = 0; f < p->face_count; ++f) add_face(solver, &p->face[f], s, residual, value);
   double sum = 0, load = 0;
   for (uint32_t i = 0; i < p->free_count; ++i) sum += residual[i] * residual[i];
   for (uint32_t i = p->free_count; i < p->place_count; ++i) load += residual[i] * p->cosine[i];
@@ -205,8 +219,8 @@ static sonde_status adjoint(sonde_patch_solver *solver, const double *s, double 
     int held = 0;
     for (int k = 0; k < 3; ++k) held += face->place[k] >= p->free_count;
     if (held == 0 || held == 3) continue;
-    double flux[3], beyond;
-    double modulus = face_modulus(&solver->law, face, face_slope(face, s, flux), &beyond);
+    double flux[3], beyond, g = face_slope(face, s, flux);
+    double modulus = face_modulus(law_of_face(solver, face), face, g, &beyond);
     for (int k = 0; k < 3; ++k) {
       int ends[2] = {(k + 1) % 3, (k + 2) % 3};
       uint32_t a = face->place[ends[0]], b = face->place[ends[1]];
@@ -219,6 +233,20 @@ static sonde_status adjoint(sonde_patch_solver *solver, const double *s, double 
   return solve(solver, mu, solver->adjoint_accuracy, error);
 }
 
+// A share counts in its face by its part of the sum.
+static void add_by_shares(const sonde_patch_solver *solver, const sonde_patch_face *face,
+                          double by_shear, double by_limit, sonde_patch_gradient *gradient) {
+  double shear = sum_of(solver->shear_share, face->place);
+  double limit = sum_of(solver->limit_share, face->place);
+  gradient->by_ln_shear += by_shear;
+  gradient->by_ln_limit += by_limit;
+  for (int k = 0; k < 3; ++k) {
+    uint32_t at = face->place[k];
+    gradient->by_place[2][at] += by_shear * solver->shear_share[at] / shear;
+    gradient->by_place[3][at] += by_limit * solver->limit_share[at] / limit;
+  }
+}
+
 // p(s; k0, xm) = k0 xm f(s/xm), so k0 dp/dk0 = p and xm dp/dxm = p - s p', straight part included;
 // the same holds for q(g; G, gm).
 static void differentiate(const sonde_patch_solver *solver, const double *s, const double *mu,
@@ -229,17 +257,18 @@ static void differentiate(const sonde_patch_solver *solver, const double *s, con
     double slope, scale = mu[i] * p->area_m2[i];
     double pressure = sonde_normal_pressure(solver->law.exponent, solver->k0_n_m3[i],
                                             solver->xm_m[i], solver->law.guard, s[i], &slope);
-    gradient->by_ln_k0[i] = scale * pressure;
-    gradient->by_ln_xm[i] = scale * (pressure - s[i] * slope);
+    gradient->by_place[0][i] = scale * pressure;
+    gradient->by_place[1][i] = scale * (pressure - s[i] * slope);
+    gradient->by_place[2][i] = gradient->by_place[3][i] = 0;
   }
   for (uint32_t f = 0; f < p->face_count; ++f) {
     const sonde_patch_face *face = &p->face[f];
     double flux[3], g = face_slope(face, s, flux), slope, along = 0;
     if (g < 1e-9) continue;
-    double q = sonde_shear_force(solver->law.shear_n_m, solver->law.limit, g, &slope);
+    face_law law = law_of_face(solver, face);
+    double q = sonde_shear_force(law.shear_n_m, law.limit, g, &slope);
     for (int k = 0; k < 3; ++k) along += mu[face->place[k]] * flux[k];
-    gradient->by_ln_shear += along * q / g;
-    gradient->by_ln_limit += along * (q - g * slope) / g;
+    add_by_shares(solver, face, along * q / g, along * (q - g * slope) / g, gradient);
   }
 }
 
@@ -269,6 +298,8 @@ sonde_status sonde_patch_solver_create(const sonde_patch *patches, uint32_t coun
   *solver = (sonde_patch_solver){.adjoint_accuracy = 1e-6,
                                  .k0_n_m3 = SONDE_NEW(double, places),
                                  .xm_m = SONDE_NEW(double, places),
+                                 .shear_share = SONDE_NEW(double, places),
+                                 .limit_share = SONDE_NEW(double, places),
                                  .residual = SONDE_NEW(double, places),
                                  .step = SONDE_NEW(double, places),
                                  .trial = SONDE_NEW(double, places),
@@ -279,9 +310,10 @@ sonde_status sonde_patch_solver_create(const sonde_patch *patches, uint32_t coun
                                  .preconditioned = SONDE_NEW(double, places),
                                  .direction = SONDE_NEW(double, places),
                                  .product = SONDE_NEW(double, places)};
-  if (solver->k0_n_m3 && solver->xm_m && solver->residual && solver->step && solver->trial &&
-      solver->multiplier && solver->value && solver->scratch && solver->right &&
-      solver->preconditioned && solver->direction && solver->product)
+  if (solver->k0_n_m3 && solver->xm_m && solver->shear_share && solver->limit_share &&
+      solver->residual && solver->step && solver->trial && solver->multiplier && solver->value &&
+      solver->scratch && solver->right && solver->preconditioned && solver->direction &&
+      solver->product)
     return SONDE_OK;
   sonde_patch_solver_clear(solver);
   return sonde_fail_memory(error);
@@ -294,11 +326,13 @@ void sonde_patch_solver_use(sonde_patch_solver *solver, const sonde_patch *patch
   solver->settled_m = NULL;
   solver->patch = patch;
   solver->law = *law;
+  const double *const from[] = {law->ln_k0, law->ln_xm, law->ln_shear, law->ln_limit};
+  double *const to[] = {solver->k0_n_m3, solver->xm_m, solver->shear_share, solver->limit_share};
   for (uint32_t i = 0; i < patch->place_count; ++i) {
     const uint32_t *of = patch->parent[i];
     double t = patch->share[i];
-    solver->k0_n_m3[i] = exp((1 - t) * law->ln_k0[of[0]] + t * law->ln_k0[of[1]]);
-    solver->xm_m[i] = exp((1 - t) * law->ln_xm[of[0]] + t * law->ln_xm[of[1]]);
+    for (int f = 0; f < 4; ++f)
+      to[f][i] = from[f] ? exp((1 - t) * from[f][of[0]] + t * from[f][of[1]]) : 1;
   }
 }
 
@@ -306,6 +340,8 @@ void sonde_patch_solver_clear(sonde_patch_solver *solver) {
   if (solver->ldl) sonde_ldl_destroy(solver->ldl);
   sonde_free(solver->k0_n_m3);
   sonde_free(solver->xm_m);
+  sonde_free(solver->shear_share);
+  sonde_free(solver->limit_share);
   sonde_free(solver->residual);
   sonde_free(solver->step);
   sonde_free(solver->trial);

@@ -23,8 +23,12 @@ sonde_status sonde_site_basis(const sonde_model *model, const sonde_site_table *
   shadow.sites = SONDE_NEW(sonde_site, count);
   shadow.k0_n_m3 = SONDE_NEW(double, nodes);
   shadow.xm_m = SONDE_NEW(double, nodes);
+  shadow.shear_share = SONDE_NEW(double, nodes);
+  shadow.limit_share = SONDE_NEW(double, nodes);
   sonde_status status = SONDE_OK;
-  if (!shadow.sites || !shadow.k0_n_m3 || !shadow.xm_m) status = sonde_fail_memory(error);
+  if (!shadow.sites || !shadow.k0_n_m3 || !shadow.xm_m || !shadow.shear_share ||
+      !shadow.limit_share)
+    status = sonde_fail_memory(error);
   if (!status) memcpy(shadow.sites, sites->sites, count * sizeof *shadow.sites);
   for (uint32_t s = 0; s < count && !status; s += 2) {
     uint32_t t = s + 1 < count ? s + 1 : s;
@@ -42,6 +46,8 @@ sonde_status sonde_site_basis(const sonde_model *model, const sonde_site_table *
   sonde_free(shadow.sites);
   sonde_free(shadow.k0_n_m3);
   sonde_free(shadow.xm_m);
+  sonde_free(shadow.shear_share);
+  sonde_free(shadow.limit_share);
   return status;
 }
 

@@ -28,7 +28,7 @@ static double deepest_of(const sonde_fit_plan *plan) {
 
 // theta holds the generic start.
 static void draw_start(const sonde_again *a, uint64_t seed, uint32_t number, double *theta) {
-  uint32_t n = a->parameters, sites = (n - 2) / 2;
+  uint32_t n = a->parameters, sites = a->refit->sites->count;
   uint64_t counter = (uint64_t)number * (n + 2);
   double least = log(1.1 * deepest_of(&a->plan));
   const range xm = {least, log(4 / 1.1) + least}, limit = {log(0.4), log(4.0)};

@@ -326,6 +326,13 @@ static void depth_map(sonde_report_view *view) {
   sonde_text_clear(&caption);
 }
 
+// Whether the shear layer differs from place to place.
+static bool varies(const sonde_model *model) {
+  for (uint32_t i = 0; i < model->surface.vertex_count; ++i)
+    if (fabs(model->shear_share[i] - 1) > 1e-6) return true;
+  return false;
+}
+
 void sonde_report_maps(sonde_report_view *view) {
   const sonde_model *model = view->in->model;
   if (!model || !model->surface.face_count || !model->normal || !model->k0_n_m3 || !model->xm_m)
@@ -349,6 +356,19 @@ void sonde_report_maps(sonde_report_view *view) {
                   .key = "x\u2098, mm",
                   .caption = "The depth at which the springs would become rigid: dark is where "
                              "little can be compressed."});
+  if (model->shear_share && varies(model)) {
+    field_map(view, model->shear_share, model->law.shear_stiffness_n_m,
+              (map){.name = "map-shear",
+                    .title = "Stiffness G of the shear layer",
+                    .key = "G, N/m",
+                    .caption = "How strongly the skin pulls its surroundings along: light is "
+                               "strongly."});
+    field_map(view, model->limit_share, model->law.shear_limit,
+              (map){.name = "map-limit",
+                    .title = "Limit g\u2098 of the shear layer",
+                    .key = "g\u2098",
+                    .caption = "The slope of the skin at which the layer would become rigid."});
+  }
   if (model->muscle_depth_m) depth_map(view);
   if (view->main && view->rows) error_map(view);
   sonde_figures_side_by_side(view, false);

@@ -72,31 +72,48 @@ static void parameter_table(sonde_report_view *view) {
 
 // ---- sites --------------------------------------------------------------------------------------
 
+typedef struct site_column {
+  const char *head;
+  double factor;
+} site_column;
+enum { SITE_COLUMNS = 4 };
+static const site_column SITE_COLUMN[SITE_COLUMNS] = {
+    {"k\u2080, kPa/mm", 1e-6}, {"x\u2098, mm", 1e3}, {"G, N/m", 1}, {"g\u2098", 1}};
+
+static const sonde_report_interval *column_of(const sonde_report_site *s, int column) {
+  const sonde_report_interval *const of[SITE_COLUMNS] = {&s->k0_n_m3, &s->xm_m, &s->shear_n_m,
+                                                         &s->shear_limit};
+  return of[column];
+}
+
 static void site_table(sonde_report_view *view) {
   const sonde_fit_report *r = view->in;
   interval_columns columns = {false, false};
-  for (uint32_t i = 0; i < r->site_parameter_count; ++i) {
-    columns_of(&r->site_parameters[i].k0_n_m3, &columns);
-    columns_of(&r->site_parameters[i].xm_m, &columns);
-  }
-  const char *heads[7];
+  bool sheared = r->site_parameter_count > 0 && r->site_parameters[0].shear_n_m.value > 0;
+  int shown = sheared ? SITE_COLUMNS : 2;
+  for (uint32_t i = 0; i < r->site_parameter_count; ++i)
+    for (int k = 0; k < shown; ++k) columns_of(column_of(&r->site_parameters[i], k), &columns);
+  const char *heads[1 + 3 * SITE_COLUMNS];
   uint32_t count = 0;
   heads[count++] = "Site";
-  for (int k = 0; k < 2; ++k) {
-    heads[count++] = k ? "x\u2098, mm" : "k\u2080, kPa/mm";
+  for (int k = 0; k < shown; ++k) {
+    heads[count++] = SITE_COLUMN[k].head;
     if (columns.bounds) heads[count++] = "95 % interval";
     if (columns.bootstrap) heads[count++] = "95 % bootstrap";
   }
   SONDE_ASSERT(count <= SONDE_COUNT_OF(heads));
   sonde_text_put(&view->page, "<details><summary>Parameters of every site</summary>\n");
-  sonde_table_begin(view, "Parameters of the sites: p(s) = k\u2080 s/(1 \u2212 s/x\u2098).");
+  sonde_table_begin(
+      view,
+      sheared ? "Parameters of the sites: normal springs k\u2080, x\u2098, shear layer G, g\u2098."
+              : "Parameters of the sites: p(s) = k\u2080 s/(1 \u2212 s/x\u2098).");
   sonde_table_head(view, heads, count);
   for (uint32_t i = 0; i < r->site_parameter_count; ++i) {
     const sonde_report_site *s = &r->site_parameters[i];
     sonde_row_begin(view, false);
     sonde_text_format(&view->page, "<td>%u</td>", s->site);
-    interval_cells(view, &s->k0_n_m3, 1e-6, columns);
-    interval_cells(view, &s->xm_m, 1e3, columns);
+    for (int k = 0; k < shown; ++k)
+      interval_cells(view, column_of(s, k), SITE_COLUMN[k].factor, columns);
     sonde_row_end(view);
   }
   sonde_table_end(view);

@@ -63,6 +63,14 @@ static void add_noise(sonde_measurements *m, const sonde_datum *exact, uint64_t 
   }
 }
 
+static double shear_of(const sonde_fit_result *r, uint32_t s) {
+  return r->law.shear_stiffness_n_m * r->sites[s].shear_share;
+}
+
+static double limit_of(const sonde_fit_result *r, uint32_t s) {
+  return r->law.shear_limit * r->sites[s].limit_share;
+}
+
 static uint32_t covered(const sonde_fit_result *r, const sonde_fit_result *truth) {
   uint32_t in = 0;
   const sonde_fit_confidence *c = &r->confidence;
@@ -71,6 +79,10 @@ static uint32_t covered(const sonde_fit_result *r, const sonde_fit_result *truth
     double x = log(r->sites[s].xm_m / truth->sites[s].xm_m);
     in += fabs(k) < 1.96 * c->ln_k0_sd[s];
     in += fabs(x) < 1.96 * c->ln_xm_sd[s];
+    double g = log(shear_of(r, s) / shear_of(truth, s));
+    double gm = log(limit_of(r, s) / limit_of(truth, s));
+    in += fabs(g) < 1.96 * c->ln_site_shear_sd[s];
+    in += fabs(gm) < 1.96 * c->ln_site_limit_sd[s];
   }
   double g = log(r->law.shear_stiffness_n_m / truth->law.shear_stiffness_n_m);
   double gm = log(r->law.shear_limit / truth->law.shear_limit);

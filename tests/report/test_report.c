@@ -45,8 +45,11 @@ static void make_sites(void) {
                                 .k0_n_m3 = 1e5 + 1e3 * s,
                                 .xm_m = 0.05};
     made.fat_m[s] = 0.01 + 1e-4 * s;
-    made.site_parameters[s] = (sonde_report_site){
-        3 * s, {1e5 + 1e3 * s, 9e4, 1.2e5, NAN, NAN}, {0.05, 0.04, INFINITY, 0.045, 0.06}};
+    made.site_parameters[s] = (sonde_report_site){3 * s,
+                                                  {1e5 + 1e3 * s, 9e4, 1.2e5, NAN, NAN},
+                                                  {0.05, 0.04, INFINITY, 0.045, 0.06},
+                                                  {15 + 0.1 * s, 14, 18, NAN, NAN},
+                                                  {1.1, 1, 1.2, NAN, NAN}};
   }
   made.sites = (sonde_site_table){SITES, made.site, made.fat_m};
 }
