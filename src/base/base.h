@@ -26,6 +26,14 @@ void *sonde_realloc(void *pointer, size_t old_bytes, size_t new_bytes);
 // Typed helpers: `double *x = SONDE_NEW(double, n);`
 #define SONDE_NEW(type, count) ((type *)sonde_calloc((count), sizeof(type)))
 
+// The next array of a block that starts at base, at multiples of 64 bytes from there; moves *offset
+// behind it. NULL base: only measures.
+static inline void *sonde_carve(char *base, size_t *offset, size_t count, size_t size) {
+  void *place = base ? base + *offset : NULL;
+  *offset += (count * size + 63) & ~(size_t)63;
+  return place;
+}
+
 // Fills error (when not NULL) and returns status: `return sonde_fail(error, SONDE_IO, "...", ...)`.
 sonde_status sonde_fail_at(sonde_error *error, sonde_status status, const char *where,
                            const char *format, ...) __attribute__((format(printf, 4, 5)));

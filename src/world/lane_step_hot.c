@@ -129,17 +129,31 @@ static void clear_touched(sonde_state *state) {
     }
 }
 
+// The place in press[] where the contact with a slice is gathered.
+static sonde_slice_press *press_at(sonde_lanes *lanes, uint32_t s) {
+  if (lanes->press_of[s] == 0) {
+    lanes->pressed[lanes->press_count++] = s;
+    lanes->press_of[s] = lanes->press_count;
+    memset(&lanes->press[lanes->press_count - 1], 0, sizeof *lanes->press);
+  }
+  SONDE_ASSERT(lanes->press_count <= lanes->slice_count);
+  return &lanes->press[lanes->press_of[s] - 1];
+}
+
 static void couple(sonde_state *state) {
-  SONDE_ASSERT(state->touched_count <= state->lanes->node_count);
+  sonde_lanes *lanes = state->lanes;
+  SONDE_ASSERT(state->touched_count <= lanes->node_count);
+  for (uint32_t k = 0; k < lanes->press_count; ++k) lanes->press_of[lanes->pressed[k]] = 0;
+  lanes->press_count = 0;
   for (uint32_t k = 0; k < state->touched_count; ++k) {
     uint32_t i = state->touched[k], l = i % SONDE_LANES;
-    sonde_slice *at = &state->lanes->slice[i / SONDE_LANES];
+    sonde_slice_press *at = press_at(lanes, i / SONDE_LANES);
     const double(*d)[3] = (const double(*)[3])state->matrix->diagonal[i].m;
     sonde_vec3 f = v_add(state->contact_force[i], state->force[i]);
-    at->r[0][l] += (float)f.x, at->r[1][l] += (float)f.y, at->r[2][l] += (float)f.z;
-    at->diagonal[0][l] += (float)d[0][0], at->diagonal[1][l] += (float)d[0][1];
-    at->diagonal[2][l] += (float)d[0][2], at->diagonal[3][l] += (float)d[1][1];
-    at->diagonal[4][l] += (float)d[1][2], at->diagonal[5][l] += (float)d[2][2];
+    at->force[0][l] = (float)f.x, at->force[1][l] = (float)f.y, at->force[2][l] = (float)f.z;
+    at->block[0][l] = (float)d[0][0], at->block[1][l] = (float)d[0][1];
+    at->block[2][l] = (float)d[0][2], at->block[3][l] = (float)d[1][1];
+    at->block[4][l] = (float)d[1][2], at->block[5][l] = (float)d[2][2];
   }
 }
 
@@ -147,24 +161,24 @@ static sonde_vec3 direction_of(const sonde_slice *slices, uint32_t i) {
   return sonde_lane_vector(slices[i / SONDE_LANES].z, i % SONDE_LANES);
 }
 
-static void add_to_product(sonde_slice *slices, uint32_t i, sonde_vec3 a) {
-  sonde_slice *at = &slices[i / SONDE_LANES];
-  uint32_t l = i % SONDE_LANES;
-  at->w[0][l] += (float)a.x, at->w[1][l] += (float)a.y, at->w[2][l] += (float)a.z;
+static void add_to_product(sonde_slice *at, bool first, uint32_t l, sonde_vec3 a) {
+  sonde_lane *out = first ? at->q : at->w;
+  out[0][l] += (float)a.x, out[1][l] += (float)a.y, out[2][l] += (float)a.z;
 }
 
-// w = A z with the contact's blocks; returns z.w.
-static double multiply(sonde_state *state) {
+// w = A z with the contact's blocks, the first time q; returns z.w.
+static double multiply(sonde_state *state, bool first) {
   sonde_lanes *lanes = state->lanes;
-  double sum = lanes->kernels->multiply(lanes);
+  double sum = lanes->kernels->multiply(lanes, first);
   for (uint32_t k = 0; k < lanes->pair_count; ++k) {
     uint32_t e = lanes->pair_edge[k], i = state->model->topology.edges[e][0];
     uint32_t j = state->model->topology.edges[e][1];
     const sonde_mat3 *block = &state->matrix->upper[e];
     sonde_vec3 pi = direction_of(lanes->slice, i), pj = direction_of(lanes->slice, j);
     sonde_vec3 qi = m_mul_v(*block, pj);
-    add_to_product(lanes->slice, i, qi);
-    add_to_product(lanes->slice, j, m_mul_v(m_transpose(*block), pi));
+    add_to_product(&lanes->slice[i / SONDE_LANES], first, i % SONDE_LANES, qi);
+    sonde_vec3 qj = m_mul_v(m_transpose(*block), pi);
+    add_to_product(&lanes->slice[j / SONDE_LANES], first, j % SONDE_LANES, qj);
     sum += 2 * v_dot(pi, qi);
   }
   return sum;
@@ -179,14 +193,15 @@ static void keep_velocities(sonde_lanes *lanes) {
 }
 
 // Vectors that the kernels read and write at least once, per slice and per slot: those of one
-// evaluation (evaluate, linearise, begin) and of one iteration (multiply, advance). Records of
-// neighbours count once per slot; faces of the shear layer and the contact do not count.
+// evaluation (linearise, the records of accept or update) and of one iteration (multiply,
+// advance). Records of neighbours count once per slot; the shear layer and the contact do not
+// count.
 enum {
-  EVALUATED_PER_SLICE = 66,
-  EVALUATED_PER_SLOT = 18,
-  ITERATED_PER_SLICE = 55,
+  EVALUATED_PER_SLICE = 47,
+  EVALUATED_PER_SLOT = 16,
+  ITERATED_PER_SLICE = 44,
   ITERATED_PER_SLOT = 10,
-  UPDATED_PER_SLICE = 18
+  UPDATED_PER_SLICE = 29
 };
 
 static void count_bytes(sonde_lanes *lanes, uint64_t evaluations, uint64_t iterations) {
@@ -197,19 +212,20 @@ static void count_bytes(sonde_lanes *lanes, uint64_t evaluations, uint64_t itera
 }
 
 // False when there was nothing left to solve.
-static bool solve(sonde_state *state) {
+// sums: r.z, r.r and (h F)^2 at the start.
+static bool solve(sonde_state *state, double sums[3]) {
   sonde_lanes *lanes = state->lanes;
   const sonde_pcg_options *options = &state->def.pcg;
-  double sums[3], next[2], alpha = 0, beta = 0;
-  lanes->kernels->begin(lanes, sums);
+  double next[2], alpha = 0, beta = 0;
   sonde_pcg_result result = {.reference = sqrt(sums[2]), .residual = sqrt(sums[1])};
   double target = fmax(options->relative_residual * result.reference, options->absolute_residual);
   while (result.residual > target && result.iterations < options->max_iterations) {
-    double curvature = multiply(state);
-    if (result.iterations > 0) curvature -= beta * sums[0] / alpha;
+    bool first = result.iterations == 0;
+    double curvature = multiply(state, first);
+    if (!first) curvature -= beta * sums[0] / alpha;
     if (!(curvature > 0)) break;
     alpha = sums[0] / curvature;
-    lanes->kernels->advance(lanes, (float)alpha, (float)beta, next);
+    lanes->kernels->advance(lanes, first, (float)alpha, (float)beta, next);
     beta = next[0] / sums[0];
     sums[0] = next[0];
     result.residual = sqrt(next[1]);
@@ -248,21 +264,19 @@ static bool iterate(sonde_state *state, const sonde_probe *probe, sonde_pose pos
   sonde_contact_detect(state, probe, pose);
   if (wake_touched(state)) list_awake(lanes);
   clear_touched(state);
-  double detected = sonde_clock_now();
-  lanes->kernels->evaluate(lanes);
-  lanes->kernels->shear(lanes);
-  lanes->kernels->linearise(lanes);
   if (probe) {
     sonde_contact_apply(state, motion, &scales);
     sonde_friction_apply(state, motion, &scales, h);
-    couple(state);
   }
+  couple(state);
+  double detected = sonde_clock_now(), sums[3];
+  lanes->kernels->shear(lanes);
+  lanes->kernels->linearise(lanes, sums);
   double assembled = sonde_clock_now();
-  bool solved = solve(state);
+  bool solved = solve(state, sums);
   publish_increments(state, false);
   sonde_contact_advance(state, motion, 1, h);
   publish_increments(state, true);
-  lanes->kernels->accept(lanes);
   state->times.contact_s += detected - start;
   state->times.assembly_s += assembled - detected;
   state->times.solve_s += sonde_clock_now() - assembled;
@@ -279,16 +293,8 @@ static void fall_asleep(sonde_state *state, uint32_t s) {
   for (int c = 0; c < 3; ++c) at->v[c] = at->ve[c] = at->z[c] = (sonde_lane){0};
   for (uint32_t l = 0; l < lanes->model[s].used; ++l) {
     uint32_t i = s * SONDE_LANES + l;
-    float *record = lanes->record + (size_t)i * SONDE_RECORD;
-    float *direction = lanes->direction + (size_t)i * SONDE_DIRECTION;
-    float indentation = 0;
-    for (int c = 0; c < 3; ++c) {
-      record[c] = at->u[c][l];
-      record[3 + c] = direction[c] = 0;
-      indentation -= lanes->model[s].normal[c][l] * at->u[c][l];
-    }
-    direction[3] = 0;
-    record[6] = indentation;
+    memset(lanes->direction + (size_t)i * SONDE_DIRECTION, 0, SONDE_DIRECTION * sizeof(float));
+    sonde_lanes_record(lanes, i);
     state->velocity[i] = vec3(0, 0, 0);
     state->position[i] = state->probed[i] =
         v_add(state->model->surface.vertices[i], sonde_lane_vector(at->u, l));
@@ -342,9 +348,10 @@ static void rest(sonde_state *state) {
 // What the probe touched may have bounced: its change of velocity says nothing about the next.
 static void hold_touched(sonde_state *state) {
   for (uint32_t k = 0; k < state->touched_count; ++k) {
-    uint32_t l = state->touched[k] % SONDE_LANES;
-    sonde_slice *at = &state->lanes->slice[state->touched[k] / SONDE_LANES];
+    uint32_t i = state->touched[k], l = i % SONDE_LANES;
+    sonde_slice *at = &state->lanes->slice[i / SONDE_LANES];
     for (int c = 0; c < 3; ++c) at->ve[c][l] = at->v[c][l];
+    sonde_lanes_record(state->lanes, i);
   }
 }
 
@@ -360,7 +367,10 @@ bool sonde_lane_step(sonde_state *state, const sonde_probe *probe, sonde_pose po
   lanes->bytes_moved = 0;
   list_awake(lanes);
   hold_touched(state);
-  for (uint32_t k = 0; k < state->def.newton_iterations; ++k) iterate(state, probe, pose, motion);
+  for (uint32_t k = 0; k < state->def.newton_iterations; ++k) {
+    if (k > 0) lanes->kernels->accept(lanes);
+    iterate(state, probe, pose, motion);
+  }
   double solved = sonde_clock_now();
   if (probe) sonde_friction_advance(state, motion);
   sonde_contact_wrench(state, pose.position);

@@ -10,18 +10,14 @@
 
 #include <string.h>
 
-static void *carve_array(char *base, size_t *offset, size_t count, size_t size) {
-  void *place = base ? base + *offset : NULL;
-  *offset += (count * size + 63) & ~(size_t)63;
-  return place;
-}
-
-#define CARVE(field, count) (l->field = carve_array(base, &offset, (count), sizeof *l->field))
+#define CARVE(field, count) (l->field = sonde_carve(base, &offset, (count), sizeof *l->field))
 
 static size_t carve(sonde_lanes *l, uint32_t edges, char *base) {
   size_t offset = 0, rows = (size_t)l->slice_count * SONDE_LANES;
   CARVE(model, l->slice_count), CARVE(slice, l->slice_count);
-  CARVE(slot, l->slot_count), CARVE(tangent, l->slot_count);
+  CARVE(slot, l->slot_count), CARVE(tangent, l->slot_count), CARVE(share, l->slot_count);
+  CARVE(slot_shear, l->law.shear > 0 ? l->slot_count : 0);
+  CARVE(press, l->slice_count), CARVE(press_of, l->slice_count), CARVE(pressed, l->slice_count);
   // One more slice of faces stays zero: what slots without a face read.
   CARVE(face, l->face_slice_count), CARVE(face_value, l->face_slice_count + 1);
   CARVE(near, l->near_total), CARVE(face_near, l->face_total);
@@ -52,10 +48,12 @@ static uint32_t count_slots(const sonde_topology *t, uint32_t slice) {
 static void fill_row(sonde_lanes *lanes, const sonde_model *model, uint32_t i) {
   const sonde_topology *t = &model->topology;
   uint32_t s = i / SONDE_LANES, l = i % SONDE_LANES;
-  const sonde_slice_model *fixed = &lanes->model[s];
+  sonde_slice_model *fixed = &lanes->model[s];
   int32_t nothing = (int32_t)(lanes->face_slice_count * SONDE_FACE_STRIDE);
+  if (l == 0) fixed->whole_count = fixed->slot_count;
   for (uint32_t k = 0; k < fixed->slot_count; ++k) {
     sonde_slot *slot = &lanes->slot[fixed->first_slot + k];
+    sonde_slot_shear *shear = &lanes->slot_shear[fixed->first_slot + k];
     bool used = k < valence(t, i);
     uint32_t j = used ? t->neighbour[t->start[i] + k] : i;
     sonde_vec3 d = vec3(1, 0, 0);
@@ -66,11 +64,12 @@ static void fill_row(sonde_lanes *lanes, const sonde_model *model, uint32_t i) {
       length = model->edge_rest_m[t->neighbour_edge[t->start[i] + k]];
     }
     slot->node[l] = (int32_t)j;
-    slot->corner[l] = slot->opposite_a[l] = slot->opposite_b[l] = nothing;
+    if (lanes->law.shear > 0)
+      shear->corner[l] = shear->opposite_a[l] = shear->opposite_b[l] = nothing;
     slot->rest[0][l] = (float)d.x, slot->rest[1][l] = (float)d.y, slot->rest[2][l] = (float)d.z;
     slot->length[l] = (float)length;
-    slot->share[l] = (float)share;
-    slot->whole = (l == 0 || slot->whole) && share == 1;
+    lanes->share[fixed->first_slot + k][l] = (float)share;
+    if (share != 1 && k < fixed->whole_count) fixed->whole_count = k;
   }
 }
 
@@ -108,11 +107,12 @@ static void fill_slice(sonde_lanes *lanes, const sonde_model *model, uint32_t s)
   }
 }
 
-static sonde_slot *slot_of(sonde_lanes *lanes, const sonde_topology *t, uint32_t i, uint32_t j) {
+static sonde_slot_shear *slot_of(sonde_lanes *lanes, const sonde_topology *t, uint32_t i,
+                                 uint32_t j) {
   uint32_t k = 0;
   while (k < valence(t, i) && t->neighbour[t->start[i] + k] != j) ++k;
   SONDE_ASSERT(k < valence(t, i));
-  return &lanes->slot[lanes->model[i / SONDE_LANES].first_slot + k];
+  return &lanes->slot_shear[lanes->model[i / SONDE_LANES].first_slot + k];
 }
 
 static void fill_face(sonde_lanes *lanes, const sonde_model *model, uint32_t at) {
@@ -137,7 +137,8 @@ static void fill_face(sonde_lanes *lanes, const sonde_model *model, uint32_t at)
 static void fill_faces(sonde_lanes *lanes, const sonde_model *model) {
   for (uint32_t s = 0; s < lanes->face_slice_count; ++s)
     for (int l = 0; l < SONDE_LANES; ++l) lanes->face[s].area[l] = 1;
-  for (uint32_t k = 0; k < model->surface.face_count; ++k) fill_face(lanes, model, k);
+  for (uint32_t k = 0; lanes->law.shear > 0 && k < model->surface.face_count; ++k)
+    fill_face(lanes, model, k);
 }
 
 // Adds value to the list that starts at first unless it is there; returns the new count.
@@ -270,6 +271,19 @@ void sonde_lanes_destroy(sonde_lanes *lanes) {
   sonde_free(lanes);
 }
 
+void sonde_lanes_record(sonde_lanes *lanes, uint32_t i) {
+  const sonde_slice *at = &lanes->slice[i / SONDE_LANES];
+  const sonde_slice_model *fixed = &lanes->model[i / SONDE_LANES];
+  uint32_t l = i % SONDE_LANES;
+  float *record = lanes->record + (size_t)i * SONDE_RECORD, normal[3];
+  for (int c = 0; c < 3; ++c) {
+    record[c] = at->u[c][l] + lanes->law.dt * at->ve[c][l];
+    record[3 + c] = at->ve[c][l];
+    normal[c] = fixed->normal[c][l] * record[c];
+  }
+  record[6] = -(normal[0] + normal[1] + normal[2]);
+}
+
 static void import_slice(sonde_lanes *lanes, uint32_t s, const sonde_vec3 *rest,
                          const sonde_vec3 *position, const sonde_vec3 *velocity) {
   sonde_slice *at = &lanes->slice[s];
@@ -279,14 +293,12 @@ static void import_slice(sonde_lanes *lanes, uint32_t s, const sonde_vec3 *rest,
   for (uint32_t l = 0; l < lanes->model[s].used; ++l) {
     uint32_t i = s * SONDE_LANES + l;
     sonde_vec3 u = v_sub(position[i], rest[i]), v = velocity[i];
-    float *record = lanes->record + (size_t)i * SONDE_RECORD;
     const double motion[6] = {u.x, u.y, u.z, v.x, v.y, v.z};
-    record[6] = 0;
     for (int c = 0; c < 3; ++c) {
-      record[c] = at->u[c][l] = at->ue[c][l] = (float)motion[c];
-      record[3 + c] = at->v[c][l] = at->ve[c][l] = (float)motion[3 + c];
-      record[6] -= lanes->model[s].normal[c][l] * record[c];
+      at->u[c][l] = (float)motion[c];
+      at->v[c][l] = at->ve[c][l] = (float)motion[3 + c];
     }
+    sonde_lanes_record(lanes, i);
     lanes->speed2[s] = fmaxf(lanes->speed2[s], (float)v_norm2(v));
     lanes->way2[s] = fmaxf(lanes->way2[s], (float)v_norm2(u));
   }

@@ -13,24 +13,28 @@ typedef int32_t sonde_lane_index __attribute__((vector_size(64)));
 
 // One neighbour of each row of a slice; rows with fewer neighbours have share 0 there.
 typedef struct sonde_slot {
-  sonde_lane_index node;       // the neighbour
+  sonde_lane_index node; // the neighbour
+  sonde_lane rest[3];    // X_j - X_i
+  sonde_lane length;     // at rest
+} sonde_slot;
+
+// The same slot in the shear layer.
+typedef struct sonde_slot_shear {
   sonde_lane_index corner;     // this row's corner of the face to the left of the edge
   sonde_lane_index opposite_a; // corners opposite the edge, whose coupling the edge carries
   sonde_lane_index opposite_b;
-  sonde_lane rest[3]; // X_j - X_i
-  sonde_lane length;  // at rest
-  sonde_lane share;   // of a spring: 1, 0 for padding
-  uint32_t whole;     // all shares are 1
-} sonde_slot;
+  sonde_lane coupling; // s of the block s N_i N_j^T
+} sonde_slot_shear;
 
-// The edge's block of the matrix: -(along n n^T + lateral I) + shear N_i N_j^T.
+// The edge's block of the matrix: -(along n n^T + lateral I).
 typedef struct sonde_slot_tangent {
-  sonde_lane n[3], along, lateral, shear;
+  sonde_lane n[3], along, lateral;
 } sonde_slot_tangent;
 
 typedef struct sonde_slice_model {
   sonde_lane normal[3], place[3], area, k0, xm, limit, mass, yield;
   uint32_t first_slot, slot_count;
+  uint32_t whole_count;            // slots from the front whose shares are all 1
   uint32_t first_near, near_count; // slices that share an edge with this one
   uint32_t first_face, face_count; // slices of faces with a corner in this one
   uint32_t used;                   // rows that are nodes, from the front
@@ -39,17 +43,20 @@ typedef struct sonde_slice_model {
 } sonde_slice_model;
 
 typedef struct sonde_slice {
-  sonde_lane u[3], v[3];   // at the start of the step: displacement, velocity
-  sonde_lane ue[3], ve[3]; // where forces are evaluated; ve starts at v + the last step's change
-  sonde_lane r[3];         // residual; force before
-  sonde_lane diagonal[6], inverse[6];      // xx xy xz yy yz zz
-  sonde_lane x[3], z[3], w[3], p[3], q[3]; // of the conjugate gradients
+  sonde_lane u[3], v[3]; // at the start of the step: displacement, velocity
+  sonde_lane ve[3]; // where forces are evaluated, at u + h ve; starts at v + the last step's change
+  sonde_lane factor[6]; // of the diagonal blocks D = L E L^T: l21 l31 l32, 1/e1 1/e2 1/e3
+  sonde_lane x[3], r[3], z[3], w[3], p[3], q[3]; // of the conjugate gradients; D z = r
 } sonde_slice;
+
+// What the contact adds to a slice: forces, and xx xy xz yy yz zz of the diagonal blocks.
+typedef struct sonde_slice_press {
+  sonde_lane force[3], block[6];
+} sonde_slice_press;
 
 typedef struct sonde_face_slice {
   sonde_lane_index node[3];
-  sonde_lane half_cotangent[3], area;
-  float stiff; // unused lanes have area 1 and cotangents 0
+  sonde_lane half_cotangent[3], area; // unused lanes have area 1 and cotangents 0
 } sonde_face_slice;
 
 // Per corner of 16 faces: force along N, share of the diagonal, coupling of the edge opposite.
@@ -72,16 +79,16 @@ typedef struct sonde_lanes sonde_lanes;
 // Kernels of one instruction set; every set gives the same bits.
 typedef struct sonde_lane_kernels {
   const char *name;
-  void (*evaluate)(sonde_lanes *lanes);  // ue = u + h ve, records; indentations for the shear layer
-  void (*shear)(sonde_lanes *lanes);     // faces' forces and couplings
-  void (*linearise)(sonde_lanes *lanes); // forces in b, matrix; reaction
-  // r = h F - M (ve - v), inverse diagonals, z = D^-1 r; r.z, r.r, (h F)^2
-  void (*begin)(sonde_lanes *lanes, double sums[3]);
-  double (*multiply)(sonde_lanes *lanes); // w = A z, returns z.w
-  // p = z + beta p, q = w + beta q, x += alpha p, r -= alpha q, z = D^-1 r; r.z, r.r
-  void (*advance)(sonde_lanes *lanes, float alpha, float beta, double sums[2]);
-  void (*accept)(sonde_lanes *lanes);   // ve += x
-  double (*update)(sonde_lanes *lanes); // u, v at the end, ve for the next; not finite: NaN
+  void (*shear)(sonde_lanes *lanes); // faces' forces and couplings
+  // r = h F - M (ve - v), matrix, z = D^-1 r; r.z, r.r, (h F)^2; reaction
+  void (*linearise)(sonde_lanes *lanes, double sums[3]);
+  double (*multiply)(sonde_lanes *lanes, bool first); // w = A z, the first time q; returns z.w
+  // p = z + beta p, q = w + beta q, x += alpha p, r -= alpha q, z = D^-1 r; r.z, r.r. The first
+  // time p = z and x = alpha p.
+  void (*advance)(sonde_lanes *lanes, bool first, float alpha, float beta, double sums[2]);
+  void (*accept)(sonde_lanes *lanes);   // ve += x, records
+  double (*update)(sonde_lanes *lanes); // u, v at the end with ve + x, ve and records for the next
+                                        // step; not finite: NaN
   // near_probe: slices with a node in the box, which grows by `edges` times their reach
   void (*near)(sonde_lanes *lanes, const float low[3], const float high[3], float edges);
 } sonde_lane_kernels;
@@ -96,11 +103,17 @@ struct sonde_lanes {
   sonde_slice *slice;
   sonde_slot *slot;
   sonde_slot_tangent *tangent;
+  sonde_slot_shear *slot_shear; // of models with a shear layer
+  sonde_lane *share;            // [slots] of a spring: 1, 0 for padding
+  sonde_slice_press *press;     // of touched slices, which press_of counts from 1
+  uint32_t *press_of;           // [slices] 0: not touched
+  uint32_t *pressed;            // those slices
+  uint32_t press_count;
   sonde_face_slice *face;
   sonde_face_value *face_value;
   uint32_t *near, *face_near;
-  float *record;           // [rows][8] ue, ve, indentation of every row, for the neighbours
-  float *direction;        // [rows][4] z and N.z of every row
+  float *record;    // [rows][8] u + h ve, ve, indentation there of every row, for the neighbours
+  float *direction; // [rows][4] z and N.z of every row
   uint32_t *awake, *faces; // lists of slices that take part
   uint32_t awake_count, face_list_count;
   uint8_t *is_awake, *calm, *face_marked, *is_near;
@@ -134,6 +147,8 @@ void sonde_lanes_destroy(sonde_lanes *lanes);
 // Takes over displacements and velocities from doubles; wakes every slice, or none.
 void sonde_lanes_import(sonde_lanes *lanes, const sonde_vec3 *rest, const sonde_vec3 *position,
                         const sonde_vec3 *velocity, bool awake);
+// The record of one row where it is evaluated. @thread tick
+void sonde_lanes_record(sonde_lanes *lanes, uint32_t i);
 // Writes positions and velocities that are not up to date as doubles. @thread tick
 void sonde_lanes_publish(sonde_lanes *lanes, const sonde_vec3 *rest, sonde_vec3 *position,
                          sonde_vec3 *velocity);

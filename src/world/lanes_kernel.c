@@ -1,30 +1,26 @@
 // Kernels of the fast engine (docs/world.md); lanes_*_hot.c include this file once per instruction
 // set. Every sum has a fixed order: all sets give the same bits.
-// evaluate:  where the step evaluates forces, and the records that neighbours read.
 // shear:     slopes, forces and couplings of the faces.
-// linearise: springs to the neighbours, normal and tangential springs, matrix.
-// begin, multiply, advance: parts of the conjugate gradients of Chronopoulos and Gear (1989), which
+// linearise: springs to the neighbours, normal and tangential springs, contact, matrix, residual.
+// multiply, advance: parts of the conjugate gradients of Chronopoulos and Gear (1989), which
 //            read and write every slice twice in an iteration.
-// accept, update: the solution's way into the motion.
+// accept, update: the solution's way into the motion, and the records that neighbours read.
 // near:      slices in the probe's box.
 #include "world/lanes_vector.h"
 
 #include "base/base.h"
 
-static void evaluate(sonde_lanes *lanes) {
-  SONDE_ASSERT(lanes->awake_count <= lanes->slice_count);
-  float h = lanes->law.dt;
-  for (uint32_t a = 0; a < lanes->awake_count; ++a) {
-    uint32_t s = lanes->awake[a];
-    sonde_slice *at = &lanes->slice[s];
-    for (int c = 0; c < 3; ++c) at->ue[c] = at->u[c] + h * at->ve[c];
-    sonde_lane indentation = -dot(lanes->model[s].normal, at->ue);
-    float *record = lanes->record + (size_t)s * SONDE_LANES * SONDE_RECORD;
-    const sonde_lane low[4] = {at->ue[0], at->ue[1], at->ue[2], at->ve[0]};
-    const sonde_lane high[4] = {at->ve[1], at->ve[2], indentation, indentation};
-    write_records(record, SONDE_RECORD, low);
-    write_records(record + 4, SONDE_RECORD, high);
-  }
+// Where slice s is evaluated: displacement there, velocity, indentation.
+INLINE void publish_record(sonde_lanes *lanes, uint32_t s) {
+  const sonde_slice *at = &lanes->slice[s];
+  float h = lanes->law.dt, *record = lanes->record + (size_t)s * SONDE_LANES * SONDE_RECORD;
+  sonde_lane ue[3];
+  for (int c = 0; c < 3; ++c) ue[c] = at->u[c] + h * at->ve[c];
+  sonde_lane indentation = -dot(lanes->model[s].normal, ue);
+  const sonde_lane low[4] = {ue[0], ue[1], ue[2], at->ve[0]};
+  const sonde_lane high[4] = {at->ve[1], at->ve[2], indentation, indentation};
+  write_records(record, SONDE_RECORD, low);
+  write_records(record + 4, SONDE_RECORD, high);
 }
 
 // Secant modulus m = q/g of the shear layer and (q' - m)/g^2, without the cancellation of q' - m.
@@ -57,7 +53,8 @@ static void shear(sonde_lanes *lanes) {
     }
     for (int k = 0; k < 3; ++k) flux[k] = across[(k + 2) % 3] - across[(k + 1) % 3];
     sonde_lane inverse = 1 / face->area;
-    shear_law(&lanes->law, root(larger(sum * inverse, all(0))), &modulus, &beyond);
+    sonde_lane slope2 = larger(sum * inverse, all(1e-30f));
+    shear_law(&lanes->law, slope2 * inverse_root(slope2), &modulus, &beyond);
     beyond = beyond * inverse;
     for (int k = 0; k < 3; ++k) {
       int i = (k + 1) % 3, j = (k + 2) % 3;
@@ -85,18 +82,25 @@ INLINE void add_rank_one(sonde_lane block[6], const sonde_lane n[3], sonde_lane 
   block[5] += scale * n[2] * n[2] + flat;
 }
 
+// The motion of a slice's rows where it is evaluated.
+typedef struct place {
+  sonde_lane ue[3], ve[3];
+} place;
+
 // The spring-damper of an edge, seen from the row; the neighbour finds the opposite, bit for bit.
-INLINE void add_spring(const sonde_lane_law *law, const sonde_slot *slot, const float *record,
-                       const sonde_slice *at, node_sum *sum, sonde_slot_tangent *tangent) {
+INLINE void add_spring(const sonde_lane_law *law, const sonde_slot *slot, sonde_lane share,
+                       const float *record, const place *at, node_sum *sum,
+                       sonde_slot_tangent *tangent) {
   sonde_lane d[3], w[3], n[3], other[6];
   read_records(record, &slot->node, other);
   for (int c = 0; c < 3; ++c) {
     d[c] = slot->rest[c] + (other[c] - at->ue[c]);
     w[c] = other[3 + c] - at->ve[c];
   }
-  sonde_lane length = larger(root(dot(d, d)), 0.05f * slot->length), inverse = 1 / length;
+  sonde_lane least = 0.05f * slot->length, length2 = larger(dot(d, d), least * least);
+  sonde_lane inverse = inverse_root(length2), length = length2 * inverse;
   for (int c = 0; c < 3; ++c) n[c] = d[c] * inverse;
-  sonde_lane stretch = length - slot->length, share = slot->whole ? all(1) : slot->share;
+  sonde_lane stretch = length - slot->length;
   sonde_lane stiffness = share * pick(stretch < 0, all(law->edge_stiffness * law->edge_compression),
                                       all(law->edge_stiffness));
   sonde_lane tension = share * law->edge_pretension + stiffness * stretch;
@@ -113,11 +117,10 @@ INLINE void add_spring(const sonde_lane_law *law, const sonde_slot *slot, const 
   tangent->lateral = flat;
 }
 
-INLINE void add_coupling(const sonde_slot *slot, const float *values, node_sum *sum,
-                         sonde_slot_tangent *tangent) {
+INLINE void add_coupling(sonde_slot_shear *slot, const float *values, node_sum *sum) {
   sum->shear_force += gather(values, slot->corner);
   sum->shear_diagonal += gather(values + 3 * SONDE_LANES, slot->corner);
-  tangent->shear = gather(values + 6 * SONDE_LANES, slot->opposite_a) +
+  slot->coupling = gather(values + 6 * SONDE_LANES, slot->opposite_a) +
                    gather(values + 6 * SONDE_LANES, slot->opposite_b);
 }
 
@@ -136,8 +139,8 @@ INLINE sonde_lane normal_pressure(const sonde_slice_model *fixed, int exponent, 
   return pressure + *slope * straight;
 }
 
-INLINE void add_anchor(const sonde_lane_law *law, const sonde_slice_model *fixed,
-                       const sonde_slice *at, node_sum *sum) {
+INLINE void add_anchor(const sonde_lane_law *law, const sonde_slice_model *fixed, const place *at,
+                       node_sum *sum) {
   const sonde_lane *n = fixed->normal;
   sonde_lane s = -dot(n, at->ue), rate = dot(n, at->ve), slope;
   sonde_lane pressure = normal_pressure(fixed, law->exponent, s, &slope);
@@ -153,88 +156,39 @@ INLINE void add_anchor(const sonde_lane_law *law, const sonde_slice_model *fixed
   add_rank_one(sum->block, n, steep - flat, flat + fixed->mass);
 }
 
-INLINE void linearise_slice(sonde_lanes *lanes, uint32_t s, bool sheared, node_sum *sum) {
-  const sonde_slice_model *fixed = &lanes->model[s];
-  const sonde_slice *at = &lanes->slice[s];
-  const sonde_slot *slot = lanes->slot + fixed->first_slot;
-  sonde_slot_tangent *tangent = lanes->tangent + fixed->first_slot;
-  for (uint32_t k = 0; k < fixed->slot_count; ++k) {
-    add_spring(&lanes->law, &slot[k], lanes->record, at, sum, &tangent[k]);
-    if (sheared) add_coupling(&slot[k], (const float *)lanes->face_value, sum, &tangent[k]);
+// Forces and diagonal blocks of a slice's springs, the blocks of its edges.
+INLINE void add_springs(sonde_lanes *lanes, const sonde_slice_model *fixed, bool sheared,
+                        const place *at, node_sum *sum) {
+  uint32_t first = fixed->first_slot, whole = fixed->whole_count;
+  for (uint32_t k = first; k < first + fixed->slot_count; ++k) {
+    add_spring(&lanes->law, &lanes->slot[k], k < first + whole ? all(1) : lanes->share[k],
+               lanes->record, at, sum, &lanes->tangent[k]);
+    if (sheared) add_coupling(&lanes->slot_shear[k], (const float *)lanes->face_value, sum);
   }
   add_anchor(&lanes->law, fixed, at, sum);
 }
 
-static void linearise(sonde_lanes *lanes) {
-  bool sheared = lanes->law.shear > 0;
-  lane_double reaction[3] = {{0}};
-  for (uint32_t a = 0; a < lanes->awake_count; ++a) {
-    uint32_t s = lanes->awake[a];
-    sonde_slice *at = &lanes->slice[s];
-    node_sum sum = {{{0}}, {{0}}, {0}, {0}};
-    if (sheared)
-      linearise_slice(lanes, s, true, &sum);
-    else
-      linearise_slice(lanes, s, false, &sum);
-    for (int c = 0; c < 3; ++c) {
-      at->r[c] = sum.force[c];
-      reaction[c] += widen(sum.force[c]);
-    }
-    for (int c = 0; c < 6; ++c) at->diagonal[c] = sum.block[c];
-  }
-  lanes->reaction_n = (sonde_vec3){total(reaction[0]), total(reaction[1]), total(reaction[2])};
+INLINE void add_press(const sonde_slice_press *press, node_sum *sum) {
+  for (int c = 0; c < 3; ++c) sum->force[c] += press->force[c];
+  for (int c = 0; c < 6; ++c) sum->block[c] += press->block[c];
 }
 
-// Adjugate over determinant.
-INLINE void invert(const sonde_lane d[6], sonde_lane inverse[6]) {
-  sonde_lane xx = d[3] * d[5] - d[4] * d[4], xy = d[2] * d[4] - d[1] * d[5];
-  sonde_lane xz = d[1] * d[4] - d[2] * d[3];
-  sonde_lane scale = 1 / (d[0] * xx + d[1] * xy + d[2] * xz);
-  inverse[0] = xx * scale;
-  inverse[1] = xy * scale;
-  inverse[2] = xz * scale;
-  inverse[3] = (d[0] * d[5] - d[2] * d[2]) * scale;
-  inverse[4] = (d[1] * d[2] - d[0] * d[4]) * scale;
-  inverse[5] = (d[0] * d[3] - d[1] * d[1]) * scale;
+// L E L^T without pivoting: stable for positive definite blocks however long and thin.
+INLINE void factorise(const sonde_lane d[6], sonde_lane factor[6]) {
+  factor[3] = 1 / d[0];
+  factor[0] = d[1] * factor[3];
+  factor[1] = d[2] * factor[3];
+  factor[4] = 1 / (d[3] - factor[0] * d[1]);
+  sonde_lane rest = d[4] - factor[1] * d[1];
+  factor[2] = rest * factor[4];
+  factor[5] = 1 / (d[5] - factor[1] * d[2] - factor[2] * rest);
 }
 
-INLINE void symmetric(const sonde_lane m[6], const sonde_lane a[3], sonde_lane out[3]) {
-  out[0] = m[0] * a[0] + m[1] * a[1] + m[2] * a[2];
-  out[1] = m[1] * a[0] + m[3] * a[1] + m[4] * a[2];
-  out[2] = m[2] * a[0] + m[4] * a[1] + m[5] * a[2];
-}
-
-INLINE void multiply_slice(sonde_lanes *lanes, uint32_t s, bool sheared, sonde_lane q[3]) {
-  const sonde_slice_model *fixed = &lanes->model[s];
-  const sonde_slot *slot = lanes->slot + fixed->first_slot;
-  const sonde_slot_tangent *tangent = lanes->tangent + fixed->first_slot;
-  sonde_lane along_normal = {0};
-  for (uint32_t k = 0; k < fixed->slot_count; ++k) {
-    sonde_lane p[4];
-    read_directions(lanes->direction, &slot[k].node, p);
-    sonde_lane pull = tangent[k].along * dot(tangent[k].n, p);
-    for (int c = 0; c < 3; ++c) q[c] -= pull * tangent[k].n[c] + tangent[k].lateral * p[c];
-    if (sheared) along_normal += tangent[k].shear * p[3];
-  }
-  for (int c = 0; sheared && c < 3; ++c) q[c] += along_normal * fixed->normal[c];
-}
-
-static double multiply(sonde_lanes *lanes) {
-  bool sheared = lanes->law.shear > 0;
-  lane_double sum = {0};
-  for (uint32_t a = 0; a < lanes->awake_count; ++a) {
-    uint32_t s = lanes->awake[a];
-    sonde_slice *at = &lanes->slice[s];
-    sonde_lane q[3];
-    symmetric(at->diagonal, at->z, q);
-    if (sheared)
-      multiply_slice(lanes, s, true, q);
-    else
-      multiply_slice(lanes, s, false, q);
-    for (int c = 0; c < 3; ++c) at->w[c] = q[c];
-    sum += widen(dot(at->z, q));
-  }
-  return total(sum);
+INLINE void divide(const sonde_lane factor[6], const sonde_lane r[3], sonde_lane z[3]) {
+  sonde_lane y = r[1] - factor[0] * r[0];
+  z[2] = (r[2] - factor[1] * r[0] - factor[2] * y) * factor[5];
+  z[1] = y * factor[4] - factor[2] * z[2];
+  z[0] = r[0] * factor[3] - factor[0] * z[1] - factor[1] * z[2];
 }
 
 INLINE void publish_direction(sonde_lanes *lanes, uint32_t s) {
@@ -249,43 +203,109 @@ INLINE float most(sonde_lane a) {
   return value;
 }
 
-static void begin(sonde_lanes *lanes, double sums[3]) {
+typedef struct sums_of_rows {
+  lane_double rz, rr, ff, reaction[3];
+} sums_of_rows;
+
+INLINE void linearise_slice(sonde_lanes *lanes, uint32_t s, bool sheared, sums_of_rows *sums) {
+  const sonde_slice_model *fixed = &lanes->model[s];
+  sonde_slice *at = &lanes->slice[s];
   float h = lanes->law.dt;
-  lane_double rz = {0}, rr = {0}, ff = {0};
-  for (uint32_t a = 0; a < lanes->awake_count; ++a) {
-    sonde_slice *at = &lanes->slice[lanes->awake[a]];
-    sonde_lane mass = lanes->model[lanes->awake[a]].mass, force[3];
-    for (int c = 0; c < 3; ++c) {
-      force[c] = h * at->r[c];
-      at->r[c] = force[c] - mass * (at->ve[c] - at->v[c]);
-    }
-    sonde_lane yield = lanes->model[lanes->awake[a]].yield / h;
-    lanes->unrest2[lanes->awake[a]] = most(dot(force, force) * (yield * yield));
-    invert(at->diagonal, at->inverse);
-    symmetric(at->inverse, at->r, at->z);
-    rz += widen(dot(at->r, at->z));
-    rr += widen(dot(at->r, at->r));
-    ff += widen(dot(force, force));
-    publish_direction(lanes, lanes->awake[a]);
+  node_sum sum = {{{0}}, {{0}}, {0}, {0}};
+  place here;
+  for (int c = 0; c < 3; ++c) here.ve[c] = at->ve[c], here.ue[c] = at->u[c] + h * at->ve[c];
+  add_springs(lanes, fixed, sheared, &here, &sum);
+  for (int c = 0; c < 3; ++c) sums->reaction[c] += widen(sum.force[c]);
+  if (lanes->press_of[s]) add_press(&lanes->press[lanes->press_of[s] - 1], &sum);
+  sonde_lane force[3], r[3], z[3];
+  for (int c = 0; c < 3; ++c) {
+    force[c] = h * sum.force[c];
+    at->r[c] = r[c] = force[c] - fixed->mass * (here.ve[c] - at->v[c]);
   }
-  sums[0] = total(rz);
-  sums[1] = total(rr);
-  sums[2] = total(ff);
+  sonde_lane yield = fixed->yield / h, force2 = dot(force, force);
+  lanes->unrest2[s] = most(force2 * (yield * yield));
+  factorise(sum.block, at->factor);
+  divide(at->factor, r, z);
+  for (int c = 0; c < 3; ++c) at->z[c] = z[c];
+  sums->rz += widen(dot(r, z));
+  sums->rr += widen(dot(r, r));
+  sums->ff += widen(force2);
+  publish_direction(lanes, s);
 }
 
-static void advance(sonde_lanes *lanes, float alpha, float beta, double sums[2]) {
+static void linearise(sonde_lanes *lanes, double sums[3]) {
+  bool sheared = lanes->law.shear > 0;
+  sums_of_rows all_rows = {{0}, {0}, {0}, {{0}}};
+  for (uint32_t a = 0; a < lanes->awake_count; ++a) {
+    if (sheared)
+      linearise_slice(lanes, lanes->awake[a], true, &all_rows);
+    else
+      linearise_slice(lanes, lanes->awake[a], false, &all_rows);
+  }
+  sums[0] = total(all_rows.rz);
+  sums[1] = total(all_rows.rr);
+  sums[2] = total(all_rows.ff);
+  const lane_double *reaction = all_rows.reaction;
+  lanes->reaction_n = (sonde_vec3){total(reaction[0]), total(reaction[1]), total(reaction[2])};
+}
+
+// The diagonal blocks' part of A z is r.
+INLINE void multiply_slice(sonde_lanes *lanes, const sonde_slice_model *fixed, bool sheared,
+                           sonde_lane q[3]) {
+  uint32_t first = fixed->first_slot;
+  sonde_lane along_normal = {0};
+  for (uint32_t k = first; k < first + fixed->slot_count; ++k) {
+    const sonde_slot_tangent *tangent = &lanes->tangent[k];
+    sonde_lane p[4];
+    read_directions(lanes->direction, &lanes->slot[k].node, p);
+    sonde_lane pull = tangent->along * dot(tangent->n, p);
+    for (int c = 0; c < 3; ++c) q[c] -= pull * tangent->n[c] + tangent->lateral * p[c];
+    if (sheared) along_normal += lanes->slot_shear[k].coupling * p[3];
+  }
+  for (int c = 0; sheared && c < 3; ++c) q[c] += along_normal * fixed->normal[c];
+}
+
+static double multiply(sonde_lanes *lanes, bool first) {
+  bool sheared = lanes->law.shear > 0;
+  lane_double sum = {0};
+  for (uint32_t a = 0; a < lanes->awake_count; ++a) {
+    uint32_t s = lanes->awake[a];
+    sonde_slice *at = &lanes->slice[s];
+    sonde_lane q[3] = {at->r[0], at->r[1], at->r[2]}, *out = first ? at->q : at->w;
+    if (sheared)
+      multiply_slice(lanes, &lanes->model[s], true, q);
+    else
+      multiply_slice(lanes, &lanes->model[s], false, q);
+    for (int c = 0; c < 3; ++c) out[c] = q[c];
+    sum += widen(dot(at->z, q));
+  }
+  return total(sum);
+}
+
+INLINE void advance_slice(sonde_slice *at, bool first, float alpha, float beta) {
+  for (int c = 0; c < 3; ++c) {
+    sonde_lane p = first ? at->z[c] : at->z[c] + beta * at->p[c];
+    sonde_lane q = first ? at->q[c] : at->w[c] + beta * at->q[c];
+    at->x[c] = first ? alpha * p : at->x[c] + alpha * p;
+    at->r[c] -= alpha * q;
+    at->p[c] = p;
+    if (!first) at->q[c] = q;
+  }
+}
+
+static void advance(sonde_lanes *lanes, bool first, float alpha, float beta, double sums[2]) {
   lane_double rz = {0}, rr = {0};
   for (uint32_t a = 0; a < lanes->awake_count; ++a) {
     sonde_slice *at = &lanes->slice[lanes->awake[a]];
-    for (int c = 0; c < 3; ++c) {
-      at->p[c] = beta == 0 ? at->z[c] : at->z[c] + beta * at->p[c];
-      at->q[c] = beta == 0 ? at->w[c] : at->w[c] + beta * at->q[c];
-      at->x[c] = beta == 0 ? alpha * at->p[c] : at->x[c] + alpha * at->p[c];
-      at->r[c] -= alpha * at->q[c];
-    }
-    symmetric(at->inverse, at->r, at->z);
-    rz += widen(dot(at->r, at->z));
-    rr += widen(dot(at->r, at->r));
+    if (first)
+      advance_slice(at, true, alpha, beta);
+    else
+      advance_slice(at, false, alpha, beta);
+    sonde_lane r[3] = {at->r[0], at->r[1], at->r[2]}, z[3];
+    divide(at->factor, r, z);
+    for (int c = 0; c < 3; ++c) at->z[c] = z[c];
+    rz += widen(dot(r, z));
+    rr += widen(dot(r, r));
     publish_direction(lanes, lanes->awake[a]);
   }
   sums[0] = total(rz);
@@ -296,6 +316,7 @@ static void accept(sonde_lanes *lanes) {
   for (uint32_t a = 0; a < lanes->awake_count; ++a) {
     sonde_slice *at = &lanes->slice[lanes->awake[a]];
     for (int c = 0; c < 3; ++c) at->ve[c] += at->x[c];
+    publish_record(lanes, lanes->awake[a]);
   }
 }
 
@@ -319,7 +340,7 @@ static double update(sonde_lanes *lanes) {
     uint32_t s = lanes->awake[a];
     sonde_slice *at = &lanes->slice[s];
     sonde_lane move[3], v[3];
-    for (int c = 0; c < 3; ++c) v[c] = at->ve[c], move[c] = h * v[c];
+    for (int c = 0; c < 3; ++c) v[c] = at->ve[c] + at->x[c], move[c] = h * v[c];
     bound(&lanes->model[s], h, at, move, v);
     for (int c = 0; c < 3; ++c) {
       at->u[c] += move[c];
@@ -330,6 +351,7 @@ static double update(sonde_lanes *lanes) {
     lanes->speed2[s] = most(speed2);
     lanes->way2[s] = most(way2);
     lanes->published[s] = 0;
+    publish_record(lanes, s);
     sum += widen(speed2 + way2);
   }
   return total(sum);
@@ -366,10 +388,8 @@ static void near(sonde_lanes *lanes, const float low[3], const float high[3], fl
 }
 
 const sonde_lane_kernels SONDE_KERNELS = {.name = SONDE_KERNELS_NAME,
-                                          .evaluate = evaluate,
                                           .shear = shear,
                                           .linearise = linearise,
-                                          .begin = begin,
                                           .multiply = multiply,
                                           .advance = advance,
                                           .accept = accept,

@@ -78,13 +78,7 @@ sonde_status sonde_state_set_friction(sonde_state *state, const sonde_friction *
   return SONDE_OK;
 }
 
-static void *carve_array(char *base, size_t *offset, size_t count, size_t size) {
-  void *place = base ? base + *offset : NULL;
-  *offset += (count * size + 63) & ~(size_t)63;
-  return place;
-}
-
-#define CARVE(field, count) (s->field = carve_array(base, &offset, (count), sizeof *s->field))
+#define CARVE(field, count) (s->field = sonde_carve(base, &offset, (count), sizeof *s->field))
 
 static size_t carve(sonde_state *s, char *base) {
   size_t offset = 0;
