@@ -3,6 +3,7 @@
 // detect:   clips candidate faces, gathers V_i and g_i per node, joins regions by union-find.
 // apply:    regions, pushes of the chosen law, terms of the implicit matrix.
 // advance:  the pushes at the end of the step by the same linearisation.
+// surprise: the pushes that nodes meet where the solution brings them.
 // wrench:   force and torque on the probe, region by region.
 #include "world/lanes.h"
 #include "world/state.h"
@@ -69,6 +70,76 @@ static void touch(sonde_state *state, uint32_t i) {
   state->touched[state->touched_count++] = i;
 }
 
+// The sides of a turned box face backwards by rounding.
+static bool pushes_forward(const sonde_state *state, sonde_vec3 slope) {
+  return v_dot(slope, state->inward) <= 1e-9;
+}
+
+// t = weight (d - n.x) for one plane.
+static double plane_depth(const sonde_state *state, uint32_t k, sonde_vec3 x) {
+  return state->plane_weight[k] * (state->plane_offset[k] - v_dot(state->plane_normal[k], x));
+}
+
+static sonde_vec3 plane_slope(const sonde_state *state, uint32_t k) {
+  return v_scale(state->plane_normal[k], -state->plane_weight[k]);
+}
+
+// The plane of the depth of a point inside the probe: the least weighted distance. Planes steeper
+// than 60 degrees to the beam count four times farther: a probe that sinks in deeper than it is
+// wide still pushes back along its face. SONDE_OUTSIDE outside, and where the nearest surface faces
+// backwards: skin gets there only when a narrow probe slips through between nodes, and a push from
+// there would draw the probe deeper.
+static uint16_t nearest_plane(const sonde_state *state, sonde_vec3 x) {
+  double least = INFINITY;
+  uint32_t best = 0;
+  for (uint32_t k = 0; k < state->plane_count; ++k) {
+    double t = plane_depth(state, k, x);
+    if (t <= 0) return SONDE_OUTSIDE;
+    if (t < least) least = t, best = k;
+  }
+  return pushes_forward(state, plane_slope(state, best)) ? (uint16_t)best : SONDE_OUTSIDE;
+}
+
+bool sonde_contact_depth(const sonde_state *state, sonde_vec3 x, double *depth, sonde_vec3 *slope) {
+  if (state->ball_radius > 0) {
+    sonde_vec3 d = v_sub(state->ball_centre, x);
+    *depth = state->ball_radius - v_norm(d);
+    if (!(*depth > 0)) return false;
+    *slope = v_unit(d, v_scale(state->inward, -1));
+    return pushes_forward(state, *slope);
+  }
+  uint16_t plane = nearest_plane(state, x);
+  if (plane == SONDE_OUTSIDE) return false;
+  *depth = plane_depth(state, plane, x);
+  *slope = plane_slope(state, plane);
+  return true;
+}
+
+// Integration points of a face: the centres of its four congruent parts, each a quarter of the rest
+// area. With the rest area as measure the elastic pushes have the energy kappa/2 sum A t^2, whose
+// Hessian kappa A (grad t)(grad t)^T is exact.
+static const double POINT[SONDE_POINTS][3] = {{1.0 / 3, 1.0 / 3, 1.0 / 3},
+                                              {2.0 / 3, 1.0 / 6, 1.0 / 6},
+                                              {1.0 / 6, 2.0 / 3, 1.0 / 6},
+                                              {1.0 / 6, 1.0 / 6, 2.0 / 3}};
+
+static sonde_vec3 blend(const sonde_vec3 *field, const uint32_t *v, const double *weight) {
+  sonde_vec3 sum = v_scale(field[v[0]], weight[0]);
+  return v_madd(v_madd(sum, weight[1], field[v[1]]), weight[2], field[v[2]]);
+}
+
+// Planes of a face's points, kept for its pushes; true when a point is inside the probe.
+static bool find_planes(sonde_state *state, uint32_t face) {
+  const uint32_t *v = state->model->surface.faces[face];
+  bool inside = false;
+  for (int q = 0; q < SONDE_POINTS; ++q) {
+    uint16_t plane = nearest_plane(state, blend(state->probed, v, POINT[q]));
+    state->point_planes[face][q] = plane;
+    inside |= plane != SONDE_OUTSIDE;
+  }
+  return inside;
+}
+
 static void clip_face(sonde_state *state, uint32_t face) {
   const uint32_t *v = state->model->surface.faces[face];
   const sonde_vec3 corners[3] = {state->probed[v[0]], state->probed[v[1]], state->probed[v[2]]};
@@ -85,6 +156,7 @@ static void clip_face(sonde_state *state, uint32_t face) {
   sonde_contact_join(state, v[0], v[1]);
   sonde_contact_join(state, v[1], v[2]);
   state->touched_faces[state->touched_face_count++] = face;
+  if (state->def.contact_law == SONDE_CONTACT_FOUNDATION) find_planes(state, face);
   state->contact.area_m2 += clip.area_m2;
   state->contact.volume_m3 += clip.volume_m3;
 }
@@ -245,61 +317,18 @@ static void sum_regions(sonde_state *state, const sonde_motion *probe) {
   }
 }
 
-// The sides of a turned box face backwards by rounding.
-static bool pushes_forward(const sonde_state *state, sonde_vec3 slope) {
-  return v_dot(slope, state->inward) <= 1e-9;
-}
-
-// Depth of a point inside the probe: the least weighted distance to a plane, t = weight (d - n.x),
-// and its gradient -weight n in *slope. Planes steeper than 60 degrees to the beam count four times
-// farther: a probe that sinks in deeper than it is wide still pushes back along its face.
-// False outside, and where the nearest surface faces backwards: skin gets there only when a narrow
-// probe slips through between nodes, and a push from there would draw the probe deeper.
-bool sonde_contact_depth(const sonde_state *state, sonde_vec3 x, double *depth, sonde_vec3 *slope) {
-  if (state->ball_radius > 0) {
-    sonde_vec3 d = v_sub(state->ball_centre, x);
-    *depth = state->ball_radius - v_norm(d);
-    *slope = v_unit(d, v_scale(state->inward, -1));
-    return *depth > 0 && pushes_forward(state, *slope);
-  }
-  double least = INFINITY;
-  uint32_t best = 0;
-  for (uint32_t k = 0; k < state->plane_count; ++k) {
-    double t = state->plane_weight[k] * (state->plane_offset[k] - v_dot(state->plane_normal[k], x));
-    if (t <= 0) return false;
-    if (t < least) least = t, best = k;
-  }
-  *depth = least;
-  *slope = v_scale(state->plane_normal[best], -state->plane_weight[best]);
-  return pushes_forward(state, *slope);
-}
-
-// Integration points of a face: the centres of its four congruent parts, each a quarter of the rest
-// area. With the rest area as measure the elastic pushes have the energy kappa/2 sum A t^2, whose
-// Hessian kappa A (grad t)(grad t)^T is exact.
-enum { POINTS = 4 };
-static const double POINT[POINTS][3] = {{1.0 / 3, 1.0 / 3, 1.0 / 3},
-                                        {2.0 / 3, 1.0 / 6, 1.0 / 6},
-                                        {1.0 / 6, 2.0 / 3, 1.0 / 6},
-                                        {1.0 / 6, 1.0 / 6, 2.0 / 3}};
-
-static sonde_vec3 blend(const sonde_vec3 *field, const uint32_t *v, const double *weight) {
-  sonde_vec3 sum = v_scale(field[v[0]], weight[0]);
-  return v_madd(v_madd(sum, weight[1], field[v[1]]), weight[2], field[v[2]]);
-}
-
 // A face by its points: shares and gradients by the same quadrature as the pushes, instead of the
 // exact clip.
 static void sample_face(sonde_state *state, uint32_t face) {
   const uint32_t *v = state->model->surface.faces[face];
-  double area = state->model->face_area_m2[face] / POINTS, depth;
-  uint32_t inside = 0;
-  for (int q = 0; q < POINTS; ++q) {
-    sonde_vec3 slope;
-    if (!sonde_contact_depth(state, blend(state->probed, v, POINT[q]), &depth, &slope)) continue;
-    if (inside++ == 0)
-      for (int k = 0; k < 3; ++k) touch(state, v[k]);
-    sonde_vec3 outward = v_scale(v_unit(slope, state->inward), area);
+  double area = state->model->face_area_m2[face] / SONDE_POINTS;
+  if (!find_planes(state, face)) return;
+  for (int k = 0; k < 3; ++k) touch(state, v[k]);
+  for (int q = 0; q < SONDE_POINTS; ++q) {
+    uint16_t plane = state->point_planes[face][q];
+    if (plane == SONDE_OUTSIDE) continue;
+    double depth = plane_depth(state, plane, blend(state->probed, v, POINT[q]));
+    sonde_vec3 outward = v_scale(v_unit(plane_slope(state, plane), state->inward), area);
     for (int k = 0; k < 3; ++k) {
       state->share_m3[v[k]] += POINT[q][k] * area * depth;
       state->gradient[v[k]] = v_madd(state->gradient[v[k]], POINT[q][k], outward);
@@ -307,7 +336,6 @@ static void sample_face(sonde_state *state, uint32_t face) {
     state->contact.area_m2 += area;
     state->contact.volume_m3 += area * depth;
   }
-  if (inside == 0) return;
   sonde_contact_join(state, v[0], v[1]);
   sonde_contact_join(state, v[1], v[2]);
   SONDE_ASSERT(state->touched_face_count < state->model->surface.face_count);
@@ -345,24 +373,28 @@ typedef struct pressed_point {
   double push_n, stiffness_n_m, damping_n_s_m;
 } pressed_point;
 
-static bool pressed_at(const sonde_state *state, uint32_t face, const double *weight,
+static bool pressed_at(const sonde_state *state, uint32_t face, int point,
                        const sonde_motion *probe, pressed_point *at) {
   const uint32_t *v = state->model->surface.faces[face];
+  const double *weight = POINT[point];
+  uint16_t plane = state->point_planes[face][point];
+  if (plane == SONDE_OUTSIDE) return false;
   sonde_vec3 x = blend(state->probed, v, weight);
-  double depth, area = state->model->face_area_m2[face] / POINTS;
-  if (!sonde_contact_depth(state, x, &depth, &at->slope)) return false;
+  double area = state->model->face_area_m2[face] / SONDE_POINTS;
+  at->slope = plane_slope(state, plane);
   at->stiffness_n_m = state->def.contact_stiffness_n_m3 * area;
   at->damping_n_s_m = state->def.contact_damping_n_s_m3 * area;
   sonde_vec3 carried = v_add(probe->velocity, v_cross(probe->spin, v_sub(x, probe->origin)));
   double rate = v_dot(at->slope, v_sub(blend(state->velocity, v, weight), carried));
-  at->push_n = at->stiffness_n_m * depth + at->damping_n_s_m * rate;
+  at->push_n = at->stiffness_n_m * plane_depth(state, plane, x) + at->damping_n_s_m * rate;
   return at->push_n > 0;
 }
 
-static void press_point(sonde_state *state, uint32_t face, const double *weight,
-                        const sonde_motion *probe, const sonde_contact_scales *scales) {
+static void press_point(sonde_state *state, uint32_t face, int point, const sonde_motion *probe,
+                        const sonde_contact_scales *scales) {
   pressed_point at;
-  if (!pressed_at(state, face, weight, probe, &at)) return;
+  if (!pressed_at(state, face, point, probe, &at)) return;
+  const double *weight = POINT[point];
   spread_push(state, state->model->surface.faces[face], weight, at.slope, at.push_n);
   add_point_terms(state, face, weight, at.slope,
                   scales->stiffness * at.stiffness_n_m + scales->damping * at.damping_n_s_m);
@@ -371,8 +403,8 @@ static void press_point(sonde_state *state, uint32_t face, const double *weight,
 static void apply_foundation(sonde_state *state, const sonde_motion *probe,
                              const sonde_contact_scales *scales) {
   for (uint32_t k = 0; k < state->touched_face_count; ++k)
-    for (int q = 0; q < POINTS; ++q)
-      press_point(state, state->touched_faces[k], POINT[q], probe, scales);
+    for (int q = 0; q < SONDE_POINTS; ++q)
+      press_point(state, state->touched_faces[k], q, probe, scales);
 }
 
 // Packs w_i k of one region behind the ones before.
@@ -425,14 +457,14 @@ void sonde_contact_apply(sonde_state *state, const sonde_motion *probe,
 }
 
 // The same point at the end of the step: the linearised push with the step's own moves.
-static void advance_point(sonde_state *state, uint32_t face, const double *weight,
-                          const sonde_motion *probe, double lambda, double h) {
+static void advance_point(sonde_state *state, uint32_t face, int point, const sonde_motion *probe,
+                          double lambda, double h) {
   const uint32_t *v = state->model->surface.faces[face];
   pressed_point at;
-  if (!pressed_at(state, face, weight, probe, &at)) return;
-  double along = lambda * v_dot(at.slope, blend(state->increment, v, weight));
+  if (!pressed_at(state, face, point, probe, &at)) return;
+  double along = lambda * v_dot(at.slope, blend(state->increment, v, POINT[point]));
   double push = at.push_n + along * (lambda * h * at.stiffness_n_m + at.damping_n_s_m);
-  if (push > 0) spread_push(state, v, weight, at.slope, push);
+  if (push > 0) spread_push(state, v, POINT[point], at.slope, push);
 }
 
 static void advance_foundation(sonde_state *state, const sonde_motion *probe, double lambda,
@@ -440,8 +472,8 @@ static void advance_foundation(sonde_state *state, const sonde_motion *probe, do
   for (uint32_t k = 0; k < state->touched_count; ++k)
     state->contact_force[state->touched[k]] = vec3(0, 0, 0);
   for (uint32_t k = 0; k < state->touched_face_count; ++k)
-    for (int q = 0; q < POINTS; ++q)
-      advance_point(state, state->touched_faces[k], POINT[q], probe, lambda, h);
+    for (int q = 0; q < SONDE_POINTS; ++q)
+      advance_point(state, state->touched_faces[k], q, probe, lambda, h);
 }
 
 // Linear change of the lumped force when its weighted point changes its velocity by lambda dv.
@@ -474,6 +506,38 @@ void sonde_contact_advance(sonde_state *state, const sonde_motion *probe, double
     sonde_nodes_advance(state, probe, lambda, h);
   else
     advance_foundation(state, probe, lambda, h);
+}
+
+// Takes a point's push where the nodes go from right[].
+static void meet_point(sonde_state *state, uint32_t face, int point, const sonde_motion *probe,
+                       double h) {
+  const uint32_t *v = state->model->surface.faces[face];
+  const double *weight = POINT[point];
+  sonde_vec3 dv = blend(state->increment, v, weight);
+  sonde_vec3 x = v_madd(blend(state->probed, v, weight), h, dv);
+  uint16_t plane = nearest_plane(state, x);
+  if (plane == SONDE_OUTSIDE) return;
+  double area = state->model->face_area_m2[face] / SONDE_POINTS;
+  sonde_vec3 slope = plane_slope(state, plane);
+  sonde_vec3 carried = v_add(probe->velocity, v_cross(probe->spin, v_sub(x, probe->origin)));
+  sonde_vec3 speed = v_sub(v_add(blend(state->velocity, v, weight), dv), carried);
+  double push = area * (state->def.contact_stiffness_n_m3 * plane_depth(state, plane, x) +
+                        state->def.contact_damping_n_s_m3 * v_dot(slope, speed));
+  for (int k = 0; k < 3 && push > 0; ++k)
+    state->right[v[k]] = v_madd(state->right[v[k]], push * weight[k], slope);
+}
+
+double sonde_contact_surprise(sonde_state *state, const sonde_motion *probe, double h) {
+  SONDE_ASSERT(state->def.contact_law != SONDE_CONTACT_VOLUME);
+  if (state->def.contact_law == SONDE_CONTACT_NODES) return sonde_nodes_surprise(state, probe, h);
+  double sum = 0;
+  for (uint32_t k = 0; k < state->touched_count; ++k)
+    state->right[state->touched[k]] = state->contact_force[state->touched[k]];
+  for (uint32_t k = 0; k < state->touched_face_count; ++k)
+    for (int q = 0; q < SONDE_POINTS; ++q) meet_point(state, state->touched_faces[k], q, probe, h);
+  for (uint32_t k = 0; k < state->touched_count; ++k)
+    sum += v_norm2(state->right[state->touched[k]]);
+  return sum;
 }
 
 void sonde_contact_wrench(sonde_state *state, sonde_vec3 origin) {

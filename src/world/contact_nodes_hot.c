@@ -52,17 +52,22 @@ typedef struct pressed_node {
   double push_n, stiffness_n_m, damping_n_s_m;
 } pressed_node;
 
-static bool push_at(const sonde_state *state, uint32_t i, const sonde_motion *probe,
-                    pressed_node *at) {
+// The push on node i at x with velocity v.
+static bool push_at(const sonde_state *state, uint32_t i, sonde_vec3 x, sonde_vec3 v,
+                    const sonde_motion *probe, pressed_node *at) {
   double depth, area = state->model->area_m2[i];
-  sonde_vec3 x = state->probed[i];
   if (!sonde_contact_depth(state, x, &depth, &at->slope)) return false;
   at->stiffness_n_m = state->def.contact_stiffness_n_m3 * area;
   at->damping_n_s_m = state->def.contact_damping_n_s_m3 * area;
   sonde_vec3 carried = v_add(probe->velocity, v_cross(probe->spin, v_sub(x, probe->origin)));
-  double rate = v_dot(at->slope, v_sub(state->velocity[i], carried));
+  double rate = v_dot(at->slope, v_sub(v, carried));
   at->push_n = at->stiffness_n_m * depth + at->damping_n_s_m * rate;
   return at->push_n > 0;
+}
+
+static bool push_here(const sonde_state *state, uint32_t i, const sonde_motion *probe,
+                      pressed_node *at) {
+  return push_at(state, i, state->probed[i], state->velocity[i], probe, at);
 }
 
 void sonde_nodes_apply(sonde_state *state, const sonde_motion *probe,
@@ -70,7 +75,7 @@ void sonde_nodes_apply(sonde_state *state, const sonde_motion *probe,
   for (uint32_t k = 0; k < state->touched_count; ++k) {
     uint32_t i = state->touched[k];
     pressed_node at;
-    if (!push_at(state, i, probe, &at)) continue;
+    if (!push_here(state, i, probe, &at)) continue;
     double scale = scales->stiffness * at.stiffness_n_m + scales->damping * at.damping_n_s_m;
     state->contact_force[i] = v_scale(at.slope, -at.push_n);
     state->matrix->diagonal[i] = m_add(state->matrix->diagonal[i], m_rank1(at.slope, scale, 0));
@@ -82,9 +87,22 @@ void sonde_nodes_advance(sonde_state *state, const sonde_motion *probe, double l
     uint32_t i = state->touched[k];
     pressed_node at;
     state->contact_force[i] = vec3(0, 0, 0);
-    if (!push_at(state, i, probe, &at)) continue;
+    if (!push_here(state, i, probe, &at)) continue;
     double along = lambda * v_dot(at.slope, state->increment[i]);
     double push = at.push_n + along * (lambda * h * at.stiffness_n_m + at.damping_n_s_m);
     if (push > 0) state->contact_force[i] = v_scale(at.slope, -push);
   }
+}
+
+double sonde_nodes_surprise(const sonde_state *state, const sonde_motion *probe, double h) {
+  double sum = 0;
+  for (uint32_t k = 0; k < state->touched_count; ++k) {
+    uint32_t i = state->touched[k];
+    pressed_node at;
+    sonde_vec3 dv = state->increment[i], difference = state->contact_force[i];
+    sonde_vec3 x = v_madd(state->probed[i], h, dv), v = v_add(state->velocity[i], dv);
+    if (push_at(state, i, x, v, probe, &at)) difference = v_madd(difference, at.push_n, at.slope);
+    sum += v_norm2(difference);
+  }
+  return sum;
 }

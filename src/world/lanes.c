@@ -101,8 +101,11 @@ static void fill_slice(sonde_lanes *lanes, const sonde_model *model, uint32_t s)
       fixed->high[c] = l == 0 || p > fixed->high[c] ? p : fixed->high[c];
     }
     const sonde_topology *t = &model->topology;
-    for (uint32_t k = t->start[i]; k < t->start[i + 1]; ++k)
-      fixed->reach = fmaxf(fixed->reach, (float)model->edge_rest_m[t->neighbour_edge[k]]);
+    for (uint32_t k = t->start[i]; k < t->start[i + 1]; ++k) {
+      float rest = (float)model->edge_rest_m[t->neighbour_edge[k]];
+      fixed->reach = fmaxf(fixed->reach, rest);
+      fixed->bend = fmaxf(fixed->bend, 1 / rest);
+    }
     fixed->used = l + 1;
   }
 }

@@ -40,6 +40,7 @@ typedef struct sonde_slice_model {
   uint32_t used;                   // rows that are nodes, from the front
   float low[3], high[3];           // box at rest
   float reach;                     // longest edge at a node, at rest
+  float bend;                      // 1 over the shortest
 } sonde_slice_model;
 
 typedef struct sonde_slice {
@@ -86,6 +87,7 @@ typedef struct sonde_lane_kernels {
   // p = z + beta p, q = w + beta q, x += alpha p, r -= alpha q, z = D^-1 r; r.z, r.r. The first
   // time p = z and x = alpha p.
   void (*advance)(sonde_lanes *lanes, bool first, float alpha, float beta, double sums[2]);
+  double (*bend)(sonde_lanes *lanes);   // square of what x leaves unbalanced, see lanes_kernel.c
   void (*accept)(sonde_lanes *lanes);   // ve += x, records
   double (*update)(sonde_lanes *lanes); // u, v at the end with ve + x, ve and records for the next
                                         // step; not finite: NaN

@@ -4,6 +4,7 @@
 // linearise: springs to the neighbours, normal and tangential springs, contact, matrix, residual.
 // multiply, advance: parts of the conjugate gradients of Chronopoulos and Gear (1989), which
 //            read and write every slice twice in an iteration.
+// bend:      what a solution leaves unbalanced.
 // accept, update: the solution's way into the motion, and the records that neighbours read.
 // near:      slices in the probe's box.
 #include "world/lanes_vector.h"
@@ -312,6 +313,26 @@ static void advance(sonde_lanes *lanes, bool first, float alpha, float beta, dou
   sums[1] = total(rr);
 }
 
+// What the linear system does not see of the move d = h x: an edge of length L that is left
+// sideways by d pulls by k d^2/2L, and the normal springs' slope changes. As squares of impulses,
+// like the residual's.
+static double bend(sonde_lanes *lanes) {
+  const sonde_lane_law *law = &lanes->law;
+  float h = law->dt;
+  lane_double sum = {0};
+  for (uint32_t a = 0; a < lanes->awake_count; ++a) {
+    const sonde_slice_model *fixed = &lanes->model[lanes->awake[a]];
+    const sonde_slice *at = &lanes->slice[lanes->awake[a]];
+    sonde_lane way2 = h * h * dot(at->x, at->x);
+    sonde_lane gap = 1 + dot(fixed->normal, at->u) / fixed->xm;
+    gap = larger(gap, all(0.05f));
+    sonde_lane slope = fixed->k0 * fixed->area / (fixed->xm * gap * gap * gap);
+    sonde_lane left = h * way2 * (law->edge_stiffness * fixed->bend + slope);
+    sum += widen(left * left);
+  }
+  return total(sum);
+}
+
 static void accept(sonde_lanes *lanes) {
   for (uint32_t a = 0; a < lanes->awake_count; ++a) {
     sonde_slice *at = &lanes->slice[lanes->awake[a]];
@@ -392,6 +413,7 @@ const sonde_lane_kernels SONDE_KERNELS = {.name = SONDE_KERNELS_NAME,
                                           .linearise = linearise,
                                           .multiply = multiply,
                                           .advance = advance,
+                                          .bend = bend,
                                           .accept = accept,
                                           .update = update,
                                           .near = near};

@@ -89,7 +89,7 @@ static size_t carve(sonde_state *s, char *base) {
   CARVE(edges, edges), CARVE(pairs, edges), CARVE(faces, faces), CARVE(rim, n), CARVE(in_rim, n);
   CARVE(face_order, faces), CARVE(boxes, s->block_count);
   CARVE(touched, n), CARVE(parent, n), CARVE(share_m3, n), CARVE(gradient, n);
-  CARVE(touched_faces, faces);
+  CARVE(touched_faces, faces), CARVE(point_planes, faces);
   CARVE(contact_force, n), CARVE(lumped, n), CARVE(lumped_rows, n);
   CARVE(bond_m, n), CARVE(grip_n, n), CARVE(grip_tick, n);
   CARVE(plane_weight, SONDE_MAX_PROBE_PLANES);

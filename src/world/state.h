@@ -11,6 +11,10 @@ typedef struct sonde_box {
   sonde_vec3 low, high;
 } sonde_box;
 
+// The four integration points of a face; SONDE_OUTSIDE: not inside the probe.
+enum { SONDE_POINTS = 4, SONDE_OUTSIDE = 0xffff };
+typedef uint16_t sonde_point_planes[SONDE_POINTS];
+
 struct sonde_state {
   const sonde_model *model;
   sonde_world_def def;
@@ -48,11 +52,12 @@ struct sonde_state {
   double *share_m3;        // [nodes] V_i
   uint32_t *touched_faces; // [faces] faces inside the probe, in the order they were found
   uint32_t touched_face_count;
-  sonde_vec3 inward;         // direction of the columns: the beam axis of the probe
-  sonde_vec3 *gradient;      // [nodes] g_i = dV/dx_i
-  sonde_vec3 *contact_force; // [nodes] of the probe on the node
-  sonde_vec3 *lumped;        // [nodes] w_i k of lumped regions, packed per region
-  uint32_t *lumped_rows;     // [nodes]
+  sonde_point_planes *point_planes; // [faces] of touched faces: the plane nearest to each point
+  sonde_vec3 inward;                // direction of the columns: the beam axis of the probe
+  sonde_vec3 *gradient;             // [nodes] g_i = dV/dx_i
+  sonde_vec3 *contact_force;        // [nodes] of the probe on the node
+  sonde_vec3 *lumped;               // [nodes] w_i k of lumped regions, packed per region
+  uint32_t *lumped_rows;            // [nodes]
   sonde_rank_one term[SONDE_MAX_REGIONS];
   uint32_t term_count;
   sonde_vec3 *plane_normal; // [max planes] of the probe in the world frame
@@ -121,6 +126,10 @@ void sonde_contact_apply(sonde_state *state, const sonde_motion *probe,
 // Pushes at the end of the step by the same linearisation: from probed[] the nodes go on by
 // lambda^2 h dv at velocities changed by lambda dv. @thread tick
 void sonde_contact_advance(sonde_state *state, const sonde_motion *probe, double lambda, double h);
+// Square of the difference between the pushes that sonde_contact_advance() foresaw for nodes that
+// go on by h dv and those that they meet there. FOUNDATION and NODES. Uses right[]. @thread tick
+double sonde_contact_surprise(sonde_state *state, const sonde_motion *probe, double h);
+double sonde_nodes_surprise(const sonde_state *state, const sonde_motion *probe, double h);
 // Box of the probe in the world. @thread tick
 sonde_box sonde_contact_box(const sonde_probe *probe, sonde_pose pose);
 // Depth of a point inside the probe and its gradient; false outside. @thread tick
