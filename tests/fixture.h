@@ -98,6 +98,14 @@ static inline sonde_model *fixture_model(int levels, const sonde_surface_law *la
   return model;
 }
 
+// Lets the shear layer differ from node to node.
+static inline void fixture_vary_shear(sonde_model *model) {
+  for (uint32_t i = 0; i < model->surface.vertex_count; ++i) {
+    model->shear_share[i] = 1 + 0.25 * ((int)(i % 5) - 2) / 2.0;
+    model->limit_share[i] = 1 + 0.1 * (int)(i % 3) / 2.0;
+  }
+}
+
 // A probe that looks along -x at the site, its face `depth_m` below the skin.
 static inline sonde_pose fixture_pose(double depth_m) {
   sonde_mat3 r = m_columns(vec3(0, 1, 0), vec3(0, 0, -1), vec3(-1, 0, 0));

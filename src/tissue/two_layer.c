@@ -2,7 +2,7 @@
 // begin_node: clears a node's sums, its indentation and rate.
 // add_edge:   surface spring-damper: force, projected stiffness, damping block.
 // face_slope: gradient of the indentation over a face.
-// law_of_face: stiffness of the shear layer there. add_shear: the layer of one face.
+// sonde_tissue_face_law: G and gm of a face. add_shear: the layer of one face.
 // add_anchor: normal spring of eq. (1), tangential spring and their dampers at one node.
 // linearise:  assembles force, K v and the matrix of the implicit step.
 #include "tissue/two_layer.h"
@@ -93,15 +93,11 @@ static inline double face_slope(const double half_cotangent[3], double area_m2, 
   return sqrt(sum > 0 ? sum / area_m2 : 0);
 }
 
-typedef struct face_law {
-  double shear_n_m, limit;
-} face_law;
-
-// G and gm of a face: the law's, times the mean share of its corners.
-static inline face_law law_of_face(const sonde_model *model, const uint32_t v[3]) {
-  const double *shear = model->shear_share, *limit = model->limit_share;
-  return (face_law){model->law.shear_stiffness_n_m * (shear[v[0]] + shear[v[1]] + shear[v[2]]) / 3,
-                    model->law.shear_limit * (limit[v[0]] + limit[v[1]] + limit[v[2]]) / 3};
+void sonde_tissue_face_law(const sonde_model *model, uint32_t f, double *shear_n_m, double *limit) {
+  const uint32_t *v = model->surface.faces[f];
+  const double *shear = model->shear_share, *steep = model->limit_share;
+  *shear_n_m = model->law.shear_stiffness_n_m * (shear[v[0]] + shear[v[1]] + shear[v[2]]) / 3;
+  *limit = model->law.shear_limit * (steep[v[0]] + steep[v[1]] + steep[v[2]]) / 3;
 }
 
 // Energy A W(|grad s|): forces m flux_k along N_k with the secant modulus m = q/g, and the
@@ -115,8 +111,9 @@ static void add_shear(const evaluation *at, uint32_t f) {
   for (int k = 0; k < 3; ++k)
     s[k] = at->node[v[k]].indentation_m, rate[k] = at->node[v[k]].rate_m_s;
   double g = face_slope(half, area, s, flux);
-  face_law law = law_of_face(model, v);
-  double q = sonde_shear_force(law.shear_n_m, law.limit, g, &slope);
+  double shear_n_m, limit;
+  sonde_tissue_face_law(model, f, &shear_n_m, &limit);
+  double q = sonde_shear_force(shear_n_m, limit, g, &slope);
   double modulus = g > 1e-9 ? q / g : slope;
   double beyond = g > 1e-9 ? (slope - modulus) / (g * g * area) : 0;
   for (int k = 0; k < 3; ++k) along += flux[k] * rate[k];
@@ -207,8 +204,9 @@ static double shear_energy(const sonde_model *model, const sonde_vec3 *position,
   }
   double area = model->face_area_m2[f];
   double g = face_slope(model->face_half_cotangent[f], area, s, flux);
-  face_law law = law_of_face(model, model->surface.faces[f]);
-  return area * sonde_shear_energy(law.shear_n_m, law.limit, g);
+  double shear_n_m, limit;
+  sonde_tissue_face_law(model, f, &shear_n_m, &limit);
+  return area * sonde_shear_energy(shear_n_m, limit, g);
 }
 
 double sonde_tissue_energy(const sonde_model *model, const sonde_vec3 *position) {

@@ -41,6 +41,9 @@ void sonde_tissue_linearise(const sonde_model *model, const sonde_tissue_part *p
                             sonde_vec3 *stiffness_velocity, sonde_block_matrix *matrix,
                             sonde_tissue_node *scratch);
 
+// G (N/m) and gm of a face: the law's times the mean share of its corners. @thread tick
+void sonde_tissue_face_law(const sonde_model *model, uint32_t f, double *shear_n_m, double *limit);
+
 // Total elastic energy of all springs (J); tests and line searches.
 double sonde_tissue_energy(const sonde_model *model, const sonde_vec3 *position);
 

@@ -3,6 +3,7 @@
 // fill_slots:  neighbours of every row, padded to the slice's largest number.
 // fill_faces:  faces in slices of 16, and which corner each slot reads.
 // list_near:   slices that share an edge, and slices of faces that touch a slice.
+#include "tissue/two_layer.h"
 #include "world/lanes.h"
 
 #include "base/base.h"
@@ -124,6 +125,10 @@ static void fill_face(sonde_lanes *lanes, const sonde_model *model, uint32_t at)
   SONDE_ASSERT(at / SONDE_LANES < lanes->face_slice_count);
   sonde_face_slice *face = &lanes->face[at / SONDE_LANES];
   face->area[lane] = (float)model->face_area_m2[f];
+  double shear, limit;
+  sonde_tissue_face_law(model, f, &shear, &limit);
+  face->shear[lane] = (float)shear;
+  face->limit[lane] = (float)limit;
   for (uint32_t k = 0; k < 3; ++k) {
     uint32_t i = v[k], j = v[(k + 1) % 3], opposite = (k + 2) % 3;
     int32_t first = (int32_t)(at / SONDE_LANES * SONDE_FACE_STRIDE + lane);
@@ -139,7 +144,7 @@ static void fill_face(sonde_lanes *lanes, const sonde_model *model, uint32_t at)
 
 static void fill_faces(sonde_lanes *lanes, const sonde_model *model) {
   for (uint32_t s = 0; s < lanes->face_slice_count; ++s)
-    for (int l = 0; l < SONDE_LANES; ++l) lanes->face[s].area[l] = 1;
+    for (int l = 0; l < SONDE_LANES; ++l) lanes->face[s].area[l] = lanes->face[s].limit[l] = 1;
   for (uint32_t k = 0; lanes->law.shear > 0 && k < model->surface.face_count; ++k)
     fill_face(lanes, model, k);
 }
@@ -177,7 +182,6 @@ static sonde_lane_law law_of(const sonde_surface_law *law, const sonde_world_def
                           .tangential = (float)law->tangential_stiffness_n_m3,
                           .normal_damping_s = (float)law->normal_damping_s,
                           .shear = (float)law->shear_stiffness_n_m,
-                          .shear_limit = (float)law->shear_limit,
                           .exponent = (int)law->normal_exponent,
                           .dt = (float)h,
                           .stiffness_scale = (float)(h * h),

@@ -58,6 +58,7 @@ typedef struct sonde_slice_press {
 typedef struct sonde_face_slice {
   sonde_lane_index node[3];
   sonde_lane half_cotangent[3], area; // unused lanes have area 1 and cotangents 0
+  sonde_lane shear, limit;            // of the shear layer
 } sonde_face_slice;
 
 // Per corner of 16 faces: force along N, share of the diagonal, coupling of the edge opposite.
@@ -70,7 +71,7 @@ enum { SONDE_FACE_STRIDE = 9 * SONDE_LANES };
 typedef struct sonde_lane_law {
   float edge_stiffness, edge_damper, edge_compression, edge_pretension;
   float tangential, normal_damping_s;
-  float shear, shear_limit;
+  float shear; // 0: no layer
   int exponent;
   float dt, stiffness_scale, damping_scale;
 } sonde_lane_law;

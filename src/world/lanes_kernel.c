@@ -25,15 +25,15 @@ INLINE void publish_record(sonde_lanes *lanes, uint32_t s) {
 }
 
 // Secant modulus m = q/g of the shear layer and (q' - m)/g^2, without the cancellation of q' - m.
-INLINE void shear_law(const sonde_lane_law *law, sonde_lane g, sonde_lane *modulus,
+INLINE void shear_law(const sonde_face_slice *face, sonde_lane g, sonde_lane *modulus,
                       sonde_lane *beyond) {
-  float limit = 0.95f * law->shear_limit, rate = 1 / law->shear_limit;
-  sonde_lane x = smaller(g, all(limit)) * rate;
-  sonde_lane inverse = 1 / (1 - x * x), secant = law->shear * inverse;
-  sonde_lane curve = 2 * law->shear * rate * rate * inverse * inverse;
+  sonde_lane limit = 0.95f * face->limit, rate = 1 / face->limit;
+  sonde_lane x = smaller(g, limit) * rate;
+  sonde_lane inverse = 1 / (1 - x * x), secant = face->shear * inverse;
+  sonde_lane curve = 2 * face->shear * rate * rate * inverse * inverse;
   sonde_lane slope = secant + curve * x * x / (rate * rate);
   sonde_lane_index past = g > limit;
-  sonde_lane safe = larger(g, all(limit));
+  sonde_lane safe = larger(g, limit);
   sonde_lane force = secant * limit + slope * (safe - limit);
   *modulus = pick(past, force / safe, secant);
   *beyond = pick(past, (slope - force / safe) / (safe * safe), curve);
@@ -55,7 +55,7 @@ static void shear(sonde_lanes *lanes) {
     for (int k = 0; k < 3; ++k) flux[k] = across[(k + 2) % 3] - across[(k + 1) % 3];
     sonde_lane inverse = 1 / face->area;
     sonde_lane slope2 = larger(sum * inverse, all(1e-30f));
-    shear_law(&lanes->law, slope2 * inverse_root(slope2), &modulus, &beyond);
+    shear_law(face, slope2 * inverse_root(slope2), &modulus, &beyond);
     beyond = beyond * inverse;
     for (int k = 0; k < 3; ++k) {
       int i = (k + 1) % 3, j = (k + 2) % 3;

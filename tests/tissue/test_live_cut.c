@@ -14,6 +14,7 @@ static sonde_model *make_model(const sonde_surface_law *law) {
     model->k0_n_m3[i] *= 1 + 0.5 * fixture_random(&seed);
     model->xm_m[i] *= 1 + 0.5 * fixture_random(&seed);
   }
+  fixture_vary_shear(model);
   return model;
 }
 

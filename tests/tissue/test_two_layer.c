@@ -21,6 +21,7 @@ static sonde_surface_law full_law(void) {
 static bench make(double stretch, double noise_m, sonde_surface_law law) {
   bench b = {.model = fixture_model(2, &law)};
   b.n = b.model->surface.vertex_count;
+  fixture_vary_shear(b.model);
   sonde_vec3 **array[] = {&b.x, &b.v, &b.force, &b.product, &b.probe};
   for (int k = 0; k < 5; ++k) assert_non_null(*array[k] = SONDE_NEW(sonde_vec3, b.n));
   uint64_t seed = 5;

@@ -23,6 +23,7 @@ static scene make(int levels, const char *probe, const sonde_world_def *def) {
   law.normal_exponent = 2;
   scene s = {.model = fixture_model(levels, &law)};
   s.n = s.model->surface.vertex_count;
+  fixture_vary_shear(s.model);
   assert_int_equal(sonde_state_create(s.model, def, &s.state, NULL), SONDE_OK);
   assert_int_equal(sonde_probe_create(probe, &s.probe, NULL), SONDE_OK);
   return s;
