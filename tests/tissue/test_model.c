@@ -2,6 +2,7 @@
 #include "../fixture.h"
 
 #include <unistd.h>
+#include <zlib.h>
 
 static const char *const FILE_NAME = "test_model.sonde";
 
@@ -64,11 +65,14 @@ static void parameters_pass_through_the_sites(void **state) {
   sonde_site sites[3] = {fixture_site(), fixture_site(), fixture_site()};
   const uint32_t node[3] = {0, 1, 2};
   const double k0[3] = {1e5, 2e5, 4e5}, xm[3] = {0.03, 0.05, 0.04};
+  const double shear[3] = {0.8, 1.3, 0}, limit[3] = {1, 0, 0.9}; // 0: the law's
   for (uint32_t k = 0; k < 3; ++k) {
     sites[k].id = k;
     sites[k].position_m = skin.vertices[node[k]];
     sites[k].k0_n_m3 = k0[k];
     sites[k].xm_m = xm[k];
+    sites[k].shear_share = shear[k];
+    sites[k].limit_share = limit[k];
   }
   sonde_model_def def = sonde_model_def_default();
   def.skin = &skin;
@@ -82,6 +86,8 @@ static void parameters_pass_through_the_sites(void **state) {
     while (v_distance(model->surface.vertices[at], sites[k].position_m) > 1e-9) at++;
     assert_near(model->k0_n_m3[at], k0[k], 1e-4 * k0[k]);
     assert_near(model->xm_m[at], xm[k], 1e-4 * xm[k]);
+    assert_near(model->shear_share[at], shear[k] > 0 ? shear[k] : 1, 1e-4);
+    assert_near(model->limit_share[at], limit[k] > 0 ? limit[k] : 1, 1e-4);
   }
   for (uint32_t i = 0; i < model->surface.vertex_count; ++i)
     assert_true(model->k0_n_m3[i] > 0.5e5 && model->k0_n_m3[i] < 8e5);
@@ -97,6 +103,9 @@ static void file_returns_the_same_model(void **state) {
   a->data = SONDE_NEW(sonde_datum, 2);
   memcpy(a->data, data, sizeof data);
   a->datum_count = 2;
+  fixture_vary_shear(a);
+  a->sites[0].shear_share = 1.25;
+  a->sites[0].limit_share = 0.75;
   assert_int_equal(sonde_model_save(a, FILE_NAME, NULL), SONDE_OK);
   assert_int_equal(sonde_model_load(FILE_NAME, &b, NULL), SONDE_OK);
   size_t n = a->surface.vertex_count;
@@ -104,6 +113,9 @@ static void file_returns_the_same_model(void **state) {
   assert_memory_equal(a->normal, b->normal, n * sizeof(sonde_vec3));
   assert_memory_equal(a->k0_n_m3, b->k0_n_m3, n * sizeof(double));
   assert_memory_equal(a->bone_depth_m, b->bone_depth_m, n * sizeof(double));
+  assert_memory_equal(a->shear_share, b->shear_share, n * sizeof(double));
+  assert_memory_equal(a->limit_share, b->limit_share, n * sizeof(double));
+  assert_memory_equal(a->sites, b->sites, a->site_count * sizeof *a->sites);
   assert_memory_equal(a->face_half_cotangent, b->face_half_cotangent,
                       a->surface.face_count * sizeof *a->face_half_cotangent);
   assert_memory_equal(&a->law, &b->law, sizeof a->law);
@@ -122,6 +134,39 @@ static void write_bytes(const char *bytes, size_t count) {
   assert_non_null(file);
   assert_int_equal(fwrite(bytes, 1, count, file), count);
   fclose(file);
+}
+
+// Renames all arrays called `from` in the header.
+static void rename_arrays(char *bytes, size_t count, const char *from, const char *to) {
+  assert_int_equal(strlen(from), strlen(to));
+  for (size_t k = 0; k + strlen(from) < count; ++k)
+    if (memcmp(bytes + k, from, strlen(from)) == 0) memcpy(bytes + k, to, strlen(to));
+}
+
+// A file from before the shear layer's fields is one without their arrays: the shares are one.
+static void older_files_have_a_uniform_layer(void **state) {
+  (void)state;
+  sonde_model *model = fixture_model(1, NULL), *loaded;
+  fixture_vary_shear(model);
+  assert_int_equal(sonde_model_save(model, FILE_NAME, NULL), SONDE_OK);
+  char *bytes;
+  size_t count;
+  assert_int_equal(sonde_file_load(FILE_NAME, &bytes, &count, NULL), SONDE_OK);
+  assert_memory_equal(bytes, "SONDE-MODEL 3", 13);
+  bytes[12] = '2';
+  rename_arrays(bytes, count, "node_shear_share", "node_other_thing");
+  uint32_t crc = (uint32_t)crc32_z(0, (const Bytef *)bytes, count - 4);
+  memcpy(bytes + count - 4, &crc, 4);
+  write_bytes(bytes, count);
+  assert_int_equal(sonde_model_load(FILE_NAME, &loaded, NULL), SONDE_OK);
+  for (uint32_t i = 0; i < loaded->surface.vertex_count; ++i)
+    assert_true(loaded->shear_share[i] == 1 && loaded->limit_share[i] == 1);
+  assert_memory_equal(model->k0_n_m3, loaded->k0_n_m3,
+                      model->surface.vertex_count * sizeof(double));
+  sonde_free(bytes);
+  unlink(FILE_NAME);
+  sonde_model_destroy(model);
+  sonde_model_destroy(loaded);
 }
 
 // Any flipped byte and any cut is refused with a sentence that names the file.
@@ -185,6 +230,7 @@ int main(void) {
                                      cmocka_unit_test(vein_passes_below_the_site),
                                      cmocka_unit_test(parameters_pass_through_the_sites),
                                      cmocka_unit_test(file_returns_the_same_model),
+                                     cmocka_unit_test(older_files_have_a_uniform_layer),
                                      cmocka_unit_test(damage_is_refused),
                                      cmocka_unit_test(open_skin_is_refused),
                                      cmocka_unit_test(bad_law_is_refused)};
