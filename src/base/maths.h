@@ -22,6 +22,9 @@ static inline sonde_vec3 v_neg(sonde_vec3 a) { return vec3(-a.x, -a.y, -a.z); }
 static inline sonde_vec3 v_madd(sonde_vec3 a, double s, sonde_vec3 b) {
   return vec3(a.x + s * b.x, a.y + s * b.y, a.z + s * b.z);
 }
+static inline double v_coordinate(sonde_vec3 p, int axis) {
+  return axis == 0 ? p.x : axis == 1 ? p.y : p.z;
+}
 static inline double v_dot(sonde_vec3 a, sonde_vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 static inline sonde_vec3 v_cross(sonde_vec3 a, sonde_vec3 b) {
   return vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);

@@ -1,13 +1,37 @@
-// Order statistics of reals.
+// Orders and order statistics.
 #ifndef SONDE_SRC_ORDER_H
 #define SONDE_SRC_ORDER_H
 
 #include "base/base.h"
+#include "base/maths.h"
+
+#include <stdlib.h>
 
 // Ascending order for qsort.
 static inline int sonde_compare_reals(const void *a, const void *b) {
   double x = *(const double *)a, y = *(const double *)b;
   return (x > y) - (x < y);
+}
+
+typedef struct sonde_ranked {
+  double value;
+  uint32_t index;
+} sonde_ranked;
+
+// Ascending by value, equal ones by index.
+static inline int sonde_compare_ranked(const void *a, const void *b) {
+  const sonde_ranked *x = a, *y = b;
+  if (x->value != y->value) return x->value < y->value ? -1 : 1;
+  return (x->index > y->index) - (x->index < y->index);
+}
+
+// Sorts list[count] of places in points[] along an axis; scratch [count].
+static inline void sonde_sort_along(const sonde_vec3 *points, int axis, uint32_t *list,
+                                    uint32_t count, sonde_ranked *scratch) {
+  for (uint32_t i = 0; i < count; ++i)
+    scratch[i] = (sonde_ranked){v_coordinate(points[list[i]], axis), list[i]};
+  qsort(scratch, count, sizeof *scratch, sonde_compare_ranked);
+  for (uint32_t i = 0; i < count; ++i) list[i] = scratch[i].index;
 }
 
 // Value at a fraction of the way through ascending reals, linear between ranks.

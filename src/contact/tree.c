@@ -3,27 +3,14 @@
 //   split     one node, then its two halves
 #include "contact/tree.h"
 
-#include <stdlib.h>
-
-typedef struct keyed_face {
-  double key;
-  uint32_t face;
-} keyed_face;
+#include "base/order.h"
 
 typedef struct builder {
   const sonde_mesh *mesh;
   sonde_face_tree *tree;
   sonde_vec3 *centroids;
-  keyed_face *keys;
+  sonde_ranked *keys;
 } builder;
-
-static int compare_keys(const void *a, const void *b) {
-  const keyed_face *x = a, *y = b;
-  if (x->key != y->key) return x->key < y->key ? -1 : 1;
-  return x->face < y->face ? -1 : x->face > y->face;
-}
-
-static double coordinate(sonde_vec3 p, int axis) { return axis == 0 ? p.x : axis == 1 ? p.y : p.z; }
 
 // The axis along which the centroids of face[from, to) spread most.
 static int longest_axis(const builder *b, uint32_t from, uint32_t to) {
@@ -31,7 +18,7 @@ static int longest_axis(const builder *b, uint32_t from, uint32_t to) {
   for (uint32_t i = from; i < to; ++i) spread = bounds_add(spread, b->centroids[b->tree->face[i]]);
   sonde_vec3 d = v_sub(spread.high, spread.low);
   int axis = d.y > d.x ? 1 : 0;
-  return d.z > coordinate(d, axis) ? 2 : axis;
+  return d.z > v_coordinate(d, axis) ? 2 : axis;
 }
 
 static void split(builder *b, uint32_t from, uint32_t to, int depth) {
@@ -44,10 +31,7 @@ static void split(builder *b, uint32_t from, uint32_t to, int depth) {
     return;
   }
   int axis = longest_axis(b, from, to);
-  for (uint32_t i = from; i < to; ++i)
-    b->keys[i] = (keyed_face){coordinate(b->centroids[face[i]], axis), face[i]};
-  qsort(b->keys + from, to - from, sizeof *b->keys, compare_keys);
-  for (uint32_t i = from; i < to; ++i) face[i] = b->keys[i].face;
+  sonde_sort_along(b->centroids, axis, face + from, to - from, b->keys);
   uint32_t middle = from + (to - from) / 2;
   split(b, from, middle, depth + 1);
   node->first = b->tree->node_count;
@@ -92,7 +76,7 @@ sonde_status sonde_face_tree_create(const sonde_mesh *mesh, sonde_face_tree **ou
   tree->face = SONDE_NEW(uint32_t, mesh->face_count);
   tree->nodes = SONDE_NEW(tree_node, 2 * (size_t)mesh->face_count);
   builder b = {mesh, tree, SONDE_NEW(sonde_vec3, mesh->face_count),
-               SONDE_NEW(keyed_face, mesh->face_count)};
+               SONDE_NEW(sonde_ranked, mesh->face_count)};
   bool room = tree->corners && tree->face && tree->nodes && b.centroids && b.keys;
   if (room) build(&b);
   sonde_free(b.centroids);

@@ -3,33 +3,21 @@
 //
 //   split            one node of the tree, then its two halves
 //   fill_normals     face, side and angle-weighted vertex normals
+#include "base/order.h"
 #include "geometry/surface.h"
 
 #include <string.h>
 
-typedef struct keyed_face {
-  double key;
-  uint32_t face;
-} keyed_face;
-
 typedef struct builder {
   sonde_surface_index *index;
   sonde_vec3 *centroids;
-  keyed_face *keys;
+  sonde_ranked *keys;
 } builder;
-
-static int compare_keys(const void *a, const void *b) {
-  const keyed_face *x = a, *y = b;
-  if (x->key != y->key) return x->key < y->key ? -1 : 1;
-  return x->face < y->face ? -1 : x->face > y->face;
-}
 
 static void grow_box(sonde_vec3 *low, sonde_vec3 *high, sonde_vec3 p) {
   *low = vec3(fmin(low->x, p.x), fmin(low->y, p.y), fmin(low->z, p.z));
   *high = vec3(fmax(high->x, p.x), fmax(high->y, p.y), fmax(high->z, p.z));
 }
-
-static double coordinate(sonde_vec3 p, int axis) { return axis == 0 ? p.x : axis == 1 ? p.y : p.z; }
 
 static void measure(const builder *b, uint32_t from, uint32_t to, surface_node *node,
                     sonde_vec3 *spread) {
@@ -58,11 +46,8 @@ static void split(builder *b, uint32_t from, uint32_t to, int depth) {
     return;
   }
   int axis = spread.y > spread.x ? 1 : 0;
-  if (spread.z > coordinate(spread, axis)) axis = 2;
-  for (uint32_t i = from; i < to; ++i)
-    b->keys[i] = (keyed_face){coordinate(b->centroids[order[i]], axis), order[i]};
-  qsort(b->keys + from, to - from, sizeof *b->keys, compare_keys);
-  for (uint32_t i = from; i < to; ++i) order[i] = b->keys[i].face;
+  if (spread.z > v_coordinate(spread, axis)) axis = 2;
+  sonde_sort_along(b->centroids, axis, order + from, to - from, b->keys);
   uint32_t middle = from + (to - from) / 2;
   split(b, from, middle, depth + 1);
   node->first = b->index->node_count;
@@ -72,7 +57,7 @@ static void split(builder *b, uint32_t from, uint32_t to, int depth) {
 static sonde_status build_tree(sonde_surface_index *index, sonde_error *error) {
   const sonde_mesh *mesh = &index->mesh;
   builder b = {index, SONDE_NEW(sonde_vec3, mesh->face_count),
-               SONDE_NEW(keyed_face, mesh->face_count)};
+               SONDE_NEW(sonde_ranked, mesh->face_count)};
   sonde_status status = SONDE_OK;
   if (b.centroids && b.keys) {
     for (uint32_t f = 0; f < mesh->face_count; ++f) {

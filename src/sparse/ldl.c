@@ -12,8 +12,8 @@
 
 #include "base/base.h"
 #include "base/maths.h"
+#include "base/order.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 enum { LEAF = 24 }; // pieces this small are not split further
@@ -24,35 +24,19 @@ typedef struct pattern {
   const sonde_vec3 *points;
 } pattern;
 
-typedef struct keyed {
-  double key;
-  uint32_t row;
-} keyed;
-
-static int compare_keyed(const void *a, const void *b) {
-  const keyed *x = a, *y = b;
-  if (x->key != y->key) return x->key < y->key ? -1 : 1;
-  return x->row < y->row ? -1 : (x->row > y->row);
-}
-
-static double coordinate(sonde_vec3 p, int axis) { return axis == 0 ? p.x : axis == 1 ? p.y : p.z; }
-
 // Sorts the piece along its widest side.
-static void sort_piece(const pattern *a, uint32_t *piece, uint32_t count, keyed *keys) {
+static void sort_piece(const pattern *a, uint32_t *piece, uint32_t count, sonde_ranked *keys) {
   double spread = -1;
   int widest = 0;
   for (int axis = 0; axis < 3; ++axis) {
     double low = INFINITY, high = -INFINITY;
     for (uint32_t i = 0; i < count; ++i) {
-      double c = coordinate(a->points[piece[i]], axis);
+      double c = v_coordinate(a->points[piece[i]], axis);
       low = fmin(low, c), high = fmax(high, c);
     }
     if (high - low > spread) spread = high - low, widest = axis;
   }
-  for (uint32_t i = 0; i < count; ++i)
-    keys[i] = (keyed){coordinate(a->points[piece[i]], widest), piece[i]};
-  qsort(keys, count, sizeof *keys, compare_keyed);
-  for (uint32_t i = 0; i < count; ++i) piece[i] = keys[i].row;
+  sonde_sort_along(a->points, widest, piece, count, keys);
 }
 
 // side[row] is 1 for the upper half of the current piece; moves its rows that touch the lower half
@@ -75,7 +59,7 @@ static uint32_t split_separator(const pattern *a, uint32_t *upper, uint32_t coun
 }
 
 // Nested dissection with an explicit stack: a piece becomes lower half, upper half, separator.
-static void order_by_points(const pattern *a, uint32_t *order, keyed *keys, uint32_t *side,
+static void order_by_points(const pattern *a, uint32_t *order, sonde_ranked *keys, uint32_t *side,
                             uint32_t *scratch) {
   struct {
     uint32_t first, count;
@@ -136,7 +120,7 @@ static void order_by_degree(const pattern *a, uint32_t *order, uint32_t *seen) {
 
 static sonde_status find_order(const pattern *a, sonde_ldl *ldl, sonde_error *error) {
   sonde_status status = SONDE_OK;
-  keyed *keys = SONDE_NEW(keyed, a->n);
+  sonde_ranked *keys = SONDE_NEW(sonde_ranked, a->n);
   uint32_t *side = SONDE_NEW(uint32_t, a->n), *scratch = SONDE_NEW(uint32_t, a->n);
   if (!keys || !side || !scratch) {
     status = sonde_fail_memory(error);

@@ -139,17 +139,4 @@ static inline double body_counted(const sonde_mesh *a, const sonde_mesh *b, uint
   return (double)inside * step.x * step.y * step.z;
 }
 
-// Least squares slope of log(y) over log(x).
-static inline double body_slope(const double *x, const double *y, int count) {
-  double sx = 0, sy = 0, sxx = 0, sxy = 0;
-  for (int k = 0; k < count; ++k) {
-    double a = log(x[k]), b = log(y[k]);
-    sx += a;
-    sy += b;
-    sxx += a * a;
-    sxy += a * b;
-  }
-  return (count * sxy - sx * sy) / (count * sxx - sx * sx);
-}
-
 #endif

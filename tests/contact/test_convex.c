@@ -262,10 +262,10 @@ static void test_depth_cost(void **state) {
     sonde_convex_clear(&body);
     sonde_mesh_clear(&ball);
   }
-  print_message("slopes %.3f, %.3f, %.3f\n", body_slope(vertices, cold, SIZES),
-                body_slope(vertices, warm, SIZES), body_slope(vertices, expand, SIZES));
-  assert_true(body_slope(vertices, cold, SIZES) < 1.1);
-  assert_true(body_slope(vertices, expand, SIZES) < 1.1);
+  print_message("slopes %.3f, %.3f, %.3f\n", shape_slope(vertices, cold, SIZES),
+                shape_slope(vertices, warm, SIZES), shape_slope(vertices, expand, SIZES));
+  assert_true(shape_slope(vertices, cold, SIZES) < 1.1);
+  assert_true(shape_slope(vertices, expand, SIZES) < 1.1);
 }
 
 // ---- casts --------------------------------------------------------------------------------

@@ -441,8 +441,8 @@ static void test_cost(void **state) {
     sonde_mesh_clear(&a);
     sonde_mesh_clear(&b);
   }
-  double slope_pairs = body_slope(faces, pairs, SIZES),
-         slope_boxes = body_slope(faces, boxes, SIZES);
+  double slope_pairs = shape_slope(faces, pairs, SIZES),
+         slope_boxes = shape_slope(faces, boxes, SIZES);
   print_message("slope of face pairs %.3f, of boxes %.3f\n", slope_pairs, slope_boxes);
   assert_near(slope_pairs, 1, 0.15);
   assert_near(slope_boxes, 1, 0.15);

@@ -143,4 +143,17 @@ static inline double shape_seconds(void) {
   return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
+// Least squares slope of log(y) over log(x).
+static inline double shape_slope(const double *x, const double *y, int count) {
+  double sx = 0, sy = 0, sxx = 0, sxy = 0;
+  for (int k = 0; k < count; ++k) {
+    double a = log(x[k]), b = log(y[k]);
+    sx += a;
+    sy += b;
+    sxx += a * a;
+    sxy += a * b;
+  }
+  return (count * sxy - sx * sy) / (count * sxx - sx * sx);
+}
+
 #endif

@@ -241,19 +241,6 @@ static void test_foreign_cache(void **state) {
   sonde_convex_clear(&b);
 }
 
-// Least squares slope of log(work) over log(vertices).
-static double slope(const double *vertices, const double *work, int count) {
-  double sx = 0, sy = 0, sxx = 0, sxy = 0;
-  for (int k = 0; k < count; ++k) {
-    double x = log(vertices[k]), y = log(work[k]);
-    sx += x;
-    sy += y;
-    sxx += x * x;
-    sxy += x * y;
-  }
-  return (count * sxy - sx * sy) / (count * sxx - sx * sx);
-}
-
 enum { SIZES = 6, POSES = 40 };
 
 // Mean cost without cache, and of following a slow motion with it.
@@ -289,7 +276,8 @@ static void test_cost(void **state) {
     sonde_convex_clear(&body);
     sonde_mesh_clear(&ball);
   }
-  double cold_slope = slope(vertices, cold, SIZES), warm_slope = slope(vertices, warm, SIZES);
+  double cold_slope = shape_slope(vertices, cold, SIZES),
+         warm_slope = shape_slope(vertices, warm, SIZES);
   print_message("slope cold %.3f, warm %.3f\n", cold_slope, warm_slope);
   assert_near(cold_slope, 1, 0.1);
   assert_near(warm_slope, 0, 0.15);
