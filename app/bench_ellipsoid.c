@@ -156,7 +156,7 @@ sonde_world_def bench_ellipsoid_world(double dt_s) {
   def.contact_law = SONDE_CONTACT_NODES;
   def.contact_stiffness_n_m3 = CONTACT_N_M3;
   def.contact_damping_n_s_m3 = 0;
-  def.newton_iterations = 1;
+  def.newton_iterations = 4;
   return def;
 }
 

@@ -72,11 +72,11 @@ static int sweep_model(const bench_ellipsoid *scene, const sonde_model *model,
 }
 
 int main(int argc, char **argv) {
-  int sizes = argc > 1 ? atoi(argv[1]) : SIZES, newton = argc > 2 ? atoi(argv[2]) : 1, failed = 0;
+  int sizes = argc > 1 ? atoi(argv[1]) : SIZES, newton = argc > 2 ? atoi(argv[2]) : 4, failed = 0;
   if (argc > 3 || sizes < 1 || sizes > SIZES || newton < 1 || newton > 100) {
     fprintf(stderr,
             "usage: bench_sweep [SIZES [NEWTON]]: how many of 492, 1962 and 7842 nodes, 1 to "
-            "3; Newton iterations of a step, default 1\n");
+            "3; Newton iterations of a step, default 4; FAST: at most\n");
     return 2;
   }
   sonde_error error = {0};

@@ -51,8 +51,10 @@ SONDE_API double sonde_friction_coefficient(const sonde_friction *friction, doub
 typedef struct sonde_world_def {
   double dt_s;                /**< step; default 1e-3 */
   double implicitness;        /**< lambda in [0,1]; default 1 (backward Euler) */
-  uint32_t newton_iterations; /**< from the last step's change of velocity; default 2. 0: eq. (4) as
-                                   in the paper, linearised at the start of the step (DOUBLE) */
+  uint32_t newton_iterations; /**< from the last step's change of velocity; default 2. FAST: at
+                                   most, fewer where the next would change less than the solver
+                                   leaves. 0: eq. (4) as in the paper, linearised at the start of
+                                   the step (DOUBLE) */
   sonde_engine engine;        /**< default DOUBLE */
   sonde_pcg_options pcg;      /**< default relative 5e-3, at most 200 iterations */
   sonde_contact_law contact_law;

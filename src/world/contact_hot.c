@@ -103,8 +103,9 @@ static uint16_t nearest_plane(const sonde_state *state, sonde_vec3 x) {
 bool sonde_contact_depth(const sonde_state *state, sonde_vec3 x, double *depth, sonde_vec3 *slope) {
   if (state->ball_radius > 0) {
     sonde_vec3 d = v_sub(state->ball_centre, x);
-    *depth = state->ball_radius - v_norm(d);
-    if (!(*depth > 0)) return false;
+    double distance2 = v_norm2(d), radius = state->ball_radius;
+    if (distance2 >= radius * radius) return false;
+    *depth = radius - sqrt(distance2);
     *slope = v_unit(d, v_scale(state->inward, -1));
     return pushes_forward(state, *slope);
   }
