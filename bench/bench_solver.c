@@ -155,6 +155,7 @@ static double time_dense(linear_system *s, double *off) {
 
 static size_t world_bytes(const sonde_model *model, sonde_engine engine) {
   sonde_world_def def = bench_ellipsoid_world(1e-3);
+  def.newton_iterations = 1;
   def.engine = engine;
   sonde_state *state = NULL;
   size_t before = held;
@@ -196,6 +197,7 @@ static void print_history(linear_system *s, double stiffness) {
 static sonde_status print_stages(const bench_ellipsoid *scene, const sonde_model *model,
                                  sonde_engine engine, sonde_error *error) {
   sonde_world_def def = bench_ellipsoid_world(1e-3);
+  def.newton_iterations = 1;
   def.engine = engine;
   sonde_state *state = NULL;
   sonde_probe probe = {0};

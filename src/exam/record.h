@@ -5,7 +5,7 @@
 #include "sonde/exam.h"
 
 enum {
-  SONDE_RECORD_VERSION = 2,
+  SONDE_RECORD_VERSION = 3,
   SONDE_RECORD_TICK = 1,
   SONDE_RECORD_CONTROLS = 2,
   SONDE_RECORD_END = 3,

@@ -134,6 +134,60 @@ static void rests_in_equilibrium(void **state) {
   clear(&s);
 }
 
+// Newton's method of at most `most` iterations: how far a run is from one solved to the end.
+static double distance_from_solved(uint32_t most, double stop_m, int steps) {
+  sonde_world_def def = fast_def();
+  def.sleep_displacement_m = 0;
+  def.pcg.relative_residual = 1e-4;
+  def.newton_iterations = most;
+  scene s = make(4, "linear", &def);
+  def.newton_iterations = 30;
+  def.pcg.relative_residual = 1e-6;
+  scene solved = make(4, "linear", &def);
+  double speed = (stop_m + 0.001) / steps;
+  for (int k = 1; k <= steps; ++k) {
+    sonde_step(s.state, &s.probe, fixture_pose(speed * k - 0.001));
+    sonde_step(solved.state, &solved.probe, fixture_pose(speed * k - 0.001));
+  }
+  double distance = farthest(&s, &solved);
+  clear(&s);
+  clear(&solved);
+  return distance;
+}
+
+// Driven in at 0.45 and 2 m/s the first iteration misses what the skin meets; the others bring it
+// back.
+static void iterates_where_one_is_not_enough(void **state) {
+  (void)state;
+  const int steps[] = {20, 4};
+  for (int k = 0; k < 2; ++k) {
+    double one = distance_from_solved(1, 0.008, steps[k]);
+    double more = distance_from_solved(8, 0.008, steps[k]);
+    assert_true(one > 1e-5);
+    assert_true(more < one / 10);
+  }
+}
+
+// Held still nothing bends: more iterations are allowed, none is made.
+static void iterates_once_where_that_is_enough(void **state) {
+  (void)state;
+  uint64_t hash[2];
+  sonde_world_def def = fast_def();
+  scene s = make(4, "linear", &def);
+  for (int k = 0; k < 400; ++k) sonde_step(s.state, &s.probe, fixture_pose(0.005));
+  for (uint32_t k = 0; k < 2; ++k) {
+    def.newton_iterations = k ? 20 : 1;
+    scene held = make(4, "linear", &def);
+    sonde_state_set(held.state, sonde_state_positions(s.state), NULL);
+    for (int t = 0; t < 20; ++t) sonde_step(held.state, &held.probe, fixture_pose(0.005));
+    assert_true(sonde_state_contact(held.state)->region_count > 0);
+    hash[k] = sonde_state_hash(held.state);
+    clear(&held);
+  }
+  assert_true(hash[0] == hash[1]);
+  clear(&s);
+}
+
 static void sleeping_is_harmless_and_ends(void **state) {
   (void)state;
   sonde_world_def def = fast_def();
@@ -188,6 +242,8 @@ int main(void) {
       cmocka_unit_test(instruction_sets_agree_to_the_bit),
       cmocka_unit_test(follows_the_double_engine),
       cmocka_unit_test(rests_in_equilibrium),
+      cmocka_unit_test(iterates_where_one_is_not_enough),
+      cmocka_unit_test(iterates_once_where_that_is_enough),
       cmocka_unit_test(sleeping_is_harmless_and_ends),
       cmocka_unit_test(trouble_is_flagged_and_survived),
       cmocka_unit_test(refuses_what_it_cannot_do),
