@@ -10,6 +10,7 @@ enum { APP_OK = 0, APP_FAILED = 1, APP_BAD_INPUT = 2 };
 // Every command gets its own verb as argv[0] and its arguments after it.
 int cmd_run(int argc, char **argv);
 int cmd_fit(int argc, char **argv);
+int cmd_generate(int argc, char **argv);
 int cmd_predict(int argc, char **argv);
 int cmd_measure(int argc, char **argv);
 int cmd_identify(int argc, char **argv);

@@ -18,6 +18,7 @@ typedef struct command {
 static const command COMMANDS[] = {
     {"run", cmd_run, "simulate in real time and serve the page"},
     {"fit", cmd_fit, "fit a thigh to measurements and write a model file"},
+    {"generate", cmd_generate, "make a thigh from parameters and a seed"},
     {"predict", cmd_predict, "compare a model's forces with measurements"},
     {"measure", cmd_measure, "press a model at its sites with the virtual robot"},
     {"identify", cmd_identify, "find damping and friction from records of a moving probe"},

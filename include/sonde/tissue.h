@@ -100,6 +100,8 @@ typedef struct sonde_model {
   uint32_t datum_count;
   sonde_datum *data;         /**< the measurements it was fitted to */
   sonde_vessel vein, artery; /**< femoral vessels */
+  /** NULL, or named anatomy (sonde/tissue_anatomy.h); released with the model by sonde_free. */
+  struct sonde_thigh_anatomy *anatomy;
   uint64_t checksum;         /**< of the file's content; 0 before it is saved or loaded */
 } sonde_model;
 

@@ -10,6 +10,7 @@
 #include "base/base.h"
 #include "base/maths.h"
 #include "tissue/live_cut.h"
+#include "sonde/tissue_anatomy.h"
 #include "tissue/model.h"
 
 #include <string.h>
@@ -203,6 +204,11 @@ static sonde_status copy_rest(const sonde_model *model, sonde_model *cut, sonde_
   cut->law = model->law;
   cut->vein = model->vein;
   cut->artery = model->artery;
+  if (model->anatomy) {
+    cut->anatomy = SONDE_NEW(sonde_thigh_anatomy, 1);
+    if (!cut->anatomy) return sonde_fail_memory(error);
+    *cut->anatomy = *model->anatomy;
+  }
   cut->sites = SONDE_NEW(sonde_site, model->site_count);
   cut->data = SONDE_NEW(sonde_datum, model->datum_count);
   if (!cut->sites || !cut->data) return sonde_fail_memory(error);

@@ -307,7 +307,7 @@ void sonde_model_destroy(sonde_model *model) {
                     model->bone_depth_m, model->muscle_depth_m, model->edge_rest_m,
                     model->edge_share,   model->face_area_m2,   model->face_half_cotangent,
                     model->face_edge,    model->sites,          model->data,
-                    model->shear_share,  model->limit_share};
+                    model->anatomy,      model->shear_share,    model->limit_share};
   for (size_t k = 0; k < SONDE_COUNT_OF(arrays); ++k) sonde_free(arrays[k]);
   sonde_topology_clear(&model->topology);
   sonde_mesh_clear(&model->surface);

@@ -3,6 +3,7 @@
 // writer: collects arrays into one blob and their descriptions into the header.
 // reader: checks magic and CRC first, then takes the arrays by name with their expected shape.
 #include "tissue/live_cut.h"
+#include "tissue/model_file.h"
 #include "tissue/model.h"
 
 #include "base/base.h"
@@ -17,17 +18,13 @@ enum { FORMAT_VERSION = 3, OLDEST_VERSION = 2 };
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the model file is little-endian");
 
+typedef sonde_model_writer writer;
+typedef sonde_model_reader reader;
+
 /* ---- writer ------------------------------------------------------------------------------- */
 
-typedef struct writer {
-  cJSON *arrays;
-  char *blob;
-  size_t used, room;
-  bool failed;
-} writer;
-
-static void put(writer *w, const char *name, const char *type, const char *unit, uint32_t rows,
-                uint32_t columns, const void *bytes) {
+void sonde_model_put(writer *w, const char *name, const char *type, const char *unit, uint32_t rows,
+                     uint32_t columns, const void *bytes) {
   size_t count = (size_t)rows * columns * (strcmp(type, "f64") == 0 ? 8 : 4);
   if (w->used + count > w->room) {
     size_t room = 2 * (w->used + count) + 4096;
@@ -54,26 +51,26 @@ static void put(writer *w, const char *name, const char *type, const char *unit,
 }
 
 static void put_mesh(writer *w, const char *vertices, const char *faces, const sonde_mesh *mesh) {
-  put(w, vertices, "f64", "m", mesh->vertex_count, 3, mesh->vertices);
-  put(w, faces, "u32", "1", mesh->face_count, 3, mesh->faces);
+  sonde_model_put(w, vertices, "f64", "m", mesh->vertex_count, 3, mesh->vertices);
+  sonde_model_put(w, faces, "u32", "1", mesh->face_count, 3, mesh->faces);
 }
 
 static void put_nodes(writer *w, const sonde_model *model) {
   uint32_t n = model->surface.vertex_count;
-  put(w, "node_k0", "f64", "N/m^3", n, 1, model->k0_n_m3);
-  put(w, "node_xm", "f64", "m", n, 1, model->xm_m);
-  put(w, "node_shear_share", "f64", "1", n, 1, model->shear_share);
-  put(w, "node_limit_share", "f64", "1", n, 1, model->limit_share);
-  put(w, "node_fat_depth", "f64", "m", n, 1, model->fat_depth_m);
-  put(w, "node_muscle_depth", "f64", "m", n, 1, model->muscle_depth_m);
-  put(w, "node_bone_depth", "f64", "m", n, 1, model->bone_depth_m);
+  sonde_model_put(w, "node_k0", "f64", "N/m^3", n, 1, model->k0_n_m3);
+  sonde_model_put(w, "node_xm", "f64", "m", n, 1, model->xm_m);
+  sonde_model_put(w, "node_shear_share", "f64", "1", n, 1, model->shear_share);
+  sonde_model_put(w, "node_limit_share", "f64", "1", n, 1, model->limit_share);
+  sonde_model_put(w, "node_fat_depth", "f64", "m", n, 1, model->fat_depth_m);
+  sonde_model_put(w, "node_muscle_depth", "f64", "m", n, 1, model->muscle_depth_m);
+  sonde_model_put(w, "node_bone_depth", "f64", "m", n, 1, model->bone_depth_m);
 }
 
 // What cannot be derived again from a skin with lips.
 static void put_cuts(writer *w, const sonde_model *model) {
   if (!model->edge_share) return;
-  put(w, "node_normal", "f64", "1", model->surface.vertex_count, 3, model->normal);
-  put(w, "edge_share", "f64", "1", model->topology.edge_count, 1, model->edge_share);
+  sonde_model_put(w, "node_normal", "f64", "1", model->surface.vertex_count, 3, model->normal);
+  sonde_model_put(w, "edge_share", "f64", "1", model->topology.edge_count, 1, model->edge_share);
 }
 
 static void put_sites(writer *w, const sonde_model *model) {
@@ -94,9 +91,9 @@ static void put_sites(writer *w, const sonde_model *model) {
       share[k][0] = s->shear_share;
       share[k][1] = s->limit_share;
     }
-    put(w, "site_id", "u32", "1", n, 1, id);
-    put(w, "site", "f64", "position m, normal, u, v, k0 N/m^3, xm m", n, 14, row);
-    put(w, "site_share", "f64", "of G, of gm", n, 2, share);
+    sonde_model_put(w, "site_id", "u32", "1", n, 1, id);
+    sonde_model_put(w, "site", "f64", "position m, normal, u, v, k0 N/m^3, xm m", n, 14, row);
+    sonde_model_put(w, "site_share", "f64", "of G, of gm", n, 2, share);
   } else {
     w->failed = true;
   }
@@ -125,8 +122,8 @@ static void put_data(writer *w, cJSON *names, const sonde_model *model) {
       value[k][0] = model->data[k].penetration_m;
       value[k][1] = model->data[k].force_n;
     }
-    put(w, "datum_key", "u32", "site, probe", n, 2, key);
-    put(w, "datum", "f64", "penetration m, force N", n, 2, value);
+    sonde_model_put(w, "datum_key", "u32", "site, probe", n, 2, key);
+    sonde_model_put(w, "datum", "f64", "penetration m, force N", n, 2, value);
   } else {
     w->failed = true;
   }
@@ -142,7 +139,7 @@ static void put_vessel(writer *w, const char *name, const sonde_vessel *vessel) 
     row[k][3] = p->radius_m;
     row[k][4] = p->depth_m;
   }
-  put(w, name, "f64", "centre m, radius m, depth m", vessel->count, 5, row);
+  sonde_model_put(w, name, "f64", "centre m, radius m, depth m", vessel->count, 5, row);
 }
 
 // Fields of the law in file order.
@@ -198,6 +195,7 @@ static cJSON *make_header(writer *w, const sonde_model *model) {
   put_data(w, names, model);
   put_vessel(w, "vein", &model->vein);
   put_vessel(w, "artery", &model->artery);
+  sonde_anatomy_put(w, header, model);
   return header;
 }
 
@@ -236,14 +234,6 @@ sonde_status sonde_model_save(sonde_model *model, const char *path, sonde_error 
 
 /* ---- reader ------------------------------------------------------------------------------- */
 
-typedef struct reader {
-  const char *path;
-  const cJSON *header;
-  const char *blob;
-  size_t size;
-  sonde_error *error;
-} reader;
-
 static const cJSON *find_array(const reader *r, const char *name) {
   const cJSON *entry = NULL;
   cJSON_ArrayForEach(entry, cJSON_GetObjectItem(r->header, "arrays")) {
@@ -254,8 +244,8 @@ static const cJSON *find_array(const reader *r, const char *name) {
 }
 
 // Bytes of a named array with `columns` columns; NULL after setting the error.
-static const void *take(const reader *r, const char *name, const char *type, uint32_t columns,
-                        uint32_t *rows) {
+const void *sonde_model_take(const reader *r, const char *name, const char *type, uint32_t columns,
+                             uint32_t *rows) {
   const cJSON *entry = find_array(r, name);
   const cJSON *shape = cJSON_GetObjectItem(entry, "shape");
   const char *kind = cJSON_GetStringValue(cJSON_GetObjectItem(entry, "type"));
@@ -277,8 +267,8 @@ static const void *take(const reader *r, const char *name, const char *type, uin
 
 static bool take_mesh(const reader *r, const char *vertices, const char *faces, sonde_mesh *mesh) {
   uint32_t v, f;
-  const void *xyz = take(r, vertices, "f64", 3, &v);
-  const void *abc = xyz ? take(r, faces, "u32", 3, &f) : NULL;
+  const void *xyz = sonde_model_take(r, vertices, "f64", 3, &v);
+  const void *abc = xyz ? sonde_model_take(r, faces, "u32", 3, &f) : NULL;
   if (!abc || sonde_mesh_create(mesh, v, f, r->error)) return false;
   memcpy(mesh->vertices, xyz, (size_t)v * 24);
   memcpy(mesh->faces, abc, (size_t)f * 12);
@@ -304,7 +294,7 @@ static bool take_nodes(const reader *r, sonde_model *model) {
   uint32_t n = model->surface.vertex_count;
   for (size_t k = 0; k < SONDE_COUNT_OF(array); ++k) {
     uint32_t rows;
-    const void *from = take(r, array[k].name, "f64", 1, &rows);
+    const void *from = sonde_model_take(r, array[k].name, "f64", 1, &rows);
     if (from && rows != n)
       sonde_fail(r->error, SONDE_FORMAT, "%s: array '%s' has %u rows, expected %u", r->path,
                  array[k].name, rows, n);
@@ -318,9 +308,9 @@ static bool take_nodes(const reader *r, sonde_model *model) {
 static bool take_shares(const reader *r, sonde_model *model) {
   uint32_t n = model->surface.vertex_count, m = model->site_count, rows[3];
   if (!find_array(r, "node_shear_share")) return true;
-  const char *shear = take(r, "node_shear_share", "f64", 1, &rows[0]);
-  const char *limit = shear ? take(r, "node_limit_share", "f64", 1, &rows[1]) : NULL;
-  const char *site = limit ? take(r, "site_share", "f64", 2, &rows[2]) : NULL;
+  const char *shear = sonde_model_take(r, "node_shear_share", "f64", 1, &rows[0]);
+  const char *limit = shear ? sonde_model_take(r, "node_limit_share", "f64", 1, &rows[1]) : NULL;
+  const char *site = limit ? sonde_model_take(r, "site_share", "f64", 2, &rows[2]) : NULL;
   if (!site) return false;
   if (rows[0] != n || rows[1] != n || rows[2] != m) {
     sonde_fail(r->error, SONDE_FORMAT,
@@ -339,8 +329,8 @@ static bool take_shares(const reader *r, sonde_model *model) {
 
 static bool take_sites(const reader *r, sonde_model *model) {
   uint32_t n, m;
-  const char *id = take(r, "site_id", "u32", 1, &n);
-  const char *row = id ? take(r, "site", "f64", 14, &m) : NULL;
+  const char *id = sonde_model_take(r, "site_id", "u32", 1, &n);
+  const char *row = id ? sonde_model_take(r, "site", "f64", 14, &m) : NULL;
   if (!row) return false;
   model->sites = SONDE_NEW(sonde_site, n);
   if (!model->sites || n != m) {
@@ -363,8 +353,8 @@ static bool take_sites(const reader *r, sonde_model *model) {
 
 static bool take_data(const reader *r, sonde_model *model) {
   uint32_t n, m;
-  const char *key = take(r, "datum_key", "u32", 2, &n);
-  const char *value = key ? take(r, "datum", "f64", 2, &m) : NULL;
+  const char *key = sonde_model_take(r, "datum_key", "u32", 2, &n);
+  const char *value = key ? sonde_model_take(r, "datum", "f64", 2, &m) : NULL;
   if (!value || n != m) return false;
   const cJSON *names = cJSON_GetObjectItem(r->header, "probes");
   model->data = SONDE_NEW(sonde_datum, n);
@@ -385,7 +375,7 @@ static bool take_data(const reader *r, sonde_model *model) {
 
 static bool take_vessel(const reader *r, const char *name, sonde_vessel *vessel) {
   uint32_t n;
-  const char *row = take(r, name, "f64", 5, &n);
+  const char *row = sonde_model_take(r, name, "f64", 5, &n);
   if (!row || n > SONDE_VESSEL_POINTS) return false;
   vessel->count = n;
   for (uint32_t k = 0; k < n; ++k, row += 40) {
@@ -468,8 +458,8 @@ static bool check_numbers(const reader *r, const sonde_model *model) {
 // A cut skin brings the normals that it had when it was whole and the edges' shares of the springs.
 static bool take_cuts(const reader *r, sonde_model *model) {
   uint32_t n = model->surface.vertex_count, edges = model->topology.edge_count, rows[2];
-  const char *normal = take(r, "node_normal", "f64", 3, &rows[0]);
-  const char *share = normal ? take(r, "edge_share", "f64", 1, &rows[1]) : NULL;
+  const char *normal = sonde_model_take(r, "node_normal", "f64", 3, &rows[0]);
+  const char *share = normal ? sonde_model_take(r, "edge_share", "f64", 1, &rows[1]) : NULL;
   if (!share) return false;
   model->edge_share = SONDE_NEW(double, edges);
   if (!model->edge_share || rows[0] != n || rows[1] != edges) {
@@ -518,6 +508,7 @@ static sonde_status read_model(const reader *r, sonde_model *model) {
       !take_vessel(r, "artery", &model->artery))
     return SONDE_FORMAT;
   if (!check_numbers(r, model)) return SONDE_FORMAT;
+  if ((status = sonde_anatomy_take(r, model)) != SONDE_OK) return status;
   bool is_cut = find_array(r, "edge_share") != NULL;
   if (!is_cut) status = check_closed(r, model, false);
   if (!status) status = sonde_model_derive(model, r->error);

@@ -1,0 +1,89 @@
+/**
+ * @file tissue_anatomy.h
+ * Named anatomy of a thigh beyond skin, femur and the two femoral vessels: further vessels,
+ * landmarks, segments of the vein, fascia, muscle compartments and the direction of their fibres.
+ * Kept in the model and its file (docs/model_file.md); made by sonde/anatomy.h. No part points into
+ * another, so a struct copy is a copy.
+ */
+#ifndef SONDE_TISSUE_ANATOMY_H
+#define SONDE_TISSUE_ANATOMY_H
+
+#include "sonde/tissue.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum { SONDE_BRANCHES = 8, SONDE_LANDMARKS = 16, SONDE_SEGMENTS = 8, SONDE_LEVELS = 64 };
+
+typedef enum sonde_vessel_kind { SONDE_VESSEL_VEIN, SONDE_VESSEL_ARTERY } sonde_vessel_kind;
+
+/** A vessel beside the model's femoral vein and artery, from its junction with them downwards. */
+typedef struct sonde_branch {
+  char
+      name[32]; /**< great_saphenous, deep_femoral_artery, deep_femoral_vein, second_femoral_vein */
+  sonde_vessel_kind kind;
+  sonde_vessel line;
+} sonde_branch;
+
+/** A place of the examination: where the probe is put to see the femoral vein there. */
+typedef struct sonde_landmark {
+  char name[32];
+  sonde_vec3 skin_m; /**< above the vein */
+  sonde_vec3 normal; /**< outward, unit */
+  sonde_vec3 vein_m; /**< centre of the femoral vein */
+  uint32_t site;     /**< id of the nearest site of the model */
+} sonde_landmark;
+
+/** A stretch of the femoral vein by model z. */
+typedef struct sonde_segment {
+  char name[32]; /**< common_femoral, femoral_proximal, femoral_mid, femoral_distal, popliteal_near
+                  */
+  double from_m, to_m;
+} sonde_segment;
+
+typedef enum sonde_compartment {
+  SONDE_COMPARTMENT_ANTERIOR,  /**< quadriceps, sartorius */
+  SONDE_COMPARTMENT_MEDIAL,    /**< adductors, gracilis */
+  SONDE_COMPARTMENT_POSTERIOR, /**< hamstrings */
+  SONDE_COMPARTMENTS
+} sonde_compartment;
+
+/** The compartments at one height: sheets from the femur to the fascia part them. */
+typedef struct sonde_muscle_level {
+  double z_m;
+  double bone_x_m, bone_y_m; /**< middle of the femur */
+  /** Directions about the femur, from +x towards +y, where each compartment ends when the angle
+      grows: medial -> anterior, anterior -> posterior, posterior -> medial. Ascending. */
+  double septum_rad[SONDE_COMPARTMENTS];
+} sonde_muscle_level;
+
+/** Everything named in a thigh. */
+typedef struct sonde_thigh_anatomy {
+  uint32_t branch_count, landmark_count, segment_count, level_count;
+  sonde_branch branch[SONDE_BRANCHES];
+  sonde_landmark landmark[SONDE_LANDMARKS];
+  sonde_segment segment[SONDE_SEGMENTS];
+  sonde_muscle_level level[SONDE_LEVELS];   /**< ascending z */
+  double pennation_rad[SONDE_COMPARTMENTS]; /**< of the fibres, from the leg's axis to the bone */
+  /** Fascia lata at node_muscle_depth: thickness at its medial and its lateral side. */
+  double fascia_medial_m, fascia_lateral_m;
+} sonde_thigh_anatomy;
+
+/** The compartment at a point of the muscle. @thread any */
+SONDE_API sonde_compartment sonde_anatomy_compartment(const sonde_thigh_anatomy *anatomy,
+                                                      sonde_vec3 rest_m);
+/** Unit direction of the muscle fibres there, towards the knee. @thread any */
+SONDE_API sonde_vec3 sonde_anatomy_fibre(const sonde_thigh_anatomy *anatomy, sonde_vec3 rest_m);
+/** Thickness of the fascia lata above a point. @thread any */
+SONDE_API double sonde_anatomy_fascia(const sonde_thigh_anatomy *anatomy, sonde_vec3 rest_m);
+/** The landmark or branch with that name, NULL when absent. @thread any */
+SONDE_API const sonde_landmark *sonde_anatomy_landmark(const sonde_thigh_anatomy *anatomy,
+                                                       const char *name);
+SONDE_API const sonde_branch *sonde_anatomy_branch(const sonde_thigh_anatomy *anatomy,
+                                                   const char *name);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,314 @@
+// Where the vessels run (docs/anatomy.md).
+// vein_angle, cover, calibre: the femoral vein by its share of the thigh's length, groin 0, knee 1.
+// lay_vein:      below the skin at its angle, under fat and cover.
+// lay_artery:    beside the vein: lateral of it at the groin, in front from the middle on.
+// lay_saphenous: in the fat above the fascia, into the common femoral vein.
+// lay_deep:      artery and vein that leave backwards along the femur.
+// lay_second:    a second femoral vein on the other side of the artery.
+// side_of:       the skin without its flat ends.
+// gap_between:   least distance of two vessels' walls.
+// check_*:       walls apart, below the fascia, outside the bone; all covers shrink until it holds.
+#include "anatomy/shape.h"
+
+#include <string.h>
+
+static const double WALL_GAP_M = 0.002;   // between neighbours when they are placed
+static const double LEAST_GAP_M = 0.0008; // accepted between walls of different vessels
+static const double LEAST_COVER_M = 0.0005, LEAST_BONE_GAP_M = 0.002;
+static const double JUNCTION = 0.09; // of the great saphenous vein
+static const double FIRST = 0.02, LAST = 0.98;
+
+typedef struct layout {
+  const sonde_thigh *thigh;
+  const sonde_thigh_shape *shape;
+  const sonde_surface_index *skin;
+  sonde_course *course;
+  double cover_scale;
+} layout;
+
+double sonde_course_junction(void) { return JUNCTION; }
+
+double sonde_course_confluence(const sonde_thigh *thigh) {
+  return thigh->deep_branch_m / thigh->length_m + 0.07;
+}
+
+// 30 degrees less at mid-thigh, 100 less above the knee.
+double sonde_course_angle(const sonde_thigh *thigh, double share) {
+  return thigh->vein_angle_rad - (20 * share + 80 * share * share) * SONDE_PI / 180;
+}
+
+static double cover(const layout *l, double t) {
+  double a = l->thigh->vein_cover_m, b = l->thigh->canal_cover_m, c = b + 0.006;
+  double all = a * (1 - t) * (1 - 2 * t) + 4 * b * t * (1 - t) + c * t * (2 * t - 1);
+  return l->cover_scale * fmax(all, 0.001);
+}
+
+static double calibre(double t) {
+  return 1 - 0.12 * smooth_step(2 * t) - 0.08 * smooth_step(2 * t - 1);
+}
+
+static double depth_of(const layout *l, sonde_vec3 p) {
+  return whole_nm(sonde_surface_closest(l->skin, p).distance_m);
+}
+
+static void add(const layout *l, sonde_vessel *line, sonde_vec3 centre, double radius) {
+  SONDE_ASSERT(line->count < SONDE_VESSEL_POINTS);
+  centre = v_whole_nm(centre);
+  line->point[line->count++] = (sonde_vessel_point){centre, whole_nm(radius), depth_of(l, centre)};
+}
+
+static double share_of(uint32_t k) {
+  return FIRST + (LAST - FIRST) * k / (SONDE_VESSEL_POINTS - 1);
+}
+
+// At the same height: the way in the section's plane that is `depth` below a slanting skin.
+static sonde_vec3 below_skin(const layout *l, double angle, double z_m, double depth) {
+  const sonde_tube *skin = &l->shape->skin;
+  sonde_vec3 n = sonde_tube_normal(skin, angle, z_m);
+  double level = n.x * n.x + n.y * n.y;
+  return v_madd(sonde_tube_point(skin, angle, z_m), -depth / level, vec3(n.x, n.y, 0));
+}
+
+static double fat_at(const layout *l, double angle, double z_m) {
+  return sonde_shape_fat(l->shape, sonde_tube_point(&l->shape->skin, angle, z_m));
+}
+
+static void lay_vein(const layout *l) {
+  l->course->vein.count = 0;
+  for (uint32_t k = 0; k < SONDE_VESSEL_POINTS; ++k) {
+    double t = share_of(k), z = t * l->thigh->length_m, angle = sonde_course_angle(l->thigh, t);
+    double radius = 0.5 * l->thigh->vein_m * calibre(t);
+    double depth = l->thigh->skin_m + fat_at(l, angle, z) + cover(l, t) + radius;
+    l->course->angle_rad[k] = angle;
+    l->course->skin_z_m[k] = z;
+    add(l, &l->course->vein, below_skin(l, angle, z, depth), radius);
+  }
+}
+
+static sonde_vec3 tangent(const sonde_vessel *line, uint32_t k) {
+  uint32_t a = k > 0 ? k - 1 : 0, b = k + 1 < line->count ? k + 1 : k;
+  return v_unit(v_sub(line->point[b].centre_m, line->point[a].centre_m), vec3(0, 0, 1));
+}
+
+// From lateral (10 degrees) by the front (80 at mid-thigh) to the medial front (125 at the knee).
+static void lay_artery(const layout *l) {
+  sonde_course *c = l->course;
+  c->artery.count = 0;
+  for (uint32_t k = 0; k < SONDE_VESSEL_POINTS; ++k) {
+    double t = share_of(k), radius = 0.5 * l->thigh->artery_m * calibre(t);
+    double side = (10 + 165 * t - 50 * t * t) * SONDE_PI / 180;
+    sonde_vec3 along = tangent(&c->vein, k), to = vec3(-cos(side), sin(side), 0);
+    to = v_unit(v_madd(to, -v_dot(to, along), along), to);
+    double apart = c->vein.point[k].radius_m + radius + WALL_GAP_M;
+    add(l, &c->artery, v_madd(c->vein.point[k].centre_m, apart, to), radius);
+  }
+}
+
+// A vessel's point at a share of the length, between its stored ones.
+static sonde_vessel_point at_share(const sonde_vessel *line, double t) {
+  double at = clamp((t - FIRST) / (LAST - FIRST), 0, 1) * (line->count - 1);
+  uint32_t k = (uint32_t)fmin(floor(at), line->count - 2);
+  const sonde_vessel_point *a = &line->point[k], *b = a + 1;
+  double s = at - k;
+  return (sonde_vessel_point){v_lerp(a->centre_m, b->centre_m, s),
+                              a->radius_m + s * (b->radius_m - a->radius_m),
+                              a->depth_m + s * (b->depth_m - a->depth_m)};
+}
+
+static sonde_vessel *begin(const layout *l, const char *name, sonde_vessel_kind kind) {
+  SONDE_ASSERT(l->course->branch_count < SONDE_BRANCHES);
+  sonde_branch *branch = &l->course->branch[l->course->branch_count++];
+  *branch = (sonde_branch){.kind = kind};
+  snprintf(branch->name, sizeof branch->name, "%s", name);
+  return &branch->line;
+}
+
+// Medial and behind at the knee, in front at its junction with the femoral vein.
+static void lay_saphenous(const layout *l) {
+  enum { POINTS = 60 };
+  const double reach = 0.10; // share of the length over which it dives to the vein
+  sonde_vessel *line = begin(l, "great_saphenous", SONDE_VESSEL_VEIN);
+  for (uint32_t k = 0; k < POINTS; ++k) {
+    double t = JUNCTION + (LAST - JUNCTION) * k / (POINTS - 1), z = t * l->thigh->length_m;
+    double s = (t - JUNCTION) / (1 - JUNCTION);
+    double angle = sonde_course_angle(l->thigh, t) - (0.05 + 0.7 * s * (1 - s)) +
+                   0.05 * (1 - smooth_step(s / reach));
+    double fat = fat_at(l, angle, z);
+    double radius = fmin(0.5 * l->thigh->saphenous_m * (1 - 0.25 * s), 0.4 * fat);
+    double depth = l->thigh->skin_m + fmax(radius, fat - radius - 0.0005);
+    sonde_vec3 own = below_skin(l, angle, z, depth);
+    sonde_vec3 end = at_share(&l->course->vein, t).centre_m;
+    add(l, line, v_lerp(end, own, smooth_step((t - JUNCTION) / reach)), radius);
+  }
+}
+
+// Point beside the femur, `gap` outside it, towards a medial and then back side.
+static sonde_vec3 beside_bone(const layout *l, double t, double gap) {
+  const sonde_tube *bone = &l->shape->femur;
+  double z = t * l->thigh->length_m, angle = -(10 + 60 * t) * SONDE_PI / 180;
+  sonde_vec3 out = vec3(cos(angle), sin(angle), 0);
+  return v_madd(sonde_tube_point(bone, angle, z), gap, out);
+}
+
+static void lay_deep(const layout *l) {
+  enum { POINTS = 40 };
+  const double from[2] = {l->thigh->deep_branch_m / l->thigh->length_m,
+                          sonde_course_confluence(l->thigh)};
+  const double to = fmax(0.62, from[1] + 0.2), bend = 0.2, bone_gap = 0.006;
+  double ra = 0.35 * l->thigh->artery_m, rv = 0.37 * l->thigh->vein_m;
+  const char *const name[2] = {"deep_femoral_artery", "deep_femoral_vein"};
+  for (int which = 0; which < 2; ++which) {
+    const sonde_vessel *parent = which == 0 ? &l->course->artery : &l->course->vein;
+    sonde_vessel *line =
+        begin(l, name[which], which == 0 ? SONDE_VESSEL_ARTERY : SONDE_VESSEL_VEIN);
+    for (uint32_t k = 0; k < POINTS; ++k) {
+      double t = from[which] + (to - from[which]) * k / (POINTS - 1);
+      double thin = 1 - 0.35 * (t - from[which]) / (to - from[which]);
+      double gap = which == 0 ? bone_gap + ra : bone_gap + 2 * ra + rv + WALL_GAP_M;
+      sonde_vec3 leaves = at_share(parent, t).centre_m, goal = beside_bone(l, t, gap);
+      double w = smooth_step((t - from[which]) / bend);
+      add(l, line, v_lerp(leaves, goal, w), thin * (which == 0 ? ra : rv));
+    }
+  }
+}
+
+static sonde_vec3 turned(sonde_vec3 v, double angle) {
+  return vec3(v.x * cos(angle) - v.y * sin(angle), v.x * sin(angle) + v.y * cos(angle), v.z);
+}
+
+static void lay_second(const layout *l) {
+  enum { POINTS = 40 };
+  const double from = 0.32, to = 0.74;
+  sonde_vessel *line = begin(l, "second_femoral_vein", SONDE_VESSEL_VEIN);
+  double best = -INFINITY, sign = 1;
+  for (int way = -1; way <= 1; way += 2) { // away from the bone
+    sonde_vessel_point v = at_share(&l->course->vein, 0.53), a = at_share(&l->course->artery, 0.53);
+    sonde_vec3 p = v_add(a.centre_m, turned(v_sub(v.centre_m, a.centre_m), way * 2.0));
+    double gap = sonde_tube_outside(&l->shape->femur, p);
+    if (gap > best) best = gap, sign = way;
+  }
+  for (uint32_t k = 0; k < POINTS; ++k) {
+    double s = (double)k / (POINTS - 1), t = from + (to - from) * s;
+    sonde_vessel_point v = at_share(&l->course->vein, t), a = at_share(&l->course->artery, t);
+    double w = smooth_step(4 * s) * smooth_step(4 * (1 - s)), radius = 0.7 * v.radius_m;
+    sonde_vec3 d = turned(v_sub(v.centre_m, a.centre_m), sign * 2.0 * w);
+    add(l, line, v_add(a.centre_m, d), radius);
+  }
+}
+
+/* ---- checks ------------------------------------------------------------------------------- */
+
+static double piece_distance(sonde_vec3 p, sonde_vec3 a, sonde_vec3 b) {
+  sonde_vec3 d = v_sub(b, a);
+  double t = clamp(v_dot(v_sub(p, a), d) / fmax(v_norm2(d), 1e-18), 0, 1);
+  return v_distance(p, v_madd(a, t, d));
+}
+
+static double gap_between(const sonde_vessel *p, const sonde_vessel *q) {
+  double least = INFINITY;
+  for (uint32_t i = 0; i < p->count; ++i)
+    for (uint32_t j = 0; j + 1 < q->count; ++j) {
+      double d =
+          piece_distance(p->point[i].centre_m, q->point[j].centre_m, q->point[j + 1].centre_m);
+      least = fmin(least,
+                   d - p->point[i].radius_m - fmax(q->point[j].radius_m, q->point[j + 1].radius_m));
+    }
+  return least;
+}
+
+static sonde_status blame(const char *name, const char *what, double z_m, sonde_error *error) {
+  return sonde_fail(error, SONDE_ARGUMENT,
+                    "vein-mm, artery-mm, girth-mm: the %s %s at %.0f mm from the groin: the "
+                    "vessels find no room; a larger girth, less fat or thinner vessels would do",
+                    name, what, z_m * 1e3);
+}
+
+// Deep vessels stay between bone and fascia, the great saphenous vein between skin and fascia
+// before it dives.
+static sonde_status check_line(const layout *l, const char *name, const sonde_vessel *line,
+                               sonde_error *error) {
+  bool superficial = strcmp(name, "great_saphenous") == 0;
+  for (uint32_t k = 0; k < line->count; ++k) {
+    const sonde_vessel_point *p = &line->point[k];
+    double fascia = l->thigh->skin_m + sonde_shape_fat(l->shape, p->centre_m), z = p->centre_m.z;
+    if (z < 0 || z > l->thigh->length_m) return blame(name, "leaves the thigh", z, error);
+    if (sonde_tube_outside(&l->shape->femur, p->centre_m) < p->radius_m + LEAST_BONE_GAP_M)
+      return blame(name, "meets the femur", z, error);
+    if (superficial && p->depth_m < l->thigh->skin_m + p->radius_m * 0.9)
+      return blame(name, "meets the skin", z, error);
+    if (!superficial && p->depth_m - p->radius_m < fascia + LEAST_COVER_M * l->cover_scale)
+      return blame(name, "leaves the muscle", z, error);
+  }
+  return SONDE_OK;
+}
+
+static sonde_status check_apart(const layout *l, sonde_error *error) {
+  const sonde_course *c = l->course;
+  if (gap_between(&c->vein, &c->artery) < LEAST_GAP_M)
+    return blame("femoral artery", "meets the vein", 0, error);
+  for (uint32_t b = 0; b < c->branch_count; ++b) {
+    bool vein = c->branch[b].kind == SONDE_VESSEL_VEIN;
+    if (gap_between(&c->branch[b].line, vein ? &c->artery : &c->vein) < LEAST_GAP_M)
+      return blame(c->branch[b].name, vein ? "meets the artery" : "meets the vein",
+                   c->branch[b].line.point[0].centre_m.z, error);
+    for (uint32_t a = 0; a < b; ++a)
+      if (c->branch[a].kind != c->branch[b].kind &&
+          gap_between(&c->branch[a].line, &c->branch[b].line) < LEAST_GAP_M)
+        return blame(c->branch[b].name, "meets its companion",
+                     c->branch[b].line.point[0].centre_m.z, error);
+  }
+  return SONDE_OK;
+}
+
+static sonde_status lay_all(const layout *l, sonde_error *error) {
+  sonde_course *c = l->course;
+  c->branch_count = 0;
+  lay_vein(l);
+  lay_artery(l);
+  lay_saphenous(l);
+  lay_deep(l);
+  if (l->thigh->second_vein > 0) lay_second(l);
+  sonde_status status = check_line(l, "femoral vein", &c->vein, error);
+  if (!status) status = check_line(l, "femoral artery", &c->artery, error);
+  for (uint32_t b = 0; b < c->branch_count && !status; ++b)
+    status = check_line(l, c->branch[b].name, &c->branch[b].line, error);
+  return status ? status : check_apart(l, error);
+}
+
+// The skin without the flat ends, from which depth is not counted.
+static sonde_status side_of(const sonde_mesh *skin, double length, sonde_mesh *side,
+                            sonde_error *error) {
+  sonde_status status = sonde_mesh_copy(skin, side, error);
+  if (status) return status;
+  side->face_count = 0;
+  for (uint32_t f = 0; f < skin->face_count; ++f) {
+    double low = INFINITY, high = -INFINITY;
+    for (int k = 0; k < 3; ++k) {
+      low = fmin(low, skin->vertices[skin->faces[f][k]].z);
+      high = fmax(high, skin->vertices[skin->faces[f][k]].z);
+    }
+    if (high > 1e-9 && low < length - 1e-9)
+      memcpy(side->faces[side->face_count++], skin->faces[f], sizeof side->faces[0]);
+  }
+  SONDE_ASSERT(side->face_count > 0);
+  return SONDE_OK;
+}
+
+sonde_status sonde_course_place(const sonde_thigh *thigh, const sonde_thigh_shape *shape,
+                                const sonde_mesh *skin, sonde_course *course, sonde_error *error) {
+  layout l = {thigh, shape, NULL, course, 1};
+  sonde_surface_index *index = NULL;
+  sonde_mesh side = {0};
+  sonde_status status = side_of(skin, shape->skin.length_m, &side, error);
+  if (!status) status = sonde_surface_index_create(&side, &index, error);
+  sonde_mesh_clear(&side);
+  if (status) return status;
+  l.skin = index;
+  for (int k = 0; k <= 16; ++k) {
+    l.cover_scale = 1 - 0.05 * k;
+    status = lay_all(&l, error);
+    if (!status) break;
+  }
+  sonde_surface_index_destroy(index);
+  return status;
+}

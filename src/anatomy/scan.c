@@ -1,0 +1,385 @@
+// From scanned surfaces of a leg to the shape of a thigh.
+// shaft_line:   straight line through the middle of the femur's middle third.
+// leg_frame:    knee by the end without the head, medial side by the condyles' width and the head.
+// centre_line:  the frame turned so that z runs through the middles of the skin's sections.
+// sample_skin, sample_femur, sample_muscle: tables by rays; misses are filled from neighbours.
+// smooth:       one binomial pass over a table.
+#include "anatomy/shape.h"
+
+#include <stdlib.h>
+
+static const double CUT_TOP = 0.09, CUT_BOTTOM = 0.80; // of the femur's length, from the head
+static const double END = 0.12;                        // of its length: head, condyles
+static const double LEAST_HEAD_M = 0.012, MOST_MISSED = 0.05;
+static const double REACH_M = 0.25, BONE_REACH_M = 0.07, WIDEST_BONE = 1.6; // of the shaft
+
+// Columns of x, y, z: model_from_scan p = axes^T (p - origin).
+typedef struct frame {
+  sonde_vec3 origin, x, y, z;
+  double low, high; // extent of the femur along z, from the origin
+} frame;
+
+static sonde_vec3 to_scan(const frame *f, sonde_vec3 p) {
+  return v_madd(v_madd(v_madd(f->origin, p.x, f->x), p.y, f->y), p.z, f->z);
+}
+static sonde_vec3 to_frame(const frame *f, sonde_vec3 p) {
+  sonde_vec3 d = v_sub(p, f->origin);
+  return vec3(v_dot(d, f->x), v_dot(d, f->y), v_dot(d, f->z));
+}
+
+static sonde_vec3 across(sonde_vec3 d, sonde_vec3 axis) {
+  return v_madd(d, -v_dot(d, axis), axis);
+}
+
+// Largest principal direction of the vertices within [low, high] along the axis, by power iteration.
+static sonde_vec3 wide_direction(const sonde_mesh *mesh, const frame *f, double low, double high,
+                                 bool only_across) {
+  sonde_vec3 mean = vec3(0, 0, 0);
+  sonde_mat3 moment = m_zero();
+  uint32_t count = 0;
+  for (int pass = 0; pass < 2; ++pass)
+    for (uint32_t i = 0; i < mesh->vertex_count; ++i) {
+      sonde_vec3 d = v_sub(mesh->vertices[i], f->origin);
+      double s = v_dot(d, f->z);
+      if (s < low || s > high) continue;
+      if (only_across) d = across(d, f->z);
+      if (pass == 0)
+        mean = v_add(mean, d), ++count;
+      else
+        moment = m_add(moment, m_rank1(v_madd(d, -1.0 / count, mean), 1, 0));
+    }
+  sonde_vec3 direction = vec3(0.48, 0.6, 0.64);
+  for (int k = 0; k < 300; ++k) direction = v_unit(m_mul_v(moment, direction), direction);
+  return direction;
+}
+
+static void measure_extent(const sonde_mesh *femur, frame *f) {
+  f->low = INFINITY, f->high = -INFINITY;
+  for (uint32_t i = 0; i < femur->vertex_count; ++i) {
+    double s = v_dot(v_sub(femur->vertices[i], f->origin), f->z);
+    f->low = fmin(f->low, s), f->high = fmax(f->high, s);
+  }
+}
+
+// Mean of the femur's surface between two heights, by area.
+static bool slab_centre(const sonde_mesh *femur, const frame *f, double low, double high,
+                        sonde_vec3 *centre) {
+  double area = 0;
+  sonde_vec3 sum = vec3(0, 0, 0);
+  for (uint32_t k = 0; k < femur->face_count; ++k) {
+    const uint32_t *v = femur->faces[k];
+    sonde_vec3 a = femur->vertices[v[0]], b = femur->vertices[v[1]], c = femur->vertices[v[2]];
+    sonde_vec3 middle = v_scale(v_add(a, v_add(b, c)), 1.0 / 3);
+    double s = v_dot(v_sub(middle, f->origin), f->z);
+    if (s < low || s > high) continue;
+    double part = v_norm(v_cross(v_sub(b, a), v_sub(c, a)));
+    area += part;
+    sum = v_madd(sum, part, middle);
+  }
+  *centre = area > 0 ? v_scale(sum, 1 / area) : sum;
+  return area > 0;
+}
+
+static sonde_status shaft_line(const sonde_mesh *femur, frame *f, sonde_error *error) {
+  if (femur->vertex_count < 50 || femur->face_count < 50)
+    return sonde_fail(error, SONDE_MESH, "the femur has %u vertices, expected a surface",
+                      femur->vertex_count);
+  f->origin = femur->vertices[0];
+  f->z = vec3(0, 0, 1);
+  f->z = wide_direction(femur, f, -INFINITY, INFINITY, false);
+  for (int pass = 0; pass < 3; ++pass) {
+    measure_extent(femur, f);
+    double length = f->high - f->low;
+    sonde_vec3 a, b;
+    if (!slab_centre(femur, f, f->low + 0.3 * length, f->low + 0.4 * length, &a) ||
+        !slab_centre(femur, f, f->low + 0.6 * length, f->low + 0.7 * length, &b))
+      return sonde_fail(error, SONDE_MESH, "the femur has no shaft");
+    f->origin = a;
+    f->z = v_unit(v_sub(b, a), f->z);
+  }
+  measure_extent(femur, f);
+  return SONDE_OK;
+}
+
+// How far the middle of an end stands beside the shaft's line.
+static sonde_vec3 end_offset(const sonde_mesh *femur, const frame *f, bool far) {
+  double length = f->high - f->low;
+  sonde_vec3 centre;
+  double low = far ? f->high - END * length : f->low, high = low + END * length;
+  if (!slab_centre(femur, f, low, high, &centre)) return vec3(0, 0, 0);
+  return across(v_sub(centre, f->origin), f->z);
+}
+
+static sonde_status leg_frame(const sonde_leg_scan *scan, frame *f, sonde_error *error) {
+  sonde_status status = shaft_line(scan->femur, f, error);
+  if (status) return status;
+  sonde_vec3 head = end_offset(scan->femur, f, false), other = end_offset(scan->femur, f, true);
+  if (v_norm(other) > v_norm(head)) {
+    head = other;
+    f->z = v_neg(f->z);
+    measure_extent(scan->femur, f);
+  }
+  double length = f->high - f->low;
+  if (!(v_norm(head) > LEAST_HEAD_M) || !(length > 0.25 && length < 0.7))
+    return sonde_fail(error, SONDE_MESH,
+                      "the femur is %.0f mm long and its head stands %.1f mm beside the shaft, "
+                      "expected 250 to 700 and more than 12: a whole femur in mm",
+                      length * 1e3, v_norm(head) * 1e3);
+  sonde_vec3 wide =
+      wide_direction(scan->femur, f, f->high - END * length, f->high, true);
+  wide = v_unit(across(wide, f->z), head);
+  f->x = v_dot(wide, head) < 0 ? v_neg(wide) : wide;
+  f->y = v_cross(f->z, f->x);
+  if (scan->left) f->y = v_neg(f->y);
+  f->origin = v_madd(f->origin, f->low + CUT_TOP * length, f->z);
+  return SONDE_OK;
+}
+
+// Distance to the first hit from a point of the frame, NaN when there is none.
+static double cast(const sonde_surface_index *index, const frame *f, sonde_vec3 from,
+                   sonde_vec3 to, double reach) {
+  sonde_surface_point hit;
+  sonde_vec3 origin = to_scan(f, from), direction = v_sub(to_scan(f, v_add(from, to)), origin);
+  if (!sonde_surface_raycast(index, origin, direction, reach, &hit)) return NAN;
+  return v_distance(hit.point_m, origin);
+}
+
+static sonde_vec3 section_middle(const sonde_surface_index *skin, const frame *f, double z) {
+  enum { RAYS = 72 };
+  sonde_vec3 middle = vec3(0, 0, z);
+  for (int pass = 0; pass < 4; ++pass) {
+    double area = 0, x = 0, y = 0, last = NAN, last_angle = 0;
+    for (int k = 0; k <= RAYS; ++k) {
+      double angle = 2 * SONDE_PI * k / RAYS;
+      double r = cast(skin, f, middle, vec3(cos(angle), sin(angle), 0), REACH_M);
+      if (isfinite(last) && isfinite(r)) { // triangle of the middle and two skin points
+        double part = 0.5 * last * r * sin(angle - last_angle);
+        area += part;
+        x += part * (last * cos(last_angle) + r * cos(angle)) / 3;
+        y += part * (last * sin(last_angle) + r * sin(angle)) / 3;
+      }
+      last = r, last_angle = angle;
+    }
+    if (area > 0) middle = v_add(middle, vec3(x / area, y / area, 0));
+  }
+  return middle;
+}
+
+// Least squares through the sections' middles.
+static void centre_line(const sonde_surface_index *skin, frame *f, double length) {
+  enum { ROWS = 21 };
+  sonde_vec3 mean = vec3(0, 0, 0), slope = vec3(0, 0, 0);
+  double weight = 0;
+  for (int k = 0; k < ROWS; ++k) {
+    double t = (double)k / (ROWS - 1) - 0.5;
+    sonde_vec3 m = section_middle(skin, f, (0.04 + 0.92 * (t + 0.5)) * length);
+    mean = v_madd(mean, 1.0 / ROWS, m);
+    slope = v_madd(slope, t, m);
+    weight += t * t;
+  }
+  slope = v_scale(slope, 1 / weight);
+  sonde_vec3 z = v_unit(slope, vec3(0, 0, 1));
+  sonde_vec3 top = v_madd(mean, -mean.z / z.z, z);
+  sonde_vec3 x = v_unit(across(vec3(1, 0, 0), z), vec3(1, 0, 0)), y = v_cross(z, x);
+  frame old = *f;
+  f->origin = to_scan(&old, top);
+  f->x = v_sub(to_scan(&old, x), old.origin);
+  f->y = v_sub(to_scan(&old, y), old.origin);
+  f->z = v_sub(to_scan(&old, z), old.origin);
+}
+
+/* ---- tables ------------------------------------------------------------------------------- */
+
+// Fills NaN entries from the nearest ones of the row on both sides; a row without any from the row
+// before it.
+static void fill_row(double *row, const double *before) {
+  for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i) {
+    if (isfinite(row[i])) continue;
+    uint32_t a = 1, b = 1;
+    const uint32_t n = SONDE_TUBE_COLUMNS;
+    while (a < n && !isfinite(row[(i + n - a) % n])) ++a;
+    while (b < n && !isfinite(row[(i + b) % n])) ++b;
+    if (a == n)
+      row[i] = before ? before[i] : 0;
+    else
+      row[i] = (b * row[(i + n - a) % n] + a * row[(i + b) % n]) / (a + b);
+  }
+}
+
+static void fill_table(double (*table)[SONDE_TUBE_COLUMNS]) {
+  uint32_t first = 0;
+  for (uint32_t j = 0; j < SONDE_TUBE_ROWS; ++j) { // a row that has something to begin with
+    uint32_t i = 0;
+    while (i < SONDE_TUBE_COLUMNS && !isfinite(table[j][i])) ++i;
+    if (i < SONDE_TUBE_COLUMNS) {
+      first = j;
+      break;
+    }
+  }
+  for (uint32_t j = first; j < SONDE_TUBE_ROWS; ++j)
+    fill_row(table[j], j > first ? table[j - 1] : NULL);
+  for (uint32_t j = first; j-- > 0;) fill_row(table[j], table[j + 1]);
+}
+
+static void smooth(double (*table)[SONDE_TUBE_COLUMNS], int passes) {
+  double old[SONDE_TUBE_ROWS];
+  const uint32_t n = SONDE_TUBE_COLUMNS, rows = SONDE_TUBE_ROWS;
+  for (int pass = 0; pass < passes; ++pass) {
+    for (uint32_t j = 0; j < rows; ++j) {
+      double row[SONDE_TUBE_COLUMNS];
+      for (uint32_t i = 0; i < n; ++i)
+        row[i] = 0.25 * (table[j][(i + n - 1) % n] + 2 * table[j][i] + table[j][(i + 1) % n]);
+      for (uint32_t i = 0; i < n; ++i) table[j][i] = row[i];
+    }
+    for (uint32_t i = 0; i < n; ++i) {
+      for (uint32_t j = 0; j < rows; ++j) old[j] = table[j][i];
+      for (uint32_t j = 0; j < rows; ++j)
+        table[j][i] = whole_nm(0.25 * (old[j > 0 ? j - 1 : 0] + 2 * old[j] +
+                                       old[j + 1 < rows ? j + 1 : j]));
+    }
+  }
+}
+
+static double row_height(double length, uint32_t row) {
+  const double inset = 1e-4; // a scan may be cut flat exactly at the ends
+  return clamp(length * row / (SONDE_TUBE_ROWS - 1), inset, length - inset);
+}
+
+static void sample_skin(const sonde_surface_index *skin, const frame *f, sonde_tube *tube,
+                        sonde_leg_report *report) {
+  for (uint32_t j = 0; j < SONDE_TUBE_ROWS; ++j)
+    for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i) {
+      double angle = tube_angle(i), z = row_height(tube->length_m, j);
+      double r = cast(skin, f, vec3(0, 0, z), vec3(cos(angle), sin(angle), 0), REACH_M);
+      tube->radius_m[j][i] = r;
+      report->rays++;
+      if (!isfinite(r)) report->missed++;
+    }
+}
+
+static int by_size(const void *a, const void *b) {
+  double p = *(const double *)a, q = *(const double *)b;
+  return (p > q) - (p < q);
+}
+
+static double median_radius(const sonde_tube *tube) {
+  double list[SONDE_TUBE_COLUMNS];
+  for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i)
+    list[i] = tube->radius_m[SONDE_TUBE_ROWS / 2][i];
+  qsort(list, SONDE_TUBE_COLUMNS, sizeof *list, by_size);
+  return list[SONDE_TUBE_COLUMNS / 2];
+}
+
+// Rays come from outside; head, neck and trochanter are held within 1.6 times the shaft's radius.
+static void sample_femur(const sonde_leg_scan *scan, const sonde_surface_index *bone,
+                         const frame *f, sonde_tube *tube) {
+  sonde_vec3 line[2]; // of the shaft, carried on to both ends
+  for (int k = 0; k < 2; ++k) {
+    double z = (k == 0 ? 0.35 : 0.85) * tube->length_m;
+    if (!slab_centre(scan->femur, f, z - 0.01, z + 0.01, &line[k])) line[k] = f->origin;
+    line[k] = to_frame(f, line[k]);
+  }
+  for (uint32_t j = 0; j < SONDE_TUBE_ROWS; ++j) {
+    double z = row_height(tube->length_m, j);
+    double t = (z - line[0].z) / (line[1].z - line[0].z);
+    sonde_vec3 middle = v_lerp(line[0], line[1], t);
+    tube->x_m[j] = whole_nm(middle.x), tube->y_m[j] = whole_nm(middle.y);
+    for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i) {
+      sonde_vec3 out = vec3(cos(tube_angle(i)), sin(tube_angle(i)), 0);
+      sonde_vec3 from = v_madd(vec3(middle.x, middle.y, z), BONE_REACH_M, out);
+      tube->radius_m[j][i] = BONE_REACH_M - cast(bone, f, from, v_neg(out), BONE_REACH_M);
+    }
+  }
+  fill_table(tube->radius_m);
+  double shaft = median_radius(tube);
+  for (uint32_t j = 0; j < SONDE_TUBE_ROWS; ++j)
+    for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i)
+      tube->radius_m[j][i] = clamp(tube->radius_m[j][i], 0.6 * shaft, WIDEST_BONE * shaft);
+  smooth(tube->radius_m, 3);
+}
+
+static void sample_muscle(const sonde_surface_index *muscle, const frame *f,
+                          const sonde_thigh *thigh, sonde_thigh_shape *shape) {
+  const sonde_tube *skin = &shape->skin;
+  for (uint32_t j = 0; j < SONDE_TUBE_ROWS; ++j)
+    for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i) {
+      double angle = tube_angle(i), z = row_height(skin->length_m, j);
+      sonde_vec3 in = v_neg(sonde_tube_normal(skin, angle, z));
+      double depth = cast(muscle, f, sonde_tube_point(skin, angle, z), in, 0.06);
+      shape->fat_m[j][i] = isfinite(depth) ? fmax(depth - thigh->skin_m, 0.002) : NAN;
+    }
+  fill_table(shape->fat_m);
+  smooth(shape->fat_m, 3);
+}
+
+/* ---- the whole ---------------------------------------------------------------------------- */
+
+static void describe(sonde_thigh_shape *shape, sonde_thigh *thigh, bool fat) {
+  const sonde_tube *skin = &shape->skin;
+  double length = skin->length_m, half = 0.5 * length;
+  thigh->length_m = length;
+  thigh->girth_m = sonde_tube_girth(skin, half);
+  thigh->girth_proximal_m = fmax(sonde_tube_girth(skin, 0), thigh->girth_m);
+  thigh->girth_distal_m = fmin(sonde_tube_girth(skin, length), thigh->girth_m);
+  thigh->femur_m = whole_nm(sonde_tube_girth(&shape->femur, half) / SONDE_PI);
+  thigh->femur_lateral_m = clamp(-shape->femur.x_m[0], 0, 0.045);
+  thigh->femur_anterior_m = clamp(shape->femur.y_m[SONDE_TUBE_ROWS / 2], 0, 0.025);
+  if (!fat) return;
+  double *side[] = {&thigh->fat_inner_m, &thigh->fat_front_m, &thigh->fat_outer_m,
+                    &thigh->fat_back_m};
+  for (int k = 0; k < 4; ++k)
+    *side[k] = whole_nm(
+        clamp(sonde_tube_lookup(skin, shape->fat_m, 0.5 * SONDE_PI * k, half), 0.002, 0.06));
+}
+
+typedef struct indices {
+  sonde_surface_index *skin, *femur, *muscle;
+} indices;
+
+static sonde_status sample(const sonde_leg_scan *scan, const indices *in, sonde_thigh *thigh,
+                           sonde_thigh_shape *shape, sonde_leg_report *report,
+                           sonde_error *error) {
+  frame f;
+  sonde_status status = leg_frame(scan, &f, error);
+  if (status) return status;
+  report->femur_length_m = f.high - f.low;
+  double length = whole_nm((CUT_BOTTOM - CUT_TOP) * report->femur_length_m);
+  shape->skin.length_m = shape->femur.length_m = length;
+  centre_line(in->skin, &f, length);
+  sample_skin(in->skin, &f, &shape->skin, report);
+  if (report->missed > MOST_MISSED * report->rays)
+    return sonde_fail(error, SONDE_MESH,
+                      "%u of %u rays from the middle of the thigh miss the skin, expected at most "
+                      "5 %%: it must reach from the groin to the knee around the femur",
+                      report->missed, report->rays);
+  fill_table(shape->skin.radius_m);
+  smooth(shape->skin.radius_m, 2);
+  sample_femur(scan, in->femur, &f, &shape->femur);
+  sonde_shape_fill_fat(thigh, shape);
+  if (in->muscle) sample_muscle(in->muscle, &f, thigh, shape);
+  describe(shape, thigh, in->muscle != NULL);
+  return sonde_thigh_check(thigh, error);
+}
+
+sonde_status sonde_thigh_shape_scan(const sonde_leg_scan *scan, sonde_thigh *thigh,
+                                    sonde_thigh_shape **out, sonde_leg_report *report,
+                                    sonde_error *error) {
+  SONDE_ASSERT(scan->skin && scan->femur && thigh && report);
+  *out = NULL;
+  *report = (sonde_leg_report){0};
+  indices in = {0};
+  sonde_thigh_shape *shape = SONDE_NEW(sonde_thigh_shape, 1);
+  sonde_status status = shape ? SONDE_OK : sonde_fail_memory(error);
+  if (!status) status = sonde_surface_index_create(scan->skin, &in.skin, error);
+  if (!status) status = sonde_surface_index_create(scan->femur, &in.femur, error);
+  if (!status && scan->muscle) status = sonde_surface_index_create(scan->muscle, &in.muscle, error);
+  if (!status) status = sample(scan, &in, thigh, shape, report, error);
+  sonde_surface_index_destroy(in.skin);
+  sonde_surface_index_destroy(in.femur);
+  sonde_surface_index_destroy(in.muscle);
+  if (status)
+    sonde_thigh_shape_destroy(shape);
+  else
+    *out = shape;
+  return status;
+}

@@ -1,0 +1,114 @@
+// The shape that parameters describe.
+// between:      a value given at groin, middle and knee, quadratic in between.
+// outline:      the section's radius up to a factor.
+// scale_row:    the factor that gives the girth.
+// fat_around:   fat between four sides: its logarithm by two harmonics, so that it stays positive.
+// check_muscle: room between fat and femur.
+#include "anatomy/shape.h"
+
+static const double LEAST_MUSCLE_M = 0.012;
+static const double FAT_TAPER = 0.25; // more at the groin, less at the knee
+
+static double between(double groin, double middle, double knee, double t) {
+  return groin * (1 - t) * (1 - 2 * t) + 4 * middle * t * (1 - t) + knee * t * (2 * t - 1);
+}
+
+static double outline(const sonde_thigh *thigh, double angle, double t) {
+  double second = thigh->oval * (1 - 0.45 * t), third = 0.02 * (1 - 0.4 * t);
+  return 1 + second * cos(2 * (angle - 1.745)) + third * cos(3 * (angle - 0.349));
+}
+
+static void scale_row(const sonde_thigh *thigh, sonde_tube *skin, uint32_t row) {
+  double t = (double)row / (SONDE_TUBE_ROWS - 1), z = t * skin->length_m;
+  for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i)
+    skin->radius_m[row][i] = outline(thigh, tube_angle(i), t);
+  double wanted = between(thigh->girth_proximal_m, thigh->girth_m, thigh->girth_distal_m, t);
+  double factor = wanted / sonde_tube_girth(skin, z);
+  for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i)
+    skin->radius_m[row][i] = whole_nm(factor * skin->radius_m[row][i]);
+}
+
+static double fat_around(const sonde_thigh *thigh, double angle) {
+  double inner = log(thigh->fat_inner_m), outer = log(thigh->fat_outer_m);
+  double front = log(thigh->fat_front_m), back = log(thigh->fat_back_m);
+  return exp(0.25 * (inner + outer + front + back) + 0.5 * (inner - outer) * cos(angle) +
+             0.5 * (front - back) * sin(angle) +
+             0.25 * (inner + outer - front - back) * cos(2 * angle));
+}
+
+void sonde_shape_fill_fat(const sonde_thigh *thigh, sonde_thigh_shape *shape) {
+  for (uint32_t j = 0; j < SONDE_TUBE_ROWS; ++j) {
+    double taper = 1 + FAT_TAPER * (1 - 2.0 * j / (SONDE_TUBE_ROWS - 1));
+    for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i)
+      shape->fat_m[j][i] = whole_nm(taper * fat_around(thigh, tube_angle(i)));
+  }
+}
+
+// The shaft widens towards the trochanter and the condyles, and comes from the side to the middle.
+static void fill_femur(const sonde_thigh *thigh, sonde_tube *femur) {
+  const double at_knee_m = fmin(0.003, thigh->femur_lateral_m);
+  for (uint32_t j = 0; j < SONDE_TUBE_ROWS; ++j) {
+    double t = (double)j / (SONDE_TUBE_ROWS - 1);
+    double up = fmax(0, (0.15 - t) / 0.15), down = fmax(0, (t - 0.7) / 0.3);
+    double radius = 0.5 * thigh->femur_m * (1 + 0.35 * (up * up + down * down));
+    femur->x_m[j] = whole_nm(-at_knee_m - (thigh->femur_lateral_m - at_knee_m) * (1 - t) * (1 - t));
+    femur->y_m[j] = thigh->femur_anterior_m;
+    for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i) femur->radius_m[j][i] = whole_nm(radius);
+  }
+}
+
+double sonde_shape_fat(const sonde_thigh_shape *shape, sonde_vec3 point_m) {
+  sonde_thigh_shape *s = (sonde_thigh_shape *)(uintptr_t)shape;
+  return sonde_tube_lookup(&shape->skin, s->fat_m, sonde_tube_angle_of(&shape->skin, point_m),
+                           point_m.z);
+}
+
+double sonde_shape_least_muscle(const sonde_thigh_shape *shape, const sonde_thigh *thigh,
+                                double *z_m) {
+  double least = INFINITY;
+  for (uint32_t j = 0; j < SONDE_TUBE_ROWS; ++j) {
+    double z = shape->skin.length_m * j / (SONDE_TUBE_ROWS - 1);
+    for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i) {
+      double angle = tube_angle(i), depth = thigh->skin_m + shape->fat_m[j][i];
+      sonde_vec3 skin = sonde_tube_point(&shape->skin, angle, z);
+      sonde_vec3 below = v_madd(skin, -depth, sonde_tube_normal(&shape->skin, angle, z));
+      double muscle = sonde_tube_outside(&shape->femur, below);
+      if (muscle < least) least = muscle, *z_m = z;
+    }
+  }
+  return least;
+}
+
+static sonde_status check_muscle(const sonde_thigh *thigh, const sonde_thigh_shape *shape,
+                                 sonde_error *error) {
+  double z_m = 0, least = sonde_shape_least_muscle(shape, thigh, &z_m);
+  if (least >= LEAST_MUSCLE_M) return SONDE_OK;
+  double here = sonde_tube_girth(&shape->skin, z_m);
+  double more = 2 * SONDE_PI * (LEAST_MUSCLE_M - least) * thigh->girth_m / here;
+  return sonde_fail(error, SONDE_ARGUMENT,
+                    "girth-mm is %g: fat and femur leave %.1f mm of muscle at %.0f mm from the "
+                    "groin, expected 12; girth-mm from about %.0f to 900 would do, or less fat",
+                    thigh->girth_m * 1e3, least * 1e3, z_m * 1e3, (thigh->girth_m + more) * 1e3);
+}
+
+sonde_status sonde_thigh_shape_create(const sonde_thigh *thigh, sonde_thigh_shape **out,
+                                      sonde_error *error) {
+  *out = NULL;
+  sonde_status status = sonde_thigh_check(thigh, error);
+  if (status) return status;
+  sonde_thigh_shape *shape = SONDE_NEW(sonde_thigh_shape, 1);
+  if (!shape) return sonde_fail_memory(error);
+  shape->skin.length_m = shape->femur.length_m = thigh->length_m;
+  for (uint32_t j = 0; j < SONDE_TUBE_ROWS; ++j) scale_row(thigh, &shape->skin, j);
+  sonde_shape_fill_fat(thigh, shape);
+  fill_femur(thigh, &shape->femur);
+  status = check_muscle(thigh, shape, error);
+  if (status) {
+    sonde_thigh_shape_destroy(shape);
+    return status;
+  }
+  *out = shape;
+  return SONDE_OK;
+}
+
+void sonde_thigh_shape_destroy(sonde_thigh_shape *shape) { sonde_free(shape); }

@@ -1,0 +1,244 @@
+// The section `anatomy` of the model file (docs/model_file.md).
+// put_names:   vessels, landmarks and segments by name in the header.
+// put_numbers: their points and the muscle levels as arrays.
+// take_*:      the same back, each checked against the room that the struct has.
+#include "tissue/model_file.h"
+
+#include "base/base.h"
+#include "base/maths.h"
+
+#include <string.h>
+
+enum { SECTION_VERSION = 1, LEVEL_COLUMNS = 6, POINT_COLUMNS = 5 };
+enum { ALL_POINTS = SONDE_BRANCHES * SONDE_VESSEL_POINTS };
+static const char *const KIND[] = {"vein", "artery"};
+
+/* ---- writing ------------------------------------------------------------------------------ */
+
+static bool put_names(cJSON *section, const sonde_thigh_anatomy *a) {
+  cJSON *vessels = cJSON_AddArrayToObject(section, "vessels");
+  cJSON *landmarks = cJSON_AddArrayToObject(section, "landmarks");
+  cJSON *segments = cJSON_AddArrayToObject(section, "segments");
+  bool ok = vessels && landmarks && segments;
+  for (uint32_t k = 0; ok && k < a->branch_count; ++k) {
+    cJSON *entry = cJSON_CreateObject();
+    ok = cJSON_AddItemToArray(vessels, entry) &&
+         cJSON_AddStringToObject(entry, "name", a->branch[k].name) &&
+         cJSON_AddStringToObject(entry, "kind", KIND[a->branch[k].kind]) &&
+         cJSON_AddNumberToObject(entry, "points", a->branch[k].line.count);
+  }
+  for (uint32_t k = 0; ok && k < a->landmark_count; ++k)
+    ok = cJSON_AddItemToArray(landmarks, cJSON_CreateString(a->landmark[k].name));
+  for (uint32_t k = 0; ok && k < a->segment_count; ++k) {
+    cJSON *entry = cJSON_CreateObject();
+    ok = cJSON_AddItemToArray(segments, entry) &&
+         cJSON_AddStringToObject(entry, "name", a->segment[k].name) &&
+         cJSON_AddNumberToObject(entry, "from_m", a->segment[k].from_m) &&
+         cJSON_AddNumberToObject(entry, "to_m", a->segment[k].to_m);
+  }
+  return ok && cJSON_AddNumberToObject(section, "fascia_medial_m", a->fascia_medial_m) &&
+         cJSON_AddNumberToObject(section, "fascia_lateral_m", a->fascia_lateral_m) &&
+         cJSON_AddItemToObject(section, "pennation_rad",
+                               cJSON_CreateDoubleArray(a->pennation_rad, SONDE_COMPARTMENTS));
+}
+
+static void put_points(sonde_model_writer *w, const sonde_thigh_anatomy *a) {
+  double(*row)[POINT_COLUMNS] = sonde_calloc(ALL_POINTS, sizeof *row);
+  if (!row) {
+    w->failed = true;
+    return;
+  }
+  uint32_t rows = 0;
+  for (uint32_t b = 0; b < a->branch_count; ++b)
+    for (uint32_t k = 0; k < a->branch[b].line.count; ++k, ++rows) {
+      const sonde_vessel_point *p = &a->branch[b].line.point[k];
+      memcpy(row[rows], &p->centre_m, 24);
+      row[rows][3] = p->radius_m;
+      row[rows][4] = p->depth_m;
+    }
+  sonde_model_put(w, "anatomy_vessels", "f64", "centre m, radius m, depth m", rows, POINT_COLUMNS,
+                  row);
+  sonde_free(row);
+}
+
+static void put_numbers(sonde_model_writer *w, const sonde_thigh_anatomy *a) {
+  double mark[SONDE_LANDMARKS][9], level[SONDE_LEVELS][LEVEL_COLUMNS];
+  uint32_t site[SONDE_LANDMARKS];
+  for (uint32_t k = 0; k < a->landmark_count; ++k) {
+    memcpy(mark[k], &a->landmark[k].skin_m, 24);
+    memcpy(mark[k] + 3, &a->landmark[k].normal, 24);
+    memcpy(mark[k] + 6, &a->landmark[k].vein_m, 24);
+    site[k] = a->landmark[k].site;
+  }
+  for (uint32_t k = 0; k < a->level_count; ++k) {
+    const sonde_muscle_level *l = &a->level[k];
+    const double row[LEVEL_COLUMNS] = {l->z_m,           l->bone_x_m,      l->bone_y_m,
+                                       l->septum_rad[0], l->septum_rad[1], l->septum_rad[2]};
+    memcpy(level[k], row, sizeof row);
+  }
+  put_points(w, a);
+  sonde_model_put(w, "anatomy_landmarks", "f64", "skin m, normal, vein m", a->landmark_count, 9,
+                  mark);
+  sonde_model_put(w, "anatomy_landmark_sites", "u32", "1", a->landmark_count, 1, site);
+  sonde_model_put(w, "anatomy_levels", "f64", "z m, bone x m, bone y m, septa rad", a->level_count,
+                  LEVEL_COLUMNS, level);
+}
+
+void sonde_anatomy_put(sonde_model_writer *w, cJSON *header, const sonde_model *model) {
+  const sonde_thigh_anatomy *a = model->anatomy;
+  if (!a) return;
+  SONDE_ASSERT(a->branch_count <= SONDE_BRANCHES && a->landmark_count <= SONDE_LANDMARKS);
+  SONDE_ASSERT(a->segment_count <= SONDE_SEGMENTS && a->level_count <= SONDE_LEVELS);
+  cJSON *section = cJSON_AddObjectToObject(header, "anatomy");
+  w->failed |= !section || !cJSON_AddNumberToObject(section, "version", SECTION_VERSION) ||
+               !put_names(section, a);
+  if (!w->failed) put_numbers(w, a);
+}
+
+/* ---- reading ------------------------------------------------------------------------------ */
+
+static sonde_status wrong(const sonde_model_reader *r, const char *what) {
+  return sonde_fail(r->error, SONDE_FORMAT, "%s: anatomy: %s", r->path, what);
+}
+
+static bool take_name(const cJSON *text, char to[32]) {
+  const char *name = cJSON_GetStringValue(text);
+  if (name) snprintf(to, 32, "%s", name);
+  return name && name[0];
+}
+
+static bool finite_row(const double *row, int count) {
+  for (int k = 0; k < count; ++k)
+    if (!(fabs(row[k]) < 100)) return false;
+  return true;
+}
+
+// A number of entries from 0 to `room`.
+static bool take_count(const cJSON *list, uint32_t room, uint32_t *count) {
+  int entries = cJSON_GetArraySize(list);
+  *count = (uint32_t)entries;
+  return cJSON_IsArray(list) && entries >= 0 && (uint32_t)entries <= room;
+}
+
+// Points [points] of a branch from consecutive rows.
+static bool take_line(const char *row, uint32_t points, sonde_vessel *line) {
+  line->count = points;
+  for (uint32_t k = 0; k < points; ++k, row += POINT_COLUMNS * 8) {
+    double x[POINT_COLUMNS];
+    memcpy(x, row, sizeof x);
+    if (!finite_row(x, POINT_COLUMNS) || !(x[3] >= 1e-6) || !(x[4] >= 0)) return false;
+    line->point[k] = (sonde_vessel_point){vec3(x[0], x[1], x[2]), x[3], x[4]};
+  }
+  return true;
+}
+
+static sonde_status take_vessels(const sonde_model_reader *r, const cJSON *section,
+                                 sonde_thigh_anatomy *a) {
+  const cJSON *list = cJSON_GetObjectItem(section, "vessels"), *entry = NULL;
+  uint32_t rows, used = 0, b = 0;
+  const char *row = sonde_model_take(r, "anatomy_vessels", "f64", POINT_COLUMNS, &rows);
+  if (!row) return SONDE_FORMAT;
+  if (!take_count(list, SONDE_BRANCHES, &a->branch_count)) return wrong(r, "too many vessels");
+  cJSON_ArrayForEach(entry, list) {
+    sonde_branch *branch = &a->branch[b++];
+    const char *kind = cJSON_GetStringValue(cJSON_GetObjectItem(entry, "kind"));
+    double points = cJSON_GetNumberValue(cJSON_GetObjectItem(entry, "points"));
+    bool artery = kind && strcmp(kind, KIND[SONDE_VESSEL_ARTERY]) == 0;
+    if (!take_name(cJSON_GetObjectItem(entry, "name"), branch->name) || !kind ||
+        (!artery && strcmp(kind, KIND[SONDE_VESSEL_VEIN]) != 0))
+      return wrong(r, "a vessel lacks its name or kind");
+    branch->kind = artery ? SONDE_VESSEL_ARTERY : SONDE_VESSEL_VEIN;
+    if (!(points >= 2 && points <= SONDE_VESSEL_POINTS && points <= rows - used))
+      return wrong(r, "a vessel has a wrong number of points");
+    if (!take_line(row + (size_t)used * POINT_COLUMNS * 8, (uint32_t)points, &branch->line))
+      return wrong(r, "a vessel has a point out of range");
+    used += (uint32_t)points;
+  }
+  return SONDE_OK;
+}
+
+static sonde_status take_landmarks(const sonde_model_reader *r, const cJSON *section,
+                                   sonde_thigh_anatomy *a) {
+  const cJSON *list = cJSON_GetObjectItem(section, "landmarks"), *entry = NULL;
+  uint32_t rows, sites, k = 0;
+  const char *row = sonde_model_take(r, "anatomy_landmarks", "f64", 9, &rows);
+  const char *site = row ? sonde_model_take(r, "anatomy_landmark_sites", "u32", 1, &sites) : NULL;
+  if (!site) return SONDE_FORMAT;
+  if (!take_count(list, SONDE_LANDMARKS, &a->landmark_count) || a->landmark_count != rows ||
+      rows != sites)
+    return wrong(r, "landmarks do not match their rows");
+  cJSON_ArrayForEach(entry, list) {
+    sonde_landmark *mark = &a->landmark[k];
+    double x[9];
+    memcpy(x, row + (size_t)k * sizeof x, sizeof x);
+    memcpy(&mark->site, site + (size_t)k * 4, 4);
+    if (!take_name(entry, mark->name) || !finite_row(x, 9))
+      return wrong(r, "a landmark lacks its name or place");
+    memcpy(&mark->skin_m, x, 24);
+    memcpy(&mark->normal, x + 3, 24);
+    memcpy(&mark->vein_m, x + 6, 24);
+    ++k;
+  }
+  return SONDE_OK;
+}
+
+static sonde_status take_segments(const sonde_model_reader *r, const cJSON *section,
+                                  sonde_thigh_anatomy *a) {
+  const cJSON *list = cJSON_GetObjectItem(section, "segments"), *entry = NULL;
+  if (!take_count(list, SONDE_SEGMENTS, &a->segment_count)) return wrong(r, "too many segments");
+  uint32_t k = 0;
+  cJSON_ArrayForEach(entry, list) {
+    sonde_segment *s = &a->segment[k++];
+    s->from_m = cJSON_GetNumberValue(cJSON_GetObjectItem(entry, "from_m"));
+    s->to_m = cJSON_GetNumberValue(cJSON_GetObjectItem(entry, "to_m"));
+    if (!take_name(cJSON_GetObjectItem(entry, "name"), s->name) || !finite_row(&s->from_m, 2))
+      return wrong(r, "a segment lacks its name or ends");
+  }
+  return SONDE_OK;
+}
+
+static sonde_status take_levels(const sonde_model_reader *r, sonde_thigh_anatomy *a) {
+  uint32_t rows;
+  const char *row = sonde_model_take(r, "anatomy_levels", "f64", LEVEL_COLUMNS, &rows);
+  if (!row) return SONDE_FORMAT;
+  if (rows < 2 || rows > SONDE_LEVELS) return wrong(r, "a wrong number of levels");
+  a->level_count = rows;
+  for (uint32_t k = 0; k < rows; ++k) {
+    double x[LEVEL_COLUMNS];
+    memcpy(x, row + (size_t)k * sizeof x, sizeof x);
+    if (!finite_row(x, LEVEL_COLUMNS) || (k > 0 && !(x[0] > a->level[k - 1].z_m)) ||
+        !(x[3] < x[4] && x[4] < x[5]))
+      return wrong(r, "a level is out of order");
+    a->level[k] = (sonde_muscle_level){x[0], x[1], x[2], {x[3], x[4], x[5]}};
+  }
+  return SONDE_OK;
+}
+
+static sonde_status take_scalars(const sonde_model_reader *r, const cJSON *section,
+                                 sonde_thigh_anatomy *a) {
+  const cJSON *angle = cJSON_GetObjectItem(section, "pennation_rad");
+  for (int k = 0; k < SONDE_COMPARTMENTS; ++k)
+    a->pennation_rad[k] = cJSON_GetNumberValue(cJSON_GetArrayItem(angle, k));
+  a->fascia_medial_m = cJSON_GetNumberValue(cJSON_GetObjectItem(section, "fascia_medial_m"));
+  a->fascia_lateral_m = cJSON_GetNumberValue(cJSON_GetObjectItem(section, "fascia_lateral_m"));
+  bool ok = finite_row(a->pennation_rad, SONDE_COMPARTMENTS) && a->fascia_medial_m >= 0 &&
+            a->fascia_lateral_m >= 0 && finite_row(&a->fascia_medial_m, 2);
+  return ok ? SONDE_OK : wrong(r, "pennation or fascia is missing or out of range");
+}
+
+sonde_status sonde_anatomy_take(const sonde_model_reader *r, sonde_model *model) {
+  const cJSON *section = cJSON_GetObjectItem(r->header, "anatomy");
+  if (!section) return SONDE_OK;
+  SONDE_ASSERT(!model->anatomy);
+  double version = cJSON_GetNumberValue(cJSON_GetObjectItem(section, "version"));
+  if (!(version == SECTION_VERSION))
+    return sonde_fail(r->error, SONDE_VERSION, "%s: anatomy has version %g, expected %d", r->path,
+                      version, SECTION_VERSION);
+  sonde_thigh_anatomy *a = model->anatomy = SONDE_NEW(sonde_thigh_anatomy, 1);
+  if (!a) return sonde_fail_memory(r->error);
+  sonde_status status = take_vessels(r, section, a);
+  if (!status) status = take_landmarks(r, section, a);
+  if (!status) status = take_segments(r, section, a);
+  if (!status) status = take_levels(r, a);
+  return status ? status : take_scalars(r, section, a);
+}
