@@ -171,7 +171,7 @@ static sonde_status make(const sonde_thigh *thigh, const sonde_thigh_shape *shap
                          sonde_course *course, sonde_model **model, sonde_error *error) {
   sonde_site sites[SITES];
   sonde_status status = sonde_tube_mesh(&shape->skin, def->edge_m, skin, error);
-  if (!status) status = sonde_tube_mesh(&shape->femur, 0.005, femur, error);
+  if (!status) status = sonde_tube_mesh(&shape->femur, 0.004, femur, error);
   if (!status) status = sonde_course_place(thigh, shape, skin, course, error);
   if (status) return status;
   place_sites(thigh, shape, sites);

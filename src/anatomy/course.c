@@ -1,13 +1,14 @@
 // Where the vessels run (docs/anatomy.md).
 // vein_angle, cover, calibre: the femoral vein by its share of the thigh's length, groin 0, knee 1.
 // lay_vein:      below the skin at its angle, under fat and cover.
-// lay_artery:    beside the vein: lateral of it at the groin, in front from the middle on.
+// beside_vein, lay_artery: lateral of the vein at the groin, in front from the middle on.
 // lay_saphenous: in the fat above the fascia, into the common femoral vein.
 // lay_deep:      artery and vein that leave backwards along the femur.
 // lay_second:    a second femoral vein on the other side of the artery.
 // side_of:       the skin without its flat ends.
 // gap_between:   least distance of two vessels' walls.
-// check_*:       walls apart, below the fascia, outside the bone; all covers shrink until it holds.
+// check_*:       walls apart, below the fascia, outside the bone; all covers shrink or grow until
+// it holds.
 #include "anatomy/shape.h"
 
 #include <string.h>
@@ -32,13 +33,13 @@ double sonde_course_confluence(const sonde_thigh *thigh) {
   return thigh->deep_branch_m / thigh->length_m + 0.07;
 }
 
-// 30 degrees less at mid-thigh, 100 less above the knee.
+// 30 degrees less at mid-thigh, 110 less above the knee.
 double sonde_course_angle(const sonde_thigh *thigh, double share) {
-  return thigh->vein_angle_rad - (20 * share + 80 * share * share) * SONDE_PI / 180;
+  return thigh->vein_angle_rad - (10 * share + 100 * share * share) * SONDE_PI / 180;
 }
 
 static double cover(const layout *l, double t) {
-  double a = l->thigh->vein_cover_m, b = l->thigh->canal_cover_m, c = b + 0.006;
+  double a = l->thigh->vein_cover_m, b = l->thigh->canal_cover_m, c = b + 0.01;
   double all = a * (1 - t) * (1 - 2 * t) + 4 * b * t * (1 - t) + c * t * (2 * t - 1);
   return l->cover_scale * fmax(all, 0.001);
 }
@@ -90,6 +91,31 @@ static sonde_vec3 tangent(const sonde_vessel *line, uint32_t k) {
   return v_unit(v_sub(line->point[b].centre_m, line->point[a].centre_m), vec3(0, 0, 1));
 }
 
+static sonde_vec3 turned(sonde_vec3 v, double angle) {
+  return vec3(v.x * cos(angle) - v.y * sin(angle), v.x * sin(angle) + v.y * cos(angle), v.z);
+}
+
+// How far a vessel's wall lies below the fascia there.
+static double below_fascia(const layout *l, sonde_vec3 centre, double radius) {
+  sonde_surface_point above = sonde_surface_closest(l->skin, centre);
+  return above.distance_m - radius - l->thigh->skin_m - sonde_shape_fat(l->shape, above.point_m);
+}
+
+// Beside the vein in the direction `to`, which turns away from the skin where the fascia is near.
+static sonde_vec3 beside_vein(const layout *l, uint32_t k, sonde_vec3 to, double radius) {
+  const sonde_vessel_point *vein = &l->course->vein.point[k];
+  sonde_vec3 along = tangent(&l->course->vein, k), centre = vein->centre_m;
+  sonde_vec3 up = v_sub(sonde_surface_closest(l->skin, centre).point_m, centre);
+  double way = v_dot(turned(to, 0.01), up) < v_dot(to, up) ? 1 : -1;
+  for (int degree = 0; degree <= 60; ++degree) {
+    sonde_vec3 side = turned(to, way * degree * SONDE_PI / 180);
+    side = v_unit(v_madd(side, -v_dot(side, along), along), side);
+    centre = v_madd(vein->centre_m, vein->radius_m + radius + WALL_GAP_M, side);
+    if (below_fascia(l, centre, radius) > 2 * LEAST_COVER_M) break;
+  }
+  return centre;
+}
+
 // From lateral (10 degrees) by the front (80 at mid-thigh) to the medial front (125 at the knee).
 static void lay_artery(const layout *l) {
   sonde_course *c = l->course;
@@ -97,10 +123,7 @@ static void lay_artery(const layout *l) {
   for (uint32_t k = 0; k < SONDE_VESSEL_POINTS; ++k) {
     double t = share_of(k), radius = 0.5 * l->thigh->artery_m * calibre(t);
     double side = (10 + 165 * t - 50 * t * t) * SONDE_PI / 180;
-    sonde_vec3 along = tangent(&c->vein, k), to = vec3(-cos(side), sin(side), 0);
-    to = v_unit(v_madd(to, -v_dot(to, along), along), to);
-    double apart = c->vein.point[k].radius_m + radius + WALL_GAP_M;
-    add(l, &c->artery, v_madd(c->vein.point[k].centre_m, apart, to), radius);
+    add(l, &c->artery, beside_vein(l, k, vec3(-cos(side), sin(side), 0), radius), radius);
   }
 }
 
@@ -172,10 +195,6 @@ static void lay_deep(const layout *l) {
   }
 }
 
-static sonde_vec3 turned(sonde_vec3 v, double angle) {
-  return vec3(v.x * cos(angle) - v.y * sin(angle), v.x * sin(angle) + v.y * cos(angle), v.z);
-}
-
 static void lay_second(const layout *l) {
   enum { POINTS = 40 };
   const double from = 0.32, to = 0.74;
@@ -230,13 +249,13 @@ static sonde_status check_line(const layout *l, const char *name, const sonde_ve
   bool superficial = strcmp(name, "great_saphenous") == 0;
   for (uint32_t k = 0; k < line->count; ++k) {
     const sonde_vessel_point *p = &line->point[k];
-    double fascia = l->thigh->skin_m + sonde_shape_fat(l->shape, p->centre_m), z = p->centre_m.z;
+    double z = p->centre_m.z;
     if (z < 0 || z > l->thigh->length_m) return blame(name, "leaves the thigh", z, error);
     if (sonde_tube_outside(&l->shape->femur, p->centre_m) < p->radius_m + LEAST_BONE_GAP_M)
       return blame(name, "meets the femur", z, error);
     if (superficial && p->depth_m < l->thigh->skin_m + p->radius_m * 0.9)
       return blame(name, "meets the skin", z, error);
-    if (!superficial && p->depth_m - p->radius_m < fascia + LEAST_COVER_M * l->cover_scale)
+    if (!superficial && below_fascia(l, p->centre_m, p->radius_m) < LEAST_COVER_M)
       return blame(name, "leaves the muscle", z, error);
   }
   return SONDE_OK;
@@ -304,9 +323,10 @@ sonde_status sonde_course_place(const sonde_thigh *thigh, const sonde_thigh_shap
   sonde_mesh_clear(&side);
   if (status) return status;
   l.skin = index;
-  for (int k = 0; k <= 16; ++k) {
-    l.cover_scale = 1 - 0.05 * k;
-    status = lay_all(&l, error);
+  for (int k = 0; k <= 24; ++k) { // shallower and deeper in turn
+    l.cover_scale = k % 2 ? 1 - 0.06 * ((k + 1) / 2) : 1 + 0.12 * (k / 2);
+    sonde_error later;
+    status = lay_all(&l, k == 0 ? error : &later); // the first complaint is the one to tell
     if (!status) break;
   }
   sonde_surface_index_destroy(index);

@@ -2,6 +2,7 @@
 // shaft_line:   straight line through the middle of the femur's middle third.
 // leg_frame:    knee by the end without the head, medial side by the condyles' width and the head.
 // centre_line:  the frame turned so that z runs through the middles of the skin's sections.
+// bone_line:    the femur's middle, with its bow.
 // sample_skin, sample_femur, sample_muscle: tables by rays; misses are filled from neighbours.
 // smooth:       one binomial pass over a table.
 #include "anatomy/shape.h"
@@ -9,8 +10,8 @@
 #include <stdlib.h>
 
 static const double CUT_TOP = 0.09, CUT_BOTTOM = 0.80; // of the femur's length, from the head
-static const double END = 0.12;                        // of its length: head, condyles
-static const double LEAST_HEAD_M = 0.012, MOST_MISSED = 0.05;
+static const double HEAD = 0.05, CONDYLES = 0.12;      // ends of the femur, of its length
+static const double LEAST_HEAD_M = 0.02, MOST_MISSED = 0.05;
 static const double REACH_M = 0.25, BONE_REACH_M = 0.07, WIDEST_BONE = 1.6; // of the shaft
 
 // Columns of x, y, z: model_from_scan p = axes^T (p - origin).
@@ -27,11 +28,10 @@ static sonde_vec3 to_frame(const frame *f, sonde_vec3 p) {
   return vec3(v_dot(d, f->x), v_dot(d, f->y), v_dot(d, f->z));
 }
 
-static sonde_vec3 across(sonde_vec3 d, sonde_vec3 axis) {
-  return v_madd(d, -v_dot(d, axis), axis);
-}
+static sonde_vec3 across(sonde_vec3 d, sonde_vec3 axis) { return v_madd(d, -v_dot(d, axis), axis); }
 
-// Largest principal direction of the vertices within [low, high] along the axis, by power iteration.
+// Largest principal direction of the vertices within [low, high] along the axis, by power
+// iteration.
 static sonde_vec3 wide_direction(const sonde_mesh *mesh, const frame *f, double low, double high,
                                  bool only_across) {
   sonde_vec3 mean = vec3(0, 0, 0);
@@ -105,7 +105,7 @@ static sonde_status shaft_line(const sonde_mesh *femur, frame *f, sonde_error *e
 static sonde_vec3 end_offset(const sonde_mesh *femur, const frame *f, bool far) {
   double length = f->high - f->low;
   sonde_vec3 centre;
-  double low = far ? f->high - END * length : f->low, high = low + END * length;
+  double low = far ? f->high - HEAD * length : f->low, high = low + HEAD * length;
   if (!slab_centre(femur, f, low, high, &centre)) return vec3(0, 0, 0);
   return across(v_sub(centre, f->origin), f->z);
 }
@@ -123,10 +123,9 @@ static sonde_status leg_frame(const sonde_leg_scan *scan, frame *f, sonde_error 
   if (!(v_norm(head) > LEAST_HEAD_M) || !(length > 0.25 && length < 0.7))
     return sonde_fail(error, SONDE_MESH,
                       "the femur is %.0f mm long and its head stands %.1f mm beside the shaft, "
-                      "expected 250 to 700 and more than 12: a whole femur in mm",
+                      "expected 250 to 700 and more than 20: a whole femur in mm",
                       length * 1e3, v_norm(head) * 1e3);
-  sonde_vec3 wide =
-      wide_direction(scan->femur, f, f->high - END * length, f->high, true);
+  sonde_vec3 wide = wide_direction(scan->femur, f, f->high - CONDYLES * length, f->high, true);
   wide = v_unit(across(wide, f->z), head);
   f->x = v_dot(wide, head) < 0 ? v_neg(wide) : wide;
   f->y = v_cross(f->z, f->x);
@@ -136,8 +135,8 @@ static sonde_status leg_frame(const sonde_leg_scan *scan, frame *f, sonde_error 
 }
 
 // Distance to the first hit from a point of the frame, NaN when there is none.
-static double cast(const sonde_surface_index *index, const frame *f, sonde_vec3 from,
-                   sonde_vec3 to, double reach) {
+static double cast(const sonde_surface_index *index, const frame *f, sonde_vec3 from, sonde_vec3 to,
+                   double reach) {
   sonde_surface_point hit;
   sonde_vec3 origin = to_scan(f, from), direction = v_sub(to_scan(f, v_add(from, to)), origin);
   if (!sonde_surface_raycast(index, origin, direction, reach, &hit)) return NAN;
@@ -234,8 +233,8 @@ static void smooth(double (*table)[SONDE_TUBE_COLUMNS], int passes) {
     for (uint32_t i = 0; i < n; ++i) {
       for (uint32_t j = 0; j < rows; ++j) old[j] = table[j][i];
       for (uint32_t j = 0; j < rows; ++j)
-        table[j][i] = whole_nm(0.25 * (old[j > 0 ? j - 1 : 0] + 2 * old[j] +
-                                       old[j + 1 < rows ? j + 1 : j]));
+        table[j][i] =
+            whole_nm(0.25 * (old[j > 0 ? j - 1 : 0] + 2 * old[j] + old[j + 1 < rows ? j + 1 : j]));
     }
   }
 }
@@ -270,19 +269,31 @@ static double median_radius(const sonde_tube *tube) {
   return list[SONDE_TUBE_COLUMNS / 2];
 }
 
+enum { KNOTS = 5 };
+
+// The bone's middle at some heights, by the surface within 8 mm; straight in between and beyond.
+static void bone_line(const sonde_mesh *femur, const frame *f, double length,
+                      sonde_vec3 knot[KNOTS]) {
+  for (int k = 0; k < KNOTS; ++k) {
+    double z = (0.15 + 0.2 * k) * length;
+    if (!slab_centre(femur, f, z - 0.008, z + 0.008, &knot[k]))
+      knot[k] = k > 0 ? to_scan(f, knot[k - 1]) : f->origin;
+    knot[k] = to_frame(f, knot[k]);
+    knot[k].z = z;
+  }
+}
+
 // Rays come from outside; head, neck and trochanter are held within 1.6 times the shaft's radius.
 static void sample_femur(const sonde_leg_scan *scan, const sonde_surface_index *bone,
                          const frame *f, sonde_tube *tube) {
-  sonde_vec3 line[2]; // of the shaft, carried on to both ends
-  for (int k = 0; k < 2; ++k) {
-    double z = (k == 0 ? 0.35 : 0.85) * tube->length_m;
-    if (!slab_centre(scan->femur, f, z - 0.01, z + 0.01, &line[k])) line[k] = f->origin;
-    line[k] = to_frame(f, line[k]);
-  }
+  sonde_vec3 knot[KNOTS];
+  bone_line(scan->femur, f, tube->length_m, knot);
   for (uint32_t j = 0; j < SONDE_TUBE_ROWS; ++j) {
     double z = row_height(tube->length_m, j);
-    double t = (z - line[0].z) / (line[1].z - line[0].z);
-    sonde_vec3 middle = v_lerp(line[0], line[1], t);
+    int k = 1;
+    while (k + 1 < KNOTS && knot[k].z < z) ++k;
+    double t = (z - knot[k - 1].z) / (knot[k].z - knot[k - 1].z);
+    sonde_vec3 middle = v_lerp(knot[k - 1], knot[k], t);
     tube->x_m[j] = whole_nm(middle.x), tube->y_m[j] = whole_nm(middle.y);
     for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i) {
       sonde_vec3 out = vec3(cos(tube_angle(i)), sin(tube_angle(i)), 0);
@@ -309,7 +320,7 @@ static void sample_muscle(const sonde_surface_index *muscle, const frame *f,
       shape->fat_m[j][i] = isfinite(depth) ? fmax(depth - thigh->skin_m, 0.002) : NAN;
     }
   fill_table(shape->fat_m);
-  smooth(shape->fat_m, 3);
+  smooth(shape->fat_m, 12);
 }
 
 /* ---- the whole ---------------------------------------------------------------------------- */
@@ -337,8 +348,7 @@ typedef struct indices {
 } indices;
 
 static sonde_status sample(const sonde_leg_scan *scan, const indices *in, sonde_thigh *thigh,
-                           sonde_thigh_shape *shape, sonde_leg_report *report,
-                           sonde_error *error) {
+                           sonde_thigh_shape *shape, sonde_leg_report *report, sonde_error *error) {
   frame f;
   sonde_status status = leg_frame(scan, &f, error);
   if (status) return status;

@@ -1,6 +1,7 @@
 // Cross-sections of a model as a drawing, seen from the feet: front up, medial side right.
 // cut_mesh:     points where a plane z meets a mesh's edges, in order around its middle.
 // draw_loop:    a closed outline.
+// fitting_scale: pixels per metre.
 // draw_septa:   the sheets between the compartments, from femur to fascia.
 // draw_line_at: a vessel's circle where it passes the plane.
 // draw_panel:   one section with its captions.
@@ -10,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const double PIXELS_PER_M = 2200, PANEL = 460, CAPTION = 84;
+static const double PANEL = 460, MARGIN = 14, CAPTION = 84; // pixels
 
 typedef struct section_point {
   double angle, x, y;      // m
@@ -60,11 +61,12 @@ static sonde_status cut_mesh(const sonde_mesh *mesh, const sonde_model *model, d
 
 typedef struct panel {
   sonde_text *out;
-  double x, y; // pixels of the model's middle line
+  double x, y;  // pixels of the model's middle line
+  double scale; // pixels per m
 } panel;
 
-static double px(const panel *p, double x_m) { return p->x + x_m * PIXELS_PER_M; }
-static double py(const panel *p, double y_m) { return p->y - y_m * PIXELS_PER_M; }
+static double px(const panel *p, double x_m) { return p->x + x_m * p->scale; }
+static double py(const panel *p, double y_m) { return p->y - y_m * p->scale; }
 
 static void draw_loop(const panel *p, const loop *l, bool inner, const char *look) {
   sonde_path path = sonde_path_begin(p->out, look);
@@ -122,7 +124,7 @@ static void draw_line_at(const panel *p, const sonde_vessel *line, sonde_vessel_
   const char *look = kind == SONDE_VESSEL_VEIN ? "fill='#3f6fb5' stroke='#d9e4f5'"
                                                : "fill='#c8383a' stroke='#f7dada'";
   double x = px(p, v.centre_m.x), y = py(p, v.centre_m.y);
-  sonde_svg_circle(p->out, x, y, v.radius_m * PIXELS_PER_M, look);
+  sonde_svg_circle(p->out, x, y, v.radius_m * p->scale, look);
   sonde_svg_words(p->out, x, y + 3, "class='small light middle'", letters);
 }
 
@@ -131,17 +133,17 @@ static void caption(const panel *p, const sonde_model *model, const sonde_landma
   sonde_vessel_point v, a;
   bool both = line_at(&model->vein, mark->vein_m.z, &v);
   both = line_at(&model->artery, mark->vein_m.z, &a) && both;
-  double top = p->y + PANEL / 2 + 6;
+  double top = p->y + PANEL / 2 + 12;
   sonde_svg_text(p->out, left + 16, top, "class='head'", mark->name);
   if (!both) return;
   char text[240];
   snprintf(text, sizeof text, "z %s mm; vein %s mm wide, centre %s mm deep",
            sonde_fixed(mark->vein_m.z * 1e3, 0).s, sonde_fixed(2e3 * v.radius_m, 1).s,
            sonde_fixed(v.depth_m * 1e3, 1).s);
-  sonde_svg_words(p->out, left + 16, top + 18, "class='tick'", text);
+  sonde_svg_words(p->out, left + 16, top + 17, "class='tick'", text);
   snprintf(text, sizeof text, "artery %s mm wide, centre %s mm deep",
            sonde_fixed(2e3 * a.radius_m, 1).s, sonde_fixed(a.depth_m * 1e3, 1).s);
-  sonde_svg_words(p->out, left + 16, top + 34, "class='tick'", text);
+  sonde_svg_words(p->out, left + 16, top + 33, "class='tick'", text);
 }
 
 static sonde_status draw_panel(const panel *p, const sonde_model *model, const sonde_landmark *mark,
@@ -167,10 +169,18 @@ static sonde_status draw_panel(const panel *p, const sonde_model *model, const s
   return status;
 }
 
-static void draw_frame(sonde_text *out, uint32_t panels) {
+// One scale for all panels, so that the widest part of the thigh fits.
+static double fitting_scale(const sonde_mesh *surface) {
+  double widest = 0.01;
+  for (uint32_t k = 0; k < surface->vertex_count; ++k)
+    widest = fmax(widest, fmax(fabs(surface->vertices[k].x), fabs(surface->vertices[k].y)));
+  return (PANEL / 2 - MARGIN) / widest;
+}
+
+static void draw_frame(sonde_text *out, uint32_t panels, double scale) {
   double y = PANEL + CAPTION - 14, x = 16;
-  sonde_svg_line(out, x, y, x + 0.05 * PIXELS_PER_M, y, "stroke='#222' stroke-width='3'");
-  sonde_svg_words(out, x + 0.05 * PIXELS_PER_M + 8, y + 4, "class='tick'", "50 mm");
+  sonde_svg_line(out, x, y, x + 0.05 * scale, y, "stroke='#222' stroke-width='3'");
+  sonde_svg_words(out, x + 0.05 * scale + 8, y + 4, "class='tick'", "50 mm");
   sonde_svg_words(out, panels * PANEL - 16, y + 4, "class='tick end'",
                   "seen from the feet: front up, lateral left, medial right");
 }
@@ -182,15 +192,16 @@ sonde_status sonde_thigh_sections(const sonde_model *model, const char *path, so
   sonde_figure figure = {.name = "sections", .width = PANELS * PANEL, .height = PANEL + CAPTION};
   snprintf(figure.title, sizeof figure.title, "Cross-sections of %s", model->name);
   sonde_status status = SONDE_OK;
+  double scale = fitting_scale(&model->surface);
   for (int k = 0; k < PANELS && !status; ++k) {
     const sonde_landmark *mark = sonde_anatomy_landmark(model->anatomy, MARK[k]);
-    panel p = {&figure.body, (k + 0.5) * PANEL, PANEL / 2};
+    panel p = {&figure.body, (k + 0.5) * PANEL, PANEL / 2, scale};
     if (!mark)
       status = sonde_fail(error, SONDE_NOT_FOUND, "the model has no landmark '%s'", MARK[k]);
     else
       status = draw_panel(&p, model, mark, k * PANEL, error);
   }
-  draw_frame(&figure.body, PANELS);
+  draw_frame(&figure.body, PANELS, scale);
   sonde_text text = {0};
   sonde_file *file = NULL;
   if (!status) sonde_svg_write(&text, &figure, true);
