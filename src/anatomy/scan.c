@@ -1,7 +1,8 @@
 // From scanned surfaces of a leg to the shape of a thigh.
 // shaft_line:   straight line through the middle of the femur's middle third.
 // leg_frame:    knee by the end without the head, medial side by the condyles' width and the head.
-// centre_line:  the frame turned so that z runs through the middles of the skin's sections.
+// align_bone:   the frame turned so that z runs along the femur.
+// centre_line:  the straight line through the middles of the skin's sections.
 // bone_line:    the femur's middle, with its bow.
 // sample_skin, sample_femur, sample_muscle: tables by rays; misses are filled from neighbours.
 // smooth:       one binomial pass over a table.
@@ -164,27 +165,61 @@ static sonde_vec3 section_middle(const sonde_surface_index *skin, const frame *f
   return middle;
 }
 
-// Least squares through the sections' middles.
-static void centre_line(const sonde_surface_index *skin, frame *f, double length) {
-  enum { ROWS = 21 };
-  sonde_vec3 mean = vec3(0, 0, 0), slope = vec3(0, 0, 0);
+// Least squares through points at equal steps: value at the middle and change over the whole.
+static void fit_line(const sonde_vec3 *point, int count, sonde_vec3 *mean, sonde_vec3 *slope) {
   double weight = 0;
-  for (int k = 0; k < ROWS; ++k) {
-    double t = (double)k / (ROWS - 1) - 0.5;
-    sonde_vec3 m = section_middle(skin, f, (0.04 + 0.92 * (t + 0.5)) * length);
-    mean = v_madd(mean, 1.0 / ROWS, m);
-    slope = v_madd(slope, t, m);
+  *mean = *slope = vec3(0, 0, 0);
+  for (int k = 0; k < count; ++k) {
+    double t = (double)k / (count - 1) - 0.5;
+    *mean = v_madd(*mean, 1.0 / count, point[k]);
+    *slope = v_madd(*slope, t, point[k]);
     weight += t * t;
   }
-  slope = v_scale(slope, 1 / weight);
-  sonde_vec3 z = v_unit(slope, vec3(0, 0, 1));
-  sonde_vec3 top = v_madd(mean, -mean.z / z.z, z);
-  sonde_vec3 x = v_unit(across(vec3(1, 0, 0), z), vec3(1, 0, 0)), y = v_cross(z, x);
-  frame old = *f;
-  f->origin = to_scan(&old, top);
-  f->x = v_sub(to_scan(&old, x), old.origin);
-  f->y = v_sub(to_scan(&old, y), old.origin);
-  f->z = v_sub(to_scan(&old, z), old.origin);
+  *slope = v_scale(*slope, 1 / weight);
+}
+
+// The straight line through the middles of the skin's sections.
+static void centre_line(const sonde_surface_index *skin, const frame *f, sonde_tube *tube) {
+  enum { ROWS = 21 };
+  sonde_vec3 middle[ROWS], mean, slope;
+  for (int k = 0; k < ROWS; ++k)
+    middle[k] = section_middle(skin, f, (0.02 + 0.96 * k / (ROWS - 1)) * tube->length_m);
+  fit_line(middle, ROWS, &mean, &slope);
+  for (uint32_t j = 0; j < SONDE_TUBE_ROWS; ++j) {
+    double t = (double)j / (SONDE_TUBE_ROWS - 1) - 0.5;
+    tube->x_m[j] = whole_nm(mean.x + t * slope.x);
+    tube->y_m[j] = whole_nm(mean.y + t * slope.y);
+  }
+}
+
+enum { KNOTS = 5 };
+
+// The bone's middle at some heights, by the surface within 8 mm; straight in between and beyond.
+static void bone_line(const sonde_mesh *femur, const frame *f, double length,
+                      sonde_vec3 knot[KNOTS]) {
+  for (int k = 0; k < KNOTS; ++k) {
+    double z = (0.15 + 0.2 * k) * length;
+    if (!slab_centre(femur, f, z - 0.008, z + 0.008, &knot[k]))
+      knot[k] = k > 0 ? to_scan(f, knot[k - 1]) : f->origin;
+    knot[k] = to_frame(f, knot[k]);
+    knot[k].z = z;
+  }
+}
+
+// Turns the frame until z runs along the bone's middles in the thigh, and x = y = 0 is their mean.
+static void align_bone(const sonde_mesh *femur, frame *f, double length) {
+  for (int pass = 0; pass < 4; ++pass) {
+    sonde_vec3 knot[KNOTS], mean, slope;
+    bone_line(femur, f, length, knot);
+    fit_line(knot, KNOTS, &mean, &slope);
+    sonde_vec3 z = v_unit(slope, vec3(0, 0, 1));
+    sonde_vec3 x = v_unit(across(vec3(1, 0, 0), z), vec3(1, 0, 0)), y = v_cross(z, x);
+    frame old = *f;
+    f->origin = to_scan(&old, v_madd(mean, -mean.z / z.z, z));
+    f->x = v_sub(to_scan(&old, x), old.origin);
+    f->y = v_sub(to_scan(&old, y), old.origin);
+    f->z = v_sub(to_scan(&old, z), old.origin);
+  }
 }
 
 /* ---- tables ------------------------------------------------------------------------------- */
@@ -249,7 +284,8 @@ static void sample_skin(const sonde_surface_index *skin, const frame *f, sonde_t
   for (uint32_t j = 0; j < SONDE_TUBE_ROWS; ++j)
     for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i) {
       double angle = tube_angle(i), z = row_height(tube->length_m, j);
-      double r = cast(skin, f, vec3(0, 0, z), vec3(cos(angle), sin(angle), 0), REACH_M);
+      sonde_vec3 middle = vec3(tube->x_m[j], tube->y_m[j], z);
+      double r = cast(skin, f, middle, vec3(cos(angle), sin(angle), 0), REACH_M);
       tube->radius_m[j][i] = r;
       report->rays++;
       if (!isfinite(r)) report->missed++;
@@ -267,20 +303,6 @@ static double median_radius(const sonde_tube *tube) {
     list[i] = tube->radius_m[SONDE_TUBE_ROWS / 2][i];
   qsort(list, SONDE_TUBE_COLUMNS, sizeof *list, by_size);
   return list[SONDE_TUBE_COLUMNS / 2];
-}
-
-enum { KNOTS = 5 };
-
-// The bone's middle at some heights, by the surface within 8 mm; straight in between and beyond.
-static void bone_line(const sonde_mesh *femur, const frame *f, double length,
-                      sonde_vec3 knot[KNOTS]) {
-  for (int k = 0; k < KNOTS; ++k) {
-    double z = (0.15 + 0.2 * k) * length;
-    if (!slab_centre(femur, f, z - 0.008, z + 0.008, &knot[k]))
-      knot[k] = k > 0 ? to_scan(f, knot[k - 1]) : f->origin;
-    knot[k] = to_frame(f, knot[k]);
-    knot[k].z = z;
-  }
 }
 
 // Rays come from outside; head, neck and trochanter are held within 1.6 times the shaft's radius.
@@ -333,8 +355,9 @@ static void describe(sonde_thigh_shape *shape, sonde_thigh *thigh, bool fat) {
   thigh->girth_proximal_m = fmax(sonde_tube_girth(skin, 0), thigh->girth_m);
   thigh->girth_distal_m = fmin(sonde_tube_girth(skin, length), thigh->girth_m);
   thigh->femur_m = whole_nm(sonde_tube_girth(&shape->femur, half) / SONDE_PI);
-  thigh->femur_lateral_m = clamp(-shape->femur.x_m[0], 0, 0.045);
-  thigh->femur_anterior_m = clamp(shape->femur.y_m[SONDE_TUBE_ROWS / 2], 0, 0.025);
+  const uint32_t middle = SONDE_TUBE_ROWS / 2;
+  thigh->femur_lateral_m = clamp(skin->x_m[0] - shape->femur.x_m[0], 0, 0.045);
+  thigh->femur_anterior_m = clamp(shape->femur.y_m[middle] - skin->y_m[middle], 0, 0.025);
   if (!fat) return;
   double *side[] = {&thigh->fat_inner_m, &thigh->fat_front_m, &thigh->fat_outer_m,
                     &thigh->fat_back_m};
@@ -349,13 +372,14 @@ typedef struct indices {
 
 static sonde_status sample(const sonde_leg_scan *scan, const indices *in, sonde_thigh *thigh,
                            sonde_thigh_shape *shape, sonde_leg_report *report, sonde_error *error) {
-  frame f;
+  frame f = {0};
   sonde_status status = leg_frame(scan, &f, error);
   if (status) return status;
   report->femur_length_m = f.high - f.low;
   double length = whole_nm((CUT_BOTTOM - CUT_TOP) * report->femur_length_m);
   shape->skin.length_m = shape->femur.length_m = length;
-  centre_line(in->skin, &f, length);
+  align_bone(scan->femur, &f, length);
+  centre_line(in->skin, &f, &shape->skin);
   sample_skin(in->skin, &f, &shape->skin, report);
   if (report->missed > MOST_MISSED * report->rays)
     return sonde_fail(error, SONDE_MESH,

@@ -133,7 +133,7 @@ static void caption(const panel *p, const sonde_model *model, const sonde_landma
   sonde_vessel_point v, a;
   bool both = line_at(&model->vein, mark->vein_m.z, &v);
   both = line_at(&model->artery, mark->vein_m.z, &a) && both;
-  double top = p->y + PANEL / 2 + 12;
+  double top = PANEL + 12;
   sonde_svg_text(p->out, left + 16, top, "class='head'", mark->name);
   if (!both) return;
   char text[240];
@@ -146,7 +146,17 @@ static void caption(const panel *p, const sonde_model *model, const sonde_landma
   sonde_svg_words(p->out, left + 16, top + 33, "class='tick'", text);
 }
 
-static sonde_status draw_panel(const panel *p, const sonde_model *model, const sonde_landmark *mark,
+static void centre_panel(panel *p, const loop *skin) {
+  double low_x = INFINITY, high_x = -INFINITY, low_y = INFINITY, high_y = -INFINITY;
+  for (uint32_t k = 0; k < skin->count; ++k) {
+    low_x = fmin(low_x, skin->point[k].x), high_x = fmax(high_x, skin->point[k].x);
+    low_y = fmin(low_y, skin->point[k].y), high_y = fmax(high_y, skin->point[k].y);
+  }
+  p->x -= 0.5 * (low_x + high_x) * p->scale;
+  p->y += 0.5 * (low_y + high_y) * p->scale;
+}
+
+static sonde_status draw_panel(panel *p, const sonde_model *model, const sonde_landmark *mark,
                                double left, sonde_error *error) {
   const sonde_thigh_anatomy *a = model->anatomy;
   double z = mark->vein_m.z;
@@ -154,6 +164,7 @@ static sonde_status draw_panel(const panel *p, const sonde_model *model, const s
   sonde_status status = cut_mesh(&model->surface, model, z, &skin, error);
   if (!status) status = cut_mesh(&model->femur, NULL, z, &bone, error);
   if (!status) {
+    centre_panel(p, &skin);
     draw_loop(p, &skin, false, "fill='#f3dfa2' stroke='#a9744f' stroke-width='3'");
     draw_loop(p, &skin, true, "fill='#a8443c' stroke='#f5efe6' stroke-width='1.5'");
     draw_septa(p, a, &skin, z);
@@ -169,12 +180,16 @@ static sonde_status draw_panel(const panel *p, const sonde_model *model, const s
   return status;
 }
 
-// One scale for all panels, so that the widest part of the thigh fits.
+// One scale for all panels, so that the widest section fits; each is drawn about its middle.
 static double fitting_scale(const sonde_mesh *surface) {
-  double widest = 0.01;
-  for (uint32_t k = 0; k < surface->vertex_count; ++k)
-    widest = fmax(widest, fmax(fabs(surface->vertices[k].x), fabs(surface->vertices[k].y)));
-  return (PANEL / 2 - MARGIN) / widest;
+  sonde_vec3 low = vec3(INFINITY, INFINITY, 0), high = vec3(-INFINITY, -INFINITY, 0);
+  for (uint32_t k = 0; k < surface->vertex_count; ++k) {
+    sonde_vec3 p = surface->vertices[k];
+    low = vec3(fmin(low.x, p.x), fmin(low.y, p.y), 0);
+    high = vec3(fmax(high.x, p.x), fmax(high.y, p.y), 0);
+  }
+  double widest = fmax(fmax(high.x - low.x, high.y - low.y), 0.02);
+  return (PANEL - 2 * MARGIN) / widest;
 }
 
 static void draw_frame(sonde_text *out, uint32_t panels, double scale) {

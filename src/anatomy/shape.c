@@ -44,14 +44,19 @@ void sonde_shape_fill_fat(const sonde_thigh *thigh, sonde_thigh_shape *shape) {
   }
 }
 
-// The shaft widens towards the trochanter and the condyles, and comes from the side to the middle.
-static void fill_femur(const sonde_thigh *thigh, sonde_tube *femur) {
+// The shaft widens towards the trochanter and the condyles. z runs along it, so that it is the
+// middle of the sections that comes from the medial side to the femur on the way to the knee.
+static void fill_femur(const sonde_thigh *thigh, sonde_thigh_shape *shape) {
+  sonde_tube *femur = &shape->femur;
   const double at_knee_m = fmin(0.003, thigh->femur_lateral_m);
   for (uint32_t j = 0; j < SONDE_TUBE_ROWS; ++j) {
     double t = (double)j / (SONDE_TUBE_ROWS - 1);
     double up = fmax(0, (0.15 - t) / 0.15), down = fmax(0, (t - 0.7) / 0.3);
     double radius = 0.5 * thigh->femur_m * (1 + 0.35 * (up * up + down * down));
-    femur->x_m[j] = whole_nm(-at_knee_m - (thigh->femur_lateral_m - at_knee_m) * (1 - t) * (1 - t));
+    double swing = thigh->femur_lateral_m - at_knee_m;
+    double lateral = at_knee_m + swing * (1 - t) * (1 - t); // of the section's middle
+    shape->skin.x_m[j] = whole_nm(swing * (0.5 - t)); // straight line through the bone's middles
+    femur->x_m[j] = whole_nm(shape->skin.x_m[j] - lateral);
     femur->y_m[j] = thigh->femur_anterior_m;
     for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i) femur->radius_m[j][i] = whole_nm(radius);
   }
@@ -101,7 +106,7 @@ sonde_status sonde_thigh_shape_create(const sonde_thigh *thigh, sonde_thigh_shap
   shape->skin.length_m = shape->femur.length_m = thigh->length_m;
   for (uint32_t j = 0; j < SONDE_TUBE_ROWS; ++j) scale_row(thigh, &shape->skin, j);
   sonde_shape_fill_fat(thigh, shape);
-  fill_femur(thigh, &shape->femur);
+  fill_femur(thigh, shape);
   status = check_muscle(thigh, shape, error);
   if (status) {
     sonde_thigh_shape_destroy(shape);
