@@ -100,7 +100,7 @@ static int read_option(arguments *a, int c, const char *text) {
   case 'v': a->section = text; break;
   case 'e': good = app_parse_real(VERB, "--edge-mm", text, 4, 12, &a->edge_mm); break;
   case 'f': good = app_parse_real(VERB, "--fine-edge-mm", text, 2, 6, &a->fine_edge_mm); break;
-  case 't': good = app_parse_real(VERB, "--fat-mm", text, 3, 35, &a->fat_mm); break;
+  case 't': good = app_parse_real(VERB, "--fat-mm", text, 4, 35, &a->fat_mm); break;
   case 's': a->skin = text; break;
   case 'm': a->femur = text; break;
   case 'u': a->muscle = text; break;

@@ -4,7 +4,7 @@
 // beside_vein, lay_artery: lateral of the vein at the groin, in front from the middle on.
 // lay_saphenous: in the fat above the fascia, into the common femoral vein.
 // lay_deep:      artery and vein that leave backwards along the femur.
-// lay_second:    a second femoral vein on the other side of the artery.
+// around_artery, room_around, lay_second: a second femoral vein on another side of the artery.
 // side_of:       the skin without its flat ends.
 // gap_between:   least distance of two vessels' walls.
 // check_*:       walls apart, below the fascia, outside the bone; all covers shrink or grow until
@@ -195,23 +195,38 @@ static void lay_deep(const layout *l) {
   }
 }
 
+// Around the artery at a share s of the second vein's way, turned by `angle` in its middle.
+static sonde_vec3 around_artery(const layout *l, double s, double angle, double *radius) {
+  const double from = 0.32, to = 0.74;
+  double t = from + (to - from) * s, w = smooth_step(4 * s) * smooth_step(4 * (1 - s));
+  sonde_vessel_point v = at_share(&l->course->vein, t), a = at_share(&l->course->artery, t);
+  *radius = 0.7 * v.radius_m;
+  return v_add(a.centre_m, turned(v_sub(v.centre_m, a.centre_m), angle * w));
+}
+
+// Least room to bone and fascia along the way.
+static double room_around(const layout *l, double angle) {
+  double least = INFINITY, radius;
+  for (int k = 0; k <= 8; ++k) {
+    sonde_vec3 p = around_artery(l, k / 8.0, angle, &radius);
+    least = fmin(least, below_fascia(l, p, radius));
+    least = fmin(least, sonde_tube_outside(&l->shape->femur, p) - radius - LEAST_BONE_GAP_M);
+  }
+  return least;
+}
+
 static void lay_second(const layout *l) {
   enum { POINTS = 40 };
-  const double from = 0.32, to = 0.74;
+  const double angle[] = {2, -2, 1.7, -1.7, 1.4, -1.4, 1.1, -1.1};
   sonde_vessel *line = begin(l, "second_femoral_vein", SONDE_VESSEL_VEIN);
-  double best = -INFINITY, sign = 1;
-  for (int way = -1; way <= 1; way += 2) { // away from the bone
-    sonde_vessel_point v = at_share(&l->course->vein, 0.53), a = at_share(&l->course->artery, 0.53);
-    sonde_vec3 p = v_add(a.centre_m, turned(v_sub(v.centre_m, a.centre_m), way * 2.0));
-    double gap = sonde_tube_outside(&l->shape->femur, p);
-    if (gap > best) best = gap, sign = way;
+  double best = -INFINITY, chosen = angle[0], radius;
+  for (size_t k = 0; k < SONDE_COUNT_OF(angle); ++k) {
+    double room = fmin(room_around(l, angle[k]), 0.003); // enough is enough: the wider turn first
+    if (room > best) best = room, chosen = angle[k];
   }
   for (uint32_t k = 0; k < POINTS; ++k) {
-    double s = (double)k / (POINTS - 1), t = from + (to - from) * s;
-    sonde_vessel_point v = at_share(&l->course->vein, t), a = at_share(&l->course->artery, t);
-    double w = smooth_step(4 * s) * smooth_step(4 * (1 - s)), radius = 0.7 * v.radius_m;
-    sonde_vec3 d = turned(v_sub(v.centre_m, a.centre_m), sign * 2.0 * w);
-    add(l, line, v_add(a.centre_m, d), radius);
+    sonde_vec3 p = around_artery(l, (double)k / (POINTS - 1), chosen, &radius);
+    add(l, line, p, radius);
   }
 }
 

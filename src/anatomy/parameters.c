@@ -77,7 +77,7 @@ static void normal_draw(const draw *d, double *member, double mean, double devia
 
 static void fill_fat(const draw *d) {
   sonde_thigh *t = d->thigh;
-  double share = t->sex == SONDE_SEX_FEMALE ? 1.2 : 0.8;
+  double share = t->sex == SONDE_SEX_FEMALE ? 1.15 : 0.85;
   normal_draw(d, &t->fat_front_m, 0.0104 * share, 0.0041 * share, 0.003, 0.04);
   normal_draw(d, &t->fat_inner_m, 1.5 * t->fat_front_m, 0.15 * t->fat_front_m, 0.003, 0.06);
   normal_draw(d, &t->fat_outer_m, 0.7 * t->fat_front_m, 0.05 * t->fat_front_m, 0.002, 0.06);
@@ -106,8 +106,8 @@ static void fill_vessels(const draw *d) {
   normal_draw(d, &t->vein_m, female ? 0.0098 : 0.0106, 0.0012, 0.004, 0.018);
   normal_draw(d, &t->artery_m, female ? 0.0075 : 0.0085, 0.0007, 0.003, 0.014);
   normal_draw(d, &t->vein_angle_rad, 70 * SONDE_PI / 180, 4 * SONDE_PI / 180, 0.78, 1.57);
-  normal_draw(d, &t->vein_cover_m, 0.004, 0.001, 0.001, 0.03);
-  normal_draw(d, &t->canal_cover_m, 0.012, 0.002, 0.003, 0.04);
+  normal_draw(d, &t->vein_cover_m, 0.003, 0.0008, 0.001, 0.03);
+  normal_draw(d, &t->canal_cover_m, 0.009, 0.0015, 0.003, 0.04);
   normal_draw(d, &t->saphenous_m, 0.004, 0.0007, 0.001, 0.01);
   normal_draw(d, &t->deep_branch_m, 0.04, 0.006, 0.015, 0.08);
   if (isnan(t->second_vein))

@@ -7,7 +7,7 @@
 #include "anatomy/shape.h"
 
 static const double LEAST_MUSCLE_M = 0.012;
-static const double FAT_TAPER = 0.25; // more at the groin, less at the knee
+static const double FAT_TAPER = 0.15; // more at the groin, less at the knee
 
 static double between(double groin, double middle, double knee, double t) {
   return groin * (1 - t) * (1 - 2 * t) + 4 * middle * t * (1 - t) + knee * t * (2 * t - 1);
@@ -89,7 +89,8 @@ static sonde_status check_muscle(const sonde_thigh *thigh, const sonde_thigh_sha
   double z_m = 0, least = sonde_shape_least_muscle(shape, thigh, &z_m);
   if (least >= LEAST_MUSCLE_M) return SONDE_OK;
   double here = sonde_tube_girth(&shape->skin, z_m);
-  double more = 2 * SONDE_PI * (LEAST_MUSCLE_M - least) * thigh->girth_m / here;
+  const double share = 0.65; // of a wider radius: the femur moves aside with the girth
+  double more = 2 * SONDE_PI * (LEAST_MUSCLE_M - least) * thigh->girth_m / here / share;
   return sonde_fail(error, SONDE_ARGUMENT,
                     "girth-mm is %g: fat and femur leave %.1f mm of muscle at %.0f mm from the "
                     "groin, expected 12; girth-mm from about %.0f to 900 would do, or less fat",
