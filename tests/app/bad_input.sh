@@ -105,6 +105,15 @@ rejects 'missing/' fit "$DATA/indentation.csv" --surface "$in/skin.ply" --sites 
 rejects 'skin\.ply' replay "$in/skin.ply"
 rejects 'nowhere\.rec' replay nowhere.rec
 
+# Generated thighs.
+rejects 'girth-mm.*300 to 900' generate --girth-mm 100 -o out.sonde
+rejects 'girth-mm.*muscle' generate --girth-mm 350 --fat-mm 35 -o out.sonde
+rejects 'sex.*female or male' generate --sex other -o out.sonde
+rejects 'go together' generate --skin "$in/skin.ply" -o out.sonde
+rejects 'missing' generate --seed 1
+rejects 'nowhere\.stl' generate --skin nowhere.stl --femur nowhere.stl -o out.sonde
+rejects 'femur' generate --skin "$in/skin.ply" --femur "$in/skin.ply" -o out.sonde
+
 # Records and presets of sonde identify.
 columns=time_s,penetration_mm,slide_mm,normal_n
 printf '%s\n0,0,0,0\n' $columns >"$in/lacks.csv"
