@@ -157,7 +157,7 @@ static void lay_saphenous(const layout *l) {
     double angle = sonde_course_angle(l->thigh, t) - (0.05 + 0.7 * s * (1 - s)) +
                    0.05 * (1 - smooth_step(s / reach));
     double fat = fat_at(l, angle, z);
-    double radius = fmin(0.5 * l->thigh->saphenous_m * (1 - 0.25 * s), 0.4 * fat);
+    double radius = fmin(0.5 * l->thigh->saphenous_m * (1 - 0.25 * s), 0.35 * fat);
     double depth = l->thigh->skin_m + fmax(radius, fat - radius - 0.0005);
     sonde_vec3 own = below_skin(l, angle, z, depth);
     sonde_vec3 end = at_share(&l->course->vein, t).centre_m;
@@ -268,7 +268,7 @@ static sonde_status check_line(const layout *l, const char *name, const sonde_ve
     if (z < 0 || z > l->thigh->length_m) return blame(name, "leaves the thigh", z, error);
     if (sonde_tube_outside(&l->shape->femur, p->centre_m) < p->radius_m + LEAST_BONE_GAP_M)
       return blame(name, "meets the femur", z, error);
-    if (superficial && p->depth_m < l->thigh->skin_m + p->radius_m * 0.9)
+    if (superficial && p->depth_m < l->thigh->skin_m + 0.5 * p->radius_m)
       return blame(name, "meets the skin", z, error);
     if (!superficial && below_fascia(l, p->centre_m, p->radius_m) < LEAST_COVER_M)
       return blame(name, "leaves the muscle", z, error);

@@ -1,16 +1,9 @@
 // Every one of twenty thighs comes to rest under the linear probe.
 #include "anatomy_test.h"
 
-static sonde_thigh_def medium(void) {
-  sonde_thigh_def def = sonde_thigh_def_default();
-  def.edge_m = 0.008;
-  def.fine_edge_m = 0.004;
-  return def;
-}
-
 static void twenty_thighs_settle(void **state) {
   (void)state;
-  sonde_thigh_def def = medium();
+  sonde_thigh_def def = coarse();
   for (uint64_t seed = 1; seed <= 20; ++seed) {
     sonde_thigh thigh;
     sonde_model *model = make_thigh(NULL, seed, &def, &thigh);
@@ -22,7 +15,7 @@ static void twenty_thighs_settle(void **state) {
 static void lean_and_obese_thighs_settle(void **state) {
   (void)state;
   const double fat_m[] = {0.004, 0.030};
-  sonde_thigh_def def = medium();
+  sonde_thigh_def def = coarse();
   for (int k = 0; k < 2; ++k) {
     sonde_thigh known = sonde_thigh_unknown(), thigh;
     known.fat_front_m = known.fat_inner_m = known.fat_outer_m = known.fat_back_m = fat_m[k];

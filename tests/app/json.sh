@@ -27,6 +27,13 @@ gives "$press vein_area_ratio>=0.7" press "$MODEL" --site 27 --probe linear --fo
 gives "$press penetration_mm>=4.999 penetration_mm<=5.001" press "$MODEL" --site 27 --probe point \
   --depth-mm 5 --json
 
+gives "seed=7 sex=male nodes:integer nodes>=3000 closed:bool smallest_angle_deg>=15 volume_l:number
+  parameters.girth-mm>=519.999 parameters.girth-mm<=520.001 landmarks.femoral_mid.site:integer
+  landmarks.common_femoral.vein_depth_mm>=10" \
+  generate --seed 7 --sex male --girth-mm 520 -o seven.sonde --section-svg seven.svg --json
+[[ -s seven.sonde && -s seven.svg ]] || wrong "sonde generate wrote no model or drawing"
+gives "$press" press seven.sonde --site 27 --depth-mm 5 --json
+
 gives "samples:integer samples>=400 normal_max_n:number" identify "$MODEL" --simulate ramp-hold \
   --site 27 --probe point --depth-mm 4 --speed-mm-s 40 --hold-s 0.05 --noise-n 0.05 --noise-mm 0.05 \
   -o ramp.csv --json
