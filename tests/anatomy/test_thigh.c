@@ -145,6 +145,17 @@ static void check_fat(const sonde_thigh *t, const sonde_model *model) {
   }
 }
 
+static void unlike_sides_keep_their_fat(void **state) {
+  (void)state;
+  sonde_thigh known = sonde_thigh_unknown(), thigh;
+  sonde_thigh_def def = coarse();
+  known.fat_inner_m = 0.022, known.fat_front_m = 0.008;
+  known.fat_outer_m = 0.005, known.fat_back_m = 0.016;
+  sonde_model *model = make_thigh(&known, 3, &def, &thigh);
+  check_fat(&thigh, model);
+  sonde_model_destroy(model);
+}
+
 /* ---- vessels ------------------------------------------------------------------------------ */
 
 typedef struct inside {
@@ -387,6 +398,7 @@ int main(void) {
       cmocka_unit_test(draws_do_not_disturb_each_other),
       cmocka_unit_test(draws_follow_their_distributions),
       cmocka_unit_test(twenty_thighs_are_valid),
+      cmocka_unit_test(unlike_sides_keep_their_fat),
       cmocka_unit_test(compartments_lie_around_the_femur),
       cmocka_unit_test(springs_follow_the_layers),
       cmocka_unit_test(springs_match_the_bundled_thigh),
