@@ -21,6 +21,8 @@ static const char HELP[] =
     "  --spacing-mm S     of the voxels (0.01 to 100; default 0.5)\n"
     "  --method NAME      linear (default) or nearest: how a pixel goes into voxels\n"
     "  --hole-fill-mm D   longest gap to bridge (0 to 100 spacings; default 3)\n"
+    "  --beside K         with --leave-one-out: leave out K frames on either side as well (0 to "
+    "50)\n"
     "  --along-sweep      with --leave-one-out: join frames pixel to pixel, not across\n"
     "  --gap-mm D         with --leave-one-out: frames further apart are not joined; default "
     "10\n" FRAMES_HELP "  --raw              write without compression\n"
@@ -28,7 +30,7 @@ static const char HELP[] =
     "  --help             this text\n";
 
 typedef struct arguments {
-  const char *sequence, *output, *copy, *spacing, *method, *hole_fill, *gap;
+  const char *sequence, *output, *copy, *spacing, *method, *hole_fill, *gap, *beside;
   frames_options frames;
   bool along_sweep, leave_one_out, raw, json, help;
   sonde_reconstruct_options options;
@@ -47,6 +49,9 @@ static bool parse_numbers(arguments *a) {
     return false;
   if (a->gap && !app_parse_real(VERB, "--gap-mm", a->gap, 0.001, 1000, &gap_mm)) return false;
   if (a->method && !app_parse_word(VERB, "--method", a->method, methods, &method)) return false;
+  long beside = 0;
+  if (a->beside && !app_parse_integer(VERB, "--beside", a->beside, 0, 50, &beside)) return false;
+  a->slicer.left_out_beside = (uint32_t)beside;
   a->options.spacing_m = spacing_mm * 1e-3;
   a->options.hole_fill_m = fill_mm * 1e-3;
   a->options.method = method ? SONDE_RECONSTRUCT_NEAREST : SONDE_RECONSTRUCT_LINEAR;
@@ -63,6 +68,7 @@ static int read_arguments(int argc, char **argv, arguments *a) {
                                 {"--method", &a->method, NULL},
                                 {"--hole-fill-mm", &a->hole_fill, NULL},
                                 {"--gap-mm", &a->gap, NULL},
+                                {"--beside", &a->beside, NULL},
                                 FRAMES_OPTION_LIST(a->frames),
                                 {"--along-sweep", NULL, &a->along_sweep},
                                 {"--leave-one-out", NULL, &a->leave_one_out},
@@ -129,8 +135,10 @@ static sonde_status leave_one_out(const arguments *a, const sonde_sequence *s,
   if (!a->json) {
     print_frames(s, located);
     printf("left out      %8u frames one by one, %llu pixels, %.2f s\n", r.frames,
-           (unsigned long long)r.bracket.count, app_seconds() - start);
+           (unsigned long long)r.krige.count, app_seconds() - start);
     printf("  %-22s %8s %8s %8s %8s %8s\n", "made from", "RMS", "MAE", "PSNR dB", "NCC", "SSIM");
+    print_likeness(r.along_sweep * 2 > r.frames ? "kriging along sweep" : "kriging across",
+                   &r.krige);
     print_likeness("frames on both sides", &r.bracket);
     print_likeness("nearest frame", &r.nearest);
     print_likeness("mean of neighbours", &r.neighbours);
@@ -138,10 +146,13 @@ static sonde_status leave_one_out(const arguments *a, const sonde_sequence *s,
   }
   app_json_begin();
   app_json_integer("frames", r.frames);
-  app_json_integer("pixels", (long long)r.bracket.count);
-  json_likeness("", &r.bracket);
+  app_json_integer("pixels", (long long)r.krige.count);
+  json_likeness("", &r.krige);
+  json_likeness("both_sides_", &r.bracket);
   json_likeness("nearest_", &r.nearest);
   json_likeness("neighbour_mean_", &r.neighbours);
+  app_json_integer("joined_along_sweep", r.along_sweep);
+  app_json_integer("left_out_beside", a->slicer.left_out_beside);
   json_frames(s, located);
   app_json_end();
   return SONDE_OK;

@@ -35,7 +35,9 @@ static const char HELP[] =
     "  --stack K          with --frame or --hold-out: the picture framed in white among every "
     "K-th\n"
     "                     frame, seen from the side\n"
-    "  --method NAME      both (default) or nearest: frames on both sides or the nearest one;\n"
+    "  --method NAME      both (default), nearest or krige: frames on both sides, the nearest one, "
+    "or two\n"
+    "                     on either side weighted by how alike the frames are;\n"
     "                     of a volume linear (default) or nearest\n"
     "  --size-mm W,H      of the picture with --pose (default 40,40)\n"
     "  --pixels W,H       of the picture with --pose (default 512,512)\n"
@@ -98,8 +100,8 @@ static bool parse_pair(const char *option, const char *text, double low, double 
 }
 
 static bool parse_numbers(arguments *a) {
-  static const char *const ways[] = {"both", "nearest", NULL}, *const voxels[] = {"linear",
-                                                                                  "nearest", NULL};
+  static const char *const ways[] = {"both", "nearest", "krige", NULL};
+  static const char *const voxels[] = {"linear", "nearest", NULL};
   double pixels[2] = {512, 512}, gap_mm = 10, reach_mm = 1;
   a->size_mm[0] = a->size_mm[1] = 40;
   if ((a->pose && !parse_pose(a)) || !parse_pair("--size-mm", a->size, 0.1, 1000, a->size_mm) ||
@@ -121,7 +123,9 @@ static bool parse_numbers(arguments *a) {
   a->width = (uint32_t)pixels[0], a->height = (uint32_t)pixels[1];
   a->options.gap_m = gap_mm * 1e-3, a->options.reach_m = reach_mm * 1e-3;
   a->options.along_sweep = a->along_sweep;
-  a->options.method = a->method_index ? SONDE_SLICE_NEAREST : SONDE_SLICE_BRACKET;
+  static const sonde_slice_method methods[] = {SONDE_SLICE_BRACKET, SONDE_SLICE_NEAREST,
+                                               SONDE_SLICE_KRIGE};
+  a->options.method = methods[a->method_index];
   return true;
 }
 

@@ -160,27 +160,35 @@ SONDE_API sonde_affine sonde_slice_plane(sonde_pose world_from_probe, const sond
 
 typedef enum sonde_slice_method {
   SONDE_SLICE_BRACKET, /**< between the nearest frames on both sides, weighted by distance */
-  SONDE_SLICE_NEAREST  /**< the nearest frame alone */
+  SONDE_SLICE_NEAREST, /**< the nearest frame alone */
+  SONDE_SLICE_KRIGE    /**< from two frames on either side, each scale of the picture weighted by
+                            how far it is alike from frame to frame, measured in the sweep */
 } sonde_slice_method;
 
 typedef struct sonde_slicer_options {
   sonde_slice_method method;
-  bool along_sweep;  /**< join frames pixel to pixel instead of across, see below */
+  bool along_sweep;  /**< join frames pixel to pixel instead of across, see below; KRIGE chooses
+                          the better one itself */
   double gap_m;      /**< frames further apart are not joined; default 10 mm */
   double reach_m;    /**< how far a frame speaks for itself with none beyond; default 1 mm */
   uint32_t left_out; /**< frame that is not used, SONDE_WHOLE_FILE: none (default) */
-  uint32_t threads;  /**< 0 (default): all cores; results do not depend on it */
+  uint32_t
+      left_out_beside; /**< used frames on either side of it that are left out too; default 0 */
+  uint32_t threads;    /**< 0 (default): all cores; results do not depend on it */
 } sonde_slicer_options;
 
 SONDE_API sonde_slicer_options sonde_slicer_options_default(void);
 
 typedef struct sonde_slicer sonde_slicer;
 
-/** @param sequence borrowed, located @thread owner */
+/** KRIGE measures the likeness of the frames here, the left-out ones excluded.
+ *  @param sequence borrowed, located @thread owner */
 SONDE_API sonde_status sonde_slicer_create(const sonde_sequence *sequence,
                                            const sonde_slicer_options *options,
                                            sonde_slicer **slicer, sonde_error *error);
 SONDE_API void sonde_slicer_destroy(sonde_slicer *slicer);
+/** Whether frames are joined pixel to pixel: as asked for, or as KRIGE chose. @thread any */
+SONDE_API bool sonde_slicer_is_along_sweep(const sonde_slicer *slicer);
 /**
  * Fills an image straight from the frames: each pixel lies between the planes of two frames and
  * takes their values where a line through it meets them, weighted by the distance to the other.
@@ -213,13 +221,16 @@ SONDE_API sonde_status sonde_image_likeness(const uint8_t *a, const uint8_t *b,
 /** Every frame with a neighbour on both sides made again from the others. */
 typedef struct sonde_left_out {
   uint32_t frames;
-  /** Pooled rms; means of the other measures over the frames. Between the frames on both sides,
-   *  from the nearest frame alone, mean of the frames before and after without their poses. */
-  sonde_likeness bracket, nearest, neighbours;
+  uint32_t along_sweep; /**< frames that KRIGE joined pixel to pixel */
+  /** Pooled rms and mae; means of the other measures over the frames. KRIGE, BRACKET, NEAREST, and
+   *  the mean of the frames before and after without their poses. */
+  sonde_likeness krige, bracket, nearest, neighbours;
 } sonde_left_out;
 
 /**
- * Compares over the pixels that all three ways reach and that some frame shows brighter than black.
+ * Compares over the pixels that all ways reach and that some frame shows brighter than black.
+ * Nothing of a left-out frame but its pose enters its picture. `options` gives the bracket's way,
+ * gap and reach and how many frames beside are left out too.
  * @return SONDE_MISMATCH when fewer than three frames are used
  * @thread owner
  */

@@ -2,11 +2,13 @@
 //
 // mark_lit             pixels that some frame shows brighter than black
 // neighbour_mean       frames before and after, pixel by pixel
-// render               one way of making a frame
+// render, make_all     ways of making a frame
 // add, finish          sums and means over frames
 // leave_out            one frame
+// leave_each_out
+// make_work, clear_work
 // sonde_sequence_leave_one_out
-#include "echo/frames.h"
+#include "echo/slice.h"
 
 #include <string.h>
 
@@ -14,8 +16,10 @@ typedef struct work {
   const sonde_sequence *sequence;
   sonde_slicer_options options;
   size_t pixels; // of a frame
-  uint8_t *lit, *known, *nearest_known, *mean;
-  sonde_image bracket, nearest;
+  uint8_t *lit, *known, *other_known, *mean;
+  slice_bank *bank;
+  uint32_t *used, count; // frames with a pose
+  sonde_image images[3]; // kriging, bracket, nearest
 } work;
 
 static const uint8_t *frame_of(const work *w, uint32_t frame) {
@@ -36,13 +40,14 @@ static void neighbour_mean(work *w, uint32_t before, uint32_t after) {
 }
 
 static sonde_status render(work *w, uint32_t frame, sonde_slice_method method, sonde_image *image,
-                           uint8_t *known, sonde_error *error) {
+                           uint8_t *known, bool *along_sweep, sonde_error *error) {
   sonde_slicer *slicer;
   sonde_slicer_options options = w->options;
   options.method = method;
   options.left_out = frame;
-  sonde_status status = sonde_slicer_create(w->sequence, &options, &slicer, error);
+  sonde_status status = sonde_slicer_create_with(w->sequence, &options, w->bank, &slicer, error);
   if (status) return status;
+  *along_sweep = sonde_slicer_is_along_sweep(slicer);
   sonde_slicer_render(slicer, &w->sequence->frames[frame].world_from_pixel, image, known);
   sonde_slicer_destroy(slicer);
   return SONDE_OK;
@@ -71,46 +76,88 @@ static sonde_status compare(const work *w, uint32_t frame, const uint8_t *made, 
   return status;
 }
 
-static sonde_status leave_out(work *w, uint32_t before, uint32_t frame, uint32_t after,
-                              sonde_left_out *result, sonde_error *error) {
-  sonde_status status = render(w, frame, SONDE_SLICE_BRACKET, &w->bracket, w->known, error);
-  if (!status) status = render(w, frame, SONDE_SLICE_NEAREST, &w->nearest, w->nearest_known, error);
-  if (status) return status;
-  uint64_t left = 0;
-  for (size_t p = 0; p < w->pixels; ++p) {
-    w->known[p] = w->known[p] && w->nearest_known[p] && w->lit[p];
-    left += w->known[p];
+// The three ways of making a frame; marks the pixels that all reach.
+static sonde_status make_all(work *w, uint32_t frame, uint64_t *left, bool *along_sweep,
+                             sonde_error *error) {
+  static const sonde_slice_method ways[3] = {SONDE_SLICE_KRIGE, SONDE_SLICE_BRACKET,
+                                             SONDE_SLICE_NEAREST};
+  memcpy(w->known, w->lit, w->pixels);
+  bool ignored;
+  for (int k = 0; k < 3; ++k) {
+    sonde_status status =
+        render(w, frame, ways[k], &w->images[k], w->other_known, k ? &ignored : along_sweep, error);
+    if (status) return status;
+    for (size_t p = 0; p < w->pixels; ++p) w->known[p] = w->known[p] && w->other_known[p];
   }
-  if (!left) return SONDE_OK; // the others do not reach this frame: not counted
-  neighbour_mean(w, before, after);
-  status = compare(w, frame, w->bracket.pixels, &result->bracket, error);
-  if (!status) status = compare(w, frame, w->nearest.pixels, &result->nearest, error);
-  if (!status) status = compare(w, frame, w->mean, &result->neighbours, error);
+  *left = 0;
+  for (size_t p = 0; p < w->pixels; ++p) *left += w->known[p];
+  return SONDE_OK;
+}
+
+static sonde_status leave_out(work *w, uint32_t k, sonde_left_out *result, sonde_error *error) {
+  uint32_t frame = w->used[k], step = 1 + w->options.left_out_beside;
+  uint64_t left;
+  bool along_sweep;
+  sonde_status status = make_all(w, frame, &left, &along_sweep, error);
+  if (status || !left) return status; // the others do not reach this frame: not counted
+  neighbour_mean(w, w->used[k - step], w->used[k + step]);
+  sonde_likeness *sums[4] = {&result->krige, &result->bracket, &result->nearest,
+                             &result->neighbours};
+  for (int i = 0; i < 4 && !status; ++i)
+    status = compare(w, frame, i < 3 ? w->images[i].pixels : w->mean, sums[i], error);
+  result->along_sweep += along_sweep;
   ++result->frames;
   return status;
 }
 
 static sonde_status leave_each_out(work *w, sonde_left_out *result, const sonde_progress *progress,
                                    sonde_error *error) {
-  uint32_t count = w->sequence->count, last[2] = {0, 0}, seen = 0;
-  sonde_status status = SONDE_OK;
-  for (uint32_t i = 0; i < count && !status; ++i) {
-    if (!w->sequence->frames[i].used) continue;
-    if (!sonde_progress_report(progress, (double)i / count, "leave one out"))
-      return sonde_fail(error, SONDE_CANCELLED, "cancelled after frame %u of %u", i, count);
-    if (++seen > 2) status = leave_out(w, last[0], last[1], i, result, error);
-    last[0] = last[1], last[1] = i;
+  uint32_t step = 1 + w->options.left_out_beside;
+  for (uint32_t k = step; k + step < w->count; ++k) {
+    if (!sonde_progress_report(progress, (double)k / w->count, "leave one out"))
+      return sonde_fail(error, SONDE_CANCELLED, "cancelled after frame %u of %u", w->used[k],
+                        w->sequence->count);
+    sonde_status status = leave_out(w, k, result, error);
+    if (status) return status;
   }
-  if (status) return status;
   if (!result->frames)
     return sonde_fail(error, SONDE_MISMATCH,
                       "%u frames with a pose, none of which lies between others; expected at least "
-                      "three in a sweep",
-                      seen);
+                      "%u in a sweep",
+                      w->count, 2 * step + 1);
+  finish(&result->krige, result->frames);
   finish(&result->bracket, result->frames);
   finish(&result->nearest, result->frames);
   finish(&result->neighbours, result->frames);
   return SONDE_OK;
+}
+
+static sonde_status make_work(work *w, sonde_error *error) {
+  const sonde_sequence *s = w->sequence;
+  sonde_status status = SONDE_OK;
+  for (int k = 0; k < 3 && !status; ++k)
+    status = sonde_image_create(s->width, s->height, &w->images[k], error);
+  w->lit = SONDE_NEW(uint8_t, w->pixels);
+  w->known = SONDE_NEW(uint8_t, w->pixels);
+  w->other_known = SONDE_NEW(uint8_t, w->pixels);
+  w->mean = SONDE_NEW(uint8_t, w->pixels);
+  w->used = SONDE_NEW(uint32_t, s->count);
+  if (!status && !(w->lit && w->known && w->other_known && w->mean && w->used))
+    status = sonde_fail_memory(error);
+  for (uint32_t i = 0; i < s->count && !status; ++i)
+    if (s->frames[i].used) w->used[w->count++] = i;
+  if (!status) mark_lit(w);
+  return status ? status : sonde_slice_bank_create(s, &w->bank, error);
+}
+
+static void clear_work(work *w) {
+  for (int k = 0; k < 3; ++k) sonde_image_clear(&w->images[k]);
+  sonde_slice_bank_destroy(w->bank);
+  sonde_free(w->lit);
+  sonde_free(w->known);
+  sonde_free(w->other_known);
+  sonde_free(w->mean);
+  sonde_free(w->used);
 }
 
 sonde_status sonde_sequence_leave_one_out(const sonde_sequence *s,
@@ -121,21 +168,9 @@ sonde_status sonde_sequence_leave_one_out(const sonde_sequence *s,
   *result = (sonde_left_out){0};
   work w = {.sequence = s, .pixels = (size_t)s->width * s->height};
   w.options = options ? *options : sonde_slicer_options_default();
-  sonde_status status = sonde_image_create(s->width, s->height, &w.bracket, error);
-  if (!status) status = sonde_image_create(s->width, s->height, &w.nearest, error);
-  w.lit = SONDE_NEW(uint8_t, w.pixels);
-  w.known = SONDE_NEW(uint8_t, w.pixels);
-  w.nearest_known = SONDE_NEW(uint8_t, w.pixels);
-  w.mean = SONDE_NEW(uint8_t, w.pixels);
-  if (!status && !(w.lit && w.known && w.nearest_known && w.mean))
-    status = sonde_fail_memory(error);
-  if (!status) mark_lit(&w);
+  sonde_status status = sonde_slicer_check(s, &w.options, error);
+  if (!status) status = make_work(&w, error);
   if (!status) status = leave_each_out(&w, result, progress, error);
-  sonde_image_clear(&w.bracket);
-  sonde_image_clear(&w.nearest);
-  sonde_free(w.lit);
-  sonde_free(w.known);
-  sonde_free(w.nearest_known);
-  sonde_free(w.mean);
+  clear_work(&w);
   return status;
 }

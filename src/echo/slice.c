@@ -2,8 +2,12 @@
 //
 // plane_of                      map from the world onto a frame
 // make_rooms                    scratch of the workers
+// used_between                  frames counted between two
+// sonde_slice_is_left_out
 // fill_planes                   all used frames, normals to one side
-// sonde_slicer_create, sonde_slicer_destroy
+// start_bank                    what kriging needs
+// sonde_slicer_create, sonde_slicer_create_with, sonde_slicer_destroy
+// sonde_slicer_is_along_sweep
 // prepare                       the forms of every plane for a picture
 // block_row                     one row of blocks, for the workers
 // sonde_slicer_render
@@ -35,20 +39,39 @@ static sonde_status plane_of(const sonde_sequence *s, uint32_t frame, sonde_vec3
   return SONDE_OK;
 }
 
+// Used frames that lie between two frames, the second one counted.
+static uint32_t used_between(const sonde_sequence *s, uint32_t low, uint32_t high) {
+  uint32_t count = 0;
+  for (uint32_t i = low + 1; i <= high; ++i) count += s->frames[i].used;
+  return count;
+}
+
+bool sonde_slice_is_left_out(const sonde_sequence *s, const sonde_slicer_options *o,
+                             uint32_t frame) {
+  if (o->left_out >= s->count || frame == o->left_out) return frame == o->left_out;
+  if (!o->left_out_beside) return false;
+  uint32_t low = frame < o->left_out ? frame : o->left_out;
+  uint32_t high = frame < o->left_out ? o->left_out : frame;
+  return used_between(s, low, high) <= o->left_out_beside;
+}
+
 static sonde_status fill_planes(const sonde_sequence *s, sonde_slicer *slicer, sonde_error *error) {
   sonde_vec3 previous = vec3(0, 0, 0);
   for (uint32_t i = 0; i < s->count; ++i) {
-    if (!s->frames[i].used || i == slicer->options.left_out) continue;
-    sonde_status status = plane_of(s, i, &previous, &slicer->planes[slicer->count], error);
+    if (!s->frames[i].used || sonde_slice_is_left_out(s, &slicer->options, i)) continue;
+    slice_plane *plane = &slicer->planes[slicer->count];
+    sonde_status status = plane_of(s, i, &previous, plane, error);
     if (status) return status;
+    plane->frame = i;
+    plane->pyramid = slicer->bank ? &slicer->bank->pyramids[i] : NULL;
     ++slicer->count;
   }
   if (slicer->count) return SONDE_OK;
   return sonde_fail(error, SONDE_MISMATCH, "no frame with a pose is left to slice");
 }
 
-static sonde_status check_sequence(const sonde_sequence *s, const sonde_slicer_options *o,
-                                   sonde_error *error) {
+sonde_status sonde_slicer_check(const sonde_sequence *s, const sonde_slicer_options *o,
+                                sonde_error *error) {
   if (s->clip[2] < 2 || s->clip[3] < 2)
     return sonde_fail(error, SONDE_ARGUMENT,
                       "frames of %u x %u used pixels, expected at least 2 x 2", s->clip[2],
@@ -74,12 +97,26 @@ static bool make_rooms(sonde_slicer *slicer, uint32_t count) {
   return true;
 }
 
+// The tables of kriging; takes the caller's bank or makes its own.
+static sonde_status start_bank(const sonde_sequence *s, slice_bank *bank, sonde_slicer *slicer,
+                               sonde_error *error) {
+  slicer->bank = bank;
+  if (bank || slicer->options.method != SONDE_SLICE_KRIGE) return SONDE_OK;
+  slicer->owns_bank = true;
+  return sonde_slice_bank_create(s, &slicer->bank, error);
+}
+
 sonde_status sonde_slicer_create(const sonde_sequence *s, const sonde_slicer_options *options,
                                  sonde_slicer **out, sonde_error *error) {
+  return sonde_slicer_create_with(s, options, NULL, out, error);
+}
+
+sonde_status sonde_slicer_create_with(const sonde_sequence *s, const sonde_slicer_options *options,
+                                      slice_bank *bank, sonde_slicer **out, sonde_error *error) {
   SONDE_ASSERT(s != NULL && out != NULL && s->frames != NULL);
   *out = NULL;
   sonde_slicer_options o = options ? *options : sonde_slicer_options_default();
-  sonde_status status = check_sequence(s, &o, error);
+  sonde_status status = sonde_slicer_check(s, &o, error);
   if (status) return status;
   sonde_slicer *slicer = SONDE_NEW(sonde_slicer, 1);
   if (!slicer) return sonde_fail_memory(error);
@@ -93,7 +130,9 @@ sonde_status sonde_slicer_create(const sonde_sequence *s, const sonde_slicer_opt
   slicer->planes = SONDE_NEW(slice_plane, s->count);
   slicer->reached = SONDE_NEW(uint64_t, slicer->workers);
   bool enough = slicer->planes && slicer->reached && make_rooms(slicer, s->count);
-  status = enough ? fill_planes(s, slicer, error) : sonde_fail_memory(error);
+  status = enough ? start_bank(s, bank, slicer, error) : sonde_fail_memory(error);
+  if (!status) status = fill_planes(s, slicer, error);
+  if (!status && o.method == SONDE_SLICE_KRIGE) status = sonde_slicer_krige(slicer, error);
   if (status) sonde_slicer_destroy(slicer);
   *out = status ? NULL : slicer;
   return status;
@@ -110,7 +149,15 @@ void sonde_slicer_destroy(sonde_slicer *slicer) {
   sonde_free(slicer->rooms);
   sonde_free(slicer->every);
   sonde_free(slicer->reached);
+  sonde_free(slicer->joins);
+  sonde_free(slicer->far);
+  if (slicer->owns_bank) sonde_slice_bank_destroy(slicer->bank);
   sonde_free(slicer);
+}
+
+bool sonde_slicer_is_along_sweep(const sonde_slicer *slicer) {
+  SONDE_ASSERT(slicer != NULL);
+  return slicer->options.along_sweep;
 }
 
 static void prepare(sonde_slicer *slicer, const sonde_affine *world_from_pixel) {

@@ -6,6 +6,46 @@
 
 enum { SLICE_TILE = 16, SLICE_BLOCK = 64 }; // pixels along a side
 
+// Kriging: levels of a picture, steps of the tables between two frames, frames joined.
+enum { SLICE_LEVELS = 6, SLICE_STEPS = 64, SLICE_JOINED = 4 };
+
+// Used part of a frame at falling resolution, each half as wide and high as the one before; level 0
+// is the frame itself.
+typedef struct slice_pyramid {
+  const uint8_t *level[SLICE_LEVELS];
+} slice_pyramid;
+
+// Products of two frames' scales over a grid of points, their distance, for both ways of joining.
+typedef struct slice_likeness {
+  uint32_t a, b;               // frames
+  float distance_m;            // between their middles
+  float mean[2][SLICE_LEVELS]; // [across, along the sweep]: of the product of both
+} slice_likeness;
+
+// What kriging knows of a sequence; leaving frames out selects from it.
+typedef struct slice_bank {
+  const sonde_sequence *sequence;
+  uint8_t *levels;         // all levels above 0
+  slice_pyramid *pyramids; // [count of the sequence]
+  uint32_t wide[SLICE_LEVELS], high[SLICE_LEVELS];
+  size_t stride[SLICE_LEVELS];
+  slice_likeness *pairs;
+  uint32_t pair_count;
+  float base; // mean grey, taken off the coarsest scale
+} slice_bank;
+
+// Weights of the levels of four frames: before, lower, upper, behind.
+typedef struct slice_weights {
+  float of[SLICE_JOINED][SLICE_LEVELS];
+} slice_weights;
+
+// Between a plane and the next one.
+typedef struct slice_join {
+  int32_t before, behind;                 // planes beyond both, -1 for none
+  float to_before[2][3], to_behind[2][3]; // pixel of the lower, upper plane -> there
+  slice_weights steps[SLICE_STEPS + 1];   // from the lower plane to the upper
+} slice_join;
+
 // Column u, row v and signed distance d (m) from a plane, linear in the pixel of the picture.
 typedef struct slice_forms {
   double u[3], v[3], d[3]; // value at pixel (0, 0), per column, per row
@@ -17,7 +57,9 @@ typedef struct slice_plane {
   double pixel_m[2]; // length of a step in u and v
   sonde_vec3 normal;
   const uint8_t *pixels;
-  slice_forms forms; // of the picture being rendered
+  const slice_pyramid *pyramid; // NULL without kriging
+  uint32_t frame;               // of the sequence
+  slice_forms forms;            // of the picture being rendered
 } slice_plane;
 
 // The forms of one plane from a tile's first pixel on.
@@ -42,7 +84,28 @@ struct sonde_slicer {
   sonde_image *image;        // of the render under way
   uint8_t *known;
   uint64_t *reached; // [workers] pixels
+  slice_bank *bank;  // with kriging
+  bool owns_bank;
+  slice_join *joins;  // [count - 1] planes that follow each other
+  slice_weights *far; // [SLICE_FAR][SLICE_STEPS + 1] two frames that do not, by their gap
 };
+
+enum { SLICE_FAR = 32 };
+
+sonde_status sonde_slice_bank_create(const sonde_sequence *sequence, slice_bank **bank,
+                                     sonde_error *error);
+void sonde_slice_bank_destroy(slice_bank *bank);
+// Chooses the way of joining and fills the tables of weights.
+sonde_status sonde_slicer_krige(sonde_slicer *slicer, sonde_error *error);
+sonde_status sonde_slicer_check(const sonde_sequence *sequence, const sonde_slicer_options *options,
+                                sonde_error *error);
+// The same as sonde_slicer_create with a bank of the caller's, NULL to make one when needed.
+sonde_status sonde_slicer_create_with(const sonde_sequence *sequence,
+                                      const sonde_slicer_options *options, slice_bank *bank,
+                                      sonde_slicer **slicer, sonde_error *error);
+// Frames that the options leave out.
+bool sonde_slice_is_left_out(const sonde_sequence *sequence, const sonde_slicer_options *options,
+                             uint32_t frame);
 
 // One block; returns the pixels reached.
 uint64_t sonde_slice_block(const sonde_slicer *slicer, uint32_t column, uint32_t row,

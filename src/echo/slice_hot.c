@@ -26,6 +26,9 @@
 // sample            bilinear
 // sample_foot       a frame straight below a pixel
 // foot, follow      where a line through a pixel meets a frame
+// meet              the points on both frames
+// sample_levels     levels of a frame's pyramid, weighted
+// krige             up to four frames, every scale by its own weight
 // between           two frames and their weights
 // value_at          one pixel
 // fill_tile
@@ -218,30 +221,82 @@ static inline void follow(float way[3][3], float u, float v, float d, float at[2
   at[1] -= t * (way[1][0] + u * way[1][1] + v * way[1][2]);
 }
 
-// Mean of both frames, each weighted by the distance a or b of the other; negative when the line
-// passes a frame by.
-static inline float between(const sonde_slicer *s, const slice_candidate *room, pair *p, float x,
-                            float y, float a, float b) {
+// Where a line through the pixel meets both frames; false when it passes one by.
+static inline bool meet(const sonde_slicer *s, const slice_candidate *room, pair *p, float x,
+                        float y, float a, float b, float m[2], float n[2]) {
   const slice_candidate *up = &room[p->up], *down = &room[p->down];
-  float m[2], n[2];
-  bool met = false;
+  foot(up, x, y, m);
+  foot(down, x, y, n);
   if (p->along_sweep) {
-    foot(up, x, y, m);
-    foot(down, x, y, n);
-    float u = m[0], v = m[1]; // one line for both
+    float u = m[0], v = m[1], start[2] = {n[0], n[1]}; // one line for both
     follow(p->up_way, u, v, a, m);
     follow(p->down_way, u, v, -b, n);
-    met = is_inside(s, m) && is_inside(s, n);
+    if (is_inside(s, m) && is_inside(s, n)) return true;
+    m[0] = u, m[1] = v, n[0] = start[0], n[1] = start[1];
   }
-  if (!met) {
-    foot(up, x, y, m);
-    foot(down, x, y, n);
-    for (int k = 0; k < 2; ++k) m[k] -= a * p->up_shift[k], n[k] += b * p->down_shift[k];
-    if (!is_inside(s, m) || !is_inside(s, n)) return -1;
+  for (int k = 0; k < 2; ++k) m[k] -= a * p->up_shift[k], n[k] += b * p->down_shift[k];
+  return is_inside(s, m) && is_inside(s, n);
+}
+
+static inline float sample_level(const slice_bank *bank, const uint8_t *level, int k, float u,
+                                 float v) {
+  uint32_t i = (uint32_t)u, j = (uint32_t)v;
+  uint32_t right = i + 1 < bank->wide[k];
+  const uint8_t *p = level + j * bank->stride[k] + i;
+  const uint8_t *q = p + (j + 1 < bank->high[k] ? bank->stride[k] : 0);
+  float a = u - (float)i, b = v - (float)j;
+  float top = (float)p[0] + a * (float)(p[right] - p[0]);
+  float low = (float)q[0] + a * (float)(q[right] - q[0]);
+  return top + b * (low - top);
+}
+
+// All levels of a frame, weighted.
+static inline float sample_levels(const sonde_slicer *s, const slice_plane *plane,
+                                  const float at[2], const float *w0, const float *w1, float t) {
+  float u = limit(at[0], s->low[0], s->high[0]) - s->low[0];
+  float v = limit(at[1], s->low[1], s->high[1]) - s->low[1], sum = 0, scale = 1;
+  for (int k = 0; k < SLICE_LEVELS; ++k, scale *= 0.5f) {
+    float w = w0[k] + t * (w1[k] - w0[k]);
+    sum += w * sample_level(s->bank, plane->pyramid->level[k], k, u * scale, v * scale);
   }
-  float near = sample(s, up->plane->pixels, m[0], m[1]);
-  float far = sample(s, down->plane->pixels, n[0], n[1]);
-  return near + (far - near) * (a / (a + b));
+  return sum;
+}
+
+// Kriging between lower and upper plane, a share of the way t from the lower one.
+static float krige(const sonde_slicer *s, const slice_plane *lower, const float l[2],
+                   const slice_plane *upper, const float u[2], float t, float gap) {
+  int32_t i = (int32_t)(lower - s->planes);
+  const slice_join *join = upper == lower + 1 ? &s->joins[i] : NULL;
+  uint32_t far = (uint32_t)limit(gap / (float)s->options.gap_m * SLICE_FAR, 0, SLICE_FAR - 1);
+  const slice_weights *steps = join ? join->steps : s->far + far * (SLICE_STEPS + 1);
+  uint32_t step = (uint32_t)limit(t * SLICE_STEPS, 0, SLICE_STEPS - 1);
+  const slice_weights *w = &steps[step], *x = w + 1;
+  float r = t * SLICE_STEPS - (float)step;
+  float value = sample_levels(s, lower, l, w->of[1], x->of[1], r) +
+                sample_levels(s, upper, u, w->of[2], x->of[2], r);
+  for (int side = 0; join && side < 2; ++side) {
+    int32_t outer = side ? join->behind : join->before;
+    const float(*map)[3] = side ? join->to_behind : join->to_before, *from = side ? u : l;
+    if (outer < 0) continue;
+    float at[2];
+    for (int k = 0; k < 2; ++k) at[k] = map[k][0] * from[0] + map[k][1] * from[1] + map[k][2];
+    value += sample_levels(s, &s->planes[outer], at, w->of[3 * side], x->of[3 * side], r);
+  }
+  return limit(value, 0, 255);
+}
+
+// Mean of both frames, each weighted by the distance a or b of the other, or their kriging;
+// negative when the line passes a frame by.
+static inline float between(const sonde_slicer *s, const slice_candidate *room, pair *p, float x,
+                            float y, float a, float b) {
+  const slice_plane *up = room[p->up].plane, *down = room[p->down].plane;
+  float m[2], n[2];
+  if (!meet(s, room, p, x, y, a, b, m, n)) return -1;
+  float t = a / (a + b);
+  if (s->options.method == SONDE_SLICE_KRIGE)
+    return up < down ? krige(s, up, m, down, n, t, a + b) : krige(s, down, n, up, m, 1 - t, a + b);
+  float near = sample(s, up->pixels, m[0], m[1]), far = sample(s, down->pixels, n[0], n[1]);
+  return near + (far - near) * t;
 }
 
 // Negative when no frame reaches the pixel.

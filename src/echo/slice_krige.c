@@ -1,0 +1,440 @@
+// Weights for pictures between frames, from how alike the frames are.
+//
+// A frame is the sum of scales: differences of a pyramid's levels, the coarsest level last. Of each
+// scale the covariance between frames is measured over a grid of points for all pairs up to LAGS
+// frames apart, and r(d) = exp(-(d/L)^p) is fitted to its fall with the distance d. Simple kriging
+// then gives the weights of least expected square error for each scale: fine grain, which no other
+// frame shares, fades away from the frames; coarse structure is interpolated smoothly. The mean of
+// the coarsest scale is not known: its weights add up to one.
+//
+// halve                       next level of a pyramid
+// build_pyramid
+// scales_at                   all scales of a frame at a point
+// middle, apart               distance of two frames
+// foot_map                    pixels of a frame on another
+// compare                     products over the grid
+// measure_pairs
+// sonde_slice_bank_create, sonde_slice_bank_destroy
+// collect, fit, fit_all       decay of one scale, of all
+// expected_error              of a frame made from its two neighbours
+// solve                       small linear system
+// krige_scale, weights_at     weights at a place
+// make_join, make_far         tables
+// sonde_slicer_krige
+#include "echo/slice.h"
+
+#include <string.h>
+
+enum { LAGS = 5, GRID_POINTS = 16000, REFERENCES = 128, BINS = 24, LENGTHS = 96, POWERS = 17 };
+
+static const double SHORTEST_M = 2e-5, LONGEST_M = 20, FIRST_POWER = 0.3, POWER_STEP = 0.1;
+
+typedef struct decay {
+  double variance, length_m, power;
+} decay;
+
+typedef struct bin {
+  double log_m, likeness, weight;
+} bin;
+
+typedef struct grid {
+  uint32_t step, columns, rows;
+} grid;
+
+// Binomial weights 1 4 6 4 1 along both axes; the edge is repeated.
+static void halve(const uint8_t *from, size_t stride, uint32_t wide, uint32_t high, uint16_t *rows,
+                  uint8_t *to) {
+  static const uint32_t weight[5] = {1, 4, 6, 4, 1};
+  uint32_t w2 = (wide + 1) / 2, h2 = (high + 1) / 2;
+  for (uint32_t y = 0; y < high; ++y)
+    for (uint32_t x = 0; x < w2; ++x) {
+      uint32_t sum = 0;
+      for (int k = 0; k < 5; ++k) {
+        int at = (int)(2 * x) + k - 2;
+        at = at < 0 ? 0 : at >= (int)wide ? (int)wide - 1 : at;
+        sum += weight[k] * from[y * stride + (size_t)at];
+      }
+      rows[(size_t)y * w2 + x] = (uint16_t)sum;
+    }
+  for (uint32_t y = 0; y < h2; ++y)
+    for (uint32_t x = 0; x < w2; ++x) {
+      uint32_t sum = 128;
+      for (int k = 0; k < 5; ++k) {
+        int at = (int)(2 * y) + k - 2;
+        at = at < 0 ? 0 : at >= (int)high ? (int)high - 1 : at;
+        sum += weight[k] * rows[(size_t)at * w2 + x];
+      }
+      to[(size_t)y * w2 + x] = (uint8_t)(sum >> 8);
+    }
+}
+
+static void build_pyramid(slice_bank *bank, uint32_t frame, uint8_t *levels, uint16_t *rows) {
+  const sonde_sequence *s = bank->sequence;
+  slice_pyramid *p = &bank->pyramids[frame];
+  p->level[0] = s->pixels + ((size_t)frame * s->height + s->clip[1]) * s->width + s->clip[0];
+  for (int k = 1; k < SLICE_LEVELS; ++k) {
+    halve(p->level[k - 1], bank->stride[k - 1], bank->wide[k - 1], bank->high[k - 1], rows, levels);
+    p->level[k] = levels;
+    levels += (size_t)bank->wide[k] * bank->high[k];
+  }
+}
+
+static inline float level_at(const slice_bank *bank, const slice_pyramid *p, int k, float u,
+                             float v) {
+  float scale = 1.0f / (float)(1 << k), x = u * scale, y = v * scale;
+  uint32_t i = (uint32_t)x, j = (uint32_t)y;
+  uint32_t right = i + 1 < bank->wide[k], below = j + 1 < bank->high[k];
+  const uint8_t *q = p->level[k] + j * bank->stride[k] + i;
+  const uint8_t *r = q + below * bank->stride[k];
+  float a = x - (float)i, b = y - (float)j;
+  float top = (float)q[0] + a * (float)(q[right] - q[0]);
+  float low = (float)r[0] + a * (float)(r[right] - r[0]);
+  return top + b * (low - top);
+}
+
+// (u, v) counts from the corner of the used part.
+static void scales_at(const slice_bank *bank, uint32_t frame, float u, float v,
+                      float scales[SLICE_LEVELS]) {
+  const slice_pyramid *p = &bank->pyramids[frame];
+  float finer = level_at(bank, p, 0, u, v);
+  for (int k = 1; k < SLICE_LEVELS; ++k) {
+    float level = level_at(bank, p, k, u, v);
+    scales[k - 1] = finer - level;
+    finer = level;
+  }
+  scales[SLICE_LEVELS - 1] = finer - bank->base;
+}
+
+static sonde_vec3 middle(const sonde_sequence *s, uint32_t frame) {
+  double u = s->clip[0] + 0.5 * (s->clip[2] - 1), v = s->clip[1] + 0.5 * (s->clip[3] - 1);
+  return affine_apply(&s->frames[frame].world_from_pixel, vec3(u, v, 0));
+}
+
+static sonde_vec3 normal_of(const sonde_sequence *s, uint32_t frame) {
+  const sonde_affine *a = &s->frames[frame].world_from_pixel;
+  return v_unit(v_cross(affine_column(a, 0), affine_column(a, 1)), vec3(0, 0, 0));
+}
+
+// From the middle of either frame to the plane of the other, mean of both.
+static double apart(const sonde_sequence *s, uint32_t a, uint32_t b) {
+  sonde_vec3 way = v_sub(middle(s, a), middle(s, b));
+  return 0.5 * (fabs(v_dot(way, normal_of(s, a))) + fabs(v_dot(way, normal_of(s, b))));
+}
+
+// Pixel (u, v, 1) of frame a -> its foot on frame b; false for a frame without a plane.
+static bool foot_map(const sonde_sequence *s, uint32_t a, uint32_t b, float map[2][3]) {
+  const sonde_affine *to = &s->frames[b].world_from_pixel;
+  sonde_affine whole = affine_columns(affine_column(to, 0), affine_column(to, 1), normal_of(s, b),
+                                      affine_column(to, 3));
+  sonde_affine inverse;
+  if (!affine_inverse(&whole, &inverse)) return false;
+  sonde_affine m = affine_mul(&inverse, &s->frames[a].world_from_pixel);
+  for (int k = 0; k < 2; ++k)
+    for (int j = 0; j < 3; ++j) map[k][j] = (float)m.m[k][j == 2 ? 3 : j];
+  return true;
+}
+
+static grid grid_of(const slice_bank *bank) {
+  grid g = {.step = 1};
+  while ((bank->wide[0] / g.step) * (bank->high[0] / g.step) > GRID_POINTS) ++g.step;
+  g.columns = bank->wide[0] / g.step, g.rows = bank->high[0] / g.step;
+  return g;
+}
+
+// Mean products of frames a and b; of b at the same pixel or at the foot.
+static void compare(const slice_bank *bank, slice_likeness *pair) {
+  const sonde_sequence *s = bank->sequence;
+  grid g = grid_of(bank);
+  float map[2][3], own[SLICE_LEVELS], other[SLICE_LEVELS];
+  double sum[2][SLICE_LEVELS] = {{0}}, count[2] = {0};
+  bool flat = !foot_map(s, pair->a, pair->b, map);
+  for (uint32_t i = 0; i < g.columns * g.rows; ++i) {
+    float u = (float)(i % g.columns * g.step + g.step / 2);
+    float v = (float)(i / g.columns * g.step + g.step / 2);
+    float x = u + (float)s->clip[0], y = v + (float)s->clip[1];
+    scales_at(bank, pair->a, u, v, own);
+    for (int way = 0; way < 2; ++way) {
+      float p = u, q = v;
+      if (way == 0 && pair->a != pair->b) {
+        p = map[0][0] * x + map[0][1] * y + map[0][2] - (float)s->clip[0];
+        q = map[1][0] * x + map[1][1] * y + map[1][2] - (float)s->clip[1];
+      }
+      if (flat ||
+          !(p >= 0 && q >= 0 && p <= (float)(bank->wide[0] - 1) && q <= (float)(bank->high[0] - 1)))
+        continue;
+      scales_at(bank, pair->b, p, q, other);
+      for (int k = 0; k < SLICE_LEVELS; ++k) sum[way][k] += (double)(own[k] * other[k]);
+      count[way] += 1;
+    }
+  }
+  for (int way = 0; way < 2; ++way)
+    for (int k = 0; k < SLICE_LEVELS; ++k)
+      pair->mean[way][k] = count[way] > 0 ? (float)(sum[way][k] / count[way]) : 0;
+}
+
+static void mean_grey(slice_bank *bank) {
+  const int k = SLICE_LEVELS - 1;
+  double sum = 0, count = 0;
+  for (uint32_t i = 0; i < bank->sequence->count; ++i)
+    for (size_t p = 0; bank->sequence->frames[i].used && p < bank->stride[k] * bank->high[k]; ++p)
+      sum += bank->pyramids[i].level[k][p], count += 1;
+  bank->base = count > 0 ? (float)(sum / count) : 0;
+}
+
+// Every frame with itself and the next LAGS; of a long sequence, evenly chosen frames.
+static sonde_status measure_pairs(slice_bank *bank, uint32_t used, sonde_error *error) {
+  const sonde_sequence *s = bank->sequence;
+  uint32_t *index = SONDE_NEW(uint32_t, used), n = 0, every = 1 + used / REFERENCES;
+  bank->pairs = SONDE_NEW(slice_likeness, (size_t)used * (LAGS + 1));
+  sonde_status status = index && bank->pairs ? SONDE_OK : sonde_fail_memory(error);
+  for (uint32_t i = 0; i < s->count && !status; ++i)
+    if (s->frames[i].used) index[n++] = i;
+  for (uint32_t i = 0; i < n; i += every)
+    for (uint32_t lag = 0; lag <= LAGS && i + lag < n; ++lag) {
+      slice_likeness *pair = &bank->pairs[bank->pair_count++];
+      *pair = (slice_likeness){.a = index[i], .b = index[i + lag]};
+      pair->distance_m = (float)apart(s, pair->a, pair->b);
+      compare(bank, pair);
+    }
+  sonde_free(index);
+  return status;
+}
+
+static size_t measure_levels(slice_bank *bank) {
+  size_t bytes = 0;
+  bank->wide[0] = bank->sequence->clip[2], bank->high[0] = bank->sequence->clip[3];
+  bank->stride[0] = bank->sequence->width;
+  for (int k = 1; k < SLICE_LEVELS; ++k) {
+    bank->wide[k] = (bank->wide[k - 1] + 1) / 2, bank->high[k] = (bank->high[k - 1] + 1) / 2;
+    bank->stride[k] = bank->wide[k];
+    bytes += bank->stride[k] * bank->high[k];
+  }
+  return bytes;
+}
+
+sonde_status sonde_slice_bank_create(const sonde_sequence *s, slice_bank **out,
+                                     sonde_error *error) {
+  SONDE_ASSERT(s != NULL && out != NULL && s->clip[2] > 1 && s->clip[3] > 1);
+  *out = NULL;
+  slice_bank *bank = SONDE_NEW(slice_bank, 1);
+  if (!bank) return sonde_fail_memory(error);
+  bank->sequence = s;
+  uint32_t used = 0;
+  for (uint32_t i = 0; i < s->count; ++i) used += s->frames[i].used;
+  size_t bytes = measure_levels(bank);
+  bank->levels = SONDE_NEW(uint8_t, bytes * used);
+  bank->pyramids = SONDE_NEW(slice_pyramid, s->count);
+  uint16_t *rows = SONDE_NEW(uint16_t, (size_t)s->clip[3] * ((s->clip[2] + 1) / 2));
+  bool enough = bank->levels && bank->pyramids && rows;
+  sonde_status status = enough ? SONDE_OK : sonde_fail_memory(error);
+  for (uint32_t i = 0, n = 0; i < s->count && !status; ++i)
+    if (s->frames[i].used) build_pyramid(bank, i, bank->levels + bytes * n++, rows);
+  sonde_free(rows);
+  if (!status) {
+    mean_grey(bank);
+    status = measure_pairs(bank, used, error);
+  }
+  if (status) sonde_slice_bank_destroy(bank);
+  *out = status ? NULL : bank;
+  return status;
+}
+
+void sonde_slice_bank_destroy(slice_bank *bank) {
+  if (!bank) return;
+  sonde_free(bank->levels);
+  sonde_free(bank->pyramids);
+  sonde_free(bank->pairs);
+  sonde_free(bank);
+}
+
+// Likeness over distance of the frames in use, in bins of the logarithm of the distance.
+static double collect(const sonde_slicer *slicer, int way, int level, bin bins[BINS]) {
+  const slice_bank *bank = slicer->bank;
+  double variance = 0, count = 0;
+  memset(bins, 0, BINS * sizeof *bins);
+  for (int pass = 0; pass < 2; ++pass)
+    for (uint32_t i = 0; i < bank->pair_count; ++i) {
+      const slice_likeness *p = &bank->pairs[i];
+      if (sonde_slice_is_left_out(bank->sequence, &slicer->options, p->a) ||
+          sonde_slice_is_left_out(bank->sequence, &slicer->options, p->b))
+        continue;
+      double mean = (double)p->mean[way][level], d = fmax((double)p->distance_m, SHORTEST_M);
+      if (pass == 0 && p->a == p->b) variance += mean, count += 1;
+      if (pass == 0 || p->a == p->b || !(variance > 0)) continue;
+      // Four bins per doubling, the first one ends at 0.1 mm.
+      int at = (int)clamp(4 * log2(d / 1e-4), 0, BINS - 1);
+      bins[at].log_m += log(d), bins[at].likeness += mean / (variance / count);
+      bins[at].weight += 1;
+    }
+  for (int i = 0; i < BINS; ++i)
+    if (bins[i].weight > 0) bins[i].log_m /= bins[i].weight, bins[i].likeness /= bins[i].weight;
+  return count > 0 ? variance / count : 0;
+}
+
+static double likeness_at(const decay *d, double distance_m) {
+  return distance_m > 0 ? exp(-pow(distance_m / d->length_m, d->power)) : 1;
+}
+
+static double misfit(const bin bins[BINS], const decay *d) {
+  double sum = 0;
+  for (int i = 0; i < BINS; ++i) {
+    if (!(bins[i].weight > 0)) continue;
+    double error = exp(-exp(d->power * (bins[i].log_m - log(d->length_m)))) - bins[i].likeness;
+    sum += bins[i].weight * error * error;
+  }
+  return sum;
+}
+
+static decay fit(const sonde_slicer *slicer, int way, int level) {
+  bin bins[BINS];
+  decay best = {collect(slicer, way, level, bins), 1e-3, 1};
+  double least = (double)INFINITY;
+  for (int i = 0; i < LENGTHS; ++i)
+    for (int j = 0; j < POWERS; ++j) {
+      decay d = {best.variance, SHORTEST_M * pow(LONGEST_M / SHORTEST_M, i / (LENGTHS - 1.0)),
+                 FIRST_POWER + POWER_STEP * j};
+      double error = misfit(bins, &d);
+      if (error < least) least = error, best = d;
+    }
+  return best;
+}
+
+// Of a frame made from the two beside it, each `step_m` away.
+static double expected_error(const decay decays[SLICE_LEVELS], double step_m) {
+  double sum = 0;
+  for (int k = 0; k < SLICE_LEVELS; ++k) {
+    double near = likeness_at(&decays[k], step_m), far = likeness_at(&decays[k], 2 * step_m);
+    double share =
+        k + 1 < SLICE_LEVELS ? 1 - 2 * near * near / (1 + far) : 1.5 - 2 * near + far / 2;
+    sum += decays[k].variance * share;
+  }
+  return sum;
+}
+
+// Gauss with the largest pivot; a system without one leaves zeros.
+static void solve(int n, double a[][SLICE_JOINED + 1], double *b) {
+  for (int k = 0; k < n; ++k) {
+    int pivot = k;
+    for (int i = k + 1; i < n; ++i)
+      if (fabs(a[i][k]) > fabs(a[pivot][k])) pivot = i;
+    if (!(fabs(a[pivot][k]) > 1e-12)) {
+      memset(b, 0, (size_t)n * sizeof *b);
+      return;
+    }
+    for (int j = 0; j < n; ++j) {
+      double kept = a[k][j];
+      a[k][j] = a[pivot][j], a[pivot][j] = kept;
+    }
+    double kept = b[k];
+    b[k] = b[pivot], b[pivot] = kept;
+    for (int i = k + 1; i < n; ++i) {
+      double factor = a[i][k] / a[k][k];
+      for (int j = k; j < n; ++j) a[i][j] -= factor * a[k][j];
+      b[i] -= factor * b[k];
+    }
+  }
+  for (int k = n - 1; k >= 0; --k) {
+    for (int j = k + 1; j < n; ++j) b[k] -= a[k][j] * b[j];
+    b[k] /= a[k][k];
+  }
+}
+
+// Weights of frames at `at` for the place x; with `whole` they add up to one.
+static void krige_scale(const decay *d, int n, const double *at, double x, bool whole, double *w) {
+  double a[SLICE_JOINED + 1][SLICE_JOINED + 1], b[SLICE_JOINED + 1];
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < n; ++j) a[i][j] = likeness_at(d, fabs(at[i] - at[j]));
+    b[i] = likeness_at(d, fabs(at[i] - x));
+    a[i][n] = a[n][i] = b[n] = 1;
+  }
+  a[n][n] = 0;
+  solve(whole ? n + 1 : n, a, b);
+  memcpy(w, b, (size_t)n * sizeof *w);
+}
+
+// @param slots where the n frames stand in the weights
+static void weights_at(const decay decays[SLICE_LEVELS], int n, const double *at, const int *slots,
+                       double x, slice_weights *out) {
+  double w[SLICE_JOINED], finer[SLICE_JOINED] = {0};
+  memset(out, 0, sizeof *out);
+  for (int k = 0; k < SLICE_LEVELS; ++k) {
+    krige_scale(&decays[k], n, at, x, k + 1 == SLICE_LEVELS, w);
+    for (int i = 0; i < n; ++i) {
+      out->of[slots[i]][k] = (float)(w[i] - finer[i]); // scales are differences of levels
+      finer[i] = w[i];
+    }
+  }
+}
+
+static uint32_t frame_of(const sonde_slicer *slicer, int32_t plane) {
+  return slicer->planes[plane].frame;
+}
+
+// A plane beyond an end of the gap that goes on the same way and is not too far.
+static bool goes_on(const sonde_slicer *s, int32_t plane, int32_t end, int32_t other, double *way) {
+  *way = 0;
+  if (plane < 0 || plane >= (int32_t)s->count) return false;
+  const sonde_sequence *q = s->bank->sequence;
+  double gap = apart(q, frame_of(s, end), frame_of(s, other));
+  double all = apart(q, frame_of(s, plane), frame_of(s, other));
+  *way = apart(q, frame_of(s, plane), frame_of(s, end));
+  return *way > 0.05 * gap && *way <= s->options.gap_m && fabs(all - gap - *way) < 0.25 * all;
+}
+
+static void make_map(const sonde_slicer *s, int32_t from, int32_t to, float map[2][3]) {
+  static const float same[2][3] = {{1, 0, 0}, {0, 1, 0}};
+  memcpy(map, same, sizeof same);
+  if (to >= 0 && !s->options.along_sweep)
+    (void)foot_map(s->bank->sequence, frame_of(s, from), frame_of(s, to), map);
+}
+
+static void make_join(sonde_slicer *s, int32_t lower, const decay decays[SLICE_LEVELS]) {
+  slice_join *join = &s->joins[lower];
+  int32_t upper = lower + 1;
+  double gap = apart(s->bank->sequence, frame_of(s, lower), frame_of(s, upper)), beyond[2];
+  bool before = goes_on(s, lower - 1, lower, upper, &beyond[0]);
+  bool behind = goes_on(s, upper + 1, upper, lower, &beyond[1]);
+  join->before = before ? lower - 1 : -1, join->behind = behind ? upper + 1 : -1;
+  make_map(s, lower, join->before, join->to_before);
+  make_map(s, upper, join->behind, join->to_behind);
+  double at[SLICE_JOINED];
+  int slots[SLICE_JOINED], n = 0;
+  if (before) at[n] = -beyond[0], slots[n++] = 0;
+  at[n] = 0, slots[n++] = 1;
+  at[n] = gap, slots[n++] = 2;
+  if (behind) at[n] = gap + beyond[1], slots[n++] = 3;
+  for (int t = 0; t <= SLICE_STEPS; ++t)
+    weights_at(decays, n, at, slots, gap * t / SLICE_STEPS, &join->steps[t]);
+}
+
+static void make_far(sonde_slicer *s, const decay decays[SLICE_LEVELS]) {
+  for (int k = 0; k < SLICE_FAR; ++k) {
+    double gap = s->options.gap_m * (k + 0.5) / SLICE_FAR, at[2] = {0, gap};
+    for (int t = 0; t <= SLICE_STEPS; ++t)
+      weights_at(decays, 2, at, (const int[]){1, 2}, gap * t / SLICE_STEPS,
+                 &s->far[k * (SLICE_STEPS + 1) + t]);
+  }
+}
+
+static double mean_step(const sonde_slicer *s) {
+  double sum = 0;
+  for (uint32_t i = 0; i + 1 < s->count; ++i)
+    sum += apart(s->bank->sequence, s->planes[i].frame, s->planes[i + 1].frame);
+  return s->count > 1 ? sum / (s->count - 1) : 0;
+}
+
+sonde_status sonde_slicer_krige(sonde_slicer *s, sonde_error *error) {
+  SONDE_ASSERT(s->bank != NULL && s->count > 0);
+  s->joins = SONDE_NEW(slice_join, s->count);
+  s->far = SONDE_NEW(slice_weights, SLICE_FAR * (SLICE_STEPS + 1));
+  if (!s->joins || !s->far) return sonde_fail_memory(error);
+  decay decays[2][SLICE_LEVELS];
+  for (int way = 0; way < 2; ++way)
+    for (int k = 0; k < SLICE_LEVELS; ++k) decays[way][k] = fit(s, way, k);
+  double step = mean_step(s);
+  bool along = expected_error(decays[1], step) < expected_error(decays[0], step);
+  s->options.along_sweep = along;
+  for (uint32_t i = 0; i + 1 < s->count; ++i) make_join(s, (int32_t)i, decays[along]);
+  make_far(s, decays[along]);
+  return SONDE_OK;
+}
