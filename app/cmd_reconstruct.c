@@ -137,8 +137,9 @@ static sonde_status leave_one_out(const arguments *a, const sonde_sequence *s,
     printf("left out      %8u frames one by one, %llu pixels, %.2f s\n", r.frames,
            (unsigned long long)r.krige.count, app_seconds() - start);
     printf("  %-22s %8s %8s %8s %8s %8s\n", "made from", "RMS", "MAE", "PSNR dB", "NCC", "SSIM");
-    print_likeness(r.along_sweep * 2 > r.frames ? "kriging along sweep" : "kriging across",
-                   &r.krige);
+    print_likeness(2 * r.along_sweep > r.frames ? "kriging, same pixel" : "kriging, across",
+                   &r.place);
+    print_likeness("kriging, any pose", &r.krige);
     print_likeness("frames on both sides", &r.bracket);
     print_likeness("nearest frame", &r.nearest);
     print_likeness("mean of neighbours", &r.neighbours);
@@ -147,7 +148,8 @@ static sonde_status leave_one_out(const arguments *a, const sonde_sequence *s,
   app_json_begin();
   app_json_integer("frames", r.frames);
   app_json_integer("pixels", (long long)r.krige.count);
-  json_likeness("", &r.krige);
+  json_likeness("", &r.place);
+  json_likeness("any_pose_", &r.krige);
   json_likeness("both_sides_", &r.bracket);
   json_likeness("nearest_", &r.nearest);
   json_likeness("neighbour_mean_", &r.neighbours);

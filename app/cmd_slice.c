@@ -282,7 +282,11 @@ static sonde_status slice_sequence(const arguments *a, work *w, sonde_error *err
   if (!status) status = sonde_slicer_create(s, &options, &w->slicer, error);
   if (status) return status;
   double start = app_seconds();
-  w->reached = sonde_slicer_render(w->slicer, &w->plane, &w->image, w->known);
+  if (a->options.method == SONDE_SLICE_KRIGE && !a->pose)
+    w->reached = sonde_slicer_render_place(w->slicer, a->frame_number, &w->plane, s->clip,
+                                           &w->image, w->known);
+  else
+    w->reached = sonde_slicer_render(w->slicer, &w->plane, &w->image, w->known);
   w->seconds = app_seconds() - start;
   return write_picture(a, w, error);
 }

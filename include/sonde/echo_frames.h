@@ -201,6 +201,18 @@ SONDE_API bool sonde_slicer_is_along_sweep(const sonde_slicer *slicer);
 SONDE_API uint64_t sonde_slicer_render(sonde_slicer *slicer, const sonde_affine *world_from_pixel,
                                        sonde_image *image, uint8_t *known);
 
+/**
+ * The picture that the sweep itself would hold at a place between its frames, by KRIGE: pixel (x,
+ * y) is pixel (x, y) + corner of the frames. Frames are joined, and their distance counted, as
+ * foretells the frames of the sweep best.
+ * @param place frame number, 7.5 lies between frames 7 and 8
+ * @return pixels that frames reach
+ */
+SONDE_API uint64_t sonde_slicer_render_place(sonde_slicer *slicer, double place,
+                                             const sonde_affine *world_from_pixel,
+                                             const uint32_t corner[2], sonde_image *image,
+                                             uint8_t *known);
+
 /** The same from a volume, trilinear or nearest voxel. @thread any, one per image */
 SONDE_API uint64_t sonde_volume_slice(const sonde_volume *volume, bool nearest,
                                       const sonde_affine *world_from_pixel, sonde_image *image,
@@ -221,10 +233,11 @@ SONDE_API sonde_status sonde_image_likeness(const uint8_t *a, const uint8_t *b,
 /** Every frame with a neighbour on both sides made again from the others. */
 typedef struct sonde_left_out {
   uint32_t frames;
-  uint32_t along_sweep; /**< frames that KRIGE joined pixel to pixel */
-  /** Pooled rms and mae; means of the other measures over the frames. KRIGE, BRACKET, NEAREST, and
-   *  the mean of the frames before and after without their poses. */
-  sonde_likeness krige, bracket, nearest, neighbours;
+  uint32_t along_sweep; /**< frames whose place was joined pixel to pixel */
+  /** Pooled rms and mae; means of the other measures over the frames. KRIGE at the
+   *  place in the sweep and from the pose alone, BRACKET, NEAREST, and the mean of the frames
+   * before and after without their poses. */
+  sonde_likeness place, krige, bracket, nearest, neighbours;
 } sonde_left_out;
 
 /**

@@ -2,6 +2,7 @@
 //
 // mark_lit             pixels that some frame shows brighter than black
 // neighbour_mean       frames before and after, pixel by pixel
+// keep_common          pixels that all ways reach
 // render, make_all     ways of making a frame
 // add, finish          sums and means over frames
 // leave_out            one frame
@@ -19,7 +20,7 @@ typedef struct work {
   uint8_t *lit, *known, *other_known, *mean;
   slice_bank *bank;
   uint32_t *used, count; // frames with a pose
-  sonde_image images[3]; // kriging, bracket, nearest
+  sonde_image images[4];
 } work;
 
 static const uint8_t *frame_of(const work *w, uint32_t frame) {
@@ -39,16 +40,29 @@ static void neighbour_mean(work *w, uint32_t before, uint32_t after) {
   for (size_t p = 0; p < w->pixels; ++p) w->mean[p] = (uint8_t)((a[p] + b[p] + 1) / 2);
 }
 
-static sonde_status render(work *w, uint32_t frame, sonde_slice_method method, sonde_image *image,
-                           uint8_t *known, bool *along_sweep, sonde_error *error) {
+enum { AT_PLACE, KRIGED, BRACKETED, NEAREST, WAYS };
+
+static void keep_common(work *w) {
+  for (size_t p = 0; p < w->pixels; ++p) w->known[p] = w->known[p] && w->other_known[p];
+}
+
+static sonde_status render(work *w, uint32_t frame, sonde_slice_method method, int way,
+                           bool *along_sweep, sonde_error *error) {
   sonde_slicer *slicer;
   sonde_slicer_options options = w->options;
+  const sonde_affine *pose = &w->sequence->frames[frame].world_from_pixel;
   options.method = method;
   options.left_out = frame;
   sonde_status status = sonde_slicer_create_with(w->sequence, &options, w->bank, &slicer, error);
   if (status) return status;
-  *along_sweep = sonde_slicer_is_along_sweep(slicer);
-  sonde_slicer_render(slicer, &w->sequence->frames[frame].world_from_pixel, image, known);
+  if (method == SONDE_SLICE_KRIGE) {
+    *along_sweep = slicer->model.along_sweep;
+    sonde_slicer_render_place(slicer, frame, pose, (const uint32_t[2]){0, 0}, &w->images[AT_PLACE],
+                              w->other_known);
+    keep_common(w);
+  }
+  sonde_slicer_render(slicer, pose, &w->images[way], w->other_known);
+  keep_common(w);
   sonde_slicer_destroy(slicer);
   return SONDE_OK;
 }
@@ -76,19 +90,14 @@ static sonde_status compare(const work *w, uint32_t frame, const uint8_t *made, 
   return status;
 }
 
-// The three ways of making a frame; marks the pixels that all reach.
+// The ways of making a frame; marks the pixels that all reach.
 static sonde_status make_all(work *w, uint32_t frame, uint64_t *left, bool *along_sweep,
                              sonde_error *error) {
-  static const sonde_slice_method ways[3] = {SONDE_SLICE_KRIGE, SONDE_SLICE_BRACKET,
-                                             SONDE_SLICE_NEAREST};
   memcpy(w->known, w->lit, w->pixels);
-  bool ignored;
-  for (int k = 0; k < 3; ++k) {
-    sonde_status status =
-        render(w, frame, ways[k], &w->images[k], w->other_known, k ? &ignored : along_sweep, error);
-    if (status) return status;
-    for (size_t p = 0; p < w->pixels; ++p) w->known[p] = w->known[p] && w->other_known[p];
-  }
+  sonde_status status = render(w, frame, SONDE_SLICE_KRIGE, KRIGED, along_sweep, error);
+  if (!status) status = render(w, frame, SONDE_SLICE_BRACKET, BRACKETED, NULL, error);
+  if (!status) status = render(w, frame, SONDE_SLICE_NEAREST, NEAREST, NULL, error);
+  if (status) return status;
   *left = 0;
   for (size_t p = 0; p < w->pixels; ++p) *left += w->known[p];
   return SONDE_OK;
@@ -97,14 +106,14 @@ static sonde_status make_all(work *w, uint32_t frame, uint64_t *left, bool *alon
 static sonde_status leave_out(work *w, uint32_t k, sonde_left_out *result, sonde_error *error) {
   uint32_t frame = w->used[k], step = 1 + w->options.left_out_beside;
   uint64_t left;
-  bool along_sweep;
+  bool along_sweep = false;
   sonde_status status = make_all(w, frame, &left, &along_sweep, error);
   if (status || !left) return status; // the others do not reach this frame: not counted
   neighbour_mean(w, w->used[k - step], w->used[k + step]);
-  sonde_likeness *sums[4] = {&result->krige, &result->bracket, &result->nearest,
-                             &result->neighbours};
-  for (int i = 0; i < 4 && !status; ++i)
-    status = compare(w, frame, i < 3 ? w->images[i].pixels : w->mean, sums[i], error);
+  sonde_likeness *sums[WAYS + 1] = {&result->place, &result->krige, &result->bracket,
+                                    &result->nearest, &result->neighbours};
+  for (int i = 0; i <= WAYS && !status; ++i)
+    status = compare(w, frame, i < WAYS ? w->images[i].pixels : w->mean, sums[i], error);
   result->along_sweep += along_sweep;
   ++result->frames;
   return status;
@@ -125,6 +134,7 @@ static sonde_status leave_each_out(work *w, sonde_left_out *result, const sonde_
                       "%u frames with a pose, none of which lies between others; expected at least "
                       "%u in a sweep",
                       w->count, 2 * step + 1);
+  finish(&result->place, result->frames);
   finish(&result->krige, result->frames);
   finish(&result->bracket, result->frames);
   finish(&result->nearest, result->frames);
@@ -135,7 +145,7 @@ static sonde_status leave_each_out(work *w, sonde_left_out *result, const sonde_
 static sonde_status make_work(work *w, sonde_error *error) {
   const sonde_sequence *s = w->sequence;
   sonde_status status = SONDE_OK;
-  for (int k = 0; k < 3 && !status; ++k)
+  for (int k = 0; k < WAYS && !status; ++k)
     status = sonde_image_create(s->width, s->height, &w->images[k], error);
   w->lit = SONDE_NEW(uint8_t, w->pixels);
   w->known = SONDE_NEW(uint8_t, w->pixels);
@@ -151,7 +161,7 @@ static sonde_status make_work(work *w, sonde_error *error) {
 }
 
 static void clear_work(work *w) {
-  for (int k = 0; k < 3; ++k) sonde_image_clear(&w->images[k]);
+  for (int k = 0; k < WAYS; ++k) sonde_image_clear(&w->images[k]);
   sonde_slice_bank_destroy(w->bank);
   sonde_free(w->lit);
   sonde_free(w->known);

@@ -7,7 +7,7 @@
 enum { SLICE_TILE = 16, SLICE_BLOCK = 64 }; // pixels along a side
 
 // Kriging: levels of a picture, steps of the tables between two frames, frames joined.
-enum { SLICE_LEVELS = 6, SLICE_STEPS = 64, SLICE_JOINED = 4 };
+enum { SLICE_LEVELS = 6, SLICE_STEPS = 64, SLICE_JOINED = 4, SLICE_LAGS = 5 };
 
 // Used part of a frame at falling resolution, each half as wide and high as the one before; level 0
 // is the frame itself.
@@ -29,10 +29,22 @@ typedef struct slice_bank {
   slice_pyramid *pyramids; // [count of the sequence]
   uint32_t wide[SLICE_LEVELS], high[SLICE_LEVELS];
   size_t stride[SLICE_LEVELS];
-  slice_likeness *pairs;
-  uint32_t pair_count;
-  float base; // mean grey, taken off the coarsest scale
+  uint32_t used, *frames; // [used] with a pose
+  slice_likeness *pairs;  // [used][SLICE_LAGS + 1]
+  float base;             // mean grey, taken off the coarsest scale
 } slice_bank;
+
+// r(d) = exp(-(d/length)^power)
+typedef struct slice_decay {
+  double variance, length_m, power;
+} slice_decay;
+
+// How frames are joined, how alike they are, and the error of frames made again.
+typedef struct slice_model {
+  bool along_sweep, by_order;
+  slice_decay decays[SLICE_LEVELS];
+  double error;
+} slice_model;
 
 // Weights of the levels of four frames: before, lower, upper, behind.
 typedef struct slice_weights {
@@ -86,7 +98,8 @@ struct sonde_slicer {
   uint64_t *reached; // [workers] pixels
   slice_bank *bank;  // with kriging
   bool owns_bank;
-  slice_join *joins;  // [count - 1] planes that follow each other
+  slice_join *joins;             // [count - 1] planes that follow each other
+  slice_model model, pose_model; // of the sweep's own pictures, of any pose
   slice_weights *far; // [SLICE_FAR][SLICE_STEPS + 1] two frames that do not, by their gap
 };
 
@@ -115,5 +128,19 @@ uint64_t sonde_slice_block(const sonde_slicer *slicer, uint32_t column, uint32_t
 uint64_t sonde_slice_voxels(const sonde_volume *volume, bool nearest,
                             const sonde_affine *voxel_from_pixel, sonde_image *image,
                             uint8_t *known);
+
+// Weighted sum of frames' levels, each frame by a map from the picture's pixels to its own.
+typedef struct slice_sum {
+  const sonde_slicer *slicer;
+  sonde_image *image;
+  uint8_t *known;
+  int n;
+  const slice_plane *planes[SLICE_JOINED];
+  float maps[SLICE_JOINED][2][3];
+  float weights[SLICE_JOINED][SLICE_LEVELS];
+} slice_sum;
+
+// Known where the two frames in the middle are.
+uint64_t sonde_slice_sum(const slice_sum *sum);
 
 #endif

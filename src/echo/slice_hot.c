@@ -32,6 +32,7 @@
 // between           two frames and their weights
 // value_at          one pixel
 // fill_tile
+// sonde_slice_sum   a picture of the sweep's own
 // sonde_slice_block
 // trilinear         eight voxels
 // sonde_slice_voxels
@@ -334,6 +335,30 @@ static uint64_t fill_tile(const sonde_slicer *s, const rectangle *r, const slice
       reached += value >= 0;
     }
   }
+  return reached;
+}
+
+uint64_t sonde_slice_sum(const slice_sum *sum) {
+  const sonde_slicer *s = sum->slicer;
+  uint64_t reached = 0;
+  for (uint32_t y = 0; y < sum->image->height; ++y)
+    for (uint32_t x = 0; x < sum->image->width; ++x) {
+      float value = 0;
+      int met = 0;
+      for (int k = 0; k < sum->n; ++k) {
+        float at[2];
+        for (int i = 0; i < 2; ++i)
+          at[i] =
+              sum->maps[k][i][0] * (float)x + sum->maps[k][i][1] * (float)y + sum->maps[k][i][2];
+        met += is_inside(s, at);
+        value += sample_levels(s, sum->planes[k], at, sum->weights[k], sum->weights[k], 0);
+      }
+      bool inside = 2 * met >= sum->n;
+      size_t i = (size_t)y * sum->image->width + x;
+      sum->image->pixels[i] = inside ? (uint8_t)(limit(value, 0, 255) + 0.5f) : 0;
+      if (sum->known) sum->known[i] = inside;
+      reached += inside;
+    }
   return reached;
 }
 

@@ -15,23 +15,26 @@
 // compare                     products over the grid
 // measure_pairs
 // sonde_slice_bank_create, sonde_slice_bank_destroy
-// collect, fit, fit_all       decay of one scale, of all
-// expected_error              of a frame made from its two neighbours
+// product, variance_of        from the bank
+// collect, misfit, fit        decay of one scale
 // solve                       small linear system
 // krige_scale, weights_at     weights at a place
-// make_join, make_far         tables
+// foretell, make_model        a model and how well it makes frames again
+// make_join, make_far         tables for any pose
 // sonde_slicer_krige
+// choose, place_frames, map_frames   frames around a place of the sweep
+// sonde_slicer_render_place
 #include "echo/slice.h"
 
 #include <string.h>
 
-enum { LAGS = 5, GRID_POINTS = 16000, REFERENCES = 128, BINS = 24, LENGTHS = 96, POWERS = 17 };
+enum { LAGS = SLICE_LAGS, BINS = 32, LENGTHS = 96, POWERS = 17 };
+enum { MOST_POINTS = 16000, FEWEST_POINTS = 1000, ALL_POINTS = 1200000 };
 
 static const double SHORTEST_M = 2e-5, LONGEST_M = 20, FIRST_POWER = 0.3, POWER_STEP = 0.1;
+static const double ORDER_M = 1e-3; // one frame, where distance goes by number
 
-typedef struct decay {
-  double variance, length_m, power;
-} decay;
+typedef slice_decay decay;
 
 typedef struct bin {
   double log_m, likeness, weight;
@@ -136,7 +139,8 @@ static bool foot_map(const sonde_sequence *s, uint32_t a, uint32_t b, float map[
 
 static grid grid_of(const slice_bank *bank) {
   grid g = {.step = 1};
-  while ((bank->wide[0] / g.step) * (bank->high[0] / g.step) > GRID_POINTS) ++g.step;
+  uint32_t most = (uint32_t)clamp(ALL_POINTS / (bank->used + 1.0), FEWEST_POINTS, MOST_POINTS);
+  while ((bank->wide[0] / g.step) * (bank->high[0] / g.step) > most) ++g.step;
   g.columns = bank->wide[0] / g.step, g.rows = bank->high[0] / g.step;
   return g;
 }
@@ -181,23 +185,23 @@ static void mean_grey(slice_bank *bank) {
   bank->base = count > 0 ? (float)(sum / count) : 0;
 }
 
-// Every frame with itself and the next LAGS; of a long sequence, evenly chosen frames.
-static sonde_status measure_pairs(slice_bank *bank, uint32_t used, sonde_error *error) {
+// Every frame with itself and the next LAGS.
+static sonde_status measure_pairs(slice_bank *bank, sonde_error *error) {
   const sonde_sequence *s = bank->sequence;
-  uint32_t *index = SONDE_NEW(uint32_t, used), n = 0, every = 1 + used / REFERENCES;
-  bank->pairs = SONDE_NEW(slice_likeness, (size_t)used * (LAGS + 1));
-  sonde_status status = index && bank->pairs ? SONDE_OK : sonde_fail_memory(error);
-  for (uint32_t i = 0; i < s->count && !status; ++i)
-    if (s->frames[i].used) index[n++] = i;
-  for (uint32_t i = 0; i < n; i += every)
+  uint32_t n = 0;
+  bank->frames = SONDE_NEW(uint32_t, bank->used);
+  bank->pairs = SONDE_NEW(slice_likeness, (size_t)bank->used * (LAGS + 1));
+  if (!bank->frames || !bank->pairs) return sonde_fail_memory(error);
+  for (uint32_t i = 0; i < s->count; ++i)
+    if (s->frames[i].used) bank->frames[n++] = i;
+  for (uint32_t i = 0; i < n; ++i)
     for (uint32_t lag = 0; lag <= LAGS && i + lag < n; ++lag) {
-      slice_likeness *pair = &bank->pairs[bank->pair_count++];
-      *pair = (slice_likeness){.a = index[i], .b = index[i + lag]};
+      slice_likeness *pair = &bank->pairs[i * (LAGS + 1) + lag];
+      *pair = (slice_likeness){.a = bank->frames[i], .b = bank->frames[i + lag]};
       pair->distance_m = (float)apart(s, pair->a, pair->b);
       compare(bank, pair);
     }
-  sonde_free(index);
-  return status;
+  return SONDE_OK;
 }
 
 static size_t measure_levels(slice_bank *bank) {
@@ -219,10 +223,9 @@ sonde_status sonde_slice_bank_create(const sonde_sequence *s, slice_bank **out,
   slice_bank *bank = SONDE_NEW(slice_bank, 1);
   if (!bank) return sonde_fail_memory(error);
   bank->sequence = s;
-  uint32_t used = 0;
-  for (uint32_t i = 0; i < s->count; ++i) used += s->frames[i].used;
+  for (uint32_t i = 0; i < s->count; ++i) bank->used += s->frames[i].used;
   size_t bytes = measure_levels(bank);
-  bank->levels = SONDE_NEW(uint8_t, bytes * used);
+  bank->levels = SONDE_NEW(uint8_t, bytes * bank->used + 1);
   bank->pyramids = SONDE_NEW(slice_pyramid, s->count);
   uint16_t *rows = SONDE_NEW(uint16_t, (size_t)s->clip[3] * ((s->clip[2] + 1) / 2));
   bool enough = bank->levels && bank->pyramids && rows;
@@ -232,7 +235,7 @@ sonde_status sonde_slice_bank_create(const sonde_sequence *s, slice_bank **out,
   sonde_free(rows);
   if (!status) {
     mean_grey(bank);
-    status = measure_pairs(bank, used, error);
+    status = measure_pairs(bank, error);
   }
   if (status) sonde_slice_bank_destroy(bank);
   *out = status ? NULL : bank;
@@ -244,31 +247,51 @@ void sonde_slice_bank_destroy(slice_bank *bank) {
   sonde_free(bank->levels);
   sonde_free(bank->pyramids);
   sonde_free(bank->pairs);
+  sonde_free(bank->frames);
   sonde_free(bank);
 }
 
-// Likeness over distance of the frames in use, in bins of the logarithm of the distance.
-static double collect(const sonde_slicer *slicer, int way, int level, bin bins[BINS]) {
-  const slice_bank *bank = slicer->bank;
-  double variance = 0, count = 0;
+static bool is_out(const sonde_slicer *s, uint32_t frame) {
+  return sonde_slice_is_left_out(s->bank->sequence, &s->options, frame);
+}
+
+// Mean product of two used frames at most LAGS apart; their places among the used ones.
+static double product(const slice_bank *bank, uint32_t a, uint32_t b, int way, int level) {
+  uint32_t low = a < b ? a : b, high = a < b ? b : a;
+  SONDE_ASSERT(high < bank->used && high - low <= LAGS);
+  return (double)bank->pairs[low * (LAGS + 1) + high - low].mean[way][level];
+}
+
+static double variance_of(const sonde_slicer *s, int level) {
+  double sum = 0, count = 0;
+  for (uint32_t i = 0; i < s->bank->used; ++i)
+    if (!is_out(s, s->bank->frames[i])) sum += product(s->bank, i, i, 1, level), count += 1;
+  return count > 0 ? sum / count : 0;
+}
+
+// Likeness of the frames in use, 1 - variogram / variance, in bins of the logarithm of the
+// distance.
+static void collect(const sonde_slicer *s, const slice_model *m, int level, bin bins[BINS]) {
+  const slice_bank *bank = s->bank;
+  double variance = m->decays[level].variance;
   memset(bins, 0, BINS * sizeof *bins);
-  for (int pass = 0; pass < 2; ++pass)
-    for (uint32_t i = 0; i < bank->pair_count; ++i) {
-      const slice_likeness *p = &bank->pairs[i];
-      if (sonde_slice_is_left_out(bank->sequence, &slicer->options, p->a) ||
-          sonde_slice_is_left_out(bank->sequence, &slicer->options, p->b))
-        continue;
-      double mean = (double)p->mean[way][level], d = fmax((double)p->distance_m, SHORTEST_M);
-      if (pass == 0 && p->a == p->b) variance += mean, count += 1;
-      if (pass == 0 || p->a == p->b || !(variance > 0)) continue;
-      // Four bins per doubling, the first one ends at 0.1 mm.
-      int at = (int)clamp(4 * log2(d / 1e-4), 0, BINS - 1);
-      bins[at].log_m += log(d), bins[at].likeness += mean / (variance / count);
+  for (uint32_t i = 0; i < bank->used && variance > 0; ++i) {
+    if (is_out(s, bank->frames[i])) continue;
+    for (uint32_t lag = 1; lag <= LAGS && i + lag < bank->used; ++lag) {
+      if (is_out(s, bank->frames[i + lag])) continue;
+      const slice_likeness *p = &bank->pairs[i * (LAGS + 1) + lag];
+      double d = m->by_order ? lag * ORDER_M : fmax((double)p->distance_m, SHORTEST_M);
+      double own = product(bank, i, i, m->along_sweep, level) +
+                   product(bank, i + lag, i + lag, m->along_sweep, level);
+      // Four bins per doubling, the first one ends at 0.05 mm.
+      int at = (int)clamp(1 + 4 * log2(d / 5e-5), 0, BINS - 1);
+      bins[at].log_m += log(d);
+      bins[at].likeness += 1 - (0.5 * own - (double)p->mean[m->along_sweep][level]) / variance;
       bins[at].weight += 1;
     }
+  }
   for (int i = 0; i < BINS; ++i)
     if (bins[i].weight > 0) bins[i].log_m /= bins[i].weight, bins[i].likeness /= bins[i].weight;
-  return count > 0 ? variance / count : 0;
 }
 
 static double likeness_at(const decay *d, double distance_m) {
@@ -285,9 +308,11 @@ static double misfit(const bin bins[BINS], const decay *d) {
   return sum;
 }
 
-static decay fit(const sonde_slicer *slicer, int way, int level) {
+static void fit(const sonde_slicer *slicer, slice_model *m, int level) {
   bin bins[BINS];
-  decay best = {collect(slicer, way, level, bins), 1e-3, 1};
+  decay best = {variance_of(slicer, level), 1e-3, 1};
+  m->decays[level] = best;
+  collect(slicer, m, level, bins);
   double least = (double)INFINITY;
   for (int i = 0; i < LENGTHS; ++i)
     for (int j = 0; j < POWERS; ++j) {
@@ -296,19 +321,7 @@ static decay fit(const sonde_slicer *slicer, int way, int level) {
       double error = misfit(bins, &d);
       if (error < least) least = error, best = d;
     }
-  return best;
-}
-
-// Of a frame made from the two beside it, each `step_m` away.
-static double expected_error(const decay decays[SLICE_LEVELS], double step_m) {
-  double sum = 0;
-  for (int k = 0; k < SLICE_LEVELS; ++k) {
-    double near = likeness_at(&decays[k], step_m), far = likeness_at(&decays[k], 2 * step_m);
-    double share =
-        k + 1 < SLICE_LEVELS ? 1 - 2 * near * near / (1 + far) : 1.5 - 2 * near + far / 2;
-    sum += decays[k].variance * share;
-  }
-  return sum;
+  m->decays[level] = best;
 }
 
 // Gauss with the largest pivot; a system without one leaves zeros.
@@ -366,6 +379,43 @@ static void weights_at(const decay decays[SLICE_LEVELS], int n, const double *at
   }
 }
 
+// Mean square error of frame i made from the two before and the two behind; false when one of them
+// is left out.
+static bool foretell(const sonde_slicer *s, const slice_model *m, uint32_t i, double *error) {
+  static const int steps[SLICE_JOINED] = {-2, -1, 1, 2};
+  const slice_bank *bank = s->bank;
+  double at[SLICE_JOINED], w[SLICE_JOINED];
+  uint32_t from[SLICE_JOINED];
+  if (i < 2 || i + 2 >= bank->used || is_out(s, bank->frames[i])) return false;
+  for (int k = 0; k < SLICE_JOINED; ++k) {
+    from[k] = (uint32_t)((int)i + steps[k]);
+    if (is_out(s, bank->frames[from[k]])) return false;
+    double d = m->by_order ? ORDER_M * abs(steps[k])
+                           : apart(bank->sequence, bank->frames[i], bank->frames[from[k]]);
+    at[k] = steps[k] < 0 ? -d : d;
+  }
+  for (int level = 0; level < SLICE_LEVELS; ++level) {
+    krige_scale(&m->decays[level], SLICE_JOINED, at, 0, level + 1 == SLICE_LEVELS, w);
+    double square = product(bank, i, i, m->along_sweep, level);
+    for (int k = 0; k < SLICE_JOINED; ++k) {
+      square -= 2 * w[k] * product(bank, i, from[k], m->along_sweep, level);
+      for (int j = 0; j < SLICE_JOINED; ++j)
+        square += w[k] * w[j] * product(bank, from[k], from[j], m->along_sweep, level);
+    }
+    *error += square;
+  }
+  return true;
+}
+
+static slice_model make_model(const sonde_slicer *s, bool along_sweep, bool by_order) {
+  slice_model m = {.along_sweep = along_sweep, .by_order = by_order};
+  double sum = 0, count = 0;
+  for (int level = 0; level < SLICE_LEVELS; ++level) fit(s, &m, level);
+  for (uint32_t i = 0; i < s->bank->used; ++i) count += foretell(s, &m, i, &sum);
+  m.error = count > 0 ? sum / count : m.decays[0].variance * along_sweep;
+  return m;
+}
+
 static uint32_t frame_of(const sonde_slicer *slicer, int32_t plane) {
   return slicer->planes[plane].frame;
 }
@@ -416,25 +466,82 @@ static void make_far(sonde_slicer *s, const decay decays[SLICE_LEVELS]) {
   }
 }
 
-static double mean_step(const sonde_slicer *s) {
-  double sum = 0;
-  for (uint32_t i = 0; i + 1 < s->count; ++i)
-    sum += apart(s->bank->sequence, s->planes[i].frame, s->planes[i + 1].frame);
-  return s->count > 1 ? sum / (s->count - 1) : 0;
-}
-
 sonde_status sonde_slicer_krige(sonde_slicer *s, sonde_error *error) {
   SONDE_ASSERT(s->bank != NULL && s->count > 0);
   s->joins = SONDE_NEW(slice_join, s->count);
   s->far = SONDE_NEW(slice_weights, SLICE_FAR * (SLICE_STEPS + 1));
   if (!s->joins || !s->far) return sonde_fail_memory(error);
-  decay decays[2][SLICE_LEVELS];
-  for (int way = 0; way < 2; ++way)
-    for (int k = 0; k < SLICE_LEVELS; ++k) decays[way][k] = fit(s, way, k);
-  double step = mean_step(s);
-  bool along = expected_error(decays[1], step) < expected_error(decays[0], step);
-  s->options.along_sweep = along;
-  for (uint32_t i = 0; i + 1 < s->count; ++i) make_join(s, (int32_t)i, decays[along]);
-  make_far(s, decays[along]);
+  for (int k = 0; k < 4; ++k) {
+    slice_model m = make_model(s, k & 1, k & 2);
+    if (k == 0 || m.error < s->model.error) s->model = m;
+    if (k == 0 || (k == 1 && m.error < s->pose_model.error)) s->pose_model = m;
+  }
+  s->options.along_sweep = s->pose_model.along_sweep;
+  for (uint32_t i = 0; i + 1 < s->count; ++i) make_join(s, (int32_t)i, s->pose_model.decays);
+  make_far(s, s->pose_model.decays);
   return SONDE_OK;
+}
+
+// ---- a picture of the sweep's own ------------------------------------------------------------
+
+typedef struct own {
+  int n, slots[SLICE_JOINED];
+  double at[SLICE_JOINED];
+  const slice_plane *planes[SLICE_JOINED];
+  float maps[SLICE_JOINED][2][3]; // pixel of the picture -> of the frame
+  slice_weights weights;
+} own;
+
+// Two planes before the place and two behind it, as far as there are; none twice.
+static void choose(const sonde_slicer *s, double place, own *o) {
+  int32_t upper = 0;
+  while (upper < (int32_t)s->count && s->planes[upper].frame <= place) ++upper;
+  if (upper == (int32_t)s->count && upper > 1) --upper; // the last frame itself
+  for (int k = 0; k < SLICE_JOINED; ++k) {
+    int32_t plane = upper - 2 + k;
+    if (plane < 0 || plane >= (int32_t)s->count) continue;
+    o->planes[o->n] = &s->planes[plane];
+    o->slots[o->n++] = k;
+  }
+}
+
+static void place_frames(const sonde_slicer *s, double place, const sonde_affine *world_from_pixel,
+                         const sonde_image *image, own *o) {
+  sonde_vec3 here =
+      affine_apply(world_from_pixel, vec3(0.5 * (image->width - 1), 0.5 * (image->height - 1), 0));
+  for (int k = 0; k < o->n; ++k) {
+    const slice_plane *p = o->planes[k];
+    double side = p->frame <= place ? -1 : 1;
+    double d = fabs(affine_apply(&p->local_from_world, here).z);
+    o->at[k] = s->model.by_order ? ORDER_M * (p->frame - place) : side * d;
+  }
+}
+
+static void map_frames(const sonde_slicer *s, const sonde_affine *world_from_pixel,
+                       const uint32_t corner[2], own *o) {
+  for (int k = 0; k < o->n; ++k) {
+    sonde_affine m = affine_mul(&o->planes[k]->local_from_world, world_from_pixel);
+    for (int i = 0; i < 2; ++i)
+      for (int j = 0; j < 3; ++j)
+        o->maps[k][i][j] = s->model.along_sweep ? (j == 2 ? (float)corner[i] : i == j)
+                                                : (float)m.m[i][j == 2 ? 3 : j];
+  }
+}
+
+uint64_t sonde_slicer_render_place(sonde_slicer *s, double place,
+                                   const sonde_affine *world_from_pixel, const uint32_t corner[2],
+                                   sonde_image *image, uint8_t *known) {
+  SONDE_ASSERT(s != NULL && s->bank != NULL && image != NULL && s->count > 0);
+  own o = {0};
+  choose(s, place, &o);
+  place_frames(s, place, world_from_pixel, image, &o);
+  map_frames(s, world_from_pixel, corner, &o);
+  weights_at(s->model.decays, o.n, o.at, o.slots, 0, &o.weights);
+  slice_sum sum = {.slicer = s, .image = image, .known = known, .n = o.n};
+  for (int k = 0; k < o.n; ++k) {
+    sum.planes[k] = o.planes[k];
+    memcpy(sum.maps[k], o.maps[k], sizeof o.maps[k]);
+    memcpy(sum.weights[k], o.weights.of[o.slots[k]], sizeof sum.weights[k]);
+  }
+  return sonde_slice_sum(&sum);
 }
