@@ -25,8 +25,9 @@ typedef struct slice_likeness {
 // What kriging knows of a sequence; leaving frames out selects from it.
 typedef struct slice_bank {
   const sonde_sequence *sequence;
-  uint8_t *levels;         // all levels above 0
-  slice_pyramid *pyramids; // [count of the sequence]
+  uint8_t *levels;               // all levels above 0
+  uint8_t *shares[SLICE_LEVELS]; // of what changes in a pixel of a level; level 0: 0 or 255
+  slice_pyramid *pyramids;       // [count of the sequence]
   uint32_t wide[SLICE_LEVELS], high[SLICE_LEVELS];
   size_t stride[SLICE_LEVELS];
   uint32_t used, *frames; // [used] with a pose

@@ -338,6 +338,13 @@ static uint64_t fill_tile(const sonde_slicer *s, const rectangle *r, const slice
   return reached;
 }
 
+// A pixel that is the same in all frames.
+static inline bool is_still(const sonde_slicer *s, const float at[2]) {
+  uint32_t x = (uint32_t)(limit(at[0], s->low[0], s->high[0]) - s->low[0] + 0.5f);
+  uint32_t y = (uint32_t)(limit(at[1], s->low[1], s->high[1]) - s->low[1] + 0.5f);
+  return s->model.along_sweep && !s->bank->shares[0][(size_t)y * s->bank->wide[0] + x];
+}
+
 uint64_t sonde_slice_sum(const slice_sum *sum) {
   const sonde_slicer *s = sum->slicer;
   uint64_t reached = 0;
@@ -351,6 +358,11 @@ uint64_t sonde_slice_sum(const slice_sum *sum) {
           at[i] =
               sum->maps[k][i][0] * (float)x + sum->maps[k][i][1] * (float)y + sum->maps[k][i][2];
         met += is_inside(s, at);
+        if (met && is_still(s, at)) { // the first frame that is there speaks for all
+          value = sample(s, sum->planes[k]->pixels, at[0], at[1]);
+          met = sum->n;
+          break;
+        }
         value += sample_levels(s, sum->planes[k], at, sum->weights[k], sum->weights[k], 0);
       }
       bool inside = 2 * met >= sum->n;

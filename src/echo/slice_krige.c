@@ -7,13 +7,15 @@
 // frame shares, fades away from the frames; coarse structure is interpolated smoothly. The mean of
 // the coarsest scale is not known: its weights add up to one.
 //
-// halve                       next level of a pyramid
+// halve, halve_shares         next level of a pyramid
 // build_pyramid
+// mark_changing               pixels that are not surround
 // scales_at                   all scales of a frame at a point
 // middle, apart               distance of two frames
 // foot_map                    pixels of a frame on another
-// compare                     products over the grid
+// changes, compare            products over the grid
 // measure_pairs
+// build_pyramids
 // sonde_slice_bank_create, sonde_slice_bank_destroy
 // product, variance_of        from the bank
 // collect, misfit, fit        decay of one scale
@@ -29,6 +31,7 @@
 #include <string.h>
 
 enum { LAGS = SLICE_LAGS, BINS = 32, LENGTHS = 96, POWERS = 17 };
+enum { STILL = 3 }; // grey levels
 enum { MOST_POINTS = 16000, FEWEST_POINTS = 1000, ALL_POINTS = 1200000 };
 
 static const double SHORTEST_M = 2e-5, LONGEST_M = 20, FIRST_POWER = 0.3, POWER_STEP = 0.1;
@@ -44,42 +47,73 @@ typedef struct grid {
   uint32_t step, columns, rows;
 } grid;
 
-// Binomial weights 1 4 6 4 1 along both axes; the edge is repeated.
-static void halve(const uint8_t *from, size_t stride, uint32_t wide, uint32_t high, uint16_t *rows,
-                  uint8_t *to) {
-  static const uint32_t weight[5] = {1, 4, 6, 4, 1};
-  uint32_t w2 = (wide + 1) / 2, h2 = (high + 1) / 2;
-  for (uint32_t y = 0; y < high; ++y)
+static const uint32_t BINOMIAL[5] = {1, 4, 6, 4, 1};
+
+static uint32_t bounded(int at, uint32_t count) {
+  return at < 0 ? 0 : at >= (int)count ? count - 1 : (uint32_t)at;
+}
+
+// Binomial weights along both axes, the edge repeated; pixels that never change (share 0) do not
+// count. Level k + 1 and, from level 0, its shares.
+static void halve(const slice_bank *bank, int k, const uint8_t *from, uint8_t *to) {
+  const uint8_t *share = bank->shares[k];
+  uint32_t wide = bank->wide[k], high = bank->high[k], w2 = bank->wide[k + 1];
+  for (uint32_t y = 0; y < bank->high[k + 1]; ++y)
     for (uint32_t x = 0; x < w2; ++x) {
-      uint32_t sum = 0;
-      for (int k = 0; k < 5; ++k) {
-        int at = (int)(2 * x) + k - 2;
-        at = at < 0 ? 0 : at >= (int)wide ? (int)wide - 1 : at;
-        sum += weight[k] * from[y * stride + (size_t)at];
+      uint32_t sum = 0, weight = 0;
+      for (int j = 0; j < 5; ++j) {
+        uint32_t row = bounded((int)(2 * y) + j - 2, high);
+        for (int i = 0; i < 5; ++i) {
+          uint32_t column = bounded((int)(2 * x) + i - 2, wide);
+          uint32_t w = BINOMIAL[i] * BINOMIAL[j] * share[(size_t)row * wide + column];
+          sum += w * from[row * bank->stride[k] + column], weight += w;
+        }
       }
-      rows[(size_t)y * w2 + x] = (uint16_t)sum;
-    }
-  for (uint32_t y = 0; y < h2; ++y)
-    for (uint32_t x = 0; x < w2; ++x) {
-      uint32_t sum = 128;
-      for (int k = 0; k < 5; ++k) {
-        int at = (int)(2 * y) + k - 2;
-        at = at < 0 ? 0 : at >= (int)high ? (int)high - 1 : at;
-        sum += weight[k] * rows[(size_t)at * w2 + x];
-      }
-      to[(size_t)y * w2 + x] = (uint8_t)(sum >> 8);
+      to[(size_t)y * w2 + x] = weight ? (uint8_t)((sum + weight / 2) / weight) : 0;
     }
 }
 
-static void build_pyramid(slice_bank *bank, uint32_t frame, uint8_t *levels, uint16_t *rows) {
+// 255 for a pixel that changes; of the levels above, the mean below.
+static void halve_shares(const slice_bank *bank, int k, uint8_t *to) {
+  const uint8_t *from = bank->shares[k];
+  uint32_t wide = bank->wide[k], high = bank->high[k], w2 = bank->wide[k + 1];
+  for (uint32_t y = 0; y < bank->high[k + 1]; ++y)
+    for (uint32_t x = 0; x < w2; ++x) {
+      uint32_t sum = 0;
+      for (int j = 0; j < 5; ++j)
+        for (int i = 0; i < 5; ++i)
+          sum += BINOMIAL[i] * BINOMIAL[j] *
+                 from[(size_t)bounded((int)(2 * y) + j - 2, high) * wide +
+                      bounded((int)(2 * x) + i - 2, wide)];
+      to[(size_t)y * w2 + x] = (uint8_t)((sum + 255) >> 8); // what has any keeps some
+    }
+}
+
+static void build_pyramid(slice_bank *bank, uint32_t frame, uint8_t *levels) {
   const sonde_sequence *s = bank->sequence;
   slice_pyramid *p = &bank->pyramids[frame];
   p->level[0] = s->pixels + ((size_t)frame * s->height + s->clip[1]) * s->width + s->clip[0];
   for (int k = 1; k < SLICE_LEVELS; ++k) {
-    halve(p->level[k - 1], bank->stride[k - 1], bank->wide[k - 1], bank->high[k - 1], rows, levels);
+    halve(bank, k - 1, p->level[k - 1], levels);
     p->level[k] = levels;
-    levels += (size_t)bank->wide[k] * bank->high[k];
+    levels += bank->stride[k] * bank->high[k];
   }
+}
+
+// What never changes by more than a few grey levels is surround or writing, not tissue.
+static void mark_changing(slice_bank *bank) {
+  const sonde_sequence *s = bank->sequence;
+  for (uint32_t y = 0; y < bank->high[0]; ++y)
+    for (uint32_t x = 0; x < bank->wide[0]; ++x) {
+      size_t at = (size_t)(y + s->clip[1]) * s->width + x + s->clip[0];
+      int low = 255, high = 0;
+      for (uint32_t i = 0; i < s->count; ++i) {
+        if (!s->frames[i].used) continue;
+        int grey = s->pixels[(size_t)i * s->width * s->height + at];
+        low = grey < low ? grey : low, high = grey > high ? grey : high;
+      }
+      bank->shares[0][(size_t)y * bank->wide[0] + x] = high - low > STILL ? 255 : 0;
+    }
 }
 
 static inline float level_at(const slice_bank *bank, const slice_pyramid *p, int k, float u,
@@ -145,6 +179,13 @@ static grid grid_of(const slice_bank *bank) {
   return g;
 }
 
+// Inside of the frames and not a pixel that stands still.
+static inline bool changes(const slice_bank *bank, float u, float v) {
+  if (!(u >= 0 && v >= 0 && u <= (float)(bank->wide[0] - 1) && v <= (float)(bank->high[0] - 1)))
+    return false;
+  return bank->shares[0][(size_t)(v + 0.5f) * bank->wide[0] + (size_t)(u + 0.5f)] != 0;
+}
+
 // Mean products of frames a and b; of b at the same pixel or at the foot.
 static void compare(const slice_bank *bank, slice_likeness *pair) {
   const sonde_sequence *s = bank->sequence;
@@ -156,6 +197,7 @@ static void compare(const slice_bank *bank, slice_likeness *pair) {
     float u = (float)(i % g.columns * g.step + g.step / 2);
     float v = (float)(i / g.columns * g.step + g.step / 2);
     float x = u + (float)s->clip[0], y = v + (float)s->clip[1];
+    if (!changes(bank, u, v)) continue;
     scales_at(bank, pair->a, u, v, own);
     for (int way = 0; way < 2; ++way) {
       float p = u, q = v;
@@ -181,7 +223,7 @@ static void mean_grey(slice_bank *bank) {
   double sum = 0, count = 0;
   for (uint32_t i = 0; i < bank->sequence->count; ++i)
     for (size_t p = 0; bank->sequence->frames[i].used && p < bank->stride[k] * bank->high[k]; ++p)
-      sum += bank->pyramids[i].level[k][p], count += 1;
+      sum += bank->pyramids[i].level[k][p] * bank->shares[k][p], count += bank->shares[k][p];
   bank->base = count > 0 ? (float)(sum / count) : 0;
 }
 
@@ -204,6 +246,7 @@ static sonde_status measure_pairs(slice_bank *bank, sonde_error *error) {
   return SONDE_OK;
 }
 
+// Bytes of the levels above 0.
 static size_t measure_levels(slice_bank *bank) {
   size_t bytes = 0;
   bank->wide[0] = bank->sequence->clip[2], bank->high[0] = bank->sequence->clip[3];
@@ -216,6 +259,24 @@ static size_t measure_levels(slice_bank *bank) {
   return bytes;
 }
 
+static sonde_status build_pyramids(slice_bank *bank, sonde_error *error) {
+  const sonde_sequence *s = bank->sequence;
+  size_t bytes = measure_levels(bank), own = (size_t)bank->wide[0] * bank->high[0];
+  bank->levels = SONDE_NEW(uint8_t, bytes * bank->used + 1);
+  bank->pyramids = SONDE_NEW(slice_pyramid, s->count);
+  bank->shares[0] = SONDE_NEW(uint8_t, own + bytes);
+  if (!bank->levels || !bank->pyramids || !bank->shares[0]) return sonde_fail_memory(error);
+  mark_changing(bank);
+  for (int k = 1; k < SLICE_LEVELS; ++k) {
+    bank->shares[k] = bank->shares[k - 1] + (size_t)bank->wide[k - 1] * bank->high[k - 1];
+    halve_shares(bank, k - 1, bank->shares[k]);
+  }
+  for (uint32_t i = 0, n = 0; i < s->count; ++i)
+    if (s->frames[i].used) build_pyramid(bank, i, bank->levels + bytes * n++);
+  mean_grey(bank);
+  return SONDE_OK;
+}
+
 sonde_status sonde_slice_bank_create(const sonde_sequence *s, slice_bank **out,
                                      sonde_error *error) {
   SONDE_ASSERT(s != NULL && out != NULL && s->clip[2] > 1 && s->clip[3] > 1);
@@ -224,19 +285,8 @@ sonde_status sonde_slice_bank_create(const sonde_sequence *s, slice_bank **out,
   if (!bank) return sonde_fail_memory(error);
   bank->sequence = s;
   for (uint32_t i = 0; i < s->count; ++i) bank->used += s->frames[i].used;
-  size_t bytes = measure_levels(bank);
-  bank->levels = SONDE_NEW(uint8_t, bytes * bank->used + 1);
-  bank->pyramids = SONDE_NEW(slice_pyramid, s->count);
-  uint16_t *rows = SONDE_NEW(uint16_t, (size_t)s->clip[3] * ((s->clip[2] + 1) / 2));
-  bool enough = bank->levels && bank->pyramids && rows;
-  sonde_status status = enough ? SONDE_OK : sonde_fail_memory(error);
-  for (uint32_t i = 0, n = 0; i < s->count && !status; ++i)
-    if (s->frames[i].used) build_pyramid(bank, i, bank->levels + bytes * n++, rows);
-  sonde_free(rows);
-  if (!status) {
-    mean_grey(bank);
-    status = measure_pairs(bank, error);
-  }
+  sonde_status status = build_pyramids(bank, error);
+  if (!status) status = measure_pairs(bank, error);
   if (status) sonde_slice_bank_destroy(bank);
   *out = status ? NULL : bank;
   return status;
@@ -248,6 +298,7 @@ void sonde_slice_bank_destroy(slice_bank *bank) {
   sonde_free(bank->pyramids);
   sonde_free(bank->pairs);
   sonde_free(bank->frames);
+  sonde_free(bank->shares[0]);
   sonde_free(bank);
 }
 
@@ -298,11 +349,14 @@ static double likeness_at(const decay *d, double distance_m) {
   return distance_m > 0 ? exp(-pow(distance_m / d->length_m, d->power)) : 1;
 }
 
+// Of the variogram, relative as Cressie weighs it: short distances, where frames are most alike,
+// count as much as long ones.
 static double misfit(const bin bins[BINS], const decay *d) {
   double sum = 0;
   for (int i = 0; i < BINS; ++i) {
     if (!(bins[i].weight > 0)) continue;
-    double error = exp(-exp(d->power * (bins[i].log_m - log(d->length_m)))) - bins[i].likeness;
+    double unlike = -expm1(-exp(d->power * (bins[i].log_m - log(d->length_m))));
+    double error = (1 - bins[i].likeness) / fmax(unlike, 1e-6) - 1;
     sum += bins[i].weight * error * error;
   }
   return sum;
@@ -310,8 +364,9 @@ static double misfit(const bin bins[BINS], const decay *d) {
 
 static void fit(const sonde_slicer *slicer, slice_model *m, int level) {
   bin bins[BINS];
-  decay best = {variance_of(slicer, level), 1e-3, 1};
+  decay best = {variance_of(slicer, level), LONGEST_M, 1};
   m->decays[level] = best;
+  if (!(best.variance > 0)) return;
   collect(slicer, m, level, bins);
   double least = (double)INFINITY;
   for (int i = 0; i < LENGTHS; ++i)
