@@ -218,6 +218,24 @@ SONDE_API uint64_t sonde_volume_slice(const sonde_volume *volume, bool nearest,
                                       const sonde_affine *world_from_pixel, sonde_image *image,
                                       uint8_t *known);
 
+/** Field of offsets on a regular grid: what is seen at p in the world is read at p + offset. Beyond
+ *  the grid its edge holds. Owns the offsets. */
+typedef struct sonde_warp {
+  uint32_t size[3];             /**< nodes, 2 to 1024 along each axis */
+  sonde_affine world_from_node; /**< node (i, j, k) -> m */
+  float *offsets_m;             /**< [size[2]*size[1]*size[0]][3], i runs fastest */
+} sonde_warp;
+
+/** Zero offsets, nodes 1 m apart. @thread owner */
+SONDE_API sonde_status sonde_warp_create(const uint32_t size[3], sonde_warp *warp,
+                                         sonde_error *error);
+SONDE_API void sonde_warp_clear(sonde_warp *warp);
+/** Picture of a deformed volume, trilinear; the field is read every 16 x 8 pixels and bilinear
+ *  between. @thread any, one per image */
+SONDE_API uint64_t sonde_volume_slice_warped(const sonde_volume *volume, const sonde_warp *warp,
+                                             const sonde_affine *world_from_pixel,
+                                             sonde_image *image, uint8_t *known);
+
 /** How like two images are, over the known pixels. */
 typedef struct sonde_likeness {
   uint64_t count;

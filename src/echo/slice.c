@@ -12,7 +12,7 @@
 // block_row                     one row of blocks, for the workers
 // sonde_slicer_render
 // sonde_slice_plane             picture of a probe's pose
-// sonde_volume_slice
+// sonde_slice_kernels_find
 #include "echo/slice.h"
 #include "fit/parallel.h"
 
@@ -122,6 +122,7 @@ sonde_status sonde_slicer_create_with(const sonde_sequence *s, const sonde_slice
   if (!slicer) return sonde_fail_memory(error);
   slicer->options = o;
   slicer->width = s->width;
+  slicer->kernels = sonde_slice_kernels_find(NULL);
   slicer->workers = sonde_parallel_workers(o.threads, 64);
   for (int k = 0; k < 2; ++k) {
     slicer->low[k] = (float)s->clip[k];
@@ -179,7 +180,7 @@ static sonde_status block_row(void *user, uint32_t worker, uint32_t item, const 
   (void)stop, (void)error;
   for (uint32_t column = 0; column < slicer->image->width; column += SLICE_BLOCK)
     slicer->reached[worker] +=
-        sonde_slice_block(slicer, column, item * SLICE_BLOCK, &slicer->rooms[worker]);
+        slicer->kernels->block(slicer, column, item * SLICE_BLOCK, &slicer->rooms[worker]);
   return SONDE_OK;
 }
 
@@ -212,17 +213,14 @@ sonde_affine sonde_slice_plane(sonde_pose probe, const sonde_image *image) {
   return affine_columns(v_scale(x, dx), v_scale(z, dz), v_neg(y), corner);
 }
 
-uint64_t sonde_volume_slice(const sonde_volume *volume, bool nearest,
-                            const sonde_affine *world_from_pixel, sonde_image *image,
-                            uint8_t *known) {
-  SONDE_ASSERT(volume != NULL && volume->voxels != NULL && image != NULL && image->pixels);
-  sonde_affine voxel_from_world, voxel_from_pixel;
-  size_t pixels = (size_t)image->width * image->height;
-  if (!affine_inverse(&volume->world_from_voxel, &voxel_from_world)) {
-    memset(image->pixels, 0, pixels);
-    if (known) memset(known, 0, pixels);
-    return 0;
-  }
-  voxel_from_pixel = affine_mul(&voxel_from_world, world_from_pixel);
-  return sonde_slice_voxels(volume, nearest, &voxel_from_pixel, image, known);
+const slice_kernels *sonde_slice_kernels_find(const char *name) {
+  const slice_kernels *known[] = {
+#ifdef __x86_64__
+      __builtin_cpu_supports("avx512f") ? &sonde_slice_kernels_avx512 : NULL,
+      __builtin_cpu_supports("avx2") ? &sonde_slice_kernels_avx2 : NULL,
+#endif
+      &sonde_slice_kernels_base};
+  for (size_t k = 0; k < SONDE_COUNT_OF(known); ++k)
+    if (known[k] && (!name || strcmp(name, known[k]->name) == 0)) return known[k];
+  return NULL;
 }

@@ -81,6 +81,8 @@ typedef struct slice_candidate {
   float u[3], v[3], d[3];
 } slice_candidate;
 
+typedef struct slice_kernels slice_kernels;
+
 // Scratch of one worker.
 typedef struct slice_room {
   slice_candidate *candidates;       // [count]
@@ -89,6 +91,7 @@ typedef struct slice_room {
 
 struct sonde_slicer {
   sonde_slicer_options options;
+  const slice_kernels *kernels;
   uint32_t width, count, workers;
   float low[2], high[2];     // used columns and rows
   slice_plane *planes;       // [count]
@@ -121,15 +124,6 @@ sonde_status sonde_slicer_create_with(const sonde_sequence *sequence,
 bool sonde_slice_is_left_out(const sonde_sequence *sequence, const sonde_slicer_options *options,
                              uint32_t frame);
 
-// One block; returns the pixels reached.
-uint64_t sonde_slice_block(const sonde_slicer *slicer, uint32_t column, uint32_t row,
-                           slice_room *room);
-
-// One picture from a volume; voxel_from_pixel is linear in column and row.
-uint64_t sonde_slice_voxels(const sonde_volume *volume, bool nearest,
-                            const sonde_affine *voxel_from_pixel, sonde_image *image,
-                            uint8_t *known);
-
 // Weighted sum of frames' levels, each frame by a map from the picture's pixels to its own.
 typedef struct slice_sum {
   const sonde_slicer *slicer;
@@ -141,7 +135,37 @@ typedef struct slice_sum {
   float weights[SLICE_JOINED][SLICE_LEVELS];
 } slice_sum;
 
-// Known where the two frames in the middle are.
-uint64_t sonde_slice_sum(const slice_sum *sum);
+// A volume that a picture is taken from; cells of the picture share four places in the volume.
+enum { SLICE_CELL_WIDE = 16, SLICE_CELL_HIGH = 8 };
+typedef struct slice_voxels {
+  const uint8_t *voxels;
+  uint32_t size[3]; // at least two each
+  sonde_image *image;
+  uint8_t *known;
+} slice_voxels;
+
+struct slice_kernels {
+  const char *name;
+  // One block; returns the pixels reached.
+  uint64_t (*block)(const sonde_slicer *slicer, uint32_t column, uint32_t row, slice_room *room);
+  // Known where at least half of the frames are.
+  uint64_t (*sum)(const slice_sum *sum);
+  uint64_t (*cell)(const slice_voxels *v, const float corners[4][3], uint32_t column, uint32_t row);
+};
+
+// The widest kernels that this processor runs, or those called `name` (NULL: widest).
+const slice_kernels *sonde_slice_kernels_find(const char *name);
+extern const slice_kernels sonde_slice_kernels_base;
+#ifdef __x86_64__
+extern const slice_kernels sonde_slice_kernels_avx2, sonde_slice_kernels_avx512;
+#endif
+
+// With kernels of a name; see sonde_volume_slice.
+uint64_t sonde_volume_slice_with(const slice_kernels *kernels, const sonde_volume *volume,
+                                 bool nearest, const sonde_warp *warp,
+                                 const sonde_affine *world_from_pixel, sonde_image *image,
+                                 uint8_t *known);
+// Offset at a place of the grid.
+sonde_vec3 sonde_warp_at(const sonde_warp *warp, sonde_vec3 node);
 
 #endif

@@ -598,5 +598,5 @@ uint64_t sonde_slicer_render_place(sonde_slicer *s, double place,
     memcpy(sum.maps[k], o.maps[k], sizeof o.maps[k]);
     memcpy(sum.weights[k], o.weights.of[o.slots[k]], sizeof sum.weights[k]);
   }
-  return sonde_slice_sum(&sum);
+  return s->kernels->sum(&sum);
 }

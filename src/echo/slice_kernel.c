@@ -32,13 +32,33 @@
 // between           two frames and their weights
 // value_at          one pixel
 // fill_tile
-// sonde_slice_sum   a picture of the sweep's own
-// sonde_slice_block
-// trilinear         eight voxels
-// sonde_slice_voxels
+// slice_sum_all     a picture of the sweep's own
+// slice_block
+// gather_bytes      words at 16 places
+// trilinear_lane    eight voxels for 16 pixels
+// voxel_row, voxel_cell
+//
+// Compiled once for each instruction set with SLICE_KERNELS defined; every operation is one IEEE
+// operation per lane, so that all give the same bits.
 #include "echo/slice.h"
 
 #include <string.h>
+
+#if defined(__AVX512F__) || defined(__AVX2__)
+#include <immintrin.h>
+#endif
+
+// Without optimisation gcc's intrinsics are macros whose masks it then warns about.
+#if defined(__GNUC__) && !defined(__clang__) && !defined(__OPTIMIZE__)
+#pragma GCC diagnostic ignored "-Wsign-conversion"
+#pragma GCC diagnostic ignored "-Wconversion"
+#endif
+
+#define INLINE static inline __attribute__((always_inline))
+enum { LANES = 16 };
+typedef float lane __attribute__((vector_size(64)));
+typedef int32_t index_lane __attribute__((vector_size(64)));
+typedef uint32_t word_lane __attribute__((vector_size(64)));
 
 static const float SLACK = 1e-3f; // of a pixel: rounding at the frame's edge
 
@@ -345,7 +365,7 @@ static inline bool is_still(const sonde_slicer *s, const float at[2]) {
   return s->model.along_sweep && !s->bank->shares[0][(size_t)y * s->bank->wide[0] + x];
 }
 
-uint64_t sonde_slice_sum(const slice_sum *sum) {
+static uint64_t slice_sum_all(const slice_sum *sum) {
   const sonde_slicer *s = sum->slicer;
   uint64_t reached = 0;
   for (uint32_t y = 0; y < sum->image->height; ++y)
@@ -377,7 +397,8 @@ uint64_t sonde_slice_sum(const slice_sum *sum) {
 static inline uint32_t at_most(uint32_t a, uint32_t b) { return a < b ? a : b; }
 
 // Planes of the block first, then of each tile in it.
-uint64_t sonde_slice_block(const sonde_slicer *s, uint32_t column, uint32_t row, slice_room *room) {
+static uint64_t slice_block(const sonde_slicer *s, uint32_t column, uint32_t row,
+                            slice_room *room) {
   SONDE_ASSERT(s->image != NULL && column < s->image->width && row < s->image->height);
   rectangle block = {column, row, at_most(SLICE_BLOCK, s->image->width - column),
                      at_most(SLICE_BLOCK, s->image->height - row)};
@@ -400,52 +421,125 @@ uint64_t sonde_slice_block(const sonde_slicer *s, uint32_t column, uint32_t row,
   return reached;
 }
 
-static inline float trilinear(const sonde_volume *v, const float at[3]) {
-  uint32_t index[3];
-  float t[3];
-  for (int k = 0; k < 3; ++k) {
-    uint32_t last = v->size[k] > 1 ? v->size[k] - 2 : 0;
-    float x = limit(at[k], 0, (float)(v->size[k] - 1));
-    index[k] = (uint32_t)x < last ? (uint32_t)x : last;
-    t[k] = x - (float)index[k];
+INLINE lane all(float a) { return a - (lane){0}; }
+
+INLINE lane pick(index_lane mask, lane yes, lane no) {
+  return (lane)((mask & (index_lane)yes) | (~mask & (index_lane)no));
+}
+
+INLINE lane limit_lane(lane x, float low, float high) {
+  x = pick(x > all(low), x, all(low)); // nothing that is no number gets through
+  return pick(x > all(high), all(high), x);
+}
+
+// Four bytes from base + at, as whole numbers.
+INLINE word_lane gather_bytes(const uint8_t *base, index_lane at) {
+#if defined(__AVX512F__)
+  return (word_lane)_mm512_i32gather_epi32((__m512i)at, base, 1);
+#elif defined(__AVX2__)
+  union {
+    index_lane whole;
+    __m256i part[2];
+  } i = {at};
+  union {
+    __m256i part[2];
+    word_lane whole;
+  } v;
+  for (int k = 0; k < 2; ++k) v.part[k] = _mm256_i32gather_epi32((const int *)base, i.part[k], 1);
+  return v.whole;
+#else
+  word_lane v;
+  for (int k = 0; k < LANES; ++k) {
+    uint32_t word;
+    memcpy(&word, base + at[k], sizeof word); // little-endian where there are kernels
+    v[k] = word;
   }
-  size_t dx = v->size[0] > 1, dy = v->size[1] > 1 ? v->size[0] : 0;
-  size_t dz = v->size[2] > 1 ? (size_t)v->size[0] * v->size[1] : 0;
-  const uint8_t *p = v->voxels + ((size_t)index[2] * v->size[1] + index[1]) * v->size[0] + index[0];
-  float plane[2];
-  for (int k = 0; k < 2; ++k, p += dz) {
-    float top = (float)p[0] + t[0] * (float)(p[dx] - p[0]);
-    float low = (float)p[dy] + t[0] * (float)(p[dy + dx] - p[dy]);
+  return v;
+#endif
+}
+
+INLINE lane real_of(word_lane byte) {
+  return __builtin_convertvector((index_lane)(byte & 255u), lane);
+}
+
+// Two bytes of each word, mixed.
+INLINE lane mix_bytes(word_lane word, lane t) {
+  lane a = real_of(word), b = real_of(word >> 8);
+  return a + t * (b - a);
+}
+
+INLINE lane trilinear_lane(const slice_voxels *v, const lane at[3]) {
+  index_lane i[3];
+  lane t[3];
+  for (int k = 0; k < 3; ++k) {
+    int32_t last = (int32_t)v->size[k] - 2;
+    lane x = limit_lane(at[k], 0, (float)(v->size[k] - 1));
+    i[k] = __builtin_convertvector(x, index_lane);
+    index_lane beyond = i[k] > last;
+    i[k] = (beyond & last) | (~beyond & i[k]);
+    t[k] = x - __builtin_convertvector(i[k], lane);
+  }
+  int32_t dy = (int32_t)v->size[0], dz = dy * (int32_t)v->size[1];
+  index_lane base = (i[2] * (int32_t)v->size[1] + i[1]) * dy + i[0];
+  // No word may end behind the volume: those near its end begin earlier and are shifted.
+  int32_t most = dz * (int32_t)v->size[2] - 4 - dy - dz;
+  index_lane late = base > most, start = (late & most) | (~late & base);
+  word_lane shift = (word_lane)(base - start) * 8u;
+  lane plane[2];
+  for (int k = 0; k < 2; ++k) {
+    lane top = mix_bytes(gather_bytes(v->voxels, start + k * dz) >> shift, t[0]);
+    lane low = mix_bytes(gather_bytes(v->voxels, start + k * dz + dy) >> shift, t[0]);
     plane[k] = top + t[1] * (low - top);
   }
   return plane[0] + t[2] * (plane[1] - plane[0]);
 }
 
-static inline float nearest_voxel(const sonde_volume *v, const float at[3]) {
-  size_t index[3];
-  for (int k = 0; k < 3; ++k) index[k] = (size_t)(limit(at[k], 0, (float)(v->size[k] - 1)) + 0.5f);
-  return (float)v->voxels[(index[2] * v->size[1] + index[1]) * v->size[0] + index[0]];
-}
-
-uint64_t sonde_slice_voxels(const sonde_volume *v, bool nearest, const sonde_affine *a,
-                            sonde_image *image, uint8_t *known) {
-  SONDE_ASSERT(v->size[0] > 0 && v->size[1] > 0 && v->size[2] > 0);
-  uint64_t reached = 0;
-  for (uint32_t row = 0; row < image->height; ++row) {
-    float start[3], at[3];
-    for (int k = 0; k < 3; ++k) start[k] = (float)(a->m[k][3] + row * a->m[k][1]);
-    size_t line = (size_t)row * image->width;
-    for (uint32_t x = 0; x < image->width; ++x) {
-      bool inside = true;
-      for (int k = 0; k < 3; ++k) {
-        at[k] = start[k] + (float)x * (float)a->m[k][0];
-        inside &= at[k] >= -SLACK && at[k] <= (float)(v->size[k] - 1) + SLACK;
-      }
-      float value = !inside ? 0 : nearest ? nearest_voxel(v, at) : trilinear(v, at);
-      image->pixels[line + x] = (uint8_t)(value + 0.5f);
-      if (known) known[line + x] = inside;
-      reached += inside;
-    }
+// One row of a cell; pixels beyond `wide` are worked out and dropped.
+INLINE uint32_t voxel_row(const slice_voxels *v, const float start[3], const float step[3],
+                          uint32_t wide, uint8_t *out, uint8_t *known) {
+  static const lane count = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+  lane at[3];
+  index_lane inside = (index_lane){0} - 1;
+  for (int k = 0; k < 3; ++k) {
+    at[k] = all(start[k]) + count * all(step[k]);
+    inside &= (at[k] >= all(-SLACK)) & (at[k] <= all((float)(v->size[k] - 1) + SLACK));
+  }
+  lane value = trilinear_lane(v, at) + 0.5f;
+  typedef uint8_t bytes __attribute__((vector_size(16)));
+  bytes in = __builtin_convertvector((word_lane)inside & 1u, bytes);
+  bytes grey = __builtin_convertvector(__builtin_convertvector(value, index_lane) & inside, bytes);
+  uint32_t reached = 0;
+  if (wide == LANES) {
+    memcpy(out, &grey, LANES);
+    if (known) memcpy(known, &in, LANES);
+    for (int k = 0; k < LANES; ++k) reached += in[k];
+    return reached;
+  }
+  for (uint32_t x = 0; x < wide; ++x) {
+    out[x] = grey[x], reached += in[x];
+    if (known) known[x] = in[x];
   }
   return reached;
 }
+
+// A cell of the picture between four corners, at which the places in the volume are known.
+static uint64_t voxel_cell(const slice_voxels *v, const float corners[4][3], uint32_t column,
+                           uint32_t row) {
+  uint32_t wide = at_most(SLICE_CELL_WIDE, v->image->width - column);
+  uint32_t high = at_most(SLICE_CELL_HIGH, v->image->height - row);
+  uint64_t reached = 0;
+  for (uint32_t y = 0; y < high; ++y) {
+    float start[3], step[3], t = (float)y / SLICE_CELL_HIGH;
+    for (int k = 0; k < 3; ++k) {
+      start[k] = corners[0][k] + t * (corners[2][k] - corners[0][k]);
+      float end = corners[1][k] + t * (corners[3][k] - corners[1][k]);
+      step[k] = (end - start[k]) / SLICE_CELL_WIDE;
+    }
+    size_t at = (size_t)(row + y) * v->image->width + column;
+    reached +=
+        voxel_row(v, start, step, wide, v->image->pixels + at, v->known ? v->known + at : NULL);
+  }
+  return reached;
+}
+
+const slice_kernels SLICE_KERNELS = {SLICE_KERNELS_NAME, slice_block, slice_sum_all, voxel_cell};
