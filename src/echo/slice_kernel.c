@@ -34,9 +34,10 @@
 // fill_tile
 // slice_sum_all     a picture of the sweep's own
 // slice_block
-// gather_bytes      words at 16 places
-// trilinear_lane    eight voxels for 16 pixels
-// voxel_row, voxel_cell
+// find_voxels       places of a row of a cell
+// load_voxels       the eight greys around each
+// mix_voxels        trilinear
+// voxel_cell
 //
 // Compiled once for each instruction set with SLICE_KERNELS defined; every operation is one IEEE
 // operation per lane, so that all give the same bits.
@@ -44,21 +45,8 @@
 
 #include <string.h>
 
-#if defined(__AVX512F__) || defined(__AVX2__)
-#include <immintrin.h>
-#endif
-
-// Without optimisation gcc's intrinsics are macros whose masks it then warns about.
-#if defined(__GNUC__) && !defined(__clang__) && !defined(__OPTIMIZE__)
-#pragma GCC diagnostic ignored "-Wsign-conversion"
-#pragma GCC diagnostic ignored "-Wconversion"
-#endif
-
 #define INLINE static inline __attribute__((always_inline))
 enum { LANES = 16 };
-typedef float lane __attribute__((vector_size(64)));
-typedef int32_t index_lane __attribute__((vector_size(64)));
-typedef uint32_t word_lane __attribute__((vector_size(64)));
 
 static const float SLACK = 1e-3f; // of a pixel: rounding at the frame's edge
 
@@ -421,123 +409,103 @@ static uint64_t slice_block(const sonde_slicer *s, uint32_t column, uint32_t row
   return reached;
 }
 
-INLINE lane all(float a) { return a - (lane){0}; }
+// A cell on its way: which voxels, how far between them, and the eight greys of each pixel. Loops
+// over a row of 16 pixels are plain, for the compiler to take as many at a time as there is room.
+typedef struct voxel_work {
+  int32_t base[SLICE_CELL_HIGH][LANES];
+  float t[SLICE_CELL_HIGH][3][LANES];
+  uint32_t inside[SLICE_CELL_HIGH][LANES]; // 1 or 0
+  uint64_t greys[SLICE_CELL_HIGH][LANES];
+} voxel_work;
 
-INLINE lane pick(index_lane mask, lane yes, lane no) {
-  return (lane)((mask & (index_lane)yes) | (~mask & (index_lane)no));
+// What is no number becomes `low`.
+INLINE float bound(float x, float low, float high) {
+  x = x > low ? x : low;
+  return x < high ? x : high;
 }
 
-INLINE lane limit_lane(lane x, float low, float high) {
-  x = pick(x > all(low), x, all(low)); // nothing that is no number gets through
-  return pick(x > all(high), all(high), x);
-}
-
-// Four bytes from base + at, as whole numbers.
-INLINE word_lane gather_bytes(const uint8_t *base, index_lane at) {
-#if defined(__AVX512F__)
-  return (word_lane)_mm512_i32gather_epi32((__m512i)at, base, 1);
-#elif defined(__AVX2__)
-  union {
-    index_lane whole;
-    __m256i part[2];
-  } i = {at};
-  union {
-    __m256i part[2];
-    word_lane whole;
-  } v;
-  for (int k = 0; k < 2; ++k) v.part[k] = _mm256_i32gather_epi32((const int *)base, i.part[k], 1);
-  return v.whole;
-#else
-  word_lane v;
-  for (int k = 0; k < LANES; ++k) {
-    uint32_t word;
-    memcpy(&word, base + at[k], sizeof word); // little-endian where there are kernels
-    v[k] = word;
-  }
-  return v;
-#endif
-}
-
-INLINE lane real_of(word_lane byte) {
-  return __builtin_convertvector((index_lane)(byte & 255u), lane);
-}
-
-// Two bytes of each word, mixed.
-INLINE lane mix_bytes(word_lane word, lane t) {
-  lane a = real_of(word), b = real_of(word >> 8);
-  return a + t * (b - a);
-}
-
-INLINE lane trilinear_lane(const slice_voxels *v, const lane at[3]) {
-  index_lane i[3];
-  lane t[3];
+INLINE void find_voxels(const slice_voxels *v, const float start[3], const float step[3],
+                        uint32_t y, voxel_work *w) {
+  int32_t stride[3] = {1, (int32_t)v->size[0], (int32_t)(v->size[0] * v->size[1])};
+  for (int x = 0; x < LANES; ++x) w->base[y][x] = 0, w->inside[y][x] = 1;
   for (int k = 0; k < 3; ++k) {
     int32_t last = (int32_t)v->size[k] - 2;
-    lane x = limit_lane(at[k], 0, (float)(v->size[k] - 1));
-    i[k] = __builtin_convertvector(x, index_lane);
-    index_lane beyond = i[k] > last;
-    i[k] = (beyond & last) | (~beyond & i[k]);
-    t[k] = x - __builtin_convertvector(i[k], lane);
+    float high = (float)(v->size[k] - 1);
+    for (int x = 0; x < LANES; ++x) {
+      float at = start[k] + (float)x * step[k], in = bound(at, 0, high);
+      int32_t i = (int32_t)in;
+      i = i > last ? last : i;
+      w->inside[y][x] &= (uint32_t)((at >= -SLACK) & (at <= high + SLACK));
+      w->t[y][k][x] = in - (float)i;
+      w->base[y][x] += i * stride[k];
+    }
   }
-  int32_t dy = (int32_t)v->size[0], dz = dy * (int32_t)v->size[1];
-  index_lane base = (i[2] * (int32_t)v->size[1] + i[1]) * dy + i[0];
-  // No word may end behind the volume: those near its end begin earlier and are shifted.
-  int32_t most = dz * (int32_t)v->size[2] - 4 - dy - dz;
-  index_lane late = base > most, start = (late & most) | (~late & base);
-  word_lane shift = (word_lane)(base - start) * 8u;
-  lane plane[2];
-  for (int k = 0; k < 2; ++k) {
-    lane top = mix_bytes(gather_bytes(v->voxels, start + k * dz) >> shift, t[0]);
-    lane low = mix_bytes(gather_bytes(v->voxels, start + k * dz + dy) >> shift, t[0]);
-    plane[k] = top + t[1] * (low - top);
-  }
-  return plane[0] + t[2] * (plane[1] - plane[0]);
 }
 
-// One row of a cell; pixels beyond `wide` are worked out and dropped.
-INLINE uint32_t voxel_row(const slice_voxels *v, const float start[3], const float step[3],
-                          uint32_t wide, uint8_t *out, uint8_t *known) {
-  static const lane count = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
-  lane at[3];
-  index_lane inside = (index_lane){0} - 1;
-  for (int k = 0; k < 3; ++k) {
-    at[k] = all(start[k]) + count * all(step[k]);
-    inside &= (at[k] >= all(-SLACK)) & (at[k] <= all((float)(v->size[k] - 1) + SLACK));
-  }
-  lane value = trilinear_lane(v, at) + 0.5f;
-  typedef uint8_t bytes __attribute__((vector_size(16)));
-  bytes in = __builtin_convertvector((word_lane)inside & 1u, bytes);
-  bytes grey = __builtin_convertvector(__builtin_convertvector(value, index_lane) & inside, bytes);
-  uint32_t reached = 0;
-  if (wide == LANES) {
-    memcpy(out, &grey, LANES);
-    if (known) memcpy(known, &in, LANES);
-    for (int k = 0; k < LANES; ++k) reached += in[k];
-    return reached;
-  }
-  for (uint32_t x = 0; x < wide; ++x) {
-    out[x] = grey[x], reached += in[x];
-    if (known) known[x] = in[x];
-  }
-  return reached;
+static inline uint64_t two_greys(const uint8_t *p) {
+  uint16_t both;
+  memcpy(&both, p, sizeof both);
+  return both;
 }
 
-// A cell of the picture between four corners, at which the places in the volume are known.
+// Plain loads: processors that guard gathers against leaks are slower at them.
+INLINE void load_voxels(const slice_voxels *v, uint32_t rows, voxel_work *w) {
+  size_t dy = v->size[0], dz = dy * v->size[1];
+  for (uint32_t y = 0; y < rows; ++y)
+    for (int x = 0; x < LANES; ++x) {
+      const uint8_t *p = v->voxels + w->base[y][x];
+      w->greys[y][x] = two_greys(p) | two_greys(p + dy) << 16 | two_greys(p + dz) << 32 |
+                       two_greys(p + dz + dy) << 48;
+    }
+}
+
+INLINE float grey_of(uint32_t word, int byte) {
+  return (float)(int32_t)(word >> (8 * byte) & 255u);
+}
+
+// Two rows of two greys each.
+INLINE float mix_sheet(uint32_t word, float t0, float t1) {
+  float a = grey_of(word, 0), b = grey_of(word, 1), c = grey_of(word, 2), d = grey_of(word, 3);
+  float top = a + t0 * (b - a), low = c + t0 * (d - c);
+  return top + t1 * (low - top);
+}
+
+INLINE void mix_voxels(const voxel_work *w, uint32_t y, uint8_t out[LANES]) {
+  const float(*t)[LANES] = w->t[y];
+  int32_t value[LANES];
+  for (int x = 0; x < LANES; ++x) {
+    float near = mix_sheet((uint32_t)w->greys[y][x], t[0][x], t[1][x]);
+    float far = mix_sheet((uint32_t)(w->greys[y][x] >> 32), t[0][x], t[1][x]);
+    value[x] = (int32_t)(near + t[2][x] * (far - near) + 0.5f) * (int32_t)w->inside[y][x];
+  }
+  for (int x = 0; x < LANES; ++x) out[x] = (uint8_t)value[x];
+}
+
+// A cell of the picture between four corners, at which the places in the volume are known. Pixels
+// beyond the picture are worked out and dropped.
 static uint64_t voxel_cell(const slice_voxels *v, const float corners[4][3], uint32_t column,
                            uint32_t row) {
   uint32_t wide = at_most(SLICE_CELL_WIDE, v->image->width - column);
   uint32_t high = at_most(SLICE_CELL_HIGH, v->image->height - row);
-  uint64_t reached = 0;
+  voxel_work w;
   for (uint32_t y = 0; y < high; ++y) {
-    float start[3], step[3], t = (float)y / SLICE_CELL_HIGH;
+    float start[3], step[3], t = (float)y * (1.0f / SLICE_CELL_HIGH);
     for (int k = 0; k < 3; ++k) {
       start[k] = corners[0][k] + t * (corners[2][k] - corners[0][k]);
       float end = corners[1][k] + t * (corners[3][k] - corners[1][k]);
-      step[k] = (end - start[k]) / SLICE_CELL_WIDE;
+      step[k] = (end - start[k]) * (1.0f / SLICE_CELL_WIDE);
     }
+    find_voxels(v, start, step, y, &w);
+  }
+  load_voxels(v, high, &w);
+  uint64_t reached = 0;
+  for (uint32_t y = 0; y < high; ++y) {
+    uint8_t grey[LANES];
+    mix_voxels(&w, y, grey);
     size_t at = (size_t)(row + y) * v->image->width + column;
-    reached +=
-        voxel_row(v, start, step, wide, v->image->pixels + at, v->known ? v->known + at : NULL);
+    memcpy(v->image->pixels + at, grey, wide);
+    for (uint32_t x = 0; x < wide; ++x) reached += w.inside[y][x];
+    for (uint32_t x = 0; x < wide && v->known; ++x) v->known[at + x] = (uint8_t)w.inside[y][x];
   }
   return reached;
 }
