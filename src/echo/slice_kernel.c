@@ -31,6 +31,8 @@
 // krige             up to four frames, every scale by its own weight
 // between           two frames and their weights
 // value_at          one pixel
+// find_pair         remembered
+// meet_row, find_pixels, mix_row, bracket_row   between two frames, a row of a tile at a time
 // fill_tile
 // slice_sum_all     a picture of the sweep's own
 // slice_block
@@ -46,7 +48,7 @@
 #include <string.h>
 
 #define INLINE static inline __attribute__((always_inline))
-enum { LANES = 16 };
+enum { LANES = 16, PAIRS = 16 }; // pixels at a time; pairs of frames remembered in a tile
 
 static const float SLACK = 1e-3f; // of a pixel: rounding at the frame's edge
 
@@ -327,17 +329,141 @@ static inline float value_at(const sonde_slicer *s, const slice_candidate *room,
   return -1;
 }
 
+// What is no number becomes `low`.
+INLINE float bound(float x, float low, float high) {
+  x = x > low ? x : low;
+  return x < high ? x : high;
+}
+
+static inline uint64_t two_greys(const uint8_t *p) {
+  uint16_t both;
+  memcpy(&both, p, sizeof both);
+  return both;
+}
+
+INLINE float grey_of(uint32_t word, int byte) {
+  return (float)(int32_t)(word >> (8 * byte) & 255u);
+}
+
+// Two rows of two greys each.
+INLINE float mix_sheet(uint32_t word, float t0, float t1) {
+  float a = grey_of(word, 0), b = grey_of(word, 1), c = grey_of(word, 2), d = grey_of(word, 3);
+  float top = a + t0 * (b - a), low = c + t0 * (d - c);
+  return top + t1 * (low - top);
+}
+
+// Between two frames across, a row of a tile at a time.
+typedef struct row_work {
+  const uint8_t *near[SLICE_TILE], *far[SLICE_TILE];
+  float m[2][SLICE_TILE], n[2][SLICE_TILE], t[SLICE_TILE];
+  int32_t at[2][SLICE_TILE];
+  float share[2][2][SLICE_TILE];
+  uint64_t greys[SLICE_TILE];
+} row_work;
+
+static inline pair *find_pair(const sonde_slicer *s, const slice_candidate *room, int32_t up,
+                              int32_t down, pair pairs[PAIRS]) {
+  pair *p = &pairs[(up * 5 + down) % PAIRS];
+  if (p->up != up || p->down != down) blend(s, room, up, down, p);
+  return p;
+}
+
+// All pixels of the row between these two frames; -1 in `met` for those whose line meets both.
+INLINE void meet_row(const sonde_slicer *s, const slice_candidate *room, const row_pick *pick,
+                     const pair *p, float y, row_work *w, int32_t met[SLICE_TILE]) {
+  const slice_candidate *a = &room[p->up], *b = &room[p->down];
+  float gap = (float)s->options.gap_m, u0 = s->low[0] - SLACK, u1 = s->high[0] + SLACK;
+  float v0 = s->low[1] - SLACK, v1 = s->high[1] + SLACK;
+  float start[4] = {a->u[0] + y * a->u[2], a->v[0] + y * a->v[2], b->u[0] + y * b->u[2],
+                    b->v[0] + y * b->v[2]};
+  const float step[4] = {a->u[1], a->v[1], b->u[1], b->v[1]};
+  const float shift[4] = {-p->up_shift[0], -p->up_shift[1], p->down_shift[0], p->down_shift[1]};
+  for (int x = 0; x < SLICE_TILE; ++x) {
+    float near = pick->up_d[x], far = -pick->down_d[x], fx = (float)x;
+    float m0 = start[0] + fx * step[0] + near * shift[0];
+    float m1 = start[1] + fx * step[1] + near * shift[1];
+    float n0 = start[2] + fx * step[2] + far * shift[2];
+    float n1 = start[3] + fx * step[3] + far * shift[3];
+    int hit = (pick->up[x] == p->up) & (pick->down[x] == p->down) & (near + far <= gap);
+    hit = hit & (m0 >= u0) & (m0 <= u1) & (m1 >= v0) & (m1 <= v1);
+    hit = hit & (n0 >= u0) & (n0 <= u1) & (n1 >= v0) & (n1 <= v1);
+    w->m[0][x] = hit ? m0 : w->m[0][x], w->m[1][x] = hit ? m1 : w->m[1][x];
+    w->n[0][x] = hit ? n0 : w->n[0][x], w->n[1][x] = hit ? n1 : w->n[1][x];
+    w->t[x] = hit ? near / (near + far) : w->t[x];
+    met[x] = hit ? -1 : met[x];
+  }
+}
+
+// Where in the frame, and how far between its pixels.
+INLINE void find_pixels(const sonde_slicer *s, float at[2][SLICE_TILE], float share[2][SLICE_TILE],
+                        int32_t place[SLICE_TILE]) {
+  int32_t width = (int32_t)s->width, iu_high = (int32_t)s->high[0], iv_high = (int32_t)s->high[1];
+  for (int x = 0; x < SLICE_TILE; ++x) {
+    float u = bound(at[0][x], s->low[0], s->high[0]), v = bound(at[1][x], s->low[1], s->high[1]);
+    int32_t i = (int32_t)u, j = (int32_t)v;
+    i = i < iu_high ? i : iu_high - 1, j = j < iv_high ? j : iv_high - 1;
+    share[0][x] = u - (float)i, share[1][x] = v - (float)j;
+    place[x] = j * width + i;
+  }
+}
+
+INLINE void mix_row(const sonde_slicer *s, row_work *w, uint8_t grey[SLICE_TILE]) {
+  find_pixels(s, w->m, w->share[0], w->at[0]);
+  find_pixels(s, w->n, w->share[1], w->at[1]);
+  for (int x = 0; x < SLICE_TILE; ++x) {
+    const uint8_t *p = w->near[x] + w->at[0][x], *q = w->far[x] + w->at[1][x];
+    w->greys[x] = two_greys(p) | two_greys(p + s->width) << 16 | two_greys(q) << 32 |
+                  two_greys(q + s->width) << 48;
+  }
+  int32_t value[SLICE_TILE];
+  for (int x = 0; x < SLICE_TILE; ++x) {
+    float near = mix_sheet((uint32_t)w->greys[x], w->share[0][0][x], w->share[0][1][x]);
+    float far = mix_sheet((uint32_t)(w->greys[x] >> 32), w->share[1][0][x], w->share[1][1][x]);
+    value[x] = (int32_t)(near + (far - near) * w->t[x] + 0.5f);
+  }
+  for (int x = 0; x < SLICE_TILE; ++x) grey[x] = (uint8_t)value[x];
+}
+
+// What lies between two frames; the rest is left with `met` zero.
+static void bracket_row(const sonde_slicer *s, const slice_candidate *room, const row_pick *pick,
+                        uint32_t wide, float y, pair pairs[PAIRS], int32_t met[SLICE_TILE],
+                        uint8_t grey[SLICE_TILE]) {
+  row_work w;
+  uint32_t done = 0;
+  for (int x = 0; x < SLICE_TILE; ++x) {
+    met[x] = 0, w.near[x] = w.far[x] = room[0].plane->pixels;
+    w.m[0][x] = w.n[0][x] = s->low[0], w.m[1][x] = w.n[1][x] = s->low[1], w.t[x] = 0;
+  }
+  for (uint32_t x = 0; x < wide; ++x) {
+    int32_t up = pick->up[x], down = pick->down[x];
+    if (done >> x & 1 || up < 0 || down < 0) continue;
+    meet_row(s, room, pick, find_pair(s, room, up, down, pairs), y, &w, met);
+    const uint8_t *near = room[up].plane->pixels, *far = room[down].plane->pixels;
+    for (uint32_t k = x; k < wide; ++k) {
+      bool same = pick->up[k] == up && pick->down[k] == down;
+      done |= (uint32_t)same << k;
+      w.near[k] = same ? near : w.near[k], w.far[k] = same ? far : w.far[k];
+    }
+  }
+  mix_row(s, &w, grey);
+}
+
 static uint64_t fill_tile(const sonde_slicer *s, const rectangle *r, const slice_candidate *room,
                           uint32_t count) {
   uint64_t reached = 0;
-  pair p = {.up = -1};
+  pair p = {.up = -1}, pairs[PAIRS];
+  for (int k = 0; k < PAIRS; ++k) pairs[k].up = -1;
   row_pick pick;
+  bool fast = count && s->options.method == SONDE_SLICE_BRACKET && !s->options.along_sweep;
+  int32_t met[SLICE_TILE] = {0};
+  uint8_t grey[SLICE_TILE];
   for (uint32_t y = 0; y < r->high; ++y) {
     nearest_of_row(s, room, count, y, &pick);
+    if (fast) bracket_row(s, room, &pick, r->wide, (float)y, pairs, met, grey);
     size_t at = (size_t)(r->row + y) * s->image->width + r->column;
     uint8_t *out = s->image->pixels + at, *known = s->known ? s->known + at : NULL;
     for (uint32_t x = 0; x < r->wide; ++x) {
-      float value = value_at(s, room, &pick, (int)x, (float)y, &p);
+      float value = met[x] ? (float)grey[x] : value_at(s, room, &pick, (int)x, (float)y, &p);
       out[x] = value > 0 ? (uint8_t)(value + 0.5f) : 0;
       if (known) known[x] = value >= 0;
       reached += value >= 0;
@@ -418,12 +544,6 @@ typedef struct voxel_work {
   uint64_t greys[SLICE_CELL_HIGH][LANES];
 } voxel_work;
 
-// What is no number becomes `low`.
-INLINE float bound(float x, float low, float high) {
-  x = x > low ? x : low;
-  return x < high ? x : high;
-}
-
 INLINE void find_voxels(const slice_voxels *v, const float start[3], const float step[3],
                         uint32_t y, voxel_work *w) {
   int32_t stride[3] = {1, (int32_t)v->size[0], (int32_t)(v->size[0] * v->size[1])};
@@ -442,12 +562,6 @@ INLINE void find_voxels(const slice_voxels *v, const float start[3], const float
   }
 }
 
-static inline uint64_t two_greys(const uint8_t *p) {
-  uint16_t both;
-  memcpy(&both, p, sizeof both);
-  return both;
-}
-
 // Plain loads: processors that guard gathers against leaks are slower at them.
 INLINE void load_voxels(const slice_voxels *v, uint32_t rows, voxel_work *w) {
   size_t dy = v->size[0], dz = dy * v->size[1];
@@ -457,17 +571,6 @@ INLINE void load_voxels(const slice_voxels *v, uint32_t rows, voxel_work *w) {
       w->greys[y][x] = two_greys(p) | two_greys(p + dy) << 16 | two_greys(p + dz) << 32 |
                        two_greys(p + dz + dy) << 48;
     }
-}
-
-INLINE float grey_of(uint32_t word, int byte) {
-  return (float)(int32_t)(word >> (8 * byte) & 255u);
-}
-
-// Two rows of two greys each.
-INLINE float mix_sheet(uint32_t word, float t0, float t1) {
-  float a = grey_of(word, 0), b = grey_of(word, 1), c = grey_of(word, 2), d = grey_of(word, 3);
-  float top = a + t0 * (b - a), low = c + t0 * (d - c);
-  return top + t1 * (low - top);
 }
 
 INLINE void mix_voxels(const voxel_work *w, uint32_t y, uint8_t out[LANES]) {

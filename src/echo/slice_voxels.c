@@ -38,21 +38,22 @@ sonde_vec3 sonde_warp_at(const sonde_warp *warp, sonde_vec3 node) {
   const double at[3] = {node.x, node.y, node.z};
   const float *p = warp->offsets_m;
   size_t stride[3] = {3, 3 * (size_t)warp->size[0], 3 * (size_t)warp->size[0] * warp->size[1]};
-  double t[3], sum[3] = {0};
+  double t[3], sum[3];
   for (int k = 0; k < 3; ++k) {
-    double x = clamp(at[k], 0, warp->size[k] - 1.0), i = floor(fmin(x, warp->size[k] - 2.0));
-    t[k] = x - i;
-    p += (size_t)i * stride[k];
+    double x = clamp(at[k], 0, warp->size[k] - 1.0);
+    size_t i = (size_t)x;
+    if (i > warp->size[k] - 2) i = warp->size[k] - 2;
+    t[k] = x - (double)i;
+    p += i * stride[k];
   }
-  for (int corner = 0; corner < 8; ++corner) {
-    const float *q = p;
-    double w = 1;
-    for (int k = 0; k < 3; ++k) {
-      bool high = corner >> k & 1;
-      q += high ? stride[k] : 0;
-      w *= high ? t[k] : 1 - t[k];
+  for (int c = 0; c < 3; ++c) {
+    double line[4];
+    for (int k = 0; k < 4; ++k) {
+      const float *q = p + (k & 1 ? stride[1] : 0) + (k & 2 ? stride[2] : 0) + c;
+      line[k] = (1 - t[0]) * (double)q[0] + t[0] * (double)q[3];
     }
-    for (int c = 0; c < 3; ++c) sum[c] += w * (double)q[c];
+    sum[c] = (1 - t[2]) * ((1 - t[1]) * line[0] + t[1] * line[1]) +
+             t[2] * ((1 - t[1]) * line[2] + t[1] * line[3]);
   }
   return vec3(sum[0], sum[1], sum[2]);
 }
