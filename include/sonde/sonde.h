@@ -22,6 +22,7 @@
 #include "sonde/interior.h"
 #include "sonde/echo.h"
 #include "sonde/echo_frames.h"
+#include "sonde/echo_volume.h"
 #include "sonde/haptics.h"
 #include "sonde/exam.h"
 #include "sonde/stream.h"

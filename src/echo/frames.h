@@ -4,7 +4,7 @@
 
 #include "base/base.h"
 #include "base/maths.h"
-#include "sonde/echo_frames.h"
+#include "sonde/echo_volume.h"
 
 enum {
   SONDE_SIDE_MAX = 16384,     // pixels or voxels along an axis

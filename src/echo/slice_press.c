@@ -1,0 +1,130 @@
+// A picture taken at rest, deformed with the thigh.
+//
+// The rest point of a place of the pressed probe's plane is found at nodes every NODE pixels and is
+// bilinear between them: a lumen is tens of pixels wide. Only its part in the rest picture's plane
+// counts; what moves through the plane is seen as if the tissue went on alike.
+//
+// uncarry, without_walls   back from where the moving walls of the vessels took the tissue
+// node_places            places in the rest picture, a row of nodes
+// grey_at                bilinear
+// press_row
+// sonde_image_pressed
+#include "echo/frames.h"
+#include "interior/interior.h"
+
+enum { NODE = 4, NODES = 64 }; // pixels between nodes; nodes held at once along a row
+
+typedef struct job {
+  const sonde_image *rest;
+  const sonde_image_press *press;
+  sonde_image *out;
+  uint8_t *known;
+  sonde_vessel_state vessels[2]; // that the plane cuts
+  int vessel_count;
+} job;
+
+// Circles about a vessel become ellipses: the circle whose ellipse runs through the point, found by
+// halving, since the ellipses lie inside each other.
+static void uncarry(const sonde_vessel_state *v, double *short_m, double *long_m) {
+  double a = *short_m, b = *long_m, low = v->rest_radius_m, high = low;
+  if (hypot(a / v->half_short_m, b / v->half_long_m) <= 1) {
+    *short_m = a * low / v->half_short_m, *long_m = b * low / v->half_long_m;
+    return;
+  }
+  high = 4 * low + hypot(a, b);
+  double half[2] = {0, 0}, none;
+  for (int k = 0; k < 40; ++k) {
+    double r = 0.5 * (low + high);
+    half[0] = half[1] = r, none = 0;
+    sonde_vessel_carry(v, &half[0], &none);
+    none = 0;
+    sonde_vessel_carry(v, &none, &half[1]);
+    *(hypot(a / half[0], b / half[1]) > 1 ? &low : &high) = r;
+  }
+  *short_m = a * high / half[0], *long_m = b * high / half[1];
+}
+
+static sonde_vec3 without_walls(const job *j, sonde_vec3 p) {
+  for (int k = j->vessel_count; k-- > 0;) { // the walls carried the vein's tissue first
+    const sonde_vessel_state *v = &j->vessels[k];
+    sonde_vec3 d = v_sub(p, v->centre_m), across = v_cross(v->axis, v->flat_axis);
+    double a = v_dot(d, v->flat_axis), b = v_dot(d, across), a0 = a, b0 = b;
+    uncarry(v, &a0, &b0);
+    p = v_madd(v_madd(p, a0 - a, v->flat_axis), b0 - b, across);
+  }
+  return p;
+}
+
+// Middle of pixel 0 to middle of the last one spans the size less one pixel.
+static void node_places(const job *j, uint32_t column, uint32_t row, uint32_t count,
+                        double places[][2]) {
+  const sonde_image *out = j->out, *rest = j->rest;
+  double dx = out->width_m / out->width, dz = out->height_m / out->height;
+  for (uint32_t k = 0; k < count; ++k) {
+    double x = (column + k * (double)NODE + 0.5) * dx - 0.5 * out->width_m;
+    double z = (row + 0.5) * dz;
+    sonde_vec3 p = without_walls(j, pose_apply(j->press->pose, vec3(x, 0, z)));
+    sonde_vec3 q =
+        pose_apply_inverse(j->press->rest_pose, sonde_interior_rest_point(j->press->interior, p));
+    places[k][0] = (q.x + j->press->shift_m[0] + 0.5 * rest->width_m) / rest->width_m * rest->width;
+    places[k][1] = (q.z + j->press->shift_m[1]) / rest->height_m * rest->height;
+    places[k][0] -= 0.5, places[k][1] -= 0.5;
+  }
+}
+
+static bool grey_at(const sonde_image *image, double u, double v, uint8_t *grey) {
+  *grey = 0;
+  if (!(u >= -0.5 && v >= -0.5 && u <= image->width - 0.5 && v <= image->height - 0.5))
+    return false;
+  u = clamp(u, 0, image->width - 1.0), v = clamp(v, 0, image->height - 1.0);
+  size_t i = (size_t)u, j = (size_t)v;
+  size_t right = i + 1 < image->width, below = j + 1 < image->height ? image->width : 0;
+  const uint8_t *p = image->pixels + j * image->width + i, *q = p + below;
+  double a = u - (double)i, b = v - (double)j;
+  double top = p[0] + a * (p[right] - p[0]), low = q[0] + a * (q[right] - q[0]);
+  *grey = (uint8_t)(top + b * (low - top) + 0.5);
+  return true;
+}
+
+// Rows of pixels between two rows of nodes.
+static uint64_t press_row(const job *j, uint32_t column, uint32_t row, uint32_t wide,
+                          double (*above)[2], double (*below)[2]) {
+  uint64_t reached = 0;
+  for (uint32_t y = 0; y < NODE && row + y < j->out->height; ++y)
+    for (uint32_t x = 0; x < wide; ++x) {
+      double t = (double)y / NODE, s = (double)(x % NODE) / NODE, at[2];
+      for (int k = 0; k < 2; ++k) {
+        double top = above[x / NODE][k] + s * (above[x / NODE + 1][k] - above[x / NODE][k]);
+        double low = below[x / NODE][k] + s * (below[x / NODE + 1][k] - below[x / NODE][k]);
+        at[k] = top + t * (low - top);
+      }
+      size_t i = (size_t)(row + y) * j->out->width + column + x;
+      bool known = grey_at(j->rest, at[0], at[1], &j->out->pixels[i]);
+      if (j->known) j->known[i] = known;
+      reached += known;
+    }
+  return reached;
+}
+
+uint64_t sonde_image_pressed(const sonde_image *rest, const sonde_image_press *press,
+                             sonde_image *out, uint8_t *known) {
+  SONDE_ASSERT(rest != NULL && press != NULL && press->interior != NULL && out != NULL);
+  SONDE_ASSERT(rest->pixels != out->pixels && rest->width_m > 0 && out->width_m > 0);
+  job j = {rest, press, out, known, .vessel_count = 0};
+  for (int which = 0; which < 2; ++which)
+    j.vessel_count += sonde_interior_vessel_at_plane(press->interior, which, press->pose,
+                                                     &j.vessels[j.vessel_count]);
+  uint64_t reached = 0;
+  for (uint32_t left = 0; left < out->width; left += NODE * (NODES - 1)) {
+    double places[2][NODES][2];
+    uint32_t wide = out->width - left, k = 0;
+    if (wide > NODE * (NODES - 1)) wide = NODE * (NODES - 1);
+    uint32_t count = (wide + NODE - 1) / NODE + 1;
+    node_places(&j, left, 0, count, places[0]);
+    for (uint32_t row = 0; row < out->height; row += NODE, k ^= 1) {
+      node_places(&j, left, row + NODE, count, places[k ^ 1]);
+      reached += press_row(&j, left, row, wide, places[k], places[k ^ 1]);
+    }
+  }
+  return reached;
+}
