@@ -8,7 +8,7 @@
 // compare           held-out frame, made frame, difference
 // used_part         pixels of a frame
 // slice_sequence, slice_volume
-#include "frames_common.h"
+#include "frames_press.h"
 #include "stack_figure.h"
 
 #include <math.h>
@@ -44,13 +44,25 @@ static const char HELP[] =
     "  --along-sweep      join frames pixel to pixel instead of across\n"
     "  --gap-mm D         frames further apart are not joined (default 10)\n"
     "  --reach-mm D       how far a frame speaks alone at the end of a sweep (default "
-    "1)\n" FRAMES_HELP "  --json             print one JSON object\n"
+    "1)\n" FRAMES_HELP
+    "  --press MODEL      deform the picture as that thigh is deformed; its top lies on the skin\n"
+    "  --site K           with --press: number of the site\n"
+    "  --force-n F        with --press: settled force (0.01 to 200)\n"
+    "  --probe NAME       with --press: as of sonde press; default linear\n"
+    "  --case NAME        with --press: as of sonde press; default healthy\n"
+    "  --venous-mmhg P    with --press: pressure in the vein; default of the case\n"
+    "  --arterial-mmhg P  with --press: pressure in the artery; default of the case\n"
+    "  --vein-at X,Z      with --press: where the vein is in the picture, mm from the middle of "
+    "its\n"
+    "                     top; default where the model has it\n"
+    "  --json             print one JSON object\n"
     "  --help             this text\n";
 
 typedef struct arguments {
   const char *input, *output, *pose, *frame, *hold_out, *method, *size, *pixels, *gap, *reach;
   const char *stack;
   frames_options frames;
+  press_options press;
   bool compare, along_sweep, json, help, volume;
   double position_mm[3], quaternion[4], size_mm[2], frame_number;
   uint32_t width, height;
@@ -71,6 +83,7 @@ typedef struct work {
   double seconds;
   sonde_likeness likeness;
   bool compared;
+  press_result pressed;
 } work;
 
 static bool parse_pose(arguments *a) {
@@ -153,25 +166,21 @@ static int check(arguments *a) {
   if (a->compare && !a->hold_out) return app_usage_error(VERB, "--compare belongs to --hold-out");
   if (a->stack && (a->pose || a->compare))
     return app_usage_error(VERB, "--stack belongs to --frame or --hold-out, without --compare");
-  return parse_numbers(a) ? -1 : APP_BAD_INPUT;
+  if (a->press.model && (a->compare || a->stack))
+    return app_usage_error(VERB, "--press does not go with --compare or --stack");
+  return press_check(VERB, &a->press) && parse_numbers(a) ? -1 : APP_BAD_INPUT;
 }
 
 static int read_arguments(int argc, char **argv, arguments *a) {
-  const app_option options[] = {{"--pose", &a->pose, NULL},
-                                {"--frame", &a->frame, NULL},
-                                {"--hold-out", &a->hold_out, NULL},
-                                {"-o", &a->output, NULL},
-                                {"--method", &a->method, NULL},
-                                {"--size-mm", &a->size, NULL},
-                                {"--pixels", &a->pixels, NULL},
-                                {"--gap-mm", &a->gap, NULL},
-                                {"--reach-mm", &a->reach, NULL},
-                                {"--stack", &a->stack, NULL},
-                                FRAMES_OPTION_LIST(a->frames),
-                                {"--compare", NULL, &a->compare},
-                                {"--along-sweep", NULL, &a->along_sweep},
-                                {"--json", NULL, &a->json},
-                                {"--help", NULL, &a->help}};
+  const app_option options[] = {
+      {"--pose", &a->pose, NULL},         {"--frame", &a->frame, NULL},
+      {"--hold-out", &a->hold_out, NULL}, {"-o", &a->output, NULL},
+      {"--method", &a->method, NULL},     {"--size-mm", &a->size, NULL},
+      {"--pixels", &a->pixels, NULL},     {"--gap-mm", &a->gap, NULL},
+      {"--reach-mm", &a->reach, NULL},    {"--stack", &a->stack, NULL},
+      FRAMES_OPTION_LIST(a->frames),      PRESS_OPTION_LIST(a->press),
+      {"--compare", NULL, &a->compare},   {"--along-sweep", NULL, &a->along_sweep},
+      {"--json", NULL, &a->json},         {"--help", NULL, &a->help}};
   a->options = sonde_slicer_options_default();
   if (!app_take_options(VERB, argc, argv, options, sizeof options / sizeof *options, &a->input))
     return APP_BAD_INPUT;
@@ -260,6 +269,10 @@ static sonde_status write_picture(const arguments *a, work *w, sonde_error *erro
     free(real);
     if (status || a->compare) return status;
   }
+  if (a->press.model) {
+    sonde_status status = press_picture(VERB, &a->press, &w->image, w->known, &w->pressed, error);
+    if (status) return status;
+  }
   if (a->stack)
     return stack_figure(s, (uint32_t)a->stack_step, a->frame_number, &w->plane, &w->image,
                         a->output, error);
@@ -299,7 +312,7 @@ static sonde_status slice_volume(const arguments *a, work *w, sonde_error *error
   double start = app_seconds();
   w->reached = sonde_volume_slice(&w->volume, a->method_index == 1, &w->plane, &w->image, w->known);
   w->seconds = app_seconds() - start;
-  return sonde_image_save_png(&w->image, a->output, error);
+  return write_picture(a, w, error);
 }
 
 static void print_json(const arguments *a, const work *w, double share) {
@@ -321,6 +334,12 @@ static void print_json(const arguments *a, const work *w, double share) {
     app_json_real("ncc", w->likeness.ncc);
     app_json_real("ssim", w->likeness.ssim);
   }
+  if (a->press.model) {
+    app_json_real("force_n", w->pressed.force_n);
+    app_json_real("penetration_mm", w->pressed.depth_m * 1e3);
+    app_json_real("vein_area_ratio", w->pressed.vein_area_ratio);
+    app_json_real("artery_area_ratio", w->pressed.artery_area_ratio);
+  }
   app_json_text("image", a->output);
   app_json_end();
 }
@@ -338,6 +357,10 @@ static void print(const arguments *a, const work *w) {
     printf("against real  RMS %.2f, MAE %.2f grey levels, PSNR %.2f dB, NCC %.4f, SSIM %.4f\n",
            w->likeness.rms_grey, w->likeness.mae_grey, w->likeness.psnr_db, w->likeness.ncc,
            w->likeness.ssim);
+  if (a->press.model)
+    printf("pressed       %.2f N at %.2f mm, vein %.1f %% and artery %.1f %% of their rest area\n",
+           w->pressed.force_n, w->pressed.depth_m * 1e3, 100 * w->pressed.vein_area_ratio,
+           100 * w->pressed.artery_area_ratio);
   printf("written       %s\n", a->output);
 }
 

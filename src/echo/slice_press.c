@@ -12,7 +12,7 @@
 #include "echo/frames.h"
 #include "interior/interior.h"
 
-enum { NODE = 4, NODES = 64 }; // pixels between nodes; nodes held at once along a row
+enum { NODE = 2, NODES = 64 }; // pixels between nodes; nodes held at once along a row
 
 typedef struct job {
   const sonde_image *rest;
@@ -44,15 +44,23 @@ static void uncarry(const sonde_vessel_state *v, double *short_m, double *long_m
   *short_m = a * high / half[0], *long_m = b * high / half[1];
 }
 
+// Each vessel's part of the way back, weighted by the distance from the other's lumen: inside a
+// lumen the other vessel moves nothing, so that both keep the areas that the model gives them.
 static sonde_vec3 without_walls(const job *j, sonde_vec3 p) {
-  for (int k = j->vessel_count; k-- > 0;) { // the walls carried the vein's tissue first
+  sonde_vec3 back[2] = {{0}};
+  double outside[2] = {1, 1};
+  for (int k = 0; k < j->vessel_count; ++k) {
     const sonde_vessel_state *v = &j->vessels[k];
     sonde_vec3 d = v_sub(p, v->centre_m), across = v_cross(v->axis, v->flat_axis);
     double a = v_dot(d, v->flat_axis), b = v_dot(d, across), a0 = a, b0 = b;
     uncarry(v, &a0, &b0);
-    p = v_madd(v_madd(p, a0 - a, v->flat_axis), b0 - b, across);
+    back[k] = v_madd(v_scale(v->flat_axis, a0 - a), b0 - b, across);
+    outside[k] = fmax(hypot(a0, b0) - v->rest_radius_m, 0);
   }
-  return p;
+  double both = outside[0] + outside[1];
+  if (j->vessel_count == 1) return v_add(p, back[0]);
+  if (j->vessel_count == 0 || !(both > 0)) return p;
+  return v_madd(v_madd(p, outside[1] / both, back[0]), outside[0] / both, back[1]);
 }
 
 // Middle of pixel 0 to middle of the last one spans the size less one pixel.

@@ -1,0 +1,160 @@
+// A picture of the thigh at rest, pressed with the mechanical model.
+//
+// press_check      options
+// settle, seek     the depth at which the settled force is the wanted one
+// place            where the picture lies on the model
+// deform           interior and picture
+// press_picture
+#include "frames_press.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double DEEPEST_M = 0.06, STEP_M = 2e-3, COARSE = 1e-6;
+
+typedef struct work {
+  sonde_model *model;
+  sonde_state *state;
+  sonde_interior *interior;
+  sonde_probe probe;
+  sonde_pathology pathology;
+  const sonde_site *site;
+  sonde_pose pose;
+  double force_n, target_n, depth_m, at_mm[2];
+} work;
+
+static bool parse(const char *verb, const press_options *o, long *site, work *w) {
+  double venous = 10, arterial = 95;
+  return (!o->site || app_parse_integer(verb, "--site", o->site, 0, 1000000, site)) &&
+         (!o->force || app_parse_real(verb, "--force-n", o->force, 0.01, 200, &w->target_n)) &&
+         (!o->venous || app_parse_real(verb, "--venous-mmhg", o->venous, 0.1, 200, &venous)) &&
+         (!o->arterial || app_parse_real(verb, "--arterial-mmhg", o->arterial, 1, 300, &arterial));
+}
+
+bool press_check(const char *verb, const press_options *o) {
+  bool any =
+      o->site || o->force || o->probe || o->pathology || o->venous || o->arterial || o->vein_at;
+  work w = {0};
+  long site = 0;
+  if (!o->model && !any) return true;
+  if (!o->model || !o->site || !o->force) {
+    app_usage_error(verb, "--press MODEL, --site K and --force-n F belong together");
+    return false;
+  }
+  if (o->vein_at && !frames_numbers(o->vein_at, 2, ',', w.at_mm)) {
+    app_usage_error(verb, "--vein-at expects X,Z in mm, got '%s'", o->vein_at);
+    return false;
+  }
+  return parse(verb, o, &site, &w);
+}
+
+static void settle(work *w, double depth_m) {
+  w->depth_m = depth_m;
+  w->pose = sonde_site_pose(w->site, depth_m);
+  sonde_settle(w->state, &w->probe, w->pose, COARSE, 400);
+  sonde_vec3 f = sonde_state_contact(w->state)->force_n, n = w->site->normal;
+  w->force_n = f.x * n.x + f.y * n.y + f.z * n.z;
+}
+
+// The settled force grows with depth: step out to a bracket, then halve it.
+static sonde_status seek(work *w, sonde_error *error) {
+  double low = 0, high = 0;
+  while (w->force_n < w->target_n && high < DEEPEST_M) {
+    low = high, high += STEP_M;
+    settle(w, high);
+  }
+  for (int k = 0; k < 40 && fabs(w->force_n - w->target_n) > 1e-3 * w->target_n; ++k) {
+    settle(w, 0.5 * (low + high));
+    *(w->force_n < w->target_n ? &low : &high) = w->depth_m;
+  }
+  if (fabs(w->force_n - w->target_n) <= 5e-3 * w->target_n) return SONDE_OK;
+  return frames_fail(error, SONDE_CONVERGENCE, "%g N was not reached: %g N at %g mm", w->target_n,
+                     w->force_n, w->depth_m * 1e3);
+}
+
+static sonde_status prepare(const char *verb, const press_options *o, work *w, sonde_error *error) {
+  long site = 0;
+  sonde_status status =
+      sonde_pathology_preset(o->pathology ? o->pathology : "healthy", &w->pathology, error);
+  if (!status) status = sonde_probe_create(o->probe ? o->probe : "linear", &w->probe, error);
+  if (!status) status = sonde_model_load(o->model, &w->model, error);
+  if (status) return status;
+  (void)parse(verb, o, &site, w);
+  if (o->venous) w->pathology.venous_pressure_pa = atof(o->venous) * 133.322387415;
+  if (o->arterial) w->pathology.arterial_pressure_pa = atof(o->arterial) * 133.322387415;
+  w->site = sonde_model_site(w->model, (uint32_t)site);
+  if (!w->site)
+    return frames_fail(error, SONDE_NOT_FOUND, "%.300s: no site %ld, the model has %u sites",
+                       o->model, site, w->model->site_count);
+  sonde_world_def world = sonde_world_def_default();
+  status = sonde_state_create(w->model, &world, &w->state, error);
+  return status ? status : sonde_interior_create(w->model, &w->interior, error);
+}
+
+// Rest vein of the model -> the place of the vein in the picture.
+static sonde_status place(const press_options *o, const work *w, sonde_image_press *press,
+                          sonde_error *error) {
+  sonde_vessel_state vein;
+  if (!o->vein_at) return SONDE_OK;
+  if (!sonde_interior_vessel_at_plane(w->interior, 0, press->rest_pose, &vein))
+    return frames_fail(error, SONDE_MISMATCH, "--vein-at: the model's vein is not under site %s",
+                       o->site);
+  double at_mm[2];
+  (void)frames_numbers(o->vein_at, 2, ',', at_mm);
+  const sonde_vec3 c = vein.rest_centre_m, p = press->rest_pose.position;
+  const sonde_quat q = press->rest_pose.rotation;
+  // Axes of the probe in the world: x across the beam, z along it.
+  double x[3] = {1 - 2 * (q.y * q.y + q.z * q.z), 2 * (q.x * q.y + q.w * q.z),
+                 2 * (q.x * q.z - q.w * q.y)};
+  double z[3] = {2 * (q.x * q.z + q.w * q.y), 2 * (q.y * q.z - q.w * q.x),
+                 1 - 2 * (q.x * q.x + q.y * q.y)};
+  double d[3] = {c.x - p.x, c.y - p.y, c.z - p.z};
+  press->shift_m[0] = at_mm[0] * 1e-3 - (d[0] * x[0] + d[1] * x[1] + d[2] * x[2]);
+  press->shift_m[1] = at_mm[1] * 1e-3 - (d[0] * z[0] + d[1] * z[1] + d[2] * z[2]);
+  return SONDE_OK;
+}
+
+static void update(work *w) {
+  sonde_interior_update(w->interior,
+                        &(sonde_interior_input){sonde_state_positions(w->state),
+                                                sonde_state_contact_forces(w->state), w->pose,
+                                                &w->pathology, -1, sonde_state_tick(w->state),
+                                                w->probe.half_x_m, w->probe.half_y_m});
+}
+
+static sonde_status deform(const press_options *o, work *w, sonde_image *image, uint8_t *known,
+                           press_result *r, sonde_error *error) {
+  sonde_image_press press = {.interior = w->interior, .rest_pose = sonde_site_pose(w->site, 0)};
+  sonde_image out;
+  update(w); // at rest
+  sonde_status status = place(o, w, &press, error);
+  if (!status) status = seek(w, error);
+  if (!status) status = sonde_image_create(image->width, image->height, &out, error);
+  if (status) return status;
+  update(w);
+  out.width_m = image->width_m, out.height_m = image->height_m;
+  press.pose = w->pose;
+  sonde_image_pressed(image, &press, &out, known);
+  memcpy(image->pixels, out.pixels, (size_t)image->width * image->height);
+  sonde_image_clear(&out);
+  sonde_vessel_state v;
+  *r = (press_result){w->force_n, w->depth_m, NAN, NAN};
+  if (sonde_interior_vessel_at_plane(w->interior, 0, w->pose, &v))
+    r->vein_area_ratio = v.area_ratio;
+  if (sonde_interior_vessel_at_plane(w->interior, 1, w->pose, &v))
+    r->artery_area_ratio = v.area_ratio;
+  return SONDE_OK;
+}
+
+sonde_status press_picture(const char *verb, const press_options *o, sonde_image *image,
+                           uint8_t *known, press_result *result, sonde_error *error) {
+  work w = {0};
+  sonde_status status = prepare(verb, o, &w, error);
+  if (!status) status = deform(o, &w, image, known, result, error);
+  sonde_interior_destroy(w.interior);
+  sonde_state_destroy(w.state);
+  sonde_probe_clear(&w.probe);
+  sonde_model_destroy(w.model);
+  return status;
+}
