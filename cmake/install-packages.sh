@@ -44,6 +44,8 @@ test_packages() {
   fi
   has chromium || has google-chrome || missing+=(chromium)
   need_command mandoc mandoc
+  need_command teem-unu teem-apps
+  installed python3-vtk9 || missing+=(python3-vtk9) # reads MetaImage and NRRD files as others do
 }
 
 check_node() {

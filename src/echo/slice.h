@@ -32,7 +32,6 @@ typedef struct slice_bank {
   size_t stride[SLICE_LEVELS];
   uint32_t used, *frames; // [used] with a pose
   slice_likeness *pairs;  // [used][SLICE_LAGS + 1]
-  float base;             // mean grey, taken off the coarsest scale
 } slice_bank;
 
 // r(d) = exp(-(d/length)^power)

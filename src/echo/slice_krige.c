@@ -35,6 +35,7 @@ enum { STILL = 3 }; // grey levels
 enum { MOST_POINTS = 16000, FEWEST_POINTS = 1000, ALL_POINTS = 1200000 };
 
 static const double SHORTEST_M = 2e-5, LONGEST_M = 20, FIRST_POWER = 0.3, POWER_STEP = 0.1;
+static const float MIDDLE = 128;    // grey level that the coarsest scale is counted from
 static const double ORDER_M = 1e-3; // one frame, where distance goes by number
 
 typedef slice_decay decay;
@@ -139,7 +140,7 @@ static void scales_at(const slice_bank *bank, uint32_t frame, float u, float v,
     scales[k - 1] = finer - level;
     finer = level;
   }
-  scales[SLICE_LEVELS - 1] = finer - bank->base;
+  scales[SLICE_LEVELS - 1] = finer - MIDDLE;
 }
 
 static sonde_vec3 middle(const sonde_sequence *s, uint32_t frame) {
@@ -218,15 +219,6 @@ static void compare(const slice_bank *bank, slice_likeness *pair) {
       pair->mean[way][k] = count[way] > 0 ? (float)(sum[way][k] / count[way]) : 0;
 }
 
-static void mean_grey(slice_bank *bank) {
-  const int k = SLICE_LEVELS - 1;
-  double sum = 0, count = 0;
-  for (uint32_t i = 0; i < bank->sequence->count; ++i)
-    for (size_t p = 0; bank->sequence->frames[i].used && p < bank->stride[k] * bank->high[k]; ++p)
-      sum += bank->pyramids[i].level[k][p] * bank->shares[k][p], count += bank->shares[k][p];
-  bank->base = count > 0 ? (float)(sum / count) : 0;
-}
-
 // Every frame with itself and the next LAGS.
 static sonde_status measure_pairs(slice_bank *bank, sonde_error *error) {
   const sonde_sequence *s = bank->sequence;
@@ -273,7 +265,6 @@ static sonde_status build_pyramids(slice_bank *bank, sonde_error *error) {
   }
   for (uint32_t i = 0, n = 0; i < s->count; ++i)
     if (s->frames[i].used) build_pyramid(bank, i, bank->levels + bytes * n++);
-  mean_grey(bank);
   return SONDE_OK;
 }
 
