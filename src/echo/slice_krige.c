@@ -343,10 +343,10 @@ static double likeness_at(const decay *d, double distance_m) {
 // Of the variogram, relative as Cressie weighs it: short distances, where frames are most alike,
 // count as much as long ones.
 static double misfit(const bin bins[BINS], const decay *d) {
-  double sum = 0;
+  double sum = 0, log_m = log(d->length_m);
   for (int i = 0; i < BINS; ++i) {
     if (!(bins[i].weight > 0)) continue;
-    double unlike = -expm1(-exp(d->power * (bins[i].log_m - log(d->length_m))));
+    double unlike = -expm1(-exp(d->power * (bins[i].log_m - log_m)));
     double error = (1 - bins[i].likeness) / fmax(unlike, 1e-6) - 1;
     sum += bins[i].weight * error * error;
   }
