@@ -78,6 +78,16 @@ SONDE_API sonde_status sonde_interior_create(const sonde_model *model, sonde_int
                                              sonde_error *error);
 SONDE_API void sonde_interior_destroy(sonde_interior *interior);
 
+/** How the inside follows the skin. */
+typedef enum sonde_interior_method {
+  SONDE_INTERIOR_SOLID,  /**< finite elements around the probe; columns until they are factored */
+  SONDE_INTERIOR_COLUMNS /**< divergence-free column field only */
+} sonde_interior_method;
+/** Method of the following updates; SOLID after a creation. @thread owner */
+SONDE_API void sonde_interior_set_method(sonde_interior *interior, sonde_interior_method method);
+/** Method that the last update used. @thread any */
+SONDE_API sonde_interior_method sonde_interior_used_method(const sonde_interior *interior);
+
 /** What one update reads; all borrowed for the call. */
 typedef struct sonde_interior_input {
   const sonde_vec3 *positions_m;      /**< [nodes] deformed skin */
@@ -95,6 +105,14 @@ SONDE_API void sonde_interior_update(sonde_interior *interior, const sonde_inter
 
 /** Displacement (m) of the rest point, zero outside and in bone. After an update. @thread any */
 SONDE_API sonde_vec3 sonde_interior_displacement(const sonde_interior *interior, sonde_vec3 rest_m);
+/** The same for many points. @param rest_m,out_m [count] @thread any */
+SONDE_API void sonde_interior_displacements(const sonde_interior *interior, uint32_t count,
+                                            const sonde_vec3 *rest_m, sonde_vec3 *out_m);
+/** Cauchy stress (Pa, tension positive, world axes) at a rest point, scaled so that the solid's
+ *  reaction is the contact force; without vessels. @return false (zero stress) where the solid does
+ *  not reach: no contact, outside the leg or its window, in bone. @thread any */
+SONDE_API bool sonde_interior_stress(const sonde_interior *interior, sonde_vec3 rest_m,
+                                     sonde_mat3 *stress);
 /** Rest point that is now at `point` (fixed-point inversion). @thread any */
 SONDE_API sonde_vec3 sonde_interior_rest_point(const sonde_interior *interior, sonde_vec3 point_m);
 /** Static tissue label and depth below the skin of a rest point. @thread any */

@@ -19,6 +19,7 @@
 // sonde_interior_label         tissue
 #include "base/base.h"
 #include "interior/interior.h"
+#include "interior/window.h"
 
 #include <string.h>
 
@@ -127,8 +128,7 @@ static stencil stencil_at(const sonde_interior *in, double i, double j) {
   ((double)((st).w[0] * (st).f[0]->member + (st).w[1] * (st).f[1]->member +                        \
             (st).w[2] * (st).f[2]->member + (st).w[3] * (st).f[3]->member))
 
-sonde_vec3 sonde_interior_field(const sonde_interior *in, sonde_vec3 rest) {
-  polar q = to_polar(in, rest);
+static sonde_vec3 column_field(const sonde_interior *in, polar q) {
   double i = q.theta / in->theta_step, j = (q.s - in->s_first_m) / in->s_step_m;
   stencil at = stencil_at(in, i, j);
   stencil mid_i = stencil_at(in, i - 0.5, j), mid_j = stencil_at(in, i, j - 0.5);
@@ -148,13 +148,33 @@ sonde_vec3 sonde_interior_field(const sonde_interior *in, sonde_vec3 rest) {
   return v_madd(u, density * shift, in->axis);
 }
 
+sonde_vec3 sonde_interior_column_field(const sonde_interior *in, sonde_vec3 rest) {
+  return column_field(in, to_polar(in, rest));
+}
+
+// Beyond the ends of the window the solid is at rest.
+sonde_vec3 sonde_interior_field(const sonde_interior *in, sonde_vec3 rest) {
+  polar q = to_polar(in, rest);
+  if (!in->solid) return column_field(in, q);
+  double u[3];
+  (void)sonde_window_field(in->live, q.theta, q.s, q.r, u);
+  return v_madd(v_madd(v_scale(in->e1, u[0]), u[1], in->e2), u[2], in->axis);
+}
+
+void sonde_interior_column(const sonde_interior *in, double theta, double s,
+                           sonde_column_point *at) {
+  stencil st = stencil_at(in, theta / in->theta_step, (s - in->s_first_m) / in->s_step_m);
+  at->theta = theta, at->s = s, at->depth_m = 0;
+  at->r = at->radius_m = BLEND(st, radius_m);
+  at->cosine = BLEND(st, cosine);
+  at->fat_m = BLEND(st, fat_m), at->muscle_m = BLEND(st, muscle_m);
+}
+
 bool sonde_interior_locate(const sonde_interior *in, sonde_vec3 rest, sonde_column_point *at) {
   polar q = to_polar(in, rest);
-  stencil st = stencil_at(in, q.theta / in->theta_step, (q.s - in->s_first_m) / in->s_step_m);
-  at->theta = q.theta, at->s = q.s, at->r = q.r;
-  at->radius_m = BLEND(st, radius_m);
-  at->depth_m = (at->radius_m - q.r) * BLEND(st, cosine);
-  at->fat_m = BLEND(st, fat_m), at->muscle_m = BLEND(st, muscle_m);
+  sonde_interior_column(in, q.theta, q.s, at);
+  at->r = q.r;
+  at->depth_m = (at->radius_m - q.r) * at->cosine;
   return q.s >= in->s_low_m && q.s <= in->s_high_m;
 }
 
@@ -164,6 +184,24 @@ sonde_vec3 sonde_interior_displacement(const sonde_interior *in, sonde_vec3 rest
   if (!in->ready || !sonde_interior_locate(in, rest, &at)) return vec3(0, 0, 0);
   if (at.depth_m < 0 || at.r <= in->bone_radius_m) return vec3(0, 0, 0);
   return sonde_interior_field(in, rest);
+}
+
+void sonde_interior_displacements(const sonde_interior *in, uint32_t count,
+                                  const sonde_vec3 *rest, sonde_vec3 *out) {
+  SONDE_ASSERT(in != NULL && (count == 0 || (rest != NULL && out != NULL)));
+  for (uint32_t i = 0; i < count; ++i) out[i] = sonde_interior_displacement(in, rest[i]);
+}
+
+bool sonde_interior_stress(const sonde_interior *in, sonde_vec3 rest, sonde_mat3 *stress) {
+  SONDE_ASSERT(in != NULL && stress != NULL);
+  sonde_column_point at;
+  *stress = m_zero();
+  if (!in->ready || !in->solid || !sonde_interior_locate(in, rest, &at)) return false;
+  if (at.depth_m < 0 || at.r <= in->bone_radius_m) return false;
+  sonde_mat3 local, world_from_leg = m_columns(in->e1, in->e2, in->axis);
+  if (!sonde_window_stress(in->live, at.theta, at.s, at.r, &local)) return false;
+  *stress = m_mul(world_from_leg, m_mul(local, m_transpose(world_from_leg)));
+  return true;
 }
 
 // Fixed point q <- q - (q + u(q) - p). Where the map contracts strongly the plain step would

@@ -4,6 +4,7 @@
 // sonde_interior_destroy
 #include "base/base.h"
 #include "interior/interior.h"
+#include "interior/window.h"
 
 static sonde_status check_model(const sonde_model *model, sonde_error *error) {
   if (model == NULL || model->surface.face_count == 0)
@@ -25,6 +26,8 @@ sonde_status sonde_interior_create(const sonde_model *model, sonde_interior **in
   status = sonde_pathology_preset("healthy", &made->pathology, error);
   if (status == SONDE_OK) status = sonde_columns_create(made, error);
   if (status == SONDE_OK) status = sonde_stations_create(made, error);
+  if (status == SONDE_OK) status = sonde_window_create(&made->live, error);
+  if (status == SONDE_OK) status = sonde_window_create(&made->next, error);
   if (status == SONDE_OK)
     *interior = made;
   else
@@ -34,6 +37,8 @@ sonde_status sonde_interior_create(const sonde_model *model, sonde_interior **in
 
 void sonde_interior_destroy(sonde_interior *interior) {
   if (interior == NULL) return;
+  sonde_window_destroy(interior->live);
+  sonde_window_destroy(interior->next);
   sonde_surface_index_destroy(interior->skin);
   sonde_ldl_destroy(interior->ldl);
   sonde_free(interior->column);
@@ -41,4 +46,14 @@ void sonde_interior_destroy(sonde_interior *interior) {
   sonde_free(interior->potential);
   sonde_free(interior->scratch);
   sonde_free(interior);
+}
+
+void sonde_interior_set_method(sonde_interior *interior, sonde_interior_method method) {
+  SONDE_ASSERT(interior != NULL && method <= SONDE_INTERIOR_COLUMNS);
+  interior->method = method;
+}
+
+sonde_interior_method sonde_interior_used_method(const sonde_interior *interior) {
+  SONDE_ASSERT(interior != NULL);
+  return interior->solid ? SONDE_INTERIOR_SOLID : SONDE_INTERIOR_COLUMNS;
 }

@@ -37,7 +37,10 @@ typedef struct sonde_column_point {
   double theta, s, r;
   double radius_m, depth_m; // of the column's skin; depth along the skin normal, < 0 outside
   double fat_m, muscle_m;
+  double cosine; // between column and skin normal: depth over distance along the column
 } sonde_column_point;
+
+struct sonde_window;
 
 // A vessel's constant station.
 typedef struct sonde_station {
@@ -59,6 +62,10 @@ struct sonde_interior {
   sonde_column_field *field; // same shape
   sonde_ldl *ldl;
   double *potential, *scratch;
+  struct sonde_window *live, *next; // the solid in use and the one that is being factored
+  bool building;                    // next has a place and is not ready
+  bool solid;                       // the last update was solved by the solid
+  sonde_interior_method method;
   uint32_t station_count[2];
   sonde_station station[2][SONDE_STATIONS];
   sonde_vessel_state state[2][SONDE_STATIONS];
@@ -67,6 +74,11 @@ struct sonde_interior {
   uint64_t tick;
 };
 
+// Facts of the column at angle theta and row s; r and depth_m of its skin. @thread any
+void sonde_interior_column(const sonde_interior *interior, double theta, double s,
+                           sonde_column_point *at);
+// Displacement of the column field, whatever the method. @thread any
+sonde_vec3 sonde_interior_column_field(const sonde_interior *interior, sonde_vec3 rest_m);
 // Displacement anywhere; outside the skin it continues with the skin's. @thread any
 sonde_vec3 sonde_interior_field(const sonde_interior *interior, sonde_vec3 rest_m);
 // Inversion of the field from a first guess; *error_m receives the last correction. @thread any
@@ -86,6 +98,8 @@ void sonde_vessel_carry(const sonde_vessel_state *state, double *short_m, double
 // Stages of an update.
 void sonde_interior_solve(sonde_interior *interior, const sonde_vec3 *positions_m);
 void sonde_interior_vessels(sonde_interior *interior, const sonde_interior_input *input);
+// Keeps a factored window under the probe and solves it; false when the columns have to do.
+bool sonde_interior_follow(sonde_interior *interior, const sonde_interior_input *input);
 
 // Stages of a creation.
 sonde_status sonde_columns_create(sonde_interior *interior, sonde_error *error);

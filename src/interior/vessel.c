@@ -147,7 +147,8 @@ void sonde_interior_update(sonde_interior *in, const sonde_interior_input *input
   SONDE_ASSERT(in != NULL && input != NULL && input->pathology != NULL);
   SONDE_ASSERT(input->positions_m != NULL && input->contact_forces_n != NULL);
   in->pathology = *input->pathology;
-  sonde_interior_solve(in, input->positions_m);
+  in->solid = sonde_interior_follow(in, input);
+  if (!in->solid) sonde_interior_solve(in, input->positions_m);
   sonde_interior_vessels(in, input);
   in->tick = input->tick;
   in->ready = true;

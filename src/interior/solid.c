@@ -1,0 +1,242 @@
+// Elements of the solid: eight nodes, mean dilatation, a membrane for the skin.
+//
+// The shape change is integrated at 2x2x2 points, the volume change once per element (Nagtegaal,
+// Parks and Rice 1974): with both at all points eight incompressibility conditions per element
+// would leave no motion.
+//
+// sonde_solid_connect   numbers of the unknowns, order, analysis
+// gradients             of the eight shape functions at a point
+// add_point             shape change at one integration point
+// add_volume            mean dilatation
+// add_skin              in-plane stiffness of the outer face
+// sonde_solid_stress    mean over the element
+#include "interior/solid.h"
+
+#include "base/base.h"
+
+#include <string.h>
+
+static const double gauss = 0.57735026918962576;
+static const double sign[8][3] = {{-1, -1, -1}, {1, -1, -1}, {1, 1, -1}, {-1, 1, -1},
+                                  {-1, -1, 1},  {1, -1, 1},  {1, 1, 1},  {-1, 1, 1}};
+
+sonde_status sonde_solid_allocate(sonde_solid *s, uint32_t nodes, uint32_t hexes,
+                                  sonde_error *error) {
+  SONDE_ASSERT(s != NULL && nodes > 0 && hexes > 0);
+  *s = (sonde_solid){.node_count = nodes, .hex_count = hexes};
+  s->node = SONDE_NEW(sonde_vec3, nodes);
+  s->hex = SONDE_NEW(sonde_solid_hex, hexes);
+  s->unknown = SONDE_NEW(uint32_t, nodes);
+  s->held = SONDE_NEW(unsigned char, nodes);
+  s->corner = (uint32_t(*)[8])sonde_calloc(hexes, sizeof *s->corner);
+  s->x = SONDE_NEW(float, 3 * (size_t)nodes);
+  bool all = s->node && s->hex && s->unknown && s->held && s->corner && s->x;
+  return all ? SONDE_OK : sonde_fail_memory(error);
+}
+
+void sonde_solid_clear(sonde_solid *s) {
+  void *parts[] = {s->node, s->hex, s->unknown, s->held, s->corner, s->x};
+  for (size_t i = 0; i < SONDE_COUNT_OF(parts); ++i) sonde_free(parts[i]);
+  sonde_fronts_destroy(s->fronts);
+  *s = (sonde_solid){0};
+}
+
+sonde_status sonde_solid_connect(sonde_solid *s, const unsigned char *last,
+                                 const sonde_vec3 *points, sonde_error *error) {
+  SONDE_ASSERT(s->fronts == NULL && last != NULL);
+  uint32_t count = 0, free_count = 0;
+  for (int pass = 0; pass < 2; ++pass) {
+    for (uint32_t i = 0; i < s->node_count; ++i)
+      if (s->held[i] == 7)
+        s->unknown[i] = SONDE_FRONT_NONE;
+      else if ((last[i] != 0) == (pass == 1))
+        s->unknown[i] = count++;
+    if (pass == 0) free_count = count;
+  }
+  s->unknown_count = count, s->last_count = count - free_count;
+  for (uint32_t h = 0; h < s->hex_count; ++h)
+    for (int c = 0; c < 8; ++c) s->corner[h][c] = s->unknown[s->hex[h].node[c]];
+  sonde_vec3 *place = SONDE_NEW(sonde_vec3, count + 1);
+  if (!place) return sonde_fail_memory(error);
+  for (uint32_t i = 0; i < s->node_count; ++i)
+    if (s->unknown[i] != SONDE_FRONT_NONE) place[s->unknown[i]] = (points ? points : s->node)[i];
+  sonde_fronts_def def = {count, s->last_count, place, s->hex_count,
+                          (const uint32_t(*)[8])s->corner};
+  sonde_status status = sonde_fronts_create(&def, &s->fronts, error);
+  sonde_free(place);
+  return status;
+}
+
+// ---- element ------------------------------------------------------------------------------
+
+// Gradients of the shape functions at local (a, b, c); returns |det J|.
+static double gradients(const sonde_solid *s, const sonde_solid_hex *h, double a, double b,
+                        double c, sonde_vec3 g[8]) {
+  sonde_vec3 local[8], j[3] = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
+  for (int n = 0; n < 8; ++n) {
+    double x = 1 + sign[n][0] * a, y = 1 + sign[n][1] * b, z = 1 + sign[n][2] * c;
+    local[n] = vec3(sign[n][0] * y * z / 8, x * sign[n][1] * z / 8, x * y * sign[n][2] / 8);
+    sonde_vec3 p = s->node[h->node[n]];
+    j[0] = v_madd(j[0], local[n].x, p);
+    j[1] = v_madd(j[1], local[n].y, p);
+    j[2] = v_madd(j[2], local[n].z, p);
+  }
+  double det = v_dot(j[0], v_cross(j[1], j[2]));
+  sonde_vec3 dual[3] = {v_scale(v_cross(j[1], j[2]), 1 / det), v_scale(v_cross(j[2], j[0]), 1 / det),
+                        v_scale(v_cross(j[0], j[1]), 1 / det)};
+  for (int n = 0; n < 8; ++n) {
+    g[n] = v_scale(dual[0], local[n].x);
+    g[n] = v_madd(g[n], local[n].y, dual[1]);
+    g[n] = v_madd(g[n], local[n].z, dual[2]);
+  }
+  return fabs(det);
+}
+
+static void to_array(const sonde_vec3 g[8], double d[8][3]) {
+  for (int n = 0; n < 8; ++n) d[n][0] = g[n].x, d[n][1] = g[n].y, d[n][2] = g[n].z;
+}
+
+static void add_point(const sonde_vec3 g[8], double shear, double bulk, double (*k)[24]) {
+  double d[8][3];
+  to_array(g, d);
+  for (int a = 0; a < 8; ++a)
+    for (int b = 0; b < 8; ++b) {
+      double dot = shear * v_dot(g[a], g[b]);
+      for (int i = 0; i < 3; ++i) {
+        for (int j = 0; j < 3; ++j)
+          k[3 * a + i][3 * b + j] +=
+              shear * d[a][j] * d[b][i] + (bulk - 2 * shear / 3) * d[a][i] * d[b][j];
+        k[3 * a + i][3 * b + i] += dot;
+      }
+    }
+}
+
+static void add_volume(const sonde_vec3 mean[8], double bulk, double (*k)[24]) {
+  double d[24];
+  for (int n = 0; n < 8; ++n)
+    d[3 * n] = mean[n].x, d[3 * n + 1] = mean[n].y, d[3 * n + 2] = mean[n].z;
+  for (int i = 0; i < 24; ++i)
+    for (int j = 0; j < 24; ++j) k[i][j] += bulk * d[i] * d[j];
+}
+
+// Gradients of the four corner functions in the plane of the outer face; returns the area density.
+static double face_gradients(const sonde_solid *s, const sonde_solid_hex *h, double a, double b,
+                             sonde_vec3 g[4], sonde_vec3 *normal) {
+  sonde_vec3 t[2] = {{0, 0, 0}, {0, 0, 0}};
+  double local[4][2];
+  for (int n = 0; n < 4; ++n) {
+    local[n][0] = sign[n][0] * (1 + sign[n][1] * b) / 4;
+    local[n][1] = (1 + sign[n][0] * a) * sign[n][1] / 4;
+    for (int k = 0; k < 2; ++k) t[k] = v_madd(t[k], local[n][k], s->node[h->node[n]]);
+  }
+  sonde_vec3 cross = v_cross(t[0], t[1]);
+  double area = v_norm(cross);
+  *normal = v_scale(cross, 1 / area);
+  sonde_vec3 dual[2] = {v_scale(v_cross(t[1], *normal), 1 / area),
+                        v_scale(v_cross(*normal, t[0]), 1 / area)};
+  for (int n = 0; n < 4; ++n)
+    g[n] = v_madd(v_scale(dual[0], local[n][0]), local[n][1], dual[1]);
+  return area;
+}
+
+// Plane stress of an incompressible sheet: energy mu t (e:e + (tr e)^2).
+static void add_skin(const sonde_solid *s, const sonde_solid_hex *h, double a, double b,
+                     double (*k)[24]) {
+  sonde_vec3 g[4], normal;
+  double weight = h->skin_n_m * face_gradients(s, h, a, b, g, &normal), d[4][3];
+  sonde_mat3 plane = m_rank1(normal, -1, 1);
+  for (int n = 0; n < 4; ++n) d[n][0] = g[n].x, d[n][1] = g[n].y, d[n][2] = g[n].z;
+  for (int p = 0; p < 4; ++p)
+    for (int q = 0; q < 4; ++q)
+      for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j)
+          k[3 * p + i][3 * q + j] += weight * (v_dot(g[p], g[q]) * plane.m[i][j] +
+                                               d[p][j] * d[q][i] + 2 * d[p][i] * d[q][j]);
+}
+
+static void hold(const sonde_solid *s, const sonde_solid_hex *h, double (*k)[24]) {
+  for (int n = 0; n < 8; ++n)
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!(s->held[h->node[n]] >> axis & 1)) continue;
+      int row = 3 * n + axis;
+      for (int i = 0; i < 24; ++i)
+        if (i != row) k[row][i] = k[i][row] = 0;
+    }
+}
+
+void sonde_solid_matrix(const void *user, uint32_t hex, double (*k)[24]) {
+  const sonde_solid *s = user;
+  SONDE_ASSERT(hex < s->hex_count);
+  const sonde_solid_hex *h = &s->hex[hex];
+  sonde_vec3 g[8], mean[8];
+  double volume = 0;
+  memset(k, 0, 24 * sizeof *k);
+  memset(mean, 0, sizeof mean);
+  for (int p = 0; p < 8; ++p) {
+    double w = gradients(s, h, gauss * sign[p][0], gauss * sign[p][1], gauss * sign[p][2], g);
+    add_point(g, w * h->shear_pa, s->plain ? w * h->bulk_pa : 0, k);
+    for (int n = 0; n < 8; ++n) mean[n] = v_madd(mean[n], w, g[n]);
+    volume += w;
+  }
+  if (!s->plain) add_volume(mean, h->bulk_pa / volume, k);
+  for (int p = 0; p < 4 && h->skin_n_m > 0; ++p)
+    add_skin(s, h, gauss * sign[p][0], gauss * sign[p][1], k);
+  hold(s, h, k);
+}
+
+bool sonde_solid_factor(sonde_solid *s) {
+  SONDE_ASSERT(s->fronts != NULL);
+  sonde_fronts_begin(s->fronts);
+  while (!sonde_fronts_step(s->fronts, sonde_solid_matrix, s, UINT64_MAX)) {}
+  return !sonde_fronts_failed(s->fronts);
+}
+
+// ---- reading ------------------------------------------------------------------------------
+
+sonde_vec3 sonde_solid_moved(const sonde_solid *s, uint32_t node) {
+  SONDE_ASSERT(node < s->node_count);
+  uint32_t at = s->unknown[node];
+  if (at == SONDE_FRONT_NONE) return vec3(0, 0, 0);
+  const float *x = s->x + 3 * (size_t)at;
+  return vec3((double)x[0], (double)x[1], (double)x[2]);
+}
+
+sonde_mat3 sonde_solid_stress(const sonde_solid *s, uint32_t hex) {
+  SONDE_ASSERT(hex < s->hex_count);
+  const sonde_solid_hex *h = &s->hex[hex];
+  sonde_vec3 g[8];
+  (void)gradients(s, h, 0, 0, 0, g);
+  sonde_mat3 grad = m_zero();
+  for (int n = 0; n < 8; ++n) {
+    sonde_vec3 u = sonde_solid_moved(s, h->node[n]);
+    double ua[3] = {u.x, u.y, u.z}, ga[3] = {g[n].x, g[n].y, g[n].z};
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) grad.m[i][j] += ua[i] * ga[j];
+  }
+  double trace = grad.m[0][0] + grad.m[1][1] + grad.m[2][2];
+  sonde_mat3 stress = m_scale(m_add(grad, m_transpose(grad)), h->shear_pa);
+  for (int i = 0; i < 3; ++i) stress.m[i][i] += (h->bulk_pa - 2 * h->shear_pa / 3) * trace;
+  return stress;
+}
+
+// Six tetrahedra about the diagonal 0-6.
+static double volume_of(const sonde_vec3 p[8]) {
+  static const int round[6][2] = {{1, 2}, {2, 3}, {3, 7}, {7, 4}, {4, 5}, {5, 1}};
+  double sum = 0;
+  sonde_vec3 d = v_sub(p[6], p[0]);
+  for (int k = 0; k < 6; ++k)
+    sum += v_dot(d, v_cross(v_sub(p[round[k][0]], p[0]), v_sub(p[round[k][1]], p[0])));
+  return sum / 6;
+}
+
+double sonde_solid_dilatation(const sonde_solid *s, uint32_t hex, double *rest_m3) {
+  SONDE_ASSERT(hex < s->hex_count);
+  sonde_vec3 rest[8], now[8];
+  for (int n = 0; n < 8; ++n) {
+    rest[n] = s->node[s->hex[hex].node[n]];
+    now[n] = v_add(rest[n], sonde_solid_moved(s, s->hex[hex].node[n]));
+  }
+  double volume = volume_of(rest);
+  if (rest_m3 != NULL) *rest_m3 = fabs(volume);
+  return volume_of(now) / volume - 1;
+}

@@ -1,0 +1,75 @@
+// The solid of a leg: a ring of elements from the femur to the skin, fine under the probe, growing
+// away from it. Its topology never changes; placing it somewhere else gives it new corners and new
+// numbers on the same pattern.
+//
+// Under the contact the skin's displacement is prescribed; everywhere else the skin is free and
+// follows from equilibrium. The solid knows the compliance of the skin nodes near the probe, finds
+// the forces that move the touched points as prescribed and recovers the inside from them.
+#ifndef SONDE_SRC_WINDOW_H
+#define SONDE_SRC_WINDOW_H
+
+#include "interior/interior.h"
+#include "interior/solid.h"
+
+enum {
+  SONDE_WINDOW_THETA = 27,  // columns around
+  SONDE_WINDOW_S = 19,      // rows along
+  SONDE_WINDOW_LEVELS = 8,  // skin .. bone
+  SONDE_WINDOW_FAT = 2,     // level of the fat/muscle interface
+  SONDE_WINDOW_NEAR_T = 15, // columns and rows whose skin can be touched: first columns, middle rows
+  SONDE_WINDOW_NEAR_S = 9,
+  SONDE_WINDOW_NEAR = SONDE_WINDOW_NEAR_T * SONDE_WINDOW_NEAR_S,
+  SONDE_WINDOW_NODES = SONDE_WINDOW_THETA * SONDE_WINDOW_S * SONDE_WINDOW_LEVELS,
+  SONDE_WINDOW_TOUCHED = 512 // points of contact that are used
+};
+
+// Where a window is: middle and half extents of the probe's face on the leg.
+typedef struct sonde_window_place {
+  double theta, s;
+  double half_theta_m, half_s_m;
+} sonde_window_place;
+
+// One touched point of the skin.
+typedef struct sonde_touched {
+  uint32_t near[4]; // places among the near skin nodes
+  double weight[4];
+  double move[3], force[3]; // leg frame; force on the skin
+} sonde_touched;
+
+typedef struct sonde_window {
+  sonde_solid solid;
+  sonde_window_place place;
+  double theta[SONDE_WINDOW_THETA + 1]; // offsets from place.theta, ascending; the last is the first
+  double s[SONDE_WINDOW_S];
+  float radius[SONDE_WINDOW_S * SONDE_WINDOW_THETA][SONDE_WINDOW_LEVELS];
+  double *compliance; // [3 near][3 near] of the near skin nodes
+  bool ready;         // factored
+  uint32_t touched_count;
+  sonde_touched *touched;            // [SONDE_WINDOW_TOUCHED]
+  double *scratch;                   // of the contact's solver
+  double reaction_n;                 // along the beam, of the linear solid
+  double stress_scale;               // contact force over reaction
+  bool loaded;
+  uint32_t iterations;
+} sonde_window;
+
+// Memory and pattern. @thread owner
+sonde_status sonde_window_create(sonde_window **window, sonde_error *error);
+void sonde_window_destroy(sonde_window *window);
+
+// Corners and materials for a place; the numbers follow by steps. No allocation.
+void sonde_window_begin(sonde_window *window, const sonde_interior *in, sonde_window_place place);
+// True when done (window->ready) or failed.
+bool sonde_window_step(sonde_window *window, uint64_t budget);
+
+// Reads the contact and solves. @return false when nothing is touched
+bool sonde_window_update(sonde_window *window, const sonde_interior *in,
+                         const sonde_interior_input *input);
+
+// Displacement (leg frame: e1, e2, axis) at angle, row and radius; false beyond the ends.
+bool sonde_window_field(const sonde_window *window, double theta, double s, double r, double u[3]);
+// Cauchy stress (Pa, tension positive, leg frame), scaled to the contact force.
+bool sonde_window_stress(const sonde_window *window, double theta, double s, double r,
+                         sonde_mat3 *stress);
+
+#endif

@@ -1,0 +1,284 @@
+// The solid of a leg at every update.
+//
+// sonde_window_update   touched points, forces, recovery
+// find_cell             cell of the ring and local coordinates
+// touch                 one vertex of the skin that carries contact force
+// apply                 displacement of the touched points under forces on them
+// solve_forces          conjugate gradients on the forces
+// sonde_window_field    trilinear in angle, row and level
+// sonde_window_stress   between the elements' middles, within a tissue
+#include "base/base.h"
+#include "interior/window.h"
+
+#include <string.h>
+
+enum { NT = SONDE_WINDOW_THETA, NS = SONDE_WINDOW_S, NL = SONDE_WINDOW_LEVELS };
+enum { SIDE = 3 * SONDE_WINDOW_NEAR, MOST_ITERATIONS = 80 };
+
+static const double give = 0.02;      // of the points' mean compliance: dense points do not fight
+static const double tolerance = 2e-3; // of the prescribed motion
+
+// ---- cells --------------------------------------------------------------------------------
+
+typedef struct cell {
+  uint32_t i, j;
+  double a, b; // 0..1
+} cell;
+
+static bool find_cell(const sonde_window *w, double theta, double s, cell *c) {
+  if (s < w->s[0] || s > w->s[NS - 1]) return false;
+  double turn = fmod(theta - w->place.theta - w->theta[0], 2 * SONDE_PI);
+  if (turn < 0) turn += 2 * SONDE_PI;
+  turn += w->theta[0];
+  c->i = 0, c->j = 0;
+  while (c->i + 1 < NT && w->theta[c->i + 1] <= turn) ++c->i;
+  while (c->j + 2 < NS && w->s[c->j + 1] <= s) ++c->j;
+  c->a = clamp((turn - w->theta[c->i]) / (w->theta[c->i + 1] - w->theta[c->i]), 0, 1);
+  c->b = (s - w->s[c->j]) / (w->s[c->j + 1] - w->s[c->j]);
+  return true;
+}
+
+static void corners(const cell *c, uint32_t column[4], double weight[4]) {
+  uint32_t next = (c->i + 1) % NT;
+  column[0] = c->j * NT + c->i, column[1] = c->j * NT + next;
+  column[2] = column[1] + NT, column[3] = column[0] + NT;
+  weight[0] = (1 - c->a) * (1 - c->b), weight[1] = c->a * (1 - c->b);
+  weight[2] = c->a * c->b, weight[3] = (1 - c->a) * c->b;
+}
+
+// ---- contact ------------------------------------------------------------------------------
+
+static void touch(sonde_window *w, const sonde_interior *in, sonde_vec3 rest, sonde_vec3 move) {
+  sonde_vec3 d = v_sub(rest, in->origin);
+  uint32_t column[4], first = (NS - SONDE_WINDOW_NEAR_S) / 2;
+  cell c;
+  if (!find_cell(w, atan2(v_dot(d, in->e2), v_dot(d, in->e1)), v_dot(d, in->axis), &c)) return;
+  if (c.i + 1 >= SONDE_WINDOW_NEAR_T || c.j < first || c.j + 1 >= first + SONDE_WINDOW_NEAR_S)
+    return;
+  if (w->touched_count == SONDE_WINDOW_TOUCHED) return;
+  sonde_touched *t = &w->touched[w->touched_count++];
+  corners(&c, column, t->weight);
+  for (int k = 0; k < 4; ++k)
+    t->near[k] = (column[k] / NT - first) * SONDE_WINDOW_NEAR_T + column[k] % NT;
+  t->move[0] = v_dot(move, in->e1), t->move[1] = v_dot(move, in->e2);
+  t->move[2] = v_dot(move, in->axis);
+}
+
+typedef struct contact {
+  uint32_t count, active; // touched points; near nodes they use
+  uint32_t *node;         // [active]
+  double *force, *moved;  // [SIDE] of the near nodes
+  double give;
+} contact;
+
+static void gather(const sonde_window *w, const double *f, const contact *c) {
+  memset(c->force, 0, SIDE * sizeof *c->force);
+  for (uint32_t p = 0; p < c->count; ++p)
+    for (int k = 0; k < 4; ++k)
+      for (int axis = 0; axis < 3; ++axis)
+        c->force[3 * w->touched[p].near[k] + (uint32_t)axis] +=
+            w->touched[p].weight[k] * f[3 * p + (uint32_t)axis];
+}
+
+// moved = compliance * force over the active nodes.
+static void comply(const sonde_window *w, const contact *c) {
+  for (uint32_t n = 0; n < 3 * c->active; ++n) {
+    uint32_t row = 3 * c->node[n / 3] + n % 3;
+    const double *of = w->compliance + (size_t)row * SIDE;
+    double sum = 0;
+    for (uint32_t m = 0; m < c->active; ++m) {
+      uint32_t k = 3 * c->node[m];
+      sum += of[k] * c->force[k] + of[k + 1] * c->force[k + 1] + of[k + 2] * c->force[k + 2];
+    }
+    c->moved[row] = sum;
+  }
+}
+
+static void apply(const sonde_window *w, const contact *c, const double *f, double *out) {
+  gather(w, f, c);
+  comply(w, c);
+  for (uint32_t p = 0; p < c->count; ++p)
+    for (uint32_t axis = 0; axis < 3; ++axis) {
+      double sum = c->give * f[3 * p + axis];
+      for (int k = 0; k < 4; ++k)
+        sum += w->touched[p].weight[k] * c->moved[3 * w->touched[p].near[k] + axis];
+      out[3 * p + axis] = sum;
+    }
+}
+
+static double dot(const double *a, const double *b, uint32_t n) {
+  double sum = 0;
+  for (uint32_t i = 0; i < n; ++i) sum += a[i] * b[i];
+  return sum;
+}
+
+static void solve_forces(sonde_window *w, const contact *c, double *f, double *r) {
+  uint32_t n = 3 * c->count;
+  double *p = r + n, *q = p + n, reference = 0;
+  for (uint32_t i = 0; i < n; ++i) {
+    r[i] = w->touched[i / 3].move[i % 3];
+    reference += r[i] * r[i];
+    f[i] = 0;
+    p[i] = r[i];
+  }
+  double old = reference;
+  for (w->iterations = 0; w->iterations < MOST_ITERATIONS; ++w->iterations) {
+    if (old <= tolerance * tolerance * reference) break;
+    apply(w, c, p, q);
+    double step = old / dot(p, q, n);
+    for (uint32_t i = 0; i < n; ++i) f[i] += step * p[i], r[i] -= step * q[i];
+    double now = dot(r, r, n), share = now / old;
+    for (uint32_t i = 0; i < n; ++i) p[i] = r[i] + share * p[i];
+    old = now;
+  }
+}
+
+static void list_active(const sonde_window *w, contact *c) {
+  bool seen[SONDE_WINDOW_NEAR] = {false};
+  double sum = 0;
+  for (uint32_t p = 0; p < c->count; ++p)
+    for (int k = 0; k < 4; ++k) seen[w->touched[p].near[k]] = true;
+  for (uint32_t n = 0; n < SONDE_WINDOW_NEAR; ++n) {
+    if (!seen[n]) continue;
+    c->node[c->active++] = n;
+    for (size_t k = 3 * (size_t)n; k < 3 * (size_t)n + 3; ++k) sum += w->compliance[k * SIDE + k];
+  }
+  SONDE_ASSERT(c->active > 0);
+  c->give = give * sum / (3 * c->active);
+}
+
+// Displacements of all near nodes under the forces, then everything else.
+static void recover(sonde_window *w, const contact *c) {
+  sonde_solid *s = &w->solid;
+  float *last = s->x + 3 * (size_t)(s->unknown_count - s->last_count);
+  for (uint32_t row = 0; row < SIDE; ++row) {
+    const double *of = w->compliance + (size_t)row * SIDE;
+    double sum = 0;
+    for (uint32_t m = 0; m < c->active; ++m) {
+      uint32_t k = 3 * c->node[m];
+      sum += of[k] * c->force[k] + of[k + 1] * c->force[k + 1] + of[k + 2] * c->force[k + 2];
+    }
+    last[row] = (float)sum;
+  }
+  sonde_fronts_recover(s->fronts, s->x);
+}
+
+static double read_contact(sonde_window *w, const sonde_interior *in,
+                           const sonde_interior_input *input, sonde_vec3 beam) {
+  double force = 0;
+  const sonde_mesh *skin = &in->model->surface;
+  w->touched_count = 0;
+  for (uint32_t v = 0; v < skin->vertex_count; ++v) {
+    double f = v_dot(input->contact_forces_n[v], beam);
+    if (!(f > 0)) continue;
+    force += f;
+    sonde_vec3 move = v_sub(input->positions_m[v], skin->vertices[v]);
+    move = v_scale(beam, v_dot(move, beam));
+    touch(w, in, skin->vertices[v], move);
+  }
+  return force;
+}
+
+bool sonde_window_update(sonde_window *w, const sonde_interior *in,
+                         const sonde_interior_input *input) {
+  SONDE_ASSERT(w != NULL && w->ready && input != NULL);
+  uint32_t nodes[SONDE_WINDOW_NEAR];
+  sonde_vec3 beam = q_rotate(input->world_from_probe.rotation, vec3(0, 0, 1));
+  double force = read_contact(w, in, input, beam);
+  w->loaded = w->touched_count > 0;
+  if (!w->loaded) return false;
+  contact c = {.count = w->touched_count, .node = nodes, .force = w->scratch,
+               .moved = w->scratch + SIDE};
+  double *f = w->scratch + 2 * SIDE;
+  list_active(w, &c);
+  solve_forces(w, &c, f, f + 3 * c.count);
+  gather(w, f, &c);
+  recover(w, &c);
+  double along[3] = {v_dot(beam, in->e1), v_dot(beam, in->e2), v_dot(beam, in->axis)};
+  w->reaction_n = 0;
+  for (uint32_t i = 0; i < 3 * c.count; ++i) w->reaction_n += f[i] * along[i % 3];
+  w->stress_scale = w->reaction_n > 1e-6 ? force / w->reaction_n : 0;
+  return true;
+}
+
+// ---- reading ------------------------------------------------------------------------------
+
+// Level below which the radius lies, and the fraction of the way to the next.
+static double find_level(const double radius[NL], double r, uint32_t *level) {
+  uint32_t l = 0;
+  while (l + 2 < NL && radius[l + 1] >= r) ++l;
+  *level = l;
+  return clamp((radius[l] - r) / (radius[l] - radius[l + 1]), 0, 1);
+}
+
+static void blend_radii(const sonde_window *w, const uint32_t column[4], const double weight[4],
+                        double radius[NL]) {
+  for (uint32_t l = 0; l < NL; ++l) {
+    radius[l] = 0;
+    for (int k = 0; k < 4; ++k) radius[l] += weight[k] * (double)w->radius[column[k]][l];
+  }
+}
+
+bool sonde_window_field(const sonde_window *w, double theta, double s, double r, double u[3]) {
+  uint32_t column[4], level;
+  double weight[4], radius[NL];
+  cell c;
+  u[0] = u[1] = u[2] = 0;
+  if (!find_cell(w, theta, s, &c)) return false;
+  corners(&c, column, weight);
+  blend_radii(w, column, weight, radius);
+  double t = find_level(radius, r, &level);
+  for (int k = 0; k < 4; ++k)
+    for (uint32_t l = 0; l < 2; ++l) {
+      uint32_t at = w->solid.unknown[column[k] * NL + level + l];
+      if (at == SONDE_FRONT_NONE) continue;
+      const float *x = w->solid.x + 3 * (size_t)at;
+      double share = weight[k] * (l ? t : 1 - t);
+      for (int axis = 0; axis < 3; ++axis) u[axis] += share * (double)x[axis];
+    }
+  return true;
+}
+
+// Between the middles of neighbouring cells of these widths: the first of the two for a point at
+// fraction a of cell `at`, and the fraction of the way to the second.
+static double between_middles(uint32_t at, double a, double before, double own, double after,
+                              uint32_t *first) {
+  double middle = a - 0.5;
+  *first = middle < 0 ? at - 1 : at;
+  double gap = 0.5 * (own + (middle < 0 ? before : after));
+  return middle < 0 ? 1 + middle * own / gap : middle * own / gap;
+}
+
+bool sonde_window_stress(const sonde_window *w, double theta, double s, double r,
+                         sonde_mat3 *stress) {
+  uint32_t column[4], level, first[3];
+  double weight[4], radius[NL], f[3];
+  cell c;
+  *stress = m_zero();
+  if (!find_cell(w, theta, s, &c)) return false;
+  corners(&c, column, weight);
+  blend_radii(w, column, weight, radius);
+  double t = find_level(radius, r, &level);
+  uint32_t i0 = (c.i + NT - 1) % NT, i1 = (c.i + 1) % NT;
+  f[0] = between_middles(c.i + NT, c.a, w->theta[i0 + 1] - w->theta[i0],
+                         w->theta[c.i + 1] - w->theta[c.i], w->theta[i1 + 1] - w->theta[i1],
+                         &first[0]);
+  double below = c.j > 0 ? w->s[c.j] - w->s[c.j - 1] : 1,
+         above = c.j + 2 < NS ? w->s[c.j + 2] - w->s[c.j + 1] : 1;
+  f[1] = between_middles(c.j + 1, c.b, below, w->s[c.j + 1] - w->s[c.j], above, &first[1]);
+  double over = level > 0 ? radius[level - 1] - radius[level] : 1,
+         under = level + 2 < NL ? radius[level + 1] - radius[level + 2] : 1;
+  f[2] = between_middles(level + 1, t, over, radius[level] - radius[level + 1], under, &first[2]);
+  uint32_t low = level < SONDE_WINDOW_FAT ? 0 : SONDE_WINDOW_FAT,
+           high = level < SONDE_WINDOW_FAT ? SONDE_WINDOW_FAT - 1 : NL - 2;
+  for (uint32_t k = 0; k < 8; ++k) {
+    uint32_t i = (first[0] + (k & 1)) % NT, j = first[1] + (k >> 1 & 1), l = first[2] + (k >> 2);
+    double share = (k & 1 ? f[0] : 1 - f[0]) * (k >> 1 & 1 ? f[1] : 1 - f[1]) *
+                   (k >> 2 ? f[2] : 1 - f[2]);
+    j = j > 0 ? j - 1 : 0, l = l > 0 ? l - 1 : 0;
+    j = j > NS - 2 ? NS - 2 : j, l = l < low ? low : l > high ? high : l;
+    sonde_mat3 of = sonde_solid_stress(&w->solid, (j * NT + i) * (NL - 1) + l);
+    *stress = m_add(*stress, m_scale(of, share * w->stress_scale));
+  }
+  return true;
+}
