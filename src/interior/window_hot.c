@@ -163,6 +163,27 @@ static void recover(sonde_window *w, const contact *c) {
   sonde_fronts_recover(s->fronts, s->x);
 }
 
+// A mesh coarser than the elements would leave the skin free between its vertices: the columns of
+// the table whose whole triangle is touched count as points of contact too.
+static void touch_columns(sonde_window *w, const sonde_interior *in,
+                          const sonde_interior_input *input, sonde_vec3 beam) {
+  uint32_t first = (NS - SONDE_WINDOW_NEAR_S) / 2, last = first + SONDE_WINDOW_NEAR_S - 1;
+  double low = (w->s[first] - in->s_first_m) / in->s_step_m,
+         high = (w->s[last] - in->s_first_m) / in->s_step_m;
+  uint32_t from = (uint32_t)fmax(ceil(low), 0), to = (uint32_t)fmin(high, in->s_count - 1);
+  for (uint32_t k = from * in->theta_count; k < (to + 1) * in->theta_count; ++k) {
+    const sonde_column *c = &in->column[k];
+    sonde_vec3 now = vec3(0, 0, 0);
+    bool all = true;
+    for (int n = 0; n < 3; ++n) {
+      all = all && v_dot(input->contact_forces_n[c->node[n]], beam) > 0;
+      now = v_madd(now, c->weight[n], input->positions_m[c->node[n]]);
+    }
+    if (!all) continue;
+    touch(w, in, c->rest_m, v_scale(beam, v_dot(v_sub(now, c->rest_m), beam)));
+  }
+}
+
 static double read_contact(sonde_window *w, const sonde_interior *in,
                            const sonde_interior_input *input, sonde_vec3 beam) {
   double force = 0;
@@ -176,6 +197,7 @@ static double read_contact(sonde_window *w, const sonde_interior *in,
     move = v_scale(beam, v_dot(move, beam));
     touch(w, in, skin->vertices[v], move);
   }
+  touch_columns(w, in, input, beam);
   return force;
 }
 

@@ -264,15 +264,13 @@ static void fe_layers(tube *t) {
 
 // The footprint moves with the skin under it; its nodes carry contact.
 static void press_patch(sonde_interior *in, const tube *t, const sonde_vec3 *moved,
-                        const site_row *site) {
+                        const site_row *site, double depth) {
   uint32_t n = t->model.surface.vertex_count;
   sonde_pathology p = healthy();
   sonde_vec3 *force = SONDE_NEW(sonde_vec3, n), beam = v_neg(site->normal);
   for (uint32_t i = 0; i < n; ++i) {
-    sonde_vec3 d = v_sub(t->model.surface.vertices[i], site->at);
-    bool under = fabs(v_dot(d, site->u)) < 30.1e-3 && fabs(v_dot(d, site->v)) < 6.1e-3 &&
-                 v_dot(d, site->normal) > -0.04;
-    if (under) force[i] = beam;
+    sonde_vec3 move = v_sub(moved[i], t->model.surface.vertices[i]);
+    if (v_distance(move, v_scale(beam, depth)) < 2e-5) force[i] = beam;
   }
   sonde_vec3 across = v_cross(site->v, beam);
   sonde_pose pose = {site->at, q_from_matrix(m_columns(across, site->v, beam))};
@@ -331,7 +329,7 @@ static void finite_element_fields(void **state) {
       tally got[2];
       for (int method = 0; method < 2; ++method) {
         sonde_interior_set_method(in, (sonde_interior_method)method);
-        press_patch(in, &t, moved, &site);
+        press_patch(in, &t, moved, &site, 1e-3 * mm);
         assert_int_equal(sonde_interior_used_method(in), method);
         got[method] = compare(in, nodes, count, &site);
         all[method] += got[method].error;
