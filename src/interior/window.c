@@ -15,9 +15,9 @@
 enum { NT = SONDE_WINDOW_THETA, NS = SONDE_WINDOW_S, NL = SONDE_WINDOW_LEVELS };
 
 // Shear moduli of the layers (docs/interior.md); only their ratio moves the inside. Muscle and skin
-// as at rest, fat (1.1 kPa at rest, Ogden exponent 8) as at 22 % compression: it is squeezed most.
-static const double fat_pa = 2.0e3, muscle_pa = 3.6e3, skin_pa = 40e3;
-static const double bulk_over_shear = 50;
+// as at rest, fat (1.1 kPa at rest, Ogden exponent 8) as at 16 % compression: it is squeezed most.
+static const double fat_pa = 1.5e3, muscle_pa = 3.6e3, skin_pa = 40e3;
+static const double bulk_over_shear = 100;
 static const double margin_t_m = 12e-3, margin_s_m = 10e-3; // fine part beyond the face
 static const double reach_m = 75e-3;                        // window beyond the fine part
 static const double muscle_level[NL] = {0, 0, 0, 0.12, 0.27, 0.46, 0.70, 1};

@@ -6,7 +6,7 @@
 // apply                 displacement of the touched points under forces on them
 // solve_forces          conjugate gradients on the forces
 // sonde_window_field    trilinear in angle, row and level
-// sonde_window_stress   between the elements' middles, within a tissue
+// sonde_window_stress   nodal means within a tissue, interpolated
 #include "base/base.h"
 #include "interior/window.h"
 
@@ -261,44 +261,40 @@ bool sonde_window_field(const sonde_window *w, double theta, double s, double r,
   return true;
 }
 
-// Between the middles of neighbouring cells of these widths: the first of the two for a point at
-// fraction a of cell `at`, and the fraction of the way to the second.
-static double between_middles(uint32_t at, double a, double before, double own, double after,
-                              uint32_t *first) {
-  double middle = a - 0.5;
-  *first = middle < 0 ? at - 1 : at;
-  double gap = 0.5 * (own + (middle < 0 ? before : after));
-  return middle < 0 ? 1 + middle * own / gap : middle * own / gap;
+// Weights of the elements before, at and after a cell for a point at fraction a of it: the means at
+// the two nodes, interpolated. Nodal means remove the chequered pressure that elements of constant
+// pressure carry.
+static void element_weights(double a, double w[3]) {
+  w[0] = 0.5 * (1 - a);
+  w[1] = 0.5;
+  w[2] = 0.5 * a;
+}
+
+// Layer `level + d - 1`, kept within the tissue of `level`: stress jumps between tissues.
+static uint32_t layer_within(uint32_t level, uint32_t d) {
+  uint32_t low = level < SONDE_WINDOW_FAT ? 0 : SONDE_WINDOW_FAT,
+           high = level < SONDE_WINDOW_FAT ? SONDE_WINDOW_FAT - 1 : NL - 2, l = level + d;
+  return l <= low ? low : l - 1 > high ? high : l - 1;
 }
 
 bool sonde_window_stress(const sonde_window *w, double theta, double s, double r,
                          sonde_mat3 *stress) {
-  uint32_t column[4], level, first[3];
-  double weight[4], radius[NL], f[3];
+  uint32_t column[4], level;
+  double weight[4], radius[NL], f[3][3];
   cell c;
   *stress = m_zero();
   if (!find_cell(w, theta, s, &c)) return false;
   corners(&c, column, weight);
   blend_radii(w, column, weight, radius);
   double t = find_level(radius, r, &level);
-  uint32_t i0 = (c.i + NT - 1) % NT, i1 = (c.i + 1) % NT;
-  f[0] = between_middles(c.i + NT, c.a, w->theta[i0 + 1] - w->theta[i0],
-                         w->theta[c.i + 1] - w->theta[c.i], w->theta[i1 + 1] - w->theta[i1],
-                         &first[0]);
-  double below = c.j > 0 ? w->s[c.j] - w->s[c.j - 1] : 1,
-         above = c.j + 2 < NS ? w->s[c.j + 2] - w->s[c.j + 1] : 1;
-  f[1] = between_middles(c.j + 1, c.b, below, w->s[c.j + 1] - w->s[c.j], above, &first[1]);
-  double over = level > 0 ? radius[level - 1] - radius[level] : 1,
-         under = level + 2 < NL ? radius[level + 1] - radius[level + 2] : 1;
-  f[2] = between_middles(level + 1, t, over, radius[level] - radius[level + 1], under, &first[2]);
-  uint32_t low = level < SONDE_WINDOW_FAT ? 0 : SONDE_WINDOW_FAT,
-           high = level < SONDE_WINDOW_FAT ? SONDE_WINDOW_FAT - 1 : NL - 2;
-  for (uint32_t k = 0; k < 8; ++k) {
-    uint32_t i = (first[0] + (k & 1)) % NT, j = first[1] + (k >> 1 & 1), l = first[2] + (k >> 2);
-    double share = (k & 1 ? f[0] : 1 - f[0]) * (k >> 1 & 1 ? f[1] : 1 - f[1]) *
-                   (k >> 2 ? f[2] : 1 - f[2]);
-    j = j > 0 ? j - 1 : 0, l = l > 0 ? l - 1 : 0;
-    j = j > NS - 2 ? NS - 2 : j, l = l < low ? low : l > high ? high : l;
+  element_weights(c.a, f[0]);
+  element_weights(c.b, f[1]);
+  element_weights(t, f[2]);
+  for (uint32_t k = 0; k < 27; ++k) {
+    uint32_t di = k % 3, dj = k / 3 % 3, dl = k / 9;
+    uint32_t i = (c.i + di + NT - 1) % NT, j = c.j + dj, l = layer_within(level, dl);
+    j = j < 1 ? 0 : j - 1 > NS - 2 ? NS - 2 : j - 1;
+    double share = f[0][di] * f[1][dj] * f[2][dl];
     sonde_mat3 of = sonde_solid_stress(&w->solid, (j * NT + i) * (NL - 1) + l);
     *stress = m_add(*stress, m_scale(of, share * w->stress_scale));
   }
