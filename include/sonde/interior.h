@@ -37,6 +37,7 @@ typedef struct sonde_pathology {
   double thrombus_from_m, thrombus_to_m; /**< extent along the leg (model z); all when equal */
   double lumen_scale;                    /**< rest radius relative to the healthy vein */
   double echogenicity; /**< backscatter of the thrombus relative to muscle, 0..1 */
+  double wall_shear_pa; /**< shear modulus of the vein's wall; 0: 30 kPa */
 } sonde_pathology;
 
 /** Preset names, NULL-terminated: healthy, partial_mural, acute_occlusive, subacute_occlusive,
@@ -57,6 +58,10 @@ SONDE_API sonde_vec3 sonde_rectangle_stress(double pressure_pa, double half_x_m,
  *  pressure and thrombus (tube law, docs/interior.md). Monotone, > 0. @thread any */
 SONDE_API double sonde_vein_area_ratio(const sonde_pathology *pathology, double outside_pa);
 SONDE_API double sonde_artery_area_ratio(const sonde_pathology *pathology, double outside_pa);
+
+/** Pressure inside an empty vein's wall (Pa) that holds it at `area_ratio` of its stress-free area
+ *  inside muscle, for a wall of that shear modulus (docs/interior.md). Monotone. @thread any */
+SONDE_API double sonde_vein_tube_pressure(double area_ratio, double wall_shear_pa);
 
 /** Cross-section of a vessel at one station of its centre line. */
 typedef struct sonde_vessel_state {

@@ -188,7 +188,7 @@ static void decode_controls(byte_reader *reader, sonde_record *record) {
   double n[14];
   for (int i = 0; i < 14; ++i) n[i] = get_real(reader);
   c->echo = (sonde_echo_settings){n[0], n[1], n[2], n[3], n[4], n[5]};
-  c->pathology = (sonde_pathology){"", n[6], n[7], n[8], n[9], n[10], n[11], n[12], n[13]};
+  c->pathology = (sonde_pathology){"", n[6], n[7], n[8], n[9], n[10], n[11], n[12], n[13], 0};
   memcpy(c->pathology.name, reader->at, sizeof c->pathology.name);
   c->pathology.name[sizeof c->pathology.name - 1] = 0;
 }

@@ -5,12 +5,15 @@
 // sonde_vein_area_ratio    tube law of the open part, compression law of the solid part
 // sonde_artery_area_ratio  exponential law
 // sonde_vessel_shape       semi-axes of the ellipse
-// open_area                inverse of the cubic tube law with the tail of touching walls
+// ring_pressure            of the wall alone
+// open_area                inverse of the tube law with the tail of touching walls
 // solid_ratio              area of a clot
 #include "base/base.h"
 #include "interior/interior.h"
 
 static const double contact_area = 0.06;          // of the stress-free area: walls begin to touch
+static const double study_wall_pa = 30e3, least_wall_pa = 10e3, most_wall_pa = 300e3;
+static const double ring_inner_share = 0.797; // (4.16/4.66)^2
 static const double reference_pa = 1333.22387415; // 10 mmHg: the pressure the model's radii hold at
 
 // Stress below the corner of a rectangle a x b (signed sides) at depth z, over the pressure.
@@ -31,24 +34,48 @@ sonde_vec3 sonde_rectangle_stress(double pressure_pa, double half_x_m, double ha
   return v_scale(sum, pressure_pa);
 }
 
-// Transmural pressure (Pa) of an open vein with area a over the stress-free one, and its slope.
-static double tube_pressure(double a, double *slope) {
-  *slope = 1e3 * ((3 * 1.688 * a - 2 * 5.746) * a + 12.547);
-  return 1e3 * (((1.688 * a - 5.746) * a + 12.547) * a - 8.248);
+// Hoop pressure over the shear modulus of the wall (Ogden, exponent 8, 0.5 mm on 4.16 mm) at a > 1:
+// thick ring in plane strain, P = int (2/n)(l^n - l^-n)/(l (l^2 - 1)) dl from outside to inside.
+static double ring_pressure(double a) {
+  if (a <= 1 + 1e-6) return 0;
+  double inner = sqrt(a), outer = sqrt(1 + (a - 1) * ring_inner_share), sum = 0;
+  enum { STEPS = 8 };
+  for (int i = 0; i <= STEPS; ++i) {
+    double l = outer + (inner - outer) * i / STEPS, l8 = l * l * l * l;
+    l8 *= l8;
+    double weight = i == 0 || i == STEPS ? 1 : i % 2 ? 4 : 2;
+    sum += weight * 0.25 * (l8 - 1 / l8) / (l * (l * l - 1));
+  }
+  return sum * (inner - outer) / (3 * STEPS);
 }
 
-// Area over the stress-free one. The cubic rises everywhere; Newton converges from above and below
-// because its slope stays within a factor of two over the range.
-static double open_area(double transmural_pa) {
+// Transmural pressure (Pa) of an open vein with area a over the stress-free one: the study's cubic
+// for a wall of 30 kPa, and the ring's difference for another wall. A wall that is squeezed flat
+// keeps its length and bends: 3 EI/r^3 is 50 Pa, nothing beside the muscle.
+double sonde_vein_tube_pressure(double a, double wall_pa) {
+  double cubic = 1e3 * (((1.688 * a - 5.746) * a + 12.547) * a - 8.248);
+  double wall = wall_pa > 0 ? clamp(wall_pa, least_wall_pa, most_wall_pa) : study_wall_pa;
+  return cubic + (wall - study_wall_pa) * ring_pressure(a);
+}
+
+// Area over the stress-free one: the pressure rises with the area; bracketed Newton.
+static double open_area(double transmural_pa, double wall_pa) {
   SONDE_ASSERT(isfinite(transmural_pa));
-  double slope, low = tube_pressure(contact_area, &slope);
-  if (transmural_pa < low)
-    return contact_area * exp((transmural_pa - low) / (slope * contact_area));
-  double a = 1;
-  for (int i = 0; i < 24; ++i) {
-    double excess = tube_pressure(a, &slope) - transmural_pa;
-    a -= excess / slope;
+  const double d = 1e-5;
+  double touch = sonde_vein_tube_pressure(contact_area, wall_pa);
+  double touch_slope = (sonde_vein_tube_pressure(contact_area + d, wall_pa) - touch) / d;
+  if (transmural_pa < touch)
+    return contact_area * exp((transmural_pa - touch) / (touch_slope * contact_area));
+  double low = contact_area, high = 8, a = 1;
+  for (int i = 0; i < 60; ++i) {
+    double p = sonde_vein_tube_pressure(a, wall_pa), excess = p - transmural_pa;
     if (fabs(excess) < 1e-6) break;
+    if (excess > 0)
+      high = a;
+    else
+      low = a;
+    double next = a - excess * d / (sonde_vein_tube_pressure(a + d, wall_pa) - p);
+    a = next > low && next < high ? next : 0.5 * (low + high);
   }
   return a;
 }
@@ -64,8 +91,9 @@ double sonde_vein_area_ratio(const sonde_pathology *pathology, double outside_pa
   SONDE_ASSERT(pathology != NULL && isfinite(outside_pa));
   double solid = clamp(pathology->thrombus_fraction, 0, 1), ratio = 0;
   if (solid < 1) {
-    double rest = open_area(pathology->venous_pressure_pa);
-    ratio += (1 - solid) * open_area(pathology->venous_pressure_pa - outside_pa) / rest;
+    double wall = pathology->wall_shear_pa;
+    double rest = open_area(pathology->venous_pressure_pa, wall);
+    ratio += (1 - solid) * open_area(pathology->venous_pressure_pa - outside_pa, wall) / rest;
   }
   if (solid > 0) ratio += solid * solid_ratio(pathology->thrombus_modulus_pa, outside_pa);
   return ratio;
@@ -81,7 +109,9 @@ double sonde_artery_area_ratio(const sonde_pathology *pathology, double outside_
 double sonde_vein_rest_scale(const sonde_pathology *pathology, bool clot) {
   double scale = clot ? pathology->lumen_scale : 1.0;
   if (clot && pathology->thrombus_fraction >= 1) return scale;
-  return scale * sqrt(open_area(pathology->venous_pressure_pa) / open_area(reference_pa));
+  double wall = pathology->wall_shear_pa;
+  return scale *
+         sqrt(open_area(pathology->venous_pressure_pa, wall) / open_area(reference_pa, wall));
 }
 
 void sonde_vessel_shape(int which, const sonde_pathology *pathology, bool clot, double ratio,

@@ -3,13 +3,15 @@
 // sonde_interior_update           field, then vessels
 // sonde_interior_vessels          all stations of both vessels
 // measure_load, half_side         equivalent uniform rectangle of the contact forces
-// outside_pressure                effective pressure on the wall
+// solid_pressure                  effective pressure on the wall from the solid's stress
+// rectangle_pressure              the same below a rectangle on a half space
 // update_station                  dynamics and shape
 // sonde_vessel_at                 state between stations
 // sonde_vessel_carry              where the moving wall takes the tissue around it
 // sonde_interior_vessel_at_plane  where the image plane cuts
 #include "base/base.h"
 #include "interior/interior.h"
+#include "interior/window.h"
 
 static const double relaxation_s = 0.1;     // emptying of a vein segment (docs/interior.md)
 static const double skin_spread_m = 1.8e-3; // the skin widens the loaded patch by its thickness
@@ -88,9 +90,26 @@ static double depth_along_beam(const sonde_interior *in, const sonde_station *st
   return v_distance(hit.point_m, station->rest_m);
 }
 
-// (4 s2 - s_axial)/3 with s2 the mean normal stress in the vessel's cross-section.
-static double outside_pressure(const sonde_interior *in, const sonde_station *station,
-                               const load *l) {
+// (4 s2 - s_axial)/3 with s2 the mean normal stress in the vessel's cross-section, compression
+// positive.
+static double effective(double trace, double axial) {
+  return fmax(0, (4 * 0.5 * (trace - axial) - axial) / 3);
+}
+
+// From the solid's stress; false where it has none.
+static bool solid_pressure(const sonde_interior *in, const sonde_station *station, double *out) {
+  sonde_mat3 s;
+  if (!in->solid || !(in->live->stress_scale > 0)) return false;
+  *out = 0;
+  if (!sonde_interior_stress(in, station->rest_m, &s)) return true;
+  double axial = -v_dot(station->axis, m_mul_v(s, station->axis));
+  *out = effective(-(s.m[0][0] + s.m[1][1] + s.m[2][2]), axial);
+  return true;
+}
+
+// From the half space under the equivalent rectangle, until the solid is factored.
+static double rectangle_pressure(const sonde_interior *in, const sonde_station *station,
+                                 const load *l) {
   sonde_vec3 d = v_sub(station->rest_m, l->centre_m);
   if (!(l->force_n > 0) || v_norm2(d) > 0.12 * 0.12) return 0;
   double z = fmax(depth_along_beam(in, station, l->beam), least_depth_m);
@@ -99,9 +118,8 @@ static double outside_pressure(const sonde_interior *in, const sonde_station *st
   sonde_vec3 a =
       vec3(v_dot(station->axis, l->x), v_dot(station->axis, l->y), v_dot(station->axis, l->beam));
   double axial = a.x * a.x * s.x + a.y * a.y * s.y + a.z * a.z * s.z;
-  double across = 0.5 * (s.x + s.y + s.z - axial);
   double base = 1 + bone_rise * fmax(0, fmin(z / station->tissue_m, 1) - bone_start);
-  return fmax(0, base * (4 * across - axial) / 3);
+  return base * effective(s.x + s.y + s.z, axial);
 }
 
 static void update_station(sonde_interior *in, int which, uint32_t i, const load *l,
@@ -113,7 +131,8 @@ static void update_station(sonde_interior *in, int which, uint32_t i, const load
   sonde_pathology local = *p;
   if (!clot) local.thrombus_fraction = 0;
   double scale = which == 0 ? sonde_vein_rest_scale(&local, clot) : 1;
-  double outside = outside_pressure(in, station, l);
+  double outside;
+  if (!solid_pressure(in, station, &outside)) outside = rectangle_pressure(in, station, l);
   double goal = which == 0 ? sonde_vein_area_ratio(&local, outside)
                            : sonde_artery_area_ratio(&local, outside);
   double blend = input->dt_s < 0 || !in->ready ? 1 : 1 - exp(-input->dt_s / relaxation_s);

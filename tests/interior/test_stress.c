@@ -64,9 +64,108 @@ static void stress_follows_the_study(void **state) {
   tube_clear(&t);
 }
 
+
+// ---- areas ----------------------------------------------------------------------------------
+
+typedef struct area_row {
+  char name[24];
+  double depth_m, venous_mmhg, wall_pa, thrombus_pa, penetration_m, force_n;
+  double vein, artery, short_m;
+  double got_vein, got_artery, got_short_m;
+} area_row;
+
+static uint32_t read_areas(area_row *rows, uint32_t capacity) {
+  FILE *file = fopen(SONDE_SOURCE_DIR "/../shared/data/vein_compression/area_force.csv", "r");
+  char line[512];
+  uint32_t count = 0;
+  while (file != NULL && count < capacity && fgets(line, sizeof line, file) != NULL) {
+    char *field[32] = {0}, *at = line;
+    for (int i = 0; i < 32 && at != NULL; ++i) field[i] = strsep(&at, ",");
+    if (field[18] == NULL || strcmp(field[0], "case") == 0) continue;
+    if (strstr(field[0], "mesh2") == NULL) continue; // the reference meshes
+    area_row *r = &rows[count];
+    *r = (area_row){.depth_m = atof(field[1]) * 1e-3, .venous_mmhg = atof(field[2]),
+                    .wall_pa = atof(field[3]) * 1e3, .thrombus_pa = atof(field[4]) * 1e3,
+                    .penetration_m = atof(field[7]) * 1e-3, .force_n = atof(field[8]),
+                    .vein = atof(field[11]), .artery = atof(field[18]),
+                    .short_m = atof(field[13]) * 1e-3};
+    snprintf(r->name, sizeof r->name, "%s", field[0]);
+    if (r->penetration_m > 0) ++count;
+  }
+  if (file != NULL) fclose(file);
+  return count;
+}
+
+static void press_row(area_row *row) {
+  sonde_pathology p;
+  assert_int_equal(sonde_pathology_preset("healthy", &p, NULL), SONDE_OK);
+  p.wall_shear_pa = row->wall_pa;
+  if (row->venous_mmhg > 0) p.venous_pressure_pa = row->venous_mmhg * SONDE_PA_PER_MMHG;
+  if (row->thrombus_pa > 0) {
+    p.thrombus_fraction = 1;
+    p.thrombus_modulus_pa = 3 * row->thrombus_pa;
+  }
+  static tube t;
+  static sonde_interior *in;
+  static double depth;
+  if (in == NULL || fabs(depth - row->depth_m) > 1e-6) {
+    if (in != NULL) {
+      sonde_interior_destroy(in);
+      tube_clear(&t);
+    }
+    t = study_thigh(row->depth_m), depth = row->depth_m;
+    assert_int_equal(sonde_interior_create(&t.model, &in, NULL), SONDE_OK);
+  }
+  sonde_vessel_state vein, artery;
+  study_press(in, &t, row->penetration_m, row->force_n, &p);
+  assert_true(sonde_interior_vessel_at_plane(in, 0, study_pose(0), &vein));
+  assert_true(sonde_interior_vessel_at_plane(in, 1, study_pose(0), &artery));
+  row->got_vein = vein.area_ratio, row->got_artery = artery.area_ratio;
+  row->got_short_m = 2 * vein.half_short_m;
+}
+
+// Force at which the area passes 0.2 of rest, by the rows; 0 when it does not.
+static double force_at_fifth(const area_row *rows, uint32_t count, const char *name, bool got) {
+  for (uint32_t i = 1; i < count; ++i) {
+    double a = got ? rows[i - 1].got_vein : rows[i - 1].vein, b = got ? rows[i].got_vein : rows[i].vein;
+    if (strcmp(rows[i].name, name) != 0 || strcmp(rows[i - 1].name, name) != 0) continue;
+    if (a >= 0.2 && b < 0.2)
+      return rows[i - 1].force_n + (a - 0.2) / (a - b) * (rows[i].force_n - rows[i - 1].force_n);
+  }
+  return 0;
+}
+
+static void areas_follow_the_study(void **state) {
+  (void)state;
+  static area_row rows[300];
+  uint32_t count = read_areas(rows, 300), from = 0;
+  if (count == 0) skip();
+  for (uint32_t i = 0; i < count; ++i) press_row(&rows[i]);
+  while (from < count) {
+    uint32_t to = from, used = 0;
+    double vein = 0, artery = 0, mm = 0;
+    for (; to < count && strcmp(rows[to].name, rows[from].name) == 0; ++to) {
+      if (rows[to].vein < 0.03) continue; // walls have crossed: beyond the study
+      vein += fabs(rows[to].got_vein - rows[to].vein);
+      artery += fabs(rows[to].got_artery - rows[to].artery);
+      mm += fabs(rows[to].got_short_m - rows[to].short_m) * 1e3;
+      ++used;
+    }
+    double f = force_at_fifth(rows, count, rows[from].name, false),
+           g = force_at_fifth(rows, count, rows[from].name, true);
+    print_message("%-16s %2u rows: vein %.3f artery %.3f of rest, short diameter %.2f mm; 20 %% at "
+                  "%.2f N (study %.2f)\n",
+                  rows[from].name, used, vein / used, artery / used, mm / used, g, f);
+    assert_true(used > 5 && vein / used <= 0.06 && artery / used <= 0.06);
+    if (f > 0) assert_true(fabs(g / f - 1) < 0.1);
+    from = to;
+  }
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(stress_follows_the_study),
+      cmocka_unit_test(areas_follow_the_study),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
