@@ -196,7 +196,7 @@ bool sonde_interior_stress(const sonde_interior *in, sonde_vec3 rest, sonde_mat3
   SONDE_ASSERT(in != NULL && stress != NULL);
   sonde_column_point at;
   *stress = m_zero();
-  if (!in->ready || !in->solid || !sonde_interior_locate(in, rest, &at)) return false;
+  if (!in->solid || !sonde_interior_locate(in, rest, &at)) return false;
   if (at.depth_m < 0 || at.r <= in->bone_radius_m) return false;
   sonde_mat3 local, world_from_leg = m_columns(in->e1, in->e2, in->axis);
   if (!sonde_window_stress(in->live, at.theta, at.s, at.r, &local)) return false;
