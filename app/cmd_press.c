@@ -21,6 +21,10 @@ static const char HELP[] =
     "  --depth-mm D      press D millimetres below the rest skin (-10 to 60)\n"
     "  --case NAME       healthy, partial_mural, acute_occlusive, subacute_occlusive,\n"
     "                    chronic_occlusive; default healthy\n"
+    "  --vein-depth-mm D    put the vein D below the site, the artery 11 mm beside it (8 to 50)\n"
+    "  --venous-mmhg P      pressure in the vein (0 to 80); default 10\n"
+    "  --thrombus-kpa MU    fill the vein with a clot of this shear modulus (0.5 to 100)\n"
+    "  --wall-kpa W         shear modulus of the vein's wall (10 to 300); default 30\n"
     "  --preset FILE     damping, stiffness and friction (sonde-identify(1)); a settled probe\n"
     "                    feels the stiffness only\n"
     "  --image PNG       write the echographic image of the settled state (512 x 512)\n"
@@ -32,7 +36,8 @@ typedef struct options {
   char model[1024];
   long site;
   const char *probe, *pathology, *image, *preset;
-  double force_n, depth_m; // NaN when not asked for
+  double force_n, depth_m; // NaN when not asked for, as all below
+  double vein_depth_m, venous_pa, thrombus_pa, wall_pa;
   bool json;
 } options;
 
@@ -46,11 +51,31 @@ typedef struct press {
   double depth_m, force_n;
   sonde_settle_result settled;
   uint32_t steps;
-  double vein, artery, vein_short_m; // NaN when not under the probe
+  double vein_depth_m;                       // NaN: where the model has it
+  sonde_vessel_state vessel[2]; // vein, artery
+  bool cut[2];                  // the image plane meets it
 } press;
 
 static const double COARSE = 1e-6, RESIDUAL = 1e-9; // relative residual on the way and at the end
 static const double DEEPEST_M = 0.06;
+
+// A number within bounds, scaled to SI; false after a message.
+static bool read_real(const char *name, double low, double high, double scale, double *to) {
+  if (!app_parse_real("press", name, optarg, low, high, to)) return false;
+  *to *= scale;
+  return true;
+}
+
+// The vessel options; false after a message.
+static bool read_vessel_option(int c, options *o) {
+  const double pa_per_mmhg = 133.322387415;
+  switch (c) {
+  case 'D': return read_real("--vein-depth-mm", 8, 50, 1e-3, &o->vein_depth_m);
+  case 'V': return read_real("--venous-mmhg", 0, 80, pa_per_mmhg, &o->venous_pa);
+  case 'T': return read_real("--thrombus-kpa", 0.5, 100, 1e3, &o->thrombus_pa);
+  default: return read_real("--wall-kpa", 10, 300, 1e3, &o->wall_pa);
+  }
+}
 
 // Returns -1 to go on, else the exit code.
 static int read_options(int argc, char **argv, options *o) {
@@ -59,20 +84,27 @@ static int read_options(int argc, char **argv, options *o) {
       {"force-n", required_argument, NULL, 'f'}, {"depth-mm", required_argument, NULL, 'd'},
       {"case", required_argument, NULL, 'c'},    {"image", required_argument, NULL, 'i'},
       {"preset", required_argument, NULL, 'P'},  {"json", no_argument, NULL, 'j'},
+      {"vein-depth-mm", required_argument, NULL, 'D'},
+      {"venous-mmhg", required_argument, NULL, 'V'},
+      {"thrombus-kpa", required_argument, NULL, 'T'},
+      {"wall-kpa", required_argument, NULL, 'W'},
       {"help", no_argument, NULL, 'h'},          {NULL, 0, NULL, 0}};
-  double mm = 0;
   for (int c; (c = getopt_long(argc, argv, "", LONG, NULL)) != -1;) switch (c) {
     case 's':
       if (!app_parse_integer("press", "--site", optarg, 0, 1000000, &o->site)) return APP_BAD_INPUT;
       break;
     case 'p': o->probe = optarg; break;
     case 'f':
-      if (!app_parse_real("press", "--force-n", optarg, 0.01, 200, &o->force_n))
-        return APP_BAD_INPUT;
+      if (!read_real("--force-n", 0.01, 200, 1, &o->force_n)) return APP_BAD_INPUT;
       break;
     case 'd':
-      if (!app_parse_real("press", "--depth-mm", optarg, -10, 60, &mm)) return APP_BAD_INPUT;
-      o->depth_m = mm * 1e-3;
+      if (!read_real("--depth-mm", -10, 60, 1e-3, &o->depth_m)) return APP_BAD_INPUT;
+      break;
+    case 'D':
+    case 'V':
+    case 'T':
+    case 'W':
+      if (!read_vessel_option(c, o)) return APP_BAD_INPUT;
       break;
     case 'c': o->pathology = optarg; break;
     case 'i': o->image = optarg; break;
@@ -143,19 +175,17 @@ static sonde_status look(press *p, const char *image_path, sonde_error *error) {
   sonde_echo *echo = NULL;
   sonde_image image = {0};
   sonde_status status = sonde_interior_create(p->model, &interior, error);
+  if (!status && !isnan(p->vein_depth_m))
+    status =
+        sonde_interior_set_vein_depth(interior, p->site->position_m, p->vein_depth_m, error);
   if (status) goto done;
   sonde_interior_update(interior,
                         &(sonde_interior_input){sonde_state_positions(p->state),
                                                 sonde_state_contact_forces(p->state), p->pose,
                                                 &p->pathology, -1, sonde_state_tick(p->state),
                                                 p->probe.half_x_m, p->probe.half_y_m});
-  sonde_vessel_state vessel;
-  p->vein = p->artery = p->vein_short_m = NAN;
-  if (sonde_interior_vessel_at_plane(interior, 0, p->pose, &vessel)) {
-    p->vein = vessel.area_ratio;
-    p->vein_short_m = 2 * vessel.half_short_m;
-  }
-  if (sonde_interior_vessel_at_plane(interior, 1, p->pose, &vessel)) p->artery = vessel.area_ratio;
+  for (int which = 0; which < 2; ++which)
+    p->cut[which] = sonde_interior_vessel_at_plane(interior, which, p->pose, &p->vessel[which]);
   if (!image_path) goto done;
   sonde_echo_settings settings = sonde_echo_settings_default();
   status = sonde_echo_create(interior, &(sonde_echo_def){0}, &echo, error);
@@ -170,6 +200,26 @@ done:
   return status;
 }
 
+// Of one vessel; null when the plane misses it. Diameters before are those of the rest circle.
+static void print_vessel(const char *name, const sonde_vessel_state *v, bool cut) {
+  char key[64];
+  const double nan = NAN, mm = 1e3;
+  const struct {
+    const char *what;
+    double value;
+  } row[] = {{"area_ratio", v->area_ratio},
+             {"rest_area_mm2", 3.14159265358979 * v->rest_radius_m * v->rest_radius_m * mm * mm},
+             {"area_mm2", 3.14159265358979 * v->half_short_m * v->half_long_m * mm * mm},
+             {"rest_ap_mm", 2 * v->rest_radius_m * mm},
+             {"ap_mm", 2 * v->half_short_m * mm},
+             {"compressibility", v->half_short_m / v->rest_radius_m},
+             {"outside_kpa", v->outside_pa * 1e-3}};
+  for (size_t i = 0; i < sizeof row / sizeof row[0]; ++i) {
+    snprintf(key, sizeof key, "%s_%s", name, row[i].what);
+    app_json_real(key, cut ? row[i].value : nan);
+  }
+}
+
 static void print(const press *p, const options *o) {
   if (o->json) {
     app_json_begin();
@@ -177,9 +227,9 @@ static void print(const press *p, const options *o) {
     app_json_real("penetration_mm", p->depth_m * 1e3);
     app_json_real("reaction_n", p->settled.reaction_n);
     app_json_real("contact_n", p->settled.contact_n);
-    app_json_real("vein_area_ratio", p->vein);
-    app_json_real("artery_area_ratio", p->artery);
-    app_json_real("vein_short_mm", p->vein_short_m * 1e3);
+    print_vessel("vein", &p->vessel[0], p->cut[0]);
+    print_vessel("artery", &p->vessel[1], p->cut[1]);
+    app_json_real("vein_short_mm", p->cut[0] ? p->vessel[0].half_short_m * 2e3 : NAN);
     app_json_real("residual", p->settled.residual);
     app_json_integer("steps", p->steps);
     app_json_text("case", p->pathology.name);
@@ -192,19 +242,30 @@ static void print(const press *p, const options *o) {
   printf("force         %8.3f N\n", p->force_n);
   printf("penetration   %8.2f mm\n", p->depth_m * 1e3);
   printf("residual      %8.1e of the contact force (%u steps)\n", p->settled.residual, p->steps);
-  if (isnan(p->vein))
+  if (!p->cut[0])
     printf("vein          not under the probe\n");
   else
-    printf("vein area     %8.1f %% of rest, %.1f mm front to back\n", p->vein * 100,
-           p->vein_short_m * 1e3);
-  if (!isnan(p->artery)) printf("artery area   %8.1f %% of rest\n", p->artery * 100);
+    printf("vein area     %8.1f %% of rest, %.1f mm front to back (%.2f of rest)\n",
+           p->vessel[0].area_ratio * 100, p->vessel[0].half_short_m * 2e3,
+           p->vessel[0].half_short_m / p->vessel[0].rest_radius_m);
+  if (p->cut[1]) printf("artery area   %8.1f %% of rest\n", p->vessel[1].area_ratio * 100);
   if (o->image) printf("image         %s\n", o->image);
+}
+
+static void set_vein(press *p, const options *o) {
+  p->vein_depth_m = o->vein_depth_m;
+  if (!isnan(o->venous_pa)) p->pathology.venous_pressure_pa = o->venous_pa;
+  if (!isnan(o->wall_pa)) p->pathology.wall_shear_pa = o->wall_pa;
+  if (isnan(o->thrombus_pa)) return;
+  p->pathology.thrombus_fraction = 1;
+  p->pathology.thrombus_modulus_pa = 3 * o->thrombus_pa; // Young's, incompressible
 }
 
 static sonde_status prepare(press *p, const options *o, sonde_error *error) {
   sonde_preset preset = sonde_preset_default();
   sonde_world_def world = sonde_world_def_default();
   sonde_status status = sonde_pathology_preset(o->pathology, &p->pathology, error);
+  if (!status) set_vein(p, o);
   if (!status && o->preset) status = sonde_preset_load(o->preset, &preset, error);
   if (!status) status = sonde_probe_create(o->probe, &p->probe, error);
   if (!status) status = sonde_model_load(o->model, &p->model, error);
@@ -221,8 +282,15 @@ static sonde_status prepare(press *p, const options *o, sonde_error *error) {
 }
 
 int cmd_press(int argc, char **argv) {
-  options o = {
-      .site = -1, .probe = "linear", .pathology = "healthy", .force_n = NAN, .depth_m = NAN};
+  options o = {.site = -1,
+               .probe = "linear",
+               .pathology = "healthy",
+               .force_n = NAN,
+               .depth_m = NAN,
+               .vein_depth_m = NAN,
+               .venous_pa = NAN,
+               .thrombus_pa = NAN,
+               .wall_pa = NAN};
   int code = read_options(argc, argv, &o);
   if (code >= 0) return code;
   press p = {0};

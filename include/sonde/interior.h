@@ -93,6 +93,13 @@ SONDE_API void sonde_interior_set_method(sonde_interior *interior, sonde_interio
 /** Method that the last update used. @thread any */
 SONDE_API sonde_interior_method sonde_interior_used_method(const sonde_interior *interior);
 
+/** Moves the vein below a point of the skin, to the same depth along its whole course, and the
+ *  artery 11 mm beside it on its own side. Pressures and radii stay.
+ *  @return ARGUMENT for a depth out of the tissue @thread owner, before the next update */
+SONDE_API sonde_status sonde_interior_set_vein_depth(sonde_interior *interior,
+                                                     sonde_vec3 below_skin_m, double depth_m,
+                                                     sonde_error *error);
+
 /** What one update reads; all borrowed for the call. */
 typedef struct sonde_interior_input {
   const sonde_vec3 *positions_m;      /**< [nodes] deformed skin */
@@ -132,6 +139,34 @@ SONDE_API bool sonde_interior_vessel_at_plane(const sonde_interior *interior, in
                                               sonde_pose world_from_probe,
                                               sonde_vessel_state *state);
 SONDE_API uint64_t sonde_interior_tick(const sonde_interior *interior);
+
+/** Posture of the leg. */
+typedef enum sonde_posture {
+  SONDE_POSTURE_SUPINE,
+  SONDE_POSTURE_SITTING,
+  SONDE_POSTURE_STANDING,
+  SONDE_POSTURE_COUNT
+} sonde_posture;
+
+/** What moves the pressures in time. */
+typedef struct sonde_circulation {
+  sonde_posture posture;
+  double heart_rate_hz, systolic_pa, diastolic_pa;
+  double breath_rate_hz, breath_pa; /**< half swing of the venous pressure */
+  double valsalva_from_s, valsalva_to_s, valsalva_pa; /**< a strain and its plateau; none: equal */
+} sonde_circulation;
+
+/** 1.1 Hz, 120/80 mmHg, 0.25 Hz with 1.5 mmHg, no Valsalva (20 mmHg when timed). @thread any */
+SONDE_API sonde_circulation sonde_circulation_default(void);
+/** Pressure in the common femoral vein (Pa) at time t: posture, breath, Valsalva
+ *  (docs/interior.md). A function of t only. @thread any */
+SONDE_API double sonde_venous_pressure(const sonde_circulation *circulation, double t_s);
+/** Pressure in the femoral artery (Pa) at time t: between diastolic and systolic, periodic.
+ *  @thread any */
+SONDE_API double sonde_arterial_pressure(const sonde_circulation *circulation, double t_s);
+/** Both pressures of a pathology at a tick of `dt_s`. @thread any */
+SONDE_API void sonde_circulation_apply(const sonde_circulation *circulation, uint64_t tick,
+                                       double dt_s, sonde_pathology *pathology);
 
 #ifdef __cplusplus
 }

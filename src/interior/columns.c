@@ -9,6 +9,7 @@
 // factor_surface        five-point Laplacian of the skin in (theta, s), zero at both ends
 #include "base/base.h"
 #include "interior/interior.h"
+#include "interior/window.h"
 
 enum { THETA_COUNT = 128, S_COUNT_MAX = 256 };
 
@@ -242,4 +243,10 @@ sonde_status sonde_columns_create(sonde_interior *in, sonde_error *error) {
   slope_columns(in);
   store_field(in);
   return factor_surface(in, error);
+}
+
+void sonde_columns_refresh(sonde_interior *in) {
+  SONDE_ASSERT(in != NULL && in->field != NULL);
+  store_field(in);
+  in->live->ready = in->building = in->solid = false;
 }

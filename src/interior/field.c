@@ -12,8 +12,8 @@
 // tangential; at the bone both vanish.
 //
 // sonde_interior_solve         reads the skin, solves for Phi, stores the fluxes
-// sonde_interior_field         displacement at a point
-// sonde_interior_displacement  the same, zero outside and in bone
+// sonde_interior_field         displacement at a point: the solid's, or the columns'
+// sonde_interior_stress        the solid's
 // sonde_interior_invert        rest point by iteration
 // sonde_interior_locate        column coordinates and layers
 // sonde_interior_label         tissue
@@ -178,20 +178,6 @@ bool sonde_interior_locate(const sonde_interior *in, sonde_vec3 rest, sonde_colu
   return q.s >= in->s_low_m && q.s <= in->s_high_m;
 }
 
-sonde_vec3 sonde_interior_displacement(const sonde_interior *in, sonde_vec3 rest) {
-  SONDE_ASSERT(in != NULL);
-  sonde_column_point at;
-  if (!in->ready || !sonde_interior_locate(in, rest, &at)) return vec3(0, 0, 0);
-  if (at.depth_m < 0 || at.r <= in->bone_radius_m) return vec3(0, 0, 0);
-  return sonde_interior_field(in, rest);
-}
-
-void sonde_interior_displacements(const sonde_interior *in, uint32_t count,
-                                  const sonde_vec3 *rest, sonde_vec3 *out) {
-  SONDE_ASSERT(in != NULL && (count == 0 || (rest != NULL && out != NULL)));
-  for (uint32_t i = 0; i < count; ++i) out[i] = sonde_interior_displacement(in, rest[i]);
-}
-
 bool sonde_interior_stress(const sonde_interior *in, sonde_vec3 rest, sonde_mat3 *stress) {
   SONDE_ASSERT(in != NULL && stress != NULL);
   sonde_column_point at;
@@ -222,15 +208,6 @@ sonde_vec3 sonde_interior_invert(const sonde_interior *in, sonde_vec3 point, son
   }
   if (error_m != NULL) *error_m = least;
   return best;
-}
-
-sonde_vec3 sonde_interior_rest_point(const sonde_interior *in, sonde_vec3 point) {
-  SONDE_ASSERT(in != NULL);
-  if (!in->ready) return point;
-  sonde_vec3 rest = sonde_interior_invert(in, point, point, 40, NULL);
-  sonde_column_point at;
-  bool within = sonde_interior_locate(in, rest, &at);
-  return within && at.depth_m >= -1e-6 ? rest : point;
 }
 
 // Vessel label of a rest point, LABEL_COUNT when it lies in none.

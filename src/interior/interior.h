@@ -105,11 +105,16 @@ bool sonde_interior_follow(sonde_interior *interior, const sonde_interior_input 
 sonde_status sonde_columns_create(sonde_interior *interior, sonde_error *error);
 sonde_status sonde_stations_create(sonde_interior *interior, sonde_error *error);
 
+// Layer depths of the table again as the model gives them; windows have to be made again.
+void sonde_columns_refresh(sonde_interior *interior);
+
 // Ellipse of the vein (0) or artery (1) with that area ratio: half axes over the rest radius.
 void sonde_vessel_shape(int which, const sonde_pathology *pathology, bool clot, double ratio,
                         double *half_short, double *half_long);
 // Radius of the vein at rest relative to the healthy one at 10 mmHg.
 double sonde_vein_rest_scale(const sonde_pathology *pathology, bool clot);
+// Radius of the artery at its pressure relative to that at 95 mmHg.
+double sonde_artery_rest_scale(const sonde_pathology *pathology);
 // True where a thrombus lies.
 bool sonde_pathology_clot(const sonde_pathology *pathology, double z_m);
 

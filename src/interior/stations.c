@@ -1,6 +1,7 @@
 // Stations of the vessels: the model's centre lines cut into equal pieces.
 //
 // sonde_stations_create  both vessels
+// sonde_interior_set_vein_depth  moves both
 // resample               points at equal arc length, ascending along the femur's axis
 // place_station          facts of one station
 // raise_fascia           keeps the vessels below the fat
@@ -8,6 +9,7 @@
 #include "interior/interior.h"
 
 static const double spacing_m = 5e-3;
+static const double artery_aside_m = 11e-3; // between the middles, when they are placed
 static const double clearance_m = 1.5e-3, bump_radius_m = 20e-3;
 
 static double line_length(const sonde_vessel *line) {
@@ -109,11 +111,70 @@ static void rest_state(sonde_interior *in, int which) {
   }
 }
 
-sonde_status sonde_stations_create(sonde_interior *in, sonde_error *error) {
-  sonde_status status = resample(in, 0, &in->model->vein, error);
-  if (status == SONDE_OK) status = resample(in, 1, &in->model->artery, error);
+static sonde_status lay_out(sonde_interior *in, const sonde_vessel *vein,
+                            const sonde_vessel *artery, sonde_error *error) {
+  sonde_status status = resample(in, 0, vein, error);
+  if (status == SONDE_OK) status = resample(in, 1, artery, error);
   if (status != SONDE_OK) return status;
   for (int which = 0; which < 2; ++which) rest_state(in, which);
   for (int which = 0; which < 2; ++which) raise_fascia(in, which);
   return SONDE_OK;
+}
+
+sonde_status sonde_stations_create(sonde_interior *in, sonde_error *error) {
+  return lay_out(in, &in->model->vein, &in->model->artery, error);
+}
+
+// Point at angle theta and row s, `depth` below the skin.
+static sonde_vec3 below_skin(const sonde_interior *in, double theta, double s, double depth) {
+  sonde_column_point at;
+  sonde_interior_column(in, theta, s, &at);
+  double r = at.radius_m - depth / at.cosine;
+  sonde_vec3 p = v_madd(in->origin, s, in->axis);
+  return v_madd(v_madd(p, r * cos(theta), in->e1), r * sin(theta), in->e2);
+}
+
+// The line keeps its course and its radii, turned about the femur's axis by `turn`.
+static void move_line(const sonde_interior *in, sonde_vessel *line, double turn, double depth) {
+  for (uint32_t i = 0; i < line->count; ++i) {
+    sonde_column_point at;
+    (void)sonde_interior_locate(in, line->point[i].centre_m, &at);
+    line->point[i].centre_m = below_skin(in, at.theta + turn, at.s, depth);
+    line->point[i].depth_m = depth;
+  }
+}
+
+// Angle of the line at row s.
+static double angle_at(const sonde_interior *in, const sonde_vessel *line, double s) {
+  double nearest = INFINITY, theta = 0;
+  for (uint32_t i = 0; i < line->count; ++i) {
+    sonde_column_point at;
+    (void)sonde_interior_locate(in, line->point[i].centre_m, &at);
+    if (fabs(at.s - s) < nearest) nearest = fabs(at.s - s), theta = at.theta;
+  }
+  return theta;
+}
+
+sonde_status sonde_interior_set_vein_depth(sonde_interior *in, sonde_vec3 below_m, double depth_m,
+                                           sonde_error *error) {
+  SONDE_ASSERT(in != NULL && v_finite(below_m));
+  sonde_vessel vein = in->model->vein, artery = in->model->artery;
+  sonde_column_point at;
+  bool within = sonde_interior_locate(in, below_m, &at);
+  double deepest = (at.radius_m - in->bone_radius_m) * at.cosine - 8e-3;
+  if (!within || vein.count < 2)
+    return sonde_fail(error, SONDE_ARGUMENT, "expected a point of a leg with a vein");
+  if (!(depth_m >= 8e-3) || !(depth_m <= deepest))
+    return sonde_fail(error, SONDE_ARGUMENT, "vein depth %g mm, expected 8 to %.0f mm here",
+                      depth_m * 1e3, deepest * 1e3);
+  double side = artery.count >= 2 ? remainder(angle_at(in, &artery, at.s) -
+                                                  angle_at(in, &vein, at.s),
+                                              2 * SONDE_PI)
+                                  : 0;
+  double beside = asin(fmin(artery_aside_m / (at.radius_m - depth_m), 0.9));
+  double turn = at.theta - angle_at(in, &vein, at.s);
+  move_line(in, &vein, turn, depth_m);
+  move_line(in, &artery, turn + (side < 0 ? -beside : beside) - side, depth_m);
+  sonde_columns_refresh(in);
+  return lay_out(in, &vein, &artery, error);
 }

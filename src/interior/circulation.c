@@ -1,0 +1,64 @@
+// Pressures of the femoral vessels in time: closed functions of t, so that a tick says all.
+//
+// sonde_venous_pressure    posture + breath + Valsalva
+// sonde_arterial_pressure  a pulse of two waves between diastolic and systolic
+// strain_share             rise, plateau and fall of a Valsalva manoeuvre
+#include "base/base.h"
+#include "interior/interior.h"
+
+// Venous pressure at the groin, mmHg: supine about 10, sitting and standing by the column of blood
+// up to the heart, part of it carried by the valves (docs/interior.md).
+static const double posture_mmhg[SONDE_POSTURE_COUNT] = {10, 25, 40};
+static const double rise_s = 0.6; // of a strain, and of its release
+
+sonde_circulation sonde_circulation_default(void) {
+  return (sonde_circulation){.posture = SONDE_POSTURE_SUPINE,
+                             .heart_rate_hz = 1.1,
+                             .systolic_pa = 120 * SONDE_PA_PER_MMHG,
+                             .diastolic_pa = 80 * SONDE_PA_PER_MMHG,
+                             .breath_rate_hz = 0.25,
+                             .breath_pa = 1.5 * SONDE_PA_PER_MMHG,
+                             .valsalva_pa = 20 * SONDE_PA_PER_MMHG};
+}
+
+static double smooth(double x) {
+  x = clamp(x, 0, 1);
+  return x * x * (3 - 2 * x);
+}
+
+static double strain_share(const sonde_circulation *c, double t) {
+  if (!(c->valsalva_to_s > c->valsalva_from_s)) return 0;
+  return smooth((t - c->valsalva_from_s) / rise_s) *
+         (1 - smooth((t - c->valsalva_to_s) / rise_s));
+}
+
+// Inspiration raises the pressure in the belly and with it that of the leg's veins. A strain holds
+// the breath.
+double sonde_venous_pressure(const sonde_circulation *c, double t) {
+  SONDE_ASSERT(c != NULL && c->posture < SONDE_POSTURE_COUNT && isfinite(t));
+  double strain = strain_share(c, t);
+  double breath = c->breath_pa * sin(2 * SONDE_PI * fmod(c->breath_rate_hz * t, 1));
+  return posture_mmhg[c->posture] * SONDE_PA_PER_MMHG + (1 - strain) * breath +
+         strain * c->valsalva_pa;
+}
+
+// Systolic wave, dicrotic wave; the sum spans exactly 0..1 over a beat.
+static double pulse(double phase) {
+  double rise = smooth(phase / 0.14), fall = 1 - smooth((phase - 0.14) / 0.42);
+  double echo = 0.18 * smooth((phase - 0.40) / 0.10) * (1 - smooth((phase - 0.50) / 0.5));
+  return fmin(rise * fall + echo, 1);
+}
+
+double sonde_arterial_pressure(const sonde_circulation *c, double t) {
+  SONDE_ASSERT(c != NULL && isfinite(t));
+  double beats = c->heart_rate_hz * t, phase = beats - floor(beats);
+  return c->diastolic_pa + (c->systolic_pa - c->diastolic_pa) * pulse(phase);
+}
+
+void sonde_circulation_apply(const sonde_circulation *c, uint64_t tick, double dt_s,
+                             sonde_pathology *pathology) {
+  SONDE_ASSERT(pathology != NULL && dt_s > 0);
+  double t = (double)tick * dt_s;
+  pathology->venous_pressure_pa = sonde_venous_pressure(c, t);
+  pathology->arterial_pressure_pa = sonde_arterial_pressure(c, t);
+}
