@@ -193,22 +193,26 @@ bool sonde_solid_factor(sonde_solid *s) {
 
 // ---- reading ------------------------------------------------------------------------------
 
-sonde_vec3 sonde_solid_moved(const sonde_solid *s, uint32_t node) {
-  SONDE_ASSERT(node < s->node_count);
+static sonde_vec3 moved_in(const sonde_solid *s, const float *x, uint32_t node) {
   uint32_t at = s->unknown[node];
   if (at == SONDE_FRONT_NONE) return vec3(0, 0, 0);
-  const float *x = s->x + 3 * (size_t)at;
+  x += 3 * (size_t)at;
   return vec3((double)x[0], (double)x[1], (double)x[2]);
 }
 
-sonde_mat3 sonde_solid_stress(const sonde_solid *s, uint32_t hex) {
+sonde_vec3 sonde_solid_moved(const sonde_solid *s, uint32_t node) {
+  SONDE_ASSERT(node < s->node_count);
+  return moved_in(s, s->x, node);
+}
+
+sonde_mat3 sonde_solid_stress(const sonde_solid *s, const float *x, uint32_t hex) {
   SONDE_ASSERT(hex < s->hex_count);
   const sonde_solid_hex *h = &s->hex[hex];
   sonde_vec3 g[8];
   (void)gradients(s, h, 0, 0, 0, g);
   sonde_mat3 grad = m_zero();
   for (int n = 0; n < 8; ++n) {
-    sonde_vec3 u = sonde_solid_moved(s, h->node[n]);
+    sonde_vec3 u = moved_in(s, x, h->node[n]);
     double ua[3] = {u.x, u.y, u.z}, ga[3] = {g[n].x, g[n].y, g[n].z};
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) grad.m[i][j] += ua[i] * ga[j];

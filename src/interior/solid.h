@@ -40,8 +40,9 @@ void sonde_solid_matrix(const void *solid, uint32_t hex, double (*k)[24]);
 bool sonde_solid_factor(sonde_solid *solid);
 
 sonde_vec3 sonde_solid_moved(const sonde_solid *solid, uint32_t node);
-// Mean Cauchy stress (Pa, tension positive) of an element.
-sonde_mat3 sonde_solid_stress(const sonde_solid *solid, uint32_t hex);
+// Stress (Pa, tension positive) in the middle of an element under displacements x (solid->x or
+// another solution of the same shape).
+sonde_mat3 sonde_solid_stress(const sonde_solid *solid, const float *x, uint32_t hex);
 // Change of an element's volume over its volume at rest, exact for the moved corners.
 double sonde_solid_dilatation(const sonde_solid *solid, uint32_t hex, double *rest_m3);
 

@@ -70,7 +70,8 @@ sonde_status sonde_window_create(sonde_window **window, sonde_error *error) {
   w->compliance = SONDE_NEW(double, 2 * side * side);
   w->touched = SONDE_NEW(sonde_touched, SONDE_WINDOW_TOUCHED);
   w->scratch = SONDE_NEW(double, 12 * SONDE_WINDOW_TOUCHED + 2 * side);
-  if (!status && (!w->compliance || !w->touched || !w->scratch)) status = sonde_fail_memory(error);
+  w->pressed = SONDE_NEW(float, 3 * (size_t)SONDE_WINDOW_NODES);
+  if (!status && (!w->pressed || !w->compliance || !w->touched || !w->scratch)) status = sonde_fail_memory(error);
   if (!status) {
     list_hexes(&w->solid);
     status = connect(w, error);
@@ -87,6 +88,7 @@ void sonde_window_destroy(sonde_window *w) {
   sonde_solid_clear(&w->solid);
   sonde_free(w->compliance);
   sonde_free(w->touched);
+  sonde_free(w->pressed);
   sonde_free(w->scratch);
   sonde_free(w);
 }
@@ -146,6 +148,7 @@ void sonde_window_begin(sonde_window *w, const sonde_interior *in, sonde_window_
   sonde_column_point at;
   w->place = place;
   w->ready = w->loaded = false;
+  w->pressed_key = 0;
   sonde_interior_column(in, place.theta, place.s, &at);
   spread_rows(w, in->s_low_m, in->s_high_m);
   spread_columns(w, at.radius_m);

@@ -5,6 +5,10 @@
 // Under the contact the skin's displacement is prescribed; everywhere else the skin is free and
 // follows from equilibrium. The solid knows the compliance of the skin nodes near the probe, finds
 // the forces that move the touched points as prescribed and recovers the inside from them.
+//
+// Two solutions: every touched point moves as it does (displacement), and all move by one length
+// along the beam (stress per newton). A linear solid does not stiffen where a flat face digs in; the
+// second lets the edges of the face carry what they carry in the finite-element study.
 #ifndef SONDE_SRC_WINDOW_H
 #define SONDE_SRC_WINDOW_H
 
@@ -33,7 +37,7 @@ typedef struct sonde_window_place {
 typedef struct sonde_touched {
   uint32_t near[4]; // places among the near skin nodes
   double weight[4];
-  double move[3], force[3]; // leg frame; force on the skin
+  double move[3], kept[3]; // leg frame
 } sonde_touched;
 
 typedef struct sonde_window {
@@ -47,8 +51,11 @@ typedef struct sonde_window {
   uint32_t touched_count;
   sonde_touched *touched;            // [SONDE_WINDOW_TOUCHED]
   double *scratch;                   // of the contact's solver
-  double reaction_n;                 // along the beam, of the linear solid
-  double stress_scale;               // contact force over reaction
+  float *pressed;                    // [3*unknowns] displacements under a unit motion
+  double reaction_n;                 // along the beam, to the motion as it is
+  double stress_scale;               // contact force over the reaction to the unit motion
+  double pressed_n_m;                // that reaction
+  uint64_t pressed_key;              // the contact it was found for
   bool loaded;
   uint32_t iterations;
 } sonde_window;

@@ -16,6 +16,7 @@ enum { NT = SONDE_WINDOW_THETA, NS = SONDE_WINDOW_S, NL = SONDE_WINDOW_LEVELS };
 enum { SIDE = 3 * SONDE_WINDOW_NEAR, MOST_ITERATIONS = 80 };
 
 static const double give = 0.02;      // of the points' mean compliance: dense points do not fight
+static const double face_edge_m = 0.3e-3;
 static const double tolerance = 2e-3; // of the prescribed motion
 
 // ---- cells --------------------------------------------------------------------------------
@@ -148,9 +149,9 @@ static void list_active(const sonde_window *w, contact *c) {
 }
 
 // Displacements of all near nodes under the forces, then everything else.
-static void recover(sonde_window *w, const contact *c) {
-  sonde_solid *s = &w->solid;
-  float *last = s->x + 3 * (size_t)(s->unknown_count - s->last_count);
+static void recover(const sonde_window *w, const contact *c, float *x) {
+  const sonde_solid *s = &w->solid;
+  float *last = x + 3 * (size_t)(s->unknown_count - s->last_count);
   for (uint32_t row = 0; row < SIDE; ++row) {
     const double *of = w->compliance + (size_t)row * SIDE;
     double sum = 0;
@@ -160,7 +161,14 @@ static void recover(sonde_window *w, const contact *c) {
     }
     last[row] = (float)sum;
   }
-  sonde_fronts_recover(s->fronts, s->x);
+  sonde_fronts_recover(s->fronts, x);
+}
+
+// Nodes beside the face carry a share of the contact but do not lie under it.
+static bool under_face(const sonde_interior_input *input, sonde_vec3 now) {
+  sonde_vec3 q = pose_apply_inverse(input->world_from_probe, now);
+  double x = input->face_half_x_m, y = input->face_half_y_m;
+  return !(x > 0) || !(y > 0) || (fabs(q.x) <= x + face_edge_m && fabs(q.y) <= y + face_edge_m);
 }
 
 // A mesh coarser than the elements would leave the skin free between its vertices: the columns of
@@ -179,7 +187,7 @@ static void touch_columns(sonde_window *w, const sonde_interior *in,
       all = all && v_dot(input->contact_forces_n[c->node[n]], beam) > 0;
       now = v_madd(now, c->weight[n], input->positions_m[c->node[n]]);
     }
-    if (!all) continue;
+    if (!all || !under_face(input, now)) continue;
     touch(w, in, c->rest_m, v_scale(beam, v_dot(v_sub(now, c->rest_m), beam)));
   }
 }
@@ -193,6 +201,7 @@ static double read_contact(sonde_window *w, const sonde_interior *in,
     double f = v_dot(input->contact_forces_n[v], beam);
     if (!(f > 0)) continue;
     force += f;
+    if (!under_face(input, input->positions_m[v])) continue;
     sonde_vec3 move = v_sub(input->positions_m[v], skin->vertices[v]);
     move = v_scale(beam, v_dot(move, beam));
     touch(w, in, skin->vertices[v], move);
@@ -201,25 +210,63 @@ static double read_contact(sonde_window *w, const sonde_interior *in,
   return force;
 }
 
+// Solves for `move`, leaves x; the reaction along the beam.
+static double respond(sonde_window *w, contact *c, const double along[3], float *x) {
+  double *f = w->scratch + 2 * SIDE, reaction = 0;
+  solve_forces(w, c, f, f + 3 * c->count);
+  gather(w, f, c);
+  recover(w, c, x);
+  for (uint32_t i = 0; i < 3 * c->count; ++i) reaction += f[i] * along[i % 3];
+  return reaction;
+}
+
+// FNV-1a over what the response to a unit motion depends on.
+static uint64_t contact_key(const sonde_window *w, const double along[3]) {
+  uint64_t key = 14695981039346656037u;
+  for (uint32_t p = 0; p <= w->touched_count; ++p) {
+    bool end = p == w->touched_count;
+    const void *from = end ? (const void *)along : (const void *)w->touched[p].weight;
+    const unsigned char *byte = from;
+    size_t count = end ? 3 * sizeof *along : sizeof w->touched[p].weight;
+    for (size_t k = 0; k < count; ++k) key = (key ^ byte[k]) * 1099511628211u;
+    if (!end) key = (key ^ w->touched[p].near[0]) * 1099511628211u;
+  }
+  return key;
+}
+
+// The response to a unit motion depends on which points are touched only: found again when they
+// change.
+static void press_evenly(sonde_window *w, contact *c, const double along[3]) {
+  uint64_t key = contact_key(w, along);
+  if (key == w->pressed_key) return;
+  for (uint32_t p = 0; p < c->count; ++p) {
+    sonde_touched *t = &w->touched[p];
+    memcpy(t->kept, t->move, sizeof t->move);
+    memcpy(t->move, along, sizeof t->move);
+  }
+  w->pressed_n_m = respond(w, c, along, w->pressed);
+  for (uint32_t p = 0; p < c->count; ++p)
+    memcpy(w->touched[p].move, w->touched[p].kept, sizeof w->touched[p].move);
+  w->pressed_key = key;
+}
+
 bool sonde_window_update(sonde_window *w, const sonde_interior *in,
                          const sonde_interior_input *input) {
   SONDE_ASSERT(w != NULL && w->ready && input != NULL);
   uint32_t nodes[SONDE_WINDOW_NEAR];
   sonde_vec3 beam = q_rotate(input->world_from_probe.rotation, vec3(0, 0, 1));
+  double along[3] = {v_dot(beam, in->e1), v_dot(beam, in->e2), v_dot(beam, in->axis)};
   double force = read_contact(w, in, input, beam);
   w->loaded = w->touched_count > 0;
   if (!w->loaded) return false;
-  contact c = {.count = w->touched_count, .node = nodes, .force = w->scratch,
+  contact c = {.count = w->touched_count,
+               .node = nodes,
+               .force = w->scratch,
                .moved = w->scratch + SIDE};
-  double *f = w->scratch + 2 * SIDE;
   list_active(w, &c);
-  solve_forces(w, &c, f, f + 3 * c.count);
-  gather(w, f, &c);
-  recover(w, &c);
-  double along[3] = {v_dot(beam, in->e1), v_dot(beam, in->e2), v_dot(beam, in->axis)};
-  w->reaction_n = 0;
-  for (uint32_t i = 0; i < 3 * c.count; ++i) w->reaction_n += f[i] * along[i % 3];
-  w->stress_scale = w->reaction_n > 1e-6 ? force / w->reaction_n : 0;
+  press_evenly(w, &c, along);
+  w->reaction_n = respond(w, &c, along, w->solid.x);
+  w->stress_scale = w->pressed_n_m > 0 ? force / w->pressed_n_m : 0;
   return true;
 }
 
@@ -295,7 +342,7 @@ bool sonde_window_stress(const sonde_window *w, double theta, double s, double r
     uint32_t i = (c.i + di + NT - 1) % NT, j = c.j + dj, l = layer_within(level, dl);
     j = j < 1 ? 0 : j - 1 > NS - 2 ? NS - 2 : j - 1;
     double share = f[0][di] * f[1][dj] * f[2][dl];
-    sonde_mat3 of = sonde_solid_stress(&w->solid, (j * NT + i) * (NL - 1) + l);
+    sonde_mat3 of = sonde_solid_stress(&w->solid, w->pressed, (j * NT + i) * (NL - 1) + l);
     *stress = m_add(*stress, m_scale(of, share * w->stress_scale));
   }
   return true;
