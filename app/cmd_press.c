@@ -51,7 +51,7 @@ typedef struct press {
   double depth_m, force_n;
   sonde_settle_result settled;
   uint32_t steps;
-  double vein_depth_m;                       // NaN: where the model has it
+  double vein_depth_m;          // NaN: where the model has it
   sonde_vessel_state vessel[2]; // vein, artery
   bool cut[2];                  // the image plane meets it
 } press;
@@ -79,16 +79,20 @@ static bool read_vessel_option(int c, options *o) {
 
 // Returns -1 to go on, else the exit code.
 static int read_options(int argc, char **argv, options *o) {
-  static const struct option LONG[] = {
-      {"site", required_argument, NULL, 's'},    {"probe", required_argument, NULL, 'p'},
-      {"force-n", required_argument, NULL, 'f'}, {"depth-mm", required_argument, NULL, 'd'},
-      {"case", required_argument, NULL, 'c'},    {"image", required_argument, NULL, 'i'},
-      {"preset", required_argument, NULL, 'P'},  {"json", no_argument, NULL, 'j'},
-      {"vein-depth-mm", required_argument, NULL, 'D'},
-      {"venous-mmhg", required_argument, NULL, 'V'},
-      {"thrombus-kpa", required_argument, NULL, 'T'},
-      {"wall-kpa", required_argument, NULL, 'W'},
-      {"help", no_argument, NULL, 'h'},          {NULL, 0, NULL, 0}};
+  static const struct option LONG[] = {{"site", required_argument, NULL, 's'},
+                                       {"probe", required_argument, NULL, 'p'},
+                                       {"force-n", required_argument, NULL, 'f'},
+                                       {"depth-mm", required_argument, NULL, 'd'},
+                                       {"case", required_argument, NULL, 'c'},
+                                       {"image", required_argument, NULL, 'i'},
+                                       {"preset", required_argument, NULL, 'P'},
+                                       {"json", no_argument, NULL, 'j'},
+                                       {"vein-depth-mm", required_argument, NULL, 'D'},
+                                       {"venous-mmhg", required_argument, NULL, 'V'},
+                                       {"thrombus-kpa", required_argument, NULL, 'T'},
+                                       {"wall-kpa", required_argument, NULL, 'W'},
+                                       {"help", no_argument, NULL, 'h'},
+                                       {NULL, 0, NULL, 0}};
   for (int c; (c = getopt_long(argc, argv, "", LONG, NULL)) != -1;) switch (c) {
     case 's':
       if (!app_parse_integer("press", "--site", optarg, 0, 1000000, &o->site)) return APP_BAD_INPUT;
@@ -176,8 +180,7 @@ static sonde_status look(press *p, const char *image_path, sonde_error *error) {
   sonde_image image = {0};
   sonde_status status = sonde_interior_create(p->model, &interior, error);
   if (!status && !isnan(p->vein_depth_m))
-    status =
-        sonde_interior_set_vein_depth(interior, p->site->position_m, p->vein_depth_m, error);
+    status = sonde_interior_set_vein_depth(interior, p->site->position_m, p->vein_depth_m, error);
   if (status) goto done;
   sonde_interior_update(interior,
                         &(sonde_interior_input){sonde_state_positions(p->state),

@@ -36,7 +36,7 @@ typedef struct sonde_pathology {
   double thrombus_modulus_pa;            /**< Young's modulus of the solid */
   double thrombus_from_m, thrombus_to_m; /**< extent along the leg (model z); all when equal */
   double lumen_scale;                    /**< rest radius relative to the healthy vein */
-  double echogenicity; /**< backscatter of the thrombus relative to muscle, 0..1 */
+  double echogenicity;  /**< backscatter of the thrombus relative to muscle, 0..1 */
   double wall_shear_pa; /**< shear modulus of the vein's wall; 0: 30 kPa */
 } sonde_pathology;
 
@@ -152,7 +152,7 @@ typedef enum sonde_posture {
 typedef struct sonde_circulation {
   sonde_posture posture;
   double heart_rate_hz, systolic_pa, diastolic_pa;
-  double breath_rate_hz, breath_pa; /**< half swing of the venous pressure */
+  double breath_rate_hz, breath_pa;                   /**< half swing of the venous pressure */
   double valsalva_from_s, valsalva_to_s, valsalva_pa; /**< a strain and its plateau; none: equal */
 } sonde_circulation;
 

@@ -8,7 +8,7 @@
 #include "base/base.h"
 #include "interior/interior.h"
 
-static const double reach = 3.0;        // rest radii over which a wall's motion fades
+static const double reach = 3.0;         // rest radii over which a wall's motion fades
 static const double engaged_loss = 0.05; // share of the area from which the wall leads fully
 
 typedef struct pulled {

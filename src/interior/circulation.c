@@ -28,8 +28,7 @@ static double smooth(double x) {
 
 static double strain_share(const sonde_circulation *c, double t) {
   if (!(c->valsalva_to_s > c->valsalva_from_s)) return 0;
-  return smooth((t - c->valsalva_from_s) / rise_s) *
-         (1 - smooth((t - c->valsalva_to_s) / rise_s));
+  return smooth((t - c->valsalva_from_s) / rise_s) * (1 - smooth((t - c->valsalva_to_s) / rise_s));
 }
 
 // Inspiration raises the pressure in the belly and with it that of the leg's veins. A strain holds

@@ -12,7 +12,7 @@
 #include "base/base.h"
 #include "interior/interior.h"
 
-static const double contact_area = 0.06;          // of the stress-free area: walls begin to touch
+static const double contact_area = 0.06; // of the stress-free area: walls begin to touch
 static const double study_wall_pa = 30e3, least_wall_pa = 10e3, most_wall_pa = 300e3;
 static const double ring_inner_share = 0.797; // (4.16/4.66)^2
 static const double artery_wall_pa = 150e3, artery_inner_share = 0.633, muscle_pa = 3.6e3;

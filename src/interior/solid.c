@@ -82,7 +82,8 @@ static double gradients(const sonde_solid *s, const sonde_solid_hex *h, double a
     j[2] = v_madd(j[2], local[n].z, p);
   }
   double det = v_dot(j[0], v_cross(j[1], j[2]));
-  sonde_vec3 dual[3] = {v_scale(v_cross(j[1], j[2]), 1 / det), v_scale(v_cross(j[2], j[0]), 1 / det),
+  sonde_vec3 dual[3] = {v_scale(v_cross(j[1], j[2]), 1 / det),
+                        v_scale(v_cross(j[2], j[0]), 1 / det),
                         v_scale(v_cross(j[0], j[1]), 1 / det)};
   for (int n = 0; n < 8; ++n) {
     g[n] = v_scale(dual[0], local[n].x);
@@ -134,8 +135,7 @@ static double face_gradients(const sonde_solid *s, const sonde_solid_hex *h, dou
   *normal = v_scale(cross, 1 / area);
   sonde_vec3 dual[2] = {v_scale(v_cross(t[1], *normal), 1 / area),
                         v_scale(v_cross(*normal, t[0]), 1 / area)};
-  for (int n = 0; n < 4; ++n)
-    g[n] = v_madd(v_scale(dual[0], local[n][0]), local[n][1], dual[1]);
+  for (int n = 0; n < 4; ++n) g[n] = v_madd(v_scale(dual[0], local[n][0]), local[n][1], dual[1]);
   return area;
 }
 
@@ -187,7 +187,8 @@ void sonde_solid_matrix(const void *user, uint32_t hex, double (*k)[24]) {
 bool sonde_solid_factor(sonde_solid *s) {
   SONDE_ASSERT(s->fronts != NULL);
   sonde_fronts_begin(s->fronts);
-  while (!sonde_fronts_step(s->fronts, sonde_solid_matrix, s, UINT64_MAX)) {}
+  while (!sonde_fronts_step(s->fronts, sonde_solid_matrix, s, UINT64_MAX)) {
+  }
   return !sonde_fronts_failed(s->fronts);
 }
 

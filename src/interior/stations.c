@@ -167,10 +167,10 @@ sonde_status sonde_interior_set_vein_depth(sonde_interior *in, sonde_vec3 below_
   if (!(depth_m >= 8e-3) || !(depth_m <= deepest))
     return sonde_fail(error, SONDE_ARGUMENT, "vein depth %g mm, expected 8 to %.0f mm here",
                       depth_m * 1e3, deepest * 1e3);
-  double side = artery.count >= 2 ? remainder(angle_at(in, &artery, at.s) -
-                                                  angle_at(in, &vein, at.s),
-                                              2 * SONDE_PI)
-                                  : 0;
+  double side =
+      artery.count >= 2
+          ? remainder(angle_at(in, &artery, at.s) - angle_at(in, &vein, at.s), 2 * SONDE_PI)
+          : 0;
   double beside = asin(fmin(artery_aside_m / (at.radius_m - depth_m), 0.9));
   double turn = at.theta - angle_at(in, &vein, at.s);
   move_line(in, &vein, turn, depth_m);

@@ -130,8 +130,7 @@ static void update_station(sonde_interior *in, int which, uint32_t i, const load
   bool clot = which == 0 && sonde_pathology_clot(p, station->rest_m.z);
   sonde_pathology local = *p;
   if (!clot) local.thrombus_fraction = 0;
-  double scale =
-      which == 0 ? sonde_vein_rest_scale(&local, clot) : sonde_artery_rest_scale(&local);
+  double scale = which == 0 ? sonde_vein_rest_scale(&local, clot) : sonde_artery_rest_scale(&local);
   double outside;
   if (!solid_pressure(in, station, &outside)) outside = rectangle_pressure(in, station, l);
   double goal = which == 0 ? sonde_vein_area_ratio(&local, outside)

@@ -71,7 +71,8 @@ sonde_status sonde_window_create(sonde_window **window, sonde_error *error) {
   w->touched = SONDE_NEW(sonde_touched, SONDE_WINDOW_TOUCHED);
   w->scratch = SONDE_NEW(double, 12 * SONDE_WINDOW_TOUCHED + 2 * side);
   w->pressed = SONDE_NEW(float, 3 * (size_t)SONDE_WINDOW_NODES);
-  if (!status && (!w->pressed || !w->compliance || !w->touched || !w->scratch)) status = sonde_fail_memory(error);
+  if (!status && (!w->pressed || !w->compliance || !w->touched || !w->scratch))
+    status = sonde_fail_memory(error);
   if (!status) {
     list_hexes(&w->solid);
     status = connect(w, error);
@@ -104,7 +105,8 @@ static double sum_of(const double *d, uint32_t count) {
 static void spread_rows(sonde_window *w, double low, double high) {
   double half = w->place.half_s_m + margin_s_m;
   half = fmin(half, 0.4 * (high - low));
-  double s = clamp(w->place.s, low + half, high - half), step = 2 * half / (SONDE_WINDOW_NEAR_S - 1);
+  double s = clamp(w->place.s, low + half, high - half),
+         step = 2 * half / (SONDE_WINDOW_NEAR_S - 1);
   double down = fmin(reach_m, s - half - low), up = fmin(reach_m, high - s - half);
   uint32_t first = near_first_row(), last = first + SONDE_WINDOW_NEAR_S - 1;
   for (uint32_t k = 0; k < SONDE_WINDOW_NEAR_S; ++k) w->s[first + k] = s - half + step * k;
@@ -135,8 +137,8 @@ static void place_column(sonde_window *w, const sonde_interior *in, uint32_t i, 
   double height = at.radius_m - in->bone_radius_m;
   double fat = clamp(at.muscle_m / at.cosine, 2.5e-3, 0.6 * height);
   for (uint32_t l = 0; l < NL; ++l) {
-    double depth = l <= SONDE_WINDOW_FAT ? fat * l / SONDE_WINDOW_FAT
-                                         : fat + (height - fat) * muscle_level[l];
+    double depth =
+        l <= SONDE_WINDOW_FAT ? fat * l / SONDE_WINDOW_FAT : fat + (height - fat) * muscle_level[l];
     double r = at.radius_m - depth;
     w->radius[j * NT + i][l] = (float)r;
     w->solid.node[node_of(i, j, l)] = vec3(r * cos(theta), r * sin(theta), s);
@@ -148,7 +150,6 @@ void sonde_window_begin(sonde_window *w, const sonde_interior *in, sonde_window_
   sonde_column_point at;
   w->place = place;
   w->ready = w->loaded = false;
-  w->pressed_key = 0;
   sonde_interior_column(in, place.theta, place.s, &at);
   spread_rows(w, in->s_low_m, in->s_high_m);
   spread_columns(w, at.radius_m);

@@ -6,9 +6,10 @@
 // follows from equilibrium. The solid knows the compliance of the skin nodes near the probe, finds
 // the forces that move the touched points as prescribed and recovers the inside from them.
 //
-// Two solutions: every touched point moves as it does (displacement), and all move by one length
-// along the beam (stress per newton). A linear solid does not stiffen where a flat face digs in; the
-// second lets the edges of the face carry what they carry in the finite-element study.
+// Two solutions: every touched point moves as it does (displacement), and the touched rectangle of
+// the face moves by one length along the beam (stress per newton). A linear solid does not stiffen
+// where a flat face digs in; the second lets the edges of the face carry what they carry in the
+// finite-element study.
 #ifndef SONDE_SRC_WINDOW_H
 #define SONDE_SRC_WINDOW_H
 
@@ -16,11 +17,12 @@
 #include "interior/solid.h"
 
 enum {
-  SONDE_WINDOW_THETA = 27,  // columns around
-  SONDE_WINDOW_S = 19,      // rows along
-  SONDE_WINDOW_LEVELS = 8,  // skin .. bone
-  SONDE_WINDOW_FAT = 2,     // level of the fat/muscle interface
-  SONDE_WINDOW_NEAR_T = 15, // columns and rows whose skin can be touched: first columns, middle rows
+  SONDE_WINDOW_THETA = 27, // columns around
+  SONDE_WINDOW_S = 19,     // rows along
+  SONDE_WINDOW_LEVELS = 8, // skin .. bone
+  SONDE_WINDOW_FAT = 2,    // level of the fat/muscle interface
+  SONDE_WINDOW_NEAR_T =
+      15, // columns and rows whose skin can be touched: first columns, middle rows
   SONDE_WINDOW_NEAR_S = 9,
   SONDE_WINDOW_NEAR = SONDE_WINDOW_NEAR_T * SONDE_WINDOW_NEAR_S,
   SONDE_WINDOW_NODES = SONDE_WINDOW_THETA * SONDE_WINDOW_S * SONDE_WINDOW_LEVELS,
@@ -37,25 +39,25 @@ typedef struct sonde_window_place {
 typedef struct sonde_touched {
   uint32_t near[4]; // places among the near skin nodes
   double weight[4];
-  double move[3], kept[3]; // leg frame
+  double move[3]; // leg frame
 } sonde_touched;
 
 typedef struct sonde_window {
   sonde_solid solid;
   sonde_window_place place;
-  double theta[SONDE_WINDOW_THETA + 1]; // offsets from place.theta, ascending; the last is the first
+  double
+      theta[SONDE_WINDOW_THETA + 1]; // offsets from place.theta, ascending; the last is the first
   double s[SONDE_WINDOW_S];
   float radius[SONDE_WINDOW_S * SONDE_WINDOW_THETA][SONDE_WINDOW_LEVELS];
   double *compliance; // [3 near][3 near] of the near skin nodes
   bool ready;         // factored
   uint32_t touched_count;
-  sonde_touched *touched;            // [SONDE_WINDOW_TOUCHED]
-  double *scratch;                   // of the contact's solver
-  float *pressed;                    // [3*unknowns] displacements under a unit motion
-  double reaction_n;                 // along the beam, to the motion as it is
-  double stress_scale;               // contact force over the reaction to the unit motion
-  double pressed_n_m;                // that reaction
-  uint64_t pressed_key;              // the contact it was found for
+  sonde_touched *touched; // [SONDE_WINDOW_TOUCHED]
+  double *scratch;        // of the contact's solver
+  float *pressed;         // [3*unknowns] displacements under a unit motion
+  double reaction_n;      // along the beam, to the motion as it is
+  double stress_scale;    // contact force over the reaction to the unit motion
+  double pressed_n_m;     // that reaction
   bool loaded;
   uint32_t iterations;
 } sonde_window;

@@ -4,6 +4,7 @@
 // find_cell             cell of the ring and local coordinates
 // touch                 one vertex of the skin that carries contact force
 // apply                 displacement of the touched points under forces on them
+// press_evenly          the response to an even press of the touched rectangle
 // solve_forces          conjugate gradients on the forces
 // sonde_window_field    trilinear in angle, row and level
 // sonde_window_stress   nodal means within a tissue, interpolated
@@ -13,9 +14,11 @@
 #include <string.h>
 
 enum { NT = SONDE_WINDOW_THETA, NS = SONDE_WINDOW_S, NL = SONDE_WINDOW_LEVELS };
+enum { SAMPLES_X = 21, SAMPLES_Y = 7 };
 enum { SIDE = 3 * SONDE_WINDOW_NEAR, MOST_ITERATIONS = 80 };
 
-static const double give = 0.02;      // of the points' mean compliance: dense points do not fight
+static const double give = 0.02; // of the points' mean compliance: dense points do not fight
+static const double sample_start_m = 0.08; // above the face
 static const double face_edge_m = 0.3e-3;
 static const double tolerance = 2e-3; // of the prescribed motion
 
@@ -137,6 +140,7 @@ static void solve_forces(sonde_window *w, const contact *c, double *f, double *r
 static void list_active(const sonde_window *w, contact *c) {
   bool seen[SONDE_WINDOW_NEAR] = {false};
   double sum = 0;
+  c->active = 0;
   for (uint32_t p = 0; p < c->count; ++p)
     for (int k = 0; k < 4; ++k) seen[w->touched[p].near[k]] = true;
   for (uint32_t n = 0; n < SONDE_WINDOW_NEAR; ++n) {
@@ -192,22 +196,51 @@ static void touch_columns(sonde_window *w, const sonde_interior *in,
   }
 }
 
+// Rectangle of the contact on the face, probe frame.
+typedef struct patch {
+  double low_x, high_x, low_y, high_y;
+} patch;
+
+static void widen(patch *r, sonde_vec3 q) {
+  r->low_x = fmin(r->low_x, q.x), r->high_x = fmax(r->high_x, q.x);
+  r->low_y = fmin(r->low_y, q.y), r->high_y = fmax(r->high_y, q.y);
+}
+
 static double read_contact(sonde_window *w, const sonde_interior *in,
-                           const sonde_interior_input *input, sonde_vec3 beam) {
+                           const sonde_interior_input *input, sonde_vec3 beam, patch *r) {
   double force = 0;
   const sonde_mesh *skin = &in->model->surface;
   w->touched_count = 0;
+  *r = (patch){INFINITY, -INFINITY, INFINITY, -INFINITY};
   for (uint32_t v = 0; v < skin->vertex_count; ++v) {
     double f = v_dot(input->contact_forces_n[v], beam);
     if (!(f > 0)) continue;
     force += f;
+    widen(r, pose_apply_inverse(input->world_from_probe, input->positions_m[v]));
     if (!under_face(input, input->positions_m[v])) continue;
     sonde_vec3 move = v_sub(input->positions_m[v], skin->vertices[v]);
-    move = v_scale(beam, v_dot(move, beam));
-    touch(w, in, skin->vertices[v], move);
+    touch(w, in, skin->vertices[v], v_scale(beam, v_dot(move, beam)));
   }
   touch_columns(w, in, input, beam);
+  double x = input->face_half_x_m, y = input->face_half_y_m;
+  if (x > 0) r->low_x = fmax(r->low_x, -x), r->high_x = fmin(r->high_x, x);
+  if (y > 0) r->low_y = fmax(r->low_y, -y), r->high_y = fmin(r->high_y, y);
   return force;
+}
+
+// Even samples of the patch on the rest skin, all moved by one length along the beam.
+static void sample_patch(sonde_window *w, const sonde_interior *in, sonde_pose probe,
+                         const patch *r, sonde_vec3 beam) {
+  w->touched_count = 0;
+  for (int j = 0; j < SAMPLES_Y; ++j)
+    for (int i = 0; i < SAMPLES_X; ++i) {
+      double x = r->low_x + (r->high_x - r->low_x) * i / (SAMPLES_X - 1),
+             y = r->low_y + (r->high_y - r->low_y) * j / (SAMPLES_Y - 1);
+      sonde_surface_point hit;
+      sonde_vec3 from = pose_apply(probe, vec3(x, y, -sample_start_m));
+      if (sonde_surface_raycast(in->skin, from, beam, 2 * sample_start_m, &hit))
+        touch(w, in, hit.point_m, beam);
+    }
 }
 
 // Solves for `move`, leaves x; the reaction along the beam.
@@ -220,34 +253,15 @@ static double respond(sonde_window *w, contact *c, const double along[3], float 
   return reaction;
 }
 
-// FNV-1a over what the response to a unit motion depends on.
-static uint64_t contact_key(const sonde_window *w, const double along[3]) {
-  uint64_t key = 14695981039346656037u;
-  for (uint32_t p = 0; p <= w->touched_count; ++p) {
-    bool end = p == w->touched_count;
-    const void *from = end ? (const void *)along : (const void *)w->touched[p].weight;
-    const unsigned char *byte = from;
-    size_t count = end ? 3 * sizeof *along : sizeof w->touched[p].weight;
-    for (size_t k = 0; k < count; ++k) key = (key ^ byte[k]) * 1099511628211u;
-    if (!end) key = (key ^ w->touched[p].near[0]) * 1099511628211u;
-  }
-  return key;
-}
-
-// The response to a unit motion depends on which points are touched only: found again when they
-// change.
-static void press_evenly(sonde_window *w, contact *c, const double along[3]) {
-  uint64_t key = contact_key(w, along);
-  if (key == w->pressed_key) return;
-  for (uint32_t p = 0; p < c->count; ++p) {
-    sonde_touched *t = &w->touched[p];
-    memcpy(t->kept, t->move, sizeof t->move);
-    memcpy(t->move, along, sizeof t->move);
-  }
+// Stress per newton: the touched rectangle of the face moves as one.
+static void press_evenly(sonde_window *w, const sonde_interior *in, contact *c, sonde_pose probe,
+                         const patch *r, const double along[3]) {
+  sample_patch(w, in, probe, r, q_rotate(probe.rotation, vec3(0, 0, 1)));
+  c->count = w->touched_count;
+  w->pressed_n_m = 0;
+  if (c->count == 0) return;
+  list_active(w, c);
   w->pressed_n_m = respond(w, c, along, w->pressed);
-  for (uint32_t p = 0; p < c->count; ++p)
-    memcpy(w->touched[p].move, w->touched[p].kept, sizeof w->touched[p].move);
-  w->pressed_key = key;
 }
 
 bool sonde_window_update(sonde_window *w, const sonde_interior *in,
@@ -256,16 +270,15 @@ bool sonde_window_update(sonde_window *w, const sonde_interior *in,
   uint32_t nodes[SONDE_WINDOW_NEAR];
   sonde_vec3 beam = q_rotate(input->world_from_probe.rotation, vec3(0, 0, 1));
   double along[3] = {v_dot(beam, in->e1), v_dot(beam, in->e2), v_dot(beam, in->axis)};
-  double force = read_contact(w, in, input, beam);
-  w->loaded = w->touched_count > 0;
+  contact c = {.node = nodes, .force = w->scratch, .moved = w->scratch + SIDE};
+  patch r;
+  double force = read_contact(w, in, input, beam, &r);
+  c.count = w->touched_count;
+  w->loaded = c.count > 0;
   if (!w->loaded) return false;
-  contact c = {.count = w->touched_count,
-               .node = nodes,
-               .force = w->scratch,
-               .moved = w->scratch + SIDE};
   list_active(w, &c);
-  press_evenly(w, &c, along);
   w->reaction_n = respond(w, &c, along, w->solid.x);
+  press_evenly(w, in, &c, input->world_from_probe, &r, along);
   w->stress_scale = w->pressed_n_m > 0 ? force / w->pressed_n_m : 0;
   return true;
 }

@@ -21,9 +21,9 @@
 enum { LEAF = 20, PANEL = 32 };
 
 typedef struct piece {
-  uint32_t first, count;            // own nodes: places in the order
+  uint32_t first, count;             // own nodes: places in the order
   uint32_t boundary, boundary_count; // places of later nodes, in `boundary`
-  uint32_t parent;                  // NONE at a root
+  uint32_t parent;                   // NONE at a root
   uint32_t child_count;
   uint32_t element, element_count; // in `element_of`
   size_t factor;                   // in `factor`
@@ -39,8 +39,8 @@ struct sonde_fronts {
   size_t boundary_size;
   float *factor; // per piece: rows of boundary then own unknowns, each 3*count wide
   size_t factor_size;
-  double *work;  // working front, also the condensed matrix at the end
-  double *stack; // updates that wait for their parent
+  double *work;              // working front, also the condensed matrix at the end
+  double *stack;             // updates that wait for their parent
   uint32_t *local, *waiting; // place -> index in the working front; pieces on the stack
   size_t stack_size, stack_top, work_order;
   float *gathered;
@@ -119,8 +119,8 @@ static void sort_widest(const graph *g, uint32_t *list, uint32_t count, keyed *k
 }
 
 // Rows of the upper half that touch the lower half go behind the others; returns how many stay.
-static uint32_t split(const graph *g, uint32_t *list, uint32_t half, uint32_t count,
-                      uint32_t *side, uint32_t mark, uint32_t *scratch) {
+static uint32_t split(const graph *g, uint32_t *list, uint32_t half, uint32_t count, uint32_t *side,
+                      uint32_t mark, uint32_t *scratch) {
   uint32_t keep = half, parted = 0;
   for (uint32_t i = 0; i < half; ++i) side[list[i]] = mark;
   for (uint32_t i = half; i < count; ++i) {
@@ -136,10 +136,10 @@ static uint32_t split(const graph *g, uint32_t *list, uint32_t half, uint32_t co
   return keep - half;
 }
 
-// above[place] becomes the place where the parent of the piece that starts there starts. The tree is
-// that of the dissection, so that children directly precede their parent.
-static void dissect(sonde_fronts *f, const graph *g, keyed *keys, uint32_t *side,
-                    uint32_t *scratch, uint32_t *above) {
+// above[place] becomes the place where the parent of the piece that starts there starts. The tree
+// is that of the dissection, so that children directly precede their parent.
+static void dissect(sonde_fronts *f, const graph *g, keyed *keys, uint32_t *side, uint32_t *scratch,
+                    uint32_t *above) {
   struct {
     uint32_t first, count, above;
   } stack[128];

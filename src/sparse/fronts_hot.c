@@ -30,9 +30,9 @@ static void subtract_eight(double *restrict cj, const double *restrict p, size_t
   double l[WIDTH];
   for (size_t k = 0; k < WIDTH; ++k) l[k] = p[k * n + j];
   for (size_t i = j; i < n; ++i)
-    cj[i] -= ((l[0] * p[i] + l[1] * p[n + i]) + (l[2] * p[2 * n + i] + l[3] * p[3 * n + i])) +
-             ((l[4] * p[4 * n + i] + l[5] * p[5 * n + i]) +
-              (l[6] * p[6 * n + i] + l[7] * p[7 * n + i]));
+    cj[i] -=
+        ((l[0] * p[i] + l[1] * p[n + i]) + (l[2] * p[2 * n + i] + l[3] * p[3 * n + i])) +
+        ((l[4] * p[4 * n + i] + l[5] * p[5 * n + i]) + (l[6] * p[6 * n + i] + l[7] * p[7 * n + i]));
 }
 
 bool sonde_front_eliminate(double *f, uint32_t n, uint32_t from, uint32_t to) {

@@ -61,7 +61,7 @@ static inline void block_solve(block *b) {
   assert_true(sonde_solid_factor(s));
   uint32_t side = 3 * s->last_count, first = s->unknown_count - s->last_count;
   const double *condensed = sonde_fronts_condensed(s->fronts);
-  double *a = SONDE_NEW(double, (size_t)side * side), *x = SONDE_NEW(double, side), stiff = 0;
+  double *a = SONDE_NEW(double, (size_t)side *side), *x = SONDE_NEW(double, side), stiff = 0;
   for (uint32_t j = 0; j < side; ++j)
     for (uint32_t i = j; i < side; ++i) a[(size_t)i * side + j] = condensed[(size_t)j * side + i];
   for (uint32_t i = 0; i < side; ++i) stiff = fmax(stiff, 1e8 * a[(size_t)i * side + i]);

@@ -31,8 +31,8 @@ static inline sonde_pose study_pose(double penetration) {
 }
 
 // Skin under the arc of 60 x 12 mm moves by the penetration; `force_n` is spread over it.
-static inline void study_press(sonde_interior *in, const tube *t, double penetration, double force_n,
-                               const sonde_pathology *pathology) {
+static inline void study_press(sonde_interior *in, const tube *t, double penetration,
+                               double force_n, const sonde_pathology *pathology) {
   uint32_t n = t->model.surface.vertex_count, touched = 0;
   sonde_vec3 *now = SONDE_NEW(sonde_vec3, n), *force = SONDE_NEW(sonde_vec3, n);
   for (int pass = 0; pass < 2; ++pass)

@@ -220,7 +220,6 @@ static tube fe_leg(const fe_node *nodes, uint32_t count, sonde_vec3 **moved) {
   return t;
 }
 
-
 typedef struct site_row {
   sonde_vec3 at, normal, u, v;
   double fat_m;

@@ -53,8 +53,9 @@ static void boussinesq_under_a_round_load(void **state) {
         uint32_t node = block_node(&b, i + (c == 1 || c == 2), j + (c >= 2), 0);
         double in = i == 0 ? 0 : r[i], out = r[i + 1], sector = SONDE_PI / 2 / (TURN - 1);
         b.last[node] = 1; // consistent forces of a ring sector: more goes to the outer corners
-        double outer = sector * ((out * out * out - in * in * in) / 3 -
-                                 in * (out * out - in * in) / 2) / (out - in);
+        double outer = sector *
+                       ((out * out * out - in * in * in) / 3 - in * (out * out - in * in) / 2) /
+                       (out - in);
         double all = sector * (out * out - in * in) / 2;
         b.load[3 * node + 2] += pressure * 0.5 * (c == 1 || c == 2 ? outer : all - outer);
       }

@@ -17,8 +17,12 @@ static uint32_t read_stress(stress_row *rows, uint32_t capacity) {
     if (sscanf(line, "novessel,%lf,%lf,%lf,%11[a-z0-9],%lf,%lf,%lf", &v[0], &v[1], &v[2], r->point,
                &xx, &yy, &zz) != 7)
       continue;
-    *r = (stress_row){.penetration_m = v[0] * 1e-3, .force_n = v[1], .xx = xx * 1e3,
-                      .yy = yy * 1e3, .zz = zz * 1e3, .point = {0}};
+    *r = (stress_row){.penetration_m = v[0] * 1e-3,
+                      .force_n = v[1],
+                      .xx = xx * 1e3,
+                      .yy = yy * 1e3,
+                      .zz = zz * 1e3,
+                      .point = {0}};
     (void)sscanf(line, "novessel,%*f,%*f,%*f,%11[a-z0-9]", r->point);
     ++count;
   }
@@ -64,7 +68,6 @@ static void stress_follows_the_study(void **state) {
   tube_clear(&t);
 }
 
-
 // ---- areas ----------------------------------------------------------------------------------
 
 typedef struct area_row {
@@ -84,10 +87,14 @@ static uint32_t read_areas(area_row *rows, uint32_t capacity) {
     if (field[18] == NULL || strcmp(field[0], "case") == 0) continue;
     if (strstr(field[0], "mesh2") == NULL) continue; // the reference meshes
     area_row *r = &rows[count];
-    *r = (area_row){.depth_m = atof(field[1]) * 1e-3, .venous_mmhg = atof(field[2]),
-                    .wall_pa = atof(field[3]) * 1e3, .thrombus_pa = atof(field[4]) * 1e3,
-                    .penetration_m = atof(field[7]) * 1e-3, .force_n = atof(field[8]),
-                    .vein = atof(field[11]), .artery = atof(field[18]),
+    *r = (area_row){.depth_m = atof(field[1]) * 1e-3,
+                    .venous_mmhg = atof(field[2]),
+                    .wall_pa = atof(field[3]) * 1e3,
+                    .thrombus_pa = atof(field[4]) * 1e3,
+                    .penetration_m = atof(field[7]) * 1e-3,
+                    .force_n = atof(field[8]),
+                    .vein = atof(field[11]),
+                    .artery = atof(field[18]),
                     .short_m = atof(field[13]) * 1e-3};
     snprintf(r->name, sizeof r->name, "%s", field[0]);
     if (r->penetration_m > 0) ++count;
@@ -127,7 +134,8 @@ static void press_row(area_row *row) {
 // Force at which the area passes 0.2 of rest, by the rows; 0 when it does not.
 static double force_at_fifth(const area_row *rows, uint32_t count, const char *name, bool got) {
   for (uint32_t i = 1; i < count; ++i) {
-    double a = got ? rows[i - 1].got_vein : rows[i - 1].vein, b = got ? rows[i].got_vein : rows[i].vein;
+    double a = got ? rows[i - 1].got_vein : rows[i - 1].vein,
+           b = got ? rows[i].got_vein : rows[i].vein;
     if (strcmp(rows[i].name, name) != 0 || strcmp(rows[i - 1].name, name) != 0) continue;
     if (a >= 0.2 && b < 0.2)
       return rows[i - 1].force_n + (a - 0.2) / (a - b) * (rows[i].force_n - rows[i - 1].force_n);
