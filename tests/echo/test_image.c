@@ -1,5 +1,6 @@
 // The picture: speckle statistics, attenuation, contrast, shadow, motion with the tissue, air,
 // determinism, PNG.
+#include "interior/interior.h"
 #include "interior/tube.h"
 #include "sonde/echo.h"
 
@@ -22,6 +23,7 @@ typedef struct bench {
 
 static void look(bench *b, const sonde_vec3 *positions) {
   const sonde_vec3 *p = positions ? positions : b->leg.model.surface.vertices;
+  b->interior->model = &b->leg.model; // the bench was returned by value
   sonde_interior_update(b->interior,
                         &(sonde_interior_input){p, b->forces, b->pose, &b->pathology, -1, 1, 0, 0});
   sonde_echo_render(b->echo, b->pose, 0.04, &b->pathology, &b->settings, &b->image);
