@@ -1,5 +1,6 @@
 // Stress of the solid against the finite-element study of vessels, and vessels driven by it.
 #include "interior/study.h"
+#include "interior/window.h"
 
 typedef struct stress_row {
   double penetration_m, force_n;
@@ -170,10 +171,99 @@ static void areas_follow_the_study(void **state) {
   }
 }
 
+// The solid under the probe keeps its volume; the reaction it is scaled by is the contact force.
+static void the_solid_keeps_volume(void **state) {
+  (void)state;
+  tube t = study_thigh(25e-3);
+  sonde_interior *in;
+  sonde_pathology p;
+  assert_int_equal(sonde_pathology_preset("healthy", &p, NULL), SONDE_OK);
+  assert_int_equal(sonde_interior_create(&t.model, &in, NULL), SONDE_OK);
+  study_press(in, &t, 1e-3, 1, &p);
+  assert_int_equal(sonde_interior_used_method(in), SONDE_INTERIOR_SOLID);
+  double change = 0, all = 0;
+  const sonde_solid *solid = &in->live->solid;
+  for (uint32_t h = 0; h < solid->hex_count; ++h) {
+    double rest, dilatation = sonde_solid_dilatation(solid, h, &rest);
+    change += fabs(dilatation) * rest, all += rest;
+  }
+  print_message("1 mm of penetration: volume changes by %.5f on average\n", change / all);
+  assert_true(change / all < 0.005);
+  sonde_interior_destroy(in);
+  tube_clear(&t);
+}
+
+// A point of the wall at rest lies on the wall's ellipse when pressed, and is found again.
+static void walls_move_with_the_mechanics(void **state) {
+  (void)state;
+  tube t = study_thigh(18e-3);
+  sonde_interior *in;
+  sonde_pathology p;
+  sonde_vessel_state v;
+  assert_int_equal(sonde_pathology_preset("healthy", &p, NULL), SONDE_OK);
+  assert_int_equal(sonde_interior_create(&t.model, &in, NULL), SONDE_OK);
+  study_press(in, &t, 16e-3, 12, &p);
+  assert_true(sonde_vessel_at(in, 0, 0, &v));
+  sonde_vec3 across = v_cross(v.axis, v.flat_axis);
+  double worst = 0, lost = 0;
+  for (int k = 0; k < 24; ++k) {
+    double a = 2 * SONDE_PI * k / 24;
+    sonde_vec3 d = v_madd(v_scale(v.flat_axis, cos(a)), sin(a), across);
+    for (double r = 0.5; r < 1.01; r += 0.4999) {
+      sonde_vec3 rest = v_madd(v.rest_centre_m, r * v.rest_radius_m, d);
+      sonde_vec3 now = v_add(rest, sonde_interior_displacement(in, rest));
+      sonde_vec3 from = v_sub(now, v.centre_m);
+      double x = v_dot(from, v.flat_axis) / v.half_short_m, y = v_dot(from, across) / v.half_long_m;
+      worst = fmax(worst, fabs(hypot(x, y) - r));
+      if (r < 0.9) lost = fmax(lost, v_distance(sonde_interior_rest_point(in, now), rest));
+    }
+  }
+  print_message("area %.3f: wall within %.3f of its ellipse, rest points within %.2g m\n",
+                v.area_ratio, worst, lost);
+  assert_true(v.area_ratio < 0.4 && worst < 0.08 && lost < 3e-4);
+  sonde_interior_destroy(in);
+  tube_clear(&t);
+}
+
+static void pressures_follow_the_clock(void **state) {
+  (void)state;
+  sonde_circulation c = sonde_circulation_default();
+  double low = INFINITY, high = -INFINITY, mean = 0, last = sonde_arterial_pressure(&c, 0);
+  for (int k = 0; k < 1000; ++k) {
+    double p = sonde_arterial_pressure(&c, k / 1000.0 / c.heart_rate_hz);
+    low = fmin(low, p), high = fmax(high, p), mean += p / 1000;
+    assert_true(fabs(p - last) < 0.05 * (c.systolic_pa - c.diastolic_pa));
+    last = p;
+  }
+  assert_true(fabs(low - c.diastolic_pa) < 1 && fabs(high - c.systolic_pa) < 1);
+  assert_true(mean > low + 0.25 * (high - low) && mean < low + 0.5 * (high - low));
+  double beat = sonde_arterial_pressure(&c, 0.3),
+         next = sonde_arterial_pressure(&c, 0.3 + 1 / c.heart_rate_hz);
+  assert_true(fabs(beat - next) < 1e-6);
+  double supine = sonde_venous_pressure(&c, 0);
+  assert_true(fabs(supine - 10 * SONDE_PA_PER_MMHG) < 1);
+  assert_true(sonde_venous_pressure(&c, 1) > supine && sonde_venous_pressure(&c, 3) < supine);
+  c.valsalva_from_s = 10, c.valsalva_to_s = 14;
+  assert_true(fabs(sonde_venous_pressure(&c, 12) - 30 * SONDE_PA_PER_MMHG) < 1);
+  for (int posture = 0; posture + 1 < SONDE_POSTURE_COUNT; ++posture) {
+    c.posture = (sonde_posture)posture;
+    double lower = sonde_venous_pressure(&c, 0);
+    c.posture = (sonde_posture)(posture + 1);
+    assert_true(sonde_venous_pressure(&c, 0) > lower + 1e3);
+  }
+  sonde_pathology p;
+  assert_int_equal(sonde_pathology_preset("healthy", &p, NULL), SONDE_OK);
+  sonde_circulation_apply(&c, 12000, 1e-3, &p);
+  assert_true(p.venous_pressure_pa > 60 * SONDE_PA_PER_MMHG - 1);
+  // Stiffer walls give way less to the pressure that fills them.
+  assert_true(sonde_vein_tube_pressure(1.3, 60e3) > sonde_vein_tube_pressure(1.3, 15e3) + 500);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(stress_follows_the_study),
-      cmocka_unit_test(areas_follow_the_study),
+      cmocka_unit_test(stress_follows_the_study),   cmocka_unit_test(areas_follow_the_study),
+      cmocka_unit_test(the_solid_keeps_volume),     cmocka_unit_test(walls_move_with_the_mechanics),
+      cmocka_unit_test(pressures_follow_the_clock),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
