@@ -198,7 +198,7 @@ static void stations_close_and_open_with_a_delay(void **state) {
   assert_true(sonde_interior_vessel_at_plane(in, 1, pose, &a));
   double eff = v.outside_pa / 16 / kpa;
   print_message("16 N: vein %.3f artery %.3f, %.4f kPa/N\n", v.area_ratio, a.area_ratio, eff);
-  assert_true(fabs(eff - 0.4214) < 0.03);
+  assert_true(fabs(eff - 0.43) < 0.05); // the study: 0.43 on a thigh of 76 mm with 13.8 mm of fat
   assert_true(a.area_ratio > 0.7 && v.area_ratio < 0.35);
   assert_true(fabs(SONDE_PI * v.half_short_m * v.half_long_m -
                    SONDE_PI * v.rest_radius_m * v.rest_radius_m * v.area_ratio) < 1e-9);
