@@ -252,10 +252,13 @@ static void publish_increments(sonde_state *state, bool clear) {
   }
 }
 
-// Whether what the linear system did not see of its solution is more than what the solver may
-// leave of it.
+// Of what the linear solver may leave: what is not seen adds up from step to step.
+static const double BENT_SHARE = 0.1;
+
+// Whether what the linear system did not see of its solution is more than a share of what
+// the solver may leave.
 static bool is_bent(sonde_state *state, const sonde_motion *motion, double force2) {
-  double h = state->def.dt_s, share = state->def.pcg.relative_residual;
+  double h = state->def.dt_s, share = BENT_SHARE * state->def.pcg.relative_residual;
   double contact2 = h * h * sonde_contact_surprise(state, motion, h);
   double left2 = contact2 + state->lanes->kernels->bend(state->lanes);
   double least = state->def.pcg.absolute_residual;
