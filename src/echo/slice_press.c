@@ -4,7 +4,6 @@
 // bilinear between them: a lumen is tens of pixels wide. Only its part in the rest picture's plane
 // counts; what moves through the plane is seen as if the tissue went on alike.
 //
-// uncarry, without_walls   back from where the moving walls of the vessels took the tissue
 // node_places            places in the rest picture, a row of nodes
 // grey_at                bilinear
 // press_row
@@ -19,49 +18,7 @@ typedef struct job {
   const sonde_image_press *press;
   sonde_image *out;
   uint8_t *known;
-  sonde_vessel_state vessels[2]; // that the plane cuts
-  int vessel_count;
 } job;
-
-// Circles about a vessel become ellipses: the circle whose ellipse runs through the point, found by
-// halving, since the ellipses lie inside each other.
-static void uncarry(const sonde_vessel_state *v, double *short_m, double *long_m) {
-  double a = *short_m, b = *long_m, low = v->rest_radius_m, high = low;
-  if (hypot(a / v->half_short_m, b / v->half_long_m) <= 1) {
-    *short_m = a * low / v->half_short_m, *long_m = b * low / v->half_long_m;
-    return;
-  }
-  high = 4 * low + hypot(a, b);
-  double half[2] = {0, 0}, none;
-  for (int k = 0; k < 40; ++k) {
-    double r = 0.5 * (low + high);
-    half[0] = half[1] = r, none = 0;
-    sonde_vessel_carry(v, &half[0], &none);
-    none = 0;
-    sonde_vessel_carry(v, &none, &half[1]);
-    *(hypot(a / half[0], b / half[1]) > 1 ? &low : &high) = r;
-  }
-  *short_m = a * high / half[0], *long_m = b * high / half[1];
-}
-
-// Each vessel's part of the way back, weighted by the distance from the other's lumen: inside a
-// lumen the other vessel moves nothing, so that both keep the areas that the model gives them.
-static sonde_vec3 without_walls(const job *j, sonde_vec3 p) {
-  sonde_vec3 back[2] = {{0}};
-  double outside[2] = {1, 1};
-  for (int k = 0; k < j->vessel_count; ++k) {
-    const sonde_vessel_state *v = &j->vessels[k];
-    sonde_vec3 d = v_sub(p, v->centre_m), across = v_cross(v->axis, v->flat_axis);
-    double a = v_dot(d, v->flat_axis), b = v_dot(d, across), a0 = a, b0 = b;
-    uncarry(v, &a0, &b0);
-    back[k] = v_madd(v_scale(v->flat_axis, a0 - a), b0 - b, across);
-    outside[k] = fmax(hypot(a0, b0) - v->rest_radius_m, 0);
-  }
-  double both = outside[0] + outside[1];
-  if (j->vessel_count == 1) return v_add(p, back[0]);
-  if (j->vessel_count == 0 || !(both > 0)) return p;
-  return v_madd(v_madd(p, outside[1] / both, back[0]), outside[0] / both, back[1]);
-}
 
 // Middle of pixel 0 to middle of the last one spans the size less one pixel.
 static void node_places(const job *j, uint32_t column, uint32_t row, uint32_t count,
@@ -71,9 +28,9 @@ static void node_places(const job *j, uint32_t column, uint32_t row, uint32_t co
   for (uint32_t k = 0; k < count; ++k) {
     double x = (column + k * (double)NODE + 0.5) * dx - 0.5 * out->width_m;
     double z = (row + 0.5) * dz;
-    sonde_vec3 p = without_walls(j, pose_apply(j->press->pose, vec3(x, 0, z)));
-    sonde_vec3 q =
-        pose_apply_inverse(j->press->rest_pose, sonde_interior_rest_point(j->press->interior, p));
+    sonde_vec3 p =
+        sonde_interior_rest_point(j->press->interior, pose_apply(j->press->pose, vec3(x, 0, z)));
+    sonde_vec3 q = pose_apply_inverse(j->press->rest_pose, p);
     places[k][0] = (q.x + j->press->shift_m[0] + 0.5 * rest->width_m) / rest->width_m * rest->width;
     places[k][1] = (q.z + j->press->shift_m[1]) / rest->height_m * rest->height;
     places[k][0] -= 0.5, places[k][1] -= 0.5;
@@ -118,10 +75,7 @@ uint64_t sonde_image_pressed(const sonde_image *rest, const sonde_image_press *p
                              sonde_image *out, uint8_t *known) {
   SONDE_ASSERT(rest != NULL && press != NULL && press->interior != NULL && out != NULL);
   SONDE_ASSERT(rest->pixels != out->pixels && rest->width_m > 0 && out->width_m > 0);
-  job j = {rest, press, out, known, .vessel_count = 0};
-  for (int which = 0; which < 2; ++which)
-    j.vessel_count += sonde_interior_vessel_at_plane(press->interior, which, press->pose,
-                                                     &j.vessels[j.vessel_count]);
+  job j = {rest, press, out, known};
   uint64_t reached = 0;
   for (uint32_t left = 0; left < out->width; left += NODE * (NODES - 1)) {
     double places[2][NODES][2];
