@@ -47,6 +47,7 @@ typedef struct settings {
 // What a headless run saw.
 typedef struct summary {
   double wall_s, force_max_n, penetration_max_m, vein_ratio_min;
+  double latency_s[2]; // from pose to image: median, 99 %; NaN in lockstep
   uint64_t ticks, images, hash;
   sonde_loop_stats loop;
 } summary;
@@ -263,6 +264,8 @@ static sonde_status run_headless(const settings *s, sonde_session *session, summ
   seen->wall_s = now_s() - start_s;
   seen->ticks = sonde_session_ticks(session);
   seen->images = sonde_session_images(session);
+  seen->latency_s[0] = sonde_session_latency(session, 0.5);
+  seen->latency_s[1] = sonde_session_latency(session, 0.99);
   seen->hash = sonde_session_hash(session);
   seen->loop = sonde_session_loop(session);
   return status;
@@ -275,6 +278,12 @@ static void print_json(const settings *s, const summary *seen) {
   app_json_integer("ticks", (long long)seen->ticks);
   app_json_integer("deadline_misses", (long long)seen->loop.deadline_misses);
   app_json_integer("images", (long long)seen->images);
+  if (isfinite(seen->latency_s[0])) {
+    app_json_object("pose_to_image_ms");
+    app_json_real("median", 1e3 * seen->latency_s[0]);
+    app_json_real("p99", 1e3 * seen->latency_s[1]);
+    app_json_close();
+  }
   app_json_text("hash", hash);
   app_json_real("wall_s", seen->wall_s);
   app_json_real("tick_mean_ms", 1e3 * seen->loop.compute_mean_s);
@@ -296,6 +305,9 @@ static void print_summary(const settings *s, const summary *seen) {
   printf("%llu ticks and %llu images in %.2f s, %llu deadline misses\n",
          (unsigned long long)seen->ticks, (unsigned long long)seen->images, seen->wall_s,
          (unsigned long long)seen->loop.deadline_misses);
+  if (isfinite(seen->latency_s[0]))
+    printf("from pose to image %.1f ms, 99 %% within %.1f ms\n", 1e3 * seen->latency_s[0],
+           1e3 * seen->latency_s[1]);
   printf("force up to %.1f N at up to %.1f mm", seen->force_max_n, 1e3 * seen->penetration_max_m);
   if (isfinite(seen->vein_ratio_min))
     printf(", vein down to %.0f %% of its area", 100.0 * seen->vein_ratio_min);

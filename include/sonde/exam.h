@@ -106,6 +106,10 @@ SONDE_API bool sonde_session_frame(sonde_session *session, sonde_frame *frame);
 /** Ticks and images so far. @thread any */
 SONDE_API uint64_t sonde_session_ticks(const sonde_session *session);
 SONDE_API uint64_t sonde_session_images(const sonde_session *session);
+/** Age of the pose that a finished image shows, seconds: `fraction` of the images since the creation
+ *  are at most so old, to 0.25 ms; NaN before the first in real time. From the tick's reading of the
+ *  device to the frame that sonde_session_frame() gives. @thread any */
+SONDE_API double sonde_session_latency(const sonde_session *session, double fraction);
 /** State hash now; 0 while the loop runs. @thread owner */
 SONDE_API uint64_t sonde_session_hash(const sonde_session *session);
 /** Counters of the running loop, or of the last one. @thread owner and any one other while the

@@ -33,7 +33,12 @@ sonde_session_controls sonde_controls_clean(const sonde_session_controls *wanted
 typedef struct sonde_surface_slot {
   sonde_snapshot snapshot;
   sonde_session_controls controls;
+  double pose_s; // clock when the tick read its pose; 0 in lockstep
 } sonde_surface_slot;
+
+// Bins of 0.25 ms; the last one holds all that is older.
+enum { LATENCY_BINS = 1024 };
+static const double LATENCY_BIN_S = 0.25e-3;
 
 struct sonde_session {
   // set up once
@@ -65,6 +70,7 @@ struct sonde_session {
   bool shown; // an image was made
   uint64_t shown_tick;
   _Atomic uint64_t images;
+  _Atomic uint32_t latency[LATENCY_BINS]; // images by age of their pose when finished
 
   // recorder; NULL without a recording
   sonde_recorder *recorder;

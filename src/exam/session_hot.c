@@ -82,6 +82,7 @@ static void offer_surface(sonde_session *session) {
   sonde_surface_slot *head = (sonde_surface_slot *)(void *)slot;
   fill_snapshot(session, &head->snapshot);
   head->controls = session->controls;
+  head->pose_s = session->last_tick_s;
   size_t bytes = session->nodes * sizeof(sonde_vec3);
   memcpy(slot + session->positions_at, sonde_state_positions(session->state), bytes);
   memcpy(slot + session->forces_at, sonde_state_contact_forces(session->state), bytes);

@@ -3,10 +3,12 @@
 // update_interior:    the inside and the vessels at this surface.
 // read_vessels:       what the image plane cuts.
 // fill_frame:         everything into one slot.
-// sonde_session_show: one image.
+// count_latency:      how old the frame's pose is when the frame is finished.
+// sonde_session_show: one image. sonde_session_latency: percentiles.
 #include "exam/session.h"
 
 #include "base/base.h"
+#include "base/clock.h"
 #include "base/maths.h"
 
 #include <string.h>
@@ -87,12 +89,20 @@ static void fill_frame(sonde_session *session, const unsigned char *slot, unsign
   read_vessels(session, &frame->snapshot);
 }
 
+static void count_latency(sonde_session *session, double pose_s) {
+  if (!(pose_s > 0)) return;
+  double bin = (sonde_clock_now() - pose_s) / LATENCY_BIN_S;
+  uint32_t at = bin < LATENCY_BINS - 1 ? (uint32_t)fmax(bin, 0) : LATENCY_BINS - 1;
+  atomic_fetch_add_explicit(&session->latency[at], 1, memory_order_relaxed);
+}
+
 bool sonde_session_show(sonde_session *session) {
   const unsigned char *slot = sonde_mailbox_read(session->surface_box);
   if (!slot) return false;
   update_interior(session, slot);
   fill_frame(session, slot, sonde_mailbox_write_slot(session->frame_box));
   sonde_mailbox_publish(session->frame_box);
+  count_latency(session, ((const sonde_surface_slot *)(const void *)slot)->pose_s);
   uint64_t images = atomic_load_explicit(&session->images, memory_order_relaxed);
   atomic_store_explicit(&session->images, images + 1, memory_order_release);
   return true;
@@ -104,4 +114,17 @@ bool sonde_session_frame(sonde_session *session, sonde_frame *frame) {
   SONDE_ASSERT(newest->width == session->image_width && newest->pixels != NULL);
   *frame = *newest;
   return true;
+}
+
+double sonde_session_latency(const sonde_session *session, double fraction) {
+  SONDE_ASSERT(fraction >= 0 && fraction <= 1);
+  uint32_t count[LATENCY_BINS];
+  uint64_t all = 0, seen = 0;
+  for (int k = 0; k < LATENCY_BINS; ++k)
+    all += count[k] = atomic_load_explicit(&session->latency[k], memory_order_relaxed);
+  for (int k = 0; k < LATENCY_BINS; ++k) {
+    seen += count[k];
+    if (all > 0 && (double)seen >= fraction * (double)all) return (k + 1) * LATENCY_BIN_S;
+  }
+  return (double)NAN;
 }

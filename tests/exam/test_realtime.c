@@ -60,6 +60,8 @@ static void realtime_run_replays_in_lockstep(void **state) {
   sonde_loop_stats stats = sonde_session_loop(session);
   assert_int_equal(stats.ticks, sonde_session_ticks(session));
   assert_true(seen > 0 && seen <= sonde_session_images(session));
+  double median_s = sonde_session_latency(session, 0.5), most_s = sonde_session_latency(session, 1);
+  assert_true(median_s > 0 && median_s <= most_s);
   assert_true(stats.ticks > 50);
   for (int i = 0; i < 30; ++i) sonde_session_tick(session); // lockstep goes on where it stopped
   uint64_t hash = sonde_session_hash(session);

@@ -77,6 +77,7 @@ static void frame_is_of_one_state(void **state) {
   }
   assert_true(force_max_n > 1.0);
   assert_int_equal(sonde_session_images(session), 600 / def.ticks_per_image);
+  assert_true(isnan(sonde_session_latency(session, 0.5))); // of real time only
   close_session(session);
 }
 
