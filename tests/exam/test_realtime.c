@@ -13,10 +13,13 @@ static int tear_down(void **state) {
   return 0;
 }
 
-// Reads frames for a while; every one must be whole and newer than the last.
+// Reads frames for a while, and until there are two; every one must be whole and newer than the
+// last.
 static uint64_t watch(sonde_session *session, double seconds) {
   uint64_t seen = 0, last = 0;
-  for (double end_s = sonde_clock_now() + seconds; sonde_clock_now() < end_s;) {
+  const double patience_s = 60;
+  double end_s = sonde_clock_now() + seconds, now_s;
+  while ((now_s = sonde_clock_now()) < end_s || (seen < 2 && now_s < end_s + patience_s)) {
     sonde_frame frame;
     if (!sonde_session_frame(session, &frame)) {
       sonde_clock_sleep_until(sonde_clock_now() + 2e-3);
