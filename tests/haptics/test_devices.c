@@ -16,7 +16,7 @@ static sonde_device_sample read_at(sonde_device *device, uint64_t tick) {
 
 static void families_have_sentences(void **state) {
   (void)state;
-  static const char *const expected[] = {"null", "script", "replay", "page"};
+  static const char *const expected[] = {"null", "hand", "script", "replay", "page"};
   uint32_t count = 0;
   const sonde_device_info *info = sonde_devices(&count);
   assert_int_equal(count, SONDE_COUNT_OF(expected));

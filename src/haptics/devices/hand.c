@@ -1,0 +1,129 @@
+// The simulated operator: creation.
+// exponential: matrix exponential by scaling and squaring of its Taylor sum.
+// discretise:  exact step of the arm for a load that is constant over a tick.
+// check:       ranges of the definition.
+#include "haptics/devices/hand.h"
+
+#include "base/base.h"
+#include "base/maths.h"
+#include "base/random.h"
+
+#include <string.h>
+
+static const sonde_hand_preset presets[] = {
+    {"bare", 0.1, 0.0},  {"loose", 0.5, 0.5}, {"child", 0.2, 1.0},
+    {"light", 0.5, 2.0}, {"firm", 1.0, 5.0},  {"heavy", 2.0, 3.0},
+};
+
+const sonde_hand_preset *sonde_hand_presets(uint32_t *count) {
+  SONDE_ASSERT(count != NULL);
+  *count = SONDE_COUNT_OF(presets);
+  return presets;
+}
+
+sonde_hand_def sonde_hand_def_default(void) {
+  return (sonde_hand_def){.mass_kg = 0.5,
+                          .damping_n_s_m = 2.0,
+                          .stiffness_n_m = 400.0,
+                          .delay_s = 0.15,
+                          .tremor_m = 50e-6,
+                          .tremor_hz = 9.0};
+}
+
+static sonde_status check(const sonde_hand_def *def, double dt_s, sonde_error *error) {
+  const struct {
+    const char *name;
+    double value, low, high;
+  } range[] = {{"mass_kg", def->mass_kg, 1e-3, 100},
+               {"damping_n_s_m", def->damping_n_s_m, 0, 1e4},
+               {"stiffness_n_m", def->stiffness_n_m, 0, 1e5},
+               {"delay_s", def->delay_s, 0, 1},
+               {"tremor_m", def->tremor_m, 0, 0.1},
+               {"tremor_hz", def->tremor_hz, 0, 100},
+               {"resolution_m", def->resolution_m, 0, 0.01},
+               {"force_limit_n", def->force_limit_n, 0, 1e4},
+               {"latency_ticks", def->latency_ticks, 0, SONDE_HAND_LATENCY},
+               {"a tick, s,", dt_s, 1e-5, 0.1}};
+  for (size_t i = 0; i < SONDE_COUNT_OF(range); ++i)
+    if (!(range[i].value >= range[i].low && range[i].value <= range[i].high))
+      return sonde_fail(error, SONDE_ARGUMENT, "hand: %s is %g, expected %g to %g", range[i].name,
+                        range[i].value, range[i].low, range[i].high);
+  return SONDE_OK;
+}
+
+typedef struct square {
+  double m[3][3];
+} square;
+
+static square multiply(square a, square b) {
+  square c = {{{0}}};
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      for (int k = 0; k < 3; ++k) c.m[i][j] += a.m[i][k] * b.m[k][j];
+  return c;
+}
+
+// exp(a) = exp(a / 2^s)^(2^s); twelve terms of the sum suffice for |a| / 2^s <= 1/4.
+static square exponential(square a) {
+  double size = 0.0;
+  for (int i = 0; i < 9; ++i) size = fmax(size, fabs((&a.m[0][0])[i]));
+  int halvings = 0;
+  for (; size > 0.08; size *= 0.5) halvings++;
+  for (int i = 0; i < 9; ++i) (&a.m[0][0])[i] = ldexp((&a.m[0][0])[i], -halvings);
+  square sum = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}, term = sum;
+  for (int n = 1; n <= 12; ++n) {
+    term = multiply(term, a);
+    for (int i = 0; i < 9; ++i) {
+      (&term.m[0][0])[i] /= n;
+      (&sum.m[0][0])[i] += (&term.m[0][0])[i];
+    }
+  }
+  for (int i = 0; i < halvings; ++i) sum = multiply(sum, sum);
+  return sum;
+}
+
+// (x, v, load)' = ((0 1 0) (-k/m -b/m 1/m) (0 0 0)) (x, v, load)
+static void discretise(sonde_hand *hand) {
+  const sonde_hand_def *def = &hand->def;
+  double m = def->mass_kg, h = hand->dt_s;
+  square rate = {{{0, h, 0}, {-def->stiffness_n_m / m * h, -def->damping_n_s_m / m * h, h / m}}};
+  square step = exponential(rate);
+  for (int i = 0; i < 2; ++i) {
+    hand->a[i][0] = step.m[i][0];
+    hand->a[i][1] = step.m[i][1];
+    hand->b[i] = step.m[i][2];
+  }
+}
+
+static void destroy(void *self) {
+  sonde_hand *hand = self;
+  if (!hand) return;
+  if (hand->goal.destroy) hand->goal.destroy(hand->goal.self);
+  sonde_free(hand);
+}
+
+sonde_status sonde_device_hand(const sonde_hand_def *def, const sonde_script_key *keys,
+                               uint32_t count, double dt_s, sonde_device *device,
+                               sonde_error *error) {
+  SONDE_ASSERT(def != NULL && device != NULL);
+  *device = (sonde_device){0};
+  sonde_status status = check(def, dt_s, error);
+  if (status) return status;
+  sonde_hand *hand = SONDE_NEW(sonde_hand, 1);
+  if (!hand) return sonde_fail_memory(error);
+  status = sonde_device_script(keys, count, dt_s, &hand->goal, error);
+  if (status) {
+    destroy(hand);
+    return status;
+  }
+  hand->def = *def;
+  hand->dt_s = dt_s;
+  hand->delay_ticks = (uint64_t)(def->delay_s / dt_s + 0.5);
+  hand->x_m = hand->load_m = keys[0].world_from_probe.position;
+  hand->rotation = q_unit(keys[0].world_from_probe.rotation);
+  for (uint64_t i = 0; i < 3; ++i)
+    hand->phase_rad[i] = 2.0 * SONDE_PI * sonde_random_uniform(def->seed, i);
+  discretise(hand);
+  *device = (sonde_device){"hand", hand, sonde_hand_read, sonde_hand_write, destroy};
+  return SONDE_OK;
+}
