@@ -6,7 +6,7 @@
 #define SONDE_EXAM_H
 
 #include "sonde/echo.h"
-#include "sonde/haptics.h"
+#include "sonde/haptics_render.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -27,6 +27,7 @@ typedef struct sonde_session_def {
   const char *const *probe_names; /**< NULL-terminated; NULL: all built-in */
   sonde_world_def world;
   sonde_safety_limits limits;
+  sonde_render_def rendering;         /**< coupling and force scale; default none, 1 */
   sonde_session_controls controls;    /**< at the start */
   uint32_t image_width, image_height; /**< default 512 x 512 */
   uint32_t ticks_per_image;           /**< lockstep: an image every so many ticks; real time: the

@@ -81,6 +81,11 @@ typedef struct sonde_safety_limits {
   double soft_start_s; /**< ramp from zero after start or resume; default 0.1 */
   double stale_s;      /**< gap between two ticks of a running session that counts as STALE;
                             default 0.25 */
+  // 0, the default: no such limit
+  double continuous_n; /**< what the motors bear for ever; above it they heat (thermal_s) */
+  double thermal_s;    /**< time constant of that heat; default 5 */
+  double velocity_m_s; /**< a faster probe is a fault; a jump of its pose counts as speed */
+  double impulse_n_s;  /**< a force that drives the hand along for longer is a fault */
 } sonde_safety_limits;
 
 /** @thread any */
@@ -92,7 +97,9 @@ SONDE_API sonde_safety_limits sonde_safety_limits_default(void);
   X(NON_FINITE, "the simulation produced a force that is not a number")                            \
   X(DEVICE_LOST, "the device stopped answering")                                                   \
   X(STALE, "the simulation did not deliver a force in time")                                       \
-  X(STOPPED, "the emergency stop was pressed")
+  X(STOPPED, "the emergency stop was pressed")                                                     \
+  X(VELOCITY, "the device moved faster than its limit")                                            \
+  X(IMPULSE, "the force pushed the hand away for too long")
 
 typedef enum sonde_fault {
 #define SONDE_FAULT_ENUM(name, text) SONDE_FAULT_##name,
@@ -114,6 +121,10 @@ typedef struct sonde_safety {
   uint64_t limited_ticks;  /**< how often a limit acted */
   sonde_vec3 fade_force_n; /**< rendered when the fault came */
   sonde_vec3 fade_torque_n_m;
+  double heat;        /**< of the motors: 1 is what continuous_n leads to */
+  double impulse_n_s; /**< leaky integral of a force that drives the hand along */
+  bool placed;        /**< position_m is one */
+  sonde_vec3 position_m;
 } sonde_safety;
 
 /** Starts softly from zero. @param limits NULL: the defaults; members that are not finite or
@@ -124,6 +135,9 @@ SONDE_API void sonde_safety_init(sonde_safety *safety, const sonde_safety_limits
 SONDE_API void sonde_safety_trip(sonde_safety *safety, sonde_fault fault);
 /** Clears the fault and starts softly. @thread tick */
 SONDE_API void sonde_safety_resume(sonde_safety *safety);
+/** Watches the device's motion before the wrench of the tick: trips VELOCITY and IMPULSE. Skipping
+ *  it leaves these two limits off. @thread tick */
+SONDE_API void sonde_safety_motion(sonde_safety *safety, sonde_vec3 position_m, double dt_s);
 /** Passes a wanted wrench through the limits; the result is in safety->force_n and torque_n_m. A
  *  wrench that is not finite trips NON_FINITE. @thread tick */
 SONDE_API void sonde_safety_apply(sonde_safety *safety, sonde_vec3 force_n, sonde_vec3 torque_n_m,

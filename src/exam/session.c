@@ -14,6 +14,7 @@ enum { RING_RECORDS = 8192 }; // 8 s of ticks while the disk does not answer
 sonde_session_def sonde_session_def_default(void) {
   sonde_session_def def = {.world = sonde_world_def_default(),
                            .limits = sonde_safety_limits_default(),
+                           .rendering = sonde_render_def_default(),
                            .image_width = 512,
                            .image_height = 512,
                            .ticks_per_image = 20};
@@ -156,6 +157,9 @@ sonde_status sonde_session_create(const sonde_session_def *def, sonde_device *de
   session->sample.world_from_probe.rotation = quat_identity();
   session->controls.echo = sonde_echo_settings_default();
   sonde_safety_init(&session->safety, &def->limits);
+  sonde_render_def rendering = def->rendering;
+  rendering.dt_s = session->dt_s;
+  sonde_render_init(&session->render, &rendering);
   status = sonde_pathology_preset("healthy", &session->controls.pathology, error);
   if (!status) status = create_parts(session, def, error);
   if (status) {

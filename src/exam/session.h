@@ -55,6 +55,7 @@ struct sonde_session {
   // tick
   sonde_state *state;
   sonde_safety safety;
+  sonde_render render;
   sonde_session_controls controls; // in force
   sonde_device_sample sample;      // last used
   bool realtime;

@@ -35,7 +35,8 @@ static void take_controls(sonde_session *session, uint64_t tick) {
   push(session, &record);
 }
 
-// A pose that is not one counts as an absent device; the probe then stays where it was.
+// A pose that is not one counts as an absent device; the device then stays where it was. What is
+// recorded is the probe's pose behind the coupling: a replay needs no device.
 static void read_device(sonde_session *session, uint64_t tick) {
   sonde_device_sample sample = session->sample;
   session->device.read(session->device.self, tick, &sample);
@@ -43,9 +44,14 @@ static void read_device(sonde_session *session, uint64_t tick) {
     sample.world_from_probe.rotation = q_unit(sample.world_from_probe.rotation);
   } else {
     sample.world_from_probe = session->sample.world_from_probe;
+    if (session->render.started) sample.world_from_probe.position = session->render.device_m;
     sample.present = false;
   }
   if (!sample.present) sonde_safety_trip(&session->safety, SONDE_FAULT_DEVICE_LOST);
+  sonde_safety_motion(&session->safety, sample.world_from_probe.position, session->dt_s);
+  sample.world_from_probe =
+      sonde_render_probe(&session->render, sample.world_from_probe,
+                         sonde_state_contact(session->state)->force_n, session->safety.force_n);
   session->sample = sample;
   sonde_record record = {.tag = SONDE_RECORD_TICK, .tick = tick};
   record.sample = sample;
@@ -98,7 +104,9 @@ void sonde_session_step(sonde_session *session) {
   if (sonde_state_flags(session->state) & SONDE_FLAG_NON_FINITE)
     sonde_safety_trip(&session->safety, SONDE_FAULT_NON_FINITE);
   const sonde_contact *contact = sonde_state_contact(session->state);
-  sonde_safety_apply(&session->safety, contact->force_n, contact->torque_n_m, session->dt_s);
+  sonde_render_force(&session->render, contact->force_n);
+  sonde_vec3 torque = v_scale(contact->torque_n_m, session->render.def.force_scale);
+  sonde_safety_apply(&session->safety, session->render.force_n, torque, session->dt_s);
   session->device.write(session->device.self, session->safety.force_n, session->safety.torque_n_m);
   if ((tick + 1) % session->ticks_per_image == 0) offer_surface(session);
   SONDE_ASSERT(sonde_state_tick(session->state) == tick + 1);

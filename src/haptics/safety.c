@@ -22,7 +22,8 @@ sonde_safety_limits sonde_safety_limits_default(void) {
                                .slew_n_s = 2000.0,
                                .fade_s = 0.02,
                                .soft_start_s = 0.1,
-                               .stale_s = 0.25};
+                               .stale_s = 0.25,
+                               .thermal_s = 5.0};
 }
 
 static double limit_or(double value, double fallback) {
@@ -41,6 +42,10 @@ void sonde_safety_init(sonde_safety *safety, const sonde_safety_limits *limits) 
       .fade_s = limit_or(limits->fade_s, d.fade_s),
       .soft_start_s = limit_or(limits->soft_start_s, d.soft_start_s),
       .stale_s = limit_or(limits->stale_s, d.stale_s),
+      .continuous_n = limit_or(limits->continuous_n, 0.0),
+      .thermal_s = limits->thermal_s > 0.0 ? limit_or(limits->thermal_s, d.thermal_s) : d.thermal_s,
+      .velocity_m_s = limit_or(limits->velocity_m_s, 0.0),
+      .impulse_n_s = limit_or(limits->impulse_n_s, 0.0),
   };
   SONDE_ASSERT(safety->gain <= 0.0 && safety->fault == SONDE_FAULT_NONE);
 }

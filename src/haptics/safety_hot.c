@@ -5,8 +5,13 @@
 // them does too: both limits hold at every tick. Fault: what was rendered last fades in equal steps
 // to exactly zero within fade_s, whatever the simulation says.
 //
+// Heat. The motors' heat follows (f / continuous)^2 with a time constant. Between 0.8 and 1 of what
+// the continuous force leads to, the norm limit falls from force_n to continuous_n: at rest there
+// it stays, since a force above it would raise the heat further.
+//
 // limited:     vector cut to a norm.
 // slewed:      a step of bounded length towards a target.
+// cap_n:       norm limit of this tick, lower when the motors are hot.
 // apply_fade:  one tick of a latched fault.
 // apply_force: one healthy tick.
 #include "sonde/haptics.h"
@@ -47,6 +52,39 @@ void sonde_safety_trip(sonde_safety *safety, sonde_fault fault) {
 void sonde_safety_resume(sonde_safety *safety) {
   safety->fault = SONDE_FAULT_NONE;
   safety->gain = 0.0;
+  safety->impulse_n_s = 0.0;
+  safety->placed = false; // where the device went meanwhile is no motion
+}
+
+// The leak of the impulse, 0.1 s, lets a short push pass.
+void sonde_safety_motion(sonde_safety *safety, sonde_vec3 position_m, double dt_s) {
+  SONDE_ASSERT(dt_s > 0.0);
+  if (!v_finite(position_m)) return;
+  sonde_vec3 moved = v_sub(position_m, safety->position_m);
+  bool known = safety->placed;
+  safety->position_m = position_m;
+  safety->placed = true;
+  if (!known) return;
+  const sonde_safety_limits *limits = &safety->limits;
+  double along = v_dot(safety->force_n, moved), distance = v_norm(moved);
+  double push = along > 0.0 ? along / distance : 0.0;
+  safety->impulse_n_s += dt_s * (push - safety->impulse_n_s / 0.1);
+  safety->impulse_n_s = fmax(safety->impulse_n_s, 0.0);
+  if (limits->velocity_m_s > 0.0 && distance > limits->velocity_m_s * dt_s)
+    sonde_safety_trip(safety, SONDE_FAULT_VELOCITY);
+  if (limits->impulse_n_s > 0.0 && safety->impulse_n_s > limits->impulse_n_s)
+    sonde_safety_trip(safety, SONDE_FAULT_IMPULSE);
+}
+
+static double cap_n(sonde_safety *safety, double dt_s) {
+  const sonde_safety_limits *limits = &safety->limits;
+  if (!(limits->continuous_n > 0.0)) return limits->force_n;
+  double load = v_norm2(safety->force_n) / (limits->continuous_n * limits->continuous_n);
+  double share = fmin(dt_s / limits->thermal_s, 1.0);
+  safety->heat += share * (load - safety->heat);
+  double cool = clamp(5.0 * (1.0 - safety->heat), 0.0, 1.0);
+  return fmin(limits->force_n,
+              limits->continuous_n + cool * fmax(limits->force_n - limits->continuous_n, 0.0));
 }
 
 static void apply_fade(sonde_safety *safety, double dt_s) {
@@ -57,13 +95,13 @@ static void apply_fade(sonde_safety *safety, double dt_s) {
   safety->torque_n_m = v_scale(safety->fade_torque_n_m, safety->gain);
 }
 
-static void apply_force(sonde_safety *safety, sonde_vec3 force_n, sonde_vec3 torque_n_m,
+static void apply_force(sonde_safety *safety, sonde_vec3 force_n, sonde_vec3 torque_n_m, double cap,
                         double dt_s) {
   const sonde_safety_limits *limits = &safety->limits;
   bool acted = false;
   double step = limits->soft_start_s > 0.0 ? dt_s / limits->soft_start_s : 1.0;
   safety->gain = fmin(1.0, safety->gain + step);
-  force_n = v_scale(limited(force_n, limits->force_n, &acted), safety->gain);
+  force_n = v_scale(limited(force_n, cap, &acted), safety->gain);
   torque_n_m = v_scale(limited(torque_n_m, limits->torque_n_m, &acted), safety->gain);
   double reach_n = limits->slew_n_s * dt_s;
   double reach_n_m = limits->force_n > 0.0 ? reach_n * limits->torque_n_m / limits->force_n : 0.0;
@@ -77,8 +115,9 @@ void sonde_safety_apply(sonde_safety *safety, sonde_vec3 force_n, sonde_vec3 tor
   SONDE_ASSERT(dt_s > 0.0);
   if (!v_finite(force_n) || !v_finite(torque_n_m))
     sonde_safety_trip(safety, SONDE_FAULT_NON_FINITE);
+  double cap = cap_n(safety, dt_s);
   if (safety->fault == SONDE_FAULT_NONE)
-    apply_force(safety, force_n, torque_n_m, dt_s);
+    apply_force(safety, force_n, torque_n_m, cap, dt_s);
   else
     apply_fade(safety, dt_s);
   SONDE_ASSERT(v_finite(safety->force_n) && v_finite(safety->torque_n_m));

@@ -82,17 +82,20 @@ static square exponential(square a) {
   return sum;
 }
 
-// (x, v, load)' = ((0 1 0) (-k/m -b/m 1/m) (0 0 0)) (x, v, load)
+// (x, v h, load)' h = ((0 1 0) (-k h^2/m -b h/m h^2/m) (0 0 0)) (x, v h, load); with v h the entries
+// are balanced, so that little is lost in the squarings.
 static void discretise(sonde_hand *hand) {
   const sonde_hand_def *def = &hand->def;
   double m = def->mass_kg, h = hand->dt_s;
-  square rate = {{{0, h, 0}, {-def->stiffness_n_m / m * h, -def->damping_n_s_m / m * h, h / m}}};
+  square rate = {
+      {{0, 1, 0}, {-def->stiffness_n_m * h * h / m, -def->damping_n_s_m * h / m, h * h / m}}};
   square step = exponential(rate);
-  for (int i = 0; i < 2; ++i) {
-    hand->a[i][0] = step.m[i][0];
-    hand->a[i][1] = step.m[i][1];
-    hand->b[i] = step.m[i][2];
-  }
+  hand->a[0][0] = step.m[0][0];
+  hand->a[0][1] = step.m[0][1] * h;
+  hand->a[1][0] = step.m[1][0] / h;
+  hand->a[1][1] = step.m[1][1];
+  hand->b[0] = step.m[0][2];
+  hand->b[1] = step.m[1][2] / h;
 }
 
 static void destroy(void *self) {
