@@ -24,6 +24,7 @@
 #include "sonde/echo_frames.h"
 #include "sonde/echo_volume.h"
 #include "sonde/haptics.h"
+#include "sonde/haptics_devices.h"
 #include "sonde/haptics_hand.h"
 #include "sonde/haptics_local.h"
 #include "sonde/haptics_render.h"

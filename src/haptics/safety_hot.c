@@ -9,8 +9,6 @@
 // the continuous force leads to, the norm limit falls from force_n to continuous_n: at rest there
 // it stays, since a force above it would raise the heat further.
 //
-// limited:     vector cut to a norm.
-// slewed:      a step of bounded length towards a target.
 // cap_n:       norm limit of this tick, lower when the motors are hot.
 // apply_fade:  one tick of a latched fault.
 // apply_force: one healthy tick.
@@ -18,27 +16,7 @@
 
 #include "base/base.h"
 #include "base/maths.h"
-
-static sonde_vec3 limited(sonde_vec3 wanted, double limit, bool *acted) {
-  double norm = v_norm(wanted);
-  if (norm <= limit) return wanted;
-  *acted = true;
-  // a huge vector whose squared norm overflows still has a direction
-  if (!isfinite(norm)) {
-    double largest = fmax(fabs(wanted.x), fmax(fabs(wanted.y), fabs(wanted.z)));
-    wanted = v_scale(wanted, 1.0 / largest);
-    norm = v_norm(wanted);
-  }
-  return v_scale(wanted, limit / norm);
-}
-
-static sonde_vec3 slewed(sonde_vec3 last, sonde_vec3 target, double reach, bool *acted) {
-  sonde_vec3 change = v_sub(target, last);
-  double norm = v_norm(change);
-  if (norm <= reach) return target;
-  *acted = true;
-  return v_madd(last, reach / norm, change);
-}
+#include "haptics/bounds.h"
 
 void sonde_safety_trip(sonde_safety *safety, sonde_fault fault) {
   if (fault == SONDE_FAULT_NONE || safety->fault != SONDE_FAULT_NONE) return;
@@ -101,12 +79,12 @@ static void apply_force(sonde_safety *safety, sonde_vec3 force_n, sonde_vec3 tor
   bool acted = false;
   double step = limits->soft_start_s > 0.0 ? dt_s / limits->soft_start_s : 1.0;
   safety->gain = fmin(1.0, safety->gain + step);
-  force_n = v_scale(limited(force_n, cap, &acted), safety->gain);
-  torque_n_m = v_scale(limited(torque_n_m, limits->torque_n_m, &acted), safety->gain);
+  force_n = v_scale(sonde_bound_norm(force_n, cap, &acted), safety->gain);
+  torque_n_m = v_scale(sonde_bound_norm(torque_n_m, limits->torque_n_m, &acted), safety->gain);
   double reach_n = limits->slew_n_s * dt_s;
   double reach_n_m = limits->force_n > 0.0 ? reach_n * limits->torque_n_m / limits->force_n : 0.0;
-  safety->force_n = slewed(safety->force_n, force_n, reach_n, &acted);
-  safety->torque_n_m = slewed(safety->torque_n_m, torque_n_m, reach_n_m, &acted);
+  safety->force_n = sonde_bound_step(safety->force_n, force_n, reach_n, &acted);
+  safety->torque_n_m = sonde_bound_step(safety->torque_n_m, torque_n_m, reach_n_m, &acted);
   safety->limited_ticks += acted;
 }
 

@@ -82,8 +82,8 @@ static square exponential(square a) {
   return sum;
 }
 
-// (x, v h, load)' h = ((0 1 0) (-k h^2/m -b h/m h^2/m) (0 0 0)) (x, v h, load); with v h the entries
-// are balanced, so that little is lost in the squarings.
+// (x, v h, load)' h = ((0 1 0) (-k h^2/m -b h/m h^2/m) (0 0 0)) (x, v h, load); with v h the
+// entries are balanced, so that little is lost in the squarings.
 static void discretise(sonde_hand *hand) {
   const sonde_hand_def *def = &hand->def;
   double m = def->mass_kg, h = hand->dt_s;

@@ -1,0 +1,133 @@
+// Haply Inverse3 through the service of its maker: JSON over WebSocket on this machine. One state
+// comes back for every command; a command that is not repeated is forgotten by the service.
+// read_vector: three numbers of an object.
+// read_state:  what a message says about the device.
+#include "haptics/devices/pump.h"
+
+#include "base/base.h"
+#include "base/clock.h"
+#include "base/maths.h"
+#include "haptics/devices/websocket.h"
+
+#include <cjson/cJSON.h>
+
+static const double silence_s = 0.1;
+
+typedef struct haply {
+  sonde_websocket socket;
+  bool opened;
+  char device[64]; // id; empty before the first state
+  double heard_s;  // clock of the newest state
+  sonde_quat rotation;
+} haply;
+
+static sonde_status look(const sonde_device_open_def *def, sonde_error *error) {
+  sonde_websocket *socket = SONDE_NEW(sonde_websocket, 1);
+  if (!socket) return sonde_fail_memory(error);
+  sonde_status status = sonde_websocket_open(socket, def->port, error);
+  sonde_websocket_close(socket);
+  sonde_free(socket);
+  return status;
+}
+
+static bool read_vector(const cJSON *object, const char *name, sonde_vec3 *v) {
+  const cJSON *o = cJSON_GetObjectItemCaseSensitive(object, name);
+  const cJSON *x = cJSON_GetObjectItemCaseSensitive(o, "x");
+  const cJSON *y = cJSON_GetObjectItemCaseSensitive(o, "y");
+  const cJSON *z = cJSON_GetObjectItemCaseSensitive(o, "z");
+  if (!cJSON_IsNumber(x) || !cJSON_IsNumber(y) || !cJSON_IsNumber(z)) return false;
+  *v = vec3(x->valuedouble, y->valuedouble, z->valuedouble);
+  return v_finite(*v);
+}
+
+// The grip is optional: without it the last rotation stays.
+static void read_grip(haply *h, const cJSON *root, sonde_device_sample *sample) {
+  static const char *const kinds[] = {"wireless_verse_grip", "verse_grip"};
+  static const char *const buttons[] = {"a", "b", "c"};
+  for (size_t k = 0; k < SONDE_COUNT_OF(kinds); ++k) {
+    const cJSON *grip = cJSON_GetArrayItem(cJSON_GetObjectItemCaseSensitive(root, kinds[k]), 0);
+    const cJSON *state = cJSON_GetObjectItemCaseSensitive(grip, "state");
+    sonde_vec3 v;
+    const cJSON *w = cJSON_GetObjectItemCaseSensitive(
+        cJSON_GetObjectItemCaseSensitive(state, "orientation"), "w");
+    if (cJSON_IsNumber(w) && read_vector(state, "orientation", &v))
+      h->rotation = q_unit((sonde_quat){w->valuedouble, v.x, v.y, v.z});
+    const cJSON *pressed = cJSON_GetObjectItemCaseSensitive(state, "buttons");
+    for (size_t b = 0; b < SONDE_COUNT_OF(buttons); ++b)
+      if (cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(pressed, buttons[b])))
+        sample->buttons |= 1u << b;
+  }
+}
+
+// Torn or foreign messages are dropped: silence, not nonsense, decides that a device is lost.
+static bool read_state(haply *h, sonde_device_sample *sample) {
+  cJSON *root = cJSON_Parse(h->socket.message);
+  const cJSON *device = cJSON_GetArrayItem(cJSON_GetObjectItemCaseSensitive(root, "inverse3"), 0);
+  const char *id = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(device, "device_id"));
+  const cJSON *state = cJSON_GetObjectItemCaseSensitive(device, "state");
+  bool known = id && read_vector(state, "cursor_position", &sample->world_from_probe.position);
+  if (known) {
+    snprintf(h->device, sizeof h->device, "%s", id);
+    read_grip(h, root, sample);
+    sample->world_from_probe.rotation = h->rotation;
+  }
+  cJSON_Delete(root);
+  return known;
+}
+
+// Waits for the first state: a service without a device sends none.
+static sonde_status open_device(void *self, const sonde_device_open_def *def, sonde_error *error) {
+  haply *h = self;
+  sonde_status status = sonde_websocket_open(&h->socket, def->port, error);
+  if (status) return status;
+  h->opened = true;
+  h->rotation = quat_identity();
+  sonde_device_sample sample = {0};
+  double until_s = sonde_clock_now() + 0.5;
+  for (int got = 0; got >= 0 && !h->device[0] && sonde_clock_now() < until_s;) {
+    sonde_websocket_wait(&h->socket, 50);
+    got = sonde_websocket_receive(&h->socket);
+    if (got > 0) read_state(h, &sample);
+  }
+  if (!h->device[0])
+    return sonde_fail(error, SONDE_DEVICE, "the service on port %u knows no Inverse3",
+                      (unsigned)def->port);
+  h->heard_s = sonde_clock_now();
+  return SONDE_OK;
+}
+
+static bool send_force(haply *h, sonde_vec3 f) {
+  char text[256];
+  int length = snprintf(text, sizeof text,
+                        "{\"inverse3\":[{\"device_id\":\"%s\",\"commands\":{\"set_cursor_force\":"
+                        "{\"values\":{\"x\":%.6f,\"y\":%.6f,\"z\":%.6f}}}}]}",
+                        h->device, f.x, f.y, f.z);
+  return length > 0 && (size_t)length < sizeof text &&
+         sonde_websocket_send(&h->socket, text, (size_t)length);
+}
+
+static int exchange(void *self, sonde_vec3 force_n, sonde_vec3 torque_n_m,
+                    sonde_device_sample *sample) {
+  haply *h = self;
+  (void)torque_n_m;
+  SONDE_ASSERT(h->opened);
+  if (!send_force(h, force_n)) return -1;
+  int got, fresh = 0;
+  while ((got = sonde_websocket_receive(&h->socket)) > 0)
+    if (read_state(h, sample)) fresh = 1;
+  if (fresh) h->heard_s = sonde_clock_now();
+  if (got < 0 || sonde_clock_now() - h->heard_s > silence_s) return -1;
+  return fresh;
+}
+
+static void close_device(void *self) {
+  haply *h = self;
+  if (h->opened) sonde_websocket_close(&h->socket);
+  h->opened = false;
+  h->device[0] = '\0';
+}
+
+const sonde_driver sonde_driver_haply = {"haply",       "Inverse3 through its service (WebSocket)",
+                                         sizeof(haply), open_device,
+                                         exchange,      close_device,
+                                         look};
