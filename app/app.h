@@ -21,6 +21,7 @@ int cmd_bench(int argc, char **argv);
 int cmd_simulate(int argc, char **argv);
 int cmd_reconstruct(int argc, char **argv);
 int cmd_slice(int argc, char **argv);
+int cmd_validate(int argc, char **argv);
 int cmd_devices(int argc, char **argv);
 
 // Prints "sonde <verb>: <message>" on stderr and returns the exit code that fits the status.

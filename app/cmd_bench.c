@@ -2,6 +2,7 @@
 // scene solved to the end (every node awake, residual 1e-10) at the same time step.
 #include "app.h"
 #include "bench_ellipsoid.h"
+#include "bench_haptics.h"
 
 #include <getopt.h>
 #include <math.h>
@@ -37,6 +38,9 @@ static const char HELP[] =
     "  --repeat N     timed runs, the fastest median is reported; default 3\n"
     "  --csv FILE     write one row per step: time, total and per-stage milliseconds, iterations\n"
     "  --no-reference skip the converged run; relative_error is then null\n"
+    "  --haptics      the whole 1 kHz loop in real time instead: a simulated hand presses to\n"
+    "                 20 mm through a device's limits, for --seconds (default 5)\n"
+    "  --device NAME  touch (default), touch_x, premium_1.5, omega.3, omega.6 or falcon\n"
     "  --json         print one JSON object\n"
     "  --help         this text\n";
 
@@ -61,7 +65,8 @@ typedef struct options {
   double seconds, dt_s;
   long repeat;
   const char *csv;
-  bool json, reference;
+  bool json, reference, haptics;
+  const char *device;
 } options;
 
 typedef struct sample {
@@ -114,6 +119,8 @@ static const struct option LONG[] = {{"scene", required_argument, NULL, 's'},
                                      {"repeat", required_argument, NULL, 'r'},
                                      {"csv", required_argument, NULL, 'c'},
                                      {"no-reference", no_argument, NULL, 'n'},
+                                     {"haptics", no_argument, NULL, 'H'},
+                                     {"device", required_argument, NULL, 'D'},
                                      {"json", no_argument, NULL, 'j'},
                                      {"help", no_argument, NULL, 'h'},
                                      {NULL, 0, NULL, 0}};
@@ -147,6 +154,8 @@ static int read_option(options *o, int option) {
   case 'c': o->csv = optarg; return -1;
   case 'n': o->reference = false; return -1;
   case 'j': o->json = true; return -1;
+  case 'H': o->haptics = true; return -1;
+  case 'D': o->device = optarg; return -1;
   case 'h': fputs(HELP, stdout); return APP_OK;
   case '?': return APP_BAD_INPUT;
   default: return read_number(o, option, optarg) ? -1 : APP_BAD_INPUT;
@@ -159,7 +168,8 @@ static int read_options(int argc, char **argv, options *o) {
     if (code >= 0) return code;
   }
   if (!(o->tolerance > 0)) o->tolerance = is_ellipsoid(o) ? 0.1 : 2e-2;
-  if (!(o->seconds > 0)) o->seconds = is_ellipsoid(o) ? 0.5 : 1;
+  if (!(o->seconds > 0)) o->seconds = o->haptics ? 5 : is_ellipsoid(o) ? 0.5 : 1;
+  if (o->device && !o->haptics) return app_usage_error("bench", "--device belongs to --haptics");
   if (argc - optind > (is_ellipsoid(o) ? 0 : 1))
     return app_usage_error("bench", "'%s' is too much", argv[argc - 1]);
   if (is_ellipsoid(o)) return -1;
@@ -429,6 +439,7 @@ int cmd_bench(int argc, char **argv) {
                .reference = true};
   int code = read_options(argc, argv, &o);
   if (code >= 0) return code;
+  if (o.haptics) return bench_haptics(o.model, o.device ? o.device : "touch", o.seconds, o.json);
   bench b = {.o = &o, .steps = (uint32_t)(o.seconds / o.dt_s + 0.5)};
   sonde_error error = {0};
   sonde_model *model = NULL;

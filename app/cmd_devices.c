@@ -5,10 +5,11 @@
 #include <stdio.h>
 
 static const char help[] =
-    "usage: sonde devices [--json]\n"
+    "usage: sonde devices [--probe] [--json]\n"
     "\n"
     "Lists the input devices that hold the probe and whether this machine has them.\n"
     "\n"
+    "  --probe  open each device for a moment instead of only looking for its library\n"
     "  --json   print one JSON object\n"
     "  --help   this text\n";
 
@@ -25,16 +26,18 @@ static void print_json(const sonde_device_info *info, uint32_t count) {
 }
 
 static void print_table(const sonde_device_info *info, uint32_t count) {
-  printf("%-8s %-9s %-36s %s\n", "device", "available", "what it does", "why");
+  printf("%-14s %-9s %-48s %s\n", "device", "available", "what it does", "why");
   for (uint32_t i = 0; i < count; ++i)
-    printf("%-8s %-9s %-36s %s\n", info[i].name, info[i].available ? "yes" : "no",
+    printf("%-14s %-9s %-48s %s\n", info[i].name, info[i].available ? "yes" : "no",
            info[i].description, info[i].reason);
 }
 
 int cmd_devices(int argc, char **argv) {
-  static const struct option options[] = {
-      {"json", no_argument, NULL, 'j'}, {"help", no_argument, NULL, 'h'}, {NULL, 0, NULL, 0}};
-  bool json = false;
+  static const struct option options[] = {{"json", no_argument, NULL, 'j'},
+                                          {"probe", no_argument, NULL, 'p'},
+                                          {"help", no_argument, NULL, 'h'},
+                                          {NULL, 0, NULL, 0}};
+  bool json = false, probe = false;
   int option;
   opterr = 0;
   while ((option = getopt_long(argc, argv, ":h", options, NULL)) != -1) {
@@ -42,12 +45,14 @@ int cmd_devices(int argc, char **argv) {
       fputs(help, stdout);
       return APP_OK;
     }
-    if (option != 'j') return app_usage_error("devices", "unknown option '%s'", argv[optind - 1]);
-    json = true;
+    if (option != 'j' && option != 'p')
+      return app_usage_error("devices", "unknown option '%s'", argv[optind - 1]);
+    json |= option == 'j';
+    probe |= option == 'p';
   }
   if (optind < argc) return app_usage_error("devices", "unexpected argument '%s'", argv[optind]);
-  uint32_t count = 0;
-  const sonde_device_info *info = sonde_devices(&count);
+  sonde_device_info info[32];
+  uint32_t count = sonde_devices_find(probe, info, 32);
   if (json)
     print_json(info, count);
   else

@@ -1,0 +1,168 @@
+// sonde bench --haptics: the whole loop at 1 kHz in real time, with the simulated hand in place of
+// a hardware.
+//
+// tick        one tick, with its times
+// lateness    wake-ups against the grid that the earliest of them lie on
+// print_*     the results
+#include "bench_haptics.h"
+
+#include "app.h"
+#include "haptics_rig.h"
+
+#include <math.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <time.h>
+
+typedef struct bench {
+  haptics_rig rig;
+  size_t capacity;
+  _Atomic size_t count;
+  double *woken_s, *compute_s;
+} bench;
+
+static double now(clockid_t clock) {
+  struct timespec t;
+  clock_gettime(clock, &t);
+  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static void tick(void *user) {
+  bench *b = user;
+  size_t k = atomic_load(&b->count);
+  if (k >= b->capacity) return;
+  b->woken_s[k] = now(CLOCK_MONOTONIC);
+  haptics_rig_tick(&b->rig);
+  b->compute_s[k] = now(CLOCK_MONOTONIC) - b->woken_s[k];
+  atomic_store(&b->count, k + 1);
+}
+
+// In place. Whole periods are deadline misses and counted by the loop.
+static void lateness(double *woken_s, size_t count) {
+  double start = woken_s[0], earliest = 1.0;
+  for (size_t k = 0; k < count; ++k) {
+    woken_s[k] = fmod(woken_s[k] - start + 0.5e-3, 1e-3) - 0.5e-3;
+    earliest = fmin(earliest, woken_s[k]);
+  }
+  for (size_t k = 0; k < count; ++k) woken_s[k] -= earliest;
+}
+
+static void print_times(const char *name, double *list, size_t count) {
+  app_json_object(name);
+  app_json_real("p50", 1e6 * haptics_quantile(list, count, 0.5));
+  app_json_real("p99", 1e6 * haptics_quantile(list, count, 0.99));
+  app_json_real("p999", 1e6 * haptics_quantile(list, count, 0.999));
+  app_json_real("max", 1e6 * haptics_quantile(list, count, 1.0));
+  app_json_close();
+}
+
+static void print_json(bench *b, const sonde_loop_stats *stats) {
+  sonde_render_margins margins = sonde_render_margins_of(&b->rig.render.def, b->rig.def.mass_kg,
+                                                         b->rig.def.damping_n_s_m, 0.0);
+  app_json_begin();
+  app_json_text("device", b->rig.def.limits->name);
+  app_json_integer("ticks", (long long)b->count);
+  print_times("compute_us", b->compute_s, b->count);
+  print_times("lateness_us", b->woken_s, b->count);
+  app_json_integer("deadline_misses", (long long)stats->deadline_misses);
+  app_json_real("energy_j", b->rig.render.energy_j);
+  app_json_real("energy_min_j", b->rig.render.energy_min_j);
+  app_json_real("max_force_n", b->rig.max_force_n);
+  app_json_real("max_slew_n_per_s", b->rig.max_step_n * 1e3);
+  app_json_real("force_scale", b->rig.render.def.force_scale);
+  app_json_real("coupling_n_per_m", b->rig.render.def.stiffness_n_m);
+  app_json_real("stiffness_margin", margins.stiffness);
+  app_json_real("phase_margin_deg", margins.phase_rad * 57.29577951308232);
+  app_json_real("passivity_margin", margins.passivity);
+  app_json_text("fault", sonde_fault_text(b->rig.safety.fault));
+  app_json_text("priority_note", stats->priority_note);
+  app_json_end();
+}
+
+static void print_table(bench *b, const sonde_loop_stats *stats) {
+  static const double share[] = {0.5, 0.99, 0.999, 1.0};
+  const char *const names[] = {"compute", "lateness"};
+  double *const lists[] = {b->compute_s, b->woken_s};
+  printf("%s held by a hand of %g kg, %zu ticks of 1 ms\n", b->rig.def.limits->product,
+         b->rig.def.mass_kg, (size_t)b->count);
+  for (int i = 0; i < 2; ++i) {
+    printf("  %-9s", names[i]);
+    for (int q = 0; q < 4; ++q)
+      printf("  %s %7.0f us", (const char *const[]){"p50", "p99", "p99.9", "max"}[q],
+             1e6 * haptics_quantile(lists[i], b->count, share[q]));
+    printf("\n");
+  }
+  printf("  deadline misses %llu   energy taken from the hand %.4f J   largest force %.2f N, "
+         "slew %.0f N/s\n",
+         (unsigned long long)stats->deadline_misses, b->rig.render.energy_j, b->rig.max_force_n,
+         b->rig.max_step_n * 1e3);
+  printf("  tissue force is rendered times %.3f; %s\n", b->rig.render.def.force_scale,
+         sonde_fault_text(b->rig.safety.fault));
+  if (stats->priority_note[0]) printf("  %s\n", stats->priority_note);
+}
+
+static sonde_status run(bench *b, const haptics_rig_def *def, double seconds,
+                        sonde_loop_stats *stats, sonde_error *error) {
+  sonde_world_def world = haptics_world();
+  sonde_state *state = NULL;
+  sonde_loop *loop = NULL;
+  sonde_status status = sonde_state_create(def->model, &world, &state, error);
+  if (!status) status = haptics_rig_start(&b->rig, def, state, error);
+  if (!status) status = sonde_loop_start(1e-3, tick, b, &loop, error);
+  if (!status) {
+    double until = now(CLOCK_MONOTONIC) + seconds;
+    while (now(CLOCK_MONOTONIC) < until && !app_interrupted())
+      nanosleep(&(struct timespec){0, 20000000}, NULL);
+    sonde_loop_stop(loop, stats);
+  }
+  haptics_rig_stop(&b->rig);
+  sonde_state_destroy(state);
+  return status;
+}
+
+int bench_haptics(const char *model_path, const char *device, double seconds, bool json) {
+  const sonde_device_limits *limits = sonde_device_limits_find(device);
+  if (!limits || !(limits->force_peak_n > 0.0))
+    return app_usage_error("bench",
+                           "no known limits of a device '%s', expected touch, touch_x, "
+                           "premium_1.5, omega.3, omega.6 or falcon",
+                           device);
+  bench *b = calloc(1, sizeof *b);
+  sonde_error error = {0};
+  sonde_model *model = NULL;
+  sonde_probe probe = {0};
+  sonde_loop_stats stats = {0};
+  sonde_status status = sonde_model_load(model_path, &model, &error);
+  if (!status) status = sonde_probe_create("linear", &probe, &error);
+  if (!status && b) {
+    b->capacity = (size_t)(seconds * 1e3) + 1000;
+    b->woken_s = calloc(b->capacity, sizeof(double));
+    b->compute_s = calloc(b->capacity, sizeof(double));
+  }
+  if (!status && (!b || !b->woken_s || !b->compute_s)) status = SONDE_MEMORY;
+  if (!status) {
+    const sonde_site *site = sonde_model_site(model, 27);
+    haptics_rig_def def = {.model = model,
+                           .probe = &probe,
+                           .site = site ? site : &model->sites[model->site_count / 2],
+                           .limits = limits,
+                           .mass_kg = 0.5,
+                           .damping_n_s_m = 2.0,
+                           .depth_m = 0.02};
+    app_catch_interrupt();
+    status = run(b, &def, seconds, &stats, &error);
+  }
+  if (!status && b->count > 0) {
+    lateness(b->woken_s, b->count);
+    (json ? print_json : print_table)(b, &stats);
+  }
+  if (b) {
+    free(b->woken_s);
+    free(b->compute_s);
+  }
+  free(b);
+  sonde_probe_clear(&probe);
+  sonde_model_destroy(model);
+  return status ? app_fail("bench", &error) : APP_OK;
+}

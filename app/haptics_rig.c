@@ -1,0 +1,84 @@
+// A hand that presses the thigh through a device's limits.
+#include "haptics_rig.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double DT_S = 1e-3;
+
+sonde_world_def haptics_world(void) { return sonde_session_def_default().world; }
+
+void haptics_rig_follow(haptics_rig *rig, const haptics_rig_def *def, sonde_state *state,
+                        sonde_device device) {
+  *rig = (haptics_rig){.def = *def, .state = state, .device = device};
+  sonde_render_def rendering = sonde_render_def_for(def->limits, DT_S, 0.0);
+  if (def->direct) {
+    rendering.stiffness_n_m = 0.0;
+    rendering.controller = false;
+  }
+  sonde_render_init(&rig->render, &rendering);
+  sonde_safety_limits bounds = sonde_safety_limits_of(def->limits);
+  if (def->faultless) bounds.velocity_m_s = bounds.impulse_n_s = bounds.continuous_n = 0.0;
+  sonde_safety_init(&rig->safety, &bounds);
+  sonde_state_reset(state);
+}
+
+sonde_status haptics_rig_start(haptics_rig *rig, const haptics_rig_def *def, sonde_state *state,
+                               sonde_error *error) {
+  sonde_hand_def hand = sonde_hand_def_default();
+  hand.mass_kg = def->mass_kg;
+  hand.damping_n_s_m = def->damping_n_s_m;
+  hand.tremor_m = 0.0;
+  // at the goal the arm is stretched by what the device can push
+  double goal = def->depth_m + 0.8 * def->limits->force_peak_n / hand.stiffness_n_m;
+  const sonde_script_key keys[] = {{0.1, sonde_site_pose(def->site, -0.005)},
+                                   {0.6, sonde_site_pose(def->site, goal)}};
+  sonde_device device;
+  sonde_status status = sonde_device_hand(&hand, keys, 2, DT_S, &device, error);
+  if (status) return status;
+  haptics_rig_follow(rig, def, state, device);
+  return SONDE_OK;
+}
+
+static double norm(sonde_vec3 v) { return sqrt(v.x * v.x + v.y * v.y + v.z * v.z); }
+
+void haptics_rig_tick(haptics_rig *rig) {
+  sonde_device_sample sample;
+  sonde_vec3 before = rig->safety.force_n;
+  rig->device.read(rig->device.self, rig->tick++, &sample);
+  sonde_safety_motion(&rig->safety, sample.world_from_probe.position, DT_S);
+  sonde_pose pose = sonde_render_probe(&rig->render, sample.world_from_probe,
+                                       sonde_state_contact(rig->state)->force_n, before);
+  sonde_step(rig->state, rig->def.probe, pose);
+  sonde_render_force(&rig->render, sonde_state_contact(rig->state)->force_n);
+  sonde_safety_apply(&rig->safety, rig->render.force_n, (sonde_vec3){0, 0, 0}, DT_S);
+  rig->device.write(rig->device.self, rig->safety.force_n, (sonde_vec3){0, 0, 0});
+  sonde_vec3 f = rig->safety.force_n;
+  sonde_vec3 step = {f.x - before.x, f.y - before.y, f.z - before.z};
+  rig->max_force_n = fmax(rig->max_force_n, norm(f));
+  rig->max_step_n = fmax(rig->max_step_n, norm(step));
+}
+
+void haptics_rig_stop(haptics_rig *rig) {
+  if (rig->device.destroy) rig->device.destroy(rig->device.self);
+  rig->device = (sonde_device){0};
+}
+
+double haptics_rig_depth(const haptics_rig *rig) {
+  sonde_pose surface = sonde_site_pose(rig->def.site, 0.0),
+             below = sonde_site_pose(rig->def.site, 1);
+  sonde_vec3 at = rig->render.device_m, a = surface.position, b = below.position;
+  return (at.x - a.x) * (b.x - a.x) + (at.y - a.y) * (b.y - a.y) + (at.z - a.z) * (b.z - a.z);
+}
+
+static int by_value(const void *a, const void *b) {
+  double x = *(const double *)a, y = *(const double *)b;
+  return (x > y) - (x < y);
+}
+
+double haptics_quantile(double *list, size_t count, double share) {
+  if (count == 0) return NAN;
+  qsort(list, count, sizeof *list, by_value);
+  return list[(size_t)(share * (double)(count - 1) + 0.5)];
+}

@@ -1,0 +1,475 @@
+// sonde validate haptics: every measure of the haptics room with its target, without hardware.
+//
+// report          one measure
+// full_model      compute time of the loop with the full model
+// local_model     the local model fed at 100 Hz beside the full model
+// high_pass       vibration: what is left above 80 Hz
+// stability       operators, devices and sites; and the same without control
+// faults          stalls, jumps, loss and nonsense before both gates
+// friction        tangential over normal force in a slide there and back
+// pressing        a recorded hand
+#include "app.h"
+#include "haptics_rig.h"
+#include "validate.h"
+
+#include <getopt.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+typedef struct options {
+  char model[1024];
+  const char *pressing;
+  long sites;
+  bool json;
+} options;
+
+typedef struct work {
+  const options *o;
+  sonde_model *model;
+  sonde_probe probe;
+  sonde_state *state;
+  const sonde_site *site;
+  sonde_error *error;
+  int passed, failed;
+} work;
+
+static const sonde_vec3 ZERO = {0, 0, 0};
+
+static sonde_vec3 minus(sonde_vec3 a, sonde_vec3 b) {
+  return (sonde_vec3){a.x - b.x, a.y - b.y, a.z - b.z};
+}
+static double dot(sonde_vec3 a, sonde_vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+static double norm(sonde_vec3 a) { return sqrt(dot(a, a)); }
+
+// `most`: the target is an upper bound, else a lower one.
+static void report(work *w, const char *name, double value, double target, bool most) {
+  bool pass = most ? value <= target : value >= target;
+  w->passed += pass;
+  w->failed += !pass;
+  if (!w->o->json) {
+    printf("  %-34s %12.5g   %s %-8g %s\n", name, value, most ? "<=" : ">=", target,
+           pass ? "pass" : "FAIL");
+    fflush(stdout);
+    return;
+  }
+  app_json_object(name);
+  app_json_real("value", value);
+  app_json_text("bound", most ? "at most" : "at least");
+  app_json_real("target", target);
+  app_json_bool("pass", pass);
+  app_json_close();
+}
+
+static haptics_rig_def rig_def(const work *w, const char *device) {
+  return (haptics_rig_def){.model = w->model,
+                           .probe = &w->probe,
+                           .site = w->site,
+                           .limits = sonde_device_limits_find(device),
+                           .mass_kg = 0.5,
+                           .damping_n_s_m = 2.0,
+                           .depth_m = 0.03};
+}
+
+static double cpu_now(void) {
+  struct timespec t;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static sonde_status full_model(work *w) {
+  enum { TICKS = 3000 };
+  static double spent_s[TICKS];
+  haptics_rig rig;
+  haptics_rig_def def = rig_def(w, "omega.3");
+  sonde_status status = haptics_rig_start(&rig, &def, w->state, w->error);
+  if (status) return status;
+  uint64_t stale = 0;
+  for (int i = 0; i < TICKS; ++i) {
+    double start = cpu_now();
+    haptics_rig_tick(&rig);
+    spent_s[i] = cpu_now() - start;
+    stale += sonde_state_tick(w->state) != (uint64_t)i + 1;
+  }
+  haptics_rig_stop(&rig);
+  report(w, "full_model_stale_ticks", (double)stale, 0, true);
+  report(w, "full_model_cpu_p50_ms", 1e3 * haptics_quantile(spent_s, TICKS, 0.5), 0.5, true);
+  report(w, "full_model_cpu_p999_ms", 1e3 * haptics_quantile(spent_s, TICKS, 0.999), 0.5, true);
+  return SONDE_OK;
+}
+
+// Two Butterworth sections of second order; state in z.
+static double high_pass(double z[2][2], double x, double hz) {
+  double c = tan(3.14159265358979323846 * hz * 1e-3), n = 1.0 / (1.0 + 1.41421356 * c + c * c);
+  for (int s = 0; s < 2; ++s) {
+    double y = n * x + z[s][0];
+    z[s][0] = -2.0 * n * x - 2.0 * (c * c - 1.0) * n * y + z[s][1];
+    z[s][1] = n * x - (1.0 - 1.41421356 * c + c * c) * n * y;
+    x = y;
+  }
+  return x;
+}
+
+typedef struct locals {
+  sonde_local local;
+  sonde_vec3 at[10], speed[10], force[10]; // of the last ten ticks
+  sonde_vec3 before, model_before, held, last_at;
+  double worst_n, largest_n, jump_n, square, model_z[2][2], held_z[2][2], model_e, held_e;
+} locals;
+
+// An answer comes every 10 ticks and is 10 ticks old: what a scene of 100 Hz delivers.
+static void compare(locals *l, int tick, sonde_vec3 at, sonde_vec3 force) {
+  int slot = tick % 10;
+  bool answered = slot == 0 && tick >= 10;
+  if (answered) {
+    l->held = l->force[slot];
+    sonde_local_feed(&l->local, l->at[slot], l->speed[slot], l->held);
+  }
+  sonde_vec3 v = minus(at, l->last_at);
+  l->at[slot] = at;
+  l->speed[slot] = tick ? (sonde_vec3){1e3 * v.x, 1e3 * v.y, 1e3 * v.z} : ZERO;
+  l->force[slot] = force;
+  sonde_vec3 model = sonde_local_force(&l->local, at);
+  double error = norm(minus(model, force));
+  l->worst_n = fmax(l->worst_n, error);
+  l->largest_n = fmax(l->largest_n, norm(force));
+  l->square += error * error;
+  if (answered)
+    l->jump_n =
+        fmax(l->jump_n, norm(minus(model, l->model_before)) - norm(minus(force, l->before)));
+  double a = high_pass(l->model_z, norm(model), 80), b = high_pass(l->held_z, norm(l->held), 80);
+  l->model_e += a * a;
+  l->held_e += b * b;
+  l->before = force;
+  l->model_before = model;
+  l->last_at = at;
+}
+
+static sonde_status local_model(work *w) {
+  static const double keys_mm[][2] = {{0, -2},    {600, 15},  {900, 15}, {1200, 22},
+                                      {1500, 10}, {1800, 12}, {2400, -2}};
+  sonde_script_key keys[7];
+  for (int i = 0; i < 7; ++i)
+    keys[i] =
+        (sonde_script_key){1e-3 * keys_mm[i][0], sonde_site_pose(w->site, 1e-3 * keys_mm[i][1])};
+  sonde_device device;
+  sonde_status status = sonde_device_script(keys, 7, 1e-3, &device, w->error);
+  if (status) return status;
+  static locals l;
+  memset(&l, 0, sizeof l);
+  sonde_local_init(&l.local, NULL);
+  sonde_state_reset(w->state);
+  for (int tick = 0; tick < 2400; ++tick) {
+    sonde_device_sample sample;
+    device.read(device.self, (uint64_t)tick, &sample);
+    sonde_step(w->state, &w->probe, sample.world_from_probe);
+    compare(&l, tick, sample.world_from_probe.position, sonde_state_contact(w->state)->force_n);
+  }
+  device.destroy(device.self);
+  report(w, "local_worst_error_percent", 100 * l.worst_n / l.largest_n, 5, true);
+  report(w, "local_rms_error_percent", 100 * sqrt(l.square / 2400) / l.largest_n, 5, true);
+  report(w, "local_jump_n", l.jump_n, 0.1, true);
+  report(w, "local_vibration_below_hold_db", 10 * log10(l.held_e / l.model_e), 20, false);
+  return SONDE_OK;
+}
+
+// Swing of the hand in two windows of a press and hold.
+typedef struct swing {
+  double early_m, late_m, deepest_m, energy_min_j, surplus_min_j;
+} swing;
+
+static sonde_status press(work *w, const haptics_rig_def *def, swing *s) {
+  haptics_rig rig;
+  double low[2] = {1, 1}, high[2] = {-1, -1};
+  *s = (swing){0};
+  sonde_status status = haptics_rig_start(&rig, def, w->state, w->error);
+  if (status) return status;
+  for (int tick = 0; tick < 2500; ++tick) {
+    haptics_rig_tick(&rig);
+    double depth = haptics_rig_depth(&rig);
+    s->deepest_m = fmax(s->deepest_m, depth);
+    int window = tick >= 2100 ? 1 : tick >= 1300 && tick < 1700 ? 0 : -1;
+    if (window < 0) continue;
+    low[window] = fmin(low[window], depth);
+    high[window] = fmax(high[window], depth);
+  }
+  haptics_rig_stop(&rig);
+  s->early_m = high[0] - low[0];
+  s->late_m = high[1] - low[1];
+  s->energy_min_j = rig.render.energy_min_j;
+  return SONDE_OK;
+}
+
+// A limit cycle does not decay.
+static bool cycles(const swing *s) { return s->late_m > 1e-4 && s->late_m > 0.9 * s->early_m; }
+
+static haptics_rig_def combination(const work *w, uint32_t k) {
+  static const char *const devices[] = {"touch", "premium_1.5", "omega.3"};
+  static const double masses[] = {0.1, 0.2, 0.5, 1.0, 2.0}, dampings[] = {0.0, 0.5, 1.0, 2.0, 5.0};
+  haptics_rig_def def = rig_def(w, devices[k % 3]);
+  def.mass_kg = masses[k / 3 % 5];
+  def.damping_n_s_m = dampings[k / 15 % 5];
+  def.faultless = true;
+  return def;
+}
+
+// Site by site with the 75 combinations in turn (37 is coprime to 75).
+static sonde_status stability(work *w) {
+  uint32_t sites = w->model->site_count, wanted = (uint32_t)w->o->sites;
+  if (wanted > 0 && wanted < sites) sites = wanted;
+  double energy = 0.0, deepest = 1.0;
+  uint32_t cases = 0, unstable = 0, direct_cases = 0, direct_unstable = 0;
+  for (uint32_t i = 0; i < sites && !app_interrupted(); ++i) {
+    haptics_rig_def def = combination(w, i * 37 % 75);
+    def.site = &w->model->sites[(uint64_t)i * w->model->site_count / sites];
+    swing s;
+    sonde_status status = press(w, &def, &s);
+    if (status) return status;
+    cases++;
+    unstable += cycles(&s);
+    energy = fmin(energy, s.energy_min_j);
+    deepest = fmin(deepest, s.deepest_m);
+    if (i % 8) continue;
+    def.direct = true;
+    def.damping_n_s_m = 0.0;
+    def.mass_kg = i % 16 ? 0.2 : 0.1;
+    status = press(w, &def, &s);
+    if (status) return status;
+    direct_cases++;
+    direct_unstable += cycles(&s);
+  }
+  report(w, "stability_presses", cases, 1, false);
+  report(w, "stability_limit_cycles", unstable, 0, true);
+  report(w, "stability_energy_min_j", energy, -1e-9, false);
+  report(w, "stability_handle_depth_mm", 1e3 * deepest, 28, false);
+  report(w, "uncontrolled_presses", direct_cases, 1, false);
+  report(w, "uncontrolled_unstable", direct_unstable, 1, false);
+  return SONDE_OK;
+}
+
+typedef struct chain {
+  sonde_safety safety;
+  sonde_render render;
+  sonde_gate gate;
+  sonde_safety_limits bounds;
+  uint64_t random;
+  int silent;
+  double over_n, over_slew_n, late_n;
+} chain;
+
+static double draw(chain *c) {
+  c->random = c->random * 6364136223846793005u + 1442695040888963407u;
+  return (double)(c->random >> 11) * 0x1p-53;
+}
+
+static void exchange(chain *c, bool fresh, bool torn) {
+  sonde_vec3 before = c->gate.force_n, sent = c->safety.force_n;
+  if (torn) sent.y = NAN;
+  sonde_gate_apply(&c->gate, fresh, sent, ZERO, 1e-3);
+  c->silent = fresh && !torn ? 0 : c->silent + 1;
+  c->over_n = fmax(c->over_n, norm(c->gate.force_n) / c->bounds.force_n);
+  c->over_slew_n =
+      fmax(c->over_slew_n, norm(minus(c->gate.force_n, before)) / (c->bounds.slew_n_s * 1e-3));
+  if (c->silent > 50) c->late_n = fmax(c->late_n, norm(c->gate.force_n));
+}
+
+// kind: 1 stall, 2 no pose, 3 jump, 4 unplugged, 5 force that is huge or no number, 6 torn command
+static void faulty_tick(chain *c, int kind, int tick) {
+  sonde_vec3 at = {0, 0, -0.01 + 0.005 * sin(0.01 * tick)};
+  if (kind == 3) at.x = 0.02 + 0.1 * draw(c);
+  if (kind == 2 || kind == 4) sonde_safety_trip(&c->safety, SONDE_FAULT_DEVICE_LOST);
+  if (kind == 2) at = c->render.device_m;
+  for (int gap = kind == 1 ? 1 + (int)(200 * draw(c)) : 0; gap > 0; --gap) {
+    exchange(c, false, false);
+    if (c->silent * 1e-3 > c->bounds.stale_s) sonde_safety_trip(&c->safety, SONDE_FAULT_STALE);
+  }
+  sonde_safety_motion(&c->safety, at, 1e-3);
+  sonde_vec3 tissue = {0, 0, fmax(0.0, -1000 * c->render.probe_m.z)};
+  sonde_render_probe(&c->render, (sonde_pose){at, {1, 0, 0, 0}}, tissue, c->safety.force_n);
+  sonde_vec3 wanted = c->render.force_n;
+  if (kind == 5) wanted.y = draw(c) < 0.5 ? 1e9 : (double)NAN;
+  sonde_safety_apply(&c->safety, wanted, ZERO, 1e-3);
+  exchange(c, true, kind == 6);
+}
+
+static void faults(work *w) {
+  int injected = 0, tick = 0, resumed = 0;
+  chain c = {.random = 12345};
+  const sonde_device_limits *limits = sonde_device_limits_find("touch");
+  c.bounds = sonde_safety_limits_of(limits);
+  sonde_render_def def = sonde_render_def_for(limits, 1e-3, 0.0);
+  sonde_safety_init(&c.safety, &c.bounds);
+  sonde_gate_init(&c.gate, &c.bounds);
+  sonde_render_init(&c.render, &def);
+  for (; injected < 5000; ++tick) {
+    int kind = draw(&c) < 0.02 ? 1 + (int)(6 * draw(&c)) : 0;
+    injected += kind != 0;
+    faulty_tick(&c, kind, tick);
+    if (c.safety.fault == SONDE_FAULT_NONE || draw(&c) > 0.05) continue;
+    sonde_safety_resume(&c.safety);
+    resumed++;
+  }
+  report(w, "faults_injected", injected, 1000, false);
+  report(w, "faults_force_over_limit", c.over_n, 1 + 1e-12, true);
+  report(w, "faults_slew_over_limit", c.over_slew_n, 1 + 1e-9, true);
+  report(w, "faults_force_after_50_ms_n", c.late_n, 0, true);
+  sonde_safety_resume(&c.safety);
+  for (int i = 0; i < 300; ++i) faulty_tick(&c, 0, 0);
+  report(w, "faults_resumes", resumed, 100, false);
+  report(w, "faults_force_after_resume_n", norm(c.gate.force_n), 0.2, false);
+}
+
+// Tangential over normal force, half the difference of a slide there and back over one place: what
+// the shape of the thigh adds is the same both ways.
+static double slide_ratio(work *w, const sonde_friction *friction) {
+  sonde_error error;
+  if (sonde_state_set_friction(w->state, friction, &error)) return NAN;
+  sonde_state_reset(w->state);
+  const double depth_m = 0.012, speed = 0.02;
+  double along[2] = {0, 0}, pressed[2] = {0, 0};
+  sonde_vec3 v = w->site->v;
+  for (int tick = 0; tick < 3000; ++tick) {
+    double t = 1e-3 * tick, press = depth_m * fmin(t / 0.4, 1.0);
+    double s = t < 0.5 ? 0 : t < 1.7 ? speed * (t - 0.5) : fmax(speed * (2.9 - t), 0);
+    sonde_pose pose = sonde_site_pose(w->site, press);
+    pose.position.x += s * v.x;
+    pose.position.y += s * v.y;
+    pose.position.z += s * v.z;
+    sonde_step(w->state, &w->probe, pose);
+    int way = t > 1.25 && t < 1.35 ? 0 : t > 2.05 && t < 2.15 ? 1 : -1; // both at 15 to 17 mm
+    if (way < 0) continue;
+    const sonde_contact *contact = sonde_state_contact(w->state);
+    along[way] += dot(contact->force_n, v);
+    pressed[way] += dot(contact->force_n, w->site->normal);
+  }
+  return 0.5 * fabs(along[0] - along[1]) / (0.5 * (pressed[0] + pressed[1]));
+}
+
+static void friction(work *w) {
+  sonde_friction dry = {
+      .mu_static = 0.5, .mu_kinetic = 0.36, .stribeck_speed_m_s = 0.01, .mu_gel = 0.05};
+  sonde_friction gel = dry;
+  gel.gel_film = 4.0;
+  const sonde_friction *const kinds[] = {&dry, &gel};
+  static const char *const names[] = {"friction_dry_error_percent", "friction_gel_error_percent"};
+  double base = 0.0;
+  (void)base;
+  for (int i = 0; i < 2; ++i) {
+    double mu = sonde_friction_coefficient(kinds[i], 0.02), seen = slide_ratio(w, kinds[i]);
+    report(w, names[i], 100 * fabs(seen / mu - 1), 3, true);
+  }
+  sonde_state_set_friction(w->state, &(sonde_friction){0}, NULL);
+}
+
+static sonde_status read_pressing(const char *path, const sonde_site *site, sonde_script_key *keys,
+                                  uint32_t capacity, uint32_t *count, sonde_error *error) {
+  FILE *file = fopen(path, "r");
+  if (!file) {
+    snprintf(error->message, sizeof error->message, "%s cannot be read", path);
+    return error->status = SONDE_IO;
+  }
+  char line[1024];
+  *count = 0;
+  while (*count < capacity && fgets(line, sizeof line, file)) {
+    double t, x, y, z;
+    if (sscanf(line, "%lf %lf %lf %lf", &t, &x, &y, &z) != 4) continue;
+    if (*count && !(t > keys[*count - 1].time_s)) continue;
+    // a third of the motion: 83 mm into a spring there, 28 mm into a thigh here
+    keys[(*count)++] = (sonde_script_key){t, sonde_site_pose(site, fmax(-y / 3, -0.03))};
+  }
+  fclose(file);
+  if (*count > 1) return SONDE_OK;
+  snprintf(error->message, sizeof error->message,
+           "%s holds no motion, expected lines of time and position", path);
+  return error->status = SONDE_FORMAT;
+}
+
+static sonde_status pressing(work *w) {
+  enum { CAPACITY = 100000 };
+  sonde_script_key *keys = calloc(CAPACITY, sizeof *keys);
+  uint32_t count = 0;
+  sonde_device device = {0};
+  sonde_status status =
+      keys ? read_pressing(w->o->pressing, w->site, keys, CAPACITY, &count, w->error)
+           : SONDE_MEMORY;
+  if (!status) status = sonde_device_script(keys, count, 1e-3, &device, w->error);
+  if (!status) {
+    haptics_rig rig;
+    haptics_rig_def def = rig_def(w, "premium_1.5");
+    haptics_rig_follow(&rig, &def, w->state, device);
+    uint64_t ticks = (uint64_t)(keys[count - 1].time_s * 1e3);
+    for (uint64_t i = 0; i < ticks && !app_interrupted(); ++i) haptics_rig_tick(&rig);
+    double slew = rig.safety.limits.slew_n_s * 1e-3;
+    report(w, "pressing_seconds", 1e-3 * (double)rig.tick, 10, false);
+    report(w, "pressing_fault", rig.safety.fault, SONDE_FAULT_NONE, true);
+    report(w, "pressing_largest_force_n", rig.max_force_n, 0.5, false);
+    report(w, "pressing_step_over_slew", rig.max_step_n / slew, 0.5, true);
+    report(w, "pressing_energy_min_j", rig.render.energy_min_j, -1e-6, false);
+    haptics_rig_stop(&rig);
+  }
+  free(keys);
+  return status;
+}
+
+static sonde_status measure(work *w) {
+  sonde_status status = full_model(w);
+  if (!status) status = local_model(w);
+  if (!status) status = stability(w);
+  if (status) return status;
+  faults(w);
+  friction(w);
+  return w->o->pressing ? pressing(w) : SONDE_OK;
+}
+
+static int run(const options *o) {
+  sonde_error error = {0};
+  work w = {.o = o, .error = &error};
+  sonde_world_def world = haptics_world();
+  // bonds are made at creation; the measures but one run without friction
+  sonde_status status = sonde_model_load(o->model, &w.model, &error);
+  if (!status) status = sonde_probe_create("linear", &w.probe, &error);
+  if (!status) status = sonde_state_create(w.model, &world, &w.state, &error);
+  if (!status) {
+    w.site = sonde_model_site(w.model, 27);
+    if (!w.site) w.site = &w.model->sites[w.model->site_count / 2];
+    app_catch_interrupt();
+    if (o->json) app_json_begin();
+    status = measure(&w);
+    if (o->json) {
+      app_json_integer("passed", w.passed);
+      app_json_integer("failed", w.failed);
+      app_json_end();
+    } else if (!status) {
+      printf("%d passed, %d failed\n", w.passed, w.failed);
+    }
+  }
+  sonde_state_destroy(w.state);
+  sonde_probe_clear(&w.probe);
+  sonde_model_destroy(w.model);
+  if (status) return app_fail("validate", &error);
+  return w.failed ? APP_FAILED : APP_OK;
+}
+
+int validate_haptics(int argc, char **argv) {
+  static const struct option list[] = {{"pressing", required_argument, NULL, 'p'},
+                                       {"sites", required_argument, NULL, 's'},
+                                       {"json", no_argument, NULL, 'j'},
+                                       {NULL, 0, NULL, 0}};
+  options o = {0};
+  for (int c; (c = getopt_long(argc, argv, "", list, NULL)) != -1;) {
+    if (c == '?') return APP_BAD_INPUT;
+    if (c == 'p') o.pressing = optarg;
+    if (c == 'j') o.json = true;
+    if (c == 's' && !app_parse_integer("validate", "--sites", optarg, 1, 1000, &o.sites))
+      return APP_BAD_INPUT;
+  }
+  if (argc - optind > 1) return app_usage_error("validate", "'%s' is too much", argv[argc - 1]);
+  char searched[1024];
+  if (optind < argc)
+    snprintf(o.model, sizeof o.model, "%s", argv[optind]);
+  else if (!app_bundled_model(o.model, sizeof o.model, searched, sizeof searched))
+    return app_usage_error("validate", "no bundled model found (looked at %s)", searched);
+  return run(&o);
+}
