@@ -21,7 +21,28 @@ void haptics_rig_follow(haptics_rig *rig, const haptics_rig_def *def, sonde_stat
   sonde_safety_limits bounds = sonde_safety_limits_of(def->limits);
   if (def->faultless) bounds.velocity_m_s = bounds.impulse_n_s = bounds.continuous_n = 0.0;
   sonde_safety_init(&rig->safety, &bounds);
+  sonde_local_def local = sonde_local_def_default();
+  if (def->slow_ticks) local.period_s = def->slow_ticks * DT_S;
+  sonde_local_init(&rig->local, &local);
   sonde_state_reset(state);
+}
+
+// What a scene that answers every so many ticks, and a period late, makes of the true force.
+static sonde_vec3 slow_force(haptics_rig *rig, sonde_vec3 at, sonde_vec3 force) {
+  sonde_vec3 v = {(at.x - rig->last_m.x) / DT_S, (at.y - rig->last_m.y) / DT_S,
+                  (at.z - rig->last_m.z) / DT_S};
+  if (rig->tick == 1) v = (sonde_vec3){0, 0, 0};
+  rig->last_m = at;
+  if (rig->tick % (uint64_t)rig->def.slow_ticks == 0) {
+    rig->held_n = rig->asked_n;
+    if (rig->tick > (uint64_t)rig->def.slow_ticks)
+      sonde_local_feed(&rig->local, rig->asked_m, rig->asked_m_s, rig->asked_n);
+    rig->asked_m = at;
+    rig->asked_m_s = v;
+    rig->asked_n = force;
+  }
+  sonde_vec3 model = sonde_local_force(&rig->local, at);
+  return rig->def.direct ? rig->held_n : model;
 }
 
 sonde_status haptics_rig_start(haptics_rig *rig, const haptics_rig_def *def, sonde_state *state,
@@ -48,10 +69,11 @@ void haptics_rig_tick(haptics_rig *rig) {
   sonde_vec3 before = rig->safety.force_n;
   rig->device.read(rig->device.self, rig->tick++, &sample);
   sonde_safety_motion(&rig->safety, sample.world_from_probe.position, DT_S);
-  sonde_pose pose = sonde_render_probe(&rig->render, sample.world_from_probe,
-                                       sonde_state_contact(rig->state)->force_n, before);
+  sonde_pose pose = sonde_render_probe(&rig->render, sample.world_from_probe, rig->felt_n, before);
   sonde_step(rig->state, rig->def.probe, pose);
-  sonde_render_force(&rig->render, sonde_state_contact(rig->state)->force_n);
+  rig->felt_n = sonde_state_contact(rig->state)->force_n;
+  if (rig->def.slow_ticks) rig->felt_n = slow_force(rig, pose.position, rig->felt_n);
+  sonde_render_force(&rig->render, rig->felt_n);
   sonde_safety_apply(&rig->safety, rig->render.force_n, (sonde_vec3){0, 0, 0}, DT_S);
   rig->device.write(rig->device.self, rig->safety.force_n, (sonde_vec3){0, 0, 0});
   sonde_vec3 f = rig->safety.force_n;

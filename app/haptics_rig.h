@@ -12,7 +12,8 @@ typedef struct haptics_rig_def {
   const sonde_device_limits *limits;
   double mass_kg, damping_n_s_m; // of the hand
   double depth_m;                // that the handle is pressed to
-  bool direct;                   // neither coupling nor controller
+  bool direct;                   // neither coupling nor controller, nor local model
+  int slow_ticks;                // the scene answers so seldom and as late; 0: every tick
   bool faultless;                // speed, impulse and heat are not watched
 } haptics_rig_def;
 
@@ -22,6 +23,10 @@ typedef struct haptics_rig {
   sonde_device device;
   sonde_render render;
   sonde_safety safety;
+  sonde_local local;
+  sonde_vec3 felt_n, held_n; // tissue force of this tick; newest answer of a slow scene
+  sonde_vec3 asked_m, asked_m_s, asked_n; // the answer that is under way
+  sonde_vec3 last_m;
   uint64_t tick;
   double max_force_n, max_step_n; // rendered: largest, and largest change in a tick
 } haptics_rig;

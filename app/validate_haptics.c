@@ -4,9 +4,9 @@
 // full_model      compute time of the loop with the full model
 // local_model     the local model fed at 100 Hz beside the full model
 // high_pass       vibration: what is left above 80 Hz
-// stability       operators, devices and sites; and the same without control
+// stability       operators, devices and sites; and a scene of 100 Hz with and without control
 // faults          stalls, jumps, loss and nonsense before both gates
-// friction        tangential over normal force in a slide there and back
+// friction        tangential over normal force in a slide
 // pressing        a recorded hand
 #include "app.h"
 #include "haptics_rig.h"
@@ -95,7 +95,6 @@ static sonde_status full_model(work *w) {
   }
   haptics_rig_stop(&rig);
   report(w, "full_model_stale_ticks", (double)stale, 0, true);
-  report(w, "full_model_cpu_p50_ms", 1e3 * haptics_quantile(spent_s, TICKS, 0.5), 0.5, true);
   report(w, "full_model_cpu_p999_ms", 1e3 * haptics_quantile(spent_s, TICKS, 0.999), 0.5, true);
   return SONDE_OK;
 }
@@ -215,12 +214,15 @@ static haptics_rig_def combination(const work *w, uint32_t k) {
   return def;
 }
 
-// Site by site with the 75 combinations in turn (37 is coprime to 75).
+// Site by site with the 75 combinations in turn (37 is coprime to 75). Every eighth also with a
+// scene of 100 Hz: through the local model, and held and rendered as it is, which has to be found
+// unstable.
 static sonde_status stability(work *w) {
   uint32_t sites = w->model->site_count, wanted = (uint32_t)w->o->sites;
   if (wanted > 0 && wanted < sites) sites = wanted;
   double energy = 0.0, deepest = 1.0;
-  uint32_t cases = 0, unstable = 0, direct_cases = 0, direct_unstable = 0;
+  uint32_t cases = 0, unstable = 0, slow_unstable = 0;
+  uint32_t direct_cases = 0, direct_unstable = 0;
   for (uint32_t i = 0; i < sites && !app_interrupted(); ++i) {
     haptics_rig_def def = combination(w, i * 37 % 75);
     def.site = &w->model->sites[(uint64_t)i * w->model->site_count / sites];
@@ -232,10 +234,11 @@ static sonde_status stability(work *w) {
     energy = fmin(energy, s.energy_min_j);
     deepest = fmin(deepest, s.deepest_m);
     if (i % 8) continue;
-    def.direct = true;
-    def.damping_n_s_m = 0.0;
-    def.mass_kg = i % 16 ? 0.2 : 0.1;
+    def.slow_ticks = 10;
     status = press(w, &def, &s);
+    slow_unstable += cycles(&s);
+    def.direct = true;
+    if (!status) status = press(w, &def, &s);
     if (status) return status;
     direct_cases++;
     direct_unstable += cycles(&s);
@@ -244,8 +247,9 @@ static sonde_status stability(work *w) {
   report(w, "stability_limit_cycles", unstable, 0, true);
   report(w, "stability_energy_min_j", energy, -1e-9, false);
   report(w, "stability_handle_depth_mm", 1e3 * deepest, 28, false);
-  report(w, "uncontrolled_presses", direct_cases, 1, false);
-  report(w, "uncontrolled_unstable", direct_unstable, 1, false);
+  report(w, "at_100_hz_presses", direct_cases, 1, false);
+  report(w, "at_100_hz_local_limit_cycles", slow_unstable, 0, true);
+  report(w, "at_100_hz_uncontrolled_unstable", direct_unstable, 1, false);
   return SONDE_OK;
 }
 
@@ -312,8 +316,8 @@ static void faults(work *w) {
     resumed++;
   }
   report(w, "faults_injected", injected, 1000, false);
-  report(w, "faults_force_over_limit", c.over_n, 1 + 1e-12, true);
-  report(w, "faults_slew_over_limit", c.over_slew_n, 1 + 1e-9, true);
+  report(w, "faults_force_share_of_limit", c.over_n, 1 + 1e-12, true);
+  report(w, "faults_slew_share_of_limit", c.over_slew_n, 1 + 1e-9, true);
   report(w, "faults_force_after_50_ms_n", c.late_n, 0, true);
   sonde_safety_resume(&c.safety);
   for (int i = 0; i < 300; ++i) faulty_tick(&c, 0, 0);
@@ -321,45 +325,49 @@ static void faults(work *w) {
   report(w, "faults_force_after_resume_n", norm(c.gate.force_n), 0.2, false);
 }
 
-// Tangential over normal force, half the difference of a slide there and back over one place: what
-// the shape of the thigh adds is the same both ways.
-static double slide_ratio(work *w, const sonde_friction *friction) {
+typedef struct slide {
+  double mean, swing; // tangential over normal force
+} slide;
+
+// Pressed to 8 mm, slid at 10 mm/s along u; what is seen over 7 mm in the middle.
+static slide slide_with(work *w, const sonde_friction *friction) {
   sonde_error error;
-  if (sonde_state_set_friction(w->state, friction, &error)) return NAN;
+  if (sonde_state_set_friction(w->state, friction, &error)) return (slide){NAN, NAN};
   sonde_state_reset(w->state);
-  const double depth_m = 0.012, speed = 0.02;
-  double along[2] = {0, 0}, pressed[2] = {0, 0};
-  sonde_vec3 v = w->site->v;
-  for (int tick = 0; tick < 3000; ++tick) {
-    double t = 1e-3 * tick, press = depth_m * fmin(t / 0.4, 1.0);
-    double s = t < 0.5 ? 0 : t < 1.7 ? speed * (t - 0.5) : fmax(speed * (2.9 - t), 0);
-    sonde_pose pose = sonde_site_pose(w->site, press);
-    pose.position.x += s * v.x;
-    pose.position.y += s * v.y;
-    pose.position.z += s * v.z;
+  double along = 0, pressed = 0, low = INFINITY, high = -INFINITY;
+  for (int tick = 0; tick < 1600; ++tick) {
+    double t = 1e-3 * tick, way = 0.01 * fmax(t - 0.5, 0);
+    sonde_pose pose = sonde_site_pose(w->site, 0.008 * fmin(t / 0.4, 1.0));
+    pose.position.x += way * w->site->u.x;
+    pose.position.y += way * w->site->u.y;
+    pose.position.z += way * w->site->u.z;
     sonde_step(w->state, &w->probe, pose);
-    int way = t > 1.25 && t < 1.35 ? 0 : t > 2.05 && t < 2.15 ? 1 : -1; // both at 15 to 17 mm
-    if (way < 0) continue;
-    const sonde_contact *contact = sonde_state_contact(w->state);
-    along[way] += dot(contact->force_n, v);
-    pressed[way] += dot(contact->force_n, w->site->normal);
+    if (tick < 900) continue;
+    sonde_vec3 force = sonde_state_contact(w->state)->force_n;
+    double f = -dot(force, w->site->u), n = dot(force, w->site->normal);
+    along += f;
+    pressed += n;
+    low = fmin(low, f / n);
+    high = fmax(high, f / n);
   }
-  return 0.5 * fabs(along[0] - along[1]) / (0.5 * (pressed[0] + pressed[1]));
+  return (slide){along / pressed, high - low};
 }
 
 static void friction(work *w) {
-  sonde_friction dry = {
-      .mu_static = 0.5, .mu_kinetic = 0.36, .stribeck_speed_m_s = 0.01, .mu_gel = 0.05};
-  sonde_friction gel = dry;
-  gel.gel_film = 4.0;
-  const sonde_friction *const kinds[] = {&dry, &gel};
+  sonde_friction even = {
+      .mu_static = 0.4, .mu_kinetic = 0.4, .stribeck_speed_m_s = 0.01, .mu_gel = 0.05};
+  sonde_friction dry = even, wet = even, slick = even;
+  wet.gel_film = slick.gel_film = 4.0;
+  dry.mu_static = slick.mu_static = 0.6;
+  dry.mu_kinetic = slick.mu_kinetic = 0.3;
+  const sonde_friction *const kinds[] = {&even, &wet};
   static const char *const names[] = {"friction_dry_error_percent", "friction_gel_error_percent"};
-  double base = 0.0;
-  (void)base;
   for (int i = 0; i < 2; ++i) {
-    double mu = sonde_friction_coefficient(kinds[i], 0.02), seen = slide_ratio(w, kinds[i]);
-    report(w, names[i], 100 * fabs(seen / mu - 1), 3, true);
+    double mu = sonde_friction_coefficient(kinds[i], 0.01);
+    report(w, names[i], 100 * fabs(slide_with(w, kinds[i]).mean / mu - 1), 3, true);
   }
+  report(w, "stick_slip_dry_swing", slide_with(w, &dry).swing, 0.1, false);
+  report(w, "stick_slip_gel_swing", slide_with(w, &slick).swing, 0.02, true);
   sonde_state_set_friction(w->state, &(sonde_friction){0}, NULL);
 }
 
@@ -427,7 +435,6 @@ static int run(const options *o) {
   sonde_error error = {0};
   work w = {.o = o, .error = &error};
   sonde_world_def world = haptics_world();
-  // bonds are made at creation; the measures but one run without friction
   sonde_status status = sonde_model_load(o->model, &w.model, &error);
   if (!status) status = sonde_probe_create("linear", &w.probe, &error);
   if (!status) status = sonde_state_create(w.model, &world, &w.state, &error);

@@ -15,8 +15,9 @@ declare -A options=(
   [reconstruct]="-o --leave-one-out --copy --config --json"
   [slice]="--pose --frame --hold-out -o --compare --stack --json"
   [replay]="--json"
-  [bench]="--scene --json"
-  [devices]="--json"
+  [bench]="--scene --haptics --device --json"
+  [validate]="--pressing --sites --json"
+  [devices]="--probe --json"
 )
 
 listed() { grep -oE -- '(^|[^a-zA-Z0-9-])--[a-z][a-z-]*' | grep -oE -- '--[a-z-]+' | sort -u; }

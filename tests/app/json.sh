@@ -53,6 +53,8 @@ gives "ticks:integer ticks>=1 deadline_misses:integer images:integer images>=1 h
 [[ -s a.rec ]] || wrong "sonde run recorded nothing"
 gives "" replay a.rec --json
 gives "" devices --json
+gives "deadline_misses:integer energy_j:number max_force_n>=0 max_slew_n_per_s>=0 compute_us.p999:number" \
+  bench "$MODEL" --haptics --device touch --seconds 1 --json
 
 # A run in two parts ends as one in one, in all files.
 simulate="steps:integer steps>=40 steps<=40 time_s:number hash:text flagged_steps<=0 ms_per_step:number"
