@@ -25,6 +25,7 @@
 #include "sonde/echo_volume.h"
 #include "sonde/haptics.h"
 #include "sonde/haptics_devices.h"
+#include "sonde/haptics_gel.h"
 #include "sonde/haptics_hand.h"
 #include "sonde/haptics_local.h"
 #include "sonde/haptics_render.h"

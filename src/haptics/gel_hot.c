@@ -1,0 +1,143 @@
+// The gel film: what moves it and what it does.
+//
+// Thin-film flow between the nodes of the skin (Reynolds): across an edge of length L and width w
+// goes
+//   q = w (h^3/(12 eta) (P_i - P_j)/L + h U.e/2),
+// P the pressure of the probe and of the film's own weight, U the probe's velocity where it
+// touches, h the film of the node that gives. Volume only changes hands; no node gives more than a
+// sixteenth of what it has per edge and step, so that films stay positive and rough steps stay
+// stable.
+//
+// pressure:   of a node.
+// flow:       volume over an edge in a step.
+// dry:        loss to the air; skin that loses its film stays moist for a while.
+#include "base/base.h"
+#include "base/maths.h"
+#include "haptics/gel.h"
+
+static const double weight_pa_m = 1e4; // density times gravity
+static const double reach_m = 4e-3;    // skin that far from a point of the face touches it
+
+void sonde_gel_put(sonde_gel *gel, sonde_vec3 centre_m, double radius_m, double volume_m3) {
+  SONDE_ASSERT(radius_m >= 0.0 && volume_m3 >= 0.0 && v_finite(centre_m));
+  const sonde_model *model = gel->model;
+  uint32_t nearest = 0;
+  double area = 0.0, best = (double)INFINITY;
+  for (uint32_t i = 0; i < model->surface.vertex_count; ++i) {
+    double distance = v_distance(model->surface.vertices[i], centre_m);
+    if (distance <= radius_m) area += model->area_m2[i];
+    if (distance < best) {
+      best = distance;
+      nearest = i;
+    }
+  }
+  bool disc = area > 0.0;
+  if (!disc) area = model->area_m2[nearest];
+  for (uint32_t i = 0; i < model->surface.vertex_count; ++i)
+    if (disc ? v_distance(model->surface.vertices[i], centre_m) <= radius_m : i == nearest)
+      gel->film_m[i] += volume_m3 / area;
+}
+
+void sonde_gel_wipe(sonde_gel *gel) {
+  SONDE_ASSERT(gel != NULL);
+  for (uint32_t i = 0; i < gel->model->surface.vertex_count; ++i)
+    gel->film_m[i] = gel->moisture[i] = 0.0;
+}
+
+static double pressure(const sonde_gel *gel, const sonde_vec3 *contact_n, uint32_t i) {
+  return v_norm(contact_n[i]) / gel->model->area_m2[i] + weight_pa_m * gel->film_m[i];
+}
+
+static double flow(const sonde_gel *gel, const sonde_vec3 *contact_n, sonde_vec3 probe_m_s,
+                   uint32_t edge, double dt_s) {
+  const sonde_model *model = gel->model;
+  uint32_t i = model->topology.edges[edge][0], j = model->topology.edges[edge][1];
+  const double *h = gel->film_m;
+  if (!(h[i] > 0.0) && !(h[j] > 0.0)) return 0.0;
+  double length = gel->edge_m[edge];
+  double width = 0.3 * (model->area_m2[i] + model->area_m2[j]) / length; // a third per direction
+  double push = pressure(gel, contact_n, i) - pressure(gel, contact_n, j);
+  uint32_t giver = push >= 0.0 ? i : j;
+  double rate = pow(h[giver], 3) / (12.0 * gel->def.viscosity_pa_s) * push / length;
+  bool touched = v_norm2(contact_n[i]) > 0.0 || v_norm2(contact_n[j]) > 0.0;
+  if (touched) {
+    sonde_vec3 along = v_sub(model->surface.vertices[j], model->surface.vertices[i]);
+    double drift = 0.5 * v_dot(probe_m_s, along) / length;
+    rate += drift * h[drift >= 0.0 ? i : j];
+  }
+  giver = rate >= 0.0 ? i : j;
+  double most = h[giver] * model->area_m2[giver] / 16.0;
+  return clamp(width * rate * dt_s, -most, most);
+}
+
+static void dry(sonde_gel *gel, double dt_s) {
+  double keep = exp(-dt_s / gel->def.moist_s), loss = gel->def.drying_m_s * dt_s;
+  for (uint32_t i = 0; i < gel->model->surface.vertex_count; ++i) {
+    gel->film_m[i] = fmax(gel->film_m[i] - loss, 0.0);
+    gel->moisture[i] = gel->film_m[i] > 0.0 ? 1.0 : gel->moisture[i] * keep;
+  }
+}
+
+void sonde_gel_step(sonde_gel *gel, const sonde_vec3 *contact_n, sonde_vec3 probe_m_s,
+                    double dt_s) {
+  SONDE_ASSERT(contact_n != NULL && dt_s > 0.0 && v_finite(probe_m_s));
+  const sonde_topology *topology = &gel->model->topology;
+  uint32_t nodes = gel->model->surface.vertex_count;
+  for (uint32_t i = 0; i < nodes; ++i) gel->change_m3[i] = 0.0;
+  for (uint32_t e = 0; e < topology->edge_count; ++e) {
+    double volume = flow(gel, contact_n, probe_m_s, e, dt_s);
+    gel->change_m3[topology->edges[e][0]] -= volume;
+    gel->change_m3[topology->edges[e][1]] += volume;
+  }
+  for (uint32_t i = 0; i < nodes; ++i)
+    gel->film_m[i] = fmax(gel->film_m[i] + gel->change_m3[i] / gel->model->area_m2[i], 0.0);
+  dry(gel, dt_s);
+}
+
+// The coefficient is linear in e^-film, so that its mean under the probe is the mean of that.
+sonde_friction sonde_gel_friction(const sonde_gel *gel, const sonde_vec3 *contact_n,
+                                  const sonde_friction *base) {
+  SONDE_ASSERT(contact_n != NULL && base != NULL);
+  double force = 0.0, bare = 0.0, moist = 0.0;
+  for (uint32_t i = 0; i < gel->model->surface.vertex_count; ++i) {
+    double n = v_norm(contact_n[i]);
+    if (!(n > 0.0)) continue;
+    double share = exp(-gel->film_m[i] / gel->def.lubricating_m);
+    force += n;
+    bare += n * share;
+    moist += n * share * gel->moisture[i];
+  }
+  sonde_friction friction = *base;
+  if (!(force > 0.0)) return friction;
+  friction.gel_film = -log(fmax(bare / force, 1e-12));
+  double stickier = 1.0 + gel->def.moist_stickiness * moist / fmax(bare, 1e-300);
+  friction.mu_static *= stickier;
+  friction.mu_kinetic *= stickier;
+  return friction;
+}
+
+void sonde_gel_coupling(const sonde_gel *gel, const sonde_vec3 *skin_m, const sonde_vec3 *contact_n,
+                        const sonde_vec3 *point_m, uint32_t count, float *share) {
+  SONDE_ASSERT(skin_m != NULL && contact_n != NULL && (count == 0 || (point_m && share)));
+  for (uint32_t k = 0; k < count; ++k) {
+    double weight = 0.0, sum = 0.0;
+    for (uint32_t i = 0; i < gel->model->surface.vertex_count; ++i) {
+      if (!(v_norm2(contact_n[i]) > 0.0)) continue;
+      double near = 1.0 - v_distance(skin_m[i], point_m[k]) / reach_m;
+      if (near <= 0.0) continue;
+      weight += near;
+      sum += near * -expm1(-gel->film_m[i] / gel->def.lubricating_m);
+    }
+    share[k] = weight > 0.0 ? (float)(sum / weight) : 0.0f;
+  }
+}
+
+const double *sonde_gel_film(const sonde_gel *gel) { return gel->film_m; }
+
+double sonde_gel_volume(const sonde_gel *gel) {
+  SONDE_ASSERT(gel != NULL);
+  double sum = 0.0;
+  for (uint32_t i = 0; i < gel->model->surface.vertex_count; ++i)
+    sum += gel->film_m[i] * gel->model->area_m2[i];
+  return sum;
+}
