@@ -7,6 +7,7 @@
 // stability       operators, devices and sites; and a scene of 100 Hz with and without control
 // faults          stalls, jumps, loss and nonsense before both gates
 // friction        tangential over normal force in a slide
+// gel_film        one film, two effects
 // pressing        a recorded hand
 #include "app.h"
 #include "haptics_rig.h"
@@ -371,6 +372,46 @@ static void friction(work *w) {
   sonde_state_set_friction(w->state, &(sonde_friction){0}, NULL);
 }
 
+// Film under the probe, friction and image of one tick.
+static void gel_effects(const work *w, const sonde_gel *gel, sonde_pose pose, double *mu,
+                        double *image) {
+  const sonde_friction dry = {
+      .mu_static = 0.5, .mu_kinetic = 0.36, .stribeck_speed_m_s = 0.01, .mu_gel = 0.05};
+  const sonde_vec3 *contact = sonde_state_contact_forces(w->state);
+  sonde_friction now = sonde_gel_friction(gel, contact, &dry);
+  sonde_error error;
+  *mu = sonde_state_set_friction(w->state, &now, &error) ? NAN
+                                                         : sonde_friction_coefficient(&now, 0.1);
+  float share;
+  sonde_gel_coupling(gel, sonde_state_positions(w->state), contact, &pose.position, 1, &share);
+  *image = (double)share;
+}
+
+// Pressed with 1 ml; wiped off while held. Both effects have to change in the tick of the wipe.
+static sonde_status gel_film(work *w) {
+  sonde_gel *gel = NULL;
+  sonde_status status = sonde_gel_create(w->model, NULL, &gel, w->error);
+  if (status) return status;
+  sonde_state_reset(w->state);
+  sonde_gel_put(gel, w->site->position_m, 0.03, 1e-6);
+  double mu[3] = {0}, image[3] = {0}; // before the wipe, in its tick, in the next
+  for (int tick = 0; tick < 1002; ++tick) {
+    sonde_pose pose = sonde_site_pose(w->site, 0.006 * fmin(1e-3 * tick / 0.4, 1.0));
+    sonde_step(w->state, &w->probe, pose);
+    if (tick == 1000) sonde_gel_wipe(gel);
+    int k = tick >= 1000 ? tick - 999 : 0;
+    if (k == 0) sonde_gel_step(gel, sonde_state_contact_forces(w->state), ZERO, 1e-3);
+    gel_effects(w, gel, pose, &mu[k], &image[k]);
+  }
+  sonde_gel_destroy(gel);
+  report(w, "gel_friction_with", mu[0], 0.1, true);
+  report(w, "gel_friction_without_same_tick", mu[1], 0.35, false);
+  report(w, "gel_image_share_with", image[0], 0.9, false);
+  report(w, "gel_image_share_without_same_tick", image[1], 0.01, true);
+  sonde_state_set_friction(w->state, &(sonde_friction){0}, NULL);
+  return SONDE_OK;
+}
+
 static sonde_status read_pressing(const char *path, const sonde_site *site, sonde_script_key *keys,
                                   uint32_t capacity, uint32_t *count, sonde_error *error) {
   FILE *file = fopen(path, "r");
@@ -428,6 +469,8 @@ static sonde_status measure(work *w) {
   if (status) return status;
   faults(w);
   friction(w);
+  status = gel_film(w);
+  if (status) return status;
   return w->o->pressing ? pressing(w) : SONDE_OK;
 }
 
