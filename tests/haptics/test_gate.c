@@ -129,6 +129,7 @@ static sonde_safety hot(double continuous_n, double wanted_n, double seconds) {
 static void motors_stay_cool(void **state) {
   (void)state;
   assert_true(fabs(hot(0.9, 3.0, 0.15).force_n.z - 3.0) < 1e-9);
+  assert_true(hot(0.9, 3.0, 0.5).force_n.z < 2.0); // heat 1 after 2 s ln(11.1/10.1)
   sonde_safety safety = hot(0.9, 3.0, 30.0);
   assert_true(safety.force_n.z < 1.05 * 0.9 && safety.force_n.z > 0.95 * 0.9);
   assert_true(safety.heat <= 1.0 + 1e-3);
