@@ -3,6 +3,7 @@
 //
 // tick        one tick, with its times
 // lateness    wake-ups against the grid that the earliest of them lie on
+// run         the loop for some seconds
 // print_*     the results
 #include "bench_haptics.h"
 
@@ -19,7 +20,7 @@ typedef struct bench {
   haptics_rig rig;
   size_t capacity;
   _Atomic size_t count;
-  double *woken_s, *compute_s;
+  double *woken_s, *compute_s, *scratch;
 } bench;
 
 static double now(clockid_t clock) {
@@ -38,14 +39,20 @@ static void tick(void *user) {
   atomic_store(&b->count, k + 1);
 }
 
-// In place. Whole periods are deadline misses and counted by the loop.
-static void lateness(double *woken_s, size_t count) {
-  double start = woken_s[0], earliest = 1.0;
+// In place. Where wake-ups lie within the period is a circle; they begin after its widest empty
+// arc. Whole periods are deadline misses and counted by the loop.
+static void lateness(double *woken_s, double *scratch, size_t count) {
+  const double period = 1e-3;
+  double start = woken_s[0], widest = 0.0, earliest = 0.0;
+  for (size_t k = 0; k < count; ++k) scratch[k] = woken_s[k] = fmod(woken_s[k] - start, period);
+  haptics_quantile(scratch, count, 0.5); // sorts
   for (size_t k = 0; k < count; ++k) {
-    woken_s[k] = fmod(woken_s[k] - start + 0.5e-3, 1e-3) - 0.5e-3;
-    earliest = fmin(earliest, woken_s[k]);
+    double before = k ? scratch[k - 1] : scratch[count - 1] - period;
+    if (scratch[k] - before <= widest) continue;
+    widest = scratch[k] - before;
+    earliest = scratch[k];
   }
-  for (size_t k = 0; k < count; ++k) woken_s[k] -= earliest;
+  for (size_t k = 0; k < count; ++k) woken_s[k] = fmod(woken_s[k] - earliest + period, period);
 }
 
 static void print_times(const char *name, double *list, size_t count) {
@@ -139,8 +146,9 @@ int bench_haptics(const char *model_path, const char *device, double seconds, bo
     b->capacity = (size_t)(seconds * 1e3) + 1000;
     b->woken_s = calloc(b->capacity, sizeof(double));
     b->compute_s = calloc(b->capacity, sizeof(double));
+    b->scratch = calloc(b->capacity, sizeof(double));
   }
-  if (!status && (!b || !b->woken_s || !b->compute_s)) status = SONDE_MEMORY;
+  if (!status && (!b || !b->woken_s || !b->compute_s || !b->scratch)) status = SONDE_MEMORY;
   if (!status) {
     const sonde_site *site = sonde_model_site(model, 27);
     haptics_rig_def def = {.model = model,
@@ -154,12 +162,13 @@ int bench_haptics(const char *model_path, const char *device, double seconds, bo
     status = run(b, &def, seconds, &stats, &error);
   }
   if (!status && b->count > 0) {
-    lateness(b->woken_s, b->count);
+    lateness(b->woken_s, b->scratch, b->count);
     (json ? print_json : print_table)(b, &stats);
   }
   if (b) {
     free(b->woken_s);
     free(b->compute_s);
+    free(b->scratch);
   }
   free(b);
   sonde_probe_clear(&probe);
