@@ -280,6 +280,24 @@ static void limits_hold_against_a_jump(void **state) {
   close_session(session);
 }
 
+// Through a coupling: at rest the device feels scale x tissue, and the metrics the tissue itself.
+static void device_force_is_the_scaled_tissue(void **state) {
+  sonde_session_def def = small_def(*state);
+  const sonde_device_limits *omega = sonde_device_limits_find("omega.3");
+  def.rendering = sonde_render_def_for(omega, def.world.dt_s, 0.0);
+  def.limits = sonde_safety_limits_of(omega);
+  moody m;
+  sonde_session *session = pressed_session(&def, &m);
+  for (int i = 0; i < 1000; ++i) sonde_session_tick(session);
+  double tissue = v_norm(sonde_state_contact(session->state)->force_n);
+  double device = v_norm(session->safety.force_n);
+  assert_int_equal(session->safety.fault, SONDE_FAULT_NONE);
+  assert_true(tissue > 0.5 && device < 0.5 * tissue);
+  assert_true(fabs(device - def.rendering.force_scale * tissue) < 0.02 * device);
+  assert_true(session->render.energy_j >= 0.0);
+  close_session(session);
+}
+
 // Allocations: none on the tick path; a session that lacks memory at any point leaves nothing.
 static size_t calls, alive, fail_at;
 static void *counting(size_t bytes, void *user) {
@@ -344,6 +362,7 @@ int main(void) {
       cmocka_unit_test(rotations_are_made_unit),
       cmocka_unit_test(a_short_stop_is_not_missed),
       cmocka_unit_test(limits_hold_against_a_jump),
+      cmocka_unit_test(device_force_is_the_scaled_tissue),
       cmocka_unit_test(ticks_do_not_allocate),
       cmocka_unit_test(creation_survives_lack_of_memory),
   };
