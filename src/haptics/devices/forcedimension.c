@@ -43,8 +43,7 @@ static sonde_status open_device(void *self, const sonde_device_open_def *def, so
   sonde_status status = bind(fd, def->library, error);
   if (status) return status;
   int device = fd->open();
-  if (device < 0)
-    return sonde_fail(error, SONDE_DEVICE, "no device answers: %s", fd->error_text());
+  if (device < 0) return sonde_fail(error, SONDE_DEVICE, "no device answers: %s", fd->error_text());
   fd->device = (signed char)device;
   fd->opened = true;
   if (fd->enable(1, (char)fd->device) < 0)

@@ -52,8 +52,7 @@ static sonde_status open_device(void *self, const sonde_device_open_def *def, so
   sonde_status status = bind(nav, def->library, error);
   if (status) return status;
   nav->opened = nav->open() != -1;
-  if (!nav->opened)
-    return sonde_fail(error, SONDE_DEVICE, "the daemon spacenavd does not answer");
+  if (!nav->opened) return sonde_fail(error, SONDE_DEVICE, "the daemon spacenavd does not answer");
   nav->pose = nav->placed ? kept : (sonde_pose){vec3(0, 0, 0), quat_identity()};
   nav->placed = true;
   return SONDE_OK;
