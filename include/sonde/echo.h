@@ -71,6 +71,22 @@ SONDE_API void sonde_echo_render(sonde_echo *echo, sonde_pose world_from_probe, 
                                  const sonde_pathology *pathology,
                                  const sonde_echo_settings *settings, sonde_image *image);
 
+/** CPU time of the stages of the last render, and scatterers moved with the tissue. */
+typedef struct sonde_echo_times {
+  double settings_s, plane_s, medium_s, scatter_s, beam_s, picture_s;
+  uint32_t scatterers;
+} sonde_echo_times;
+SONDE_API sonde_echo_times sonde_echo_last_times(const sonde_echo *echo);
+
+/** Radius of a curved face (m, 20 mm and more), its aperture measured along the arc; 0: flat.
+ *  @return SONDE_ARGUMENT @thread as sonde_echo_render */
+SONDE_API sonde_status sonde_echo_set_radius(sonde_echo *echo, double radius_m, sonde_error *error);
+/** Chooses the inner loops: "avx512", "avx2", "base" (the widest that runs here is the default) or
+ *  "plain" without vectors. @return SONDE_NOT_FOUND when this processor lacks them */
+SONDE_API sonde_status sonde_echo_set_kernels(sonde_echo *echo, const char *name,
+                                              sonde_error *error);
+SONDE_API const char *sonde_echo_kernels(const sonde_echo *echo);
+
 /** Envelope before log compression of the last render: [sample_count*line_count], sample-major. */
 SONDE_API const float *sonde_echo_envelope(const sonde_echo *echo, uint32_t *lines,
                                            uint32_t *samples);

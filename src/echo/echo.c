@@ -3,18 +3,22 @@
 // sonde_echo_settings_default, sonde_echo_settings_clamp
 // sonde_echo_create   buffers and random tables
 // sonde_echo_destroy
-// fill_tables         scatterers, noise, carrier phases
+// fill_tables         scatterers, noise
+// sonde_echo_set_radius, sonde_echo_set_kernels
 #include "base/base.h"
 #include "base/random.h"
 #include "echo/echo.h"
 
+#include <stdlib.h>
+#include <string.h>
+
 enum {
   LINES = 192,
   SAMPLES = 1024,
-  MOST_LINES = 512,
   MOST_SAMPLES = 4096,
   MOST_PER_CELL = 4096,
-  POOL_ROOM = SONDE_POOL + MOST_PER_CELL
+  LOOSE_ROOM = MOST_PER_CELL / 8,
+  STEP = 8 * ECHO_ALIGN, // scatterers of a cube come in eighths of whole vectors
 };
 
 static const double default_density_m3 = 32e9;
@@ -44,61 +48,95 @@ sonde_echo_settings sonde_echo_settings_clamp(sonde_echo_settings s) {
       .tgc_db_per_m = bounded(s.tgc_db_per_m, -5000, 5000, d.tgc_db_per_m)};
 }
 
-static void fill_tables(sonde_echo *echo) {
-  for (uint64_t i = 0; i < POOL_ROOM; ++i) {
-    uint64_t j = i % SONDE_POOL; // a cube's piece may run over the end
-    echo->pool_x[i] = (float)(sonde_random_uniform(echo->seed, 4 * j + 1) - 0.5);
-    echo->pool_y[i] = (float)(sonde_random_uniform(echo->seed, 4 * j + 2) - 0.5);
-    echo->pool_z[i] = (float)(sonde_random_uniform(echo->seed, 4 * j + 3) - 0.5);
-    echo->pool_sign[i] = sonde_random_bits(echo->seed, 4 * j) & (1u << 20) ? 1.0f : -1.0f;
-  }
-  for (uint64_t i = 0; i < SONDE_NOISE; ++i)
-    echo->noise[i] = (float)(sonde_random_normal(echo->seed + 1, i) * sqrt(0.5));
-  for (int i = 0; i < SONDE_PHASES; ++i) {
-    echo->phase[2 * i] = (float)cos(2 * SONDE_PI * i / SONDE_PHASES);
-    echo->phase[2 * i + 1] = (float)-sin(2 * SONDE_PI * i / SONDE_PHASES);
+static float place(uint64_t seed, uint64_t i) {
+  return (float)(sonde_random_uniform(seed, i) - 0.5);
+}
+
+static void fill_pool(const scatter_pool *pool, uint64_t seed, uint32_t count, uint32_t room) {
+  for (uint64_t i = 0; i < room; ++i) {
+    uint64_t j = i % count; // a piece may run over the end
+    pool->x[i] = place(seed, 4 * j + 1);
+    pool->y[i] = place(seed, 4 * j + 2);
+    pool->z[i] = place(seed, 4 * j + 3);
+    pool->sign[i] = sonde_random_bits(seed, 4 * j) & (1u << 20) ? 1.0f : -1.0f;
   }
 }
 
+static int by_value(const void *a, const void *b) {
+  float x = *(const float *)a, y = *(const float *)b;
+  return (x > y) - (x < y);
+}
+
+// In each cube's share the scatterers come in order of z, along the leg: the slab of a transverse
+// plane then takes or leaves whole vectors of them. The other coordinates do not depend on z, so
+// that z alone is sorted.
+static void sort_pool(sonde_echo *echo) {
+  for (uint32_t first = 0; first + echo->per_cell <= SONDE_POOL; first += echo->per_cell)
+    qsort(echo->pool.z + first, echo->per_cell, sizeof(float), by_value);
+}
+
+static void fill_tables(sonde_echo *echo) {
+  fill_pool(&echo->pool, echo->seed, SONDE_POOL, SONDE_POOL);
+  fill_pool(&echo->loose, echo->seed + 5, SONDE_LOOSE, SONDE_LOOSE + LOOSE_ROOM);
+  sort_pool(echo);
+  for (uint64_t i = 0; i < SONDE_NOISE; ++i)
+    echo->noise[i] = (float)(sonde_random_normal(echo->seed + 1, i) * sqrt(0.5));
+}
+
+static bool allocate_pool(scatter_pool *pool, size_t count) {
+  pool->x = SONDE_NEW(float, count);
+  pool->y = SONDE_NEW(float, count);
+  pool->z = SONDE_NEW(float, count);
+  pool->sign = SONDE_NEW(float, count);
+  return pool->x && pool->y && pool->z && pool->sign;
+}
+
+// Rows end with room for whole vectors that run over.
 static bool allocate(sonde_echo *echo) {
-  size_t nodes = SONDE_PLANE_COLUMNS * SONDE_PLANE_ROWS, lines = echo->lines;
-  size_t image = lines * echo->samples;
-  echo->rest = SONDE_NEW(sonde_vec3, nodes);
-  echo->plane = SONDE_NEW(float, nodes *PLANE_FIELDS);
+  size_t lines = echo->padded, most_lines = lines + 2 * SONDE_MOST_TAPS + ECHO_ALIGN;
+  size_t image = lines * echo->samples, most_samples = echo->samples + 2 * SONDE_MOST_TAPS;
+  echo->psf = SONDE_NEW(beam_psf, 1);
+  echo->node = SONDE_NEW(plane_node, SONDE_PLANE_NODES);
+  echo->plane = SONDE_NEW(float, SONDE_PLANE_NODES *PLANE_FIELDS);
+  echo->wide = SONDE_NEW(float, 2 * lines * PLANE_FIELDS);
   echo->row = SONDE_NEW(float, lines *PLANE_FIELDS);
-  echo->last_row = SONDE_NEW(float, lines *PLANE_FIELDS);
+  echo->level[0] = SONDE_NEW(float, lines *LEVELS);
+  echo->level[1] = SONDE_NEW(float, lines *LEVELS);
+  echo->scatter = SONDE_NEW(float, lines);
+  echo->loss = SONDE_NEW(float, lines);
   echo->gain = SONDE_NEW(float, lines *SONDE_MEDIUM_ROWS);
   echo->loss_db = SONDE_NEW(float, lines);
   echo->air = SONDE_NEW(uint8_t, lines);
   echo->echo_count = SONDE_NEW(uint8_t, lines);
   echo->echoes = SONDE_NEW(specular, lines * SONDE_MAX_ECHOES);
-  echo->grid = SONDE_NEW(float, 2 * (size_t)echo->grid_lines * echo->grid_samples);
-  echo->beam = SONDE_NEW(float, 2 * lines * echo->grid_samples);
-  echo->sum = SONDE_NEW(float, 2 * lines);
+  echo->grid = SONDE_NEW(float, 2 * most_lines * most_samples);
+  echo->line_re = SONDE_NEW(float, most_lines);
+  echo->line_im = SONDE_NEW(float, most_lines);
+  echo->ring = SONDE_NEW(float, lines *RING_PLANES *(2 * SONDE_MOST_TAPS + 1));
   echo->envelope = SONDE_NEW(float, image);
+  echo->flat_envelope = SONDE_NEW(float, image);
   echo->grey = SONDE_NEW(float, image);
-  echo->pool_x = SONDE_NEW(float, POOL_ROOM);
-  echo->pool_y = SONDE_NEW(float, POOL_ROOM);
-  echo->pool_z = SONDE_NEW(float, POOL_ROOM);
-  echo->pool_sign = SONDE_NEW(float, POOL_ROOM);
   echo->noise = SONDE_NEW(float, SONDE_NOISE);
-  echo->phase = SONDE_NEW(float, 2 * SONDE_PHASES);
-  echo->cell_set = SONDE_NEW(uint64_t, SONDE_CELL_SET);
-  echo->cells = sonde_calloc(SONDE_MAX_CELLS, sizeof *echo->cells);
-  return echo->rest && echo->plane && echo->row && echo->last_row && echo->gain && echo->loss_db &&
-         echo->air && echo->echo_count && echo->echoes && echo->grid && echo->beam && echo->sum &&
-         echo->envelope && echo->grey && echo->pool_x && echo->pool_y && echo->pool_z &&
-         echo->pool_sign && echo->noise && echo->phase && echo->cell_set && echo->cells;
+  echo->cell_key = SONDE_NEW(uint64_t, SONDE_CELL_SET);
+  echo->cell_stamp = SONDE_NEW(uint32_t, SONDE_CELL_SET);
+  bool pools = allocate_pool(&echo->pool, SONDE_POOL);
+  pools = allocate_pool(&echo->loose, SONDE_LOOSE + LOOSE_ROOM) && pools;
+  return pools && echo->psf && echo->node && echo->plane && echo->wide && echo->row &&
+         echo->level[0] && echo->level[1] && echo->scatter && echo->loss && echo->gain &&
+         echo->loss_db && echo->air && echo->echo_count && echo->echoes && echo->grid &&
+         echo->line_re && echo->line_im && echo->ring && echo->envelope && echo->flat_envelope &&
+         echo->grey && echo->noise && echo->cell_key && echo->cell_stamp;
 }
 
 static sonde_status check_def(const sonde_echo_def *def, sonde_error *error) {
-  bool lines = def->line_count == 0 || (def->line_count >= 8 && def->line_count <= MOST_LINES);
+  bool lines =
+      def->line_count == 0 || (def->line_count >= 8 && def->line_count <= SONDE_MOST_LINES);
   bool samples =
       def->sample_count == 0 || (def->sample_count >= 64 && def->sample_count <= MOST_SAMPLES);
   if (!lines || !samples)
     return sonde_fail(error, SONDE_ARGUMENT,
                       "%u lines of %u samples; expected 8 to %d lines of 64 to %d samples",
-                      def->line_count, def->sample_count, MOST_LINES, MOST_SAMPLES);
+                      def->line_count, def->sample_count, SONDE_MOST_LINES, MOST_SAMPLES);
   if (!(def->scatterers_per_m3 >= 0) || def->scatterers_per_m3 > 400e9)
     return sonde_fail(error, SONDE_ARGUMENT, "%g scatterers per m^3; expected 0 to 4e11",
                       def->scatterers_per_m3);
@@ -118,14 +156,14 @@ sonde_status sonde_echo_create(const sonde_interior *interior, const sonde_echo_
   made->interior = interior;
   made->lines = def->line_count ? def->line_count : LINES;
   made->samples = def->sample_count ? def->sample_count : SAMPLES;
-  made->grid_lines = made->lines + 2 * SONDE_LINE_PAD;
-  made->grid_samples = made->samples + 2 * SONDE_SAMPLE_PAD;
+  made->padded = (made->lines + ECHO_ALIGN - 1) / ECHO_ALIGN * ECHO_ALIGN;
+  made->kernels = sonde_echo_kernels_find(NULL);
   made->density_m3 = def->scatterers_per_m3 > 0 ? def->scatterers_per_m3 : default_density_m3;
   made->seed = def->seed;
   made->plain = def->plain;
   made->cell_m = cell_size_m;
   double per_cell = made->density_m3 * cell_size_m * cell_size_m * cell_size_m;
-  made->per_cell = (uint32_t)clamp(8 * ceil(per_cell / 8), 8, MOST_PER_CELL);
+  made->per_cell = (uint32_t)clamp(STEP * ceil(per_cell / STEP), STEP, MOST_PER_CELL);
   if (!allocate(made)) {
     sonde_echo_destroy(made);
     return sonde_fail_memory(error);
@@ -137,11 +175,14 @@ sonde_status sonde_echo_create(const sonde_interior *interior, const sonde_echo_
 
 void sonde_echo_destroy(sonde_echo *echo) {
   if (echo == NULL) return;
-  void *parts[] = {echo->rest,     echo->plane,  echo->row,        echo->last_row, echo->gain,
-                   echo->loss_db,  echo->air,    echo->echo_count, echo->echoes,   echo->grid,
-                   echo->beam,     echo->sum,    echo->envelope,   echo->grey,     echo->pool_x,
-                   echo->pool_y,   echo->pool_z, echo->pool_sign,  echo->noise,    echo->phase,
-                   echo->cell_set, echo->cells};
+  void *parts[] = {echo->psf,        echo->node,     echo->plane,         echo->wide,
+                   echo->row,        echo->level[0], echo->level[1],      echo->scatter,
+                   echo->loss,       echo->gain,     echo->loss_db,       echo->air,
+                   echo->echo_count, echo->echoes,   echo->grid,          echo->line_re,
+                   echo->line_im,    echo->ring,     echo->noise,         echo->cell_key,
+                   echo->envelope,   echo->grey,     echo->flat_envelope, echo->pool.x,
+                   echo->pool.y,     echo->pool.z,   echo->loose.x,       echo->pool.sign,
+                   echo->loose.y,    echo->loose.z,  echo->loose.sign,    echo->cell_stamp};
   for (size_t i = 0; i < SONDE_COUNT_OF(parts); ++i) sonde_free(parts[i]);
   sonde_free(echo);
 }
@@ -150,5 +191,43 @@ const float *sonde_echo_envelope(const sonde_echo *echo, uint32_t *lines, uint32
   SONDE_ASSERT(echo != NULL && lines != NULL && samples != NULL);
   *lines = echo->lines;
   *samples = echo->samples;
-  return echo->envelope;
+  return echo->padded == echo->lines ? echo->envelope : echo->flat_envelope;
+}
+
+sonde_status sonde_echo_set_radius(sonde_echo *echo, double radius_m, sonde_error *error) {
+  SONDE_ASSERT(echo != NULL);
+  if (!(radius_m == 0 || (radius_m >= 0.02 && radius_m <= 1)))
+    return sonde_fail(error, SONDE_ARGUMENT, "face of radius %g m; expected 0 or 0.02 to 1",
+                      radius_m);
+  echo->frame.radius_m = radius_m;
+  return SONDE_OK;
+}
+
+const echo_kernels *sonde_echo_kernels_find(const char *name) {
+  const echo_kernels *known[] = {
+#ifdef __x86_64__
+      __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq")
+          ? &sonde_echo_kernels_avx512
+          : NULL,
+      __builtin_cpu_supports("avx2") ? &sonde_echo_kernels_avx2 : NULL,
+#endif
+      &sonde_echo_kernels_base, &sonde_echo_kernels_plain};
+  for (size_t k = 0; k < SONDE_COUNT_OF(known); ++k)
+    if (known[k] && (!name || strcmp(name, known[k]->name) == 0)) return known[k];
+  return NULL;
+}
+
+sonde_status sonde_echo_set_kernels(sonde_echo *echo, const char *name, sonde_error *error) {
+  SONDE_ASSERT(echo != NULL);
+  const echo_kernels *found = sonde_echo_kernels_find(name);
+  if (found == NULL)
+    return sonde_fail(error, SONDE_NOT_FOUND,
+                      "no kernels '%s' here; expected avx512, avx2, base or plain", name);
+  echo->kernels = found;
+  return SONDE_OK;
+}
+
+const char *sonde_echo_kernels(const sonde_echo *echo) {
+  SONDE_ASSERT(echo != NULL && echo->kernels != NULL);
+  return echo->kernels->name;
 }

@@ -3,98 +3,122 @@
 #define SONDE_SRC_ECHO_H
 
 #include "base/maths.h"
+#include "echo/kernel.h"
+#include "echo/plane.h"
+#include "echo/psf.h"
 #include "interior/interior.h"
 #include "sonde/echo.h"
+#include "sonde/echo_reference.h"
 
 enum {
-  SONDE_PLANE_COLUMNS = 41, // coarse nodes across the image plane
-  SONDE_PLANE_ROWS = 81,    // and down
-  SONDE_MEDIUM_ROWS = 256,  // steps of the march along the lines
-  SONDE_LINE_PAD = 12,      // lines beyond the aperture that the beam still reaches
-  SONDE_SAMPLE_PAD = 12,
-  SONDE_MAX_TAPS = 12,   // half width of the beam's kernels
-  SONDE_MAX_ECHOES = 16, // specular echoes per line
-  SONDE_POOL = 32768,    // random scatterers shared by all cells
+  SONDE_PLANE_COLUMNS = 25, // coarse nodes across the lines
+  SONDE_PLANE_ROWS = 57,    // and down
+  SONDE_PLANE_NODES = SONDE_PLANE_COLUMNS * SONDE_PLANE_ROWS,
+  SONDE_MEDIUM_ROWS = 256, // steps of the march along the lines
+  SONDE_MAX_ECHOES = 24,   // specular echoes per line
+  SONDE_POOL = 32768,      // random scatterers shared by all cells
+  SONDE_LOOSE = 8192,      // the same for pieces of cells
   SONDE_NOISE = 65536,
-  SONDE_PHASES = 4096,
-  SONDE_CELL_SET = 65536, // hash set of visited cells
-  SONDE_MAX_CELLS = 40000,
+  SONDE_CELL_SET = 32768, // hash set of visited cells
+  SONDE_MAX_CELLS = 24000,
 };
-
-// Smooth fields over the image plane.
-typedef enum plane_field {
-  PLANE_THETA, // radians, unwrapped around the picture's centre
-  PLANE_S,
-  PLANE_DEPTH,
-  PLANE_FAT,
-  PLANE_MUSCLE,
-  PLANE_R,
-  PLANE_VEIN_SHORT, // coordinates in the vessel's deformed cross-section over its semi-axes
-  PLANE_VEIN_LONG,
-  PLANE_ARTERY_SHORT,
-  PLANE_ARTERY_LONG,
-  PLANE_VEIN_HALF_SHORT, // semi-axes, m
-  PLANE_VEIN_HALF_LONG,
-  PLANE_ARTERY_HALF_SHORT,
-  PLANE_ARTERY_HALF_LONG,
-  PLANE_CLOT, // 1 where a thrombus lies
-  PLANE_FIELDS
-} plane_field;
 
 typedef struct specular {
   float depth_m, amplitude;
 } specular;
 
+// Scatterers of an eighth of a cube, in whole vectors.
+#define SONDE_PIECE(per_cell) (((per_cell) / 8 + ECHO_ALIGN - 1) / ECHO_ALIGN * ECHO_ALIGN)
+
 // What the stages of one frame share.
 typedef struct frame {
   sonde_pose probe;
   sonde_mat3 from_world;                       // rotation world -> probe
-  double aperture_m, depth_m, pitch_m, step_m; // line pitch, sample step
+  double aperture_m, depth_m, pitch_m, step_m; // line pitch at the face, sample step
+  double radius_m;                             // of a curved face, else 0
   double frequency_hz, wavelength_m, focus_m;
+  double first_line, edge_lines; // line at x = 0; lines beyond the outer ones that matter
   const sonde_pathology *pathology;
   sonde_echo_settings settings;
   double tgc_db_per_m;
 } frame;
 
+// A node of the coarse plane. `in` turns small rest vectors into (columns, metres beside the
+// plane, rows) of the plane.
+typedef struct plane_node {
+  sonde_vec3 rest;
+  sonde_vec3 side; // where a step of 1 m beside the plane in rest coordinates leads: same units
+  sonde_mat3 in;
+} plane_node;
+
+// Scatterers in a unit cube about 0, amplitude +-1.
+typedef struct scatter_pool {
+  float *x, *y, *z, *sign;
+} scatter_pool;
+
 struct sonde_echo {
   const sonde_interior *interior;
-  uint32_t lines, samples, grid_lines, grid_samples;
+  const echo_kernels *kernels;
+  uint32_t lines, samples;
+  uint32_t padded; // lines in whole vectors
+  uint32_t grid_lines, grid_samples, pad_lines, pad_samples;
   double density_m3, cell_m;
   uint32_t per_cell;
   uint64_t seed;
   bool plain; // no texture
   frame frame;
-  sonde_vec3 *rest;                            // [rows*columns] rest points of the coarse plane
-  float *plane;                                // [PLANE_FIELDS][rows*columns]
-  float *row;                                  // [PLANE_FIELDS][lines], one row of the march
-  float *last_row;                             // the row before
-  float *gain;                                 // [MEDIUM_ROWS][lines]
-  float *loss_db;                              // [lines] accumulated
-  uint8_t *air;                                // [lines]
-  uint8_t *echo_count;                         // [lines]
-  specular *echoes;                            // [lines*MAX_ECHOES]
-  float *grid;                                 // [grid_samples][grid_lines][2] scattered field
-  float *beam;                                 // [grid_samples][lines][2] after the lateral kernel
-  float *sum;                                  // [lines][2]
-  float *envelope;                             // [samples][lines]
-  float *grey;                                 // [samples][lines]
-  float *pool_x, *pool_y, *pool_z, *pool_sign; // scatterers in a unit cube about 0, +-1
-  float *noise;                                // [NOISE]
-  float *phase;                                // [PHASES][2] cos, -sin
-  uint64_t *cell_set;                          // [CELL_SET] keys, 0 empty
-  int32_t (*cells)[3];                         // [MAX_CELLS]
-  uint32_t cell_count;
+  double theta_centre;
+  double lines_per_column, depth_per_row; // of the coarse plane; depth in m
+  bool vessels;                           // any
+  beam_psf *psf;
+  plane_node *node;    // [PLANE_NODES]
+  float *plane;        // [PLANE_FIELDS][PLANE_NODES]
+  float *wide;         // [2][PLANE_FIELDS][padded] two coarse rows, per line
+  float *row;          // [PLANE_FIELDS][padded], one row of the march
+  float *level[2];     // [LEVELS][padded] of this row and the last
+  float *scatter;      // [padded] of this row
+  float *loss;         // [padded] of this row
+  float *gain;         // [MEDIUM_ROWS][padded]
+  float *loss_db;      // [padded] accumulated
+  uint8_t *air;        // [padded]
+  uint8_t *echo_count; // [lines]
+  specular *echoes;    // [lines*MAX_ECHOES]
+  float *grid;         // [grid_samples][grid_lines][2] scattered field
+  float *line_re;      // one row of it with its gain: [grid_lines]
+  float *line_im;
+  float *ring;          // [2*MOST_TAPS+1][RING_PLANES][padded]
+  float *envelope;      // [samples][padded]
+  float *flat_envelope; // [samples][lines], what readers see
+  float *grey;          // [samples][padded]
+  scatter_pool pool;    // [POOL] sorted by z within each cell's share
+  scatter_pool loose;   // [LOOSE] unsorted
+  float *noise;         // [NOISE]
+  uint64_t *cell_key;   // [CELL_SET]
+  uint32_t *cell_stamp; // [CELL_SET] frame that wrote the key
+  uint32_t stamp;
+  uint32_t cell_count, moved; // cells and scatterers of the last frame
+  sonde_echo_times times;
 };
 
+// Lines, samples and focus from what the operator sets; the key of the beam they need.
+void sonde_echo_geometry(sonde_echo *echo, double aperture_m, const sonde_echo_settings *settings);
+beam_key sonde_echo_key(const frame *f);
 // Stages of a frame, in order.
+void sonde_echo_frame(sonde_echo *echo, sonde_pose world_from_probe, double aperture_m,
+                      const sonde_echo_settings *settings);
 void sonde_echo_plane(sonde_echo *echo);
 void sonde_echo_medium(sonde_echo *echo);
 void sonde_echo_scatter(sonde_echo *echo);
-void sonde_echo_beam(sonde_echo *echo);
+void sonde_echo_scatter_points(sonde_echo *echo, const sonde_echo_point *points, uint32_t count);
+void sonde_echo_beam(sonde_echo *echo, bool tissue);
 void sonde_echo_picture(sonde_echo *echo, sonde_image *image);
 
-// Half width of the elevation kernel (1 - (y/h)^2)^2: 2.4 mm between its half values.
-static const double sonde_elevation_half_m = 2.2e-3;
+// Point of the image in the probe frame: line, depth.
+sonde_vec3 sonde_echo_place(const frame *f, double line, double depth_m);
+// Its inverse: (line, metres beside the plane, depth).
+sonde_vec3 sonde_echo_unplace(const frame *f, sonde_vec3 local_m);
+
+static const float sonde_white_db = 40; // white over the rms of muscle speckle
 // Speed of sound that the scanner assumes, m/s.
 static const double sonde_sound_m_s = 1540;
 

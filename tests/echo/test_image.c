@@ -29,18 +29,19 @@ static void look(bench *b, const sonde_vec3 *positions) {
   sonde_echo_render(b->echo, b->pose, 0.04, &b->pathology, &b->settings, &b->image);
 }
 
-static bench bench_create(double radius, double bone, double fat_m, bool plain, bool vessels) {
-  bench b = {.leg = tube_create(radius, bone, 0.3, fat_m, 160, 60)};
-  if (!vessels) b.leg.model.vein.count = b.leg.model.artery.count = 0;
+// The interior keeps the address of the leg: the bench stays where it is.
+static void bench_create(bench *b, double radius, double bone, double fat_m, bool plain,
+                         bool vessels) {
+  *b = (bench){.leg = tube_create(radius, bone, 0.3, fat_m, 160, 60)};
+  if (!vessels) b->leg.model.vein.count = b->leg.model.artery.count = 0;
   sonde_echo_def def = {.plain = plain, .seed = 5};
-  assert_int_equal(sonde_interior_create(&b.leg.model, &b.interior, NULL), SONDE_OK);
-  assert_int_equal(sonde_echo_create(b.interior, &def, &b.echo, NULL), SONDE_OK);
-  assert_int_equal(sonde_image_create(512, 512, &b.image, NULL), SONDE_OK);
-  assert_int_equal(sonde_pathology_preset("healthy", &b.pathology, NULL), SONDE_OK);
-  b.settings = sonde_echo_settings_default();
-  b.pose = tube_pose(radius - 3e-3, 0.15);
-  b.forces = SONDE_NEW(sonde_vec3, b.leg.model.surface.vertex_count);
-  return b;
+  assert_int_equal(sonde_interior_create(&b->leg.model, &b->interior, NULL), SONDE_OK);
+  assert_int_equal(sonde_echo_create(b->interior, &def, &b->echo, NULL), SONDE_OK);
+  assert_int_equal(sonde_image_create(512, 512, &b->image, NULL), SONDE_OK);
+  assert_int_equal(sonde_pathology_preset("healthy", &b->pathology, NULL), SONDE_OK);
+  b->settings = sonde_echo_settings_default();
+  b->pose = tube_pose(radius - 3e-3, 0.15);
+  b->forces = SONDE_NEW(sonde_vec3, b->leg.model.surface.vertex_count);
 }
 
 static void bench_clear(bench *b) {
@@ -71,7 +72,8 @@ static double block(const bench *b, double depth0, double depth1, double *deviat
 // Fully developed speckle has a Rayleigh envelope: mean over deviation sqrt(pi/(4 - pi)) = 1.913.
 static void speckle_is_fully_developed(void **state) {
   (void)state;
-  bench b = bench_create(0.2, 0.014, 2.5e-3, true, false);
+  bench b;
+  bench_create(&b, 0.2, 0.014, 2.5e-3, true, false);
   b.settings.tgc_db_per_m =
       2 * 100 * 7.5 - sonde_echo_default_tgc_db_per_m(7.5e6); // exactly the muscle's loss
   double snr = 0;
@@ -92,7 +94,8 @@ static void speckle_is_fully_developed(void **state) {
 // Without compensation the echo falls by 2 alpha f z: the depth of -40 dB follows the frequency.
 static void attenuation_follows_the_frequency(void **state) {
   (void)state;
-  bench b = bench_create(0.4, 0.014, 2.5e-3, true, false);
+  bench b;
+  bench_create(&b, 0.4, 0.014, 2.5e-3, true, false);
   b.settings.depth_m = 0.15;
   for (double mhz = 2; mhz <= 10; mhz += 2) {
     b.settings.frequency_hz = mhz * 1e6;
@@ -129,7 +132,8 @@ static double grey(const bench *b, double x_m, double z_m, double half_m) {
 
 static void lumen_is_dark_bone_shadows(void **state) {
   (void)state;
-  bench b = bench_create(leg_radius, 0.014, 0.012, false, true);
+  bench b;
+  bench_create(&b, leg_radius, 0.014, 0.012, false, true);
   b.settings.depth_m = 0.08;
   look(&b, NULL);
   double muscle = grey(&b, -0.014, 0.025, 0.003), vein = grey(&b, 0, 0.015, 0.0025);
@@ -154,7 +158,8 @@ static void lumen_is_dark_bone_shadows(void **state) {
 // tissue moved under a resting probe by whole samples shifts the picture by as many.
 static void speckle_belongs_to_the_tissue(void **state) {
   (void)state;
-  bench b = bench_create(0.2, 0.014, 2.5e-3, true, false);
+  bench b;
+  bench_create(&b, 0.2, 0.014, 2.5e-3, true, false);
   look(&b, NULL);
   uint32_t lines, samples;
   const float *e = sonde_echo_envelope(b.echo, &lines, &samples);
@@ -198,7 +203,8 @@ static double track(const float *a, const float *b, uint32_t lines, uint32_t n0,
 
 static void tracked_motion_is_the_field(void **state) {
   (void)state;
-  bench b = bench_create(leg_radius, 0.014, 2.5e-3, true, false);
+  bench b;
+  bench_create(&b, leg_radius, 0.014, 2.5e-3, true, false);
   b.settings.depth_m = 0.06;
   look(&b, NULL);
   uint32_t lines, samples, n = b.leg.model.surface.vertex_count;
@@ -237,7 +243,8 @@ static void tracked_motion_is_the_field(void **state) {
 
 static void air_stays_dark(void **state) {
   (void)state;
-  bench b = bench_create(leg_radius, 0.014, 0.012, false, true);
+  bench b;
+  bench_create(&b, leg_radius, 0.014, 0.012, false, true);
   b.pose = tube_pose(leg_radius + 0.01, 0.15);
   look(&b, NULL);
   assert_true(grey(&b, 0, 0.04, 0.01) < 2);
@@ -250,8 +257,10 @@ static void air_stays_dark(void **state) {
 
 static void same_state_same_pixels_and_png(void **state) {
   (void)state;
-  bench b = bench_create(leg_radius, 0.014, 0.012, false, true);
-  bench c = bench_create(leg_radius, 0.014, 0.012, false, true);
+  bench b;
+  bench_create(&b, leg_radius, 0.014, 0.012, false, true);
+  bench c;
+  bench_create(&c, leg_radius, 0.014, 0.012, false, true);
   look(&b, NULL);
   look(&c, NULL);
   assert_memory_equal(b.image.pixels, c.image.pixels, 512 * 512);

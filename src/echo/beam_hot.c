@@ -1,0 +1,134 @@
+// From the scattered field to the envelope: local gain, lateral kernels, specular echoes, axial
+// kernels, receiver noise, time-gain compensation.
+//
+// sonde_echo_beam  all stages, row by row
+// gain_row         one row of the field times what tissue and losses leave
+// lateral_row      lateral kernels at its depth, normalised to unit speckle
+// add_specular     echoes of interfaces, carrier phase included
+// axial_row        pulse, noise, compensation, modulus
+#include "base/base.h"
+#include "base/random.h"
+#include "echo/echo.h"
+
+#include <string.h>
+
+static const float noise_db = -118; // receiver noise below muscle at the skin, before TGC
+
+static float *ring_row(const sonde_echo *echo, uint32_t row) {
+  uint32_t rows = 2 * echo->pad_samples + 1;
+  return echo->ring + (size_t)(row % rows) * RING_PLANES * echo->padded;
+}
+
+// Rms of the splatted field per line and sample: scatterers weighted by the elevation kernel's
+// energy (integral of (1 - y^2)^4 over [-1, 1] is 256/315).
+static double field_rms(const sonde_echo *echo, double depth_m, double half_m) {
+  const frame *f = &echo->frame;
+  double density = echo->per_cell / (echo->cell_m * echo->cell_m * echo->cell_m);
+  double pitch = f->pitch_m * (f->radius_m > 0 ? 1 + fmax(depth_m, 0) / f->radius_m : 1);
+  return sqrt(density * pitch * f->step_m * half_m * 256.0 / 315.0);
+}
+
+static void gain_row(sonde_echo *echo, uint32_t sample, bool tissue) {
+  const float *in = echo->grid + (size_t)sample * 2 * echo->grid_lines;
+  float gain[SONDE_MOST_LINES + 2 * SONDE_MOST_TAPS];
+  uint32_t pad = echo->pad_lines, count = echo->grid_lines;
+  SONDE_ASSERT(count <= SONDE_COUNT_OF(gain));
+  double at = ((double)sample - echo->pad_samples) / (echo->samples - 1) * (SONDE_MEDIUM_ROWS - 1);
+  at = clamp(at, 0, SONDE_MEDIUM_ROWS - 1.001);
+  uint32_t row = (uint32_t)at;
+  float b = (float)(at - row);
+  const float *top = echo->gain + row * echo->padded, *low = top + echo->padded;
+  for (uint32_t l = 0; l < echo->lines; ++l)
+    gain[l + pad] = tissue ? top[l] + b * (low[l] - top[l]) : 1;
+  for (uint32_t l = 0; l < pad; ++l) {
+    gain[l] = gain[pad];
+    gain[echo->lines + pad + l] = gain[echo->lines + pad - 1];
+  }
+  for (uint32_t l = 0; l < count; ++l) {
+    echo->line_re[l] = gain[l] * in[2 * l];
+    echo->line_im[l] = gain[l] * in[2 * l + 1];
+  }
+}
+
+static void lateral_row(sonde_echo *echo, uint32_t sample, bool tissue) {
+  const beam_psf *psf = echo->psf;
+  double depth = ((double)sample - echo->pad_samples) * echo->frame.step_m;
+  int band;
+  double t = sonde_psf_band(psf, depth, &band);
+  const double *half_m = psf->elevation_m + band;
+  double scale = tissue ? 1 / field_rms(echo, depth, half_m[0] + t * (half_m[1] - half_m[0])) : 1;
+  const int *half = psf->half + band;
+  lateral_job job = {.re = echo->line_re + echo->pad_lines,
+                     .im = echo->line_im + echo->pad_lines,
+                     .lines = echo->padded,
+                     .half = half[0] > half[1] ? half[0] : half[1],
+                     .out = ring_row(echo, sample)};
+  double low = scale * (1 - t), high = scale * t;
+  for (int l = 0; l <= job.half; ++l)
+    for (int k = 0; k < SONDE_RANK; ++k)
+      for (int c = 0; c < 2; ++c)
+        job.tap[l][k][c] =
+            (float)(low * psf->lateral[band][k][l][c] + high * psf->lateral[band + 1][k][l][c]);
+  gain_row(echo, sample, tissue);
+  echo->kernels->lateral(&job);
+}
+
+// A sheet is smooth along the lines: its echo enters after the lateral kernel, one per line.
+// Roughness comes with the tissue's own speckle beside it.
+static void add_specular(sonde_echo *echo, uint32_t sample) {
+  const frame *f = &echo->frame;
+  float *row = ring_row(echo, sample);
+  double place = (double)sample - echo->pad_samples;
+  for (uint32_t l = 0; l < echo->lines; ++l)
+    for (uint32_t e = 0; e < echo->echo_count[l]; ++e) {
+      specular s = echo->echoes[l * SONDE_MAX_ECHOES + e];
+      double share = 1 - fabs(s.depth_m / f->step_m - place);
+      if (!(share > 0)) continue;
+      double angle = -4 * SONDE_PI * s.depth_m / f->wavelength_m;
+      double re = share * s.amplitude * cos(angle), im = share * s.amplitude * sin(angle);
+      for (uint32_t k = 0; k < SONDE_RANK; ++k) {
+        row[2 * k * echo->padded + l] += (float)(re * echo->psf->pulse[k]);
+        row[(2 * k + 1) * echo->padded + l] += (float)(im * echo->psf->pulse[k]);
+      }
+    }
+}
+
+static void axial_row(sonde_echo *echo, axial_job *job, uint32_t sample, bool tissue) {
+  const frame *f = &echo->frame;
+  for (int t = 0; t < job->count; ++t) job->rows[t] = ring_row(echo, sample + (uint32_t)t);
+  uint64_t draw = sonde_random_bits(echo->seed + 3 + sonde_interior_tick(echo->interior), sample);
+  job->noise = echo->noise + draw % (SONDE_NOISE - 2 * SONDE_MOST_LINES);
+  job->compensation = tissue ? amplitude_of_db((float)(sample * f->step_m * f->tgc_db_per_m)) : 1;
+  job->envelope = echo->envelope + (size_t)sample * echo->padded;
+  job->grey = echo->grey + (size_t)sample * echo->padded;
+  echo->kernels->axial(job);
+}
+
+// Taps are mirrored: an echo at sample n reaches n + t with axial[t].
+static axial_job axial_of(const sonde_echo *echo, bool tissue) {
+  const sonde_echo_settings *s = &echo->frame.settings;
+  float range = (float)s->dynamic_range_db;
+  axial_job job = {.count = 2 * (int)echo->pad_samples + 1,
+                   .noise_size = tissue ? amplitude_of_db(noise_db) : 0,
+                   .offset_db = (float)s->gain_db - sonde_white_db + range,
+                   .grey_per_db = 255 / range,
+                   .lines = echo->padded};
+  for (int t = 0; t < job.count; ++t)
+    for (int k = 0; k < SONDE_RANK; ++k)
+      job.tap[t][k] = (float)echo->psf->axial[k][job.count - 1 - t];
+  return job;
+}
+
+void sonde_echo_beam(sonde_echo *echo, bool tissue) {
+  SONDE_ASSERT(echo->grid_lines <= SONDE_MOST_LINES + 2 * SONDE_MOST_TAPS);
+  axial_job job = axial_of(echo, tissue);
+  for (uint32_t n = 0; n < echo->grid_samples; ++n) {
+    lateral_row(echo, n, tissue);
+    if (tissue) add_specular(echo, n);
+    if (n >= 2 * echo->pad_samples) axial_row(echo, &job, n - 2 * echo->pad_samples, tissue);
+  }
+  if (echo->padded == echo->lines) return;
+  for (uint32_t n = 0; n < echo->samples; ++n)
+    memcpy(echo->flat_envelope + (size_t)n * echo->lines, echo->envelope + (size_t)n * echo->padded,
+           echo->lines * sizeof(float));
+}

@@ -1,0 +1,170 @@
+// Inner loops of the image; kernel_*_hot.c include this file once per instruction set.
+//
+// splat     scatterers through one affine map into four cells each, carrier phase included
+// lay       one vector of them, in order
+// lateral   symmetric complex kernels of rank three on one row
+// axial     real kernels down the rows, noise, compensation, modulus, logarithm
+// tissue    in kernel_tissue.h
+// fade      attenuation of a row
+// convert   bilinear scan conversion of one row of pixels
+#include "echo/kernel_vector.h"
+
+#include "base/base.h"
+#include "echo/kernel.h"
+#include "echo/kernel_tissue.h"
+
+// cos and sin of 2 pi t, error 1e-5.
+INLINE void turn(vf t, vf *c, vf *s) {
+  vf f = t - below(t + 0.5f), u = f * f;
+  vf p = -85.271621534316f + u * (58.79049212019015f + u * -21.07110562771558f);
+  *c = 0.999999210782323f + u * (-19.738980355764085f + u * (64.92865742103521f + u * p));
+  vf q = 81.44770647022276f + u * (-74.90941970418099f + u * 33.54835514514125f);
+  *s = f * (6.283161129486121f + u * (-41.336831830827336f + u * q));
+}
+
+INLINE void lay(const splat_job *job, const float *record, const int32_t *cell, const float *part) {
+  for (int j = 0; j < W; ++j) {
+    float *top = job->grid + cell[j], *low = top + job->stride;
+    v4 value = load4(record + 4 * slot_of_lane(j)), deep = part[j] * value;
+    store4(top, load4(top) + (value - deep));
+    store4(low, load4(low) + deep);
+  }
+}
+
+static void splat(const splat_job *job) {
+  SONDE_ASSERT(job->count % ECHO_ALIGN == 0);
+  const float(*m)[3] = job->m;
+  float record[4 * W], part[W];
+  int32_t cell[W];
+  for (uint32_t i = 0; i < job->count; i += W) {
+    vf x = load(job->x + i), y = load(job->y + i), z = load(job->z + i);
+    vf side = m[0][1] + m[1][1] * x + m[2][1] * y + m[3][1] * z;
+    vf height = 1 - side * side;
+    vf line = m[0][0] + m[1][0] * x + m[2][0] * y + m[3][0] * z;
+    vf depth = m[0][2] + m[1][2] * x + m[2][2] * y + m[3][2] * z;
+    vi in = (height > 0) & (line >= 0) & (line < job->right) & (depth >= 0) & (depth < job->bottom);
+    if (!any(in)) continue;
+    vf weight = only(in, load(job->sign + i) * height * height), c, s;
+    line = only(in, line), depth = only(in, depth);
+    vi l = whole(line), n = whole(depth);
+    vf a = line - real(l), b = depth - real(n);
+    turn(depth * job->turns, &c, &s);
+    vf re = weight * c, im = -weight * s, re1 = a * re, im1 = a * im;
+    vi at = n * (int32_t)job->stride + 2 * l;
+    records(record, re - re1, im - im1, re1, im1);
+    memcpy(cell, &at, sizeof at);
+    store(part, b);
+    lay(job, record, cell, part);
+  }
+}
+
+static void lateral(const lateral_job *job) {
+  SONDE_ASSERT(job->half >= 0 && job->half <= SONDE_MOST_TAPS);
+  for (uint32_t l = 0; l < job->lines; l += W) {
+    const float *re = job->re + l, *im = job->im + l;
+    vf sum[RING_PLANES], x = load(re), y = load(im);
+    for (int k = 0; k < SONDE_RANK; ++k) {
+      const float *u = job->tap[0][k];
+      sum[2 * k] = u[0] * x - u[1] * y, sum[2 * k + 1] = u[0] * y + u[1] * x;
+    }
+    for (int t = 1; t <= job->half; ++t) {
+      x = load(re - t) + load(re + t), y = load(im - t) + load(im + t);
+      for (int k = 0; k < SONDE_RANK; ++k) {
+        const float *u = job->tap[t][k];
+        sum[2 * k] = sum[2 * k] + u[0] * x - u[1] * y;
+        sum[2 * k + 1] = sum[2 * k + 1] + u[0] * y + u[1] * x;
+      }
+    }
+    for (int k = 0; k < RING_PLANES; ++k) store(job->out + (uint32_t)k * job->lines + l, sum[k]);
+  }
+}
+
+static void axial(const axial_job *job) {
+  SONDE_ASSERT(job->count > 0 && job->lines % ECHO_ALIGN == 0);
+  for (uint32_t l = 0; l < job->lines; l += W) {
+    vf re = job->noise_size * load(job->noise + l);
+    vf im = job->noise_size * load(job->noise + job->lines + l);
+    for (int t = 0; t < job->count; ++t) {
+      const float *row = job->rows[t] + l;
+      for (uint32_t k = 0; k < SONDE_RANK; ++k) {
+        float v = job->tap[t][k];
+        re += v * load(row + 2 * k * job->lines);
+        im += v * load(row + (2 * k + 1) * job->lines);
+      }
+    }
+    vf size = job->compensation * root(re * re + im * im);
+    store(job->envelope + l, size);
+    vf grey = (decibels(larger(size, all(1e-20f))) + job->offset_db) * job->grey_per_db;
+    store(job->grey + l, smaller(larger(grey, all(0)), all(255)));
+  }
+}
+
+// Angle of (z, x), |x| < 2 z: arctangent of less than 50 degrees.
+INLINE vf angle_of(vf x, vf z) {
+  vf t = x / (z + root(x * x + z * z)), u = t * t; // half the angle
+  vf p = 0.19961517305842502f + u * (-0.13722131260315293f + u * 0.07586774308787624f);
+  return 2 * t * (0.9999999631898905f + u * (-0.33332396678715026f + u * p));
+}
+
+INLINE vf pixel_of(const convert_job *job, vf x) {
+  vf from = all(job->z + job->radius_m), v = angle_of(x, from) * job->radius_m;
+  vf depth = root(x * x + from * from) - job->radius_m;
+  vf line = v * job->lines_per_m + job->first_line, sample = depth * job->samples_per_m;
+  float right = (float)(job->lines - 1), bottom = (float)(job->samples - 1);
+  vi in = (line >= 0) & (line < right) & (sample >= 0) & (sample < bottom);
+  line = only(in, line), sample = only(in, sample);
+  vi l = whole(line), n = whole(sample), at = n * (int32_t)job->stride + l;
+  vf a = line - real(l), b = sample - real(n);
+  vf p = gather(job->grey, at), q = gather(job->grey, at + 1);
+  at = at + (int32_t)job->stride;
+  vf r = gather(job->grey, at), s = gather(job->grey, at + 1);
+  p = p + a * (q - p), r = r + a * (s - r);
+  return only(in, p + b * (r - p) + 0.5f);
+}
+
+// One depth for the whole row of pixels: first between samples, then between lines.
+INLINE vf pixel_between(const convert_job *job, const float *mixed, vf x) {
+  vf line = x * job->lines_per_m + job->first_line;
+  vi in = (line >= 0) & (line < (float)(job->lines - 1));
+  line = only(in, line);
+  vi l = whole(line);
+  vf a = line - real(l), p = gather(mixed, l), q = gather(mixed, l + 1);
+  return only(in, p + a * (q - p) + 0.5f);
+}
+
+INLINE void mix_samples(const convert_job *job, float *mixed) {
+  float sample = job->z * job->samples_per_m;
+  uint32_t n = (uint32_t)sample < job->samples - 2 ? (uint32_t)sample : job->samples - 2;
+  float b = sample - (float)n;
+  const float *top = job->grey + (size_t)n * job->stride, *low = top + job->stride;
+  for (uint32_t l = 0; l < job->stride; l += W) {
+    vf p = load(top + l);
+    store(mixed + l, p + b * (load(low + l) - p));
+  }
+}
+
+static void convert(const convert_job *job) {
+  SONDE_ASSERT(job->lines_per_m > 0 && job->stride <= SONDE_MOST_LINES);
+  float ramp[W], mixed[SONDE_MOST_LINES + 1] = {0};
+  for (int k = 0; k < W; ++k) ramp[k] = (float)k;
+  bool flat = !(job->radius_m > 0);
+  if (flat) mix_samples(job, mixed);
+  for (uint32_t c = 0; c < job->width; c += W) {
+    vf x = job->x + ((float)c + load(ramp)) * job->dx;
+    vi grey = whole(flat ? pixel_between(job, mixed, x) : pixel_of(job, x));
+    uint32_t left = job->width - c < W ? job->width - c : W;
+    for (uint32_t k = 0; k < left; ++k) job->out[c + k] = (uint8_t)grey[k];
+  }
+}
+
+// What is left of the scattered amplitude behind the losses.
+static void fade(const float *scatter, const float *loss_db, float *gain, uint32_t lines) {
+  SONDE_ASSERT(lines % ECHO_ALIGN == 0);
+  for (uint32_t l = 0; l < lines; l += W) {
+    vf loss = smaller(load(loss_db + l), all(600));
+    store(gain + l, load(scatter + l) * power2(loss * -0.16609640474f));
+  }
+}
+
+const echo_kernels SONDE_KERNELS = {
+    SONDE_KERNELS_NAME, splat, lateral, axial, tissue, fade, convert};

@@ -1,0 +1,86 @@
+// Inner loops of the image, one set per instruction set.
+#ifndef SONDE_SRC_ECHO_KERNEL_H
+#define SONDE_SRC_ECHO_KERNEL_H
+
+#include "echo/psf.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+enum {
+  SONDE_MOST_LINES = 512,
+  ECHO_ALIGN = 16, // lines and batches are padded to whole vectors
+  LEVELS = 6,      // skin, dermis, fascia, cortex, vein wall, artery wall
+  RING_PLANES = 2 * SONDE_RANK,
+};
+
+// Scatterers of one affine map: (line, elevation over its half width, sample) =
+// m[0] + m[1] x + m[2] y + m[3] z.
+typedef struct splat_job {
+  const float *x, *y, *z, *sign;
+  uint32_t count; // multiple of ECHO_ALIGN
+  float m[4][3];
+  float turns;         // carrier periods per sample
+  float right, bottom; // last line and sample with a neighbour
+  float *grid;         // [sample][line][2]
+  uint32_t stride;     // floats per sample
+} splat_job;
+
+typedef struct lateral_job {
+  const float *re, *im; // one row; half values before and after
+  uint32_t lines;       // multiple of ECHO_ALIGN
+  int half;
+  float tap[SONDE_MOST_TAPS + 1][SONDE_RANK][2];
+  float *out; // [RING_PLANES][lines] re, im of each term
+} lateral_job;
+
+typedef struct axial_job {
+  const float *rows[2 * SONDE_MOST_TAPS + 1]; // of lateral results, first to last
+  int count;
+  float tap[2 * SONDE_MOST_TAPS + 1][SONDE_RANK];
+  const float *noise; // [2*lines]
+  float noise_size, compensation;
+  float offset_db, grey_per_db; // grey = (dB + offset) * grey_per_db
+  uint32_t lines;
+  float *envelope, *grey;
+} axial_job;
+
+// Rows of the fields of plane.h at one depth, in; tissue out.
+typedef struct tissue_job {
+  const float *row; // [PLANE_FIELDS][lines]
+  uint32_t lines;   // multiple of ECHO_ALIGN
+  float bone_radius_m, clot_fraction, clot_scatter;
+  bool plain;
+  float *scatter, *loss; // amplitude over muscle, dB/m/MHz one way
+  float *level;          // [LEVELS][lines] signed: sign changes are interfaces
+} tissue_job;
+
+// A row of pixels from [samples][lines] grey values.
+typedef struct convert_job {
+  const float *grey;
+  uint32_t lines, samples, stride;            // floats per sample
+  float x, dx, z;                             // of the first pixel and per pixel, m
+  float lines_per_m, samples_per_m, radius_m; // curved face when radius > 0
+  float first_line;                           // line at x = 0
+  uint32_t width;
+  uint8_t *out;
+} convert_job;
+
+typedef struct echo_kernels {
+  const char *name;
+  void (*splat)(const splat_job *job);
+  void (*lateral)(const lateral_job *job);
+  void (*axial)(const axial_job *job);
+  void (*tissue)(const tissue_job *job);
+  void (*fade)(const float *scatter, const float *loss_db, float *gain, uint32_t lines);
+  void (*convert)(const convert_job *job);
+} echo_kernels;
+
+// The widest kernels that this processor runs, or those called `name`: avx512, avx2, base, plain.
+const echo_kernels *sonde_echo_kernels_find(const char *name);
+extern const echo_kernels sonde_echo_kernels_plain, sonde_echo_kernels_base;
+#ifdef __x86_64__
+extern const echo_kernels sonde_echo_kernels_avx2, sonde_echo_kernels_avx512;
+#endif
+
+#endif

@@ -1,0 +1,4 @@
+// Inner loops of the image for one instruction set.
+#define SONDE_KERNELS sonde_echo_kernels_avx512
+#define SONDE_KERNELS_NAME "avx512"
+#include "echo/kernel.c"

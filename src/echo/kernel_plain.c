@@ -1,0 +1,96 @@
+// The inner loops without vectors and with the library's functions: what the others are tested
+// against. The tissue's row comes from the base set.
+//
+// splat, lateral, axial, fade, convert
+#include "base/base.h"
+#include "echo/kernel.h"
+
+#include <math.h>
+
+static void splat(const splat_job *job) {
+  SONDE_ASSERT(job->count % ECHO_ALIGN == 0);
+  for (uint32_t i = 0; i < job->count; ++i) {
+    double at[3];
+    for (int c = 0; c < 3; ++c)
+      at[c] = (double)job->m[0][c] + (double)job->m[1][c] * (double)job->x[i] +
+              (double)job->m[2][c] * (double)job->y[i] + (double)job->m[3][c] * (double)job->z[i];
+    double height = 1 - at[1] * at[1];
+    if (!(height > 0 && at[0] >= 0 && at[0] < (double)job->right && at[2] >= 0 &&
+          at[2] < (double)job->bottom))
+      continue;
+    double weight = (double)job->sign[i] * height * height, l = floor(at[0]), n = floor(at[2]);
+    double turn = 6.283185307179586 * at[2] * (double)job->turns;
+    for (size_t corner = 0; corner < 4; ++corner) {
+      double a = corner & 1 ? at[0] - l : 1 - (at[0] - l);
+      double b = corner & 2 ? at[2] - n : 1 - (at[2] - n);
+      float *g =
+          job->grid + ((size_t)n + (corner >> 1)) * job->stride + 2 * ((size_t)l + (corner & 1));
+      g[0] += (float)(a * b * weight * cos(turn)), g[1] -= (float)(a * b * weight * sin(turn));
+    }
+  }
+}
+
+static void lateral(const lateral_job *job) {
+  for (uint32_t l = 0; l < job->lines; ++l)
+    for (uint32_t k = 0; k < SONDE_RANK; ++k) {
+      double re = 0, im = 0;
+      for (int t = -job->half; t <= job->half; ++t) {
+        const float *u = job->tap[t < 0 ? -t : t][k];
+        double x = (double)job->re[(int)l + t], y = (double)job->im[(int)l + t];
+        re += (double)u[0] * x - (double)u[1] * y, im += (double)u[0] * y + (double)u[1] * x;
+      }
+      job->out[2 * k * job->lines + l] = (float)re;
+      job->out[(2 * k + 1) * job->lines + l] = (float)im;
+    }
+}
+
+static void axial(const axial_job *job) {
+  for (uint32_t l = 0; l < job->lines; ++l) {
+    double re = (double)(job->noise_size * job->noise[l]);
+    double im = (double)(job->noise_size * job->noise[job->lines + l]);
+    for (int t = 0; t < job->count; ++t)
+      for (uint32_t k = 0; k < SONDE_RANK; ++k) {
+        re += (double)job->tap[t][k] * (double)job->rows[t][2 * k * job->lines + l];
+        im += (double)job->tap[t][k] * (double)job->rows[t][(2 * k + 1) * job->lines + l];
+      }
+    double size = (double)job->compensation * sqrt(re * re + im * im);
+    double db = 20 * log10(fmax(size, 1e-20));
+    double grey = (db + (double)job->offset_db) * (double)job->grey_per_db;
+    job->envelope[l] = (float)size;
+    job->grey[l] = (float)fmin(fmax(grey, 0), 255);
+  }
+}
+
+static void tissue(const tissue_job *job) { sonde_echo_kernels_base.tissue(job); }
+
+static void fade(const float *scatter, const float *loss_db, float *gain, uint32_t lines) {
+  for (uint32_t l = 0; l < lines; ++l)
+    gain[l] = (float)((double)scatter[l] * pow(10, -fmin((double)loss_db[l], 600) / 20));
+}
+
+// Grey value between four samples.
+static double between(const convert_job *job, double line, double sample) {
+  if (!(line >= 0 && line < job->lines - 1.0 && sample >= 0 && sample < job->samples - 1.0))
+    return 0;
+  size_t l = (size_t)line, n = (size_t)sample;
+  const float *p = job->grey + n * job->stride + l, *q = p + job->stride;
+  double a = line - (double)l, b = sample - (double)n;
+  return (1 - b) * ((1 - a) * (double)p[0] + a * (double)p[1]) +
+         b * ((1 - a) * (double)q[0] + a * (double)q[1]) + 0.5;
+}
+
+static void convert(const convert_job *job) {
+  SONDE_ASSERT(job->lines_per_m > 0);
+  for (uint32_t c = 0; c < job->width; ++c) {
+    double v = (double)job->x + (double)job->dx * c, z = (double)job->z;
+    if (job->radius_m > 0) {
+      double x = v, from = z + (double)job->radius_m;
+      v = (double)job->radius_m * atan2(x, from), z = hypot(x, from) - (double)job->radius_m;
+    }
+    double line = v * (double)job->lines_per_m + (double)job->first_line;
+    job->out[c] = (uint8_t)between(job, line, z * (double)job->samples_per_m);
+  }
+}
+
+const echo_kernels sonde_echo_kernels_plain = {"plain", splat, lateral, axial,
+                                               tissue,  fade,  convert};

@@ -1,0 +1,135 @@
+// Tissue along one row of the march: labels, backscatter, attenuation, signed distances to the
+// interfaces, textures in tissue coordinates. Included by kernel.c only.
+//
+// cell_value, texture  value noise
+// sheet                bright layers at whole values
+// septa, bundles       textures of fat and muscle
+// wall_distance        signed distance to a vessel's inner wall
+// paint                one vector of lines
+#ifndef SONDE_SRC_ECHO_KERNEL_TISSUE_H
+#define SONDE_SRC_ECHO_KERNEL_TISSUE_H
+
+#include "echo/kernel.h"
+#include "echo/kernel_vector.h"
+#include "echo/plane.h"
+
+enum { TURNS_MUSCLE = 90, TURNS_FAT = 60 }; // noise cells around the leg
+
+// Backscatter over muscle (amplitude) and attenuation (dB/m/MHz one way); docs/echo.md.
+static const float skin_tissue[2] = {2.2f, 100}, fat_tissue[2] = {0.40f, 50},
+                   muscle_tissue[2] = {0.85f, 100}, wall_tissue[2] = {1.9f, 110},
+                   blood_tissue[2] = {0.006f, 18}, bone_tissue[2] = {0.02f, 200};
+static const float clot_loss = 45, outside_loss = 0.2f;
+static const float wall_m[2] = {0.6e-3f, 0.9e-3f};
+
+INLINE vf cell_value(vu a, vu b, vu c) {
+  vu h = a ^ b ^ c;
+  h = (h ^ (h >> 15)) * 0x2c1b3c6du;
+  h = (h ^ (h >> 12)) * 0x297a2d39u;
+  h = (h ^ (h >> 15)) >> 8;
+  return real((vi)h) * (2.0f / 16777216.0f) - 1;
+}
+
+INLINE vf smooth(vf t) { return t * t * (3 - 2 * t); }
+INLINE vi wrap(vi i, int32_t n) {
+  i += (i < 0) & n, i += (i < 0) & n;
+  i -= (i >= n) & n;
+  return i - ((i >= n) & n);
+}
+
+// Value noise in [-1, 1]; periodic around the leg with `turns` cells.
+INLINE vf texture(vf theta, vf along, vf depth, int32_t turns, int32_t salt) {
+  vf u = theta * ((float)turns * 0.159154943f);
+  vf fu = below(u), fv = below(along), fw = below(depth);
+  vi a = wrap(whole(fu), turns), a1 = wrap(a + 1, turns);
+  vu ka = (vu)a * 0x9e3779b1u, ka1 = (vu)a1 * 0x9e3779b1u;
+  vu b = (vu)(whole(fv) + 1000 * salt) * 0x85ebca77u, b1 = b + 0x85ebca77u;
+  vu c = (vu)whole(fw) * 0xc2b2ae3du, c1 = c + 0xc2b2ae3du;
+  vf tu = smooth(u - fu), tv = smooth(along - fv), tw = smooth(depth - fw);
+  vf p = cell_value(ka, b, c), q = cell_value(ka, b1, c);
+  p += tu * (cell_value(ka1, b, c) - p), q += tu * (cell_value(ka1, b1, c) - q);
+  vf r = cell_value(ka, b, c1), s = cell_value(ka, b1, c1);
+  r += tu * (cell_value(ka1, b, c1) - r), s += tu * (cell_value(ka1, b1, c1) - s);
+  p += tv * (q - p), r += tv * (s - r);
+  return p + tw * (r - p);
+}
+
+// Bright sheets at whole values of `layer`, thin over `share` of the spacing.
+INLINE vf sheet(vf layer, float share) {
+  vf away = size_of(layer - below(layer) - 0.5f) * 2; // 1 on the sheet, 0 half-way
+  vf height = larger((away - 1 + share) / share, all(0));
+  return height * height;
+}
+
+// Septa of the fat: broken sheets roughly along the skin, bent by the lobules.
+INLINE vf septa(vf theta, vf s, vf depth) {
+  vf bend = texture(theta, s * 70, depth * 250, TURNS_FAT, 1);
+  vf strength = texture(theta, s * 110, depth * 500, 2 * TURNS_FAT, 4);
+  return larger(sheet(depth * 300 + 0.9f * bend, 0.22f) * (0.5f + strength), all(0));
+}
+
+// Bundles of muscle, in decibels: dark fascicles between broken bright connective layers that run
+// at a small angle to the skin.
+INLINE vf bundles(vf theta, vf s, vf depth) {
+  vf slant = depth + 0.012f * theta;
+  vf bend = texture(theta, s * 40, depth * 130, TURNS_MUSCLE / 3, 2);
+  vf fine = texture(theta, s * 90, slant * 900, TURNS_MUSCLE, 3);
+  vf strength = texture(theta, s * 60, slant * 400, TURNS_MUSCLE / 2, 5);
+  vf bright = sheet(slant * 260 + 0.8f * bend, 0.35f) * (0.35f + strength);
+  return 2.5f * fine + 2.5f * bend + 13 * larger(bright, all(0)) - 1;
+}
+
+// Signed distance over the row, metres (negative inside): to first order (F - 1)/|grad F| of the
+// ellipse F = 1.
+INLINE vf wall_distance(vf a, vf b, vf half_a, vf half_b) {
+  vf square = a * a + b * b, size = root(square);
+  vf ga = a / half_a, gb = b / half_b, steep = root(ga * ga + gb * gb);
+  vf distance = pick(steep > 1e-3f, (size - 1) * size / larger(steep, all(1e-3f)), -half_a);
+  vf beyond = (size_of(b) - 1) * half_b; // bounds the estimate beside a flat ellipse's tips
+  distance = pick((beyond > 0) & (beyond > distance), beyond, distance);
+  return pick(square > 400, all(1), distance);
+}
+
+INLINE void mark(vi mask, vf scatter, float loss, vf out[2]) {
+  out[0] = pick(mask, scatter, out[0]), out[1] = pick(mask, all(loss), out[1]);
+}
+
+INLINE void paint(const tissue_job *job, uint32_t l) {
+  const float *f = job->row + l;
+  uint32_t n = job->lines;
+  vf depth = load(f + PLANE_DEPTH * n), fat = load(f + PLANE_FAT * n);
+  vf muscle = load(f + PLANE_MUSCLE * n), r = load(f + PLANE_R * n);
+  vf theta = load(f + PLANE_THETA * n), s = load(f + PLANE_S * n), level[LEVELS];
+  level[0] = depth, level[1] = depth - fat, level[2] = depth - muscle;
+  level[3] = job->bone_radius_m - r;
+  for (uint32_t v = 0; v < 2; ++v) {
+    const float *at = f + (PLANE_VEIN_SHORT + 2 * v) * n, *half = at + 4 * n;
+    level[4 + v] = wall_distance(load(at), load(at + n), load(half), load(half + n));
+  }
+  vf tissue[2] = {all(skin_tissue[0]), all(skin_tissue[1])};
+  vi in_fat = (level[1] >= 0) & (level[2] < 0), in_muscle = (level[1] >= 0) & (level[2] >= 0);
+  vf fat_scatter = all(fat_tissue[0]), muscle_scatter = all(job->plain ? 1 : muscle_tissue[0]);
+  if (!job->plain && any(in_fat)) fat_scatter += 1.5f * septa(theta, s, depth);
+  if (!job->plain && any(in_muscle))
+    muscle_scatter = muscle_scatter * power2(bundles(theta, s, depth) * 0.16609640474f);
+  mark(in_fat, fat_scatter, fat_tissue[1], tissue);
+  mark(in_muscle, muscle_scatter, muscle_tissue[1], tissue);
+  for (int v = 1; v >= 0; --v) {
+    mark(level[4 + v] < wall_m[v], all(wall_tissue[0]), wall_tissue[1], tissue);
+    mark(level[4 + v] <= 0, all(blood_tissue[0]), blood_tissue[1], tissue);
+  }
+  // Chord that bounds a mural clot on the deep side, in semi-axes.
+  vi clot = (level[4] <= 0) & (load(f + PLANE_CLOT * n) >= 0.5f);
+  vi part = -load(f + PLANE_VEIN_SHORT * n) > 1 - 2 * job->clot_fraction;
+  mark(job->clot_fraction >= 1 ? clot : clot & part, all(job->clot_scatter), clot_loss, tissue);
+  mark(level[3] > 0, all(bone_tissue[0]), bone_tissue[1], tissue);
+  mark(level[0] < 0, all(0), outside_loss, tissue);
+  store(job->scatter + l, tissue[0]), store(job->loss + l, tissue[1]);
+  for (uint32_t k = 0; k < LEVELS; ++k) store(job->level + k * n + l, level[k]);
+}
+
+static void tissue(const tissue_job *job) {
+  for (uint32_t l = 0; l < job->lines; l += W) paint(job, l);
+}
+
+#endif

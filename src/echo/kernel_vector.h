@@ -1,0 +1,141 @@
+// Vectors as wide as the instruction set. Every operation is one IEEE operation per lane and sums
+// run in one order: all sets give the same bits.
+#ifndef SONDE_SRC_ECHO_KERNEL_VECTOR_H
+#define SONDE_SRC_ECHO_KERNEL_VECTOR_H
+
+#include <stdbool.h>
+#include <stdint.h>
+#include <string.h>
+
+#if defined(__SSE2__)
+#include <immintrin.h>
+#endif
+
+// Without optimisation gcc's intrinsics are macros whose masks it then warns about.
+#if defined(__GNUC__) && !defined(__clang__) && !defined(__OPTIMIZE__)
+#pragma GCC diagnostic ignored "-Wsign-conversion"
+#pragma GCC diagnostic ignored "-Wconversion"
+#endif
+
+#define INLINE static inline __attribute__((always_inline))
+
+#if defined(__AVX512F__)
+enum { W = 16 };
+#define BYTES 64
+#elif defined(__AVX2__)
+enum { W = 8 };
+#define BYTES 32
+#else
+enum { W = 4 };
+#define BYTES 16
+#endif
+
+typedef float vf __attribute__((vector_size(BYTES)));
+typedef int32_t vi __attribute__((vector_size(BYTES)));
+typedef uint32_t vu __attribute__((vector_size(BYTES)));
+typedef float vf_near __attribute__((vector_size(BYTES), aligned(4), may_alias));
+typedef float v4 __attribute__((vector_size(16)));
+typedef float v4_near __attribute__((vector_size(16), aligned(4), may_alias));
+
+INLINE vf load(const float *p) { return *(const vf_near *)p; }
+INLINE void store(float *p, vf a) { *(vf_near *)p = a; }
+INLINE v4 load4(const float *p) { return *(const v4_near *)p; }
+INLINE void store4(float *p, v4 a) { *(v4_near *)p = a; }
+INLINE vf all(float a) { return a - (vf){0}; }
+INLINE vi all_of(int32_t a) { return a - (vi){0}; }
+INLINE vi whole(vf a) { return __builtin_convertvector(a, vi); }
+INLINE vf real(vi a) { return __builtin_convertvector(a, vf); }
+INLINE vf pick(vi mask, vf yes, vf no) { return (vf)((mask & (vi)yes) | (~mask & (vi)no)); }
+INLINE vi pick_of(vi mask, vi yes, vi no) { return (mask & yes) | (~mask & no); }
+INLINE vf only(vi mask, vf a) { return (vf)(mask & (vi)a); }
+INLINE vf larger(vf a, vf b) { return pick(a > b, a, b); }
+INLINE vf smaller(vf a, vf b) { return pick(a < b, a, b); }
+INLINE vf size_of(vf a) { return (vf)((vi)a & 0x7fffffff); }
+INLINE vf below(vf a) { // largest whole number not above
+  vf i = real(whole(a));
+  return i - only(i > a, all(1));
+}
+
+INLINE bool any(vi mask) {
+#if defined(__AVX512F__)
+  return _mm512_test_epi32_mask((__m512i)mask, (__m512i)mask) != 0;
+#elif defined(__AVX2__)
+  return _mm256_movemask_ps((__m256)mask) != 0;
+#elif defined(__SSE2__)
+  return _mm_movemask_ps((__m128)mask) != 0;
+#else
+  return (mask[0] | mask[1] | mask[2] | mask[3]) != 0;
+#endif
+}
+
+INLINE vf root(vf a) {
+#if defined(__AVX512F__)
+  return (vf)_mm512_sqrt_ps((__m512)a);
+#elif defined(__AVX2__)
+  return (vf)_mm256_sqrt_ps((__m256)a);
+#elif defined(__SSE2__)
+  return (vf)_mm_sqrt_ps((__m128)a);
+#else
+  for (int k = 0; k < W; ++k) a[k] = __builtin_sqrtf(a[k]);
+  return a;
+#endif
+}
+
+INLINE vf gather(const float *base, vi index) {
+#if defined(__AVX512F__)
+  return (vf)_mm512_i32gather_ps((__m512i)index, base, 4);
+#else
+  vf v;
+  for (int k = 0; k < W; ++k) v[k] = base[index[k]];
+  return v;
+#endif
+}
+
+// Lanes of four vectors as records of four numbers: record j at 4 * slot_of_lane(j).
+INLINE void records(float *out, vf a, vf b, vf c, vf d) {
+#if defined(__AVX512F__)
+  __m512 ab = _mm512_unpacklo_ps((__m512)a, (__m512)b),
+         cd = _mm512_unpacklo_ps((__m512)c, (__m512)d);
+  __m512 AB = _mm512_unpackhi_ps((__m512)a, (__m512)b),
+         CD = _mm512_unpackhi_ps((__m512)c, (__m512)d);
+  _mm512_storeu_ps(out, _mm512_shuffle_ps(ab, cd, 0x44));
+  _mm512_storeu_ps(out + 16, _mm512_shuffle_ps(ab, cd, 0xee));
+  _mm512_storeu_ps(out + 32, _mm512_shuffle_ps(AB, CD, 0x44));
+  _mm512_storeu_ps(out + 48, _mm512_shuffle_ps(AB, CD, 0xee));
+#elif defined(__AVX2__)
+  __m256 ab = _mm256_unpacklo_ps((__m256)a, (__m256)b),
+         cd = _mm256_unpacklo_ps((__m256)c, (__m256)d);
+  __m256 AB = _mm256_unpackhi_ps((__m256)a, (__m256)b),
+         CD = _mm256_unpackhi_ps((__m256)c, (__m256)d);
+  _mm256_storeu_ps(out, _mm256_shuffle_ps(ab, cd, 0x44));
+  _mm256_storeu_ps(out + 8, _mm256_shuffle_ps(ab, cd, 0xee));
+  _mm256_storeu_ps(out + 16, _mm256_shuffle_ps(AB, CD, 0x44));
+  _mm256_storeu_ps(out + 24, _mm256_shuffle_ps(AB, CD, 0xee));
+#else
+  for (int k = 0; k < W; ++k) {
+    const v4 record = {a[k], b[k], c[k], d[k]};
+    store4(out + 4 * k, record);
+  }
+#endif
+}
+// Within 128 bits the lanes keep their order; these blocks come column by column.
+INLINE int slot_of_lane(int j) { return (j & 3) * (W / 4) + (j >> 2); }
+
+// 2^a for |a| < 120, relative error 1e-7.
+INLINE vf power2(vf a) {
+  vf i = below(a), t = a - i;
+  vf p = 0.0558632826591662f + t * (0.00894621466647436f + t * 0.0018951072909317184f);
+  p = 0.9999998957631335f + t * (0.693154620003299f + t * (0.24014077009185858f + t * p));
+  return (vf)((vi)p + (whole(i) << 23));
+}
+
+// 20 log10 of a > 0 within 0.01 dB: exponent bits and a polynomial in the mantissa.
+INLINE vf decibels(vf a) {
+  vi bits = (vi)a;
+  vf exponent = real((bits >> 23) - 127);
+  vf t = (vf)((bits & 0x7fffff) | 0x3f800000) - 1;
+  vf log2m = t * (1.4419f + t * (-0.7096f + t * (0.4175f + t * (-0.1943f + t * 0.0445f))));
+  return 6.0205999f * (exponent + log2m);
+}
+
+#endif

@@ -1,0 +1,173 @@
+// March along the scan lines through the deformed tissue: backscatter, attenuation, specular
+// echoes at interfaces, shadow of the bone, air. Constants and sources: docs/echo.md.
+//
+// sonde_echo_medium  all rows of the march
+// widen, next_row    coarse plane -> one row, per line
+// roughness          of an interface along its surface
+// cross, cross_levels  a level's zero between two rows becomes an echo
+// mark_air           lines whose face does not touch the skin
+// blur_loss          an aperture looks past small obstacles
+#include "base/base.h"
+#include "base/random.h"
+#include "echo/echo.h"
+
+#include <string.h>
+
+static const float air_gap_m = 1.5e-3f;
+
+// Echo of an interface over the rms of muscle speckle: decibels at normal incidence, the angle's
+// tangent at which the specular part has fallen by 1/e, the diffuse share that stays, and what the
+// passage costs beyond, dB.
+typedef struct interface {
+  float db, tangent, diffuse, loss_db;
+} interface;
+static const interface interfaces[LEVELS] = {
+    {18, 0.5f, 0.3f, 0},   // skin
+    {10, 0.3f, 0.2f, 0},   // dermis and fat
+    {21, 0.22f, 0.12f, 0}, // fascia
+    {36, 0.4f, 0.02f, 55}, // cortex
+    {17, 0.5f, 0.12f, 0},  // vein wall
+    {17, 0.5f, 0.12f, 0},  // artery wall
+};
+
+// A coarse row, per line.
+static void widen(sonde_echo *echo, uint32_t coarse, float *wide) {
+  SONDE_ASSERT(coarse < SONDE_PLANE_ROWS);
+  float per_line = (float)(1 / echo->lines_per_column);
+  float first = (float)echo->frame.edge_lines * per_line;
+  for (int field = 0; field < PLANE_FIELDS; ++field) {
+    const float *in = echo->plane + field * SONDE_PLANE_NODES + coarse * SONDE_PLANE_COLUMNS;
+    float *out = wide + (uint32_t)field * echo->padded;
+    for (uint32_t l = 0; l < echo->padded; ++l) {
+      float x = first + (float)(l < echo->lines ? l : echo->lines - 1) * per_line;
+      uint32_t i = (uint32_t)x < SONDE_PLANE_COLUMNS - 2 ? (uint32_t)x : SONDE_PLANE_COLUMNS - 2;
+      out[l] = in[i] + (x - (float)i) * (in[i + 1] - in[i]);
+    }
+  }
+}
+
+static void mix_rows(const float *top, const float *low, float b, float *out, uint32_t count) {
+  for (uint32_t i = 0; i < count; ++i) out[i] = top[i] + b * (low[i] - top[i]);
+}
+
+// Fields of a row; coarse rows are widened when the march reaches them.
+static void next_row(sonde_echo *echo, uint32_t row, uint32_t *reached) {
+  float y = (float)row * (SONDE_PLANE_ROWS - 1) / (SONDE_MEDIUM_ROWS - 1);
+  uint32_t j = (uint32_t)y < SONDE_PLANE_ROWS - 2 ? (uint32_t)y : SONDE_PLANE_ROWS - 2;
+  uint32_t size = PLANE_FIELDS * echo->padded;
+  for (; *reached < j + 2; ++*reached) widen(echo, *reached, echo->wide + *reached % 2 * size);
+  mix_rows(echo->wide + j % 2 * size, echo->wide + (j + 1) % 2 * size, y - (float)j, echo->row,
+           size);
+}
+
+static float knot(int32_t a, int32_t b, uint32_t salt) {
+  uint32_t h = (uint32_t)a * 0x9e3779b1u ^ (uint32_t)b * 0x85ebca77u ^ salt * 0xc2b2ae3du;
+  h = (h ^ (h >> 15)) * 0x2c1b3c6du;
+  h = (h ^ (h >> 12)) * 0x297a2d39u;
+  return (float)((h ^ (h >> 15)) >> 8) * (2.0f / 16777216.0f) - 1;
+}
+
+// Value noise in [-1, 1] along a surface, cells of 1.3 mm.
+static float roughness(const sonde_echo *echo, uint32_t l, uint32_t salt) {
+  const float *row = echo->row;
+  float round = row[PLANE_THETA * echo->padded + l] * row[PLANE_R * echo->padded + l];
+  float u = round * 750, v = row[PLANE_S * echo->padded + l] * 750;
+  float fu = floorf(u), fv = floorf(v), a = u - fu, b = v - fv;
+  int32_t i = (int32_t)fu, j = (int32_t)fv;
+  float top = knot(i, j, salt) + a * (knot(i + 1, j, salt) - knot(i, j, salt));
+  float low = knot(i, j + 1, salt) + a * (knot(i + 1, j + 1, salt) - knot(i, j + 1, salt));
+  return top + b * (low - top);
+}
+
+static void record(sonde_echo *echo, uint32_t l, float depth_m, float amplitude) {
+  SONDE_ASSERT(l < echo->lines);
+  uint32_t n = echo->echo_count[l];
+  if (n >= SONDE_MAX_ECHOES || amplitude <= 0) return;
+  echo->echoes[l * SONDE_MAX_ECHOES + n] = (specular){depth_m, amplitude};
+  echo->echo_count[l] = (uint8_t)(n + 1);
+}
+
+// A level that changes sign between the last row and this one reflects.
+static void cross(sonde_echo *echo, uint32_t row, uint32_t l, uint32_t which) {
+  const interface *kind = &interfaces[which];
+  const float *now = echo->level[row % 2] + which * echo->padded;
+  float before = echo->level[(row + 1) % 2][which * echo->padded + l];
+  uint32_t left = l > 0 ? l - 1 : l, right = l + 1 < echo->lines ? l + 1 : l;
+  float dz = (float)(echo->frame.depth_m / (SONDE_MEDIUM_ROWS - 1));
+  float t = before / (before - now[l]), slope = (now[l] - before) / dz;
+  float across = (now[right] - now[left]) / (float)(right - left);
+  float pitch = (float)(echo->frame.pitch_m); // at the depth of the crossing
+  float depth = ((float)row - 1 + t) * dz;
+  if (echo->frame.radius_m > 0) pitch *= 1 + depth / (float)echo->frame.radius_m;
+  float tangent = across / pitch / (fabsf(slope) > 1e-6f ? slope : 1e-6f);
+  float q = tangent / kind->tangent;
+  float shape = kind->diffuse + (1 - kind->diffuse) * expf(-q * q);
+  float rough = echo->plain ? 0 : 4 * roughness(echo, l, which);
+  record(echo, l, depth, amplitude_of_db(kind->db + rough - echo->loss_db[l]) * shape);
+  echo->loss_db[l] += kind->loss_db;
+}
+
+static void cross_levels(sonde_echo *echo, uint32_t row) {
+  const uint32_t n = echo->padded;
+  const float *now = echo->level[row % 2], *before = echo->level[(row + 1) % 2];
+  for (uint32_t which = 0; which < LEVELS; ++which)
+    for (uint32_t l = 0; l < echo->lines; ++l) {
+      uint32_t k = which * n + l;
+      if ((before[k] < 0) == (now[k] < 0) || echo->air[l]) continue;
+      bool lumen = now[4 * n + l] < 0 || now[5 * n + l] < 0;
+      if (!lumen || which == 0 || which > 2) cross(echo, row, l, which); // layers end at a vessel
+    }
+}
+
+// Bands at multiples of the face's own thickness, fading.
+static void reverberate(sonde_echo *echo, uint32_t l) {
+  for (int k = 0; k < 6; ++k)
+    record(echo, l, 0.4e-3f + 1.3e-3f * (float)k, 6.0f * exp2f(-1.4f * (float)k));
+}
+
+static void mark_air(sonde_echo *echo) {
+  for (uint32_t l = 0; l < echo->padded; ++l) {
+    echo->air[l] = echo->row[PLANE_DEPTH * echo->padded + l] < -air_gap_m;
+    if (echo->air[l] && l < echo->lines) reverberate(echo, l);
+  }
+}
+
+// The aperture looks past small obstacles: what a line has lost mixes with its neighbours'. Lines
+// in air send nothing and take no part.
+static void blur_loss(sonde_echo *echo) {
+  float *loss = echo->loss_db, last = loss[0];
+  for (uint32_t l = 1; l + 1 < echo->lines; ++l) {
+    float here = loss[l], left = echo->air[l - 1] ? here : last;
+    float right = echo->air[l + 1] ? here : loss[l + 1];
+    loss[l] += 0.15f * (left - 2 * here + right);
+    last = here;
+  }
+}
+
+void sonde_echo_medium(sonde_echo *echo) {
+  const frame *f = &echo->frame;
+  SONDE_ASSERT(f->pathology != NULL && echo->padded % ECHO_ALIGN == 0);
+  uint32_t lines = echo->padded, reached = 0;
+  float step = (float)(2 * f->depth_m / (SONDE_MEDIUM_ROWS - 1) * f->frequency_hz * 1e-6);
+  tissue_job job = {.row = echo->row,
+                    .lines = lines,
+                    .bone_radius_m = (float)echo->interior->bone_radius_m,
+                    .clot_fraction = (float)f->pathology->thrombus_fraction,
+                    .clot_scatter = 0.12f + 0.9f * (float)f->pathology->echogenicity,
+                    .plain = echo->plain,
+                    .scatter = echo->scatter,
+                    .loss = echo->loss};
+  memset(echo->loss_db, 0, lines * sizeof *echo->loss_db);
+  memset(echo->echo_count, 0, echo->lines);
+  for (uint32_t row = 0; row < SONDE_MEDIUM_ROWS; ++row) {
+    next_row(echo, row, &reached);
+    job.level = echo->level[row % 2];
+    echo->kernels->tissue(&job);
+    if (row == 0) mark_air(echo);
+    blur_loss(echo);
+    if (row > 0) cross_levels(echo, row);
+    for (uint32_t l = 0; l < lines; ++l) echo->scatter[l] = echo->air[l] ? 0 : echo->scatter[l];
+    echo->kernels->fade(echo->scatter, echo->loss_db, echo->gain + row * lines, lines);
+    for (uint32_t l = 0; l < lines; ++l) echo->loss_db[l] += echo->loss[l] * step;
+  }
+}

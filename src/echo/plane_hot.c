@@ -1,0 +1,171 @@
+// The image plane in rest coordinates: where each point of a coarse grid came from, its layers and
+// its place in the vessels' cross-sections. These fields are smooth; later stages interpolate them.
+//
+// sonde_echo_frame, sonde_echo_geometry, sonde_echo_key  constants of a frame, its beam
+// sonde_echo_place, sonde_echo_unplace  image coordinates of a flat or curved face
+// sonde_echo_plane   all nodes, each inverted from the guess that the node above it gives
+// place_node         rest point, and where a step beside the plane leads
+// store_node, store_vessel  fields of one node
+// turn_node          inverse derivative at a node
+#include "base/base.h"
+#include "echo/echo.h"
+
+#include <string.h>
+
+enum { FIRST_ITERATIONS = 24, ITERATIONS = 4 };
+
+static const double far_away = 50; // in semi-axes
+static const double step_beside = 1e-3;
+
+sonde_vec3 sonde_echo_place(const frame *f, double line, double depth_m) {
+  double v = (line - f->first_line) * f->pitch_m;
+  if (!(f->radius_m > 0)) return vec3(v, 0, depth_m);
+  double r = f->radius_m + depth_m, angle = v / f->radius_m;
+  return vec3(r * sin(angle), 0, r * cos(angle) - f->radius_m);
+}
+
+sonde_vec3 sonde_echo_unplace(const frame *f, sonde_vec3 p) {
+  if (!(f->radius_m > 0)) return vec3(p.x / f->pitch_m + f->first_line, p.y, p.z);
+  double z = p.z + f->radius_m, angle = atan2(p.x, z);
+  return vec3(angle * f->radius_m / f->pitch_m + f->first_line, p.y,
+              sqrt(p.x * p.x + z * z) - f->radius_m);
+}
+
+void sonde_echo_geometry(sonde_echo *echo, double aperture_m, const sonde_echo_settings *settings) {
+  SONDE_ASSERT(echo != NULL && settings != NULL && aperture_m > 0);
+  sonde_echo_settings s = sonde_echo_settings_clamp(*settings);
+  frame *f = &echo->frame;
+  f->aperture_m = aperture_m;
+  f->depth_m = s.depth_m;
+  f->pitch_m = aperture_m / (echo->lines - 1);
+  f->step_m = s.depth_m / (echo->samples - 1);
+  f->frequency_hz = s.frequency_hz;
+  f->wavelength_m = sonde_sound_m_s / s.frequency_hz;
+  f->focus_m = s.focus_m;
+  f->settings = s;
+  f->tgc_db_per_m = sonde_echo_default_tgc_db_per_m(s.frequency_hz) + s.tgc_db_per_m;
+  f->first_line = 0.5 * (echo->lines - 1);
+}
+
+beam_key sonde_echo_key(const frame *f) {
+  return (beam_key){f->frequency_hz, f->focus_m, f->depth_m, f->pitch_m, f->step_m, f->radius_m};
+}
+
+void sonde_echo_frame(sonde_echo *echo, sonde_pose world_from_probe, double aperture_m,
+                      const sonde_echo_settings *settings) {
+  sonde_echo_geometry(echo, aperture_m, settings);
+  frame *f = &echo->frame;
+  f->probe = world_from_probe;
+  f->from_world = m_transpose(q_matrix(world_from_probe.rotation));
+  beam_key key = sonde_echo_key(f);
+  if (memcmp(&key, &echo->psf->key, sizeof key) != 0) sonde_psf_build(echo->psf, &key);
+  echo->pad_lines = (uint32_t)echo->psf->half_lines;
+  echo->pad_samples = (uint32_t)echo->psf->half_rows;
+  echo->grid_lines = echo->lines + 2 * echo->pad_lines;
+  echo->grid_samples = echo->samples + 2 * echo->pad_samples;
+  f->edge_lines = echo->pad_lines;
+  echo->lines_per_column = (echo->lines - 1 + 2 * f->edge_lines) / (SONDE_PLANE_COLUMNS - 1);
+  echo->depth_per_row = f->depth_m / (SONDE_PLANE_ROWS - 1);
+  echo->vessels = echo->interior->station_count[0] > 0 || echo->interior->station_count[1] > 0;
+}
+
+static void store_vessel(const sonde_echo *echo, int which, double s, sonde_vec3 point, float *at,
+                         uint32_t node) {
+  plane_field first = which == 0 ? PLANE_VEIN_SHORT : PLANE_ARTERY_SHORT;
+  plane_field halves = which == 0 ? PLANE_VEIN_HALF_SHORT : PLANE_ARTERY_HALF_SHORT;
+  sonde_vessel_state v;
+  double across = far_away, along = far_away, half_short = 1e-3, half_long = 1e-3, clot = 0;
+  if (sonde_vessel_at(echo->interior, which, s, &v)) {
+    sonde_vec3 d = v_sub(point, v.centre_m);
+    along = v_dot(d, v.flat_axis) / v.half_short_m;
+    across = v_dot(d, v_cross(v.axis, v.flat_axis)) / v.half_long_m;
+    half_short = v.half_short_m, half_long = v.half_long_m;
+    clot = which == 0 && sonde_pathology_clot(echo->frame.pathology, v.rest_centre_m.z);
+  }
+  at[first * SONDE_PLANE_NODES + node] = (float)along;
+  at[(first + 1) * SONDE_PLANE_NODES + node] = (float)across;
+  at[halves * SONDE_PLANE_NODES + node] = (float)half_short;
+  at[(halves + 1) * SONDE_PLANE_NODES + node] = (float)half_long;
+  if (which == 0) at[PLANE_CLOT * SONDE_PLANE_NODES + node] = (float)clot;
+}
+
+static void store_node(sonde_echo *echo, uint32_t node, sonde_vec3 point, double theta_centre) {
+  const uint32_t count = SONDE_PLANE_NODES;
+  sonde_column_point at;
+  bool within = sonde_interior_locate(echo->interior, echo->node[node].rest, &at);
+  double turn = at.theta - theta_centre;
+  at.theta -= 2 * SONDE_PI * floor(turn / (2 * SONDE_PI) + 0.5);
+  float *p = echo->plane;
+  p[PLANE_THETA * count + node] = (float)at.theta;
+  p[PLANE_S * count + node] = (float)at.s;
+  p[PLANE_DEPTH * count + node] = within ? (float)at.depth_m : -1;
+  p[PLANE_FAT * count + node] = (float)at.fat_m;
+  p[PLANE_MUSCLE * count + node] = (float)at.muscle_m;
+  p[PLANE_R * count + node] = (float)at.r;
+  for (int which = 0; which < 2; ++which) store_vessel(echo, which, at.s, point, p, node);
+}
+
+// Lines and depth of node (i, j).
+static double line_of(const sonde_echo *echo, double i) {
+  return i * echo->lines_per_column - echo->frame.edge_lines;
+}
+static double depth_of(const sonde_echo *echo, double j) { return j * echo->depth_per_row; }
+
+static void place_node(sonde_echo *echo, uint32_t i, uint32_t j, sonde_vec3 local) {
+  const frame *f = &echo->frame;
+  plane_node *node = &echo->node[j * SONDE_PLANE_COLUMNS + i];
+  sonde_vec3 point = pose_apply(f->probe, local), guess = point;
+  if (j > 0) {
+    sonde_vec3 above = sonde_echo_place(f, line_of(echo, i), depth_of(echo, j - 1.0));
+    sonde_vec3 step = q_rotate(f->probe.rotation, v_sub(local, above));
+    guess = v_add(node[-SONDE_PLANE_COLUMNS].rest, step);
+  }
+  node->rest = sonde_interior_invert(echo->interior, point, guess,
+                                     j > 0 ? ITERATIONS : FIRST_ITERATIONS, NULL);
+  sonde_vec3 beside = v_scale(q_rotate(f->probe.rotation, vec3(0, 1, 0)), step_beside);
+  sonde_vec3 here = sonde_interior_field(echo->interior, node->rest);
+  sonde_vec3 there = sonde_interior_field(echo->interior, v_add(node->rest, beside));
+  sonde_vec3 moved = v_add(beside, v_sub(there, here));
+  sonde_vec3 end = v_add(local, m_mul_v(f->from_world, moved));
+  sonde_vec3 at = sonde_echo_unplace(f, end), from = sonde_echo_unplace(f, local);
+  node->side =
+      vec3((at.x - from.x) / echo->lines_per_column / step_beside, (at.y - from.y) / step_beside,
+           (at.z - from.z) / echo->depth_per_row / step_beside);
+  store_node(echo, j * SONDE_PLANE_COLUMNS + i, point, echo->theta_centre);
+}
+
+// Rest steps per column, per metre beside the plane and per row, from neighbouring nodes and the
+// step beside; inverted.
+static void turn_node(sonde_echo *echo, uint32_t i, uint32_t j) {
+  const uint32_t wide = SONDE_PLANE_COLUMNS;
+  plane_node *node = &echo->node[j * wide + i];
+  uint32_t left = i > 0 ? 1 : 0, right = i + 1 < wide ? 1 : 0;
+  uint32_t up = j > 0 ? 1 : 0, down = j + 1 < SONDE_PLANE_ROWS ? 1 : 0;
+  sonde_vec3 a = v_scale(v_sub(node[right].rest, (node - left)->rest), 1.0 / (left + right));
+  sonde_vec3 b =
+      v_scale(v_sub(node[down * wide].rest, (node - up * wide)->rest), 1.0 / (up + down));
+  sonde_vec3 beside = q_rotate(echo->frame.probe.rotation, vec3(0, 1, 0));
+  double y = fabs(node->side.y) > 0.2 ? node->side.y : 0.2;
+  sonde_vec3 c = v_scale(v_madd(v_madd(beside, -node->side.x, a), -node->side.z, b), 1 / y);
+  // Rows of the inverse are the crossed columns over the volume.
+  sonde_vec3 bc = v_cross(c, b), ca = v_cross(b, a), ab = v_cross(a, c);
+  double volume = v_dot(a, bc), least = 1e-3 * v_norm(a) * v_norm(b) * v_norm(c);
+  if (fabs(volume) < least) volume = volume < 0 ? -least : least;
+  double k = volume != 0 ? 1 / volume : 0;
+  node->in = (sonde_mat3){{{bc.x * k, bc.y * k, bc.z * k},
+                           {ca.x * k, ca.y * k, ca.z * k},
+                           {ab.x * k, ab.y * k, ab.z * k}}};
+}
+
+void sonde_echo_plane(sonde_echo *echo) {
+  SONDE_ASSERT(echo->frame.pathology != NULL && echo->frame.depth_m > 0);
+  const frame *f = &echo->frame;
+  sonde_column_point centre;
+  (void)sonde_interior_locate(echo->interior, f->probe.position, &centre);
+  echo->theta_centre = centre.theta;
+  for (uint32_t j = 0; j < SONDE_PLANE_ROWS; ++j)
+    for (uint32_t i = 0; i < SONDE_PLANE_COLUMNS; ++i)
+      place_node(echo, i, j, sonde_echo_place(f, line_of(echo, i), depth_of(echo, j)));
+  for (uint32_t j = 0; j < SONDE_PLANE_ROWS; ++j)
+    for (uint32_t i = 0; i < SONDE_PLANE_COLUMNS; ++i) turn_node(echo, i, j);
+}

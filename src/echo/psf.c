@@ -1,0 +1,202 @@
+// Point response of rank three.
+//
+// The exact response at one depth is a matrix, lines by samples. Along depth every row of it is a
+// sum of delayed pulses; three real kernels span these well for all depths at once. They are the
+// leading singular vectors of all bands' rows together, found by subspace iteration from the pulse
+// and its derivatives. What is left per band are the three complex lateral kernels.
+//
+// sonde_psf_build   all of it
+// tabulate          exact responses of a band
+// sharpen           takes off what the two-tap splat widens
+// gram, iterate     shared axial kernels
+// orthonormalise    Gram-Schmidt
+// project           lateral kernels of a band, their reach
+#include "echo/psf.h"
+
+#include "base/base.h"
+#include "base/maths.h"
+#include "echo/echo.h"
+
+#include <string.h>
+
+enum { ROWS = 2 * SONDE_MOST_TAPS + 1, ITERATIONS = 40 };
+
+static const double first_depth_m = 1.5e-3;
+static const double lost = 2e-3; // energy share beyond the kernel's reach
+
+sonde_array sonde_beam_array(const beam_key *key) {
+  sonde_array a = sonde_array_default();
+  a.frequency_hz = key->frequency_hz;
+  a.focus_m = key->focus_m;
+  a.radius_m = key->radius_m;
+  return a;
+}
+
+double sonde_psf_band(const beam_psf *psf, double depth_m, int *band) {
+  int b = 0;
+  while (b < SONDE_BANDS - 2 && depth_m > psf->depth_m[b + 1]) ++b;
+  *band = b;
+  return clamp((depth_m - psf->depth_m[b]) / (psf->depth_m[b + 1] - psf->depth_m[b]), 0, 1);
+}
+
+static void tabulate(beam_psf *psf, const sonde_array *array, int b) {
+  SONDE_ASSERT(b >= 0 && b < SONDE_BANDS);
+  const beam_key *key = &psf->key;
+  double z = psf->depth_m[b], k = 2 * SONDE_PI * key->frequency_hz / sonde_sound_m_s;
+  int rows = 2 * psf->half_rows + 1;
+  for (int l = 0; l <= psf->half_lines; ++l) {
+    double x = l * key->pitch_m, depth = z;
+    if (key->radius_m > 0) {
+      double angle = x / key->radius_m;
+      x = (key->radius_m + z) * sin(angle);
+      depth = (key->radius_m + z) * cos(angle) - key->radius_m;
+    }
+    double *out = psf->table[b][l], c = cos(2 * k * z), s = sin(2 * k * z);
+    sonde_array_line(array, x, depth, z - psf->half_rows * key->step_m, key->step_m, (uint32_t)rows,
+                     out);
+    for (int n = 0; n < rows; ++n) { // the splat brings the carrier's phase
+      double re = out[2 * n], im = out[2 * n + 1];
+      out[2 * n] = re * c - im * s, out[2 * n + 1] = re * s + im * c;
+    }
+  }
+}
+
+static double weight_of(int line) { return line == 0 ? 1 : 2; } // both sides
+
+// Scales a band to unit energy.
+static void normalise(beam_psf *psf, int b) {
+  int width = 2 * (2 * psf->half_rows + 1);
+  double energy = 0;
+  for (int l = 0; l <= psf->half_lines; ++l)
+    for (int i = 0; i < width; ++i)
+      energy += weight_of(l) * psf->table[b][l][i] * psf->table[b][l][i];
+  double scale = energy > 0 ? 1 / sqrt(energy) : 0;
+  for (int l = 0; l <= psf->half_lines; ++l)
+    for (int i = 0; i < width; ++i) psf->table[b][l][i] *= scale;
+}
+
+// The triangle of two taps widens by a variance of 1/6 along either direction: to second order the
+// inverse takes a twelfth of the second difference away.
+static void sharpen(beam_psf *psf, int b) {
+  int rows = 2 * psf->half_rows + 1;
+  double line[2 * ROWS], last[2 * ROWS], copy[2 * ROWS];
+  for (int l = 0; l <= psf->half_lines; ++l) {
+    double *p = psf->table[b][l];
+    memcpy(line, p, sizeof(double) * 2 * (size_t)rows);
+    for (int i = 2; i < 2 * rows - 2; ++i) p[i] -= (line[i - 2] - 2 * line[i] + line[i + 2]) / 12;
+  }
+  memcpy(last, psf->table[b][1], sizeof last); // mirror
+  for (int l = 0; l < psf->half_lines; ++l) {
+    double *p = psf->table[b][l];
+    const double *next = psf->table[b][l + 1];
+    memcpy(copy, p, sizeof copy);
+    for (int i = 0; i < 2 * rows; ++i) p[i] -= (last[i] - 2 * p[i] + next[i]) / 12;
+    memcpy(last, copy, sizeof last);
+  }
+}
+
+static void gram(const beam_psf *psf, double g[ROWS][ROWS]) {
+  int rows = 2 * psf->half_rows + 1;
+  for (int i = 0; i < rows; ++i)
+    for (int j = 0; j < rows; ++j) g[i][j] = 0;
+  for (int b = 0; b < SONDE_BANDS; ++b)
+    for (int l = 0; l <= psf->half_lines; ++l) {
+      const double *p = psf->table[b][l];
+      double w = weight_of(l);
+      for (int i = 0; i < rows; ++i)
+        for (int j = 0; j <= i; ++j)
+          g[i][j] += w * (p[2 * i] * p[2 * j] + p[2 * i + 1] * p[2 * j + 1]);
+    }
+  for (int i = 0; i < rows; ++i)
+    for (int j = 0; j < i; ++j) g[j][i] = g[i][j];
+}
+
+static void orthonormalise(double v[SONDE_RANK][ROWS], int rows) {
+  for (int k = 0; k < SONDE_RANK; ++k) {
+    for (int m = 0; m < k; ++m) {
+      double dot = 0;
+      for (int i = 0; i < rows; ++i) dot += v[k][i] * v[m][i];
+      for (int i = 0; i < rows; ++i) v[k][i] -= dot * v[m][i];
+    }
+    double norm = 0;
+    for (int i = 0; i < rows; ++i) norm += v[k][i] * v[k][i];
+    SONDE_ASSERT(norm > 0);
+    for (int i = 0; i < rows; ++i) v[k][i] /= sqrt(norm);
+  }
+}
+
+static void iterate(beam_psf *psf, double g[ROWS][ROWS]) {
+  int rows = 2 * psf->half_rows + 1;
+  double product[SONDE_RANK][ROWS];
+  sonde_array a = sonde_beam_array(&psf->key);
+  double sigma = a.pulse_wavelengths * a.sound_m_s / a.frequency_hz / 2.35482 / psf->key.step_m;
+  for (int i = 0; i < rows; ++i) {
+    double x = (i - psf->half_rows) / sigma, e = exp(-0.5 * x * x);
+    psf->axial[0][i] = e, psf->axial[1][i] = x * e, psf->axial[2][i] = (x * x - 1) * e;
+  }
+  orthonormalise(psf->axial, rows);
+  for (int step = 0; step < ITERATIONS; ++step) {
+    for (int k = 0; k < SONDE_RANK; ++k)
+      for (int i = 0; i < rows; ++i) {
+        double sum = 0;
+        for (int j = 0; j < rows; ++j) sum += g[i][j] * psf->axial[k][j];
+        product[k][i] = sum;
+      }
+    memcpy(psf->axial, product, sizeof product);
+    orthonormalise(psf->axial, rows);
+  }
+  for (int k = 0; k < SONDE_RANK; ++k) {
+    psf->pulse[k] = 0;
+    for (int i = 0; i < rows; ++i) {
+      double x = (i - psf->half_rows) / sigma;
+      psf->pulse[k] += psf->axial[k][i] * exp(-0.5 * x * x);
+    }
+  }
+}
+
+static void project(beam_psf *psf, int b) {
+  int rows = 2 * psf->half_rows + 1;
+  double energy = 0, kept[SONDE_MOST_TAPS + 1], whole = 0;
+  for (int l = 0; l <= psf->half_lines; ++l) {
+    const double *p = psf->table[b][l];
+    kept[l] = 0;
+    for (int i = 0; i < 2 * rows; ++i) whole += weight_of(l) * p[i] * p[i];
+    for (int k = 0; k < SONDE_RANK; ++k) {
+      double re = 0, im = 0;
+      for (int i = 0; i < rows; ++i)
+        re += p[2 * i] * psf->axial[k][i], im += p[2 * i + 1] * psf->axial[k][i];
+      psf->lateral[b][k][l][0] = re, psf->lateral[b][k][l][1] = im;
+      kept[l] += weight_of(l) * (re * re + im * im);
+    }
+    energy += kept[l];
+  }
+  psf->share[b] = energy / whole;
+  double beyond = 0;
+  int half = psf->half_lines;
+  while (half > 1 && beyond + kept[half] < lost * energy) beyond += kept[half--];
+  psf->half[b] = half;
+}
+
+static int taps(double reach_m, double step_m) {
+  return (int)clamp(ceil(reach_m / step_m), 3, SONDE_MOST_TAPS);
+}
+
+void sonde_psf_build(beam_psf *psf, const beam_key *key) {
+  SONDE_ASSERT(psf != NULL && key->pitch_m > 0 && key->step_m > 0 && key->depth_m > 0);
+  double wavelength = sonde_sound_m_s / key->frequency_hz, g[ROWS][ROWS];
+  sonde_array array = sonde_beam_array(key);
+  psf->key = *key;
+  psf->half_lines = taps(12 * wavelength, key->pitch_m);
+  psf->half_rows = taps(2.3 * wavelength, key->step_m);
+  for (int b = 0; b < SONDE_BANDS; ++b) {
+    double t = (double)b / (SONDE_BANDS - 1);
+    psf->depth_m[b] = first_depth_m + (key->depth_m - first_depth_m) * t * sqrt(t);
+    psf->elevation_m[b] = sonde_array_elevation_half(&array, psf->depth_m[b]);
+    tabulate(psf, &array, b);
+    normalise(psf, b);
+    sharpen(psf, b);
+  }
+  gram(psf, g);
+  iterate(psf, g);
+  for (int b = 0; b < SONDE_BANDS; ++b) project(psf, b);
+}

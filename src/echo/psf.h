@@ -1,0 +1,41 @@
+// The beam's point response as three products of a lateral and an axial kernel.
+#ifndef SONDE_SRC_ECHO_PSF_H
+#define SONDE_SRC_ECHO_PSF_H
+
+#include "sonde/echo_reference.h"
+
+enum {
+  SONDE_RANK = 3,
+  SONDE_BANDS = 24,    // depths at which the response is known
+  SONDE_MOST_TAPS = 48 // half width of a kernel, lines or samples
+};
+
+// What a beam depends on.
+typedef struct beam_key {
+  double frequency_hz, focus_m, depth_m, pitch_m, step_m, radius_m;
+} beam_key;
+
+// Around a scatterer between lines and samples the response is
+// sum over k of lateral[band][k][|line|] axial[k][sample]; the axial kernels are the same
+// everywhere, so the lateral ones interpolate between bands.
+typedef struct beam_psf {
+  beam_key key;
+  int half_lines, half_rows; // reach of the kernels
+  double depth_m[SONDE_BANDS], elevation_m[SONDE_BANDS];
+  int half[SONDE_BANDS]; // lines needed at that depth
+  double lateral[SONDE_BANDS][SONDE_RANK][SONDE_MOST_TAPS + 1][2];
+  double axial[SONDE_RANK][2 * SONDE_MOST_TAPS + 1]; // orthonormal
+  double pulse[SONDE_RANK];                          // of a plain pulse with peak 1
+  double share[SONDE_BANDS];                         // energy of the response that rank 3 keeps
+  // scratch of the build: response at [lines 0..][rows][2]
+  double table[SONDE_BANDS][SONDE_MOST_TAPS + 1][2 * (2 * SONDE_MOST_TAPS + 1)];
+} beam_psf;
+
+// The array that belongs to a key.
+sonde_array sonde_beam_array(const beam_key *key);
+// No allocation.
+void sonde_psf_build(beam_psf *psf, const beam_key *key);
+// Fraction of the way from band *band to the next.
+double sonde_psf_band(const beam_psf *psf, double depth_m, int *band);
+
+#endif
