@@ -3,6 +3,7 @@
 #include "app.h"
 #include "bench_ellipsoid.h"
 #include "bench_haptics.h"
+#include "bench_image.h"
 
 #include <getopt.h>
 #include <math.h>
@@ -23,6 +24,7 @@ static const char HELP[] =
     "                 ellipsoid  the scene that engines are compared on: a ball of 30 mm pressed\n"
     "                        20 mm into a soft ellipsoid in 0.1 s, held to 0.3 s, slid to 0.5 s;\n"
     "                        no model is read\n"
+    "                 image  echographic frames; sonde bench --scene image --help\n"
     "  --nodes N      of the ellipsoid, 42 to 1000000; default 7842\n"
     "  --stiffness K  of its surface springs, 1 to 1e6 N/m; default 200\n"
     "  --size S       of the ellipsoid, 0.5 to 20; default 1: 0.20 x 0.08 x 0.08 m\n"
@@ -95,7 +97,7 @@ static bool is_ellipsoid(const options *o) { return strcmp(o->scene->name, "elli
 static int read_scene(options *o, const char *name) {
   o->scene = find_scene(name);
   if (o->scene) return -1;
-  return app_usage_error("bench", "unknown scene '%s', expected press, point, slide or ellipsoid",
+  return app_usage_error("bench", "unknown scene '%s', expected press, point, slide, ellipsoid or image",
                          name);
 }
 
@@ -428,6 +430,7 @@ static sonde_status load(const options *o, sonde_model **model, sonde_error *err
 }
 
 int cmd_bench(int argc, char **argv) {
+  if (bench_image_asked(argc, argv)) return bench_image(argc, argv);
   options o = {.scene = &SCENES[0],
                .ellipsoid = {7842, 200, 1},
                .engine = SONDE_ENGINE_FAST,

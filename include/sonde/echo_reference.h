@@ -44,7 +44,7 @@ SONDE_API void sonde_array_line(const sonde_array *array, double x_m, double z_m
  *  lens-focused elevation aperture, squared. @thread any */
 SONDE_API double sonde_array_elevation(const sonde_array *array, double y_m, double z_m);
 
-/** Half width h of the kernel (1 - (y/h)^2)^2 with the half values of sonde_array_elevation(). */
+/** Half width h of the kernel 1 - (y/h)^2 with the half values of sonde_array_elevation(). */
 SONDE_API double sonde_array_elevation_half(const sonde_array *array, double z_m);
 
 /** A unit scatterer in the plane or beside it, probe frame. */

@@ -20,17 +20,17 @@ static float *ring_row(const sonde_echo *echo, uint32_t row) {
 }
 
 // Rms of the splatted field per line and sample: scatterers weighted by the elevation kernel's
-// energy (integral of (1 - y^2)^4 over [-1, 1] is 256/315).
+// energy (integral of (1 - y^2)^2 over [-1, 1] is 16/15)^4 over [-1, 1] is 256/315).
 static double field_rms(const sonde_echo *echo, double depth_m, double half_m) {
   const frame *f = &echo->frame;
   double density = echo->per_cell / (echo->cell_m * echo->cell_m * echo->cell_m);
   double pitch = f->pitch_m * (f->radius_m > 0 ? 1 + fmax(depth_m, 0) / f->radius_m : 1);
-  return sqrt(density * pitch * f->step_m * half_m * 256.0 / 315.0);
+  return sqrt(density * pitch * f->step_m * half_m * 16.0 / 15.0);
 }
 
 static void gain_row(sonde_echo *echo, uint32_t sample, bool tissue) {
-  const float *in = echo->grid + (size_t)sample * 2 * echo->grid_lines;
-  float gain[SONDE_MOST_LINES + 2 * SONDE_MOST_TAPS];
+  const float *in = echo->grid + (size_t)sample * 4 * echo->grid_lines;
+  float gain[SONDE_MOST_LINES + 2 * SONDE_MOST_TAPS + ECHO_ALIGN] = {0};
   uint32_t pad = echo->pad_lines, count = echo->grid_lines;
   SONDE_ASSERT(count <= SONDE_COUNT_OF(gain));
   double at = ((double)sample - echo->pad_samples) / (echo->samples - 1) * (SONDE_MEDIUM_ROWS - 1);
@@ -44,10 +44,7 @@ static void gain_row(sonde_echo *echo, uint32_t sample, bool tissue) {
     gain[l] = gain[pad];
     gain[echo->lines + pad + l] = gain[echo->lines + pad - 1];
   }
-  for (uint32_t l = 0; l < count; ++l) {
-    echo->line_re[l] = gain[l] * in[2 * l];
-    echo->line_im[l] = gain[l] * in[2 * l + 1];
-  }
+  echo->kernels->merge(in, gain, echo->line_re, echo->line_im, count);
 }
 
 static void lateral_row(sonde_echo *echo, uint32_t sample, bool tissue) {
@@ -78,19 +75,20 @@ static void lateral_row(sonde_echo *echo, uint32_t sample, bool tissue) {
 static void add_specular(sonde_echo *echo, uint32_t sample) {
   const frame *f = &echo->frame;
   float *row = ring_row(echo, sample);
-  double place = (double)sample - echo->pad_samples;
-  for (uint32_t l = 0; l < echo->lines; ++l)
-    for (uint32_t e = 0; e < echo->echo_count[l]; ++e) {
-      specular s = echo->echoes[l * SONDE_MAX_ECHOES + e];
-      double share = 1 - fabs(s.depth_m / f->step_m - place);
-      if (!(share > 0)) continue;
-      double angle = -4 * SONDE_PI * s.depth_m / f->wavelength_m;
-      double re = share * s.amplitude * cos(angle), im = share * s.amplitude * sin(angle);
+  int64_t place = (int64_t)sample - echo->pad_samples;
+  for (int64_t list = place - 1; list <= place; ++list) {
+    if (list < 0 || list >= echo->samples) continue;
+    for (int32_t e = echo->first_echo[list]; e >= 0; e = echo->echoes[e].next) {
+      const specular *s = &echo->echoes[e];
+      double depth = (double)s->depth_m, share = 1 - fabs(depth / f->step_m - (double)place);
+      double angle = -4 * SONDE_PI * depth / f->wavelength_m, size = share * (double)s->amplitude;
       for (uint32_t k = 0; k < SONDE_RANK; ++k) {
-        row[2 * k * echo->padded + l] += (float)(re * echo->psf->pulse[k]);
-        row[(2 * k + 1) * echo->padded + l] += (float)(im * echo->psf->pulse[k]);
+        double pulse = size * echo->psf->pulse[k];
+        row[2 * k * echo->padded + s->line] += (float)(pulse * cos(angle));
+        row[(2 * k + 1) * echo->padded + s->line] += (float)(pulse * sin(angle));
       }
     }
+  }
 }
 
 static void axial_row(sonde_echo *echo, axial_job *job, uint32_t sample, bool tissue) {

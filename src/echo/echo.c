@@ -17,8 +17,7 @@ enum {
   SAMPLES = 1024,
   MOST_SAMPLES = 4096,
   MOST_PER_CELL = 4096,
-  LOOSE_ROOM = MOST_PER_CELL / 8,
-  STEP = 8 * ECHO_ALIGN, // scatterers of a cube come in eighths of whole vectors
+  STEP = 64, // scatterers of a cube come in layers of 8 x 8
 };
 
 static const double default_density_m3 = 32e9;
@@ -48,17 +47,19 @@ sonde_echo_settings sonde_echo_settings_clamp(sonde_echo_settings s) {
       .tgc_db_per_m = bounded(s.tgc_db_per_m, -5000, 5000, d.tgc_db_per_m)};
 }
 
-static float place(uint64_t seed, uint64_t i) {
-  return (float)(sonde_random_uniform(seed, i) - 0.5);
-}
-
-static void fill_pool(const scatter_pool *pool, uint64_t seed, uint32_t count, uint32_t room) {
-  for (uint64_t i = 0; i < room; ++i) {
-    uint64_t j = i % count; // a piece may run over the end
-    pool->x[i] = place(seed, 4 * j + 1);
-    pool->y[i] = place(seed, 4 * j + 2);
-    pool->z[i] = place(seed, 4 * j + 3);
-    pool->sign[i] = sonde_random_bits(seed, 4 * j) & (1u << 20) ? 1.0f : -1.0f;
+// Jittered grid: one scatterer per box of side[0] x side[1] x side[2] boxes. Fewer by chance in one
+// place and more in another would make the speckle's contrast depend on the density.
+static void fill_share(const scatter_pool *pool, uint64_t seed, uint32_t first,
+                       const uint32_t side[3]) {
+  uint32_t layer = side[0] * side[1];
+  for (uint32_t i = 0; i < layer * side[2]; ++i) {
+    uint64_t j = 4 * (uint64_t)(first + i);
+    uint32_t box[3] = {i % side[0], i / side[0] % side[1], i / layer};
+    float at[3];
+    for (uint32_t c = 0; c < 3; ++c)
+      at[c] = (float)((box[c] + sonde_random_uniform(seed, j + 1 + c)) / side[c] - 0.5);
+    pool->x[first + i] = at[0], pool->y[first + i] = at[1], pool->z[first + i] = at[2];
+    pool->sign[first + i] = sonde_random_bits(seed, j) & (1u << 20) ? 1.0f : -1.0f;
   }
 }
 
@@ -68,17 +69,22 @@ static int by_value(const void *a, const void *b) {
 }
 
 // In each cube's share the scatterers come in order of z, along the leg: the slab of a transverse
-// plane then takes or leaves whole vectors of them. The other coordinates do not depend on z, so
-// that z alone is sorted.
-static void sort_pool(sonde_echo *echo) {
-  for (uint32_t first = 0; first + echo->per_cell <= SONDE_POOL; first += echo->per_cell)
-    qsort(echo->pool.z + first, echo->per_cell, sizeof(float), by_value);
+// plane then takes or leaves whole vectors of them. Within a layer the other coordinates do not
+// depend on z, so that z alone is sorted.
+static void fill_pools(sonde_echo *echo) {
+  const uint32_t whole[3] = {8, 8, echo->per_cell / 64}, piece[3] = {4, 4, echo->per_piece / 16};
+  for (uint32_t i = 0; i + echo->per_cell <= SONDE_POOL; i += echo->per_cell) {
+    fill_share(&echo->pool, echo->seed, i, whole);
+    for (uint32_t layer = 0; layer < whole[2]; ++layer)
+      qsort(echo->pool.z + i + 64 * layer, 64, sizeof(float), by_value);
+  }
+  uint32_t each = echo->per_piece;
+  for (uint32_t i = 0; i + each <= SONDE_LOOSE; i += each)
+    fill_share(&echo->loose, echo->seed + 5, i, piece);
 }
 
 static void fill_tables(sonde_echo *echo) {
-  fill_pool(&echo->pool, echo->seed, SONDE_POOL, SONDE_POOL);
-  fill_pool(&echo->loose, echo->seed + 5, SONDE_LOOSE, SONDE_LOOSE + LOOSE_ROOM);
-  sort_pool(echo);
+  fill_pools(echo);
   for (uint64_t i = 0; i < SONDE_NOISE; ++i)
     echo->noise[i] = (float)(sonde_random_normal(echo->seed + 1, i) * sqrt(0.5));
 }
@@ -107,9 +113,9 @@ static bool allocate(sonde_echo *echo) {
   echo->gain = SONDE_NEW(float, lines *SONDE_MEDIUM_ROWS);
   echo->loss_db = SONDE_NEW(float, lines);
   echo->air = SONDE_NEW(uint8_t, lines);
-  echo->echo_count = SONDE_NEW(uint8_t, lines);
-  echo->echoes = SONDE_NEW(specular, lines * SONDE_MAX_ECHOES);
-  echo->grid = SONDE_NEW(float, 2 * most_lines * most_samples);
+  echo->echoes = SONDE_NEW(specular, SONDE_MAX_ECHOES);
+  echo->first_echo = SONDE_NEW(int32_t, echo->samples);
+  echo->grid = SONDE_NEW(float, 4 * most_lines * most_samples);
   echo->line_re = SONDE_NEW(float, most_lines);
   echo->line_im = SONDE_NEW(float, most_lines);
   echo->ring = SONDE_NEW(float, lines *RING_PLANES *(2 * SONDE_MOST_TAPS + 1));
@@ -120,10 +126,10 @@ static bool allocate(sonde_echo *echo) {
   echo->cell_key = SONDE_NEW(uint64_t, SONDE_CELL_SET);
   echo->cell_stamp = SONDE_NEW(uint32_t, SONDE_CELL_SET);
   bool pools = allocate_pool(&echo->pool, SONDE_POOL);
-  pools = allocate_pool(&echo->loose, SONDE_LOOSE + LOOSE_ROOM) && pools;
+  pools = allocate_pool(&echo->loose, SONDE_LOOSE) && pools;
   return pools && echo->psf && echo->node && echo->plane && echo->wide && echo->row &&
          echo->level[0] && echo->level[1] && echo->scatter && echo->loss && echo->gain &&
-         echo->loss_db && echo->air && echo->echo_count && echo->echoes && echo->grid &&
+         echo->loss_db && echo->air && echo->first_echo && echo->echoes && echo->grid &&
          echo->line_re && echo->line_im && echo->ring && echo->envelope && echo->flat_envelope &&
          echo->grey && echo->noise && echo->cell_key && echo->cell_stamp;
 }
@@ -163,7 +169,8 @@ sonde_status sonde_echo_create(const sonde_interior *interior, const sonde_echo_
   made->plain = def->plain;
   made->cell_m = cell_size_m;
   double per_cell = made->density_m3 * cell_size_m * cell_size_m * cell_size_m;
-  made->per_cell = (uint32_t)clamp(STEP * ceil(per_cell / STEP), STEP, MOST_PER_CELL);
+  made->per_cell = (uint32_t)clamp(STEP * floor(per_cell / STEP + 0.5), 2 * STEP, MOST_PER_CELL);
+  made->per_piece = (made->per_cell / 8 + ECHO_ALIGN - 1) / ECHO_ALIGN * ECHO_ALIGN;
   if (!allocate(made)) {
     sonde_echo_destroy(made);
     return sonde_fail_memory(error);
@@ -178,7 +185,7 @@ void sonde_echo_destroy(sonde_echo *echo) {
   void *parts[] = {echo->psf,        echo->node,     echo->plane,         echo->wide,
                    echo->row,        echo->level[0], echo->level[1],      echo->scatter,
                    echo->loss,       echo->gain,     echo->loss_db,       echo->air,
-                   echo->echo_count, echo->echoes,   echo->grid,          echo->line_re,
+                   echo->first_echo, echo->echoes,   echo->grid,          echo->line_re,
                    echo->line_im,    echo->ring,     echo->noise,         echo->cell_key,
                    echo->envelope,   echo->grey,     echo->flat_envelope, echo->pool.x,
                    echo->pool.y,     echo->pool.z,   echo->loose.x,       echo->pool.sign,

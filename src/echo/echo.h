@@ -14,10 +14,10 @@ enum {
   SONDE_PLANE_COLUMNS = 25, // coarse nodes across the lines
   SONDE_PLANE_ROWS = 57,    // and down
   SONDE_PLANE_NODES = SONDE_PLANE_COLUMNS * SONDE_PLANE_ROWS,
-  SONDE_MEDIUM_ROWS = 256, // steps of the march along the lines
-  SONDE_MAX_ECHOES = 24,   // specular echoes per line
-  SONDE_POOL = 32768,      // random scatterers shared by all cells
-  SONDE_LOOSE = 8192,      // the same for pieces of cells
+  SONDE_MEDIUM_ROWS = 256,                  // steps of the march along the lines
+  SONDE_MAX_ECHOES = 24 * SONDE_MOST_LINES, // specular echoes
+  SONDE_POOL = 32768,                       // random scatterers shared by all cells
+  SONDE_LOOSE = 8192,                       // the same for pieces of cells
   SONDE_NOISE = 65536,
   SONDE_CELL_SET = 32768, // hash set of visited cells
   SONDE_MAX_CELLS = 24000,
@@ -25,10 +25,9 @@ enum {
 
 typedef struct specular {
   float depth_m, amplitude;
+  uint32_t line;
+  int32_t next; // in the list of its sample, -1 at the end
 } specular;
-
-// Scatterers of an eighth of a cube, in whole vectors.
-#define SONDE_PIECE(per_cell) (((per_cell) / 8 + ECHO_ALIGN - 1) / ECHO_ALIGN * ECHO_ALIGN)
 
 // What the stages of one frame share.
 typedef struct frame {
@@ -63,27 +62,31 @@ struct sonde_echo {
   uint32_t padded; // lines in whole vectors
   uint32_t grid_lines, grid_samples, pad_lines, pad_samples;
   double density_m3, cell_m;
-  uint32_t per_cell;
+  uint32_t per_cell, per_piece; // scatterers of a cube and of an eighth of it
   uint64_t seed;
   bool plain; // no texture
   frame frame;
   double theta_centre;
+  uint16_t line_column[SONDE_MOST_LINES]; // coarse column left of each line
+  float line_share[SONDE_MOST_LINES];     // way to the next
   double lines_per_column, depth_per_row; // of the coarse plane; depth in m
   bool vessels;                           // any
   beam_psf *psf;
-  plane_node *node;    // [PLANE_NODES]
-  float *plane;        // [PLANE_FIELDS][PLANE_NODES]
-  float *wide;         // [2][PLANE_FIELDS][padded] two coarse rows, per line
-  float *row;          // [PLANE_FIELDS][padded], one row of the march
-  float *level[2];     // [LEVELS][padded] of this row and the last
-  float *scatter;      // [padded] of this row
-  float *loss;         // [padded] of this row
-  float *gain;         // [MEDIUM_ROWS][padded]
-  float *loss_db;      // [padded] accumulated
-  uint8_t *air;        // [padded]
-  uint8_t *echo_count; // [lines]
-  specular *echoes;    // [lines*MAX_ECHOES]
-  float *grid;         // [grid_samples][grid_lines][2] scattered field
+  plane_node *node; // [PLANE_NODES]
+  float *plane;     // [PLANE_FIELDS][PLANE_NODES]
+  float *wide;      // [2][PLANE_FIELDS][padded] two coarse rows, per line
+  float *row;       // [PLANE_FIELDS][padded], one row of the march
+  float *level[2];  // [LEVELS][padded] of this row and the last
+  float *scatter;   // [padded] of this row
+  float *loss;      // [padded] of this row
+  float *gain;      // [MEDIUM_ROWS][padded]
+  float *loss_db;   // [padded] accumulated
+  uint8_t *air;     // [padded]
+  bool some_air;
+  specular *echoes; // [MAX_ECHOES]
+  uint32_t echo_count;
+  int32_t *first_echo; // [samples] list of the echoes between this sample and the next
+  float *grid;         // [grid_samples][grid_lines][4] scattered field, kernel.h
   float *line_re;      // one row of it with its gain: [grid_lines]
   float *line_im;
   float *ring;          // [2*MOST_TAPS+1][RING_PLANES][padded]

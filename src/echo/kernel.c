@@ -1,10 +1,12 @@
 // Inner loops of the image; kernel_*_hot.c include this file once per instruction set.
 //
 // splat     scatterers through one affine map into four cells each, carrier phase included
+// splat_some  the same, with or without checks at the grid's border
 // lay       one vector of them, in order
 // lateral   symmetric complex kernels of rank three on one row
 // axial     real kernels down the rows, noise, compensation, modulus, logarithm
 // tissue    in kernel_tissue.h
+// merge     shares of neighbouring lines add up
 // fade      attenuation of a row
 // convert   bilinear scan conversion of one row of pixels
 #include "echo/kernel_vector.h"
@@ -13,49 +15,69 @@
 #include "echo/kernel.h"
 #include "echo/kernel_tissue.h"
 
-// cos and sin of 2 pi t, error 1e-5.
+// cos and sin of 2 pi t for t >= 0, error 3e-4.
 INLINE void turn(vf t, vf *c, vf *s) {
-  vf f = t - below(t + 0.5f), u = f * f;
-  vf p = -85.271621534316f + u * (58.79049212019015f + u * -21.07110562771558f);
-  *c = 0.999999210782323f + u * (-19.738980355764085f + u * (64.92865742103521f + u * p));
-  vf q = 81.44770647022276f + u * (-74.90941970418099f + u * 33.54835514514125f);
-  *s = f * (6.283161129486121f + u * (-41.336831830827336f + u * q));
+  vf f = t - real(whole(t + 0.5f)), u = f * f;
+  *c = 0.9999590208378121f +
+       u * (-19.73094236686188f +
+            u * (64.6714417761651f + u * (-82.39080631177367f + u * 45.62105110286211f)));
+  *s = f * (6.282137314937016f +
+            u * (-41.205783568541634f + u * (78.82674122450844f + u * -58.13524213160963f)));
 }
 
 INLINE void lay(const splat_job *job, const float *record, const int32_t *cell, const float *part) {
-  for (int j = 0; j < W; ++j) {
-    float *top = job->grid + cell[j], *low = top + job->stride;
-    v4 value = load4(record + 4 * slot_of_lane(j)), deep = part[j] * value;
-    store4(top, load4(top) + (value - deep));
-    store4(low, load4(low) + deep);
-  }
+  for (int block = 0; block < W / 4; ++block)
+    for (int k = 0; k < 4; ++k) { // lane order, see records()
+      int j = 4 * block + k;
+      float *top = job->grid + cell[j], *low = top + job->stride;
+      v4 value = load4(record + 4 * (k * (W / 4) + block)), deep = part[j] * value;
+      store4(top, load4(top) + (value - deep));
+      store4(low, load4(low) + deep);
+    }
 }
 
-static void splat(const splat_job *job) {
-  SONDE_ASSERT(job->count % ECHO_ALIGN == 0);
-  const float(*m)[3] = job->m;
+INLINE vf along(const splat_job *job, int c, vf x, vf y, vf z) {
+  return job->m[0][c] + job->m[1][c] * x + job->m[2][c] * y + job->m[3][c] * z;
+}
+
+INLINE void splat_some(const splat_job *job, bool inside) {
   float record[4 * W], part[W];
   int32_t cell[W];
   for (uint32_t i = 0; i < job->count; i += W) {
     vf x = load(job->x + i), y = load(job->y + i), z = load(job->z + i);
-    vf side = m[0][1] + m[1][1] * x + m[2][1] * y + m[3][1] * z;
-    vf height = 1 - side * side;
-    vf line = m[0][0] + m[1][0] * x + m[2][0] * y + m[3][0] * z;
-    vf depth = m[0][2] + m[1][2] * x + m[2][2] * y + m[3][2] * z;
-    vi in = (height > 0) & (line >= 0) & (line < job->right) & (depth >= 0) & (depth < job->bottom);
+    vf side = along(job, 1, x, y, z), height = 1 - side * side;
+    vi in = height > 0;
     if (!any(in)) continue;
-    vf weight = only(in, load(job->sign + i) * height * height), c, s;
-    line = only(in, line), depth = only(in, depth);
+    vf line = along(job, 0, x, y, z), depth = along(job, 2, x, y, z), c, s;
+    if (!inside) {
+      in = in & (line >= 0) & (line < job->right) & (depth >= 0) & (depth < job->bottom);
+      line = only(in, line), depth = only(in, depth);
+    }
+    vf weight = only(in, load(job->sign + i) * height);
     vi l = whole(line), n = whole(depth);
     vf a = line - real(l), b = depth - real(n);
     turn(depth * job->turns, &c, &s);
-    vf re = weight * c, im = -weight * s, re1 = a * re, im1 = a * im;
-    vi at = n * (int32_t)job->stride + 2 * l;
-    records(record, re - re1, im - im1, re1, im1);
+    vf re = weight * c, im = weight * s, re1 = a * re, im1 = a * im;
+    vi at = n * (int32_t)job->stride + 4 * l;
+    records(record, re - re1, im1 - im, re1, -im1);
     memcpy(cell, &at, sizeof at);
     store(part, b);
     lay(job, record, cell, part);
   }
+}
+
+// A map whose cube lies inside the grid needs no check per scatterer.
+static void splat(const splat_job *job) {
+  SONDE_ASSERT(job->count % ECHO_ALIGN == 0);
+  const float(*m)[3] = job->m;
+  float line = 0.5f * (size1(m[1][0]) + size1(m[2][0]) + size1(m[3][0])) + 0.01f;
+  float depth = 0.5f * (size1(m[1][2]) + size1(m[2][2]) + size1(m[3][2])) + 0.01f;
+  bool inside = job->cube && m[0][0] > line && m[0][0] + line < job->right && m[0][2] > depth &&
+                m[0][2] + depth < job->bottom;
+  if (inside)
+    splat_some(job, true);
+  else
+    splat_some(job, false);
 }
 
 static void lateral(const lateral_job *job) {
@@ -157,6 +179,21 @@ static void convert(const convert_job *job) {
   }
 }
 
+static void merge(const float *grid, const float *gain, float *re, float *im, uint32_t count) {
+  SONDE_ASSERT(count % ECHO_ALIGN == 0);
+  float last[2] = {0};
+  for (uint32_t l = 0; l < count; l += W) {
+    float part[2][W];
+    for (uint32_t k = 0; k < W; ++k) {
+      const float *here = grid + 4 * (size_t)(l + k);
+      part[0][k] = here[0] + last[0], part[1][k] = here[1] + last[1];
+      last[0] = here[2], last[1] = here[3];
+    }
+    store(re + l, load(gain + l) * load(part[0]));
+    store(im + l, load(gain + l) * load(part[1]));
+  }
+}
+
 // What is left of the scattered amplitude behind the losses.
 static void fade(const float *scatter, const float *loss_db, float *gain, uint32_t lines) {
   SONDE_ASSERT(lines % ECHO_ALIGN == 0);
@@ -167,4 +204,4 @@ static void fade(const float *scatter, const float *loss_db, float *gain, uint32
 }
 
 const echo_kernels SONDE_KERNELS = {
-    SONDE_KERNELS_NAME, splat, lateral, axial, tissue, fade, convert};
+    SONDE_KERNELS_NAME, splat, lateral, axial, tissue, merge, fade, convert};

@@ -14,16 +14,19 @@ enum {
   RING_PLANES = 2 * SONDE_RANK,
 };
 
-// Scatterers of one affine map: (line, elevation over its half width, sample) =
+// Scatterers of one affine map: (line, elevation over its reach, sample) =
 // m[0] + m[1] x + m[2] y + m[3] z.
 typedef struct splat_job {
   const float *x, *y, *z, *sign;
   uint32_t count; // multiple of ECHO_ALIGN
+  bool cube;      // x, y and z lie within +-1/2
   float m[4][3];
   float turns;         // carrier periods per sample
   float right, bottom; // last line and sample with a neighbour
-  float *grid;         // [sample][line][2]
-  uint32_t stride;     // floats per sample
+  // [sample][line][4]: complex shares of the line and of the next one. Whatever overlaps is added
+  // later: two scatterers then touch the same four numbers or none in common.
+  float *grid;
+  uint32_t stride; // floats per sample
 } splat_job;
 
 typedef struct lateral_job {
@@ -53,6 +56,8 @@ typedef struct tissue_job {
   bool plain;
   float *scatter, *loss; // amplitude over muscle, dB/m/MHz one way
   float *level;          // [LEVELS][lines] signed: sign changes are interfaces
+  const float *before;   // the same of the row above
+  uint8_t *crossed;      // [lines / ECHO_ALIGN] whether any sign of these lines changed
 } tissue_job;
 
 // A row of pixels from [samples][lines] grey values.
@@ -72,6 +77,8 @@ typedef struct echo_kernels {
   void (*lateral)(const lateral_job *job);
   void (*axial)(const axial_job *job);
   void (*tissue)(const tissue_job *job);
+  // A row of the grid to complex numbers per line, times a gain; count a multiple of ECHO_ALIGN.
+  void (*merge)(const float *grid, const float *gain, float *re, float *im, uint32_t count);
   void (*fade)(const float *scatter, const float *loss_db, float *gain, uint32_t lines);
   void (*convert)(const convert_job *job);
 } echo_kernels;

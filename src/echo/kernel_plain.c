@@ -18,13 +18,13 @@ static void splat(const splat_job *job) {
     if (!(height > 0 && at[0] >= 0 && at[0] < (double)job->right && at[2] >= 0 &&
           at[2] < (double)job->bottom))
       continue;
-    double weight = (double)job->sign[i] * height * height, l = floor(at[0]), n = floor(at[2]);
+    double weight = (double)job->sign[i] * height, l = floor(at[0]), n = floor(at[2]);
     double turn = 6.283185307179586 * at[2] * (double)job->turns;
     for (size_t corner = 0; corner < 4; ++corner) {
       double a = corner & 1 ? at[0] - l : 1 - (at[0] - l);
       double b = corner & 2 ? at[2] - n : 1 - (at[2] - n);
       float *g =
-          job->grid + ((size_t)n + (corner >> 1)) * job->stride + 2 * ((size_t)l + (corner & 1));
+          job->grid + ((size_t)n + (corner >> 1)) * job->stride + 4 * (size_t)l + 2 * (corner & 1);
       g[0] += (float)(a * b * weight * cos(turn)), g[1] -= (float)(a * b * weight * sin(turn));
     }
   }
@@ -63,6 +63,14 @@ static void axial(const axial_job *job) {
 
 static void tissue(const tissue_job *job) { sonde_echo_kernels_base.tissue(job); }
 
+static void merge(const float *grid, const float *gain, float *re, float *im, uint32_t count) {
+  for (uint32_t l = 0; l < count; ++l) {
+    const float *here = grid + 4 * (size_t)l;
+    re[l] = gain[l] * (l > 0 ? here[-2] + here[0] : here[0]);
+    im[l] = gain[l] * (l > 0 ? here[-1] + here[1] : here[1]);
+  }
+}
+
 static void fade(const float *scatter, const float *loss_db, float *gain, uint32_t lines) {
   for (uint32_t l = 0; l < lines; ++l)
     gain[l] = (float)((double)scatter[l] * pow(10, -fmin((double)loss_db[l], 600) / 20));
@@ -93,4 +101,4 @@ static void convert(const convert_job *job) {
 }
 
 const echo_kernels sonde_echo_kernels_plain = {"plain", splat, lateral, axial,
-                                               tissue,  fade,  convert};
+                                               tissue,  merge, fade,    convert};

@@ -94,7 +94,8 @@ INLINE void mark(vi mask, vf scatter, float loss, vf out[2]) {
   out[0] = pick(mask, scatter, out[0]), out[1] = pick(mask, all(loss), out[1]);
 }
 
-INLINE void paint(const tissue_job *job, uint32_t l) {
+// Returns the lanes in which a level changed sign since the row above.
+INLINE vi paint(const tissue_job *job, uint32_t l) {
   const float *f = job->row + l;
   uint32_t n = job->lines;
   vf depth = load(f + PLANE_DEPTH * n), fat = load(f + PLANE_FAT * n);
@@ -125,11 +126,20 @@ INLINE void paint(const tissue_job *job, uint32_t l) {
   mark(level[3] > 0, all(bone_tissue[0]), bone_tissue[1], tissue);
   mark(level[0] < 0, all(0), outside_loss, tissue);
   store(job->scatter + l, tissue[0]), store(job->loss + l, tissue[1]);
-  for (uint32_t k = 0; k < LEVELS; ++k) store(job->level + k * n + l, level[k]);
+  vi changed = all_of(0);
+  for (uint32_t k = 0; k < LEVELS; ++k) {
+    changed |= (level[k] < 0) ^ (load(job->before + k * n + l) < 0);
+    store(job->level + k * n + l, level[k]);
+  }
+  return changed;
 }
 
 static void tissue(const tissue_job *job) {
-  for (uint32_t l = 0; l < job->lines; l += W) paint(job, l);
+  for (uint32_t l = 0; l < job->lines; l += ECHO_ALIGN) {
+    bool crossed = false;
+    for (uint32_t k = 0; k < ECHO_ALIGN; k += W) crossed = any(paint(job, l + k)) || crossed;
+    job->crossed[l / ECHO_ALIGN] = crossed;
+  }
 }
 
 #endif

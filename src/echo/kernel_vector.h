@@ -91,7 +91,8 @@ INLINE vf gather(const float *base, vi index) {
 #endif
 }
 
-// Lanes of four vectors as records of four numbers: record j at 4 * slot_of_lane(j).
+// Lanes of four vectors as records of four numbers: record 4 i + k
+// at place k * (W / 4) + i.
 INLINE void records(float *out, vf a, vf b, vf c, vf d) {
 #if defined(__AVX512F__)
   __m512 ab = _mm512_unpacklo_ps((__m512)a, (__m512)b),
@@ -118,8 +119,8 @@ INLINE void records(float *out, vf a, vf b, vf c, vf d) {
   }
 #endif
 }
-// Within 128 bits the lanes keep their order; these blocks come column by column.
-INLINE int slot_of_lane(int j) { return (j & 3) * (W / 4) + (j >> 2); }
+// Size of one number.
+INLINE float size1(float a) { return a < 0 ? -a : a; }
 
 // 2^a for |a| < 120, relative error 1e-7.
 INLINE vf power2(vf a) {

@@ -2,7 +2,7 @@
 // echoes at interfaces, shadow of the bone, air. Constants and sources: docs/echo.md.
 //
 // sonde_echo_medium  all rows of the march
-// widen, next_row    coarse plane -> one row, per line
+// place_lines, widen, next_row    coarse plane -> one row, per line
 // roughness          of an interface along its surface
 // cross, cross_levels  a level's zero between two rows becomes an echo
 // mark_air           lines whose face does not touch the skin
@@ -30,18 +30,26 @@ static const interface interfaces[LEVELS] = {
     {17, 0.5f, 0.12f, 0},  // artery wall
 };
 
+static void place_lines(sonde_echo *echo) {
+  float per_line = (float)(1 / echo->lines_per_column);
+  for (uint32_t l = 0; l < echo->padded; ++l) {
+    float x =
+        ((float)echo->frame.edge_lines + (float)(l < echo->lines ? l : echo->lines - 1)) * per_line;
+    uint32_t i = (uint32_t)x < SONDE_PLANE_COLUMNS - 2 ? (uint32_t)x : SONDE_PLANE_COLUMNS - 2;
+    echo->line_column[l] = (uint16_t)i;
+    echo->line_share[l] = x - (float)i;
+  }
+}
+
 // A coarse row, per line.
 static void widen(sonde_echo *echo, uint32_t coarse, float *wide) {
   SONDE_ASSERT(coarse < SONDE_PLANE_ROWS);
-  float per_line = (float)(1 / echo->lines_per_column);
-  float first = (float)echo->frame.edge_lines * per_line;
   for (int field = 0; field < PLANE_FIELDS; ++field) {
     const float *in = echo->plane + field * SONDE_PLANE_NODES + coarse * SONDE_PLANE_COLUMNS;
     float *out = wide + (uint32_t)field * echo->padded;
     for (uint32_t l = 0; l < echo->padded; ++l) {
-      float x = first + (float)(l < echo->lines ? l : echo->lines - 1) * per_line;
-      uint32_t i = (uint32_t)x < SONDE_PLANE_COLUMNS - 2 ? (uint32_t)x : SONDE_PLANE_COLUMNS - 2;
-      out[l] = in[i] + (x - (float)i) * (in[i + 1] - in[i]);
+      const float *at = in + echo->line_column[l];
+      out[l] = at[0] + echo->line_share[l] * (at[1] - at[0]);
     }
   }
 }
@@ -79,12 +87,15 @@ static float roughness(const sonde_echo *echo, uint32_t l, uint32_t salt) {
   return top + b * (low - top);
 }
 
+// Into the list of the sample above it.
 static void record(sonde_echo *echo, uint32_t l, float depth_m, float amplitude) {
   SONDE_ASSERT(l < echo->lines);
-  uint32_t n = echo->echo_count[l];
-  if (n >= SONDE_MAX_ECHOES || amplitude <= 0) return;
-  echo->echoes[l * SONDE_MAX_ECHOES + n] = (specular){depth_m, amplitude};
-  echo->echo_count[l] = (uint8_t)(n + 1);
+  float at = depth_m / (float)echo->frame.step_m;
+  if (echo->echo_count >= SONDE_MAX_ECHOES || !(amplitude > 0) || !(at >= 0)) return;
+  if (at >= (float)(echo->samples - 1)) return;
+  int32_t *first = echo->first_echo + (uint32_t)at;
+  echo->echoes[echo->echo_count] = (specular){depth_m, amplitude, l, *first};
+  *first = (int32_t)echo->echo_count++;
 }
 
 // A level that changes sign between the last row and this one reflects.
@@ -107,16 +118,18 @@ static void cross(sonde_echo *echo, uint32_t row, uint32_t l, uint32_t which) {
   echo->loss_db[l] += kind->loss_db;
 }
 
-static void cross_levels(sonde_echo *echo, uint32_t row) {
+static void cross_levels(sonde_echo *echo, uint32_t row, const uint8_t *crossed) {
   const uint32_t n = echo->padded;
   const float *now = echo->level[row % 2], *before = echo->level[(row + 1) % 2];
-  for (uint32_t which = 0; which < LEVELS; ++which)
-    for (uint32_t l = 0; l < echo->lines; ++l) {
+  for (uint32_t l = 0; l < echo->lines; ++l) {
+    if (!crossed[l / ECHO_ALIGN] || echo->air[l]) continue;
+    bool lumen = now[4 * n + l] < 0 || now[5 * n + l] < 0;
+    for (uint32_t which = 0; which < LEVELS; ++which) {
       uint32_t k = which * n + l;
-      if ((before[k] < 0) == (now[k] < 0) || echo->air[l]) continue;
-      bool lumen = now[4 * n + l] < 0 || now[5 * n + l] < 0;
+      if ((before[k] < 0) == (now[k] < 0)) continue;
       if (!lumen || which == 0 || which > 2) cross(echo, row, l, which); // layers end at a vessel
     }
+  }
 }
 
 // Bands at multiples of the face's own thickness, fading.
@@ -126,22 +139,31 @@ static void reverberate(sonde_echo *echo, uint32_t l) {
 }
 
 static void mark_air(sonde_echo *echo) {
+  echo->some_air = false;
   for (uint32_t l = 0; l < echo->padded; ++l) {
     echo->air[l] = echo->row[PLANE_DEPTH * echo->padded + l] < -air_gap_m;
     if (echo->air[l] && l < echo->lines) reverberate(echo, l);
+    echo->some_air = echo->some_air || echo->air[l];
   }
 }
 
 // The aperture looks past small obstacles: what a line has lost mixes with its neighbours'. Lines
 // in air send nothing and take no part.
 static void blur_loss(sonde_echo *echo) {
-  float *loss = echo->loss_db, last = loss[0];
-  for (uint32_t l = 1; l + 1 < echo->lines; ++l) {
-    float here = loss[l], left = echo->air[l - 1] ? here : last;
-    float right = echo->air[l + 1] ? here : loss[l + 1];
-    loss[l] += 0.15f * (left - 2 * here + right);
-    last = here;
+  const uint8_t *air = echo->air;
+  float *loss = echo->loss_db, out[SONDE_MOST_LINES];
+  uint32_t last = echo->lines - 1;
+  if (!echo->some_air) {
+    for (uint32_t l = 1; l < last; ++l)
+      out[l] = loss[l] + 0.15f * (loss[l - 1] - 2 * loss[l] + loss[l + 1]);
+  } else {
+    for (uint32_t l = 1; l < last; ++l) {
+      float here = loss[l], left = air[l - 1] ? here : loss[l - 1];
+      float right = air[l + 1] ? here : loss[l + 1];
+      out[l] = here + 0.15f * (left - 2 * here + right);
+    }
   }
+  memcpy(loss + 1, out + 1, (last - 1) * sizeof *loss);
 }
 
 void sonde_echo_medium(sonde_echo *echo) {
@@ -149,6 +171,7 @@ void sonde_echo_medium(sonde_echo *echo) {
   SONDE_ASSERT(f->pathology != NULL && echo->padded % ECHO_ALIGN == 0);
   uint32_t lines = echo->padded, reached = 0;
   float step = (float)(2 * f->depth_m / (SONDE_MEDIUM_ROWS - 1) * f->frequency_hz * 1e-6);
+  uint8_t crossed[SONDE_MOST_LINES / ECHO_ALIGN];
   tissue_job job = {.row = echo->row,
                     .lines = lines,
                     .bone_radius_m = (float)echo->interior->bone_radius_m,
@@ -156,17 +179,21 @@ void sonde_echo_medium(sonde_echo *echo) {
                     .clot_scatter = 0.12f + 0.9f * (float)f->pathology->echogenicity,
                     .plain = echo->plain,
                     .scatter = echo->scatter,
-                    .loss = echo->loss};
+                    .loss = echo->loss,
+                    .crossed = crossed};
   memset(echo->loss_db, 0, lines * sizeof *echo->loss_db);
-  memset(echo->echo_count, 0, echo->lines);
+  echo->echo_count = 0;
+  place_lines(echo);
+  for (uint32_t n = 0; n < echo->samples; ++n) echo->first_echo[n] = -1;
   for (uint32_t row = 0; row < SONDE_MEDIUM_ROWS; ++row) {
     next_row(echo, row, &reached);
-    job.level = echo->level[row % 2];
+    job.level = echo->level[row % 2], job.before = echo->level[(row + 1) % 2];
     echo->kernels->tissue(&job);
     if (row == 0) mark_air(echo);
     blur_loss(echo);
-    if (row > 0) cross_levels(echo, row);
-    for (uint32_t l = 0; l < lines; ++l) echo->scatter[l] = echo->air[l] ? 0 : echo->scatter[l];
+    if (row > 0) cross_levels(echo, row, crossed);
+    for (uint32_t l = 0; l < lines && echo->some_air; ++l)
+      if (echo->air[l]) echo->scatter[l] = 0;
     echo->kernels->fade(echo->scatter, echo->loss_db, echo->gain + row * lines, lines);
     for (uint32_t l = 0; l < lines; ++l) echo->loss_db[l] += echo->loss[l] * step;
   }

@@ -12,7 +12,7 @@
 
 #include <string.h>
 
-enum { FIRST_ITERATIONS = 24, ITERATIONS = 4 };
+enum { FIRST_ITERATIONS = 24, ITERATIONS = 3 };
 
 static const double far_away = 50; // in semi-axes
 static const double step_beside = 1e-3;
@@ -61,7 +61,8 @@ void sonde_echo_frame(sonde_echo *echo, sonde_pose world_from_probe, double aper
   if (memcmp(&key, &echo->psf->key, sizeof key) != 0) sonde_psf_build(echo->psf, &key);
   echo->pad_lines = (uint32_t)echo->psf->half_lines;
   echo->pad_samples = (uint32_t)echo->psf->half_rows;
-  echo->grid_lines = echo->lines + 2 * echo->pad_lines;
+  uint32_t needed = echo->lines + 2 * echo->pad_lines + ECHO_ALIGN - 1;
+  echo->grid_lines = needed / ECHO_ALIGN * ECHO_ALIGN;
   echo->grid_samples = echo->samples + 2 * echo->pad_samples;
   f->edge_lines = echo->pad_lines;
   echo->lines_per_column = (echo->lines - 1 + 2 * f->edge_lines) / (SONDE_PLANE_COLUMNS - 1);
@@ -123,7 +124,7 @@ static void place_node(sonde_echo *echo, uint32_t i, uint32_t j, sonde_vec3 loca
   node->rest = sonde_interior_invert(echo->interior, point, guess,
                                      j > 0 ? ITERATIONS : FIRST_ITERATIONS, NULL);
   sonde_vec3 beside = v_scale(q_rotate(f->probe.rotation, vec3(0, 1, 0)), step_beside);
-  sonde_vec3 here = sonde_interior_field(echo->interior, node->rest);
+  sonde_vec3 here = v_sub(point, node->rest); // what the inversion converged to
   sonde_vec3 there = sonde_interior_field(echo->interior, v_add(node->rest, beside));
   sonde_vec3 moved = v_add(beside, v_sub(there, here));
   sonde_vec3 end = v_add(local, m_mul_v(f->from_world, moved));

@@ -24,7 +24,7 @@ sonde_array sonde_array_default(void) {
                        .pitch_m = 0.3e-3,
                        .width_m = 0.27e-3,
                        .pulse_wavelengths = 1.1,
-                       .height_m = 4e-3,
+                       .height_m = 3e-3,
                        .lens_m = 0.025,
                        .most_elements = 128};
 }
@@ -182,7 +182,7 @@ double sonde_array_elevation(const sonde_array *a, double y_m, double z_m) {
 
 double sonde_array_elevation_half(const sonde_array *a, double z_m) {
   SONDE_ASSERT(a != NULL && a->height_m > 0);
-  // The kernel is at its half value at y = h sqrt(1 - sqrt(1/2)). The outermost half value of the
+  // The kernel is at its half value at y = h sqrt(1/2). The outermost half value of the
   // beam counts: near the face it is as wide as the aperture and ripples.
   double z = fmax(z_m, 1e-3), step = 0.1e-3, centre = fresnel(a, 0, z), outside = 0, y = 0;
   for (y = 1.5 * a->height_m; y > step; y -= step) {
@@ -193,7 +193,7 @@ double sonde_array_elevation_half(const sonde_array *a, double z_m) {
     }
     outside = level;
   }
-  return y / 0.5411961001461970;
+  return y / 0.7071067811865476;
 }
 
 // ---- images of points ------------------------------------------------------------------------

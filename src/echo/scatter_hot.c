@@ -23,7 +23,7 @@
 
 enum { MOST_PIECES = 12, NEWTON = 3 };
 
-static const double sampling_m = 1.2e-3; // of the slab when looking for cubes
+static const double sampling_m = 1.5e-3; // of the slab when looking for cubes
 static const double reach_radii = 4.0;   // over which a wall moves the tissue around it
 static const double piece_radii = 1.7;   // within which a cube needs smaller pieces
 
@@ -184,8 +184,9 @@ static void lay(sonde_echo *echo, const map *m, const scatter_pool *pool, uint32
                    .z = pool->z + from,
                    .sign = pool->sign + from,
                    .count = count,
+                   .cube = true,
                    .grid = echo->grid,
-                   .stride = 2 * echo->grid_lines,
+                   .stride = 4 * echo->grid_lines,
                    .turns = (float)(2 * f->step_m / f->wavelength_m),
                    .right = (float)(echo->grid_lines - 1),
                    .bottom = (float)(echo->grid_samples - 1)};
@@ -205,11 +206,11 @@ static void lay(sonde_echo *echo, const map *m, const scatter_pool *pool, uint32
 
 static void place_pieces(sonde_echo *echo, const wall *walls, int count, const map *m,
                          uint64_t bits) {
-  uint32_t each = SONDE_PIECE(echo->per_cell);
+  uint32_t each = echo->per_piece, shares = SONDE_LOOSE / each;
   for (int part = 0; part < 8; ++part) {
     map piece = carried(echo, walls, count, m, part);
-    uint32_t from = (uint32_t)(bits >> 32) + (uint32_t)part * each;
-    lay(echo, &piece, &echo->loose, from % (SONDE_LOOSE / ECHO_ALIGN) * ECHO_ALIGN, each);
+    uint32_t share = (uint32_t)(bits >> 32) + (uint32_t)part;
+    lay(echo, &piece, &echo->loose, share % shares * each, each);
   }
 }
 
@@ -261,18 +262,18 @@ static void visit(sonde_echo *echo, sonde_vec3 rest, sonde_vec3 guess) {
   place_cell(echo, cell, key, guess);
 }
 
-// As many samples as the quad's longest side in rest coordinates asks for.
+// As many samples as the quad's sides in rest coordinates ask for.
 static void visit_quad(sonde_echo *echo, uint32_t i, uint32_t j, sonde_vec3 side) {
   const plane_node *n = &echo->node[j * SONDE_PLANE_COLUMNS + i], *low = n + SONDE_PLANE_COLUMNS;
-  double longest =
-      fmax(fmax(v_distance(n[0].rest, n[1].rest), v_distance(low[0].rest, low[1].rest)),
-           fmax(v_distance(n[0].rest, low[0].rest), v_distance(n[1].rest, low[1].rest)));
-  int pieces = (int)clamp(ceil(longest / sampling_m), 1, MOST_PIECES);
+  double wide = fmax(v_distance(n[0].rest, n[1].rest), v_distance(low[0].rest, low[1].rest));
+  double high = fmax(v_distance(n[0].rest, low[0].rest), v_distance(n[1].rest, low[1].rest));
+  int across = (int)clamp(ceil(wide / sampling_m), 1, MOST_PIECES);
+  int down = (int)clamp(ceil(high / sampling_m), 1, MOST_PIECES);
   double half = elevation_at(echo, (j + 0.5) * echo->depth_per_row);
   int slices = (int)ceil(2 * half / sampling_m) + 1;
-  for (int jj = 0; jj < pieces; ++jj)
-    for (int ii = 0; ii < pieces; ++ii) {
-      double a = (ii + 0.5) / pieces, b = (jj + 0.5) / pieces;
+  for (int jj = 0; jj < down; ++jj)
+    for (int ii = 0; ii < across; ++ii) {
+      double a = (ii + 0.5) / across, b = (jj + 0.5) / down;
       sonde_vec3 rest =
           v_lerp(v_lerp(n[0].rest, n[1].rest, a), v_lerp(low[0].rest, low[1].rest, a), b);
       for (int k = 0; k < slices; ++k)
@@ -282,7 +283,7 @@ static void visit_quad(sonde_echo *echo, uint32_t i, uint32_t j, sonde_vec3 side
 
 void sonde_echo_scatter(sonde_echo *echo) {
   SONDE_ASSERT(echo->per_cell % ECHO_ALIGN == 0 && echo->per_cell <= SONDE_POOL);
-  memset(echo->grid, 0, 2 * sizeof(float) * echo->grid_lines * echo->grid_samples);
+  memset(echo->grid, 0, 4 * sizeof(float) * echo->grid_lines * echo->grid_samples);
   if (++echo->stamp == 0) {
     memset(echo->cell_stamp, 0, SONDE_CELL_SET * sizeof *echo->cell_stamp);
     echo->stamp = 1;
@@ -297,14 +298,14 @@ void sonde_echo_scatter(sonde_echo *echo) {
 void sonde_echo_scatter_points(sonde_echo *echo, const sonde_echo_point *points, uint32_t count) {
   const frame *f = &echo->frame;
   float x[ECHO_ALIGN], y[ECHO_ALIGN], z[ECHO_ALIGN], size[ECHO_ALIGN];
-  memset(echo->grid, 0, 2 * sizeof(float) * echo->grid_lines * echo->grid_samples);
+  memset(echo->grid, 0, 4 * sizeof(float) * echo->grid_lines * echo->grid_samples);
   splat_job job = {.x = x,
                    .y = y,
                    .z = z,
                    .sign = size,
                    .count = ECHO_ALIGN,
                    .grid = echo->grid,
-                   .stride = 2 * echo->grid_lines,
+                   .stride = 4 * echo->grid_lines,
                    .m = {{0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
                    .turns = (float)(2 * f->step_m / f->wavelength_m),
                    .right = (float)(echo->grid_lines - 1),

@@ -1,0 +1,30 @@
+// A probe settled on a model: what `sonde image` and the image's benchmark look at.
+#ifndef SONDE_APP_SETTLED_H
+#define SONDE_APP_SETTLED_H
+
+#include "sonde/sonde.h"
+
+typedef struct settled {
+  sonde_model *model;
+  sonde_state *state;
+  sonde_probe probe;
+  sonde_interior *interior;
+  sonde_pose pose; // world_from_probe
+  double force_n;  // along the beam, onto the skin
+} settled;
+
+sonde_status settled_open(settled *s, const char *model, const char *probe, sonde_error *error);
+void settled_close(settled *s);
+// A site of the model. @return SONDE_NOT_FOUND
+sonde_status settled_site(const settled *s, long number, sonde_pose *above, sonde_error *error);
+// Where a pose's beam meets the rest skin, the pose moved there; false when it misses.
+bool settled_on_skin(const settled *s, sonde_pose *pose);
+// Settles with the face `depth_m` along the beam from `start`, coming from the last settled state.
+void settled_at(settled *s, sonde_pose start, double depth_m, double residual);
+// Presses along the beam from `start` until the settled force is force_n.
+sonde_status settled_force(settled *s, sonde_pose start, double force_n, sonde_error *error);
+// The interior at the settled state.
+void settled_update(const settled *s, const sonde_pathology *pathology, uint64_t tick);
+sonde_pose settled_advance(sonde_pose pose, double along_beam_m);
+
+#endif
