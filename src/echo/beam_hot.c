@@ -29,7 +29,7 @@ static double field_rms(const sonde_echo *echo, double depth_m, double half_m) {
 }
 
 static void gain_row(sonde_echo *echo, uint32_t sample, bool tissue) {
-  const float *in = echo->grid + (size_t)sample * 4 * echo->grid_lines;
+  float *in = echo->grid + (size_t)sample * echo->grid_stride;
   float gain[SONDE_MOST_LINES + 2 * SONDE_MOST_TAPS + ECHO_ALIGN] = {0};
   uint32_t pad = echo->pad_lines, count = echo->grid_lines;
   SONDE_ASSERT(count <= SONDE_COUNT_OF(gain));
@@ -45,6 +45,7 @@ static void gain_row(sonde_echo *echo, uint32_t sample, bool tissue) {
     gain[echo->lines + pad + l] = gain[echo->lines + pad - 1];
   }
   echo->kernels->merge(in, gain, echo->line_re, echo->line_im, count);
+  memset(in, 0, echo->grid_stride * sizeof *in);
 }
 
 static void lateral_row(sonde_echo *echo, uint32_t sample, bool tissue) {

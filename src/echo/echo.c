@@ -115,7 +115,7 @@ static bool allocate(sonde_echo *echo) {
   echo->air = SONDE_NEW(uint8_t, lines);
   echo->echoes = SONDE_NEW(specular, SONDE_MAX_ECHOES);
   echo->first_echo = SONDE_NEW(int32_t, echo->samples);
-  echo->grid = SONDE_NEW(float, 4 * most_lines * most_samples);
+  echo->grid = SONDE_NEW(float, (4 * most_lines + 16) * most_samples);
   echo->line_re = SONDE_NEW(float, most_lines);
   echo->line_im = SONDE_NEW(float, most_lines);
   echo->ring = SONDE_NEW(float, lines *RING_PLANES *(2 * SONDE_MOST_TAPS + 1));
@@ -123,15 +123,14 @@ static bool allocate(sonde_echo *echo) {
   echo->flat_envelope = SONDE_NEW(float, image);
   echo->grey = SONDE_NEW(float, image);
   echo->noise = SONDE_NEW(float, SONDE_NOISE);
-  echo->cell_key = SONDE_NEW(uint64_t, SONDE_CELL_SET);
-  echo->cell_stamp = SONDE_NEW(uint32_t, SONDE_CELL_SET);
+  echo->cell_set = SONDE_NEW(uint64_t, SONDE_CELL_SET);
   bool pools = allocate_pool(&echo->pool, SONDE_POOL);
   pools = allocate_pool(&echo->loose, SONDE_LOOSE) && pools;
   return pools && echo->psf && echo->node && echo->plane && echo->wide && echo->row &&
          echo->level[0] && echo->level[1] && echo->scatter && echo->loss && echo->gain &&
          echo->loss_db && echo->air && echo->first_echo && echo->echoes && echo->grid &&
          echo->line_re && echo->line_im && echo->ring && echo->envelope && echo->flat_envelope &&
-         echo->grey && echo->noise && echo->cell_key && echo->cell_stamp;
+         echo->grey && echo->noise && echo->cell_set;
 }
 
 static sonde_status check_def(const sonde_echo_def *def, sonde_error *error) {
@@ -186,10 +185,10 @@ void sonde_echo_destroy(sonde_echo *echo) {
                    echo->row,        echo->level[0], echo->level[1],      echo->scatter,
                    echo->loss,       echo->gain,     echo->loss_db,       echo->air,
                    echo->first_echo, echo->echoes,   echo->grid,          echo->line_re,
-                   echo->line_im,    echo->ring,     echo->noise,         echo->cell_key,
+                   echo->line_im,    echo->ring,     echo->noise,         echo->cell_set,
                    echo->envelope,   echo->grey,     echo->flat_envelope, echo->pool.x,
                    echo->pool.y,     echo->pool.z,   echo->loose.x,       echo->pool.sign,
-                   echo->loose.y,    echo->loose.z,  echo->loose.sign,    echo->cell_stamp};
+                   echo->loose.y,    echo->loose.z,  echo->loose.sign};
   for (size_t i = 0; i < SONDE_COUNT_OF(parts); ++i) sonde_free(parts[i]);
   sonde_free(echo);
 }

@@ -16,11 +16,11 @@ enum {
   SONDE_PLANE_NODES = SONDE_PLANE_COLUMNS * SONDE_PLANE_ROWS,
   SONDE_MEDIUM_ROWS = 256,                  // steps of the march along the lines
   SONDE_MAX_ECHOES = 24 * SONDE_MOST_LINES, // specular echoes
-  SONDE_POOL = 32768,                       // random scatterers shared by all cells
+  SONDE_POOL = 16384,                       // random scatterers shared by all cells
   SONDE_LOOSE = 8192,                       // the same for pieces of cells
   SONDE_NOISE = 65536,
-  SONDE_CELL_SET = 32768, // hash set of visited cells
-  SONDE_MAX_CELLS = 24000,
+  SONDE_CELL_SET = 16384, // hash set of visited cells
+  SONDE_MAX_CELLS = 12000,
 };
 
 typedef struct specular {
@@ -59,7 +59,8 @@ struct sonde_echo {
   const sonde_interior *interior;
   const echo_kernels *kernels;
   uint32_t lines, samples;
-  uint32_t padded; // lines in whole vectors
+  uint32_t padded;      // lines in whole vectors
+  uint32_t grid_stride; // floats per row of the grid
   uint32_t grid_lines, grid_samples, pad_lines, pad_samples;
   double density_m3, cell_m;
   uint32_t per_cell, per_piece; // scatterers of a cube and of an eighth of it
@@ -86,8 +87,8 @@ struct sonde_echo {
   specular *echoes; // [MAX_ECHOES]
   uint32_t echo_count;
   int32_t *first_echo; // [samples] list of the echoes between this sample and the next
-  float *grid;         // [grid_samples][grid_lines][4] scattered field, kernel.h
-  float *line_re;      // one row of it with its gain: [grid_lines]
+  float *grid;    // [grid_samples][grid_lines][4] scattered field, kernel.h; zero between frames
+  float *line_re; // one row of it with its gain: [grid_lines]
   float *line_im;
   float *ring;          // [2*MOST_TAPS+1][RING_PLANES][padded]
   float *envelope;      // [samples][padded]
@@ -96,9 +97,8 @@ struct sonde_echo {
   scatter_pool pool;    // [POOL] sorted by z within each cell's share
   scatter_pool loose;   // [LOOSE] unsorted
   float *noise;         // [NOISE]
-  uint64_t *cell_key;   // [CELL_SET]
-  uint32_t *cell_stamp; // [CELL_SET] frame that wrote the key
-  uint32_t stamp;
+  uint64_t *cell_set;   // [CELL_SET] key and stamp of the frame that wrote it
+  uint16_t stamp;
   uint32_t cell_count, moved; // cells and scatterers of the last frame
   sonde_echo_times times;
 };

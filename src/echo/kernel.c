@@ -25,44 +25,57 @@ INLINE void turn(vf t, vf *c, vf *s) {
             u * (-41.205783568541634f + u * (78.82674122450844f + u * -58.13524213160963f)));
 }
 
-INLINE void lay(const splat_job *job, const float *record, const int32_t *cell, const float *part) {
+INLINE void lay(float *grid, uint32_t stride, const float *record, const int32_t *cell,
+                const float *part) {
   for (int block = 0; block < W / 4; ++block)
     for (int k = 0; k < 4; ++k) { // lane order, see records()
       int j = 4 * block + k;
-      float *top = job->grid + cell[j], *low = top + job->stride;
+      float *top = grid + cell[j], *low = top + stride;
       v4 value = load4(record + 4 * (k * (W / 4) + block)), deep = part[j] * value;
       store4(top, load4(top) + (value - deep));
       store4(low, load4(low) + deep);
     }
 }
 
-INLINE vf along(const splat_job *job, int c, vf x, vf y, vf z) {
-  return job->m[0][c] + job->m[1][c] * x + job->m[2][c] * y + job->m[3][c] * z;
+// One coordinate of a map, spread over lanes.
+typedef struct form {
+  vf m[4];
+} form;
+
+INLINE form form_of(const splat_job *job, int c) {
+  return (form){{all(job->m[0][c]), all(job->m[1][c]), all(job->m[2][c]), all(job->m[3][c])}};
+}
+INLINE vf along(const form *f, vf x, vf y, vf z) {
+  return f->m[0] + f->m[1] * x + f->m[2] * y + f->m[3] * z;
 }
 
 INLINE void splat_some(const splat_job *job, bool inside) {
   float record[4 * W], part[W];
   int32_t cell[W];
-  for (uint32_t i = 0; i < job->count; i += W) {
-    vf x = load(job->x + i), y = load(job->y + i), z = load(job->z + i);
-    vf side = along(job, 1, x, y, z), height = 1 - side * side;
+  const float *px = job->x, *py = job->y, *pz = job->z, *sign = job->sign;
+  float *grid = job->grid, turns = job->turns, right = job->right, bottom = job->bottom;
+  const form to_line = form_of(job, 0), to_side = form_of(job, 1), to_depth = form_of(job, 2);
+  const uint32_t stride = job->stride, count = job->count;
+  for (uint32_t i = 0; i < count; i += W) {
+    vf x = load(px + i), y = load(py + i), z = load(pz + i);
+    vf side = along(&to_side, x, y, z), height = 1 - side * side;
     vi in = height > 0;
     if (!any(in)) continue;
-    vf line = along(job, 0, x, y, z), depth = along(job, 2, x, y, z), c, s;
+    vf line = along(&to_line, x, y, z), depth = along(&to_depth, x, y, z), c, s;
     if (!inside) {
-      in = in & (line >= 0) & (line < job->right) & (depth >= 0) & (depth < job->bottom);
+      in = in & (line >= 0) & (line < right) & (depth >= 0) & (depth < bottom);
       line = only(in, line), depth = only(in, depth);
     }
-    vf weight = only(in, load(job->sign + i) * height);
+    vf weight = only(in, load(sign + i) * height);
     vi l = whole(line), n = whole(depth);
     vf a = line - real(l), b = depth - real(n);
-    turn(depth * job->turns, &c, &s);
+    turn(depth * turns, &c, &s);
     vf re = weight * c, im = weight * s, re1 = a * re, im1 = a * im;
-    vi at = n * (int32_t)job->stride + 4 * l;
+    vi at = n * (int32_t)stride + 4 * l;
     records(record, re - re1, im1 - im, re1, -im1);
     memcpy(cell, &at, sizeof at);
     store(part, b);
-    lay(job, record, cell, part);
+    lay(grid, stride, record, cell, part);
   }
 }
 
@@ -103,17 +116,20 @@ static void lateral(const lateral_job *job) {
 
 static void axial(const axial_job *job) {
   SONDE_ASSERT(job->count > 0 && job->lines % ECHO_ALIGN == 0);
-  for (uint32_t l = 0; l < job->lines; l += W) {
-    vf re = job->noise_size * load(job->noise + l);
-    vf im = job->noise_size * load(job->noise + job->lines + l);
+  const uint32_t n = job->lines;
+  for (uint32_t l = 0; l < n; l += W) {
+    vf sum[RING_PLANES]; // apart, so that additions need not wait for each other
+    for (int k = 0; k < RING_PLANES; ++k) sum[k] = all(0);
     for (int t = 0; t < job->count; ++t) {
       const float *row = job->rows[t] + l;
       for (uint32_t k = 0; k < SONDE_RANK; ++k) {
-        float v = job->tap[t][k];
-        re += v * load(row + 2 * k * job->lines);
-        im += v * load(row + (2 * k + 1) * job->lines);
+        vf v = all(job->tap[t][k]);
+        sum[2 * k] += v * load(row + 2 * k * n);
+        sum[2 * k + 1] += v * load(row + (2 * k + 1) * n);
       }
     }
+    vf re = job->noise_size * load(job->noise + l) + sum[0] + sum[2] + sum[4];
+    vf im = job->noise_size * load(job->noise + n + l) + sum[1] + sum[3] + sum[5];
     vf size = job->compensation * root(re * re + im * im);
     store(job->envelope + l, size);
     vf grey = (decibels(larger(size, all(1e-20f))) + job->offset_db) * job->grey_per_db;
@@ -174,8 +190,9 @@ static void convert(const convert_job *job) {
   for (uint32_t c = 0; c < job->width; c += W) {
     vf x = job->x + ((float)c + load(ramp)) * job->dx;
     vi grey = whole(flat ? pixel_between(job, mixed, x) : pixel_of(job, x));
-    uint32_t left = job->width - c < W ? job->width - c : W;
-    for (uint32_t k = 0; k < left; ++k) job->out[c + k] = (uint8_t)grey[k];
+    size_t left = job->width - c < W ? job->width - c : W;
+    vb bytes = __builtin_convertvector(grey, vb);
+    memcpy(job->out + c, &bytes, left);
   }
 }
 

@@ -33,6 +33,7 @@ enum { W = 4 };
 typedef float vf __attribute__((vector_size(BYTES)));
 typedef int32_t vi __attribute__((vector_size(BYTES)));
 typedef uint32_t vu __attribute__((vector_size(BYTES)));
+typedef uint8_t vb __attribute__((vector_size(BYTES / 4)));
 typedef float vf_near __attribute__((vector_size(BYTES), aligned(4), may_alias));
 typedef float v4 __attribute__((vector_size(16)));
 typedef float v4_near __attribute__((vector_size(16), aligned(4), may_alias));

@@ -63,6 +63,8 @@ void sonde_echo_frame(sonde_echo *echo, sonde_pose world_from_probe, double aper
   echo->pad_samples = (uint32_t)echo->psf->half_rows;
   uint32_t needed = echo->lines + 2 * echo->pad_lines + ECHO_ALIGN - 1;
   echo->grid_lines = needed / ECHO_ALIGN * ECHO_ALIGN;
+  // Four numbers per line; an odd count of cache lines per row spreads the rows over the cache.
+  echo->grid_stride = 4 * echo->grid_lines + 16;
   echo->grid_samples = echo->samples + 2 * echo->pad_samples;
   f->edge_lines = echo->pad_lines;
   echo->lines_per_column = (echo->lines - 1 + 2 * f->edge_lines) / (SONDE_PLANE_COLUMNS - 1);

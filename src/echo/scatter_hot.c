@@ -186,7 +186,7 @@ static void lay(sonde_echo *echo, const map *m, const scatter_pool *pool, uint32
                    .count = count,
                    .cube = true,
                    .grid = echo->grid,
-                   .stride = 4 * echo->grid_lines,
+                   .stride = echo->grid_stride,
                    .turns = (float)(2 * f->step_m / f->wavelength_m),
                    .right = (float)(echo->grid_lines - 1),
                    .bottom = (float)(echo->grid_samples - 1)};
@@ -227,6 +227,8 @@ static void place_cell(sonde_echo *echo, const int32_t cell[3], uint64_t key, so
     place_pieces(echo, walls, count, &m, bits);
   } else {
     map whole = carried(echo, walls, count, &m, -1);
+    for (int k = 0; k < 3; ++k) // mirrored patterns look new
+      if (bits >> (61 + k) & 1) whole.axis[k] = v_neg(whole.axis[k]);
     uint32_t patterns = SONDE_POOL / echo->per_cell;
     lay(echo, &whole, &echo->pool, (uint32_t)(bits % patterns) * echo->per_cell, echo->per_cell);
   }
@@ -235,20 +237,18 @@ static void place_cell(sonde_echo *echo, const int32_t cell[3], uint64_t key, so
 // ---- cubes ----------------------------------------------------------------------------------
 
 static uint64_t cell_key(const int32_t cell[3]) {
-  return ((uint64_t)(uint32_t)(cell[0] + (1 << 20)) << 42) |
-         ((uint64_t)(uint32_t)(cell[1] + (1 << 20)) << 21) |
-         (uint64_t)(uint32_t)(cell[2] + (1 << 20));
+  return (uint64_t)(uint16_t)cell[0] << 32 | (uint64_t)(uint16_t)cell[1] << 16 | (uint16_t)cell[2];
 }
 
 // True the first time in a frame.
 static bool find(sonde_echo *echo, uint64_t key) {
+  uint64_t stamped = key << 16 | echo->stamp;
   uint32_t slot = (uint32_t)((key * 0x9e3779b97f4a7c15u) >> 40) % SONDE_CELL_SET;
-  while (echo->cell_stamp[slot] == echo->stamp) {
-    if (echo->cell_key[slot] == key) return false;
+  while ((uint16_t)echo->cell_set[slot] == echo->stamp) {
+    if (echo->cell_set[slot] == stamped) return false;
     slot = (slot + 1) % SONDE_CELL_SET;
   }
-  echo->cell_stamp[slot] = echo->stamp;
-  echo->cell_key[slot] = key;
+  echo->cell_set[slot] = stamped;
   return true;
 }
 
@@ -283,9 +283,8 @@ static void visit_quad(sonde_echo *echo, uint32_t i, uint32_t j, sonde_vec3 side
 
 void sonde_echo_scatter(sonde_echo *echo) {
   SONDE_ASSERT(echo->per_cell % ECHO_ALIGN == 0 && echo->per_cell <= SONDE_POOL);
-  memset(echo->grid, 0, 4 * sizeof(float) * echo->grid_lines * echo->grid_samples);
   if (++echo->stamp == 0) {
-    memset(echo->cell_stamp, 0, SONDE_CELL_SET * sizeof *echo->cell_stamp);
+    memset(echo->cell_set, 0, SONDE_CELL_SET * sizeof *echo->cell_set);
     echo->stamp = 1;
   }
   echo->cell_count = echo->moved = 0;
@@ -298,14 +297,13 @@ void sonde_echo_scatter(sonde_echo *echo) {
 void sonde_echo_scatter_points(sonde_echo *echo, const sonde_echo_point *points, uint32_t count) {
   const frame *f = &echo->frame;
   float x[ECHO_ALIGN], y[ECHO_ALIGN], z[ECHO_ALIGN], size[ECHO_ALIGN];
-  memset(echo->grid, 0, 4 * sizeof(float) * echo->grid_lines * echo->grid_samples);
   splat_job job = {.x = x,
                    .y = y,
                    .z = z,
                    .sign = size,
                    .count = ECHO_ALIGN,
                    .grid = echo->grid,
-                   .stride = 4 * echo->grid_lines,
+                   .stride = echo->grid_stride,
                    .m = {{0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
                    .turns = (float)(2 * f->step_m / f->wavelength_m),
                    .right = (float)(echo->grid_lines - 1),
