@@ -21,6 +21,8 @@
 #include "sonde/anatomy.h"
 #include "sonde/interior.h"
 #include "sonde/echo.h"
+#include "sonde/echo_reference.h"
+#include "sonde/echo_validate.h"
 #include "sonde/echo_frames.h"
 #include "sonde/echo_volume.h"
 #include "sonde/haptics.h"
