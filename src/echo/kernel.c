@@ -1,14 +1,11 @@
 // Inner loops of the image; kernel_*_hot.c include this file once per instruction set.
 //
-// splat     scatterers through one affine map into four cells each, carrier phase included
-// splat_some  the same, with or without checks at the grid's border
-// lay       one vector of them, in order
-// lateral   symmetric complex kernels of rank three on one row
-// axial     real kernels down the rows, noise, compensation, modulus, logarithm
-// tissue    in kernel_tissue.h
-// merge     shares of neighbouring lines add up
-// fade      attenuation of a row
-// convert   bilinear scan conversion of one row of pixels
+// splat     scatterers through one affine map onto two lines and three samples each, carrier phase
+// included splat_some  the same, with or without checks at the grid's border lay       one vector
+// of them, in order lateral   symmetric complex kernels of rank three on one row axial     real
+// kernels down the rows, noise, compensation, modulus, logarithm tissue    in kernel_tissue.h merge
+// shares of neighbouring lines add up fade      attenuation of a row convert   bilinear scan
+// conversion of one row of pixels
 #include "echo/kernel_vector.h"
 
 #include "base/base.h"
@@ -25,15 +22,22 @@ INLINE void turn(vf t, vf *c, vf *s) {
             u * (-41.205783568541634f + u * (78.82674122450844f + u * -58.13524213160963f)));
 }
 
+// Shares of the samples above and below; the nearest one gets the rest: a quadratic spline.
+typedef struct shares {
+  float up[W], down[W];
+} shares;
+
 INLINE void lay(float *grid, uint32_t stride, const float *record, const int32_t *cell,
-                const float *part) {
+                const shares *share) {
   for (int block = 0; block < W / 4; ++block)
     for (int k = 0; k < 4; ++k) { // lane order, see records()
       int j = 4 * block + k;
-      float *top = grid + cell[j], *low = top + stride;
-      v4 value = load4(record + 4 * (k * (W / 4) + block)), deep = part[j] * value;
-      store4(top, load4(top) + (value - deep));
-      store4(low, load4(low) + deep);
+      float *here = grid + cell[j], *above = here - stride, *below = here + stride;
+      v4 value = load4(record + 4 * (k * (W / 4) + block));
+      v4 up = share->up[j] * value, down = share->down[j] * value;
+      store4(above, load4(above) + up);
+      store4(here, load4(here) + (value - up - down));
+      store4(below, load4(below) + down);
     }
 }
 
@@ -50,7 +54,8 @@ INLINE vf along(const form *f, vf x, vf y, vf z) {
 }
 
 INLINE void splat_some(const splat_job *job, bool inside) {
-  float record[4 * W], part[W];
+  float record[4 * W];
+  shares share;
   int32_t cell[W];
   const float *px = job->x, *py = job->y, *pz = job->z, *sign = job->sign;
   float *grid = job->grid, turns = job->turns, right = job->right, bottom = job->bottom;
@@ -63,19 +68,19 @@ INLINE void splat_some(const splat_job *job, bool inside) {
     if (!any(in)) continue;
     vf line = along(&to_line, x, y, z), depth = along(&to_depth, x, y, z), c, s;
     if (!inside) {
-      in = in & (line >= 0) & (line < right) & (depth >= 0) & (depth < bottom);
-      line = only(in, line), depth = only(in, depth);
+      in = in & (line >= 0) & (line < right) & (depth >= 1) & (depth < bottom);
+      line = only(in, line), depth = pick(in, depth, all(1));
     }
     vf weight = only(in, load(sign + i) * height);
-    vi l = whole(line), n = whole(depth);
-    vf a = line - real(l), b = depth - real(n);
+    vi l = whole(line), n = whole(depth + 0.5f);
+    vf a = line - real(l), b = depth - real(n), up = 0.5f - b, down = 0.5f + b;
     turn(depth * turns, &c, &s);
     vf re = weight * c, im = weight * s, re1 = a * re, im1 = a * im;
     vi at = n * (int32_t)stride + 4 * l;
     records(record, re - re1, im1 - im, re1, -im1);
     memcpy(cell, &at, sizeof at);
-    store(part, b);
-    lay(grid, stride, record, cell, part);
+    store(share.up, 0.5f * up * up), store(share.down, 0.5f * down * down);
+    lay(grid, stride, record, cell, &share);
   }
 }
 
@@ -85,7 +90,7 @@ static void splat(const splat_job *job) {
   const float(*m)[3] = job->m;
   float line = 0.5f * (size1(m[1][0]) + size1(m[2][0]) + size1(m[3][0])) + 0.01f;
   float depth = 0.5f * (size1(m[1][2]) + size1(m[2][2]) + size1(m[3][2])) + 0.01f;
-  bool inside = job->cube && m[0][0] > line && m[0][0] + line < job->right && m[0][2] > depth &&
+  bool inside = job->cube && m[0][0] > line && m[0][0] + line < job->right && m[0][2] > depth + 1 &&
                 m[0][2] + depth < job->bottom;
   if (inside)
     splat_some(job, true);

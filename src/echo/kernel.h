@@ -22,7 +22,7 @@ typedef struct splat_job {
   bool cube;      // x, y and z lie within +-1/2
   float m[4][3];
   float turns;         // carrier periods per sample
-  float right, bottom; // last line and sample with a neighbour
+  float right, bottom; // last line with a neighbour, half a sample before the last sample
   // [sample][line][4]: complex shares of the line and of the next one. Whatever overlaps is added
   // later: two scatterers then touch the same four numbers or none in common.
   float *grid;

@@ -15,17 +15,17 @@ static void splat(const splat_job *job) {
       at[c] = (double)job->m[0][c] + (double)job->m[1][c] * (double)job->x[i] +
               (double)job->m[2][c] * (double)job->y[i] + (double)job->m[3][c] * (double)job->z[i];
     double height = 1 - at[1] * at[1];
-    if (!(height > 0 && at[0] >= 0 && at[0] < (double)job->right && at[2] >= 0 &&
+    if (!(height > 0 && at[0] >= 0 && at[0] < (double)job->right && at[2] >= 1 &&
           at[2] < (double)job->bottom))
       continue;
-    double weight = (double)job->sign[i] * height, l = floor(at[0]), n = floor(at[2]);
-    double turn = 6.283185307179586 * at[2] * (double)job->turns;
-    for (size_t corner = 0; corner < 4; ++corner) {
-      double a = corner & 1 ? at[0] - l : 1 - (at[0] - l);
-      double b = corner & 2 ? at[2] - n : 1 - (at[2] - n);
+    double weight = (double)job->sign[i] * height, l = floor(at[0]), n = floor(at[2] + 0.5);
+    double turn = 6.283185307179586 * at[2] * (double)job->turns, b = at[2] - n;
+    const double deep[3] = {0.5 * (0.5 - b) * (0.5 - b), 0.75 - b * b, 0.5 * (0.5 + b) * (0.5 + b)};
+    for (size_t corner = 0; corner < 6; ++corner) {
+      double a = corner & 1 ? at[0] - l : 1 - (at[0] - l), size = a * deep[corner / 2] * weight;
       float *g =
-          job->grid + ((size_t)n + (corner >> 1)) * job->stride + 4 * (size_t)l + 2 * (corner & 1);
-      g[0] += (float)(a * b * weight * cos(turn)), g[1] -= (float)(a * b * weight * sin(turn));
+          job->grid + ((size_t)n + corner / 2 - 1) * job->stride + 4 * (size_t)l + 2 * (corner & 1);
+      g[0] += (float)(size * cos(turn)), g[1] -= (float)(size * sin(turn));
     }
   }
 }

@@ -7,7 +7,7 @@
 //
 // sonde_psf_build   all of it
 // tabulate          exact responses of a band
-// sharpen           takes off what the two-tap splat widens
+// sharpen           takes off what the splat widens
 // gram, iterate     shared axial kernels
 // orthonormalise    Gram-Schmidt
 // project           lateral kernels of a band, their reach
@@ -75,23 +75,38 @@ static void normalise(beam_psf *psf, int b) {
     for (int i = 0; i < width; ++i) psf->table[b][l][i] *= scale;
 }
 
-// The triangle of two taps widens by a variance of 1/6 along either direction: to second order the
-// inverse takes a twelfth of the second difference away.
-static void sharpen(beam_psf *psf, int b) {
-  int rows = 2 * psf->half_rows + 1;
-  double line[2 * ROWS], last[2 * ROWS], copy[2 * ROWS];
-  for (int l = 0; l <= psf->half_lines; ++l) {
-    double *p = psf->table[b][l];
-    memcpy(line, p, sizeof(double) * 2 * (size_t)rows);
-    for (int i = 2; i < 2 * rows - 2; ++i) p[i] -= (line[i - 2] - 2 * line[i] + line[i + 2]) / 12;
+// Inverse of what the splat widens, by least squares over all places between lines and samples,
+// to fourth order in the differences d along an axis: 1 - second d^2 + fourth d^4. Two linear taps
+// between lines, three quadratic ones between samples.
+static const double line_second = 1.0 / 12, line_fourth = 7.0 / 720;
+static const double sample_second = 1.0 / 8, sample_fourth = 0.01927;
+
+static void sharpen_rows(double *p, int rows) {
+  double line[2 * ROWS];
+  memcpy(line, p, sizeof(double) * 2 * (size_t)rows);
+  for (int i = 0; i < 2 * rows; ++i) {
+    double at[5];
+    for (int k = -2; k <= 2; ++k) {
+      int j = i + 2 * k;
+      at[k + 2] = j >= 0 && j < 2 * rows ? line[j] : 0;
+    }
+    p[i] -= sample_second * (at[1] - 2 * at[2] + at[3]);
+    p[i] += sample_fourth * (at[0] - 4 * at[1] + 6 * at[2] - 4 * at[3] + at[4]);
   }
-  memcpy(last, psf->table[b][1], sizeof last); // mirror
-  for (int l = 0; l < psf->half_lines; ++l) {
-    double *p = psf->table[b][l];
-    const double *next = psf->table[b][l + 1];
-    memcpy(copy, p, sizeof copy);
-    for (int i = 0; i < 2 * rows; ++i) p[i] -= (last[i] - 2 * p[i] + next[i]) / 12;
-    memcpy(last, copy, sizeof last);
+}
+
+static void sharpen(beam_psf *psf, int b) {
+  int rows = 2 * psf->half_rows + 1, lines = psf->half_lines;
+  double column[SONDE_MOST_TAPS + 1];
+  for (int l = 0; l <= lines; ++l) sharpen_rows(psf->table[b][l], rows);
+  for (int i = 0; i < 2 * rows; ++i) {
+    for (int l = 0; l <= lines; ++l) column[l] = psf->table[b][l][i];
+    for (int l = 0; l <= lines; ++l) {
+      double at[5];
+      for (int k = -2; k <= 2; ++k) at[k + 2] = abs(l + k) <= lines ? column[abs(l + k)] : 0;
+      psf->table[b][l][i] -= line_second * (at[1] - 2 * at[2] + at[3]);
+      psf->table[b][l][i] += line_fourth * (at[0] - 4 * at[1] + 6 * at[2] - 4 * at[3] + at[4]);
+    }
   }
 }
 

@@ -189,7 +189,7 @@ static void lay(sonde_echo *echo, const map *m, const scatter_pool *pool, uint32
                    .stride = echo->grid_stride,
                    .turns = (float)(2 * f->step_m / f->wavelength_m),
                    .right = (float)(echo->grid_lines - 1),
-                   .bottom = (float)(echo->grid_samples - 1)};
+                   .bottom = (float)echo->grid_samples - 1.5f};
   for (int k = 0; k < 4; ++k) {
     sonde_vec3 v = k == 0 ? m->origin : m->axis[k - 1];
     job.m[k][0] = (float)(v.x * unit[0]);
@@ -307,7 +307,7 @@ void sonde_echo_scatter_points(sonde_echo *echo, const sonde_echo_point *points,
                    .m = {{0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
                    .turns = (float)(2 * f->step_m / f->wavelength_m),
                    .right = (float)(echo->grid_lines - 1),
-                   .bottom = (float)(echo->grid_samples - 1)};
+                   .bottom = (float)echo->grid_samples - 1.5f};
   for (uint32_t i = 0; i < count; ++i) {
     sonde_vec3 at = sonde_echo_unplace(f, vec3(points[i].x_m, points[i].y_m, points[i].z_m));
     uint32_t k = i % ECHO_ALIGN;
