@@ -2,7 +2,7 @@
 // kernels, receiver noise, time-gain compensation.
 //
 // sonde_echo_beam  all stages, row by row
-// gain_row         one row of the field times what tissue and losses leave
+// gain_row, merge_row  one row of the field times what tissue and losses leave
 // lateral_row      lateral kernels at its depth, normalised to unit speckle
 // add_specular     echoes of interfaces, carrier phase included
 // axial_row        pulse, noise, compensation, modulus
@@ -25,27 +25,37 @@ static double field_rms(const sonde_echo *echo, double depth_m, double half_m) {
   const frame *f = &echo->frame;
   double density = echo->per_cell / (echo->cell_m * echo->cell_m * echo->cell_m);
   double pitch = f->pitch_m * (f->radius_m > 0 ? 1 + fmax(depth_m, 0) / f->radius_m : 1);
-  return sqrt(density * pitch * f->step_m * half_m * 16.0 / 15.0);
+  return sqrt(density * pitch / SONDE_FINE * f->step_m * half_m * 16.0 / 15.0);
 }
 
-static void gain_row(sonde_echo *echo, uint32_t sample, bool tissue) {
-  float *in = echo->grid + (size_t)sample * echo->grid_stride;
-  float gain[SONDE_MOST_LINES + 2 * SONDE_MOST_TAPS + ECHO_ALIGN] = {0};
-  uint32_t pad = echo->pad_lines, count = echo->grid_lines;
-  SONDE_ASSERT(count <= SONDE_COUNT_OF(gain));
+// Gains on and between lines; beside the outer lines those go on.
+static void gain_row(const sonde_echo *echo, uint32_t sample, float *on, float *between) {
+  const uint32_t edge = echo->pad_lines / SONDE_FINE, lines = echo->lines;
+  const uint32_t count = echo->grid_lines / SONDE_FINE;
   double at = ((double)sample - echo->pad_samples) / (echo->samples - 1) * (SONDE_MEDIUM_ROWS - 1);
   at = clamp(at, 0, SONDE_MEDIUM_ROWS - 1.001);
   uint32_t row = (uint32_t)at;
   float b = (float)(at - row);
   const float *top = echo->gain + row * echo->padded, *low = top + echo->padded;
-  for (uint32_t l = 0; l < echo->lines; ++l)
-    gain[l + pad] = tissue ? top[l] + b * (low[l] - top[l]) : 1;
-  for (uint32_t l = 0; l < pad; ++l) {
-    gain[l] = gain[pad];
-    gain[echo->lines + pad + l] = gain[echo->lines + pad - 1];
+  for (uint32_t l = 0; l < lines; ++l) on[edge + l] = top[l] + b * (low[l] - top[l]);
+  for (uint32_t l = 0; l < edge; ++l) on[l] = on[edge];
+  for (uint32_t l = edge + lines; l < count; ++l) on[l] = on[edge + lines - 1];
+  for (uint32_t l = 0; l + 1 < count; ++l) between[l] = 0.5f * (on[l] + on[l + 1]);
+  between[count - 1] = on[count - 1];
+}
+
+static void merge_row(sonde_echo *echo, uint32_t sample, bool tissue) {
+  float gain[SONDE_FINE][SONDE_MOST_LINES + SONDE_MOST_TAPS + 2 * ECHO_ALIGN];
+  float *row = echo->grid + (size_t)sample * echo->grid_stride;
+  merge_job job = {.grid = row + 4, .count = echo->grid_lines / SONDE_FINE};
+  SONDE_ASSERT(job.count <= SONDE_COUNT_OF(gain[0]));
+  for (int k = 0; k < SONDE_FINE; ++k) {
+    job.gain[k] = gain[k], job.re[k] = echo->line_re[k], job.im[k] = echo->line_im[k];
+    for (uint32_t l = 0; l < job.count && !tissue; ++l) gain[k][l] = 1;
   }
-  echo->kernels->merge(in, gain, echo->line_re, echo->line_im, count);
-  memset(in, 0, echo->grid_stride * sizeof *in);
+  if (tissue) gain_row(echo, sample, gain[0], gain[1]);
+  echo->kernels->merge(&job);
+  memset(row, 0, echo->grid_stride * sizeof *row);
 }
 
 static void lateral_row(sonde_echo *echo, uint32_t sample, bool tissue) {
@@ -56,9 +66,7 @@ static void lateral_row(sonde_echo *echo, uint32_t sample, bool tissue) {
   const double *half_m = psf->elevation_m + band;
   double scale = tissue ? 1 / field_rms(echo, depth, half_m[0] + t * (half_m[1] - half_m[0])) : 1;
   const int *half = psf->half + band;
-  lateral_job job = {.re = echo->line_re + echo->pad_lines,
-                     .im = echo->line_im + echo->pad_lines,
-                     .lines = echo->padded,
+  lateral_job job = {.lines = echo->padded,
                      .half = half[0] > half[1] ? half[0] : half[1],
                      .out = ring_row(echo, sample)};
   double low = scale * (1 - t), high = scale * t;
@@ -67,7 +75,11 @@ static void lateral_row(sonde_echo *echo, uint32_t sample, bool tissue) {
       for (int c = 0; c < 2; ++c)
         job.tap[l][k][c] =
             (float)(low * psf->lateral[band][k][l][c] + high * psf->lateral[band + 1][k][l][c]);
-  gain_row(echo, sample, tissue);
+  for (int k = 0; k < SONDE_FINE; ++k) {
+    job.re[k] = echo->line_re[k] + echo->pad_lines / SONDE_FINE;
+    job.im[k] = echo->line_im[k] + echo->pad_lines / SONDE_FINE;
+  }
+  merge_row(echo, sample, tissue);
   echo->kernels->lateral(&job);
 }
 
@@ -119,7 +131,7 @@ static axial_job axial_of(const sonde_echo *echo, bool tissue) {
 }
 
 void sonde_echo_beam(sonde_echo *echo, bool tissue) {
-  SONDE_ASSERT(echo->grid_lines <= SONDE_MOST_LINES + 2 * SONDE_MOST_TAPS);
+  SONDE_ASSERT(echo->pad_lines % SONDE_FINE == 0);
   axial_job job = axial_of(echo, tissue);
   for (uint32_t n = 0; n < echo->grid_samples; ++n) {
     lateral_row(echo, n, tissue);

@@ -99,7 +99,8 @@ static bool allocate_pool(scatter_pool *pool, size_t count) {
 
 // Rows end with room for whole vectors that run over.
 static bool allocate(sonde_echo *echo) {
-  size_t lines = echo->padded, most_lines = lines + 2 * SONDE_MOST_TAPS + ECHO_ALIGN;
+  size_t lines = echo->padded,
+         most_lines = SONDE_FINE * lines + 2 * SONDE_MOST_TAPS + 4 * ECHO_ALIGN;
   size_t image = lines * echo->samples, most_samples = echo->samples + 2 * SONDE_MOST_TAPS;
   echo->psf = SONDE_NEW(beam_psf, 1);
   echo->node = SONDE_NEW(plane_node, SONDE_PLANE_NODES);
@@ -116,8 +117,10 @@ static bool allocate(sonde_echo *echo) {
   echo->echoes = SONDE_NEW(specular, SONDE_MAX_ECHOES);
   echo->first_echo = SONDE_NEW(int32_t, echo->samples);
   echo->grid = SONDE_NEW(float, (4 * most_lines + 16) * most_samples);
-  echo->line_re = SONDE_NEW(float, most_lines);
-  echo->line_im = SONDE_NEW(float, most_lines);
+  for (int k = 0; k < SONDE_FINE; ++k) {
+    echo->line_re[k] = SONDE_NEW(float, most_lines / SONDE_FINE);
+    echo->line_im[k] = SONDE_NEW(float, most_lines / SONDE_FINE);
+  }
   echo->ring = SONDE_NEW(float, lines *RING_PLANES *(2 * SONDE_MOST_TAPS + 1));
   echo->envelope = SONDE_NEW(float, image);
   echo->flat_envelope = SONDE_NEW(float, image);
@@ -129,8 +132,9 @@ static bool allocate(sonde_echo *echo) {
   return pools && echo->psf && echo->node && echo->plane && echo->wide && echo->row &&
          echo->level[0] && echo->level[1] && echo->scatter && echo->loss && echo->gain &&
          echo->loss_db && echo->air && echo->first_echo && echo->echoes && echo->grid &&
-         echo->line_re && echo->line_im && echo->ring && echo->envelope && echo->flat_envelope &&
-         echo->grey && echo->noise && echo->cell_set;
+         echo->line_re[0] && echo->line_re[1] && echo->line_im[0] && echo->line_im[1] &&
+         echo->ring && echo->envelope && echo->flat_envelope && echo->grey && echo->noise &&
+         echo->cell_set;
 }
 
 static sonde_status check_def(const sonde_echo_def *def, sonde_error *error) {
@@ -181,14 +185,14 @@ sonde_status sonde_echo_create(const sonde_interior *interior, const sonde_echo_
 
 void sonde_echo_destroy(sonde_echo *echo) {
   if (echo == NULL) return;
-  void *parts[] = {echo->psf,        echo->node,     echo->plane,         echo->wide,
-                   echo->row,        echo->level[0], echo->level[1],      echo->scatter,
-                   echo->loss,       echo->gain,     echo->loss_db,       echo->air,
-                   echo->first_echo, echo->echoes,   echo->grid,          echo->line_re,
-                   echo->line_im,    echo->ring,     echo->noise,         echo->cell_set,
-                   echo->envelope,   echo->grey,     echo->flat_envelope, echo->pool.x,
-                   echo->pool.y,     echo->pool.z,   echo->loose.x,       echo->pool.sign,
-                   echo->loose.y,    echo->loose.z,  echo->loose.sign};
+  void *parts[] = {
+      echo->psf,        echo->node,       echo->plane,      echo->wide,       echo->row,
+      echo->level[0],   echo->level[1],   echo->scatter,    echo->loss,       echo->gain,
+      echo->loss_db,    echo->air,        echo->first_echo, echo->echoes,     echo->grid,
+      echo->line_re[0], echo->line_re[1], echo->line_im[1], echo->line_im[0], echo->ring,
+      echo->noise,      echo->cell_set,   echo->envelope,   echo->grey,       echo->flat_envelope,
+      echo->pool.x,     echo->pool.y,     echo->pool.z,     echo->loose.x,    echo->pool.sign,
+      echo->loose.y,    echo->loose.z,    echo->loose.sign};
   for (size_t i = 0; i < SONDE_COUNT_OF(parts); ++i) sonde_free(parts[i]);
   sonde_free(echo);
 }

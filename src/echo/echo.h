@@ -59,9 +59,9 @@ struct sonde_echo {
   const sonde_interior *interior;
   const echo_kernels *kernels;
   uint32_t lines, samples;
-  uint32_t padded;      // lines in whole vectors
-  uint32_t grid_stride; // floats per row of the grid
-  uint32_t grid_lines, grid_samples, pad_lines, pad_samples;
+  uint32_t padded;                                           // lines in whole vectors
+  uint32_t grid_stride;                                      // floats per row of the grid
+  uint32_t grid_lines, grid_samples, pad_lines, pad_samples; // lines: columns of the grid
   double density_m3, cell_m;
   uint32_t per_cell, per_piece; // scatterers of a cube and of an eighth of it
   uint64_t seed;
@@ -87,9 +87,9 @@ struct sonde_echo {
   specular *echoes; // [MAX_ECHOES]
   uint32_t echo_count;
   int32_t *first_echo; // [samples] list of the echoes between this sample and the next
-  float *grid;    // [grid_samples][grid_lines][4] scattered field, kernel.h; zero between frames
-  float *line_re; // one row of it with its gain: [grid_lines]
-  float *line_im;
+  float *grid;         // [grid_samples][grid_stride] scattered field, kernel.h; zero between frames
+  float *line_re[SONDE_FINE]; // one row of it with its gain: [grid_lines / FINE]
+  float *line_im[SONDE_FINE];
   float *ring;          // [2*MOST_TAPS+1][RING_PLANES][padded]
   float *envelope;      // [samples][padded]
   float *flat_envelope; // [samples][lines], what readers see

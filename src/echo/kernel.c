@@ -1,8 +1,8 @@
 // Inner loops of the image; kernel_*_hot.c include this file once per instruction set.
 //
-// splat     scatterers through one affine map onto two lines and three samples each, carrier phase
-// included splat_some  the same, with or without checks at the grid's border lay       one vector
-// of them, in order lateral   symmetric complex kernels of rank three on one row axial     real
+// splat     scatterers through one affine map onto two columns and three samples each, carrier
+// phase included splat_some  the same, with or without checks at the grid's border lay       one
+// vector of them, in order lateral   symmetric complex kernels of rank three on one row axial real
 // kernels down the rows, noise, compensation, modulus, logarithm tissue    in kernel_tissue.h merge
 // shares of neighbouring lines add up fade      attenuation of a row convert   bilinear scan
 // conversion of one row of pixels
@@ -98,22 +98,24 @@ static void splat(const splat_job *job) {
     splat_some(job, false);
 }
 
+INLINE void add_taps(const float tap[SONDE_RANK][2], vf x, vf y, vf sum[RING_PLANES]) {
+  for (int k = 0; k < SONDE_RANK; ++k) {
+    sum[2 * k] = sum[2 * k] + tap[k][0] * x - tap[k][1] * y;
+    sum[2 * k + 1] = sum[2 * k + 1] + tap[k][0] * y + tap[k][1] * x;
+  }
+}
+
 static void lateral(const lateral_job *job) {
   SONDE_ASSERT(job->half >= 0 && job->half <= SONDE_MOST_TAPS);
   for (uint32_t l = 0; l < job->lines; l += W) {
-    const float *re = job->re + l, *im = job->im + l;
-    vf sum[RING_PLANES], x = load(re), y = load(im);
-    for (int k = 0; k < SONDE_RANK; ++k) {
-      const float *u = job->tap[0][k];
-      sum[2 * k] = u[0] * x - u[1] * y, sum[2 * k + 1] = u[0] * y + u[1] * x;
-    }
+    vf sum[RING_PLANES];
+    for (int k = 0; k < RING_PLANES; ++k) sum[k] = all(0);
+    add_taps(job->tap[0], load(job->re[0] + l), load(job->im[0] + l), sum);
     for (int t = 1; t <= job->half; ++t) {
-      x = load(re - t) + load(re + t), y = load(im - t) + load(im + t);
-      for (int k = 0; k < SONDE_RANK; ++k) {
-        const float *u = job->tap[t][k];
-        sum[2 * k] = sum[2 * k] + u[0] * x - u[1] * y;
-        sum[2 * k + 1] = sum[2 * k + 1] + u[0] * y + u[1] * x;
-      }
+      const float *re = job->re[t % 2] + l, *im = job->im[t % 2] + l;
+      int left = (t + 1) / 2, right = t / 2;
+      add_taps(job->tap[t], load(re - left) + load(re + right), load(im - left) + load(im + right),
+               sum);
     }
     for (int k = 0; k < RING_PLANES; ++k) store(job->out + (uint32_t)k * job->lines + l, sum[k]);
   }
@@ -201,18 +203,24 @@ static void convert(const convert_job *job) {
   }
 }
 
-static void merge(const float *grid, const float *gain, float *re, float *im, uint32_t count) {
-  SONDE_ASSERT(count % ECHO_ALIGN == 0);
-  float last[2] = {0};
-  for (uint32_t l = 0; l < count; l += W) {
-    float part[2][W];
-    for (uint32_t k = 0; k < W; ++k) {
-      const float *here = grid + 4 * (size_t)(l + k);
-      part[0][k] = here[0] + last[0], part[1][k] = here[1] + last[1];
-      last[0] = here[2], last[1] = here[3];
-    }
-    store(re + l, load(gain + l) * load(part[0]));
-    store(im + l, load(gain + l) * load(part[1]));
+// Complex numbers of an even column and the odd one after it.
+INLINE v4 pair_of(const float *grid) {
+  v4 before = load4(grid - 4), even = load4(grid), odd = load4(grid + 4);
+  const v4 own = {even[0], even[1], odd[0], odd[1]},
+           late = {before[2], before[3], even[2], even[3]};
+  return own + late;
+}
+
+static void merge(const merge_job *job) {
+  SONDE_ASSERT(job->count % ECHO_ALIGN == 0);
+  for (uint32_t l = 0; l < job->count; l += 4) {
+    const float *grid = job->grid + 8 * (size_t)l;
+    v4 a = pair_of(grid), b = pair_of(grid + 8), c = pair_of(grid + 16), d = pair_of(grid + 24);
+    v4 even = load4(job->gain[0] + l), odd = load4(job->gain[1] + l);
+    const v4 re = {a[0], b[0], c[0], d[0]}, im = {a[1], b[1], c[1], d[1]};
+    const v4 odd_re = {a[2], b[2], c[2], d[2]}, odd_im = {a[3], b[3], c[3], d[3]};
+    store4(job->re[0] + l, even * re), store4(job->im[0] + l, even * im);
+    store4(job->re[1] + l, odd * odd_re), store4(job->im[1] + l, odd * odd_im);
   }
 }
 

@@ -12,9 +12,10 @@ enum {
   ECHO_ALIGN = 16, // lines and batches are padded to whole vectors
   LEVELS = 6,      // skin, dermis, fascia, cortex, vein wall, artery wall
   RING_PLANES = 2 * SONDE_RANK,
+  SONDE_FINE = 2, // columns of the grid per scan line
 };
 
-// Scatterers of one affine map: (line, elevation over its reach, sample) =
+// Scatterers of one affine map: (column, elevation over its reach, sample) =
 // m[0] + m[1] x + m[2] y + m[3] z.
 typedef struct splat_job {
   const float *x, *y, *z, *sign;
@@ -22,16 +23,24 @@ typedef struct splat_job {
   bool cube;      // x, y and z lie within +-1/2
   float m[4][3];
   float turns;         // carrier periods per sample
-  float right, bottom; // last line with a neighbour, half a sample before the last sample
-  // [sample][line][4]: complex shares of the line and of the next one. Whatever overlaps is added
+  float right, bottom; // last column with a neighbour, half a sample before the last sample
+  // [sample][column][4]: complex shares of the column and of the next one. What overlaps is added
   // later: two scatterers then touch the same four numbers or none in common.
   float *grid;
   uint32_t stride; // floats per sample
 } splat_job;
 
+// A row of the grid, times a gain, to even and odd columns.
+typedef struct merge_job {
+  const float *grid;                      // one column of room before the first
+  const float *gain[SONDE_FINE];          // [count]
+  float *re[SONDE_FINE], *im[SONDE_FINE]; // [count]
+  uint32_t count;                         // pairs of columns, multiple of ECHO_ALIGN
+} merge_job;
+
 typedef struct lateral_job {
-  const float *re, *im; // one row; half values before and after
-  uint32_t lines;       // multiple of ECHO_ALIGN
+  const float *re[SONDE_FINE], *im[SONDE_FINE]; // columns on lines, columns between; as merged
+  uint32_t lines;                               // multiple of ECHO_ALIGN
   int half;
   float tap[SONDE_MOST_TAPS + 1][SONDE_RANK][2];
   float *out; // [RING_PLANES][lines] re, im of each term
@@ -77,8 +86,7 @@ typedef struct echo_kernels {
   void (*lateral)(const lateral_job *job);
   void (*axial)(const axial_job *job);
   void (*tissue)(const tissue_job *job);
-  // A row of the grid to complex numbers per line, times a gain; count a multiple of ECHO_ALIGN.
-  void (*merge)(const float *grid, const float *gain, float *re, float *im, uint32_t count);
+  void (*merge)(const merge_job *job);
   void (*fade)(const float *scatter, const float *loss_db, float *gain, uint32_t lines);
   void (*convert)(const convert_job *job);
 } echo_kernels;

@@ -30,13 +30,18 @@ static void splat(const splat_job *job) {
   }
 }
 
+// Column t of line l.
+static double column(const float *const parts[SONDE_FINE], int l, int t) {
+  return (double)parts[t & 1][l + (t - (t & 1)) / 2];
+}
+
 static void lateral(const lateral_job *job) {
   for (uint32_t l = 0; l < job->lines; ++l)
     for (uint32_t k = 0; k < SONDE_RANK; ++k) {
       double re = 0, im = 0;
       for (int t = -job->half; t <= job->half; ++t) {
         const float *u = job->tap[t < 0 ? -t : t][k];
-        double x = (double)job->re[(int)l + t], y = (double)job->im[(int)l + t];
+        double x = column(job->re, (int)l, t), y = column(job->im, (int)l, t);
         re += (double)u[0] * x - (double)u[1] * y, im += (double)u[0] * y + (double)u[1] * x;
       }
       job->out[2 * k * job->lines + l] = (float)re;
@@ -63,11 +68,11 @@ static void axial(const axial_job *job) {
 
 static void tissue(const tissue_job *job) { sonde_echo_kernels_base.tissue(job); }
 
-static void merge(const float *grid, const float *gain, float *re, float *im, uint32_t count) {
-  for (uint32_t l = 0; l < count; ++l) {
-    const float *here = grid + 4 * (size_t)l;
-    re[l] = gain[l] * (l > 0 ? here[-2] + here[0] : here[0]);
-    im[l] = gain[l] * (l > 0 ? here[-1] + here[1] : here[1]);
+static void merge(const merge_job *job) {
+  for (uint32_t i = 0; i < 2 * job->count; ++i) {
+    const float *here = job->grid + 4 * (size_t)i;
+    job->re[i % 2][i / 2] = job->gain[i % 2][i / 2] * (here[0] + here[-2]);
+    job->im[i % 2][i / 2] = job->gain[i % 2][i / 2] * (here[1] + here[-1]);
   }
 }
 

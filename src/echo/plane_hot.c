@@ -48,7 +48,8 @@ void sonde_echo_geometry(sonde_echo *echo, double aperture_m, const sonde_echo_s
 }
 
 beam_key sonde_echo_key(const frame *f) {
-  return (beam_key){f->frequency_hz, f->focus_m, f->depth_m, f->pitch_m, f->step_m, f->radius_m};
+  return (beam_key){f->frequency_hz,         f->focus_m, f->depth_m,
+                    f->pitch_m / SONDE_FINE, f->step_m,  f->radius_m};
 }
 
 void sonde_echo_frame(sonde_echo *echo, sonde_pose world_from_probe, double aperture_m,
@@ -59,14 +60,15 @@ void sonde_echo_frame(sonde_echo *echo, sonde_pose world_from_probe, double aper
   f->from_world = m_transpose(q_matrix(world_from_probe.rotation));
   beam_key key = sonde_echo_key(f);
   if (memcmp(&key, &echo->psf->key, sizeof key) != 0) sonde_psf_build(echo->psf, &key);
-  echo->pad_lines = (uint32_t)echo->psf->half_lines;
+  echo->pad_lines = ((uint32_t)echo->psf->half_lines + 1) / 2 * 2;
   echo->pad_samples = (uint32_t)echo->psf->half_rows;
-  uint32_t needed = echo->lines + 2 * echo->pad_lines + ECHO_ALIGN - 1;
-  echo->grid_lines = needed / ECHO_ALIGN * ECHO_ALIGN;
-  // Four numbers per line; an odd count of cache lines per row spreads the rows over the cache.
+  uint32_t whole = SONDE_FINE * ECHO_ALIGN, needed = SONDE_FINE * echo->lines + 2 * echo->pad_lines;
+  echo->grid_lines = (needed + whole - 1) / whole * whole;
+  // Four numbers per column and one column of room; an odd count of cache lines per row spreads
+  // the rows over the cache.
   echo->grid_stride = 4 * echo->grid_lines + 16;
   echo->grid_samples = echo->samples + 2 * echo->pad_samples;
-  f->edge_lines = echo->pad_lines;
+  f->edge_lines = (double)echo->pad_lines / SONDE_FINE;
   echo->lines_per_column = (echo->lines - 1 + 2 * f->edge_lines) / (SONDE_PLANE_COLUMNS - 1);
   echo->depth_per_row = f->depth_m / (SONDE_PLANE_ROWS - 1);
   echo->vessels = echo->interior->station_count[0] > 0 || echo->interior->station_count[1] > 0;

@@ -22,7 +22,7 @@
 enum { ROWS = 2 * SONDE_MOST_TAPS + 1, ITERATIONS = 40 };
 
 static const double first_depth_m = 1.5e-3;
-static const double lost = 2e-3; // energy share beyond the kernel's reach
+static const double lost = 1e-3; // energy share beyond the kernel's reach
 
 sonde_array sonde_beam_array(const beam_key *key) {
   sonde_array a = sonde_array_default();
@@ -60,6 +60,9 @@ static void tabulate(beam_psf *psf, const sonde_array *array, int b) {
     }
   }
 }
+
+// The axial kernels serve the main lobe first: lines within so many wavelengths weigh more.
+static const double main_lobe = 1, main_weight = 4;
 
 static double weight_of(int line) { return line == 0 ? 1 : 2; } // both sides
 
@@ -112,12 +115,13 @@ static void sharpen(beam_psf *psf, int b) {
 
 static void gram(const beam_psf *psf, double g[ROWS][ROWS]) {
   int rows = 2 * psf->half_rows + 1;
+  double wavelength = sonde_sound_m_s / psf->key.frequency_hz;
   for (int i = 0; i < rows; ++i)
     for (int j = 0; j < rows; ++j) g[i][j] = 0;
   for (int b = 0; b < SONDE_BANDS; ++b)
     for (int l = 0; l <= psf->half_lines; ++l) {
       const double *p = psf->table[b][l];
-      double w = weight_of(l);
+      double w = weight_of(l) * (l * psf->key.pitch_m < main_lobe * wavelength ? main_weight : 1);
       for (int i = 0; i < rows; ++i)
         for (int j = 0; j <= i; ++j)
           g[i][j] += w * (p[2 * i] * p[2 * j] + p[2 * i + 1] * p[2 * j + 1]);

@@ -178,14 +178,15 @@ static void lay(sonde_echo *echo, const map *m, const scatter_pool *pool, uint32
                 uint32_t count) {
   const frame *f = &echo->frame;
   double half = elevation_at(echo, m->origin.z * echo->depth_per_row);
-  const double unit[3] = {echo->lines_per_column, 1 / half, echo->depth_per_row / f->step_m};
+  const double unit[3] = {echo->lines_per_column * SONDE_FINE, 1 / half,
+                          echo->depth_per_row / f->step_m};
   splat_job job = {.x = pool->x + from,
                    .y = pool->y + from,
                    .z = pool->z + from,
                    .sign = pool->sign + from,
                    .count = count,
                    .cube = true,
-                   .grid = echo->grid,
+                   .grid = echo->grid + 4,
                    .stride = echo->grid_stride,
                    .turns = (float)(2 * f->step_m / f->wavelength_m),
                    .right = (float)(echo->grid_lines - 1),
@@ -196,7 +197,6 @@ static void lay(sonde_echo *echo, const map *m, const scatter_pool *pool, uint32
     job.m[k][1] = (float)(v.y * unit[1]);
     job.m[k][2] = (float)(v.z * unit[2]);
   }
-  job.m[0][0] += (float)(echo->pad_lines - f->edge_lines);
   job.m[0][2] += (float)echo->pad_samples;
   float reach = 0.5f * (fabsf(job.m[1][1]) + fabsf(job.m[2][1]) + fabsf(job.m[3][1]));
   if (fabsf(job.m[0][1]) > 1 + reach) return;
@@ -302,7 +302,7 @@ void sonde_echo_scatter_points(sonde_echo *echo, const sonde_echo_point *points,
                    .z = z,
                    .sign = size,
                    .count = ECHO_ALIGN,
-                   .grid = echo->grid,
+                   .grid = echo->grid + 4,
                    .stride = echo->grid_stride,
                    .m = {{0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
                    .turns = (float)(2 * f->step_m / f->wavelength_m),
@@ -311,7 +311,8 @@ void sonde_echo_scatter_points(sonde_echo *echo, const sonde_echo_point *points,
   for (uint32_t i = 0; i < count; ++i) {
     sonde_vec3 at = sonde_echo_unplace(f, vec3(points[i].x_m, points[i].y_m, points[i].z_m));
     uint32_t k = i % ECHO_ALIGN;
-    x[k] = (float)(at.x + echo->pad_lines), z[k] = (float)(at.z / f->step_m + echo->pad_samples);
+    x[k] = (float)(at.x * SONDE_FINE + echo->pad_lines),
+    z[k] = (float)(at.z / f->step_m + echo->pad_samples);
     y[k] = (float)(at.y / elevation_at(echo, at.z)), size[k] = (float)points[i].amplitude;
     if (k + 1 < ECHO_ALIGN && i + 1 < count) continue;
     for (uint32_t rest = k + 1; rest < ECHO_ALIGN; ++rest) x[rest] = -1, size[rest] = 0;
