@@ -61,9 +61,6 @@ static void tabulate(beam_psf *psf, const sonde_array *array, int b) {
   }
 }
 
-// The axial kernels serve the main lobe first: lines within so many wavelengths weigh more.
-static const double main_lobe = 1, main_weight = 4;
-
 static double weight_of(int line) { return line == 0 ? 1 : 2; } // both sides
 
 // Scales a band to unit energy.
@@ -115,13 +112,12 @@ static void sharpen(beam_psf *psf, int b) {
 
 static void gram(const beam_psf *psf, double g[ROWS][ROWS]) {
   int rows = 2 * psf->half_rows + 1;
-  double wavelength = sonde_sound_m_s / psf->key.frequency_hz;
   for (int i = 0; i < rows; ++i)
     for (int j = 0; j < rows; ++j) g[i][j] = 0;
   for (int b = 0; b < SONDE_BANDS; ++b)
     for (int l = 0; l <= psf->half_lines; ++l) {
       const double *p = psf->table[b][l];
-      double w = weight_of(l) * (l * psf->key.pitch_m < main_lobe * wavelength ? main_weight : 1);
+      double w = weight_of(l);
       for (int i = 0; i < rows; ++i)
         for (int j = 0; j <= i; ++j)
           g[i][j] += w * (p[2 * i] * p[2 * j] + p[2 * i + 1] * p[2 * j + 1]);

@@ -6,7 +6,7 @@
 
 enum {
   SONDE_RANK = 3,
-  SONDE_BANDS = 24,    // depths at which the response is known
+  SONDE_BANDS = 40,    // depths at which the response is known
   SONDE_MOST_TAPS = 48 // half width of a kernel, lines or samples
 };
 

@@ -1,0 +1,409 @@
+// sonde validate image: the echographic image measured against its targets.
+// note:        one measure with its target.
+// stage_*:     a synthetic leg, an interior and a renderer.
+// reference:   likeness, widths, flicker against the exact reference.
+// speckle, attenuation, interfaces, enhancement, shadow, closure: on round synthetic legs.
+#include "app.h"
+#include "validate_leg.h"
+
+#include <getopt.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char HELP[] =
+    "usage: sonde validate image [--quick] [--json]\n"
+    "\n"
+    "Measures the echographic image on synthetic scatterers and synthetic legs and compares it\n"
+    "with the exact per-element reference, with path integrals through the known layers and with\n"
+    "the vessels' mechanical state. Exit code 1 when a measure misses its target; the times are\n"
+    "told and do not count.\n"
+    "\n"
+    "  --quick   fewer scatterers and frames\n"
+    "  --json    print one JSON object\n"
+    "  --help    this text\n";
+
+enum { MOST = 40 };
+
+typedef struct measure {
+  char name[48], target[40];
+  double value;
+  bool pass, counts;
+} measure;
+
+typedef struct report {
+  measure list[MOST];
+  int count;
+  bool quick;
+  sonde_error error;
+} report;
+
+// Passes when low <= value <= high.
+static void note(report *r, const char *name, double value, double low, double high,
+                 const char *target) {
+  if (r->count == MOST) return;
+  measure *m = &r->list[r->count++];
+  snprintf(m->name, sizeof m->name, "%s", name);
+  snprintf(m->target, sizeof m->target, "%s", target);
+  m->value = value;
+  m->pass = value >= low && value <= high;
+  m->counts = true;
+}
+
+typedef struct stage {
+  sonde_model leg;
+  sonde_interior *interior;
+  sonde_echo_view view;
+  sonde_pathology pathology;
+  sonde_image image;
+  sonde_vec3 *forces;
+  sonde_pose pose;
+} stage;
+
+static sonde_status stage_open(stage *s, double radius, double bone, double muscle, double depth,
+                               bool vessels, sonde_error *error) {
+  *s = (stage){.view = {.aperture_m = 0.04, .settings = sonde_echo_settings_default()}};
+  sonde_echo_def def = {.plain = true, .seed = 11};
+  sonde_status status = validate_leg_build(radius, bone, muscle, depth, vessels, &s->leg, error);
+  if (!status) status = sonde_interior_create(&s->leg, &s->interior, error);
+  if (!status) status = sonde_echo_create(s->interior, &def, &s->view.echo, error);
+  if (!status) status = sonde_image_create(512, 512, &s->image, error);
+  if (!status) status = sonde_pathology_preset("healthy", &s->pathology, error);
+  if (!status) s->forces = calloc(s->leg.surface.vertex_count, sizeof *s->forces);
+  s->pose = validate_leg_pose(radius - 1e-3, 0.15);
+  return status;
+}
+
+static void stage_close(stage *s) {
+  sonde_image_clear(&s->image);
+  sonde_echo_destroy(s->view.echo);
+  sonde_interior_destroy(s->interior);
+  validate_leg_clear(&s->leg);
+  free(s->forces);
+}
+
+static const float *look(stage *s, uint64_t tick) {
+  uint32_t lines, samples;
+  sonde_interior_update(s->interior,
+                        &(sonde_interior_input){s->leg.surface.vertices, s->forces, s->pose,
+                                                &s->pathology, -1, tick, 0.02, 0.005});
+  sonde_echo_render(s->view.echo, s->pose, s->view.aperture_m, &s->pathology, &s->view.settings,
+                    &s->image);
+  return sonde_echo_envelope(s->view.echo, &lines, &samples);
+}
+
+// Without compensation.
+static void plain_gain(stage *s) {
+  s->view.settings.tgc_db_per_m = -sonde_echo_default_tgc_db_per_m(s->view.settings.frequency_hz);
+}
+
+typedef struct region {
+  double x0, x1, z0, z1;
+} region;
+
+// Mean intensity over a region, and the envelope's mean over its deviation.
+static double intensity(const stage *s, const float *e, region r, double *contrast) {
+  uint32_t lines, samples;
+  (void)sonde_echo_envelope(s->view.echo, &lines, &samples);
+  double pitch = s->view.aperture_m / (lines - 1), step = s->view.settings.depth_m / (samples - 1);
+  double n = 0, sum = 0, square = 0;
+  for (uint32_t k = (uint32_t)(r.z0 / step); k < r.z1 / step && k < samples; ++k)
+    for (uint32_t l = 0; l < lines; ++l) {
+      double x = (l - 0.5 * (lines - 1)) * pitch, v = (double)e[(size_t)k * lines + l];
+      if (x < r.x0 || x > r.x1) continue;
+      n += 1, sum += v, square += v * v;
+    }
+  if (contrast) *contrast = sum / n / sqrt(fmax(square / n - sum / n * sum / n, 1e-30));
+  return square / n;
+}
+
+static double db(double power) { return 10 * log10(fmax(power, 1e-30)); }
+
+static sonde_status reference(report *r) {
+  static const double DEPTHS[] = {0.012, 0.018, 0.025, 0.032, 0.045};
+  stage s;
+  sonde_status status = stage_open(&s, 0.08, 0.014, 2.5e-3, 0, false, &r->error);
+  for (int k = 0; k < 5 && !status; ++k) {
+    char name[48];
+    double likeness = 0;
+    status =
+        sonde_echo_likeness(&s.view, DEPTHS[k], r->quick ? 600 : 2500, 7, &likeness, &r->error);
+    snprintf(name, sizeof name, "likeness_%.0f_mm", DEPTHS[k] * 1e3);
+    note(r, name, likeness, 0.98, 1, ">= 0.98");
+  }
+  double axial = 0, lateral = 0, flicker = 1;
+  for (double z = 0.012; z < 0.06 && !status; z += r->quick ? 0.011 : 0.004) {
+    sonde_echo_widths fast, exact;
+    status = sonde_echo_point_widths(&s.view, z, &fast, &exact, &r->error);
+    axial = fmax(axial, fabs(fast.axial_m / exact.axial_m - 1));
+    lateral = fmax(lateral, fabs(fast.lateral_m / exact.lateral_m - 1));
+  }
+  if (!status) status = sonde_echo_flicker(&s.view, 0.025, 3000, 3, &flicker, &r->error);
+  note(r, "axial_width_error", axial, 0, 0.03, "<= 0.03 of the reference");
+  note(r, "lateral_width_error", lateral, 0, 0.05, "<= 0.05 of the reference");
+  note(r, "flicker", flicker, 0, 0.013, "<= 0.013 rms");
+  stage_close(&s);
+  return status;
+}
+
+static sonde_status speckle(report *r) {
+  stage s;
+  sonde_status status = stage_open(&s, 0.2, 0.014, 2.5e-3, 0, false, &r->error);
+  double sum = 0, count = 0;
+  s.view.settings.tgc_db_per_m = 2 * 100 * 7.5 - sonde_echo_default_tgc_db_per_m(7.5e6);
+  for (int k = 0; k < (r->quick ? 3 : 10) && !status; ++k) {
+    s.pose.position.z = 0.11 + 0.008 * k;
+    const float *e = look(&s, 1);
+    for (double z = 0.012; z < 0.045; z += 0.004)
+      for (double x = -0.016; x < 0.015; x += 0.008, count += 1) {
+        double contrast;
+        intensity(&s, e, (region){x, x + 0.008, z, z + 0.004}, &contrast);
+        sum += contrast;
+      }
+  }
+  note(r, "speckle_mean_over_deviation", sum / count, 1.88, 1.94, "1.91 +- 0.03");
+  stage_close(&s);
+  return status;
+}
+
+// Slope of the log intensity against depth in muscle of 1 dB/cm/MHz.
+static sonde_status attenuation(report *r) {
+  stage s;
+  sonde_status status = stage_open(&s, 0.4, 0.014, 2.5e-3, 0, false, &r->error);
+  for (int k = 0; k < 2 && !status; ++k) {
+    double mhz = k ? 7.5 : 3, sum[16] = {0}, sx = 0, sy = 0, sxx = 0, sxy = 0;
+    double step = fmin(0.065, 0.24 / mhz) / 16;
+    char name[48];
+    s.view.settings.frequency_hz = mhz * 1e6;
+    s.view.settings.depth_m = 0.08;
+    plain_gain(&s);
+    for (int frame = 0; frame < (r->quick ? 6 : 16); ++frame) {
+      s.pose.position.z = 0.10 + 0.006 * frame;
+      const float *e = look(&s, 1);
+      for (int n = 0; n < 16; ++n)
+        sum[n] += intensity(
+            &s, e, (region){-0.018, 0.018, 0.008 + n * step, 0.008 + (n + 1) * step}, NULL);
+    }
+    for (int n = 0; n < 16; ++n) {
+      double x = n * step, y = db(sum[n]);
+      sx += x, sy += y, sxx += x * x, sxy += x * y;
+    }
+    double slope = (16 * sxy - sx * sy) / (16 * sxx - sx * sx); // dB/m, both ways
+    snprintf(name, sizeof name, "attenuation_%.2g_mhz_db_cm_mhz", mhz);
+    note(r, name, -slope / 2 / mhz / 100, 0.98, 1.02, "1.00 +- 0.02 dB/cm/MHz");
+  }
+  stage_close(&s);
+  return status;
+}
+
+// Layers of the synthetic leg down to muscle, then muscle: dB both ways.
+static double loss_to(double depth_m, double mhz, double muscle_m) {
+  double skin = 1.8e-3, fat = muscle_m - skin;
+  return 2 * mhz * (100 * skin + 50 * fat + 100 * (depth_m - muscle_m));
+}
+
+// Echo of the cortex under the middle line, and what is left behind it.
+static sonde_status bone(report *r) {
+  const double radius = 0.05, inner = 0.014, muscle = 6e-3, mhz = 2;
+  stage s;
+  sonde_status status = stage_open(&s, radius, inner, muscle, 0, false, &r->error);
+  double echo = 0, behind = 0, expected_behind = 0, frames = r->quick ? 40 : 120;
+  s.view.settings.frequency_hz = mhz * 1e6;
+  s.view.settings.depth_m = 0.05;
+  plain_gain(&s);
+  double face = 1e-3, cortex = radius - inner - face; // the face lies 1 mm below the skin
+  for (int k = 0; k < frames && !status; ++k) {
+    s.pose.position.z = 0.08 + 0.0011 * k;
+    const float *e = look(&s, (uint64_t)k);
+    uint32_t lines, samples;
+    (void)sonde_echo_envelope(s.view.echo, &lines, &samples);
+    double top = 0, step = s.view.settings.depth_m / (samples - 1);
+    for (uint32_t n = (uint32_t)((cortex - 1e-3) / step); n * step < cortex + 1e-3; ++n)
+      top = fmax(top, (double)e[(size_t)n * lines + lines / 2]);
+    echo += 20 * log10(top) / frames;
+    behind += intensity(&s, e, (region){-5e-4, 5e-4, cortex + 3e-3, cortex + 5e-3}, NULL) / frames;
+  }
+  // The march begins at the face: the first millimetre of skin is behind it.
+  double loss = loss_to(cortex + face, mhz, muscle) - 2 * mhz * 100 * face;
+  note(r, "specular_level_error_db", echo - (36 - loss), -0.5, 0.5,
+       "+- 0.5 dB of the path integral");
+  double noise = -118;
+  for (int n = 0; n < 20; ++n) { // bone behind the cortex, 200 dB/m/MHz, backscatter 0.02
+    double in = 3e-3 + 2e-3 * (n + 0.5) / 20;
+    double level = 20 * log10(0.02) - loss - 55 - 2 * mhz * 200 * in;
+    expected_behind += (pow(10, level / 10) + pow(10, noise / 10)) / 20;
+  }
+  note(r, "shadow_level_error_db", db(behind) - db(expected_behind), -0.5, 0.5,
+       "+- 0.5 dB of the path integral");
+  stage_close(&s);
+  return status;
+}
+
+// Behind a vein against beside it.
+static sonde_status enhancement(report *r) {
+  const double depth = 0.02, lumen = 4.5e-3, wall = 0.6e-3, mhz = 7.5;
+  stage s;
+  sonde_status status = stage_open(&s, 0.2, 0.014, 2.5e-3, depth, true, &r->error);
+  double behind = 0, beside = 0;
+  int frames = r->quick ? 12 : 40;
+  for (int k = 0; k < frames && !status; ++k) {
+    s.pose.position.z = 0.09 + 0.003 * k;
+    const float *e = look(&s, 1);
+    behind += intensity(&s, e, (region){-0.8e-3, 0.8e-3, 0.0265, 0.0325}, NULL);
+    beside += intensity(&s, e, (region){-12e-3, -9e-3, 0.0265, 0.0325}, NULL);
+  }
+  double expected = 2 * mhz * ((100 - 18) * 2 * lumen - (110 - 100) * 2 * wall);
+  note(r, "enhancement_error_db", db(behind / beside) - expected, -0.5, 0.5,
+       "+- 0.5 dB of the path integral");
+  stage_close(&s);
+  return status;
+}
+
+// Front-to-back diameter that the picture shows: between the two walls' echoes on the middle lines.
+static double image_diameter(const stage *s, const float *e, double centre_m) {
+  uint32_t lines, samples;
+  (void)sonde_echo_envelope(s->view.echo, &lines, &samples);
+  double step = s->view.settings.depth_m / (samples - 1), sum[4096] = {0};
+  uint32_t middle = (uint32_t)(centre_m / step), reach = (uint32_t)(7e-3 / step);
+  for (uint32_t n = middle - reach; n <= middle + reach; ++n)
+    for (uint32_t l = lines / 2 - 3; l < lines / 2 + 3; ++l)
+      sum[n] += (double)e[(size_t)n * lines + l];
+  double place[2] = {0};
+  for (int side = 0; side < 2; ++side) {
+    uint32_t best = middle;
+    for (uint32_t k = 0; k <= reach; ++k) {
+      uint32_t n = side ? middle + k : middle - k;
+      if (sum[n] > sum[best]) best = n;
+    }
+    double a = log(sum[best - 1]), b = log(sum[best]), c = log(sum[best + 1]); // peak by a parabola
+    place[side] = best + (a - 2 * b + c < 0 ? 0.5 * (a - c) / (a - 2 * b + c) : 0);
+  }
+  return (place[1] - place[0]) * step;
+}
+
+static void press_skin(stage *s, double newton) {
+  uint32_t count = 0, n = s->leg.surface.vertex_count;
+  for (int pass = 0; pass < 2; ++pass)
+    for (uint32_t i = 0; i < n; ++i) {
+      sonde_vec3 p = s->leg.surface.vertices[i];
+      bool under = p.y > 0 && fabs(p.x) < 0.02 && fabs(p.z - 0.15) < 0.006;
+      if (pass == 0) s->forces[i] = (sonde_vec3){0, 0, 0}, count += under;
+      if (pass == 1 && under) s->forces[i].y = -newton / count;
+    }
+}
+
+// Pressure at which a falling diameter passes a fifth of its rest value.
+static double closure(const double *diameter, const double *pressure, int count) {
+  for (int k = 1; k < count; ++k)
+    if (diameter[k] < 0.2 * diameter[0]) {
+      double t = (diameter[k - 1] - 0.2 * diameter[0]) / (diameter[k - 1] - diameter[k]);
+      return pressure[k - 1] + t * (pressure[k] - pressure[k - 1]);
+    }
+  return NAN;
+}
+
+static sonde_status vein(report *r) {
+  enum { LOADS = 40 };
+  stage s;
+  sonde_status status = stage_open(&s, 0.08, 0.014, 6e-3, 0.018, true, &r->error);
+  double seen[LOADS], true_m[LOADS], pressure[LOADS], worst = 0;
+  int used = 0;
+  for (int k = 0; k < LOADS && !status; ++k) {
+    press_skin(&s, 1.0 * k);
+    sonde_vessel_state v;
+    const float *e = look(&s, (uint64_t)k + 1);
+    if (!sonde_interior_vessel_at_plane(s.interior, 0, s.pose, &v)) break;
+    double centre = s.pose.position.y - v.centre_m.y;
+    true_m[used] = 2 * v.half_short_m, pressure[used] = v.outside_pa / 133.322387415;
+    seen[used] = image_diameter(&s, e, centre);
+    if (true_m[used] > 0.6e-3) worst = fmax(worst, fabs(seen[used] - true_m[used]));
+    if (true_m[used++] < 0.5e-3) break;
+  }
+  note(r, "vein_diameter_error_mm", worst * 1e3, 0, 0.2, "<= 0.2 mm of the mechanics");
+  note(r, "closure_pressure_error_mmhg",
+       closure(seen, pressure, used) - closure(true_m, pressure, used), -3, 3,
+       "+- 3 mmHg of the mechanics");
+  stage_close(&s);
+  return status;
+}
+
+static int by_value(const void *a, const void *b) {
+  double x = *(const double *)a, y = *(const double *)b;
+  return (x > y) - (x < y);
+}
+
+static sonde_status times(report *r) {
+  enum { FRAMES = 30 };
+  stage s;
+  double list[FRAMES];
+  sonde_status status = stage_open(&s, 0.08, 0.014, 6e-3, 0.018, true, &r->error);
+  for (int k = 0; k < FRAMES && !status; ++k) {
+    (void)look(&s, 1);
+    sonde_echo_times t = sonde_echo_last_times(s.view.echo);
+    list[k] = t.plane_s + t.medium_s + t.scatter_s + t.beam_s + t.picture_s;
+    if (k == 0) note(r, "beam_change_ms", t.settings_s * 1e3, 0, 1e9, "told");
+  }
+  if (!status) {
+    qsort(list, FRAMES, sizeof *list, by_value);
+    note(r, "frame_ms", list[FRAMES / 2] * 1e3, 0, 1e9, "told; see sonde bench --scene image");
+    r->list[r->count - 1].counts = false;
+  }
+  stage_close(&s);
+  return status;
+}
+
+static bool print(const report *r, bool json) {
+  bool pass = true;
+  if (json) app_json_begin();
+  for (int k = 0; k < r->count; ++k) {
+    const measure *m = &r->list[k];
+    pass = pass && (m->pass || !m->counts);
+    if (!json) {
+      printf("%-34s %10.4g   %-36s %s\n", m->name, m->value, m->target, m->pass ? "pass" : "FAIL");
+      continue;
+    }
+    app_json_object(m->name);
+    app_json_real("value", m->value);
+    app_json_text("target", m->target);
+    app_json_bool("pass", m->pass);
+    app_json_close();
+  }
+  if (json) {
+    app_json_bool("pass", pass);
+    app_json_end();
+  }
+  return pass;
+}
+
+int validate_image(int argc, char **argv) {
+  static const struct option LONG[] = {{"quick", no_argument, NULL, 'q'},
+                                       {"json", no_argument, NULL, 'j'},
+                                       {"help", no_argument, NULL, 'h'},
+                                       {NULL, 0, NULL, 0}};
+  static sonde_status (*const PARTS[])(report *) = {reference,   speckle, attenuation, bone,
+                                                    enhancement, vein,    times};
+  report r = {0};
+  bool json = false;
+  for (int c; (c = getopt_long(argc, argv, "", LONG, NULL)) != -1;) switch (c) {
+    case 'q': r.quick = true; break;
+    case 'j': json = true; break;
+    case 'h': fputs(HELP, stdout); return APP_OK;
+    default: return APP_BAD_INPUT;
+    }
+  if (argc - optind != 1 || strcmp(argv[optind], "image") != 0)
+    return app_usage_error("validate", "expected what to validate: image");
+  sonde_progress progress = app_progress();
+  sonde_status status = SONDE_OK;
+  const int count = sizeof PARTS / sizeof *PARTS;
+  for (int k = 0; k < count && !status; ++k) {
+    if (!progress.report((double)k / count, "measuring", progress.user)) status = SONDE_CANCELLED;
+    if (!status) status = PARTS[k](&r);
+  }
+  app_progress_end();
+  if (status) {
+    r.error.status = status;
+    return app_fail("validate", &r.error);
+  }
+  return print(&r, json) ? APP_OK : APP_FAILED;
+}
