@@ -46,7 +46,8 @@ typedef struct frame {
 // plane, rows) of the plane.
 typedef struct plane_node {
   sonde_vec3 rest;
-  sonde_vec3 side; // where a step of 1 m beside the plane in rest coordinates leads: same units
+  sonde_vec3 side;   // where a step of 1 m beside the plane in rest coordinates leads: same units
+  sonde_vec3 beside; // rest step per metre beside the plane
   sonde_mat3 in;
 } plane_node;
 

@@ -3,7 +3,7 @@
 //
 // cell_value, texture  value noise
 // sheet                bright layers at whole values
-// septa, bundles       textures of fat and muscle
+// septa, bundles, fascia  textures of fat and muscle
 // wall_distance        signed distance to a vessel's inner wall
 // paint                one vector of lines
 #ifndef SONDE_SRC_ECHO_KERNEL_TISSUE_H
@@ -65,18 +65,25 @@ INLINE vf sheet(vf layer, float share) {
 INLINE vf septa(vf theta, vf s, vf depth) {
   vf bend = texture(theta, s * 70, depth * 250, TURNS_FAT, 1);
   vf strength = texture(theta, s * 110, depth * 500, 2 * TURNS_FAT, 4);
-  return larger(sheet(depth * 300 + 0.9f * bend, 0.22f) * (0.5f + strength), all(0));
+  return larger(sheet(depth * 420 + 1.3f * bend, 0.30f) * (0.55f + strength), all(0));
 }
 
-// Bundles of muscle, in decibels: dark fascicles between broken bright connective layers that run
-// at a small angle to the skin.
+// Bundles of muscle, in decibels: dark fascicles between short bright connective streaks that run
+// at a small angle to the skin and far along the leg.
 INLINE vf bundles(vf theta, vf s, vf depth) {
   vf slant = depth + 0.012f * theta;
   vf bend = texture(theta, s * 40, depth * 130, TURNS_MUSCLE / 3, 2);
   vf fine = texture(theta, s * 90, slant * 900, TURNS_MUSCLE, 3);
-  vf strength = texture(theta, s * 60, slant * 400, TURNS_MUSCLE / 2, 5);
-  vf bright = sheet(slant * 260 + 0.8f * bend, 0.35f) * (0.35f + strength);
-  return 2.5f * fine + 2.5f * bend + 13 * larger(bright, all(0)) - 1;
+  vf strength = texture(theta, s * 60, slant * 700, TURNS_MUSCLE, 5);
+  vf bright = sheet(slant * 420 + 1.4f * bend, 0.5f) * (0.2f + strength);
+  return 2.5f * fine + 3.5f * bend + 19 * larger(bright, all(0)) - 5;
+}
+
+// Connective tissue within half a millimetre of the fascia.
+INLINE vf fascia(vf theta, vf s, vf away) {
+  vf patch = texture(theta, s * 120, all(0.5f), 2 * TURNS_FAT, 7);
+  vf height = larger(1 - size_of(away) * (1 / 0.7e-3f), all(0));
+  return height * (1.6f + 0.9f * patch);
 }
 
 // Signed distance over the row, metres (negative inside): to first order (F - 1)/|grad F| of the
@@ -110,9 +117,14 @@ INLINE vi paint(const tissue_job *job, uint32_t l) {
   vf tissue[2] = {all(skin_tissue[0]), all(skin_tissue[1])};
   vi in_fat = (level[1] >= 0) & (level[2] < 0), in_muscle = (level[1] >= 0) & (level[2] >= 0);
   vf fat_scatter = all(fat_tissue[0]), muscle_scatter = all(job->plain ? 1 : muscle_tissue[0]);
-  if (!job->plain && any(in_fat)) fat_scatter += 1.5f * septa(theta, s, depth);
+  if (!job->plain && any(in_fat)) fat_scatter += 2.2f * septa(theta, s, depth);
   if (!job->plain && any(in_muscle))
     muscle_scatter = muscle_scatter * power2(bundles(theta, s, depth) * 0.16609640474f);
+  vi sheath = (level[1] >= 0) & (size_of(level[2]) < 0.7e-3f);
+  if (!job->plain && any(sheath)) {
+    vf more = fascia(theta, s, level[2]);
+    fat_scatter += more, muscle_scatter += more;
+  }
   mark(in_fat, fat_scatter, fat_tissue[1], tissue);
   mark(in_muscle, muscle_scatter, muscle_tissue[1], tissue);
   for (int v = 1; v >= 0; --v) {

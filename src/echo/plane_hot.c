@@ -12,7 +12,7 @@
 
 #include <string.h>
 
-enum { FIRST_ITERATIONS = 24, ITERATIONS = 3 };
+enum { FIRST_ITERATIONS = 24, ITERATIONS = 8 };
 
 static const double far_away = 50; // in semi-axes
 static const double step_beside = 1e-3;
@@ -152,6 +152,7 @@ static void turn_node(sonde_echo *echo, uint32_t i, uint32_t j) {
   sonde_vec3 beside = q_rotate(echo->frame.probe.rotation, vec3(0, 1, 0));
   double y = fabs(node->side.y) > 0.2 ? node->side.y : 0.2;
   sonde_vec3 c = v_scale(v_madd(v_madd(beside, -node->side.x, a), -node->side.z, b), 1 / y);
+  node->beside = c;
   // Rows of the inverse are the crossed columns over the volume.
   sonde_vec3 bc = v_cross(c, b), ca = v_cross(b, a), ab = v_cross(a, c);
   double volume = v_dot(a, bc), least = 1e-3 * v_norm(a) * v_norm(b) * v_norm(c);

@@ -23,9 +23,9 @@
 
 enum { MOST_PIECES = 12, NEWTON = 3 };
 
-static const double sampling_m = 1.5e-3; // of the slab when looking for cubes
+static const double sampling_m = 1.1e-3; // of the slab when looking for cubes
 static const double reach_radii = 4.0;   // over which a wall moves the tissue around it
-static const double piece_radii = 1.7;   // within which a cube needs smaller pieces
+static const double piece_radii = 2.5;   // within which a cube needs smaller pieces
 
 // p = origin + axis[0] x + axis[1] y + axis[2] z for x, y, z in +-1/2; image coordinates (columns,
 // metres beside the plane, rows) or world.
@@ -263,14 +263,15 @@ static void visit(sonde_echo *echo, sonde_vec3 rest, sonde_vec3 guess) {
 }
 
 // As many samples as the quad's sides in rest coordinates ask for.
-static void visit_quad(sonde_echo *echo, uint32_t i, uint32_t j, sonde_vec3 side) {
+static void visit_quad(sonde_echo *echo, uint32_t i, uint32_t j) {
   const plane_node *n = &echo->node[j * SONDE_PLANE_COLUMNS + i], *low = n + SONDE_PLANE_COLUMNS;
   double wide = fmax(v_distance(n[0].rest, n[1].rest), v_distance(low[0].rest, low[1].rest));
   double high = fmax(v_distance(n[0].rest, low[0].rest), v_distance(n[1].rest, low[1].rest));
   int across = (int)clamp(ceil(wide / sampling_m), 1, MOST_PIECES);
   int down = (int)clamp(ceil(high / sampling_m), 1, MOST_PIECES);
   double half = elevation_at(echo, (j + 0.5) * echo->depth_per_row);
-  int slices = (int)ceil(2 * half / sampling_m) + 1;
+  sonde_vec3 side = v_lerp(n[0].beside, low[1].beside, 0.5);
+  int slices = (int)clamp(ceil(2 * half * v_norm(side) / sampling_m), 2, 4 * MOST_PIECES) + 1;
   for (int jj = 0; jj < down; ++jj)
     for (int ii = 0; ii < across; ++ii) {
       double a = (ii + 0.5) / across, b = (jj + 0.5) / down;
@@ -288,9 +289,8 @@ void sonde_echo_scatter(sonde_echo *echo) {
     echo->stamp = 1;
   }
   echo->cell_count = echo->moved = 0;
-  sonde_vec3 side = q_rotate(echo->frame.probe.rotation, vec3(0, 1, 0));
   for (uint32_t j = 0; j + 1 < SONDE_PLANE_ROWS; ++j)
-    for (uint32_t i = 0; i + 1 < SONDE_PLANE_COLUMNS; ++i) visit_quad(echo, i, j, side);
+    for (uint32_t i = 0; i + 1 < SONDE_PLANE_COLUMNS; ++i) visit_quad(echo, i, j);
 }
 
 // Points of the probe frame, in blocks of one vector.
