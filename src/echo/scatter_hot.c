@@ -140,7 +140,7 @@ static int find_walls(const sonde_echo *echo, sonde_vec3 rest, sonde_vec3 moved,
     sonde_vessel_state v;
     if (!sonde_vessel_at(interior, which, s, &v)) continue;
     double distance = v_distance(moved, v.centre_m) / v.rest_radius_m;
-    if (distance < piece_radii) *close = true; // blood is laid on its own
+    if (distance < piece_radii) *close = true;
     if (fabs(v.area_ratio - 1) < 0.01 || distance > reach_radii) continue;
     walls[count].state = v;
     walls[count++].across = v_cross(v.axis, v.flat_axis);
