@@ -203,9 +203,9 @@ static double loss_to(double depth_m, double mhz, double muscle_m) {
   return 2 * mhz * (100 * skin + 50 * fat + 100 * (depth_m - muscle_m));
 }
 
-// Echo of the cortex under the middle line, and what is left behind it.
+// Echo of a nearly flat cortex under the middle line, and what is left behind it.
 static sonde_status bone(report *r) {
-  const double radius = 0.03, inner = 0.008, muscle = 6e-3, mhz = 4;
+  const double radius = 0.2, inner = 0.179, muscle = 6e-3, mhz = 4;
   stage s;
   sonde_status status = stage_open(&s, radius, inner, muscle, 0, false, &r->error);
   double echo = 0, behind = 0, before = 0, expected_behind = 0, frames = r->quick ? 120 : 200;

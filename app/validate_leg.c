@@ -60,7 +60,7 @@ sonde_status validate_leg_build(double radius_m, double bone_m, double muscle_m,
                                 sonde_error *error) {
   *m = (sonde_model){0};
   sonde_status status = tube(radius_m, AROUND, ROWS, &m->surface, error);
-  if (!status) status = tube(bone_m, 48, 12, &m->femur, error);
+  if (!status) status = tube(bone_m, AROUND, 12, &m->femur, error);
   if (status) return status;
   uint32_t n = m->surface.vertex_count;
   m->normal = malloc(n * sizeof *m->normal);
