@@ -74,9 +74,21 @@ SONDE_API void sonde_echo_render(sonde_echo *echo, sonde_pose world_from_probe, 
 /** CPU time of the stages of the last render, and scatterers moved with the tissue. */
 typedef struct sonde_echo_times {
   double settings_s, plane_s, medium_s, scatter_s, beam_s, picture_s;
-  uint32_t scatterers;
+  uint32_t scatterers, blood; /**< blood: those of them in the lumina */
 } sonde_echo_times;
 SONDE_API sonde_echo_times sonde_echo_last_times(const sonde_echo *echo);
+
+/** Motion of the blood, a function of the time alone. Speeds are means over the section and over
+ *  time; the profile is parabolic. The artery's speed follows its pulse above the diastolic
+ * pressure. Vein and artery flow opposite ways; behind a plug of clot the vein's blood stands. */
+typedef struct sonde_echo_flow {
+  double t_s;                    /**< default 0 */
+  double vein_m_s, artery_m_s;   /**< default 0.08 and 0.13 */
+  sonde_circulation circulation; /**< gives the pulse */
+} sonde_echo_flow;
+SONDE_API sonde_echo_flow sonde_echo_flow_default(void);
+/** Blood of the following renders; finite fields. @thread as sonde_echo_render */
+SONDE_API void sonde_echo_set_flow(sonde_echo *echo, const sonde_echo_flow *flow);
 
 /** Radius of a curved face (m, 20 mm and more), its aperture measured along the arc; 0: flat.
  *  @return SONDE_ARGUMENT @thread as sonde_echo_render */

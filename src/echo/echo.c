@@ -3,7 +3,8 @@
 // sonde_echo_settings_default, sonde_echo_settings_clamp
 // sonde_echo_create   buffers and random tables
 // sonde_echo_destroy
-// fill_tables         scatterers, noise
+// fill_tables         scatterers, streamlines of the blood, noise
+// sonde_echo_flow_default, sonde_echo_set_flow
 // sonde_echo_set_radius, sonde_echo_set_kernels
 #include "base/base.h"
 #include "base/random.h"
@@ -83,8 +84,23 @@ static void fill_pools(sonde_echo *echo) {
     fill_share(&echo->loose, echo->seed + 5, i, piece);
 }
 
+// Streamlines evenly over a round section of unit width, so that the first n fill it for any n;
+// speed over the mean is 2 (1 - (r/R)^2).
+static void fill_blood(sonde_echo *echo) {
+  const scatter_pool *blood = &echo->blood;
+  for (uint32_t i = 0; i < SONDE_BLOOD; ++i) {
+    uint64_t j = 3 * (uint64_t)i, seed = echo->seed + 6;
+    double square = sonde_random_uniform(seed, j), r = 0.5 * sqrt(square);
+    double angle = 2 * SONDE_PI * sonde_random_uniform(seed, j + 1);
+    blood->x[i] = (float)(r * cos(angle)), blood->y[i] = (float)(r * sin(angle));
+    blood->z[i] = (float)sonde_random_uniform(seed, j + 2);
+    blood->sign[i] = (float)(2 * (1 - square));
+  }
+}
+
 static void fill_tables(sonde_echo *echo) {
   fill_pools(echo);
+  fill_blood(echo);
   for (uint64_t i = 0; i < SONDE_NOISE; ++i)
     echo->noise[i] = (float)(sonde_random_normal(echo->seed + 1, i) * sqrt(0.5));
 }
@@ -129,6 +145,7 @@ static bool allocate(sonde_echo *echo) {
   echo->cell_set = SONDE_NEW(uint64_t, SONDE_CELL_SET);
   bool pools = allocate_pool(&echo->pool, SONDE_POOL);
   pools = allocate_pool(&echo->loose, SONDE_LOOSE) && pools;
+  pools = allocate_pool(&echo->blood, SONDE_BLOOD) && pools;
   return pools && echo->psf && echo->node && echo->plane && echo->wide && echo->row &&
          echo->level[0] && echo->level[1] && echo->scatter && echo->loss && echo->gain &&
          echo->loss_db && echo->air && echo->first_echo && echo->echoes && echo->grid &&
@@ -170,6 +187,7 @@ sonde_status sonde_echo_create(const sonde_interior *interior, const sonde_echo_
   made->density_m3 = def->scatterers_per_m3 > 0 ? def->scatterers_per_m3 : default_density_m3;
   made->seed = def->seed;
   made->plain = def->plain;
+  made->flow = sonde_echo_flow_default();
   made->cell_m = cell_size_m;
   double per_cell = made->density_m3 * cell_size_m * cell_size_m * cell_size_m;
   made->per_cell = (uint32_t)clamp(STEP * floor(per_cell / STEP + 0.5), 2 * STEP, MOST_PER_CELL);
@@ -192,7 +210,8 @@ void sonde_echo_destroy(sonde_echo *echo) {
       echo->line_re[0], echo->line_re[1], echo->line_im[1], echo->line_im[0], echo->ring,
       echo->noise,      echo->cell_set,   echo->envelope,   echo->grey,       echo->flat_envelope,
       echo->pool.x,     echo->pool.y,     echo->pool.z,     echo->loose.x,    echo->pool.sign,
-      echo->loose.y,    echo->loose.z,    echo->loose.sign};
+      echo->loose.y,    echo->loose.z,    echo->loose.sign, echo->blood.x,    echo->blood.y,
+      echo->blood.z,    echo->blood.sign};
   for (size_t i = 0; i < SONDE_COUNT_OF(parts); ++i) sonde_free(parts[i]);
   sonde_free(echo);
 }
@@ -202,6 +221,17 @@ const float *sonde_echo_envelope(const sonde_echo *echo, uint32_t *lines, uint32
   *lines = echo->lines;
   *samples = echo->samples;
   return echo->padded == echo->lines ? echo->envelope : echo->flat_envelope;
+}
+
+sonde_echo_flow sonde_echo_flow_default(void) {
+  return (sonde_echo_flow){
+      .vein_m_s = 0.08, .artery_m_s = 0.13, .circulation = sonde_circulation_default()};
+}
+
+void sonde_echo_set_flow(sonde_echo *echo, const sonde_echo_flow *flow) {
+  SONDE_ASSERT(echo != NULL && flow != NULL);
+  SONDE_ASSERT(isfinite(flow->t_s) && isfinite(flow->vein_m_s) && isfinite(flow->artery_m_s));
+  echo->flow = *flow;
 }
 
 sonde_status sonde_echo_set_radius(sonde_echo *echo, double radius_m, sonde_error *error) {

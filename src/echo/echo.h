@@ -18,6 +18,7 @@ enum {
   SONDE_MAX_ECHOES = 24 * SONDE_MOST_LINES, // specular echoes
   SONDE_POOL = 16384,                       // random scatterers shared by all cells
   SONDE_LOOSE = 8192,                       // the same for pieces of cells
+  SONDE_BLOOD = 16384,                      // streamlines of one vessel
   SONDE_NOISE = 65536,
   SONDE_CELL_SET = 16384, // hash set of visited cells
   SONDE_MAX_CELLS = 12000,
@@ -55,6 +56,12 @@ typedef struct plane_node {
 typedef struct scatter_pool {
   float *x, *y, *z, *sign;
 } scatter_pool;
+
+// p = origin + axis[0] x + axis[1] y + axis[2] z for x, y, z in +-1/2, in image coordinates
+// (columns, metres beside the plane, rows).
+typedef struct map {
+  sonde_vec3 origin, axis[3];
+} map;
 
 struct sonde_echo {
   const sonde_interior *interior;
@@ -97,10 +104,12 @@ struct sonde_echo {
   float *grey;          // [samples][padded]
   scatter_pool pool;    // [POOL] sorted by z within each cell's share
   scatter_pool loose;   // [LOOSE] unsorted
-  float *noise;         // [NOISE]
-  uint64_t *cell_set;   // [CELL_SET] key and stamp of the frame that wrote it
+  scatter_pool blood;   // [BLOOD] streamlines: place in a lumen of unit width, speed over the mean
+  sonde_echo_flow flow;
+  float *noise;       // [NOISE]
+  uint64_t *cell_set; // [CELL_SET] key and stamp of the frame that wrote it
   uint16_t stamp;
-  uint32_t cell_count, moved; // cells and scatterers of the last frame
+  uint32_t cell_count, moved, bled; // cells and scatterers of the last frame
   sonde_echo_times times;
 };
 
@@ -113,6 +122,7 @@ void sonde_echo_frame(sonde_echo *echo, sonde_pose world_from_probe, double aper
 void sonde_echo_plane(sonde_echo *echo);
 void sonde_echo_medium(sonde_echo *echo);
 void sonde_echo_scatter(sonde_echo *echo);
+void sonde_echo_blood(sonde_echo *echo);
 void sonde_echo_scatter_points(sonde_echo *echo, const sonde_echo_point *points, uint32_t count);
 void sonde_echo_beam(sonde_echo *echo, bool tissue);
 void sonde_echo_picture(sonde_echo *echo, sonde_image *image);
@@ -121,6 +131,15 @@ void sonde_echo_picture(sonde_echo *echo, sonde_image *image);
 sonde_vec3 sonde_echo_place(const frame *f, double line, double depth_m);
 // Its inverse: (line, metres beside the plane, depth).
 sonde_vec3 sonde_echo_unplace(const frame *f, sonde_vec3 local_m);
+
+// Image coordinates (columns, metres beside the plane, rows) and world.
+sonde_vec3 sonde_echo_to_world(const sonde_echo *echo, sonde_vec3 at);
+sonde_vec3 sonde_echo_from_world(const sonde_echo *echo, sonde_vec3 point_m);
+// Half height of the slab at a depth.
+double sonde_echo_elevation(const sonde_echo *echo, double depth_m);
+// Scatterers `from`.. of a pool through one map into the grid; a multiple of ECHO_ALIGN.
+void sonde_echo_lay(sonde_echo *echo, const map *m, const scatter_pool *pool, uint32_t from,
+                    uint32_t count);
 
 static const float sonde_white_db = 40; // white over the rms of muscle speckle
 // Speed of sound that the scanner assumes, m/s.

@@ -70,12 +70,14 @@ void sonde_echo_render(sonde_echo *echo, sonde_pose world_from_probe, double ape
   sonde_echo_medium(echo);
   t->medium_s = lap(&start);
   sonde_echo_scatter(echo);
+  sonde_echo_blood(echo);
   t->scatter_s = lap(&start);
   sonde_echo_beam(echo, true);
   t->beam_s = lap(&start);
   sonde_echo_picture(echo, image);
   t->picture_s = lap(&start);
   t->scatterers = echo->moved;
+  t->blood = echo->bled;
 }
 
 sonde_echo_times sonde_echo_last_times(const sonde_echo *echo) {

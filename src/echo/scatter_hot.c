@@ -3,17 +3,19 @@
 //
 // Tissue is cut into cubes at rest. A cube's scatterers are a piece of the common pool chosen by
 // the cube's key, so that the same tissue always shows the same speckle. Per frame one affine map
-// per cube takes them straight to lines and samples; near a vessel whose wall has moved eight maps
-// per cube follow it.
+// per cube takes them straight to lines and samples; close to a vessel eight maps per cube follow
+// its wall. Every point goes where sonde_interior_displacement takes it, walls included. The lumen
+// is left to the blood (blood_hot.c).
 //
 // sonde_echo_scatter  all cubes that the slab touches
 // visit_quad, visit   cubes along one coarse quad
 // find                each cube once
 // locate              image coordinates of a rest point, and the derivative there
 // cube_map            map of a cube without vessels
-// find_walls, carry   what the vessels' walls do to it
+// find_vessels, carry, carried  what the vessels' walls do to it
+// find_lumen, in_lumen  places at rest that hold blood
 // place_cell, place_pieces  a cube, or its pieces beside a vessel
-// lay                 scatterers of one map into the grid
+// sonde_echo_lay, lay_outside  scatterers of one map into the grid; those of the tissue alone
 // sonde_echo_scatter_points  given points instead of tissue
 #include "base/base.h"
 #include "base/random.h"
@@ -21,17 +23,9 @@
 
 #include <string.h>
 
-enum { MOST_PIECES = 12, NEWTON = 3 };
+enum { MOST_PIECES = 12, NEWTON = 3, MOST_PER_PIECE = 512 };
 
 static const double sampling_m = 1.1e-3; // of the slab when looking for cubes
-static const double reach_radii = 4.0;   // over which a wall moves the tissue around it
-static const double piece_radii = 2.5;   // within which a cube needs smaller pieces
-
-// p = origin + axis[0] x + axis[1] y + axis[2] z for x, y, z in +-1/2; image coordinates (columns,
-// metres beside the plane, rows) or world.
-typedef struct map {
-  sonde_vec3 origin, axis[3];
-} map;
 
 // ---- from rest to the image ---------------------------------------------------------------
 
@@ -97,13 +91,18 @@ static map cube_map(const sonde_echo *echo, sonde_vec3 centre, sonde_vec3 guess)
 
 // ---- vessels --------------------------------------------------------------------------------
 
-// A vessel whose wall moves the tissue of a cube.
-typedef struct wall {
-  sonde_vessel_state state;
-  sonde_vec3 across;
-} wall;
+static const double close_m = 10e-3; // rest distance within which a cube goes in pieces
+static const double reach_radii = 4; // of the vessel, over which a wall moves the tissue
 
-static sonde_vec3 to_world(const sonde_echo *echo, sonde_vec3 at) {
+// A cube at rest and the vessels beside it.
+typedef struct cube {
+  sonde_vec3 centre; // at rest
+  uint64_t bits;     // that choose its scatterers
+  bool near[2], close;
+  sonde_vessel_state vessel[2];
+} cube;
+
+sonde_vec3 sonde_echo_to_world(const sonde_echo *echo, sonde_vec3 at) {
   const frame *f = &echo->frame;
   double line = at.x * echo->lines_per_column - f->edge_lines;
   sonde_vec3 local = sonde_echo_place(f, line, at.z * echo->depth_per_row);
@@ -111,73 +110,103 @@ static sonde_vec3 to_world(const sonde_echo *echo, sonde_vec3 at) {
   return pose_apply(f->probe, local);
 }
 
-static sonde_vec3 from_world(const sonde_echo *echo, sonde_vec3 p) {
+sonde_vec3 sonde_echo_from_world(const sonde_echo *echo, sonde_vec3 p) {
   const frame *f = &echo->frame;
   sonde_vec3 at = sonde_echo_unplace(f, m_mul_v(f->from_world, v_sub(p, f->probe.position)));
   return vec3((at.x + f->edge_lines) / echo->lines_per_column, at.y, at.z / echo->depth_per_row);
 }
 
-// World point of the undisturbed cross-section -> where the walls take it.
-static sonde_vec3 carry(const wall *walls, int count, sonde_vec3 p) {
-  for (int w = 0; w < count; ++w) {
-    const sonde_vessel_state *v = &walls[w].state;
-    sonde_vec3 d = v_sub(p, v->centre_m);
-    double a = v_dot(d, v->flat_axis), b = v_dot(d, walls[w].across), a1 = a, b1 = b;
-    sonde_vessel_carry(v, &a1, &b1);
-    p = v_madd(v_madd(p, a1 - a, v->flat_axis), b1 - b, walls[w].across);
+// Whether a cube goes in pieces depends on the tissue at rest alone: its scatterers stay the same
+// while the walls move.
+static void find_vessels(const sonde_echo *echo, cube *c) {
+  const sonde_interior *interior = echo->interior;
+  double s = v_dot(v_sub(c->centre, interior->origin), interior->axis);
+  for (int which = 0; which < 2; ++which) {
+    sonde_vessel_state *v = &c->vessel[which];
+    if (!sonde_vessel_at(interior, which, s, v)) continue;
+    double distance = v_distance(c->centre, v->rest_centre_m);
+    c->near[which] = distance < reach_radii * v->rest_radius_m + echo->cell_m;
+    c->close = c->close || distance < close_m;
   }
-  return p;
 }
 
-// Vessels whose moving wall reaches the cube; *close tells whether it needs smaller pieces.
-static int find_walls(const sonde_echo *echo, sonde_vec3 rest, sonde_vec3 moved, wall *walls,
-                      bool *close) {
-  const sonde_interior *interior = echo->interior;
-  double s = v_dot(v_sub(rest, interior->origin), interior->axis);
-  int count = 0;
-  *close = false;
-  for (int which = 0; which < 2; ++which) {
-    sonde_vessel_state v;
-    if (!sonde_vessel_at(interior, which, s, &v)) continue;
-    double distance = v_distance(moved, v.centre_m) / v.rest_radius_m;
-    if (distance < piece_radii) *close = true;
-    if (fabs(v.area_ratio - 1) < 0.01 || distance > reach_radii) continue;
-    walls[count].state = v;
-    walls[count++].across = v_cross(v.axis, v.flat_axis);
-  }
-  return count;
+// Image coordinates of a rest point whose place without vessels is known.
+static sonde_vec3 carry(const sonde_echo *echo, const cube *c, sonde_vec3 rest, sonde_vec3 bare) {
+  sonde_vec3 field = v_sub(sonde_echo_to_world(echo, bare), rest);
+  sonde_vec3 u = sonde_vessels_move(c->near[0] ? &c->vessel[0] : NULL,
+                                    c->near[1] ? &c->vessel[1] : NULL, rest, field);
+  return sonde_echo_from_world(echo, v_add(rest, u));
 }
+
+// Offset of a piece's middle from the cube's along an axis, in edges.
+static double offset_of(int part, int k) { return part < 0 ? 0 : part >> k & 1 ? 0.25 : -0.25; }
 
 // Piece `part` (0..7) of a cube, carried by the walls; part < 0: the whole cube.
-static map carried(const sonde_echo *echo, const wall *walls, int count, const map *m, int part) {
+static map carried(const sonde_echo *echo, const cube *c, const map *m, int part) {
   double size = part < 0 ? 1 : 0.5;
   map out = {.origin = m->origin};
-  for (int k = 0; k < 3 && part >= 0; ++k)
-    out.origin = v_madd(out.origin, (part >> k & 1) ? 0.25 : -0.25, m->axis[k]);
-  for (int k = 0; k < 3; ++k) out.axis[k] = v_scale(m->axis[k], size);
-  if (count == 0) return out;
-  sonde_vec3 centre = out.origin;
-  out.origin = from_world(echo, carry(walls, count, to_world(echo, centre)));
+  sonde_vec3 rest = c->centre, edge[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   for (int k = 0; k < 3; ++k) {
-    sonde_vec3 end = to_world(echo, v_madd(centre, 0.5, out.axis[k]));
-    out.axis[k] = v_scale(v_sub(from_world(echo, carry(walls, count, end)), out.origin), 2);
+    edge[k] = v_scale(edge[k], echo->cell_m);
+    out.origin = v_madd(out.origin, offset_of(part, k), m->axis[k]);
+    rest = v_madd(rest, offset_of(part, k), edge[k]);
+    out.axis[k] = v_scale(m->axis[k], size);
+  }
+  if (!c->near[0] && !c->near[1]) return out;
+  sonde_vec3 bare = out.origin;
+  out.origin = carry(echo, c, rest, bare);
+  for (int k = 0; k < 3; ++k) {
+    sonde_vec3 end =
+        carry(echo, c, v_madd(rest, 0.5 * size, edge[k]), v_madd(bare, 0.5, out.axis[k]));
+    out.axis[k] = v_scale(v_sub(end, out.origin), 2);
   }
   return out;
 }
 
+// Lumen of a vessel over one piece: forms of the scatterers' coordinates, 1 on the wall at rest.
+typedef struct lumen {
+  double along[4], across[4];
+  double solid; // share of the short axis that clot fills, from the far side
+} lumen;
+
+// False when the piece lies beside the lumen or in solid clot, which belongs to the tissue.
+static bool find_lumen(const sonde_echo *echo, const cube *c, int which, int part, lumen *out) {
+  const sonde_vessel_state *v = &c->vessel[which];
+  const sonde_pathology *p = echo->frame.pathology;
+  if (!c->near[which]) return false;
+  double scale = 1 / v->rest_radius_m, piece = 0.5 * echo->cell_m * scale;
+  sonde_vec3 middle = c->centre, side = v_cross(v->axis, v->flat_axis);
+  middle = v_add(middle, v_scale(vec3(offset_of(part, 0), offset_of(part, 1), offset_of(part, 2)),
+                                 echo->cell_m));
+  sonde_vec3 d = v_scale(v_sub(middle, v->rest_centre_m), scale);
+  bool clot = which == 0 && sonde_pathology_clot(p, v->rest_centre_m.z);
+  *out = (lumen){{v_dot(d, v->flat_axis), piece * v->flat_axis.x, piece * v->flat_axis.y,
+                  piece * v->flat_axis.z},
+                 {v_dot(d, side), piece * side.x, piece * side.y, piece * side.z},
+                 clot ? p->thrombus_fraction : 0};
+  return hypot(out->along[0], out->across[0]) < 1 + piece && out->solid < 1;
+}
+
+static bool in_lumen(const lumen *l, double x, double y, double z) {
+  double a = l->along[0] + l->along[1] * x + l->along[2] * y + l->along[3] * z;
+  double b = l->across[0] + l->across[1] * x + l->across[2] * y + l->across[3] * z;
+  return a * a + b * b < 1 && !(-a > 1 - 2 * l->solid);
+}
+
 // ---- laying ---------------------------------------------------------------------------------
 
-static double elevation_at(const sonde_echo *echo, double depth_m) {
+double sonde_echo_elevation(const sonde_echo *echo, double depth_m) {
   int band;
   double t = sonde_psf_band(echo->psf, depth_m, &band);
   const double *half = echo->psf->elevation_m + band;
   return half[0] + t * (half[1] - half[0]);
 }
 
-static void lay(sonde_echo *echo, const map *m, const scatter_pool *pool, uint32_t from,
-                uint32_t count) {
+void sonde_echo_lay(sonde_echo *echo, const map *m, const scatter_pool *pool, uint32_t from,
+                    uint32_t count) {
+  SONDE_ASSERT(count % ECHO_ALIGN == 0);
   const frame *f = &echo->frame;
-  double half = elevation_at(echo, m->origin.z * echo->depth_per_row);
+  double half = sonde_echo_elevation(echo, m->origin.z * echo->depth_per_row);
   const double unit[3] = {echo->lines_per_column * SONDE_FINE, 1 / half,
                           echo->depth_per_row / f->step_m};
   splat_job job = {.x = pool->x + from,
@@ -204,34 +233,58 @@ static void lay(sonde_echo *echo, const map *m, const scatter_pool *pool, uint32
   echo->kernels->splat(&job);
 }
 
-static void place_pieces(sonde_echo *echo, const wall *walls, int count, const map *m,
-                         uint64_t bits) {
+// Without the scatterers whose place at rest is in a lumen: blood has its own.
+static void lay_outside(sonde_echo *echo, const map *m, const lumen *in, int lumens,
+                        uint32_t from) {
+  float x[MOST_PER_PIECE], y[MOST_PER_PIECE], z[MOST_PER_PIECE], sign[MOST_PER_PIECE];
+  const scatter_pool *pool = &echo->loose;
+  uint32_t kept = 0;
+  SONDE_ASSERT(echo->per_piece <= MOST_PER_PIECE);
+  for (uint32_t i = from; i < from + echo->per_piece; ++i) {
+    double at[3] = {(double)pool->x[i], (double)pool->y[i], (double)pool->z[i]};
+    bool inside = false;
+    for (int k = 0; k < lumens; ++k) inside = inside || in_lumen(&in[k], at[0], at[1], at[2]);
+    if (inside) continue;
+    x[kept] = pool->x[i], y[kept] = pool->y[i], z[kept] = pool->z[i];
+    sign[kept++] = pool->sign[i];
+  }
+  for (; kept % ECHO_ALIGN; ++kept) x[kept] = y[kept] = z[kept] = sign[kept] = 0;
+  scatter_pool some = {x, y, z, sign};
+  if (kept > 0) sonde_echo_lay(echo, m, &some, 0, kept);
+}
+
+static void place_pieces(sonde_echo *echo, const cube *c, const map *m) {
   uint32_t each = echo->per_piece, shares = SONDE_LOOSE / each;
   for (int part = 0; part < 8; ++part) {
-    map piece = carried(echo, walls, count, m, part);
-    uint32_t share = (uint32_t)(bits >> 32) + (uint32_t)part;
-    lay(echo, &piece, &echo->loose, share % shares * each, each);
+    map piece = carried(echo, c, m, part);
+    uint32_t share = (uint32_t)(c->bits >> 32) + (uint32_t)part, from = share % shares * each;
+    lumen in[2];
+    int lumens = 0;
+    for (int which = 0; which < 2; ++which)
+      if (find_lumen(echo, c, which, part, &in[lumens])) ++lumens;
+    if (lumens > 0)
+      lay_outside(echo, &piece, in, lumens, from);
+    else
+      sonde_echo_lay(echo, &piece, &echo->loose, from, each);
   }
 }
 
 static void place_cell(sonde_echo *echo, const int32_t cell[3], uint64_t key, sonde_vec3 guess) {
   double h = echo->cell_m;
-  sonde_vec3 centre = vec3((cell[0] + 0.5) * h, (cell[1] + 0.5) * h, (cell[2] + 0.5) * h);
-  uint64_t bits = sonde_random_bits(echo->seed + 2, key);
-  map m = cube_map(echo, centre, guess);
-  wall walls[2];
-  bool close = false;
-  int count = 0;
-  if (echo->vessels) count = find_walls(echo, centre, to_world(echo, m.origin), walls, &close);
-  if (close && count > 0) {
-    place_pieces(echo, walls, count, &m, bits);
-  } else {
-    map whole = carried(echo, walls, count, &m, -1);
-    for (int k = 0; k < 3; ++k) // mirrored patterns look new
-      if (bits >> (61 + k) & 1) whole.axis[k] = v_neg(whole.axis[k]);
-    uint32_t patterns = SONDE_POOL / echo->per_cell;
-    lay(echo, &whole, &echo->pool, (uint32_t)(bits % patterns) * echo->per_cell, echo->per_cell);
+  cube c = {.centre = vec3((cell[0] + 0.5) * h, (cell[1] + 0.5) * h, (cell[2] + 0.5) * h),
+            .bits = sonde_random_bits(echo->seed + 2, key)};
+  map m = cube_map(echo, c.centre, guess);
+  if (echo->vessels) find_vessels(echo, &c);
+  if (c.close) {
+    place_pieces(echo, &c, &m);
+    return;
   }
+  map whole = carried(echo, &c, &m, -1);
+  for (int k = 0; k < 3; ++k) // mirrored patterns look new
+    if (c.bits >> (61 + k) & 1) whole.axis[k] = v_neg(whole.axis[k]);
+  uint32_t patterns = SONDE_POOL / echo->per_cell;
+  sonde_echo_lay(echo, &whole, &echo->pool, (uint32_t)(c.bits % patterns) * echo->per_cell,
+                 echo->per_cell);
 }
 
 // ---- cubes ----------------------------------------------------------------------------------
@@ -269,7 +322,7 @@ static void visit_quad(sonde_echo *echo, uint32_t i, uint32_t j) {
   double high = fmax(v_distance(n[0].rest, low[0].rest), v_distance(n[1].rest, low[1].rest));
   int across = (int)clamp(ceil(wide / sampling_m), 1, MOST_PIECES);
   int down = (int)clamp(ceil(high / sampling_m), 1, MOST_PIECES);
-  double half = elevation_at(echo, (j + 0.5) * echo->depth_per_row);
+  double half = sonde_echo_elevation(echo, (j + 0.5) * echo->depth_per_row);
   sonde_vec3 side = v_lerp(n[0].beside, low[1].beside, 0.5);
   int slices = (int)clamp(ceil(2 * half * v_norm(side) / sampling_m), 2, 4 * MOST_PIECES) + 1;
   for (int jj = 0; jj < down; ++jj)
@@ -313,7 +366,7 @@ void sonde_echo_scatter_points(sonde_echo *echo, const sonde_echo_point *points,
     uint32_t k = i % ECHO_ALIGN;
     x[k] = (float)(at.x * SONDE_FINE + echo->pad_lines),
     z[k] = (float)(at.z / f->step_m + echo->pad_samples);
-    y[k] = (float)(at.y / elevation_at(echo, at.z)), size[k] = (float)points[i].amplitude;
+    y[k] = (float)(at.y / sonde_echo_elevation(echo, at.z)), size[k] = (float)points[i].amplitude;
     if (k + 1 < ECHO_ALIGN && i + 1 < count) continue;
     for (uint32_t rest = k + 1; rest < ECHO_ALIGN; ++rest) x[rest] = -1, size[rest] = 0;
     echo->kernels->splat(&job);

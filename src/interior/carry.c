@@ -3,6 +3,7 @@
 // sonde_interior_displacement  field and vessels; zero outside and in bone
 // sonde_interior_displacements the same for many points
 // sonde_interior_rest_point    inverse: exact in a lumen, iterated elsewhere
+// sonde_vessels_move           the same from a known field and the vessels' states
 // pull                         where one vessel wants a point, and how firmly
 // combine                      two vessels: each is exact on its own wall
 #include "base/base.h"
@@ -18,21 +19,19 @@ typedef struct pulled {
 
 // Offsets in the cross-section go to the ellipse (and its area-preserving surroundings); the motion
 // along the vessel stays the field's.
-static pulled pull(const sonde_interior *in, int which, double s, sonde_vec3 rest,
-                   sonde_vec3 field) {
-  sonde_vessel_state v;
+static pulled pull(const sonde_vessel_state *v, sonde_vec3 rest, sonde_vec3 field) {
   pulled none = {0, field};
-  if (!sonde_vessel_at(in, which, s, &v)) return none;
-  sonde_vec3 d = v_sub(rest, v.rest_centre_m), across = v_cross(v.axis, v.flat_axis);
-  double a = v_dot(d, v.flat_axis), b = v_dot(d, across), a1 = a, b1 = b;
-  double t = (hypot(a, b) / v.rest_radius_m - 1) / reach;
-  double engaged = clamp(fabs(1 - v.area_ratio) / engaged_loss, 0, 1);
+  if (!v) return none;
+  sonde_vec3 d = v_sub(rest, v->rest_centre_m), across = v_cross(v->axis, v->flat_axis);
+  double a = v_dot(d, v->flat_axis), b = v_dot(d, across), a1 = a, b1 = b;
+  double t = (hypot(a, b) / v->rest_radius_m - 1) / reach;
+  double engaged = clamp(fabs(1 - v->area_ratio) / engaged_loss, 0, 1);
   if (t >= 1 || !(engaged > 0)) return none;
   t = fmax(t, 0);
-  sonde_vessel_carry(&v, &a1, &b1);
-  sonde_vec3 move = v_sub(v.centre_m, v.rest_centre_m);
-  move = v_madd(v_madd(move, a1 - a, v.flat_axis), b1 - b, across);
-  move = v_madd(move, v_dot(v_sub(field, move), v.axis), v.axis);
+  sonde_vessel_carry(v, &a1, &b1);
+  sonde_vec3 move = v_sub(v->centre_m, v->rest_centre_m);
+  move = v_madd(v_madd(move, a1 - a, v->flat_axis), b1 - b, across);
+  move = v_madd(move, v_dot(v_sub(field, move), v->axis), v->axis);
   return (pulled){engaged * (1 - t) * (1 - t) * (1 + 2 * t), move};
 }
 
@@ -44,9 +43,16 @@ static sonde_vec3 combine(sonde_vec3 field, pulled a, pulled b) {
   return v_madd(u, wb, v_sub(b.move, field));
 }
 
+sonde_vec3 sonde_vessels_move(const sonde_vessel_state *vein, const sonde_vessel_state *artery,
+                              sonde_vec3 rest, sonde_vec3 field) {
+  return combine(field, pull(vein, rest, field), pull(artery, rest, field));
+}
+
 static sonde_vec3 displace(const sonde_interior *in, sonde_vec3 rest, double s) {
-  sonde_vec3 field = sonde_interior_field(in, rest);
-  return combine(field, pull(in, 0, s, rest, field), pull(in, 1, s, rest, field));
+  sonde_vessel_state vein, artery;
+  bool has_vein = sonde_vessel_at(in, 0, s, &vein), has_artery = sonde_vessel_at(in, 1, s, &artery);
+  return sonde_vessels_move(has_vein ? &vein : NULL, has_artery ? &artery : NULL, rest,
+                            sonde_interior_field(in, rest));
 }
 
 sonde_vec3 sonde_interior_displacement(const sonde_interior *in, sonde_vec3 rest) {

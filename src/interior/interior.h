@@ -95,6 +95,11 @@ bool sonde_vessel_at(const sonde_interior *interior, int which, double s_m,
 // (rest + field): area-preserving, fading out with distance. @thread any
 void sonde_vessel_carry(const sonde_vessel_state *state, double *short_m, double *long_m);
 
+// Displacement of a rest point whose field is known; vessels near it or NULL. What
+// sonde_interior_displacement gives inside the tissue. @thread any
+sonde_vec3 sonde_vessels_move(const sonde_vessel_state *vein, const sonde_vessel_state *artery,
+                              sonde_vec3 rest_m, sonde_vec3 field_m);
+
 // Stages of an update.
 void sonde_interior_solve(sonde_interior *interior, const sonde_vec3 *positions_m);
 void sonde_interior_vessels(sonde_interior *interior, const sonde_interior_input *input);

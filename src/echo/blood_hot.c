@@ -1,0 +1,120 @@
+// Blood: scatterers of its own in the lumina, as dense as the tissue's, so that their number
+// follows the area and a closed vein leaves none.
+//
+// Every streamline carries a train of scatterers one segment apart whose signs are drawn from the
+// train's count: flow of any length needs no memory, and each scatterer moves on from segment to
+// segment.
+//
+// sonde_echo_blood   both vessels, segment by segment
+// beats_of           mean share of the pulse up to a time
+// travelled          way of the mean flow in a vessel
+// segment_map        one segment's lumen in image coordinates
+// lay_segment        scatterers on the streamlines of one segment
+// flow               all segments of a vessel
+#include "base/base.h"
+#include "echo/echo.h"
+
+enum { PULSE_STEPS = 64, BATCH = 512 };
+
+static const double segment_m = 2e-3; // along the leg's axis
+
+// Pulses since t = 0, weighted by the pressure above the diastolic one: grows by 1 per beat.
+static double beats_of(const sonde_circulation *c, double t) {
+  if (!(c->heart_rate_hz > 0)) return 0;
+  double beats = c->heart_rate_hz * t, whole = floor(beats), sum = 0, part = 0;
+  for (int k = 0; k < PULSE_STEPS; ++k) {
+    double at = (k + 0.5) / PULSE_STEPS / c->heart_rate_hz;
+    double push = fmax(sonde_arterial_pressure(c, at) - c->diastolic_pa, 0);
+    sum += push;
+    part += push * clamp((beats - whole) * PULSE_STEPS - k, 0, 1);
+  }
+  return whole + (sum > 0 ? part / sum : beats - whole);
+}
+
+// Way of the mean flow since t = 0, m.
+static double travelled(const sonde_echo *echo, int which) {
+  const sonde_echo_flow *flow = &echo->flow;
+  if (which == 0)
+    return echo->frame.pathology->thrombus_fraction < 1 ? flow->vein_m_s * flow->t_s : 0;
+  double rate = flow->circulation.heart_rate_hz;
+  if (!(rate > 0)) return -flow->artery_m_s * flow->t_s;
+  return -flow->artery_m_s / rate * beats_of(&flow->circulation, flow->t_s);
+}
+
+// Lumen between two sections; returns its volume, 0 when it is out of the picture.
+static double segment_map(const sonde_echo *echo, const sonde_vessel_state *low,
+                          const sonde_vessel_state *high, map *out) {
+  sonde_vec3 middle = v_lerp(low->centre_m, high->centre_m, 0.5);
+  sonde_vec3 along = v_sub(high->centre_m, low->centre_m);
+  double half_short = 0.5 * (low->half_short_m + high->half_short_m);
+  double half_long = 0.5 * (low->half_long_m + high->half_long_m), length = v_norm(along);
+  sonde_vec3 edge[3] = {v_scale(low->flat_axis, 2 * half_short),
+                        v_scale(v_cross(low->axis, low->flat_axis), 2 * half_long), along};
+  out->origin = sonde_echo_from_world(echo, middle);
+  double depth = out->origin.z * echo->depth_per_row, reach = half_long + length;
+  double slab = sonde_echo_elevation(echo, depth);
+  if (fabs(out->origin.y) > slab + reach || depth < -reach) return 0;
+  if (depth > echo->frame.depth_m + reach) return 0;
+  for (int k = 0; k < 3; ++k)
+    out->axis[k] =
+        v_scale(v_sub(sonde_echo_from_world(echo, v_madd(middle, 0.5, edge[k])), out->origin), 2);
+  return SONDE_PI * half_short * half_long * length;
+}
+
+static float sign_of(uint32_t train, uint32_t streamline, uint32_t salt) {
+  uint32_t h = train * 0x9e3779b1u ^ streamline * 0x85ebca77u ^ salt * 0xc2b2ae3du;
+  h = (h ^ (h >> 15)) * 0x2c1b3c6du;
+  h = (h ^ (h >> 12)) * 0x297a2d39u;
+  return (h ^ (h >> 15)) & 1 ? 1.0f : -1.0f;
+}
+
+// @param solid share of the short axis that clot fills, from the far side; its scatterers belong to
+// the tissue
+static void lay_segment(sonde_echo *echo, const map *m, uint32_t count, int32_t segment,
+                        uint32_t salt, double way, double solid) {
+  float x[BATCH], y[BATCH], z[BATCH], sign[BATCH];
+  const scatter_pool *blood = &echo->blood, some = {x, y, z, sign};
+  SONDE_ASSERT(count <= SONDE_BLOOD && solid < 1);
+  for (uint32_t i = 0; i < count;) {
+    uint32_t kept = 0;
+    for (; i < count && kept < BATCH; ++i) {
+      if (-2 * (double)blood->x[i] > 1 - 2 * solid) continue;
+      double at = (double)blood->z[i] + way * (double)blood->sign[i], whole = floor(at);
+      x[kept] = blood->x[i], y[kept] = blood->y[i], z[kept] = (float)(at - whole - 0.5);
+      sign[kept++] = sign_of((uint32_t)(segment - (int32_t)whole), i, salt);
+    }
+    echo->bled += kept;
+    for (; kept % ECHO_ALIGN; ++kept) x[kept] = y[kept] = z[kept] = sign[kept] = 0;
+    if (kept > 0) sonde_echo_lay(echo, m, &some, 0, kept);
+  }
+}
+
+static void flow(sonde_echo *echo, int which) {
+  const sonde_interior *interior = echo->interior;
+  const sonde_pathology *p = echo->frame.pathology;
+  uint32_t stations = interior->station_count[which];
+  if (stations < 2) return;
+  double density = echo->per_cell / (echo->cell_m * echo->cell_m * echo->cell_m);
+  double way = travelled(echo, which) / segment_m;
+  const sonde_station *station = interior->station[which];
+  int32_t first = (int32_t)ceil(station[0].s_m / segment_m);
+  int32_t last = (int32_t)floor(station[stations - 1].s_m / segment_m);
+  uint32_t salt = (uint32_t)echo->seed + (uint32_t)which;
+  sonde_vessel_state low, high;
+  bool known = sonde_vessel_at(interior, which, first * segment_m, &low);
+  for (int32_t k = first; k < last && known; ++k, low = high) {
+    known = sonde_vessel_at(interior, which, (k + 1) * segment_m, &high);
+    bool clot = which == 0 && sonde_pathology_clot(p, low.rest_centre_m.z);
+    double solid = clot ? p->thrombus_fraction : 0, volume = 0;
+    map m;
+    if (known && solid < 1) volume = segment_map(echo, &low, &high, &m);
+    uint32_t count = (uint32_t)fmin(density * volume, SONDE_BLOOD);
+    if (count > 0) lay_segment(echo, &m, count, k, salt, way, solid);
+  }
+}
+
+void sonde_echo_blood(sonde_echo *echo) {
+  SONDE_ASSERT(echo->frame.pathology != NULL);
+  echo->bled = 0;
+  for (int which = 0; which < 2; ++which) flow(echo, which);
+}
