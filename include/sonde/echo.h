@@ -71,6 +71,19 @@ SONDE_API void sonde_echo_render(sonde_echo *echo, sonde_pose world_from_probe, 
                                  const sonde_pathology *pathology,
                                  const sonde_echo_settings *settings, sonde_image *image);
 
+/** Steps that a new beam takes in all; one costs about a millisecond. */
+#define SONDE_ECHO_PREPARE_STEPS 42
+/**
+ * Builds the beam that other frequency, focus, depth or aperture need beside the one in use, at
+ * most `steps` steps of it per call; renders in between go on with their own settings. Without it,
+ * or before it is ready, the next render with these settings does what is left. Asking for another
+ * beam drops the one under way.
+ * @return true when a render with these settings finds its beam ready
+ * @thread as sonde_echo_render; no allocation
+ */
+SONDE_API bool sonde_echo_prepare(sonde_echo *echo, double aperture_m,
+                                  const sonde_echo_settings *settings, uint32_t steps);
+
 /** CPU time of the stages of the last render, and scatterers moved with the tissue. */
 typedef struct sonde_echo_times {
   double settings_s, plane_s, medium_s, scatter_s, beam_s, picture_s;

@@ -119,6 +119,7 @@ static bool allocate(sonde_echo *echo) {
          most_lines = SONDE_FINE * lines + 2 * SONDE_MOST_TAPS + 4 * ECHO_ALIGN;
   size_t image = lines * echo->samples, most_samples = echo->samples + 2 * SONDE_MOST_TAPS;
   echo->psf = SONDE_NEW(beam_psf, 1);
+  echo->spare = SONDE_NEW(beam_psf, 1);
   echo->node = SONDE_NEW(plane_node, SONDE_PLANE_NODES);
   echo->plane = SONDE_NEW(float, SONDE_PLANE_NODES *PLANE_FIELDS);
   echo->wide = SONDE_NEW(float, 2 * lines * PLANE_FIELDS);
@@ -146,12 +147,12 @@ static bool allocate(sonde_echo *echo) {
   bool pools = allocate_pool(&echo->pool, SONDE_POOL);
   pools = allocate_pool(&echo->loose, SONDE_LOOSE) && pools;
   pools = allocate_pool(&echo->blood, SONDE_BLOOD) && pools;
-  return pools && echo->psf && echo->node && echo->plane && echo->wide && echo->row &&
-         echo->level[0] && echo->level[1] && echo->scatter && echo->loss && echo->gain &&
-         echo->loss_db && echo->air && echo->first_echo && echo->echoes && echo->grid &&
-         echo->line_re[0] && echo->line_re[1] && echo->line_im[0] && echo->line_im[1] &&
-         echo->ring && echo->envelope && echo->flat_envelope && echo->grey && echo->noise &&
-         echo->cell_set;
+  return pools && echo->psf && echo->spare && echo->node && echo->plane && echo->wide &&
+         echo->row && echo->level[0] && echo->level[1] && echo->scatter && echo->loss &&
+         echo->gain && echo->loss_db && echo->air && echo->first_echo && echo->echoes &&
+         echo->grid && echo->line_re[0] && echo->line_re[1] && echo->line_im[0] &&
+         echo->line_im[1] && echo->ring && echo->envelope && echo->flat_envelope && echo->grey &&
+         echo->noise && echo->cell_set;
 }
 
 static sonde_status check_def(const sonde_echo_def *def, sonde_error *error) {
@@ -211,7 +212,7 @@ void sonde_echo_destroy(sonde_echo *echo) {
       echo->noise,      echo->cell_set,   echo->envelope,   echo->grey,       echo->flat_envelope,
       echo->pool.x,     echo->pool.y,     echo->pool.z,     echo->loose.x,    echo->pool.sign,
       echo->loose.y,    echo->loose.z,    echo->loose.sign, echo->blood.x,    echo->blood.y,
-      echo->blood.z,    echo->blood.sign};
+      echo->blood.z,    echo->blood.sign, echo->spare};
   for (size_t i = 0; i < SONDE_COUNT_OF(parts); ++i) sonde_free(parts[i]);
   sonde_free(echo);
 }

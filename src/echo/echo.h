@@ -80,17 +80,17 @@ struct sonde_echo {
   float line_share[SONDE_MOST_LINES];     // way to the next
   double lines_per_column, depth_per_row; // of the coarse plane; depth in m
   bool vessels;                           // any
-  beam_psf *psf;
-  plane_node *node; // [PLANE_NODES]
-  float *plane;     // [PLANE_FIELDS][PLANE_NODES]
-  float *wide;      // [2][PLANE_FIELDS][padded] two coarse rows, per line
-  float *row;       // [PLANE_FIELDS][padded], one row of the march
-  float *level[2];  // [LEVELS][padded] of this row and the last
-  float *scatter;   // [padded] of this row
-  float *loss;      // [padded] of this row
-  float *gain;      // [MEDIUM_ROWS][padded]
-  float *loss_db;   // [padded] accumulated
-  uint8_t *air;     // [padded]
+  beam_psf *psf, *spare;                  // in use; being built or the one before
+  plane_node *node;                       // [PLANE_NODES]
+  float *plane;                           // [PLANE_FIELDS][PLANE_NODES]
+  float *wide;                            // [2][PLANE_FIELDS][padded] two coarse rows, per line
+  float *row;                             // [PLANE_FIELDS][padded], one row of the march
+  float *level[2];                        // [LEVELS][padded] of this row and the last
+  float *scatter;                         // [padded] of this row
+  float *loss;                            // [padded] of this row
+  float *gain;                            // [MEDIUM_ROWS][padded]
+  float *loss_db;                         // [padded] accumulated
+  uint8_t *air;                           // [padded]
   bool some_air;
   specular *echoes; // [MAX_ECHOES]
   uint32_t echo_count;

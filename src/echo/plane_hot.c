@@ -2,6 +2,7 @@
 // its place in the vessels' cross-sections. These fields are smooth; later stages interpolate them.
 //
 // sonde_echo_frame, sonde_echo_geometry, sonde_echo_key  constants of a frame, its beam
+// sonde_echo_prepare, begin_spare, take_beam  the beam of new settings, built beside the one in use
 // sonde_echo_place, sonde_echo_unplace  image coordinates of a flat or curved face
 // sonde_echo_plane   all nodes, each inverted from the guess that the node above it gives
 // place_node         rest point, and where a step beside the plane leads
@@ -13,6 +14,8 @@
 #include <string.h>
 
 enum { FIRST_ITERATIONS = 24, ITERATIONS = 8 };
+
+_Static_assert((int)SONDE_PSF_STEPS == SONDE_ECHO_PREPARE_STEPS, "steps of a beam");
 
 static const double far_away = 50; // in semi-axes
 static const double step_beside = 1e-3;
@@ -52,6 +55,36 @@ beam_key sonde_echo_key(const frame *f) {
                     f->pitch_m / SONDE_FINE, f->step_m,  f->radius_m};
 }
 
+// The beam of a key into the spare slot, if it is not there yet.
+static void begin_spare(sonde_echo *echo, const beam_key *key) {
+  if (!sonde_psf_is_for(echo->spare, key)) sonde_psf_begin(echo->spare, key);
+}
+
+bool sonde_echo_prepare(sonde_echo *echo, double aperture_m, const sonde_echo_settings *settings,
+                        uint32_t steps) {
+  SONDE_ASSERT(echo != NULL && settings != NULL && aperture_m > 0);
+  frame kept = echo->frame;
+  sonde_echo_geometry(echo, aperture_m, settings);
+  beam_key key = sonde_echo_key(&echo->frame);
+  echo->frame = kept;
+  if (sonde_psf_is_for(echo->psf, &key)) return true;
+  begin_spare(echo, &key);
+  bool ready = echo->spare->step == SONDE_PSF_STEPS;
+  for (uint32_t k = 0; k < steps && !ready; ++k) ready = sonde_psf_step(echo->spare);
+  return ready;
+}
+
+// What preparation has left to do is done here.
+static void take_beam(sonde_echo *echo, const beam_key *key) {
+  if (sonde_psf_is_for(echo->psf, key)) return;
+  begin_spare(echo, key);
+  while (!sonde_psf_step(echo->spare)) {
+  }
+  beam_psf *old = echo->psf;
+  echo->psf = echo->spare;
+  echo->spare = old;
+}
+
 void sonde_echo_frame(sonde_echo *echo, sonde_pose world_from_probe, double aperture_m,
                       const sonde_echo_settings *settings) {
   sonde_echo_geometry(echo, aperture_m, settings);
@@ -59,7 +92,7 @@ void sonde_echo_frame(sonde_echo *echo, sonde_pose world_from_probe, double aper
   f->probe = world_from_probe;
   f->from_world = m_transpose(q_matrix(world_from_probe.rotation));
   beam_key key = sonde_echo_key(f);
-  if (memcmp(&key, &echo->psf->key, sizeof key) != 0) sonde_psf_build(echo->psf, &key);
+  take_beam(echo, &key);
   echo->pad_lines = ((uint32_t)echo->psf->half_lines + 1) / 2 * 2;
   echo->pad_samples = (uint32_t)echo->psf->half_rows;
   uint32_t whole = SONDE_FINE * ECHO_ALIGN, needed = SONDE_FINE * echo->lines + 2 * echo->pad_lines;

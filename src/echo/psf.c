@@ -5,10 +5,11 @@
 // leading singular vectors of all bands' rows together, found by subspace iteration from the pulse
 // and its derivatives. What is left per band are the three complex lateral kernels.
 //
-// sonde_psf_build   all of it
+// sonde_psf_begin, sonde_psf_step  all of it, band by band, then the kernels
 // tabulate          exact responses of a band
 // sharpen           takes off what the splat widens
-// gram, iterate     shared axial kernels
+// add_band          response of one band
+// add_gram, mirror_gram, iterate  shared axial kernels
 // orthonormalise    Gram-Schmidt
 // project           lateral kernels of a band, their reach
 #include "echo/psf.h"
@@ -110,20 +111,22 @@ static void sharpen(beam_psf *psf, int b) {
   }
 }
 
-static void gram(const beam_psf *psf, double g[ROWS][ROWS]) {
+// Adds one band to the lower triangle.
+static void add_gram(beam_psf *psf, int b) {
+  int rows = 2 * psf->half_rows + 1;
+  for (int l = 0; l <= psf->half_lines; ++l) {
+    const double *p = psf->table[b][l];
+    double w = weight_of(l);
+    for (int i = 0; i < rows; ++i)
+      for (int j = 0; j <= i; ++j)
+        psf->gram[i][j] += w * (p[2 * i] * p[2 * j] + p[2 * i + 1] * p[2 * j + 1]);
+  }
+}
+
+static void mirror_gram(beam_psf *psf) {
   int rows = 2 * psf->half_rows + 1;
   for (int i = 0; i < rows; ++i)
-    for (int j = 0; j < rows; ++j) g[i][j] = 0;
-  for (int b = 0; b < SONDE_BANDS; ++b)
-    for (int l = 0; l <= psf->half_lines; ++l) {
-      const double *p = psf->table[b][l];
-      double w = weight_of(l);
-      for (int i = 0; i < rows; ++i)
-        for (int j = 0; j <= i; ++j)
-          g[i][j] += w * (p[2 * i] * p[2 * j] + p[2 * i + 1] * p[2 * j + 1]);
-    }
-  for (int i = 0; i < rows; ++i)
-    for (int j = 0; j < i; ++j) g[j][i] = g[i][j];
+    for (int j = 0; j < i; ++j) psf->gram[j][i] = psf->gram[i][j];
 }
 
 static void orthonormalise(double v[SONDE_RANK][ROWS], int rows) {
@@ -140,7 +143,7 @@ static void orthonormalise(double v[SONDE_RANK][ROWS], int rows) {
   }
 }
 
-static void iterate(beam_psf *psf, double g[ROWS][ROWS]) {
+static void iterate(beam_psf *psf) {
   int rows = 2 * psf->half_rows + 1;
   double product[SONDE_RANK][ROWS];
   sonde_array a = sonde_beam_array(&psf->key);
@@ -154,7 +157,7 @@ static void iterate(beam_psf *psf, double g[ROWS][ROWS]) {
     for (int k = 0; k < SONDE_RANK; ++k)
       for (int i = 0; i < rows; ++i) {
         double sum = 0;
-        for (int j = 0; j < rows; ++j) sum += g[i][j] * psf->axial[k][j];
+        for (int j = 0; j < rows; ++j) sum += psf->gram[i][j] * psf->axial[k][j];
         product[k][i] = sum;
       }
     memcpy(psf->axial, product, sizeof product);
@@ -196,22 +199,42 @@ static int taps(double reach_m, double step_m) {
   return (int)clamp(ceil(reach_m / step_m), 3, SONDE_MOST_TAPS);
 }
 
-void sonde_psf_build(beam_psf *psf, const beam_key *key) {
+bool sonde_psf_is_for(const beam_psf *psf, const beam_key *key) {
+  SONDE_ASSERT(psf != NULL && key != NULL);
+  return memcmp(&psf->key, key, sizeof *key) == 0;
+}
+
+void sonde_psf_begin(beam_psf *psf, const beam_key *key) {
   SONDE_ASSERT(psf != NULL && key->pitch_m > 0 && key->step_m > 0 && key->depth_m > 0);
-  double wavelength = sonde_sound_m_s / key->frequency_hz, g[ROWS][ROWS];
-  sonde_array array = sonde_beam_array(key);
+  double wavelength = sonde_sound_m_s / key->frequency_hz;
   psf->key = *key;
   psf->half_lines = taps(12 * wavelength, key->pitch_m);
   psf->half_rows = taps(2.3 * wavelength, key->step_m);
-  for (int b = 0; b < SONDE_BANDS; ++b) {
-    double t = (double)b / (SONDE_BANDS - 1);
-    psf->depth_m[b] = first_depth_m + (key->depth_m - first_depth_m) * t * sqrt(t);
-    psf->elevation_m[b] = sonde_array_elevation_half(&array, psf->depth_m[b]);
-    tabulate(psf, &array, b);
-    normalise(psf, b);
-    sharpen(psf, b);
+  psf->step = 0;
+  memset(psf->gram, 0, sizeof psf->gram);
+}
+
+static void add_band(beam_psf *psf, int b) {
+  sonde_array array = sonde_beam_array(&psf->key);
+  double t = (double)b / (SONDE_BANDS - 1);
+  psf->depth_m[b] = first_depth_m + (psf->key.depth_m - first_depth_m) * t * sqrt(t);
+  psf->elevation_m[b] = sonde_array_elevation_half(&array, psf->depth_m[b]);
+  tabulate(psf, &array, b);
+  normalise(psf, b);
+  sharpen(psf, b);
+  add_gram(psf, b);
+}
+
+bool sonde_psf_step(beam_psf *psf) {
+  SONDE_ASSERT(psf != NULL && psf->step >= 0 && psf->step <= SONDE_PSF_STEPS);
+  if (psf->step == SONDE_PSF_STEPS) return true;
+  if (psf->step < SONDE_BANDS) {
+    add_band(psf, psf->step);
+  } else if (psf->step == SONDE_BANDS) {
+    mirror_gram(psf);
+    iterate(psf);
+  } else {
+    for (int b = 0; b < SONDE_BANDS; ++b) project(psf, b);
   }
-  gram(psf, g);
-  iterate(psf, g);
-  for (int b = 0; b < SONDE_BANDS; ++b) project(psf, b);
+  return ++psf->step == SONDE_PSF_STEPS;
 }

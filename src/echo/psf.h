@@ -6,8 +6,9 @@
 
 enum {
   SONDE_RANK = 3,
-  SONDE_BANDS = 40,    // depths at which the response is known
-  SONDE_MOST_TAPS = 48 // half width of a kernel, lines or samples
+  SONDE_BANDS = 40,     // depths at which the response is known
+  SONDE_MOST_TAPS = 48, // half width of a kernel, lines or samples
+  SONDE_PSF_STEPS = SONDE_BANDS + 2
 };
 
 // What a beam depends on.
@@ -27,14 +28,20 @@ typedef struct beam_psf {
   double axial[SONDE_RANK][2 * SONDE_MOST_TAPS + 1]; // orthonormal
   double pulse[SONDE_RANK];                          // of a plain pulse with peak 1
   double share[SONDE_BANDS];                         // energy of the response that rank 3 keeps
-  // scratch of the build: response at [lines 0..][rows][2]
+  int step; // of the build, SONDE_PSF_STEPS when it is ready
+  // scratch of the build: Gram matrix of all responses' rows, response at [lines 0..][rows][2]
+  double gram[2 * SONDE_MOST_TAPS + 1][2 * SONDE_MOST_TAPS + 1];
   double table[SONDE_BANDS][SONDE_MOST_TAPS + 1][2 * (2 * SONDE_MOST_TAPS + 1)];
 } beam_psf;
 
 // The array that belongs to a key.
 sonde_array sonde_beam_array(const beam_key *key);
-// No allocation.
-void sonde_psf_build(beam_psf *psf, const beam_key *key);
+// Starts a build. No allocation here and in the steps.
+void sonde_psf_begin(beam_psf *psf, const beam_key *key);
+// One of about equal steps; true when nothing is left to do.
+bool sonde_psf_step(beam_psf *psf);
+// Whether the build, finished or not, is for that key.
+bool sonde_psf_is_for(const beam_psf *psf, const beam_key *key);
 // Fraction of the way from band *band to the next.
 double sonde_psf_band(const beam_psf *psf, double depth_m, int *band);
 

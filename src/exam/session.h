@@ -40,6 +40,11 @@ typedef struct sonde_surface_slot {
 enum { LATENCY_BINS = 1024 };
 static const double LATENCY_BIN_S = 0.25e-3;
 
+// What the image's beam depends on.
+typedef struct sonde_session_beam {
+  double aperture_m, frequency_hz, depth_m, focus_m;
+} sonde_session_beam;
+
 struct sonde_session {
   // set up once
   const sonde_model *model;
@@ -68,7 +73,9 @@ struct sonde_session {
   sonde_interior *interior;
   sonde_echo *echo;
   sonde_pathology shown_pathology;
-  bool shown; // an image was made
+  bool shown;                      // an image was made
+  sonde_session_beam beam, coming; // of the images; being built
+  bool building;                   // coming
   uint64_t shown_tick;
   _Atomic uint64_t images;
   _Atomic uint32_t latency[LATENCY_BINS]; // images by age of their pose when finished

@@ -2,6 +2,7 @@
 // penetration:        depth of the probe's face below the rest skin.
 // update_interior:    the inside and the vessels at this surface.
 // read_vessels:       what the image plane cuts.
+// choose_beam:        the one asked for when it is ready, else the last one.
 // fill_frame:         everything into one slot.
 // count_latency:      how old the frame's pose is when the frame is finished.
 // sonde_session_show: one image. sonde_session_latency: percentiles.
@@ -61,6 +62,29 @@ static void read_vessels(const sonde_session *session, sonde_snapshot *snapshot)
     snapshot->artery_area_ratio = artery.area_ratio;
 }
 
+static sonde_echo_settings with_beam(const sonde_session_beam *beam, sonde_echo_settings rest) {
+  rest.frequency_hz = beam->frequency_hz;
+  rest.depth_m = beam->depth_m;
+  rest.focus_m = beam->focus_m;
+  return rest;
+}
+
+// A new beam is built over several images, which go on with the old one: none of them comes late.
+// One under way is finished first, so that a slider that keeps moving shows where it has been.
+static void choose_beam(sonde_session *session, const sonde_echo_settings *asked,
+                        double aperture_m) {
+  const uint32_t steps = 4;
+  const sonde_session_beam now = {aperture_m, asked->frequency_hz, asked->depth_m, asked->focus_m};
+  if (!(session->beam.aperture_m > 0)) session->beam = now;
+  if (!session->building && memcmp(&now, &session->beam, sizeof now) != 0)
+    session->coming = now, session->building = true;
+  if (!session->building) return;
+  sonde_echo_settings coming = with_beam(&session->coming, *asked);
+  if (!sonde_echo_prepare(session->echo, session->coming.aperture_m, &coming, steps)) return;
+  session->beam = session->coming;
+  session->building = false;
+}
+
 static void fill_frame(sonde_session *session, const unsigned char *slot, unsigned char *out) {
   const sonde_surface_slot *head = (const void *)slot;
   const sonde_vec3 *positions_m = (const void *)(slot + session->positions_at);
@@ -74,8 +98,13 @@ static void fill_frame(sonde_session *session, const unsigned char *slot, unsign
                        .height = session->image_height,
                        .pixels = out + session->pixels_at};
   double aperture_m = 2.0 * session->probes[head->snapshot.probe].half_x_m;
-  sonde_echo_render(session->echo, head->snapshot.world_from_probe, aperture_m,
-                    &head->controls.pathology, &head->controls.echo, &image);
+  choose_beam(session, &head->controls.echo, aperture_m);
+  sonde_echo_settings settings = with_beam(&session->beam, head->controls.echo);
+  sonde_echo_flow flow = sonde_echo_flow_default();
+  flow.t_s = (double)head->snapshot.tick * session->dt_s;
+  sonde_echo_set_flow(session->echo, &flow);
+  sonde_echo_render(session->echo, head->snapshot.world_from_probe, session->beam.aperture_m,
+                    &head->controls.pathology, &settings, &image);
   SONDE_ASSERT(sonde_interior_tick(session->interior) == head->snapshot.tick);
   sonde_frame *frame = (sonde_frame *)(void *)out;
   *frame = (sonde_frame){.snapshot = head->snapshot,

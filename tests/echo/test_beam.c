@@ -208,6 +208,52 @@ static void kernels_agree(void **state) {
   bench_clear(&b);
 }
 
+static void render(bench *b, const sonde_echo_settings *settings, float *out) {
+  uint32_t lines, samples;
+  const sonde_echo_point p[2] = {{1e-3, 0, 0.012, 1}, {-4e-3, 0, 0.031, 1}};
+  sonde_echo_render_points(b->view.echo, 0.04, settings, p, 2);
+  const float *e = sonde_echo_envelope(b->view.echo, &lines, &samples);
+  memcpy(out, e, sizeof(float) * lines * samples);
+}
+
+// A beam built in slices between frames that use another one is, to the bit, the one that a frame
+// builds at once; the frames in between are not disturbed.
+static void prepared_beams_are_built_beams(void **state) {
+  (void)state;
+  enum { COUNT = 192 * 1024 };
+  bench b, c;
+  bench_create(&b);
+  bench_create(&c);
+  float *old = SONDE_NEW(float, COUNT), *now = SONDE_NEW(float, COUNT);
+  float *wanted = SONDE_NEW(float, COUNT);
+  sonde_echo_settings next = b.view.settings;
+  next.frequency_hz = 5e6, next.depth_m = 0.055, next.focus_m = 0.03;
+  render(&c, &next, wanted);
+  render(&b, &b.view.settings, old);
+  uint32_t calls = 1;
+  for (; !sonde_echo_prepare(b.view.echo, 0.04, &next, 5); ++calls) {
+    render(&b, &b.view.settings, now);
+    if (calls % 3 == 0) assert_memory_equal(now, old, sizeof(float) * COUNT);
+  }
+  assert_int_equal(calls, (SONDE_ECHO_PREPARE_STEPS + 4) / 5);
+  const beam_psf *ready = b.view.echo->spare;
+  render(&b, &next, now);
+  assert_ptr_equal(b.view.echo->psf, ready); // taken, not built again
+  assert_memory_equal(now, wanted, sizeof(float) * COUNT);
+  // the beam before is kept; a half-built one is finished by the render that needs it
+  assert_true(sonde_echo_prepare(b.view.echo, 0.04, &b.view.settings, 0));
+  sonde_echo_settings third = next;
+  third.focus_m = 0.02;
+  assert_false(sonde_echo_prepare(b.view.echo, 0.04, &third, 7));
+  render(&b, &third, now);
+  render(&c, &third, wanted);
+  assert_memory_equal(now, wanted, sizeof(float) * COUNT);
+  float *buffers[] = {old, now, wanted};
+  for (int k = 0; k < 3; ++k) sonde_free(buffers[k]);
+  bench_clear(&b);
+  bench_clear(&c);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(a_point_at_the_focus_echoes_the_pulse),
@@ -220,6 +266,7 @@ int main(void) {
       cmocka_unit_test(motion_within_a_sample_does_not_flicker),
       cmocka_unit_test(sector_lines_fan_out),
       cmocka_unit_test(kernels_agree),
+      cmocka_unit_test(prepared_beams_are_built_beams),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

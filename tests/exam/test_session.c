@@ -159,6 +159,29 @@ static void controls_are_cleaned(void **state) {
   close_session(session);
 }
 
+// Another depth is shown once its beam is built; meanwhile images keep coming and show the old one.
+// A knob that turns on and on does not stop that.
+static void a_new_depth_comes_within_images(void **state) {
+  sonde_session_def def = small_def(*state);
+  sonde_session *session = open_session(&def, press_device());
+  sonde_session_controls c = sonde_session_controls_now(session);
+  double first = 0, height = 0;
+  uint32_t images = 0;
+  for (; images < 40 && (images < 2 || height <= first); ++images) {
+    for (uint32_t i = 0; i < def.ticks_per_image; ++i) sonde_session_tick(session);
+    sonde_frame frame;
+    assert_true(sonde_session_frame(session, &frame));
+    assert_int_equal(frame.snapshot.tick / def.ticks_per_image, images + 1);
+    height = frame.height_m;
+    if (images == 0) first = height;
+    c.echo.depth_m += 1e-3;
+    sonde_session_control(session, &c);
+  }
+  print_message("%g mm deep after %u images, before %g mm\n", 1e3 * height, images, 1e3 * first);
+  assert_true(images > 2 && images < 16 && height > first);
+  close_session(session);
+}
+
 // A device that presses, notes what it is told to render, and fails on demand.
 typedef struct moody {
   sonde_pose pose;
@@ -358,6 +381,7 @@ int main(void) {
       cmocka_unit_test(equal_inputs_give_equal_states),
       cmocka_unit_test(sessions_do_not_know_of_each_other),
       cmocka_unit_test(controls_are_cleaned),
+      cmocka_unit_test(a_new_depth_comes_within_images),
       cmocka_unit_test(faults_fade_and_resume),
       cmocka_unit_test(rotations_are_made_unit),
       cmocka_unit_test(a_short_stop_is_not_missed),
