@@ -71,7 +71,7 @@ SONDE_API void sonde_echo_render(sonde_echo *echo, sonde_pose world_from_probe, 
                                  const sonde_pathology *pathology,
                                  const sonde_echo_settings *settings, sonde_image *image);
 
-/** Steps that a new beam takes in all; one costs about a millisecond. */
+/** Steps that a new beam takes in all (docs/echo.md tells what they cost). */
 #define SONDE_ECHO_PREPARE_STEPS 42
 /**
  * Builds the beam that other frequency, focus, depth or aperture need beside the one in use, at

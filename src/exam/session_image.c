@@ -73,7 +73,7 @@ static sonde_echo_settings with_beam(const sonde_session_beam *beam, sonde_echo_
 // One under way is finished first, so that a slider that keeps moving shows where it has been.
 static void choose_beam(sonde_session *session, const sonde_echo_settings *asked,
                         double aperture_m) {
-  const uint32_t steps = 4;
+  const uint32_t steps = 3;
   const sonde_session_beam now = {aperture_m, asked->frequency_hz, asked->depth_m, asked->focus_m};
   if (!(session->beam.aperture_m > 0)) session->beam = now;
   if (!session->building && memcmp(&now, &session->beam, sizeof now) != 0)
