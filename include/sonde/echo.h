@@ -103,6 +103,11 @@ SONDE_API sonde_echo_flow sonde_echo_flow_default(void);
 /** Blood of the following renders; finite fields. @thread as sonde_echo_render */
 SONDE_API void sonde_echo_set_flow(sonde_echo *echo, const sonde_echo_flow *flow);
 
+/** Gel or air below each line of the following renders: the share of the echoes' amplitude that
+ *  passes, 0..1 (NaN: 0); the rest reverberates at the face. NULL (default): all, wherever the skin
+ *  touches. @param coupling [line_count] copied @thread as sonde_echo_render */
+SONDE_API void sonde_echo_set_coupling(sonde_echo *echo, const float *coupling);
+
 /** Radius of a curved face (m, 20 mm and more), its aperture measured along the arc; 0: flat.
  *  @return SONDE_ARGUMENT @thread as sonde_echo_render */
 SONDE_API sonde_status sonde_echo_set_radius(sonde_echo *echo, double radius_m, sonde_error *error);

@@ -4,7 +4,7 @@
 // sonde_echo_create   buffers and random tables
 // sonde_echo_destroy
 // fill_tables         scatterers, streamlines of the blood, noise
-// sonde_echo_flow_default, sonde_echo_set_flow
+// sonde_echo_flow_default, sonde_echo_set_flow, sonde_echo_set_coupling
 // sonde_echo_set_radius, sonde_echo_set_kernels
 #include "base/base.h"
 #include "base/random.h"
@@ -131,6 +131,7 @@ static bool allocate(sonde_echo *echo) {
   echo->gain = SONDE_NEW(float, lines *SONDE_MEDIUM_ROWS);
   echo->loss_db = SONDE_NEW(float, lines);
   echo->air = SONDE_NEW(uint8_t, lines);
+  echo->coupling = SONDE_NEW(float, lines);
   echo->echoes = SONDE_NEW(specular, SONDE_MAX_ECHOES);
   echo->first_echo = SONDE_NEW(int32_t, echo->samples);
   echo->grid = SONDE_NEW(float, (4 * most_lines + 16) * most_samples);
@@ -149,8 +150,8 @@ static bool allocate(sonde_echo *echo) {
   pools = allocate_pool(&echo->blood, SONDE_BLOOD) && pools;
   return pools && echo->psf && echo->spare && echo->node && echo->plane && echo->wide &&
          echo->row && echo->level[0] && echo->level[1] && echo->scatter && echo->loss &&
-         echo->gain && echo->loss_db && echo->air && echo->first_echo && echo->echoes &&
-         echo->grid && echo->line_re[0] && echo->line_re[1] && echo->line_im[0] &&
+         echo->gain && echo->loss_db && echo->air && echo->coupling && echo->first_echo &&
+         echo->echoes && echo->grid && echo->line_re[0] && echo->line_re[1] && echo->line_im[0] &&
          echo->line_im[1] && echo->ring && echo->envelope && echo->flat_envelope && echo->grey &&
          echo->noise && echo->cell_set;
 }
@@ -198,6 +199,7 @@ sonde_status sonde_echo_create(const sonde_interior *interior, const sonde_echo_
     return sonde_fail_memory(error);
   }
   fill_tables(made);
+  sonde_echo_set_coupling(made, NULL);
   *echo = made;
   return SONDE_OK;
 }
@@ -212,7 +214,7 @@ void sonde_echo_destroy(sonde_echo *echo) {
       echo->noise,      echo->cell_set,   echo->envelope,   echo->grey,       echo->flat_envelope,
       echo->pool.x,     echo->pool.y,     echo->pool.z,     echo->loose.x,    echo->pool.sign,
       echo->loose.y,    echo->loose.z,    echo->loose.sign, echo->blood.x,    echo->blood.y,
-      echo->blood.z,    echo->blood.sign, echo->spare};
+      echo->blood.z,    echo->blood.sign, echo->spare,      echo->coupling};
   for (size_t i = 0; i < SONDE_COUNT_OF(parts); ++i) sonde_free(parts[i]);
   sonde_free(echo);
 }
@@ -233,6 +235,14 @@ void sonde_echo_set_flow(sonde_echo *echo, const sonde_echo_flow *flow) {
   SONDE_ASSERT(echo != NULL && flow != NULL);
   SONDE_ASSERT(isfinite(flow->t_s) && isfinite(flow->vein_m_s) && isfinite(flow->artery_m_s));
   echo->flow = *flow;
+}
+
+void sonde_echo_set_coupling(sonde_echo *echo, const float *coupling) {
+  SONDE_ASSERT(echo != NULL);
+  for (uint32_t l = 0; l < echo->padded; ++l) {
+    float value = coupling ? coupling[l < echo->lines ? l : echo->lines - 1] : 1;
+    echo->coupling[l] = value > 0 ? fminf(value, 1) : 0;
+  }
 }
 
 sonde_status sonde_echo_set_radius(sonde_echo *echo, double radius_m, sonde_error *error) {

@@ -91,6 +91,7 @@ struct sonde_echo {
   float *gain;                            // [MEDIUM_ROWS][padded]
   float *loss_db;                         // [padded] accumulated
   uint8_t *air;                           // [padded]
+  float *coupling; // [padded] share of the amplitude that passes the face, 0..1
   bool some_air;
   specular *echoes; // [MAX_ECHOES]
   uint32_t echo_count;

@@ -114,6 +114,7 @@ static void cross(sonde_echo *echo, uint32_t row, uint32_t l, uint32_t which) {
   float q = tangent / kind->tangent;
   float shape = kind->diffuse + (1 - kind->diffuse) * expf(-q * q);
   float rough = echo->plain ? 0 : 4 * roughness(echo, l, which);
+  shape *= echo->coupling[l];
   record(echo, l, depth, amplitude_of_db(kind->db + rough - echo->loss_db[l]) * shape);
   echo->loss_db[l] += kind->loss_db;
 }
@@ -132,17 +133,17 @@ static void cross_levels(sonde_echo *echo, uint32_t row, const uint8_t *crossed)
   }
 }
 
-// Bands at multiples of the face's own thickness, fading.
-static void reverberate(sonde_echo *echo, uint32_t l) {
+// Bands at multiples of the face's own thickness, fading; as loud as what does not couple in.
+static void reverberate(sonde_echo *echo, uint32_t l, float loudness) {
   for (int k = 0; k < 6; ++k)
-    record(echo, l, 0.4e-3f + 1.3e-3f * (float)k, 6.0f * exp2f(-1.4f * (float)k));
+    record(echo, l, 0.4e-3f + 1.3e-3f * (float)k, loudness * 6.0f * exp2f(-1.4f * (float)k));
 }
 
 static void mark_air(sonde_echo *echo) {
   echo->some_air = false;
   for (uint32_t l = 0; l < echo->padded; ++l) {
     echo->air[l] = echo->row[PLANE_DEPTH * echo->padded + l] < -air_gap_m;
-    if (echo->air[l] && l < echo->lines) reverberate(echo, l);
+    if (l < echo->lines) reverberate(echo, l, echo->air[l] ? 1 : 1 - echo->coupling[l]);
     echo->some_air = echo->some_air || echo->air[l];
   }
 }
@@ -194,6 +195,7 @@ void sonde_echo_medium(sonde_echo *echo) {
     if (row > 0) cross_levels(echo, row, crossed);
     for (uint32_t l = 0; l < lines && echo->some_air; ++l)
       if (echo->air[l]) echo->scatter[l] = 0;
+    for (uint32_t l = 0; l < lines; ++l) echo->scatter[l] *= echo->coupling[l];
     echo->kernels->fade(echo->scatter, echo->loss_db, echo->gain + row * lines, lines);
     for (uint32_t l = 0; l < lines; ++l) echo->loss_db[l] += echo->loss[l] * step;
   }

@@ -209,6 +209,33 @@ static void air_stays_dark(void **state) {
   bench_clear(&b);
 }
 
+// Without gel under one side that side's columns go dark below the face, the other side's stay;
+// half the amplitude is 6 dB less.
+static void dry_columns_are_dark(void **state) {
+  (void)state;
+  bench b;
+  bench_create(&b, 0.2, 0.014, 2.5e-3, true, false);
+  uint32_t lines, samples;
+  float gel[192], mean[3][2] = {{0}};
+  const float left[3] = {1, 0.5f, 0};
+  for (int k = 0; k < 3; ++k) {
+    for (int l = 0; l < 192; ++l) gel[l] = l < 96 ? left[k] : 1;
+    sonde_echo_set_coupling(b.echo, k == 0 ? NULL : gel);
+    look(&b, NULL);
+    const float *e = sonde_echo_envelope(b.echo, &lines, &samples);
+    for (uint32_t n = 300; n < 500; ++n)
+      for (uint32_t l = 0; l < 60; ++l)
+        mean[k][0] += e[n * lines + 10 + l], mean[k][1] += e[n * lines + 122 + l];
+  }
+  print_message("half %.3f, none %.5f\n", (double)(mean[1][0] / mean[0][0]),
+                (double)(mean[2][0] / mean[0][0]));
+  assert_true(fabsf(mean[1][0] / mean[0][0] - 0.5f) < 0.01f);
+  assert_true(mean[2][0] < 0.01f * mean[0][0]);
+  assert_true(mean[1][1] == mean[0][1] && mean[2][1] == mean[0][1]);
+  assert_true(grey(&b, -0.012, 1.7e-3, 2e-4) > grey(&b, -0.012, 0.02, 1e-3));
+  bench_clear(&b);
+}
+
 static void same_state_same_pixels_and_png(void **state) {
   (void)state;
   bench b;
@@ -258,6 +285,7 @@ int main(void) {
       cmocka_unit_test(speckle_belongs_to_the_tissue),
       cmocka_unit_test(tracked_motion_is_the_field),
       cmocka_unit_test(air_stays_dark),
+      cmocka_unit_test(dry_columns_are_dark),
       cmocka_unit_test(same_state_same_pixels_and_png),
       cmocka_unit_test(settings_are_clamped),
   };
