@@ -16,7 +16,6 @@ int cmd_measure(int argc, char **argv);
 int cmd_identify(int argc, char **argv);
 int cmd_press(int argc, char **argv);
 int cmd_image(int argc, char **argv);
-int cmd_validate(int argc, char **argv);
 int cmd_cut(int argc, char **argv);
 int cmd_replay(int argc, char **argv);
 int cmd_bench(int argc, char **argv);

@@ -24,7 +24,6 @@ static const command COMMANDS[] = {
     {"identify", cmd_identify, "find damping and friction from records of a moving probe"},
     {"press", cmd_press, "press once, settle, report force, penetration and vessels"},
     {"image", cmd_image, "write the echographic picture of a model at a pose"},
-    {"validate", cmd_validate, "measure the echographic image against its targets"},
     {"cut", cmd_cut, "cut the skin along a path and write the cut model"},
     {"simulate", cmd_simulate, "simulate a scene of several bodies"},
     {"reconstruct", cmd_reconstruct, "make a volume from tracked image frames"},

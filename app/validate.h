@@ -4,5 +4,6 @@
 
 // argv[0] is the second word. Returns the program's exit code.
 int validate_haptics(int argc, char **argv);
+int validate_image(int argc, char **argv);
 
 #endif

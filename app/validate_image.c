@@ -4,6 +4,7 @@
 // reference:   likeness, widths, flicker against the exact reference.
 // speckle, attenuation, interfaces, enhancement, shadow, closure: on round synthetic legs.
 #include "app.h"
+#include "validate.h"
 #include "validate_leg.h"
 
 #include <getopt.h>
@@ -11,18 +12,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-static const char HELP[] =
-    "usage: sonde validate image [--quick] [--json]\n"
-    "\n"
-    "Measures the echographic image on synthetic scatterers and synthetic legs and compares it\n"
-    "with the exact per-element reference, with path integrals through the known layers and with\n"
-    "the vessels' mechanical state. Exit code 1 when a measure misses its target; the times are\n"
-    "told and do not count.\n"
-    "\n"
-    "  --quick   fewer scatterers and frames\n"
-    "  --json    print one JSON object\n"
-    "  --help    this text\n";
 
 enum { MOST = 40 };
 
@@ -378,10 +367,8 @@ static bool print(const report *r, bool json) {
 }
 
 int validate_image(int argc, char **argv) {
-  static const struct option LONG[] = {{"quick", no_argument, NULL, 'q'},
-                                       {"json", no_argument, NULL, 'j'},
-                                       {"help", no_argument, NULL, 'h'},
-                                       {NULL, 0, NULL, 0}};
+  static const struct option LONG[] = {
+      {"quick", no_argument, NULL, 'q'}, {"json", no_argument, NULL, 'j'}, {NULL, 0, NULL, 0}};
   static sonde_status (*const PARTS[])(report *) = {reference,   speckle, attenuation, bone,
                                                     enhancement, vein,    times};
   report r = {0};
@@ -389,11 +376,9 @@ int validate_image(int argc, char **argv) {
   for (int c; (c = getopt_long(argc, argv, "", LONG, NULL)) != -1;) switch (c) {
     case 'q': r.quick = true; break;
     case 'j': json = true; break;
-    case 'h': fputs(HELP, stdout); return APP_OK;
     default: return APP_BAD_INPUT;
     }
-  if (argc - optind != 1 || strcmp(argv[optind], "image") != 0)
-    return app_usage_error("validate", "expected what to validate: image");
+  if (argc != optind) return app_usage_error("validate", "unexpected argument after image");
   sonde_progress progress = app_progress();
   sonde_status status = SONDE_OK;
   const int count = sizeof PARTS / sizeof *PARTS;

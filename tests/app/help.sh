@@ -11,14 +11,13 @@ declare -A options=(
   [identify]="--ramp-hold --slide --simulate --site --preset -o --json"
   [press]="--site --probe --force-n --depth-mm --image --case --preset --json"
   [image]="--pose --site --force-n --case --depth-mm --size -o --json"
-  [validate]="--quick --json"
   [cut]="--line --path --site --length-mm --offset-mm --turn-deg --depth-mm --probe -o --json"
   [simulate]="-o --steps --seconds --every --resume --json"
   [reconstruct]="-o --leave-one-out --copy --config --json"
   [slice]="--pose --frame --hold-out -o --compare --stack --json"
   [replay]="--json"
   [bench]="--scene --haptics --device --json"
-  [validate]="--pressing --sites --json"
+  [validate]="--quick --pressing --sites --json"
   [devices]="--probe --json"
 )
 
