@@ -30,8 +30,8 @@ typedef struct sonde_session_def {
   sonde_render_def rendering;         /**< coupling and force scale; default none, 1 */
   sonde_session_controls controls;    /**< at the start */
   uint32_t image_width, image_height; /**< default 512 x 512 */
-  uint32_t ticks_per_image;           /**< lockstep: an image every so many ticks; real time: the
-                                           surface is offered to the image thread as often; default 20 */
+  uint32_t ticks_per_image;           /**< lockstep: an image every so many ticks; real time: no
+                                           more often, when the image thread is free; default 20 */
   const char *record_path;            /**< NULL: no recording; format: docs/recording.md */
 } sonde_session_def;
 

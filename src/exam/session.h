@@ -64,7 +64,8 @@ struct sonde_session {
   sonde_session_controls controls; // in force
   sonde_device_sample sample;      // last used
   bool realtime;
-  double last_tick_s; // clock of the previous real-time tick, 0 before the first
+  uint64_t offered_tick; // of the newest surface
+  double last_tick_s;    // clock of the previous real-time tick, 0 before the first
   _Atomic uint64_t ticks;
   _Atomic uint64_t lost_records;
 
@@ -73,6 +74,7 @@ struct sonde_session {
   sonde_interior *interior;
   sonde_echo *echo;
   sonde_pathology shown_pathology;
+  atomic_bool surface_wanted;      // the image thread waits for a surface
   bool shown;                      // an image was made
   sonde_session_beam beam, coming; // of the images; being built
   bool building;                   // coming

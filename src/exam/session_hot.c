@@ -83,6 +83,13 @@ static void fill_snapshot(const sonde_session *session, sonde_snapshot *snapshot
   };
 }
 
+// In lockstep every so many ticks; in real time when the image thread asks, but no sooner.
+static bool surface_is_due(sonde_session *session, uint64_t tick) {
+  if (!session->realtime) return tick % session->ticks_per_image == 0;
+  return tick - session->offered_tick >= session->ticks_per_image &&
+         atomic_exchange_explicit(&session->surface_wanted, false, memory_order_acquire);
+}
+
 static void offer_surface(sonde_session *session) {
   unsigned char *slot = sonde_mailbox_write_slot(session->surface_box);
   sonde_surface_slot *head = (sonde_surface_slot *)(void *)slot;
@@ -92,6 +99,7 @@ static void offer_surface(sonde_session *session) {
   size_t bytes = session->nodes * sizeof(sonde_vec3);
   memcpy(slot + session->positions_at, sonde_state_positions(session->state), bytes);
   memcpy(slot + session->forces_at, sonde_state_contact_forces(session->state), bytes);
+  session->offered_tick = head->snapshot.tick;
   sonde_mailbox_publish(session->surface_box);
 }
 
@@ -108,7 +116,7 @@ void sonde_session_step(sonde_session *session) {
   sonde_vec3 torque = v_scale(contact->torque_n_m, session->render.def.force_scale);
   sonde_safety_apply(&session->safety, session->render.force_n, torque, session->dt_s);
   session->device.write(session->device.self, session->safety.force_n, session->safety.torque_n_m);
-  if ((tick + 1) % session->ticks_per_image == 0) offer_surface(session);
+  if (surface_is_due(session, tick + 1)) offer_surface(session);
   SONDE_ASSERT(sonde_state_tick(session->state) == tick + 1);
   atomic_store_explicit(&session->ticks, tick + 1, memory_order_release);
 }

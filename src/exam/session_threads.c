@@ -1,6 +1,6 @@
 // The threads of a session in real time, and the lockstep tick.
-// image_main, record_main: look for work every millisecond (every five), so that the tick never
-//                          has to wake anyone.
+// image_main, record_main: ask for a surface and look for it every half millisecond, for records
+//                          every five, so that the tick never has to wake anyone.
 // sonde_session_drain:     ring to file.
 // sonde_session_start/stop/tick: the interface.
 #include "exam/session.h"
@@ -12,8 +12,11 @@
 
 static void *image_main(void *argument) {
   sonde_session *session = argument;
-  while (!atomic_load_explicit(&session->stop_image, memory_order_acquire))
-    if (!sonde_session_show(session)) sonde_clock_sleep_until(sonde_clock_now() + 1e-3);
+  while (!atomic_load_explicit(&session->stop_image, memory_order_acquire)) {
+    if (sonde_session_show(session)) continue;
+    atomic_store_explicit(&session->surface_wanted, true, memory_order_release);
+    sonde_clock_sleep_until(sonde_clock_now() + 0.5e-3);
+  }
   return NULL;
 }
 
@@ -49,6 +52,7 @@ sonde_status sonde_session_start(sonde_session *session, sonde_error *error) {
   atomic_store(&session->stop_image, false);
   atomic_store(&session->stop_record, false);
   session->last_tick_s = 0.0;
+  session->realtime = true;
   sonde_loop *loop = NULL;
   sonde_status status =
       launch(&session->image_thread, image_main, session, &session->image_running, error);
@@ -70,6 +74,7 @@ void sonde_session_stop(sonde_session *session) {
   if (session->image_running) pthread_join(session->image_thread, NULL);
   if (session->record_running) pthread_join(session->record_thread, NULL);
   session->image_running = session->record_running = false;
+  session->realtime = false;
   sonde_session_drain(session);
 }
 
