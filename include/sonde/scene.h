@@ -42,6 +42,8 @@ typedef struct sonde_scene_step {
   uint32_t newton_iterations; /**< 1 is eq. (4); default 1 */
   double newton_residual;     /**< stop the iterations at |g| <= this * |first g|; default 1e-9 */
   bool line_search;           /**< on the slope of the incremental potential; default true */
+  bool cast;                  /**< parts of a step where bodies move fast: none passes through;
+                                   default true */
   sonde_pcg_options solver;   /**< default relative 1e-8, at most 1000 iterations */
   double substep_tolerance_m; /**< wanted error of a step, by step doubling; 0: no substeps */
   uint32_t substep_halvings;  /**< smallest substep is dt/2^this; default 8, at most 16 */
@@ -122,6 +124,7 @@ typedef struct sonde_scene_report {
   uint32_t flags;
   uint32_t newton_iterations, solver_iterations, line_halvings;
   uint32_t substeps, rejected; /**< of an adaptive step */
+  uint32_t cuts;               /**< parts made in place of a step so that no body passes through */
   uint32_t touch_points;       /**< integration points of all contacts */
   double newton_residual;      /**< |g| at the last evaluation over the first */
   double error_m;              /**< estimate by step doubling; 0 without substeps */

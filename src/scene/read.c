@@ -22,6 +22,7 @@ sonde_scene_step sonde_scene_step_default(void) {
                             .newton_iterations = 1,
                             .newton_residual = 1e-9,
                             .line_search = true,
+                            .cast = true,
                             .solver = {1e-8, 1e-14, 1000},
                             .substep_halvings = 8};
 }
@@ -33,6 +34,7 @@ static void read_step(sonde_reader *reader, sonde_place at, sonde_scene *scene) 
                                      "newton",
                                      "newton_residual",
                                      "line_search",
+                                     "cast",
                                      "solver_relative",
                                      "solver_iterations",
                                      "substep_tolerance_mm",
@@ -52,6 +54,7 @@ static void read_step(sonde_reader *reader, sonde_place at, sonde_scene *scene) 
   step->newton_residual =
       sonde_read_real(reader, at, "newton_residual", 0, 1, step->newton_residual);
   step->line_search = sonde_read_bool(reader, at, "line_search", step->line_search);
+  step->cast = sonde_read_bool(reader, at, "cast", step->cast);
   step->solver.relative_residual =
       sonde_read_real(reader, at, "solver_relative", 0, 1, step->solver.relative_residual);
   step->solver.max_iterations =

@@ -79,6 +79,8 @@ static void lay_arrays(sonde_scene_state *s, carver *c) {
   s->bond_first = carve(c, touches, sizeof(uint32_t));
   s->inertia = carve(c, bodies, sizeof *s->inertia);
   s->reach_m = carve(c, bodies, sizeof(double));
+  s->thickness_m = carve(c, bodies, sizeof(double));
+  s->way = carve(c, bodies, sizeof(sonde_bounds));
   s->body_inverse = carve(c, bodies, sizeof(sonde_mat3));
   s->island = carve(c, bodies, sizeof(uint32_t));
   s->loose = carve(c, bodies, sizeof(bool));
@@ -206,6 +208,7 @@ static void number_arrays(sonde_scene_state *state) {
     const sonde_body *body = &scene->bodies[b];
     state->surface_first[b] = surface;
     surface += body->surface.vertex_count;
+    state->thickness_m[b] = sonde_scene_thickness(&body->surface);
     if (!sonde_body_is_rigid(body)) continue;
     state->body_inverse[b] = inverse_symmetric(body->mass.inertia_kg_m2);
     for (uint32_t i = 0; i < body->surface.vertex_count; ++i)

@@ -77,6 +77,8 @@ struct sonde_scene_state {
   uint32_t *bond_first;                        // [touches]
   sonde_inertia *inertia;                      // [bodies]
   double *reach_m;                             // [bodies] of a rigid body's vertices
+  double *thickness_m;                         // [bodies] volume over area at rest
+  sonde_bounds *way;                           // [bodies] scratch: box of the vertices' ways
   sonde_mat3 *body_inverse;                    // [bodies] inverse inertia in the body's frame
 
   // contact
@@ -170,6 +172,10 @@ bool sonde_grip_rows(sonde_scene_state *state, const sonde_grip *grip, sonde_vec
 
 // One step of size h. @thread tick
 void sonde_step_once(sonde_scene_state *state, double h);
+// The same in as many parts as it takes for no body to pass through another. @thread tick
+void sonde_step_guarded(sonde_scene_state *state, double h);
+// Volume over area of a closed surface; 0 for one that encloses nothing.
+double sonde_scene_thickness(const sonde_mesh *surface);
 void sonde_kept_copy(sonde_kept *to, const sonde_kept *from);
 
 #endif

@@ -34,11 +34,11 @@ static double try_double(sonde_scene_state *state, double h) {
   SONDE_ASSERT(h > 0);
   double order_factor = state->scene->step.lambda == 0.5 ? 3 : 1;
   sonde_kept_copy(&state->saved, &state->now);
-  sonde_step_once(state, h);
+  sonde_step_guarded(state, h);
   sonde_kept_copy(&state->whole, &state->now);
   sonde_kept_copy(&state->now, &state->saved);
-  sonde_step_once(state, 0.5 * h);
-  sonde_step_once(state, 0.5 * h);
+  sonde_step_guarded(state, 0.5 * h);
+  sonde_step_guarded(state, 0.5 * h);
   return difference(state) / order_factor;
 }
 
@@ -75,7 +75,7 @@ void sonde_scene_advance(sonde_scene_state *state) {
   if (step->substep_tolerance_m > 0)
     adaptive(state);
   else
-    sonde_step_once(state, step->dt_s);
+    sonde_step_guarded(state, step->dt_s);
   sonde_kept_head *head = state->now.head;
   head->time_s = start + step->dt_s;
   head->tick++;

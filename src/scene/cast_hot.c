@@ -1,0 +1,162 @@
+// Conservative advancement inside a step: no pair moves past its first touch by more than a share
+// of the thinner body's thickness at once, so that nothing passes through (docs/scene.md).
+// thickness:     volume over area of a surface.
+// ways_of:       box of the ways of a body's vertices, chords of turning included.
+// guess, made:   ways that the velocities at the start announce; those that a step has made.
+// bounds_of:     box of a body at the start of the step.
+// free_share:    share of the ways that two boxes can go before they meet.
+// safe_share:    share of the ways that all pairs may go.
+// guarded:       steps of the size that is safe, undone and halved when they went further.
+//
+// Thickness V/A is a third of a ball's radius, a sixth of a cube's edge and half of a sheet's
+// thickness. A column that grows by less than that per step never reaches the far side of either
+// body before its push has been felt. Boxes that move by less than their gap do not meet: their
+// pairs may go that far and a thickness further.
+#include "scene/state.h"
+
+#include "base/base.h"
+#include "base/maths.h"
+#include "contact/tree.h"
+
+// The most that a pair may move as announced, and as made, in thicknesses.
+static const double PLANNED = 0.5, MADE = 1;
+enum { CUTS = 12 }; // no step is cut below h/2^CUTS
+
+double sonde_scene_thickness(const sonde_mesh *surface) {
+  double volume = 0, area = 0;
+  SONDE_ASSERT(surface->vertex_count > 0);
+  sonde_vec3 origin = surface->vertices[0];
+  for (uint32_t f = 0; f < surface->face_count; ++f) {
+    sonde_vec3 p[3];
+    for (int k = 0; k < 3; ++k) p[k] = v_sub(surface->vertices[surface->faces[f][k]], origin);
+    volume += v_dot(p[0], v_cross(p[1], p[2])) / 6;
+    area += 0.5 * v_norm(v_cross(v_sub(p[1], p[0]), v_sub(p[2], p[0])));
+  }
+  return area > 0 && volume > 0 ? volume / area : 0;
+}
+
+static sonde_bounds no_way(void) { return (sonde_bounds){vec3(0, 0, 0), vec3(0, 0, 0)}; }
+
+static sonde_bounds widen(sonde_vec3 way, double by) {
+  sonde_vec3 more = vec3(by, by, by);
+  return (sonde_bounds){v_sub(way, more), v_add(way, more)};
+}
+
+// A turn moves a vertex by no more than reach times angle, and no more than twice the reach.
+static sonde_bounds guess(const sonde_scene_state *state, uint32_t b, double h) {
+  const sonde_body *body = &state->scene->bodies[b];
+  const sonde_vec3 *v = state->now.velocity + body->first_slot;
+  sonde_vec3 fall = v_scale(state->scene->gravity_m_s2, h * h);
+  if (body->motion == SONDE_BODY_FIXED) return no_way();
+  if (body->motion == SONDE_BODY_DRIVEN) fall = vec3(0, 0, 0);
+  if (sonde_body_is_rigid(body))
+    return widen(v_madd(fall, h, v[0]), state->reach_m[b] * fmin(2, h * v_norm(v[1])));
+  sonde_bounds ways = {v_scale(v[0], h), v_scale(v[0], h)};
+  for (uint32_t i = 1; i < body->node_count; ++i) {
+    sonde_vec3 way = v_scale(v[i], h);
+    ways = bounds_add(ways, way);
+  }
+  return (sonde_bounds){v_low(ways.low, v_add(ways.low, fall)),
+                        v_high(ways.high, v_add(ways.high, fall))};
+}
+
+static sonde_bounds made(const sonde_scene_state *state, uint32_t b) {
+  const sonde_body *body = &state->scene->bodies[b];
+  const sonde_vec3 *to = state->now.position + body->first_slot;
+  const sonde_vec3 *from = state->undo.position + body->first_slot;
+  sonde_vec3 way = v_sub(to[0], from[0]);
+  if (sonde_body_is_rigid(body)) {
+    sonde_quat turn = q_mul(state->now.rotation[b], q_conj(state->undo.rotation[b]));
+    return widen(way, 2 * state->reach_m[b] * v_norm(vec3(turn.x, turn.y, turn.z)));
+  }
+  sonde_bounds ways = {way, way};
+  for (uint32_t i = 1; i < body->node_count; ++i) {
+    way = v_sub(to[i], from[i]);
+    ways = bounds_add(ways, way);
+  }
+  return ways;
+}
+
+static sonde_bounds bounds_of(const sonde_scene_state *state, const sonde_kept *at, uint32_t b) {
+  const sonde_mesh *mesh = &state->scene->bodies[b].surface;
+  sonde_vec3 *surface = state->surface + state->surface_first[b];
+  SONDE_ASSERT(mesh->vertex_count > 0);
+  if (state->scene->bodies[b].motion != SONDE_BODY_FIXED)
+    sonde_surface_at(state, b, at->position, at->rotation, surface);
+  sonde_bounds box = {surface[0], surface[0]};
+  for (uint32_t i = 1; i < mesh->vertex_count; ++i) box = bounds_add(box, surface[i]);
+  return box;
+}
+
+// Along one axis: low and high of a gap between two boxes and how much of it the ways close.
+static double axis_share(double gap, double closing) {
+  if (!(gap > 0)) return 0;
+  return closing > gap ? gap / closing : 1;
+}
+
+static double free_share(const sonde_bounds *a, const sonde_bounds *way_a, const sonde_bounds *b,
+                         const sonde_bounds *way_b) {
+  double most = 0;
+  const double gap[6] = {b->low.x - a->high.x, b->low.y - a->high.y, b->low.z - a->high.z,
+                         a->low.x - b->high.x, a->low.y - b->high.y, a->low.z - b->high.z};
+  const double closing[6] = {way_a->high.x - way_b->low.x, way_a->high.y - way_b->low.y,
+                             way_a->high.z - way_b->low.z, way_b->high.x - way_a->low.x,
+                             way_b->high.y - way_a->low.y, way_b->high.z - way_a->low.z};
+  for (int k = 0; k < 6; ++k) most = fmax(most, axis_share(gap[k], closing[k]));
+  return most;
+}
+
+// Longest way of a point of a as a point of b sees it.
+static double relative_way(const sonde_bounds *a, const sonde_bounds *b) {
+  sonde_vec3 p = v_sub(a->high, b->low), q = v_sub(b->high, a->low);
+  return v_norm(vec3(fmax(p.x, q.x), fmax(p.y, q.y), fmax(p.z, q.z)));
+}
+
+static double safe_share(const sonde_scene_state *state, const sonde_kept *from, double allowed) {
+  const sonde_scene *scene = state->scene;
+  double share = 1;
+  for (uint32_t t = 0; t < scene->touch_count; ++t) {
+    uint32_t a = scene->touches[t].a, b = scene->touches[t].b;
+    double way = relative_way(&state->way[a], &state->way[b]);
+    double most = allowed * fmin(state->thickness_m[a], state->thickness_m[b]);
+    if (!(way > share * most)) continue;
+    sonde_bounds box_a = bounds_of(state, from, a), box_b = bounds_of(state, from, b);
+    double apart = free_share(&box_a, &state->way[a], &box_b, &state->way[b]);
+    share = fmin(share, apart + most / way);
+  }
+  return share;
+}
+
+static double planned_share(sonde_scene_state *state, double h) {
+  sonde_rigid_begin(state, h); // velocities of driven bodies
+  for (uint32_t b = 0; b < state->scene->body_count; ++b) state->way[b] = guess(state, b, h);
+  return safe_share(state, &state->now, PLANNED);
+}
+
+static double made_share(sonde_scene_state *state) {
+  for (uint32_t b = 0; b < state->scene->body_count; ++b) state->way[b] = made(state, b);
+  return safe_share(state, &state->undo, MADE);
+}
+
+void sonde_step_guarded(sonde_scene_state *state, double h) {
+  SONDE_ASSERT(h > 0);
+  if (!state->scene->step.cast || !state->scene->touch_count) {
+    sonde_step_once(state, h);
+    return;
+  }
+  double start = state->now.head->time_s, done = 0, least = ldexp(h, -CUTS);
+  while (done < h) {
+    double left = h - done, part = left * planned_share(state, left);
+    if (part < least || left - part < least) part = fmin(left, fmax(part, least));
+    for (;;) {
+      sonde_step_once(state, part);
+      bool far = made_share(state) < 1 && part > least;
+      if (!far) break;
+      sonde_kept_copy(&state->now, &state->undo);
+      part *= 0.5;
+    }
+    if (part < h) state->report.cuts++;
+    done = left - part > least ? done + part : h;
+    state->now.head->time_s = start + done;
+  }
+}
