@@ -146,8 +146,9 @@ void sonde_step_guarded(sonde_scene_state *state, double h) {
   }
   double start = state->now.head->time_s, done = 0, least = ldexp(h, -CUTS);
   while (done < h) {
-    double left = h - done, part = left * planned_share(state, left);
-    if (part < least || left - part < least) part = fmin(left, fmax(part, least));
+    // equal parts: a short one after a deep one would throw the bodies apart
+    double left = h - done, parts = ceil(1 / fmax(planned_share(state, left), least / left));
+    double part = parts > 1 ? left / parts : left;
     for (;;) {
       sonde_step_once(state, part);
       bool far = made_share(state) < 1 && part > least;
