@@ -45,6 +45,7 @@ typedef struct sonde_grip {
   double share;                 // of the push: N per unit of its f
   uint32_t slot_count, slot[6]; // what moves the point
   double weight[6];             // + on a, - on b; of a rigid body on its centre
+  sonde_vec3 tilt[6];           // across the normal: what tilting the face moves the point
   sonde_vec3 arm[2];            // from the centre to the point, rigid sides
   uint32_t bond[3];             // the bonds of the face on the bond side
   double bond_weight[3];

@@ -2,6 +2,7 @@
 // near_pairs:    bodies whose boxes overlap.
 // lever:         how a body's slots move a point of its surface.
 // grip_*:        rows, relative velocity and forces of a column's two points.
+// tilt:          a point beside a face as its nodes move it.
 // meet:          one point for the friction of both bodies.
 // add_column:    a column: its grip, and under the foundation law its push.
 // add_rows:      one side of a volume's gradient as rows of slots.
@@ -77,6 +78,11 @@ static uint32_t split_of(const sonde_scene_state *state, const sonde_grip *grip)
   return rigid_side(state, grip, 0) ? 1 : 3;
 }
 
+// What a force at the point is at one of its slots.
+static sonde_vec3 part_of(const sonde_grip *grip, uint32_t k, sonde_vec3 force) {
+  return v_madd(v_scale(force, grip->weight[k]), -v_dot(grip->tilt[k], force), grip->normal);
+}
+
 bool sonde_grip_rows(sonde_scene_state *state, const sonde_grip *grip, sonde_vec3 direction,
                      uint32_t *first, uint32_t *count) {
   uint32_t split = split_of(state, grip), at = *first = state->row_count;
@@ -88,7 +94,7 @@ bool sonde_grip_rows(sonde_scene_state *state, const sonde_grip *grip, sonde_vec
   for (uint32_t k = 0; k < grip->slot_count; ++k) {
     int side = k >= split;
     state->rows[at] = grip->slot[k];
-    state->g[at++] = v_scale(direction, grip->weight[k]);
+    state->g[at++] = part_of(grip, k, direction);
     if (!rigid_side(state, grip, side)) continue;
     state->rows[at] = grip->slot[k] + 1;
     state->g[at++] = v_scale(v_cross(grip->arm[side], direction), grip->weight[k]);
@@ -107,7 +113,7 @@ sonde_vec3 sonde_grip_slip(const sonde_scene_state *state, const sonde_grip *gri
     sonde_vec3 v = field[grip->slot[k]];
     if (rigid_side(state, grip, side))
       v = v_add(v, v_cross(field[grip->slot[k] + 1], grip->arm[side]));
-    slip = v_madd(slip, grip->weight[k], v);
+    slip = v_madd(v_madd(slip, grip->weight[k], v), -v_dot(v, grip->normal), grip->tilt[k]);
   }
   return slip;
 }
@@ -118,7 +124,7 @@ void sonde_grip_spread(const sonde_scene_state *state, const sonde_grip *grip, s
   for (uint32_t k = 0; k < grip->slot_count; ++k) {
     int side = k >= split;
     uint32_t s = grip->slot[k];
-    field[s] = v_madd(field[s], grip->weight[k], force);
+    field[s] = v_add(field[s], part_of(grip, k, force));
     if (rigid_side(state, grip, side))
       field[s + 1] = v_madd(field[s + 1], grip->weight[k], v_cross(grip->arm[side], force));
   }
@@ -134,15 +140,43 @@ static sonde_push *new_push(sonde_scene_state *state, uint32_t t) {
   return push;
 }
 
+// A point beside a face, by s along the normal n, moves as if a straight line to it stood on the
+// face: v = sum w_k v_k - s sum (v_k.n) grad w_k, with the gradient of the weights across n. A
+// force f across n is then f w_k - s (f.grad w_k) n at the nodes: f in all, and the torque of f at
+// the point. A face that looks across n, or is smaller than s, cannot carry this couple: there the
+// point stays nearer to the face.
+static void tilt(const sonde_scene_state *state, uint32_t b, uint32_t face, sonde_vec3 to,
+                 sonde_grip *grip, int side) {
+  static const double STEEPEST = 1;
+  const uint32_t *vertex = body_of(state, b)->surface.faces[face];
+  const sonde_vec3 *surface = state->surface + state->surface_first[b];
+  sonde_vec3 n = grip->normal, edge[3], gradient[3];
+  double aside = v_dot(v_sub(to, grip->point[side]), n), steepest = 0;
+  for (int k = 0; k < 3; ++k)
+    edge[k] = v_sub(surface[vertex[(k + 2) % 3]], surface[vertex[(k + 1) % 3]]);
+  double twice_area = v_dot(v_cross(edge[1], edge[2]), n);
+  if (!(fabs(twice_area) > 0)) return;
+  for (int k = 0; k < 3; ++k) {
+    gradient[k] = v_scale(v_cross(n, edge[k]), 1 / twice_area);
+    steepest = fmax(steepest, fabs(aside) * v_norm(gradient[k]));
+  }
+  if (steepest > STEEPEST) aside *= STEEPEST / steepest;
+  uint32_t first = side ? grip->slot_count - 3 : 0;
+  for (uint32_t k = 0; k < 3; ++k)
+    grip->tilt[first + k] = v_scale(gradient[k], (side ? -1 : 1) * aside);
+  grip->point[side] = v_madd(grip->point[side], aside, n);
+}
+
 // The two ends of a column lie a depth apart, and forces across it would turn the bodies. A rigid
-// body is held at the other's end instead, two of them half way; two deformable ones keep the
-// couple of the friction with the depth.
-static void meet(const sonde_scene_state *state, const sonde_touch *touch, sonde_grip *grip) {
+// body is held at the other's end instead, two bodies of one kind half way.
+static void meet(const sonde_scene_state *state, const sonde_touch *touch,
+                 const sonde_overlap_point *point, sonde_grip *grip) {
   bool rigid[2] = {rigid_side(state, grip, 0), rigid_side(state, grip, 1)};
   sonde_vec3 middle = v_lerp(grip->point[0], grip->point[1], 0.5);
-  const uint32_t body[2] = {touch->a, touch->b};
+  const uint32_t body[2] = {touch->a, touch->b}, face[2] = {point->face_a, point->face_b};
   sonde_vec3 other[2] = {grip->point[1], grip->point[0]};
   for (int s = 0; s < 2; ++s) {
+    if (!rigid[s] && !rigid[!s]) tilt(state, body[s], face[s], middle, grip, s);
     if (!rigid[s]) continue;
     grip->point[s] = rigid[!s] ? middle : other[s];
     uint32_t centre = body_of(state, body[s])->first_slot;
@@ -164,7 +198,7 @@ static void add_column(sonde_scene_state *state, uint32_t t, const sonde_overlap
   grip->normal = region->direction;
   grip->slot_count = lever(state, touch->a, point->face_a, point->weight_a, 1, grip, 0);
   grip->slot_count = lever(state, touch->b, point->face_b, point->weight_b, -1, grip, 1);
-  meet(state, touch, grip);
+  meet(state, touch, point, grip);
   uint32_t side = touch->bond_side ? touch->b : touch->a;
   uint32_t face = touch->bond_side ? point->face_b : point->face_a;
   for (int k = 0; k < 3; ++k) {

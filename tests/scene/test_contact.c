@@ -99,7 +99,7 @@ static void test_damping_never_pulls(void **unused) {
 // A ball that leaves fast is far away at the end of the step: the linear law would pull it back.
 static void test_nothing_pulls_at_the_end(void **unused) {
   (void)unused;
-  world w = world_of("sonde_scene: 1\nmaterials:\n"
+  world w = world_of("sonde_scene: 1\nstep: {cast: false}\nmaterials:\n"
                      "- {name: hard, contact_stiffness_n_m3: 1e9, contact_damping_s: 0}\n"
                      "bodies:\n"
                      "- {name: floor, motion: fixed, shape: {slab_mm: [100, 100, 20]}, "
