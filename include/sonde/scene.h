@@ -44,6 +44,8 @@ typedef struct sonde_scene_step {
   bool line_search;           /**< on the slope of the incremental potential; default true */
   bool cast;                  /**< parts of a step where bodies move fast: none passes through;
                                    default true */
+  double sleep_m;             /**< nodes of a tissue whose unbalanced force over their anchors is
+                                   less sleep when slow; 0: none; default 5e-6 */
   sonde_pcg_options solver;   /**< default relative 1e-8, at most 1000 iterations */
   double substep_tolerance_m; /**< wanted error of a step, by step doubling; 0: no substeps */
   uint32_t substep_halvings;  /**< smallest substep is dt/2^this; default 8, at most 16 */
@@ -125,6 +127,7 @@ typedef struct sonde_scene_report {
   uint32_t newton_iterations, solver_iterations, line_halvings;
   uint32_t substeps, rejected; /**< of an adaptive step */
   uint32_t cuts;               /**< parts made in place of a step so that no body passes through */
+  uint32_t awake;              /**< slots that took part in the last solve */
   uint32_t touch_points;       /**< integration points of all contacts */
   double newton_residual;      /**< |g| at the last evaluation over the first */
   double error_m;              /**< estimate by step doubling; 0 without substeps */

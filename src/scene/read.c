@@ -23,6 +23,7 @@ sonde_scene_step sonde_scene_step_default(void) {
                             .newton_residual = 1e-9,
                             .line_search = true,
                             .cast = true,
+                            .sleep_m = 5e-6,
                             .solver = {1e-8, 1e-14, 1000},
                             .substep_halvings = 8};
 }
@@ -35,6 +36,7 @@ static void read_step(sonde_reader *reader, sonde_place at, sonde_scene *scene) 
                                      "newton_residual",
                                      "line_search",
                                      "cast",
+                                     "sleep_mm",
                                      "solver_relative",
                                      "solver_iterations",
                                      "substep_tolerance_mm",
@@ -55,6 +57,7 @@ static void read_step(sonde_reader *reader, sonde_place at, sonde_scene *scene) 
       sonde_read_real(reader, at, "newton_residual", 0, 1, step->newton_residual);
   step->line_search = sonde_read_bool(reader, at, "line_search", step->line_search);
   step->cast = sonde_read_bool(reader, at, "cast", step->cast);
+  step->sleep_m = 1e-3 * sonde_read_real(reader, at, "sleep_mm", 0, 1, step->sleep_m * 1e3);
   step->solver.relative_residual =
       sonde_read_real(reader, at, "solver_relative", 0, 1, step->solver.relative_residual);
   step->solver.max_iterations =
@@ -76,7 +79,7 @@ sonde_status sonde_scene_set_step(sonde_scene *scene, const sonde_scene_step *st
   if (step->newton_iterations < 1 || step->newton_iterations > 1000)
     return sonde_fail(error, SONDE_ARGUMENT, "%u Newton iterations, expected 1 to 1000",
                       step->newton_iterations);
-  if (!(step->newton_residual >= 0) || !(step->substep_tolerance_m >= 0))
+  if (!(step->newton_residual >= 0) || !(step->substep_tolerance_m >= 0) || !(step->sleep_m >= 0))
     return sonde_fail(error, SONDE_ARGUMENT, "a tolerance is negative");
   if (!(step->solver.relative_residual >= 0) || !(step->solver.absolute_residual >= 0) ||
       step->solver.max_iterations < 1)

@@ -7,7 +7,7 @@
 #include <string.h>
 
 static const char MAGIC[8] = "SONDESNP";
-enum { SNAPSHOT_VERSION = 1 };
+enum { SNAPSHOT_VERSION = 2 };
 
 typedef struct header {
   char magic[8];

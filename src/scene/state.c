@@ -37,6 +37,7 @@ static void lay_kept(const sonde_scene_state *state, carver *c, sonde_kept *kept
   kept->hint = carve(c, scene->touch_count, sizeof(sonde_vec3));
   kept->bond = carve(c, state->bond_count, sizeof(sonde_vec3));
   kept->slip = carve(c, state->bond_count, sizeof(double));
+  kept->calm = carve(c, scene->slot_count, sizeof(uint8_t));
 }
 
 static sonde_status make_kept(const sonde_scene_state *state, sonde_kept *kept,
@@ -62,7 +63,14 @@ static void lay_slots(sonde_scene_state *s, carver *c) {
   s->plain_diagonal = carve(c, slots, sizeof(sonde_mat3));
   s->active_rows = carve(c, slots, sizeof(uint32_t));
   s->active_pairs = carve(c, s->scene->pair_count, sizeof(uint32_t));
-  uint32_t most = 0;
+  s->part_rows = carve(c, slots, sizeof(uint32_t));
+  s->part_rim = carve(c, slots, sizeof(uint32_t));
+  s->part_edges = carve(c, s->scene->pair_count, sizeof(uint32_t));
+  s->in_rim = carve(c, slots, sizeof(uint8_t));
+  uint32_t most = 0, faces = 0;
+  for (uint32_t b = 0; b < s->scene->body_count; ++b)
+    faces += s->scene->bodies[b].surface.face_count;
+  s->part_faces = carve(c, faces, sizeof(uint32_t));
   for (uint32_t b = 0; b < s->scene->body_count; ++b)
     if (s->scene->bodies[b].model && s->scene->bodies[b].node_count > most)
       most = s->scene->bodies[b].node_count;
@@ -82,6 +90,7 @@ static void lay_arrays(sonde_scene_state *s, carver *c) {
   s->thickness_m = carve(c, bodies, sizeof(double));
   s->way = carve(c, bodies, sizeof(sonde_bounds));
   s->body_inverse = carve(c, bodies, sizeof(sonde_mat3));
+  s->part = carve(c, bodies, sizeof *s->part);
   s->island = carve(c, bodies, sizeof(uint32_t));
   s->loose = carve(c, bodies, sizeof(bool));
   s->tree = carve(c, bodies, sizeof(sonde_face_tree *));
@@ -166,11 +175,6 @@ static sonde_status make_contact(sonde_scene_state *state, sonde_error *error) {
   return status;
 }
 
-static bool is_active(const sonde_body *body, uint32_t slot) {
-  if (body->motion != SONDE_BODY_FREE) return false;
-  return sonde_body_is_rigid(body) || !body->held[slot];
-}
-
 static sonde_status make_solver(sonde_scene_state *state, sonde_error *error) {
   const sonde_scene *scene = state->scene;
   sonde_status status =
@@ -181,14 +185,8 @@ static sonde_status make_solver(sonde_scene_state *state, sonde_error *error) {
     const sonde_body *body = &scene->bodies[b];
     state->loose[b] = body->motion == SONDE_BODY_FREE && !body->model;
     for (uint32_t k = 0; k < body->node_count; ++k) state->loose[b] &= !body->held[k];
-    for (uint32_t k = 0; k < body->slot_count; ++k)
-      if (is_active(body, k)) state->active_rows[state->active_row_count++] = body->first_slot + k;
-    uint32_t end = b + 1 < scene->body_count ? body[1].first_pair : scene->pair_count;
-    for (uint32_t e = body->first_pair; e < end; ++e)
-      if (is_active(body, scene->pairs[e][0] - body->first_slot) &&
-          is_active(body, scene->pairs[e][1] - body->first_slot))
-        state->active_pairs[state->active_pair_count++] = e;
   }
+  sonde_sleep_list(state);
   return SONDE_OK;
 }
 
@@ -300,7 +298,7 @@ void sonde_scene_state_reset(sonde_scene_state *state) {
     for (uint32_t i = 0; i < body->node_count; ++i) {
       sonde_vec3 arm = v_sub(body->node[i], body->mass.centre_m);
       state->now.position[body->first_slot + i] = body->node[i];
-      if (is_active(body, i))
+      if (!body->held[i])
         state->now.velocity[body->first_slot + i] =
             v_add(body->velocity_m_s, v_cross(body->spin_rad_s, arm));
     }
@@ -342,6 +340,7 @@ void sonde_scene_set_nodes(sonde_scene_state *state, uint32_t b, const sonde_vec
   size_t bytes = body->node_count * sizeof(sonde_vec3);
   if (positions) memcpy(state->now.position + body->first_slot, positions, bytes);
   if (velocities) memcpy(state->now.velocity + body->first_slot, velocities, bytes);
+  memset(state->now.calm + body->first_slot, 0, body->slot_count);
 }
 
 void sonde_scene_surface(const sonde_scene_state *state, uint32_t b, sonde_vec3 *vertices) {

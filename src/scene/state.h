@@ -26,6 +26,7 @@ typedef struct sonde_kept {
   sonde_vec3 *hint;      // [touches] last direction out of a into b
   sonde_vec3 *bond;      // [bonds] way since the bond began, per vertex of a touch's bond side
   double *slip;          // [bonds] m/s by which it slipped in the last step
+  uint8_t *calm;         // [slots] steps at rest of a tissue's node; many: it sleeps
 } sonde_kept;
 
 // A push of one body on another along generalised coordinates: a quantity u (depth of a column or
@@ -111,8 +112,11 @@ struct sonde_scene_state {
   sonde_vec3 *mean_velocity;                   // [slots] scratch
   uint32_t *active_rows, *active_pairs;
   uint32_t active_row_count, active_pair_count;
-  uint32_t *island; // [bodies]
-  bool *loose;      // [bodies] nothing outside holds it
+  sonde_tissue_part *part;                                  // [bodies] the waking part of a tissue
+  uint32_t *part_rows, *part_rim, *part_edges, *part_faces; // [slots], [slots], [pairs], [faces]
+  uint8_t *in_rim;                                          // [slots] scratch
+  uint32_t *island;                                         // [bodies]
+  bool *loose;                                              // [bodies] nothing outside holds it
   sonde_pcg_scratch scratch;
   sonde_tissue_node *tissue_nodes;
   sonde_scene_report report;
@@ -170,6 +174,16 @@ void sonde_grip_spread(const sonde_scene_state *state, const sonde_grip *grip, s
 // Rows of a push along `direction` on a and against it on b; false when the pool is full.
 bool sonde_grip_rows(sonde_scene_state *state, const sonde_grip *grip, sonde_vec3 direction,
                      uint32_t *first, uint32_t *count);
+
+// The solver's rows and pairs, and the waking parts of tissues. @thread tick
+void sonde_sleep_list(sonde_scene_state *state);
+// The same at the start of a step; bodies that may not sleep are woken. @thread tick
+void sonde_sleep_begin(sonde_scene_state *state);
+// Wakes what contacts push; true when something slept: the bodies have to be linearised again.
+// @thread tick
+bool sonde_sleep_wake_touched(sonde_scene_state *state);
+// Puts nodes at rest to sleep and wakes beside movers, at the end of a step. @thread tick
+void sonde_sleep_rest(sonde_scene_state *state);
 
 // One step of size h. @thread tick
 void sonde_step_once(sonde_scene_state *state, double h);

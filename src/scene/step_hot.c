@@ -37,7 +37,7 @@ static void linearise_rigid(sonde_scene_state *state, uint32_t b) {
 
 // The part of the matrix that belongs to one body.
 static void linearise_tissue(sonde_scene_state *state, const sonde_body *body,
-                             const sonde_tissue_scales *scales) {
+                             const sonde_tissue_part *waking, const sonde_tissue_scales *scales) {
   uint32_t first = body->first_slot;
   sonde_block_matrix part = {.row_count = body->node_count,
                              .pair_count = body->model->topology.edge_count,
@@ -45,17 +45,21 @@ static void linearise_tissue(sonde_scene_state *state, const sonde_body *body,
                              .diagonal = state->matrix->diagonal + first,
                              .upper = state->matrix->upper + body->first_pair,
                              .inverse = state->matrix->inverse + first};
-  sonde_tissue_linearise(body->model, NULL, state->stage_position + first,
-                         state->stage_velocity + first, scales, state->force + first,
-                         state->product + first, &part, state->tissue_nodes);
+  sonde_tissue_linearise(body->model, waking->row_count < body->node_count ? waking : NULL,
+                         state->stage_position + first, state->stage_velocity + first, scales,
+                         state->force + first, state->product + first, &part, state->tissue_nodes);
 }
 
-static void add_loads(sonde_scene_state *state, const sonde_body *body) {
-  sonde_vec3 gravity = state->scene->gravity_m_s2;
-  for (uint32_t i = 0; i < body->node_count; ++i) {
-    sonde_vec3 *f = &state->force[body->first_slot + i];
-    *f = v_add(v_madd(*f, body->node_mass_kg[i], gravity), body->load_n[i]);
-  }
+static void add_load(sonde_scene_state *state, const sonde_body *body, uint32_t i) {
+  sonde_vec3 *f = &state->force[body->first_slot + i];
+  *f = v_add(v_madd(*f, body->node_mass_kg[i], state->scene->gravity_m_s2), body->load_n[i]);
+}
+
+// The forces of sleepers are not made anew.
+static void add_loads(sonde_scene_state *state, const sonde_body *body,
+                      const sonde_tissue_part *waking) {
+  uint32_t count = body->model ? waking->row_count : body->node_count;
+  for (uint32_t r = 0; r < count; ++r) add_load(state, body, body->model ? waking->rows[r] : r);
 }
 
 static void linearise(sonde_scene_state *state, const sonde_tissue_scales *scales) {
@@ -67,10 +71,10 @@ static void linearise(sonde_scene_state *state, const sonde_tissue_scales *scale
       continue;
     }
     if (body->model)
-      linearise_tissue(state, body, scales);
+      linearise_tissue(state, body, &state->part[b], scales);
     else
       sonde_network_linearise(state, b, scales);
-    add_loads(state, body);
+    add_loads(state, body, &state->part[b]);
   }
   state->bulk_terms = state->term_count;
 }
@@ -79,9 +83,12 @@ static void evaluate(sonde_scene_state *state, double h, double moved_s) {
   SONDE_ASSERT(h > 0 && moved_s >= 0);
   sonde_tissue_scales scales = scales_of(state, h);
   double start = sonde_clock_now();
-  linearise(state, &scales);
-  double linearised = sonde_clock_now();
-  sonde_touch_find(state);
+  double linearised;
+  do {
+    linearise(state, &scales);
+    linearised = sonde_clock_now();
+    sonde_touch_find(state);
+  } while (sonde_sleep_wake_touched(state));
   sonde_touch_evaluate(state, moved_s);
   state->report.assembly_s += linearised - start;
   state->report.contact_s += sonde_clock_now() - linearised;
@@ -304,6 +311,7 @@ static void undo(sonde_scene_state *state, double h) {
   size_t bytes = state->scene->slot_count * sizeof(sonde_vec3);
   memset(state->now.velocity, 0, bytes);
   memset(state->now.increment, 0, bytes);
+  memset(state->now.calm, 0, state->scene->slot_count);
   memset(state->now.bond, 0, state->bond_count * sizeof(sonde_vec3));
   memset(state->now.slip, 0, state->bond_count * sizeof(double));
   for (uint32_t t = 0; t < state->scene->touch_count; ++t) state->pair[t] = (sonde_pair_measure){0};
@@ -327,6 +335,7 @@ static bool good_forces(const sonde_scene_state *state) {
 void sonde_step_once(sonde_scene_state *state, double h) {
   SONDE_ASSERT(h > 0);
   sonde_kept_copy(&state->undo, &state->now);
+  sonde_sleep_begin(state);
   sonde_rigid_begin(state, h);
   sonde_stage_start(state);
   evaluate(state, h, 0);
@@ -338,8 +347,11 @@ void sonde_step_once(sonde_scene_state *state, double h) {
   sonde_touch_finish(state, h);
   bool finite = good_forces(state);
   finite = sonde_stage_finish(state, state->now.increment, h) && finite;
-  if (!finite)
+  state->report.awake = state->active_row_count;
+  if (!finite) {
     undo(state, h);
-  else
-    state->now.head->time_s += h;
+    return;
+  }
+  state->now.head->time_s += h;
+  sonde_sleep_rest(state);
 }
