@@ -3,6 +3,7 @@
 // write_frame:  surfaces of all bodies, rows of the tables, the series file, then the snapshot.
 // run:          steps until the end or Ctrl-C.
 #include "app.h"
+#include "scene_figure.h"
 
 #include <errno.h>
 #include <getopt.h>
@@ -26,13 +27,14 @@ static const char HELP[] =
     "  --seconds S       simulate S seconds; default: duration_s of the scene\n"
     "  --every K         write every K-th step; default: 60 frames per second of the scene\n"
     "  --no-frames       write no VTK files\n"
+    "  --picture FILE    draw the bodies as they stand at the end (SVG)\n"
     "  --resume          go on from the snapshot in DIR; the result is the same, bit by bit\n"
     "  --json            print one JSON object\n"
     "  --help            this text\n"
     "Ctrl-C keeps what is finished; --resume goes on from there.\n";
 
 typedef struct arguments {
-  const char *scene, *directory;
+  const char *scene, *directory, *picture;
   long steps, every; // 0: not given
   double seconds;    // 0: not given
   bool resume, json, help, no_frames;
@@ -55,6 +57,7 @@ static bool read_option(int option, arguments *a) {
   case 's': return app_parse_integer(VERB, "--steps", optarg, 1, 2000000000, &a->steps);
   case 'S': return app_parse_real(VERB, "--seconds", optarg, 1e-9, 1e6, &a->seconds);
   case 'e': return app_parse_integer(VERB, "--every", optarg, 1, 2000000000, &a->every);
+  case 'p': a->picture = optarg; return true;
   case 'n': return a->no_frames = true;
   case 'r': return a->resume = true;
   case 'j': return a->json = true;
@@ -64,15 +67,12 @@ static bool read_option(int option, arguments *a) {
 }
 
 static bool read_arguments(int argc, char **argv, arguments *a) {
-  static const struct option LONG[] = {{"output", required_argument, NULL, 'o'},
-                                       {"steps", required_argument, NULL, 's'},
-                                       {"seconds", required_argument, NULL, 'S'},
-                                       {"every", required_argument, NULL, 'e'},
-                                       {"no-frames", no_argument, NULL, 'n'},
-                                       {"resume", no_argument, NULL, 'r'},
-                                       {"json", no_argument, NULL, 'j'},
-                                       {"help", no_argument, NULL, 'h'},
-                                       {NULL, 0, NULL, 0}};
+  static const struct option LONG[] = {
+      {"output", required_argument, NULL, 'o'},  {"steps", required_argument, NULL, 's'},
+      {"seconds", required_argument, NULL, 'S'}, {"every", required_argument, NULL, 'e'},
+      {"no-frames", no_argument, NULL, 'n'},     {"picture", required_argument, NULL, 'p'},
+      {"resume", no_argument, NULL, 'r'},        {"json", no_argument, NULL, 'j'},
+      {"help", no_argument, NULL, 'h'},          {NULL, 0, NULL, 0}};
   for (int c; (c = getopt_long(argc, argv, "o:", LONG, NULL)) != -1;)
     if (!read_option(c, a)) return false;
   if (a->help) return true;
@@ -327,6 +327,7 @@ int cmd_simulate(int argc, char **argv) {
   sonde_status status = prepare(&s, &error);
   if (!status) status = run(&s, &error);
   if (!status && s.cancelled) status = save_snapshot(&s, &error);
+  if (!status && s.a.picture) status = scene_figure(s.scene, s.state, s.a.picture, &error);
   if (!status) print_summary(&s);
   if (!status && s.cancelled)
     fprintf(stderr, "sonde simulate: cancelled at step %llu of %llu; --resume goes on\n",

@@ -86,6 +86,8 @@ SONDE_API uint32_t sonde_scene_find(const sonde_scene *scene, const char *name);
 SONDE_API const char *sonde_scene_title(const sonde_scene *scene);
 /** `duration_s` of the file: how long a run is meant to be; 1 s when absent. */
 SONDE_API double sonde_scene_duration(const sonde_scene *scene);
+/** Acceleration of gravity (m/s^2); zero when the file gives none. */
+SONDE_API sonde_vec3 sonde_scene_gravity(const sonde_scene *scene);
 /** Hash of the text and of the meshes that the scene was compiled from. */
 SONDE_API uint64_t sonde_scene_checksum(const sonde_scene *scene);
 

@@ -402,6 +402,7 @@ sonde_body_measure sonde_scene_measure(const sonde_scene_state *state, uint32_t 
 uint32_t sonde_scene_body_count(const sonde_scene *scene) { return scene->body_count; }
 const char *sonde_scene_title(const sonde_scene *scene) { return scene->title; }
 double sonde_scene_duration(const sonde_scene *scene) { return scene->duration_s; }
+sonde_vec3 sonde_scene_gravity(const sonde_scene *scene) { return scene->gravity_m_s2; }
 uint64_t sonde_scene_checksum(const sonde_scene *scene) { return scene->checksum; }
 uint32_t sonde_scene_pair_count(const sonde_scene *scene) { return scene->touch_count; }
 sonde_scene_step sonde_scene_get_step(const sonde_scene *scene) { return scene->step; }
