@@ -15,7 +15,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { WIDTH = 520, TALLEST = 460, MARGIN = 12, LEGEND = 26, LAYERS = 240, SHADES = 12 };
+enum { WIDTH = 520, TALLEST = 460, MARGIN = 12, LEGEND = 26, LAYERS = 240, SHADES = 48 };
 enum { PIECES_MOST = 400000, DEEPEST = 12 };
 static const double PIECE_PX = 22; // longest edge of a piece
 
