@@ -60,7 +60,8 @@ gives "deadline_misses:integer energy_j:number max_force_n>=0 max_slew_n_per_s>=
 simulate="steps:integer steps>=40 steps<=40 time_s:number hash:text flagged_steps<=0 ms_per_step:number"
 for scene in stack four_kinds; do
   file=$DATA/../scenes/$scene.yaml
-  gives "$simulate" simulate "$file" -o whole_$scene --steps 40 --every 5 --json
+  gives "$simulate" simulate "$file" -o whole_$scene --steps 40 --every 5 --picture $scene.svg --json
+  tail -1 $scene.svg | grep -q "^</svg>$"
   gives "steps>=25 steps<=25" simulate "$file" -o parts_$scene --steps 25 --every 5 --json
   gives "$simulate" simulate "$file" -o parts_$scene --steps 40 --every 5 --resume --json
   diff -r whole_$scene parts_$scene >/dev/null || wrong "$scene: a resumed run differs"
