@@ -61,7 +61,7 @@ simulate="steps:integer steps>=40 steps<=40 time_s:number hash:text flagged_step
 for scene in stack four_kinds; do
   file=$DATA/../scenes/$scene.yaml
   gives "$simulate" simulate "$file" -o whole_$scene --steps 40 --every 5 --picture $scene.svg --json
-  tail -1 $scene.svg | grep -q "^</svg>$"
+  tail -1 $scene.svg | grep -q "^</svg>$" || wrong "$scene: the picture is not whole"
   gives "steps>=25 steps<=25" simulate "$file" -o parts_$scene --steps 25 --every 5 --json
   gives "$simulate" simulate "$file" -o parts_$scene --steps 40 --every 5 --resume --json
   diff -r whole_$scene parts_$scene >/dev/null || wrong "$scene: a resumed run differs"
