@@ -129,8 +129,8 @@ static sonde_status prepare(bench *b, const options *o, sonde_error *error) {
   const double known_m3 = 16e9;
   b->settings = sonde_echo_settings_default();
   sonde_status status = sonde_pathology_preset("healthy", &b->pathology, error);
-  if (!status) status = settled_open(&b->scene, o->model, "linear", error);
-  if (!status && settled_site(&b->scene, 27, &b->start, error))
+  if (!status) status = settled_open(&b->scene, o->model, "linear", NULL, error);
+  if (!status && settled_site(&b->scene, o->model, 27, &b->start, error))
     b->start = sonde_site_pose(&b->scene.model->sites[b->scene.model->site_count / 2], 0);
   if (!status)
     status = sonde_image_create((uint32_t)o->width, (uint32_t)o->height, &b->image, error);

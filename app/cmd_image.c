@@ -197,7 +197,7 @@ static sonde_pose turned(sonde_pose p, double angle) {
 
 static sonde_status place(settled *s, const options *o, sonde_error *error) {
   sonde_pose start = o->pose;
-  sonde_status status = o->posed ? SONDE_OK : settled_site(s, o->site, &start, error);
+  sonde_status status = o->posed ? SONDE_OK : settled_site(s, o->model, o->site, &start, error);
   if (status) return status;
   start = turned(start, o->turn);
   bool pressed = !isnan(o->force_n) || !isnan(o->press_m);
@@ -276,7 +276,7 @@ int cmd_image(int argc, char **argv) {
   sonde_pathology pathology;
   sonde_error error = {0};
   sonde_status status = sonde_pathology_preset(o.pathology, &pathology, &error);
-  if (!status) status = settled_open(&s, o.model, o.probe, &error);
+  if (!status) status = settled_open(&s, o.model, o.probe, NULL, &error);
   if (!status) status = place(&s, &o, &error);
   if (!status) status = draw(&s, &o, &pathology, &image, &error);
   if (!status) print(&s, &o, &image);

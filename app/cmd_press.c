@@ -1,7 +1,8 @@
 // sonde press: settles a probe at a site to a force or a depth and reports what is felt and seen.
-// find_depth: regula falsi on the settled force.
-// look:       interior, vessels and picture of the settled state.
+// press_on:   to a force, or in steps to a depth.
+// look:       vessels and picture of the settled state.
 #include "app.h"
+#include "settled.h"
 
 #include <getopt.h>
 #include <math.h>
@@ -42,22 +43,13 @@ typedef struct options {
 } options;
 
 typedef struct press {
-  sonde_model *model;
-  sonde_state *state;
-  sonde_probe probe;
-  const sonde_site *site;
+  settled scene;
+  sonde_pose start; // at rest on the site
   sonde_pathology pathology;
-  sonde_pose pose;
-  double depth_m, force_n;
-  sonde_settle_result settled;
-  uint32_t steps;
   double vein_depth_m;          // NaN: where the model has it
   sonde_vessel_state vessel[2]; // vein, artery
   bool cut[2];                  // the image plane meets it
 } press;
-
-static const double COARSE = 1e-6, RESIDUAL = 1e-9; // relative residual on the way and at the end
-static const double DEEPEST_M = 0.06;
 
 // A number within bounds, scaled to SI; false after a message.
 static bool read_real(const char *name, double low, double high, double scale, double *to) {
@@ -130,76 +122,30 @@ static int read_options(int argc, char **argv, options *o) {
   return -1;
 }
 
-static void settle(press *p, double depth_m, double residual) {
-  p->depth_m = depth_m;
-  p->pose = sonde_site_pose(p->site, depth_m);
-  p->settled = sonde_settle(p->state, &p->probe, p->pose, residual, 400);
-  p->steps += p->settled.iterations;
-  sonde_vec3 f = sonde_state_contact(p->state)->force_n, n = p->site->normal;
-  p->force_n = f.x * n.x + f.y * n.y + f.z * n.z;
-}
-
-static bool report(const sonde_progress *progress, const press *p, double target) {
-  double fraction = target > 0 ? fmin(p->force_n / target, 1) : 0;
-  return !progress->report || progress->report(fraction, "pressing", progress->user);
-}
-
-// The settled force grows with depth: step out to a bracket, then Illinois regula falsi.
-static sonde_status find_depth(press *p, double target, sonde_error *error) {
-  sonde_progress progress = app_progress();
-  double low = 0, low_f = -target, high = 0.002, high_f;
-  for (;; high += 0.002) {
-    settle(p, high, COARSE);
-    high_f = p->force_n - target;
-    if (!report(&progress, p, target)) return SONDE_CANCELLED;
-    if (high_f >= 0 || high >= DEEPEST_M) break;
-    low = high;
-    low_f = high_f;
-  }
-  for (int k = 0; k < 60 && fabs(p->force_n - target) > 1e-4 * target && high_f >= 0; ++k) {
-    double depth = low - low_f * (high - low) / (high_f - low_f);
-    settle(p, depth, COARSE);
-    double f = p->force_n - target;
-    if (f < 0)
-      low = depth, low_f = f, high_f *= k % 3 == 2 ? 0.5 : 1;
-    else
-      high = depth, high_f = f, low_f *= k % 3 == 2 ? 0.5 : 1;
-  }
-  settle(p, p->depth_m, RESIDUAL);
-  if (fabs(p->force_n - target) <= 5e-3 * target && p->settled.converged) return SONDE_OK;
-  error->status = SONDE_CONVERGENCE;
-  snprintf(error->message, sizeof error->message,
-           "%g N was not reached: %g N at %g mm, residual %.2g", target, p->force_n,
-           p->depth_m * 1e3, p->settled.residual);
-  return SONDE_CONVERGENCE;
-}
-
 static sonde_status look(press *p, const char *image_path, sonde_error *error) {
-  sonde_interior *interior = NULL;
+  settled *scene = &p->scene;
+  sonde_interior *interior = scene->interior;
   sonde_echo *echo = NULL;
   sonde_image image = {0};
-  sonde_status status = sonde_interior_create(p->model, &interior, error);
-  if (!status && !isnan(p->vein_depth_m))
-    status = sonde_interior_set_vein_depth(interior, p->site->position_m, p->vein_depth_m, error);
+  sonde_status status = SONDE_OK;
+  if (!isnan(p->vein_depth_m)) {
+    const sonde_vec3 at = p->start.position;
+    status = sonde_interior_set_vein_depth(interior, at, p->vein_depth_m, error);
+  }
   if (status) goto done;
-  sonde_interior_update(interior,
-                        &(sonde_interior_input){sonde_state_positions(p->state),
-                                                sonde_state_contact_forces(p->state), p->pose,
-                                                &p->pathology, -1, sonde_state_tick(p->state),
-                                                p->probe.half_x_m, p->probe.half_y_m});
+  settled_update(scene, &p->pathology, sonde_state_tick(scene->state));
   for (int which = 0; which < 2; ++which)
-    p->cut[which] = sonde_interior_vessel_at_plane(interior, which, p->pose, &p->vessel[which]);
+    p->cut[which] = sonde_interior_vessel_at_plane(interior, which, scene->pose, &p->vessel[which]);
   if (!image_path) goto done;
   sonde_echo_settings settings = sonde_echo_settings_default();
   status = sonde_echo_create(interior, &(sonde_echo_def){0}, &echo, error);
   if (!status) status = sonde_image_create(512, 512, &image, error);
   if (status) goto done;
-  sonde_echo_render(echo, p->pose, 2 * p->probe.half_x_m, &p->pathology, &settings, &image);
+  sonde_echo_render(echo, scene->pose, 2 * scene->probe.half_x_m, &p->pathology, &settings, &image);
   status = sonde_image_save_png(&image, image_path, error);
 done:
   sonde_image_clear(&image);
   sonde_echo_destroy(echo);
-  sonde_interior_destroy(interior);
   return status;
 }
 
@@ -224,27 +170,29 @@ static void print_vessel(const char *name, const sonde_vessel_state *v, bool cut
 }
 
 static void print(const press *p, const options *o) {
+  const settled *s = &p->scene;
   if (o->json) {
     app_json_begin();
-    app_json_real("force_n", p->force_n);
-    app_json_real("penetration_mm", p->depth_m * 1e3);
-    app_json_real("reaction_n", p->settled.reaction_n);
-    app_json_real("contact_n", p->settled.contact_n);
+    app_json_real("force_n", s->force_n);
+    app_json_real("penetration_mm", s->depth_m * 1e3);
+    app_json_real("reaction_n", s->result.reaction_n);
+    app_json_real("contact_n", s->result.contact_n);
     print_vessel("vein", &p->vessel[0], p->cut[0]);
     print_vessel("artery", &p->vessel[1], p->cut[1]);
     app_json_real("vein_short_mm", p->cut[0] ? p->vessel[0].half_short_m * 2e3 : NAN);
-    app_json_real("residual", p->settled.residual);
-    app_json_integer("steps", p->steps);
+    app_json_real("residual", s->result.residual);
+    app_json_integer("steps", s->iterations);
     app_json_text("case", p->pathology.name);
-    app_json_text("probe", p->probe.name);
+    app_json_text("probe", s->probe.name);
     app_json_integer("site", o->site);
     app_json_end();
     return;
   }
-  printf("site %ld, probe %s, case %s\n", o->site, p->probe.name, p->pathology.name);
-  printf("force         %8.3f N\n", p->force_n);
-  printf("penetration   %8.2f mm\n", p->depth_m * 1e3);
-  printf("residual      %8.1e of the contact force (%u steps)\n", p->settled.residual, p->steps);
+  printf("site %ld, probe %s, case %s\n", o->site, s->probe.name, p->pathology.name);
+  printf("force         %8.3f N\n", s->force_n);
+  printf("penetration   %8.2f mm\n", s->depth_m * 1e3);
+  printf("residual      %8.1e of the contact force (%u steps)\n", s->result.residual,
+         s->iterations);
   if (!p->cut[0])
     printf("vein          not under the probe\n");
   else
@@ -266,22 +214,20 @@ static void set_vein(press *p, const options *o) {
 
 static sonde_status prepare(press *p, const options *o, sonde_error *error) {
   sonde_preset preset = sonde_preset_default();
-  sonde_world_def world = sonde_world_def_default();
   sonde_status status = sonde_pathology_preset(o->pathology, &p->pathology, error);
   if (!status) set_vein(p, o);
   if (!status && o->preset) status = sonde_preset_load(o->preset, &preset, error);
-  if (!status) status = sonde_probe_create(o->probe, &p->probe, error);
-  if (!status) status = sonde_model_load(o->model, &p->model, error);
-  if (status) return status;
-  p->site = sonde_model_site(p->model, (uint32_t)o->site);
-  if (!p->site) {
-    error->status = SONDE_NOT_FOUND;
-    snprintf(error->message, sizeof error->message, "%.400s: no site %ld, the model has %u sites",
-             o->model, o->site, p->model->site_count);
-    return SONDE_NOT_FOUND;
-  }
-  status = sonde_preset_apply(&preset, p->model, &world, error);
-  return status ? status : sonde_state_create(p->model, &world, &p->state, error);
+  if (!status) status = settled_open(&p->scene, o->model, o->probe, &preset, error);
+  return status ? status : settled_site(&p->scene, o->model, o->site, &p->start, error);
+}
+
+// To a force, or in steps to a depth.
+static sonde_status press_on(press *p, const options *o, sonde_error *error) {
+  if (!isnan(o->force_n)) return settled_force(&p->scene, p->start, o->force_n, error);
+  for (double d = fmin(0.002, o->depth_m); d < o->depth_m; d += 0.002)
+    settled_at(&p->scene, p->start, d, 1e-6);
+  settled_at(&p->scene, p->start, o->depth_m, 1e-9);
+  return SONDE_OK;
 }
 
 int cmd_press(int argc, char **argv) {
@@ -299,17 +245,9 @@ int cmd_press(int argc, char **argv) {
   press p = {0};
   sonde_error error = {0};
   sonde_status status = prepare(&p, &o, &error);
-  if (!status && !isnan(o.force_n)) {
-    status = find_depth(&p, o.force_n, &error);
-    app_progress_end();
-  } else if (!status) {
-    for (double d = fmin(0.002, o.depth_m); d < o.depth_m; d += 0.002) settle(&p, d, COARSE);
-    settle(&p, o.depth_m, RESIDUAL);
-  }
+  if (!status) status = press_on(&p, &o, &error);
   if (!status) status = look(&p, o.image, &error);
   if (!status) print(&p, &o);
-  sonde_state_destroy(p.state);
-  sonde_probe_clear(&p.probe);
-  sonde_model_destroy(p.model);
+  settled_close(&p.scene);
   return status ? app_fail("press", &error) : APP_OK;
 }

@@ -1,27 +1,21 @@
 // A picture of the thigh at rest, pressed with the mechanical model.
 //
 // press_check      options
-// settle, seek     the depth at which the settled force is the wanted one
 // place            where the picture lies on the model
 // deform           interior and picture
 // press_picture
 #include "frames_press.h"
+#include "settled.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-static const double DEEPEST_M = 0.06, STEP_M = 2e-3, COARSE = 1e-6;
-
 typedef struct work {
-  sonde_model *model;
-  sonde_state *state;
-  sonde_interior *interior;
-  sonde_probe probe;
+  settled scene;
   sonde_pathology pathology;
-  const sonde_site *site;
-  sonde_pose pose;
-  double force_n, target_n, depth_m, at_mm[2];
+  sonde_pose rest_pose;
+  double target_n, at_mm[2];
 } work;
 
 static bool parse(const char *verb, const press_options *o, long *site, work *w) {
@@ -49,47 +43,17 @@ bool press_check(const char *verb, const press_options *o) {
   return parse(verb, o, &site, &w);
 }
 
-static void settle(work *w, double depth_m) {
-  w->depth_m = depth_m;
-  w->pose = sonde_site_pose(w->site, depth_m);
-  sonde_settle(w->state, &w->probe, w->pose, COARSE, 400);
-  sonde_vec3 f = sonde_state_contact(w->state)->force_n, n = w->site->normal;
-  w->force_n = f.x * n.x + f.y * n.y + f.z * n.z;
-}
-
-// The settled force grows with depth: step out to a bracket, then halve it.
-static sonde_status seek(work *w, sonde_error *error) {
-  double low = 0, high = 0;
-  while (w->force_n < w->target_n && high < DEEPEST_M) {
-    low = high, high += STEP_M;
-    settle(w, high);
-  }
-  for (int k = 0; k < 40 && fabs(w->force_n - w->target_n) > 1e-3 * w->target_n; ++k) {
-    settle(w, 0.5 * (low + high));
-    *(w->force_n < w->target_n ? &low : &high) = w->depth_m;
-  }
-  if (fabs(w->force_n - w->target_n) <= 5e-3 * w->target_n) return SONDE_OK;
-  return frames_fail(error, SONDE_CONVERGENCE, "%g N was not reached: %g N at %g mm", w->target_n,
-                     w->force_n, w->depth_m * 1e3);
-}
-
 static sonde_status prepare(const char *verb, const press_options *o, work *w, sonde_error *error) {
   long site = 0;
   sonde_status status =
       sonde_pathology_preset(o->pathology ? o->pathology : "healthy", &w->pathology, error);
-  if (!status) status = sonde_probe_create(o->probe ? o->probe : "linear", &w->probe, error);
-  if (!status) status = sonde_model_load(o->model, &w->model, error);
+  if (!status)
+    status = settled_open(&w->scene, o->model, o->probe ? o->probe : "linear", NULL, error);
   if (status) return status;
   (void)parse(verb, o, &site, w);
   if (o->venous) w->pathology.venous_pressure_pa = atof(o->venous) * 133.322387415;
   if (o->arterial) w->pathology.arterial_pressure_pa = atof(o->arterial) * 133.322387415;
-  w->site = sonde_model_site(w->model, (uint32_t)site);
-  if (!w->site)
-    return frames_fail(error, SONDE_NOT_FOUND, "%.300s: no site %ld, the model has %u sites",
-                       o->model, site, w->model->site_count);
-  sonde_world_def world = sonde_world_def_default();
-  status = sonde_state_create(w->model, &world, &w->state, error);
-  return status ? status : sonde_interior_create(w->model, &w->interior, error);
+  return settled_site(&w->scene, o->model, site, &w->rest_pose, error);
 }
 
 // Rest vein of the model -> the place of the vein in the picture.
@@ -97,7 +61,7 @@ static sonde_status place(const press_options *o, const work *w, sonde_image_pre
                           sonde_error *error) {
   sonde_vessel_state vein;
   if (!o->vein_at) return SONDE_OK;
-  if (!sonde_interior_vessel_at_plane(w->interior, 0, press->rest_pose, &vein))
+  if (!sonde_interior_vessel_at_plane(w->scene.interior, 0, press->rest_pose, &vein))
     return frames_fail(error, SONDE_MISMATCH, "--vein-at: the model's vein is not under site %s",
                        o->site);
   double at_mm[2];
@@ -115,34 +79,32 @@ static sonde_status place(const press_options *o, const work *w, sonde_image_pre
   return SONDE_OK;
 }
 
-static void update(work *w) {
-  sonde_interior_update(w->interior,
-                        &(sonde_interior_input){sonde_state_positions(w->state),
-                                                sonde_state_contact_forces(w->state), w->pose,
-                                                &w->pathology, -1, sonde_state_tick(w->state),
-                                                w->probe.half_x_m, w->probe.half_y_m});
+static void update(const work *w) {
+  settled_update(&w->scene, &w->pathology, sonde_state_tick(w->scene.state));
 }
 
 static sonde_status deform(const press_options *o, work *w, sonde_image *image, uint8_t *known,
                            press_result *r, sonde_error *error) {
-  sonde_image_press press = {.interior = w->interior, .rest_pose = sonde_site_pose(w->site, 0)};
+  settled *scene = &w->scene;
+  sonde_image_press press = {.interior = scene->interior, .rest_pose = w->rest_pose};
   sonde_image out;
+  scene->pose = w->rest_pose;
   update(w); // at rest
   sonde_status status = place(o, w, &press, error);
-  if (!status) status = seek(w, error);
+  if (!status) status = settled_force(scene, w->rest_pose, w->target_n, error);
   if (!status) status = sonde_image_create(image->width, image->height, &out, error);
   if (status) return status;
   update(w);
   out.width_m = image->width_m, out.height_m = image->height_m;
-  press.pose = w->pose;
+  press.pose = scene->pose;
   sonde_image_pressed(image, &press, &out, known);
   memcpy(image->pixels, out.pixels, (size_t)image->width * image->height);
   sonde_image_clear(&out);
   sonde_vessel_state v;
-  *r = (press_result){w->force_n, w->depth_m, NAN, NAN};
-  if (sonde_interior_vessel_at_plane(w->interior, 0, w->pose, &v))
+  *r = (press_result){scene->force_n, scene->depth_m, NAN, NAN};
+  if (sonde_interior_vessel_at_plane(scene->interior, 0, scene->pose, &v))
     r->vein_area_ratio = v.area_ratio;
-  if (sonde_interior_vessel_at_plane(w->interior, 1, w->pose, &v))
+  if (sonde_interior_vessel_at_plane(scene->interior, 1, scene->pose, &v))
     r->artery_area_ratio = v.area_ratio;
   return SONDE_OK;
 }
@@ -152,9 +114,6 @@ sonde_status press_picture(const char *verb, const press_options *o, sonde_image
   work w = {0};
   sonde_status status = prepare(verb, o, &w, error);
   if (!status) status = deform(o, &w, image, known, result, error);
-  sonde_interior_destroy(w.interior);
-  sonde_state_destroy(w.state);
-  sonde_probe_clear(&w.probe);
-  sonde_model_destroy(w.model);
+  settled_close(&w.scene);
   return status;
 }
