@@ -52,13 +52,16 @@ static void site_pose_looks_into_the_tissue(void **state) {
   assert_true(v_distance(moved, v_scale(site.normal, -0.012)) < 1e-12);
 }
 
-// Force, skin and image of a frame belong to one tick, and the skin is that tick's skin exactly.
+// Force, skin and image of a frame belong to one tick, and the skin is that tick's skin exactly;
+// the inside is the solid, once it is factored.
 static void frame_is_of_one_state(void **state) {
   sonde_session_def def = small_def(*state);
   sonde_session *session = open_session(&def, press_device());
+  sonde_interior_set_method(session->interior, SONDE_INTERIOR_SOLID);
   sonde_frame frame;
   assert_false(sonde_session_frame(session, &frame));
   double force_max_n = 0.0;
+  uint32_t by_solid = 0;
   for (uint64_t tick = 1; tick <= 600; ++tick) {
     sonde_session_tick(session);
     bool due = tick % def.ticks_per_image == 0;
@@ -66,6 +69,7 @@ static void frame_is_of_one_state(void **state) {
     if (!due) continue;
     assert_int_equal(frame.snapshot.tick, tick);
     assert_int_equal(sonde_interior_tick(session->interior), tick);
+    by_solid += sonde_interior_used_method(session->interior) == SONDE_INTERIOR_SOLID;
     const sonde_vec3 *x = sonde_state_positions(session->state);
     for (size_t i = 0; i < session->nodes; ++i) {
       float expected[3] = {(float)x[i].x, (float)x[i].y, (float)x[i].z};
@@ -76,6 +80,7 @@ static void frame_is_of_one_state(void **state) {
     force_max_n = fmax(force_max_n, frame.snapshot.force_normal_n);
   }
   assert_true(force_max_n > 1.0);
+  assert_true(by_solid > 0);
   assert_int_equal(sonde_session_images(session), 600 / def.ticks_per_image);
   assert_true(isnan(sonde_session_latency(session, 0.5))); // of real time only
   close_session(session);
