@@ -52,6 +52,9 @@ typedef struct sonde_snapshot {
   double contact_volume_m3, contact_area_m2;
   double vein_area_ratio, artery_area_ratio; /**< at the image plane; NaN when not in view */
   double vein_short_m;                       /**< AP diameter */
+  sonde_vec3 vein_rest_m; /**< where the image plane cuts the vein, on its course at rest; NaN when
+                               not in view */
+  double vein_tilt_rad;   /**< between the vein and the normal of the image plane, 0: transverse */
   uint32_t awake_nodes, solver_iterations, flags;
   sonde_fault fault;
 } sonde_snapshot;
@@ -107,9 +110,9 @@ SONDE_API bool sonde_session_frame(sonde_session *session, sonde_frame *frame);
 /** Ticks and images so far. @thread any */
 SONDE_API uint64_t sonde_session_ticks(const sonde_session *session);
 SONDE_API uint64_t sonde_session_images(const sonde_session *session);
-/** Age of the pose that a finished image shows, seconds: `fraction` of the images since the creation
- *  are at most so old, to 0.25 ms; NaN before the first in real time. From the tick's reading of the
- *  device to the frame that sonde_session_frame() gives. @thread any */
+/** Age of the pose that a finished image shows, seconds: `fraction` of the images since the
+ * creation are at most so old, to 0.25 ms; NaN before the first in real time. From the tick's
+ * reading of the device to the frame that sonde_session_frame() gives. @thread any */
 SONDE_API double sonde_session_latency(const sonde_session *session, double fraction);
 /** State hash now; 0 while the loop runs. @thread owner */
 SONDE_API uint64_t sonde_session_hash(const sonde_session *session);

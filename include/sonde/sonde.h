@@ -20,6 +20,7 @@
 #include "sonde/report.h"
 #include "sonde/anatomy.h"
 #include "sonde/interior.h"
+#include "sonde/interior_findings.h"
 #include "sonde/echo.h"
 #include "sonde/echo_reference.h"
 #include "sonde/echo_validate.h"

@@ -76,6 +76,8 @@ static void fill_snapshot(const sonde_session *session, sonde_snapshot *snapshot
       .vein_area_ratio = (double)NAN,
       .artery_area_ratio = (double)NAN,
       .vein_short_m = (double)NAN,
+      .vein_rest_m = vec3((double)NAN, (double)NAN, (double)NAN),
+      .vein_tilt_rad = (double)NAN,
       .awake_nodes = sonde_state_awake(session->state),
       .solver_iterations = sonde_state_solver(session->state).iterations,
       .flags = sonde_state_flags(session->state),

@@ -1,6 +1,7 @@
 // From the newest surface to a frame: skin, inside, vessels, image, all of one tick.
 // penetration:        depth of the probe's face below the rest skin.
 // update_interior:    the inside and the vessels at this surface.
+// tilt:               between a vessel and the normal of the image plane.
 // read_vessels:       what the image plane cuts.
 // choose_beam:        the one asked for when it is ready, else the last one.
 // fill_frame:         everything into one slot.
@@ -51,12 +52,20 @@ static void update_interior(sonde_session *session, const unsigned char *slot) {
   session->shown_pathology = *pathology;
 }
 
+// The image is the x-z plane of the probe.
+static double tilt(sonde_pose pose, sonde_vec3 axis) {
+  double along = v_dot(q_rotate(pose.rotation, vec3(0, 1, 0)), axis);
+  return acos(fmin(1.0, fabs(along)));
+}
+
 static void read_vessels(const sonde_session *session, sonde_snapshot *snapshot) {
   sonde_vessel_state vein, artery;
   sonde_pose pose = snapshot->world_from_probe;
   if (sonde_interior_vessel_at_plane(session->interior, 0, pose, &vein)) {
     snapshot->vein_area_ratio = vein.area_ratio;
     snapshot->vein_short_m = 2.0 * vein.half_short_m;
+    snapshot->vein_rest_m = vein.rest_centre_m;
+    snapshot->vein_tilt_rad = tilt(pose, vein.axis);
   }
   if (sonde_interior_vessel_at_plane(session->interior, 1, pose, &artery))
     snapshot->artery_area_ratio = artery.area_ratio;

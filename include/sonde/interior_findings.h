@@ -1,0 +1,51 @@
+/**
+ * @file interior_findings.h
+ * What a case adds to a thigh beside the femoral vein's own pathology: clots in further veins, and
+ * bodies that can be taken for a clot.
+ */
+#ifndef SONDE_INTERIOR_FINDINGS_H
+#define SONDE_INTERIOR_FINDINGS_H
+
+#include "sonde/interior.h"
+#include "sonde/tissue_anatomy.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum { SONDE_LESIONS = 8 };
+
+typedef enum sonde_lesion_kind {
+  SONDE_LESION_NODE,      /**< lymph node: dark rim, bright hilum */
+  SONDE_LESION_CYST,      /**< fluid, e.g. Baker's cyst: black, enhancement behind */
+  SONDE_LESION_HAEMATOMA, /**< inhomogeneous, dark */
+  SONDE_LESION_KINDS
+} sonde_lesion_kind;
+
+/** An ellipsoid in the thigh at rest; it moves with the tissue around it and does not collapse. */
+typedef struct sonde_lesion {
+  sonde_lesion_kind kind;
+  sonde_vec3 centre_m;
+  sonde_vec3 axis;     /**< unit: direction of half_m.z */
+  sonde_vec3 half_m;   /**< semi-axes: towards the skin and across (x), the other (y), along (z) */
+  double echogenicity; /**< backscatter relative to muscle, 0..1 */
+} sonde_lesion;
+
+/** Clot in a vein of sonde_thigh_anatomy other than the femoral vein. */
+typedef struct sonde_branch_finding {
+  char branch[32];           /**< name of a branch of the model, e.g. great_saphenous */
+  sonde_pathology pathology; /**< pressures are taken from the femoral vein's */
+} sonde_branch_finding;
+
+typedef struct sonde_findings {
+  uint32_t lesion_count, branch_count;
+  sonde_lesion lesion[SONDE_LESIONS];
+  sonde_branch_finding branch[SONDE_BRANCHES];
+  double webs;   /**< bright bands inside the femoral vein's old thrombus, 0 none .. 1 */
+  double oedema; /**< fluid between the lobules of the fat, 0 none .. 1 */
+} sonde_findings;
+
+#ifdef __cplusplus
+}
+#endif
+#endif
