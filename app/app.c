@@ -3,6 +3,7 @@
 #include "app.h"
 
 #include <errno.h>
+#include <getopt.h>
 #include <math.h>
 #include <signal.h>
 #include <stdarg.h>
@@ -157,4 +158,33 @@ bool app_bundled_model(char *path, size_t size, char *searched, size_t searched_
            SONDE_INSTALL_PREFIX, MODEL_UNDER_PREFIX);
   snprintf(path, size, "%s/%s", SONDE_INSTALL_PREFIX, MODEL_UNDER_PREFIX);
   return is_readable(path);
+}
+
+bool app_model_argument(const char *verb, int argc, char **argv, char *model, size_t size) {
+  char searched[1024];
+  if (argc - optind > 1) {
+    app_usage_error(verb, "one model expected, '%s' is too much", argv[optind + 1]);
+    return false;
+  }
+  if (optind < argc) return (size_t)snprintf(model, size, "%s", argv[optind]) > 0;
+  bool found = app_bundled_model(model, size, searched, sizeof searched);
+  if (!found) app_usage_error(verb, "no bundled model found (looked at %s)", searched);
+  return found;
+}
+
+double app_seconds(clockid_t clock) {
+  struct timespec t;
+  clock_gettime(clock, &t);
+  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static int by_value(const void *a, const void *b) {
+  double x = *(const double *)a, y = *(const double *)b;
+  return (x > y) - (x < y);
+}
+
+double app_quantile(double *list, size_t count, double share) {
+  if (count == 0) return (double)NAN;
+  qsort(list, count, sizeof *list, by_value);
+  return list[(size_t)(share * (double)(count - 1) + 0.5)];
 }

@@ -4,6 +4,8 @@
 
 #include "sonde/sonde.h"
 
+#include <time.h>
+
 // Exit codes of every command.
 enum { APP_OK = 0, APP_FAILED = 1, APP_BAD_INPUT = 2 };
 
@@ -47,6 +49,15 @@ bool app_interrupted(void);
 // Path of the bundled model, found beside the program, in the source tree or in the install tree.
 // false when there is none; then *searched names the places.
 bool app_bundled_model(char *path, size_t size, char *searched, size_t searched_size);
+// The model that a command line names after its options, else the bundled one; false after printing
+// that there is none or one argument too many.
+bool app_model_argument(const char *verb, int argc, char **argv, char *model, size_t size);
+
+// A clock of the system in seconds.
+double app_seconds(clockid_t clock);
+// Order statistic: the value that `share` (0..1) of the list does not exceed. Sorts the list; NaN
+// when it is empty.
+double app_quantile(double *list, size_t count, double share);
 
 // Minimal JSON object writer on stdout: keys in call order, numbers with up to 9 digits, NaN as
 // null.

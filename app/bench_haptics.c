@@ -23,19 +23,13 @@ typedef struct bench {
   double *woken_s, *compute_s, *scratch;
 } bench;
 
-static double now(clockid_t clock) {
-  struct timespec t;
-  clock_gettime(clock, &t);
-  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 static void tick(void *user) {
   bench *b = user;
   size_t k = atomic_load(&b->count);
   if (k >= b->capacity) return;
-  b->woken_s[k] = now(CLOCK_MONOTONIC);
+  b->woken_s[k] = app_seconds(CLOCK_MONOTONIC);
   haptics_rig_tick(&b->rig);
-  b->compute_s[k] = now(CLOCK_MONOTONIC) - b->woken_s[k];
+  b->compute_s[k] = app_seconds(CLOCK_MONOTONIC) - b->woken_s[k];
   atomic_store(&b->count, k + 1);
 }
 
@@ -45,7 +39,7 @@ static void lateness(double *woken_s, double *scratch, size_t count) {
   const double period = 1e-3;
   double start = woken_s[0], widest = 0.0, earliest = 0.0;
   for (size_t k = 0; k < count; ++k) scratch[k] = woken_s[k] = fmod(woken_s[k] - start, period);
-  haptics_quantile(scratch, count, 0.5); // sorts
+  app_quantile(scratch, count, 0.5); // sorts
   for (size_t k = 0; k < count; ++k) {
     double before = k ? scratch[k - 1] : scratch[count - 1] - period;
     if (scratch[k] - before <= widest) continue;
@@ -57,10 +51,10 @@ static void lateness(double *woken_s, double *scratch, size_t count) {
 
 static void print_times(const char *name, double *list, size_t count) {
   app_json_object(name);
-  app_json_real("p50", 1e6 * haptics_quantile(list, count, 0.5));
-  app_json_real("p99", 1e6 * haptics_quantile(list, count, 0.99));
-  app_json_real("p999", 1e6 * haptics_quantile(list, count, 0.999));
-  app_json_real("max", 1e6 * haptics_quantile(list, count, 1.0));
+  app_json_real("p50", 1e6 * app_quantile(list, count, 0.5));
+  app_json_real("p99", 1e6 * app_quantile(list, count, 0.99));
+  app_json_real("p999", 1e6 * app_quantile(list, count, 0.999));
+  app_json_real("max", 1e6 * app_quantile(list, count, 1.0));
   app_json_close();
 }
 
@@ -97,7 +91,7 @@ static void print_table(bench *b, const sonde_loop_stats *stats) {
     printf("  %-9s", names[i]);
     for (int q = 0; q < 4; ++q)
       printf("  %s %7.0f us", (const char *const[]){"p50", "p99", "p99.9", "max"}[q],
-             1e6 * haptics_quantile(lists[i], b->count, share[q]));
+             1e6 * app_quantile(lists[i], b->count, share[q]));
     printf("\n");
   }
   printf("  deadline misses %llu   energy taken from the hand %.4f J   largest force %.2f N, "
@@ -118,8 +112,8 @@ static sonde_status run(bench *b, const haptics_rig_def *def, double seconds,
   if (!status) status = haptics_rig_start(&b->rig, def, state, error);
   if (!status) status = sonde_loop_start(1e-3, tick, b, &loop, error);
   if (!status) {
-    double until = now(CLOCK_MONOTONIC) + seconds;
-    while (now(CLOCK_MONOTONIC) < until && !app_interrupted())
+    double until = app_seconds(CLOCK_MONOTONIC) + seconds;
+    while (app_seconds(CLOCK_MONOTONIC) < until && !app_interrupted())
       nanosleep(&(struct timespec){0, 20000000}, NULL);
     sonde_loop_stop(loop, stats);
   }

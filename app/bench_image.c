@@ -99,13 +99,7 @@ static int read_options(int argc, char **argv, options *o) {
     }
     if (!read_value(o, c)) return APP_BAD_INPUT;
   }
-  if (argc - optind > 1)
-    return app_usage_error("bench", "one model expected, '%s' is too much", argv[optind + 1]);
-  char searched[1024];
-  if (optind < argc)
-    snprintf(o->model, sizeof o->model, "%s", argv[optind]);
-  else if (!app_bundled_model(o->model, sizeof o->model, searched, sizeof searched))
-    return app_usage_error("bench", "no bundled model found (looked at %s)", searched);
+  if (!app_model_argument("bench", argc, argv, o->model, sizeof o->model)) return APP_BAD_INPUT;
   return -1;
 }
 
@@ -164,27 +158,18 @@ static void record(bench *b, const options *o) {
   }
 }
 
-static int by_value(const void *a, const void *b) {
-  double x = *(const double *)a, y = *(const double *)b;
-  return (x > y) - (x < y);
-}
-
-static double quantile(const double *sorted, long count, double q) {
-  return sorted[(long)(q * (double)(count - 1) + 0.5)];
-}
-
 static void print(bench *b, const options *o) {
   static const char *const NAMES[STAGES] = {"settings", "plane", "medium",
                                             "scatter",  "beam",  "picture"};
-  long n = o->frames;
-  for (long i = 0; i <= STAGES; ++i) qsort(b->stage + i * n, (size_t)n, sizeof *b->stage, by_value);
-  double median = quantile(b->stage, n, 0.5), p99 = quantile(b->stage, n, 0.99);
+  size_t n = (size_t)o->frames;
+  double median = app_quantile(b->stage, n, 0.5), p99 = app_quantile(b->stage, n, 0.99);
   if (!o->json) {
     printf("%ld lines of %ld samples, %.0f scatterers, %ldx%ld pixels, %s, one core\n", o->lines,
            o->samples, b->scatterers, o->width, o->height, sonde_echo_kernels(b->echo));
     printf("  frame     median %8.3f ms   p99 %8.3f ms\n", median, p99);
     for (long i = 0; i < STAGES; ++i)
-      printf("  %-9s median %8.3f ms\n", NAMES[i], quantile(b->stage + (i + 1) * n, n, 0.5));
+      printf("  %-9s median %8.3f ms\n", NAMES[i],
+             app_quantile(b->stage + (size_t)(i + 1) * n, n, 0.5));
     return;
   }
   app_json_begin();
@@ -198,10 +183,10 @@ static void print(bench *b, const options *o) {
   app_json_close();
   app_json_object("stages_ms");
   for (long i = 0; i < STAGES; ++i)
-    app_json_real(NAMES[i], quantile(b->stage + (i + 1) * n, n, 0.5));
+    app_json_real(NAMES[i], app_quantile(b->stage + (size_t)(i + 1) * n, n, 0.5));
   app_json_close();
   app_json_integer("scatterers", (long long)b->scatterers);
-  app_json_integer("frames", n);
+  app_json_integer("frames", o->frames);
   app_json_end();
 }
 

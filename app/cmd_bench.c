@@ -97,8 +97,8 @@ static bool is_ellipsoid(const options *o) { return strcmp(o->scene->name, "elli
 static int read_scene(options *o, const char *name) {
   o->scene = find_scene(name);
   if (o->scene) return -1;
-  return app_usage_error("bench", "unknown scene '%s', expected press, point, slide, ellipsoid or image",
-                         name);
+  return app_usage_error(
+      "bench", "unknown scene '%s', expected press, point, slide, ellipsoid or image", name);
 }
 
 static int read_engine(options *o, const char *name) {
@@ -172,14 +172,9 @@ static int read_options(int argc, char **argv, options *o) {
   if (!(o->tolerance > 0)) o->tolerance = is_ellipsoid(o) ? 0.1 : 2e-2;
   if (!(o->seconds > 0)) o->seconds = o->haptics ? 5 : is_ellipsoid(o) ? 0.5 : 1;
   if (o->device && !o->haptics) return app_usage_error("bench", "--device belongs to --haptics");
-  if (argc - optind > (is_ellipsoid(o) ? 0 : 1))
-    return app_usage_error("bench", "'%s' is too much", argv[argc - 1]);
-  if (is_ellipsoid(o)) return -1;
-  char searched[1024];
-  if (optind < argc)
-    snprintf(o->model, sizeof o->model, "%s", argv[optind]);
-  else if (!app_bundled_model(o->model, sizeof o->model, searched, sizeof searched))
-    return app_usage_error("bench", "no bundled model found (looked at %s)", searched);
+  if (is_ellipsoid(o))
+    return optind < argc ? app_usage_error("bench", "'%s' is too much", argv[optind]) : -1;
+  if (!app_model_argument("bench", argc, argv, o->model, sizeof o->model)) return APP_BAD_INPUT;
   return -1;
 }
 
@@ -202,11 +197,7 @@ static sonde_pose pose_at(const bench *b, double time_s) {
 }
 
 // Processor time of this thread: other work on the machine does not count.
-static double now(void) {
-  struct timespec t;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
+static double now(void) { return app_seconds(CLOCK_THREAD_CPUTIME_ID); }
 
 // Runs the scene from rest; fills samples when given, and keeps the positions at the time of
 // comparison: 0.3 s for the ellipsoid, else the end.
@@ -233,19 +224,13 @@ static void run(const bench *b, sonde_state *state, sample *samples, sonde_vec3 
   }
 }
 
-static int by_value(const void *a, const void *b) {
-  double x = *(const double *)a, y = *(const double *)b;
-  return (x > y) - (x < y);
-}
-
 // Order statistic of one field of the samples.
 static double quantile(const bench *b, size_t offset, double q) {
   double *list = malloc(b->steps * sizeof *list);
   if (!list) return NAN;
   for (uint32_t k = 0; k < b->steps; ++k)
     memcpy(&list[k], (const char *)&b->samples[k] + offset, sizeof *list);
-  qsort(list, b->steps, sizeof *list, by_value);
-  double value = list[(size_t)(q * (b->steps - 1) + 0.5)];
+  double value = app_quantile(list, b->steps, q);
   free(list);
   return value;
 }

@@ -256,9 +256,9 @@ static sonde_status cut(const arguments *a, work *w, sonde_error *error) {
   sonde_status status = sonde_model_load(a->model, &w->model, error);
   if (!status) status = find_path(a, w, error);
   if (status) return status;
-  double start = app_seconds();
+  double start = app_seconds(CLOCK_MONOTONIC);
   status = sonde_model_cut(w->model, NULL, w->path, w->count, &w->cut, &w->map, error);
-  w->seconds = app_seconds() - start;
+  w->seconds = app_seconds(CLOCK_MONOTONIC) - start;
   w->before_n = w->after_n = NAN;
   if (!status && a->depth) status = press(a, w, w->model, &w->before_n, error);
   if (!status && a->depth) status = press(a, w, w->cut, &w->after_n, error);

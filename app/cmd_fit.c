@@ -400,7 +400,7 @@ static void print_table(const fit_arguments *a, const fit_outcome *out, double s
 int cmd_fit(int argc, char **argv) {
   fit_arguments arguments = {0};
   sonde_fit_def def;
-  double fine_mm = 3.0, start = app_seconds();
+  double fine_mm = 3.0, start = app_seconds(CLOCK_MONOTONIC);
   if (!parse_arguments(argc, argv, &arguments)) return APP_BAD_INPUT;
   if (arguments.help) {
     fputs(HELP, stdout);
@@ -417,9 +417,9 @@ int cmd_fit(int argc, char **argv) {
   if (status)
     code = app_fail(VERB, &error);
   else if (arguments.json)
-    print_json(&arguments, &out, app_seconds() - start);
+    print_json(&arguments, &out, app_seconds(CLOCK_MONOTONIC) - start);
   else
-    print_table(&arguments, &out, app_seconds() - start);
+    print_table(&arguments, &out, app_seconds(CLOCK_MONOTONIC) - start);
   if (!status && !out.result.converged)
     fprintf(stderr, "sonde fit: the last stage reached its iteration limit before it converged\n");
   sonde_fit_result_clear(&out.result);

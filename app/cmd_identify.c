@@ -138,7 +138,7 @@ static int simulate(const arguments *a, const sonde_protocol *protocol, const so
                     const sonde_world_def *world) {
   sonde_motion_record record;
   sonde_error error = {0};
-  double start = app_seconds(), most_n = 0, across_n = 0;
+  double start = app_seconds(CLOCK_MONOTONIC), most_n = 0, across_n = 0;
   sonde_progress progress = app_progress();
   if (sonde_protocol_run(model, world, protocol, &progress, &record, &error))
     return app_fail(VERB, &error);
@@ -163,7 +163,7 @@ static int simulate(const arguments *a, const sonde_protocol *protocol, const so
   app_json_real("length_s", length_s);
   app_json_real("normal_max_n", most_n);
   app_json_real("tangential_max_n", across_n);
-  app_json_real("seconds", app_seconds() - start);
+  app_json_real("seconds", app_seconds(CLOCK_MONOTONIC) - start);
   app_json_end();
   return APP_OK;
 }
@@ -324,13 +324,13 @@ static int identify(const arguments *a, const sonde_model *model, const sonde_pr
   findings found = {.preset = *preset};
   sonde_error error = {0};
   sonde_status status = SONDE_OK;
-  double start = app_seconds();
+  double start = app_seconds(CLOCK_MONOTONIC);
   snprintf(found.preset.name, sizeof found.preset.name, "identified");
   if (a->ramp_hold) status = find_damping(a, model, site, &options, &found, &error);
   if (!status && a->slide) status = find_friction(a, model, site, &options, &found, &error);
   if (!status && a->output) status = sonde_preset_save(a->output, &found.preset, &error);
   if (status) return app_fail(VERB, &error);
-  found.seconds = app_seconds() - start;
+  found.seconds = app_seconds(CLOCK_MONOTONIC) - start;
   if (a->json)
     print_json(&found, a->output);
   else

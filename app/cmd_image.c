@@ -172,17 +172,11 @@ static int read_options(int argc, char **argv, options *o) {
     }
     if (!read_option(o, c)) return APP_BAD_INPUT;
   }
-  if (argc - optind > 1)
-    return app_usage_error("image", "one model expected, '%s' is too much", argv[optind + 1]);
   if (o->posed == (o->site >= 0)) return app_usage_error("image", "give either --pose or --site");
   if (!isnan(o->force_n) && !isnan(o->press_m))
     return app_usage_error("image", "give --force-n or --press-mm, not both");
   if (!o->out) return app_usage_error("image", "-o PNG is missing");
-  char searched[1024];
-  if (optind < argc)
-    snprintf(o->model, sizeof o->model, "%s", argv[optind]);
-  else if (!app_bundled_model(o->model, sizeof o->model, searched, sizeof searched))
-    return app_usage_error("image", "no bundled model found (looked at %s)", searched);
+  if (!app_model_argument("image", argc, argv, o->model, sizeof o->model)) return APP_BAD_INPUT;
   return -1;
 }
 

@@ -301,13 +301,14 @@ static int measure(const measure_arguments *a, const sonde_robot_def *def, const
   sonde_measurements m;
   sonde_robot_log log;
   sonde_error error = {0};
-  double start = app_seconds();
+  double start = app_seconds(CLOCK_MONOTONIC);
   sonde_progress progress = app_progress();
   sonde_status status = sonde_robot_run(model, sites, def, &progress, &m, &log, &error);
   app_progress_end();
   bool cancelled = status == SONDE_CANCELLED;
-  int code = status && !cancelled ? app_fail(VERB, &error)
-                                  : conclude(a, sites, &m, &log, cancelled, app_seconds() - start);
+  int code = status && !cancelled
+                 ? app_fail(VERB, &error)
+                 : conclude(a, sites, &m, &log, cancelled, app_seconds(CLOCK_MONOTONIC) - start);
   sonde_measurements_clear(&m);
   sonde_robot_log_clear(&log);
   return code;

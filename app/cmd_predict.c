@@ -115,7 +115,7 @@ static void print_result(const predict_arguments *a, const sonde_predict_def *de
 static sonde_status predict(const predict_arguments *a, const sonde_predict_def *def,
                             const sonde_model *model, const sonde_site_table *sites,
                             sonde_error *error) {
-  double start = app_seconds();
+  double start = app_seconds(CLOCK_MONOTONIC);
   sonde_measurements m;
   sonde_status status = sonde_measurements_load(a->measurements, sites, &m, error);
   if (status) return status;
@@ -130,7 +130,7 @@ static sonde_status predict(const predict_arguments *a, const sonde_predict_def 
   }
   app_progress_end();
   if (!status) status = sonde_error_report_of(m.data, predicted_n, m.count, &report, error);
-  if (!status) print_result(a, def, &m, predicted_n, &report, app_seconds() - start);
+  if (!status) print_result(a, def, &m, predicted_n, &report, app_seconds(CLOCK_MONOTONIC) - start);
   free(predicted_n);
   sonde_measurements_clear(&m);
   return status;

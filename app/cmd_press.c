@@ -109,16 +109,10 @@ static int read_options(int argc, char **argv, options *o) {
     case 'h': fputs(HELP, stdout); return APP_OK;
     default: return APP_BAD_INPUT;
     }
-  if (argc - optind > 1)
-    return app_usage_error("press", "one model expected, '%s' is too much", argv[optind + 1]);
   if (isnan(o->force_n) == isnan(o->depth_m))
     return app_usage_error("press", "give either --force-n or --depth-mm");
   if (o->site < 0) return app_usage_error("press", "--site is missing");
-  char searched[1024];
-  if (optind < argc)
-    snprintf(o->model, sizeof o->model, "%s", argv[optind]);
-  else if (!app_bundled_model(o->model, sizeof o->model, searched, sizeof searched))
-    return app_usage_error("press", "no bundled model found (looked at %s)", searched);
+  if (!app_model_argument("press", argc, argv, o->model, sizeof o->model)) return APP_BAD_INPUT;
   return -1;
 }
 

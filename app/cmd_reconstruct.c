@@ -128,14 +128,14 @@ static sonde_status leave_one_out(const arguments *a, const sonde_sequence *s,
                                   const sonde_located *located, sonde_error *error) {
   sonde_left_out r;
   sonde_progress progress = app_progress();
-  double start = app_seconds();
+  double start = app_seconds(CLOCK_MONOTONIC);
   sonde_status status = sonde_sequence_leave_one_out(s, &a->slicer, &r, &progress, error);
   app_progress_end();
   if (status) return status;
   if (!a->json) {
     print_frames(s, located);
     printf("left out      %8u frames one by one, %llu pixels, %.2f s\n", r.frames,
-           (unsigned long long)r.krige.count, app_seconds() - start);
+           (unsigned long long)r.krige.count, app_seconds(CLOCK_MONOTONIC) - start);
     printf("  %-22s %8s %8s %8s %8s %8s\n", "made from", "RMS", "MAE", "PSNR dB", "NCC", "SSIM");
     print_likeness(2 * r.along_sweep > r.frames ? "kriging, same pixel" : "kriging, across",
                    &r.place);
@@ -165,10 +165,10 @@ static sonde_status volume(const arguments *a, const sonde_sequence *s,
   sonde_volume v = {0};
   sonde_reconstruct_report r = {0};
   sonde_progress progress = app_progress();
-  double start = app_seconds();
+  double start = app_seconds(CLOCK_MONOTONIC);
   sonde_status status = sonde_reconstruct(s, &a->options, &v, &r, &progress, error);
   app_progress_end();
-  double seconds = app_seconds() - start;
+  double seconds = app_seconds(CLOCK_MONOTONIC) - start;
   if (!status) status = sonde_volume_save(a->output, &v, !a->raw, error);
   if (!status && a->json) {
     app_json_begin();

@@ -233,12 +233,6 @@ static sonde_status write_frame(simulation *s, sonde_error *error) {
 
 // ---- run
 
-static double now_s(void) {
-  struct timespec t;
-  clock_gettime(CLOCK_MONOTONIC, &t);
-  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 static sonde_status prepare(simulation *s, sonde_error *error) {
   char thigh[1024], searched[1024], path[1100];
   bool bundled = app_bundled_model(thigh, sizeof thigh, searched, sizeof searched);
@@ -264,9 +258,9 @@ static sonde_status run(simulation *s, sonde_error *error) {
   sonde_progress progress = app_progress();
   sonde_status status = s->a.resume ? SONDE_OK : write_frame(s, error);
   while (!status && sonde_scene_tick(s->state) < s->steps) {
-    double begin = now_s();
+    double begin = app_seconds(CLOCK_MONOTONIC);
     sonde_scene_advance(s->state);
-    s->seconds += now_s() - begin;
+    s->seconds += app_seconds(CLOCK_MONOTONIC) - begin;
     sonde_scene_report report = sonde_scene_last(s->state);
     s->solver_iterations += report.solver_iterations;
     if (report.touch_points > s->most_points) s->most_points = report.touch_points;

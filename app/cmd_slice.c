@@ -294,13 +294,13 @@ static sonde_status slice_sequence(const arguments *a, work *w, sonde_error *err
   if (a->hold_out) options.left_out = (uint32_t)a->frame_number;
   if (!status) status = sonde_slicer_create(s, &options, &w->slicer, error);
   if (status) return status;
-  double start = app_seconds();
+  double start = app_seconds(CLOCK_MONOTONIC);
   if (a->options.method == SONDE_SLICE_KRIGE && !a->pose)
     w->reached = sonde_slicer_render_place(w->slicer, a->frame_number, &w->plane, s->clip,
                                            &w->image, w->known);
   else
     w->reached = sonde_slicer_render(w->slicer, &w->plane, &w->image, w->known);
-  w->seconds = app_seconds() - start;
+  w->seconds = app_seconds(CLOCK_MONOTONIC) - start;
   return write_picture(a, w, error);
 }
 
@@ -309,9 +309,9 @@ static sonde_status slice_volume(const arguments *a, work *w, sonde_error *error
   if (!status) status = make_image(w, a->width, a->height, error);
   if (status) return status;
   pose_plane(a, w);
-  double start = app_seconds();
+  double start = app_seconds(CLOCK_MONOTONIC);
   w->reached = sonde_volume_slice(&w->volume, a->method_index == 1, &w->plane, &w->image, w->known);
-  w->seconds = app_seconds() - start;
+  w->seconds = app_seconds(CLOCK_MONOTONIC) - start;
   return write_picture(a, w, error);
 }
 

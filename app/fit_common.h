@@ -73,12 +73,6 @@ static inline bool app_require(const char *verb, const char *what, const char *v
   return value != NULL;
 }
 
-static inline double app_seconds(void) {
-  struct timespec t;
-  clock_gettime(CLOCK_MONOTONIC, &t);
-  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 static inline void app_print_statistics(const char *name, const sonde_error_statistics *s) {
   printf("  %-10s %6u %8.3f %8.3f %8.3f %10.3f %8.2f %%\n", name, s->count, s->mae_n, s->sd_n,
          s->rmse_n, s->mean_force_n, s->mae_percent);

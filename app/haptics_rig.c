@@ -93,14 +93,3 @@ double haptics_rig_depth(const haptics_rig *rig) {
   sonde_vec3 at = rig->render.device_m, a = surface.position, b = below.position;
   return (at.x - a.x) * (b.x - a.x) + (at.y - a.y) * (b.y - a.y) + (at.z - a.z) * (b.z - a.z);
 }
-
-static int by_value(const void *a, const void *b) {
-  double x = *(const double *)a, y = *(const double *)b;
-  return (x > y) - (x < y);
-}
-
-double haptics_quantile(double *list, size_t count, double share) {
-  if (count == 0) return NAN;
-  qsort(list, count, sizeof *list, by_value);
-  return list[(size_t)(share * (double)(count - 1) + 0.5)];
-}

@@ -44,7 +44,4 @@ void haptics_rig_stop(haptics_rig *rig);
 // How deep the handle is below the rest skin of the site.
 double haptics_rig_depth(const haptics_rig *rig);
 
-// Order statistic of a list that is sorted in place.
-double haptics_quantile(double *list, size_t count, double share);
-
 #endif

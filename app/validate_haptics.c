@@ -74,12 +74,6 @@ static haptics_rig_def rig_def(const work *w, const char *device) {
                            .depth_m = 0.03};
 }
 
-static double cpu_now(void) {
-  struct timespec t;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 static sonde_status full_model(work *w) {
   enum { TICKS = 3000 };
   static double spent_s[TICKS];
@@ -89,14 +83,14 @@ static sonde_status full_model(work *w) {
   if (status) return status;
   uint64_t stale = 0;
   for (int i = 0; i < TICKS; ++i) {
-    double start = cpu_now();
+    double start = app_seconds(CLOCK_THREAD_CPUTIME_ID);
     haptics_rig_tick(&rig);
-    spent_s[i] = cpu_now() - start;
+    spent_s[i] = app_seconds(CLOCK_THREAD_CPUTIME_ID) - start;
     stale += sonde_state_tick(w->state) != (uint64_t)i + 1;
   }
   haptics_rig_stop(&rig);
   report(w, "full_model_stale_ticks", (double)stale, 0, true);
-  report(w, "full_model_cpu_p999_ms", 1e3 * haptics_quantile(spent_s, TICKS, 0.999), 0.5, true);
+  report(w, "full_model_cpu_p999_ms", 1e3 * app_quantile(spent_s, TICKS, 0.999), 0.5, true);
   return SONDE_OK;
 }
 
@@ -515,11 +509,6 @@ int validate_haptics(int argc, char **argv) {
     if (c == 's' && !app_parse_integer("validate", "--sites", optarg, 1, 1000, &o.sites))
       return APP_BAD_INPUT;
   }
-  if (argc - optind > 1) return app_usage_error("validate", "'%s' is too much", argv[argc - 1]);
-  char searched[1024];
-  if (optind < argc)
-    snprintf(o.model, sizeof o.model, "%s", argv[optind]);
-  else if (!app_bundled_model(o.model, sizeof o.model, searched, sizeof searched))
-    return app_usage_error("validate", "no bundled model found (looked at %s)", searched);
+  if (!app_model_argument("validate", argc, argv, o.model, sizeof o.model)) return APP_BAD_INPUT;
   return run(&o);
 }

@@ -318,11 +318,6 @@ static sonde_status vein(report *r) {
   return status;
 }
 
-static int by_value(const void *a, const void *b) {
-  double x = *(const double *)a, y = *(const double *)b;
-  return (x > y) - (x < y);
-}
-
 static sonde_status times(report *r) {
   enum { FRAMES = 30 };
   stage s;
@@ -335,8 +330,8 @@ static sonde_status times(report *r) {
     if (k == 0) note(r, "beam_change_ms", t.settings_s * 1e3, 0, 1e9, "told");
   }
   if (!status) {
-    qsort(list, FRAMES, sizeof *list, by_value);
-    note(r, "frame_ms", list[FRAMES / 2] * 1e3, 0, 1e9, "told; see sonde bench --scene image");
+    note(r, "frame_ms", app_quantile(list, FRAMES, 0.5) * 1e3, 0, 1e9,
+         "told; see sonde bench --scene image");
     r->list[r->count - 1].counts = false;
   }
   stage_close(&s);
