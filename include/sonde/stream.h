@@ -13,11 +13,52 @@ extern "C" {
 
 typedef struct sonde_page_server sonde_page_server;
 
+/** What the page asks of the program beside probe and scanner (docs/page_protocol.md). */
+typedef enum sonde_page_ask {
+  SONDE_PAGE_START_EXAM, /**< id (case), protocol, guidance, name (trainee) */
+  SONDE_PAGE_DECIDE,     /**< id (segment), text (decision) */
+  SONDE_PAGE_HINT,
+  SONDE_PAGE_FINISH_EXAM,
+  SONDE_PAGE_LEAVE_EXAM,
+  SONDE_PAGE_LIST_EXAMS,
+  SONDE_PAGE_OPEN_REPLAY, /**< id (exam) */
+  SONDE_PAGE_SEEK,        /**< time_s */
+  SONDE_PAGE_PLAY,        /**< playing, speed */
+  SONDE_PAGE_COMMENT,     /**< time_s, text, name (author) */
+  SONDE_PAGE_ASKS
+} sonde_page_ask;
+
+/** One request; what it does not use is empty or 0. */
+typedef struct sonde_page_request {
+  sonde_page_ask ask;
+  char id[64], protocol[64], guidance[16], name[164], text[1604]; /**< UTF-8 */
+  double time_s, speed;
+  bool playing;
+} sonde_page_request;
+
+/** Texts (JSON) that each client has in its newest version. */
+typedef enum sonde_page_topic {
+  SONDE_PAGE_GREETING, /**< further members of the hello, "key":value,..., without braces */
+  SONDE_PAGE_EXAM,
+  SONDE_PAGE_EXAMS,
+  SONDE_PAGE_REPLAY,
+  SONDE_PAGE_STATUS, /**< not sent: GET /status.json */
+  SONDE_PAGE_TOPICS
+} sonde_page_topic;
+
 typedef struct sonde_page_def {
-  uint16_t port;              /**< 0: any free port */
-  const char *data_directory; /**< serve the page from here instead of memory (development) */
-  const char *model_path;     /**< for recordings and titles; may be NULL */
-  double force_limit_n;       /**< shown on the page; 0: sonde_safety_limits_default() */
+  uint16_t port;               /**< 0: any free port */
+  const char *data_directory;  /**< serve the page from here instead of memory (development) */
+  const char *model_path;      /**< for recordings and titles; may be NULL */
+  double force_limit_n;        /**< shown on the page; 0: sonde_safety_limits_default() */
+  const char *exams_directory; /**< with ID/report.html, exam.json, exam.csv; NULL: none */
+  void *user;                  /**< for the two functions below; either may be NULL */
+  /** Every frame of the session, whether a client sees it or not. Called by one thread at a time;
+   *  must be quick. */
+  void (*observe)(void *user, const sonde_frame *frame);
+  /** A request of the client that controls. Called by one thread at a time while the server's
+   *  clients wait: copy it and return; call nothing of this header from it. */
+  void (*request)(void *user, const sonde_page_request *request);
 } sonde_page_def;
 
 /** Serves the embedded page and one WebSocket (/ws) for a session: sends model, frames and images
@@ -25,6 +66,25 @@ typedef struct sonde_page_def {
  *  Binds to 127.0.0.1 and checks Origin. @return SONDE_PORT when the port is in use */
 SONDE_API sonde_status sonde_page_start(const sonde_page_def *def, sonde_session *session,
                                         sonde_page_server **server, sonde_error *error);
+/** Shows another session from now on: every client gets its thigh. After the return the server does
+ *  not touch the session before. @thread owner */
+SONDE_API sonde_status sonde_page_show(sonde_page_server *server, sonde_session *session,
+                                       sonde_error *error);
+/** Shows frames that come by sonde_page_post() instead of a session: nobody controls.
+ *  @param model,probes borrowed until the next show or stop @thread owner */
+SONDE_API sonde_status sonde_page_show_model(sonde_page_server *server, const sonde_model *model,
+                                             const sonde_probe *probes, uint32_t probe_count,
+                                             sonde_error *error);
+/** A frame of the model shown by sonde_page_show_model(), and the controls it was made with.
+ *  @return false without memory @thread owner */
+SONDE_API bool sonde_page_post(sonde_page_server *server, const sonde_frame *frame,
+                               const sonde_session_controls *controls);
+/** New text of a topic, sent to every client when it differs; NULL: none.
+ *  @return MEMORY @thread any */
+SONDE_API sonde_status sonde_page_publish(sonde_page_server *server, sonde_page_topic topic,
+                                          const char *json, sonde_error *error);
+/** A sentence for all clients. @thread any */
+SONDE_API void sonde_page_tell(sonde_page_server *server, const char *sentence);
 SONDE_API uint16_t sonde_page_port(const sonde_page_server *server);
 SONDE_API uint32_t sonde_page_clients(const sonde_page_server *server);
 /** Closes all connections and joins the threads. */

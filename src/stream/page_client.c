@@ -23,8 +23,12 @@ bool page_client_controls(const page_client *client) {
   return true;
 }
 
+bool page_client_greeted(const page_client *client) {
+  return client->greeted == client->server->generation;
+}
+
 bool page_client_wants_frame(const page_client *client) {
-  return client->connection && client->greeted && !client->leaving &&
+  return client->connection && page_client_greeted(client) && !client->leaving &&
          client->sent[PAGE_IN_FLIGHT - 1] <= client->acked;
 }
 
@@ -63,17 +67,36 @@ static void acknowledge(page_client *client, uint32_t sequence) {
   if (sequence > client->acked && sequence <= client->sent[0]) client->acked = sequence;
 }
 
-typedef enum job { JOB_NONE, JOB_GREET, JOB_CONTROLS, JOB_NOTE, JOB_PONG, JOB_FRAME } job;
+typedef enum job {
+  JOB_NONE,
+  JOB_GREET,
+  JOB_CONTROLS,
+  JOB_TOPIC,
+  JOB_NOTE,
+  JOB_PONG,
+  JOB_FRAME
+} job;
+
+// A topic whose newest text the client has not got, SONDE_PAGE_TOPICS when there is none.
+static int due_topic(const page_client *client) {
+  const sonde_page_server *server = client->server;
+  for (int i = SONDE_PAGE_EXAM; i < SONDE_PAGE_STATUS; ++i)
+    if (server->topic[i].text && client->told_topic[i] != server->topic[i].serial) return i;
+  return SONDE_PAGE_TOPICS;
+}
 
 static job next_job(const page_client *client) {
   const sonde_page_server *server = client->server;
-  if (!client->greeted) return JOB_GREET;
+  if (!page_client_greeted(client)) return JOB_GREET;
   if (client->told_serial != server->controls_serial ||
       client->told_control != page_client_controls(client))
     return JOB_CONTROLS;
+  if (due_topic(client) < SONDE_PAGE_TOPICS) return JOB_TOPIC;
   if (client->note_due) return JOB_NOTE;
   if (client->pong_due) return JOB_PONG;
-  if (server->sequence > client->sent[0] && page_client_wants_frame(client)) return JOB_FRAME;
+  if (server->latest.size > 0 && server->sequence > client->sent[0] &&
+      page_client_wants_frame(client))
+    return JOB_FRAME;
   return JOB_NONE;
 }
 
@@ -89,32 +112,28 @@ static bool send_text(page_client *client, page_text *text) {
   return sent;
 }
 
-static bool send_mesh(page_client *client, const sonde_mesh *mesh, uint32_t part) {
-  size_t size = page_encode_mesh(mesh, part, NULL, 0);
-  if (!page_buffer_reserve(&client->out, size)) return false;
-  page_encode_mesh(mesh, part, client->out.bytes, client->out.capacity);
-  return send_message(client, WS_BINARY, client->out.bytes, size);
-}
-
-static bool send_line(page_client *client, const sonde_vessel *vessel, uint32_t part) {
-  size_t size = page_encode_line(vessel, part, NULL, 0);
-  if (!page_buffer_reserve(&client->out, size)) return false;
-  page_encode_line(vessel, part, client->out.bytes, client->out.capacity);
-  return send_message(client, WS_BINARY, client->out.bytes, size);
-}
-
-static bool greet(page_client *client, bool controls) {
-  const page_source *source = &client->server->source;
-  page_hello hello = {source->model, source->probes, source->probe_count, source->force_limit_n,
-                      controls};
+// The lock is held only while the hello is written.
+static bool greet(page_client *client) {
+  sonde_page_server *server = client->server;
+  const page_source *source = &server->source;
+  page_scene *scene = server->scene;
+  page_hello hello = {source->model,
+                      source->probes,
+                      source->probe_count,
+                      source->force_limit_n,
+                      server->topic[SONDE_PAGE_GREETING].text,
+                      page_client_controls(client)};
   page_text text = {0};
   page_write_hello(&text, &hello);
-  bool good = send_text(client, &text) && send_mesh(client, &source->model->surface, PAGE_SKIN) &&
-              send_mesh(client, &source->model->femur, PAGE_FEMUR) &&
-              send_line(client, &source->model->vein, PAGE_VEIN) &&
-              send_line(client, &source->model->artery, PAGE_ARTERY);
-  for (uint32_t i = 0; good && i < source->probe_count; ++i)
-    good = send_mesh(client, &source->probes[i]->body.hull, PAGE_PROBE + i);
+  client->greeted = server->generation;
+  client->told_serial = 0;
+  ++scene->references;
+  pthread_mutex_unlock(&server->lock);
+  bool good = send_text(client, &text);
+  for (uint32_t i = 0; good && i < scene->message_count; ++i)
+    good = send_message(client, WS_BINARY, scene->messages[i].bytes, scene->messages[i].size);
+  pthread_mutex_lock(&server->lock);
+  page_scene_unref(scene);
   return good;
 }
 
@@ -138,12 +157,17 @@ static bool take_frame(page_client *client) {
 static bool do_job(page_client *client, job what) {
   sonde_page_server *server = client->server;
   page_text text = {0};
+  if (what == JOB_GREET) return greet(client);
   bool good = true, controls = page_client_controls(client);
   if (what == JOB_CONTROLS) {
     page_write_controls(&text, &server->controls, probe_name(server, server->controls.probe),
                         controls);
     client->told_serial = server->controls_serial;
     client->told_control = controls;
+  } else if (what == JOB_TOPIC) {
+    int topic = due_topic(client);
+    page_write_raw(&text, server->topic[topic].text);
+    client->told_topic[topic] = server->topic[topic].serial;
   } else if (what == JOB_NOTE) {
     page_write_note(&text, "error", client->note);
     client->note_due = false;
@@ -154,14 +178,11 @@ static bool do_job(page_client *client, job what) {
     good = take_frame(client);
   }
   pthread_mutex_unlock(&server->lock);
-  if (what == JOB_GREET)
-    good = greet(client, controls);
-  else if (what != JOB_FRAME)
+  if (what != JOB_FRAME)
     good = send_text(client, &text);
   else if (good)
     good = send_message(client, WS_BINARY, client->out.bytes, client->out.size);
   pthread_mutex_lock(&server->lock);
-  if (what == JOB_GREET) client->greeted = true;
   return good;
 }
 

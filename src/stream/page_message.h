@@ -5,10 +5,10 @@
 #define SONDE_SRC_STREAM_PAGE_MESSAGE_H
 
 #include "base/base.h"
-#include "sonde/exam.h"
+#include "sonde/stream.h"
 
 enum {
-  PAGE_VERSION = 1,
+  PAGE_VERSION = 2,
   PAGE_HEADER_BYTES = 16,
   PAGE_MESH_FIXED_BYTES = 24,   // header and counts, before the points
   PAGE_FRAME_FIXED_BYTES = 140, // header and snapshot, before the displacements
@@ -54,7 +54,8 @@ typedef struct page_hello {
   const sonde_probe *const *probes;
   uint32_t probe_count;
   double force_limit_n;
-  bool controls; // this client may move the probe
+  const char *more; // further members, "key":value,...; may be NULL
+  bool controls;    // this client may move the probe
 } page_hello;
 
 void page_write_hello(page_text *text, const page_hello *hello);
@@ -63,6 +64,7 @@ void page_write_controls(page_text *text, const sonde_session_controls *controls
 // `kind` is "error" or another message type with one text.
 void page_write_note(page_text *text, const char *kind, const char *sentence);
 void page_write_pong(page_text *text, uint32_t id);
+void page_write_raw(page_text *text, const char *json);
 
 typedef enum page_command_type {
   PAGE_COMMAND_GOAL,
@@ -70,7 +72,8 @@ typedef enum page_command_type {
   PAGE_COMMAND_STOP,
   PAGE_COMMAND_RESUME,
   PAGE_COMMAND_ACK,
-  PAGE_COMMAND_PING
+  PAGE_COMMAND_PING,
+  PAGE_COMMAND_REQUEST
 } page_command_type;
 
 // A validated command in SI units. NaN or an empty name: leave that control as it is.
@@ -80,6 +83,7 @@ typedef struct page_command {
   char probe[64], pathology[32];
   double gain_db, depth_m, frequency_hz, dynamic_range_db, focus_m, tgc_db_per_m;
   uint32_t id; // of the acknowledged frame or of the ping
+  sonde_page_request request;
 } page_command;
 
 // Parses one message of `count` bytes (need not end in 0). On failure the sentence for the client

@@ -4,6 +4,7 @@
 // read_real     a finite number within a range, or absent
 // read_name     a short plain name, or absent
 // read_vector   an array of finite numbers
+// read_text, read_bool, read_time   the same for requests
 // parse_*       one command each
 #include "stream/page_message.h"
 
@@ -140,24 +141,111 @@ static sonde_status parse_controls(const cJSON *root, page_command *command, son
   return read_name(root, "case", command->pathology, sizeof command->pathology, error);
 }
 
+// UTF-8 text without control characters; `least` 0 allows it to be absent.
+static sonde_status read_text(const cJSON *object, const char *key, size_t least, size_t most,
+                              char *text, size_t size, sonde_error *error) {
+  const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, key);
+  if (!item && least == 0) return SONDE_OK;
+  size_t count = 0;
+  bool plain = cJSON_IsString(item);
+  for (const char *c = plain ? item->valuestring : ""; *c; ++c) {
+    if ((unsigned char)*c < 0x20 && *c != '\n') plain = false;
+    if ((*c & 0xc0) != 0x80) ++count;
+  }
+  if (!plain || count < least || count > most || strlen(item->valuestring) >= size)
+    return sonde_fail(error, SONDE_ARGUMENT, "\"%s\" must be a text of %zu to %zu characters", key,
+                      least, most);
+  snprintf(text, size, "%s", item->valuestring);
+  return SONDE_OK;
+}
+
+static sonde_status read_bool(const cJSON *object, const char *key, bool *value,
+                              sonde_error *error) {
+  const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, key);
+  if (!cJSON_IsBool(item))
+    return sonde_fail(error, SONDE_ARGUMENT, "\"%s\" must be true or false", key);
+  *value = cJSON_IsTrue(item);
+  return SONDE_OK;
+}
+
+static const double LONGEST_S = 86400;
+
+static sonde_status read_time(const cJSON *root, sonde_page_request *r, sonde_error *error) {
+  r->time_s = (double)NAN;
+  sonde_status status = read_real(root, "time_s", 0, LONGEST_S, &r->time_s, error);
+  if (!status && isnan(r->time_s))
+    status = sonde_fail(error, SONDE_ARGUMENT, "\"time_s\" is missing");
+  return status;
+}
+
+static sonde_status parse_start(const cJSON *root, sonde_page_request *r, sonde_error *error) {
+  static const char *const LEVELS[] = {"full", "hints", "exam"};
+  sonde_status status = read_text(root, "case", 1, 47, r->id, sizeof r->id, error);
+  if (!status) status = read_text(root, "protocol", 1, 47, r->protocol, sizeof r->protocol, error);
+  if (!status) status = read_text(root, "guidance", 1, 15, r->guidance, sizeof r->guidance, error);
+  if (!status) status = read_text(root, "trainee", 0, 40, r->name, sizeof r->name, error);
+  if (status) return status;
+  for (size_t i = 0; i < SONDE_COUNT_OF(LEVELS); ++i)
+    if (strcmp(r->guidance, LEVELS[i]) == 0) return SONDE_OK;
+  return sonde_fail(error, SONDE_ARGUMENT, "\"guidance\" must be full, hints or exam");
+}
+
+static sonde_status parse_comment(const cJSON *root, sonde_page_request *r, sonde_error *error) {
+  sonde_status status = read_time(root, r, error);
+  if (!status) status = read_text(root, "text", 1, 400, r->text, sizeof r->text, error);
+  if (!status) status = read_text(root, "author", 0, 40, r->name, sizeof r->name, error);
+  return status;
+}
+
+static sonde_status parse_request(const cJSON *root, sonde_page_ask ask, sonde_page_request *r,
+                                  sonde_error *error) {
+  sonde_status status = SONDE_OK;
+  r->ask = ask;
+  r->speed = 1;
+  switch (ask) {
+  case SONDE_PAGE_START_EXAM: return parse_start(root, r, error);
+  case SONDE_PAGE_DECIDE:
+    status = read_text(root, "segment", 1, 31, r->id, sizeof r->id, error);
+    return status ? status : read_text(root, "decision", 0, 15, r->text, sizeof r->text, error);
+  case SONDE_PAGE_OPEN_REPLAY: return read_text(root, "exam", 1, 63, r->id, sizeof r->id, error);
+  case SONDE_PAGE_SEEK: return read_time(root, r, error);
+  case SONDE_PAGE_PLAY:
+    status = read_bool(root, "playing", &r->playing, error);
+    return status ? status : read_real(root, "speed", 0.25, 4, &r->speed, error);
+  case SONDE_PAGE_COMMENT: return parse_comment(root, r, error);
+  default: return SONDE_OK;
+  }
+}
+
+// Requests of the program after the page's own commands, in the order of sonde_page_ask.
+static const char *const TYPES[] = {"goal",        "controls",    "stop",       "resume",
+                                    "ack",         "ping",        "start_exam", "decide",
+                                    "hint",        "finish_exam", "leave_exam", "list_exams",
+                                    "open_replay", "seek",        "play",       "comment"};
+_Static_assert(SONDE_COUNT_OF(TYPES) == PAGE_COMMAND_REQUEST + (int)SONDE_PAGE_ASKS, "a type each");
+
 static sonde_status parse_object(const cJSON *root, page_command *command, sonde_error *error) {
-  static const char *const TYPES[] = {"goal", "controls", "stop", "resume", "ack", "ping"};
   const cJSON *type = cJSON_GetObjectItemCaseSensitive(root, "type");
   if (!cJSON_IsObject(root) || !cJSON_IsString(type))
     return sonde_fail(error, SONDE_FORMAT, "a message must be an object with a \"type\"");
   size_t which = 0;
   while (which < SONDE_COUNT_OF(TYPES) && strcmp(type->valuestring, TYPES[which]) != 0) ++which;
+  if (which == SONDE_COUNT_OF(TYPES))
+    return sonde_fail(error, SONDE_NOT_FOUND,
+                      "\"type\" must be goal, controls, stop, resume, ack, ping or a request of "
+                      "docs/page_protocol.md");
+  if (which >= PAGE_COMMAND_REQUEST) {
+    command->type = PAGE_COMMAND_REQUEST;
+    return parse_request(root, (sonde_page_ask)(which - PAGE_COMMAND_REQUEST), &command->request,
+                         error);
+  }
   command->type = (page_command_type)which;
   switch (which) {
   case PAGE_COMMAND_GOAL: return parse_goal(root, command, error);
   case PAGE_COMMAND_CONTROLS: return parse_controls(root, command, error);
-  case PAGE_COMMAND_STOP:
-  case PAGE_COMMAND_RESUME: return SONDE_OK;
   case PAGE_COMMAND_ACK: return read_id(root, "frame", &command->id, error);
   case PAGE_COMMAND_PING: return read_id(root, "id", &command->id, error);
-  default:
-    return sonde_fail(error, SONDE_NOT_FOUND,
-                      "\"type\" must be goal, controls, stop, resume, ack or ping");
+  default: return SONDE_OK; // stop, resume
   }
 }
 

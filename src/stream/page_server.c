@@ -1,9 +1,12 @@
 // The page's server: start, the pump of frames, commands, stop.
 //
-// pump_once, pump_run    newest frame of the source -> encoded -> `latest`
+// publish_frame          a frame -> encoded -> `latest`
+// pump_once, pump_run    newest frame of the source, observed and published
 // apply_*                what a command changes
 // bind_problem           why a port cannot be opened, in words
 // start_http             civetweb on the loopback address
+// page_server_show       another source; sonde_page_show_model: one without a session
+// sonde_page_post, sonde_page_publish, sonde_page_tell   frames and texts of the program
 // page_server_start, sonde_page_stop
 #include "stream/page_server.h"
 
@@ -24,15 +27,13 @@ static bool anyone_waits(sonde_page_server *server) {
   return waits;
 }
 
-static bool pump_once(sonde_page_server *server) {
-  sonde_frame frame;
-  if (!anyone_waits(server) || !server->source.frame(server->source.self, &frame)) return false;
+// Encodes into `spare` and makes it the newest.
+static bool publish_frame(sonde_page_server *server, const sonde_frame *frame) {
   const sonde_mesh *rest = &server->source.model->surface;
   page_buffer *spare = &server->spare;
-  size_t size = page_encode_frame(&frame, rest, server->sequence + 1, NULL, 0);
+  size_t size = page_encode_frame(frame, rest, server->sequence + 1, NULL, 0);
   if (!page_buffer_reserve(spare, size)) return false;
-  spare->size =
-      page_encode_frame(&frame, rest, server->sequence + 1, spare->bytes, spare->capacity);
+  spare->size = page_encode_frame(frame, rest, server->sequence + 1, spare->bytes, spare->capacity);
   pthread_mutex_lock(&server->lock);
   page_buffer newest = *spare;
   *spare = server->latest;
@@ -43,6 +44,17 @@ static bool pump_once(sonde_page_server *server) {
   return true;
 }
 
+// Under the source's lock. A watched session gives every frame, another only those that are waited
+// for.
+static bool pump_once(sonde_page_server *server) {
+  sonde_frame frame;
+  bool waits = anyone_waits(server);
+  if (!server->source.frame || !(waits || server->def.observe)) return false;
+  if (!server->source.frame(server->source.self, &frame)) return false;
+  if (server->def.observe) server->def.observe(server->def.user, &frame);
+  return !waits || publish_frame(server, &frame);
+}
+
 static void *pump_run(void *argument) {
   sonde_page_server *server = argument;
   for (;;) {
@@ -50,7 +62,9 @@ static void *pump_run(void *argument) {
     bool stopping = server->stopping;
     pthread_mutex_unlock(&server->lock);
     if (stopping) return NULL;
+    pthread_mutex_lock(&server->source_lock);
     double pause_s = pump_once(server) ? 0.002 : 0.005;
+    pthread_mutex_unlock(&server->source_lock);
     sonde_clock_sleep_until(sonde_clock_now() + pause_s);
   }
 }
@@ -97,6 +111,11 @@ void page_command_apply(sonde_page_server *server, page_client *client,
     page_client_note(client, "another page controls the probe; this one only watches");
     return;
   }
+  if (command->type == PAGE_COMMAND_REQUEST) {
+    if (server->def.request) server->def.request(server->def.user, &command->request);
+    return;
+  }
+  if (!source->goal) return; // nothing to control
   if (command->type == PAGE_COMMAND_GOAL) {
     source->goal(source->self, command->goal);
     return;
@@ -112,6 +131,16 @@ void page_command_apply(sonde_page_server *server, page_client *client,
   }
   ++server->controls_serial;
   source->control(source->self, &server->controls);
+}
+
+// A source without a session.
+typedef struct page_model {
+  const sonde_probe **probes;
+} page_model;
+
+static void release_model(void *self) {
+  sonde_free(((page_model *)self)->probes);
+  sonde_free(self);
 }
 
 // errno of an attempt to open the port, 0 when it works.
@@ -187,28 +216,124 @@ static sonde_status start_http(sonde_page_server *server, uint16_t port, sonde_e
   return SONDE_OK;
 }
 
+// The scene is encoded before the locks are taken; a frame of the scene before is never shown with
+// this one.
+sonde_status page_server_show(sonde_page_server *server, const page_source *source,
+                              sonde_error *error) {
+  page_scene *scene = page_scene_create(source);
+  if (!scene) return sonde_fail_memory(error);
+  pthread_mutex_lock(&server->source_lock);
+  pthread_mutex_lock(&server->lock);
+  page_source before = server->source;
+  page_scene_unref(server->scene);
+  server->source = *source;
+  server->scene = scene;
+  ++server->generation;
+  server->latest.size = 0;
+  if (source->controls_now) server->controls = source->controls_now(source->self);
+  ++server->controls_serial;
+  pthread_cond_broadcast(&server->news);
+  pthread_mutex_unlock(&server->lock);
+  pthread_mutex_unlock(&server->source_lock);
+  if (before.release) before.release(before.self);
+  return SONDE_OK;
+}
+
+sonde_status sonde_page_show_model(sonde_page_server *server, const sonde_model *model,
+                                   const sonde_probe *probes, uint32_t probe_count,
+                                   sonde_error *error) {
+  SONDE_ASSERT(server && model && (probes || probe_count == 0));
+  page_model *self = SONDE_NEW(page_model, 1);
+  if (!self) return sonde_fail_memory(error);
+  self->probes = SONDE_NEW(const sonde_probe *, probe_count + 1);
+  page_source source = {.self = self,
+                        .model = model,
+                        .probes = self->probes,
+                        .probe_count = probe_count,
+                        .force_limit_n = server->source.force_limit_n,
+                        .release = release_model};
+  for (uint32_t i = 0; self->probes && i < probe_count; ++i) self->probes[i] = &probes[i];
+  sonde_status status =
+      self->probes ? page_server_show(server, &source, error) : sonde_fail_memory(error);
+  if (status) release_model(self);
+  return status;
+}
+
+bool sonde_page_post(sonde_page_server *server, const sonde_frame *frame,
+                     const sonde_session_controls *controls) {
+  SONDE_ASSERT(server && frame && controls);
+  pthread_mutex_lock(&server->source_lock);
+  pthread_mutex_lock(&server->lock);
+  bool changed = memcmp(&server->controls, controls, sizeof *controls) != 0;
+  server->controls = *controls;
+  if (changed) ++server->controls_serial;
+  pthread_mutex_unlock(&server->lock);
+  bool posted = publish_frame(server, frame);
+  pthread_mutex_unlock(&server->source_lock);
+  return posted;
+}
+
+sonde_status sonde_page_publish(sonde_page_server *server, sonde_page_topic topic, const char *json,
+                                sonde_error *error) {
+  SONDE_ASSERT(server && topic < SONDE_PAGE_TOPICS);
+  size_t size = json ? strlen(json) + 1 : 0;
+  char *copy = json ? SONDE_NEW(char, size) : NULL;
+  if (json && !copy) return sonde_fail_memory(error);
+  if (json) memcpy(copy, json, size);
+  pthread_mutex_lock(&server->lock);
+  page_topic *slot = &server->topic[topic];
+  bool same = json && slot->text && strcmp(json, slot->text) == 0;
+  if (!same) {
+    char *before = slot->text;
+    slot->text = copy;
+    ++slot->serial;
+    copy = before;
+    pthread_cond_broadcast(&server->news);
+  }
+  pthread_mutex_unlock(&server->lock);
+  sonde_free(copy);
+  return SONDE_OK;
+}
+
+void sonde_page_tell(sonde_page_server *server, const char *sentence) {
+  pthread_mutex_lock(&server->lock);
+  for (int i = 0; i < PAGE_CLIENTS; ++i)
+    if (server->client[i].connection) page_client_note(&server->client[i], sentence);
+  pthread_cond_broadcast(&server->news);
+  pthread_mutex_unlock(&server->lock);
+}
+
+static void keep_def(sonde_page_server *server, const sonde_page_def *def) {
+  server->def = *def;
+  if (def->data_directory)
+    snprintf(server->data_directory, sizeof server->data_directory, "%s", def->data_directory);
+  if (def->exams_directory)
+    snprintf(server->exams_directory, sizeof server->exams_directory, "%s", def->exams_directory);
+  server->def.data_directory = server->def.exams_directory = server->def.model_path = NULL;
+}
+
 sonde_status page_server_start(const sonde_page_def *def, const page_source *source,
                                sonde_page_server **server_out, sonde_error *error) {
   SONDE_ASSERT(def && source && server_out && source->model && source->frame && source->goal);
   *server_out = NULL;
   sonde_page_server *server = SONDE_NEW(sonde_page_server, 1);
   if (!server) return sonde_fail_memory(error);
-  server->source = *source;
-  server->controls = source->controls_now(source->self);
-  server->controls_serial = 1;
-  if (def->data_directory)
-    snprintf(server->data_directory, sizeof server->data_directory, "%s", def->data_directory);
+  keep_def(server, def);
   pthread_mutex_init(&server->lock, NULL);
+  pthread_mutex_init(&server->source_lock, NULL);
   pthread_cond_init(&server->news, NULL);
-  sonde_status status = start_http(server, def->port, error);
+  sonde_status status = page_server_show(server, source, error);
+  if (!status) status = start_http(server, def->port, error);
   if (!status) {
     server->pump_runs = pthread_create(&server->pump, NULL, pump_run, server) == 0;
     if (!server->pump_runs) status = sonde_fail(error, SONDE_MEMORY, "a thread could not start");
   }
-  if (status)
+  if (status) {
+    server->source.release = NULL; // still the caller's
     sonde_page_stop(server);
-  else
+  } else {
     *server_out = server;
+  }
   return status;
 }
 
@@ -241,6 +366,9 @@ void sonde_page_stop(sonde_page_server *server) {
   sonde_free(server->spare.bytes);
   pthread_cond_destroy(&server->news);
   pthread_mutex_destroy(&server->lock);
-  if (server->release) server->release(server->source.self);
+  pthread_mutex_destroy(&server->source_lock);
+  page_scene_unref(server->scene);
+  for (int i = 0; i < SONDE_PAGE_TOPICS; ++i) sonde_free(server->topic[i].text);
+  if (server->source.release) server->source.release(server->source.self);
   sonde_free(server);
 }

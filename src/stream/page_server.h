@@ -21,6 +21,11 @@ enum {
   PAGE_REFUSED_MAX = 2000, // messages beyond the rate before the connection is closed
 };
 
+typedef struct page_buffer {
+  unsigned char *bytes;
+  size_t size, capacity;
+} page_buffer;
+
 // What the server serves: a session, or a synthetic source in the tests.
 typedef struct page_source {
   void *self;
@@ -32,12 +37,15 @@ typedef struct page_source {
   void (*goal)(void *self, sonde_pose pose);     // these three: one thread at a time
   void (*control)(void *self, const sonde_session_controls *controls);
   sonde_session_controls (*controls_now)(void *self);
+  void (*release)(void *self); // frees self when it is no longer shown; may be NULL
 } page_source;
 
-typedef struct page_buffer {
-  unsigned char *bytes;
-  size_t size, capacity;
-} page_buffer;
+// Geometry of a source, encoded once. Shared by the senders, so that a slow one holds up nobody.
+typedef struct page_scene {
+  uint32_t references; // under the lock
+  uint32_t message_count;
+  page_buffer *messages; // [message_count]
+} page_scene;
 
 typedef struct page_client {
   sonde_page_server *server;
@@ -45,9 +53,10 @@ typedef struct page_client {
   pthread_t sender;
   bool leaving;
   uint64_t joined;      // order of arrival; the smallest controls
-  bool greeted;         // hello and geometry sent
+  uint32_t greeted;     // generation whose hello and geometry were sent; 0: none
   uint32_t told_serial; // of the controls
-  bool told_control;    // what it was told about its role
+  uint32_t told_topic[SONDE_PAGE_TOPICS];
+  bool told_control; // what it was told about its role
   bool pong_due, note_due;
   uint32_t pong_id;
   char note[200];
@@ -59,25 +68,45 @@ typedef struct page_client {
   uint32_t refused;
 } page_client;
 
+// Newest text of a topic.
+typedef struct page_topic {
+  char *text; // NULL: none
+  uint32_t serial;
+} page_topic;
+
 struct sonde_page_server {
-  page_source source;
-  char data_directory[512]; // empty: serve from memory
+  sonde_page_def def;
+  pthread_mutex_t source_lock; // the pump and sonde_page_show; taken before the lock
+  page_source source;          // changed under both locks
+  page_scene *scene;           // of source
+  uint32_t generation;         // counts scenes, from 1
+  page_topic topic[SONDE_PAGE_TOPICS];
+  char exams_directory[512]; // empty: none
+  char data_directory[512];  // empty: serve from memory
   struct mg_context *http;
   uint16_t port;
   pthread_t pump;
   pthread_mutex_t lock;
   pthread_cond_t news;
   bool stopping, pump_runs;
-  page_buffer latest, spare; // newest encoded frame; the pump writes into spare and swaps
+  page_buffer latest, spare; // newest encoded frame (size 0: none of this scene); the pump writes
+                             // into spare and swaps
   uint32_t sequence;         // of latest; 0: none yet
   sonde_session_controls controls;
   uint32_t controls_serial;
   uint64_t joined;
   page_client client[PAGE_CLIENTS];
-  void (*release)(void *self); // frees source.self at the stop; may be NULL
 };
 
-// Starts a server for a source; sonde_page_stop() ends it.
+// Encodes the geometry of a source; one reference. NULL without memory.
+page_scene *page_scene_create(const page_source *source);
+// Under the lock.
+void page_scene_unref(page_scene *scene);
+
+// Shows a source; on failure the one before stays and this one is not released.
+sonde_status page_server_show(sonde_page_server *server, const page_source *source,
+                              sonde_error *error);
+// Starts a server for a source; sonde_page_stop() ends it and releases the source.
 sonde_status page_server_start(const sonde_page_def *def, const page_source *source,
                                sonde_page_server **server, sonde_error *error);
 
@@ -98,6 +127,7 @@ void page_client_close(const struct mg_connection *connection, void *server);
 
 // Under the lock.
 bool page_client_controls(const page_client *client);
+bool page_client_greeted(const page_client *client);
 bool page_client_wants_frame(const page_client *client);
 bool page_buffer_reserve(page_buffer *buffer, size_t capacity);
 

@@ -47,6 +47,14 @@ static session_source *adapt(sonde_session *session) {
   return self;
 }
 
+static page_source make_source(session_source *self, double force_limit_n) {
+  return (page_source){self,          sonde_session_model(self->session),
+                       self->probes,  sonde_session_probe_count(self->session),
+                       force_limit_n, take_frame,
+                       set_goal,      set_controls,
+                       get_controls,  release};
+}
+
 sonde_status sonde_page_start(const sonde_page_def *def, sonde_session *session,
                               sonde_page_server **server, sonde_error *error) {
   SONDE_ASSERT(def && session && server);
@@ -54,15 +62,19 @@ sonde_status sonde_page_start(const sonde_page_def *def, sonde_session *session,
   if (!self) return sonde_fail_memory(error);
   double limit_n =
       def->force_limit_n > 0 ? def->force_limit_n : sonde_safety_limits_default().force_n;
-  page_source source = {self,         sonde_session_model(session),
-                        self->probes, sonde_session_probe_count(session),
-                        limit_n,      take_frame,
-                        set_goal,     set_controls,
-                        get_controls};
+  page_source source = make_source(self, limit_n);
   sonde_status status = page_server_start(def, &source, server, error);
-  if (status)
-    release(self);
-  else
-    (*server)->release = release;
+  if (status) release(self);
+  return status;
+}
+
+sonde_status sonde_page_show(sonde_page_server *server, sonde_session *session,
+                             sonde_error *error) {
+  SONDE_ASSERT(server && session);
+  session_source *self = adapt(session);
+  if (!self) return sonde_fail_memory(error);
+  page_source source = make_source(self, server->source.force_limit_n);
+  sonde_status status = page_server_show(server, &source, error);
+  if (status) release(self);
   return status;
 }

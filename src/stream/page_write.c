@@ -212,6 +212,10 @@ void page_write_hello(page_text *text, const page_hello *hello) {
   put_cases(text);
   put_faults(text);
   put_sites(text, hello);
+  if (hello->more && hello->more[0]) {
+    put(text, ",");
+    put(text, hello->more);
+  }
   put(text, "}");
 }
 
@@ -247,3 +251,5 @@ void page_write_pong(page_text *text, uint32_t id) {
   put_integer(text, id);
   put(text, "}");
 }
+
+void page_write_raw(page_text *text, const char *json) { put(text, json); }

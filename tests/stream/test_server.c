@@ -7,6 +7,7 @@
 
 #include <math.h>
 #include <stdatomic.h>
+#include <sys/stat.h>
 
 enum { NODES = 3, WIDTH = 256, HEIGHT = 256 };
 
@@ -55,7 +56,21 @@ typedef struct fixture {
   synthetic source;
   sonde_page_server *server;
   uint16_t port;
+  char directory[64]; // of exams
+  atomic_uint requests;
+  sonde_page_request request; // the last one
 } fixture;
+
+static page_source source_of(synthetic *s) {
+  return (page_source){s,         &s->model,     s->probes,      2,   40, next_frame,
+                       note_goal, note_controls, first_controls, NULL};
+}
+
+static void note_request(void *user, const sonde_page_request *request) {
+  fixture *f = user;
+  f->request = *request;
+  atomic_fetch_add(&f->requests, 1);
+}
 
 static int set_up(void **state) {
   fixture *f = SONDE_NEW(fixture, 1);
@@ -67,9 +82,10 @@ static int set_up(void **state) {
   snprintf(s->probe[0].name, sizeof s->probe[0].name, "point");
   snprintf(s->probe[1].name, sizeof s->probe[1].name, "linear");
   for (int i = 0; i < 2; ++i) s->probes[i] = &s->probe[i];
-  page_source source = {s,         &s->model,     s->probes,     2, 40, next_frame,
-                        note_goal, note_controls, first_controls};
-  sonde_page_def def = {0};
+  page_source source = source_of(s);
+  snprintf(f->directory, sizeof f->directory, "/tmp/sonde-exams-XXXXXX");
+  if (!mkdtemp(f->directory)) return -1;
+  sonde_page_def def = {.exams_directory = f->directory, .user = f, .request = note_request};
   if (page_server_start(&def, &source, &f->server, NULL)) return -1;
   f->port = sonde_page_port(f->server);
   *state = f;
@@ -79,6 +95,12 @@ static int set_up(void **state) {
 static int tear_down(void **state) {
   fixture *f = *state;
   sonde_page_stop(f->server);
+  char path[128];
+  snprintf(path, sizeof path, "%s/2026-a1/report.html", f->directory);
+  unlink(path);
+  snprintf(path, sizeof path, "%s/2026-a1", f->directory);
+  rmdir(path);
+  rmdir(f->directory);
   sonde_free(f);
   return 0;
 }
@@ -166,8 +188,7 @@ static void the_server_listens_on_the_loopback_address_only(void **state) {
 
 static void a_used_port_is_named(void **state) {
   fixture *f = *state;
-  page_source source = {&f->source, &f->source.model, f->source.probes, 2, 40, next_frame,
-                        note_goal,  note_controls,    first_controls};
+  page_source source = source_of(&f->source);
   sonde_page_def def = {.port = f->port};
   sonde_page_server *second = NULL;
   sonde_error error = {0};
@@ -373,6 +394,120 @@ static void a_flood_is_slowed_down_and_then_cut(void **state) {
   close(s);
 }
 
+// ---- what the program says and is asked --------------------------------------------------------
+
+static void the_newest_text_of_a_topic_reaches_every_client(void **state) {
+  fixture *f = *state;
+  assert_int_equal(sonde_page_publish(f->server, SONDE_PAGE_GREETING, "\"trainer\":true", NULL), 0);
+  assert_int_equal(sonde_page_publish(f->server, SONDE_PAGE_EXAM, "{\"n\":1}", NULL), 0);
+  int early = ws_open(f->port);
+  assert_true(ws_expect(early, "\"trainer\":true}"));
+  assert_true(ws_expect(early, "{\"n\":1}"));
+  assert_int_equal(sonde_page_publish(f->server, SONDE_PAGE_EXAM, "{\"n\":2}", NULL), 0);
+  assert_true(ws_expect(early, "{\"n\":2}"));
+  int late = ws_open(f->port);
+  assert_true(ws_expect(late, "\"type\":\"controls\"")); // first the thigh, then what happens on it
+  assert_true(ws_expect(late, "{\"n\":2}"));
+  sonde_page_tell(f->server, "a sentence for all");
+  assert_true(ws_expect(early, "a sentence for all"));
+  assert_true(ws_expect(late, "a sentence for all"));
+  close(early);
+  close(late);
+}
+
+static void requests_come_from_the_client_that_controls(void **state) {
+  fixture *f = *state;
+  int first = ws_open(f->port);
+  assert_true(ws_expect(first, "\"type\":\"controls\""));
+  int second = ws_open(f->port);
+  assert_true(ws_expect(second, "\"type\":\"controls\""));
+  ws_say(second, "{\"type\":\"finish_exam\"}");
+  assert_true(ws_expect(second, "only watches"));
+  assert_int_equal(atomic_load(&f->requests), 0);
+  ws_say(first, "{\"type\":\"start_exam\",\"case\":\"lean\",\"protocol\":\"two_point\","
+                "\"guidance\":\"full\",\"trainee\":\"J\xc3\xb6rg\"}");
+  assert_true(reaches(&f->requests, 1));
+  assert_int_equal(f->request.ask, SONDE_PAGE_START_EXAM);
+  assert_string_equal(f->request.id, "lean");
+  assert_string_equal(f->request.name, "J\xc3\xb6rg");
+  ws_say(first, "{\"type\":\"start_exam\",\"case\":\"lean\",\"protocol\":\"two_point\","
+                "\"guidance\":\"none\"}");
+  assert_true(ws_expect(first, "full, hints or exam"));
+  ws_say(first, "{\"type\":\"play\",\"playing\":true,\"speed\":100}");
+  assert_true(ws_expect(first, "from 0.25 to 4"));
+  ws_say(first, "{\"type\":\"seek\"}");
+  assert_true(ws_expect(first, "time_s"));
+  ws_say(first, "{\"type\":\"seek\",\"time_s\":12.5}");
+  assert_true(reaches(&f->requests, 2));
+  assert_float_equal(f->request.time_s, 12.5, 0);
+  close(first);
+  close(second);
+}
+
+static unsigned first_point_count(int s) {
+  for (;;) {
+    int opcode;
+    size_t count;
+    unsigned char *data = ws_read(s, &opcode, &count);
+    if (!data) return 0;
+    bool skin = opcode == 2 && data[6] == PAGE_MESH && data[8] == PAGE_SKIN;
+    unsigned points = data[16];
+    free(data);
+    if (skin) return points;
+  }
+}
+
+// Another thigh: every client is greeted again, and no frame of the one before follows.
+static void another_source_takes_the_place_of_the_first(void **state) {
+  fixture *f = *state;
+  static sonde_vec3 points[5];
+  static uint32_t faces[1][3] = {{0, 1, 2}};
+  sonde_model other = {.surface = {5, 1, points, faces}};
+  int s = ws_open(f->port);
+  assert_int_equal(first_point_count(s), NODES);
+  assert_int_equal(sonde_page_show_model(f->server, &other, NULL, 0, NULL), SONDE_OK);
+  assert_int_equal(first_point_count(s), 5);
+  float skin[15] = {0};
+  sonde_frame frame = {.skin_m = skin, .pixels = f->source.pixels, .width = 16, .height = 16};
+  frame.snapshot.tick = 77;
+  sonde_session_controls controls = first_controls(NULL);
+  assert_true(sonde_page_post(f->server, &frame, &controls));
+  uint64_t tick = 0;
+  assert_true(next_sequence(s, &tick) > 0);
+  assert_int_equal(tick, 77);
+  ws_say(s, "{\"type\":\"goal\",\"position_mm\":[1,2,3],\"rotation\":[1,0,0,0]}");
+  ws_say(s, "{\"type\":\"ping\",\"id\":9}");
+  assert_true(ws_expect(s, "\"id\":9"));
+  assert_int_equal(atomic_load(&f->source.goals), 0); // nothing to move
+  page_source first = source_of(&f->source);
+  assert_int_equal(page_server_show(f->server, &first, NULL), SONDE_OK);
+  assert_int_equal(first_point_count(s), NODES);
+  close(s);
+}
+
+static void reports_are_served_and_nothing_else(void **state) {
+  fixture *f = *state;
+  char host[32], head[2048], path[128];
+  snprintf(host, sizeof host, "127.0.0.1:%u", (unsigned)f->port);
+  snprintf(path, sizeof path, "%s/2026-a1", f->directory);
+  assert_int_equal(mkdir(path, 0700), 0);
+  snprintf(path, sizeof path, "%s/2026-a1/report.html", f->directory);
+  sonde_file *file = NULL;
+  assert_int_equal(sonde_file_create(path, &file, NULL), SONDE_OK);
+  sonde_file_printf(file, "<p>x</p>");
+  assert_int_equal(sonde_file_commit(file, NULL), SONDE_OK);
+  assert_int_equal(get(f->port, "GET", "/report/2026-a1", host, head), 200);
+  assert_non_null(strstr(head, "default-src 'none'"));
+  assert_null(strstr(head, "script-src"));
+  static const char *const ABSENT[] = {
+      "/report/2026-a2", "/report/",           "/report/x/../../y",        "/report/2026-a1/report.html",
+      "/report/2026-A1",  "/exam/2026-a1.json", "/exam/2026-a1.html"};
+  for (size_t i = 0; i < SONDE_COUNT_OF(ABSENT); ++i)
+    assert_int_equal(get(f->port, "GET", ABSENT[i], host, head), 404);
+  assert_int_equal(get(f->port, "GET", "/report/2026-a1", "evil.example", head), 403);
+  assert_int_equal(get(f->port, "GET", "/status.json", host, head), 200);
+}
+
 #define SERVER_TEST(name) cmocka_unit_test_setup_teardown(name, set_up, tear_down)
 
 int main(void) {
@@ -391,6 +526,10 @@ int main(void) {
       SERVER_TEST(a_silent_client_gets_two_frames_and_then_the_newest),
       SERVER_TEST(frames_flow_while_they_are_acknowledged),
       SERVER_TEST(a_client_that_does_not_read_holds_up_nobody),
+      SERVER_TEST(the_newest_text_of_a_topic_reaches_every_client),
+      SERVER_TEST(requests_come_from_the_client_that_controls),
+      SERVER_TEST(another_source_takes_the_place_of_the_first),
+      SERVER_TEST(reports_are_served_and_nothing_else),
       SERVER_TEST(a_flood_is_slowed_down_and_then_cut),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

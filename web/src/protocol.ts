@@ -107,7 +107,7 @@ export interface Frame {
 }
 
 export const PART = { skin: 0, femur: 1, vein: 2, artery: 3, probe: 16 } as const;
-export const VERSION = 1;
+export const VERSION = 2;
 
 const HEADER = 16;
 const MESH_FIXED = 24;
