@@ -72,7 +72,9 @@ static void note_request(void *user, const sonde_page_request *request) {
   atomic_fetch_add(&f->requests, 1);
 }
 
-static int set_up(void **state) {
+// One server for all tests: stopping one takes two seconds. Each test starts with the source shown
+// anew, no client, no text and counters at zero.
+static int start_server(void **state) {
   fixture *f = SONDE_NEW(fixture, 1);
   synthetic *s = &f->source;
   s->faces[0][1] = 1;
@@ -92,7 +94,7 @@ static int set_up(void **state) {
   return 0;
 }
 
-static int tear_down(void **state) {
+static int stop_server(void **state) {
   fixture *f = *state;
   sonde_page_stop(f->server);
   char path[128];
@@ -102,6 +104,21 @@ static int tear_down(void **state) {
   rmdir(path);
   rmdir(f->directory);
   sonde_free(f);
+  return 0;
+}
+
+static void wait_for_clients(fixture *f, uint32_t count);
+
+static int set_up(void **state) {
+  fixture *f = *state;
+  page_source source = source_of(&f->source);
+  wait_for_clients(f, 0);
+  for (int i = 0; i < SONDE_PAGE_TOPICS; ++i)
+    sonde_page_publish(f->server, (sonde_page_topic)i, NULL, NULL);
+  if (page_server_show(f->server, &source, NULL)) return -1;
+  atomic_store(&f->source.goals, 0);
+  atomic_store(&f->source.controls, 0);
+  atomic_store(&f->requests, 0);
   return 0;
 }
 
@@ -500,15 +517,15 @@ static void reports_are_served_and_nothing_else(void **state) {
   assert_non_null(strstr(head, "default-src 'none'"));
   assert_null(strstr(head, "script-src"));
   static const char *const ABSENT[] = {
-      "/report/2026-a2", "/report/",           "/report/x/../../y",        "/report/2026-a1/report.html",
-      "/report/2026-A1",  "/exam/2026-a1.json", "/exam/2026-a1.html"};
+      "/report/2026-a2", "/report/",           "/report/x/../../y", "/report/2026-a1/report.html",
+      "/report/2026-A1", "/exam/2026-a1.json", "/exam/2026-a1.html"};
   for (size_t i = 0; i < SONDE_COUNT_OF(ABSENT); ++i)
     assert_int_equal(get(f->port, "GET", ABSENT[i], host, head), 404);
   assert_int_equal(get(f->port, "GET", "/report/2026-a1", "evil.example", head), 403);
   assert_int_equal(get(f->port, "GET", "/status.json", host, head), 200);
 }
 
-#define SERVER_TEST(name) cmocka_unit_test_setup_teardown(name, set_up, tear_down)
+#define SERVER_TEST(name) cmocka_unit_test_setup(name, set_up)
 
 int main(void) {
   const struct CMUnitTest tests[] = {
@@ -532,5 +549,5 @@ int main(void) {
       SERVER_TEST(reports_are_served_and_nothing_else),
       SERVER_TEST(a_flood_is_slowed_down_and_then_cut),
   };
-  return cmocka_run_group_tests(tests, NULL, NULL);
+  return cmocka_run_group_tests(tests, start_server, stop_server);
 }
