@@ -24,6 +24,9 @@ typedef enum sonde_label {
   SONDE_LABEL_THROMBUS,
   SONDE_LABEL_ARTERY_WALL,
   SONDE_LABEL_ARTERY,
+  SONDE_LABEL_NODE, /**< lymph node */
+  SONDE_LABEL_CYST,
+  SONDE_LABEL_HAEMATOMA,
   SONDE_LABEL_COUNT
 } sonde_label;
 
@@ -94,7 +97,8 @@ SONDE_API void sonde_interior_set_method(sonde_interior *interior, sonde_interio
 SONDE_API sonde_interior_method sonde_interior_used_method(const sonde_interior *interior);
 
 /** Moves the vein below a point of the skin, to the same depth along its whole course, and the
- *  artery 11 mm beside it on its own side. Pressures and radii stay.
+ *  artery 11 mm beside it on its own side. Pressures and radii stay. The model's branches, which
+ *  would no longer meet them, are left out.
  *  @return ARGUMENT for a depth out of the tissue @thread owner, before the next update */
 SONDE_API sonde_status sonde_interior_set_vein_depth(sonde_interior *interior,
                                                      sonde_vec3 below_skin_m, double depth_m,
@@ -130,11 +134,16 @@ SONDE_API sonde_vec3 sonde_interior_rest_point(const sonde_interior *interior, s
 /** Static tissue label and depth below the skin of a rest point. @thread any */
 SONDE_API sonde_label sonde_interior_label(const sonde_interior *interior, sonde_vec3 rest_m,
                                            double *depth_m);
-/** Stations of the vein (0) or artery (1). */
+/** Femoral vein (0), femoral artery (1) and then the branches of the model's anatomy in its order;
+ *  at least 2, also in a leg without vessels. @thread any */
+SONDE_API uint32_t sonde_interior_vessel_count(const sonde_interior *interior);
+/** femoral_vein, femoral_artery or the branch's name. @thread any */
+SONDE_API const char *sonde_interior_vessel_name(const sonde_interior *interior, int which);
+/** Stations of the vein (0), the artery (1) or a branch; 0 when the leg lacks it. */
 SONDE_API const sonde_vessel_state *sonde_interior_vessel(const sonde_interior *interior, int which,
                                                           uint32_t *count);
-/** State of the vein (0) or artery (1) where the probe's image plane cuts it; false when it does
- *  not pass within 40 mm of the beam axis. */
+/** State of the vein (0), the artery (1) or a branch where the probe's image plane cuts it; false
+ *  when it does not pass within 40 mm of the beam axis. */
 SONDE_API bool sonde_interior_vessel_at_plane(const sonde_interior *interior, int which,
                                               sonde_pose world_from_probe,
                                               sonde_vessel_state *state);

@@ -45,6 +45,16 @@ typedef struct sonde_findings {
   double oedema; /**< fluid between the lobules of the fat, 0 none .. 1 */
 } sonde_findings;
 
+/** What the following updates add to the thigh; NULL: nothing. Branches that are not named hold
+ *  what a healthy vein holds; clots are asked for in veins only.
+ *  @param findings copied
+ *  @return ARGUMENT for an unknown branch, one named twice, values out of range, or a lesion that
+ *    is not inside the soft tissue
+ *  @thread owner, before the next update */
+SONDE_API sonde_status sonde_interior_set_findings(sonde_interior *interior,
+                                                   const sonde_findings *findings,
+                                                   sonde_error *error);
+
 #ifdef __cplusplus
 }
 #endif

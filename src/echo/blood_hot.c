@@ -5,7 +5,7 @@
 // train's count: flow of any length needs no memory, and each scatterer moves on from segment to
 // segment.
 //
-// sonde_echo_blood   both vessels, segment by segment
+// sonde_echo_blood   all vessels in view, segment by segment
 // beats_of           mean share of the pulse up to a time
 // travelled          way of the mean flow in a vessel
 // segment_map        one segment's lumen in image coordinates
@@ -32,10 +32,12 @@ static double beats_of(const sonde_circulation *c, double t) {
 }
 
 // Way of the mean flow since t = 0, m.
-static double travelled(const sonde_echo *echo, int which) {
+static double travelled(const sonde_echo *echo, uint32_t which) {
   const sonde_echo_flow *flow = &echo->flow;
-  if (which == 0)
-    return echo->frame.pathology->thrombus_fraction < 1 ? flow->vein_m_s * flow->t_s : 0;
+  if (echo->interior->kind[which] == SONDE_VESSEL_VEIN) {
+    bool plug = sonde_echo_pathology(echo, which)->thrombus_fraction >= 1;
+    return plug ? 0 : flow->vein_m_s * flow->t_s;
+  }
   double rate = flow->circulation.heart_rate_hz;
   if (!(rate > 0)) return -flow->artery_m_s * flow->t_s;
   return -flow->artery_m_s / rate * beats_of(&flow->circulation, flow->t_s);
@@ -89,9 +91,8 @@ static void lay_segment(sonde_echo *echo, const map *m, uint32_t count, int32_t 
   }
 }
 
-static void flow(sonde_echo *echo, int which) {
+static void flow(sonde_echo *echo, uint32_t which) {
   const sonde_interior *interior = echo->interior;
-  const sonde_pathology *p = echo->frame.pathology;
   uint32_t stations = interior->station_count[which];
   if (stations < 2) return;
   double density = echo->per_cell / (echo->cell_m * echo->cell_m * echo->cell_m);
@@ -99,13 +100,12 @@ static void flow(sonde_echo *echo, int which) {
   const sonde_station *station = interior->station[which];
   int32_t first = (int32_t)ceil(station[0].s_m / segment_m);
   int32_t last = (int32_t)floor(station[stations - 1].s_m / segment_m);
-  uint32_t salt = (uint32_t)echo->seed + (uint32_t)which;
+  uint32_t salt = (uint32_t)echo->seed + which;
   sonde_vessel_state low, high;
   bool known = sonde_vessel_at(interior, which, first * segment_m, &low);
   for (int32_t k = first; k < last && known; ++k, low = high) {
     known = sonde_vessel_at(interior, which, (k + 1) * segment_m, &high);
-    bool clot = which == 0 && sonde_pathology_clot(p, low.rest_centre_m.z);
-    double solid = clot ? p->thrombus_fraction : 0, volume = 0;
+    double solid = sonde_echo_solid(echo, which, low.rest_centre_m.z), volume = 0;
     map m;
     if (known && solid < 1) volume = segment_map(echo, &low, &high, &m);
     uint32_t count = (uint32_t)fmin(density * volume, SONDE_BLOOD);
@@ -116,5 +116,5 @@ static void flow(sonde_echo *echo, int which) {
 void sonde_echo_blood(sonde_echo *echo) {
   SONDE_ASSERT(echo->frame.pathology != NULL);
   echo->bled = 0;
-  for (int which = 0; which < 2; ++which) flow(echo, which);
+  for (uint32_t k = 0; k < echo->shown_count; ++k) flow(echo, echo->shown[k]);
 }

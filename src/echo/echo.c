@@ -121,11 +121,11 @@ static bool allocate(sonde_echo *echo) {
   echo->psf = SONDE_NEW(beam_psf, 1);
   echo->spare = SONDE_NEW(beam_psf, 1);
   echo->node = SONDE_NEW(plane_node, SONDE_PLANE_NODES);
-  echo->plane = SONDE_NEW(float, SONDE_PLANE_NODES *PLANE_FIELDS);
-  echo->wide = SONDE_NEW(float, 2 * lines * PLANE_FIELDS);
-  echo->row = SONDE_NEW(float, lines *PLANE_FIELDS);
-  echo->level[0] = SONDE_NEW(float, lines *LEVELS);
-  echo->level[1] = SONDE_NEW(float, lines *LEVELS);
+  echo->plane = SONDE_NEW(float, SONDE_PLANE_NODES *MOST_FIELDS);
+  echo->wide = SONDE_NEW(float, 2 * lines * MOST_FIELDS);
+  echo->row = SONDE_NEW(float, lines *MOST_FIELDS);
+  echo->level[0] = SONDE_NEW(float, lines *MOST_LEVELS);
+  echo->level[1] = SONDE_NEW(float, lines *MOST_LEVELS);
   echo->scatter = SONDE_NEW(float, lines);
   echo->loss = SONDE_NEW(float, lines);
   echo->gain = SONDE_NEW(float, lines *SONDE_MEDIUM_ROWS);

@@ -24,6 +24,9 @@ enum {
   SONDE_MAX_CELLS = 12000,
 };
 
+_Static_assert((int)MOST_VESSELS == (int)SONDE_VESSELS, "vessels in view");
+_Static_assert((int)MOST_LESIONS == (int)SONDE_LESIONS, "lesions in view");
+
 typedef struct specular {
   float depth_m, amplitude;
   uint32_t line;
@@ -80,18 +83,23 @@ struct sonde_echo {
   float line_share[SONDE_MOST_LINES];     // way to the next
   double lines_per_column, depth_per_row; // of the coarse plane; depth in m
   bool vessels;                           // any
-  beam_psf *psf, *spare;                  // in use; being built or the one before
-  plane_node *node;                       // [PLANE_NODES]
-  float *plane;                           // [PLANE_FIELDS][PLANE_NODES]
-  float *wide;                            // [2][PLANE_FIELDS][padded] two coarse rows, per line
-  float *row;                             // [PLANE_FIELDS][padded], one row of the march
-  float *level[2];                        // [LEVELS][padded] of this row and the last
-  float *scatter;                         // [padded] of this row
-  float *loss;                            // [padded] of this row
-  float *gain;                            // [MEDIUM_ROWS][padded]
-  float *loss_db;                         // [padded] accumulated
-  uint8_t *air;                           // [padded]
-  float *coupling; // [padded] share of the amplitude that passes the face, 0..1
+  uint32_t shown[MOST_VESSELS];           // vessels in view: the femoral ones, then branches
+  uint32_t shown_count;
+  uint32_t lesion[MOST_LESIONS]; // lesions in view
+  uint32_t lesion_count;
+  uint32_t fields, levels; // of the plane and of the medium
+  beam_psf *psf, *spare;   // in use; being built or the one before
+  plane_node *node;        // [PLANE_NODES]
+  float *plane;            // [MOST_FIELDS][PLANE_NODES]
+  float *wide;             // [2][fields][padded] two coarse rows, per line
+  float *row;              // [fields][padded], one row of the march
+  float *level[2];         // [levels][padded] of this row and the last
+  float *scatter;          // [padded] of this row
+  float *loss;             // [padded] of this row
+  float *gain;             // [MEDIUM_ROWS][padded]
+  float *loss_db;          // [padded] accumulated
+  uint8_t *air;            // [padded]
+  float *coupling;         // [padded] share of the amplitude that passes the face, 0..1
   bool some_air;
   specular *echoes; // [MAX_ECHOES]
   uint32_t echo_count;
@@ -132,6 +140,11 @@ void sonde_echo_picture(sonde_echo *echo, sonde_image *image);
 sonde_vec3 sonde_echo_place(const frame *f, double line, double depth_m);
 // Its inverse: (line, metres beside the plane, depth).
 sonde_vec3 sonde_echo_unplace(const frame *f, sonde_vec3 local_m);
+
+// What a vessel holds: the frame's own pathology in the femoral vein.
+const sonde_pathology *sonde_echo_pathology(const sonde_echo *echo, uint32_t which);
+// Share of a vessel's short axis that clot fills at a rest height, from the far side.
+double sonde_echo_solid(const sonde_echo *echo, uint32_t which, double z_m);
 
 // Image coordinates (columns, metres beside the plane, rows) and world.
 sonde_vec3 sonde_echo_to_world(const sonde_echo *echo, sonde_vec3 at);

@@ -2,6 +2,7 @@
 #ifndef SONDE_SRC_ECHO_KERNEL_H
 #define SONDE_SRC_ECHO_KERNEL_H
 
+#include "echo/plane.h"
 #include "echo/psf.h"
 
 #include <stdbool.h>
@@ -9,8 +10,9 @@
 
 enum {
   SONDE_MOST_LINES = 512,
-  ECHO_ALIGN = 16, // lines and batches are padded to whole vectors
-  LEVELS = 6,      // skin, dermis, fascia, cortex, vein wall, artery wall
+  ECHO_ALIGN = 16,  // lines and batches are padded to whole vectors
+  LAYER_LEVELS = 4, // skin, dermis, fascia, cortex; the vessels' walls and the lesions follow
+  MOST_LEVELS = LAYER_LEVELS + MOST_VESSELS + MOST_LESIONS,
   RING_PLANES = 2 * SONDE_RANK,
   SONDE_FINE = 2, // columns of the grid per scan line
 };
@@ -57,14 +59,31 @@ typedef struct axial_job {
   float *envelope, *grey;
 } axial_job;
 
+// What a vessel in view is made of.
+typedef struct tissue_vessel {
+  float wall_m, clot_fraction, clot_scatter;
+} tissue_vessel;
+
+typedef enum tissue_lesion_kind { TISSUE_NODE, TISSUE_CYST, TISSUE_HAEMATOMA } tissue_lesion_kind;
+
+typedef struct tissue_lesion {
+  tissue_lesion_kind kind;
+  float per_half[3]; // one over the semi-axes, 1/m
+  float scatter;
+} tissue_lesion;
+
 // Rows of the fields of plane.h at one depth, in; tissue out.
 typedef struct tissue_job {
-  const float *row; // [PLANE_FIELDS][lines]
-  uint32_t lines;   // multiple of ECHO_ALIGN
-  float bone_radius_m, clot_fraction, clot_scatter;
+  const float *row;                   // [fields][lines]
+  uint32_t lines;                     // multiple of ECHO_ALIGN
+  uint32_t vessels, lesions;          // in view; the first two are the femoral vein and artery
+  tissue_vessel vessel[MOST_VESSELS]; // branches after their parents
+  tissue_lesion lesion[MOST_LESIONS];
+  float bone_radius_m;
+  float webs, oedema; // 0..1
   bool plain;
   float *scatter, *loss; // amplitude over muscle, dB/m/MHz one way
-  float *level;          // [LEVELS][lines] signed: sign changes are interfaces
+  float *level;          // [levels][lines] signed: sign changes are interfaces
   const float *before;   // the same of the row above
   uint8_t *crossed;      // [lines / ECHO_ALIGN] whether any sign of these lines changed
 } tissue_job;

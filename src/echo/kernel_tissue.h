@@ -4,14 +4,18 @@
 // cell_value, texture  value noise
 // sheet                bright layers at whole values
 // septa, bundles, fascia  textures of fat and muscle
+// clefts             fluid between the lobules of the fat
+// webs               bands in an old clot
 // wall_distance        signed distance to a vessel's inner wall
-// paint                one vector of lines
+// lesion_distance, lesion  node, cyst, haematoma
+// vessels            walls, lumina, clots
+// layers             skin, fat, muscle
+// paint              one vector of lines
 #ifndef SONDE_SRC_ECHO_KERNEL_TISSUE_H
 #define SONDE_SRC_ECHO_KERNEL_TISSUE_H
 
 #include "echo/kernel.h"
 #include "echo/kernel_vector.h"
-#include "echo/plane.h"
 
 enum { TURNS_MUSCLE = 90, TURNS_FAT = 60 }; // noise cells around the leg
 
@@ -20,7 +24,8 @@ static const float skin_tissue[2] = {2.2f, 100}, fat_tissue[2] = {0.40f, 50},
                    muscle_tissue[2] = {0.85f, 100}, wall_tissue[2] = {1.9f, 110},
                    blood_tissue[2] = {0.006f, 18}, bone_tissue[2] = {0.02f, 200};
 static const float clot_loss = 45, outside_loss = 0.2f;
-static const float wall_m[2] = {0.6e-3f, 0.9e-3f};
+static const float node_loss = 60, haematoma_loss = 45, fluid_tissue[2] = {0.006f, 5};
+static const float capsule_m = 0.3e-3f, capsule_scatter = 1.4f, hilum_scatter = 1.2f;
 
 INLINE vf cell_value(vu a, vu b, vu c) {
   vu h = a ^ b ^ c;
@@ -68,6 +73,24 @@ INLINE vf septa(vf theta, vf s, vf depth) {
   return larger(sheet(depth * 420 + 1.3f * bend, 0.30f) * (0.55f + strength), all(0));
 }
 
+// Oedema: fluid in clefts around lobules of 6 by 8 mm, 0..1.
+INLINE vf clefts(vf theta, vf s, vf depth, float oedema) {
+  vf bend = texture(theta, s * 70, depth * 250, TURNS_FAT, 1);
+  vf sway = texture(theta, s * 60, depth * 160, TURNS_FAT, 8);
+  float share = 0.12f + 0.2f * oedema;
+  vf along = sheet(depth * 170 + 0.9f * bend, share);
+  vf across = sheet(theta * (TURNS_FAT * 0.159154943f) + depth * 40 + 0.8f * sway, share);
+  vf deep = smaller(larger(along, across) * 3, all(1));
+  return deep * (oedema < 0.5f ? 2 * oedema : 1);
+}
+
+// Bright bands along the flow in a clot that has been there for long.
+INLINE vf webs(vf theta, vf s, vf depth, vf along) {
+  vf bend = texture(theta, s * 90, depth * 400, 2 * TURNS_FAT, 9);
+  vf strength = texture(theta, s * 110, depth * 500, 2 * TURNS_FAT, 10);
+  return sheet(along * 1.1f + 0.8f * bend, 0.3f) * (0.7f + 0.6f * strength);
+}
+
 // Bundles of muscle, in decibels: dark fascicles between short bright connective streaks that run
 // at a small angle to the skin and far along the leg.
 INLINE vf bundles(vf theta, vf s, vf depth) {
@@ -101,23 +124,21 @@ INLINE void mark(vi mask, vf scatter, float loss, vf out[2]) {
   out[0] = pick(mask, scatter, out[0]), out[1] = pick(mask, all(loss), out[1]);
 }
 
-// Returns the lanes in which a level changed sign since the row above.
-INLINE vi paint(const tissue_job *job, uint32_t l) {
-  const float *f = job->row + l;
-  uint32_t n = job->lines;
-  vf depth = load(f + PLANE_DEPTH * n), fat = load(f + PLANE_FAT * n);
-  vf muscle = load(f + PLANE_MUSCLE * n), r = load(f + PLANE_R * n);
-  vf theta = load(f + PLANE_THETA * n), s = load(f + PLANE_S * n), level[LEVELS];
-  level[0] = depth, level[1] = depth - fat, level[2] = depth - muscle;
-  level[3] = job->bone_radius_m - r;
-  for (uint32_t v = 0; v < 2; ++v) {
-    const float *at = f + (PLANE_VEIN_SHORT + 2 * v) * n, *half = at + 4 * n;
-    level[4 + v] = wall_distance(load(at), load(at + n), load(half), load(half + n));
-  }
-  vf tissue[2] = {all(skin_tissue[0]), all(skin_tissue[1])};
+INLINE void mark_both(vi mask, vf scatter, vf loss, vf out[2]) {
+  out[0] = pick(mask, scatter, out[0]), out[1] = pick(mask, loss, out[1]);
+}
+
+// Layer by layer; levels 1 and 2 are the depths below dermis and fascia.
+INLINE void layers(const tissue_job *job, const vf *level, vf theta, vf s, vf depth, vf out[2]) {
   vi in_fat = (level[1] >= 0) & (level[2] < 0), in_muscle = (level[1] >= 0) & (level[2] >= 0);
   vf fat_scatter = all(fat_tissue[0]), muscle_scatter = all(job->plain ? 1 : muscle_tissue[0]);
+  vf fat_loss = all(fat_tissue[1]);
   if (!job->plain && any(in_fat)) fat_scatter += 2.2f * septa(theta, s, depth);
+  if (job->oedema > 0 && any(in_fat)) {
+    vf fluid = clefts(theta, s, depth, job->oedema);
+    fat_scatter = (fat_scatter * (1 + job->oedema)) * (1 - fluid) + fluid_tissue[0] * fluid;
+    fat_loss += fluid * (fluid_tissue[1] - fat_loss);
+  }
   if (!job->plain && any(in_muscle))
     muscle_scatter = muscle_scatter * power2(bundles(theta, s, depth) * 0.16609640474f);
   vi sheath = (level[1] >= 0) & (size_of(level[2]) < 0.7e-3f);
@@ -125,21 +146,98 @@ INLINE vi paint(const tissue_job *job, uint32_t l) {
     vf more = fascia(theta, s, level[2]);
     fat_scatter += more, muscle_scatter += more;
   }
-  mark(in_fat, fat_scatter, fat_tissue[1], tissue);
-  mark(in_muscle, muscle_scatter, muscle_tissue[1], tissue);
-  for (int v = 1; v >= 0; --v) {
-    mark(level[4 + v] < wall_m[v], all(wall_tissue[0]), wall_tissue[1], tissue);
-    mark(level[4 + v] <= 0, all(blood_tissue[0]), blood_tissue[1], tissue);
+  mark_both(in_fat, fat_scatter, fat_loss, out);
+  mark(in_muscle, muscle_scatter, muscle_tissue[1], out);
+}
+
+// Signed distance to the ellipsoid |q| = 1, m, to first order.
+INLINE vf lesion_distance(const tissue_lesion *lesion, const vf q[3]) {
+  vf square = all(0), steep = all(0);
+  for (int k = 0; k < 3; ++k) {
+    vf g = q[k] * lesion->per_half[k];
+    square += q[k] * q[k], steep += g * g;
   }
-  // Chord that bounds a mural clot on the deep side, in semi-axes.
-  vi clot = (level[4] <= 0) & (load(f + PLANE_CLOT * n) >= 0.5f);
-  vi part = -load(f + PLANE_VEIN_SHORT * n) > 1 - 2 * job->clot_fraction;
-  mark(job->clot_fraction >= 1 ? clot : clot & part, all(job->clot_scatter), clot_loss, tissue);
+  vf size = root(square);
+  return (size - 1) * size / larger(root(steep), all(1));
+}
+
+// Rim and hilum, fluid, or clotted and liquid parts; a thin capsule.
+INLINE void lesion(const tissue_lesion *it, const vf q[3], vf away, vf theta, vf s, vf depth,
+                   vf out[2]) {
+  vi in = away < 0;
+  if (!any(away < capsule_m)) return;
+  if (it->kind != TISSUE_HAEMATOMA)
+    mark_both((away >= 0) & (away < capsule_m), all(capsule_scatter), out[1], out);
+  if (it->kind == TISSUE_CYST) {
+    mark(in, larger(all(it->scatter), all(fluid_tissue[0])), fluid_tissue[1], out);
+    return;
+  }
+  vf grain = texture(theta, s * 400, depth * 500, 4 * TURNS_MUSCLE, 11);
+  vf scatter = it->scatter * (1 + 0.3f * grain);
+  if (it->kind == TISSUE_NODE) {
+    vf hilum = q[0] * q[0] * 7 + q[1] * q[1] * 7 + q[2] * q[2] * 2 + 0.4f * grain;
+    vf share = smooth(smaller(larger((1.2f - hilum) * 2, all(0)), all(1)));
+    mark(in, scatter + share * (hilum_scatter - scatter), node_loss, out);
+    return;
+  }
+  vf lump = texture(theta, s * 150, depth * 200, 2 * TURNS_MUSCLE, 12);
+  vf liquid = smooth(smaller(larger(0.1f - 3 * lump, all(0)), all(1)));
+  mark(in, scatter * power2(1.5f * lump) * (1 - liquid) + fluid_tissue[0] * liquid, haematoma_loss,
+       out);
+}
+
+// Walls hide lesions, lumina walls: branches begin in the lumen of their parents. Clot last.
+INLINE void vessels(const tissue_job *job, const float *f, const vf *level, vf out[2]) {
+  const uint32_t n = job->lines;
+  for (uint32_t v = job->vessels; v-- > 0;) {
+    mark(level[v] < job->vessel[v].wall_m, all(wall_tissue[0]), wall_tissue[1], out);
+    mark(level[v] <= 0, all(blood_tissue[0]), blood_tissue[1], out);
+  }
+  for (uint32_t v = 2; v < job->vessels; ++v)
+    mark(level[v] <= 0, all(blood_tissue[0]), blood_tissue[1], out);
+  for (uint32_t v = 0; v < job->vessels; ++v) {
+    const tissue_vessel *it = &job->vessel[v];
+    if (!(it->clot_fraction > 0)) continue;
+    const float *at = f + vessel_field_at(v, VESSEL_SHORT) * n;
+    vi clot = (level[v] <= 0) & (load(at + VESSEL_CLOT * n) >= 0.5f);
+    // Chord that bounds a mural clot on the deep side, in semi-axes.
+    if (it->clot_fraction < 1) clot &= -load(at) > 1 - 2 * it->clot_fraction;
+    vf scatter = all(it->clot_scatter);
+    if (v == 0 && job->webs > 0 && any(clot))
+      scatter += job->webs * webs(load(f + PLANE_THETA * n), load(f + PLANE_S * n),
+                                  load(f + PLANE_DEPTH * n), load(at));
+    mark(clot, scatter, clot_loss, out);
+  }
+}
+
+// Returns the lanes in which a level changed sign since the row above.
+INLINE vi paint(const tissue_job *job, uint32_t l) {
+  const float *f = job->row + l;
+  const uint32_t n = job->lines, levels = LAYER_LEVELS + job->vessels + job->lesions;
+  vf depth = load(f + PLANE_DEPTH * n), fat = load(f + PLANE_FAT * n);
+  vf muscle = load(f + PLANE_MUSCLE * n), r = load(f + PLANE_R * n);
+  vf theta = load(f + PLANE_THETA * n), s = load(f + PLANE_S * n), level[MOST_LEVELS];
+  level[0] = depth, level[1] = depth - fat, level[2] = depth - muscle;
+  level[3] = job->bone_radius_m - r;
+  vf *wall = level + LAYER_LEVELS, *edge = wall + job->vessels;
+  for (uint32_t v = 0; v < job->vessels; ++v) {
+    const float *at = f + vessel_field_at(v, VESSEL_SHORT) * n, *half = at + VESSEL_HALF_SHORT * n;
+    wall[v] = wall_distance(load(at), load(at + n), load(half), load(half + n));
+  }
+  vf tissue[2] = {all(skin_tissue[0]), all(skin_tissue[1])};
+  layers(job, level, theta, s, depth, tissue);
+  for (uint32_t k = 0; k < job->lesions; ++k) {
+    const float *at = f + lesion_field_at(job->vessels, k, 0) * n;
+    vf q[3] = {load(at), load(at + n), load(at + 2 * n)};
+    edge[k] = lesion_distance(&job->lesion[k], q);
+    lesion(&job->lesion[k], q, edge[k], theta, s, depth, tissue);
+  }
+  vessels(job, f, wall, tissue);
   mark(level[3] > 0, all(bone_tissue[0]), bone_tissue[1], tissue);
   mark(level[0] < 0, all(0), outside_loss, tissue);
   store(job->scatter + l, tissue[0]), store(job->loss + l, tissue[1]);
   vi changed = all_of(0);
-  for (uint32_t k = 0; k < LEVELS; ++k) {
+  for (uint32_t k = 0; k < levels; ++k) {
     changed |= (level[k] < 0) ^ (load(job->before + k * n + l) < 0);
     store(job->level + k * n + l, level[k]);
   }

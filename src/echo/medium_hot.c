@@ -4,7 +4,9 @@
 // sonde_echo_medium  all rows of the march
 // place_lines, widen, next_row    coarse plane -> one row, per line
 // roughness          of an interface along its surface
+// interface_of, salt_of, hidden  what a level stands for and where it does not count
 // cross, cross_levels  a level's zero between two rows becomes an echo
+// materials          of what is in view
 // mark_air           lines whose face does not touch the skin
 // blur_loss          an aperture looks past small obstacles
 #include "base/base.h"
@@ -21,14 +23,19 @@ static const float air_gap_m = 1.5e-3f;
 typedef struct interface {
   float db, tangent, diffuse, loss_db;
 } interface;
-static const interface interfaces[LEVELS] = {
+static const interface interfaces[LAYER_LEVELS] = {
     {18, 0.5f, 0.3f, 0},   // skin
     {10, 0.3f, 0.2f, 0},   // dermis and fat
     {21, 0.22f, 0.12f, 0}, // fascia
     {36, 0.4f, 0.02f, 55}, // cortex
-    {17, 0.5f, 0.12f, 0},  // vein wall
-    {17, 0.5f, 0.12f, 0},  // artery wall
 };
+static const interface vessel_wall = {17, 0.5f, 0.12f, 0};
+static const interface lesion_edges[SONDE_LESION_KINDS] = {
+    {9, 0.5f, 0.2f, 0},   // capsule of a node
+    {15, 0.5f, 0.12f, 0}, // cyst
+    {3, 0.5f, 0.4f, 0},   // haematoma
+};
+static const float wall_m[2] = {0.6e-3f, 0.9e-3f}, thin_wall = 0.25f; // of a branch's radius
 
 static void place_lines(sonde_echo *echo) {
   float per_line = (float)(1 / echo->lines_per_column);
@@ -44,9 +51,9 @@ static void place_lines(sonde_echo *echo) {
 // A coarse row, per line.
 static void widen(sonde_echo *echo, uint32_t coarse, float *wide) {
   SONDE_ASSERT(coarse < SONDE_PLANE_ROWS);
-  for (int field = 0; field < PLANE_FIELDS; ++field) {
+  for (uint32_t field = 0; field < echo->fields; ++field) {
     const float *in = echo->plane + field * SONDE_PLANE_NODES + coarse * SONDE_PLANE_COLUMNS;
-    float *out = wide + (uint32_t)field * echo->padded;
+    float *out = wide + field * echo->padded;
     for (uint32_t l = 0; l < echo->padded; ++l) {
       const float *at = in + echo->line_column[l];
       out[l] = at[0] + echo->line_share[l] * (at[1] - at[0]);
@@ -62,7 +69,7 @@ static void mix_rows(const float *top, const float *low, float b, float *out, ui
 static void next_row(sonde_echo *echo, uint32_t row, uint32_t *reached) {
   float y = (float)row * (SONDE_PLANE_ROWS - 1) / (SONDE_MEDIUM_ROWS - 1);
   uint32_t j = (uint32_t)y < SONDE_PLANE_ROWS - 2 ? (uint32_t)y : SONDE_PLANE_ROWS - 2;
-  uint32_t size = PLANE_FIELDS * echo->padded;
+  uint32_t size = echo->fields * echo->padded;
   for (; *reached < j + 2; ++*reached) widen(echo, *reached, echo->wide + *reached % 2 * size);
   mix_rows(echo->wide + j % 2 * size, echo->wide + (j + 1) % 2 * size, y - (float)j, echo->row,
            size);
@@ -98,9 +105,40 @@ static void record(sonde_echo *echo, uint32_t l, float depth_m, float amplitude)
   *first = (int32_t)echo->echo_count++;
 }
 
+static const interface *interface_of(const sonde_echo *echo, uint32_t level) {
+  if (level < LAYER_LEVELS) return &interfaces[level];
+  level -= LAYER_LEVELS;
+  if (level < echo->shown_count) return &vessel_wall;
+  SONDE_ASSERT(level - echo->shown_count < echo->lesion_count);
+  return &lesion_edges[echo->interior->findings.lesion[echo->lesion[level - echo->shown_count]]
+                           .kind];
+}
+
+// Of the roughness: stays with the thing, whatever else is in view.
+static uint32_t salt_of(const sonde_echo *echo, uint32_t level) {
+  if (level < LAYER_LEVELS) return level;
+  level -= LAYER_LEVELS;
+  if (level < echo->shown_count) return LAYER_LEVELS + echo->shown[level];
+  return MOST_LEVELS + echo->lesion[level - echo->shown_count];
+}
+
+// Layers end at vessels and lesions, lesions at vessels, and branches open into their parents.
+static bool hidden(const sonde_echo *echo, const float *now, uint32_t l, uint32_t level) {
+  const uint32_t n = echo->padded, walls = LAYER_LEVELS, edges = walls + echo->shown_count;
+  if (level == 0 || level == 3) return false;
+  for (uint32_t k = walls; k < edges; ++k) {
+    if (k == level || !(now[k * n + l] < 0)) continue;
+    bool femoral = k < walls + 2 && level >= walls && level < walls + 2;
+    if (!femoral) return true;
+  }
+  for (uint32_t k = edges; k < echo->levels && level < walls; ++k)
+    if (now[k * n + l] < 0) return true;
+  return false;
+}
+
 // A level that changes sign between the last row and this one reflects.
 static void cross(sonde_echo *echo, uint32_t row, uint32_t l, uint32_t which) {
-  const interface *kind = &interfaces[which];
+  const interface *kind = interface_of(echo, which);
   const float *now = echo->level[row % 2] + which * echo->padded;
   float before = echo->level[(row + 1) % 2][which * echo->padded + l];
   uint32_t left = l > 0 ? l - 1 : l, right = l + 1 < echo->lines ? l + 1 : l;
@@ -113,7 +151,7 @@ static void cross(sonde_echo *echo, uint32_t row, uint32_t l, uint32_t which) {
   float tangent = across / pitch / (fabsf(slope) > 1e-6f ? slope : 1e-6f);
   float q = tangent / kind->tangent;
   float shape = kind->diffuse + (1 - kind->diffuse) * expf(-q * q);
-  float rough = echo->plain ? 0 : 4 * roughness(echo, l, which);
+  float rough = echo->plain ? 0 : 4 * roughness(echo, l, salt_of(echo, which));
   shape *= echo->coupling[l];
   record(echo, l, depth, amplitude_of_db(kind->db + rough - echo->loss_db[l]) * shape);
   echo->loss_db[l] += kind->loss_db;
@@ -124,11 +162,10 @@ static void cross_levels(sonde_echo *echo, uint32_t row, const uint8_t *crossed)
   const float *now = echo->level[row % 2], *before = echo->level[(row + 1) % 2];
   for (uint32_t l = 0; l < echo->lines; ++l) {
     if (!crossed[l / ECHO_ALIGN] || echo->air[l]) continue;
-    bool lumen = now[4 * n + l] < 0 || now[5 * n + l] < 0;
-    for (uint32_t which = 0; which < LEVELS; ++which) {
+    for (uint32_t which = 0; which < echo->levels; ++which) {
       uint32_t k = which * n + l;
       if ((before[k] < 0) == (now[k] < 0)) continue;
-      if (!lumen || which == 0 || which > 2) cross(echo, row, l, which); // layers end at a vessel
+      if (!hidden(echo, now, l, which)) cross(echo, row, l, which);
     }
   }
 }
@@ -167,6 +204,31 @@ static void blur_loss(sonde_echo *echo) {
   memcpy(loss + 1, out + 1, (last - 1) * sizeof *loss);
 }
 
+static float clot_scatter(const sonde_pathology *p) {
+  return 0.12f + 0.9f * (float)p->echogenicity;
+}
+
+static void materials(const sonde_echo *echo, tissue_job *job) {
+  const sonde_interior *in = echo->interior;
+  job->vessels = echo->shown_count, job->lesions = echo->lesion_count;
+  job->webs = (float)in->findings.webs, job->oedema = (float)in->findings.oedema;
+  for (uint32_t k = 0; k < job->vessels; ++k) {
+    uint32_t which = echo->shown[k];
+    const sonde_pathology *p = sonde_echo_pathology(echo, which);
+    bool vein = in->kind[which] == SONDE_VESSEL_VEIN;
+    float wall = wall_m[in->kind[which]];
+    if (which >= 2) wall = fminf(wall, thin_wall * (float)in->station[which][0].radius_m);
+    job->vessel[k] = (tissue_vessel){wall, vein ? (float)p->thrombus_fraction : 0, clot_scatter(p)};
+  }
+  for (uint32_t k = 0; k < job->lesions; ++k) {
+    const sonde_lesion *l = &in->findings.lesion[echo->lesion[k]];
+    job->lesion[k] = (tissue_lesion){
+        (tissue_lesion_kind)l->kind,
+        {(float)(1 / l->half_m.x), (float)(1 / l->half_m.y), (float)(1 / l->half_m.z)},
+        (float)l->echogenicity};
+  }
+}
+
 void sonde_echo_medium(sonde_echo *echo) {
   const frame *f = &echo->frame;
   SONDE_ASSERT(f->pathology != NULL && echo->padded % ECHO_ALIGN == 0);
@@ -176,12 +238,11 @@ void sonde_echo_medium(sonde_echo *echo) {
   tissue_job job = {.row = echo->row,
                     .lines = lines,
                     .bone_radius_m = (float)echo->interior->bone_radius_m,
-                    .clot_fraction = (float)f->pathology->thrombus_fraction,
-                    .clot_scatter = 0.12f + 0.9f * (float)f->pathology->echogenicity,
                     .plain = echo->plain,
                     .scatter = echo->scatter,
                     .loss = echo->loss,
                     .crossed = crossed};
+  materials(echo, &job);
   memset(echo->loss_db, 0, lines * sizeof *echo->loss_db);
   echo->echo_count = 0;
   place_lines(echo);

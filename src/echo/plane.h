@@ -2,6 +2,8 @@
 #ifndef SONDE_SRC_ECHO_PLANE_H
 #define SONDE_SRC_ECHO_PLANE_H
 
+#include <stdint.h>
+
 typedef enum plane_field {
   PLANE_THETA, // radians, unwrapped around the picture's centre
   PLANE_S,
@@ -9,16 +11,31 @@ typedef enum plane_field {
   PLANE_FAT,
   PLANE_MUSCLE,
   PLANE_R,
-  PLANE_VEIN_SHORT, // coordinates in the vessel's deformed cross-section over its semi-axes
-  PLANE_VEIN_LONG,
-  PLANE_ARTERY_SHORT,
-  PLANE_ARTERY_LONG,
-  PLANE_VEIN_HALF_SHORT, // semi-axes, m
-  PLANE_VEIN_HALF_LONG,
-  PLANE_ARTERY_HALF_SHORT,
-  PLANE_ARTERY_HALF_LONG,
-  PLANE_CLOT, // 1 where a thrombus lies
-  PLANE_FIELDS
+  PLANE_LAYERS // vessels follow, then lesions
 } plane_field;
+
+// Per vessel in view.
+typedef enum vessel_field {
+  VESSEL_SHORT, // coordinates in the deformed cross-section over its semi-axes
+  VESSEL_LONG,
+  VESSEL_HALF_SHORT, // semi-axes, m
+  VESSEL_HALF_LONG,
+  VESSEL_CLOT, // 1 where a thrombus lies
+  VESSEL_FIELDS
+} vessel_field;
+
+enum {
+  LESION_FIELDS = 3, // coordinates at rest over the semi-axes
+  MOST_VESSELS = 10,
+  MOST_LESIONS = 8,
+  MOST_FIELDS = PLANE_LAYERS + MOST_VESSELS * VESSEL_FIELDS + MOST_LESIONS * LESION_FIELDS
+};
+
+static inline uint32_t vessel_field_at(uint32_t vessel, vessel_field field) {
+  return (uint32_t)PLANE_LAYERS + vessel * VESSEL_FIELDS + (uint32_t)field;
+}
+static inline uint32_t lesion_field_at(uint32_t vessels, uint32_t lesion, uint32_t axis) {
+  return (uint32_t)PLANE_LAYERS + vessels * VESSEL_FIELDS + lesion * LESION_FIELDS + axis;
+}
 
 #endif

@@ -6,7 +6,9 @@
 // sonde_echo_place, sonde_echo_unplace  image coordinates of a flat or curved face
 // sonde_echo_plane   all nodes, each inverted from the guess that the node above it gives
 // place_node         rest point, and where a step beside the plane leads
-// store_node, store_vessel  fields of one node
+// choose_view, in_view  branches and lesions near the plane
+// store_node, store_vessel, store_lesions  fields of one node
+// sonde_echo_pathology, sonde_echo_solid  what a vessel holds
 // turn_node          inverse derivative at a node
 #include "base/base.h"
 #include "echo/echo.h"
@@ -19,6 +21,7 @@ _Static_assert((int)SONDE_PSF_STEPS == SONDE_ECHO_PREPARE_STEPS, "steps of a bea
 
 static const double far_away = 50; // in semi-axes
 static const double step_beside = 1e-3;
+static const double view_margin_m = 8e-3; // slab, a cube and the step between two stations
 
 sonde_vec3 sonde_echo_place(const frame *f, double line, double depth_m) {
   double v = (line - f->first_line) * f->pitch_m;
@@ -104,27 +107,87 @@ void sonde_echo_frame(sonde_echo *echo, sonde_pose world_from_probe, double aper
   f->edge_lines = (double)echo->pad_lines / SONDE_FINE;
   echo->lines_per_column = (echo->lines - 1 + 2 * f->edge_lines) / (SONDE_PLANE_COLUMNS - 1);
   echo->depth_per_row = f->depth_m / (SONDE_PLANE_ROWS - 1);
-  echo->vessels = echo->interior->station_count[0] > 0 || echo->interior->station_count[1] > 0;
 }
 
-static void store_vessel(const sonde_echo *echo, int which, double s, sonde_vec3 point, float *at,
+const sonde_pathology *sonde_echo_pathology(const sonde_echo *echo, uint32_t which) {
+  return which == 0 ? echo->frame.pathology : &echo->interior->pathology[which];
+}
+
+double sonde_echo_solid(const sonde_echo *echo, uint32_t which, double z_m) {
+  const sonde_pathology *p = sonde_echo_pathology(echo, which);
+  if (echo->interior->kind[which] == SONDE_VESSEL_ARTERY) return 0;
+  return sonde_pathology_clot(p, z_m) ? p->thrombus_fraction : 0;
+}
+
+static bool in_view(const sonde_echo *echo, sonde_vec3 point, double reach_m) {
+  const frame *f = &echo->frame;
+  sonde_vec3 at = sonde_echo_unplace(f, pose_apply_inverse(f->probe, point));
+  double beside = fabs(at.x - f->first_line) * f->pitch_m - 0.5 * f->aperture_m;
+  double above = fmax(-at.z, at.z - f->depth_m), reach = reach_m + view_margin_m;
+  return fabs(at.y) < reach && beside < reach && above < reach;
+}
+
+// The femoral vessels always, so that a leg without branches takes the same way through the stages.
+static void choose_view(sonde_echo *echo) {
+  const sonde_interior *in = echo->interior;
+  echo->shown[0] = 0, echo->shown[1] = 1, echo->shown_count = 2;
+  echo->vessels = in->station_count[0] > 0 || in->station_count[1] > 0;
+  for (uint32_t which = 2; which < in->vessel_count; ++which) {
+    const sonde_vessel_state *v = in->state[which];
+    bool seen = false;
+    for (uint32_t i = 0; i < in->station_count[which] && !seen; ++i)
+      seen = in_view(echo, v[i].centre_m, 4 * v[i].rest_radius_m);
+    if (seen) echo->shown[echo->shown_count++] = which, echo->vessels = true;
+  }
+  echo->lesion_count = 0;
+  for (uint32_t k = 0; k < in->findings.lesion_count; ++k) {
+    const sonde_lesion *l = &in->findings.lesion[k];
+    sonde_vec3 now = v_add(l->centre_m, sonde_interior_field(in, l->centre_m));
+    double reach = fmax(fmax(l->half_m.x, l->half_m.y), l->half_m.z);
+    if (in_view(echo, now, 1.5 * reach)) echo->lesion[echo->lesion_count++] = k;
+  }
+  echo->fields = lesion_field_at(echo->shown_count, echo->lesion_count, 0);
+  echo->levels = LAYER_LEVELS + echo->shown_count + echo->lesion_count;
+  SONDE_ASSERT(echo->fields <= MOST_FIELDS && echo->levels <= MOST_LEVELS);
+}
+
+// Beyond its end a branch fades away from the last section: neighbours inside and beyond then meet
+// without passing its axis.
+static void store_vessel(const sonde_echo *echo, uint32_t k, double s, sonde_vec3 point, float *at,
                          uint32_t node) {
-  plane_field first = which == 0 ? PLANE_VEIN_SHORT : PLANE_ARTERY_SHORT;
-  plane_field halves = which == 0 ? PLANE_VEIN_HALF_SHORT : PLANE_ARTERY_HALF_SHORT;
+  const sonde_interior *in = echo->interior;
+  const uint32_t which = echo->shown[k], count = in->station_count[which];
   sonde_vessel_state v;
   double across = far_away, along = far_away, half_short = 1e-3, half_long = 1e-3, clot = 0;
-  if (sonde_vessel_at(echo->interior, which, s, &v)) {
+  bool there = sonde_vessel_at(in, which, s, &v);
+  if (!there && which >= 2) v = in->state[which][s < in->station[which][0].s_m ? 0 : count - 1];
+  if (there || which >= 2) {
     sonde_vec3 d = v_sub(point, v.centre_m);
     along = v_dot(d, v.flat_axis) / v.half_short_m;
     across = v_dot(d, v_cross(v.axis, v.flat_axis)) / v.half_long_m;
     half_short = v.half_short_m, half_long = v.half_long_m;
-    clot = which == 0 && sonde_pathology_clot(echo->frame.pathology, v.rest_centre_m.z);
+    clot = sonde_echo_solid(echo, which, v.rest_centre_m.z) > 0;
   }
-  at[first * SONDE_PLANE_NODES + node] = (float)along;
-  at[(first + 1) * SONDE_PLANE_NODES + node] = (float)across;
-  at[halves * SONDE_PLANE_NODES + node] = (float)half_short;
-  at[(halves + 1) * SONDE_PLANE_NODES + node] = (float)half_long;
-  if (which == 0) at[PLANE_CLOT * SONDE_PLANE_NODES + node] = (float)clot;
+  if (!there && which >= 2) {
+    double size = fmax(hypot(along, across), 1e-3);
+    along *= far_away / size, across *= far_away / size;
+  }
+  float *field = at + vessel_field_at(k, VESSEL_SHORT) * SONDE_PLANE_NODES + node;
+  field[VESSEL_SHORT * SONDE_PLANE_NODES] = (float)along;
+  field[VESSEL_LONG * SONDE_PLANE_NODES] = (float)across;
+  field[VESSEL_HALF_SHORT * SONDE_PLANE_NODES] = (float)half_short;
+  field[VESSEL_HALF_LONG * SONDE_PLANE_NODES] = (float)half_long;
+  field[VESSEL_CLOT * SONDE_PLANE_NODES] = (float)clot;
+}
+
+static void store_lesions(const sonde_echo *echo, sonde_vec3 rest, float *at, uint32_t node) {
+  for (uint32_t k = 0; k < echo->lesion_count; ++k) {
+    sonde_vec3 q = sonde_lesion_point(echo->interior, echo->lesion[k], rest);
+    float *field = at + lesion_field_at(echo->shown_count, k, 0) * SONDE_PLANE_NODES + node;
+    field[0] = (float)q.x;
+    field[SONDE_PLANE_NODES] = (float)q.y;
+    field[2 * SONDE_PLANE_NODES] = (float)q.z;
+  }
 }
 
 static void store_node(sonde_echo *echo, uint32_t node, sonde_vec3 point, double theta_centre) {
@@ -140,7 +203,8 @@ static void store_node(sonde_echo *echo, uint32_t node, sonde_vec3 point, double
   p[PLANE_FAT * count + node] = (float)at.fat_m;
   p[PLANE_MUSCLE * count + node] = (float)at.muscle_m;
   p[PLANE_R * count + node] = (float)at.r;
-  for (int which = 0; which < 2; ++which) store_vessel(echo, which, at.s, point, p, node);
+  for (uint32_t k = 0; k < echo->shown_count; ++k) store_vessel(echo, k, at.s, point, p, node);
+  store_lesions(echo, echo->node[node].rest, p, node);
 }
 
 // Lines and depth of node (i, j).
@@ -202,6 +266,7 @@ void sonde_echo_plane(sonde_echo *echo) {
   sonde_column_point centre;
   (void)sonde_interior_locate(echo->interior, f->probe.position, &centre);
   echo->theta_centre = centre.theta;
+  choose_view(echo);
   for (uint32_t j = 0; j < SONDE_PLANE_ROWS; ++j)
     for (uint32_t i = 0; i < SONDE_PLANE_COLUMNS; ++i)
       place_node(echo, i, j, sonde_echo_place(f, line_of(echo, i), depth_of(echo, j)));

@@ -92,14 +92,16 @@ static map cube_map(const sonde_echo *echo, sonde_vec3 centre, sonde_vec3 guess)
 // ---- vessels --------------------------------------------------------------------------------
 
 static const double close_m = 10e-3; // rest distance within which a cube goes in pieces
+static const double close_radii = 3; // of a branch
 static const double reach_radii = 4; // of the vessel, over which a wall moves the tissue
 
 // A cube at rest and the vessels beside it.
 typedef struct cube {
   sonde_vec3 centre; // at rest
   uint64_t bits;     // that choose its scatterers
-  bool near[2], close;
-  sonde_vessel_state vessel[2];
+  bool close;
+  uint32_t near_count, which[MOST_VESSELS];
+  sonde_vessel_state near[MOST_VESSELS];
 } cube;
 
 sonde_vec3 sonde_echo_to_world(const sonde_echo *echo, sonde_vec3 at) {
@@ -121,20 +123,22 @@ sonde_vec3 sonde_echo_from_world(const sonde_echo *echo, sonde_vec3 p) {
 static void find_vessels(const sonde_echo *echo, cube *c) {
   const sonde_interior *interior = echo->interior;
   double s = v_dot(v_sub(c->centre, interior->origin), interior->axis);
-  for (int which = 0; which < 2; ++which) {
-    sonde_vessel_state *v = &c->vessel[which];
+  for (uint32_t k = 0; k < echo->shown_count; ++k) {
+    uint32_t which = echo->shown[k];
+    sonde_vessel_state *v = &c->near[c->near_count];
+    if (which >= 2 && !sonde_vessel_reaches(interior, which, s, c->centre, echo->cell_m)) continue;
     if (!sonde_vessel_at(interior, which, s, v)) continue;
     double distance = v_distance(c->centre, v->rest_centre_m);
-    c->near[which] = distance < reach_radii * v->rest_radius_m + echo->cell_m;
-    c->close = c->close || distance < close_m;
+    double close = which < 2 ? close_m : fmin(close_m, close_radii * v->rest_radius_m);
+    c->close = c->close || distance < close;
+    if (distance < reach_radii * v->rest_radius_m + echo->cell_m) c->which[c->near_count++] = which;
   }
 }
 
 // Image coordinates of a rest point whose place without vessels is known.
 static sonde_vec3 carry(const sonde_echo *echo, const cube *c, sonde_vec3 rest, sonde_vec3 bare) {
   sonde_vec3 field = v_sub(sonde_echo_to_world(echo, bare), rest);
-  sonde_vec3 u = sonde_vessels_move(c->near[0] ? &c->vessel[0] : NULL,
-                                    c->near[1] ? &c->vessel[1] : NULL, rest, field);
+  sonde_vec3 u = sonde_vessels_move(c->near, c->near_count, rest, field);
   return sonde_echo_from_world(echo, v_add(rest, u));
 }
 
@@ -152,7 +156,7 @@ static map carried(const sonde_echo *echo, const cube *c, const map *m, int part
     rest = v_madd(rest, offset_of(part, k), edge[k]);
     out.axis[k] = v_scale(m->axis[k], size);
   }
-  if (!c->near[0] && !c->near[1]) return out;
+  if (c->near_count == 0) return out;
   sonde_vec3 bare = out.origin;
   out.origin = carry(echo, c, rest, bare);
   for (int k = 0; k < 3; ++k) {
@@ -170,20 +174,17 @@ typedef struct lumen {
 } lumen;
 
 // False when the piece lies beside the lumen or in solid clot, which belongs to the tissue.
-static bool find_lumen(const sonde_echo *echo, const cube *c, int which, int part, lumen *out) {
-  const sonde_vessel_state *v = &c->vessel[which];
-  const sonde_pathology *p = echo->frame.pathology;
-  if (!c->near[which]) return false;
+static bool find_lumen(const sonde_echo *echo, const cube *c, uint32_t k, int part, lumen *out) {
+  const sonde_vessel_state *v = &c->near[k];
   double scale = 1 / v->rest_radius_m, piece = 0.5 * echo->cell_m * scale;
   sonde_vec3 middle = c->centre, side = v_cross(v->axis, v->flat_axis);
   middle = v_add(middle, v_scale(vec3(offset_of(part, 0), offset_of(part, 1), offset_of(part, 2)),
                                  echo->cell_m));
   sonde_vec3 d = v_scale(v_sub(middle, v->rest_centre_m), scale);
-  bool clot = which == 0 && sonde_pathology_clot(p, v->rest_centre_m.z);
   *out = (lumen){{v_dot(d, v->flat_axis), piece * v->flat_axis.x, piece * v->flat_axis.y,
                   piece * v->flat_axis.z},
                  {v_dot(d, side), piece * side.x, piece * side.y, piece * side.z},
-                 clot ? p->thrombus_fraction : 0};
+                 sonde_echo_solid(echo, c->which[k], v->rest_centre_m.z)};
   return hypot(out->along[0], out->across[0]) < 1 + piece && out->solid < 1;
 }
 
@@ -258,10 +259,10 @@ static void place_pieces(sonde_echo *echo, const cube *c, const map *m) {
   for (int part = 0; part < 8; ++part) {
     map piece = carried(echo, c, m, part);
     uint32_t share = (uint32_t)(c->bits >> 32) + (uint32_t)part, from = share % shares * each;
-    lumen in[2];
+    lumen in[MOST_VESSELS];
     int lumens = 0;
-    for (int which = 0; which < 2; ++which)
-      if (find_lumen(echo, c, which, part, &in[lumens])) ++lumens;
+    for (uint32_t k = 0; k < c->near_count; ++k)
+      if (find_lumen(echo, c, k, part, &in[lumens])) ++lumens;
     if (lumens > 0)
       lay_outside(echo, &piece, in, lumens, from);
     else

@@ -5,7 +5,7 @@
 // sonde_interior_rest_point    inverse: exact in a lumen, iterated elsewhere
 // sonde_vessels_move           the same from a known field and the vessels' states
 // pull                         where one vessel wants a point, and how firmly
-// combine                      two vessels: each is exact on its own wall
+// combine, combine_two         several vessels: each is exact on its own wall
 #include "base/base.h"
 #include "interior/interior.h"
 
@@ -21,7 +21,6 @@ typedef struct pulled {
 // along the vessel stays the field's.
 static pulled pull(const sonde_vessel_state *v, sonde_vec3 rest, sonde_vec3 field) {
   pulled none = {0, field};
-  if (!v) return none;
   sonde_vec3 d = v_sub(rest, v->rest_centre_m), across = v_cross(v->axis, v->flat_axis);
   double a = v_dot(d, v->flat_axis), b = v_dot(d, across), a1 = a, b1 = b;
   double t = (hypot(a, b) / v->rest_radius_m - 1) / reach;
@@ -35,7 +34,7 @@ static pulled pull(const sonde_vessel_state *v, sonde_vec3 rest, sonde_vec3 fiel
   return (pulled){engaged * (1 - t) * (1 - t) * (1 + 2 * t), move};
 }
 
-static sonde_vec3 combine(sonde_vec3 field, pulled a, pulled b) {
+static sonde_vec3 combine_two(sonde_vec3 field, pulled a, pulled b) {
   double both = 1 - a.weight * b.weight;
   if (!(both > 1e-9)) return a.move;
   double wa = a.weight * (1 - b.weight) / both, wb = b.weight * (1 - a.weight) / both;
@@ -43,16 +42,44 @@ static sonde_vec3 combine(sonde_vec3 field, pulled a, pulled b) {
   return v_madd(u, wb, v_sub(b.move, field));
 }
 
-sonde_vec3 sonde_vessels_move(const sonde_vessel_state *vein, const sonde_vessel_state *artery,
-                              sonde_vec3 rest, sonde_vec3 field) {
-  return combine(field, pull(vein, rest, field), pull(artery, rest, field));
+// Weights w_k prod (1 - w_j), j not k, over their sum with prod (1 - w_j): for two vessels the same
+// as above.
+static sonde_vec3 combine(sonde_vec3 field, const pulled *p, uint32_t count) {
+  double sum = 1, share[SONDE_VESSELS];
+  for (uint32_t k = 0; k < count; ++k) sum *= 1 - p[k].weight;
+  for (uint32_t k = 0; k < count; ++k) {
+    share[k] = p[k].weight;
+    for (uint32_t j = 0; j < count; ++j)
+      if (j != k) share[k] *= 1 - p[j].weight;
+    sum += share[k];
+  }
+  sonde_vec3 u = field;
+  if (!(sum > 1e-9)) return p[0].move;
+  for (uint32_t k = 0; k < count; ++k) u = v_madd(u, share[k] / sum, v_sub(p[k].move, field));
+  return u;
+}
+
+sonde_vec3 sonde_vessels_move(const sonde_vessel_state *near, uint32_t count, sonde_vec3 rest,
+                              sonde_vec3 field) {
+  SONDE_ASSERT(count <= SONDE_VESSELS);
+  pulled p[SONDE_VESSELS + 2];
+  uint32_t kept = 0;
+  for (uint32_t k = 0; k < count; ++k) {
+    p[kept] = pull(&near[k], rest, field);
+    if (p[kept].weight > 0) ++kept;
+  }
+  if (kept > 2) return combine(field, p, kept);
+  for (uint32_t k = kept; k < 2; ++k) p[k] = (pulled){0, field};
+  return combine_two(field, p[0], p[1]);
 }
 
 static sonde_vec3 displace(const sonde_interior *in, sonde_vec3 rest, double s) {
-  sonde_vessel_state vein, artery;
-  bool has_vein = sonde_vessel_at(in, 0, s, &vein), has_artery = sonde_vessel_at(in, 1, s, &artery);
-  return sonde_vessels_move(has_vein ? &vein : NULL, has_artery ? &artery : NULL, rest,
-                            sonde_interior_field(in, rest));
+  sonde_vessel_state near[SONDE_VESSELS];
+  uint32_t count = 0;
+  for (uint32_t which = 0; which < in->vessel_count; ++which)
+    if (which < 2 || sonde_vessel_reaches(in, which, s, rest, 0))
+      count += sonde_vessel_at(in, which, s, &near[count]);
+  return sonde_vessels_move(near, count, rest, sonde_interior_field(in, rest));
 }
 
 sonde_vec3 sonde_interior_displacement(const sonde_interior *in, sonde_vec3 rest) {
@@ -70,7 +97,7 @@ void sonde_interior_displacements(const sonde_interior *in, uint32_t count, cons
 }
 
 // The rest point when `point` lies in the lumen of the vessel, whose map is known both ways.
-static bool within_lumen(const sonde_interior *in, int which, sonde_vec3 point, double s,
+static bool within_lumen(const sonde_interior *in, uint32_t which, sonde_vec3 point, double s,
                          sonde_vec3 *rest) {
   sonde_vessel_state v;
   if (!sonde_vessel_at(in, which, s, &v) || fabs(1 - v.area_ratio) < engaged_loss) return false;
@@ -108,7 +135,7 @@ sonde_vec3 sonde_interior_rest_point(const sonde_interior *in, sonde_vec3 point)
   sonde_column_point at;
   sonde_vec3 bare = sonde_interior_invert(in, point, point, 40, NULL), rest;
   (void)sonde_interior_locate(in, bare, &at);
-  for (int which = 0; which < 2; ++which)
+  for (uint32_t which = 0; which < in->vessel_count; ++which)
     if (within_lumen(in, which, point, at.s, &rest)) return rest;
   rest = invert(in, point, bare);
   bool within = sonde_interior_locate(in, rest, &at);

@@ -210,25 +210,35 @@ sonde_vec3 sonde_interior_invert(const sonde_interior *in, sonde_vec3 point, son
   return best;
 }
 
-// Vessel label of a rest point, LABEL_COUNT when it lies in none.
+// A mural clot fills the deep side of the lumen up to the chord that bounds its share.
+static sonde_label lumen_label(const sonde_interior *in, uint32_t which, sonde_vec3 rest,
+                               double deep) {
+  if (in->kind[which] == SONDE_VESSEL_ARTERY) return SONDE_LABEL_ARTERY;
+  const sonde_pathology *p = &in->pathology[which];
+  bool clot = sonde_pathology_clot(p, rest.z) && deep > 1 - 2 * p->thrombus_fraction;
+  return clot ? SONDE_LABEL_THROMBUS : SONDE_LABEL_VEIN;
+}
+
+// Vessel label of a rest point, LABEL_COUNT when it lies in none. A branch begins in the lumen of
+// its parent: lumina hide walls.
 static sonde_label vessel_label(const sonde_interior *in, sonde_vec3 rest, double s) {
-  static const double wall_m[2] = {0.7e-3, 0.9e-3};
-  for (int which = 0; which < 2; ++which) {
+  static const double wall_m[2] = {0.7e-3, 0.9e-3}, wall_share = 0.25;
+  sonde_label wall = SONDE_LABEL_COUNT;
+  for (uint32_t which = 0; which < in->vessel_count; ++which) {
     sonde_vessel_state v;
+    if (which >= 2 && !sonde_vessel_reaches(in, which, s, rest, 0)) continue;
     if (!sonde_vessel_at(in, which, s, &v)) continue;
     sonde_vec3 d = v_sub(rest, v.rest_centre_m);
     d = v_madd(d, -v_dot(d, v.axis), v.axis);
-    double r = v_norm(d);
-    if (r > v.rest_radius_m + wall_m[which]) continue;
-    if (r > v.rest_radius_m) return which ? SONDE_LABEL_ARTERY_WALL : SONDE_LABEL_VEIN_WALL;
-    if (which == 1) return SONDE_LABEL_ARTERY;
-    double z = rest.z, part = in->pathology.thrombus_fraction;
-    bool clot = sonde_pathology_clot(&in->pathology, z);
-    // A mural clot fills the deep side of the lumen up to the chord that bounds its share.
-    return clot && -v_dot(d, v.flat_axis) > v.rest_radius_m * (1 - 2 * part) ? SONDE_LABEL_THROMBUS
-                                                                             : SONDE_LABEL_VEIN;
+    double r = v_norm(d), thick = wall_m[in->kind[which]];
+    if (which >= 2) thick = fmin(thick, wall_share * v.rest_radius_m);
+    if (r > v.rest_radius_m + thick) continue;
+    if (r <= v.rest_radius_m)
+      return lumen_label(in, which, rest, -v_dot(d, v.flat_axis) / v.rest_radius_m);
+    if (wall != SONDE_LABEL_COUNT) continue;
+    wall = in->kind[which] == SONDE_VESSEL_ARTERY ? SONDE_LABEL_ARTERY_WALL : SONDE_LABEL_VEIN_WALL;
   }
-  return SONDE_LABEL_COUNT;
+  return wall;
 }
 
 sonde_label sonde_interior_label(const sonde_interior *in, sonde_vec3 rest, double *depth_m) {
@@ -240,6 +250,8 @@ sonde_label sonde_interior_label(const sonde_interior *in, sonde_vec3 rest, doub
   if (at.r <= in->bone_radius_m) return SONDE_LABEL_BONE;
   sonde_label vessel = vessel_label(in, rest, at.s);
   if (vessel != SONDE_LABEL_COUNT) return vessel;
+  sonde_label lesion = sonde_lesion_label(in, rest);
+  if (lesion != SONDE_LABEL_COUNT) return lesion;
   if (at.depth_m < at.fat_m) return SONDE_LABEL_SKIN;
   return at.depth_m < at.muscle_m ? SONDE_LABEL_FAT : SONDE_LABEL_MUSCLE;
 }

@@ -23,7 +23,8 @@ sonde_status sonde_interior_create(const sonde_model *model, sonde_interior **in
   sonde_interior *made = SONDE_NEW(sonde_interior, 1);
   if (made == NULL) return sonde_fail_memory(error);
   made->model = model;
-  status = sonde_pathology_preset("healthy", &made->pathology, error);
+  status = sonde_pathology_preset("healthy", &made->pathology[0], error);
+  for (uint32_t k = 1; k < SONDE_VESSELS; ++k) made->pathology[k] = made->pathology[0];
   if (status == SONDE_OK) status = sonde_columns_create(made, error);
   if (status == SONDE_OK) status = sonde_stations_create(made, error);
   if (status == SONDE_OK) status = sonde_window_create(&made->live, error);

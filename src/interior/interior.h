@@ -7,8 +7,9 @@
 
 #include "base/maths.h"
 #include "sonde/interior.h"
+#include "sonde/interior_findings.h"
 
-enum { SONDE_STATIONS = 160 };
+enum { SONDE_STATIONS = 160, SONDE_VESSELS = 2 + SONDE_BRANCHES };
 
 // Constant facts of one column of the table.
 typedef struct sonde_column {
@@ -40,13 +41,23 @@ typedef struct sonde_column_point {
   double cosine; // between column and skin normal: depth over distance along the column
 } sonde_column_point;
 
+// Shear moduli of the layers around the vessels (docs/interior.md).
+static const double sonde_fat_pa = 1.5e3, sonde_muscle_pa = 3.6e3;
+
 struct sonde_window;
+
+// Axes of a lesion at rest over its semi-axes: dot products with the way from its centre are
+// coordinates in which it is the unit ball.
+typedef struct lesion_frame {
+  sonde_vec3 x, y, z;
+} lesion_frame;
 
 // A vessel's constant station.
 typedef struct sonde_station {
   sonde_vec3 rest_m, axis;
   double s_m; // along the femur's axis, ascending
   double radius_m, depth_m;
+  double hold;     // shear modulus around it over that of muscle
   double tissue_m; // from the skin to the bone
 } sonde_station;
 
@@ -66,10 +77,14 @@ struct sonde_interior {
   bool building;                    // next has a place and is not ready
   bool solid;                       // the last update was solved by the solid
   sonde_interior_method method;
-  uint32_t station_count[2];
-  sonde_station station[2][SONDE_STATIONS];
-  sonde_vessel_state state[2][SONDE_STATIONS];
-  sonde_pathology pathology;
+  uint32_t vessel_count; // femoral vein, femoral artery, branches
+  sonde_vessel_kind kind[SONDE_VESSELS];
+  uint32_t station_count[SONDE_VESSELS]; // 0: a leg without this vessel
+  sonde_station station[SONDE_VESSELS][SONDE_STATIONS];
+  sonde_vessel_state state[SONDE_VESSELS][SONDE_STATIONS];
+  sonde_pathology pathology[SONDE_VESSELS]; // of the last update
+  sonde_findings findings;
+  lesion_frame lesion[SONDE_LESIONS];
   bool ready; // an update has happened
   uint64_t tick;
 };
@@ -89,18 +104,27 @@ bool sonde_interior_locate(const sonde_interior *interior, sonde_vec3 rest_m,
                            sonde_column_point *at);
 
 // State of a vessel interpolated at axial position s. @thread any
-bool sonde_vessel_at(const sonde_interior *interior, int which, double s_m,
+bool sonde_vessel_at(const sonde_interior *interior, uint32_t which, double s_m,
                      sonde_vessel_state *state);
 // Where the wall carries a point given relative to the centre of the undisturbed cross-section
 // (rest + field): area-preserving, fading out with distance. @thread any
 void sonde_vessel_carry(const sonde_vessel_state *state, double *short_m, double *long_m);
 
-// Displacement of a rest point whose field is known; vessels near it or NULL. What
+// Displacement of a rest point whose field is known, with the vessels near it. What
 // sonde_interior_displacement gives inside the tissue. @thread any
-sonde_vec3 sonde_vessels_move(const sonde_vessel_state *vein, const sonde_vessel_state *artery,
-                              sonde_vec3 rest_m, sonde_vec3 field_m);
+sonde_vec3 sonde_vessels_move(const sonde_vessel_state *near, uint32_t count, sonde_vec3 rest_m,
+                              sonde_vec3 field_m);
+// Whether the wall of a branch can move a point; cheaper than its state. @thread any
+bool sonde_vessel_reaches(const sonde_interior *interior, uint32_t which, double s_m,
+                          sonde_vec3 rest_m, double beyond_m);
+
+// Coordinates of a rest point in a lesion: unit ball. @thread any
+sonde_vec3 sonde_lesion_point(const sonde_interior *interior, uint32_t lesion, sonde_vec3 rest_m);
+// Label of the lesion at a rest point, LABEL_COUNT when there is none. @thread any
+sonde_label sonde_lesion_label(const sonde_interior *interior, sonde_vec3 rest_m);
 
 // Stages of an update.
+void sonde_findings_apply(sonde_interior *interior, const sonde_pathology *pathology);
 void sonde_interior_solve(sonde_interior *interior, const sonde_vec3 *positions_m);
 void sonde_interior_vessels(sonde_interior *interior, const sonde_interior_input *input);
 // Keeps a factored window under the probe and solves it; false when the columns have to do.
@@ -113,9 +137,11 @@ sonde_status sonde_stations_create(sonde_interior *interior, sonde_error *error)
 // Layer depths of the table again as the model gives them; windows have to be made again.
 void sonde_columns_refresh(sonde_interior *interior);
 
-// Ellipse of the vein (0) or artery (1) with that area ratio: half axes over the rest radius.
-void sonde_vessel_shape(int which, const sonde_pathology *pathology, bool clot, double ratio,
-                        double *half_short, double *half_long);
+// Area ratio of a vein in tissue `hold` times as stiff as muscle where it closes.
+double sonde_vein_area_in(const sonde_pathology *pathology, double outside_pa, double hold);
+// Ellipse of a vein or artery with that area ratio: half axes over the rest radius.
+void sonde_vessel_shape(sonde_vessel_kind kind, const sonde_pathology *pathology, bool clot,
+                        double ratio, double *half_short, double *half_long);
 // Radius of the vein at rest relative to the healthy one at 10 mmHg.
 double sonde_vein_rest_scale(const sonde_pathology *pathology, bool clot);
 // Radius of the artery at its pressure relative to that at 95 mmHg.

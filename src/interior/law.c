@@ -2,7 +2,8 @@
 // docs/interior.md; calibrated on shared/data/vein_compression.
 //
 // sonde_rectangle_stress   stress below a loaded rectangle (superposed corners)
-// sonde_vein_area_ratio    tube law of the open part, compression law of the solid part
+// sonde_vein_area_ratio, sonde_vein_area_in  tube law of the open part, compression law of the
+//                          solid part
 // sonde_artery_area_ratio  exponential law
 // sonde_vessel_shape       semi-axes of the ellipse
 // ring_pressure            of the wall alone
@@ -15,7 +16,7 @@
 static const double contact_area = 0.06; // of the stress-free area: walls begin to touch
 static const double study_wall_pa = 30e3, least_wall_pa = 10e3, most_wall_pa = 300e3;
 static const double ring_inner_share = 0.797; // (4.16/4.66)^2
-static const double artery_wall_pa = 150e3, artery_inner_share = 0.633, muscle_pa = 3.6e3;
+static const double artery_wall_pa = 150e3, artery_inner_share = 0.633;
 static const double artery_reference_pa = 12665.6; // 95 mmHg
 static const double reference_pa = 1333.22387415; // 10 mmHg: the pressure the model's radii hold at
 
@@ -61,10 +62,13 @@ double sonde_vein_tube_pressure(double a, double wall_pa) {
   return cubic + (wall - study_wall_pa) * ring_pressure(a, ring_inner_share);
 }
 
-// Area over the stress-free one: the pressure rises with the area; bracketed Newton.
-static double open_area(double transmural_pa, double wall_pa) {
-  SONDE_ASSERT(isfinite(transmural_pa));
+// Area over the stress-free one: the pressure rises with the area; bracketed Newton. What resists
+// closing is the tissue around, which has to follow inwards: the negative pressures scale with its
+// modulus.
+static double open_area(double transmural_pa, double wall_pa, double hold) {
+  SONDE_ASSERT(isfinite(transmural_pa) && hold > 0);
   const double d = 1e-5;
+  if (transmural_pa < 0) transmural_pa /= hold;
   double touch = sonde_vein_tube_pressure(contact_area, wall_pa);
   double touch_slope = (sonde_vein_tube_pressure(contact_area + d, wall_pa) - touch) / d;
   if (transmural_pa < touch)
@@ -91,12 +95,16 @@ static double solid_ratio(double modulus_pa, double outside_pa) {
 }
 
 double sonde_vein_area_ratio(const sonde_pathology *pathology, double outside_pa) {
+  return sonde_vein_area_in(pathology, outside_pa, 1);
+}
+
+double sonde_vein_area_in(const sonde_pathology *pathology, double outside_pa, double hold) {
   SONDE_ASSERT(pathology != NULL && isfinite(outside_pa));
   double solid = clamp(pathology->thrombus_fraction, 0, 1), ratio = 0;
   if (solid < 1) {
     double wall = pathology->wall_shear_pa;
-    double rest = open_area(pathology->venous_pressure_pa, wall);
-    ratio += (1 - solid) * open_area(pathology->venous_pressure_pa - outside_pa, wall) / rest;
+    double rest = open_area(pathology->venous_pressure_pa, wall, hold);
+    ratio += (1 - solid) * open_area(pathology->venous_pressure_pa - outside_pa, wall, hold) / rest;
   }
   if (solid > 0) ratio += solid * solid_ratio(pathology->thrombus_modulus_pa, outside_pa);
   return ratio;
@@ -114,7 +122,7 @@ double sonde_vein_rest_scale(const sonde_pathology *pathology, bool clot) {
   if (clot && pathology->thrombus_fraction >= 1) return scale;
   double wall = pathology->wall_shear_pa;
   return scale *
-         sqrt(open_area(pathology->venous_pressure_pa, wall) / open_area(reference_pa, wall));
+         sqrt(open_area(pathology->venous_pressure_pa, wall, 1) / open_area(reference_pa, wall, 1));
 }
 
 // Wall 150 kPa, 0.8 mm on 3.11 mm, in neo-Hookean muscle: bisection on the area.
@@ -123,7 +131,7 @@ static double artery_open_area(double pressure_pa) {
   for (int i = 0; i < 40; ++i) {
     double a = 0.5 * (low + high);
     double p = artery_wall_pa * ring_pressure(a, artery_inner_share) +
-               muscle_pa * 0.5 * (log(a) + 1 - 1 / a);
+               sonde_muscle_pa * 0.5 * (log(a) + 1 - 1 / a);
     if (p < pressure_pa)
       low = a;
     else
@@ -137,11 +145,11 @@ double sonde_artery_rest_scale(const sonde_pathology *pathology) {
   return sqrt(artery_open_area(p) / artery_open_area(artery_reference_pa));
 }
 
-void sonde_vessel_shape(int which, const sonde_pathology *pathology, bool clot, double ratio,
-                        double *half_short, double *half_long) {
+void sonde_vessel_shape(sonde_vessel_kind kind, const sonde_pathology *pathology, bool clot,
+                        double ratio, double *half_short, double *half_long) {
   SONDE_ASSERT(ratio > 0 && half_short != NULL && half_long != NULL);
   double lost = clamp(1 - ratio, -1, 1), widening = (0.294 + 0.153 * lost) * lost;
-  if (which == 1) {
+  if (kind == SONDE_VESSEL_ARTERY) {
     widening = 0.33 * lost;
   } else if (clot) {
     double solid = clamp(pathology->thrombus_fraction, 0, 1);

@@ -1,15 +1,17 @@
 // Stations of the vessels: the model's centre lines cut into equal pieces.
 //
-// sonde_stations_create  both vessels
-// sonde_interior_set_vein_depth  moves both
+// sonde_stations_create  femoral vessels and branches
+// sonde_interior_set_vein_depth  moves the femoral ones
 // resample               points at equal arc length, ascending along the femur's axis
 // place_station          facts of one station
-// raise_fascia           keeps the vessels below the fat
+// raise_fascia           keeps the femoral vessels below the fat
+// lay_branches           further vessels of the model's anatomy
 #include "base/base.h"
 #include "interior/interior.h"
 
 static const double spacing_m = 5e-3;
 static const double artery_aside_m = 11e-3; // between the middles, when they are placed
+static const double least_advance_m = 1e-3;
 static const double clearance_m = 1.5e-3, bump_radius_m = 20e-3;
 
 static double line_length(const sonde_vessel *line) {
@@ -42,10 +44,20 @@ static void place_station(const sonde_interior *in, sonde_station *station) {
   station->s_m = at.s;
   station->tissue_m = at.radius_m - in->bone_radius_m;
   if (!(station->depth_m > 0)) station->depth_m = at.depth_m;
+  station->hold = 1;
 }
 
-static sonde_status resample(sonde_interior *in, int which, const sonde_vessel *line,
+static void find_axes(const sonde_interior *in, sonde_station *station, uint32_t count) {
+  for (uint32_t i = 0; i < count; ++i) {
+    uint32_t a = i > 0 ? i - 1 : 0, b = i + 1 < count ? i + 1 : i;
+    station[i].axis = v_unit(v_sub(station[b].rest_m, station[a].rest_m), in->axis);
+  }
+}
+
+// A branch may leave its parent across the leg: stations that do not advance along it are left out.
+static sonde_status resample(sonde_interior *in, uint32_t which, const sonde_vessel *line,
                              sonde_error *error) {
+  in->station_count[which] = 0;
   if (line->count < 2) return SONDE_OK; // a leg without this vessel
   SONDE_ASSERT(line->count <= SONDE_VESSEL_POINTS);
   double length = line_length(line);
@@ -54,29 +66,28 @@ static sonde_status resample(sonde_interior *in, int which, const sonde_vessel *
   sonde_vec3 along = v_sub(line->point[line->count - 1].centre_m, line->point[0].centre_m);
   bool backward = v_dot(along, in->axis) < 0;
   sonde_station *station = in->station[which];
+  uint32_t kept = 0;
   for (uint32_t i = 0; i < count; ++i) {
     double arc = length * (backward ? count - 1 - i : i) / (count - 1);
     sonde_vessel_point p = point_at(line, arc);
     if (!(p.radius_m > 0) || !v_finite(p.centre_m))
-      return sonde_fail(error, SONDE_ARGUMENT, "vessel %d has a point without radius", which);
-    station[i].rest_m = p.centre_m;
-    station[i].radius_m = p.radius_m;
-    station[i].depth_m = p.depth_m;
-    place_station(in, &station[i]);
-    if (i > 0 && !(station[i].s_m > station[i - 1].s_m))
-      return sonde_fail(error, SONDE_ARGUMENT, "vessel %d turns back along the leg", which);
+      return sonde_fail(error, SONDE_ARGUMENT, "vessel %u has a point without radius", which);
+    station[kept] = (sonde_station){.rest_m = p.centre_m, .radius_m = p.radius_m};
+    station[kept].depth_m = p.depth_m;
+    place_station(in, &station[kept]);
+    double advance = kept > 0 ? station[kept].s_m - station[kept - 1].s_m : INFINITY;
+    if (which < 2 && !(advance > 0))
+      return sonde_fail(error, SONDE_ARGUMENT, "vessel %u turns back along the leg", which);
+    if (which < 2 || advance > least_advance_m) ++kept;
   }
-  for (uint32_t i = 0; i < count; ++i) {
-    uint32_t a = i > 0 ? i - 1 : 0, b = i + 1 < count ? i + 1 : i;
-    station[i].axis = v_unit(v_sub(station[b].rest_m, station[a].rest_m), in->axis);
-  }
-  in->station_count[which] = count;
+  find_axes(in, station, kept);
+  in->station_count[which] = kept < 2 ? 0 : kept;
   return SONDE_OK;
 }
 
 // The fascia passes above the vessels, as it does in a thigh: the fat is thinner there. `clearance`
 // leaves room for a dilated vein and its wall.
-static void raise_fascia(sonde_interior *in, int which) {
+static void raise_fascia(sonde_interior *in, uint32_t which) {
   for (uint32_t j = 0; j < in->s_count; ++j)
     for (uint32_t i = 0; i < in->theta_count; ++i) {
       sonde_vessel_state v;
@@ -92,7 +103,7 @@ static void raise_fascia(sonde_interior *in, int which) {
     }
 }
 
-static void rest_state(sonde_interior *in, int which) {
+static void rest_state(sonde_interior *in, uint32_t which) {
   for (uint32_t i = 0; i < in->station_count[which]; ++i) {
     const sonde_station *station = &in->station[which][i];
     double r = station->radius_m;
@@ -116,13 +127,39 @@ static sonde_status lay_out(sonde_interior *in, const sonde_vessel *vein,
   sonde_status status = resample(in, 0, vein, error);
   if (status == SONDE_OK) status = resample(in, 1, artery, error);
   if (status != SONDE_OK) return status;
-  for (int which = 0; which < 2; ++which) rest_state(in, which);
-  for (int which = 0; which < 2; ++which) raise_fascia(in, which);
+  in->kind[0] = SONDE_VESSEL_VEIN, in->kind[1] = SONDE_VESSEL_ARTERY;
+  in->vessel_count = 2;
+  for (uint32_t which = 0; which < 2; ++which) rest_state(in, which);
+  for (uint32_t which = 0; which < 2; ++which) raise_fascia(in, which);
   return SONDE_OK;
 }
 
+// A vein in the fat gives way sooner than one in muscle.
+static void find_hold(const sonde_interior *in, sonde_station *station, uint32_t count) {
+  for (uint32_t i = 0; i < count; ++i) {
+    sonde_column_point at;
+    (void)sonde_interior_locate(in, station[i].rest_m, &at);
+    if (at.depth_m < at.muscle_m) station[i].hold = sonde_fat_pa / sonde_muscle_pa;
+  }
+}
+
+static sonde_status lay_branches(sonde_interior *in, sonde_error *error) {
+  const sonde_thigh_anatomy *anatomy = in->model->anatomy;
+  sonde_status status = SONDE_OK;
+  for (uint32_t b = 0; anatomy != NULL && b < anatomy->branch_count && !status; ++b) {
+    uint32_t which = in->vessel_count++;
+    SONDE_ASSERT(which < SONDE_VESSELS);
+    in->kind[which] = anatomy->branch[b].kind;
+    status = resample(in, which, &anatomy->branch[b].line, error);
+    find_hold(in, in->station[which], in->station_count[which]);
+    rest_state(in, which);
+  }
+  return status;
+}
+
 sonde_status sonde_stations_create(sonde_interior *in, sonde_error *error) {
-  return lay_out(in, &in->model->vein, &in->model->artery, error);
+  sonde_status status = lay_out(in, &in->model->vein, &in->model->artery, error);
+  return status ? status : lay_branches(in, error);
 }
 
 // Point at angle theta and row s, `depth` below the skin.

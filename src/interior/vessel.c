@@ -1,7 +1,8 @@
 // Vessels under the probe: load on the skin -> stress at the vessel -> area -> ellipse.
 //
 // sonde_interior_update           field, then vessels
-// sonde_interior_vessels          all stations of both vessels
+// sonde_interior_vessels          all stations of all vessels
+// find_course                     what a vessel holds this time
 // measure_load, half_side         equivalent uniform rectangle of the contact forces
 // solid_pressure                  effective pressure on the wall from the solid's stress
 // rectangle_pressure              the same below a rectangle on a half space
@@ -122,25 +123,48 @@ static double rectangle_pressure(const sonde_interior *in, const sonde_station *
   return base * effective(s.x + s.y + s.z, axial);
 }
 
-static void update_station(sonde_interior *in, int which, uint32_t i, const load *l,
-                           const sonde_interior_input *input) {
+// A vessel's state with and without clot, and the radii over the model's that belong to them.
+typedef struct course {
+  sonde_vessel_kind kind;
+  const sonde_pathology *all;
+  sonde_pathology of[2]; // [clot]
+  double scale[2];
+} course;
+
+static course find_course(const sonde_interior *in, uint32_t which) {
+  const sonde_pathology *p = &in->pathology[which];
+  course c = {.kind = in->kind[which], .all = p, .of = {*p, *p}};
+  c.of[0].thrombus_fraction = 0;
+  if (c.kind == SONDE_VESSEL_ARTERY) {
+    c.scale[0] = c.scale[1] = sonde_artery_rest_scale(p);
+  } else {
+    c.scale[0] = sonde_vein_rest_scale(&c.of[0], false);
+    c.scale[1] = p->thrombus_fraction > 0 ? sonde_vein_rest_scale(p, true) : c.scale[0];
+  }
+  return c;
+}
+
+static double area_goal(const course *c, bool clot, double outside, double hold) {
+  const sonde_pathology *p = &c->of[clot];
+  if (c->kind == SONDE_VESSEL_ARTERY) return sonde_artery_area_ratio(p, outside);
+  if (!(outside > 0) && !clot) return 1; // most stations, most of the time
+  return sonde_vein_area_in(p, outside, hold);
+}
+
+static void update_station(sonde_interior *in, uint32_t which, uint32_t i, const course *c,
+                           const load *l, const sonde_interior_input *input) {
   const sonde_station *station = &in->station[which][i];
-  const sonde_pathology *p = input->pathology;
   sonde_vessel_state *v = &in->state[which][i];
-  bool clot = which == 0 && sonde_pathology_clot(p, station->rest_m.z);
-  sonde_pathology local = *p;
-  if (!clot) local.thrombus_fraction = 0;
-  double scale = which == 0 ? sonde_vein_rest_scale(&local, clot) : sonde_artery_rest_scale(&local);
+  bool clot = c->kind == SONDE_VESSEL_VEIN && sonde_pathology_clot(c->all, station->rest_m.z);
   double outside;
   if (!solid_pressure(in, station, &outside)) outside = rectangle_pressure(in, station, l);
-  double goal = which == 0 ? sonde_vein_area_ratio(&local, outside)
-                           : sonde_artery_area_ratio(&local, outside);
+  double goal = area_goal(c, clot, outside, station->hold);
   double blend = input->dt_s < 0 || !in->ready ? 1 : 1 - exp(-input->dt_s / relaxation_s);
   v->outside_pa = outside;
   v->area_ratio += (goal - v->area_ratio) * blend;
-  v->rest_radius_m = station->radius_m * scale;
+  v->rest_radius_m = station->radius_m * c->scale[clot];
   double half_short, half_long;
-  sonde_vessel_shape(which, &local, clot, v->area_ratio, &half_short, &half_long);
+  sonde_vessel_shape(c->kind, &c->of[clot], clot, v->area_ratio, &half_short, &half_long);
   v->half_short_m = half_short * v->rest_radius_m;
   v->half_long_m = half_long * v->rest_radius_m;
   v->rest_centre_m = station->rest_m;
@@ -149,10 +173,11 @@ static void update_station(sonde_interior *in, int which, uint32_t i, const load
 
 void sonde_interior_vessels(sonde_interior *in, const sonde_interior_input *input) {
   load l = measure_load(in->model, input);
-  for (int which = 0; which < 2; ++which) {
+  for (uint32_t which = 0; which < in->vessel_count; ++which) {
     uint32_t count = in->station_count[which];
     sonde_vessel_state *v = in->state[which];
-    for (uint32_t i = 0; i < count; ++i) update_station(in, which, i, &l, input);
+    course c = find_course(in, which);
+    for (uint32_t i = 0; i < count; ++i) update_station(in, which, i, &c, &l, input);
     for (uint32_t i = 0; i < count; ++i) {
       uint32_t a = i > 0 ? i - 1 : 0, b = i + 1 < count ? i + 1 : i;
       v[i].axis = v_unit(v_sub(v[b].centre_m, v[a].centre_m), in->station[which][i].axis);
@@ -165,7 +190,7 @@ void sonde_interior_vessels(sonde_interior *in, const sonde_interior_input *inpu
 void sonde_interior_update(sonde_interior *in, const sonde_interior_input *input) {
   SONDE_ASSERT(in != NULL && input != NULL && input->pathology != NULL);
   SONDE_ASSERT(input->positions_m != NULL && input->contact_forces_n != NULL);
-  in->pathology = *input->pathology;
+  sonde_findings_apply(in, input->pathology);
   in->solid = sonde_interior_follow(in, input);
   if (!in->solid) sonde_interior_solve(in, input->positions_m);
   sonde_interior_vessels(in, input);
@@ -177,7 +202,7 @@ void sonde_interior_update(sonde_interior *in, const sonde_interior_input *input
 
 const sonde_vessel_state *sonde_interior_vessel(const sonde_interior *in, int which,
                                                 uint32_t *count) {
-  SONDE_ASSERT(in != NULL && (which == 0 || which == 1) && count != NULL);
+  SONDE_ASSERT(in != NULL && which >= 0 && (uint32_t)which < in->vessel_count && count != NULL);
   *count = in->station_count[which];
   return in->state[which];
 }
@@ -198,8 +223,9 @@ static sonde_vessel_state blend_states(const sonde_vessel_state *a, const sonde_
   return v;
 }
 
-bool sonde_vessel_at(const sonde_interior *in, int which, double s, sonde_vessel_state *state) {
-  SONDE_ASSERT(which == 0 || which == 1);
+// Stations i and i + 1 around s and the way between them; false beyond the vessel's ends.
+static bool find_stations(const sonde_interior *in, uint32_t which, double s, uint32_t *at,
+                          double *share) {
   uint32_t count = in->station_count[which];
   const sonde_station *station = in->station[which];
   if (count < 2 || s < station[0].s_m || s > station[count - 1].s_m) return false;
@@ -208,8 +234,31 @@ bool sonde_vessel_at(const sonde_interior *in, int which, double s, sonde_vessel
   while (i > 0 && station[i].s_m > s) --i;
   while (i + 2 < count && station[i + 1].s_m < s) ++i;
   double t = (s - station[i].s_m) / (station[i + 1].s_m - station[i].s_m);
-  *state = blend_states(&in->state[which][i], &in->state[which][i + 1], clamp(t, 0, 1));
+  *at = i, *share = clamp(t, 0, 1);
   return true;
+}
+
+bool sonde_vessel_at(const sonde_interior *in, uint32_t which, double s,
+                     sonde_vessel_state *state) {
+  SONDE_ASSERT(which < in->vessel_count);
+  uint32_t i;
+  double t;
+  if (!find_stations(in, which, s, &i, &t)) return false;
+  *state = blend_states(&in->state[which][i], &in->state[which][i + 1], t);
+  return true;
+}
+
+bool sonde_vessel_reaches(const sonde_interior *in, uint32_t which, double s, sonde_vec3 rest,
+                          double beyond_m) {
+  SONDE_ASSERT(which < in->vessel_count && beyond_m >= 0);
+  uint32_t i;
+  double t;
+  if (!find_stations(in, which, s, &i, &t)) return false;
+  const sonde_vessel_state *a = &in->state[which][i], *b = a + 1;
+  sonde_vec3 d = v_sub(rest, v_lerp(a->rest_centre_m, b->rest_centre_m, t));
+  double slant = fabs(v_dot(d, a->axis)); // lies along the vessel, not beside it
+  double reach = (1 + carry_reach) * fmax(a->rest_radius_m, b->rest_radius_m) + beyond_m;
+  return v_norm(d) < reach + slant;
 }
 
 // Outside the lumen circles become ellipses of half axes m - c and m + c whose area is that of the
@@ -235,7 +284,7 @@ void sonde_vessel_carry(const sonde_vessel_state *v, double *short_m, double *lo
 // The image plane is y = 0 of the probe frame.
 bool sonde_interior_vessel_at_plane(const sonde_interior *in, int which, sonde_pose probe,
                                     sonde_vessel_state *state) {
-  SONDE_ASSERT(in != NULL && (which == 0 || which == 1) && state != NULL);
+  SONDE_ASSERT(in != NULL && which >= 0 && (uint32_t)which < in->vessel_count && state != NULL);
   const sonde_vessel_state *v = in->state[which];
   double nearest = plane_reach_m;
   bool found = false;

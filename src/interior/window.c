@@ -16,7 +16,7 @@ enum { NT = SONDE_WINDOW_THETA, NS = SONDE_WINDOW_S, NL = SONDE_WINDOW_LEVELS };
 
 // Shear moduli of the layers (docs/interior.md); only their ratio moves the inside. Muscle and skin
 // as at rest, fat (1.1 kPa at rest, Ogden exponent 8) as at 16 % compression: it is squeezed most.
-static const double fat_pa = 1.5e3, muscle_pa = 3.6e3, skin_pa = 40e3;
+static const double skin_pa = 40e3;
 static const double bulk_over_shear = 100;
 static const double margin_t_m = 12e-3, margin_s_m = 10e-3; // fine part beyond the face
 static const double reach_m = 75e-3;                        // window beyond the fine part
@@ -157,10 +157,10 @@ void sonde_window_begin(sonde_window *w, const sonde_interior *in, sonde_window_
     for (uint32_t i = 0; i < NT; ++i) place_column(w, in, i, j);
   for (uint32_t h = 0; h < w->solid.hex_count; ++h) {
     uint32_t l = h % (NL - 1);
-    double shear = l < SONDE_WINDOW_FAT ? fat_pa : muscle_pa;
+    double shear = l < SONDE_WINDOW_FAT ? sonde_fat_pa : sonde_muscle_pa;
     w->solid.hex[h].shear_pa = shear;
     w->solid.hex[h].bulk_pa = bulk_over_shear * shear;
-    w->solid.hex[h].skin_n_m = l == 0 ? (skin_pa - fat_pa) * at.fat_m : 0;
+    w->solid.hex[h].skin_n_m = l == 0 ? (skin_pa - sonde_fat_pa) * at.fat_m : 0;
   }
   sonde_fronts_begin(w->solid.fronts);
 }
