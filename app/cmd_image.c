@@ -1,8 +1,10 @@
 // sonde image: one echographic picture of a model, at any pose.
 // read_pose:     seven numbers.
 // place:         the probe above a site or at a pose, pressed when asked.
+// other_vessels: branches that the plane cuts.
 // draw:          interior, picture, file.
 #include "app.h"
+#include "image_findings.h"
 #include "settled.h"
 
 #include <getopt.h>
@@ -25,6 +27,11 @@ static const char HELP[] =
     "  --curved-mm R      radius of a curved face, 20 to 1000; default flat\n"
     "  --case NAME        healthy, partial_mural, acute_occlusive, subacute_occlusive,\n"
     "                     chronic_occlusive; default healthy\n"
+    "  --clot BRANCH:CASE the same for a branch of the model, e.g. great_saphenous\n"
+    "  --lesion KIND:X:DEPTH:WIDTH:HEIGHT  node, cyst or haematoma (mm) in the image plane\n"
+    "                     before the probe presses; up to 8\n"
+    "  --webs W           bands in an old clot of the femoral vein, 0 to 1; default 0\n"
+    "  --oedema W         fluid in the fat, 0 to 1; default 0\n"
     "  --depth-mm D       imaged depth, 20 to 150; default 70\n"
     "  --frequency-mhz F  1 to 12; default 7.5\n"
     "  --focus-mm D       5 to 150; default 25\n"
@@ -47,6 +54,7 @@ typedef struct options {
   long site, width, height, seed;
   double force_n, press_m, turn, aperture_m, radius_m; // NaN when not asked for
   sonde_echo_settings settings;
+  image_findings findings;
 } options;
 
 enum {
@@ -59,6 +67,10 @@ enum {
   APERTURE,
   CURVED,
   CASE,
+  CLOT,
+  LESION,
+  WEBS,
+  OEDEMA,
   DEPTH,
   FREQUENCY,
   FOCUS,
@@ -79,6 +91,10 @@ static const struct option LONG[] = {{"pose", required_argument, NULL, POSE},
                                      {"aperture-mm", required_argument, NULL, APERTURE},
                                      {"curved-mm", required_argument, NULL, CURVED},
                                      {"case", required_argument, NULL, CASE},
+                                     {"clot", required_argument, NULL, CLOT},
+                                     {"lesion", required_argument, NULL, LESION},
+                                     {"webs", required_argument, NULL, WEBS},
+                                     {"oedema", required_argument, NULL, OEDEMA},
                                      {"depth-mm", required_argument, NULL, DEPTH},
                                      {"frequency-mhz", required_argument, NULL, FREQUENCY},
                                      {"focus-mm", required_argument, NULL, FOCUS},
@@ -139,6 +155,8 @@ static bool read_setting(options *o, int option) {
   case FORCE: return read_real(option, 0.01, 200, 1, &o->force_n);
   case PRESS: return read_real(option, -10, 60, 1e-3, &o->press_m);
   case APERTURE: return read_real(option, 5, 200, 1e-3, &o->aperture_m);
+  case WEBS: return read_real(option, 0, 1, 1, &o->findings.rest.webs);
+  case OEDEMA: return read_real(option, 0, 1, 1, &o->findings.rest.oedema);
   case CURVED: return read_real(option, 20, 1000, 1e-3, &o->radius_m);
   case DEPTH: return read_real(option, 20, 150, 1e-3, &s->depth_m);
   case FREQUENCY: return read_real(option, 1, 12, 1e6, &s->frequency_hz);
@@ -158,6 +176,8 @@ static bool read_option(options *o, int option) {
   case SIZE: return read_size(o, optarg);
   case PROBE: o->probe = optarg; return true;
   case CASE: o->pathology = optarg; return true;
+  case CLOT: return image_findings_clot(&o->findings, optarg);
+  case LESION: return image_findings_lesion(&o->findings, optarg);
   case 'o': o->out = optarg; return true;
   case JSON: o->json = true; return true;
   default: return read_setting(o, option);
@@ -201,6 +221,8 @@ static sonde_status place(settled *s, const options *o, sonde_error *error) {
     return error->status;
   }
   s->pose = start;
+  status = image_findings_apply(&o->findings, start, s->interior, error);
+  if (status) return status;
   if (!isnan(o->force_n)) return settled_force(s, start, o->force_n, error);
   for (double d = 0; pressed && d < o->press_m; d += 0.002) settled_at(s, start, d, 1e-6);
   if (pressed) settled_at(s, start, o->press_m, 1e-8);
@@ -224,6 +246,21 @@ static sonde_status draw(const settled *s, const options *o, const sonde_patholo
   return status;
 }
 
+static void other_vessels(const settled *s, bool json) {
+  if (json) app_json_object("branches");
+  for (int k = 2; k < (int)sonde_interior_vessel_count(s->interior); ++k) {
+    sonde_vessel_state v;
+    const char *name = sonde_interior_vessel_name(s->interior, k);
+    if (!sonde_interior_vessel_at_plane(s->interior, k, s->pose, &v)) continue;
+    if (json)
+      app_json_real(name, v.area_ratio);
+    else
+      printf("%s %.1f mm front to back, %.0f %% of its rest area\n", name, 2e3 * v.half_short_m,
+             100 * v.area_ratio);
+  }
+  if (json) app_json_close();
+}
+
 static void print(const settled *s, const options *o, const sonde_image *image) {
   sonde_vessel_state vein, artery;
   bool v = sonde_interior_vessel_at_plane(s->interior, 0, s->pose, &vein);
@@ -237,6 +274,7 @@ static void print(const settled *s, const options *o, const sonde_image *image) 
     if (a)
       printf("artery %.1f mm front to back, %.0f %% of its rest area\n", 2e3 * artery.half_short_m,
              100 * artery.area_ratio);
+    other_vessels(s, false);
     return;
   }
   app_json_begin();
@@ -249,6 +287,7 @@ static void print(const settled *s, const options *o, const sonde_image *image) 
   app_json_real("vein_area_ratio", v ? vein.area_ratio : NAN);
   app_json_real("artery_short_mm", a ? 2e3 * artery.half_short_m : NAN);
   app_json_real("artery_area_ratio", a ? artery.area_ratio : NAN);
+  other_vessels(s, true);
   app_json_end();
 }
 

@@ -7,6 +7,7 @@
 
 #include "sonde/echo.h"
 #include "sonde/haptics_render.h"
+#include "sonde/interior_findings.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -29,6 +30,7 @@ typedef struct sonde_session_def {
   sonde_safety_limits limits;
   sonde_render_def rendering;         /**< coupling and force scale; default none, 1 */
   sonde_session_controls controls;    /**< at the start */
+  const sonde_findings *findings;     /**< borrowed for the call; NULL: none */
   uint32_t image_width, image_height; /**< default 512 x 512 */
   uint32_t ticks_per_image;           /**< lockstep: an image every so many ticks; real time: no
                                            more often, when the image thread is free; default 20 */
@@ -51,10 +53,11 @@ typedef struct sonde_snapshot {
                                     negative above the skin */
   double contact_volume_m3, contact_area_m2;
   double vein_area_ratio, artery_area_ratio; /**< at the image plane; NaN when not in view */
-  double vein_short_m;                       /**< AP diameter */
-  sonde_vec3 vein_rest_m; /**< where the image plane cuts the vein, on its course at rest; NaN when
-                               not in view */
-  double vein_tilt_rad;   /**< between the vein and the normal of the image plane, 0: transverse */
+  double other_vein_ratio; /**< largest of the further deep veins there; NaN when none is */
+  double vein_short_m;     /**< AP diameter */
+  sonde_vec3 vein_rest_m;  /**< where the image plane cuts the vein, on its course at rest; NaN when
+                                not in view */
+  double vein_tilt_rad;    /**< between the vein and the normal of the image plane, 0: transverse */
   uint32_t awake_nodes, solver_iterations, flags;
   sonde_fault fault;
 } sonde_snapshot;

@@ -88,7 +88,7 @@ INLINE vf clefts(vf theta, vf s, vf depth, float oedema) {
 INLINE vf webs(vf theta, vf s, vf depth, vf along) {
   vf bend = texture(theta, s * 90, depth * 400, 2 * TURNS_FAT, 9);
   vf strength = texture(theta, s * 110, depth * 500, 2 * TURNS_FAT, 10);
-  return sheet(along * 1.1f + 0.8f * bend, 0.3f) * (0.7f + 0.6f * strength);
+  return 2.6f * sheet(along * 1.2f + 0.7f * bend, 0.4f) * (0.8f + 0.6f * strength);
 }
 
 // Bundles of muscle, in decibels: dark fascicles between short bright connective streaks that run
@@ -180,7 +180,7 @@ INLINE void lesion(const tissue_lesion *it, const vf q[3], vf away, vf theta, vf
     mark(in, scatter + share * (hilum_scatter - scatter), node_loss, out);
     return;
   }
-  vf lump = texture(theta, s * 150, depth * 200, 2 * TURNS_MUSCLE, 12);
+  vf lump = texture(theta, s * 150, depth * 200, 2 * TURNS_MUSCLE, 12) + 0.5f * grain;
   vf liquid = smooth(smaller(larger(0.1f - 3 * lump, all(0)), all(1)));
   mark(in, scatter * power2(1.5f * lump) * (1 - liquid) + fluid_tissue[0] * liquid, haematoma_loss,
        out);
@@ -204,8 +204,9 @@ INLINE void vessels(const tissue_job *job, const float *f, const vf *level, vf o
     if (it->clot_fraction < 1) clot &= -load(at) > 1 - 2 * it->clot_fraction;
     vf scatter = all(it->clot_scatter);
     if (v == 0 && job->webs > 0 && any(clot))
-      scatter += job->webs * webs(load(f + PLANE_THETA * n), load(f + PLANE_S * n),
-                                  load(f + PLANE_DEPTH * n), load(at));
+      scatter = scatter * (1 - 0.6f * job->webs) +
+                job->webs * webs(load(f + PLANE_THETA * n), load(f + PLANE_S * n),
+                                 load(f + PLANE_DEPTH * n), load(at));
     mark(clot, scatter, clot_loss, out);
   }
 }

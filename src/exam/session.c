@@ -114,6 +114,7 @@ static sonde_status create_parts(sonde_session *session, const sonde_session_def
   if (!status)
     status = sonde_surface_index_create(&def->model->surface, &session->rest_skin, error);
   if (!status) status = sonde_interior_create(def->model, &session->interior, error);
+  if (!status) status = sonde_interior_set_findings(session->interior, def->findings, error);
   if (!status)
     status = sonde_echo_create(session->interior, &(sonde_echo_def){0}, &session->echo, error);
   if (!status) status = create_boxes(session, error);

@@ -75,6 +75,7 @@ static void fill_snapshot(const sonde_session *session, sonde_snapshot *snapshot
       .contact_area_m2 = contact->area_m2,
       .vein_area_ratio = (double)NAN,
       .artery_area_ratio = (double)NAN,
+      .other_vein_ratio = (double)NAN,
       .vein_short_m = (double)NAN,
       .vein_rest_m = vec3((double)NAN, (double)NAN, (double)NAN),
       .vein_tilt_rad = (double)NAN,

@@ -2,7 +2,7 @@
 // penetration:        depth of the probe's face below the rest skin.
 // update_interior:    the inside and the vessels at this surface.
 // tilt:               between a vessel and the normal of the image plane.
-// read_vessels:       what the image plane cuts.
+// read_vessels, read_branches: what the image plane cuts.
 // choose_beam:        the one asked for when it is ready, else the last one.
 // fill_frame:         everything into one slot.
 // count_latency:      how old the frame's pose is when the frame is finished.
@@ -58,6 +58,19 @@ static double tilt(sonde_pose pose, sonde_vec3 axis) {
   return acos(fmin(1.0, fabs(along)));
 }
 
+// The vein that closes least speaks for all.
+static void read_branches(const sonde_session *session, sonde_snapshot *snapshot) {
+  static const char *const deep[] = {"second_femoral_vein", "deep_femoral_vein"};
+  const sonde_interior *in = session->interior;
+  for (int which = 2; which < (int)sonde_interior_vessel_count(in); ++which)
+    for (size_t k = 0; k < SONDE_COUNT_OF(deep); ++k) {
+      sonde_vessel_state v;
+      if (strcmp(sonde_interior_vessel_name(in, which), deep[k]) != 0) continue;
+      if (sonde_interior_vessel_at_plane(in, which, snapshot->world_from_probe, &v))
+        snapshot->other_vein_ratio = fmax(snapshot->other_vein_ratio, v.area_ratio);
+    }
+}
+
 static void read_vessels(const sonde_session *session, sonde_snapshot *snapshot) {
   sonde_vessel_state vein, artery;
   sonde_pose pose = snapshot->world_from_probe;
@@ -69,6 +82,7 @@ static void read_vessels(const sonde_session *session, sonde_snapshot *snapshot)
   }
   if (sonde_interior_vessel_at_plane(session->interior, 1, pose, &artery))
     snapshot->artery_area_ratio = artery.area_ratio;
+  read_branches(session, snapshot);
 }
 
 static sonde_echo_settings with_beam(const sonde_session_beam *beam, sonde_echo_settings rest) {

@@ -1,0 +1,84 @@
+// What a case adds to a thigh, from the command line.
+// image_findings_lesion, image_findings_clot:  one option each.
+// direction:             of a probe's axis, in the world.
+// image_findings_apply:  from the image plane to the thigh.
+#include "image_findings.h"
+
+#include "app.h"
+
+#include <stdio.h>
+#include <string.h>
+
+static const char *const KIND[SONDE_LESION_KINDS] = {"node", "cyst", "haematoma"};
+static const double ECHO[SONDE_LESION_KINDS] = {0.3, 0, 0.4};
+static const double LENGTH_OVER_WIDTH[SONDE_LESION_KINDS] = {1.5, 2, 1.5};
+
+bool image_findings_lesion(image_findings *f, const char *text) {
+  char kind[16], end;
+  double mm[4];
+  int read = sscanf(text, "%15[a-z]:%lf:%lf:%lf:%lf%c", kind, &mm[0], &mm[1], &mm[2], &mm[3], &end);
+  int found = -1;
+  for (int k = 0; k < SONDE_LESION_KINDS && read == 5; ++k)
+    if (strcmp(kind, KIND[k]) == 0) found = k;
+  if (found < 0) {
+    app_usage_error("image",
+                    "--lesion expects KIND:X:DEPTH:WIDTH:HEIGHT in mm with node, cyst or "
+                    "haematoma, got '%s'",
+                    text);
+    return false;
+  }
+  if (f->lesion_count == SONDE_LESIONS) {
+    app_usage_error("image", "at most %d lesions", SONDE_LESIONS);
+    return false;
+  }
+  f->lesion[f->lesion_count++] = (image_lesion){(sonde_lesion_kind)found, mm[0] * 1e-3,
+                                                mm[1] * 1e-3, mm[2] * 1e-3, mm[3] * 1e-3};
+  return true;
+}
+
+bool image_findings_clot(image_findings *f, const char *text) {
+  sonde_error error = {0};
+  const char *colon = strchr(text, ':');
+  if (f->rest.branch_count == SONDE_BRANCHES || !colon || colon == text || colon - text > 31) {
+    app_usage_error("image", "--clot expects BRANCH:CASE, at most %d times, got '%s'",
+                    SONDE_BRANCHES, text);
+    return false;
+  }
+  sonde_branch_finding *b = &f->rest.branch[f->rest.branch_count++];
+  snprintf(b->branch, sizeof b->branch, "%.*s", (int)(colon - text), text);
+  if (!sonde_pathology_preset(colon + 1, &b->pathology, &error)) return true;
+  app_usage_error("image", "--clot: %s", error.message);
+  return false;
+}
+
+// Column `axis` of the pose's rotation.
+static sonde_vec3 direction(sonde_pose p, int axis) {
+  sonde_quat q = p.rotation;
+  if (axis == 0)
+    return (sonde_vec3){1 - 2 * (q.y * q.y + q.z * q.z), 2 * (q.x * q.y + q.w * q.z),
+                        2 * (q.x * q.z - q.w * q.y)};
+  if (axis == 1)
+    return (sonde_vec3){2 * (q.x * q.y - q.w * q.z), 1 - 2 * (q.x * q.x + q.z * q.z),
+                        2 * (q.y * q.z + q.w * q.x)};
+  return (sonde_vec3){2 * (q.x * q.z + q.w * q.y), 2 * (q.y * q.z - q.w * q.x),
+                      1 - 2 * (q.x * q.x + q.y * q.y)};
+}
+
+sonde_status image_findings_apply(const image_findings *f, sonde_pose at, sonde_interior *interior,
+                                  sonde_error *error) {
+  sonde_findings all = f->rest;
+  sonde_vec3 x = direction(at, 0), z = direction(at, 2);
+  for (uint32_t k = 0; k < f->lesion_count; ++k) {
+    const image_lesion *from = &f->lesion[k];
+    sonde_lesion *to = &all.lesion[all.lesion_count++];
+    *to = (sonde_lesion){.kind = from->kind, .axis = direction(at, 1)};
+    to->centre_m.x = at.position.x + from->x_m * x.x + from->depth_m * z.x;
+    to->centre_m.y = at.position.y + from->x_m * x.y + from->depth_m * z.y;
+    to->centre_m.z = at.position.z + from->x_m * x.z + from->depth_m * z.z;
+    to->half_m.x = 0.5 * from->height_m;
+    to->half_m.y = 0.5 * from->width_m;
+    to->half_m.z = 0.5 * from->width_m * LENGTH_OVER_WIDTH[from->kind];
+    to->echogenicity = ECHO[from->kind];
+  }
+  return sonde_interior_set_findings(interior, &all, error);
+}
