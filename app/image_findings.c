@@ -10,7 +10,7 @@
 #include <string.h>
 
 static const char *const KIND[SONDE_LESION_KINDS] = {"node", "cyst", "haematoma"};
-static const double ECHO[SONDE_LESION_KINDS] = {0.3, 0, 0.4};
+static const double ECHO[SONDE_LESION_KINDS] = {0.2, 0, 0.35};
 static const double LENGTH_OVER_WIDTH[SONDE_LESION_KINDS] = {1.5, 2, 1.5};
 
 bool image_findings_lesion(image_findings *f, const char *text) {
