@@ -18,7 +18,8 @@ typedef struct forcedimension {
   const char *(*error_text)(void);
 } forcedimension;
 
-static sonde_status bind(forcedimension *fd, const char *path, sonde_error *error) {
+static sonde_status bind(void *self, const sonde_device_open_def *def, sonde_error *error) {
+  forcedimension *fd = self;
   static const char *const names[] = {"libdhd.so", "libdhd.so.3", NULL};
   const sonde_symbol symbols[] = {{"dhdOpen", &fd->open},
                                   {"dhdClose", &fd->close},
@@ -28,20 +29,13 @@ static sonde_status bind(forcedimension *fd, const char *path, sonde_error *erro
                                   {"dhdSetForceAndTorque", &fd->set_wrench},
                                   {"dhdGetButtonMask", &fd->get_buttons},
                                   {"dhdErrorGetLastStr", &fd->error_text}};
-  return sonde_library_open(path, names, symbols, SONDE_COUNT_OF(symbols), &fd->library, error);
-}
-
-static sonde_status look(const sonde_device_open_def *def, sonde_error *error) {
-  forcedimension fd = {0};
-  sonde_status status = bind(&fd, def->library, error);
-  if (fd.library) dlclose(fd.library);
-  return status;
+  return sonde_library_open(def->library, names, symbols, SONDE_COUNT_OF(symbols), &fd->library,
+                            error);
 }
 
 static sonde_status open_device(void *self, const sonde_device_open_def *def, sonde_error *error) {
   forcedimension *fd = self;
-  sonde_status status = bind(fd, def->library, error);
-  if (status) return status;
+  (void)def;
   int device = fd->open();
   if (device < 0) return sonde_fail(error, SONDE_DEVICE, "no device answers: %s", fd->error_text());
   fd->device = (signed char)device;
@@ -84,7 +78,7 @@ static void close_device(void *self) {
 const sonde_driver sonde_driver_forcedimension = {"forcedimension",
                                                   "omega, delta, sigma, lambda, Falcon (libdhd)",
                                                   sizeof(forcedimension),
+                                                  bind,
                                                   open_device,
                                                   exchange,
-                                                  close_device,
-                                                  look};
+                                                  close_device};

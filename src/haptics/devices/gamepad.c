@@ -24,7 +24,8 @@ typedef struct gamepad {
   sonde_pose pose;
 } gamepad;
 
-static sonde_status bind(gamepad *g, const char *path, sonde_error *error) {
+static sonde_status bind(void *self, const sonde_device_open_def *def, sonde_error *error) {
+  gamepad *g = self;
   static const char *const names[] = {"libSDL2-2.0.so.0", "libSDL2.so", NULL};
   const sonde_symbol symbols[] = {{"SDL_InitSubSystem", &g->init},
                                   {"SDL_NumJoysticks", &g->count},
@@ -39,21 +40,13 @@ static sonde_status bind(gamepad *g, const char *path, sonde_error *error) {
                                   {"SDL_QuitSubSystem", &g->quit},
                                   {"SDL_SetHint", &g->hint},
                                   {"SDL_GetError", &g->error}};
-  return sonde_library_open(path, names, symbols, SONDE_COUNT_OF(symbols), &g->library, error);
-}
-
-static sonde_status look(const sonde_device_open_def *def, sonde_error *error) {
-  gamepad g = {0};
-  sonde_status status = bind(&g, def->library, error);
-  if (g.library) dlclose(g.library);
-  return status;
+  return sonde_library_open(def->library, names, symbols, SONDE_COUNT_OF(symbols), &g->library,
+                            error);
 }
 
 static sonde_status open_device(void *self, const sonde_device_open_def *def, sonde_error *error) {
   gamepad *g = self;
   sonde_pose kept = g->pose;
-  sonde_status status = bind(g, def->library, error);
-  if (status) return status;
   g->hint("SDL_JOYSTICK_ALLOW_BACKGROUND_EVENTS", "1");
   g->hint("SDL_NO_SIGNAL_HANDLERS", "1"); // Ctrl-C stays ours
   g->ready = g->init(SDL_GAMECONTROLLER) == 0;
@@ -101,10 +94,6 @@ static void close_device(void *self) {
   *g = (gamepad){.pose = g->pose, .placed = g->placed};
 }
 
-const sonde_driver sonde_driver_gamepad = {"gamepad",
-                                           "gamepad steers and rumbles (SDL2)",
-                                           sizeof(gamepad),
-                                           open_device,
-                                           exchange,
-                                           close_device,
-                                           look};
+const sonde_driver sonde_driver_gamepad = {
+    "gamepad",   "gamepad steers and rumbles (SDL2)", sizeof(gamepad), bind, open_device, exchange,
+    close_device};

@@ -1,5 +1,6 @@
 // Haply Inverse3 through the service of its maker: JSON over WebSocket on this machine. One state
 // comes back for every command; a command that is not repeated is forgotten by the service.
+// bind:        the connection to the service.
 // read_vector: three numbers of an object.
 // read_state:  what a message says about the device.
 #include "haptics/devices/pump.h"
@@ -21,12 +22,10 @@ typedef struct haply {
   sonde_quat rotation;
 } haply;
 
-static sonde_status look(const sonde_device_open_def *def, sonde_error *error) {
-  sonde_websocket *socket = SONDE_NEW(sonde_websocket, 1);
-  if (!socket) return sonde_fail_memory(error);
-  sonde_status status = sonde_websocket_open(socket, def->port, error);
-  sonde_websocket_close(socket);
-  sonde_free(socket);
+static sonde_status bind(void *self, const sonde_device_open_def *def, sonde_error *error) {
+  haply *h = self;
+  sonde_status status = sonde_websocket_open(&h->socket, def->port, error);
+  h->opened = !status;
   return status;
 }
 
@@ -78,9 +77,6 @@ static bool read_state(haply *h, sonde_device_sample *sample) {
 // Waits for the first state: a service without a device sends none.
 static sonde_status open_device(void *self, const sonde_device_open_def *def, sonde_error *error) {
   haply *h = self;
-  sonde_status status = sonde_websocket_open(&h->socket, def->port, error);
-  if (status) return status;
-  h->opened = true;
   h->rotation = quat_identity();
   sonde_device_sample sample = {0};
   double until_s = sonde_clock_now() + 0.5;
@@ -128,6 +124,6 @@ static void close_device(void *self) {
 }
 
 const sonde_driver sonde_driver_haply = {"haply",       "Inverse3 through its service (WebSocket)",
-                                         sizeof(haply), open_device,
-                                         exchange,      close_device,
-                                         look};
+                                         sizeof(haply), bind,
+                                         open_device,   exchange,
+                                         close_device};

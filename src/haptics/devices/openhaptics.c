@@ -43,7 +43,8 @@ typedef struct openhaptics {
   bool lost;
 } openhaptics;
 
-static sonde_status bind(openhaptics *hd, const char *path, sonde_error *error) {
+static sonde_status bind(void *self, const sonde_device_open_def *def, sonde_error *error) {
+  openhaptics *hd = self;
   static const char *const names[] = {"libHD.so", "libHD.so.3.4", "libHD.so.3", NULL};
   const sonde_symbol symbols[] = {{"hdInitDevice", &hd->init},
                                   {"hdDisableDevice", &hd->disable},
@@ -59,20 +60,13 @@ static sonde_status bind(openhaptics *hd, const char *path, sonde_error *error) 
                                   {"hdScheduleSynchronous", &hd->schedule},
                                   {"hdGetError", &hd->error},
                                   {"hdGetErrorString", &hd->error_text}};
-  return sonde_library_open(path, names, symbols, SONDE_COUNT_OF(symbols), &hd->library, error);
-}
-
-static sonde_status look(const sonde_device_open_def *def, sonde_error *error) {
-  openhaptics hd = {0};
-  sonde_status status = bind(&hd, def->library, error);
-  if (hd.library) dlclose(hd.library);
-  return status;
+  return sonde_library_open(def->library, names, symbols, SONDE_COUNT_OF(symbols), &hd->library,
+                            error);
 }
 
 static sonde_status open_device(void *self, const sonde_device_open_def *def, sonde_error *error) {
   openhaptics *hd = self;
-  sonde_status status = bind(hd, def->library, error);
-  if (status) return status;
+  (void)def;
   hd->device = hd->init(NULL);
   hd_error problem = hd->error();
   hd->opened = hd->device != invalid_handle && problem.code == 0;
@@ -129,10 +123,8 @@ static void close_device(void *self) {
   *hd = (openhaptics){0};
 }
 
-const sonde_driver sonde_driver_openhaptics = {"openhaptics",
-                                               "Touch, Touch X, Premium (libHD)",
-                                               sizeof(openhaptics),
-                                               open_device,
-                                               exchange,
-                                               close_device,
-                                               look};
+const sonde_driver sonde_driver_openhaptics = {
+    "openhaptics",       "Touch, Touch X, Premium (libHD)",
+    sizeof(openhaptics), bind,
+    open_device,         exchange,
+    close_device};

@@ -1,6 +1,7 @@
 // What all hardware drivers share: opening, the thread, the list.
 // clean:        a definition with its defaults.
 // turn:         one exchange with the vendor behind the gate.
+// bring_up:     library or service, then the device.
 // reopen:       after a loss, a few times a second.
 // thread_main:  the driver's thread.
 // find_driver:  by name.
@@ -99,11 +100,19 @@ static void turn(sonde_pump *pump) {
   }
 }
 
+// After a failure everything is closed again.
+static sonde_status bring_up(const sonde_driver *driver, void *vendor,
+                             const sonde_device_open_def *def, sonde_error *error) {
+  SONDE_ASSERT(vendor != NULL && def != NULL);
+  sonde_status status = driver->bind(vendor, def, error);
+  if (!status) status = driver->open(vendor, def, error);
+  if (status) driver->close(vendor);
+  return status;
+}
+
 static void reopen(sonde_pump *pump) {
-  if (pump->driver->open(pump->vendor, &pump->def, NULL) == SONDE_OK)
+  if (bring_up(pump->driver, pump->vendor, &pump->def, NULL) == SONDE_OK)
     atomic_store(&pump->connected, true);
-  else
-    pump->driver->close(pump->vendor);
 }
 
 static void *thread_main(void *self) {
@@ -151,11 +160,8 @@ static sonde_status start(sonde_pump *pump, sonde_error *error) {
   sonde_status status = sonde_mailbox_create(sizeof(sonde_device_sample), &pump->samples, error);
   if (!status) status = sonde_mailbox_create(sizeof(sonde_command), &pump->commands, error);
   if (status) return status;
-  status = pump->driver->open(pump->vendor, &pump->def, error);
-  if (status) {
-    pump->driver->close(pump->vendor);
-    return status;
-  }
+  status = bring_up(pump->driver, pump->vendor, &pump->def, error);
+  if (status) return status;
   atomic_store(&pump->connected, true);
   if (pthread_create(&pump->thread, NULL, thread_main, pump) != 0)
     return sonde_fail(error, SONDE_MEMORY, "%s: its thread could not be started",
@@ -207,13 +213,12 @@ static void describe(const sonde_driver *driver, bool probe, sonde_device_info *
   *info = (sonde_device_info){driver->name, driver->description, false, ""};
   sonde_device_open_def def = clean(NULL);
   sonde_error error = {0};
-  sonde_status status = driver->look(&def, &error);
-  if (!status && probe) {
-    void *vendor = sonde_calloc(1, driver->bytes);
-    status = vendor ? driver->open(vendor, &def, &error) : sonde_fail_memory(&error);
-    if (vendor) driver->close(vendor);
-    sonde_free(vendor);
-  }
+  void *vendor = sonde_calloc(1, driver->bytes);
+  sonde_status status = vendor ? SONDE_OK : sonde_fail_memory(&error);
+  if (!status)
+    status = probe ? bring_up(driver, vendor, &def, &error) : driver->bind(vendor, &def, &error);
+  if (vendor) driver->close(vendor);
+  sonde_free(vendor);
   info->available = !status;
   const char *found = probe ? "the device answered" : "found; --probe opens the device";
   snprintf(info->reason, sizeof info->reason, "%.159s", status ? error.message : found);

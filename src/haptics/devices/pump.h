@@ -15,15 +15,15 @@
 typedef struct sonde_driver {
   const char *name, *description;
   size_t bytes; // of its state, which begins zeroed
-  // Opens library and device; a reason of one sentence in error.
+  // Finds the vendor's library or service without touching the device, then opens the device; a
+  // reason of one sentence in error.
+  sonde_status (*bind)(void *self, const sonde_device_open_def *def, sonde_error *error);
   sonde_status (*open)(void *self, const sonde_device_open_def *def, sonde_error *error);
   // Force out, pose in. 1: a pose, 0: none yet, -1: the device is lost.
   int (*exchange)(void *self, sonde_vec3 force_n, sonde_vec3 torque_n_m,
                   sonde_device_sample *sample);
-  // After open succeeded or failed half-way.
+  // After either of them, whether it succeeded or failed half-way.
   void (*close)(void *self);
-  // Finds the library without touching the device.
-  sonde_status (*look)(const sonde_device_open_def *def, sonde_error *error);
 } sonde_driver;
 
 extern const sonde_driver sonde_driver_openhaptics, sonde_driver_forcedimension, sonde_driver_haply,

@@ -30,27 +30,21 @@ typedef struct spacenav {
   sonde_pose pose;
 } spacenav;
 
-static sonde_status bind(spacenav *nav, const char *path, sonde_error *error) {
+static sonde_status bind(void *self, const sonde_device_open_def *def, sonde_error *error) {
+  spacenav *nav = self;
   static const char *const names[] = {"libspnav.so.0", "libspnav.so", NULL};
   const sonde_symbol symbols[] = {{"spnav_open", &nav->open},
                                   {"spnav_close", &nav->close},
                                   {"spnav_poll_event", &nav->poll},
                                   {"spnav_fd", &nav->fd}};
-  return sonde_library_open(path, names, symbols, SONDE_COUNT_OF(symbols), &nav->library, error);
-}
-
-static sonde_status look(const sonde_device_open_def *def, sonde_error *error) {
-  spacenav nav = {0};
-  sonde_status status = bind(&nav, def->library, error);
-  if (nav.library) dlclose(nav.library);
-  return status;
+  return sonde_library_open(def->library, names, symbols, SONDE_COUNT_OF(symbols), &nav->library,
+                            error);
 }
 
 static sonde_status open_device(void *self, const sonde_device_open_def *def, sonde_error *error) {
   spacenav *nav = self;
+  (void)def;
   sonde_pose kept = nav->pose;
-  sonde_status status = bind(nav, def->library, error);
-  if (status) return status;
   nav->opened = nav->open() != -1;
   if (!nav->opened) return sonde_fail(error, SONDE_DEVICE, "the daemon spacenavd does not answer");
   nav->pose = nav->placed ? kept : (sonde_pose){vec3(0, 0, 0), quat_identity()};
@@ -89,10 +83,8 @@ static void close_device(void *self) {
   *nav = (spacenav){.pose = nav->pose, .placed = nav->placed};
 }
 
-const sonde_driver sonde_driver_spacenav = {"spacenav",
-                                            "SpaceMouse steers, no force (libspnav)",
-                                            sizeof(spacenav),
-                                            open_device,
-                                            exchange,
-                                            close_device,
-                                            look};
+const sonde_driver sonde_driver_spacenav = {
+    "spacenav",       "SpaceMouse steers, no force (libspnav)",
+    sizeof(spacenav), bind,
+    open_device,      exchange,
+    close_device};
