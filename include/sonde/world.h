@@ -154,6 +154,20 @@ SONDE_API sonde_settle_result sonde_settle_bonded(sonde_state *state, const uint
 SONDE_API sonde_status sonde_state_set_friction(sonde_state *state, const sonde_friction *friction,
                                                 sonde_error *error);
 
+/** Springs beside those of the model. A spring's damper is a time of its stiffness: it goes along.
+ */
+typedef struct sonde_tuning {
+  double stiffness_scale;                  /**< of every spring, 0.01 to 100; default 1 */
+  double damping_scale;                    /**< of every damper, 0 to 1000; default 1 */
+  double normal_damping_s, edge_damping_s; /**< 0 to 100; NaN, the default: the model's */
+} sonde_tuning;
+/** @thread any */
+SONDE_API sonde_tuning sonde_tuning_default(void);
+/** Changes the springs of a state from the next step on and wakes every node; the model stays.
+ * @return ARGUMENT naming the value out of range @thread owner, between steps */
+SONDE_API sonde_status sonde_state_tune(sonde_state *state, const sonde_tuning *tuning,
+                                        sonde_error *error);
+
 /**
  * Cuts the skin between two steps (sonde_model_cut) along a path on the skin as it is now. The new
  * state goes on where the old one is: positions, velocities, contact memory, tick, probe; mass,

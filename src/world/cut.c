@@ -145,7 +145,10 @@ sonde_status sonde_state_cut(const sonde_state *before, const sonde_vec3 *path_m
     moved = SONDE_NEW(sonde_vec3, 2 * (size_t)(own.node_count + own.added));
     if (!moved) status = sonde_fail_memory(error);
   }
-  if (!status) carry(&(carrier){before, *after, &own}, moved);
+  if (!status) {
+    sonde_state_retune(*after, &before->tuning);
+    carry(&(carrier){before, *after, &own}, moved);
+  }
   sonde_free(moved);
   if (map) *map = status ? (sonde_cut_map){0} : own;
   if (status || !map) sonde_cut_map_clear(&own);

@@ -1,6 +1,7 @@
 // Laying out a model for the fast engine; cold.
 // carve:       all arrays in one block; measured and placed by the same code.
 // fill_slots:  neighbours of every row, padded to the slice's largest number.
+// fill_springs, fill_shear: what a tuning changes.
 // fill_faces:  faces in slices of 16, and which corner each slot reads.
 // list_near:   slices that share an edge, and slices of faces that touch a slice.
 #include "tissue/two_layer.h"
@@ -74,6 +75,13 @@ static void fill_row(sonde_lanes *lanes, const sonde_model *model, uint32_t i) {
   }
 }
 
+static void fill_springs(sonde_slice_model *fixed, const sonde_model *model, uint32_t i) {
+  double tangent = model->law.tangential_stiffness_n_m3, k0 = model->k0_n_m3[i];
+  uint32_t l = i % SONDE_LANES;
+  fixed->k0[l] = (float)k0;
+  fixed->yield[l] = (float)(1 / (model->area_m2[i] * (tangent > 0 ? fmin(tangent, k0) : k0)));
+}
+
 static void fill_slice(sonde_lanes *lanes, const sonde_model *model, uint32_t s) {
   uint32_t n = model->surface.vertex_count;
   sonde_slice_model *fixed = &lanes->model[s];
@@ -88,12 +96,10 @@ static void fill_slice(sonde_lanes *lanes, const sonde_model *model, uint32_t s)
     fixed->normal[1][l] = (float)normal.y;
     fixed->normal[2][l] = (float)normal.z;
     fixed->area[l] = (float)model->area_m2[i];
-    fixed->k0[l] = (float)model->k0_n_m3[i];
+    fill_springs(fixed, model, i);
     fixed->xm[l] = (float)model->xm_m[i];
     fixed->limit[l] = (float)(model->law.guard * model->xm_m[i]);
     fixed->mass[l] = (float)model->mass_kg[i];
-    double tangent = model->law.tangential_stiffness_n_m3, k0 = model->k0_n_m3[i];
-    fixed->yield[l] = (float)(1 / (model->area_m2[i] * (tangent > 0 ? fmin(tangent, k0) : k0)));
     sonde_vec3 x = model->surface.vertices[i];
     const double at[3] = {x.x, x.y, x.z};
     for (int c = 0; c < 3; ++c) {
@@ -119,16 +125,21 @@ static sonde_slot_shear *slot_of(sonde_lanes *lanes, const sonde_topology *t, ui
   return &lanes->slot_shear[lanes->model[i / SONDE_LANES].first_slot + k];
 }
 
+static void fill_shear(sonde_face_slice *face, const sonde_model *model, uint32_t f,
+                       uint32_t lane) {
+  double shear, limit;
+  sonde_tissue_face_law(model, f, &shear, &limit);
+  face->shear[lane] = (float)shear;
+  face->limit[lane] = (float)limit;
+}
+
 static void fill_face(sonde_lanes *lanes, const sonde_model *model, uint32_t at) {
   uint32_t f = lanes->face_order[at], lane = at % SONDE_LANES;
   const uint32_t *v = model->surface.faces[f];
   SONDE_ASSERT(at / SONDE_LANES < lanes->face_slice_count);
   sonde_face_slice *face = &lanes->face[at / SONDE_LANES];
   face->area[lane] = (float)model->face_area_m2[f];
-  double shear, limit;
-  sonde_tissue_face_law(model, f, &shear, &limit);
-  face->shear[lane] = (float)shear;
-  face->limit[lane] = (float)limit;
+  fill_shear(face, model, f, lane);
   for (uint32_t k = 0; k < 3; ++k) {
     uint32_t i = v[k], j = v[(k + 1) % 3], opposite = (k + 2) % 3;
     int32_t first = (int32_t)(at / SONDE_LANES * SONDE_FACE_STRIDE + lane);
@@ -186,6 +197,15 @@ static sonde_lane_law law_of(const sonde_surface_law *law, const sonde_world_def
                           .dt = (float)h,
                           .stiffness_scale = (float)(h * h),
                           .damping_scale = (float)h};
+}
+
+void sonde_lanes_tune(sonde_lanes *lanes, const sonde_model *tuned, const sonde_world_def *def) {
+  SONDE_ASSERT(lanes->node_count == tuned->surface.vertex_count);
+  lanes->law = law_of(&tuned->law, def);
+  for (uint32_t i = 0; i < lanes->node_count; ++i)
+    fill_springs(&lanes->model[i / SONDE_LANES], tuned, i);
+  for (uint32_t k = 0; lanes->law.shear > 0 && k < tuned->surface.face_count; ++k)
+    fill_shear(&lanes->face[k / SONDE_LANES], tuned, lanes->face_order[k], k % SONDE_LANES);
 }
 
 // Sizes that need a pass over the mesh: slots and lists per slice.

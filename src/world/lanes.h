@@ -147,6 +147,8 @@ sonde_status sonde_lanes_create(const sonde_model *model, const sonde_world_def 
                                 const uint32_t *face_order, sonde_lanes **lanes,
                                 sonde_error *error);
 void sonde_lanes_destroy(sonde_lanes *lanes);
+// Takes over the springs of a model with the same mesh. @thread tick
+void sonde_lanes_tune(sonde_lanes *lanes, const sonde_model *tuned, const sonde_world_def *def);
 // Takes over displacements and velocities from doubles; wakes every slice, or none.
 void sonde_lanes_import(sonde_lanes *lanes, const sonde_vec3 *rest, const sonde_vec3 *position,
                         const sonde_vec3 *velocity, bool awake);

@@ -31,7 +31,7 @@ static sonde_vec3 holder_force(const problem *p) {
 static double evaluate(const problem *p, double *load) {
   sonde_state *state = p->state;
   const sonde_tissue_scales scales = {1 / (p->dt_s * p->dt_s), 0, 1};
-  sonde_tissue_linearise(state->model, NULL, state->position, state->velocity, &scales,
+  sonde_tissue_linearise(state->tissue, NULL, state->position, state->velocity, &scales,
                          state->force, state->product, state->matrix, state->scratch_nodes);
   memcpy(state->probed, state->position,
          state->model->surface.vertex_count * sizeof *state->probed);

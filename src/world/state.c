@@ -78,12 +78,31 @@ sonde_status sonde_state_set_friction(sonde_state *state, const sonde_friction *
   return SONDE_OK;
 }
 
+sonde_tuning sonde_tuning_default(void) { return (sonde_tuning){1, 1, NAN, NAN}; }
+
+sonde_status sonde_state_tune(sonde_state *state, const sonde_tuning *t, sonde_error *error) {
+  const struct {
+    const char *name;
+    double value, low, high;
+  } range[] = {{"stiffness_scale", t->stiffness_scale, 0.01, 100},
+               {"damping_scale", t->damping_scale, 0, 1000},
+               {"normal_damping_s", isnan(t->normal_damping_s) ? 0 : t->normal_damping_s, 0, 100},
+               {"edge_damping_s", isnan(t->edge_damping_s) ? 0 : t->edge_damping_s, 0, 100}};
+  for (size_t k = 0; k < SONDE_COUNT_OF(range); ++k)
+    if (!(range[k].value >= range[k].low && range[k].value <= range[k].high))
+      return sonde_fail(error, SONDE_ARGUMENT, "%s is %g, expected %g to %g", range[k].name,
+                        range[k].value, range[k].low, range[k].high);
+  sonde_state_retune(state, t);
+  return SONDE_OK;
+}
+
 #define CARVE(field, count) (s->field = sonde_carve(base, &offset, (count), sizeof *s->field))
 
 static size_t carve(sonde_state *s, char *base) {
   size_t offset = 0;
   uint32_t n = s->model->surface.vertex_count, edges = s->model->topology.edge_count;
   uint32_t faces = s->model->surface.face_count;
+  CARVE(tuned_k0, n);
   CARVE(position, n), CARVE(velocity, n), CARVE(increment, n), CARVE(probed, n);
   CARVE(calm, n), CARVE(awake, n), CARVE(rows, n);
   CARVE(edges, edges), CARVE(pairs, edges), CARVE(faces, faces), CARVE(rim, n), CARVE(in_rim, n);
@@ -124,7 +143,8 @@ sonde_status sonde_state_create_ordered(const sonde_model *model, const sonde_wo
   if (status) return status;
   sonde_state *state = SONDE_NEW(sonde_state, 1);
   if (!state) return sonde_fail_memory(error);
-  state->model = model;
+  state->model = state->tissue = model;
+  state->tuning = sonde_tuning_default();
   state->def = *def;
   state->block_count =
       (model->surface.face_count + SONDE_FACES_PER_BLOCK - 1) / SONDE_FACES_PER_BLOCK;

@@ -17,9 +17,14 @@ typedef uint16_t sonde_point_planes[SONDE_POINTS];
 
 struct sonde_state {
   const sonde_model *model;
+  const sonde_model *tissue; // whose springs act: the model, or `tuned`
+  sonde_model tuned;         // shares the model's arrays but for k0_n_m3
+  sonde_tuning tuning;
   sonde_world_def def;
   struct sonde_lanes *lanes; // of the fast engine, else NULL
   void *block;               // all arrays below
+
+  double *tuned_k0; // [nodes]
 
   // motion, written by the update
   uint64_t tick;
@@ -90,6 +95,11 @@ struct sonde_state {
 };
 
 enum { SONDE_CALM_TICKS = 20, SONDE_TRIAL_PERIOD = 32 };
+
+// sonde_state_tune() and another friction with values in their ranges; the friction of a probe that
+// slips stays that of a slipping one. @thread tick
+void sonde_state_retune(sonde_state *state, const sonde_tuning *tuning);
+void sonde_state_rub(sonde_state *state, const sonde_friction *friction);
 
 // sonde_state_create() with the order of the faces known, NULL: found here.
 sonde_status sonde_state_create_ordered(const sonde_model *model, const sonde_world_def *def,

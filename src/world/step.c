@@ -36,7 +36,7 @@ static void assemble(sonde_state *state, const sonde_probe *probe, const sonde_m
   sonde_tissue_scales scales = {1, lambda * h, lambda * lambda * h * h};
   sonde_tissue_part part = {state->rows,  state->row_count,  state->rim,   state->rim_count,
                             state->edges, state->edge_count, state->faces, state->face_count};
-  sonde_tissue_linearise(state->model, &part, state->position, state->velocity, &scales,
+  sonde_tissue_linearise(state->tissue, &part, state->position, state->velocity, &scales,
                          state->force, state->product, state->matrix, state->scratch_nodes);
   sonde_contact_scales contact = {scales.damping, scales.stiffness};
   if (probe) sonde_contact_apply(state, motion, &contact);
