@@ -1,4 +1,5 @@
 // The gel film: creation.
+// check: the definition. measure_edges: what flows across each.
 #include "haptics/gel.h"
 
 #include "base/base.h"
@@ -33,8 +34,24 @@ void sonde_gel_destroy(sonde_gel *gel) {
   sonde_free(gel->film_m);
   sonde_free(gel->moisture);
   sonde_free(gel->change_m3);
-  sonde_free(gel->edge_m);
+  sonde_free(gel->push_pa);
+  sonde_free(gel->drag);
+  sonde_free(gel->half_m);
+  sonde_free(gel->touched);
   sonde_free(gel);
+}
+
+// The width of an edge's flow: a third of the area around it per direction.
+static void measure_edges(sonde_gel *gel) {
+  const sonde_topology *topology = &gel->model->topology;
+  const sonde_vec3 *x = gel->model->surface.vertices;
+  for (uint32_t e = 0; e < topology->edge_count; ++e) {
+    uint32_t i = topology->edges[e][0], j = topology->edges[e][1];
+    double length = fmax(v_distance(x[i], x[j]), 1e-6);
+    double width = 0.3 * (gel->model->area_m2[i] + gel->model->area_m2[j]) / length;
+    gel->drag[e] = width / (12.0 * gel->def.viscosity_pa_s * length);
+    gel->half_m[e] = 0.5 * width / length;
+  }
 }
 
 sonde_status sonde_gel_create(const sonde_model *model, const sonde_gel_def *def, sonde_gel **out,
@@ -54,14 +71,16 @@ sonde_status sonde_gel_create(const sonde_model *model, const sonde_gel_def *def
   gel->film_m = SONDE_NEW(double, nodes);
   gel->moisture = SONDE_NEW(double, nodes);
   gel->change_m3 = SONDE_NEW(double, nodes);
-  gel->edge_m = SONDE_NEW(double, topology->edge_count);
-  if (!gel->film_m || !gel->moisture || !gel->change_m3 || !gel->edge_m) {
+  gel->push_pa = SONDE_NEW(double, nodes);
+  gel->drag = SONDE_NEW(double, topology->edge_count);
+  gel->half_m = SONDE_NEW(double, topology->edge_count);
+  gel->touched = SONDE_NEW(uint32_t, nodes);
+  if (!gel->film_m || !gel->moisture || !gel->change_m3 || !gel->push_pa || !gel->drag ||
+      !gel->half_m || !gel->touched) {
     sonde_gel_destroy(gel);
     return sonde_fail_memory(error);
   }
-  const sonde_vec3 *x = model->surface.vertices;
-  for (uint32_t e = 0; e < topology->edge_count; ++e)
-    gel->edge_m[e] = fmax(v_distance(x[topology->edges[e][0]], x[topology->edges[e][1]]), 1e-6);
+  measure_edges(gel);
   *out = gel;
   return SONDE_OK;
 }

@@ -8,14 +8,17 @@
 // sixteenth of what it has per edge and step, so that films stay positive and rough steps stay
 // stable.
 //
-// pressure:   of a node.
 // flow:       volume over an edge in a step.
+// begin, finish: pressures before, films after.
 // dry:        loss to the air; skin that loses its film stays moist for a while.
 #include "base/base.h"
 #include "base/maths.h"
 #include "haptics/gel.h"
 
+#include <string.h>
+
 static const double weight_pa_m = 1e4; // density times gravity
+static const double least_m = 1e-9;    // a film of molecules does not flow
 static const double reach_m = 4e-3;    // skin that far from a point of the face touches it
 
 void sonde_gel_put(sonde_gel *gel, sonde_vec3 centre_m, double radius_m, double volume_m3) {
@@ -44,30 +47,38 @@ void sonde_gel_wipe(sonde_gel *gel) {
     gel->film_m[i] = gel->moisture[i] = 0.0;
 }
 
-static double pressure(const sonde_gel *gel, const sonde_vec3 *contact_n, uint32_t i) {
-  return v_norm(contact_n[i]) / gel->model->area_m2[i] + weight_pa_m * gel->film_m[i];
-}
-
-static double flow(const sonde_gel *gel, const sonde_vec3 *contact_n, sonde_vec3 probe_m_s,
-                   uint32_t edge, double dt_s) {
+// Volume in dt_s, nothing where no film is on either side. Both sides are read before either is
+// chosen: which one gives is a coin toss that no processor foresees.
+static double flow(const sonde_gel *gel, sonde_vec3 probe_m_s, uint32_t edge, double dt_s) {
   const sonde_model *model = gel->model;
   uint32_t i = model->topology.edges[edge][0], j = model->topology.edges[edge][1];
-  const double *h = gel->film_m;
-  if (!(h[i] > 0.0) && !(h[j] > 0.0)) return 0.0;
-  double length = gel->edge_m[edge];
-  double width = 0.3 * (model->area_m2[i] + model->area_m2[j]) / length; // a third per direction
-  double push = pressure(gel, contact_n, i) - pressure(gel, contact_n, j);
-  uint32_t giver = push >= 0.0 ? i : j;
-  double rate = pow(h[giver], 3) / (12.0 * gel->def.viscosity_pa_s) * push / length;
-  bool touched = v_norm2(contact_n[i]) > 0.0 || v_norm2(contact_n[j]) > 0.0;
-  if (touched) {
+  double hi = gel->film_m[i], hj = gel->film_m[j], pi = gel->push_pa[i], pj = gel->push_pa[j];
+  double vi = hi * model->area_m2[i], vj = hj * model->area_m2[j];
+  if (!(hi + hj > least_m)) return 0.0;
+  double steep = pi - pj + weight_pa_m * (hi - hj);
+  double film = steep >= 0.0 ? hi : hj;
+  double rate = film * film * film * gel->drag[edge] * steep;
+  if (pi + pj > 0.0) {
     sonde_vec3 along = v_sub(model->surface.vertices[j], model->surface.vertices[i]);
-    double drift = 0.5 * v_dot(probe_m_s, along) / length;
-    rate += drift * h[drift >= 0.0 ? i : j];
+    double drift = gel->half_m[edge] * v_dot(probe_m_s, along);
+    rate += drift * (drift >= 0.0 ? hi : hj);
   }
-  giver = rate >= 0.0 ? i : j;
-  double most = h[giver] * model->area_m2[giver] / 16.0;
-  return clamp(width * rate * dt_s, -most, most);
+  double most = (rate >= 0.0 ? vi : vj) * (1.0 / 16.0), volume = rate * dt_s;
+  return volume > most ? most : volume < -most ? -most : volume;
+}
+
+static void begin(sonde_gel *gel, const sonde_vec3 *contact_n) {
+  for (uint32_t i = 0; i < gel->model->surface.vertex_count; ++i) {
+    double n2 = v_norm2(contact_n[i]);
+    gel->push_pa[i] = n2 > 0.0 ? sqrt(n2) / gel->model->area_m2[i] : 0.0;
+    gel->change_m3[i] = 0.0;
+  }
+}
+
+static void finish(sonde_gel *gel) {
+  for (uint32_t i = 0; i < gel->model->surface.vertex_count; ++i)
+    if (gel->change_m3[i] < 0.0 || gel->change_m3[i] > 0.0)
+      gel->film_m[i] = fmax(gel->film_m[i] + gel->change_m3[i] / gel->model->area_m2[i], 0.0);
 }
 
 static void dry(sonde_gel *gel, double dt_s) {
@@ -78,20 +89,26 @@ static void dry(sonde_gel *gel, double dt_s) {
   }
 }
 
-void sonde_gel_step(sonde_gel *gel, const sonde_vec3 *contact_n, sonde_vec3 probe_m_s,
-                    double dt_s) {
-  SONDE_ASSERT(contact_n != NULL && dt_s > 0.0 && v_finite(probe_m_s));
+void sonde_gel_part(sonde_gel *gel, const sonde_vec3 *contact_n, sonde_vec3 probe_m_s, double dt_s,
+                    uint32_t part, uint32_t parts) {
+  SONDE_ASSERT(contact_n != NULL && dt_s > 0.0 && v_finite(probe_m_s) && part < parts);
   const sonde_topology *topology = &gel->model->topology;
-  uint32_t nodes = gel->model->surface.vertex_count;
-  for (uint32_t i = 0; i < nodes; ++i) gel->change_m3[i] = 0.0;
-  for (uint32_t e = 0; e < topology->edge_count; ++e) {
-    double volume = flow(gel, contact_n, probe_m_s, e, dt_s);
+  if (part == 0) begin(gel, contact_n);
+  uint32_t from = (uint32_t)((uint64_t)topology->edge_count * part / parts);
+  uint32_t to = (uint32_t)((uint64_t)topology->edge_count * (part + 1) / parts);
+  for (uint32_t e = from; e < to; ++e) {
+    double volume = flow(gel, probe_m_s, e, dt_s);
     gel->change_m3[topology->edges[e][0]] -= volume;
     gel->change_m3[topology->edges[e][1]] += volume;
   }
-  for (uint32_t i = 0; i < nodes; ++i)
-    gel->film_m[i] = fmax(gel->film_m[i] + gel->change_m3[i] / gel->model->area_m2[i], 0.0);
+  if (part + 1 < parts) return;
+  finish(gel);
   dry(gel, dt_s);
+}
+
+void sonde_gel_step(sonde_gel *gel, const sonde_vec3 *contact_n, sonde_vec3 probe_m_s,
+                    double dt_s) {
+  sonde_gel_part(gel, contact_n, probe_m_s, dt_s, 0, 1);
 }
 
 // The coefficient is linear in e^-film, so that its mean under the probe is the mean of that.
@@ -116,20 +133,35 @@ sonde_friction sonde_gel_friction(const sonde_gel *gel, const sonde_vec3 *contac
   return friction;
 }
 
-void sonde_gel_coupling(const sonde_gel *gel, const sonde_vec3 *skin_m, const sonde_vec3 *contact_n,
-                        const sonde_vec3 *point_m, uint32_t count, float *share) {
+void sonde_gel_coupling_of(const sonde_gel *gel, const double *film_m, uint32_t *touched,
+                           const sonde_vec3 *skin_m, const sonde_vec3 *contact_n,
+                           const sonde_vec3 *point_m, uint32_t count, float *share) {
   SONDE_ASSERT(skin_m != NULL && contact_n != NULL && (count == 0 || (point_m && share)));
+  uint32_t touching = 0;
+  for (uint32_t i = 0; i < gel->model->surface.vertex_count; ++i)
+    if (v_norm2(contact_n[i]) > 0.0) touched[touching++] = i;
   for (uint32_t k = 0; k < count; ++k) {
     double weight = 0.0, sum = 0.0;
-    for (uint32_t i = 0; i < gel->model->surface.vertex_count; ++i) {
-      if (!(v_norm2(contact_n[i]) > 0.0)) continue;
-      double near = 1.0 - v_distance(skin_m[i], point_m[k]) / reach_m;
+    for (uint32_t t = 0; t < touching; ++t) {
+      double near = 1.0 - v_distance(skin_m[touched[t]], point_m[k]) / reach_m;
       if (near <= 0.0) continue;
       weight += near;
-      sum += near * -expm1(-gel->film_m[i] / gel->def.lubricating_m);
+      sum += near * -expm1(-film_m[touched[t]] / gel->def.lubricating_m);
     }
     share[k] = weight > 0.0 ? (float)(sum / weight) : 0.0f;
   }
+}
+
+void sonde_gel_coupling(const sonde_gel *gel, const sonde_vec3 *skin_m, const sonde_vec3 *contact_n,
+                        const sonde_vec3 *point_m, uint32_t count, float *share) {
+  sonde_gel_coupling_of(gel, gel->film_m, gel->touched, skin_m, contact_n, point_m, count, share);
+}
+
+void sonde_gel_restore(sonde_gel *gel, const double *film_m, const double *moisture) {
+  SONDE_ASSERT(film_m != NULL && moisture != NULL);
+  size_t bytes = gel->model->surface.vertex_count * sizeof(double);
+  memcpy(gel->film_m, film_m, bytes);
+  memcpy(gel->moisture, moisture, bytes);
 }
 
 const double *sonde_gel_film(const sonde_gel *gel) { return gel->film_m; }
