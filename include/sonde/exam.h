@@ -7,6 +7,7 @@
 
 #include "sonde/echo.h"
 #include "sonde/haptics_render.h"
+#include "sonde/identify.h"
 #include "sonde/interior_findings.h"
 
 #ifdef __cplusplus
@@ -20,7 +21,21 @@ typedef struct sonde_session_controls {
   sonde_echo_settings echo;
   bool stop;       /**< emergency stop pressed (latched until resume) */
   uint32_t resume; /**< counts resumes */
+  // the skin: a film of gel drives friction and image while `gel` is on
+  bool gel;
+  uint32_t gel_put;  /**< counts: each step puts 2 ml on the skin nearest to the probe's face */
+  uint32_t gel_wipe; /**< counts: each step leaves dry skin */
+  // the patient, of a session with def.circulate
+  sonde_posture posture;
+  bool valsalva; /**< strains as long as it is set */
+  // the practitioner's bench
+  uint32_t preset;        /**< index into the session's presets */
+  double stiffness_scale; /**< of every spring of that preset, 0.5 to 2 */
+  double damping_scale;   /**< of every damper, 0.25 to 4 */
+  double friction_scale;  /**< of every coefficient of friction, 0 to 2 */
 } sonde_session_controls;
+
+enum { SONDE_SESSION_PRESETS = 2 };
 
 typedef struct sonde_session_def {
   const sonde_model *model;       /**< borrowed */
@@ -28,16 +43,21 @@ typedef struct sonde_session_def {
   const char *const *probe_names; /**< NULL-terminated; NULL: all built-in */
   sonde_world_def world;
   sonde_safety_limits limits;
-  sonde_render_def rendering;         /**< coupling and force scale; default none, 1 */
-  sonde_session_controls controls;    /**< at the start */
-  const sonde_findings *findings;     /**< borrowed for the call; NULL: none */
+  sonde_render_def rendering;                  /**< coupling and force scale; default none, 1 */
+  sonde_session_controls controls;             /**< at the start; the counters count from there */
+  uint32_t preset_count;                       /**< 0: the model's springs and world.friction */
+  sonde_preset presets[SONDE_SESSION_PRESETS]; /**< tissues to compare; controls.preset chooses */
+  double gel_m3;                      /**< spread over the model's sites at the start; default 0 */
+  bool circulate;                     /**< circulation gives the vessels' pressures, not the case */
+  sonde_circulation circulation;      /**< posture and strain follow the controls */
+  const sonde_findings *findings;     /**< copied; NULL: none */
   uint32_t image_width, image_height; /**< default 512 x 512 */
   uint32_t ticks_per_image;           /**< lockstep: an image every so many ticks; real time: no
                                            more often, when the image thread is free; default 20 */
   const char *record_path;            /**< NULL: no recording; format: docs/recording.md */
 } sonde_session_def;
 
-/** Healthy vein, first probe, default limits and world. @thread any */
+/** Healthy vein, first probe, default limits and world, no gel, constant pressures. @thread any */
 SONDE_API sonde_session_def sonde_session_def_default(void);
 
 /** Everything a viewer shows of one tick; copied as a whole through a mailbox. */
@@ -58,6 +78,9 @@ typedef struct sonde_snapshot {
   sonde_vec3 vein_rest_m;  /**< where the image plane cuts the vein, on its course at rest; NaN when
                                 not in view */
   double vein_tilt_rad;    /**< between the vein and the normal of the image plane, 0: transverse */
+  double gel_volume_m3;    /**< on the skin; NaN while the controls' gel is off */
+  double gel_coupling;     /**< mean over the lines of the image, 0..1; likewise */
+  double venous_pressure_pa, arterial_pressure_pa; /**< in the vessels */
   uint32_t awake_nodes, solver_iterations, flags;
   sonde_fault fault;
 } sonde_snapshot;
@@ -92,6 +115,8 @@ SONDE_API void sonde_session_control(sonde_session *session,
                                      const sonde_session_controls *controls);
 /** The controls set last, after clamping. @thread any */
 SONDE_API sonde_session_controls sonde_session_controls_now(const sonde_session *session);
+/** The tissue that the controls set last ask for, e.g. for sonde_preset_save(). @thread any */
+SONDE_API sonde_preset sonde_session_preset(const sonde_session *session);
 /** For sonde_device_page_goal(). @thread any */
 SONDE_API sonde_device *sonde_session_device(sonde_session *session);
 SONDE_API uint32_t sonde_session_probe_count(const sonde_session *session);

@@ -167,6 +167,9 @@ typedef struct sonde_circulation {
 
 /** 1.1 Hz, 120/80 mmHg, 0.25 Hz with 1.5 mmHg, no Valsalva (20 mmHg when timed). @thread any */
 SONDE_API sonde_circulation sonde_circulation_default(void);
+/** Begins or ends a strain at time t, from whatever share of one is in force: the pressure has no
+ *  step. @thread any */
+SONDE_API void sonde_circulation_strain(sonde_circulation *circulation, double t_s, bool on);
 /** Pressure in the common femoral vein (Pa) at time t: posture, breath, Valsalva
  *  (docs/interior.md). A function of t only. @thread any */
 SONDE_API double sonde_venous_pressure(const sonde_circulation *circulation, double t_s);

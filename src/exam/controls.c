@@ -38,6 +38,11 @@ sonde_session_controls sonde_controls_clean(const sonde_session_controls *wanted
   if (controls.probe >= probe_count) controls.probe = before->probe;
   controls.pathology = clean_pathology(wanted->pathology, &before->pathology);
   controls.echo = sonde_echo_settings_clamp(wanted->echo);
+  if ((unsigned)controls.posture >= SONDE_POSTURE_COUNT) controls.posture = before->posture;
+  if (controls.preset >= SONDE_SESSION_PRESETS) controls.preset = before->preset;
+  controls.stiffness_scale = keep_real(wanted->stiffness_scale, before->stiffness_scale, 0.5, 2.0);
+  controls.damping_scale = keep_real(wanted->damping_scale, before->damping_scale, 0.25, 4.0);
+  controls.friction_scale = keep_real(wanted->friction_scale, before->friction_scale, 0.0, 2.0);
   return controls;
 }
 

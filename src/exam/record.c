@@ -1,6 +1,6 @@
 // Writing a recording: a text header, fixed-size records, an end with hash and CRC-32.
 // emit:             bytes to the file and into the CRC.
-// put_tick, put_controls: one record as bytes.
+// put_tick:         one record as bytes.
 // json_*, header_json: the header line.
 // sonde_recorder_*: the interface.
 #include "exam/record.h"
@@ -34,34 +34,6 @@ static void put_tick(byte_writer *w, const sonde_record *record) {
   for (int i = 0; i < 7; ++i) put_real(w, numbers[i]);
 }
 
-static void put_controls(byte_writer *w, const sonde_record *record) {
-  const sonde_session_controls *c = &record->controls;
-  const sonde_pathology *p = &c->pathology;
-  const sonde_echo_settings *e = &c->echo;
-  const double numbers[14] = {e->frequency_hz,
-                              e->depth_m,
-                              e->gain_db,
-                              e->dynamic_range_db,
-                              e->focus_m,
-                              e->tgc_db_per_m,
-                              p->venous_pressure_pa,
-                              p->arterial_pressure_pa,
-                              p->thrombus_fraction,
-                              p->thrombus_modulus_pa,
-                              p->thrombus_from_m,
-                              p->thrombus_to_m,
-                              p->lumen_scale,
-                              p->echogenicity};
-  put_u32(w, SONDE_RECORD_CONTROLS);
-  put_u32(w, c->probe);
-  put_u64(w, record->tick);
-  put_u32(w, c->stop ? 1 : 0);
-  put_u32(w, c->resume);
-  for (int i = 0; i < 14; ++i) put_real(w, numbers[i]);
-  memcpy(w->at, p->name, sizeof p->name);
-  w->at += sizeof p->name;
-}
-
 void sonde_recorder_write(sonde_recorder *recorder, const sonde_record *record) {
   unsigned char bytes[SONDE_RECORD_CONTROLS_BYTES];
   byte_writer w = {bytes};
@@ -70,7 +42,8 @@ void sonde_recorder_write(sonde_recorder *recorder, const sonde_record *record) 
     SONDE_ASSERT(w.at == bytes + SONDE_RECORD_TICK_BYTES);
     recorder->ticks++;
   } else {
-    put_controls(&w, record);
+    put_u32(&w, SONDE_RECORD_CONTROLS);
+    sonde_controls_put(&w, record->tick, &record->controls);
     SONDE_ASSERT(w.at == bytes + SONDE_RECORD_CONTROLS_BYTES);
   }
   emit(recorder, bytes, (size_t)(w.at - bytes));
@@ -113,6 +86,7 @@ static char *header_json(const sonde_record_head *head) {
     cJSON_AddItemToArray(probes, probe);
   }
   json_world(root, &head->world);
+  sonde_setup_write(root, &head->setup);
   char *text = cJSON_PrintUnformatted(root);
   cJSON_Delete(root);
   return text;

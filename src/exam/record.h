@@ -2,15 +2,16 @@
 #ifndef SONDE_SRC_RECORD_H
 #define SONDE_SRC_RECORD_H
 
-#include "sonde/exam.h"
+#include "exam/inputs.h"
 
 enum {
-  SONDE_RECORD_VERSION = 3,
+  SONDE_RECORD_VERSION = 4,
+  SONDE_RECORD_OLDEST = 3,
   SONDE_RECORD_TICK = 1,
   SONDE_RECORD_CONTROLS = 2,
   SONDE_RECORD_END = 3,
   SONDE_RECORD_TICK_BYTES = 80,
-  SONDE_RECORD_CONTROLS_BYTES = 168,
+  SONDE_RECORD_CONTROLS_BYTES = 4 + SONDE_CONTROLS_BYTES,
   SONDE_RECORD_END_BYTES = 40,
   SONDE_RECORD_PATH_BYTES = 512,
 };
@@ -31,6 +32,7 @@ typedef struct sonde_record_head {
   const char *model_path, *model_name;
   uint64_t model_checksum;
   sonde_world_def world;
+  sonde_setup setup;
   uint32_t probe_count;
   const sonde_probe *probes;      // borrowed
   const char *const *probe_names; // [probe_count] as given to sonde_probe_create
@@ -57,6 +59,8 @@ typedef struct sonde_recording {
   char model_path[SONDE_RECORD_PATH_BYTES], model_name[64];
   uint64_t model_checksum;
   sonde_world_def world;
+  sonde_setup setup;
+  int version; // of the file
   uint32_t probe_count;
   char (*probe_names)[SONDE_RECORD_PATH_BYTES];
   uint64_t *probe_hashes;

@@ -2,7 +2,7 @@
 // text_of, real_of, hash_of:         members of the header that must be there.
 // read_model, read_probes, read_world: parts of the header.
 // read_magic, read_header, read_end: the three parts of the file.
-// decode_tick, decode_controls:      one record.
+// decode_tick:                       one record.
 // check_records:                     walks all of them.
 #include "exam/record.h"
 
@@ -125,9 +125,11 @@ static sonde_status read_magic(const source *s) {
   if (!named || *end != '\n')
     return sonde_fail(s->error, SONDE_FORMAT, "%s:1: not a recording, expected \"%s %d\"", s->path,
                       SONDE_RECORD_MAGIC, SONDE_RECORD_VERSION);
-  if (version != SONDE_RECORD_VERSION)
-    return sonde_fail(s->error, SONDE_VERSION, "%s:1: version %ld of a recording, expected %d",
-                      s->path, version, SONDE_RECORD_VERSION);
+  if (version < SONDE_RECORD_OLDEST || version > SONDE_RECORD_VERSION)
+    return sonde_fail(s->error, SONDE_VERSION,
+                      "%s:1: version %ld of a recording, expected %d to %d", s->path, version,
+                      SONDE_RECORD_OLDEST, SONDE_RECORD_VERSION);
+  r->version = (int)version;
   r->at = (size_t)(end + 1 - r->bytes);
   return SONDE_OK;
 }
@@ -143,6 +145,7 @@ static sonde_status read_header(const source *s) {
   sonde_status status = read_model(s, root);
   if (!status) status = read_probes(s, root);
   if (!status) status = read_world(s, root);
+  if (!status && !sonde_setup_read(root, &r->setup)) status = fail_header(s, "setup");
   cJSON_Delete(root);
   r->at = (size_t)(end + 1 - r->bytes);
   return status;
@@ -179,33 +182,19 @@ static void decode_tick(byte_reader *reader, sonde_record *record) {
   record->sample.world_from_probe = (sonde_pose){{n[0], n[1], n[2]}, {n[3], n[4], n[5], n[6]}};
 }
 
-static void decode_controls(byte_reader *reader, sonde_record *record) {
-  sonde_session_controls *c = &record->controls;
-  c->probe = get_u32(reader);
-  record->tick = get_u64(reader);
-  c->stop = get_u32(reader) & 1;
-  c->resume = get_u32(reader);
-  double n[14];
-  for (int i = 0; i < 14; ++i) n[i] = get_real(reader);
-  c->echo = (sonde_echo_settings){n[0], n[1], n[2], n[3], n[4], n[5]};
-  c->pathology = (sonde_pathology){"", n[6], n[7], n[8], n[9], n[10], n[11], n[12], n[13], 0};
-  memcpy(c->pathology.name, reader->at, sizeof c->pathology.name);
-  c->pathology.name[sizeof c->pathology.name - 1] = 0;
-}
-
 bool sonde_recording_next(sonde_recording *r, sonde_record *record) {
   SONDE_ASSERT(r->at <= r->end);
   *record = (sonde_record){0};
   if (r->end - r->at < SONDE_RECORD_TICK_BYTES) return false;
   byte_reader reader = {(const unsigned char *)r->bytes + r->at};
   record->tag = get_u32(&reader);
-  size_t bytes =
-      record->tag == SONDE_RECORD_TICK ? SONDE_RECORD_TICK_BYTES : SONDE_RECORD_CONTROLS_BYTES;
+  size_t controls = 4 + (r->version > 3 ? SONDE_CONTROLS_BYTES : SONDE_CONTROLS_BYTES_3);
+  size_t bytes = record->tag == SONDE_RECORD_TICK ? SONDE_RECORD_TICK_BYTES : controls;
   if (r->end - r->at < bytes) return false;
   if (record->tag == SONDE_RECORD_TICK)
     decode_tick(&reader, record);
   else if (record->tag == SONDE_RECORD_CONTROLS)
-    decode_controls(&reader, record);
+    sonde_controls_get(&reader, r->version, &record->tick, &record->controls);
   else
     return false;
   r->at += bytes;

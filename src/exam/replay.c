@@ -2,6 +2,7 @@
 // create_probes: the recorded probes, checked to have the recorded shape.
 // play:          all records.
 #include "exam/record.h"
+#include "exam/subject.h"
 
 #include "base/base.h"
 
@@ -35,17 +36,19 @@ static sonde_status check_model(const char *path, const sonde_recording *recordi
                     model->name, (unsigned long long)model->checksum);
 }
 
-static sonde_status play(sonde_recording *recording, const sonde_probe *probes, sonde_state *state,
-                         const sonde_progress *progress, sonde_error *error) {
+static sonde_status play(sonde_recording *recording, const sonde_probe *probes,
+                         sonde_subject *subject, const sonde_progress *progress,
+                         sonde_error *error) {
   uint32_t probe = 0;
   sonde_record record;
   while (sonde_recording_next(recording, &record)) {
     if (record.tag == SONDE_RECORD_CONTROLS) {
       probe = record.controls.probe;
+      sonde_subject_control(subject, &record.controls);
       continue;
     }
-    SONDE_ASSERT(probe < recording->probe_count && sonde_state_tick(state) == record.tick);
-    sonde_step(state, &probes[probe], record.sample.world_from_probe);
+    SONDE_ASSERT(probe < recording->probe_count && sonde_state_tick(subject->state) == record.tick);
+    sonde_subject_step(subject, &probes[probe], record.sample.world_from_probe);
     double fraction = (double)(record.tick + 1) / (double)recording->ticks;
     if (record.tick % 256 == 255 && !sonde_progress_report(progress, fraction, "replay"))
       return sonde_fail(error, SONDE_CANCELLED, "the replay was cancelled after %llu of %llu ticks",
@@ -61,23 +64,26 @@ sonde_status sonde_replay_run(const char *path, const sonde_model *model,
   *result = (sonde_replay_result){0};
   sonde_recording recording;
   sonde_probe *probes = NULL;
-  sonde_state *state = NULL;
+  sonde_subject *subject = NULL;
   sonde_status status = sonde_recording_load(path, &recording, error);
   if (status) return status;
   uint32_t probe_count = recording.probe_count;
   status = check_model(path, &recording, model, error);
   if (!status && !(probes = SONDE_NEW(sonde_probe, probe_count))) status = sonde_fail_memory(error);
   if (!status) status = create_probes(path, &recording, probes, error);
-  if (!status) status = sonde_state_create(model, &recording.world, &state, error);
-  if (!status) status = play(&recording, probes, state, progress, error);
-  if (state) {
-    *result = (sonde_replay_result){.ticks = sonde_state_tick(state),
+  sonde_session_controls first = sonde_session_def_default().controls; // the first record has them
+  if (!status)
+    status =
+        sonde_subject_create(&recording.setup, model, &recording.world, &first, &subject, error);
+  if (!status) status = play(&recording, probes, subject, progress, error);
+  if (subject) {
+    *result = (sonde_replay_result){.ticks = sonde_state_tick(subject->state),
                                     .recorded_hash = recording.hash,
-                                    .hash = sonde_state_hash(state)};
+                                    .hash = sonde_state_hash(subject->state)};
     result->same = !status && result->hash == result->recorded_hash;
   }
   memcpy(result->model_path, recording.model_path, sizeof result->model_path);
-  sonde_state_destroy(state);
+  sonde_subject_destroy(subject);
   destroy_probes(probes, probe_count);
   sonde_recording_clear(&recording);
   return status;

@@ -1,6 +1,6 @@
 // Life of a session.
 // check:           the definition.
-// create_probes, create_boxes, create_recording: parts of a session, in this order.
+// create_probes, create_boxes, create_lines, create_recording: parts of a session, in this order.
 // release:         frees whatever exists.
 // sonde_session_*: the interface; ticks are in session_hot.c, threads in session_threads.c.
 #include "exam/session.h"
@@ -15,6 +15,7 @@ sonde_session_def sonde_session_def_default(void) {
   sonde_session_def def = {.world = sonde_world_def_default(),
                            .limits = sonde_safety_limits_default(),
                            .rendering = sonde_render_def_default(),
+                           .circulation = sonde_circulation_default(),
                            .image_width = 512,
                            .image_height = 512,
                            .ticks_per_image = 20};
@@ -23,6 +24,7 @@ sonde_session_def sonde_session_def_default(void) {
   def.world.pcg.absolute_residual = 1e-3 * def.world.dt_s; // 1 mN
   def.world.sleep_displacement_m = 20e-6;
   def.controls.echo = sonde_echo_settings_default();
+  def.controls.stiffness_scale = def.controls.damping_scale = def.controls.friction_scale = 1;
   sonde_status status = sonde_pathology_preset("healthy", &def.controls.pathology, NULL);
   SONDE_ASSERT(status == SONDE_OK);
   return def;
@@ -30,6 +32,26 @@ sonde_session_def sonde_session_def_default(void) {
 
 static const char *const *probe_names(const sonde_session_def *def) {
   return def->probe_names ? def->probe_names : sonde_probe_names();
+}
+
+static sonde_status check_patient(const sonde_session_def *def, sonde_error *error) {
+  const sonde_circulation *c = &def->circulation;
+  const double numbers[] = {c->heart_rate_hz,  c->systolic_pa,     c->diastolic_pa,
+                            c->breath_rate_hz, c->valsalva_from_s, c->valsalva_to_s,
+                            c->breath_pa,      c->valsalva_pa};
+  for (size_t i = 0; i < SONDE_COUNT_OF(numbers); ++i)
+    if (!isfinite(numbers[i]))
+      return sonde_fail(error, SONDE_ARGUMENT, "session: a circulation with a number that is none");
+  if (!(def->gel_m3 >= 0 && def->gel_m3 <= 1e-3))
+    return sonde_fail(error, SONDE_ARGUMENT, "session: %g m^3 of gel, expected 0 to 0.001",
+                      def->gel_m3);
+  if (def->preset_count > SONDE_SESSION_PRESETS)
+    return sonde_fail(error, SONDE_ARGUMENT, "session: %u presets, expected at most %d",
+                      def->preset_count, SONDE_SESSION_PRESETS);
+  sonde_status status = SONDE_OK;
+  for (uint32_t i = 0; i < def->preset_count && !status; ++i)
+    status = sonde_preset_apply(&def->presets[i], NULL, NULL, error);
+  return status;
 }
 
 static sonde_status check(const sonde_session_def *def, const sonde_device *device,
@@ -48,7 +70,7 @@ static sonde_status check(const sonde_session_def *def, const sonde_device *devi
                       def->image_width, def->image_height);
   if (def->ticks_per_image == 0)
     return sonde_fail(error, SONDE_ARGUMENT, "session: 0 ticks per image, expected 1 or more");
-  return SONDE_OK;
+  return check_patient(def, error);
 }
 
 static sonde_status create_probes(sonde_session *session, const char *const *names,
@@ -77,6 +99,7 @@ static sonde_status create_boxes(sonde_session *session, sonde_error *error) {
   size_t surface_end = sizeof(sonde_surface_slot), frame_end = sizeof(sonde_frame);
   session->positions_at = place(&surface_end, vectors);
   session->forces_at = place(&surface_end, vectors);
+  session->film_at = place(&surface_end, session->nodes * sizeof(double));
   session->skin_at = place(&frame_end, 3 * session->nodes * sizeof(float));
   session->pixels_at = place(&frame_end, (size_t)session->image_width * session->image_height);
   sonde_status status =
@@ -84,6 +107,17 @@ static sonde_status create_boxes(sonde_session *session, sonde_error *error) {
   if (!status) status = sonde_mailbox_create(surface_end, &session->surface_box, error);
   if (!status) status = sonde_mailbox_create(frame_end, &session->frame_box, error);
   return status;
+}
+
+// One coupling per line of the image.
+static sonde_status create_lines(sonde_session *session, sonde_error *error) {
+  uint32_t samples;
+  sonde_echo_envelope(session->echo, &session->lines, &samples);
+  session->line_m = SONDE_NEW(sonde_vec3, session->lines);
+  session->line_coupling = SONDE_NEW(float, session->lines);
+  session->touched = SONDE_NEW(uint32_t, session->nodes);
+  if (session->line_m && session->line_coupling && session->touched) return SONDE_OK;
+  return sonde_fail_memory(error);
 }
 
 static sonde_status create_recording(sonde_session *session, const sonde_session_def *def,
@@ -96,6 +130,7 @@ static sonde_status create_recording(sonde_session *session, const sonde_session
                             .model_name = def->model->name,
                             .model_checksum = def->model->checksum,
                             .world = *sonde_state_def(session->state),
+                            .setup = session->subject->setup,
                             .probe_count = session->probe_count,
                             .probes = session->probes,
                             .probe_names = probe_names(def)};
@@ -110,7 +145,6 @@ static sonde_status create_recording(sonde_session *session, const sonde_session
 static sonde_status create_parts(sonde_session *session, const sonde_session_def *def,
                                  sonde_error *error) {
   sonde_status status = create_probes(session, probe_names(def), error);
-  if (!status) status = sonde_state_create(def->model, &def->world, &session->state, error);
   if (!status)
     status = sonde_surface_index_create(&def->model->surface, &session->rest_skin, error);
   if (!status) status = sonde_interior_create(def->model, &session->interior, error);
@@ -118,9 +152,15 @@ static sonde_status create_parts(sonde_session *session, const sonde_session_def
   if (!status)
     status = sonde_echo_create(session->interior, &(sonde_echo_def){0}, &session->echo, error);
   if (!status) status = create_boxes(session, error);
+  if (!status) status = create_lines(session, error);
   if (status) return status;
   session->controls =
       sonde_controls_clean(&def->controls, &session->controls, session->probe_count);
+  sonde_setup setup = sonde_setup_of(def);
+  status = sonde_subject_create(&setup, def->model, &def->world, &session->controls,
+                                &session->subject, error);
+  if (status) return status;
+  session->state = session->subject->state;
   sonde_shared_controls_set(&session->requested, &session->controls);
   if (session->controls.stop) sonde_safety_trip(&session->safety, SONDE_FAULT_STOPPED);
   return create_recording(session, def, error);
@@ -135,7 +175,10 @@ static void release(sonde_session *session) {
   sonde_echo_destroy(session->echo);
   sonde_interior_destroy(session->interior);
   sonde_surface_index_destroy(session->rest_skin);
-  sonde_state_destroy(session->state);
+  sonde_subject_destroy(session->subject);
+  sonde_free(session->line_m);
+  sonde_free(session->line_coupling);
+  sonde_free(session->touched);
   for (uint32_t i = 0; i < session->probe_count; ++i) sonde_probe_clear(&session->probes[i]);
   sonde_free(session->probes);
   sonde_free(session);
@@ -156,13 +199,14 @@ sonde_status sonde_session_create(const sonde_session_def *def, sonde_device *de
   session->image_width = def->image_width;
   session->image_height = def->image_height;
   session->sample.world_from_probe.rotation = quat_identity();
-  session->controls.echo = sonde_echo_settings_default();
+  session->controls = sonde_session_def_default().controls;
+  session->has_findings = def->findings != NULL;
+  if (def->findings) session->findings = *def->findings;
   sonde_safety_init(&session->safety, &def->limits);
   sonde_render_def rendering = def->rendering;
   rendering.dt_s = session->dt_s;
   sonde_render_init(&session->render, &rendering);
-  status = sonde_pathology_preset("healthy", &session->controls.pathology, error);
-  if (!status) status = create_parts(session, def, error);
+  status = create_parts(session, def, error);
   if (status) {
     release(session);
     return status;
@@ -210,6 +254,11 @@ void sonde_session_control(sonde_session *session, const sonde_session_controls 
 
 sonde_session_controls sonde_session_controls_now(const sonde_session *session) {
   return sonde_shared_controls_get(&session->requested);
+}
+
+sonde_preset sonde_session_preset(const sonde_session *session) {
+  sonde_session_controls controls = sonde_shared_controls_get(&session->requested);
+  return sonde_setup_preset(&session->subject->setup, &controls);
 }
 
 sonde_device *sonde_session_device(sonde_session *session) { return &session->device; }

@@ -11,6 +11,7 @@
 #include "base/mailbox.h"
 #include "base/ring.h"
 #include "exam/record.h"
+#include "exam/subject.h"
 
 #include <pthread.h>
 #include <stdatomic.h>
@@ -29,10 +30,13 @@ sonde_session_controls sonde_controls_clean(const sonde_session_controls *wanted
                                             const sonde_session_controls *before,
                                             uint32_t probe_count);
 
-// What the image of one tick is made from; in a mailbox slot, followed by the two arrays.
+// What the image of one tick is made from; in a mailbox slot, followed by positions, forces and
+// film.
 typedef struct sonde_surface_slot {
   sonde_snapshot snapshot;
   sonde_session_controls controls;
+  sonde_pathology pathology; // of the controls, with the pressures of this tick
+  sonde_circulation circulation;
   double pose_s; // clock when the tick read its pose; 0 in lockstep
 } sonde_surface_slot;
 
@@ -55,10 +59,11 @@ struct sonde_session {
   uint32_t ticks_per_image;
   uint32_t image_width, image_height;
   size_t nodes;
-  size_t positions_at, forces_at, skin_at, pixels_at; // offsets inside mailbox slots
+  size_t positions_at, forces_at, film_at, skin_at, pixels_at; // offsets inside mailbox slots
 
   // tick
-  sonde_state *state;
+  sonde_subject *subject;
+  sonde_state *state; // the subject's
   sonde_safety safety;
   sonde_render render;
   sonde_session_controls controls; // in force
@@ -73,7 +78,13 @@ struct sonde_session {
   sonde_surface_index *rest_skin;
   sonde_interior *interior;
   sonde_echo *echo;
-  sonde_pathology shown_pathology;
+  sonde_pathology shown_pathology; // of the controls
+  uint32_t lines;                  // of the image
+  sonde_vec3 *line_m;              // [lines] where each starts
+  float *line_coupling;            // [lines]
+  uint32_t *touched;               // [nodes] scratch
+  sonde_findings findings;
+  bool has_findings;
   atomic_bool surface_wanted;      // the image thread waits for a surface
   bool shown;                      // an image was made
   sonde_session_beam beam, coming; // of the images; being built

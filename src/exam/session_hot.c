@@ -11,6 +11,7 @@
 #include "base/clock.h"
 #include "base/maths.h"
 #include "haptics/motion.h"
+#include "sonde/haptics_gel.h"
 
 #include <string.h>
 
@@ -30,6 +31,7 @@ static void take_controls(sonde_session *session, uint64_t tick) {
   session->controls = *newest;
   SONDE_ASSERT(session->controls.probe < session->probe_count);
   if (resume && !newest->stop) sonde_safety_resume(&session->safety);
+  sonde_subject_control(session->subject, newest);
   sonde_record record = {.tag = SONDE_RECORD_CONTROLS, .tick = tick};
   record.controls = session->controls;
   push(session, &record);
@@ -79,6 +81,8 @@ static void fill_snapshot(const sonde_session *session, sonde_snapshot *snapshot
       .vein_short_m = (double)NAN,
       .vein_rest_m = vec3((double)NAN, (double)NAN, (double)NAN),
       .vein_tilt_rad = (double)NAN,
+      .gel_volume_m3 = (double)NAN,
+      .gel_coupling = (double)NAN,
       .awake_nodes = sonde_state_awake(session->state),
       .solver_iterations = sonde_state_solver(session->state).iterations,
       .flags = sonde_state_flags(session->state),
@@ -98,10 +102,15 @@ static void offer_surface(sonde_session *session) {
   sonde_surface_slot *head = (sonde_surface_slot *)(void *)slot;
   fill_snapshot(session, &head->snapshot);
   head->controls = session->controls;
+  head->pathology = sonde_subject_pathology(session->subject);
+  head->circulation = session->subject->now.circulation;
   head->pose_s = session->last_tick_s;
   size_t bytes = session->nodes * sizeof(sonde_vec3);
   memcpy(slot + session->positions_at, sonde_state_positions(session->state), bytes);
   memcpy(slot + session->forces_at, sonde_state_contact_forces(session->state), bytes);
+  if (session->controls.gel)
+    memcpy(slot + session->film_at, sonde_gel_film(session->subject->gel),
+           session->nodes * sizeof(double));
   session->offered_tick = head->snapshot.tick;
   sonde_mailbox_publish(session->surface_box);
 }
@@ -111,7 +120,7 @@ void sonde_session_step(sonde_session *session) {
   take_controls(session, tick);
   read_device(session, tick);
   const sonde_probe *probe = &session->probes[session->controls.probe];
-  sonde_step(session->state, probe, session->sample.world_from_probe);
+  sonde_subject_step(session->subject, probe, session->sample.world_from_probe);
   if (sonde_state_flags(session->state) & SONDE_FLAG_NON_FINITE)
     sonde_safety_trip(&session->safety, SONDE_FAULT_NON_FINITE);
   const sonde_contact *contact = sonde_state_contact(session->state);

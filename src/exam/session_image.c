@@ -4,6 +4,7 @@
 // tilt:               between a vessel and the normal of the image plane.
 // read_vessels, read_branches: what the image plane cuts.
 // choose_beam:        the one asked for when it is ready, else the last one.
+// couple, volume:     what the gel does to the image, and how much there is.
 // fill_frame:         everything into one slot.
 // count_latency:      how old the frame's pose is when the frame is finished.
 // sonde_session_show: one image. sonde_session_latency: percentiles.
@@ -12,6 +13,7 @@
 #include "base/base.h"
 #include "base/clock.h"
 #include "base/maths.h"
+#include "haptics/gel.h"
 
 #include <string.h>
 
@@ -32,7 +34,7 @@ static double penetration(const sonde_session *session, sonde_pose pose) {
 static void update_interior(sonde_session *session, const unsigned char *slot) {
   const sonde_surface_slot *head = (const void *)slot;
   const sonde_pathology *pathology = &head->controls.pathology;
-  // another vein, not the same one in motion: it starts in equilibrium
+  // another vein, not the same one in motion or under another pressure: it starts in equilibrium
   bool same =
       session->shown && memcmp(&session->shown_pathology, pathology, sizeof *pathology) == 0;
   double since_s = (double)(head->snapshot.tick - session->shown_tick) * session->dt_s;
@@ -40,7 +42,7 @@ static void update_interior(sonde_session *session, const unsigned char *slot) {
       .positions_m = (const void *)(slot + session->positions_at),
       .contact_forces_n = (const void *)(slot + session->forces_at),
       .world_from_probe = head->snapshot.world_from_probe,
-      .pathology = pathology,
+      .pathology = &head->pathology,
       .dt_s = same ? since_s : -1.0,
       .tick = head->snapshot.tick,
       .face_half_x_m = session->probes[head->snapshot.probe].half_x_m,
@@ -108,6 +110,36 @@ static void choose_beam(sonde_session *session, const sonde_echo_settings *asked
   session->building = false;
 }
 
+// Gel and air below each line of the image in use; returns their mean, NaN without gel.
+static double couple(sonde_session *session, const unsigned char *slot) {
+  const sonde_surface_slot *head = (const void *)slot;
+  if (!head->controls.gel) {
+    sonde_echo_set_coupling(session->echo, NULL);
+    return (double)NAN;
+  }
+  double sum = 0, width_m = session->beam.aperture_m;
+  for (uint32_t l = 0; l < session->lines; ++l) {
+    double across_m = width_m * ((double)l / (session->lines - 1) - 0.5);
+    session->line_m[l] = pose_apply(head->snapshot.world_from_probe, vec3(across_m, 0, 0));
+  }
+  sonde_gel_coupling_of(session->subject->gel, (const void *)(slot + session->film_at),
+                        session->touched, (const void *)(slot + session->positions_at),
+                        (const void *)(slot + session->forces_at), session->line_m, session->lines,
+                        session->line_coupling);
+  for (uint32_t l = 0; l < session->lines; ++l) sum += (double)session->line_coupling[l];
+  sonde_echo_set_coupling(session->echo, session->line_coupling);
+  return sum / session->lines;
+}
+
+static double volume(const sonde_session *session, const unsigned char *slot) {
+  const sonde_surface_slot *head = (const void *)slot;
+  const double *film_m = (const void *)(slot + session->film_at);
+  double sum = 0;
+  if (!head->controls.gel) return (double)NAN;
+  for (size_t i = 0; i < session->nodes; ++i) sum += film_m[i] * session->model->area_m2[i];
+  return sum;
+}
+
 static void fill_frame(sonde_session *session, const unsigned char *slot, unsigned char *out) {
   const sonde_surface_slot *head = (const void *)slot;
   const sonde_vec3 *positions_m = (const void *)(slot + session->positions_at);
@@ -122,12 +154,14 @@ static void fill_frame(sonde_session *session, const unsigned char *slot, unsign
                        .pixels = out + session->pixels_at};
   double aperture_m = 2.0 * session->probes[head->snapshot.probe].half_x_m;
   choose_beam(session, &head->controls.echo, aperture_m);
+  double coupling = couple(session, slot);
   sonde_echo_settings settings = with_beam(&session->beam, head->controls.echo);
   sonde_echo_flow flow = sonde_echo_flow_default();
   flow.t_s = (double)head->snapshot.tick * session->dt_s;
+  if (session->subject->setup.circulate) flow.circulation = head->circulation;
   sonde_echo_set_flow(session->echo, &flow);
   sonde_echo_render(session->echo, head->snapshot.world_from_probe, session->beam.aperture_m,
-                    &head->controls.pathology, &settings, &image);
+                    &head->pathology, &settings, &image);
   SONDE_ASSERT(sonde_interior_tick(session->interior) == head->snapshot.tick);
   sonde_frame *frame = (sonde_frame *)(void *)out;
   *frame = (sonde_frame){.snapshot = head->snapshot,
@@ -137,6 +171,10 @@ static void fill_frame(sonde_session *session, const unsigned char *slot, unsign
                          .height = image.height,
                          .width_m = image.width_m,
                          .height_m = image.height_m};
+  frame->snapshot.gel_coupling = coupling;
+  frame->snapshot.gel_volume_m3 = volume(session, slot);
+  frame->snapshot.venous_pressure_pa = head->pathology.venous_pressure_pa;
+  frame->snapshot.arterial_pressure_pa = head->pathology.arterial_pressure_pa;
   frame->snapshot.penetration_m = penetration(session, head->snapshot.world_from_probe);
   read_vessels(session, &frame->snapshot);
 }

@@ -20,8 +20,6 @@ struct sonde_gel {
 // pressure is that of the first part. @thread tick
 void sonde_gel_part(sonde_gel *gel, const sonde_vec3 *contact_n, sonde_vec3 probe_m_s, double dt_s,
                     uint32_t part, uint32_t parts);
-// Takes over a film as it was. @thread tick
-void sonde_gel_restore(sonde_gel *gel, const double *film_m, const double *moisture);
 // sonde_gel_coupling() with another film [nodes] and scratch [nodes] of the caller.
 void sonde_gel_coupling_of(const sonde_gel *gel, const double *film_m, uint32_t *touched,
                            const sonde_vec3 *skin_m, const sonde_vec3 *contact_n,

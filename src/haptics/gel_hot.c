@@ -15,8 +15,6 @@
 #include "base/maths.h"
 #include "haptics/gel.h"
 
-#include <string.h>
-
 static const double weight_pa_m = 1e4; // density times gravity
 static const double least_m = 1e-9;    // a film of molecules does not flow
 static const double reach_m = 4e-3;    // skin that far from a point of the face touches it
@@ -155,13 +153,6 @@ void sonde_gel_coupling_of(const sonde_gel *gel, const double *film_m, uint32_t 
 void sonde_gel_coupling(const sonde_gel *gel, const sonde_vec3 *skin_m, const sonde_vec3 *contact_n,
                         const sonde_vec3 *point_m, uint32_t count, float *share) {
   sonde_gel_coupling_of(gel, gel->film_m, gel->touched, skin_m, contact_n, point_m, count, share);
-}
-
-void sonde_gel_restore(sonde_gel *gel, const double *film_m, const double *moisture) {
-  SONDE_ASSERT(film_m != NULL && moisture != NULL);
-  size_t bytes = gel->model->surface.vertex_count * sizeof(double);
-  memcpy(gel->film_m, film_m, bytes);
-  memcpy(gel->moisture, moisture, bytes);
 }
 
 const double *sonde_gel_film(const sonde_gel *gel) { return gel->film_m; }

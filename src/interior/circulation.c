@@ -2,6 +2,7 @@
 //
 // sonde_venous_pressure    posture + breath + Valsalva
 // sonde_arterial_pressure  a pulse of two waves between diastolic and systolic
+// rising_for               inverse of the rise
 // strain_share             rise, plateau and fall of a Valsalva manoeuvre
 #include "base/base.h"
 #include "interior/interior.h"
@@ -29,6 +30,18 @@ static double smooth(double x) {
 static double strain_share(const sonde_circulation *c, double t) {
   if (!(c->valsalva_to_s > c->valsalva_from_s)) return 0;
   return smooth((t - c->valsalva_from_s) / rise_s) * (1 - smooth((t - c->valsalva_to_s) / rise_s));
+}
+
+// Time since a smooth rise began that has reached `share`: the root of 3 x^2 - 2 x^3 = share.
+static double rising_for(double share) {
+  return rise_s * (0.5 - sin(asin(clamp(1 - 2 * share, -1, 1)) / 3));
+}
+
+void sonde_circulation_strain(sonde_circulation *c, double t, bool on) {
+  SONDE_ASSERT(c != NULL && isfinite(t));
+  double share = strain_share(c, t);
+  c->valsalva_from_s = on ? t - rising_for(share) : (double)-INFINITY;
+  c->valsalva_to_s = on ? (double)INFINITY : t - rising_for(1 - share);
 }
 
 // Inspiration raises the pressure in the belly and with it that of the leg's veins. A strain holds

@@ -194,13 +194,14 @@ static void records_survive_the_file(void **state) {
   sonde_probe probe;
   assert_int_equal(sonde_probe_create("linear", &probe, NULL), SONDE_OK);
   const char *name = "linear";
-  sonde_record_head head = {"a \"quoted\"\npath",
-                            model->name,
-                            0xfedcba9876543210u,
-                            sonde_world_def_default(),
-                            1,
-                            &probe,
-                            &name};
+  sonde_record_head head = {.model_path = "a \"quoted\"\npath",
+                            .model_name = model->name,
+                            .model_checksum = 0xfedcba9876543210u,
+                            .world = sonde_world_def_default(),
+                            .setup = sonde_setup_default(),
+                            .probe_count = 1,
+                            .probes = &probe,
+                            .probe_names = &name};
   head.world.dt_s = 1.0 / 3000.0; // needs all its digits
   sonde_recorder *recorder;
   assert_int_equal(sonde_recorder_create(path, &head, &recorder, NULL), SONDE_OK);

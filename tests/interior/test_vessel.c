@@ -239,8 +239,40 @@ static void diameters_follow_the_study(void **state) {
   assert_true(worst_short < 0.8 && worst_long < 1.0);
 }
 
+// A strain rises to its plateau and falls without a step, also when it is broken off half-way or
+// begun again while it falls; between two switches it does what a timed one does.
+static void strains_have_no_step(void **state) {
+  (void)state;
+  sonde_circulation c = sonde_circulation_default();
+  c.breath_pa = 0;
+  double rest_pa = sonde_venous_pressure(&c, 0), before = rest_pa, most = 0;
+  for (int k = 0; k < 4000; ++k) {
+    double t = 1e-3 * k;
+    if (k == 500) sonde_circulation_strain(&c, t, true);
+    if (k == 750) sonde_circulation_strain(&c, t, false);
+    if (k == 900) sonde_circulation_strain(&c, t, true);
+    if (k == 2500) sonde_circulation_strain(&c, t, false);
+    double now = sonde_venous_pressure(&c, t);
+    assert_true(fabs(now - before) < 1.6 * c.valsalva_pa * 1e-3 / 0.6); // the rise's steepest slope
+    before = now;
+    most = fmax(most, now);
+  }
+  assert_near(most, rest_pa + c.valsalva_pa, 1e-9);
+  assert_near(before, rest_pa, 1e-9);
+  sonde_circulation timed = c, switched = c;
+  timed.valsalva_from_s = 1, timed.valsalva_to_s = 3;
+  switched.valsalva_from_s = switched.valsalva_to_s = 0;
+  sonde_circulation_strain(&switched, 1, true);
+  for (double t = 1; t < 3; t += 0.05)
+    assert_near(sonde_venous_pressure(&switched, t), sonde_venous_pressure(&timed, t), 1e-9);
+  sonde_circulation_strain(&switched, 3, false);
+  for (double t = 3; t < 5; t += 0.05)
+    assert_near(sonde_venous_pressure(&switched, t), sonde_venous_pressure(&timed, t), 1e-9);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
+      cmocka_unit_test(strains_have_no_step),
       cmocka_unit_test(rectangle_equals_integrated_point_loads),
       cmocka_unit_test(areas_follow_the_finite_element_study),
       cmocka_unit_test(closure_at_the_nominal_load),

@@ -1,0 +1,63 @@
+// The thigh under the probe: creation.
+// spread:  the gel of the start, equal shares around every site.
+// scale_friction, sonde_setup_preset: what the bench makes of a preset.
+#include "exam/subject.h"
+
+#include "base/base.h"
+#include "base/maths.h"
+#include "haptics/gel.h"
+
+// Shares overlap, so that the film is closed between the sites.
+static void spread(sonde_subject *subject) {
+  const sonde_model *model = subject->model;
+  const double radius_m = 0.02;
+  for (uint32_t i = 0; subject->setup.gel_m3 > 0 && i < model->site_count; ++i)
+    sonde_gel_put(subject->gel, model->sites[i].position_m, radius_m,
+                  subject->setup.gel_m3 / model->site_count);
+}
+
+sonde_preset sonde_setup_preset(const sonde_setup *setup, const sonde_session_controls *c) {
+  SONDE_ASSERT(setup->preset_count <= SONDE_SESSION_PRESETS);
+  sonde_preset preset = sonde_preset_default();
+  preset.friction = setup->friction;
+  uint32_t last = setup->preset_count ? setup->preset_count - 1 : 0;
+  if (setup->preset_count) preset = setup->presets[c->preset < last ? c->preset : last];
+  preset.stiffness_scale *= c->stiffness_scale;
+  preset.damping_multiplier *= c->damping_scale;
+  preset.friction.mu_static *= c->friction_scale;
+  preset.friction.mu_kinetic *= c->friction_scale;
+  preset.friction.mu_gel *= c->friction_scale;
+  return preset;
+}
+
+sonde_status sonde_subject_create(const sonde_setup *setup, const sonde_model *model,
+                                  const sonde_world_def *world,
+                                  const sonde_session_controls *controls, sonde_subject **out,
+                                  sonde_error *error) {
+  *out = NULL;
+  sonde_subject *subject = SONDE_NEW(sonde_subject, 1);
+  if (!subject) return sonde_fail_memory(error);
+  subject->model = model;
+  subject->setup = *setup;
+  subject->dt_s = world->dt_s;
+  subject->now.circulation = setup->circulation;
+  sonde_status status = sonde_state_create(model, world, &subject->state, error);
+  if (!status) status = sonde_gel_create(model, NULL, &subject->gel, error);
+  if (status) {
+    sonde_subject_destroy(subject);
+    return status;
+  }
+  spread(subject);
+  subject->now.controls = *controls;
+  subject->now.controls.valsalva = false;
+  sonde_subject_control(subject, controls);
+  *out = subject;
+  return SONDE_OK;
+}
+
+void sonde_subject_destroy(sonde_subject *subject) {
+  if (!subject) return;
+  sonde_gel_destroy(subject->gel);
+  sonde_state_destroy(subject->state);
+  sonde_free(subject);
+}

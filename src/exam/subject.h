@@ -1,0 +1,52 @@
+// The thigh under the probe with everything that acts on it besides the probe's pose: tissue and
+// friction in force, gel, circulation. A session and a replay drive it with the same inputs.
+#ifndef SONDE_SRC_SUBJECT_H
+#define SONDE_SRC_SUBJECT_H
+
+#include "exam/inputs.h"
+#include "sonde/haptics_gel.h"
+
+enum { SONDE_GEL_TICKS = 20 }; // of a step of the film, a part of it per tick
+
+// What moves in it besides world and film.
+typedef struct sonde_subject_moment {
+  sonde_session_controls controls; // in force
+  sonde_circulation circulation;   // with the posture and the strain of the controls
+  sonde_friction friction;         // in force
+  sonde_pose pose;                 // of the probe in the last tick
+  sonde_vec3 drift_m_s;            // of the probe, mean over about a step of the gel
+  bool placed, touching;
+} sonde_subject_moment;
+
+typedef struct sonde_subject {
+  const sonde_model *model; // borrowed
+  sonde_setup setup;
+  double dt_s;
+  sonde_state *state;
+  sonde_gel *gel;
+  sonde_subject_moment now;
+} sonde_subject;
+
+// At rest under these controls, gel spread, tissue tuned. @thread owner
+sonde_status sonde_subject_create(const sonde_setup *setup, const sonde_model *model,
+                                  const sonde_world_def *world,
+                                  const sonde_session_controls *controls, sonde_subject **subject,
+                                  sonde_error *error);
+void sonde_subject_destroy(sonde_subject *subject);
+// Other controls from the next step on. @thread tick
+void sonde_subject_control(sonde_subject *subject, const sonde_session_controls *controls);
+// One tick of world and gel. @thread tick
+void sonde_subject_step(sonde_subject *subject, const sonde_probe *probe, sonde_pose pose);
+// The case with the pressures of this tick. @thread tick
+sonde_pathology sonde_subject_pathology(const sonde_subject *subject);
+// Tissue and friction that controls ask for.
+sonde_preset sonde_setup_preset(const sonde_setup *setup, const sonde_session_controls *controls);
+
+// What has to be kept beside the state to go on from a tick: controls, strain, film, the step of
+// the film under way. @return bytes; `out` may be NULL to ask for them @thread tick
+size_t sonde_subject_save(const sonde_subject *subject, void *out);
+// Goes on from there with tissue and friction of the saved controls. It wakes every node: restore
+// the state after it. @thread tick
+void sonde_subject_restore(sonde_subject *subject, const void *saved);
+
+#endif

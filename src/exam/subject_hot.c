@@ -1,0 +1,126 @@
+// The thigh under the probe: controls and ticks.
+// apply_tissue:   springs and dampers of the preset in force.
+// apply_friction: its friction, with the film under the probe.
+// nearest_skin:   the node nearest to the probe's face, where it is now.
+// apply_gel:      what the counters ask for.
+// step_gel:       a part of the film's step.
+#include "exam/subject.h"
+
+#include "base/base.h"
+#include "base/maths.h"
+#include "haptics/gel.h"
+#include "world/state.h"
+
+#include <string.h>
+
+static const double portion_m3 = 2e-6, portion_radius_m = 0.015;
+
+static void apply_tissue(sonde_subject *subject) {
+  sonde_preset p = sonde_setup_preset(&subject->setup, &subject->now.controls);
+  sonde_tuning tuning = {p.stiffness_scale, p.damping_multiplier, p.normal_damping_s,
+                         p.edge_damping_s};
+  sonde_state_retune(subject->state, &tuning);
+}
+
+static void apply_friction(sonde_subject *subject) {
+  sonde_friction friction = sonde_setup_preset(&subject->setup, &subject->now.controls).friction;
+  if (subject->now.controls.gel) {
+    friction.gel_film = 0;
+    friction =
+        sonde_gel_friction(subject->gel, sonde_state_contact_forces(subject->state), &friction);
+  }
+  subject->now.friction = friction;
+  sonde_state_rub(subject->state, &friction);
+}
+
+static uint32_t nearest_skin(const sonde_subject *subject) {
+  const sonde_vec3 *skin_m = sonde_state_positions(subject->state);
+  uint32_t nearest = 0;
+  for (uint32_t i = 1; i < subject->model->surface.vertex_count; ++i)
+    if (v_norm2(v_sub(skin_m[i], subject->now.pose.position)) <
+        v_norm2(v_sub(skin_m[nearest], subject->now.pose.position)))
+      nearest = i;
+  return nearest;
+}
+
+// A counter that ran far ahead asks for no more than a few portions.
+static void apply_gel(sonde_subject *subject, const sonde_session_controls *before) {
+  const sonde_session_controls *now = &subject->now.controls;
+  uint32_t portions = now->gel_put - before->gel_put;
+  if (!subject->now.placed) return; // the counters count from the start
+  if (now->gel_wipe != before->gel_wipe) sonde_gel_wipe(subject->gel);
+  if (portions == 0) return;
+  sonde_vec3 centre_m = subject->model->surface.vertices[nearest_skin(subject)];
+  sonde_gel_put(subject->gel, centre_m, portion_radius_m, portion_m3 * fmin(portions, 5));
+}
+
+static bool same_tissue(const sonde_session_controls *a, const sonde_session_controls *b) {
+  return a->preset == b->preset && a->stiffness_scale == b->stiffness_scale &&
+         a->damping_scale == b->damping_scale;
+}
+
+void sonde_subject_control(sonde_subject *subject, const sonde_session_controls *controls) {
+  SONDE_ASSERT(controls->stiffness_scale > 0 && controls->friction_scale >= 0);
+  sonde_session_controls before = subject->now.controls;
+  double time_s = sonde_state_time(subject->state);
+  subject->now.controls = *controls;
+  subject->now.circulation.posture = controls->posture;
+  if (controls->valsalva != before.valsalva)
+    sonde_circulation_strain(&subject->now.circulation, time_s, controls->valsalva);
+  if (!subject->now.placed || !same_tissue(&before, controls)) apply_tissue(subject);
+  apply_gel(subject, &before);
+  apply_friction(subject);
+}
+
+static void step_gel(sonde_subject *subject) {
+  uint32_t part = (uint32_t)((sonde_state_tick(subject->state) - 1) % SONDE_GEL_TICKS);
+  sonde_gel_part(subject->gel, sonde_state_contact_forces(subject->state), subject->now.drift_m_s,
+                 SONDE_GEL_TICKS * subject->dt_s, part, SONDE_GEL_TICKS);
+  bool touching = sonde_state_contact(subject->state)->area_m2 > 0;
+  if (part + 1 == SONDE_GEL_TICKS || touching != subject->now.touching) apply_friction(subject);
+  subject->now.touching = touching;
+}
+
+void sonde_subject_step(sonde_subject *subject, const sonde_probe *probe, sonde_pose pose) {
+  sonde_subject_moment *now = &subject->now;
+  SONDE_ASSERT(subject->state != NULL && v_finite(pose.position));
+  sonde_vec3 way = now->placed ? v_sub(pose.position, now->pose.position) : vec3(0, 0, 0);
+  sonde_vec3 speed = v_scale(way, 1 / subject->dt_s);
+  now->drift_m_s = v_madd(now->drift_m_s, 1.0 / SONDE_GEL_TICKS, v_sub(speed, now->drift_m_s));
+  now->pose = pose;
+  now->placed = true;
+  sonde_step(subject->state, probe, pose);
+  if (now->controls.gel) step_gel(subject);
+}
+
+sonde_pathology sonde_subject_pathology(const sonde_subject *subject) {
+  sonde_pathology pathology = subject->now.controls.pathology;
+  if (subject->setup.circulate)
+    sonde_circulation_apply(&subject->now.circulation, sonde_state_tick(subject->state),
+                            subject->dt_s, &pathology);
+  return pathology;
+}
+
+size_t sonde_subject_save(const sonde_subject *subject, void *out) {
+  size_t bytes = subject->model->surface.vertex_count * sizeof(double);
+  const sonde_gel *gel = subject->gel;
+  const double *const arrays[] = {gel->film_m, gel->moisture, gel->change_m3, gel->push_pa};
+  char *to = out;
+  if (out) memcpy(to, &subject->now, sizeof subject->now);
+  for (size_t k = 0; out && k < SONDE_COUNT_OF(arrays); ++k)
+    memcpy(to + sizeof subject->now + k * bytes, arrays[k], bytes);
+  return sizeof subject->now + SONDE_COUNT_OF(arrays) * bytes;
+}
+
+void sonde_subject_restore(sonde_subject *subject, const void *saved) {
+  SONDE_ASSERT(saved != NULL);
+  size_t bytes = subject->model->surface.vertex_count * sizeof(double);
+  sonde_gel *gel = subject->gel;
+  double *const arrays[] = {gel->film_m, gel->moisture, gel->change_m3, gel->push_pa};
+  const char *from = saved;
+  memcpy(&subject->now, from, sizeof subject->now);
+  for (size_t k = 0; k < SONDE_COUNT_OF(arrays); ++k)
+    memcpy(arrays[k], from + sizeof subject->now + k * bytes, bytes);
+  apply_tissue(subject);
+  sonde_state_rub(subject->state, &subject->now.friction);
+}
