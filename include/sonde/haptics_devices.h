@@ -32,13 +32,33 @@ typedef struct sonde_device_open_def {
 SONDE_API sonde_status sonde_device_open(const char *name, const sonde_device_open_def *def,
                                          sonde_device *device, sonde_error *error);
 
+/** How a handle takes hold of the probe; zero means default. */
+typedef struct sonde_clutch_def {
+  sonde_pose world_from_probe; /**< where the probe is at the start; a zero rotation is none */
+  uint32_t buttons; /**< while one of them is pressed the probe stays where it is; 0: never */
+  double ramp_s;    /**< the force comes back within so long; default 0.1 */
+  double dt_s;      /**< a tick; default 1e-3 */
+} sonde_clutch_def;
+
+/**
+ * A device with a clutch around another one, `inner`, which is moved into it: the handle takes hold
+ * of the probe wherever the handle is - at the start, when the buttons are released and when a lost
+ * device comes back - and moves it from there as it moves itself. A handle with little room reaches
+ * everything in strokes, and no hold ever moves the probe. Forces go to the handle as they are,
+ * none while it does not hold the probe.
+ * @param inner zeroed; on failure it stays the caller's
+ * @return SONDE_ARGUMENT, SONDE_MEMORY @thread owner
+ */
+SONDE_API sonde_status sonde_device_clutch(const sonde_clutch_def *def, sonde_device *inner,
+                                           sonde_device *device, sonde_error *error);
+
 /** Counters of an opened driver. */
 typedef struct sonde_device_link {
   uint64_t exchanges; /**< poses that the vendor delivered */
   uint64_t losses;    /**< times that the device was lost */
   bool connected;
 } sonde_device_link;
-/** Zeros for a device that is not a driver. @thread any */
+/** Of a driver, also behind a clutch; zeros for other devices. @thread any */
 SONDE_API sonde_device_link sonde_device_link_of(const sonde_device *device);
 
 /** Built-in families, then the drivers, each with the reason why it is there or not.

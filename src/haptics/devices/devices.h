@@ -36,6 +36,20 @@ typedef struct sonde_page_device {
   double reach_m, turn_rad, share; // per tick
 } sonde_page_device;
 
+// The handle holds the probe while `holds`: probe = offset + handle, turned by grip.
+typedef struct sonde_clutch_device {
+  sonde_device inner;
+  uint32_t buttons;
+  sonde_pose probe;
+  sonde_vec3 offset_m;
+  sonde_quat grip;
+  double gain, gain_step; // of the force; per tick
+  bool holds;
+} sonde_clutch_device;
+
+void sonde_clutch_read(void *self, uint64_t tick, sonde_device_sample *sample);
+void sonde_clutch_write(void *self, sonde_vec3 force_n, sonde_vec3 torque_n_m);
+
 // Force is not rendered anywhere by the built-in families.
 void sonde_device_write_nothing(void *self, sonde_vec3 force_n, sonde_vec3 torque_n_m);
 void sonde_null_read(void *self, uint64_t tick, sonde_device_sample *sample);

@@ -6,6 +6,7 @@
 // thread_main:  the driver's thread.
 // find_driver:  by name.
 // describe:     one line of the list.
+#include "haptics/devices/devices.h"
 #include "haptics/devices/pump.h"
 
 #include "base/base.h"
@@ -202,6 +203,8 @@ sonde_status sonde_device_open(const char *name, const sonde_device_open_def *de
 
 sonde_device_link sonde_device_link_of(const sonde_device *device) {
   SONDE_ASSERT(device != NULL);
+  if (device->read == sonde_clutch_read)
+    return sonde_device_link_of(&((const sonde_clutch_device *)device->self)->inner);
   if (device->read != sonde_pump_read) return (sonde_device_link){0};
   const sonde_pump *pump = device->self;
   return (sonde_device_link){.exchanges = atomic_load(&pump->exchanges),
