@@ -163,6 +163,10 @@ typedef struct sonde_replay_result {
 SONDE_API sonde_status sonde_replay_run(const char *path, const sonde_model *model,
                                         const sonde_progress *progress, sonde_replay_result *result,
                                         sonde_error *error);
+/** A device that plays the poses of a recording again; absent after the
+ *  last. @return as sonde_replay_run() for an unusable file @thread owner */
+SONDE_API sonde_status sonde_device_recording(const char *path, sonde_device *device,
+                                              sonde_error *error);
 /** Path and checksum of the model that a recording was made on; checks the whole file.
  *  @param model_path [size] receives the path, cut to size; either output may be NULL
  *  @thread owner */

@@ -32,6 +32,11 @@ typedef struct sonde_device_open_def {
 SONDE_API sonde_status sonde_device_open(const char *name, const sonde_device_open_def *def,
                                          sonde_device *device, sonde_error *error);
 
+/** Frame of a driver's device on a table in front of its user, at a probe: to the right is the
+ *  probe's x, up is away from the skin, towards the user is the probe's y. Its origin is the probe's.
+ *  @return world_from_base; for another name as for openhaptics @thread any */
+SONDE_API sonde_pose sonde_device_base(const char *name, sonde_pose world_from_probe);
+
 /** How a handle takes hold of the probe; zero means default. */
 typedef struct sonde_clutch_def {
   sonde_pose world_from_probe; /**< where the probe is at the start; a zero rotation is none */

@@ -126,6 +126,29 @@ static void force_comes_back_slowly(void **state) {
   r.device.destroy(r.device.self);
 }
 
+// A device on the table: pulling the handle up takes the probe off the skin, to the right moves it
+// along its x, whatever axes the maker chose.
+static void bases_follow_the_user(void **state) {
+  (void)state;
+  sonde_pose probe = {vec3(1, 2, 3), quat_about(vec3(1, -2, 0.5), 0.8)};
+  const struct {
+    const char *name;
+    sonde_vec3 right, up, towards; // in the maker's axes
+  } device[] = {{"openhaptics", {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
+                {"forcedimension", {0, 1, 0}, {0, 0, 1}, {1, 0, 0}},
+                {"haply", {1, 0, 0}, {0, 0, 1}, {0, -1, 0}},
+                {"gamepad", {1, 0, 0}, {0, 0, 1}, {0, -1, 0}}};
+  for (size_t k = 0; k < SONDE_COUNT_OF(device); ++k) {
+    sonde_pose base = sonde_device_base(device[k].name, probe);
+    sonde_vec3 x = q_rotate(probe.rotation, vec3(1, 0, 0)),
+               y = q_rotate(probe.rotation, vec3(0, 1, 0));
+    sonde_vec3 out = q_rotate(probe.rotation, vec3(0, 0, -1));
+    assert_true(v_distance(q_rotate(base.rotation, device[k].right), x) < 1e-12);
+    assert_true(v_distance(q_rotate(base.rotation, device[k].up), out) < 1e-12);
+    assert_true(v_distance(q_rotate(base.rotation, device[k].towards), y) < 1e-12);
+  }
+}
+
 static void bad_definitions_are_named(void **state) {
   (void)state;
   handle h = {0};
@@ -143,6 +166,7 @@ static void bad_definitions_are_named(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(strokes_go_anywhere), cmocka_unit_test(taking_hold_moves_nothing),
-      cmocka_unit_test(force_comes_back_slowly), cmocka_unit_test(bad_definitions_are_named)};
+      cmocka_unit_test(force_comes_back_slowly), cmocka_unit_test(bases_follow_the_user),
+      cmocka_unit_test(bad_definitions_are_named)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -75,8 +75,10 @@ static void close_device(void *self) {
   *fd = (forcedimension){0};
 }
 
+// x towards the user, y to the right, z up
 const sonde_driver sonde_driver_forcedimension = {"forcedimension",
                                                   "omega, delta, sigma, lambda, Falcon (libdhd)",
+                                                  {0.5, -0.5, -0.5, -0.5},
                                                   sizeof(forcedimension),
                                                   bind,
                                                   open_device,

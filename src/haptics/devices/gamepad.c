@@ -94,6 +94,12 @@ static void close_device(void *self) {
   *g = (gamepad){.pose = g->pose, .placed = g->placed};
 }
 
-const sonde_driver sonde_driver_gamepad = {
-    "gamepad",   "gamepad steers and rumbles (SDL2)", sizeof(gamepad), bind, open_device, exchange,
-    close_device};
+// as exchange() makes it: x to the right, y away, z up
+const sonde_driver sonde_driver_gamepad = {"gamepad",
+                                           "gamepad steers and rumbles (SDL2)",
+                                           {0.70710678118654752, -0.70710678118654752, 0, 0},
+                                           sizeof(gamepad),
+                                           bind,
+                                           open_device,
+                                           exchange,
+                                           close_device};

@@ -123,7 +123,12 @@ static void close_device(void *self) {
   h->device[0] = '\0';
 }
 
-const sonde_driver sonde_driver_haply = {"haply",       "Inverse3 through its service (WebSocket)",
-                                         sizeof(haply), bind,
-                                         open_device,   exchange,
+// x to the right, y away from the user, z up: not verified
+const sonde_driver sonde_driver_haply = {"haply",
+                                         "Inverse3 through its service (WebSocket)",
+                                         {0.70710678118654752, -0.70710678118654752, 0, 0},
+                                         sizeof(haply),
+                                         bind,
+                                         open_device,
+                                         exchange,
                                          close_device};

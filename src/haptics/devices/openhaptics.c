@@ -123,8 +123,7 @@ static void close_device(void *self) {
   *hd = (openhaptics){0};
 }
 
-const sonde_driver sonde_driver_openhaptics = {
-    "openhaptics",       "Touch, Touch X, Premium (libHD)",
-    sizeof(openhaptics), bind,
-    open_device,         exchange,
-    close_device};
+const sonde_driver sonde_driver_openhaptics = {"openhaptics", "Touch, Touch X, Premium (libHD)",
+                                               {1, 0, 0, 0},  sizeof(openhaptics),
+                                               bind,          open_device,
+                                               exchange,      close_device};

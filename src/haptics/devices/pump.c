@@ -201,6 +201,15 @@ sonde_status sonde_device_open(const char *name, const sonde_device_open_def *de
   return SONDE_OK;
 }
 
+sonde_pose sonde_device_base(const char *name, sonde_pose probe) {
+  SONDE_ASSERT(name != NULL);
+  const sonde_driver *driver = find_driver(name);
+  sonde_quat device = driver ? driver->user_from_device : quat_identity();
+  const sonde_quat probe_from_user = {0.70710678118654752, -0.70710678118654752, 0, 0}; // y -> -z
+  return (sonde_pose){probe.position,
+                      q_unit(q_mul(probe.rotation, q_mul(probe_from_user, device)))};
+}
+
 sonde_device_link sonde_device_link_of(const sonde_device *device) {
   SONDE_ASSERT(device != NULL);
   if (device->read == sonde_clutch_read)

@@ -14,7 +14,8 @@
 // thread, calls these.
 typedef struct sonde_driver {
   const char *name, *description;
-  size_t bytes; // of its state, which begins zeroed
+  sonde_quat user_from_device; // user: x to the right, y up, z towards whoever sits before it
+  size_t bytes;                // of its state, which begins zeroed
   // Finds the vendor's library or service without touching the device, then opens the device; a
   // reason of one sentence in error.
   sonde_status (*bind)(void *self, const sonde_device_open_def *def, sonde_error *error);

@@ -83,8 +83,8 @@ static void close_device(void *self) {
   *nav = (spacenav){.pose = nav->pose, .placed = nav->placed};
 }
 
-const sonde_driver sonde_driver_spacenav = {
-    "spacenav",       "SpaceMouse steers, no force (libspnav)",
-    sizeof(spacenav), bind,
-    open_device,      exchange,
-    close_device};
+// x to the right, y up, z towards the user: not verified
+const sonde_driver sonde_driver_spacenav = {"spacenav",   "SpaceMouse steers, no force (libspnav)",
+                                            {1, 0, 0, 0}, sizeof(spacenav),
+                                            bind,         open_device,
+                                            exchange,     close_device};
