@@ -2,13 +2,13 @@
 //
 // parse              the command line
 // choose_probes      built-in probes, and a probe file when one is named
-// exam_keys          the scripted exam: press, hold, slide, come back, release
-// create_device      the page's device, or the script
+// load_tissue        presets
 // create_session     everything that simulates
 // run_page           until Ctrl-C
 // run_headless       for a time, in real time or in lockstep
 // print_summary      what a headless run did
 #include "app.h"
+#include "run_device.h"
 
 #include <getopt.h>
 #include <math.h>
@@ -31,26 +31,59 @@ static const char help[] =
     "  --probe NAME    point, linear, square, sphere or a mesh file (default linear)\n"
     "  --case NAME     healthy, partial_mural, acute_occlusive, subacute_occlusive,\n"
     "                  chronic_occlusive (default healthy)\n"
-    "  --preset FILE   damping, stiffness and friction (sonde-identify(1)); not with --record\n"
+    "  --preset FILE   damping, stiffness and friction (sonde-identify(1))\n"
+    "  --compare FILE  a second preset, which the page can change over to\n"
+    "  --gel-ml V      gel spread over the sites at the start (default 10; 0: dry skin)\n"
+    "  --no-gel        no gel is simulated: every line of the image is coupled\n"
+    "  --circulation   pulse, breath, posture and strain move the vessels' pressures\n"
+    "  --posture NAME  supine, sitting or standing; with --circulation (default supine)\n"
+    "  --device NAME   page, touch, touch_x, premium_1.5, omega.3, omega.6, falcon, haply,\n"
+    "                  spacenav, gamepad, hand (simulated operator), script or replay\n"
+    "                  (default page; headless: script)\n"
+    "  --device-at AT  site or landmark where the probe starts (default 27)\n"
+    "  --clutch N      button that lets the handle move without the probe; 0: none (default 1)\n"
+    "  --force-scale X rendered over tissue force (default: from the device's limits)\n"
+    "  --limits NAME   render as for this device (docs/haptics.md)\n"
+    "  --from FILE     recording whose poses --device replay plays\n"
+    "  --device-library FILE, --device-port N: of the maker's driver, when not the usual ones\n"
     "  --json          headless: print one JSON object at the end\n"
     "  --help          this text\n";
 
-enum { FIRST_SITE = 27, MAX_PROBES = 16 };
+enum { MAX_PROBES = 16 };
 
 typedef struct settings {
-  const char *model, *record, *probe, *pathology, *preset;
+  const char *model, *record, *probe, *pathology, *preset, *compare, *posture;
   long port;
-  double seconds;
-  bool headless, lockstep, json, help, timed;
+  double seconds, gel_ml;
+  bool headless, lockstep, json, help, timed, no_gel, circulate;
+  run_device device;
 } settings;
 
 // What a headless run saw.
 typedef struct summary {
-  double wall_s, force_max_n, penetration_max_m, vein_ratio_min;
+  double wall_s, force_max_n, rendered_max_n, penetration_max_m, vein_ratio_min, force_scale;
+  double gel_volume_m3, gel_coupling;
+  uint32_t faults; // latched one after the other
+  sonde_fault fault;
+  sonde_device_link link;
   double latency_s[2]; // from pose to image: median, 99 %; NaN in lockstep
   uint64_t ticks, images, hash;
   sonde_loop_stats loop;
 } summary;
+
+static bool parse_device(int option, settings *s) {
+  run_device *d = &s->device;
+  switch (option) {
+  case 'D': d->name = optarg; return true;
+  case 'A': d->at = optarg; return true;
+  case 'L': d->limits = optarg; return true;
+  case 'F': d->from = optarg; return true;
+  case 'y': d->library = optarg; return true;
+  case 'o': return app_parse_integer("run", "--device-port", optarg, 1, 65535, &d->port);
+  case 'k': return app_parse_integer("run", "--clutch", optarg, 0, 32, &d->clutch);
+  default: return app_parse_real("run", "--force-scale", optarg, 1e-4, 10, &d->force_scale);
+  }
+}
 
 static bool parse_option(int option, settings *s) {
   switch (option) {
@@ -65,26 +98,70 @@ static bool parse_option(int option, settings *s) {
   case 'r': s->record = optarg; return true;
   case 'P': s->probe = optarg; return true;
   case 'e': s->preset = optarg; return true;
-  default: s->pathology = optarg; return true;
+  case 'm': s->compare = optarg; return true;
+  case 'g': return app_parse_real("run", "--gel-ml", optarg, 0, 1000, &s->gel_ml);
+  case 'n': s->no_gel = true; return true;
+  case 'C': s->circulate = true; return true;
+  case 'u': s->posture = optarg; return true;
+  case 'c': s->pathology = optarg; return true;
+  default: return parse_device(option, s);
   }
+}
+
+static const struct option OPTIONS[] = {{"port", required_argument, NULL, 'p'},
+                                        {"seconds", required_argument, NULL, 's'},
+                                        {"headless", no_argument, NULL, 'H'},
+                                        {"lockstep", no_argument, NULL, 'l'},
+                                        {"json", no_argument, NULL, 'j'},
+                                        {"help", no_argument, NULL, 'h'},
+                                        {"record", required_argument, NULL, 'r'},
+                                        {"probe", required_argument, NULL, 'P'},
+                                        {"case", required_argument, NULL, 'c'},
+                                        {"preset", required_argument, NULL, 'e'},
+                                        {"compare", required_argument, NULL, 'm'},
+                                        {"gel-ml", required_argument, NULL, 'g'},
+                                        {"no-gel", no_argument, NULL, 'n'},
+                                        {"circulation", no_argument, NULL, 'C'},
+                                        {"posture", required_argument, NULL, 'u'},
+                                        {"device", required_argument, NULL, 'D'},
+                                        {"device-at", required_argument, NULL, 'A'},
+                                        {"limits", required_argument, NULL, 'L'},
+                                        {"from", required_argument, NULL, 'F'},
+                                        {"device-library", required_argument, NULL, 'y'},
+                                        {"device-port", required_argument, NULL, 'o'},
+                                        {"clutch", required_argument, NULL, 'k'},
+                                        {"force-scale", required_argument, NULL, 'x'},
+                                        {NULL, 0, NULL, 0}};
+
+static const char *const POSTURES[SONDE_POSTURE_COUNT] = {"supine", "sitting", "standing"};
+
+// SONDE_POSTURE_COUNT for a name that is none.
+static sonde_posture posture_of(const char *name) {
+  int k = 0;
+  while (name && k < SONDE_POSTURE_COUNT && strcmp(name, POSTURES[k]) != 0) ++k;
+  return (sonde_posture)k;
+}
+
+// 0 when the options go together.
+static int check(settings *s) {
+  if ((s->timed || s->lockstep || s->json) && !s->headless)
+    return app_usage_error("run", "--seconds, --lockstep and --json need --headless");
+  if (s->compare && !s->preset)
+    return app_usage_error("run", "--compare needs a --preset to compare with");
+  if (posture_of(s->posture) == SONDE_POSTURE_COUNT)
+    return app_usage_error("run", "unknown posture '%s', expected supine, sitting or standing",
+                           s->posture);
+  s->device.headless = s->headless;
+  s->device.lockstep = s->lockstep;
+  s->device.seconds = s->headless ? s->seconds : 3600.0;
+  return run_device_check(&s->device) ? APP_OK : APP_BAD_INPUT;
 }
 
 // 0 when the command line is good.
 static int parse(int argc, char **argv, settings *s) {
-  static const struct option options[] = {{"port", required_argument, NULL, 'p'},
-                                          {"seconds", required_argument, NULL, 's'},
-                                          {"headless", no_argument, NULL, 'H'},
-                                          {"lockstep", no_argument, NULL, 'l'},
-                                          {"json", no_argument, NULL, 'j'},
-                                          {"help", no_argument, NULL, 'h'},
-                                          {"record", required_argument, NULL, 'r'},
-                                          {"probe", required_argument, NULL, 'P'},
-                                          {"case", required_argument, NULL, 'c'},
-                                          {"preset", required_argument, NULL, 'e'},
-                                          {NULL, 0, NULL, 0}};
   int option;
   opterr = 0;
-  while ((option = getopt_long(argc, argv, ":h", options, NULL)) != -1) {
+  while ((option = getopt_long(argc, argv, ":h", OPTIONS, NULL)) != -1) {
     if (option == ':') return app_usage_error("run", "%s needs a value", argv[optind - 1]);
     if (option == '?') return app_usage_error("run", "unknown option '%s'", argv[optind - 1]);
     if (!parse_option(option, s)) return APP_BAD_INPUT;
@@ -92,11 +169,7 @@ static int parse(int argc, char **argv, settings *s) {
   if (s->help) return APP_OK;
   if (optind < argc) s->model = argv[optind++];
   if (optind < argc) return app_usage_error("run", "unexpected argument '%s'", argv[optind]);
-  if ((s->timed || s->lockstep || s->json) && !s->headless)
-    return app_usage_error("run", "--seconds, --lockstep and --json need --headless");
-  if (s->preset && s->record) // a recording names the model file, whose law it would replay with
-    return app_usage_error("run", "--record keeps no preset: give one of --preset and --record");
-  return APP_OK;
+  return check(s);
 }
 
 // Fills a NULL-terminated list and returns the index of the wanted probe.
@@ -115,72 +188,38 @@ static uint32_t choose_probes(const char *wanted, const char *names[MAX_PROBES])
   return index;
 }
 
-static const sonde_site *first_site(const sonde_model *model) {
-  const sonde_site *site = sonde_model_site(model, FIRST_SITE);
-  return site || model->site_count == 0 ? site : &model->sites[0];
-}
-
-// One round: depth of the probe's face and offset along the leg at a time.
-typedef struct exam_step {
-  double time_s, depth_m, along_m;
-} exam_step;
-
-static const exam_step ROUND[] = {{0.0, -0.010, 0.0}, {0.6, 0.0, 0.0},     {1.8, 0.020, 0.0},
-                                  {2.6, 0.020, 0.0},  {3.4, 0.020, 0.008}, {4.2, 0.020, 0.0},
-                                  {5.2, -0.010, 0.0}};
-enum { ROUND_STEPS = sizeof ROUND / sizeof ROUND[0] };
-static const double round_s = 6.0;
-
-// Keys for the whole run, freed by the caller; NULL without memory.
-static sonde_script_key *exam_keys(const sonde_site *site, double seconds, uint32_t *count) {
-  uint32_t rounds = (uint32_t)(seconds / round_s) + 1;
-  sonde_script_key *keys = calloc((size_t)rounds * ROUND_STEPS, sizeof *keys);
-  *count = 0;
-  for (uint32_t i = 0; keys && i < rounds * ROUND_STEPS; ++i) {
-    const exam_step *step = &ROUND[i % ROUND_STEPS];
-    sonde_pose pose = sonde_site_pose(site, step->depth_m);
-    pose.position.x += step->along_m * site->v.x;
-    pose.position.y += step->along_m * site->v.y;
-    pose.position.z += step->along_m * site->v.z;
-    keys[(*count)++] = (sonde_script_key){i / ROUND_STEPS * round_s + step->time_s, pose};
-  }
-  return keys;
-}
-
-static sonde_status create_device(const settings *s, const sonde_model *model, double dt_s,
-                                  sonde_device *device, sonde_error *error) {
-  const sonde_site *site = first_site(model);
-  if (!site) {
-    *error = (sonde_error){.status = SONDE_MISMATCH};
-    snprintf(error->message, sizeof error->message,
-             "the model %s has no measured site where the probe could start", model->name);
-    return error->status;
-  }
-  if (!s->headless) return sonde_device_page(sonde_site_pose(site, -0.01), dt_s, device, error);
-  uint32_t count = 0;
-  sonde_script_key *keys = exam_keys(site, s->seconds, &count);
-  sonde_status status = sonde_device_script(keys, count, dt_s, device, error);
-  free(keys);
+static sonde_status load_tissue(const settings *s, sonde_session_def *def, sonde_error *error) {
+  const char *const paths[SONDE_SESSION_PRESETS] = {s->preset, s->compare};
+  sonde_status status = SONDE_OK;
+  for (int k = 0; k < SONDE_SESSION_PRESETS && paths[k] && !status; ++k)
+    status = sonde_preset_load(paths[k], &def->presets[def->preset_count++], error);
   return status;
 }
 
-static sonde_status create_session(const settings *s, sonde_model *model, const char *model_path,
+static sonde_status create_session(const settings *s, const sonde_model *model,
+                                   const char *model_path, sonde_session_def *def,
                                    sonde_session **session, sonde_error *error) {
   const char *names[MAX_PROBES];
-  sonde_session_def def = sonde_session_def_default();
-  def.model = model;
-  def.model_path = model_path;
-  def.record_path = s->record;
-  def.probe_names = names;
-  def.controls.probe = choose_probes(s->probe, names);
-  sonde_preset preset = sonde_preset_default();
-  sonde_status status = sonde_pathology_preset(s->pathology, &def.controls.pathology, error);
-  if (!status && s->preset) status = sonde_preset_load(s->preset, &preset, error);
-  if (!status) status = sonde_preset_apply(&preset, model, &def.world, error);
+  *def = sonde_session_def_default();
+  def->model = model;
+  def->model_path = model_path;
+  def->record_path = s->record;
+  def->probe_names = names;
+  def->controls.probe = choose_probes(s->probe, names);
+  def->controls.gel = !s->no_gel;
+  def->gel_m3 = 1e-6 * s->gel_ml;
+  def->circulate = s->circulate;
+  def->controls.posture = posture_of(s->posture);
+  run_device_limits(&s->device, def);
+  sonde_site site;
   sonde_device device = {0};
-  if (!status) status = create_device(s, model, def.world.dt_s, &device, error);
-  if (!status) status = sonde_session_create(&def, &device, session, error);
+  sonde_status status = sonde_pathology_preset(s->pathology, &def->controls.pathology, error);
+  if (!status) status = load_tissue(s, def, error);
+  if (!status) status = run_device_site(&s->device, model, &site, error);
+  if (!status) status = run_device_create(&s->device, &site, def, &device, error);
+  if (!status) status = sonde_session_create(def, &device, session, error);
   if (device.destroy) device.destroy(device.self); // not moved: creation failed
+  def->probe_names = NULL;
   return status;
 }
 
@@ -195,10 +234,12 @@ static void sleep_s(double seconds) {
   nanosleep(&pause, NULL);
 }
 
-static sonde_status run_page(const settings *s, const char *model_path, sonde_session *session,
-                             sonde_error *error) {
+static sonde_status run_page(const settings *s, const sonde_session_def *session_def,
+                             sonde_session *session, sonde_error *error) {
   sonde_page_server *server = NULL;
-  sonde_page_def def = {.port = (uint16_t)s->port, .model_path = model_path};
+  sonde_page_def def = {.port = (uint16_t)s->port,
+                        .model_path = session_def->model_path,
+                        .force_limit_n = session_def->limits.force_n};
   app_catch_interrupt();
   sonde_status status = sonde_page_start(&def, session, &server, error);
   if (status) return status;
@@ -220,6 +261,22 @@ static void look(sonde_session *session, summary *seen) {
   seen->force_max_n = fmax(seen->force_max_n, frame.snapshot.force_normal_n);
   seen->penetration_max_m = fmax(seen->penetration_max_m, frame.snapshot.penetration_m);
   seen->vein_ratio_min = fmin(seen->vein_ratio_min, frame.snapshot.vein_area_ratio);
+  sonde_vec3 f = frame.snapshot.rendered_force_n;
+  seen->rendered_max_n = fmax(seen->rendered_max_n, sqrt(f.x * f.x + f.y * f.y + f.z * f.z));
+  seen->faults += frame.snapshot.fault && !seen->fault;
+  seen->fault = frame.snapshot.fault;
+  seen->gel_volume_m3 = frame.snapshot.gel_volume_m3;
+  seen->gel_coupling = frame.snapshot.gel_coupling;
+}
+
+// Nobody is there to press a button: a device that came back is taken up again, softly.
+static void resume_device(sonde_session *session, const summary *seen) {
+  if (seen->fault != SONDE_FAULT_DEVICE_LOST ||
+      !sonde_device_link_of(sonde_session_device(session)).connected)
+    return;
+  sonde_session_controls controls = sonde_session_controls_now(session);
+  controls.resume++;
+  sonde_session_control(session, &controls);
 }
 
 static void run_lockstep(const settings *s, double dt_s, sonde_session *session,
@@ -242,6 +299,7 @@ static sonde_status run_realtime(const settings *s, sonde_session *session,
   while (passed_s < s->seconds &&
          progress->report(passed_s / s->seconds, "real time", progress->user)) {
     look(session, seen);
+    resume_device(session, seen);
     sleep_s(fmin(0.01, s->seconds - passed_s));
     passed_s = now_s() - start_s;
   }
@@ -254,7 +312,7 @@ static sonde_status run_headless(const settings *s, sonde_session *session, summ
                                  sonde_error *error) {
   sonde_progress progress = app_progress();
   sonde_status status = SONDE_OK;
-  *seen = (summary){.vein_ratio_min = INFINITY};
+  *seen = (summary){.vein_ratio_min = INFINITY, .gel_volume_m3 = NAN};
   double start_s = now_s();
   if (s->lockstep)
     run_lockstep(s, sonde_session_def_default().world.dt_s, session, &progress, seen);
@@ -266,6 +324,7 @@ static sonde_status run_headless(const settings *s, sonde_session *session, summ
   seen->images = sonde_session_images(session);
   seen->latency_s[0] = sonde_session_latency(session, 0.5);
   seen->latency_s[1] = sonde_session_latency(session, 0.99);
+  seen->link = sonde_device_link_of(sonde_session_device(session));
   seen->hash = sonde_session_hash(session);
   seen->loop = sonde_session_loop(session);
   return status;
@@ -290,7 +349,20 @@ static void print_json(const settings *s, const summary *seen) {
   app_json_real("tick_max_ms", 1e3 * seen->loop.compute_max_s);
   app_json_bool("realtime_priority", seen->loop.realtime_priority);
   app_json_bool("memory_locked", seen->loop.memory_locked);
+  app_json_text("device", s->device.name);
+  app_json_real("force_scale", seen->force_scale);
   app_json_real("force_max_n", seen->force_max_n);
+  app_json_real("rendered_force_max_n", seen->rendered_max_n);
+  app_json_integer("faults", seen->faults);
+  app_json_text("fault", sonde_fault_text(seen->fault));
+  if (seen->link.exchanges) {
+    app_json_integer("device_exchanges", (long long)seen->link.exchanges);
+    app_json_integer("device_losses", (long long)seen->link.losses);
+  }
+  if (isfinite(seen->gel_volume_m3)) {
+    app_json_real("gel_ml", 1e6 * seen->gel_volume_m3);
+    app_json_real("gel_coupling", seen->gel_coupling);
+  }
   app_json_real("penetration_max_mm", 1e3 * seen->penetration_max_m);
   app_json_real("vein_area_ratio_min", seen->vein_ratio_min);
   if (s->record) app_json_text("recording", s->record);
@@ -308,24 +380,32 @@ static void print_summary(const settings *s, const summary *seen) {
   if (isfinite(seen->latency_s[0]))
     printf("from pose to image %.1f ms, 99 %% within %.1f ms\n", 1e3 * seen->latency_s[0],
            1e3 * seen->latency_s[1]);
-  printf("force up to %.1f N at up to %.1f mm", seen->force_max_n, 1e3 * seen->penetration_max_m);
+  printf("tissue force up to %.1f N at up to %.1f mm", seen->force_max_n,
+         1e3 * seen->penetration_max_m);
   if (isfinite(seen->vein_ratio_min))
     printf(", vein down to %.0f %% of its area", 100.0 * seen->vein_ratio_min);
+  printf("\nrendered force up to %.2f N: tissue force times %.3f", seen->rendered_max_n,
+         seen->force_scale);
+  if (seen->faults) printf("; %u faults, now: %s", seen->faults, sonde_fault_text(seen->fault));
+  if (seen->link.exchanges)
+    printf("\ndevice %s: %llu exchanges, lost %llu times", s->device.name,
+           (unsigned long long)seen->link.exchanges, (unsigned long long)seen->link.losses);
   printf("\nstate hash %016llx\n", (unsigned long long)seen->hash);
   if (seen->loop.priority_note[0]) printf("note: %s\n", seen->loop.priority_note);
   if (s->record) printf("recorded to %s\n", s->record);
 }
 
 // The session from beginning to end; errors of the recording come at the end.
-static int simulate(const settings *s, sonde_model *model, const char *model_path) {
+static int simulate(const settings *s, const sonde_model *model, const char *model_path) {
   sonde_error error = {0};
   sonde_session *session = NULL;
+  sonde_session_def def;
   summary seen = {0};
-  sonde_status status = create_session(s, model, model_path, &session, &error);
+  sonde_status status = create_session(s, model, model_path, &def, &session, &error);
   if (!status && s->headless)
     status = run_headless(s, session, &seen, &error);
   else if (!status)
-    status = run_page(s, model_path, session, &error);
+    status = run_page(s, &def, session, &error);
   sonde_error late = {0};
   sonde_status closed = sonde_session_destroy(session, &late);
   if (!status && closed) {
@@ -333,12 +413,19 @@ static int simulate(const settings *s, sonde_model *model, const char *model_pat
     error = late;
   }
   if (status) return app_fail("run", &error);
+  seen.force_scale = def.rendering.force_scale;
   if (s->headless) print_summary(s, &seen);
   return APP_OK;
 }
 
 int cmd_run(int argc, char **argv) {
-  settings s = {.port = 8642, .seconds = 10.0, .probe = "linear", .pathology = "healthy"};
+  settings s = {.port = 8642,
+                .seconds = 10.0,
+                .probe = "linear",
+                .pathology = "healthy",
+                .posture = "supine",
+                .gel_ml = 10.0,
+                .device = {.clutch = 1}};
   int code = parse(argc, argv, &s);
   if (code != APP_OK) return code;
   if (s.help) {
