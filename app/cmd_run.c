@@ -263,14 +263,15 @@ static void look(sonde_session *session, summary *seen) {
   seen->vein_ratio_min = fmin(seen->vein_ratio_min, frame.snapshot.vein_area_ratio);
   sonde_vec3 f = frame.snapshot.rendered_force_n;
   seen->rendered_max_n = fmax(seen->rendered_max_n, sqrt(f.x * f.x + f.y * f.y + f.z * f.z));
-  seen->faults += frame.snapshot.fault && !seen->fault;
-  seen->fault = frame.snapshot.fault;
   seen->gel_volume_m3 = frame.snapshot.gel_volume_m3;
   seen->gel_coupling = frame.snapshot.gel_coupling;
 }
 
 // Nobody is there to press a button: a device that came back is taken up again, softly.
-static void resume_device(sonde_session *session, const summary *seen) {
+static void watch(sonde_session *session, summary *seen) {
+  sonde_fault fault = sonde_session_fault(session);
+  seen->faults += fault && !seen->fault;
+  seen->fault = fault;
   if (seen->fault != SONDE_FAULT_DEVICE_LOST ||
       !sonde_device_link_of(sonde_session_device(session)).connected)
     return;
@@ -285,6 +286,7 @@ static void run_lockstep(const settings *s, double dt_s, sonde_session *session,
   for (uint64_t i = 0; i < ticks; ++i) {
     sonde_session_tick(session);
     look(session, seen);
+    watch(session, seen);
     double fraction = (double)(i + 1) / (double)ticks;
     if (i % 100 == 99 && !progress->report(fraction, "lockstep", progress->user)) break;
   }
@@ -299,7 +301,7 @@ static sonde_status run_realtime(const settings *s, sonde_session *session,
   while (passed_s < s->seconds &&
          progress->report(passed_s / s->seconds, "real time", progress->user)) {
     look(session, seen);
-    resume_device(session, seen);
+    watch(session, seen);
     sleep_s(fmin(0.01, s->seconds - passed_s));
     passed_s = now_s() - start_s;
   }

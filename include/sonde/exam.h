@@ -135,6 +135,8 @@ typedef struct sonde_frame {
  *  next call. @thread one reader */
 SONDE_API bool sonde_session_frame(sonde_session *session, sonde_frame *frame);
 
+/** Fault that is latched, e.g. to resume when a lost device is back. @thread any */
+SONDE_API sonde_fault sonde_session_fault(const sonde_session *session);
 /** Ticks and images so far. @thread any */
 SONDE_API uint64_t sonde_session_ticks(const sonde_session *session);
 SONDE_API uint64_t sonde_session_images(const sonde_session *session);

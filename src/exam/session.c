@@ -272,6 +272,10 @@ const sonde_probe *sonde_session_probe(const sonde_session *session, uint32_t in
 
 const sonde_model *sonde_session_model(const sonde_session *session) { return session->model; }
 
+sonde_fault sonde_session_fault(const sonde_session *session) {
+  return (sonde_fault)atomic_load_explicit(&session->fault, memory_order_relaxed);
+}
+
 uint64_t sonde_session_ticks(const sonde_session *session) {
   return atomic_load_explicit(&session->ticks, memory_order_acquire);
 }

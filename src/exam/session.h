@@ -72,6 +72,7 @@ struct sonde_session {
   uint64_t offered_tick; // of the newest surface
   double last_tick_s;    // clock of the previous real-time tick, 0 before the first
   _Atomic uint64_t ticks;
+  _Atomic int fault; // the safety's, for other threads
   _Atomic uint64_t lost_records;
 
   // image

@@ -128,6 +128,7 @@ void sonde_session_step(sonde_session *session) {
   sonde_vec3 torque = v_scale(contact->torque_n_m, session->render.def.force_scale);
   sonde_safety_apply(&session->safety, session->render.force_n, torque, session->dt_s);
   session->device.write(session->device.self, session->safety.force_n, session->safety.torque_n_m);
+  atomic_store_explicit(&session->fault, (int)session->safety.fault, memory_order_relaxed);
   if (surface_is_due(session, tick + 1)) offer_surface(session);
   SONDE_ASSERT(sonde_state_tick(session->state) == tick + 1);
   atomic_store_explicit(&session->ticks, tick + 1, memory_order_release);
