@@ -1,5 +1,5 @@
 // Hold without creep: a hand presses to about 10 N, pulls sideways within what friction holds, and
-// waits for a minute.
+// waits for a minute. What it drifts stays below the default tremor of a hand, 50 um.
 #include "exam_test.h"
 #include "sonde/haptics_hand.h"
 
@@ -54,7 +54,7 @@ static void holds_without_creep(void **state) {
                 1e6 * v_distance(now.probe_m, start.probe_m), 1e6 * way_m,
                 v_distance(now.force_n, start.force_n), force_n);
   assert_true(normal_n > 9 && normal_n < 11 && aside_n > 1 && aside_n < 0.4 * normal_n);
-  assert_true(way_m < 20e-6 && force_n < 0.2);
+  assert_true(way_m < 50e-6 && force_n < 0.2);
   assert_int_equal(session->safety.fault, SONDE_FAULT_NONE);
   close_session(session);
   sonde_model_destroy(model);
