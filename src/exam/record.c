@@ -35,7 +35,7 @@ static void put_tick(byte_writer *w, const sonde_record *record) {
 }
 
 void sonde_recorder_write(sonde_recorder *recorder, const sonde_record *record) {
-  unsigned char bytes[SONDE_RECORD_CONTROLS_BYTES];
+  unsigned char bytes[SONDE_RECORD_MOST_BYTES];
   byte_writer w = {bytes};
   if (record->tag == SONDE_RECORD_TICK) {
     put_tick(&w, record);
@@ -43,8 +43,9 @@ void sonde_recorder_write(sonde_recorder *recorder, const sonde_record *record) 
     recorder->ticks++;
   } else {
     put_u32(&w, SONDE_RECORD_CONTROLS);
-    sonde_controls_put(&w, record->tick, &record->controls);
-    SONDE_ASSERT(w.at == bytes + SONDE_RECORD_CONTROLS_BYTES);
+    put_u32(&w, record->controls.probe);
+    put_u64(&w, record->tick);
+    sonde_controls_put(&w, &record->controls);
   }
   emit(recorder, bytes, (size_t)(w.at - bytes));
 }

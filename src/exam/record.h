@@ -2,16 +2,17 @@
 #ifndef SONDE_SRC_RECORD_H
 #define SONDE_SRC_RECORD_H
 
-#include "exam/inputs.h"
+#include "exam/bytes.h"
+#include "exam/setup.h"
 
 enum {
   SONDE_RECORD_VERSION = 4,
-  SONDE_RECORD_OLDEST = 3,
+  SONDE_RECORD_OLDEST = 3, // that can be read
   SONDE_RECORD_TICK = 1,
   SONDE_RECORD_CONTROLS = 2,
   SONDE_RECORD_END = 3,
   SONDE_RECORD_TICK_BYTES = 80,
-  SONDE_RECORD_CONTROLS_BYTES = 4 + SONDE_CONTROLS_BYTES,
+  SONDE_RECORD_MOST_BYTES = 512, // of any record
   SONDE_RECORD_END_BYTES = 40,
   SONDE_RECORD_PATH_BYTES = 512,
 };
@@ -37,6 +38,11 @@ typedef struct sonde_record_head {
   const sonde_probe *probes;      // borrowed
   const char *const *probe_names; // [probe_count] as given to sonde_probe_create
 } sonde_record_head;
+
+// What follows the tick in a controls record.
+size_t sonde_controls_bytes(int version);
+void sonde_controls_put(byte_writer *writer, const sonde_session_controls *controls);
+void sonde_controls_get(byte_reader *reader, int version, sonde_session_controls *controls);
 
 typedef struct sonde_recorder sonde_recorder;
 

@@ -2,7 +2,7 @@
 // text_of, real_of, hash_of:         members of the header that must be there.
 // read_model, read_probes, read_world: parts of the header.
 // read_magic, read_header, read_end: the three parts of the file.
-// decode_tick:                       one record.
+// decode_tick, decode_controls:      one record.
 // check_records:                     walks all of them.
 #include "exam/record.h"
 
@@ -182,19 +182,26 @@ static void decode_tick(byte_reader *reader, sonde_record *record) {
   record->sample.world_from_probe = (sonde_pose){{n[0], n[1], n[2]}, {n[3], n[4], n[5], n[6]}};
 }
 
+static void decode_controls(byte_reader *reader, int version, sonde_record *record) {
+  uint32_t probe = get_u32(reader);
+  record->tick = get_u64(reader);
+  sonde_controls_get(reader, version, &record->controls);
+  record->controls.probe = probe;
+}
+
 bool sonde_recording_next(sonde_recording *r, sonde_record *record) {
   SONDE_ASSERT(r->at <= r->end);
   *record = (sonde_record){0};
   if (r->end - r->at < SONDE_RECORD_TICK_BYTES) return false;
   byte_reader reader = {(const unsigned char *)r->bytes + r->at};
   record->tag = get_u32(&reader);
-  size_t controls = 4 + (r->version > 3 ? SONDE_CONTROLS_BYTES : SONDE_CONTROLS_BYTES_3);
+  size_t controls = 16 + sonde_controls_bytes(r->version);
   size_t bytes = record->tag == SONDE_RECORD_TICK ? SONDE_RECORD_TICK_BYTES : controls;
   if (r->end - r->at < bytes) return false;
   if (record->tag == SONDE_RECORD_TICK)
     decode_tick(&reader, record);
   else if (record->tag == SONDE_RECORD_CONTROLS)
-    sonde_controls_get(&reader, r->version, &record->tick, &record->controls);
+    decode_controls(&reader, r->version, record);
   else
     return false;
   r->at += bytes;

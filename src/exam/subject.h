@@ -3,7 +3,7 @@
 #ifndef SONDE_SRC_SUBJECT_H
 #define SONDE_SRC_SUBJECT_H
 
-#include "exam/inputs.h"
+#include "exam/setup.h"
 #include "sonde/haptics_gel.h"
 
 enum { SONDE_GEL_TICKS = 20 }; // of a step of the film, a part of it per tick

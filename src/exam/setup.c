@@ -1,96 +1,15 @@
-// Controls and set-up of a session in a recording.
-// pack, unpack:          the numbers that version 3 had. get_rest: what it lacks.
-// add_friction, list_preset, list_circulation: numbers of the set-up by name; the same list writes
-//                        and reads.
+// What a session starts with, as a member of a recording's header.
+// add_friction, list_preset, list_circulation: its numbers by name; the same list writes and reads.
 // write_real, write_list, read_list: such a list in a JSON object.
-// read_presets, read_circulation: parts of the set-up.
-#include "exam/inputs.h"
+// read_presets, read_circulation: parts of it.
+#include "exam/setup.h"
 
 #include "base/base.h"
 #include "base/maths.h"
 
-enum { REALS = 14, MOST_NUMBERS = 16 };
+#include <string.h>
 
-static void pack(const sonde_session_controls *c, double number[REALS]) {
-  const sonde_pathology *p = &c->pathology;
-  const sonde_echo_settings *e = &c->echo;
-  const double numbers[REALS] = {e->frequency_hz,
-                                 e->depth_m,
-                                 e->gain_db,
-                                 e->dynamic_range_db,
-                                 e->focus_m,
-                                 e->tgc_db_per_m,
-                                 p->venous_pressure_pa,
-                                 p->arterial_pressure_pa,
-                                 p->thrombus_fraction,
-                                 p->thrombus_modulus_pa,
-                                 p->thrombus_from_m,
-                                 p->thrombus_to_m,
-                                 p->lumen_scale,
-                                 p->echogenicity};
-  memcpy(number, numbers, sizeof numbers);
-}
-
-static void unpack(const double n[REALS], sonde_session_controls *c) {
-  c->echo = (sonde_echo_settings){n[0], n[1], n[2], n[3], n[4], n[5]};
-  c->pathology = (sonde_pathology){"", n[6], n[7], n[8], n[9], n[10], n[11], n[12], n[13], 0};
-}
-
-void sonde_controls_put(byte_writer *w, uint64_t tick, const sonde_session_controls *c) {
-  const unsigned char *start = w->at;
-  double number[REALS];
-  pack(c, number);
-  put_u32(w, c->probe);
-  put_u64(w, tick);
-  put_u32(w, c->stop ? 1 : 0);
-  put_u32(w, c->resume);
-  for (int i = 0; i < REALS; ++i) put_real(w, number[i]);
-  memcpy(w->at, c->pathology.name, sizeof c->pathology.name);
-  w->at += sizeof c->pathology.name;
-  SONDE_ASSERT(w->at == start + SONDE_CONTROLS_BYTES_3);
-  put_u32(w, (c->gel ? 1u : 0u) | (c->valsalva ? 2u : 0u));
-  put_u32(w, c->gel_put);
-  put_u32(w, c->gel_wipe);
-  put_u32(w, c->posture);
-  put_u32(w, c->preset);
-  put_u32(w, 0);
-  put_real(w, c->stiffness_scale);
-  put_real(w, c->damping_scale);
-  put_real(w, c->friction_scale);
-  put_real(w, c->pathology.wall_shear_pa);
-  SONDE_ASSERT(w->at == start + SONDE_CONTROLS_BYTES);
-}
-
-static void get_rest(byte_reader *r, sonde_session_controls *c) {
-  uint32_t flags = get_u32(r);
-  c->gel = flags & 1;
-  c->valsalva = flags & 2;
-  c->gel_put = get_u32(r);
-  c->gel_wipe = get_u32(r);
-  uint32_t posture = get_u32(r);
-  c->posture = posture < SONDE_POSTURE_COUNT ? (sonde_posture)posture : SONDE_POSTURE_SUPINE;
-  c->preset = get_u32(r);
-  (void)get_u32(r);
-  c->stiffness_scale = get_real(r);
-  c->damping_scale = get_real(r);
-  c->friction_scale = get_real(r);
-  c->pathology.wall_shear_pa = get_real(r);
-}
-
-void sonde_controls_get(byte_reader *r, int version, uint64_t *tick, sonde_session_controls *c) {
-  double number[REALS];
-  *c = (sonde_session_controls){.stiffness_scale = 1, .damping_scale = 1, .friction_scale = 1};
-  c->probe = get_u32(r);
-  *tick = get_u64(r);
-  c->stop = get_u32(r) & 1;
-  c->resume = get_u32(r);
-  for (int i = 0; i < REALS; ++i) number[i] = get_real(r);
-  unpack(number, c);
-  memcpy(c->pathology.name, r->at, sizeof c->pathology.name);
-  c->pathology.name[sizeof c->pathology.name - 1] = 0;
-  r->at += sizeof c->pathology.name;
-  if (version > 3) get_rest(r, c);
-}
+enum { MOST_NUMBERS = 16 };
 
 sonde_setup sonde_setup_default(void) {
   return (sonde_setup){.friction = sonde_world_def_default().friction,
@@ -105,6 +24,16 @@ sonde_setup sonde_setup_of(const sonde_session_def *def) {
                        .circulation = def->circulation};
   memcpy(setup.presets, def->presets, sizeof setup.presets);
   return setup;
+}
+
+void sonde_setup_apply(const sonde_setup *setup, sonde_session_def *def) {
+  SONDE_ASSERT(setup->preset_count <= SONDE_SESSION_PRESETS);
+  def->world.friction = setup->friction;
+  def->preset_count = setup->preset_count;
+  memcpy(def->presets, setup->presets, sizeof def->presets);
+  def->gel_m3 = setup->gel_m3;
+  def->circulate = setup->circulate;
+  def->circulation = setup->circulation;
 }
 
 // A number by name. NaN and infinity have no JSON: they are left out, and read as NaN.

@@ -1,0 +1,92 @@
+// Controls as bytes of a recording (docs/recording.md): the one place that knows their order.
+// sonde_controls_bytes: how many follow the tick in a controls record.
+// put_rest, get_rest:   what version 3 lacks.
+// sonde_controls_put, sonde_controls_get: those.
+#include "exam/record.h"
+
+#include "base/base.h"
+
+#include <string.h>
+
+size_t sonde_controls_bytes(int version) {
+  SONDE_ASSERT(version >= SONDE_RECORD_OLDEST && version <= SONDE_RECORD_VERSION);
+  return version < 4 ? 152 : 208;
+}
+
+static void put_rest(byte_writer *w, const sonde_session_controls *c) {
+  put_real(w, c->pathology.wall_shear_pa);
+  put_u32(w, (c->gel ? 1u : 0u) | (c->valsalva ? 2u : 0u));
+  put_u32(w, c->gel_put);
+  put_u32(w, c->gel_wipe);
+  put_u32(w, c->posture);
+  put_u32(w, c->preset);
+  put_u32(w, 0);
+  put_real(w, c->stiffness_scale);
+  put_real(w, c->damping_scale);
+  put_real(w, c->friction_scale);
+}
+
+void sonde_controls_put(byte_writer *w, const sonde_session_controls *c) {
+  const unsigned char *start = w->at;
+  const sonde_pathology *p = &c->pathology;
+  const sonde_echo_settings *e = &c->echo;
+  const double numbers[] = {e->frequency_hz,
+                            e->depth_m,
+                            e->gain_db,
+                            e->dynamic_range_db,
+                            e->focus_m,
+                            e->tgc_db_per_m,
+                            p->venous_pressure_pa,
+                            p->arterial_pressure_pa,
+                            p->thrombus_fraction,
+                            p->thrombus_modulus_pa,
+                            p->thrombus_from_m,
+                            p->thrombus_to_m,
+                            p->lumen_scale,
+                            p->echogenicity};
+  put_u32(w, c->stop ? 1 : 0);
+  put_u32(w, c->resume);
+  for (size_t i = 0; i < SONDE_COUNT_OF(numbers); ++i) put_real(w, numbers[i]);
+  memcpy(w->at, p->name, sizeof p->name);
+  w->at += sizeof p->name;
+  put_rest(w, c);
+  SONDE_ASSERT(w->at == start + sonde_controls_bytes(SONDE_RECORD_VERSION));
+}
+
+static double within(double value, double low, double high) {
+  return value >= low && value <= high ? value : 1.0;
+}
+
+// Out of range only in a file that nobody wrote so: the tick takes them as they are.
+static void get_rest(byte_reader *r, sonde_session_controls *c) {
+  c->pathology.wall_shear_pa = get_real(r);
+  uint32_t flags = get_u32(r);
+  c->gel = flags & 1;
+  c->valsalva = flags & 2;
+  c->gel_put = get_u32(r);
+  c->gel_wipe = get_u32(r);
+  uint32_t posture = get_u32(r), preset = get_u32(r);
+  c->posture = posture < SONDE_POSTURE_COUNT ? (sonde_posture)posture : SONDE_POSTURE_SUPINE;
+  c->preset = preset < SONDE_SESSION_PRESETS ? preset : 0;
+  (void)get_u32(r);
+  c->stiffness_scale = within(get_real(r), 0.5, 2.0);
+  c->damping_scale = within(get_real(r), 0.25, 4.0);
+  c->friction_scale = within(get_real(r), 0.0, 2.0);
+}
+
+void sonde_controls_get(byte_reader *r, int version, sonde_session_controls *c) {
+  const unsigned char *start = r->at;
+  double n[14];
+  *c = (sonde_session_controls){
+      .probe = c->probe, .stiffness_scale = 1, .damping_scale = 1, .friction_scale = 1};
+  c->stop = get_u32(r) & 1;
+  c->resume = get_u32(r);
+  for (int i = 0; i < 14; ++i) n[i] = get_real(r);
+  c->echo = (sonde_echo_settings){n[0], n[1], n[2], n[3], n[4], n[5]};
+  c->pathology = (sonde_pathology){"", n[6], n[7], n[8], n[9], n[10], n[11], n[12], n[13], 0};
+  memcpy(c->pathology.name, r->at, sizeof c->pathology.name);
+  c->pathology.name[sizeof c->pathology.name - 1] = 0;
+  r->at += sizeof c->pathology.name;
+  if (version >= 4) get_rest(r, c);
+  SONDE_ASSERT(r->at == start + sonde_controls_bytes(version));
+}
