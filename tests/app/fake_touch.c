@@ -1,7 +1,7 @@
 // A fake libHD for the program as a whole: the one of the haptics tests with a hand of its own. It
-// presses the handle down 35 mm and is unplugged from 1.2 s to 2.2 s after the library was opened
-// first. At the end FAKE_TOUCH_LOG, a file, receives the largest force, the largest after the
-// device came back, and the first then, N. Linked so that it stays: its thread outlives dlclose().
+// lowers the handle until it feels 0.3 N, is unplugged there for a second, and comes back. At the
+// end FAKE_TOUCH_LOG, a file, receives the largest force, N, and the largest after the device came
+// back. Linked so that it stays: its thread outlives dlclose().
 #include "../haptics/fake_hd.c"
 
 #include <math.h>
@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <time.h>
 
-static double largest_n, after_n, first_after_n = -1;
+static double largest_n, after_n;
 
 static double now_s(void) {
   struct timespec t;
@@ -22,34 +22,35 @@ __attribute__((destructor)) static void write_log(void) {
   const char *path = getenv("FAKE_TOUCH_LOG");
   FILE *file = path ? fopen(path, "w") : NULL;
   if (!file) return;
-  fprintf(file, "%.4f %.4f %.4f\n", largest_n, after_n, first_after_n);
+  fprintf(file, "%.4f %.4f\n", largest_n, after_n);
   fclose(file);
+}
+
+static double felt_n(void) {
+  double x = fake.force_n[0], y = fake.force_n[1], z = fake.force_n[2];
+  return sqrt(x * x + y * y + z * z);
 }
 
 static void *live(void *unused) {
   (void)unused;
-  double start_s = now_s();
-  bool back = false;
+  const double step_s = 2e-3, speed_m_s = 0.02;
+  double lost_s = 0;
   for (;;) {
-    double t = now_s() - start_s;
-    fake.position_m[1] = -0.035 * fmin(t / 1.0, 1.0); // y is up there
-    fake.plugged = t < 1.2 || t > 2.2;
-    double force_n = sqrt(fake.force_n[0] * fake.force_n[0] + fake.force_n[1] * fake.force_n[1] +
-                          fake.force_n[2] * fake.force_n[2]);
+    double force_n = felt_n();
     largest_n = fmax(largest_n, force_n);
-    if (t > 2.2 && fake.opened > 1) {
-      if (!back) first_after_n = force_n;
-      back = true;
-      after_n = fmax(after_n, force_n);
-    }
-    nanosleep(&(struct timespec){0, 5000000}, NULL);
+    if (lost_s > 0 && fake.plugged) after_n = fmax(after_n, force_n);
+    if (lost_s <= 0 && force_n < 0.3)
+      fake.position_m[1] = fake.position_m[1] - speed_m_s * step_s; // y is up there
+    else if (lost_s <= 0)
+      lost_s = now_s();
+    fake.plugged = lost_s <= 0 || now_s() > lost_s + 1.0;
+    nanosleep(&(struct timespec){0, (long)(1e9 * step_s)}, NULL);
   }
   return NULL;
 }
 
 __attribute__((constructor)) static void begin(void) {
   static pthread_t thread;
-  if (fake.plugged) return;
   fake.plugged = true;
   pthread_create(&thread, NULL, live, NULL);
 }
