@@ -135,6 +135,9 @@ SONDE_API void sonde_file_write(sonde_file *file, const void *bytes, size_t coun
 /** printf onto the file; a failure is remembered and reported by the commit. @thread owner */
 SONDE_API void sonde_file_printf(sonde_file *file, const char *format, ...)
     __attribute__((format(printf, 2, 3)));
+/** Hands what was written to the system, so that the end of the program cannot lose it.
+ * @thread owner */
+SONDE_API void sonde_file_flush(sonde_file *file);
 /** Flushes, renames over `path` and frees; on failure nothing is left behind. @thread owner */
 SONDE_API sonde_status sonde_file_commit(sonde_file *file, sonde_error *error);
 /** Removes the temporary file and frees; NULL is ignored. @thread owner */

@@ -153,8 +153,12 @@ SONDE_API sonde_loop_stats sonde_session_loop(const sonde_session *session);
 /** Result of playing a recording again. */
 typedef struct sonde_replay_result {
   uint64_t ticks;
-  uint64_t recorded_hash, hash;
-  bool same;
+  uint64_t recorded_hash, hash; /**< recorded_hash: 0 for a file without an end */
+  bool same;                    /**< also every state hash on the way */
+  uint64_t different_tick;      /**< of the first of them that differs, 0: none */
+  uint32_t checks;              /**< state hashes on the way that were compared */
+  uint64_t images, recorded_image_hash, image_hash;
+  bool same_images; /**< false when images were not made */
   char model_path[512];
 } sonde_replay_result;
 

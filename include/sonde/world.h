@@ -202,6 +202,27 @@ SONDE_API sonde_stage_times sonde_state_times(const sonde_state *state);
 /** Bytes that the fast engine's kernels read and wrote in the last step, at the least; 0 for
  * DOUBLE. */
 SONDE_API uint64_t sonde_state_bytes_moved(const sonde_state *state);
+/** Most bytes that sonde_state_save() writes for this state. @thread any */
+SONDE_API size_t sonde_state_size(const sonde_state *state);
+/**
+ * Copies all that the next steps depend on: motion, contact, friction, sleep, warm starts, tick.
+ * For the same program on the same machine.
+ * @param[out] blob [sonde_state_size()] aligned to 8 bytes
+ * @return bytes written
+ * @thread tick, between steps; copies only
+ */
+SONDE_API size_t sonde_state_save(const sonde_state *state, void *blob);
+/**
+ * Goes on where a state of the same model and options was saved: the next steps have the same bits
+ * as if it had never stopped. The blob is checked before anything changes.
+ * @return FORMAT for a blob that is not one, MISMATCH for one of another model or engine
+ * @thread owner, between steps
+ */
+SONDE_API sonde_status sonde_state_restore(sonde_state *state, const void *blob, size_t bytes,
+                                           sonde_error *error);
+/** sonde_state_hash() of the state that was saved, from a blob as sonde_state_save() left it.
+ * @thread any */
+SONDE_API uint64_t sonde_state_saved_hash(const sonde_model *model, const void *blob);
 /** Hash of positions, velocities and tick: equal runs have equal hashes. @thread owner */
 SONDE_API uint64_t sonde_state_hash(const sonde_state *state);
 

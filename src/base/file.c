@@ -71,6 +71,11 @@ void sonde_file_printf(sonde_file *file, const char *format, ...) {
   va_end(arguments);
 }
 
+void sonde_file_flush(sonde_file *file) {
+  SONDE_ASSERT(file->stream);
+  if (fflush(file->stream) && !file->failure) file->failure = errno ? errno : EIO;
+}
+
 sonde_status sonde_file_commit(sonde_file *file, sonde_error *error) {
   SONDE_ASSERT(file->stream);
   int failure = file->failure;

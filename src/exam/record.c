@@ -1,6 +1,7 @@
 // Writing a recording: a text header, fixed-size records, an end with hash and CRC-32.
 // emit:             bytes to the file and into the CRC.
-// put_tick:         one record as bytes.
+// put_*:            one record as bytes.
+// close_block:      a block record; what came before survives the program.
 // json_*, header_json: the header line.
 // sonde_recorder_*: the interface.
 #include "exam/record.h"
@@ -9,12 +10,13 @@
 #include "exam/bytes.h"
 
 #include <cjson/cJSON.h>
+#include <math.h>
 #include <zlib.h>
 
 struct sonde_recorder {
   sonde_file *file;
   uLong crc;
-  uint64_t ticks;
+  uint64_t ticks, images, block_ticks;
 };
 
 static void emit(sonde_recorder *recorder, const void *bytes, size_t count) {
@@ -34,20 +36,55 @@ static void put_tick(byte_writer *w, const sonde_record *record) {
   for (int i = 0; i < 7; ++i) put_real(w, numbers[i]);
 }
 
+static void put_controls(byte_writer *w, const sonde_record *record) {
+  put_u32(w, SONDE_RECORD_CONTROLS);
+  put_u32(w, record->controls.probe);
+  put_u64(w, record->tick);
+  sonde_controls_put(w, &record->controls);
+}
+
+static void put_image(byte_writer *w, const sonde_record *record) {
+  const sonde_record_image *image = &record->image;
+  put_u32(w, SONDE_RECORD_IMAGE);
+  put_u32(w, image->fault);
+  put_u64(w, record->tick);
+  put_real(w, image->rendered_force_n.x);
+  put_real(w, image->rendered_force_n.y);
+  put_real(w, image->rendered_force_n.z);
+}
+
+static void put_check(byte_writer *w, const sonde_record *record) {
+  put_u32(w, SONDE_RECORD_CHECK);
+  put_u32(w, record->check.kind);
+  put_u64(w, record->check.tick);
+  put_u64(w, record->check.hash);
+}
+
+static void close_block(sonde_recorder *recorder) {
+  unsigned char bytes[16];
+  byte_writer w = {bytes};
+  put_u32(&w, SONDE_RECORD_BLOCK);
+  put_u32(&w, (uint32_t)recorder->crc);
+  put_u64(&w, recorder->ticks);
+  SONDE_ASSERT(w.at == bytes + sizeof bytes);
+  emit(recorder, bytes, sizeof bytes);
+  sonde_file_flush(recorder->file);
+}
+
 void sonde_recorder_write(sonde_recorder *recorder, const sonde_record *record) {
   unsigned char bytes[SONDE_RECORD_MOST_BYTES];
   byte_writer w = {bytes};
-  if (record->tag == SONDE_RECORD_TICK) {
-    put_tick(&w, record);
-    SONDE_ASSERT(w.at == bytes + SONDE_RECORD_TICK_BYTES);
-    recorder->ticks++;
-  } else {
-    put_u32(&w, SONDE_RECORD_CONTROLS);
-    put_u32(&w, record->controls.probe);
-    put_u64(&w, record->tick);
-    sonde_controls_put(&w, &record->controls);
+  switch (record->tag) {
+  case SONDE_RECORD_TICK: put_tick(&w, record); break;
+  case SONDE_RECORD_CONTROLS: put_controls(&w, record); break;
+  case SONDE_RECORD_IMAGE: put_image(&w, record); break;
+  default: put_check(&w, record); break;
   }
+  SONDE_ASSERT(w.at - bytes == (ptrdiff_t)sonde_record_bytes(SONDE_RECORD_VERSION, record->tag));
   emit(recorder, bytes, (size_t)(w.at - bytes));
+  recorder->images += record->tag == SONDE_RECORD_IMAGE;
+  if (record->tag != SONDE_RECORD_TICK) return;
+  if (++recorder->ticks % recorder->block_ticks == 0) close_block(recorder);
 }
 
 // 64-bit numbers do not fit a JSON number.
@@ -88,6 +125,10 @@ static char *header_json(const sonde_record_head *head) {
   }
   json_world(root, &head->world);
   sonde_setup_write(root, &head->setup);
+  cJSON *image = cJSON_AddObjectToObject(root, "image");
+  cJSON_AddNumberToObject(image, "width", head->image_width);
+  cJSON_AddNumberToObject(image, "height", head->image_height);
+  cJSON_AddNumberToObject(image, "ticks_per_image", head->ticks_per_image);
   char *text = cJSON_PrintUnformatted(root);
   cJSON_Delete(root);
   return text;
@@ -112,11 +153,13 @@ sonde_status sonde_recorder_create(const char *path, const sonde_record_head *he
   }
   status = sonde_file_create(path, &recorder->file, error);
   if (status) goto done;
+  recorder->block_ticks = (uint64_t)ceil(SONDE_RECORD_BLOCK_S / head->world.dt_s);
   char magic[40];
   snprintf(magic, sizeof magic, "%s %d\n", SONDE_RECORD_MAGIC, SONDE_RECORD_VERSION);
   emit(recorder, magic, strlen(magic));
   emit(recorder, json, strlen(json));
   emit(recorder, "\n", 1);
+  sonde_file_flush(recorder->file);
   *out = recorder;
   recorder = NULL;
 done:
@@ -125,19 +168,24 @@ done:
   return status;
 }
 
-sonde_status sonde_recorder_close(sonde_recorder *recorder, uint64_t hash, uint64_t lost,
+sonde_status sonde_recorder_close(sonde_recorder *recorder, sonde_record_end *end,
                                   sonde_error *error) {
-  unsigned char bytes[SONDE_RECORD_END_BYTES];
+  unsigned char bytes[SONDE_RECORD_MOST_BYTES];
   byte_writer w = {bytes};
+  end->ticks = recorder->ticks, end->images = recorder->images;
   put_u32(&w, SONDE_RECORD_END);
   put_u32(&w, 0);
-  put_u64(&w, recorder->ticks);
-  put_u64(&w, hash);
-  put_u64(&w, lost);
+  put_u64(&w, end->ticks);
+  put_u64(&w, end->hash);
+  put_u64(&w, end->lost);
+  put_u64(&w, end->images);
+  put_u64(&w, end->image_hash);
   emit(recorder, bytes, (size_t)(w.at - bytes));
-  put_u32(&w, (uint32_t)recorder->crc);
+  end->crc = (uint32_t)recorder->crc;
+  put_u32(&w, end->crc);
   put_u32(&w, 0);
-  SONDE_ASSERT(w.at == bytes + SONDE_RECORD_END_BYTES);
+  SONDE_ASSERT(w.at - bytes ==
+               (ptrdiff_t)sonde_record_bytes(SONDE_RECORD_VERSION, SONDE_RECORD_END));
   sonde_file_write(recorder->file, w.at - 8, 8);
   sonde_status status = sonde_file_commit(recorder->file, error);
   sonde_free(recorder);

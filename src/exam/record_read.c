@@ -2,11 +2,13 @@
 // text_of, real_of, hash_of:         members of the header that must be there.
 // read_model, read_probes, read_world: parts of the header.
 // read_magic, read_header, read_end: the three parts of the file.
-// decode_tick, decode_controls:      one record.
+// sonde_record_bytes, decode_*:      one record.
+// read_blocks:                       of a file that was cut off, as far as it is whole.
 // check_records:                     walks all of them.
 #include "exam/record.h"
 
 #include "base/base.h"
+#include "base/maths.h"
 #include "exam/bytes.h"
 #include "haptics/motion.h"
 
@@ -115,6 +117,17 @@ static sonde_status read_world(const source *s, const cJSON *root) {
   return status;
 }
 
+// Came with version 4.
+static sonde_status read_image(const source *s, const cJSON *root) {
+  const cJSON *image = cJSON_GetObjectItemCaseSensitive(root, "image");
+  sonde_recording *r = s->recording;
+  sonde_status status = count_of(s, image, "width", &r->image_width);
+  if (!status) status = count_of(s, image, "height", &r->image_height);
+  if (!status) status = count_of(s, image, "ticks_per_image", &r->ticks_per_image);
+  if (!status && r->ticks_per_image == 0) status = fail_header(s, "ticks_per_image");
+  return status;
+}
+
 // Leaves recording->at at the second line.
 static sonde_status read_magic(const source *s) {
   sonde_recording *r = s->recording;
@@ -145,30 +158,49 @@ static sonde_status read_header(const source *s) {
   sonde_status status = read_model(s, root);
   if (!status) status = read_probes(s, root);
   if (!status) status = read_world(s, root);
+  r->image_width = r->image_height = 512, r->ticks_per_image = 20;
   if (!status && !sonde_setup_read(root, &r->setup)) status = fail_header(s, "setup");
+  r->world.friction = r->setup.friction;
+  if (!status && r->version >= 4) status = read_image(s, root);
   cJSON_Delete(root);
-  r->at = (size_t)(end + 1 - r->bytes);
+  r->at = r->start = (size_t)(end + 1 - r->bytes);
   return status;
+}
+
+size_t sonde_record_bytes(int version, uint32_t tag) {
+  switch (tag) {
+  case SONDE_RECORD_TICK: return SONDE_RECORD_TICK_BYTES;
+  case SONDE_RECORD_CONTROLS: return 16 + sonde_controls_bytes(version);
+  case SONDE_RECORD_END: return version < 4 ? 40 : 56;
+  case SONDE_RECORD_IMAGE: return version < 4 ? 0 : 40;
+  case SONDE_RECORD_CHECK: return version < 4 ? 0 : 24;
+  case SONDE_RECORD_BLOCK: return version < 4 ? 0 : 16;
+  default: return 0;
+  }
 }
 
 // The last bytes; afterwards recording->end is the end of the records.
 static sonde_status read_end(const source *s) {
   sonde_recording *r = s->recording;
-  size_t start = r->end < SONDE_RECORD_END_BYTES ? 0 : r->end - SONDE_RECORD_END_BYTES;
+  size_t bytes = sonde_record_bytes(r->version, SONDE_RECORD_END);
+  size_t start = r->end < bytes ? 0 : r->end - bytes;
   byte_reader reader = {(const unsigned char *)r->bytes + start};
   if (start < r->at || get_u32(&reader) != SONDE_RECORD_END || get_u32(&reader) != 0)
     return sonde_fail(s->error, SONDE_FORMAT,
                       "%s: the recording has no end: it was cut off or not finished", s->path);
-  r->ticks = get_u64(&reader);
-  r->hash = get_u64(&reader);
-  r->lost = get_u64(&reader);
-  uint32_t expected = get_u32(&reader);
+  sonde_record_end *told = &r->told;
+  told->ticks = get_u64(&reader);
+  told->hash = get_u64(&reader);
+  told->lost = get_u64(&reader);
+  if (r->version >= 4) told->images = get_u64(&reader), told->image_hash = get_u64(&reader);
+  told->crc = get_u32(&reader);
   uint32_t crc = (uint32_t)crc32_z(0, (const unsigned char *)r->bytes, r->end - 8);
-  if (crc != expected)
+  if (crc != told->crc)
     return sonde_fail(s->error, SONDE_CHECKSUM,
                       "%s: the recording is damaged: its CRC-32 is %08x, expected %08x", s->path,
-                      crc, expected);
+                      crc, told->crc);
   r->end = start;
+  r->ended = true;
   return SONDE_OK;
 }
 
@@ -189,67 +221,126 @@ static void decode_controls(byte_reader *reader, int version, sonde_record *reco
   record->controls.probe = probe;
 }
 
+static void decode_image(byte_reader *reader, sonde_record *record) {
+  uint32_t fault = get_u32(reader);
+  record->tick = get_u64(reader);
+  record->image.fault = fault < SONDE_FAULT_COUNT ? (sonde_fault)fault : SONDE_FAULT_COUNT;
+  sonde_vec3 *force_n = &record->image.rendered_force_n;
+  force_n->x = get_real(reader), force_n->y = get_real(reader), force_n->z = get_real(reader);
+}
+
+static void decode_check(byte_reader *reader, sonde_record *record) {
+  uint32_t kind = get_u32(reader);
+  record->check.kind = kind == SONDE_CHECK_STATE ? SONDE_CHECK_STATE : SONDE_CHECK_IMAGES;
+  record->check.tick = record->tick = get_u64(reader);
+  record->check.hash = get_u64(reader);
+}
+
+// The tag at a place and the record's bytes; 0 when no whole record is there.
+static size_t record_at(const sonde_recording *r, size_t at, uint32_t *tag) {
+  if (r->end - at < 4) return 0;
+  byte_reader reader = {(const unsigned char *)r->bytes + at};
+  *tag = get_u32(&reader);
+  size_t bytes = sonde_record_bytes(r->version, *tag);
+  return *tag == SONDE_RECORD_END || bytes > r->end - at ? 0 : bytes;
+}
+
 bool sonde_recording_next(sonde_recording *r, sonde_record *record) {
   SONDE_ASSERT(r->at <= r->end);
-  *record = (sonde_record){0};
-  if (r->end - r->at < SONDE_RECORD_TICK_BYTES) return false;
-  byte_reader reader = {(const unsigned char *)r->bytes + r->at};
-  record->tag = get_u32(&reader);
-  size_t controls = 16 + sonde_controls_bytes(r->version);
-  size_t bytes = record->tag == SONDE_RECORD_TICK ? SONDE_RECORD_TICK_BYTES : controls;
-  if (r->end - r->at < bytes) return false;
-  if (record->tag == SONDE_RECORD_TICK)
-    decode_tick(&reader, record);
-  else if (record->tag == SONDE_RECORD_CONTROLS)
-    decode_controls(&reader, r->version, record);
-  else
-    return false;
+  memset(record, 0, sizeof *record);
+  uint32_t tag;
+  size_t bytes;
+  while ((bytes = record_at(r, r->at, &tag)) > 0 && tag == SONDE_RECORD_BLOCK) r->at += bytes;
+  if (bytes == 0) return false;
+  record->tag = tag;
+  byte_reader reader = {(const unsigned char *)r->bytes + r->at + 4};
+  switch (tag) {
+  case SONDE_RECORD_TICK: decode_tick(&reader, record); break;
+  case SONDE_RECORD_CONTROLS: decode_controls(&reader, r->version, record); break;
+  case SONDE_RECORD_IMAGE: decode_image(&reader, record); break;
+  default: decode_check(&reader, record); break;
+  }
   r->at += bytes;
   return true;
 }
 
-// What is wrong with a record, NULL when nothing is.
+// What is wrong with a record, NULL when nothing is. `tick`: ticks before it.
 static const char *fault_of(const sonde_recording *r, const sonde_record *record, uint64_t tick) {
+  bool first = r->at == r->start + sonde_record_bytes(r->version, record->tag);
+  if (first && record->tag != SONDE_RECORD_CONTROLS) return "comes before the first controls";
+  if (record->tag == SONDE_RECORD_CHECK)
+    return record->tick <= tick ? NULL : "is a hash of what did not happen yet";
   if (record->tick != tick) return "is out of order";
   if (record->tag == SONDE_RECORD_CONTROLS)
     return record->controls.probe < r->probe_count ? NULL : "names a missing probe";
+  if (record->tag == SONDE_RECORD_IMAGE)
+    return record->image.fault < SONDE_FAULT_COUNT && v_finite(record->image.rendered_force_n)
+               ? NULL
+               : "has a force or a fault that is not one";
   return sonde_pose_usable(record->sample.world_from_probe) ? NULL : "has a pose that is not one";
+}
+
+// Of a file without an end: blocks whose CRC fits, or all whole records of one without blocks.
+static sonde_status read_blocks(const source *s) {
+  sonde_recording *r = s->recording;
+  size_t at = r->start, summed = 0, whole = r->start, bytes;
+  uLong crc = 0;
+  uint32_t tag;
+  r->told = (sonde_record_end){0};
+  for (; (bytes = record_at(r, at, &tag)) > 0; at += bytes) {
+    if (r->version < 4) whole = at + bytes;
+    if (tag != SONDE_RECORD_BLOCK) continue;
+    crc = crc32_z(crc, (const unsigned char *)r->bytes + summed, at - summed);
+    summed = at;
+    byte_reader reader = {(const unsigned char *)r->bytes + at + 4};
+    if (get_u32(&reader) != (uint32_t)crc) break;
+    whole = at + bytes;
+    r->told.crc = (uint32_t)crc;
+  }
+  r->end = whole;
+  if (whole > r->start) return SONDE_OK;
+  return sonde_fail(s->error, SONDE_FORMAT,
+                    "%s: the recording was cut off before its first whole block (%g s)", s->path,
+                    SONDE_RECORD_BLOCK_S);
 }
 
 static sonde_status check_records(const source *s) {
   sonde_recording *r = s->recording;
-  size_t start = r->at;
-  uint64_t tick = 0;
+  uint64_t tick = 0, images = 0;
   sonde_record record;
-  if (r->lost)
+  if (r->told.lost)
     return sonde_fail(s->error, SONDE_FORMAT,
                       "%s: %llu records were lost while it was written (the disk was too slow): it "
                       "cannot be replayed",
-                      s->path, (unsigned long long)r->lost);
+                      s->path, (unsigned long long)r->told.lost);
   while (sonde_recording_next(r, &record)) {
     const char *fault = fault_of(r, &record, tick);
     if (fault)
       return sonde_fail(s->error, SONDE_FORMAT, "%s: the record of tick %llu %s", s->path,
                         (unsigned long long)tick, fault);
     tick += record.tag == SONDE_RECORD_TICK;
+    images += record.tag == SONDE_RECORD_IMAGE;
   }
-  if (r->at != r->end || tick != r->ticks)
+  if (!r->ended) r->told.ticks = tick, r->told.images = images;
+  if (r->at != r->end || tick != r->told.ticks || images != r->told.images)
     return sonde_fail(s->error, SONDE_FORMAT,
                       "%s: %llu whole ticks and %zu bytes more, expected %llu ticks", s->path,
-                      (unsigned long long)tick, r->end - r->at, (unsigned long long)r->ticks);
-  r->at = start;
+                      (unsigned long long)tick, r->end - r->at, (unsigned long long)r->told.ticks);
+  r->at = r->start;
   return SONDE_OK;
 }
 
-sonde_status sonde_recording_load(const char *path, sonde_recording *recording,
+sonde_status sonde_recording_load(const char *path, bool recover, sonde_recording *recording,
                                   sonde_error *error) {
   SONDE_ASSERT(path != NULL && recording != NULL);
   *recording = (sonde_recording){0};
   source s = {path, recording, error};
   sonde_status status = sonde_file_load(path, &recording->bytes, &recording->end, error);
   if (!status) status = read_magic(&s);
-  if (!status) status = read_end(&s);
+  sonde_status ended = status ? status : read_end(&s);
+  if (!status && !recover) status = ended;
   if (!status) status = read_header(&s);
+  if (!status && ended) status = read_blocks(&s);
   if (!status) status = check_records(&s);
   if (status) sonde_recording_clear(recording);
   return status;

@@ -3,13 +3,13 @@
 // create_probes, create_boxes, create_lines, create_recording: parts of a session, in this order.
 // release:         frees whatever exists.
 // sonde_session_*: the interface; ticks are in session_hot.c, threads in session_threads.c.
-#include "exam/session.h"
+#include "exam/keys.h"
 
 #include "base/base.h"
 #include "base/maths.h"
 #include "haptics/motion.h"
 
-enum { RING_RECORDS = 8192 }; // 8 s of ticks while the disk does not answer
+enum { RING_RECORDS = 8192, RING_CHECKS = 256 }; // 8 s of ticks while the disk does not answer
 
 sonde_session_def sonde_session_def_default(void) {
   sonde_session_def def = {.world = sonde_world_def_default(),
@@ -120,17 +120,34 @@ static sonde_status create_lines(sonde_session *session, sonde_error *error) {
   return sonde_fail_memory(error);
 }
 
+// Keyframes beside the recording; without them it is whole as well.
+static void create_keys(sonde_session *session, const char *record_path) {
+  char *path = sonde_keys_path(record_path);
+  if (path) (void)sonde_keys_create(path, session->subject, &session->keys, NULL);
+  sonde_free(path);
+}
+
 static sonde_status create_recording(sonde_session *session, const sonde_session_def *def,
                                      sonde_error *error) {
   if (!def->record_path) return SONDE_OK;
+  size_t world_bytes = sizeof(sonde_world_slot) + sonde_subject_size(session->subject);
   sonde_status status =
       sonde_ring_create(sizeof(sonde_record), RING_RECORDS, &session->records, error);
+  if (!status)
+    status =
+        sonde_ring_create(sizeof(sonde_record_check), RING_CHECKS, &session->image_checks, error);
+  if (!status) status = sonde_mailbox_create(world_bytes, &session->world_box, error);
+  if (!status)
+    status = sonde_mailbox_create(sizeof(sonde_inside_slot), &session->inside_box, error);
   if (status) return status;
   sonde_record_head head = {.model_path = def->model_path,
                             .model_name = def->model->name,
                             .model_checksum = def->model->checksum,
                             .world = *sonde_state_def(session->state),
                             .setup = session->subject->setup,
+                            .image_width = session->image_width,
+                            .image_height = session->image_height,
+                            .ticks_per_image = session->ticks_per_image,
                             .probe_count = session->probe_count,
                             .probes = session->probes,
                             .probe_names = probe_names(def)};
@@ -139,6 +156,7 @@ static sonde_status create_recording(sonde_session *session, const sonde_session
   sonde_record first = {.tag = SONDE_RECORD_CONTROLS};
   first.controls = session->controls;
   sonde_recorder_write(session->recorder, &first);
+  create_keys(session, def->record_path);
   return SONDE_OK;
 }
 
@@ -168,7 +186,11 @@ static sonde_status create_parts(sonde_session *session, const sonde_session_def
 
 static void release(sonde_session *session) {
   sonde_recorder_discard(session->recorder);
+  sonde_keys_discard(session->keys);
   sonde_ring_destroy(session->records);
+  sonde_ring_destroy(session->image_checks);
+  sonde_mailbox_destroy(session->world_box);
+  sonde_mailbox_destroy(session->inside_box);
   sonde_mailbox_destroy(session->control_box);
   sonde_mailbox_destroy(session->surface_box);
   sonde_mailbox_destroy(session->frame_box);
@@ -196,6 +218,8 @@ sonde_status sonde_session_create(const sonde_session_def *def, sonde_device *de
   session->nodes = def->model->surface.vertex_count;
   session->dt_s = def->world.dt_s;
   session->ticks_per_image = def->ticks_per_image;
+  session->key_period = (uint64_t)ceil(SONDE_KEY_PERIOD_S / session->dt_s);
+  session->key_tick = session->key_period;
   session->image_width = def->image_width;
   session->image_height = def->image_height;
   session->sample.world_from_probe.rotation = quat_identity();
@@ -223,8 +247,14 @@ static sonde_status close_recording(sonde_session *session, sonde_error *error) 
   uint64_t lost = atomic_load(&session->lost_records);
   sonde_recorder *recorder = session->recorder;
   session->recorder = NULL;
-  sonde_status status =
-      sonde_recorder_close(recorder, sonde_state_hash(session->state), lost, error);
+  sonde_record_end end = {
+      .hash = sonde_state_hash(session->state), .lost = lost, .image_hash = session->images_hash};
+  sonde_status status = sonde_recorder_close(recorder, &end, error);
+  if (session->keys && !status && !lost)
+    (void)sonde_keys_commit(session->keys, end.crc, NULL);
+  else
+    sonde_keys_discard(session->keys);
+  session->keys = NULL;
   if (!status && lost)
     status = sonde_fail(error, SONDE_IO,
                         "the disk was too slow: the recording lacks %llu records and cannot be "

@@ -12,6 +12,7 @@
 #include "base/ring.h"
 #include "exam/record.h"
 #include "exam/subject.h"
+#include "interior/interior.h"
 
 #include <pthread.h>
 #include <stdatomic.h>
@@ -38,6 +39,7 @@ typedef struct sonde_surface_slot {
   sonde_pathology pathology; // of the controls, with the pressures of this tick
   sonde_circulation circulation;
   double pose_s; // clock when the tick read its pose; 0 in lockstep
+  bool key;      // a keyframe was taken with it
 } sonde_surface_slot;
 
 // Bins of 0.25 ms; the last one holds all that is older.
@@ -48,6 +50,38 @@ static const double LATENCY_BIN_S = 0.25e-3;
 typedef struct sonde_session_beam {
   double aperture_m, frequency_hz, depth_m, focus_m;
 } sonde_session_beam;
+
+// What the next tick depends on besides the world and its own inputs. Whatever else a tick carries
+// on to the next belongs here too: a player starts from it.
+typedef struct sonde_tick_memory {
+  sonde_session_controls controls;
+  sonde_device_sample sample;
+} sonde_tick_memory;
+
+// What the next image depends on besides its surface. Whatever else an image carries on to the next
+// belongs here too.
+typedef struct sonde_image_memory {
+  uint32_t shown, building, beam_images;
+  uint64_t shown_tick;
+  sonde_pathology shown_pathology;
+  sonde_session_beam beam, coming;
+  sonde_interior_memory interior;
+} sonde_image_memory;
+
+// In mailbox slots on the way to the recorder: the world, followed by sonde_subject_remember(), and
+// the inside of the same image.
+typedef struct sonde_world_slot {
+  uint64_t tick;
+  size_t bytes;
+  sonde_tick_memory memory;
+} sonde_world_slot;
+typedef struct sonde_inside_slot {
+  uint64_t tick;
+  sonde_image_memory memory;
+} sonde_inside_slot;
+
+// Keyframes are taken at the last images before every multiple of this.
+#define SONDE_KEY_PERIOD_S 0.5
 
 struct sonde_session {
   // set up once
@@ -69,8 +103,9 @@ struct sonde_session {
   sonde_session_controls controls; // in force
   sonde_device_sample sample;      // last used
   bool realtime;
-  uint64_t offered_tick; // of the newest surface
-  double last_tick_s;    // clock of the previous real-time tick, 0 before the first
+  uint64_t offered_tick;         // of the newest surface
+  uint64_t key_period, key_tick; // ticks; the next multiple that wants a keyframe
+  double last_tick_s;            // clock of the previous real-time tick, 0 before the first
   _Atomic uint64_t ticks;
   _Atomic int fault; // the safety's, for other threads
   _Atomic uint64_t lost_records;
@@ -86,16 +121,22 @@ struct sonde_session {
   uint32_t *touched;               // [nodes] scratch
   sonde_findings findings;
   bool has_findings;
-  atomic_bool surface_wanted;      // the image thread waits for a surface
+  atomic_bool surface_pending;     // offered and not yet an image: real time offers no other
+  const void *surface;             // slot of the newest image
   bool shown;                      // an image was made
   sonde_session_beam beam, coming; // of the images; being built
   bool building;                   // coming
+  uint32_t beam_images;            // since the building began
   uint64_t shown_tick;
   _Atomic uint64_t images;
+  uint64_t images_hash;                   // of all pixels so far, with a recording
   _Atomic uint32_t latency[LATENCY_BINS]; // images by age of their pose when finished
 
   // recorder; NULL without a recording
   sonde_recorder *recorder;
+  struct sonde_keys_file *keys;
+  const sonde_world_slot *world_part; // of the next keyframe, until both parts are there
+  const sonde_inside_slot *inside_part;
 
   // between threads
   sonde_shared_controls requested;
@@ -103,7 +144,10 @@ struct sonde_session {
   sonde_mailbox *control_box; // sonde_session_controls
   sonde_mailbox *surface_box; // sonde_surface_slot + arrays
   sonde_mailbox *frame_box;   // sonde_frame + arrays
-  sonde_ring *records;        // sonde_record; NULL without a recording
+  sonde_ring *records;        // sonde_record; NULL without a recording, like the others below
+  sonde_ring *image_checks;   // sonde_record_check of images
+  sonde_mailbox *world_box;   // sonde_world_slot + state
+  sonde_mailbox *inside_box;  // sonde_inside_slot
 
   // real time
   _Atomic(sonde_loop *) loop;
@@ -117,9 +161,27 @@ struct sonde_session {
 void sonde_session_step(sonde_session *session);
 // Body of the loop's tick (hot).
 void sonde_session_realtime_tick(void *session);
-// Turns the newest surface, if there is one, into a frame. Image thread or lockstep.
+// The same with recorded inputs instead of the device's (hot). @param controls NULL: as before
+void sonde_session_replay(sonde_session *session, const sonde_session_controls *controls,
+                          const sonde_device_sample *sample);
+// The surface and its snapshot into the mailbox of the image thread (hot).
+void sonde_session_offer(sonde_session *session);
+// What the next tick depends on, also sonde_subject_remember() into world[] (hot). Returns its
+// bytes.
+size_t sonde_session_remember_tick(const sonde_session *session, sonde_tick_memory *memory,
+                                   void *world);
+void sonde_session_remember_image(const sonde_session *session, sonde_image_memory *memory);
+// Goes on from there; not while threads run. @return FORMAT, MISMATCH: then the session stands
+// somewhere between
+sonde_status sonde_session_recall(sonde_session *session, const sonde_tick_memory *tick_memory,
+                                  const sonde_image_memory *image_memory, const void *world,
+                                  size_t world_bytes, sonde_error *error);
+// Turns the newest surface, if there is one, into a frame: inside and beam follow it, then it is
+// drawn. Image thread or lockstep.
 bool sonde_session_show(sonde_session *session);
-// Moves everything in the ring to the file. Recorder thread or lockstep.
+bool sonde_session_follow(sonde_session *session);
+void sonde_session_draw(sonde_session *session);
+// Moves everything in the rings and keyframes to their files. Recorder thread or lockstep.
 void sonde_session_drain(sonde_session *session);
 
 #endif

@@ -2,9 +2,12 @@
 // push:            a record into the ring; a full ring is counted.
 // take_controls:   newest controls come into force, with their stop and resume.
 // read_device:     pose of this tick, exactly as the world and the recording get it.
+// step_world:      everything that moves with the probe.
 // fill_snapshot:   what viewers are told about this tick.
-// offer_surface:   the surface and its snapshot into the mailbox of the image thread.
-// sonde_session_step, sonde_session_realtime_tick: the tick.
+// surface_is_due, key_is_due: when an image, and a keyframe with it, is to be made.
+// offer_key:       all that the next tick depends on into the mailbox of the recorder.
+// sonde_session_offer: the surface and its snapshot into the mailbox of the image thread.
+// sonde_session_step, sonde_session_realtime_tick, sonde_session_replay: the tick.
 #include "exam/session.h"
 
 #include "base/base.h"
@@ -60,6 +63,12 @@ static void read_device(sonde_session *session, uint64_t tick) {
   push(session, &record);
 }
 
+// Shared by live and replayed ticks: what the world depends on belongs here.
+static void step_world(sonde_session *session) {
+  const sonde_probe *probe = &session->probes[session->controls.probe];
+  sonde_subject_step(session->subject, probe, session->sample.world_from_probe);
+}
+
 static void fill_snapshot(const sonde_session *session, sonde_snapshot *snapshot) {
   const sonde_contact *contact = sonde_state_contact(session->state);
   sonde_pose pose = session->sample.world_from_probe;
@@ -90,14 +99,37 @@ static void fill_snapshot(const sonde_session *session, sonde_snapshot *snapshot
   };
 }
 
-// In lockstep every so many ticks; in real time when the image thread asks, but no sooner.
+// In lockstep every so many ticks; in real time when the last image is finished, but no sooner:
+// every surface that is offered becomes an image, so that a replay can make the same ones.
 static bool surface_is_due(sonde_session *session, uint64_t tick) {
   if (!session->realtime) return tick % session->ticks_per_image == 0;
   return tick - session->offered_tick >= session->ticks_per_image &&
-         atomic_exchange_explicit(&session->surface_wanted, false, memory_order_acquire);
+         !atomic_load_explicit(&session->surface_pending, memory_order_acquire);
 }
 
-static void offer_surface(sonde_session *session) {
+// At the last images before every multiple of the period, where a seek to it starts.
+static bool key_is_due(sonde_session *session, uint64_t tick) {
+  uint64_t near = tick + 2 * (uint64_t)session->ticks_per_image;
+  if (!session->world_box || near <= session->key_tick) return false;
+  session->key_tick = (near / session->key_period + 1) * session->key_period;
+  return true;
+}
+
+size_t sonde_session_remember_tick(const sonde_session *session, sonde_tick_memory *memory,
+                                   void *world) {
+  memory->controls = session->controls;
+  memory->sample = session->sample;
+  return sonde_subject_remember(session->subject, world);
+}
+
+static void offer_key(sonde_session *session) {
+  sonde_world_slot *slot = (void *)sonde_mailbox_write_slot(session->world_box);
+  slot->tick = sonde_state_tick(session->state);
+  slot->bytes = sonde_session_remember_tick(session, &slot->memory, slot + 1);
+  sonde_mailbox_publish(session->world_box);
+}
+
+void sonde_session_offer(sonde_session *session) {
   unsigned char *slot = sonde_mailbox_write_slot(session->surface_box);
   sonde_surface_slot *head = (sonde_surface_slot *)(void *)slot;
   fill_snapshot(session, &head->snapshot);
@@ -105,6 +137,8 @@ static void offer_surface(sonde_session *session) {
   head->pathology = sonde_subject_pathology(session->subject);
   head->circulation = session->subject->now.circulation;
   head->pose_s = session->last_tick_s;
+  head->key = key_is_due(session, head->snapshot.tick);
+  if (head->key) offer_key(session);
   size_t bytes = session->nodes * sizeof(sonde_vec3);
   memcpy(slot + session->positions_at, sonde_state_positions(session->state), bytes);
   memcpy(slot + session->forces_at, sonde_state_contact_forces(session->state), bytes);
@@ -112,15 +146,21 @@ static void offer_surface(sonde_session *session) {
     memcpy(slot + session->film_at, sonde_gel_film(session->subject->gel),
            session->nodes * sizeof(double));
   session->offered_tick = head->snapshot.tick;
+  atomic_store_explicit(&session->surface_pending, true, memory_order_relaxed);
   sonde_mailbox_publish(session->surface_box);
+}
+
+static void record_image(sonde_session *session, uint64_t tick) {
+  sonde_record record = {.tag = SONDE_RECORD_IMAGE, .tick = tick};
+  record.image = (sonde_record_image){session->safety.force_n, session->safety.fault};
+  push(session, &record);
 }
 
 void sonde_session_step(sonde_session *session) {
   uint64_t tick = atomic_load_explicit(&session->ticks, memory_order_relaxed);
   take_controls(session, tick);
   read_device(session, tick);
-  const sonde_probe *probe = &session->probes[session->controls.probe];
-  sonde_subject_step(session->subject, probe, session->sample.world_from_probe);
+  step_world(session);
   if (sonde_state_flags(session->state) & SONDE_FLAG_NON_FINITE)
     sonde_safety_trip(&session->safety, SONDE_FAULT_NON_FINITE);
   const sonde_contact *contact = sonde_state_contact(session->state);
@@ -129,7 +169,23 @@ void sonde_session_step(sonde_session *session) {
   sonde_safety_apply(&session->safety, session->render.force_n, torque, session->dt_s);
   session->device.write(session->device.self, session->safety.force_n, session->safety.torque_n_m);
   atomic_store_explicit(&session->fault, (int)session->safety.fault, memory_order_relaxed);
-  if (surface_is_due(session, tick + 1)) offer_surface(session);
+  if (surface_is_due(session, tick + 1)) {
+    record_image(session, tick + 1);
+    sonde_session_offer(session);
+  }
+  SONDE_ASSERT(sonde_state_tick(session->state) == tick + 1);
+  atomic_store_explicit(&session->ticks, tick + 1, memory_order_release);
+}
+
+void sonde_session_replay(sonde_session *session, const sonde_session_controls *controls,
+                          const sonde_device_sample *sample) {
+  uint64_t tick = atomic_load_explicit(&session->ticks, memory_order_relaxed);
+  if (controls) {
+    session->controls = *controls;
+    sonde_subject_control(session->subject, controls);
+  }
+  session->sample = *sample;
+  step_world(session);
   SONDE_ASSERT(sonde_state_tick(session->state) == tick + 1);
   atomic_store_explicit(&session->ticks, tick + 1, memory_order_release);
 }

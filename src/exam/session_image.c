@@ -3,11 +3,12 @@
 // update_interior:    the inside and the vessels at this surface.
 // tilt:               between a vessel and the normal of the image plane.
 // read_vessels, read_branches: what the image plane cuts.
-// choose_beam:        the one asked for when it is ready, else the last one.
+// choose_beam:        the one asked for when it is due, else the last one.
 // couple, volume:     what the gel does to the image, and how much there is.
 // fill_frame:         everything into one slot.
 // count_latency:      how old the frame's pose is when the frame is finished.
-// sonde_session_show: one image. sonde_session_latency: percentiles.
+// check_image:        hash of the pixels for the recording.
+// sonde_session_follow, _draw, _show: one image. sonde_session_latency: percentiles.
 #include "exam/session.h"
 
 #include "base/base.h"
@@ -95,17 +96,20 @@ static sonde_echo_settings with_beam(const sonde_session_beam *beam, sonde_echo_
 }
 
 // A new beam is built over several images, which go on with the old one: none of them comes late.
-// One under way is finished first, so that a slider that keeps moving shows where it has been.
+// One under way is finished first, so that a slider that keeps moving shows where it has been. The
+// number of images is the same for every beam, whatever was built before: a replay that starts
+// anywhere changes beams at the same image.
 static void choose_beam(sonde_session *session, const sonde_echo_settings *asked,
                         double aperture_m) {
-  const uint32_t steps = 3;
+  const uint32_t steps = 3, images = (SONDE_ECHO_PREPARE_STEPS + steps - 1) / steps;
   const sonde_session_beam now = {aperture_m, asked->frequency_hz, asked->depth_m, asked->focus_m};
   if (!(session->beam.aperture_m > 0)) session->beam = now;
   if (!session->building && memcmp(&now, &session->beam, sizeof now) != 0)
-    session->coming = now, session->building = true;
+    session->coming = now, session->building = true, session->beam_images = 0;
   if (!session->building) return;
   sonde_echo_settings coming = with_beam(&session->coming, *asked);
-  if (!sonde_echo_prepare(session->echo, session->coming.aperture_m, &coming, steps)) return;
+  (void)sonde_echo_prepare(session->echo, session->coming.aperture_m, &coming, steps);
+  if (++session->beam_images < images) return;
   session->beam = session->coming;
   session->building = false;
 }
@@ -152,8 +156,6 @@ static void fill_frame(sonde_session *session, const unsigned char *slot, unsign
   sonde_image image = {.width = session->image_width,
                        .height = session->image_height,
                        .pixels = out + session->pixels_at};
-  double aperture_m = 2.0 * session->probes[head->snapshot.probe].half_x_m;
-  choose_beam(session, &head->controls.echo, aperture_m);
   double coupling = couple(session, slot);
   sonde_echo_settings settings = with_beam(&session->beam, head->controls.echo);
   sonde_echo_flow flow = sonde_echo_flow_default();
@@ -186,15 +188,48 @@ static void count_latency(sonde_session *session, double pose_s) {
   atomic_fetch_add_explicit(&session->latency[at], 1, memory_order_relaxed);
 }
 
-bool sonde_session_show(sonde_session *session) {
+// All pixels so far, so that one number tells whether a replay shows the same.
+static void check_image(sonde_session *session, const sonde_frame *frame) {
+  if (!session->image_checks) return;
+  size_t count = (size_t)frame->width * frame->height;
+  session->images_hash = sonde_hash(session->images_hash, frame->pixels, count);
+  sonde_record_check check = {SONDE_CHECK_IMAGES, frame->snapshot.tick, session->images_hash};
+  (void)sonde_ring_push(session->image_checks, &check); // the end has the last one at any rate
+}
+
+static void offer_inside(sonde_session *session, uint64_t tick) {
+  sonde_inside_slot *slot = (void *)sonde_mailbox_write_slot(session->inside_box);
+  slot->tick = tick;
+  sonde_session_remember_image(session, &slot->memory);
+  sonde_mailbox_publish(session->inside_box);
+}
+
+bool sonde_session_follow(sonde_session *session) {
   const unsigned char *slot = sonde_mailbox_read(session->surface_box);
   if (!slot) return false;
+  session->surface = slot;
+  const sonde_surface_slot *head = (const void *)slot;
+  if (head->key) offer_inside(session, head->snapshot.tick);
   update_interior(session, slot);
-  fill_frame(session, slot, sonde_mailbox_write_slot(session->frame_box));
+  choose_beam(session, &head->controls.echo, 2.0 * session->probes[head->snapshot.probe].half_x_m);
+  return true;
+}
+
+void sonde_session_draw(sonde_session *session) {
+  SONDE_ASSERT(session->surface != NULL);
+  sonde_frame *frame = (void *)sonde_mailbox_write_slot(session->frame_box);
+  fill_frame(session, session->surface, (unsigned char *)frame);
+  check_image(session, frame);
   sonde_mailbox_publish(session->frame_box);
-  count_latency(session, ((const sonde_surface_slot *)(const void *)slot)->pose_s);
+}
+
+bool sonde_session_show(sonde_session *session) {
+  if (!sonde_session_follow(session)) return false;
+  sonde_session_draw(session);
+  count_latency(session, ((const sonde_surface_slot *)session->surface)->pose_s);
   uint64_t images = atomic_load_explicit(&session->images, memory_order_relaxed);
   atomic_store_explicit(&session->images, images + 1, memory_order_release);
+  atomic_store_explicit(&session->surface_pending, false, memory_order_release);
   return true;
 }
 

@@ -1,9 +1,10 @@
 // The threads of a session in real time, and the lockstep tick.
-// image_main, record_main: ask for a surface and look for it every half millisecond, for records
-//                          every five, so that the tick never has to wake anyone.
-// sonde_session_drain:     ring to file.
+// image_main, record_main: look for a surface every half millisecond, for records every five, so
+//                          that the tick never has to wake anyone.
+// write_records, write_key: rings and mailboxes to the files.
+// sonde_session_drain:     all of that.
 // sonde_session_start/stop/tick: the interface.
-#include "exam/session.h"
+#include "exam/keys.h"
 
 #include "base/base.h"
 #include "base/clock.h"
@@ -14,17 +15,56 @@ static void *image_main(void *argument) {
   sonde_session *session = argument;
   while (!atomic_load_explicit(&session->stop_image, memory_order_acquire)) {
     if (sonde_session_show(session)) continue;
-    atomic_store_explicit(&session->surface_wanted, true, memory_order_release);
     sonde_clock_sleep_until(sonde_clock_now() + 0.5e-3);
   }
   return NULL;
 }
 
-void sonde_session_drain(sonde_session *session) {
+static void write_records(sonde_session *session) {
   sonde_record record;
-  if (!session->recorder) return;
   while (sonde_ring_pop(session->records, &record))
     sonde_recorder_write(session->recorder, &record);
+}
+
+static void write_check(sonde_session *session, const sonde_record_check *check) {
+  sonde_record record = {.tag = SONDE_RECORD_CHECK, .tick = check->tick};
+  record.check = *check;
+  sonde_recorder_write(session->recorder, &record);
+}
+
+// When the world and the inside of the same image are there; a newer one may overtake either.
+static void write_key(sonde_session *session) {
+  const sonde_world_slot *world = session->world_part;
+  const sonde_inside_slot *inside = session->inside_part;
+  if (!world || !inside || world->tick != inside->tick) return;
+  sonde_key key = {.tick = world->tick,
+                   .inputs = &world->memory,
+                   .inside = &inside->memory,
+                   .world = world + 1,
+                   .world_bytes = world->bytes};
+  if (session->keys) sonde_keys_write(session->keys, &key);
+  write_check(session,
+              &(sonde_record_check){SONDE_CHECK_STATE, world->tick,
+                                    sonde_subject_saved_hash(session->subject, world + 1)});
+  session->world_part = NULL, session->inside_part = NULL;
+}
+
+// The hashes come behind the records of their ticks: what is seen before the ring is emptied has
+// its records in it.
+void sonde_session_drain(sonde_session *session) {
+  if (!session->recorder) return;
+  const void *world = sonde_mailbox_read(session->world_box);
+  const void *inside = sonde_mailbox_read(session->inside_box);
+  sonde_record_check check;
+  bool checked = sonde_ring_pop(session->image_checks, &check);
+  write_records(session);
+  if (world) session->world_part = world;
+  if (inside) session->inside_part = inside;
+  write_key(session);
+  for (; checked; checked = sonde_ring_pop(session->image_checks, &check)) {
+    write_records(session);
+    write_check(session, &check);
+  }
 }
 
 static void *record_main(void *argument) {
@@ -76,13 +116,15 @@ void sonde_session_stop(sonde_session *session) {
   session->image_running = session->record_running = false;
   session->realtime = false;
   sonde_session_drain(session);
+  sonde_session_show(session); // what was offered last
+  sonde_session_drain(session);
 }
 
 void sonde_session_tick(sonde_session *session) {
   SONDE_ASSERT(!atomic_load(&session->loop));
   sonde_session_step(session);
-  sonde_session_drain(session);
   sonde_session_show(session);
+  sonde_session_drain(session);
 }
 
 sonde_loop_stats sonde_session_loop(const sonde_session *session) {

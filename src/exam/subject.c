@@ -1,11 +1,15 @@
 // The thigh under the probe: creation.
 // spread:  the gel of the start, equal shares around every site.
 // scale_friction, sonde_setup_preset: what the bench makes of a preset.
+// usable, sonde_subject_recall: going on from a moment.
 #include "exam/subject.h"
 
 #include "base/base.h"
 #include "base/maths.h"
 #include "haptics/gel.h"
+#include "haptics/motion.h"
+
+#include <string.h>
 
 // Shares overlap, so that the film is closed between the sites.
 static void spread(sonde_subject *subject) {
@@ -60,4 +64,24 @@ void sonde_subject_destroy(sonde_subject *subject) {
   sonde_gel_destroy(subject->gel);
   sonde_state_destroy(subject->state);
   sonde_free(subject);
+}
+
+// Bytes of a file may hold anything.
+static bool usable(const sonde_subject_moment *m) {
+  const sonde_session_controls *c = &m->controls;
+  return c->stiffness_scale >= 0.5 && c->stiffness_scale <= 2 && c->damping_scale >= 0.25 &&
+         c->damping_scale <= 4 && c->friction_scale >= 0 && c->friction_scale <= 2 &&
+         c->posture < SONDE_POSTURE_COUNT && v_finite(m->drift_m_s) &&
+         (!m->placed || sonde_pose_usable(m->pose));
+}
+
+sonde_status sonde_subject_recall(sonde_subject *subject, const void *saved, size_t bytes,
+                                  sonde_error *error) {
+  size_t own = sonde_subject_save(subject, NULL);
+  sonde_subject_moment moment;
+  if (bytes > own) memcpy(&moment, saved, sizeof moment);
+  if (bytes <= own || !usable(&moment))
+    return sonde_fail(error, SONDE_FORMAT, "the saved moment is damaged");
+  sonde_subject_restore(subject, saved);
+  return sonde_state_restore(subject->state, (const char *)saved + own, bytes - own, error);
 }

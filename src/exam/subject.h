@@ -49,4 +49,14 @@ size_t sonde_subject_save(const sonde_subject *subject, void *out);
 // the state after it. @thread tick
 void sonde_subject_restore(sonde_subject *subject, const void *saved);
 
+// All of a subject: the above and sonde_state_save(). @param[out] out [sonde_subject_size()]
+// aligned to 8 bytes @return bytes @thread tick
+size_t sonde_subject_size(const sonde_subject *subject);
+size_t sonde_subject_remember(const sonde_subject *subject, void *out);
+// sonde_state_hash() of a remembered moment. @thread any
+uint64_t sonde_subject_saved_hash(const sonde_subject *subject, const void *saved);
+// Goes on from there. @return FORMAT, MISMATCH: then it stands somewhere between @thread owner
+sonde_status sonde_subject_recall(sonde_subject *subject, const void *saved, size_t bytes,
+                                  sonde_error *error);
+
 #endif

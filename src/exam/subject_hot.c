@@ -124,3 +124,17 @@ void sonde_subject_restore(sonde_subject *subject, const void *saved) {
   apply_tissue(subject);
   sonde_state_rub(subject->state, &subject->now.friction);
 }
+
+size_t sonde_subject_size(const sonde_subject *subject) {
+  return sonde_subject_save(subject, NULL) + sonde_state_size(subject->state);
+}
+
+size_t sonde_subject_remember(const sonde_subject *subject, void *out) {
+  size_t own = sonde_subject_save(subject, out);
+  return own + sonde_state_save(subject->state, (char *)out + own);
+}
+
+uint64_t sonde_subject_saved_hash(const sonde_subject *subject, const void *saved) {
+  size_t own = sonde_subject_save(subject, NULL);
+  return sonde_state_saved_hash(subject->model, (const char *)saved + own);
+}

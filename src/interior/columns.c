@@ -248,5 +248,6 @@ sonde_status sonde_columns_create(sonde_interior *in, sonde_error *error) {
 void sonde_columns_refresh(sonde_interior *in) {
   SONDE_ASSERT(in != NULL && in->field != NULL);
   store_field(in);
-  in->live->ready = in->building = in->solid = false;
+  in->live->ready = in->next->ready = in->building = in->solid = false;
+  for (uint32_t k = 0; k < in->shelf_count; ++k) in->shelf[k]->ready = false;
 }

@@ -4,15 +4,18 @@
 // place_of               where a window for this probe would be
 // distance               between two places, in units of what a window tolerates
 // prepare                starts, continues and swaps
+// sonde_interior_remember, _recall  the state between two updates
+// sonde_interior_keep_windows, _next_window  factored windows of other places
 #include "base/base.h"
 #include "interior/interior.h"
 #include "interior/window.h"
+
+#include <string.h>
 
 static const double default_half_x_m = 30e-3, default_half_y_m = 6e-3;
 static const double far_m = 60e-3; // a probe this far above the skin needs no window yet
 static const double slack_t_m = 9e-3, slack_s_m = 7e-3, slack_half_m = 6e-3;
 static const double start_at = 0.5, exact = 0.05; // of the slack
-static const uint64_t work_per_update = 4000000;
 
 static bool place_of(const sonde_interior *in, const sonde_interior_input *input,
                      sonde_window_place *place) {
@@ -45,17 +48,26 @@ static void swap(sonde_interior *in) {
   in->building = false;
 }
 
+// A window takes the same number of updates everywhere; the work may be done earlier (from the
+// shelf) or later (after a recall).
+static bool build(sonde_interior *in, bool at_once) {
+  bool due = ++in->built >= in->whole || at_once;
+  if (!in->next->ready && !sonde_window_step(in->next, due ? UINT64_MAX : SONDE_WINDOW_BUDGET))
+    return false;
+  return due || !in->next->ready;
+}
+
 // At rest in time (dt < 0) the window is made at once, in a running session bit by bit.
 static void prepare(sonde_interior *in, sonde_window_place place, bool at_once) {
   SONDE_ASSERT(in->live != NULL && in->next != NULL);
   double off = in->live->ready ? distance(in, in->live->place, place) : INFINITY;
   if (in->building && distance(in, in->next->place, place) > 1) in->building = false;
   if (!in->building && off > (at_once ? exact : start_at)) {
-    sonde_window_begin(in->next, in, place);
-    in->building = true;
+    const double at[4] = {place.theta, place.s, place.half_theta_m, place.half_s_m};
+    sonde_interior_next_window(in, at);
+    in->building = true, in->built = 0;
   }
-  if (!in->building) return;
-  if (!sonde_window_step(in->next, at_once ? UINT64_MAX : work_per_update)) return;
+  if (!in->building || !build(in, at_once)) return;
   if (in->next->ready)
     swap(in);
   else
@@ -68,4 +80,107 @@ bool sonde_interior_follow(sonde_interior *in, const sonde_interior_input *input
   prepare(in, place, input->dt_s < 0);
   if (!in->live->ready || distance(in, in->live->place, place) > 1) return false;
   return sonde_window_update(in->live, in, input);
+}
+
+// ---- memory -------------------------------------------------------------------------------
+
+static sonde_window_place place_at(const double p[4]) {
+  return (sonde_window_place){p[0], p[1], p[2], p[3]};
+}
+
+static void place_to(const sonde_window_place *place, double p[4]) {
+  p[0] = place->theta, p[1] = place->s, p[2] = place->half_theta_m, p[3] = place->half_s_m;
+}
+
+static bool is_at(const struct sonde_window *window, const sonde_window_place *place) {
+  return window->ready && memcmp(&window->place, place, sizeof *place) == 0;
+}
+
+sonde_status sonde_interior_keep_windows(sonde_interior *in, uint32_t count, sonde_error *error) {
+  SONDE_ASSERT(in != NULL && in->shelf == NULL);
+  in->shelf = SONDE_NEW(struct sonde_window *, count);
+  if (in->shelf == NULL) return sonde_fail_memory(error);
+  for (; in->shelf_count < count; ++in->shelf_count) {
+    sonde_status status = sonde_window_create(&in->shelf[in->shelf_count], error);
+    if (status) return status;
+  }
+  return SONDE_OK;
+}
+
+// The window at `from` of the shelf changes places with next and becomes its first.
+static void exchange(sonde_interior *in, uint32_t from) {
+  struct sonde_window *taken = in->shelf[from];
+  memmove(in->shelf + 1, in->shelf, from * sizeof *in->shelf);
+  in->shelf[0] = in->next;
+  in->next = taken;
+}
+
+void sonde_interior_next_window(sonde_interior *in, const double at[4]) {
+  sonde_window_place place = place_at(at);
+  if (is_at(in->next, &place)) return;
+  for (uint32_t k = 0; k < in->shelf_count; ++k)
+    if (is_at(in->shelf[k], &place)) {
+      exchange(in, k);
+      return;
+    }
+  if (in->shelf_count > 0 && in->next->ready) exchange(in, in->shelf_count - 1);
+  sonde_window_begin(in->next, in, place);
+}
+
+void sonde_interior_remember(const sonde_interior *in, sonde_interior_memory *memory) {
+  SONDE_ASSERT(in != NULL && memory != NULL);
+  memset(memory, 0, sizeof *memory);
+  memory->tick = in->tick;
+  memory->ready = in->ready, memory->live_ready = in->live->ready;
+  memory->building = in->building, memory->built = in->built;
+  if (in->live->ready) place_to(&in->live->place, memory->live);
+  if (in->building) place_to(&in->next->place, memory->next);
+  for (int which = 0; which < 2; ++which)
+    for (uint32_t i = 0; i < in->station_count[which]; ++i) {
+      memory->area_ratio[which][i] = in->state[which][i].area_ratio;
+      memory->flat_axis[which][i] = in->state[which][i].flat_axis;
+    }
+}
+
+static bool usable(const sonde_interior_memory *m) {
+  bool good = m->ready <= 1 && m->live_ready <= 1 && m->building <= 1;
+  for (int k = 0; k < 4; ++k) {
+    bool extent = k < 2 || (m->live[k] >= 0 && m->live[k] < 1 && m->next[k] >= 0 && m->next[k] < 1);
+    good = good && extent && fabs(m->live[k]) < 1e3 && fabs(m->next[k]) < 1e3;
+  }
+  for (int which = 0; which < 2; ++which)
+    for (uint32_t i = 0; i < SONDE_STATIONS; ++i)
+      good = good && fabs(m->area_ratio[which][i]) < 1e6 && v_finite(m->flat_axis[which][i]);
+  return good;
+}
+
+// False when the solid cannot be factored there.
+static bool recall_live(sonde_interior *in, const double at[4]) {
+  sonde_window_place place = place_at(at);
+  if (is_at(in->live, &place)) return true;
+  sonde_interior_next_window(in, at);
+  if (!in->next->ready) (void)sonde_window_step(in->next, UINT64_MAX);
+  if (in->next->ready) swap(in);
+  return in->live->ready;
+}
+
+sonde_status sonde_interior_recall(sonde_interior *in, const sonde_interior_memory *memory,
+                                   sonde_error *error) {
+  SONDE_ASSERT(in != NULL && memory != NULL);
+  if (!usable(memory))
+    return sonde_fail(error, SONDE_FORMAT, "not a state of the inside that was saved");
+  in->building = false;
+  if (!memory->live_ready)
+    in->live->ready = false;
+  else if (!recall_live(in, memory->live))
+    return sonde_fail(error, SONDE_FORMAT, "the saved inside has no solid at its place");
+  if (memory->building) sonde_interior_next_window(in, memory->next);
+  in->building = memory->building, in->built = memory->built;
+  in->ready = memory->ready, in->tick = memory->tick, in->solid = false;
+  for (int which = 0; which < 2; ++which)
+    for (uint32_t i = 0; i < in->station_count[which]; ++i) {
+      in->state[which][i].area_ratio = memory->area_ratio[which][i];
+      in->state[which][i].flat_axis = memory->flat_axis[which][i];
+    }
+  return SONDE_OK;
 }

@@ -29,6 +29,7 @@ sonde_status sonde_interior_create(const sonde_model *model, sonde_interior **in
   if (status == SONDE_OK) status = sonde_stations_create(made, error);
   if (status == SONDE_OK) status = sonde_window_create(&made->live, error);
   if (status == SONDE_OK) status = sonde_window_create(&made->next, error);
+  if (status == SONDE_OK) made->whole = sonde_window_steps(made->live, SONDE_WINDOW_BUDGET);
   if (status == SONDE_OK)
     *interior = made;
   else
@@ -40,6 +41,8 @@ void sonde_interior_destroy(sonde_interior *interior) {
   if (interior == NULL) return;
   sonde_window_destroy(interior->live);
   sonde_window_destroy(interior->next);
+  for (uint32_t k = 0; k < interior->shelf_count; ++k) sonde_window_destroy(interior->shelf[k]);
+  sonde_free(interior->shelf);
   sonde_surface_index_destroy(interior->skin);
   sonde_ldl_destroy(interior->ldl);
   sonde_free(interior->column);

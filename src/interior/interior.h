@@ -74,7 +74,10 @@ struct sonde_interior {
   sonde_ldl *ldl;
   double *potential, *scratch;
   struct sonde_window *live, *next; // the solid in use and the one that is being factored
-  bool building;                    // next has a place and is not ready
+  bool building;                    // next has a place and is not in use yet
+  uint32_t built, whole;            // updates that it has been building, that a build takes
+  struct sonde_window **shelf;      // [shelf_count] factored windows of other places, latest first
+  uint32_t shelf_count;             // 0 in a running session
   bool solid;                       // the last update was solved by the solid
   sonde_interior_method method;
   uint32_t vessel_count; // femoral vein, femoral artery, branches
@@ -129,6 +132,27 @@ void sonde_interior_solve(sonde_interior *interior, const sonde_vec3 *positions_
 void sonde_interior_vessels(sonde_interior *interior, const sonde_interior_input *input);
 // Keeps a factored window under the probe and solves it; false when the columns have to do.
 bool sonde_interior_follow(sonde_interior *interior, const sonde_interior_input *input);
+
+// What the next updates depend on besides their input; a copy of it is enough to go on bit for bit.
+typedef struct sonde_interior_memory {
+  uint64_t tick;
+  uint32_t ready, live_ready, building, built;
+  double live[4], next[4]; // places: angle, position, half extents
+  double area_ratio[2][SONDE_STATIONS];
+  sonde_vec3 flat_axis[2][SONDE_STATIONS];
+} sonde_interior_memory;
+
+// No allocation. @thread of the updates
+void sonde_interior_remember(const sonde_interior *interior, sonde_interior_memory *memory);
+// Goes on from there. Factors the window in use unless it or one like it on the shelf is at hand;
+// one that was being built is made when it is due. @return FORMAT @thread owner
+sonde_status sonde_interior_recall(sonde_interior *interior, const sonde_interior_memory *memory,
+                                   sonde_error *error);
+// Room for factored windows that are not in use. @thread owner
+sonde_status sonde_interior_keep_windows(sonde_interior *interior, uint32_t count,
+                                         sonde_error *error);
+// Makes in->next a window for a place: from the shelf when it is there. No allocation.
+void sonde_interior_next_window(sonde_interior *interior, const double place[4]);
 
 // Stages of a creation.
 sonde_status sonde_columns_create(sonde_interior *interior, sonde_error *error);

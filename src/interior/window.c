@@ -4,6 +4,7 @@
 // sonde_window_begin   rows, columns, corners and materials of a place
 // spread               distances that grow from the fine part to an end
 // place_column         corners of one column
+// sonde_window_steps   how many of them
 // sonde_window_step    a share of the factorisation, then the skin's compliance
 #include "interior/window.h"
 
@@ -180,6 +181,11 @@ static bool invert(sonde_window *w) {
     sonde_cholesky_solve(factor, side, inverse + (size_t)i * side);
   }
   return true;
+}
+
+uint32_t sonde_window_steps(const sonde_window *w, uint64_t budget) {
+  SONDE_ASSERT(w != NULL && budget > 0);
+  return sonde_fronts_steps(w->solid.fronts, budget);
 }
 
 bool sonde_window_step(sonde_window *w, uint64_t budget) {

@@ -35,6 +35,8 @@ typedef struct sonde_window_place {
   double half_theta_m, half_s_m;
 } sonde_window_place;
 
+enum { SONDE_WINDOW_BUDGET = 4000000 }; // multiplications per update of a running session
+
 // One touched point of the skin.
 typedef struct sonde_touched {
   uint32_t near[4]; // places among the near skin nodes
@@ -70,6 +72,9 @@ void sonde_window_destroy(sonde_window *window);
 void sonde_window_begin(sonde_window *window, const sonde_interior *in, sonde_window_place place);
 // True when done (window->ready) or failed.
 bool sonde_window_step(sonde_window *window, uint64_t budget);
+
+// Steps of that budget that a window takes, wherever it is.
+uint32_t sonde_window_steps(const sonde_window *window, uint64_t budget);
 
 // Reads the contact and solves. @return false when nothing is touched
 bool sonde_window_update(sonde_window *window, const sonde_interior *in,

@@ -9,6 +9,7 @@
 // measure               sizes of factors, working front, stack of updates
 // sonde_fronts_step     the current piece: assemble, panels, store, push
 // assemble              elements and the children's updates into the working front
+// sonde_fronts_steps    how many steps that takes
 // sonde_fronts_recover  pieces backward
 #include "sparse/fronts.h"
 
@@ -454,6 +455,34 @@ static void store(sonde_fronts *f, const piece *p) {
   f->waiting[f->waiting_count++] = f->now;
 }
 
+// Multiplications, about, of assembling a piece and of a panel of its columns.
+static uint64_t assembly_cost(const piece *p) {
+  size_t n = order_of(p);
+  return n * n + 20000 * (uint64_t)p->element_count;
+}
+
+static uint64_t panel_cost(size_t n, uint32_t from, uint32_t to) {
+  return (to - from) * (n - from) * (n - from) / 2;
+}
+
+// The same walk as sonde_fronts_step() without the numbers.
+uint32_t sonde_fronts_steps(const sonde_fronts *f, uint64_t budget) {
+  SONDE_ASSERT(f != NULL && budget > 0);
+  uint32_t steps = 1;
+  uint64_t spent = 0;
+  for (uint32_t t = 0; t <= f->piece_count; ++t) {
+    const piece *p = &f->pieces[t];
+    size_t n = order_of(p), own = 3 * (size_t)p->count;
+    if (spent >= budget) spent = 0, ++steps;
+    spent += assembly_cost(p);
+    for (uint32_t from = 0; from < own && t < f->piece_count; from += PANEL) {
+      if (spent >= budget) spent = 0, ++steps;
+      spent += panel_cost(n, from, from + PANEL < own ? from + PANEL : (uint32_t)own);
+    }
+  }
+  return steps;
+}
+
 bool sonde_fronts_step(sonde_fronts *f, sonde_front_matrix *matrix, const void *user,
                        uint64_t budget) {
   SONDE_ASSERT(f != NULL && matrix != NULL);
@@ -463,13 +492,13 @@ bool sonde_fronts_step(sonde_fronts *f, sonde_front_matrix *matrix, const void *
     if (!f->assembled) {
       assemble(f, p, matrix, user);
       f->assembled = true, f->column = 0;
-      spent += n * n + 20000 * (uint64_t)p->element_count;
+      spent += assembly_cost(p);
       continue;
     }
     if (f->now == f->piece_count) return true; // the condensed matrix stays in the working front
     uint32_t to = f->column + PANEL < own ? f->column + PANEL : (uint32_t)own;
     f->failed = !sonde_front_eliminate(f->work, (uint32_t)n, f->column, to);
-    spent += (to - f->column) * (n - f->column) * (n - f->column) / 2;
+    spent += panel_cost(n, f->column, to);
     f->column = to;
     if (to < own) continue;
     store(f, p);

@@ -34,6 +34,8 @@ void sonde_fronts_begin(sonde_fronts *fronts);
 // Works for about `budget` multiplications. Returns true when all is factored or a pivot failed.
 bool sonde_fronts_step(sonde_fronts *fronts, sonde_front_matrix *matrix, const void *user,
                        uint64_t budget);
+// Steps of that budget from begin to the end; they depend on the pattern only.
+uint32_t sonde_fronts_steps(const sonde_fronts *fronts, uint64_t budget);
 // A pivot was not positive since _begin.
 bool sonde_fronts_failed(const sonde_fronts *fronts);
 
