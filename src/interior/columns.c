@@ -249,5 +249,6 @@ void sonde_columns_refresh(sonde_interior *in) {
   SONDE_ASSERT(in != NULL && in->field != NULL);
   store_field(in);
   in->live->ready = in->next->ready = in->building = in->solid = false;
-  for (uint32_t k = 0; k < in->shelf_count; ++k) in->shelf[k]->ready = false;
+  for (uint32_t k = 0; k < in->shelf_count; ++k)
+    if (in->shelf[k]) in->shelf[k]->ready = false;
 }

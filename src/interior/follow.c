@@ -100,10 +100,7 @@ sonde_status sonde_interior_keep_windows(sonde_interior *in, uint32_t count, son
   SONDE_ASSERT(in != NULL && in->shelf == NULL);
   in->shelf = SONDE_NEW(struct sonde_window *, count);
   if (in->shelf == NULL) return sonde_fail_memory(error);
-  for (; in->shelf_count < count; ++in->shelf_count) {
-    sonde_status status = sonde_window_create(&in->shelf[in->shelf_count], error);
-    if (status) return status;
-  }
+  in->shelf_count = count;
   return SONDE_OK;
 }
 
@@ -115,15 +112,22 @@ static void exchange(sonde_interior *in, uint32_t from) {
   in->next = taken;
 }
 
+// The oldest of the shelf makes room for next; without memory next is written over.
+static void put_away(sonde_interior *in) {
+  uint32_t last = in->shelf_count - 1;
+  if (!in->shelf[last]) (void)sonde_window_create(&in->shelf[last], NULL);
+  if (in->shelf[last]) exchange(in, last);
+}
+
 void sonde_interior_next_window(sonde_interior *in, const double at[4]) {
   sonde_window_place place = place_at(at);
   if (is_at(in->next, &place)) return;
   for (uint32_t k = 0; k < in->shelf_count; ++k)
-    if (is_at(in->shelf[k], &place)) {
+    if (in->shelf[k] && is_at(in->shelf[k], &place)) {
       exchange(in, k);
       return;
     }
-  if (in->shelf_count > 0 && in->next->ready) exchange(in, in->shelf_count - 1);
+  if (in->shelf_count > 0 && in->next->ready) put_away(in);
   sonde_window_begin(in->next, in, place);
 }
 

@@ -76,9 +76,10 @@ struct sonde_interior {
   struct sonde_window *live, *next; // the solid in use and the one that is being factored
   bool building;                    // next has a place and is not in use yet
   uint32_t built, whole;            // updates that it has been building, that a build takes
-  struct sonde_window **shelf;      // [shelf_count] factored windows of other places, latest first
-  uint32_t shelf_count;             // 0 in a running session
-  bool solid;                       // the last update was solved by the solid
+  struct sonde_window **shelf; // [shelf_count] factored windows of other places, latest first; NULL
+                               // before it is needed
+  uint32_t shelf_count;        // 0 in a running session
+  bool solid;                  // the last update was solved by the solid
   sonde_interior_method method;
   uint32_t vessel_count; // femoral vein, femoral artery, branches
   sonde_vessel_kind kind[SONDE_VESSELS];
@@ -151,7 +152,8 @@ sonde_status sonde_interior_recall(sonde_interior *interior, const sonde_interio
 // Room for factored windows that are not in use. @thread owner
 sonde_status sonde_interior_keep_windows(sonde_interior *interior, uint32_t count,
                                          sonde_error *error);
-// Makes in->next a window for a place: from the shelf when it is there. No allocation.
+// Makes in->next a window for a place: from the shelf when it is there. Without a shelf no
+// allocation.
 void sonde_interior_next_window(sonde_interior *interior, const double place[4]);
 
 // Stages of a creation.

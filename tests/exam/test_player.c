@@ -111,7 +111,7 @@ static uint64_t next_random(uint64_t *x) { return *x = *x * 6364136223846793005u
 // Any order of moments: what a player shows does not depend on where it was before.
 static void seek_everywhere(sonde_player *player, const seen *s, uint64_t ticks) {
   uint64_t x = 7;
-  for (int k = 0; k < 40; ++k) {
+  for (int k = 0; k < 24; ++k) {
     uint64_t goal = next_random(&x) >> 33;
     goal = k == 0 ? ticks : k == 1 ? 0 : goal % (ticks + 1);
     assert_int_equal(sonde_player_seek(player, 1e-3 * (double)goal, NULL, NULL), SONDE_OK);
@@ -160,7 +160,7 @@ static void keyframes_are_a_cache(void **state) {
   assert_int_equal(sonde_file_load(keys_path, &again, &other, NULL), SONDE_OK);
   assert_int_equal(other, count);
   uint64_t x = 3;
-  for (int k = 0; k < 12; ++k) {
+  for (int k = 0; k < 5; ++k) {
     size_t at = (next_random(&x) >> 20) % count;
     if (k == 0) at = count - 10; // the recording's CRC
     again[at] = (char)(again[at] ^ 0x11);
@@ -247,7 +247,7 @@ static void every_cut_loses_at_most_a_block(void **state) {
   sonde_recording_clear(&r);
   size_t most = 250 * SONDE_RECORD_TICK_BYTES + 4096;
   uint64_t last = 0;
-  for (size_t cut = 0; cut <= count; cut += cut < start || cut > count - 700 ? 1 : 13) {
+  for (size_t cut = 0; cut <= count; cut += cut < start || cut > count - 200 ? 1 : 101) {
     write_file(bytes, cut);
     sonde_error error = {0};
     sonde_recording_info info;
@@ -283,7 +283,7 @@ static void damaged_files_are_survived(void **state) {
   size_t count;
   assert_int_equal(sonde_file_load(path, &bytes, &count, NULL), SONDE_OK);
   uint64_t x = 11;
-  for (int k = 0; k < 1500; ++k) {
+  for (int k = 0; k < 700; ++k) {
     size_t at = (next_random(&x) >> 20) % (k % 2 ? count : 1500);
     char was = bytes[at];
     bytes[at] = (char)(next_random(&x) >> 40);

@@ -1,0 +1,131 @@
+// A film through ffmpeg, a program of its own that reads grey pictures from a pipe: Debian's
+// libraries of it carry parts under the GPL, which a library that links them would take on.
+// start:     the program, without a shell.
+// write_all: a picture into the pipe.
+// film_*:    the interface.
+#include "replay_export.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <signal.h>
+#include <spawn.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+extern char **environ;
+
+struct film {
+  char path[4096], part[4200];
+  int pipe; // -1: ffmpeg went away
+  pid_t child;
+  size_t bytes; // of a picture
+  uint64_t frames;
+};
+
+static sonde_status fail(sonde_error *error, sonde_status status, const char *what,
+                         const char *path) {
+  *error = (sonde_error){.status = status};
+  snprintf(error->message, sizeof error->message, "%.200s: %.200s", path, what);
+  return status;
+}
+
+// Its own process group: Ctrl-C ends the pictures, and ffmpeg then finishes the film.
+static int start(film *f, uint32_t width, uint32_t height, int frames_per_s, int from) {
+  char size[32], rate[16];
+  snprintf(size, sizeof size, "%ux%u", width, height);
+  snprintf(rate, sizeof rate, "%d", frames_per_s);
+  const char *arguments[] = {"ffmpeg",      "-hide_banner", "-loglevel",  "error",    "-nostdin",
+                             "-y",          "-f",           "rawvideo",   "-pix_fmt", "gray",
+                             "-video_size", size,           "-framerate", rate,       "-i",
+                             "pipe:0",      "-an",          "-pix_fmt",   "yuv420p",  "-movflags",
+                             "+faststart",  "-f",           "mp4",        f->part,    NULL};
+  posix_spawn_file_actions_t actions;
+  posix_spawnattr_t attributes;
+  sigset_t pipe_signal;
+  sigemptyset(&pipe_signal);
+  sigaddset(&pipe_signal, SIGPIPE);
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_adddup2(&actions, from, 0);
+  posix_spawnattr_init(&attributes);
+  posix_spawnattr_setsigdefault(&attributes, &pipe_signal);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP | POSIX_SPAWN_SETSIGDEF);
+  char *argv[sizeof arguments / sizeof arguments[0]];
+  memcpy(argv, arguments, sizeof argv);
+  int failure = posix_spawnp(&f->child, "ffmpeg", &actions, &attributes, argv, environ);
+  posix_spawn_file_actions_destroy(&actions);
+  posix_spawnattr_destroy(&attributes);
+  return failure;
+}
+
+sonde_status film_open(const char *path, uint32_t width, uint32_t height, int frames_per_s,
+                       film **out, sonde_error *error) {
+  int ends[2];
+  *out = NULL;
+  film *f = calloc(1, sizeof *f);
+  if (!f) return fail(error, SONDE_MEMORY, "out of memory", path);
+  if (strlen(path) >= sizeof f->path || pipe2(ends, O_CLOEXEC)) {
+    free(f);
+    return fail(error, SONDE_IO, "the film cannot be written", path);
+  }
+  signal(SIGPIPE, SIG_IGN); // an ffmpeg that gives up is told by write()
+  snprintf(f->path, sizeof f->path, "%s", path);
+  snprintf(f->part, sizeof f->part, "%s.part-%ld", path, (long)getpid());
+  f->bytes = (size_t)width * height;
+  int failure = start(f, width, height, frames_per_s, ends[0]);
+  close(ends[0]);
+  f->pipe = ends[1];
+  if (!failure) {
+    *out = f;
+    return SONDE_OK;
+  }
+  close(ends[1]);
+  free(f);
+  if (failure == ENOENT)
+    return fail(error, SONDE_NOT_FOUND,
+                "a film needs the program ffmpeg (Debian package ffmpeg), which is not there; "
+                "--frames does without",
+                path);
+  return fail(error, SONDE_IO, strerror(failure), path);
+}
+
+static bool write_all(int to, const uint8_t *bytes, size_t count) {
+  while (count > 0) {
+    ssize_t written = write(to, bytes, count);
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) return false;
+    bytes += written;
+    count -= (size_t)written;
+  }
+  return true;
+}
+
+bool film_add(film *f, const uint8_t *pixels) {
+  if (f->pipe >= 0 && write_all(f->pipe, pixels, f->bytes)) {
+    f->frames++;
+    return true;
+  }
+  if (f->pipe >= 0) close(f->pipe);
+  f->pipe = -1;
+  return false;
+}
+
+sonde_status film_close(film *f, sonde_error *error) {
+  if (!f) return SONDE_OK;
+  bool broken = f->pipe < 0;
+  if (!broken) close(f->pipe);
+  int code = 0;
+  while (waitpid(f->child, &code, 0) < 0 && errno == EINTR) {
+  }
+  sonde_status status = SONDE_OK;
+  bool good = !broken && WIFEXITED(code) && WEXITSTATUS(code) == 0;
+  if (!good)
+    status = fail(error, SONDE_IO, "ffmpeg failed; what it said stands above", f->path);
+  else if (f->frames > 0 && rename(f->part, f->path))
+    status = fail(error, SONDE_IO, strerror(errno), f->path);
+  if (status || f->frames == 0) unlink(f->part);
+  free(f);
+  return status;
+}

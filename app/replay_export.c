@@ -1,0 +1,283 @@
+// Exports of an exam.
+// columns, print_row: a row per image, as CSV or JSON.
+// open_tables, close_tables: both files.
+// save_picture:       the image as a PNG.
+// picture_of, film_until: pictures of the film at even times.
+// replay_export_run:  plays and writes.
+#include "replay_export.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+enum { FRAMES_PER_S = 25, CAPTION_SCALE = 2, STRIP = 2 * (CAPTION_HEIGHT * CAPTION_SCALE + 6) };
+
+typedef struct output {
+  replay_export *what;
+  sonde_player *player;
+  sonde_file *csv, *json;
+  film *film;
+  uint8_t *picture; // [height][width] of the film
+  uint32_t width, height;
+  bool any; // the picture shows an image
+} output;
+
+typedef struct column {
+  const char *name;
+  double value;
+} column;
+
+enum { COLUMNS = 24 };
+
+static void columns(const sonde_player *player, const sonde_frame *frame, column out[COLUMNS]) {
+  const sonde_snapshot *s = &frame->snapshot;
+  sonde_vec3 p = s->world_from_probe.position, f = s->force_n, r = s->rendered_force_n;
+  sonde_quat q = s->world_from_probe.rotation;
+  sonde_session_controls c = sonde_player_controls(player);
+  const column list[COLUMNS] = {{"time_s", s->time_s},
+                                {"probe_x_mm", 1e3 * p.x},
+                                {"probe_y_mm", 1e3 * p.y},
+                                {"probe_z_mm", 1e3 * p.z},
+                                {"probe_qw", q.w},
+                                {"probe_qx", q.x},
+                                {"probe_qy", q.y},
+                                {"probe_qz", q.z},
+                                {"force_x_n", f.x},
+                                {"force_y_n", f.y},
+                                {"force_z_n", f.z},
+                                {"force_normal_n", s->force_normal_n},
+                                {"rendered_x_n", r.x},
+                                {"rendered_y_n", r.y},
+                                {"rendered_z_n", r.z},
+                                {"penetration_mm", 1e3 * s->penetration_m},
+                                {"contact_area_mm2", 1e6 * s->contact_area_m2},
+                                {"vein_area_ratio", s->vein_area_ratio},
+                                {"artery_area_ratio", s->artery_area_ratio},
+                                {"vein_ap_mm", 1e3 * s->vein_short_m},
+                                {"vein_tilt_deg", s->vein_tilt_rad * 57.29577951308232},
+                                {"frequency_mhz", 1e-6 * c.echo.frequency_hz},
+                                {"depth_mm", 1e3 * c.echo.depth_m},
+                                {"gain_db", c.echo.gain_db}};
+  memcpy(out, list, sizeof list);
+}
+
+static void json_text(sonde_file *file, const char *text) {
+  sonde_file_printf(file, "\"");
+  for (const unsigned char *c = (const unsigned char *)text; *c; ++c)
+    if (*c == '"' || *c == '\\')
+      sonde_file_printf(file, "\\%c", *c);
+    else if (*c < 0x20)
+      sonde_file_printf(file, "\\u%04x", *c);
+    else
+      sonde_file_printf(file, "%c", *c);
+  sonde_file_printf(file, "\"");
+}
+
+// Quoted, with quotes doubled.
+static void csv_text(sonde_file *file, const char *text) {
+  sonde_file_printf(file, "\"");
+  for (; *text; ++text) sonde_file_printf(file, *text == '"' ? "\"\"" : "%c", *text);
+  sonde_file_printf(file, "\"");
+}
+
+static void print_row(const output *o, const sonde_frame *frame) {
+  column list[COLUMNS];
+  columns(o->player, frame, list);
+  const char *fault = sonde_fault_text(frame->snapshot.fault);
+  sonde_session_controls c = sonde_player_controls(o->player);
+  for (int k = 0; o->csv && k < COLUMNS; ++k)
+    sonde_file_printf(o->csv, isfinite(list[k].value) ? "%.9g," : ",", list[k].value);
+  if (o->csv) {
+    csv_text(o->csv, c.pathology.name);
+    sonde_file_printf(o->csv, ",");
+    csv_text(o->csv, frame->snapshot.fault ? fault : "");
+    sonde_file_printf(o->csv, "\n");
+  }
+  if (!o->json) return;
+  sonde_file_printf(o->json, "%s\n    {", o->what->rows ? "," : "");
+  for (int k = 0; k < COLUMNS; ++k)
+    sonde_file_printf(o->json, isfinite(list[k].value) ? "\"%s\": %.9g, " : "\"%s\": null, ",
+                      list[k].name, list[k].value);
+  sonde_file_printf(o->json, "\"case\": ");
+  json_text(o->json, c.pathology.name);
+  sonde_file_printf(o->json, ", \"fault\": ");
+  json_text(o->json, frame->snapshot.fault ? fault : "");
+  sonde_file_printf(o->json, "}");
+}
+
+static void print_heads(const output *o) {
+  column list[COLUMNS];
+  sonde_frame none = {0};
+  columns(o->player, &none, list);
+  for (int k = 0; o->csv && k < COLUMNS; ++k) sonde_file_printf(o->csv, "%s,", list[k].name);
+  if (o->csv) sonde_file_printf(o->csv, "case,fault\n");
+  if (!o->json) return;
+  const sonde_recording_info *info = sonde_player_info(o->player);
+  sonde_file_printf(o->json, "{\n  \"recording\": ");
+  json_text(o->json, o->what->recording);
+  sonde_file_printf(o->json, ",\n  \"model\": ");
+  json_text(o->json, info->model_name);
+  sonde_file_printf(o->json, ",\n  \"duration_s\": %.9g,\n  \"images\": [", info->duration_s);
+}
+
+static sonde_status print_comments(const output *o, sonde_error *error) {
+  sonde_comments comments;
+  sonde_status status = sonde_comments_load(o->what->recording, &comments, error);
+  if (status) return status;
+  sonde_file_printf(o->json, "\n  ],\n  \"comments\": [");
+  for (uint32_t k = 0; k < comments.count; ++k) {
+    const sonde_comment *c = &comments.list[k];
+    sonde_file_printf(o->json, "%s\n    {\"time_s\": %.9g, \"author\": ", k ? "," : "", c->time_s);
+    json_text(o->json, c->author);
+    sonde_file_printf(o->json, ", \"text\": ");
+    json_text(o->json, c->text);
+    sonde_file_printf(o->json, "}");
+  }
+  sonde_file_printf(o->json, "\n  ]\n}\n");
+  sonde_comments_clear(&comments);
+  return SONDE_OK;
+}
+
+static sonde_status save_picture(const output *o, const sonde_frame *frame, sonde_error *error) {
+  char path[4200];
+  snprintf(path, sizeof path, "%s/image_%08llu.png", o->what->frames,
+           (unsigned long long)frame->snapshot.tick);
+  sonde_image image = {.width = frame->width,
+                       .height = frame->height,
+                       .pixels = (uint8_t *)(uintptr_t)frame->pixels};
+  return sonde_image_save_png(&image, path, error);
+}
+
+// ---- film ---------------------------------------------------------------------------------
+
+static void add_percent(char *text, size_t size, const char *name, double ratio) {
+  size_t used = strlen(text);
+  if (isfinite(ratio))
+    snprintf(text + used, size - used, "   %s %3.0f %%", name, 100 * ratio);
+  else
+    snprintf(text + used, size - used, "   %s   - %%", name);
+}
+
+static void picture_of(output *o, const sonde_frame *frame) {
+  for (uint32_t j = 0; j < frame->height; ++j)
+    memcpy(o->picture + (size_t)j * o->width, frame->pixels + (size_t)j * frame->width,
+           frame->width);
+  size_t strip = (size_t)frame->height * o->width;
+  memset(o->picture + strip, 24, (size_t)o->width * o->height - strip);
+  o->any = true;
+  const sonde_snapshot *s = &frame->snapshot;
+  char line[2][96];
+  snprintf(line[0], sizeof line[0], "%7.2f s   force %5.1f N", s->time_s, s->force_normal_n);
+  snprintf(line[1], sizeof line[1], "depth %5.1f mm", 1e3 * s->penetration_m);
+  add_percent(line[1], sizeof line[1], "vein", s->vein_area_ratio);
+  add_percent(line[1], sizeof line[1], "artery", s->artery_area_ratio);
+  uint32_t scale = o->width >= 32 * CAPTION_WIDTH * CAPTION_SCALE ? CAPTION_SCALE : 1;
+  for (uint32_t k = 0; k < 2; ++k)
+    caption_draw(o->picture, o->width, o->height, 8, frame->height + 5 + k * STRIP / 2, scale,
+                 line[k]);
+}
+
+// All pictures of the film up to a time; the last image stands until the next one.
+static bool film_until(output *o, double time_s) {
+  while (o->what->from_s + (double)o->what->film_frames / FRAMES_PER_S < time_s) {
+    if (!film_add(o->film, o->picture)) return false;
+    o->what->film_frames++;
+  }
+  return true;
+}
+
+// Even sides, as the film's colours want them.
+static sonde_status open_film(output *o, sonde_error *error) {
+  const sonde_recording_info *info = sonde_player_info(o->player);
+  o->width = (info->image_width + 1) / 2 * 2;
+  o->height = (info->image_height + STRIP + 1) / 2 * 2;
+  o->picture = calloc(o->width, o->height);
+  if (!o->picture) {
+    *error = (sonde_error){.status = SONDE_MEMORY, .message = "out of memory"};
+    return SONDE_MEMORY;
+  }
+  return film_open(o->what->video, o->width, o->height, FRAMES_PER_S, &o->film, error);
+}
+
+// ---- all ----------------------------------------------------------------------------------
+
+static sonde_status open_all(output *o, sonde_error *error) {
+  replay_export *what = o->what;
+  if (what->frames && mkdir(what->frames, 0777) && errno != EEXIST) {
+    *error = (sonde_error){.status = SONDE_IO};
+    snprintf(error->message, sizeof error->message, "%.200s: cannot be made: %.200s", what->frames,
+             strerror(errno));
+    return SONDE_IO;
+  }
+  sonde_status status = SONDE_OK;
+  if (what->csv) status = sonde_file_create(what->csv, &o->csv, error);
+  if (!status && what->json) status = sonde_file_create(what->json, &o->json, error);
+  if (!status && what->video) status = open_film(o, error);
+  if (!status) print_heads(o);
+  return status;
+}
+
+static sonde_status write_image(output *o, const sonde_frame *frame, sonde_error *error) {
+  sonde_status status = SONDE_OK;
+  bool filmed = !o->film || film_until(o, frame->snapshot.time_s);
+  if (o->film) picture_of(o, frame);
+  if (o->csv || o->json) print_row(o, frame), o->what->rows++;
+  if (o->what->frames) status = save_picture(o, frame, error);
+  if (!status && o->what->frames) o->what->pictures++;
+  if (!filmed) *error = (sonde_error){.status = SONDE_IO, .message = "ffmpeg went away"};
+  return filmed ? status : SONDE_IO;
+}
+
+static sonde_status play(output *o, const sonde_progress *progress, sonde_error *error) {
+  replay_export *what = o->what;
+  sonde_status status = sonde_player_seek(o->player, what->from_s, progress, error);
+  sonde_frame frame;
+  bool any = !status && sonde_player_frame(o->player, &frame);
+  if (any && frame.snapshot.time_s >= what->from_s) status = write_image(o, &frame, error);
+  if (any && o->film) picture_of(o, &frame);
+  while (!status && sonde_player_next_image(o->player, true)) {
+    if (!sonde_player_frame(o->player, &frame) || frame.snapshot.time_s > what->to_s) break;
+    status = write_image(o, &frame, error);
+    double share = (frame.snapshot.time_s - what->from_s) / fmax(what->to_s - what->from_s, 1e-9);
+    if (!status && !progress->report(fmin(share, 1), "export", progress->user)) {
+      *error = (sonde_error){.status = SONDE_CANCELLED,
+                             .message = "cancelled; what was written is whole"};
+      return SONDE_CANCELLED;
+    }
+  }
+  if (!status && o->film) (void)film_until(o, what->to_s + 0.5 / FRAMES_PER_S);
+  return status;
+}
+
+// What a cancelled export has is kept, what a failed one has is not.
+static sonde_status close_all(output *o, sonde_status status, sonde_error *error) {
+  bool keep = status == SONDE_OK || status == SONDE_CANCELLED;
+  sonde_error own = {0};
+  sonde_status first = SONDE_OK;
+  if (keep && o->json) first = print_comments(o, &own);
+  sonde_file *files[2] = {o->csv, o->json};
+  for (int k = 0; k < 2; ++k) {
+    if (!files[k]) continue;
+    if (!keep || first)
+      sonde_file_discard(files[k]);
+    else
+      first = sonde_file_commit(files[k], &own);
+  }
+  sonde_error filmed = {0};
+  sonde_status film_status = film_close(o->film, &filmed);
+  free(o->picture);
+  if (status) return status;
+  *error = first ? own : filmed;
+  return first ? first : film_status;
+}
+
+sonde_status replay_export_run(sonde_player *player, replay_export *what,
+                               const sonde_progress *progress, sonde_error *error) {
+  output o = {.what = what, .player = player};
+  sonde_status status = open_all(&o, error);
+  if (!status) status = play(&o, progress, error);
+  return close_all(&o, status, error);
+}
