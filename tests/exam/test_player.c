@@ -267,7 +267,7 @@ static void every_cut_loses_at_most_a_block(void **state) {
   sonde_player *player = open_player(*state, true, true);
   assert_int_equal(sonde_player_info(player)->ticks, 500);
   assert_int_equal(sonde_player_seek(player, 0.5, NULL, NULL), SONDE_OK);
-  same_frame(player, &s, 24);
+  same_frame(player, &s, 23); // the one of tick 500 came behind the block
   sonde_replay_result result;
   assert_int_equal(sonde_player_check(player, true, NULL, &result, NULL), SONDE_OK);
   assert_true(result.same && result.same_images && result.ticks == 500 && result.checks == 1);
