@@ -156,9 +156,9 @@ static sonde_status save_picture(const output *o, const sonde_frame *frame, sond
 static void add_percent(char *text, size_t size, const char *name, double ratio) {
   size_t used = strlen(text);
   if (isfinite(ratio))
-    snprintf(text + used, size - used, "   %s %3.0f %%", name, 100 * ratio);
+    snprintf(text + used, size - used, "  %s %3.0f %%", name, 100 * ratio);
   else
-    snprintf(text + used, size - used, "   %s   - %%", name);
+    snprintf(text + used, size - used, "  %s   - %%", name);
 }
 
 static void picture_of(output *o, const sonde_frame *frame) {
