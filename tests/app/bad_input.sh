@@ -104,6 +104,8 @@ rejects 'missing/' fit "$DATA/indentation.csv" --surface "$in/skin.ply" --sites 
 # Recordings.
 rejects 'skin\.ply' replay "$in/skin.ply"
 rejects 'nowhere\.rec' replay nowhere.rec
+rejects 'behind' replay nowhere.rec --csv x.csv --from 3 --to 2
+rejects 'need --csv' replay nowhere.rec --from 1
 
 # Generated thighs.
 rejects 'girth-mm.*300 to 900' generate --girth-mm 100 -o out.sonde

@@ -55,7 +55,15 @@ gives "$press" press cut.sonde --site 27 --depth-mm 4 --image cut.png --json
 gives "ticks:integer ticks>=1 deadline_misses:integer images:integer images>=1 hash:text" \
   run "$MODEL" --headless --seconds 1 --record a.rec --json
 [[ -s a.rec ]] || wrong "sonde run recorded nothing"
-gives "" replay a.rec --json
+gives "ticks>=1 same:bool checks:integer" replay a.rec --json
+gives "images>=1 image_hash:text same_images:bool" replay a.rec --images --json
+[[ -s a.rec.keys ]] || wrong "sonde run left no keyframes"
+gives "rows>=1 pictures>=1" replay a.rec --csv a.csv --json-file a.json --frames a_png --json
+"$CHECK_JSON" duration_s:number <a.json || wrong "sonde replay --json-file wrote no object"
+[[ $(wc -l <a.csv) -ge 2 && $(ls a_png | wc -l) -ge 1 ]] || wrong "sonde replay exported nothing"
+mkdir -p fake && printf '#!/bin/sh\nfor last; do :; done\ncat >"$last"\n' >fake/ffmpeg && chmod +x fake/ffmpeg
+PATH=$PWD/fake:$PATH gives "film_frames>=1" replay a.rec --video a.mp4 --to 0.5 --json
+[[ -s a.mp4 ]] || wrong "sonde replay --video wrote no film"
 gives "" devices --json
 gives "deadline_misses:integer energy_j:number max_force_n>=0 max_slew_n_per_s>=0 compute_us.p999:number" \
   bench "$MODEL" --haptics --device touch --seconds 1 --json

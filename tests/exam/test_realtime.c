@@ -43,6 +43,9 @@ static void replay_and_compare(const char *path, const sonde_model *model, uint6
   if (sonde_replay_run(path, model, NULL, &result, &error)) fail_msg("%s", error.message);
   assert_true(result.same);
   assert_true(result.hash == hash);
+  char keys[64];
+  snprintf(keys, sizeof keys, "%s.keys", path);
+  unlink(keys);
   unlink(path);
 }
 

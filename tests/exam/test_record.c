@@ -13,6 +13,7 @@ static int set_up(void **state) {
 static int tear_down(void **state) {
   sonde_model_destroy(*state);
   unlink(path);
+  unlink("exam_record.rec.keys");
   return 0;
 }
 
