@@ -59,7 +59,10 @@ void sonde_state_list_awake(sonde_state *state) {
 
 void sonde_state_reset(sonde_state *state) {
   uint32_t n = state->model->surface.vertex_count;
-  memcpy(state->position, state->model->surface.vertices, n * sizeof *state->position);
+  // As rest + displacement gives them: a coordinate of -0 would hash differently once it is
+  // restored.
+  for (uint32_t i = 0; i < n; ++i)
+    state->position[i] = v_add(state->model->surface.vertices[i], vec3(0, 0, 0));
   memcpy(state->probed, state->model->surface.vertices, n * sizeof *state->probed);
   memset(state->velocity, 0, n * sizeof *state->velocity);
   memset(state->increment, 0, n * sizeof *state->increment);
