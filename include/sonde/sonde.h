@@ -34,6 +34,10 @@
 #include "sonde/haptics_render.h"
 #include "sonde/exam.h"
 #include "sonde/exam_player.h"
+#include "sonde/trainer.h"
+#include "sonde/trainer_protocol.h"
+#include "sonde/trainer_judge.h"
+#include "sonde/trainer_operator.h"
 #include "sonde/stream.h"
 
 #endif

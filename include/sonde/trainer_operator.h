@@ -1,0 +1,61 @@
+/**
+ * @file trainer_operator.h
+ * Scripted operators: they see what a trainee sees (snapshots, never the truth), move a device
+ * along a protocol, press, and decide. docs/trainer.md.
+ */
+#ifndef SONDE_TRAINER_OPERATOR_H
+#define SONDE_TRAINER_OPERATOR_H
+
+#include "sonde/trainer_judge.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/** Names, NULL-terminated: expert, novice, timid, forceful. @thread any */
+SONDE_API const char *const *sonde_operator_names(void);
+
+typedef struct sonde_operator sonde_operator;
+
+/** @param device filled with the operator's hand, moved into a session; it may be destroyed before
+ *    or after the operator
+ *  @param plan copied
+ *  @return NOT_FOUND listing the names @thread owner */
+SONDE_API sonde_status sonde_operator_create(const char *name, uint64_t seed,
+                                             const sonde_plan *plan, double dt_s,
+                                             sonde_operator **out, sonde_device *device,
+                                             sonde_error *error);
+SONDE_API void sonde_operator_destroy(sonde_operator *op);
+/** Shows the newest snapshot: the operator moves on. @thread reader, while no tick runs */
+SONDE_API void sonde_operator_see(sonde_operator *op, const sonde_snapshot *snapshot);
+/** Whether the exam is over for the operator. @thread reader */
+SONDE_API bool sonde_operator_done(const sonde_operator *op);
+/** What the operator thinks of a segment of the map. @thread reader */
+SONDE_API sonde_decision sonde_operator_decision(const sonde_operator *op, uint32_t segment);
+
+/** A whole exam without a person. */
+typedef struct sonde_exam_def {
+  const sonde_case *patient;
+  const sonde_exam_protocol *protocol;
+  const char *operator_name;        /**< default expert */
+  uint64_t seed;                    /**< of the operator's hand */
+  const char *bundled;              /**< path of the bundled model */
+  const char *directory;            /**< of the case file, for model paths */
+  double limit_s;                   /**< of simulated time; default 1200 */
+  const char *record_path;          /**< NULL: no recording */
+  const char *json_path, *csv_path; /**< NULL: not written */
+} sonde_exam_def;
+SONDE_API sonde_exam_def sonde_exam_def_default(void);
+
+/** Builds the case, lets the operator examine it in lockstep, judges.
+ *  @param setup of this case, borrowed; NULL: built for this exam
+ *  @return what building says, CANCELLED, CONVERGENCE when the operator found no end @thread owner
+ */
+SONDE_API sonde_status sonde_exam_run(const sonde_exam_def *def, const sonde_case_setup *setup,
+                                      const sonde_progress *progress, sonde_score *score,
+                                      sonde_error *error);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
