@@ -160,6 +160,16 @@ bool app_bundled_model(char *path, size_t size, char *searched, size_t searched_
   return is_readable(path);
 }
 
+bool app_data_directory(const char *name, char *path, size_t size) {
+  char prefix[4096] = "";
+  if (own_prefix(prefix, sizeof prefix)) {
+    snprintf(path, size, "%.3000s/share/sonde/data/%s", prefix, name);
+    if (is_readable(path)) return true;
+  }
+  snprintf(path, size, "%s/share/sonde/data/%s", SONDE_INSTALL_PREFIX, name);
+  return is_readable(path);
+}
+
 bool app_model_argument(const char *verb, int argc, char **argv, char *model, size_t size) {
   char searched[1024];
   if (argc - optind > 1) {

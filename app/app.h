@@ -26,6 +26,8 @@ int cmd_reconstruct(int argc, char **argv);
 int cmd_slice(int argc, char **argv);
 int cmd_validate(int argc, char **argv);
 int cmd_devices(int argc, char **argv);
+int cmd_exam(int argc, char **argv);
+int cmd_cases(int argc, char **argv);
 
 // Prints "sonde <verb>: <message>" on stderr and returns the exit code that fits the status.
 int app_fail(const char *verb, const sonde_error *error);
@@ -58,6 +60,10 @@ double app_seconds(clockid_t clock);
 // Order statistic: the value that `share` (0..1) of the list does not exceed. Sorts the list; NaN
 // when it is empty.
 double app_quantile(double *list, size_t count, double share);
+
+// Directory of data that ships (cases, protocols), found as the bundled model is; false when there
+// is none.
+bool app_data_directory(const char *name, char *path, size_t size);
 
 // Minimal JSON object writer on stdout: keys in call order, numbers with up to 9 digits, NaN as
 // null.

@@ -30,6 +30,8 @@ static const command COMMANDS[] = {
     {"slice", cmd_slice, "make a picture at any pose from tracked frames or a volume"},
     {"replay", cmd_replay, "play a recording again and compare the state hash"},
     {"bench", cmd_bench, "time the simulation's stages"},
+    {"exam", cmd_exam, "let a scripted operator examine a case and score it"},
+    {"cases", cmd_cases, "list, check and draw the cases of the trainer"},
     {"validate", cmd_validate, "measure a room against its targets"},
     {"devices", cmd_devices, "list the input devices of this machine"},
 };

@@ -19,12 +19,12 @@ typedef struct sonde_operator sonde_operator;
 
 /** @param device filled with the operator's hand, moved into a session; it may be destroyed before
  *    or after the operator
- *  @param plan copied
+ *  @param map,plan copied
  *  @return NOT_FOUND listing the names @thread owner */
 SONDE_API sonde_status sonde_operator_create(const char *name, uint64_t seed,
-                                             const sonde_plan *plan, double dt_s,
-                                             sonde_operator **out, sonde_device *device,
-                                             sonde_error *error);
+                                             const sonde_vein_map *map, const sonde_plan *plan,
+                                             double dt_s, sonde_operator **out,
+                                             sonde_device *device, sonde_error *error);
 SONDE_API void sonde_operator_destroy(sonde_operator *op);
 /** Shows the newest snapshot: the operator moves on. @thread reader, while no tick runs */
 SONDE_API void sonde_operator_see(sonde_operator *op, const sonde_snapshot *snapshot);
@@ -42,6 +42,8 @@ typedef struct sonde_exam_def {
   const char *bundled;              /**< path of the bundled model */
   const char *directory;            /**< of the case file, for model paths */
   double limit_s;                   /**< of simulated time; default 1200 */
+  bool solid;                       /**< the inside by finite elements, as in real time; default
+                                         columns: half the time, ratios within 0.06 */
   const char *record_path;          /**< NULL: no recording */
   const char *json_path, *csv_path; /**< NULL: not written */
 } sonde_exam_def;

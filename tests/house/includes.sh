@@ -3,7 +3,7 @@
 # include public headers only.
 set -euo pipefail
 root=$1
-rooms=(base geometry contact sparse tissue world scene fit robot identify report anatomy interior echo haptics exam stream)
+rooms=(base geometry contact sparse tissue world scene fit robot identify report anatomy interior echo haptics exam trainer stream)
 bad=0
 
 rank() {

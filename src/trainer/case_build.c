@@ -1,0 +1,178 @@
+// A case on its thigh.
+// make_thigh:      by seed and parameters.
+// get_model:       bundled, from a file, or made.
+// place_extent:    a stretch of vein as model z.
+// place_lesions, place_branches: findings where the thigh has the places.
+// clot_in:         how much of a segment has a clot.
+// check_truth:     every segment is called what its vein is.
+#include "trainer/case.h"
+
+#include <string.h>
+
+// Less clot than this in a segment does not make it a segment with a clot.
+static const double CLOT_M = 0.005;
+
+static sonde_status make_thigh(const sonde_case *from, sonde_model **model, sonde_error *error) {
+  sonde_thigh thigh;
+  sonde_thigh_shape *shape = NULL;
+  sonde_thigh_def def = sonde_thigh_def_default();
+  def.name = from->id;
+  def.provenance = "Synthetic thigh of a training case";
+  sonde_status status = sonde_thigh_draw(&from->known, from->seed, &thigh, error);
+  if (!status) status = sonde_thigh_shape_create(&thigh, &shape, error);
+  if (!status) status = sonde_thigh_build(&thigh, shape, &def, model, error);
+  sonde_thigh_shape_destroy(shape);
+  return status;
+}
+
+static sonde_status get_model(const sonde_case *from, const char *bundled, const char *directory,
+                              sonde_model **model, sonde_error *error) {
+  if (from->thigh == SONDE_CASE_GENERATED) return make_thigh(from, model, error);
+  if (from->thigh == SONDE_CASE_BUNDLED) {
+    if (bundled) return sonde_model_load(bundled, model, error);
+    return sonde_fail(error, SONDE_NOT_FOUND, "case %s needs the bundled thigh", from->id);
+  }
+  char path[4096];
+  bool alone = !directory || from->model[0] == '/';
+  snprintf(path, sizeof path, "%.3700s%s%s", alone ? "" : directory, alone ? "" : "/", from->model);
+  return sonde_model_load(path, model, error);
+}
+
+static sonde_status place_extent(const sonde_case_extent *extent, const sonde_vein_map *map,
+                                 sonde_pathology *pathology, sonde_error *error) {
+  pathology->thrombus_from_m = pathology->thrombus_to_m = 0; // all
+  if (extent->whole) return SONDE_OK;
+  double from, to;
+  sonde_status status = sonde_station_find(&extent->from, map, &from, error);
+  if (!status) status = sonde_station_find(&extent->to, map, &to, error);
+  if (status) return status;
+  if (!(to > from))
+    return sonde_fail(error, SONDE_ARGUMENT,
+                      "a clot from %.0f to %.0f mm below the groin end, expected from < to",
+                      1e3 * from, 1e3 * to);
+  double a = sonde_vein_at(map, from).z_m, b = sonde_vein_at(map, to).z_m;
+  pathology->thrombus_from_m = fmin(a, b);
+  pathology->thrombus_to_m = fmax(a, b);
+  return SONDE_OK;
+}
+
+static sonde_status place_lesions(const sonde_case *from, sonde_case_setup *setup,
+                                  sonde_error *error) {
+  setup->findings.lesion_count = from->lesion_count;
+  for (uint32_t i = 0; i < from->lesion_count; ++i) {
+    const sonde_case_lesion *lesion = &from->lesion[i];
+    double along;
+    sonde_status status = sonde_station_find(&lesion->station, &setup->map, &along, error);
+    if (status) return status;
+    sonde_vein_point p = sonde_vein_at(&setup->map, along);
+    sonde_vec3 below = v_madd(p.skin_m, -lesion->depth_m, p.normal);
+    setup->findings.lesion[i] =
+        (sonde_lesion){.kind = lesion->kind,
+                       .centre_m = v_madd(below, lesion->across_m, p.across),
+                       .axis = v_unit(v_cross(p.normal, p.across), vec3(0, 0, 1)),
+                       .half_m = lesion->half_m,
+                       .echogenicity = lesion->echogenicity};
+  }
+  return SONDE_OK;
+}
+
+static sonde_status place_branches(const sonde_case *from, sonde_case_setup *setup,
+                                   sonde_error *error) {
+  setup->findings.branch_count = from->branch_count;
+  for (uint32_t i = 0; i < from->branch_count; ++i) {
+    const sonde_case_branch *branch = &from->branch[i];
+    const sonde_thigh_anatomy *anatomy = setup->model->anatomy;
+    const sonde_branch *there = anatomy ? sonde_anatomy_branch(anatomy, branch->branch) : NULL;
+    if (!there || there->kind != SONDE_VESSEL_VEIN)
+      return sonde_fail(error, SONDE_NOT_FOUND, "the thigh has no vein '%s'", branch->branch);
+    sonde_branch_finding *to = &setup->findings.branch[i];
+    to->pathology = branch->pathology;
+    memcpy(to->branch, branch->branch, sizeof to->branch);
+    sonde_status status = place_extent(&branch->extent, &setup->map, &to->pathology, error);
+    if (status) return status;
+  }
+  return SONDE_OK;
+}
+
+// ---- truth
+
+static double overlap(double a_from, double a_to, double b_from, double b_to) {
+  return fmax(0, fmin(a_to, b_to) - fmax(a_from, b_from));
+}
+
+static double clot_length(const sonde_pathology *p, const sonde_segment *segment) {
+  if (!(p->thrombus_fraction > 0)) return 0;
+  if (p->thrombus_from_m == p->thrombus_to_m) return segment->to_m - segment->from_m;
+  return overlap(p->thrombus_from_m, p->thrombus_to_m, segment->from_m, segment->to_m);
+}
+
+// A second femoral vein is a deep vein of the segment beside it; other branches are not.
+static double clot_in(const sonde_case_setup *setup, const sonde_segment *segment) {
+  double most = clot_length(&setup->pathology, segment);
+  for (uint32_t i = 0; i < setup->findings.branch_count; ++i) {
+    const sonde_branch_finding *finding = &setup->findings.branch[i];
+    if (strcmp(finding->branch, "second_femoral_vein") != 0) continue;
+    const sonde_vessel *line = &sonde_anatomy_branch(setup->model->anatomy, finding->branch)->line;
+    double a = line->point[0].centre_m.z, b = line->point[line->count - 1].centre_m.z;
+    sonde_segment beside = *segment;
+    beside.from_m = fmax(segment->from_m, fmin(a, b));
+    beside.to_m = fmin(segment->to_m, fmax(a, b));
+    if (beside.to_m > beside.from_m) most = fmax(most, clot_length(&finding->pathology, &beside));
+  }
+  return most;
+}
+
+static sonde_status check_truth(const sonde_case *from, const sonde_case_setup *setup,
+                                sonde_error *error) {
+  const sonde_vein_map *map = &setup->map;
+  for (uint32_t k = 0; k < from->truth_count; ++k)
+    if (sonde_vein_segment(map, from->truth_segment[k]) == SONDE_SEGMENTS)
+      return sonde_fail(error, SONDE_MISMATCH, "%s: the truth names '%s', which the thigh has not",
+                        from->id, from->truth_segment[k]);
+  for (uint32_t i = 0; i < map->segment_count; ++i) {
+    const sonde_segment *segment = &map->segment[i];
+    sonde_decision called = SONDE_DECISION_NONE;
+    for (uint32_t k = 0; k < from->truth_count; ++k)
+      if (strcmp(from->truth_segment[k], segment->name) == 0) called = from->truth[k];
+    if (called == SONDE_DECISION_NONE)
+      return sonde_fail(error, SONDE_MISMATCH, "%s: the truth misses the segment '%s'", from->id,
+                        segment->name);
+    double clot_m = clot_in(setup, segment);
+    if ((called == SONDE_DECISION_CLOT) == (clot_m >= CLOT_M)) continue;
+    return sonde_fail(error, SONDE_MISMATCH,
+                      "%s: the truth calls %s %s, but %.0f of its %.0f mm have a clot", from->id,
+                      segment->name, called == SONDE_DECISION_CLOT ? "clot" : "compressible",
+                      1e3 * clot_m, 1e3 * (segment->to_m - segment->from_m));
+  }
+  return SONDE_OK;
+}
+
+sonde_status sonde_case_build(const sonde_case *from, const char *bundled, const char *directory,
+                              sonde_case_setup *setup, sonde_error *error) {
+  SONDE_ASSERT(from && setup);
+  *setup = (sonde_case_setup){.pathology = from->pathology, .circulation = from->circulation};
+  setup->findings.webs = from->webs;
+  setup->findings.oedema = from->oedema;
+  sonde_status status = sonde_case_check(from, error);
+  if (!status) status = get_model(from, bundled, directory, &setup->model, error);
+  if (!status) status = sonde_vein_map_make(setup->model, &setup->map, error);
+  if (!status) status = place_extent(&from->extent, &setup->map, &setup->pathology, error);
+  if (!status) status = place_lesions(from, setup, error);
+  if (!status) status = place_branches(from, setup, error);
+  if (!status) status = check_truth(from, setup, error);
+  sonde_circulation_apply(&from->circulation, 0, 1e-3, &setup->pathology);
+  if (status) sonde_case_setup_clear(setup);
+  return status;
+}
+
+void sonde_case_setup_clear(sonde_case_setup *setup) {
+  if (!setup) return;
+  sonde_model_destroy(setup->model);
+  *setup = (sonde_case_setup){0};
+}
+
+void sonde_case_session(const sonde_case_setup *setup, sonde_session_def *def) {
+  SONDE_ASSERT(setup->model != NULL);
+  def->model = setup->model;
+  def->controls.pathology = setup->pathology;
+}

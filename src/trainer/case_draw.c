@@ -1,0 +1,126 @@
+// A case drawn by its seed.
+// draw_person:    thigh, age and posture.
+// draw_clot:      stage and stretch, and the truth that follows.
+// draw_lookalike: something that is not a clot of the femoral vein.
+// tell_history:   what the patient says; it does not give the answer away.
+#include "trainer/case.h"
+
+#include "base/random.h"
+
+#include <string.h>
+
+static const char *const SEGMENTS[] = {"common_femoral", "femoral_proximal", "femoral_mid",
+                                       "femoral_distal", "popliteal_near"};
+enum { SEGMENT_COUNT = 5 };
+
+typedef struct draw {
+  uint64_t seed, count;
+} draw;
+
+static double uniform(draw *d, double low, double high) {
+  return low + (high - low) * sonde_random_uniform(d->seed, d->count++);
+}
+static uint32_t below(draw *d, uint32_t count) {
+  return (uint32_t)(count * sonde_random_uniform(d->seed, d->count++));
+}
+// Files have a tenth of a millimetre, a hundredth of a share.
+static double rounded(double value, double step) { return step * round(value / step); }
+
+static void draw_person(draw *d, sonde_case *c) {
+  c->thigh = SONDE_CASE_GENERATED;
+  c->seed = d->seed & UINT32_MAX;
+  c->known.sex = below(d, 2) ? SONDE_SEX_FEMALE : SONDE_SEX_MALE;
+  double fat_mm = rounded(c->level == SONDE_CASE_HARD ? uniform(d, 6, 11) : uniform(d, 5, 8), 0.1);
+  c->known.fat_front_m = 1e-3 * fat_mm;
+  c->known.second_vein = c->level == SONDE_CASE_HARD && below(d, 4) == 0;
+  if (c->level == SONDE_CASE_HARD && below(d, 4) == 0)
+    c->circulation.posture = SONDE_POSTURE_SITTING;
+  bool sitting = c->circulation.posture == SONDE_POSTURE_SITTING;
+  c->criteria = (sonde_case_criteria){18, sitting ? 36 : 34, sitting ? 42 : 40};
+}
+
+static void draw_clot(draw *d, sonde_case *c) {
+  static const char *const STAGE[] = {"acute_occlusive", "subacute_occlusive", "chronic_occlusive",
+                                      "partial_mural"};
+  uint32_t stage = below(d, c->level == SONDE_CASE_FIRST ? 1 : c->level == SONDE_CASE_EASY ? 3 : 4);
+  uint32_t length = c->level == SONDE_CASE_HARD ? 1 : 1 + below(d, 3);
+  uint32_t from = below(d, SEGMENT_COUNT + 1 - length), to = from + length - 1;
+  sonde_status status = sonde_pathology_preset(STAGE[stage], &c->pathology, NULL);
+  SONDE_ASSERT(status == SONDE_OK && to < SEGMENT_COUNT);
+  c->webs = stage == 2 ? rounded(uniform(d, 0.3, 0.9), 0.01) : 0;
+  c->extent.whole = false;
+  snprintf(c->extent.from.segment, sizeof c->extent.from.segment, "%s", SEGMENTS[from]);
+  snprintf(c->extent.to.segment, sizeof c->extent.to.segment, "%s", SEGMENTS[to]);
+  c->extent.from.share = rounded(uniform(d, 0, 0.15), 0.01);
+  c->extent.to.share = rounded(uniform(d, 0.85, 1), 0.01);
+  for (uint32_t i = from; i <= to; ++i) c->truth[i] = SONDE_DECISION_CLOT;
+  c->thrombosis = true;
+  static const char *const WORD[] = {"Acute", "Subacute", "Chronic", "Partial (mural)"};
+  snprintf(c->diagnosis, sizeof c->diagnosis, "%s deep vein thrombosis: %s%s%s", WORD[stage],
+           sonde_segment_title(SEGMENTS[from]), to > from ? " to " : "",
+           to > from ? sonde_segment_title(SEGMENTS[to]) : "");
+}
+
+static void draw_lookalike(draw *d, sonde_case *c) {
+  uint32_t kind = below(d, 3);
+  if (kind == 2) { // a clot in the superficial vein
+    sonde_case_branch *branch = &c->branch[c->branch_count++];
+    *branch = (sonde_case_branch){.branch = "great_saphenous", .extent.whole = true};
+    sonde_status status = sonde_pathology_preset("acute_occlusive", &branch->pathology, NULL);
+    SONDE_ASSERT(status == SONDE_OK);
+    snprintf(c->look_alike[c->look_alike_count++], sizeof c->look_alike[0], "%s",
+             "clot in the great saphenous vein");
+    return;
+  }
+  sonde_case_lesion *lesion = &c->lesion[c->lesion_count++];
+  bool cyst = kind == 1;
+  *lesion = (sonde_case_lesion){.kind = cyst ? SONDE_LESION_CYST : SONDE_LESION_NODE,
+                                .across_m = 1e-3 * rounded(uniform(d, 14, 18), 0.1),
+                                .depth_m = 1e-3 * rounded(uniform(d, 10, 14), 0.1),
+                                .half_m = {0.004, 0.006, 0.009},
+                                .echogenicity = cyst ? 0 : 0.25};
+  snprintf(lesion->station.segment, sizeof lesion->station.segment, "%s", SEGMENTS[cyst ? 4 : 0]);
+  lesion->station.share = 0.5;
+  snprintf(c->look_alike[c->look_alike_count++], sizeof c->look_alike[0], "%s",
+           cyst ? "cyst beside the vein" : "lymph node");
+}
+
+static void tell_history(draw *d, sonde_case *c) {
+  static const char *const COMPLAINT[] = {
+      "swelling of the leg for %u days", "pain in the thigh for %u days",
+      "a heavy leg since a journey %u days ago", "a tender calf and thigh %u days after surgery"};
+  static const char *const MORE[] = {
+      "Walks without help.", "Takes no tablets.", "Has had a thrombosis of the other leg.",
+      "The leg is a little warmer than the other.", "Otherwise well."};
+  char what[80];
+  uint32_t age = 24 + below(d, 60), days = 2 + below(d, 9);
+  const char *format = COMPLAINT[below(d, SONDE_COUNT_OF(COMPLAINT))];
+  const char *at = strstr(format, "%u");
+  SONDE_ASSERT(at != NULL);
+  snprintf(what, sizeof what, "%.*s%u%s", (int)(at - format), format, days, at + 2);
+  snprintf(c->history, sizeof c->history, "%s, %u years, with %s. %s",
+           c->known.sex == SONDE_SEX_FEMALE ? "Woman" : "Man", age, what,
+           MORE[below(d, SONDE_COUNT_OF(MORE))]);
+}
+
+void sonde_case_generate(uint64_t seed, sonde_case_level level, sonde_case *out) {
+  SONDE_ASSERT(out && level <= SONDE_CASE_HARD);
+  draw d = {.seed = seed};
+  *out = sonde_case_default();
+  out->level = level;
+  snprintf(out->id, sizeof out->id, "seed-%s-%llu", sonde_case_levels[level],
+           (unsigned long long)seed);
+  snprintf(out->title, sizeof out->title, "Drawn case %llu", (unsigned long long)seed);
+  snprintf(out->note, sizeof out->note, "Drawn by a seed; synthetic.");
+  snprintf(out->diagnosis, sizeof out->diagnosis, "No deep vein thrombosis");
+  out->truth_count = SEGMENT_COUNT;
+  for (uint32_t i = 0; i < SEGMENT_COUNT; ++i) {
+    snprintf(out->truth_segment[i], sizeof out->truth_segment[i], "%s", SEGMENTS[i]);
+    out->truth[i] = SONDE_DECISION_COMPRESSIBLE;
+  }
+  draw_person(&d, out);
+  bool clot = below(&d, 2) == 0;
+  if (clot) draw_clot(&d, out);
+  if (level == SONDE_CASE_HARD && !clot) draw_lookalike(&d, out);
+  tell_history(&d, out);
+}

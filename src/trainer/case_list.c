@@ -1,0 +1,39 @@
+// The cases of a directory.
+// load_one:  a file into an item of the list.
+// compare:   by level, then id.
+#include "trainer/trainer.h"
+
+#include <string.h>
+
+static sonde_status load_one(const char *path, void *item, sonde_error *error) {
+  return sonde_case_load(path, item, error);
+}
+
+static int compare(const void *a, const void *b) {
+  const sonde_case *x = a, *y = b;
+  if (x->level != y->level) return x->level < y->level ? -1 : 1;
+  return strcmp(x->id, y->id);
+}
+
+sonde_status sonde_case_list(const char *directory, sonde_case **cases, uint32_t *count,
+                             sonde_error *error) {
+  void *items;
+  sonde_status status =
+      sonde_load_directory(directory, sizeof(sonde_case), load_one, &items, count, error);
+  *cases = items;
+  if (status) return status;
+  sonde_case *c = *cases;
+  for (uint32_t i = 0; i < *count; ++i)
+    for (uint32_t k = 0; k < i && !status; ++k)
+      if (strcmp(c[i].id, c[k].id) == 0)
+        status =
+            sonde_fail(error, SONDE_ARGUMENT, "%s: two cases have the id '%s'", directory, c[i].id);
+  if (status) {
+    sonde_free(c);
+    *cases = NULL;
+    *count = 0;
+    return status;
+  }
+  qsort(c, *count, sizeof *c, compare);
+  return SONDE_OK;
+}

@@ -1,0 +1,337 @@
+// Reading a case file.
+// read_thigh, read_circulation:    the patient.
+// read_extent, read_clot:          a stretch of vein and what fills it.
+// read_lesion, read_branch:        findings.
+// read_truth:                      the answer.
+// check_id, sonde_case_check:      what no single key can tell.
+#include "trainer/case.h"
+
+#include <ctype.h>
+#include <string.h>
+
+const char *const sonde_case_levels[] = {"first", "easy", "hard", NULL};
+const char *const sonde_case_postures[] = {"supine", "sitting", "standing", NULL};
+const char *const sonde_case_lesions[] = {"node", "cyst", "haematoma", NULL};
+const char *const sonde_case_sexes[] = {"drawn", "female", "male", NULL};
+static const char *const DECISIONS[] = {"", "compressible", "clot", "not_seen"};
+
+static const double UNKNOWN = (double)NAN;
+
+const char *sonde_decision_name(sonde_decision decision) {
+  SONDE_ASSERT(decision < SONDE_DECISIONS);
+  return DECISIONS[decision];
+}
+
+bool sonde_decision_parse(const char *name, sonde_decision *decision) {
+  for (int i = 0; name && i < SONDE_DECISIONS; ++i)
+    if (strcmp(DECISIONS[i], name) == 0) {
+      *decision = (sonde_decision)i;
+      return true;
+    }
+  return false;
+}
+
+double *sonde_thigh_member(sonde_thigh *thigh, const sonde_thigh_parameter *parameter) {
+  return (double *)(void *)((char *)thigh + parameter->offset);
+}
+
+sonde_case sonde_case_default(void) {
+  sonde_case c = {.known = sonde_thigh_unknown(),
+                  .circulation = sonde_circulation_default(),
+                  .extent.whole = true,
+                  .criteria = {UNKNOWN, UNKNOWN, UNKNOWN}};
+  sonde_status status = sonde_pathology_preset("healthy", &c.pathology, NULL);
+  SONDE_ASSERT(status == SONDE_OK);
+  return c;
+}
+
+// ---- the patient
+
+static void read_generated(sonde_reader *reader, sonde_place at, sonde_case *c) {
+  enum { KEYS = 40 };
+  const char *keys[KEYS] = {"seed", "sex"};
+  uint32_t count;
+  const sonde_thigh_parameter *parameter = sonde_thigh_parameters(&count);
+  SONDE_ASSERT(count + 3 <= KEYS);
+  for (uint32_t i = 0; i < count; ++i) keys[2 + i] = parameter[i].name;
+  sonde_read_keys(reader, at, "thigh", keys);
+  c->thigh = SONDE_CASE_GENERATED;
+  c->seed = sonde_read_integer(reader, at, "seed", 0, UINT32_MAX, 1);
+  c->known.sex = (sonde_sex)sonde_read_choice(reader, at, "sex", sonde_case_sexes, 0);
+  for (uint32_t i = 0; i < count; ++i) {
+    const sonde_thigh_parameter *p = &parameter[i];
+    if (!sonde_read_find(reader, at, p->name)) continue;
+    double value =
+        sonde_read_real(reader, at, p->name, p->low / p->unit, p->high / p->unit, UNKNOWN);
+    *sonde_thigh_member(&c->known, p) = value * p->unit;
+  }
+}
+
+static void read_thigh(sonde_reader *reader, sonde_place root, sonde_case *c) {
+  sonde_place at = sonde_read_find(reader, root, "thigh");
+  if (!at) return;
+  if (sonde_read_is_text(reader, at)) {
+    const char *text = sonde_read_text_at(reader, at, "thigh");
+    if (text && strcmp(text, "bundled") != 0)
+      sonde_reader_fail(reader, at, SONDE_FORMAT,
+                        "thigh is '%s', expected bundled, {seed: ...} or {model: FILE}", text);
+    return;
+  }
+  if (!sonde_read_find(reader, at, "model")) {
+    read_generated(reader, at, c);
+    return;
+  }
+  static const char *const KEYS[] = {"model", NULL};
+  sonde_read_keys(reader, at, "thigh", KEYS);
+  c->thigh = SONDE_CASE_MODEL;
+  sonde_read_member(reader, at, "model", true, c->model, sizeof c->model);
+}
+
+static void read_circulation(sonde_reader *reader, sonde_place at, sonde_circulation *c) {
+  static const char *const KEYS[] = {"posture",       "breath_mmhg",   "valsalva_from_s",
+                                     "valsalva_to_s", "valsalva_mmhg", NULL};
+  if (!at) return;
+  sonde_read_keys(reader, at, "circulation", KEYS);
+  c->posture = (sonde_posture)sonde_read_choice(reader, at, "posture", sonde_case_postures, 0);
+  const double pa = SONDE_PA_PER_MMHG;
+  c->breath_pa = pa * sonde_read_real(reader, at, "breath_mmhg", 0, 10, c->breath_pa / pa);
+  c->valsalva_pa = pa * sonde_read_real(reader, at, "valsalva_mmhg", 0, 60, c->valsalva_pa / pa);
+  c->valsalva_from_s = sonde_read_real(reader, at, "valsalva_from_s", 0, 3600, 0);
+  c->valsalva_to_s = sonde_read_real(reader, at, "valsalva_to_s", 0, 3600, 0);
+  if (c->valsalva_to_s < c->valsalva_from_s)
+    sonde_reader_fail(reader, at, SONDE_ARGUMENT,
+                      "valsalva_to_s is %g, expected valsalva_from_s (%g) or more",
+                      c->valsalva_to_s, c->valsalva_from_s);
+}
+
+// ---- pathology
+
+static void read_extent(sonde_reader *reader, sonde_place map, sonde_case_extent *extent) {
+  sonde_place from = sonde_read_find(reader, map, "from"), to = sonde_read_find(reader, map, "to");
+  *extent = (sonde_case_extent){.whole = !from && !to};
+  if (extent->whole) return;
+  if (!from || !to) {
+    sonde_reader_fail(reader, map, SONDE_FORMAT, "give both from and to, or neither");
+    return;
+  }
+  sonde_read_station(reader, from, "from", &extent->from);
+  sonde_read_station(reader, to, "to", &extent->to);
+}
+
+// Stage and what is changed of it. `keys` are those of the map, for messages.
+static void read_clot(sonde_reader *reader, sonde_place map, sonde_pathology *pathology,
+                      sonde_case_extent *extent) {
+  sonde_error error = {0};
+  sonde_place at = sonde_read_find(reader, map, "stage");
+  const char *stage = sonde_read_text(reader, map, "stage", true);
+  if (stage && sonde_pathology_preset(stage, pathology, &error))
+    sonde_reader_pass(reader, at, &error);
+  sonde_pathology *p = pathology;
+  p->thrombus_fraction = sonde_read_real(reader, map, "fraction", 0, 1, p->thrombus_fraction);
+  p->thrombus_modulus_pa =
+      1e3 * sonde_read_real(reader, map, "modulus_kpa", 0, 500, 1e-3 * p->thrombus_modulus_pa);
+  p->echogenicity = sonde_read_real(reader, map, "echogenicity", 0, 1, p->echogenicity);
+  p->lumen_scale = sonde_read_real(reader, map, "lumen_scale", 0.3, 2, p->lumen_scale);
+  p->wall_shear_pa =
+      1e3 * sonde_read_real(reader, map, "wall_kpa", 0, 300, 1e-3 * p->wall_shear_pa);
+  read_extent(reader, map, extent);
+}
+
+static void read_vein(sonde_reader *reader, sonde_place root, sonde_case *c) {
+  static const char *const KEYS[] = {
+      "stage",        "from",        "to",       "fraction", "modulus_kpa",
+      "echogenicity", "lumen_scale", "wall_kpa", "webs",     NULL};
+  sonde_place at = sonde_read_find(reader, root, "vein");
+  if (!at) return;
+  sonde_read_keys(reader, at, "vein", KEYS);
+  read_clot(reader, at, &c->pathology, &c->extent);
+  c->webs = sonde_read_real(reader, at, "webs", 0, 1, 0);
+}
+
+static void read_lesion(sonde_reader *reader, sonde_place at, sonde_case_lesion *lesion) {
+  static const char *const KEYS[] = {"kind",    "at",           "across_mm", "depth_mm",
+                                     "size_mm", "echogenicity", NULL};
+  static const double ECHO[] = {0.25, 0.0, 0.4}; // of node, cyst, haematoma
+  sonde_read_keys(reader, at, "a lesion", KEYS);
+  lesion->kind = (sonde_lesion_kind)sonde_read_choice(reader, at, "kind", sonde_case_lesions, 0);
+  sonde_place where = sonde_read_find(reader, at, "at");
+  if (!where)
+    sonde_reader_fail(reader, at, SONDE_FORMAT, "at is missing");
+  else
+    sonde_read_station(reader, where, "at", &lesion->station);
+  lesion->across_m = 1e-3 * sonde_read_real(reader, at, "across_mm", -100, 100, 0);
+  lesion->depth_m = 1e-3 * sonde_read_real(reader, at, "depth_mm", 1, 120, UNKNOWN);
+  sonde_vec3 size = sonde_read_vector(reader, at, "size_mm", 100, vec3(10, 10, 16));
+  if (!(size.x > 0 && size.y > 0 && size.z > 0))
+    sonde_reader_fail(reader, at, SONDE_ARGUMENT, "size_mm must be three lengths more than 0");
+  lesion->half_m = v_scale(size, 0.5e-3);
+  lesion->echogenicity = sonde_read_real(reader, at, "echogenicity", 0, 1, ECHO[lesion->kind % 3]);
+}
+
+static void read_branch(sonde_reader *reader, sonde_place at, sonde_case_branch *branch) {
+  static const char *const KEYS[] = {"branch",   "stage",       "from",         "to",
+                                     "fraction", "modulus_kpa", "echogenicity", "lumen_scale",
+                                     "wall_kpa", NULL};
+  sonde_read_keys(reader, at, "a branch", KEYS);
+  sonde_read_member(reader, at, "branch", true, branch->branch, sizeof branch->branch);
+  read_clot(reader, at, &branch->pathology, &branch->extent);
+}
+
+static uint32_t read_some(sonde_reader *reader, sonde_place list, const char *what, uint32_t most) {
+  uint32_t count = sonde_read_count(reader, list);
+  if (count <= most) return count;
+  sonde_reader_fail(reader, list, SONDE_ARGUMENT, "%u %s, expected at most %u", count, what, most);
+  return 0;
+}
+
+static void read_findings(sonde_reader *reader, sonde_place root, sonde_case *c) {
+  static const char *const KEYS[] = {"lesions", "branches", "oedema", NULL};
+  sonde_place at = sonde_read_find(reader, root, "findings");
+  if (!at) return;
+  sonde_read_keys(reader, at, "findings", KEYS);
+  c->oedema = sonde_read_real(reader, at, "oedema", 0, 1, 0);
+  sonde_place lesions = sonde_read_find(reader, at, "lesions");
+  c->lesion_count = read_some(reader, lesions, "lesions", SONDE_LESIONS);
+  for (uint32_t i = 0; i < c->lesion_count; ++i)
+    read_lesion(reader, sonde_read_item(reader, lesions, i), &c->lesion[i]);
+  sonde_place branches = sonde_read_find(reader, at, "branches");
+  c->branch_count = read_some(reader, branches, "branches", SONDE_BRANCHES);
+  for (uint32_t i = 0; i < c->branch_count; ++i)
+    read_branch(reader, sonde_read_item(reader, branches, i), &c->branch[i]);
+}
+
+static void read_criteria(sonde_reader *reader, sonde_place root, sonde_case_criteria *criteria) {
+  static const char *const KEYS[] = {"force_low_n", "force_high_n", "force_limit_n", NULL};
+  sonde_place at = sonde_read_find(reader, root, "criteria");
+  if (!at) return;
+  sonde_read_keys(reader, at, "criteria", KEYS);
+  double *to[] = {&criteria->force_low_n, &criteria->force_high_n, &criteria->force_limit_n};
+  for (int i = 0; i < 3; ++i)
+    if (sonde_read_find(reader, at, KEYS[i]))
+      *to[i] = sonde_read_real(reader, at, KEYS[i], 1, 60, UNKNOWN);
+}
+
+// ---- the answer
+
+static void read_segments(sonde_reader *reader, sonde_place at, sonde_case *c) {
+  static const char *const NAMES[] = {"common_femoral", "femoral_proximal", "femoral_mid",
+                                      "femoral_distal", "popliteal_near",   NULL};
+  static const char *const WORDS[] = {"compressible", "clot", NULL};
+  if (!at) return;
+  sonde_read_keys(reader, at, "segments", NAMES);
+  for (int i = 0; NAMES[i]; ++i) {
+    if (!sonde_read_find(reader, at, NAMES[i])) continue;
+    int word = sonde_read_choice(reader, at, NAMES[i], WORDS, 0);
+    SONDE_ASSERT(c->truth_count < SONDE_SEGMENTS);
+    snprintf(c->truth_segment[c->truth_count], sizeof c->truth_segment[0], "%s", NAMES[i]);
+    c->truth[c->truth_count++] = word ? SONDE_DECISION_CLOT : SONDE_DECISION_COMPRESSIBLE;
+  }
+}
+
+static void read_truth(sonde_reader *reader, sonde_place root, sonde_case *c) {
+  static const char *const KEYS[] = {"thrombosis", "diagnosis", "segments", "look_alikes", NULL};
+  sonde_place at = sonde_read_find(reader, root, "truth");
+  if (!at) {
+    sonde_reader_fail(reader, root, SONDE_FORMAT, "truth is missing");
+    return;
+  }
+  sonde_read_keys(reader, at, "truth", KEYS);
+  if (!sonde_read_find(reader, at, "thrombosis"))
+    sonde_reader_fail(reader, at, SONDE_FORMAT, "thrombosis (true or false) is missing");
+  c->thrombosis = sonde_read_bool(reader, at, "thrombosis", false);
+  sonde_read_member(reader, at, "diagnosis", true, c->diagnosis, sizeof c->diagnosis);
+  read_segments(reader, sonde_read_find(reader, at, "segments"), c);
+  sonde_place list = sonde_read_find(reader, at, "look_alikes");
+  c->look_alike_count = read_some(reader, list, "look_alikes", SONDE_LOOK_ALIKES);
+  for (uint32_t i = 0; i < c->look_alike_count; ++i) {
+    const char *text = sonde_read_text_at(reader, sonde_read_item(reader, list, i), "a look-alike");
+    if (text) snprintf(c->look_alike[i], sizeof c->look_alike[i], "%s", text);
+  }
+}
+
+// ---- the whole
+
+static sonde_status check_id(const char *id, sonde_error *error) {
+  for (const char *c = id; *c; ++c)
+    if (!islower((unsigned char)*c) && !isdigit((unsigned char)*c) && *c != '-' && *c != '_')
+      return sonde_fail(error, SONDE_FORMAT, "id '%s' has '%c', expected a-z, 0-9, - and _", id,
+                        *c);
+  return id[0] ? SONDE_OK : sonde_fail(error, SONDE_FORMAT, "the case has no id");
+}
+
+static sonde_status check_criteria(const sonde_case_criteria *c, sonde_error *error) {
+  double low = c->force_low_n, high = c->force_high_n, limit = c->force_limit_n;
+  if (low > high || high > limit || low > limit)
+    return sonde_fail(error, SONDE_ARGUMENT,
+                      "criteria of %g, %g and %g N, expected force_low_n <= force_high_n <= "
+                      "force_limit_n",
+                      low, high, limit);
+  return SONDE_OK;
+}
+
+sonde_status sonde_case_check(const sonde_case *of, sonde_error *error) {
+  sonde_status status = check_id(of->id, error);
+  if (!status) status = check_criteria(&of->criteria, error);
+  if (status) return status;
+  bool clot = false;
+  for (uint32_t i = 0; i < of->truth_count; ++i) clot |= of->truth[i] == SONDE_DECISION_CLOT;
+  if (of->truth_count == 0) return sonde_fail(error, SONDE_FORMAT, "the truth has no segments");
+  if (clot != of->thrombosis)
+    return sonde_fail(error, SONDE_MISMATCH, "thrombosis is %s, but %s segment is clot",
+                      of->thrombosis ? "true" : "false", clot ? "a" : "no");
+  if (of->webs > 0 && !(of->pathology.thrombus_fraction > 0))
+    return sonde_fail(error, SONDE_MISMATCH, "webs in a vein without a clot");
+  return SONDE_OK;
+}
+
+static void read_case(sonde_reader *reader, sonde_case *c) {
+  static const char *const KEYS[] = {"sonde_case", "id",    "title",       "level", "history",
+                                     "note",       "thigh", "circulation", "vein",  "findings",
+                                     "criteria",   "truth", NULL};
+  sonde_place root = sonde_reader_root(reader);
+  sonde_read_keys(reader, root, "a case", KEYS);
+  if (!sonde_read_find(reader, root, "sonde_case"))
+    sonde_reader_fail(reader, root, SONDE_FORMAT, "sonde_case: 1 is missing");
+  double version = sonde_read_real(reader, root, "sonde_case", 0, 1e6, 0);
+  if (version != SONDE_CASE_VERSION)
+    sonde_reader_fail(reader, sonde_read_find(reader, root, "sonde_case"), SONDE_VERSION,
+                      "case of version %g, expected %d", version, SONDE_CASE_VERSION);
+  sonde_read_member(reader, root, "id", true, c->id, sizeof c->id);
+  sonde_read_member(reader, root, "title", true, c->title, sizeof c->title);
+  c->level = (sonde_case_level)sonde_read_choice(reader, root, "level", sonde_case_levels, 0);
+  sonde_read_member(reader, root, "history", true, c->history, sizeof c->history);
+  sonde_read_member(reader, root, "note", false, c->note, sizeof c->note);
+  read_thigh(reader, root, c);
+  read_circulation(reader, sonde_read_find(reader, root, "circulation"), &c->circulation);
+  read_vein(reader, root, c);
+  read_findings(reader, root, c);
+  read_criteria(reader, root, &c->criteria);
+  read_truth(reader, root, c);
+  sonde_error error = {0};
+  if (sonde_reader_good(reader) && sonde_case_check(c, &error))
+    sonde_reader_pass(reader, sonde_read_find(reader, root, "truth"), &error);
+}
+
+sonde_status sonde_case_parse(const char *text, const char *name, sonde_case *out,
+                              sonde_error *error) {
+  SONDE_ASSERT(text && name && out);
+  sonde_reader *reader;
+  *out = sonde_case_default();
+  sonde_status status = sonde_reader_create(text, name, &reader, error);
+  if (status) return status;
+  read_case(reader, out);
+  status = sonde_reader_status(reader, error);
+  sonde_reader_destroy(reader);
+  return status;
+}
+
+sonde_status sonde_case_load(const char *path, sonde_case *out, sonde_error *error) {
+  char *text = NULL;
+  size_t count;
+  sonde_status status = sonde_file_load(path, &text, &count, error);
+  if (!status && strlen(text) != count)
+    status = sonde_fail(error, SONDE_FORMAT, "%s: has zero bytes, expected text", path);
+  if (!status) status = sonde_case_parse(text, path, out, error);
+  sonde_free(text);
+  return status;
+}

@@ -1,0 +1,63 @@
+// Inside of the judge: what it keeps of an exam. Nothing grows with time but the list of presses.
+#ifndef SONDE_SRC_TRAINER_JUDGE_H
+#define SONDE_SRC_TRAINER_JUDGE_H
+
+#include "trainer/trainer.h"
+
+enum { JUDGE_BINS = 1024, FORCE_BINS = 256 };
+// Stretches of vein are kept in steps of half a millimetre; force against time in steps of 1/4 N.
+static const double JUDGE_BIN_M = 0.0005, FORCE_BIN_N = 0.25;
+// Beyond the reach of a place a press still covers this much vein, so that neighbours 20 mm apart
+// which are missed by a millimetre or two leave no gap.
+static const double COVER_EXTRA_M = 0.0025;
+// Lighter contact than this is not pressing.
+static const double CONTACT_N = 1.0;
+
+// The probe's way on a fixed grid of time, whatever the rate of the snapshots.
+typedef struct sonde_motion {
+  bool started;
+  double last_s, next_s;
+  sonde_vec3 last_m;
+  sonde_vec3 stage_m[2];  // low-pass
+  sonde_vec3 before_m[3]; // filtered, newest first
+  uint32_t filled;
+  double path_m, jerk_sum, speed_peak_m_s, time_s;
+} sonde_motion;
+void sonde_motion_feed(sonde_motion *motion, double time_s, sonde_vec3 position_m);
+// Log dimensionless jerk; NaN before the probe has moved.
+double sonde_motion_smoothness(const sonde_motion *motion);
+
+struct sonde_judge {
+  sonde_vein_map map;
+  sonde_plan plan;
+  sonde_decision decision[SONDE_SEGMENTS];
+  uint32_t hints;
+  double hint_s; // when the last one was asked for
+
+  // presses
+  sonde_compression *press; // [capacity]
+  uint32_t press_count, capacity;
+  uint32_t result_count[SONDE_PRESS_RESULTS];
+  double closed_sum; // of 1 - ratio, complete presses
+  bool done[SONDE_PLAN_POINTS];
+  uint32_t open[SONDE_SEGMENTS], complete[SONDE_SEGMENTS];
+  bool covered[JUDGE_BINS], wanted[JUDGE_BINS];
+
+  // the press under way
+  bool pressing, seen_at_peak;
+  sonde_compression now;
+  double trough_n; // least force since the last press
+
+  // time
+  bool started;
+  double first_s;
+  sonde_snapshot last;
+  double force_s[FORCE_BINS]; // contact time by force
+  double force_peak_n, contact_s;
+  sonde_motion motion;
+};
+
+// What a press is so far.
+sonde_press_result sonde_press_classify(const sonde_judge *judge);
+
+#endif

@@ -1,0 +1,121 @@
+// What to do next: one sentence for the learner.
+// next_point:    first place of the plan that is not examined.
+// undecided:     first needed segment whose places are done and that has no decision.
+// measure:       where the probe is against a place.
+// say_move, say_press, say_end: the sentence.
+#include "trainer/judge.h"
+
+static uint32_t next_point(const sonde_judge *judge) {
+  for (uint32_t i = 0; i < judge->plan.count; ++i)
+    if (!judge->done[i]) return i;
+  return SONDE_PLAN_POINTS;
+}
+
+static uint32_t undecided(const sonde_judge *judge) {
+  for (uint32_t i = 0; i < judge->map.segment_count; ++i) {
+    sonde_segment_status s = sonde_judge_segment(judge, i);
+    if (s.needed && s.done == s.points && s.decision == SONDE_DECISION_NONE) return i;
+  }
+  return SONDE_SEGMENTS;
+}
+
+// Distance along the skin: what lies along the normal is the press itself.
+static double measure(const sonde_judge *judge, const sonde_vein_point *at, double *along_m,
+                      double *angle_rad) {
+  sonde_pose pose = judge->last.world_from_probe;
+  sonde_vec3 away = v_sub(pose.position, at->skin_m);
+  sonde_vec3 flat = v_madd(away, -v_dot(away, at->normal), at->normal);
+  sonde_vec3 course = v_cross(at->normal, at->across);
+  // towards the knee: the way on which the map's points come later
+  const sonde_vein_map *map = &judge->map;
+  sonde_vec3 down = v_sub(map->point[map->point_count - 1].vein_m, map->point[0].vein_m);
+  if (v_dot(down, course) < 0) course = v_neg(course);
+  *along_m = v_dot(flat, course);
+  double transverse = fabs(v_dot(q_rotate(pose.rotation, vec3(0, 1, 0)), course));
+  *angle_rad = acos(fmin(transverse, 1));
+  return v_norm(flat);
+}
+
+static void say_move(sonde_guidance *g, const char *title, double along_m, double offset_m) {
+  double across_m = sqrt(fmax(0, offset_m * offset_m - along_m * along_m));
+  double along_mm = fabs(1e3 * along_m), across_mm = 1e3 * across_m;
+  if (along_mm >= across_mm)
+    snprintf(g->text, sizeof g->text, "Move the probe %.0f mm towards the %s: %s.", along_mm,
+             along_m < 0 ? "knee" : "groin", title);
+  else
+    snprintf(g->text, sizeof g->text, "Move the probe %.0f mm sideways: %s.", across_mm, title);
+}
+
+static void say_press(const sonde_judge *judge, sonde_guidance *g) {
+  const sonde_criteria *c = &judge->plan.criteria;
+  if (!g->angle_ok) {
+    snprintf(g->text, sizeof g->text,
+             "Turn the probe by %.0f degrees, so that it lies straight across the leg.",
+             g->angle_rad * 180 / SONDE_PI);
+    return;
+  }
+  static const char *const OTHER[] = {
+      [SONDE_PRESS_STATE_COMPLETE] = "The vein is closed: let go, then move on.",
+      [SONDE_PRESS_STATE_OPEN] =
+          "The vein stays open although the artery gives way: let go; it may hold a clot.",
+      [SONDE_PRESS_STATE_TOO_HARD] = "Too hard: let go and press again with less force.",
+      [SONDE_PRESS_STATE_OFF_AXIS] = "The vein is not cut straight across: let go and tilt back."};
+  sonde_press_state state = sonde_judge_state(judge).state;
+  if (state > SONDE_PRESS_STATE_PRESSING)
+    snprintf(g->text, sizeof g->text, "%s", OTHER[state]);
+  else if (state == SONDE_PRESS_STATE_PRESSING)
+    snprintf(g->text, sizeof g->text,
+             "Press on slowly until the walls of the vein touch (%.0f to %.0f N).", c->force_low_n,
+             c->force_high_n);
+  else
+    snprintf(g->text, sizeof g->text, "Here: press until the walls of the vein touch.");
+}
+
+static void say_end(const sonde_judge *judge, sonde_guidance *g) {
+  if (g->undecided < SONDE_SEGMENTS)
+    snprintf(g->text, sizeof g->text, "Decide: %s.",
+             sonde_segment_title(judge->map.segment[g->undecided].name));
+  else
+    snprintf(g->text, sizeof g->text, "All places are examined: finish the exam.");
+}
+
+sonde_guidance sonde_judge_guidance(const sonde_judge *judge) {
+  const sonde_criteria *c = &judge->plan.criteria;
+  sonde_guidance g = {.point = next_point(judge),
+                      .offset_m = (double)NAN,
+                      .angle_rad = (double)NAN,
+                      .force_low_n = c->force_low_n,
+                      .force_high_n = c->force_high_n,
+                      .undecided = undecided(judge)};
+  if (g.point == SONDE_PLAN_POINTS) {
+    say_end(judge, &g);
+    return g;
+  }
+  const sonde_plan_point *point = &judge->plan.point[g.point];
+  snprintf(g.detail, sizeof g.detail, "%s", point->text);
+  if (!judge->started) {
+    snprintf(g.text, sizeof g.text, "Put the probe across the leg: %s.", point->title);
+    return g;
+  }
+  double along_m;
+  g.offset_m = measure(judge, &point->at, &along_m, &g.angle_rad);
+  g.angle_ok = g.angle_rad <= c->tilt_rad;
+  // a press that is under way is finished before the next place is named
+  if (!judge->pressing && g.offset_m > c->reach_m)
+    say_move(&g, point->title, along_m, g.offset_m);
+  else
+    say_press(judge, &g);
+  return g;
+}
+
+sonde_guidance sonde_judge_hint(sonde_judge *judge) {
+  judge->hints++;
+  judge->hint_s = judge->started ? judge->last.time_s : 0;
+  return sonde_judge_guidance(judge);
+}
+
+uint32_t sonde_judge_hints(const sonde_judge *judge, bool *showing) {
+  double now_s = judge->started ? judge->last.time_s : 0;
+  if (showing) *showing = judge->hints > 0 && now_s - judge->hint_s <= SONDE_HINT_S;
+  return judge->hints;
+}

@@ -1,0 +1,294 @@
+// Scripted operators.
+// choose_places:   which places of the plan are visited.
+// aim:             the errors of the hand at a place.
+// pose_at:         pose above or below a place.
+// begin_place:     the next place, or the end.
+// travel, press, release: one step of each phase, at every snapshot.
+// too_far:         whether this press ends.
+// weigh:           what a finished press showed.
+#include "trainer/trainer.h"
+
+#include "base/random.h"
+
+#include <string.h>
+
+// What makes an operator. Ratios and forces are what the operator goes by, not the judge's.
+typedef struct habit {
+  const char *name;
+  double skip;                         // share of the places that are left out
+  double along_m, across_m, twist_rad; // spread of the aim
+  double approach_m_s, press_m_s, travel_m_s;
+  double force_from_n, force_to_n;   // stops at a force drawn from here, 0: by the image
+  double beyond_from_n, beyond_to_n; // the same above the limit of force
+  double closed_ratio, open_ratio;   // of the vein: called closed, called open
+  double artery_ratio;               // ends a press on an open vein; 0: goes on
+  double pause_s, wander_m;          // before a place; sway of the hand while travelling
+  uint32_t attempts;                 // at a place, until it is clear
+  bool confirm, guess;               // repeats what looks open; calls what it has not seen
+} habit;
+
+static const habit HABIT[] = {
+    {.name = "expert",
+     .along_m = 0.001,
+     .across_m = 0.0015,
+     .twist_rad = 0.045,
+     .approach_m_s = 0.03,
+     .press_m_s = 0.010,
+     .travel_m_s = 0.08,
+     .closed_ratio = 0.08,
+     .open_ratio = 0.33,
+     .artery_ratio = 0.66,
+     .pause_s = 0.2,
+     .wander_m = 0,
+     .attempts = 3,
+     .confirm = true},
+    {.name = "novice",
+     .skip = 0.5,
+     .along_m = 0.006,
+     .across_m = 0.007,
+     .twist_rad = 0.42,
+     .approach_m_s = 0.05,
+     .press_m_s = 0.035,
+     .travel_m_s = 0.05,
+     .force_from_n = 6,
+     .force_to_n = 20,
+     .closed_ratio = 0.7,
+     .open_ratio = 0.7,
+     .pause_s = 1.2,
+     .wander_m = 0.004,
+     .attempts = 1,
+     .guess = true},
+    {.name = "timid",
+     .along_m = 0.002,
+     .across_m = 0.002,
+     .twist_rad = 0.08,
+     .approach_m_s = 0.02,
+     .press_m_s = 0.008,
+     .travel_m_s = 0.05,
+     .force_from_n = 5,
+     .force_to_n = 9,
+     .closed_ratio = 0.75,
+     .open_ratio = 0.85,
+     .pause_s = 0.6,
+     .wander_m = 0.002,
+     .attempts = 1},
+    {.name = "forceful",
+     .along_m = 0.002,
+     .across_m = 0.003,
+     .twist_rad = 0.08,
+     .approach_m_s = 0.05,
+     .press_m_s = 0.03,
+     .travel_m_s = 0.1,
+     .beyond_from_n = 3,
+     .beyond_to_n = 10,
+     .closed_ratio = 0.1,
+     .open_ratio = 0.3,
+     .pause_s = 0.2,
+     .attempts = 1},
+};
+static const char *const NAMES[] = {"expert", "novice", "timid", "forceful", NULL};
+
+static const double LIFT_M = 0.006, DEEPEST_M = 0.060, TOUCH_N = 3, HOLD_S = 0.2;
+static const double NEAR_LIMIT = 0.95, CALL_FORCE_N = 8, RELEASE_M_S = 0.08;
+
+typedef enum phase { TRAVEL, PRESS, HOLD, RELEASE, DONE } phase;
+
+struct sonde_operator {
+  habit habit;
+  sonde_vein_map map;
+  sonde_plan plan;
+  uint64_t seed, draws;
+  sonde_device hand; // functions and self only; the session owns it
+  bool visit[SONDE_PLAN_POINTS];
+  uint32_t open[SONDE_SEGMENTS], closed[SONDE_SEGMENTS], unsure[SONDE_SEGMENTS];
+
+  phase phase;
+  uint32_t place, attempt, opens;
+  double along_m, across_m, twist_rad, depth_m; // where the hand is told to be
+  double aim_m, aim_across_m, aim_twist_rad;    // at this attempt
+  double stop_n, wait_s, last_s;
+  double ratio, artery, peak_n; // of this press; NaN: not seen
+  bool started;
+};
+
+const char *const *sonde_operator_names(void) { return NAMES; }
+
+static double uniform(sonde_operator *op, double low, double high) {
+  return low + (high - low) * sonde_random_uniform(op->seed, op->draws++);
+}
+
+// Cut at two and a half times the spread: hands do not jump.
+static double spread(sonde_operator *op, double size) {
+  return size * clamp(sonde_random_normal(op->seed, op->draws++), -2.5, 2.5);
+}
+
+static void choose_places(sonde_operator *op) {
+  for (uint32_t i = 0; i < op->plan.count; ++i) op->visit[i] = uniform(op, 0, 1) >= op->habit.skip;
+}
+
+static void aim(sonde_operator *op) {
+  const habit *h = &op->habit;
+  double calm = op->attempt > 0 ? 0.5 : 1; // a second try is made with more care
+  op->aim_m = op->plan.point[op->place].at.along_m + calm * spread(op, h->along_m);
+  op->aim_across_m = calm * spread(op, h->across_m);
+  op->aim_twist_rad = calm * spread(op, h->twist_rad);
+  const sonde_criteria *c = &op->plan.criteria;
+  op->stop_n = NEAR_LIMIT * c->force_limit_n;
+  if (h->force_to_n > 0) op->stop_n = uniform(op, h->force_from_n, h->force_to_n);
+  if (h->beyond_to_n > 0)
+    op->stop_n = c->force_limit_n + uniform(op, h->beyond_from_n, h->beyond_to_n);
+  op->ratio = op->artery = (double)NAN;
+  op->peak_n = 0;
+  op->wait_s = h->pause_s * uniform(op, 0.5, 1.5);
+}
+
+static sonde_pose pose_at(const sonde_operator *op) {
+  sonde_vein_point p = sonde_vein_at(&op->map, op->along_m);
+  sonde_vec3 z = v_neg(p.normal), y = v_cross(z, p.across);
+  double c = cos(op->twist_rad), s = sin(op->twist_rad);
+  sonde_vec3 x = v_add(v_scale(p.across, c), v_scale(y, s));
+  sonde_vec3 at = v_madd(p.skin_m, op->across_m, p.across);
+  return (sonde_pose){v_madd(at, -op->depth_m, p.normal),
+                      q_from_matrix(m_columns(x, v_cross(z, x), z))};
+}
+
+static void begin_place(sonde_operator *op, uint32_t place) {
+  while (place < op->plan.count && !op->visit[place]) ++place;
+  op->place = place;
+  op->attempt = op->opens = 0;
+  op->phase = place < op->plan.count ? TRAVEL : DONE;
+  if (op->phase == TRAVEL) aim(op);
+}
+
+sonde_status sonde_operator_create(const char *name, uint64_t seed, const sonde_vein_map *map,
+                                   const sonde_plan *plan, double dt_s, sonde_operator **out,
+                                   sonde_device *device, sonde_error *error) {
+  SONDE_ASSERT(name && map && plan && out && device);
+  *out = NULL;
+  size_t k = 0;
+  while (k < SONDE_COUNT_OF(HABIT) && strcmp(HABIT[k].name, name) != 0) ++k;
+  if (k == SONDE_COUNT_OF(HABIT))
+    return sonde_fail(error, SONDE_NOT_FOUND,
+                      "no operator '%s', expected expert, novice, timid or forceful", name);
+  sonde_operator *op = SONDE_NEW(sonde_operator, 1);
+  if (!op) return sonde_fail_memory(error);
+  *op = (sonde_operator){.habit = HABIT[k], .map = *map, .plan = *plan, .seed = seed};
+  choose_places(op);
+  begin_place(op, 0);
+  op->along_m = plan->count > 0 ? plan->point[0].at.along_m : 0;
+  op->depth_m = -LIFT_M;
+  sonde_status status = sonde_device_page(pose_at(op), dt_s, device, error);
+  if (status) {
+    sonde_free(op);
+    return status;
+  }
+  op->hand = *device;
+  *out = op;
+  return SONDE_OK;
+}
+
+void sonde_operator_destroy(sonde_operator *op) { sonde_free(op); }
+
+// ---- phases
+
+static double towards(double from, double to, double step) {
+  return fabs(to - from) <= step ? to : from + (to > from ? step : -step);
+}
+
+// Along the course of the vein at a small height, so that the skin's curve is followed.
+static void travel(sonde_operator *op, const sonde_snapshot *s, double dt_s) {
+  const habit *h = &op->habit;
+  double step = h->travel_m_s * dt_s;
+  op->along_m = towards(op->along_m, op->aim_m, step);
+  op->across_m = towards(op->across_m, op->aim_across_m, step);
+  op->twist_rad = towards(op->twist_rad, op->aim_twist_rad, dt_s);
+  if (op->along_m != op->aim_m || op->across_m != op->aim_across_m ||
+      op->twist_rad != op->aim_twist_rad)
+    return;
+  op->wait_s -= dt_s;
+  // a hand that looks for its place sways over it
+  op->across_m += h->wander_m * sin(2 * SONDE_PI * 0.7 * s->time_s) * dt_s * 4;
+  op->aim_across_m = op->across_m;
+  if (op->wait_s <= 0) op->phase = PRESS;
+}
+
+static bool too_far(const sonde_operator *op, const sonde_snapshot *s) {
+  const habit *h = &op->habit;
+  if (s->force_normal_n >= op->stop_n || op->depth_m >= DEEPEST_M) return true;
+  if (h->force_to_n > 0 || h->beyond_to_n > 0) return false;
+  if (s->vein_area_ratio <= h->closed_ratio) return true;
+  return s->artery_area_ratio <= h->artery_ratio && s->vein_area_ratio >= h->open_ratio;
+}
+
+static void press(sonde_operator *op, const sonde_snapshot *s, double dt_s) {
+  const habit *h = &op->habit;
+  op->depth_m += dt_s * (s->force_normal_n < TOUCH_N ? h->approach_m_s : h->press_m_s);
+  if (!too_far(op, s)) return;
+  op->phase = HOLD;
+  op->wait_s = HOLD_S;
+}
+
+static void watch(sonde_operator *op, const sonde_snapshot *s) {
+  op->ratio = fmin(op->ratio, s->vein_area_ratio);
+  op->artery = fmin(op->artery, s->artery_area_ratio);
+  op->peak_n = fmax(op->peak_n, s->force_normal_n);
+}
+
+// Closed once is closed: a vein that can be emptied has no clot there.
+static void weigh(sonde_operator *op) {
+  const habit *h = &op->habit;
+  uint32_t segment = op->plan.point[op->place].segment;
+  bool by_image = !(h->force_to_n > 0);
+  bool closed = op->ratio <= h->closed_ratio + (by_image ? 0.02 : 0);
+  bool firm = by_image ? op->artery <= op->plan.criteria.artery_ratio : op->peak_n >= CALL_FORCE_N;
+  bool open = !closed && op->ratio >= h->open_ratio && firm;
+  op->attempt++;
+  op->opens += open;
+  bool clear = closed || (open && (!h->confirm || op->opens >= 2));
+  if (!clear && op->attempt < h->attempts) {
+    op->phase = TRAVEL;
+    aim(op);
+    return;
+  }
+  if (closed)
+    op->closed[segment]++;
+  else if (open)
+    op->open[segment]++;
+  else
+    op->unsure[segment]++;
+  begin_place(op, op->place + 1);
+}
+
+static void release(sonde_operator *op, double dt_s) {
+  op->depth_m = towards(op->depth_m, -LIFT_M, RELEASE_M_S * dt_s);
+  if (op->depth_m <= -LIFT_M) weigh(op);
+}
+
+void sonde_operator_see(sonde_operator *op, const sonde_snapshot *s) {
+  SONDE_ASSERT(op && s);
+  double dt_s = op->started ? clamp(s->time_s - op->last_s, 0, 0.2) : 0;
+  op->started = true;
+  op->last_s = s->time_s;
+  if (op->phase == PRESS || op->phase == HOLD) watch(op, s);
+  switch (op->phase) {
+  case TRAVEL: travel(op, s, dt_s); break;
+  case PRESS: press(op, s, dt_s); break;
+  case HOLD:
+    op->wait_s -= dt_s;
+    if (op->wait_s <= 0) op->phase = RELEASE;
+    break;
+  case RELEASE: release(op, dt_s); break;
+  case DONE: break;
+  }
+  sonde_device_page_goal(&op->hand, pose_at(op));
+}
+
+bool sonde_operator_done(const sonde_operator *op) { return op->phase == DONE; }
+
+sonde_decision sonde_operator_decision(const sonde_operator *op, uint32_t segment) {
+  SONDE_ASSERT(segment < SONDE_SEGMENTS);
+  if (op->open[segment]) return SONDE_DECISION_CLOT;
+  if (op->habit.guess) return SONDE_DECISION_COMPRESSIBLE;
+  if (op->closed[segment] && !op->unsure[segment]) return SONDE_DECISION_COMPRESSIBLE;
+  return SONDE_DECISION_NOT_SEEN;
+}

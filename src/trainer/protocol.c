@@ -1,0 +1,193 @@
+// Protocols: their files, and their places on one thigh.
+// read_criteria, read_stop: parts of the file.
+// load_one, compare:        the protocols of a directory.
+// add_point, add_stop:      places on a thigh.
+#include "trainer/trainer.h"
+
+#include <string.h>
+
+static const double DEGREE = SONDE_PI / 180, SAME_M = 1e-6;
+
+// Ratios: docs/trainer.md. Forces: what closes a healthy vein 15 to 25 mm below the skin of the
+// bundled thigh.
+sonde_criteria sonde_criteria_default(void) {
+  return (sonde_criteria){.tilt_rad = 20 * DEGREE,
+                          .closed_ratio = 0.10,
+                          .open_ratio = 0.30,
+                          .artery_ratio = 0.70,
+                          .crushed_ratio = 0.45,
+                          .force_low_n = 16,
+                          .force_high_n = 28,
+                          .force_limit_n = 32,
+                          .reach_m = 0.010};
+}
+
+static void read_criteria(sonde_reader *reader, sonde_place root, sonde_criteria *c) {
+  static const char *const KEYS[] = {
+      "tilt_deg",    "closed_ratio", "open_ratio",    "artery_ratio", "crushed_ratio",
+      "force_low_n", "force_high_n", "force_limit_n", "reach_mm",     NULL};
+  sonde_place at = sonde_read_find(reader, root, "criteria");
+  if (!at) return;
+  sonde_read_keys(reader, at, "criteria", KEYS);
+  c->tilt_rad = DEGREE * sonde_read_real(reader, at, "tilt_deg", 1, 80, c->tilt_rad / DEGREE);
+  double *ratio[] = {&c->closed_ratio, &c->open_ratio, &c->artery_ratio, &c->crushed_ratio};
+  for (int i = 0; i < 4; ++i) *ratio[i] = sonde_read_real(reader, at, KEYS[1 + i], 0, 1, *ratio[i]);
+  double *force[] = {&c->force_low_n, &c->force_high_n, &c->force_limit_n};
+  for (int i = 0; i < 3; ++i)
+    *force[i] = sonde_read_real(reader, at, KEYS[5 + i], 0, 60, *force[i]);
+  c->reach_m = 1e-3 * sonde_read_real(reader, at, "reach_mm", 1, 50, 1e3 * c->reach_m);
+  if (!(c->closed_ratio < c->open_ratio))
+    sonde_reader_fail(reader, at, SONDE_ARGUMENT,
+                      "closed_ratio is %g, expected less than open_ratio (%g)", c->closed_ratio,
+                      c->open_ratio);
+  if (!(c->crushed_ratio < c->artery_ratio))
+    sonde_reader_fail(reader, at, SONDE_ARGUMENT,
+                      "crushed_ratio is %g, expected less than artery_ratio (%g)", c->crushed_ratio,
+                      c->artery_ratio);
+  if (!(c->force_low_n <= c->force_high_n && c->force_high_n <= c->force_limit_n))
+    sonde_reader_fail(reader, at, SONDE_ARGUMENT,
+                      "expected force_low_n <= force_high_n <= force_limit_n");
+}
+
+static void read_stop(sonde_reader *reader, sonde_place at, sonde_exam_stop *stop) {
+  static const char *const KEYS[] = {"title", "text", "at", "from", "to", "every_mm", NULL};
+  sonde_read_keys(reader, at, "a place", KEYS);
+  sonde_read_member(reader, at, "title", true, stop->title, sizeof stop->title);
+  sonde_read_member(reader, at, "text", true, stop->text, sizeof stop->text);
+  sonde_place one = sonde_read_find(reader, at, "at"), from = sonde_read_find(reader, at, "from");
+  sonde_place to = sonde_read_find(reader, at, "to");
+  if ((one != 0) == (from != 0) || (from != 0) != (to != 0)) {
+    sonde_reader_fail(reader, at, SONDE_FORMAT, "give either at, or from, to and every_mm");
+    return;
+  }
+  if (one) {
+    sonde_read_station(reader, one, "at", &stop->from);
+    return;
+  }
+  sonde_read_station(reader, from, "from", &stop->from);
+  sonde_read_station(reader, to, "to", &stop->to);
+  stop->every_m = 1e-3 * sonde_read_real(reader, at, "every_mm", 2, 200, (double)NAN);
+}
+
+static void read_protocol(sonde_reader *reader, sonde_exam_protocol *p) {
+  static const char *const KEYS[] = {"sonde_protocol", "id",     "title", "text",
+                                     "criteria",       "places", NULL};
+  sonde_place root = sonde_reader_root(reader);
+  sonde_read_keys(reader, root, "a protocol", KEYS);
+  double version = sonde_read_real(reader, root, "sonde_protocol", 0, 1e6, (double)NAN);
+  if (version != SONDE_EXAM_PROTOCOL_VERSION)
+    sonde_reader_fail(reader, sonde_read_find(reader, root, "sonde_protocol"), SONDE_VERSION,
+                      "protocol of version %g, expected %d", version, SONDE_EXAM_PROTOCOL_VERSION);
+  sonde_read_member(reader, root, "id", true, p->id, sizeof p->id);
+  sonde_read_member(reader, root, "title", true, p->title, sizeof p->title);
+  sonde_read_member(reader, root, "text", true, p->text, sizeof p->text);
+  read_criteria(reader, root, &p->criteria);
+  sonde_place places = sonde_read_find(reader, root, "places");
+  p->stop_count = sonde_read_count(reader, places);
+  if (p->stop_count == 0 || p->stop_count > SONDE_EXAM_STOPS) {
+    sonde_reader_fail(reader, root, SONDE_FORMAT, "%u places, expected 1 to %d", p->stop_count,
+                      SONDE_EXAM_STOPS);
+    p->stop_count = 0;
+  }
+  for (uint32_t i = 0; i < p->stop_count; ++i)
+    read_stop(reader, sonde_read_item(reader, places, i), &p->stop[i]);
+}
+
+sonde_status sonde_exam_protocol_parse(const char *text, const char *name, sonde_exam_protocol *out,
+                                       sonde_error *error) {
+  SONDE_ASSERT(text && name && out);
+  sonde_reader *reader;
+  *out = (sonde_exam_protocol){.criteria = sonde_criteria_default()};
+  sonde_status status = sonde_reader_create(text, name, &reader, error);
+  if (status) return status;
+  read_protocol(reader, out);
+  status = sonde_reader_status(reader, error);
+  sonde_reader_destroy(reader);
+  return status;
+}
+
+sonde_status sonde_exam_protocol_load(const char *path, sonde_exam_protocol *out,
+                                      sonde_error *error) {
+  char *text = NULL;
+  size_t count;
+  sonde_status status = sonde_file_load(path, &text, &count, error);
+  if (!status && strlen(text) != count)
+    status = sonde_fail(error, SONDE_FORMAT, "%s: has zero bytes, expected text", path);
+  if (!status) status = sonde_exam_protocol_parse(text, path, out, error);
+  sonde_free(text);
+  return status;
+}
+
+static sonde_status load_one(const char *path, void *item, sonde_error *error) {
+  return sonde_exam_protocol_load(path, item, error);
+}
+
+// Single places before stretches, fewer before more.
+static int compare(const void *a, const void *b) {
+  const sonde_exam_protocol *x = a, *y = b;
+  double rank[2] = {0, 0};
+  for (uint32_t i = 0; i < x->stop_count; ++i) rank[0] += x->stop[i].every_m > 0 ? 100 : 1;
+  for (uint32_t i = 0; i < y->stop_count; ++i) rank[1] += y->stop[i].every_m > 0 ? 100 : 1;
+  if (rank[0] != rank[1]) return rank[0] < rank[1] ? -1 : 1;
+  return strcmp(x->id, y->id);
+}
+
+sonde_status sonde_exam_protocol_list(const char *directory, sonde_exam_protocol **protocols,
+                                      uint32_t *count, sonde_error *error) {
+  void *items;
+  sonde_status status =
+      sonde_load_directory(directory, sizeof(sonde_exam_protocol), load_one, &items, count, error);
+  *protocols = items;
+  if (!status) qsort(items, *count, sizeof(sonde_exam_protocol), compare);
+  return status;
+}
+
+// ---- on a thigh
+
+static sonde_status add_point(const sonde_exam_stop *stop, const sonde_vein_map *map,
+                              double along_m, sonde_plan *plan, sonde_error *error) {
+  if (plan->count == SONDE_PLAN_POINTS)
+    return sonde_fail(error, SONDE_ARGUMENT, "more than %d places, expected fewer",
+                      SONDE_PLAN_POINTS);
+  sonde_plan_point *point = &plan->point[plan->count];
+  point->at = sonde_vein_at(map, along_m);
+  point->segment = sonde_vein_segment_at(map, point->at.z_m);
+  if (point->segment == SONDE_SEGMENTS)
+    return sonde_fail(error, SONDE_NOT_FOUND, "'%s' lies in no segment of the vein", stop->title);
+  const char *segment = sonde_segment_title(map->segment[point->segment].name);
+  snprintf(point->title, sizeof point->title, "%s", stop->every_m > 0 ? segment : stop->title);
+  memcpy(point->text, stop->text, sizeof point->text);
+  plan->count++;
+  return SONDE_OK;
+}
+
+// Equal steps of at most every_m from the first place to the last.
+static sonde_status add_stop(const sonde_exam_stop *stop, const sonde_vein_map *map,
+                             sonde_plan *plan, sonde_error *error) {
+  double from, to;
+  sonde_status status = sonde_station_find(&stop->from, map, &from, error);
+  if (!status && !(stop->every_m > 0)) return add_point(stop, map, from, plan, error);
+  if (!status) status = sonde_station_find(&stop->to, map, &to, error);
+  if (status) return status;
+  double steps = fmax(1, ceil((fabs(to - from) - SAME_M) / stop->every_m));
+  for (double k = 0; k <= steps && !status; ++k)
+    status = add_point(stop, map, from + (to - from) * k / steps, plan, error);
+  return status;
+}
+
+sonde_status sonde_plan_make(const sonde_exam_protocol *protocol, const sonde_vein_map *map,
+                             const sonde_case_criteria *criteria, sonde_plan *plan,
+                             sonde_error *error) {
+  SONDE_ASSERT(protocol && map && plan);
+  *plan = (sonde_plan){.criteria = protocol->criteria};
+  if (criteria) {
+    sonde_criteria *c = &plan->criteria;
+    if (isfinite(criteria->force_low_n)) c->force_low_n = criteria->force_low_n;
+    if (isfinite(criteria->force_high_n)) c->force_high_n = criteria->force_high_n;
+    if (isfinite(criteria->force_limit_n)) c->force_limit_n = criteria->force_limit_n;
+  }
+  sonde_status status = SONDE_OK;
+  for (uint32_t i = 0; i < protocol->stop_count && !status; ++i)
+    status = add_stop(&protocol->stop[i], map, plan, error);
+  return status;
+}

@@ -1,0 +1,148 @@
+// The score: what was found against what is there. Formulas: docs/trainer.md, version
+// SONDE_SCORE_VERSION.
+// judge_segments:  right and supported decisions.
+// overall:         the diagnosis that the decisions amount to.
+// parts:           the weighted parts, each 0..1.
+// total:           the sum, and what caps it.
+// tell:            one sentence.
+#include "trainer/judge.h"
+
+#include <string.h>
+
+// A wrong or missing diagnosis scores at most this, below what passes.
+static const double CAP = 49, PASS = 70;
+static const double TIME_FULL_S = 600, TIME_NONE_S = 1200;
+
+static void judge_segments(const sonde_judge *judge, const sonde_case *truth, sonde_score *score) {
+  score->segment_count = judge->map.segment_count;
+  for (uint32_t i = 0; i < score->segment_count; ++i) {
+    sonde_segment_status status = sonde_judge_segment(judge, i);
+    sonde_segment_verdict *v = &score->segment[i];
+    const sonde_segment *segment = &judge->map.segment[i];
+    *v = (sonde_segment_verdict){.needed = status.needed,
+                                 .decision = status.decision,
+                                 .from_m = segment->from_m,
+                                 .to_m = segment->to_m,
+                                 .points = status.points,
+                                 .done = status.done};
+    memcpy(v->name, segment->name, sizeof v->name);
+    for (uint32_t k = 0; k < truth->truth_count; ++k)
+      if (strcmp(truth->truth_segment[k], v->name) == 0) v->truth = truth->truth[k];
+    v->correct = v->decision != SONDE_DECISION_NONE && v->decision == v->truth;
+    bool clot = v->decision == SONDE_DECISION_CLOT;
+    v->supported = clot ? judge->open[i] > 0 : judge->complete[i] > 0;
+  }
+}
+
+// One segment with a clot makes a thrombosis; its absence takes all segments of the plan.
+static void overall(const sonde_case *truth, sonde_score *score) {
+  bool all = true;
+  for (uint32_t i = 0; i < score->segment_count; ++i) {
+    const sonde_segment_verdict *v = &score->segment[i];
+    score->called_thrombosis |= v->decision == SONDE_DECISION_CLOT;
+    if (v->needed) all &= v->decision == SONDE_DECISION_COMPRESSIBLE;
+  }
+  score->thrombosis = truth->thrombosis;
+  score->answered = score->called_thrombosis || all;
+  score->correct = score->answered && score->called_thrombosis == score->thrombosis;
+}
+
+static double decided(const sonde_score *score) {
+  double sum = 0;
+  uint32_t needed = 0;
+  for (uint32_t i = 0; i < score->segment_count; ++i) {
+    const sonde_segment_verdict *v = &score->segment[i];
+    if (!v->needed) continue;
+    needed++;
+    if (!v->correct || !v->supported) continue;
+    // one open place shows a clot; that there is none takes every place
+    sum += v->decision == SONDE_DECISION_CLOT ? 1 : (double)v->done / v->points;
+  }
+  return needed ? sum / needed : 0;
+}
+
+// What restraint earns counts only for the vein that was examined: doing nothing earns nothing.
+static void parts(const sonde_judge *judge, sonde_score *score) {
+  const sonde_metrics *m = &score->metrics;
+  const sonde_criteria *c = &judge->plan.criteria;
+  score->decisions = decided(score);
+  score->coverage = m->coverage;
+  score->technique = m->press_count ? m->valid_share : 0;
+  double over = (m->force_p95_n - c->force_high_n) / (c->force_limit_n - c->force_high_n);
+  bool measured = isfinite(m->force_p95_n) && c->force_limit_n > c->force_high_n;
+  double gentle = measured ? clamp(1 - over, 0, 1) : 1;
+  if (m->force_peak_n > c->force_limit_n) gentle *= 0.5;
+  score->force = gentle * m->coverage;
+  score->economy =
+      m->coverage * clamp((TIME_NONE_S - m->time_s) / (TIME_NONE_S - TIME_FULL_S), 0, 1);
+}
+
+static void total(sonde_score *score) {
+  score->score = 0;
+#define SONDE_SCORE_ADD(name, weight, text) score->score += (weight)*score->name;
+  SONDE_SCORE_LIST(SONDE_SCORE_ADD)
+#undef SONDE_SCORE_ADD
+  SONDE_ASSERT(score->score >= 0 && score->score <= 100 + 1e-9);
+  if (!score->correct) score->score = fmin(score->score, CAP);
+  score->passed = score->correct && score->score >= PASS;
+}
+
+static void tell(const sonde_case *truth, sonde_score *score) {
+  snprintf(score->truth, sizeof score->truth, "%s", truth->diagnosis);
+  const char *asked = score->called_thrombosis ? "Deep vein thrombosis"
+                      : score->answered        ? "No deep vein thrombosis where examined"
+                                               : "No diagnosis: not every segment was decided";
+  snprintf(score->asked, sizeof score->asked, "%s", asked);
+  const char *verdict =
+      score->passed              ? "Passed"
+      : score->correct           ? "Right diagnosis, but the examination does not support it"
+      : !score->answered         ? "Not passed: no diagnosis"
+      : score->called_thrombosis ? "Not passed: a clot was called that is not there"
+                                 : "Not passed: a clot was missed";
+  snprintf(score->summary, sizeof score->summary,
+           "%s. %.0f of 100 points; %u of %u places examined, %u of %u compressions valid.",
+           verdict, score->score, score->metrics.points_done, score->metrics.points,
+           score->metrics.presses[SONDE_PRESS_COMPLETE] + score->metrics.presses[SONDE_PRESS_OPEN],
+           score->metrics.press_count);
+}
+
+void sonde_judge_score(const sonde_judge *judge, const sonde_case *truth, sonde_score *score) {
+  SONDE_ASSERT(judge && truth && score);
+  *score = (sonde_score){.metrics = sonde_judge_metrics(judge)};
+  judge_segments(judge, truth, score);
+  overall(truth, score);
+  parts(judge, score);
+  total(score);
+  tell(truth, score);
+}
+
+// ---- series
+
+void sonde_series_add(sonde_series *series, const sonde_score *score) {
+  series->exams++;
+  series->passed += score->passed;
+  series->score_sum += score->score;
+  series->unanswered += !score->answered;
+  if (score->thrombosis) {
+    if (score->called_thrombosis)
+      series->true_positive++;
+    else
+      series->false_negative++;
+  } else if (score->called_thrombosis) {
+    series->false_positive++;
+  } else if (score->answered) {
+    series->true_negative++;
+  }
+}
+
+static double share(uint32_t part, uint32_t rest) {
+  return part + rest > 0 ? (double)part / (part + rest) : (double)NAN;
+}
+
+double sonde_series_sensitivity(const sonde_series *series) {
+  return share(series->true_positive, series->false_negative);
+}
+
+double sonde_series_specificity(const sonde_series *series) {
+  return share(series->true_negative, series->false_positive);
+}
