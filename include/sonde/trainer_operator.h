@@ -44,7 +44,6 @@ typedef struct sonde_exam_def {
   double limit_s;                   /**< of simulated time; default 1200 */
   bool solid;                       /**< the inside by finite elements, as in real time; default
                                          columns: half the time, ratios within 0.06 */
-  const char *record_path;          /**< NULL: no recording */
   const char *json_path, *csv_path; /**< NULL: not written */
 } sonde_exam_def;
 SONDE_API sonde_exam_def sonde_exam_def_default(void);

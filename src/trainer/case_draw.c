@@ -24,13 +24,13 @@ static uint32_t below(draw *d, uint32_t count) {
   return (uint32_t)(count * sonde_random_uniform(d->seed, d->count++));
 }
 // Files have a tenth of a millimetre, a hundredth of a share.
-static double rounded(double value, double step) { return step * round(value / step); }
+static double rounded(double value, double parts) { return round(value * parts) / parts; }
 
 static void draw_person(draw *d, sonde_case *c) {
   c->thigh = SONDE_CASE_GENERATED;
   c->seed = d->seed & UINT32_MAX;
   c->known.sex = below(d, 2) ? SONDE_SEX_FEMALE : SONDE_SEX_MALE;
-  double fat_mm = rounded(c->level == SONDE_CASE_HARD ? uniform(d, 6, 11) : uniform(d, 5, 8), 0.1);
+  double fat_mm = rounded(c->level == SONDE_CASE_HARD ? uniform(d, 6, 11) : uniform(d, 5, 8), 10);
   c->known.fat_front_m = 1e-3 * fat_mm;
   c->known.second_vein = c->level == SONDE_CASE_HARD && below(d, 4) == 0;
   if (c->level == SONDE_CASE_HARD && below(d, 4) == 0)
@@ -47,12 +47,12 @@ static void draw_clot(draw *d, sonde_case *c) {
   uint32_t from = below(d, SEGMENT_COUNT + 1 - length), to = from + length - 1;
   sonde_status status = sonde_pathology_preset(STAGE[stage], &c->pathology, NULL);
   SONDE_ASSERT(status == SONDE_OK && to < SEGMENT_COUNT);
-  c->webs = stage == 2 ? rounded(uniform(d, 0.3, 0.9), 0.01) : 0;
+  c->webs = stage == 2 ? rounded(uniform(d, 0.3, 0.9), 100) : 0;
   c->extent.whole = false;
   snprintf(c->extent.from.segment, sizeof c->extent.from.segment, "%s", SEGMENTS[from]);
   snprintf(c->extent.to.segment, sizeof c->extent.to.segment, "%s", SEGMENTS[to]);
-  c->extent.from.share = rounded(uniform(d, 0, 0.15), 0.01);
-  c->extent.to.share = rounded(uniform(d, 0.85, 1), 0.01);
+  c->extent.from.share = rounded(uniform(d, 0, 0.15), 100);
+  c->extent.to.share = rounded(uniform(d, 0.85, 1), 100);
   for (uint32_t i = from; i <= to; ++i) c->truth[i] = SONDE_DECISION_CLOT;
   c->thrombosis = true;
   static const char *const WORD[] = {"Acute", "Subacute", "Chronic", "Partial (mural)"};
@@ -75,8 +75,8 @@ static void draw_lookalike(draw *d, sonde_case *c) {
   sonde_case_lesion *lesion = &c->lesion[c->lesion_count++];
   bool cyst = kind == 1;
   *lesion = (sonde_case_lesion){.kind = cyst ? SONDE_LESION_CYST : SONDE_LESION_NODE,
-                                .across_m = 1e-3 * rounded(uniform(d, 14, 18), 0.1),
-                                .depth_m = 1e-3 * rounded(uniform(d, 10, 14), 0.1),
+                                .across_m = 1e-3 * rounded(uniform(d, 14, 18), 10),
+                                .depth_m = 1e-3 * rounded(uniform(d, 10, 14), 10),
                                 .half_m = {0.004, 0.006, 0.009},
                                 .echogenicity = cyst ? 0 : 0.25};
   snprintf(lesion->station.segment, sizeof lesion->station.segment, "%s", SEGMENTS[cyst ? 4 : 0]);

@@ -297,6 +297,9 @@ static void read_case(sonde_reader *reader, sonde_case *c) {
     sonde_reader_fail(reader, sonde_read_find(reader, root, "sonde_case"), SONDE_VERSION,
                       "case of version %g, expected %d", version, SONDE_CASE_VERSION);
   sonde_read_member(reader, root, "id", true, c->id, sizeof c->id);
+  sonde_error error = {0};
+  if (sonde_reader_good(reader) && check_id(c->id, &error))
+    sonde_reader_pass(reader, sonde_read_find(reader, root, "id"), &error);
   sonde_read_member(reader, root, "title", true, c->title, sizeof c->title);
   c->level = (sonde_case_level)sonde_read_choice(reader, root, "level", sonde_case_levels, 0);
   sonde_read_member(reader, root, "history", true, c->history, sizeof c->history);
@@ -307,7 +310,6 @@ static void read_case(sonde_reader *reader, sonde_case *c) {
   read_findings(reader, root, c);
   read_criteria(reader, root, &c->criteria);
   read_truth(reader, root, c);
-  sonde_error error = {0};
   if (sonde_reader_good(reader) && sonde_case_check(c, &error))
     sonde_reader_pass(reader, sonde_read_find(reader, root, "truth"), &error);
 }

@@ -1,69 +1,146 @@
-// A whole exam without a person: session, operator and judge in lockstep.
-// open_session:  a session of the case with the operator's hand, made for speed.
-// examine:       ticks until the operator is done.
-// conclude:      decisions, score, files.
+// A whole exam without a person: world, inside, operator and judge in lockstep. No picture is made:
+// the operator reads the figures that a session's snapshot holds.
+// open_rig:     the thigh, the probe and the inside, made for speed.
+// tilt:         between a vessel and the normal of the image plane.
+// look:         a snapshot; the inside is worked out only under a pressing probe.
+// step:         one tick: hand, world.
+// examine:      ticks until the operator is done.
+// conclude:     decisions, score, files.
 #include "trainer/trainer.h"
 
-#include "exam/session.h"
-
-// Steps of 4 ms change forces by less than 2 % against 1 ms (docs/trainer.md); 21 looks per second.
-static const double STEP_S = 0.004;
+// 21 looks per second. A force beyond FORCE_MAX_N is no hand's: the inside is not asked then.
+static const double STEP_S = 0.004, FORCE_MAX_N = 150;
 enum { TICKS_PER_LOOK = 12, LOOKS_PER_REPORT = 20 };
 
-typedef struct run {
+typedef struct rig {
   const sonde_exam_def *def;
   const sonde_case_setup *setup;
   sonde_plan plan;
-  sonde_session *session;
+  sonde_probe probe;
+  sonde_state *state;
+  sonde_interior *interior;
+  sonde_device hand;
+  sonde_device_sample sample;
   sonde_operator *op;
   sonde_judge *judge;
-} run;
+  uint64_t tick, looked_tick; // of the last look at the inside
+  bool looked;
+} rig;
 
 sonde_exam_def sonde_exam_def_default(void) {
   return (sonde_exam_def){.operator_name = "expert", .seed = 1, .limit_s = 1200};
 }
 
-static sonde_status open_session(run *r, sonde_device *hand, sonde_error *error) {
-  static const char *const PROBES[] = {"linear", NULL};
-  sonde_session_def def = sonde_session_def_default();
-  def.world.dt_s = STEP_S;
-  def.world.pcg.absolute_residual = 1e-3 * STEP_S; // 1 mN
-  def.probe_names = PROBES;
-  def.image_width = def.image_height = 16; // nobody looks at them
-  def.ticks_per_image = TICKS_PER_LOOK;
-  def.record_path = r->def->record_path;
-  def.model_path = r->def->patient->id;
-  sonde_case_session(r->setup, &def);
-  sonde_status status = sonde_session_create(&def, hand, &r->session, error);
-  if (!status && !r->def->solid)
-    sonde_interior_set_method(r->session->interior, SONDE_INTERIOR_COLUMNS);
+static sonde_status open_rig(rig *r, sonde_error *error) {
+  sonde_world_def world = sonde_session_def_default().world;
+  world.dt_s = STEP_S;
+  world.pcg.absolute_residual = 1e-3 * STEP_S; // 1 mN
+  const sonde_case *patient = r->def->patient;
+  const sonde_vein_map *map = &r->setup->map;
+  sonde_status status = sonde_plan_make(r->def->protocol, map, &patient->criteria, &r->plan, error);
+  if (!status) status = sonde_judge_create(map, &r->plan, &r->judge, error);
+  if (!status)
+    status = sonde_operator_create(r->def->operator_name, r->def->seed, map, &r->plan, STEP_S,
+                                   &r->op, &r->hand, error);
+  if (!status) status = sonde_probe_create("linear", &r->probe, error);
+  if (!status) status = sonde_state_create(r->setup->model, &world, &r->state, error);
+  if (!status) status = sonde_interior_create(r->setup->model, &r->interior, error);
+  if (!status && !r->def->solid) sonde_interior_set_method(r->interior, SONDE_INTERIOR_COLUMNS);
   return status;
 }
 
-static sonde_status examine(run *r, const sonde_progress *progress, sonde_error *error) {
-  sonde_frame frame;
+static void close_rig(rig *r) {
+  sonde_interior_destroy(r->interior);
+  sonde_state_destroy(r->state);
+  sonde_probe_clear(&r->probe);
+  if (r->hand.destroy) r->hand.destroy(r->hand.self);
+  sonde_operator_destroy(r->op);
+  sonde_judge_destroy(r->judge);
+}
+
+static double tilt(sonde_pose pose, sonde_vec3 axis) {
+  return acos(fmin(1, fabs(v_dot(q_rotate(pose.rotation, vec3(0, 1, 0)), axis))));
+}
+
+static void look_inside(rig *r, sonde_snapshot *s) {
+  sonde_pathology pathology = r->setup->pathology;
+  sonde_circulation_apply(&r->setup->circulation, r->tick, STEP_S, &pathology);
+  sonde_interior_input input = {.positions_m = sonde_state_positions(r->state),
+                                .contact_forces_n = sonde_state_contact_forces(r->state),
+                                .world_from_probe = s->world_from_probe,
+                                .pathology = &pathology,
+                                .dt_s =
+                                    r->looked ? (double)(r->tick - r->looked_tick) * STEP_S : -1,
+                                .tick = r->tick,
+                                .face_half_x_m = r->probe.half_x_m,
+                                .face_half_y_m = r->probe.half_y_m};
+  sonde_interior_update(r->interior, &input);
+  r->looked_tick = r->tick;
+  r->looked = true;
+  sonde_vessel_state vein, artery;
+  if (sonde_interior_vessel_at_plane(r->interior, 0, s->world_from_probe, &vein)) {
+    s->vein_area_ratio = vein.area_ratio;
+    s->vein_short_m = 2 * vein.half_short_m;
+    s->vein_rest_m = vein.rest_centre_m;
+    s->vein_tilt_rad = tilt(s->world_from_probe, vein.axis);
+  }
+  if (sonde_interior_vessel_at_plane(r->interior, 1, s->world_from_probe, &artery))
+    s->artery_area_ratio = artery.area_ratio;
+}
+
+static sonde_snapshot look(rig *r) {
+  const double nan_m = (double)NAN;
+  const sonde_contact *contact = sonde_state_contact(r->state);
+  sonde_pose pose = r->sample.world_from_probe;
+  sonde_snapshot s = {.tick = r->tick,
+                      .time_s = (double)r->tick * STEP_S,
+                      .world_from_probe = pose,
+                      .force_n = contact->force_n,
+                      .force_normal_n =
+                          -v_dot(contact->force_n, q_rotate(pose.rotation, vec3(0, 0, 1))),
+                      .penetration_m = nan_m,
+                      .vein_area_ratio = nan_m,
+                      .artery_area_ratio = nan_m,
+                      .vein_short_m = nan_m,
+                      .vein_rest_m = {nan_m, nan_m, nan_m},
+                      .vein_tilt_rad = nan_m};
+  if (s.force_normal_n > 0.5)
+    look_inside(r, &s);
+  else
+    r->looked = false;
+  return s;
+}
+
+static void step(rig *r) {
+  r->hand.read(r->hand.self, r->tick, &r->sample);
+  sonde_step(r->state, &r->probe, r->sample.world_from_probe);
+  r->tick++;
+}
+
+static sonde_status examine(rig *r, const sonde_progress *progress, sonde_error *error) {
   for (uint64_t looks = 0; !sonde_operator_done(r->op);) {
-    sonde_session_tick(r->session);
-    if (!sonde_session_frame(r->session, &frame)) continue;
-    double time_s = frame.snapshot.time_s;
-    if (!sonde_judge_feed(r->judge, &frame.snapshot)) return sonde_fail_memory(error);
-    sonde_operator_see(r->op, &frame.snapshot);
-    if (time_s > r->def->limit_s)
+    step(r);
+    if (r->tick % TICKS_PER_LOOK != 0) continue;
+    sonde_snapshot s = look(r);
+    if (!sonde_judge_feed(r->judge, &s)) return sonde_fail_memory(error);
+    sonde_operator_see(r->op, &s);
+    if (s.time_s > r->def->limit_s)
       return sonde_fail(error, SONDE_CONVERGENCE, "the %s found no end in %.0f s",
                         r->def->operator_name, r->def->limit_s);
+    if (++looks % LOOKS_PER_REPORT != 0) continue;
     sonde_metrics m = sonde_judge_metrics(r->judge);
     double share = m.points ? (double)m.points_done / m.points : 0;
-    if (++looks % LOOKS_PER_REPORT == 0 &&
-        !sonde_progress_report(progress, share, r->def->patient->id))
-      return sonde_fail(error, SONDE_CANCELLED, "cancelled at %.0f s", time_s);
+    if (!sonde_progress_report(progress, share, r->def->patient->id))
+      return sonde_fail(error, SONDE_CANCELLED, "cancelled at %.0f s", s.time_s);
   }
   return sonde_judge_finish(r->judge) ? SONDE_OK : sonde_fail_memory(error);
 }
 
-static sonde_status conclude(run *r, sonde_score *score, sonde_error *error) {
+static sonde_status conclude(rig *r, sonde_score *score, sonde_error *error) {
   for (uint32_t i = 0; i < r->setup->map.segment_count; ++i) {
     if (!sonde_judge_segment(r->judge, i).needed) continue;
-    sonde_status status = sonde_judge_decide(r->judge, i, sonde_operator_decision(r->op, i), error);
+    sonde_decision decision = sonde_operator_decision(r->op, i);
+    sonde_status status = sonde_judge_decide(r->judge, i, decision, error);
     if (status) return status;
   }
   sonde_judge_score(r->judge, r->def->patient, score);
@@ -73,34 +150,18 @@ static sonde_status conclude(run *r, sonde_score *score, sonde_error *error) {
                           r->def->csv_path, error);
 }
 
-static sonde_status prepare(run *r, sonde_device *hand, sonde_error *error) {
-  const sonde_case *patient = r->def->patient;
-  sonde_status status =
-      sonde_plan_make(r->def->protocol, &r->setup->map, &patient->criteria, &r->plan, error);
-  if (!status) status = sonde_judge_create(&r->setup->map, &r->plan, &r->judge, error);
-  if (!status)
-    status = sonde_operator_create(r->def->operator_name, r->def->seed, &r->setup->map, &r->plan,
-                                   STEP_S, &r->op, hand, error);
-  if (!status) status = open_session(r, hand, error);
-  return status;
-}
-
 sonde_status sonde_exam_run(const sonde_exam_def *def, const sonde_case_setup *setup,
                             const sonde_progress *progress, sonde_score *score,
                             sonde_error *error) {
   SONDE_ASSERT(def && def->patient && def->protocol && score);
   sonde_case_setup own = {0};
-  run r = {.def = def, .setup = setup ? setup : &own};
-  sonde_device hand = {0};
+  rig r = {.def = def, .setup = setup ? setup : &own};
   sonde_status status = SONDE_OK;
   if (!setup) status = sonde_case_build(def->patient, def->bundled, def->directory, &own, error);
-  if (!status) status = prepare(&r, &hand, error);
+  if (!status) status = open_rig(&r, error);
   if (!status) status = examine(&r, progress, error);
   if (!status) status = conclude(&r, score, error);
-  sonde_status closed = sonde_session_destroy(r.session, status ? NULL : error);
-  if (hand.destroy) hand.destroy(hand.self);
-  sonde_operator_destroy(r.op);
-  sonde_judge_destroy(r.judge);
+  close_rig(&r);
   sonde_case_setup_clear(&own);
-  return status ? status : closed;
+  return status;
 }

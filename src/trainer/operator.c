@@ -33,14 +33,14 @@ static const habit HABIT[] = {
      .across_m = 0.0015,
      .twist_rad = 0.045,
      .approach_m_s = 0.03,
-     .press_m_s = 0.010,
+     .press_m_s = 0.012,
      .travel_m_s = 0.08,
      .closed_ratio = 0.08,
      .open_ratio = 0.33,
      .artery_ratio = 0.66,
      .pause_s = 0.2,
      .wander_m = 0,
-     .attempts = 3,
+     .attempts = 2,
      .confirm = true},
     {.name = "novice",
      .skip = 0.5,
@@ -88,7 +88,7 @@ static const habit HABIT[] = {
 };
 static const char *const NAMES[] = {"expert", "novice", "timid", "forceful", NULL};
 
-static const double LIFT_M = 0.006, DEEPEST_M = 0.060, TOUCH_N = 3, HOLD_S = 0.2;
+static const double LIFT_M = 0.006, DEEPEST_M = 0.060, TOUCH_N = 6, HOLD_S = 0.2;
 static const double NEAR_LIMIT = 0.95, CALL_FORCE_N = 8, RELEASE_M_S = 0.08;
 
 typedef enum phase { TRAVEL, PRESS, HOLD, RELEASE, DONE } phase;

@@ -1,0 +1,266 @@
+// Case files: every mistake is named with its line, what ships is good, what is drawn is good, the
+// truth must fit, and writing and reading agree.
+#include "trainer_test.h"
+
+static const char GOOD[] = "sonde_case: 1\n"
+                           "id: one\n"
+                           "title: One\n"
+                           "level: easy\n"
+                           "history: >\n"
+                           "  Two lines of\n"
+                           "  history.\n"
+                           "thigh: {seed: 3, fat-front-mm: 6}\n"
+                           "circulation: {posture: sitting}\n"
+                           "vein:\n"
+                           "  stage: acute_occlusive\n"
+                           "  from: {segment: femoral_mid, share: 0.1}\n"
+                           "  to: {segment: femoral_mid, share: 0.9}\n"
+                           "truth:\n"
+                           "  thrombosis: true\n"
+                           "  diagnosis: A clot\n"
+                           "  segments: {common_femoral: compressible, femoral_proximal: "
+                           "compressible, femoral_mid: clot, femoral_distal: compressible, "
+                           "popliteal_near: compressible}\n";
+
+// The good text with one piece replaced.
+static char *changed(const char *from, const char *to) {
+  static char text[4096];
+  const char *at = strstr(GOOD, from);
+  assert_non_null(at);
+  snprintf(text, sizeof text, "%.*s%s%s", (int)(at - GOOD), GOOD, to, at + strlen(from));
+  return text;
+}
+
+static void a_case_is_read(void **state) {
+  (void)state;
+  sonde_case c;
+  sonde_error error = {0};
+  if (sonde_case_parse(GOOD, "one.yaml", &c, &error)) fail_msg("%s", error.message);
+  assert_string_equal(c.history, "Two lines of history.");
+  assert_int_equal(c.thigh, SONDE_CASE_GENERATED);
+  assert_int_equal(c.seed, 3);
+  assert_near(c.known.fat_front_m, 0.006, 1e-15);
+  assert_true(isnan(c.known.length_m));
+  assert_int_equal(c.circulation.posture, SONDE_POSTURE_SITTING);
+  assert_string_equal(c.pathology.name, "acute_occlusive");
+  assert_int_equal(c.truth_count, 5);
+  assert_int_equal(c.truth[2], SONDE_DECISION_CLOT);
+}
+
+static void mistakes_are_named_with_their_line(void **state) {
+  (void)state;
+  static const struct {
+    const char *from, *to, *says;
+    int line;
+  } MISTAKE[] = {
+      {"sonde_case: 1", "sonde_case: 7", "version 7", 1},
+      {"id: one", "id: One", "'O'", 2},
+      {"id: one\n", "", "id is missing", 1},
+      {"title: One", "titel: One", "unknown key 'titel'", 3},
+      {"level: easy", "level: simple", "first, easy, hard", 4},
+      {"thigh: {seed: 3, fat-front-mm: 6}", "thigh: small", "expected bundled", 8},
+      {"fat-front-mm: 6", "fat-front-mm: 600", "from 2 to 60", 8},
+      {"seed: 3", "seed: -3", "seed must be", 8},
+      {"sitting", "lying", "supine, sitting, standing", 9},
+      {"stage: acute_occlusive", "stage: odd", "odd", 11},
+      {"share: 0.1", "share: 1.1", "from 0 to 1", 12},
+      {"  from: {segment: femoral_mid, share: 0.1}\n", "", "both from and to", 11},
+      {"thrombosis: true", "thrombosis: perhaps", "false, true", 15},
+      {"thrombosis: true", "thrombosis: false", "a segment is clot", 15},
+      {"femoral_mid: clot", "femoral_mid: open", "compressible, clot", 17},
+      {"femoral_mid: clot", "femoral_middle: clot", "unknown key", 17},
+      {"title: One", "title: [", "not YAML", 5},
+  };
+  for (size_t i = 0; i < SONDE_COUNT_OF(MISTAKE); ++i) {
+    sonde_case c;
+    sonde_error error = {0};
+    const char *text = changed(MISTAKE[i].from, MISTAKE[i].to);
+    if (!sonde_case_parse(text, "one.yaml", &c, &error)) fail_msg("accepted: %s", MISTAKE[i].to);
+    char place[32];
+    snprintf(place, sizeof place, "one.yaml:%d:", MISTAKE[i].line);
+    if (!strstr(error.message, MISTAKE[i].says) ||
+        strncmp(error.message, place, strlen(place)) != 0)
+      fail_msg("'%s' says: %s (expected %s %s)", MISTAKE[i].to, error.message, place,
+               MISTAKE[i].says);
+  }
+}
+
+static sonde_status build(const sonde_case *c, sonde_case_setup *setup, sonde_error *error) {
+  return sonde_case_build(c, NULL, NULL, setup, error);
+}
+
+// The clot lies where the file says; moved truth, moved clot and a clot beyond the leg are refused.
+static void the_truth_must_fit(void **state) {
+  (void)state;
+  sonde_case c, bad;
+  sonde_case_setup setup;
+  sonde_error error = {0};
+  assert_int_equal(sonde_case_parse(GOOD, "one.yaml", &c, NULL), SONDE_OK);
+  if (build(&c, &setup, &error)) fail_msg("%s", error.message);
+  uint32_t mid = sonde_vein_segment(&setup.map, "femoral_mid");
+  assert_true(setup.pathology.thrombus_from_m > setup.map.segment[mid].from_m);
+  assert_true(setup.pathology.thrombus_to_m < setup.map.segment[mid].to_m);
+  double supine_pa = 10 * SONDE_PA_PER_MMHG;
+  assert_true(setup.pathology.venous_pressure_pa > 2 * supine_pa);
+  sonde_case_setup_clear(&setup);
+  bad = c;
+  bad.truth[1] = SONDE_DECISION_CLOT;
+  assert_int_equal(build(&bad, &setup, &error), SONDE_MISMATCH);
+  assert_non_null(strstr(error.message, "femoral_proximal clot"));
+  assert_null(setup.model);
+  bad = c;
+  snprintf(bad.extent.to.segment, sizeof bad.extent.to.segment, "femoral_distal");
+  assert_int_equal(build(&bad, &setup, &error), SONDE_MISMATCH);
+  assert_non_null(strstr(error.message, "femoral_distal compressible"));
+  bad = c;
+  bad.extent.to.shift_m = 0.5;
+  assert_int_equal(build(&bad, &setup, &error), SONDE_ARGUMENT);
+  bad = c;
+  bad.truth_count = 4;
+  assert_int_equal(build(&bad, &setup, &error), SONDE_MISMATCH);
+  assert_non_null(strstr(error.message, "misses"));
+  bad = c;
+  bad.thigh = SONDE_CASE_BUNDLED;
+  assert_int_equal(build(&bad, &setup, &error), SONDE_NOT_FOUND);
+}
+
+// Lesions lie where the vein and the skin are; a branch has to be there.
+static void findings_are_placed(void **state) {
+  (void)state;
+  sonde_case c;
+  sonde_case_setup setup;
+  sonde_error error = {0};
+  assert_int_equal(sonde_case_parse(GOOD, "one.yaml", &c, NULL), SONDE_OK);
+  c.lesion_count = 1;
+  c.lesion[0] = (sonde_case_lesion){.kind = SONDE_LESION_NODE,
+                                    .station = {.segment = "common_femoral", .share = 0.5},
+                                    .depth_m = 0.012,
+                                    .half_m = {0.004, 0.005, 0.008}};
+  c.branch_count = 1;
+  c.branch[0].extent.whole = true;
+  snprintf(c.branch[0].branch, sizeof c.branch[0].branch, "great_saphenous");
+  if (build(&c, &setup, &error)) fail_msg("%s", error.message);
+  const sonde_lesion *lesion = &setup.findings.lesion[0];
+  double along = sonde_vein_along(&setup.map, lesion->centre_m.z);
+  sonde_vein_point p = sonde_vein_at(&setup.map, along);
+  assert_near(v_distance(lesion->centre_m, p.skin_m), 0.012, 0.001);
+  assert_true(v_distance(lesion->centre_m, p.vein_m) < p.depth_m);
+  assert_int_equal(setup.findings.branch_count, 1);
+  sonde_case_setup_clear(&setup);
+  snprintf(c.branch[0].branch, sizeof c.branch[0].branch, "jugular");
+  assert_int_equal(build(&c, &setup, &error), SONDE_NOT_FOUND);
+  assert_non_null(strstr(error.message, "jugular"));
+}
+
+// The probe's place above every point of the vein looks at the vein.
+static void the_map_looks_at_the_vein(void **state) {
+  (void)state;
+  sonde_case c;
+  sonde_case_setup setup;
+  assert_int_equal(sonde_case_parse(GOOD, "one.yaml", &c, NULL), SONDE_OK);
+  assert_int_equal(build(&c, &setup, NULL), SONDE_OK);
+  const sonde_vein_map *map = &setup.map;
+  for (uint32_t k = 0; k < map->point_count; ++k) {
+    const sonde_vein_point *p = &map->point[k];
+    sonde_vec3 beam = v_madd(p->skin_m, -p->depth_m, p->normal);
+    assert_true(v_distance(beam, p->vein_m) < 1e-6);
+    assert_near(v_dot(p->normal, p->across), 0, 1e-9);
+    assert_near(v_norm(p->across), 1, 1e-9);
+    assert_near(sonde_vein_along(map, p->z_m), p->along_m, 1e-9);
+    assert_true(p->depth_m > 0.008 && p->depth_m < 0.06);
+    if (k > 0) assert_true(v_dot(p->across, map->point[k - 1].across) > 0.9);
+  }
+  for (uint32_t i = 1; i < map->segment_count; ++i)
+    assert_near(map->segment[i].from_m, map->segment[i - 1].to_m, 1e-9);
+  sonde_case_setup_clear(&setup);
+}
+
+static void same_case(const sonde_case *a, const sonde_case *b) {
+  assert_string_equal(a->id, b->id);
+  assert_string_equal(a->history, b->history);
+  assert_string_equal(a->note, b->note);
+  assert_string_equal(a->diagnosis, b->diagnosis);
+  assert_true(a->level == b->level && a->thigh == b->thigh && a->seed == b->seed);
+  assert_near(a->pathology.thrombus_modulus_pa, b->pathology.thrombus_modulus_pa, 1e-9);
+  assert_true(a->pathology.thrombus_fraction == b->pathology.thrombus_fraction);
+  assert_true(a->extent.whole == b->extent.whole && a->extent.from.share == b->extent.from.share);
+  assert_string_equal(a->extent.to.segment, b->extent.to.segment);
+  assert_true(a->circulation.posture == b->circulation.posture);
+  assert_near(a->circulation.breath_pa, b->circulation.breath_pa, 1e-9);
+  assert_true(a->webs == b->webs && a->oedema == b->oedema);
+  assert_true(a->thrombosis == b->thrombosis && a->truth_count == b->truth_count);
+  assert_memory_equal(a->truth, b->truth, a->truth_count * sizeof a->truth[0]);
+  assert_true(a->lesion_count == b->lesion_count && a->branch_count == b->branch_count);
+  for (uint32_t i = 0; i < a->lesion_count; ++i) {
+    assert_near(a->lesion[i].depth_m, b->lesion[i].depth_m, 1e-12);
+    assert_near(a->lesion[i].half_m.z, b->lesion[i].half_m.z, 1e-12);
+  }
+  assert_int_equal(a->look_alike_count, b->look_alike_count);
+}
+
+static void save_and_load_again(const sonde_case *c) {
+  sonde_case back;
+  sonde_error error = {0};
+  if (sonde_case_save(c, "trainer_case.yaml", &error)) fail_msg("%s", error.message);
+  if (sonde_case_load("trainer_case.yaml", &back, &error)) fail_msg("%s", error.message);
+  same_case(c, &back);
+  unlink("trainer_case.yaml");
+}
+
+static void drawn_cases_are_good(void **state) {
+  (void)state;
+  uint32_t sick = 0, count = 0;
+  for (uint64_t seed = 1; seed <= 40; ++seed)
+    for (int level = 0; level < 3; ++level) {
+      sonde_case c, again;
+      sonde_case_generate(seed, (sonde_case_level)level, &c);
+      sonde_case_generate(seed, (sonde_case_level)level, &again);
+      same_case(&c, &again);
+      save_and_load_again(&c);
+      sick += c.thrombosis;
+      count++;
+      if (seed > 4) continue;
+      sonde_case_setup setup;
+      sonde_error error = {0};
+      if (build(&c, &setup, &error)) fail_msg("%s", error.message);
+      sonde_case_setup_clear(&setup);
+    }
+  assert_true(sick > count / 4 && sick < 3 * count / 4);
+}
+
+// Those of a generated thigh are built too; the bundled thigh belongs to another test.
+static void the_cases_that_ship_are_good(void **state) {
+  (void)state;
+  sonde_case *cases;
+  uint32_t count, sick = 0;
+  sonde_error error = {0};
+  if (sonde_case_list(SONDE_SOURCE_DIR "/data/cases", &cases, &count, &error))
+    fail_msg("%s", error.message);
+  assert_true(count >= 12);
+  for (uint32_t i = 0; i < count; ++i) {
+    save_and_load_again(&cases[i]);
+    sick += cases[i].thrombosis;
+    assert_true(strlen(cases[i].history) > 40 && strlen(cases[i].note) > 40);
+    if (i > 0) assert_true(cases[i].level >= cases[i - 1].level);
+    if (cases[i].thigh != SONDE_CASE_GENERATED) continue;
+    sonde_case_setup setup;
+    if (build(&cases[i], &setup, &error)) fail_msg("%s", error.message);
+    sonde_case_setup_clear(&setup);
+  }
+  assert_true(sick >= 4 && count - sick >= 4);
+  sonde_free(cases);
+  assert_int_equal(sonde_case_list("/nonexistent", &cases, &count, &error), SONDE_IO);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(a_case_is_read),
+      cmocka_unit_test(mistakes_are_named_with_their_line),
+      cmocka_unit_test(the_truth_must_fit),
+      cmocka_unit_test(findings_are_placed),
+      cmocka_unit_test(the_map_looks_at_the_vein),
+      cmocka_unit_test(drawn_cases_are_good),
+      cmocka_unit_test(the_cases_that_ship_are_good),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}

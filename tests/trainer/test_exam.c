@@ -1,0 +1,79 @@
+// One exam of two places on a generated thigh, in lockstep: the expert finds the clot, the novice
+// does not pass, and the same exam again is the same to the last bit.
+#include "trainer_test.h"
+
+static sonde_case patient(bool sick) {
+  sonde_case c = truth_of(sick ? 2 : 0);
+  c.thigh = SONDE_CASE_GENERATED;
+  c.seed = 3;
+  c.known.fat_front_m = 0.006;
+  c.criteria = (sonde_case_criteria){18, 36, 42};
+  if (!sick) return c;
+  assert_int_equal(sonde_pathology_preset("acute", &c.pathology, NULL), SONDE_OK);
+  c.extent = (sonde_case_extent){.from = {.segment = "femoral_proximal"},
+                                 .to = {.segment = "femoral_proximal", .share = 1}};
+  return c;
+}
+
+static sonde_score examine(const sonde_case *c, const sonde_case_setup *setup, const char *name) {
+  sonde_exam_protocol protocol = protocol_of(
+      "{sonde_protocol: 1, id: two, title: Two, text: Two, places: [{title: A, text: a, "
+      "at: {segment: common_femoral, share: 0.6}}, {title: B, text: b, at: {segment: "
+      "femoral_proximal, share: 0.5}}]}");
+  sonde_exam_def def = sonde_exam_def_default();
+  def.patient = c;
+  def.protocol = &protocol;
+  def.operator_name = name;
+  sonde_score score;
+  sonde_error error = {0};
+  if (sonde_exam_run(&def, setup, NULL, &score, &error)) fail_msg("%s", error.message);
+  return score;
+}
+
+static void expert_and_novice(void **state) {
+  (void)state;
+  sonde_case sick = patient(true);
+  sonde_case_setup setup;
+  sonde_error error = {0};
+  if (sonde_case_build(&sick, NULL, NULL, &setup, &error)) fail_msg("%s", error.message);
+  sonde_score expert = examine(&sick, &setup, "expert"), novice = examine(&sick, &setup, "novice");
+  assert_true(expert.passed && expert.score >= 90);
+  assert_int_equal(expert.segment[0].decision, SONDE_DECISION_COMPRESSIBLE);
+  assert_int_equal(expert.segment[1].decision, SONDE_DECISION_CLOT);
+  assert_true(!novice.passed && novice.score <= 60);
+  sonde_score again = examine(&sick, &setup, "novice");
+  assert_memory_equal(&again.metrics, &novice.metrics, sizeof again.metrics);
+  sonde_case_setup_clear(&setup);
+}
+
+static bool cancel(double fraction, const char *what, void *user) {
+  (void)fraction;
+  (void)what;
+  (void)user;
+  return false;
+}
+
+static void an_exam_can_be_cancelled(void **state) {
+  (void)state;
+  sonde_case healthy = patient(false);
+  sonde_exam_protocol protocol = every_20_mm();
+  sonde_exam_def def = sonde_exam_def_default();
+  def.patient = &healthy;
+  def.protocol = &protocol;
+  sonde_progress progress = {cancel, NULL};
+  sonde_score score;
+  assert_int_equal(sonde_exam_run(&def, NULL, &progress, &score, NULL), SONDE_CANCELLED);
+  def.operator_name = "nobody";
+  assert_int_equal(sonde_exam_run(&def, NULL, NULL, &score, NULL), SONDE_NOT_FOUND);
+  def.operator_name = "expert";
+  def.limit_s = 0.5;
+  assert_int_equal(sonde_exam_run(&def, NULL, NULL, &score, NULL), SONDE_CONVERGENCE);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(expert_and_novice),
+      cmocka_unit_test(an_exam_can_be_cancelled),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,323 @@
+// The judge: what a press is, that the order and the rate of the snapshots do not matter, that
+// coverage adds up, and that memory is bounded.
+#include "trainer_test.h"
+
+static sonde_press_result result_of(test_press p) {
+  sonde_vein_map map = straight_map();
+  sonde_exam_protocol protocol = every_20_mm();
+  sonde_plan plan = plan_of(&protocol, &map);
+  sonde_judge *judge = judge_of(&plan);
+  feed_press(judge, &p, 0, 0.03);
+  uint32_t count;
+  const sonde_compression *presses = sonde_judge_compressions(judge, &count);
+  assert_int_equal(count, 1);
+  sonde_press_result result = presses[0].result;
+  sonde_judge_destroy(judge);
+  return result;
+}
+
+static void a_press_is_named(void **state) {
+  (void)state;
+  const double unseen = (double)NAN;
+  assert_int_equal(result_of(closing(0.1)), SONDE_PRESS_COMPLETE);
+  assert_int_equal(result_of(staying_open(0.1)), SONDE_PRESS_OPEN);
+  assert_int_equal(result_of((test_press){0.1, 8, 0.6, 0.92, 0.1}), SONDE_PRESS_INSUFFICIENT);
+  // half closed while the artery deforms: neither closed nor clearly open
+  assert_int_equal(result_of((test_press){0.1, 20, 0.2, 0.66, 0.1}), SONDE_PRESS_INSUFFICIENT);
+  // the vein is still open, but nothing shows that enough was pressed
+  assert_int_equal(result_of((test_press){0.1, 20, 0.8, 0.9, 0.1}), SONDE_PRESS_INSUFFICIENT);
+  assert_int_equal(result_of((test_press){0.1, 22, 0.03, 0.66, 0.6}), SONDE_PRESS_OFF_AXIS);
+  assert_int_equal(result_of((test_press){0.1, 22, unseen, 0.66, 0.1}), SONDE_PRESS_OFF_AXIS);
+  assert_int_equal(result_of((test_press){0.1, 45, 0.01, 0.66, 0.1}), SONDE_PRESS_TOO_HARD);
+  assert_int_equal(result_of((test_press){0.1, 22, 0.01, 0.3, 0.1}), SONDE_PRESS_TOO_HARD);
+  assert_int_equal(result_of((test_press){0.1, 20, 0.8, unseen, 0.1}), SONDE_PRESS_INSUFFICIENT);
+}
+
+static sonde_judge *judged(const test_press *presses, size_t count, const size_t *order,
+                           double step_s) {
+  sonde_vein_map map = straight_map();
+  sonde_exam_protocol protocol = every_20_mm();
+  sonde_plan plan = plan_of(&protocol, &map);
+  sonde_judge *judge = judge_of(&plan);
+  for (size_t i = 0; i < count; ++i)
+    feed_press(judge, &presses[order ? order[i] : i], 3.0 * (double)i, step_s);
+  return judge;
+}
+
+static const double PLACES_M[] = {0.01, 0.031, 0.05, 0.118, 0.13, 0.187};
+enum { PLACES = 6 };
+
+static void the_order_does_not_matter(void **state) {
+  (void)state;
+  test_press presses[PLACES];
+  for (int i = 0; i < PLACES; ++i)
+    presses[i] = i == 3 ? staying_open(PLACES_M[i]) : closing(PLACES_M[i]);
+  const size_t orders[][PLACES] = {{5, 4, 3, 2, 1, 0}, {2, 0, 5, 1, 3, 4}, {3, 5, 1, 0, 4, 2}};
+  sonde_judge *first = judged(presses, PLACES, NULL, 0.03);
+  sonde_metrics m = sonde_judge_metrics(first);
+  assert_true(m.coverage > 0.4 && m.coverage < 0.8);
+  for (size_t k = 0; k < 3; ++k) {
+    sonde_judge *other = judged(presses, PLACES, orders[k], 0.03);
+    sonde_metrics n = sonde_judge_metrics(other);
+    assert_true(n.coverage == m.coverage && n.vein_coverage == m.vein_coverage);
+    assert_true(n.gap_m == m.gap_m && n.points_done == m.points_done);
+    assert_memory_equal(n.presses, m.presses, sizeof m.presses);
+    for (uint32_t i = 0; i < 5; ++i)
+      assert_int_equal(sonde_judge_segment(other, i).open, sonde_judge_segment(first, i).open);
+    sonde_judge_destroy(other);
+  }
+  sonde_judge_destroy(first);
+}
+
+static double coverage_of(const double *places_m, size_t count, double *gap_m) {
+  test_press presses[PLACES];
+  for (size_t i = 0; i < count; ++i) presses[i] = closing(places_m[i]);
+  sonde_judge *judge = judged(presses, count, NULL, 0.03);
+  sonde_metrics m = sonde_judge_metrics(judge);
+  sonde_judge_destroy(judge);
+  if (gap_m) *gap_m = m.gap_m;
+  return m.coverage;
+}
+
+// Apart from each other two presses cover what each covers; twice the same covers no more.
+static void coverage_adds_up(void **state) {
+  (void)state;
+  const double near[] = {0.03}, far[] = {0.15}, both[] = {0.03, 0.15}, twice[] = {0.03, 0.03};
+  double a = coverage_of(near, 1, NULL), b = coverage_of(far, 1, NULL);
+  assert_true(a > 0 && b > 0);
+  assert_near(coverage_of(both, 2, NULL), a + b, 1e-12);
+  assert_true(coverage_of(twice, 2, NULL) == a);
+  const double overlapping[] = {0.03, 0.04};
+  assert_true(coverage_of(overlapping, 2, NULL) < 2 * a);
+}
+
+// With nothing pressed the gap is the whole stretch; a press in its middle halves it at best.
+static void the_gap_shrinks(void **state) {
+  (void)state;
+  double all, halves, shorter;
+  const double middle[] = {0.1}, more[] = {0.1, 0.05};
+  assert_true(coverage_of(NULL, 0, &all) == 0);
+  assert_near(all, 0.2, 1e-9);
+  coverage_of(middle, 1, &halves);
+  coverage_of(more, 2, &shorter);
+  assert_near(2 * halves + 0.025, 0.2, 1e-3);
+  assert_true(shorter <= halves);
+}
+
+// Looked at every 20 ms, every 50 ms or at any irregular times: the same exam.
+static void the_rate_does_not_matter(void **state) {
+  (void)state;
+  test_press presses[PLACES];
+  for (int i = 0; i < PLACES; ++i)
+    presses[i] = i == 2 ? staying_open(PLACES_M[i]) : closing(PLACES_M[i]);
+  sonde_judge *regular = judged(presses, PLACES, NULL, 0.02);
+  sonde_judge *irregular = judged(presses, 0, NULL, 0.02);
+  unsigned noise = 1;
+  for (double t = 0; t < 3.0 * PLACES;) {
+    size_t i = (size_t)(t / 3.0);
+    sonde_snapshot s = press_at(&presses[i], 3.0 * (double)i, t);
+    sonde_judge_feed(irregular, &s);
+    noise = noise * 1664525u + 1013904223u;
+    t += 0.01 + 0.05 * (noise >> 8) / (double)(1u << 24);
+  }
+  sonde_metrics m = sonde_judge_metrics(regular), n = sonde_judge_metrics(irregular);
+  assert_memory_equal(m.presses, n.presses, sizeof m.presses);
+  assert_true(m.coverage == n.coverage && m.gap_m == n.gap_m && m.points_done == n.points_done);
+  assert_near(n.force_p95_n, m.force_p95_n, 0.5);
+  assert_near(n.force_peak_n, m.force_peak_n, 0.7);
+  assert_near(n.completeness, m.completeness, 0.03);
+  assert_near(n.contact_s, m.contact_s, 0.4);
+  assert_near(n.path_m, m.path_m, 0.04 * m.path_m);
+  sonde_judge_destroy(regular);
+  sonde_judge_destroy(irregular);
+}
+
+// The same snapshot again, or an older one, changes nothing; nor does one that is no number.
+static void stale_snapshots_are_ignored(void **state) {
+  (void)state;
+  test_press press = closing(0.1);
+  sonde_judge *once = judged(&press, 1, NULL, 0.03), *again = judged(&press, 0, NULL, 0.03);
+  for (double t = 0; t < 2.4; t += 0.03) {
+    sonde_snapshot s = press_at(&press, 0, t), old = press_at(&press, 0, 0.5 * t), bad = s;
+    bad.force_normal_n = (double)NAN;
+    bad.time_s = t + 0.01;
+    sonde_judge_feed(again, &s);
+    sonde_judge_feed(again, &s);
+    sonde_judge_feed(again, &old);
+    sonde_judge_feed(again, &bad);
+  }
+  sonde_metrics m = sonde_judge_metrics(once), n = sonde_judge_metrics(again);
+  assert_memory_equal(&m, &n, sizeof m);
+  sonde_judge_destroy(once);
+  sonde_judge_destroy(again);
+}
+
+// A hand that trembles around the threshold presses once, not at every tremor.
+static void tremor_is_one_press(void **state) {
+  (void)state;
+  sonde_judge *judge = judged(NULL, 0, NULL, 0.03);
+  test_press press = closing(0.1);
+  for (int i = 0; i < 200; ++i) {
+    sonde_snapshot s = press_at(&press, 0, 1);
+    s.time_s = 0.05 * i;
+    s.force_normal_n = i < 5 || i > 190 ? 0 : 12 + 3 * sin(2.1 * i);
+    sonde_judge_feed(judge, &s);
+  }
+  uint32_t count;
+  sonde_judge_compressions(judge, &count);
+  assert_int_equal(count, 1);
+  sonde_judge_destroy(judge);
+}
+
+static size_t allocations;
+static void *counted(size_t bytes, void *user) {
+  (void)user;
+  allocations++;
+  return malloc(bytes);
+}
+static void released(void *pointer, void *user) {
+  (void)user;
+  free(pointer);
+}
+
+static void memory_is_bounded(void **state) {
+  (void)state;
+  sonde_set_allocator(&(sonde_allocator){counted, released, NULL});
+  sonde_judge *judge = judged(NULL, 0, NULL, 0.03);
+  test_press press = closing(0.1);
+  allocations = 0;
+  for (int i = 0; i < 5000; ++i) { // presses of 0.4 s, seen ten times each
+    for (int k = 0; k < 10; ++k) {
+      sonde_snapshot s = press_at(&press, 0, 0.2 * k);
+      s.time_s = 0.4 * i + 0.04 * k;
+      assert_true(sonde_judge_feed(judge, &s));
+    }
+  }
+  assert_true(sonde_judge_finish(judge));
+  uint32_t count;
+  sonde_judge_compressions(judge, &count);
+  assert_int_equal(count, SONDE_COMPRESSIONS);
+  assert_int_equal(sonde_judge_metrics(judge).press_count, 5000);
+  assert_true(allocations <= 8); // doublings of the list
+  sonde_judge_destroy(judge);
+  sonde_set_allocator(&(sonde_allocator){0});
+}
+
+static void guidance_leads_through_the_plan(void **state) {
+  (void)state;
+  sonde_judge *judge = judged(NULL, 0, NULL, 0.03);
+  sonde_guidance g = sonde_judge_guidance(judge);
+  assert_int_equal(g.point, 0);
+  test_press press = closing(0.07);
+  sonde_snapshot above = press_at(&press, 0, 0);
+  sonde_judge_feed(judge, &above);
+  g = sonde_judge_guidance(judge);
+  assert_near(g.offset_m, 0.06, 1e-9);
+  assert_non_null(strstr(g.text, "60 mm"));
+  assert_non_null(strstr(g.text, "groin"));
+  assert_true(g.angle_ok && g.angle_rad < 1e-6);
+  for (int i = 0; i < 10; ++i) {
+    assert_int_equal(sonde_judge_guidance(judge).point, i);
+    press = closing(0.01 + 0.02 * i);
+    feed_press(judge, &press, 10 + 3.0 * i, 0.03);
+  }
+  g = sonde_judge_guidance(judge);
+  assert_int_equal(g.point, SONDE_PLAN_POINTS);
+  assert_int_equal(g.undecided, 0);
+  assert_int_equal(sonde_judge_decide(judge, 0, SONDE_DECISION_COMPRESSIBLE, NULL), SONDE_OK);
+  assert_int_equal(sonde_judge_guidance(judge).undecided, 1);
+  assert_int_equal(sonde_judge_decide(judge, 5, SONDE_DECISION_CLOT, NULL), SONDE_ARGUMENT);
+  sonde_judge_destroy(judge);
+}
+
+static void hints_are_counted_and_fade(void **state) {
+  (void)state;
+  sonde_judge *judge = judged(NULL, 0, NULL, 0.03);
+  test_press press = closing(0.01);
+  bool showing = true;
+  assert_int_equal(sonde_judge_hints(judge, &showing), 0);
+  assert_false(showing);
+  feed_press(judge, &press, 0, 0.03);
+  sonde_judge_hint(judge);
+  assert_int_equal(sonde_judge_hints(judge, &showing), 1);
+  assert_true(showing);
+  feed_press(judge, &press, 2 + SONDE_HINT_S, 0.03);
+  assert_int_equal(sonde_judge_hints(judge, &showing), 1);
+  assert_false(showing);
+  sonde_judge_destroy(judge);
+}
+
+// At the peak of each kind of press the learner is told what it is.
+static void the_state_follows_the_press(void **state) {
+  (void)state;
+  sonde_judge *judge = judged(NULL, 0, NULL, 0.03);
+  assert_int_equal(sonde_judge_state(judge).state, SONDE_PRESS_STATE_NONE);
+  test_press press = closing(0.1);
+  for (double t = 0; t <= 0.5; t += 0.05) {
+    sonde_snapshot s = press_at(&press, 0, t);
+    sonde_judge_feed(judge, &s);
+  }
+  assert_int_equal(sonde_judge_state(judge).state, SONDE_PRESS_STATE_PRESSING);
+  for (double t = 0.55; t <= 1.01; t += 0.05) {
+    sonde_snapshot s = press_at(&press, 0, t);
+    sonde_judge_feed(judge, &s);
+  }
+  assert_int_equal(sonde_judge_state(judge).state, SONDE_PRESS_STATE_COMPLETE);
+  for (double t = 1.05; t <= 2.2; t += 0.05) {
+    sonde_snapshot s = press_at(&press, 0, t);
+    sonde_judge_feed(judge, &s);
+  }
+  assert_int_equal(sonde_judge_state(judge).state, SONDE_PRESS_STATE_NONE);
+  sonde_judge_destroy(judge);
+}
+
+static sonde_metrics moved(double (*where)(double t), double step_s) {
+  sonde_judge *judge = judged(NULL, 0, NULL, 0.03);
+  test_press press = closing(0.1);
+  for (double t = 0; t < 4; t += step_s) {
+    sonde_snapshot s = press_at(&press, 0, 0);
+    s.time_s = t;
+    s.world_from_probe.position = vec3(0.1, 0, where(t));
+    sonde_judge_feed(judge, &s);
+  }
+  sonde_metrics m = sonde_judge_metrics(judge);
+  sonde_judge_destroy(judge);
+  return m;
+}
+
+static double minimum_jerk(double t) {
+  double x = fmin(t / 3, 1);
+  return 0.1 * x * x * x * (10 - 15 * x + 6 * x * x);
+}
+static double in_steps(double t) { return minimum_jerk(t) + 0.003 * sin(2 * SONDE_PI * 2.5 * t); }
+
+// The smoothest way there is scores higher than a trembling one, which is also longer; a way and
+// back has no length of its own.
+static void path_and_smoothness(void **state) {
+  (void)state;
+  sonde_metrics smooth = moved(minimum_jerk, 0.02), rough = moved(in_steps, 0.02);
+  assert_near(smooth.path_m, 0.1, 0.002);
+  assert_true(rough.path_m > 1.2 * smooth.path_m);
+  assert_true(smooth.smoothness > rough.smoothness + 1);
+  sonde_metrics slower = moved(minimum_jerk, 0.05);
+  assert_near(slower.smoothness, smooth.smoothness, 0.1);
+  assert_near(slower.path_m, smooth.path_m, 0.002);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(a_press_is_named),
+      cmocka_unit_test(the_order_does_not_matter),
+      cmocka_unit_test(coverage_adds_up),
+      cmocka_unit_test(the_gap_shrinks),
+      cmocka_unit_test(the_rate_does_not_matter),
+      cmocka_unit_test(stale_snapshots_are_ignored),
+      cmocka_unit_test(tremor_is_one_press),
+      cmocka_unit_test(memory_is_bounded),
+      cmocka_unit_test(guidance_leads_through_the_plan),
+      cmocka_unit_test(hints_are_counted_and_fade),
+      cmocka_unit_test(the_state_follows_the_press),
+      cmocka_unit_test(path_and_smoothness),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}

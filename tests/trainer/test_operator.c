@@ -1,0 +1,115 @@
+// Scripted operators on a thigh of two formulas: they are told apart, they find what is there, and
+// they never see the truth.
+#include "trainer_test.h"
+
+enum { OPERATORS = 4 };
+
+// A flat skin at x = 0.07: 1 N per mm; a healthy vein keeps 1 - F/20 of its area, a clotted one
+// 1 - F/120, the artery 1 - F/60.
+static sonde_snapshot plant(sonde_pose pose, double time_s, unsigned clots) {
+  double depth_m = 0.07 - pose.position.x, force = fmax(0, 1e3 * depth_m);
+  double z = clamp(pose.position.z, 0, 0.2);
+  bool clot = clots & (1u << (unsigned)fmin(4, z / 0.04));
+  double along = fabs(v_dot(q_rotate(pose.rotation, vec3(0, 1, 0)), vec3(0, 0, 1)));
+  return (sonde_snapshot){.tick = (uint64_t)(1e3 * time_s),
+                          .time_s = time_s,
+                          .world_from_probe = pose,
+                          .force_normal_n = force,
+                          .vein_area_ratio = fmax(0, 1 - force / (clot ? 120 : 20)),
+                          .artery_area_ratio = fmax(0, 1 - force / 60),
+                          .vein_rest_m = vec3(0.05, 0, z),
+                          .vein_tilt_rad = acos(fmin(1, along))};
+}
+
+static sonde_score examine(const char *name, uint64_t seed, unsigned clots) {
+  sonde_vein_map map = straight_map();
+  sonde_exam_protocol protocol = every_20_mm();
+  sonde_plan plan = plan_of(&protocol, &map);
+  sonde_judge *judge = judge_of(&plan);
+  sonde_operator *op;
+  sonde_device hand;
+  assert_int_equal(sonde_operator_create(name, seed, &map, &plan, 0.004, &op, &hand, NULL),
+                   SONDE_OK);
+  uint64_t tick = 0;
+  for (; !sonde_operator_done(op) && tick < 200000; ++tick) {
+    sonde_device_sample sample;
+    hand.read(hand.self, tick, &sample);
+    if (tick % 10) continue;
+    sonde_snapshot s = plant(sample.world_from_probe, 0.004 * (double)tick, clots);
+    sonde_judge_feed(judge, &s);
+    sonde_operator_see(op, &s);
+  }
+  assert_true(sonde_operator_done(op));
+  sonde_judge_finish(judge);
+  for (uint32_t i = 0; i < 5; ++i)
+    sonde_judge_decide(judge, i, sonde_operator_decision(op, i), NULL);
+  sonde_case truth = truth_of(clots);
+  sonde_score score = score_of(judge, &truth);
+  hand.destroy(hand.self);
+  sonde_operator_destroy(op);
+  sonde_judge_destroy(judge);
+  return score;
+}
+
+static void the_expert_finds_every_clot(void **state) {
+  (void)state;
+  for (unsigned clots = 0; clots < 32; ++clots) {
+    sonde_score score = examine("expert", clots + 1, clots);
+    assert_true(score.correct && score.passed);
+    assert_true(score.score >= 90);
+    for (uint32_t i = 0; i < 5; ++i) assert_true(score.segment[i].correct);
+  }
+}
+
+static void the_others_do_not_pass(void **state) {
+  (void)state;
+  for (int k = 1; k < OPERATORS; ++k)
+    for (unsigned clots = 0; clots < 32; clots += 5) {
+      sonde_score score = examine(sonde_operator_names()[k], clots + 1, clots);
+      assert_true(score.score <= 60);
+    }
+}
+
+// Each fault shows in the metric that is made for it.
+static void faults_show_where_they_belong(void **state) {
+  (void)state;
+  sonde_metrics m[OPERATORS];
+  for (int k = 0; k < OPERATORS; ++k) m[k] = examine(sonde_operator_names()[k], 7, 0).metrics;
+  enum { EXPERT, NOVICE, TIMID, FORCEFUL };
+  assert_true(m[TIMID].presses[SONDE_PRESS_INSUFFICIENT] >= 9);
+  assert_true(m[TIMID].force_peak_n < 12 && m[EXPERT].force_peak_n > 15);
+  assert_true(m[FORCEFUL].presses[SONDE_PRESS_TOO_HARD] >= 9);
+  assert_true(m[FORCEFUL].force_peak_n > 32);
+  assert_true(m[NOVICE].presses[SONDE_PRESS_OFF_AXIS] >= 1);
+  assert_true(m[NOVICE].gap_m > 0.03 && m[EXPERT].gap_m == 0);
+  assert_int_equal(m[EXPERT].presses[SONDE_PRESS_OFF_AXIS], 0);
+}
+
+static void equal_seeds_equal_exams(void **state) {
+  (void)state;
+  sonde_score a = examine("novice", 3, 4), b = examine("novice", 3, 4), c = examine("novice", 4, 4);
+  assert_memory_equal(&a.metrics, &b.metrics, sizeof a.metrics);
+  assert_true(memcmp(&a.metrics, &c.metrics, sizeof a.metrics) != 0);
+}
+
+static void unknown_names_are_refused(void **state) {
+  (void)state;
+  sonde_vein_map map = straight_map();
+  sonde_exam_protocol protocol = every_20_mm();
+  sonde_plan plan = plan_of(&protocol, &map);
+  sonde_operator *op;
+  sonde_device hand;
+  sonde_error error = {0};
+  assert_int_equal(sonde_operator_create("surgeon", 1, &map, &plan, 0.004, &op, &hand, &error),
+                   SONDE_NOT_FOUND);
+  assert_non_null(strstr(error.message, "timid"));
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(the_expert_finds_every_clot),   cmocka_unit_test(the_others_do_not_pass),
+      cmocka_unit_test(faults_show_where_they_belong), cmocka_unit_test(equal_seeds_equal_exams),
+      cmocka_unit_test(unknown_names_are_refused),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
