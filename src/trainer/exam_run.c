@@ -104,7 +104,7 @@ static sonde_snapshot look(rig *r) {
                       .vein_short_m = nan_m,
                       .vein_rest_m = {nan_m, nan_m, nan_m},
                       .vein_tilt_rad = nan_m};
-  if (s.force_normal_n > 0.5)
+  if (s.force_normal_n > 0.5 && s.force_normal_n < FORCE_MAX_N)
     look_inside(r, &s);
   else
     r->looked = false;
