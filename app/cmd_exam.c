@@ -146,6 +146,7 @@ static int examine(const arguments *a, const exam_library *library,
   sonde_exam_def def = sonde_exam_def_default();
   if (exam_find_case(library, a->patient, &patient, directory, sizeof directory, &error))
     return app_fail(VERB, &error);
+  if (a->directory && exam_make_directory(a->directory, &error)) return app_fail(VERB, &error);
   def.patient = &patient;
   def.protocol = protocol;
   def.operator_name = a->operator_name;
@@ -192,7 +193,6 @@ int cmd_exam(int argc, char **argv) {
   sonde_exam_protocol protocol;
   sonde_error error = {0};
   sonde_status status = exam_find_protocol(&library, a.protocol, &protocol, &error);
-  if (!status && a.directory) status = exam_make_directory(a.directory, &error);
   if (status) return app_fail(VERB, &error);
   if (!a.compare) return examine(&a, &library, &protocol);
   compare_options o = {&library, &protocol, a.patient, a.directory,

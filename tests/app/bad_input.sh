@@ -160,4 +160,19 @@ coproc HOLDER { "$HOLD_PORT"; }
 read -r port <&"${HOLDER[0]}"
 rejects "$port" run "$MODEL" --port "$port"
 eval "exec ${HOLDER[1]}>&-"
+# Cases and exams.
+rejects '--case is missing' exam
+rejects "no case 'nobody'" exam --case nobody
+rejects "no protocol 'all', expected two_point, three_point, extended" exam --case healthy-lean --protocol all
+rejects "no operator 'surgeon'" exam --case healthy-lean --operator surgeon
+rejects 'from 1 to 100' exam --compare --seeds 0
+rejects 'no such' exam --case ./absent.yaml
+rejects 'no such' cases --check ./absent.yaml
+rejects '-o FILE with' cases --generate 3
+rejects 'first, easy or hard' cases --generate 3 --level odd -o x.yaml
+sed 's/^level:.*/level: simple/' "$DATA/../cases/isolated-femoral.yaml" >"$work/in/level.yaml"
+rejects 'level.yaml:4: level is .simple.' cases --check "$work/in/level.yaml"
+sed 's/femoral_mid: clot/femoral_mid: compressible/; s/common_femoral: compressible/common_femoral: clot/' \
+  "$DATA/../cases/isolated-femoral.yaml" >"$work/in/truth.yaml"
+rejects 'the truth calls common_femoral clot' cases --check "$work/in/truth.yaml"
 finish

@@ -18,6 +18,8 @@ declare -A options=(
   [replay]="--json"
   [bench]="--scene --haptics --device --json"
   [validate]="--quick --pressing --sites --json"
+  [exam]="--case --protocol --operator --seed --compare -o --json"
+  [cases]="--check --generate --level -o --json"
   [devices]="--probe --json"
 )
 

@@ -83,4 +83,14 @@ grep -q 'frames/thigh_000000040.vtp' drop/scene.pvd || wrong "scene.pvd misses t
 bench="scene:text nodes:integer dt_s:number steps_per_s:number step_ms.median:number step_ms.p99:number"
 bench+=" step_ms.max:number iterations:number relative_error:number stages_ms:object nodes>=4000"
 gives "$bench" bench "$MODEL" --json
+
+gives "id=seed-hard-7 level=hard thrombosis:bool vein_mm>=200 segments.femoral_mid:text" \
+  cases --generate 7 --level hard -o seven.yaml --json
+gives "id=seed-hard-7" cases --check seven.yaml --json
+gives "lymph-node.level=easy healthy-lean.history:text" cases --json
+# The novice is the quickest; two places.
+gives "case=healthy-lean protocol=two_point operator=novice score<=60 passed:bool correct:bool
+  coverage>=0 technique>=0 places>=3 time_s>=1 segments.common_femoral:text" \
+  exam --case healthy-lean --protocol two_point --operator novice -o exams --json
+[[ -s exams/healthy-lean-novice-1.json && -s exams/healthy-lean-novice-1.csv ]] || wrong "sonde exam wrote no result"
 finish
