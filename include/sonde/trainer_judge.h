@@ -31,7 +31,7 @@ typedef struct sonde_compression {
   sonde_press_result result;
   uint32_t segment;    /**< of the map; SONDE_SEGMENTS when the vein was not in view */
   uint32_t point;      /**< nearest of the plan within reach; SONDE_PLAN_POINTS: none */
-  double z_m, along_m; /**< where the image plane cut the vein */
+  double z_m, along_m; /**< where the image plane cut the vein when it began */
   double force_peak_n;
   double vein_ratio, artery_ratio; /**< least of the vein; the artery's at the same time */
   double artery_least;

@@ -95,11 +95,12 @@ static void look(sonde_judge *judge, const sonde_snapshot *s) {
   }
   p->end_s = s->time_s;
   p->artery_least = fmin(p->artery_least, s->artery_area_ratio);
+  // where the probe was put: under the press tissue moves along the leg
+  if (seen && isnan(p->z_m)) p->z_m = s->vein_rest_m.z;
   if (!seen || s->vein_area_ratio >= (isnan(p->vein_ratio) ? INFINITY : p->vein_ratio)) return;
   p->vein_ratio = s->vein_area_ratio;
   p->artery_ratio = s->artery_area_ratio;
   p->tilt_rad = s->vein_tilt_rad;
-  p->z_m = s->vein_rest_m.z;
 }
 
 // Comparisons with NaN are false: an artery that is not in view is neither crushed nor deformed.

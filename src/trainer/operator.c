@@ -23,6 +23,7 @@ typedef struct habit {
   double closed_ratio, open_ratio;   // of the vein: called closed, called open
   double artery_ratio;               // ends a press on an open vein; 0: goes on
   double pause_s, wander_m;          // before a place; sway of the hand while travelling
+  double rate_n_s;                   // slows down where the force rises faster
   uint32_t attempts;                 // at a place, until it is clear
   bool confirm, guess;               // repeats what looks open; calls what it has not seen
 } habit;
@@ -40,6 +41,7 @@ static const habit HABIT[] = {
      .artery_ratio = 0.66,
      .pause_s = 0.2,
      .wander_m = 0,
+     .rate_n_s = 12,
      .attempts = 2,
      .confirm = true},
     {.name = "novice",
@@ -56,6 +58,7 @@ static const habit HABIT[] = {
      .open_ratio = 0.7,
      .pause_s = 1.2,
      .wander_m = 0.004,
+     .rate_n_s = 40,
      .attempts = 1,
      .guess = true},
     {.name = "timid",
@@ -71,6 +74,7 @@ static const habit HABIT[] = {
      .open_ratio = 0.85,
      .pause_s = 0.6,
      .wander_m = 0.002,
+     .rate_n_s = 8,
      .attempts = 1},
     {.name = "forceful",
      .along_m = 0.002,
@@ -84,6 +88,7 @@ static const habit HABIT[] = {
      .closed_ratio = 0.1,
      .open_ratio = 0.3,
      .pause_s = 0.2,
+     .rate_n_s = 50,
      .attempts = 1},
 };
 static const char *const NAMES[] = {"expert", "novice", "timid", "forceful", NULL};
@@ -108,6 +113,7 @@ struct sonde_operator {
   double aim_m, aim_across_m, aim_twist_rad;    // at this attempt
   double stop_n, wait_s, last_s;
   double ratio, artery, peak_n; // of this press; NaN: not seen
+  double felt_n, felt_depth_m;  // at the last look
   bool started;
 };
 
@@ -138,7 +144,8 @@ static void aim(sonde_operator *op) {
   if (h->beyond_to_n > 0)
     op->stop_n = c->force_limit_n + uniform(op, h->beyond_from_n, h->beyond_to_n);
   op->ratio = op->artery = (double)NAN;
-  op->peak_n = 0;
+  op->peak_n = op->felt_n = 0;
+  op->felt_depth_m = -INFINITY;
   op->wait_s = h->pause_s * uniform(op, 0.5, 1.5);
 }
 
@@ -222,7 +229,12 @@ static bool too_far(const sonde_operator *op, const sonde_snapshot *s) {
 
 static void press(sonde_operator *op, const sonde_snapshot *s, double dt_s) {
   const habit *h = &op->habit;
-  op->depth_m += dt_s * (s->force_normal_n < TOUCH_N ? h->approach_m_s : h->press_m_s);
+  double speed = s->force_normal_n < TOUCH_N ? h->approach_m_s : h->press_m_s;
+  double stiffness = (s->force_normal_n - op->felt_n) / (op->depth_m - op->felt_depth_m);
+  if (stiffness > 0) speed = fmin(speed, h->rate_n_s / stiffness);
+  op->felt_n = s->force_normal_n;
+  op->felt_depth_m = op->depth_m;
+  op->depth_m += dt_s * speed;
   if (!too_far(op, s)) return;
   op->phase = HOLD;
   op->wait_s = HOLD_S;
