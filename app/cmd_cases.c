@@ -26,7 +26,6 @@ static const char HELP[] =
     "  --json            print one JSON object\n"
     "  --help            this text\n";
 
-static const char *const LEVELS[] = {"first", "easy", "hard"};
 static const char *const THIGHS[] = {"bundled", "generated", "model"};
 
 typedef struct arguments {
@@ -37,7 +36,7 @@ typedef struct arguments {
 
 static bool read_level(const char *text, long *level) {
   for (*level = 0; *level < 3; ++*level)
-    if (strcmp(LEVELS[*level], text) == 0) return true;
+    if (strcmp(sonde_case_level_name((sonde_case_level)*level), text) == 0) return true;
   app_usage_error(VERB, "--level expects first, easy or hard, got '%s'", text);
   return false;
 }
@@ -93,13 +92,14 @@ static int list(const arguments *a, const exam_library *library) {
   for (uint32_t i = 0; i < count; ++i) {
     const sonde_case *c = &cases[i];
     if (!a->json) {
-      printf("%-22s %-6s %-10s %s\n", c->id, LEVELS[c->level], THIGHS[c->thigh], c->title);
+      printf("%-22s %-6s %-10s %s\n", c->id, sonde_case_level_name(c->level), THIGHS[c->thigh],
+             c->title);
       if (a->truth) printf("%-22s %s\n", "", c->diagnosis);
       continue;
     }
     app_json_object(c->id);
     app_json_text("title", c->title);
-    app_json_text("level", LEVELS[c->level]);
+    app_json_text("level", sonde_case_level_name(c->level));
     app_json_text("thigh", THIGHS[c->thigh]);
     app_json_text("history", c->history);
     if (a->truth) app_json_text("diagnosis", c->diagnosis);
@@ -113,7 +113,7 @@ static int list(const arguments *a, const exam_library *library) {
 static int tell(const arguments *a, const sonde_case *c, const sonde_vein_map *map,
                 const char *file) {
   if (!a->json) {
-    printf("%s: %s (%s), %s\n", file, c->id, LEVELS[c->level], c->diagnosis);
+    printf("%s: %s (%s), %s\n", file, c->id, sonde_case_level_name(c->level), c->diagnosis);
     for (uint32_t i = 0; i < map->segment_count; ++i)
       printf("  %-18s z %.0f to %.0f mm\n", map->segment[i].name, 1e3 * map->segment[i].from_m,
              1e3 * map->segment[i].to_m);
@@ -122,7 +122,7 @@ static int tell(const arguments *a, const sonde_case *c, const sonde_vein_map *m
   app_json_begin();
   app_json_text("file", file);
   app_json_text("id", c->id);
-  app_json_text("level", LEVELS[c->level]);
+  app_json_text("level", sonde_case_level_name(c->level));
   app_json_bool("thrombosis", c->thrombosis);
   app_json_text("diagnosis", c->diagnosis);
   app_json_real("vein_mm", 1e3 * map->length_m);

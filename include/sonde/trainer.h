@@ -83,6 +83,8 @@ typedef enum sonde_decision {
   SONDE_DECISION_NOT_SEEN,
   SONDE_DECISIONS
 } sonde_decision;
+/** "first", "easy", "hard". @thread any */
+SONDE_API const char *sonde_case_level_name(sonde_case_level level);
 /** "", "compressible", "clot", "not_seen". @thread any */
 SONDE_API const char *sonde_decision_name(sonde_decision decision);
 /** @return false for an unknown name @thread any */

@@ -27,7 +27,7 @@ SONDE_API const char *sonde_press_result_name(sonde_press_result result);
 
 /** One compression, from touching harder than the threshold to letting go. */
 typedef struct sonde_compression {
-  double start_s, peak_s, end_s;
+  double start_s, peak_s, end_s; /**< since the first snapshot */
   sonde_press_result result;
   uint32_t segment;    /**< of the map; SONDE_SEGMENTS when the vein was not in view */
   uint32_t point;      /**< nearest of the plan within reach; SONDE_PLAN_POINTS: none */

@@ -47,7 +47,7 @@ void sonde_reader_fail(sonde_reader *reader, sonde_place at, sonde_status status
   va_start(arguments, format);
   vsnprintf(text, sizeof text, format, arguments);
   va_end(arguments);
-  sonde_fail_at(&reader->error, status, "sonde_scene_load", "%s:%d: %s", reader->name,
+  sonde_fail_at(&reader->error, status, "sonde_reader", "%s:%d: %s", reader->name,
                 sonde_reader_line(reader, at), text);
 }
 
@@ -65,12 +65,12 @@ static void parse(sonde_reader *reader, const char *text) {
   yaml_parser_set_input_string(&parser, (const unsigned char *)text, strlen(text));
   reader->has_document = yaml_parser_load(&parser, &reader->document) == 1;
   if (!reader->has_document)
-    sonde_fail_at(&reader->error, SONDE_FORMAT, "sonde_scene_load", "%s:%d: not YAML: %s",
-                  reader->name, (int)parser.problem_mark.line + 1,
+    sonde_fail_at(&reader->error, SONDE_FORMAT, "sonde_reader", "%s:%d: not YAML: %s", reader->name,
+                  (int)parser.problem_mark.line + 1,
                   parser.problem ? parser.problem : "out of memory");
   else if (!yaml_document_get_root_node(&reader->document))
-    sonde_fail_at(&reader->error, SONDE_FORMAT, "sonde_scene_load",
-                  "%s:1: the file is empty, expected a scene", reader->name);
+    sonde_fail_at(&reader->error, SONDE_FORMAT, "sonde_reader",
+                  "%s:1: the file is empty, expected a map", reader->name);
   yaml_parser_delete(&parser);
 }
 

@@ -17,6 +17,11 @@ static const char *const DECISIONS[] = {"", "compressible", "clot", "not_seen"};
 
 static const double UNKNOWN = (double)NAN;
 
+const char *sonde_case_level_name(sonde_case_level level) {
+  SONDE_ASSERT(level <= SONDE_CASE_HARD);
+  return sonde_case_levels[level];
+}
+
 const char *sonde_decision_name(sonde_decision decision) {
   SONDE_ASSERT(decision < SONDE_DECISIONS);
   return DECISIONS[decision];

@@ -73,7 +73,7 @@ void sonde_judge_destroy(sonde_judge *judge) {
 static void begin(sonde_judge *judge, const sonde_snapshot *s) {
   judge->pressing = true;
   judge->seen_at_peak = false;
-  judge->now = (sonde_compression){.start_s = s->time_s,
+  judge->now = (sonde_compression){.start_s = s->time_s - judge->first_s,
                                    .segment = SONDE_SEGMENTS,
                                    .point = SONDE_PLAN_POINTS,
                                    .z_m = (double)NAN,
@@ -90,10 +90,10 @@ static void look(sonde_judge *judge, const sonde_snapshot *s) {
   bool seen = isfinite(s->vein_area_ratio) && isfinite(s->vein_rest_m.z);
   if (s->force_normal_n >= p->force_peak_n) {
     p->force_peak_n = s->force_normal_n;
-    p->peak_s = s->time_s;
+    p->peak_s = s->time_s - judge->first_s;
     judge->seen_at_peak = seen;
   }
-  p->end_s = s->time_s;
+  p->end_s = s->time_s - judge->first_s;
   p->artery_least = fmin(p->artery_least, s->artery_area_ratio);
   // where the probe was put: under the press tissue moves along the leg
   if (seen && isnan(p->z_m)) p->z_m = s->vein_rest_m.z;

@@ -100,14 +100,8 @@ static void put_presses(sonde_file *file, const sonde_judge *judge) {
                                      "force_peak_n", "vein",   "artery_least", "tilt_deg"};
   for (uint32_t i = 0; i < judge->press_count; ++i) {
     const sonde_compression *p = &judge->press[i];
-    const double value[] = {p->start_s - judge->first_s,
-                            p->peak_s - judge->first_s,
-                            p->end_s - judge->first_s,
-                            1e3 * p->z_m,
-                            p->force_peak_n,
-                            p->vein_ratio,
-                            p->artery_least,
-                            DEG * p->tilt_rad};
+    const double value[] = {p->start_s,      p->peak_s,     p->end_s,        1e3 * p->z_m,
+                            p->force_peak_n, p->vein_ratio, p->artery_least, DEG * p->tilt_rad};
     sonde_file_printf(file, "%s\n    {\"result\": \"%s\", \"segment\": \"%s\"", i ? "," : "",
                       sonde_press_result_name(p->result), segment_of(judge, p));
     for (size_t k = 0; k < SONDE_COUNT_OF(KEYS); ++k) {
@@ -153,15 +147,9 @@ static sonde_status save_csv(const sonde_judge *judge, const char *path, sonde_e
                           "artery_ratio,artery_least,tilt_deg\n");
   for (uint32_t i = 0; i < judge->press_count; ++i) {
     const sonde_compression *p = &judge->press[i];
-    const double value[] = {p->start_s - judge->first_s,
-                            p->peak_s - judge->first_s,
-                            p->end_s - judge->first_s,
-                            1e3 * p->z_m,
-                            p->force_peak_n,
-                            p->vein_ratio,
-                            p->artery_ratio,
-                            p->artery_least,
-                            DEG * p->tilt_rad};
+    const double value[] = {p->start_s,      p->peak_s,       p->end_s,
+                            1e3 * p->z_m,    p->force_peak_n, p->vein_ratio,
+                            p->artery_ratio, p->artery_least, DEG * p->tilt_rad};
     sonde_file_printf(file, "%u,%s,%s", i + 1, sonde_press_result_name(p->result),
                       segment_of(judge, p));
     for (size_t k = 0; k < SONDE_COUNT_OF(value); ++k) csv_real(file, value[k]);
