@@ -94,7 +94,7 @@ static const habit HABIT[] = {
 static const char *const NAMES[] = {"expert", "novice", "timid", "forceful", NULL};
 
 static const double LIFT_M = 0.006, DEEPEST_M = 0.060, TOUCH_N = 6, HOLD_S = 0.2;
-static const double GIVES_WAY = 0.8; // of the force so far
+static const double GIVES_WAY = 0.8, FIRM_N = 15; // share of the force so far
 static const double NEAR_LIMIT = 0.95, CALL_FORCE_N = 8, RELEASE_M_S = 0.08;
 
 typedef enum phase { TRAVEL, PRESS, HOLD, RELEASE, DONE } phase;
@@ -223,7 +223,8 @@ static void travel(sonde_operator *op, const sonde_snapshot *s, double dt_s) {
 static bool too_far(const sonde_operator *op, const sonde_snapshot *s) {
   const habit *h = &op->habit;
   if (s->force_normal_n >= op->stop_n || op->depth_m >= DEEPEST_M) return true;
-  if (s->force_normal_n < GIVES_WAY * op->peak_n) return true; // the skin slips from the probe
+  // the skin slips from the probe; a light touch may bounce
+  if (op->peak_n > FIRM_N && s->force_normal_n < GIVES_WAY * op->peak_n) return true;
   if (h->force_to_n > 0 || h->beyond_to_n > 0) return false;
   if (s->vein_area_ratio <= h->closed_ratio) return true;
   return s->artery_area_ratio <= h->artery_ratio && s->vein_area_ratio >= h->open_ratio;
