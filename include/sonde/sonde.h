@@ -38,6 +38,8 @@
 #include "sonde/trainer_protocol.h"
 #include "sonde/trainer_judge.h"
 #include "sonde/trainer_operator.h"
+#include "sonde/trainer_log.h"
+#include "sonde/trainer_report.h"
 #include "sonde/stream.h"
 
 #endif
