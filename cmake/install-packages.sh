@@ -25,6 +25,7 @@ build_packages() {
   need_library - libcivetweb-dev # ships no .pc file
   need_library libcjson libcjson-dev
   need_library libpng libpng-dev
+  need_library sqlite3 libsqlite3-dev
   need_library yaml-0.1 libyaml-dev
   need_library zlib zlib1g-dev
   need_command node nodejs

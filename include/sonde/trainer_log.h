@@ -12,7 +12,12 @@
 extern "C" {
 #endif
 
-enum { SONDE_LOG_VERSION = 1, SONDE_LOG_WINDOW = 5, SONDE_LOG_TEXT = 96 };
+enum {
+  SONDE_LOG_VERSION = 1,
+  SONDE_LOG_WINDOW = 5,
+  SONDE_LOG_WINDOW_MAX = 99,
+  SONDE_LOG_TEXT = 96
+};
 
 /** One exam as the log keeps it. Plain data; texts are UTF-8. */
 typedef struct sonde_log_entry {
@@ -73,7 +78,8 @@ typedef struct sonde_learning_point {
   char date[24];
 } sonde_learning_point;
 /** Finished exams of a trainee, oldest first.
- *  @param window 0: SONDE_LOG_WINDOW @param[out] points [*count] freed by sonde_free
+ *  @param window 0: SONDE_LOG_WINDOW; at most SONDE_LOG_WINDOW_MAX @param[out] points [*count]
+ * freed by sonde_free
  *  @thread owner */
 SONDE_API sonde_status sonde_exam_log_curve(sonde_exam_log *log, const char *trainee,
                                             uint32_t window, sonde_learning_point **points,

@@ -1,0 +1,459 @@
+// The log of exams in one SQLite file.
+//
+// sql_fail        what SQLite says, as a status and a sentence
+// run             statements without a result
+// prepare         one statement
+// integer_of      first value of a statement's first row
+// is_new, check_kind, check_whole  empty file; a log of this version; nothing in it is damaged
+// make_tables     schema of a new log, once, whoever comes first
+// configure       waiting, distrust of the file's own code
+// sonde_exam_log_open, sonde_exam_log_close
+// put_columns     names of all columns, or as many numbered places, with commas between
+// bind_value, read_value  one member of an entry to and from a statement
+// is_date         a date of our form
+// check_entry     what the table could not say in words
+// grow            room for one more item of an array
+#include "trainer/log.h"
+
+#include <sqlite3.h>
+#include <string.h>
+
+// "Sond": tells a log from other SQLite files.
+enum { APPLICATION = 0x536f6e64, WAIT_MS = 5000, SQL_SIZE = 2048 };
+
+struct sonde_exam_log {
+  sqlite3 *base;
+  char path[512]; // for messages
+};
+
+typedef enum column_kind { COLUMN_TEXT, COLUMN_REAL, COLUMN_COUNT, COLUMN_FLAG } column_kind;
+
+typedef struct column {
+  const char *name;
+  column_kind kind;
+  size_t offset, size;
+} column;
+
+#define TEXT(member)                                                                               \
+  { #member, COLUMN_TEXT, offsetof(sonde_log_entry, member), sizeof((sonde_log_entry *)0)->member }
+#define FLAG(member)                                                                               \
+  { #member, COLUMN_FLAG, offsetof(sonde_log_entry, member), sizeof(bool) }
+#define REAL(name, member)                                                                         \
+  { name, COLUMN_REAL, offsetof(sonde_log_entry, member), sizeof(double) }
+#define COUNT(name, member)                                                                        \
+  { name, COLUMN_COUNT, offsetof(sonde_log_entry, member), sizeof(uint32_t) }
+
+// One row of this table is one column of the file's.
+static const column COLUMNS[] = {
+    TEXT(id),
+    TEXT(trainee),
+    TEXT(case_id),
+    TEXT(case_title),
+    TEXT(protocol),
+    TEXT(guidance),
+    TEXT(date),
+    TEXT(recording),
+    REAL("score", score),
+    FLAG(passed),
+    FLAG(correct),
+    FLAG(answered),
+    FLAG(called_thrombosis),
+    FLAG(thrombosis),
+    FLAG(interrupted),
+    REAL("seconds", metrics.time_s),
+    REAL("contact_s", metrics.contact_s),
+    REAL("coverage", metrics.coverage),
+    REAL("vein_coverage", metrics.vein_coverage),
+    REAL("gap_m", metrics.gap_m),
+    COUNT("points", metrics.points),
+    COUNT("points_done", metrics.points_done),
+    COUNT("presses", metrics.press_count),
+    COUNT("presses_complete", metrics.presses[SONDE_PRESS_COMPLETE]),
+    COUNT("presses_open", metrics.presses[SONDE_PRESS_OPEN]),
+    COUNT("presses_insufficient", metrics.presses[SONDE_PRESS_INSUFFICIENT]),
+    COUNT("presses_too_hard", metrics.presses[SONDE_PRESS_TOO_HARD]),
+    COUNT("presses_off_axis", metrics.presses[SONDE_PRESS_OFF_AXIS]),
+    REAL("completeness", metrics.completeness),
+    REAL("valid_share", metrics.valid_share),
+    REAL("force_peak_n", metrics.force_peak_n),
+    REAL("force_p95_n", metrics.force_p95_n),
+    REAL("path_m", metrics.path_m),
+    REAL("smoothness", metrics.smoothness),
+    COUNT("hints", metrics.hints)};
+enum { COLUMN_TOTAL = SONDE_COUNT_OF(COLUMNS) };
+
+_Static_assert(SONDE_PRESS_RESULTS == 5, "the log has a column per result of a press");
+
+// ---- SQLite -------------------------------------------------------------------------------------
+
+static sonde_status sql_fail(const sonde_exam_log *log, sonde_error *error) {
+  const char *words = sqlite3_errmsg(log->base);
+  switch (sqlite3_errcode(log->base) & 0xff) {
+  case SQLITE_NOMEM: return sonde_fail_memory(error);
+  case SQLITE_NOTADB:
+    return sonde_fail(error, SONDE_FORMAT, "%s: is not a log of exams; expected an SQLite file",
+                      log->path);
+  case SQLITE_CORRUPT:
+  case SQLITE_ERROR: // a table or column is missing
+    return sonde_fail(error, SONDE_FORMAT, "%s: the log of exams is damaged: %s; it stays as it is",
+                      log->path, words);
+  case SQLITE_BUSY:
+  case SQLITE_LOCKED:
+    return sonde_fail(error, SONDE_IO, "%s: another program kept the log for more than %d s",
+                      log->path, WAIT_MS / 1000);
+  default: return sonde_fail(error, SONDE_IO, "%s: %s", log->path, words);
+  }
+}
+
+static sonde_status run(sonde_exam_log *log, const char *sql, sonde_error *error) {
+  SONDE_ASSERT(log->base && sql);
+  return sqlite3_exec(log->base, sql, NULL, NULL, NULL) ? sql_fail(log, error) : SONDE_OK;
+}
+
+static sonde_status prepare(sonde_exam_log *log, const char *sql, sqlite3_stmt **statement,
+                            sonde_error *error) {
+  int code = sqlite3_prepare_v2(log->base, sql, -1, statement, NULL);
+  SONDE_ASSERT(code || *statement);
+  return code ? sql_fail(log, error) : SONDE_OK;
+}
+
+static sonde_status integer_of(sonde_exam_log *log, const char *sql, int64_t *value,
+                               sonde_error *error) {
+  sqlite3_stmt *statement = NULL;
+  sonde_status status = prepare(log, sql, &statement, error);
+  if (!status && sqlite3_step(statement) != SQLITE_ROW) status = sql_fail(log, error);
+  if (!status) *value = sqlite3_column_int64(statement, 0);
+  sqlite3_finalize(statement);
+  return status;
+}
+
+// ---- opening ------------------------------------------------------------------------------------
+
+typedef struct file_kind {
+  int64_t application, version, tables;
+} file_kind;
+
+static sonde_status kind_of(sonde_exam_log *log, file_kind *kind, sonde_error *error) {
+  sonde_status status = integer_of(log, "PRAGMA application_id", &kind->application, error);
+  if (!status) status = integer_of(log, "PRAGMA user_version", &kind->version, error);
+  if (!status) status = integer_of(log, "SELECT count(*) FROM sqlite_schema", &kind->tables, error);
+  return status;
+}
+
+static bool is_new(const file_kind *kind) {
+  return kind->application == 0 && kind->version == 0 && kind->tables == 0;
+}
+
+static sonde_status check_kind(const sonde_exam_log *log, const file_kind *kind,
+                               sonde_error *error) {
+  if (kind->application != APPLICATION)
+    return sonde_fail(error, SONDE_FORMAT,
+                      "%s: is an SQLite file of something else; expected a log of exams",
+                      log->path);
+  if (kind->version != SONDE_LOG_VERSION)
+    return sonde_fail(error, SONDE_VERSION, "%s: log of exams of version %lld; expected %d",
+                      log->path, (long long)kind->version, SONDE_LOG_VERSION);
+  return SONDE_OK;
+}
+
+static sonde_status check_whole(sonde_exam_log *log, sonde_error *error) {
+  sqlite3_stmt *statement = NULL;
+  sonde_status status = prepare(log, "PRAGMA quick_check(1)", &statement, error);
+  if (!status && sqlite3_step(statement) != SQLITE_ROW) status = sql_fail(log, error);
+  if (!status) {
+    const char *words = (const char *)sqlite3_column_text(statement, 0);
+    if (!words || strcmp(words, "ok") != 0)
+      status =
+          sonde_fail(error, SONDE_FORMAT, "%s: the log of exams is damaged: %s; it stays as it is",
+                     log->path, words ? words : "unreadable");
+  }
+  sqlite3_finalize(statement);
+  return status;
+}
+
+static const char *sql_type(column_kind kind) {
+  switch (kind) {
+  case COLUMN_TEXT: return "TEXT NOT NULL";
+  case COLUMN_REAL: return "REAL"; // NULL: not measured
+  default: return "INTEGER NOT NULL";
+  }
+}
+
+// Adds to a statement that must fit.
+static void put(char *sql, size_t *used, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+static void put(char *sql, size_t *used, const char *format, ...) {
+  va_list arguments;
+  va_start(arguments, format);
+  int length = vsnprintf(sql + *used, SQL_SIZE - *used, format, arguments);
+  va_end(arguments);
+  SONDE_ASSERT(length >= 0 && *used + (size_t)length < SQL_SIZE);
+  *used += (size_t)length;
+}
+
+static void put_tables(char *sql) {
+  size_t used = 0;
+  put(sql, &used, "CREATE TABLE exams (number INTEGER PRIMARY KEY");
+  for (uint32_t i = 0; i < COLUMN_TOTAL; ++i)
+    put(sql, &used, ", %s %s%s", COLUMNS[i].name, sql_type(COLUMNS[i].kind),
+        i == 0 ? " UNIQUE" : "");
+  put(sql, &used, ") STRICT; CREATE INDEX exams_of_trainee ON exams (trainee, date);");
+  put(sql, &used, "PRAGMA application_id = %d; PRAGMA user_version = %d;", APPLICATION,
+      SONDE_LOG_VERSION);
+}
+
+// Looks again once the file is ours: another program may have made the tables meanwhile.
+static sonde_status make_tables(sonde_exam_log *log, sonde_error *error) {
+  char sql[SQL_SIZE];
+  file_kind kind = {0};
+  sonde_status status = run(log, "BEGIN IMMEDIATE", error);
+  if (status) return status;
+  status = kind_of(log, &kind, error);
+  if (!status && is_new(&kind)) {
+    put_tables(sql);
+    status = run(log, sql, error);
+  }
+  if (!status) status = run(log, "COMMIT", error);
+  if (status) sqlite3_exec(log->base, "ROLLBACK", NULL, NULL, NULL);
+  return status;
+}
+
+static void configure(sonde_exam_log *log) {
+  sqlite3_extended_result_codes(log->base, 1);
+  sqlite3_busy_timeout(log->base, WAIT_MS);
+  sqlite3_db_config(log->base, SQLITE_DBCONFIG_DEFENSIVE, 1, NULL);
+  sqlite3_db_config(log->base, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, NULL);
+}
+
+static sonde_status open_and_check(sonde_exam_log *log, const char *path, sonde_error *error) {
+  file_kind kind = {0};
+  int code = sqlite3_open_v2(path, &log->base, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE, NULL);
+  if (!log->base) return sonde_fail_memory(error);
+  if (code) return sql_fail(log, error);
+  configure(log);
+  sonde_status status = kind_of(log, &kind, error);
+  if (!status && is_new(&kind)) {
+    status = make_tables(log, error);
+    if (!status) status = kind_of(log, &kind, error);
+  }
+  if (!status) status = check_kind(log, &kind, error);
+  if (!status) status = check_whole(log, error);
+  return status;
+}
+
+sonde_status sonde_exam_log_open(const char *path, sonde_exam_log **out, sonde_error *error) {
+  SONDE_ASSERT(path && out);
+  *out = NULL;
+  if (!path[0]) return sonde_fail(error, SONDE_ARGUMENT, "expected the path of a log of exams");
+  sonde_exam_log *log = SONDE_NEW(sonde_exam_log, 1);
+  if (!log) return sonde_fail_memory(error);
+  snprintf(log->path, sizeof log->path, "%s", path);
+  sonde_status status = open_and_check(log, path, error);
+  if (status)
+    sonde_exam_log_close(log);
+  else
+    *out = log;
+  return status;
+}
+
+void sonde_exam_log_close(sonde_exam_log *log) {
+  if (!log) return;
+  int code = sqlite3_close(log->base); // refuses while a statement is unfinished
+  SONDE_ASSERT(code == SQLITE_OK);
+  sonde_free(log);
+}
+
+// ---- entries ------------------------------------------------------------------------------------
+
+static void put_columns(char *sql, size_t *used, bool names) {
+  for (uint32_t i = 0; i < COLUMN_TOTAL; ++i) {
+    const char *comma = i ? ", " : "";
+    if (names)
+      put(sql, used, "%s%s", comma, COLUMNS[i].name);
+    else
+      put(sql, used, "%s?%u", comma, i + 1);
+  }
+}
+
+static int bind_value(sqlite3_stmt *statement, int place, const column *c, const char *member) {
+  if (c->kind == COLUMN_TEXT) return sqlite3_bind_text(statement, place, member, -1, SQLITE_STATIC);
+  if (c->kind == COLUMN_FLAG) return sqlite3_bind_int(statement, place, *(const bool *)member);
+  if (c->kind == COLUMN_COUNT)
+    return sqlite3_bind_int64(statement, place, *(const uint32_t *)(const void *)member);
+  return sqlite3_bind_double(statement, place, *(const double *)(const void *)member); // NaN: NULL
+}
+
+static void read_value(sqlite3_stmt *statement, int place, const column *c, char *member) {
+  if (c->kind == COLUMN_TEXT) {
+    sonde_log_copy(member, c->size, (const char *)sqlite3_column_text(statement, place));
+  } else if (c->kind == COLUMN_FLAG) {
+    *(bool *)member = sqlite3_column_int(statement, place) != 0;
+  } else if (c->kind == COLUMN_COUNT) {
+    int64_t value = sqlite3_column_int64(statement, place);
+    *(uint32_t *)(void *)member = (uint32_t)(value < 0            ? 0
+                                             : value > UINT32_MAX ? UINT32_MAX
+                                                                  : value);
+  } else {
+    bool is_null = sqlite3_column_type(statement, place) == SQLITE_NULL;
+    *(double *)(void *)member = is_null ? (double)NAN : sqlite3_column_double(statement, place);
+  }
+}
+
+static bool is_date(const char *date) {
+  static const char FORM[] = "dddd-dd-ddTdd:dd:ddZ";
+  for (size_t i = 0; i < sizeof FORM; ++i) { // the end too
+    bool digit = date[i] >= '0' && date[i] <= '9';
+    if (FORM[i] == 'd' ? !digit : date[i] != FORM[i]) return false;
+  }
+  return true;
+}
+
+static sonde_status check_entry(const sonde_log_entry *entry, sonde_error *error) {
+  if (!entry->id[0] || !entry->trainee[0] || !entry->case_id[0])
+    return sonde_fail(error, SONDE_ARGUMENT,
+                      "exam '%s' of '%s' on case '%s'; expected an id, a trainee and a case",
+                      entry->id, entry->trainee, entry->case_id);
+  if (!is_date(entry->date))
+    return sonde_fail(error, SONDE_ARGUMENT,
+                      "exam %s: date '%s'; expected the form 2026-11-22T04:40:00Z", entry->id,
+                      entry->date);
+  if (!(entry->score >= 0 && entry->score <= 100))
+    return sonde_fail(error, SONDE_ARGUMENT, "exam %s: score %g; expected 0 to 100", entry->id,
+                      entry->score);
+  return SONDE_OK;
+}
+
+sonde_status sonde_exam_log_add(sonde_exam_log *log, const sonde_log_entry *entry,
+                                sonde_error *error) {
+  SONDE_ASSERT(log && entry);
+  sonde_status status = check_entry(entry, error);
+  if (status) return status;
+  char sql[SQL_SIZE];
+  size_t used = 0;
+  put(sql, &used, "INSERT INTO exams (");
+  put_columns(sql, &used, true);
+  put(sql, &used, ") VALUES (");
+  put_columns(sql, &used, false);
+  put(sql, &used, ")");
+  sqlite3_stmt *statement = NULL;
+  status = prepare(log, sql, &statement, error);
+  int code = SQLITE_OK;
+  for (int i = 0; !status && i < COLUMN_TOTAL && !code; ++i)
+    code = bind_value(statement, i + 1, &COLUMNS[i], (const char *)entry + COLUMNS[i].offset);
+  if (!status && (code || sqlite3_step(statement) != SQLITE_DONE)) {
+    bool twice = sqlite3_extended_errcode(log->base) == SQLITE_CONSTRAINT_UNIQUE;
+    status = twice ? sonde_fail(error, SONDE_ARGUMENT, "%s: exam '%s' is in the log already",
+                                log->path, entry->id)
+                   : sql_fail(log, error);
+  }
+  sqlite3_finalize(statement);
+  return status;
+}
+
+// Makes room for item number `count`; false when out of memory.
+static bool grow(void **items, uint32_t count, uint32_t *room, size_t size) {
+  if (count < *room) return true;
+  uint32_t more = *room ? 2 * *room : 16;
+  void *grown = sonde_realloc(*items, *room * size, more * size);
+  if (!grown) return false;
+  *items = grown;
+  *room = more;
+  return true;
+}
+
+static int bind_trainee(sqlite3_stmt *statement, const char *trainee) {
+  return trainee ? sqlite3_bind_text(statement, 1, trainee, -1, SQLITE_STATIC)
+                 : sqlite3_bind_null(statement, 1);
+}
+
+typedef void (*read_row_fn)(sqlite3_stmt *statement, void *item);
+
+static void read_entry(sqlite3_stmt *statement, void *item) {
+  for (int i = 0; i < COLUMN_TOTAL; ++i)
+    read_value(statement, i, &COLUMNS[i], (char *)item + COLUMNS[i].offset);
+}
+
+// All rows of a statement whose first parameter is a trainee and whose second is a most.
+static sonde_status read_rows(sonde_exam_log *log, const char *sql, const char *trainee,
+                              int64_t most, size_t size, read_row_fn read, void **items,
+                              uint32_t *count, sonde_error *error) {
+  uint32_t room = 0;
+  sqlite3_stmt *statement = NULL;
+  sonde_status status = prepare(log, sql, &statement, error);
+  if (!status && (bind_trainee(statement, trainee) || sqlite3_bind_int64(statement, 2, most)))
+    status = sql_fail(log, error);
+  int code = SQLITE_DONE;
+  while (!status && (code = sqlite3_step(statement)) == SQLITE_ROW) {
+    if (!grow(items, *count, &room, size)) {
+      status = sonde_fail_memory(error);
+    } else {
+      char *item = (char *)*items + *count * size;
+      memset(item, 0, size);
+      read(statement, item);
+      ++*count;
+    }
+  }
+  if (!status && code != SQLITE_DONE) status = sql_fail(log, error);
+  sqlite3_finalize(statement);
+  if (!status) return SONDE_OK;
+  sonde_free(*items);
+  *items = NULL;
+  *count = 0;
+  return status;
+}
+
+sonde_status sonde_exam_log_list(sonde_exam_log *log, const char *trainee, uint32_t most,
+                                 sonde_log_entry **entries, uint32_t *count, sonde_error *error) {
+  SONDE_ASSERT(log && entries && count);
+  char sql[SQL_SIZE];
+  size_t used = 0;
+  void *items = NULL;
+  *count = 0;
+  put(sql, &used, "SELECT ");
+  put_columns(sql, &used, true);
+  put(sql, &used,
+      " FROM exams WHERE ?1 IS NULL OR trainee = ?1 ORDER BY date DESC, number DESC LIMIT ?2");
+  sonde_status status = read_rows(log, sql, trainee, most ? (int64_t)most : -1,
+                                  sizeof(sonde_log_entry), read_entry, &items, count, error);
+  *entries = items;
+  return status;
+}
+
+static double real_or_nan(sqlite3_stmt *statement, int place) {
+  if (sqlite3_column_type(statement, place) == SQLITE_NULL) return (double)NAN;
+  return sqlite3_column_double(statement, place);
+}
+
+static void read_count(sqlite3_stmt *statement, void *item) {
+  sonde_log_count *c = item;
+  sonde_log_copy(c->name, sizeof c->name, (const char *)sqlite3_column_text(statement, 0));
+  sonde_log_copy(c->title, sizeof c->title, (const char *)sqlite3_column_text(statement, 1));
+  c->exams = (uint32_t)sqlite3_column_int64(statement, 2);
+  c->finished = (uint32_t)sqlite3_column_int64(statement, 3);
+  c->passed = (uint32_t)sqlite3_column_int64(statement, 4);
+  c->score_best = real_or_nan(statement, 5);
+  c->score_mean = real_or_nan(statement, 6);
+  sonde_log_copy(c->last, sizeof c->last, (const char *)sqlite3_column_text(statement, 7));
+  SONDE_ASSERT(c->finished <= c->exams && c->passed <= c->finished);
+}
+
+#define COUNTS                                                                                     \
+  ", count(*), sum(NOT interrupted), sum(passed AND NOT interrupted),"                             \
+  " max(score) FILTER (WHERE NOT interrupted), avg(score) FILTER (WHERE NOT interrupted),"         \
+  " max(date) FROM exams AS e WHERE ?1 IS NULL OR trainee = ?1 "
+
+sonde_status sonde_exam_log_count(sonde_exam_log *log, sonde_log_by by, const char *trainee,
+                                  sonde_log_count **counts, uint32_t *count, sonde_error *error) {
+  SONDE_ASSERT(log && counts && count);
+  static const char BY_TRAINEE[] = "SELECT trainee, ''" COUNTS "GROUP BY trainee ORDER BY trainee"
+                                   " LIMIT ?2";
+  static const char BY_CASE[] =
+      "SELECT case_id, (SELECT case_title FROM exams WHERE case_id = e.case_id"
+      " ORDER BY number DESC LIMIT 1)" COUNTS "GROUP BY case_id ORDER BY case_id LIMIT ?2";
+  void *items = NULL;
+  *count = 0;
+  sonde_status status = read_rows(log, by == SONDE_LOG_BY_CASE ? BY_CASE : BY_TRAINEE, trainee, -1,
+                                  sizeof(sonde_log_count), read_count, &items, count, error);
+  *counts = items;
+  return status;
+}
