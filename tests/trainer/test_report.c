@@ -1,0 +1,579 @@
+// The page of an exam: well-formed, self-contained, foreign texts escaped, every press once, right
+// with nothing and with much. With a directory as argument it also writes examples there.
+#include "base/random.h"
+#include "fixture.h"
+#include "sonde/trainer_report.h"
+
+#include <png.h>
+#include <stdio.h>
+#include <unistd.h>
+
+#define NASTY "<b>&\"'\x01\xff</script><script>alert(1)</script>"
+enum { PRESSES = 300, SAMPLES = 5000, EARLIER = 14, SIDE = 512, POINTS = 31, PAIRS = 12 };
+
+static struct {
+  sonde_case patient;
+  sonde_exam_protocol protocol;
+  sonde_vein_map map;
+  sonde_plan plan;
+  sonde_score score;
+  sonde_compression presses[PRESSES];
+  sonde_exam_picture pictures[PAIRS];
+  sonde_exam_sample samples[SAMPLES];
+  sonde_log_entry earlier[EARLIER];
+  uint8_t open[SIDE * SIDE], closed[SIDE * SIDE];
+} made;
+
+// ---- a synthetic exam ---------------------------------------------------------------------------
+
+static void make_map(void) {
+  static const char *const NAMES[] = {"common_femoral", "femoral_proximal", "femoral_mid",
+                                      "femoral_distal", "popliteal_near"};
+  static const double TO[] = {0.04, 0.12, 0.20, 0.26, 0.30};
+  made.map = (sonde_vein_map){.segment_count = 5, .point_count = POINTS, .length_m = 0.3};
+  for (uint32_t i = 0; i < POINTS; ++i)
+    made.map.point[i] = (sonde_vein_point){.along_m = 0.01 * i,
+                                           .z_m = 0.4 - 0.01 * i,
+                                           .vein_m = {0, 0, 0.4 - 0.01 * i},
+                                           .skin_m = {0.03, 0, 0.4 - 0.01 * i},
+                                           .normal = {1, 0, 0},
+                                           .across = {0, 1, 0},
+                                           .radius_m = 0.004,
+                                           .depth_m = 0.03};
+  for (uint32_t i = 0; i < 5; ++i) {
+    made.map.segment[i].from_m = 0.4 - TO[i];
+    made.map.segment[i].to_m = 0.4 - (i ? TO[i - 1] : 0);
+    snprintf(made.map.segment[i].name, sizeof made.map.segment[i].name, "%s", NAMES[i]);
+  }
+}
+
+static void make_plan(void) {
+  made.plan = (sonde_plan){.criteria = sonde_criteria_default(), .count = 15};
+  for (uint32_t i = 0; i < made.plan.count; ++i) {
+    sonde_plan_point *p = &made.plan.point[i];
+    p->at = sonde_vein_at(&made.map, 0.01 + 0.02 * i);
+    p->segment = sonde_vein_segment_at(&made.map, p->at.z_m);
+    snprintf(p->title, sizeof p->title, "%u cm below the groin", 1 + 2 * i);
+  }
+  made.protocol = (sonde_exam_protocol){.id = "extended", .title = "Extended compression"};
+  snprintf(made.protocol.text, sizeof made.protocol.text,
+           "Compress the vein every two centimetres from the groin to the knee.");
+}
+
+static void make_case(void) {
+  made.patient = sonde_case_default();
+  snprintf(made.patient.id, sizeof made.patient.id, "isolated-femoral");
+  snprintf(made.patient.title, sizeof made.patient.title, "A swollen calf after a long flight");
+  snprintf(made.patient.history, sizeof made.patient.history,
+           "Woman, 54 years. Three days of pain and swelling of the right calf after a flight of "
+           "eleven hours. No earlier thrombosis.\nWells score 3.");
+  snprintf(made.patient.note, sizeof made.patient.note,
+           "A clot confined to the femoral vein is missed by protocols that look at the groin and "
+           "the knee only. Compress in small steps along the whole thigh when the suspicion is "
+           "high.");
+  snprintf(made.patient.diagnosis, sizeof made.patient.diagnosis,
+           "Acute thrombosis of the femoral vein, middle third");
+  made.patient.pathology.thrombus_fraction = 0.9;
+  made.patient.extent = (sonde_case_extent){.from = {.shift_m = 0.125}, .to = {.shift_m = 0.175}};
+  made.patient.thrombosis = true;
+}
+
+static void make_presses(uint32_t count) {
+  for (uint32_t i = 0; i < count; ++i) {
+    double along = fmod(0.012 + 0.0193 * i, 0.23) + 0.002 * sonde_random_normal(1, i);
+    bool clot = along > 0.125 && along < 0.175;
+    double luck = sonde_random_uniform(2, i);
+    sonde_press_result result = luck < 0.68   ? clot ? SONDE_PRESS_OPEN : SONDE_PRESS_COMPLETE
+                                : luck < 0.80 ? SONDE_PRESS_INSUFFICIENT
+                                : luck < 0.90 ? SONDE_PRESS_TOO_HARD
+                                              : SONDE_PRESS_OFF_AXIS;
+    double force = result == SONDE_PRESS_TOO_HARD       ? 31
+                   : result == SONDE_PRESS_INSUFFICIENT ? 5
+                                                        : 13;
+    sonde_compression *p = &made.presses[i];
+    *p = (sonde_compression){.start_s = 8 + 240.0 * i / count,
+                             .result = result,
+                             .point = SONDE_PLAN_POINTS,
+                             .along_m = fmax(along, 0),
+                             .force_peak_n = force * (1 + 0.12 * sonde_random_normal(3, i)),
+                             .vein_ratio = result == SONDE_PRESS_COMPLETE ? 0.03
+                                           : clot                         ? 0.88
+                                                                          : 0.42,
+                             .artery_ratio = 0.86,
+                             .artery_least = 0.84,
+                             .tilt_rad = result == SONDE_PRESS_OFF_AXIS ? 0.55 : 0.12};
+    p->peak_s = p->start_s + 1.2 * fmin(1, 60.0 / count);
+    p->end_s = p->start_s + 2.4 * fmin(1, 60.0 / count);
+    p->z_m = 0.4 - p->along_m;
+    p->segment = sonde_vein_segment_at(&made.map, p->z_m);
+  }
+  if (count > 5) made.presses[5].along_m = made.presses[5].vein_ratio = NAN;
+  if (count > 5) made.presses[5].segment = SONDE_SEGMENTS;
+}
+
+static void make_score(uint32_t presses, bool right) {
+  sonde_score *s = &made.score;
+  *s = (sonde_score){.segment_count = 5, .thrombosis = true, .answered = true};
+  for (uint32_t i = 0; i < presses; ++i) s->metrics.presses[made.presses[i].result]++;
+  s->metrics.press_count = presses;
+  s->metrics.points = 15;
+  s->metrics.points_done = presses ? 11 : 0;
+  s->metrics.coverage = presses ? 0.78 : 0;
+  s->metrics.vein_coverage = presses ? 0.76 : 0;
+  s->metrics.gap_m = presses ? 0.06 : 0.3;
+  s->metrics.completeness = presses ? 0.968 : NAN;
+  s->metrics.valid_share = presses ? 0.7 : NAN;
+  s->metrics.force_peak_n = presses ? 33.1 : 0;
+  s->metrics.force_p95_n = presses ? 17.4 : NAN;
+  s->metrics.time_s = 252;
+  s->metrics.contact_s = presses ? 198 : 0;
+  s->metrics.path_m = 1.84;
+  s->metrics.smoothness = -11.2;
+  s->decisions = right ? 0.8 : 0.6;
+  s->coverage = s->metrics.coverage;
+  s->technique = presses ? 0.7 : 0;
+  s->force = presses ? 0.42 : 0;
+  s->economy = presses ? 0.78 : 0;
+  s->score = right ? 73.6 : 49;
+  s->correct = s->passed = s->called_thrombosis = right;
+  for (uint32_t i = 0; i < 5; ++i) {
+    sonde_segment_verdict *v = &s->segment[i];
+    memcpy(v->name, made.map.segment[i].name, sizeof v->name);
+    v->needed = true;
+    v->truth = i == 2 ? SONDE_DECISION_CLOT : SONDE_DECISION_COMPRESSIBLE;
+    v->decision = i == 2 && !right ? SONDE_DECISION_COMPRESSIBLE
+                  : i == 4         ? SONDE_DECISION_NONE
+                                   : v->truth;
+    v->correct = v->decision == v->truth;
+    v->supported = presses && i != 3 && v->correct;
+    v->points = 3;
+    v->done = presses ? i == 4 ? 0 : 3 : 0;
+  }
+  snprintf(s->asked, sizeof s->asked, "%s",
+           right ? "Deep vein thrombosis" : "No deep vein thrombosis where examined");
+  snprintf(s->truth, sizeof s->truth, "%s", made.patient.diagnosis);
+  snprintf(s->summary, sizeof s->summary, "%s. %.0f of 100 points; %u of 15 places examined.",
+           right ? "Passed" : "Not passed: a clot was missed", s->score, s->metrics.points_done);
+}
+
+static void make_samples(uint32_t presses) {
+  for (uint32_t i = 0; i < SAMPLES; ++i) {
+    double t = 0.05 * i, force = 1.2 + 0.3 * sonde_random_normal(4, i), vein = 1;
+    for (uint32_t k = 0; k < presses; ++k) {
+      const sonde_compression *p = &made.presses[k];
+      double share = 1 - fabs(t - p->peak_s) / (p->peak_s - p->start_s);
+      if (share <= 0) continue;
+      force += share * p->force_peak_n;
+      vein = fmin(vein, 1 - share * (1 - p->vein_ratio)); // NaN: not in view
+      if (isnan(p->vein_ratio)) vein = NAN;
+    }
+    made.samples[i] = (sonde_exam_sample){t, force, vein};
+  }
+}
+
+// A dark vessel pair in speckle; the vein is flat in the second image.
+static void make_images(void) {
+  for (uint32_t y = 0; y < SIDE; ++y)
+    for (uint32_t x = 0; x < SIDE; ++x) {
+      double dx = x / 512.0 - 0.55, dy = y / 512.0 - 0.5, ax = x / 512.0 - 0.36;
+      double speckle = 60 + 40 * sonde_random_uniform(5, (uint64_t)y * SIDE + x) - 40 * fabs(dy);
+      bool artery = ax * ax + dy * dy < 0.006;
+      bool open = dx * dx + dy * dy < 0.009, flat = dx * dx + 40 * dy * dy < 0.012;
+      made.open[y * SIDE + x] = (uint8_t)(artery || open ? 8 : speckle);
+      made.closed[y * SIDE + x] = (uint8_t)(artery || flat ? 8 : speckle);
+    }
+}
+
+static sonde_image image_of(uint8_t *pixels) {
+  return (sonde_image){
+      .width = SIDE, .height = SIDE, .width_m = 0.05, .height_m = 0.05, .pixels = pixels};
+}
+
+static uint32_t make_pictures(uint32_t presses) {
+  uint32_t chosen[PAIRS], count = sonde_exam_report_choose(made.presses, presses, PAIRS, chosen);
+  for (uint32_t i = 0; i < count; ++i)
+    made.pictures[i] = (sonde_exam_picture){chosen[i], image_of(made.open), image_of(made.closed)};
+  return count;
+}
+
+static void make_earlier(void) {
+  for (uint32_t i = 0; i < EARLIER; ++i) {
+    sonde_log_entry *e = &made.earlier[i];
+    *e = (sonde_log_entry){.score = 78 - 3.4 * i + 9 * sonde_random_normal(6, i)};
+    e->score = fmin(fmax(e->score, 5), 97);
+    e->passed = e->correct = e->score >= 70;
+    e->metrics = (sonde_metrics){
+        .coverage = 0.95 - 0.04 * i, .valid_share = 0.9 - 0.03 * i, .time_s = 220 + 20 * i};
+    snprintf(e->id, sizeof e->id, "exam-%u", EARLIER - i);
+    snprintf(e->case_id, sizeof e->case_id, i % 5 ? "case-%u" : "isolated-femoral", i % 4);
+    snprintf(e->case_title, sizeof e->case_title,
+             i % 5 ? "A painful thigh, number %u" : "A swollen calf after a long flight", i);
+    sonde_log_date(1795000000 - 86400 * (int64_t)i, e->date);
+  }
+  made.earlier[3].interrupted = true;
+}
+
+static sonde_exam_report exam(uint32_t presses, bool right) {
+  memset(&made, 0, sizeof made);
+  make_map();
+  make_plan();
+  make_case();
+  make_presses(presses);
+  make_score(presses, right);
+  make_samples(presses);
+  make_images();
+  make_earlier();
+  return (sonde_exam_report){.patient = &made.patient,
+                             .protocol = &made.protocol,
+                             .map = &made.map,
+                             .plan = &made.plan,
+                             .score = &made.score,
+                             .note = {.exam = "20261122-044000-anna",
+                                      .trainee = "Anna Example",
+                                      .protocol = "extended",
+                                      .guidance = "hints on request",
+                                      .date = "2026-11-22T04:40:00Z"},
+                             .presses = made.presses,
+                             .press_count = presses,
+                             .pictures = made.pictures,
+                             .picture_count = make_pictures(presses),
+                             .samples = made.samples,
+                             .sample_count = SAMPLES,
+                             .earlier = made.earlier,
+                             .earlier_count = EARLIER,
+                             .recording = "exams/20261122-044000-anna.rec"};
+}
+
+static sonde_exam_report hostile(void) {
+  sonde_exam_report r = exam(30, false);
+  char longer[1020];
+  for (size_t i = 0; i + 1 < sizeof longer; ++i) longer[i] = i % 90 == 89 ? ' ' : 'w';
+  longer[sizeof longer - 1] = 0;
+  snprintf(made.patient.title, sizeof made.patient.title, "%s", NASTY);
+  snprintf(made.patient.id, sizeof made.patient.id, "%s", NASTY);
+  snprintf(made.patient.history, sizeof made.patient.history, "%s %.900s", NASTY, longer);
+  snprintf(made.patient.note, sizeof made.patient.note, "%s", longer);
+  snprintf(made.protocol.title, sizeof made.protocol.title, "%s", NASTY);
+  snprintf(made.protocol.text, sizeof made.protocol.text, "%s", NASTY);
+  snprintf(made.score.asked, sizeof made.score.asked, "%s", NASTY);
+  snprintf(made.score.truth, sizeof made.score.truth, "%s", NASTY);
+  snprintf(made.score.summary, sizeof made.score.summary, "%s", NASTY);
+  for (uint32_t i = 0; i < 5; ++i) {
+    snprintf(made.score.segment[i].name, sizeof made.score.segment[i].name, "%.30s", NASTY);
+    snprintf(made.map.segment[i].name, sizeof made.map.segment[i].name, "%.30s", NASTY);
+  }
+  snprintf(made.plan.point[13].title, sizeof made.plan.point[13].title, "%s", NASTY);
+  snprintf(made.earlier[0].case_title, sizeof made.earlier[0].case_title, "%s", NASTY);
+  snprintf(made.earlier[1].date, sizeof made.earlier[1].date, "%.20s", NASTY);
+  r.note = (sonde_score_note){NASTY, NASTY, NASTY, NASTY, NASTY};
+  r.recording = NASTY;
+  return r;
+}
+
+// ---- reading the page
+// -----------------------------------------------------------------------------
+
+static char *write_page(const sonde_exam_report *report) {
+  char path[64], *bytes = NULL;
+  size_t count = 0;
+  sonde_error error = {0};
+  snprintf(path, sizeof path, "exam_%d.html", (int)getpid());
+  if (sonde_exam_report_write(report, path, &error)) fail_msg("%s", error.message);
+  assert_int_equal(sonde_file_load(path, &bytes, &count, NULL), SONDE_OK);
+  assert_int_equal(strlen(bytes), count);
+  unlink(path);
+  return bytes;
+}
+
+static uint32_t times(const char *text, const char *what) {
+  uint32_t count = 0;
+  for (const char *p = text; (p = strstr(p, what)); p += strlen(what)) ++count;
+  return count;
+}
+
+static const char *check_attributes(const char *p) {
+  while (*p != '>' && *p != '/') {
+    p += strspn(p, " \n");
+    size_t name = strcspn(p, "=<> \n");
+    if (p[name] != '=' || (p[name + 1] != '"' && p[name + 1] != '\'') || !name)
+      fail_msg("attribute at '%.40s'", p);
+    char quote[] = {p[name + 1], '<', 0};
+    p += name + 2;
+    size_t value = strcspn(p, quote);
+    if (p[value] != quote[0]) fail_msg("value at '%.40s'", p);
+    char text[64];
+    snprintf(text, sizeof text, "%.*s", (int)(value < 60 ? value : 60), p);
+    if (strncmp(text, "data:", 5) != 0 && (strstr(text, "nan") || strstr(text, "inf")))
+      fail_msg("number '%s'", text);
+    p += value + 1;
+    p += strspn(p, " \n");
+  }
+  return p;
+}
+
+static void check_entity(const char *p) {
+  static const char *const KNOWN[] = {"&lt;", "&gt;", "&amp;", "&quot;", "&#39;"};
+  for (size_t i = 0; i < SONDE_COUNT_OF(KNOWN); ++i)
+    if (strncmp(p, KNOWN[i], strlen(KNOWN[i])) == 0) return;
+  fail_msg("stray & at '%.20s'", p);
+}
+
+// Every element is closed, every attribute quoted, every & an entity.
+static void check_page(const char *page) {
+  enum { DEEP = 32 };
+  char names[DEEP][24];
+  int depth = 0;
+  assert_int_equal(strncmp(page, "<!DOCTYPE html>", 15), 0);
+  for (const char *p = page + 15; *p; ++p) {
+    if ((unsigned char)*p < 0x20 && *p != '\n') fail_msg("control character");
+    if (*p == '&') check_entity(p);
+    if (*p != '<') continue;
+    bool end = p[1] == '/';
+    size_t length = strcspn(p + 1 + end, " />\n");
+    char name[24];
+    assert_true(length > 0 && length < sizeof name);
+    snprintf(name, sizeof name, "%.*s", (int)length, p + 1 + end);
+    p = end ? p + 2 + length : check_attributes(p + 1 + length);
+    if (end) {
+      if (depth == 0 || strcmp(names[depth - 1], name) != 0) fail_msg("</%s>", name);
+      --depth;
+    } else if (*p != '/') {
+      assert_true(depth < DEEP);
+      memcpy(names[depth++], name, sizeof name);
+    } else {
+      ++p;
+    }
+    if (*p != '>') fail_msg("end of <%s> at '%.20s'", name, p);
+  }
+  assert_int_equal(depth, 0);
+}
+
+// Nothing is loaded and nothing runs.
+static void check_alone(const char *page) {
+  static const char *const FOREIGN[] = {"<script", "<link", "@import", "url(",      "<iframe",
+                                        "https:",  "<a ",   "onload",  "javascript"};
+  for (size_t i = 0; i < SONDE_COUNT_OF(FOREIGN); ++i)
+    if (strstr(page, FOREIGN[i])) fail_msg("%s in the page", FOREIGN[i]);
+  assert_int_equal(times(page, "http:"), times(page, "http://www.w3.org/2000/svg"));
+  assert_int_equal(times(page, "src="), times(page, "src=\"data:image/png;base64,"));
+}
+
+static void check_presses(const char *page, uint32_t count) {
+  for (uint32_t i = 1; i <= count; ++i) {
+    char id[32];
+    snprintf(id, sizeof id, "id=\"press-%u\"", i);
+    assert_int_equal(times(page, id), 1);
+  }
+  assert_int_equal(times(page, "id=\"press-"), count);
+}
+
+// ---- tests --------------------------------------------------------------------------------------
+
+static void pages_are_well_formed_and_alone(void **state) {
+  (void)state;
+  static const uint32_t COUNTS[] = {0, 1, 30, PRESSES};
+  for (size_t i = 0; i < SONDE_COUNT_OF(COUNTS); ++i) {
+    sonde_exam_report r = exam(COUNTS[i], i % 2);
+    char *page = write_page(&r);
+    check_page(page);
+    check_alone(page);
+    check_presses(page, COUNTS[i]);
+    assert_int_equal(times(page, "<img "), 2 * r.picture_count);
+    assert_non_null(strstr(page, "default-src 'none'"));
+    sonde_free(page);
+  }
+}
+
+static void foreign_texts_are_escaped(void **state) {
+  (void)state;
+  sonde_exam_report r = hostile();
+  char *page = write_page(&r);
+  check_page(page);
+  check_alone(page);
+  assert_null(strstr(page, "<b>&\""));
+  assert_null(strstr(page, "\x01"));
+  assert_true(times(page, "&lt;b&gt;&amp;&quot;&#39;\ufffd\ufffd") >= 12);
+  sonde_free(page);
+}
+
+static void equal_reports_give_equal_bytes(void **state) {
+  (void)state;
+  sonde_exam_report r = exam(40, true);
+  char *a = write_page(&r), *b = write_page(&r);
+  assert_string_equal(a, b);
+  sonde_free(a);
+  sonde_free(b);
+}
+
+static void missing_parts_are_left_out(void **state) {
+  (void)state;
+  sonde_exam_report r = exam(12, true);
+  r.picture_count = r.sample_count = r.earlier_count = 0;
+  r.protocol = NULL;
+  r.recording = NULL;
+  r.note = (sonde_score_note){0};
+  made.patient.note[0] = made.patient.history[0] = 0;
+  char *page = write_page(&r);
+  check_page(page);
+  assert_non_null(strstr(page, "No images were kept"));
+  assert_non_null(strstr(page, "first exam in your log"));
+  assert_null(strstr(page, "id=\"traces\""));
+  assert_null(strstr(page, "id=\"case\""));
+  assert_null(strstr(page, "sonde replay"));
+  sonde_free(page);
+  r = exam(12, true);
+  made.pictures[0].peak.pixels = NULL;
+  page = write_page(&r);
+  check_page(page);
+  assert_int_equal(times(page, "no image"), 1);
+  assert_int_equal(times(page, "<img "), 2 * r.picture_count - 1);
+  sonde_free(page);
+}
+
+static void words_say_what_was_missed(void **state) {
+  (void)state;
+  sonde_exam_report r = exam(30, false);
+  char *page = write_page(&r);
+  assert_non_null(strstr(page, "a clot was missed; your answer was \u201ccompressible\u201d"));
+  assert_non_null(strstr(page, "left undecided"));
+  assert_non_null(strstr(page, "29 cm below the groin")); // no press reaches the knee's end
+  assert_non_null(strstr(page, "never passed"));
+  sonde_free(page);
+  r = exam(30, true);
+  page = write_page(&r);
+  assert_null(strstr(page, "a clot was missed"));
+  assert_non_null(strstr(page, "the clot was found"));
+  assert_null(strstr(page, "never passed"));
+  sonde_free(page);
+}
+
+// The exam itself is in the log, later ones may be too: neither is an earlier one.
+static void only_earlier_exams_are_compared(void **state) {
+  (void)state;
+  sonde_exam_report r = exam(12, true);
+  r.earlier_count = 2;
+  snprintf(made.earlier[0].id, sizeof made.earlier[0].id, "%s", r.note.exam);
+  snprintf(made.earlier[0].case_title, sizeof made.earlier[0].case_title, "Twice here");
+  sonde_log_date(1900000000, made.earlier[1].date);
+  snprintf(made.earlier[1].case_title, sizeof made.earlier[1].case_title, "From the future");
+  char *page = write_page(&r);
+  assert_null(strstr(page, "Twice here"));
+  assert_null(strstr(page, "From the future"));
+  assert_non_null(strstr(page, "first exam in your log"));
+  sonde_free(page);
+}
+
+static uint32_t decode(const char *text, uint8_t *bytes, uint32_t room) {
+  static const char DIGITS[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  uint32_t count = 0, held = 0, bits = 0;
+  for (const char *p = text; strchr(DIGITS, *p) && *p; ++p) {
+    held = held << 6 | (uint32_t)(strchr(DIGITS, *p) - DIGITS);
+    if ((bits += 6) < 8) continue;
+    bits -= 8;
+    assert_true(count < room);
+    bytes[count++] = (uint8_t)(held >> bits);
+  }
+  return count;
+}
+
+// A small image comes back pixel by pixel; a large one keeps its mean.
+static void images_come_back(void **state) {
+  (void)state;
+  static uint8_t bytes[1 << 20], pixels[SIDE * SIDE];
+  static const uint32_t SIDES[] = {96, SIDE};
+  for (size_t k = 0; k < 2; ++k) {
+    sonde_exam_report r = exam(1, true);
+    made.pictures[0].before.width = made.pictures[0].before.height = SIDES[k];
+    char *page = write_page(&r), *data = strstr(page, "base64,") + 7;
+    uint32_t count = decode(data, bytes, sizeof bytes);
+    png_image png = {.version = PNG_IMAGE_VERSION};
+    assert_true(png_image_begin_read_from_memory(&png, bytes, count));
+    png.format = PNG_FORMAT_GRAY;
+    assert_true(png_image_finish_read(&png, NULL, pixels, 0, NULL));
+    if (k == 0) {
+      assert_int_equal(png.width, 96);
+      assert_memory_equal(pixels, made.open, 96 * 96);
+    } else {
+      double got = 0, wanted = 0;
+      for (uint32_t i = 0; i < png.width * png.height; ++i) got += pixels[i];
+      for (uint32_t i = 0; i < SIDE * SIDE; ++i) wanted += made.open[i];
+      assert_true(png.width < SIDE);
+      assert_near(got / (png.width * png.height), wanted / (SIDE * SIDE), 0.5);
+    }
+    sonde_free(page);
+  }
+}
+
+static void choice_shows_every_kind_all_along(void **state) {
+  (void)state;
+  exam(PRESSES, true);
+  uint32_t chosen[PAIRS];
+  bool kinds[SONDE_PRESS_RESULTS] = {false};
+  double least = 1, most = 0;
+  assert_int_equal(sonde_exam_report_choose(made.presses, PRESSES, PAIRS, chosen), PAIRS);
+  for (uint32_t i = 0; i < PAIRS; ++i) {
+    const sonde_compression *p = &made.presses[chosen[i]];
+    assert_true(i == 0 || chosen[i] > chosen[i - 1]);
+    kinds[p->result] = true;
+    if (p->result != SONDE_PRESS_COMPLETE) continue;
+    least = fmin(least, p->along_m);
+    most = fmax(most, p->along_m);
+  }
+  for (int k = 0; k < SONDE_PRESS_RESULTS; ++k) assert_true(kinds[k]);
+  assert_true(most - least > 0.1);
+  assert_int_equal(sonde_exam_report_choose(made.presses, 3, PAIRS, chosen), 3);
+  assert_int_equal(sonde_exam_report_choose(NULL, 0, PAIRS, chosen), 0);
+}
+
+static void wrong_reports_are_refused(void **state) {
+  (void)state;
+  sonde_exam_report r = exam(3, true);
+  made.pictures[0].press = 3;
+  assert_int_equal(sonde_exam_report_write(&r, "never.html", NULL), SONDE_ARGUMENT);
+  r = exam(3, true);
+  r.plan = NULL;
+  assert_int_equal(sonde_exam_report_write(&r, "never.html", NULL), SONDE_ARGUMENT);
+  r = exam(3, true);
+  assert_int_equal(sonde_exam_report_write(&r, "no/such/place.html", NULL), SONDE_IO);
+  assert_int_not_equal(access("never.html", F_OK), 0);
+}
+
+static void write_example(const char *directory, const char *name, const sonde_exam_report *r) {
+  char path[512];
+  sonde_error error = {0};
+  snprintf(path, sizeof path, "%s/%s.html", directory, name);
+  if (sonde_exam_report_write(r, path, &error)) fprintf(stderr, "%s\n", error.message);
+}
+
+static void write_examples(const char *directory) {
+  sonde_exam_report r = exam(26, true);
+  write_example(directory, "passed", &r);
+  r = exam(26, false);
+  write_example(directory, "missed", &r);
+  r = exam(PRESSES, true);
+  write_example(directory, "many", &r);
+  r = exam(0, false);
+  r.earlier_count = 0;
+  r.interrupted = true;
+  write_example(directory, "nothing", &r);
+  r = hostile();
+  made.pictures[1].before.pixels = made.pictures[1].peak.pixels = made.pictures[2].peak.pixels =
+      NULL;
+  write_example(directory, "hostile", &r);
+}
+
+int main(int argc, char **argv) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(pages_are_well_formed_and_alone),
+      cmocka_unit_test(foreign_texts_are_escaped),
+      cmocka_unit_test(equal_reports_give_equal_bytes),
+      cmocka_unit_test(missing_parts_are_left_out),
+      cmocka_unit_test(words_say_what_was_missed),
+      cmocka_unit_test(only_earlier_exams_are_compared),
+      cmocka_unit_test(images_come_back),
+      cmocka_unit_test(choice_shows_every_kind_all_along),
+      cmocka_unit_test(wrong_reports_are_refused),
+  };
+  if (argc > 1) write_examples(argv[1]);
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
