@@ -4,6 +4,7 @@
 // put_date        22 November 2026, 04:40 UTC
 // put_dial        the score as a ring
 // masthead        title, who and when, result
+// teaching_note   of the case
 // footer          formulas, recording
 // check           what a caller can get wrong
 #include "trainer/report.h"
@@ -39,6 +40,9 @@ static const char STYLE[] =
     ".card h3{color:#55616b;font-size:13.5px;margin:0 0 2px;font-weight:600}"
     ".card p{margin:2px 0;font-size:16.5px;font-weight:600}"
     ".card.right{border-left:5px solid #00795a}.card.wrong{border-left:5px solid #b3261e}"
+    ".day{white-space:nowrap}.two{display:grid;grid-template-columns:repeat(auto-fit,minmax(330px,"
+    "1fr));"
+    "gap:8px 32px}.two>div{min-width:0}.two h3{margin-top:6px}"
     "ul{margin:6px 0;padding-left:20px}li{margin:5px 0;max-width:74ch}"
     ".wide{overflow-x:auto}"
     "table{border-collapse:collapse;width:100%;font-size:14.5px;line-height:1.4}"
@@ -56,7 +60,7 @@ static const char STYLE[] =
     "overflow:hidden}.bar i{display:block;height:100%;background:#0b5cad;border-radius:5px}"
     "figure{margin:16px 0 0}figure.full svg{width:100%;height:auto;display:block}"
     "figcaption{font-size:14px;line-height:1.5;color:#434d56;margin-top:8px;max-width:90ch}"
-    ".pictures{display:grid;grid-template-columns:repeat(auto-fill,minmax(285px,1fr));gap:18px;"
+    ".pictures{display:grid;grid-template-columns:repeat(auto-fill,minmax(250px,1fr));gap:16px;"
     "margin-top:14px}.pictures figure{margin:0;border:1px solid #d9dfe4;border-radius:8px;"
     "overflow:hidden}.pictures figcaption{padding:8px 12px 10px;margin:0}"
     ".pair{display:grid;grid-template-columns:1fr 1fr;gap:2px;background:#0d1114}"
@@ -175,15 +179,18 @@ static void masthead(sonde_debrief *page) {
   sonde_text_put(out, "</div></header>\n<main>\n");
 }
 
+static void teaching_note(sonde_debrief *page) {
+  const char *note = page->in->patient->note;
+  if (!note[0]) return;
+  sonde_debrief_section(page, "case", "About this case");
+  sonde_text_put(&page->out, "<p class=\"text\">");
+  sonde_text_escape(&page->out, note);
+  sonde_text_put(&page->out, "</p>\n</section>\n");
+}
+
 static void footer(sonde_debrief *page) {
   const sonde_exam_report *r = page->in;
   sonde_text *out = &page->out;
-  if (r->patient->note[0]) {
-    sonde_debrief_section(page, "case", "About this case");
-    sonde_text_put(out, "<p class=\"text\">");
-    sonde_text_escape(out, r->patient->note);
-    sonde_text_put(out, "</p>\n</section>\n");
-  }
   sonde_text_format(out,
                     "</main>\n<footer>\n<p>The patient, the images and the forces are synthetic: "
                     "computed by Sonde %s. Scores and measures: formulas of version %d, "
@@ -241,6 +248,7 @@ static sonde_status compose(sonde_debrief *page, sonde_error *error) {
   masthead(page);
   sonde_debrief_question(page);
   sonde_debrief_advice(page);
+  teaching_note(page);
   sonde_debrief_score(page);
   sonde_debrief_along(page);
   sonde_status status = sonde_debrief_pictures(page, error);

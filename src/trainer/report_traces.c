@@ -174,7 +174,7 @@ static void compare(const sonde_exam_report *r, const history *h, sonde_text *ou
   if (h->point_count >= 2 && !r->interrupted) {
     const sonde_learning_point *now = &h->points[h->point_count - 1];
     sonde_text_format(out,
-                      "Exam %u. Your last exams have a median of %s points; before this one it was "
+                      "Exam %u. The median of your last five is %s points; before this exam it was "
                       "%s. ",
                       now->number, sonde_fixed(now->median, 0).s,
                       sonde_fixed(h->points[h->point_count - 2].median, 0).s);
@@ -195,10 +195,13 @@ static void row(sonde_text *out, const sonde_log_entry *e, bool now) {
   if (strlen(day) == 16 && day[10] == 'T') day[10] = ' ';
   sonde_text_put(out, now ? "<tr class=\"this\"><th scope=\"row\">" : "<tr><th scope=\"row\">");
   sonde_text_escape(out, e->case_title);
-  sonde_text_put(out, now ? " (this exam)</th><td>" : "</th><td>");
+  sonde_text_put(out, now ? " (this exam)</th><td class=\"day\">" : "</th><td class=\"day\">");
   sonde_text_escape(out, day);
   sonde_text_format(out, "</td><td class=\"n\">%s</td><td class=\"%s\">%s</td>",
-                    sonde_fixed(e->score, 0).s, e->passed && !e->interrupted ? "yes" : "no",
+                    sonde_fixed(e->score, 0).s,
+                    e->interrupted ? "quiet"
+                    : e->passed    ? "yes"
+                                   : "no",
                     e->interrupted ? "interrupted"
                     : e->passed    ? "\u2713 passed"
                     : e->correct   ? "\u2717 not passed"

@@ -323,9 +323,10 @@ static void segment_row(sonde_debrief *page, uint32_t index) {
     sonde_text_put(out, "<td>\u2013</td>");
   else
     sonde_text_format(out, "<td class=\"%s\">%s</td>", v->correct ? "yes" : "no",
-                      !v->correct    ? "\u2717 wrong"
-                      : v->supported ? "\u2713 right"
-                                     : "\u2713 right, unsupported");
+                      v->decision == SONDE_DECISION_NONE ? "\u2717 not decided"
+                      : !v->correct                      ? "\u2717 wrong"
+                      : v->supported                     ? "\u2713 right"
+                                                         : "\u2713 right, but not shown");
   sonde_text_format(out, "<td class=\"n\">%u of %u</td></tr>\n", v->done, v->points);
 }
 
@@ -340,8 +341,8 @@ void sonde_debrief_along(sonde_debrief *page) {
                  "pressed well</th></tr></thead>\n<tbody>\n");
   for (uint32_t i = 0; i < score->segment_count; ++i) segment_row(page, i);
   sonde_text_put(&page->out,
-                 "</tbody></table></div>\n<p class=\"quiet\">An answer is supported when "
-                 "a press of the right kind in that segment shows it: one that closed "
+                 "</tbody></table></div>\n<p class=\"quiet\">An answer is shown when "
+                 "a press of the right kind in that segment supports it: one that closed "
                  "the vein, or one that left it open while the artery deformed.</p>\n"
                  "</section>\n");
 }

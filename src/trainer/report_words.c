@@ -209,7 +209,7 @@ static void well(advice *a) {
 
 static void put_list(sonde_debrief *page, const char *title, const advice *a, const char *none) {
   sonde_text *out = &page->out;
-  sonde_text_format(out, "<h3>%s</h3>\n", title);
+  sonde_text_format(out, "<div><h3>%s</h3>\n", title);
   if (a->items.used) {
     sonde_text_put(out, "<ul>\n");
     sonde_text_append(out, &a->items);
@@ -217,6 +217,7 @@ static void put_list(sonde_debrief *page, const char *title, const advice *a, co
   } else {
     sonde_text_format(out, "<p>%s</p>\n", none);
   }
+  sonde_text_put(out, "</div>\n");
   if (a->items.failed) out->failed = true;
 }
 
@@ -228,10 +229,11 @@ void sonde_debrief_advice(sonde_debrief *page) {
   work_places(&work);
   work_presses(&work);
   sonde_debrief_section(page, "advice", "What to take away");
+  sonde_text_put(&page->out, "<div class=\"two\">\n");
   put_list(page, "What to work on", &work,
            "Nothing: every answer was right and every press was good.");
   if (good.items.used) put_list(page, "What went well", &good, "");
-  sonde_text_put(&page->out, "</section>\n");
+  sonde_text_put(&page->out, "</div>\n</section>\n");
   sonde_text_clear(&good.items);
   sonde_text_clear(&work.items);
 }
