@@ -26,6 +26,7 @@ int cmd_reconstruct(int argc, char **argv);
 int cmd_slice(int argc, char **argv);
 int cmd_validate(int argc, char **argv);
 int cmd_devices(int argc, char **argv);
+int cmd_class(int argc, char **argv);
 int cmd_exam(int argc, char **argv);
 int cmd_cases(int argc, char **argv);
 

@@ -31,6 +31,7 @@ static const command COMMANDS[] = {
     {"replay", cmd_replay, "play a recording again and compare the state hash"},
     {"bench", cmd_bench, "time the simulation's stages"},
     {"exam", cmd_exam, "let a scripted operator examine a case and score it"},
+    {"class", cmd_class, "run several learners on one machine"},
     {"cases", cmd_cases, "list, check and draw the cases of the trainer"},
     {"validate", cmd_validate, "measure a room against its targets"},
     {"devices", cmd_devices, "list the input devices of this machine"},

@@ -1,0 +1,220 @@
+// Processes of a class: start, watch, stop.
+//
+// child_arguments   PROGRAM run --port N and what the user added
+// child_environment the parent's, with the learner's name
+// attributes        signals as if started from a shell
+// files             no input, no output, errors to a pipe
+// hear              keeps the last line that a program said
+// ended             why a program ended, in words
+#include "class_learners.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <math.h>
+#include <signal.h>
+#include <spawn.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+
+extern char **environ;
+static const double LONG_S = 60, AGAIN_S = 0.5, STOP_S = 5;
+enum { ARGUMENTS = 64, VARIABLES = 1024 };
+
+double class_now_s(void) {
+  struct timespec now;
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+// ---- starting
+
+static bool child_arguments(const class_room *room, const char *port, const char *list[ARGUMENTS]) {
+  const char *const first[] = {room->program, "run", "--port", port};
+  int count = 0;
+  for (; count < 4; ++count) list[count] = first[count];
+  if (room->argument_count > ARGUMENTS - 5) return false;
+  for (int i = 0; i < room->argument_count; ++i) list[count++] = room->arguments[i];
+  list[count] = NULL;
+  return true;
+}
+
+static void child_environment(char *name, char *list[VARIABLES]) {
+  int count = 0;
+  list[count++] = name;
+  for (char **p = environ; *p && count < VARIABLES - 1; ++p)
+    if (strncmp(*p, "SONDE_TRAINEE=", 14) != 0) list[count++] = *p;
+  list[count] = NULL;
+}
+
+static int attributes(posix_spawnattr_t *attribute) {
+  sigset_t defaults, none;
+  int code = posix_spawnattr_init(attribute);
+  if (code) return code;
+  sigemptyset(&none);
+  sigemptyset(&defaults);
+  sigaddset(&defaults, SIGINT);
+  sigaddset(&defaults, SIGTERM);
+  sigaddset(&defaults, SIGPIPE);
+  posix_spawnattr_setsigdefault(attribute, &defaults);
+  posix_spawnattr_setsigmask(attribute, &none);
+  return posix_spawnattr_setflags(attribute, POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETSIGMASK);
+}
+
+static int files(posix_spawn_file_actions_t *actions, int errors) {
+  int code = posix_spawn_file_actions_init(actions);
+  if (!code) code = posix_spawn_file_actions_addopen(actions, 0, "/dev/null", O_RDONLY, 0);
+  if (!code) code = posix_spawn_file_actions_addopen(actions, 1, "/dev/null", O_WRONLY, 0);
+  if (!code) code = posix_spawn_file_actions_adddup2(actions, errors, 2);
+  return code;
+}
+
+static int spawn(const class_room *room, class_learner *learner, int errors) {
+  char port[8], name[CLASS_NAME + 16];
+  const char *argument[ARGUMENTS];
+  char *variable[VARIABLES];
+  posix_spawnattr_t attribute;
+  posix_spawn_file_actions_t actions;
+  snprintf(port, sizeof port, "%u", (unsigned)learner->port);
+  snprintf(name, sizeof name, "SONDE_TRAINEE=%s", learner->name);
+  if (!child_arguments(room, port, argument)) return E2BIG;
+  child_environment(name, variable);
+  int code = attributes(&attribute);
+  if (code) return code;
+  code = files(&actions, errors);
+  // posix_spawn() takes words that it does not change as if it might
+  char *words[ARGUMENTS];
+  memcpy(words, argument, sizeof words);
+  if (!code)
+    code = posix_spawn(&learner->process, room->program, &actions, &attribute, words, variable);
+  posix_spawn_file_actions_destroy(&actions);
+  posix_spawnattr_destroy(&attribute);
+  if (code) learner->process = 0;
+  return code;
+}
+
+bool class_start(const class_room *room, class_learner *learner, class_say say) {
+  int ends[2], code = pipe2(ends, O_CLOEXEC | O_NONBLOCK) ? errno : 0;
+  learner->started_s = class_now_s();
+  learner->last_line[0] = 0;
+  learner->status = (class_status){.elapsed_s = (double)NAN, .score = (double)NAN};
+  if (!code) {
+    fcntl(ends[1], F_SETFL, 0); // the program's end waits as usual
+    code = spawn(room, learner, ends[1]);
+    close(ends[1]);
+    if (code)
+      close(ends[0]);
+    else
+      learner->errors_fd = ends[0];
+  }
+  if (!code) return true;
+  char sentence[512];
+  snprintf(sentence, sizeof sentence, "%.300s cannot be started: %s", room->program,
+           strerror(code));
+  learner->gave_up = true;
+  say(learner, sentence);
+  return false;
+}
+
+// ---- watching
+
+static void hear(class_learner *learner) {
+  char bytes[1024];
+  ssize_t got;
+  while ((got = read(learner->errors_fd, bytes, sizeof bytes - 1)) > 0) {
+    bytes[got] = 0;
+    for (char *save = NULL, *line = strtok_r(bytes, "\r\n", &save); line;
+         line = strtok_r(NULL, "\r\n", &save))
+      snprintf(learner->last_line, sizeof learner->last_line, "%.255s", line);
+  }
+  for (char *p = learner->last_line; *p; ++p)
+    if ((unsigned char)*p < 0x20 || *p == 0x7f) *p = ' ';
+}
+
+static void ended(const class_learner *learner, int status, char *words, size_t size) {
+  char how[64];
+  if (WIFSIGNALED(status))
+    snprintf(how, sizeof how, "was ended by signal %d", WTERMSIG(status));
+  else
+    snprintf(how, sizeof how, "ended with exit code %d", WEXITSTATUS(status));
+  const char *said = learner->last_line[0] ? ": " : "";
+  snprintf(words, size, "%s after %.0f s%s%s", how, class_now_s() - learner->started_s, said,
+           learner->last_line);
+}
+
+static void bury(class_learner *learner, int status, class_say say) {
+  char words[400], sentence[512];
+  hear(learner);
+  ended(learner, status, words, sizeof words);
+  if (class_now_s() - learner->started_s >= LONG_S) learner->restarts = 0;
+  close(learner->errors_fd);
+  learner->process = 0;
+  learner->status = (class_status){.elapsed_s = (double)NAN, .score = (double)NAN};
+  learner->gave_up = learner->restarts >= CLASS_RESTARTS;
+  if (learner->gave_up) {
+    snprintf(sentence, sizeof sentence, "%s; given up after %d restarts", words, CLASS_RESTARTS);
+  } else {
+    learner->restarts++;
+    learner->start_again_s = class_now_s() + AGAIN_S;
+    snprintf(sentence, sizeof sentence, "%s; starting again (%u of %d)", words, learner->restarts,
+             CLASS_RESTARTS);
+  }
+  say(learner, sentence);
+}
+
+bool class_watch(class_room *room, class_say say) {
+  uint32_t lost = 0;
+  for (uint32_t i = 0; i < room->count; ++i) {
+    class_learner *learner = &room->learner[i];
+    int status = 0;
+    if (learner->process && waitpid(learner->process, &status, WNOHANG) == learner->process) {
+      if (app_interrupted()) { // Ctrl-C reached it first
+        close(learner->errors_fd);
+        learner->process = 0;
+      } else {
+        bury(learner, status, say);
+      }
+    } else if (learner->process) {
+      hear(learner);
+    } else if (!learner->gave_up && class_now_s() >= learner->start_again_s && !app_interrupted()) {
+      class_start(room, learner, say);
+    }
+    lost += learner->gave_up;
+  }
+  return lost < room->count;
+}
+
+// ---- stopping
+
+static uint32_t running(class_room *room) {
+  uint32_t count = 0;
+  for (uint32_t i = 0; i < room->count; ++i) {
+    class_learner *learner = &room->learner[i];
+    if (!learner->process) continue;
+    hear(learner); // a full pipe would keep it from ending
+    if (waitpid(learner->process, NULL, WNOHANG) == 0) {
+      ++count;
+    } else {
+      close(learner->errors_fd);
+      learner->process = 0;
+    }
+  }
+  return count;
+}
+
+static void signal_all(const class_room *room, int number) {
+  for (uint32_t i = 0; i < room->count; ++i)
+    if (room->learner[i].process) kill(room->learner[i].process, number);
+}
+
+void class_stop(class_room *room) {
+  double until_s = class_now_s() + STOP_S;
+  signal_all(room, SIGTERM);
+  while (running(room) && class_now_s() < until_s)
+    nanosleep(&(struct timespec){.tv_nsec = 20000000}, NULL);
+  signal_all(room, SIGKILL);
+  while (running(room)) nanosleep(&(struct timespec){.tv_nsec = 5000000}, NULL);
+}

@@ -1,0 +1,265 @@
+// sonde class: several learners on one machine, one process each, and a table for the teacher.
+//
+// parse_names     a list with commas
+// check_names, check_arguments
+// own_program     this program's path
+// state_of        one word or two about a learner
+// cell, draw_row  fixed columns
+// say             a sentence that stays on the screen
+// draw            the table, over the last one on a terminal
+// tell_changes    a line per change, in a pipe
+#include "class_learners.h"
+
+#include <getopt.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+static const char VERB[] = "class";
+static const char HELP[] =
+    "usage: sonde class --learners N [--names A,B,C] [--port P] [-- RUN OPTIONS]\n"
+    "\n"
+    "Starts `sonde run` for each of N learners, each with a page of its own, and shows how they\n"
+    "are doing. A program that dies is started again, three times at most. Open a learner's\n"
+    "address in a second window to watch. Ctrl-C ends them all.\n"
+    "\n"
+    "  --learners N    how many (1 to 16); default: as many as names\n"
+    "  --names A,B,C   what to call them; default: Learner 1, Learner 2, ...\n"
+    "  --port P        page of the first learner, the others follow (default 8642)\n"
+    "  --help          this text\n"
+    "\n"
+    "Everything after -- goes to every sonde run (see sonde run --help).\n";
+
+typedef struct settings {
+  long learners, port;
+  const char *names, *program;
+  bool help;
+} settings;
+
+// ---- the command line
+
+static bool parse_option(int option, settings *s) {
+  switch (option) {
+  case 'n': return app_parse_integer(VERB, "--learners", optarg, 1, CLASS_LEARNERS, &s->learners);
+  case 'p': return app_parse_integer(VERB, "--port", optarg, 1, 65535, &s->port);
+  case 'a': s->names = optarg; return true;
+  case 'x': s->program = optarg; return true; // for tests: what is run instead of this program
+  default: return s->help = true;
+  }
+}
+
+static int parse(int argc, char **argv, settings *s) {
+  static const struct option options[] = {
+      {"learners", required_argument, NULL, 'n'}, {"port", required_argument, NULL, 'p'},
+      {"names", required_argument, NULL, 'a'},    {"program", required_argument, NULL, 'x'},
+      {"help", no_argument, NULL, 'h'},           {NULL, 0, NULL, 0}};
+  int option;
+  opterr = 0;
+  while ((option = getopt_long(argc, argv, "+:h", options, NULL)) != -1) {
+    if (option == ':') return app_usage_error(VERB, "%s needs a value", argv[optind - 1]);
+    if (option == '?') return app_usage_error(VERB, "unknown option '%s'", argv[optind - 1]);
+    if (!parse_option(option, s)) return APP_BAD_INPUT;
+  }
+  if (!s->help && optind < argc && strcmp(argv[optind - 1], "--") != 0)
+    return app_usage_error(VERB, "unexpected argument '%s'; options of sonde run come after --",
+                           argv[optind]);
+  return APP_OK;
+}
+
+static int parse_names(const settings *s, class_room *room) {
+  const char *p = s->names;
+  while (p) {
+    size_t length = strcspn(p, ",");
+    if (room->count == CLASS_LEARNERS)
+      return app_usage_error(VERB, "--names expects at most %d names", CLASS_LEARNERS);
+    if (length == 0 || length >= CLASS_NAME)
+      return app_usage_error(VERB, "--names expects names of 1 to %d bytes, got '%.*s'",
+                             CLASS_NAME - 1, (int)length, p);
+    class_learner *learner = &room->learner[room->count++];
+    snprintf(learner->name, sizeof learner->name, "%.*s", (int)length, p);
+    p = p[length] ? p + length + 1 : NULL;
+  }
+  if (s->learners && room->count && room->count != (uint32_t)s->learners)
+    return app_usage_error(VERB, "--learners %ld, but %u names", s->learners, room->count);
+  if (!s->learners && !room->count)
+    return app_usage_error(VERB, "expected --learners N or --names A,B,C");
+  if (!room->count) room->count = (uint32_t)s->learners;
+  return APP_OK;
+}
+
+static int check_names(const settings *s, class_room *room) {
+  for (uint32_t i = 0; i < room->count; ++i) {
+    class_learner *learner = &room->learner[i];
+    if (!learner->name[0]) snprintf(learner->name, sizeof learner->name, "Learner %u", i + 1);
+    for (const char *p = learner->name; *p; ++p)
+      if ((unsigned char)*p < 0x20 || *p == 0x7f)
+        return app_usage_error(VERB, "--names expects no control characters");
+    for (uint32_t k = 0; k < i; ++k)
+      if (strcmp(room->learner[k].name, learner->name) == 0)
+        return app_usage_error(VERB, "two learners are called '%s'", learner->name);
+    learner->port = (uint16_t)(s->port + i);
+  }
+  if (s->port + room->count - 1 > 65535)
+    return app_usage_error(VERB, "--port %ld leaves no room for %u learners", s->port, room->count);
+  return APP_OK;
+}
+
+// What would make the learners meet in one place.
+static int check_arguments(const class_room *room) {
+  static const char *const OWN[] = {"--port", "--headless", "--record"};
+  for (int i = 0; i < room->argument_count; ++i)
+    for (size_t k = 0; k < sizeof OWN / sizeof OWN[0]; ++k) {
+      size_t length = strlen(OWN[k]);
+      const char *word = room->arguments[i];
+      if (strncmp(word, OWN[k], length) == 0 && (word[length] == 0 || word[length] == '='))
+        return app_usage_error(VERB, "%s cannot be the same for all learners", OWN[k]);
+    }
+  return APP_OK;
+}
+
+static bool own_program(char *path, size_t size) {
+  ssize_t length = readlink("/proc/self/exe", path, size - 1);
+  if (length > 0) path[length] = 0;
+  return length > 0;
+}
+
+// ---- the screen
+
+static struct {
+  bool terminal;
+  uint32_t lines; // of the table that stands at the end of the screen
+} screen;
+
+static void wipe(void) {
+  if (screen.lines) printf("\033[%uA\033[J", screen.lines);
+  screen.lines = 0;
+}
+
+static void say(const class_learner *learner, const char *sentence) {
+  char clock[16];
+  time_t now = time(NULL);
+  struct tm parts = {0};
+  localtime_r(&now, &parts);
+  strftime(clock, sizeof clock, "%H:%M:%S", &parts);
+  wipe();
+  printf("%s %s: %s\n", clock, learner->name, sentence);
+  fflush(stdout);
+}
+
+static const char *state_of(const class_learner *learner) {
+  if (learner->gave_up) return "given up";
+  if (!learner->process) return "ended";
+  if (!learner->status.answers) return "starting";
+  return learner->status.phase[0] ? learner->status.phase : "running";
+}
+
+static void numbers_of(const class_status *status, char elapsed[16], char score[16]) {
+  snprintf(elapsed, 16, "-");
+  snprintf(score, 16, "-");
+  unsigned seconds = status->elapsed_s >= 0 ? (unsigned)status->elapsed_s : 0;
+  if (status->elapsed_s >= 0) snprintf(elapsed, 16, "%u:%02u", seconds / 60, seconds % 60);
+  if (isfinite(status->score)) snprintf(score, 16, "%.0f", status->score);
+}
+
+// A column of so many characters, and a space.
+static void cell(const char *text, int width) {
+  const char *p = text;
+  int used = 0;
+  for (; *p && used < width; ++used) do
+      ++p;
+    while (((unsigned char)*p & 0xc0) == 0x80);
+  printf("%.*s%*s ", (int)(p - text), text, width - used, "");
+}
+
+static void draw_row(const char *name, const char *address, const char *state, const char *patient,
+                     const char *elapsed, const char *score) {
+  cell(name, 15); // 79 characters in all: a line that wraps would spoil the table
+  cell(address, 23);
+  cell(state, 10);
+  cell(patient, 15);
+  printf("%6.6s %5.5s\n", elapsed, score);
+}
+
+static void draw(const class_room *room) {
+  wipe();
+  draw_row("learner", "address", "state", "case", "time", "score");
+  for (uint32_t i = 0; i < room->count; ++i) {
+    const class_learner *learner = &room->learner[i];
+    char address[32], elapsed[16], score[16];
+    snprintf(address, sizeof address, "http://127.0.0.1:%u/", (unsigned)learner->port);
+    numbers_of(&learner->status, elapsed, score);
+    draw_row(learner->name, address, state_of(learner),
+             learner->status.patient[0] ? learner->status.patient : "-", elapsed, score);
+  }
+  screen.lines = screen.terminal ? room->count + 1 : 0;
+  fflush(stdout);
+}
+
+static void tell_changes(const class_room *room, char told[CLASS_LEARNERS][128]) {
+  for (uint32_t i = 0; i < room->count; ++i) {
+    const class_learner *learner = &room->learner[i];
+    char line[128], elapsed[16], score[16];
+    numbers_of(&learner->status, elapsed, score);
+    snprintf(line, sizeof line, "%s, case %.60s, score %s", state_of(learner),
+             learner->status.patient[0] ? learner->status.patient : "-", score);
+    if (strcmp(line, told[i]) == 0) continue;
+    memcpy(told[i], line, sizeof line);
+    say(learner, line);
+  }
+}
+
+// ---- a class
+
+static int run_class(class_room *room) {
+  static char told[CLASS_LEARNERS][128];
+  double ask_s = 0;
+  bool alive = true;
+  app_catch_interrupt();
+  screen.terminal = isatty(STDOUT_FILENO) == 1;
+  for (uint32_t i = 0; i < room->count; ++i) class_start(room, &room->learner[i], say);
+  printf("%u learners; open an address in a second window to watch. Ctrl-C ends them all.\n",
+         room->count);
+  draw(room);
+  while (!app_interrupted() && alive) {
+    alive = class_watch(room, say);
+    if (class_now_s() >= ask_s) {
+      class_ask(room);
+      ask_s = class_now_s() + 1;
+      if (screen.terminal)
+        draw(room);
+      else
+        tell_changes(room, told);
+    }
+    if (screen.terminal && !screen.lines) draw(room); // something was said
+    nanosleep(&(struct timespec){.tv_nsec = 200000000}, NULL);
+  }
+  class_stop(room);
+  if (!alive) fprintf(stderr, "sonde class: no learner's program keeps running\n");
+  return alive ? APP_OK : APP_FAILED;
+}
+
+int cmd_class(int argc, char **argv) {
+  settings s = {.port = 8642};
+  static class_room room;
+  char program[4096];
+  int code = parse(argc, argv, &s);
+  if (code != APP_OK) return code;
+  if (s.help) {
+    fputs(HELP, stdout);
+    return APP_OK;
+  }
+  room.arguments = argv + optind;
+  room.argument_count = argc - optind;
+  code = parse_names(&s, &room);
+  if (code == APP_OK) code = check_names(&s, &room);
+  if (code == APP_OK) code = check_arguments(&room);
+  if (code != APP_OK) return code;
+  if (!s.program && !own_program(program, sizeof program)) {
+    fprintf(stderr, "sonde class: /proc/self/exe cannot be read\n");
+    return APP_FAILED;
+  }
+  room.program = s.program ? s.program : program;
+  return run_class(&room);
+}
