@@ -21,6 +21,7 @@ declare -A options=(
   [exam]="--case --protocol --operator --seed --compare -o --json"
   [cases]="--check --generate --level -o --json"
   [devices]="--probe --json"
+  [class]="--learners --names --port"
 )
 
 listed() { grep -oE -- '(^|[^a-zA-Z0-9-])--[a-z][a-z-]*' | grep -oE -- '--[a-z-]+' | sort -u; }
