@@ -39,8 +39,10 @@ void sonde_debrief_question(sonde_debrief *page) {
   }
   sonde_text_put(out, "<div class=\"cards\">\n");
   card(out, score->correct ? " right" : " wrong",
-       score->correct ? "\u2713 Your answer, right" : "\u2717 Your answer, wrong", score->asked,
-       "No answer");
+       score->correct    ? "\u2713 Your answer, right"
+       : score->answered ? "\u2717 Your answer, wrong"
+                         : "\u2717 No answer",
+       score->asked, "No answer");
   card(out, "", "The truth", score->truth[0] ? score->truth : r->patient->diagnosis,
        score->thrombosis ? "Deep vein thrombosis" : "No deep vein thrombosis");
   sonde_text_put(out, "</div>\n</section>\n");

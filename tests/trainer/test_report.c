@@ -1,8 +1,8 @@
 // The page of an exam: well-formed, self-contained, foreign texts escaped, every press once, right
 // with nothing and with much. With a directory as argument it also writes examples there.
 #include "base/random.h"
-#include "fixture.h"
-#include "sonde/trainer_report.h"
+#include "trainer/report.h"
+#include "trainer_test.h"
 
 #include <png.h>
 #include <stdio.h>
@@ -525,6 +525,45 @@ static void choice_shows_every_kind_all_along(void **state) {
   assert_int_equal(sonde_exam_report_choose(NULL, 0, PAIRS, chosen), 0);
 }
 
+// What the drawing shows is what the judge measures.
+static void the_drawing_agrees_with_the_judge(void **state) {
+  (void)state;
+  static const double places_m[] = {0.012, 0.031, 0.05, 0.118, 0.13, 0.187};
+  enum { PLACES = SONDE_COUNT_OF(places_m) };
+  sonde_vein_map map = straight_map();
+  sonde_exam_protocol protocol = every_20_mm();
+  sonde_plan plan = plan_of(&protocol, &map);
+  sonde_case patient = truth_of(1u << 2);
+  for (size_t count = 0; count <= PLACES; ++count) {
+    sonde_judge *judge = judge_of(&plan);
+    for (size_t i = 0; i < count; ++i) {
+      test_press press = i == 3 ? staying_open(places_m[i]) : closing(places_m[i]);
+      if (i == 4) press.force_n = 45; // too hard: covers nothing
+      feed_press(judge, &press, 3.0 * (double)i, 0.03);
+    }
+    sonde_score score;
+    sonde_judge_score(judge, &patient, &score);
+    sonde_exam_report r = {.patient = &patient, .map = &map, .plan = &plan, .score = &score};
+    r.presses = sonde_judge_compressions(judge, &r.press_count);
+    assert_int_equal(r.press_count, count);
+    sonde_debrief_vein vein = sonde_debrief_vein_make(&r);
+    uint32_t wanted = 0, both = 0, done = 0;
+    for (uint32_t i = 0; i < vein.bins; ++i) {
+      wanted += vein.wanted[i];
+      both += vein.wanted[i] && vein.covered[i];
+    }
+    for (uint32_t i = 0; i < plan.count; ++i) done += vein.done[i];
+    assert_near((double)both / wanted, score.metrics.coverage, 1e-12);
+    assert_near(vein.gap_to_m - vein.gap_from_m, score.metrics.gap_m, 1e-12);
+    assert_int_equal(done, score.metrics.points_done);
+    char *page = write_page(&r);
+    check_page(page);
+    check_presses(page, (uint32_t)count);
+    sonde_free(page);
+    sonde_judge_destroy(judge);
+  }
+}
+
 static void wrong_reports_are_refused(void **state) {
   (void)state;
   sonde_exam_report r = exam(3, true);
@@ -572,6 +611,7 @@ int main(int argc, char **argv) {
       cmocka_unit_test(only_earlier_exams_are_compared),
       cmocka_unit_test(images_come_back),
       cmocka_unit_test(choice_shows_every_kind_all_along),
+      cmocka_unit_test(the_drawing_agrees_with_the_judge),
       cmocka_unit_test(wrong_reports_are_refused),
   };
   if (argc > 1) write_examples(argv[1]);
