@@ -4,6 +4,7 @@
 // run             statements without a result
 // prepare         one statement
 // integer_of      first value of a statement's first row
+// kind_of, look   what file this is, at one moment
 // is_new, check_kind, check_whole  empty file; a log of this version; nothing in it is damaged
 // make_tables     schema of a new log, once, whoever comes first
 // configure       waiting, distrust of the file's own code
@@ -140,6 +141,15 @@ static sonde_status kind_of(sonde_exam_log *log, file_kind *kind, sonde_error *e
   return status;
 }
 
+// In one transaction: another program may be making the tables between two questions.
+static sonde_status look(sonde_exam_log *log, file_kind *kind, sonde_error *error) {
+  sonde_status status = run(log, "BEGIN", error);
+  if (status) return status;
+  status = kind_of(log, kind, error);
+  sqlite3_exec(log->base, "ROLLBACK", NULL, NULL, NULL);
+  return status;
+}
+
 static bool is_new(const file_kind *kind) {
   return kind->application == 0 && kind->version == 0 && kind->tables == 0;
 }
@@ -231,10 +241,10 @@ static sonde_status open_and_check(sonde_exam_log *log, const char *path, sonde_
   if (!log->base) return sonde_fail_memory(error);
   if (code) return sql_fail(log, error);
   configure(log);
-  sonde_status status = kind_of(log, &kind, error);
+  sonde_status status = look(log, &kind, error);
   if (!status && is_new(&kind)) {
     status = make_tables(log, error);
-    if (!status) status = kind_of(log, &kind, error);
+    if (!status) status = look(log, &kind, error);
   }
   if (!status) status = check_kind(log, &kind, error);
   if (!status) status = check_whole(log, error);

@@ -45,7 +45,8 @@ static const char STYLE[] =
     "gap:8px 32px}.two>div{min-width:0}.two h3{margin-top:6px}"
     "ul{margin:6px 0;padding-left:20px}li{margin:5px 0;max-width:74ch}"
     ".wide{overflow-x:auto}"
-    "table{border-collapse:collapse;width:100%;font-size:14.5px;line-height:1.4}"
+    "table{border-collapse:collapse;width:100%;font-size:14.5px;line-height:1.4;overflow-wrap:"
+    "break-word}"
     "th,td{padding:7px 10px;text-align:left;vertical-align:top}"
     "th{font-weight:600;color:#55616b;font-size:13.5px;border-bottom:1.5px solid #aeb8c1;"
     "vertical-align:bottom}"
@@ -65,7 +66,7 @@ static const char STYLE[] =
     "overflow:hidden}.pictures figcaption{padding:8px 12px 10px;margin:0}"
     ".pair{display:grid;grid-template-columns:1fr 1fr;gap:2px;background:#0d1114}"
     ".pair div{position:relative;min-height:90px;color:#c9d2d9;font-size:12.5px}"
-    ".pair img{width:100%;display:block}"
+    ".pair img{width:100%;height:auto;display:block}"
     ".pair span{position:absolute;left:6px;top:4px;color:#fff;background:rgba(0,0,0,.55);"
     "border-radius:4px;padding:0 6px;font-size:12px;line-height:1.5}"
     ".pair em{position:absolute;inset:0;display:flex;align-items:center;justify-content:center;"
@@ -79,7 +80,9 @@ static const char STYLE[] =
     "main,footer,.top{max-width:none;padding-left:0;padding-right:0}"
     "section{border:none;padding:0;margin:20px 0;border-radius:0}"
     ".pictures figure,tr,li,.card,figure.full{break-inside:avoid}h2,h3{break-after:avoid}"
-    ".wide{overflow:visible}*{print-color-adjust:exact;-webkit-print-color-adjust:exact}}";
+    ".wide{overflow:visible}.pictures{grid-template-columns:repeat(3,1fr);gap:10px}table{font-size:"
+    "9pt}"
+    "th,td{padding:4px 8px}*{print-color-adjust:exact;-webkit-print-color-adjust:exact}}";
 
 static void head(sonde_debrief *page) {
   sonde_text_put(&page->out,

@@ -175,10 +175,14 @@ static void dates_are_universal_time(void **state) {
 
 // ---- several programs ---------------------------------------------------------------------------
 
-static void writer(uint32_t who) {
+// Waits until all are there, so that they meet.
+static void writer(uint32_t who, uint32_t each, const int gate[2]) {
   sonde_exam_log *log = NULL;
+  char byte;
+  close(gate[1]);
+  if (read(gate[0], &byte, 1) != 0) _exit(3);
   if (sonde_exam_log_open(path, &log, NULL)) _exit(1);
-  for (uint32_t i = 0; i < EACH; ++i) {
+  for (uint32_t i = 0; i < each; ++i) {
     char id[32];
     snprintf(id, sizeof id, "%u-%u", who, i);
     sonde_log_entry e = entry_of(id, who % 2 ? "odd" : "even", i);
@@ -188,20 +192,36 @@ static void writer(uint32_t who) {
   _exit(0);
 }
 
-static void several_programs_lose_nothing(void **state) {
-  (void)state;
+static void write_together(uint32_t each) {
   pid_t child[WRITERS];
+  int gate[2];
+  assert_int_equal(pipe(gate), 0);
   for (uint32_t i = 0; i < WRITERS; ++i)
-    if ((child[i] = fork()) == 0) writer(i);
+    if ((child[i] = fork()) == 0) writer(i, each, gate);
+  close(gate[0]);
+  close(gate[1]);
   for (uint32_t i = 0; i < WRITERS; ++i) {
     int status = -1;
     assert_int_equal(waitpid(child[i], &status, 0), child[i]);
     assert_int_equal(status, 0);
   }
   sonde_exam_log *log = opened();
-  assert_int_equal(rows_of(log, NULL), WRITERS * EACH);
-  assert_int_equal(rows_of(log, "odd"), WRITERS * EACH / 2);
+  assert_int_equal(rows_of(log, NULL), WRITERS * each);
+  assert_int_equal(rows_of(log, "odd"), WRITERS * each / 2);
   sonde_exam_log_close(log);
+}
+
+static void several_programs_lose_nothing(void **state) {
+  (void)state;
+  write_together(EACH);
+}
+
+static void several_programs_make_one_log(void **state) {
+  (void)state;
+  for (int round = 0; round < 10; ++round) {
+    unlink(path);
+    write_together(1);
+  }
 }
 
 static void a_killed_program_leaves_whole_exams(void **state) {
@@ -435,6 +455,7 @@ int main(void) {
       TEST(texts_are_cut_between_characters),
       TEST(dates_are_universal_time),
       TEST(several_programs_lose_nothing),
+      TEST(several_programs_make_one_log),
       TEST(a_killed_program_leaves_whole_exams),
       TEST(other_files_are_refused_untouched),
       TEST(newer_logs_are_refused),
