@@ -224,6 +224,8 @@ static int run_class(class_room *room) {
   draw(room);
   while (!app_interrupted() && alive) {
     alive = class_watch(room, say);
+    for (uint32_t i = 0; i < room->count; ++i) // that it is back will be news
+      if (!room->learner[i].process && !room->learner[i].gave_up) told[i][0] = 0;
     if (class_now_s() >= ask_s) {
       class_ask(room);
       ask_s = class_now_s() + 1;

@@ -84,7 +84,7 @@ const char *sonde_press_words(sonde_press_result result) {
 
 // Of Okabe and Ito's palette; shapes say the same.
 const char *sonde_press_colour(sonde_press_result result) {
-  static const char *const COLOURS[] = {"#00795a", "#0072b2", "#c98200", "#c2410c", "#8a4b78"};
+  static const char *const COLOURS[] = {"#00795a", "#0072b2", "#946000", "#c2410c", "#8a4b78"};
   _Static_assert(SONDE_COUNT_OF(COLOURS) == SONDE_PRESS_RESULTS, "a colour per result");
   SONDE_ASSERT(result < SONDE_PRESS_RESULTS);
   return COLOURS[result];

@@ -55,6 +55,7 @@ for ((i = 0; i < 300; ++i)); do
   [[ $(grep -c "Bo: exam" "$out") -ge 2 ]] && break
   sleep 0.1
 done
+[[ $(grep -c "Bo: exam" "$out") -ge 2 ]] || wrong "Bo never came back"
 read -r second _ <"pid.$((port + 1))"
 [[ $first != "$second" ]] || wrong "Bo's program was not started again"
 alive "$second" || wrong "Bo's second program does not run"
