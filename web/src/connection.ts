@@ -1,6 +1,17 @@
 // The WebSocket: connects, says when the connection is lost and tries again.
 
-import { decode, type Frame, type Line, type Mesh, type Quat, type TextMessage, type Vec3 } from "./protocol";
+import {
+  decode,
+  type Decision,
+  type Frame,
+  type Guidance,
+  type Line,
+  type Mesh,
+  type Posture,
+  type Quat,
+  type TextMessage,
+  type Vec3,
+} from "./protocol";
 
 export interface ConnectionEvents {
   text(message: TextMessage): void;
@@ -9,7 +20,15 @@ export interface ConnectionEvents {
   state(connected: boolean, retryInS: number): void;
 }
 
-export type EchoKey = "gain_db" | "depth_mm" | "frequency_mhz" | "dynamic_range_db" | "focus_mm";
+export type EchoKey = "gain_db" | "depth_mm" | "frequency_mhz" | "dynamic_range_db" | "focus_mm" | "tgc_db_per_cm";
+export type TissueKey = "stiffness_scale" | "damping_scale" | "friction_scale";
+
+export interface ExamWish {
+  case: string;
+  protocol: string;
+  guidance: Guidance;
+  trainee: string;
+}
 
 export class Connection {
   /** smoothed round trip of a ping, ms */
@@ -33,14 +52,53 @@ export class Connection {
   pathology(name: string): void {
     this.send({ type: "controls", case: name });
   }
-  echo(key: EchoKey, value: number): void {
+  set(key: EchoKey | TissueKey, value: number): void {
     this.send({ type: "controls", [key]: value });
+  }
+  posture(posture: Posture): void {
+    this.send({ type: "controls", posture });
+  }
+  valsalva(valsalva: boolean): void {
+    this.send({ type: "controls", valsalva });
+  }
+  gel(action: "put" | "wipe"): void {
+    this.send({ type: "gel", action });
   }
   stop(): void {
     this.send({ type: "stop" });
   }
   resume(): void {
     this.send({ type: "resume" });
+  }
+  startExam(wish: ExamWish): void {
+    this.send({ type: "start_exam", ...wish });
+  }
+  decide(segment: string, decision: Decision): void {
+    this.send({ type: "decide", segment, decision });
+  }
+  hint(): void {
+    this.send({ type: "hint" });
+  }
+  finishExam(): void {
+    this.send({ type: "finish_exam" });
+  }
+  leaveExam(): void {
+    this.send({ type: "leave_exam" });
+  }
+  listExams(): void {
+    this.send({ type: "list_exams" });
+  }
+  openReplay(exam: string): void {
+    this.send({ type: "open_replay", exam });
+  }
+  seek(time_s: number): void {
+    this.send({ type: "seek", time_s });
+  }
+  play(playing: boolean, speed: number): void {
+    this.send({ type: "play", playing, speed });
+  }
+  comment(time_s: number, text: string, author: string): void {
+    this.send({ type: "comment", time_s, text, author });
   }
   ack(sequence: number): void {
     this.send({ type: "ack", frame: sequence });

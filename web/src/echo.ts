@@ -1,10 +1,17 @@
-// The echo image as on a scanner: grey picture, depth scale, focus and orientation marks.
+// The echo image as on a scanner: grey picture, depth scale, focus, gain over depth; freeze, calipers,
+// and a kept image beside the live one.
 
+import { Calipers, type Tool } from "./calipers";
+import { label, make } from "./dom";
 import type { Controls, Frame } from "./protocol";
 
-const RULER_PX = 44;
+const RULER_PX = 40;
+const CURVE_PX = 26; // gain over depth, left of the image
 const PAD_PX = 10;
-const TOP_PX = 14;
+const GAP_PX = 14;
+const TOP_PX = 16;
+const FULL_DB = 70; // of the gain curve's width
+const INK = { scale: "#98a5b5", focus: "#e6b450", mark: "#5cc8c2" };
 
 function context(canvas: HTMLCanvasElement): CanvasRenderingContext2D {
   const c = canvas.getContext("2d");
@@ -12,46 +19,102 @@ function context(canvas: HTMLCanvasElement): CanvasRenderingContext2D {
   return c;
 }
 
-export class EchoView {
-  private frozen = false;
+/** One image with its calipers. */
+class Pane {
+  readonly root = make("div", "pane");
+  readonly canvas = make("canvas");
+  readonly title = make("span", "pane-title");
+  readonly calipers: Calipers;
+  width_mm = 60;
+  height_mm = 70;
   private readonly image: CanvasRenderingContext2D;
-  private readonly marks: CanvasRenderingContext2D;
   private data: ImageData | null = null;
-  private controls: Controls | null = null;
-  private width_mm = 60;
-  private height_mm = 70;
 
-  get isFrozen(): boolean {
-    return this.frozen;
+  constructor(name: string, changed: () => void) {
+    this.calipers = new Calipers(changed);
+    this.image = context(this.canvas);
+    this.canvas.setAttribute("role", "img");
+    this.canvas.setAttribute("aria-label", name);
+    this.root.append(this.canvas, this.calipers.svg, this.title);
   }
 
-  constructor(
-    private readonly box: HTMLElement,
-    private readonly picture: HTMLCanvasElement,
-    private readonly overlay: HTMLCanvasElement,
-    private readonly text: HTMLElement,
-  ) {
-    this.image = context(picture);
-    this.marks = context(overlay);
-    new ResizeObserver(() => this.layout()).observe(box);
-  }
-
-  show(frame: Frame): void {
-    if (this.frozen) return;
+  /** True when the size in millimetres changed. */
+  show(frame: Frame): boolean {
     if (!this.data || this.data.width !== frame.width || this.data.height !== frame.height) {
-      this.picture.width = frame.width;
-      this.picture.height = frame.height;
+      this.canvas.width = frame.width;
+      this.canvas.height = frame.height;
       this.data = this.image.createImageData(frame.width, frame.height);
     }
     const rgba = new Uint32Array(this.data.data.buffer);
     const grey = frame.pixels;
     for (let i = 0; i < grey.length; ++i) rgba[i] = 0xff000000 | (grey[i]! * 0x010101);
     this.image.putImageData(this.data, 0, 0);
-    if (frame.width_mm !== this.width_mm || frame.height_mm !== this.height_mm) {
-      this.width_mm = frame.width_mm;
-      this.height_mm = frame.height_mm;
-      this.layout();
-    }
+    const same = frame.width_mm === this.width_mm && frame.height_mm === this.height_mm;
+    this.width_mm = frame.width_mm;
+    this.height_mm = frame.height_mm;
+    return !same;
+  }
+
+  copyFrom(other: Pane): void {
+    this.canvas.width = other.canvas.width;
+    this.canvas.height = other.canvas.height;
+    this.image.drawImage(other.canvas, 0, 0);
+    this.width_mm = other.width_mm;
+    this.height_mm = other.height_mm;
+    this.calipers.copyFrom(other.calipers);
+  }
+
+  place(left: number, top: number, scale: number): void {
+    const style = { left: `${left}px`, top: `${top}px`, width: `${this.width_mm * scale}px`, height: `${this.height_mm * scale}px` };
+    Object.assign(this.root.style, style);
+    this.calipers.layout(this.width_mm, this.height_mm, scale);
+  }
+}
+
+export class EchoView {
+  measured: () => void = () => undefined;
+  private frozen = false;
+  private compared = false;
+  private nameCase = true;
+  private tool: Tool = null;
+  private controls: Controls | null = null;
+  private force_n = 0;
+  private readonly live: Pane;
+  private readonly kept: Pane;
+  private readonly marks: CanvasRenderingContext2D;
+
+  constructor(
+    private readonly box: HTMLElement,
+    private readonly overlay: HTMLCanvasElement,
+    private readonly text: HTMLElement,
+    private readonly values: HTMLElement,
+  ) {
+    this.live = new Pane("Echo image", () => this.list());
+    this.kept = new Pane("Kept echo image", () => this.list());
+    this.kept.root.hidden = true;
+    this.box.prepend(this.kept.root, this.live.root);
+    this.marks = context(overlay);
+    new ResizeObserver(() => this.layout()).observe(box);
+  }
+
+  get isFrozen(): boolean {
+    return this.frozen;
+  }
+  get isCompared(): boolean {
+    return this.compared;
+  }
+  get activeTool(): Tool {
+    return this.tool;
+  }
+  get measures(): { kind: string; value: number; text: string }[] {
+    return [...(this.compared ? this.kept.calipers.measures : []), ...this.live.calipers.measures];
+  }
+
+  show(frame: Frame): void {
+    if (this.frozen) return;
+    this.force_n = Math.max(0, frame.snapshot.force_normal_n);
+    if (this.live.show(frame)) this.layout();
+    this.titles();
   }
 
   set(controls: Controls): void {
@@ -60,59 +123,125 @@ export class EchoView {
     this.layout();
   }
 
+  /** An exam does not say what is in the vein. */
+  tellCase(tell: boolean): void {
+    if (this.nameCase === tell) return;
+    this.nameCase = tell;
+    if (this.controls) this.caption(this.controls);
+  }
+
   /** A frozen picture keeps its caption. */
   freeze(frozen: boolean): void {
     this.frozen = frozen;
+    this.live.root.classList.toggle("frozen", frozen);
+    this.titles();
     if (!frozen && this.controls) this.set(this.controls);
   }
 
+  /** Keeps the image of now on the left while the live one goes on at the right, or ends that. */
+  compare(on: boolean): void {
+    this.compared = on;
+    if (on) {
+      this.kept.copyFrom(this.live);
+      this.kept.title.textContent = `Kept, ${this.force_n.toFixed(1)} N`;
+      this.live.calipers.clear();
+    } else {
+      this.kept.calipers.clear();
+    }
+    this.kept.root.hidden = !on;
+    this.titles();
+    this.layout();
+  }
+
+  use(tool: Tool, byKeyboard = false): void {
+    this.tool = tool;
+    this.live.calipers.use(tool);
+    this.kept.calipers.use(tool);
+    if (tool && byKeyboard) this.live.calipers.placeDefault(this.live.width_mm, this.live.height_mm);
+  }
+
+  clearMeasures(): void {
+    this.live.calipers.clear();
+    this.kept.calipers.clear();
+  }
+
+  private list(): void {
+    const line = (m: { kind: string; text: string }): HTMLElement => make("span", m.kind, m.text);
+    const kept = this.compared ? this.kept.calipers.measures : [];
+    const live = this.live.calipers.measures;
+    const head = (text: string): HTMLElement => make("span", "which", text);
+    this.values.replaceChildren(
+      ...(kept.length ? [head("Kept"), ...kept.map(line)] : []),
+      ...(kept.length && live.length ? [head("Now")] : []),
+      ...live.map(line),
+    );
+    this.measured();
+  }
+
+  private titles(): void {
+    const state = this.frozen ? "Frozen" : this.compared ? "Now" : "";
+    const force = this.compared ? `, ${this.force_n.toFixed(1)} N` : "";
+    this.live.title.textContent = state ? state + force : "";
+  }
+
   private caption(controls: Controls): void {
+    const what = this.nameCase ? `, ${label(controls.case).toLowerCase()}` : "";
     this.text.textContent =
-      `${label(controls.probe)} probe, ${label(controls.case).toLowerCase()}\n` +
+      `${label(controls.probe)} probe${what}\n` +
       `${controls.frequency_mhz.toFixed(1)} MHz, gain ${controls.gain_db.toFixed(0)} dB, range ${controls.dynamic_range_db.toFixed(0)} dB`;
   }
 
-  /** Largest picture with its true proportions beside the ruler. */
+  /** Largest pictures with their true proportions between the gain curve and the ruler. */
   private layout(): void {
     const { clientWidth: w, clientHeight: h } = this.box;
-    const room = [w - RULER_PX - 2 * PAD_PX, h - TOP_PX - PAD_PX] as const;
-    const scale = Math.min(room[0] / this.width_mm, room[1] / this.height_mm);
+    const panes = this.compared ? [this.kept, this.live] : [this.live];
+    const room = w - RULER_PX - CURVE_PX - 2 * PAD_PX - GAP_PX * (panes.length - 1);
+    const wide = panes.reduce((sum, p) => sum + p.width_mm, 0);
+    const high = Math.max(...panes.map((p) => p.height_mm));
+    const scale = Math.min(room / wide, (h - TOP_PX - PAD_PX) / high);
     if (!(scale > 0)) return;
-    const [pw, ph] = [this.width_mm * scale, this.height_mm * scale];
-    const left = PAD_PX + (room[0] - pw) / 2;
-    Object.assign(this.picture.style, {
-      left: `${left}px`,
-      top: `${TOP_PX}px`,
-      width: `${pw}px`,
-      height: `${ph}px`,
-    });
-    this.text.style.left = `${left}px`;
-    const below = TOP_PX + ph + 8; // under the picture when there is room, else over its foot
-    this.text.style.top = `${Math.min(below, h - this.text.offsetHeight - 8)}px`;
+    const first = PAD_PX + CURVE_PX + (room - wide * scale) / 2;
+    let left = first;
+    for (const pane of panes) {
+      pane.place(left, TOP_PX, scale);
+      left += pane.width_mm * scale + GAP_PX;
+    }
+    this.placeText(first, TOP_PX + high * scale, h);
     const ratio = window.devicePixelRatio;
     this.overlay.width = Math.round(w * ratio);
     this.overlay.height = Math.round(h * ratio);
     this.marks.setTransform(ratio, 0, 0, ratio, 0, 0);
-    this.drawMarks(left, left + pw, scale);
+    this.drawMarks(first, left - GAP_PX, scale);
+  }
+
+  /** Under the picture when there is room, else over its foot. */
+  private placeText(left: number, foot: number, h: number): void {
+    this.text.style.left = `${left + 6}px`;
+    this.values.style.left = `${left + 6}px`;
+    this.values.style.top = `${TOP_PX + 24}px`;
+    this.text.style.top = `${Math.min(foot + 6, h - this.text.offsetHeight - 8)}px`;
   }
 
   private drawMarks(left: number, right: number, scale: number): void {
     const c = this.marks;
-    c.font = "11px system-ui, sans-serif";
+    const height_mm = this.live.height_mm;
+    c.clearRect(0, 0, this.overlay.width, this.overlay.height);
+    c.font = "11.5px system-ui, sans-serif";
     c.textBaseline = "middle";
-    c.strokeStyle = c.fillStyle = "#8491a1";
+    c.strokeStyle = c.fillStyle = INK.scale;
     c.lineWidth = 1;
     c.beginPath();
-    for (let mm = 0; mm <= this.height_mm + 0.01; mm += 5) {
+    for (let mm = 0; mm <= height_mm + 0.01; mm += 5) {
       const y = Math.round(TOP_PX + mm * scale) + 0.5;
       c.moveTo(right + 3, y);
       c.lineTo(right + (mm % 10 === 0 ? 10 : 6), y);
-      if (mm % 10 === 0 && mm > 0) c.fillText(`${mm}`, right + 14, y);
+      if (mm % 10 === 0 && mm > 0) c.fillText(`${mm / 10}`, right + 15, y);
     }
     c.stroke();
-    c.fillText("mm", right + 14, TOP_PX + 1);
+    c.fillText("cm", right + 14, TOP_PX + 1);
     this.drawFocus(right, scale);
-    c.fillStyle = "#5cc8c2"; // the side of the probe's own mark
+    this.drawGain(left, scale);
+    c.fillStyle = INK.mark; // the side of the probe's own mark
     c.beginPath();
     c.arc(left + 5, TOP_PX - 7, 3.5, 0, 2 * Math.PI);
     c.fill();
@@ -120,20 +249,36 @@ export class EchoView {
 
   private drawFocus(right: number, scale: number): void {
     const focus_mm = this.controls?.focus_mm ?? NaN;
-    if (!(focus_mm < this.height_mm)) return;
+    if (!(focus_mm < this.live.height_mm)) return;
     const y = TOP_PX + focus_mm * scale;
     const c = this.marks;
-    c.fillStyle = "#e6b450";
+    c.fillStyle = INK.focus;
     c.beginPath();
     c.moveTo(right + 2, y);
     c.lineTo(right + 10, y - 5);
     c.lineTo(right + 10, y + 5);
     c.fill();
   }
-}
 
-/** "partial_mural" -> "Partial mural" */
-export function label(name: string): string {
-  const words = name.replace(/.*\//, "").replace(/_/g, " ");
-  return words.charAt(0).toUpperCase() + words.slice(1);
+  /** How much the depth compensation lifts each depth: to the right is more. */
+  private drawGain(left: number, scale: number): void {
+    const slope = this.controls?.tgc_db_per_cm ?? NaN;
+    if (!Number.isFinite(slope)) return;
+    const c = this.marks;
+    const middle = left - CURVE_PX / 2 - 4;
+    const bottom = TOP_PX + this.live.height_mm * scale;
+    const db = Math.max(-FULL_DB, Math.min(FULL_DB, (slope * this.live.height_mm) / 10));
+    c.strokeStyle = "#2c3643";
+    c.beginPath();
+    c.moveTo(middle, TOP_PX);
+    c.lineTo(middle, bottom);
+    c.stroke();
+    c.strokeStyle = INK.mark;
+    c.globalAlpha = 0.8;
+    c.beginPath();
+    c.moveTo(middle, TOP_PX);
+    c.lineTo(middle + (db / FULL_DB) * (CURVE_PX / 2), bottom);
+    c.stroke();
+    c.globalAlpha = 1;
+  }
 }

@@ -10,6 +10,7 @@ const SITE_MM = 4;      // a click this near to a site goes to the site
 const LIFTED_MM = -8;
 const STEP_RAD = (5 * Math.PI) / 180;
 const SPACE_MM_S = 8;   // progressive press
+const FINGER_MM = 0.15; // press per pixel of a drag
 
 export interface InputActions {
   moved(): void;
@@ -21,6 +22,8 @@ export interface InputActions {
   stop(): void;
   help(): void;
   sites(): readonly Site[];
+  /** a key of the page; true when it was one of its own */
+  key(code: string, shift: boolean): boolean;
 }
 
 type Drag = { kind: "slide" | "press"; x: number; y: number; moved: boolean } | null;
@@ -40,7 +43,10 @@ export class Input {
     canvas.addEventListener("pointerdown", (e) => this.down(e), { capture: true });
     canvas.addEventListener("pointermove", (e) => this.move(e));
     canvas.addEventListener("pointerup", (e) => this.up(e));
-    canvas.addEventListener("pointercancel", () => (this.drag = null));
+    canvas.addEventListener("pointercancel", (e) => {
+      this.drag = null;
+      this.fingers.delete(e.pointerId);
+    });
     canvas.addEventListener("pointerleave", () => this.scene.hover(null, null));
     canvas.addEventListener("contextmenu", (e) => e.preventDefault());
     canvas.addEventListener("wheel", (e) => this.wheel(e), { passive: false });
@@ -49,12 +55,30 @@ export class Input {
     window.addEventListener("blur", () => (this.space = 0));
   }
 
+  /** Two fingers: up and down presses, apart zooms. */
+  private readonly fingers = new Map<number, { x: number; y: number }>();
+  private twoFingers(e: PointerEvent): void {
+    const before = [...this.fingers.values()].map((f) => ({ ...f }));
+    this.fingers.set(e.pointerId, { x: e.clientX, y: e.clientY });
+    const after = [...this.fingers.values()];
+    const [a, b, c, d] = [before[0]!, before[1]!, after[0]!, after[1]!];
+    this.press(((c.y + d.y - a.y - b.y) / 2) * FINGER_MM);
+    const apart = Math.hypot(d.x - c.x, d.y - c.y);
+    if (apart > 1) this.scene.zoom(Math.hypot(b.x - a.x, b.y - a.y) / apart);
+  }
+
   private down(e: PointerEvent): void {
     this.canvas.focus();
+    if (e.pointerType === "touch") this.fingers.set(e.pointerId, { x: e.clientX, y: e.clientY });
+    if (this.fingers.size > 1) {
+      this.drag = null;
+      return;
+    }
     const left = e.button === 0 && !e.altKey;
     const point = left && this.enabled ? this.scene.pick(e.clientX, e.clientY) : null;
     // Beside the thigh, and with Alt, the left button turns the view.
     this.scene.orbit.mouseButtons.LEFT = e.button === 0 && !point ? THREE.MOUSE.ROTATE : null;
+    this.scene.orbit.touches.ONE = point ? null : THREE.TOUCH.ROTATE;
     if (!this.enabled) return;
     if (e.button === 2) this.drag = { kind: "press", x: e.clientX, y: e.clientY, moved: false };
     if (!point) return;
@@ -65,6 +89,7 @@ export class Input {
   }
 
   private move(e: PointerEvent): void {
+    if (this.fingers.size === 2 && this.fingers.has(e.pointerId)) return this.twoFingers(e);
     const point = e.buttons === 0 || this.drag?.kind === "slide" ? this.scene.pick(e.clientX, e.clientY) : null;
     this.canvas.classList.toggle("over", point !== null);
     this.scene.hover(e.buttons === 0 ? point : null, point && this.scene.skin ? this.scene.skin.normalAt(point) : null);
@@ -72,12 +97,13 @@ export class Input {
     if (Math.hypot(e.clientX - this.drag.x, e.clientY - this.drag.y) > 3) this.drag.moved = true;
     if (this.drag.kind === "slide" && point && this.drag.moved) this.place(point);
     if (this.drag.kind === "press") {
-      this.press((e.clientY - this.drag.y) * 0.15);
+      this.press((e.clientY - this.drag.y) * FINGER_MM);
       this.drag.y = e.clientY;
     }
   }
 
   private up(e: PointerEvent): void {
+    this.fingers.delete(e.pointerId);
     const drag = this.drag;
     this.drag = null;
     if (!drag || drag.kind !== "slide" || drag.moved) return;
@@ -124,10 +150,19 @@ export class Input {
     this.actions.moved();
   }
 
+  /** Keys that belong to a field, a focused button, a dialog or the browser. */
+  private static taken(e: KeyboardEvent): boolean {
+    const inField = e.target instanceof HTMLInputElement || e.target instanceof HTMLSelectElement;
+    const onButton = e.target instanceof HTMLElement && e.target.closest("button, a, [role=radio]") !== null;
+    const ownsKey = onButton && (e.code === "Space" || (e.code === "Enter" && !e.shiftKey));
+    const open = document.querySelector("dialog[open]") !== null;
+    return inField || ownsKey || open || e.ctrlKey || e.metaKey || e.altKey;
+  }
+
   private key(e: KeyboardEvent): void {
     if (e.key === "Escape" && !document.querySelector("dialog[open]")) return this.actions.stop();
-    const inField = e.target instanceof HTMLInputElement || document.querySelector("dialog[open]") !== null;
-    if (inField || e.ctrlKey || e.metaKey || e.altKey) return;
+    if (Input.taken(e)) return;
+    if (this.actions.key(e.code, e.shiftKey)) return e.preventDefault();
     const step = e.shiftKey ? 5 : 1;
     const keys: Record<string, () => void> = {
       ArrowUp: () => this.press(step),

@@ -1,68 +1,102 @@
 // The page: connects the server's messages with the views, and the operator's hand with the server.
 
+import { Coach } from "./coach";
 import { gradient } from "./colour";
 import { Connection } from "./connection";
-import { EchoView, label } from "./echo";
+import { Dial } from "./dial";
+import { announce, find, label, minutes, press, pressed, release, remember } from "./dom";
+import { EchoView } from "./echo";
+import { ExamBar } from "./exam";
+import { ForceBar } from "./force_bar";
+import { HistoryDialog } from "./history";
 import { Input } from "./input";
-import { Chips, fillHelp, find, Readouts, Sliders } from "./panel";
+import { fillHelp, Readouts, Sliders } from "./panel";
 import { ForcePlot } from "./plot";
-import { add, Hold, nearestSite, rotate, type Pose } from "./pose";
-import { VERSION, type Controls, type Frame, type Hello, type Snapshot, type TextMessage } from "./protocol";
+import { Hold, nearestSite } from "./pose";
+import { PatientTools } from "./practice";
+import { VERSIONS, type Controls, type Exam, type Frame, type Hello, type Phase, type Replay, type Snapshot, type TextMessage } from "./protocol";
+import { Rates } from "./rates";
+import { ReplayBar } from "./replay";
+import { ResultDialog } from "./result";
 import { ThighScene } from "./scene";
+import { StartDialog } from "./start";
+import { EchoTools } from "./tools";
+import { Traces } from "./traces";
 
 const HOME_SITE = 27;
 const NEAR_MM = 20; // farther from a site its curve says nothing about this place
+const COMFORT = 0.5; // of the limit, when the program does not say what is comfortable
+const LIFTED_MM = -8;
 
 const query = new URLSearchParams(location.search);
 
 class App {
   hello: Hello | null = null;
   controls: Controls | null = null;
+  exam: Exam | null = null;
+  replay: Replay | null = null;
   snapshot: Snapshot | null = null;
   connected = false;
   frames = 0;
   imageSum = 0;
   readonly hold = new Hold();
   readonly scene = new ThighScene(find<HTMLCanvasElement>("scene"), query.get("quality") === "low");
-  readonly echo = new EchoView(
-    find("echo-box"),
-    find<HTMLCanvasElement>("echo"),
-    find<HTMLCanvasElement>("echo-marks"),
-    find("echo-text"),
-  );
-  readonly plot = new ForcePlot(find("plot"));
-  readonly readouts = new Readouts(find("readouts"));
-  readonly sliders = new Sliders(find("sliders"), (key, value) => this.connection.echo(key, value));
-  readonly probes = new Chips(find("probes"), (name) => this.connection.probe(name));
-  readonly cases = new Chips(find("cases"), (name) => this.connection.pathology(name), shortCase);
-  readonly input: Input;
+  readonly echo = new EchoView(find("echo-box"), find<HTMLCanvasElement>("echo-marks"), find("echo-text"), find("measures"));
   readonly connection: Connection;
+  private readonly plot = new ForcePlot(find("plot"));
+  private readonly traces = new Traces();
+  private readonly readouts = new Readouts(find("readouts"));
+  private readonly forceBar = new ForceBar();
+  private readonly dial = new Dial(find("dial"));
+  private readonly sliders = new Sliders(find("sliders"), (key, value) => this.connection.set(key, value));
+  private readonly tools = new EchoTools(this.echo);
+  private readonly patient: PatientTools;
+  private readonly examBar: ExamBar;
+  private readonly replayBar: ReplayBar;
+  private readonly start: StartDialog;
+  private readonly result: ResultDialog;
+  private readonly history: HistoryDialog;
+  private readonly coach = new Coach();
+  private readonly rates = new Rates();
+  private readonly input: Input;
   private pending: Frame | null = null;
   private goalDue = false;
   private curveKey = "";
-  private started = false;
-  private rates = { at_s: 0, tick: 0, frames: 0 };
-  private rates_s = 0; // when they were last computed
-  private shown_s = 0; // when the last frame was drawn
+  private placed = false; // the hold of this thigh is chosen
+  private greeted = false;
+  private lost = false; // since the last hello
+  private through = true; // what the operator chose, also while an exam forbids it
+  private phase: Phase = "practice";
 
   constructor() {
-    this.connection = new Connection({
+    const connection = (this.connection = new Connection({
       text: (message) => this.text(message),
       geometry: (part) => this.scene.setPart(part),
       frame: (frame) => (this.pending = frame),
       state: (connected, wait_s) => this.setConnected(connected, wait_s),
+    }));
+    this.patient = new PatientTools(connection);
+    this.examBar = new ExamBar({
+      decide: (segment, decision) => connection.decide(segment, decision),
+      hint: () => connection.hint(),
+      finish: () => connection.finishExam(),
+      leave: () => connection.leaveExam(),
     });
-    this.input = new Input(find<HTMLCanvasElement>("scene"), this.scene, this.hold, {
-      moved: () => this.moved(),
-      probe: (i) => this.hello?.probes[i] && this.connection.probe(this.hello.probes[i].name),
-      nextCase: () => this.nextCase(),
-      freeze: () => this.freeze(),
-      seeThrough: () => this.toggleThrough(),
-      reset: () => this.reset(),
-      stop: () => this.connection.stop(),
-      help: () => find<HTMLDialogElement>("help").showModal(),
-      sites: () => this.hello?.sites ?? [],
+    this.replayBar = new ReplayBar({
+      seek: (time_s) => connection.seek(time_s),
+      play: (playing, speed) => connection.play(playing, speed),
+      comment: (time_s, text, author) => connection.comment(time_s, text, author),
+      leave: () => connection.leaveExam(),
     });
+    this.start = new StartDialog((wish) => connection.startExam(wish), () => find("scene").focus());
+    this.result = new ResultDialog({
+      replay: (exam) => (this.result.hide(), connection.openReplay(exam)),
+      again: (id) => (this.result.hide(), this.start.again(id)),
+      next: (id) => (this.result.hide(), connection.leaveExam(), this.start.open(this.start.next(id))),
+      close: () => (this.result.hide(), connection.leaveExam()),
+    });
+    this.history = new HistoryDialog((exam) => connection.openReplay(exam));
+    this.input = this.wireInput();
     this.wireButtons();
     const loop = (now: number): void => {
       this.animate(now / 1000);
@@ -71,26 +105,48 @@ class App {
     requestAnimationFrame(loop);
   }
 
+  private wireInput(): Input {
+    return new Input(find<HTMLCanvasElement>("scene"), this.scene, this.hold, {
+      moved: () => this.moved(),
+      probe: (i) => this.hello?.probes[i] && this.connection.probe(this.hello.probes[i].name),
+      nextCase: () => this.nextCase(),
+      freeze: () => this.tools.freeze(),
+      seeThrough: () => this.toggleThrough(),
+      reset: () => this.reset(),
+      stop: () => this.connection.stop(),
+      help: () => find<HTMLDialogElement>("help").showModal(),
+      sites: () => (this.phase === "practice" ? (this.hello?.sites ?? []) : []),
+      key: (code, shift) => this.key(code, shift),
+    });
+  }
+
   private wireButtons(): void {
     fillHelp(find("help").querySelector<HTMLElement>(".keys")!);
     find("legend-bar").style.background = gradient();
     this.scene.rangeChanged = (mm) => (find("legend-top").textContent = `${mm} mm`);
-    const press = (id: string, action: () => void): void => {
-      find(id).onclick = () => {
-        action();
-        find(id).blur();
-      };
-    };
     press("stop", () => this.connection.stop());
     press("resume", () => this.connection.resume());
     press("help-button", () => find<HTMLDialogElement>("help").showModal());
+    press("start-button", () => this.start.open());
+    press("exams-button", () => this.openHistory());
+    press("status", () => this.rates.toggle());
     press("see-through", () => this.toggleThrough());
     press("home", () => this.reset());
     press("depth-less", () => this.setDepth(this.hold.depth_mm - 1));
     press("depth-more", () => this.setDepth(this.hold.depth_mm + 1));
+    press("tab-time", () => this.chart(true));
+    press("tab-depth", () => this.chart(false));
     const slider = find<HTMLInputElement>("depth-slider");
     slider.oninput = () => this.setDepth(slider.valueAsNumber);
-    slider.onchange = () => slider.blur();
+    slider.onchange = () => release(slider);
+  }
+
+  /** Keys that the views own; true when one of them took it. */
+  private key(code: string, shift: boolean): boolean {
+    if (code === "KeyI") this.rates.toggle();
+    else if (this.phase === "replay" && this.controls?.controls && this.replayBar.key(code, shift)) return true;
+    else return this.tools.key(code) || this.examBar.key(code, shift) || this.patient.key(code, shift);
+    return true;
   }
 
   // ---- messages --------------------------------------------------------------------------------
@@ -98,45 +154,53 @@ class App {
   private text(message: TextMessage): void {
     if (message.type === "hello") this.greet(message);
     else if (message.type === "controls") this.setControls(message);
+    else if (message.type === "exam") this.setExam(message);
+    else if (message.type === "exams") this.history.fill(message.list);
+    else if (message.type === "replay") this.setReplay(message);
     else if (message.type === "error") this.say(message.message);
   }
 
   private greet(hello: Hello): void {
-    if (hello.version !== VERSION) return this.say("this page belongs to another version: reload it");
+    if (!VERSIONS.includes(hello.version)) return this.say("this page belongs to another version: reload it");
+    const same = this.hello?.model === hello.model && this.hello.nodes === hello.nodes;
+    this.placed = this.lost && same && this.placed; // the hand stays where it was
+    this.lost = false;
     this.hello = hello;
-    this.started = false;
-    find("model").textContent = `${label(hello.model)}: ${hello.provenance}`;
-    find("model").title = hello.provenance;
     find("about").textContent =
-      `Sonde ${hello.program}. Trains and simulates; not a medical device. ` + `${hello.nodes} skin nodes. ${hello.provenance}`;
-    this.probes.fill(hello.probes.map((p) => p.name));
-    this.cases.fill(hello.cases);
-    this.readouts.setLimit(hello.force_limit_n);
+      `Sonde ${hello.program}. Trains and simulates; not a medical device. ${hello.nodes} skin nodes. ${hello.provenance}`;
+    this.patient.greet(hello);
+    this.start.greet(hello);
+    this.forceBar.limits(hello.force_limit_n, hello.comfort_n ?? COMFORT * hello.force_limit_n);
+    find("start-button").hidden = find("exams-button").hidden = !hello.trainer;
+    this.showMode();
+    if (!this.greeted && hello.trainer && !query.has("site")) window.setTimeout(() => this.offerStart(), 300);
+    this.greeted = true;
+  }
+
+  /** The first question of a new visit; not when an exam already runs, nor to who only watches. */
+  private offerStart(): void {
+    const busy = this.exam !== null && this.exam.phase !== "practice";
+    if (!busy && this.controls?.controls) this.start.open();
   }
 
   /** Comes after the geometry, so the thigh is there now. */
   private setControls(controls: Controls): void {
     const probeChanged = this.controls?.probe !== controls.probe;
     this.controls = controls;
-    this.probes.press(controls.probe);
-    this.cases.press(controls.case);
     this.sliders.set(controls);
     this.echo.set(controls);
-    this.input.enabled = controls.controls;
-    this.probes.enable(controls.controls);
-    this.cases.enable(controls.controls);
-    for (const id of ["depth-slider", "depth-less", "depth-more", "home"])
-      find<HTMLButtonElement>(id).disabled = !controls.controls;
+    this.patient.set(controls);
+    this.scene.setGel((controls.gel_ml ?? 0) > 0.05);
     if (probeChanged) this.plot.clear();
     this.curveKey = "";
-    if (!this.started) this.start(controls);
+    if (!this.placed) this.place(controls);
     this.updateCurve();
-    if (!controls.controls) this.say("Another page controls the probe; this one watches.", 6000);
+    this.showMode();
   }
 
-  /** First controls of a connection: sets the scene up and applies the address's wishes. */
-  private start(controls: Controls): void {
-    this.started = true;
+  /** First controls of a thigh: sets the scene up and applies the address's wishes. */
+  private place(controls: Controls): void {
+    this.placed = true;
     this.scene.setProbes(this.hello!.probes);
     this.scene.setSites(this.hello!.sites);
     if (!controls.controls) return;
@@ -146,14 +210,66 @@ class App {
     if (wantedCase && wantedCase !== controls.case) this.connection.pathology(wantedCase);
     const depth = Number.parseFloat(query.get("depth") ?? "");
     this.setSite(Number.parseInt(query.get("site") ?? `${HOME_SITE}`, 10));
-    this.setDepth(Number.isFinite(depth) ? depth : -8);
+    this.setDepth(Number.isFinite(depth) ? depth : LIFTED_MM);
+    for (const key of ["probe", "case", "depth", "site"]) query.delete(key); // once
+  }
+
+  private setExam(exam: Exam): void {
+    const before = this.phase;
+    this.exam = exam;
+    this.phase = exam.phase;
+    if (exam.phase === "running" && before !== "running") this.begin(before);
+    if (exam.phase === "practice" && exam.message && before !== "practice") this.say(exam.message, 8000);
+    if (exam.phase === "running" || exam.phase === "done") this.examBar.show(exam, this.controls?.controls ?? false);
+    if (exam.phase === "done") this.result.show(exam, this.controls?.controls ?? false);
+    else this.result.hide();
+    if (exam.phase !== "replay") this.replayBar.leave();
+    this.guide(exam);
+    this.showMode();
+  }
+
+  /** An exam begins, or goes on after the page was loaded anew. */
+  private begin(before: Phase): void {
+    remember("trained", "yes");
+    this.start.close();
+    this.history.close();
+    if (this.echo.isFrozen) this.tools.freeze();
+    this.traces.clear();
+    find("hint").classList.add("gone");
+    const s = this.snapshot;
+    if (before === "practice" && s && s.penetration_mm > 0) this.hold.adopt(s.position_mm, s.rotation, s.penetration_mm);
+    find("scene").focus();
+  }
+
+  /** What guidance shows: ring, angle, force. */
+  private guide(exam: Exam): void {
+    const running = exam.phase === "running";
+    const target = running ? exam.step.target : null;
+    const reached = target !== null && exam.step.offset_mm !== null && exam.step.offset_mm <= target.radius_mm;
+    this.scene.setTarget(target, reached);
+    this.forceBar.ask(running ? exam.step.force_n : null);
+    this.dial.show(running ? exam.step.angle_deg : null, exam.step.angle_ok);
+    const name = find("target-label");
+    name.hidden = target === null;
+    const away = exam.step.offset_mm === null || reached ? "" : `${exam.step.offset_mm.toFixed(0)} mm away`;
+    if (target) name.textContent = away ? `${target.name}, ${away}` : target.name;
+    name.classList.toggle("reached", reached);
+  }
+
+  private setReplay(replay: Replay): void {
+    this.replay = replay;
+    this.replayBar.show(replay, this.controls?.controls ?? false);
   }
 
   private setConnected(connected: boolean, wait_s: number): void {
     this.connected = connected;
     find("status").classList.toggle("off", !connected);
     if (connected) find("banner").hidden = true;
-    else this.say(`The connection to Sonde is lost. Trying again in ${wait_s.toFixed(1)} s. Is the program running?`, 0);
+    else {
+      this.lost = true;
+      const running = this.phase === "running" ? " Your exam goes on when it is back." : " Is the program running?";
+      this.say(`The connection to Sonde is lost. Trying again in ${wait_s.toFixed(1)} s.${running}`, 0);
+    }
   }
 
   private sayTimer = 0;
@@ -166,11 +282,83 @@ class App {
     if (ms > 0) this.sayTimer = window.setTimeout(() => (banner.hidden = !this.connected ? banner.hidden : true), ms);
   }
 
+  // ---- modes -----------------------------------------------------------------------------------
+
+  /** This page's hand moves the probe: not when watching, with another device, or in a replay. */
+  private get hands(): boolean {
+    const device = this.hello?.device ?? "page";
+    return (this.controls?.controls ?? false) && device === "page" && this.phase !== "replay" && this.phase !== "preparing";
+  }
+
+  private showMode(): void {
+    const phase = this.phase;
+    const examining = phase === "running" || phase === "done";
+    const judged = phase === "running" || phase === "preparing"; // nothing may tell the truth
+    const guidance = this.exam?.guidance ?? "full";
+    document.body.dataset.phase = phase;
+    find("practice-bar").hidden = examining || phase === "replay";
+    find("exam-bar").hidden = !examining;
+    find("replay-bar").hidden = phase !== "replay";
+    find("comments").hidden = phase !== "replay";
+    find("sliders").hidden = phase === "replay";
+    this.header(phase);
+    this.preparing();
+    const bare = judged && guidance === "exam";
+    find<HTMLButtonElement>("see-through").disabled = bare;
+    this.applyThrough(this.through && !bare);
+    this.scene.showSites(phase === "practice");
+    this.echo.tellCase(phase === "practice");
+    this.readouts.showVessels(!judged || guidance === "full");
+    this.traces.showVessels(!judged || guidance === "full");
+    find("tab-depth").hidden = phase !== "practice";
+    if (phase !== "practice") this.chart(true);
+    if (phase !== "practice") this.patient.openTissue(false);
+    this.input.enabled = this.hands;
+    for (const id of ["depth-slider", "depth-less", "depth-more", "home"]) find<HTMLButtonElement>(id).disabled = !this.hands;
+    this.coach.show(this.exam, this.hands);
+  }
+
+  private header(phase: Phase): void {
+    const exam = this.exam;
+    const own = exam !== null && phase !== "practice" && exam.title !== "";
+    find("case-title").textContent = own ? exam.title : label(this.hello?.model ?? "");
+    find("case-history").textContent = own ? exam.history : (this.hello?.provenance ?? "");
+    find("case").title = find("case-history").textContent ?? "";
+    find("watching").hidden = this.controls?.controls ?? true;
+    const device = this.hello?.device ?? "page";
+    if (device !== "page" && this.controls?.controls) find("hint").textContent = `The probe is moved by: ${device}.`;
+    const clock = find("clock");
+    clock.hidden = phase !== "running" && phase !== "done";
+    clock.classList.toggle("recording", phase === "running" && (exam?.recording ?? false));
+    clock.title = exam?.recording ? "This exam is recorded" : "This exam is not recorded";
+    find("clock-text").textContent = minutes(exam?.elapsed_s ?? 0);
+  }
+
+  private preparing(): void {
+    const on = this.phase === "preparing";
+    find("preparing").hidden = !on;
+    if (!on || !this.exam) return;
+    find("preparing-text").textContent = this.exam.message || "Preparing the case";
+    find<HTMLProgressElement>("preparing-bar").value = this.exam.progress;
+  }
+
+  private openHistory(): void {
+    this.history.open(this.hello?.trainee ?? "");
+    this.connection.listExams();
+  }
+
+  private chart(time: boolean): void {
+    pressed("tab-time", time);
+    pressed("tab-depth", !time);
+    find("traces").hidden = !time;
+    find("plot-box").hidden = time;
+  }
+
   // ---- what the operator does ------------------------------------------------------------------
 
   private moved(): void {
     this.goalDue = true;
-    if (this.started && this.snapshot && this.snapshot.tick > 0 && this.hold.depth_mm > 0) find("hint").classList.add("gone");
+    if (this.snapshot && this.snapshot.tick > 0 && this.hold.depth_mm > 0) find("hint").classList.add("gone");
     find("depth-value").textContent = `${this.hold.depth_mm.toFixed(1).replace(/\.0$/, "")} mm`;
     find<HTMLInputElement>("depth-slider").value = String(this.hold.depth_mm);
     this.updateCurve();
@@ -203,7 +391,7 @@ class App {
   }
 
   private reset(): void {
-    this.hold.setDepth(-8);
+    this.hold.setDepth(LIFTED_MM);
     this.setSite(HOME_SITE);
     this.scene.home();
     this.plot.clear();
@@ -212,17 +400,18 @@ class App {
   private nextCase(): void {
     const cases = this.hello?.cases ?? [];
     const next = cases[(cases.indexOf(this.controls?.case ?? "") + 1) % cases.length];
-    if (next) this.connection.pathology(next);
-  }
-
-  private freeze(): void {
-    this.echo.freeze(!this.echo.isFrozen);
-    find("frozen").hidden = !this.echo.isFrozen;
+    if (next && this.phase === "practice") this.connection.pathology(next);
   }
 
   private toggleThrough(): void {
-    this.scene.seeThrough(!this.scene.isThrough);
-    find("see-through").setAttribute("aria-pressed", String(this.scene.isThrough));
+    if (find<HTMLButtonElement>("see-through").disabled) return;
+    this.through = !this.through;
+    this.applyThrough(this.through);
+  }
+
+  private applyThrough(on: boolean): void {
+    if (this.scene.isThrough !== on) this.scene.seeThrough(on);
+    pressed("see-through", on);
   }
 
   /** The nearest site's measured curve for this probe, or the reason why there is none. */
@@ -251,18 +440,18 @@ class App {
 
   private animate(now_s: number): void {
     this.input.tick(now_s);
-    if (this.goalDue && this.controls?.controls) {
+    if (this.goalDue && this.hands) {
       this.goalDue = false;
-      const pose: Pose = this.hold.pose();
+      const pose = this.hold.pose();
       this.connection.goal(pose.position_mm, pose.rotation);
     }
     const frame = this.pending;
     this.pending = null;
     if (frame) this.show(frame);
-    if (frame) this.shown_s = now_s;
     this.scene.render();
+    this.nameTarget();
     if (frame) this.connection.ack(frame.sequence);
-    if (now_s - this.rates_s > 1) this.showRates(now_s);
+    this.rates.update(now_s, frame !== null, this.snapshot?.tick ?? 0, this.connected, this.connection.latency_ms);
   }
 
   private show(frame: Frame): void {
@@ -273,18 +462,30 @@ class App {
     this.scene.show(frame);
     this.echo.show(frame);
     this.readouts.show(s);
-    if (!this.controls?.controls) this.follow(s);
+    this.forceBar.show(s);
+    this.traces.add(s);
+    this.examBar.follow(s.position_mm[2], s.penetration_mm > 0);
+    if (!this.hands) this.follow(s);
     if (s.penetration_mm > -1) this.plot.add(s.penetration_mm, Math.max(0, s.force_normal_n));
     this.showFault(s.fault);
   }
 
   /** A watching page takes over the hold that it sees, so that nothing jumps when it may control. */
   private follow(s: Snapshot): void {
-    const z = rotate(s.rotation, [0, 0, 1]);
-    this.hold.at(add(s.position_mm, z, -s.penetration_mm), [-z[0], -z[1], -z[2]]);
-    this.hold.setDepth(s.penetration_mm);
+    this.hold.adopt(s.position_mm, s.rotation, s.penetration_mm);
     this.moved();
     this.goalDue = false;
+  }
+
+  /** Writes the target's name beside its ring. */
+  private nameTarget(): void {
+    const at = this.scene.targetOnScreen();
+    const name = find("target-label");
+    if (!at || name.hidden) return;
+    const [w, h] = [name.parentElement!.clientWidth - name.offsetWidth, name.parentElement!.clientHeight - name.offsetHeight];
+    const x = Math.max(6, Math.min(w - 6, at[0] - name.offsetWidth / 2));
+    const y = Math.max(6, Math.min(h - 6, at[1] - name.offsetHeight - 6));
+    name.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px)`;
   }
 
   private shownFault = -1;
@@ -299,28 +500,8 @@ class App {
     const advice = document.createElement("small");
     advice.textContent = "The force has faded to zero. Press Resume to go on.";
     box.replaceChildren(`${label(sentence)}.`, document.createElement("br"), advice);
+    if (fault) announce(`${sentence}. Press Resume to go on.`);
   }
-
-  private showRates(now_s: number): void {
-    const r = this.rates;
-    const tick = this.snapshot?.tick ?? 0;
-    const first = r.tick === 0;
-    const dt_s = Math.max(0.001, this.shown_s - r.at_s);
-    const ticks_s = Math.max(0, tick - r.tick) / dt_s;
-    const images_s = (this.frames - r.frames) / dt_s;
-    this.rates = { at_s: this.shown_s, tick, frames: this.frames };
-    this.rates_s = now_s;
-    if (first && this.connected) return;
-    const latency = Number.isNaN(this.connection.latency_ms) ? "" : `, ${this.connection.latency_ms.toFixed(0)} ms`;
-    find("status").textContent = this.connected
-      ? `${ticks_s.toFixed(0)} steps/s, ${images_s.toFixed(0)} images/s${latency}`
-      : "not connected";
-  }
-}
-
-/** Chips have little room: "partial_mural" -> "Partial". */
-function shortCase(name: string): string {
-  return label(name.split("_")[0] ?? name);
 }
 
 const app = new App();
@@ -331,10 +512,14 @@ const sonde = {
   get connected() { return app.connected; },
   get controls() { return app.controls; },
   get hello() { return app.hello; },
+  get exam() { return app.exam; },
+  get replay() { return app.replay; },
   get frames() { return app.frames; },
   /** changes whenever the echo image changes */
   get imageSum() { return app.imageSum; },
+  get measures() { return app.echo.measures; },
   get depth() { return app.hold.depth_mm; },
+  get point() { return app.hold.point; },
   setDepth: (depth_mm: number) => app.setDepth(depth_mm),
   setSite: (id: number) => app.setSite(id),
   selectProbe: (name: string) => app.connection.probe(name),

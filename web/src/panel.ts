@@ -1,21 +1,8 @@
-// Everything of the page that is neither picture, thigh nor plot: choices, sliders, read-outs.
+// Everything of the page that is neither picture, thigh nor plot: choices, sliders, read-outs, keys.
 
 import type { EchoKey } from "./connection";
-import { label } from "./echo";
+import { label, make, release } from "./dom";
 import type { Controls, Snapshot } from "./protocol";
-
-export function find<T extends HTMLElement>(id: string): T {
-  const element = document.getElementById(id);
-  if (!element) throw new Error(`#${id} is missing`);
-  return element as T;
-}
-
-function make(tag: string, className = "", text = ""): HTMLElement {
-  const element = document.createElement(tag);
-  if (className) element.className = className;
-  element.textContent = text;
-  return element;
-}
 
 /** A row of buttons of which one is pressed. */
 export class Chips {
@@ -36,7 +23,7 @@ export class Chips {
         button.title = label(name);
         button.onclick = () => {
           this.choose(name);
-          button.blur();
+          release(button);
         };
         return button;
       }),
@@ -63,9 +50,11 @@ interface SliderInfo {
 
 const SLIDERS: SliderInfo[] = [
   { key: "gain_db", name: "Gain", unit: "dB", low: -30, high: 30, step: 1 },
-  { key: "depth_mm", name: "Image depth", unit: "mm", low: 30, high: 120, step: 5 },
+  { key: "depth_mm", name: "Depth", unit: "mm", low: 30, high: 120, step: 5 },
   { key: "frequency_mhz", name: "Frequency", unit: "MHz", low: 2, high: 12, step: 0.5 },
-  { key: "dynamic_range_db", name: "Dynamic range", unit: "dB", low: 30, high: 90, step: 5 },
+  { key: "dynamic_range_db", name: "Range", unit: "dB", low: 30, high: 90, step: 5 },
+  { key: "focus_mm", name: "Focus", unit: "mm", low: 5, high: 115, step: 1 },
+  { key: "tgc_db_per_cm", name: "TGC", unit: "dB/cm", low: -10, high: 10, step: 0.5 },
 ];
 
 export class Sliders {
@@ -87,7 +76,7 @@ export class Sliders {
       this.write(output, info, input.valueAsNumber);
       this.change(info.key, input.valueAsNumber);
     };
-    input.onchange = () => input.blur(); // the arrow keys press the probe again
+    input.onchange = () => release(input); // the arrow keys press the probe again
     row.append(make("span", "caption", info.name), output, input);
     this.inputs.set(info.key, { input, output, info });
     return row;
@@ -110,91 +99,68 @@ export class Sliders {
 interface Gauge {
   row: HTMLElement;
   value: HTMLElement;
-  fill: HTMLElement;
 }
 
+/** A line of numbers: depth, contact, vein, artery. */
 export class Readouts {
-  private readonly force = make("b");
-  private readonly forceFill = make("i");
-  private readonly limit = make("span");
-  private readonly penetration: HTMLElement;
+  private readonly depth: Gauge;
   private readonly vein: Gauge;
+  private readonly diameter: Gauge;
   private readonly artery: Gauge;
-  private limit_n = 40;
+  private vessels = true;
 
   constructor(private readonly box: HTMLElement) {
-    const force = make("div", "force");
-    force.append(make("span", "caption", "Force on the probe"), this.force);
-    const bar = make("div");
-    const track = make("div", "bar");
-    track.append(this.forceFill);
-    const scale = make("div", "scale");
-    scale.append(make("span", "", "0"), this.limit);
-    bar.append(track, scale);
-    const row = make("div", "row");
-    this.penetration = make("b");
-    row.append(make("span", "caption", "Penetration"), this.penetration);
-    this.box.append(force, bar, row);
-    this.vein = this.gauge("Vein area", "var(--vein)");
-    this.artery = this.gauge("Artery area", "var(--artery)");
-    this.setLimit(40);
+    this.depth = this.gauge("Depth");
+    this.vein = this.gauge("Vein area", "vein");
+    this.diameter = this.gauge("Vein, short diameter", "vein");
+    this.artery = this.gauge("Artery area", "artery");
   }
 
-  private gauge(name: string, colour: string): Gauge {
-    const row = make("div", "row");
+  private gauge(name: string, colour = ""): Gauge {
+    const row = make("div", `readout ${colour}`);
     const value = make("b");
-    const bar = make("div", "bar");
-    const fill = make("i");
-    fill.style.background = colour;
-    bar.append(fill);
-    row.append(make("span", "caption", name), value, bar);
+    row.append(make("span", "caption", name), value);
     this.box.append(row);
-    return { row, value, fill };
+    return { row, value };
   }
 
-  setLimit(limit_n: number): void {
-    this.limit_n = limit_n;
-    this.limit.textContent = `limit ${limit_n.toFixed(0)} N`;
+  /** In an exam without full guidance the learner judges the vein by eye. */
+  showVessels(on: boolean): void {
+    if (this.vessels === on) return;
+    this.vessels = on;
+    for (const g of [this.vein, this.diameter, this.artery]) g.row.hidden = !on;
   }
 
-  private static number(element: HTMLElement, text: string, unit: string): void {
-    element.replaceChildren(text, make("small", "", unit));
-  }
-
-  private setGauge(gauge: Gauge, ratio: number): void {
-    const away = Number.isNaN(ratio);
+  private static number(gauge: Gauge, value: number, digits: number, unit: string): void {
+    const away = !Number.isFinite(value);
     gauge.row.classList.toggle("away", away);
-    if (away) gauge.value.textContent = "not in view";
-    else Readouts.number(gauge.value, (100 * ratio).toFixed(0), "% of rest");
-    gauge.fill.style.width = away ? "0" : `${Math.min(100, 100 * ratio)}%`;
+    gauge.value.replaceChildren(away ? "not in view" : value.toFixed(digits), ...(away ? [] : [make("small", "", unit)]));
   }
 
   show(s: Snapshot): void {
-    const share = Math.max(0, s.force_normal_n) / this.limit_n;
-    Readouts.number(this.force, Math.max(0, s.force_normal_n).toFixed(1), "N");
-    this.forceFill.style.width = `${Math.min(100, 100 * share)}%`;
-    this.forceFill.style.background = share > 0.95 ? "var(--danger)" : share > 0.75 ? "var(--warn)" : "var(--accent)";
-    const deep = s.penetration_mm;
-    if (deep > -0.05) Readouts.number(this.penetration, Math.abs(deep).toFixed(1), "mm");
-    else Readouts.number(this.penetration, (-deep).toFixed(1), "mm above");
-    this.setGauge(this.vein, s.vein_area_ratio);
-    this.setGauge(this.artery, s.artery_area_ratio);
+    const above = s.penetration_mm < -0.05;
+    Readouts.number(this.depth, Math.abs(s.penetration_mm), 1, above ? "mm above" : "mm");
+    Readouts.number(this.vein, 100 * s.vein_area_ratio, 0, "% of rest");
+    Readouts.number(this.diameter, Number.isNaN(s.vein_area_ratio) ? NaN : s.vein_short_mm, 1, "mm");
+    Readouts.number(this.artery, 100 * s.artery_area_ratio, 0, "% of rest");
   }
 }
 
 const KEYS: [string, string][] = [
-  ["Drag on the thigh", "slide the probe along the skin; a far click lifts it and sets it down there"],
-  ["Click a dot", "go to that measured site"],
-  ["Wheel, Up / Down, W / S", "press deeper or shallower by 1 mm, with Shift by 5 mm"],
+  ["Drag on the thigh", "slides the probe along the skin; a far click lifts it and sets it down there"],
+  ["Wheel, two fingers, Up / Down, W / S", "press deeper or shallower by 1 mm, with Shift by 5 mm"],
   ["Right drag, hold Space", "press progressively (Shift + Space lifts)"],
   ["A / D, Left / Right", "slide across or along the leg"],
-  ["Q / E", "rotate about the beam"],
-  ["T / G, Y / H", "tilt the beam"],
-  ["1 to 9, C", "choose the probe, next case"],
-  ["F, X", "freeze the image, see through the skin"],
-  ["R", "lift and return above site 27"],
-  ["Esc", "emergency stop; Resume continues"],
-  ["Drag beside the thigh", "turn the view; also middle drag or Alt + drag. Ctrl + wheel zooms"],
+  ["Q / E, T / G, Y / H", "rotate about the beam, tilt the beam"],
+  ["Drag beside the thigh", "turns the view; Ctrl + wheel zooms; X see through; R reset"],
+  ["1 to 9, C", "choose the probe, next vein (free practice)"],
+  ["F, M, O, B", "freeze; measure a distance, an area (Delete clears); compare with now"],
+  ["P, V, Z", "patient's position, strain, gel (Shift + Z wipes)"],
+  [", and .", "segment before, next segment"],
+  ["J, K, L", "finding: compressible, clot, not seen"],
+  ["U, Shift + Enter", "hint, finish the exam"],
+  ["Replay: Space, Left / Right", "play or pause, 1 s back or on (Shift: 5 s)"],
+  ["I, Esc", "latency and frame rate; emergency stop (Resume goes on)"],
 ];
 
 export function fillHelp(box: HTMLElement): void {

@@ -127,6 +127,17 @@ export class Hold {
     return [x, y, z];
   }
 
+  /** Takes over a pose of the probe as it is, untilted, with its depth below the skin. */
+  adopt(position_mm: Vec3, rotation: Quat, depth_mm: number): void {
+    const z = rotate(rotation, [0, 0, 1]);
+    this.straighten();
+    this.at(add(position_mm, z, -depth_mm), [-z[0], -z[1], -z[2]]);
+    this.setDepth(depth_mm);
+    const [x, y] = this.axes();
+    const now = rotate(rotation, [1, 0, 0]);
+    this.rotation = Math.atan2(dot(now, y), dot(now, x));
+  }
+
   pose(): Pose {
     const [x, y, z] = this.axes();
     return { position_mm: add(this.point, this.normal, -this.depth_mm), rotation: quaternion(x, y, z) };

@@ -35,6 +35,27 @@ export interface Hello {
   cases: string[];
   faults: string[];
   sites: Site[];
+  // version 2
+  trainer?: boolean;
+  trainee?: string;
+  case_list?: CaseInfo[];
+  protocols?: ProtocolInfo[];
+  device?: string;
+  /** above it a press is uncomfortable; half the limit when absent */
+  comfort_n?: number;
+}
+
+export interface CaseInfo {
+  id: string;
+  title: string;
+  history: string;
+  level: "first" | "easy" | "hard";
+}
+
+export interface ProtocolInfo {
+  id: string;
+  title: string;
+  text: string;
 }
 
 export interface Controls {
@@ -49,11 +70,134 @@ export interface Controls {
   dynamic_range_db: number;
   focus_mm: number;
   tgc_db_per_cm: number;
+  // version 2
+  posture?: Posture;
+  valsalva?: boolean;
+  gel?: boolean;
+  gel_ml?: number;
+  stiffness_scale?: number;
+  damping_scale?: number;
+  friction_scale?: number;
+}
+
+export type Posture = "supine" | "sitting" | "standing";
+export type Guidance = "full" | "hints" | "exam";
+export type Decision = "" | "compressible" | "clot" | "not_seen";
+export type PressResult = "complete" | "open" | "too_hard" | "off_axis" | "insufficient";
+export type Phase = "practice" | "preparing" | "running" | "done" | "replay";
+
+export interface Target {
+  name: string;
+  position_mm: Vec3;
+  normal: Vec3;
+  across: Vec3;
+  radius_mm: number;
+}
+
+export interface Step {
+  text: string;
+  detail: string;
+  target: Target | null;
+  force_n: [number, number] | null;
+  offset_mm: number | null;
+  angle_deg: number | null;
+  angle_ok: boolean;
+}
+
+export interface Compression {
+  state: "none" | "pressing" | "complete" | "open" | "too_hard" | "off_axis";
+  vein: number | null;
+  artery: number | null;
+}
+
+export interface Segment {
+  id: string;
+  title: string;
+  from_mm: number;
+  to_mm: number;
+  needed: boolean;
+  points: number;
+  done: number;
+  decision: Decision;
+}
+
+export interface Press {
+  t_s: number;
+  z_mm: number;
+  segment: string;
+  result: PressResult;
+  force_n: number;
+}
+
+export interface Result {
+  score: number;
+  passed: boolean;
+  correct: boolean;
+  summary: string;
+  report: string;
+  diagnosis: { asked: string; truth: string };
+}
+
+export interface Exam {
+  type: "exam";
+  phase: Phase;
+  message: string;
+  progress: number;
+  exam: string;
+  case: string;
+  title: string;
+  history: string;
+  protocol: string;
+  guidance: Guidance;
+  elapsed_s: number;
+  recording: boolean;
+  step: Step;
+  compression: Compression | null;
+  segments: Segment[];
+  presses: Press[];
+  hint: string;
+  hints_used: number;
+  result: Result | null;
+}
+
+export interface ExamEntry {
+  id: string;
+  trainee: string;
+  case: string;
+  title: string;
+  date: string;
+  protocol: string;
+  score: number | null;
+  passed: boolean;
+  seconds: number;
+  report: string;
+  recording: boolean;
+}
+
+export interface Comment {
+  t_s: number;
+  text: string;
+  author: string;
+}
+
+export interface Replay {
+  type: "replay";
+  exam: string;
+  title: string;
+  duration_s: number;
+  time_s: number;
+  playing: boolean;
+  speed: number;
+  presses: Press[];
+  comments: Comment[];
 }
 
 export type TextMessage =
   | Hello
   | Controls
+  | Exam
+  | Replay
+  | { type: "exams"; list: ExamEntry[] }
   | { type: "error"; message: string }
   | { type: "pong"; id: number };
 
@@ -107,7 +251,8 @@ export interface Frame {
 }
 
 export const PART = { skin: 0, femur: 1, vein: 2, artery: 3, probe: 16 } as const;
-export const VERSION = 2;
+/** versions of the protocol that this page speaks; 1 has no trainer */
+export const VERSIONS = [1, 2];
 
 const HEADER = 16;
 const MESH_FIXED = 24;
@@ -196,7 +341,7 @@ export function decode(bytes: ArrayBuffer): Mesh | Line | Frame {
   const c = new Cursor(new DataView(bytes), 0);
   if (bytes.byteLength < HEADER || c.u32() !== MAGIC) throw new Error("not a Sonde message");
   const version = c.u16();
-  if (version !== VERSION) throw new Error(`protocol version ${version} is not ${VERSION}`);
+  if (!VERSIONS.includes(version)) throw new Error(`protocol version ${version} is not one of ${VERSIONS.join(", ")}`);
   const type = c.u16();
   const id = c.u32();
   if (c.u32() !== bytes.byteLength) throw new Error("a message was cut");

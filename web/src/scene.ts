@@ -5,8 +5,10 @@ import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { toCreasedNormals } from "three/examples/jsm/utils/BufferGeometryUtils.js";
 import { nextRange, SHADES, SHADE_TABLE } from "./colour";
+import { Gel } from "./gel";
 import { Skin } from "./pose";
-import { PART, type Frame, type Line, type Mesh, type ProbeInfo, type Quat, type Site, type Vec3 } from "./protocol";
+import { TargetMark } from "./target";
+import { PART, type Frame, type Line, type Mesh, type ProbeInfo, type Quat, type Site, type Target, type Vec3 } from "./protocol";
 
 const COLOUR = { vein: 0x5b8def, artery: 0xe0604d, bone: 0xe7dfcb, probe: 0xd3dae2, mark: 0x5cc8c2 };
 const CALM_ALPHA = 0.4; // of see-through skin at rest; displaced skin is up to MOVED_ALPHA
@@ -14,18 +16,26 @@ const MOVED_ALPHA = 0.86;
 const CREASE_RAD = 0.6; // sharper edges are drawn sharp
 const BEHIND_MM = 46; // how much of a probe's body is drawn: a hand's breadth, not the whole handle
 
-/** Skin: vertex colours with alpha; more opaque where it is seen at a grazing angle, like glass. */
+/** Skin: vertex colours with alpha; more opaque where it is seen at a grazing angle, like glass; where
+ *  it is wet with gel it shines. */
 function skinMaterial(): THREE.MeshStandardMaterial {
   const material = new THREE.MeshStandardMaterial({ vertexColors: true, roughness: 0.78, metalness: 0 });
   material.onBeforeCompile = (shader) => {
-    shader.fragmentShader = shader.fragmentShader.replace(
-      "#include <opaque_fragment>",
-      `#ifndef OPAQUE
-        float facing = abs(dot(normal, normalize(vViewPosition)));
-        diffuseColor.a = mix(1.0, diffuseColor.a, smoothstep(0.0, 0.75, facing));
-      #endif
-      #include <opaque_fragment>`,
-    );
+    shader.vertexShader = shader.vertexShader
+      .replace("#include <common>", "#include <common>\nattribute float wet; varying float vWet;")
+      .replace("#include <begin_vertex>", "#include <begin_vertex>\nvWet = wet;");
+    shader.fragmentShader = shader.fragmentShader
+      .replace("#include <common>", "#include <common>\nvarying float vWet;")
+      .replace("#include <roughnessmap_fragment>", "#include <roughnessmap_fragment>\nroughnessFactor = mix(roughnessFactor, 0.16, vWet);")
+      .replace(
+        "#include <opaque_fragment>",
+        `float facing = abs(dot(normal, normalize(vViewPosition)));
+        outgoingLight += vWet * vec3(0.05, 0.12, 0.15) * (1.4 - facing);
+        #ifndef OPAQUE
+          diffuseColor.a = mix(1.0, max(diffuseColor.a, 0.6 * vWet), smoothstep(0.0, 0.75, facing));
+        #endif
+        #include <opaque_fragment>`,
+      );
   };
   return material;
 }
@@ -77,6 +87,10 @@ export class ThighScene {
   private readonly ends = new THREE.Mesh(new THREE.BufferGeometry(), endMaterial());
   private restMesh: THREE.Mesh | null = null; // never drawn: the rays meet the resting skin
   private dots: THREE.InstancedMesh | null = null;
+  private readonly gel = new Gel();
+  private readonly target = new TargetMark();
+  private probes: readonly ProbeInfo[] = [];
+  private gelled = false;
   private dotInfo: SiteDot[] = [];
   private range_mm = 10;
   private through = true;
@@ -102,7 +116,7 @@ export class ThighScene {
     this.plane.renderOrder = 2.5; // after the skin, so that it shows through at full brightness
     this.plane.rotation.set(Math.PI / 2, 0, 0);
     this.probe.add(this.plane);
-    this.scene.add(this.inside, this.probe, this.ring);
+    this.scene.add(this.inside, this.probe, this.ring, this.target.group);
     this.addLights();
     this.camera.up.set(0, 1, 0);
     this.orbit = new OrbitControls(this.camera, canvas);
@@ -126,7 +140,7 @@ export class ThighScene {
     this.orbit.enableDamping = false;
     this.orbit.enableZoom = false; // the wheel presses; Ctrl + wheel zooms (input.ts)
     this.orbit.mouseButtons = { LEFT: null, MIDDLE: THREE.MOUSE.ROTATE, RIGHT: null };
-    this.orbit.touches = { ONE: null, TWO: THREE.TOUCH.DOLLY_ROTATE };
+    this.orbit.touches = { ONE: null, TWO: null }; // one finger beside the thigh turns (input.ts)
     this.orbit.minDistance = 220;
     this.orbit.maxDistance = 1400;
     this.orbit.addEventListener("change", () => (this.dirty = true));
@@ -199,6 +213,8 @@ export class ThighScene {
     const colours = new Float32Array((mesh.points.length / 3) * 4).fill(CALM_ALPHA);
     for (let i = 0; i < colours.length; i += 4) colours.set(SHADE_TABLE.subarray(0, 3), i);
     g.setAttribute("color", new THREE.BufferAttribute(colours, 4));
+    this.gel.resize(mesh.points.length / 3);
+    g.setAttribute("wet", new THREE.BufferAttribute(this.gel.wet, 1));
     this.surface?.geometry.dispose();
     this.surface?.removeFromParent();
     this.surface = new THREE.Mesh(g, this.skinMaterial);
@@ -257,6 +273,7 @@ export class ThighScene {
 
   /** The coloured mark of each probe: the image's left side. */
   setProbes(probes: readonly ProbeInfo[]): void {
+    this.probes = probes;
     probes.forEach((info, i) => {
       const mark = new THREE.Mesh(new THREE.SphereGeometry(1.6, 16, 12), new THREE.MeshBasicMaterial({ color: COLOUR.mark }));
       mark.position.set(-info.half_x_mm, 0, -Math.min(10, 4 * info.half_y_mm));
@@ -275,6 +292,36 @@ export class ThighScene {
     this.dotInfo = sites.map((site) => ({ node: this.nearestNode(site.position_mm), rest: new THREE.Vector3(...site.position_mm) }));
     this.scene.add(this.dots);
     this.moveDots(null);
+  }
+
+  /** The measured sites mean something in free practice only. */
+  showSites(on: boolean): void {
+    if (!this.dots || this.dots.visible === on) return;
+    this.dots.visible = on;
+    this.dirty = true;
+  }
+
+  setTarget(target: Target | null, reached: boolean): void {
+    if (this.target.set(target, reached)) this.dirty = true;
+  }
+
+  /** Where the target's name belongs on the canvas, px; null when there is none or it is behind. */
+  targetOnScreen(): [number, number] | null {
+    if (!this.target.group.visible) return null;
+    const p = this.target.anchor.clone().project(this.camera);
+    if (p.z > 1) return null;
+    return [((p.x + 1) / 2) * this.canvas.clientWidth, ((1 - p.y) / 2) * this.canvas.clientHeight];
+  }
+
+  setGel(on: boolean): void {
+    this.gelled = on;
+    if (!on && this.gel.wipe()) this.wetSkin();
+  }
+
+  private wetSkin(): void {
+    const wet = this.surface?.geometry.getAttribute("wet");
+    if (wet) wet.needsUpdate = true;
+    this.dirty = true;
   }
 
   private nearestNode(p: Vec3): number {
@@ -309,6 +356,8 @@ export class ThighScene {
     this.moveDots(frame);
     this.placeProbe(frame.snapshot.probe, frame.snapshot.position_mm, frame.snapshot.rotation);
     this.placeImage(frame);
+    const probe = this.probes[frame.snapshot.probe];
+    if (this.gelled && probe && this.skin && this.gel.spread(this.skin.points, frame.snapshot, probe)) this.wetSkin();
     this.dirty = true;
   }
 

@@ -1,0 +1,69 @@
+// Says to a newcomer, one sentence at a time and next to the thing, what to do in the first guided
+// exam. Each sentence goes when it has been done.
+
+import { find, press, recall, remember } from "./dom";
+import type { Exam } from "./protocol";
+
+interface Mark {
+  id: string;
+  anchor: string;
+  text: string;
+  done(exam: Exam): boolean;
+}
+
+const far = (exam: Exam): boolean => {
+  const { target, offset_mm } = exam.step;
+  return target !== null && offset_mm !== null && offset_mm > target.radius_mm;
+};
+const pressed = (exam: Exam): boolean => exam.presses.some((p) => p.result === "complete" || p.result === "open");
+const decided = (exam: Exam): boolean => exam.segments.some((s) => s.decision !== "");
+
+const MARKS: Mark[] = [
+  { id: "move", anchor: "stage", text: "Drag the probe along the skin into the ring.", done: (e) => !far(e) },
+  { id: "press", anchor: "press", text: "Press: pull this slider up until the bar reaches the bracket, watch the vein in the image, then let go.", done: pressed },
+  { id: "decide", anchor: "decide", text: "Say what you saw here. The bar above leads you to the next point.", done: decided },
+];
+
+export class Coach {
+  private readonly box = find("coach");
+  private seen = new Set(recall("coach").split(" "));
+
+  constructor() {
+    press("coach-close", () => this.close());
+  }
+
+  private now: Mark | null = null;
+
+  private close(): void {
+    if (this.now) this.seen.add(this.now.id);
+    remember("coach", [...this.seen].join(" "));
+    this.place(null);
+  }
+
+  show(exam: Exam | null, controls: boolean): void {
+    const coaching = exam !== null && exam.phase === "running" && exam.guidance === "full" && controls;
+    if (!coaching) return this.place(null);
+    const next = MARKS.find((m) => !this.seen.has(m.id));
+    if (next?.done(exam)) {
+      this.now = next;
+      this.close();
+      return this.show(exam, controls);
+    }
+    this.place(next ?? null);
+  }
+
+  private place(mark: Mark | null): void {
+    this.now = mark;
+    this.box.hidden = mark === null;
+    if (!mark) return;
+    find("coach-text").textContent = mark.text;
+    this.box.dataset.at = mark.id;
+    const a = find(mark.anchor).getBoundingClientRect();
+    const b = this.box.getBoundingClientRect();
+    const [x, y] =
+      mark.id === "move" ? [a.left + (a.width - b.width) / 2, a.bottom - b.height - 64]
+      : mark.id === "press" ? [a.left - b.width - 14, a.top + a.height * 0.4]
+      : [Math.min(a.left + 10, innerWidth - b.width - 12), a.bottom + 12];
+    Object.assign(this.box.style, { left: `${Math.max(8, x)}px`, top: `${Math.max(8, y)}px` });
+  }
+}

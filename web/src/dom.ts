@@ -1,0 +1,90 @@
+// Small helpers for the document: finding, making, announcing, and giving the focus back.
+
+export function find<T extends HTMLElement>(id: string): T {
+  const element = document.getElementById(id);
+  if (!element) throw new Error(`#${id} is missing`);
+  return element as T;
+}
+
+export function make<K extends keyof HTMLElementTagNameMap>(tag: K, className = "", text = ""): HTMLElementTagNameMap[K] {
+  const element = document.createElement(tag);
+  if (className) element.className = className;
+  element.textContent = text;
+  return element;
+}
+
+const SVG = "http://www.w3.org/2000/svg";
+
+export function draw(tag: string, attributes: Record<string, string | number> = {}, text = ""): SVGElement {
+  const element = document.createElementNS(SVG, tag);
+  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, String(value));
+  if (text) element.textContent = text;
+  return element;
+}
+
+export function button(text: string, action: () => void, className = ""): HTMLButtonElement {
+  const element = make("button", className, text);
+  element.type = "button";
+  element.onclick = () => {
+    action();
+    release(element);
+  };
+  return element;
+}
+
+let byPointer = false;
+window.addEventListener("pointerdown", () => (byPointer = true), true);
+window.addEventListener("keydown", () => (byPointer = false), true);
+
+/** After a click the keys move the probe again; who came by keyboard stays where he is. */
+export function release(element: HTMLElement): void {
+  if (byPointer) element.blur();
+}
+
+/** Wires a button of the document. */
+export function press(id: string, action: () => void): void {
+  const element = find(id);
+  element.onclick = () => {
+    action();
+    release(element);
+  };
+}
+
+export function pressed(id: string, on: boolean): void {
+  find(id).setAttribute("aria-pressed", String(on));
+}
+
+/** Said by screen readers; the same sentence is not said twice in a row. */
+export function announce(sentence: string): void {
+  const live = find("live");
+  if (live.textContent !== sentence) live.textContent = sentence;
+}
+
+/** "partial_mural" -> "Partial mural" */
+export function label(name: string): string {
+  const words = name.replace(/.*\//, "").replace(/_/g, " ");
+  return words.charAt(0).toUpperCase() + words.slice(1);
+}
+
+/** 65.2 -> "1:05" */
+export function minutes(time_s: number): string {
+  const s = Math.max(0, Math.floor(time_s));
+  return `${Math.floor(s / 60)}:${String(s % 60).padStart(2, "0")}`;
+}
+
+/** What this browser remembers of its user; a browser that forbids it remembers nothing. */
+export function recall(key: string): string {
+  try {
+    return localStorage.getItem(`sonde.${key}`) ?? "";
+  } catch {
+    return "";
+  }
+}
+
+export function remember(key: string, value: string): void {
+  try {
+    localStorage.setItem(`sonde.${key}`, value);
+  } catch {
+    // private mode: the page works without
+  }
+}

@@ -1,0 +1,172 @@
+// The exam's bar: the next step, the segments with what was done and found, findings by buttons and
+// keys, hint, leave, and finish with a question first.
+
+import { announce, button, find, make, press } from "./dom";
+import type { Decision, Exam, Segment } from "./protocol";
+import { compressionWords, finding, FINDINGS } from "./words";
+
+export interface ExamActions {
+  decide(segment: string, decision: Decision): void;
+  hint(): void;
+  finish(): void;
+  leave(): void;
+}
+
+interface Cell {
+  root: HTMLButtonElement;
+  dots: HTMLElement;
+  finding: HTMLElement;
+}
+
+export class ExamBar {
+  private exam: Exam | null = null;
+  private controls = false;
+  private chosen = "";
+  private near = ""; // the segment that the probe was last above
+  private cells = new Map<string, Cell>();
+  private readonly box = find("segments");
+  private readonly choices: HTMLButtonElement[];
+
+  constructor(private readonly actions: ExamActions) {
+    this.choices = FINDINGS.map((f) => {
+      const b = button(f.name, () => this.decide(f.decision), `finding ${f.decision}`);
+      b.append(make("kbd", "", f.key));
+      return b;
+    });
+    find("decisions").append(...this.choices);
+    press("hint-button", () => actions.hint());
+    press("leave-button", () => actions.leave());
+    press("finish-button", () => this.askFinish());
+    this.box.onkeydown = (e) => this.arrow(e);
+  }
+
+  show(exam: Exam, controls: boolean): void {
+    this.exam = exam;
+    this.controls = controls;
+    this.sayStep(exam);
+    const tag = find("compression");
+    const words = compressionWords(exam.compression);
+    tag.hidden = words === "";
+    tag.textContent = words;
+    tag.dataset.state = exam.compression?.state ?? "none";
+    find("hint-button").hidden = exam.guidance !== "hints";
+    for (const id of ["hint-button", "leave-button", "finish-button"]) find<HTMLButtonElement>(id).disabled = !controls;
+    this.fill(exam.segments);
+    if (!exam.segments.some((s) => s.id === this.chosen)) this.chosen = exam.segments[0]?.id ?? "";
+    this.mark(exam.segments);
+  }
+
+  private sayStep(exam: Exam): void {
+    const hint = exam.hint !== "";
+    const text = exam.step.text || (exam.guidance === "exam" ? "Examine the vein and say what you find in each segment." : "");
+    find("step-text").textContent = text;
+    find("step-detail").textContent = hint ? `Hint: ${exam.hint}` : exam.step.detail;
+    find("step-detail").classList.toggle("hinted", hint);
+    announce(hint ? `${text} Hint: ${exam.hint}` : text);
+  }
+
+  private fill(segments: Segment[]): void {
+    if (segments.length === this.cells.size && segments.every((s) => this.cells.has(s.id))) return;
+    this.cells = new Map(segments.map((s) => [s.id, this.cell(s)]));
+    this.box.replaceChildren(...[...this.cells.values()].map((c) => c.root));
+    this.chosen = segments[0]?.id ?? "";
+    this.near = "";
+  }
+
+  private cell(s: Segment): Cell {
+    const root = button("", () => this.choose(s.id), "segment");
+    const [dots, found] = [make("span", "dots"), make("span", "found")];
+    root.setAttribute("role", "radio");
+    root.append(make("span", "name", s.title), dots, found);
+    return { root, dots, finding: found };
+  }
+
+  private mark(segments: Segment[]): void {
+    for (const s of segments) {
+      const cell = this.cells.get(s.id)!;
+      const on = s.id === this.chosen;
+      cell.root.setAttribute("aria-checked", String(on));
+      cell.root.tabIndex = on ? 0 : -1;
+      cell.root.dataset.decision = s.decision;
+      cell.root.classList.toggle("done", s.points > 0 && s.done >= s.points);
+      cell.root.classList.toggle("spare", !s.needed);
+      cell.dots.textContent = s.needed ? (s.points > 5 ? `${s.done} / ${s.points}` : "●".repeat(Math.min(s.done, s.points)) + "○".repeat(Math.max(0, s.points - s.done))) : "not asked";
+      cell.finding.textContent = s.decision ? finding(s.decision) : "";
+      cell.root.setAttribute(
+        "aria-label",
+        `${s.title}: ${s.needed ? `${s.done} of ${s.points} compressions` : "not asked"}, ${finding(s.decision).toLowerCase()}`,
+      );
+    }
+    const now = segments.find((s) => s.id === this.chosen);
+    find("decide-title").textContent = now ? now.title : "Your finding";
+    this.choices.forEach((b, i) => {
+      b.disabled = !this.controls || !now;
+      b.setAttribute("aria-pressed", String(now?.decision === FINDINGS[i]!.decision));
+    });
+  }
+
+  /** With guidance the finding follows the probe: z along the leg, mm. */
+  follow(z_mm: number, touching: boolean): void {
+    if (!this.exam || this.exam.guidance === "exam" || !touching) return;
+    const s = this.exam.segments.find((x) => z_mm >= Math.min(x.from_mm, x.to_mm) && z_mm <= Math.max(x.from_mm, x.to_mm));
+    if (!s || s.id === this.near) return;
+    this.near = s.id;
+    this.choose(s.id);
+  }
+
+  private choose(id: string): void {
+    this.chosen = id;
+    if (this.exam) this.mark(this.exam.segments);
+  }
+
+  private step(by: number): void {
+    const all = this.exam?.segments ?? [];
+    const i = all.findIndex((s) => s.id === this.chosen);
+    const next = all[Math.max(0, Math.min(all.length - 1, i + by))];
+    if (next) this.choose(next.id);
+  }
+
+  private arrow(e: KeyboardEvent): void {
+    const by = { ArrowLeft: -1, ArrowUp: -1, ArrowRight: 1, ArrowDown: 1 }[e.key];
+    if (by === undefined) return;
+    this.step(by);
+    this.cells.get(this.chosen)?.root.focus();
+    e.preventDefault();
+    e.stopPropagation();
+  }
+
+  /** The same finding again takes it back. */
+  private decide(decision: Decision): void {
+    const now = this.exam?.segments.find((s) => s.id === this.chosen);
+    if (!now || !this.controls) return;
+    this.actions.decide(now.id, now.decision === decision ? "" : decision);
+    announce(`${now.title}: ${finding(now.decision === decision ? "" : decision)}`);
+  }
+
+  key(code: string, shift: boolean): boolean {
+    if (this.exam?.phase !== "running") return false;
+    const f = FINDINGS.find((x) => x.code === code);
+    if (f) this.decide(f.decision);
+    else if (code === "Comma") this.step(-1);
+    else if (code === "Period") this.step(1);
+    else if (code === "KeyU" && this.exam.guidance === "hints") this.actions.hint();
+    else if (code === "Enter" && shift) this.askFinish();
+    else return false;
+    return true;
+  }
+
+  private askFinish(): void {
+    if (!this.exam || !this.controls) return;
+    const open = this.exam.segments.filter((s) => s.needed && s.decision === "").map((s) => s.title);
+    const box = find<HTMLDialogElement>("finish");
+    const head = make("h2", "", "Finish the exam?");
+    head.id = "finish-title";
+    const words = open.length ? `Still without a finding: ${open.join(", ")}.` : "Every segment that the protocol asks for has a finding.";
+    const row = make("div", "actions");
+    const done = button("Finish and see the result", () => (box.close(), this.actions.finish()), "primary");
+    row.append(button("Go on", () => box.close()), done);
+    box.replaceChildren(head, make("p", open.length ? "warn" : "", words), row);
+    box.showModal();
+    done.focus();
+  }
+}

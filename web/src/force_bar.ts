@@ -1,0 +1,129 @@
+// The force on the probe as a bar: what is comfortable, what is not, the limit, and the corridor that
+// a guided compression asks for. True newtons; what a device renders, when that is less, is a notch.
+
+import { find, make } from "./dom";
+import type { Snapshot } from "./protocol";
+
+const TOP_PX = 10;
+const FOOT_PX = 8;
+const BAR = { left: 34, width: 22 };
+const OVER = 1.1; // the scale ends above the limit
+const RENDERED_N = 0.3; // smaller differences between true and rendered force are not shown
+const INK = {
+  comfort: "#2f7f6f", firm: "#96742c", hard: "#8e3a3d", fill: "#e9f1f8", text: "#98a5b5", corridor: "#5cc8c2", notch: "#c7a6ff",
+};
+
+export class ForceBar {
+  private limit_n = 40;
+  private comfort_n = 20;
+  private corridor: [number, number] | null = null;
+  private force_n = 0;
+  private rendered_n = 0;
+  private drawn = "";
+  private readonly c: CanvasRenderingContext2D;
+  private readonly canvas = find<HTMLCanvasElement>("force-bar");
+
+  constructor() {
+    this.c = this.canvas.getContext("2d")!;
+    new ResizeObserver(() => {
+      this.drawn = "";
+      this.paint();
+    }).observe(this.canvas);
+  }
+
+  limits(limit_n: number, comfort_n: number): void {
+    this.limit_n = limit_n;
+    this.comfort_n = comfort_n;
+    this.canvas.setAttribute("aria-valuemax", limit_n.toFixed(0));
+    this.paint();
+  }
+
+  ask(corridor: [number, number] | null): void {
+    this.corridor = corridor;
+    this.paint();
+  }
+
+  show(s: Snapshot): void {
+    this.force_n = Math.max(0, s.force_normal_n);
+    this.rendered_n = Math.hypot(...s.rendered_force_n);
+    find("force-value").replaceChildren(this.force_n.toFixed(1), make("small", "", "N"));
+    const word = this.word();
+    find("force-word").textContent = word;
+    find("force-head").dataset.state = word.split(" ")[0] ?? "";
+    this.canvas.setAttribute("aria-valuenow", this.force_n.toFixed(1));
+    this.canvas.setAttribute("aria-valuetext", `${this.force_n.toFixed(1)} newtons, ${word}`);
+    this.paint();
+  }
+
+  private word(): string {
+    if (this.force_n >= 0.98 * this.limit_n) return "limit";
+    if (this.corridor && this.force_n > this.corridor[1]) return "too hard";
+    if (this.force_n > this.comfort_n) return "uncomfortable";
+    if (this.corridor && this.force_n >= this.corridor[0]) return "right";
+    return this.force_n > 0.3 ? "comfortable" : "no contact";
+  }
+
+  private paint(): void {
+    const { clientWidth: w, clientHeight: h } = this.canvas;
+    const state = `${w} ${h} ${this.limit_n} ${this.comfort_n} ${this.corridor} ${this.force_n.toFixed(1)} ${this.rendered_n.toFixed(1)}`;
+    if (state === this.drawn || w === 0 || h === 0) return;
+    this.drawn = state;
+    const ratio = window.devicePixelRatio;
+    this.canvas.width = Math.round(w * ratio);
+    this.canvas.height = Math.round(h * ratio);
+    this.c.setTransform(ratio, 0, 0, ratio, 0, 0);
+    this.c.clearRect(0, 0, w, h);
+    const span = h - TOP_PX - FOOT_PX;
+    const y = (n: number): number => TOP_PX + span * (1 - Math.min(1, n / (OVER * this.limit_n)));
+    this.zones(y);
+    this.scale(y);
+    this.level(y);
+    if (this.corridor) this.bracket(y, this.corridor);
+  }
+
+  private block(y: (n: number) => number, from: number, to: number, colour: string, left = BAR.left, width = BAR.width): void {
+    this.c.fillStyle = colour;
+    this.c.fillRect(left, y(to), width, y(from) - y(to));
+  }
+
+  private zones(y: (n: number) => number): void {
+    this.c.globalAlpha = 0.55;
+    this.block(y, 0, this.comfort_n, INK.comfort);
+    this.block(y, this.comfort_n, this.limit_n, INK.firm);
+    this.block(y, this.limit_n, OVER * this.limit_n, INK.hard);
+    this.c.globalAlpha = 1;
+  }
+
+  private scale(y: (n: number) => number): void {
+    const c = this.c;
+    c.font = "11px system-ui, sans-serif";
+    c.textBaseline = "middle";
+    c.textAlign = "right";
+    c.fillStyle = INK.text;
+    for (let n = 0; n <= this.limit_n; n += 10) {
+      c.fillText(`${n}`, BAR.left - 9, y(n));
+      c.fillRect(BAR.left - 5, Math.round(y(n)), 4, 1);
+    }
+  }
+
+  private level(y: (n: number) => number): void {
+    this.block(y, 0, this.force_n, INK.fill, BAR.left + 6, BAR.width - 12);
+    if (Math.abs(this.rendered_n - this.force_n) < RENDERED_N || this.rendered_n === 0) return;
+    this.c.fillStyle = INK.notch; // what the device renders
+    this.c.fillRect(BAR.left, y(this.rendered_n) - 1.5, BAR.width, 3);
+  }
+
+  private bracket(y: (n: number) => number, [low, high]: [number, number]): void {
+    const c = this.c;
+    const right = BAR.left + BAR.width + 3;
+    c.strokeStyle = INK.corridor;
+    c.lineWidth = 2;
+    c.strokeRect(BAR.left - 1.5, y(high), BAR.width + 3, y(low) - y(high));
+    c.fillStyle = INK.corridor;
+    c.beginPath();
+    c.moveTo(right + 1, (y(low) + y(high)) / 2);
+    c.lineTo(right + 9, (y(low) + y(high)) / 2 - 5);
+    c.lineTo(right + 9, (y(low) + y(high)) / 2 + 5);
+    c.fill();
+  }
+}

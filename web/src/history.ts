@@ -1,0 +1,110 @@
+// My exams: a learning curve and the list, with report and replay of each.
+
+import { button, draw, find, label, make, minutes } from "./dom";
+import type { ExamEntry } from "./protocol";
+
+const CURVE = { width: 640, height: 96, left: 30, right: 10, top: 8, foot: 16 };
+
+/** Scores from the oldest to the newest exam. */
+function curve(list: ExamEntry[]): SVGElement {
+  const scored = list.filter((e) => e.score !== null).reverse();
+  const svg = draw("svg", { viewBox: `0 0 ${CURVE.width} ${CURVE.height}`, role: "img", class: "curve", "aria-label": `Scores of ${scored.length} exams: ${scored.map((e) => e.score!.toFixed(0)).join(", ")}` });
+  const span = CURVE.height - CURVE.top - CURVE.foot;
+  const y = (score: number): number => CURVE.top + span * (1 - score / 100);
+  const x = (i: number): number => CURVE.left + ((CURVE.width - CURVE.left - CURVE.right) * (i + 0.5)) / Math.max(1, scored.length);
+  for (const mark of [0, 50, 100])
+    svg.append(
+      draw("line", { x1: CURVE.left, x2: CURVE.width - CURVE.right, y1: y(mark), y2: y(mark), class: "grid" }),
+      draw("text", { x: CURVE.left - 6, y: y(mark) + 4, "text-anchor": "end" }, String(mark)),
+    );
+  svg.append(draw("polyline", { points: scored.map((e, i) => `${x(i)},${y(e.score!)}`).join(" "), class: "path" }));
+  scored.forEach((e, i) => svg.append(draw("circle", { cx: x(i), cy: y(e.score!), r: 4, class: e.passed ? "good" : "bad" })));
+  return svg;
+}
+
+export class HistoryDialog {
+  private readonly box = find<HTMLDialogElement>("exams");
+  private list: ExamEntry[] = [];
+  private trainee = "";
+
+  constructor(private readonly replay: (exam: string) => void) {}
+
+  /** Opens with what is known; the list comes with the next message. */
+  open(trainee: string): void {
+    this.trainee = trainee;
+    this.build();
+    if (!this.box.open) this.box.showModal();
+  }
+
+  close(): void {
+    this.box.close();
+  }
+
+  fill(list: ExamEntry[]): void {
+    this.list = list;
+    if (this.trainee && !list.some((e) => e.trainee === this.trainee)) this.trainee = "";
+    if (this.box.open) this.build();
+  }
+
+  private build(): void {
+    const head = make("div", "head");
+    const title = make("h2", "", "My exams");
+    title.id = "exams-title";
+    head.append(title, make("span", "spring"), this.who());
+    const mine = this.trainee ? this.list.filter((e) => e.trainee === this.trainee) : this.list;
+    const row = make("div", "actions");
+    const close = button("Close", () => this.box.close(), "primary");
+    row.append(make("span", "spring"), close);
+    const nothing = make("p", "intro", "No exam yet. Each exam that you finish is kept here with its report and replay.");
+    this.box.replaceChildren(head, ...(mine.length ? [curve(mine), this.table(mine)] : [nothing]), row);
+    if (this.box.open) close.focus();
+  }
+
+  private who(): HTMLElement {
+    const names = [...new Set(this.list.map((e) => e.trainee))].sort();
+    if (names.length < 2) return make("span");
+    const select = make("select");
+    select.setAttribute("aria-label", "Learner");
+    for (const name of ["", ...names.filter((n) => n)]) {
+      const option = make("option", "", name || "All learners");
+      option.value = name;
+      option.selected = name === this.trainee;
+      select.append(option);
+    }
+    select.onchange = () => {
+      this.trainee = select.value;
+      this.build();
+    };
+    return select;
+  }
+
+  private table(list: ExamEntry[]): HTMLElement {
+    const scroll = make("div", "scroll");
+    scroll.tabIndex = 0;
+    scroll.setAttribute("aria-label", "List of exams");
+    scroll.setAttribute("role", "region");
+    const table = make("table");
+    const head = make("tr");
+    for (const name of ["Date", "Case", "Learner", "Protocol", "Score", "Time", ""]) head.append(make("th", "", name));
+    table.append(head, ...list.map((e) => this.row(e)));
+    scroll.append(table);
+    return scroll;
+  }
+
+  private row(e: ExamEntry): HTMLElement {
+    const row = make("tr");
+    const date = new Date(e.date);
+    const when = Number.isNaN(date.getTime()) ? e.date : date.toLocaleString([], { dateStyle: "medium", timeStyle: "short" });
+    const score = make("td", e.passed ? "good" : "bad", e.score === null ? "none" : `${e.score.toFixed(0)} ${e.passed ? "passed" : "not passed"}`);
+    const does = make("td", "does");
+    const report = make("a", "button", "Report");
+    Object.assign(report, { href: e.report, target: "_blank", rel: "noopener" });
+    report.setAttribute("aria-label", `Report of ${e.title}, ${when}`);
+    const replay = button("Replay", () => (this.box.close(), this.replay(e.id)));
+    replay.setAttribute("aria-label", `Replay of ${e.title}, ${when}`);
+    replay.disabled = !e.recording;
+    does.append(report, replay);
+    row.append(make("td", "", when), make("td", "", e.title), make("td", "", e.trainee), make("td", "", label(e.protocol)), score, make("td", "", minutes(e.seconds)), does);
+    return row;
+  }
+}

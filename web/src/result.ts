@@ -1,0 +1,104 @@
+// After the exam: the score, whether the diagnosis was right, what was found and missed, and where to
+// go from here.
+
+import { button, draw, find, make } from "./dom";
+import type { Exam, PressResult, Result } from "./protocol";
+import { finding, PRESS_WORDS } from "./words";
+
+export interface ResultActions {
+  replay(exam: string): void;
+  again(caseId: string): void;
+  next(caseId: string): void;
+  close(): void;
+}
+
+function ring(result: Result): HTMLElement {
+  const r = 46;
+  const round = 2 * Math.PI * r;
+  const svg = draw("svg", { viewBox: "0 0 120 120", role: "img", "aria-label": `Score ${result.score.toFixed(0)} of 100` });
+  const part = (round * Math.max(0, Math.min(100, result.score))) / 100;
+  svg.append(
+    draw("circle", { cx: 60, cy: 60, r, class: "track" }),
+    draw("circle", { cx: 60, cy: 60, r, class: "part", "stroke-dasharray": `${part} ${round}`, transform: "rotate(-90 60 60)" }),
+    draw("text", { x: 60, y: 66, "text-anchor": "middle", class: "score" }, result.score.toFixed(0)),
+    draw("text", { x: 60, y: 84, "text-anchor": "middle", class: "of" }, "of 100"),
+  );
+  const box = make("div", `ring ${result.passed ? "good" : "bad"}`);
+  box.append(svg);
+  return box;
+}
+
+/** "6 x vein closed, 1 x too hard" */
+function tally(exam: Exam): string {
+  const count = new Map<PressResult, number>();
+  for (const p of exam.presses) count.set(p.result, (count.get(p.result) ?? 0) + 1);
+  const parts = [...count].map(([result, n]) => `${n} × ${PRESS_WORDS[result]}`);
+  return parts.length ? parts.join(", ") : "no compression";
+}
+
+function segments(exam: Exam): HTMLElement {
+  const table = make("table");
+  const head = make("tr");
+  for (const name of ["Segment", "Compressions", "Your finding"]) head.append(make("th", "", name));
+  table.append(head);
+  for (const s of exam.segments.filter((x) => x.needed || x.decision || x.done)) {
+    const row = make("tr");
+    const done = s.done >= s.points;
+    row.append(make("td", "", s.title), make("td", done ? "good" : "warn", `${s.done} of ${s.points}`), make("td", s.decision ? "" : "warn", finding(s.decision)));
+    table.append(row);
+  }
+  return table;
+}
+
+export class ResultDialog {
+  private readonly box = find<HTMLDialogElement>("result");
+  private shown = "";
+
+  constructor(private readonly actions: ResultActions) {
+    this.box.oncancel = (e) => e.preventDefault();
+  }
+
+  hide(): void {
+    this.shown = "";
+    this.box.close();
+  }
+
+  show(exam: Exam, controls: boolean): void {
+    const result = exam.result;
+    const key = `${exam.exam} ${controls}`;
+    if (!result || key === this.shown) return;
+    this.shown = key;
+    const head = make("h2", result.passed ? "good" : "bad", result.passed ? "Passed" : "Not passed");
+    head.id = "result-title";
+    const words = make("div", "words");
+    words.append(head, make("p", "case-name", exam.title), make("p", "summary", result.summary));
+    const top = make("div", "top");
+    top.append(ring(result), words);
+    this.box.replaceChildren(top, this.diagnosis(result), segments(exam), make("p", "tally", `Compressions: ${tally(exam)}.`), this.foot(exam, result, controls));
+    if (!this.box.open) this.box.showModal();
+    this.box.querySelector<HTMLElement>("a.primary")?.focus();
+  }
+
+  private diagnosis(result: Result): HTMLElement {
+    const box = make("dl", result.correct ? "good" : "bad");
+    box.append(make("dt", "", "You said"), make("dd", "", result.diagnosis.asked), make("dt", "", "The truth"), make("dd", "", result.diagnosis.truth));
+    const verdict = make("strong", "", result.correct ? "Right diagnosis" : "Wrong diagnosis");
+    box.append(verdict);
+    return box;
+  }
+
+  private foot(exam: Exam, result: Result, controls: boolean): HTMLElement {
+    const row = make("div", "actions");
+    const report = make("a", "primary button", "Open the report");
+    Object.assign(report, { href: result.report, target: "_blank", rel: "noopener" });
+    const later = [
+      button("Watch the replay", () => this.actions.replay(exam.exam)),
+      button("Try again", () => this.actions.again(exam.case)),
+      button("Next case", () => this.actions.next(exam.case)),
+    ];
+    later[0]!.disabled = !exam.recording;
+    for (const b of later) b.disabled ||= !controls;
+    row.append(report, ...later, make("span", "spring"), button("Close", () => this.actions.close()));
+    return row;
+  }
+}

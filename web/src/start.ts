@@ -1,0 +1,129 @@
+// The start: choose a case with its history, a protocol, a level of guidance and a name; or practise.
+
+import type { ExamWish } from "./connection";
+import { button, find, make, recall, remember } from "./dom";
+import type { CaseInfo, Guidance, Hello } from "./protocol";
+import { GUIDANCE, LEVELS } from "./words";
+
+interface Choice {
+  id: string;
+  title: string;
+  text: string;
+  tag?: string;
+}
+
+function cards(name: string, legend: string, list: Choice[], chosen: string, change: (id: string) => void): HTMLElement {
+  const box = make("fieldset", `cards ${name}`);
+  box.append(make("legend", "caption", legend));
+  for (const c of list) {
+    const row = make("label", "card");
+    const input = make("input");
+    Object.assign(input, { type: "radio", name, value: c.id, checked: c.id === chosen });
+    input.onchange = () => change(c.id);
+    const words = make("span", "words");
+    words.append(make("b", "", c.title), make("span", "", c.text));
+    row.append(input, words);
+    if (c.tag) row.append(make("i", "level", c.tag));
+    box.append(row);
+  }
+  return box;
+}
+
+export class StartDialog {
+  private hello: Hello | null = null;
+  private wish: ExamWish = { case: "", protocol: "", guidance: "full", trainee: "" };
+  private readonly box = find<HTMLDialogElement>("start");
+
+  constructor(
+    private readonly start: (wish: ExamWish) => void,
+    private readonly practise: () => void,
+  ) {}
+
+  get isOpen(): boolean {
+    return this.box.open;
+  }
+
+  close(): void {
+    this.box.close();
+  }
+
+  /** The case after the one that was just examined. */
+  next(after: string): string {
+    const list = this.hello?.case_list ?? [];
+    return list[(list.findIndex((c) => c.id === after) + 1) % Math.max(1, list.length)]?.id ?? after;
+  }
+
+  greet(hello: Hello): void {
+    this.hello = hello;
+    const cases = hello.case_list ?? [];
+    const protocols = hello.protocols ?? [];
+    const keep = (list: { id: string }[], id: string): string => (list.some((x) => x.id === id) ? id : (list[0]?.id ?? ""));
+    const first = cases.find((c) => c.level === "first")?.id ?? "";
+    this.wish = {
+      case: keep(cases, this.wish.case || first),
+      protocol: keep(protocols, this.wish.protocol || recall("protocol")),
+      guidance: (recall("guidance") as Guidance) || "full",
+      trainee: hello.trainee || recall("trainee"),
+    };
+  }
+
+  open(caseId?: string): void {
+    if (!this.hello?.trainer || this.box.open) return;
+    if (caseId) this.wish.case = caseId;
+    this.build(this.hello);
+    this.box.showModal();
+    find<HTMLButtonElement>("start-go").focus();
+    this.box.querySelector(".cards.case input:checked")?.closest(".card")?.scrollIntoView({ block: "nearest" });
+  }
+
+  /** Starts the same way as last time, with another case or the same again. */
+  again(caseId: string): void {
+    this.wish.case = caseId;
+    this.go();
+  }
+
+  private build(hello: Hello): void {
+    const head = make("h2", "", "What do you want to do?");
+    head.id = "start-title";
+    const intro = recall("trained") ? "Choose a case, or practise freely." : "New here? Press Start: the page leads you through a first exam.";
+    const cases = (hello.case_list ?? []).map((c: CaseInfo) => ({ id: c.id, title: c.title, text: c.history, tag: LEVELS[c.level] }));
+    const left = cards("case", "Case", cases, this.wish.case, (id) => (this.wish.case = id));
+    const right = make("div", "options");
+    const guidance = (Object.keys(GUIDANCE) as Guidance[]).map((id) => ({ id, title: GUIDANCE[id][0], text: GUIDANCE[id][1] }));
+    right.append(
+      cards("protocol", "Protocol", hello.protocols ?? [], this.wish.protocol, (id) => (this.wish.protocol = id)),
+      cards("guidance", "Guidance", guidance, this.wish.guidance, (id) => (this.wish.guidance = id as Guidance)),
+      this.name(),
+    );
+    const columns = make("div", "columns");
+    columns.append(left, right);
+    this.box.replaceChildren(head, make("p", "intro", intro), columns, this.foot());
+  }
+
+  private name(): HTMLElement {
+    const box = make("label", "field");
+    const input = make("input");
+    Object.assign(input, { id: "trainee", maxLength: 40, value: this.wish.trainee, placeholder: "so that your exams are kept together", autocomplete: "off" });
+    input.oninput = () => (this.wish.trainee = input.value.trim());
+    input.onkeydown = (e) => e.key === "Enter" && this.go();
+    box.append(make("span", "caption", "Your name"), input);
+    return box;
+  }
+
+  private foot(): HTMLElement {
+    const row = make("div", "actions");
+    const go = button("Start the exam", () => this.go(), "primary big");
+    go.id = "start-go";
+    const free = button("Free practice", () => (this.box.close(), this.practise()));
+    row.append(free, make("span", "caption note", "No score, every vein, every setting"), make("span", "spring"), go);
+    return row;
+  }
+
+  private go(): void {
+    remember("protocol", this.wish.protocol);
+    remember("guidance", this.wish.guidance);
+    remember("trainee", this.wish.trainee);
+    this.box.close();
+    this.start({ ...this.wish });
+  }
+}

@@ -1,0 +1,42 @@
+// What the page calls results, findings and levels.
+
+import type { CaseInfo, Compression, Decision, Guidance, PressResult } from "./protocol";
+
+export const FINDINGS: { decision: Exclude<Decision, "">; name: string; key: string; code: string }[] = [
+  { decision: "compressible", name: "Compressible", key: "J", code: "KeyJ" },
+  { decision: "clot", name: "Clot", key: "K", code: "KeyK" },
+  { decision: "not_seen", name: "Not seen", key: "L", code: "KeyL" },
+];
+
+export const finding = (d: Decision): string => FINDINGS.find((f) => f.decision === d)?.name ?? "No finding";
+
+export const PRESS_WORDS: Record<PressResult, string> = {
+  complete: "vein closed",
+  open: "vein stayed open",
+  insufficient: "not hard enough",
+  too_hard: "too hard",
+  off_axis: "off axis",
+};
+
+export const LEVELS: Record<CaseInfo["level"], string> = { first: "First exam", easy: "Easy", hard: "Hard" };
+
+export const GUIDANCE: Record<Guidance, [string, string]> = {
+  full: ["Full", "A ring shows where, a needle the angle, a bracket the force."],
+  hints: ["Hints", "The next point is named; more only when you ask for a hint."],
+  exam: ["None", "As in an exam: the protocol and your own eyes."],
+};
+
+/** What to say of the compression of now; empty when nothing. */
+export function compressionWords(c: Compression | null): string {
+  if (!c) return "";
+  const vein = c.vein === null ? "" : `: vein ${(100 * c.vein).toFixed(0)} % open`;
+  const words: Record<Compression["state"], string> = {
+    none: "",
+    pressing: `Pressing${vein}`,
+    complete: "Vein closed. Let go",
+    open: "Firm, and the vein stays open",
+    too_hard: "Too hard: ease off",
+    off_axis: "Turn the probe across the vein",
+  };
+  return words[c.state];
+}
