@@ -50,8 +50,12 @@ class ProgramThigh {
   }
   receive(m) {
     if (m.type === "gel") this.extra.gel_ml = m.action === "put" ? this.extra.gel_ml + 2 : 0;
-    else if (m.type === "controls" && Object.keys(m).some((k) => k in this.extra)) for (const k of Object.keys(m)) if (k in this.extra) this.extra[k] = m[k];
-    else if (["goal", "controls", "stop", "resume"].includes(m.type)) return (this.send(m), false);
+    else if (m.type === "controls" && Object.keys(m).some((k) => k in this.extra)) {
+      for (const k of Object.keys(m)) if (k in this.extra) this.extra[k] = m[k];
+    } else {
+      this.send(m);
+      return false; // the program answers with its controls
+    }
     return true;
   }
   close() {

@@ -104,6 +104,7 @@ export class Trainer {
     this.prepare(c.truth);
     Object.assign(this.exam, { phase: "running", message: "" });
     this.started = Date.now();
+    this.press = null;
     this.frames = [];
     this.tell();
   }

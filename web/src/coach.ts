@@ -8,20 +8,23 @@ interface Mark {
   id: string;
   anchor: string;
   text: string;
+  /** whether there is something to do just now */
+  due(exam: Exam): boolean;
   done(exam: Exam): boolean;
 }
 
-const far = (exam: Exam): boolean => {
+const there = (exam: Exam): boolean => {
   const { target, offset_mm } = exam.step;
-  return target !== null && offset_mm !== null && offset_mm > target.radius_mm;
+  return target !== null && offset_mm !== null && offset_mm <= target.radius_mm;
 };
+const wanted = (exam: Exam): boolean => exam.step.target !== null;
 const pressed = (exam: Exam): boolean => exam.presses.some((p) => p.result === "complete" || p.result === "open");
 const decided = (exam: Exam): boolean => exam.segments.some((s) => s.decision !== "");
 
 const MARKS: Mark[] = [
-  { id: "move", anchor: "stage", text: "Drag the probe along the skin into the ring.", done: (e) => !far(e) },
-  { id: "press", anchor: "press", text: "Press: pull this slider up until the bar reaches the bracket, watch the vein in the image, then let go.", done: pressed },
-  { id: "decide", anchor: "decide", text: "Say what you saw here. The bar above leads you to the next point.", done: decided },
+  { id: "move", anchor: "stage", text: "Drag the probe along the skin into the ring.", due: wanted, done: there },
+  { id: "press", anchor: "press", text: "Press: pull this slider up until the bar reaches the bracket. Watch the vein in the image. Then let go (button below).", due: wanted, done: pressed },
+  { id: "decide", anchor: "decide", text: "Say what you saw here. The bar above leads you to the next point.", due: pressed, done: decided },
 ];
 
 export class Coach {
@@ -49,7 +52,7 @@ export class Coach {
       this.close();
       return this.show(exam, controls);
     }
-    this.place(next ?? null);
+    this.place(next?.due(exam) ? next : null);
   }
 
   private place(mark: Mark | null): void {

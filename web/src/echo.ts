@@ -10,7 +10,7 @@ const CURVE_PX = 26; // gain over depth, left of the image
 const PAD_PX = 10;
 const GAP_PX = 14;
 const TOP_PX = 16;
-const FULL_DB = 70; // of the gain curve's width
+const FULL_DB = 30; // at the edge of the gain curve
 const INK = { scale: "#98a5b5", focus: "#e6b450", mark: "#5cc8c2" };
 
 function context(canvas: HTMLCanvasElement): CanvasRenderingContext2D {
@@ -175,6 +175,7 @@ export class EchoView {
       ...(kept.length && live.length ? [head("Now")] : []),
       ...live.map(line),
     );
+    this.layout();
     this.measured();
   }
 
@@ -214,12 +215,15 @@ export class EchoView {
     this.drawMarks(first, left - GAP_PX, scale);
   }
 
-  /** Under the picture when there is room, else over its foot. */
+  /** Under the pictures when there is room, else over their foot; measurements above the caption. */
   private placeText(left: number, foot: number, h: number): void {
+    const top = Math.min(foot + 6, h - this.text.offsetHeight - 8);
     this.text.style.left = `${left + 6}px`;
+    this.text.style.top = `${top}px`;
+    const below = top + this.text.offsetHeight + 8;
+    const roomy = below + this.values.offsetHeight < h;
     this.values.style.left = `${left + 6}px`;
-    this.values.style.top = `${TOP_PX + 24}px`;
-    this.text.style.top = `${Math.min(foot + 6, h - this.text.offsetHeight - 8)}px`;
+    this.values.style.top = `${roomy ? below : top - this.values.offsetHeight - 4}px`;
   }
 
   private drawMarks(left: number, right: number, scale: number): void {
@@ -280,5 +284,9 @@ export class EchoView {
     c.lineTo(middle + (db / FULL_DB) * (CURVE_PX / 2), bottom);
     c.stroke();
     c.globalAlpha = 1;
+    c.fillStyle = INK.scale;
+    c.textAlign = "center";
+    c.fillText("TGC", middle, TOP_PX - 7);
+    c.textAlign = "left";
   }
 }

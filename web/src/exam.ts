@@ -50,7 +50,8 @@ export class ExamBar {
     tag.textContent = words;
     tag.dataset.state = exam.compression?.state ?? "none";
     find("hint-button").hidden = exam.guidance !== "hints";
-    for (const id of ["hint-button", "leave-button", "finish-button"]) find<HTMLButtonElement>(id).disabled = !controls;
+    for (const id of ["leave-button", "finish-button", "decide"]) find(id).hidden = !controls;
+    if (!controls) find("hint-button").hidden = true;
     this.fill(exam.segments);
     if (!exam.segments.some((s) => s.id === this.chosen)) this.chosen = exam.segments[0]?.id ?? "";
     this.mark(exam.segments);
@@ -69,7 +70,7 @@ export class ExamBar {
     if (segments.length === this.cells.size && segments.every((s) => this.cells.has(s.id))) return;
     this.cells = new Map(segments.map((s) => [s.id, this.cell(s)]));
     this.box.replaceChildren(...[...this.cells.values()].map((c) => c.root));
-    this.chosen = segments[0]?.id ?? "";
+    this.chosen = (segments.find((s) => s.needed) ?? segments[0])?.id ?? "";
     this.near = "";
   }
 
@@ -90,6 +91,7 @@ export class ExamBar {
       cell.root.dataset.decision = s.decision;
       cell.root.classList.toggle("done", s.points > 0 && s.done >= s.points);
       cell.root.classList.toggle("spare", !s.needed);
+      cell.dots.classList.toggle("word", !s.needed || s.points > 5);
       cell.dots.textContent = s.needed ? (s.points > 5 ? `${s.done} / ${s.points}` : "●".repeat(Math.min(s.done, s.points)) + "○".repeat(Math.max(0, s.points - s.done))) : "not asked";
       cell.finding.textContent = s.decision ? finding(s.decision) : "";
       cell.root.setAttribute(
@@ -98,7 +100,7 @@ export class ExamBar {
       );
     }
     const now = segments.find((s) => s.id === this.chosen);
-    find("decide-title").textContent = now ? now.title : "Your finding";
+    find("decide-title").textContent = now ? `Finding: ${now.title}` : "Finding";
     this.choices.forEach((b, i) => {
       b.disabled = !this.controls || !now;
       b.setAttribute("aria-pressed", String(now?.decision === FINDINGS[i]!.decision));
@@ -108,7 +110,7 @@ export class ExamBar {
   /** With guidance the finding follows the probe: z along the leg, mm. */
   follow(z_mm: number, touching: boolean): void {
     if (!this.exam || this.exam.guidance === "exam" || !touching) return;
-    const s = this.exam.segments.find((x) => z_mm >= Math.min(x.from_mm, x.to_mm) && z_mm <= Math.max(x.from_mm, x.to_mm));
+    const s = this.exam.segments.find((x) => x.needed && z_mm >= Math.min(x.from_mm, x.to_mm) && z_mm <= Math.max(x.from_mm, x.to_mm));
     if (!s || s.id === this.near) return;
     this.near = s.id;
     this.choose(s.id);

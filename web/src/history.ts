@@ -3,7 +3,7 @@
 import { button, draw, find, label, make, minutes } from "./dom";
 import type { ExamEntry } from "./protocol";
 
-const CURVE = { width: 640, height: 96, left: 30, right: 10, top: 8, foot: 16 };
+const CURVE = { width: 880, height: 110, left: 30, right: 10, top: 8, foot: 16 };
 
 /** Scores from the oldest to the newest exam. */
 function curve(list: ExamEntry[]): SVGElement {

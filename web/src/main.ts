@@ -4,7 +4,7 @@ import { Coach } from "./coach";
 import { gradient } from "./colour";
 import { Connection } from "./connection";
 import { Dial } from "./dial";
-import { announce, find, label, minutes, press, pressed, release, remember } from "./dom";
+import { announce, find, label, minutes, press, pressed, recall, release, remember } from "./dom";
 import { EchoView } from "./echo";
 import { ExamBar } from "./exam";
 import { ForceBar } from "./force_bar";
@@ -27,6 +27,7 @@ const HOME_SITE = 27;
 const NEAR_MM = 20; // farther from a site its curve says nothing about this place
 const COMFORT = 0.5; // of the limit, when the program does not say what is comfortable
 const LIFTED_MM = -8;
+const EASED_MM = 0.5; // the probe rests on the skin
 
 const query = new URLSearchParams(location.search);
 
@@ -134,6 +135,7 @@ class App {
     press("home", () => this.reset());
     press("depth-less", () => this.setDepth(this.hold.depth_mm - 1));
     press("depth-more", () => this.setDepth(this.hold.depth_mm + 1));
+    press("ease", () => this.setDepth(EASED_MM));
     press("tab-time", () => this.chart(true));
     press("tab-depth", () => this.chart(false));
     const slider = find<HTMLInputElement>("depth-slider");
@@ -144,6 +146,7 @@ class App {
   /** Keys that the views own; true when one of them took it. */
   private key(code: string, shift: boolean): boolean {
     if (code === "KeyI") this.rates.toggle();
+    else if (code === "Digit0" && this.hands) this.setDepth(EASED_MM);
     else if (this.phase === "replay" && this.controls?.controls && this.replayBar.key(code, shift)) return true;
     else return this.tools.key(code) || this.examBar.key(code, shift) || this.patient.key(code, shift);
     return true;
@@ -310,11 +313,11 @@ class App {
     this.echo.tellCase(phase === "practice");
     this.readouts.showVessels(!judged || guidance === "full");
     this.traces.showVessels(!judged || guidance === "full");
-    find("tab-depth").hidden = phase !== "practice";
+    find("chart-tabs").hidden = phase !== "practice";
     if (phase !== "practice") this.chart(true);
     if (phase !== "practice") this.patient.openTissue(false);
     this.input.enabled = this.hands;
-    for (const id of ["depth-slider", "depth-less", "depth-more", "home"]) find<HTMLButtonElement>(id).disabled = !this.hands;
+    for (const id of ["depth-slider", "depth-less", "depth-more", "ease", "home"]) find<HTMLButtonElement>(id).disabled = !this.hands;
     this.coach.show(this.exam, this.hands);
   }
 
@@ -343,7 +346,7 @@ class App {
   }
 
   private openHistory(): void {
-    this.history.open(this.hello?.trainee ?? "");
+    this.history.open(this.hello?.trainee || recall("trainee"));
     this.connection.listExams();
   }
 
@@ -519,7 +522,8 @@ const sonde = {
   get imageSum() { return app.imageSum; },
   get measures() { return app.echo.measures; },
   get depth() { return app.hold.depth_mm; },
-  get point() { return app.hold.point; },
+  /** middle of the wanted ring on the canvas, px */
+  targetOnScreen: () => app.scene.targetOnScreen("middle"),
   setDepth: (depth_mm: number) => app.setDepth(depth_mm),
   setSite: (id: number) => app.setSite(id),
   selectProbe: (name: string) => app.connection.probe(name),

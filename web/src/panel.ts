@@ -112,7 +112,7 @@ export class Readouts {
   constructor(private readonly box: HTMLElement) {
     this.depth = this.gauge("Depth");
     this.vein = this.gauge("Vein area", "vein");
-    this.diameter = this.gauge("Vein, short diameter", "vein");
+    this.diameter = this.gauge("Vein diameter", "vein");
     this.artery = this.gauge("Artery area", "artery");
   }
 
@@ -149,7 +149,7 @@ export class Readouts {
 const KEYS: [string, string][] = [
   ["Drag on the thigh", "slides the probe along the skin; a far click lifts it and sets it down there"],
   ["Wheel, two fingers, Up / Down, W / S", "press deeper or shallower by 1 mm, with Shift by 5 mm"],
-  ["Right drag, hold Space", "press progressively (Shift + Space lifts)"],
+  ["Right drag, hold Space, 0", "press progressively (Shift + Space lifts), let go"],
   ["A / D, Left / Right", "slide across or along the leg"],
   ["Q / E, T / G, Y / H", "rotate about the beam, tilt the beam"],
   ["Drag beside the thigh", "turns the view; Ctrl + wheel zooms; X see through; R reset"],

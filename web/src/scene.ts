@@ -306,9 +306,9 @@ export class ThighScene {
   }
 
   /** Where the target's name belongs on the canvas, px; null when there is none or it is behind. */
-  targetOnScreen(): [number, number] | null {
+  targetOnScreen(part: "name" | "middle" = "name"): [number, number] | null {
     if (!this.target.group.visible) return null;
-    const p = this.target.anchor.clone().project(this.camera);
+    const p = (part === "name" ? this.target.anchor : this.target.group.position).clone().project(this.camera);
     if (p.z > 1) return null;
     return [((p.x + 1) / 2) * this.canvas.clientWidth, ((1 - p.y) / 2) * this.canvas.clientHeight];
   }

@@ -1,0 +1,43 @@
+// What tests and pictures of the page do with it: open a browser, wait, move, press.
+import { existsSync } from "node:fs";
+
+export const browserPath = ["/usr/bin/chromium", "/usr/bin/chromium-browser"].find(existsSync);
+
+export const openBrowser = (chromium) =>
+  chromium.launch({ executablePath: browserPath, args: ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"] });
+
+export const ready = (page) => page.waitForFunction(() => (window.sonde?.frames ?? 0) > 2 && window.sonde.exam !== null);
+
+/** Puts the probe, lifted, onto the target by dragging there. */
+export async function goTo(page) {
+  const label = page.locator("#target-label");
+  await page.waitForFunction(() => window.sonde.exam.step.target !== null);
+  for (let i = 0; i < 4; ++i) {
+    const at = await page.evaluate(() => window.sonde.targetOnScreen());
+    const box = await page.locator("#scene").boundingBox();
+    await page.mouse.click(box.x + at[0], box.y + at[1]);
+    const there = () => window.sonde.exam.step.target && window.sonde.exam.step.offset_mm <= window.sonde.exam.step.target.radius_mm;
+    if (await page.waitForFunction(there, null, { timeout: 3000 }).catch(() => null)) return;
+  }
+  throw new Error(`the target is not reached: ${await label.textContent()}`);
+}
+
+/** Presses to a depth and lets go; waits until the press is counted. */
+export async function pressAndRelease(page, depth_mm) {
+  const before = await page.evaluate(() => window.sonde.exam.presses.length);
+  await page.evaluate((d) => window.sonde.setDepth(d), depth_mm);
+  await page.waitForFunction((d) => window.sonde.snapshot.penetration_mm > d - 1, depth_mm);
+  await page.evaluate(() => window.sonde.setDepth(-3));
+  await page.waitForFunction((n) => window.sonde.exam.presses.length > n, before);
+}
+
+/** Exams of two learners over some days. */
+export function exams() {
+  const rows = [
+    ["Lea", "first_walk", "First walk", 34, false], ["Lea", "first_walk", "First walk", 52, false], ["Lea", "runner", "The runner", 61, false],
+    ["Tim", "first_walk", "First walk", 40, false], ["Lea", "after_hip", "After the new hip", 58, false], ["Lea", "long_drive", "A long drive", 77, true],
+    ["Lea", "old_story", "An old story", 84, true], ["Lea", "partial", "Half a day", 91, true],
+  ];
+  return rows.map(([trainee, id, title, score, passed], i) => ({ id: `old-${i}`, trainee, case: id, title, date: new Date(Date.UTC(2026, 10, 10 + i, 9, 12)).toISOString(),
+    protocol: i < 4 ? "two_point" : "extended", score, passed, seconds: 420 - 31 * i, report: `/report/old-${i}`, recording: false })).reverse();
+}
