@@ -220,17 +220,17 @@ export class Trainer {
     this.tell();
   }
 
-  /** Skin above the vein at a height: nearest node, facing away from the leg's middle. */
+  /** Skin nearest to the vein at a height, and the way out of the leg there. */
   skinAbove(z) {
     const vein = this.vein.reduce((a, p) => (Math.abs(p[2] - z) < Math.abs(a[2] - z) ? p : a));
     let best = null;
     let least = Infinity;
     for (const p of this.points) {
-      const cost = 3 * Math.abs(p[2] - z) + Math.hypot(p[0] - vein[0], p[1] - vein[1]);
-      if (cost < least) [best, least] = [p, cost];
+      const cost = Math.hypot(p[0] - vein[0], p[1] - vein[1], 2 * (p[2] - z));
+      if (p[1] > vein[1] && cost < least) [best, least] = [p, cost];
     }
-    const out = Math.hypot(best[0], best[1]);
-    const normal = [best[0] / out, best[1] / out, 0];
+    const out = Math.hypot(best[0] - vein[0], best[1] - vein[1]);
+    const normal = [(best[0] - vein[0]) / out, (best[1] - vein[1]) / out, 0];
     return { position_mm: best, normal, across: [normal[1], -normal[0], 0] };
   }
 
@@ -250,7 +250,9 @@ export class Trainer {
     else {
       const z = next.from_mm + ((next.done + 0.5) / next.points) * (next.to_mm - next.from_mm);
       const at = this.skinAbove(z);
-      step.offset_mm = Math.hypot(...at.position_mm.map((v, i) => v - s.position[i]));
+      const off = at.position_mm.map((v, i) => v - s.position[i]);
+      const height = off.reduce((sum, v, i) => sum + v * at.normal[i], 0);
+      step.offset_mm = Math.hypot(...off.map((v, i) => v - height * at.normal[i]));
       step.target = { name: next.title, ...at, radius_mm: RADIUS_MM };
       step.force_n = CORRIDOR_N;
       step.detail = step.offset_mm > RADIUS_MM ? "Move the probe into the ring, across the leg." : "Press until the walls touch and the artery just begins to deform, then let go.";

@@ -64,7 +64,7 @@ class App {
   private goalDue = false;
   private curveKey = "";
   private placed = false; // the hold of this thigh is chosen
-  private greeted = false;
+  private offered = query.has("site"); // who names a site knows what he wants
   private lost = false; // since the last hello
   private through = true; // what the operator chose, also while an exam forbids it
   private phase: Phase = "practice";
@@ -176,14 +176,13 @@ class App {
     this.forceBar.limits(hello.force_limit_n, hello.comfort_n ?? COMFORT * hello.force_limit_n);
     find("start-button").hidden = find("exams-button").hidden = !hello.trainer;
     this.showMode();
-    if (!this.greeted && hello.trainer && !query.has("site")) window.setTimeout(() => this.offerStart(), 300);
-    this.greeted = true;
   }
 
   /** The first question of a new visit; not when an exam already runs, nor to who only watches. */
   private offerStart(): void {
-    const busy = this.exam !== null && this.exam.phase !== "practice";
-    if (!busy && this.controls?.controls) this.start.open();
+    if (this.offered || !this.hello?.trainer || !this.exam || !this.controls) return;
+    this.offered = true;
+    if (this.exam.phase === "practice" && this.controls.controls) this.start.open();
   }
 
   /** Comes after the geometry, so the thigh is there now. */
@@ -199,6 +198,7 @@ class App {
     if (!this.placed) this.place(controls);
     this.updateCurve();
     this.showMode();
+    this.offerStart();
   }
 
   /** First controls of a thigh: sets the scene up and applies the address's wishes. */
@@ -229,6 +229,7 @@ class App {
     if (exam.phase !== "replay") this.replayBar.leave();
     this.guide(exam);
     this.showMode();
+    this.offerStart();
   }
 
   /** An exam begins, or goes on after the page was loaded anew. */

@@ -71,6 +71,7 @@ export class Sliders {
     const row = make("label", "slider");
     const output = make("output");
     const input = document.createElement("input");
+    input.setAttribute("aria-label", `${info.name}, ${info.unit}`); // the label names its output
     Object.assign(input, { type: "range", min: info.low, max: info.high, step: info.step });
     input.oninput = () => {
       this.write(output, info, input.valueAsNumber);

@@ -88,6 +88,7 @@ export class PatientTools {
       const row = make("label", "slider");
       const output = make("output", "", "1.00 ×");
       const input = make("input");
+      input.setAttribute("aria-label", `${name}, times the fitted value`);
       Object.assign(input, { type: "range", min: 0.5, max: 2, step: 0.05, value: 1 });
       input.oninput = () => {
         output.textContent = `${input.valueAsNumber.toFixed(2)} ×`;

@@ -6,7 +6,7 @@ import type { Snapshot } from "./protocol";
 
 const SPAN_S = 15;
 const REDRAW_S = 0.1;
-const JUMP_S = 1; // a step of time larger than this, or back, starts the curve anew
+const JUMP_S = 3; // a step of time larger than this, or back, starts the curve anew
 const INK = { grid: "#1e2630", axis: "#98a5b5", force: "#5cc8c2", vein: "#8ab0f7" };
 
 export class Traces {

@@ -1,0 +1,374 @@
+// The page's trainer in a real browser against the mock: whole exams by pointer and by keyboard, each
+// level of guidance, calipers, compare, replay, list, watching, a lost connection, and for every state
+// names, contrast and layout. Usage: node trainer_test.mjs WEB_BUILD_DIR OUT_DIR
+import { createRequire } from "node:module";
+import { mkdirSync, statSync } from "node:fs";
+import path from "node:path";
+import { browserPath, exams, goTo, openBrowser, ready } from "./drive.mjs";
+import { contrastFaults, layoutFaults, nameFaults } from "./inspect.mjs";
+import { startMock } from "./mock_server.mjs";
+
+const [, , webDir, outDir] = process.argv;
+const SKIPPED = 77;
+const CLOSED_MM = 15; // closes the mock's vein
+const SMALL = { width: 1024, height: 700 };
+if (!browserPath) {
+  console.log("skipped: /usr/bin/chromium is not installed");
+  process.exit(SKIPPED);
+}
+const { chromium } = createRequire(path.join(webDir, "package.json"))("playwright-core");
+const failures = [];
+function check(good, what) {
+  console.log(`${good ? "ok    " : "FAILED"} ${what}`);
+  if (!good) failures.push(what);
+}
+
+const button = (page, name) => page.getByRole("button", { name, exact: true });
+const exam = (page) => page.evaluate(() => window.sonde.exam);
+const phase = (page, wanted) => page.waitForFunction((p) => window.sonde.exam.phase === p, wanted);
+
+/** Names, contrast and layout of what is on the screen. */
+async function inspect(page, state) {
+  for (const [kind, find] of [["names", nameFaults], ["contrast", contrastFaults], ["layout", layoutFaults]]) {
+    const faults = await page.evaluate(find);
+    check(faults.length === 0, `${state}: ${kind}${faults.slice(0, 5).map((f) => `\n       ${f}`).join("")}`);
+  }
+}
+
+async function testStart(page) {
+  check(await page.locator("#start").isVisible(), "a new visit asks what to do");
+  check((await page.locator(".cards.case .card").count()) >= 12, "every case is offered");
+  await inspect(page, "start");
+}
+
+/** Drags the press slider's thumb up until the probe is so deep. */
+async function pressBySlider(page, depth_mm) {
+  const box = await page.locator("#depth-slider").boundingBox();
+  const y = (mm) => box.y + 16 + (box.height - 32) * (1 - (mm + 20) / 65);
+  const now = await page.evaluate(() => window.sonde.depth);
+  await page.mouse.move(box.x + box.width / 2, y(now));
+  await page.mouse.down();
+  await page.mouse.move(box.x + box.width / 2, y(depth_mm), { steps: 6 });
+  await page.mouse.up();
+  await page.waitForFunction((d) => window.sonde.snapshot.penetration_mm > d - 2.5, depth_mm);
+}
+
+async function testPointerExam(page) {
+  await button(page, "Start the exam").click();
+  await phase(page, "running");
+  check(await page.locator("#practice-bar").isHidden(), "in an exam the veins to choose from are hidden");
+  check(await page.locator("#coach").isVisible(), "a newcomer is told what to do first");
+  await inspect(page, "guided exam");
+  let pointed = false;
+  for (let i = 0; i < 2; ++i) {
+    await goTo(page);
+    pointed ||= await page.locator("#target-label.reached").isVisible();
+    await pressBySlider(page, CLOSED_MM);
+    await page.waitForFunction(() => document.getElementById("compression").dataset.state === "complete");
+    const before = (await exam(page)).presses.length;
+    await page.locator("#ease").click();
+    await page.waitForFunction((n) => window.sonde.exam.presses.length > n, before);
+    if (i === 0) await page.screenshot({ path: path.join(outDir, "guided.png") });
+    await page.locator(".finding.compressible").click();
+    await page.waitForFunction((n) => window.sonde.exam.segments.filter((s) => s.decision === "compressible").length === n, i + 1);
+  }
+  check(pointed, "the ring says that the probe is there");
+  await page.locator("#finish-button").click();
+  await inspect(page, "finish");
+  await button(page, "Finish and see the result").click();
+  await phase(page, "done");
+  const result = (await exam(page)).result;
+  check(result.passed && result.correct, `an exam by pointer passes: ${result.score}`);
+  check((await page.locator("#result").textContent()).includes("Right diagnosis"), "the result says that the diagnosis is right");
+  await inspect(page, "result");
+  const [report] = await Promise.all([page.context().waitForEvent("page"), page.getByRole("link", { name: "Open the report" }).click()]);
+  await report.waitForLoadState();
+  check((await report.locator("h1").textContent()).includes("First walk"), "the report opens in a new tab");
+  await report.close();
+}
+
+async function testReplay(page) {
+  await button(page, "Watch the replay").click();
+  await page.waitForFunction(() => window.sonde.replay);
+  const presses = (await page.evaluate(() => window.sonde.replay)).presses.length;
+  check((await page.locator("#scrub-marks rect").count()) === presses && presses > 0, `the track has a mark for each of ${presses} presses`);
+  const at = async (share) => {
+    await page.locator("#scrub").evaluate((e, s) => {
+      e.value = String(Number(e.max) * s);
+      e.dispatchEvent(new Event("input"));
+      e.dispatchEvent(new Event("change"));
+    }, share);
+    await page.waitForFunction((s) => Math.abs(window.sonde.replay.time_s - s * window.sonde.replay.duration_s) < 0.2, share);
+    const frames = await page.evaluate(() => window.sonde.frames);
+    await page.waitForFunction((n) => window.sonde.frames > n + 3, frames);
+    return page.evaluate(() => [window.sonde.imageSum, window.sonde.snapshot.force_normal_n]);
+  };
+  const [early, late, again] = [await at(0.05), await at(0.5), await at(0.05)];
+  check(early[0] !== late[0] && early[0] === again[0] && early[1] === again[1], "scrubbing back shows the same image and force");
+  check(await page.locator("#depth-slider").isDisabled(), "in a replay nothing moves the probe");
+  await page.locator("#comment-text").fill("Well <b>done</b>");
+  await page.locator("#comment-author").fill("Dr. Keller");
+  await button(page, "Add").click();
+  await page.waitForFunction(() => window.sonde.replay.comments.length === 1);
+  check((await page.locator("#comment-list li").textContent()).includes("Well <b>done</b>"), "a comment is shown as it was written");
+  check((await page.locator("#scrub-marks path").count()) === 1, "a comment has its mark");
+  await page.locator("#replay-play").click();
+  await page.waitForFunction(() => window.sonde.replay.playing && window.sonde.replay.time_s > 0.5);
+  await inspect(page, "replay");
+  await page.locator("#replay-leave").click();
+  await phase(page, "practice");
+  await button(page, "My exams").click();
+  await page.waitForFunction(() => document.querySelectorAll("#exams tbody tr, #exams table tr").length > 2);
+  check((await page.locator("#exams circle").count()) > 2, "the learning curve has a point for each exam");
+  await inspect(page, "my exams");
+  await button(page, "Close").click();
+}
+
+/** Presses a key until a condition of the exam holds. */
+async function keyUntil(page, key, condition, most = 80) {
+  for (let i = 0; i < most; ++i) {
+    if (await page.evaluate(condition)) return;
+    await page.keyboard.press(key);
+    await page.waitForTimeout(60);
+  }
+  throw new Error(`pressing ${key} does not lead there`);
+}
+
+async function testKeyboardExam(page) {
+  await page.locator("#start-button").focus();
+  await page.keyboard.press("Enter");
+  await page.keyboard.press("Enter");
+  await phase(page, "running");
+  const offset = () => window.sonde.exam.step.offset_mm < 12;
+  for (const way of ["ArrowRight", "ArrowLeft"]) {
+    await page.waitForFunction(() => window.sonde.exam.step.target !== null);
+    await page.keyboard.press("5" === way ? "" : "0");
+    const side = await page.evaluate(() => window.sonde.exam.step.target.position_mm[2] - window.sonde.snapshot.position_mm[2]);
+    await keyUntil(page, side > 0 ? "Shift+ArrowLeft" : "Shift+ArrowRight", offset, 40);
+    await keyUntil(page, "Shift+ArrowUp", () => window.sonde.exam.compression.state === "complete");
+    const before = (await exam(page)).presses.length;
+    await page.keyboard.press("0");
+    await page.waitForFunction((n) => window.sonde.exam.presses.length > n, before);
+    await page.keyboard.press("j");
+    await page.waitForFunction(() => window.sonde.exam.segments.every((s) => s.done === 0 || s.decision !== ""));
+  }
+  await page.keyboard.press("Shift+Enter");
+  await page.keyboard.press("Enter");
+  await phase(page, "done");
+  check((await exam(page)).result.passed, `an exam by keyboard alone passes: ${(await exam(page)).result.score}`);
+  await page.keyboard.press("Tab");
+  await page.keyboard.press("Enter");
+  await page.waitForFunction(() => window.sonde.replay !== null && window.sonde.exam.phase === "replay");
+  await page.locator("#scene").focus();
+  await page.keyboard.press("Shift+ArrowRight");
+  await page.waitForFunction(() => window.sonde.replay.time_s > 2);
+  check(true, "keys open and move the replay");
+  await page.locator("#replay-leave").focus();
+  await page.keyboard.press("Enter");
+  await phase(page, "practice");
+}
+
+async function begin(page, guidance, caseName) {
+  await button(page, "Start an exam").click();
+  await page.getByRole("radio", { name: guidance }).check();
+  await page.getByRole("radio", { name: caseName }).check();
+  await page.locator("#start-go").click();
+  await phase(page, "running");
+}
+
+async function testGuidance(page) {
+  const shown = async () => ({
+    ring: await page.locator("#target-label").isVisible(), angle: await page.locator("#dial").isVisible(),
+    vein: await page.getByText("Vein area").isVisible(), inside: await page.locator("#see-through").isEnabled(), hint: await page.locator("#hint-button").isVisible(),
+  });
+  await begin(page, /^Full/, /^After the new hip/);
+  await page.waitForFunction(() => window.sonde.exam.step.target);
+  const full = await shown();
+  check(full.ring && full.angle && full.vein && full.inside && !full.hint, "full guidance shows ring, angle and vessels");
+  await button(page, "Leave").click();
+  await begin(page, /^Hints/, /^After the new hip/);
+  const hints = await shown();
+  check(!hints.ring && !hints.angle && !hints.vein && hints.hint, "with hints only the next point is named");
+  check((await page.locator("#step-text").textContent()).includes("groin"), "the next point is named");
+  await page.keyboard.press("u");
+  await page.waitForFunction(() => document.getElementById("step-detail").textContent.startsWith("Hint:"));
+  check((await exam(page)).hints_used === 1, "a hint comes when asked for");
+  await inspect(page, "exam with hints");
+  await button(page, "Leave").click();
+  await begin(page, /^None/, /^After the new hip/);
+  const none = await shown();
+  check(!none.ring && !none.angle && !none.vein && !none.inside && !none.hint, "without guidance nothing is told");
+  await page.evaluate(() => window.sonde.setDepth(12));
+  await page.waitForFunction(() => window.sonde.snapshot.penetration_mm > 11);
+  const words = (await page.locator("body").innerText()).toLowerCase();
+  check(!/occlusive|acute|thromb|healthy/.test(words), "nothing on the page tells the truth");
+  await inspect(page, "exam without guidance");
+}
+
+async function testWatch(page, mock) {
+  const second = await page.context().newPage();
+  await second.goto(mock.address);
+  await ready(second);
+  check(await second.locator("#watching").isVisible(), "a second page says that it watches");
+  check((await second.locator("#step").innerText()).includes("Examine") && (await second.locator("#finish-button").isHidden()), "it follows the exam and cannot end it");
+  await second.keyboard.press("k");
+  await page.waitForTimeout(300);
+  check((await exam(page)).segments.every((s) => s.decision !== "clot"), "it cannot decide");
+  await inspect(second, "watching");
+  await second.close();
+}
+
+async function testLoss(page, mock) {
+  await page.keyboard.press("l");
+  await page.waitForFunction(() => window.sonde.exam.segments[0].decision === "not_seen");
+  const depth = await page.evaluate(() => window.sonde.depth);
+  mock.drop(900);
+  await page.waitForFunction(() => !document.getElementById("banner").hidden);
+  check((await page.locator("#banner").textContent()).includes("lost"), "a lost connection is said");
+  await page.waitForFunction(() => window.sonde.connected);
+  const frames = await page.evaluate(() => window.sonde.frames);
+  await page.waitForFunction((n) => window.sonde.frames > n + 2, frames);
+  const now = await exam(page);
+  check(now.phase === "running" && now.segments[0].decision === "not_seen", "the exam goes on when the connection is back");
+  check((await page.evaluate(() => window.sonde.depth)) === depth, "the hand is where it was");
+  check(await page.locator("#start").isHidden(), "nobody is asked what to do in the middle of an exam");
+  check(await page.locator("#banner").isHidden(), "the sentence goes away");
+  await page.reload();
+  await ready(page);
+  check(await page.locator("#exam-bar").isVisible(), "a page that is loaded anew is back in the exam");
+  await button(page, "Leave").click();
+  await phase(page, "practice");
+}
+
+async function drag(page, from, to) {
+  await page.mouse.move(...from);
+  await page.mouse.down();
+  await page.mouse.move(...to, { steps: 4 });
+  await page.mouse.up();
+}
+
+async function testCalipers(page) {
+  const pane = await page.locator(".pane").last().boundingBox();
+  const at = (x, y) => [pane.x + (x * pane.width) / 60, pane.y + (y * pane.height) / 70];
+  const measures = () => page.evaluate(() => window.sonde.measures);
+  await button(page, "Distance").click();
+  await drag(page, at(20, 20), at(26, 28));
+  const distance = (await measures())[0].value;
+  check(Math.abs(distance - 10) < 0.15, `a line of 10 mm measures ${distance.toFixed(2)} mm`);
+  check((await page.locator("#measures").innerText()).includes("10.0 mm") || (await page.locator("#measures").innerText()).includes("mm"), "it is written with its unit");
+  await button(page, "Area").click();
+  await drag(page, at(20, 40), at(40, 40));
+  await drag(page, at(30, 47), at(30, 45));
+  const area = (await measures())[1].value;
+  check(Math.abs(area - Math.PI * 50) < 5, `an ellipse of 20 x 10 mm measures ${area.toFixed(1)} mm²`);
+  await page.keyboard.press("Delete");
+  check((await measures()).length === 0, "Delete clears");
+  await page.keyboard.press("m");
+  await page.keyboard.press("m");
+  const before = (await measures())[0].value;
+  await page.keyboard.press("Shift+ArrowUp");
+  check(Math.abs((await measures())[0].value - before - 2) < 1e-9, "arrow keys move a caliper's point");
+  await button(page, "Clear").click();
+  if (await page.locator("#measure-distance[aria-pressed=true]").count()) await button(page, "Distance").click();
+}
+
+async function testCompare(page) {
+  const pixels = (n) => page.locator(".pane canvas").nth(n).evaluate((c) => c.toDataURL());
+  await page.evaluate(() => window.sonde.setDepth(1));
+  await page.waitForFunction(() => window.sonde.snapshot.penetration_mm > 0.5);
+  await page.waitForTimeout(200);
+  await button(page, "Compare").click();
+  const kept = await pixels(0);
+  await page.evaluate((d) => window.sonde.setDepth(d), CLOSED_MM);
+  await page.waitForFunction((d) => window.sonde.snapshot.penetration_mm > d - 1, CLOSED_MM);
+  await page.waitForTimeout(200);
+  check((await pixels(0)) === kept && (await pixels(1)) !== kept, "the kept image stays, the live one goes on");
+  await button(page, "Freeze").click();
+  const frozen = await pixels(1);
+  await page.evaluate(() => window.sonde.setDepth(1));
+  await page.waitForFunction(() => window.sonde.snapshot.penetration_mm < 3);
+  check((await pixels(1)) === frozen, "before and after stand side by side");
+  await inspect(page, "compare");
+  await page.screenshot({ path: path.join(outDir, "compare.png") });
+  await button(page, "Compare").click();
+  check(await page.locator(".pane").first().isHidden(), "compare ends");
+}
+
+async function testPatient(page, mock) {
+  await page.locator("#posture").selectOption("standing");
+  await page.waitForFunction(() => window.sonde.controls.posture === "standing");
+  await page.locator("#valsalva").click();
+  await page.waitForFunction(() => window.sonde.controls.valsalva === true);
+  await page.locator("#gel-put").click();
+  await page.waitForFunction(() => window.sonde.controls.gel_ml === 2);
+  await page.locator("#gel-wipe").click();
+  await page.waitForFunction(() => window.sonde.controls.gel_ml === 0);
+  await button(page, "Tissue").click();
+  await page.locator("#tissue input").first().fill("1.5");
+  await page.waitForFunction(() => window.sonde.controls.stiffness_scale === 1.5);
+  await page.keyboard.press("Escape");
+  check(mock.thigh.controls.stiffness_scale === 1.5, "position, strain, gel and tissue reach the program");
+}
+
+/** Two fingers that go up press. */
+async function testTouch(page) {
+  const before = await page.evaluate(() => window.sonde.depth);
+  await page.locator("#scene").evaluate((canvas) => {
+    const box = canvas.getBoundingClientRect();
+    const send = (type, pointerId, x, y) => canvas.dispatchEvent(new PointerEvent(type, { pointerId, pointerType: "touch", isPrimary: pointerId === 11, bubbles: true, clientX: box.left + x, clientY: box.top + y, button: 0, buttons: 1 }));
+    canvas.setPointerCapture = () => undefined;
+    canvas.releasePointerCapture = () => undefined;
+    send("pointerdown", 11, 20, 20);
+    send("pointerdown", 12, 60, 20);
+    for (let i = 1; i <= 5; ++i) send("pointermove", 11, 20, 20 + 8 * i), send("pointermove", 12, 60, 20 + 8 * i);
+    send("pointerup", 11, 20, 60);
+    send("pointerup", 12, 60, 60);
+  });
+  const after = await page.evaluate(() => window.sonde.depth);
+  check(Math.abs(after - before - 6) < 0.6, `two fingers by 40 px press by ${(after - before).toFixed(1)} mm`);
+}
+
+async function testLight(page, mock) {
+  const bytes = ["index.html", "style.css", "app.js"].reduce((sum, f) => sum + statSync(path.join(webDir, "dist", `${f}.gz`)).size, 0);
+  check(bytes < 1e6, `the page weighs ${(bytes / 1000).toFixed(0)} kB compressed`);
+  const start = Date.now();
+  await page.goto(`${mock.address}?quality=low`);
+  await page.waitForFunction(() => (window.sonde?.frames ?? 0) > 0);
+  console.log(`       first image after ${Date.now() - start} ms`);
+  await ready(page);
+}
+
+async function main() {
+  mkdirSync(outDir, { recursive: true });
+  const mock = await startMock({ webDir, list: exams() });
+  const browser = await openBrowser(chromium);
+  try {
+    const context = await browser.newContext({ viewport: SMALL, reducedMotion: "reduce" });
+    const page = await context.newPage();
+    page.setDefaultTimeout(30000);
+    const errors = [];
+    page.on("console", (m) => m.type() === "error" && !/WebSocket|ERR_CONNECTION/.test(m.text()) && errors.push(m.text()));
+    page.on("pageerror", (e) => errors.push(e.message));
+    await testLight(page, mock);
+    await page.locator("#start[open]").waitFor();
+    await testStart(page);
+    await testPointerExam(page);
+    await testReplay(page);
+    await inspect(page, "free practice");
+    await testKeyboardExam(page);
+    await testGuidance(page);
+    await testWatch(page, mock);
+    await testLoss(page, mock);
+    await testCalipers(page);
+    await testCompare(page);
+    await testPatient(page, mock);
+    await testTouch(page);
+    check(errors.length === 0, `no errors on the console${errors.map((e) => `\n       ${e}`).join("")}`);
+  } finally {
+    await browser.close();
+    mock.close();
+  }
+}
+
+await main().catch((error) => check(false, error.stack));
+process.exit(failures.length ? 1 : 0);
