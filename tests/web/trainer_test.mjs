@@ -48,7 +48,10 @@ async function pressBySlider(page, depth_mm) {
   const now = await page.evaluate(() => window.sonde.depth);
   await page.mouse.move(box.x + box.width / 2, y(now));
   await page.mouse.down();
-  await page.mouse.move(box.x + box.width / 2, y(depth_mm), { steps: 6 });
+  for (const mm of [now, (now + depth_mm) / 2, depth_mm, depth_mm + 0.5]) {
+    await page.mouse.move(box.x + box.width / 2, y(mm));
+    await page.waitForTimeout(40);
+  }
   await page.mouse.up();
   await page.waitForFunction((d) => window.sonde.snapshot.penetration_mm > d - 2.5, depth_mm);
 }
@@ -125,11 +128,12 @@ async function testReplay(page) {
 }
 
 /** Presses a key until a condition of the exam holds. */
-async function keyUntil(page, key, condition, most = 80) {
+async function keyUntil(page, key, condition, most = 20) {
   for (let i = 0; i < most; ++i) {
     if (await page.evaluate(condition)) return;
+    const before = await page.evaluate(() => window.sonde.exam.elapsed_s);
     await page.keyboard.press(key);
-    await page.waitForTimeout(60);
+    await page.waitForFunction((t) => window.sonde.exam.elapsed_s > t + 0.3, before);
   }
   throw new Error(`pressing ${key} does not lead there`);
 }
@@ -139,12 +143,13 @@ async function testKeyboardExam(page) {
   await page.keyboard.press("Enter");
   await page.keyboard.press("Enter");
   await phase(page, "running");
-  const offset = () => window.sonde.exam.step.offset_mm < 12;
-  for (const way of ["ArrowRight", "ArrowLeft"]) {
+  const offset = () => window.sonde.exam.step.offset_mm !== null && window.sonde.exam.step.offset_mm < 12;
+  for (let point = 0; point < 2; ++point) {
     await page.waitForFunction(() => window.sonde.exam.step.target !== null);
-    await page.keyboard.press("5" === way ? "" : "0");
-    const side = await page.evaluate(() => window.sonde.exam.step.target.position_mm[2] - window.sonde.snapshot.position_mm[2]);
-    await keyUntil(page, side > 0 ? "Shift+ArrowLeft" : "Shift+ArrowRight", offset, 40);
+    await page.keyboard.press("0");
+    const by = await page.evaluate(() => window.sonde.exam.step.target.position_mm[2] - window.sonde.snapshot.position_mm[2]);
+    for (let i = 0; i < Math.round(Math.abs(by) / 10); ++i) await page.keyboard.press(by > 0 ? "Shift+ArrowLeft" : "Shift+ArrowRight");
+    await page.waitForFunction(offset);
     await keyUntil(page, "Shift+ArrowUp", () => window.sonde.exam.compression.state === "complete");
     const before = (await exam(page)).presses.length;
     await page.keyboard.press("0");

@@ -39,7 +39,8 @@ class App {
   snapshot: Snapshot | null = null;
   connected = false;
   frames = 0;
-  imageSum = 0;
+  /** pixels of the last frame */
+  pixels: Uint8Array = new Uint8Array(0);
   readonly hold = new Hold();
   readonly scene = new ThighScene(find<HTMLCanvasElement>("scene"), query.get("quality") === "low");
   readonly echo = new EchoView(find("echo-box"), find<HTMLCanvasElement>("echo-marks"), find("echo-text"), find("measures"));
@@ -462,7 +463,7 @@ class App {
     const s = frame.snapshot;
     this.snapshot = s;
     ++this.frames;
-    this.imageSum = frame.pixels.reduce((sum, p, i) => (sum + p * ((i % 251) + 1)) % 1e9, 0);
+    this.pixels = frame.pixels;
     this.scene.show(frame);
     this.echo.show(frame);
     this.readouts.show(s);
@@ -520,7 +521,7 @@ const sonde = {
   get replay() { return app.replay; },
   get frames() { return app.frames; },
   /** changes whenever the echo image changes */
-  get imageSum() { return app.imageSum; },
+  get imageSum() { return app.pixels.reduce((sum, p, i) => (sum + p * ((i % 251) + 1)) % 1e9, 0); },
   get measures() { return app.echo.measures; },
   get depth() { return app.hold.depth_mm; },
   /** middle of the wanted ring on the canvas, px */

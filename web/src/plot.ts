@@ -1,6 +1,7 @@
 // Force against penetration: what the probe does now, beside what was measured at the nearest site.
 
 import uPlot from "uplot";
+import { nameDrawing } from "./dom";
 
 const TRACE_POINTS = 900;
 const MOST = { mm: 50, n: 60 }; // a point beyond stays at the edge
@@ -19,6 +20,7 @@ export class ForcePlot {
 
   constructor(private readonly box: HTMLElement) {
     this.plot = new uPlot(this.options(), [[0], [0]], box);
+    nameDrawing(box, "Force in newtons against penetration in millimetres: now, and as measured");
     new ResizeObserver(() => this.resize()).observe(box);
     this.resize();
   }

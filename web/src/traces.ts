@@ -1,7 +1,7 @@
 // Force and vein area over the last seconds, side by side in time: what pressing does to the vein.
 
 import uPlot from "uplot";
-import { find } from "./dom";
+import { find, nameDrawing } from "./dom";
 import type { Snapshot } from "./protocol";
 
 const SPAN_S = 15;
@@ -21,6 +21,7 @@ export class Traces {
 
   constructor() {
     this.plot = new uPlot(this.options(), [[], [], []], this.box);
+    nameDrawing(this.box, "Force in newtons and vein area in percent over the last 15 seconds");
     new ResizeObserver(() => this.resize()).observe(this.box);
     this.resize();
   }
