@@ -18,7 +18,7 @@ const { chromium } = createRequire(path.join(webDir, "package.json"))("playwrigh
 const mock = await startMock({ webDir, program: option("--program"), list: exams() });
 const browser = await openBrowser(chromium);
 const page = await browser.newPage({ viewport: { width, height } });
-page.setDefaultTimeout(60000);
+page.setDefaultTimeout(120000);
 page.on("pageerror", (e) => console.log(e.stack));
 let count = 0;
 const shot = async (name, wait = 400) => {
@@ -61,7 +61,7 @@ await button("Clear").click();
 await button("Compare").click();
 await page.evaluate(() => window.sonde.resume());
 await page.evaluate(() => window.sonde.setDepth(10));
-await button("Force by depth").click();
+await button("By depth").click();
 await page.locator("#see-through").click();
 await shot("skin", 1200);
 await page.locator("#see-through").click();

@@ -52,6 +52,8 @@ export class ExamBar {
     find("hint-button").hidden = exam.guidance !== "hints";
     for (const id of ["leave-button", "finish-button", "decide"]) find(id).hidden = !controls;
     if (!controls) find("hint-button").hidden = true;
+    const complete = exam.segments.every((s) => !s.needed || s.decision !== "");
+    find("finish-button").classList.toggle("primary", complete); // not before there is something to finish
     this.fill(exam.segments);
     if (!exam.segments.some((s) => s.id === this.chosen)) this.chosen = exam.segments[0]?.id ?? "";
     this.mark(exam.segments);
@@ -101,6 +103,8 @@ export class ExamBar {
     }
     const now = segments.find((s) => s.id === this.chosen);
     find("decide-title").textContent = now ? `Finding: ${now.title}` : "Finding";
+    const due = now !== undefined && now.needed && now.done >= now.points && now.decision === "" && this.exam?.guidance !== "exam";
+    find("decide").classList.toggle("due", due);
     this.choices.forEach((b, i) => {
       b.disabled = !this.controls || !now;
       b.setAttribute("aria-pressed", String(now?.decision === FINDINGS[i]!.decision));

@@ -65,6 +65,7 @@ class App {
   private goalDue = false;
   private curveKey = "";
   private placed = false; // the hold of this thigh is chosen
+  private fresh = false; // a hello came, its controls not yet
   private offered = query.has("site"); // who names a site knows what he wants
   private lost = false; // since the last hello
   private through = true; // what the operator chose, also while an exam forbids it
@@ -95,7 +96,7 @@ class App {
       replay: (exam) => (this.result.hide(), connection.openReplay(exam)),
       again: (id) => (this.result.hide(), this.start.again(id)),
       next: (id) => (this.result.hide(), connection.leaveExam(), this.start.open(this.start.next(id))),
-      close: () => (this.result.hide(), connection.leaveExam()),
+      close: () => connection.leaveExam(),
     });
     this.history = new HistoryDialog((exam) => connection.openReplay(exam));
     this.input = this.wireInput();
@@ -169,6 +170,7 @@ class App {
     const same = this.hello?.model === hello.model && this.hello.nodes === hello.nodes;
     this.placed = this.lost && same && this.placed; // the hand stays where it was
     this.lost = false;
+    this.fresh = true;
     this.hello = hello;
     find("about").textContent =
       `Sonde ${hello.program}. Trains and simulates; not a medical device. ${hello.nodes} skin nodes. ${hello.provenance}`;
@@ -196,17 +198,24 @@ class App {
     this.scene.setGel((controls.gel_ml ?? 0) > 0.05);
     if (probeChanged) this.plot.clear();
     this.curveKey = "";
+    if (this.fresh) this.furnish();
     if (!this.placed) this.place(controls);
     this.updateCurve();
     this.showMode();
     this.offerStart();
   }
 
-  /** First controls of a thigh: sets the scene up and applies the address's wishes. */
-  private place(controls: Controls): void {
-    this.placed = true;
+  /** Marks and sites of a thigh that has just come; the hand is told where it is. */
+  private furnish(): void {
+    this.fresh = false;
     this.scene.setProbes(this.hello!.probes);
     this.scene.setSites(this.hello!.sites);
+    this.goalDue = this.placed;
+  }
+
+  /** First controls of a thigh: puts the hand somewhere and applies the address's wishes. */
+  private place(controls: Controls): void {
+    this.placed = true;
     if (!controls.controls) return;
     const probe = query.get("probe");
     const wantedCase = query.get("case");
@@ -222,6 +231,7 @@ class App {
     const before = this.phase;
     this.exam = exam;
     this.phase = exam.phase;
+    if (exam.phase !== before && this.echo.isFrozen) this.tools.freeze();
     if (exam.phase === "running" && before !== "running") this.begin(before);
     if (exam.phase === "practice" && exam.message && before !== "practice") this.say(exam.message, 8000);
     if (exam.phase === "running" || exam.phase === "done") this.examBar.show(exam, this.controls?.controls ?? false);
@@ -238,7 +248,6 @@ class App {
     remember("trained", "yes");
     this.start.close();
     this.history.close();
-    if (this.echo.isFrozen) this.tools.freeze();
     this.traces.clear();
     find("hint").classList.add("gone");
     const s = this.snapshot;
@@ -524,6 +533,8 @@ const sonde = {
   get imageSum() { return app.pixels.reduce((sum, p, i) => (sum + p * ((i % 251) + 1)) % 1e9, 0); },
   get measures() { return app.echo.measures; },
   get depth() { return app.hold.depth_mm; },
+  /** where the hand holds the probe on the resting skin */
+  get point() { return app.hold.point; },
   /** middle of the wanted ring on the canvas, px */
   targetOnScreen: () => app.scene.targetOnScreen("middle"),
   setDepth: (depth_mm: number) => app.setDepth(depth_mm),

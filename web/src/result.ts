@@ -98,7 +98,7 @@ export class ResultDialog {
     ];
     later[0]!.disabled = !exam.recording;
     for (const b of later) b.disabled ||= !controls;
-    row.append(report, ...later, make("span", "spring"), button("Close", () => this.actions.close()));
+    row.append(report, ...later, make("span", "spring"), button("Close", () => (this.box.close(), controls && this.actions.close())));
     return row;
   }
 }
