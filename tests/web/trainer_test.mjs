@@ -89,6 +89,7 @@ async function testPointerExam(page) {
   await report.waitForLoadState();
   check((await report.locator("h1").textContent()).includes("First walk"), "the report opens in a new tab");
   await report.close();
+  await page.bringToFront();
 }
 
 async function testReplay(page) {
@@ -222,6 +223,7 @@ async function testWatch(page, mock) {
   check((await exam(page)).segments.every((s) => s.decision !== "clot"), "it cannot decide");
   await inspect(second, "watching");
   await second.close();
+  await page.bringToFront();
 }
 
 async function testLoss(page, mock) {
