@@ -41,6 +41,7 @@ export class ExamBar {
   }
 
   show(exam: Exam, controls: boolean): void {
+    if (exam.exam !== this.exam?.exam) this.cells.clear(); // another exam begins at its first segment
     this.exam = exam;
     this.controls = controls;
     this.sayStep(exam);
