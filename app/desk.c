@@ -1,0 +1,290 @@
+// Practice, exams and replays behind one page.
+//
+// take_request, watch     what the page's threads leave
+// end_session             the session before, with its recording
+// desk_run_session        another thigh
+// answer                  one request
+// create_*                parts of a desk, in this order
+// desk_create, desk_turn, desk_destroy
+#include "desk_parts.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+static const double TELL_EVERY_S = 0.2;
+
+// Called by the page's threads, one at a time.
+static void take_request(void *user, const sonde_page_request *request) {
+  desk *d = user;
+  pthread_mutex_lock(&d->lock);
+  if (d->request_count < DESK_REQUESTS)
+    d->request[(d->request_first + d->request_count++) % DESK_REQUESTS] = *request;
+  pthread_mutex_unlock(&d->lock);
+}
+
+static bool next_request(desk *d, sonde_page_request *request) {
+  pthread_mutex_lock(&d->lock);
+  bool any = d->request_count > 0;
+  if (any) {
+    *request = d->request[d->request_first];
+    d->request_first = (d->request_first + 1) % DESK_REQUESTS;
+    --d->request_count;
+  }
+  pthread_mutex_unlock(&d->lock);
+  return any;
+}
+
+static void watch(void *user, const sonde_frame *frame) {
+  desk *d = user;
+  pthread_mutex_lock(&d->lock);
+  if (d->phase == DESK_RUNNING && d->exam) desk_exam_observe(d->exam, frame);
+  pthread_mutex_unlock(&d->lock);
+}
+
+void desk_set_phase(desk *d, desk_phase phase, const char *message) {
+  pthread_mutex_lock(&d->lock);
+  d->phase = phase;
+  snprintf(d->message, sizeof d->message, "%.*s", DESK_SENTENCE - 1, message);
+  pthread_mutex_unlock(&d->lock);
+  desk_tell_exam(d);
+}
+
+const sonde_case *desk_find_case(const desk *d, const char *id) {
+  for (uint32_t i = 0; i < d->case_count; ++i)
+    if (strcmp(d->case_list[i].id, id) == 0) return &d->case_list[i];
+  return NULL;
+}
+
+const sonde_exam_protocol *desk_find_protocol(const desk *d, const char *id) {
+  for (uint32_t i = 0; i < d->protocol_count; ++i)
+    if (strcmp(d->protocol_list[i].id, id) == 0) return &d->protocol_list[i];
+  return NULL;
+}
+
+// ---- sessions
+
+static sonde_status make_session(desk *d, sonde_session_def *def, sonde_pose start,
+                                 sonde_session **session, sonde_error *error) {
+  sonde_device device = {0};
+  sonde_status status = d->def.make_device(d->def.user, def->model, start, &device, error);
+  if (!status) status = sonde_session_create(def, &device, session, error);
+  if (device.destroy) device.destroy(device.self); // not moved: creation failed
+  return status;
+}
+
+// The server must not show it any more. A recording that could not be written is told.
+static void end_session(desk *d, sonde_session *session) {
+  sonde_error error = {0};
+  sonde_session_stop(session);
+  if (sonde_session_destroy(session, &error)) sonde_page_tell(d->server, error.message);
+}
+
+void desk_end_session(desk *d) {
+  sonde_session *session = d->session;
+  d->session = NULL;
+  if (session) end_session(d, session);
+}
+
+sonde_status desk_run_session(desk *d, sonde_session_def *def, sonde_pose start,
+                              sonde_error *error) {
+  sonde_session *before = d->session;
+  bool shared = strcmp(d->def.device_name, "page") != 0; // one hand cannot hold two devices
+  if (before && shared) {
+    sonde_status status = sonde_page_show_model(d->server, def->model, NULL, 0, error);
+    if (status) return status;
+    desk_end_session(d);
+    before = NULL;
+  }
+  sonde_session *next = NULL;
+  sonde_status status = make_session(d, def, start, &next, error);
+  if (!status && d->server) status = sonde_page_show(d->server, next, error);
+  if (status) {
+    sonde_session_destroy(next, NULL);
+    return status;
+  }
+  d->session = next;
+  if (before) end_session(d, before);
+  return d->server ? sonde_session_start(next, error) : SONDE_OK;
+}
+
+// Above the middle of the examined skin.
+static sonde_pose practice_pose(const sonde_model *model) {
+  enum { FIRST_SITE = 27 };
+  const sonde_site *site = sonde_model_site(model, FIRST_SITE);
+  if (!site) site = &model->sites[0];
+  return sonde_site_pose(site, -0.01);
+}
+
+static sonde_status start_practice(desk *d, sonde_error *error) {
+  sonde_session_def def = d->def.practice;
+  def.model = d->def.model;
+  def.model_path = d->def.model_path;
+  return desk_run_session(d, &def, practice_pose(def.model), error);
+}
+
+sonde_status desk_practice(desk *d, sonde_error *error) {
+  desk_exam *exam = d->exam;
+  desk_replay *replay = d->replay;
+  sonde_status status = start_practice(d, error);
+  if (status) return status;
+  pthread_mutex_lock(&d->lock);
+  d->exam = NULL;
+  pthread_mutex_unlock(&d->lock);
+  d->replay = NULL;
+  desk_exam_destroy(exam); // their thighs are not shown any more
+  desk_replay_destroy(replay);
+  desk_set_phase(d, DESK_PRACTICE, "");
+  return SONDE_OK;
+}
+
+// ---- requests
+
+static sonde_status refuse(sonde_error *error, const char *sentence) {
+  error->status = SONDE_ARGUMENT;
+  snprintf(error->message, sizeof error->message, "%s", sentence);
+  return SONDE_ARGUMENT;
+}
+
+static sonde_status decide(desk *d, const sonde_page_request *request, sonde_error *error) {
+  sonde_decision decision;
+  if (d->phase != DESK_RUNNING) return refuse(error, "there is no exam to decide in");
+  if (!sonde_decision_parse(request->text, &decision))
+    return refuse(error, "a decision must be compressible, clot, not_seen or empty");
+  pthread_mutex_lock(&d->lock);
+  uint32_t segment = sonde_vein_segment(&d->exam->setup.map, request->id);
+  sonde_status status = sonde_judge_decide(d->exam->judge, segment, decision, error);
+  pthread_mutex_unlock(&d->lock);
+  return status;
+}
+
+static sonde_status hint(desk *d, sonde_error *error) {
+  if (d->phase != DESK_RUNNING || strcmp(d->exam->guidance, "hints") != 0)
+    return refuse(error, "hints belong to an exam with hints");
+  pthread_mutex_lock(&d->lock);
+  sonde_judge_hint(d->exam->judge);
+  pthread_mutex_unlock(&d->lock);
+  return SONDE_OK;
+}
+
+static sonde_status play(desk *d, const sonde_page_request *request, sonde_error *error) {
+  if (d->phase != DESK_REPLAY) return refuse(error, "there is no replay to play");
+  d->replay->playing = request->playing;
+  d->replay->speed = request->speed;
+  d->replay->time_s = sonde_player_time(d->replay->player);
+  d->replay->at_s = app_seconds(CLOCK_MONOTONIC);
+  return SONDE_OK;
+}
+
+static sonde_status answer(desk *d, const sonde_page_request *request, sonde_error *error) {
+  switch (request->ask) {
+  case SONDE_PAGE_START_EXAM: return desk_exam_start(d, request, error);
+  case SONDE_PAGE_DECIDE: return decide(d, request, error);
+  case SONDE_PAGE_HINT: return hint(d, error);
+  case SONDE_PAGE_FINISH_EXAM: return desk_exam_finish(d, error);
+  case SONDE_PAGE_LEAVE_EXAM: return desk_practice(d, error);
+  case SONDE_PAGE_LIST_EXAMS: desk_tell_exams(d); return SONDE_OK;
+  case SONDE_PAGE_OPEN_REPLAY: return desk_replay_open(d, request->id, error);
+  case SONDE_PAGE_SEEK: return desk_replay_seek(d, request->time_s, error);
+  case SONDE_PAGE_PLAY: return play(d, request, error);
+  default: return desk_replay_comment(d, request, error);
+  }
+}
+
+void desk_turn(desk *d) {
+  sonde_page_request request;
+  bool asked = false;
+  while (next_request(d, &request)) {
+    sonde_error error = {0};
+    if (answer(d, &request, &error)) sonde_page_tell(d->server, error.message);
+    asked = true;
+  }
+  if (d->phase == DESK_REPLAY) desk_replay_turn(d);
+  double now_s = app_seconds(CLOCK_MONOTONIC);
+  if (!asked && now_s - d->published_s < TELL_EVERY_S) return;
+  d->published_s = now_s;
+  desk_tell_exam(d);
+  desk_tell_replay(d);
+}
+
+// ---- the desk
+
+static sonde_status make_directory(const char *path, sonde_error *error) {
+  char part[4096];
+  snprintf(part, sizeof part, "%s", path);
+  for (char *c = part + 1; *c; ++c) {
+    if (*c != '/') continue;
+    *c = 0;
+    mkdir(part, 0700);
+    *c = '/';
+  }
+  if (mkdir(part, 0700) == 0 || errno == EEXIST) return SONDE_OK;
+  error->status = SONDE_IO;
+  snprintf(error->message, sizeof error->message,
+           "%.200s: the directory of the exams cannot be made: %s", path, strerror(errno));
+  return SONDE_IO;
+}
+
+static sonde_status create_library(desk *d, sonde_error *error) {
+  char path[4200];
+  sonde_status status = sonde_case_list(d->cases, &d->case_list, &d->case_count, error);
+  if (!status)
+    status = sonde_exam_protocol_list(d->protocols, &d->protocol_list, &d->protocol_count, error);
+  if (!status) status = make_directory(d->exams, error);
+  snprintf(path, sizeof path, "%s/exams.sqlite", d->exams);
+  return status ? status : sonde_exam_log_open(path, &d->log, error);
+}
+
+static sonde_status create_page(desk *d, sonde_error *error) {
+  sonde_page_def page = {.port = d->def.port,
+                         .model_path = d->def.model_path,
+                         .force_limit_n = d->def.force_limit_n,
+                         .exams_directory = d->exams,
+                         .user = d,
+                         .observe = watch,
+                         .request = take_request};
+  sonde_status status = sonde_page_start(&page, d->session, &d->server, error);
+  if (status) return status;
+  desk_tell_greeting(d);
+  desk_tell_exam(d);
+  return sonde_session_start(d->session, error);
+}
+
+sonde_status desk_create(const desk_def *def, desk **out, sonde_error *error) {
+  desk *d = calloc(1, sizeof *d);
+  *out = NULL;
+  if (!d) return error->status = SONDE_MEMORY;
+  d->def = *def;
+  pthread_mutex_init(&d->lock, NULL);
+  snprintf(d->cases, sizeof d->cases, "%s", def->cases);
+  snprintf(d->protocols, sizeof d->protocols, "%s", def->protocols);
+  snprintf(d->exams, sizeof d->exams, "%s", def->exams);
+  snprintf(d->trainee, sizeof d->trainee, "%s", def->trainee);
+  sonde_status status = create_library(d, error);
+  if (!status) status = start_practice(d, error);
+  if (!status) status = create_page(d, error);
+  if (status)
+    desk_destroy(d, NULL);
+  else
+    *out = d;
+  return status;
+}
+
+uint16_t desk_port(const desk *d) { return sonde_page_port(d->server); }
+
+sonde_status desk_destroy(desk *d, sonde_error *error) {
+  if (!d) return SONDE_OK;
+  sonde_page_stop(d->server);
+  if (d->session) sonde_session_stop(d->session);
+  sonde_status status = sonde_session_destroy(d->session, error);
+  desk_exam_destroy(d->exam);
+  desk_replay_destroy(d->replay);
+  sonde_exam_log_close(d->log);
+  sonde_free(d->case_list);
+  sonde_free(d->protocol_list);
+  pthread_mutex_destroy(&d->lock);
+  free(d);
+  return status;
+}

@@ -1,0 +1,36 @@
+// The examiner's desk of `sonde run`: free practice, exams of cases, replays; what the page shows
+// of them and asks for. One thread owns it; the page's threads only leave requests and frames.
+#ifndef SONDE_APP_DESK_H
+#define SONDE_APP_DESK_H
+
+#include "app.h"
+
+typedef struct desk desk;
+
+typedef struct desk_def {
+  const sonde_model *model; // of free practice; borrowed
+  const char *model_path;   // absolute; also of the cases that use the bundled thigh
+  const char *bundled_path; // NULL: model_path
+  const char *cases;        // directories
+  const char *protocols;
+  const char *exams;          // created when it is missing
+  const char *trainee;        // "" unknown
+  sonde_session_def practice; // model is set from above
+  uint16_t port;
+  double force_limit_n; // shown on the page
+  // The device that moves the probe over a thigh; `start` is a pose above the first place.
+  sonde_status (*make_device)(void *user, const sonde_model *model, sonde_pose start,
+                              sonde_device *device, sonde_error *error);
+  void *user;
+  const char *device_name;
+} desk_def;
+
+// Starts practice and serves the page.
+sonde_status desk_create(const desk_def *def, desk **out, sonde_error *error);
+// Ends what runs; an exam under way is kept without a score.
+sonde_status desk_destroy(desk *d, sonde_error *error);
+uint16_t desk_port(const desk *d);
+// Does what was asked for since the last turn; call it every 10 ms or so.
+void desk_turn(desk *d);
+
+#endif

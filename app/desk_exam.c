@@ -1,0 +1,227 @@
+// An exam at the desk: begun on a case's thigh, watched frame by frame, judged, kept.
+//
+// name_exam            id, directory and date
+// prepare              thigh, plan, judge
+// keep_start           what a replay needs beside the recording
+// shrink, keep_pictures   the learner's own pictures of a press
+// desk_exam_observe    one frame
+// desk_exam_finish     judged and kept
+#include "desk_parts.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+static sonde_status name_exam(desk *d, desk_exam *exam, sonde_error *error) {
+  struct timespec now;
+  struct tm day;
+  char stamp[32];
+  clock_gettime(CLOCK_REALTIME, &now);
+  localtime_r(&now.tv_sec, &day);
+  strftime(stamp, sizeof stamp, "%Y-%m-%d-%H%M%S", &day);
+  sonde_log_date((int64_t)now.tv_sec, exam->date);
+  unsigned mark = (unsigned)(now.tv_nsec / 1000 ^ (long)getpid()) & 0xffff;
+  snprintf(exam->id, sizeof exam->id, "%s-%04x", stamp, mark);
+  snprintf(exam->directory, sizeof exam->directory, "%.4000s/%s", d->exams, exam->id);
+  if (mkdir(exam->directory, 0700) == 0) return SONDE_OK;
+  error->status = SONDE_IO;
+  snprintf(error->message, sizeof error->message, "%.300s cannot be made: %s", exam->directory,
+           strerror(errno));
+  return SONDE_IO;
+}
+
+static sonde_status prepare(desk *d, desk_exam *exam, sonde_error *error) {
+  const char *bundled = d->def.bundled_path ? d->def.bundled_path : d->def.model_path;
+  sonde_status status = sonde_case_build(&exam->patient, bundled, d->cases, &exam->setup, error);
+  if (!status)
+    status = sonde_plan_make(exam->protocol, &exam->setup.map, &exam->patient.criteria, &exam->plan,
+                             error);
+  if (!status) status = sonde_judge_create(&exam->setup.map, &exam->plan, &exam->judge, error);
+  if (!status && !(exam->sample = calloc(DESK_SAMPLES, sizeof *exam->sample)))
+    status = error->status = SONDE_MEMORY;
+  return status;
+}
+
+static sonde_status write_json(const char *directory, const char *name, const cJSON *root,
+                               sonde_error *error) {
+  char path[4200], *text = cJSON_Print(root);
+  sonde_file *file = NULL;
+  snprintf(path, sizeof path, "%s/%s", directory, name);
+  sonde_status status = text ? sonde_file_create(path, &file, error) : SONDE_MEMORY;
+  if (!status) {
+    sonde_file_write(file, text, strlen(text));
+    status = sonde_file_commit(file, error);
+  }
+  cJSON_free(text);
+  return status;
+}
+
+// The case as it was, so that a replay does not depend on the library of cases.
+static sonde_status keep_start(const desk_exam *exam, sonde_error *error) {
+  char path[4200];
+  snprintf(path, sizeof path, "%s/case.yaml", exam->directory);
+  sonde_status status = sonde_case_save(&exam->patient, path, error);
+  if (status) return status;
+  cJSON *root = cJSON_CreateObject();
+  cJSON_AddStringToObject(root, "exam", exam->id);
+  cJSON_AddStringToObject(root, "trainee", exam->trainee);
+  cJSON_AddStringToObject(root, "case", exam->patient.id);
+  cJSON_AddStringToObject(root, "protocol", exam->protocol->id);
+  cJSON_AddStringToObject(root, "guidance", exam->guidance);
+  cJSON_AddStringToObject(root, "date", exam->date);
+  status = write_json(exam->directory, "start.json", root, error);
+  cJSON_Delete(root);
+  return status;
+}
+
+static sonde_status run(desk *d, desk_exam *exam, sonde_error *error) {
+  char recording[4200];
+  snprintf(recording, sizeof recording, "%s/exam.rec", exam->directory);
+  sonde_session_def def = d->def.practice;
+  sonde_case_session(&exam->setup, &def);
+  def.model_path = exam->patient.thigh == SONDE_CASE_BUNDLED ? d->def.model_path : NULL;
+  def.record_path = recording;
+  sonde_vein_point first = sonde_vein_at(&exam->setup.map, 0.0);
+  sonde_site site = {.position_m = first.skin_m, .normal = first.normal, .u = first.across};
+  return desk_run_session(d, &def, sonde_site_pose(&site, -0.01), error);
+}
+
+static void copy_text(char *to, size_t size, const char *from) { snprintf(to, size, "%s", from); }
+
+sonde_status desk_exam_start(desk *d, const sonde_page_request *request, sonde_error *error) {
+  const sonde_case *patient = desk_find_case(d, request->id);
+  const sonde_exam_protocol *protocol = desk_find_protocol(d, request->protocol);
+  if (!patient || !protocol) {
+    error->status = SONDE_NOT_FOUND;
+    snprintf(error->message, sizeof error->message, "there is no %s of that name",
+             patient ? "protocol" : "case");
+    return SONDE_NOT_FOUND;
+  }
+  if (d->phase != DESK_PRACTICE) {
+    sonde_status left = desk_practice(d, error);
+    if (left) return left;
+  }
+  desk_exam *exam = calloc(1, sizeof *exam);
+  if (!exam) return error->status = SONDE_MEMORY;
+  exam->patient = *patient;
+  exam->protocol = protocol;
+  copy_text(exam->guidance, sizeof exam->guidance, request->guidance);
+  copy_text(exam->trainee, sizeof exam->trainee, request->name);
+  copy_text(d->trainee, sizeof d->trainee, request->name);
+  desk_set_phase(d, DESK_PREPARING, "The patient is being prepared.");
+  sonde_status status = prepare(d, exam, error);
+  if (!status) status = name_exam(d, exam, error);
+  if (!status) status = keep_start(exam, error);
+  if (!status) status = run(d, exam, error);
+  if (status) {
+    desk_exam_destroy(exam);
+    desk_set_phase(d, DESK_PRACTICE, error->message);
+    return status;
+  }
+  pthread_mutex_lock(&d->lock);
+  d->exam = exam;
+  pthread_mutex_unlock(&d->lock);
+  desk_tell_greeting(d);
+  desk_set_phase(d, DESK_RUNNING, "");
+  return SONDE_OK;
+}
+
+// ---- watching
+
+// Means of 2 x 2 pixels.
+static void shrink(const sonde_frame *frame, desk_picture *picture) {
+  sonde_image *image = &picture->image;
+  if (!image->pixels &&
+      sonde_image_create(frame->width / 2, frame->height / 2, image, NULL) != SONDE_OK)
+    return;
+  for (uint32_t y = 0; y < image->height; ++y)
+    for (uint32_t x = 0; x < image->width; ++x) {
+      const uint8_t *p = frame->pixels + 2 * (size_t)y * frame->width + 2 * (size_t)x;
+      image->pixels[y * image->width + x] =
+          (uint8_t)((p[0] + p[1] + p[frame->width] + p[frame->width + 1] + 2) / 4);
+    }
+  image->width_m = frame->width_m;
+  image->height_m = frame->height_m;
+  image->tick = frame->snapshot.tick;
+  picture->vein_ratio = frame->snapshot.vein_area_ratio;
+}
+
+// Hands both images over to the press that just ended.
+static void keep_pictures(desk_exam *exam, uint32_t press) {
+  if (!exam->open.image.pixels || !exam->closed.image.pixels) return;
+  if (exam->picture_count == DESK_PICTURES) return;
+  exam->picture[exam->picture_count++] =
+      (sonde_exam_picture){press, exam->open.image, exam->closed.image};
+  exam->open.image = exam->closed.image = (sonde_image){0};
+}
+
+// The open vein is pictured as long as nothing presses, the closed one whenever it gets smaller.
+static void watch_pictures(desk_exam *exam, const sonde_frame *frame) {
+  uint32_t presses;
+  sonde_judge_compressions(exam->judge, &presses);
+  if (presses > exam->presses_seen) {
+    exam->presses_seen = presses;
+    keep_pictures(exam, presses - 1);
+    exam->closed.vein_ratio = INFINITY;
+  }
+  double ratio = frame->snapshot.vein_area_ratio;
+  if (!isfinite(ratio)) return;
+  if (sonde_judge_state(exam->judge).state == SONDE_PRESS_STATE_NONE) {
+    shrink(frame, &exam->open);
+    exam->closed.vein_ratio = INFINITY;
+  } else if (ratio < exam->closed.vein_ratio) {
+    shrink(frame, &exam->closed);
+  }
+}
+
+static void watch_curve(desk_exam *exam, const sonde_snapshot *s) {
+  const double every_s = 0.1;
+  uint32_t n = exam->sample_count;
+  if (n == DESK_SAMPLES || (n && s->time_s - exam->sample[n - 1].time_s < every_s)) return;
+  exam->sample[exam->sample_count++] =
+      (sonde_exam_sample){s->time_s, s->force_normal_n, s->vein_area_ratio};
+}
+
+void desk_exam_observe(desk_exam *exam, const sonde_frame *frame) {
+  sonde_judge_feed(exam->judge, &frame->snapshot);
+  watch_pictures(exam, frame);
+  watch_curve(exam, &frame->snapshot);
+}
+
+// ---- the end
+
+sonde_status desk_exam_finish(desk *d, sonde_error *error) {
+  desk_exam *exam = d->exam;
+  if (d->phase != DESK_RUNNING) {
+    error->status = SONDE_ARGUMENT;
+    snprintf(error->message, sizeof error->message, "there is no exam to finish");
+    return SONDE_ARGUMENT;
+  }
+  desk_set_phase(d, DESK_DONE, ""); // from here on nothing is watched
+  sonde_session_stop(d->session);
+  sonde_judge_finish(exam->judge);
+  sonde_judge_score(exam->judge, &exam->patient, &exam->score);
+  sonde_status status = desk_exam_save(d, exam, error);
+  exam->scored = true;
+  desk_tell_exam(d);
+  desk_tell_exams(d);
+  return status;
+}
+
+void desk_exam_destroy(desk_exam *exam) {
+  if (!exam) return;
+  for (uint32_t i = 0; i < exam->picture_count; ++i) {
+    sonde_image_clear(&exam->picture[i].before);
+    sonde_image_clear(&exam->picture[i].peak);
+  }
+  sonde_image_clear(&exam->open.image);
+  sonde_image_clear(&exam->closed.image);
+  free(exam->sample);
+  sonde_judge_destroy(exam->judge);
+  sonde_case_setup_clear(&exam->setup);
+  free(exam);
+}

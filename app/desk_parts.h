@@ -1,0 +1,116 @@
+// Inside of the desk. Everything belongs to the owner's thread, except what `lock` guards: the
+// page's threads leave requests and watch frames.
+#ifndef SONDE_APP_DESK_PARTS_H
+#define SONDE_APP_DESK_PARTS_H
+
+#include "desk.h"
+
+#include <cjson/cJSON.h>
+#include <pthread.h>
+
+enum { DESK_REQUESTS = 64, DESK_PICTURES = 64, DESK_SAMPLES = 36000, DESK_SENTENCE = 240 };
+
+typedef enum desk_phase {
+  DESK_PRACTICE,
+  DESK_PREPARING,
+  DESK_RUNNING,
+  DESK_DONE,
+  DESK_REPLAY
+} desk_phase;
+
+// Picture at half the image's size; the vein's ratio in it.
+typedef struct desk_picture {
+  sonde_image image;
+  double vein_ratio;
+} desk_picture;
+
+// An exam, running or done.
+typedef struct desk_exam {
+  char id[64], directory[4096], trainee[164];
+  sonde_case patient;
+  const sonde_exam_protocol *protocol;
+  char guidance[16];
+  sonde_case_setup setup;
+  sonde_plan plan;
+  sonde_judge *judge; // under the lock
+  double started_s;
+  bool scored;
+  sonde_score score;
+  char date[32];
+  // under the lock
+  uint32_t picture_count, presses_seen;
+  sonde_exam_picture picture[DESK_PICTURES]; // owned here
+  desk_picture open, closed;                 // of the press under way
+  sonde_exam_sample *sample;                 // [DESK_SAMPLES] ten a second
+  uint32_t sample_count;
+} desk_exam;
+
+typedef struct desk_replay {
+  char id[64], title[96], recording[4200];
+  sonde_case_setup setup;
+  sonde_probe *probes;
+  uint32_t probe_count;
+  sonde_player *player;
+  sonde_comments comments;
+  cJSON *presses; // of the exam's data
+  bool playing;
+  double speed, time_s, at_s; // time_s of the exam at the clock's at_s
+  uint64_t shown_tick;
+} desk_replay;
+
+struct desk {
+  desk_def def;
+  char cases[4096], protocols[4096], exams[4096], trainee[164];
+  sonde_case *case_list;
+  uint32_t case_count;
+  sonde_exam_protocol *protocol_list;
+  uint32_t protocol_count;
+  sonde_exam_log *log;
+  sonde_page_server *server;
+  sonde_session *session; // practice or exam; NULL in a replay
+  desk_phase phase;       // under the lock when changed
+  char message[DESK_SENTENCE];
+  desk_exam *exam;     // NULL: none
+  desk_replay *replay; // NULL: none
+  double published_s;
+
+  pthread_mutex_t lock;
+  sonde_page_request request[DESK_REQUESTS]; // ring
+  uint32_t request_first, request_count;
+};
+
+// desk_text.c: what the page is told.
+void desk_tell_greeting(desk *d);
+void desk_tell_exam(desk *d);
+void desk_tell_exams(desk *d);
+void desk_tell_replay(desk *d);
+
+// desk_exam.c
+sonde_status desk_exam_start(desk *d, const sonde_page_request *request, sonde_error *error);
+void desk_exam_observe(desk_exam *exam, const sonde_frame *frame); // under the lock
+sonde_status desk_exam_finish(desk *d, sonde_error *error);
+// The session must be gone.
+void desk_exam_destroy(desk_exam *exam);
+
+// desk_keep.c: data, report and log of an exam that is over.
+sonde_status desk_exam_save(desk *d, desk_exam *exam, sonde_error *error);
+
+// desk_replay.c
+sonde_status desk_replay_open(desk *d, const char *id, sonde_error *error);
+void desk_replay_turn(desk *d);
+sonde_status desk_replay_seek(desk *d, double time_s, sonde_error *error);
+sonde_status desk_replay_comment(desk *d, const sonde_page_request *request, sonde_error *error);
+void desk_replay_destroy(desk_replay *replay);
+
+// desk.c
+// A session on the thigh of `def`, started and shown; what ran before is ended.
+sonde_status desk_run_session(desk *d, sonde_session_def *def, sonde_pose start,
+                              sonde_error *error);
+sonde_status desk_practice(desk *d, sonde_error *error);
+void desk_end_session(desk *d);
+void desk_set_phase(desk *d, desk_phase phase, const char *message);
+// NULL when there is none.
+const sonde_case *desk_find_case(const desk *d, const char *id);
+const sonde_exam_protocol *desk_find_protocol(const desk *d, const char *id);
+
+#endif

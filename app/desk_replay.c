@@ -1,0 +1,185 @@
+// A kept exam at the desk: any moment of it, played, with comments.
+//
+// is_id                an id names one directory
+// load_presses         what the judge saw, from the exam's data
+// load_thigh, open_player, create_probes   parts of a replay
+// show                 the image in view to the page
+#include "desk_parts.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+static sonde_status fail(sonde_error *error, sonde_status status, const char *sentence) {
+  error->status = status;
+  snprintf(error->message, sizeof error->message, "%s", sentence);
+  return status;
+}
+
+static bool is_id(const char *id) {
+  return id[0] && strspn(id, "abcdefghijklmnopqrstuvwxyz0123456789-") == strlen(id);
+}
+
+static void load_presses(desk_replay *replay, const char *directory) {
+  char path[4200], *text = NULL;
+  size_t size = 0;
+  snprintf(path, sizeof path, "%s/exam.json", directory);
+  if (sonde_file_load(path, &text, &size, NULL)) return; // an exam without an end has none
+  cJSON *root = cJSON_ParseWithLength(text, size);
+  replay->presses = cJSON_DetachItemFromObjectCaseSensitive(root, "presses");
+  cJSON_Delete(root);
+  sonde_free(text);
+}
+
+static sonde_status load_thigh(desk *d, desk_replay *replay, const char *directory,
+                               sonde_error *error) {
+  char path[4200];
+  sonde_case patient;
+  snprintf(path, sizeof path, "%s/case.yaml", directory);
+  sonde_status status = sonde_case_load(path, &patient, error);
+  if (status) return status;
+  snprintf(replay->title, sizeof replay->title, "%s", patient.title);
+  const char *bundled = d->def.bundled_path ? d->def.bundled_path : d->def.model_path;
+  return sonde_case_build(&patient, bundled, d->cases, &replay->setup, error);
+}
+
+static sonde_status open_player(desk_replay *replay, const char *directory, sonde_error *error) {
+  snprintf(replay->recording, sizeof replay->recording, "%s/exam.rec", directory);
+  sonde_player_def def = {.path = replay->recording, .model = replay->setup.model, .recover = true};
+  return sonde_player_open(&def, &replay->player, error);
+}
+
+static sonde_status create_probes(desk *d, desk_replay *replay, sonde_error *error) {
+  const char *const *names = d->def.practice.probe_names;
+  if (!names) names = sonde_probe_names();
+  uint32_t count = 0;
+  while (names[count]) ++count;
+  replay->probes = calloc(count, sizeof *replay->probes);
+  if (!replay->probes) return fail(error, SONDE_MEMORY, "out of memory");
+  for (uint32_t i = 0; i < count; ++i) {
+    sonde_status status = sonde_probe_create(names[i], &replay->probes[i], error);
+    if (status) return status;
+    replay->probe_count = i + 1;
+  }
+  return SONDE_OK;
+}
+
+static void show(desk *d) {
+  desk_replay *replay = d->replay;
+  sonde_frame frame;
+  if (!sonde_player_frame(replay->player, &frame)) return;
+  if (frame.snapshot.tick == replay->shown_tick) return;
+  sonde_session_controls controls = sonde_player_controls(replay->player);
+  if (sonde_page_post(d->server, &frame, &controls)) replay->shown_tick = frame.snapshot.tick;
+}
+
+// The session goes: its thigh is not shown any more.
+static sonde_status take_over(desk *d, desk_replay *replay, sonde_error *error) {
+  sonde_status status = sonde_page_show_model(d->server, replay->setup.model, replay->probes,
+                                              replay->probe_count, error);
+  if (status) return status;
+  desk_exam *exam = d->exam;
+  desk_replay *before = d->replay;
+  pthread_mutex_lock(&d->lock);
+  d->exam = NULL;
+  pthread_mutex_unlock(&d->lock);
+  d->replay = replay;
+  desk_end_session(d);
+  desk_exam_destroy(exam);
+  desk_replay_destroy(before);
+  return SONDE_OK;
+}
+
+static sonde_status build(desk *d, desk_replay *replay, const char *id, sonde_error *error) {
+  char directory[4200];
+  snprintf(directory, sizeof directory, "%s/%s", d->exams, id);
+  snprintf(replay->id, sizeof replay->id, "%s", id);
+  load_presses(replay, directory);
+  sonde_status status = load_thigh(d, replay, directory, error);
+  if (!status) status = create_probes(d, replay, error);
+  if (!status) status = open_player(replay, directory, error);
+  if (!status) status = sonde_comments_load(replay->recording, &replay->comments, error);
+  return status;
+}
+
+sonde_status desk_replay_open(desk *d, const char *id, sonde_error *error) {
+  if (!is_id(id)) return fail(error, SONDE_NOT_FOUND, "there is no such exam");
+  if (d->phase == DESK_RUNNING)
+    return fail(error, SONDE_ARGUMENT, "finish or leave the exam before a replay");
+  desk_replay *replay = calloc(1, sizeof *replay);
+  if (!replay) return fail(error, SONDE_MEMORY, "out of memory");
+  replay->speed = 1;
+  desk_phase before = d->phase;
+  // the recording of an exam that was just finished gets its end now
+  if (d->exam && strcmp(d->exam->id, id) == 0) {
+    sonde_status status = desk_practice(d, error);
+    if (status) {
+      free(replay);
+      return status;
+    }
+    before = d->phase;
+  }
+  desk_set_phase(d, DESK_PREPARING, "The recording is being opened.");
+  sonde_status status = build(d, replay, id, error);
+  if (!status) status = take_over(d, replay, error);
+  if (status) {
+    desk_replay_destroy(replay);
+    desk_set_phase(d, before, "");
+    return status;
+  }
+  status = sonde_player_seek(replay->player, 0.5, NULL, error);
+  show(d);
+  desk_set_phase(d, DESK_REPLAY, "");
+  return status;
+}
+
+// A machine that is too slow for the exam's pace plays slower; the page stays in step.
+void desk_replay_turn(desk *d) {
+  const double most_s = 0.1; // of the exam, in one turn
+  desk_replay *replay = d->replay;
+  if (!replay->playing) return;
+  double now_s = app_seconds(CLOCK_MONOTONIC);
+  double to_s = replay->time_s + replay->speed * (now_s - replay->at_s);
+  if (to_s > replay->time_s + most_s) to_s = replay->time_s + most_s;
+  sonde_player_advance(replay->player, to_s);
+  replay->time_s = to_s;
+  replay->at_s = now_s;
+  show(d);
+  if (to_s >= sonde_player_info(replay->player)->duration_s) replay->playing = false;
+}
+
+sonde_status desk_replay_seek(desk *d, double time_s, sonde_error *error) {
+  desk_replay *replay = d->replay;
+  if (!replay) return fail(error, SONDE_ARGUMENT, "there is no replay to seek in");
+  sonde_status status = sonde_player_seek(replay->player, time_s, NULL, error);
+  replay->time_s = sonde_player_time(replay->player);
+  replay->at_s = app_seconds(CLOCK_MONOTONIC);
+  show(d);
+  return status;
+}
+
+sonde_status desk_replay_comment(desk *d, const sonde_page_request *request, sonde_error *error) {
+  desk_replay *replay = d->replay;
+  if (!replay) return fail(error, SONDE_ARGUMENT, "there is no replay to comment on");
+  sonde_comment comment = {.time_s = request->time_s};
+  snprintf(comment.author, sizeof comment.author, "%.*s", (int)sizeof comment.author - 1,
+           request->name);
+  snprintf(comment.text, sizeof comment.text, "%.*s", (int)sizeof comment.text - 1, request->text);
+  sonde_status status = sonde_comments_add(replay->recording, &comment, error);
+  if (status) return status;
+  sonde_comments_clear(&replay->comments);
+  return sonde_comments_load(replay->recording, &replay->comments, error);
+}
+
+void desk_replay_destroy(desk_replay *replay) {
+  if (!replay) return;
+  sonde_player_close(replay->player);
+  sonde_comments_clear(&replay->comments);
+  for (uint32_t i = 0; i < replay->probe_count; ++i) sonde_probe_clear(&replay->probes[i]);
+  free(replay->probes);
+  cJSON_Delete(replay->presses);
+  sonde_case_setup_clear(&replay->setup);
+  free(replay);
+}
