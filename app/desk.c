@@ -247,6 +247,7 @@ static sonde_status create_page(desk *d, sonde_error *error) {
                          .request = take_request};
   sonde_status status = sonde_page_start(&page, d->session, &d->server, error);
   if (status) return status;
+  desk_recover(d);
   desk_tell_greeting(d);
   desk_tell_exam(d);
   return sonde_session_start(d->session, error);

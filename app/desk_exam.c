@@ -70,6 +70,7 @@ static sonde_status keep_start(const desk_exam *exam, sonde_error *error) {
   cJSON_AddStringToObject(root, "exam", exam->id);
   cJSON_AddStringToObject(root, "trainee", exam->trainee);
   cJSON_AddStringToObject(root, "case", exam->patient.id);
+  cJSON_AddStringToObject(root, "title", exam->patient.title);
   cJSON_AddStringToObject(root, "protocol", exam->protocol->id);
   cJSON_AddStringToObject(root, "guidance", exam->guidance);
   cJSON_AddStringToObject(root, "date", exam->date);
@@ -107,6 +108,7 @@ sonde_status desk_exam_start(desk *d, const sonde_page_request *request, sonde_e
   }
   desk_exam *exam = calloc(1, sizeof *exam);
   if (!exam) return error->status = SONDE_MEMORY;
+  exam->held = -1;
   exam->patient = *patient;
   exam->protocol = protocol;
   copy_text(exam->guidance, sizeof exam->guidance, request->guidance);
@@ -115,6 +117,7 @@ sonde_status desk_exam_start(desk *d, const sonde_page_request *request, sonde_e
   desk_set_phase(d, DESK_PREPARING, "The patient is being prepared.");
   sonde_status status = prepare(d, exam, error);
   if (!status) status = name_exam(d, exam, error);
+  if (!status) exam->held = desk_hold(exam->directory);
   if (!status) status = keep_start(exam, error);
   if (!status) status = run(d, exam, error);
   if (status) {
@@ -221,6 +224,7 @@ void desk_exam_destroy(desk_exam *exam) {
   sonde_image_clear(&exam->open.image);
   sonde_image_clear(&exam->closed.image);
   free(exam->sample);
+  if (exam->held >= 0) close(exam->held);
   sonde_judge_destroy(exam->judge);
   sonde_case_setup_clear(&exam->setup);
   free(exam);

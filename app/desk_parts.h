@@ -37,6 +37,7 @@ typedef struct desk_exam {
   bool scored;
   sonde_score score;
   char date[32];
+  int held; // file that says that the exam runs, locked; < 0: none
   // under the lock
   uint32_t picture_count, presses_seen;
   sonde_exam_picture picture[DESK_PICTURES]; // owned here
@@ -94,6 +95,10 @@ void desk_exam_destroy(desk_exam *exam);
 
 // desk_keep.c: data, report and log of an exam that is over.
 sonde_status desk_exam_save(desk *d, desk_exam *exam, sonde_error *error);
+// Exams whose program ended before them: their recordings get names, and rows in the log.
+void desk_recover(desk *d);
+// Says that an exam runs, until the descriptor is closed.
+int desk_hold(const char *directory);
 
 // desk_replay.c
 sonde_status desk_replay_open(desk *d, const char *id, sonde_error *error);
