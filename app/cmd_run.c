@@ -3,11 +3,13 @@
 // parse              the command line
 // choose_probes      built-in probes, and a probe file when one is named
 // load_tissue        presets
-// create_session     everything that simulates
-// run_page           until Ctrl-C
+// define, create_session   everything that simulates
+// run_page, run_desk until Ctrl-C
 // run_headless       for a time, in real time or in lockstep
 // print_summary      what a headless run did
 #include "app.h"
+#include "desk.h"
+#include "exam_common.h"
 #include "run_device.h"
 
 #include <getopt.h>
@@ -46,6 +48,10 @@ static const char help[] =
     "  --limits NAME   render as for this device (docs/haptics.md)\n"
     "  --from FILE     recording whose poses --device replay plays\n"
     "  --device-library FILE, --device-port N: of the maker's driver, when not the usual ones\n"
+    "  --trainee NAME  whose exams they are (default: $SONDE_TRAINEE, else as the page says)\n"
+    "  --exams DIR     where exams are kept (default: sonde/exams in $XDG_DATA_HOME or\n"
+    "                  ~/.local/share)\n"
+    "  --cases DIR, --protocols DIR: other cases and protocols than those that ship\n"
     "  --json          headless: print one JSON object at the end\n"
     "  --help          this text\n";
 
@@ -53,6 +59,7 @@ enum { MAX_PROBES = 16 };
 
 typedef struct settings {
   const char *model, *record, *probe, *pathology, *preset, *compare, *posture;
+  const char *trainee, *exams, *cases, *protocols;
   long port;
   double seconds, gel_ml;
   bool headless, lockstep, json, help, timed, no_gel, circulate;
@@ -104,6 +111,10 @@ static bool parse_option(int option, settings *s) {
   case 'C': s->circulate = true; return true;
   case 'u': s->posture = optarg; return true;
   case 'c': s->pathology = optarg; return true;
+  case 't': s->trainee = optarg; return true;
+  case 'E': s->exams = optarg; return true;
+  case 'a': s->cases = optarg; return true;
+  case 'O': s->protocols = optarg; return true;
   default: return parse_device(option, s);
   }
 }
@@ -130,6 +141,10 @@ static const struct option OPTIONS[] = {{"port", required_argument, NULL, 'p'},
                                         {"device-library", required_argument, NULL, 'y'},
                                         {"device-port", required_argument, NULL, 'o'},
                                         {"clutch", required_argument, NULL, 'k'},
+                                        {"trainee", required_argument, NULL, 't'},
+                                        {"exams", required_argument, NULL, 'E'},
+                                        {"cases", required_argument, NULL, 'a'},
+                                        {"protocols", required_argument, NULL, 'O'},
                                         {"force-scale", required_argument, NULL, 'x'},
                                         {NULL, 0, NULL, 0}};
 
@@ -196,37 +211,35 @@ static sonde_status load_tissue(const settings *s, sonde_session_def *def, sonde
   return status;
 }
 
-static sonde_status create_session(const settings *s, const sonde_model *model,
-                                   const char *model_path, sonde_session_def *def,
-                                   sonde_session **session, sonde_error *error) {
-  const char *names[MAX_PROBES];
+// Everything but the probes and the model.
+static sonde_status define(const settings *s, sonde_session_def *def, sonde_error *error) {
   *def = sonde_session_def_default();
-  def->model = model;
-  def->model_path = model_path;
   def->record_path = s->record;
-  def->probe_names = names;
-  def->controls.probe = choose_probes(s->probe, names);
   def->controls.gel = !s->no_gel;
   def->gel_m3 = 1e-6 * s->gel_ml;
   def->circulate = s->circulate;
   def->controls.posture = posture_of(s->posture);
   run_device_limits(&s->device, def);
-  sonde_site site;
-  sonde_device device = {0};
   sonde_status status = sonde_pathology_preset(s->pathology, &def->controls.pathology, error);
-  if (!status) status = load_tissue(s, def, error);
-  if (!status) status = run_device_site(&s->device, model, &site, error);
-  if (!status) status = run_device_create(&s->device, &site, def, &device, error);
-  if (!status) status = sonde_session_create(def, &device, session, error);
-  if (device.destroy) device.destroy(device.self); // not moved: creation failed
-  def->probe_names = NULL;
-  return status;
+  return status ? status : load_tissue(s, def, error);
 }
 
-static double now_s(void) {
-  struct timespec now;
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+static sonde_status make_device(const void *user, const sonde_site *start,
+                                const sonde_session_def *def, sonde_device *device,
+                                sonde_error *error) {
+  return run_device_create(&((const settings *)user)->device, start, def, device, error);
+}
+
+static sonde_status create_session(const settings *s, const sonde_model *model,
+                                   sonde_session_def *def, sonde_session **session,
+                                   sonde_error *error) {
+  sonde_site site;
+  sonde_device device = {0};
+  sonde_status status = run_device_site(&s->device, model, &site, error);
+  if (!status) status = make_device(s, &site, def, &device, error);
+  if (!status) status = sonde_session_create(def, &device, session, error);
+  if (device.destroy) device.destroy(device.self); // not moved: creation failed
+  return status;
 }
 
 static void sleep_s(double seconds) {
@@ -234,6 +247,12 @@ static void sleep_s(double seconds) {
   nanosleep(&pause, NULL);
 }
 
+static void announce(uint16_t port) {
+  printf("Sonde is running: http://127.0.0.1:%u/  (Ctrl-C stops)\n", (unsigned)port);
+  fflush(stdout);
+}
+
+// Free practice only, recorded.
 static sonde_status run_page(const settings *s, const sonde_session_def *session_def,
                              sonde_session *session, sonde_error *error) {
   sonde_page_server *server = NULL;
@@ -245,14 +264,58 @@ static sonde_status run_page(const settings *s, const sonde_session_def *session
   if (status) return status;
   status = sonde_session_start(session, error);
   if (!status) {
-    printf("Sonde is running: http://127.0.0.1:%u/  (Ctrl-C stops)\n",
-           (unsigned)sonde_page_port(server));
-    fflush(stdout);
+    announce(sonde_page_port(server));
     while (!app_interrupted()) sleep_s(0.1);
   }
   sonde_page_stop(server);
   sonde_session_stop(session);
   return status;
+}
+
+// Where exams are kept when the command line does not say.
+static void exams_directory(const settings *s, char *path, size_t size) {
+  const char *data = getenv("XDG_DATA_HOME"), *home = getenv("HOME");
+  if (s->exams)
+    snprintf(path, size, "%s", s->exams);
+  else if (data && data[0])
+    snprintf(path, size, "%s/sonde/exams", data);
+  else
+    snprintf(path, size, "%s/.local/share/sonde/exams", home && home[0] ? home : "/tmp");
+}
+
+// Practice, exams and replays.
+static sonde_status run_desk(const settings *s, const sonde_model *model,
+                             const sonde_session_def *session_def, sonde_error *error) {
+  char exams[4096];
+  exam_library library = exam_library_find(s->cases, s->protocols);
+  const char *named = getenv("SONDE_TRAINEE");
+  exams_directory(s, exams, sizeof exams);
+  desk_def def = {.model = model,
+                  .model_path = session_def->model_path,
+                  .bundled_path = library.has_bundled ? library.bundled : NULL,
+                  .cases = library.cases,
+                  .protocols = library.protocols,
+                  .exams = exams,
+                  .trainee = s->trainee ? s->trainee
+                             : named    ? named
+                                        : "",
+                  .practice = *session_def,
+                  .port = (uint16_t)s->port,
+                  .force_limit_n = session_def->limits.force_n,
+                  .make_device = make_device,
+                  .user = s,
+                  .device_name = s->device.name};
+  desk *d = NULL;
+  app_catch_interrupt();
+  sonde_status status = run_device_site(&s->device, model, &def.start, error);
+  if (!status) status = desk_create(&def, &d, error);
+  if (status) return status;
+  announce(desk_port(d));
+  while (!app_interrupted()) {
+    desk_turn(d);
+    sleep_s(0.01);
+  }
+  return desk_destroy(d, error);
 }
 
 static void look(sonde_session *session, summary *seen) {
@@ -297,13 +360,13 @@ static sonde_status run_realtime(const settings *s, sonde_session *session,
                                  sonde_error *error) {
   sonde_status status = sonde_session_start(session, error);
   if (status) return status;
-  double start_s = now_s(), passed_s = 0.0;
+  double start_s = app_seconds(CLOCK_MONOTONIC), passed_s = 0.0;
   while (passed_s < s->seconds &&
          progress->report(passed_s / s->seconds, "real time", progress->user)) {
     look(session, seen);
     watch(session, seen);
     sleep_s(fmin(0.01, s->seconds - passed_s));
-    passed_s = now_s() - start_s;
+    passed_s = app_seconds(CLOCK_MONOTONIC) - start_s;
   }
   sonde_session_stop(session);
   look(session, seen);
@@ -315,13 +378,13 @@ static sonde_status run_headless(const settings *s, sonde_session *session, summ
   sonde_progress progress = app_progress();
   sonde_status status = SONDE_OK;
   *seen = (summary){.vein_ratio_min = INFINITY, .gel_volume_m3 = NAN};
-  double start_s = now_s();
+  double start_s = app_seconds(CLOCK_MONOTONIC);
   if (s->lockstep)
     run_lockstep(s, sonde_session_def_default().world.dt_s, session, &progress, seen);
   else
     status = run_realtime(s, session, &progress, seen, error);
   app_progress_end();
-  seen->wall_s = now_s() - start_s;
+  seen->wall_s = app_seconds(CLOCK_MONOTONIC) - start_s;
   seen->ticks = sonde_session_ticks(session);
   seen->images = sonde_session_images(session);
   seen->latency_s[0] = sonde_session_latency(session, 0.5);
@@ -398,16 +461,15 @@ static void print_summary(const settings *s, const summary *seen) {
 }
 
 // The session from beginning to end; errors of the recording come at the end.
-static int simulate(const settings *s, const sonde_model *model, const char *model_path) {
+static int simulate(const settings *s, const sonde_model *model, sonde_session_def *def) {
   sonde_error error = {0};
   sonde_session *session = NULL;
-  sonde_session_def def;
   summary seen = {0};
-  sonde_status status = create_session(s, model, model_path, &def, &session, &error);
+  sonde_status status = create_session(s, model, def, &session, &error);
   if (!status && s->headless)
     status = run_headless(s, session, &seen, &error);
   else if (!status)
-    status = run_page(s, &def, session, &error);
+    status = run_page(s, def, session, &error);
   sonde_error late = {0};
   sonde_status closed = sonde_session_destroy(session, &late);
   if (!status && closed) {
@@ -415,9 +477,23 @@ static int simulate(const settings *s, const sonde_model *model, const char *mod
     error = late;
   }
   if (status) return app_fail("run", &error);
-  seen.force_scale = def.rendering.force_scale;
+  seen.force_scale = def->rendering.force_scale;
   if (s->headless) print_summary(s, &seen);
   return APP_OK;
+}
+
+static int run(const settings *s, const sonde_model *model, const char *model_path) {
+  const char *names[MAX_PROBES];
+  sonde_error error = {0};
+  sonde_session_def def;
+  if (define(s, &def, &error)) return app_fail("run", &error);
+  def.model = model;
+  def.model_path = model_path;
+  def.probe_names = names;
+  def.controls.probe = choose_probes(s->probe, names);
+  def.circulate = s->circulate || !s->headless; // the page has buttons for posture and strain
+  if (s->headless || s->record) return simulate(s, model, &def);
+  return run_desk(s, model, &def, &error) ? app_fail("run", &error) : APP_OK;
 }
 
 int cmd_run(int argc, char **argv) {
@@ -444,7 +520,7 @@ int cmd_run(int argc, char **argv) {
   sonde_model *model = NULL;
   if (sonde_model_load(s.model, &model, &error)) return app_fail("run", &error);
   char *absolute = realpath(s.model, NULL);
-  code = simulate(&s, model, absolute ? absolute : s.model);
+  code = run(&s, model, absolute ? absolute : s.model);
   free(absolute);
   sonde_model_destroy(model);
   return code;

@@ -44,6 +44,11 @@ static void watch(void *user, const sonde_frame *frame) {
   pthread_mutex_unlock(&d->lock);
 }
 
+const char *desk_path(char path[DESK_PATH], const char *directory, const char *name) {
+  if (snprintf(path, DESK_PATH, "%s/%s", directory, name) >= DESK_PATH) path[0] = 0;
+  return path;
+}
+
 void desk_set_phase(desk *d, desk_phase phase, const char *message) {
   pthread_mutex_lock(&d->lock);
   d->phase = phase;
@@ -66,10 +71,10 @@ const sonde_exam_protocol *desk_find_protocol(const desk *d, const char *id) {
 
 // ---- sessions
 
-static sonde_status make_session(desk *d, sonde_session_def *def, sonde_pose start,
+static sonde_status make_session(desk *d, sonde_session_def *def, const sonde_site *start,
                                  sonde_session **session, sonde_error *error) {
   sonde_device device = {0};
-  sonde_status status = d->def.make_device(d->def.user, def->model, start, &device, error);
+  sonde_status status = d->def.make_device(d->def.user, start, def, &device, error);
   if (!status) status = sonde_session_create(def, &device, session, error);
   if (device.destroy) device.destroy(device.self); // not moved: creation failed
   return status;
@@ -88,7 +93,7 @@ void desk_end_session(desk *d) {
   if (session) end_session(d, session);
 }
 
-sonde_status desk_run_session(desk *d, sonde_session_def *def, sonde_pose start,
+sonde_status desk_run_session(desk *d, sonde_session_def *def, const sonde_site *start,
                               sonde_error *error) {
   sonde_session *before = d->session;
   bool shared = strcmp(d->def.device_name, "page") != 0; // one hand cannot hold two devices
@@ -110,19 +115,11 @@ sonde_status desk_run_session(desk *d, sonde_session_def *def, sonde_pose start,
   return d->server ? sonde_session_start(next, error) : SONDE_OK;
 }
 
-// Above the middle of the examined skin.
-static sonde_pose practice_pose(const sonde_model *model) {
-  enum { FIRST_SITE = 27 };
-  const sonde_site *site = sonde_model_site(model, FIRST_SITE);
-  if (!site) site = &model->sites[0];
-  return sonde_site_pose(site, -0.01);
-}
-
 static sonde_status start_practice(desk *d, sonde_error *error) {
   sonde_session_def def = d->def.practice;
   def.model = d->def.model;
   def.model_path = d->def.model_path;
-  return desk_run_session(d, &def, practice_pose(def.model), error);
+  return desk_run_session(d, &def, &d->def.start, error);
 }
 
 sonde_status desk_practice(desk *d, sonde_error *error) {
@@ -134,6 +131,7 @@ sonde_status desk_practice(desk *d, sonde_error *error) {
   d->exam = NULL;
   pthread_mutex_unlock(&d->lock);
   d->replay = NULL;
+  sonde_page_conceal(d->server, false, false);
   desk_exam_destroy(exam); // their thighs are not shown any more
   desk_replay_destroy(replay);
   desk_set_phase(d, DESK_PRACTICE, "");
@@ -228,13 +226,13 @@ static sonde_status make_directory(const char *path, sonde_error *error) {
 }
 
 static sonde_status create_library(desk *d, sonde_error *error) {
-  char path[4200];
+  char path[DESK_PATH];
   sonde_status status = sonde_case_list(d->cases, &d->case_list, &d->case_count, error);
   if (!status)
     status = sonde_exam_protocol_list(d->protocols, &d->protocol_list, &d->protocol_count, error);
   if (!status) status = make_directory(d->exams, error);
-  snprintf(path, sizeof path, "%s/exams.sqlite", d->exams);
-  return status ? status : sonde_exam_log_open(path, &d->log, error);
+  if (status) return status;
+  return sonde_exam_log_open(desk_path(path, d->exams, "exams.sqlite"), &d->log, error);
 }
 
 static sonde_status create_page(desk *d, sonde_error *error) {

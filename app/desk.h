@@ -11,6 +11,7 @@ typedef struct desk_def {
   const sonde_model *model; // of free practice; borrowed
   const char *model_path;   // absolute; also of the cases that use the bundled thigh
   const char *bundled_path; // NULL: model_path
+  sonde_site start;         // where the probe of free practice begins
   const char *cases;        // directories
   const char *protocols;
   const char *exams;          // created when it is missing
@@ -18,10 +19,11 @@ typedef struct desk_def {
   sonde_session_def practice; // model is set from above
   uint16_t port;
   double force_limit_n; // shown on the page
-  // The device that moves the probe over a thigh; `start` is a pose above the first place.
-  sonde_status (*make_device)(void *user, const sonde_model *model, sonde_pose start,
-                              sonde_device *device, sonde_error *error);
-  void *user;
+  // The device that moves the probe over a thigh, above a place at first.
+  sonde_status (*make_device)(const void *user, const sonde_site *start,
+                              const sonde_session_def *def, sonde_device *device,
+                              sonde_error *error);
+  const void *user;
   const char *device_name;
 } desk_def;
 

@@ -26,7 +26,7 @@ static sonde_status name_exam(desk *d, desk_exam *exam, sonde_error *error) {
   sonde_log_date((int64_t)now.tv_sec, exam->date);
   unsigned mark = (unsigned)(now.tv_nsec / 1000 ^ (long)getpid()) & 0xffff;
   snprintf(exam->id, sizeof exam->id, "%s-%04x", stamp, mark);
-  snprintf(exam->directory, sizeof exam->directory, "%.4000s/%s", d->exams, exam->id);
+  desk_path(exam->directory, d->exams, exam->id);
   if (mkdir(exam->directory, 0700) == 0) return SONDE_OK;
   error->status = SONDE_IO;
   snprintf(error->message, sizeof error->message, "%.300s cannot be made: %s", exam->directory,
@@ -48,9 +48,9 @@ static sonde_status prepare(desk *d, desk_exam *exam, sonde_error *error) {
 
 static sonde_status write_json(const char *directory, const char *name, const cJSON *root,
                                sonde_error *error) {
-  char path[4200], *text = cJSON_Print(root);
+  char path[DESK_PATH], *text = cJSON_Print(root);
   sonde_file *file = NULL;
-  snprintf(path, sizeof path, "%s/%s", directory, name);
+  desk_path(path, directory, name);
   sonde_status status = text ? sonde_file_create(path, &file, error) : SONDE_MEMORY;
   if (!status) {
     sonde_file_write(file, text, strlen(text));
@@ -62,8 +62,8 @@ static sonde_status write_json(const char *directory, const char *name, const cJ
 
 // The case as it was, so that a replay does not depend on the library of cases.
 static sonde_status keep_start(const desk_exam *exam, sonde_error *error) {
-  char path[4200];
-  snprintf(path, sizeof path, "%s/case.yaml", exam->directory);
+  char path[DESK_PATH];
+  desk_path(path, exam->directory, "case.yaml");
   sonde_status status = sonde_case_save(&exam->patient, path, error);
   if (status) return status;
   cJSON *root = cJSON_CreateObject();
@@ -80,15 +80,15 @@ static sonde_status keep_start(const desk_exam *exam, sonde_error *error) {
 }
 
 static sonde_status run(desk *d, desk_exam *exam, sonde_error *error) {
-  char recording[4200];
-  snprintf(recording, sizeof recording, "%s/exam.rec", exam->directory);
+  char recording[DESK_PATH];
+  desk_path(recording, exam->directory, "exam.rec");
   sonde_session_def def = d->def.practice;
   sonde_case_session(&exam->setup, &def);
   def.model_path = exam->patient.thigh == SONDE_CASE_BUNDLED ? d->def.model_path : NULL;
   def.record_path = recording;
   sonde_vein_point first = sonde_vein_at(&exam->setup.map, 0.0);
   sonde_site site = {.position_m = first.skin_m, .normal = first.normal, .u = first.across};
-  return desk_run_session(d, &def, sonde_site_pose(&site, -0.01), error);
+  return desk_run_session(d, &def, &site, error);
 }
 
 static void copy_text(char *to, size_t size, const char *from) { snprintf(to, size, "%s", from); }
@@ -129,6 +129,7 @@ sonde_status desk_exam_start(desk *d, const sonde_page_request *request, sonde_e
   d->exam = exam;
   pthread_mutex_unlock(&d->lock);
   desk_tell_greeting(d);
+  sonde_page_conceal(d->server, true, strcmp(exam->guidance, "full") != 0);
   desk_set_phase(d, DESK_RUNNING, "");
   return SONDE_OK;
 }

@@ -52,8 +52,8 @@ static sonde_status write_report(desk *d, desk_exam *exam, sonde_error *error) {
       if (exam->picture[k].press == chosen[i]) pictures[found++] = exam->picture[k];
   report.pictures = pictures;
   report.picture_count = found;
-  char path[4200];
-  snprintf(path, sizeof path, "%s/report.html", exam->directory);
+  char path[DESK_PATH];
+  desk_path(path, exam->directory, "report.html");
   status = sonde_exam_report_write(&report, path, error);
   sonde_free(earlier);
   return status;
@@ -67,10 +67,10 @@ static sonde_status write_log(desk *d, desk_exam *exam, sonde_error *error) {
 }
 
 sonde_status desk_exam_save(desk *d, desk_exam *exam, sonde_error *error) {
-  char json[4200], csv[4200];
+  char json[DESK_PATH], csv[DESK_PATH];
   sonde_score_note note = note_of(exam);
-  snprintf(json, sizeof json, "%s/exam.json", exam->directory);
-  snprintf(csv, sizeof csv, "%s/exam.csv", exam->directory);
+  desk_path(json, exam->directory, "exam.json");
+  desk_path(csv, exam->directory, "exam.csv");
   sonde_status status =
       sonde_score_save(exam->judge, &exam->patient, &exam->score, &note, json, csv, error);
   if (!status) status = write_report(d, exam, error);
@@ -80,8 +80,8 @@ sonde_status desk_exam_save(desk *d, desk_exam *exam, sonde_error *error) {
 // ---- after a program that was killed
 
 int desk_hold(const char *directory) {
-  char path[4300];
-  snprintf(path, sizeof path, "%s/running", directory);
+  char path[DESK_PATH];
+  desk_path(path, directory, "running");
   int file = open(path, O_CREAT | O_RDWR | O_CLOEXEC, 0600);
   if (file >= 0 && flock(file, LOCK_EX | LOCK_NB) == 0) return file;
   if (file >= 0) close(file);
@@ -89,8 +89,8 @@ int desk_hold(const char *directory) {
 }
 
 static bool exists(const char *directory, const char *name) {
-  char path[4300];
-  snprintf(path, sizeof path, "%s/%s", directory, name);
+  char path[DESK_PATH];
+  desk_path(path, directory, name);
   return access(path, F_OK) == 0;
 }
 
@@ -99,9 +99,9 @@ static void rename_part(const char *directory) {
   DIR *list = opendir(directory);
   for (const struct dirent *entry; list && (entry = readdir(list));) {
     if (strncmp(entry->d_name, "exam.rec.part-", 14) != 0) continue;
-    char from[4600], to[4300];
-    snprintf(from, sizeof from, "%s/%s", directory, entry->d_name);
-    snprintf(to, sizeof to, "%s/exam.rec", directory);
+    char from[DESK_PATH], to[DESK_PATH];
+    desk_path(from, directory, entry->d_name);
+    desk_path(to, directory, "exam.rec");
     rename(from, to);
   }
   if (list) closedir(list);
@@ -113,9 +113,9 @@ static void copy_member(const cJSON *root, const char *key, char *to, size_t siz
 }
 
 static bool read_start(const char *directory, sonde_log_entry *entry) {
-  char path[4300], *text = NULL;
+  char path[DESK_PATH], *text = NULL;
   size_t size = 0;
-  snprintf(path, sizeof path, "%s/start.json", directory);
+  desk_path(path, directory, "start.json");
   if (sonde_file_load(path, &text, &size, NULL)) return false;
   cJSON *root = cJSON_ParseWithLength(text, size);
   copy_member(root, "exam", entry->id, sizeof entry->id);
@@ -148,8 +148,8 @@ static void recover_one(desk *d, const char *directory) {
 void desk_recover(desk *d) {
   DIR *list = opendir(d->exams);
   for (const struct dirent *entry; list && (entry = readdir(list));) {
-    char directory[4300];
-    snprintf(directory, sizeof directory, "%.4000s/%.255s", d->exams, entry->d_name);
+    char directory[DESK_PATH];
+    desk_path(directory, d->exams, entry->d_name);
     if (entry->d_name[0] != '.' && exists(directory, "start.json") &&
         !exists(directory, "exam.json"))
       recover_one(d, directory);

@@ -8,7 +8,13 @@
 #include <cjson/cJSON.h>
 #include <pthread.h>
 
-enum { DESK_REQUESTS = 64, DESK_PICTURES = 64, DESK_SAMPLES = 36000, DESK_SENTENCE = 240 };
+enum {
+  DESK_PATH = 4096,
+  DESK_REQUESTS = 64,
+  DESK_PICTURES = 64,
+  DESK_SAMPLES = 36000,
+  DESK_SENTENCE = 240
+};
 
 typedef enum desk_phase {
   DESK_PRACTICE,
@@ -26,7 +32,7 @@ typedef struct desk_picture {
 
 // An exam, running or done.
 typedef struct desk_exam {
-  char id[64], directory[4096], trainee[164];
+  char id[64], directory[DESK_PATH], trainee[164];
   sonde_case patient;
   const sonde_exam_protocol *protocol;
   char guidance[16];
@@ -47,7 +53,7 @@ typedef struct desk_exam {
 } desk_exam;
 
 typedef struct desk_replay {
-  char id[64], title[96], recording[4200];
+  char id[64], title[96], recording[DESK_PATH];
   sonde_case_setup setup;
   sonde_probe *probes;
   uint32_t probe_count;
@@ -61,7 +67,7 @@ typedef struct desk_replay {
 
 struct desk {
   desk_def def;
-  char cases[4096], protocols[4096], exams[4096], trainee[164];
+  char cases[DESK_PATH], protocols[DESK_PATH], exams[DESK_PATH], trainee[164];
   sonde_case *case_list;
   uint32_t case_count;
   sonde_exam_protocol *protocol_list;
@@ -108,8 +114,10 @@ sonde_status desk_replay_comment(desk *d, const sonde_page_request *request, son
 void desk_replay_destroy(desk_replay *replay);
 
 // desk.c
+// directory/name; a path that does not fit is empty, so that nothing is found there.
+const char *desk_path(char path[DESK_PATH], const char *directory, const char *name);
 // A session on the thigh of `def`, started and shown; what ran before is ended.
-sonde_status desk_run_session(desk *d, sonde_session_def *def, sonde_pose start,
+sonde_status desk_run_session(desk *d, sonde_session_def *def, const sonde_site *start,
                               sonde_error *error);
 sonde_status desk_practice(desk *d, sonde_error *error);
 void desk_end_session(desk *d);

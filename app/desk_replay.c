@@ -23,9 +23,9 @@ static bool is_id(const char *id) {
 }
 
 static void load_presses(desk_replay *replay, const char *directory) {
-  char path[4200], *text = NULL;
+  char path[DESK_PATH], *text = NULL;
   size_t size = 0;
-  snprintf(path, sizeof path, "%s/exam.json", directory);
+  desk_path(path, directory, "exam.json");
   if (sonde_file_load(path, &text, &size, NULL)) return; // an exam without an end has none
   cJSON *root = cJSON_ParseWithLength(text, size);
   replay->presses = cJSON_DetachItemFromObjectCaseSensitive(root, "presses");
@@ -35,9 +35,9 @@ static void load_presses(desk_replay *replay, const char *directory) {
 
 static sonde_status load_thigh(desk *d, desk_replay *replay, const char *directory,
                                sonde_error *error) {
-  char path[4200];
+  char path[DESK_PATH];
   sonde_case patient;
-  snprintf(path, sizeof path, "%s/case.yaml", directory);
+  desk_path(path, directory, "case.yaml");
   sonde_status status = sonde_case_load(path, &patient, error);
   if (status) return status;
   snprintf(replay->title, sizeof replay->title, "%s", patient.title);
@@ -46,8 +46,11 @@ static sonde_status load_thigh(desk *d, desk_replay *replay, const char *directo
 }
 
 static sonde_status open_player(desk_replay *replay, const char *directory, sonde_error *error) {
-  snprintf(replay->recording, sizeof replay->recording, "%s/exam.rec", directory);
-  sonde_player_def def = {.path = replay->recording, .model = replay->setup.model, .recover = true};
+  desk_path(replay->recording, directory, "exam.rec");
+  sonde_player_def def = {.path = replay->recording,
+                          .model = replay->setup.model,
+                          .findings = &replay->setup.findings,
+                          .recover = true};
   return sonde_player_open(&def, &replay->player, error);
 }
 
@@ -86,6 +89,7 @@ static sonde_status take_over(desk *d, desk_replay *replay, sonde_error *error) 
   d->exam = NULL;
   pthread_mutex_unlock(&d->lock);
   d->replay = replay;
+  sonde_page_conceal(d->server, false, false);
   desk_end_session(d);
   desk_exam_destroy(exam);
   desk_replay_destroy(before);
@@ -93,8 +97,8 @@ static sonde_status take_over(desk *d, desk_replay *replay, sonde_error *error) 
 }
 
 static sonde_status build(desk *d, desk_replay *replay, const char *id, sonde_error *error) {
-  char directory[4200];
-  snprintf(directory, sizeof directory, "%s/%s", d->exams, id);
+  char directory[DESK_PATH];
+  desk_path(directory, d->exams, id);
   snprintf(replay->id, sizeof replay->id, "%s", id);
   load_presses(replay, directory);
   sonde_status status = load_thigh(d, replay, directory, error);

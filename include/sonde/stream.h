@@ -83,6 +83,9 @@ SONDE_API bool sonde_page_post(sonde_page_server *server, const sonde_frame *fra
  *  @return MEMORY @thread any */
 SONDE_API sonde_status sonde_page_publish(sonde_page_server *server, sonde_page_topic topic,
                                           const char *json, sonde_error *error);
+/** What clients are not told from now on: the name of the case (which they then cannot change), the
+ *  vessels' areas in frames. @thread owner */
+SONDE_API void sonde_page_conceal(sonde_page_server *server, bool pathology, bool areas);
 /** A sentence for all clients. @thread any */
 SONDE_API void sonde_page_tell(sonde_page_server *server, const char *sentence);
 SONDE_API uint16_t sonde_page_port(const sonde_page_server *server);

@@ -183,7 +183,7 @@ SONDE_API sonde_status sonde_case_build(const sonde_case *from, const char *bund
                                         const char *directory, sonde_case_setup *setup,
                                         sonde_error *error);
 SONDE_API void sonde_case_setup_clear(sonde_case_setup *setup);
-/** Model, pathology, findings and circulation of a session; the setup must outlive it.
+/** Model, pathology, findings, posture and circulation of a session; the setup must outlive it.
  *  @thread owner */
 SONDE_API void sonde_case_session(const sonde_case_setup *setup, sonde_session_def *def);
 

@@ -17,6 +17,7 @@ static const double contact_area = 0.06; // of the stress-free area: walls begin
 static const double study_wall_pa = 30e3, least_wall_pa = 10e3, most_wall_pa = 300e3;
 static const double ring_inner_share = 0.797; // (4.16/4.66)^2
 static const double artery_wall_pa = 150e3, artery_inner_share = 0.633;
+static const double least_area = 1e-6;             // of the artery under any pressure
 static const double artery_reference_pa = 12665.6; // 95 mmHg
 static const double reference_pa = 1333.22387415; // 10 mmHg: the pressure the model's radii hold at
 
@@ -114,7 +115,7 @@ double sonde_artery_area_ratio(const sonde_pathology *pathology, double outside_
   SONDE_ASSERT(pathology != NULL && isfinite(outside_pa));
   double relative = artery_reference_pa / fmax(pathology->arterial_pressure_pa, 1e3);
   double e = outside_pa > 0 ? outside_pa * 1e-3 * relative : 0;
-  return exp(-(0.0185 + 0.0030 * e) * e);
+  return fmax(exp(-(0.0185 + 0.0030 * e) * e), least_area);
 }
 
 double sonde_vein_rest_scale(const sonde_pathology *pathology, bool clot) {

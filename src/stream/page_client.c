@@ -161,7 +161,7 @@ static bool do_job(page_client *client, job what) {
   bool good = true, controls = page_client_controls(client);
   if (what == JOB_CONTROLS) {
     page_write_controls(&text, &server->controls, probe_name(server, server->controls.probe),
-                        controls);
+                        server->hide_case, server->gel_m3, controls);
     client->told_serial = server->controls_serial;
     client->told_control = controls;
   } else if (what == JOB_TOPIC) {

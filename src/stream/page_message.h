@@ -59,8 +59,11 @@ typedef struct page_hello {
 } page_hello;
 
 void page_write_hello(page_text *text, const page_hello *hello);
+// @param hide_case a learner may not be told its name @param gel_m3 on the skin
 void page_write_controls(page_text *text, const sonde_session_controls *controls,
-                         const char *probe_name, bool client_controls);
+                         const char *probe_name, bool hide_case, double gel_m3,
+                         bool client_controls);
+bool page_posture_parse(const char *name, sonde_posture *posture);
 // `kind` is "error" or another message type with one text.
 void page_write_note(page_text *text, const char *kind, const char *sentence);
 void page_write_pong(page_text *text, uint32_t id);
@@ -73,6 +76,7 @@ typedef enum page_command_type {
   PAGE_COMMAND_RESUME,
   PAGE_COMMAND_ACK,
   PAGE_COMMAND_PING,
+  PAGE_COMMAND_GEL,
   PAGE_COMMAND_REQUEST
 } page_command_type;
 
@@ -82,6 +86,10 @@ typedef struct page_command {
   sonde_pose goal;
   char probe[64], pathology[32];
   double gain_db, depth_m, frequency_hz, dynamic_range_db, focus_m, tgc_db_per_m;
+  double stiffness_scale, damping_scale, friction_scale;
+  char posture[16];
+  int strain; // 1, 0; -1: as it is
+  bool gel_put, gel_wipe;
   uint32_t id; // of the acknowledged frame or of the ping
   sonde_page_request request;
 } page_command;

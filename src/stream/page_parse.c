@@ -114,6 +114,17 @@ static sonde_status parse_goal(const cJSON *root, page_command *command, sonde_e
   return SONDE_OK;
 }
 
+// -1 when it is absent.
+static sonde_status read_strain(const cJSON *root, page_command *command, sonde_error *error) {
+  const cJSON *item = cJSON_GetObjectItemCaseSensitive(root, "valsalva");
+  command->strain = -1;
+  if (!item) return SONDE_OK;
+  if (!cJSON_IsBool(item))
+    return sonde_fail(error, SONDE_ARGUMENT, "\"valsalva\" must be true or false");
+  command->strain = cJSON_IsTrue(item) ? 1 : 0;
+  return SONDE_OK;
+}
+
 typedef struct control_field {
   const char *key;
   double low, high, si; // range in the page's unit, factor to SI
@@ -128,6 +139,9 @@ static sonde_status parse_controls(const cJSON *root, page_command *command, son
       {"dynamic_range_db", 30, 90, 1, &command->dynamic_range_db},
       {"focus_mm", 5, 150, 1e-3, &command->focus_m},
       {"tgc_db_per_cm", -10, 10, 1e2, &command->tgc_db_per_m},
+      {"stiffness_scale", 0.5, 2, 1, &command->stiffness_scale},
+      {"damping_scale", 0.25, 4, 1, &command->damping_scale},
+      {"friction_scale", 0, 2, 1, &command->friction_scale},
   };
   for (size_t i = 0; i < SONDE_COUNT_OF(fields); ++i) {
     double value = (double)NAN;
@@ -137,8 +151,21 @@ static sonde_status parse_controls(const cJSON *root, page_command *command, son
     *fields[i].target = value * fields[i].si;
   }
   sonde_status status = read_name(root, "probe", command->probe, sizeof command->probe, error);
-  if (status) return status;
-  return read_name(root, "case", command->pathology, sizeof command->pathology, error);
+  if (!status)
+    status = read_name(root, "case", command->pathology, sizeof command->pathology, error);
+  if (!status)
+    status = read_name(root, "posture", command->posture, sizeof command->posture, error);
+  return status ? status : read_strain(root, command, error);
+}
+
+static sonde_status parse_gel(const cJSON *root, page_command *command, sonde_error *error) {
+  char action[8] = "";
+  sonde_status status = read_name(root, "action", action, sizeof action, error);
+  command->gel_put = strcmp(action, "put") == 0;
+  command->gel_wipe = strcmp(action, "wipe") == 0;
+  if (!status && !command->gel_put && !command->gel_wipe)
+    status = sonde_fail(error, SONDE_ARGUMENT, "\"action\" must be put or wipe");
+  return status;
 }
 
 // UTF-8 text without control characters; `least` 0 allows it to be absent.
@@ -218,10 +245,10 @@ static sonde_status parse_request(const cJSON *root, sonde_page_ask ask, sonde_p
 }
 
 // Requests of the program after the page's own commands, in the order of sonde_page_ask.
-static const char *const TYPES[] = {"goal",        "controls",    "stop",       "resume",
-                                    "ack",         "ping",        "start_exam", "decide",
-                                    "hint",        "finish_exam", "leave_exam", "list_exams",
-                                    "open_replay", "seek",        "play",       "comment"};
+static const char *const TYPES[] = {
+    "goal",       "controls",    "stop",   "resume", "ack",         "ping",
+    "gel",        "start_exam",  "decide", "hint",   "finish_exam", "leave_exam",
+    "list_exams", "open_replay", "seek",   "play",   "comment"};
 _Static_assert(SONDE_COUNT_OF(TYPES) == PAGE_COMMAND_REQUEST + (int)SONDE_PAGE_ASKS, "a type each");
 
 static sonde_status parse_object(const cJSON *root, page_command *command, sonde_error *error) {
@@ -231,9 +258,10 @@ static sonde_status parse_object(const cJSON *root, page_command *command, sonde
   size_t which = 0;
   while (which < SONDE_COUNT_OF(TYPES) && strcmp(type->valuestring, TYPES[which]) != 0) ++which;
   if (which == SONDE_COUNT_OF(TYPES))
-    return sonde_fail(error, SONDE_NOT_FOUND,
-                      "\"type\" must be goal, controls, stop, resume, ack, ping or a request of "
-                      "docs/page_protocol.md");
+    return sonde_fail(
+        error, SONDE_NOT_FOUND,
+        "\"type\" must be goal, controls, stop, resume, ack, ping, gel or a request of "
+        "docs/page_protocol.md");
   if (which >= PAGE_COMMAND_REQUEST) {
     command->type = PAGE_COMMAND_REQUEST;
     return parse_request(root, (sonde_page_ask)(which - PAGE_COMMAND_REQUEST), &command->request,
@@ -245,6 +273,7 @@ static sonde_status parse_object(const cJSON *root, page_command *command, sonde
   case PAGE_COMMAND_CONTROLS: return parse_controls(root, command, error);
   case PAGE_COMMAND_ACK: return read_id(root, "frame", &command->id, error);
   case PAGE_COMMAND_PING: return read_id(root, "id", &command->id, error);
+  case PAGE_COMMAND_GEL: return parse_gel(root, command, error);
   default: return SONDE_OK; // stop, resume
   }
 }

@@ -1,5 +1,6 @@
 // The page's server: start, the pump of frames, commands, stop.
 //
+// tell_gel               how much is on the skin
 // publish_frame          a frame -> encoded -> `latest`
 // pump_once, pump_run    newest frame of the source, observed and published
 // apply_*                what a command changes
@@ -27,14 +28,31 @@ static bool anyone_waits(sonde_page_server *server) {
   return waits;
 }
 
+// Under the lock. It dries slowly: clients are told of a change that they could see.
+static void tell_gel(sonde_page_server *server, double volume_m3) {
+  const double visible_m3 = 0.25e-6;
+  bool same =
+      fabs(volume_m3 - server->gel_m3) < visible_m3 || (isnan(volume_m3) && isnan(server->gel_m3));
+  if (same) return;
+  server->gel_m3 = volume_m3;
+  ++server->controls_serial;
+}
+
 // Encodes into `spare` and makes it the newest.
-static bool publish_frame(sonde_page_server *server, const sonde_frame *frame) {
+static bool publish_frame(sonde_page_server *server, const sonde_frame *whole) {
+  sonde_frame told = *whole;
+  const sonde_frame *frame = &told;
+  if (server->hide_areas) {
+    told.snapshot.vein_area_ratio = told.snapshot.artery_area_ratio = (double)NAN;
+    told.snapshot.vein_short_m = (double)NAN;
+  }
   const sonde_mesh *rest = &server->source.model->surface;
   page_buffer *spare = &server->spare;
   size_t size = page_encode_frame(frame, rest, server->sequence + 1, NULL, 0);
   if (!page_buffer_reserve(spare, size)) return false;
   spare->size = page_encode_frame(frame, rest, server->sequence + 1, spare->bytes, spare->capacity);
   pthread_mutex_lock(&server->lock);
+  tell_gel(server, told.snapshot.gel_volume_m3);
   page_buffer newest = *spare;
   *spare = server->latest;
   server->latest = newest;
@@ -89,8 +107,16 @@ static void apply_controls(sonde_page_server *server, page_client *client,
     page_client_note(client, "there is no probe of that name");
     return;
   }
+  if (command->pathology[0] && server->hide_case) {
+    page_client_note(client, "the case is the exam's");
+    return;
+  }
   if (command->pathology[0] && sonde_pathology_preset(command->pathology, &next.pathology, NULL)) {
     page_client_note(client, "there is no case of that name");
+    return;
+  }
+  if (command->posture[0] && !page_posture_parse(command->posture, &next.posture)) {
+    page_client_note(client, "a posture is supine, sitting or standing");
     return;
   }
   take(command->gain_db, &next.echo.gain_db);
@@ -99,6 +125,10 @@ static void apply_controls(sonde_page_server *server, page_client *client,
   take(command->dynamic_range_db, &next.echo.dynamic_range_db);
   take(command->focus_m, &next.echo.focus_m);
   take(command->tgc_db_per_m, &next.echo.tgc_db_per_m);
+  take(command->stiffness_scale, &next.stiffness_scale);
+  take(command->damping_scale, &next.damping_scale);
+  take(command->friction_scale, &next.friction_scale);
+  if (command->strain >= 0) next.valsalva = command->strain > 0;
   next.echo = sonde_echo_settings_clamp(next.echo);
   server->controls = next;
 }
@@ -122,6 +152,9 @@ void page_command_apply(sonde_page_server *server, page_client *client,
   }
   if (command->type == PAGE_COMMAND_CONTROLS) {
     apply_controls(server, client, command);
+  } else if (command->type == PAGE_COMMAND_GEL) {
+    server->controls.gel_put += command->gel_put;
+    server->controls.gel_wipe += command->gel_wipe;
   } else if (command->type == PAGE_COMMAND_STOP) {
     server->controls.stop = true;
   } else {
@@ -293,6 +326,17 @@ sonde_status sonde_page_publish(sonde_page_server *server, sonde_page_topic topi
   pthread_mutex_unlock(&server->lock);
   sonde_free(copy);
   return SONDE_OK;
+}
+
+void sonde_page_conceal(sonde_page_server *server, bool pathology, bool areas) {
+  pthread_mutex_lock(&server->source_lock);
+  pthread_mutex_lock(&server->lock);
+  server->hide_case = pathology;
+  server->hide_areas = areas;
+  ++server->controls_serial;
+  pthread_cond_broadcast(&server->news);
+  pthread_mutex_unlock(&server->lock);
+  pthread_mutex_unlock(&server->source_lock);
 }
 
 void sonde_page_tell(sonde_page_server *server, const char *sentence) {

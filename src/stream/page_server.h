@@ -78,6 +78,7 @@ struct sonde_page_server {
   sonde_page_def def;
   pthread_mutex_t source_lock; // the pump and sonde_page_show; taken before the lock
   page_source source;          // changed under both locks
+  bool hide_areas;             // under the source's lock
   page_scene *scene;           // of source
   uint32_t generation;         // counts scenes, from 1
   page_topic topic[SONDE_PAGE_TOPICS];
@@ -93,6 +94,8 @@ struct sonde_page_server {
                              // into spare and swaps
   uint32_t sequence;         // of latest; 0: none yet
   sonde_session_controls controls;
+  bool hide_case;
+  double gel_m3; // told to the clients; NaN without gel
   uint32_t controls_serial;
   uint64_t joined;
   page_client client[PAGE_CLIENTS];

@@ -219,14 +219,37 @@ void page_write_hello(page_text *text, const page_hello *hello) {
   put(text, "}");
 }
 
+static const char *const POSTURES[SONDE_POSTURE_COUNT] = {"supine", "sitting", "standing"};
+
+bool page_posture_parse(const char *name, sonde_posture *posture) {
+  for (int k = 0; k < SONDE_POSTURE_COUNT; ++k) {
+    if (strcmp(name, POSTURES[k]) != 0) continue;
+    *posture = (sonde_posture)k;
+    return true;
+  }
+  return false;
+}
+
+static void put_patient(page_text *text, const sonde_session_controls *controls, double gel_m3) {
+  SONDE_ASSERT(controls->posture < SONDE_POSTURE_COUNT);
+  put_named_text(text, "posture", POSTURES[controls->posture]);
+  put_named_bool(text, "valsalva", controls->valsalva);
+  put_named_bool(text, "gel", controls->gel);
+  put_named_real(text, "gel_ml", gel_m3 * 1e6);
+  put_named_real(text, "stiffness_scale", controls->stiffness_scale);
+  put_named_real(text, "damping_scale", controls->damping_scale);
+  put_named_real(text, "friction_scale", controls->friction_scale);
+}
+
 void page_write_controls(page_text *text, const sonde_session_controls *controls,
-                         const char *probe_name, bool client_controls) {
+                         const char *probe_name, bool hide_case, double gel_m3,
+                         bool client_controls) {
   const sonde_echo_settings *echo = &controls->echo;
   put(text, "{");
   put_named_text(text, "type", "controls");
   put_named_bool(text, "controls", client_controls);
   put_named_text(text, "probe", probe_name);
-  put_named_text(text, "case", controls->pathology.name);
+  put_named_text(text, "case", hide_case ? "" : controls->pathology.name);
   put_named_bool(text, "stop", controls->stop);
   put_named_real(text, "gain_db", echo->gain_db);
   put_named_real(text, "depth_mm", echo->depth_m * 1e3);
@@ -234,6 +257,7 @@ void page_write_controls(page_text *text, const sonde_session_controls *controls
   put_named_real(text, "dynamic_range_db", echo->dynamic_range_db);
   put_named_real(text, "focus_mm", echo->focus_m * 1e3);
   put_named_real(text, "tgc_db_per_cm", echo->tgc_db_per_m * 1e-2);
+  put_patient(text, controls, gel_m3);
   put(text, "}");
 }
 

@@ -175,4 +175,8 @@ void sonde_case_session(const sonde_case_setup *setup, sonde_session_def *def) {
   SONDE_ASSERT(setup->model != NULL);
   def->model = setup->model;
   def->controls.pathology = setup->pathology;
+  def->controls.posture = setup->circulation.posture;
+  def->findings = &setup->findings;
+  def->circulate = true;
+  def->circulation = setup->circulation;
 }

@@ -194,8 +194,16 @@ static void spend(sonde_judge *judge, const sonde_snapshot *s) {
   judge->contact_s += step_s;
 }
 
-bool sonde_judge_feed(sonde_judge *judge, const sonde_snapshot *s) {
-  SONDE_ASSERT(judge && s);
+// A double vein is as open as the one of the two that is.
+static sonde_snapshot with_further_veins(const sonde_snapshot *told) {
+  sonde_snapshot s = *told;
+  if (isfinite(s.vein_area_ratio)) s.vein_area_ratio = fmax(s.vein_area_ratio, s.other_vein_ratio);
+  return s;
+}
+
+bool sonde_judge_feed(sonde_judge *judge, const sonde_snapshot *snapshot) {
+  SONDE_ASSERT(judge && snapshot);
+  const sonde_snapshot all = with_further_veins(snapshot), *s = &all;
   if (!isfinite(s->time_s) || !isfinite(s->force_normal_n)) return true;
   if (judge->started && !(s->time_s > judge->last.time_s)) return true;
   if (judge->started)

@@ -166,7 +166,7 @@ static void the_hello_can_be_read_by_a_json_parser(void **state) {
 static double written(double gain_db) {
   sonde_session_controls controls = {.echo = {.gain_db = gain_db}};
   page_text text = {0};
-  page_write_controls(&text, &controls, "point", false);
+  page_write_controls(&text, &controls, "point", false, 0, false);
   cJSON *root = cJSON_ParseWithOpts(text.text, NULL, 1);
   assert_non_null(root);
   const cJSON *gain = cJSON_GetObjectItem(root, "gain_db");

@@ -33,6 +33,30 @@ static void a_press_is_named(void **state) {
   assert_int_equal(result_of((test_press){0.1, 20, 0.8, unseen, 0.1}), SONDE_PRESS_INSUFFICIENT);
 }
 
+// The second femoral vein with a clot: the first closes alone.
+static void a_double_vein_is_closed_when_both_are(void **state) {
+  (void)state;
+  const double further[] = {0.03, 0.85};
+  const sonde_press_result expected[] = {SONDE_PRESS_COMPLETE, SONDE_PRESS_OPEN};
+  sonde_vein_map map = straight_map();
+  sonde_exam_protocol protocol = every_20_mm();
+  sonde_plan plan = plan_of(&protocol, &map);
+  test_press press = closing(0.1);
+  for (int k = 0; k < 2; ++k) {
+    sonde_judge *judge = judge_of(&plan);
+    for (double t = 0; t < 2.4; t += 0.03) {
+      sonde_snapshot s = press_at(&press, 0, t);
+      s.other_vein_ratio = further[k];
+      assert_true(sonde_judge_feed(judge, &s));
+    }
+    uint32_t count;
+    const sonde_compression *presses = sonde_judge_compressions(judge, &count);
+    assert_int_equal(count, 1);
+    assert_int_equal(presses[0].result, expected[k]);
+    sonde_judge_destroy(judge);
+  }
+}
+
 static sonde_judge *judged(const test_press *presses, size_t count, const size_t *order,
                            double step_s) {
   sonde_vein_map map = straight_map();
@@ -307,6 +331,7 @@ static void path_and_smoothness(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(a_press_is_named),
+      cmocka_unit_test(a_double_vein_is_closed_when_both_are),
       cmocka_unit_test(the_order_does_not_matter),
       cmocka_unit_test(coverage_adds_up),
       cmocka_unit_test(the_gap_shrinks),
