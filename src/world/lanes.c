@@ -65,7 +65,7 @@ static void fill_row(sonde_lanes *lanes, const sonde_model *model, uint32_t i) {
       d = v_sub(model->surface.vertices[j], model->surface.vertices[i]);
       length = model->edge_rest_m[t->neighbour_edge[t->start[i] + k]];
     }
-    slot->node[l] = (int32_t)j;
+    lanes->tangent[fixed->first_slot + k].node[l] = (int32_t)j;
     if (lanes->law.shear > 0)
       shear->corner[l] = shear->opposite_a[l] = shear->opposite_b[l] = nothing;
     slot->rest[0][l] = (float)d.x, slot->rest[1][l] = (float)d.y, slot->rest[2][l] = (float)d.z;

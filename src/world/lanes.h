@@ -13,9 +13,8 @@ typedef int32_t sonde_lane_index __attribute__((vector_size(64)));
 
 // One neighbour of each row of a slice; rows with fewer neighbours have share 0 there.
 typedef struct sonde_slot {
-  sonde_lane_index node; // the neighbour
-  sonde_lane rest[3];    // X_j - X_i
-  sonde_lane length;     // at rest
+  sonde_lane rest[3]; // X_j - X_i
+  sonde_lane length;  // at rest
 } sonde_slot;
 
 // The same slot in the shear layer.
@@ -26,8 +25,10 @@ typedef struct sonde_slot_shear {
   sonde_lane coupling; // s of the block s N_i N_j^T
 } sonde_slot_shear;
 
-// The edge's block of the matrix: -(along n n^T + lateral I).
+// The neighbour and the edge's block of the matrix, -(along n n^T + lateral I): all that a product
+// reads of a slot, in one stream.
 typedef struct sonde_slot_tangent {
+  sonde_lane_index node;
   sonde_lane n[3], along, lateral;
 } sonde_slot_tangent;
 

@@ -93,7 +93,7 @@ INLINE void add_spring(const sonde_lane_law *law, const sonde_slot *slot, sonde_
                        const float *record, const place *at, node_sum *sum,
                        sonde_slot_tangent *tangent) {
   sonde_lane d[3], w[3], n[3], other[6];
-  read_records(record, &slot->node, other);
+  read_records(record, &tangent->node, other);
   for (int c = 0; c < 3; ++c) {
     d[c] = slot->rest[c] + (other[c] - at->ue[c]);
     w[c] = other[3 + c] - at->ve[c];
@@ -258,7 +258,7 @@ INLINE void multiply_slice(sonde_lanes *lanes, const sonde_slice_model *fixed, b
   for (uint32_t k = first; k < first + fixed->slot_count; ++k) {
     const sonde_slot_tangent *tangent = &lanes->tangent[k];
     sonde_lane p[4];
-    read_directions(lanes->direction, &lanes->slot[k].node, p);
+    read_directions(lanes->direction, &tangent->node, p);
     sonde_lane pull = tangent->along * dot(tangent->n, p);
     for (int c = 0; c < 3; ++c) q[c] -= pull * tangent->n[c] + tangent->lateral * p[c];
     if (sheared) along_normal += lanes->slot_shear[k].coupling * p[3];
