@@ -37,6 +37,7 @@ static const char HELP[] =
     "                 ellipsoid 0.1\n"
     "  --seconds S    simulated time, 0.05 to 60; default 1, ellipsoid 0.5\n"
     "  --dt-ms H      time step, 0.1 to 20; default 1\n"
+    "  --dt S         the same in seconds\n"
     "  --repeat N     timed runs, the fastest median is reported; default 3\n"
     "  --csv FILE     write one row per step: time, total and per-stage milliseconds, iterations\n"
     "  --no-reference skip the converged run; relative_error is then null\n"
@@ -118,6 +119,7 @@ static const struct option LONG[] = {{"scene", required_argument, NULL, 's'},
                                      {"tolerance", required_argument, NULL, 'T'},
                                      {"seconds", required_argument, NULL, 't'},
                                      {"dt-ms", required_argument, NULL, 'd'},
+                                     {"dt", required_argument, NULL, 'q'},
                                      {"repeat", required_argument, NULL, 'r'},
                                      {"csv", required_argument, NULL, 'c'},
                                      {"no-reference", no_argument, NULL, 'n'},
@@ -141,6 +143,7 @@ static bool read_number(options *o, int option, const char *text) {
   case 'u': return app_parse_real("bench", "--sleep-um", text, 0, 1000, &o->sleep_um);
   case 'T': return app_parse_real("bench", "--tolerance", text, 1e-12, 0.5, &o->tolerance);
   case 't': return app_parse_real("bench", "--seconds", text, 0.05, 60, &o->seconds);
+  case 'q': return app_parse_real("bench", "--dt", text, 1e-4, 0.02, &o->dt_s);
   case 'r': return app_parse_integer("bench", "--repeat", text, 1, 1000, &o->repeat);
   default:
     ok = app_parse_real("bench", "--dt-ms", text, 0.1, 20, &ms);

@@ -84,6 +84,7 @@ rejects 'linear' measure "$MODEL" --sites "$DATA/sites.csv" --probe finger --ste
 rejects 'interaction|simplified' predict "$MODEL" --measurements "$DATA/indentation.csv" \
   --sites "$DATA/sites.csv" --interaction some
 rejects 'scene' bench --scene moon
+rejects 'dt expects a number from 0.0001 to 0.02' bench --scene ellipsoid --dt 1
 
 # Numbers.
 rejects 'depth-mm' press "$MODEL" --site 27 --probe linear --depth-mm deep
