@@ -100,9 +100,9 @@ static void add_guides(cJSON *to, const desk_exam *exam, const sonde_guidance *g
     add_target(to, exam, &exam->plan.point[g->point]);
   else
     cJSON_AddNullToObject(to, "target");
-  const double force[2] = {g->force_low_n, g->force_high_n};
   if (shown)
-    cJSON_AddItemToObject(to, "force_n", cJSON_CreateDoubleArray(force, 2));
+    cJSON_AddItemToObject(to, "force_n",
+                          cJSON_CreateDoubleArray((double[]){g->force_low_n, g->force_high_n}, 2));
   else
     cJSON_AddNullToObject(to, "force_n");
   add_real(to, "offset_mm", shown ? g->offset_m * 1e3 : (double)NAN, 1);
@@ -207,6 +207,25 @@ static void add_exam(cJSON *root, const desk_exam *exam) {
   add_result(root, exam);
 }
 
+// The same keys when there is no exam.
+static void add_no_exam(cJSON *root) {
+  static const char *const TEXTS[] = {"exam",     "case",     "title", "history",
+                                      "protocol", "guidance", "hint"};
+  for (size_t i = 0; i < sizeof TEXTS / sizeof TEXTS[0]; ++i)
+    cJSON_AddStringToObject(root, TEXTS[i], "");
+  cJSON_AddNumberToObject(root, "elapsed_s", 0);
+  cJSON_AddBoolToObject(root, "recording", false);
+  cJSON_AddNumberToObject(root, "hints_used", 0);
+  cJSON *step = cJSON_AddObjectToObject(root, "step");
+  cJSON_AddStringToObject(step, "text", "");
+  cJSON_AddStringToObject(step, "detail", "");
+  add_guides(step, NULL, NULL, false);
+  cJSON_AddNullToObject(root, "compression");
+  cJSON_AddArrayToObject(root, "segments");
+  cJSON_AddArrayToObject(root, "presses");
+  cJSON_AddNullToObject(root, "result");
+}
+
 static const char *phase_name(desk_phase phase) {
   static const char *const NAMES[] = {"practice", "preparing", "running", "done", "replay"};
   return NAMES[phase];
@@ -230,7 +249,11 @@ void desk_tell_exam(desk *d) {
   cJSON_AddStringToObject(root, "type", "exam");
   cJSON_AddStringToObject(root, "phase", phase_name(d->phase));
   cJSON_AddStringToObject(root, "message", d->message);
-  if (d->exam) add_exam(root, d->exam);
+  cJSON_AddNumberToObject(root, "progress", 0); // a thigh takes a second: no bar is worth it
+  if (d->exam)
+    add_exam(root, d->exam);
+  else
+    add_no_exam(root);
   cJSON *status = status_of(d);
   pthread_mutex_unlock(&d->lock); // the server's lock is taken before this one elsewhere
   publish(d, SONDE_PAGE_EXAM, root);
