@@ -1,7 +1,7 @@
 // A kept exam at the desk: any moment of it, played, with comments.
 //
 // is_id                an id names one directory
-// load_presses         what the judge saw, from the exam's data
+// press_of, load_presses   what the judge saw, from the exam's data
 // load_thigh, open_player, create_probes   parts of a replay
 // show                 the image in view to the page
 #include "desk_parts.h"
@@ -22,13 +22,31 @@ static bool is_id(const char *id) {
   return id[0] && strspn(id, "abcdefghijklmnopqrstuvwxyz0123456789-") == strlen(id);
 }
 
+// In the page's words.
+static cJSON *press_of(const cJSON *kept) {
+  static const char *const KEYS[][2] = {{"peak_s", "t_s"},
+                                        {"z_mm", "z_mm"},
+                                        {"segment", "segment"},
+                                        {"result", "result"},
+                                        {"force_peak_n", "force_n"}};
+  cJSON *press = cJSON_CreateObject();
+  for (size_t i = 0; i < sizeof KEYS / sizeof KEYS[0]; ++i) {
+    cJSON *value = cJSON_Duplicate(cJSON_GetObjectItemCaseSensitive(kept, KEYS[i][0]), true);
+    cJSON_AddItemToObject(press, KEYS[i][1], value ? value : cJSON_CreateNull());
+  }
+  return press;
+}
+
 static void load_presses(desk_replay *replay, const char *directory) {
   char path[DESK_PATH], *text = NULL;
   size_t size = 0;
-  desk_path(path, directory, "exam.json");
-  if (sonde_file_load(path, &text, &size, NULL)) return; // an exam without an end has none
+  if (sonde_file_load(desk_path(path, directory, "exam.json"), &text, &size, NULL))
+    return; // an exam without an end has none
   cJSON *root = cJSON_ParseWithLength(text, size);
-  replay->presses = cJSON_DetachItemFromObjectCaseSensitive(root, "presses");
+  const cJSON *kept;
+  replay->presses = cJSON_CreateArray();
+  cJSON_ArrayForEach(kept, cJSON_GetObjectItemCaseSensitive(root, "presses"))
+      cJSON_AddItemToArray(replay->presses, press_of(kept));
   cJSON_Delete(root);
   sonde_free(text);
 }

@@ -1,0 +1,197 @@
+// A whole exam in the page with the real program behind it: guided by the ring, pressed, decided,
+// finished, reported, replayed; then the program is killed in the middle of another one and started
+// again. Usage: exam_test.mjs SONDE WEB_DIR OUT_DIR
+import assert from "node:assert/strict";
+import { spawn } from "node:child_process";
+import { mkdirSync, mkdtempSync, readdirSync, readFileSync, rmSync } from "node:fs";
+import { createRequire } from "node:module";
+import { tmpdir } from "node:os";
+import { join, resolve } from "node:path";
+import { browserPath, goTo, openBrowser, ready } from "./drive.mjs";
+
+const [sonde, web, out] = process.argv.slice(2).map((p) => resolve(p));
+if (!browserPath) {
+  console.log("skipped: no Chromium");
+  process.exit(77);
+}
+const { chromium } = createRequire(join(web, "package.json"))("playwright-core");
+mkdirSync(out, { recursive: true });
+const exams = mkdtempSync(join(tmpdir(), "sonde-exams-"));
+let checks = 0;
+const check = (condition, what) => {
+  assert.ok(condition, what);
+  checks += 1;
+  console.log(`ok ${what}`);
+};
+
+/** The program, once it says where it is. */
+function start(port) {
+  const child = spawn(sonde, ["run", "--port", String(port), "--exams", exams], { stdio: ["ignore", "pipe", "inherit"] });
+  return new Promise((done, fail) => {
+    child.stdout.on("data", (text) => {
+      const at = /http:\/\/127\.0\.0\.1:(\d+)\//.exec(String(text));
+      if (at) done({ child, port: Number(at[1]) });
+    });
+    child.on("exit", (code) => fail(new Error(`sonde run ended with ${code}`)));
+  });
+}
+
+const state = (page) => page.evaluate(() => ({ exam: window.sonde.exam, replay: window.sonde.replay, snapshot: window.sonde.snapshot, sum: window.sonde.imageSum }));
+const until = (page, condition, argument, timeout = 60000) => page.waitForFunction(condition, argument, { timeout });
+
+async function begin(page, guidance) {
+  const again = page.getByRole("button", { name: "Start an exam", exact: true });
+  if (!(await page.locator("#start").isVisible())) await again.click();
+  await page.locator("#trainee").fill("Test learner");
+  await page.getByRole("radio", { name: guidance }).check();
+  await page.locator("#start-go").click();
+  await until(page, () => window.sonde.exam?.phase === "running");
+  await until(page, () => window.sonde.snapshot?.tick > 0 && window.sonde.exam.elapsed_s > 0);
+}
+
+/** Presses deeper and deeper until the program calls it something, then lets go. */
+async function press(page) {
+  const before = (await state(page)).exam.presses.length;
+  const named = () => ["complete", "open", "too_hard"].includes(window.sonde.exam.compression?.state);
+  for (let depth = 8; depth <= 45; depth += 1.5) {
+    await page.evaluate((d) => window.sonde.setDepth(d), depth);
+    await page.waitForFunction((d) => window.sonde.snapshot.penetration_mm > d - 0.5, depth, { timeout: 5000 }).catch(() => null);
+    await page.waitForTimeout(250);
+    if (await page.evaluate(named)) break;
+  }
+  await page.evaluate(() => window.sonde.setDepth(-4));
+  await until(page, (n) => window.sonde.exam.presses.length > n, before);
+}
+
+async function guidedExam(page) {
+  const first = (await state(page)).exam;
+  check(first.segments.some((s) => s.needed), "the exam names segments");
+  check((await page.evaluate(() => window.sonde.controls.case)) === "", "the case's pathology is not told");
+  for (let i = 0; i < 8; ++i) {
+    const { exam } = await state(page);
+    if (exam.step.target === null) break;
+    await goTo(page);
+    await press(page);
+  }
+  const { exam } = await state(page);
+  await page.screenshot({ path: join(out, "real_exam.png") });
+  check(exam.segments.filter((s) => s.needed).every((s) => s.done === s.points), "every place of the protocol was examined");
+  return exam;
+}
+
+/** Each segment is called what its presses showed. */
+async function decide(page) {
+  const { exam } = await state(page);
+  for (const s of exam.segments.filter((one) => one.needed)) {
+    const open = exam.presses.some((p) => p.segment === s.id && p.result === "open");
+    await page.locator("#segments [role=radio]", { hasText: s.title }).click();
+    await page.locator(open ? ".finding.clot" : ".finding.compressible").click();
+    await until(page, (id) => window.sonde.exam.segments.find((one) => one.id === id).decision !== "", s.id);
+  }
+}
+
+async function finish(page) {
+  await page.locator("#finish-button").click();
+  await page.getByRole("button", { name: "Finish and see the result" }).click();
+  await until(page, () => window.sonde.exam.result);
+  await page.waitForTimeout(500);
+  await page.screenshot({ path: join(out, "real_result.png") });
+  return (await state(page)).exam;
+}
+
+async function readReport(browser, port, exam) {
+  const page = await browser.newPage();
+  const errors = [];
+  page.on("console", (m) => m.type() === "error" && errors.push(m.text()));
+  const answer = await page.goto(`http://127.0.0.1:${port}${exam.result.report}`);
+  check(answer.status() === 200, "the report is served");
+  await page.screenshot({ path: join(out, "real_report.png"), fullPage: true });
+  check((await page.locator("img").count()) > 0, "the report shows the learner's own images");
+  check(errors.length === 0, `the report has no console error ${errors.join(" ")}`);
+  await page.close();
+  const data = JSON.parse(readFileSync(join(exams, exam.exam, "exam.json")));
+  check(data !== null && readdirSync(join(exams, exam.exam)).includes("exam.csv"), "the data is kept");
+}
+
+const hash = (page) => page.evaluate(() => window.sonde.imageSum);
+
+async function replay(page, exam) {
+  await page.getByRole("button", { name: "Watch the replay" }).click();
+  await until(page, () => window.sonde.exam.phase === "replay" && window.sonde.replay?.duration_s > 0);
+  const { replay: opened } = await state(page);
+  check(opened.presses.length === exam.presses.length, "the replay marks the presses");
+  const seek = async (share) => {
+    await page.locator("#scrub").evaluate((e, at) => {
+      e.value = String(Number(e.max) * at);
+      e.dispatchEvent(new Event("input"));
+      e.dispatchEvent(new Event("change"));
+    }, share);
+    await until(page, (at) => Math.abs(window.sonde.replay.time_s - at * window.sonde.replay.duration_s) < 0.2, share);
+    await page.waitForTimeout(700);
+    return hash(page);
+  };
+  const there = await seek(0.5);
+  const elsewhere = await seek(0.2);
+  check(there !== elsewhere, "another moment shows another image");
+  check((await seek(0.5)) === there, "the same moment shows the same image again");
+  await page.screenshot({ path: join(out, "real_replay.png") });
+  await page.locator("#replay-leave").click();
+  await until(page, () => window.sonde.exam.phase === "practice");
+}
+
+async function killed(browser, running) {
+  const page = await browser.newPage({ viewport: { width: 1440, height: 900 } });
+  await page.goto(`http://127.0.0.1:${running.port}/`);
+  await ready(page);
+  await begin(page, /^None/);
+  await page.evaluate(() => window.sonde.setDepth(10));
+  await page.waitForTimeout(2500);
+  running.child.removeAllListeners("exit");
+  running.child.kill("SIGKILL");
+  const again = await start(running.port);
+  await until(page, () => window.sonde.connected && window.sonde.exam?.phase === "practice");
+  check(true, "the page finds the program again");
+  const kept = readdirSync(exams, { withFileTypes: true }).filter((e) => e.isDirectory()).map((e) => readdirSync(join(exams, e.name)));
+  check(kept.some((files) => files.includes("exam.rec") && !files.includes("exam.json")), "the killed exam's recording is kept");
+  await page.close();
+  return again;
+}
+
+let running = null;
+
+async function main() {
+  running = await start(0);
+  const browser = await openBrowser(chromium);
+  const page = await browser.newPage({ viewport: { width: 1440, height: 900 } });
+  const errors = [];
+  page.on("console", (m) => m.type() === "error" && errors.push(m.text()));
+  page.on("pageerror", (e) => errors.push(String(e)));
+  await page.goto(`http://127.0.0.1:${running.port}/`);
+  await ready(page);
+  await begin(page, /^Full/);
+  await guidedExam(page);
+  await decide(page);
+  const exam = await finish(page);
+  console.log(`score ${exam.result.score}, ${exam.result.summary}`);
+  check(exam.result.passed && exam.result.correct, "who follows the guidance passes");
+  await readReport(browser, running.port, exam);
+  await replay(page, exam);
+  check(errors.length === 0, `no console error ${errors.join("; ")}`);
+  await page.close();
+  running = await killed(browser, running);
+  await browser.close();
+  running.child.removeAllListeners("exit");
+  running.child.kill("SIGINT");
+  await new Promise((done) => running.child.on("exit", done));
+  rmSync(exams, { recursive: true });
+  console.log(`${checks} checks`);
+}
+
+main().then(
+  () => process.exit(0),
+  (problem) => {
+    console.error(problem);
+    running?.child.kill("SIGKILL");
+    process.exit(1);
+  },
+);
