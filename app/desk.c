@@ -57,9 +57,18 @@ void desk_set_phase(desk *d, desk_phase phase, const char *message) {
   desk_tell_exam(d);
 }
 
-const sonde_case *desk_find_case(const desk *d, const char *id) {
+void desk_case_alias(const desk *d, const char *id, char alias[DESK_ALIAS]) {
+  alias[0] = 0;
   for (uint32_t i = 0; i < d->case_count; ++i)
-    if (strcmp(d->case_list[i].id, id) == 0) return &d->case_list[i];
+    if (strcmp(d->case_list[i].id, id) == 0) snprintf(alias, DESK_ALIAS, "patient-%u", i + 1);
+}
+
+const sonde_case *desk_find_case(const desk *d, const char *alias) {
+  for (uint32_t i = 0; i < d->case_count; ++i) {
+    char name[DESK_ALIAS];
+    snprintf(name, sizeof name, "patient-%u", i + 1);
+    if (strcmp(name, alias) == 0) return &d->case_list[i];
+  }
   return NULL;
 }
 

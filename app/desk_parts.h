@@ -10,6 +10,7 @@
 
 enum {
   DESK_PATH = 4096,
+  DESK_ALIAS = 24,
   DESK_REQUESTS = 64,
   DESK_PICTURES = 64,
   DESK_SAMPLES = 36000,
@@ -122,8 +123,11 @@ sonde_status desk_run_session(desk *d, sonde_session_def *def, const sonde_site 
 sonde_status desk_practice(desk *d, sonde_error *error);
 void desk_end_session(desk *d);
 void desk_set_phase(desk *d, desk_phase phase, const char *message);
+// What the page is told instead of a case's id, which may tell the truth about it: "patient-3";
+// empty for a case that is not in the library.
+void desk_case_alias(const desk *d, const char *id, char alias[DESK_ALIAS]);
 // NULL when there is none.
-const sonde_case *desk_find_case(const desk *d, const char *id);
+const sonde_case *desk_find_case(const desk *d, const char *alias);
 const sonde_exam_protocol *desk_find_protocol(const desk *d, const char *id);
 
 #endif

@@ -27,6 +27,12 @@ static void add_vector(cJSON *to, const char *key, sonde_vec3 v, double scale) {
   cJSON_AddItemToObject(to, key, cJSON_CreateDoubleArray(list, 3));
 }
 
+static void add_case(const desk *d, cJSON *to, const char *key, const char *id) {
+  char alias[DESK_ALIAS];
+  desk_case_alias(d, id, alias);
+  cJSON_AddStringToObject(to, key, alias);
+}
+
 static void publish(desk *d, sonde_page_topic topic, cJSON *root) {
   char *text = root ? cJSON_PrintUnformatted(root) : NULL;
   if (d->server) sonde_page_publish(d->server, topic, text, NULL);
@@ -46,7 +52,7 @@ static cJSON *cases(const desk *d) {
   cJSON *list = cJSON_CreateArray();
   for (uint32_t i = 0; i < d->case_count; ++i) {
     cJSON *item = cJSON_CreateObject();
-    cJSON_AddStringToObject(item, "id", d->case_list[i].id);
+    add_case(d, item, "id", d->case_list[i].id);
     cJSON_AddStringToObject(item, "title", d->case_list[i].title);
     cJSON_AddStringToObject(item, "history", d->case_list[i].history);
     cJSON_AddStringToObject(item, "level", level_name(d->case_list[i].level));
@@ -188,11 +194,11 @@ static void add_result(cJSON *root, const desk_exam *exam) {
 }
 
 // Under the lock.
-static void add_exam(cJSON *root, const desk_exam *exam) {
+static void add_exam(cJSON *root, const desk *d, const desk_exam *exam) {
   bool hinted = false, full = strcmp(exam->guidance, "full") == 0;
   uint32_t hints = sonde_judge_hints(exam->judge, &hinted);
   cJSON_AddStringToObject(root, "exam", exam->id);
-  cJSON_AddStringToObject(root, "case", exam->patient.id);
+  add_case(d, root, "case", exam->patient.id);
   cJSON_AddStringToObject(root, "title", exam->patient.title);
   cJSON_AddStringToObject(root, "history", exam->patient.history);
   cJSON_AddStringToObject(root, "protocol", exam->protocol->id);
@@ -251,7 +257,7 @@ void desk_tell_exam(desk *d) {
   cJSON_AddStringToObject(root, "message", d->message);
   cJSON_AddNumberToObject(root, "progress", 0); // a thigh takes a second: no bar is worth it
   if (d->exam)
-    add_exam(root, d->exam);
+    add_exam(root, d, d->exam);
   else
     add_no_exam(root);
   cJSON *status = status_of(d);
@@ -262,13 +268,13 @@ void desk_tell_exam(desk *d) {
 
 // ---- kept exams
 
-static cJSON *kept(const sonde_log_entry *entry) {
+static cJSON *kept(const desk *d, const sonde_log_entry *entry) {
   char report[SONDE_LOG_TEXT + 16];
   snprintf(report, sizeof report, "/report/%s", entry->id);
   cJSON *item = cJSON_CreateObject();
   cJSON_AddStringToObject(item, "id", entry->id);
   cJSON_AddStringToObject(item, "trainee", entry->trainee);
-  cJSON_AddStringToObject(item, "case", entry->case_id);
+  add_case(d, item, "case", entry->case_id);
   cJSON_AddStringToObject(item, "title", entry->case_title);
   cJSON_AddStringToObject(item, "date", entry->date);
   cJSON_AddStringToObject(item, "protocol", entry->protocol);
@@ -290,7 +296,7 @@ void desk_tell_exams(desk *d) {
   cJSON *root = cJSON_CreateObject();
   cJSON_AddStringToObject(root, "type", "exams");
   cJSON *list = cJSON_AddArrayToObject(root, "list");
-  for (uint32_t i = 0; i < count; ++i) cJSON_AddItemToArray(list, kept(&entries[i]));
+  for (uint32_t i = 0; i < count; ++i) cJSON_AddItemToArray(list, kept(d, &entries[i]));
   sonde_free(entries);
   publish(d, SONDE_PAGE_EXAMS, root);
 }
