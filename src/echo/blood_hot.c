@@ -9,10 +9,12 @@
 // beats_of           mean share of the pulse up to a time
 // travelled          way of the mean flow in a vessel
 // segment_map        one segment's lumen in image coordinates
-// lay_segment        scatterers on the streamlines of one segment
+// lay_segment, outside_clot  scatterers on the streamlines of one segment
 // flow               all segments of a vessel
 #include "base/base.h"
 #include "echo/echo.h"
+
+#include <string.h>
 
 enum { PULSE_STEPS = 64, BATCH = 512 };
 
@@ -63,11 +65,15 @@ static double segment_map(const sonde_echo *echo, const sonde_vessel_state *low,
   return SONDE_PI * half_short * half_long * length;
 }
 
-static float sign_of(uint32_t train, uint32_t streamline, uint32_t salt) {
-  uint32_t h = train * 0x9e3779b1u ^ streamline * 0x85ebca77u ^ salt * 0xc2b2ae3du;
-  h = (h ^ (h >> 15)) * 0x2c1b3c6du;
-  h = (h ^ (h >> 12)) * 0x297a2d39u;
-  return (h ^ (h >> 15)) & 1 ? 1.0f : -1.0f;
+// Drops the streamlines of a batch that clot fills.
+static uint32_t outside_clot(scatter_pool *some, uint32_t count, double solid) {
+  uint32_t kept = 0;
+  for (uint32_t i = 0; i < count; ++i) {
+    if (-2 * (double)some->x[i] > 1 - 2 * solid) continue;
+    some->x[kept] = some->x[i], some->y[kept] = some->y[i];
+    some->z[kept] = some->z[i], some->sign[kept++] = some->sign[i];
+  }
+  return kept;
 }
 
 // @param solid share of the short axis that clot fills, from the far side; its scatterers belong to
@@ -75,16 +81,16 @@ static float sign_of(uint32_t train, uint32_t streamline, uint32_t salt) {
 static void lay_segment(sonde_echo *echo, const map *m, uint32_t count, int32_t segment,
                         uint32_t salt, double way, double solid) {
   float x[BATCH], y[BATCH], z[BATCH], sign[BATCH];
-  const scatter_pool *blood = &echo->blood, some = {x, y, z, sign};
+  const scatter_pool *blood = &echo->blood;
   SONDE_ASSERT(count <= SONDE_BLOOD && solid < 1);
-  for (uint32_t i = 0; i < count;) {
-    uint32_t kept = 0;
-    for (; i < count && kept < BATCH; ++i) {
-      if (-2 * (double)blood->x[i] > 1 - 2 * solid) continue;
-      double at = (double)blood->z[i] + way * (double)blood->sign[i], whole = floor(at);
-      x[kept] = blood->x[i], y[kept] = blood->y[i], z[kept] = (float)(at - whole - 0.5);
-      sign[kept++] = sign_of((uint32_t)(segment - (int32_t)whole), i, salt);
-    }
+  for (uint32_t i = 0; i < count; i += BATCH) {
+    uint32_t kept = count - i < BATCH ? count - i : BATCH;
+    scatter_pool some = {x, y, z, sign};
+    stream_job job = {blood->z + i, blood->sign + i, kept, i, way, segment, salt, z, sign};
+    echo->kernels->stream(&job);
+    memcpy(x, blood->x + i, kept * sizeof *x);
+    memcpy(y, blood->y + i, kept * sizeof *y);
+    if (solid > 0) kept = outside_clot(&some, kept, solid);
     echo->bled += kept;
     for (; kept % ECHO_ALIGN; ++kept) x[kept] = y[kept] = z[kept] = sign[kept] = 0;
     if (kept > 0) sonde_echo_lay(echo, m, &some, 0, kept);

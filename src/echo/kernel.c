@@ -98,6 +98,26 @@ static void splat(const splat_job *job) {
     splat_some(job, false);
 }
 
+// Streamlines are apart from each other: the compiler makes vectors of this.
+static void stream(const stream_job *job) {
+  const float *restrict z = job->z, *restrict speed = job->speed;
+  float *restrict place = job->at, *restrict sign = job->sign;
+  const double way = job->way;
+  const uint32_t salt = job->salt * 0xc2b2ae3du, first = job->first;
+  const int32_t segment = job->segment;
+  SONDE_ASSERT(job->count <= 0x7fffffff);
+  for (uint32_t i = 0; i < job->count; ++i) {
+    double at = (double)z[i] + way * (double)speed[i], whole = __builtin_floor(at);
+    uint32_t train = (uint32_t)(segment - (int32_t)whole);
+    uint32_t h = train * 0x9e3779b1u ^ (first + i) * 0x85ebca77u ^ salt;
+    h = (h ^ (h >> 15)) * 0x2c1b3c6du;
+    h = (h ^ (h >> 12)) * 0x297a2d39u;
+    h = (h ^ (h >> 15)) & 1;
+    place[i] = (float)(at - whole - 0.5);
+    sign[i] = (float)(2 * (int32_t)h - 1);
+  }
+}
+
 INLINE void add_taps(const float tap[SONDE_RANK][2], vf x, vf y, vf sum[RING_PLANES]) {
   for (int k = 0; k < SONDE_RANK; ++k) {
     sum[2 * k] = sum[2 * k] + tap[k][0] * x - tap[k][1] * y;
@@ -234,4 +254,4 @@ static void fade(const float *scatter, const float *loss_db, float *gain, uint32
 }
 
 const echo_kernels SONDE_KERNELS = {
-    SONDE_KERNELS_NAME, splat, lateral, axial, tissue, merge, fade, convert};
+    SONDE_KERNELS_NAME, splat, stream, lateral, axial, tissue, merge, fade, convert};

@@ -40,6 +40,16 @@ typedef struct merge_job {
   uint32_t count;                         // pairs of columns, multiple of ECHO_ALIGN
 } merge_job;
 
+// Blood: places along one segment, in segments, and signs of the scatterers on some streamlines.
+typedef struct stream_job {
+  const float *z, *speed; // [count] place at the start, speed over the mean
+  uint32_t count, first;  // number of the first streamline
+  double way;             // of the mean flow, in segments
+  int32_t segment;
+  uint32_t salt;
+  float *at, *sign; // [count] place about the segment's middle; +-1
+} stream_job;
+
 typedef struct lateral_job {
   const float *re[SONDE_FINE], *im[SONDE_FINE]; // columns on lines, columns between; as merged
   uint32_t lines;                               // multiple of ECHO_ALIGN
@@ -102,6 +112,7 @@ typedef struct convert_job {
 typedef struct echo_kernels {
   const char *name;
   void (*splat)(const splat_job *job);
+  void (*stream)(const stream_job *job);
   void (*lateral)(const lateral_job *job);
   void (*axial)(const axial_job *job);
   void (*tissue)(const tissue_job *job);

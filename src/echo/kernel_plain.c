@@ -1,7 +1,7 @@
 // The inner loops without vectors and with the library's functions: what the others are tested
 // against. The tissue's row comes from the base set.
 //
-// splat, lateral, axial, fade, convert
+// splat, stream, lateral, axial, fade, convert
 #include "base/base.h"
 #include "echo/kernel.h"
 
@@ -27,6 +27,18 @@ static void splat(const splat_job *job) {
           job->grid + ((size_t)n + corner / 2 - 1) * job->stride + 4 * (size_t)l + 2 * (corner & 1);
       g[0] += (float)(size * cos(turn)), g[1] -= (float)(size * sin(turn));
     }
+  }
+}
+
+static void stream(const stream_job *job) {
+  for (uint32_t i = 0; i < job->count; ++i) {
+    double at = (double)job->z[i] + job->way * (double)job->speed[i], whole = floor(at);
+    uint32_t train = (uint32_t)(job->segment - (int32_t)whole);
+    uint32_t h = train * 0x9e3779b1u ^ (job->first + i) * 0x85ebca77u ^ job->salt * 0xc2b2ae3du;
+    h = (h ^ (h >> 15)) * 0x2c1b3c6du;
+    h = (h ^ (h >> 12)) * 0x297a2d39u;
+    job->at[i] = (float)(at - whole - 0.5);
+    job->sign[i] = (h ^ (h >> 15)) & 1 ? 1.0f : -1.0f;
   }
 }
 
@@ -105,5 +117,5 @@ static void convert(const convert_job *job) {
   }
 }
 
-const echo_kernels sonde_echo_kernels_plain = {"plain", splat, lateral, axial,
-                                               tissue,  merge, fade,    convert};
+const echo_kernels sonde_echo_kernels_plain = {"plain", splat, stream, lateral, axial,
+                                               tissue,  merge, fade,   convert};

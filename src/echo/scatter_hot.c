@@ -23,7 +23,7 @@
 
 #include <string.h>
 
-enum { MOST_PIECES = 12, NEWTON = 3, MOST_PER_PIECE = 512 };
+enum { MOST_PIECES = 12, NEWTON = 2, MOST_PER_PIECE = 512 };
 
 static const double sampling_m = 1.1e-3; // of the slab when looking for cubes
 
@@ -102,6 +102,7 @@ typedef struct cube {
   bool close;
   uint32_t near_count, which[MOST_VESSELS];
   sonde_vessel_state near[MOST_VESSELS];
+  bool moving; // any of them
 } cube;
 
 sonde_vec3 sonde_echo_to_world(const sonde_echo *echo, sonde_vec3 at) {
@@ -131,7 +132,9 @@ static void find_vessels(const sonde_echo *echo, cube *c) {
     double distance = v_distance(c->centre, v->rest_centre_m);
     double close = which < 2 ? close_m : fmin(close_m, close_radii * v->rest_radius_m);
     c->close = c->close || distance < close;
-    if (distance < reach_radii * v->rest_radius_m + echo->cell_m) c->which[c->near_count++] = which;
+    if (!(distance < reach_radii * v->rest_radius_m + echo->cell_m)) continue;
+    c->which[c->near_count++] = which;
+    c->moving = c->moving || v->area_ratio < 1 || v->area_ratio > 1;
   }
 }
 
@@ -156,7 +159,7 @@ static map carried(const sonde_echo *echo, const cube *c, const map *m, int part
     rest = v_madd(rest, offset_of(part, k), edge[k]);
     out.axis[k] = v_scale(m->axis[k], size);
   }
-  if (c->near_count == 0) return out;
+  if (!c->moving) return out;
   sonde_vec3 bare = out.origin;
   out.origin = carry(echo, c, rest, bare);
   for (int k = 0; k < 3; ++k) {
@@ -290,6 +293,11 @@ static void place_cell(sonde_echo *echo, const int32_t cell[3], uint64_t key, so
 
 // ---- cubes ----------------------------------------------------------------------------------
 
+static int32_t below(double x) {
+  int32_t i = (int32_t)x;
+  return i - (x < i);
+}
+
 static uint64_t cell_key(const int32_t cell[3]) {
   return (uint64_t)(uint16_t)cell[0] << 32 | (uint64_t)(uint16_t)cell[1] << 16 | (uint16_t)cell[2];
 }
@@ -306,11 +314,14 @@ static bool find(sonde_echo *echo, uint64_t key) {
   return true;
 }
 
-static void visit(sonde_echo *echo, sonde_vec3 rest, sonde_vec3 guess) {
+// *last: key of the visit before.
+static void visit(sonde_echo *echo, sonde_vec3 rest, sonde_vec3 guess, uint64_t *last) {
   double inverse = 1 / echo->cell_m;
-  const int32_t cell[3] = {(int32_t)floor(rest.x * inverse), (int32_t)floor(rest.y * inverse),
-                           (int32_t)floor(rest.z * inverse)};
+  const int32_t cell[3] = {below(rest.x * inverse), below(rest.y * inverse),
+                           below(rest.z * inverse)};
   uint64_t key = cell_key(cell);
+  if (key == *last) return;
+  *last = key;
   if (echo->cell_count >= SONDE_MAX_CELLS || !find(echo, key)) return;
   ++echo->cell_count;
   place_cell(echo, cell, key, guess);
@@ -331,8 +342,10 @@ static void visit_quad(sonde_echo *echo, uint32_t i, uint32_t j) {
       double a = (ii + 0.5) / across, b = (jj + 0.5) / down;
       sonde_vec3 rest =
           v_lerp(v_lerp(n[0].rest, n[1].rest, a), v_lerp(low[0].rest, low[1].rest, a), b);
+      sonde_vec3 first = v_madd(rest, -half, side), step = v_scale(side, 2 * half / (slices - 1));
+      uint64_t last = UINT64_MAX;
       for (int k = 0; k < slices; ++k)
-        visit(echo, v_madd(rest, half * (2.0 * k / (slices - 1) - 1), side), vec3(i + a, 0, j + b));
+        visit(echo, v_madd(first, k, step), vec3(i + a, 0, j + b), &last);
     }
 }
 

@@ -23,7 +23,7 @@ static pulled pull(const sonde_vessel_state *v, sonde_vec3 rest, sonde_vec3 fiel
   pulled none = {0, field};
   sonde_vec3 d = v_sub(rest, v->rest_centre_m), across = v_cross(v->axis, v->flat_axis);
   double a = v_dot(d, v->flat_axis), b = v_dot(d, across), a1 = a, b1 = b;
-  double t = (hypot(a, b) / v->rest_radius_m - 1) / reach;
+  double t = (sqrt(a * a + b * b) / v->rest_radius_m - 1) / reach;
   double engaged = clamp(fabs(1 - v->area_ratio) / engaged_loss, 0, 1);
   if (t >= 1 || !(engaged > 0)) return none;
   t = fmax(t, 0);
