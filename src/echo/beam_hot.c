@@ -5,7 +5,7 @@
 // gain_row, merge_row  one row of the field times what tissue and losses leave
 // lateral_row      lateral kernels at its depth, normalised to unit speckle
 // add_specular     echoes of interfaces, carrier phase included
-// axial_row        pulse, noise, compensation, modulus
+// axial_rows       pulse, noise, compensation, modulus
 #include "base/base.h"
 #include "base/random.h"
 #include "echo/echo.h"
@@ -15,7 +15,7 @@
 static const float noise_db = -118; // receiver noise below muscle at the skin, before TGC
 
 static float *ring_row(const sonde_echo *echo, uint32_t row) {
-  uint32_t rows = 2 * echo->pad_samples + 1;
+  uint32_t rows = 2 * echo->pad_samples + 2; // of two samples at once
   return echo->ring + (size_t)(row % rows) * RING_PLANES * echo->padded;
 }
 
@@ -104,14 +104,21 @@ static void add_specular(sonde_echo *echo, uint32_t sample) {
   }
 }
 
-static void axial_row(sonde_echo *echo, axial_job *job, uint32_t sample, bool tissue) {
+// One sample, or two from there on.
+static void axial_rows(sonde_echo *echo, axial_job *job, uint32_t first, int samples, bool tissue) {
   const frame *f = &echo->frame;
-  for (int t = 0; t < job->count; ++t) job->rows[t] = ring_row(echo, sample + (uint32_t)t);
-  uint64_t draw = sonde_random_bits(echo->seed + 3 + sonde_interior_tick(echo->interior), sample);
-  job->noise = echo->noise + draw % (SONDE_NOISE - 2 * SONDE_MOST_LINES);
-  job->compensation = tissue ? amplitude_of_db((float)(sample * f->step_m * f->tgc_db_per_m)) : 1;
-  job->envelope = echo->envelope + (size_t)sample * echo->padded;
-  job->grey = echo->grey + (size_t)sample * echo->padded;
+  for (int t = 0; t < job->count + samples - 1; ++t)
+    job->rows[t] = ring_row(echo, first + (uint32_t)t);
+  job->samples = samples;
+  for (int k = 0; k < samples; ++k) {
+    uint32_t sample = first + (uint32_t)k;
+    uint64_t draw = sonde_random_bits(echo->seed + 3 + sonde_interior_tick(echo->interior), sample);
+    job->noise[k] = echo->noise + draw % (SONDE_NOISE - 2 * SONDE_MOST_LINES);
+    job->compensation[k] =
+        tissue ? amplitude_of_db((float)(sample * f->step_m * f->tgc_db_per_m)) : 1;
+    job->envelope[k] = echo->envelope + (size_t)sample * echo->padded;
+    job->grey[k] = echo->grey + (size_t)sample * echo->padded;
+  }
   echo->kernels->axial(job);
 }
 
@@ -136,7 +143,12 @@ void sonde_echo_beam(sonde_echo *echo, bool tissue) {
   for (uint32_t n = 0; n < echo->grid_samples; ++n) {
     lateral_row(echo, n, tissue);
     if (tissue) add_specular(echo, n);
-    if (n >= 2 * echo->pad_samples) axial_row(echo, &job, n - 2 * echo->pad_samples, tissue);
+    if (n < 2 * echo->pad_samples) continue;
+    uint32_t sample = n - 2 * echo->pad_samples; // the newest that has all its rows
+    if (sample % 2 == 1)
+      axial_rows(echo, &job, sample - 1, 2, tissue);
+    else if (sample + 1 == echo->samples)
+      axial_rows(echo, &job, sample, 1, tissue);
   }
   if (echo->padded == echo->lines) return;
   for (uint32_t n = 0; n < echo->samples; ++n)

@@ -141,26 +141,39 @@ static void lateral(const lateral_job *job) {
   }
 }
 
+INLINE void add_axial(const float tap[SONDE_RANK], const vf row[RING_PLANES], vf sum[RING_PLANES]) {
+  for (int k = 0; k < SONDE_RANK; ++k) {
+    vf v = all(tap[k]);
+    sum[2 * k] += v * row[2 * k], sum[2 * k + 1] += v * row[2 * k + 1];
+  }
+}
+
+INLINE void finish_axial(const axial_job *job, int sample, uint32_t l, const vf *sum) {
+  const float *noise = job->noise[sample] + l;
+  vf re = job->noise_size * load(noise) + sum[0] + sum[2] + sum[4];
+  vf im = job->noise_size * load(noise + job->lines) + sum[1] + sum[3] + sum[5];
+  vf size = job->compensation[sample] * root(re * re + im * im);
+  store(job->envelope[sample] + l, size);
+  vf grey = (decibels(larger(size, all(1e-20f))) + job->offset_db) * job->grey_per_db;
+  store(job->grey[sample] + l, smaller(larger(grey, all(0)), all(255)));
+}
+
+// Two samples share the rows they read; each is summed from its first row to its last.
 static void axial(const axial_job *job) {
   SONDE_ASSERT(job->count > 0 && job->lines % ECHO_ALIGN == 0);
+  SONDE_ASSERT(job->samples == 1 || job->samples == 2);
   const uint32_t n = job->lines;
+  const int last = job->count + job->samples - 1;
   for (uint32_t l = 0; l < n; l += W) {
-    vf sum[RING_PLANES]; // apart, so that additions need not wait for each other
-    for (int k = 0; k < RING_PLANES; ++k) sum[k] = all(0);
-    for (int t = 0; t < job->count; ++t) {
-      const float *row = job->rows[t] + l;
-      for (uint32_t k = 0; k < SONDE_RANK; ++k) {
-        vf v = all(job->tap[t][k]);
-        sum[2 * k] += v * load(row + 2 * k * n);
-        sum[2 * k + 1] += v * load(row + (2 * k + 1) * n);
-      }
+    vf sum[2][RING_PLANES], row[RING_PLANES]; // apart: additions need not wait for each other
+    for (int k = 0; k < RING_PLANES; ++k) sum[0][k] = sum[1][k] = all(0);
+    for (int t = 0; t < last; ++t) {
+      for (uint32_t k = 0; k < RING_PLANES; ++k) row[k] = load(job->rows[t] + k * n + l);
+      if (t < job->count) add_axial(job->tap[t], row, sum[0]);
+      if (t > 0) add_axial(job->tap[t - 1], row, sum[1]);
     }
-    vf re = job->noise_size * load(job->noise + l) + sum[0] + sum[2] + sum[4];
-    vf im = job->noise_size * load(job->noise + n + l) + sum[1] + sum[3] + sum[5];
-    vf size = job->compensation * root(re * re + im * im);
-    store(job->envelope + l, size);
-    vf grey = (decibels(larger(size, all(1e-20f))) + job->offset_db) * job->grey_per_db;
-    store(job->grey + l, smaller(larger(grey, all(0)), all(255)));
+    finish_axial(job, 0, l, sum[0]);
+    if (job->samples == 2) finish_axial(job, 1, l, sum[1]);
   }
 }
 

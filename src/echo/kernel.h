@@ -58,15 +58,17 @@ typedef struct lateral_job {
   float *out; // [RING_PLANES][lines] re, im of each term
 } lateral_job;
 
+// One sample of all lines, or two: the second one starts a row later.
 typedef struct axial_job {
-  const float *rows[2 * SONDE_MOST_TAPS + 1]; // of lateral results, first to last
+  const float *rows[2 * SONDE_MOST_TAPS + 2]; // of lateral results, first to last
   int count;
   float tap[2 * SONDE_MOST_TAPS + 1][SONDE_RANK];
-  const float *noise; // [2*lines]
-  float noise_size, compensation;
+  int samples;           // 1 or 2
+  const float *noise[2]; // [2*lines]
+  float noise_size, compensation[2];
   float offset_db, grey_per_db; // grey = (dB + offset) * grey_per_db
   uint32_t lines;
-  float *envelope, *grey;
+  float *envelope[2], *grey[2];
 } axial_job;
 
 // What a vessel in view is made of.

@@ -1,7 +1,7 @@
 // The inner loops without vectors and with the library's functions: what the others are tested
 // against. The tissue's row comes from the base set.
 //
-// splat, stream, lateral, axial, fade, convert
+// splat, stream, lateral, axial (sample by sample), fade, convert
 #include "base/base.h"
 #include "echo/kernel.h"
 
@@ -61,21 +61,28 @@ static void lateral(const lateral_job *job) {
     }
 }
 
-static void axial(const axial_job *job) {
+static void axial_sample(const axial_job *job, int sample) {
   for (uint32_t l = 0; l < job->lines; ++l) {
-    double re = (double)(job->noise_size * job->noise[l]);
-    double im = (double)(job->noise_size * job->noise[job->lines + l]);
+    const float *noise = job->noise[sample] + l;
+    double re = (double)(job->noise_size * noise[0]);
+    double im = (double)(job->noise_size * noise[job->lines]);
     for (int t = 0; t < job->count; ++t)
       for (uint32_t k = 0; k < SONDE_RANK; ++k) {
-        re += (double)job->tap[t][k] * (double)job->rows[t][2 * k * job->lines + l];
-        im += (double)job->tap[t][k] * (double)job->rows[t][(2 * k + 1) * job->lines + l];
+        const float *row = job->rows[t + sample] + 2 * k * job->lines + l;
+        re += (double)job->tap[t][k] * (double)row[0];
+        im += (double)job->tap[t][k] * (double)row[job->lines];
       }
-    double size = (double)job->compensation * sqrt(re * re + im * im);
+    double size = (double)job->compensation[sample] * sqrt(re * re + im * im);
     double db = 20 * log10(fmax(size, 1e-20));
     double grey = (db + (double)job->offset_db) * (double)job->grey_per_db;
-    job->envelope[l] = (float)size;
-    job->grey[l] = (float)fmin(fmax(grey, 0), 255);
+    job->envelope[sample][l] = (float)size;
+    job->grey[sample][l] = (float)fmin(fmax(grey, 0), 255);
   }
+}
+
+static void axial(const axial_job *job) {
+  SONDE_ASSERT(job->samples == 1 || job->samples == 2);
+  for (int sample = 0; sample < job->samples; ++sample) axial_sample(job, sample);
 }
 
 static void tissue(const tissue_job *job) { sonde_echo_kernels_base.tissue(job); }
