@@ -1,0 +1,98 @@
+// Textures in tissue coordinates: angle around the leg, way along it, depth below the skin.
+// Included by kernel_tissue.h only.
+//
+// cell_value, texture     value noise
+// sheet                   bright layers at whole values
+// septa, bundles, fascia  fat and muscle
+// clefts                  fluid between the lobules of the fat
+// webs                    bands in an old clot
+#ifndef SONDE_SRC_ECHO_KERNEL_TEXTURE_H
+#define SONDE_SRC_ECHO_KERNEL_TEXTURE_H
+
+#include "echo/kernel_vector.h"
+
+enum { TURNS_MUSCLE = 90, TURNS_FAT = 60 }; // noise cells around the leg
+
+INLINE vf cell_value(vu a, vu b, vu c) {
+  vu h = a ^ b ^ c;
+  h = (h ^ (h >> 15)) * 0x2c1b3c6du;
+  h = (h ^ (h >> 12)) * 0x297a2d39u;
+  h = (h ^ (h >> 15)) >> 8;
+  return real((vi)h) * (2.0f / 16777216.0f) - 1;
+}
+
+INLINE vf smooth(vf t) { return t * t * (3 - 2 * t); }
+INLINE vi wrap(vi i, int32_t n) {
+  i += (i < 0) & n, i += (i < 0) & n;
+  i -= (i >= n) & n;
+  return i - ((i >= n) & n);
+}
+
+// Value noise in [-1, 1]; periodic around the leg with `turns` cells.
+INLINE vf texture(vf theta, vf along, vf depth, int32_t turns, int32_t salt) {
+  vf u = theta * ((float)turns * 0.159154943f);
+  vf fu = below(u), fv = below(along), fw = below(depth);
+  vi a = wrap(whole(fu), turns), a1 = wrap(a + 1, turns);
+  vu ka = (vu)a * 0x9e3779b1u, ka1 = (vu)a1 * 0x9e3779b1u;
+  vu b = (vu)(whole(fv) + 1000 * salt) * 0x85ebca77u, b1 = b + 0x85ebca77u;
+  vu c = (vu)whole(fw) * 0xc2b2ae3du, c1 = c + 0xc2b2ae3du;
+  vf tu = smooth(u - fu), tv = smooth(along - fv), tw = smooth(depth - fw);
+  vf p = cell_value(ka, b, c), q = cell_value(ka, b1, c);
+  p += tu * (cell_value(ka1, b, c) - p), q += tu * (cell_value(ka1, b1, c) - q);
+  vf r = cell_value(ka, b, c1), s = cell_value(ka, b1, c1);
+  r += tu * (cell_value(ka1, b, c1) - r), s += tu * (cell_value(ka1, b1, c1) - s);
+  p += tv * (q - p), r += tv * (s - r);
+  return p + tw * (r - p);
+}
+
+// Bright sheets at whole values of `layer`, thin over `share` of the spacing.
+INLINE vf sheet(vf layer, float share) {
+  vf away = size_of(layer - below(layer) - 0.5f) * 2; // 1 on the sheet, 0 half-way
+  vf height = larger((away - 1 + share) / share, all(0));
+  return height * height;
+}
+
+// Septa of the fat: broken sheets roughly along the skin, bent by the lobules.
+INLINE vf septa(vf theta, vf s, vf depth) {
+  vf bend = texture(theta, s * 70, depth * 250, TURNS_FAT, 1);
+  vf strength = texture(theta, s * 110, depth * 500, 2 * TURNS_FAT, 4);
+  return larger(sheet(depth * 420 + 1.3f * bend, 0.30f) * (0.55f + strength), all(0));
+}
+
+// Oedema: fluid in clefts around lobules of 6 by 8 mm, 0..1.
+INLINE vf clefts(vf theta, vf s, vf depth, float oedema) {
+  vf bend = texture(theta, s * 70, depth * 250, TURNS_FAT, 1);
+  vf sway = texture(theta, s * 60, depth * 160, TURNS_FAT, 8);
+  float share = 0.12f + 0.2f * oedema;
+  vf along = sheet(depth * 170 + 0.9f * bend, share);
+  vf across = sheet(theta * (TURNS_FAT * 0.159154943f) + depth * 40 + 0.8f * sway, share);
+  vf deep = smaller(larger(along, across) * 3, all(1));
+  return deep * (oedema < 0.5f ? 2 * oedema : 1);
+}
+
+// Bright bands along the flow in a clot that has been there for long.
+INLINE vf webs(vf theta, vf s, vf depth, vf along) {
+  vf bend = texture(theta, s * 90, depth * 400, 2 * TURNS_FAT, 9);
+  vf strength = texture(theta, s * 110, depth * 500, 2 * TURNS_FAT, 10);
+  return 2.6f * sheet(along * 1.2f + 0.7f * bend, 0.4f) * (0.8f + 0.6f * strength);
+}
+
+// Bundles of muscle, in decibels: dark fascicles between short bright connective streaks that run
+// at a small angle to the skin and far along the leg.
+INLINE vf bundles(vf theta, vf s, vf depth) {
+  vf slant = depth + 0.012f * theta;
+  vf bend = texture(theta, s * 40, depth * 130, TURNS_MUSCLE / 3, 2);
+  vf fine = texture(theta, s * 90, slant * 900, TURNS_MUSCLE, 3);
+  vf strength = texture(theta, s * 60, slant * 700, TURNS_MUSCLE, 5);
+  vf bright = sheet(slant * 420 + 1.4f * bend, 0.5f) * (0.2f + strength);
+  return 2.5f * fine + 3.5f * bend + 19 * larger(bright, all(0)) - 5;
+}
+
+// Connective tissue within half a millimetre of the fascia.
+INLINE vf fascia(vf theta, vf s, vf away) {
+  vf patch = texture(theta, s * 120, all(0.5f), 2 * TURNS_FAT, 7);
+  vf height = larger(1 - size_of(away) * (1 / 0.7e-3f), all(0));
+  return height * (1.6f + 0.9f * patch);
+}
+
+#endif
