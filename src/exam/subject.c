@@ -1,5 +1,5 @@
 // The thigh under the probe: creation.
-// skin_at, spread: the gel of the start, equal shares around every site and along the vein.
+// skin_at, spread: the gel of the start, half around the sites, half along the vein.
 // scale_friction, sonde_setup_preset: what the bench makes of a preset.
 // usable, sonde_subject_recall: going on from a moment.
 #include "exam/subject.h"
@@ -22,18 +22,19 @@ static sonde_vec3 skin_at(const sonde_model *model, sonde_vec3 point_m) {
   return skin->vertices[nearest];
 }
 
-// Over every site and along the vein, where an exam goes. Shares overlap, so that the film is
+// Half over the sites, half along the vein, where an exam goes. Shares overlap, so that the film is
 // closed between the places.
 static void spread(sonde_subject *subject) {
   const sonde_model *model = subject->model;
-  const double radius_m = 0.02, along_m = 0.03;
-  uint32_t places = model->site_count + model->vein.count;
-  if (!(subject->setup.gel_m3 > 0) || places == 0) return;
-  double share_m3 = subject->setup.gel_m3 / places;
-  for (uint32_t i = 0; i < model->site_count; ++i)
-    sonde_gel_put(subject->gel, model->sites[i].position_m, radius_m, share_m3);
-  for (uint32_t i = 0; i < model->vein.count; ++i)
-    sonde_gel_put(subject->gel, skin_at(model, model->vein.point[i].centre_m), along_m, share_m3);
+  const double radius_m = 0.02, along_m = 0.03, all_m3 = subject->setup.gel_m3;
+  uint32_t sites = model->site_count, points = model->vein.count;
+  if (!(all_m3 > 0)) return;
+  double half = sites && points ? 0.5 : 1.0;
+  for (uint32_t i = 0; i < sites; ++i)
+    sonde_gel_put(subject->gel, model->sites[i].position_m, radius_m, half * all_m3 / sites);
+  for (uint32_t i = 0; i < points; ++i)
+    sonde_gel_put(subject->gel, skin_at(model, model->vein.point[i].centre_m), along_m,
+                  half * all_m3 / points);
 }
 
 sonde_preset sonde_setup_preset(const sonde_setup *setup, const sonde_session_controls *c) {

@@ -80,7 +80,7 @@ static void without_gel_the_image_is_coupled(void **state) {
 
 // One state: in the slide, the session with less gel rubs more and sees less, at the same tick.
 static void less_gel_rubs_more_and_shows_less(void **state) {
-  const double gel_m3[] = {20e-6, 0.02e-6, 0};
+  const double gel_m3[] = {40e-6, 0.04e-6, 0}; // half of it where the probe slides
   double rubs[3], grey[3], coupling[3];
   for (int k = 0; k < 3; ++k) {
     sonde_session_def def = small_def(*state);
