@@ -10,6 +10,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 // ---- messages
@@ -25,6 +26,23 @@ int app_fail(const char *verb, const sonde_error *error) {
   const char *text = error->message[0] ? error->message : sonde_status_text(error->status);
   fprintf(stderr, "sonde %s: %s\n", verb, text);
   return is_bad_input(error->status) ? APP_BAD_INPUT : APP_FAILED;
+}
+
+sonde_status app_error(sonde_error *error, sonde_status status, const char *format, ...) {
+  va_list arguments;
+  va_start(arguments, format);
+  error->status = status;
+  vsnprintf(error->message, sizeof error->message, format, arguments);
+  va_end(arguments);
+  return status;
+}
+
+sonde_status app_make_directory(const char *path, mode_t mode, sonde_error *error) {
+  struct stat facts;
+  if (mkdir(path, mode) == 0) return SONDE_OK;
+  if (errno == EEXIST && stat(path, &facts) == 0 && S_ISDIR(facts.st_mode)) return SONDE_OK;
+  return app_error(error, SONDE_IO, "%.300s: %s", path,
+                   strerror(errno == EEXIST ? ENOTDIR : errno));
 }
 
 int app_usage_error(const char *verb, const char *format, ...) {

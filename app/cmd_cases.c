@@ -83,7 +83,7 @@ static int list(const arguments *a, const exam_library *library) {
   sonde_error error = {0};
   sonde_status status =
       library->cases[0] ? sonde_case_list(library->cases, &cases, &count, &error)
-                        : exam_fail(&error, SONDE_NOT_FOUND, "the cases that ship were not found");
+                        : app_error(&error, SONDE_NOT_FOUND, "the cases that ship were not found");
   if (status) return app_fail(VERB, &error);
   if (a->json)
     app_json_begin();

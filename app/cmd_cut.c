@@ -97,16 +97,6 @@ static int read_arguments(int argc, char **argv, arguments *a) {
   return -1;
 }
 
-static sonde_status fail(sonde_error *error, sonde_status status, const char *format, ...)
-    __attribute__((format(printf, 3, 4)));
-static sonde_status fail(sonde_error *error, sonde_status status, const char *format, ...) {
-  va_list list;
-  va_start(list, format);
-  vsnprintf(error->message, sizeof error->message, format, list);
-  va_end(list);
-  return error->status = status;
-}
-
 // "x,y,z" in mm up to a character of `last` or the end; NULL when it is not that.
 static const char *read_triple(const char *text, const char *last, sonde_vec3 *point) {
   double mm[3];
@@ -126,7 +116,7 @@ static sonde_status read_line(const char *text, work *w, sonde_error *error) {
   if (next) next = *next == ':' ? read_triple(next + 1, "", &w->path[1]) : NULL;
   w->count = 2;
   if (next) return SONDE_OK;
-  return fail(error, SONDE_ARGUMENT, "--line expects x,y,z:x,y,z in mm, got '%.80s'", text);
+  return app_error(error, SONDE_ARGUMENT, "--line expects x,y,z:x,y,z in mm, got '%.80s'", text);
 }
 
 static sonde_status read_file(const char *path, work *w, sonde_error *error) {
@@ -144,15 +134,15 @@ static sonde_status read_file(const char *path, work *w, sonde_error *error) {
     if (!header) {
       header = strncmp(line, "x_mm,y_mm,z_mm", 14) == 0 && line + 14 == end;
       if (!header)
-        status = fail(error, SONDE_FORMAT, "%.300s:%d: expected the header x_mm,y_mm,z_mm", path,
-                      number);
+        status = app_error(error, SONDE_FORMAT, "%.300s:%d: expected the header x_mm,y_mm,z_mm",
+                           path, number);
       continue;
     }
     if (w->count == MOST_POINTS)
-      status = fail(error, SONDE_FORMAT, "%.300s:%d: expected at most %d points", path, number,
-                    MOST_POINTS);
+      status = app_error(error, SONDE_FORMAT, "%.300s:%d: expected at most %d points", path, number,
+                         MOST_POINTS);
     else if (!read_triple(line, "\n", &w->path[w->count++]))
-      status = fail(error, SONDE_FORMAT, "%.300s:%d: expected three numbers", path, number);
+      status = app_error(error, SONDE_FORMAT, "%.300s:%d: expected three numbers", path, number);
   }
   sonde_free(bytes);
   return status;
@@ -180,8 +170,8 @@ static sonde_status site_line(const arguments *a, work *w, sonde_error *error) {
     if (sonde_surface_raycast(skin, above, inward, 0.1, &hit))
       w->path[w->count] = hit.point_m;
     else
-      status = fail(error, SONDE_ARGUMENT, "the cut leaves the skin %.1f mm beside site %ld",
-                    sqrt(t * t + o * o) * 1e3, a->site_id);
+      status = app_error(error, SONDE_ARGUMENT, "the cut leaves the skin %.1f mm beside site %ld",
+                         sqrt(t * t + o * o) * 1e3, a->site_id);
   }
   sonde_surface_index_destroy(skin);
   return status;
@@ -200,8 +190,8 @@ static sonde_status press(const arguments *a, const work *w, const sonde_model *
         sonde_settle(state, &probe, sonde_site_pose(w->site, a->depth_m), 1e-9, 400);
     *force_n = r.contact_n;
     if (!r.converged)
-      status = fail(error, SONDE_CONVERGENCE, "the probe did not come to rest: residual %.2g",
-                    r.residual);
+      status = app_error(error, SONDE_CONVERGENCE, "the probe did not come to rest: residual %.2g",
+                         r.residual);
   }
   sonde_state_destroy(state);
   sonde_probe_clear(&probe);
@@ -248,8 +238,8 @@ static sonde_status find_path(const arguments *a, work *w, sonde_error *error) {
   if (a->path) return read_file(a->path, w, error);
   w->site = sonde_model_site(w->model, (uint32_t)a->site_id);
   if (w->site) return site_line(a, w, error);
-  return fail(error, SONDE_NOT_FOUND, "%.400s: no site %ld, the model has %u sites", a->model,
-              a->site_id, w->model->site_count);
+  return app_error(error, SONDE_NOT_FOUND, "%.400s: no site %ld, the model has %u sites", a->model,
+                   a->site_id, w->model->site_count);
 }
 
 static sonde_status cut(const arguments *a, work *w, sonde_error *error) {

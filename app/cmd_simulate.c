@@ -95,16 +95,7 @@ static void path_of(const simulation *s, const char *name, char *path, size_t si
 
 static sonde_status fail(sonde_error *error, sonde_status status, const char *path,
                          const char *what) {
-  error->status = status;
-  snprintf(error->message, sizeof error->message, "%.300s: %s", path, what);
-  return status;
-}
-
-static sonde_status make_directory(const char *path, sonde_error *error) {
-  struct stat facts;
-  if (mkdir(path, 0777) == 0) return SONDE_OK;
-  if (errno == EEXIST && stat(path, &facts) == 0 && S_ISDIR(facts.st_mode)) return SONDE_OK;
-  return fail(error, SONDE_IO, path, strerror(errno == EEXIST ? ENOTDIR : errno));
+  return app_error(error, status, "%.300s: %s", path, what);
 }
 
 // ---- tables
@@ -246,9 +237,9 @@ static sonde_status prepare(simulation *s, sonde_error *error) {
   path_of(s, "state.snapshot", path, sizeof path);
   if (s->a.resume) status = sonde_scene_state_load(s->state, path, error);
   s->start = sonde_scene_tick(s->state);
-  if (!status) status = make_directory(s->a.directory, error);
+  if (!status) status = app_make_directory(s->a.directory, 0777, error);
   path_of(s, "frames", path, sizeof path);
-  if (!status && !s->a.no_frames) status = make_directory(path, error);
+  if (!status && !s->a.no_frames) status = app_make_directory(path, 0777, error);
   if (!status) status = open_table(s, "bodies.csv", BODIES_HEAD, &s->bodies, error);
   if (!status) status = open_table(s, "contacts.csv", CONTACTS_HEAD, &s->contacts, error);
   return status;

@@ -1,21 +1,9 @@
 // Cases and protocols by name or path.
 #include "exam_common.h"
 
-#include <errno.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
-
-sonde_status exam_fail(sonde_error *error, sonde_status status, const char *format, ...) {
-  va_list arguments;
-  va_start(arguments, format);
-  error->status = status;
-  vsnprintf(error->message, sizeof error->message, format, arguments);
-  va_end(arguments);
-  return status;
-}
 
 static void directory_of(const char *asked, const char *name, char *path, size_t size) {
   if (asked)
@@ -47,11 +35,11 @@ sonde_status exam_find_case(const exam_library *library, const char *word, sonde
   sonde_case *cases = NULL;
   uint32_t count = 0, k = 0;
   if (!library->cases[0])
-    return exam_fail(error, SONDE_NOT_FOUND, "the cases that ship were not found");
+    return app_error(error, SONDE_NOT_FOUND, "the cases that ship were not found");
   sonde_status status = sonde_case_list(library->cases, &cases, &count, error);
   while (k < count && strcmp(cases[k].id, word) != 0) ++k;
   if (!status && k == count)
-    status = exam_fail(error, SONDE_NOT_FOUND, "no case '%s' in %.300s (sonde cases lists them)",
+    status = app_error(error, SONDE_NOT_FOUND, "no case '%s' in %.300s (sonde cases lists them)",
                        word, library->cases);
   if (!status) *out = cases[k];
   sonde_free(cases);
@@ -64,7 +52,7 @@ sonde_status exam_find_protocol(const exam_library *library, const char *word,
   sonde_exam_protocol *all = NULL;
   uint32_t count = 0, k = 0;
   if (!library->protocols[0])
-    return exam_fail(error, SONDE_NOT_FOUND, "the protocols that ship were not found");
+    return app_error(error, SONDE_NOT_FOUND, "the protocols that ship were not found");
   sonde_status status = sonde_exam_protocol_list(library->protocols, &all, &count, error);
   char known[200] = "";
   for (uint32_t i = 0; i < count; ++i) {
@@ -73,16 +61,8 @@ sonde_status exam_find_protocol(const exam_library *library, const char *word,
   }
   while (k < count && strcmp(all[k].id, word) != 0) ++k;
   if (!status && k == count)
-    status = exam_fail(error, SONDE_NOT_FOUND, "no protocol '%s', expected %s", word, known);
+    status = app_error(error, SONDE_NOT_FOUND, "no protocol '%s', expected %s", word, known);
   if (!status) *out = all[k];
   sonde_free(all);
   return status;
-}
-
-sonde_status exam_make_directory(const char *path, sonde_error *error) {
-  struct stat facts;
-  if (mkdir(path, 0777) == 0) return SONDE_OK;
-  if (errno == EEXIST && stat(path, &facts) == 0 && S_ISDIR(facts.st_mode)) return SONDE_OK;
-  return exam_fail(error, SONDE_IO, "%.300s: %s", path,
-                   strerror(errno == EEXIST ? ENOTDIR : errno));
 }

@@ -17,11 +17,6 @@ sonde_status exam_find_case(const exam_library *library, const char *word, sonde
                             char *directory, size_t size, sonde_error *error);
 sonde_status exam_find_protocol(const exam_library *library, const char *word,
                                 sonde_exam_protocol *out, sonde_error *error);
-// Fills the error; returns the status.
-sonde_status exam_fail(sonde_error *error, sonde_status status, const char *format, ...)
-    __attribute__((format(printf, 3, 4)));
-// Makes a directory when it is absent.
-sonde_status exam_make_directory(const char *path, sonde_error *error);
 
 typedef struct compare_options {
   const exam_library *library;

@@ -199,8 +199,8 @@ int exam_compare(const compare_options *options) {
   sonde_progress progress = app_progress();
   sonde_status status = load(&t, &error);
   if (!status && t.case_count == 0)
-    status = exam_fail(&error, SONDE_NOT_FOUND, "no cases in '%.300s'", options->library->cases);
-  if (!status && options->directory) status = exam_make_directory(options->directory, &error);
+    status = app_error(&error, SONDE_NOT_FOUND, "no cases in '%.300s'", options->library->cases);
+  if (!status && options->directory) status = app_make_directory(options->directory, 0777, &error);
   size_t exams = (size_t)t.case_count * OPERATORS * (size_t)options->seeds;
   if (!status && !(t.score = calloc(exams, sizeof *t.score))) status = error.status = SONDE_MEMORY;
   for (uint32_t of = 0; of < t.case_count && !status; ++of)

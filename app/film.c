@@ -27,9 +27,7 @@ struct film {
 
 static sonde_status fail(sonde_error *error, sonde_status status, const char *what,
                          const char *path) {
-  *error = (sonde_error){.status = status};
-  snprintf(error->message, sizeof error->message, "%.200s: %.200s", path, what);
-  return status;
+  return app_error(error, status, "%.200s: %.200s", path, what);
 }
 
 // Its own process group: Ctrl-C ends the pictures, and ffmpeg then finishes the film.
