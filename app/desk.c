@@ -8,7 +8,6 @@
 // desk_create, desk_turn, desk_destroy
 #include "desk_parts.h"
 
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -131,35 +130,35 @@ static sonde_status start_practice(desk *d, sonde_error *error) {
   return desk_run_session(d, &def, &d->def.start, error);
 }
 
+void desk_change(desk *d, desk_exam *exam, desk_replay *replay) {
+  desk_exam *exam_before = d->exam;
+  desk_replay *replay_before = d->replay;
+  pthread_mutex_lock(&d->lock);
+  d->exam = exam;
+  pthread_mutex_unlock(&d->lock);
+  d->replay = replay;
+  desk_exam_destroy(exam_before);
+  desk_replay_destroy(replay_before);
+}
+
 sonde_status desk_practice(desk *d, sonde_error *error) {
-  desk_exam *exam = d->exam;
-  desk_replay *replay = d->replay;
   sonde_status status = start_practice(d, error);
   if (status) return status;
-  pthread_mutex_lock(&d->lock);
-  d->exam = NULL;
-  pthread_mutex_unlock(&d->lock);
-  d->replay = NULL;
   sonde_page_conceal(d->server, false, false);
-  desk_exam_destroy(exam); // their thighs are not shown any more
-  desk_replay_destroy(replay);
+  desk_change(d, NULL, NULL);
   desk_set_phase(d, DESK_PRACTICE, "");
   return SONDE_OK;
 }
 
 // ---- requests
 
-static sonde_status refuse(sonde_error *error, const char *sentence) {
-  error->status = SONDE_ARGUMENT;
-  snprintf(error->message, sizeof error->message, "%s", sentence);
-  return SONDE_ARGUMENT;
-}
-
 static sonde_status decide(desk *d, const sonde_page_request *request, sonde_error *error) {
   sonde_decision decision;
-  if (d->phase != DESK_RUNNING) return refuse(error, "there is no exam to decide in");
+  if (d->phase != DESK_RUNNING)
+    return app_error(error, SONDE_ARGUMENT, "there is no exam to decide in");
   if (!sonde_decision_parse(request->text, &decision))
-    return refuse(error, "a decision must be compressible, clot, not_seen or empty");
+    return app_error(error, SONDE_ARGUMENT,
+                     "a decision must be compressible, clot, not_seen or empty");
   pthread_mutex_lock(&d->lock);
   uint32_t segment = sonde_vein_segment(&d->exam->setup.map, request->id);
   sonde_status status = sonde_judge_decide(d->exam->judge, segment, decision, error);
@@ -169,7 +168,7 @@ static sonde_status decide(desk *d, const sonde_page_request *request, sonde_err
 
 static sonde_status hint(desk *d, sonde_error *error) {
   if (d->phase != DESK_RUNNING || strcmp(d->exam->guidance, "hints") != 0)
-    return refuse(error, "hints belong to an exam with hints");
+    return app_error(error, SONDE_ARGUMENT, "hints belong to an exam with hints");
   pthread_mutex_lock(&d->lock);
   sonde_judge_hint(d->exam->judge);
   pthread_mutex_unlock(&d->lock);
@@ -177,7 +176,8 @@ static sonde_status hint(desk *d, sonde_error *error) {
 }
 
 static sonde_status play(desk *d, const sonde_page_request *request, sonde_error *error) {
-  if (d->phase != DESK_REPLAY) return refuse(error, "there is no replay to play");
+  if (d->phase != DESK_REPLAY)
+    return app_error(error, SONDE_ARGUMENT, "there is no replay to play");
   d->replay->playing = request->playing;
   d->replay->speed = request->speed;
   d->replay->time_s = sonde_player_time(d->replay->player);
@@ -218,6 +218,7 @@ void desk_turn(desk *d) {
 
 // ---- the desk
 
+// With its parents.
 static sonde_status make_directory(const char *path, sonde_error *error) {
   char part[4096];
   snprintf(part, sizeof part, "%s", path);
@@ -227,11 +228,7 @@ static sonde_status make_directory(const char *path, sonde_error *error) {
     mkdir(part, 0700);
     *c = '/';
   }
-  if (mkdir(part, 0700) == 0 || errno == EEXIST) return SONDE_OK;
-  error->status = SONDE_IO;
-  snprintf(error->message, sizeof error->message,
-           "%.200s: the directory of the exams cannot be made: %s", path, strerror(errno));
-  return SONDE_IO;
+  return app_make_directory(path, 0700, error);
 }
 
 static sonde_status create_library(desk *d, sonde_error *error) {

@@ -1,7 +1,7 @@
 // An exam at the desk: begun on a case's thigh, watched frame by frame, judged, kept.
 //
 // name_exam            id, directory and date
-// prepare              thigh, plan, judge
+// prepare, begin       thigh, plan, judge, session
 // keep_start           what a replay needs beside the recording
 // shrink, keep_pictures   the learner's own pictures of a press
 // desk_exam_observe    one frame
@@ -28,10 +28,7 @@ static sonde_status name_exam(desk *d, desk_exam *exam, sonde_error *error) {
   snprintf(exam->id, sizeof exam->id, "%s-%04x", stamp, mark);
   desk_path(exam->directory, d->exams, exam->id);
   if (mkdir(exam->directory, 0700) == 0) return SONDE_OK;
-  error->status = SONDE_IO;
-  snprintf(error->message, sizeof error->message, "%.300s cannot be made: %s", exam->directory,
-           strerror(errno));
-  return SONDE_IO;
+  return app_error(error, SONDE_IO, "%.300s cannot be made: %s", exam->directory, strerror(errno));
 }
 
 static sonde_status prepare(desk *d, desk_exam *exam, sonde_error *error) {
@@ -93,43 +90,43 @@ static sonde_status run(desk *d, desk_exam *exam, sonde_error *error) {
 
 static void copy_text(char *to, size_t size, const char *from) { snprintf(to, size, "%s", from); }
 
+// The learner is told nothing before the session is shown.
+static sonde_status begin(desk *d, desk_exam *exam, sonde_error *error) {
+  sonde_status status = prepare(d, exam, error);
+  if (!status) status = name_exam(d, exam, error);
+  if (!status) exam->held = desk_hold(exam->directory);
+  if (!status) status = keep_start(exam, error);
+  if (status) return status;
+  sonde_page_conceal(d->server, true, strcmp(exam->guidance, "full") != 0);
+  status = run(d, exam, error);
+  if (status) sonde_page_conceal(d->server, false, false);
+  return status;
+}
+
 sonde_status desk_exam_start(desk *d, const sonde_page_request *request, sonde_error *error) {
   const sonde_case *patient = desk_find_case(d, request->id);
   const sonde_exam_protocol *protocol = desk_find_protocol(d, request->protocol);
-  if (!patient || !protocol) {
-    error->status = SONDE_NOT_FOUND;
-    snprintf(error->message, sizeof error->message, "there is no %s of that name",
-             patient ? "protocol" : "case");
-    return SONDE_NOT_FOUND;
-  }
-  if (d->phase != DESK_PRACTICE) {
-    sonde_status left = desk_practice(d, error);
-    if (left) return left;
-  }
+  if (!patient || !protocol)
+    return app_error(error, SONDE_NOT_FOUND, "there is no %s of that name",
+                     patient ? "protocol" : "case");
   desk_exam *exam = calloc(1, sizeof *exam);
-  if (!exam) return error->status = SONDE_MEMORY;
+  if (!exam) return app_error(error, SONDE_MEMORY, "out of memory");
   exam->held = -1;
   exam->patient = *patient;
   exam->protocol = protocol;
   copy_text(exam->guidance, sizeof exam->guidance, request->guidance);
   copy_text(exam->trainee, sizeof exam->trainee, request->name);
   copy_text(d->trainee, sizeof d->trainee, request->name);
+  desk_phase before = d->phase;
   desk_set_phase(d, DESK_PREPARING, "The patient is being prepared.");
-  sonde_status status = prepare(d, exam, error);
-  if (!status) status = name_exam(d, exam, error);
-  if (!status) exam->held = desk_hold(exam->directory);
-  if (!status) status = keep_start(exam, error);
-  if (!status) status = run(d, exam, error);
+  sonde_status status = begin(d, exam, error);
   if (status) {
     desk_exam_destroy(exam);
-    desk_set_phase(d, DESK_PRACTICE, error->message);
+    desk_set_phase(d, before, error->message);
     return status;
   }
-  pthread_mutex_lock(&d->lock);
-  d->exam = exam;
-  pthread_mutex_unlock(&d->lock);
+  desk_change(d, exam, NULL);
   desk_tell_greeting(d);
-  sonde_page_conceal(d->server, true, strcmp(exam->guidance, "full") != 0);
   desk_set_phase(d, DESK_RUNNING, "");
   return SONDE_OK;
 }
@@ -200,11 +197,8 @@ void desk_exam_observe(desk_exam *exam, const sonde_frame *frame) {
 
 sonde_status desk_exam_finish(desk *d, sonde_error *error) {
   desk_exam *exam = d->exam;
-  if (d->phase != DESK_RUNNING) {
-    error->status = SONDE_ARGUMENT;
-    snprintf(error->message, sizeof error->message, "there is no exam to finish");
-    return SONDE_ARGUMENT;
-  }
+  if (d->phase != DESK_RUNNING)
+    return app_error(error, SONDE_ARGUMENT, "there is no exam to finish");
   desk_set_phase(d, DESK_DONE, ""); // from here on nothing is watched
   sonde_session_stop(d->session);
   sonde_judge_finish(exam->judge);

@@ -122,6 +122,9 @@ sonde_status desk_run_session(desk *d, sonde_session_def *def, const sonde_site 
                               sonde_error *error);
 sonde_status desk_practice(desk *d, sonde_error *error);
 void desk_end_session(desk *d);
+// Puts these in the place of the exam and the replay before (NULL: none), whose thighs are not
+// shown any more.
+void desk_change(desk *d, desk_exam *exam, desk_replay *replay);
 void desk_set_phase(desk *d, desk_phase phase, const char *message);
 // What the page is told instead of a case's id, which may tell the truth about it: "patient-3";
 // empty for a case that is not in the library.

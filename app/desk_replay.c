@@ -12,12 +12,6 @@
 #include <string.h>
 #include <unistd.h>
 
-static sonde_status fail(sonde_error *error, sonde_status status, const char *sentence) {
-  error->status = status;
-  snprintf(error->message, sizeof error->message, "%s", sentence);
-  return status;
-}
-
 static bool is_id(const char *id) {
   return id[0] && strspn(id, "abcdefghijklmnopqrstuvwxyz0123456789-") == strlen(id);
 }
@@ -78,7 +72,7 @@ static sonde_status create_probes(desk *d, desk_replay *replay, sonde_error *err
   uint32_t count = 0;
   while (names[count]) ++count;
   replay->probes = calloc(count, sizeof *replay->probes);
-  if (!replay->probes) return fail(error, SONDE_MEMORY, "out of memory");
+  if (!replay->probes) return app_error(error, SONDE_MEMORY, "out of memory");
   for (uint32_t i = 0; i < count; ++i) {
     sonde_status status = sonde_probe_create(names[i], &replay->probes[i], error);
     if (status) return status;
@@ -101,16 +95,9 @@ static sonde_status take_over(desk *d, desk_replay *replay, sonde_error *error) 
   sonde_status status = sonde_page_show_model(d->server, replay->setup.model, replay->probes,
                                               replay->probe_count, error);
   if (status) return status;
-  desk_exam *exam = d->exam;
-  desk_replay *before = d->replay;
-  pthread_mutex_lock(&d->lock);
-  d->exam = NULL;
-  pthread_mutex_unlock(&d->lock);
-  d->replay = replay;
   sonde_page_conceal(d->server, false, false);
   desk_end_session(d);
-  desk_exam_destroy(exam);
-  desk_replay_destroy(before);
+  desk_change(d, NULL, replay);
   return SONDE_OK;
 }
 
@@ -127,11 +114,11 @@ static sonde_status build(desk *d, desk_replay *replay, const char *id, sonde_er
 }
 
 sonde_status desk_replay_open(desk *d, const char *id, sonde_error *error) {
-  if (!is_id(id)) return fail(error, SONDE_NOT_FOUND, "there is no such exam");
+  if (!is_id(id)) return app_error(error, SONDE_NOT_FOUND, "there is no such exam");
   if (d->phase == DESK_RUNNING)
-    return fail(error, SONDE_ARGUMENT, "finish or leave the exam before a replay");
+    return app_error(error, SONDE_ARGUMENT, "finish or leave the exam before a replay");
   desk_replay *replay = calloc(1, sizeof *replay);
-  if (!replay) return fail(error, SONDE_MEMORY, "out of memory");
+  if (!replay) return app_error(error, SONDE_MEMORY, "out of memory");
   replay->speed = 1;
   desk_phase before = d->phase;
   // the recording of an exam that was just finished gets its end now
@@ -174,7 +161,7 @@ void desk_replay_turn(desk *d) {
 
 sonde_status desk_replay_seek(desk *d, double time_s, sonde_error *error) {
   desk_replay *replay = d->replay;
-  if (!replay) return fail(error, SONDE_ARGUMENT, "there is no replay to seek in");
+  if (!replay) return app_error(error, SONDE_ARGUMENT, "there is no replay to seek in");
   sonde_status status = sonde_player_seek(replay->player, time_s, NULL, error);
   replay->time_s = sonde_player_time(replay->player);
   replay->at_s = app_seconds(CLOCK_MONOTONIC);
@@ -184,7 +171,7 @@ sonde_status desk_replay_seek(desk *d, double time_s, sonde_error *error) {
 
 sonde_status desk_replay_comment(desk *d, const sonde_page_request *request, sonde_error *error) {
   desk_replay *replay = d->replay;
-  if (!replay) return fail(error, SONDE_ARGUMENT, "there is no replay to comment on");
+  if (!replay) return app_error(error, SONDE_ARGUMENT, "there is no replay to comment on");
   sonde_comment comment = {.time_s = request->time_s};
   snprintf(comment.author, sizeof comment.author, "%.*s", (int)sizeof comment.author - 1,
            request->name);
