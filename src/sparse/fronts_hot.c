@@ -26,7 +26,9 @@ static bool factor_panel(double *f, size_t n, uint32_t from, uint32_t to) {
   return true;
 }
 
-static void subtract_eight(double *restrict cj, const double *restrict p, size_t n, size_t j) {
+// p: [8][n]; cj: [n].
+SONDE_UNWATCHED static void subtract_eight(double *restrict cj, const double *restrict p, size_t n,
+                                           size_t j) {
   double l[WIDTH];
   for (size_t k = 0; k < WIDTH; ++k) l[k] = p[k * n + j];
   for (size_t i = j; i < n; ++i)
@@ -39,6 +41,7 @@ bool sonde_front_eliminate(double *f, uint32_t n, uint32_t from, uint32_t to) {
   SONDE_ASSERT(f != NULL && from <= to && to <= n);
   if (!factor_panel(f, n, from, to)) return false;
   size_t order = n;
+  if (order > 0) (void)*(volatile double *)(f + order * order - 1); // the end of what loops reach
   for (size_t j = to; j < order; ++j) {
     double *cj = f + j * order;
     size_t p = from;

@@ -1,6 +1,7 @@
 // Laws of the fast engine: the same bits from every instruction set, the double engine's motion
 // within single precision, equilibrium, sleeping, and what it refuses.
 #include "../fixture.h"
+#include "../sanitized.h"
 #include "world/lanes.h"
 #include "world/state.h"
 
@@ -88,7 +89,7 @@ static void follows_the_double_engine(void **state) {
   (void)state;
   const sonde_contact_law laws[] = {SONDE_CONTACT_FOUNDATION, SONDE_CONTACT_NODES};
   const char *probes[] = {"point", "linear", "ball:20"};
-  for (size_t k = 0; k < 6; ++k) {
+  for (size_t k = 0; k < ROUNDS(6, 2); ++k) {
     sonde_world_def def = sonde_world_def_default();
     def.newton_iterations = 8;
     def.pcg = (sonde_pcg_options){1e-6, 1e-12, 500};
