@@ -47,7 +47,7 @@ static void friction_comes_back(void **unused) {
   (void)unused;
   const sonde_friction truth[2] = {{0.3, 0.2, 0.03, 0, 0.05}, {0.15, 0.15, 0.01, 0, 0.05}};
   for (int k = 0; k < 2; ++k) {
-    sonde_model *model = fixture_model(4, NULL);
+    sonde_model *model = fixture_model(3, NULL);
     sonde_world_def def = sonde_identify_world();
     def.friction = truth[k];
     sonde_protocol p = sonde_protocol_default(SONDE_PROTOCOL_SLIDE);
