@@ -119,9 +119,11 @@ static void add_guides(cJSON *to, const desk_exam *exam, const sonde_guidance *g
 static void add_step(cJSON *root, const desk_exam *exam, bool full, bool hinted) {
   sonde_guidance g = sonde_judge_guidance(exam->judge);
   bool silent = strcmp(exam->guidance, "exam") == 0;
+  bool asked = !silent && g.undecided < exam->setup.map.segment_count;
   cJSON *step = cJSON_AddObjectToObject(root, "step");
   cJSON_AddStringToObject(step, "text", silent ? "" : g.text);
-  cJSON_AddStringToObject(step, "detail", full || hinted ? g.detail : "");
+  cJSON_AddStringToObject(step, "detail", full || hinted || asked ? g.detail : "");
+  cJSON_AddStringToObject(step, "segment", asked ? exam->setup.map.segment[g.undecided].name : "");
   add_guides(step, exam, &g, full || hinted);
   cJSON_AddStringToObject(root, "hint", hinted ? g.text : "");
 }
@@ -225,6 +227,7 @@ static void add_no_exam(cJSON *root) {
   cJSON *step = cJSON_AddObjectToObject(root, "step");
   cJSON_AddStringToObject(step, "text", "");
   cJSON_AddStringToObject(step, "detail", "");
+  cJSON_AddStringToObject(step, "segment", "");
   add_guides(step, NULL, NULL, false);
   cJSON_AddNullToObject(root, "compression");
   cJSON_AddArrayToObject(root, "segments");

@@ -12,7 +12,7 @@
 extern "C" {
 #endif
 
-enum { SONDE_SCORE_VERSION = 1, SONDE_COMPRESSIONS = 4096, SONDE_HINT_S = 10 };
+enum { SONDE_SCORE_VERSION = 2, SONDE_COMPRESSIONS = 4096, SONDE_HINT_S = 10 };
 
 typedef enum sonde_press_result {
   SONDE_PRESS_COMPLETE,     /**< walls touch, transverse, not too hard */
@@ -91,13 +91,14 @@ SONDE_API sonde_status sonde_judge_decide(sonde_judge *judge, uint32_t segment,
 
 /** What to do next, for guidance and hints. */
 typedef struct sonde_guidance {
-  uint32_t point; /**< of the plan; SONDE_PLAN_POINTS when all are done */
-  char text[160], detail[256];
-  double offset_m;  /**< of the probe's face from the target along the skin */
-  double angle_rad; /**< of the image plane from transverse there */
+  uint32_t point;              /**< of the plan; SONDE_PLAN_POINTS when all are done */
+  char text[160], detail[256]; /**< what to do; how, or what comes then */
+  double offset_m;             /**< of the probe's face from the target along the skin */
+  double angle_rad;            /**< of the image plane from transverse there */
   bool angle_ok;
   double force_low_n, force_high_n;
-  uint32_t undecided; /**< segment to decide next; SONDE_SEGMENTS: none */
+  uint32_t undecided; /**< segment to decide next: the one pressed last, else the first that waits;
+                           SONDE_SEGMENTS: none */
 } sonde_guidance;
 SONDE_API sonde_guidance sonde_judge_guidance(const sonde_judge *judge);
 /** The same, counted; force and target may be shown for SONDE_HINT_S. @thread reader */
@@ -117,7 +118,7 @@ typedef struct sonde_metrics {
   double force_peak_n, force_p95_n; /**< while pressing */
   double time_s, contact_s;
   double path_m;     /**< of the probe */
-  double smoothness; /**< log dimensionless jerk, higher is smoother */
+  double smoothness; /**< log dimensionless jerk of the way to a press, mean; higher is smoother */
   uint32_t hints;
 } sonde_metrics;
 SONDE_API sonde_metrics sonde_judge_metrics(const sonde_judge *judge);

@@ -58,6 +58,7 @@ sonde_status sonde_judge_create(const sonde_vein_map *map, const sonde_plan *pla
   judge->map = *map;
   judge->plan = *plan;
   judge->hint_s = -INFINITY;
+  judge->seen = SONDE_SEGMENTS;
   want(judge);
   return SONDE_OK;
 }
@@ -141,6 +142,7 @@ static void cover(sonde_judge *judge, const sonde_compression *p) {
     judge->done[i] |= fabs(judge->plan.point[i].at.along_m - p->along_m) <= reach;
   if (p->result == SONDE_PRESS_COMPLETE) judge->closed_sum += 1 - p->vein_ratio;
   if (p->segment == SONDE_SEGMENTS) return;
+  judge->seen = p->segment;
   if (p->result == SONDE_PRESS_OPEN)
     judge->open[p->segment]++;
   else
@@ -167,6 +169,7 @@ static bool end(sonde_judge *judge) {
   cover(judge, &judge->now);
   judge->pressing = false;
   judge->trough_n = judge->now.force_peak_n;
+  sonde_motion_pressed(&judge->motion);
   return keep(judge, &judge->now);
 }
 
@@ -194,16 +197,11 @@ static void spend(sonde_judge *judge, const sonde_snapshot *s) {
   judge->contact_s += step_s;
 }
 
-// A double vein is as open as the one of the two that is.
-static sonde_snapshot with_further_veins(const sonde_snapshot *told) {
-  sonde_snapshot s = *told;
-  if (isfinite(s.vein_area_ratio)) s.vein_area_ratio = fmax(s.vein_area_ratio, s.other_vein_ratio);
-  return s;
-}
-
 bool sonde_judge_feed(sonde_judge *judge, const sonde_snapshot *snapshot) {
   SONDE_ASSERT(judge && snapshot);
-  const sonde_snapshot all = with_further_veins(snapshot), *s = &all;
+  sonde_snapshot all = *snapshot;
+  const sonde_snapshot *s = &all;
+  all.vein_area_ratio = sonde_vein_ratio(snapshot);
   if (!isfinite(s->time_s) || !isfinite(s->force_normal_n)) return true;
   if (judge->started && !(s->time_s > judge->last.time_s)) return true;
   if (judge->started)

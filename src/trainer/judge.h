@@ -21,10 +21,15 @@ typedef struct sonde_motion {
   sonde_vec3 stage_m[2];  // low-pass
   sonde_vec3 before_m[3]; // filtered, newest first
   uint32_t filled;
-  double path_m, jerk_sum, speed_peak_m_s, time_s;
+  double path_m;
+  double jerk_sum, speed_peak_m_s, time_s; // since the last press
+  double smooth_sum;                       // over the ways before
+  uint32_t ways;
 } sonde_motion;
 void sonde_motion_feed(sonde_motion *motion, double time_s, sonde_vec3 position_m);
-// Log dimensionless jerk; NaN before the probe has moved.
+// A press has ended, and with it the way to it.
+void sonde_motion_pressed(sonde_motion *motion);
+// Log dimensionless jerk, mean over the ways; NaN before the probe has moved.
 double sonde_motion_smoothness(const sonde_motion *motion);
 
 struct sonde_judge {
@@ -41,6 +46,7 @@ struct sonde_judge {
   double closed_sum; // of 1 - ratio, complete presses
   bool done[SONDE_PLAN_POINTS];
   uint32_t open[SONDE_SEGMENTS], complete[SONDE_SEGMENTS];
+  uint32_t seen; // segment of the last valid press, SONDE_SEGMENTS: none
   bool covered[JUDGE_BINS], wanted[JUDGE_BINS];
 
   // the press under way

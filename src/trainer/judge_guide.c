@@ -1,9 +1,13 @@
 // What to do next: one sentence for the learner.
 // next_point:    first place of the plan that is not examined.
-// undecided:     first needed segment whose places are done and that has no decision.
+// is_due:        a needed segment whose places are done and that has no decision.
+// undecided:     the one that was pressed last if it is due, else the first that is.
 // measure:       where the probe is against a place.
-// say_move, say_press, say_end: the sentence.
+// say_next, say_move, say_press: the sentence.
+// ask:           for the finding, before what comes next.
 #include "trainer/judge.h"
+
+#include <ctype.h>
 
 static uint32_t next_point(const sonde_judge *judge) {
   for (uint32_t i = 0; i < judge->plan.count; ++i)
@@ -11,11 +15,16 @@ static uint32_t next_point(const sonde_judge *judge) {
   return SONDE_PLAN_POINTS;
 }
 
+static bool is_due(const sonde_judge *judge, uint32_t segment) {
+  sonde_segment_status s = sonde_judge_segment(judge, segment);
+  return s.needed && s.done == s.points && s.decision == SONDE_DECISION_NONE;
+}
+
+// What was just seen is asked for first: it is still in the learner's mind, and in the picture.
 static uint32_t undecided(const sonde_judge *judge) {
-  for (uint32_t i = 0; i < judge->map.segment_count; ++i) {
-    sonde_segment_status s = sonde_judge_segment(judge, i);
-    if (s.needed && s.done == s.points && s.decision == SONDE_DECISION_NONE) return i;
-  }
+  if (judge->seen < SONDE_SEGMENTS && is_due(judge, judge->seen)) return judge->seen;
+  for (uint32_t i = 0; i < judge->map.segment_count; ++i)
+    if (is_due(judge, i)) return i;
   return SONDE_SEGMENTS;
 }
 
@@ -55,7 +64,7 @@ static void say_press(const sonde_judge *judge, sonde_guidance *g) {
     return;
   }
   static const char *const OTHER[] = {
-      [SONDE_PRESS_STATE_COMPLETE] = "The vein is closed: let go, then move on.",
+      [SONDE_PRESS_STATE_COMPLETE] = "The vein is closed: let go.",
       [SONDE_PRESS_STATE_OPEN] =
           "The vein stays open although the artery gives way: let go; it may hold a clot.",
       [SONDE_PRESS_STATE_TOO_HARD] = "Too hard: let go and press again with less force.",
@@ -71,12 +80,34 @@ static void say_press(const sonde_judge *judge, sonde_guidance *g) {
     snprintf(g->text, sizeof g->text, "Here: press until the walls of the vein touch.");
 }
 
-static void say_end(const sonde_judge *judge, sonde_guidance *g) {
-  if (g->undecided < SONDE_SEGMENTS)
-    snprintf(g->text, sizeof g->text, "Decide: %s.",
-             sonde_segment_title(judge->map.segment[g->undecided].name));
-  else
+// Where to go and what to do there.
+static void say_next(const sonde_judge *judge, sonde_guidance *g) {
+  const sonde_criteria *c = &judge->plan.criteria;
+  if (g->point == SONDE_PLAN_POINTS) {
     snprintf(g->text, sizeof g->text, "All places are examined: finish the exam.");
+    return;
+  }
+  const sonde_plan_point *point = &judge->plan.point[g->point];
+  snprintf(g->detail, sizeof g->detail, "%s", point->text);
+  if (!judge->started) {
+    snprintf(g->text, sizeof g->text, "Put the probe across the leg: %s.", point->title);
+    return;
+  }
+  double along_m;
+  g->offset_m = measure(judge, &point->at, &along_m, &g->angle_rad);
+  g->angle_ok = g->angle_rad <= c->tilt_rad;
+  // a press that is under way is finished before the next place is named
+  if (!judge->pressing && g->offset_m > c->reach_m)
+    say_move(g, point->title, along_m, g->offset_m);
+  else
+    say_press(judge, g);
+}
+
+static void ask(const sonde_judge *judge, sonde_guidance *g) {
+  g->text[0] = (char)tolower((unsigned char)g->text[0]);
+  if (g->point < SONDE_PLAN_POINTS) snprintf(g->detail, sizeof g->detail, "Then %s", g->text);
+  snprintf(g->text, sizeof g->text, "Say what you saw: %s.",
+           sonde_segment_title(judge->map.segment[g->undecided].name));
 }
 
 sonde_guidance sonde_judge_guidance(const sonde_judge *judge) {
@@ -87,24 +118,8 @@ sonde_guidance sonde_judge_guidance(const sonde_judge *judge) {
                       .force_low_n = c->force_low_n,
                       .force_high_n = c->force_high_n,
                       .undecided = undecided(judge)};
-  if (g.point == SONDE_PLAN_POINTS) {
-    say_end(judge, &g);
-    return g;
-  }
-  const sonde_plan_point *point = &judge->plan.point[g.point];
-  snprintf(g.detail, sizeof g.detail, "%s", point->text);
-  if (!judge->started) {
-    snprintf(g.text, sizeof g.text, "Put the probe across the leg: %s.", point->title);
-    return g;
-  }
-  double along_m;
-  g.offset_m = measure(judge, &point->at, &along_m, &g.angle_rad);
-  g.angle_ok = g.angle_rad <= c->tilt_rad;
-  // a press that is under way is finished before the next place is named
-  if (!judge->pressing && g.offset_m > c->reach_m)
-    say_move(&g, point->title, along_m, g.offset_m);
-  else
-    say_press(judge, &g);
+  say_next(judge, &g);
+  if (g.undecided < SONDE_SEGMENTS && !judge->pressing) ask(judge, &g);
   return g;
 }
 

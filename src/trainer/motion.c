@@ -1,5 +1,6 @@
 // The probe's way: length and smoothness.
-// advance:  one step of the grid: low-pass, path, speed, jerk.
+// advance:     one step of the grid: low-pass, path, speed, jerk.
+// smoothness:  of the way since the last press.
 #include "trainer/judge.h"
 
 // Grid of 20 Hz; two low-passes of 4 Hz each: a hand's movements stay, its tremor and the sampling
@@ -55,8 +56,20 @@ void sonde_motion_feed(sonde_motion *m, double time_s, sonde_vec3 position_m) {
   m->last_m = position_m;
 }
 
-double sonde_motion_smoothness(const sonde_motion *m) {
+static double smoothness(const sonde_motion *m) {
   if (!(m->jerk_sum > 0 && m->speed_peak_m_s > 0)) return (double)NAN;
   double scale = m->time_s * m->time_s * m->time_s / (m->speed_peak_m_s * m->speed_peak_m_s);
   return -log(m->jerk_sum * scale);
+}
+
+// The figure falls with the number of movements that it is taken over (by 4 ln of it), so it is
+// taken over the way to each press: who examines more places is not called less smooth.
+void sonde_motion_pressed(sonde_motion *m) {
+  double way = smoothness(m);
+  if (isfinite(way)) m->smooth_sum += way, m->ways++;
+  m->jerk_sum = m->speed_peak_m_s = m->time_s = 0;
+}
+
+double sonde_motion_smoothness(const sonde_motion *m) {
+  return m->ways > 0 ? m->smooth_sum / m->ways : smoothness(m);
 }

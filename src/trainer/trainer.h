@@ -20,6 +20,12 @@ typedef sonde_status (*sonde_item_load)(const char *path, void *item, sonde_erro
 sonde_status sonde_load_directory(const char *directory, size_t item_bytes, sonde_item_load load,
                                   void **items, uint32_t *count, sonde_error *error);
 
+// A double vein is as open as the one of the two that is; NaN when the first is not in view.
+static inline double sonde_vein_ratio(const sonde_snapshot *s) {
+  double first = s->vein_area_ratio;
+  return isfinite(first) ? fmax(first, s->other_vein_ratio) : first;
+}
+
 // JSON text with escapes, quotes included.
 void sonde_json_text(sonde_file *file, const char *text);
 // A number, null when it is not finite.

@@ -75,6 +75,8 @@ async function guidedExam(page) {
   }
   const { exam } = await state(page);
   await page.screenshot({ path: join(out, "real_exam.png") });
+  const [asked, shown] = [exam.segments.find((s) => s.id === exam.step.segment), await page.locator("#segments [aria-checked=true] .name").textContent()];
+  check(asked?.id === exam.presses.at(-1).segment && shown === asked.title, `the finding asked for is that of the last press, and selected: ${shown}`);
   check(exam.segments.filter((s) => s.needed).every((s) => s.done === s.points), "every place of the protocol was examined");
   return exam;
 }

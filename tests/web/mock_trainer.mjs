@@ -45,7 +45,7 @@ const HINT_MS = 10000;
 const rotateY = ([w, x, y, z]) => [2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)];
 const practice = () => ({
   type: "exam", phase: "practice", message: "", progress: 0, exam: "", case: "", title: "", history: "", protocol: "", guidance: "full", elapsed_s: 0,
-  recording: false, step: { text: "", detail: "", target: null, force_n: null, offset_mm: null, angle_deg: null, angle_ok: false }, compression: null,
+  recording: false, step: { text: "", detail: "", segment: "", target: null, force_n: null, offset_mm: null, angle_deg: null, angle_ok: false }, compression: null,
   segments: [], presses: [], hint: "", hints_used: 0, result: null,
 });
 
@@ -105,6 +105,7 @@ export class Trainer {
     Object.assign(this.exam, { phase: "running", message: "" });
     this.started = Date.now();
     this.press = null;
+    this.seen = "";
     this.frames = [];
     this.tell();
   }
@@ -217,6 +218,7 @@ export class Trainer {
     const result = p.angle > OFF_AXIS_DEG ? "off_axis" : p.force > HARD_N ? "too_hard" : p.vein < CLOSED ? "complete" : p.force >= CORRIDOR_N[0] ? "open" : "insufficient";
     if (p.force > 1) this.exam.presses.push({ t_s: p.t_s, z_mm: p.z, segment: s?.id ?? "", result, force_n: p.force });
     if (s && (result === "complete" || result === "open") && s.done < s.points) s.done++;
+    if (s && (result === "complete" || result === "open")) this.seen = s.id; // asked for first
     this.tell();
   }
 
@@ -236,11 +238,13 @@ export class Trainer {
 
   guide(s) {
     const e = this.exam;
-    const step = (e.step = { text: "", detail: "", target: null, force_n: null, offset_mm: null, angle_deg: null, angle_ok: s.angle <= OFF_AXIS_DEG });
+    const step = (e.step = { text: "", detail: "", segment: "", target: null, force_n: null, offset_mm: null, angle_deg: null, angle_ok: s.angle <= OFF_AXIS_DEG });
     if (this.hintUntil && Date.now() > this.hintUntil) [e.hint, this.hintUntil] = ["", 0];
     if (e.guidance === "exam") return;
     const [next, open] = [this.next(), this.undecided()];
-    const pending = e.segments.find((x) => x.needed && x.done >= x.points && x.decision === "");
+    const due = (x) => x.needed && x.done >= x.points && x.decision === "";
+    const pending = e.segments.find((x) => x.id === this.seen && due(x)) ?? e.segments.find(due);
+    step.segment = pending?.id ?? "";
     if (pending) step.text = `What did you see at ${pending.title.toLowerCase()}?`;
     else if (next) step.text = `Compress the vein ${this.where(next)}: ${next.title.toLowerCase()}`;
     else step.text = open ? `What did you see at ${open.title.toLowerCase()}?` : "All points are done. Finish the exam.";

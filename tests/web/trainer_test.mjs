@@ -183,6 +183,31 @@ async function begin(page, guidance, caseName) {
   await phase(page, "running");
 }
 
+const chosen = (page) => page.locator("#segments [aria-checked=true] .name").textContent();
+
+/** The finding that the bar asks for is the one that is selected: first the segment pressed last. */
+async function testAsked(page) {
+  await begin(page, /^Full/, /^First walk/);
+  const asked = (id) => page.waitForFunction((s) => window.sonde.exam.step.segment === s, id);
+  for (const id of ["common_femoral", "popliteal"]) {
+    await goTo(page);
+    await pressBySlider(page, CLOSED_MM);
+    await page.waitForFunction(() => document.getElementById("compression").dataset.state === "complete");
+    await page.locator("#ease").click();
+    await asked(id);
+  }
+  check((await chosen(page)) === "Popliteal", "who decided nothing is asked for what was pressed last, and it is selected");
+  await page.keyboard.press("j");
+  await asked("common_femoral");
+  check((await chosen(page)) === "Common femoral", "then for the first that waits");
+  const bar = await page.locator("#step-text").textContent();
+  check(bar.includes("common femoral"), `the bar names it: ${bar}`);
+  await page.keyboard.press("j");
+  await asked("");
+  await button(page, "Leave").click();
+  await phase(page, "practice");
+}
+
 async function testGuidance(page) {
   const shown = async () => ({
     ring: await page.locator("#target-label").isVisible(), angle: await page.locator("#dial").isVisible(),
@@ -369,6 +394,7 @@ async function main() {
     await testReplay(page);
     await inspect(page, "free practice");
     await testKeyboardExam(page);
+    await testAsked(page);
     await testGuidance(page);
     await testWatch(page, mock);
     await testLoss(page, mock);

@@ -23,6 +23,7 @@ export class ExamBar {
   private controls = false;
   private chosen = "";
   private near = ""; // the segment that the probe was last above
+  private asked = ""; // the segment that the guidance asks for
   private cells = new Map<string, Cell>();
   private readonly box = find("segments");
   private readonly choices: HTMLButtonElement[];
@@ -56,8 +57,18 @@ export class ExamBar {
     const complete = exam.segments.every((s) => !s.needed || s.decision !== "");
     find("finish-button").classList.toggle("primary", complete); // not before there is something to finish
     this.fill(exam.segments);
+    this.obey(exam);
     if (!exam.segments.some((s) => s.id === this.chosen)) this.chosen = exam.segments[0]?.id ?? "";
     this.mark(exam.segments);
+  }
+
+  /** The segment that the guidance asks for is chosen, once: the learner may choose another. */
+  private obey(exam: Exam): void {
+    const asked = exam.step.segment;
+    if (asked === this.asked) return;
+    this.asked = asked;
+    this.near = "";
+    if (asked) this.chosen = asked;
   }
 
   private sayStep(exam: Exam): void {
@@ -74,7 +85,7 @@ export class ExamBar {
     this.cells = new Map(segments.map((s) => [s.id, this.cell(s)]));
     this.box.replaceChildren(...[...this.cells.values()].map((c) => c.root));
     this.chosen = (segments.find((s) => s.needed) ?? segments[0])?.id ?? "";
-    this.near = "";
+    this.near = this.asked = "";
   }
 
   private cell(s: Segment): Cell {
@@ -112,9 +123,9 @@ export class ExamBar {
     });
   }
 
-  /** With guidance the finding follows the probe: z along the leg, mm. */
+  /** With guidance the finding follows the probe while none is asked for: z along the leg, mm. */
   follow(z_mm: number, touching: boolean): void {
-    if (!this.exam || this.exam.guidance === "exam" || !touching) return;
+    if (!this.exam || this.exam.guidance === "exam" || this.asked || !touching) return;
     const s = this.exam.segments.find((x) => x.needed && z_mm >= Math.min(x.from_mm, x.to_mm) && z_mm <= Math.max(x.from_mm, x.to_mm));
     if (!s || s.id === this.near) return;
     this.near = s.id;

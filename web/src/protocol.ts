@@ -97,6 +97,8 @@ export interface Target {
 export interface Step {
   text: string;
   detail: string;
+  /** to be decided now; empty: none */
+  segment: string;
   target: Target | null;
   force_n: [number, number] | null;
   offset_mm: number | null;

@@ -1,0 +1,163 @@
+// Two learners at once in their pages, started by sonde class: what one does is nowhere in the other's
+// exam, page, log or directory; and a client that never reads costs the others no frame.
+// Usage: two_test.mjs SONDE WEB_DIR OUT_DIR
+import assert from "node:assert/strict";
+import { spawn } from "node:child_process";
+import { existsSync, mkdirSync, mkdtempSync, readdirSync, readFileSync, rmSync } from "node:fs";
+import { createRequire } from "node:module";
+import { createServer } from "node:net";
+import { tmpdir } from "node:os";
+import { join, resolve } from "node:path";
+import { browserPath, goTo, openBrowser, ready } from "./drive.mjs";
+import { Client } from "./socket.mjs";
+
+const [sonde, web, out] = process.argv.slice(2).map((p) => resolve(p));
+if (!browserPath) {
+  console.log("skipped: no Chromium");
+  process.exit(77);
+}
+const { chromium } = createRequire(join(web, "package.json"))("playwright-core");
+mkdirSync(out, { recursive: true });
+const exams = mkdtempSync(join(tmpdir(), "sonde-two-"));
+const PATIENCE_MS = 120000;
+const PUBLISHED = 200; // frames that are counted
+let checks = 0;
+const check = (condition, what) => {
+  assert.ok(condition, what);
+  checks += 1;
+  console.log(`ok ${what}`);
+};
+
+const isFree = (port) =>
+  new Promise((done) => {
+    const server = createServer();
+    server.once("error", () => done(false));
+    server.listen(port, "127.0.0.1", () => server.close(() => done(true)));
+  });
+
+async function freePair() {
+  for (let port = 20000 + (process.pid % 15000); ; port += 2) if ((await isFree(port)) && (await isFree(port + 1))) return port;
+}
+
+const until = (page, condition, argument) => page.waitForFunction(condition, argument, { timeout: PATIENCE_MS });
+const exam = (page) => page.evaluate(() => window.sonde.exam);
+const status = async (port) => (await fetch(`http://127.0.0.1:${port}/status.json`)).json();
+
+/** Both programs, once they answer. */
+async function startClass(port) {
+  const child = spawn(sonde, ["class", "--names", "Ada,Bo", "--port", String(port), "--", "--exams", exams], { stdio: ["ignore", "ignore", "inherit"] });
+  for (const p of [port, port + 1])
+    for (let i = 0; !(await status(p).catch(() => null)); ++i) {
+      assert.ok(i < 600, `no program at ${p}`);
+      await new Promise((done) => setTimeout(done, 100));
+    }
+  return child;
+}
+
+async function visit(browser, port, errors) {
+  const page = await browser.newPage({ viewport: { width: 1280, height: 800 } });
+  page.setDefaultTimeout(PATIENCE_MS);
+  page.on("console", (m) => m.type() === "error" && errors.push(m.text()));
+  page.on("pageerror", (e) => errors.push(String(e)));
+  await page.goto(`http://127.0.0.1:${port}/?quality=low`);
+  await ready(page);
+  return page;
+}
+
+async function begin(page, guidance, which) {
+  await page.locator(".cards.case .card").nth(which).click();
+  await page.getByRole("radio", { name: guidance }).check();
+  await page.locator("#start-go").click();
+  await until(page, () => window.sonde.exam?.phase === "running" && window.sonde.exam.elapsed_s > 0);
+}
+
+async function press(page, depth) {
+  const before = (await exam(page)).presses.length;
+  await page.evaluate((d) => window.sonde.setDepth(d), depth);
+  await until(page, (d) => window.sonde.snapshot.penetration_mm > d - 2, depth);
+  await page.evaluate(() => window.sonde.setDepth(-4));
+  await until(page, (n) => window.sonde.exam.presses.length > n, before);
+}
+
+/** Ada presses twice and decides; Bo presses once; neither sees anything of the other. */
+async function apart(ada, bo, port) {
+  await begin(ada, /^Full/, 0);
+  await begin(bo, /^None/, 3);
+  const [first, second] = [await exam(ada), await exam(bo)];
+  check(first.exam !== second.exam && first.case !== second.case, "two learners, two exams, two cases");
+  await goTo(ada);
+  const still = await bo.evaluate(() => window.sonde.snapshot.position_mm);
+  await press(ada, 14);
+  check((await bo.evaluate(() => window.sonde.snapshot.position_mm)).every((v, i) => Math.abs(v - still[i]) < 0.5), "one's probe moves, the other's stays");
+  await press(ada, 18);
+  await press(bo, 12);
+  check((await exam(ada)).presses.length === 2 && (await exam(bo)).presses.length === 1, "presses are counted where they were made");
+  const needed = (await exam(ada)).segments.find((s) => s.needed);
+  await ada.locator("#segments [role=radio]", { hasText: needed.title }).click();
+  await ada.locator(".finding.clot").click();
+  await until(ada, (id) => window.sonde.exam.segments.find((s) => s.id === id).decision === "clot", needed.id);
+  check((await exam(bo)).segments.every((s) => s.decision === ""), "a finding belongs to who gave it");
+  const told = [await status(port), await status(port + 1)];
+  check(told[0].trainee === "Ada" && told[1].trainee === "Bo" && told[0].case === first.title && told[1].case === second.title, "the teacher's overview has each with the own case");
+}
+
+async function ends(ada, bo) {
+  await ada.locator("#finish-button").click();
+  await ada.getByRole("button", { name: "Finish and see the result" }).click();
+  await until(ada, () => window.sonde.exam.result);
+  const [first, second] = [await exam(ada), await exam(bo)];
+  check(second.phase === "running" && second.result === null, "one has finished, the other goes on");
+  await bo.screenshot({ path: join(out, "two_learners.png") });
+  const kept = readdirSync(exams, { withFileTypes: true }).filter((e) => e.isDirectory()).map((e) => e.name);
+  const start = (id) => JSON.parse(readFileSync(join(exams, id, "start.json")));
+  check(kept.length === 2 && start(first.exam).trainee === "Ada" && start(second.exam).trainee === "Bo", "each exam has its own directory and name");
+  const result = JSON.parse(readFileSync(join(exams, first.exam, "exam.json")));
+  check(result.presses.length === 2 && !existsSync(join(exams, second.exam, "exam.json")), "only the finished one has a result, with its own presses");
+}
+
+/** Frames of a client that reads, with and without one beside it that does not. */
+async function slow(bo, port) {
+  const reader = new Client(port, true);
+  await reader.open;
+  const shown = async () => {
+    const before = await bo.evaluate(() => window.sonde.frames);
+    const share = await reader.share(PUBLISHED);
+    return [share, (await bo.evaluate(() => window.sonde.frames)) - before];
+  };
+  const [alone, page] = await shown();
+  const stuck = new Client(port, false);
+  await stuck.open;
+  const [beside, pageBeside] = await shown();
+  console.log(`of ${PUBLISHED} frames a reader got ${(100 * alone).toFixed(0)} %, beside a client that never reads ${(100 * beside).toFixed(0)} %; the page drew ${page} and ${pageBeside}`);
+  check(alone > 0.9 && beside > 0.9 && pageBeside > 0, "a client that never reads costs the others no frame");
+  reader.close();
+  stuck.close();
+}
+
+let programs = null;
+
+async function main() {
+  const port = await freePair();
+  programs = await startClass(port);
+  const browser = await openBrowser(chromium);
+  const errors = [];
+  const [ada, bo] = [await visit(browser, port, errors), await visit(browser, port + 1, errors)];
+  await apart(ada, bo, port);
+  await ends(ada, bo);
+  await slow(bo, port + 1);
+  check(errors.length === 0, `no console error ${errors.join("; ")}`);
+  await browser.close();
+  programs.kill("SIGINT");
+  await new Promise((done) => programs.on("exit", done));
+  rmSync(exams, { recursive: true });
+  console.log(`${checks} checks`);
+}
+
+main().then(
+  () => process.exit(0),
+  (problem) => {
+    console.error(problem);
+    programs?.kill("SIGINT");
+    process.exit(1);
+  },
+);
