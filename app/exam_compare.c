@@ -30,6 +30,8 @@ METRIC(of_peak, s->metrics.force_peak_n)
 METRIC(of_p95, s->metrics.force_p95_n)
 METRIC(of_time, s->metrics.time_s)
 METRIC(of_path, 1e3 * s->metrics.path_m)
+METRIC(of_press_time, s->metrics.time_s / s->metrics.press_count)
+METRIC(of_press_path, 1e3 * s->metrics.path_m / s->metrics.press_count)
 METRIC(of_smoothness, s->metrics.smoothness)
 #undef METRIC
 
@@ -46,6 +48,8 @@ static const metric METRICS[] = {{"score", of_score},
                                  {"force_p95_n", of_p95},
                                  {"time_s", of_time},
                                  {"path_mm", of_path},
+                                 {"press_time_s", of_press_time},
+                                 {"press_path_mm", of_press_path},
                                  {"smoothness", of_smoothness}};
 enum { METRIC_COUNT = sizeof METRICS / sizeof METRICS[0] };
 

@@ -22,10 +22,12 @@ typedef struct habit {
   double beyond_from_n, beyond_to_n; // the same above the limit of force
   double closed_ratio, open_ratio;   // of the vein: called closed, called open
   double artery_ratio;               // ends a press on an open vein; 0: goes on
-  double pause_s, wander_m;          // before a place; sway of the hand while travelling
+  double pause_s, wander_m;          // looks for the vein before a press; how far it sways then
+  double past_m;                     // a travel goes past its place by this spread, then back
   double rate_n_s;                   // slows down where the force rises faster
   uint32_t attempts;                 // at a place, until it is clear
   bool confirm, guess;               // repeats what looks open; calls what it has not seen
+  bool hesitant;                     // stops while pressing
 } habit;
 
 static const habit HABIT[] = {
@@ -56,8 +58,10 @@ static const habit HABIT[] = {
      .force_to_n = 20,
      .closed_ratio = 0.7,
      .open_ratio = 0.7,
-     .pause_s = 1.2,
-     .wander_m = 0.004,
+     .pause_s = 4,
+     .wander_m = 0.012,
+     .past_m = 0.02,
+     .hesitant = true,
      .rate_n_s = 40,
      .attempts = 1,
      .guess = true},
@@ -93,6 +97,7 @@ static const habit HABIT[] = {
 };
 static const char *const NAMES[] = {"expert", "novice", "timid", "forceful", NULL};
 
+static const double SETTLED_M = 0.003;
 static const double LIFT_M = 0.006, DEEPEST_M = 0.060, TOUCH_N = 6, HOLD_S = 0.2;
 static const double GIVES_WAY = 0.8, FIRM_N = 15; // share of the force so far
 static const double NEAR_LIMIT = 0.95, CALL_FORCE_N = 8, RELEASE_M_S = 0.08;
@@ -111,7 +116,9 @@ struct sonde_operator {
   phase phase;
   uint32_t place, attempt, opens;
   double along_m, across_m, twist_rad, depth_m; // where the hand is told to be
+  double sway_m, sway_across_m;                 // beside it, while looking
   double aim_m, aim_across_m, aim_twist_rad;    // at this attempt
+  double beyond_m;                              // the travel goes there first
   double stop_n, wait_s, last_s;
   double ratio, artery, peak_n; // of this press; NaN: not seen
   double felt_n, felt_depth_m;  // at the last look
@@ -148,14 +155,15 @@ static void aim(sonde_operator *op) {
   op->peak_n = op->felt_n = 0;
   op->felt_depth_m = -INFINITY;
   op->wait_s = h->pause_s * uniform(op, 0.5, 1.5);
+  op->beyond_m = h->past_m > 0 ? spread(op, h->past_m) : 0;
 }
 
 static sonde_pose pose_at(const sonde_operator *op) {
-  sonde_vein_point p = sonde_vein_at(&op->map, op->along_m);
+  sonde_vein_point p = sonde_vein_at(&op->map, op->along_m + op->sway_m);
   sonde_vec3 z = v_neg(p.normal), y = v_cross(z, p.across);
   double c = cos(op->twist_rad), s = sin(op->twist_rad);
   sonde_vec3 x = v_add(v_scale(p.across, c), v_scale(y, s));
-  sonde_vec3 at = v_madd(p.skin_m, op->across_m, p.across);
+  sonde_vec3 at = v_madd(p.skin_m, op->across_m + op->sway_across_m, p.across);
   return (sonde_pose){v_madd(at, -op->depth_m, p.normal),
                       q_from_matrix(m_columns(x, v_cross(z, x), z))};
 }
@@ -206,17 +214,21 @@ static double towards(double from, double to, double step) {
 // Along the course of the vein at a small height, so that the skin's curve is followed.
 static void travel(sonde_operator *op, const sonde_snapshot *s, double dt_s) {
   const habit *h = &op->habit;
-  double step = h->travel_m_s * dt_s;
-  op->along_m = towards(op->along_m, op->aim_m, step);
+  double step = h->travel_m_s * dt_s, goal_m = op->aim_m + op->beyond_m;
+  op->along_m = towards(op->along_m, goal_m, step);
   op->across_m = towards(op->across_m, op->aim_across_m, step);
   op->twist_rad = towards(op->twist_rad, op->aim_twist_rad, dt_s);
-  if (op->along_m != op->aim_m || op->across_m != op->aim_across_m ||
+  if (op->along_m != goal_m || op->across_m != op->aim_across_m ||
       op->twist_rad != op->aim_twist_rad)
     return;
+  if (op->beyond_m != 0) { // back, and again a little too far
+    op->beyond_m = fabs(op->beyond_m) > SETTLED_M ? -0.5 * op->beyond_m : 0;
+    return;
+  }
   op->wait_s -= dt_s;
-  // a hand that looks for its place sways over it
-  op->across_m += h->wander_m * sin(2 * SONDE_PI * 0.7 * s->time_s) * dt_s * 4;
-  op->aim_across_m = op->across_m;
+  double reach_m = h->wander_m * clamp(op->wait_s, 0, 1); // comes to rest in the end
+  op->sway_m = reach_m * sin(2 * SONDE_PI * 0.45 * s->time_s);
+  op->sway_across_m = reach_m * sin(2 * SONDE_PI * 0.7 * s->time_s);
   if (op->wait_s <= 0) op->phase = PRESS;
 }
 
@@ -226,8 +238,9 @@ static bool too_far(const sonde_operator *op, const sonde_snapshot *s) {
   // the skin slips from the probe; a light touch may bounce
   if (op->peak_n > FIRM_N && s->force_normal_n < GIVES_WAY * op->peak_n) return true;
   if (h->force_to_n > 0 || h->beyond_to_n > 0) return false;
-  if (s->vein_area_ratio <= h->closed_ratio) return true;
-  return s->artery_area_ratio <= h->artery_ratio && s->vein_area_ratio >= h->open_ratio;
+  double vein = sonde_vein_ratio(s);
+  if (vein <= h->closed_ratio) return true;
+  return s->artery_area_ratio <= h->artery_ratio && vein >= h->open_ratio;
 }
 
 static void press(sonde_operator *op, const sonde_snapshot *s, double dt_s) {
@@ -237,14 +250,15 @@ static void press(sonde_operator *op, const sonde_snapshot *s, double dt_s) {
   if (stiffness > 0) speed = fmin(speed, h->rate_n_s / stiffness);
   op->felt_n = s->force_normal_n;
   op->felt_depth_m = op->depth_m;
-  op->depth_m += dt_s * speed;
+  bool stops = h->hesitant && sin(2 * SONDE_PI * 1.1 * s->time_s) > 0.3;
+  if (!stops) op->depth_m += dt_s * speed;
   if (!too_far(op, s)) return;
   op->phase = HOLD;
   op->wait_s = HOLD_S;
 }
 
 static void watch(sonde_operator *op, const sonde_snapshot *s) {
-  op->ratio = fmin(op->ratio, s->vein_area_ratio);
+  op->ratio = fmin(op->ratio, sonde_vein_ratio(s));
   op->artery = fmin(op->artery, s->artery_area_ratio);
   op->peak_n = fmax(op->peak_n, s->force_normal_n);
 }
