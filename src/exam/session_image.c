@@ -1,8 +1,6 @@
 // From the newest surface to a frame: skin, inside, vessels, image, all of one tick.
 // penetration:        depth of the probe's face below the rest skin.
 // update_interior:    the inside and the vessels at this surface.
-// tilt:               between a vessel and the normal of the image plane.
-// read_vessels, read_branches: what the image plane cuts.
 // choose_beam:        the one asked for when it is due, else the last one.
 // couple, volume:     what the gel does to the image, and how much there is.
 // fill_frame:         everything into one slot.
@@ -10,6 +8,7 @@
 // check_image:        hash of the pixels for the recording.
 // sonde_session_follow, _draw, _show: one image. sonde_session_latency: percentiles.
 #include "exam/session.h"
+#include "exam/vessels.h"
 
 #include "base/base.h"
 #include "base/clock.h"
@@ -53,39 +52,6 @@ static void update_interior(sonde_session *session, const unsigned char *slot) {
   session->shown = true;
   session->shown_tick = head->snapshot.tick;
   session->shown_pathology = *pathology;
-}
-
-// The image is the x-z plane of the probe.
-static double tilt(sonde_pose pose, sonde_vec3 axis) {
-  double along = v_dot(q_rotate(pose.rotation, vec3(0, 1, 0)), axis);
-  return acos(fmin(1.0, fabs(along)));
-}
-
-// The vein that closes least speaks for all.
-static void read_branches(const sonde_session *session, sonde_snapshot *snapshot) {
-  static const char *const deep[] = {"second_femoral_vein", "deep_femoral_vein"};
-  const sonde_interior *in = session->interior;
-  for (int which = 2; which < (int)sonde_interior_vessel_count(in); ++which)
-    for (size_t k = 0; k < SONDE_COUNT_OF(deep); ++k) {
-      sonde_vessel_state v;
-      if (strcmp(sonde_interior_vessel_name(in, which), deep[k]) != 0) continue;
-      if (sonde_interior_vessel_at_plane(in, which, snapshot->world_from_probe, &v))
-        snapshot->other_vein_ratio = fmax(snapshot->other_vein_ratio, v.area_ratio);
-    }
-}
-
-static void read_vessels(const sonde_session *session, sonde_snapshot *snapshot) {
-  sonde_vessel_state vein, artery;
-  sonde_pose pose = snapshot->world_from_probe;
-  if (sonde_interior_vessel_at_plane(session->interior, 0, pose, &vein)) {
-    snapshot->vein_area_ratio = vein.area_ratio;
-    snapshot->vein_short_m = 2.0 * vein.half_short_m;
-    snapshot->vein_rest_m = vein.rest_centre_m;
-    snapshot->vein_tilt_rad = tilt(pose, vein.axis);
-  }
-  if (sonde_interior_vessel_at_plane(session->interior, 1, pose, &artery))
-    snapshot->artery_area_ratio = artery.area_ratio;
-  read_branches(session, snapshot);
 }
 
 static sonde_echo_settings with_beam(const sonde_session_beam *beam, sonde_echo_settings rest) {
@@ -178,7 +144,7 @@ static void fill_frame(sonde_session *session, const unsigned char *slot, unsign
   frame->snapshot.venous_pressure_pa = head->pathology.venous_pressure_pa;
   frame->snapshot.arterial_pressure_pa = head->pathology.arterial_pressure_pa;
   frame->snapshot.penetration_m = penetration(session, head->snapshot.world_from_probe);
-  read_vessels(session, &frame->snapshot);
+  sonde_snapshot_read_vessels(session->interior, &frame->snapshot);
 }
 
 static void count_latency(sonde_session *session, double pose_s) {

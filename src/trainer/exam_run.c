@@ -1,11 +1,11 @@
 // A whole exam without a person: world, inside, operator and judge in lockstep. No picture is made:
 // the operator reads the figures that a session's snapshot holds.
 // open_rig:     the thigh, the probe and the inside, made for speed.
-// tilt:         between a vessel and the normal of the image plane.
 // look:         a snapshot; the inside is worked out only under a pressing probe.
 // step:         one tick: hand, world.
 // examine:      ticks until the operator is done.
 // conclude:     decisions, score, files.
+#include "exam/vessels.h"
 #include "trainer/trainer.h"
 
 // 21 looks per second. A force beyond FORCE_MAX_N is no hand's: the inside is not asked then.
@@ -45,6 +45,7 @@ static sonde_status open_rig(rig *r, sonde_error *error) {
   if (!status) status = sonde_probe_create("linear", &r->probe, error);
   if (!status) status = sonde_state_create(r->setup->model, &world, &r->state, error);
   if (!status) status = sonde_interior_create(r->setup->model, &r->interior, error);
+  if (!status) status = sonde_interior_set_findings(r->interior, &r->setup->findings, error);
   if (!status && !r->def->solid) sonde_interior_set_method(r->interior, SONDE_INTERIOR_COLUMNS);
   return status;
 }
@@ -56,10 +57,6 @@ static void close_rig(rig *r) {
   if (r->hand.destroy) r->hand.destroy(r->hand.self);
   sonde_operator_destroy(r->op);
   sonde_judge_destroy(r->judge);
-}
-
-static double tilt(sonde_pose pose, sonde_vec3 axis) {
-  return acos(fmin(1, fabs(v_dot(q_rotate(pose.rotation, vec3(0, 1, 0)), axis))));
 }
 
 static void look_inside(rig *r, sonde_snapshot *s) {
@@ -77,15 +74,7 @@ static void look_inside(rig *r, sonde_snapshot *s) {
   sonde_interior_update(r->interior, &input);
   r->looked_tick = r->tick;
   r->looked = true;
-  sonde_vessel_state vein, artery;
-  if (sonde_interior_vessel_at_plane(r->interior, 0, s->world_from_probe, &vein)) {
-    s->vein_area_ratio = vein.area_ratio;
-    s->vein_short_m = 2 * vein.half_short_m;
-    s->vein_rest_m = vein.rest_centre_m;
-    s->vein_tilt_rad = tilt(s->world_from_probe, vein.axis);
-  }
-  if (sonde_interior_vessel_at_plane(r->interior, 1, s->world_from_probe, &artery))
-    s->artery_area_ratio = artery.area_ratio;
+  sonde_snapshot_read_vessels(r->interior, s);
 }
 
 static sonde_snapshot look(rig *r) {
@@ -101,6 +90,7 @@ static sonde_snapshot look(rig *r) {
                       .penetration_m = nan_m,
                       .vein_area_ratio = nan_m,
                       .artery_area_ratio = nan_m,
+                      .other_vein_ratio = nan_m,
                       .vein_short_m = nan_m,
                       .vein_rest_m = {nan_m, nan_m, nan_m},
                       .vein_tilt_rad = nan_m};
