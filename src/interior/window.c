@@ -9,7 +9,6 @@
 #include "interior/window.h"
 
 #include "base/base.h"
-#include "fit/dense.h"
 
 #include <string.h>
 
@@ -166,20 +165,17 @@ void sonde_window_begin(sonde_window *w, const sonde_interior *in, sonde_window_
   sonde_fronts_begin(w->solid.fronts);
 }
 
-// Inverse of the condensed stiffness, column by column of the unit matrix.
-static bool invert(sonde_window *w) {
-  uint32_t side = 3 * SONDE_WINDOW_NEAR;
-  double *inverse = w->compliance, *factor = inverse + (size_t)side * side;
-  const double *stiffness = sonde_fronts_condensed(w->solid.fronts);
-  for (uint32_t j = 0; j < side; ++j)
-    for (uint32_t i = j; i < side; ++i)
-      factor[(size_t)i * side + j] = stiffness[(size_t)j * side + i];
-  if (!sonde_cholesky(factor, side)) return false;
-  memset(inverse, 0, (size_t)side * side * sizeof *inverse);
-  for (uint32_t i = 0; i < side; ++i) {
-    inverse[(size_t)i * side + i] = 1;
-    sonde_cholesky_solve(factor, side, inverse + (size_t)i * side);
-  }
+// Row k of the compliance is the answer to a force on unknown k.
+static bool comply(sonde_window *w) {
+  const size_t side = 3 * (size_t)SONDE_WINDOW_NEAR;
+  double *c = w->compliance;
+  if (!sonde_fronts_compliance(w->solid.fronts, c, c + side * side)) return false;
+  for (size_t i = 0; i < side; ++i)
+    for (size_t j = 0; j < i; ++j) {
+      double kept = c[i * side + j];
+      c[i * side + j] = c[j * side + i];
+      c[j * side + i] = kept;
+    }
   return true;
 }
 
@@ -191,6 +187,6 @@ uint32_t sonde_window_steps(const sonde_window *w, uint64_t budget) {
 bool sonde_window_step(sonde_window *w, uint64_t budget) {
   SONDE_ASSERT(w != NULL && !w->ready);
   if (!sonde_fronts_step(w->solid.fronts, sonde_solid_matrix, &w->solid, budget)) return false;
-  w->ready = !sonde_fronts_failed(w->solid.fronts) && invert(w);
+  w->ready = !sonde_fronts_failed(w->solid.fronts) && comply(w);
   return true;
 }

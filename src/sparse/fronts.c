@@ -11,6 +11,7 @@
 // assemble              elements and the children's updates into the working front
 // sonde_fronts_steps    how many steps that takes
 // sonde_fronts_recover  pieces backward
+// sonde_front_kernels_find  of this processor
 #include "sparse/fronts.h"
 
 #include "base/base.h"
@@ -31,6 +32,7 @@ typedef struct piece {
 } piece;
 
 struct sonde_fronts {
+  const sonde_front_kernels *kernels;
   uint32_t node_count, last_count, element_count;
   const uint32_t (*elements)[8];
   uint32_t *order, *rank; // node at a place, place of a node
@@ -358,6 +360,7 @@ sonde_status sonde_fronts_create(const sonde_fronts_def *def, sonde_fronts **fro
   if (f == NULL) return sonde_fail_memory(error);
   f->node_count = def->node_count, f->last_count = def->last_count;
   f->element_count = def->element_count, f->elements = def->elements;
+  f->kernels = sonde_front_kernels_find(NULL);
   f->order = SONDE_NEW(uint32_t, f->node_count);
   f->rank = SONDE_NEW(uint32_t, f->node_count);
   graph g = {.points = def->points};
@@ -497,7 +500,7 @@ bool sonde_fronts_step(sonde_fronts *f, sonde_front_matrix *matrix, const void *
     }
     if (f->now == f->piece_count) return true; // the condensed matrix stays in the working front
     uint32_t to = f->column + PANEL < own ? f->column + PANEL : (uint32_t)own;
-    f->failed = !sonde_front_eliminate(f->work, (uint32_t)n, f->column, to);
+    f->failed = !f->kernels->eliminate(f->work, (uint32_t)n, f->column, to);
     spent += panel_cost(n, f->column, to);
     f->column = to;
     if (to < own) continue;
@@ -514,6 +517,25 @@ const double *sonde_fronts_condensed(const sonde_fronts *f) {
   return f->work;
 }
 
+bool sonde_fronts_compliance(const sonde_fronts *f, double *inverse, double *scratch) {
+  SONDE_ASSERT(f != NULL && inverse != NULL && scratch != NULL);
+  uint32_t side = 3 * f->last_count;
+  memcpy(scratch, sonde_fronts_condensed(f), (size_t)side * side * sizeof *scratch);
+  return f->kernels->invert(scratch, side, inverse);
+}
+
+const sonde_front_kernels *sonde_front_kernels_find(const char *name) {
+  const sonde_front_kernels *known[] = {
+#ifdef __x86_64__
+      __builtin_cpu_supports("avx512f") ? &sonde_front_kernels_avx512 : NULL,
+      __builtin_cpu_supports("avx2") ? &sonde_front_kernels_avx2 : NULL,
+#endif
+      &sonde_front_kernels_base};
+  for (size_t k = 0; k < SONDE_COUNT_OF(known); ++k)
+    if (known[k] && (!name || strcmp(name, known[k]->name) == 0)) return known[k];
+  return NULL;
+}
+
 // ---- backward pass ------------------------------------------------------------------------
 
 // L11^T x1 = -L21^T x2, row by row.
@@ -524,12 +546,12 @@ static void recover_piece(const sonde_fronts *f, const piece *p, float *x) {
   for (uint32_t j = 0; j < own; ++j) y[j] = 0;
   for (uint32_t i = 0; i < p->boundary_count; ++i) {
     const float *from = x + 3 * (size_t)f->order[f->boundary[p->boundary + i]];
-    for (int axis = 0; axis < 3; ++axis, row += own) sonde_front_subtract(y, row, from[axis], own);
+    for (int axis = 0; axis < 3; ++axis, row += own) f->kernels->subtract(y, row, from[axis], own);
   }
   for (uint32_t k = own; k-- > 0;) {
     const float *of = row + (size_t)k * own;
     y[k] *= of[k];
-    sonde_front_subtract(y, of, y[k], k);
+    f->kernels->subtract(y, of, y[k], k);
   }
   for (uint32_t j = 0; j < own; ++j) x[3 * (size_t)f->order[p->first + j / 3] + j % 3] = y[j];
 }

@@ -48,11 +48,29 @@ void sonde_fronts_recover(const sonde_fronts *fronts, float *x);
 size_t sonde_fronts_nonzeros(const sonde_fronts *fronts);
 uint64_t sonde_fronts_work(const sonde_fronts *fronts); // multiplications of one factorisation
 
-// Cholesky of the first `own` columns of a symmetric matrix (lower triangle by columns, order n),
-// columns [from, to); the rest receives the Schur complement. False at a pivot that is not
-// positive.
-bool sonde_front_eliminate(double *f, uint32_t n, uint32_t from, uint32_t to);
-// y[0..count) -= scale * row[0..count)
-void sonde_front_subtract(float *y, const float *row, float scale, uint32_t count);
+// The inverse of that matrix, symmetric but for rounding: inverse[side*side]. False when it is not
+// positive definite. @param scratch [side*side]
+bool sonde_fronts_compliance(const sonde_fronts *fronts, double *inverse, double *scratch);
+
+// For one instruction set; all of them give the same bits. Symmetric matrices are lower triangles
+// by columns, of order n.
+typedef struct sonde_front_kernels {
+  const char *name;
+  // Cholesky of the columns [from, to); what lies behind receives the Schur complement. False at a
+  // pivot that is not positive.
+  bool (*eliminate)(double *f, uint32_t n, uint32_t from, uint32_t to);
+  // y[0..count) -= scale * row[0..count)
+  void (*subtract)(float *y, const float *row, float scale, uint32_t count);
+  // inverse[n*n]; f receives the factor.
+  bool (*invert)(double *f, uint32_t n, double *inverse);
+} sonde_front_kernels;
+
+// The widest that this processor runs, or those called `name`; NULL: none of that name.
+const sonde_front_kernels *sonde_front_kernels_find(const char *name);
+extern const sonde_front_kernels sonde_front_kernels_base;
+#ifdef __x86_64__
+extern const sonde_front_kernels sonde_front_kernels_avx2;
+extern const sonde_front_kernels sonde_front_kernels_avx512;
+#endif
 
 #endif

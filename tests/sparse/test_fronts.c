@@ -7,6 +7,7 @@
 
 #include <setjmp.h>
 #include <stdarg.h>
+#include <stdlib.h>
 #include <string.h>
 #include <cmocka.h>
 
@@ -205,10 +206,85 @@ static void bad_numbers_are_refused(void **state) {
   clear(&b);
 }
 
+static double noise(uint64_t *x) {
+  *x = *x * 6364136223846793005u + 1442695040888963407u;
+  return (double)(*x >> 40) / (double)(1 << 24) - 0.5;
+}
+
+// Symmetric, diagonally dominant: lower triangle by columns.
+static double *matrix_of(uint32_t n) {
+  uint64_t x = n;
+  double *f = calloc((size_t)n * n, sizeof *f);
+  assert_non_null(f);
+  for (size_t j = 0; j < n; ++j)
+    for (size_t i = j; i < n; ++i) f[j * n + i] = noise(&x) + (i == j ? n : 0);
+  return f;
+}
+
+static double entry(const double *f, uint32_t n, size_t i, size_t j) {
+  return i >= j ? f[j * n + i] : f[i * n + j];
+}
+
+static void eliminated(const sonde_front_kernels *set, double *f, uint32_t n) {
+  uint32_t own = 2 * n / 3;
+  for (uint32_t from = 0; from < own; from += 45)
+    assert_true(set->eliminate(f, n, from, from + 45 < own ? from + 45 : own));
+}
+
+// Fewer rows than a vector has, more than a band, and what divides by nothing.
+static void every_instruction_set_gives_the_same_bits(void **state) {
+  (void)state;
+  static const uint32_t SIZES[] = {1, 3, 7, 40, 101, 263};
+  static const char *const SETS[] = {"avx2", "avx512"};
+  for (size_t k = 0; k < sizeof SETS / sizeof SETS[0]; ++k) {
+    const sonde_front_kernels *wide = sonde_front_kernels_find(SETS[k]);
+    if (!wide) continue;
+    for (size_t q = 0; q < sizeof SIZES / sizeof SIZES[0]; ++q) {
+      uint32_t n = SIZES[q];
+      size_t bytes = (size_t)n * n * sizeof(double);
+      double *a = matrix_of(n), *b = matrix_of(n), *x = malloc(bytes), *y = malloc(bytes);
+      eliminated(&sonde_front_kernels_base, a, n);
+      eliminated(wide, b, n);
+      assert_memory_equal(a, b, bytes);
+      free(a);
+      free(b);
+      a = matrix_of(n), b = matrix_of(n);
+      assert_true(sonde_front_kernels_base.invert(a, n, x) && wide->invert(b, n, y));
+      assert_memory_equal(x, y, bytes);
+      float from[263], one[263] = {0}, other[263] = {0};
+      for (uint32_t i = 0; i < n; ++i) from[i] = (float)x[i];
+      sonde_front_kernels_base.subtract(one, from, 0.3f, n);
+      wide->subtract(other, from, 0.3f, n);
+      assert_memory_equal(one, other, n * sizeof *one);
+      free(a), free(b), free(x), free(y);
+    }
+  }
+}
+
+static void the_inverse_undoes_the_matrix(void **state) {
+  (void)state;
+  const uint32_t n = 70;
+  double *a = matrix_of(n), *f = matrix_of(n), *x = malloc(n * n * sizeof *x);
+  assert_true(sonde_front_kernels_find(NULL)->invert(f, n, x));
+  for (size_t i = 0; i < n; ++i)
+    for (size_t j = 0; j < n; ++j) {
+      double sum = 0;
+      for (size_t k = 0; k < n; ++k) sum += entry(a, n, i, k) * x[k * n + j];
+      assert_true(fabs(sum - (i == j)) < 1e-12);
+    }
+  a[0] = -1;
+  assert_false(sonde_front_kernels_find(NULL)->invert(a, n, x));
+  assert_null(sonde_front_kernels_find("none"));
+  free(a), free(f), free(x);
+}
+
 int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(condensed_is_the_schur_complement),
-      cmocka_unit_test(recovered_nodes_are_in_equilibrium), cmocka_unit_test(slices_change_nothing),
-      cmocka_unit_test(a_bad_pivot_is_reported), cmocka_unit_test(bad_numbers_are_refused)};
+  const struct CMUnitTest tests[] = {cmocka_unit_test(condensed_is_the_schur_complement),
+                                     cmocka_unit_test(recovered_nodes_are_in_equilibrium),
+                                     cmocka_unit_test(slices_change_nothing),
+                                     cmocka_unit_test(a_bad_pivot_is_reported),
+                                     cmocka_unit_test(bad_numbers_are_refused),
+                                     cmocka_unit_test(every_instruction_set_gives_the_same_bits),
+                                     cmocka_unit_test(the_inverse_undoes_the_matrix)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
