@@ -241,6 +241,21 @@ static sonde_status create_library(desk *d, sonde_error *error) {
   return sonde_exam_log_open(desk_path(path, d->exams, "exams.sqlite"), &d->log, error);
 }
 
+static sonde_status create_probes(desk *d, sonde_error *error) {
+  const char *const *names = d->def.practice.probe_names;
+  if (!names) names = sonde_probe_names();
+  uint32_t count = 0;
+  while (names[count]) ++count;
+  d->probes = calloc(count, sizeof *d->probes);
+  if (!d->probes) return app_error(error, SONDE_MEMORY, "out of memory");
+  for (uint32_t i = 0; i < count; ++i) {
+    sonde_status status = sonde_probe_create(names[i], &d->probes[i], error);
+    if (status) return status;
+    d->probe_count = i + 1;
+  }
+  return SONDE_OK;
+}
+
 static sonde_status create_page(desk *d, sonde_error *error) {
   sonde_page_def page = {.port = d->def.port,
                          .model_path = d->def.model_path,
@@ -268,6 +283,7 @@ sonde_status desk_create(const desk_def *def, desk **out, sonde_error *error) {
   snprintf(d->exams, sizeof d->exams, "%s", def->exams);
   snprintf(d->trainee, sizeof d->trainee, "%s", def->trainee);
   sonde_status status = create_library(d, error);
+  if (!status) status = create_probes(d, error);
   if (!status) status = start_practice(d, error);
   if (!status) status = create_page(d, error);
   if (status)
@@ -287,6 +303,8 @@ sonde_status desk_destroy(desk *d, sonde_error *error) {
   desk_exam_destroy(d->exam);
   desk_replay_destroy(d->replay);
   sonde_exam_log_close(d->log);
+  for (uint32_t i = 0; i < d->probe_count; ++i) sonde_probe_clear(&d->probes[i]);
+  free(d->probes);
   sonde_free(d->case_list);
   sonde_free(d->protocol_list);
   pthread_mutex_destroy(&d->lock);

@@ -56,8 +56,6 @@ typedef struct desk_exam {
 typedef struct desk_replay {
   char id[64], title[96], recording[DESK_PATH];
   sonde_case_setup setup;
-  sonde_probe *probes;
-  uint32_t probe_count;
   sonde_player *player;
   sonde_comments comments;
   cJSON *presses; // of the exam's data
@@ -73,6 +71,8 @@ struct desk {
   uint32_t case_count;
   sonde_exam_protocol *protocol_list;
   uint32_t protocol_count;
+  sonde_probe *probes; // [probe_count] that a replay shows
+  uint32_t probe_count;
   sonde_exam_log *log;
   sonde_page_server *server;
   sonde_session *session; // practice or exam; NULL in a replay

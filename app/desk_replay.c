@@ -2,8 +2,9 @@
 //
 // is_id                an id names one directory
 // press_of, load_presses   what the judge saw, from the exam's data
-// load_thigh, open_player, create_probes   parts of a replay
+// load_thigh, open_player   parts of a replay
 // show                 the image in view to the page
+// end_exam, take_over  from a session to a replay
 #include "desk_parts.h"
 
 #include <math.h>
@@ -66,21 +67,6 @@ static sonde_status open_player(desk_replay *replay, const char *directory, sond
   return sonde_player_open(&def, &replay->player, error);
 }
 
-static sonde_status create_probes(desk *d, desk_replay *replay, sonde_error *error) {
-  const char *const *names = d->def.practice.probe_names;
-  if (!names) names = sonde_probe_names();
-  uint32_t count = 0;
-  while (names[count]) ++count;
-  replay->probes = calloc(count, sizeof *replay->probes);
-  if (!replay->probes) return app_error(error, SONDE_MEMORY, "out of memory");
-  for (uint32_t i = 0; i < count; ++i) {
-    sonde_status status = sonde_probe_create(names[i], &replay->probes[i], error);
-    if (status) return status;
-    replay->probe_count = i + 1;
-  }
-  return SONDE_OK;
-}
-
 static void show(desk *d) {
   desk_replay *replay = d->replay;
   sonde_frame frame;
@@ -92,13 +78,21 @@ static void show(desk *d) {
 
 // The session goes: its thigh is not shown any more.
 static sonde_status take_over(desk *d, desk_replay *replay, sonde_error *error) {
-  sonde_status status = sonde_page_show_model(d->server, replay->setup.model, replay->probes,
-                                              replay->probe_count, error);
+  sonde_status status =
+      sonde_page_show_model(d->server, replay->setup.model, d->probes, d->probe_count, error);
   if (status) return status;
   sonde_page_conceal(d->server, false, false);
   desk_end_session(d);
   desk_change(d, NULL, replay);
   return SONDE_OK;
+}
+
+// The exam that was just finished: its recording gets its end, its thigh stays in view.
+static sonde_status end_exam(desk *d, sonde_error *error) {
+  sonde_status status =
+      sonde_page_show_model(d->server, d->exam->setup.model, d->probes, d->probe_count, error);
+  if (!status) desk_end_session(d);
+  return status;
 }
 
 static sonde_status build(desk *d, desk_replay *replay, const char *id, sonde_error *error) {
@@ -107,7 +101,6 @@ static sonde_status build(desk *d, desk_replay *replay, const char *id, sonde_er
   snprintf(replay->id, sizeof replay->id, "%s", id);
   load_presses(replay, directory);
   sonde_status status = load_thigh(d, replay, directory, error);
-  if (!status) status = create_probes(d, replay, error);
   if (!status) status = open_player(replay, directory, error);
   if (!status) status = sonde_comments_load(replay->recording, &replay->comments, error);
   return status;
@@ -121,21 +114,15 @@ sonde_status desk_replay_open(desk *d, const char *id, sonde_error *error) {
   if (!replay) return app_error(error, SONDE_MEMORY, "out of memory");
   replay->speed = 1;
   desk_phase before = d->phase;
-  // the recording of an exam that was just finished gets its end now
-  if (d->exam && strcmp(d->exam->id, id) == 0) {
-    sonde_status status = desk_practice(d, error);
-    if (status) {
-      free(replay);
-      return status;
-    }
-    before = d->phase;
-  }
   desk_set_phase(d, DESK_PREPARING, "The recording is being opened.");
-  sonde_status status = build(d, replay, id, error);
+  sonde_status status = SONDE_OK;
+  if (d->session && d->exam && strcmp(d->exam->id, id) == 0) status = end_exam(d, error);
+  if (!status) status = build(d, replay, id, error);
   if (!status) status = take_over(d, replay, error);
   if (status) {
     desk_replay_destroy(replay);
-    desk_set_phase(d, before, "");
+    bool bare = before != DESK_REPLAY && !d->session;
+    if (!bare || desk_practice(d, NULL)) desk_set_phase(d, before, "");
     return status;
   }
   status = sonde_player_seek(replay->player, 0.5, NULL, error);
@@ -186,8 +173,6 @@ void desk_replay_destroy(desk_replay *replay) {
   if (!replay) return;
   sonde_player_close(replay->player);
   sonde_comments_clear(&replay->comments);
-  for (uint32_t i = 0; i < replay->probe_count; ++i) sonde_probe_clear(&replay->probes[i]);
-  free(replay->probes);
   cJSON_Delete(replay->presses);
   sonde_case_setup_clear(&replay->setup);
   free(replay);
