@@ -158,15 +158,7 @@ static bool grow(sonde_keys *keys) {
 
 // Place of the first keyframe behind a tick.
 static uint32_t place_after(const sonde_keys *keys, uint64_t tick) {
-  uint32_t low = 0, high = keys->count;
-  while (low < high) {
-    uint32_t middle = low + (high - low) / 2;
-    if (keys->list[middle].tick <= tick)
-      low = middle + 1;
-    else
-      high = middle;
-  }
-  return low;
+  return sonde_count_until(keys->list, sizeof *keys->list, keys->count, tick);
 }
 
 sonde_packed_key *sonde_keys_find(const sonde_keys *keys, uint64_t tick) {

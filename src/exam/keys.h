@@ -6,6 +6,8 @@
 
 #include "exam/session.h"
 
+#include <string.h>
+
 // Parts of a keyframe; they lie one behind the other when packed.
 typedef struct sonde_key {
   uint64_t tick;
@@ -21,6 +23,22 @@ typedef struct sonde_packed_key {
   unsigned char *packed; // NULL: in the file at `at`
   uint64_t at;
 } sonde_packed_key;
+
+// How many of the items, which begin with their tick and are in its order, are at or before a tick.
+static inline uint32_t sonde_count_until(const void *items, size_t item_bytes, uint32_t count,
+                                         uint64_t tick) {
+  uint32_t low = 0, high = count;
+  while (low < high) {
+    uint32_t middle = low + (high - low) / 2;
+    uint64_t there;
+    memcpy(&there, (const char *)items + middle * item_bytes, sizeof there);
+    if (there <= tick)
+      low = middle + 1;
+    else
+      high = middle;
+  }
+  return low;
+}
 
 // Where keyframes belong: the recording's name with ".keys" behind it. Freed by sonde_free, NULL
 // without memory.

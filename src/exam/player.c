@@ -64,13 +64,18 @@ static sonde_status remember_start(sonde_player *player, sonde_error *error) {
   return sonde_keys_init(&player->keys, subject, error);
 }
 
+static uint32_t images_until(const sonde_player *player, uint64_t tick) {
+  return sonde_count_until(player->images, sizeof *player->images, player->image_count, tick);
+}
+
 // Events, images and the reader's place behind `tick` ticks; an image of that very tick is still to
 // come.
 static void place(sonde_player *player, uint64_t tick) {
   sonde_recording *r = &player->recording;
+  const uint64_t *events = player->event_ticks;
   uint32_t e = 0, i = 0;
-  while (e < player->event_count && player->event_ticks[e] < tick) ++e;
-  while (i < player->image_count && player->images[i].tick < tick) ++i;
+  if (tick > 0) e = sonde_count_until(events, sizeof *events, player->event_count, tick - 1);
+  if (tick > 0) i = images_until(player, tick - 1);
   player->next_event = e > 0 ? e : 1, player->next_image = i;
   uint64_t mark = tick / SONDE_PLAYER_MARK;
   r->at = r->end;
@@ -240,19 +245,6 @@ static uint64_t clamp_tick(const sonde_player *player, double time_s) {
   double tick = floor(time_s / player->info.dt_s + 1e-6);
   if (!(tick > 0)) return 0;
   return tick < (double)player->info.ticks ? (uint64_t)tick : player->info.ticks;
-}
-
-// Index of the last image at or before a tick plus one.
-static uint32_t images_until(const sonde_player *player, uint64_t tick) {
-  uint32_t low = 0, high = player->image_count;
-  while (low < high) {
-    uint32_t middle = low + (high - low) / 2;
-    if (player->images[middle].tick <= tick)
-      low = middle + 1;
-    else
-      high = middle;
-  }
-  return low;
 }
 
 // To the nearest place from which the goal's image can be made: a keyframe's own image is made

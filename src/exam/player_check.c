@@ -29,7 +29,7 @@ static void meet(checker *c, const sonde_record_check *check) {
 // Hashes of the state and of the images come in the order of their ticks each, but not together.
 static void meet_all(checker *c) {
   const sonde_player *p = c->player;
-  uint64_t tick = sonde_player_tick(p), slack = 4 * p->session->key_period;
+  uint64_t tick = sonde_player_tick(p), slack = 8 * p->session->key_period;
   while (c->next < p->check_count && p->checks[c->next].tick + slack < tick) c->next++;
   for (uint32_t k = c->next; k < p->check_count && p->checks[k].tick <= tick + slack; ++k)
     if (p->checks[k].tick == tick) meet(c, &p->checks[k]);

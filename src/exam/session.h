@@ -81,7 +81,7 @@ typedef struct sonde_inside_slot {
 } sonde_inside_slot;
 
 // Keyframes are taken at the last images before every multiple of this.
-#define SONDE_KEY_PERIOD_S 0.5
+#define SONDE_KEY_PERIOD_S 0.25
 
 struct sonde_session {
   // set up once
