@@ -73,7 +73,7 @@ typedef struct sonde_snapshot {
                                     negative above the skin */
   double contact_volume_m3, contact_area_m2;
   double vein_area_ratio, artery_area_ratio; /**< at the image plane; NaN when not in view */
-  double other_vein_ratio; /**< largest of the further deep veins there; NaN when none is */
+  double other_vein_ratio; /**< of a second femoral vein there; NaN when none is */
   double vein_short_m;     /**< AP diameter */
   sonde_vec3 vein_rest_m;  /**< where the image plane cuts the vein, on its course at rest; NaN when
                                 not in view */

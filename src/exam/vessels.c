@@ -1,6 +1,6 @@
 // What the image plane cuts of the vessels.
-// tilt:           between a vessel and the normal of the image plane.
-// read_branches:  deep veins beside the femoral one.
+// tilt:              between a vessel and the normal of the image plane.
+// read_second_vein:  of a double femoral vein.
 #include "exam/vessels.h"
 
 #include "base/base.h"
@@ -14,16 +14,15 @@ static double tilt(sonde_pose pose, sonde_vec3 axis) {
   return acos(fmin(1.0, fabs(along)));
 }
 
-// The vein that closes least speaks for all.
-static void read_branches(const sonde_interior *in, sonde_snapshot *snapshot) {
-  static const char *const deep[] = {"second_femoral_vein", "deep_femoral_vein"};
-  for (int which = 2; which < (int)sonde_interior_vessel_count(in); ++which)
-    for (size_t k = 0; k < SONDE_COUNT_OF(deep); ++k) {
-      sonde_vessel_state v;
-      if (strcmp(sonde_interior_vessel_name(in, which), deep[k]) != 0) continue;
-      if (sonde_interior_vessel_at_plane(in, which, snapshot->world_from_probe, &v))
-        snapshot->other_vein_ratio = fmax(snapshot->other_vein_ratio, v.area_ratio);
-    }
+// The deep femoral vein is left out: it lies behind the femur's front and does not close under a
+// press from the front, in health either.
+static void read_second_vein(const sonde_interior *in, sonde_snapshot *snapshot) {
+  for (int which = 2; which < (int)sonde_interior_vessel_count(in); ++which) {
+    sonde_vessel_state v;
+    if (strcmp(sonde_interior_vessel_name(in, which), "second_femoral_vein") != 0) continue;
+    if (sonde_interior_vessel_at_plane(in, which, snapshot->world_from_probe, &v))
+      snapshot->other_vein_ratio = fmax(snapshot->other_vein_ratio, v.area_ratio);
+  }
 }
 
 void sonde_snapshot_read_vessels(const sonde_interior *interior, sonde_snapshot *snapshot) {
@@ -38,5 +37,5 @@ void sonde_snapshot_read_vessels(const sonde_interior *interior, sonde_snapshot 
   }
   if (sonde_interior_vessel_at_plane(interior, 1, pose, &artery))
     snapshot->artery_area_ratio = artery.area_ratio;
-  read_branches(interior, snapshot);
+  read_second_vein(interior, snapshot);
 }

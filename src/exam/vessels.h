@@ -4,7 +4,7 @@
 
 #include "sonde/exam.h"
 
-// Vein, artery and further deep veins in the image plane of the snapshot's pose; members without a
+// Vein, artery and a second femoral vein in the image plane of the snapshot's pose; members without a
 // vessel in view keep what they hold. No allocation. @thread of the interior's updates
 void sonde_snapshot_read_vessels(const sonde_interior *interior, sonde_snapshot *snapshot);
 
