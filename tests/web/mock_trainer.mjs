@@ -250,7 +250,7 @@ export class Trainer {
     else step.text = open ? `What did you see at ${open.title.toLowerCase()}?` : "All points are done. Finish the exam.";
     if (e.guidance !== "full") return;
     step.angle_deg = s.angle;
-    if (!next || pending) step.detail = pending ? "Choose a finding." : "You see your score and the truth after it.";
+    if (!next) step.detail = pending ? "Choose a finding." : "You see your score and the truth after it.";
     else {
       const z = next.from_mm + ((next.done + 0.5) / next.points) * (next.to_mm - next.from_mm);
       const at = this.skinAbove(z);
@@ -259,7 +259,8 @@ export class Trainer {
       step.offset_mm = Math.hypot(...off.map((v, i) => v - height * at.normal[i]));
       step.target = { name: next.title, ...at, radius_mm: RADIUS_MM };
       step.force_n = CORRIDOR_N;
-      step.detail = step.offset_mm > RADIUS_MM ? "Move the probe into the ring, across the leg." : "Press until the walls touch and the artery just begins to deform, then let go.";
+      if (pending) step.detail = `Then compress the vein ${this.where(next)}.`;
+      else step.detail = step.offset_mm > RADIUS_MM ? "Move the probe into the ring, across the leg." : "Press until the walls touch and the artery just begins to deform, then let go.";
     }
   }
 
