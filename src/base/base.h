@@ -16,10 +16,6 @@
 #endif
 _Noreturn void sonde_assert_failed(const char *condition, const char *file, int line);
 
-// For a dense inner loop whose first and last element its caller touches: sanitizers watch the
-// caller and leave the loop as fast as it is.
-#define SONDE_UNWATCHED __attribute__((noinline, no_sanitize("address", "thread", "undefined")))
-
 #define SONDE_COUNT_OF(array) (sizeof(array) / sizeof((array)[0]))
 
 // Zeroed memory for count items; NULL when out of memory or when the size overflows.
