@@ -1,33 +1,30 @@
 // wrapped:       coordinates of a node in the footprint's axes, measured along the skin.
 // mark_inside:   nodes under the footprint, or the nearest one on a coarse mesh.
 // keep_nodes:    nodes within reach of them, with whole faces.
-// cut_vertex:    the point where a side crosses an edge, made once per edge.
-// add_face:      a face whole, or its parts inside and outside.
+// too_long:      middles of edges near the sides. crossing: points on edges that a side crosses.
+// cut_sides:     both, until the sides run along edges.
 // is_coarse:     whether the mesh can carry the footprint.
 // add_rim:       lengths of the border beyond which the skin is left out.
-#include "fit/cut.h"
+#include "fit/cut_split.h"
 
 #include "base/maths.h"
 #include "tissue/model.h"
 
 #include <string.h>
 
-static const double BEHIND_M = 0.03; // skin farther along the normal is another side of the leg
-static const double FACING = 0.2;    // least cosine between a node's normal and the footprint's
-static const double SNAP_M = 5e-5;   // nodes this close to a side lie on it
-static const double LEAST_SHARE = 0.02, MOST_SHARE = 0.98;
+static const double BEHIND_M = 0.03;    // skin farther along the normal is another side of the leg
+static const double FACING = 0.2;       // least cosine between a node's normal and the footprint's
+static const double SNAP_M = 5e-5;      // nodes this close to a side lie on it
+static const double LONGEST_M = 2.1e-3; // edge near a side
+static const double OUTSIDE_M = 4.5e-3, WITHIN_M = 1.5e-3; // what is near
+enum { HALVINGS = 6 };
 enum { NOWHERE = UINT32_MAX, LONE = UINT32_MAX - 1, KEPT = UINT32_MAX - 2 };
-
-typedef struct plane_point {
-  double u, v;
-} plane_point;
 
 typedef struct cutter {
   const sonde_model *model;
   const sonde_site *site;
   double half_u_m, half_v_m, reach_m;
   uint32_t *vertex_of; // [nodes] vertex of a node, NOWHERE when not kept
-  uint32_t *on_edge;   // [edges] vertex on an edge, NOWHERE when none yet
   bool *inside;        // [nodes]
   uint32_t inside_count;
   sonde_cut *cut;
@@ -39,14 +36,14 @@ static double along_skin(double chord_m, double sine, double cosine) {
   return fabs(angle) < 1e-3 ? chord_m : chord_m * angle / sin(angle);
 }
 
-static bool wrapped(const cutter *c, uint32_t node, plane_point *p) {
+static bool wrapped(const cutter *c, uint32_t node, sonde_pad_place *p) {
   const sonde_site *site = c->site;
   sonde_vec3 d = v_sub(c->model->surface.vertices[node], site->position_m);
   sonde_vec3 normal = c->model->normal[node];
   double facing = v_dot(normal, site->normal);
   if (facing < FACING || fabs(v_dot(d, site->normal)) > BEHIND_M) return false;
-  p->u = along_skin(v_dot(d, site->u), v_dot(normal, site->u), facing);
-  p->v = along_skin(v_dot(d, site->v), v_dot(normal, site->v), facing);
+  p->u_m = along_skin(v_dot(d, site->u), v_dot(normal, site->u), facing);
+  p->v_m = along_skin(v_dot(d, site->v), v_dot(normal, site->v), facing);
   return true;
 }
 
@@ -54,19 +51,18 @@ static void mark_inside(cutter *c) {
   uint32_t nearest = NOWHERE;
   double least = INFINITY;
   for (uint32_t i = 0; i < c->model->surface.vertex_count; ++i) {
-    plane_point p;
+    sonde_pad_place p;
     if (!wrapped(c, i, &p)) continue;
-    double beyond = fmax(fabs(p.u) - c->half_u_m, fabs(p.v) - c->half_v_m);
+    double beyond = fmax(fabs(p.u_m) - c->half_u_m, fabs(p.v_m) - c->half_v_m);
     c->inside[i] = beyond <= SNAP_M;
     c->inside_count += c->inside[i];
-    double distance = hypot(p.u, p.v);
+    double distance = hypot(p.u_m, p.v_m);
     if (distance < least) {
       least = distance;
       nearest = i;
     }
   }
-  c->cut->single = c->inside_count == 0;
-  if (!c->cut->single || nearest == NOWHERE) return;
+  if (c->inside_count > 0 || nearest == NOWHERE) return;
   c->inside[nearest] = true;
   c->inside_count = 1;
 }
@@ -108,69 +104,54 @@ static sonde_status keep_nodes(cutter *c, sonde_error *error) {
   return SONDE_OK;
 }
 
-// Where the straight line between the coordinates of both ends leaves the footprint.
-static double leaving_share(const cutter *c, uint32_t in, uint32_t out) {
-  plane_point a = {0, 0}, b = {0, 0};
-  double share = 1;
-  if (!wrapped(c, in, &a) || !wrapped(c, out, &b)) return MOST_SHARE;
-  if (fabs(b.u) > c->half_u_m)
-    share = fmin(share, (copysign(c->half_u_m, b.u) - a.u) / (b.u - a.u));
-  if (fabs(b.v) > c->half_v_m)
-    share = fmin(share, (copysign(c->half_v_m, b.v) - a.v) / (b.v - a.v));
-  return clamp(share, LEAST_SHARE, MOST_SHARE);
+// Distance to the footprint's sides, negative under it.
+static double beyond(const sonde_cutter *c, uint32_t vertex) {
+  const sonde_pad_place *p = &c->place[vertex];
+  return fmax(fabs(p->u_m) - c->half_u_m, fabs(p->v_m) - c->half_v_m);
 }
 
-static uint32_t cut_vertex(cutter *c, uint32_t edge) {
-  const uint32_t *end = c->model->topology.edges[edge];
-  uint32_t in = c->inside[end[0]] ? end[0] : end[1], out = c->inside[end[0]] ? end[1] : end[0];
-  SONDE_ASSERT(c->inside[in] && !c->inside[out]);
-  if (c->on_edge[edge] != NOWHERE) return c->on_edge[edge];
+static bool is_near(const sonde_cutter *c, uint32_t vertex) {
+  double distance = beyond(c, vertex);
+  return distance < OUTSIDE_M && distance > -WITHIN_M;
+}
+
+static double too_long(const sonde_cutter *c, int which, uint32_t a, uint32_t b) {
+  (void)which;
+  double side = beyond(c, a) * beyond(c, b);
+  if (!is_near(c, a) && !is_near(c, b) && !(side < 0)) return 0;
+  sonde_vec3 x = sonde_cut_point(c->model, c->cut, a), y = sonde_cut_point(c->model, c->cut, b);
+  return v_distance(x, y) > LONGEST_M ? 0.5 : 0;
+}
+
+// Side `which`: +u, -u, +v, -v. It runs on beyond the corners, so that the next one meets it there.
+static double crossing(const sonde_cutter *c, int which, uint32_t a, uint32_t b) {
+  sonde_pad_place p = c->place[a], q = c->place[b];
+  double sign = which & 1 ? -1 : 1, half = which < 2 ? c->half_u_m : c->half_v_m;
+  double from = sign * (which < 2 ? p.u_m : p.v_m) - half;
+  double to = sign * (which < 2 ? q.u_m : q.v_m) - half;
+  bool crosses = fmin(from, to) < -SNAP_M && fmax(from, to) > SNAP_M;
+  if (!crosses) return 0;
+  double share = from / (from - to);
+  double along = which < 2 ? p.v_m + share * (q.v_m - p.v_m) : p.u_m + share * (q.u_m - p.u_m);
+  return fabs(along) <= (which < 2 ? c->half_v_m : c->half_u_m) + LONGEST_M ? share : 0;
+}
+
+static sonde_status cut_sides(sonde_cutter *c, sonde_error *error) {
+  uint32_t added = 1;
+  sonde_status status = SONDE_OK;
+  for (int k = 0; k < HALVINGS && added && !status; ++k)
+    status = sonde_cut_split(c, too_long, k, &added, error);
+  for (int side = 0; side < 4 && !status; ++side)
+    status = sonde_cut_split(c, crossing, side, &added, error);
+  if (status) return status;
   sonde_cut *cut = c->cut;
-  uint32_t at = cut->vertex_count++;
-  cut->parent[at][0] = in;
-  cut->parent[at][1] = out;
-  cut->share[at] = leaving_share(c, in, out);
-  cut->held[at] = true;
-  return c->on_edge[edge] = at;
-}
-
-static void put_face(sonde_cut *cut, uint32_t a, uint32_t b, uint32_t d) {
-  SONDE_ASSERT(a != b && b != d && d != a);
-  cut->face[cut->face_count][0] = a;
-  cut->face[cut->face_count][1] = b;
-  cut->face[cut->face_count++][2] = d;
-}
-
-// The quadrilateral (p, b, d, q) halved along its shorter diagonal.
-static void put_quadrilateral(const cutter *c, uint32_t p, uint32_t b, uint32_t d, uint32_t q) {
-  sonde_vec3 x[4] = {sonde_cut_point(c->model, c->cut, p), sonde_cut_point(c->model, c->cut, b),
-                     sonde_cut_point(c->model, c->cut, d), sonde_cut_point(c->model, c->cut, q)};
-  bool by_pd = v_distance(x[0], x[2]) <= v_distance(x[1], x[3]);
-  put_face(c->cut, p, b, by_pd ? d : q);
-  if (by_pd)
-    put_face(c->cut, p, d, q);
-  else
-    put_face(c->cut, b, d, q);
-}
-
-static void add_face(cutter *c, uint32_t face) {
-  const uint32_t *node = c->model->surface.faces[face], *edge = c->model->face_edge[face];
-  uint32_t v[3], within = 0, first = 0;
-  if (!is_kept(c, face)) return;
-  for (int k = 0; k < 3; ++k) {
-    v[k] = c->vertex_of[node[k]];
-    within += c->inside[node[k]];
+  cut->held = SONDE_NEW(bool, cut->vertex_count);
+  if (!cut->held) return sonde_fail_memory(error);
+  for (uint32_t v = 0; v < cut->vertex_count; ++v) {
+    cut->held[v] = beyond(c, v) <= 1.001 * SNAP_M;
+    cut->held_count += cut->held[v];
   }
-  if (within == 0 || within == 3 || c->cut->single) {
-    put_face(c->cut, v[0], v[1], v[2]);
-    return;
-  }
-  // first: the corner that is alone on its side; the others follow in order.
-  while (c->inside[node[first]] != (within == 1)) ++first;
-  uint32_t a = first, b = (first + 1) % 3, d = (first + 2) % 3;
-  uint32_t p = cut_vertex(c, edge[d]), q = cut_vertex(c, edge[b]); // edges ab and ad
-  put_face(c->cut, v[a], p, q);
-  put_quadrilateral(c, p, v[b], v[d], q);
+  return SONDE_OK;
 }
 
 static bool is_coarse(const cutter *c) {
@@ -195,38 +176,46 @@ static void add_rim(cutter *c) {
   }
 }
 
-static bool allocate(cutter *c) {
-  const sonde_model *m = c->model;
-  uint32_t crossing = 0;
-  for (uint32_t e = 0; e < m->topology.edge_count; ++e)
-    crossing += c->inside[m->topology.edges[e][0]] != c->inside[m->topology.edges[e][1]];
-  size_t room = (size_t)c->cut->node_count + crossing;
-  c->on_edge = SONDE_NEW(uint32_t, m->topology.edge_count);
-  c->cut->parent = sonde_calloc(room, sizeof *c->cut->parent);
-  c->cut->share = SONDE_NEW(double, room);
-  c->cut->held = SONDE_NEW(bool, room);
-  c->cut->rim_m = SONDE_NEW(double, room);
-  c->cut->face =
-      sonde_calloc((size_t)m->surface.face_count + 2 * (size_t)crossing, sizeof *c->cut->face);
-  return c->on_edge && c->cut->parent && c->cut->share && c->cut->held && c->cut->rim_m &&
-         c->cut->face;
+static bool allocate(const cutter *c, sonde_cutter *at) {
+  sonde_cut *cut = c->cut;
+  cut->parent = sonde_calloc(cut->node_count, sizeof *cut->parent);
+  cut->share = sonde_calloc(cut->node_count, sizeof *cut->share);
+  cut->rim_m = SONDE_NEW(double, cut->node_count);
+  cut->face = sonde_calloc(c->model->surface.face_count, sizeof *cut->face);
+  at->place = SONDE_NEW(sonde_pad_place, cut->node_count);
+  return cut->parent && cut->share && cut->rim_m && cut->face && at->place;
 }
 
-static void fill(cutter *c) {
+// The kept skin as it is.
+static void copy_skin(const cutter *c, sonde_cutter *at) {
   sonde_cut *cut = c->cut;
   const sonde_mesh *skin = &c->model->surface;
-  for (uint32_t e = 0; e < c->model->topology.edge_count; ++e) c->on_edge[e] = NOWHERE;
   cut->vertex_count = cut->node_count;
   for (uint32_t i = 0; i < skin->vertex_count; ++i) {
     uint32_t v = c->vertex_of[i];
     if (v == NOWHERE) continue;
-    cut->parent[v][0] = cut->parent[v][1] = i;
-    cut->held[v] = c->inside[i];
+    for (int k = 0; k < 3; ++k) cut->parent[v][k] = i;
+    cut->share[v][0] = 1;
+    if (!wrapped(c, i, &at->place[v])) at->place[v] = (sonde_pad_place){NAN, NAN};
   }
-  for (uint32_t f = 0; f < skin->face_count; ++f) add_face(c, f);
-  for (uint32_t v = 0; v < cut->vertex_count; ++v) cut->held_count += cut->held[v];
-  add_rim(c);
-  cut->coarse = is_coarse(c);
+  for (uint32_t f = 0; f < skin->face_count; ++f) {
+    if (!is_kept(c, f)) continue;
+    for (int k = 0; k < 3; ++k) cut->face[cut->face_count][k] = c->vertex_of[skin->faces[f][k]];
+    ++cut->face_count;
+  }
+}
+
+static sonde_status fill(cutter *c, sonde_error *error) {
+  sonde_cutter at = {c->model, c->half_u_m, c->half_v_m, NULL, c->cut};
+  sonde_status status = allocate(c, &at) ? SONDE_OK : sonde_fail_memory(error);
+  if (!status) {
+    copy_skin(c, &at);
+    add_rim(c);
+    c->cut->coarse = is_coarse(c);
+    status = cut_sides(&at, error);
+  }
+  sonde_free(at.place);
+  return status;
 }
 
 sonde_status sonde_cut_create(const sonde_model *model, const sonde_site *site, double half_u_m,
@@ -234,11 +223,14 @@ sonde_status sonde_cut_create(const sonde_model *model, const sonde_site *site, 
   SONDE_ASSERT(half_u_m > 0 && half_v_m > 0 && reach_m > 0);
   *cut = (sonde_cut){0};
   uint32_t nodes = model->surface.vertex_count;
-  cutter c = {model,    site,
-              half_u_m, half_v_m,
-              reach_m,  SONDE_NEW(uint32_t, nodes),
-              NULL,     SONDE_NEW(bool, nodes),
-              0,        cut};
+  cutter c = {.model = model,
+              .site = site,
+              .half_u_m = half_u_m,
+              .half_v_m = half_v_m,
+              .reach_m = reach_m,
+              .vertex_of = SONDE_NEW(uint32_t, nodes),
+              .inside = SONDE_NEW(bool, nodes),
+              .cut = cut};
   sonde_status status = c.vertex_of && c.inside ? SONDE_OK : sonde_fail_memory(error);
   if (!status) mark_inside(&c);
   if (!status && !c.inside_count)
@@ -247,10 +239,8 @@ sonde_status sonde_cut_create(const sonde_model *model, const sonde_site *site, 
                         "not belong together",
                         site->id, BEHIND_M * 1e3);
   if (!status) status = keep_nodes(&c, error);
-  if (!status && !allocate(&c)) status = sonde_fail_memory(error);
-  if (!status) fill(&c);
+  if (!status) status = fill(&c, error);
   sonde_free(c.vertex_of);
-  sonde_free(c.on_edge);
   sonde_free(c.inside);
   if (status) sonde_cut_clear(cut);
   return status;
@@ -265,14 +255,19 @@ void sonde_cut_clear(sonde_cut *cut) {
   *cut = (sonde_cut){0};
 }
 
+static sonde_vec3 mean_of(const sonde_vec3 *x, const sonde_cut *cut, uint32_t vertex) {
+  sonde_vec3 sum = vec3(0, 0, 0);
+  for (int k = 0; k < 3; ++k) sum = v_madd(sum, cut->share[vertex][k], x[cut->parent[vertex][k]]);
+  return sum;
+}
+
 sonde_vec3 sonde_cut_point(const sonde_model *model, const sonde_cut *cut, uint32_t vertex) {
-  const sonde_vec3 *x = model->surface.vertices;
-  return v_lerp(x[cut->parent[vertex][0]], x[cut->parent[vertex][1]], cut->share[vertex]);
+  SONDE_ASSERT(vertex < cut->vertex_count || vertex >= cut->node_count);
+  return mean_of(model->surface.vertices, cut, vertex);
 }
 
 sonde_vec3 sonde_cut_normal(const sonde_model *model, const sonde_cut *cut, uint32_t vertex) {
-  const uint32_t *parent = cut->parent[vertex];
-  sonde_vec3 first = model->normal[parent[0]];
-  if (parent[0] == parent[1]) return first;
-  return v_unit(v_lerp(first, model->normal[parent[1]], cut->share[vertex]), first);
+  sonde_vec3 first = model->normal[cut->parent[vertex][0]];
+  if (vertex < cut->node_count) return first;
+  return v_unit(mean_of(model->normal, cut, vertex), first);
 }

@@ -3,14 +3,23 @@
 #include "fit/cut.h"
 #include "tissue/model.h"
 
-static double between(const double *field, const uint32_t parent[2], double share) {
-  return exp((1 - share) * log(field[parent[0]]) + share * log(field[parent[1]]));
+static double between(const double *field, const uint32_t parent[3], const double share[3]) {
+  double sum = 0;
+  for (int k = 0; k < 3; ++k) sum += share[k] * log(field[parent[k]]);
+  return exp(sum);
+}
+
+static uint32_t nearest_parent(const sonde_cut *cut, uint32_t vertex) {
+  int best = 0;
+  for (int k = 1; k < 3; ++k)
+    if (cut->share[vertex][k] > cut->share[vertex][best]) best = k;
+  return cut->parent[vertex][best];
 }
 
 static void fill(const sonde_model *model, const sonde_cut *cut, sonde_model *to) {
   for (uint32_t v = 0; v < cut->vertex_count; ++v) {
     const uint32_t *parent = cut->parent[v];
-    uint32_t near = cut->share[v] < 0.5 ? parent[0] : parent[1];
+    uint32_t near = nearest_parent(cut, v);
     to->normal[v] = sonde_cut_normal(model, cut, v);
     to->k0_n_m3[v] = between(model->k0_n_m3, parent, cut->share[v]);
     to->xm_m[v] = between(model->xm_m, parent, cut->share[v]);

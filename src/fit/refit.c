@@ -87,8 +87,8 @@ static void carry_to_sites(const sonde_refit *r, const sonde_patch *patch,
   uint32_t count = r->sites->count;
   memset(row, 0, sonde_refit_parameters(r) * sizeof *row);
   for (uint32_t i = 0; i < patch->place_count; ++i)
-    for (int k = 0; k < 2; ++k) {
-      double part = k ? patch->share[i] : 1 - patch->share[i];
+    for (int k = 0; k < 3; ++k) {
+      double part = patch->share[i][k];
       if (!(part > 0)) continue;
       const double *basis = &r->basis[(size_t)patch->parent[i][k] * count];
       for (uint32_t f = 0; f < r->fields; ++f) {

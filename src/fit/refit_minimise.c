@@ -2,6 +2,7 @@
 // fix:       takes fixed parameters out of the normal equations.
 // promised:  fall of the cost that a step promises.
 // try_point: forces, derivatives and cost at a set of parameters.
+// linearise: normal equations at the accepted point. accept: moves there.
 // iterate:   Levenberg-Marquardt with Marquardt's scaling. descend: the same from its first point.
 // sonde_refit_minimise: on few depths, then on all.
 #include "fit/refit_inside.h"
@@ -17,12 +18,14 @@ static const double SMALL_DAMPING = 1e-3; // a nearly full Gauss-Newton step
 static const double DAMPING_FALL = 0.1, DAMPING_LEAST = 1e-9, DAMPING_MOST = 1e9;
 enum { MOST_ITERATIONS = 40 };
 
-// stride: every so many depths; enough: relative fall of the cost that is not worth a step.
+// stride: every so many depths; enough: relative fall of the cost that is not worth a step; choose:
+// the smoothness at its first point.
 typedef struct stage {
   uint32_t stride;
   double damping, enough;
+  bool choose;
 } stage;
-static const stage COARSE = {4, 1, 1e-2}, WHOLE = {1, 1e-3, 1e-4};
+static const stage COARSE = {4, 1, 1e-2, false}, WHOLE = {1, 1e-3, 1e-4, false};
 
 // Cost at theta with the trial's forces.
 static double cost_of(const sonde_refit *r, sonde_refit_workspace *w, const double *theta) {
@@ -105,16 +108,22 @@ static sonde_status try_point(sonde_refit *r, sonde_refit_workspace *w, stepwise
   return status == SONDE_CONVERGENCE ? SONDE_OK : status;
 }
 
+// The normal equations at the accepted point.
+static void linearise(const sonde_refit *r, sonde_refit_workspace *w, const double *theta,
+                      const double *force_n) {
+  sonde_normal_clear(&w->normal);
+  sonde_refit_add_rows(r, 0, w->rows, force_n, w->kept_jacobian, &w->normal);
+  sonde_refit_add_prior(r, theta, r->smoothness, w->line, &w->normal);
+  fix(r, &w->normal);
+}
+
 static void accept(const sonde_refit *r, sonde_refit_workspace *w, double *theta, double *force_n) {
   memcpy(theta, w->trial, w->n * sizeof *theta);
   memcpy(force_n, w->force_n, w->rows * sizeof *force_n);
-  sonde_normal_clear(&w->normal);
-  sonde_refit_add_rows(r, 0, w->rows, w->force_n, w->jacobian, &w->normal);
-  sonde_refit_add_prior(r, theta, r->smoothness, w->line, &w->normal);
-  fix(r, &w->normal);
   double *swap = w->kept_jacobian;
   w->kept_jacobian = w->jacobian;
   w->jacobian = swap;
+  linearise(r, w, theta, force_n);
 }
 
 static sonde_status iterate(sonde_refit *r, sonde_refit_workspace *w, stage goal, double *theta,
@@ -163,13 +172,19 @@ static sonde_status descend(sonde_refit *r, sonde_refit_workspace *w, stage goal
   if (!status && !isfinite(result->cost)) status = SONDE_CONVERGENCE; // error says where
   if (status) return status;
   accept(r, w, theta, force_n);
+  if (goal.choose) {
+    status = sonde_refit_choose_smoothness(r, w, theta, force_n, error);
+    if (status) return status;
+    linearise(r, w, theta, force_n);
+    result->cost = cost_of(r, w, theta);
+  }
   at->cost = result->cost;
   if (first) result->start_cost = result->cost;
   return iterate(r, w, goal, theta, force_n, at, result, error);
 }
 
 // The way from a far start to the neighbourhood of the optimum needs few depths. The smoothness is
-// then chosen and the end found with it.
+// then chosen on all of them, and the end found with it.
 sonde_status sonde_refit_minimise(sonde_refit *r, double *theta, double *force_n,
                                   const sonde_progress *progress, sonde_refit_result *result,
                                   sonde_error *error) {
@@ -185,8 +200,8 @@ sonde_status sonde_refit_minimise(sonde_refit *r, double *theta, double *force_n
   sonde_status status = allocate(&w) ? SONDE_OK : sonde_fail_memory(error);
   r->rough = true;
   if (!status && !r->near) status = descend(r, &w, COARSE, theta, force_n, &at, result, error);
-  if (!status && !given) status = sonde_refit_choose_smoothness(r, &w, theta, force_n, error);
   stage whole = WHOLE;
+  whole.choose = !given;
   if (r->enough > 0) whole.enough = r->enough;
   if (!status) status = descend(r, &w, whole, theta, force_n, &at, result, error);
   r->rough = false;

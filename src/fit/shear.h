@@ -19,8 +19,8 @@ typedef struct sonde_patch_face {
 // The skin around one footprint. Places: free nodes first, then the held vertices.
 typedef struct sonde_patch {
   uint32_t free_count, place_count;
-  uint32_t (*parent)[2]; // [place_count] model nodes whose parameters it takes
-  double *share;         // [place_count] of the second parent
+  uint32_t (*parent)[3]; // [place_count] model nodes whose parameters it takes
+  double (*share)[3];    // [place_count] of each parent, sum 1
   double *area_m2;       // [place_count]
   double *cosine;        // [place_count] rest normal . site normal for held places, else 0
   double sliding_m2;     // sum of A (1 - cosine^2): how far the footprint drags tangential springs

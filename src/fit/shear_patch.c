@@ -17,7 +17,7 @@ static const double RIM_WIDTH_M = 0.009;
 static bool allocate_places(sonde_patch *p, const sonde_cut *cut) {
   size_t places = cut->vertex_count;
   p->parent = sonde_calloc(places, sizeof *p->parent);
-  p->share = SONDE_NEW(double, places);
+  p->share = sonde_calloc(places, sizeof *p->share);
   p->area_m2 = SONDE_NEW(double, places);
   p->cosine = SONDE_NEW(double, places);
   p->face = SONDE_NEW(sonde_patch_face, cut->face_count);
@@ -35,12 +35,12 @@ static void order_places(const sonde_model *model, const sonde_cut *cut, sonde_v
   for (uint32_t v = 0; v < cut->vertex_count; ++v) {
     uint32_t at = place[v] = cut->held[v] ? held++ : free++;
     memcpy(p->parent[at], cut->parent[v], sizeof p->parent[at]);
-    p->share[at] = cut->share[v];
-    p->area_m2[at] = RIM_WIDTH_M * cut->rim_m[v];
+    memcpy(p->share[at], cut->share[v], sizeof p->share[at]);
+    p->area_m2[at] = v < cut->node_count ? RIM_WIDTH_M * cut->rim_m[v] : 0;
     if (cut->held[v])
       p->cosine[at] = v_dot(sonde_cut_normal(model, cut, v), normal);
     else
-      p->point_m[at] = model->surface.vertices[cut->parent[v][0]];
+      p->point_m[at] = sonde_cut_point(model, cut, v);
   }
   SONDE_ASSERT(free == p->free_count && held == p->place_count);
 }

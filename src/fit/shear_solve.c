@@ -330,9 +330,11 @@ void sonde_patch_solver_use(sonde_patch_solver *solver, const sonde_patch *patch
   double *const to[] = {solver->k0_n_m3, solver->xm_m, solver->shear_share, solver->limit_share};
   for (uint32_t i = 0; i < patch->place_count; ++i) {
     const uint32_t *of = patch->parent[i];
-    double t = patch->share[i];
-    for (int f = 0; f < 4; ++f)
-      to[f][i] = from[f] ? exp((1 - t) * from[f][of[0]] + t * from[f][of[1]]) : 1;
+    const double *t = patch->share[i];
+    for (int f = 0; f < 4; ++f) {
+      const double *x = from[f];
+      to[f][i] = x ? exp(t[0] * x[of[0]] + t[1] * x[of[1]] + t[2] * x[of[2]]) : 1;
+    }
   }
 }
 
