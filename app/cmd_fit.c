@@ -44,6 +44,8 @@ static const char HELP[] =
     "                    out one by one\n"
     "  --hold-out KIND   sites (eight parts in turn), probe (each in turn) or depth (the deepest\n"
     "                    quarter): refit without them and print the error on them\n"
+    "  --also FILE       with --hold-out sites: measurements of other probes that the refits\n"
+    "                    predict too, each at the sites that it has not seen\n"
     "  --profile         likelihood of the shear stiffness: all else refitted at nine values\n"
     "  --identifiability what each probe alone and all together would determine\n"
     "  --starts N        refit from N random points and count how many end in the same optimum\n"
@@ -59,7 +61,7 @@ static const char *const HOLD_OUTS[] = {"sites", "probe", "depth", NULL};
 typedef struct fit_arguments {
   const char *measurements, *surface, *sites, *output, *femur, *fat, *muscle, *name, *provenance;
   const char *stages, *weights, *loss, *fine_mm, *exponent, *report, *hold_out, *smoothness;
-  const char *starts, *seed;
+  const char *starts, *seed, *also;
   bool json, help, pretension, cold_start, profile, identify, uniform_shear;
   char command_line[1024]; // as typed
 } fit_arguments;
@@ -67,13 +69,13 @@ typedef struct fit_arguments {
 // All that was found.
 typedef struct fit_outcome {
   sonde_fit_result result;
-  sonde_error_report hold_out;
+  sonde_error_report hold_out, also;
   fit_checks checks;
 } fit_outcome;
 
 typedef struct fit_inputs {
   sonde_site_table sites;
-  sonde_measurements measurements;
+  sonde_measurements measurements, also;
   sonde_mesh skin, femur, fat, muscle;
 } fit_inputs;
 
@@ -96,6 +98,7 @@ static bool parse_arguments(int argc, char **argv, fit_arguments *a) {
                                 {"--uniform-shear", NULL, &a->uniform_shear},
                                 {"--report", &a->report, NULL},
                                 {"--hold-out", &a->hold_out, NULL},
+                                {"--also", &a->also, NULL},
                                 {"--starts", &a->starts, NULL},
                                 {"--seed", &a->seed, NULL},
                                 {"--profile", NULL, &a->profile},
@@ -165,6 +168,10 @@ static bool parse_fit(const fit_arguments *a, sonde_fit_def *def, double *fine_m
     int kind;
     if (!app_parse_word(VERB, "--hold-out", a->hold_out, HOLD_OUTS, &kind)) return false;
   }
+  if (a->also && (!a->hold_out || strcmp(a->hold_out, HOLD_OUTS[0]) != 0)) {
+    app_usage_error(VERB, "--also needs --hold-out sites");
+    return false;
+  }
   def->normal_exponent = (double)exponent;
   def->uniform_shear = a->uniform_shear;
   def->stages = (uint32_t)stages;
@@ -194,6 +201,7 @@ static sonde_status load_inputs(const fit_arguments *a, fit_inputs *in, sonde_er
   sonde_status status = sonde_site_table_load(a->sites, &in->sites, error);
   if (!status)
     status = sonde_measurements_load(a->measurements, &in->sites, &in->measurements, error);
+  if (!status && a->also) status = sonde_measurements_load(a->also, &in->sites, &in->also, error);
   if (!status) status = sonde_mesh_load(a->surface, 1e-3, &in->skin, error);
   if (!status) status = load_layer(a->femur, a->surface, "femur.ply", &in->femur, error);
   if (!status) status = load_layer(a->fat, a->surface, "fat_skin_interface.ply", &in->fat, error);
@@ -204,6 +212,7 @@ static sonde_status load_inputs(const fit_arguments *a, fit_inputs *in, sonde_er
 static void clear_inputs(fit_inputs *in) {
   sonde_site_table_clear(&in->sites);
   sonde_measurements_clear(&in->measurements);
+  sonde_measurements_clear(&in->also);
   sonde_mesh_clear(&in->skin);
   sonde_mesh_clear(&in->femur);
   sonde_mesh_clear(&in->fat);
@@ -234,19 +243,24 @@ static sonde_status build_model(const fit_arguments *a, const fit_inputs *in, do
 }
 
 static sonde_status leave_out(const fit_arguments *a, const fit_inputs *in,
-                              const sonde_model *model, const sonde_fit_def *def,
-                              const sonde_fit_result *result, sonde_error_report *report,
+                              const sonde_model *model, const sonde_fit_def *def, fit_outcome *out,
                               sonde_error *error) {
   int kind;
   sonde_progress progress = app_progress();
+  const sonde_measurements *m = &in->measurements, *also = &in->also;
   if (!app_parse_word(VERB, "--hold-out", a->hold_out, HOLD_OUTS, &kind)) return SONDE_ARGUMENT;
-  double *predicted_n = calloc(in->measurements.count, sizeof *predicted_n);
+  double *predicted_n = calloc(m->count + also->count, sizeof *predicted_n);
   if (!predicted_n) return SONDE_MEMORY;
-  sonde_status status = sonde_fit_hold_out(model, &in->sites, &in->measurements, def, result,
-                                           (sonde_hold_out)kind, &progress, predicted_n, error);
+  sonde_status status =
+      a->also ? sonde_fit_hold_out_also(model, &in->sites, m, also, def, &out->result, &progress,
+                                        predicted_n, error)
+              : sonde_fit_hold_out(model, &in->sites, m, def, &out->result, (sonde_hold_out)kind,
+                                   &progress, predicted_n, error);
   if (!status)
-    status = sonde_error_report_of(in->measurements.data, predicted_n, in->measurements.count,
-                                   report, error);
+    status = sonde_error_report_of(m->data, predicted_n, m->count, &out->hold_out, error);
+  if (!status && a->also)
+    status =
+        sonde_error_report_of(also->data, predicted_n + m->count, also->count, &out->also, error);
   app_progress_end();
   free(predicted_n);
   return status;
@@ -285,7 +299,7 @@ static sonde_status fit_model(const fit_arguments *a, const fit_inputs *in,
     status =
         sonde_model_set_parameters(model, &result->law, result->sites, result->site_count, error);
   if (!status) status = sonde_model_save(model, a->output, error);
-  if (!status && a->hold_out) status = leave_out(a, in, model, def, result, &out->hold_out, error);
+  if (!status && a->hold_out) status = leave_out(a, in, model, def, out, error);
   if (!status)
     status = fit_checks_run(&out->checks, model, &in->sites, &in->measurements, def, result,
                             &progress, error);
@@ -348,6 +362,7 @@ static void print_json(const fit_arguments *a, const fit_outcome *out, double se
     app_json_object("hold_out");
     app_json_text("kind", a->hold_out);
     app_json_report("full", &out->hold_out);
+    if (a->also) app_json_report("also", &out->also);
     app_json_close();
   }
   fit_checks_print_json(&out->checks);
@@ -392,6 +407,7 @@ static void print_table(const fit_arguments *a, const fit_outcome *out, double s
   if (a->hold_out) {
     snprintf(title, sizeof title, "left out and predicted by a refit: %s", a->hold_out);
     app_print_report(title, &out->hold_out);
+    if (a->also) app_print_report("never fitted, predicted at the sites left out", &out->also);
   }
   fit_checks_print(&out->checks);
   printf("wrote %s in %.2f s\n", a->output, seconds);

@@ -29,6 +29,17 @@ SONDE_API sonde_status sonde_fit_hold_out(const sonde_model *model, const sonde_
                                           sonde_hold_out kind, const sonde_progress *progress,
                                           double *predicted_n, sonde_error *error);
 
+/**
+ * The same by sites; each part's refit also predicts the measurements `also` at its sites, made
+ * with probes that were never fitted.
+ * @param predicted_n [measurements->count + also->count]
+ * @return ARGUMENT when `also` has a fitted probe @thread owner
+ */
+SONDE_API sonde_status sonde_fit_hold_out_also(
+    const sonde_model *model, const sonde_site_table *sites, const sonde_measurements *measurements,
+    const sonde_measurements *also, const sonde_fit_def *def, const sonde_fit_result *result,
+    const sonde_progress *progress, double *predicted_n, sonde_error *error);
+
 enum { SONDE_FIT_PROFILE = 9 };
 /** How the fit gets worse when the shear stiffness is held and all else is fitted again. */
 typedef struct sonde_fit_profile {

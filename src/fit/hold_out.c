@@ -1,7 +1,8 @@
 // fold_of:       which part of the measurements a row belongs to.
 // start:         parameters at which a refit begins.
 // run_fold:      refit without that part, then its forces.
-// sonde_fit_hold_out: all parts in turn.
+// run_folds:     all parts in turn.
+// join:          measurements of both tables, checked to be of different probes.
 #include "fit/again.h"
 #include "sonde/fit_confidence.h"
 
@@ -41,18 +42,20 @@ static void start(sonde_again *a, const sonde_fit_result *result, sonde_hold_out
     sonde_refit_start(a->refit, result->curves, a->theta);
 }
 
+// fitted: measurements from this one on are predicted with their part, but never fitted.
 static sonde_status run_fold(sonde_again *a, const sonde_fit_result *result, sonde_hold_out kind,
-                             uint32_t fold, const sonde_progress *progress, double *predicted_n,
-                             sonde_error *error) {
+                             uint32_t fold, uint32_t fitted, const sonde_progress *progress,
+                             double *predicted_n, sonde_error *error) {
   sonde_refit *r = a->refit;
   uint32_t rows = a->plan.row_count;
   SONDE_ASSERT(fold < fold_count(&a->plan, kind));
-  for (uint32_t k = 0; k < rows; ++k) a->left_out[k] = fold_of(r, kind, k) == fold;
+  for (uint32_t k = 0; k < rows; ++k)
+    a->left_out[k] = fold_of(r, kind, k) == fold || a->plan.row[k] >= fitted;
   start(a, result, kind);
   sonde_refit_result found;
   r->left_out = a->left_out;
   sonde_status status = sonde_again_run(a, progress, &found, error);
-  for (uint32_t k = 0; k < rows; ++k) a->left_out[k] = !a->left_out[k]; // now only that part
+  for (uint32_t k = 0; k < rows; ++k) a->left_out[k] = fold_of(r, kind, k) != fold;
   r->stride = 1;
   if (!status) status = sonde_refit_forces(r, a->theta, a->force_n, NULL, progress, error);
   for (uint32_t k = 0; k < rows && !status; ++k)
@@ -60,11 +63,11 @@ static sonde_status run_fold(sonde_again *a, const sonde_fit_result *result, son
   return status;
 }
 
-sonde_status sonde_fit_hold_out(const sonde_model *model, const sonde_site_table *sites,
-                                const sonde_measurements *m, const sonde_fit_def *def,
-                                const sonde_fit_result *result, sonde_hold_out kind,
-                                const sonde_progress *progress, double *predicted_n,
-                                sonde_error *error) {
+static sonde_status run_folds(const sonde_model *model, const sonde_site_table *sites,
+                              const sonde_measurements *m, uint32_t fitted,
+                              const sonde_fit_def *def, const sonde_fit_result *result,
+                              sonde_hold_out kind, const sonde_progress *progress,
+                              double *predicted_n, sonde_error *error) {
   for (uint32_t i = 0; i < m->count; ++i) predicted_n[i] = NAN;
   sonde_again again;
   sonde_status status = sonde_again_create(model, sites, m, def, result, &again, error);
@@ -73,7 +76,45 @@ sonde_status sonde_fit_hold_out(const sonde_model *model, const sonde_site_table
     status = sonde_fail(error, SONDE_ARGUMENT, "one probe only: none can be left out");
   uint32_t folds = fold_count(&again.plan, kind);
   for (uint32_t fold = 0; !status && fold < folds; ++fold)
-    status = run_fold(&again, result, kind, fold, progress, predicted_n, error);
+    status = run_fold(&again, result, kind, fold, fitted, progress, predicted_n, error);
   sonde_again_clear(&again);
+  return status;
+}
+
+sonde_status sonde_fit_hold_out(const sonde_model *model, const sonde_site_table *sites,
+                                const sonde_measurements *m, const sonde_fit_def *def,
+                                const sonde_fit_result *result, sonde_hold_out kind,
+                                const sonde_progress *progress, double *predicted_n,
+                                sonde_error *error) {
+  return run_folds(model, sites, m, m->count, def, result, kind, progress, predicted_n, error);
+}
+
+static sonde_status join(const sonde_measurements *m, const sonde_measurements *also,
+                         sonde_measurements *both, sonde_error *error) {
+  for (uint32_t k = 0; k < also->count; ++k)
+    for (uint32_t i = 0; i < m->count; ++i)
+      if (strcmp(also->data[k].probe, m->data[i].probe) == 0)
+        return sonde_fail(error, SONDE_ARGUMENT,
+                          "probe %s was fitted, expected one that was not, to be predicted only",
+                          also->data[k].probe);
+  *both = (sonde_measurements){.count = m->count + also->count};
+  both->data = SONDE_NEW(sonde_datum, both->count);
+  if (!both->data) return sonde_fail_memory(error);
+  memcpy(both->data, m->data, m->count * sizeof *m->data);
+  memcpy(both->data + m->count, also->data, also->count * sizeof *also->data);
+  return SONDE_OK;
+}
+
+sonde_status sonde_fit_hold_out_also(const sonde_model *model, const sonde_site_table *sites,
+                                     const sonde_measurements *m, const sonde_measurements *also,
+                                     const sonde_fit_def *def, const sonde_fit_result *result,
+                                     const sonde_progress *progress, double *predicted_n,
+                                     sonde_error *error) {
+  sonde_measurements both;
+  sonde_status status = join(m, also, &both, error);
+  if (status) return status;
+  status = run_folds(model, sites, &both, m->count, def, result, SONDE_HOLD_OUT_SITES, progress,
+                     predicted_n, error);
+  sonde_free(both.data);
   return status;
 }

@@ -121,6 +121,34 @@ static void intervals_cover_the_truth(void **state) {
   bundled_clear(&b);
 }
 
+// A footprint under another name is never fitted, and where its site is left out it is predicted as
+// under its own.
+static void other_probes_are_predicted_too(const bundled *b, const sonde_fit_def *def,
+                                           const sonde_fit_result *result, const double *out_n) {
+  sonde_measurements also = {.count = b->m.count, .data = SONDE_NEW(sonde_datum, b->m.count)};
+  double *both_n = SONDE_NEW(double, 2 * (size_t)b->m.count);
+  sonde_error error;
+  memcpy(also.data, b->m.data, b->m.count * sizeof *also.data);
+  assert_int_equal(
+      sonde_fit_hold_out_also(b->model, &b->sites, &b->m, &also, def, result, NULL, both_n, &error),
+      SONDE_ARGUMENT);
+  assert_says(&error, "was fitted");
+  for (uint32_t k = 0; k < also.count; ++k) {
+    bool point = strcmp(also.data[k].probe, "point") == 0;
+    snprintf(also.data[k].probe, sizeof also.data[k].probe, point ? "rect:6x6" : "rect:60x12");
+    also.data[k].force_n *= 3; // whatever was measured
+  }
+  assert_ok(
+      sonde_fit_hold_out_also(b->model, &b->sites, &b->m, &also, def, result, NULL, both_n, &error),
+      &error);
+  for (uint32_t k = 0; k < b->m.count; ++k) {
+    assert_near(both_n[k] / out_n[k], 1, 1e-4);
+    assert_near(both_n[b->m.count + k] / out_n[k], 1, 1e-4);
+  }
+  sonde_free(both_n);
+  sonde_free(also.data);
+}
+
 // Every row is left out once, and is then predicted worse than when it was seen; leaving sites out
 // in the linearised problem says nearly the same. By depth only the deep rows are left out.
 static void hold_out_predicts_what_was_not_seen(void **state) {
@@ -145,6 +173,7 @@ static void hold_out_predicts_what_was_not_seen(void **state) {
   assert_true(out.all.mae_percent > result.stage3.all.mae_percent);
   assert_true(out.all.mae_percent < 12);
   assert_near(result.confidence.one_out.all.mae_percent / out.all.mae_percent, 1, 0.5);
+  other_probes_are_predicted_too(&b, &def, &result, out_n);
   assert_ok(sonde_fit_hold_out(b.model, &b.sites, &b.m, &def, &result, SONDE_HOLD_OUT_DEPTH, NULL,
                                out_n, &error),
             &error);

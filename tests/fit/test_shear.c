@@ -144,7 +144,7 @@ static void scalar_equals_full_model(void **state) {
                 worst_patch, worst_edges);
   assert_true(worst_whole < 1e-5);
   assert_true(worst_patch < 1e-3);
-  assert_true(worst_edges < 1e-3);
+  assert_true(worst_edges < 3e-3);
   fields_clear(&f);
   bundled_clear(&b);
 }
@@ -171,7 +171,7 @@ static void force_does_not_depend_on_the_mesh(void **state) {
   }
   double point = force[1][0] / force[0][0] - 1, linear = force[1][1] / force[0][1] - 1;
   print_message("2 mm against 3 mm: point %.2g, linear %.2g\n", point, linear);
-  assert_true(fabs(point) < 0.04 && fabs(linear) < 0.01);
+  assert_true(fabs(point) < 0.012 && fabs(linear) < 0.005);
 }
 
 // A 6 mm point on a mesh of 8 mm is named as too coarse; a 12 mm wide pad there is not.
@@ -203,6 +203,9 @@ static void cut_faces_are_the_footprint(void **state) {
       for (int k = 0; k < 3; ++k) x[k] = sonde_cut_point(b.model, &cut, v[k]);
       double area = 0.5 * v_norm(v_cross(v_sub(x[1], x[0]), v_sub(x[2], x[0])));
       all += area;
+      for (int k = 0; k < 3; ++k) // fine where a side runs
+        if (cut.held[v[k]] && !cut.held[v[(k + 1) % 3]])
+          assert_true(v_distance(x[k], x[(k + 1) % 3]) <= 2.1e-3);
       if (cut.held[v[0]] && cut.held[v[1]] && cut.held[v[2]]) held += area;
     }
     for (uint32_t i = 0; i < b.model->surface.vertex_count; ++i) skin += b.model->area_m2[i];
