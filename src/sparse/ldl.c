@@ -2,7 +2,6 @@
 //
 // sonde_ldl_create    orders, builds the permuted pattern, analyses, factors
 // sonde_ldl_refactor  numbers on the same pattern
-// order_by_points     nested dissection: halves along the widest side, separator last
 // order_by_degree     reverse Cuthill-McKee: breadth-first from a far node, reversed
 // build_upper         permuted entries above the diagonal, by column, with their source
 // analyse             elimination tree and column counts of L
@@ -12,79 +11,13 @@
 
 #include "base/base.h"
 #include "base/maths.h"
-#include "base/order.h"
+#include "sparse/dissect.h"
 
 #include <string.h>
 
-enum { LEAF = 24 }; // pieces this small are not split further
-
-typedef struct pattern {
-  uint32_t n;
-  const uint32_t *start, *column;
-  const sonde_vec3 *points;
-} pattern;
-
-// Sorts the piece along its widest side.
-static void sort_piece(const pattern *a, uint32_t *piece, uint32_t count, sonde_ranked *keys) {
-  double spread = -1;
-  int widest = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    double low = INFINITY, high = -INFINITY;
-    for (uint32_t i = 0; i < count; ++i) {
-      double c = v_coordinate(a->points[piece[i]], axis);
-      low = fmin(low, c), high = fmax(high, c);
-    }
-    if (high - low > spread) spread = high - low, widest = axis;
-  }
-  sonde_sort_along(a->points, widest, piece, count, keys);
-}
-
-// side[row] is 1 for the upper half of the current piece; moves its rows that touch the lower half
-// behind the others. Returns how many rows of the upper half stay.
-static uint32_t split_separator(const pattern *a, uint32_t *upper, uint32_t count,
-                                const uint32_t *side, uint32_t low_mark, uint32_t *scratch) {
-  uint32_t keep = 0, parted = 0;
-  for (uint32_t i = 0; i < count; ++i) {
-    uint32_t row = upper[i];
-    bool touches = false;
-    for (uint32_t p = a->start[row]; p < a->start[row + 1] && !touches; ++p)
-      touches = side[a->column[p]] == low_mark;
-    if (touches)
-      scratch[parted++] = row;
-    else
-      upper[keep++] = row;
-  }
-  memcpy(upper + keep, scratch, parted * sizeof *scratch);
-  return keep;
-}
-
-// Nested dissection with an explicit stack: a piece becomes lower half, upper half, separator.
-static void order_by_points(const pattern *a, uint32_t *order, sonde_ranked *keys, uint32_t *side,
-                            uint32_t *scratch) {
-  struct {
-    uint32_t first, count;
-  } stack[128];
-  uint32_t depth = 0, mark = 0;
-  for (uint32_t i = 0; i < a->n; ++i) order[i] = i;
-  stack[depth].first = 0, stack[depth++].count = a->n;
-  while (depth > 0) {
-    --depth;
-    uint32_t first = stack[depth].first, count = stack[depth].count;
-    if (count <= LEAF) continue;
-    uint32_t *piece = order + first, half = count / 2;
-    sort_piece(a, piece, count, keys);
-    ++mark;
-    for (uint32_t i = 0; i < half; ++i) side[piece[i]] = mark;
-    uint32_t keep = split_separator(a, piece + half, count - half, side, mark, scratch);
-    SONDE_ASSERT(depth + 2 <= SONDE_COUNT_OF(stack));
-    stack[depth].first = first, stack[depth++].count = half;
-    stack[depth].first = first + half, stack[depth++].count = keep;
-  }
-}
-
 // Breadth-first numbering of one component from `root`; returns the last node reached.
-static uint32_t breadth_first(const pattern *a, uint32_t root, uint32_t *queue, uint32_t *seen,
-                              uint32_t mark, uint32_t *reached) {
+static uint32_t breadth_first(const sonde_pattern *a, uint32_t root, uint32_t *queue,
+                              uint32_t *seen, uint32_t mark, uint32_t *reached) {
   uint32_t head = 0, tail = 0;
   queue[tail++] = root;
   seen[root] = mark;
@@ -101,7 +34,7 @@ static uint32_t breadth_first(const pattern *a, uint32_t root, uint32_t *queue, 
   return queue[tail - 1];
 }
 
-static void order_by_degree(const pattern *a, uint32_t *order, uint32_t *seen) {
+static void order_by_degree(const sonde_pattern *a, uint32_t *order, uint32_t *seen) {
   uint32_t done = 0, mark = 0;
   for (uint32_t i = 0; i < a->n; ++i) seen[i] = 0;
   for (uint32_t i = 0; i < a->n; ++i) {
@@ -118,27 +51,17 @@ static void order_by_degree(const pattern *a, uint32_t *order, uint32_t *seen) {
   }
 }
 
-static sonde_status find_order(const pattern *a, sonde_ldl *ldl, sonde_error *error) {
+static sonde_status find_order(const sonde_pattern *a, sonde_ldl *ldl, sonde_error *error) {
   sonde_status status = SONDE_OK;
-  sonde_ranked *keys = SONDE_NEW(sonde_ranked, a->n);
-  uint32_t *side = SONDE_NEW(uint32_t, a->n), *scratch = SONDE_NEW(uint32_t, a->n);
-  if (!keys || !side || !scratch) {
-    status = sonde_fail_memory(error);
-    goto done;
-  }
   if (a->points != NULL)
-    order_by_points(a, ldl->order, keys, side, scratch);
+    status = sonde_dissect(a, ldl->order, NULL, error);
   else
-    order_by_degree(a, ldl->order, side);
-  for (uint32_t k = 0; k < a->n; ++k) ldl->rank[ldl->order[k]] = k;
-done:
-  sonde_free(keys);
-  sonde_free(side);
-  sonde_free(scratch);
+    order_by_degree(a, ldl->order, ldl->mark);
+  for (uint32_t k = 0; k < a->n && !status; ++k) ldl->rank[ldl->order[k]] = k;
   return status;
 }
 
-static sonde_status build_upper(const pattern *a, sonde_ldl *ldl, sonde_error *error) {
+static sonde_status build_upper(const sonde_pattern *a, sonde_ldl *ldl, sonde_error *error) {
   for (uint32_t k = 0; k < a->n; ++k) {
     uint32_t old = ldl->order[k], diagonal = UINT32_MAX;
     ldl->upper_start[k + 1] = ldl->upper_start[k];
@@ -248,18 +171,7 @@ static bool allocate_pattern(sonde_ldl *ldl, size_t entries) {
          ldl->mark && ldl->stack && ldl->fill;
 }
 
-static sonde_status check_pattern(const pattern *a, sonde_error *error) {
-  if (a->n == 0 || a->n >= UINT32_MAX / 2 || a->start == NULL || a->column == NULL)
-    return sonde_fail(error, SONDE_ARGUMENT, "expected a matrix with at least one row");
-  for (uint32_t i = 0; i < a->n; ++i)
-    for (uint32_t p = a->start[i]; p < a->start[i + 1]; ++p)
-      if (a->column[p] >= a->n || (p > a->start[i] && a->column[p] <= a->column[p - 1]))
-        return sonde_fail(error, SONDE_ARGUMENT, "columns of row %u are not ascending below %u", i,
-                          a->n);
-  return SONDE_OK;
-}
-
-static sonde_status build(const pattern *a, sonde_ldl *ldl, const double *value,
+static sonde_status build(const sonde_pattern *a, sonde_ldl *ldl, const double *value,
                           sonde_error *error) {
   if (!allocate_pattern(ldl, a->start[a->n])) return sonde_fail_memory(error);
   sonde_status status = find_order(a, ldl, error);
@@ -275,10 +187,10 @@ static sonde_status build(const pattern *a, sonde_ldl *ldl, const double *value,
 sonde_status sonde_ldl_create(uint32_t n, const uint32_t *row_start, const uint32_t *column,
                               const double *value, const sonde_vec3 *points, sonde_ldl **ldl,
                               sonde_error *error) {
-  pattern a = {n, row_start, column, points};
+  sonde_pattern a = {n, row_start, column, points};
   SONDE_ASSERT(ldl != NULL);
   *ldl = NULL;
-  sonde_status status = check_pattern(&a, error);
+  sonde_status status = sonde_pattern_check(&a, error);
   if (status != SONDE_OK) return status;
   sonde_ldl *made = SONDE_NEW(sonde_ldl, 1);
   if (made == NULL) return sonde_fail_memory(error);

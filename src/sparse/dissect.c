@@ -1,0 +1,114 @@
+// sort_piece:       along its widest side.
+// split_separator:  rows of the upper half that touch the lower one go behind the others.
+// part:             one piece into lower half, upper half, separator.
+// sonde_dissect:    all pieces, with an explicit stack.
+#include "sparse/dissect.h"
+
+#include "base/base.h"
+#include "base/maths.h"
+#include "base/order.h"
+
+#include <string.h>
+
+enum { LEAF = 24, STACK = 128 }; // pieces as small as LEAF are not split further
+
+typedef struct dissection {
+  const sonde_pattern *pattern;
+  sonde_ranked *keys;
+  uint32_t *side, *scratch;
+  uint32_t mark; // of the current piece in side
+} dissection;
+
+static void sort_piece(const dissection *d, uint32_t *piece, uint32_t count) {
+  const sonde_vec3 *points = d->pattern->points;
+  double spread = -1;
+  int widest = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    double low = INFINITY, high = -INFINITY;
+    for (uint32_t i = 0; i < count; ++i) {
+      double c = v_coordinate(points[piece[i]], axis);
+      low = fmin(low, c), high = fmax(high, c);
+    }
+    if (high - low > spread) spread = high - low, widest = axis;
+  }
+  sonde_sort_along(points, widest, piece, count, d->keys);
+}
+
+// side[row] is the mark for the lower half of the current piece. Returns how many rows of the upper
+// half stay.
+static uint32_t split_separator(const dissection *d, uint32_t *upper, uint32_t count) {
+  const sonde_pattern *a = d->pattern;
+  uint32_t keep = 0, parted = 0;
+  for (uint32_t i = 0; i < count; ++i) {
+    uint32_t row = upper[i];
+    bool touches = false;
+    for (uint32_t p = a->start[row]; p < a->start[row + 1] && !touches; ++p)
+      touches = d->side[a->column[p]] == d->mark;
+    if (touches)
+      d->scratch[parted++] = row;
+    else
+      upper[keep++] = row;
+  }
+  memcpy(upper + keep, d->scratch, parted * sizeof *d->scratch);
+  return keep;
+}
+
+// Returns how many rows of the upper half stay.
+static uint32_t part(dissection *d, uint32_t *piece, uint32_t count) {
+  uint32_t half = count / 2;
+  sort_piece(d, piece, count);
+  ++d->mark;
+  for (uint32_t i = 0; i < half; ++i) d->side[piece[i]] = d->mark;
+  return split_separator(d, piece + half, count - half);
+}
+
+static void dissect(dissection *d, uint32_t *order, uint32_t *above) {
+  struct {
+    uint32_t first, count, above;
+  } stack[STACK];
+  uint32_t depth = 0, n = d->pattern->n;
+  for (uint32_t i = 0; i < n; ++i) order[i] = i;
+  for (uint32_t i = 0; i < n && above; ++i) above[i] = UINT32_MAX;
+  stack[depth].first = 0, stack[depth].count = n, stack[depth++].above = n;
+  while (depth > 0) {
+    --depth;
+    uint32_t first = stack[depth].first, count = stack[depth].count, up = stack[depth].above;
+    if (count <= LEAF) {
+      if (above) above[first] = up;
+      continue;
+    }
+    uint32_t half = count / 2, keep = part(d, order + first, count), last = first + half + keep;
+    if (half + keep < count) {
+      if (above) above[last] = up;
+      up = last;
+    }
+    SONDE_ASSERT(depth + 2 <= SONDE_COUNT_OF(stack));
+    stack[depth].first = first, stack[depth].count = half, stack[depth++].above = up;
+    if (keep == 0) continue;
+    stack[depth].first = first + half, stack[depth].count = keep, stack[depth++].above = up;
+  }
+}
+
+sonde_status sonde_dissect(const sonde_pattern *pattern, uint32_t *order, uint32_t *above,
+                           sonde_error *error) {
+  SONDE_ASSERT(pattern->n > 0 && pattern->points != NULL);
+  dissection d = {pattern, SONDE_NEW(sonde_ranked, pattern->n), SONDE_NEW(uint32_t, pattern->n),
+                  SONDE_NEW(uint32_t, pattern->n), 0};
+  sonde_status status = d.keys && d.side && d.scratch ? SONDE_OK : sonde_fail_memory(error);
+  if (!status) dissect(&d, order, above);
+  sonde_free(d.keys);
+  sonde_free(d.side);
+  sonde_free(d.scratch);
+  return status;
+}
+
+sonde_status sonde_pattern_check(const sonde_pattern *a, sonde_error *error) {
+  if (a->n == 0 || a->n >= UINT32_MAX / 2 || a->start == NULL || a->column == NULL)
+    return sonde_fail(error, SONDE_ARGUMENT, "expected a matrix with at least one row");
+  for (uint32_t i = 0; i < a->n; ++i)
+    for (uint32_t p = a->start[i]; p < a->start[i + 1]; ++p)
+      if (a->column[p] >= a->n || (p > a->start[i] && a->column[p] <= a->column[p - 1]))
+        return sonde_fail(error, SONDE_ARGUMENT, "columns of row %u are not ascending below %u", i,
+                          a->n);
+  return SONDE_OK;
+}
