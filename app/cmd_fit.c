@@ -45,7 +45,9 @@ static const char HELP[] =
     "  --hold-out KIND   sites (eight parts in turn), probe (each in turn) or depth (the deepest\n"
     "                    quarter): refit without them and print the error on them\n"
     "  --also FILE       with --hold-out sites: measurements of other probes that the refits\n"
-    "                    predict too, each at the sites that it has not seen\n"
+    "                    predict too, each at the sites that it has not seen; also by --layers\n"
+    "  --layers          the same fit with other laws between neighbours, their errors beside\n"
+    "                    ours: pre-tension (T), pre-tension and stiffening (J)\n"
     "  --profile         likelihood of the shear stiffness: all else refitted at nine values\n"
     "  --identifiability what each probe alone and all together would determine\n"
     "  --starts N        refit from N random points and count how many end in the same optimum\n"
@@ -62,7 +64,7 @@ typedef struct fit_arguments {
   const char *measurements, *surface, *sites, *output, *femur, *fat, *muscle, *name, *provenance;
   const char *stages, *weights, *loss, *fine_mm, *exponent, *report, *hold_out, *smoothness;
   const char *starts, *seed, *also;
-  bool json, help, pretension, cold_start, profile, identify, uniform_shear;
+  bool json, help, pretension, cold_start, profile, identify, layers, uniform_shear;
   char command_line[1024]; // as typed
 } fit_arguments;
 
@@ -103,6 +105,7 @@ static bool parse_arguments(int argc, char **argv, fit_arguments *a) {
                                 {"--seed", &a->seed, NULL},
                                 {"--profile", NULL, &a->profile},
                                 {"--identifiability", NULL, &a->identify},
+                                {"--layers", NULL, &a->layers},
                                 {"--pretension", NULL, &a->pretension},
                                 {"--cold-start", NULL, &a->cold_start},
                                 {"--json", NULL, &a->json},
@@ -133,6 +136,7 @@ static bool parse_checks(const fit_arguments *a, long stages, fit_checks *checks
   const char *late = a->hold_out   ? "--hold-out"
                      : a->profile  ? "--profile"
                      : a->identify ? "--identifiability"
+                     : a->layers   ? "--layers"
                      : a->starts   ? "--starts"
                                    : NULL;
   if (late && stages < 3) {
@@ -142,6 +146,7 @@ static bool parse_checks(const fit_arguments *a, long stages, fit_checks *checks
   bool reported = a->report && stages == 3;
   *checks = (fit_checks){.profile = a->profile || reported,
                          .identify = a->identify || reported,
+                         .layers = a->layers,
                          .starts = (uint32_t)starts,
                          .seed = (uint64_t)seed};
   return true;
@@ -168,8 +173,9 @@ static bool parse_fit(const fit_arguments *a, sonde_fit_def *def, double *fine_m
     int kind;
     if (!app_parse_word(VERB, "--hold-out", a->hold_out, HOLD_OUTS, &kind)) return false;
   }
-  if (a->also && (!a->hold_out || strcmp(a->hold_out, HOLD_OUTS[0]) != 0)) {
-    app_usage_error(VERB, "--also needs --hold-out sites");
+  bool by_sites = a->hold_out && strcmp(a->hold_out, HOLD_OUTS[0]) == 0;
+  if (a->also && !a->layers && !by_sites) {
+    app_usage_error(VERB, "--also needs --hold-out sites or --layers");
     return false;
   }
   def->normal_exponent = (double)exponent;
@@ -251,14 +257,15 @@ static sonde_status leave_out(const fit_arguments *a, const fit_inputs *in,
   if (!app_parse_word(VERB, "--hold-out", a->hold_out, HOLD_OUTS, &kind)) return SONDE_ARGUMENT;
   double *predicted_n = calloc(m->count + also->count, sizeof *predicted_n);
   if (!predicted_n) return SONDE_MEMORY;
+  bool with_also = a->also && kind == SONDE_HOLD_OUT_SITES;
   sonde_status status =
-      a->also ? sonde_fit_hold_out_also(model, &in->sites, m, also, def, &out->result, &progress,
-                                        predicted_n, error)
-              : sonde_fit_hold_out(model, &in->sites, m, def, &out->result, (sonde_hold_out)kind,
-                                   &progress, predicted_n, error);
+      with_also ? sonde_fit_hold_out_also(model, &in->sites, m, also, def, &out->result, &progress,
+                                          predicted_n, error)
+                : sonde_fit_hold_out(model, &in->sites, m, def, &out->result, (sonde_hold_out)kind,
+                                     &progress, predicted_n, error);
   if (!status)
     status = sonde_error_report_of(m->data, predicted_n, m->count, &out->hold_out, error);
-  if (!status && a->also)
+  if (!status && with_also)
     status =
         sonde_error_report_of(also->data, predicted_n + m->count, also->count, &out->also, error);
   app_progress_end();
@@ -278,6 +285,7 @@ static sonde_status write_report(const fit_arguments *a, const fit_inputs *in,
                                  .command_line = a->command_line,
                                  .hold_out_name = name,
                                  .hold_out = a->hold_out ? &out->hold_out : NULL,
+                                 .also = out->also.all.count ? &out->also : NULL,
                                  .checks = &out->checks};
   sonde_progress progress = app_progress();
   sonde_status status = fit_report_write(&findings, a->report, &progress, error);
@@ -300,6 +308,7 @@ static sonde_status fit_model(const fit_arguments *a, const fit_inputs *in,
         sonde_model_set_parameters(model, &result->law, result->sites, result->site_count, error);
   if (!status) status = sonde_model_save(model, a->output, error);
   if (!status && a->hold_out) status = leave_out(a, in, model, def, out, error);
+  out->checks.also = a->also ? &in->also : NULL;
   if (!status)
     status = fit_checks_run(&out->checks, model, &in->sites, &in->measurements, def, result,
                             &progress, error);
@@ -362,7 +371,11 @@ static void print_json(const fit_arguments *a, const fit_outcome *out, double se
     app_json_object("hold_out");
     app_json_text("kind", a->hold_out);
     app_json_report("full", &out->hold_out);
-    if (a->also) app_json_report("also", &out->also);
+    if (out->also.all.count) {
+      app_json_object("also");
+      app_json_report("full", &out->also);
+      app_json_close();
+    }
     app_json_close();
   }
   fit_checks_print_json(&out->checks);
@@ -383,7 +396,8 @@ static void print_table(const fit_arguments *a, const fit_outcome *out, double s
            r->stage1_parameters);
   app_print_report(title, &r->stage1);
   if (r->stage2.all.count > 0) {
-    snprintf(title, sizeof title, "stage 2, simplified interaction: %u parameters",
+    snprintf(title, sizeof title,
+             "stage 2, the paper's model (simplified interaction): %u parameters",
              r->stage2_parameters);
     app_print_report(title, &r->stage2);
     printf("edge stiffness %.3f N/m (ln sd %.3f), %u iterations\n", r->stage2_edge_n_m,
@@ -407,7 +421,8 @@ static void print_table(const fit_arguments *a, const fit_outcome *out, double s
   if (a->hold_out) {
     snprintf(title, sizeof title, "left out and predicted by a refit: %s", a->hold_out);
     app_print_report(title, &out->hold_out);
-    if (a->also) app_print_report("never fitted, predicted at the sites left out", &out->also);
+    if (out->also.all.count)
+      app_print_report("never fitted, predicted at the sites left out", &out->also);
   }
   fit_checks_print(&out->checks);
   printf("wrote %s in %.2f s\n", a->output, seconds);

@@ -2,7 +2,7 @@
 // fit_checks_print: as text. fit_checks_print_json: into the open object.
 #include "fit_checks.h"
 
-#include "app.h"
+#include "fit_common.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -21,7 +21,15 @@ sonde_status fit_checks_run(fit_checks *c, const sonde_model *model, const sonde
   if (c->starts && !status)
     status = sonde_fit_random_starts(model, sites, data, def, result, c->starts, c->seed, progress,
                                      &c->ends, error);
+  if (c->layers && !status)
+    status = sonde_fit_layers(model, sites, data, c->also, def, result, progress, c->layer, error);
   return status;
+}
+
+const char *fit_checks_layer(sonde_layer kind) {
+  static const char *const NAME[] = {"A, shear with a limit", "T, pre-tension",
+                                     "J, pre-tension and stiffening"};
+  return NAME[kind];
 }
 
 void fit_checks_name(const sonde_fit_part *part, char name[40]) {
@@ -44,6 +52,20 @@ static void print_parts(const sonde_fit_identifiability *parts) {
   }
 }
 
+// One line: errors of seen rows, of sites left out, of probes that were never fitted.
+static void print_layer(const sonde_fit_layer *l) {
+  printf("  %-30s %4u parameters, cost %8.1f;", fit_checks_layer(l->kind), l->parameters, l->cost);
+  for (uint32_t p = 0; p < l->seen.probe_count; ++p)
+    printf(" %s %.2f %% (site left out %.2f %%)", l->seen.probe[p], l->seen.probes[p].mae_percent,
+           l->one_out.probes[p].mae_percent);
+  for (uint32_t p = 0; p < l->also.probe_count; ++p)
+    printf(" %s, never fitted, %.2f %%", l->also.probe[p], l->also.probes[p].mae_percent);
+  printf("\n");
+  if (l->kind != SONDE_LAYER_LIMIT)
+    printf("  %-30s T %.3g N/m, k %.3g N/m, c %.3g%s\n", "", l->tension_n_m, l->second,
+           l->stiffening, l->converged ? "" : ", not converged");
+}
+
 void fit_checks_print(const fit_checks *c) {
   if (c->shear.count)
     printf("profile likelihood of G: %.4g N/m, 95 %% interval %.4g to %.4g\n",
@@ -52,6 +74,9 @@ void fit_checks_print(const fit_checks *c) {
   if (c->ends.count)
     printf("random starts: %u of %u end in the same optimum (cost %.6g to %.6g), %u fail\n",
            c->ends.same, c->ends.count, c->ends.least_cost, c->ends.most_cost, c->ends.failed);
+  if (!c->layers) return;
+  printf("other laws of the layer between neighbours, refitted\n");
+  for (int k = 0; k < SONDE_FIT_LAYERS; ++k) print_layer(&c->layer[k]);
 }
 
 static void print_json_part(const sonde_fit_part *part) {
@@ -87,7 +112,34 @@ static void print_json_profile(const sonde_fit_profile *p) {
   app_json_close();
 }
 
+static void print_json_layers(const fit_checks *c) {
+  static const char *const KEY[] = {"limit", "tension", "stiffening"};
+  app_json_object("layers");
+  for (int k = 0; k < SONDE_FIT_LAYERS; ++k) {
+    const sonde_fit_layer *l = &c->layer[k];
+    app_json_object(KEY[k]);
+    app_json_report("full", &l->seen);
+    app_json_integer("parameters", l->parameters);
+    app_json_bool("converged", l->converged);
+    app_json_real("cost", l->cost);
+    app_json_real("tension_n_m", l->tension_n_m);
+    app_json_real("second", l->second);
+    app_json_real("stiffening_c", l->stiffening);
+    app_json_object("one_site_out");
+    app_json_report("full", &l->one_out);
+    app_json_close();
+    if (c->also) {
+      app_json_object("also");
+      app_json_report("full", &l->also);
+      app_json_close();
+    }
+    app_json_close();
+  }
+  app_json_close();
+}
+
 void fit_checks_print_json(const fit_checks *c) {
+  if (c->layers) print_json_layers(c);
   if (c->shear.count) print_json_profile(&c->shear);
   if (c->parts.count) {
     app_json_object("identifiability");

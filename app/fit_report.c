@@ -10,7 +10,7 @@
 #include <string.h>
 #include <time.h>
 
-enum { STAGES = 5, HOLDOUTS = 2 * SONDE_FIT_PROBES, NOTES = 4 };
+enum { STAGES = 5, HOLDOUTS = 3 * SONDE_FIT_PROBES, NOTES = 4 };
 
 typedef struct builder {
   const fit_findings *in;
@@ -294,6 +294,7 @@ sonde_status fit_report_write(const fit_findings *in, const char *directory,
   if (in->result->confidence.one_out_n)
     add_holdout(b, "one site at a time (linearised)", &in->result->confidence.one_out);
   if (in->hold_out) add_holdout(b, in->hold_out_name, in->hold_out);
+  if (in->also) add_holdout(b, "sites, refitted; probe never fitted", in->also);
   add_profile(b);
   add_identifiability(b);
   add_timings(b);

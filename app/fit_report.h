@@ -12,6 +12,7 @@ typedef struct fit_findings {
   const char *command_line;
   const char *hold_out_name;          // NULL: none
   const sonde_error_report *hold_out; // NULL: none
+  const sonde_error_report *also;     // probes that were never fitted, in the same folds; or NULL
   const fit_checks *checks;
 } fit_findings;
 

@@ -110,6 +110,41 @@ SONDE_API sonde_status sonde_fit_random_starts(
     const sonde_fit_def *def, const sonde_fit_result *result, uint32_t count, uint64_t seed,
     const sonde_progress *progress, sonde_fit_starts *starts, sonde_error *error);
 
+typedef enum sonde_layer {
+  SONDE_LAYER_LIMIT,      /**< the model's: q = G g/(1 - (g/gm)^2), g the slope of the skin */
+  SONDE_LAYER_TENSION,    /**< "T": a membrane of tension T + k e, e = sqrt(1 + g^2) - 1 */
+  SONDE_LAYER_STIFFENING, /**< "J": T + k e (1 + c e^2) */
+  SONDE_FIT_LAYERS,
+} sonde_layer;
+
+/** Stage 3 with another law of the layer between neighbours. */
+typedef struct sonde_fit_layer {
+  sonde_layer kind;
+  uint32_t parameters;
+  bool converged;
+  double cost;        /**< as in sonde_fit_result */
+  double tension_n_m; /**< T, or G of the model's own law */
+  double second;      /**< k in N/m, or gm */
+  double stiffening;  /**< c of J, else 0 */
+  double smoothness_sd, shear_smoothness_sd;
+  sonde_error_report seen, one_out; /**< of fitted rows; of sites left out (linearised) */
+  sonde_error_report also;          /**< of measurements that were never fitted */
+} sonde_fit_layer;
+
+/**
+ * Fits stage 3 with the model's own law of the layer, with pre-tension ("T") and with pre-tension
+ * and stiffening ("J"), each with fields, smoothness and equilibria of its own, the skin moving
+ * along its normals. Only the first is a law of the dynamic model. docs/fit.md.
+ * @param also measurements with other probes that are predicted only; may be NULL
+ * @param layers [SONDE_FIT_LAYERS] @thread owner
+ */
+SONDE_API sonde_status sonde_fit_layers(const sonde_model *model, const sonde_site_table *sites,
+                                        const sonde_measurements *measurements,
+                                        const sonde_measurements *also, const sonde_fit_def *def,
+                                        const sonde_fit_result *result,
+                                        const sonde_progress *progress, sonde_fit_layer *layers,
+                                        sonde_error *error);
+
 #ifdef __cplusplus
 }
 #endif

@@ -2,6 +2,7 @@
 // without_site:     errors of a site's rows at the linearised optimum without them.
 // leave_out:        the same site by site.
 // sonde_refit_choose_smoothness: the prior whose left-out sites are predicted best.
+// solve_rows:       H^-1 of many rows at once.
 // sandwich:         covariance from the residuals themselves.
 // add_prior_spread: what the smoothness adds to it.
 // bootstrap:        linearised refits with sites drawn again.
@@ -27,9 +28,9 @@ typedef struct linear {
   sonde_normal whole; // with a prior
   sonde_normal part;  // of some sites, with a prior
   double *factor, *step;
-  double *forward; // [most_rows * n] of one site
-  double *within;  // [most_rows^2] of one site
-  double *error_n; // [most_rows] of one site
+  double *forward, *turned; // [most_rows * n] of one site or batch
+  double *within;           // [most_rows^2] of one site
+  double *error_n;          // [most_rows] of one site
 } linear;
 
 static uint32_t most_rows(const sonde_fit_plan *plan) {
@@ -46,12 +47,13 @@ static bool linear_create(linear *l, uint32_t n, const sonde_fit_plan *plan) {
   size_t rows = most_rows(plan);
   *l = (linear){.n = n, .site_count = sites};
   l->forward = SONDE_NEW(double, rows *n);
+  l->turned = SONDE_NEW(double, rows *n);
   l->within = SONDE_NEW(double, rows *rows);
   l->error_n = SONDE_NEW(double, rows);
   l->site = SONDE_NEW(sonde_normal, sites);
   l->factor = SONDE_NEW(double, (size_t)n *n);
   l->step = SONDE_NEW(double, n);
-  bool ok = l->forward && l->within && l->error_n && l->site && l->factor && l->step &&
+  bool ok = l->forward && l->turned && l->within && l->error_n && l->site && l->factor && l->step &&
             sonde_normal_create(&l->data, n) && sonde_normal_create(&l->whole, n) &&
             sonde_normal_create(&l->part, n);
   for (uint32_t s = 0; s < sites && ok; ++s) ok = sonde_normal_create(&l->site[s], n);
@@ -67,6 +69,7 @@ static void linear_clear(linear *l) {
   sonde_free(l->factor);
   sonde_free(l->step);
   sonde_free(l->forward);
+  sonde_free(l->turned);
   sonde_free(l->within);
   sonde_free(l->error_n);
 }
@@ -94,20 +97,24 @@ static uint32_t used_rows(const sonde_refit *r, uint32_t site) {
   return count;
 }
 
-// Row `at` of the site's own system W^-1 - S and of its right-hand side.
-static void add_own_row(const linear *l, const double *slope, sonde_refit_row row, uint32_t at,
-                        uint32_t rows) {
-  uint32_t n = l->n;
-  double *forward = &l->forward[(size_t)at * n];
-  l->error_n[at] = row.error_n;
-  for (uint32_t a = 0; a < n; ++a) l->error_n[at] += slope[a] * l->step[a];
-  memcpy(forward, slope, n * sizeof *forward);
-  sonde_cholesky_forward(l->factor, n, forward);
-  for (uint32_t j = 0; j <= at; ++j) {
-    double sum = j == at ? 1 / row.weight : 0;
-    for (uint32_t a = 0; a < n; ++a) sum -= forward[a] * l->forward[(size_t)j * n + a];
-    l->within[(size_t)at * rows + j] = sum;
+// Rows of a site that take part: slopes to l->forward, errors after the full step to l->error_n,
+// 1/weight to the diagonal of l->within.
+static void gather_rows(const sonde_refit *r, const sonde_refit_workspace *w, const double *force_n,
+                        uint32_t site, uint32_t rows, linear *l) {
+  uint32_t n = l->n, at = 0;
+  const uint32_t *start = r->plan->site_start + site;
+  memset(l->within, 0, (size_t)rows * rows * sizeof *l->within);
+  for (uint32_t k = start[0]; k < start[1]; ++k) {
+    if (!sonde_refit_uses(r, k)) continue;
+    const double *slope = &w->kept_jacobian[(size_t)k * n];
+    sonde_refit_row row = sonde_refit_weigh(r, k, force_n[k]);
+    double error_n = row.error_n;
+    for (uint32_t a = 0; a < n; ++a) error_n += slope[a] * l->step[a];
+    l->error_n[at] = error_n;
+    l->within[(size_t)at * rows + at] = 1 / row.weight;
+    memcpy(&l->forward[(size_t)at++ * n], slope, n * sizeof *slope);
   }
+  SONDE_ASSERT(at == rows);
 }
 
 // Let e = r + J d be the errors after the full step d, S = J H^-1 J^T and W the weights of a site's
@@ -118,14 +125,23 @@ static bool without_site(const sonde_refit *r, const sonde_refit_workspace *w,
   uint32_t rows = used_rows(r, site), at = 0;
   const uint32_t *start = r->plan->site_start + site;
   if (rows == 0) return true;
-  for (uint32_t k = start[0]; k < start[1]; ++k)
-    if (sonde_refit_uses(r, k))
-      add_own_row(l, &w->kept_jacobian[(size_t)k * l->n], sonde_refit_weigh(r, k, force_n[k]), at++,
-                  rows);
-  SONDE_ASSERT(at == rows);
+  gather_rows(r, w, force_n, site, rows, l);
+  sonde_transpose(l->forward, rows, l->n, l->turned);
+  sonde_cholesky_forward_many(l->factor, l->n, l->turned, rows);
+  const sonde_product spread = {.c = l->within,
+                                .c_row = rows,
+                                .a = l->turned,
+                                .a_row = 1,
+                                .a_step = rows,
+                                .b = l->turned,
+                                .b_row = rows,
+                                .rows = rows,
+                                .columns = rows,
+                                .depth = l->n,
+                                .subtract = true};
+  sonde_multiply(&spread);
   if (!sonde_cholesky(l->within, rows)) return false;
   sonde_cholesky_solve(l->within, rows, l->error_n);
-  at = 0;
   for (uint32_t k = start[0]; k < start[1]; ++k)
     if (sonde_refit_uses(r, k)) l->error_n[at++] /= sonde_refit_weigh(r, k, force_n[k]).weight;
   return true;
@@ -188,32 +204,44 @@ done:
   return status;
 }
 
+// l->turned = H^-1 of `count` rows in l->forward, and these themselves become H^-1 of them.
+static void solve_rows(linear *l, uint32_t count) {
+  sonde_transpose(l->forward, count, l->n, l->turned);
+  sonde_cholesky_solve_many(l->factor, l->n, l->turned, count);
+  sonde_transpose(l->turned, l->n, count, l->forward);
+}
+
 // Covariance H^-1 (sum (w r)^2/(1 - h)^2 J J^T) H^-1: the spread of the residuals as they are,
 // whatever their standard deviations were assumed to be; h is the leverage. factor: Cholesky of H.
 static void sandwich(const sonde_refit *r, const sonde_refit_workspace *w, const double *force_n,
                      linear *l, double *covariance) {
-  uint32_t n = l->n;
-  for (uint32_t k = 0; k < w->rows; ++k) {
-    if (!sonde_refit_uses(r, k)) continue;
-    sonde_refit_row row = sonde_refit_weigh(r, k, force_n[k]);
-    const double *slope = &w->kept_jacobian[(size_t)k * n];
-    double leverage = 0;
-    memcpy(l->step, slope, n * sizeof *l->step);
-    sonde_cholesky_solve(l->factor, n, l->step);
-    for (uint32_t a = 0; a < n; ++a) leverage += row.weight * slope[a] * l->step[a];
-    SONDE_ASSERT(leverage >= 0);
-    double pull = row.weight * row.error_n / fmax(1 - leverage, 0.2);
-    sonde_add_outer(covariance, n, l->step, pull * pull);
+  uint32_t n = l->n, most = most_rows(r->plan);
+  for (uint32_t from = 0; from < w->rows; from += most) {
+    uint32_t count = w->rows - from < most ? w->rows - from : most;
+    memcpy(l->forward, &w->kept_jacobian[(size_t)from * n], (size_t)count * n * sizeof *l->forward);
+    solve_rows(l, count);
+    for (uint32_t k = 0; k < count; ++k) {
+      sonde_refit_row row = sonde_refit_weigh(r, from + k, force_n[from + k]);
+      const double *slope = &w->kept_jacobian[(size_t)(from + k) * n];
+      double leverage = 0;
+      for (uint32_t a = 0; a < n; ++a)
+        leverage += row.weight * slope[a] * l->forward[(size_t)k * n + a];
+      double pull = row.weight * row.error_n / fmax(1 - leverage, 0.2);
+      l->error_n[k] = sonde_refit_uses(r, from + k) ? pull * pull : 0;
+    }
+    sonde_add_outers(covariance, n, l->forward, count, l->error_n);
   }
 }
 
 // The prior holds the fields only as far as it is true: its own spread counts too.
 static void add_prior_spread(const sonde_refit *r, linear *l, double *covariance) {
-  for (uint32_t k = 0; k < sonde_refit_prior_rows(r); ++k) {
-    double weight = sonde_refit_prior_row(r, r->smoothness, k, l->step);
-    SONDE_ASSERT(isfinite(weight));
-    sonde_cholesky_solve(l->factor, l->n, l->step);
-    sonde_add_outer(covariance, l->n, l->step, weight);
+  uint32_t n = l->n, most = most_rows(r->plan), rows = sonde_refit_prior_rows(r);
+  for (uint32_t from = 0; from < rows; from += most) {
+    uint32_t count = rows - from < most ? rows - from : most;
+    for (uint32_t k = 0; k < count; ++k)
+      l->error_n[k] = sonde_refit_prior_row(r, r->smoothness, from + k, &l->forward[(size_t)k * n]);
+    solve_rows(l, count);
+    sonde_add_outers(covariance, n, l->forward, count, l->error_n);
   }
 }
 
@@ -253,7 +281,7 @@ static void correlate(const sonde_refit *r, const double *covariance, double cor
     for (int b = 0; b < 4; ++b) correlation[a][b] = c[a][b] / sqrt(c[a][a] * c[b][b]);
 }
 
-// One draw: sites with replacement, one step of the linearised problem; ln G and ln gm.
+// Sites with replacement, one step of the linearised problem; ln G and ln gm.
 static bool draw_sites(const sonde_refit *r, sonde_refit_workspace *w, const double *theta,
                        uint32_t draw, linear *l, double *out) {
   uint32_t sites = l->site_count, n = l->n;

@@ -31,6 +31,41 @@ static void fill(const sonde_model *model, const sonde_cut *cut, sonde_model *to
   }
 }
 
+// The model's edge that the edge between two vertices is a part of; UINT32_MAX when it crosses a
+// face.
+static uint32_t edge_below(const sonde_model *model, const sonde_cut *cut, const uint32_t end[2]) {
+  uint32_t node[2], count = 0;
+  for (int v = 0; v < 2; ++v)
+    for (int k = 0; k < 3; ++k) {
+      uint32_t of = cut->parent[end[v]][k];
+      if (!(cut->share[end[v]][k] > 0) || (count && of == node[0]) || (count > 1 && of == node[1]))
+        continue;
+      if (count == 2) return UINT32_MAX;
+      node[count++] = of;
+    }
+  SONDE_ASSERT(count == 2);
+  const sonde_topology *t = &model->topology;
+  uint32_t k = t->start[node[0]];
+  while (t->neighbour[k] != node[1]) ++k;
+  SONDE_ASSERT(k < t->start[node[0] + 1]);
+  return t->neighbour_edge[k];
+}
+
+// Springs stay where they are: parts of one hang in series, so that each is as stiff as it is
+// short, and what the cut adds across faces carries none.
+static sonde_status divide_springs(const sonde_model *model, const sonde_cut *cut, sonde_model *to,
+                                   sonde_error *error) {
+  to->edge_share = SONDE_NEW(double, to->topology.edge_count);
+  if (!to->edge_share) return sonde_fail_memory(error);
+  for (uint32_t e = 0; e < to->topology.edge_count; ++e) {
+    uint32_t of = edge_below(model, cut, to->topology.edges[e]);
+    if (of == UINT32_MAX) continue;
+    double whole = model->edge_share ? model->edge_share[of] : 1;
+    to->edge_share[e] = whole * model->edge_rest_m[of] / to->edge_rest_m[e];
+  }
+  return SONDE_OK;
+}
+
 sonde_status sonde_cut_model(const sonde_model *model, const sonde_cut *cut,
                              sonde_model **cut_model, sonde_error *error) {
   sonde_model *to = *cut_model = SONDE_NEW(sonde_model, 1);
@@ -43,6 +78,7 @@ sonde_status sonde_cut_model(const sonde_model *model, const sonde_cut *cut,
     for (int k = 0; k < 3; ++k) to->surface.faces[f][k] = cut->face[f][k];
   if (!status) status = sonde_model_allocate_nodes(to, error);
   if (!status) status = sonde_model_derive(to, error);
+  if (!status) status = divide_springs(model, cut, to, error);
   if (!status) {
     fill(model, cut, to);
     return SONDE_OK;

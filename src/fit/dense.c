@@ -1,45 +1,155 @@
-// sonde_cholesky: factor by rows. sonde_cholesky_forward, _solve: forward, then backward.
+// sonde_multiply: by the widest kernels that this processor runs.
+// factor_rows:    rows of the transposed factor against each other and what follows them.
+// sonde_cholesky: blocks of rows of the transposed factor in the upper triangle, then mirrored.
+// sonde_cholesky_forward, _solve: forward, then backward; _many: by blocks of rows.
+// sonde_add_outers: by strips of the lower triangle.
 #include "fit/dense.h"
 
 #include "base/base.h"
 
 #include <math.h>
 
+enum { BLOCK = 16, STRIP = 32 };
+
+void sonde_multiply(const sonde_product *product) {
+#ifdef __x86_64__
+  if (__builtin_cpu_supports("avx2")) {
+    sonde_dense_kernels_avx2.multiply(product);
+    return;
+  }
+#endif
+  sonde_dense_kernels_base.multiply(product);
+}
+
+static void mirror(double *a, uint32_t n, bool to_upper) {
+  for (uint32_t i = 0; i < n; ++i)
+    for (uint32_t j = 0; j < i; ++j)
+      if (to_upper)
+        a[(size_t)j * n + i] = a[(size_t)i * n + j];
+      else
+        a[(size_t)i * n + j] = a[(size_t)j * n + i];
+}
+
+// Rows [from, to) of the upper triangle, from which all earlier ones have been taken.
+static bool factor_rows(double *a, uint32_t n, uint32_t from, uint32_t to) {
+  for (uint32_t i = from; i < to; ++i) {
+    double *row = a + (size_t)i * n;
+    for (uint32_t k = from; k < i; ++k) {
+      const double *above = a + (size_t)k * n;
+      double l = above[i];
+      for (uint32_t j = i; j < n; ++j) row[j] -= l * above[j];
+    }
+    if (!(row[i] > 0)) return false;
+    double root = row[i] = sqrt(row[i]);
+    for (uint32_t j = i + 1; j < n; ++j) row[j] /= root;
+  }
+  return true;
+}
+
 bool sonde_cholesky(double *a, uint32_t n) {
   SONDE_ASSERT(n > 0);
-  for (uint32_t i = 0; i < n; ++i) {
-    double *row = a + (size_t)i * n;
-    for (uint32_t j = 0; j <= i; ++j) {
-      const double *other = a + (size_t)j * n;
-      double sum = row[j];
-      for (uint32_t k = 0; k < j; ++k) sum -= row[k] * other[k];
-      if (i == j && !(sum > 0)) return false;
-      row[j] = i == j ? sqrt(sum) : sum / other[j];
-    }
+  mirror(a, n, true);
+  for (uint32_t i = 0; i < n; i += BLOCK) {
+    uint32_t end = n - i < BLOCK ? n : i + BLOCK;
+    const sonde_product product = {.c = a + (size_t)i * n + i,
+                                   .c_row = n,
+                                   .a = a + i,
+                                   .a_row = 1,
+                                   .a_step = n,
+                                   .b = a + i,
+                                   .b_row = n,
+                                   .rows = end - i,
+                                   .columns = n - i,
+                                   .depth = i,
+                                   .subtract = true};
+    sonde_multiply(&product);
+    if (!factor_rows(a, n, i, end)) return false;
   }
+  mirror(a, n, false);
   return true;
 }
 
 void sonde_cholesky_forward(const double *factor, uint32_t n, double *x) {
   SONDE_ASSERT(n > 0);
   for (uint32_t i = 0; i < n; ++i) {
-    for (uint32_t k = 0; k < i; ++k) x[i] -= factor[(size_t)i * n + k] * x[k];
-    x[i] /= factor[(size_t)i * n + i];
+    double sum = x[i];
+    for (uint32_t k = 0; k < i; ++k) sum -= factor[(size_t)i * n + k] * x[k];
+    x[i] = sum / factor[(size_t)i * n + i];
   }
 }
 
 void sonde_cholesky_solve(const double *factor, uint32_t n, double *x) {
   sonde_cholesky_forward(factor, n, x);
   for (uint32_t i = n; i-- > 0;) {
-    for (uint32_t k = i + 1; k < n; ++k) x[i] -= factor[(size_t)k * n + i] * x[k];
-    x[i] /= factor[(size_t)i * n + i];
+    double sum = x[i];
+    for (uint32_t k = i + 1; k < n; ++k) sum -= factor[(size_t)k * n + i] * x[k];
+    x[i] = sum / factor[(size_t)i * n + i];
   }
 }
 
-void sonde_add_outer(double *a, uint32_t n, const double *row, double weight) {
-  for (uint32_t i = 0; i < n; ++i) {
-    double scaled = weight * row[i], *to = a + (size_t)i * n;
-    if (fpclassify(scaled) == FP_ZERO) continue;
-    for (uint32_t j = 0; j <= i; ++j) to[j] += scaled * row[j];
+// x[i] -= sum over rows [from, to) of the coefficient times x[k]; along rows of L or of L^T.
+static void subtract_rows(const double *factor, uint32_t n, double *x, uint32_t columns, uint32_t i,
+                          uint32_t end, uint32_t from, uint32_t to, bool transposed) {
+  size_t row = transposed ? 1 : n, step = transposed ? n : 1;
+  const sonde_product product = {.c = x + (size_t)i * columns,
+                                 .c_row = columns,
+                                 .a = factor + i * row + from * step,
+                                 .a_row = row,
+                                 .a_step = step,
+                                 .b = x + (size_t)from * columns,
+                                 .b_row = columns,
+                                 .rows = end - i,
+                                 .columns = columns,
+                                 .depth = to - from,
+                                 .subtract = true};
+  sonde_multiply(&product);
+}
+
+static void divide_row(double *x, uint32_t columns, double by) {
+  for (uint32_t c = 0; c < columns; ++c) x[c] /= by;
+}
+
+void sonde_cholesky_forward_many(const double *factor, uint32_t n, double *x, uint32_t columns) {
+  SONDE_ASSERT(n > 0 && columns > 0);
+  for (uint32_t i = 0; i < n; i += BLOCK) {
+    uint32_t end = n - i < BLOCK ? n : i + BLOCK;
+    subtract_rows(factor, n, x, columns, i, end, 0, i, false);
+    for (uint32_t k = i; k < end; ++k) {
+      subtract_rows(factor, n, x, columns, k, k + 1, i, k, false);
+      divide_row(x + (size_t)k * columns, columns, factor[(size_t)k * n + k]);
+    }
   }
+}
+
+void sonde_cholesky_solve_many(const double *factor, uint32_t n, double *x, uint32_t columns) {
+  sonde_cholesky_forward_many(factor, n, x, columns);
+  for (uint32_t k = n; k-- > 0;) {
+    subtract_rows(factor, n, x, columns, k, k + 1, k + 1, n, true);
+    divide_row(x + (size_t)k * columns, columns, factor[(size_t)k * n + k]);
+  }
+}
+
+void sonde_add_outers(double *a, uint32_t n, const double *rows, uint32_t count,
+                      const double *weight) {
+  SONDE_ASSERT(n > 0);
+  for (uint32_t i = 0; i < n; i += STRIP) {
+    uint32_t end = n - i < STRIP ? n : i + STRIP;
+    const sonde_product product = {.c = a + (size_t)i * n,
+                                   .c_row = n,
+                                   .a = rows + i,
+                                   .a_row = 1,
+                                   .a_step = n,
+                                   .b = rows,
+                                   .b_row = n,
+                                   .rows = end - i,
+                                   .columns = end,
+                                   .depth = count,
+                                   .weight = weight};
+    sonde_multiply(&product);
+  }
+}
+
+void sonde_transpose(const double *from, uint32_t rows, uint32_t columns, double *to) {
+  for (uint32_t i = 0; i < rows; ++i)
+    for (uint32_t j = 0; j < columns; ++j) to[(size_t)j * rows + i] = from[(size_t)i * columns + j];
 }

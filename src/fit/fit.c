@@ -17,7 +17,7 @@
 static const double COLD_K0 = 1.8e5, COLD_ABOVE_M = 0.02;
 static const double EDGE_START_N_M = 50.0, TENSION_START_N = 1e-3;
 static const double LN_EDGE_LOW = -11.5, LN_EDGE_HIGH = 18.4; // 1e-5 .. 1e8 N/m
-static const double KEPT_EDGE_N_M = 0.1;
+static const double KEPT_EDGE_N_M = 0.01;
 static const double LN_TENSION_LOW = -13.8, LN_TENSION_HIGH = 6.9;
 
 sonde_fit_def sonde_fit_def_default(void) {
@@ -339,15 +339,20 @@ sonde_status sonde_fit(const sonde_model *model, const sonde_site_table *sites,
   return status;
 }
 
+void sonde_fit_confidence_clear(sonde_fit_confidence *c) {
+  sonde_free(c->ln_k0_sd);
+  sonde_free(c->ln_xm_sd);
+  sonde_free(c->ln_site_shear_sd);
+  sonde_free(c->ln_site_limit_sd);
+  sonde_free(c->band_n);
+  sonde_free(c->one_out_n);
+  *c = (sonde_fit_confidence){0};
+}
+
 void sonde_fit_result_clear(sonde_fit_result *result) {
   if (!result) return;
   for (int k = 0; k < 3; ++k) sonde_free(result->stage_n[k]);
-  sonde_free(result->confidence.ln_k0_sd);
-  sonde_free(result->confidence.ln_xm_sd);
-  sonde_free(result->confidence.ln_site_shear_sd);
-  sonde_free(result->confidence.ln_site_limit_sd);
-  sonde_free(result->confidence.band_n);
-  sonde_free(result->confidence.one_out_n);
+  sonde_fit_confidence_clear(&result->confidence);
   sonde_free(result->curves);
   sonde_free(result->sites);
   sonde_free(result->stage2_sites);

@@ -93,4 +93,11 @@ void sonde_footprint_edges(const sonde_footprint *footprint, double x, double co
 // Force of the simplified interaction with the model's parameters at its nodes.
 double sonde_footprint_force(const sonde_footprint *footprint, const sonde_model *model, double x);
 
+// Measurements of both tables, the first ones first; released by sonde_free(both->data). ARGUMENT
+// when a probe occurs in both.
+sonde_status sonde_measurements_join(const sonde_measurements *m, const sonde_measurements *also,
+                                     sonde_measurements *both, sonde_error *error);
+
+void sonde_fit_confidence_clear(sonde_fit_confidence *confidence);
+
 #endif

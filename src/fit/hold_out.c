@@ -2,7 +2,7 @@
 // start:         parameters at which a refit begins.
 // run_fold:      refit without that part, then its forces.
 // run_folds:     all parts in turn.
-// join:          measurements of both tables, checked to be of different probes.
+// sonde_measurements_join: measurements of both tables, checked to be of different probes.
 #include "fit/again.h"
 #include "sonde/fit_confidence.h"
 
@@ -89,8 +89,8 @@ sonde_status sonde_fit_hold_out(const sonde_model *model, const sonde_site_table
   return run_folds(model, sites, m, m->count, def, result, kind, progress, predicted_n, error);
 }
 
-static sonde_status join(const sonde_measurements *m, const sonde_measurements *also,
-                         sonde_measurements *both, sonde_error *error) {
+sonde_status sonde_measurements_join(const sonde_measurements *m, const sonde_measurements *also,
+                                     sonde_measurements *both, sonde_error *error) {
   for (uint32_t k = 0; k < also->count; ++k)
     for (uint32_t i = 0; i < m->count; ++i)
       if (strcmp(also->data[k].probe, m->data[i].probe) == 0)
@@ -111,7 +111,7 @@ sonde_status sonde_fit_hold_out_also(const sonde_model *model, const sonde_site_
                                      const sonde_progress *progress, double *predicted_n,
                                      sonde_error *error) {
   sonde_measurements both;
-  sonde_status status = join(m, also, &both, error);
+  sonde_status status = sonde_measurements_join(m, also, &both, error);
   if (status) return status;
   status = run_folds(model, sites, &both, m->count, def, result, SONDE_HOLD_OUT_SITES, progress,
                      predicted_n, error);

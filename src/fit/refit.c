@@ -5,6 +5,7 @@
 // sonde_refit_forces: all curves in parallel.
 // sonde_refit_start: nominal area enlarged by a rim of surrounding skin.
 #include "fit/refit.h"
+#include "fit/dense.h"
 #include "fit/parallel.h"
 #include "fit/refit_inside.h"
 #include "fit/site_field.h"
@@ -82,22 +83,39 @@ static sonde_status settle_datum(const sonde_refit *r, sonde_patch_solver *solve
   return status;
 }
 
-static void carry_to_sites(const sonde_refit *r, const sonde_patch *patch,
-                           const sonde_patch_gradient *gradient, double *row) {
+// The patch's part of the basis, in the order of its nodes.
+static void gather_basis(const sonde_refit *r, const sonde_patch *patch, double *basis) {
   uint32_t count = r->sites->count;
-  memset(row, 0, sonde_refit_parameters(r) * sizeof *row);
+  for (uint32_t i = 0; i < patch->node_count; ++i)
+    memcpy(basis + (size_t)i * count, &r->basis[(size_t)patch->node[i] * count],
+           count * sizeof *basis);
+}
+
+// First to the model's nodes, then by the basis to all sites at once.
+static void carry_to_sites(const sonde_refit *r, const sonde_patch *patch,
+                           sonde_refit_worker *worker, double *row) {
+  uint32_t count = r->sites->count, fields = r->fields;
+  const sonde_patch_gradient *gradient = &worker->gradient;
+  memset(worker->by_node, 0, (size_t)patch->node_count * fields * sizeof *worker->by_node);
   for (uint32_t i = 0; i < patch->place_count; ++i)
-    for (int k = 0; k < 3; ++k) {
-      double part = patch->share[i][k];
-      if (!(part > 0)) continue;
-      const double *basis = &r->basis[(size_t)patch->parent[i][k] * count];
-      for (uint32_t f = 0; f < r->fields; ++f) {
-        double by = part * gradient->by_place[f][i];
-        for (uint32_t s = 0; s < count; ++s) row[f * count + s] += basis[s] * by;
-      }
+    for (int k = 0; k < 3 && patch->share[i][k] > 0; ++k) {
+      double *to = &worker->by_node[(size_t)patch->among[i][k] * fields];
+      for (uint32_t f = 0; f < fields; ++f) to[f] += patch->share[i][k] * gradient->by_place[f][i];
     }
-  row[r->fields * count] = gradient->by_ln_shear;
-  row[r->fields * count + 1] = gradient->by_ln_limit;
+  memset(row, 0, sonde_refit_parameters(r) * sizeof *row);
+  const sonde_product product = {.c = row,
+                                 .c_row = count,
+                                 .a = worker->by_node,
+                                 .a_row = 1,
+                                 .a_step = fields,
+                                 .b = worker->basis,
+                                 .b_row = count,
+                                 .rows = fields,
+                                 .columns = count,
+                                 .depth = patch->node_count};
+  sonde_multiply(&product);
+  row[fields * count] = gradient->by_ln_shear;
+  row[fields * count + 1] = gradient->by_ln_limit;
 }
 
 typedef struct evaluation {
@@ -113,13 +131,14 @@ static sonde_status work_on_curve(void *user, uint32_t worker, uint32_t curve,
   SONDE_ASSERT(curve < r->plan->curve_count && worker < r->workers);
   const sonde_patch *patch = &r->patch[curve];
   sonde_patch_solver *solver = &r->crew[worker].solver;
-  sonde_patch_gradient *gradient = &r->crew[worker].gradient;
+  sonde_refit_worker *me = &r->crew[worker];
   uint32_t parameters = sonde_refit_parameters(r);
   depth_before before = {0};
   bool rough = r->rough && at->jacobian;
   sonde_status status = SONDE_OK;
   solver->adjoint_accuracy = rough ? ROUGH_ADJOINT : FINE_ADJOINT;
   sonde_patch_solver_use(solver, patch, &at->law);
+  if (at->jacobian) gather_basis(r, patch, me->basis);
   for (uint32_t k = r->plan->curve_start[curve]; k < r->plan->curve_start[curve + 1]; ++k) {
     if (!sonde_refit_uses(r, k)) continue;
     if (atomic_load(stop)) return sonde_fail(error, SONDE_CANCELLED, "cancelled");
@@ -128,13 +147,13 @@ static sonde_status work_on_curve(void *user, uint32_t worker, uint32_t curve,
     sonde_error inner;
     status = settle_datum(r, solver, k, rough, depth, &before, s, &inner);
     if (!status)
-      status = sonde_patch_force(solver, depth, s, &at->force_n[k], at->jacobian ? gradient : NULL,
-                                 &inner);
+      status = sonde_patch_force(solver, depth, s, &at->force_n[k],
+                                 at->jacobian ? &me->gradient : NULL, &inner);
     if (status)
       return sonde_fail(error, status, "site %u, probe %s: %s",
                         r->sites->sites[r->plan->curve_site[curve]].id,
                         r->plan->probe[r->plan->curve_probe[curve]], inner.message);
-    if (at->jacobian) carry_to_sites(r, patch, gradient, at->jacobian + (size_t)k * parameters);
+    if (at->jacobian) carry_to_sites(r, patch, me, at->jacobian + (size_t)k * parameters);
     before = (depth_before){s, depth, at->jacobian != NULL};
   }
   return SONDE_OK;
@@ -155,7 +174,9 @@ sonde_status sonde_refit_forces(sonde_refit *r, const double *theta, double *for
                     .shear_n_m = exp(shear[0]),
                     .limit = exp(shear[1]),
                     .guard = law->guard,
-                    .tangential_n_m3 = law->tangential_stiffness_n_m3},
+                    .tangential_n_m3 = law->tangential_stiffness_n_m3,
+                    .membrane = r->membrane,
+                    .stiffening = r->stiffening},
                    force_n,
                    jacobian};
   return sonde_parallel_run(r->plan->curve_count, r->workers, work_on_curve, &at, progress,
@@ -220,15 +241,20 @@ static sonde_status create_starts(sonde_refit *r, sonde_error *error) {
 }
 
 static sonde_status create_crew(sonde_refit *r, uint32_t threads, sonde_error *error) {
-  uint32_t curves = r->plan->curve_count, places = 0;
+  uint32_t curves = r->plan->curve_count, places = 0, nodes = 0;
   r->workers = sonde_parallel_workers(threads, curves);
   r->crew = SONDE_NEW(sonde_refit_worker, r->workers);
   if (!r->crew) return sonde_fail_memory(error);
-  for (uint32_t c = 0; c < curves; ++c)
+  for (uint32_t c = 0; c < curves; ++c) {
     if (r->patch[c].place_count > places) places = r->patch[c].place_count;
+    if (r->patch[c].node_count > nodes) nodes = r->patch[c].node_count;
+  }
   for (uint32_t w = 0; w < r->workers; ++w) {
     sonde_status status = sonde_patch_solver_create(r->patch, curves, &r->crew[w].solver, error);
     if (status) return status;
+    r->crew[w].by_node = SONDE_NEW(double, (size_t)nodes * r->fields);
+    r->crew[w].basis = SONDE_NEW(double, (size_t)nodes * r->sites->count);
+    if (!r->crew[w].by_node || !r->crew[w].basis) return sonde_fail_memory(error);
     for (int f = 0; f < 4; ++f)
       if (!(r->crew[w].gradient.by_place[f] = SONDE_NEW(double, places)))
         return sonde_fail_memory(error);
@@ -284,6 +310,8 @@ void sonde_refit_destroy(sonde_refit *r) {
   for (uint32_t c = 0; r->patch && c < r->plan->curve_count; ++c) sonde_patch_clear(&r->patch[c]);
   for (uint32_t w = 0; r->crew && w < r->workers; ++w) {
     sonde_patch_solver_clear(&r->crew[w].solver);
+    sonde_free(r->crew[w].by_node);
+    sonde_free(r->crew[w].basis);
     for (int f = 0; f < 4; ++f) sonde_free(r->crew[w].gradient.by_place[f]);
   }
   sonde_free(r->crew);

@@ -14,6 +14,7 @@ typedef struct sonde_smoothness {
 typedef struct sonde_refit_worker {
   sonde_patch_solver solver;
   sonde_patch_gradient gradient;
+  double *by_node, *basis; // of the nodes of a patch: [nodes * fields], [nodes * sites]
 } sonde_refit_worker;
 
 struct sonde_refit {
@@ -40,6 +41,8 @@ struct sonde_refit {
   double enough;           // relative fall of the cost that is not worth a step; 0: default
   bool near;               // the start is near the optimum: no minimisation on few depths before
   bool rough;              // equilibria need not be exact
+  bool membrane;           // the layer is a membrane: T and k in the places of G and gm (shear.h)
+  double stiffening;       // its c
   uint32_t stride;         // every so many rows of a curve, counted from its last, take part
 };
 
@@ -60,7 +63,9 @@ void sonde_normal_clear(sonde_normal *normal); // all zero
 void sonde_normal_copy(const sonde_normal *from, sonde_normal *to);
 // Adds `times` another one.
 void sonde_normal_add(const sonde_normal *other, double times, sonde_normal *normal);
-void sonde_normal_add_row(sonde_normal *normal, const double *row, double residual, double weight);
+// Adds rows [count][n].
+void sonde_normal_add_rows(sonde_normal *normal, const double *rows, uint32_t count,
+                           const double *residual, const double *weight);
 // The minimiser of the quadratic: Cholesky in factor [n * n], step [n]; damping scales the diagonal
 // by 1 + damping. False: not positive definite.
 bool sonde_normal_solve(const sonde_normal *normal, double damping, double *factor, double *step);

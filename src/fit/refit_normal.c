@@ -14,6 +14,7 @@
 static const double SHARE_SD = 0.3;
 // Of the mean of these logarithms: nothing, so that G and gm are the leg's geometric means.
 static const double MEAN_SD = 3e-3;
+enum { CHUNK = 64 };
 
 bool sonde_normal_create(sonde_normal *normal, uint32_t n) {
   *normal = (sonde_normal){n, SONDE_NEW(double, (size_t)n *n), SONDE_NEW(double, n)};
@@ -48,9 +49,12 @@ void sonde_normal_add(const sonde_normal *other, double times, sonde_normal *nor
   }
 }
 
-void sonde_normal_add_row(sonde_normal *normal, const double *row, double residual, double weight) {
-  sonde_add_outer(normal->matrix, normal->n, row, weight);
-  for (uint32_t a = 0; a < normal->n; ++a) normal->gradient[a] += weight * row[a] * residual;
+void sonde_normal_add_rows(sonde_normal *normal, const double *rows, uint32_t count,
+                           const double *residual, const double *weight) {
+  sonde_add_outers(normal->matrix, normal->n, rows, count, weight);
+  for (uint32_t k = 0; k < count; ++k)
+    for (uint32_t a = 0; a < normal->n; ++a)
+      normal->gradient[a] += weight[k] * rows[(size_t)k * normal->n + a] * residual[k];
 }
 
 bool sonde_normal_solve(const sonde_normal *normal, double damping, double *factor, double *step) {
@@ -78,15 +82,22 @@ sonde_refit_row sonde_refit_weigh(const sonde_refit *r, uint32_t row, double for
   return (sonde_refit_row){error_n, weight / (sd_n * sd_n), loss};
 }
 
+// Rows that do not take part get no weight.
 double sonde_refit_add_rows(const sonde_refit *r, uint32_t first, uint32_t end,
                             const double *force_n, const double *jacobian, sonde_normal *normal) {
-  double loss = 0;
-  for (uint32_t k = first; k < end; ++k) {
-    if (!sonde_refit_uses(r, k)) continue;
-    sonde_refit_row row = sonde_refit_weigh(r, k, force_n[k]);
-    loss += row.loss;
+  double loss = 0, error[CHUNK], weight[CHUNK];
+  for (uint32_t from = first; from < end; from += CHUNK) {
+    uint32_t count = end - from < CHUNK ? end - from : CHUNK;
+    for (uint32_t k = 0; k < count; ++k) {
+      error[k] = weight[k] = 0;
+      if (!sonde_refit_uses(r, from + k)) continue;
+      sonde_refit_row row = sonde_refit_weigh(r, from + k, force_n[from + k]);
+      error[k] = row.error_n;
+      weight[k] = row.weight;
+      loss += row.loss;
+    }
     if (normal)
-      sonde_normal_add_row(normal, jacobian + (size_t)k * normal->n, row.error_n, row.weight);
+      sonde_normal_add_rows(normal, jacobian + (size_t)from * normal->n, count, error, weight);
   }
   return loss;
 }
@@ -114,16 +125,28 @@ double sonde_refit_prior_row(const sonde_refit *r, sonde_smoothness s, uint32_t 
   return 1 / (sd * sd);
 }
 
+// Where row k of the prior has entries: in one field.
+static uint32_t prior_begins(const sonde_refit *r, uint32_t k) {
+  uint32_t count = r->sites->count, field = k / count, last = sonde_refit_prior_rows(r) - k;
+  if (r->fields > 2 && last <= r->fields - 2) return (r->fields - last) * count;
+  return (field < r->fields ? field : field - r->fields + 2) * count;
+}
+
 double sonde_refit_add_prior(const sonde_refit *r, const double *theta, sonde_smoothness s,
                              double *row, sonde_normal *normal) {
-  uint32_t n = sonde_refit_parameters(r);
+  uint32_t n = sonde_refit_parameters(r), count = r->sites->count;
   double cost = 0;
   SONDE_ASSERT(!normal || normal->n == n);
   for (uint32_t k = 0; k < sonde_refit_prior_rows(r); ++k) {
     double weight = sonde_refit_prior_row(r, s, k, row), residual = 0;
-    for (uint32_t t = 0; t < n; ++t) residual += row[t] * theta[t];
+    uint32_t begin = prior_begins(r, k), end = begin + count;
+    for (uint32_t t = begin; t < end; ++t) residual += row[t] * theta[t];
     cost += 0.5 * weight * residual * residual;
-    if (normal) sonde_normal_add_row(normal, row, residual, weight);
+    for (uint32_t i = begin; normal && i < end; ++i) {
+      double scaled = weight * row[i];
+      normal->gradient[i] += scaled * residual;
+      for (uint32_t j = begin; j <= i; ++j) normal->matrix[(size_t)i * n + j] += scaled * row[j];
+    }
   }
   SONDE_ASSERT(isfinite(cost));
   return cost;

@@ -7,7 +7,7 @@
 
 #include "fit/cut.h"
 #include "fit/fit_inside.h"
-#include "sonde/sparse.h"
+#include "sparse/frontal.h"
 
 typedef struct sonde_patch_face {
   uint32_t place[3];
@@ -21,14 +21,18 @@ typedef struct sonde_patch {
   uint32_t free_count, place_count;
   uint32_t (*parent)[3]; // [place_count] model nodes whose parameters it takes
   double (*share)[3];    // [place_count] of each parent, sum 1
+  uint32_t node_count;   // of model nodes among the parents
+  uint32_t *node;        // [node_count] ascending
+  uint32_t (*among)[3];  // [place_count] the parents as indices of node
   double *area_m2;       // [place_count]
   double *cosine;        // [place_count] rest normal . site normal for held places, else 0
   double sliding_m2;     // sum of A (1 - cosine^2): how far the footprint drags tangential springs
   uint32_t face_count;
   sonde_patch_face *face;
+  uint32_t side_count, *side;   // [side_count] faces with free and held corners
   uint32_t *row_start, *column; // matrix of the free places, full pattern
   uint32_t *diagonal;           // [free_count] entry
-  sonde_vec3 *point_m;          // [free_count]
+  sonde_frontal *frontal;       // its analysis
   bool coarse;                  // the mesh is too coarse for the footprint
 } sonde_patch;
 
@@ -42,7 +46,16 @@ void sonde_patch_clear(sonde_patch *patch);
 typedef struct sonde_patch_law {
   const double *ln_k0, *ln_xm, *ln_shear, *ln_limit; // the last two NULL: uniform
   double exponent, shear_n_m, limit, guard, tangential_n_m3;
+  // The layer as a membrane with tension: q(g) = (T + k e (1 + c e^2)) g/sqrt(1 + g^2) with
+  // e = sqrt(1 + g^2) - 1, T = shear_n_m, k = limit (N/m); else G and gm.
+  bool membrane;
+  double stiffening; // c
 } sonde_patch_law;
+
+typedef struct sonde_patch_face_law {
+  double shear_n_m, limit;   // G and gm, or T and k
+  double by_shear, by_limit; // 1 over the sums of its corners' shares
+} sonde_patch_face_law;
 
 // Scratch of one worker, large enough for any patch of a list. Systems are solved by conjugate
 // gradients with the factor of an earlier matrix, which is renewed when that takes too long.
@@ -52,18 +65,31 @@ typedef struct sonde_patch_solver {
   double adjoint_accuracy; // relative, of the gradients; 1e-6 from creation
   const double *settled_m; // indentations to which residual, value and load_n belong
   double load_n;           // force of the held places there
-  sonde_ldl *ldl;          // of a matrix of patch; NULL before its first factorisation
-  double *k0_n_m3, *xm_m, *shear_share, *limit_share; // of the places
-  double *residual, *step, *trial, *multiplier, *value, *scratch;
+  bool factored;           // factor is of a matrix of patch
+  // Of the places and faces with the law's parameters.
+  double *k0_n_m3, *xm_m, *shear_share, *limit_share;
+  double *stiff, *inverse_xm; // A k0, 1/xm
+  sonde_patch_face_law *face_law;
+  double *steepness; // 1/(A gm^2)
+  // At the last assembly: A p and A p' of places; of faces flux (half the cotangent Laplacian of
+  // s), A g^2, secant modulus q/g and factor of the rank-one part of the stiffness.
+  double *normal_n, *normal_slope, *residual, *value;
+  double (*flux)[3], *square, *secant, *beyond;
+  float *factor, *scratch;
+  double *work, *step, *trial, *multiplier;
   double *right, *preconditioned, *direction, *product;
 } sonde_patch_solver;
 
 sonde_status sonde_patch_solver_create(const sonde_patch *patches, uint32_t count,
                                        sonde_patch_solver *solver, sonde_error *error);
 void sonde_patch_solver_clear(sonde_patch_solver *solver);
-// Turns to a patch and its parameters; the next solve orders and analyses its matrix.
+// Turns to a patch and its parameters.
 void sonde_patch_solver_use(sonde_patch_solver *solver, const sonde_patch *patch,
                             const sonde_patch_law *law);
+
+// Residual of every place and the matrix of the free ones at indentations s. Returns |R| over the
+// free places; *load_n is the force of the held ones.
+double sonde_patch_assemble(sonde_patch_solver *solver, const double *s, double *load_n);
 
 // Equilibrium with the footprint at a depth; s_m [place_count] holds the start in its free places.
 // Newton with line search until |R| <= relative * force.
@@ -75,6 +101,10 @@ typedef struct sonde_patch_gradient {
   double *by_place[4];             // [place_count] by ln k0, ln xm, ln shares of G and gm there
   double by_ln_shear, by_ln_limit; // of the whole skin
 } sonde_patch_gradient;
+
+// Derivatives of sum mu R at the last assembly.
+void sonde_patch_differentiate(const sonde_patch_solver *solver, const double *s, const double *mu,
+                               sonde_patch_gradient *gradient);
 
 // Force along the site's normal where sonde_patch_settle() has just ended. gradient (may be NULL):
 // by one adjoint solve, which also takes the first order of the remaining residual out of the force

@@ -1,7 +1,8 @@
 // order_places:  free nodes first, then the held vertices.
+// find_parents:  nodes whose parameters the places take.
 // add_faces:     areas and cotangents of the cut faces.
 // build_rows:    pattern of the free places' matrix, ascending columns.
-// find_entries:  where each face adds to it.
+// find_entries:  where each face adds to it. analyse: its order of elimination.
 #include "fit/shear.h"
 
 #include "base/maths.h"
@@ -14,21 +15,41 @@ enum { NOWHERE = UINT32_MAX };
 // a length l meets there what an endless skin would offer, k0 l per length.
 static const double RIM_WIDTH_M = 0.009;
 
+static int compare_nodes(const void *a, const void *b) {
+  uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
+  return (x > y) - (x < y);
+}
+
 static bool allocate_places(sonde_patch *p, const sonde_cut *cut) {
   size_t places = cut->vertex_count;
   p->parent = sonde_calloc(places, sizeof *p->parent);
   p->share = sonde_calloc(places, sizeof *p->share);
+  p->among = sonde_calloc(places, sizeof *p->among);
+  p->node = SONDE_NEW(uint32_t, cut->node_count);
   p->area_m2 = SONDE_NEW(double, places);
   p->cosine = SONDE_NEW(double, places);
   p->face = SONDE_NEW(sonde_patch_face, cut->face_count);
-  p->point_m = SONDE_NEW(sonde_vec3, p->free_count);
+  p->side = SONDE_NEW(uint32_t, cut->face_count);
   p->row_start = SONDE_NEW(uint32_t, p->free_count + 1);
   p->diagonal = SONDE_NEW(uint32_t, p->free_count);
-  return p->parent && p->share && p->area_m2 && p->cosine && p->face && p->point_m &&
-         p->row_start && p->diagonal;
+  return p->parent && p->share && p->among && p->node && p->area_m2 && p->cosine && p->face &&
+         p->side && p->row_start && p->diagonal;
 }
 
-// Vertices that are nodes come in ascending order, so free places ascend with nodes.
+// Vertices that are nodes come first and ascend.
+static void find_parents(const sonde_cut *cut, const uint32_t *place, sonde_patch *p) {
+  p->node_count = cut->node_count;
+  for (uint32_t v = 0; v < cut->node_count; ++v) p->node[v] = cut->parent[v][0];
+  for (uint32_t v = 0; v < cut->vertex_count; ++v)
+    for (int k = 0; k < 3; ++k) {
+      const uint32_t *at =
+          bsearch(&cut->parent[v][k], p->node, p->node_count, sizeof *p->node, compare_nodes);
+      SONDE_ASSERT(at != NULL);
+      p->among[place[v]][k] = (uint32_t)(at - p->node);
+    }
+}
+
+// Free places ascend with nodes.
 static void order_places(const sonde_model *model, const sonde_cut *cut, sonde_vec3 normal,
                          uint32_t *place, sonde_patch *p) {
   uint32_t free = 0, held = p->free_count;
@@ -37,10 +58,7 @@ static void order_places(const sonde_model *model, const sonde_cut *cut, sonde_v
     memcpy(p->parent[at], cut->parent[v], sizeof p->parent[at]);
     memcpy(p->share[at], cut->share[v], sizeof p->share[at]);
     p->area_m2[at] = v < cut->node_count ? RIM_WIDTH_M * cut->rim_m[v] : 0;
-    if (cut->held[v])
-      p->cosine[at] = v_dot(sonde_cut_normal(model, cut, v), normal);
-    else
-      p->point_m[at] = sonde_cut_point(model, cut, v);
+    if (cut->held[v]) p->cosine[at] = v_dot(sonde_cut_normal(model, cut, v), normal);
   }
   SONDE_ASSERT(free == p->free_count && held == p->place_count);
 }
@@ -106,12 +124,30 @@ static uint32_t entry_of(const sonde_patch *p, uint32_t row, uint32_t column) {
 }
 
 static void find_entries(sonde_patch *p) {
+  for (uint32_t f = 0; f < p->face_count; ++f) {
+    uint32_t held = 0;
+    for (int k = 0; k < 3; ++k) held += p->face[f].place[k] >= p->free_count;
+    if (held == 1 || held == 2) p->side[p->side_count++] = f;
+  }
   for (uint32_t f = 0; f < p->face_count; ++f)
     for (int k = 0; k < 3; ++k) {
       uint32_t a = p->face[f].place[(k + 1) % 3], b = p->face[f].place[(k + 2) % 3];
       p->face[f].entry[k][0] = entry_of(p, a, b);
       p->face[f].entry[k][1] = entry_of(p, b, a);
     }
+}
+
+static sonde_status analyse(const sonde_model *model, const sonde_cut *cut, sonde_patch *p,
+                            sonde_error *error) {
+  sonde_vec3 *point_m = SONDE_NEW(sonde_vec3, p->free_count);
+  if (!point_m) return sonde_fail_memory(error);
+  uint32_t free = 0;
+  for (uint32_t v = 0; v < cut->vertex_count; ++v)
+    if (!cut->held[v]) point_m[free++] = sonde_cut_point(model, cut, v);
+  const sonde_pattern pattern = {p->free_count, p->row_start, p->column, point_m};
+  sonde_status status = sonde_frontal_create(&pattern, &p->frontal, error);
+  sonde_free(point_m);
+  return status;
 }
 
 static sonde_status fill(const sonde_model *model, const sonde_cut *cut, const sonde_site *site,
@@ -122,12 +158,14 @@ static sonde_status fill(const sonde_model *model, const sonde_cut *cut, const s
     return sonde_fail_memory(error);
   }
   order_places(model, cut, site->normal, place, p);
+  find_parents(cut, place, p);
   for (uint32_t f = 0; f < cut->face_count; ++f) add_face(model, cut, f, place, p);
   for (uint32_t k = p->free_count; k < p->place_count; ++k)
     p->sliding_m2 += p->area_m2[k] * (1 - p->cosine[k] * p->cosine[k]);
   sonde_free(place);
   sonde_status status = build_rows(p, error);
   if (!status) find_entries(p);
+  if (!status) status = analyse(model, cut, p, error);
   return status;
 }
 
@@ -154,12 +192,15 @@ sonde_status sonde_patch_create(const sonde_model *model, const sonde_site *site
 void sonde_patch_clear(sonde_patch *p) {
   sonde_free(p->parent);
   sonde_free(p->share);
+  sonde_free(p->among);
+  sonde_free(p->node);
   sonde_free(p->area_m2);
   sonde_free(p->cosine);
   sonde_free(p->face);
+  sonde_free(p->side);
   sonde_free(p->row_start);
   sonde_free(p->column);
   sonde_free(p->diagonal);
-  sonde_free(p->point_m);
+  sonde_frontal_destroy(p->frontal);
   *p = (sonde_patch){0};
 }

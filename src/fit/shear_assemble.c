@@ -1,0 +1,209 @@
+// spread_law: parameters of places and faces. press: normal springs of all places.
+// slopes:     gradients of s over some faces. resist: secant moduli of the layer there.
+// resist_steep: the same where the limit is near, and of a membrane.
+// add_faces:  into residual and matrix.
+// sonde_patch_assemble: all of it. sonde_patch_differentiate: the same numbers by parameters.
+#include "fit/shear.h"
+
+#include "base/maths.h"
+
+#include <string.h>
+
+enum { BLOCK = 64 };
+static const double STEEP = 0.85; // (g/gm)^2 from which the law's straight part may begin
+static const double FLAT = 1e-9;  // slope whose secant modulus is the tangent
+
+static double sum_of(const double *field, const uint32_t place[3]) {
+  return field[place[0]] + field[place[1]] + field[place[2]];
+}
+
+// A face takes the mean of its corners, as the model's two layers have it.
+static void spread_law(sonde_patch_solver *solver) {
+  const sonde_patch *p = solver->patch;
+  const sonde_patch_law *law = &solver->law;
+  for (uint32_t i = 0; i < p->place_count; ++i)
+    solver->inverse_xm[i] = 1 / solver->xm_m[i],
+    solver->stiff[i] = p->area_m2[i] * solver->k0_n_m3[i];
+  for (uint32_t f = 0; f < p->face_count; ++f) {
+    const uint32_t *place = p->face[f].place;
+    double shear = sum_of(solver->shear_share, place), limit = sum_of(solver->limit_share, place);
+    sonde_patch_face_law *to = &solver->face_law[f];
+    to->shear_n_m = law->shear_n_m * shear / 3;
+    to->limit = law->limit * limit / 3;
+    to->by_shear = 1 / shear;
+    to->by_limit = 1 / limit;
+    solver->steepness[f] = 1 / (p->face[f].area_m2 * to->limit * to->limit);
+  }
+}
+
+void sonde_patch_solver_use(sonde_patch_solver *solver, const sonde_patch *patch,
+                            const sonde_patch_law *law) {
+  solver->factored = false;
+  solver->settled_m = NULL;
+  solver->patch = patch;
+  solver->law = *law;
+  const double *const from[] = {law->ln_k0, law->ln_xm, law->ln_shear, law->ln_limit};
+  double *const to[] = {solver->k0_n_m3, solver->xm_m, solver->shear_share, solver->limit_share};
+  for (uint32_t i = 0; i < patch->place_count; ++i) {
+    const uint32_t *of = patch->parent[i];
+    const double *share = patch->share[i];
+    for (int f = 0; f < 4; ++f) {
+      double ln = 0;
+      for (int k = 0; k < 3 && from[f]; ++k) ln += share[k] * from[f][of[k]];
+      to[f][i] = from[f] ? exp(ln) : 1;
+    }
+  }
+  spread_law(solver);
+}
+
+// x/(1 - x^n) of sonde_normal_pressure(), straight below zero when n > 1; the few places beyond the
+// guard are done again by that function.
+static void press(sonde_patch_solver *solver, const double *s) {
+  const sonde_patch *p = solver->patch;
+  const sonde_patch_law *law = &solver->law;
+  double n = law->exponent, *normal = solver->normal_n, *slope = solver->normal_slope;
+  const double *stiff = solver->stiff, *inverse_xm = solver->inverse_xm;
+  for (uint32_t i = 0; i < p->place_count; ++i) {
+    double x = s[i] * inverse_xm[i], straight = n > 1 && x < 0 ? 0 : x;
+    double power = n > 2 ? straight * straight * straight : n > 1 ? straight * straight : straight;
+    double inverse = 1 / (1 - power);
+    normal[i] = stiff[i] * s[i] * inverse;
+    slope[i] = stiff[i] * (1 + (n - 1) * power) * (inverse * inverse);
+  }
+  for (uint32_t i = 0; i < p->place_count; ++i)
+    if (s[i] > law->guard * solver->xm_m[i]) {
+      normal[i] = p->area_m2[i] * sonde_normal_pressure(n, solver->k0_n_m3[i], solver->xm_m[i],
+                                                        law->guard, s[i], &slope[i]);
+      slope[i] *= p->area_m2[i];
+    }
+}
+
+// flux[k] = half the cotangent Laplacian of s at corner k, so that square = A |grad s|^2 = sum s
+// flux.
+static void slopes(const sonde_patch_solver *solver, uint32_t from, uint32_t count,
+                   const double *s) {
+  for (uint32_t f = from; f < from + count; ++f) {
+    const sonde_patch_face *face = &solver->patch->face[f];
+    const double *half = face->half_cotangent;
+    double a = s[face->place[0]], b = s[face->place[1]], c = s[face->place[2]];
+    double across[3] = {half[0] * (b - c), half[1] * (c - a), half[2] * (a - b)};
+    double square = across[0] * (b - c) + across[1] * (c - a) + across[2] * (a - b);
+    double *flux = solver->flux[f];
+    flux[0] = across[2] - across[1];
+    flux[1] = across[0] - across[2];
+    flux[2] = across[1] - across[0];
+    solver->square[f] = square > 0 ? square : 0;
+  }
+}
+
+// Force q of the layer at a slope and dq/dg.
+static double layer_force(const sonde_patch_law *layer, const sonde_patch_face_law *law, double g,
+                          double *slope) {
+  if (!layer->membrane) return sonde_shear_force(law->shear_n_m, law->limit, g, slope);
+  double root = sqrt(1 + g * g), e = root - 1, c = layer->stiffening, steep = g / root;
+  double tension = law->shear_n_m + law->limit * e * (1 + c * e * e);
+  *slope = tension / (root * root * root) + law->limit * (1 + 3 * c * e * e) * steep * steep;
+  return tension * steep;
+}
+
+static void resist_steep(const sonde_patch_solver *solver, uint32_t f) {
+  double area = solver->patch->face[f].area_m2, g = sqrt(solver->square[f] / area), slope;
+  double q = layer_force(&solver->law, &solver->face_law[f], g, &slope);
+  solver->secant[f] = g > FLAT ? q / g : slope;
+  solver->beyond[f] = g > FLAT ? (slope - q / g) / solver->square[f] : 0;
+}
+
+// Secant modulus m = q/g and the factor (q' - m)/(g^2 A) of the rank-one part of a face's
+// stiffness. With r = (g/gm)^2: m = G/(1 - r), and the factor is 2 m/((1 - r) gm^2 A).
+static void resist(const sonde_patch_solver *solver, uint32_t from, uint32_t count) {
+  double *secant = solver->secant, *beyond = solver->beyond;
+  const double *square = solver->square, *steepness = solver->steepness;
+  for (uint32_t f = from; f < from + count; ++f) {
+    double inverse = 1 / (1 - square[f] * steepness[f]);
+    secant[f] = solver->face_law[f].shear_n_m * inverse;
+    beyond[f] = 2 * secant[f] * inverse * steepness[f];
+  }
+  for (uint32_t f = from; f < from + count; ++f)
+    if (solver->law.membrane || !(square[f] * steepness[f] < STEEP)) resist_steep(solver, f);
+}
+
+static void add_faces(const sonde_patch_solver *solver, uint32_t from, uint32_t count) {
+  const sonde_patch *p = solver->patch;
+  double *residual = solver->residual, *value = solver->value;
+  for (uint32_t f = from; f < from + count; ++f) {
+    const sonde_patch_face *face = &p->face[f];
+    const double *flux = solver->flux[f], *half = face->half_cotangent;
+    double modulus = solver->secant[f], beyond = solver->beyond[f];
+    for (int k = 0; k < 3; ++k) {
+      uint32_t at = face->place[k];
+      int a = (k + 1) % 3, b = (k + 2) % 3;
+      residual[at] += modulus * flux[k];
+      if (at < p->free_count)
+        value[p->diagonal[at]] += modulus * (half[a] + half[b]) + beyond * flux[k] * flux[k];
+      if (face->entry[k][0] == UINT32_MAX) continue;
+      double pair = beyond * flux[a] * flux[b] - modulus * half[k];
+      value[face->entry[k][0]] += pair;
+      value[face->entry[k][1]] += pair;
+    }
+  }
+}
+
+double sonde_patch_assemble(sonde_patch_solver *solver, const double *s, double *load_n) {
+  const sonde_patch *p = solver->patch;
+  double *residual = solver->residual, *value = solver->value;
+  SONDE_ASSERT(p && p->free_count > 0);
+  memset(value, 0, p->row_start[p->free_count] * sizeof *value);
+  press(solver, s);
+  memcpy(residual, solver->normal_n, p->place_count * sizeof *residual);
+  for (uint32_t i = 0; i < p->free_count; ++i) value[p->diagonal[i]] = solver->normal_slope[i];
+  for (uint32_t f = 0; f < p->face_count; f += BLOCK) {
+    uint32_t count = p->face_count - f < BLOCK ? p->face_count - f : BLOCK;
+    slopes(solver, f, count, s);
+    resist(solver, f, count);
+    add_faces(solver, f, count);
+  }
+  double sum = 0, load = 0;
+  for (uint32_t i = 0; i < p->free_count; ++i) sum += residual[i] * residual[i];
+  for (uint32_t i = p->free_count; i < p->place_count; ++i) load += residual[i] * p->cosine[i];
+  *load_n = load;
+  return sqrt(sum);
+}
+
+// What the first and the second parameter of a face's law count in q/g: q and q - g q' by ln G and
+// ln gm, since q(g; G, gm) = G gm f(g/gm), straight part included; a membrane is linear in T and k.
+static void face_parts(const sonde_patch_solver *solver, uint32_t f, double part[2]) {
+  part[0] = solver->secant[f];
+  part[1] = -solver->beyond[f] * solver->square[f];
+  if (!solver->law.membrane) return;
+  double stretch = sqrt(1 + solver->square[f] / solver->patch->face[f].area_m2);
+  part[0] = solver->face_law[f].shear_n_m / stretch;
+  part[1] = solver->secant[f] - part[0];
+}
+
+// p(s; k0, xm) = k0 xm f(s/xm), so k0 dp/dk0 = p and xm dp/dxm = p - s p', straight part included.
+void sonde_patch_differentiate(const sonde_patch_solver *solver, const double *s, const double *mu,
+                               sonde_patch_gradient *gradient) {
+  const sonde_patch *p = solver->patch;
+  double **by = gradient->by_place;
+  gradient->by_ln_shear = gradient->by_ln_limit = 0;
+  for (uint32_t i = 0; i < p->place_count; ++i) {
+    by[0][i] = mu[i] * solver->normal_n[i];
+    by[1][i] = mu[i] * (solver->normal_n[i] - s[i] * solver->normal_slope[i]);
+    by[2][i] = by[3][i] = 0;
+  }
+  // A corner's share counts in its face by its part of the sum.
+  for (uint32_t f = 0; f < p->face_count; ++f) {
+    const sonde_patch_face *face = &p->face[f];
+    const double *flux = solver->flux[f];
+    double part[2], along = 0;
+    face_parts(solver, f, part);
+    for (int k = 0; k < 3; ++k) along += mu[face->place[k]] * flux[k];
+    gradient->by_ln_shear += along * part[0];
+    gradient->by_ln_limit += along * part[1];
+    double shear = along * part[0] * solver->face_law[f].by_shear;
+    double limit = along * part[1] * solver->face_law[f].by_limit;
+    for (int k = 0; k < 3; ++k) by[2][face->place[k]] += shear, by[3][face->place[k]] += limit;
+  }
+  for (uint32_t i = 0; i < p->place_count; ++i)
+    by[2][i] *= solver->shear_share[i], by[3][i] *= solver->limit_share[i];
+}
