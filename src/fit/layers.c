@@ -100,7 +100,7 @@ static sonde_status compare(comparison *c, const sonde_fit_result *result, sonde
   sonde_refit *r = a->refit;
   for (uint32_t k = 0; k < a->plan.row_count; ++k) a->left_out[k] = a->plan.row[k] >= c->fitted;
   r->left_out = a->left_out;
-  for (int k = 0; k < SONDE_FIT_LAYERS; ++k) layer[k] = (sonde_fit_layer){.kind = k};
+  for (int k = 0; k < SONDE_FIT_LAYERS; ++k) layer[k] = (sonde_fit_layer){.kind = (sonde_layer)k};
   r->near = true;
   sonde_status status = settle(c, &layer[SONDE_LAYER_LIMIT], error);
   if (status) return status;
