@@ -62,6 +62,8 @@ static double segment_map(const sonde_echo *echo, const sonde_vessel_state *low,
   for (int k = 0; k < 3; ++k)
     out->axis[k] =
         v_scale(v_sub(sonde_echo_from_world(echo, v_madd(middle, 0.5, edge[k])), out->origin), 2);
+  double beside = 0.5 * (fabs(out->axis[0].y) + fabs(out->axis[1].y) + fabs(out->axis[2].y));
+  if (fabs(out->origin.y) > slab + beside) return 0;
   return SONDE_PI * half_short * half_long * length;
 }
 

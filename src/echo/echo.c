@@ -144,7 +144,7 @@ static bool allocate(sonde_echo *echo) {
   echo->flat_envelope = SONDE_NEW(float, image);
   echo->grey = SONDE_NEW(float, image);
   echo->noise = SONDE_NEW(float, SONDE_NOISE);
-  echo->cell_set = SONDE_NEW(uint64_t, SONDE_CELL_SET);
+  echo->seen = SONDE_NEW(uint64_t, (size_t)SONDE_BOX_SIDE * SONDE_BOX_SIDE * SONDE_BOX_SIDE / 64);
   bool pools = allocate_pool(&echo->pool, SONDE_POOL);
   pools = allocate_pool(&echo->loose, SONDE_LOOSE) && pools;
   pools = allocate_pool(&echo->blood, SONDE_BLOOD) && pools;
@@ -153,7 +153,7 @@ static bool allocate(sonde_echo *echo) {
          echo->gain && echo->loss_db && echo->air && echo->coupling && echo->first_echo &&
          echo->echoes && echo->grid && echo->line_re[0] && echo->line_re[1] && echo->line_im[0] &&
          echo->line_im[1] && echo->ring && echo->envelope && echo->flat_envelope && echo->grey &&
-         echo->noise && echo->cell_set;
+         echo->noise && echo->seen;
 }
 
 static sonde_status check_def(const sonde_echo_def *def, sonde_error *error) {
@@ -211,7 +211,7 @@ void sonde_echo_destroy(sonde_echo *echo) {
       echo->level[0],   echo->level[1],   echo->scatter,    echo->loss,       echo->gain,
       echo->loss_db,    echo->air,        echo->first_echo, echo->echoes,     echo->grid,
       echo->line_re[0], echo->line_re[1], echo->line_im[1], echo->line_im[0], echo->ring,
-      echo->noise,      echo->cell_set,   echo->envelope,   echo->grey,       echo->flat_envelope,
+      echo->noise,      echo->seen,       echo->envelope,   echo->grey,       echo->flat_envelope,
       echo->pool.x,     echo->pool.y,     echo->pool.z,     echo->loose.x,    echo->pool.sign,
       echo->loose.y,    echo->loose.z,    echo->loose.sign, echo->blood.x,    echo->blood.y,
       echo->blood.z,    echo->blood.sign, echo->spare,      echo->coupling};

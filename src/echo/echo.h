@@ -20,7 +20,7 @@ enum {
   SONDE_LOOSE = 8192,                       // the same for pieces of cells
   SONDE_BLOOD = 16384,                      // streamlines of one vessel
   SONDE_NOISE = 65536,
-  SONDE_CELL_SET = 16384, // hash set of visited cells
+  SONDE_BOX_SIDE = 128, // cubes along a side of the box around the slab
   SONDE_MAX_CELLS = 12000,
 };
 
@@ -115,9 +115,10 @@ struct sonde_echo {
   scatter_pool loose;   // [LOOSE] unsorted
   scatter_pool blood;   // [BLOOD] streamlines: place in a lumen of unit width, speed over the mean
   sonde_echo_flow flow;
-  float *noise;       // [NOISE]
-  uint64_t *cell_set; // [CELL_SET] key and stamp of the frame that wrote it
-  uint16_t stamp;
+  float *noise;         // [NOISE]
+  int32_t box_first[3]; // cubes of the box around the slab at rest
+  uint32_t box_size[3];
+  uint64_t *seen;                   // [BOX_SIDE^3 / 64] a bit per cube of the box, x fastest
   uint32_t cell_count, moved, bled; // cells and scatterers of the last frame
   sonde_echo_times times;
 };

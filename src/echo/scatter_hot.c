@@ -9,7 +9,7 @@
 //
 // sonde_echo_scatter  all cubes that the slab touches
 // visit_quad, visit   cubes along one coarse quad
-// find                each cube once
+// clear_seen, find    each cube once
 // locate              image coordinates of a rest point, and the derivative there
 // cube_map            map of a cube without vessels
 // find_vessels, carry, carried  what the vessels' walls do to it
@@ -127,7 +127,7 @@ static void find_vessels(const sonde_echo *echo, cube *c) {
   for (uint32_t k = 0; k < echo->shown_count; ++k) {
     uint32_t which = echo->shown[k];
     sonde_vessel_state *v = &c->near[c->near_count];
-    if (which >= 2 && !sonde_vessel_reaches(interior, which, s, c->centre, echo->cell_m)) continue;
+    if (!sonde_vessel_reaches(interior, which, s, c->centre, fmax(close_m, echo->cell_m))) continue;
     if (!sonde_vessel_at(interior, which, s, v)) continue;
     double distance = v_distance(c->centre, v->rest_centre_m);
     double close = which < 2 ? close_m : fmin(close_m, close_radii * v->rest_radius_m);
@@ -195,6 +195,15 @@ static bool in_lumen(const lumen *l, double x, double y, double z) {
   double a = l->along[0] + l->along[1] * x + l->along[2] * y + l->along[3] * z;
   double b = l->across[0] + l->across[1] * x + l->across[2] * y + l->across[3] * z;
   return a * a + b * b < 1 && !(-a > 1 - 2 * l->solid);
+}
+
+static int32_t below(double x) {
+  int32_t i = (int32_t)x;
+  return i - (x < i);
+}
+
+static uint64_t cell_key(const int32_t cell[3]) {
+  return (uint64_t)(uint16_t)cell[0] << 32 | (uint64_t)(uint16_t)cell[1] << 16 | (uint16_t)cell[2];
 }
 
 // ---- laying ---------------------------------------------------------------------------------
@@ -273,10 +282,12 @@ static void place_pieces(sonde_echo *echo, const cube *c, const map *m) {
   }
 }
 
-static void place_cell(sonde_echo *echo, const int32_t cell[3], uint64_t key, sonde_vec3 guess) {
+static void place_cell(sonde_echo *echo, const int32_t cell[3], sonde_vec3 guess) {
   double h = echo->cell_m;
-  cube c = {.centre = vec3((cell[0] + 0.5) * h, (cell[1] + 0.5) * h, (cell[2] + 0.5) * h),
-            .bits = sonde_random_bits(echo->seed + 2, key)};
+  cube c; // the states of vessels that are not near stay unset
+  c.centre = vec3((cell[0] + 0.5) * h, (cell[1] + 0.5) * h, (cell[2] + 0.5) * h);
+  c.bits = sonde_random_bits(echo->seed + 2, cell_key(cell));
+  c.close = c.moving = false, c.near_count = 0;
   map m = cube_map(echo, c.centre, guess);
   if (echo->vessels) find_vessels(echo, &c);
   if (c.close) {
@@ -293,38 +304,50 @@ static void place_cell(sonde_echo *echo, const int32_t cell[3], uint64_t key, so
 
 // ---- cubes ----------------------------------------------------------------------------------
 
-static int32_t below(double x) {
-  int32_t i = (int32_t)x;
-  return i - (x < i);
-}
-
-static uint64_t cell_key(const int32_t cell[3]) {
-  return (uint64_t)(uint16_t)cell[0] << 32 | (uint64_t)(uint16_t)cell[1] << 16 | (uint16_t)cell[2];
+// The box of cubes around the slab at rest, none of them visited.
+static void clear_seen(sonde_echo *echo) {
+  double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+  for (uint32_t k = 0; k < SONDE_PLANE_NODES; ++k) {
+    const plane_node *n = &echo->node[k];
+    double half = sonde_echo_elevation(echo, k / SONDE_PLANE_COLUMNS * echo->depth_per_row) + 1e-3;
+    const double at[3] = {n->rest.x, n->rest.y, n->rest.z};
+    const double side[3] = {n->beside.x, n->beside.y, n->beside.z};
+    for (int c = 0; c < 3; ++c) {
+      low[c] = fmin(low[c], at[c] - half * fabs(side[c]));
+      high[c] = fmax(high[c], at[c] + half * fabs(side[c]));
+    }
+  }
+  uint32_t cubes = 1;
+  for (int c = 0; c < 3; ++c) {
+    echo->box_first[c] = below(low[c] / echo->cell_m);
+    double size = floor(high[c] / echo->cell_m) - echo->box_first[c] + 1;
+    echo->box_size[c] = (uint32_t)clamp(size, 1, SONDE_BOX_SIDE);
+    cubes *= echo->box_size[c];
+  }
+  memset(echo->seen, 0, (cubes + 63) / 64 * sizeof *echo->seen);
 }
 
 // True the first time in a frame.
-static bool find(sonde_echo *echo, uint64_t key) {
-  uint64_t stamped = key << 16 | echo->stamp;
-  uint32_t slot = (uint32_t)((key * 0x9e3779b97f4a7c15u) >> 40) % SONDE_CELL_SET;
-  while ((uint16_t)echo->cell_set[slot] == echo->stamp) {
-    if (echo->cell_set[slot] == stamped) return false;
-    slot = (slot + 1) % SONDE_CELL_SET;
+static bool find(sonde_echo *echo, const int32_t cell[3]) {
+  uint32_t at[3];
+  for (int c = 0; c < 3; ++c) {
+    at[c] = (uint32_t)(cell[c] - echo->box_first[c]);
+    if (at[c] >= echo->box_size[c]) return false;
   }
-  echo->cell_set[slot] = stamped;
-  return true;
+  uint32_t bit = (at[2] * echo->box_size[1] + at[1]) * echo->box_size[0] + at[0];
+  uint64_t *word = &echo->seen[bit / 64], mask = (uint64_t)1 << bit % 64;
+  bool first = !(*word & mask);
+  *word |= mask;
+  return first;
 }
 
-// *last: key of the visit before.
-static void visit(sonde_echo *echo, sonde_vec3 rest, sonde_vec3 guess, uint64_t *last) {
+static void visit(sonde_echo *echo, sonde_vec3 rest, sonde_vec3 guess) {
   double inverse = 1 / echo->cell_m;
   const int32_t cell[3] = {below(rest.x * inverse), below(rest.y * inverse),
                            below(rest.z * inverse)};
-  uint64_t key = cell_key(cell);
-  if (key == *last) return;
-  *last = key;
-  if (echo->cell_count >= SONDE_MAX_CELLS || !find(echo, key)) return;
+  if (!find(echo, cell) || echo->cell_count >= SONDE_MAX_CELLS) return;
   ++echo->cell_count;
-  place_cell(echo, cell, key, guess);
+  place_cell(echo, cell, guess);
 }
 
 // As many samples as the quad's sides in rest coordinates ask for.
@@ -343,18 +366,13 @@ static void visit_quad(sonde_echo *echo, uint32_t i, uint32_t j) {
       sonde_vec3 rest =
           v_lerp(v_lerp(n[0].rest, n[1].rest, a), v_lerp(low[0].rest, low[1].rest, a), b);
       sonde_vec3 first = v_madd(rest, -half, side), step = v_scale(side, 2 * half / (slices - 1));
-      uint64_t last = UINT64_MAX;
-      for (int k = 0; k < slices; ++k)
-        visit(echo, v_madd(first, k, step), vec3(i + a, 0, j + b), &last);
+      for (int k = 0; k < slices; ++k) visit(echo, v_madd(first, k, step), vec3(i + a, 0, j + b));
     }
 }
 
 void sonde_echo_scatter(sonde_echo *echo) {
   SONDE_ASSERT(echo->per_cell % ECHO_ALIGN == 0 && echo->per_cell <= SONDE_POOL);
-  if (++echo->stamp == 0) {
-    memset(echo->cell_set, 0, SONDE_CELL_SET * sizeof *echo->cell_set);
-    echo->stamp = 1;
-  }
+  clear_seen(echo);
   echo->cell_count = echo->moved = 0;
   for (uint32_t j = 0; j + 1 < SONDE_PLANE_ROWS; ++j)
     for (uint32_t i = 0; i + 1 < SONDE_PLANE_COLUMNS; ++i) visit_quad(echo, i, j);
