@@ -47,7 +47,7 @@ static void gain_row(const sonde_echo *echo, uint32_t sample, float *on, float *
 static void merge_row(sonde_echo *echo, uint32_t sample, bool tissue) {
   float gain[SONDE_FINE][SONDE_MOST_LINES + SONDE_MOST_TAPS + 2 * ECHO_ALIGN];
   float *row = echo->grid + (size_t)sample * echo->grid_stride;
-  merge_job job = {.grid = row + 4, .count = echo->grid_lines / SONDE_FINE};
+  merge_job job = {.grid = row, .count = echo->grid_lines / SONDE_FINE};
   SONDE_ASSERT(job.count <= SONDE_COUNT_OF(gain[0]));
   for (int k = 0; k < SONDE_FINE; ++k) {
     job.gain[k] = gain[k], job.re[k] = echo->line_re[k], job.im[k] = echo->line_im[k];

@@ -48,14 +48,16 @@ sonde_echo_settings sonde_echo_settings_clamp(sonde_echo_settings s) {
       .tgc_db_per_m = bounded(s.tgc_db_per_m, -5000, 5000, d.tgc_db_per_m)};
 }
 
-// Jittered grid: one scatterer per box of side[0] x side[1] x side[2] boxes. Fewer by chance in one
-// place and more in another would make the speckle's contrast depend on the density.
-static void fill_share(const scatter_pool *pool, uint64_t seed, uint32_t first,
-                       const uint32_t side[3]) {
-  uint32_t layer = side[0] * side[1];
-  for (uint32_t i = 0; i < layer * side[2]; ++i) {
+// Jittered grid: one scatterer per box of layers of 2^bits x 2^bits boxes. Fewer by chance in one
+// place and more in another would make the speckle's contrast depend on the density. Boxes that
+// follow each other lie apart, so that a scatterer seldom waits for what the one before it wrote.
+static void fill_share(const scatter_pool *pool, uint64_t seed, uint32_t first, uint32_t bits,
+                       uint32_t layers) {
+  const uint32_t layer = 1u << 2 * bits, side[3] = {1u << bits, 1u << bits, layers};
+  for (uint32_t i = 0; i < layer * layers; ++i) {
     uint64_t j = 4 * (uint64_t)(first + i);
-    uint32_t box[3] = {i % side[0], i / side[0] % side[1], i / layer};
+    uint32_t box[3] = {0, 0, i / layer};
+    for (uint32_t k = 0; k < 2 * bits; ++k) box[k % 2] |= (i >> k & 1) << (bits - 1 - k / 2);
     float at[3];
     for (uint32_t c = 0; c < 3; ++c)
       at[c] = (float)((box[c] + sonde_random_uniform(seed, j + 1 + c)) / side[c] - 0.5);
@@ -73,15 +75,14 @@ static int by_value(const void *a, const void *b) {
 // plane then takes or leaves whole vectors of them. Within a layer the other coordinates do not
 // depend on z, so that z alone is sorted.
 static void fill_pools(sonde_echo *echo) {
-  const uint32_t whole[3] = {8, 8, echo->per_cell / 64}, piece[3] = {4, 4, echo->per_piece / 16};
+  const uint32_t layers = echo->per_cell / 64, each = echo->per_piece;
   for (uint32_t i = 0; i + echo->per_cell <= SONDE_POOL; i += echo->per_cell) {
-    fill_share(&echo->pool, echo->seed, i, whole);
-    for (uint32_t layer = 0; layer < whole[2]; ++layer)
+    fill_share(&echo->pool, echo->seed, i, 3, layers);
+    for (uint32_t layer = 0; layer < layers; ++layer)
       qsort(echo->pool.z + i + 64 * layer, 64, sizeof(float), by_value);
   }
-  uint32_t each = echo->per_piece;
   for (uint32_t i = 0; i + each <= SONDE_LOOSE; i += each)
-    fill_share(&echo->loose, echo->seed + 5, i, piece);
+    fill_share(&echo->loose, echo->seed + 5, i, 2, each / 16);
 }
 
 // Streamlines evenly over a round section of unit width, so that the first n fill it for any n;
@@ -134,7 +135,7 @@ static bool allocate(sonde_echo *echo) {
   echo->coupling = SONDE_NEW(float, lines);
   echo->echoes = SONDE_NEW(specular, SONDE_MAX_ECHOES);
   echo->first_echo = SONDE_NEW(int32_t, echo->samples);
-  echo->grid = SONDE_NEW(float, (4 * most_lines + 16) * most_samples);
+  echo->grid = SONDE_NEW(float, (2 * most_lines + 16) * most_samples);
   for (int k = 0; k < SONDE_FINE; ++k) {
     echo->line_re[k] = SONDE_NEW(float, most_lines / SONDE_FINE);
     echo->line_im[k] = SONDE_NEW(float, most_lines / SONDE_FINE);

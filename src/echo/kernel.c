@@ -76,7 +76,7 @@ INLINE void splat_some(const splat_job *job, bool inside) {
     vf a = line - real(l), b = depth - real(n), up = 0.5f - b, down = 0.5f + b;
     turn(depth * turns, &c, &s);
     vf re = weight * c, im = weight * s, re1 = a * re, im1 = a * im;
-    vi at = n * (int32_t)stride + 4 * l;
+    vi at = n * (int32_t)stride + 2 * l;
     records(record, re - re1, im1 - im, re1, -im1);
     memcpy(cell, &at, sizeof at);
     store(share.up, 0.5f * up * up), store(share.down, 0.5f * down * down);
@@ -236,19 +236,11 @@ static void convert(const convert_job *job) {
   }
 }
 
-// Complex numbers of an even column and the odd one after it.
-INLINE v4 pair_of(const float *grid) {
-  v4 before = load4(grid - 4), even = load4(grid), odd = load4(grid + 4);
-  const v4 own = {even[0], even[1], odd[0], odd[1]},
-           late = {before[2], before[3], even[2], even[3]};
-  return own + late;
-}
-
 static void merge(const merge_job *job) {
   SONDE_ASSERT(job->count % ECHO_ALIGN == 0);
   for (uint32_t l = 0; l < job->count; l += 4) {
-    const float *grid = job->grid + 8 * (size_t)l;
-    v4 a = pair_of(grid), b = pair_of(grid + 8), c = pair_of(grid + 16), d = pair_of(grid + 24);
+    const float *grid = job->grid + 4 * (size_t)l; // an even column and the odd one after it
+    v4 a = load4(grid), b = load4(grid + 4), c = load4(grid + 8), d = load4(grid + 12);
     v4 even = load4(job->gain[0] + l), odd = load4(job->gain[1] + l);
     const v4 re = {a[0], b[0], c[0], d[0]}, im = {a[1], b[1], c[1], d[1]};
     const v4 odd_re = {a[2], b[2], c[2], d[2]}, odd_im = {a[3], b[3], c[3], d[3]};

@@ -26,15 +26,13 @@ typedef struct splat_job {
   float m[4][3];
   float turns;         // carrier periods per sample
   float right, bottom; // last column with a neighbour, half a sample before the last sample
-  // [sample][column][4]: complex shares of the column and of the next one. What overlaps is added
-  // later: two scatterers then touch the same four numbers or none in common.
-  float *grid;
-  uint32_t stride; // floats per sample
+  float *grid;         // [sample][column][re, im]
+  uint32_t stride;     // floats per sample
 } splat_job;
 
 // A row of the grid, times a gain, to even and odd columns.
 typedef struct merge_job {
-  const float *grid;                      // one column of room before the first
+  const float *grid;
   const float *gain[SONDE_FINE];          // [count]
   float *re[SONDE_FINE], *im[SONDE_FINE]; // [count]
   uint32_t count;                         // pairs of columns, multiple of ECHO_ALIGN

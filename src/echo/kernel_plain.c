@@ -24,7 +24,7 @@ static void splat(const splat_job *job) {
     for (size_t corner = 0; corner < 6; ++corner) {
       double a = corner & 1 ? at[0] - l : 1 - (at[0] - l), size = a * deep[corner / 2] * weight;
       float *g =
-          job->grid + ((size_t)n + corner / 2 - 1) * job->stride + 4 * (size_t)l + 2 * (corner & 1);
+          job->grid + ((size_t)n + corner / 2 - 1) * job->stride + 2 * ((size_t)l + (corner & 1));
       g[0] += (float)(size * cos(turn)), g[1] -= (float)(size * sin(turn));
     }
   }
@@ -89,9 +89,9 @@ static void tissue(const tissue_job *job) { sonde_echo_kernels_base.tissue(job);
 
 static void merge(const merge_job *job) {
   for (uint32_t i = 0; i < 2 * job->count; ++i) {
-    const float *here = job->grid + 4 * (size_t)i;
-    job->re[i % 2][i / 2] = job->gain[i % 2][i / 2] * (here[0] + here[-2]);
-    job->im[i % 2][i / 2] = job->gain[i % 2][i / 2] * (here[1] + here[-1]);
+    const float *here = job->grid + 2 * (size_t)i;
+    job->re[i % 2][i / 2] = job->gain[i % 2][i / 2] * here[0];
+    job->im[i % 2][i / 2] = job->gain[i % 2][i / 2] * here[1];
   }
 }
 
