@@ -15,7 +15,7 @@
 static const float noise_db = -118; // receiver noise below muscle at the skin, before TGC
 
 static float *ring_row(const sonde_echo *echo, uint32_t row) {
-  uint32_t rows = 2 * echo->pad_samples + 2; // of two samples at once
+  uint32_t rows = 2 * echo->pad_samples + AXIAL_MOST;
   return echo->ring + (size_t)(row % rows) * RING_PLANES * echo->padded;
 }
 
@@ -104,7 +104,7 @@ static void add_specular(sonde_echo *echo, uint32_t sample) {
   }
 }
 
-// One sample, or two from there on.
+// Samples from there on.
 static void axial_rows(sonde_echo *echo, axial_job *job, uint32_t first, int samples, bool tissue) {
   const frame *f = &echo->frame;
   for (int t = 0; t < job->count + samples - 1; ++t)
@@ -145,10 +145,9 @@ void sonde_echo_beam(sonde_echo *echo, bool tissue) {
     if (tissue) add_specular(echo, n);
     if (n < 2 * echo->pad_samples) continue;
     uint32_t sample = n - 2 * echo->pad_samples; // the newest that has all its rows
-    if (sample % 2 == 1)
-      axial_rows(echo, &job, sample - 1, 2, tissue);
-    else if (sample + 1 == echo->samples)
-      axial_rows(echo, &job, sample, 1, tissue);
+    uint32_t before = sample % AXIAL_MOST;
+    if (before + 1 == AXIAL_MOST || sample + 1 == echo->samples)
+      axial_rows(echo, &job, sample - before, (int)before + 1, tissue);
   }
   if (echo->padded == echo->lines) return;
   for (uint32_t n = 0; n < echo->samples; ++n)

@@ -140,7 +140,7 @@ static bool allocate(sonde_echo *echo) {
     echo->line_re[k] = SONDE_NEW(float, most_lines / SONDE_FINE);
     echo->line_im[k] = SONDE_NEW(float, most_lines / SONDE_FINE);
   }
-  echo->ring = SONDE_NEW(float, lines *RING_PLANES *(2 * SONDE_MOST_TAPS + 2));
+  echo->ring = SONDE_NEW(float, lines *RING_PLANES *(2 * SONDE_MOST_TAPS + AXIAL_MOST));
   echo->envelope = SONDE_NEW(float, image);
   echo->flat_envelope = SONDE_NEW(float, image);
   echo->grey = SONDE_NEW(float, image);

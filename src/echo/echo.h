@@ -107,7 +107,7 @@ struct sonde_echo {
   float *grid;         // [grid_samples][grid_stride] scattered field, kernel.h; zero between frames
   float *line_re[SONDE_FINE]; // one row of it with its gain: [grid_lines / FINE]
   float *line_im[SONDE_FINE];
-  float *ring;          // [2*MOST_TAPS+2][RING_PLANES][padded]
+  float *ring;          // [2*MOST_TAPS+AXIAL_MOST][RING_PLANES][padded]
   float *envelope;      // [samples][padded]
   float *flat_envelope; // [samples][lines], what readers see
   float *grey;          // [samples][padded]

@@ -158,22 +158,30 @@ INLINE void finish_axial(const axial_job *job, int sample, uint32_t l, const vf 
   store(job->grey[sample] + l, smaller(larger(grey, all(0)), all(255)));
 }
 
-// Two samples share the rows they read; each is summed from its first row to its last.
+// Samples share the rows they read; each is summed from its first row to its last.
+INLINE void axial_some(const axial_job *job, uint32_t l, int from, int samples) {
+  const uint32_t n = job->lines;
+  vf sum[AXIAL_MOST][RING_PLANES], row[RING_PLANES]; // apart: sums need not wait for each other
+  for (int s = 0; s < samples; ++s)
+    for (int k = 0; k < RING_PLANES; ++k) sum[s][k] = all(0);
+  for (int t = 0; t < job->count + samples - 1; ++t) {
+    for (uint32_t k = 0; k < RING_PLANES; ++k) row[k] = load(job->rows[from + t] + k * n + l);
+    for (int s = 0; s < samples; ++s)
+      if (t >= s && t - s < job->count) add_axial(job->tap[t - s], row, sum[s]);
+  }
+  for (int s = 0; s < samples; ++s) finish_axial(job, from + s, l, sum[s]);
+}
+
+// As many as there are registers for.
+enum { AT_ONCE = W == 16 ? AXIAL_MOST : 2 };
+
 static void axial(const axial_job *job) {
   SONDE_ASSERT(job->count > 0 && job->lines % ECHO_ALIGN == 0);
-  SONDE_ASSERT(job->samples == 1 || job->samples == 2);
-  const uint32_t n = job->lines;
-  const int last = job->count + job->samples - 1;
-  for (uint32_t l = 0; l < n; l += W) {
-    vf sum[2][RING_PLANES], row[RING_PLANES]; // apart: additions need not wait for each other
-    for (int k = 0; k < RING_PLANES; ++k) sum[0][k] = sum[1][k] = all(0);
-    for (int t = 0; t < last; ++t) {
-      for (uint32_t k = 0; k < RING_PLANES; ++k) row[k] = load(job->rows[t] + k * n + l);
-      if (t < job->count) add_axial(job->tap[t], row, sum[0]);
-      if (t > 0) add_axial(job->tap[t - 1], row, sum[1]);
-    }
-    finish_axial(job, 0, l, sum[0]);
-    if (job->samples == 2) finish_axial(job, 1, l, sum[1]);
+  SONDE_ASSERT(job->samples > 0 && job->samples <= AXIAL_MOST);
+  for (uint32_t l = 0; l < job->lines; l += W) {
+    int from = 0;
+    for (; from + AT_ONCE <= job->samples; from += AT_ONCE) axial_some(job, l, from, AT_ONCE);
+    for (; from < job->samples; ++from) axial_some(job, l, from, 1);
   }
 }
 

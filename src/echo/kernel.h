@@ -15,6 +15,7 @@ enum {
   MOST_LEVELS = LAYER_LEVELS + MOST_VESSELS + MOST_LESIONS,
   RING_PLANES = 2 * SONDE_RANK,
   SONDE_FINE = 2, // columns of the grid per scan line
+  AXIAL_MOST = 4, // samples summed at once
 };
 
 // Scatterers of one affine map: (column, elevation over its reach, sample) =
@@ -56,17 +57,17 @@ typedef struct lateral_job {
   float *out; // [RING_PLANES][lines] re, im of each term
 } lateral_job;
 
-// One sample of all lines, or two: the second one starts a row later.
+// Some samples of all lines: each starts a row after the one before.
 typedef struct axial_job {
-  const float *rows[2 * SONDE_MOST_TAPS + 2]; // of lateral results, first to last
+  const float *rows[2 * SONDE_MOST_TAPS + AXIAL_MOST]; // of lateral results, first to last
   int count;
   float tap[2 * SONDE_MOST_TAPS + 1][SONDE_RANK];
-  int samples;           // 1 or 2
-  const float *noise[2]; // [2*lines]
-  float noise_size, compensation[2];
+  int samples;                    // up to AXIAL_MOST
+  const float *noise[AXIAL_MOST]; // [2*lines]
+  float noise_size, compensation[AXIAL_MOST];
   float offset_db, grey_per_db; // grey = (dB + offset) * grey_per_db
   uint32_t lines;
-  float *envelope[2], *grey[2];
+  float *envelope[AXIAL_MOST], *grey[AXIAL_MOST];
 } axial_job;
 
 // What a vessel in view is made of.

@@ -81,7 +81,7 @@ static void axial_sample(const axial_job *job, int sample) {
 }
 
 static void axial(const axial_job *job) {
-  SONDE_ASSERT(job->samples == 1 || job->samples == 2);
+  SONDE_ASSERT(job->samples > 0 && job->samples <= AXIAL_MOST);
   for (int sample = 0; sample < job->samples; ++sample) axial_sample(job, sample);
 }
 
