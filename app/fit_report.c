@@ -10,7 +10,7 @@
 #include <string.h>
 #include <time.h>
 
-enum { STAGES = 5, HOLDOUTS = 3 * SONDE_FIT_PROBES, NOTES = 4 };
+enum { STAGES = 5, HOLDOUTS = 3 * SONDE_FIT_PROBES, NOTES = 5 };
 
 typedef struct builder {
   const fit_findings *in;
@@ -26,7 +26,7 @@ typedef struct builder {
   double correlation[16];
   double *stage2_full_n, *linear_n;
   const char *note[NOTES];
-  char date[32], text[NOTES][256];
+  char date[32], text[NOTES][400];
 } builder;
 
 static void add_stage(builder *b, const char *name, uint32_t parameters, const double *model_n,
@@ -163,6 +163,22 @@ static void add_timings(builder *b) {
   b->report.timings = b->timing;
 }
 
+static void describe_layers(const fit_checks *checks, char *text, size_t room) {
+  int used = snprintf(text, room,
+                      "Laws of the layer between neighbours, each refitted; MAE, seen "
+                      "(sites left out, linearised):");
+  for (int k = 0; k < SONDE_FIT_LAYERS; ++k) {
+    const sonde_fit_layer *l = &checks->layer[k];
+    for (uint32_t p = 0; p < l->seen.probe_count && used > 0 && (size_t)used < room; ++p)
+      used += snprintf(text + used, room - (size_t)used, "%s%s %s %.2f %% (%.2f %%)",
+                       p   ? ", "
+                       : k ? "; "
+                           : " ",
+                       p ? "" : fit_checks_layer(l->kind), l->seen.probe[p],
+                       l->seen.probes[p].mae_percent, l->one_out.probes[p].mae_percent);
+  }
+}
+
 static void add_notes(builder *b) {
   const sonde_fit_confidence *c = &b->in->result->confidence;
   uint32_t count = 0;
@@ -187,6 +203,11 @@ static void add_notes(builder *b) {
                        name, parts->part[k].correlation[0][2], parts->part[k].condition,
                        k + 1 < parts->count ? ";" : ".");
     }
+    b->note[count] = b->text[count];
+    ++count;
+  }
+  if (b->in->checks->layers) {
+    describe_layers(b->in->checks, b->text[count], sizeof b->text[0]);
     b->note[count] = b->text[count];
     ++count;
   }

@@ -2,7 +2,8 @@
 // settle:      a refit with one law of the layer and what it gives.
 // cost_at:     J's least cost with its stiffening held.
 // search:      that stiffening by golden section.
-// sonde_fit_layers: the result's own law, T, J.
+// start_membrane: T from the result's own law.
+// sonde_fit_layers: that law, T, J.
 #include "fit/again.h"
 #include "sonde/fit_confidence.h"
 
@@ -10,9 +11,8 @@
 
 #include <string.h>
 
-static const double LEAST_LN = 0, MOST_LN = 6, CLOSE_LN = 0.3; // of J's stiffening
+static const double LEAST_LN = 0, MOST_LN = 9, CLOSE_LN = 0.3; // of J's stiffening
 static const double GOLDEN = 0.6180339887498949;
-static const double START_STIFFNESS = 2; // of the pre-tension
 
 typedef struct comparison {
   sonde_again again;
@@ -94,8 +94,20 @@ static sonde_status search(comparison *c, const sonde_fit_layer *before, sonde_e
   return SONDE_OK;
 }
 
-static sonde_status compare(comparison *c, const sonde_fit_result *result, sonde_fit_layer *layer,
-                            sonde_error *error) {
+// From G g (1 + (g/gm)^2), the first terms of the result's law: T g + (k - T) g^3/2 has the same
+// ones with T = G and k = T (1 + 2/gm^2).
+static void start_membrane(sonde_again *a) {
+  uint32_t n = a->parameters, sites = a->refit->sites->count;
+  double *theta = memcpy(a->theta, a->optimum, n * sizeof *a->theta), limit = theta[n - 1],
+         mean = log1p(2 * exp(-2 * limit));
+  theta[n - 1] = theta[n - 2] + mean;
+  for (uint32_t s = 0; s < sites && a->refit->fields > 2; ++s) {
+    double *to = &theta[3 * sites + s];
+    *to = theta[2 * sites + s] + log1p(2 * exp(-2 * (limit + *to))) - mean;
+  }
+}
+
+static sonde_status compare(comparison *c, sonde_fit_layer *layer, sonde_error *error) {
   sonde_again *a = &c->again;
   sonde_refit *r = a->refit;
   for (uint32_t k = 0; k < a->plan.row_count; ++k) a->left_out[k] = a->plan.row[k] >= c->fitted;
@@ -104,14 +116,12 @@ static sonde_status compare(comparison *c, const sonde_fit_result *result, sonde
   r->near = true;
   sonde_status status = settle(c, &layer[SONDE_LAYER_LIMIT], error);
   if (status) return status;
-  r->near = false;
   r->membrane = true;
   sonde_refit_forget(r);
-  sonde_refit_start(r, result->curves, a->theta);
-  a->theta[a->parameters - 1] = a->theta[a->parameters - 2] + log(START_STIFFNESS);
+  start_membrane(a);
   status = settle(c, &layer[SONDE_LAYER_TENSION], error);
-  r->near = true;
-  if (!status) status = search(c, &layer[SONDE_LAYER_TENSION], error);
+  start_membrane(a); // T alone may have run to where J would not come back from
+  if (!status) status = search(c, &layer[SONDE_LAYER_LIMIT], error);
   return status ? status : settle(c, &layer[SONDE_LAYER_STIFFENING], error);
 }
 
@@ -126,7 +136,7 @@ sonde_status sonde_fit_layers(const sonde_model *model, const sonde_site_table *
   comparison c = {.m = &both, .fitted = m->count, .progress = progress};
   status = sonde_again_create(model, sites, &both, def, result, &c.again, error);
   if (!status) {
-    status = compare(&c, result, layers, error);
+    status = compare(&c, layers, error);
     sonde_again_clear(&c.again);
   }
   if (also) sonde_free(both.data);

@@ -180,11 +180,49 @@ static void stage_2_has_no_such_confidence(void **state) {
   nine_clear(&t);
 }
 
+// The model's own law leads back to the result; pre-tension with stiffening follows the data at
+// least as well as without; rows that were never fitted are predicted as under their own name.
+static void laws_of_the_layer_are_compared(void **state) {
+  (void)state;
+  nine t;
+  nine_create(&t);
+  sonde_fit_layer layer[SONDE_FIT_LAYERS];
+  sonde_measurements also = {.count = t.b.m.count, .data = SONDE_NEW(sonde_datum, t.b.m.count)};
+  sonde_error error;
+  memcpy(also.data, t.b.m.data, also.count * sizeof *also.data);
+  assert_int_equal(sonde_fit_layers(t.b.model, &t.b.sites, &t.b.m, &also, &t.def, &t.result, NULL,
+                                    layer, &error),
+                   SONDE_ARGUMENT);
+  for (uint32_t k = 0; k < also.count; ++k) {
+    bool point = strcmp(also.data[k].probe, "point") == 0;
+    snprintf(also.data[k].probe, sizeof also.data[k].probe, point ? "rect:6x6" : "rect:60x12");
+  }
+  assert_ok(sonde_fit_layers(t.b.model, &t.b.sites, &t.b.m, &also, &t.def, &t.result, NULL, layer,
+                             &error),
+            &error);
+  for (int k = 0; k < SONDE_FIT_LAYERS; ++k) {
+    print_message("layer %d: %.2f %%, left out %.2f %%, cost %.2f, T %.3g, %.3g, c %.3g\n", k,
+                  layer[k].seen.all.mae_percent, layer[k].one_out.all.mae_percent, layer[k].cost,
+                  layer[k].tension_n_m, layer[k].second, layer[k].stiffening);
+    assert_int_equal(layer[k].kind, k);
+    assert_true(layer[k].converged || k == SONDE_LAYER_TENSION); // its T runs to 0
+    assert_int_equal(layer[k].seen.all.count, t.b.m.count);
+    assert_true(layer[k].one_out.all.mae_percent > 0.9 * layer[k].seen.all.mae_percent);
+    assert_near(layer[k].also.all.mae_percent / layer[k].seen.all.mae_percent, 1, 1e-3);
+  }
+  assert_near(layer[0].tension_n_m / t.result.law.shear_stiffness_n_m, 1, 0.1);
+  assert_true(layer[2].cost < 0.5 * layer[1].cost && layer[2].stiffening > 0);
+  assert_int_equal(layer[2].parameters, layer[1].parameters + 1);
+  sonde_free(also.data);
+  nine_clear(&t);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(profile_rises_from_the_optimum),
       cmocka_unit_test(both_probes_determine_more_than_one),
       cmocka_unit_test(random_starts_end_in_one_optimum),
+      cmocka_unit_test(laws_of_the_layer_are_compared),
       cmocka_unit_test(robust_loss_holds_estimate_and_intervals),
       cmocka_unit_test(stage_2_has_no_such_confidence),
   };

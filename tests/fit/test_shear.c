@@ -80,6 +80,7 @@ typedef struct bench {
   sonde_patch patch;
   sonde_patch_solver solver;
   double *s_m;
+  bool membrane; // tension, stiffness and stiffening in place of G and gm
 } bench;
 
 static void bench_create(bench *t, const bundled *b, uint32_t site, int probe, double reach_m) {
@@ -89,13 +90,18 @@ static void bench_create(bench *t, const bundled *b, uint32_t site, int probe, d
             &error);
   assert_ok(sonde_patch_solver_create(&t->patch, 1, &t->solver, &error), &error);
   t->s_m = SONDE_NEW(double, t->patch.place_count);
+  t->membrane = false;
 }
 
 static double bench_force(bench *t, const sonde_patch_law *law, double depth_m,
                           sonde_patch_gradient *gradient) {
   double force_n;
   sonde_error error;
-  sonde_patch_solver_use(&t->solver, &t->patch, law);
+  sonde_patch_law used = *law;
+  used.membrane = t->membrane;
+  used.stiffening = 5;
+  if (t->membrane) used.limit *= 20;
+  sonde_patch_solver_use(&t->solver, &t->patch, &used);
   assert_ok(sonde_patch_settle(&t->solver, depth_m, 1e-12, 100, t->s_m, &error), &error);
   assert_ok(sonde_patch_force(&t->solver, depth_m, t->s_m, &force_n, gradient, &error), &error);
   return force_n;
@@ -333,9 +339,11 @@ static void adjoint_equals_finite_differences(void **state) {
                                                     {0, 0, 0, 0, 1, 0},
                                                     {0, 0, 0, 0, 0, 1},
                                                     {0.4, -0.6, 0.5, 0.2, 0.8, -0.3}};
-  for (int probe = 0; probe < 2; ++probe) {
+  for (int law = 0; law < 4; ++law) {
+    int probe = law % 2;
     bench t;
     bench_create(&t, &b, 20, probe, 0.05);
+    t.membrane = law > 1;
     for (double depth = 0.008; depth < 0.025; depth += 0.008)
       for (int d = 0; d < DIRECTIONS; ++d) {
         double adjoint = by_adjoint(&t, &b, direction[d], depth), h = 1e-4;
@@ -347,6 +355,35 @@ static void adjoint_equals_finite_differences(void **state) {
       }
     bench_clear(&t);
   }
+  bundled_clear(&b);
+}
+
+// Where slopes are small a membrane's tension is the shear layer's G; where they are not, its force
+// is smaller, for it turns with the skin, and its stiffness adds to it.
+static void a_membrane_begins_as_a_shear_layer(void **state) {
+  (void)state;
+  bundled b = shear_thigh(4.0);
+  fields f = fields_of(b.model);
+  sonde_patch_law law = law_of(b.model, &f);
+  law.limit = 1e6; // G alone
+  bench t;
+  bench_create(&t, &b, 20, 0, 0.05);
+  double ratio[3];
+  for (int k = 0; k < 3; ++k) {
+    double depth = k ? 0.015 : 2e-5;
+    t.membrane = false;
+    law.limit = 1e6;
+    double layer = bench_force(&t, &law, depth, NULL);
+    t.membrane = true;
+    law.limit = k > 1 ? 1 : 1e-9;
+    ratio[k] = bench_force(&t, &law, depth, NULL) / layer;
+  }
+  print_message("membrane over shear layer: %.6f, deep %.3f, with stiffness %.3f\n", ratio[0],
+                ratio[1], ratio[2]);
+  assert_near(ratio[0], 1, 1e-4);
+  assert_true(ratio[1] < 0.9 && ratio[2] > 1.05 * ratio[1]);
+  bench_clear(&t);
+  fields_clear(&f);
   bundled_clear(&b);
 }
 
@@ -570,6 +607,7 @@ int main(void) {
       cmocka_unit_test(a_cut_divides_the_springs),
       cmocka_unit_test(rim_does_not_matter),
       cmocka_unit_test(adjoint_equals_finite_differences),
+      cmocka_unit_test(a_membrane_begins_as_a_shear_layer),
       cmocka_unit_test(adjoint_corrects_the_force),
       cmocka_unit_test(basis_is_the_models_interpolation),
       cmocka_unit_test(roughness_spares_planes),
