@@ -11,7 +11,7 @@
 
 #include <string.h>
 
-static const double LEAST_LN = 0, MOST_LN = 9, CLOSE_LN = 0.3; // of J's stiffening
+static const double LEAST_LN = 0, MOST_LN = 6, CLOSE_LN = 0.3; // of J's stiffening
 static const double GOLDEN = 0.6180339887498949;
 
 typedef struct comparison {
