@@ -15,6 +15,7 @@
 #include "interior/window.h"
 
 static const double relaxation_s = 0.1;     // emptying of a vein segment (docs/interior.md)
+static const double least_ratio = 1e-12;    // a vein that is pressed flat is still an ellipse
 static const double skin_spread_m = 1.8e-3; // the skin widens the loaded patch by its thickness
 static const double reach_share = 0.65;     // of the way from the moment's side to the reach's
 static const double least_half_m = 1.5e-3;  // a point probe still has a face
@@ -161,7 +162,7 @@ static void update_station(sonde_interior *in, uint32_t which, uint32_t i, const
   double goal = area_goal(c, clot, outside, station->hold);
   double blend = input->dt_s < 0 || !in->ready ? 1 : 1 - exp(-input->dt_s / relaxation_s);
   v->outside_pa = outside;
-  v->area_ratio += (goal - v->area_ratio) * blend;
+  v->area_ratio = fmax(v->area_ratio + (goal - v->area_ratio) * blend, least_ratio);
   v->rest_radius_m = station->radius_m * c->scale[clot];
   double half_short, half_long;
   sonde_vessel_shape(c->kind, &c->of[clot], clot, v->area_ratio, &half_short, &half_long);

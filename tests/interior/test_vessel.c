@@ -264,10 +264,28 @@ static void strains_have_no_step(void **state) {
   switched.valsalva_from_s = switched.valsalva_to_s = 0;
   sonde_circulation_strain(&switched, 1, true);
   for (double t = 1; t < 3; t += 0.05)
-    assert_true(fabs(sonde_venous_pressure(&switched, t) - sonde_venous_pressure(&timed, t)) < 1e-9);
+    assert_true(fabs(sonde_venous_pressure(&switched, t) - sonde_venous_pressure(&timed, t)) <
+                1e-9);
   sonde_circulation_strain(&switched, 3, false);
   for (double t = 3; t < 5; t += 0.05)
-    assert_true(fabs(sonde_venous_pressure(&switched, t) - sonde_venous_pressure(&timed, t)) < 1e-9);
+    assert_true(fabs(sonde_venous_pressure(&switched, t) - sonde_venous_pressure(&timed, t)) <
+                1e-9);
+}
+
+// A press that no hand makes rounds the vein's area to nothing; the ellipse stays one.
+static void a_vein_pressed_flat_has_a_shape(void **state) {
+  (void)state;
+  tube t = tube_create(0.08, 0.014, 0.3, 0.012, 250, 151);
+  sonde_interior *in = loaded(&t, 2000, "healthy", -1);
+  sonde_vessel_state v;
+  assert_true(sonde_interior_vessel_at_plane(in, 0, tube_pose(0.08, 0.15), &v));
+  assert_true(v.area_ratio > 0 && v.area_ratio < 1e-6);
+  assert_true(v.half_short_m > 0 && v.half_long_m > v.half_short_m && v.half_long_m < 0.02);
+  in = loaded(&t, 0, "healthy", 100);
+  assert_true(sonde_interior_vessel_at_plane(in, 0, tube_pose(0.08, 0.15), &v));
+  assert_true(v.area_ratio > 0.99);
+  sonde_interior_destroy(in);
+  tube_clear(&t);
 }
 
 int main(void) {
@@ -278,6 +296,7 @@ int main(void) {
       cmocka_unit_test(closure_at_the_nominal_load),
       cmocka_unit_test(laws_are_monotone_and_positive),
       cmocka_unit_test(stiffer_clots_keep_more),
+      cmocka_unit_test(a_vein_pressed_flat_has_a_shape),
       cmocka_unit_test(stations_close_and_open_with_a_delay),
       cmocka_unit_test(diameters_follow_the_study),
   };
