@@ -120,7 +120,7 @@ static void keep(sonde_player *player, uint64_t tick) {
   sonde_session *s = player->session;
   uint64_t ahead = 2 * (uint64_t)s->ticks_per_image;
   const sonde_packed_key *last = sonde_keys_find(&player->keys, tick);
-  uint64_t from = (tick + ahead - 1) / s->key_period * s->key_period;
+  uint64_t from = sonde_session_key_place(s, tick);
   if (from == 0 || (last && last->tick + ahead > from)) return;
   sonde_tick_memory inputs;
   memset(&inputs, 0, sizeof inputs);

@@ -80,7 +80,8 @@ typedef struct sonde_inside_slot {
   sonde_image_memory memory;
 } sonde_inside_slot;
 
-// Keyframes are taken at the last images before every multiple of this.
+// Keyframes are taken at the last images before every multiple of this, every other one while the
+// probe touches nothing.
 #define SONDE_KEY_PERIOD_S 0.25
 
 struct sonde_session {
@@ -104,7 +105,7 @@ struct sonde_session {
   sonde_device_sample sample;      // last used
   bool realtime;
   uint64_t offered_tick;         // of the newest surface
-  uint64_t key_period, key_tick; // ticks; the next multiple that wants a keyframe
+  uint64_t key_period, key_tick; // ticks; the next multiple that may want a keyframe
   double last_tick_s;            // clock of the previous real-time tick, 0 before the first
   _Atomic uint64_t ticks;
   _Atomic int fault; // the safety's, for other threads
@@ -164,6 +165,8 @@ void sonde_session_realtime_tick(void *session);
 // The same with recorded inputs instead of the device's (hot). @param controls NULL: as before
 void sonde_session_replay(sonde_session *session, const sonde_session_controls *controls,
                           const sonde_device_sample *sample);
+// The multiple whose keyframe an image of this tick would be, 0: none is wanted (hot).
+uint64_t sonde_session_key_place(const sonde_session *session, uint64_t tick);
 // The surface and its snapshot into the mailbox of the image thread (hot).
 void sonde_session_offer(sonde_session *session);
 // What the next tick depends on, also sonde_subject_remember() into world[] (hot). Returns its

@@ -4,7 +4,8 @@
 // read_device:     pose of this tick, exactly as the world and the recording get it.
 // step_world:      everything that moves with the probe.
 // fill_snapshot:   what viewers are told about this tick.
-// surface_is_due, key_is_due: when an image, and a keyframe with it, is to be made.
+// surface_is_due, key_is_due, sonde_session_key_place: when an image, and a keyframe with it, is to
+// be made.
 // offer_key:       all that the next tick depends on into the mailbox of the recorder.
 // sonde_session_offer: the surface and its snapshot into the mailbox of the image thread.
 // sonde_session_step, sonde_session_realtime_tick, sonde_session_replay: the tick.
@@ -107,11 +108,17 @@ static bool surface_is_due(sonde_session *session, uint64_t tick) {
          !atomic_load_explicit(&session->surface_pending, memory_order_acquire);
 }
 
-// At the last images before every multiple of the period, where a seek to it starts.
+// Tissue that nothing touches is soon at rest, and quick to go through.
+uint64_t sonde_session_key_place(const sonde_session *session, uint64_t tick) {
+  uint64_t near = tick + 2 * (uint64_t)session->ticks_per_image - 1, period = session->key_period;
+  bool touching = sonde_state_contact(session->state)->area_m2 > 0;
+  return touching || near / period % 2 == 0 ? near / period * period : 0;
+}
+
 static bool key_is_due(sonde_session *session, uint64_t tick) {
-  uint64_t near = tick + 2 * (uint64_t)session->ticks_per_image;
-  if (!session->world_box || near <= session->key_tick) return false;
-  session->key_tick = (near / session->key_period + 1) * session->key_period;
+  uint64_t place = session->world_box ? sonde_session_key_place(session, tick) : 0;
+  if (place < session->key_tick) return false;
+  session->key_tick = place + session->key_period;
   return true;
 }
 

@@ -4,8 +4,8 @@
 
 #include "sonde/exam.h"
 
-// Vein, artery and a second femoral vein in the image plane of the snapshot's pose; members without a
-// vessel in view keep what they hold. No allocation. @thread of the interior's updates
+// Vein, artery and a second femoral vein in the image plane of the snapshot's pose; members without
+// a vessel in view keep what they hold. No allocation. @thread of the interior's updates
 void sonde_snapshot_read_vessels(const sonde_interior *interior, sonde_snapshot *snapshot);
 
 #endif

@@ -65,8 +65,7 @@ static void say_press(const sonde_judge *judge, sonde_guidance *g) {
   }
   static const char *const OTHER[] = {
       [SONDE_PRESS_STATE_COMPLETE] = "The vein is closed: let go.",
-      [SONDE_PRESS_STATE_OPEN] =
-          "The vein stays open although the artery gives way: let go; it may hold a clot.",
+      [SONDE_PRESS_STATE_OPEN] = "The vein stays open though the artery gives way: let go.",
       [SONDE_PRESS_STATE_TOO_HARD] = "Too hard: let go and press again with less force.",
       [SONDE_PRESS_STATE_OFF_AXIS] = "The vein is not cut straight across: let go and tilt back."};
   sonde_press_state state = sonde_judge_state(judge).state;

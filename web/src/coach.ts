@@ -17,14 +17,15 @@ const there = (exam: Exam): boolean => {
   const { target, offset_mm } = exam.step;
   return target !== null && offset_mm !== null && offset_mm <= target.radius_mm;
 };
-const wanted = (exam: Exam): boolean => exam.step.target !== null;
+const away = (exam: Exam): boolean => exam.step.target !== null && !there(exam);
 const pressed = (exam: Exam): boolean => exam.presses.some((p) => p.result === "complete" || p.result === "open");
+const asked = (exam: Exam): boolean => exam.step.segment !== "";
 const decided = (exam: Exam): boolean => exam.segments.some((s) => s.decision !== "");
 
 const MARKS: Mark[] = [
-  { id: "move", anchor: "stage", text: "Drag the probe along the skin into the ring.", due: wanted, done: there },
-  { id: "press", anchor: "press", text: "Press: pull this slider up until the bar reaches the bracket. Watch the vein in the image. Then let go (button below).", due: wanted, done: pressed },
-  { id: "decide", anchor: "decide", text: "Say what you saw here. The bar above leads you to the next point.", due: pressed, done: decided },
+  { id: "move", anchor: "stage", text: "Drag the probe along the leg into the ring.", due: away, done: there },
+  { id: "press", anchor: "press", text: "Pull this slider up, slowly, until the white bar reaches the bracket. Watch the vein in the image: do its walls touch? Then press Let go below.", due: there, done: pressed },
+  { id: "decide", anchor: "decide", text: "Did the walls touch? Then the vein is compressible. Did it stay open? Then there is a clot. After this the bar leads you on.", due: asked, done: decided },
 ];
 
 export class Coach {
@@ -46,12 +47,8 @@ export class Coach {
   show(exam: Exam | null, controls: boolean): void {
     const coaching = exam !== null && exam.phase === "running" && exam.guidance === "full" && controls;
     if (!coaching) return this.place(null);
-    const next = MARKS.find((m) => !this.seen.has(m.id));
-    if (next?.done(exam)) {
-      this.now = next;
-      this.close();
-      return this.show(exam, controls);
-    }
+    if (this.now?.done(exam)) this.close(); // done while it was in view
+    const next = MARKS.find((m) => !this.seen.has(m.id) && !m.done(exam));
     this.place(next?.due(exam) ? next : null);
   }
 

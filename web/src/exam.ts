@@ -32,6 +32,7 @@ export class ExamBar {
     this.choices = FINDINGS.map((f) => {
       const b = button(f.name, () => this.decide(f.decision), `finding ${f.decision}`);
       b.append(make("kbd", "", f.key));
+      b.title = f.help;
       return b;
     });
     find("decisions").append(...this.choices);
@@ -92,6 +93,7 @@ export class ExamBar {
     const root = button("", () => this.choose(s.id), "segment");
     const [dots, found] = [make("span", "dots"), make("span", "found")];
     root.setAttribute("role", "radio");
+    root.title = s.needed ? s.title : `${s.title}: not part of this protocol`;
     root.append(make("span", "name", s.title), dots, found);
     return { root, dots, finding: found };
   }

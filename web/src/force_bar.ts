@@ -58,8 +58,8 @@ export class ForceBar {
   private word(): string {
     if (this.force_n >= 0.98 * this.limit_n) return "limit";
     if (this.corridor && this.force_n > this.corridor[1]) return "too hard";
+    if (this.corridor && this.force_n >= this.corridor[0]) return "right"; // asked for, comfortable or not
     if (this.force_n > this.comfort_n) return "uncomfortable";
-    if (this.corridor && this.force_n >= this.corridor[0]) return "right";
     return this.force_n > 0.3 ? "comfortable" : "no contact";
   }
 

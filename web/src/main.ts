@@ -27,6 +27,7 @@ const HOME_SITE = 27;
 const NEAR_MM = 20; // farther from a site its curve says nothing about this place
 const COMFORT = 0.5; // of the limit, when the program does not say what is comfortable
 const LIFTED_MM = -8;
+const LIFTED_NOTE_MM = -1; // farther from the skin the image says why it is dark
 const EASED_MM = 0.5; // the probe rests on the skin
 
 const query = new URLSearchParams(location.search);
@@ -272,6 +273,7 @@ class App {
 
   private setReplay(replay: Replay): void {
     this.replay = replay;
+    this.header(this.phase);
     this.replayBar.show(replay, this.controls?.controls ?? false);
   }
 
@@ -335,8 +337,9 @@ class App {
   private header(phase: Phase): void {
     const exam = this.exam;
     const own = exam !== null && phase !== "practice" && exam.title !== "";
-    find("case-title").textContent = own ? exam.title : label(this.hello?.model ?? "");
-    find("case-history").textContent = own ? exam.history : (this.hello?.provenance ?? "");
+    const played = phase === "replay" ? (this.replay?.title ?? "") : "";
+    find("case-title").textContent = own ? exam.title : played || label(this.hello?.model ?? "");
+    find("case-history").textContent = own ? exam.history : played ? "" : (this.hello?.provenance ?? "");
     find("case").title = find("case-history").textContent ?? "";
     find("watching").hidden = this.controls?.controls ?? true;
     const device = this.hello?.device ?? "page";
@@ -478,6 +481,8 @@ class App {
     this.readouts.show(s);
     this.forceBar.show(s);
     this.traces.add(s);
+    find("echo-note").hidden = s.penetration_mm > LIFTED_NOTE_MM;
+    find("traces-note").hidden = this.phase !== "replay" || this.traces.drawn;
     this.examBar.follow(s.position_mm[2], s.penetration_mm > 0);
     if (!this.hands) this.follow(s);
     if (s.penetration_mm > -1) this.plot.add(s.penetration_mm, Math.max(0, s.force_normal_n));

@@ -113,7 +113,7 @@ export class ReplayBar {
       row.append(go, words);
       return row;
     });
-    const none = make("li", "none", "No comment yet.");
+    const none = make("li", "none", "No comment yet. A remark stands at its time in the exam, for the learner to find.");
     find("comment-list").replaceChildren(...(rows.length ? rows : [none]));
     for (const e of find("comment-form").querySelectorAll<HTMLInputElement>("input, button")) e.disabled = !controls;
   }

@@ -28,6 +28,12 @@ function ring(result: Result): HTMLElement {
   return box;
 }
 
+/** The head already says whether it is passed. */
+function beyondVerdict(summary: string): string {
+  const rest = summary.replace(/^(Passed\.|Not passed:) */, "");
+  return rest.charAt(0).toUpperCase() + rest.slice(1);
+}
+
 /** "6 x vein closed, 1 x too hard" */
 function tally(exam: Exam): string {
   const count = new Map<PressResult, number>();
@@ -71,7 +77,7 @@ export class ResultDialog {
     const head = make("h2", result.passed ? "good" : "bad", result.passed ? "Passed" : "Not passed");
     head.id = "result-title";
     const words = make("div", "words");
-    words.append(head, make("p", "case-name", exam.title), make("p", "summary", result.summary));
+    words.append(head, make("p", "case-name", exam.title), make("p", "summary", beyondVerdict(result.summary)));
     const top = make("div", "top");
     top.append(ring(result), words);
     this.box.replaceChildren(top, this.diagnosis(result), segments(exam), make("p", "tally", `Compressions: ${tally(exam)}.`), this.foot(exam, result, controls));

@@ -60,6 +60,11 @@ export class Traces {
     };
   }
 
+  /** There is a curve to look at. */
+  get drawn(): boolean {
+    return this.times.length > 2;
+  }
+
   showVessels(on: boolean): void {
     if (this.vessels === on) return;
     this.vessels = on;

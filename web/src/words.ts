@@ -2,10 +2,10 @@
 
 import type { CaseInfo, Compression, Decision, Guidance, PressResult } from "./protocol";
 
-export const FINDINGS: { decision: Exclude<Decision, "">; name: string; key: string; code: string }[] = [
-  { decision: "compressible", name: "Compressible", key: "J", code: "KeyJ" },
-  { decision: "clot", name: "Clot", key: "K", code: "KeyK" },
-  { decision: "not_seen", name: "Not seen", key: "L", code: "KeyL" },
+export const FINDINGS: { decision: Exclude<Decision, "">; name: string; help: string; key: string; code: string }[] = [
+  { decision: "compressible", name: "Compressible", help: "The walls of the vein touched: no clot here", key: "J", code: "KeyJ" },
+  { decision: "clot", name: "Clot", help: "Pressed firmly, the vein stayed open", key: "K", code: "KeyK" },
+  { decision: "not_seen", name: "Not seen", help: "The vein was not seen well enough to tell", key: "L", code: "KeyL" },
 ];
 
 export const finding = (d: Decision): string => FINDINGS.find((f) => f.decision === d)?.name ?? "No finding";
