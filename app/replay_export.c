@@ -2,6 +2,7 @@
 // columns, print_row: a row per image, as CSV or JSON.
 // open_tables, close_tables: both files.
 // save_picture:       the image as a PNG.
+// draw_scale:         depth in centimetres.
 // picture_of, film_until: pictures of the film at even times.
 // replay_export_run:  plays and writes.
 #include "replay_export.h"
@@ -161,10 +162,27 @@ static void add_percent(char *text, size_t size, const char *name, double ratio)
     snprintf(text + used, size - used, "  %s   - %%", name);
 }
 
+// A mark for every centimetre of depth, at the right edge.
+static void draw_scale(output *o, const sonde_frame *frame) {
+  enum { MARK = 7, EDGE = 26 };
+  const uint8_t grey = 170;
+  uint32_t left = frame->width > EDGE ? frame->width - EDGE : 0;
+  for (uint32_t cm = 1; cm * 0.01 < frame->height_m; ++cm) {
+    uint32_t y = (uint32_t)(cm * 0.01 / frame->height_m * frame->height);
+    memset(o->picture + (size_t)y * o->width + left, grey, frame->width > EDGE ? MARK : 0);
+    char text[12];
+    snprintf(text, sizeof text, "%u", cm);
+    if (y > CAPTION_HEIGHT)
+      caption_draw(o->picture, o->width, frame->height, left + MARK + 4, y - CAPTION_HEIGHT / 2 + 1,
+                   1, text);
+  }
+}
+
 static void picture_of(output *o, const sonde_frame *frame) {
   for (uint32_t j = 0; j < frame->height; ++j)
     memcpy(o->picture + (size_t)j * o->width, frame->pixels + (size_t)j * frame->width,
            frame->width);
+  draw_scale(o, frame);
   size_t strip = (size_t)frame->height * o->width;
   memset(o->picture + strip, 24, (size_t)o->width * o->height - strip);
   o->any = true;
