@@ -50,6 +50,7 @@ export class Client {
     let rest = Buffer.concat(this.parts);
     for (let m = message(rest); m; m = message(rest)) {
       rest = rest.subarray(m.end);
+      if (m.opcode === 1) this.heard?.(JSON.parse(m.data.toString()));
       if (m.opcode === 2 && m.data.readUInt16LE(6) === FRAME) this.acknowledge(m.data.readUInt32LE(8));
     }
     this.parts = [rest];
