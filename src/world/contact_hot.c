@@ -5,11 +5,11 @@
 // advance:  the pushes at the end of the step by the same linearisation.
 // surprise: the pushes that nodes meet where the solution brings them.
 // wrench:   force and torque on the probe, region by region.
+#include "world/contact.h"
 #include "world/lanes.h"
 #include "world/state.h"
 
 #include "base/base.h"
-#include "base/maths.h"
 
 static const double STEEP_WEIGHT = 4;
 
@@ -63,25 +63,11 @@ void sonde_contact_join(sonde_state *state, uint32_t a, uint32_t b) {
     state->parent[x] = y;
 }
 
-static void touch(sonde_state *state, uint32_t i) {
+void sonde_contact_touch(sonde_state *state, uint32_t i) {
   const sonde_vec3 *g = &state->gradient[i];
   if (state->share_m3[i] != 0 || g->x != 0 || g->y != 0 || g->z != 0) return;
   state->parent[i] = i;
   state->touched[state->touched_count++] = i;
-}
-
-// The sides of a turned box face backwards by rounding.
-static bool pushes_forward(const sonde_state *state, sonde_vec3 slope) {
-  return v_dot(slope, state->inward) <= 1e-9;
-}
-
-// t = weight (d - n.x) for one plane.
-static double plane_depth(const sonde_state *state, uint32_t k, sonde_vec3 x) {
-  return state->plane_weight[k] * (state->plane_offset[k] - v_dot(state->plane_normal[k], x));
-}
-
-static sonde_vec3 plane_slope(const sonde_state *state, uint32_t k) {
-  return v_scale(state->plane_normal[k], -state->plane_weight[k]);
 }
 
 // The plane of the depth of a point inside the probe: the least weighted distance. Planes steeper
@@ -149,7 +135,7 @@ static void clip_face(sonde_state *state, uint32_t face) {
                            state->inward, &clip))
     return;
   if (!(clip.area_m2 > 0)) return;
-  for (int k = 0; k < 3; ++k) touch(state, v[k]);
+  for (int k = 0; k < 3; ++k) sonde_contact_touch(state, v[k]);
   for (int k = 0; k < 3; ++k) {
     state->share_m3[v[k]] += clip.share_m3[k];
     state->gradient[v[k]] = v_add(state->gradient[v[k]], clip.gradient[k]);
@@ -179,13 +165,17 @@ static void place_probe(sonde_state *state, const sonde_probe *probe, sonde_pose
   SONDE_ASSERT(body->plane_count <= SONDE_MAX_PROBE_PLANES);
   sonde_mat3 r = q_matrix(pose.rotation);
   state->inward = m_mul_v(r, vec3(0, 0, 1));
+  state->origin = pose.position;
   state->plane_count = body->plane_count;
   state->ball_radius = state->def.contact_law == SONDE_CONTACT_NODES ? probe->ball_radius_m : 0;
   state->ball_centre = v_madd(pose.position, -probe->ball_radius_m, state->inward);
   for (uint32_t k = 0; k < body->plane_count; ++k) {
     state->plane_normal[k] = m_mul_v(r, body->plane_normal[k]);
     state->plane_offset[k] = body->plane_offset_m[k] + v_dot(state->plane_normal[k], pose.position);
-    state->plane_weight[k] = body->plane_normal[k].z > 0.5 ? 1 : STEEP_WEIGHT;
+    double weight = state->plane_weight[k] = body->plane_normal[k].z > 0.5 ? 1 : STEEP_WEIGHT;
+    sonde_vec3 n = state->plane_normal[k];
+    const double lane[4] = {n.x, n.y, n.z, body->plane_offset_m[k]};
+    for (int c = 0; c < 4; ++c) state->plane_lane[k][c] = (float)(weight * lane[c]);
   }
 }
 
@@ -318,34 +308,9 @@ static void sum_regions(sonde_state *state, const sonde_motion *probe) {
   }
 }
 
-// A face by its points: shares and gradients by the same quadrature as the pushes, instead of the
-// exact clip.
-static void sample_face(sonde_state *state, uint32_t face) {
-  const uint32_t *v = state->model->surface.faces[face];
-  double area = state->model->face_area_m2[face] / SONDE_POINTS;
-  if (!find_planes(state, face)) return;
-  for (int k = 0; k < 3; ++k) touch(state, v[k]);
-  for (int q = 0; q < SONDE_POINTS; ++q) {
-    uint16_t plane = state->point_planes[face][q];
-    if (plane == SONDE_OUTSIDE) continue;
-    double depth = plane_depth(state, plane, blend(state->probed, v, POINT[q]));
-    sonde_vec3 outward = v_scale(v_unit(plane_slope(state, plane), state->inward), area);
-    for (int k = 0; k < 3; ++k) {
-      state->share_m3[v[k]] += POINT[q][k] * area * depth;
-      state->gradient[v[k]] = v_madd(state->gradient[v[k]], POINT[q][k], outward);
-    }
-    state->contact.area_m2 += area;
-    state->contact.volume_m3 += area * depth;
-  }
-  sonde_contact_join(state, v[0], v[1]);
-  sonde_contact_join(state, v[1], v[2]);
-  SONDE_ASSERT(state->touched_face_count < state->model->surface.face_count);
-  state->touched_faces[state->touched_face_count++] = face;
-}
-
 void sonde_contact_sample(sonde_state *state, uint32_t face, const sonde_box *box) {
   sonde_box own = face_box(state, face);
-  if (overlap(&own, box)) sample_face(state, face);
+  if (overlap(&own, box)) sonde_faces_sample(state, face);
 }
 
 // The push acts against the slope of the depth: out of the probe.
@@ -397,8 +362,8 @@ static void press_point(sonde_state *state, uint32_t face, int point, const sond
   if (!pressed_at(state, face, point, probe, &at)) return;
   const double *weight = POINT[point];
   spread_push(state, state->model->surface.faces[face], weight, at.slope, at.push_n);
-  add_point_terms(state, face, weight, at.slope,
-                  scales->stiffness * at.stiffness_n_m + scales->damping * at.damping_n_s_m);
+  double scale = scales->stiffness * at.stiffness_n_m + scales->damping * at.damping_n_s_m;
+  add_point_terms(state, face, weight, at.slope, scale);
 }
 
 static void apply_foundation(sonde_state *state, const sonde_motion *probe,
@@ -453,6 +418,8 @@ void sonde_contact_apply(sonde_state *state, const sonde_motion *probe,
     apply_lumped(state, scales);
   else if (state->def.contact_law == SONDE_CONTACT_NODES)
     sonde_nodes_apply(state, probe, scales);
+  else if (scales->lumped)
+    sonde_faces_apply(state, probe, scales);
   else
     apply_foundation(state, probe, scales);
 }
@@ -500,45 +467,22 @@ static void advance_lumped(sonde_state *state, double lambda, double h) {
   }
 }
 
-void sonde_contact_advance(sonde_state *state, const sonde_motion *probe, double lambda, double h) {
+void sonde_contact_advance(sonde_state *state, const sonde_motion *probe, double lambda, double h,
+                           bool lumped) {
   if (state->def.contact_law == SONDE_CONTACT_VOLUME)
     advance_lumped(state, lambda, h);
   else if (state->def.contact_law == SONDE_CONTACT_NODES)
     sonde_nodes_advance(state, probe, lambda, h);
+  else if (lumped)
+    sonde_faces_advance(state, h);
   else
     advance_foundation(state, probe, lambda, h);
-}
-
-// Takes a point's push where the nodes go from right[].
-static void meet_point(sonde_state *state, uint32_t face, int point, const sonde_motion *probe,
-                       double h) {
-  const uint32_t *v = state->model->surface.faces[face];
-  const double *weight = POINT[point];
-  sonde_vec3 dv = blend(state->increment, v, weight);
-  sonde_vec3 x = v_madd(blend(state->probed, v, weight), h, dv);
-  uint16_t plane = nearest_plane(state, x);
-  if (plane == SONDE_OUTSIDE) return;
-  double area = state->model->face_area_m2[face] / SONDE_POINTS;
-  sonde_vec3 slope = plane_slope(state, plane);
-  sonde_vec3 carried = v_add(probe->velocity, v_cross(probe->spin, v_sub(x, probe->origin)));
-  sonde_vec3 speed = v_sub(v_add(blend(state->velocity, v, weight), dv), carried);
-  double push = area * (state->def.contact_stiffness_n_m3 * plane_depth(state, plane, x) +
-                        state->def.contact_damping_n_s_m3 * v_dot(slope, speed));
-  for (int k = 0; k < 3 && push > 0; ++k)
-    state->right[v[k]] = v_madd(state->right[v[k]], push * weight[k], slope);
 }
 
 double sonde_contact_surprise(sonde_state *state, const sonde_motion *probe, double h) {
   SONDE_ASSERT(state->def.contact_law != SONDE_CONTACT_VOLUME);
   if (state->def.contact_law == SONDE_CONTACT_NODES) return sonde_nodes_surprise(state, probe, h);
-  double sum = 0;
-  for (uint32_t k = 0; k < state->touched_count; ++k)
-    state->right[state->touched[k]] = state->contact_force[state->touched[k]];
-  for (uint32_t k = 0; k < state->touched_face_count; ++k)
-    for (int q = 0; q < SONDE_POINTS; ++q) meet_point(state, state->touched_faces[k], q, probe, h);
-  for (uint32_t k = 0; k < state->touched_count; ++k)
-    sum += v_norm2(state->right[state->touched[k]]);
-  return sum;
+  return sonde_faces_surprise(state, probe, h);
 }
 
 void sonde_contact_wrench(sonde_state *state, sonde_vec3 origin) {

@@ -3,11 +3,10 @@
 // touch_range: looks at a run of nodes.
 // detect:      runs near the probe; regions join neighbours.
 // push_at:     push of one node.
+#include "world/contact.h"
 #include "world/lanes.h"
-#include "world/state.h"
 
 #include "base/base.h"
-#include "base/maths.h"
 
 static bool inside_box(const sonde_box *box, sonde_vec3 x) {
   return x.x >= box->low.x && x.x <= box->high.x && x.y >= box->low.y && x.y <= box->high.y &&

@@ -108,25 +108,13 @@ static bool wake_touched(sonde_state *state) {
   return woke;
 }
 
-// Clears what the contact adds to, and lists the edges whose blocks it fills.
+// Clears what the contact adds to.
 static void clear_touched(sonde_state *state) {
-  sonde_lanes *lanes = state->lanes;
-  lanes->pair_count = 0;
-  lanes->stamp++;
   for (uint32_t k = 0; k < state->touched_count; ++k) {
     uint32_t i = state->touched[k];
     state->matrix->diagonal[i] = m_zero();
     state->force[i] = state->product[i] = vec3(0, 0, 0);
   }
-  for (uint32_t k = 0; k < state->touched_face_count; ++k)
-    for (int e = 0; e < 3; ++e) {
-      uint32_t edge = state->model->face_edge[state->touched_faces[k]][e];
-      if (lanes->pair_stamp[edge] == lanes->stamp) continue;
-      lanes->pair_stamp[edge] = lanes->stamp;
-      SONDE_ASSERT(lanes->pair_count < state->model->topology.edge_count);
-      lanes->pair_edge[lanes->pair_count++] = edge;
-      state->matrix->upper[edge] = m_zero();
-    }
 }
 
 // The place in press[] where the contact with a slice is gathered.
@@ -157,85 +145,75 @@ static void couple(sonde_state *state) {
   }
 }
 
-static sonde_vec3 direction_of(const sonde_slice *slices, uint32_t i) {
-  return sonde_lane_vector(slices[i / SONDE_LANES].z, i % SONDE_LANES);
-}
-
-static void add_to_product(sonde_slice *at, bool first, uint32_t l, sonde_vec3 a) {
-  sonde_lane *out = first ? at->q : at->w;
-  out[0][l] += (float)a.x, out[1][l] += (float)a.y, out[2][l] += (float)a.z;
-}
-
-// w = A z with the contact's blocks, the first time q; returns z.w.
-static double multiply(sonde_state *state, bool first) {
-  sonde_lanes *lanes = state->lanes;
-  double sum = lanes->kernels->multiply(lanes, first);
-  for (uint32_t k = 0; k < lanes->pair_count; ++k) {
-    uint32_t e = lanes->pair_edge[k], i = state->model->topology.edges[e][0];
-    uint32_t j = state->model->topology.edges[e][1];
-    const sonde_mat3 *block = &state->matrix->upper[e];
-    sonde_vec3 pi = direction_of(lanes->slice, i), pj = direction_of(lanes->slice, j);
-    sonde_vec3 qi = m_mul_v(*block, pj);
-    add_to_product(&lanes->slice[i / SONDE_LANES], first, i % SONDE_LANES, qi);
-    sonde_vec3 qj = m_mul_v(m_transpose(*block), pi);
-    add_to_product(&lanes->slice[j / SONDE_LANES], first, j % SONDE_LANES, qj);
-    sum += 2 * v_dot(pi, qi);
-  }
-  return sum;
-}
-
-// Nothing to solve: the nodes go on as they are.
-static void keep_velocities(sonde_lanes *lanes) {
-  for (uint32_t a = 0; a < lanes->awake_count; ++a) {
-    sonde_slice *at = &lanes->slice[lanes->awake[a]];
-    for (int c = 0; c < 3; ++c) at->x[c] = (sonde_lane){0};
-  }
-}
-
 // Vectors that the kernels read and write at least once, per slice and per slot: those of one
-// evaluation (linearise, the records of accept or update) and of one iteration (multiply,
-// advance). Records of neighbours count once per slot; the shear layer and the contact do not
+// evaluation (linearise, the records of accept or update), of one sweep and of one iteration
+// (multiply, advance). Records of neighbours count once per slot; the shear layer and the contact do not
 // count.
 enum {
-  EVALUATED_PER_SLICE = 47,
+  EVALUATED_PER_SLICE = 39,
   EVALUATED_PER_SLOT = 16,
+  SWEPT_PER_SLICE = 19,
+  SWEPT_PER_SLOT = 10,
   ITERATED_PER_SLICE = 44,
   ITERATED_PER_SLOT = 10,
   UPDATED_PER_SLICE = 29
 };
 
-static void count_bytes(sonde_lanes *lanes, uint64_t evaluations, uint64_t iterations) {
+static void count_bytes(sonde_lanes *lanes, uint64_t sweeps, uint64_t iterations) {
   uint64_t slices = lanes->awake_count, slots = lanes->slot_total;
   lanes->bytes_moved += sizeof(sonde_lane) *
-                        (evaluations * (EVALUATED_PER_SLICE * slices + EVALUATED_PER_SLOT * slots) +
+                        (EVALUATED_PER_SLICE * slices + EVALUATED_PER_SLOT * slots +
+                         sweeps * (SWEPT_PER_SLICE * slices + SWEPT_PER_SLOT * slots) +
                          iterations * (ITERATED_PER_SLICE * slices + ITERATED_PER_SLOT * slots));
 }
 
-// False when there was nothing left to solve.
-// sums: r.z, r.r and (h F)^2 at the start.
-static bool solve(sonde_state *state, double sums[3]) {
+// Whether Gauss-Seidel needs more than six sweeps more at the pace of the last one: then conjugate
+// gradients are faster.
+static bool is_slow(double before, double now, double target) {
+  double pace = now / before, sixth = pace * pace * pace;
+  return now > target && !(now * sixth * sixth <= target);
+}
+
+// Conjugate gradients from where the sweeps ended.
+static void conjugate(sonde_state *state, double target, sonde_pcg_result *result) {
   sonde_lanes *lanes = state->lanes;
-  const sonde_pcg_options *options = &state->def.pcg;
-  double next[2], alpha = 0, beta = 0;
-  sonde_pcg_result result = {.reference = sqrt(sums[2]), .residual = sqrt(sums[1])};
-  double target = fmax(options->relative_residual * result.reference, options->absolute_residual);
-  while (result.residual > target && result.iterations < options->max_iterations) {
-    bool first = result.iterations == 0;
-    double curvature = multiply(state, first);
+  double sums[2], next[2], alpha = 0, beta = 0;
+  lanes->kernels->restart(lanes, sums);
+  result->residual = sqrt(sums[1]);
+  uint32_t most = state->def.pcg.max_iterations;
+  for (bool first = true; result->residual > target && result->iterations < most; first = false) {
+    double curvature = lanes->kernels->multiply(lanes, first);
     if (!first) curvature -= beta * sums[0] / alpha;
     if (!(curvature > 0)) break;
     alpha = sums[0] / curvature;
     lanes->kernels->advance(lanes, first, (float)alpha, (float)beta, next);
     beta = next[0] / sums[0];
     sums[0] = next[0];
-    result.residual = sqrt(next[1]);
-    result.iterations++;
+    result->residual = sqrt(next[1]);
+    result->iterations++;
   }
-  if (result.iterations == 0) keep_velocities(lanes);
+}
+
+// sums: r.r and (h F)^2 of the first sweep. False when there was nothing left to solve.
+static bool solve(sonde_state *state, const double sums[2]) {
+  sonde_lanes *lanes = state->lanes;
+  const sonde_pcg_options *options = &state->def.pcg;
+  sonde_pcg_result result = {.reference = sqrt(sums[1]), .residual = sqrt(sums[0])};
+  double target = fmax(options->relative_residual * result.reference, options->absolute_residual);
+  bool solved = result.residual > target;
+  uint32_t sweeps = 0;
+  while (result.residual > target && result.iterations < options->max_iterations) {
+    double before = result.residual;
+    result.residual = sqrt(lanes->kernels->sweep(lanes));
+    result.iterations++;
+    sweeps++;
+    if (!is_slow(before, result.residual, target)) continue;
+    conjugate(state, target, &result);
+    break;
+  }
   result.converged = result.residual <= target;
   if (!result.converged) state->flags |= SONDE_FLAG_NOT_CONVERGED;
-  bool solved = result.iterations > 0;
-  count_bytes(lanes, 1, result.iterations);
+  count_bytes(lanes, sweeps, result.iterations - sweeps);
   result.iterations += state->solver.iterations;
   state->solver = result;
   return solved;
@@ -270,8 +248,8 @@ static bool is_bent(sonde_state *state, const sonde_motion *motion, double force
 static bool iterate(sonde_state *state, const sonde_probe *probe, sonde_pose pose,
                     const sonde_motion *motion, bool last) {
   sonde_lanes *lanes = state->lanes;
-  double h = state->def.dt_s, start = sonde_clock_now(), sums[3];
-  const sonde_contact_scales scales = {h, h * h};
+  double h = state->def.dt_s, start = sonde_clock_now(), sums[2];
+  const sonde_contact_scales scales = {h, h * h, true};
   find_near(state, probe, pose);
   publish_evaluated(state);
   sonde_contact_detect(state, probe, pose);
@@ -288,8 +266,8 @@ static bool iterate(sonde_state *state, const sonde_probe *probe, sonde_pose pos
   double assembled = sonde_clock_now();
   bool solved = solve(state, sums);
   publish_increments(state, false);
-  sonde_contact_advance(state, motion, 1, h);
-  bool again = solved && !last && is_bent(state, motion, sums[2]);
+  sonde_contact_advance(state, motion, 1, h, true);
+  bool again = solved && !last && is_bent(state, motion, sums[1]);
   publish_increments(state, true);
   state->times.contact_s += detected - start;
   state->times.assembly_s += assembled - detected;

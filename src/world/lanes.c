@@ -14,7 +14,7 @@
 
 #define CARVE(field, count) (l->field = sonde_carve(base, &offset, (count), sizeof *l->field))
 
-static size_t carve(sonde_lanes *l, uint32_t edges, char *base) {
+static size_t carve(sonde_lanes *l, uint32_t faces, char *base) {
   size_t offset = 0, rows = (size_t)l->slice_count * SONDE_LANES;
   CARVE(model, l->slice_count), CARVE(slice, l->slice_count);
   CARVE(slot, l->slot_count), CARVE(tangent, l->slot_count), CARVE(share, l->slot_count);
@@ -29,8 +29,7 @@ static size_t carve(sonde_lanes *l, uint32_t edges, char *base) {
   CARVE(face_marked, l->face_slice_count), CARVE(is_near, l->slice_count),
       CARVE(speed2, l->slice_count);
   CARVE(way2, l->slice_count), CARVE(unrest2, l->slice_count), CARVE(published, l->slice_count);
-  CARVE(near_probe, l->slice_count);
-  CARVE(pair_edge, edges), CARVE(pair_stamp, edges);
+  CARVE(near_probe, l->slice_count), CARVE(pressed_face, faces);
   return offset;
 }
 
@@ -251,11 +250,11 @@ static void fill(sonde_lanes *lanes, const sonde_model *model, const uint32_t *p
 }
 
 // The block starts at a multiple of 64, as vectors need.
-static sonde_status allocate(sonde_lanes *lanes, uint32_t edges, sonde_error *error) {
-  size_t bytes = carve(lanes, edges, NULL);
+static sonde_status allocate(sonde_lanes *lanes, uint32_t faces, sonde_error *error) {
+  size_t bytes = carve(lanes, faces, NULL);
   lanes->block = sonde_calloc(1, bytes + 63);
   if (!lanes->block) return sonde_fail_memory(error);
-  carve(lanes, edges, (char *)(((uintptr_t)lanes->block + 63) & ~(uintptr_t)63));
+  carve(lanes, faces, (char *)(((uintptr_t)lanes->block + 63) & ~(uintptr_t)63));
   SONDE_ASSERT(((uintptr_t)lanes->slice & 63) == 0);
   return SONDE_OK;
 }
@@ -280,7 +279,7 @@ sonde_status sonde_lanes_create(const sonde_model *model, const sonde_world_def 
     lanes->kernels = sonde_lane_kernels_find(NULL);
     status = measure(lanes, model, place, sizes, error);
   }
-  if (!status) status = allocate(lanes, model->topology.edge_count, error);
+  if (!status) status = allocate(lanes, faces, error);
   if (!status) {
     fill(lanes, model, place, sizes);
     *out = lanes;

@@ -68,6 +68,13 @@ typedef struct sonde_face_value {
 } sonde_face_value;
 enum { SONDE_FACE_STRIDE = 9 * SONDE_LANES };
 
+// Of a face that the probe touches, by its points: depth and push where they were evaluated, plane
+// of the depth or -1.
+typedef struct sonde_pressed_face {
+  double depth[4], push[4];
+  int32_t plane[4];
+} sonde_pressed_face;
+
 // Numbers of the law and of the step, in single precision.
 typedef struct sonde_lane_law {
   float edge_stiffness, edge_damper, edge_compression, edge_pretension;
@@ -83,11 +90,13 @@ typedef struct sonde_lanes sonde_lanes;
 typedef struct sonde_lane_kernels {
   const char *name;
   void (*shear)(sonde_lanes *lanes); // faces' forces and couplings
-  // r = h F - M (ve - v), matrix, z = D^-1 r; r.z, r.r, (h F)^2; reaction
-  void (*linearise)(sonde_lanes *lanes, double sums[3]);
+  // r = h F - M (ve - v), matrix, x = D^-1 r, slice by slice; r.r, (h F)^2; reaction
+  void (*linearise)(sonde_lanes *lanes, double sums[2]);
+  double (*sweep)(sonde_lanes *lanes); // x += D^-1 r, slice by slice; r.r as each slice found it
+  void (*restart)(sonde_lanes *lanes, double sums[2]); // r after the sweeps, z = D^-1 r; r.z, r.r
   double (*multiply)(sonde_lanes *lanes, bool first); // w = A z, the first time q; returns z.w
   // p = z + beta p, q = w + beta q, x += alpha p, r -= alpha q, z = D^-1 r; r.z, r.r. The first
-  // time p = z and x = alpha p.
+  // time p = z.
   void (*advance)(sonde_lanes *lanes, bool first, float alpha, float beta, double sums[2]);
   double (*bend)(sonde_lanes *lanes);   // square of what x leaves unbalanced, see lanes_kernel.c
   void (*accept)(sonde_lanes *lanes);   // ve += x, records
@@ -113,6 +122,7 @@ struct sonde_lanes {
   uint32_t *press_of;           // [slices] 0: not touched
   uint32_t *pressed;            // those slices
   uint32_t press_count;
+  sonde_pressed_face *pressed_face; // [faces] in the order of touched_faces of the state
   sonde_face_slice *face;
   sonde_face_value *face_value;
   uint32_t *near, *face_near;
@@ -129,9 +139,6 @@ struct sonde_lanes {
   uint32_t *near_probe; // slices that the contact looks at
   uint32_t near_probe_count;
   sonde_vec3 reaction_n;
-  uint32_t *pair_edge;  // edges whose blocks the contact fills
-  uint32_t *pair_stamp; // [edges]
-  uint32_t pair_count, stamp;
   uint32_t slot_total;  // of the waking slices
   uint64_t bytes_moved; // by the last step, see count_bytes()
   bool stale;           // the doubles of the state are newer

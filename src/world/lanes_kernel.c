@@ -1,7 +1,10 @@
 // Kernels of the fast engine (docs/world.md); lanes_*_hot.c include this file once per instruction
 // set. Every sum has a fixed order: all sets give the same bits.
 // shear:     slopes, forces and couplings of the faces.
-// linearise: springs to the neighbours, normal and tangential springs, contact, matrix, residual.
+// linearise: springs to the neighbours, normal and tangential springs, contact, matrix, and the
+//            first sweep: every slice is solved for itself and goes on before the next one looks.
+// sweep:     block Gauss-Seidel: the same with what the neighbours have moved since.
+// restart:   residual after the sweeps.
 // multiply, advance: parts of the conjugate gradients of Chronopoulos and Gear (1989), which
 //            read and write every slice twice in an iteration.
 // bend:      what a solution leaves unbalanced.
@@ -11,15 +14,15 @@
 
 #include "base/base.h"
 
-// Where slice s is evaluated: displacement there, velocity, indentation.
-INLINE void publish_record(sonde_lanes *lanes, uint32_t s) {
+// Where slice s is after a step at velocity v: displacement there, velocity, indentation.
+INLINE void publish_record(sonde_lanes *lanes, uint32_t s, const sonde_lane v[3]) {
   const sonde_slice *at = &lanes->slice[s];
   float h = lanes->law.dt, *record = lanes->record + (size_t)s * SONDE_LANES * SONDE_RECORD;
   sonde_lane ue[3];
-  for (int c = 0; c < 3; ++c) ue[c] = at->u[c] + h * at->ve[c];
+  for (int c = 0; c < 3; ++c) ue[c] = at->u[c] + h * v[c];
   sonde_lane indentation = -dot(lanes->model[s].normal, ue);
-  const sonde_lane low[4] = {ue[0], ue[1], ue[2], at->ve[0]};
-  const sonde_lane high[4] = {at->ve[1], at->ve[2], indentation, indentation};
+  const sonde_lane low[4] = {ue[0], ue[1], ue[2], v[0]};
+  const sonde_lane high[4] = {v[1], v[2], indentation, indentation};
   write_records(record, SONDE_RECORD, low);
   write_records(record + 4, SONDE_RECORD, high);
 }
@@ -70,6 +73,7 @@ static void shear(sonde_lanes *lanes) {
 typedef struct node_sum {
   sonde_lane force[3], block[6]; // xx xy xz yy yz zz
   sonde_lane shear_force, shear_diagonal;
+  sonde_lane pending; // along N: what neighbours that went on do by the shear layer
 } node_sum;
 
 INLINE void add_rank_one(sonde_lane block[6], const sonde_lane n[3], sonde_lane scale,
@@ -118,11 +122,14 @@ INLINE void add_spring(const sonde_lane_law *law, const sonde_slot *slot, sonde_
   tangent->lateral = flat;
 }
 
-INLINE void add_coupling(sonde_slot_shear *slot, const float *values, node_sum *sum) {
+INLINE void add_coupling(const sonde_lanes *lanes, sonde_slot_shear *slot,
+                         const sonde_lane_index *node, node_sum *sum) {
+  const float *values = (const float *)lanes->face_value;
   sum->shear_force += gather(values, slot->corner);
   sum->shear_diagonal += gather(values + 3 * SONDE_LANES, slot->corner);
   slot->coupling = gather(values + 6 * SONDE_LANES, slot->opposite_a) +
                    gather(values + 6 * SONDE_LANES, slot->opposite_b);
+  sum->pending += slot->coupling * gather(lanes->direction + 3, *node * SONDE_DIRECTION);
 }
 
 // Pressure of the normal spring and its slope; exponents above 1 go on straight for s < 0.
@@ -164,7 +171,7 @@ INLINE void add_springs(sonde_lanes *lanes, const sonde_slice_model *fixed, bool
   for (uint32_t k = first; k < first + fixed->slot_count; ++k) {
     add_spring(&lanes->law, &lanes->slot[k], k < first + whole ? all(1) : lanes->share[k],
                lanes->record, at, sum, &lanes->tangent[k]);
-    if (sheared) add_coupling(&lanes->slot_shear[k], (const float *)lanes->face_value, sum);
+    if (sheared) add_coupling(lanes, &lanes->slot_shear[k], &lanes->tangent[k].node, sum);
   }
   add_anchor(&lanes->law, fixed, at, sum);
 }
@@ -192,9 +199,8 @@ INLINE void divide(const sonde_lane factor[6], const sonde_lane r[3], sonde_lane
   z[0] = r[0] * factor[3] - factor[0] * z[1] - factor[1] * z[2];
 }
 
-INLINE void publish_direction(sonde_lanes *lanes, uint32_t s) {
-  const sonde_slice *at = &lanes->slice[s];
-  const sonde_lane out[4] = {at->z[0], at->z[1], at->z[2], dot(lanes->model[s].normal, at->z)};
+INLINE void publish_direction(sonde_lanes *lanes, uint32_t s, const sonde_lane z[3]) {
+  const sonde_lane out[4] = {z[0], z[1], z[2], dot(lanes->model[s].normal, z)};
   write_records(lanes->direction + (size_t)s * SONDE_LANES * SONDE_DIRECTION, SONDE_DIRECTION, out);
 }
 
@@ -205,52 +211,55 @@ INLINE float most(sonde_lane a) {
 }
 
 typedef struct sums_of_rows {
-  lane_double rz, rr, ff, reaction[3];
+  lane_double rr, ff, reaction[3];
 } sums_of_rows;
 
 INLINE void linearise_slice(sonde_lanes *lanes, uint32_t s, bool sheared, sums_of_rows *sums) {
   const sonde_slice_model *fixed = &lanes->model[s];
   sonde_slice *at = &lanes->slice[s];
   float h = lanes->law.dt;
-  node_sum sum = {{{0}}, {{0}}, {0}, {0}};
+  node_sum sum = {{{0}}, {{0}}, {0}, {0}, {0}};
   place here;
   for (int c = 0; c < 3; ++c) here.ve[c] = at->ve[c], here.ue[c] = at->u[c] + h * at->ve[c];
   add_springs(lanes, fixed, sheared, &here, &sum);
   for (int c = 0; c < 3; ++c) sums->reaction[c] += widen(sum.force[c]);
   if (lanes->press_of[s]) add_press(&lanes->press[lanes->press_of[s] - 1], &sum);
-  sonde_lane force[3], r[3], z[3];
+  sonde_lane force[3], r[3], x[3];
   for (int c = 0; c < 3; ++c) {
     force[c] = h * sum.force[c];
-    at->r[c] = r[c] = force[c] - fixed->mass * (here.ve[c] - at->v[c]);
+    r[c] = force[c] - fixed->mass * (here.ve[c] - at->v[c]);
+    if (sheared) r[c] -= sum.pending * fixed->normal[c];
   }
   sonde_lane yield = fixed->yield / h, force2 = dot(force, force);
   lanes->unrest2[s] = most(force2 * (yield * yield));
   factorise(sum.block, at->factor);
-  divide(at->factor, r, z);
-  for (int c = 0; c < 3; ++c) at->z[c] = z[c];
-  sums->rz += widen(dot(r, z));
+  divide(at->factor, r, x);
+  for (int c = 0; c < 3; ++c) at->x[c] = x[c], here.ve[c] += x[c];
   sums->rr += widen(dot(r, r));
   sums->ff += widen(force2);
-  publish_direction(lanes, s);
+  publish_record(lanes, s, here.ve);
+  publish_direction(lanes, s, x);
 }
 
-static void linearise(sonde_lanes *lanes, double sums[3]) {
+// Directions are what slices have moved since their neighbours looked: at first nothing.
+static void linearise(sonde_lanes *lanes, double sums[2]) {
   bool sheared = lanes->law.shear > 0;
-  sums_of_rows all_rows = {{0}, {0}, {0}, {{0}}};
+  sums_of_rows all_rows = {{0}, {0}, {{0}}};
+  for (uint32_t a = 0; sheared && a < lanes->awake_count; ++a)
+    publish_direction(lanes, lanes->awake[a], (const sonde_lane[3]){{0}, {0}, {0}});
   for (uint32_t a = 0; a < lanes->awake_count; ++a) {
     if (sheared)
       linearise_slice(lanes, lanes->awake[a], true, &all_rows);
     else
       linearise_slice(lanes, lanes->awake[a], false, &all_rows);
   }
-  sums[0] = total(all_rows.rz);
-  sums[1] = total(all_rows.rr);
-  sums[2] = total(all_rows.ff);
+  sums[0] = total(all_rows.rr);
+  sums[1] = total(all_rows.ff);
   const lane_double *reaction = all_rows.reaction;
   lanes->reaction_n = (sonde_vec3){total(reaction[0]), total(reaction[1]), total(reaction[2])};
 }
 
-// The diagonal blocks' part of A z is r.
+// q += A p without the diagonal blocks.
 INLINE void multiply_slice(sonde_lanes *lanes, const sonde_slice_model *fixed, bool sheared,
                            sonde_lane q[3]) {
   uint32_t first = fixed->first_slot;
@@ -266,17 +275,59 @@ INLINE void multiply_slice(sonde_lanes *lanes, const sonde_slice_model *fixed, b
   for (int c = 0; sheared && c < 3; ++c) q[c] += along_normal * fixed->normal[c];
 }
 
+// q += A p without the diagonal blocks for a slice, p the directions.
+INLINE void couple(sonde_lanes *lanes, uint32_t s, sonde_lane q[3]) {
+  if (lanes->law.shear > 0)
+    multiply_slice(lanes, &lanes->model[s], true, q);
+  else
+    multiply_slice(lanes, &lanes->model[s], false, q);
+}
+
+// After a slice was solved for itself its residual is what its neighbours have moved since.
+static double sweep(sonde_lanes *lanes) {
+  lane_double rr = {0};
+  SONDE_ASSERT(lanes->awake_count <= lanes->slice_count);
+  for (uint32_t a = 0; a < lanes->awake_count; ++a) {
+    uint32_t s = lanes->awake[a];
+    sonde_slice *at = &lanes->slice[s];
+    sonde_lane q[3] = {{0}, {0}, {0}}, r[3], z[3];
+    couple(lanes, s, q);
+    for (int c = 0; c < 3; ++c) r[c] = -q[c];
+    divide(at->factor, r, z);
+    for (int c = 0; c < 3; ++c) at->x[c] += z[c];
+    rr += widen(dot(r, r));
+    publish_direction(lanes, s, z);
+  }
+  return total(rr);
+}
+
+static void restart(sonde_lanes *lanes, double sums[2]) {
+  lane_double rz = {0}, rr = {0};
+  for (uint32_t a = 0; a < lanes->awake_count; ++a) {
+    sonde_slice *at = &lanes->slice[lanes->awake[a]];
+    sonde_lane q[3] = {{0}, {0}, {0}};
+    couple(lanes, lanes->awake[a], q);
+    for (int c = 0; c < 3; ++c) at->r[c] = -q[c];
+  }
+  for (uint32_t a = 0; a < lanes->awake_count; ++a) {
+    sonde_slice *at = &lanes->slice[lanes->awake[a]];
+    divide(at->factor, at->r, at->z);
+    rz += widen(dot(at->r, at->z));
+    rr += widen(dot(at->r, at->r));
+    publish_direction(lanes, lanes->awake[a], at->z);
+  }
+  sums[0] = total(rz);
+  sums[1] = total(rr);
+}
+
+// The diagonal blocks' part of A z is r.
 static double multiply(sonde_lanes *lanes, bool first) {
-  bool sheared = lanes->law.shear > 0;
   lane_double sum = {0};
   for (uint32_t a = 0; a < lanes->awake_count; ++a) {
     uint32_t s = lanes->awake[a];
     sonde_slice *at = &lanes->slice[s];
     sonde_lane q[3] = {at->r[0], at->r[1], at->r[2]}, *out = first ? at->q : at->w;
-    if (sheared)
-      multiply_slice(lanes, &lanes->model[s], true, q);
-    else
-      multiply_slice(lanes, &lanes->model[s], false, q);
+    couple(lanes, s, q);
     for (int c = 0; c < 3; ++c) out[c] = q[c];
     sum += widen(dot(at->z, q));
   }
@@ -287,7 +338,7 @@ INLINE void advance_slice(sonde_slice *at, bool first, float alpha, float beta) 
   for (int c = 0; c < 3; ++c) {
     sonde_lane p = first ? at->z[c] : at->z[c] + beta * at->p[c];
     sonde_lane q = first ? at->q[c] : at->w[c] + beta * at->q[c];
-    at->x[c] = first ? alpha * p : at->x[c] + alpha * p;
+    at->x[c] += alpha * p;
     at->r[c] -= alpha * q;
     at->p[c] = p;
     if (!first) at->q[c] = q;
@@ -307,7 +358,7 @@ static void advance(sonde_lanes *lanes, bool first, float alpha, float beta, dou
     for (int c = 0; c < 3; ++c) at->z[c] = z[c];
     rz += widen(dot(r, z));
     rr += widen(dot(r, r));
-    publish_direction(lanes, lanes->awake[a]);
+    publish_direction(lanes, lanes->awake[a], z);
   }
   sums[0] = total(rz);
   sums[1] = total(rr);
@@ -337,7 +388,7 @@ static void accept(sonde_lanes *lanes) {
   for (uint32_t a = 0; a < lanes->awake_count; ++a) {
     sonde_slice *at = &lanes->slice[lanes->awake[a]];
     for (int c = 0; c < 3; ++c) at->ve[c] += at->x[c];
-    publish_record(lanes, lanes->awake[a]);
+    publish_record(lanes, lanes->awake[a], at->ve);
   }
 }
 
@@ -372,7 +423,7 @@ static double update(sonde_lanes *lanes) {
     lanes->speed2[s] = most(speed2);
     lanes->way2[s] = most(way2);
     lanes->published[s] = 0;
-    publish_record(lanes, s);
+    publish_record(lanes, s, at->ve);
     sum += widen(speed2 + way2);
   }
   return total(sum);
@@ -411,6 +462,8 @@ static void near(sonde_lanes *lanes, const float low[3], const float high[3], fl
 const sonde_lane_kernels SONDE_KERNELS = {.name = SONDE_KERNELS_NAME,
                                           .shear = shear,
                                           .linearise = linearise,
+                                          .sweep = sweep,
+                                          .restart = restart,
                                           .multiply = multiply,
                                           .advance = advance,
                                           .bend = bend,

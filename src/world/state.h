@@ -68,6 +68,8 @@ struct sonde_state {
   sonde_vec3 *plane_normal; // [max planes] of the probe in the world frame
   double *plane_offset;
   double *plane_weight; // of its distance in the depth: see depth_at()
+  float (*plane_lane)[4]; // [max planes] weight times normal and distance from the origin
+  sonde_vec3 origin;      // of the probe
   uint32_t plane_count;
   sonde_vec3 ball_centre; // of a ball
   double ball_radius;     // > 0 for a ball
@@ -117,8 +119,10 @@ sonde_vec3 sonde_bounded_move(const sonde_model *model, uint32_t i, sonde_vec3 f
                               sonde_vec3 move);
 
 // How a contact law enters the linear system at a step of size h (0: static): scales of K and C.
+// lumped: each row's terms on its diagonal block alone.
 typedef struct sonde_contact_scales {
   double damping, stiffness;
+  bool lumped;
 } sonde_contact_scales;
 
 // Finds the skin inside the probe at probed[]: shares, gradients, touched nodes,
@@ -135,7 +139,8 @@ void sonde_contact_apply(sonde_state *state, const sonde_motion *probe,
                          const sonde_contact_scales *scales);
 // Pushes at the end of the step by the same linearisation: from probed[] the nodes go on by
 // lambda^2 h dv at velocities changed by lambda dv. @thread tick
-void sonde_contact_advance(sonde_state *state, const sonde_motion *probe, double lambda, double h);
+void sonde_contact_advance(sonde_state *state, const sonde_motion *probe, double lambda, double h,
+                           bool lumped);
 // Square of the difference between the pushes that sonde_contact_advance() foresaw for nodes that
 // go on by h dv and those that they meet there. FOUNDATION and NODES. Uses right[]. @thread tick
 double sonde_contact_surprise(sonde_state *state, const sonde_motion *probe, double h);
@@ -154,8 +159,6 @@ void sonde_nodes_advance(sonde_state *state, const sonde_motion *probe, double l
 // engine. @thread tick
 void sonde_contact_sample(sonde_state *state, uint32_t face, const sonde_box *box);
 void sonde_lanes_detect(sonde_state *state, const sonde_box *box);
-// Joins the regions of two touched nodes. @thread tick
-void sonde_contact_join(sonde_state *state, uint32_t a, uint32_t b);
 // One step of the fast engine; false when something is not finite. @thread tick
 bool sonde_lane_step(sonde_state *state, const sonde_probe *probe, sonde_pose pose,
                      const sonde_motion *motion);
