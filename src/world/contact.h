@@ -32,5 +32,7 @@ void sonde_faces_apply(sonde_state *state, const sonde_motion *probe,
                        const sonde_contact_scales *scales);
 void sonde_faces_advance(sonde_state *state, double h);
 double sonde_faces_surprise(sonde_state *state, const sonde_motion *probe, double h);
+// What the ties take from the product of the matrix with the directions, into carry[] of press[].
+void sonde_faces_carry(struct sonde_lanes *lanes);
 
 #endif

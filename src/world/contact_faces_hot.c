@@ -7,6 +7,7 @@
 // apply:     pushes where the nodes are evaluated.
 // advance:   pushes at the end of the step by the same linearisation.
 // surprise:  the pushes that nodes meet where the solution brings them.
+// carry:     what couples the corners of a face, for the solver.
 #include "world/contact.h"
 #include "world/lanes.h"
 
@@ -156,6 +157,20 @@ INLINE void push_side(const four depth, const four rate, double stiffness, doubl
   }
 }
 
+// scale: of the points that push.
+static void add_tie(sonde_lanes *lanes, const uint32_t *v, sonde_vec3 slope, double scale,
+                    const four pushes) {
+  sonde_press_tie *tie = &lanes->tie[lanes->tie_count++];
+  const double n[3] = {slope.x, slope.y, slope.z};
+  for (int c = 0; c < 3; ++c) {
+    four both;
+    for (int q = 0; q < SONDE_POINTS; ++q) both[q] = WEIGHT[(c + 1) % 3][q] * pushes[q];
+    tie->row[c] = v[c];
+    tie->slope[c] = (float)n[c];
+    tie->tie[c] = (float)(scale * sum(WEIGHT[c], both));
+  }
+}
+
 static void apply_face(sonde_state *state, uint32_t k, const sonde_motion *probe,
                        const sonde_contact_scales *scales) {
   const uint32_t *v = state->model->surface.faces[state->touched_faces[k]];
@@ -178,30 +193,45 @@ static void apply_face(sonde_state *state, uint32_t k, const sonde_motion *probe
       *force = v_madd(*force, -sum(WEIGHT[c], push), slope);
       *block = m_add(*block, m_rank1(slope, scale * sum(WEIGHT[c], side), 0));
     }
+    if (state->lanes->tied) add_tie(state->lanes, v, slope, scale, side);
   }
 }
 
 void sonde_faces_apply(sonde_state *state, const sonde_motion *probe,
                        const sonde_contact_scales *scales) {
   SONDE_ASSERT(scales->stiffness > 0);
+  state->lanes->tie_count = 0;
   for (uint32_t k = 0; k < state->touched_face_count; ++k) apply_face(state, k, probe, scales);
 }
 
+// The push of a plane's points when the corners' ways along its slope change it by `more`.
+INLINE void change_side(const sonde_pressed_face *at, const four more, const four side, four push) {
+  for (int q = 0; q < SONDE_POINTS; ++q) {
+    double p = at->push[q] + more[q];
+    push[q] = at->push[q] > 0 && p > 0 ? p * side[q] : 0;
+  }
+}
+
+// With ties the points' pushes change with the points, without them with each corner as if all
+// three went its way.
 static void advance_face(sonde_state *state, uint32_t k, double h) {
   const uint32_t *v = state->model->surface.faces[state->touched_faces[k]];
   const sonde_pressed_face *at = &state->lanes->pressed_face[k];
   double stiffness, damping;
-  four side;
+  four side, push, more;
   point_law(state, state->touched_faces[k], &stiffness, &damping);
+  double gain = h * stiffness + damping;
   for (int q = 0; next_side(at->plane, &q, side); ++q) {
     sonde_vec3 slope = plane_slope(state, (uint32_t)at->plane[q]);
+    double way[3];
+    for (int c = 0; c < 3; ++c) way[c] = gain * v_dot(slope, state->increment[v[c]]);
+    for (int p = 0; p < SONDE_POINTS; ++p)
+      more[p] = way[0] * WEIGHT[0][p] + way[1] * WEIGHT[1][p] + way[2] * WEIGHT[2][p];
+    if (state->lanes->tied) change_side(at, more, side, push);
     for (int c = 0; c < 3; ++c) {
-      double more = v_dot(slope, state->increment[v[c]]) * (h * stiffness + damping);
-      four push;
-      for (int p = 0; p < SONDE_POINTS; ++p)
-        push[p] = at->push[p] > 0 && at->push[p] + more > 0 ? (at->push[p] + more) * side[p] : 0;
-      state->contact_force[v[c]] =
-          v_madd(state->contact_force[v[c]], -sum(WEIGHT[c], push), slope);
+      for (int p = 0; p < SONDE_POINTS && !state->lanes->tied; ++p) more[p] = way[c];
+      if (!state->lanes->tied) change_side(at, more, side, push);
+      state->contact_force[v[c]] = v_madd(state->contact_force[v[c]], -sum(WEIGHT[c], push), slope);
     }
   }
 }
@@ -248,4 +278,27 @@ double sonde_faces_surprise(sonde_state *state, const sonde_motion *probe, doubl
   for (uint32_t k = 0; k < state->touched_count; ++k)
     sum2 += v_norm2(state->right[state->touched[k]]);
   return sum2;
+}
+
+// The ties' part of the rows for the directions at hand.
+void sonde_faces_carry(sonde_lanes *lanes) {
+  for (uint32_t k = 0; k < lanes->press_count; ++k)
+    for (int c = 0; c < 3; ++c) lanes->press[k].carry[c] = (sonde_lane){0};
+  for (uint32_t k = 0; k < lanes->tie_count; ++k) {
+    const sonde_press_tie *tie = &lanes->tie[k];
+    float along[3];
+    for (int c = 0; c < 3; ++c) {
+      const float *z = lanes->direction + (size_t)tie->row[c] * SONDE_DIRECTION;
+      along[c] = tie->slope[0] * z[0] + tie->slope[1] * z[1] + tie->slope[2] * z[2];
+    }
+    float part[3];
+    for (int c = 0; c < 3; ++c) part[c] = tie->tie[c] * (along[c] - along[(c + 1) % 3]);
+    for (int c = 0; c < 3; ++c) {
+      uint32_t s = tie->row[c] / SONDE_LANES, l = tie->row[c] % SONDE_LANES;
+      SONDE_ASSERT(lanes->press_of[s] > 0);
+      sonde_slice_press *press = &lanes->press[lanes->press_of[s] - 1];
+      float push = part[c] - part[(c + 2) % 3];
+      for (int d = 0; d < 3; ++d) press->carry[d][l] += push * tie->slope[d];
+    }
+  }
 }

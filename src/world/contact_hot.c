@@ -418,7 +418,7 @@ void sonde_contact_apply(sonde_state *state, const sonde_motion *probe,
     apply_lumped(state, scales);
   else if (state->def.contact_law == SONDE_CONTACT_NODES)
     sonde_nodes_apply(state, probe, scales);
-  else if (scales->lumped)
+  else if (state->lanes && !state->lanes->stale)
     sonde_faces_apply(state, probe, scales);
   else
     apply_foundation(state, probe, scales);
@@ -467,13 +467,12 @@ static void advance_lumped(sonde_state *state, double lambda, double h) {
   }
 }
 
-void sonde_contact_advance(sonde_state *state, const sonde_motion *probe, double lambda, double h,
-                           bool lumped) {
+void sonde_contact_advance(sonde_state *state, const sonde_motion *probe, double lambda, double h) {
   if (state->def.contact_law == SONDE_CONTACT_VOLUME)
     advance_lumped(state, lambda, h);
   else if (state->def.contact_law == SONDE_CONTACT_NODES)
     sonde_nodes_advance(state, probe, lambda, h);
-  else if (lumped)
+  else if (state->lanes && !state->lanes->stale)
     sonde_faces_advance(state, h);
   else
     advance_foundation(state, probe, lambda, h);

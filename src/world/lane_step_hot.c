@@ -6,8 +6,8 @@
 // couple:    pushes and blocks of the contact, found in double precision, into the slices.
 // solve:     conjugate gradients.
 // rest:      slices that stopped moving fall asleep, movers wake their neighbours.
+#include "world/contact.h"
 #include "world/lanes.h"
-#include "world/state.h"
 
 #include "base/base.h"
 #include "base/clock.h"
@@ -15,13 +15,9 @@
 
 #include <string.h>
 
-static void list_awake(sonde_lanes *lanes) {
-  lanes->awake_count = lanes->face_list_count = lanes->slot_total = 0;
-  for (uint32_t s = 0; s < lanes->slice_count; ++s) {
-    lanes->awake[lanes->awake_count] = s;
-    lanes->awake_count += lanes->is_awake[s];
-    lanes->slot_total += lanes->is_awake[s] ? lanes->model[s].slot_count : 0;
-  }
+// Faces with a corner in the listed slices.
+static void list_faces(sonde_lanes *lanes) {
+  lanes->face_list_count = 0;
   if (!(lanes->law.shear > 0)) return;
   memset(lanes->face_marked, 0, lanes->face_slice_count);
   for (uint32_t a = 0; a < lanes->awake_count; ++a) {
@@ -33,6 +29,36 @@ static void list_awake(sonde_lanes *lanes) {
     lanes->faces[lanes->face_list_count] = f;
     lanes->face_list_count += lanes->face_marked[f];
   }
+}
+
+// Lists the slices that `take` marks.
+static void list_slices(sonde_lanes *lanes, const uint8_t *take) {
+  lanes->awake_count = lanes->slot_total = 0;
+  for (uint32_t s = 0; s < lanes->slice_count; ++s) {
+    lanes->awake[lanes->awake_count] = s;
+    lanes->awake_count += take[s];
+    lanes->slot_total += take[s] ? lanes->model[s].slot_count : 0;
+  }
+  list_faces(lanes);
+}
+
+static void list_awake(sonde_lanes *lanes) { list_slices(lanes, lanes->is_awake); }
+
+// Lists the touched slices and those beside them; the others stand still for now.
+static void list_touched(sonde_lanes *lanes) {
+  uint8_t *take = lanes->is_near;
+  memset(take, 0, lanes->slice_count);
+  for (uint32_t k = 0; k < lanes->press_count; ++k) {
+    const sonde_slice_model *fixed = &lanes->model[lanes->pressed[k]];
+    const uint32_t *near = lanes->near + fixed->first_near;
+    take[lanes->pressed[k]] = 1;
+    for (uint32_t n = 0; n < fixed->near_count; ++n) take[near[n]] = lanes->is_awake[near[n]];
+  }
+  size_t size = SONDE_LANES * SONDE_DIRECTION;
+  for (uint32_t s = 0; s < lanes->slice_count; ++s)
+    if (lanes->is_awake[s] && !take[s])
+      memset(lanes->direction + s * size, 0, size * sizeof *lanes->direction);
+  list_slices(lanes, take);
 }
 
 // Where the nodes of the slices that the contact looks at are evaluated, and their velocities.
@@ -147,8 +173,8 @@ static void couple(sonde_state *state) {
 
 // Vectors that the kernels read and write at least once, per slice and per slot: those of one
 // evaluation (linearise, the records of accept or update), of one sweep and of one iteration
-// (multiply, advance). Records of neighbours count once per slot; the shear layer and the contact do not
-// count.
+// (multiply, advance). Records of neighbours count once per slot; the shear layer and the contact
+// do not count.
 enum {
   EVALUATED_PER_SLICE = 39,
   EVALUATED_PER_SLOT = 16,
@@ -161,10 +187,10 @@ enum {
 
 static void count_bytes(sonde_lanes *lanes, uint64_t sweeps, uint64_t iterations) {
   uint64_t slices = lanes->awake_count, slots = lanes->slot_total;
-  lanes->bytes_moved += sizeof(sonde_lane) *
-                        (EVALUATED_PER_SLICE * slices + EVALUATED_PER_SLOT * slots +
-                         sweeps * (SWEPT_PER_SLICE * slices + SWEPT_PER_SLOT * slots) +
-                         iterations * (ITERATED_PER_SLICE * slices + ITERATED_PER_SLOT * slots));
+  lanes->bytes_moved +=
+      sizeof(sonde_lane) * (EVALUATED_PER_SLICE * slices + EVALUATED_PER_SLOT * slots +
+                            sweeps * (SWEPT_PER_SLICE * slices + SWEPT_PER_SLOT * slots) +
+                            iterations * (ITERATED_PER_SLICE * slices + ITERATED_PER_SLOT * slots));
 }
 
 // Whether Gauss-Seidel needs more than six sweeps more at the pace of the last one: then conjugate
@@ -178,10 +204,12 @@ static bool is_slow(double before, double now, double target) {
 static void conjugate(sonde_state *state, double target, sonde_pcg_result *result) {
   sonde_lanes *lanes = state->lanes;
   double sums[2], next[2], alpha = 0, beta = 0;
+  sonde_faces_carry(lanes);
   lanes->kernels->restart(lanes, sums);
   result->residual = sqrt(sums[1]);
   uint32_t most = state->def.pcg.max_iterations;
   for (bool first = true; result->residual > target && result->iterations < most; first = false) {
+    sonde_faces_carry(lanes);
     double curvature = lanes->kernels->multiply(lanes, first);
     if (!first) curvature -= beta * sums[0] / alpha;
     if (!(curvature > 0)) break;
@@ -194,23 +222,23 @@ static void conjugate(sonde_state *state, double target, sonde_pcg_result *resul
   }
 }
 
-// sums: r.r and (h F)^2 of the first sweep. False when there was nothing left to solve.
-static bool solve(sonde_state *state, const double sums[2]) {
+// From the first sweep's residual on; with ties, which sweeps resolve badly, by conjugate gradients
+// at once. reference: |h F|. False when there was nothing left to solve.
+static bool solve(sonde_state *state, double residual, double reference) {
   sonde_lanes *lanes = state->lanes;
   const sonde_pcg_options *options = &state->def.pcg;
-  sonde_pcg_result result = {.reference = sqrt(sums[1]), .residual = sqrt(sums[0])};
-  double target = fmax(options->relative_residual * result.reference, options->absolute_residual);
-  bool solved = result.residual > target;
+  sonde_pcg_result result = {.reference = reference, .residual = residual};
+  double target = fmax(options->relative_residual * reference, options->absolute_residual);
+  bool solved = result.residual > target, slow = lanes->tied;
   uint32_t sweeps = 0;
-  while (result.residual > target && result.iterations < options->max_iterations) {
+  while (result.residual > target && result.iterations < options->max_iterations && !slow) {
     double before = result.residual;
     result.residual = sqrt(lanes->kernels->sweep(lanes));
     result.iterations++;
     sweeps++;
-    if (!is_slow(before, result.residual, target)) continue;
-    conjugate(state, target, &result);
-    break;
+    slow = is_slow(before, result.residual, target);
   }
+  if (result.residual > target) conjugate(state, target, &result);
   result.converged = result.residual <= target;
   if (!result.converged) state->flags |= SONDE_FLAG_NOT_CONVERGED;
   count_bytes(lanes, sweeps, result.iterations - sweeps);
@@ -230,48 +258,82 @@ static void publish_increments(sonde_state *state, bool clear) {
   }
 }
 
+// How a Newton iteration is made.
+typedef struct iteration {
+  uint32_t number; // from 1
+  bool tied;       // with ties
+  bool local;      // touched slices and those beside them only
+  double force2;   // (h F)^2 of the first one
+} iteration;
+
 // Of what the linear solver may leave: what is not seen adds up from step to step.
 static const double BENT_SHARE = 0.1;
 
-// Whether what the linear system did not see of its solution is more than a share of what
-// the solver may leave.
-static bool is_bent(sonde_state *state, const sonde_motion *motion, double force2) {
+// Whether what the linear system did not see of its solution is more than a share of what the
+// solver may leave; the next iteration is local when what it sees of the contact is the most of it.
+static bool is_bent(sonde_state *state, const sonde_motion *motion, iteration *now) {
   double h = state->def.dt_s, share = BENT_SHARE * state->def.pcg.relative_residual;
   double contact2 = h * h * sonde_contact_surprise(state, motion, h);
-  double left2 = contact2 + state->lanes->kernels->bend(state->lanes);
+  double bent2 = state->lanes->kernels->bend(state->lanes);
   double least = state->def.pcg.absolute_residual;
-  return left2 > fmax(share * share * force2, least * least);
+  double limit2 = fmax(share * share * now->force2, least * least);
+  now->local = bent2 <= limit2;
+  return contact2 + bent2 > limit2;
 }
 
-// One Newton iteration: forces and matrix where the nodes are expected, solution, pushes after it.
-// True when another one is needed; `last`: there will be none.
-static bool iterate(sonde_state *state, const sonde_probe *probe, sonde_pose pose,
-                    const sonde_motion *motion, bool last) {
+// Finds the contact where the nodes are expected and adds it up by slices.
+static void touch(sonde_state *state, const sonde_probe *probe, sonde_pose pose,
+                  const sonde_motion *motion, bool tied) {
   sonde_lanes *lanes = state->lanes;
-  double h = state->def.dt_s, start = sonde_clock_now(), sums[2];
-  const sonde_contact_scales scales = {h, h * h, true};
+  double h = state->def.dt_s;
+  const sonde_contact_scales scales = {h, h * h};
   find_near(state, probe, pose);
   publish_evaluated(state);
   sonde_contact_detect(state, probe, pose);
   if (wake_touched(state)) list_awake(lanes);
   clear_touched(state);
+  lanes->tied = tied;
+  lanes->tie_count = 0;
   if (probe) {
     sonde_contact_apply(state, motion, &scales);
     sonde_friction_apply(state, motion, &scales, h);
   }
   couple(state);
-  double detected = sonde_clock_now();
+}
+
+// Forces and matrix, the first sweep and the rest of the solution. False when there was nothing
+// left to solve.
+static bool linearise(sonde_state *state, iteration *now) {
+  sonde_lanes *lanes = state->lanes;
+  double start = sonde_clock_now(), sums[2];
+  sonde_vec3 reaction = lanes->reaction_n;
   lanes->kernels->shear(lanes);
   lanes->kernels->linearise(lanes, sums);
+  if (now->number == 1) now->force2 = sums[1];
+  if (now->local) lanes->reaction_n = reaction;
   double assembled = sonde_clock_now();
-  bool solved = solve(state, sums);
-  publish_increments(state, false);
-  sonde_contact_advance(state, motion, 1, h, true);
-  bool again = solved && !last && is_bent(state, motion, sums[1]);
-  publish_increments(state, true);
-  state->times.contact_s += detected - start;
-  state->times.assembly_s += assembled - detected;
+  bool solved = solve(state, sqrt(sums[0]), sqrt(now->force2));
+  state->times.assembly_s += assembled - start;
   state->times.solve_s += sonde_clock_now() - assembled;
+  return solved;
+}
+
+// One Newton iteration: forces and matrix where the nodes are expected, solution, pushes after it.
+// True when another one is needed; `last`: there will be none. The first one makes do without ties.
+static bool iterate(sonde_state *state, const sonde_probe *probe, sonde_pose pose,
+                    const sonde_motion *motion, iteration *now, bool last) {
+  double start = sonde_clock_now();
+  now->tied = now->number > 1 && state->def.contact_law == SONDE_CONTACT_FOUNDATION;
+  touch(state, probe, pose, motion, now->tied);
+  if (now->local) list_touched(state->lanes);
+  double detected = sonde_clock_now();
+  bool solved = linearise(state, now);
+  double left = sonde_clock_now();
+  publish_increments(state, false);
+  sonde_contact_advance(state, motion, 1, state->def.dt_s);
+  bool again = solved && !last && is_bent(state, motion, now);
+  publish_increments(state, true);
+  state->times.contact_s += detected - start + (sonde_clock_now() - left);
   return again;
 }
 
@@ -282,7 +344,7 @@ static void fall_asleep(sonde_state *state, uint32_t s) {
   lanes->is_awake[s] = 0;
   lanes->speed2[s] = 0;
   lanes->published[s] = 1;
-  for (int c = 0; c < 3; ++c) at->v[c] = at->ve[c] = at->z[c] = (sonde_lane){0};
+  for (int c = 0; c < 3; ++c) at->v[c] = at->ve[c] = at->x[c] = (sonde_lane){0};
   for (uint32_t l = 0; l < lanes->model[s].used; ++l) {
     uint32_t i = s * SONDE_LANES + l;
     memset(lanes->direction + (size_t)i * SONDE_DIRECTION, 0, SONDE_DIRECTION * sizeof(float));
@@ -359,9 +421,13 @@ bool sonde_lane_step(sonde_state *state, const sonde_probe *probe, sonde_pose po
   lanes->bytes_moved = 0;
   list_awake(lanes);
   hold_touched(state);
+  iteration now = {.number = 1};
   uint32_t most = state->def.newton_iterations;
-  for (uint32_t k = 1; iterate(state, probe, pose, motion, k >= most); ++k)
+  for (; iterate(state, probe, pose, motion, &now, now.number >= most); now.number++) {
     lanes->kernels->accept(lanes);
+    list_awake(lanes);
+  }
+  list_awake(lanes);
   double solved = sonde_clock_now();
   if (probe) sonde_friction_advance(state, motion);
   sonde_contact_wrench(state, pose.position);

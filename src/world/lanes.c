@@ -30,6 +30,7 @@ static size_t carve(sonde_lanes *l, uint32_t faces, char *base) {
       CARVE(speed2, l->slice_count);
   CARVE(way2, l->slice_count), CARVE(unrest2, l->slice_count), CARVE(published, l->slice_count);
   CARVE(near_probe, l->slice_count), CARVE(pressed_face, faces);
+  CARVE(tie, 4 * (size_t)faces);
   return offset;
 }
 
@@ -50,7 +51,7 @@ static void fill_row(sonde_lanes *lanes, const sonde_model *model, uint32_t i) {
   const sonde_topology *t = &model->topology;
   uint32_t s = i / SONDE_LANES, l = i % SONDE_LANES;
   sonde_slice_model *fixed = &lanes->model[s];
-  int32_t nothing = (int32_t)(lanes->face_slice_count * SONDE_FACE_STRIDE);
+  int32_t nothing = (int32_t)(lanes->face_slice_count * 3 * SONDE_LANES);
   if (l == 0) fixed->whole_count = fixed->slot_count;
   for (uint32_t k = 0; k < fixed->slot_count; ++k) {
     sonde_slot *slot = &lanes->slot[fixed->first_slot + k];
@@ -65,8 +66,10 @@ static void fill_row(sonde_lanes *lanes, const sonde_model *model, uint32_t i) {
       length = model->edge_rest_m[t->neighbour_edge[t->start[i] + k]];
     }
     lanes->tangent[fixed->first_slot + k].node[l] = (int32_t)j;
-    if (lanes->law.shear > 0)
-      shear->corner[l] = shear->opposite_a[l] = shear->opposite_b[l] = nothing;
+    if (lanes->law.shear > 0) {
+      shear->left[l] = nothing;
+      shear->right[l] = nothing * SONDE_CORNER;
+    }
     slot->rest[0][l] = (float)d.x, slot->rest[1][l] = (float)d.y, slot->rest[2][l] = (float)d.z;
     slot->length[l] = (float)length;
     lanes->share[fixed->first_slot + k][l] = (float)share;
@@ -130,6 +133,7 @@ static void fill_shear(sonde_face_slice *face, const sonde_model *model, uint32_
   sonde_tissue_face_law(model, f, &shear, &limit);
   face->shear[lane] = (float)shear;
   face->limit[lane] = (float)limit;
+  face->inverse_limit[lane] = (float)(1 / limit);
 }
 
 static void fill_face(sonde_lanes *lanes, const sonde_model *model, uint32_t at) {
@@ -137,24 +141,22 @@ static void fill_face(sonde_lanes *lanes, const sonde_model *model, uint32_t at)
   const uint32_t *v = model->surface.faces[f];
   SONDE_ASSERT(at / SONDE_LANES < lanes->face_slice_count);
   sonde_face_slice *face = &lanes->face[at / SONDE_LANES];
-  face->area[lane] = (float)model->face_area_m2[f];
+  face->inverse_area[lane] = (float)(1 / model->face_area_m2[f]);
   fill_shear(face, model, f, lane);
   for (uint32_t k = 0; k < 3; ++k) {
-    uint32_t i = v[k], j = v[(k + 1) % 3], opposite = (k + 2) % 3;
-    int32_t first = (int32_t)(at / SONDE_LANES * SONDE_FACE_STRIDE + lane);
+    uint32_t i = v[k], next = v[(k + 1) % 3], before = v[(k + 2) % 3], row = i % SONDE_LANES;
+    int32_t corner = (int32_t)((at / SONDE_LANES * 3 + k) * SONDE_LANES + lane);
     face->node[k][lane] = (int32_t)i;
     face->half_cotangent[k][lane] = (float)model->face_half_cotangent[f][k];
-    slot_of(lanes, &model->topology, i, j)->corner[i % SONDE_LANES] =
-        first + (int32_t)(k * SONDE_LANES);
-    int32_t across = first + (int32_t)(opposite * SONDE_LANES);
-    slot_of(lanes, &model->topology, i, j)->opposite_a[i % SONDE_LANES] = across;
-    slot_of(lanes, &model->topology, j, i)->opposite_b[j % SONDE_LANES] = across;
+    slot_of(lanes, &model->topology, i, next)->left[row] = corner;
+    slot_of(lanes, &model->topology, i, before)->right[row] =
+        corner * SONDE_CORNER + SONDE_CORNER_BEFORE;
   }
 }
 
 static void fill_faces(sonde_lanes *lanes, const sonde_model *model) {
   for (uint32_t s = 0; s < lanes->face_slice_count; ++s)
-    for (int l = 0; l < SONDE_LANES; ++l) lanes->face[s].area[l] = lanes->face[s].limit[l] = 1;
+    for (int l = 0; l < SONDE_LANES; ++l) lanes->face[s].limit[l] = 1;
   for (uint32_t k = 0; lanes->law.shear > 0 && k < model->surface.face_count; ++k)
     fill_face(lanes, model, k);
 }
@@ -308,6 +310,7 @@ void sonde_lanes_record(sonde_lanes *lanes, uint32_t i) {
     normal[c] = fixed->normal[c][l] * record[c];
   }
   record[6] = -(normal[0] + normal[1] + normal[2]);
+  record[7] = 0;
 }
 
 static void import_slice(sonde_lanes *lanes, uint32_t s, const sonde_vec3 *rest,

@@ -19,10 +19,9 @@ typedef struct sonde_slot {
 
 // The same slot in the shear layer.
 typedef struct sonde_slot_shear {
-  sonde_lane_index corner;     // this row's corner of the face to the left of the edge
-  sonde_lane_index opposite_a; // corners opposite the edge, whose coupling the edge carries
-  sonde_lane_index opposite_b;
-  sonde_lane coupling; // s of the block s N_i N_j^T
+  sonde_lane_index left;  // this row's corner of the face to the left of the edge
+  sonde_lane_index right; // and of the face to its right: the coupling with the corner before
+  sonde_lane coupling;    // s of the block s N_i N_j^T
 } sonde_slot_shear;
 
 // The neighbour and the edge's block of the matrix, -(along n n^T + lateral I): all that a product
@@ -51,22 +50,30 @@ typedef struct sonde_slice {
   sonde_lane x[3], r[3], z[3], w[3], p[3], q[3]; // of the conjugate gradients; D z = r
 } sonde_slice;
 
-// What the contact adds to a slice: forces, and xx xy xz yy yz zz of the diagonal blocks.
+// What the contact adds to a slice: forces, xx xy xz yy yz zz of the diagonal blocks, and what ties
+// make of the directions.
 typedef struct sonde_slice_press {
-  sonde_lane force[3], block[6];
+  sonde_lane force[3], block[6], carry[3];
 } sonde_slice_press;
+
+// A pressed face couples its corners along the slope of the depth. A diagonal block holds the whole
+// row; a tie takes back what is too much when two corners part: it acts on their difference.
+typedef struct sonde_press_tie {
+  uint32_t row[3];
+  float slope[3], tie[3]; // of corners 0 1, 1 2, 2 0
+} sonde_press_tie;
 
 typedef struct sonde_face_slice {
   sonde_lane_index node[3];
-  sonde_lane half_cotangent[3], area; // unused lanes have area 1 and cotangents 0
-  sonde_lane shear, limit;            // of the shear layer
+  sonde_lane half_cotangent[3], inverse_area;
+  sonde_lane shear, limit, inverse_limit; // of the shear layer
 } sonde_face_slice;
 
-// Per corner of 16 faces: force along N, share of the diagonal, coupling of the edge opposite.
+// Per corner of 16 faces: force along N, coupling with the next corner and with the one before.
+enum { SONDE_CORNER = 4, SONDE_CORNER_BEFORE = 2 };
 typedef struct sonde_face_value {
-  sonde_lane force[3], diagonal[3], coupling[3];
+  float corner[3][SONDE_LANES][SONDE_CORNER];
 } sonde_face_value;
-enum { SONDE_FACE_STRIDE = 9 * SONDE_LANES };
 
 // Of a face that the probe touches, by its points: depth and push where they were evaluated, plane
 // of the depth or -1.
@@ -94,7 +101,7 @@ typedef struct sonde_lane_kernels {
   void (*linearise)(sonde_lanes *lanes, double sums[2]);
   double (*sweep)(sonde_lanes *lanes); // x += D^-1 r, slice by slice; r.r as each slice found it
   void (*restart)(sonde_lanes *lanes, double sums[2]); // r after the sweeps, z = D^-1 r; r.z, r.r
-  double (*multiply)(sonde_lanes *lanes, bool first); // w = A z, the first time q; returns z.w
+  double (*multiply)(sonde_lanes *lanes, bool first);  // w = A z, the first time q; returns z.w
   // p = z + beta p, q = w + beta q, x += alpha p, r -= alpha q, z = D^-1 r; r.z, r.r. The first
   // time p = z.
   void (*advance)(sonde_lanes *lanes, bool first, float alpha, float beta, double sums[2]);
@@ -122,11 +129,15 @@ struct sonde_lanes {
   uint32_t *press_of;           // [slices] 0: not touched
   uint32_t *pressed;            // those slices
   uint32_t press_count;
+  sonde_press_tie *tie; // [4 faces]
+  uint32_t tie_count;
+  bool tied;                        // this evaluation has them
   sonde_pressed_face *pressed_face; // [faces] in the order of touched_faces of the state
   sonde_face_slice *face;
   sonde_face_value *face_value;
   uint32_t *near, *face_near;
-  float *record;    // [rows][8] u + h ve, ve, indentation there of every row, for the neighbours
+  float *record;    // [rows][8] u + h ve, ve, indentation there of every row, for the neighbours,
+                    // and N.x of what a row moved since they looked
   float *direction; // [rows][4] z and N.z of every row
   uint32_t *awake, *faces; // lists of slices that take part
   uint32_t awake_count, face_list_count;

@@ -14,15 +14,17 @@
 
 #include "base/base.h"
 
-// Where slice s is after a step at velocity v: displacement there, velocity, indentation.
-INLINE void publish_record(sonde_lanes *lanes, uint32_t s, const sonde_lane v[3]) {
+// Where slice s is after a step at velocity v: displacement there, velocity, indentation; and how
+// much of the velocity along N the neighbours have not seen.
+INLINE void publish_record(sonde_lanes *lanes, uint32_t s, const sonde_lane v[3],
+                           sonde_lane unseen) {
   const sonde_slice *at = &lanes->slice[s];
   float h = lanes->law.dt, *record = lanes->record + (size_t)s * SONDE_LANES * SONDE_RECORD;
   sonde_lane ue[3];
   for (int c = 0; c < 3; ++c) ue[c] = at->u[c] + h * v[c];
   sonde_lane indentation = -dot(lanes->model[s].normal, ue);
   const sonde_lane low[4] = {ue[0], ue[1], ue[2], v[0]};
-  const sonde_lane high[4] = {v[1], v[2], indentation, indentation};
+  const sonde_lane high[4] = {v[1], v[2], indentation, unseen};
   write_records(record, SONDE_RECORD, low);
   write_records(record + 4, SONDE_RECORD, high);
 }
@@ -30,16 +32,14 @@ INLINE void publish_record(sonde_lanes *lanes, uint32_t s, const sonde_lane v[3]
 // Secant modulus m = q/g of the shear layer and (q' - m)/g^2, without the cancellation of q' - m.
 INLINE void shear_law(const sonde_face_slice *face, sonde_lane g, sonde_lane *modulus,
                       sonde_lane *beyond) {
-  sonde_lane limit = 0.95f * face->limit, rate = 1 / face->limit;
-  sonde_lane x = smaller(g, limit) * rate;
+  sonde_lane limit = 0.95f * face->limit, rate = face->inverse_limit, x = smaller(g, limit) * rate;
   sonde_lane inverse = 1 / (1 - x * x), secant = face->shear * inverse;
-  sonde_lane curve = 2 * face->shear * rate * rate * inverse * inverse;
-  sonde_lane slope = secant + curve * x * x / (rate * rate);
+  sonde_lane steep = 2 * secant * inverse, slope = secant + steep * x * x;
   sonde_lane_index past = g > limit;
-  sonde_lane safe = larger(g, limit);
-  sonde_lane force = secant * limit + slope * (safe - limit);
-  *modulus = pick(past, force / safe, secant);
-  *beyond = pick(past, (slope - force / safe) / (safe * safe), curve);
+  sonde_lane safe = larger(g, limit), share = 1 / safe;
+  sonde_lane mean = (secant * limit + slope * (safe - limit)) * share;
+  *modulus = pick(past, mean, secant);
+  *beyond = pick(past, (slope - mean) * share * share, steep * rate * rate);
 }
 
 static void shear(sonde_lanes *lanes) {
@@ -48,7 +48,7 @@ static void shear(sonde_lanes *lanes) {
   for (uint32_t a = 0; a < lanes->face_list_count; ++a) {
     const sonde_face_slice *face = &lanes->face[lanes->faces[a]];
     sonde_face_value *value = &lanes->face_value[lanes->faces[a]];
-    sonde_lane s[3], across[3], flux[3], sum = {0}, modulus, beyond;
+    sonde_lane s[3], across[3], flux[3], coupling[3], sum = {0}, modulus, beyond;
     for (int k = 0; k < 3; ++k) s[k] = gather(lanes->record + 6, face->node[k] * SONDE_RECORD);
     for (int k = 0; k < 3; ++k) {
       sonde_lane d = s[(k + 1) % 3] - s[(k + 2) % 3];
@@ -56,24 +56,25 @@ static void shear(sonde_lanes *lanes) {
       sum += across[k] * d;
     }
     for (int k = 0; k < 3; ++k) flux[k] = across[(k + 2) % 3] - across[(k + 1) % 3];
-    sonde_lane inverse = 1 / face->area;
-    sonde_lane slope2 = larger(sum * inverse, all(1e-30f));
+    sonde_lane slope2 = larger(sum * face->inverse_area, all(1e-30f));
     shear_law(face, slope2 * inverse_root(slope2), &modulus, &beyond);
-    beyond = beyond * inverse;
+    beyond = beyond * face->inverse_area;
     for (int k = 0; k < 3; ++k) {
       int i = (k + 1) % 3, j = (k + 2) % 3;
-      value->force[k] = modulus * flux[k];
-      value->diagonal[k] = scale * (modulus * (face->half_cotangent[i] + face->half_cotangent[j]) +
-                                    beyond * flux[k] * flux[k]);
-      value->coupling[k] = scale * (beyond * flux[i] * flux[j] - modulus * face->half_cotangent[k]);
+      coupling[k] = scale * (beyond * flux[i] * flux[j] - modulus * face->half_cotangent[k]);
+    }
+    for (int k = 0; k < 3; ++k) {
+      const sonde_lane out[4] = {
+          modulus * flux[k], coupling[(k + 2) % 3], coupling[(k + 1) % 3], {0}};
+      write_records(&value->corner[k][0][0], SONDE_CORNER, out);
     }
   }
 }
 
 typedef struct node_sum {
-  sonde_lane force[3], block[6]; // xx xy xz yy yz zz
-  sonde_lane shear_force, shear_diagonal;
-  sonde_lane pending; // along N: what neighbours that went on do by the shear layer
+  sonde_lane force[3], block[6];    // xx xy xz yy yz zz
+  sonde_lane shear_force, coupling; // along N
+  sonde_lane pending;               // along N: what neighbours that went on do by the shear layer
 } node_sum;
 
 INLINE void add_rank_one(sonde_lane block[6], const sonde_lane n[3], sonde_lane scale,
@@ -95,8 +96,8 @@ typedef struct place {
 // The spring-damper of an edge, seen from the row; the neighbour finds the opposite, bit for bit.
 INLINE void add_spring(const sonde_lane_law *law, const sonde_slot *slot, sonde_lane share,
                        const float *record, const place *at, node_sum *sum,
-                       sonde_slot_tangent *tangent) {
-  sonde_lane d[3], w[3], n[3], other[6];
+                       sonde_slot_tangent *tangent, sonde_lane *unseen) {
+  sonde_lane d[3], w[3], n[3], other[7];
   read_records(record, &tangent->node, other);
   for (int c = 0; c < 3; ++c) {
     d[c] = slot->rest[c] + (other[c] - at->ue[c]);
@@ -120,16 +121,19 @@ INLINE void add_spring(const sonde_lane_law *law, const sonde_slot *slot, sonde_
   add_rank_one(sum->block, n, steep, flat);
   tangent->along = steep;
   tangent->lateral = flat;
+  *unseen = other[6];
 }
 
-INLINE void add_coupling(const sonde_lanes *lanes, sonde_slot_shear *slot,
-                         const sonde_lane_index *node, node_sum *sum) {
-  const float *values = (const float *)lanes->face_value;
-  sum->shear_force += gather(values, slot->corner);
-  sum->shear_diagonal += gather(values + 3 * SONDE_LANES, slot->corner);
-  slot->coupling = gather(values + 6 * SONDE_LANES, slot->opposite_a) +
-                   gather(values + 6 * SONDE_LANES, slot->opposite_b);
-  sum->pending += slot->coupling * gather(lanes->direction + 3, *node * SONDE_DIRECTION);
+// unseen: of the neighbours' records.
+INLINE void add_coupling(sonde_slot_shear *slot, const float *values, sonde_lane unseen,
+                         node_sum *sum) {
+  sonde_lane corner[4];
+  read_directions(values, &slot->left, corner);
+  sonde_lane coupling = corner[1] + gather(values, slot->right);
+  sum->shear_force += corner[0];
+  sum->coupling += coupling;
+  sum->pending += coupling * unseen;
+  slot->coupling = coupling;
 }
 
 // Pressure of the normal spring and its slope; exponents above 1 go on straight for s < 0.
@@ -159,8 +163,8 @@ INLINE void add_anchor(const sonde_lane_law *law, const sonde_slice_model *fixed
     sum->force[c] +=
         push * n[c] - tangent * (at->ue[c] + s * n[c]) - slow * (at->ve[c] - rate * n[c]);
   sonde_lane flat = law->stiffness_scale * tangent + law->damping_scale * slow;
-  sonde_lane steep = law->stiffness_scale * slope * fixed->area + law->damping_scale * damper +
-                     sum->shear_diagonal;
+  sonde_lane steep =
+      law->stiffness_scale * slope * fixed->area + law->damping_scale * damper - sum->coupling;
   add_rank_one(sum->block, n, steep - flat, flat + fixed->mass);
 }
 
@@ -169,9 +173,10 @@ INLINE void add_springs(sonde_lanes *lanes, const sonde_slice_model *fixed, bool
                         const place *at, node_sum *sum) {
   uint32_t first = fixed->first_slot, whole = fixed->whole_count;
   for (uint32_t k = first; k < first + fixed->slot_count; ++k) {
+    sonde_lane unseen;
     add_spring(&lanes->law, &lanes->slot[k], k < first + whole ? all(1) : lanes->share[k],
-               lanes->record, at, sum, &lanes->tangent[k]);
-    if (sheared) add_coupling(lanes, &lanes->slot_shear[k], &lanes->tangent[k].node, sum);
+               lanes->record, at, sum, &lanes->tangent[k], &unseen);
+    if (sheared) add_coupling(&lanes->slot_shear[k], (const float *)lanes->face_value, unseen, sum);
   }
   add_anchor(&lanes->law, fixed, at, sum);
 }
@@ -237,16 +242,13 @@ INLINE void linearise_slice(sonde_lanes *lanes, uint32_t s, bool sheared, sums_o
   for (int c = 0; c < 3; ++c) at->x[c] = x[c], here.ve[c] += x[c];
   sums->rr += widen(dot(r, r));
   sums->ff += widen(force2);
-  publish_record(lanes, s, here.ve);
+  publish_record(lanes, s, here.ve, dot(fixed->normal, x));
   publish_direction(lanes, s, x);
 }
 
-// Directions are what slices have moved since their neighbours looked: at first nothing.
 static void linearise(sonde_lanes *lanes, double sums[2]) {
   bool sheared = lanes->law.shear > 0;
   sums_of_rows all_rows = {{0}, {0}, {{0}}};
-  for (uint32_t a = 0; sheared && a < lanes->awake_count; ++a)
-    publish_direction(lanes, lanes->awake[a], (const sonde_lane[3]){{0}, {0}, {0}});
   for (uint32_t a = 0; a < lanes->awake_count; ++a) {
     if (sheared)
       linearise_slice(lanes, lanes->awake[a], true, &all_rows);
@@ -281,6 +283,9 @@ INLINE void couple(sonde_lanes *lanes, uint32_t s, sonde_lane q[3]) {
     multiply_slice(lanes, &lanes->model[s], true, q);
   else
     multiply_slice(lanes, &lanes->model[s], false, q);
+  if (lanes->press_of[s] == 0) return;
+  const sonde_slice_press *press = &lanes->press[lanes->press_of[s] - 1];
+  for (int c = 0; c < 3; ++c) q[c] -= press->carry[c];
 }
 
 // After a slice was solved for itself its residual is what its neighbours have moved since.
@@ -387,8 +392,8 @@ static double bend(sonde_lanes *lanes) {
 static void accept(sonde_lanes *lanes) {
   for (uint32_t a = 0; a < lanes->awake_count; ++a) {
     sonde_slice *at = &lanes->slice[lanes->awake[a]];
-    for (int c = 0; c < 3; ++c) at->ve[c] += at->x[c];
-    publish_record(lanes, lanes->awake[a], at->ve);
+    for (int c = 0; c < 3; ++c) at->ve[c] += at->x[c], at->x[c] = (sonde_lane){0};
+    publish_record(lanes, lanes->awake[a], at->ve, (sonde_lane){0});
   }
 }
 
@@ -423,7 +428,7 @@ static double update(sonde_lanes *lanes) {
     lanes->speed2[s] = most(speed2);
     lanes->way2[s] = most(way2);
     lanes->published[s] = 0;
-    publish_record(lanes, s, at->ve);
+    publish_record(lanes, s, at->ve, (sonde_lane){0});
     sum += widen(speed2 + way2);
   }
   return total(sum);

@@ -124,8 +124,8 @@ INLINE void read_directions(const float *base, const sonde_lane_index *nodes, so
 #endif
 }
 
-// The first six numbers of a record at 16 nodes.
-INLINE void read_records(const float *base, const sonde_lane_index *nodes, sonde_lane out[6]) {
+// The first six numbers of a record at 16 nodes, and the last.
+INLINE void read_records(const float *base, const sonde_lane_index *nodes, sonde_lane out[7]) {
   const int32_t *node = (const int32_t *)nodes;
 #if defined(__AVX512F__)
   __m512 row[8], column[8];
@@ -139,6 +139,7 @@ INLINE void read_records(const float *base, const sonde_lane_index *nodes, sonde
     out[c] = (sonde_lane)_mm512_shuffle_f32x4(column[c], column[4 + c], 0x88);
     if (c < 2) out[4 + c] = (sonde_lane)_mm512_shuffle_f32x4(column[c], column[4 + c], 0xdd);
   }
+  out[6] = (sonde_lane)_mm512_shuffle_f32x4(column[3], column[7], 0xdd);
 #elif defined(__AVX2__)
   for (int half = 0; half < 2; ++half) {
     __m256 row[8], column[8];
@@ -151,10 +152,12 @@ INLINE void read_records(const float *base, const sonde_lane_index *nodes, sonde
       if (c < 2)
         ((__m256 *)&out[4 + c])[half] = _mm256_permute2f128_ps(column[c], column[4 + c], 0x31);
     }
+    ((__m256 *)&out[6])[half] = _mm256_permute2f128_ps(column[3], column[7], 0x31);
   }
 #else
-  for (int c = 0; c < 6; ++c)
-    for (int l = 0; l < SONDE_LANES; ++l) out[c][l] = base[node[l] * SONDE_RECORD + c];
+  for (int c = 0; c < 7; ++c)
+    for (int l = 0; l < SONDE_LANES; ++l)
+      out[c][l] = base[node[l] * SONDE_RECORD + (c < 6 ? c : SONDE_RECORD - 1)];
 #endif
 }
 

@@ -39,7 +39,7 @@ static double evaluate(const problem *p, double *load) {
   sonde_contact_detect(state, p->probe, p->pose);
   if (p->probe) {
     const sonde_motion still = {.origin = p->pose.position};
-    const sonde_contact_scales contact = {0, 1, false};
+    const sonde_contact_scales contact = {0, 1};
     sonde_contact_apply(state, &still, &contact);
     sonde_contact_wrench(state, p->pose.position);
   }

@@ -67,7 +67,7 @@ struct sonde_state {
   uint32_t term_count;
   sonde_vec3 *plane_normal; // [max planes] of the probe in the world frame
   double *plane_offset;
-  double *plane_weight; // of its distance in the depth: see depth_at()
+  double *plane_weight;   // of its distance in the depth: see depth_at()
   float (*plane_lane)[4]; // [max planes] weight times normal and distance from the origin
   sonde_vec3 origin;      // of the probe
   uint32_t plane_count;
@@ -119,10 +119,8 @@ sonde_vec3 sonde_bounded_move(const sonde_model *model, uint32_t i, sonde_vec3 f
                               sonde_vec3 move);
 
 // How a contact law enters the linear system at a step of size h (0: static): scales of K and C.
-// lumped: each row's terms on its diagonal block alone.
 typedef struct sonde_contact_scales {
   double damping, stiffness;
-  bool lumped;
 } sonde_contact_scales;
 
 // Finds the skin inside the probe at probed[]: shares, gradients, touched nodes,
@@ -139,8 +137,7 @@ void sonde_contact_apply(sonde_state *state, const sonde_motion *probe,
                          const sonde_contact_scales *scales);
 // Pushes at the end of the step by the same linearisation: from probed[] the nodes go on by
 // lambda^2 h dv at velocities changed by lambda dv. @thread tick
-void sonde_contact_advance(sonde_state *state, const sonde_motion *probe, double lambda, double h,
-                           bool lumped);
+void sonde_contact_advance(sonde_state *state, const sonde_motion *probe, double lambda, double h);
 // Square of the difference between the pushes that sonde_contact_advance() foresaw for nodes that
 // go on by h dv and those that they meet there. FOUNDATION and NODES. Uses right[]. @thread tick
 double sonde_contact_surprise(sonde_state *state, const sonde_motion *probe, double h);

@@ -38,7 +38,7 @@ static void assemble(sonde_state *state, const sonde_probe *probe, const sonde_m
                             state->edges, state->edge_count, state->faces, state->face_count};
   sonde_tissue_linearise(state->tissue, &part, state->position, state->velocity, &scales,
                          state->force, state->product, state->matrix, state->scratch_nodes);
-  sonde_contact_scales contact = {scales.damping, scales.stiffness, false};
+  sonde_contact_scales contact = {scales.damping, scales.stiffness};
   if (probe) sonde_contact_apply(state, motion, &contact);
   sonde_vec3 reaction = vec3(0, 0, 0);
   for (uint32_t r = 0; r < state->row_count; ++r)
@@ -175,7 +175,7 @@ static void newton(sonde_state *state, const sonde_probe *probe, sonde_pose pose
   }
   double assembled = sonde_clock_now();
   solve(state);
-  sonde_contact_advance(state, motion, lambda, h, false);
+  sonde_contact_advance(state, motion, lambda, h);
   for (uint32_t r = 0; r < state->row_count; ++r) {
     uint32_t i = state->rows[r];
     state->velocity[i] = v_madd(state->velocity[i], -lambda, state->trial[i]);
@@ -194,7 +194,7 @@ static void linear_step(sonde_state *state, const sonde_probe *probe, sonde_pose
   first_right_side(state);
   double assembled = sonde_clock_now();
   solve(state);
-  sonde_contact_advance(state, motion, state->def.implicitness, state->def.dt_s, false);
+  sonde_contact_advance(state, motion, state->def.implicitness, state->def.dt_s);
   add_times(state, detected - start, assembled - detected, sonde_clock_now() - assembled);
 }
 
