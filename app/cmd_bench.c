@@ -29,11 +29,11 @@ static const char HELP[] =
     "  --stiffness K  of its surface springs, 1 to 1e6 N/m; default 200\n"
     "  --size S       of the ellipsoid, 0.5 to 20; default 1: 0.20 x 0.08 x 0.08 m\n"
     "  --engine NAME  fast (default) or double\n"
-    "  --newton N     Newton iterations of a step, with the fast engine at most; default 2,\n"
+    "  --newton N     Newton iterations of a step, with the fast engine at most; default 3,\n"
     "                 ellipsoid 4\n"
     "  --reference-newton N  of the converged run; default as --newton\n"
     "  --sleep-um D   nodes nearer than this to balance may sleep, 0 to 1000; default 20\n"
-    "  --tolerance R  of the linear solver, 1e-12 to 0.5; default 2e-2,\n"
+    "  --tolerance R  of the linear solver, 1e-12 to 0.5; default 1e-2,\n"
     "                 ellipsoid 0.1\n"
     "  --seconds S    simulated time, 0.05 to 60; default 1, ellipsoid 0.5\n"
     "  --dt-ms H      time step, 0.1 to 20; default 1\n"
@@ -172,7 +172,7 @@ static int read_options(int argc, char **argv, options *o) {
     code = read_option(o, c);
     if (code >= 0) return code;
   }
-  if (!(o->tolerance > 0)) o->tolerance = is_ellipsoid(o) ? 0.1 : 2e-2;
+  if (!(o->tolerance > 0)) o->tolerance = is_ellipsoid(o) ? 0.1 : 1e-2;
   if (!(o->seconds > 0)) o->seconds = o->haptics ? 5 : is_ellipsoid(o) ? 0.5 : 1;
   if (o->device && !o->haptics) return app_usage_error("bench", "--device belongs to --haptics");
   if (is_ellipsoid(o))
@@ -264,7 +264,7 @@ static double relative_error(const sonde_model *model, const sonde_vec3 *x, cons
 // The world that is timed, or the one solved to the end that it is compared with.
 static sonde_world_def world_of(const options *o, bool reference) {
   sonde_world_def def =
-      is_ellipsoid(o) ? bench_ellipsoid_world(o->dt_s) : sonde_world_def_default();
+      is_ellipsoid(o) ? bench_ellipsoid_world(o->dt_s) : sonde_session_def_default().world;
   def.dt_s = o->dt_s;
   if (o->newton >= 0) def.newton_iterations = (uint32_t)o->newton;
   def.engine = reference ? SONDE_ENGINE_DOUBLE : o->engine;

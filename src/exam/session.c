@@ -21,7 +21,7 @@ sonde_session_def sonde_session_def_default(void) {
                            .ticks_per_image = 20};
   def.world.engine = SONDE_ENGINE_FAST;
   def.world.newton_iterations = 3;
-  def.world.pcg.relative_residual = 2e-2;
+  def.world.pcg.relative_residual = 1e-2;
   def.world.pcg.absolute_residual = 1e-3 * def.world.dt_s; // 1 mN
   def.world.sleep_displacement_m = 20e-6;
   def.controls.echo = sonde_echo_settings_default();

@@ -193,7 +193,7 @@ static void apply_face(sonde_state *state, uint32_t k, const sonde_motion *probe
       *force = v_madd(*force, -sum(WEIGHT[c], push), slope);
       *block = m_add(*block, m_rank1(slope, scale * sum(WEIGHT[c], side), 0));
     }
-    if (state->lanes->tied) add_tie(state->lanes, v, slope, scale, side);
+    add_tie(state->lanes, v, slope, scale, side);
   }
 }
 
@@ -204,35 +204,24 @@ void sonde_faces_apply(sonde_state *state, const sonde_motion *probe,
   for (uint32_t k = 0; k < state->touched_face_count; ++k) apply_face(state, k, probe, scales);
 }
 
-// The push of a plane's points when the corners' ways along its slope change it by `more`.
-INLINE void change_side(const sonde_pressed_face *at, const four more, const four side, four push) {
-  for (int q = 0; q < SONDE_POINTS; ++q) {
-    double p = at->push[q] + more[q];
-    push[q] = at->push[q] > 0 && p > 0 ? p * side[q] : 0;
-  }
-}
-
-// With ties the points' pushes change with the points, without them with each corner as if all
-// three went its way.
 static void advance_face(sonde_state *state, uint32_t k, double h) {
   const uint32_t *v = state->model->surface.faces[state->touched_faces[k]];
   const sonde_pressed_face *at = &state->lanes->pressed_face[k];
   double stiffness, damping;
-  four side, push, more;
+  four side, push;
   point_law(state, state->touched_faces[k], &stiffness, &damping);
   double gain = h * stiffness + damping;
   for (int q = 0; next_side(at->plane, &q, side); ++q) {
     sonde_vec3 slope = plane_slope(state, (uint32_t)at->plane[q]);
     double way[3];
     for (int c = 0; c < 3; ++c) way[c] = gain * v_dot(slope, state->increment[v[c]]);
-    for (int p = 0; p < SONDE_POINTS; ++p)
-      more[p] = way[0] * WEIGHT[0][p] + way[1] * WEIGHT[1][p] + way[2] * WEIGHT[2][p];
-    if (state->lanes->tied) change_side(at, more, side, push);
-    for (int c = 0; c < 3; ++c) {
-      for (int p = 0; p < SONDE_POINTS && !state->lanes->tied; ++p) more[p] = way[c];
-      if (!state->lanes->tied) change_side(at, more, side, push);
-      state->contact_force[v[c]] = v_madd(state->contact_force[v[c]], -sum(WEIGHT[c], push), slope);
+    for (int p = 0; p < SONDE_POINTS; ++p) {
+      double end =
+          at->push[p] + way[0] * WEIGHT[0][p] + way[1] * WEIGHT[1][p] + way[2] * WEIGHT[2][p];
+      push[p] = at->push[p] > 0 && end > 0 ? end * side[p] : 0;
     }
+    for (int c = 0; c < 3; ++c)
+      state->contact_force[v[c]] = v_madd(state->contact_force[v[c]], -sum(WEIGHT[c], push), slope);
   }
 }
 

@@ -201,15 +201,15 @@ static bool is_slow(double before, double now, double target) {
 }
 
 // Conjugate gradients from where the sweeps ended.
-static void conjugate(sonde_state *state, double target, sonde_pcg_result *result) {
+static void conjugate(sonde_state *state, bool tied, double target, sonde_pcg_result *result) {
   sonde_lanes *lanes = state->lanes;
   double sums[2], next[2], alpha = 0, beta = 0;
-  sonde_faces_carry(lanes);
+  if (tied) sonde_faces_carry(lanes);
   lanes->kernels->restart(lanes, sums);
   result->residual = sqrt(sums[1]);
   uint32_t most = state->def.pcg.max_iterations;
   for (bool first = true; result->residual > target && result->iterations < most; first = false) {
-    sonde_faces_carry(lanes);
+    if (tied) sonde_faces_carry(lanes);
     double curvature = lanes->kernels->multiply(lanes, first);
     if (!first) curvature -= beta * sums[0] / alpha;
     if (!(curvature > 0)) break;
@@ -224,12 +224,12 @@ static void conjugate(sonde_state *state, double target, sonde_pcg_result *resul
 
 // From the first sweep's residual on; with ties, which sweeps resolve badly, by conjugate gradients
 // at once. reference: |h F|. False when there was nothing left to solve.
-static bool solve(sonde_state *state, double residual, double reference) {
+static bool solve(sonde_state *state, bool tied, double residual, double reference) {
   sonde_lanes *lanes = state->lanes;
   const sonde_pcg_options *options = &state->def.pcg;
   sonde_pcg_result result = {.reference = reference, .residual = residual};
   double target = fmax(options->relative_residual * reference, options->absolute_residual);
-  bool solved = result.residual > target, slow = lanes->tied;
+  bool solved = result.residual > target, slow = tied;
   uint32_t sweeps = 0;
   while (result.residual > target && result.iterations < options->max_iterations && !slow) {
     double before = result.residual;
@@ -238,7 +238,7 @@ static bool solve(sonde_state *state, double residual, double reference) {
     sweeps++;
     slow = is_slow(before, result.residual, target);
   }
-  if (result.residual > target) conjugate(state, target, &result);
+  if (result.residual > target) conjugate(state, tied, target, &result);
   result.converged = result.residual <= target;
   if (!result.converged) state->flags |= SONDE_FLAG_NOT_CONVERGED;
   count_bytes(lanes, sweeps, result.iterations - sweeps);
@@ -269,21 +269,44 @@ typedef struct iteration {
 // Of what the linear solver may leave: what is not seen adds up from step to step.
 static const double BENT_SHARE = 0.1;
 
+// Square of what a solution without ties left out.
+static double untied2(sonde_state *state) {
+  sonde_lanes *lanes = state->lanes;
+  double sum = 0;
+  for (uint32_t k = 0; k < state->touched_count; ++k) {
+    uint32_t i = state->touched[k];
+    const sonde_slice *at = &lanes->slice[i / SONDE_LANES];
+    for (int c = 0; c < 3; ++c)
+      lanes->direction[(size_t)i * SONDE_DIRECTION + (size_t)c] = at->x[c][i % SONDE_LANES];
+  }
+  sonde_faces_carry(lanes);
+  for (uint32_t k = 0; k < lanes->press_count; ++k)
+    for (int c = 0; c < 3; ++c)
+      for (int l = 0; l < SONDE_LANES; ++l) {
+        double carry = (double)lanes->press[k].carry[c][l];
+        sum += carry * carry;
+      }
+  return sum;
+}
+
 // Whether what the linear system did not see of its solution is more than a share of what the
-// solver may leave; the next iteration is local when what it sees of the contact is the most of it.
+// solver may leave, or what it left out is more than that; the next iteration is local when the
+// contact is all of it.
 static bool is_bent(sonde_state *state, const sonde_motion *motion, iteration *now) {
-  double h = state->def.dt_s, share = BENT_SHARE * state->def.pcg.relative_residual;
+  double h = state->def.dt_s, rest2 = state->def.pcg.absolute_residual;
+  double share = state->def.pcg.relative_residual * state->def.pcg.relative_residual;
   double contact2 = h * h * sonde_contact_surprise(state, motion, h);
   double bent2 = state->lanes->kernels->bend(state->lanes);
-  double least = state->def.pcg.absolute_residual;
-  double limit2 = fmax(share * share * now->force2, least * least);
+  rest2 *= rest2;
+  double limit2 = fmax(BENT_SHARE * BENT_SHARE * share * now->force2, rest2);
   now->local = bent2 <= limit2;
-  return contact2 + bent2 > limit2;
+  if (contact2 + bent2 > limit2) return true;
+  return !now->tied && untied2(state) > fmax(share * now->force2, rest2);
 }
 
 // Finds the contact where the nodes are expected and adds it up by slices.
 static void touch(sonde_state *state, const sonde_probe *probe, sonde_pose pose,
-                  const sonde_motion *motion, bool tied) {
+                  const sonde_motion *motion) {
   sonde_lanes *lanes = state->lanes;
   double h = state->def.dt_s;
   const sonde_contact_scales scales = {h, h * h};
@@ -292,7 +315,6 @@ static void touch(sonde_state *state, const sonde_probe *probe, sonde_pose pose,
   sonde_contact_detect(state, probe, pose);
   if (wake_touched(state)) list_awake(lanes);
   clear_touched(state);
-  lanes->tied = tied;
   lanes->tie_count = 0;
   if (probe) {
     sonde_contact_apply(state, motion, &scales);
@@ -312,7 +334,7 @@ static bool linearise(sonde_state *state, iteration *now) {
   if (now->number == 1) now->force2 = sums[1];
   if (now->local) lanes->reaction_n = reaction;
   double assembled = sonde_clock_now();
-  bool solved = solve(state, sqrt(sums[0]), sqrt(now->force2));
+  bool solved = solve(state, now->tied, sqrt(sums[0]), sqrt(now->force2));
   state->times.assembly_s += assembled - start;
   state->times.solve_s += sonde_clock_now() - assembled;
   return solved;
@@ -324,7 +346,7 @@ static bool iterate(sonde_state *state, const sonde_probe *probe, sonde_pose pos
                     const sonde_motion *motion, iteration *now, bool last) {
   double start = sonde_clock_now();
   now->tied = now->number > 1 && state->def.contact_law == SONDE_CONTACT_FOUNDATION;
-  touch(state, probe, pose, motion, now->tied);
+  touch(state, probe, pose, motion);
   if (now->local) list_touched(state->lanes);
   double detected = sonde_clock_now();
   bool solved = linearise(state, now);

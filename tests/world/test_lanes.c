@@ -174,6 +174,7 @@ static void iterates_once_where_that_is_enough(void **state) {
   (void)state;
   uint64_t hash[2];
   sonde_world_def def = fast_def();
+  def.pcg.absolute_residual = 1e-3 * def.dt_s; // 1 mN
   scene s = make(4, "linear", &def);
   for (int k = 0; k < 400; ++k) sonde_step(s.state, &s.probe, fixture_pose(0.005));
   for (uint32_t k = 0; k < 2; ++k) {
