@@ -193,8 +193,8 @@ static void count_bytes(sonde_lanes *lanes, uint64_t sweeps, uint64_t iterations
                             iterations * (ITERATED_PER_SLICE * slices + ITERATED_PER_SLOT * slots));
 }
 
-// Whether Gauss-Seidel needs more than six sweeps more at the pace of the last one: then conjugate
-// gradients are faster.
+// Whether Gauss-Seidel needs more than seven sweeps more at the pace of the last one: then
+// conjugate gradients are faster.
 static bool is_slow(double before, double now, double target) {
   double pace = now / before, sixth = pace * pace * pace;
   return now > target && !(now * sixth * sixth <= target);
@@ -222,22 +222,24 @@ static void conjugate(sonde_state *state, bool tied, double target, sonde_pcg_re
   }
 }
 
-// From the first sweep's residual on; with ties, which sweeps resolve badly, by conjugate gradients
-// at once. reference: |h F|. False when there was nothing left to solve.
-static bool solve(sonde_state *state, bool tied, double residual, double reference) {
+// From the residual that the first sweep found on; what a sweep leaves is what it found times the
+// pace. With ties, which sweeps resolve badly, by conjugate gradients at once. reference: |h F|.
+// False when there was nothing left to solve.
+static bool solve(sonde_state *state, bool tied, double found, double reference) {
   sonde_lanes *lanes = state->lanes;
   const sonde_pcg_options *options = &state->def.pcg;
-  sonde_pcg_result result = {.reference = reference, .residual = residual};
+  sonde_pcg_result result = {.reference = reference, .residual = found};
   double target = fmax(options->relative_residual * reference, options->absolute_residual);
   bool solved = result.residual > target, slow = tied;
   uint32_t sweeps = 0;
-  while (result.residual > target && result.iterations < options->max_iterations && !slow) {
-    double before = result.residual;
-    result.residual = sqrt(lanes->kernels->sweep(lanes));
-    result.iterations++;
+  while (result.residual > target && sweeps < options->max_iterations && !slow) {
+    double before = found;
+    found = sqrt(lanes->kernels->sweep(lanes));
     sweeps++;
-    slow = is_slow(before, result.residual, target);
+    result.residual = found * fmin(found / before, 1);
+    slow = is_slow(before, found, target);
   }
+  result.iterations = sweeps;
   if (result.residual > target) conjugate(state, tied, target, &result);
   result.converged = result.residual <= target;
   if (!result.converged) state->flags |= SONDE_FLAG_NOT_CONVERGED;
