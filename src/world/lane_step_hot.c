@@ -223,14 +223,13 @@ static void conjugate(sonde_state *state, bool tied, double target, sonde_pcg_re
 }
 
 // From the residual that the first sweep found on; what a sweep leaves is what it found times the
-// pace. With ties, which sweeps resolve badly, by conjugate gradients at once. reference: |h F|.
-// False when there was nothing left to solve.
-static bool solve(sonde_state *state, bool tied, double found, double reference) {
+// pace. Without sweeps by conjugate gradients at once. False when there was nothing left to solve.
+static bool solve(sonde_state *state, bool tied, bool sweep, double found, double reference) {
   sonde_lanes *lanes = state->lanes;
   const sonde_pcg_options *options = &state->def.pcg;
   sonde_pcg_result result = {.reference = reference, .residual = found};
   double target = fmax(options->relative_residual * reference, options->absolute_residual);
-  bool solved = result.residual > target, slow = tied;
+  bool solved = result.residual > target, slow = !sweep;
   uint32_t sweeps = 0;
   while (result.residual > target && sweeps < options->max_iterations && !slow) {
     double before = found;
@@ -332,11 +331,12 @@ static bool linearise(sonde_state *state, iteration *now) {
   double start = sonde_clock_now(), sums[2];
   sonde_vec3 reaction = lanes->reaction_n;
   lanes->kernels->shear(lanes);
-  lanes->kernels->linearise(lanes, sums);
+  bool sweep = !now->tied && !lanes->stiff;
+  lanes->kernels->linearise(lanes, sweep, sums);
   if (now->number == 1) now->force2 = sums[1];
   if (now->local) lanes->reaction_n = reaction;
   double assembled = sonde_clock_now();
-  bool solved = solve(state, now->tied, sqrt(sums[0]), sqrt(now->force2));
+  bool solved = solve(state, now->tied, sweep, sqrt(sums[0]), sqrt(now->force2));
   state->times.assembly_s += assembled - start;
   state->times.solve_s += sonde_clock_now() - assembled;
   return solved;

@@ -200,9 +200,21 @@ static sonde_lane_law law_of(const sonde_surface_law *law, const sonde_world_def
                           .damping_scale = (float)h};
 }
 
+// Sweeps carry a move from slice to slice; where springs outweigh masses they need many, and the
+// springs turn under the first one's moves. The bound is mild: runs blew up from 400 on.
+static bool is_stiff(const sonde_model *model, const sonde_lane_law *law) {
+  const double most = 30;
+  double mass = 0,
+         coupling = (double)law->stiffness_scale * (double)(law->edge_stiffness + law->shear) +
+                    (double)(law->damping_scale * law->edge_damper);
+  for (uint32_t i = 0; i < model->surface.vertex_count; ++i) mass += model->mass_kg[i];
+  return 2 * model->topology.edge_count * coupling > most * mass;
+}
+
 void sonde_lanes_tune(sonde_lanes *lanes, const sonde_model *tuned, const sonde_world_def *def) {
   SONDE_ASSERT(lanes->node_count == tuned->surface.vertex_count);
   lanes->law = law_of(&tuned->law, def);
+  lanes->stiff = is_stiff(tuned, &lanes->law);
   for (uint32_t i = 0; i < lanes->node_count; ++i)
     fill_springs(&lanes->model[i / SONDE_LANES], tuned, i);
   for (uint32_t k = 0; lanes->law.shear > 0 && k < tuned->surface.face_count; ++k)
@@ -278,6 +290,7 @@ sonde_status sonde_lanes_create(const sonde_model *model, const sonde_world_def 
     lanes->node_count = n;
     lanes->face_order = face_order;
     lanes->law = law_of(&model->law, def);
+    lanes->stiff = is_stiff(model, &lanes->law);
     lanes->kernels = sonde_lane_kernels_find(NULL);
     status = measure(lanes, model, place, sizes, error);
   }

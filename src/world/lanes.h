@@ -97,8 +97,9 @@ typedef struct sonde_lanes sonde_lanes;
 typedef struct sonde_lane_kernels {
   const char *name;
   void (*shear)(sonde_lanes *lanes); // faces' forces and couplings
-  // r = h F - M (ve - v), matrix, x = D^-1 r, slice by slice; r.r, (h F)^2; reaction
-  void (*linearise)(sonde_lanes *lanes, double sums[2]);
+  // r = h F - M (ve - v), matrix, x = D^-1 r; r.r, (h F)^2; reaction. `sweep`: slice by slice, and
+  // each sees where those before it went; else the matrix is symmetric and restart() must follow
+  void (*linearise)(sonde_lanes *lanes, bool sweep, double sums[2]);
   double (*sweep)(sonde_lanes *lanes); // x += D^-1 r, slice by slice; r.r as each slice found it
   void (*restart)(sonde_lanes *lanes, double sums[2]); // r after the sweeps, z = D^-1 r; r.z, r.r
   double (*multiply)(sonde_lanes *lanes, bool first);  // w = A z, the first time q; returns z.w
@@ -152,6 +153,7 @@ struct sonde_lanes {
   sonde_vec3 reaction_n;
   uint32_t slot_total;  // of the waking slices
   uint64_t bytes_moved; // by the last step, see count_bytes()
+  bool stiff;           // too stiff for sweeps
   bool stale;           // the doubles of the state are newer
 };
 

@@ -219,7 +219,8 @@ typedef struct sums_of_rows {
   lane_double rr, ff, reaction[3];
 } sums_of_rows;
 
-INLINE void linearise_slice(sonde_lanes *lanes, uint32_t s, bool sheared, sums_of_rows *sums) {
+INLINE void linearise_slice(sonde_lanes *lanes, uint32_t s, bool sheared, bool moves,
+                            sums_of_rows *sums) {
   const sonde_slice_model *fixed = &lanes->model[s];
   sonde_slice *at = &lanes->slice[s];
   float h = lanes->law.dt;
@@ -242,18 +243,18 @@ INLINE void linearise_slice(sonde_lanes *lanes, uint32_t s, bool sheared, sums_o
   for (int c = 0; c < 3; ++c) at->x[c] = x[c], here.ve[c] += x[c];
   sums->rr += widen(dot(r, r));
   sums->ff += widen(force2);
-  publish_record(lanes, s, here.ve, dot(fixed->normal, x));
+  if (moves) publish_record(lanes, s, here.ve, dot(fixed->normal, x));
   publish_direction(lanes, s, x);
 }
 
-static void linearise(sonde_lanes *lanes, double sums[2]) {
+static void linearise(sonde_lanes *lanes, bool moves, double sums[2]) {
   bool sheared = lanes->law.shear > 0;
   sums_of_rows all_rows = {{0}, {0}, {{0}}};
   for (uint32_t a = 0; a < lanes->awake_count; ++a) {
     if (sheared)
-      linearise_slice(lanes, lanes->awake[a], true, &all_rows);
+      linearise_slice(lanes, lanes->awake[a], true, moves, &all_rows);
     else
-      linearise_slice(lanes, lanes->awake[a], false, &all_rows);
+      linearise_slice(lanes, lanes->awake[a], false, moves, &all_rows);
   }
   sums[0] = total(all_rows.rr);
   sums[1] = total(all_rows.ff);
