@@ -300,7 +300,7 @@ static bool is_bent(sonde_state *state, const sonde_motion *motion, iteration *n
   double bent2 = state->lanes->kernels->bend(state->lanes);
   rest2 *= rest2;
   double limit2 = fmax(BENT_SHARE * BENT_SHARE * share * now->force2, rest2);
-  now->local = bent2 <= limit2;
+  now->local = bent2 <= limit2 && !state->lanes->stiff;
   if (contact2 + bent2 > limit2) return true;
   return !now->tied && untied2(state) > fmax(share * now->force2, rest2);
 }
