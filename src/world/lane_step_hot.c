@@ -200,12 +200,13 @@ static bool is_slow(double before, double now, double target) {
   return now > target && !(now * sixth * sixth <= target);
 }
 
-// Conjugate gradients from where the sweeps ended.
-static void conjugate(sonde_state *state, bool tied, double target, sonde_pcg_result *result) {
+// Conjugate gradients from r and z, whose products are r.z and r.r. They begin at x = 0 when no
+// sweep went before: each of their steps then is one downhill, however early they end, while a
+// first sweep may overshoot where springs are stiff.
+static void conjugate(sonde_state *state, bool tied, double target, double sums[2],
+                      sonde_pcg_result *result) {
   sonde_lanes *lanes = state->lanes;
-  double sums[2], next[2], alpha = 0, beta = 0;
-  if (tied) sonde_faces_carry(lanes);
-  lanes->kernels->restart(lanes, sums);
+  double next[2], alpha = 0, beta = 0;
   result->residual = sqrt(sums[1]);
   uint32_t most = state->def.pcg.max_iterations;
   for (bool first = true; result->residual > target && result->iterations < most; first = false) {
@@ -222,11 +223,14 @@ static void conjugate(sonde_state *state, bool tied, double target, sonde_pcg_re
   }
 }
 
-// From the residual that the first sweep found on; what a sweep leaves is what it found times the
-// pace. Without sweeps by conjugate gradients at once. False when there was nothing left to solve.
-static bool solve(sonde_state *state, bool tied, bool sweep, double found, double reference) {
+// sums: of the linearisation. From the residual that the first sweep found on; what a sweep leaves
+// is what it found times the pace. Without sweeps by conjugate gradients at once. False when there
+// was nothing left to solve.
+static bool solve(sonde_state *state, bool tied, bool sweep, const double sums[3],
+                  double reference) {
   sonde_lanes *lanes = state->lanes;
   const sonde_pcg_options *options = &state->def.pcg;
+  double found = sqrt(sums[0]), products[2] = {sums[2], sums[0]};
   sonde_pcg_result result = {.reference = reference, .residual = found};
   double target = fmax(options->relative_residual * reference, options->absolute_residual);
   bool solved = result.residual > target, slow = !sweep;
@@ -239,7 +243,10 @@ static bool solve(sonde_state *state, bool tied, bool sweep, double found, doubl
     slow = is_slow(before, found, target);
   }
   result.iterations = sweeps;
-  if (result.residual > target) conjugate(state, tied, target, &result);
+  if (result.residual > target) {
+    if (sweep) lanes->kernels->restart(lanes, products);
+    conjugate(state, tied, target, products, &result);
+  }
   result.converged = result.residual <= target;
   if (!result.converged) state->flags |= SONDE_FLAG_NOT_CONVERGED;
   count_bytes(lanes, sweeps, result.iterations - sweeps);
@@ -264,7 +271,7 @@ typedef struct iteration {
   uint32_t number; // from 1
   bool tied;       // with ties
   bool local;      // touched slices and those beside them only
-  double force2;   // (h F)^2 of the first one
+  double force2;   // (h F)^2 of the last one of all slices: extrapolation makes the first large
 } iteration;
 
 // Of what the linear solver may leave: what is not seen adds up from step to step.
@@ -328,15 +335,15 @@ static void touch(sonde_state *state, const sonde_probe *probe, sonde_pose pose,
 // left to solve.
 static bool linearise(sonde_state *state, iteration *now) {
   sonde_lanes *lanes = state->lanes;
-  double start = sonde_clock_now(), sums[2];
+  double start = sonde_clock_now(), sums[3];
   sonde_vec3 reaction = lanes->reaction_n;
   lanes->kernels->shear(lanes);
   bool sweep = !now->tied && !lanes->stiff;
   lanes->kernels->linearise(lanes, sweep, sums);
-  if (now->number == 1) now->force2 = sums[1];
+  if (!now->local) now->force2 = sums[1];
   if (now->local) lanes->reaction_n = reaction;
   double assembled = sonde_clock_now();
-  bool solved = solve(state, now->tied, sweep, sqrt(sums[0]), sqrt(now->force2));
+  bool solved = solve(state, now->tied, sweep, sums, sqrt(now->force2));
   state->times.assembly_s += assembled - start;
   state->times.solve_s += sonde_clock_now() - assembled;
   return solved;

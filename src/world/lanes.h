@@ -97,9 +97,9 @@ typedef struct sonde_lanes sonde_lanes;
 typedef struct sonde_lane_kernels {
   const char *name;
   void (*shear)(sonde_lanes *lanes); // faces' forces and couplings
-  // r = h F - M (ve - v), matrix, x = D^-1 r; r.r, (h F)^2; reaction. `sweep`: slice by slice, and
-  // each sees where those before it went; else the matrix is symmetric and restart() must follow
-  void (*linearise)(sonde_lanes *lanes, bool sweep, double sums[2]);
+  // r = h F - M (ve - v), matrix; r.r, (h F)^2, r.z; reaction. `sweep`: x = D^-1 r slice by slice,
+  // and each sees where those before it went; else the matrix is symmetric, x = 0, z = D^-1 r
+  void (*linearise)(sonde_lanes *lanes, bool sweep, double sums[3]);
   double (*sweep)(sonde_lanes *lanes); // x += D^-1 r, slice by slice; r.r as each slice found it
   void (*restart)(sonde_lanes *lanes, double sums[2]); // r after the sweeps, z = D^-1 r; r.z, r.r
   double (*multiply)(sonde_lanes *lanes, bool first);  // w = A z, the first time q; returns z.w

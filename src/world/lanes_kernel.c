@@ -2,7 +2,8 @@
 // set. Every sum has a fixed order: all sets give the same bits.
 // shear:     slopes, forces and couplings of the faces.
 // linearise: springs to the neighbours, normal and tangential springs, contact, matrix, and the
-//            first sweep: every slice is solved for itself and goes on before the next one looks.
+//            first sweep: every slice is solved for itself and goes on before the next one looks;
+//            or the start of the conjugate gradients.
 // sweep:     block Gauss-Seidel: the same with what the neighbours have moved since.
 // restart:   residual after the sweeps.
 // multiply, advance: parts of the conjugate gradients of Chronopoulos and Gear (1989), which
@@ -216,7 +217,7 @@ INLINE float most(sonde_lane a) {
 }
 
 typedef struct sums_of_rows {
-  lane_double rr, ff, reaction[3];
+  lane_double rr, ff, rz, reaction[3];
 } sums_of_rows;
 
 INLINE void linearise_slice(sonde_lanes *lanes, uint32_t s, bool sheared, bool moves,
@@ -240,16 +241,20 @@ INLINE void linearise_slice(sonde_lanes *lanes, uint32_t s, bool sheared, bool m
   lanes->unrest2[s] = most(force2 * (yield * yield));
   factorise(sum.block, at->factor);
   divide(at->factor, r, x);
-  for (int c = 0; c < 3; ++c) at->x[c] = x[c], here.ve[c] += x[c];
+  for (int c = 0; c < 3; ++c) {
+    at->x[c] = moves ? x[c] : (sonde_lane){0}, here.ve[c] += x[c];
+    if (!moves) at->r[c] = r[c], at->z[c] = x[c];
+  }
   sums->rr += widen(dot(r, r));
+  sums->rz += widen(dot(r, x));
   sums->ff += widen(force2);
   if (moves) publish_record(lanes, s, here.ve, dot(fixed->normal, x));
   publish_direction(lanes, s, x);
 }
 
-static void linearise(sonde_lanes *lanes, bool moves, double sums[2]) {
+static void linearise(sonde_lanes *lanes, bool moves, double sums[3]) {
   bool sheared = lanes->law.shear > 0;
-  sums_of_rows all_rows = {{0}, {0}, {{0}}};
+  sums_of_rows all_rows = {{0}, {0}, {0}, {{0}}};
   for (uint32_t a = 0; a < lanes->awake_count; ++a) {
     if (sheared)
       linearise_slice(lanes, lanes->awake[a], true, moves, &all_rows);
@@ -258,6 +263,7 @@ static void linearise(sonde_lanes *lanes, bool moves, double sums[2]) {
   }
   sums[0] = total(all_rows.rr);
   sums[1] = total(all_rows.ff);
+  sums[2] = total(all_rows.rz);
   const lane_double *reaction = all_rows.reaction;
   lanes->reaction_n = (sonde_vec3){total(reaction[0]), total(reaction[1]), total(reaction[2])};
 }

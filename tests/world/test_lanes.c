@@ -210,6 +210,36 @@ static void sleeping_is_harmless_and_ends(void **state) {
   clear(&awake);
 }
 
+// Springs that outweigh the masses by far, long steps.
+static void stiff_springs_and_long_steps_stay_stable(void **state) {
+  (void)state;
+  static const double stiffness_n_m[] = {2000, 6300, 20000};
+  for (size_t k = 0; k < 3; ++k) {
+    sonde_surface_law law = sonde_surface_law_default();
+    law.edge_stiffness_n_m = stiffness_n_m[k];
+    law.edge_compression = 1;
+    sonde_world_def def = fast_def();
+    def.contact_law = SONDE_CONTACT_NODES;
+    def.newton_iterations = 4;
+    def.pcg.relative_residual = 0.1;
+    def.dt_s = 0.02;
+    scene s = {.model = fixture_model(4, &law)};
+    s.n = s.model->surface.vertex_count;
+    assert_int_equal(sonde_state_create(s.model, &def, &s.state, NULL), SONDE_OK);
+    assert_int_equal(sonde_probe_create("ball:20", &s.probe, NULL), SONDE_OK);
+    double most = 0;
+    for (int tick = 0; tick < 40; ++tick) {
+      sonde_step(s.state, &s.probe, fixture_pose(fmin(0.01, 0.002 * tick)));
+      const sonde_vec3 *x = sonde_state_positions(s.state);
+      for (uint32_t i = 0; i < s.n; ++i)
+        most = fmax(most, v_distance(x[i], s.model->surface.vertices[i]));
+    }
+    print_message("%g N/m: largest move %.1f mm\n", law.edge_stiffness_n_m, most * 1e3);
+    assert_true(most > 0.005 && most < 0.015);
+    clear(&s);
+  }
+}
+
 static void trouble_is_flagged_and_survived(void **state) {
   (void)state;
   sonde_world_def def = fast_def();
@@ -247,6 +277,7 @@ int main(void) {
       cmocka_unit_test(iterates_where_one_is_not_enough),
       cmocka_unit_test(iterates_once_where_that_is_enough),
       cmocka_unit_test(sleeping_is_harmless_and_ends),
+      cmocka_unit_test(stiff_springs_and_long_steps_stay_stable),
       cmocka_unit_test(trouble_is_flagged_and_survived),
       cmocka_unit_test(refuses_what_it_cannot_do),
   };
