@@ -32,6 +32,16 @@ static inline sonde_vec3 v_cross(sonde_vec3 a, sonde_vec3 b) {
 static inline double v_norm2(sonde_vec3 a) { return v_dot(a, a); }
 static inline double v_norm(sonde_vec3 a) { return sqrt(v_dot(a, a)); }
 static inline double v_distance(sonde_vec3 a, sonde_vec3 b) { return v_norm(v_sub(a, b)); }
+// Index of the nearest of count > 0 points; the first of equals.
+static inline uint32_t v_nearest(const sonde_vec3 *points, uint32_t count, sonde_vec3 to) {
+  uint32_t nearest = 0;
+  double least = INFINITY;
+  for (uint32_t i = 0; i < count; ++i) {
+    double d2 = v_norm2(v_sub(points[i], to));
+    if (d2 < least) least = d2, nearest = i;
+  }
+  return nearest;
+}
 static inline sonde_vec3 v_lerp(sonde_vec3 a, sonde_vec3 b, double t) {
   return v_madd(v_scale(a, 1.0 - t), t, b);
 }

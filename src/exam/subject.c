@@ -12,14 +12,8 @@
 #include <string.h>
 
 // The vertex of the skin nearest to a point at rest.
-static sonde_vec3 skin_at(const sonde_model *model, sonde_vec3 point_m) {
-  const sonde_mesh *skin = &model->surface;
-  uint32_t nearest = 0;
-  for (uint32_t i = 1; i < skin->vertex_count; ++i)
-    if (v_norm2(v_sub(skin->vertices[i], point_m)) <
-        v_norm2(v_sub(skin->vertices[nearest], point_m)))
-      nearest = i;
-  return skin->vertices[nearest];
+static sonde_vec3 skin_at(const sonde_mesh *skin, sonde_vec3 point_m) {
+  return skin->vertices[v_nearest(skin->vertices, skin->vertex_count, point_m)];
 }
 
 // Half over the sites, half along the vein, where an exam goes. Shares overlap, so that the film is
@@ -33,7 +27,7 @@ static void spread(sonde_subject *subject) {
   for (uint32_t i = 0; i < sites; ++i)
     sonde_gel_put(subject->gel, model->sites[i].position_m, radius_m, half * all_m3 / sites);
   for (uint32_t i = 0; i < points; ++i)
-    sonde_gel_put(subject->gel, skin_at(model, model->vein.point[i].centre_m), along_m,
+    sonde_gel_put(subject->gel, skin_at(&model->surface, model->vein.point[i].centre_m), along_m,
                   half * all_m3 / points);
 }
 

@@ -34,13 +34,8 @@ static void apply_friction(sonde_subject *subject) {
 }
 
 static uint32_t nearest_skin(const sonde_subject *subject) {
-  const sonde_vec3 *skin_m = sonde_state_positions(subject->state);
-  uint32_t nearest = 0;
-  for (uint32_t i = 1; i < subject->model->surface.vertex_count; ++i)
-    if (v_norm2(v_sub(skin_m[i], subject->now.pose.position)) <
-        v_norm2(v_sub(skin_m[nearest], subject->now.pose.position)))
-      nearest = i;
-  return nearest;
+  return v_nearest(sonde_state_positions(subject->state), subject->model->surface.vertex_count,
+                   subject->now.pose.position);
 }
 
 // A counter that ran far ahead asks for no more than a few portions.

@@ -3,7 +3,6 @@
 // places_find:   copies of a node, made by earlier cuts, share a place.
 // skin_closes:   the mesh of places is closed.
 // thin_path:     drops points that lie on the straight line between others.
-// nearest_node:  the node where a point of the path goes to.
 // check_point:   whether the point lies on the skin there.
 // push, pop:     binary heap by cost, equal costs by place.
 // relax:         a cheaper way to a neighbour; far from the plane of the path is dear.
@@ -124,17 +123,6 @@ static uint32_t thin_path(const sonde_vec3 *path, uint32_t count, uint32_t *kept
     kept[used++] = from = to;
   }
   return used;
-}
-
-static uint32_t nearest_node(const sonde_vec3 *position, uint32_t nodes, sonde_vec3 point) {
-  SONDE_ASSERT(nodes > 0);
-  uint32_t nearest = 0;
-  double least = INFINITY;
-  for (uint32_t i = 0; i < nodes; ++i) {
-    double d2 = v_norm2(v_sub(position[i], point));
-    if (d2 < least) least = d2, nearest = i;
-  }
-  return nearest;
 }
 
 // No point of a face is farther from its nearest corner than 0.58 of its edge when all are equal;
@@ -286,7 +274,7 @@ static sonde_status follow(search *s, const sonde_vec3 *path, const uint32_t *ke
                            sonde_error *error) {
   uint32_t nodes = s->model->surface.vertex_count, room = 0, node[2] = {NOWHERE, NOWHERE};
   for (uint32_t k = 0; k < count; ++k) {
-    node[1] = nearest_node(s->position, nodes, path[kept[k]]);
+    node[1] = v_nearest(s->position, nodes, path[kept[k]]);
     sonde_status status = check_point(s->model, s->position, node[1], path, kept[k], error);
     if (!status && k > 0) status = place_plane(s, path, kept[k - 1], kept[k], node, error);
     if (status) return status;
