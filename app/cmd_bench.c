@@ -172,7 +172,6 @@ static int read_options(int argc, char **argv, options *o) {
     code = read_option(o, c);
     if (code >= 0) return code;
   }
-  if (!(o->tolerance > 0)) o->tolerance = is_ellipsoid(o) ? 0.1 : 1e-2;
   if (!(o->seconds > 0)) o->seconds = o->haptics ? 5 : is_ellipsoid(o) ? 0.5 : 1;
   if (o->device && !o->haptics) return app_usage_error("bench", "--device belongs to --haptics");
   if (is_ellipsoid(o))
@@ -269,7 +268,7 @@ static sonde_world_def world_of(const options *o, bool reference) {
   if (o->newton >= 0) def.newton_iterations = (uint32_t)o->newton;
   def.engine = reference ? SONDE_ENGINE_DOUBLE : o->engine;
   def.pcg.max_iterations = 5000;
-  if (!reference) def.pcg.relative_residual = o->tolerance;
+  if (o->tolerance > 0) def.pcg.relative_residual = o->tolerance;
   if (reference) def.pcg = (sonde_pcg_options){1e-10, 1e-16, 5000};
   if (reference && o->newton_reference) def.newton_iterations = (uint32_t)o->newton_reference;
   def.sleep_displacement_m = reference ? 0 : o->sleep_um * 1e-6;
@@ -423,7 +422,6 @@ int cmd_bench(int argc, char **argv) {
                .ellipsoid = {7842, 200, 1},
                .engine = SONDE_ENGINE_FAST,
                .newton = -1,
-               .tolerance = 0,
                .sleep_um = 20,
                .dt_s = 1e-3,
                .repeat = 3,
