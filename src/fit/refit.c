@@ -223,8 +223,8 @@ static sonde_status create_patches(sonde_refit *r, double reach_m, sonde_error *
   for (uint32_t c = 0; c < plan->curve_count && !status; ++c) coarse += r->patch[c].coarse;
   if (coarse)
     sonde_log(SONDE_LOG_WARNING,
-              "the mesh is too coarse for %u of %u footprints, expected edges of at most half "
-              "their narrow side",
+              "the mesh is too coarse for %u of %u footprints, expected edges of at most three "
+              "quarters of their narrow side",
               coarse, plan->curve_count);
   return status;
 }

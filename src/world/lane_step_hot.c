@@ -1,10 +1,12 @@
 // One step of the fast engine (docs/world.md): Newton's method on
 //   M (v1 - v0) = h F(x0 + h v1, v1)
-// from v1 = v0, its linear systems by conjugate gradients in single precision.
+// from v1 = v0 in single precision, its linear systems by sweeps, or by conjugate gradients where
+// these are faster.
 // list:      slices that take part.
 // publish:   positions and velocities in double precision, for the contact.
 // couple:    pushes and blocks of the contact, found in double precision, into the slices.
-// solve:     conjugate gradients.
+// conjugate, solve: the rest of a linear system that a first sweep began.
+// touch, linearise, iterate: one Newton iteration; is_bent: whether it needs another.
 // rest:      slices that stopped moving fall asleep, movers wake their neighbours.
 #include "world/contact.h"
 #include "world/lanes.h"
