@@ -53,7 +53,7 @@ async function begin(page, guidance) {
 async function press(page) {
   const before = (await state(page)).exam.presses.length;
   const named = () => ["complete", "open", "too_hard"].includes(window.sonde.exam.compression?.state);
-  for (let depth = 8; depth <= 45; depth += 1.5) {
+  for (let depth = 16; depth <= 45; depth += 1.5) {
     await page.evaluate((d) => window.sonde.setDepth(d), depth);
     await page.waitForFunction((d) => window.sonde.snapshot.penetration_mm > d - 0.5, depth, { timeout: 5000 }).catch(() => null);
     await page.waitForTimeout(250);
@@ -143,7 +143,7 @@ async function replay(page, exam) {
 
 async function killed(browser, running) {
   const page = await browser.newPage({ viewport: { width: 1440, height: 900 } });
-  await page.goto(`http://127.0.0.1:${running.port}/`);
+  await page.goto(`http://127.0.0.1:${running.port}/?quality=low`);
   await ready(page);
   await begin(page, /^None/);
   await page.evaluate(() => window.sonde.setDepth(10));
@@ -168,7 +168,7 @@ async function main() {
   const errors = [];
   page.on("console", (m) => m.type() === "error" && errors.push(m.text()));
   page.on("pageerror", (e) => errors.push(String(e)));
-  await page.goto(`http://127.0.0.1:${running.port}/`);
+  await page.goto(`http://127.0.0.1:${running.port}/?quality=low`);
   await ready(page);
   await begin(page, /^Full/);
   await guidedExam(page);
