@@ -40,6 +40,7 @@ class App {
   snapshot: Snapshot | null = null;
   connected = false;
   frames = 0;
+  private imaged = false; // an image has been painted
   /** pixels of the last frame */
   pixels: Uint8Array = new Uint8Array(0);
   readonly hold = new Hold();
@@ -465,7 +466,8 @@ class App {
     const frame = this.pending;
     this.pending = null;
     if (frame) this.show(frame);
-    this.scene.render();
+    if (this.imaged) this.scene.render(); // its first picture takes long: the image goes before it
+    this.imaged = this.frames > 0;
     this.nameTarget();
     if (frame) this.connection.ack(frame.sequence);
     this.rates.update(now_s, frame !== null, this.snapshot?.tick ?? 0, this.connected, this.connection.latency_ms);
