@@ -8,9 +8,10 @@
 #include "exam/vessels.h"
 #include "trainer/trainer.h"
 
-// 21 looks per second. A force beyond FORCE_MAX_N is no hand's: the inside is not asked then.
-static const double STEP_S = 0.004, FORCE_MAX_N = 150;
-enum { TICKS_PER_LOOK = 12, LOOKS_PER_REPORT = 20 };
+// The step of a session: in longer ones the skin under hard presses blows up. 21 looks per second. A
+// force beyond FORCE_MAX_N is no hand's: the inside is not asked then.
+static const double STEP_S = 0.001, FORCE_MAX_N = 150;
+enum { TICKS_PER_LOOK = 48, LOOKS_PER_REPORT = 20 };
 
 typedef struct rig {
   const sonde_exam_def *def;
@@ -33,8 +34,7 @@ sonde_exam_def sonde_exam_def_default(void) {
 
 static sonde_status open_rig(rig *r, sonde_error *error) {
   sonde_world_def world = sonde_session_def_default().world;
-  world.dt_s = STEP_S;
-  world.pcg.absolute_residual = 1e-3 * STEP_S; // 1 mN
+  SONDE_ASSERT(world.dt_s == STEP_S); // its residuals belong to it
   const sonde_case *patient = r->def->patient;
   const sonde_vein_map *map = &r->setup->map;
   sonde_status status = sonde_plan_make(r->def->protocol, map, &patient->criteria, &r->plan, error);
