@@ -10,7 +10,7 @@
 
 #include <string.h>
 
-enum { LEAF = 24, STACK = 128 }; // pieces as small as LEAF are not split further
+enum { STACK = 128 };
 
 typedef struct dissection {
   const sonde_pattern *pattern;
@@ -29,7 +29,8 @@ static void sort_piece(const dissection *d, uint32_t *piece, uint32_t count) {
       double c = v_coordinate(points[piece[i]], axis);
       low = fmin(low, c), high = fmax(high, c);
     }
-    if (high - low > spread) spread = high - low, widest = axis;
+    // Sides that differ by rounding only count as equal: grids are cut alike.
+    if (high - low > spread * (1 + 1e-9)) spread = high - low, widest = axis;
   }
   sonde_sort_along(points, widest, piece, count, d->keys);
 }
@@ -62,18 +63,18 @@ static uint32_t part(dissection *d, uint32_t *piece, uint32_t count) {
   return split_separator(d, piece + half, count - half);
 }
 
-static void dissect(dissection *d, uint32_t *order, uint32_t *above) {
+static void dissect(dissection *d, uint32_t rows, uint32_t leaf, uint32_t *order, uint32_t *above) {
   struct {
     uint32_t first, count, above;
   } stack[STACK];
   uint32_t depth = 0, n = d->pattern->n;
   for (uint32_t i = 0; i < n; ++i) order[i] = i;
   for (uint32_t i = 0; i < n && above; ++i) above[i] = UINT32_MAX;
-  stack[depth].first = 0, stack[depth].count = n, stack[depth++].above = n;
+  stack[depth].first = 0, stack[depth].count = rows, stack[depth++].above = rows;
   while (depth > 0) {
     --depth;
     uint32_t first = stack[depth].first, count = stack[depth].count, up = stack[depth].above;
-    if (count <= LEAF) {
+    if (count <= leaf) {
       if (above) above[first] = up;
       continue;
     }
@@ -89,13 +90,13 @@ static void dissect(dissection *d, uint32_t *order, uint32_t *above) {
   }
 }
 
-sonde_status sonde_dissect(const sonde_pattern *pattern, uint32_t *order, uint32_t *above,
-                           sonde_error *error) {
-  SONDE_ASSERT(pattern->n > 0 && pattern->points != NULL);
-  dissection d = {pattern, SONDE_NEW(sonde_ranked, pattern->n), SONDE_NEW(uint32_t, pattern->n),
-                  SONDE_NEW(uint32_t, pattern->n), 0};
+sonde_status sonde_dissect(const sonde_pattern *pattern, uint32_t rows, uint32_t leaf,
+                           uint32_t *order, uint32_t *above, sonde_error *error) {
+  SONDE_ASSERT(rows > 0 && rows <= pattern->n && leaf > 0 && pattern->points != NULL);
+  dissection d = {pattern, SONDE_NEW(sonde_ranked, rows), SONDE_NEW(uint32_t, pattern->n),
+                  SONDE_NEW(uint32_t, rows), 0};
   sonde_status status = d.keys && d.side && d.scratch ? SONDE_OK : sonde_fail_memory(error);
-  if (!status) dissect(&d, order, above);
+  if (!status) dissect(&d, rows, leaf, order, above);
   sonde_free(d.keys);
   sonde_free(d.side);
   sonde_free(d.scratch);

@@ -1,7 +1,5 @@
 // Analysis and walk of the multifrontal solver.
 //
-// find_pieces       pieces of the dissection
-// find_boundaries   later rows that a piece touches or its children leave
 // relate            where a piece's boundary lies in its parent
 // list_entries      where the matrix adds to a piece
 // measure           sizes of the factor and of the updates that wait
@@ -10,20 +8,9 @@
 #include "sparse/frontal.h"
 
 #include "base/base.h"
-#include "base/maths.h"
+#include "sparse/pieces.h"
 
-#include <stdlib.h>
 #include <string.h>
-
-typedef struct piece {
-  uint32_t first, count;             // own rows: places in the order
-  uint32_t boundary, boundary_count; // later places, in `boundary`
-  uint32_t parent, child_count;      // parent: piece_count at a root
-  uint32_t before;                   // the sibling that waits below it, when there is one
-  uint32_t entry, entry_count;       // in `entries`
-  uint32_t rows, size;               // of its columns and of its update, with what is rounded up
-  size_t factor;                     // its columns
-} piece;
 
 // A number of the matrix and its place in the piece's columns.
 typedef struct entry {
@@ -31,185 +18,81 @@ typedef struct entry {
 } entry;
 
 struct sonde_frontal {
-  uint32_t n, piece_count;
-  uint32_t *order; // [n] row at a place
-  piece *pieces;
-  uint32_t *boundary; // places, ascending per piece
-  uint32_t *related;  // [as boundary] index among the rows of the parent's columns
+  uint32_t n;
+  sonde_pieces pieces;
+  uint32_t *related; // [as boundary] index among the rows of the parent's columns
   entry *entries;
-  size_t boundary_total, factor_size, update_size, most_update, most_columns;
+  size_t factor_size, update_size, most_update, most_columns;
   uint32_t most_rows;
   const sonde_frontal_kernels *kernels;
 };
 
-// What the analysis needs besides.
-typedef struct analysis {
-  const sonde_pattern *pattern;
-  uint32_t *rank, *above, *seen, *piece_of, *waiting; // [n]
-} analysis;
-
-static int compare(const void *a, const void *b) {
-  uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
-  return x < y ? -1 : x > y;
-}
-
 static uint32_t rounded(uint32_t count, uint32_t to) { return (count + to - 1) / to * to; }
 
-static sonde_status find_pieces(sonde_frontal *f, analysis *a, sonde_error *error) {
-  for (uint32_t k = 0; k < f->n; ++k) f->piece_count += a->above[k] != UINT32_MAX;
-  f->pieces = SONDE_NEW(piece, f->piece_count);
-  if (!f->pieces) return sonde_fail_memory(error);
-  uint32_t t = 0;
-  for (uint32_t k = 0; k < f->n; ++k) {
-    if (a->above[k] != UINT32_MAX) f->pieces[t++].first = k;
-    a->piece_of[k] = t - 1;
-    ++f->pieces[t - 1].count;
-  }
-  SONDE_ASSERT(t == f->piece_count);
-  for (t = 0; t < f->piece_count; ++t) {
-    uint32_t up = a->above[f->pieces[t].first];
-    f->pieces[t].parent = up < f->n ? a->piece_of[up] : f->piece_count;
-    if (up < f->n) ++f->pieces[f->pieces[t].parent].child_count;
-  }
-  return SONDE_OK;
-}
+// Order of a piece's update, and rows of its columns, with what is rounded up.
+static uint32_t size_of(const sonde_piece *p) { return rounded(p->boundary_count, 4); }
+static uint32_t rows_of(const sonde_piece *p) { return rounded(p->count + size_of(p), 8); }
 
-static sonde_status reserve(sonde_frontal *f, size_t used, size_t *room, sonde_error *error) {
-  if (used + f->n <= *room) return SONDE_OK;
-  size_t wanted = 2 * (used + f->n);
-  uint32_t *grown = sonde_realloc(f->boundary, *room * sizeof *grown, wanted * sizeof *grown);
-  if (!grown) return sonde_fail_memory(error);
-  f->boundary = grown;
-  *room = wanted;
-  return SONDE_OK;
-}
-
-static void add_place(sonde_frontal *f, analysis *a, uint32_t t, uint32_t place) {
-  piece *p = &f->pieces[t];
-  if (place < p->first + p->count || a->seen[place] == t + 1) return;
-  a->seen[place] = t + 1;
-  f->boundary[p->boundary + p->boundary_count++] = place;
-}
-
-// Children wait on a stack: they directly precede their parent.
-static sonde_status find_boundaries(sonde_frontal *f, analysis *a, sonde_error *error) {
-  size_t room = 0;
-  uint32_t waiting = 0;
-  for (uint32_t t = 0; t < f->piece_count; ++t) {
-    piece *p = &f->pieces[t];
-    sonde_status status = reserve(f, f->boundary_total, &room, error);
-    if (status) return status;
-    p->boundary = (uint32_t)f->boundary_total;
-    for (uint32_t k = p->first; k < p->first + p->count; ++k) {
-      uint32_t row = f->order[k];
-      for (uint32_t q = a->pattern->start[row]; q < a->pattern->start[row + 1]; ++q)
-        add_place(f, a, t, a->rank[a->pattern->column[q]]);
-    }
-    for (uint32_t c = 0; c < p->child_count; ++c) {
-      const piece *child = &f->pieces[a->waiting[--waiting]];
-      SONDE_ASSERT(child->parent == t);
-      for (uint32_t i = 0; i < child->boundary_count; ++i)
-        add_place(f, a, t, f->boundary[child->boundary + i]);
-    }
-    p->before = waiting ? a->waiting[waiting - 1] : 0;
-    a->waiting[waiting++] = t;
-    qsort(f->boundary + p->boundary, p->boundary_count, sizeof *f->boundary, compare);
-    f->boundary_total += p->boundary_count;
-  }
-  return SONDE_OK;
-}
-
-// seen[place] becomes the place's index among the rows of piece t.
-static void number_rows(const sonde_frontal *f, uint32_t t, uint32_t *index) {
-  const piece *p = &f->pieces[t];
+// index[place] becomes the place's index among the rows of the piece.
+static void number_rows(const sonde_frontal *f, const sonde_piece *p, uint32_t *index) {
   for (uint32_t k = 0; k < p->count; ++k) index[p->first + k] = k;
   for (uint32_t i = 0; i < p->boundary_count; ++i)
-    index[f->boundary[p->boundary + i]] = p->count + i;
+    index[f->pieces.boundary[p->boundary + i]] = p->count + i;
 }
 
-static sonde_status relate(sonde_frontal *f, analysis *a, sonde_error *error) {
-  f->related = SONDE_NEW(uint32_t, f->boundary_total + 1);
-  if (!f->related) return sonde_fail_memory(error);
-  uint32_t waiting = 0;
-  for (uint32_t t = 0; t < f->piece_count; ++t) {
-    number_rows(f, t, a->seen);
-    for (uint32_t c = 0; c < f->pieces[t].child_count; ++c) {
-      const piece *child = &f->pieces[a->waiting[--waiting]];
-      for (uint32_t i = child->boundary; i < child->boundary + child->boundary_count; ++i)
-        f->related[i] = a->seen[f->boundary[i]];
-    }
-    a->waiting[waiting++] = t;
+static void relate(sonde_frontal *f, uint32_t *index) {
+  const sonde_piece *list = f->pieces.list;
+  for (uint32_t t = 0; t < f->pieces.count; ++t) {
+    number_rows(f, &list[t], index);
+    for (uint32_t c = 0, at = t - 1; c < list[t].child_count; ++c, at = list[at].before)
+      for (uint32_t i = 0; i < list[at].boundary_count; ++i)
+        f->related[list[at].boundary + i] = index[f->pieces.boundary[list[at].boundary + i]];
   }
-  return SONDE_OK;
 }
 
-static sonde_status list_entries(sonde_frontal *f, analysis *a, sonde_error *error) {
-  const sonde_pattern *m = a->pattern;
-  f->entries = SONDE_NEW(entry, m->start[m->n]);
-  if (!f->entries) return sonde_fail_memory(error);
+static void list_entries(sonde_frontal *f, const sonde_pattern *m, uint32_t *index) {
   uint32_t used = 0;
-  for (uint32_t t = 0; t < f->piece_count; ++t) {
-    piece *p = &f->pieces[t];
+  for (uint32_t t = 0; t < f->pieces.count; ++t) {
+    sonde_piece *p = &f->pieces.list[t];
     p->entry = used;
-    number_rows(f, t, a->seen);
+    number_rows(f, p, index);
     for (uint32_t k = 0; k < p->count; ++k) {
-      uint32_t row = f->order[p->first + k];
+      uint32_t row = f->pieces.order[p->first + k];
       for (uint32_t q = m->start[row]; q < m->start[row + 1]; ++q) {
-        uint32_t place = a->rank[m->column[q]];
-        if (place >= p->first + k) f->entries[used++] = (entry){q, k * p->rows + a->seen[place]};
+        uint32_t place = f->pieces.rank[m->column[q]];
+        if (place >= p->first + k) f->entries[used++] = (entry){q, k * rows_of(p) + index[place]};
       }
     }
     p->entry_count = used - p->entry;
   }
-  return SONDE_OK;
 }
 
-static sonde_status measure(sonde_frontal *f, sonde_error *error) {
-  size_t top = 0;
-  uint32_t waiting = 0;
-  uint32_t *stack = SONDE_NEW(uint32_t, f->piece_count);
-  if (!stack) return sonde_fail_memory(error);
-  for (uint32_t t = 0; t < f->piece_count; ++t) {
-    piece *p = &f->pieces[t];
-    p->size = rounded(p->boundary_count, 4);
-    p->rows = rounded(p->count + p->size, 8);
+static void measure(sonde_frontal *f) {
+  f->update_size = sonde_pieces_stack(&f->pieces, size_of);
+  for (uint32_t t = 0; t < f->pieces.count; ++t) {
+    sonde_piece *p = &f->pieces.list[t];
+    size_t columns = (size_t)p->count * rows_of(p), update = (size_t)size_of(p) * size_of(p);
     p->factor = f->factor_size;
-    size_t columns = (size_t)p->count * p->rows;
     f->factor_size += columns;
     if (columns > f->most_columns) f->most_columns = columns;
-    size_t update = (size_t)p->size * p->size;
     if (update > f->most_update) f->most_update = update;
-    if (p->rows > f->most_rows) f->most_rows = p->rows;
-    for (uint32_t c = 0; c < p->child_count; ++c) {
-      size_t side = f->pieces[stack[--waiting]].size;
-      top -= side * side;
-    }
-    stack[waiting++] = t;
-    top += update;
-    if (top > f->update_size) f->update_size = top;
+    if (rows_of(p) > f->most_rows) f->most_rows = rows_of(p);
   }
-  sonde_free(stack);
-  return SONDE_OK;
 }
 
-static sonde_status analyse(sonde_frontal *f, analysis *a, sonde_error *error) {
-  uint32_t n = f->n;
-  f->order = SONDE_NEW(uint32_t, n);
-  a->rank = SONDE_NEW(uint32_t, n);
-  a->above = SONDE_NEW(uint32_t, n);
-  a->seen = SONDE_NEW(uint32_t, n);
-  a->piece_of = SONDE_NEW(uint32_t, n);
-  a->waiting = SONDE_NEW(uint32_t, n);
-  if (!f->order || !a->rank || !a->above || !a->seen || !a->piece_of || !a->waiting)
-    return sonde_fail_memory(error);
-  sonde_status status = sonde_dissect(a->pattern, f->order, a->above, error);
+static sonde_status analyse(sonde_frontal *f, const sonde_pattern *pattern, sonde_error *error) {
+  sonde_status status = sonde_pieces_find(pattern, f->n, SONDE_LEAF, &f->pieces, error);
   if (status) return status;
-  for (uint32_t k = 0; k < n; ++k) a->rank[f->order[k]] = k;
-  status = find_pieces(f, a, error);
-  if (!status) status = find_boundaries(f, a, error);
-  if (!status) status = measure(f, error);
-  if (!status) status = relate(f, a, error);
-  if (!status) status = list_entries(f, a, error);
+  uint32_t *index = SONDE_NEW(uint32_t, f->n);
+  f->related = SONDE_NEW(uint32_t, f->pieces.boundary_total);
+  f->entries = SONDE_NEW(entry, pattern->start[f->n]);
+  if (!index || !f->related || !f->entries) status = sonde_fail_memory(error);
+  if (!status) {
+    measure(f);
+    relate(f, index);
+    list_entries(f, pattern, index);
+  }
+  sonde_free(index);
   return status;
 }
 
@@ -222,13 +105,7 @@ sonde_status sonde_frontal_create(const sonde_pattern *pattern, sonde_frontal **
   sonde_frontal *f = SONDE_NEW(sonde_frontal, 1);
   if (!f) return sonde_fail_memory(error);
   *f = (sonde_frontal){.n = pattern->n, .kernels = sonde_frontal_kernels_named(NULL)};
-  analysis a = {.pattern = pattern};
-  status = analyse(f, &a, error);
-  sonde_free(a.rank);
-  sonde_free(a.above);
-  sonde_free(a.seen);
-  sonde_free(a.piece_of);
-  sonde_free(a.waiting);
+  status = analyse(f, pattern, error);
   if (status)
     sonde_frontal_destroy(f);
   else
@@ -238,9 +115,7 @@ sonde_status sonde_frontal_create(const sonde_pattern *pattern, sonde_frontal **
 
 void sonde_frontal_destroy(sonde_frontal *f) {
   if (!f) return;
-  sonde_free(f->order);
-  sonde_free(f->pieces);
-  sonde_free(f->boundary);
+  sonde_pieces_clear(&f->pieces);
   sonde_free(f->related);
   sonde_free(f->entries);
   sonde_free(f);
@@ -273,12 +148,13 @@ void sonde_frontal_use(sonde_frontal *f, const sonde_frontal_kernels *kernels) {
 // ---- numbers ------------------------------------------------------------------------------
 
 // A child's update into the columns of its parent and into what these leave.
-static void add_update(const uint32_t *related, const piece *child, const double *from,
-                       const piece *p, double *columns, double *update) {
-  for (uint32_t j = 0; j < child->boundary_count; ++j, from += child->size) {
+static void add_update(const uint32_t *related, const sonde_piece *child, const double *from,
+                       const sonde_piece *p, double *columns, double *update) {
+  uint32_t rows = rows_of(p), size = size_of(p), step = size_of(child);
+  for (uint32_t j = 0; j < child->boundary_count; ++j, from += step) {
     uint32_t column = related[j];
-    double *to = column < p->count ? columns + (size_t)column * p->rows
-                                   : update + (size_t)(column - p->count) * p->size;
+    double *to = column < p->count ? columns + (size_t)column * rows
+                                   : update + (size_t)(column - p->count) * size;
     uint32_t shift = column < p->count ? 0 : p->count;
     for (uint32_t i = j; i < child->boundary_count; ++i) to[related[i] - shift] += from[i];
   }
@@ -286,23 +162,23 @@ static void add_update(const uint32_t *related, const piece *child, const double
 
 bool sonde_frontal_factor(const sonde_frontal *f, const double *value, float *factor,
                           double *work) {
+  const sonde_piece *list = f->pieces.list;
   double *columns = work, *update = columns + f->most_columns, *stack = update + f->most_update;
   size_t top = 0;
-  SONDE_ASSERT(f->piece_count > 0);
-  for (uint32_t t = 0; t < f->piece_count; ++t) {
-    const piece *p = &f->pieces[t];
-    size_t size = (size_t)p->size * p->size, numbers = (size_t)p->count * p->rows;
+  SONDE_ASSERT(f->pieces.count > 0);
+  for (uint32_t t = 0; t < f->pieces.count; ++t) {
+    const sonde_piece *p = &list[t];
+    uint32_t rows = rows_of(p), side = size_of(p);
+    size_t size = (size_t)side * side, numbers = (size_t)p->count * rows;
     memset(columns, 0, numbers * sizeof *columns);
     memset(update, 0, size * sizeof *update);
     for (uint32_t k = p->entry; k < p->entry + p->entry_count; ++k)
       columns[f->entries[k].target] = value[f->entries[k].source];
-    for (uint32_t c = 0, at = t; c < p->child_count; ++c) {
-      at = c ? f->pieces[at].before : t - 1;
-      const piece *child = &f->pieces[at];
-      top -= (size_t)child->size * child->size;
-      add_update(f->related + child->boundary, child, stack + top, p, columns, update);
+    for (uint32_t c = 0, at = t - 1; c < p->child_count; ++c, at = list[at].before) {
+      top -= (size_t)size_of(&list[at]) * size_of(&list[at]);
+      add_update(f->related + list[at].boundary, &list[at], stack + top, p, columns, update);
     }
-    if (!f->kernels->eliminate(columns, p->count, p->rows, update, p->size)) return false;
+    if (!f->kernels->eliminate(columns, p->count, rows, update, side)) return false;
     for (size_t k = 0; k < numbers; ++k) factor[p->factor + k] = (float)columns[k];
     memcpy(stack + top, update, size * sizeof *stack);
     top += size;
@@ -311,25 +187,28 @@ bool sonde_frontal_factor(const sonde_frontal *f, const double *value, float *fa
 }
 
 void sonde_frontal_solve(const sonde_frontal *f, const float *factor, double *x, float *scratch) {
+  const uint32_t *order = f->pieces.order;
   float *y = scratch, *part = scratch + f->n;
-  for (uint32_t k = 0; k < f->n; ++k) y[k] = (float)x[f->order[k]];
-  for (uint32_t t = 0; t < f->piece_count; ++t) {
-    const piece *p = &f->pieces[t];
-    const uint32_t *boundary = f->boundary + p->boundary;
+  for (uint32_t k = 0; k < f->n; ++k) y[k] = (float)x[order[k]];
+  for (uint32_t t = 0; t < f->pieces.count; ++t) {
+    const sonde_piece *p = &f->pieces.list[t];
+    const uint32_t *boundary = f->pieces.boundary + p->boundary;
+    uint32_t rows = rows_of(p);
     memcpy(part, y + p->first, p->count * sizeof *part);
-    memset(part + p->count, 0, (p->rows - p->count) * sizeof *part);
-    f->kernels->forward(factor + p->factor, p->count, p->rows, part);
+    memset(part + p->count, 0, (rows - p->count) * sizeof *part);
+    f->kernels->forward(factor + p->factor, p->count, rows, part);
     memcpy(y + p->first, part, p->count * sizeof *part);
     for (uint32_t i = 0; i < p->boundary_count; ++i) y[boundary[i]] += part[p->count + i];
   }
-  for (uint32_t t = f->piece_count; t-- > 0;) {
-    const piece *p = &f->pieces[t];
-    const uint32_t *boundary = f->boundary + p->boundary;
+  for (uint32_t t = f->pieces.count; t-- > 0;) {
+    const sonde_piece *p = &f->pieces.list[t];
+    const uint32_t *boundary = f->pieces.boundary + p->boundary;
+    uint32_t rows = rows_of(p);
     memcpy(part, y + p->first, p->count * sizeof *part);
-    memset(part + p->count, 0, (p->rows - p->count) * sizeof *part);
+    memset(part + p->count, 0, (rows - p->count) * sizeof *part);
     for (uint32_t i = 0; i < p->boundary_count; ++i) part[p->count + i] = y[boundary[i]];
-    f->kernels->backward(factor + p->factor, p->count, p->rows, part);
+    f->kernels->backward(factor + p->factor, p->count, rows, part);
     memcpy(y + p->first, part, p->count * sizeof *part);
   }
-  for (uint32_t k = 0; k < f->n; ++k) x[f->order[k]] = (double)y[k];
+  for (uint32_t k = 0; k < f->n; ++k) x[order[k]] = (double)y[k];
 }

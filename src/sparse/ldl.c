@@ -54,7 +54,7 @@ static void order_by_degree(const sonde_pattern *a, uint32_t *order, uint32_t *s
 static sonde_status find_order(const sonde_pattern *a, sonde_ldl *ldl, sonde_error *error) {
   sonde_status status = SONDE_OK;
   if (a->points != NULL)
-    status = sonde_dissect(a, ldl->order, NULL, error);
+    status = sonde_dissect(a, a->n, SONDE_LEAF, ldl->order, NULL, error);
   else
     order_by_degree(a, ldl->order, ldl->mark);
   for (uint32_t k = 0; k < a->n && !status; ++k) ldl->rank[ldl->order[k]] = k;
