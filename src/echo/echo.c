@@ -8,10 +8,10 @@
 // sonde_echo_set_radius, sonde_echo_set_kernels
 #include "base/base.h"
 #include "base/random.h"
+#include "base/vector.h"
 #include "echo/echo.h"
 
 #include <stdlib.h>
-#include <string.h>
 
 enum {
   LINES = 192,
@@ -258,14 +258,11 @@ sonde_status sonde_echo_set_radius(sonde_echo *echo, double radius_m, sonde_erro
 const echo_kernels *sonde_echo_kernels_find(const char *name) {
   const echo_kernels *known[] = {
 #ifdef __x86_64__
-      __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq")
-          ? &sonde_echo_kernels_avx512
-          : NULL,
-      __builtin_cpu_supports("avx2") ? &sonde_echo_kernels_avx2 : NULL,
+      &sonde_echo_kernels_avx512, &sonde_echo_kernels_avx2,
 #endif
       &sonde_echo_kernels_base, &sonde_echo_kernels_plain};
   for (size_t k = 0; k < SONDE_COUNT_OF(known); ++k)
-    if (known[k] && (!name || strcmp(name, known[k]->name) == 0)) return known[k];
+    if (sonde_vectors_serve(known[k]->name, name)) return known[k];
   return NULL;
 }
 

@@ -3,6 +3,8 @@
 #ifndef SONDE_SRC_ECHO_KERNEL_VECTOR_H
 #define SONDE_SRC_ECHO_KERNEL_VECTOR_H
 
+#include "base/vector.h"
+
 #include <stdbool.h>
 #include <stdint.h>
 #include <string.h>
@@ -17,24 +19,13 @@
 #pragma GCC diagnostic ignored "-Wconversion"
 #endif
 
-#define INLINE static inline __attribute__((always_inline))
+enum { W = VECTOR_BYTES / 4 };
 
-#if defined(__AVX512F__)
-enum { W = 16 };
-#define BYTES 64
-#elif defined(__AVX2__)
-enum { W = 8 };
-#define BYTES 32
-#else
-enum { W = 4 };
-#define BYTES 16
-#endif
-
-typedef float vf __attribute__((vector_size(BYTES)));
-typedef int32_t vi __attribute__((vector_size(BYTES)));
-typedef uint32_t vu __attribute__((vector_size(BYTES)));
-typedef uint8_t vb __attribute__((vector_size(BYTES / 4)));
-typedef float vf_near __attribute__((vector_size(BYTES), aligned(4), may_alias));
+typedef float vf __attribute__((vector_size(VECTOR_BYTES)));
+typedef int32_t vi __attribute__((vector_size(VECTOR_BYTES)));
+typedef uint32_t vu __attribute__((vector_size(VECTOR_BYTES)));
+typedef uint8_t vb __attribute__((vector_size(VECTOR_BYTES / 4)));
+typedef float vf_near __attribute__((vector_size(VECTOR_BYTES), aligned(4), may_alias));
 typedef float v4 __attribute__((vector_size(16)));
 typedef float v4_near __attribute__((vector_size(16), aligned(4), may_alias));
 

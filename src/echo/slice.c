@@ -14,6 +14,8 @@
 // sonde_slice_plane             picture of a probe's pose
 // sonde_slice_kernels_find
 #include "echo/slice.h"
+
+#include "base/vector.h"
 #include "fit/parallel.h"
 
 #include <string.h>
@@ -216,11 +218,10 @@ sonde_affine sonde_slice_plane(sonde_pose probe, const sonde_image *image) {
 const slice_kernels *sonde_slice_kernels_find(const char *name) {
   const slice_kernels *known[] = {
 #ifdef __x86_64__
-      __builtin_cpu_supports("avx512f") ? &sonde_slice_kernels_avx512 : NULL,
-      __builtin_cpu_supports("avx2") ? &sonde_slice_kernels_avx2 : NULL,
+      &sonde_slice_kernels_avx512, &sonde_slice_kernels_avx2,
 #endif
       &sonde_slice_kernels_base};
   for (size_t k = 0; k < SONDE_COUNT_OF(known); ++k)
-    if (known[k] && (!name || strcmp(name, known[k]->name) == 0)) return known[k];
+    if (sonde_vectors_serve(known[k]->name, name)) return known[k];
   return NULL;
 }

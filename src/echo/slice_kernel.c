@@ -45,9 +45,10 @@
 // operation per lane, so that all give the same bits.
 #include "echo/slice.h"
 
+#include "base/vector.h"
+
 #include <string.h>
 
-#define INLINE static inline __attribute__((always_inline))
 enum { LANES = 16, PAIRS = 16 }; // pixels at a time; pairs of frames remembered in a tile
 
 static const float SLACK = 1e-3f; // of a pixel: rounding at the frame's edge

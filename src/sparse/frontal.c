@@ -8,6 +8,7 @@
 #include "sparse/frontal.h"
 
 #include "base/base.h"
+#include "base/vector.h"
 #include "sparse/pieces.h"
 
 #include <string.h>
@@ -132,11 +133,11 @@ size_t sonde_frontal_scratch_size(const sonde_frontal *f) { return (size_t)f->n 
 const sonde_frontal_kernels *sonde_frontal_kernels_named(const char *name) {
   const sonde_frontal_kernels *known[] = {
 #ifdef __x86_64__
-      __builtin_cpu_supports("avx2") ? &sonde_frontal_kernels_avx2 : NULL,
+      &sonde_frontal_kernels_avx2,
 #endif
       &sonde_frontal_kernels_base};
   for (size_t k = 0; k < SONDE_COUNT_OF(known); ++k)
-    if (known[k] && (!name || strcmp(name, known[k]->name) == 0)) return known[k];
+    if (sonde_vectors_serve(known[k]->name, name)) return known[k];
   return NULL;
 }
 

@@ -12,6 +12,7 @@
 #include "sparse/fronts.h"
 
 #include "base/base.h"
+#include "base/vector.h"
 #include "sparse/pieces.h"
 
 #include <string.h>
@@ -306,12 +307,11 @@ bool sonde_fronts_compliance(const sonde_fronts *f, double *inverse, double *scr
 const sonde_front_kernels *sonde_front_kernels_find(const char *name) {
   const sonde_front_kernels *known[] = {
 #ifdef __x86_64__
-      __builtin_cpu_supports("avx512f") ? &sonde_front_kernels_avx512 : NULL,
-      __builtin_cpu_supports("avx2") ? &sonde_front_kernels_avx2 : NULL,
+      &sonde_front_kernels_avx512, &sonde_front_kernels_avx2,
 #endif
       &sonde_front_kernels_base};
   for (size_t k = 0; k < SONDE_COUNT_OF(known); ++k)
-    if (known[k] && (!name || strcmp(name, known[k]->name) == 0)) return known[k];
+    if (sonde_vectors_serve(known[k]->name, name)) return known[k];
   return NULL;
 }
 

@@ -9,24 +9,16 @@
 // subtract        one row of the backward pass
 // invert          a symmetric matrix, all columns of the unit matrix at once
 #include "base/base.h"
+#include "base/vector.h"
 #include "sparse/fronts.h"
 
 #include <math.h>
 #include <string.h>
 
-#if defined(__AVX512F__)
-#define FRONT_BYTES 64
-#elif defined(__AVX2__)
-#define FRONT_BYTES 32
-#else
-#define FRONT_BYTES 16
-#endif
-
-#define INLINE static inline __attribute__((always_inline))
-typedef double lot __attribute__((vector_size(FRONT_BYTES), aligned(8), may_alias));
+typedef double lot __attribute__((vector_size(VECTOR_BYTES), aligned(8), may_alias));
 
 // WIDTH columns of the panel are added up as a tree; MOST of them are taken in one go.
-enum { V = FRONT_BYTES / 8, LOTS = 8, WIDTH = 8, MOST = 32, COLUMNS = 4, BAND = 96 };
+enum { V = VECTOR_BYTES / 8, LOTS = 8, WIDTH = 8, MOST = 32, COLUMNS = 4, BAND = 96 };
 
 // ---- rows ---------------------------------------------------------------------------------
 

@@ -12,8 +12,8 @@
 #include "world/lanes.h"
 
 #include "base/base.h"
+#include "base/vector.h"
 
-#define INLINE static inline __attribute__((always_inline))
 typedef double four[SONDE_POINTS];
 typedef float four_floats __attribute__((vector_size(16)));
 typedef int32_t four_integers __attribute__((vector_size(16)));

@@ -9,6 +9,7 @@
 
 #include "base/base.h"
 #include "base/maths.h"
+#include "base/vector.h"
 
 #include <string.h>
 
@@ -376,13 +377,10 @@ void sonde_lanes_publish(sonde_lanes *lanes, const sonde_vec3 *rest, sonde_vec3 
 const sonde_lane_kernels *sonde_lane_kernels_find(const char *name) {
   const sonde_lane_kernels *known[] = {
 #ifdef __x86_64__
-      __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq")
-          ? &sonde_lane_kernels_avx512
-          : NULL,
-      __builtin_cpu_supports("avx2") ? &sonde_lane_kernels_avx2 : NULL,
+      &sonde_lane_kernels_avx512, &sonde_lane_kernels_avx2,
 #endif
       &sonde_lane_kernels_base};
   for (size_t k = 0; k < SONDE_COUNT_OF(known); ++k)
-    if (known[k] && (!name || strcmp(name, known[k]->name) == 0)) return known[k];
+    if (sonde_vectors_serve(known[k]->name, name)) return known[k];
   return NULL;
 }

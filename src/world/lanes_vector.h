@@ -6,6 +6,8 @@
 
 #include "world/lanes.h"
 
+#include "base/vector.h"
+
 #if defined(__AVX512F__) || defined(__AVX2__) || defined(__SSE2__)
 #include <immintrin.h>
 #endif
@@ -16,7 +18,6 @@
 #pragma GCC diagnostic ignored "-Wconversion"
 #endif
 
-#define INLINE static inline __attribute__((always_inline))
 typedef double lane_double __attribute__((vector_size(128)));
 
 INLINE sonde_lane all(float a) { return a - (sonde_lane){0}; }

@@ -1,0 +1,20 @@
+// Which instruction sets this processor runs.
+#include "base/vector.h"
+
+#include "base/base.h"
+
+#include <string.h>
+
+static bool runs(const char *set) {
+#ifdef __x86_64__
+  if (strcmp(set, "avx512") == 0)
+    return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq");
+  if (strcmp(set, "avx2") == 0) return __builtin_cpu_supports("avx2");
+#endif
+  return strcmp(set, "base") == 0 || strcmp(set, "plain") == 0;
+}
+
+bool sonde_vectors_serve(const char *set, const char *wanted) {
+  SONDE_ASSERT(set != NULL);
+  return (!wanted || strcmp(wanted, set) == 0) && runs(set);
+}
