@@ -16,6 +16,9 @@
 #define VECTOR_BYTES 16
 #endif
 
+// So many doubles anywhere in memory.
+typedef double lot __attribute__((vector_size(VECTOR_BYTES), aligned(8), may_alias));
+
 // This processor runs the set, and `wanted` is its name or NULL for any.
 bool sonde_vectors_serve(const char *set, const char *wanted);
 

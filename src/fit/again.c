@@ -2,7 +2,7 @@
 // sonde_again_create: both and the refit. sonde_again_run: the refit from theta.
 // sonde_again_factor / sonde_again_spread: variances from the curvature at its end.
 #include "fit/again.h"
-#include "fit/dense.h"
+#include "sparse/dense.h"
 
 #include "base/maths.h"
 

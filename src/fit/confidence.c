@@ -7,7 +7,7 @@
 // add_prior_spread: what the smoothness adds to it.
 // bootstrap:        linearised refits with sites drawn again.
 // sonde_refit_confidence: all of it at the optimum.
-#include "fit/dense.h"
+#include "sparse/dense.h"
 #include "fit/refit_inside.h"
 
 #include "base/maths.h"

@@ -5,7 +5,7 @@
 // sonde_refit_forces: all curves in parallel.
 // sonde_refit_start: nominal area enlarged by a rim of surrounding skin.
 #include "fit/refit.h"
-#include "fit/dense.h"
+#include "sparse/dense.h"
 #include "fit/parallel.h"
 #include "fit/refit_inside.h"
 #include "fit/site_field.h"

@@ -3,7 +3,7 @@
 // sonde_refit_weigh:     what one measurement counts.
 // sonde_refit_add_rows / sonde_refit_prior_row, _add_prior: measurements and what is known before.
 #include "fit/arrow.h"
-#include "fit/dense.h"
+#include "sparse/dense.h"
 #include "fit/refit_inside.h"
 
 #include "base/maths.h"

@@ -8,7 +8,6 @@
 #include "sparse/frontal.h"
 
 #include "base/base.h"
-#include "base/vector.h"
 #include "sparse/pieces.h"
 
 #include <string.h>
@@ -25,7 +24,7 @@ struct sonde_frontal {
   entry *entries;
   size_t factor_size, update_size, most_update, most_columns;
   uint32_t most_rows;
-  const sonde_frontal_kernels *kernels;
+  const sonde_dense_kernels *kernels;
 };
 
 static uint32_t rounded(uint32_t count, uint32_t to) { return (count + to - 1) / to * to; }
@@ -105,7 +104,7 @@ sonde_status sonde_frontal_create(const sonde_pattern *pattern, sonde_frontal **
   if (status) return status;
   sonde_frontal *f = SONDE_NEW(sonde_frontal, 1);
   if (!f) return sonde_fail_memory(error);
-  *f = (sonde_frontal){.n = pattern->n, .kernels = sonde_frontal_kernels_named(NULL)};
+  *f = (sonde_frontal){.n = pattern->n, .kernels = sonde_dense_kernels_find(NULL)};
   status = analyse(f, pattern, error);
   if (status)
     sonde_frontal_destroy(f);
@@ -130,18 +129,7 @@ size_t sonde_frontal_work_size(const sonde_frontal *f) {
 
 size_t sonde_frontal_scratch_size(const sonde_frontal *f) { return (size_t)f->n + f->most_rows; }
 
-const sonde_frontal_kernels *sonde_frontal_kernels_named(const char *name) {
-  const sonde_frontal_kernels *known[] = {
-#ifdef __x86_64__
-      &sonde_frontal_kernels_avx2,
-#endif
-      &sonde_frontal_kernels_base};
-  for (size_t k = 0; k < SONDE_COUNT_OF(known); ++k)
-    if (sonde_vectors_serve(known[k]->name, name)) return known[k];
-  return NULL;
-}
-
-void sonde_frontal_use(sonde_frontal *f, const sonde_frontal_kernels *kernels) {
+void sonde_frontal_use(sonde_frontal *f, const sonde_dense_kernels *kernels) {
   SONDE_ASSERT(kernels != NULL);
   f->kernels = kernels;
 }

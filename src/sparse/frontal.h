@@ -7,6 +7,7 @@
 #ifndef SONDE_SRC_FRONTAL_H
 #define SONDE_SRC_FRONTAL_H
 
+#include "sparse/dense.h"
 #include "sparse/dissect.h"
 
 typedef struct sonde_frontal sonde_frontal;
@@ -28,21 +29,7 @@ bool sonde_frontal_factor(const sonde_frontal *frontal, const double *value, flo
 void sonde_frontal_solve(const sonde_frontal *frontal, const float *factor, double *x,
                          float *scratch);
 
-// Kernels on one piece: `own` columns of `rows` numbers each, the triangle at the top; rows are a
-// multiple of 8, those behind the last used one zero.
-typedef struct sonde_frontal_kernels {
-  const char *name;
-  // Factors the columns and subtracts their product from the update [size x size], lower triangle
-  // by columns, size a multiple of 4; the diagonal receives its inverse, what is above it zero.
-  // False: a pivot is not positive.
-  bool (*eliminate)(double *columns, uint32_t own, uint32_t rows, double *update, uint32_t size);
-  void (*forward)(const float *columns, uint32_t own, uint32_t rows, float *x);
-  void (*backward)(const float *columns, uint32_t own, uint32_t rows, float *x);
-} sonde_frontal_kernels;
-extern const sonde_frontal_kernels sonde_frontal_kernels_base, sonde_frontal_kernels_avx2;
-
-// The widest kernels that this processor runs; another name for tests, NULL when it has none such.
-const sonde_frontal_kernels *sonde_frontal_kernels_named(const char *name);
-void sonde_frontal_use(sonde_frontal *frontal, const sonde_frontal_kernels *kernels);
+// Other kernels than the widest, for tests.
+void sonde_frontal_use(sonde_frontal *frontal, const sonde_dense_kernels *kernels);
 
 #endif

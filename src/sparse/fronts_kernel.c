@@ -15,8 +15,6 @@
 #include <math.h>
 #include <string.h>
 
-typedef double lot __attribute__((vector_size(VECTOR_BYTES), aligned(8), may_alias));
-
 // WIDTH columns of the panel are added up as a tree; MOST of them are taken in one go.
 enum { V = VECTOR_BYTES / 8, LOTS = 8, WIDTH = 8, MOST = 32, COLUMNS = 4, BAND = 96 };
 

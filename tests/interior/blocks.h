@@ -4,7 +4,7 @@
 #define SONDE_TEST_BLOCKS_H
 
 #include "base/base.h"
-#include "fit/dense.h"
+#include "sparse/dense.h"
 #include "interior/solid.h"
 
 #include <setjmp.h>

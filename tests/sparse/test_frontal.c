@@ -99,10 +99,10 @@ static void instruction_sets_agree(void **state) {
   solve(&t);
   double *y = SONDE_NEW(double, t.a.n);
   memcpy(y, t.x, t.a.n * sizeof *y);
-  sonde_frontal_use(t.frontal, sonde_frontal_kernels_named("base"));
+  sonde_frontal_use(t.frontal, sonde_dense_kernels_find("base"));
   solve(&t);
   assert_memory_equal(y, t.x, t.a.n * sizeof *y);
-  assert_null(sonde_frontal_kernels_named("no such set"));
+  assert_null(sonde_dense_kernels_find("no such set"));
   sonde_free(y);
   bench_clear(&t);
 }

@@ -1,7 +1,8 @@
-// Dense symmetric systems, lower triangles in row order, and products of matrices. Every number is
-// summed in the order of plain loops.
-#ifndef SONDE_SRC_FIT_DENSE_H
-#define SONDE_SRC_FIT_DENSE_H
+// Dense symmetric systems, lower triangles in row order, products of matrices, and what the pieces
+// of a multifrontal factor need. Every number is the same whatever the instruction set; products
+// sum in the order of plain loops.
+#ifndef SONDE_SRC_DENSE_H
+#define SONDE_SRC_DENSE_H
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -21,11 +22,25 @@ typedef struct sonde_product {
 } sonde_product;
 void sonde_multiply(const sonde_product *product);
 
+// For one instruction set. Columns of a piece: `own` of them with `rows` numbers each, the triangle
+// at the top; rows are a multiple of 8, those behind the last used one zero.
 typedef struct sonde_dense_kernels {
   const char *name;
   void (*multiply)(const sonde_product *product);
+  // Factors the columns and subtracts their product from the update [size x size], lower triangle
+  // by columns, size a multiple of 4; the diagonal receives its inverse, what is above it zero.
+  // False: a pivot is not positive.
+  bool (*eliminate)(double *columns, uint32_t own, uint32_t rows, double *update, uint32_t size);
+  void (*forward)(const float *columns, uint32_t own, uint32_t rows, float *x);
+  void (*backward)(const float *columns, uint32_t own, uint32_t rows, float *x);
 } sonde_dense_kernels;
-extern const sonde_dense_kernels sonde_dense_kernels_base, sonde_dense_kernels_avx2;
+
+// The widest that this processor runs, or those called `name`; NULL: none of that name.
+const sonde_dense_kernels *sonde_dense_kernels_find(const char *name);
+extern const sonde_dense_kernels sonde_dense_kernels_base;
+#ifdef __x86_64__
+extern const sonde_dense_kernels sonde_dense_kernels_avx2;
+#endif
 
 // Cholesky factor in the lower triangle of a [n * n], in place; the upper one is scratch. @return
 // false: not positive definite

@@ -3,22 +3,28 @@
 // sonde_cholesky: blocks of rows of the transposed factor in the upper triangle, then mirrored.
 // sonde_cholesky_forward, _solve: forward, then backward; _many: by blocks of rows.
 // sonde_add_outers: by strips of the lower triangle.
-#include "fit/dense.h"
+#include "sparse/dense.h"
 
 #include "base/base.h"
+#include "base/vector.h"
 
 #include <math.h>
 
 enum { BLOCK = 16, STRIP = 32 };
 
-void sonde_multiply(const sonde_product *product) {
+const sonde_dense_kernels *sonde_dense_kernels_find(const char *name) {
+  const sonde_dense_kernels *known[] = {
 #ifdef __x86_64__
-  if (__builtin_cpu_supports("avx2")) {
-    sonde_dense_kernels_avx2.multiply(product);
-    return;
-  }
+      &sonde_dense_kernels_avx2,
 #endif
-  sonde_dense_kernels_base.multiply(product);
+      &sonde_dense_kernels_base};
+  for (size_t k = 0; k < SONDE_COUNT_OF(known); ++k)
+    if (sonde_vectors_serve(known[k]->name, name)) return known[k];
+  return NULL;
+}
+
+void sonde_multiply(const sonde_product *product) {
+  sonde_dense_kernels_find(NULL)->multiply(product);
 }
 
 static void mirror(double *a, uint32_t n, bool to_upper) {

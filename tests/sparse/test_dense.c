@@ -1,10 +1,8 @@
 // Dense products and triangular systems: the same bits as plain loops, whatever the instruction
 // set.
-#include "fit_test.h"
-
-#include "base/base.h"
+#include "../fixture.h"
 #include "base/random.h"
-#include "fit/dense.h"
+#include "sparse/dense.h"
 
 static double *random_matrix(uint32_t rows, uint32_t columns, uint64_t seed) {
   double *a = SONDE_NEW(double, (size_t)rows *columns);
@@ -27,12 +25,7 @@ static double *definite_matrix(uint32_t n) {
 // Every shape, by every set of instructions.
 static void products_are_those_of_plain_loops(void **state) {
   (void)state;
-  const sonde_dense_kernels *sets[] = {&sonde_dense_kernels_base,
-#ifdef __x86_64__
-                                       __builtin_cpu_supports("avx2") ? &sonde_dense_kernels_avx2
-                                                                      : NULL
-#endif
-  };
+  const sonde_dense_kernels *sets[] = {&sonde_dense_kernels_base, sonde_dense_kernels_find(NULL)};
   for (uint32_t rows = 1; rows < 7; ++rows)
     for (uint32_t columns = 1; columns < 20; columns += 3)
       for (int kind = 0; kind < 3; ++kind) {
@@ -54,7 +47,6 @@ static void products_are_those_of_plain_loops(void **state) {
                                    .depth = DEPTH,
                                    .weight = kind == 1 ? weight : NULL,
                                    .subtract = kind == 2};
-          if (!sets[set]) continue;
           sets[set]->multiply(&p);
           for (uint32_t i = 0; i < rows; ++i)
             for (uint32_t j = 0; j < columns; ++j)

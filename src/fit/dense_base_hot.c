@@ -1,4 +1,0 @@
-// Product of dense matrices for one instruction set.
-#define DENSE_KERNELS sonde_dense_kernels_base
-#define DENSE_NAME "base"
-#include "fit/dense_kernel.h"
