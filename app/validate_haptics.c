@@ -12,6 +12,7 @@
 #include "app.h"
 #include "haptics_rig.h"
 #include "validate.h"
+#include "validate_list.h"
 
 #include <getopt.h>
 #include <math.h>
@@ -34,7 +35,7 @@ typedef struct work {
   sonde_state *state;
   const sonde_site *site;
   sonde_error *error;
-  int passed, failed;
+  validate_list list;
 } work;
 
 static const sonde_vec3 ZERO = {0, 0, 0};
@@ -47,21 +48,7 @@ static double norm(sonde_vec3 a) { return sqrt(dot(a, a)); }
 
 // `most`: the target is an upper bound, else a lower one.
 static void report(work *w, const char *name, double value, double target, bool most) {
-  bool pass = most ? value <= target : value >= target;
-  w->passed += pass;
-  w->failed += !pass;
-  if (!w->o->json) {
-    printf("  %-34s %12.5g   %s %-8g %s\n", name, value, most ? "<=" : ">=", target,
-           pass ? "pass" : "FAIL");
-    fflush(stdout);
-    return;
-  }
-  app_json_object(name);
-  app_json_real("value", value);
-  app_json_text("bound", most ? "at most" : "at least");
-  app_json_real("target", target);
-  app_json_bool("pass", pass);
-  app_json_close();
+  validate_note(&w->list, name, value, most ? -INFINITY : target, most ? target : INFINITY, NULL);
 }
 
 static haptics_rig_def rig_def(const work *w, const char *device) {
@@ -470,7 +457,7 @@ static sonde_status measure(work *w) {
 
 static int run(const options *o) {
   sonde_error error = {0};
-  work w = {.o = o, .error = &error};
+  work w = {.o = o, .error = &error, .list.json = o->json};
   sonde_world_def world = haptics_world();
   sonde_status status = sonde_model_load(o->model, &w.model, &error);
   if (!status) status = sonde_probe_create("linear", &w.probe, &error);
@@ -479,21 +466,13 @@ static int run(const options *o) {
     w.site = sonde_model_site(w.model, 27);
     if (!w.site) w.site = &w.model->sites[w.model->site_count / 2];
     app_catch_interrupt();
-    if (o->json) app_json_begin();
     status = measure(&w);
-    if (o->json) {
-      app_json_integer("passed", w.passed);
-      app_json_integer("failed", w.failed);
-      app_json_end();
-    } else if (!status) {
-      printf("%d passed, %d failed\n", w.passed, w.failed);
-    }
   }
   sonde_state_destroy(w.state);
   sonde_probe_clear(&w.probe);
   sonde_model_destroy(w.model);
   if (status) return app_fail("validate", &error);
-  return w.failed ? APP_FAILED : APP_OK;
+  return validate_end(&w.list) ? APP_OK : APP_FAILED;
 }
 
 int validate_haptics(int argc, char **argv) {

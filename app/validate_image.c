@@ -6,38 +6,23 @@
 #include "app.h"
 #include "validate.h"
 #include "validate_leg.h"
+#include "validate_list.h"
 
 #include <getopt.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
-
-enum { MOST = 40 };
-
-typedef struct measure {
-  char name[48], target[40];
-  double value;
-  bool pass, counts;
-} measure;
 
 typedef struct report {
-  measure list[MOST];
-  int count;
+  validate_list list;
   bool quick;
   sonde_error error;
 } report;
 
-// Passes when low <= value <= high.
-static void note(report *r, const char *name, double value, double low, double high,
+// Nothing after a failure.
+static void note(report *r, const char *name, double value, double least, double most,
                  const char *target) {
-  if (r->count == MOST) return;
-  measure *m = &r->list[r->count++];
-  snprintf(m->name, sizeof m->name, "%s", name);
-  snprintf(m->target, sizeof m->target, "%s", target);
-  m->value = value;
-  m->pass = value >= low && value <= high;
-  m->counts = true;
+  if (!r->error.status) validate_note(&r->list, name, value, least, most, target);
 }
 
 typedef struct stage {
@@ -327,38 +312,13 @@ static sonde_status times(report *r) {
     (void)look(&s, 1);
     sonde_echo_times t = sonde_echo_last_times(s.view.echo);
     list[k] = t.plane_s + t.medium_s + t.scatter_s + t.beam_s + t.picture_s;
-    if (k == 0) note(r, "beam_change_ms", t.settings_s * 1e3, 0, 1e9, "told");
+    if (k == 0) note(r, "beam_change_ms", t.settings_s * 1e3, -INFINITY, INFINITY, "told");
   }
-  if (!status) {
-    note(r, "frame_ms", app_quantile(list, FRAMES, 0.5) * 1e3, 0, 1e9,
+  if (!status)
+    note(r, "frame_ms", app_quantile(list, FRAMES, 0.5) * 1e3, -INFINITY, INFINITY,
          "told; see sonde bench --scene image");
-    r->list[r->count - 1].counts = false;
-  }
   stage_close(&s);
   return status;
-}
-
-static bool print(const report *r, bool json) {
-  bool pass = true;
-  if (json) app_json_begin();
-  for (int k = 0; k < r->count; ++k) {
-    const measure *m = &r->list[k];
-    pass = pass && (m->pass || !m->counts);
-    if (!json) {
-      printf("%-34s %10.4g   %-36s %s\n", m->name, m->value, m->target, m->pass ? "pass" : "FAIL");
-      continue;
-    }
-    app_json_object(m->name);
-    app_json_real("value", m->value);
-    app_json_text("target", m->target);
-    app_json_bool("pass", m->pass);
-    app_json_close();
-  }
-  if (json) {
-    app_json_bool("pass", pass);
-    app_json_end();
-  }
-  return pass;
 }
 
 int validate_image(int argc, char **argv) {
@@ -367,10 +327,9 @@ int validate_image(int argc, char **argv) {
   static sonde_status (*const PARTS[])(report *) = {reference,   speckle, attenuation, bone,
                                                     enhancement, vein,    times};
   report r = {0};
-  bool json = false;
   for (int c; (c = getopt_long(argc, argv, "", LONG, NULL)) != -1;) switch (c) {
     case 'q': r.quick = true; break;
-    case 'j': json = true; break;
+    case 'j': r.list.json = true; break;
     default: return APP_BAD_INPUT;
     }
   if (argc != optind) return app_usage_error("validate", "unexpected argument after image");
@@ -386,5 +345,5 @@ int validate_image(int argc, char **argv) {
     r.error.status = status;
     return app_fail("validate", &r.error);
   }
-  return print(&r, json) ? APP_OK : APP_FAILED;
+  return validate_end(&r.list) ? APP_OK : APP_FAILED;
 }
