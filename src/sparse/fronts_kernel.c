@@ -1,7 +1,7 @@
 // Kernels of the multifrontal factor; fronts_*_hot.c include this file once per instruction set.
 // Every entry is made by the same operations in the same order: all sets give the same bits.
 //
-// reduce          rows times shares from a row, one after the other
+// reduce          rows times shares from a row
 // factor_panel    columns of the panel against each other
 // trail           what the panel leaves in four columns, or one, behind it
 // trail_rows      the same for a band of rows that stays in the cache with its part of the panel
@@ -9,41 +9,27 @@
 // subtract        one row of the backward pass
 // invert          a symmetric matrix, all columns of the unit matrix at once
 #include "base/base.h"
-#include "base/vector.h"
 #include "sparse/fronts.h"
+#include "sparse/product_kernel.h"
 
 #include <math.h>
 #include <string.h>
 
 // WIDTH columns of the panel are added up as a tree; MOST of them are taken in one go.
-enum { V = VECTOR_BYTES / 8, LOTS = 8, WIDTH = 8, MOST = 32, COLUMNS = 4, BAND = 96 };
+enum { WIDTH = 8, MOST = 32, COLUMNS = 4, BAND = 96 };
 
-// ---- rows ---------------------------------------------------------------------------------
-
-// Row k lies at from + k*step, its share at share + k*share_step.
-typedef struct rows {
-  const double *from, *share;
-  size_t step, share_step, count;
-} rows;
-
-INLINE void reduce_lots(double *to, const rows *r, size_t at, size_t lots) {
-  lot sum[LOTS];
-  for (size_t v = 0; v < lots; ++v) sum[v] = ((const lot *)(to + at))[v];
-  for (size_t k = 0; k < r->count; ++k) {
-    double share = r->share[k * r->share_step];
-    const lot *row = (const lot *)(r->from + k * r->step + at);
-    for (size_t v = 0; v < lots; ++v) sum[v] -= share * row[v];
-  }
-  for (size_t v = 0; v < lots; ++v) ((lot *)(to + at))[v] = sum[v];
-}
-
-static void reduce(double *to, const rows *r, size_t width) {
-  size_t at = 0;
-  for (; at + LOTS * V <= width; at += LOTS * V) reduce_lots(to, r, at, LOTS);
-  for (; at + V <= width; at += V) reduce_lots(to, r, at, 1);
-  for (; at < width; ++at)
-    for (size_t k = 0; k < r->count; ++k)
-      to[at] -= r->share[k * r->share_step] * r->from[k * r->step + at];
+// to[width] -= sum over k < count of share[k * share_step] from[k * step].
+static void reduce(double *to, size_t width, const double *from, size_t step, const double *share,
+                   size_t share_step, size_t count) {
+  const sonde_product product = {.c = to,
+                                 .a = share,
+                                 .a_step = share_step,
+                                 .b = from,
+                                 .b_row = step,
+                                 .rows = 1,
+                                 .columns = (uint32_t)width,
+                                 .depth = (uint32_t)count};
+  strip(&product, 0, 1, true, false);
 }
 
 // ---- elimination --------------------------------------------------------------------------
@@ -52,8 +38,7 @@ static bool factor_panel(double *f, size_t n, size_t from, size_t to) {
   for (size_t j = from; j < to; ++j) {
     double *column = f + j * n;
     const double *first = f + from * n + j;
-    const rows before = {first, first, n, n, j - from};
-    reduce(column + j, &before, n - j);
+    reduce(column + j, n - j, first, n, first, n, j - from);
     if (!(column[j] > 0) || !isfinite(column[j])) return false;
     double root = 1 / sqrt(column[j]);
     for (size_t i = j; i < n; ++i) column[i] *= root;
@@ -141,8 +126,7 @@ static void subtract(float *restrict y, const float *restrict row, float scale, 
 static bool factor_whole(double *f, size_t n) {
   for (size_t j = 0; j < n; ++j) {
     double *column = f + j * n;
-    const rows before = {f + j, f + j, n, n, j};
-    reduce(column + j, &before, n - j);
+    reduce(column + j, n - j, f + j, n, f + j, n, j);
     if (!(column[j] > 0) || !isfinite(column[j])) return false;
     column[j] = sqrt(column[j]);
     for (size_t i = j + 1; i < n; ++i) column[i] /= column[j];
@@ -156,14 +140,12 @@ static bool invert(double *f, uint32_t n, double *x) {
   if (!factor_whole(f, n)) return false;
   memset(x, 0, (size_t)n * n * sizeof *x);
   for (size_t i = 0; i < n; ++i) {
-    const rows above = {x, f + i, n, n, i};
     x[i * n + i] = 1;
-    reduce(x + i * n, &above, i);
+    reduce(x + i * n, i, x, n, f + i, n, i);
     for (size_t c = 0; c <= i; ++c) x[i * n + c] /= f[i * n + i];
   }
   for (size_t i = n; i-- > 0;) {
-    const rows below = {x + (i + 1) * n, f + i * n + i + 1, n, 1, n - 1 - i};
-    reduce(x + i * n, &below, n);
+    reduce(x + i * n, n, x + (i + 1) * n, n, f + i * n + i + 1, 1, n - 1 - i);
     for (size_t c = 0; c < n; ++c) x[i * n + c] /= f[i * n + i];
   }
   return true;
