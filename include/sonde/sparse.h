@@ -90,7 +90,7 @@ SONDE_API sonde_pcg_result sonde_pcg_solve(const sonde_block_matrix *matrix,
 typedef struct sonde_ldl sonde_ldl;
 
 /**
- * Orders (reverse Cuthill-McKee refined by nested dissection on `points` when given), analyses and
+ * Orders (nested dissection by `points`, without them breadth-first levels reversed), analyses and
  * factors. The matrix is given by its full pattern in CSR with ascending columns.
  * @param points [n] positions for the ordering, or NULL
  * @return SONDE_CONVERGENCE when a pivot is not positive

@@ -16,7 +16,7 @@
 #define VECTOR_BYTES 16
 #endif
 
-// So many doubles anywhere in memory.
+// As many doubles as fit into one, at the address of any double.
 typedef double lot __attribute__((vector_size(VECTOR_BYTES), aligned(8), may_alias));
 
 // This processor runs the set, and `wanted` is its name or NULL for any.

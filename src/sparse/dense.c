@@ -1,4 +1,6 @@
-// sonde_multiply: by the widest kernels that this processor runs.
+// sonde_dense_kernels_find: of this processor.
+// sonde_multiply: by the widest of them.
+// mirror:         one triangle onto the other.
 // factor_rows:    rows of the transposed factor against each other and what follows them.
 // sonde_cholesky: blocks of rows of the transposed factor in the upper triangle, then mirrored.
 // sonde_cholesky_forward, _solve: forward, then backward; _many: by blocks of rows.

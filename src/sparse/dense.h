@@ -31,6 +31,7 @@ typedef struct sonde_dense_kernels {
   // by columns, size a multiple of 4; the diagonal receives its inverse, what is above it zero.
   // False: a pivot is not positive.
   bool (*eliminate)(double *columns, uint32_t own, uint32_t rows, double *update, uint32_t size);
+  // Triangular solves with such columns, x [rows].
   void (*forward)(const float *columns, uint32_t own, uint32_t rows, float *x);
   void (*backward)(const float *columns, uint32_t own, uint32_t rows, float *x);
 } sonde_dense_kernels;

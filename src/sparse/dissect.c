@@ -1,7 +1,8 @@
 // sort_piece:       along its widest side.
 // split_separator:  rows of the upper half that touch the lower one go behind the others.
 // part:             one piece into lower half, upper half, separator.
-// sonde_dissect:    all pieces, with an explicit stack.
+// dissect:          all pieces, with an explicit stack.
+// sonde_pattern_check: columns within the rows and ascending.
 #include "sparse/dissect.h"
 
 #include "base/base.h"

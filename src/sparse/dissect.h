@@ -17,8 +17,8 @@ sonde_status sonde_pattern_check(const sonde_pattern *pattern, sonde_error *erro
 enum { SONDE_LEAF = 24 }; // rows of a piece that is not worth splitting
 
 // order[n] receives the row at each place: the first `rows` of them with halves before what
-// separates them, down to pieces of `leaf`; the others as they are. Columns may be in any order.
-// above [n], may be NULL: where a piece (a leaf or a separator) begins, the place where the
+// separates them, down to pieces of `leaf`; the others as they are. Columns may repeat, in any
+// order. above [n], may be NULL: where a piece (a leaf or a separator) begins, the place where the
 // separator above it begins, `rows` at a root; UINT32_MAX elsewhere. Children directly precede
 // their parent.
 sonde_status sonde_dissect(const sonde_pattern *pattern, uint32_t rows, uint32_t leaf,

@@ -17,13 +17,13 @@
 
 #include <string.h>
 
-enum { LEAF = 20, PANEL = 32 };
+enum { LEAF = 20, PANEL = 32 }; // nodes of a piece not worth splitting, columns at a time
 
 struct sonde_fronts {
   const sonde_front_kernels *kernels;
   uint32_t node_count, last_count, element_count;
   const uint32_t (*elements)[8];
-  sonde_pieces pieces; // of the other nodes, and at last the last nodes'
+  sonde_pieces pieces; // behind those of the dissection comes that of the last nodes
   uint32_t *element_of;
   float *factor; // per piece: rows of boundary then own unknowns, each 3*count wide
   size_t factor_size;
@@ -31,15 +31,15 @@ struct sonde_fronts {
   double *stack;   // updates that wait for their parent
   uint32_t *local; // place -> index in the working front
   size_t stack_size, stack_top, work_order;
-  float *gathered;
+  float *gathered;      // own unknowns of a piece in the backward pass
   uint32_t now, column; // state of the factorisation
   bool assembled, failed;
-  uint64_t macs;
+  uint64_t macs; // multiplications of one factorisation
 };
 
 // ---- analysis -----------------------------------------------------------------------------
 
-// Pairs of one element's corners, as often as they share one. start [node_count + 2].
+// Nodes that share an element, as often as they do. start [node_count + 2].
 static void list_neighbours(const sonde_fronts *f, uint32_t *start, uint32_t *to) {
   for (int pass = 0; pass < 2; ++pass) {
     for (uint32_t e = 0; e < f->element_count; ++e)
@@ -124,7 +124,7 @@ static sonde_status build(sonde_fronts *f, const sonde_vec3 *points, sonde_error
   f->factor = SONDE_NEW(float, f->factor_size);
   f->work = SONDE_NEW(double, f->work_order * f->work_order);
   f->stack = SONDE_NEW(double, f->stack_size);
-  f->gathered = SONDE_NEW(float, 2 * f->work_order);
+  f->gathered = SONDE_NEW(float, f->work_order);
   return f->factor && f->work && f->stack && f->gathered ? SONDE_OK : sonde_fail_memory(error);
 }
 

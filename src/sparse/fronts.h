@@ -4,7 +4,8 @@
 // The nodes are ordered by nested dissection; every piece (a leaf or a separator) owns a dense
 // front. What remains at the end is the dense matrix of the last nodes: their stiffness with
 // everything else in equilibrium. From their displacements all others follow by one backward pass.
-// Factors are kept in single precision for that pass; they are made in double.
+// Factors are kept in single precision for that pass; they are made in double. It works in steps,
+// so that it fits between ticks; frontal.h is the solver for a scalar matrix in one go.
 #ifndef SONDE_SRC_FRONTS_H
 #define SONDE_SRC_FRONTS_H
 
@@ -42,15 +43,14 @@ bool sonde_fronts_failed(const sonde_fronts *fronts);
 // Condensed stiffness of the last nodes, lower triangle by columns: (i, j) at j*side + i, i >= j,
 // side = 3*last_count. Owned by the fronts.
 const double *sonde_fronts_condensed(const sonde_fronts *fronts);
+// The inverse of that matrix, symmetric but for rounding: inverse[side*side]. False when it is not
+// positive definite. @param scratch [side*side]
+bool sonde_fronts_compliance(const sonde_fronts *fronts, double *inverse, double *scratch);
 // x[3*node_count] holds the displacements of the last nodes; fills in all others.
 void sonde_fronts_recover(const sonde_fronts *fronts, float *x);
 
 size_t sonde_fronts_nonzeros(const sonde_fronts *fronts);
 uint64_t sonde_fronts_work(const sonde_fronts *fronts); // multiplications of one factorisation
-
-// The inverse of that matrix, symmetric but for rounding: inverse[side*side]. False when it is not
-// positive definite. @param scratch [side*side]
-bool sonde_fronts_compliance(const sonde_fronts *fronts, double *inverse, double *scratch);
 
 // For one instruction set; all of them give the same bits. Symmetric matrices are lower triangles
 // by columns, of order n.

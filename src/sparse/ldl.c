@@ -2,11 +2,11 @@
 //
 // sonde_ldl_create    orders, builds the permuted pattern, analyses, factors
 // sonde_ldl_refactor  numbers on the same pattern
-// order_by_degree     reverse Cuthill-McKee: breadth-first from a far node, reversed
+// order_by_levels     without places: breadth-first from a far row, reversed
 // build_upper         permuted entries above the diagonal, by column, with their source
 // analyse             elimination tree and column counts of L
 // row_pattern         nonzeros of one row of L: paths in the elimination tree
-// factor              up-looking: each row solves a triangular system with the rows before it
+// factor_row          up-looking: each row solves a triangular system with the rows before it
 #include "sparse/ldl.h"
 
 #include "base/base.h"
@@ -34,7 +34,7 @@ static uint32_t breadth_first(const sonde_pattern *a, uint32_t root, uint32_t *q
   return queue[tail - 1];
 }
 
-static void order_by_degree(const sonde_pattern *a, uint32_t *order, uint32_t *seen) {
+static void order_by_levels(const sonde_pattern *a, uint32_t *order, uint32_t *seen) {
   uint32_t done = 0, mark = 0;
   for (uint32_t i = 0; i < a->n; ++i) seen[i] = 0;
   for (uint32_t i = 0; i < a->n; ++i) {
@@ -56,7 +56,7 @@ static sonde_status find_order(const sonde_pattern *a, sonde_ldl *ldl, sonde_err
   if (a->points != NULL)
     status = sonde_dissect(a, a->n, SONDE_LEAF, ldl->order, NULL, error);
   else
-    order_by_degree(a, ldl->order, ldl->mark);
+    order_by_levels(a, ldl->order, ldl->mark);
   for (uint32_t k = 0; k < a->n && !status; ++k) ldl->rank[ldl->order[k]] = k;
   return status;
 }
