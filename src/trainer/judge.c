@@ -131,6 +131,13 @@ static void locate(const sonde_judge *judge, sonde_compression *p) {
   }
 }
 
+bool sonde_press_is_astray(const sonde_judge *judge) {
+  sonde_compression now = judge->now;
+  if (!judge->pressing || !isfinite(now.z_m)) return false;
+  locate(judge, &now);
+  return now.point == SONDE_PLAN_POINTS;
+}
+
 // Every place within reach is examined, not only the nearest one: presses in any order do the same.
 static void cover(sonde_judge *judge, const sonde_compression *p) {
   judge->result_count[p->result]++;

@@ -65,5 +65,7 @@ struct sonde_judge {
 
 // What a press is so far.
 sonde_press_result sonde_press_classify(const sonde_judge *judge);
+// A press is under way within reach of no place of the plan.
+bool sonde_press_is_astray(const sonde_judge *judge);
 
 #endif

@@ -45,14 +45,16 @@ static double measure(const sonde_judge *judge, const sonde_vein_point *at, doub
   return v_norm(flat);
 }
 
-static void say_move(sonde_guidance *g, const char *title, double along_m, double offset_m) {
+static void say_move(sonde_guidance *g, bool pressing, const char *title, double along_m,
+                     double offset_m) {
+  const char *move = pressing ? "Not here: let go and move" : "Move";
   double across_m = sqrt(fmax(0, offset_m * offset_m - along_m * along_m));
   double along_mm = fabs(1e3 * along_m), across_mm = 1e3 * across_m;
   if (along_mm >= across_mm)
-    snprintf(g->text, sizeof g->text, "Move the probe %.0f mm towards the %s: %s.", along_mm,
+    snprintf(g->text, sizeof g->text, "%s the probe %.0f mm towards the %s: %s.", move, along_mm,
              along_m < 0 ? "knee" : "groin", title);
   else
-    snprintf(g->text, sizeof g->text, "Move the probe %.0f mm sideways: %s.", across_mm, title);
+    snprintf(g->text, sizeof g->text, "%s the probe %.0f mm sideways: %s.", move, across_mm, title);
 }
 
 static void say_press(const sonde_judge *judge, sonde_guidance *g) {
@@ -95,9 +97,10 @@ static void say_next(const sonde_judge *judge, sonde_guidance *g) {
   double along_m;
   g->offset_m = measure(judge, &point->at, &along_m, &g->angle_rad);
   g->angle_ok = g->angle_rad <= c->tilt_rad;
-  // a press that is under way is finished before the next place is named
-  if (!judge->pressing && g->offset_m > c->reach_m)
-    say_move(g, point->title, along_m, g->offset_m);
+  // a press at a place is finished before the next one is named
+  bool elsewhere = judge->pressing ? sonde_press_is_astray(judge) : g->offset_m > c->reach_m;
+  if (elsewhere)
+    say_move(g, judge->pressing, point->title, along_m, g->offset_m);
   else
     say_press(judge, g);
 }

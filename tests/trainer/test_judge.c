@@ -254,6 +254,32 @@ static void guidance_leads_through_the_plan(void **state) {
   sonde_judge_destroy(judge);
 }
 
+// A press that counts for no place is not led on, one at any place of the plan is.
+static void a_press_elsewhere_is_called_off(void **state) {
+  (void)state;
+  sonde_vein_map map = straight_map();
+  sonde_exam_protocol protocol =
+      protocol_of("{sonde_protocol: 1, id: few, title: Few, text: Few places, places: [{title: "
+                  "Vein, text: Press., from: 10, to: 190, every_mm: 60}]}");
+  sonde_plan plan = plan_of(&protocol, &map);
+  assert_true(plan.count > 2);
+  for (int elsewhere = 0; elsewhere < 2; ++elsewhere) {
+    sonde_judge *judge = judge_of(&plan);
+    test_press press = closing(plan.point[1].at.skin_m.z + elsewhere * 0.03);
+    for (double t = 0; t < 1; t += 0.03) {
+      sonde_snapshot s = press_at(&press, 0, t);
+      assert_true(sonde_judge_feed(judge, &s));
+    }
+    const char *text = sonde_judge_guidance(judge).text;
+    if (elsewhere)
+      assert_non_null(strstr(text, "Not here: let go and move the probe 90 mm towards the groin"));
+    else
+      assert_non_null(strstr(text, "let go"));
+    assert_int_equal(strstr(text, "Not here") != NULL, elsewhere);
+    sonde_judge_destroy(judge);
+  }
+}
+
 // What is asked for is what was pressed last, as long as it waits for a finding; then what comes
 // first. A press that is under way is not talked over, and the next place is still named.
 static void the_finding_of_what_was_just_seen_is_asked_for(void **state) {
@@ -389,6 +415,7 @@ int main(void) {
       cmocka_unit_test(tremor_is_one_press),
       cmocka_unit_test(memory_is_bounded),
       cmocka_unit_test(guidance_leads_through_the_plan),
+      cmocka_unit_test(a_press_elsewhere_is_called_off),
       cmocka_unit_test(the_finding_of_what_was_just_seen_is_asked_for),
       cmocka_unit_test(hints_are_counted_and_fade),
       cmocka_unit_test(the_state_follows_the_press),

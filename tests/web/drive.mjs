@@ -16,7 +16,10 @@ export async function goTo(page) {
     const at = await page.evaluate(() => window.sonde.targetOnScreen());
     const box = await page.locator("#scene").boundingBox();
     await page.mouse.click(box.x + at[0], box.y + at[1]);
-    const there = () => window.sonde.exam.step.target && window.sonde.exam.step.offset_mm <= window.sonde.exam.step.target.radius_mm;
+    const there = () => {
+      const { target, offset_mm } = window.sonde.exam.step;
+      return target && offset_mm !== null && offset_mm <= target.radius_mm;
+    };
     if (await page.waitForFunction(there, null, { timeout: 3000 }).catch(() => null)) return;
   }
   throw new Error(`the target is not reached: ${await label.textContent()}`);

@@ -42,7 +42,7 @@ const pause = (ms) => page.waitForTimeout(ms);
 async function intoRing() {
   for (let i = 0; i < 5; ++i) {
     const s = await step();
-    if (!s.target || s.offset_mm <= s.target.radius_mm) return;
+    if (!s.target || (s.offset_mm !== null && s.offset_mm <= s.target.radius_mm)) return;
     const at = await page.evaluate(() => window.sonde.targetOnScreen());
     const box = await page.locator("#scene").boundingBox();
     await page.mouse.click(box.x + at[0], box.y + at[1]);
