@@ -71,7 +71,10 @@ sonde_status sonde_window_create(sonde_window **window, sonde_error *error) {
   w->touched = SONDE_NEW(sonde_touched, SONDE_WINDOW_TOUCHED);
   w->scratch = SONDE_NEW(double, 12 * SONDE_WINDOW_TOUCHED + 2 * side);
   w->pressed = SONDE_NEW(float, 3 * (size_t)SONDE_WINDOW_NODES);
-  if (!status && (!w->pressed || !w->compliance || !w->touched || !w->scratch))
+  w->stress = SONDE_NEW(sonde_mat3, w->solid.hex_count);
+  w->felt = SONDE_NEW(bool, w->solid.hex_count);
+  if (!status &&
+      (!w->stress || !w->felt || !w->pressed || !w->compliance || !w->touched || !w->scratch))
     status = sonde_fail_memory(error);
   if (!status) {
     list_hexes(&w->solid);
@@ -90,6 +93,8 @@ void sonde_window_destroy(sonde_window *w) {
   sonde_free(w->compliance);
   sonde_free(w->touched);
   sonde_free(w->pressed);
+  sonde_free(w->stress);
+  sonde_free(w->felt);
   sonde_free(w->scratch);
   sonde_free(w);
 }
@@ -150,6 +155,7 @@ void sonde_window_begin(sonde_window *w, const sonde_interior *in, sonde_window_
   sonde_column_point at;
   w->place = place;
   w->ready = w->loaded = false;
+  memset(w->felt, 0, w->solid.hex_count * sizeof *w->felt);
   sonde_interior_column(in, place.theta, place.s, &at);
   spread_rows(w, in->s_low_m, in->s_high_m);
   spread_columns(w, at.radius_m);

@@ -60,6 +60,8 @@ typedef struct sonde_window {
   double reaction_n;      // along the beam, to the motion as it is
   double stress_scale;    // contact force over the reaction to the unit motion
   double pressed_n_m;     // that reaction
+  sonde_mat3 *stress;     // [hexes] under a unit motion, where felt
+  bool *felt;             // [hexes] those around the vessels
   bool loaded;
   uint32_t iterations;
 } sonde_window;

@@ -3,11 +3,12 @@
 // sonde_window_update   touched points, forces, recovery
 // find_cell             cell of the ring and local coordinates
 // touch                 one vertex of the skin that carries contact force
-// apply                 displacement of the touched points under forces on them
+// apply, comply         displacement of the touched points under forces on them
 // press_evenly          the response to an even press of the touched rectangle
 // solve_forces          conjugate gradients on the forces
 // sonde_window_field    trilinear in angle, row and level
-// sonde_window_stress   nodal means within a tissue, interpolated
+// sonde_window_stress, list_elements  nodal means within a tissue, interpolated
+// feel_vessels          stress of the elements around the vessels
 #include "base/base.h"
 #include "interior/window.h"
 
@@ -70,42 +71,50 @@ static void touch(sonde_window *w, const sonde_interior *in, sonde_vec3 rest, so
 
 typedef struct contact {
   uint32_t count, active; // touched points; near nodes they use
-  uint32_t *node;         // [active]
-  double *force, *moved;  // [SIDE] of the near nodes
+  uint32_t *node, *place; // [active] those, [NEAR] where in that list
+  double *force;          // [3*active]
+  double *moved;          // [3*active]
+  double *compliance;     // [3*active][3*active] of those nodes; row k: what a force on k moves
   double give;
 } contact;
 
 static void gather(const sonde_window *w, const double *f, const contact *c) {
-  memset(c->force, 0, SIDE * sizeof *c->force);
+  memset(c->force, 0, 3 * c->active * sizeof *c->force);
   for (uint32_t p = 0; p < c->count; ++p)
-    for (int k = 0; k < 4; ++k)
+    for (int k = 0; k < 4; ++k) {
+      double *at = c->force + 3 * c->place[w->touched[p].near[k]];
       for (int axis = 0; axis < 3; ++axis)
-        c->force[3 * w->touched[p].near[k] + (uint32_t)axis] +=
-            w->touched[p].weight[k] * f[3 * p + (uint32_t)axis];
+        at[axis] += w->touched[p].weight[k] * f[3 * p + (uint32_t)axis];
+    }
 }
 
-// moved = compliance * force over the active nodes.
-static void comply(const sonde_window *w, const contact *c) {
-  for (uint32_t n = 0; n < 3 * c->active; ++n) {
-    uint32_t row = 3 * c->node[n / 3] + n % 3;
-    const double *of = w->compliance + (size_t)row * SIDE;
-    double sum = 0;
-    for (uint32_t m = 0; m < c->active; ++m) {
-      uint32_t k = 3 * c->node[m];
-      sum += of[k] * c->force[k] + of[k + 1] * c->force[k + 1] + of[k + 2] * c->force[k + 2];
-    }
-    c->moved[row] = sum;
+// sum += of `rows` rows, each times its scale.
+static inline void add_rows(double *restrict sum, const double *restrict row, size_t stride,
+                            const double *restrict scale, int rows, uint32_t count) {
+  for (uint32_t i = 0; i < count; ++i) {
+    double s = sum[i];
+    for (int k = 0; k < rows; ++k) s += scale[k] * row[(size_t)k * stride + i];
+    sum[i] = s;
   }
+}
+
+// moved = compliance * force, two nodes at a time.
+static void comply(const contact *c) {
+  uint32_t n = 3 * c->active, k = 0;
+  memset(c->moved, 0, n * sizeof *c->moved);
+  for (; k + 6 <= n; k += 6)
+    add_rows(c->moved, c->compliance + (size_t)k * n, n, c->force + k, 6, n);
+  if (k < n) add_rows(c->moved, c->compliance + (size_t)k * n, n, c->force + k, 3, n);
 }
 
 static void apply(const sonde_window *w, const contact *c, const double *f, double *out) {
   gather(w, f, c);
-  comply(w, c);
+  comply(c);
   for (uint32_t p = 0; p < c->count; ++p)
     for (uint32_t axis = 0; axis < 3; ++axis) {
       double sum = c->give * f[3 * p + axis];
       for (int k = 0; k < 4; ++k)
-        sum += w->touched[p].weight[k] * c->moved[3 * w->touched[p].near[k] + axis];
+        sum += w->touched[p].weight[k] * c->moved[3 * c->place[w->touched[p].near[k]] + axis];
       out[3 * p + axis] = sum;
     }
 }
@@ -145,27 +154,29 @@ static void list_active(const sonde_window *w, contact *c) {
     for (int k = 0; k < 4; ++k) seen[w->touched[p].near[k]] = true;
   for (uint32_t n = 0; n < SONDE_WINDOW_NEAR; ++n) {
     if (!seen[n]) continue;
+    c->place[n] = c->active;
     c->node[c->active++] = n;
     for (size_t k = 3 * (size_t)n; k < 3 * (size_t)n + 3; ++k) sum += w->compliance[k * SIDE + k];
   }
   SONDE_ASSERT(c->active > 0);
   c->give = give * sum / (3 * c->active);
+  for (uint32_t k = 0; k < 3 * c->active; ++k) {
+    const double *of = w->compliance + (size_t)(3 * c->node[k / 3] + k % 3) * SIDE;
+    double *out = c->compliance + (size_t)k * 3 * c->active;
+    for (uint32_t m = 0; m < 3 * c->active; ++m) out[m] = of[3 * c->node[m / 3] + m % 3];
+  }
 }
 
-// Displacements of all near nodes under the forces, then everything else.
-static void recover(const sonde_window *w, const contact *c, float *x) {
+// Displacements of all near nodes under the forces.
+static void move_near(const sonde_window *w, const contact *c, float *x) {
   const sonde_solid *s = &w->solid;
   float *last = x + 3 * (size_t)(s->unknown_count - s->last_count);
-  for (uint32_t row = 0; row < SIDE; ++row) {
-    const double *of = w->compliance + (size_t)row * SIDE;
-    double sum = 0;
-    for (uint32_t m = 0; m < c->active; ++m) {
-      uint32_t k = 3 * c->node[m];
-      sum += of[k] * c->force[k] + of[k + 1] * c->force[k + 1] + of[k + 2] * c->force[k + 2];
-    }
-    last[row] = (float)sum;
+  double sum[SIDE] = {0};
+  for (uint32_t k = 0; k < 3 * c->active; ++k) {
+    const double *restrict of = w->compliance + (size_t)(3 * c->node[k / 3] + k % 3) * SIDE;
+    for (uint32_t row = 0; row < SIDE; ++row) sum[row] += c->force[k] * of[row];
   }
-  sonde_fronts_recover(s->fronts, x);
+  for (uint32_t row = 0; row < SIDE; ++row) last[row] = (float)sum[row];
 }
 
 // Nodes beside the face carry a share of the contact but do not lie under it.
@@ -243,12 +254,12 @@ static void sample_patch(sonde_window *w, const sonde_interior *in, sonde_pose p
     }
 }
 
-// Solves for `move`, leaves x; the reaction along the beam.
+// Solves for `move`, leaves x of the near nodes; the reaction along the beam.
 static double respond(sonde_window *w, contact *c, const double along[3], float *x) {
   double *f = w->scratch + 2 * SIDE, reaction = 0;
   solve_forces(w, c, f, f + 3 * c->count);
   gather(w, f, c);
-  recover(w, c, x);
+  move_near(w, c, x);
   for (uint32_t i = 0; i < 3 * c->count; ++i) reaction += f[i] * along[i % 3];
   return reaction;
 }
@@ -262,25 +273,6 @@ static void press_evenly(sonde_window *w, const sonde_interior *in, contact *c, 
   if (c->count == 0) return;
   list_active(w, c);
   w->pressed_n_m = respond(w, c, along, w->pressed);
-}
-
-bool sonde_window_update(sonde_window *w, const sonde_interior *in,
-                         const sonde_interior_input *input) {
-  SONDE_ASSERT(w != NULL && w->ready && input != NULL);
-  uint32_t nodes[SONDE_WINDOW_NEAR];
-  sonde_vec3 beam = q_rotate(input->world_from_probe.rotation, vec3(0, 0, 1));
-  double along[3] = {v_dot(beam, in->e1), v_dot(beam, in->e2), v_dot(beam, in->axis)};
-  contact c = {.node = nodes, .force = w->scratch, .moved = w->scratch + SIDE};
-  patch r;
-  double force = read_contact(w, in, input, beam, &r);
-  c.count = w->touched_count;
-  w->loaded = c.count > 0;
-  if (!w->loaded) return false;
-  list_active(w, &c);
-  w->reaction_n = respond(w, &c, along, w->solid.x);
-  press_evenly(w, in, &c, input->world_from_probe, &r, along);
-  w->stress_scale = w->pressed_n_m > 0 ? force / w->pressed_n_m : 0;
-  return true;
 }
 
 // ---- reading ------------------------------------------------------------------------------
@@ -337,12 +329,12 @@ static uint32_t layer_within(uint32_t level, uint32_t d) {
   return l <= low ? low : l - 1 > high ? high : l - 1;
 }
 
-bool sonde_window_stress(const sonde_window *w, double theta, double s, double r,
-                         sonde_mat3 *stress) {
+// The 27 elements around a point that share in its stress; false beyond the ends.
+static bool list_elements(const sonde_window *w, double theta, double s, double r,
+                          uint32_t element[27], double share[27]) {
   uint32_t column[4], level;
   double weight[4], radius[NL], f[3][3];
   cell c;
-  *stress = m_zero();
   if (!find_cell(w, theta, s, &c)) return false;
   corners(&c, column, weight);
   blend_radii(w, column, weight, radius);
@@ -354,9 +346,66 @@ bool sonde_window_stress(const sonde_window *w, double theta, double s, double r
     uint32_t di = k % 3, dj = k / 3 % 3, dl = k / 9;
     uint32_t i = (c.i + di + NT - 1) % NT, j = c.j + dj, l = layer_within(level, dl);
     j = j < 1 ? 0 : j - 1 > NS - 2 ? NS - 2 : j - 1;
-    double share = f[0][di] * f[1][dj] * f[2][dl];
-    sonde_mat3 of = sonde_solid_stress(&w->solid, w->pressed, (j * NT + i) * (NL - 1) + l);
-    *stress = m_add(*stress, m_scale(of, share * w->stress_scale));
+    element[k] = (j * NT + i) * (NL - 1) + l;
+    share[k] = f[0][di] * f[1][dj] * f[2][dl];
   }
+  return true;
+}
+
+// Stations of a vessel are closer than elements: each of these is evaluated once per update.
+static void feel_vessels(sonde_window *w, const sonde_interior *in) {
+  memset(w->felt, 0, w->solid.hex_count * sizeof *w->felt);
+  for (uint32_t which = 0; which < in->vessel_count; ++which)
+    for (uint32_t n = 0; n < in->station_count[which]; ++n) {
+      uint32_t element[27];
+      double share[27];
+      sonde_column_point at;
+      (void)sonde_interior_locate(in, in->station[which][n].rest_m, &at);
+      if (!list_elements(w, at.theta, at.s, at.r, element, share)) continue;
+      for (uint32_t k = 0; k < 27; ++k) {
+        if (w->felt[element[k]]) continue;
+        w->felt[element[k]] = true;
+        w->stress[element[k]] = sonde_solid_stress(&w->solid, w->pressed, element[k]);
+      }
+    }
+}
+
+bool sonde_window_stress(const sonde_window *w, double theta, double s, double r,
+                         sonde_mat3 *stress) {
+  uint32_t element[27];
+  double share[27];
+  *stress = m_zero();
+  if (!list_elements(w, theta, s, r, element, share)) return false;
+  for (uint32_t k = 0; k < 27; ++k) {
+    sonde_mat3 of = w->felt[element[k]] ? w->stress[element[k]]
+                                        : sonde_solid_stress(&w->solid, w->pressed, element[k]);
+    *stress = m_add(*stress, m_scale(of, share[k] * w->stress_scale));
+  }
+  return true;
+}
+
+// ---- update -------------------------------------------------------------------------------
+
+bool sonde_window_update(sonde_window *w, const sonde_interior *in,
+                         const sonde_interior_input *input) {
+  SONDE_ASSERT(w != NULL && w->ready && input != NULL);
+  uint32_t nodes[SONDE_WINDOW_NEAR], places[SONDE_WINDOW_NEAR];
+  sonde_vec3 beam = q_rotate(input->world_from_probe.rotation, vec3(0, 0, 1));
+  double along[3] = {v_dot(beam, in->e1), v_dot(beam, in->e2), v_dot(beam, in->axis)};
+  contact c = {.node = nodes, .place = places, .force = w->scratch};
+  c.moved = w->scratch + SIDE;
+  c.compliance = w->compliance + (size_t)SIDE * SIDE; // free once it is inverted
+  patch r;
+  double force = read_contact(w, in, input, beam, &r);
+  c.count = w->touched_count;
+  w->loaded = c.count > 0;
+  if (!w->loaded) return false;
+  list_active(w, &c);
+  w->reaction_n = respond(w, &c, along, w->solid.x);
+  press_evenly(w, in, &c, input->world_from_probe, &r, along);
+  sonde_fronts_recover(w->solid.fronts, w->solid.x);
+  if (w->pressed_n_m > 0) sonde_fronts_recover(w->solid.fronts, w->pressed);
+  w->stress_scale = w->pressed_n_m > 0 ? force / w->pressed_n_m : 0;
+  feel_vessels(w, in);
   return true;
 }
