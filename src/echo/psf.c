@@ -34,8 +34,14 @@ sonde_array sonde_beam_array(const beam_key *key) {
 }
 
 double sonde_psf_band(const beam_psf *psf, double depth_m, int *band) {
-  int b = 0;
-  while (b < SONDE_BANDS - 2 && depth_m > psf->depth_m[b + 1]) ++b;
+  int b = 0, high = SONDE_BANDS - 2;
+  while (b < high) {
+    int middle = (b + high) / 2;
+    if (depth_m > psf->depth_m[middle + 1])
+      b = middle + 1;
+    else
+      high = middle;
+  }
   *band = b;
   return clamp((depth_m - psf->depth_m[b]) / (psf->depth_m[b + 1] - psf->depth_m[b]), 0, 1);
 }

@@ -12,7 +12,8 @@
 // clear_seen, find    each cube once
 // locate              image coordinates of a rest point, and the derivative there
 // cube_map            map of a cube without vessels
-// find_vessels, carry, carried  what the vessels' walls do to it
+// find_vessels, carry  what the vessels' walls do to it
+// carried, carry_pieces  its map and those of its pieces with them
 // find_lumen, in_lumen  places at rest that hold blood
 // place_cell, place_pieces  a cube, or its pieces beside a vessel
 // sonde_echo_lay, lay_outside  scatterers of one map into the grid; those of the tissue alone
@@ -146,28 +147,40 @@ static sonde_vec3 carry(const sonde_echo *echo, const cube *c, sonde_vec3 rest, 
 }
 
 // Offset of a piece's middle from the cube's along an axis, in edges.
-static double offset_of(int part, int k) { return part < 0 ? 0 : part >> k & 1 ? 0.25 : -0.25; }
+static double offset_of(int part, int k) { return part >> k & 1 ? 0.25 : -0.25; }
 
-// Piece `part` (0..7) of a cube, carried by the walls; part < 0: the whole cube.
-static map carried(const sonde_echo *echo, const cube *c, const map *m, int part) {
-  double size = part < 0 ? 1 : 0.5;
-  map out = {.origin = m->origin};
-  sonde_vec3 rest = c->centre, edge[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-  for (int k = 0; k < 3; ++k) {
-    edge[k] = v_scale(edge[k], echo->cell_m);
-    out.origin = v_madd(out.origin, offset_of(part, k), m->axis[k]);
-    rest = v_madd(rest, offset_of(part, k), edge[k]);
-    out.axis[k] = v_scale(m->axis[k], size);
-  }
+static sonde_vec3 unit_of(int k) { return vec3(k == 0, k == 1, k == 2); }
+
+// The whole cube, carried by the walls.
+static map carried(const sonde_echo *echo, const cube *c, const map *m) {
+  map out = *m;
   if (!c->moving) return out;
-  sonde_vec3 bare = out.origin;
-  out.origin = carry(echo, c, rest, bare);
+  out.origin = carry(echo, c, c->centre, m->origin);
   for (int k = 0; k < 3; ++k) {
-    sonde_vec3 end =
-        carry(echo, c, v_madd(rest, 0.5 * size, edge[k]), v_madd(bare, 0.5, out.axis[k]));
+    sonde_vec3 rest = v_madd(c->centre, 0.5 * echo->cell_m, unit_of(k));
+    sonde_vec3 end = carry(echo, c, rest, v_madd(m->origin, 0.5, m->axis[k]));
     out.axis[k] = v_scale(v_sub(end, out.origin), 2);
   }
   return out;
+}
+
+// Its eight pieces. The middles of two neighbours are as far apart as a piece is long: one carried
+// point per piece gives all the maps.
+static void carry_pieces(const sonde_echo *echo, const cube *c, const map *m, map piece[8]) {
+  for (int part = 0; part < 8; ++part) {
+    map *out = &piece[part];
+    sonde_vec3 rest = c->centre;
+    out->origin = m->origin;
+    for (int k = 0; k < 3; ++k) {
+      out->origin = v_madd(out->origin, offset_of(part, k), m->axis[k]);
+      rest = v_madd(rest, offset_of(part, k) * echo->cell_m, unit_of(k));
+      out->axis[k] = v_scale(m->axis[k], 0.5);
+    }
+    if (c->moving) out->origin = carry(echo, c, rest, out->origin);
+  }
+  for (int part = 0; part < 8 && c->moving; ++part)
+    for (int k = 0; k < 3; ++k)
+      piece[part].axis[k] = v_sub(piece[part | 1 << k].origin, piece[part & ~(1 << k)].origin);
 }
 
 // Lumen of a vessel over one piece: forms of the scatterers' coordinates, 1 on the wall at rest.
@@ -268,17 +281,18 @@ static void lay_outside(sonde_echo *echo, const map *m, const lumen *in, int lum
 
 static void place_pieces(sonde_echo *echo, const cube *c, const map *m) {
   uint32_t each = echo->per_piece, shares = SONDE_LOOSE / each;
+  map piece[8];
+  carry_pieces(echo, c, m, piece);
   for (int part = 0; part < 8; ++part) {
-    map piece = carried(echo, c, m, part);
     uint32_t share = (uint32_t)(c->bits >> 32) + (uint32_t)part, from = share % shares * each;
     lumen in[MOST_VESSELS];
     int lumens = 0;
     for (uint32_t k = 0; k < c->near_count; ++k)
       if (find_lumen(echo, c, k, part, &in[lumens])) ++lumens;
     if (lumens > 0)
-      lay_outside(echo, &piece, in, lumens, from);
+      lay_outside(echo, &piece[part], in, lumens, from);
     else
-      sonde_echo_lay(echo, &piece, &echo->loose, from, each);
+      sonde_echo_lay(echo, &piece[part], &echo->loose, from, each);
   }
 }
 
@@ -294,7 +308,7 @@ static void place_cell(sonde_echo *echo, const int32_t cell[3], sonde_vec3 guess
     place_pieces(echo, &c, &m);
     return;
   }
-  map whole = carried(echo, &c, &m, -1);
+  map whole = carried(echo, &c, &m);
   for (int k = 0; k < 3; ++k) // mirrored patterns look new
     if (c.bits >> (61 + k) & 1) whole.axis[k] = v_neg(whole.axis[k]);
   uint32_t patterns = SONDE_POOL / echo->per_cell;
