@@ -208,13 +208,32 @@ INLINE vf pixel_of(const convert_job *job, vf x) {
   return only(in, p + b * (r - p) + 0.5f);
 }
 
+// base[index] for indices below W: a permutation is quicker than a gather.
+INLINE vf look_up(const float *base, vi index) {
+#if defined(__AVX512F__)
+  return (vf)_mm512_permutexvar_ps((__m512i)index, (__m512)load(base));
+#elif defined(__AVX2__)
+  return (vf)_mm256_permutevar8x32_ps((__m256)load(base), (__m256i)index);
+#else
+  return gather(base, index);
+#endif
+}
+
 // One depth for the whole row of pixels: first between samples, then between lines.
-INLINE vf pixel_between(const convert_job *job, const float *mixed, vf x) {
+INLINE vf pixel_between(const convert_job *job, const float *mixed, bool close, vf x) {
   vf line = x * job->lines_per_m + job->first_line;
   vi in = (line >= 0) & (line < (float)(job->lines - 1));
+  if (!any(in)) return all(0);
   line = only(in, line);
   vi l = whole(line);
-  vf a = line - real(l), p = gather(mixed, l), q = gather(mixed, l + 1);
+  vf a = line - real(l), p, q;
+  if (close) {
+    const int32_t from = in[0] ? l[0] : 0;
+    const vi at = in & (l - from);
+    p = look_up(mixed + from, at), q = look_up(mixed + from + 1, at);
+  } else {
+    p = gather(mixed, l), q = gather(mixed, l + 1);
+  }
   return only(in, p + a * (q - p) + 0.5f);
 }
 
@@ -227,20 +246,23 @@ INLINE void mix_samples(const convert_job *job, float *mixed) {
     vf p = load(top + l);
     store(mixed + l, p + b * (load(low + l) - p));
   }
+  store(mixed + job->stride, all(0)); // read beside the last line, not used
 }
 
 static void convert(const convert_job *job) {
   SONDE_ASSERT(job->lines_per_m > 0 && job->stride <= SONDE_MOST_LINES);
-  float ramp[W], mixed[SONDE_MOST_LINES + 1] = {0};
+  float ramp[W], mixed[SONDE_MOST_LINES + W + 1];
   for (int k = 0; k < W; ++k) ramp[k] = (float)k;
-  bool flat = !(job->radius_m > 0);
+  const bool flat = !(job->radius_m > 0), close = (W - 1) * job->dx * job->lines_per_m < W - 2;
   if (flat) mix_samples(job, mixed);
   for (uint32_t c = 0; c < job->width; c += W) {
     vf x = job->x + ((float)c + load(ramp)) * job->dx;
-    vi grey = whole(flat ? pixel_between(job, mixed, x) : pixel_of(job, x));
-    size_t left = job->width - c < W ? job->width - c : W;
+    vi grey = whole(flat ? pixel_between(job, mixed, close, x) : pixel_of(job, x));
     vb bytes = __builtin_convertvector(grey, vb);
-    memcpy(job->out + c, &bytes, left);
+    if (c + W <= job->width)
+      memcpy(job->out + c, &bytes, W);
+    else
+      memcpy(job->out + c, &bytes, job->width - c);
   }
 }
 
