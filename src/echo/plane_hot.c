@@ -4,8 +4,10 @@
 // sonde_echo_frame, sonde_echo_geometry, sonde_echo_key  constants of a frame, its beam
 // sonde_echo_prepare, begin_spare, take_beam  the beam of new settings, built beside the one in use
 // sonde_echo_place, sonde_echo_unplace  image coordinates of a flat or curved face
-// sonde_echo_plane   all nodes, each inverted from the guess that the node above it gives
+// sonde_echo_plane   all nodes
 // place_node         rest point, and where a step beside the plane leads
+// find_rest, find_first  the rest point from what the rows above give
+// steps_at           derivative at a node
 // choose_view, in_view  branches and lesions near the plane
 // store_node, store_vessel, store_lesions  fields of one node
 // sonde_echo_pathology, sonde_echo_solid  what a vessel holds
@@ -15,12 +17,13 @@
 
 #include <string.h>
 
-enum { FIRST_ITERATIONS = 24, ITERATIONS = 8 };
+enum { FIRST_ITERATIONS = 24, ITERATIONS = 8, NEWTON_ITERATIONS = 4 };
 
 _Static_assert((int)SONDE_PSF_STEPS == SONDE_ECHO_PREPARE_STEPS, "steps of a beam");
 
 static const double far_away = 50; // in semi-axes
 static const double step_beside = 1e-3;
+static const double tolerance_m = 1e-7;
 static const double view_margin_m = 8e-3; // slab, a cube and the step between two stations
 
 sonde_vec3 sonde_echo_place(const frame *f, double line, double depth_m) {
@@ -212,17 +215,64 @@ static double line_of(const sonde_echo *echo, double i) {
 }
 static double depth_of(const sonde_echo *echo, double j) { return j * echo->depth_per_row; }
 
-static void place_node(sonde_echo *echo, uint32_t i, uint32_t j, sonde_vec3 local) {
+// Rest steps per column, per metre beside the plane and per row: from the neighbours, of the rows
+// up to `last`, and the step beside.
+static sonde_mat3 steps_at(const sonde_echo *echo, uint32_t i, uint32_t j, uint32_t last) {
+  const uint32_t wide = SONDE_PLANE_COLUMNS;
+  const plane_node *node = &echo->node[j * wide + i];
+  uint32_t left = i > 0 ? 1 : 0, right = i + 1 < wide ? 1 : 0;
+  uint32_t up = j > 0 ? 1 : 0, down = j < last ? 1 : 0;
+  sonde_vec3 a = v_scale(v_sub(node[right].rest, (node - left)->rest), 1.0 / (left + right));
+  sonde_vec3 b =
+      v_scale(v_sub(node[down * wide].rest, (node - up * wide)->rest), 1.0 / (up + down));
+  sonde_vec3 beside = q_rotate(echo->frame.probe.rotation, vec3(0, 1, 0));
+  double y = fabs(node->side.y) > 0.2 ? node->side.y : 0.2;
+  sonde_vec3 c = v_scale(v_madd(v_madd(beside, -node->side.x, a), -node->side.z, b), 1 / y);
+  return m_columns(a, c, b);
+}
+
+// Two rows above give a first guess and the derivative that turns a miss into a correction. Where
+// that does not lead to the point, the plain iteration goes on from the best so far.
+static sonde_vec3 find_rest(const sonde_echo *echo, uint32_t i, uint32_t j, sonde_vec3 local,
+                            sonde_vec3 point) {
   const frame *f = &echo->frame;
-  plane_node *node = &echo->node[j * SONDE_PLANE_COLUMNS + i];
-  sonde_vec3 point = pose_apply(f->probe, local), guess = point;
+  const plane_node *above = &echo->node[(j - 1) * SONDE_PLANE_COLUMNS + i];
+  sonde_mat3 steps = steps_at(echo, i, j - 1, j - 1);
+  sonde_vec3 best = v_add(above->rest, v_sub(above->rest, (above - SONDE_PLANE_COLUMNS)->rest));
+  sonde_vec3 q = best, from = sonde_echo_unplace(f, local);
+  double least = INFINITY;
+  for (int k = 0; k < NEWTON_ITERATIONS; ++k) {
+    sonde_vec3 miss = v_sub(v_add(q, sonde_interior_field(echo->interior, q)), point);
+    double size = v_norm(miss);
+    if (!(size < least)) break;
+    least = size, best = q;
+    if (size < tolerance_m) return best;
+    sonde_vec3 at = sonde_echo_unplace(f, v_add(local, m_mul_v(f->from_world, miss)));
+    q = v_sub(q, m_mul_v(steps, vec3((at.x - from.x) / echo->lines_per_column, at.y - from.y,
+                                     (at.z - from.z) / echo->depth_per_row)));
+  }
+  return sonde_interior_invert(echo->interior, point, best, ITERATIONS, NULL);
+}
+
+// The first two rows: from the point itself, and a step from the row above.
+static sonde_vec3 find_first(const sonde_echo *echo, uint32_t i, uint32_t j, sonde_vec3 local,
+                             sonde_vec3 point) {
+  const frame *f = &echo->frame;
+  sonde_vec3 guess = point;
   if (j > 0) {
     sonde_vec3 above = sonde_echo_place(f, line_of(echo, i), depth_of(echo, j - 1.0));
     sonde_vec3 step = q_rotate(f->probe.rotation, v_sub(local, above));
-    guess = v_add(node[-SONDE_PLANE_COLUMNS].rest, step);
+    guess = v_add(echo->node[(j - 1) * SONDE_PLANE_COLUMNS + i].rest, step);
   }
-  node->rest = sonde_interior_invert(echo->interior, point, guess,
-                                     j > 0 ? ITERATIONS : FIRST_ITERATIONS, NULL);
+  return sonde_interior_invert(echo->interior, point, guess, j > 0 ? ITERATIONS : FIRST_ITERATIONS,
+                               NULL);
+}
+
+static void place_node(sonde_echo *echo, uint32_t i, uint32_t j, sonde_vec3 local) {
+  const frame *f = &echo->frame;
+  plane_node *node = &echo->node[j * SONDE_PLANE_COLUMNS + i];
+  sonde_vec3 point = pose_apply(f->probe, local);
+  node->rest = j > 1 ? find_rest(echo, i, j, local, point) : find_first(echo, i, j, local, point);
   sonde_vec3 beside = v_scale(q_rotate(f->probe.rotation, vec3(0, 1, 0)), step_beside);
   sonde_vec3 here = v_sub(point, node->rest); // what the inversion converged to
   sonde_vec3 there = sonde_interior_field(echo->interior, v_add(node->rest, beside));
@@ -235,19 +285,15 @@ static void place_node(sonde_echo *echo, uint32_t i, uint32_t j, sonde_vec3 loca
   store_node(echo, j * SONDE_PLANE_COLUMNS + i, point, echo->theta_centre);
 }
 
-// Rest steps per column, per metre beside the plane and per row, from neighbouring nodes and the
-// step beside; inverted.
+static sonde_vec3 column_of(const sonde_mat3 *m, int k) {
+  return vec3(m->m[0][k], m->m[1][k], m->m[2][k]);
+}
+
+// The inverse of the steps.
 static void turn_node(sonde_echo *echo, uint32_t i, uint32_t j) {
-  const uint32_t wide = SONDE_PLANE_COLUMNS;
-  plane_node *node = &echo->node[j * wide + i];
-  uint32_t left = i > 0 ? 1 : 0, right = i + 1 < wide ? 1 : 0;
-  uint32_t up = j > 0 ? 1 : 0, down = j + 1 < SONDE_PLANE_ROWS ? 1 : 0;
-  sonde_vec3 a = v_scale(v_sub(node[right].rest, (node - left)->rest), 1.0 / (left + right));
-  sonde_vec3 b =
-      v_scale(v_sub(node[down * wide].rest, (node - up * wide)->rest), 1.0 / (up + down));
-  sonde_vec3 beside = q_rotate(echo->frame.probe.rotation, vec3(0, 1, 0));
-  double y = fabs(node->side.y) > 0.2 ? node->side.y : 0.2;
-  sonde_vec3 c = v_scale(v_madd(v_madd(beside, -node->side.x, a), -node->side.z, b), 1 / y);
+  plane_node *node = &echo->node[j * SONDE_PLANE_COLUMNS + i];
+  sonde_mat3 steps = steps_at(echo, i, j, SONDE_PLANE_ROWS - 1);
+  sonde_vec3 a = column_of(&steps, 0), c = column_of(&steps, 1), b = column_of(&steps, 2);
   node->beside = c;
   // Rows of the inverse are the crossed columns over the volume.
   sonde_vec3 bc = v_cross(c, b), ca = v_cross(b, a), ab = v_cross(a, c);
