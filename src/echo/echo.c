@@ -3,6 +3,7 @@
 // sonde_echo_settings_default, sonde_echo_settings_clamp
 // sonde_echo_create   buffers and random tables
 // sonde_echo_destroy
+// take, carve         one block of memory for what vectors read
 // fill_tables         scatterers, streamlines of the blood, noise
 // sonde_echo_flow_default, sonde_echo_set_flow, sonde_echo_set_coupling
 // sonde_echo_set_radius, sonde_echo_set_kernels
@@ -18,6 +19,7 @@ enum {
   SAMPLES = 1024,
   MOST_SAMPLES = 4096,
   MOST_PER_CELL = 4096,
+  CACHE_LINE = 64,
   STEP = 64, // scatterers of a cube come in layers of 8 x 8
 };
 
@@ -106,55 +108,65 @@ static void fill_tables(sonde_echo *echo) {
     echo->noise[i] = (float)(sonde_random_normal(echo->seed + 1, i) * sqrt(0.5));
 }
 
-static bool allocate_pool(scatter_pool *pool, size_t count) {
-  pool->x = SONDE_NEW(float, count);
-  pool->y = SONDE_NEW(float, count);
-  pool->z = SONDE_NEW(float, count);
-  pool->sign = SONDE_NEW(float, count);
-  return pool->x && pool->y && pool->z && pool->sign;
+// Whole vectors begin at whole cache lines: one that straddles two is read twice.
+static void *take(unsigned char *block, size_t *used, size_t count, size_t size) {
+  size_t at = (*used + CACHE_LINE - 1) / CACHE_LINE * CACHE_LINE;
+  *used = at + count * size;
+  return block ? block + at : NULL;
 }
 
-// Rows end with room for whole vectors that run over.
-static bool allocate(sonde_echo *echo) {
-  size_t lines = echo->padded,
+#define TAKE(pointer, count) (pointer) = take(block, &used, (count), sizeof *(pointer))
+
+static size_t carve_pool(scatter_pool *pool, unsigned char *block, size_t used, size_t count) {
+  TAKE(pool->x, count);
+  TAKE(pool->y, count);
+  TAKE(pool->z, count);
+  TAKE(pool->sign, count);
+  return used;
+}
+
+// What vectors read and write; without a block it only measures. Rows end with room for whole
+// vectors that run over.
+static size_t carve(sonde_echo *echo, unsigned char *block) {
+  size_t lines = echo->padded, image = lines * echo->samples, used = 0,
          most_lines = SONDE_FINE * lines + 2 * SONDE_MOST_TAPS + 4 * ECHO_ALIGN;
-  size_t image = lines * echo->samples, most_samples = echo->samples + 2 * SONDE_MOST_TAPS;
+  TAKE(echo->wide, 2 * lines * MOST_FIELDS);
+  TAKE(echo->row, lines * MOST_FIELDS);
+  TAKE(echo->level[0], lines * MOST_LEVELS);
+  TAKE(echo->level[1], lines * MOST_LEVELS);
+  TAKE(echo->scatter, lines);
+  TAKE(echo->loss, lines);
+  TAKE(echo->gain, lines * SONDE_MEDIUM_ROWS);
+  TAKE(echo->loss_db, lines);
+  TAKE(echo->coupling, lines);
+  TAKE(echo->grid, (2 * most_lines + 16) * (echo->samples + 2 * SONDE_MOST_TAPS));
+  for (int k = 0; k < SONDE_FINE; ++k) {
+    TAKE(echo->line_re[k], most_lines / SONDE_FINE);
+    TAKE(echo->line_im[k], most_lines / SONDE_FINE);
+  }
+  TAKE(echo->ring, lines * RING_PLANES * (2 * SONDE_MOST_TAPS + AXIAL_MOST));
+  TAKE(echo->envelope, image);
+  TAKE(echo->flat_envelope, image);
+  TAKE(echo->grey, image);
+  TAKE(echo->noise, SONDE_NOISE);
+  used = carve_pool(&echo->pool, block, used, SONDE_POOL);
+  used = carve_pool(&echo->loose, block, used, SONDE_LOOSE);
+  return carve_pool(&echo->blood, block, used, SONDE_BLOOD);
+}
+
+static bool allocate(sonde_echo *echo) {
+  echo->block = SONDE_NEW(unsigned char, carve(echo, NULL) + CACHE_LINE);
+  if (echo->block) carve(echo, echo->block + (-(uintptr_t)echo->block & (CACHE_LINE - 1)));
   echo->psf = SONDE_NEW(beam_psf, 1);
   echo->spare = SONDE_NEW(beam_psf, 1);
   echo->node = SONDE_NEW(plane_node, SONDE_PLANE_NODES);
   echo->plane = SONDE_NEW(float, SONDE_PLANE_NODES *MOST_FIELDS);
-  echo->wide = SONDE_NEW(float, 2 * lines * MOST_FIELDS);
-  echo->row = SONDE_NEW(float, lines *MOST_FIELDS);
-  echo->level[0] = SONDE_NEW(float, lines *MOST_LEVELS);
-  echo->level[1] = SONDE_NEW(float, lines *MOST_LEVELS);
-  echo->scatter = SONDE_NEW(float, lines);
-  echo->loss = SONDE_NEW(float, lines);
-  echo->gain = SONDE_NEW(float, lines *SONDE_MEDIUM_ROWS);
-  echo->loss_db = SONDE_NEW(float, lines);
-  echo->air = SONDE_NEW(uint8_t, lines);
-  echo->coupling = SONDE_NEW(float, lines);
+  echo->air = SONDE_NEW(uint8_t, echo->padded);
   echo->echoes = SONDE_NEW(specular, SONDE_MAX_ECHOES);
   echo->first_echo = SONDE_NEW(int32_t, echo->samples);
-  echo->grid = SONDE_NEW(float, (2 * most_lines + 16) * most_samples);
-  for (int k = 0; k < SONDE_FINE; ++k) {
-    echo->line_re[k] = SONDE_NEW(float, most_lines / SONDE_FINE);
-    echo->line_im[k] = SONDE_NEW(float, most_lines / SONDE_FINE);
-  }
-  echo->ring = SONDE_NEW(float, lines *RING_PLANES *(2 * SONDE_MOST_TAPS + AXIAL_MOST));
-  echo->envelope = SONDE_NEW(float, image);
-  echo->flat_envelope = SONDE_NEW(float, image);
-  echo->grey = SONDE_NEW(float, image);
-  echo->noise = SONDE_NEW(float, SONDE_NOISE);
   echo->seen = SONDE_NEW(uint64_t, (size_t)SONDE_BOX_SIDE * SONDE_BOX_SIDE * SONDE_BOX_SIDE / 64);
-  bool pools = allocate_pool(&echo->pool, SONDE_POOL);
-  pools = allocate_pool(&echo->loose, SONDE_LOOSE) && pools;
-  pools = allocate_pool(&echo->blood, SONDE_BLOOD) && pools;
-  return pools && echo->psf && echo->spare && echo->node && echo->plane && echo->wide &&
-         echo->row && echo->level[0] && echo->level[1] && echo->scatter && echo->loss &&
-         echo->gain && echo->loss_db && echo->air && echo->coupling && echo->first_echo &&
-         echo->echoes && echo->grid && echo->line_re[0] && echo->line_re[1] && echo->line_im[0] &&
-         echo->line_im[1] && echo->ring && echo->envelope && echo->flat_envelope && echo->grey &&
-         echo->noise && echo->seen;
+  return echo->block && echo->psf && echo->spare && echo->node && echo->plane && echo->air &&
+         echo->echoes && echo->first_echo && echo->seen;
 }
 
 static sonde_status check_def(const sonde_echo_def *def, sonde_error *error) {
@@ -207,15 +219,8 @@ sonde_status sonde_echo_create(const sonde_interior *interior, const sonde_echo_
 
 void sonde_echo_destroy(sonde_echo *echo) {
   if (echo == NULL) return;
-  void *parts[] = {
-      echo->psf,        echo->node,       echo->plane,      echo->wide,       echo->row,
-      echo->level[0],   echo->level[1],   echo->scatter,    echo->loss,       echo->gain,
-      echo->loss_db,    echo->air,        echo->first_echo, echo->echoes,     echo->grid,
-      echo->line_re[0], echo->line_re[1], echo->line_im[1], echo->line_im[0], echo->ring,
-      echo->noise,      echo->seen,       echo->envelope,   echo->grey,       echo->flat_envelope,
-      echo->pool.x,     echo->pool.y,     echo->pool.z,     echo->loose.x,    echo->pool.sign,
-      echo->loose.y,    echo->loose.z,    echo->loose.sign, echo->blood.x,    echo->blood.y,
-      echo->blood.z,    echo->blood.sign, echo->spare,      echo->coupling};
+  void *parts[] = {echo->block, echo->psf,        echo->spare,  echo->node, echo->plane,
+                   echo->air,   echo->first_echo, echo->echoes, echo->seen};
   for (size_t i = 0; i < SONDE_COUNT_OF(parts); ++i) sonde_free(parts[i]);
   sonde_free(echo);
 }

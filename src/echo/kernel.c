@@ -54,9 +54,9 @@ INLINE vf along(const form *f, vf x, vf y, vf z) {
 }
 
 INLINE void splat_some(const splat_job *job, bool inside) {
-  float record[4 * W];
-  shares share;
-  int32_t cell[W];
+  _Alignas(BYTES) float record[4 * W];
+  _Alignas(BYTES) shares share;
+  _Alignas(BYTES) int32_t cell[W];
   const float *px = job->x, *py = job->y, *pz = job->z, *sign = job->sign;
   float *grid = job->grid, turns = job->turns, right = job->right, bottom = job->bottom;
   const form to_line = form_of(job, 0), to_side = form_of(job, 1), to_depth = form_of(job, 2);
