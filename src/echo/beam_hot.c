@@ -2,7 +2,7 @@
 // kernels, receiver noise, time-gain compensation.
 //
 // sonde_echo_beam  all stages, row by row
-// gain_row, merge_row  one row of the field times what tissue and losses leave
+// merge_row        one row of the field times what tissue and losses leave
 // lateral_row      lateral kernels at its depth, normalised to unit speckle
 // add_specular     echoes of interfaces, carrier phase included
 // axial_rows       pulse, noise, compensation, modulus
@@ -28,34 +28,17 @@ static double field_rms(const sonde_echo *echo, double depth_m, double half_m) {
   return sqrt(density * pitch / SONDE_FINE * f->step_m * half_m * 16.0 / 15.0);
 }
 
-// Gains on and between lines; beside the outer lines those go on.
-static void gain_row(const sonde_echo *echo, uint32_t sample, float *on, float *between) {
-  const uint32_t edge = echo->pad_lines / SONDE_FINE, lines = echo->lines;
-  const uint32_t count = echo->grid_lines / SONDE_FINE;
+static void merge_row(sonde_echo *echo, uint32_t sample, bool tissue) {
   double at = ((double)sample - echo->pad_samples) / (echo->samples - 1) * (SONDE_MEDIUM_ROWS - 1);
   at = clamp(at, 0, SONDE_MEDIUM_ROWS - 1.001);
   uint32_t row = (uint32_t)at;
-  float b = (float)(at - row);
-  const float *top = echo->gain + row * echo->padded, *low = top + echo->padded;
-  for (uint32_t l = 0; l < lines; ++l) on[edge + l] = top[l] + b * (low[l] - top[l]);
-  for (uint32_t l = 0; l < edge; ++l) on[l] = on[edge];
-  for (uint32_t l = edge + lines; l < count; ++l) on[l] = on[edge + lines - 1];
-  for (uint32_t l = 0; l + 1 < count; ++l) between[l] = 0.5f * (on[l] + on[l + 1]);
-  between[count - 1] = on[count - 1];
-}
-
-static void merge_row(sonde_echo *echo, uint32_t sample, bool tissue) {
-  float gain[SONDE_FINE][SONDE_MOST_LINES + SONDE_MOST_TAPS + 2 * ECHO_ALIGN];
-  float *row = echo->grid + (size_t)sample * echo->grid_stride;
-  merge_job job = {.grid = row, .count = echo->grid_lines / SONDE_FINE};
-  SONDE_ASSERT(job.count <= SONDE_COUNT_OF(gain[0]));
-  for (int k = 0; k < SONDE_FINE; ++k) {
-    job.gain[k] = gain[k], job.re[k] = echo->line_re[k], job.im[k] = echo->line_im[k];
-    for (uint32_t l = 0; l < job.count && !tissue; ++l) gain[k][l] = 1;
-  }
-  if (tissue) gain_row(echo, sample, gain[0], gain[1]);
+  const float *top = echo->gain + (size_t)row * echo->gain_stride;
+  merge_job job = {.grid = echo->grid + (size_t)sample * echo->grid_stride,
+                   .count = echo->grid_lines / SONDE_FINE};
+  if (tissue) job.top = top, job.low = top + echo->gain_stride, job.share = (float)(at - row);
+  for (int k = 0; k < SONDE_FINE; ++k) job.re[k] = echo->line_re[k], job.im[k] = echo->line_im[k];
+  SONDE_ASSERT(job.count < echo->gain_stride);
   echo->kernels->merge(&job);
-  memset(row, 0, echo->grid_stride * sizeof *row);
 }
 
 static void lateral_row(sonde_echo *echo, uint32_t sample, bool tissue) {

@@ -136,7 +136,7 @@ static size_t carve(sonde_echo *echo, unsigned char *block) {
   TAKE(echo->level[1], lines * MOST_LEVELS);
   TAKE(echo->scatter, lines);
   TAKE(echo->loss, lines);
-  TAKE(echo->gain, lines * SONDE_MEDIUM_ROWS);
+  TAKE(echo->gain, (most_lines / SONDE_FINE + ECHO_ALIGN) * SONDE_MEDIUM_ROWS);
   TAKE(echo->loss_db, lines);
   TAKE(echo->coupling, lines);
   TAKE(echo->grid, (2 * most_lines + 16) * (echo->samples + 2 * SONDE_MOST_TAPS));

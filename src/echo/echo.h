@@ -71,7 +71,7 @@ struct sonde_echo {
   const echo_kernels *kernels;
   uint32_t lines, samples;
   uint32_t padded;                                           // lines in whole vectors
-  uint32_t grid_stride;                                      // floats per row of the grid
+  uint32_t grid_stride, gain_stride;                         // floats per row of the grid, gains
   uint32_t grid_lines, grid_samples, pad_lines, pad_samples; // lines: columns of the grid
   double density_m3, cell_m;
   uint32_t per_cell, per_piece; // scatterers of a cube and of an eighth of it
@@ -97,10 +97,11 @@ struct sonde_echo {
   float *level[2];         // [levels][padded] of this row and the last
   float *scatter;          // [padded] of this row
   float *loss;             // [padded] of this row
-  float *gain;             // [MEDIUM_ROWS][padded]
-  float *loss_db;          // [padded] accumulated
-  uint8_t *air;            // [padded]
-  float *coupling;         // [padded] share of the amplitude that passes the face, 0..1
+  float *gain; // [MEDIUM_ROWS][gain_stride] of the grid's even columns: beside the outer lines
+               // those go on
+  float *loss_db;  // [padded] accumulated
+  uint8_t *air;    // [padded]
+  float *coupling; // [padded] share of the amplitude that passes the face, 0..1
   bool some_air;
   specular *echoes; // [MAX_ECHOES]
   uint32_t echo_count;

@@ -266,16 +266,47 @@ static void convert(const convert_job *job) {
   }
 }
 
+// Numbers k, k + 4, k + 8, .. of 4 W.
+INLINE void fields(const float *p, vf out[4]) {
+#if defined(__AVX512F__)
+  const __m512i pairs = _mm512_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28, 1, 5, 9, 13, 17, 21, 25, 29);
+  const __m512i others = _mm512_add_epi32(pairs, _mm512_set1_epi32(2));
+  __m512 a = (__m512)load(p), b = (__m512)load(p + W);
+  __m512 c = (__m512)load(p + 2 * W), d = (__m512)load(p + 3 * W);
+  __m512 ab = _mm512_permutex2var_ps(a, pairs, b), cd = _mm512_permutex2var_ps(c, pairs, d);
+  out[0] = (vf)_mm512_shuffle_f32x4(ab, cd, 0x44), out[1] = (vf)_mm512_shuffle_f32x4(ab, cd, 0xee);
+  ab = _mm512_permutex2var_ps(a, others, b), cd = _mm512_permutex2var_ps(c, others, d);
+  out[2] = (vf)_mm512_shuffle_f32x4(ab, cd, 0x44), out[3] = (vf)_mm512_shuffle_f32x4(ab, cd, 0xee);
+#elif defined(__AVX2__)
+  __m256 a = (__m256)load(p), b = (__m256)load(p + W);
+  __m256 c = (__m256)load(p + 2 * W), d = (__m256)load(p + 3 * W);
+  __m256 ac = _mm256_permute2f128_ps(a, c, 0x20), AC = _mm256_permute2f128_ps(a, c, 0x31);
+  __m256 bd = _mm256_permute2f128_ps(b, d, 0x20), BD = _mm256_permute2f128_ps(b, d, 0x31);
+  __m256 lo = _mm256_unpacklo_ps(ac, bd), LO = _mm256_unpacklo_ps(AC, BD);
+  __m256 hi = _mm256_unpackhi_ps(ac, bd), HI = _mm256_unpackhi_ps(AC, BD);
+  out[0] = (vf)_mm256_unpacklo_ps(lo, LO), out[1] = (vf)_mm256_unpackhi_ps(lo, LO);
+  out[2] = (vf)_mm256_unpacklo_ps(hi, HI), out[3] = (vf)_mm256_unpackhi_ps(hi, HI);
+#else
+  v4 a = load4(p), b = load4(p + 4), c = load4(p + 8), d = load4(p + 12);
+  for (int k = 0; k < 4; ++k) out[k] = (vf){a[k], b[k], c[k], d[k]};
+#endif
+}
+
+INLINE vf gain_at(const merge_job *job, uint32_t l) {
+  vf top = load(job->top + l);
+  return top + job->share * (load(job->low + l) - top);
+}
+
 static void merge(const merge_job *job) {
   SONDE_ASSERT(job->count % ECHO_ALIGN == 0);
-  for (uint32_t l = 0; l < job->count; l += 4) {
-    const float *grid = job->grid + 4 * (size_t)l; // an even column and the odd one after it
-    v4 a = load4(grid), b = load4(grid + 4), c = load4(grid + 8), d = load4(grid + 12);
-    v4 even = load4(job->gain[0] + l), odd = load4(job->gain[1] + l);
-    const v4 re = {a[0], b[0], c[0], d[0]}, im = {a[1], b[1], c[1], d[1]};
-    const v4 odd_re = {a[2], b[2], c[2], d[2]}, odd_im = {a[3], b[3], c[3], d[3]};
-    store4(job->re[0] + l, even * re), store4(job->im[0] + l, even * im);
-    store4(job->re[1] + l, odd * odd_re), store4(job->im[1] + l, odd * odd_im);
+  for (uint32_t l = 0; l < job->count; l += W) {
+    float *grid = job->grid + 4 * (size_t)l; // an even column and the odd one after it
+    vf number[4], even = all(1), odd = all(1);
+    fields(grid, number);
+    if (job->top) even = gain_at(job, l), odd = 0.5f * (even + gain_at(job, l + 1));
+    store(job->re[0] + l, even * number[0]), store(job->im[0] + l, even * number[1]);
+    store(job->re[1] + l, odd * number[2]), store(job->im[1] + l, odd * number[3]);
+    for (uint32_t k = 0; k < 4; ++k) store(grid + k * W, all(0));
   }
 }
 

@@ -31,10 +31,12 @@ typedef struct splat_job {
   uint32_t stride;     // floats per sample
 } splat_job;
 
-// A row of the grid, times a gain, to even and odd columns.
+// A row of the grid, times a gain, to even and odd columns; leaves zeros.
 typedef struct merge_job {
-  const float *grid;
-  const float *gain[SONDE_FINE];          // [count]
+  float *grid;
+  const float *top, *low; // [count + 1] gains of even columns in the rows above and below; odd ones
+                          // take the mean of their neighbours; NULL: 1
+  float share;            // of the way from top to low
   float *re[SONDE_FINE], *im[SONDE_FINE]; // [count]
   uint32_t count;                         // pairs of columns, multiple of ECHO_ALIGN
 } merge_job;

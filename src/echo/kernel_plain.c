@@ -88,10 +88,17 @@ static void axial(const axial_job *job) {
 static void tissue(const tissue_job *job) { sonde_echo_kernels_base.tissue(job); }
 
 static void merge(const merge_job *job) {
-  for (uint32_t i = 0; i < 2 * job->count; ++i) {
-    const float *here = job->grid + 2 * (size_t)i;
-    job->re[i % 2][i / 2] = job->gain[i % 2][i / 2] * here[0];
-    job->im[i % 2][i / 2] = job->gain[i % 2][i / 2] * here[1];
+  for (uint32_t i = 0; i < SONDE_FINE * job->count; ++i) {
+    float *here = job->grid + 2 * (size_t)i, gain = 1;
+    uint32_t l = i / 2;
+    if (job->top) {
+      float even = job->top[l] + job->share * (job->low[l] - job->top[l]);
+      float next = job->top[l + 1] + job->share * (job->low[l + 1] - job->top[l + 1]);
+      gain = i % 2 ? 0.5f * (even + next) : even;
+    }
+    job->re[i % 2][l] = gain * here[0];
+    job->im[i % 2][l] = gain * here[1];
+    here[0] = here[1] = 0;
   }
 }
 

@@ -8,6 +8,7 @@
 // cross, cross_levels  a level's zero between two rows becomes an echo
 // materials          of what is in view
 // mark_air           lines whose face does not touch the skin
+// store_gain         of a row
 // blur_loss          an aperture looks past small obstacles
 #include "base/base.h"
 #include "base/random.h"
@@ -204,6 +205,16 @@ static void blur_loss(sonde_echo *echo) {
   memcpy(loss + 1, out + 1, (last - 1) * sizeof *loss);
 }
 
+// Beside the outer lines those go on.
+static void store_gain(sonde_echo *echo, uint32_t row) {
+  float *gain = echo->gain + (size_t)row * echo->gain_stride;
+  const uint32_t first = echo->pad_lines / SONDE_FINE, last = first + echo->lines - 1;
+  SONDE_ASSERT(first + echo->padded <= echo->gain_stride);
+  echo->kernels->fade(echo->scatter, echo->loss_db, gain + first, echo->padded);
+  for (uint32_t l = 0; l < first; ++l) gain[l] = gain[first];
+  for (uint32_t l = last + 1; l < echo->gain_stride; ++l) gain[l] = gain[last];
+}
+
 static float clot_scatter(const sonde_pathology *p) {
   return 0.12f + 0.9f * (float)p->echogenicity;
 }
@@ -257,7 +268,7 @@ void sonde_echo_medium(sonde_echo *echo) {
     for (uint32_t l = 0; l < lines && echo->some_air; ++l)
       if (echo->air[l]) echo->scatter[l] = 0;
     for (uint32_t l = 0; l < lines; ++l) echo->scatter[l] *= echo->coupling[l];
-    echo->kernels->fade(echo->scatter, echo->loss_db, echo->gain + row * lines, lines);
+    store_gain(echo, row);
     for (uint32_t l = 0; l < lines; ++l) echo->loss_db[l] += echo->loss[l] * step;
   }
 }

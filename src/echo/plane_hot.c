@@ -105,6 +105,7 @@ void sonde_echo_frame(sonde_echo *echo, sonde_pose world_from_probe, double aper
   echo->grid_lines = (needed + whole - 1) / whole * whole;
   // An odd count of cache lines per row spreads the rows over the cache.
   echo->grid_stride = 2 * echo->grid_lines + 16;
+  echo->gain_stride = echo->grid_lines / SONDE_FINE + ECHO_ALIGN;
   echo->grid_samples = echo->samples + 2 * echo->pad_samples;
   f->edge_lines = (double)echo->pad_lines / SONDE_FINE;
   echo->lines_per_column = (echo->lines - 1 + 2 * f->edge_lines) / (SONDE_PLANE_COLUMNS - 1);
