@@ -22,19 +22,21 @@ INLINE void turn(vf t, vf *c, vf *s) {
             u * (-41.205783568541634f + u * (78.82674122450844f + u * -58.13524213160963f)));
 }
 
-// Shares of the samples above and below; the nearest one gets the rest: a quadratic spline.
-typedef struct shares {
+// A vector of scatterers: what each adds to its two columns, where, and the shares of the samples
+// above and below; the nearest one gets the rest: a quadratic spline.
+typedef struct parcel {
+  _Alignas(BYTES) float record[4 * W];
+  int32_t cell[W];
   float up[W], down[W];
-} shares;
+} parcel;
 
-INLINE void lay(float *grid, uint32_t stride, const float *record, const int32_t *cell,
-                const shares *share) {
+INLINE void lay(float *grid, uint32_t stride, const parcel *p) {
   for (int block = 0; block < W / 4; ++block)
     for (int k = 0; k < 4; ++k) { // lane order, see records()
       int j = 4 * block + k;
-      float *here = grid + cell[j], *above = here - stride, *below = here + stride;
-      v4 value = load4(record + 4 * (k * (W / 4) + block));
-      v4 up = share->up[j] * value, down = share->down[j] * value;
+      float *here = grid + p->cell[j], *above = here - stride, *below = here + stride;
+      v4 value = load4(p->record + 4 * (k * (W / 4) + block));
+      v4 up = p->up[j] * value, down = p->down[j] * value;
       store4(above, load4(above) + up);
       store4(here, load4(here) + (value - up - down));
       store4(below, load4(below) + down);
@@ -53,10 +55,12 @@ INLINE vf along(const form *f, vf x, vf y, vf z) {
   return f->m[0] + f->m[1] * x + f->m[2] * y + f->m[3] * z;
 }
 
+// Vectors whose arithmetic goes on before the first of them is laid: it has long chains.
+enum { BATCH = 128 / W };
+
 INLINE void splat_some(const splat_job *job, bool inside) {
-  _Alignas(BYTES) float record[4 * W];
-  _Alignas(BYTES) shares share;
-  _Alignas(BYTES) int32_t cell[W];
+  parcel batch[BATCH];
+  uint32_t kept = 0;
   const float *px = job->x, *py = job->y, *pz = job->z, *sign = job->sign;
   float *grid = job->grid, turns = job->turns, right = job->right, bottom = job->bottom;
   const form to_line = form_of(job, 0), to_side = form_of(job, 1), to_depth = form_of(job, 2);
@@ -77,11 +81,15 @@ INLINE void splat_some(const splat_job *job, bool inside) {
     turn(depth * turns, &c, &s);
     vf re = weight * c, im = weight * s, re1 = a * re, im1 = a * im;
     vi at = n * (int32_t)stride + 2 * l;
-    records(record, re - re1, im1 - im, re1, -im1);
-    memcpy(cell, &at, sizeof at);
-    store(share.up, 0.5f * up * up), store(share.down, 0.5f * down * down);
-    lay(grid, stride, record, cell, &share);
+    parcel *p = &batch[kept++];
+    records(p->record, re - re1, im1 - im, re1, -im1);
+    memcpy(p->cell, &at, sizeof at);
+    store(p->up, 0.5f * up * up), store(p->down, 0.5f * down * down);
+    if (kept < BATCH) continue;
+    for (kept = 0; kept < BATCH; ++kept) lay(grid, stride, &batch[kept]);
+    kept = 0;
   }
+  for (uint32_t k = 0; k < kept; ++k) lay(grid, stride, &batch[k]);
 }
 
 // A map whose cube lies inside the grid needs no check per scatterer.
