@@ -160,7 +160,7 @@ static bool allocate(sonde_echo *echo) {
   echo->psf = SONDE_NEW(beam_psf, 1);
   echo->spare = SONDE_NEW(beam_psf, 1);
   echo->node = SONDE_NEW(plane_node, SONDE_PLANE_NODES);
-  echo->plane = SONDE_NEW(float, SONDE_PLANE_NODES *MOST_FIELDS);
+  echo->plane = SONDE_NEW(float, SONDE_PLANE_NODES *MOST_FIELDS + 2 * ECHO_ALIGN);
   echo->air = SONDE_NEW(uint8_t, echo->padded);
   echo->echoes = SONDE_NEW(specular, SONDE_MAX_ECHOES);
   echo->first_echo = SONDE_NEW(int32_t, echo->samples);

@@ -79,7 +79,7 @@ struct sonde_echo {
   bool plain; // no texture
   frame frame;
   double theta_centre;
-  uint16_t line_column[SONDE_MOST_LINES]; // coarse column left of each line
+  int32_t line_column[SONDE_MOST_LINES];  // coarse column left of each line
   float line_share[SONDE_MOST_LINES];     // way to the next
   double lines_per_column, depth_per_row; // of the coarse plane; depth in m
   bool vessels;                           // any
@@ -91,14 +91,14 @@ struct sonde_echo {
   unsigned char *block;    // of all float buffers but the coarse plane
   beam_psf *psf, *spare;   // in use; being built or the one before
   plane_node *node;        // [PLANE_NODES]
-  float *plane;            // [MOST_FIELDS][PLANE_NODES]
+  float *plane;            // [MOST_FIELDS][PLANE_NODES] and a vector
   float *wide;             // [2][fields][padded] two coarse rows, per line
   float *row;              // [fields][padded], one row of the march
   float *level[2];         // [levels][padded] of this row and the last
   float *scatter;          // [padded] of this row
   float *loss;             // [padded] of this row
-  float *gain; // [MEDIUM_ROWS][gain_stride] of the grid's even columns: beside the outer lines
-               // those go on
+  float *gain;     // [MEDIUM_ROWS][gain_stride] of the grid's even columns: beside the outer lines
+                   // those go on
   float *loss_db;  // [padded] accumulated
   uint8_t *air;    // [padded]
   float *coupling; // [padded] share of the amplitude that passes the face, 0..1

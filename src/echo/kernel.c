@@ -1,11 +1,17 @@
 // Inner loops of the image; kernel_*_hot.c include this file once per instruction set.
 //
-// splat     scatterers through one affine map onto two columns and three samples each, carrier
-// phase included splat_some  the same, with or without checks at the grid's border lay       one
-// vector of them, in order lateral   symmetric complex kernels of rank three on one row axial real
-// kernels down the rows, noise, compensation, modulus, logarithm tissue    in kernel_tissue.h merge
-// shares of neighbouring lines add up fade      attenuation of a row convert   bilinear scan
-// conversion of one row of pixels
+// splat      scatterers through one affine map onto two columns and three samples each, carrier
+//            phase included
+// splat_some the same, with or without checks at the grid's border
+// lay        one vector of them, in order
+// stream     blood along its streamlines
+// lateral    symmetric complex kernels of rank three on one row
+// axial      real kernels down the rows, noise, compensation, modulus, logarithm
+// tissue     in kernel_tissue.h
+// merge      a row of the grid, times its gain, to even and odd columns
+// widen, mix rows of the coarse plane, per line and between two
+// fade       attenuation of a row
+// convert    bilinear scan conversion of one row of pixels
 #include "echo/kernel_vector.h"
 
 #include "base/base.h"
@@ -193,6 +199,17 @@ static void axial(const axial_job *job) {
   }
 }
 
+// base[index] for indices below W: a permutation is quicker than a gather.
+INLINE vf look_up(const float *base, vi index) {
+#if defined(__AVX512F__)
+  return (vf)_mm512_permutexvar_ps((__m512i)index, (__m512)load(base));
+#elif defined(__AVX2__)
+  return (vf)_mm256_permutevar8x32_ps((__m256)load(base), (__m256i)index);
+#else
+  return gather(base, index);
+#endif
+}
+
 // Angle of (z, x), |x| < 2 z: arctangent of less than 50 degrees.
 INLINE vf angle_of(vf x, vf z) {
   vf t = x / (z + root(x * x + z * z)), u = t * t; // half the angle
@@ -214,17 +231,6 @@ INLINE vf pixel_of(const convert_job *job, vf x) {
   vf r = gather(job->grey, at), s = gather(job->grey, at + 1);
   p = p + a * (q - p), r = r + a * (s - r);
   return only(in, p + b * (r - p) + 0.5f);
-}
-
-// base[index] for indices below W: a permutation is quicker than a gather.
-INLINE vf look_up(const float *base, vi index) {
-#if defined(__AVX512F__)
-  return (vf)_mm512_permutexvar_ps((__m512i)index, (__m512)load(base));
-#elif defined(__AVX2__)
-  return (vf)_mm256_permutevar8x32_ps((__m256)load(base), (__m256i)index);
-#else
-  return gather(base, index);
-#endif
 }
 
 // One depth for the whole row of pixels: first between samples, then between lines.
@@ -318,6 +324,30 @@ static void merge(const merge_job *job) {
   }
 }
 
+static void widen(const widen_job *job) {
+  SONDE_ASSERT(job->lines % ECHO_ALIGN == 0);
+  for (uint32_t l = 0; l < job->lines; l += W) {
+    const int32_t from = job->column[l];
+    vi column, at;
+    memcpy(&column, job->column + l, sizeof column);
+    at = column - from;
+    vf left, right;
+    if (job->column[l + W - 1] - from < W)
+      left = look_up(job->in + from, at), right = look_up(job->in + from + 1, at);
+    else
+      left = gather(job->in, column), right = gather(job->in + 1, column);
+    store(job->out + l, left + load(job->share + l) * (right - left));
+  }
+}
+
+static void mix(const float *top, const float *low, float share, float *out, uint32_t count) {
+  SONDE_ASSERT(count % ECHO_ALIGN == 0);
+  for (uint32_t i = 0; i < count; i += W) {
+    vf a = load(top + i);
+    store(out + i, a + share * (load(low + i) - a));
+  }
+}
+
 // What is left of the scattered amplitude behind the losses.
 static void fade(const float *scatter, const float *loss_db, float *gain, uint32_t lines) {
   SONDE_ASSERT(lines % ECHO_ALIGN == 0);
@@ -328,4 +358,4 @@ static void fade(const float *scatter, const float *loss_db, float *gain, uint32
 }
 
 const echo_kernels SONDE_KERNELS = {
-    SONDE_KERNELS_NAME, splat, stream, lateral, axial, tissue, merge, fade, convert};
+    SONDE_KERNELS_NAME, splat, stream, lateral, axial, tissue, merge, widen, mix, fade, convert};

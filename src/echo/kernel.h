@@ -85,6 +85,15 @@ typedef struct tissue_lesion {
   float scatter;
 } tissue_lesion;
 
+// A row of the coarse plane, per line.
+typedef struct widen_job {
+  const float *in;       // [columns], readable for a whole vector more
+  const int32_t *column; // [lines] to the left of each line, ascending
+  const float *share;    // [lines] of the way to the next
+  float *out;            // [lines]
+  uint32_t lines;        // multiple of ECHO_ALIGN
+} widen_job;
+
 // Rows of the fields of plane.h at one depth, in; tissue out.
 typedef struct tissue_job {
   const float *row;                   // [fields][lines]
@@ -120,6 +129,9 @@ typedef struct echo_kernels {
   void (*axial)(const axial_job *job);
   void (*tissue)(const tissue_job *job);
   void (*merge)(const merge_job *job);
+  void (*widen)(const widen_job *job);
+  // out = top + share (low - top); count is a multiple of ECHO_ALIGN
+  void (*mix)(const float *top, const float *low, float share, float *out, uint32_t count);
   void (*fade)(const float *scatter, const float *loss_db, float *gain, uint32_t lines);
   void (*convert)(const convert_job *job);
 } echo_kernels;

@@ -1,7 +1,7 @@
 // The inner loops without vectors and with the library's functions: what the others are tested
 // against. The tissue's row comes from the base set.
 //
-// splat, stream, lateral, axial (sample by sample), fade, convert
+// splat, stream, lateral, axial (sample by sample), merge, widen, mix, fade, convert
 #include "base/base.h"
 #include "echo/kernel.h"
 
@@ -102,6 +102,17 @@ static void merge(const merge_job *job) {
   }
 }
 
+static void widen(const widen_job *job) {
+  for (uint32_t l = 0; l < job->lines; ++l) {
+    const float *at = job->in + job->column[l];
+    job->out[l] = at[0] + job->share[l] * (at[1] - at[0]);
+  }
+}
+
+static void mix(const float *top, const float *low, float share, float *out, uint32_t count) {
+  for (uint32_t i = 0; i < count; ++i) out[i] = top[i] + share * (low[i] - top[i]);
+}
+
 static void fade(const float *scatter, const float *loss_db, float *gain, uint32_t lines) {
   for (uint32_t l = 0; l < lines; ++l)
     gain[l] = (float)((double)scatter[l] * pow(10, -fmin((double)loss_db[l], 600) / 20));
@@ -131,5 +142,5 @@ static void convert(const convert_job *job) {
   }
 }
 
-const echo_kernels sonde_echo_kernels_plain = {"plain", splat, stream, lateral, axial,
-                                               tissue,  merge, fade,   convert};
+const echo_kernels sonde_echo_kernels_plain = {"plain", splat, stream, lateral, axial,  tissue,
+                                               merge,   widen, mix,    fade,    convert};

@@ -44,7 +44,7 @@ static void place_lines(sonde_echo *echo) {
     float x =
         ((float)echo->frame.edge_lines + (float)(l < echo->lines ? l : echo->lines - 1)) * per_line;
     uint32_t i = (uint32_t)x < SONDE_PLANE_COLUMNS - 2 ? (uint32_t)x : SONDE_PLANE_COLUMNS - 2;
-    echo->line_column[l] = (uint16_t)i;
+    echo->line_column[l] = (int32_t)i;
     echo->line_share[l] = x - (float)i;
   }
 }
@@ -52,18 +52,12 @@ static void place_lines(sonde_echo *echo) {
 // A coarse row, per line.
 static void widen(sonde_echo *echo, uint32_t coarse, float *wide) {
   SONDE_ASSERT(coarse < SONDE_PLANE_ROWS);
+  widen_job job = {.column = echo->line_column, .share = echo->line_share, .lines = echo->padded};
   for (uint32_t field = 0; field < echo->fields; ++field) {
-    const float *in = echo->plane + field * SONDE_PLANE_NODES + coarse * SONDE_PLANE_COLUMNS;
-    float *out = wide + field * echo->padded;
-    for (uint32_t l = 0; l < echo->padded; ++l) {
-      const float *at = in + echo->line_column[l];
-      out[l] = at[0] + echo->line_share[l] * (at[1] - at[0]);
-    }
+    job.in = echo->plane + field * SONDE_PLANE_NODES + coarse * SONDE_PLANE_COLUMNS;
+    job.out = wide + field * echo->padded;
+    echo->kernels->widen(&job);
   }
-}
-
-static void mix_rows(const float *top, const float *low, float b, float *out, uint32_t count) {
-  for (uint32_t i = 0; i < count; ++i) out[i] = top[i] + b * (low[i] - top[i]);
 }
 
 // Fields of a row; coarse rows are widened when the march reaches them.
@@ -72,8 +66,8 @@ static void next_row(sonde_echo *echo, uint32_t row, uint32_t *reached) {
   uint32_t j = (uint32_t)y < SONDE_PLANE_ROWS - 2 ? (uint32_t)y : SONDE_PLANE_ROWS - 2;
   uint32_t size = echo->fields * echo->padded;
   for (; *reached < j + 2; ++*reached) widen(echo, *reached, echo->wide + *reached % 2 * size);
-  mix_rows(echo->wide + j % 2 * size, echo->wide + (j + 1) % 2 * size, y - (float)j, echo->row,
-           size);
+  echo->kernels->mix(echo->wide + j % 2 * size, echo->wide + (j + 1) % 2 * size, y - (float)j,
+                     echo->row, size);
 }
 
 static float knot(int32_t a, int32_t b, uint32_t salt) {
