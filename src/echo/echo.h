@@ -22,6 +22,7 @@ enum {
   SONDE_NOISE = 65536,
   SONDE_BOX_SIDE = 128, // cubes along a side of the box around the slab
   SONDE_MAX_CELLS = 12000,
+  SONDE_SLAB_ROWS = 256, // depths at which the slab's height is tabulated
 };
 
 _Static_assert((int)MOST_VESSELS == (int)SONDE_VESSELS, "vessels in view");
@@ -120,7 +121,10 @@ struct sonde_echo {
   float *noise;         // [NOISE]
   int32_t box_first[3]; // cubes of the box around the slab at rest
   uint32_t box_size[3];
-  uint64_t *seen;                   // [BOX_SIDE^3 / 64] a bit per cube of the box, x fastest
+  uint64_t *seen;                     // [BOX_SIDE^3 / 64] a bit per cube of the box, x fastest
+  double slab_m[SONDE_SLAB_ROWS + 1]; // half height, depths in even steps
+  sonde_vec3 vessel_low[MOST_VESSELS],
+      vessel_high[MOST_VESSELS];    // cubes beside that box stay whole
   uint32_t cell_count, moved, bled; // cells and scatterers of the last frame
   sonde_echo_times times;
 };

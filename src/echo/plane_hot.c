@@ -108,6 +108,12 @@ void sonde_echo_frame(sonde_echo *echo, sonde_pose world_from_probe, double aper
   echo->gain_stride = echo->grid_lines / SONDE_FINE + ECHO_ALIGN;
   echo->grid_samples = echo->samples + 2 * echo->pad_samples;
   f->edge_lines = (double)echo->pad_lines / SONDE_FINE;
+  for (int k = 0; k <= SONDE_SLAB_ROWS; ++k) {
+    int band;
+    double t = sonde_psf_band(echo->psf, f->depth_m * k / SONDE_SLAB_ROWS, &band);
+    const double *half = echo->psf->elevation_m + band;
+    echo->slab_m[k] = half[0] + t * (half[1] - half[0]);
+  }
   echo->lines_per_column = (echo->lines - 1 + 2 * f->edge_lines) / (SONDE_PLANE_COLUMNS - 1);
   echo->depth_per_row = f->depth_m / (SONDE_PLANE_ROWS - 1);
 }

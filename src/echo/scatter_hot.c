@@ -8,11 +8,11 @@
 // is left to the blood (blood_hot.c).
 //
 // sonde_echo_scatter  all cubes that the slab touches
-// visit_quad, visit   cubes along one coarse quad
+// visit_quad, visit, choose_samples  cubes along one coarse quad
 // clear_seen, find    each cube once
 // locate              image coordinates of a rest point, and the derivative there
 // cube_map            map of a cube without vessels
-// find_vessels, carry  what the vessels' walls do to it
+// bound_vessels, find_vessels, carry  what the vessels' walls do to it
 // carried, carry_pieces  its map and those of its pieces with them
 // find_lumen, in_lumen  places at rest that hold blood
 // place_cell, place_pieces  a cube, or its pieces beside a vessel
@@ -26,7 +26,9 @@
 
 enum { MOST_PIECES = 12, NEWTON = 2, MOST_PER_PIECE = 512 };
 
-static const double sampling_m = 1.1e-3; // of the slab when looking for cubes
+// Of the slab when looking for cubes. A grid meets every cube when no point is farther from it than
+// a cube's inscribed ball reaches: half the diagonal of its cells.
+static const double sampling_m = 1.1e-3; // beside the plane
 
 // ---- from rest to the image ---------------------------------------------------------------
 
@@ -120,6 +122,42 @@ sonde_vec3 sonde_echo_from_world(const sonde_echo *echo, sonde_vec3 p) {
   return vec3((at.x + f->edge_lines) / echo->lines_per_column, at.y, at.z / echo->depth_per_row);
 }
 
+static bool within(sonde_vec3 p, sonde_vec3 low, sonde_vec3 high) {
+  return p.x >= low.x && p.x <= high.x && p.y >= low.y && p.y <= high.y && p.z >= low.z &&
+         p.z <= high.z;
+}
+
+static void widen_box(sonde_vec3 *low, sonde_vec3 *high, sonde_vec3 p, double by) {
+  *low = vec3(fmin(low->x, p.x - by), fmin(low->y, p.y - by), fmin(low->z, p.z - by));
+  *high = vec3(fmax(high->x, p.x + by), fmax(high->y, p.y + by), fmax(high->z, p.z + by));
+}
+
+// Boxes of the vessels in view and what they reach, along the stretch of the leg that is visited.
+static void bound_vessels(sonde_echo *echo) {
+  const sonde_interior *interior = echo->interior;
+  double first = INFINITY, last = -INFINITY;
+  for (int k = 0; k < 8; ++k) {
+    sonde_vec3 corner = vec3(echo->box_first[0] + (k & 1 ? echo->box_size[0] : 0.0),
+                             echo->box_first[1] + (k & 2 ? echo->box_size[1] : 0.0),
+                             echo->box_first[2] + (k & 4 ? echo->box_size[2] : 0.0));
+    double s = v_dot(v_sub(v_scale(corner, echo->cell_m), interior->origin), interior->axis);
+    first = fmin(first, s), last = fmax(last, s);
+  }
+  for (uint32_t k = 0; k < echo->shown_count; ++k) {
+    const uint32_t which = echo->shown[k], count = interior->station_count[which];
+    const sonde_station *station = interior->station[which];
+    echo->vessel_low[k] = vec3(INFINITY, INFINITY, INFINITY);
+    echo->vessel_high[k] = v_neg(echo->vessel_low[k]);
+    for (uint32_t i = 0; i < count; ++i) {
+      if (i + 1 < count && station[i + 1].s_m < first) continue;
+      if (i > 0 && station[i - 1].s_m > last) break;
+      const sonde_vessel_state *v = &interior->state[which][i];
+      double reach = fmax(close_m, reach_radii * v->rest_radius_m + echo->cell_m);
+      widen_box(&echo->vessel_low[k], &echo->vessel_high[k], v->rest_centre_m, reach);
+    }
+  }
+}
+
 // Whether a cube goes in pieces depends on the tissue at rest alone: its scatterers stay the same
 // while the walls move.
 static void find_vessels(const sonde_echo *echo, cube *c) {
@@ -127,8 +165,8 @@ static void find_vessels(const sonde_echo *echo, cube *c) {
   double s = v_dot(v_sub(c->centre, interior->origin), interior->axis);
   for (uint32_t k = 0; k < echo->shown_count; ++k) {
     uint32_t which = echo->shown[k];
+    if (!within(c->centre, echo->vessel_low[k], echo->vessel_high[k])) continue;
     sonde_vessel_state *v = &c->near[c->near_count];
-    if (!sonde_vessel_reaches(interior, which, s, c->centre, fmax(close_m, echo->cell_m))) continue;
     if (!sonde_vessel_at(interior, which, s, v)) continue;
     double distance = v_distance(c->centre, v->rest_centre_m);
     double close = which < 2 ? close_m : fmin(close_m, close_radii * v->rest_radius_m);
@@ -222,10 +260,9 @@ static uint64_t cell_key(const int32_t cell[3]) {
 // ---- laying ---------------------------------------------------------------------------------
 
 double sonde_echo_elevation(const sonde_echo *echo, double depth_m) {
-  int band;
-  double t = sonde_psf_band(echo->psf, depth_m, &band);
-  const double *half = echo->psf->elevation_m + band;
-  return half[0] + t * (half[1] - half[0]);
+  double at = clamp(depth_m / echo->frame.depth_m, 0, 1) * SONDE_SLAB_ROWS;
+  uint32_t k = at < SONDE_SLAB_ROWS ? (uint32_t)at : SONDE_SLAB_ROWS - 1;
+  return echo->slab_m[k] + (at - k) * (echo->slab_m[k + 1] - echo->slab_m[k]);
 }
 
 void sonde_echo_lay(sonde_echo *echo, const map *m, const scatter_pool *pool, uint32_t from,
@@ -364,13 +401,26 @@ static void visit(sonde_echo *echo, sonde_vec3 rest, sonde_vec3 guess) {
   place_cell(echo, cell, guess);
 }
 
+// The fewest samples of a quad with these sides at rest.
+static void choose_samples(const sonde_echo *echo, double wide, double high, int *across,
+                           int *down) {
+  double most = echo->cell_m * echo->cell_m - sampling_m * sampling_m, fewest = INFINITY;
+  *across = *down = MOST_PIECES;
+  for (int a = 1; a <= MOST_PIECES; ++a) {
+    double left = most - wide * wide / (a * a);
+    if (!(left > 0) && a < MOST_PIECES) continue;
+    double d = clamp(ceil(high / sqrt(fmax(left, 1e-9))), 1, MOST_PIECES);
+    if (a * d < fewest) fewest = a * d, *across = a, *down = (int)d;
+  }
+}
+
 // As many samples as the quad's sides in rest coordinates ask for.
 static void visit_quad(sonde_echo *echo, uint32_t i, uint32_t j) {
   const plane_node *n = &echo->node[j * SONDE_PLANE_COLUMNS + i], *low = n + SONDE_PLANE_COLUMNS;
   double wide = fmax(v_distance(n[0].rest, n[1].rest), v_distance(low[0].rest, low[1].rest));
   double high = fmax(v_distance(n[0].rest, low[0].rest), v_distance(n[1].rest, low[1].rest));
-  int across = (int)clamp(ceil(wide / sampling_m), 1, MOST_PIECES);
-  int down = (int)clamp(ceil(high / sampling_m), 1, MOST_PIECES);
+  int across, down;
+  choose_samples(echo, wide, high, &across, &down);
   double half = sonde_echo_elevation(echo, (j + 0.5) * echo->depth_per_row);
   sonde_vec3 side = v_lerp(n[0].beside, low[1].beside, 0.5);
   int slices = (int)clamp(ceil(2 * half * v_norm(side) / sampling_m), 2, 4 * MOST_PIECES) + 1;
@@ -387,6 +437,7 @@ static void visit_quad(sonde_echo *echo, uint32_t i, uint32_t j) {
 void sonde_echo_scatter(sonde_echo *echo) {
   SONDE_ASSERT(echo->per_cell % ECHO_ALIGN == 0 && echo->per_cell <= SONDE_POOL);
   clear_seen(echo);
+  bound_vessels(echo);
   echo->cell_count = echo->moved = 0;
   for (uint32_t j = 0; j + 1 < SONDE_PLANE_ROWS; ++j)
     for (uint32_t i = 0; i + 1 < SONDE_PLANE_COLUMNS; ++i) visit_quad(echo, i, j);
