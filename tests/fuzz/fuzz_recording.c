@@ -11,7 +11,7 @@ static void inspect(const char *path, bool recover) {
     fuzz_check_error(status, &error);
     return;
   }
-  FUZZ_CHECK(info.version >= 3 && info.version <= 5 && (info.ended || recover));
+  FUZZ_CHECK(info.version >= 3 && info.version <= 6 && (info.ended || recover));
   FUZZ_CHECK(memchr(info.model_path, 0, sizeof info.model_path) != NULL);
   FUZZ_CHECK(memchr(info.model_name, 0, sizeof info.model_name) != NULL);
 }
