@@ -70,11 +70,14 @@ sonde_status sonde_window_create(sonde_window **window, sonde_error *error) {
   w->compliance = SONDE_NEW(double, 2 * side * side);
   w->touched = SONDE_NEW(sonde_touched, SONDE_WINDOW_TOUCHED);
   w->scratch = SONDE_NEW(double, 12 * SONDE_WINDOW_TOUCHED + 2 * side);
-  w->pressed = SONDE_NEW(float, 3 * (size_t)SONDE_WINDOW_NODES);
+  w->moved.x = w->solid.x;
+  w->moved.touched = SONDE_NEW(sonde_touched, SONDE_WINDOW_TOUCHED);
+  w->pressed.x = SONDE_NEW(float, 3 * (size_t)SONDE_WINDOW_NODES);
+  w->pressed.touched = SONDE_NEW(sonde_touched, SONDE_WINDOW_TOUCHED);
   w->stress = SONDE_NEW(sonde_mat3, w->solid.hex_count);
   w->felt = SONDE_NEW(bool, w->solid.hex_count);
-  if (!status &&
-      (!w->stress || !w->felt || !w->pressed || !w->compliance || !w->touched || !w->scratch))
+  if (!status && (!w->stress || !w->felt || !w->pressed.x || !w->pressed.touched ||
+                  !w->moved.touched || !w->compliance || !w->touched || !w->scratch))
     status = sonde_fail_memory(error);
   if (!status) {
     list_hexes(&w->solid);
@@ -92,7 +95,9 @@ void sonde_window_destroy(sonde_window *w) {
   sonde_solid_clear(&w->solid);
   sonde_free(w->compliance);
   sonde_free(w->touched);
-  sonde_free(w->pressed);
+  sonde_free(w->moved.touched);
+  sonde_free(w->pressed.x);
+  sonde_free(w->pressed.touched);
   sonde_free(w->stress);
   sonde_free(w->felt);
   sonde_free(w->scratch);
@@ -155,6 +160,7 @@ void sonde_window_begin(sonde_window *w, const sonde_interior *in, sonde_window_
   sonde_column_point at;
   w->place = place;
   w->ready = w->loaded = false;
+  w->moved.count = w->pressed.count = 0;
   memset(w->felt, 0, w->solid.hex_count * sizeof *w->felt);
   sonde_interior_column(in, place.theta, place.s, &at);
   spread_rows(w, in->s_low_m, in->s_high_m);

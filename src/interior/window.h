@@ -44,6 +44,14 @@ typedef struct sonde_touched {
   double move[3]; // leg frame
 } sonde_touched;
 
+// What a solution was found for. While a still probe asks for the same again it stays.
+typedef struct sonde_answer {
+  uint32_t count;         // 0: none yet
+  sonde_touched *touched; // [SONDE_WINDOW_TOUCHED]
+  double along[3], reaction_n;
+  float *x; // [3*unknowns] displacements
+} sonde_answer;
+
 typedef struct sonde_window {
   sonde_solid solid;
   sonde_window_place place;
@@ -56,10 +64,9 @@ typedef struct sonde_window {
   uint32_t touched_count;
   sonde_touched *touched; // [SONDE_WINDOW_TOUCHED]
   double *scratch;        // of the contact's solver
-  float *pressed;         // [3*unknowns] displacements under a unit motion
-  double reaction_n;      // along the beam, to the motion as it is
+  sonde_answer moved;     // by the motion as it is; x is the solid's
+  sonde_answer pressed;   // by a unit motion of the touched rectangle
   double stress_scale;    // contact force over the reaction to the unit motion
-  double pressed_n_m;     // that reaction
   sonde_mat3 *stress;     // [hexes] under a unit motion, where felt
   bool *felt;             // [hexes] those around the vessels
   bool loaded;

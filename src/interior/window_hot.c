@@ -4,7 +4,8 @@
 // find_cell             cell of the ring and local coordinates
 // touch                 one vertex of the skin that carries contact force
 // apply, comply         displacement of the touched points under forces on them
-// press_evenly          the response to an even press of the touched rectangle
+// sample_patch          an even press of the touched rectangle
+// respond               the response to the touched points' motion
 // solve_forces          conjugate gradients on the forces
 // sonde_window_field    trilinear in angle, row and level
 // sonde_window_stress, list_elements  nodal means within a tissue, interpolated
@@ -254,25 +255,29 @@ static void sample_patch(sonde_window *w, const sonde_interior *in, sonde_pose p
     }
 }
 
-// Solves for `move`, leaves x of the near nodes; the reaction along the beam.
-static double respond(sonde_window *w, contact *c, const double along[3], float *x) {
-  double *f = w->scratch + 2 * SIDE, reaction = 0;
-  solve_forces(w, c, f, f + 3 * c->count);
-  gather(w, f, c);
-  move_near(w, c, x);
-  for (uint32_t i = 0; i < 3 * c->count; ++i) reaction += f[i] * along[i % 3];
-  return reaction;
+static bool is_answered(const sonde_window *w, const sonde_answer *answer, const double along[3]) {
+  return answer->count == w->touched_count &&
+         memcmp(answer->along, along, sizeof answer->along) == 0 &&
+         memcmp(answer->touched, w->touched, answer->count * sizeof *w->touched) == 0;
 }
 
-// Stress per newton: the touched rectangle of the face moves as one.
-static void press_evenly(sonde_window *w, const sonde_interior *in, contact *c, sonde_pose probe,
-                         const patch *r, const double along[3]) {
-  sample_patch(w, in, probe, r, q_rotate(probe.rotation, vec3(0, 0, 1)));
+// Displacements of the whole solid for the touched points' `move`; false when they stay as they
+// are.
+static bool respond(sonde_window *w, contact *c, const double along[3], sonde_answer *answer) {
   c->count = w->touched_count;
-  w->pressed_n_m = 0;
-  if (c->count == 0) return;
+  if (is_answered(w, answer, along)) return false;
+  answer->count = c->count, answer->reaction_n = 0;
+  memcpy(answer->along, along, sizeof answer->along);
+  memcpy(answer->touched, w->touched, c->count * sizeof *w->touched);
+  if (c->count == 0) return true;
+  double *f = w->scratch + 2 * SIDE;
   list_active(w, c);
-  w->pressed_n_m = respond(w, c, along, w->pressed);
+  solve_forces(w, c, f, f + 3 * c->count);
+  gather(w, f, c);
+  move_near(w, c, answer->x);
+  sonde_fronts_recover(w->solid.fronts, answer->x);
+  for (uint32_t i = 0; i < 3 * c->count; ++i) answer->reaction_n += f[i] * along[i % 3];
+  return true;
 }
 
 // ---- reading ------------------------------------------------------------------------------
@@ -365,7 +370,7 @@ static void feel_vessels(sonde_window *w, const sonde_interior *in) {
       for (uint32_t k = 0; k < 27; ++k) {
         if (w->felt[element[k]]) continue;
         w->felt[element[k]] = true;
-        w->stress[element[k]] = sonde_solid_stress(&w->solid, w->pressed, element[k]);
+        w->stress[element[k]] = sonde_solid_stress(&w->solid, w->pressed.x, element[k]);
       }
     }
 }
@@ -378,7 +383,7 @@ bool sonde_window_stress(const sonde_window *w, double theta, double s, double r
   if (!list_elements(w, theta, s, r, element, share)) return false;
   for (uint32_t k = 0; k < 27; ++k) {
     sonde_mat3 of = w->felt[element[k]] ? w->stress[element[k]]
-                                        : sonde_solid_stress(&w->solid, w->pressed, element[k]);
+                                        : sonde_solid_stress(&w->solid, w->pressed.x, element[k]);
     *stress = m_add(*stress, m_scale(of, share[k] * w->stress_scale));
   }
   return true;
@@ -397,15 +402,11 @@ bool sonde_window_update(sonde_window *w, const sonde_interior *in,
   c.compliance = w->compliance + (size_t)SIDE * SIDE; // free once it is inverted
   patch r;
   double force = read_contact(w, in, input, beam, &r);
-  c.count = w->touched_count;
-  w->loaded = c.count > 0;
+  w->loaded = w->touched_count > 0;
   if (!w->loaded) return false;
-  list_active(w, &c);
-  w->reaction_n = respond(w, &c, along, w->solid.x);
-  press_evenly(w, in, &c, input->world_from_probe, &r, along);
-  sonde_fronts_recover(w->solid.fronts, w->solid.x);
-  if (w->pressed_n_m > 0) sonde_fronts_recover(w->solid.fronts, w->pressed);
-  w->stress_scale = w->pressed_n_m > 0 ? force / w->pressed_n_m : 0;
-  feel_vessels(w, in);
+  (void)respond(w, &c, along, &w->moved);
+  sample_patch(w, in, input->world_from_probe, &r, beam); // stress per newton: it moves as one
+  if (respond(w, &c, along, &w->pressed)) feel_vessels(w, in);
+  w->stress_scale = w->pressed.reaction_n > 0 ? force / w->pressed.reaction_n : 0;
   return true;
 }
