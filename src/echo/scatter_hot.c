@@ -75,7 +75,7 @@ static sonde_vec3 locate(const sonde_echo *echo, sonde_vec3 rest, sonde_vec3 at,
     double a = clamp(at.x, 0, SONDE_PLANE_COLUMNS - 1.0),
            b = clamp(at.z, 0, SONDE_PLANE_ROWS - 1.0);
     spot s = spot_at(echo, a, b);
-    *in = turn_at(&s);
+    *in = step + 1 < NEWTON ? s.node->in : turn_at(&s); // close enough for the first
     sonde_vec3 change = m_mul_v(*in, v_sub(rest, rest_at(&s)));
     at = vec3(a + change.x, change.y, b + change.z);
   }
@@ -392,13 +392,19 @@ static bool find(sonde_echo *echo, const int32_t cell[3]) {
   return first;
 }
 
-static void visit(sonde_echo *echo, sonde_vec3 rest, sonde_vec3 guess) {
-  double inverse = 1 / echo->cell_m;
-  const int32_t cell[3] = {below(rest.x * inverse), below(rest.y * inverse),
-                           below(rest.z * inverse)};
-  if (!find(echo, cell) || echo->cell_count >= SONDE_MAX_CELLS) return;
-  ++echo->cell_count;
-  place_cell(echo, cell, guess);
+// Samples `first`, `first` + `step`, .. beside the plane, in cubes.
+static void visit(sonde_echo *echo, sonde_vec3 first, sonde_vec3 step, int count,
+                  sonde_vec3 guess) {
+  int32_t last[3] = {INT32_MIN, 0, 0};
+  for (int k = 0; k < count; ++k) {
+    const int32_t cell[3] = {below(first.x + k * step.x), below(first.y + k * step.y),
+                             below(first.z + k * step.z)};
+    if (cell[0] == last[0] && cell[1] == last[1] && cell[2] == last[2]) continue;
+    memcpy(last, cell, sizeof last);
+    if (!find(echo, cell) || echo->cell_count >= SONDE_MAX_CELLS) continue;
+    ++echo->cell_count;
+    place_cell(echo, cell, guess);
+  }
 }
 
 // The fewest samples of a quad with these sides at rest.
@@ -422,6 +428,7 @@ static void visit_quad(sonde_echo *echo, uint32_t i, uint32_t j) {
   int across, down;
   choose_samples(echo, wide, high, &across, &down);
   double half = sonde_echo_elevation(echo, (j + 0.5) * echo->depth_per_row);
+  double inverse = 1 / echo->cell_m;
   sonde_vec3 side = v_lerp(n[0].beside, low[1].beside, 0.5);
   int slices = (int)clamp(ceil(2 * half * v_norm(side) / sampling_m), 2, 4 * MOST_PIECES) + 1;
   for (int jj = 0; jj < down; ++jj)
@@ -429,8 +436,9 @@ static void visit_quad(sonde_echo *echo, uint32_t i, uint32_t j) {
       double a = (ii + 0.5) / across, b = (jj + 0.5) / down;
       sonde_vec3 rest =
           v_lerp(v_lerp(n[0].rest, n[1].rest, a), v_lerp(low[0].rest, low[1].rest, a), b);
-      sonde_vec3 first = v_madd(rest, -half, side), step = v_scale(side, 2 * half / (slices - 1));
-      for (int k = 0; k < slices; ++k) visit(echo, v_madd(first, k, step), vec3(i + a, 0, j + b));
+      sonde_vec3 first = v_scale(v_madd(rest, -half, side), inverse);
+      visit(echo, first, v_scale(side, 2 * half * inverse / (slices - 1)), slices,
+            vec3(i + a, 0, j + b));
     }
 }
 
