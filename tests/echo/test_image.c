@@ -1,6 +1,7 @@
 // The picture: speckle statistics, attenuation, contrast, shadow, motion with the tissue, air,
 // determinism, PNG.
 #include "echo/bench.h"
+#include "echo/echo.h"
 #include "sanitized.h"
 
 #include <png.h>
@@ -196,6 +197,37 @@ static void tracked_motion_is_the_field(void **state) {
   bench_clear(&b);
 }
 
+// Every node of the coarse plane lies where the field takes its place at rest.
+static void the_plane_is_inverted(void **state) {
+  (void)state;
+  bench b;
+  bench_create(&b, leg_radius, 0.012, 0.012, true, true);
+  uint32_t n = b.leg.model.surface.vertex_count;
+  sonde_vec3 *now = SONDE_NEW(sonde_vec3, n);
+  for (uint32_t i = 0; i < n; ++i) { // as steep as a hard press
+    sonde_vec3 v = b.leg.model.surface.vertices[i];
+    double away = (v.x * v.x + (v.z - 0.15) * (v.z - 0.15)) / (0.025 * 0.025);
+    now[i] = v_madd(v, v.y > 0 ? -12e-3 * exp(-away) : 0, vec3(0, 1, 0));
+  }
+  for (int curved = 0; curved < 2; ++curved) {
+    double worst = 0;
+    assert_int_equal(sonde_echo_set_radius(b.echo, curved ? 0.05 : 0, NULL), SONDE_OK);
+    b.pose = tube_pose(leg_radius - 12e-3, 0.15);
+    look(&b, now);
+    for (uint32_t k = 0; k < SONDE_PLANE_NODES; ++k) {
+      const plane_node *node = &b.echo->node[k];
+      uint32_t i = k % SONDE_PLANE_COLUMNS, j = k / SONDE_PLANE_COLUMNS;
+      sonde_vec3 moved = v_add(node->rest, sonde_interior_field(b.interior, node->rest));
+      sonde_vec3 at = sonde_echo_to_world(b.echo, vec3(i, 0, j));
+      worst = fmax(worst, v_distance(moved, at));
+    }
+    print_message("%s: %.2g um off\n", curved ? "curved" : "flat", worst * 1e6);
+    assert_true(worst < 1e-6);
+  }
+  sonde_free(now);
+  bench_clear(&b);
+}
+
 static void air_stays_dark(void **state) {
   (void)state;
   bench b;
@@ -285,6 +317,7 @@ int main(void) {
       cmocka_unit_test(lumen_is_dark_bone_shadows),
       cmocka_unit_test(speckle_belongs_to_the_tissue),
       cmocka_unit_test(tracked_motion_is_the_field),
+      cmocka_unit_test(the_plane_is_inverted),
       cmocka_unit_test(air_stays_dark),
       cmocka_unit_test(dry_columns_are_dark),
       cmocka_unit_test(same_state_same_pixels_and_png),

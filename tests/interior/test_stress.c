@@ -225,6 +225,39 @@ static void walls_move_with_the_mechanics(void **state) {
   tube_clear(&t);
 }
 
+static void press_for(sonde_interior *in, const tube *t, double penetration, sonde_mat3 *stress,
+                      sonde_vec3 *moved) {
+  sonde_pathology p;
+  sonde_vec3 at = vec3(3e-3, study_radius - 20e-3, study_length / 2);
+  assert_int_equal(sonde_pathology_preset("healthy", &p, NULL), SONDE_OK);
+  study_press(in, t, penetration, 10, &p);
+  assert_true(sonde_interior_stress(in, at, stress));
+  *moved = sonde_interior_displacement(in, at);
+}
+
+// The solid keeps its last answers; what it says depends on the press alone.
+static void answers_do_not_depend_on_the_past(void **state) {
+  (void)state;
+  tube t = study_thigh(25e-3);
+  sonde_interior *in, *fresh;
+  sonde_mat3 stress[4];
+  sonde_vec3 moved[4];
+  assert_int_equal(sonde_interior_create(&t.model, &in, NULL), SONDE_OK);
+  assert_int_equal(sonde_interior_create(&t.model, &fresh, NULL), SONDE_OK);
+  press_for(in, &t, 9e-3, &stress[0], &moved[0]);
+  press_for(in, &t, 6e-3, &stress[1], &moved[1]);
+  press_for(in, &t, 6e-3, &stress[2], &moved[2]);
+  press_for(fresh, &t, 6e-3, &stress[3], &moved[3]);
+  assert_true(v_distance(moved[0], moved[1]) > 0.5e-3);
+  for (int k = 2; k < 4; ++k) {
+    assert_memory_equal(&stress[k], &stress[1], sizeof stress[1]);
+    assert_memory_equal(&moved[k], &moved[1], sizeof moved[1]);
+  }
+  sonde_interior_destroy(in);
+  sonde_interior_destroy(fresh);
+  tube_clear(&t);
+}
+
 static void pressures_follow_the_clock(void **state) {
   (void)state;
   sonde_circulation c = sonde_circulation_default();
@@ -261,9 +294,13 @@ static void pressures_follow_the_clock(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(stress_follows_the_study),   cmocka_unit_test(areas_follow_the_study),
-      cmocka_unit_test(the_solid_keeps_volume),     cmocka_unit_test(walls_move_with_the_mechanics),
+      cmocka_unit_test(stress_follows_the_study),
+      cmocka_unit_test(areas_follow_the_study),
+      cmocka_unit_test(the_solid_keeps_volume),
+      cmocka_unit_test(walls_move_with_the_mechanics),
+      cmocka_unit_test(answers_do_not_depend_on_the_past),
       cmocka_unit_test(pressures_follow_the_clock),
+
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
