@@ -1,5 +1,6 @@
 // A picture of two discs pressed with the leg: areas of vein and artery are measured in the
 // picture.
+#include "interior/interior.h"
 #include "interior/tube.h"
 #include "sonde/echo_volume.h"
 
@@ -50,6 +51,7 @@ static void update(bench *b, const char *name, double venous_mmhg, double push_n
       sonde_vec3 way = q_rotate(b->press.pose.rotation, vec3(0, 0, 1));
       if (pass == 1) b->forces[i] = under ? v_scale(way, push_n / touched) : vec3(0, 0, 0);
     }
+  b->interior->model = &b->leg.model; // the bench was returned by value
   sonde_interior_update(b->interior, &(sonde_interior_input){b->positions, b->forces, b->press.pose,
                                                              &p, -1, 1, 0.02, 5e-3});
 }
