@@ -31,7 +31,7 @@ INLINE void turn(vf t, vf *c, vf *s) {
 // A vector of scatterers: what each adds to its two columns, where, and the shares of the samples
 // above and below; the nearest one gets the rest: a quadratic spline.
 typedef struct parcel {
-  _Alignas(BYTES) float record[4 * W];
+  _Alignas(sizeof(vf)) float record[4 * W];
   int32_t cell[W];
   float up[W], down[W];
 } parcel;
