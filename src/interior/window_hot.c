@@ -261,8 +261,7 @@ static bool is_answered(const sonde_window *w, const sonde_answer *answer, const
          memcmp(answer->touched, w->touched, answer->count * sizeof *w->touched) == 0;
 }
 
-// Displacements of the whole solid for the touched points' `move`; false when they stay as they
-// are.
+// Displacements of the near nodes for the touched points' `move`; false when they stay as they are.
 static bool respond(sonde_window *w, contact *c, const double along[3], sonde_answer *answer) {
   c->count = w->touched_count;
   if (is_answered(w, answer, along)) return false;
@@ -275,7 +274,6 @@ static bool respond(sonde_window *w, contact *c, const double along[3], sonde_an
   solve_forces(w, c, f, f + 3 * c->count);
   gather(w, f, c);
   move_near(w, c, answer->x);
-  sonde_fronts_recover(w->solid.fronts, answer->x);
   for (uint32_t i = 0; i < 3 * c->count; ++i) answer->reaction_n += f[i] * along[i % 3];
   return true;
 }
@@ -404,9 +402,14 @@ bool sonde_window_update(sonde_window *w, const sonde_interior *in,
   double force = read_contact(w, in, input, beam, &r);
   w->loaded = w->touched_count > 0;
   if (!w->loaded) return false;
-  (void)respond(w, &c, along, &w->moved);
+  float *fresh[2];
+  uint32_t count = 0;
+  if (respond(w, &c, along, &w->moved)) fresh[count++] = w->moved.x;
   sample_patch(w, in, input->world_from_probe, &r, beam); // stress per newton: it moves as one
-  if (respond(w, &c, along, &w->pressed)) feel_vessels(w, in);
+  bool pressed = respond(w, &c, along, &w->pressed);
+  if (pressed && w->pressed.count > 0) fresh[count++] = w->pressed.x;
+  sonde_fronts_recover(w->solid.fronts, fresh, count); // all other nodes
+  if (pressed) feel_vessels(w, in);
   w->stress_scale = w->pressed.reaction_n > 0 ? force / w->pressed.reaction_n : 0;
   return true;
 }

@@ -336,9 +336,11 @@ static void recover_piece(const sonde_fronts *f, const sonde_piece *p, float *x)
     x[3 * (size_t)f->pieces.order[p->first + j / 3] + j % 3] = y[j];
 }
 
-void sonde_fronts_recover(const sonde_fronts *f, float *x) {
+// All solutions piece by piece: a piece of the factor comes from memory once.
+void sonde_fronts_recover(const sonde_fronts *f, float *const *x, uint32_t count) {
   SONDE_ASSERT(f != NULL && x != NULL);
-  for (uint32_t t = f->pieces.count; t-- > 0;) recover_piece(f, &f->pieces.list[t], x);
+  for (uint32_t t = f->pieces.count; t-- > 0;)
+    for (uint32_t k = 0; k < count; ++k) recover_piece(f, &f->pieces.list[t], x[k]);
 }
 
 size_t sonde_fronts_nonzeros(const sonde_fronts *f) { return f->factor_size; }

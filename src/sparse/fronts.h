@@ -46,8 +46,8 @@ const double *sonde_fronts_condensed(const sonde_fronts *fronts);
 // The inverse of that matrix, symmetric but for rounding: inverse[side*side]. False when it is not
 // positive definite. @param scratch [side*side]
 bool sonde_fronts_compliance(const sonde_fronts *fronts, double *inverse, double *scratch);
-// x[3*node_count] holds the displacements of the last nodes; fills in all others.
-void sonde_fronts_recover(const sonde_fronts *fronts, float *x);
+// Each x[k][3*node_count] holds displacements of the last nodes; fills in all others.
+void sonde_fronts_recover(const sonde_fronts *fronts, float *const *x, uint32_t count);
 
 size_t sonde_fronts_nonzeros(const sonde_fronts *fronts);
 uint64_t sonde_fronts_work(const sonde_fronts *fronts); // multiplications of one factorisation

@@ -82,7 +82,7 @@ static inline void block_solve(block *b) {
       double u = x[3 * (s->unknown[node] - first) + axis];
       b->reaction[3 * node + axis] = stiff * (b->load[3 * node + axis] - u);
     }
-  sonde_fronts_recover(s->fronts, s->x);
+  sonde_fronts_recover(s->fronts, &s->x, 1);
   sonde_free(a);
   sonde_free(x);
 }

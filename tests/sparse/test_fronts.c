@@ -136,16 +136,23 @@ static void condensed_is_the_schur_complement(void **state) {
   clear(&b);
 }
 
-// With the last nodes given, no force is left on any other.
+// With the last nodes given, no force is left on any other; two at once give what each gives alone.
 static void recovered_nodes_are_in_equilibrium(void **state) {
   (void)state;
   block b = make();
   sonde_fronts *fronts = fronts_of(&b);
   factor(fronts, &b, UINT64_MAX);
   uint32_t n = 3 * b.nodes, side = 3 * LAST;
-  float *x = SONDE_NEW(float, n);
-  for (uint32_t i = n - side; i < n; ++i) x[i] = (float)sonde_random_uniform(9, i);
-  sonde_fronts_recover(fronts, x);
+  float *x = SONDE_NEW(float, n), *other = SONDE_NEW(float, n), *again = SONDE_NEW(float, n);
+  for (uint32_t i = n - side; i < n; ++i) {
+    again[i] = x[i] = (float)sonde_random_uniform(9, i);
+    other[i] = (float)sonde_random_uniform(10, i);
+  }
+  sonde_fronts_recover(fronts, &x, 1);
+  float *const both[] = {other, again};
+  sonde_fronts_recover(fronts, both, 2);
+  assert_memory_equal(again, x, n * sizeof *x);
+  assert_memory_not_equal(other, x, n * sizeof *x);
   double *a = dense_of(&b), load = 0, left = 0;
   for (uint32_t i = 0; i < n; ++i) {
     double sum = 0;
@@ -156,6 +163,8 @@ static void recovered_nodes_are_in_equilibrium(void **state) {
   assert_true(load > 0 && left < 1e-5 * load); // single precision
   sonde_free(a);
   sonde_free(x);
+  sonde_free(other);
+  sonde_free(again);
   sonde_fronts_destroy(fronts);
   clear(&b);
 }
