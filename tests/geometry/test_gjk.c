@@ -1,4 +1,5 @@
 // Distance of convex bodies against enumeration of all features, and its cost.
+#include "../sanitized.h"
 #include "geometry/shapes.h"
 
 // ---- oracle -------------------------------------------------------------------------------
@@ -241,7 +242,7 @@ static void test_foreign_cache(void **state) {
   sonde_convex_clear(&b);
 }
 
-enum { SIZES = 6, POSES = 40 };
+enum { SIZES = 6, POSES = ROUNDS(40, 10) };
 
 // Mean cost without cache, and of following a slow motion with it.
 static void measure(const sonde_convex *body, double *cold, double *warm) {
