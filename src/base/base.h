@@ -34,6 +34,11 @@ static inline void *sonde_carve(char *base, size_t *offset, size_t count, size_t
   return place;
 }
 
+// Where such a block begins in memory that is 63 bytes longer.
+static inline char *sonde_whole_lines(void *memory) {
+  return (char *)memory + (-(uintptr_t)memory & 63);
+}
+
 // Fills error (when not NULL) and returns status: `return sonde_fail(error, SONDE_IO, "...", ...)`.
 sonde_status sonde_fail_at(sonde_error *error, sonde_status status, const char *where,
                            const char *format, ...) __attribute__((format(printf, 4, 5)));

@@ -3,7 +3,7 @@
 // sonde_echo_settings_default, sonde_echo_settings_clamp
 // sonde_echo_create   buffers and random tables
 // sonde_echo_destroy
-// take, carve         one block of memory for what vectors read
+// carve               one block of memory for what vectors read
 // fill_tables         scatterers, streamlines of the blood, noise
 // sonde_echo_flow_default, sonde_echo_set_flow, sonde_echo_set_coupling
 // sonde_echo_set_radius, sonde_echo_set_kernels
@@ -19,7 +19,6 @@ enum {
   SAMPLES = 1024,
   MOST_SAMPLES = 4096,
   MOST_PER_CELL = 4096,
-  CACHE_LINE = 64,
   STEP = 64, // scatterers of a cube come in layers of 8 x 8
 };
 
@@ -108,55 +107,48 @@ static void fill_tables(sonde_echo *echo) {
     echo->noise[i] = (float)(sonde_random_normal(echo->seed + 1, i) * sqrt(0.5));
 }
 
-// Whole vectors begin at whole cache lines: one that straddles two is read twice.
-static void *take(unsigned char *block, size_t *used, size_t count, size_t size) {
-  size_t at = (*used + CACHE_LINE - 1) / CACHE_LINE * CACHE_LINE;
-  *used = at + count * size;
-  return block ? block + at : NULL;
-}
+#define CARVE(pointer, count) ((pointer) = sonde_carve(block, &used, (count), sizeof *(pointer)))
 
-#define TAKE(pointer, count) (pointer) = take(block, &used, (count), sizeof *(pointer))
-
-static size_t carve_pool(scatter_pool *pool, unsigned char *block, size_t used, size_t count) {
-  TAKE(pool->x, count);
-  TAKE(pool->y, count);
-  TAKE(pool->z, count);
-  TAKE(pool->sign, count);
+static size_t carve_pool(scatter_pool *pool, char *block, size_t used, size_t count) {
+  CARVE(pool->x, count);
+  CARVE(pool->y, count);
+  CARVE(pool->z, count);
+  CARVE(pool->sign, count);
   return used;
 }
 
-// What vectors read and write; without a block it only measures. Rows end with room for whole
-// vectors that run over.
-static size_t carve(sonde_echo *echo, unsigned char *block) {
+// What vectors read and write; without a block it only measures. Whole vectors begin at whole cache
+// lines: one that straddles two is read twice. Rows end with room for whole vectors that run over.
+static size_t carve(sonde_echo *echo, char *block) {
   size_t lines = echo->padded, image = lines * echo->samples, used = 0,
          most_lines = SONDE_FINE * lines + 2 * SONDE_MOST_TAPS + 4 * ECHO_ALIGN;
-  TAKE(echo->wide, 2 * lines * MOST_FIELDS);
-  TAKE(echo->row, lines * MOST_FIELDS);
-  TAKE(echo->level[0], lines * MOST_LEVELS);
-  TAKE(echo->level[1], lines * MOST_LEVELS);
-  TAKE(echo->scatter, lines);
-  TAKE(echo->loss, lines);
-  TAKE(echo->gain, (most_lines / SONDE_FINE + ECHO_ALIGN) * SONDE_MEDIUM_ROWS);
-  TAKE(echo->loss_db, lines);
-  TAKE(echo->coupling, lines);
-  TAKE(echo->grid, (2 * most_lines + 16) * (echo->samples + 2 * SONDE_MOST_TAPS));
+  CARVE(echo->wide, 2 * lines * MOST_FIELDS);
+  CARVE(echo->row, lines * MOST_FIELDS);
+  CARVE(echo->level[0], lines * MOST_LEVELS);
+  CARVE(echo->level[1], lines * MOST_LEVELS);
+  CARVE(echo->scatter, lines);
+  CARVE(echo->loss, lines);
+  CARVE(echo->gain, (most_lines / SONDE_FINE + ECHO_ALIGN) * SONDE_MEDIUM_ROWS);
+  CARVE(echo->loss_db, lines);
+  CARVE(echo->coupling, lines);
+  CARVE(echo->grid, (2 * most_lines + 16) * (echo->samples + 2 * SONDE_MOST_TAPS));
   for (int k = 0; k < SONDE_FINE; ++k) {
-    TAKE(echo->line_re[k], most_lines / SONDE_FINE);
-    TAKE(echo->line_im[k], most_lines / SONDE_FINE);
+    CARVE(echo->line_re[k], most_lines / SONDE_FINE);
+    CARVE(echo->line_im[k], most_lines / SONDE_FINE);
   }
-  TAKE(echo->ring, lines * RING_PLANES * (2 * SONDE_MOST_TAPS + AXIAL_MOST));
-  TAKE(echo->envelope, image);
-  TAKE(echo->flat_envelope, image);
-  TAKE(echo->grey, image);
-  TAKE(echo->noise, SONDE_NOISE);
+  CARVE(echo->ring, lines * RING_PLANES * (2 * SONDE_MOST_TAPS + AXIAL_MOST));
+  CARVE(echo->envelope, image);
+  CARVE(echo->flat_envelope, image);
+  CARVE(echo->grey, image);
+  CARVE(echo->noise, SONDE_NOISE);
   used = carve_pool(&echo->pool, block, used, SONDE_POOL);
   used = carve_pool(&echo->loose, block, used, SONDE_LOOSE);
   return carve_pool(&echo->blood, block, used, SONDE_BLOOD);
 }
 
 static bool allocate(sonde_echo *echo) {
-  echo->block = SONDE_NEW(unsigned char, carve(echo, NULL) + CACHE_LINE);
-  if (echo->block) carve(echo, echo->block + (-(uintptr_t)echo->block & (CACHE_LINE - 1)));
+  echo->block = SONDE_NEW(char, carve(echo, NULL) + 63);
+  if (echo->block) carve(echo, sonde_whole_lines(echo->block));
   echo->psf = SONDE_NEW(beam_psf, 1);
   echo->spare = SONDE_NEW(beam_psf, 1);
   echo->node = SONDE_NEW(plane_node, SONDE_PLANE_NODES);

@@ -89,7 +89,7 @@ struct sonde_echo {
   uint32_t lesion[MOST_LESIONS]; // lesions in view
   uint32_t lesion_count;
   uint32_t fields, levels; // of the plane and of the medium
-  unsigned char *block;    // of all float buffers but the coarse plane
+  char *block;             // of all float buffers but the coarse plane
   beam_psf *psf, *spare;   // in use; being built or the one before
   plane_node *node;        // [PLANE_NODES]
   float *plane;            // [MOST_FIELDS][PLANE_NODES] and a vector

@@ -269,7 +269,7 @@ static sonde_status allocate(sonde_lanes *lanes, uint32_t faces, sonde_error *er
   size_t bytes = carve(lanes, faces, NULL);
   lanes->block = sonde_calloc(1, bytes + 63);
   if (!lanes->block) return sonde_fail_memory(error);
-  carve(lanes, faces, (char *)(((uintptr_t)lanes->block + 63) & ~(uintptr_t)63));
+  carve(lanes, faces, sonde_whole_lines(lanes->block));
   SONDE_ASSERT(((uintptr_t)lanes->slice & 63) == 0);
   return SONDE_OK;
 }
@@ -281,7 +281,7 @@ sonde_status sonde_lanes_create(const sonde_model *model, const sonde_world_def 
   uint32_t slices = (n + SONDE_LANES - 1) / SONDE_LANES;
   sonde_lanes *lanes = SONDE_NEW(sonde_lanes, 1);
   char *room = sonde_calloc(slices + 1, sizeof(sonde_slice_model));
-  sonde_slice_model *sizes = (sonde_slice_model *)(((uintptr_t)room + 63) & ~(uintptr_t)63);
+  sonde_slice_model *sizes = (void *)sonde_whole_lines(room);
   uint32_t *place = SONDE_NEW(uint32_t, faces);
   sonde_status status = lanes && room && place ? SONDE_OK : sonde_fail_memory(error);
   for (uint32_t k = 0; !status && k < faces; ++k) place[face_order[k]] = k;
