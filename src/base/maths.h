@@ -97,6 +97,10 @@ static inline sonde_mat3 m_columns(sonde_vec3 a, sonde_vec3 b, sonde_vec3 c) {
   return (sonde_mat3){{{a.x, b.x, c.x}, {a.y, b.y, c.y}, {a.z, b.z, c.z}}};
 }
 
+static inline sonde_vec3 m_column(const sonde_mat3 *a, int k) {
+  return vec3(a->m[0][k], a->m[1][k], a->m[2][k]);
+}
+
 static inline sonde_quat quat_identity(void) { return (sonde_quat){1, 0, 0, 0}; }
 static inline sonde_quat q_mul(sonde_quat a, sonde_quat b) {
   return (sonde_quat){

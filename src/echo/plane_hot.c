@@ -292,15 +292,11 @@ static void place_node(sonde_echo *echo, uint32_t i, uint32_t j, sonde_vec3 loca
   store_node(echo, j * SONDE_PLANE_COLUMNS + i, point, echo->theta_centre);
 }
 
-static sonde_vec3 column_of(const sonde_mat3 *m, int k) {
-  return vec3(m->m[0][k], m->m[1][k], m->m[2][k]);
-}
-
 // The inverse of the steps.
 static void turn_node(sonde_echo *echo, uint32_t i, uint32_t j) {
   plane_node *node = &echo->node[j * SONDE_PLANE_COLUMNS + i];
   sonde_mat3 steps = steps_at(echo, i, j, SONDE_PLANE_ROWS - 1);
-  sonde_vec3 a = column_of(&steps, 0), c = column_of(&steps, 1), b = column_of(&steps, 2);
+  sonde_vec3 a = m_column(&steps, 0), c = m_column(&steps, 1), b = m_column(&steps, 2);
   node->beside = c;
   // Rows of the inverse are the crossed columns over the volume.
   sonde_vec3 bc = v_cross(c, b), ca = v_cross(b, a), ab = v_cross(a, c);

@@ -20,7 +20,7 @@ static const double start_at = 0.5, exact = 0.05; // of the slack
 static bool place_of(const sonde_interior *in, const sonde_interior_input *input,
                      sonde_window_place *place) {
   sonde_mat3 r = q_matrix(input->world_from_probe.rotation);
-  sonde_vec3 x = vec3(r.m[0][0], r.m[1][0], r.m[2][0]), y = vec3(r.m[0][1], r.m[1][1], r.m[2][1]);
+  sonde_vec3 x = m_column(&r, 0), y = m_column(&r, 1);
   double hx = input->face_half_x_m > 0 ? input->face_half_x_m : default_half_x_m;
   double hy = input->face_half_y_m > 0 ? input->face_half_y_m : default_half_y_m;
   sonde_column_point at;

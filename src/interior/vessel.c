@@ -59,9 +59,7 @@ static double half_side(double moment, double low, double high, double face) {
 
 static load measure_load(const sonde_model *model, const sonde_interior_input *input) {
   sonde_mat3 r = q_matrix(input->world_from_probe.rotation);
-  load l = {.x = vec3(r.m[0][0], r.m[1][0], r.m[2][0]),
-            .y = vec3(r.m[0][1], r.m[1][1], r.m[2][1]),
-            .beam = vec3(r.m[0][2], r.m[1][2], r.m[2][2])};
+  load l = {.x = m_column(&r, 0), .y = m_column(&r, 1), .beam = m_column(&r, 2)};
   sums t = {.low_x = INFINITY, .high_x = -INFINITY, .low_y = INFINITY, .high_y = -INFINITY};
   double largest = 0;
   for (uint32_t i = 0; i < model->surface.vertex_count; ++i)
