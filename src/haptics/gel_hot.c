@@ -22,21 +22,18 @@ static const double reach_m = 4e-3;    // skin that far from a point of the face
 void sonde_gel_put(sonde_gel *gel, sonde_vec3 centre_m, double radius_m, double volume_m3) {
   SONDE_ASSERT(radius_m >= 0.0 && volume_m3 >= 0.0 && v_finite(centre_m));
   const sonde_model *model = gel->model;
-  uint32_t nearest = 0;
-  double area = 0.0, best = (double)INFINITY;
-  for (uint32_t i = 0; i < model->surface.vertex_count; ++i) {
-    double distance = v_distance(model->surface.vertices[i], centre_m);
-    if (distance <= radius_m) area += model->area_m2[i];
-    if (distance < best) {
-      best = distance;
-      nearest = i;
-    }
+  const sonde_vec3 *skin_m = model->surface.vertices;
+  uint32_t count = model->surface.vertex_count;
+  double area = 0.0;
+  for (uint32_t i = 0; i < count; ++i)
+    if (v_distance(skin_m[i], centre_m) <= radius_m) area += model->area_m2[i];
+  if (!(area > 0.0)) {
+    uint32_t nearest = v_nearest(skin_m, count, centre_m);
+    gel->film_m[nearest] += volume_m3 / model->area_m2[nearest];
+    return;
   }
-  bool disc = area > 0.0;
-  if (!disc) area = model->area_m2[nearest];
-  for (uint32_t i = 0; i < model->surface.vertex_count; ++i)
-    if (disc ? v_distance(model->surface.vertices[i], centre_m) <= radius_m : i == nearest)
-      gel->film_m[i] += volume_m3 / area;
+  for (uint32_t i = 0; i < count; ++i)
+    if (v_distance(skin_m[i], centre_m) <= radius_m) gel->film_m[i] += volume_m3 / area;
 }
 
 void sonde_gel_wipe(sonde_gel *gel) {
