@@ -251,15 +251,19 @@ INLINE vf pixel_between(const convert_job *job, const float *mixed, bool close, 
   return only(in, p + a * (q - p) + 0.5f);
 }
 
+static void mix(const float *top, const float *low, float share, float *out, uint32_t count) {
+  SONDE_ASSERT(count % ECHO_ALIGN == 0);
+  for (uint32_t i = 0; i < count; i += W) {
+    vf a = load(top + i);
+    store(out + i, a + share * (load(low + i) - a));
+  }
+}
+
 INLINE void mix_samples(const convert_job *job, float *mixed) {
   float sample = job->z * job->samples_per_m;
   uint32_t n = (uint32_t)sample < job->samples - 2 ? (uint32_t)sample : job->samples - 2;
-  float b = sample - (float)n;
-  const float *top = job->grey + (size_t)n * job->stride, *low = top + job->stride;
-  for (uint32_t l = 0; l < job->stride; l += W) {
-    vf p = load(top + l);
-    store(mixed + l, p + b * (load(low + l) - p));
-  }
+  const float *top = job->grey + (size_t)n * job->stride;
+  mix(top, top + job->stride, sample - (float)n, mixed, job->stride);
   store(mixed + job->stride, all(0)); // read beside the last line, not used
 }
 
@@ -337,14 +341,6 @@ static void widen(const widen_job *job) {
     else
       left = gather(job->in, column), right = gather(job->in + 1, column);
     store(job->out + l, left + load(job->share + l) * (right - left));
-  }
-}
-
-static void mix(const float *top, const float *low, float share, float *out, uint32_t count) {
-  SONDE_ASSERT(count % ECHO_ALIGN == 0);
-  for (uint32_t i = 0; i < count; i += W) {
-    vf a = load(top + i);
-    store(out + i, a + share * (load(low + i) - a));
   }
 }
 
