@@ -342,8 +342,10 @@ static bool linearise(sonde_state *state, iteration *now) {
   lanes->kernels->shear(lanes);
   bool sweep = !now->tied && !lanes->stiff;
   lanes->kernels->linearise(lanes, sweep, sums);
-  if (!now->local) now->force2 = sums[1];
-  if (now->local) lanes->reaction_n = reaction;
+  if (now->local)
+    lanes->reaction_n = reaction;
+  else
+    now->force2 = sums[1];
   double assembled = sonde_clock_now();
   bool solved = solve(state, now->tied, sweep, sums, sqrt(now->force2));
   state->times.assembly_s += assembled - start;

@@ -132,7 +132,6 @@ struct sonde_lanes {
   uint32_t press_count;
   sonde_press_tie *tie; // [4 faces]
   uint32_t tie_count;
-  bool tied;                        // this evaluation has them
   sonde_pressed_face *pressed_face; // [faces] in the order of touched_faces of the state
   sonde_face_slice *face;
   sonde_face_value *face_value;
