@@ -1,7 +1,7 @@
 /**
  * @file tissue.h
  * The thigh model (constant once built) and its file; the two-layer tissue: surface masses,
- * spring-dampers, nonlinear normal springs f(x)=x/(ax+b), a shear layer.
+ * spring-dampers, nonlinear normal springs f(x)=x/(ax+b), a shear layer, in-plane stiffness.
  *
  * Notation of the paper in brackets. Normal spring per unit area, with indentation s along the
  * inward rest normal: p(s) = k0 s/(1 - (s/xm)^n); n = 1 is the paper's eq. (1)
@@ -23,6 +23,7 @@ typedef struct sonde_surface_law {
   double edge_compression;          /**< chi in [0,1]: share of the stiffness left when shortened */
   double edge_pretension_n;         /**< T0 >= 0 */
   double tangential_stiffness_n_m3; /**< g_t per area: (I - NN^T) spring to the rest position */
+  double inplane_stiffness_n_m;     /**< K between neighbours' tangential displacements (0: none) */
   double shear_stiffness_n_m;       /**< G of the shear layer (0: none) */
   double shear_limit;               /**< slope gm of the skin at which the layer becomes rigid */
   double normal_exponent;           /**< n of the normal springs: 1 (the paper's), 2 or 3 */
@@ -30,6 +31,10 @@ typedef struct sonde_surface_law {
   double surface_density_kg_m2;     /**< lumped mass per skin area */
   double guard;                     /**< theta: straight continuation of p(s) beyond theta*xm */
 } sonde_surface_law;
+
+/** A thigh's in-plane (N/m) and tangential (N/m^3) stiffness; how chosen: docs/fit.md. */
+#define SONDE_SKIN_INPLANE_N_M 35.0
+#define SONDE_SKIN_TANGENTIAL_N_M3 1e5
 
 /** Defaults with all documented values; see docs/tissue.md. @thread any */
 SONDE_API sonde_surface_law sonde_surface_law_default(void);
@@ -102,7 +107,7 @@ typedef struct sonde_model {
   sonde_vessel vein, artery; /**< femoral vessels */
   /** NULL, or named anatomy (sonde/tissue_anatomy.h); released with the model by sonde_free. */
   struct sonde_thigh_anatomy *anatomy;
-  uint64_t checksum;         /**< of the file's content; 0 before it is saved or loaded */
+  uint64_t checksum; /**< of the file's content; 0 before it is saved or loaded */
 } sonde_model;
 
 /** What a model is built from; zero means default where a default is named. */

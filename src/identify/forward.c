@@ -136,6 +136,7 @@ void sonde_law_scale(sonde_surface_law *law, double scale) {
   law->edge_stiffness_n_m *= scale;
   law->edge_pretension_n *= scale;
   law->tangential_stiffness_n_m3 *= scale;
+  law->inplane_stiffness_n_m *= scale;
   law->shear_stiffness_n_m *= scale;
 }
 

@@ -14,7 +14,7 @@
 #include <zlib.h>
 
 #define MAGIC "SONDE-MODEL "
-enum { FORMAT_VERSION = 3, OLDEST_VERSION = 2 };
+enum { FORMAT_VERSION = 4, OLDEST_VERSION = 2 };
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the model file is little-endian");
 
@@ -154,7 +154,8 @@ static double *law_field(sonde_surface_law *law, int index, const char **name) {
                      &law->normal_damping_s,
                      &law->surface_density_kg_m2,
                      &law->guard,
-                     &law->normal_exponent};
+                     &law->normal_exponent,
+                     &law->inplane_stiffness_n_m};
   static const char *const NAME[] = {"edge_stiffness_n_m",
                                      "edge_damping_s",
                                      "edge_compression",
@@ -165,7 +166,8 @@ static double *law_field(sonde_surface_law *law, int index, const char **name) {
                                      "normal_damping_s",
                                      "surface_density_kg_m2",
                                      "guard",
-                                     "normal_exponent"};
+                                     "normal_exponent",
+                                     "inplane_stiffness_n_m"};
   if (index >= (int)SONDE_COUNT_OF(field)) return NULL;
   *name = NAME[index];
   return field[index];
@@ -393,6 +395,7 @@ static bool take_law(const reader *r, sonde_surface_law *law) {
   double *field;
   for (int k = 0; (field = law_field(law, k, &name)) != NULL; ++k) {
     const cJSON *item = cJSON_GetObjectItem(object, name);
+    if (!item && field == &law->inplane_stiffness_n_m) continue; // files before version 4 have none
     if (!cJSON_IsNumber(item)) {
       sonde_fail(r->error, SONDE_FORMAT, "%s: law.%s is missing, expected a number", r->path, name);
       return false;

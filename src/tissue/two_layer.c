@@ -2,7 +2,7 @@
 // begin_node: clears a node's sums, its indentation and rate.
 // add_edge:   surface spring-damper: force, projected stiffness, damping block.
 // face_slope: gradient of the indentation over a face.
-// sonde_tissue_face_law: G and gm of a face. add_shear: the layer of one face.
+// sonde_tissue_face_law: G and gm of a face. add_shear, add_inplane: the layers of one face.
 // add_anchor: normal spring of eq. (1), tangential spring and their dampers at one node.
 // linearise:  assembles force, K v and the matrix of the implicit step.
 #include "tissue/two_layer.h"
@@ -39,11 +39,15 @@ typedef struct evaluation {
 } evaluation;
 
 static void begin_node(const evaluation *at, uint32_t i, bool is_row) {
-  sonde_vec3 n = at->model->normal[i];
+  sonde_vec3 n = at->model->normal[i], u = v_sub(at->x[i], at->model->surface.vertices[i]);
+  double s = -v_dot(n, u), rate = -v_dot(n, at->v[i]);
   at->force[i] = at->stiffness_velocity[i] = vec3(0, 0, 0);
   at->matrix->diagonal[i] = m_zero();
-  at->node[i] = (sonde_tissue_node){v_dot(n, v_sub(at->model->surface.vertices[i], at->x[i])),
-                                    -v_dot(n, at->v[i]), 0, is_row};
+  at->node[i] = (sonde_tissue_node){.indentation_m = s,
+                                    .rate_m_s = rate,
+                                    .slide_m = v_madd(u, s, n),
+                                    .slide_m_s = v_madd(at->v[i], rate, n),
+                                    .is_row = is_row};
 }
 
 static inline void add_block(sonde_mat3 *m, const sonde_mat3 *block) {
@@ -141,28 +145,62 @@ static void add_shear(const evaluation *at, uint32_t f) {
   }
 }
 
+// m += a P Q with the projections P and Q across the unit vectors p and q.
+static void add_across(sonde_mat3 *m, double a, sonde_vec3 p, sonde_vec3 q) {
+  const double x[3] = {p.x, p.y, p.z}, y[3] = {q.x, q.y, q.z};
+  double both = v_dot(p, q);
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 3; ++c)
+      m->m[r][c] += a * ((r == c) - x[r] * x[c] - y[r] * y[c] + both * x[r] * y[c]);
+}
+
+// Energy K A |grad t|^2/2 of the tangential displacements t = (I - NN^T) u, linear over the face:
+// half the cotangent at a corner pulls the two others together.
+static void add_inplane(const evaluation *at, uint32_t f) {
+  const sonde_model *model = at->model;
+  const uint32_t *v = model->surface.faces[f];
+  for (int k = 0; k < 3; ++k) {
+    uint32_t i = v[(k + 1) % 3], j = v[(k + 2) % 3];
+    sonde_tissue_node *a = &at->node[i], *b = &at->node[j];
+    double stiffness = model->law.inplane_stiffness_n_m * model->face_half_cotangent[f][k];
+    sonde_vec3 apart = v_sub(b->slide_m, a->slide_m), leaving = v_sub(b->slide_m_s, a->slide_m_s);
+    a->pull_n = v_madd(a->pull_n, stiffness, apart);
+    b->pull_n = v_madd(b->pull_n, -stiffness, apart);
+    a->drag_n_s = v_madd(a->drag_n_s, -stiffness, leaving);
+    b->drag_n_s = v_madd(b->drag_n_s, stiffness, leaving);
+    stiffness *= at->scale.stiffness;
+    a->inplane_n_m += stiffness;
+    b->inplane_n_m += stiffness;
+    if (a->is_row || b->is_row)
+      add_across(&at->matrix->upper[model->face_edge[f][k]], -stiffness,
+                 model->normal[i < j ? i : j], model->normal[i < j ? j : i]);
+  }
+}
+
 // Normal spring p(s) A along N plus tangential spring g_t A (I - NN^T), each with its damper.
 static void add_anchor(const evaluation *at, uint32_t i) {
   const sonde_model *model = at->model;
   const sonde_surface_law *law = &model->law;
-  sonde_vec3 n = model->normal[i], v = at->v[i];
-  sonde_vec3 u = v_sub(at->x[i], model->surface.vertices[i]);
-  double s = at->node[i].indentation_m, rate = -at->node[i].rate_m_s;
+  const sonde_tissue_node *node = &at->node[i];
+  sonde_vec3 n = model->normal[i];
+  double s = node->indentation_m, rate = -node->rate_m_s;
   double area = model->area_m2[i], slope;
   double pressure = sonde_normal_pressure(law->normal_exponent, model->k0_n_m3[i], model->xm_m[i],
                                           law->guard, s, &slope);
   double normal_damper = law->normal_damping_s * model->k0_n_m3[i] * area;
   double tangent = law->tangential_stiffness_n_m3 * area;
   double tangent_damper = law->normal_damping_s * tangent;
-  sonde_vec3 u_t = v_madd(u, s, n), v_t = v_madd(v, -rate, n);
-  sonde_vec3 f = v_madd(at->force[i], pressure * area - normal_damper * rate, n);
-  at->force[i] = v_madd(v_madd(f, -tangent, u_t), -tangent_damper, v_t);
+  double push = pressure * area - normal_damper * rate - v_dot(n, node->pull_n);
+  sonde_vec3 f = v_madd(v_add(at->force[i], node->pull_n), push, n);
+  at->force[i] = v_madd(v_madd(f, -tangent, node->slide_m), -tangent_damper, node->slide_m_s);
   double normal_stiffness = slope * area;
-  at->stiffness_velocity[i] =
-      v_madd(v_madd(at->stiffness_velocity[i], tangent, v_t), normal_stiffness * rate, n);
-  double flat = at->scale.stiffness * tangent + at->scale.damping * tangent_damper;
-  double steep = at->scale.stiffness * normal_stiffness + at->scale.damping * normal_damper +
-                 at->node[i].shear_n_m;
+  double hold = normal_stiffness * rate - v_dot(n, node->drag_n_s);
+  sonde_vec3 kv = v_madd(v_add(at->stiffness_velocity[i], node->drag_n_s), hold, n);
+  at->stiffness_velocity[i] = v_madd(kv, tangent, node->slide_m_s);
+  double flat =
+      at->scale.stiffness * tangent + at->scale.damping * tangent_damper + node->inplane_n_m;
+  double steep =
+      at->scale.stiffness * normal_stiffness + at->scale.damping * normal_damper + node->shear_n_m;
   sonde_mat3 block = m_rank1(n, steep - flat, flat + at->scale.mass * model->mass_kg[i]);
   add_block(&at->matrix->diagonal[i], &block);
 }
@@ -185,8 +223,10 @@ void sonde_tissue_linearise(const sonde_model *model, const sonde_tissue_part *p
     add_edge(&at, e, model->topology.edges[e][0], model->topology.edges[e][1]);
   }
   uint32_t face_count = part ? part->face_count : model->surface.face_count;
-  if (!(model->law.shear_stiffness_n_m > 0)) face_count = 0;
-  for (uint32_t k = 0; k < face_count; ++k) add_shear(&at, part ? part->faces[k] : k);
+  for (uint32_t k = 0; k < face_count && model->law.shear_stiffness_n_m > 0; ++k)
+    add_shear(&at, part ? part->faces[k] : k);
+  for (uint32_t k = 0; k < face_count && model->law.inplane_stiffness_n_m > 0; ++k)
+    add_inplane(&at, part ? part->faces[k] : k);
   for (uint32_t r = 0; r < row_count; ++r) add_anchor(&at, rows ? rows[r] : r);
 }
 
@@ -209,6 +249,20 @@ static double shear_energy(const sonde_model *model, const sonde_vec3 *position,
   return area * sonde_shear_energy(shear_n_m, limit, g);
 }
 
+static double inplane_energy(const sonde_model *model, const sonde_vec3 *position, uint32_t f) {
+  sonde_vec3 slide[3];
+  double sum = 0;
+  for (int k = 0; k < 3; ++k) {
+    uint32_t i = model->surface.faces[f][k];
+    sonde_vec3 u = v_sub(position[i], model->surface.vertices[i]);
+    slide[k] = v_madd(u, -v_dot(model->normal[i], u), model->normal[i]);
+  }
+  for (int k = 0; k < 3; ++k)
+    sum +=
+        model->face_half_cotangent[f][k] * v_norm2(v_sub(slide[(k + 2) % 3], slide[(k + 1) % 3]));
+  return 0.5 * model->law.inplane_stiffness_n_m * sum;
+}
+
 double sonde_tissue_energy(const sonde_model *model, const sonde_vec3 *position) {
   const sonde_surface_law *law = &model->law;
   double energy = 0;
@@ -227,5 +281,7 @@ double sonde_tissue_energy(const sonde_model *model, const sonde_vec3 *position)
   }
   for (uint32_t f = 0; f < model->surface.face_count && law->shear_stiffness_n_m > 0; ++f)
     energy += shear_energy(model, position, f);
+  for (uint32_t f = 0; f < model->surface.face_count && law->inplane_stiffness_n_m > 0; ++f)
+    energy += inplane_energy(model, position, f);
   return energy;
 }

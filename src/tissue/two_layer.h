@@ -22,6 +22,9 @@ typedef struct sonde_tissue_part {
 typedef struct sonde_tissue_node {
   double indentation_m, rate_m_s; // s = N.(X - x) and its rate
   double shear_n_m;               // the shear layer's stiffness at the node, scaled
+  sonde_vec3 slide_m, slide_m_s;  // displacement and velocity less their parts along N
+  sonde_vec3 pull_n, drag_n_s;    // of the in-plane layer, before the part along N is taken out
+  double inplane_n_m;             // its stiffness at the node, scaled
   bool is_row;                    // of the evaluated part
 } sonde_tissue_node;
 
@@ -43,6 +46,11 @@ void sonde_tissue_linearise(const sonde_model *model, const sonde_tissue_part *p
 
 // G (N/m) and gm of a face: the law's times the mean share of its corners. @thread tick
 void sonde_tissue_face_law(const sonde_model *model, uint32_t f, double *shear_n_m, double *limit);
+
+// Whether a law couples neighbours over faces.
+static inline bool sonde_tissue_is_layered(const sonde_surface_law *law) {
+  return law->shear_stiffness_n_m > 0 || law->inplane_stiffness_n_m > 0;
+}
 
 // Total elastic energy of all springs (J); tests and line searches.
 double sonde_tissue_energy(const sonde_model *model, const sonde_vec3 *position);

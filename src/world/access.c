@@ -1,4 +1,5 @@
 // Reading, resetting and waking the moving state. No allocation: callable on the tick path.
+#include "tissue/two_layer.h"
 #include "world/lanes.h"
 #include "world/state.h"
 
@@ -47,9 +48,9 @@ void sonde_state_list_awake(sonde_state *state) {
     else
       add_rim(state, a ? j : i);
   }
-  // Faces are for the shear layer only.
+  // Faces are for the layers only.
   const sonde_mesh *skin = &state->model->surface;
-  uint32_t face_count = state->model->law.shear_stiffness_n_m > 0 ? skin->face_count : 0;
+  uint32_t face_count = sonde_tissue_is_layered(&state->model->law) ? skin->face_count : 0;
   for (uint32_t f = 0; f < face_count; ++f) {
     const uint32_t *v = skin->faces[f];
     state->faces[state->face_count] = f;

@@ -277,7 +277,7 @@ void sonde_faces_carry(sonde_lanes *lanes) {
     const sonde_press_tie *tie = &lanes->tie[k];
     float along[3];
     for (int c = 0; c < 3; ++c) {
-      const float *z = lanes->direction + (size_t)tie->row[c] * SONDE_DIRECTION;
+      const float *z = lanes->direction + (size_t)tie->row[c] * SONDE_QUAD;
       along[c] = tie->slope[0] * z[0] + tie->slope[1] * z[1] + tie->slope[2] * z[2];
     }
     float part[3];

@@ -69,7 +69,7 @@ static void restore_slices(sonde_state *state, const sonde_keep_parts *parts, co
   memcpy(lanes->speed2, from + parts->speed2, count * sizeof *lanes->speed2);
   memcpy(lanes->way2, from + parts->way2, count * sizeof *lanes->way2);
   memset(lanes->published, 0, count);
-  memset(lanes->direction, 0, rows * SONDE_DIRECTION * sizeof *lanes->direction);
+  sonde_lanes_still(lanes, 0, lanes->slice_count);
   for (uint32_t i = 0; i < rows; ++i) sonde_lanes_record(lanes, i);
   lanes->stale = stale;
 }

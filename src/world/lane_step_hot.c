@@ -56,10 +56,8 @@ static void list_touched(sonde_lanes *lanes) {
     take[lanes->pressed[k]] = 1;
     for (uint32_t n = 0; n < fixed->near_count; ++n) take[near[n]] = lanes->is_awake[near[n]];
   }
-  size_t size = SONDE_LANES * SONDE_DIRECTION;
   for (uint32_t s = 0; s < lanes->slice_count; ++s)
-    if (lanes->is_awake[s] && !take[s])
-      memset(lanes->direction + s * size, 0, size * sizeof *lanes->direction);
+    if (lanes->is_awake[s] && !take[s]) sonde_lanes_still(lanes, s, 1);
   list_slices(lanes, take);
 }
 
@@ -287,7 +285,7 @@ static double untied2(sonde_state *state) {
     uint32_t i = state->touched[k];
     const sonde_slice *at = &lanes->slice[i / SONDE_LANES];
     for (int c = 0; c < 3; ++c)
-      lanes->direction[(size_t)i * SONDE_DIRECTION + (size_t)c] = at->x[c][i % SONDE_LANES];
+      lanes->direction[(size_t)i * SONDE_QUAD + (size_t)c] = at->x[c][i % SONDE_LANES];
   }
   sonde_faces_carry(lanes);
   for (uint32_t k = 0; k < lanes->press_count; ++k)
@@ -380,9 +378,9 @@ static void fall_asleep(sonde_state *state, uint32_t s) {
   lanes->speed2[s] = 0;
   lanes->published[s] = 1;
   for (int c = 0; c < 3; ++c) at->v[c] = at->ve[c] = at->x[c] = (sonde_lane){0};
+  sonde_lanes_still(lanes, s, 1);
   for (uint32_t l = 0; l < lanes->model[s].used; ++l) {
     uint32_t i = s * SONDE_LANES + l;
-    memset(lanes->direction + (size_t)i * SONDE_DIRECTION, 0, SONDE_DIRECTION * sizeof(float));
     sonde_lanes_record(lanes, i);
     state->velocity[i] = vec3(0, 0, 0);
     state->position[i] = state->probed[i] =

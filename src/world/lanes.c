@@ -19,12 +19,15 @@ static size_t carve(sonde_lanes *l, uint32_t faces, char *base) {
   size_t offset = 0, rows = (size_t)l->slice_count * SONDE_LANES;
   CARVE(model, l->slice_count), CARVE(slice, l->slice_count);
   CARVE(slot, l->slot_count), CARVE(tangent, l->slot_count), CARVE(share, l->slot_count);
-  CARVE(slot_shear, l->law.shear > 0 ? l->slot_count : 0);
+  CARVE(slot_layer, l->law.layered ? l->slot_count : 0);
   CARVE(press, l->slice_count), CARVE(press_of, l->slice_count), CARVE(pressed, l->slice_count);
   // One more slice of faces stays zero: what slots without a face read.
   CARVE(face, l->face_slice_count), CARVE(face_value, l->face_slice_count + 1);
   CARVE(near, l->near_total), CARVE(face_near, l->face_total);
-  CARVE(record, rows * SONDE_RECORD), CARVE(direction, rows * SONDE_DIRECTION);
+  CARVE(record, l->law.springs ? rows * SONDE_RECORD : 0), CARVE(direction, rows * SONDE_QUAD);
+  CARVE(indentation, l->law.layered ? rows : 0);
+  CARVE(slide, l->law.layered ? rows * SONDE_QUAD : 0);
+  CARVE(layer_direction, l->law.layered ? rows * SONDE_QUAD : 0);
   CARVE(awake, l->slice_count), CARVE(faces, l->face_slice_count);
   CARVE(is_awake, l->slice_count), CARVE(calm, l->slice_count);
   CARVE(face_marked, l->face_slice_count), CARVE(is_near, l->slice_count),
@@ -56,7 +59,7 @@ static void fill_row(sonde_lanes *lanes, const sonde_model *model, uint32_t i) {
   if (l == 0) fixed->whole_count = fixed->slot_count;
   for (uint32_t k = 0; k < fixed->slot_count; ++k) {
     sonde_slot *slot = &lanes->slot[fixed->first_slot + k];
-    sonde_slot_shear *shear = &lanes->slot_shear[fixed->first_slot + k];
+    sonde_slot_layer *layer = &lanes->slot_layer[fixed->first_slot + k];
     bool used = k < valence(t, i);
     uint32_t j = used ? t->neighbour[t->start[i] + k] : i;
     sonde_vec3 d = vec3(1, 0, 0);
@@ -67,9 +70,9 @@ static void fill_row(sonde_lanes *lanes, const sonde_model *model, uint32_t i) {
       length = model->edge_rest_m[t->neighbour_edge[t->start[i] + k]];
     }
     lanes->tangent[fixed->first_slot + k].node[l] = (int32_t)j;
-    if (lanes->law.shear > 0) {
-      shear->left[l] = nothing;
-      shear->right[l] = nothing * SONDE_CORNER;
+    if (lanes->law.layered) {
+      layer->left[l] = nothing;
+      layer->right[l] = nothing * SONDE_CORNER;
     }
     slot->rest[0][l] = (float)d.x, slot->rest[1][l] = (float)d.y, slot->rest[2][l] = (float)d.z;
     slot->length[l] = (float)length;
@@ -120,12 +123,12 @@ static void fill_slice(sonde_lanes *lanes, const sonde_model *model, uint32_t s)
   }
 }
 
-static sonde_slot_shear *slot_of(sonde_lanes *lanes, const sonde_topology *t, uint32_t i,
+static sonde_slot_layer *slot_of(sonde_lanes *lanes, const sonde_topology *t, uint32_t i,
                                  uint32_t j) {
   uint32_t k = 0;
   while (k < valence(t, i) && t->neighbour[t->start[i] + k] != j) ++k;
   SONDE_ASSERT(k < valence(t, i));
-  return &lanes->slot_shear[lanes->model[i / SONDE_LANES].first_slot + k];
+  return &lanes->slot_layer[lanes->model[i / SONDE_LANES].first_slot + k];
 }
 
 static void fill_shear(sonde_face_slice *face, const sonde_model *model, uint32_t f,
@@ -149,16 +152,21 @@ static void fill_face(sonde_lanes *lanes, const sonde_model *model, uint32_t at)
     int32_t corner = (int32_t)((at / SONDE_LANES * 3 + k) * SONDE_LANES + lane);
     face->node[k][lane] = (int32_t)i;
     face->half_cotangent[k][lane] = (float)model->face_half_cotangent[f][k];
-    slot_of(lanes, &model->topology, i, next)->left[row] = corner;
-    slot_of(lanes, &model->topology, i, before)->right[row] =
-        corner * SONDE_CORNER + SONDE_CORNER_BEFORE;
+    const double *half = model->face_half_cotangent[f];
+    sonde_slot_layer *ahead = slot_of(lanes, &model->topology, i, next);
+    sonde_slot_layer *behind = slot_of(lanes, &model->topology, i, before);
+    ahead->left[row] = corner;
+    behind->right[row] = corner * SONDE_CORNER + SONDE_CORNER_BEFORE;
+    ahead->weight[row] += (float)half[(k + 2) % 3];
+    behind->weight[row] += (float)half[(k + 1) % 3];
+    lanes->model[i / SONDE_LANES].weight[row] += (float)(half[(k + 1) % 3] + half[(k + 2) % 3]);
   }
 }
 
 static void fill_faces(sonde_lanes *lanes, const sonde_model *model) {
   for (uint32_t s = 0; s < lanes->face_slice_count; ++s)
     for (int l = 0; l < SONDE_LANES; ++l) lanes->face[s].limit[l] = 1;
-  for (uint32_t k = 0; lanes->law.shear > 0 && k < model->surface.face_count; ++k)
+  for (uint32_t k = 0; lanes->law.layered && k < model->surface.face_count; ++k)
     fill_face(lanes, model, k);
 }
 
@@ -188,7 +196,12 @@ static void list_near(sonde_lanes *lanes, const sonde_model *model, const uint32
 
 static sonde_lane_law law_of(const sonde_surface_law *law, const sonde_world_def *def) {
   double h = def->dt_s;
-  return (sonde_lane_law){.edge_stiffness = (float)law->edge_stiffness_n_m,
+  bool layered = sonde_tissue_is_layered(law);
+  return (sonde_lane_law){.springs =
+                              law->edge_stiffness_n_m > 0 || law->edge_pretension_n > 0 || !layered,
+                          .layered = layered,
+                          .inplane = (float)law->inplane_stiffness_n_m,
+                          .edge_stiffness = (float)law->edge_stiffness_n_m,
                           .edge_damper = (float)(law->edge_damping_s * law->edge_stiffness_n_m),
                           .edge_compression = (float)law->edge_compression,
                           .edge_pretension = (float)law->edge_pretension_n,
@@ -205,9 +218,9 @@ static sonde_lane_law law_of(const sonde_surface_law *law, const sonde_world_def
 // springs turn under the first one's moves. The bound is mild: runs blew up from 400 on.
 static bool is_stiff(const sonde_model *model, const sonde_lane_law *law) {
   const double most = 30;
-  double mass = 0,
-         coupling = (double)law->stiffness_scale * (double)(law->edge_stiffness + law->shear) +
-                    (double)(law->damping_scale * law->edge_damper);
+  double mass = 0, coupling = (double)law->stiffness_scale *
+                                  (double)(law->edge_stiffness + law->shear + law->inplane) +
+                              (double)(law->damping_scale * law->edge_damper);
   for (uint32_t i = 0; i < model->surface.vertex_count; ++i) mass += model->mass_kg[i];
   return 2 * model->topology.edge_count * coupling > most * mass;
 }
@@ -317,14 +330,21 @@ void sonde_lanes_record(sonde_lanes *lanes, uint32_t i) {
   const sonde_slice *at = &lanes->slice[i / SONDE_LANES];
   const sonde_slice_model *fixed = &lanes->model[i / SONDE_LANES];
   uint32_t l = i % SONDE_LANES;
-  float *record = lanes->record + (size_t)i * SONDE_RECORD, normal[3];
+  float ue[3], normal[3];
   for (int c = 0; c < 3; ++c) {
-    record[c] = at->u[c][l] + lanes->law.dt * at->ve[c][l];
-    record[3 + c] = at->ve[c][l];
-    normal[c] = fixed->normal[c][l] * record[c];
+    ue[c] = at->u[c][l] + lanes->law.dt * at->ve[c][l];
+    normal[c] = fixed->normal[c][l] * ue[c];
   }
-  record[6] = -(normal[0] + normal[1] + normal[2]);
-  record[7] = 0;
+  for (int c = 0; lanes->law.springs && c < 3; ++c) {
+    lanes->record[(size_t)i * SONDE_RECORD + (size_t)c] = ue[c];
+    lanes->record[(size_t)i * SONDE_RECORD + 3 + (size_t)c] = at->ve[c][l];
+  }
+  if (!lanes->law.layered) return;
+  float indentation = -(normal[0] + normal[1] + normal[2]),
+        *slide = lanes->slide + (size_t)i * SONDE_QUAD;
+  lanes->indentation[i] = indentation;
+  for (int c = 0; c < 3; ++c) slide[c] = ue[c] + indentation * fixed->normal[c][l];
+  slide[3] = 0;
 }
 
 static void import_slice(sonde_lanes *lanes, uint32_t s, const sonde_vec3 *rest,
@@ -347,10 +367,17 @@ static void import_slice(sonde_lanes *lanes, uint32_t s, const sonde_vec3 *rest,
   }
 }
 
+void sonde_lanes_still(sonde_lanes *lanes, uint32_t first, uint32_t count) {
+  const size_t quads = SONDE_LANES * SONDE_QUAD;
+  SONDE_ASSERT(first + count <= lanes->slice_count);
+  memset(lanes->direction + first * quads, 0, count * quads * sizeof(float));
+  if (lanes->law.layered)
+    memset(lanes->layer_direction + first * quads, 0, count * quads * sizeof(float));
+}
+
 void sonde_lanes_import(sonde_lanes *lanes, const sonde_vec3 *rest, const sonde_vec3 *position,
                         const sonde_vec3 *velocity, bool awake) {
-  size_t rows = (size_t)lanes->slice_count * SONDE_LANES;
-  memset(lanes->direction, 0, rows * SONDE_DIRECTION * sizeof *lanes->direction);
+  sonde_lanes_still(lanes, 0, lanes->slice_count);
   for (uint32_t s = 0; s < lanes->slice_count; ++s) {
     import_slice(lanes, s, rest, position, velocity);
     lanes->is_awake[s] = awake;

@@ -6,7 +6,7 @@
 
 #include "sonde/world.h"
 
-enum { SONDE_LANES = 16, SONDE_RECORD = 8, SONDE_DIRECTION = 4 };
+enum { SONDE_LANES = 16, SONDE_RECORD = 8, SONDE_QUAD = 4 };
 
 typedef float sonde_lane __attribute__((vector_size(64)));
 typedef int32_t sonde_lane_index __attribute__((vector_size(64)));
@@ -17,12 +17,13 @@ typedef struct sonde_slot {
   sonde_lane length;  // at rest
 } sonde_slot;
 
-// The same slot in the shear layer.
-typedef struct sonde_slot_shear {
+// The same slot in the layers.
+typedef struct sonde_slot_layer {
   sonde_lane_index left;  // this row's corner of the face to the left of the edge
   sonde_lane_index right; // and of the face to its right: the coupling with the corner before
-  sonde_lane coupling;    // s of the block s N_i N_j^T
-} sonde_slot_shear;
+  sonde_lane coupling;    // s of the block s N_i N_j^T of the shear layer
+  sonde_lane weight;      // half the cotangents of both faces: of the in-plane layer
+} sonde_slot_layer;
 
 // The neighbour and the edge's block of the matrix, -(along n n^T + lateral I): all that a product
 // reads of a slot, in one stream.
@@ -33,6 +34,7 @@ typedef struct sonde_slot_tangent {
 
 typedef struct sonde_slice_model {
   sonde_lane normal[3], place[3], area, k0, xm, limit, mass, yield;
+  sonde_lane weight; // sum of its slots' weights
   uint32_t first_slot, slot_count;
   uint32_t whole_count;            // slots from the front whose shares are all 1
   uint32_t first_near, near_count; // slices that share an edge with this one
@@ -86,7 +88,8 @@ typedef struct sonde_pressed_face {
 typedef struct sonde_lane_law {
   float edge_stiffness, edge_damper, edge_compression, edge_pretension;
   float tangential, normal_damping_s;
-  float shear; // 0: no layer
+  float inplane, shear;  // 0: no such layer
+  bool springs, layered; // whether edges carry springs, and faces layers
   int exponent;
   float dt, stiffness_scale, damping_scale;
 } sonde_lane_law;
@@ -124,7 +127,7 @@ struct sonde_lanes {
   sonde_slice *slice;
   sonde_slot *slot;
   sonde_slot_tangent *tangent;
-  sonde_slot_shear *slot_shear; // of models with a shear layer
+  sonde_slot_layer *slot_layer; // of layered models
   sonde_lane *share;            // [slots] of a spring: 1, 0 for padding
   sonde_slice_press *press;     // of touched slices, which press_of counts from 1
   uint32_t *press_of;           // [slices] 0: not touched
@@ -136,10 +139,13 @@ struct sonde_lanes {
   sonde_face_slice *face;
   sonde_face_value *face_value;
   uint32_t *near, *face_near;
-  float *record;    // [rows][8] u + h ve, ve, indentation there of every row, for the neighbours,
-                    // and N.x of what a row moved since they looked
-  float *direction; // [rows][4] z and N.z of every row
-  uint32_t *awake, *faces; // lists of slices that take part
+  // For the neighbours, of every row where it is evaluated
+  float *record;      // [rows][8] of springs: u + h ve, ve
+  float *indentation; // [rows] of layers
+  float *slide;       // [rows][4] tangential displacement; N.x of what it moved since they looked
+  // and of the directions: z; its tangential part and N.z for layers.
+  float *direction, *layer_direction; // [rows][4]
+  uint32_t *awake, *faces;            // lists of slices that take part
   uint32_t awake_count, face_list_count;
   uint8_t *is_awake, *calm, *face_marked, *is_near;
   float *speed2;      // [slices] largest square of a node's speed
@@ -172,6 +178,8 @@ void sonde_lanes_tune(sonde_lanes *lanes, const sonde_model *tuned, const sonde_
 // Takes over displacements and velocities from doubles; wakes every slice, or none.
 void sonde_lanes_import(sonde_lanes *lanes, const sonde_vec3 *rest, const sonde_vec3 *position,
                         const sonde_vec3 *velocity, bool awake);
+// Directions of zero in `count` slices. @thread tick
+void sonde_lanes_still(sonde_lanes *lanes, uint32_t first, uint32_t count);
 // The record of one row where it is evaluated. @thread tick
 void sonde_lanes_record(sonde_lanes *lanes, uint32_t i);
 // Writes positions and velocities that are not up to date as doubles. @thread tick

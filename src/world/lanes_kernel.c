@@ -1,7 +1,8 @@
 // Kernels of the fast engine (docs/world.md); lanes_*_hot.c include this file once per instruction
 // set. Every sum has a fixed order: all sets give the same bits.
 // shear:     slopes, forces and couplings of the faces.
-// linearise: springs to the neighbours, normal and tangential springs, contact, matrix, and the
+// linearise: springs and layers to the neighbours, normal and tangential springs, contact, matrix,
+// and the
 //            first sweep: every slice is solved for itself and goes on before the next one looks;
 //            or the start of the conjugate gradients.
 // sweep:     block Gauss-Seidel: the same with what the neighbours have moved since.
@@ -15,19 +16,27 @@
 
 #include "base/base.h"
 
-// Where slice s is after a step at velocity v: displacement there, velocity, indentation; and how
-// much of the velocity along N the neighbours have not seen.
+// Where slice s is after a step at velocity v; and how much of the velocity along N the neighbours
+// have not seen.
 INLINE void publish_record(sonde_lanes *lanes, uint32_t s, const sonde_lane v[3],
                            sonde_lane unseen) {
   const sonde_slice *at = &lanes->slice[s];
-  float h = lanes->law.dt, *record = lanes->record + (size_t)s * SONDE_LANES * SONDE_RECORD;
+  const sonde_lane *n = lanes->model[s].normal;
+  size_t first = (size_t)s * SONDE_LANES;
+  float h = lanes->law.dt;
   sonde_lane ue[3];
   for (int c = 0; c < 3; ++c) ue[c] = at->u[c] + h * v[c];
-  sonde_lane indentation = -dot(lanes->model[s].normal, ue);
-  const sonde_lane low[4] = {ue[0], ue[1], ue[2], v[0]};
-  const sonde_lane high[4] = {v[1], v[2], indentation, unseen};
-  write_records(record, SONDE_RECORD, low);
-  write_records(record + 4, SONDE_RECORD, high);
+  if (lanes->law.springs) {
+    const sonde_lane low[4] = {ue[0], ue[1], ue[2], v[0]}, high[4] = {v[1], v[2], {0}, {0}};
+    write_records(lanes->record + first * SONDE_RECORD, SONDE_RECORD, low);
+    write_records(lanes->record + first * SONDE_RECORD + 4, SONDE_RECORD, high);
+  }
+  if (!lanes->law.layered) return;
+  sonde_lane indentation = -dot(n, ue), slide[4];
+  for (int c = 0; c < 3; ++c) slide[c] = ue[c] + indentation * n[c];
+  slide[3] = unseen;
+  *(sonde_lane *)(lanes->indentation + first) = indentation;
+  write_records(lanes->slide + first * SONDE_QUAD, SONDE_QUAD, slide);
 }
 
 // Secant modulus m = q/g of the shear layer and (q' - m)/g^2, without the cancellation of q' - m.
@@ -50,7 +59,7 @@ static void shear(sonde_lanes *lanes) {
     const sonde_face_slice *face = &lanes->face[lanes->faces[a]];
     sonde_face_value *value = &lanes->face_value[lanes->faces[a]];
     sonde_lane s[3], across[3], flux[3], coupling[3], sum = {0}, modulus, beyond;
-    for (int k = 0; k < 3; ++k) s[k] = gather(lanes->record + 6, face->node[k] * SONDE_RECORD);
+    for (int k = 0; k < 3; ++k) s[k] = gather(lanes->indentation, face->node[k]);
     for (int k = 0; k < 3; ++k) {
       sonde_lane d = s[(k + 1) % 3] - s[(k + 2) % 3];
       across[k] = face->half_cotangent[k] * d;
@@ -72,10 +81,16 @@ static void shear(sonde_lanes *lanes) {
   }
 }
 
+// By what neighbours are coupled.
+typedef struct coupled {
+  bool springs, layers;
+} coupled;
+
 typedef struct node_sum {
   sonde_lane force[3], block[6];    // xx xy xz yy yz zz
   sonde_lane shear_force, coupling; // along N
   sonde_lane pending;               // along N: what neighbours that went on do by the shear layer
+  sonde_lane slide[3];              // the neighbours' tangential displacements times their weights
 } node_sum;
 
 INLINE void add_rank_one(sonde_lane block[6], const sonde_lane n[3], sonde_lane scale,
@@ -97,8 +112,8 @@ typedef struct place {
 // The spring-damper of an edge, seen from the row; the neighbour finds the opposite, bit for bit.
 INLINE void add_spring(const sonde_lane_law *law, const sonde_slot *slot, sonde_lane share,
                        const float *record, const place *at, node_sum *sum,
-                       sonde_slot_tangent *tangent, sonde_lane *unseen) {
-  sonde_lane d[3], w[3], n[3], other[7];
+                       sonde_slot_tangent *tangent) {
+  sonde_lane d[3], w[3], n[3], other[6];
   read_records(record, &tangent->node, other);
   for (int c = 0; c < 3; ++c) {
     d[c] = slot->rest[c] + (other[c] - at->ue[c]);
@@ -122,19 +137,27 @@ INLINE void add_spring(const sonde_lane_law *law, const sonde_slot *slot, sonde_
   add_rank_one(sum->block, n, steep, flat);
   tangent->along = steep;
   tangent->lateral = flat;
-  *unseen = other[6];
 }
 
-// unseen: of the neighbours' records.
-INLINE void add_coupling(sonde_slot_shear *slot, const float *values, sonde_lane unseen,
-                         node_sum *sum) {
-  sonde_lane corner[4];
-  read_directions(values, &slot->left, corner);
+// Both layers of an edge.
+INLINE void add_layers(const sonde_lanes *lanes, const sonde_lane_index *node,
+                       sonde_slot_layer *slot, node_sum *sum) {
+  const float *values = (const float *)lanes->face_value;
+  sonde_lane corner[4], other[4];
+  read_quads(values, &slot->left, corner);
+  read_quads(lanes->slide, node, other);
   sonde_lane coupling = corner[1] + gather(values, slot->right);
   sum->shear_force += corner[0];
   sum->coupling += coupling;
-  sum->pending += coupling * unseen;
+  sum->pending += coupling * other[3];
   slot->coupling = coupling;
+  for (int c = 0; c < 3; ++c) sum->slide[c] += slot->weight * other[c];
+}
+
+// The part of a across the unit vector n.
+INLINE void project(const sonde_lane n[3], sonde_lane a[3]) {
+  sonde_lane along = dot(n, a);
+  for (int c = 0; c < 3; ++c) a[c] -= along * n[c];
 }
 
 // Pressure of the normal spring and its slope; exponents above 1 go on straight for s < 0.
@@ -160,24 +183,26 @@ INLINE void add_anchor(const sonde_lane_law *law, const sonde_slice_model *fixed
   sonde_lane damper = law->normal_damping_s * fixed->k0 * fixed->area;
   sonde_lane tangent = law->tangential * fixed->area, slow = law->normal_damping_s * tangent;
   sonde_lane push = pressure * fixed->area - damper * rate + sum->shear_force;
+  sonde_lane inplane = law->inplane * fixed->weight, hold = tangent + inplane;
+  if (law->layered) project(n, sum->slide);
   for (int c = 0; c < 3; ++c)
-    sum->force[c] +=
-        push * n[c] - tangent * (at->ue[c] + s * n[c]) - slow * (at->ve[c] - rate * n[c]);
-  sonde_lane flat = law->stiffness_scale * tangent + law->damping_scale * slow;
+    sum->force[c] += push * n[c] - hold * (at->ue[c] + s * n[c]) -
+                     slow * (at->ve[c] - rate * n[c]) + law->inplane * sum->slide[c];
+  sonde_lane flat = law->stiffness_scale * hold + law->damping_scale * slow;
   sonde_lane steep =
       law->stiffness_scale * slope * fixed->area + law->damping_scale * damper - sum->coupling;
   add_rank_one(sum->block, n, steep - flat, flat + fixed->mass);
 }
 
 // Forces and diagonal blocks of a slice's springs, the blocks of its edges.
-INLINE void add_springs(sonde_lanes *lanes, const sonde_slice_model *fixed, bool sheared,
+INLINE void add_springs(sonde_lanes *lanes, const sonde_slice_model *fixed, coupled by,
                         const place *at, node_sum *sum) {
   uint32_t first = fixed->first_slot, whole = fixed->whole_count;
   for (uint32_t k = first; k < first + fixed->slot_count; ++k) {
-    sonde_lane unseen;
-    add_spring(&lanes->law, &lanes->slot[k], k < first + whole ? all(1) : lanes->share[k],
-               lanes->record, at, sum, &lanes->tangent[k], &unseen);
-    if (sheared) add_coupling(&lanes->slot_shear[k], (const float *)lanes->face_value, unseen, sum);
+    if (by.springs)
+      add_spring(&lanes->law, &lanes->slot[k], k < first + whole ? all(1) : lanes->share[k],
+                 lanes->record, at, sum, &lanes->tangent[k]);
+    if (by.layers) add_layers(lanes, &lanes->tangent[k].node, &lanes->slot_layer[k], sum);
   }
   add_anchor(&lanes->law, fixed, at, sum);
 }
@@ -206,8 +231,15 @@ INLINE void divide(const sonde_lane factor[6], const sonde_lane r[3], sonde_lane
 }
 
 INLINE void publish_direction(sonde_lanes *lanes, uint32_t s, const sonde_lane z[3]) {
-  const sonde_lane out[4] = {z[0], z[1], z[2], dot(lanes->model[s].normal, z)};
-  write_records(lanes->direction + (size_t)s * SONDE_LANES * SONDE_DIRECTION, SONDE_DIRECTION, out);
+  const sonde_lane *n = lanes->model[s].normal;
+  size_t first = (size_t)s * SONDE_LANES * SONDE_QUAD;
+  const sonde_lane whole[4] = {z[0], z[1], z[2], {0}};
+  write_records(lanes->direction + first, SONDE_QUAD, whole);
+  if (!lanes->law.layered) return;
+  sonde_lane along = dot(n, z), parts[4];
+  for (int c = 0; c < 3; ++c) parts[c] = z[c] - along * n[c];
+  parts[3] = along;
+  write_records(lanes->layer_direction + first, SONDE_QUAD, parts);
 }
 
 INLINE float most(sonde_lane a) {
@@ -220,22 +252,22 @@ typedef struct sums_of_rows {
   lane_double rr, ff, rz, reaction[3];
 } sums_of_rows;
 
-INLINE void linearise_slice(sonde_lanes *lanes, uint32_t s, bool sheared, bool moves,
+INLINE void linearise_slice(sonde_lanes *lanes, uint32_t s, coupled by, bool moves,
                             sums_of_rows *sums) {
   const sonde_slice_model *fixed = &lanes->model[s];
   sonde_slice *at = &lanes->slice[s];
   float h = lanes->law.dt;
-  node_sum sum = {{{0}}, {{0}}, {0}, {0}, {0}};
+  node_sum sum = {{{0}}, {{0}}, {0}, {0}, {0}, {{0}}};
   place here;
   for (int c = 0; c < 3; ++c) here.ve[c] = at->ve[c], here.ue[c] = at->u[c] + h * at->ve[c];
-  add_springs(lanes, fixed, sheared, &here, &sum);
+  add_springs(lanes, fixed, by, &here, &sum);
   for (int c = 0; c < 3; ++c) sums->reaction[c] += widen(sum.force[c]);
   if (lanes->press_of[s]) add_press(&lanes->press[lanes->press_of[s] - 1], &sum);
   sonde_lane force[3], r[3], x[3];
   for (int c = 0; c < 3; ++c) {
     force[c] = h * sum.force[c];
     r[c] = force[c] - fixed->mass * (here.ve[c] - at->v[c]);
-    if (sheared) r[c] -= sum.pending * fixed->normal[c];
+    if (by.layers) r[c] -= sum.pending * fixed->normal[c];
   }
   sonde_lane yield = fixed->yield / h, force2 = dot(force, force);
   lanes->unrest2[s] = most(force2 * (yield * yield));
@@ -253,13 +285,15 @@ INLINE void linearise_slice(sonde_lanes *lanes, uint32_t s, bool sheared, bool m
 }
 
 static void linearise(sonde_lanes *lanes, bool moves, double sums[3]) {
-  bool sheared = lanes->law.shear > 0;
+  const sonde_lane_law *law = &lanes->law;
   sums_of_rows all_rows = {{0}, {0}, {0}, {{0}}};
   for (uint32_t a = 0; a < lanes->awake_count; ++a) {
-    if (sheared)
-      linearise_slice(lanes, lanes->awake[a], true, moves, &all_rows);
+    if (law->springs && law->layered)
+      linearise_slice(lanes, lanes->awake[a], (coupled){true, true}, moves, &all_rows);
+    else if (law->layered)
+      linearise_slice(lanes, lanes->awake[a], (coupled){false, true}, moves, &all_rows);
     else
-      linearise_slice(lanes, lanes->awake[a], false, moves, &all_rows);
+      linearise_slice(lanes, lanes->awake[a], (coupled){true, false}, moves, &all_rows);
   }
   sums[0] = total(all_rows.rr);
   sums[1] = total(all_rows.ff);
@@ -269,27 +303,38 @@ static void linearise(sonde_lanes *lanes, bool moves, double sums[3]) {
 }
 
 // q += A p without the diagonal blocks.
-INLINE void multiply_slice(sonde_lanes *lanes, const sonde_slice_model *fixed, bool sheared,
+INLINE void multiply_slice(sonde_lanes *lanes, const sonde_slice_model *fixed, coupled by,
                            sonde_lane q[3]) {
   uint32_t first = fixed->first_slot;
-  sonde_lane along_normal = {0};
+  sonde_lane along = {0}, slide[3] = {{0}, {0}, {0}};
   for (uint32_t k = first; k < first + fixed->slot_count; ++k) {
     const sonde_slot_tangent *tangent = &lanes->tangent[k];
     sonde_lane p[4];
-    read_directions(lanes->direction, &tangent->node, p);
-    sonde_lane pull = tangent->along * dot(tangent->n, p);
-    for (int c = 0; c < 3; ++c) q[c] -= pull * tangent->n[c] + tangent->lateral * p[c];
-    if (sheared) along_normal += lanes->slot_shear[k].coupling * p[3];
+    if (by.springs) {
+      read_quads(lanes->direction, &tangent->node, p);
+      sonde_lane pull = tangent->along * dot(tangent->n, p);
+      for (int c = 0; c < 3; ++c) q[c] -= pull * tangent->n[c] + tangent->lateral * p[c];
+    }
+    if (!by.layers) continue;
+    const sonde_slot_layer *layer = &lanes->slot_layer[k];
+    read_quads(lanes->layer_direction, &tangent->node, p);
+    along += layer->coupling * p[3];
+    for (int c = 0; c < 3; ++c) slide[c] += layer->weight * p[c];
   }
-  for (int c = 0; sheared && c < 3; ++c) q[c] += along_normal * fixed->normal[c];
+  if (!by.layers) return;
+  project(fixed->normal, slide);
+  float inplane = lanes->law.stiffness_scale * lanes->law.inplane;
+  for (int c = 0; c < 3; ++c) q[c] += along * fixed->normal[c] - inplane * slide[c];
 }
 
 // q += A p without the diagonal blocks for a slice, p the directions.
 INLINE void couple(sonde_lanes *lanes, uint32_t s, sonde_lane q[3]) {
-  if (lanes->law.shear > 0)
-    multiply_slice(lanes, &lanes->model[s], true, q);
+  if (lanes->law.springs && lanes->law.layered)
+    multiply_slice(lanes, &lanes->model[s], (coupled){true, true}, q);
+  else if (lanes->law.layered)
+    multiply_slice(lanes, &lanes->model[s], (coupled){false, true}, q);
   else
-    multiply_slice(lanes, &lanes->model[s], false, q);
+    multiply_slice(lanes, &lanes->model[s], (coupled){true, false}, q);
   if (lanes->press_of[s] == 0) return;
   const sonde_slice_press *press = &lanes->press[lanes->press_of[s] - 1];
   for (int c = 0; c < 3; ++c) q[c] -= press->carry[c];

@@ -87,10 +87,10 @@ INLINE void turn4(const wide row[4], wide out[4]) {
 #if defined(__AVX512F__)
 // Rows k, k+4, k+8 and k+12 of the list side by side.
 INLINE __m512 rows4(const float *base, const int32_t *node, int k) {
-  __m512 z = _mm512_castps128_ps512(_mm_load_ps(base + (size_t)node[k] * SONDE_DIRECTION));
-  z = _mm512_insertf32x4(z, _mm_load_ps(base + (size_t)node[k + 4] * SONDE_DIRECTION), 1);
-  z = _mm512_insertf32x4(z, _mm_load_ps(base + (size_t)node[k + 8] * SONDE_DIRECTION), 2);
-  return _mm512_insertf32x4(z, _mm_load_ps(base + (size_t)node[k + 12] * SONDE_DIRECTION), 3);
+  __m512 z = _mm512_castps128_ps512(_mm_load_ps(base + (size_t)node[k] * SONDE_QUAD));
+  z = _mm512_insertf32x4(z, _mm_load_ps(base + (size_t)node[k + 4] * SONDE_QUAD), 1);
+  z = _mm512_insertf32x4(z, _mm_load_ps(base + (size_t)node[k + 8] * SONDE_QUAD), 2);
+  return _mm512_insertf32x4(z, _mm_load_ps(base + (size_t)node[k + 12] * SONDE_QUAD), 3);
 }
 INLINE __m512 rows8(const float *base, const int32_t *node, int k) {
   __m512 z = _mm512_castps256_ps512(_mm256_load_ps(base + (size_t)node[k] * SONDE_RECORD));
@@ -98,14 +98,14 @@ INLINE __m512 rows8(const float *base, const int32_t *node, int k) {
 }
 #elif defined(__AVX2__)
 INLINE __m256 rows4(const float *base, const int32_t *node, int k) {
-  __m256 z = _mm256_castps128_ps256(_mm_load_ps(base + (size_t)node[k] * SONDE_DIRECTION));
-  return _mm256_insertf128_ps(z, _mm_load_ps(base + (size_t)node[k + 4] * SONDE_DIRECTION), 1);
+  __m256 z = _mm256_castps128_ps256(_mm_load_ps(base + (size_t)node[k] * SONDE_QUAD));
+  return _mm256_insertf128_ps(z, _mm_load_ps(base + (size_t)node[k + 4] * SONDE_QUAD), 1);
 }
 #endif
 
-// The four numbers of a direction at 16 nodes: loads of whole records, turned in registers, cost a
+// The four numbers at each of 16 nodes: loads of whole records, turned in registers, cost a
 // fraction of gathers.
-INLINE void read_directions(const float *base, const sonde_lane_index *nodes, sonde_lane out[4]) {
+INLINE void read_quads(const float *base, const sonde_lane_index *nodes, sonde_lane out[4]) {
   const int32_t *node = (const int32_t *)nodes;
 #if defined(__AVX512F__)
   __m512 row[4], column[4];
@@ -121,12 +121,12 @@ INLINE void read_directions(const float *base, const sonde_lane_index *nodes, so
   }
 #else
   for (int c = 0; c < 4; ++c)
-    for (int l = 0; l < SONDE_LANES; ++l) out[c][l] = base[node[l] * SONDE_DIRECTION + c];
+    for (int l = 0; l < SONDE_LANES; ++l) out[c][l] = base[node[l] * SONDE_QUAD + c];
 #endif
 }
 
-// The first six numbers of a record at 16 nodes, and the last.
-INLINE void read_records(const float *base, const sonde_lane_index *nodes, sonde_lane out[7]) {
+// The first six numbers of a record at 16 nodes.
+INLINE void read_records(const float *base, const sonde_lane_index *nodes, sonde_lane out[6]) {
   const int32_t *node = (const int32_t *)nodes;
 #if defined(__AVX512F__)
   __m512 row[8], column[8];
@@ -140,7 +140,6 @@ INLINE void read_records(const float *base, const sonde_lane_index *nodes, sonde
     out[c] = (sonde_lane)_mm512_shuffle_f32x4(column[c], column[4 + c], 0x88);
     if (c < 2) out[4 + c] = (sonde_lane)_mm512_shuffle_f32x4(column[c], column[4 + c], 0xdd);
   }
-  out[6] = (sonde_lane)_mm512_shuffle_f32x4(column[3], column[7], 0xdd);
 #elif defined(__AVX2__)
   for (int half = 0; half < 2; ++half) {
     __m256 row[8], column[8];
@@ -153,12 +152,10 @@ INLINE void read_records(const float *base, const sonde_lane_index *nodes, sonde
       if (c < 2)
         ((__m256 *)&out[4 + c])[half] = _mm256_permute2f128_ps(column[c], column[4 + c], 0x31);
     }
-    ((__m256 *)&out[6])[half] = _mm256_permute2f128_ps(column[3], column[7], 0x31);
   }
 #else
-  for (int c = 0; c < 7; ++c)
-    for (int l = 0; l < SONDE_LANES; ++l)
-      out[c][l] = base[node[l] * SONDE_RECORD + (c < 6 ? c : SONDE_RECORD - 1)];
+  for (int c = 0; c < 6; ++c)
+    for (int l = 0; l < SONDE_LANES; ++l) out[c][l] = base[node[l] * SONDE_RECORD + c];
 #endif
 }
 

@@ -18,6 +18,7 @@ static void scale_springs(sonde_state *state) {
   law->edge_stiffness_n_m *= t->stiffness_scale;
   law->edge_pretension_n *= t->stiffness_scale;
   law->tangential_stiffness_n_m3 *= t->stiffness_scale;
+  law->inplane_stiffness_n_m *= t->stiffness_scale;
   law->shear_stiffness_n_m *= t->stiffness_scale;
   for (uint32_t i = 0; i < state->model->surface.vertex_count; ++i)
     state->tuned_k0[i] = t->stiffness_scale * state->model->k0_n_m3[i];

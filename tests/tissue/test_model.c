@@ -97,7 +97,9 @@ static void parameters_pass_through_the_sites(void **state) {
 
 static void file_returns_the_same_model(void **state) {
   (void)state;
-  sonde_model *a = fixture_model(3, NULL), *b;
+  sonde_surface_law law = sonde_surface_law_default();
+  law.inplane_stiffness_n_m = 35;
+  sonde_model *a = fixture_model(3, &law), *b;
   static const sonde_datum data[2] = {{0, "linear", 0.002, 1.25}, {0, "point", 0.004, 0.5}};
   sonde_free(a->data);
   a->data = SONDE_NEW(sonde_datum, 2);
@@ -119,6 +121,7 @@ static void file_returns_the_same_model(void **state) {
   assert_memory_equal(a->face_half_cotangent, b->face_half_cotangent,
                       a->surface.face_count * sizeof *a->face_half_cotangent);
   assert_memory_equal(&a->law, &b->law, sizeof a->law);
+  assert_true(b->law.inplane_stiffness_n_m == 35);
   assert_memory_equal(a->data, b->data, sizeof data);
   assert_memory_equal(&a->vein.point[1], &b->vein.point[1], sizeof a->vein.point[1]);
   assert_string_equal(a->name, b->name);
@@ -143,24 +146,29 @@ static void rename_arrays(char *bytes, size_t count, const char *from, const cha
     if (memcmp(bytes + k, from, strlen(from)) == 0) memcpy(bytes + k, to, strlen(to));
 }
 
-// A file from before the shear layer's fields is one without their arrays: the shares are one.
-static void older_files_have_a_uniform_layer(void **state) {
+// A file from before the shear layer's fields is one without their arrays: the shares are one. One
+// from before the in-plane layer has no number for it: zero.
+static void older_files_have_simpler_layers(void **state) {
   (void)state;
-  sonde_model *model = fixture_model(1, NULL), *loaded;
+  sonde_surface_law law = sonde_surface_law_default();
+  law.inplane_stiffness_n_m = 35;
+  sonde_model *model = fixture_model(1, &law), *loaded;
   fixture_vary_shear(model);
   assert_int_equal(sonde_model_save(model, FILE_NAME, NULL), SONDE_OK);
   char *bytes;
   size_t count;
   assert_int_equal(sonde_file_load(FILE_NAME, &bytes, &count, NULL), SONDE_OK);
-  assert_memory_equal(bytes, "SONDE-MODEL 3", 13);
+  assert_memory_equal(bytes, "SONDE-MODEL 4", 13);
   bytes[12] = '2';
   rename_arrays(bytes, count, "node_shear_share", "node_other_thing");
+  rename_arrays(bytes, count, "inplane_stiffness_n_m", "some_other_number_n_m");
   uint32_t crc = (uint32_t)crc32_z(0, (const Bytef *)bytes, count - 4);
   memcpy(bytes + count - 4, &crc, 4);
   write_bytes(bytes, count);
   assert_int_equal(sonde_model_load(FILE_NAME, &loaded, NULL), SONDE_OK);
   for (uint32_t i = 0; i < loaded->surface.vertex_count; ++i)
     assert_true(loaded->shear_share[i] == 1 && loaded->limit_share[i] == 1);
+  assert_true(loaded->law.inplane_stiffness_n_m == 0);
   assert_memory_equal(model->k0_n_m3, loaded->k0_n_m3,
                       model->surface.vertex_count * sizeof(double));
   sonde_free(bytes);
@@ -230,7 +238,7 @@ int main(void) {
                                      cmocka_unit_test(vein_passes_below_the_site),
                                      cmocka_unit_test(parameters_pass_through_the_sites),
                                      cmocka_unit_test(file_returns_the_same_model),
-                                     cmocka_unit_test(older_files_have_a_uniform_layer),
+                                     cmocka_unit_test(older_files_have_simpler_layers),
                                      cmocka_unit_test(damage_is_refused),
                                      cmocka_unit_test(open_skin_is_refused),
                                      cmocka_unit_test(bad_law_is_refused)};

@@ -13,6 +13,7 @@ typedef struct bench {
 static sonde_surface_law full_law(void) {
   sonde_surface_law law = sonde_surface_law_default();
   law.shear_stiffness_n_m = 15;
+  law.inplane_stiffness_n_m = 70;
   law.edge_stiffness_n_m = 300;
   return law;
 }
@@ -162,6 +163,25 @@ static void edges_conserve_momentum(void **state) {
   clear(&b);
 }
 
+// A sphere's skin that turns by the small angle w: t = w x X, |grad t|^2 = 2 w^2 - |w x N|^2, whose
+// mean over the sphere is 4/3 w^2.
+static void turning_stretches_the_skin(void **state) {
+  (void)state;
+  sonde_surface_law law = sonde_surface_law_default();
+  law.edge_stiffness_n_m = law.tangential_stiffness_n_m3 = 0;
+  law.inplane_stiffness_n_m = 70;
+  sonde_model *model = fixture_model(4, &law);
+  uint32_t n = model->surface.vertex_count;
+  sonde_vec3 *x = SONDE_NEW(sonde_vec3, n), axis = vec3(0.48, 0.6, 0.64);
+  double w = 0.01, radius = FIXTURE_RADIUS_M;
+  for (uint32_t i = 0; i < n; ++i)
+    x[i] = v_madd(model->surface.vertices[i], w, v_cross(axis, model->surface.vertices[i]));
+  double energy = 0.5 * 70 * 4 * M_PI * radius * radius * 4.0 / 3 * w * w;
+  assert_near(sonde_tissue_energy(model, x) / energy, 1, 0.01);
+  sonde_free(x);
+  sonde_model_destroy(model);
+}
+
 // A part of the mesh gives the same rows as the whole when everything outside it is at rest.
 static void part_equals_whole(void **state) {
   (void)state;
@@ -214,6 +234,7 @@ int main(void) {
                                      cmocka_unit_test(product_is_stiffness_times_velocity),
                                      cmocka_unit_test(matrix_is_positive_in_compression),
                                      cmocka_unit_test(edges_conserve_momentum),
+                                     cmocka_unit_test(turning_stretches_the_skin),
                                      cmocka_unit_test(part_equals_whole)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -18,9 +18,18 @@ static sonde_world_def fast_def(void) {
   return def;
 }
 
-static scene make(int levels, const char *probe, const sonde_world_def *def) {
+// By what neighbours are coupled.
+typedef struct couplings {
+  double edge_n_m, shear_n_m, inplane_n_m;
+} couplings;
+static const couplings usual = {50, 15, 0},
+                       kinds[] = {{50, 15, 70}, {0, 15, 70}, {0, 0, 70}, {0, 15, 0}};
+
+static scene make_coupled(couplings by, int levels, const char *probe, const sonde_world_def *def) {
   sonde_surface_law law = sonde_surface_law_default();
-  law.shear_stiffness_n_m = 15;
+  law.edge_stiffness_n_m = by.edge_n_m;
+  law.shear_stiffness_n_m = by.shear_n_m;
+  law.inplane_stiffness_n_m = by.inplane_n_m;
   law.normal_exponent = 2;
   scene s = {.model = fixture_model(levels, &law)};
   s.n = s.model->surface.vertex_count;
@@ -36,6 +45,10 @@ static void clear(scene *s) {
   sonde_probe_clear(&s->probe);
 }
 
+static scene make(int levels, const char *probe, const sonde_world_def *def) {
+  return make_coupled(usual, levels, probe, def);
+}
+
 // Down to 8 mm in 0.15 s, then along the skin.
 static void play(scene *s, int steps) {
   for (int k = 0; k < steps; ++k) {
@@ -45,8 +58,8 @@ static void play(scene *s, int steps) {
   }
 }
 
-static uint64_t hash_with(const char *kernels, const sonde_world_def *def) {
-  scene s = make(4, "point", def);
+static uint64_t hash_with(const char *kernels, couplings by, const sonde_world_def *def) {
+  scene s = make_coupled(by, 4, "point", def);
   s.state->lanes->kernels = sonde_lane_kernels_find(kernels);
   uint64_t hash = 0;
   if (s.state->lanes->kernels) {
@@ -61,14 +74,16 @@ static uint64_t hash_with(const char *kernels, const sonde_world_def *def) {
 static void instruction_sets_agree_to_the_bit(void **state) {
   (void)state;
   const sonde_contact_law laws[] = {SONDE_CONTACT_FOUNDATION, SONDE_CONTACT_NODES};
-  for (size_t k = 0; k < SONDE_COUNT_OF(laws); ++k) {
+  for (size_t k = 0; k < SONDE_COUNT_OF(laws) + SONDE_COUNT_OF(kinds); ++k) {
     sonde_world_def def = fast_def();
-    def.contact_law = laws[k];
-    uint64_t base = hash_with("base", &def);
+    bool more = k >= SONDE_COUNT_OF(laws);
+    def.contact_law = laws[more ? 0 : k];
+    couplings by = more ? kinds[k - SONDE_COUNT_OF(laws)] : usual;
+    uint64_t base = hash_with("base", by, &def);
     assert_true(base != 0);
     const char *wider[] = {"avx2", "avx512"};
     for (size_t w = 0; w < SONDE_COUNT_OF(wider); ++w) {
-      uint64_t hash = hash_with(wider[w], &def);
+      uint64_t hash = hash_with(wider[w], by, &def);
       if (hash == 0)
         print_message("this processor has no %s: skipped\n", wider[w]);
       else
@@ -89,7 +104,8 @@ static void follows_the_double_engine(void **state) {
   (void)state;
   const sonde_contact_law laws[] = {SONDE_CONTACT_FOUNDATION, SONDE_CONTACT_NODES};
   const char *probes[] = {"point", "linear", "ball:20"};
-  for (size_t k = 0; k < ROUNDS(6, 2); ++k) {
+  for (size_t k = 0; k < ROUNDS(10, 3); ++k) {
+    couplings by = k < 2 ? usual : kinds[k % SONDE_COUNT_OF(kinds)];
     sonde_world_def def = sonde_world_def_default();
     def.newton_iterations = 8;
     def.pcg = (sonde_pcg_options){1e-6, 1e-12, 500};
@@ -97,9 +113,9 @@ static void follows_the_double_engine(void **state) {
     def.contact_law = laws[k % 2];
     def.friction.mu_static = k % 2 ? 0.4 : 0;
     def.friction.mu_kinetic = k % 2 ? 0.3 : 0;
-    scene precise = make(4, probes[k / 2], &def);
+    scene precise = make_coupled(by, 4, probes[k / 2 % 3], &def);
     def.engine = SONDE_ENGINE_FAST;
-    scene fast = make(4, probes[k / 2], &def);
+    scene fast = make_coupled(by, 4, probes[k / 2 % 3], &def);
     play(&precise, 140);
     play(&fast, 140);
     double load = v_norm(sonde_state_contact(precise.state)->force_n);
