@@ -37,6 +37,9 @@ static const char HELP[] =
     "  --cold-start      start stage 2 from generic values instead of stage 1\n"
     "  --exponent N      of the normal springs k0 x/(1 - (x/xm)^N) in stage 3: 1, 2 (default) or "
     "3\n"
+    "  --inplane-n-m K   in-plane stiffness of the skin in stage 3, 0 to 1e4; default 35, chosen\n"
+    "  --tangential-n-m3 G  stiffness per area against sliding along the skin, 0 to 1e8; default\n"
+    "                    1e5, chosen\n"
     "  --uniform-shear   one shear stiffness and limit for the whole skin in stage 3; default: a\n"
     "                    field like k0 and xm\n"
     "  --smoothness SD   of ln k0 and ln xm per site spacing in stage 3; default: by leaving "
@@ -63,10 +66,15 @@ static const char *const HOLD_OUTS[] = {"sites", "probe", "depth", NULL};
 typedef struct fit_arguments {
   const char *measurements, *surface, *sites, *output, *femur, *fat, *muscle, *name, *provenance;
   const char *stages, *weights, *loss, *fine_mm, *exponent, *report, *hold_out, *smoothness;
-  const char *starts, *seed, *also;
+  const char *starts, *seed, *also, *inplane, *tangential;
   bool json, help, pretension, cold_start, profile, identify, layers, uniform_shear;
   char command_line[1024]; // as typed
 } fit_arguments;
+
+// Of the model that is fitted.
+typedef struct fit_skin {
+  double fine_mm, inplane_n_m, tangential_n_m3;
+} fit_skin;
 
 // All that was found.
 typedef struct fit_outcome {
@@ -98,6 +106,8 @@ static bool parse_arguments(int argc, char **argv, fit_arguments *a) {
                                 {"--exponent", &a->exponent, NULL},
                                 {"--smoothness", &a->smoothness, NULL},
                                 {"--uniform-shear", NULL, &a->uniform_shear},
+                                {"--inplane-n-m", &a->inplane, NULL},
+                                {"--tangential-n-m3", &a->tangential, NULL},
                                 {"--report", &a->report, NULL},
                                 {"--hold-out", &a->hold_out, NULL},
                                 {"--also", &a->also, NULL},
@@ -152,7 +162,7 @@ static bool parse_checks(const fit_arguments *a, long stages, fit_checks *checks
   return true;
 }
 
-static bool parse_fit(const fit_arguments *a, sonde_fit_def *def, double *fine_mm,
+static bool parse_fit(const fit_arguments *a, sonde_fit_def *def, fit_skin *skin,
                       fit_checks *checks) {
   static const char *const WEIGHTS[] = {"absolute", "relative", NULL};
   static const char *const LOSSES[] = {"squares", "huber", "student", NULL};
@@ -161,7 +171,13 @@ static bool parse_fit(const fit_arguments *a, sonde_fit_def *def, double *fine_m
   if (a->stages && !app_parse_integer(VERB, "--stages", a->stages, 1, 3, &stages)) return false;
   if (a->weights && !app_parse_word(VERB, "--weights", a->weights, WEIGHTS, &weights)) return false;
   if (a->loss && !app_parse_word(VERB, "--loss", a->loss, LOSSES, &loss)) return false;
-  if (a->fine_mm && !app_parse_real(VERB, "--fine-mm", a->fine_mm, 0.5, 50, fine_mm)) return false;
+  if (a->fine_mm && !app_parse_real(VERB, "--fine-mm", a->fine_mm, 0.5, 50, &skin->fine_mm))
+    return false;
+  if (a->inplane && !app_parse_real(VERB, "--inplane-n-m", a->inplane, 0, 1e4, &skin->inplane_n_m))
+    return false;
+  if (a->tangential &&
+      !app_parse_real(VERB, "--tangential-n-m3", a->tangential, 0, 1e8, &skin->tangential_n_m3))
+    return false;
   *def = sonde_fit_def_default();
   long exponent = (long)def->normal_exponent;
   if (a->exponent && !app_parse_integer(VERB, "--exponent", a->exponent, 1, 3, &exponent))
@@ -227,7 +243,7 @@ static void clear_inputs(fit_inputs *in) {
 
 static const sonde_mesh *given(const sonde_mesh *mesh) { return mesh->vertex_count ? mesh : NULL; }
 
-static sonde_status build_model(const fit_arguments *a, const fit_inputs *in, double fine_mm,
+static sonde_status build_model(const fit_arguments *a, const fit_inputs *in, const fit_skin *skin,
                                 sonde_model **model, sonde_error *error) {
   sonde_model_def def = sonde_model_def_default();
   char provenance[256];
@@ -244,7 +260,9 @@ static sonde_status build_model(const fit_arguments *a, const fit_inputs *in, do
   def.site_count = in->sites.count;
   def.data = in->measurements.data;
   def.datum_count = in->measurements.count;
-  def.fine_edge_m = 1e-3 * fine_mm;
+  def.fine_edge_m = 1e-3 * skin->fine_mm;
+  def.law.inplane_stiffness_n_m = skin->inplane_n_m;
+  def.law.tangential_stiffness_n_m3 = skin->tangential_n_m3;
   return sonde_model_build(&def, model, error);
 }
 
@@ -294,12 +312,12 @@ static sonde_status write_report(const fit_arguments *a, const fit_inputs *in,
 }
 
 static sonde_status fit_model(const fit_arguments *a, const fit_inputs *in,
-                              const sonde_fit_def *def, double fine_mm, fit_outcome *out,
+                              const sonde_fit_def *def, const fit_skin *skin, fit_outcome *out,
                               sonde_error *error) {
   sonde_model *model = NULL;
   sonde_fit_result *result = &out->result;
   sonde_progress progress = app_progress();
-  sonde_status status = build_model(a, in, fine_mm, &model, error);
+  sonde_status status = build_model(a, in, skin, &model, error);
   if (!status)
     status = sonde_fit(model, &in->sites, &in->measurements, def, &progress, result, error);
   app_progress_end();
@@ -385,6 +403,7 @@ static void print_json(const fit_arguments *a, const fit_outcome *out, double se
   app_json_real("edge_pretension_n", r->law.edge_pretension_n);
   app_json_real("shear_stiffness_n_m", r->law.shear_stiffness_n_m);
   app_json_real("shear_limit", r->law.shear_limit);
+  app_json_real("inplane_stiffness_n_m", r->law.inplane_stiffness_n_m);
   app_json_real("seconds", seconds);
   app_json_end();
 }
@@ -412,8 +431,8 @@ static void print_table(const fit_arguments *a, const fit_outcome *out, double s
              c->tried_percent[k]);
     if (c->tried_count) printf("\n");
     app_print_report("one site left out (linearised)", &c->one_out);
-    printf("shear stiffness %.3f N/m, limit %.3f, edges kept at %.3g N/m, %u iterations\n",
-           r->law.shear_stiffness_n_m, r->law.shear_limit, r->law.edge_stiffness_n_m,
+    printf("shear stiffness %.3f N/m, limit %.3f, in-plane stiffness %.3g N/m, %u iterations\n",
+           r->law.shear_stiffness_n_m, r->law.shear_limit, r->law.inplane_stiffness_n_m,
            r->iterations);
   } else if (r->law.edge_pretension_n > 0) {
     printf("pre-tension %.3g N\n", r->law.edge_pretension_n);
@@ -431,19 +450,20 @@ static void print_table(const fit_arguments *a, const fit_outcome *out, double s
 int cmd_fit(int argc, char **argv) {
   fit_arguments arguments = {0};
   sonde_fit_def def;
-  double fine_mm = 3.0, start = app_seconds(CLOCK_MONOTONIC);
+  fit_skin skin = {3, SONDE_SKIN_INPLANE_N_M, SONDE_SKIN_TANGENTIAL_N_M3};
+  double start = app_seconds(CLOCK_MONOTONIC);
   if (!parse_arguments(argc, argv, &arguments)) return APP_BAD_INPUT;
   if (arguments.help) {
     fputs(HELP, stdout);
     return APP_OK;
   }
   fit_outcome out = {0};
-  if (!parse_fit(&arguments, &def, &fine_mm, &out.checks)) return APP_BAD_INPUT;
+  if (!parse_fit(&arguments, &def, &skin, &out.checks)) return APP_BAD_INPUT;
   keep_command_line(argc, argv, &arguments);
   fit_inputs inputs = {0};
   sonde_error error = {0};
   sonde_status status = load_inputs(&arguments, &inputs, &error);
-  if (!status) status = fit_model(&arguments, &inputs, &def, fine_mm, &out, &error);
+  if (!status) status = fit_model(&arguments, &inputs, &def, &skin, &out, &error);
   int code = APP_OK;
   if (status)
     code = app_fail(VERB, &error);

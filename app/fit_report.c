@@ -16,7 +16,7 @@ typedef struct builder {
   const fit_findings *in;
   sonde_fit_report report;
   sonde_report_stage stage[STAGES];
-  sonde_report_parameter parameter[8];
+  sonde_report_parameter parameter[9];
   sonde_report_holdout holdout[HOLDOUTS];
   sonde_report_timing timing[3];
   sonde_report_profile profile;
@@ -76,6 +76,9 @@ static void add_parameters(builder *b) {
     b->parameter[count++] = (sonde_report_parameter){
         "tangential stiffness", "N/m3", sonde_report_value(r->law.tangential_stiffness_n_m3),
         "chosen: these data do not determine it"};
+    b->parameter[count++] =
+        (sonde_report_parameter){"in-plane stiffness of the skin", "N/m",
+                                 sonde_report_value(r->law.inplane_stiffness_n_m), "chosen"};
     b->parameter[count++] =
         (sonde_report_parameter){"smoothness of ln k0 and ln xm per site spacing", "",
                                  sonde_report_value(c->smoothness_sd), "by leaving sites out"};

@@ -121,7 +121,7 @@ typedef struct sonde_fit_def {
   uint32_t max_iterations;    /**< default 400 */
   bool fit_pretension;        /**< also estimate T0 >= 0 (stage 2); default false */
   bool cold_start;            /**< stage 2 from one generic start instead of stage 1 */
-  double kept_edge_n_m;       /**< edge stiffness of a stage 3 model; default 0.01 */
+  double kept_edge_n_m;       /**< edge stiffness of a stage 3 model; default 0 */
   double normal_exponent;     /**< of the normal springs of stage 3: 1, 2 (default) or 3 */
   double smoothness_sd;       /**< of ln k0 and ln xm per site spacing; 0 (default): by leave-out */
   double shear_smoothness_sd; /**< of ln G and ln gm; 0 (default): by leave-out, or the same when

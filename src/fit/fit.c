@@ -17,12 +17,10 @@
 static const double COLD_K0 = 1.8e5, COLD_ABOVE_M = 0.02;
 static const double EDGE_START_N_M = 50.0, TENSION_START_N = 1e-3;
 static const double LN_EDGE_LOW = -11.5, LN_EDGE_HIGH = 18.4; // 1e-5 .. 1e8 N/m
-static const double KEPT_EDGE_N_M = 0.01;
 static const double LN_TENSION_LOW = -13.8, LN_TENSION_HIGH = 6.9;
 
 sonde_fit_def sonde_fit_def_default(void) {
-  return (sonde_fit_def){
-      .stages = 2, .max_iterations = 400, .kept_edge_n_m = KEPT_EDGE_N_M, .normal_exponent = 2};
+  return (sonde_fit_def){.stages = 2, .max_iterations = 400, .normal_exponent = 2};
 }
 
 sonde_fit_def sonde_fit_def_complete(const sonde_fit_def *def) {
@@ -247,11 +245,18 @@ static void set_refitted(const sonde_fit_def *def, const double *theta,
   result->start_cost = found->start_cost;
 }
 
+// The paper's skin has surface springs and no in-plane layer.
+static void use_springs_only(sonde_surface_law *law) {
+  law->inplane_stiffness_n_m = 0;
+  law->tangential_stiffness_n_m3 = sonde_surface_law_default().tangential_stiffness_n_m3;
+}
+
 static sonde_status keep_stage2(sonde_fit_result *result, sonde_error *error) {
   SONDE_ASSERT(result->stage2_parameters > 0 && !result->stage2_sites);
   result->stage2_law = result->law;
   result->stage2_law.normal_exponent = 1;
   result->stage2_law.shear_stiffness_n_m = 0;
+  use_springs_only(&result->stage2_law);
   result->stage2_sites = SONDE_NEW(sonde_site, result->site_count);
   if (!result->stage2_sites) return sonde_fail_memory(error);
   memcpy(result->stage2_sites, result->sites, result->site_count * sizeof *result->sites);
@@ -323,6 +328,7 @@ sonde_status sonde_fit(const sonde_model *model, const sonde_site_table *sites,
   if (status) return status;
   sonde_site_problem problem = {.plan = &plan, .m = measurements};
   status = allocate_result(model, sites, measurements, result, error);
+  if (full.stages < 3) use_springs_only(&result->law);
   double start = sonde_clock_now();
   if (!status) status = fit_curves(model, sites, measurements, &plan, &full, result, error);
   if (!status) status = end_stage(result, 0, measurements->count, &start, error);

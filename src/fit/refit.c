@@ -174,7 +174,6 @@ sonde_status sonde_refit_forces(sonde_refit *r, const double *theta, double *for
                     .shear_n_m = exp(shear[0]),
                     .limit = exp(shear[1]),
                     .guard = law->guard,
-                    .tangential_n_m3 = law->tangential_stiffness_n_m3,
                     .membrane = r->membrane,
                     .stiffening = r->stiffening},
                    force_n,

@@ -1,7 +1,7 @@
 // Static equilibrium of the skin with normal springs and the shear layer only: one unknown per
 // node, the indentation s along the inward rest normal. Energy = sum A U(s) + sum over faces A
 // W(|grad s|), convex (docs/fit.md). It is the full model without surface springs: there the
-// tangential motion of free nodes decouples and stays zero.
+// tangential motion decouples (sonde_patch_drag).
 #ifndef SONDE_SRC_FIT_SHEAR_H
 #define SONDE_SRC_FIT_SHEAR_H
 
@@ -26,7 +26,7 @@ typedef struct sonde_patch {
   uint32_t (*among)[3];  // [place_count] the parents as indices of node
   double *area_m2;       // [place_count]
   double *cosine;        // [place_count] rest normal . site normal for held places, else 0
-  double sliding_m2;     // sum of A (1 - cosine^2): how far the footprint drags tangential springs
+  double drag_n_m;       // force per depth of the tangential springs and the in-plane layer
   uint32_t face_count;
   sonde_patch_face *face;
   uint32_t side_count, *side;   // [side_count] faces with free and held corners
@@ -41,11 +41,14 @@ sonde_status sonde_patch_create(const sonde_model *model, const sonde_site *site
                                 double half_v_m, double reach_m, sonde_patch *patch,
                                 sonde_error *error);
 void sonde_patch_clear(sonde_patch *patch);
+// Finds drag_n_m; normal: [place_count] at rest.
+sonde_status sonde_patch_drag(sonde_patch *patch, const sonde_surface_law *law,
+                              const sonde_vec3 *normal, sonde_vec3 site_normal, sonde_error *error);
 
 // Parameters of an equilibrium; logarithms of k0, xm and the shares of G and gm per surface node.
 typedef struct sonde_patch_law {
   const double *ln_k0, *ln_xm, *ln_shear, *ln_limit; // the last two NULL: uniform
-  double exponent, shear_n_m, limit, guard, tangential_n_m3;
+  double exponent, shear_n_m, limit, guard;
   // The layer as a membrane with tension: q(g) = (T + k e (1 + c e^2)) g/sqrt(1 + g^2) with
   // e = sqrt(1 + g^2) - 1, T = shear_n_m, k = limit (N/m); else G and gm.
   bool membrane;

@@ -51,14 +51,15 @@ static void find_parents(const sonde_cut *cut, const uint32_t *place, sonde_patc
 
 // Free places ascend with nodes.
 static void order_places(const sonde_model *model, const sonde_cut *cut, sonde_vec3 normal,
-                         uint32_t *place, sonde_patch *p) {
+                         uint32_t *place, sonde_vec3 *normals, sonde_patch *p) {
   uint32_t free = 0, held = p->free_count;
   for (uint32_t v = 0; v < cut->vertex_count; ++v) {
     uint32_t at = place[v] = cut->held[v] ? held++ : free++;
     memcpy(p->parent[at], cut->parent[v], sizeof p->parent[at]);
     memcpy(p->share[at], cut->share[v], sizeof p->share[at]);
     p->area_m2[at] = v < cut->node_count ? RIM_WIDTH_M * cut->rim_m[v] : 0;
-    if (cut->held[v]) p->cosine[at] = v_dot(sonde_cut_normal(model, cut, v), normal);
+    normals[at] = sonde_cut_normal(model, cut, v);
+    if (cut->held[v]) p->cosine[at] = v_dot(normals[at], normal);
   }
   SONDE_ASSERT(free == p->free_count && held == p->place_count);
 }
@@ -153,17 +154,18 @@ static sonde_status analyse(const sonde_model *model, const sonde_cut *cut, sond
 static sonde_status fill(const sonde_model *model, const sonde_cut *cut, const sonde_site *site,
                          sonde_patch *p, sonde_error *error) {
   uint32_t *place = SONDE_NEW(uint32_t, cut->vertex_count);
-  if (!place || !allocate_places(p, cut)) {
-    sonde_free(place);
-    return sonde_fail_memory(error);
+  sonde_vec3 *normal = SONDE_NEW(sonde_vec3, cut->vertex_count);
+  bool ok = place && normal && allocate_places(p, cut);
+  sonde_status status = ok ? SONDE_OK : sonde_fail_memory(error);
+  if (!status) {
+    order_places(model, cut, site->normal, place, normal, p);
+    find_parents(cut, place, p);
+    for (uint32_t f = 0; f < cut->face_count; ++f) add_face(model, cut, f, place, p);
+    status = sonde_patch_drag(p, &model->law, normal, site->normal, error);
   }
-  order_places(model, cut, site->normal, place, p);
-  find_parents(cut, place, p);
-  for (uint32_t f = 0; f < cut->face_count; ++f) add_face(model, cut, f, place, p);
-  for (uint32_t k = p->free_count; k < p->place_count; ++k)
-    p->sliding_m2 += p->area_m2[k] * (1 - p->cosine[k] * p->cosine[k]);
   sonde_free(place);
-  sonde_status status = build_rows(p, error);
+  sonde_free(normal);
+  if (!status) status = build_rows(p, error);
   if (!status) find_entries(p);
   if (!status) status = analyse(model, cut, p, error);
   return status;

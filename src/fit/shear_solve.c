@@ -164,7 +164,7 @@ sonde_status sonde_patch_force(sonde_patch_solver *solver, double depth_m, const
                                double *force_n, sonde_patch_gradient *gradient,
                                sonde_error *error) {
   SONDE_ASSERT(solver->settled_m == s_m);
-  *force_n = solver->load_n + solver->law.tangential_n_m3 * solver->patch->sliding_m2 * depth_m;
+  *force_n = solver->load_n + solver->patch->drag_n_m * depth_m;
   if (!gradient) return SONDE_OK;
   sonde_status status = adjoint(solver, solver->multiplier, error);
   if (status) return status;

@@ -1,0 +1,110 @@
+// The force with which a footprint drags the skin along itself. Tangential displacements t are
+// linear in the depth and do not see the indentations (docs/tissue.md): they cost
+// g_t A t^2/2 + K A |grad t|^2/2, the footprint's own are given, and the free ones follow.
+// multiply:      product with that energy's matrix.
+// drag_places:   what the footprint's places move at a depth of one.
+// follow:        the free places by conjugate gradients.
+#include "fit/shear.h"
+
+#include "base/maths.h"
+
+static const double ACCURACY = 1e-7; // of the residual
+enum { MOST_ITERATIONS = 500 };
+
+typedef struct slide {
+  const sonde_patch *patch;
+  const sonde_surface_law *law;
+  const sonde_vec3 *normal;      // [places]
+  double *diagonal;              // [places]
+  sonde_vec3 *t, *product;       // [places]
+  sonde_vec3 *r, *z, *direction; // [places] of the conjugate gradients
+} slide;
+
+static sonde_vec3 across(sonde_vec3 n, sonde_vec3 a) { return v_madd(a, -v_dot(n, a), n); }
+
+// y = A x; x is tangential at every place, and so is y.
+static void multiply(const slide *s, const sonde_vec3 *x, sonde_vec3 *y) {
+  const sonde_patch *p = s->patch;
+  double foundation = s->law->tangential_stiffness_n_m3;
+  SONDE_ASSERT(foundation >= 0);
+  for (uint32_t k = 0; k < p->place_count; ++k) y[k] = v_scale(x[k], foundation * p->area_m2[k]);
+  for (uint32_t f = 0; f < p->face_count; ++f) {
+    const sonde_patch_face *face = &p->face[f];
+    for (int k = 0; k < 3; ++k) {
+      uint32_t a = face->place[(k + 1) % 3], b = face->place[(k + 2) % 3];
+      double stiffness = s->law->inplane_stiffness_n_m * face->half_cotangent[k];
+      sonde_vec3 apart = v_sub(x[b], x[a]);
+      y[a] = v_madd(y[a], -stiffness, apart);
+      y[b] = v_madd(y[b], stiffness, apart);
+    }
+  }
+  for (uint32_t k = 0; k < p->place_count; ++k) y[k] = across(s->normal[k], y[k]);
+}
+
+static void drag_places(slide *s, sonde_vec3 site_normal) {
+  const sonde_patch *p = s->patch;
+  for (uint32_t k = 0; k < p->place_count; ++k)
+    s->diagonal[k] = s->law->tangential_stiffness_n_m3 * p->area_m2[k];
+  for (uint32_t f = 0; f < p->face_count; ++f)
+    for (int k = 0; k < 3; ++k) {
+      double stiffness = s->law->inplane_stiffness_n_m * p->face[f].half_cotangent[k];
+      s->diagonal[p->face[f].place[(k + 1) % 3]] += stiffness;
+      s->diagonal[p->face[f].place[(k + 2) % 3]] += stiffness;
+    }
+  for (uint32_t k = p->free_count; k < p->place_count; ++k)
+    s->t[k] = v_scale(across(s->normal[k], site_normal), -1);
+}
+
+// z = r over the diagonal; returns r.z over the free places.
+static double precondition(slide *s) {
+  double sum = 0;
+  for (uint32_t k = 0; k < s->patch->free_count; ++k) {
+    s->z[k] = s->diagonal[k] > 0 ? v_scale(s->r[k], 1 / s->diagonal[k]) : vec3(0, 0, 0);
+    sum += v_dot(s->r[k], s->z[k]);
+  }
+  return sum;
+}
+
+static void follow(slide *s) {
+  uint32_t n = s->patch->free_count;
+  multiply(s, s->t, s->product);
+  for (uint32_t k = 0; k < n; ++k) s->r[k] = v_scale(s->product[k], -1);
+  double before = precondition(s), least = before * ACCURACY * ACCURACY, beta = 0;
+  for (int i = 0; i < MOST_ITERATIONS && before > least && before > 0; ++i) {
+    double curvature = 0;
+    for (uint32_t k = 0; k < n; ++k) s->direction[k] = v_madd(s->z[k], beta, s->direction[k]);
+    multiply(s, s->direction, s->product);
+    for (uint32_t k = 0; k < n; ++k) curvature += v_dot(s->direction[k], s->product[k]);
+    SONDE_ASSERT(curvature > 0);
+    double alpha = before / curvature;
+    for (uint32_t k = 0; k < n; ++k) {
+      s->t[k] = v_madd(s->t[k], alpha, s->direction[k]);
+      s->r[k] = v_madd(s->r[k], -alpha, s->product[k]);
+    }
+    double now = precondition(s);
+    beta = now / before;
+    before = now;
+  }
+}
+
+sonde_status sonde_patch_drag(sonde_patch *patch, const sonde_surface_law *law,
+                              const sonde_vec3 *normal, sonde_vec3 site_normal,
+                              sonde_error *error) {
+  size_t places = patch->place_count;
+  slide s = {.patch = patch, .law = law, .normal = normal, .diagonal = SONDE_NEW(double, places)};
+  sonde_vec3 **array[] = {&s.t, &s.product, &s.r, &s.z, &s.direction};
+  bool ok = s.diagonal != NULL;
+  for (size_t k = 0; k < SONDE_COUNT_OF(array); ++k)
+    ok = (*array[k] = SONDE_NEW(sonde_vec3, places)) != NULL && ok;
+  if (ok) {
+    drag_places(&s, site_normal);
+    follow(&s);
+    multiply(&s, s.t, s.product);
+    patch->drag_n_m = 0;
+    for (uint32_t k = patch->free_count; k < places; ++k)
+      patch->drag_n_m += v_dot(s.t[k], s.product[k]);
+  }
+  for (size_t k = 0; k < SONDE_COUNT_OF(array); ++k) sonde_free(*array[k]);
+  sonde_free(s.diagonal);
+  return ok ? SONDE_OK : sonde_fail_memory(error);
+}
