@@ -14,7 +14,7 @@ static const double SITE_STEP_M = 0.015, FINE_REACH_M = 0.005; // between column
 static const double FAT_COMPLIANCE = 1.688e-4, MUSCLE_COMPLIANCE = 4.963e-5; // m^2/N
 static const double ASYMPTOTE_SHARE = 0.6726;
 static const double LEAST_FAT_M = 0.002, LEAST_TISSUE_M = 0.02;
-static const double SHEAR_N_M = 15.74, SHEAR_LIMIT = 1.104, EDGE_N_M = 0.1;
+static const double SHEAR_N_M = 15.74, SHEAR_LIMIT = 1.104;
 
 void sonde_thigh_springs(double fat_m, double muscle_m, double stiffness, double *k0_n_m3,
                          double *xm_m) {
@@ -31,7 +31,9 @@ sonde_thigh_def sonde_thigh_def_default(void) {
 
 static sonde_surface_law law_of(const sonde_thigh *thigh) {
   sonde_surface_law law = sonde_surface_law_default();
-  law.edge_stiffness_n_m = EDGE_N_M;
+  law.edge_stiffness_n_m = 0;
+  law.inplane_stiffness_n_m = SONDE_SKIN_INPLANE_N_M * thigh->stiffness;
+  law.tangential_stiffness_n_m3 = SONDE_SKIN_TANGENTIAL_N_M3 * thigh->stiffness;
   law.shear_stiffness_n_m = SHEAR_N_M * thigh->stiffness;
   law.shear_limit = SHEAR_LIMIT;
   law.normal_exponent = 2;
