@@ -8,7 +8,7 @@
 #include "exam/setup.h"
 
 enum {
-  SONDE_RECORD_VERSION = 6,
+  SONDE_RECORD_VERSION = 7,
   SONDE_RECORD_OLDEST = 3, // that can be read
   SONDE_RECORD_TICK = 1,
   SONDE_RECORD_CONTROLS = 2,
