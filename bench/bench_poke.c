@@ -1,7 +1,7 @@
-// bench_poke MODEL [SECONDS [SEED [FIRST COUNT]]]: random poking of a model with every probe, law,
-// engine and friction in turn, SECONDS of simulated time in all (default 600); FIRST and COUNT
-// choose some of the 48 runs. Prints a row per run and the laws that broke (poke.h); exit code 1 if
-// any did, or if a step took memory.
+// bench_poke MODEL [SECONDS [SEED [FIRST COUNT [DT_MS]]]]: random poking of a model with every
+// probe, law, engine and friction in turn, SECONDS of simulated time in all (default 600); FIRST
+// and COUNT choose some of the 48 runs, DT_MS the step (1). Prints a row per run and the laws that
+// broke (poke.h); exit code 1 if any did, or if a step took memory.
 #include "poke.h"
 #include "sonde/sonde.h"
 
@@ -92,8 +92,9 @@ static long play(const run *r, account *memory) {
 
 int main(int argc, char **argv) {
   long first = argc > 5 ? atol(argv[4]) : 0, count = argc > 5 ? atol(argv[5]) : RUNS;
-  if (argc < 2 || argc > 6 || first < 0 || count < 1 || first + count > RUNS) {
-    fprintf(stderr, "usage: bench_poke MODEL [SECONDS [SEED [FIRST COUNT]]], runs 0 to 47\n");
+  if (argc < 2 || argc > 7 || first < 0 || count < 1 || first + count > RUNS) {
+    fprintf(stderr,
+            "usage: bench_poke MODEL [SECONDS [SEED [FIRST COUNT [DT_MS]]]], runs 0 to 47\n");
     return 2;
   }
   account memory = {0};
@@ -107,12 +108,14 @@ int main(int argc, char **argv) {
   double seconds = argc > 2 ? atof(argv[2]) : 600;
   uint64_t seed = argc > 3 ? strtoul(argv[3], NULL, 10) : 1;
   size_t before = memory.bytes;
-  long broken = 0, ticks = (long)(seconds * 1e3 / RUNS + 0.5);
+  double dt_ms = argc > 6 ? atof(argv[6]) : 1;
+  long broken = 0, ticks = (long)(seconds * 1e3 / (RUNS * dt_ms) + 0.5);
   printf("probe      engine law              mu   ticks touch%% most_N  ticks>50N move_mm s/xm "
          "forward "
          "unconv full broken\n");
   for (long k = first; k < first + count; ++k) {
     run r = run_of((int)k, model, ticks, seed);
+    r.def.dt_s = 1e-3 * dt_ms;
     broken += play(&r, &memory);
   }
   printf("%ld ticks, %ld broken laws, %ld bytes more held at the end\n", ticks * count, broken,

@@ -23,6 +23,8 @@ awk -F, -v OFS=, '/^#/ { print; next } ++n == 5 { $NF = "nan" } { print }' \
 line=$(grep -n 'nan' "$in/nan.csv" | tail -1 | cut -d: -f1)
 rejects "nan\\.csv:$line" fit "$in/nan.csv" "${fit[@]}"
 rejects 'nowhere\.csv' fit nowhere.csv "${fit[@]}"
+rejects 'inplane-n-m.*-1' fit "$DATA/indentation.csv" "${fit[@]}" --inplane-n-m -1
+rejects 'tangential-n-m3.*1e9' fit "$DATA/indentation.csv" "${fit[@]}" --tangential-n-m3 1e9
 : >"$in/empty.csv"
 rejects 'empty\.csv' fit "$in/empty.csv" "${fit[@]}"
 rejects 'empty\.csv' measure "$MODEL" --sites "$in/empty.csv" --probe linear --step-mm 2 --limit-n 10 \
