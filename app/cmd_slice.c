@@ -291,6 +291,7 @@ static sonde_status slice_sequence(const arguments *a, work *w, sonde_error *err
   else
     status = between_frames(a, w, error);
   sonde_slicer_options options = a->options;
+  options.once = true;
   if (a->hold_out) options.left_out = (uint32_t)a->frame_number;
   if (!status) status = sonde_slicer_create(s, &options, &w->slicer, error);
   if (status) return status;

@@ -53,6 +53,7 @@ static sonde_status render(work *w, uint32_t frame, sonde_slice_method method, i
   const sonde_affine *pose = &w->sequence->frames[frame].world_from_pixel;
   options.method = method;
   options.left_out = frame;
+  options.once = true;
   sonde_status status = sonde_slicer_create_with(w->sequence, &options, w->bank, &slicer, error);
   if (status) return status;
   if (method == SONDE_SLICE_KRIGE) {

@@ -1,7 +1,8 @@
 // Creating a slicer and rendering with it.
 //
 // plane_of                      map from the world onto a frame
-// make_rooms                    scratch of the workers
+// make_room, make_rooms         scratch of the workers
+// fill_lines, lay_out           frames where many pictures read them fast
 // used_between                  frames counted between two
 // sonde_slice_is_left_out
 // fill_planes                   all used frames, normals to one side
@@ -68,6 +69,10 @@ static sonde_status fill_planes(const sonde_sequence *s, sonde_slicer *slicer, s
     plane->pyramid = slicer->bank ? &slicer->bank->pyramids[i] : NULL;
     ++slicer->count;
   }
+  for (slice_plane *p = slicer->planes; p + 1 < slicer->planes + slicer->count; ++p) {
+    slice_shift(p, p + 1, p->next_shift);
+    slice_shift(p + 1, p, p[1].last_shift);
+  }
   if (slicer->count) return SONDE_OK;
   return sonde_fail(error, SONDE_MISMATCH, "no frame with a pose is left to slice");
 }
@@ -84,19 +89,70 @@ sonde_status sonde_slicer_check(const sonde_sequence *s, const sonde_slicer_opti
   return SONDE_OK;
 }
 
+static bool make_room(slice_room *room, uint32_t count) {
+  room->candidates = SONDE_NEW(slice_candidate, count);
+  room->block = SONDE_NEW(const slice_plane *, count);
+  room->tile = SONDE_NEW(const slice_plane *, count);
+  room->strips = SONDE_NEW(slice_strip, count);
+  double *numbers = SONDE_NEW(double, 5 * (size_t)count);
+  for (uint32_t k = 0; k < 3; ++k) room->spans.form[k] = numbers ? numbers + k * count : NULL;
+  room->spans.low = numbers ? numbers + 3 * (size_t)count : NULL;
+  room->spans.high = numbers ? numbers + 4 * (size_t)count : NULL;
+  return room->candidates && room->block && room->tile && room->strips && numbers;
+}
+
 static bool make_rooms(sonde_slicer *slicer, uint32_t count) {
   slicer->every = SONDE_NEW(const slice_plane *, count);
+  slicer->forms = SONDE_NEW(double, 3 * (size_t)count);
   slicer->rooms = SONDE_NEW(slice_room, slicer->workers);
-  if (!slicer->every || !slicer->rooms) return false;
+  if (!slicer->every || !slicer->forms || !slicer->rooms) return false;
   for (uint32_t i = 0; i < count; ++i) slicer->every[i] = &slicer->planes[i];
-  for (uint32_t k = 0; k < slicer->workers; ++k) {
-    slice_room *room = &slicer->rooms[k];
-    room->candidates = SONDE_NEW(slice_candidate, count);
-    room->block = SONDE_NEW(const slice_plane *, count);
-    room->tile = SONDE_NEW(const slice_plane *, count);
-    if (!room->candidates || !room->block || !room->tile) return false;
-  }
-  return true;
+  bool enough = true;
+  for (uint32_t k = 0; k < slicer->workers && enough; ++k)
+    enough = make_room(&slicer->rooms[k], count);
+  return enough;
+}
+
+// Used part of a frame, line by line down its columns.
+static void fill_lines(const sonde_slicer *slicer, const slice_plane *plane) {
+  uint32_t wide = (uint32_t)(slicer->high[0] - slicer->low[0]) + 1;
+  uint32_t high = (uint32_t)(slicer->high[1] - slicer->low[1]) + 1;
+  const uint8_t *from =
+      plane->pixels + (size_t)slicer->low[1] * slicer->width + (size_t)slicer->low[0];
+  uint8_t *line = slicer->layout.lines + plane->place;
+  for (uint32_t u = 0; u < wide - 1; u += SLICE_LINE_WIDE - 1)
+    for (uint32_t v = 0; v < high - 1; v += SLICE_LINE_HIGH - 1, line += SLICE_LINE)
+      for (uint32_t j = 0; j < SLICE_LINE_HIGH && v + j < high; ++j) {
+        uint32_t bytes = wide - u < SLICE_LINE_WIDE ? wide - u : SLICE_LINE_WIDE;
+        memcpy(line + j * SLICE_LINE_WIDE, from + (size_t)(v + j) * slicer->width + u, bytes);
+      }
+}
+
+// Where the strips read the frames: in lines for many pictures, else where they are. None when the
+// places do not fit into 32 bits.
+static sonde_status lay_out(const sonde_sequence *s, sonde_slicer *slicer, sonde_error *error) {
+  const sonde_slicer_options *o = &slicer->options;
+  slice_layout *layout = &slicer->layout;
+  uint64_t columns = (s->clip[2] + SLICE_LINE_WIDE - 3) / (SLICE_LINE_WIDE - 1);
+  uint64_t rows = (s->clip[3] + SLICE_LINE_HIGH - 3) / (SLICE_LINE_HIGH - 1);
+  uint64_t frame = columns * rows * SLICE_LINE, all = frame * slicer->count + SLICE_LINE;
+  bool lines = !o->once && all < INT32_MAX;
+  slicer->has_strips = o->method == SONDE_SLICE_BRACKET && !o->along_sweep &&
+                       (lines || (uint64_t)s->width * s->height * s->count < INT32_MAX);
+  if (!slicer->has_strips) return SONDE_OK;
+  *layout = (slice_layout){.pixels = s->pixels, .row = (int32_t)s->width};
+  size_t first = (size_t)s->clip[1] * s->width + s->clip[0];
+  for (uint32_t i = 0; i < slicer->count; ++i)
+    slicer->planes[i].place =
+        lines ? (int32_t)(i * frame) : (int32_t)(slicer->planes[i].pixels + first - s->pixels);
+  if (!lines) return SONDE_OK;
+  layout->pixels = layout->lines = SONDE_NEW(uint8_t, all);
+  if (!layout->lines) return sonde_fail_memory(error);
+  layout->row = SLICE_LINE_WIDE;
+  layout->column_line = (int32_t)(rows * SLICE_LINE) - (SLICE_LINE_WIDE - 1);
+  layout->row_line = SLICE_LINE - (SLICE_LINE_HIGH - 1) * SLICE_LINE_WIDE;
+  for (uint32_t i = 0; i < slicer->count; ++i) fill_lines(slicer, &slicer->planes[i]);
+  return SONDE_OK;
 }
 
 // The tables of kriging; takes the caller's bank or makes its own.
@@ -135,6 +191,7 @@ sonde_status sonde_slicer_create_with(const sonde_sequence *s, const sonde_slice
   bool enough = slicer->planes && slicer->reached && make_rooms(slicer, s->count);
   status = enough ? start_bank(s, bank, slicer, error) : sonde_fail_memory(error);
   if (!status) status = fill_planes(s, slicer, error);
+  if (!status) status = lay_out(s, slicer, error);
   if (!status && o.method == SONDE_SLICE_KRIGE) status = sonde_slicer_krige(slicer, error);
   if (status) sonde_slicer_destroy(slicer);
   *out = status ? NULL : slicer;
@@ -148,9 +205,13 @@ void sonde_slicer_destroy(sonde_slicer *slicer) {
     sonde_free(slicer->rooms[k].candidates);
     sonde_free(slicer->rooms[k].block);
     sonde_free(slicer->rooms[k].tile);
+    sonde_free(slicer->rooms[k].spans.form[0]);
+    sonde_free(slicer->rooms[k].strips);
   }
   sonde_free(slicer->rooms);
   sonde_free(slicer->every);
+  sonde_free(slicer->forms);
+  sonde_free(slicer->layout.lines);
   sonde_free(slicer->reached);
   sonde_free(slicer->joins);
   sonde_free(slicer->far);
@@ -173,6 +234,7 @@ static void prepare(sonde_slicer *slicer, const sonde_affine *world_from_pixel) 
       forms[k][1] = local.m[k][0];
       forms[k][2] = local.m[k][1];
     }
+    for (uint32_t k = 0; k < 3; ++k) slicer->forms[k * slicer->count + i] = plane->forms.d[k];
   }
 }
 

@@ -68,11 +68,24 @@ typedef struct slice_plane {
   sonde_affine world_from_pixel;
   double pixel_m[2]; // length of a step in u and v
   sonde_vec3 normal;
+  float last_shift[2], next_shift[2]; // slice_shift() to the planes before and behind
   const uint8_t *pixels;
+  int32_t place;                // of its first used pixel in the layout
   const slice_pyramid *pyramid; // NULL without kriging
   uint32_t frame;               // of the sequence
   slice_forms forms;            // of the picture being rendered
 } slice_plane;
+
+// Half way between the two normals, in local coordinates of a: its own normal moves nothing. Planes
+// that stand across each other are met at their feet.
+static inline void slice_shift(const slice_plane *a, const slice_plane *b, float shift[2]) {
+  double c = v_dot(a->normal, b->normal);
+  for (int k = 0; k < 2; ++k) {
+    const double *r = a->local_from_world.m[k];
+    double along = r[0] * b->normal.x + r[1] * b->normal.y + r[2] * b->normal.z;
+    shift[k] = c > 0 ? (float)(along / (1 + c)) : 0;
+  }
+}
 
 // The forms of one plane from a tile's first pixel on.
 typedef struct slice_candidate {
@@ -80,21 +93,54 @@ typedef struct slice_candidate {
   float u[3], v[3], d[3];
 } slice_candidate;
 
+// What is linear in the picture's pixels between two planes, in front (d < 0) and behind: column
+// and row where a pixel's line meets the plane behind, the same in front, distance of both (m).
+enum { SLICE_FORMS = 6 };
+typedef struct slice_strip {
+  const slice_plane *behind, *front;
+  double forms[SLICE_FORMS][3];
+  double lean[2]; // most columns and rows from a pixel's foot to where its line meets, per metre
+} slice_strip;
+
 typedef struct slice_kernels slice_kernels;
+
+// Lines of a processor's memory hold tiles of 6 x 10 pixels, each 5 x 9 from the next, so that the
+// four pixels around a place stand within eight bytes of one line.
+enum { SLICE_LINE = 64, SLICE_LINE_WIDE = 6, SLICE_LINE_HIGH = 10 };
+
+// Pixel (i, j) of the used part of a frame is `frame + i + j row + (i / 5) column_line + (j / 9)
+// row_line` bytes after `pixels`.
+typedef struct slice_layout {
+  const uint8_t *pixels;
+  uint8_t *lines;                     // owned; NULL: `pixels` are the sequence's, row by row
+  int32_t row, column_line, row_line; // bytes
+} slice_layout;
+
+// Distances of planes, each form's numbers one after the other; their range over a rectangle.
+typedef struct slice_spans {
+  double *form[3], *low, *high; // [count]
+} slice_spans;
 
 // Scratch of one worker.
 typedef struct slice_room {
   slice_candidate *candidates;       // [count]
   const slice_plane **block, **tile; // [count]
+  slice_spans spans;                 // of the block's planes
+  slice_strip *strips;               // [count] of the block, none where planes cross
+  uint32_t strip_count;
+  bool covered; // by both frames of each strip
 } slice_room;
 
 struct sonde_slicer {
   sonde_slicer_options options;
   const slice_kernels *kernels;
   uint32_t width, count, workers;
+  bool has_strips; // frames are joined across
+  slice_layout layout;
   float low[2], high[2];     // used columns and rows
   slice_plane *planes;       // [count]
   const slice_plane **every; // [count]
+  double *forms;             // [3][count] distances of the planes
   slice_room *rooms;         // [workers]
   sonde_image *image;        // of the render under way
   uint8_t *known;

@@ -15,12 +15,10 @@
 // frame, the normals serve again. In local coordinates (u, v, d) of a frame the direction is (e_u,
 // e_v, e_d), and the line meets the frame at u - d e_u / e_d.
 //
-// span              range of a form over the tile
 // covers, touches   a plane and the tile
-// gather            planes that may be nearest in a rectangle
-// nearest_of_row    for each pixel of a row the nearest candidate on either side
+// plane_covers, find_hiding, gather_planes, gather_block            planes that may be nearest in a
+// rectangle nearest_of_row    for each pixel of a row the nearest candidate on either side
 // sweep_way         from a pixel to the same pixel of the other frame
-// normal_shift      half way between two normals
 // is_steep          a way that does not graze the plane
 // blend             pair constants of two planes
 // sample            bilinear
@@ -33,13 +31,13 @@
 // value_at          one pixel
 // find_pair         remembered
 // meet_row, find_pixels, mix_row, bracket_row   between two frames, a row of a tile at a time
-// fill_tile
+// fill_tile, search_tile
 // slice_sum_all     a picture of the sweep's own
 // slice_block
 //
 // Compiled once for each instruction set with SLICE_KERNELS defined; every operation is one IEEE
 // operation per lane, so that all give the same bits.
-#include "echo/slice_mix.h"
+#include "echo/slice_strips.h"
 #include "echo/slice_voxel_kernel.h"
 
 enum { PAIRS = 16 }; // pairs of frames remembered in a tile
@@ -59,21 +57,6 @@ typedef struct pair {
   float up_way[3][3], down_way[3][3]; // along the sweep
 } pair;
 
-typedef struct bounds {
-  double low, high;
-} bounds;
-
-typedef struct rectangle {
-  uint32_t column, row, wide, high; // pixels of the picture
-} rectangle;
-
-static inline bounds span(const double form[3], const rectangle *r) {
-  double wide = r->wide - 1, high = r->high - 1;
-  double centre = form[0] + form[1] * (r->column + 0.5 * wide) + form[2] * (r->row + 0.5 * high);
-  double reach = 0.5 * (fabs(form[1]) * wide + fabs(form[2]) * high);
-  return (bounds){centre - reach, centre + reach};
-}
-
 static inline bool covers(const sonde_slicer *s, bounds u, bounds v) {
   return u.low >= s->low[0] && u.high <= s->high[0] && v.low >= s->low[1] && v.high <= s->high[1];
 }
@@ -89,26 +72,48 @@ static void start_at(const double form[3], const rectangle *r, float out[3]) {
   out[2] = (float)form[2];
 }
 
-// Planes that may be nearest somewhere in a rectangle, out of `count` candidates; may work in
-// place.
-static uint32_t gather(const sonde_slicer *s, const rectangle *r, const slice_plane *const *from,
-                       uint32_t count, const slice_plane **out) {
-  double front = (double)INFINITY, back = -front; // far bounds of the nearest covering planes
+static bool plane_covers(const sonde_slicer *s, const rectangle *r, const slice_plane *plane) {
+  return covers(s, span(plane->forms.u, r), span(plane->forms.v, r));
+}
+
+// Far bounds of the nearest planes that cover a rectangle: all d >= 0, and all d < 0. The nearest
+// planes usually do.
+static bounds find_hiding(const sonde_slicer *s, const rectangle *r, const slice_plane *const *from,
+                          uint32_t count, const slice_spans *spans) {
+  const double *low = spans->low, *high = spans->high, none = (double)INFINITY;
+  bounds best = {-none, none};
+  int64_t front = -1, back = -1;
   for (uint32_t i = 0; i < count; ++i) {
-    const slice_forms *f = &from[i]->forms;
-    bounds d = span(f->d, r);
-    if (!((d.low >= 0 && d.high < front) || (d.high < 0 && d.low > back))) continue;
-    if (!covers(s, span(f->u, r), span(f->v, r))) continue;
-    if (d.low >= 0)
-      front = d.high;
-    else
-      back = d.low;
+    if (low[i] >= 0 && high[i] < best.high) best.high = high[i], back = i;
+    if (high[i] < 0 && low[i] > best.low) best.low = low[i], front = i;
   }
+  bool hidden = back < 0 || plane_covers(s, r, from[back]);
+  bool covered = front < 0 || plane_covers(s, r, from[front]);
+  if (!hidden) best.high = none;
+  if (!covered) best.low = -none;
+  for (uint32_t i = 0; i < count && !(hidden && covered); ++i) {
+    bool behind = !hidden && low[i] >= 0 && high[i] < best.high;
+    bool before = !covered && high[i] < 0 && low[i] > best.low;
+    if ((!behind && !before) || !plane_covers(s, r, from[i])) continue;
+    if (behind)
+      best.high = high[i];
+    else
+      best.low = low[i];
+  }
+  return best;
+}
+
+// Planes that may be nearest somewhere in a rectangle, out of `count` candidates whose spans are
+// known.
+static uint32_t gather_planes(const sonde_slicer *s, const rectangle *r,
+                              const slice_plane *const *from, uint32_t count,
+                              const slice_spans *spans, const slice_plane **out) {
+  bounds hiding = find_hiding(s, r, from, count, spans);
   uint32_t found = 0;
   for (uint32_t i = 0; i < count; ++i) {
+    double low = spans->low[i], high = spans->high[i];
+    if (!((high >= 0 && low <= hiding.high) || (low < 0 && high >= hiding.low))) continue;
     const slice_forms *f = &from[i]->forms;
-    bounds d = span(f->d, r);
-    if (!((d.high >= 0 && d.low <= front) || (d.low < 0 && d.high >= back))) continue;
     if (touches(s, span(f->u, r), span(f->v, r))) out[found++] = from[i];
   }
   return found;
@@ -150,17 +155,6 @@ static void sweep_way(const slice_plane *a, const slice_plane *b, float way[3][3
   }
 }
 
-// Half way between the two normals, in local coordinates of a: its own normal moves nothing. Planes
-// that stand across each other are met at their feet.
-static void normal_shift(const slice_plane *a, const slice_plane *b, float shift[2]) {
-  double c = v_dot(a->normal, b->normal);
-  for (int k = 0; k < 2; ++k) {
-    const double *r = a->local_from_world.m[k];
-    double along = r[0] * b->normal.x + r[1] * b->normal.y + r[2] * b->normal.z;
-    shift[k] = c > 0 ? (float)(along / (1 + c)) : 0;
-  }
-}
-
 // The way leaves to that side of the plane, at most 60 degrees off its normal.
 static bool is_steep(const slice_plane *plane, float way[3][3], float u, float v, float side) {
   float e[3];
@@ -174,8 +168,8 @@ static void blend(const sonde_slicer *s, const slice_candidate *room, int32_t up
   const slice_plane *a = room[up].plane, *b = room[down].plane;
   p->up = up, p->down = down;
   p->along_sweep = s->options.along_sweep;
-  normal_shift(a, b, p->up_shift);
-  normal_shift(b, a, p->down_shift);
+  slice_shift(a, b, p->up_shift);
+  slice_shift(b, a, p->down_shift);
   if (!p->along_sweep) return;
   sweep_way(a, b, p->up_way);
   sweep_way(b, a, p->down_way);
@@ -417,18 +411,22 @@ static void bracket_row(const sonde_slicer *s, const slice_candidate *room, cons
   mix_row(s, &w, grey);
 }
 
+// Pixels that no strip speaks for by the search among all candidates.
 static uint64_t fill_tile(const sonde_slicer *s, const rectangle *r, const slice_candidate *room,
-                          uint32_t count) {
+                          uint32_t count, const strip_work *strips) {
   uint64_t reached = 0;
   pair p = {.up = -1}, pairs[PAIRS];
   for (int k = 0; k < PAIRS; ++k) pairs[k].up = -1;
   row_pick pick;
-  bool fast = count && s->options.method == SONDE_SLICE_BRACKET && !s->options.along_sweep;
+  bool fast = s->options.method == SONDE_SLICE_BRACKET && !s->options.along_sweep;
   int32_t met[SLICE_TILE] = {0};
   uint8_t grey[SLICE_TILE];
   for (uint32_t y = 0; y < r->high; ++y) {
     nearest_of_row(s, room, count, y, &pick);
-    if (fast) bracket_row(s, room, &pick, r->wide, (float)y, pairs, met, grey);
+    if (strips)
+      mix_checked_row(strips, y, met, grey);
+    else if (fast)
+      bracket_row(s, room, &pick, r->wide, (float)y, pairs, met, grey);
     size_t at = (size_t)(r->row + y) * s->image->width + r->column;
     uint8_t *out = s->image->pixels + at, *known = s->known ? s->known + at : NULL;
     for (uint32_t x = 0; x < r->wide; ++x) {
@@ -477,27 +475,56 @@ static uint64_t slice_sum_all(const slice_sum *sum) {
   return reached;
 }
 
+// By search where the strips do not cover the tile.
+static uint64_t search_tile(const sonde_slicer *s, const rectangle *tile, uint32_t all,
+                            slice_room *room, const strip_table *table) {
+  uint32_t count = gather_planes(s, tile, room->block, all, &room->spans, room->tile);
+  if (!count) return fill_evenly(s, tile, NULL);
+  for (uint32_t i = 0; i < count; ++i) {
+    slice_candidate *c = &room->candidates[i];
+    c->plane = room->tile[i];
+    start_at(c->plane->forms.u, tile, c->u);
+    start_at(c->plane->forms.v, tile, c->v);
+    start_at(c->plane->forms.d, tile, c->d);
+  }
+  strip_work work;
+  if (table) place_tile(s, table, tile->high, &work);
+  return fill_tile(s, tile, room->candidates, count, table ? &work : NULL);
+}
+
+// Planes of a block, sorted where they make strips.
+static uint32_t gather_block(const sonde_slicer *s, const rectangle *block, slice_room *room) {
+  slice_spans spans = room->spans;
+  for (uint32_t k = 0; k < 3; ++k) spans.form[k] = s->forms + k * s->count;
+  span_all(&spans, s->count, block);
+  uint32_t all = gather_planes(s, block, s->every, s->count, &spans, room->block);
+  find_strips(s, block, all, room);
+  for (uint32_t i = 0; i < all; ++i)
+    for (int k = 0; k < 3; ++k) room->spans.form[k][i] = room->block[i]->forms.d[k];
+  return all;
+}
+
 // Planes of the block first, then of each tile in it.
 static uint64_t slice_block(const sonde_slicer *s, uint32_t column, uint32_t row,
                             slice_room *room) {
   SONDE_ASSERT(s->image != NULL && column < s->image->width && row < s->image->height);
   rectangle block = {column, row, at_most(SLICE_BLOCK, s->image->width - column),
                      at_most(SLICE_BLOCK, s->image->height - row)};
-  uint32_t all = gather(s, &block, s->every, s->count, room->block);
+  uint32_t all = gather_block(s, &block, room);
   uint64_t reached = 0;
   for (uint32_t y = 0; y < block.high; y += SLICE_TILE)
     for (uint32_t x = 0; x < block.wide; x += SLICE_TILE) {
       rectangle tile = {column + x, row + y, at_most(SLICE_TILE, block.wide - x),
                         at_most(SLICE_TILE, block.high - y)};
-      uint32_t count = gather(s, &tile, room->block, all, room->tile);
-      for (uint32_t i = 0; i < count; ++i) {
-        slice_candidate *c = &room->candidates[i];
-        c->plane = room->tile[i];
-        start_at(c->plane->forms.u, &tile, c->u);
-        start_at(c->plane->forms.v, &tile, c->v);
-        start_at(c->plane->forms.d, &tile, c->d);
-      }
-      reached += fill_tile(s, &tile, room->candidates, count);
+      strip_table table;
+      span_all(&room->spans, all, &tile);
+      bool known = fill_table(s, room, &tile, &table);
+      if (known && table.whole) {
+        strip_work work;
+        place_tile(s, &table, tile.high, &work);
+        reached += fill_evenly(s, &tile, &work);
+      } else
+        reached += search_tile(s, &tile, all, room, known ? &table : NULL);
     }
   return reached;
 }
