@@ -18,6 +18,8 @@
 // covers, touches   a plane and the tile
 // plane_covers, find_hiding, gather_planes, gather_block            planes that may be nearest in a
 // rectangle nearest_of_row    for each pixel of a row the nearest candidate on either side
+// outline_of, is_outside   where no frame can be
+// has_foot, distance_at, nearest_of_sorted   the same for one pixel
 // sweep_way         from a pixel to the same pixel of the other frame
 // is_steep          a way that does not graze the plane
 // blend             pair constants of two planes
@@ -31,7 +33,7 @@
 // value_at          one pixel
 // find_pair         remembered
 // meet_row, find_pixels, mix_row, bracket_row   between two frames, a row of a tile at a time
-// fill_tile, search_tile
+// put_pixel, fill_tile, fill_edge, search_tile
 // slice_sum_all     a picture of the sweep's own
 // slice_block
 //
@@ -109,10 +111,12 @@ static uint32_t gather_planes(const sonde_slicer *s, const rectangle *r,
                               const slice_plane *const *from, uint32_t count,
                               const slice_spans *spans, const slice_plane **out) {
   bounds hiding = find_hiding(s, r, from, count, spans);
+  double reach = s->options.gap_m > s->options.reach_m ? s->options.gap_m : s->options.reach_m;
   uint32_t found = 0;
   for (uint32_t i = 0; i < count; ++i) {
     double low = spans->low[i], high = spans->high[i];
     if (!((high >= 0 && low <= hiding.high) || (low < 0 && high >= hiding.low))) continue;
+    if (low > reach || high < -reach) continue; // joined with none, seen from nowhere
     const slice_forms *f = &from[i]->forms;
     if (touches(s, span(f->u, r), span(f->v, r))) out[found++] = from[i];
   }
@@ -143,6 +147,67 @@ static void nearest_of_row(const sonde_slicer *s, const slice_candidate *room, u
       pick->down[x] = down ? (int32_t)k : pick->down[x];
     }
   }
+}
+
+// Bounds of all candidates' columns and rows over a tile, linear in the pixel.
+typedef struct outline {
+  float most[2][3], least[2][3];
+} outline;
+
+static void outline_of(const slice_candidate *room, uint32_t count, outline *o) {
+  for (int i = 0; i < 3; ++i) {
+    o->most[0][i] = o->least[0][i] = room[0].u[i];
+    o->most[1][i] = o->least[1][i] = room[0].v[i];
+  }
+  for (uint32_t k = 1; k < count; ++k)
+    for (int i = 0; i < 3; ++i) {
+      float u = room[k].u[i], v = room[k].v[i];
+      o->most[0][i] = u > o->most[0][i] ? u : o->most[0][i];
+      o->least[0][i] = u < o->least[0][i] ? u : o->least[0][i];
+      o->most[1][i] = v > o->most[1][i] ? v : o->most[1][i];
+      o->least[1][i] = v < o->least[1][i] ? v : o->least[1][i];
+    }
+}
+
+// No candidate can be there.
+static inline bool is_outside(const sonde_slicer *s, const outline *o, float x, float y) {
+  for (int k = 0; k < 2; ++k) {
+    const float *most = o->most[k], *least = o->least[k];
+    if (most[0] + x * most[1] + y * most[2] < s->low[k] - 2 * SLACK) return true;
+    if (least[0] + x * least[1] + y * least[2] > s->high[k] + 2 * SLACK) return true;
+  }
+  return false;
+}
+
+static inline bool has_foot(const sonde_slicer *s, const slice_candidate *c, float x, float y) {
+  float at[2] = {c->u[0] + y * c->u[2] + x * c->u[1], c->v[0] + y * c->v[2] + x * c->v[1]};
+  return at[0] >= s->low[0] - SLACK && at[0] <= s->high[0] + SLACK && at[1] >= s->low[1] - SLACK &&
+         at[1] <= s->high[1] + SLACK;
+}
+
+static inline float distance_at(const slice_candidate *c, float x, float y) {
+  return c->d[0] + y * c->d[2] + x * c->d[1];
+}
+
+// The same for one pixel among candidates sorted by distance: outwards from it.
+static void nearest_of_sorted(const sonde_slicer *s, const slice_candidate *room, uint32_t count,
+                              uint32_t x, float y, row_pick *pick) {
+  uint32_t low = 0, high = count; // the first behind the pixel
+  float at = (float)x;
+  while (low < high) {
+    uint32_t middle = (low + high) / 2;
+    if (distance_at(&room[middle], at, y) < 0)
+      low = middle + 1;
+    else
+      high = middle;
+  }
+  uint32_t up = low, down = low;
+  while (up < count && !has_foot(s, &room[up], at, y)) ++up;
+  while (down && !has_foot(s, &room[down - 1], at, y)) --down;
+  pick->up[x] = up < count ? (int32_t)up : -1;
+  pick->down[x] = (int32_t)down - 1;
+  pick->up_d[x] = up < count ? distance_at(&room[up], at, y) : INFINITY;
+  pick->down_d[x] = down ? distance_at(&room[down - 1], at, y) : -INFINITY;
 }
 
 // Way from a pixel of plane a to the same pixel of plane b, in local coordinates of a.
@@ -411,9 +476,13 @@ static void bracket_row(const sonde_slicer *s, const slice_candidate *room, cons
   mix_row(s, &w, grey);
 }
 
-// Pixels that no strip speaks for by the search among all candidates.
+static inline void put_pixel(const sonde_slicer *s, size_t at, float value) {
+  s->image->pixels[at] = value > 0 ? (uint8_t)(value + 0.5f) : 0;
+  if (s->known) s->known[at] = value >= 0;
+}
+
 static uint64_t fill_tile(const sonde_slicer *s, const rectangle *r, const slice_candidate *room,
-                          uint32_t count, const strip_work *strips) {
+                          uint32_t count) {
   uint64_t reached = 0;
   pair p = {.up = -1}, pairs[PAIRS];
   for (int k = 0; k < PAIRS; ++k) pairs[k].up = -1;
@@ -423,16 +492,37 @@ static uint64_t fill_tile(const sonde_slicer *s, const rectangle *r, const slice
   uint8_t grey[SLICE_TILE];
   for (uint32_t y = 0; y < r->high; ++y) {
     nearest_of_row(s, room, count, y, &pick);
-    if (strips)
-      mix_checked_row(strips, y, met, grey);
-    else if (fast)
-      bracket_row(s, room, &pick, r->wide, (float)y, pairs, met, grey);
+    if (fast) bracket_row(s, room, &pick, r->wide, (float)y, pairs, met, grey);
     size_t at = (size_t)(r->row + y) * s->image->width + r->column;
-    uint8_t *out = s->image->pixels + at, *known = s->known ? s->known + at : NULL;
     for (uint32_t x = 0; x < r->wide; ++x) {
       float value = met[x] ? (float)grey[x] : value_at(s, room, &pick, (int)x, (float)y, &p);
-      out[x] = value > 0 ? (uint8_t)(value + 0.5f) : 0;
-      if (known) known[x] = value >= 0;
+      put_pixel(s, at + x, value);
+      reached += value >= 0;
+    }
+  }
+  return reached;
+}
+
+// A tile in which strips speak for some pixels; the candidates are sorted.
+static uint64_t fill_edge(const sonde_slicer *s, const rectangle *r, const slice_candidate *room,
+                          uint32_t count, const strip_work *strips) {
+  uint64_t reached = 0;
+  pair p = {.up = -1};
+  row_pick pick;
+  outline o;
+  outline_of(room, count, &o);
+  for (uint32_t y = 0; y < r->high; ++y) {
+    uint8_t grey[SLICE_TILE];
+    mix_row_of(strips, y * SLICE_TILE, grey);
+    size_t at = (size_t)(r->row + y) * s->image->width + r->column;
+    for (uint32_t x = 0; x < r->wide; ++x) {
+      float value = (float)grey[x];
+      if (!strips->met[y * SLICE_TILE + x]) {
+        bool outside = is_outside(s, &o, (float)x, (float)y);
+        if (!outside) nearest_of_sorted(s, room, count, x, (float)y, &pick);
+        value = outside ? -1 : value_at(s, room, &pick, (int)x, (float)y, &p);
+      }
+      put_pixel(s, at + x, value);
       reached += value >= 0;
     }
   }
@@ -487,9 +577,10 @@ static uint64_t search_tile(const sonde_slicer *s, const rectangle *tile, uint32
     start_at(c->plane->forms.v, tile, c->v);
     start_at(c->plane->forms.d, tile, c->d);
   }
+  if (!table) return fill_tile(s, tile, room->candidates, count);
   strip_work work;
-  if (table) place_tile(s, table, tile->high, &work);
-  return fill_tile(s, tile, room->candidates, count, table ? &work : NULL);
+  place_tile(s, table, tile->high, &work);
+  return fill_edge(s, tile, room->candidates, count, &work);
 }
 
 // Planes of a block, sorted where they make strips.

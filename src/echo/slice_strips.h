@@ -24,7 +24,7 @@
 // load_greys        four pixels of a frame around each place
 // place_tile
 // mix_apart         bilinear
-// mix_row_of, mix_checked_row
+// mix_row_of
 // fill_evenly       a tile that strips cover, or none
 #ifndef SONDE_SRC_ECHO_SLICE_STRIPS_H
 #define SONDE_SRC_ECHO_SLICE_STRIPS_H
@@ -322,12 +322,6 @@ INLINE void mix_row_of(const strip_work *w, uint32_t first, uint8_t grey[SLICE_T
     value[x] = (int32_t)(near + (far - near) * t[x] + 0.5f);
   }
   for (int x = 0; x < SLICE_TILE; ++x) grey[x] = (uint8_t)value[x];
-}
-
-INLINE void mix_checked_row(const strip_work *w, uint32_t y, int32_t met[SLICE_TILE],
-                            uint8_t grey[SLICE_TILE]) {
-  memcpy(met, w->met + y * SLICE_TILE, SLICE_TILE * sizeof *met);
-  mix_row_of(w, y * SLICE_TILE, grey);
 }
 
 // A tile that strips cover, or a black one without.
