@@ -23,7 +23,7 @@
 // sweep_way         from a pixel to the same pixel of the other frame
 // is_steep          a way that does not graze the plane
 // blend             pair constants of two planes
-// sample            bilinear
+// pixel_of, sample            bilinear
 // sample_foot       a frame straight below a pixel
 // foot, follow      where a line through a pixel meets a frame
 // meet              the points on both frames
@@ -33,7 +33,7 @@
 // value_at          one pixel
 // find_pair         remembered
 // meet_row, find_pixels, mix_row, bracket_row   between two frames, a row of a tile at a time
-// put_pixel, fill_tile, fill_edge, search_tile
+// put_pixel, fill_tile, fill_edge, start_candidate, search_tile, search_edge
 // slice_sum_all     a picture of the sweep's own
 // slice_block
 //
@@ -105,18 +105,23 @@ static bounds find_hiding(const sonde_slicer *s, const rectangle *r, const slice
   return best;
 }
 
+// Planes further away are joined with none and seen from nowhere.
+static inline double reach_of(const sonde_slicer *s) {
+  return s->options.gap_m > s->options.reach_m ? s->options.gap_m : s->options.reach_m;
+}
+
 // Planes that may be nearest somewhere in a rectangle, out of `count` candidates whose spans are
 // known.
 static uint32_t gather_planes(const sonde_slicer *s, const rectangle *r,
                               const slice_plane *const *from, uint32_t count,
                               const slice_spans *spans, const slice_plane **out) {
   bounds hiding = find_hiding(s, r, from, count, spans);
-  double reach = s->options.gap_m > s->options.reach_m ? s->options.gap_m : s->options.reach_m;
+  double reach = reach_of(s);
   uint32_t found = 0;
   for (uint32_t i = 0; i < count; ++i) {
     double low = spans->low[i], high = spans->high[i];
     if (!((high >= 0 && low <= hiding.high) || (low < 0 && high >= hiding.low))) continue;
-    if (low > reach || high < -reach) continue; // joined with none, seen from nowhere
+    if (low > reach || high < -reach) continue;
     const slice_forms *f = &from[i]->forms;
     if (touches(s, span(f->u, r), span(f->v, r))) out[found++] = from[i];
   }
@@ -169,12 +174,15 @@ static void outline_of(const slice_candidate *room, uint32_t count, outline *o) 
     }
 }
 
-// No candidate can be there.
-static inline bool is_outside(const sonde_slicer *s, const outline *o, float x, float y) {
+// No candidate reaches any of `wide` x `high` pixels from (x, y).
+static inline bool is_outside(const sonde_slicer *s, const outline *o, float x, float y, float wide,
+                              float high) {
   for (int k = 0; k < 2; ++k) {
     const float *most = o->most[k], *least = o->least[k];
-    if (most[0] + x * most[1] + y * most[2] < s->low[k] - 2 * SLACK) return true;
-    if (least[0] + x * least[1] + y * least[2] > s->high[k] + 2 * SLACK) return true;
+    float top = most[0] + x * most[1] + y * most[2], low = least[0] + x * least[1] + y * least[2];
+    top += (most[1] > 0 ? wide * most[1] : 0) + (most[2] > 0 ? high * most[2] : 0);
+    low += (least[1] < 0 ? wide * least[1] : 0) + (least[2] < 0 ? high * least[2] : 0);
+    if (top < s->low[k] - 2 * SLACK || low > s->high[k] + 2 * SLACK) return true;
   }
   return false;
 }
@@ -248,20 +256,31 @@ static inline float limit(float x, float low, float high) {
   return x < low ? low : (x > high ? high : x);
 }
 
-static inline float sample(const sonde_slicer *s, const uint8_t *pixels, float u, float v) {
+// Pixel (i, j) of the frame; with lines, where the strips have read already.
+static inline const uint8_t *pixel_of(const sonde_slicer *s, const slice_plane *plane, uint32_t i,
+                                      uint32_t j) {
+  const slice_layout *l = &s->layout;
+  if (!l->lines) return plane->pixels + (size_t)j * s->width + i;
+  int32_t x = (int32_t)i - (int32_t)s->low[0], y = (int32_t)j - (int32_t)s->low[1];
+  return l->lines + plane->place + x + y * l->row + x / (SLICE_LINE_WIDE - 1) * l->column_line +
+         y / (SLICE_LINE_HIGH - 1) * l->row_line;
+}
+
+static inline float sample(const sonde_slicer *s, const slice_plane *plane, float u, float v) {
   u = limit(u, s->low[0], s->high[0]);
   v = limit(v, s->low[1], s->high[1]);
   uint32_t iu = (uint32_t)limit(u, s->low[0], s->high[0] - 1);
   uint32_t iv = (uint32_t)limit(v, s->low[1], s->high[1] - 1);
   float a = u - (float)iu, b = v - (float)iv;
-  const uint8_t *p = pixels + (size_t)iv * s->width + iu, *q = p + s->width;
+  const uint8_t *p = pixel_of(s, plane, iu, iv);
+  const uint8_t *q = p + (s->layout.lines ? SLICE_LINE_WIDE : s->width);
   float top = (float)p[0] + a * (float)(p[1] - p[0]), low = (float)q[0] + a * (float)(q[1] - q[0]);
   return top + b * (low - top);
 }
 
 // A frame at pixel (x, y) of the tile, straight below it.
 static inline float sample_foot(const sonde_slicer *s, const slice_candidate *c, float x, float y) {
-  return sample(s, c->plane->pixels, c->u[0] + y * c->u[2] + x * c->u[1],
+  return sample(s, c->plane, c->u[0] + y * c->u[2] + x * c->u[1],
                 c->v[0] + y * c->v[2] + x * c->v[1]);
 }
 
@@ -357,7 +376,7 @@ static inline float between(const sonde_slicer *s, const slice_candidate *room, 
   float t = a / (a + b);
   if (s->options.method == SONDE_SLICE_KRIGE)
     return up < down ? krige(s, up, m, down, n, t, a + b) : krige(s, down, n, up, m, 1 - t, a + b);
-  float near = sample(s, up->pixels, m[0], m[1]), far = sample(s, down->pixels, n[0], n[1]);
+  float near = sample(s, up, m[0], m[1]), far = sample(s, down, n[0], n[1]);
   return near + (far - near) * t;
 }
 
@@ -505,12 +524,10 @@ static uint64_t fill_tile(const sonde_slicer *s, const rectangle *r, const slice
 
 // A tile in which strips speak for some pixels; the candidates are sorted.
 static uint64_t fill_edge(const sonde_slicer *s, const rectangle *r, const slice_candidate *room,
-                          uint32_t count, const strip_work *strips) {
+                          uint32_t count, const outline *o, const strip_work *strips) {
   uint64_t reached = 0;
   pair p = {.up = -1};
   row_pick pick;
-  outline o;
-  outline_of(room, count, &o);
   for (uint32_t y = 0; y < r->high; ++y) {
     uint8_t grey[SLICE_TILE];
     mix_row_of(strips, y * SLICE_TILE, grey);
@@ -518,7 +535,7 @@ static uint64_t fill_edge(const sonde_slicer *s, const rectangle *r, const slice
     for (uint32_t x = 0; x < r->wide; ++x) {
       float value = (float)grey[x];
       if (!strips->met[y * SLICE_TILE + x]) {
-        bool outside = is_outside(s, &o, (float)x, (float)y);
+        bool outside = is_outside(s, o, (float)x, (float)y, 0, 0);
         if (!outside) nearest_of_sorted(s, room, count, x, (float)y, &pick);
         value = outside ? -1 : value_at(s, room, &pick, (int)x, (float)y, &p);
       }
@@ -550,7 +567,7 @@ static uint64_t slice_sum_all(const slice_sum *sum) {
               sum->maps[k][i][0] * (float)x + sum->maps[k][i][1] * (float)y + sum->maps[k][i][2];
         met += is_inside(s, at);
         if (met && is_still(s, at)) { // the first frame that is there speaks for all
-          value = sample(s, sum->planes[k]->pixels, at[0], at[1]);
+          value = sample(s, sum->planes[k], at[0], at[1]);
           met = sum->n;
           break;
         }
@@ -565,22 +582,38 @@ static uint64_t slice_sum_all(const slice_sum *sum) {
   return reached;
 }
 
-// By search where the strips do not cover the tile.
+static void start_candidate(const slice_plane *plane, const rectangle *tile, slice_candidate *c) {
+  c->plane = plane;
+  start_at(plane->forms.u, tile, c->u);
+  start_at(plane->forms.v, tile, c->v);
+  start_at(plane->forms.d, tile, c->d);
+}
+
+// Without strips.
 static uint64_t search_tile(const sonde_slicer *s, const rectangle *tile, uint32_t all,
-                            slice_room *room, const strip_table *table) {
+                            slice_room *room) {
   uint32_t count = gather_planes(s, tile, room->block, all, &room->spans, room->tile);
   if (!count) return fill_evenly(s, tile, NULL);
-  for (uint32_t i = 0; i < count; ++i) {
-    slice_candidate *c = &room->candidates[i];
-    c->plane = room->tile[i];
-    start_at(c->plane->forms.u, tile, c->u);
-    start_at(c->plane->forms.v, tile, c->v);
-    start_at(c->plane->forms.d, tile, c->d);
-  }
-  if (!table) return fill_tile(s, tile, room->candidates, count);
+  for (uint32_t i = 0; i < count; ++i) start_candidate(room->tile[i], tile, &room->candidates[i]);
+  return fill_tile(s, tile, room->candidates, count);
+}
+
+// Where strips do not speak for every pixel: all planes of the block within reach.
+static uint64_t search_edge(const sonde_slicer *s, const rectangle *tile, uint32_t all,
+                            slice_room *room, const strip_table *table) {
+  double reach = reach_of(s);
+  uint32_t count = 0;
+  for (uint32_t i = 0; i < all; ++i)
+    if (room->spans.low[i] <= reach && room->spans.high[i] >= -reach)
+      start_candidate(room->block[i], tile, &room->candidates[count++]);
+  SONDE_ASSERT(count > 0);
+  outline o;
   strip_work work;
+  outline_of(room->candidates, count, &o);
+  if (is_outside(s, &o, 0, 0, (float)tile->wide, (float)tile->high))
+    return fill_evenly(s, tile, NULL);
   place_tile(s, table, tile->high, &work);
-  return fill_edge(s, tile, room->candidates, count, &work);
+  return fill_edge(s, tile, room->candidates, count, &o, &work);
 }
 
 // Planes of a block, sorted where they make strips.
@@ -603,19 +636,21 @@ static uint64_t slice_block(const sonde_slicer *s, uint32_t column, uint32_t row
                      at_most(SLICE_BLOCK, s->image->height - row)};
   uint32_t all = gather_block(s, &block, room);
   uint64_t reached = 0;
+  strip_table table = {.count = 0};
   for (uint32_t y = 0; y < block.high; y += SLICE_TILE)
     for (uint32_t x = 0; x < block.wide; x += SLICE_TILE) {
       rectangle tile = {column + x, row + y, at_most(SLICE_TILE, block.wide - x),
                         at_most(SLICE_TILE, block.high - y)};
-      strip_table table;
       span_all(&room->spans, all, &tile);
-      bool known = fill_table(s, room, &tile, &table);
-      if (known && table.whole) {
+      if (!fill_table(s, room, &tile, &table))
+        reached += search_tile(s, &tile, all, room);
+      else if (!table.whole)
+        reached += search_edge(s, &tile, all, room, &table);
+      else {
         strip_work work;
         place_tile(s, &table, tile.high, &work);
         reached += fill_evenly(s, &tile, &work);
-      } else
-        reached += search_tile(s, &tile, all, room, known ? &table : NULL);
+      }
     }
   return reached;
 }

@@ -16,12 +16,12 @@
 // widest            distance of two planes
 // fill_lane, find_limits, fill_table        a tile's strips
 // look_up           a number of 16 pixels' strips
-// within            bounds
+// at_most_of, at_least_of   bounds
 // find_index        the strip of each pixel of a row
 // place_pixels      where in the frame, and how far between its pixels
 // check             pixels for which the strip speaks
 // place_row         a row of a tile
-// load_greys        four pixels of a frame around each place
+// ask_for, load_greys        four pixels of a frame around each place
 // place_tile
 // mix_apart         bilinear
 // mix_row_of
@@ -126,7 +126,7 @@ static bool strips_cover(const sonde_slicer *s, const rectangle *r, const slice_
     if (most > s->options.gap_m) return false;
     for (int k = 0; k < 4; ++k) {
       bounds b = span(strips[i].forms[k], r);
-      double margin = most * strips[i].lean[k & 1] - (double)SLACK;
+      double margin = most * strips[i].lean[k & 1] - 0.1 * (double)SLACK; // unbounded later
       if (b.low < s->low[k & 1] + margin || b.high > s->high[k & 1] - margin) return false;
     }
   }
@@ -193,7 +193,7 @@ static bool fill_table(const sonde_slicer *s, const slice_room *room, const rect
   uint32_t first = planes[0] ? planes[0] - 1 : 0, last = at_most(planes[1], room->strip_count);
   if (last <= first || last - first > STRIPS) return false;
   const slice_strip *strips = room->strips + first;
-  *table = (strip_table){.count = last - first};
+  table->count = last - first;
   table->whole = !ends && (room->covered || strips_cover(s, tile, strips, table->count));
   for (uint32_t i = 0; i < table->count; ++i) fill_lane(s, tile, &strips[i], i, table);
   if (!table->whole) find_limits(s, tile, strips, table);
@@ -218,14 +218,23 @@ INLINE vi look_up(const void *table, vi index) {
 #endif
 }
 
-// What is no number becomes 0.
-INLINE vf within(vf a, float most) {
+INLINE vf at_most_of(vf a, float most) {
 #if defined(__AVX512F__)
-  return (vf)_mm512_min_ps(_mm512_max_ps((__m512)a, (__m512)all(0)), (__m512)all(most));
+  return (vf)_mm512_min_ps((__m512)a, (__m512)all(most));
 #elif defined(__AVX2__)
-  return (vf)_mm256_min_ps(_mm256_max_ps((__m256)a, (__m256)all(0)), (__m256)all(most));
+  return (vf)_mm256_min_ps((__m256)a, (__m256)all(most));
 #else
-  return smaller(larger(a, all(0)), all(most));
+  return smaller(a, all(most));
+#endif
+}
+
+INLINE vf at_least_of(vf a, float least) {
+#if defined(__AVX512F__)
+  return (vf)_mm512_max_ps((__m512)a, (__m512)all(least));
+#elif defined(__AVX2__)
+  return (vf)_mm256_max_ps((__m256)a, (__m256)all(least));
+#else
+  return larger(a, all(least));
 #endif
 }
 
@@ -239,8 +248,7 @@ INLINE vi find_index(const strip_table *table, vf x, float y) {
 INLINE void place_pixels(const sonde_slicer *s, vf u, vf v, vi frame, int side, uint32_t first,
                          strip_work *w) {
   float wide = s->high[0] - s->low[0], high = s->high[1] - s->low[1];
-  u = within(u, wide), v = within(v, high);
-  vi i = whole(within(u, wide - 1)), j = whole(within(v, high - 1));
+  vi i = whole(at_most_of(u, wide - 1)), j = whole(at_most_of(v, high - 1));
   vf left = real(i), top = real(j);
   vi p = whole((left + 0.5f) * (1.0f / (SLICE_LINE_WIDE - 1)));
   vi q = whole((top + 0.5f) * (1.0f / (SLICE_LINE_HIGH - 1)));
@@ -255,13 +263,15 @@ INLINE vi check(const sonde_slicer *s, const strip_table *table, vf value[SLICE_
   vi hit = (value[4] >= 0) & (value[5] > 0) & (value[4] + value[5] <= (float)s->options.gap_m);
   for (int k = 0; k < 4; ++k)
     hit = hit & (value[k] >= table->low[k & 1]) & (value[k] <= table->high[k & 1]);
+  for (int k = 0; k < 4; ++k)
+    value[k] = at_least_of(at_most_of(value[k], s->high[k & 1] - s->low[k & 1]), 0);
   value[4] = only(hit, value[4]), value[5] = pick(hit, value[5], all(1));
   return hit;
 }
 
 // A row of a tile.
-INLINE void place_row(const sonde_slicer *s, const strip_table *table, float row, uint32_t first,
-                      strip_work *w) {
+INLINE void place_row(const sonde_slicer *s, const strip_table *table, bool checked, float row,
+                      uint32_t first, strip_work *w) {
   static const float lanes[] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
   float starts[SLICE_FORMS][STRIPS];
   for (int f = 0; f < SLICE_FORMS; ++f)
@@ -272,7 +282,7 @@ INLINE void place_row(const sonde_slicer *s, const strip_table *table, float row
     vi index = find_index(table, x, row);
     for (int f = 0; f < SLICE_FORMS; ++f)
       value[f] = (vf)look_up(starts[f], index) + x * (vf)look_up(table->column[f], index);
-    if (!table->whole) {
+    if (checked) {
       vi met = check(s, table, value);
       memcpy(w->met + first + k, &met, sizeof met);
     }
@@ -284,24 +294,38 @@ INLINE void place_row(const sonde_slicer *s, const strip_table *table, float row
 }
 
 // Pixels around many places: many loads are under way at once.
-static void load_greys(const slice_layout *layout, const int32_t *place, uint32_t count,
-                       uint64_t *greys) {
+static void load_greys(const slice_layout *layout, uint32_t count, strip_work *w) {
   const uint8_t *pixels = layout->pixels;
   size_t row = (size_t)layout->row;
-  if (layout->lines)
-    for (uint32_t i = 0; i < count; ++i) memcpy(&greys[i], pixels + place[i], sizeof greys[i]);
-  else
-    for (uint32_t i = 0; i < count; ++i) {
+  for (int side = 0; side < 2; ++side) {
+    const int32_t *place = w->place[side];
+    uint64_t *greys = w->greys[side];
+    for (uint32_t i = 0; layout->lines && i < count; i += 8)
+      for (uint32_t k = 0; k < 8; ++k) memcpy(&greys[i + k], pixels + place[i + k], sizeof *greys);
+    for (uint32_t i = 0; !layout->lines && i < count; ++i) {
       const uint8_t *p = pixels + place[i];
       greys[i] = two_greys(p) | two_greys(p + row) << 48;
     }
+  }
+}
+
+// Most lines of memory that a row will read.
+INLINE void ask_for(const slice_layout *layout, const strip_work *w, uint32_t first) {
+  for (uint32_t x = 0; x < SLICE_TILE; x += 4)
+    for (int side = 0; side < 2; ++side)
+      __builtin_prefetch(layout->pixels + w->place[side][first + x]);
 }
 
 static void place_tile(const sonde_slicer *s, const strip_table *table, uint32_t high,
                        strip_work *w) {
-  for (uint32_t y = 0; y < high; ++y) place_row(s, table, (float)y, y * SLICE_TILE, w);
-  for (int side = 0; side < 2; ++side)
-    load_greys(&s->layout, w->place[side], high * SLICE_TILE, w->greys[side]);
+  for (uint32_t y = 0; y < high; ++y) {
+    if (table->whole)
+      place_row(s, table, false, (float)y, y * SLICE_TILE, w);
+    else
+      place_row(s, table, true, (float)y, y * SLICE_TILE, w);
+    ask_for(&s->layout, w, y * SLICE_TILE);
+  }
+  load_greys(&s->layout, high * SLICE_TILE, w);
 }
 
 // Four greys of which two stand in bytes 0 and 1, two in 6 and 7.
