@@ -1,7 +1,7 @@
 // Creating a slicer and rendering with it.
 //
 // plane_of                      map from the world onto a frame
-// make_room, make_rooms         scratch of the workers
+// make_strips, make_room, make_rooms, clear_room   scratch of the workers
 // fill_lines, lay_out           frames where many pictures read them fast
 // used_between                  frames counted between two
 // sonde_slice_is_left_out
@@ -89,16 +89,44 @@ sonde_status sonde_slicer_check(const sonde_sequence *s, const sonde_slicer_opti
   return SONDE_OK;
 }
 
+static bool make_strips(slice_strips *strips, size_t count) {
+  size_t lanes = count + SLICE_STRIPS;
+  double *wide = SONDE_NEW(double, (3 * SLICE_FORMS + 2) * lanes);
+  float *narrow = SONDE_NEW(float, 2 * SLICE_FORMS * lanes);
+  int32_t *places = SONDE_NEW(int32_t, 2 * lanes);
+  strips->forms[0][0] = wide, strips->steps[0][0] = narrow, strips->place[0] = places;
+  if (!wide || !narrow || !places) return false;
+  for (size_t f = 0; f < SLICE_FORMS; ++f) {
+    for (size_t k = 0; k < 3; ++k) strips->forms[f][k] = wide + (3 * f + k) * lanes;
+    for (size_t k = 0; k < 2; ++k) strips->steps[f][k] = narrow + (2 * f + k) * lanes;
+  }
+  for (size_t k = 0; k < 2; ++k) {
+    strips->place[k] = places + k * lanes;
+    strips->lean[k] = wide + (3 * SLICE_FORMS + k) * lanes;
+  }
+  return true;
+}
+
 static bool make_room(slice_room *room, uint32_t count) {
   room->candidates = SONDE_NEW(slice_candidate, count);
   room->block = SONDE_NEW(const slice_plane *, count);
   room->tile = SONDE_NEW(const slice_plane *, count);
-  room->strips = SONDE_NEW(slice_strip, count);
   double *numbers = SONDE_NEW(double, 5 * (size_t)count);
   for (uint32_t k = 0; k < 3; ++k) room->spans.form[k] = numbers ? numbers + k * count : NULL;
   room->spans.low = numbers ? numbers + 3 * (size_t)count : NULL;
   room->spans.high = numbers ? numbers + 4 * (size_t)count : NULL;
-  return room->candidates && room->block && room->tile && room->strips && numbers;
+  bool strips = make_strips(&room->strips, count);
+  return room->candidates && room->block && room->tile && strips && numbers;
+}
+
+static void clear_room(slice_room *room) {
+  sonde_free(room->candidates);
+  sonde_free(room->block);
+  sonde_free(room->tile);
+  sonde_free(room->spans.form[0]);
+  sonde_free(room->strips.forms[0][0]);
+  sonde_free(room->strips.steps[0][0]);
+  sonde_free(room->strips.place[0]);
 }
 
 static bool make_rooms(sonde_slicer *slicer, uint32_t count) {
@@ -123,8 +151,11 @@ static void fill_lines(const sonde_slicer *slicer, const slice_plane *plane) {
   for (uint32_t u = 0; u < wide - 1; u += SLICE_LINE_WIDE - 1)
     for (uint32_t v = 0; v < high - 1; v += SLICE_LINE_HIGH - 1, line += SLICE_LINE)
       for (uint32_t j = 0; j < SLICE_LINE_HIGH && v + j < high; ++j) {
-        uint32_t bytes = wide - u < SLICE_LINE_WIDE ? wide - u : SLICE_LINE_WIDE;
-        memcpy(line + j * SLICE_LINE_WIDE, from + (size_t)(v + j) * slicer->width + u, bytes);
+        const uint8_t *row = from + (size_t)(v + j) * slicer->width + u;
+        if (wide - u >= SLICE_LINE_WIDE)
+          memcpy(line + j * SLICE_LINE_WIDE, row, SLICE_LINE_WIDE);
+        else
+          memcpy(line + j * SLICE_LINE_WIDE, row, wide - u);
       }
 }
 
@@ -201,13 +232,7 @@ sonde_status sonde_slicer_create_with(const sonde_sequence *s, const sonde_slice
 void sonde_slicer_destroy(sonde_slicer *slicer) {
   if (!slicer) return;
   sonde_free(slicer->planes);
-  for (uint32_t k = 0; slicer->rooms && k < slicer->workers; ++k) {
-    sonde_free(slicer->rooms[k].candidates);
-    sonde_free(slicer->rooms[k].block);
-    sonde_free(slicer->rooms[k].tile);
-    sonde_free(slicer->rooms[k].spans.form[0]);
-    sonde_free(slicer->rooms[k].strips);
-  }
+  for (uint32_t k = 0; slicer->rooms && k < slicer->workers; ++k) clear_room(&slicer->rooms[k]);
   sonde_free(slicer->rooms);
   sonde_free(slicer->every);
   sonde_free(slicer->forms);

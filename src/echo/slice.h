@@ -95,12 +95,15 @@ typedef struct slice_candidate {
 
 // What is linear in the picture's pixels between two planes, in front (d < 0) and behind: column
 // and row where a pixel's line meets the plane behind, the same in front, distance of both (m).
-enum { SLICE_FORMS = 6 };
-typedef struct slice_strip {
-  const slice_plane *behind, *front;
-  double forms[SLICE_FORMS][3];
-  double lean[2]; // most columns and rows from a pixel's foot to where its line meets, per metre
-} slice_strip;
+// Value at pixel (0, 0), per column, per row.
+enum { SLICE_FORMS = 6, SLICE_STRIPS = 16 };
+typedef struct slice_strips {
+  double *forms[SLICE_FORMS][3]; // [count + SLICE_STRIPS]
+  float *steps[SLICE_FORMS][2];  // per column and row, rounded
+  int32_t *place[2];             // of the frames: behind and in front
+  double *lean[2]; // most columns and rows from a pixel's foot to where its line meets, per metre
+  uint32_t count;
+} slice_strips;
 
 typedef struct slice_kernels slice_kernels;
 
@@ -126,9 +129,8 @@ typedef struct slice_room {
   slice_candidate *candidates;       // [count]
   const slice_plane **block, **tile; // [count]
   slice_spans spans;                 // of the block's planes
-  slice_strip *strips;               // [count] of the block, none where planes cross
-  uint32_t strip_count;
-  bool covered; // by both frames of each strip
+  slice_strips strips;               // of the block, none where planes cross
+  bool covered;                      // by both frames of each strip
 } slice_room;
 
 struct sonde_slicer {

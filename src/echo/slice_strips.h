@@ -14,7 +14,7 @@
 // find_strips       of a block
 // count_planes      in front of all and of some of a tile's pixels
 // widest            distance of two planes
-// fill_lane, find_limits, fill_table        a tile's strips
+// fill_lanes, find_limits, fill_table        a tile's strips
 // look_up           a number of 16 pixels' strips
 // at_most_of, at_least_of   bounds
 // find_index        the strip of each pixel of a row
@@ -33,7 +33,7 @@
 
 #include "echo/kernel_vector.h"
 
-enum { STRIPS = 16, TILE_PIXELS = SLICE_TILE * SLICE_TILE };
+enum { STRIPS = SLICE_STRIPS, TILE_PIXELS = SLICE_TILE * SLICE_TILE };
 
 // Numbers of a tile's strips at its first pixel, and per column and row. Columns and rows of the
 // frames count from the used part.
@@ -92,42 +92,48 @@ static void shift_between(const slice_plane *a, const slice_plane *b, float shif
     slice_shift(a, b, shift);
 }
 
-static void make_strip(const slice_plane *front, const slice_plane *behind, slice_strip *strip) {
+static void make_strip(const slice_plane *front, const slice_plane *behind, uint32_t i,
+                       slice_strips *strips) {
   float behind_shift[2], front_shift[2];
   shift_between(behind, front, behind_shift);
   shift_between(front, behind, front_shift);
-  strip->front = front, strip->behind = behind;
+  strips->place[0][i] = behind->place, strips->place[1][i] = front->place;
   for (int k = 0; k < 3; ++k) {
     double a = behind->forms.d[k], b = -front->forms.d[k];
-    strip->forms[0][k] = behind->forms.u[k] - a * (double)behind_shift[0];
-    strip->forms[1][k] = behind->forms.v[k] - a * (double)behind_shift[1];
-    strip->forms[2][k] = front->forms.u[k] + b * (double)front_shift[0];
-    strip->forms[3][k] = front->forms.v[k] + b * (double)front_shift[1];
-    strip->forms[4][k] = a;
-    strip->forms[5][k] = b;
+    strips->forms[0][k][i] = behind->forms.u[k] - a * (double)behind_shift[0];
+    strips->forms[1][k][i] = behind->forms.v[k] - a * (double)behind_shift[1];
+    strips->forms[2][k][i] = front->forms.u[k] + b * (double)front_shift[0];
+    strips->forms[3][k][i] = front->forms.v[k] + b * (double)front_shift[1];
+    strips->forms[4][k][i] = a;
+    strips->forms[5][k][i] = b;
   }
+  for (int f = 0; f < SLICE_FORMS; ++f)
+    for (int k = 0; k < 2; ++k) strips->steps[f][k][i] = (float)strips->forms[f][k + 1][i];
   for (int k = 0; k < 2; ++k) {
     double a = fabs((double)behind_shift[k]), b = fabs((double)front_shift[k]);
-    strip->lean[k] = a > b ? a : b;
+    strips->lean[k][i] = a > b ? a : b;
   }
 }
 
-// Largest distance of both planes from each other.
-static double widest(const slice_strip *strip, const rectangle *r) {
-  const double *a = strip->forms[4], *b = strip->forms[5];
-  return span((const double[3]){a[0] + b[0], a[1] + b[1], a[2] + b[2]}, r).high;
+// Largest distance of both planes of a strip from each other.
+static double widest(const slice_strips *s, uint32_t i, const rectangle *r) {
+  double gap[3];
+  for (int k = 0; k < 3; ++k) gap[k] = s->forms[4][k][i] + s->forms[5][k][i];
+  return span(gap, r).high;
 }
 
 // Also that the frames are near enough to be joined.
-static bool strips_cover(const sonde_slicer *s, const rectangle *r, const slice_strip *strips,
-                         uint32_t count) {
-  for (uint32_t i = 0; i < count; ++i) {
-    double most = widest(&strips[i], r);
+static bool strips_cover(const sonde_slicer *s, const rectangle *r, const slice_strips *strips,
+                         uint32_t first, uint32_t last) {
+  for (uint32_t i = first; i < last; ++i) {
+    double most = widest(strips, i, r);
     if (most > s->options.gap_m) return false;
-    for (int k = 0; k < 4; ++k) {
-      bounds b = span(strips[i].forms[k], r);
-      double margin = most * strips[i].lean[k & 1] - 0.1 * (double)SLACK; // unbounded later
-      if (b.low < s->low[k & 1] + margin || b.high > s->high[k & 1] - margin) return false;
+    for (int f = 0; f < 4; ++f) {
+      double *const *form = strips->forms[f];
+      bounds b = span((const double[3]){form[0][i], form[1][i], form[2][i]}, r);
+      double margin = most * strips->lean[f & 1][i] - 0.1 * (double)SLACK; // unbounded later
+      if (b.low < (double)s->low[f & 1] + margin || b.high > (double)s->high[f & 1] - margin)
+        return false;
     }
   }
   return true;
@@ -136,45 +142,48 @@ static bool strips_cover(const sonde_slicer *s, const rectangle *r, const slice_
 // Sorts the block's planes; none when they cross.
 static void find_strips(const sonde_slicer *s, const rectangle *r, uint32_t count,
                         slice_room *room) {
-  room->strip_count = 0;
+  slice_strips *strips = &room->strips;
+  strips->count = 0;
   if (!s->has_strips || count < 2) return;
   sort_planes(r, room->block, count, room->spans.low);
   if (!are_ordered(r, room->block, count)) return;
-  room->strip_count = count - 1;
+  strips->count = count - 1;
   for (uint32_t i = 0; i + 1 < count; ++i)
-    make_strip(room->block[i], room->block[i + 1], &room->strips[i]);
-  room->covered = strips_cover(s, r, room->strips, count - 1);
+    make_strip(room->block[i], room->block[i + 1], i, strips);
+  room->covered = strips_cover(s, r, strips, 0, count - 1);
 }
 
 // Planes that are in front of (d < 0) all, and of some, of a tile's pixels.
 static void count_planes(const slice_room *room, uint32_t count[2]) {
   count[0] = count[1] = 0;
-  for (uint32_t i = 0; i <= room->strip_count; ++i) {
+  for (uint32_t i = 0; i <= room->strips.count; ++i) {
     count[0] += room->spans.high[i] < 0;
     count[1] += room->spans.low[i] < 0;
   }
 }
 
-static void fill_lane(const sonde_slicer *s, const rectangle *tile, const slice_strip *strip,
-                      uint32_t lane, strip_table *table) {
+static void fill_lanes(const sonde_slicer *s, const rectangle *tile, const slice_strips *strips,
+                       uint32_t first, strip_table *table) {
+  double x = tile->column, y = tile->row;
   for (int f = 0; f < SLICE_FORMS; ++f) {
-    const double *form = strip->forms[f];
-    double start = f < 4 ? (double)s->low[f & 1] : 0;
-    table->at[f][lane] = (float)(form[0] + form[1] * tile->column + form[2] * tile->row - start);
-    table->column[f][lane] = (float)form[1];
-    table->row[f][lane] = (float)form[2];
+    const double *at = strips->forms[f][0] + first, *column = strips->forms[f][1] + first;
+    const double *row = strips->forms[f][2] + first, start = f < 4 ? (double)s->low[f & 1] : 0;
+    float *to = table->at[f];
+    for (int k = 0; k < STRIPS; ++k) to[k] = (float)(at[k] + column[k] * x + row[k] * y - start);
+    memcpy(table->column[f], strips->steps[f][0] + first, sizeof table->column[f]);
+    memcpy(table->row[f], strips->steps[f][1] + first, sizeof table->row[f]);
   }
-  table->frame[0][lane] = strip->behind->place;
-  table->frame[1][lane] = strip->front->place;
+  for (int side = 0; side < 2; ++side)
+    memcpy(table->frame[side], strips->place[side] + first, sizeof table->frame[side]);
 }
 
 // Where a line that meets both frames starts from a foot on both.
-static void find_limits(const sonde_slicer *s, const rectangle *tile, const slice_strip *strips,
-                        strip_table *table) {
+static void find_limits(const sonde_slicer *s, const rectangle *tile, const slice_strips *strips,
+                        uint32_t first, strip_table *table) {
   double margin[2] = {0, 0};
-  for (uint32_t i = 0; i < table->count; ++i)
+  for (uint32_t i = first; i < first + table->count; ++i)
     for (int k = 0; k < 2; ++k) {
-      double lean = strips[i].lean[k] * widest(&strips[i], tile);
+      double lean = strips->lean[k][i] * widest(strips, i, tile);
       margin[k] = lean > margin[k] ? lean : margin[k];
     }
   for (int k = 0; k < 2; ++k) {
@@ -186,17 +195,17 @@ static void find_limits(const sonde_slicer *s, const rectangle *tile, const slic
 // False when the tile has no strip or too many.
 static bool fill_table(const sonde_slicer *s, const slice_room *room, const rectangle *tile,
                        strip_table *table) {
+  const slice_strips *strips = &room->strips;
   uint32_t planes[2];
-  if (!room->strip_count) return false;
+  if (!strips->count) return false;
   count_planes(room, planes);
-  bool ends = planes[0] == 0 || planes[1] > room->strip_count; // a pixel has planes on one side
-  uint32_t first = planes[0] ? planes[0] - 1 : 0, last = at_most(planes[1], room->strip_count);
+  bool ends = planes[0] == 0 || planes[1] > strips->count; // a pixel has planes on one side
+  uint32_t first = planes[0] ? planes[0] - 1 : 0, last = at_most(planes[1], strips->count);
   if (last <= first || last - first > STRIPS) return false;
-  const slice_strip *strips = room->strips + first;
   table->count = last - first;
-  table->whole = !ends && (room->covered || strips_cover(s, tile, strips, table->count));
-  for (uint32_t i = 0; i < table->count; ++i) fill_lane(s, tile, &strips[i], i, table);
-  if (!table->whole) find_limits(s, tile, strips, table);
+  table->whole = !ends && (room->covered || strips_cover(s, tile, strips, first, last));
+  fill_lanes(s, tile, strips, first, table);
+  if (!table->whole) find_limits(s, tile, strips, first, table);
   return true;
 }
 
