@@ -33,7 +33,7 @@
 // value_at          one pixel
 // find_pair         remembered
 // meet_row, find_pixels, mix_row, bracket_row   between two frames, a row of a tile at a time
-// put_pixel, fill_tile, fill_edge, start_candidate, search_tile, search_edge
+// put_pixel, fill_tile, search_pixel, fill_edge, start_candidate, search_tile, search_edge
 // slice_sum_all     a picture of the sweep's own
 // slice_block
 //
@@ -522,23 +522,33 @@ static uint64_t fill_tile(const sonde_slicer *s, const rectangle *r, const slice
   return reached;
 }
 
-// A tile in which strips speak for some pixels; the candidates are sorted.
+// One pixel that no strip speaks for; the candidates are sorted.
+static float search_pixel(const sonde_slicer *s, const slice_candidate *room, uint32_t count,
+                          uint32_t x, float y, const outline *o, pair pairs[PAIRS]) {
+  row_pick pick;
+  if (is_outside(s, o, (float)x, y, 0, 0)) return -1;
+  nearest_of_sorted(s, room, count, x, y, &pick);
+  bool both = pick.up[x] >= 0 && pick.down[x] >= 0;
+  pair *p = both ? find_pair(s, room, pick.up[x], pick.down[x], pairs) : pairs;
+  return value_at(s, room, &pick, (int)x, y, p);
+}
+
+// A tile in which strips speak for some pixels.
 static uint64_t fill_edge(const sonde_slicer *s, const rectangle *r, const slice_candidate *room,
                           uint32_t count, const outline *o, const strip_work *strips) {
   uint64_t reached = 0;
-  pair p = {.up = -1};
-  row_pick pick;
+  pair pairs[PAIRS];
+  for (int k = 0; k < PAIRS; ++k) pairs[k].up = -1;
   for (uint32_t y = 0; y < r->high; ++y) {
     uint8_t grey[SLICE_TILE];
+    const int32_t *met = strips->met + y * SLICE_TILE;
+    int32_t every = -1;
     mix_row_of(strips, y * SLICE_TILE, grey);
+    for (int x = 0; x < SLICE_TILE; ++x) every &= met[x];
     size_t at = (size_t)(r->row + y) * s->image->width + r->column;
-    for (uint32_t x = 0; x < r->wide; ++x) {
-      float value = (float)grey[x];
-      if (!strips->met[y * SLICE_TILE + x]) {
-        bool outside = is_outside(s, o, (float)x, (float)y, 0, 0);
-        if (!outside) nearest_of_sorted(s, room, count, x, (float)y, &pick);
-        value = outside ? -1 : value_at(s, room, &pick, (int)x, (float)y, &p);
-      }
+    if (every) reached += put_row(s, at, r->wide, grey, true);
+    for (uint32_t x = 0; x < r->wide && !every; ++x) {
+      float value = met[x] ? (float)grey[x] : search_pixel(s, room, count, x, (float)y, o, pairs);
       put_pixel(s, at + x, value);
       reached += value >= 0;
     }

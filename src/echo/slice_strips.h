@@ -25,6 +25,7 @@
 // place_tile
 // mix_apart         bilinear
 // mix_row_of
+// put_row
 // fill_evenly       a tile that strips cover, or none
 #ifndef SONDE_SRC_ECHO_SLICE_STRIPS_H
 #define SONDE_SRC_ECHO_SLICE_STRIPS_H
@@ -357,16 +358,26 @@ INLINE void mix_row_of(const strip_work *w, uint32_t first, uint8_t grey[SLICE_T
   for (int x = 0; x < SLICE_TILE; ++x) grey[x] = (uint8_t)value[x];
 }
 
+static inline uint32_t put_row(const sonde_slicer *s, size_t at, uint32_t wide,
+                               const uint8_t grey[SLICE_TILE], bool known) {
+  if (wide == SLICE_TILE)
+    memcpy(s->image->pixels + at, grey, SLICE_TILE);
+  else
+    memcpy(s->image->pixels + at, grey, wide);
+  if (s->known) memset(s->known + at, known, wide);
+  return wide;
+}
+
 // A tile that strips cover, or a black one without.
 static uint64_t fill_evenly(const sonde_slicer *s, const rectangle *r, const strip_work *strips) {
+  uint64_t reached = 0;
   for (uint32_t y = 0; y < r->high; ++y) {
-    size_t at = (size_t)(r->row + y) * s->image->width + r->column;
     uint8_t grey[SLICE_TILE] = {0};
     if (strips) mix_row_of(strips, y * SLICE_TILE, grey);
-    memcpy(s->image->pixels + at, grey, r->wide);
-    if (s->known) memset(s->known + at, strips != NULL, r->wide);
+    reached += put_row(s, (size_t)(r->row + y) * s->image->width + r->column, r->wide, grey,
+                       strips != NULL);
   }
-  return strips ? (uint64_t)r->wide * r->high : 0;
+  return strips ? reached : 0;
 }
 
 #endif
