@@ -82,6 +82,24 @@ SONDE_API uint64_t sonde_volume_slice_warped(const sonde_volume *volume, const s
                                              const sonde_affine *world_from_pixel,
                                              sonde_image *image, uint8_t *known);
 
+/** A volume laid out for many pictures: 2.4 bytes for each voxel. */
+typedef struct sonde_volume_slicer sonde_volume_slicer;
+
+/**
+ * Copies the volume, which may then be cleared.
+ * @return SONDE_ARGUMENT for one that is flat or has more than 2^31 / 2.4 voxels
+ * @thread owner
+ */
+SONDE_API sonde_status sonde_volume_slicer_create(const sonde_volume *volume,
+                                                  sonde_volume_slicer **slicer, sonde_error *error);
+SONDE_API void sonde_volume_slicer_destroy(sonde_volume_slicer *slicer);
+/** The same picture as sonde_volume_slice(), or sonde_volume_slice_warped() with a field, sooner.
+ *  @param warp NULL at rest @thread any, one per image */
+SONDE_API uint64_t sonde_volume_slicer_render(const sonde_volume_slicer *slicer,
+                                              const sonde_warp *warp,
+                                              const sonde_affine *world_from_pixel,
+                                              sonde_image *image, uint8_t *known);
+
 /** How a picture of the thigh at rest is pressed. */
 typedef struct sonde_image_press {
   const sonde_interior *interior; /**< updated to the pressed state; borrowed for the call */

@@ -183,10 +183,14 @@ typedef struct slice_sum {
 } slice_sum;
 
 // A volume that a picture is taken from; cells of the picture share four places in the volume.
-enum { SLICE_CELL_WIDE = 16, SLICE_CELL_HIGH = 8 };
+// Voxel (i, j, k) is sum(i step + i / 3 line_step) bytes after `voxels`; in lines of memory that
+// hold bricks of 4 x 4 x 4 voxels, each 3 from the next, or row by row.
+enum { SLICE_CELL_WIDE = 16, SLICE_CELL_HIGH = 8, SLICE_BRICK = 4 };
 typedef struct slice_voxels {
   const uint8_t *voxels;
-  uint32_t size[3]; // at least two each
+  bool lines;
+  int32_t step[3], line_step[3]; // bytes
+  uint32_t size[3];              // at least two each
   sonde_image *image;
   uint8_t *known;
 } slice_voxels;
@@ -207,11 +211,16 @@ extern const slice_kernels sonde_slice_kernels_base;
 extern const slice_kernels sonde_slice_kernels_avx2, sonde_slice_kernels_avx512;
 #endif
 
-// With kernels of a name; see sonde_volume_slice.
+// With kernels of a name, NULL: pixel by pixel in double precision; see sonde_volume_slice.
 uint64_t sonde_volume_slice_with(const slice_kernels *kernels, const sonde_volume *volume,
                                  bool nearest, const sonde_warp *warp,
                                  const sonde_affine *world_from_pixel, sonde_image *image,
                                  uint8_t *known);
+// The same from the lines of a volume's slicer.
+uint64_t sonde_volume_slicer_render_with(const slice_kernels *kernels,
+                                         const sonde_volume_slicer *slicer, const sonde_warp *warp,
+                                         const sonde_affine *world_from_pixel, sonde_image *image,
+                                         uint8_t *known);
 // Offset at a place of the grid.
 sonde_vec3 sonde_warp_at(const sonde_warp *warp, sonde_vec3 node);
 

@@ -2,7 +2,7 @@
 #ifndef SONDE_SRC_ECHO_SLICE_MIX_H
 #define SONDE_SRC_ECHO_SLICE_MIX_H
 
-#include "base/vector.h"
+#include "echo/kernel_vector.h"
 #include "echo/slice.h"
 
 #include <string.h>
@@ -38,6 +38,26 @@ static void span_all(const slice_spans *s, uint32_t count, const rectangle *r) {
 }
 
 static inline uint32_t at_most(uint32_t a, uint32_t b) { return a < b ? a : b; }
+
+INLINE vf at_most_of(vf a, float most) {
+#if defined(__AVX512F__)
+  return (vf)_mm512_min_ps((__m512)a, (__m512)all(most));
+#elif defined(__AVX2__)
+  return (vf)_mm256_min_ps((__m256)a, (__m256)all(most));
+#else
+  return smaller(a, all(most));
+#endif
+}
+
+INLINE vf at_least_of(vf a, float least) {
+#if defined(__AVX512F__)
+  return (vf)_mm512_max_ps((__m512)a, (__m512)all(least));
+#elif defined(__AVX2__)
+  return (vf)_mm256_max_ps((__m256)a, (__m256)all(least));
+#else
+  return larger(a, all(least));
+#endif
+}
 
 // What is no number becomes `low`.
 INLINE float bound(float x, float low, float high) {

@@ -16,7 +16,6 @@
 // widest            distance of two planes
 // fill_lanes, find_limits, fill_table        a tile's strips
 // look_up           a number of 16 pixels' strips
-// at_most_of, at_least_of   bounds
 // find_index        the strip of each pixel of a row
 // place_pixels      where in the frame, and how far between its pixels
 // check             pixels for which the strip speaks
@@ -30,9 +29,8 @@
 #ifndef SONDE_SRC_ECHO_SLICE_STRIPS_H
 #define SONDE_SRC_ECHO_SLICE_STRIPS_H
 
-#include "echo/slice_mix.h"
-
 #include "echo/kernel_vector.h"
+#include "echo/slice_mix.h"
 
 enum { STRIPS = SLICE_STRIPS, TILE_PIXELS = SLICE_TILE * SLICE_TILE };
 
@@ -225,26 +223,6 @@ INLINE vi look_up(const void *table, vi index) {
   vi to;
   for (int x = 0; x < W; ++x) to[x] = from[index[x]];
   return to;
-#endif
-}
-
-INLINE vf at_most_of(vf a, float most) {
-#if defined(__AVX512F__)
-  return (vf)_mm512_min_ps((__m512)a, (__m512)all(most));
-#elif defined(__AVX2__)
-  return (vf)_mm256_min_ps((__m256)a, (__m256)all(most));
-#else
-  return smaller(a, all(most));
-#endif
-}
-
-INLINE vf at_least_of(vf a, float least) {
-#if defined(__AVX512F__)
-  return (vf)_mm512_max_ps((__m512)a, (__m512)all(least));
-#elif defined(__AVX2__)
-  return (vf)_mm256_max_ps((__m256)a, (__m256)all(least));
-#else
-  return larger(a, all(least));
 #endif
 }
 

@@ -5,10 +5,16 @@
 //
 // sonde_warp_create, sonde_warp_clear
 // sonde_warp_at            trilinear in the field, its edge beyond it
+// find_maps                from pixels to nodes and voxels
+// place_of                 of a pixel in the volume
+// cell_of, triple, offset_at   sonde_warp_at() in single precision, for the corners of cells
 // places_of_row            places in the volume at the corners of a row of cells
 // slice_cells
 // voxel_at, slice_plainly  pixel by pixel: the nearest voxel, flat and very large volumes
+// blacken, slice_voxels_with
 // sonde_volume_slice_with, sonde_volume_slice, sonde_volume_slice_warped
+// fill_bricks              voxels into lines of memory
+// sonde_volume_slicer_create, sonde_volume_slicer_destroy, sonde_volume_slicer_render
 #include "echo/slice.h"
 
 #include <string.h>
@@ -61,7 +67,19 @@ sonde_vec3 sonde_warp_at(const sonde_warp *warp, sonde_vec3 node) {
 typedef struct maps {
   const sonde_warp *warp; // NULL at rest
   sonde_affine voxel_from_world, node_from_world, world_from_pixel;
+  sonde_affine node_from_pixel, voxel_from_pixel;
 } maps;
+
+static bool find_maps(const sonde_affine *world_from_voxel, const sonde_warp *warp,
+                      const sonde_affine *world_from_pixel, maps *m) {
+  *m = (maps){.warp = warp, .world_from_pixel = *world_from_pixel};
+  if (!affine_inverse(world_from_voxel, &m->voxel_from_world)) return false;
+  m->voxel_from_pixel = affine_mul(&m->voxel_from_world, world_from_pixel);
+  if (!warp) return true;
+  if (!affine_inverse(&warp->world_from_node, &m->node_from_world)) return false;
+  m->node_from_pixel = affine_mul(&m->node_from_world, world_from_pixel);
+  return true;
+}
 
 static sonde_vec3 place_of(const maps *m, double u, double v) {
   sonde_vec3 p = affine_apply(&m->world_from_pixel, vec3(u, v, 0));
@@ -69,11 +87,53 @@ static sonde_vec3 place_of(const maps *m, double u, double v) {
   return affine_apply(&m->voxel_from_world, p);
 }
 
+typedef float four __attribute__((vector_size(16)));
+
+// Cell of the grid along an axis, and how far in it.
+static inline size_t cell_of(double at, uint32_t nodes, float *t) {
+  double last = nodes - 1.0, x = at > 0 ? (at < last ? at : last) : 0;
+  int32_t i = (int32_t)x;
+  i = i < (int32_t)nodes - 2 ? i : (int32_t)nodes - 2;
+  *t = (float)(x - i);
+  return (size_t)i;
+}
+
+// Between two nodes that follow each other; reads nothing beyond them.
+static inline four triple(const float *p, four t) {
+  four a, b;
+  memcpy(&a, p, sizeof a);
+  memcpy(&b, p + 2, sizeof b);
+  b = (four){b[1], b[2], b[3], 0};
+  return a + t * (b - a);
+}
+
+static inline four offset_at(const sonde_warp *warp, const double at[3]) {
+  float t[3];
+  const uint32_t *n = warp->size;
+  size_t row = 3 * (size_t)n[0], sheet = row * n[1];
+  const float *p = warp->offsets_m + 3 * cell_of(at[0], n[0], &t[0]) +
+                   row * cell_of(at[1], n[1], &t[1]) + sheet * cell_of(at[2], n[2], &t[2]);
+  four x = {t[0], t[0], t[0], t[0]};
+  four a = triple(p, x), b = triple(p + row, x);
+  four c = triple(p + sheet, x), d = triple(p + sheet + row, x);
+  a = a + t[1] * (b - a), c = c + t[1] * (d - c);
+  return a + t[2] * (c - a);
+}
+
 static void places_of_row(const maps *m, uint32_t column, uint32_t row, uint32_t count,
                           float (*places)[3]) {
+  const double(*voxel)[4] = m->voxel_from_pixel.m, (*node)[4] = m->node_from_pixel.m;
+  const double(*turn)[4] = m->voxel_from_world.m;
   for (uint32_t c = 0; c < count; ++c) {
-    sonde_vec3 p = place_of(m, column + (double)c * SLICE_CELL_WIDE, row);
-    places[c][0] = (float)p.x, places[c][1] = (float)p.y, places[c][2] = (float)p.z;
+    double u = column + (double)c * SLICE_CELL_WIDE, v = row, at[3], p[3];
+    for (int k = 0; k < 3; ++k) p[k] = voxel[k][0] * u + voxel[k][1] * v + voxel[k][3];
+    if (m->warp) {
+      for (int k = 0; k < 3; ++k) at[k] = node[k][0] * u + node[k][1] * v + node[k][3];
+      four o = offset_at(m->warp, at);
+      for (int k = 0; k < 3; ++k)
+        p[k] += turn[k][0] * (double)o[0] + turn[k][1] * (double)o[1] + turn[k][2] * (double)o[2];
+    }
+    for (int k = 0; k < 3; ++k) places[c][k] = (float)p[k];
   }
 }
 
@@ -136,24 +196,29 @@ static uint64_t slice_plainly(const sonde_volume *v, bool nearest, const maps *m
   return reached;
 }
 
+static uint64_t blacken(sonde_image *image, uint8_t *known) {
+  size_t pixels = (size_t)image->width * image->height;
+  memset(image->pixels, 0, pixels);
+  if (known) memset(known, 0, pixels);
+  return 0;
+}
+
 uint64_t sonde_volume_slice_with(const slice_kernels *kernels, const sonde_volume *volume,
                                  bool nearest, const sonde_warp *warp,
                                  const sonde_affine *world_from_pixel, sonde_image *image,
                                  uint8_t *known) {
   SONDE_ASSERT(volume != NULL && volume->voxels != NULL && image != NULL && image->pixels);
-  maps m = {.warp = warp, .world_from_pixel = *world_from_pixel};
-  size_t pixels = (size_t)image->width * image->height;
-  if (!affine_inverse(&volume->world_from_voxel, &m.voxel_from_world) ||
-      (warp && !affine_inverse(&warp->world_from_node, &m.node_from_world))) {
-    memset(image->pixels, 0, pixels);
-    if (known) memset(known, 0, pixels);
-    return 0;
-  }
+  maps m;
+  if (!find_maps(&volume->world_from_voxel, warp, world_from_pixel, &m))
+    return blacken(image, known);
   const uint32_t *n = volume->size;
-  uint64_t row = n[0], sheet = row * n[1], all = sheet * n[2];
-  bool fits = n[0] > 1 && n[1] > 1 && n[2] > 1 && all >= row + sheet + 4 && all < INT32_MAX;
+  uint64_t row = n[0], sheet = row * n[1], voxels = sheet * n[2];
+  bool fits = n[0] > 1 && n[1] > 1 && n[2] > 1 && voxels < INT32_MAX;
   if (!kernels || !fits || nearest) return slice_plainly(volume, nearest, &m, image, known);
-  slice_voxels v = {.voxels = volume->voxels, .image = image, .known = known};
+  slice_voxels v = {.voxels = volume->voxels,
+                    .step = {1, (int32_t)row, (int32_t)sheet},
+                    .image = image,
+                    .known = known};
   memcpy(v.size, volume->size, sizeof v.size);
   return slice_cells(kernels, &v, &m);
 }
@@ -171,4 +236,91 @@ uint64_t sonde_volume_slice_warped(const sonde_volume *volume, const sonde_warp 
   SONDE_ASSERT(warp != NULL && warp->offsets_m != NULL);
   return sonde_volume_slice_with(sonde_slice_kernels_find(NULL), volume, false, warp,
                                  world_from_pixel, image, known);
+}
+
+struct sonde_volume_slicer {
+  sonde_affine world_from_voxel;
+  uint8_t *lines;
+  slice_voxels voxels; // without a picture
+};
+
+static void fill_bricks(const sonde_volume *volume, const uint32_t bricks[3], uint8_t *line) {
+  const uint32_t *n = volume->size, step = SLICE_BRICK - 1;
+  for (uint32_t z = 0; z < bricks[2]; ++z)
+    for (uint32_t y = 0; y < bricks[1]; ++y)
+      for (uint32_t x = 0; x < bricks[0]; ++x, line += SLICE_LINE)
+        for (uint32_t k = 0; k < SLICE_BRICK && step * z + k < n[2]; ++k)
+          for (uint32_t j = 0; j < SLICE_BRICK && step * y + j < n[1]; ++j) {
+            const uint8_t *from =
+                volume->voxels + ((size_t)(step * z + k) * n[1] + step * y + j) * n[0] + step * x;
+            uint8_t *to = line + (SLICE_BRICK * k + j) * SLICE_BRICK;
+            if (step * x + SLICE_BRICK <= n[0])
+              memcpy(to, from, SLICE_BRICK);
+            else
+              memcpy(to, from, n[0] - step * x);
+          }
+}
+
+sonde_status sonde_volume_slicer_create(const sonde_volume *volume, sonde_volume_slicer **out,
+                                        sonde_error *error) {
+  SONDE_ASSERT(volume != NULL && volume->voxels != NULL && out != NULL);
+  *out = NULL;
+  uint32_t bricks[3];
+  uint64_t bytes = SLICE_LINE;
+  for (int k = 0; k < 3; ++k) {
+    bricks[k] = (volume->size[k] + SLICE_BRICK - 3) / (SLICE_BRICK - 1);
+    bytes *= bricks[k];
+  }
+  const uint32_t *n = volume->size;
+  if (n[0] < 2 || n[1] < 2 || n[2] < 2 || bytes >= INT32_MAX)
+    return sonde_fail(error, SONDE_ARGUMENT,
+                      "volume of %u x %u x %u voxels: expected 2 and more along each axis and at "
+                      "most 9e8 in all",
+                      n[0], n[1], n[2]);
+  sonde_volume_slicer *slicer = SONDE_NEW(sonde_volume_slicer, 1);
+  uint8_t *lines = slicer ? SONDE_NEW(uint8_t, bytes) : NULL;
+  if (!lines) {
+    sonde_free(slicer);
+    return sonde_fail_memory(error);
+  }
+  int32_t row = (int32_t)bricks[0] * SLICE_LINE, sheet = row * (int32_t)bricks[1];
+  const int32_t lose = SLICE_BRICK - 1; // voxels of a brick that the next one begins with
+  *slicer =
+      (sonde_volume_slicer){.world_from_voxel = volume->world_from_voxel,
+                            .lines = lines,
+                            .voxels = {.voxels = lines,
+                                       .lines = true,
+                                       .step = {1, SLICE_BRICK, SLICE_BRICK * SLICE_BRICK},
+                                       .line_step = {SLICE_LINE - lose, row - lose * SLICE_BRICK,
+                                                     sheet - lose * SLICE_BRICK * SLICE_BRICK}}};
+  memcpy(slicer->voxels.size, n, sizeof slicer->voxels.size);
+  fill_bricks(volume, bricks, lines);
+  *out = slicer;
+  return SONDE_OK;
+}
+
+void sonde_volume_slicer_destroy(sonde_volume_slicer *slicer) {
+  if (!slicer) return;
+  sonde_free(slicer->lines);
+  sonde_free(slicer);
+}
+
+uint64_t sonde_volume_slicer_render_with(const slice_kernels *kernels,
+                                         const sonde_volume_slicer *slicer, const sonde_warp *warp,
+                                         const sonde_affine *world_from_pixel, sonde_image *image,
+                                         uint8_t *known) {
+  SONDE_ASSERT(slicer != NULL && kernels != NULL && image != NULL && image->pixels);
+  maps m;
+  if (!find_maps(&slicer->world_from_voxel, warp, world_from_pixel, &m))
+    return blacken(image, known);
+  slice_voxels v = slicer->voxels;
+  v.image = image, v.known = known;
+  return slice_cells(kernels, &v, &m);
+}
+
+uint64_t sonde_volume_slicer_render(const sonde_volume_slicer *slicer, const sonde_warp *warp,
+                                    const sonde_affine *world_from_pixel, sonde_image *image,
+                                    uint8_t *known) {
+  return sonde_volume_slicer_render_with(sonde_slice_kernels_find(NULL), slicer, warp,
+                                         world_from_pixel, image, known);
 }
