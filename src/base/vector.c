@@ -8,7 +8,8 @@
 static bool runs(const char *set) {
 #ifdef __x86_64__
   if (strcmp(set, "avx512") == 0)
-    return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq");
+    return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+           __builtin_cpu_supports("avx512bw");
   if (strcmp(set, "avx2") == 0) return __builtin_cpu_supports("avx2");
 #endif
   return strcmp(set, "base") == 0 || strcmp(set, "plain") == 0;

@@ -1,4 +1,4 @@
-// Kernels that are compiled once for each instruction set: "avx512" (F and DQ), "avx2", "base"
+// Kernels that are compiled once for each instruction set: "avx512" (F, DQ and BW), "avx2", "base"
 // (what the compiler takes without asking) and, where there are such, "plain" loops.
 #ifndef SONDE_SRC_VECTOR_H
 #define SONDE_SRC_VECTOR_H

@@ -1,9 +1,9 @@
 // Pixels of a picture from a volume; part of slice_kernel.c.
 //
 // is_within         a cell whose pixels all lie in the volume
-// find_voxels       places of a row of a cell
+// find_voxels, find_cell       places of a row, of a cell
 // load_voxels       the eight greys around each
-// mix_voxels        trilinear
+// sum_of_products, mix_voxels   trilinear
 // voxel_cell
 #ifndef SONDE_SRC_ECHO_SLICE_VOXEL_KERNEL_H
 #define SONDE_SRC_ECHO_SLICE_VOXEL_KERNEL_H
@@ -33,29 +33,42 @@ static bool is_within(const slice_voxels *v, const float corners[4][3]) {
   return true;
 }
 
-INLINE void find_voxels(const slice_voxels *v, const float start[3], const float step[3],
-                        bool checked, uint32_t first, voxel_work *w) {
+// A row of a cell: places are bilinear between the corners.
+INLINE void find_voxels(const slice_voxels *v, const vf start[3], const vf step[3], float row,
+                        bool lines, bool checked, uint32_t first, voxel_work *w) {
+  vi place = {0}, inside = all_of(-1);
+  for (int k = 0; k < 3; ++k) {
+    float high = (float)(v->size[k] - 1);
+    vf at = start[k] + row * step[k];
+    if (checked) {
+      inside = inside & (at >= -SLACK) & (at <= high + SLACK);
+      at = at_least_of(at_most_of(at, high), 0);
+    }
+    vi i = whole(at_most_of(at, high - 1));
+    vf low = real(i);
+    store(w->t[k] + first, at - low);
+    if (lines) {
+      vi line = whole((low + 0.5f) * (1.0f / (SLICE_BRICK - 1)));
+      place += line * v->line_step[k] + (i << (2 * k)); // a brick is four voxels wide
+    } else
+      place += i * v->step[k];
+  }
+  memcpy(w->place + first, &place, sizeof place);
+  if (checked) memcpy(w->inside + first, &inside, sizeof inside);
+}
+
+INLINE void find_cell(const slice_voxels *v, const float corners[4][3], uint32_t high, bool lines,
+                      bool checked, voxel_work *w) {
   static const float lanes[] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
   for (uint32_t x = 0; x < LANES; x += W) {
-    vi place = {0}, inside = all_of(-1);
+    vf share = load(lanes + x) * (1.0f / SLICE_CELL_WIDE), start[3], step[3];
     for (int k = 0; k < 3; ++k) {
-      float high = (float)(v->size[k] - 1);
-      vf at = start[k] + load(lanes + x) * step[k];
-      if (checked) {
-        inside = inside & (at >= -SLACK) & (at <= high + SLACK);
-        at = at_least_of(at_most_of(at, high), 0);
-      }
-      vi i = whole(at_most_of(at, high - 1));
-      vf t = at - real(i);
-      store(w->t[k] + first + x, t);
-      if (v->lines) {
-        vi line = whole((real(i) + 0.5f) * (1.0f / (SLICE_BRICK - 1)));
-        place += line * v->line_step[k];
-      }
-      place += i * v->step[k];
+      start[k] = corners[0][k] + share * (corners[1][k] - corners[0][k]);
+      vf end = corners[2][k] + share * (corners[3][k] - corners[2][k]);
+      step[k] = (end - start[k]) * (1.0f / SLICE_CELL_HIGH);
     }
-    memcpy(w->place + first + x, &place, sizeof place);
-    if (checked) memcpy(w->inside + first + x, &inside, sizeof inside);
+    for (uint32_t y = 0; y < high; ++y)
+      find_voxels(v, start, step, (float)y, lines, checked, y * LANES + x, w);
   }
 }
 
@@ -64,11 +77,13 @@ INLINE void load_voxels(const slice_voxels *v, uint32_t count, voxel_work *w) {
   const uint8_t *voxels = v->voxels;
   size_t dy = (size_t)v->step[1], dz = (size_t)v->step[2];
   if (v->lines)
-    for (uint32_t i = 0; i < count; i += LANES)
-      for (uint32_t x = 0; x < LANES; ++x) {
-        const uint8_t *p = voxels + w->place[i + x];
-        memcpy(&w->near[i + x], p, sizeof *w->near);
-        memcpy(&w->far[i + x], p + dz - 2, sizeof *w->far);
+    for (uint32_t i = 0; i < count; i += 4)
+      for (uint32_t x = i; x < i + 4; ++x) {
+        const uint8_t *p = voxels + w->place[x];
+        uint64_t both[2];
+        memcpy(&both[0], p, sizeof both[0]);
+        memcpy(&both[1], p + 4 * SLICE_BRICK - 2, sizeof both[1]);
+        w->near[x] = both[0], w->far[x] = both[1];
       }
   else
     for (uint32_t i = 0; i < count; ++i) {
@@ -78,42 +93,41 @@ INLINE void load_voxels(const slice_voxels *v, uint32_t count, voxel_work *w) {
     }
 }
 
+// Sum of the products of both halves of each lane, numbers with a sign.
+INLINE vi sum_of_products(vi a, vi b) {
+#if defined(__AVX512BW__)
+  return (vi)_mm512_madd_epi16((__m512i)a, (__m512i)b);
+#elif defined(__AVX2__)
+  return (vi)_mm256_madd_epi16((__m256i)a, (__m256i)b);
+#elif defined(__SSE2__)
+  return (vi)_mm_madd_epi16((__m128i)a, (__m128i)b);
+#else
+  return (a << 16 >> 16) * (b << 16 >> 16) + (a >> 16) * (b >> 16);
+#endif
+}
+
+// Along k in whole numbers, two greys of a lane at once; their sums are exact as floats.
 INLINE void mix_voxels(const voxel_work *w, uint32_t first, uint8_t out[LANES]) {
+  enum { ONE = 1 << 14, EVEN = 0x00ff00ff };
   const uint64_t *near = w->near + first, *far = w->far + first;
-  const float *t0 = w->t[0] + first, *t1 = w->t[1] + first, *t2 = w->t[2] + first;
-  int32_t value[LANES];
+  int32_t low[LANES], high[LANES], value[LANES];
   for (int x = 0; x < LANES; ++x) {
     uint64_t both = (near[x] & NEAR_BYTES) | (far[x] & ~NEAR_BYTES);
-    uint32_t low = (uint32_t)both, high = (uint32_t)(both >> 32);
-    float a = grey_of(low, 0), b = grey_of(high, 0), c = grey_of(low, 2), d = grey_of(high, 2);
-    a = a + t0[x] * (grey_of(low, 1) - a), b = b + t0[x] * (grey_of(high, 1) - b);
-    c = c + t0[x] * (grey_of(low, 3) - c), d = d + t0[x] * (grey_of(high, 3) - d);
-    float close = a + t1[x] * (b - a), beyond = c + t1[x] * (d - c);
-    value[x] = (int32_t)(close + t2[x] * (beyond - close) + 0.5f);
+    low[x] = (int32_t)(uint32_t)both, high[x] = (int32_t)(uint32_t)(both >> 32);
+  }
+  for (uint32_t x = 0; x < LANES; x += W) {
+    vi a, b;
+    memcpy(&a, low + x, sizeof a);
+    memcpy(&b, high + x, sizeof b);
+    vf t0 = load(w->t[0] + first + x), t1 = load(w->t[1] + first + x);
+    vi t = whole(load(w->t[2] + first + x) * ONE + 0.5f), share = (t << 16) - t + ONE;
+    vf p = real(sum_of_products(a & EVEN, share)), q = real(sum_of_products(a >> 8 & EVEN, share));
+    vf r = real(sum_of_products(b & EVEN, share)), s = real(sum_of_products(b >> 8 & EVEN, share));
+    vf top = p + t0 * (q - p), under = r + t0 * (s - r);
+    vi grey = whole((top + t1 * (under - top)) * (1.0f / ONE) + 0.5f);
+    memcpy(value + x, &grey, sizeof grey);
   }
   for (int x = 0; x < LANES; ++x) out[x] = (uint8_t)value[x];
-}
-
-// Asks for most lines of memory that a row will read.
-INLINE void ask_for_voxels(const slice_voxels *v, const voxel_work *w, uint32_t first) {
-  for (uint32_t x = 0; x < LANES; x += 4) __builtin_prefetch(v->voxels + w->place[first + x]);
-}
-
-static void find_cell(const slice_voxels *v, const float corners[4][3], uint32_t high, bool checked,
-                      voxel_work *w) {
-  for (uint32_t y = 0; y < high; ++y) {
-    float start[3], step[3], t = (float)y * (1.0f / SLICE_CELL_HIGH);
-    for (int k = 0; k < 3; ++k) {
-      start[k] = corners[0][k] + t * (corners[2][k] - corners[0][k]);
-      float end = corners[1][k] + t * (corners[3][k] - corners[1][k]);
-      step[k] = (end - start[k]) * (1.0f / SLICE_CELL_WIDE);
-    }
-    if (checked)
-      find_voxels(v, start, step, true, y * LANES, w);
-    else
-      find_voxels(v, start, step, false, y * LANES, w);
-    if (v->lines) ask_for_voxels(v, w, y * LANES);
-  }
 }
 
 // A cell of the picture between four corners, at which the places in the volume are known. Pixels
@@ -122,9 +136,14 @@ static uint64_t voxel_cell(const slice_voxels *v, const float corners[4][3], uin
                            uint32_t row) {
   uint32_t wide = at_most(SLICE_CELL_WIDE, v->image->width - column);
   uint32_t high = at_most(SLICE_CELL_HIGH, v->image->height - row);
-  bool within = is_within(v, corners);
+  bool within = v->lines && is_within(v, corners);
   voxel_work w;
-  find_cell(v, corners, high, !within, &w);
+  if (v->lines && within)
+    find_cell(v, corners, high, true, false, &w);
+  else if (v->lines)
+    find_cell(v, corners, high, true, true, &w);
+  else
+    find_cell(v, corners, high, false, true, &w);
   load_voxels(v, high * LANES, &w);
   uint64_t reached = within ? (uint64_t)wide * high : 0;
   for (uint32_t y = 0; y < high; ++y) {
@@ -136,8 +155,11 @@ static uint64_t voxel_cell(const slice_voxels *v, const float corners[4][3], uin
       grey[x] &= (uint8_t)inside;
       reached += x < wide && inside;
     }
-    memcpy(v->image->pixels + at, grey, wide);
-    for (uint32_t x = 0; x < wide && v->known; ++x)
+    if (wide == LANES)
+      memcpy(v->image->pixels + at, grey, LANES);
+    else
+      memcpy(v->image->pixels + at, grey, wide);
+    for (uint32_t x = 0; v->known && x < wide; ++x)
       v->known[at + x] = within || w.inside[y * LANES + x];
   }
   return reached;
