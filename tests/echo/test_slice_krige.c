@@ -160,6 +160,17 @@ static sonde_warp bend(void) {
 static const sonde_affine OBLIQUE = {
     {{60e-6, 10e-6, 0, 1e-3}, {-8e-6, 70e-6, 0, 2e-3}, {30e-6, 5e-6, 1, 0.5e-3}}};
 
+// Turns and shifts the frames a little, so that a picture has edges everywhere.
+static void sway(sonde_sequence *s) {
+  for (uint32_t i = 0; i < s->count; ++i) {
+    double lean = 0.02 * sin(0.7 * i), turn = 0.03 * cos(0.9 * i);
+    sonde_affine a = {{{pixel_m, -turn * pixel_m, 0, 1e-4 * sin(i)},
+                       {turn * pixel_m, pixel_m, 0, 1e-4 * cos(i)},
+                       {lean * pixel_m, 0, 1, gap_m * i}}};
+    s->frames[i].world_from_pixel = a;
+  }
+}
+
 static void kernels_give_the_same_bits(void **state) {
   (void)state;
   sonde_volume v = noise_volume();
@@ -167,7 +178,8 @@ static void kernels_give_the_same_bits(void **state) {
   sonde_sequence s = sweep(40, 0);
   sonde_image image[3];
   uint8_t *known[3];
-  for (int job = 0; job < 4; ++job) {
+  sway(&s);
+  for (int job = 0; job < 6; ++job) {
     for (int k = 0; k < 3; ++k) {
       const slice_kernels *kernels = sonde_slice_kernels_find(NAMES[k]);
       image[k] = image_of(301, 203), known[k] = SONDE_NEW(uint8_t, 301 * 203);
@@ -177,9 +189,17 @@ static void kernels_give_the_same_bits(void **state) {
         sonde_volume_slice_with(kernels, &v, false, job ? &w : NULL, &OBLIQUE, &image[k], known[k]);
         continue;
       }
+      if (job == 5) {
+        sonde_volume_slicer *bricks;
+        assert_int_equal(sonde_volume_slicer_create(&v, &bricks, NULL), SONDE_OK);
+        sonde_volume_slicer_render_with(kernels, bricks, &w, &OBLIQUE, &image[k], known[k]);
+        sonde_volume_slicer_destroy(bricks);
+        continue;
+      }
       sonde_slicer *slicer;
       sonde_slicer_options o = sonde_slicer_options_default();
-      o.method = job == 2 ? SONDE_SLICE_BRACKET : SONDE_SLICE_KRIGE;
+      o.method = job == 3 ? SONDE_SLICE_KRIGE : SONDE_SLICE_BRACKET;
+      o.once = job == 4;
       assert_int_equal(sonde_slicer_create(&s, &o, &slicer, NULL), SONDE_OK);
       slicer->kernels = kernels;
       assert_true(sonde_slicer_render(slicer, &OBLIQUE, &image[k], known[k]) > 10000);
@@ -194,6 +214,146 @@ static void kernels_give_the_same_bits(void **state) {
   sonde_volume_clear(&v);
   sonde_warp_clear(&w);
   sonde_sequence_clear(&s);
+}
+
+// Poses across and along the sweep, and one of its frames.
+static const sonde_affine POSES[] = {
+    {{{60e-6, 10e-6, 0, 1e-3}, {-8e-6, 70e-6, 0, 2e-3}, {30e-6, 5e-6, 1, 0.5e-3}}},
+    {{{1e-6, 0, 0, 9e-3}, {0, 90e-6, 0, -1e-3}, {90e-6, 3e-6, 1, -2e-3}}},
+    {{{pixel_m / 3, 0, 0, -1e-3}, {0, pixel_m / 3, 0, -1e-3}, {1e-5, 1e-6, 1, 5.2e-3}}}};
+
+typedef struct take {
+  sonde_image image;
+  uint8_t *known;
+  uint64_t reached;
+} take;
+
+static take take_of(const sonde_sequence *s, bool once, bool strips, const sonde_affine *pose) {
+  take t = {image_of(301, 203), SONDE_NEW(uint8_t, 301 * 203), 0};
+  sonde_slicer *slicer;
+  sonde_slicer_options o = sonde_slicer_options_default();
+  o.once = once;
+  assert_int_equal(sonde_slicer_create(s, &o, &slicer, NULL), SONDE_OK);
+  assert_true(slicer->has_strips);
+  slicer->has_strips = strips;
+  t.reached = sonde_slicer_render(slicer, pose, &t.image, t.known);
+  sonde_slicer_destroy(slicer);
+  return t;
+}
+
+static void clear_take(take *t) {
+  sonde_image_clear(&t->image);
+  sonde_free(t->known);
+}
+
+// Strips find what the search among all frames finds, at edges and ends of the sweep too; where the
+// frames are read from changes nothing.
+static void strips_agree_with_the_search(void **state) {
+  (void)state;
+  sonde_sequence s = sweep(40, 0);
+  sway(&s);
+  memcpy(s.clip, (const uint32_t[4]){3, 2, 83, 64}, sizeof s.clip);
+  for (size_t k = 0; k < SONDE_COUNT_OF(POSES); ++k) {
+    take lines = take_of(&s, false, true, &POSES[k]), rows = take_of(&s, true, true, &POSES[k]);
+    take search = take_of(&s, true, false, &POSES[k]);
+    assert_memory_equal(lines.image.pixels, rows.image.pixels, 301 * 203);
+    assert_memory_equal(lines.known, rows.known, 301 * 203);
+    assert_int_equal(lines.reached, rows.reached);
+    uint32_t apart = 0, found = 0;
+    for (int i = 0; i < 301 * 203; ++i) {
+      apart += abs(lines.image.pixels[i] - search.image.pixels[i]) > 1;
+      apart += lines.known[i] != search.known[i];
+      found += search.known[i];
+    }
+    print_message("pose %zu: %u of %u pixels differ\n", k, apart, found);
+    assert_int_equal(lines.reached, search.reached);
+    assert_true(found > 10000 && found < 301 * 203);
+    assert_int_equal(apart, 0);
+    clear_take(&lines), clear_take(&rows), clear_take(&search);
+  }
+  sonde_sequence_clear(&s);
+}
+
+// Frames that cross have no strips.
+static void crossing_frames_are_searched(void **state) {
+  (void)state;
+  sonde_sequence s = sweep(40, 0);
+  for (uint32_t i = 0; i < FRAMES; ++i) s.frames[i].world_from_pixel.m[2][0] = 2e-5 * (i % 3);
+  take strips = take_of(&s, false, true, &OBLIQUE), search = take_of(&s, false, false, &OBLIQUE);
+  assert_true(strips.reached > 10000);
+  assert_int_equal(strips.reached, search.reached);
+  assert_true(worst(strips.image.pixels, search.image.pixels, 301 * 203) <= 1);
+  clear_take(&strips), clear_take(&search);
+  sonde_sequence_clear(&s);
+}
+
+// Bricks hold the volume, up to its last voxel whatever its size.
+static void bricks_give_the_volumes_picture(void **state) {
+  (void)state;
+  sonde_warp w = bend();
+  sonde_image a = image_of(301, 203), b = image_of(301, 203);
+  uint8_t known[2][301 * 203];
+  uint64_t seed = 5;
+  for (uint32_t n = 2; n < 40; n += n < 9 ? 1 : 13) {
+    sonde_volume v;
+    sonde_volume_slicer *bricks;
+    assert_int_equal(sonde_volume_create((uint32_t[3]){n, n + 1, 2 * n}, &v, NULL), SONDE_OK);
+    for (uint32_t i = 0; i < 2 * n * n * (n + 1); ++i)
+      v.voxels[i] = (uint8_t)(127 + 127 * fixture_random(&seed));
+    v.world_from_voxel = affine_identity();
+    for (int k = 0; k < 3; ++k) v.world_from_voxel.m[k][k] = 25e-3 / n;
+    assert_int_equal(sonde_volume_slicer_create(&v, &bricks, NULL), SONDE_OK);
+    for (int bent = 0; bent < 2; ++bent) {
+      uint64_t whole = bent ? sonde_volume_slice_warped(&v, &w, &OBLIQUE, &a, known[0])
+                            : sonde_volume_slice(&v, false, &OBLIQUE, &a, known[0]);
+      const sonde_warp *warp = bent ? &w : NULL;
+      assert_int_equal(sonde_volume_slicer_render(bricks, warp, &OBLIQUE, &b, known[1]), whole);
+      assert_memory_equal(a.pixels, b.pixels, 301 * 203);
+      assert_memory_equal(known[0], known[1], 301 * 203);
+      assert_true(whole > 10000);
+    }
+    sonde_volume_slicer_destroy(bricks);
+    sonde_volume_clear(&v);
+  }
+  sonde_volume flat;
+  sonde_volume_slicer *none;
+  sonde_error error;
+  assert_int_equal(sonde_volume_create((uint32_t[3]){9, 1, 9}, &flat, NULL), SONDE_OK);
+  assert_int_equal(sonde_volume_slicer_create(&flat, &none, &error), SONDE_ARGUMENT);
+  assert_null(none);
+  sonde_volume_clear(&flat);
+  sonde_image_clear(&a), sonde_image_clear(&b);
+  sonde_warp_clear(&w);
+}
+
+// Grain of four voxels, as wide as speckle, against double precision with the field at every pixel.
+static void a_deformed_picture_is_off_by_less_than_a_tenth(void **state) {
+  (void)state;
+  enum { N = 120 };
+  sonde_volume v;
+  sonde_warp w = bend();
+  sonde_volume_slicer *bricks;
+  uint64_t seed = 7;
+  static uint8_t known[2][301 * 203], grain[N / 4 * N / 4 * N / 4];
+  for (size_t i = 0; i < sizeof grain; ++i) grain[i] = (uint8_t)(120 + 80 * fixture_random(&seed));
+  assert_int_equal(sonde_volume_create((uint32_t[3]){N, N, N}, &v, NULL), SONDE_OK);
+  for (int i = 0; i < N * N * N; ++i)
+    v.voxels[i] = grain[i % N / 4 + N / 4 * (i / N % N / 4 + N / 4 * (i / N / N / 4))];
+  for (int k = 0; k < 3; ++k) v.world_from_voxel.m[k][k] = 0.2e-3;
+  sonde_image fast = image_of(301, 203), exact = image_of(301, 203);
+  assert_int_equal(sonde_volume_slicer_create(&v, &bricks, NULL), SONDE_OK);
+  sonde_volume_slicer_render(bricks, &w, &OBLIQUE, &fast, known[0]);
+  sonde_volume_slice_with(NULL, &v, false, &w, &OBLIQUE, &exact, known[1]);
+  double sum = 0, count = 0;
+  for (int i = 0; i < 301 * 203; ++i)
+    if (known[0][i] && known[1][i]) sum += abs(fast.pixels[i] - exact.pixels[i]), count += 1;
+  print_message("mean error %.4f grey levels over %.0f pixels\n", sum / count, count);
+  assert_true(count > 40000);
+  assert_true(sum / count <= 0.1);
+  sonde_volume_slicer_destroy(bricks);
+  sonde_image_clear(&fast), sonde_image_clear(&exact);
+  sonde_volume_clear(&v);
+  sonde_warp_clear(&w);
 }
 
 // Against the field at every pixel. White noise is the hardest picture to place.
@@ -255,6 +415,10 @@ int main(void) {
       cmocka_unit_test(own_grain_is_not_repeated),
       cmocka_unit_test(more_may_be_left_out_beside),
       cmocka_unit_test(kernels_give_the_same_bits),
+      cmocka_unit_test(strips_agree_with_the_search),
+      cmocka_unit_test(crossing_frames_are_searched),
+      cmocka_unit_test(bricks_give_the_volumes_picture),
+      cmocka_unit_test(a_deformed_picture_is_off_by_less_than_a_tenth),
       cmocka_unit_test(a_deformed_picture_is_where_the_field_says),
       cmocka_unit_test(an_even_offset_is_a_shift),
   };
