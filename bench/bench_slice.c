@@ -1,7 +1,9 @@
 // bench_slice [REPEAT]: CPU time of a picture of 512 x 512 pixels, on one thread, as one JSON
 // object: at oblique and along-sweep poses straight from 200 frames of 512 x 512 pixels 0.2 mm
-// apart, from a volume of 256^3 at rest, and through a field of 33^3 offsets; the mean and largest
-// error of the latter against a field that is read at every pixel. All pictures are synthetic.
+// apart, from a volume of 256^3 at rest, and through a field of 33^3 offsets, as it lies in memory
+// (`once_`) and from the copy laid out for many pictures; the time of that copy, and of the
+// frames'; the mean and largest error against a field that is read at every pixel. All pictures are
+// synthetic.
 #include "sonde/sonde.h"
 
 #include <math.h>
@@ -63,14 +65,17 @@ static times sort(double *ms, int repeat, uint64_t reached) {
 }
 
 static times time_sweep(const sonde_sequence *s, const sonde_affine *pose,
-                        sonde_slice_method method, int repeat, sonde_image *image) {
+                        sonde_slice_method method, int repeat, sonde_image *image,
+                        double *create_ms) {
   double ms[MOST_REPEATS];
   uint64_t reached = 0;
   sonde_slicer_options o = sonde_slicer_options_default();
   sonde_slicer *slicer;
   o.threads = 1;
   o.method = method;
+  double begin = cpu_ms();
   if (sonde_slicer_create(s, &o, &slicer, NULL)) exit(1);
+  *create_ms = cpu_ms() - begin;
   for (int k = 0; k < repeat; ++k) {
     double start = cpu_ms();
     reached = sonde_slicer_render(slicer, pose, image, NULL);
@@ -93,14 +98,19 @@ static void fill_warp(sonde_warp *w) {
   }
 }
 
-static times time_volume(const sonde_volume *v, const sonde_warp *w, const sonde_affine *pose,
-                         int repeat, sonde_image *image) {
+// From the slicer, or from the volume without one.
+static times time_volume(const sonde_volume *v, const sonde_volume_slicer *slicer,
+                         const sonde_warp *w, const sonde_affine *pose, int repeat,
+                         sonde_image *image) {
   double ms[MOST_REPEATS];
   uint64_t reached = 0;
   for (int k = 0; k < repeat; ++k) {
     double start = cpu_ms();
-    reached = w ? sonde_volume_slice_warped(v, w, pose, image, NULL)
-                : sonde_volume_slice(v, false, pose, image, NULL);
+    if (slicer)
+      reached = sonde_volume_slicer_render(slicer, w, pose, image, NULL);
+    else
+      reached = w ? sonde_volume_slice_warped(v, w, pose, image, NULL)
+                  : sonde_volume_slice(v, false, pose, image, NULL);
     ms[k] = cpu_ms() - start;
   }
   return sort(ms, repeat, reached);
@@ -149,18 +159,26 @@ int main(int argc, char **argv) {
   sonde_affine along = plane(0.02, 0, 0, 1.5, 0, STEP_M),
                still = plane(0, 0, 0.0201, 0.01, 0, STEP_M);
   sonde_affine pose = plane(3e-3, 4e-3, 9e-3, 0.5, 0.1, 0.09e-3);
+  sonde_volume_slicer *bricks;
+  double frames_ms, volume_ms = cpu_ms(), unused;
+  if (sonde_volume_slicer_create(&v, &bricks, NULL)) return 1;
+  volume_ms = cpu_ms() - volume_ms;
   puts("{");
-  print("oblique", time_sweep(&s, &oblique, SONDE_SLICE_BRACKET, repeat, &image));
-  print("along", time_sweep(&s, &along, SONDE_SLICE_BRACKET, repeat, &image));
-  print("parallel", time_sweep(&s, &still, SONDE_SLICE_BRACKET, repeat, &image));
-  print("nearest", time_sweep(&s, &oblique, SONDE_SLICE_NEAREST, repeat, &image));
-  print("volume", time_volume(&v, NULL, &pose, repeat, &image));
-  print("deformed", time_volume(&v, &w, &pose, repeat, &image));
+  print("oblique", time_sweep(&s, &oblique, SONDE_SLICE_BRACKET, repeat, &image, &frames_ms));
+  print("along", time_sweep(&s, &along, SONDE_SLICE_BRACKET, repeat, &image, &unused));
+  print("parallel", time_sweep(&s, &still, SONDE_SLICE_BRACKET, repeat, &image, &unused));
+  print("nearest", time_sweep(&s, &oblique, SONDE_SLICE_NEAREST, repeat, &image, &unused));
+  print("once_volume", time_volume(&v, NULL, NULL, &pose, repeat, &image));
+  print("once_deformed", time_volume(&v, NULL, &w, &pose, repeat, &image));
+  print("volume", time_volume(&v, bricks, NULL, &pose, repeat, &image));
+  print("deformed", time_volume(&v, bricks, &w, &pose, repeat, &image));
+  printf("  \"copy_frames_ms\": %.1f, \"copy_volume_ms\": %.1f,\n", frames_ms, volume_ms);
   double mean, most;
   error_of(&v, &w, &pose, &image, &mean, &most);
   printf("  \"deformed_mean_error_grey\": %.4f, \"deformed_most_error_grey\": %.0f\n}\n", mean,
          most);
   sonde_sequence_clear(&s);
+  sonde_volume_slicer_destroy(bricks);
   sonde_volume_clear(&v);
   sonde_warp_clear(&w);
   sonde_image_clear(&image);

@@ -3,7 +3,8 @@
 // A picture is cut into blocks and those into tiles. Over a tile the distance d to a plane is
 // linear, so its bounds are known from the tile's centre. A plane that covers the whole tile on one
 // side hides every plane of that side that lies behind its far bound; what is left are two or three
-// candidates.
+// candidates. Where frames are joined across and do not cross, slice_strips.h does most of the
+// work.
 //
 // Between plane i (d_i >= 0) and plane j (d_j < 0) the pixel p lies on a line that meets both.
 // Weights in proportion to the distance of the other plane make the mean of the two points p
@@ -15,31 +16,34 @@
 // frame, the normals serve again. In local coordinates (u, v, d) of a frame the direction is (e_u,
 // e_v, e_d), and the line meets the frame at u - d e_u / e_d.
 //
-// covers, touches   a plane and the tile
-// plane_covers, find_hiding, gather_planes, gather_block            planes that may be nearest in a
-// rectangle nearest_of_row    for each pixel of a row the nearest candidate on either side
-// outline_of, is_outside   where no frame can be
-// has_foot, distance_at, nearest_of_sorted   the same for one pixel
-// sweep_way         from a pixel to the same pixel of the other frame
-// is_steep          a way that does not graze the plane
-// blend             pair constants of two planes
-// pixel_of, sample            bilinear
-// sample_foot       a frame straight below a pixel
-// foot, follow      where a line through a pixel meets a frame
-// meet              the points on both frames
-// sample_levels     levels of a frame's pyramid, weighted
-// krige             up to four frames, every scale by its own weight
-// between           two frames and their weights
-// value_at          one pixel
-// find_pair         remembered
+// covers, touches        a plane and the tile
+// start_at               a form from a tile's first pixel on
+// plane_covers, find_hiding, reach_of, gather_planes   planes that may be nearest in a rectangle
+// nearest_of_row         for each pixel of a row the nearest candidate on either side
+// outline_of, is_outside where no frame can be
+// has_foot, distance_at, nearest_of_sorted   for one pixel, among sorted candidates
+// sweep_way              from a pixel to the same pixel of the other frame
+// is_steep               a way that does not graze the plane
+// blend                  pair constants of two planes
+// pixel_of, sample       bilinear
+// sample_foot            a frame straight below a pixel
+// foot, follow           where a line through a pixel meets a frame
+// meet                   the points on both frames
+// sample_level, sample_levels   of a frame's pyramid, weighted
+// krige                  up to four frames, every scale by its own weight
+// between                two frames and their weights
+// value_at               one pixel
+// find_pair              remembered
 // meet_row, find_pixels, mix_row, bracket_row   between two frames, a row of a tile at a time
-// put_pixel, fill_tile, search_pixel, fill_edge, start_candidate, search_tile, search_edge
-// slice_sum_all     a picture of the sweep's own
-// slice_block
+// put_pixel, fill_tile   by search alone
+// search_pixel, fill_edge   where strips do not speak for every pixel
+// is_still, slice_sum_all   a picture of the sweep's own
+// start_candidate, search_tile, search_edge
+// gather_block, slice_block
 //
 // Compiled once for each instruction set with SLICE_KERNELS defined; every operation is one IEEE
 // operation per lane, so that all give the same bits.
-#include "echo/slice_strips.h"
+#include "echo/slice_strip_kernel.h"
 #include "echo/slice_voxel_kernel.h"
 
 enum { PAIRS = 16 }; // pairs of frames remembered in a tile
