@@ -67,8 +67,12 @@ INLINE void find_cell(const slice_voxels *v, const float corners[4][3], uint32_t
       vf end = corners[2][k] + share * (corners[3][k] - corners[2][k]);
       step[k] = (end - start[k]) * (1.0f / SLICE_CELL_HIGH);
     }
-    for (uint32_t y = 0; y < high; ++y)
-      find_voxels(v, start, step, (float)y, lines, checked, y * LANES + x, w);
+    if (checked)
+      for (uint32_t y = 0; y < high; ++y)
+        find_voxels(v, start, step, (float)y, lines, true, y * LANES + x, w);
+    else
+      for (uint32_t y = 0; y < high; ++y)
+        find_voxels(v, start, step, (float)y, lines, false, y * LANES + x, w);
   }
 }
 
@@ -136,14 +140,12 @@ static uint64_t voxel_cell(const slice_voxels *v, const float corners[4][3], uin
                            uint32_t row) {
   uint32_t wide = at_most(SLICE_CELL_WIDE, v->image->width - column);
   uint32_t high = at_most(SLICE_CELL_HIGH, v->image->height - row);
-  bool within = v->lines && is_within(v, corners);
+  bool within = is_within(v, corners);
   voxel_work w;
-  if (v->lines && within)
-    find_cell(v, corners, high, true, false, &w);
-  else if (v->lines)
-    find_cell(v, corners, high, true, true, &w);
+  if (v->lines)
+    find_cell(v, corners, high, true, !within, &w);
   else
-    find_cell(v, corners, high, false, true, &w);
+    find_cell(v, corners, high, false, !within, &w);
   load_voxels(v, high * LANES, &w);
   uint64_t reached = within ? (uint64_t)wide * high : 0;
   for (uint32_t y = 0; y < high; ++y) {
