@@ -173,24 +173,28 @@ static void couple(sonde_state *state) {
 
 // Vectors that the kernels read and write at least once, per slice and per slot: those of one
 // evaluation (linearise, the records of accept or update), of one sweep and of one iteration
-// (multiply, advance). Records of neighbours count once per slot; the shear layer and the contact
-// do not count.
+// (multiply, advance). Records of neighbours count once per slot; the faces of the shear layer and
+// the contact do not count.
 enum {
   EVALUATED_PER_SLICE = 39,
-  EVALUATED_PER_SLOT = 16,
+  EVALUATED_PER_SPRING = 16,
+  EVALUATED_PER_LAYERED = 13,
   SWEPT_PER_SLICE = 19,
-  SWEPT_PER_SLOT = 10,
   ITERATED_PER_SLICE = 44,
-  ITERATED_PER_SLOT = 10,
+  MULTIPLIED_PER_SPRING = 10,
+  MULTIPLIED_PER_LAYERED = 7,
   UPDATED_PER_SLICE = 29
 };
 
 static void count_bytes(sonde_lanes *lanes, uint64_t sweeps, uint64_t iterations) {
   uint64_t slices = lanes->awake_count, slots = lanes->slot_total;
+  uint64_t springs = lanes->law.springs ? slots : 0, layered = lanes->law.layered ? slots : 0;
+  uint64_t evaluated = EVALUATED_PER_SLICE * slices + EVALUATED_PER_SPRING * springs +
+                       EVALUATED_PER_LAYERED * layered;
+  uint64_t multiplied = MULTIPLIED_PER_SPRING * springs + MULTIPLIED_PER_LAYERED * layered;
   lanes->bytes_moved +=
-      sizeof(sonde_lane) * (EVALUATED_PER_SLICE * slices + EVALUATED_PER_SLOT * slots +
-                            sweeps * (SWEPT_PER_SLICE * slices + SWEPT_PER_SLOT * slots) +
-                            iterations * (ITERATED_PER_SLICE * slices + ITERATED_PER_SLOT * slots));
+      sizeof(sonde_lane) * (evaluated + sweeps * (SWEPT_PER_SLICE * slices + multiplied) +
+                            iterations * (ITERATED_PER_SLICE * slices + multiplied));
 }
 
 // Whether Gauss-Seidel needs more than seven sweeps more at the pace of the last one: then
