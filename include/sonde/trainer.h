@@ -114,6 +114,7 @@ typedef struct sonde_case_branch {
 /** What a protocol's criteria are replaced by where a thigh needs it; NaN: as the protocol. */
 typedef struct sonde_case_criteria {
   double force_low_n, force_high_n, force_limit_n;
+  double artery_ratio;
 } sonde_case_criteria;
 
 /** A patient with a question, and the answer. Plain data: a struct copy is a copy. */

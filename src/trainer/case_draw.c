@@ -36,7 +36,7 @@ static void draw_person(draw *d, sonde_case *c) {
   if (c->level == SONDE_CASE_HARD && below(d, 4) == 0)
     c->circulation.posture = SONDE_POSTURE_SITTING;
   bool sitting = c->circulation.posture == SONDE_POSTURE_SITTING;
-  c->criteria = (sonde_case_criteria){18, sitting ? 36 : 34, sitting ? 42 : 40};
+  c->criteria = (sonde_case_criteria){18, sitting ? 36 : 34, sitting ? 42 : 40, (double)NAN};
 }
 
 static void draw_clot(draw *d, sonde_case *c) {

@@ -44,7 +44,7 @@ sonde_case sonde_case_default(void) {
   sonde_case c = {.known = sonde_thigh_unknown(),
                   .circulation = sonde_circulation_default(),
                   .extent.whole = true,
-                  .criteria = {UNKNOWN, UNKNOWN, UNKNOWN}};
+                  .criteria = {UNKNOWN, UNKNOWN, UNKNOWN, UNKNOWN}};
   sonde_status status = sonde_pathology_preset("healthy", &c.pathology, NULL);
   SONDE_ASSERT(status == SONDE_OK);
   return c;
@@ -206,7 +206,8 @@ static void read_findings(sonde_reader *reader, sonde_place root, sonde_case *c)
 }
 
 static void read_criteria(sonde_reader *reader, sonde_place root, sonde_case_criteria *criteria) {
-  static const char *const KEYS[] = {"force_low_n", "force_high_n", "force_limit_n", NULL};
+  static const char *const KEYS[] = {"force_low_n", "force_high_n", "force_limit_n", "artery_ratio",
+                                     NULL};
   sonde_place at = sonde_read_find(reader, root, "criteria");
   if (!at) return;
   sonde_read_keys(reader, at, "criteria", KEYS);
@@ -214,6 +215,8 @@ static void read_criteria(sonde_reader *reader, sonde_place root, sonde_case_cri
   for (int i = 0; i < 3; ++i)
     if (sonde_read_find(reader, at, KEYS[i]))
       *to[i] = sonde_read_real(reader, at, KEYS[i], 1, 60, UNKNOWN);
+  if (sonde_read_find(reader, at, KEYS[3]))
+    criteria->artery_ratio = sonde_read_real(reader, at, KEYS[3], 0.3, 0.95, UNKNOWN);
 }
 
 // ---- the answer

@@ -82,10 +82,10 @@ static void put_findings(sonde_file *file, const sonde_case *c) {
 }
 
 static void put_criteria(sonde_file *file, const sonde_case_criteria *c) {
-  const double value[] = {c->force_low_n, c->force_high_n, c->force_limit_n};
-  static const char *const KEY[] = {"force_low_n", "force_high_n", "force_limit_n"};
+  const double value[] = {c->force_low_n, c->force_high_n, c->force_limit_n, c->artery_ratio};
+  static const char *const KEY[] = {"force_low_n", "force_high_n", "force_limit_n", "artery_ratio"};
   bool any = false;
-  for (int i = 0; i < 3; ++i) {
+  for (size_t i = 0; i < SONDE_COUNT_OF(value); ++i) {
     if (!isfinite(value[i])) continue;
     sonde_file_printf(file, "%s  %s: %.12g\n", any ? "" : "criteria:\n", KEY[i], value[i]);
     any = true;

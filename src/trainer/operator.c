@@ -21,7 +21,7 @@ typedef struct habit {
   double force_from_n, force_to_n;   // stops at a force drawn from here, 0: by the image
   double beyond_from_n, beyond_to_n; // the same above the limit of force
   double closed_ratio, open_ratio;   // of the vein: called closed, called open
-  double artery_ratio;               // ends a press on an open vein; 0: goes on
+  double artery_below;               // the criterion: ends a press on an open vein; 0: goes on
   double pause_s, wander_m;          // looks for the vein before a press; how far it sways then
   double past_m;                     // a travel goes past its place by this spread, then back
   double rate_n_s;                   // slows down where the force rises faster
@@ -40,7 +40,7 @@ static const habit HABIT[] = {
      .travel_m_s = 0.08,
      .closed_ratio = 0.08,
      .open_ratio = 0.33,
-     .artery_ratio = 0.66,
+     .artery_below = 0.04,
      .pause_s = 0.2,
      .wander_m = 0,
      .rate_n_s = 12,
@@ -240,7 +240,8 @@ static bool too_far(const sonde_operator *op, const sonde_snapshot *s) {
   if (h->force_to_n > 0 || h->beyond_to_n > 0) return false;
   double vein = sonde_vein_ratio(s);
   if (vein <= h->closed_ratio) return true;
-  return s->artery_area_ratio <= h->artery_ratio && vein >= h->open_ratio;
+  double artery = op->plan.criteria.artery_ratio - h->artery_below;
+  return h->artery_below > 0 && s->artery_area_ratio <= artery && vein >= h->open_ratio;
 }
 
 static void press(sonde_operator *op, const sonde_snapshot *s, double dt_s) {

@@ -185,6 +185,12 @@ sonde_status sonde_plan_make(const sonde_exam_protocol *protocol, const sonde_ve
     if (isfinite(criteria->force_low_n)) c->force_low_n = criteria->force_low_n;
     if (isfinite(criteria->force_high_n)) c->force_high_n = criteria->force_high_n;
     if (isfinite(criteria->force_limit_n)) c->force_limit_n = criteria->force_limit_n;
+    if (isfinite(criteria->artery_ratio)) c->artery_ratio = criteria->artery_ratio;
+    if (c->artery_ratio <= c->crushed_ratio)
+      return sonde_fail(error, SONDE_ARGUMENT,
+                        "the case's artery_ratio is %g, expected more than the protocol's "
+                        "crushed_ratio (%g)",
+                        c->artery_ratio, c->crushed_ratio);
   }
   sonde_status status = SONDE_OK;
   for (uint32_t i = 0; i < protocol->stop_count && !status; ++i)

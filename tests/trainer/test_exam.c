@@ -7,7 +7,7 @@ static sonde_case patient(bool sick) {
   c.thigh = SONDE_CASE_GENERATED;
   c.seed = 3;
   c.known.fat_front_m = 0.006;
-  c.criteria = (sonde_case_criteria){18, 36, 42};
+  c.criteria = (sonde_case_criteria){18, 36, 42, (double)NAN};
   if (!sick) return c;
   assert_int_equal(sonde_pathology_preset("acute", &c.pathology, NULL), SONDE_OK);
   c.extent = (sonde_case_extent){.from = {.segment = "femoral_proximal"},

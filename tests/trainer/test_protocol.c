@@ -39,15 +39,20 @@ static void a_stretch_is_divided_evenly(void **state) {
     assert_near(plan.point[k].at.along_m, 0.02 + 0.055 / 3 * k, 1e-12);
 }
 
-static void a_case_replaces_forces(void **state) {
+static void a_case_replaces_criteria(void **state) {
   (void)state;
   sonde_vein_map map = straight_map();
   sonde_exam_protocol p = every_20_mm();
-  sonde_case_criteria own = {(double)NAN, 31, 44};
+  sonde_case_criteria own = {(double)NAN, 31, 44, 0.6};
   sonde_plan plan;
   assert_int_equal(sonde_plan_make(&p, &map, &own, &plan, NULL), SONDE_OK);
   assert_true(plan.criteria.force_low_n == p.criteria.force_low_n);
   assert_true(plan.criteria.force_high_n == 31 && plan.criteria.force_limit_n == 44);
+  assert_true(plan.criteria.artery_ratio == 0.6);
+  own.artery_ratio = p.criteria.crushed_ratio;
+  sonde_error error;
+  assert_int_equal(sonde_plan_make(&p, &map, &own, &plan, &error), SONDE_ARGUMENT);
+  assert_non_null(strstr(error.message, "crushed_ratio"));
 }
 
 static void mistakes_are_named(void **state) {
@@ -96,7 +101,7 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(the_protocols_that_ship),
       cmocka_unit_test(a_stretch_is_divided_evenly),
-      cmocka_unit_test(a_case_replaces_forces),
+      cmocka_unit_test(a_case_replaces_criteria),
       cmocka_unit_test(mistakes_are_named),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
