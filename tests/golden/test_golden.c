@@ -8,22 +8,26 @@ typedef struct scene {
   const char *probe;
   double lambda;
   sonde_contact_law law;
-  double shear_n_m;
+  double shear_n_m, inplane_n_m; // with an in-plane layer there are no surface springs
   sonde_engine engine;
   uint64_t hash;
 } scene;
 
 static const scene SCENES[] = {
-    {"point", 1.0, SONDE_CONTACT_FOUNDATION, 0, SONDE_ENGINE_DOUBLE, 0xdeeeef8cf10440c1u},
-    {"linear", 0.5, SONDE_CONTACT_FOUNDATION, 15, SONDE_ENGINE_DOUBLE, 0x85a4fa203b5bab13u},
-    {"square", 1.0, SONDE_CONTACT_VOLUME, 0, SONDE_ENGINE_DOUBLE, 0xcd0c2d2d30c60da4u},
-    {"linear", 1.0, SONDE_CONTACT_FOUNDATION, 15, SONDE_ENGINE_FAST, 0x9c8ed547a838cf83u},
-    {"ball:20", 1.0, SONDE_CONTACT_NODES, 0, SONDE_ENGINE_FAST, 0x4ea932628f95adcdu},
+    {"point", 1.0, SONDE_CONTACT_FOUNDATION, 0, 0, SONDE_ENGINE_DOUBLE, 0xdeeeef8cf10440c1u},
+    {"linear", 0.5, SONDE_CONTACT_FOUNDATION, 15, 0, SONDE_ENGINE_DOUBLE, 0x85a4fa203b5bab13u},
+    {"square", 1.0, SONDE_CONTACT_VOLUME, 0, 0, SONDE_ENGINE_DOUBLE, 0xcd0c2d2d30c60da4u},
+    {"linear", 1.0, SONDE_CONTACT_FOUNDATION, 15, 0, SONDE_ENGINE_FAST, 0x9c8ed547a838cf83u},
+    {"ball:20", 1.0, SONDE_CONTACT_NODES, 0, 0, SONDE_ENGINE_FAST, 0x4ea932628f95adcdu},
+    {"linear", 1.0, SONDE_CONTACT_FOUNDATION, 15, 35, SONDE_ENGINE_DOUBLE, 0x9aa2b4bd6cf1a865u},
+    {"linear", 1.0, SONDE_CONTACT_FOUNDATION, 15, 35, SONDE_ENGINE_FAST, 0xb60414ee896e1fd8u},
 };
 
 static uint64_t run(const scene *s) {
   sonde_surface_law law = sonde_surface_law_default();
   law.shear_stiffness_n_m = s->shear_n_m;
+  law.inplane_stiffness_n_m = s->inplane_n_m;
+  if (s->inplane_n_m > 0) law.edge_stiffness_n_m = 0;
   sonde_world_def def = sonde_world_def_default();
   def.implicitness = s->lambda;
   def.contact_law = s->law;
