@@ -131,15 +131,6 @@ sonde_status sonde_drive_run(const sonde_drive *drive, const sonde_model *model,
   return status;
 }
 
-void sonde_law_scale(sonde_surface_law *law, double scale) {
-  SONDE_ASSERT(scale > 0);
-  law->edge_stiffness_n_m *= scale;
-  law->edge_pretension_n *= scale;
-  law->tangential_stiffness_n_m3 *= scale;
-  law->inplane_stiffness_n_m *= scale;
-  law->shear_stiffness_n_m *= scale;
-}
-
 sonde_status sonde_model_borrow(const sonde_model *model, double stiffness_scale, sonde_model *copy,
                                 sonde_error *error) {
   SONDE_ASSERT(stiffness_scale > 0);

@@ -4,6 +4,7 @@
 
 #include "identify/track.h"
 #include "sonde/identify.h"
+#include "tissue/model.h"
 
 #include <stdatomic.h>
 
@@ -41,7 +42,5 @@ sonde_status sonde_drive_run(const sonde_drive *drive, const sonde_model *model,
 sonde_status sonde_model_borrow(const sonde_model *model, double stiffness_scale, sonde_model *copy,
                                 sonde_error *error);
 void sonde_model_return(sonde_model *copy);
-// Every uniform stiffness of a law times scale.
-void sonde_law_scale(sonde_surface_law *law, double scale);
 
 #endif

@@ -4,6 +4,8 @@
 
 #include "sonde/tissue.h"
 
+// Every uniform stiffness of a law times scale > 0. @thread tick
+void sonde_law_scale(sonde_surface_law *law, double scale);
 // Allocates the per-node arrays for model->surface.vertex_count nodes.
 sonde_status sonde_model_allocate_nodes(sonde_model *model, sonde_error *error);
 // Topology, normals, areas, masses, rest lengths, areas and cotangents from surface and law.

@@ -3,7 +3,8 @@
 // normal_pressure: eq. (1) per area with a straight continuation beyond the guard.
 // normal_energy:   its integral, a log barrier below the guard and a parabola beyond.
 // shear_force:     the even law (n = 2) applied to the slope of the skin.
-#include "sonde/tissue.h"
+// sonde_law_scale: all stiffnesses of a law.
+#include "tissue/model.h"
 
 #include "base/base.h"
 #include "base/maths.h"
@@ -59,4 +60,13 @@ double sonde_shear_force(double shear_n_m, double limit, double g, double *slope
 
 double sonde_shear_energy(double shear_n_m, double limit, double g) {
   return sonde_normal_energy(2, shear_n_m, limit, SHEAR_GUARD, g);
+}
+
+void sonde_law_scale(sonde_surface_law *law, double scale) {
+  SONDE_ASSERT(scale > 0);
+  law->edge_stiffness_n_m *= scale;
+  law->edge_pretension_n *= scale;
+  law->tangential_stiffness_n_m3 *= scale;
+  law->inplane_stiffness_n_m *= scale;
+  law->shear_stiffness_n_m *= scale;
 }

@@ -1,5 +1,6 @@
 // Other springs and another friction for a state that is under way.
 // scale_springs: the tuned model from the model.
+#include "tissue/model.h"
 #include "world/lanes.h"
 #include "world/state.h"
 
@@ -15,11 +16,7 @@ static void scale_springs(sonde_state *state) {
   if (!isnan(t->edge_damping_s)) law->edge_damping_s = t->edge_damping_s;
   law->normal_damping_s *= t->damping_scale;
   law->edge_damping_s *= t->damping_scale;
-  law->edge_stiffness_n_m *= t->stiffness_scale;
-  law->edge_pretension_n *= t->stiffness_scale;
-  law->tangential_stiffness_n_m3 *= t->stiffness_scale;
-  law->inplane_stiffness_n_m *= t->stiffness_scale;
-  law->shear_stiffness_n_m *= t->stiffness_scale;
+  sonde_law_scale(law, t->stiffness_scale);
   for (uint32_t i = 0; i < state->model->surface.vertex_count; ++i)
     state->tuned_k0[i] = t->stiffness_scale * state->model->k0_n_m3[i];
 }
