@@ -40,8 +40,25 @@ INLINE vf real(vi a) { return __builtin_convertvector(a, vf); }
 INLINE vf pick(vi mask, vf yes, vf no) { return (vf)((mask & (vi)yes) | (~mask & (vi)no)); }
 INLINE vi pick_of(vi mask, vi yes, vi no) { return (mask & yes) | (~mask & no); }
 INLINE vf only(vi mask, vf a) { return (vf)(mask & (vi)a); }
-INLINE vf larger(vf a, vf b) { return pick(a > b, a, b); }
-INLINE vf smaller(vf a, vf b) { return pick(a < b, a, b); }
+// b where either is no number or both are equal, as the instructions have it.
+INLINE vf larger(vf a, vf b) {
+#if defined(__AVX512F__)
+  return (vf)_mm512_max_ps((__m512)a, (__m512)b);
+#elif defined(__AVX2__)
+  return (vf)_mm256_max_ps((__m256)a, (__m256)b);
+#else
+  return pick(a > b, a, b);
+#endif
+}
+INLINE vf smaller(vf a, vf b) {
+#if defined(__AVX512F__)
+  return (vf)_mm512_min_ps((__m512)a, (__m512)b);
+#elif defined(__AVX2__)
+  return (vf)_mm256_min_ps((__m256)a, (__m256)b);
+#else
+  return pick(a < b, a, b);
+#endif
+}
 INLINE vf size_of(vf a) { return (vf)((vi)a & 0x7fffffff); }
 INLINE vf below(vf a) { // largest whole number not above
   vf i = real(whole(a));

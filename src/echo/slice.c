@@ -170,8 +170,8 @@ static sonde_status lay_out(const sonde_sequence *s, sonde_slicer *slicer, sonde
   bool lines = !o->once && all < INT32_MAX;
   slicer->has_strips = o->method == SONDE_SLICE_BRACKET && !o->along_sweep &&
                        (lines || (uint64_t)s->width * s->height * s->count < INT32_MAX);
-  if (!slicer->has_strips) return SONDE_OK;
   *layout = (slice_layout){.pixels = s->pixels, .row = (int32_t)s->width};
+  if (!slicer->has_strips) return SONDE_OK;
   size_t first = (size_t)s->clip[1] * s->width + s->clip[0];
   for (uint32_t i = 0; i < slicer->count; ++i)
     slicer->planes[i].place =

@@ -256,10 +256,6 @@ static void blend(const sonde_slicer *s, const slice_candidate *room, int32_t up
   }
 }
 
-static inline float limit(float x, float low, float high) {
-  return x < low ? low : (x > high ? high : x);
-}
-
 // Pixel (i, j) of the frame; with lines, where the strips have read already.
 static inline const uint8_t *pixel_of(const sonde_slicer *s, const slice_plane *plane, uint32_t i,
                                       uint32_t j) {
@@ -271,13 +267,13 @@ static inline const uint8_t *pixel_of(const sonde_slicer *s, const slice_plane *
 }
 
 static inline float sample(const sonde_slicer *s, const slice_plane *plane, float u, float v) {
-  u = limit(u, s->low[0], s->high[0]);
-  v = limit(v, s->low[1], s->high[1]);
-  uint32_t iu = (uint32_t)limit(u, s->low[0], s->high[0] - 1);
-  uint32_t iv = (uint32_t)limit(v, s->low[1], s->high[1] - 1);
+  u = bound(u, s->low[0], s->high[0]);
+  v = bound(v, s->low[1], s->high[1]);
+  uint32_t iu = (uint32_t)bound(u, s->low[0], s->high[0] - 1);
+  uint32_t iv = (uint32_t)bound(v, s->low[1], s->high[1] - 1);
   float a = u - (float)iu, b = v - (float)iv;
   const uint8_t *p = pixel_of(s, plane, iu, iv);
-  const uint8_t *q = p + (s->layout.lines ? SLICE_LINE_WIDE : s->width);
+  const uint8_t *q = p + s->layout.row;
   float top = (float)p[0] + a * (float)(p[1] - p[0]), low = (float)q[0] + a * (float)(q[1] - q[0]);
   return top + b * (low - top);
 }
@@ -338,8 +334,8 @@ static inline float sample_level(const slice_bank *bank, const uint8_t *level, i
 // All levels of a frame, weighted.
 static inline float sample_levels(const sonde_slicer *s, const slice_plane *plane,
                                   const float at[2], const float *w0, const float *w1, float t) {
-  float u = limit(at[0], s->low[0], s->high[0]) - s->low[0];
-  float v = limit(at[1], s->low[1], s->high[1]) - s->low[1], sum = 0, scale = 1;
+  float u = bound(at[0], s->low[0], s->high[0]) - s->low[0];
+  float v = bound(at[1], s->low[1], s->high[1]) - s->low[1], sum = 0, scale = 1;
   for (int k = 0; k < SLICE_LEVELS; ++k, scale *= 0.5f) {
     float w = w0[k] + t * (w1[k] - w0[k]);
     sum += w * sample_level(s->bank, plane->pyramid->level[k], k, u * scale, v * scale);
@@ -352,9 +348,9 @@ static float krige(const sonde_slicer *s, const slice_plane *lower, const float 
                    const slice_plane *upper, const float u[2], float t, float gap) {
   int32_t i = (int32_t)(lower - s->planes);
   const slice_join *join = upper == lower + 1 ? &s->joins[i] : NULL;
-  uint32_t far = (uint32_t)limit(gap / (float)s->options.gap_m * SLICE_FAR, 0, SLICE_FAR - 1);
+  uint32_t far = (uint32_t)bound(gap / (float)s->options.gap_m * SLICE_FAR, 0, SLICE_FAR - 1);
   const slice_weights *steps = join ? join->steps : s->far + far * (SLICE_STEPS + 1);
-  uint32_t step = (uint32_t)limit(t * SLICE_STEPS, 0, SLICE_STEPS - 1);
+  uint32_t step = (uint32_t)bound(t * SLICE_STEPS, 0, SLICE_STEPS - 1);
   const slice_weights *w = &steps[step], *x = w + 1;
   float r = t * SLICE_STEPS - (float)step;
   float value = sample_levels(s, lower, l, w->of[1], x->of[1], r) +
@@ -367,7 +363,7 @@ static float krige(const sonde_slicer *s, const slice_plane *lower, const float 
     for (int k = 0; k < 2; ++k) at[k] = map[k][0] * from[0] + map[k][1] * from[1] + map[k][2];
     value += sample_levels(s, &s->planes[outer], at, w->of[3 * side], x->of[3 * side], r);
   }
-  return limit(value, 0, 255);
+  return bound(value, 0, 255);
 }
 
 // Mean of both frames, each weighted by the distance a or b of the other, or their kriging;
@@ -562,8 +558,8 @@ static uint64_t fill_edge(const sonde_slicer *s, const rectangle *r, const slice
 
 // A pixel that is the same in all frames.
 static inline bool is_still(const sonde_slicer *s, const float at[2]) {
-  uint32_t x = (uint32_t)(limit(at[0], s->low[0], s->high[0]) - s->low[0] + 0.5f);
-  uint32_t y = (uint32_t)(limit(at[1], s->low[1], s->high[1]) - s->low[1] + 0.5f);
+  uint32_t x = (uint32_t)(bound(at[0], s->low[0], s->high[0]) - s->low[0] + 0.5f);
+  uint32_t y = (uint32_t)(bound(at[1], s->low[1], s->high[1]) - s->low[1] + 0.5f);
   return s->model.along_sweep && !s->bank->shares[0][(size_t)y * s->bank->wide[0] + x];
 }
 
@@ -589,7 +585,7 @@ static uint64_t slice_sum_all(const slice_sum *sum) {
       }
       bool inside = 2 * met >= sum->n;
       size_t i = (size_t)y * sum->image->width + x;
-      sum->image->pixels[i] = inside ? (uint8_t)(limit(value, 0, 255) + 0.5f) : 0;
+      sum->image->pixels[i] = inside ? (uint8_t)(bound(value, 0, 255) + 0.5f) : 0;
       if (sum->known) sum->known[i] = inside;
       reached += inside;
     }

@@ -39,26 +39,6 @@ static void span_all(const slice_spans *s, uint32_t count, const rectangle *r) {
 
 static inline uint32_t at_most(uint32_t a, uint32_t b) { return a < b ? a : b; }
 
-INLINE vf at_most_of(vf a, float most) {
-#if defined(__AVX512F__)
-  return (vf)_mm512_min_ps((__m512)a, (__m512)all(most));
-#elif defined(__AVX2__)
-  return (vf)_mm256_min_ps((__m256)a, (__m256)all(most));
-#else
-  return smaller(a, all(most));
-#endif
-}
-
-INLINE vf at_least_of(vf a, float least) {
-#if defined(__AVX512F__)
-  return (vf)_mm512_max_ps((__m512)a, (__m512)all(least));
-#elif defined(__AVX2__)
-  return (vf)_mm256_max_ps((__m256)a, (__m256)all(least));
-#else
-  return larger(a, all(least));
-#endif
-}
-
 // What is no number becomes `low`.
 INLINE float bound(float x, float low, float high) {
   x = x > low ? x : low;
@@ -76,10 +56,12 @@ INLINE float grey_of(uint32_t word, int byte) {
 }
 
 // Two rows of two greys each.
-INLINE float mix_sheet(uint32_t word, float t0, float t1) {
-  float a = grey_of(word, 0), b = grey_of(word, 1), c = grey_of(word, 2), d = grey_of(word, 3);
+INLINE float mix_four(float a, float b, float c, float d, float t0, float t1) {
   float top = a + t0 * (b - a), low = c + t0 * (d - c);
   return top + t1 * (low - top);
+}
+INLINE float mix_sheet(uint32_t word, float t0, float t1) {
+  return mix_four(grey_of(word, 0), grey_of(word, 1), grey_of(word, 2), grey_of(word, 3), t0, t1);
 }
 
 #endif

@@ -50,7 +50,7 @@ INLINE vi find_index(const strip_table *table, vf x, float y) {
 INLINE void place_pixels(const sonde_slicer *s, vf u, vf v, vi frame, int side, uint32_t first,
                          strip_work *w) {
   float wide = s->high[0] - s->low[0], high = s->high[1] - s->low[1];
-  vi i = whole(at_most_of(u, wide - 1)), j = whole(at_most_of(v, high - 1));
+  vi i = whole(smaller(u, all(wide - 1))), j = whole(smaller(v, all(high - 1)));
   vf left = real(i), top = real(j);
   vi p = whole((left + 0.5f) * (1.0f / (SLICE_LINE_WIDE - 1)));
   vi q = whole((top + 0.5f) * (1.0f / (SLICE_LINE_HIGH - 1)));
@@ -66,7 +66,7 @@ INLINE vi check(const sonde_slicer *s, const strip_table *table, vf value[SLICE_
   for (int k = 0; k < 4; ++k)
     hit = hit & (value[k] >= table->low[k & 1]) & (value[k] <= table->high[k & 1]);
   for (int k = 0; k < 4; ++k)
-    value[k] = at_least_of(at_most_of(value[k], s->high[k & 1] - s->low[k & 1]), 0);
+    value[k] = larger(smaller(value[k], all(s->high[k & 1] - s->low[k & 1])), all(0));
   value[4] = only(hit, value[4]), value[5] = pick(hit, value[5], all(1));
   return hit;
 }
@@ -133,9 +133,7 @@ static void place_tile(const sonde_slicer *s, const strip_table *table, uint32_t
 // Four greys of which two stand in bytes 0 and 1, two in 6 and 7.
 INLINE float mix_apart(uint64_t greys, float t0, float t1) {
   uint32_t high = (uint32_t)greys, low = (uint32_t)(greys >> 32);
-  float a = grey_of(high, 0), b = grey_of(high, 1), c = grey_of(low, 2), d = grey_of(low, 3);
-  float top = a + t0 * (b - a), under = c + t0 * (d - c);
-  return top + t1 * (under - top);
+  return mix_four(grey_of(high, 0), grey_of(high, 1), grey_of(low, 2), grey_of(low, 3), t0, t1);
 }
 
 INLINE void mix_row_of(const strip_work *w, uint32_t first, uint8_t grey[SLICE_TILE]) {

@@ -42,9 +42,9 @@ INLINE void find_voxels(const slice_voxels *v, const vf start[3], const vf step[
     vf at = start[k] + row * step[k];
     if (checked) {
       inside = inside & (at >= -SLACK) & (at <= high + SLACK);
-      at = at_least_of(at_most_of(at, high), 0);
+      at = larger(smaller(at, all(high)), all(0));
     }
-    vi i = whole(at_most_of(at, high - 1));
+    vi i = whole(smaller(at, all(high - 1)));
     vf low = real(i);
     store(w->t[k] + first, at - low);
     if (lines) {
