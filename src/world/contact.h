@@ -24,15 +24,22 @@ static inline sonde_vec3 plane_slope(const sonde_state *state, uint32_t k) {
 void sonde_contact_touch(sonde_state *state, uint32_t i);
 // Joins the regions of two touched nodes. @thread tick
 void sonde_contact_join(sonde_state *state, uint32_t a, uint32_t b);
-// FOUNDATION in the fast engine: a face near the probe, with its push when a point is inside; the
-// pushes at probed[], those at the end of the step, and the square of the difference between these
-// and the ones that nodes meet when they go on by h dv (uses right[]). @thread tick
-void sonde_faces_sample(sonde_state *state, uint32_t face);
-void sonde_faces_apply(sonde_state *state, const sonde_motion *probe,
-                       const sonde_contact_scales *scales);
-void sonde_faces_advance(sonde_state *state, double h);
-double sonde_faces_surprise(sonde_state *state, const sonde_motion *probe, double h);
-// What the ties take from the product of the matrix with the directions, into carry[] of press[].
-void sonde_faces_carry(struct sonde_lanes *lanes);
+// Joins the regions of touched nodes beside one another. @thread tick
+void sonde_nodes_join(sonde_state *state);
+// Parts of sonde_contact_detect() and sonde_contact_apply() for the fast engine: no node is touched;
+// the probe's planes in the world frame; touched nodes are awake; regions. @thread tick
+void sonde_contact_forget(sonde_state *state);
+void sonde_contact_place(sonde_state *state, const sonde_probe *probe, sonde_pose pose);
+void sonde_contact_wake(sonde_state *state);
+void sonde_contact_regions(sonde_state *state, const sonde_motion *probe);
+// The contact of the fast engine. Finds touched nodes and adds pushes and their part of the matrix
+// to press[], with ties; near_probe is found. @thread tick
+void sonde_press_detect(sonde_state *state, const sonde_probe *probe, sonde_pose pose,
+                        const sonde_motion *motion);
+// contact_force[] at the end of the step by the linear system; with `surprise` the square of the
+// difference between these pushes and the ones that nodes meet where they go. @thread tick
+double sonde_press_meet(sonde_state *state, bool surprise);
+// What the ties take from the product of the matrix with vectors [rows][4], into carry[] of press[].
+void sonde_press_carry(struct sonde_lanes *lanes, const float *vectors);
 
 #endif

@@ -3,10 +3,8 @@
 // detect:   clips candidate faces, gathers V_i and g_i per node, joins regions by union-find.
 // apply:    regions, pushes of the chosen law, terms of the implicit matrix.
 // advance:  the pushes at the end of the step by the same linearisation.
-// surprise: the pushes that nodes meet where the solution brings them.
 // wrench:   force and torque on the probe, region by region.
 #include "world/contact.h"
-#include "world/lanes.h"
 #include "world/state.h"
 
 #include "base/base.h"
@@ -159,27 +157,23 @@ sonde_box sonde_contact_box(const sonde_probe *probe, sonde_pose pose) {
   return box;
 }
 
-// Planes of the probe in the world frame.
-static void place_probe(sonde_state *state, const sonde_probe *probe, sonde_pose pose) {
+void sonde_contact_place(sonde_state *state, const sonde_probe *probe, sonde_pose pose) {
   const sonde_convex *body = &probe->body;
   SONDE_ASSERT(body->plane_count <= SONDE_MAX_PROBE_PLANES);
   sonde_mat3 r = q_matrix(pose.rotation);
   state->inward = m_mul_v(r, vec3(0, 0, 1));
   state->origin = pose.position;
-  state->plane_count = body->plane_count;
   state->ball_radius = state->def.contact_law == SONDE_CONTACT_NODES ? probe->ball_radius_m : 0;
   state->ball_centre = v_madd(pose.position, -probe->ball_radius_m, state->inward);
-  for (uint32_t k = 0; k < body->plane_count; ++k) {
+  state->plane_count = state->ball_radius > 0 ? 0 : body->plane_count;
+  for (uint32_t k = 0; k < state->plane_count; ++k) {
     state->plane_normal[k] = m_mul_v(r, body->plane_normal[k]);
     state->plane_offset[k] = body->plane_offset_m[k] + v_dot(state->plane_normal[k], pose.position);
-    double weight = state->plane_weight[k] = body->plane_normal[k].z > 0.5 ? 1 : STEEP_WEIGHT;
-    sonde_vec3 n = state->plane_normal[k];
-    const double lane[4] = {n.x, n.y, n.z, body->plane_offset_m[k]};
-    for (int c = 0; c < 4; ++c) state->plane_lane[k][c] = (float)(weight * lane[c]);
+    state->plane_weight[k] = body->plane_normal[k].z > 0.5 ? 1 : STEEP_WEIGHT;
   }
 }
 
-static void forget(sonde_state *state) {
+void sonde_contact_forget(sonde_state *state) {
   for (uint32_t k = 0; k < state->touched_count; ++k) {
     uint32_t i = state->touched[k];
     state->share_m3[i] = 0;
@@ -191,7 +185,7 @@ static void forget(sonde_state *state) {
 }
 
 void sonde_contact_clear(sonde_state *state) {
-  forget(state);
+  sonde_contact_forget(state);
   sonde_friction_release(state);
   for (uint32_t b = 0; b < state->block_count; ++b) refit(state, b);
 }
@@ -230,20 +224,22 @@ static void search_blocks(sonde_state *state, const sonde_probe *probe, const so
 }
 
 void sonde_contact_detect(sonde_state *state, const sonde_probe *probe, sonde_pose pose) {
-  forget(state);
+  sonde_contact_forget(state);
   sonde_box box = {vec3(INFINITY, INFINITY, INFINITY), vec3(-INFINITY, -INFINITY, -INFINITY)};
   if (probe) {
     box = sonde_contact_box(probe, pose);
-    place_probe(state, probe, pose);
+    sonde_contact_place(state, probe, pose);
   }
   if (state->def.contact_law == SONDE_CONTACT_NODES) {
     if (probe) sonde_nodes_detect(state, &box);
-  } else if (state->lanes && !state->lanes->stale) {
-    if (probe) sonde_lanes_detect(state, &box);
   } else {
     search_blocks(state, probe, &box);
   }
   sort_touched(state);
+  sonde_contact_wake(state);
+}
+
+void sonde_contact_wake(sonde_state *state) {
   for (uint32_t k = 0; k < state->touched_count; ++k) {
     state->lists_stale |= !state->awake[state->touched[k]];
     state->awake[state->touched[k]] = 1;
@@ -308,9 +304,9 @@ static void sum_regions(sonde_state *state, const sonde_motion *probe) {
   }
 }
 
-void sonde_contact_sample(sonde_state *state, uint32_t face, const sonde_box *box) {
-  sonde_box own = face_box(state, face);
-  if (overlap(&own, box)) sonde_faces_sample(state, face);
+void sonde_contact_regions(sonde_state *state, const sonde_motion *probe) {
+  number_regions(state);
+  sum_regions(state, probe);
 }
 
 // The push acts against the slope of the depth: out of the probe.
@@ -412,14 +408,11 @@ static void apply_lumped(sonde_state *state, const sonde_contact_scales *scales)
 
 void sonde_contact_apply(sonde_state *state, const sonde_motion *probe,
                          const sonde_contact_scales *scales) {
-  number_regions(state);
-  sum_regions(state, probe);
+  sonde_contact_regions(state, probe);
   if (state->def.contact_law == SONDE_CONTACT_VOLUME)
     apply_lumped(state, scales);
   else if (state->def.contact_law == SONDE_CONTACT_NODES)
     sonde_nodes_apply(state, probe, scales);
-  else if (state->lanes && !state->lanes->stale)
-    sonde_faces_apply(state, probe, scales);
   else
     apply_foundation(state, probe, scales);
 }
@@ -472,16 +465,8 @@ void sonde_contact_advance(sonde_state *state, const sonde_motion *probe, double
     advance_lumped(state, lambda, h);
   else if (state->def.contact_law == SONDE_CONTACT_NODES)
     sonde_nodes_advance(state, probe, lambda, h);
-  else if (state->lanes && !state->lanes->stale)
-    sonde_faces_advance(state, h);
   else
     advance_foundation(state, probe, lambda, h);
-}
-
-double sonde_contact_surprise(sonde_state *state, const sonde_motion *probe, double h) {
-  SONDE_ASSERT(state->def.contact_law != SONDE_CONTACT_VOLUME);
-  if (state->def.contact_law == SONDE_CONTACT_NODES) return sonde_nodes_surprise(state, probe, h);
-  return sonde_faces_surprise(state, probe, h);
 }
 
 void sonde_contact_wrench(sonde_state *state, sonde_vec3 origin) {

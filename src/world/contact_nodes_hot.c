@@ -4,7 +4,6 @@
 // detect:      runs near the probe; regions join neighbours.
 // push_at:     push of one node.
 #include "world/contact.h"
-#include "world/lanes.h"
 
 #include "base/base.h"
 
@@ -31,12 +30,11 @@ static void touch_range(sonde_state *state, const sonde_box *box, uint32_t first
 }
 
 void sonde_nodes_detect(sonde_state *state, const sonde_box *box) {
-  const sonde_lanes *lanes = state->lanes && !state->lanes->stale ? state->lanes : NULL;
-  if (!lanes) touch_range(state, box, 0, state->model->surface.vertex_count);
-  for (uint32_t k = 0; lanes && k < lanes->near_probe_count; ++k) {
-    uint32_t s = lanes->near_probe[k];
-    touch_range(state, box, s * SONDE_LANES, s * SONDE_LANES + lanes->model[s].used);
-  }
+  touch_range(state, box, 0, state->model->surface.vertex_count);
+  sonde_nodes_join(state);
+}
+
+void sonde_nodes_join(sonde_state *state) {
   const sonde_topology *t = &state->model->topology;
   for (uint32_t k = 0; k < state->touched_count; ++k) {
     uint32_t i = state->touched[k];
@@ -91,17 +89,4 @@ void sonde_nodes_advance(sonde_state *state, const sonde_motion *probe, double l
     double push = at.push_n + along * (lambda * h * at.stiffness_n_m + at.damping_n_s_m);
     if (push > 0) state->contact_force[i] = v_scale(at.slope, -push);
   }
-}
-
-double sonde_nodes_surprise(const sonde_state *state, const sonde_motion *probe, double h) {
-  double sum = 0;
-  for (uint32_t k = 0; k < state->touched_count; ++k) {
-    uint32_t i = state->touched[k];
-    pressed_node at;
-    sonde_vec3 dv = state->increment[i], difference = state->contact_force[i];
-    sonde_vec3 x = v_madd(state->probed[i], h, dv), v = v_add(state->velocity[i], dv);
-    if (push_at(state, i, x, v, probe, &at)) difference = v_madd(difference, at.push_n, at.slope);
-    sum += v_norm2(difference);
-  }
-  return sum;
 }

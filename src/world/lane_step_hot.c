@@ -3,8 +3,7 @@
 // from v1 = v0 in single precision, its linear systems by sweeps, or by conjugate gradients where
 // these are faster.
 // list:      slices that take part.
-// publish:   positions and velocities in double precision, for the contact.
-// couple:    pushes and blocks of the contact, found in double precision, into the slices.
+// couple_friction: forces and blocks found in double precision.
 // conjugate, solve: the rest of a linear system that a first sweep began.
 // touch, linearise, iterate: one Newton iteration; is_bent: whether it needs another.
 // rest:      slices that stopped moving fall asleep, movers wake their neighbours.
@@ -21,16 +20,10 @@
 static void list_faces(sonde_lanes *lanes) {
   lanes->face_list_count = 0;
   if (!(lanes->law.shear > 0)) return;
-  memset(lanes->face_marked, 0, lanes->face_slice_count);
-  for (uint32_t a = 0; a < lanes->awake_count; ++a) {
-    const sonde_slice_model *fixed = &lanes->model[lanes->awake[a]];
-    for (uint32_t k = 0; k < fixed->face_count; ++k)
-      lanes->face_marked[lanes->face_near[fixed->first_face + k]] = 1;
-  }
-  for (uint32_t f = 0; f < lanes->face_slice_count; ++f) {
-    lanes->faces[lanes->face_list_count] = f;
-    lanes->face_list_count += lanes->face_marked[f];
-  }
+  sonde_lanes_mark_faces(lanes, lanes->awake, lanes->awake_count);
+  for (uint32_t word = 0; word <= lanes->face_slice_count / 64; ++word)
+    for (uint64_t rest = lanes->face_marked[word]; rest; rest &= rest - 1)
+      lanes->faces[lanes->face_list_count++] = word * 64 + (uint32_t)__builtin_ctzll(rest);
 }
 
 // Lists the slices that `take` marks.
@@ -61,63 +54,6 @@ static void list_touched(sonde_lanes *lanes) {
   list_slices(lanes, take);
 }
 
-// Where the nodes of the slices that the contact looks at are evaluated, and their velocities.
-static void publish_evaluated(sonde_state *state) {
-  const sonde_lanes *lanes = state->lanes;
-  float h = lanes->law.dt;
-  for (uint32_t k = 0; k < lanes->near_probe_count; ++k) {
-    uint32_t s = lanes->near_probe[k], first = s * SONDE_LANES;
-    const sonde_slice *at = &lanes->slice[s];
-    for (uint32_t l = 0; l < lanes->model[s].used; ++l) {
-      sonde_vec3 v = sonde_lane_vector(at->ve, l), u = sonde_lane_vector(at->u, l);
-      state->velocity[first + l] = v;
-      state->position[first + l] = v_add(state->model->surface.vertices[first + l], u);
-      state->probed[first + l] = v_madd(state->position[first + l], (double)h, v);
-    }
-  }
-}
-
-// Slices that the contact looks at: with a node in the probe's box, which for pushes on faces grows
-// by one and a half of their edges, so that all corners of a face that meets the probe are among
-// them.
-static void find_near(sonde_state *state, const sonde_probe *probe, sonde_pose pose) {
-  sonde_lanes *lanes = state->lanes;
-  lanes->near_probe_count = 0;
-  if (!probe) return;
-  sonde_box box = sonde_contact_box(probe, pose);
-  const float low[3] = {(float)box.low.x, (float)box.low.y, (float)box.low.z};
-  const float high[3] = {(float)box.high.x, (float)box.high.y, (float)box.high.z};
-  lanes->kernels->near(lanes, low, high, state->def.contact_law == SONDE_CONTACT_NODES ? 0 : 1.5f);
-}
-
-// Slices of faces with a corner in those slices.
-static void mark_near_faces(sonde_lanes *lanes) {
-  memset(lanes->face_marked, 0, lanes->face_slice_count);
-  memset(lanes->is_near, 0, lanes->slice_count);
-  for (uint32_t k = 0; k < lanes->near_probe_count; ++k) {
-    const sonde_slice_model *fixed = &lanes->model[lanes->near_probe[k]];
-    lanes->is_near[lanes->near_probe[k]] = 1;
-    for (uint32_t f = 0; f < fixed->face_count; ++f)
-      lanes->face_marked[lanes->face_near[fixed->first_face + f]] = 1;
-  }
-}
-
-void sonde_lanes_detect(sonde_state *state, const sonde_box *box) {
-  sonde_lanes *lanes = state->lanes;
-  uint32_t faces = state->model->surface.face_count;
-  mark_near_faces(lanes);
-  for (uint32_t k = 0; k < faces; ++k) {
-    if (!lanes->face_marked[k / SONDE_LANES]) {
-      k |= SONDE_LANES - 1;
-      continue;
-    }
-    const uint32_t *v = state->model->surface.faces[lanes->face_order[k]];
-    if (lanes->is_near[v[0] / SONDE_LANES] && lanes->is_near[v[1] / SONDE_LANES] &&
-        lanes->is_near[v[2] / SONDE_LANES])
-      sonde_contact_sample(state, lanes->face_order[k], box);
-  }
-}
-
 static void wake(sonde_lanes *lanes, uint32_t s) {
   lanes->is_awake[s] = 1;
   lanes->calm[s] = 0;
@@ -143,31 +79,19 @@ static void clear_touched(sonde_state *state) {
   }
 }
 
-// The place in press[] where the contact with a slice is gathered.
-static sonde_slice_press *press_at(sonde_lanes *lanes, uint32_t s) {
-  if (lanes->press_of[s] == 0) {
-    lanes->pressed[lanes->press_count++] = s;
-    lanes->press_of[s] = lanes->press_count;
-    memset(&lanes->press[lanes->press_count - 1], 0, sizeof *lanes->press);
-  }
-  SONDE_ASSERT(lanes->press_count <= lanes->slice_count);
-  return &lanes->press[lanes->press_of[s] - 1];
-}
-
-static void couple(sonde_state *state) {
+// Adds friction, found in double precision, to what the contact gathered.
+static void couple_friction(sonde_state *state) {
   sonde_lanes *lanes = state->lanes;
   SONDE_ASSERT(state->touched_count <= lanes->node_count);
-  for (uint32_t k = 0; k < lanes->press_count; ++k) lanes->press_of[lanes->pressed[k]] = 0;
-  lanes->press_count = 0;
   for (uint32_t k = 0; k < state->touched_count; ++k) {
     uint32_t i = state->touched[k], l = i % SONDE_LANES;
-    sonde_slice_press *at = press_at(lanes, i / SONDE_LANES);
+    sonde_slice_press *at = &lanes->press[lanes->press_of[i / SONDE_LANES] - 1];
     const double(*d)[3] = (const double(*)[3])state->matrix->diagonal[i].m;
-    sonde_vec3 f = v_add(state->contact_force[i], state->force[i]);
-    at->force[0][l] = (float)f.x, at->force[1][l] = (float)f.y, at->force[2][l] = (float)f.z;
-    at->block[0][l] = (float)d[0][0], at->block[1][l] = (float)d[0][1];
-    at->block[2][l] = (float)d[0][2], at->block[3][l] = (float)d[1][1];
-    at->block[4][l] = (float)d[1][2], at->block[5][l] = (float)d[2][2];
+    sonde_vec3 f = state->force[i];
+    at->force[0][l] += (float)f.x, at->force[1][l] += (float)f.y, at->force[2][l] += (float)f.z;
+    at->block[0][l] += (float)d[0][0], at->block[1][l] += (float)d[0][1];
+    at->block[2][l] += (float)d[0][2], at->block[3][l] += (float)d[1][1];
+    at->block[4][l] += (float)d[1][2], at->block[5][l] += (float)d[2][2];
   }
 }
 
@@ -214,7 +138,7 @@ static void conjugate(sonde_state *state, bool tied, double target, double sums[
   result->residual = sqrt(sums[1]);
   uint32_t most = state->def.pcg.max_iterations;
   for (bool first = true; result->residual > target && result->iterations < most; first = false) {
-    if (tied) sonde_faces_carry(lanes);
+    if (tied) sonde_press_carry(lanes, lanes->direction);
     double curvature = lanes->kernels->multiply(lanes, first);
     if (!first) curvature -= beta * sums[0] / alpha;
     if (!(curvature > 0)) break;
@@ -285,13 +209,7 @@ static const double BENT_SHARE = 0.1;
 static double untied2(sonde_state *state) {
   sonde_lanes *lanes = state->lanes;
   double sum = 0;
-  for (uint32_t k = 0; k < state->touched_count; ++k) {
-    uint32_t i = state->touched[k];
-    const sonde_slice *at = &lanes->slice[i / SONDE_LANES];
-    for (int c = 0; c < 3; ++c)
-      lanes->direction[(size_t)i * SONDE_QUAD + (size_t)c] = at->x[c][i % SONDE_LANES];
-  }
-  sonde_faces_carry(lanes);
+  sonde_press_carry(lanes, lanes->probe_way);
   for (uint32_t k = 0; k < lanes->press_count; ++k)
     for (int c = 0; c < 3; ++c)
       for (int l = 0; l < SONDE_LANES; ++l) {
@@ -304,10 +222,10 @@ static double untied2(sonde_state *state) {
 // Whether what the linear system did not see of its solution is more than a share of what the
 // solver may leave, or what it left out is more than that; the next iteration is local when the
 // contact is all of it.
-static bool is_bent(sonde_state *state, const sonde_motion *motion, iteration *now) {
+static bool is_bent(sonde_state *state, double surprise2, iteration *now) {
   double h = state->def.dt_s, rest2 = state->def.pcg.absolute_residual;
   double share = state->def.pcg.relative_residual * state->def.pcg.relative_residual;
-  double contact2 = h * h * sonde_contact_surprise(state, motion, h);
+  double contact2 = h * h * surprise2;
   double bent2 = state->lanes->kernels->bend(state->lanes);
   rest2 *= rest2;
   double limit2 = fmax(BENT_SHARE * BENT_SHARE * share * now->force2, rest2);
@@ -316,23 +234,17 @@ static bool is_bent(sonde_state *state, const sonde_motion *motion, iteration *n
   return !now->tied && untied2(state) > fmax(share * now->force2, rest2);
 }
 
-// Finds the contact where the nodes are expected and adds it up by slices.
+// Finds the contact where the nodes are expected.
 static void touch(sonde_state *state, const sonde_probe *probe, sonde_pose pose,
                   const sonde_motion *motion) {
-  sonde_lanes *lanes = state->lanes;
   double h = state->def.dt_s;
   const sonde_contact_scales scales = {h, h * h};
-  find_near(state, probe, pose);
-  publish_evaluated(state);
-  sonde_contact_detect(state, probe, pose);
-  if (wake_touched(state)) list_awake(lanes);
+  sonde_press_detect(state, probe, pose, motion);
+  if (wake_touched(state)) list_awake(state->lanes);
+  if (!probe || !(state->def.friction.mu_static > 0)) return;
   clear_touched(state);
-  lanes->tie_count = 0;
-  if (probe) {
-    sonde_contact_apply(state, motion, &scales);
-    sonde_friction_apply(state, motion, &scales, h);
-  }
-  couple(state);
+  sonde_friction_apply(state, motion, &scales, h);
+  couple_friction(state);
 }
 
 // Forces and matrix, the first sweep and the rest of the solution. False when there was nothing
@@ -367,8 +279,9 @@ static bool iterate(sonde_state *state, const sonde_probe *probe, sonde_pose pos
   bool solved = linearise(state, now);
   double left = sonde_clock_now();
   publish_increments(state, false);
-  sonde_contact_advance(state, motion, 1, state->def.dt_s);
-  bool again = solved && !last && is_bent(state, motion, now);
+  bool open = solved && !last;
+  double surprise2 = sonde_press_meet(state, open);
+  bool again = open && is_bent(state, surprise2, now);
   publish_increments(state, true);
   state->times.contact_s += detected - start + (sonde_clock_now() - left);
   return again;

@@ -13,16 +13,20 @@
 
 #include <string.h>
 
+// Of face_marked.
+static size_t mark_words(const sonde_lanes *l) { return l->face_slice_count / 64 + 1; }
+
 #define CARVE(field, count) (l->field = sonde_carve(base, &offset, (count), sizeof *l->field))
 
 static size_t carve(sonde_lanes *l, uint32_t faces, char *base) {
   size_t offset = 0, rows = (size_t)l->slice_count * SONDE_LANES;
-  CARVE(model, l->slice_count), CARVE(slice, l->slice_count);
+  CARVE(model, l->slice_count), CARVE(box, l->slice_count), CARVE(slice, l->slice_count);
   CARVE(slot, l->slot_count), CARVE(tangent, l->slot_count), CARVE(share, l->slot_count);
   CARVE(slot_layer, l->law.layered ? l->slot_count : 0);
   CARVE(press, l->slice_count), CARVE(press_of, l->slice_count), CARVE(pressed, l->slice_count);
   // One more slice of faces stays zero: what slots without a face read.
   CARVE(face, l->face_slice_count), CARVE(face_value, l->face_slice_count + 1);
+  CARVE(point_area, l->face_slice_count);
   CARVE(near, l->near_total), CARVE(face_near, l->face_total);
   CARVE(record, l->law.springs ? rows * SONDE_RECORD : 0), CARVE(direction, rows * SONDE_QUAD);
   CARVE(indentation, l->law.layered ? rows : 0);
@@ -30,11 +34,14 @@ static size_t carve(sonde_lanes *l, uint32_t faces, char *base) {
   CARVE(layer_direction, l->law.layered ? rows * SONDE_QUAD : 0);
   CARVE(awake, l->slice_count), CARVE(faces, l->face_slice_count);
   CARVE(is_awake, l->slice_count), CARVE(calm, l->slice_count);
-  CARVE(face_marked, l->face_slice_count), CARVE(is_near, l->slice_count),
-      CARVE(speed2, l->slice_count);
+  CARVE(face_marked, mark_words(l)), CARVE(is_near, l->slice_count), CARVE(speed2, l->slice_count);
   CARVE(way2, l->slice_count), CARVE(unrest2, l->slice_count), CARVE(published, l->slice_count);
-  CARVE(near_probe, l->slice_count), CARVE(pressed_face, faces);
-  CARVE(tie, 4 * (size_t)faces);
+  CARVE(near_probe, l->slice_count), CARVE(touched_rows, l->slice_count);
+  CARVE(probe_place, rows * SONDE_QUAD), CARVE(probe_motion, rows * SONDE_QUAD);
+  CARVE(probe_way, rows * SONDE_QUAD);
+  CARVE(probe.plane, SONDE_MAX_PROBE_PLANES), CARVE(probe.slope, SONDE_MAX_PROBE_PLANES);
+  CARVE(pressed_slice, l->slice_count > l->face_slice_count ? l->slice_count : l->face_slice_count);
+  CARVE(press_corners, 1), CARVE(meet_corners, 1), CARVE(tie, SONDE_FACE_POINTS * (size_t)faces);
   return offset;
 }
 
@@ -91,6 +98,7 @@ static void fill_springs(sonde_slice_model *fixed, const sonde_model *model, uin
 static void fill_slice(sonde_lanes *lanes, const sonde_model *model, uint32_t s) {
   uint32_t n = model->surface.vertex_count;
   sonde_slice_model *fixed = &lanes->model[s];
+  sonde_slice_box *box = &lanes->box[s];
   for (uint32_t l = 0; l < SONDE_LANES; ++l) {
     uint32_t i = s * SONDE_LANES + l;
     fixed->k0[l] = fixed->area[l] = 0;
@@ -110,13 +118,14 @@ static void fill_slice(sonde_lanes *lanes, const sonde_model *model, uint32_t s)
     const double at[3] = {x.x, x.y, x.z};
     for (int c = 0; c < 3; ++c) {
       float p = fixed->place[c][l] = (float)at[c];
-      fixed->low[c] = l == 0 || p < fixed->low[c] ? p : fixed->low[c];
-      fixed->high[c] = l == 0 || p > fixed->high[c] ? p : fixed->high[c];
+      fixed->place_low[c][l] = (float)(at[c] - (double)p);
+      box->low[c] = l == 0 || p < box->low[c] ? p : box->low[c];
+      box->high[c] = l == 0 || p > box->high[c] ? p : box->high[c];
     }
     const sonde_topology *t = &model->topology;
     for (uint32_t k = t->start[i]; k < t->start[i + 1]; ++k) {
       float rest = (float)model->edge_rest_m[t->neighbour_edge[k]];
-      fixed->reach = fmaxf(fixed->reach, rest);
+      box->reach = fmaxf(box->reach, rest);
       fixed->bend = fmaxf(fixed->bend, 1 / rest);
     }
     fixed->used = l + 1;
@@ -145,12 +154,14 @@ static void fill_face(sonde_lanes *lanes, const sonde_model *model, uint32_t at)
   const uint32_t *v = model->surface.faces[f];
   SONDE_ASSERT(at / SONDE_LANES < lanes->face_slice_count);
   sonde_face_slice *face = &lanes->face[at / SONDE_LANES];
+  lanes->point_area[at / SONDE_LANES][lane] = (float)(model->face_area_m2[f] / SONDE_FACE_POINTS);
+  for (uint32_t k = 0; k < 3; ++k) face->node[k][lane] = (int32_t)v[k];
+  if (!lanes->law.layered) return;
   face->inverse_area[lane] = (float)(1 / model->face_area_m2[f]);
   fill_shear(face, model, f, lane);
   for (uint32_t k = 0; k < 3; ++k) {
     uint32_t i = v[k], next = v[(k + 1) % 3], before = v[(k + 2) % 3], row = i % SONDE_LANES;
     int32_t corner = (int32_t)((at / SONDE_LANES * 3 + k) * SONDE_LANES + lane);
-    face->node[k][lane] = (int32_t)i;
     face->half_cotangent[k][lane] = (float)model->face_half_cotangent[f][k];
     const double *half = model->face_half_cotangent[f];
     sonde_slot_layer *ahead = slot_of(lanes, &model->topology, i, next);
@@ -166,8 +177,7 @@ static void fill_face(sonde_lanes *lanes, const sonde_model *model, uint32_t at)
 static void fill_faces(sonde_lanes *lanes, const sonde_model *model) {
   for (uint32_t s = 0; s < lanes->face_slice_count; ++s)
     for (int l = 0; l < SONDE_LANES; ++l) lanes->face[s].limit[l] = 1;
-  for (uint32_t k = 0; lanes->law.layered && k < model->surface.face_count; ++k)
-    fill_face(lanes, model, k);
+  for (uint32_t k = 0; k < model->surface.face_count; ++k) fill_face(lanes, model, k);
 }
 
 // Adds value to the list that starts at first unless it is there; returns the new count.

@@ -4,12 +4,9 @@
 #ifndef SONDE_SRC_LANES_H
 #define SONDE_SRC_LANES_H
 
+#include "world/press.h"
+
 #include "sonde/world.h"
-
-enum { SONDE_LANES = 16, SONDE_RECORD = 8, SONDE_QUAD = 4 };
-
-typedef float sonde_lane __attribute__((vector_size(64)));
-typedef int32_t sonde_lane_index __attribute__((vector_size(64)));
 
 // One neighbour of each row of a slice; rows with fewer neighbours have share 0 there.
 typedef struct sonde_slot {
@@ -40,10 +37,14 @@ typedef struct sonde_slice_model {
   uint32_t first_near, near_count; // slices that share an edge with this one
   uint32_t first_face, face_count; // slices of faces with a corner in this one
   uint32_t used;                   // rows that are nodes, from the front
-  float low[3], high[3];           // box at rest
-  float reach;                     // longest edge at a node, at rest
-  float bend;                      // 1 over the shortest
+  float bend;                      // 1 over the shortest edge at a node, at rest
+  sonde_lane place_low[3];         // what single precision leaves of `place`
 } sonde_slice_model;
+
+// At rest: box of a slice's nodes, longest edge at one of them.
+typedef struct sonde_slice_box {
+  float low[3], high[3], reach;
+} sonde_slice_box;
 
 typedef struct sonde_slice {
   sonde_lane u[3], v[3]; // at the start of the step: displacement, velocity
@@ -51,19 +52,6 @@ typedef struct sonde_slice {
   sonde_lane factor[6]; // of the diagonal blocks D = L E L^T: l21 l31 l32, 1/e1 1/e2 1/e3
   sonde_lane x[3], r[3], z[3], w[3], p[3], q[3]; // of the conjugate gradients; D z = r
 } sonde_slice;
-
-// What the contact adds to a slice: forces, xx xy xz yy yz zz of the diagonal blocks, and what ties
-// make of the directions.
-typedef struct sonde_slice_press {
-  sonde_lane force[3], block[6], carry[3];
-} sonde_slice_press;
-
-// A pressed face couples its corners along the slope of the depth. A diagonal block holds the whole
-// row; a tie takes back what is too much when two corners part: it acts on their difference.
-typedef struct sonde_press_tie {
-  uint32_t row[3];
-  float slope[3], tie[3]; // of corners 0 1, 1 2, 2 0
-} sonde_press_tie;
 
 typedef struct sonde_face_slice {
   sonde_lane_index node[3];
@@ -76,13 +64,6 @@ enum { SONDE_CORNER = 4, SONDE_CORNER_BEFORE = 2 };
 typedef struct sonde_face_value {
   float corner[3][SONDE_LANES][SONDE_CORNER];
 } sonde_face_value;
-
-// Of a face that the probe touches, by its points: depth and push where they were evaluated, plane
-// of the depth or -1.
-typedef struct sonde_pressed_face {
-  double depth[4], push[4];
-  int32_t plane[4];
-} sonde_pressed_face;
 
 // Numbers of the law and of the step, in single precision.
 typedef struct sonde_lane_law {
@@ -115,6 +96,17 @@ typedef struct sonde_lane_kernels {
                                         // step; not finite: NaN
   // near_probe: slices with a node in the box, which grows by `edges` times their reach
   void (*near)(sonde_lanes *lanes, const float low[3], const float high[3], float edges);
+  void (*locate)(sonde_lanes *lanes);  // nodes of these slices from the probe, for their faces
+  void (*hand_on)(sonde_lanes *lanes); // and their solution
+  // Pushes where the nodes are evaluated; false where none of the slice is inside.
+  bool (*press_faces)(const sonde_lanes *lanes, uint32_t index, sonde_pressed_slice *at,
+                      sonde_press_corners *to);
+  bool (*press_nodes)(const sonde_lanes *lanes, uint32_t index, sonde_pressed_slice *at,
+                      sonde_press_corners *to);
+  void (*meet_faces)(const sonde_lanes *lanes, const sonde_pressed_slice *at, bool surprise,
+                     sonde_meet_corners *to);
+  void (*meet_nodes)(const sonde_lanes *lanes, const sonde_pressed_slice *at, bool surprise,
+                     sonde_meet_corners *to);
 } sonde_lane_kernels;
 
 struct sonde_lanes {
@@ -124,6 +116,7 @@ struct sonde_lanes {
   sonde_lane_law law;
   const sonde_lane_kernels *kernels;
   sonde_slice_model *model;
+  sonde_slice_box *box;
   sonde_slice *slice;
   sonde_slot *slot;
   sonde_slot_tangent *tangent;
@@ -135,8 +128,17 @@ struct sonde_lanes {
   uint32_t press_count;
   sonde_press_tie *tie; // [4 faces]
   uint32_t tie_count;
-  sonde_pressed_face *pressed_face; // [faces] in the order of touched_faces of the state
+  sonde_lane_probe probe;
+  float *probe_place;  // [rows][4] from the probe's origin; 1 for nodes of near_probe, else 0
+  float *probe_motion; // [rows][4] velocity against the probe
+  float *probe_way;    // [rows][4] solution
+  sonde_pressed_slice *pressed_slice; // [slices of faces, or of nodes if more] ascending
+  uint32_t pressed_slice_count;
+  sonde_press_corners *press_corners; // [1] of the slice at hand
+  sonde_meet_corners *meet_corners;   // [1]
+  uint16_t *touched_rows;             // [slices] lanes that the probe touches
   sonde_face_slice *face;
+  sonde_lane *point_area; // [slices of faces] a quarter of a face's at rest; 0: no face
   sonde_face_value *face_value;
   uint32_t *near, *face_near;
   // For the neighbours, of every row where it is evaluated
@@ -147,9 +149,10 @@ struct sonde_lanes {
   float *direction, *layer_direction; // [rows][4]
   uint32_t *awake, *faces;            // lists of slices that take part
   uint32_t awake_count, face_list_count;
-  uint8_t *is_awake, *calm, *face_marked, *is_near;
-  float *speed2;      // [slices] largest square of a node's speed
-  float *way2;        // [slices] and displacement
+  uint8_t *is_awake, *calm, *is_near;
+  uint64_t *face_marked; // [slices of faces / 64] bits
+  float *speed2;         // [slices] largest square of a node's speed
+  float *way2;           // [slices] and displacement
   float *unrest2;     // [slices] largest square of unbalanced force over the anchors' stiffness: no
                       // node is farther from its equilibrium
   uint8_t *published; // [slices] the doubles of the state are up to date
@@ -182,6 +185,8 @@ void sonde_lanes_import(sonde_lanes *lanes, const sonde_vec3 *rest, const sonde_
 void sonde_lanes_still(sonde_lanes *lanes, uint32_t first, uint32_t count);
 // The record of one row where it is evaluated. @thread tick
 void sonde_lanes_record(sonde_lanes *lanes, uint32_t i);
+// Marks slices of faces with a corner in one of the slices. @thread tick
+void sonde_lanes_mark_faces(sonde_lanes *lanes, const uint32_t *slices, uint32_t count);
 // Writes positions and velocities that are not up to date as doubles. @thread tick
 void sonde_lanes_publish(sonde_lanes *lanes, const sonde_vec3 *rest, sonde_vec3 *position,
                          sonde_vec3 *velocity);

@@ -11,7 +11,8 @@
 //            read and write every slice twice in an iteration.
 // bend:      what a solution leaves unbalanced.
 // accept, update: the solution's way into the motion, and the records that neighbours read.
-// near:      slices in the probe's box.
+// near:      slices in the probe's box. The contact itself: lanes_press_kernel.c.
+#include "world/lanes_press_kernel.c"
 #include "world/lanes_vector.h"
 
 #include "base/base.h"
@@ -494,22 +495,19 @@ INLINE bool reaches(const sonde_slice_model *fixed, const sonde_slice *at, float
     sonde_lane x = fixed->place[c] + (at->u[c] + h * at->ve[c]);
     inside &= (x >= low[c] - margin) & (x <= high[c] + margin);
   }
-  int any = 0;
-  for (int l = 0; l < SONDE_LANES; ++l) any |= inside[l];
-  return any != 0;
+  return bits(inside) != 0;
 }
 
 static void near(sonde_lanes *lanes, const float low[3], const float high[3], float edges) {
   float h = lanes->law.dt;
   uint32_t count = 0;
   for (uint32_t s = 0; s < lanes->slice_count; ++s) {
-    const sonde_slice_model *fixed = &lanes->model[s];
-    float margin = edges * fixed->reach, way = margin + 1e-4f;
+    const sonde_slice_box *box = &lanes->box[s];
+    float margin = edges * box->reach, way = margin + 1e-4f;
     way += __builtin_sqrtf(lanes->way2[s]) + 3 * h * __builtin_sqrtf(lanes->speed2[s]);
     bool apart = false;
-    for (int c = 0; c < 3; ++c)
-      apart |= fixed->low[c] - way > high[c] || fixed->high[c] + way < low[c];
-    if (apart || !reaches(fixed, &lanes->slice[s], h, low, high, margin)) continue;
+    for (int c = 0; c < 3; ++c) apart |= box->low[c] - way > high[c] || box->high[c] + way < low[c];
+    if (apart || !reaches(&lanes->model[s], &lanes->slice[s], h, low, high, margin)) continue;
     lanes->near_probe[count++] = s;
   }
   SONDE_ASSERT(count <= lanes->slice_count);
@@ -526,4 +524,10 @@ const sonde_lane_kernels SONDE_KERNELS = {.name = SONDE_KERNELS_NAME,
                                           .bend = bend,
                                           .accept = accept,
                                           .update = update,
-                                          .near = near};
+                                          .near = near,
+                                          .locate = locate,
+                                          .hand_on = hand_on,
+                                          .press_faces = press_faces,
+                                          .press_nodes = press_nodes,
+                                          .meet_faces = meet_faces,
+                                          .meet_nodes = meet_nodes};

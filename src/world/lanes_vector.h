@@ -38,6 +38,25 @@ INLINE sonde_lane inverse_root(sonde_lane a) {
   return y;
 }
 
+// Lanes whose mask is set.
+INLINE uint32_t bits(sonde_lane_index mask) {
+#if defined(__AVX512DQ__)
+  return (uint32_t)_mm512_movepi32_mask((__m512i)mask);
+#elif defined(__SSE2__)
+  union {
+    sonde_lane_index whole;
+    __m128 part[4];
+  } of = {mask};
+  uint32_t set = 0;
+  for (int k = 0; k < 4; ++k) set |= (uint32_t)_mm_movemask_ps(of.part[k]) << (4 * k);
+  return set;
+#else
+  uint32_t set = 0;
+  for (int k = 0; k < SONDE_LANES; ++k) set |= (uint32_t)(mask[k] & 1) << k;
+  return set;
+#endif
+}
+
 // base[index * stride + offset] for each lane.
 INLINE sonde_lane gather(const float *base, sonde_lane_index index) {
 #if defined(__AVX512F__)

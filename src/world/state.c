@@ -111,7 +111,7 @@ static size_t carve(sonde_state *s, char *base) {
   CARVE(touched_faces, faces), CARVE(point_planes, faces);
   CARVE(contact_force, n), CARVE(lumped, n), CARVE(lumped_rows, n);
   CARVE(bond_m, n), CARVE(grip_n, n), CARVE(grip_tick, n);
-  CARVE(plane_weight, SONDE_MAX_PROBE_PLANES), CARVE(plane_lane, SONDE_MAX_PROBE_PLANES);
+  CARVE(plane_weight, SONDE_MAX_PROBE_PLANES);
   CARVE(plane_normal, SONDE_MAX_PROBE_PLANES), CARVE(plane_offset, SONDE_MAX_PROBE_PLANES);
   CARVE(force, n), CARVE(product, n), CARVE(right, n), CARVE(trial, n), CARVE(scratch_nodes, n);
   CARVE(scratch.r, n), CARVE(scratch.z, n), CARVE(scratch.p, n), CARVE(scratch.q, n);

@@ -68,7 +68,6 @@ struct sonde_state {
   sonde_vec3 *plane_normal; // [max planes] of the probe in the world frame
   double *plane_offset;
   double *plane_weight;   // of its distance in the depth: see depth_at()
-  float (*plane_lane)[4]; // [max planes] weight times normal and distance from the origin
   sonde_vec3 origin;      // of the probe
   uint32_t plane_count;
   sonde_vec3 ball_centre; // of a ball
@@ -138,10 +137,6 @@ void sonde_contact_apply(sonde_state *state, const sonde_motion *probe,
 // Pushes at the end of the step by the same linearisation: from probed[] the nodes go on by
 // lambda^2 h dv at velocities changed by lambda dv. @thread tick
 void sonde_contact_advance(sonde_state *state, const sonde_motion *probe, double lambda, double h);
-// Square of the difference between the pushes that sonde_contact_advance() foresaw for nodes that
-// go on by h dv and those that they meet there. FOUNDATION and NODES. Uses right[]. @thread tick
-double sonde_contact_surprise(sonde_state *state, const sonde_motion *probe, double h);
-double sonde_nodes_surprise(const sonde_state *state, const sonde_motion *probe, double h);
 // Box of the probe in the world. @thread tick
 sonde_box sonde_contact_box(const sonde_probe *probe, sonde_pose pose);
 // Depth of a point inside the probe and its gradient; false outside. @thread tick
@@ -152,10 +147,6 @@ void sonde_nodes_detect(sonde_state *state, const sonde_box *box);
 void sonde_nodes_apply(sonde_state *state, const sonde_motion *probe,
                        const sonde_contact_scales *scales);
 void sonde_nodes_advance(sonde_state *state, const sonde_motion *probe, double lambda, double h);
-// A face whose box meets the probe's, by its integration points; all such faces for the fast
-// engine. @thread tick
-void sonde_contact_sample(sonde_state *state, uint32_t face, const sonde_box *box);
-void sonde_lanes_detect(sonde_state *state, const sonde_box *box);
 // One step of the fast engine; false when something is not finite. @thread tick
 bool sonde_lane_step(sonde_state *state, const sonde_probe *probe, sonde_pose pose,
                      const sonde_motion *motion);
