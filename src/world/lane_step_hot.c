@@ -16,16 +16,6 @@
 
 #include <string.h>
 
-// Faces with a corner in the listed slices.
-static void list_faces(sonde_lanes *lanes) {
-  lanes->face_list_count = 0;
-  if (!(lanes->law.shear > 0)) return;
-  sonde_lanes_mark_faces(lanes, lanes->awake, lanes->awake_count);
-  for (uint32_t word = 0; word <= lanes->face_slice_count / 64; ++word)
-    for (uint64_t rest = lanes->face_marked[word]; rest; rest &= rest - 1)
-      lanes->faces[lanes->face_list_count++] = word * 64 + (uint32_t)__builtin_ctzll(rest);
-}
-
 // Lists the slices that `take` marks.
 static void list_slices(sonde_lanes *lanes, const uint8_t *take) {
   lanes->awake_count = lanes->slot_total = 0;
@@ -34,7 +24,6 @@ static void list_slices(sonde_lanes *lanes, const uint8_t *take) {
     lanes->awake_count += take[s];
     lanes->slot_total += take[s] ? lanes->model[s].slot_count : 0;
   }
-  list_faces(lanes);
 }
 
 static void list_awake(sonde_lanes *lanes) { list_slices(lanes, lanes->is_awake); }
@@ -97,12 +86,11 @@ static void couple_friction(sonde_state *state) {
 
 // Vectors that the kernels read and write at least once, per slice and per slot: those of one
 // evaluation (linearise, the records of accept or update), of one sweep and of one iteration
-// (multiply, advance). Records of neighbours count once per slot; the faces of the shear layer and
-// the contact do not count.
+// (multiply, advance). Records of neighbours count once per slot; the contact does not count.
 enum {
   EVALUATED_PER_SLICE = 39,
   EVALUATED_PER_SPRING = 16,
-  EVALUATED_PER_LAYERED = 13,
+  EVALUATED_PER_LAYERED = 12,
   SWEPT_PER_SLICE = 19,
   ITERATED_PER_SLICE = 44,
   MULTIPLIED_PER_SPRING = 10,
@@ -253,7 +241,6 @@ static bool linearise(sonde_state *state, iteration *now) {
   sonde_lanes *lanes = state->lanes;
   double start = sonde_clock_now(), sums[3];
   sonde_vec3 reaction = lanes->reaction_n;
-  lanes->kernels->shear(lanes);
   bool sweep = !now->tied && !lanes->stiff;
   lanes->kernels->linearise(lanes, sweep, sums);
   if (now->local)
