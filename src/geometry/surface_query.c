@@ -1,14 +1,13 @@
 // Queries of the surface index; they allocate nothing.
 //
-//   closest_on_triangle   closest point by the Voronoi regions of corner, side and face
+//   sonde_triangle_closest closest point by the Voronoi regions of corner, side and face
 //   sonde_surface_closest branch and bound over the tree
 //   hit_triangle          ray against triangle, both sides, watertight
 //   sonde_surface_inside  sign against the pseudo-normal of the closest feature
 #include "geometry/surface.h"
+#include "geometry/triangle.h"
 
-// Sets weights so that all but those of the closest corner or side are exactly 0.
-static void closest_on_triangle(sonde_vec3 p, sonde_vec3 a, sonde_vec3 b, sonde_vec3 c,
-                                double w[3]) {
+void sonde_triangle_closest(sonde_vec3 p, sonde_vec3 a, sonde_vec3 b, sonde_vec3 c, double w[3]) {
   sonde_vec3 ab = v_sub(b, a), ac = v_sub(c, a), ap = v_sub(p, a);
   double d1 = v_dot(ab, ap), d2 = v_dot(ac, ap);
   w[0] = w[1] = w[2] = 0;
@@ -64,7 +63,7 @@ static void closest_in_leaf(const sonde_surface_index *index, const surface_node
     sonde_surface_point trial = {.face = index->order[i]};
     const uint32_t *v = index->mesh.faces[trial.face];
     const sonde_vec3 *x = index->mesh.vertices;
-    closest_on_triangle(query, x[v[0]], x[v[1]], x[v[2]], trial.weight);
+    sonde_triangle_closest(query, x[v[0]], x[v[1]], x[v[2]], trial.weight);
     trial.point_m = weighted(&index->mesh, trial.face, trial.weight);
     double d2 = v_norm2(v_sub(query, trial.point_m));
     if (d2 < *best2) {

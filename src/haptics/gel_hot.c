@@ -11,13 +11,16 @@
 // flow:       volume over an edge in a step.
 // begin, finish: pressures before, films after.
 // dry:        loss to the air; skin that loses its film stays moist for a while.
+// enter:        share of sound at a place of a face of the skin.
+// share_around: at the place nearest to a point.
 #include "base/base.h"
 #include "base/maths.h"
+#include "geometry/triangle.h"
 #include "haptics/gel.h"
 
 static const double weight_pa_m = 1e4; // density times gravity
 static const double least_m = 1e-9;    // a film of molecules does not flow
-static const double reach_m = 4e-3;    // skin that far from a point of the face touches it
+static const double reach_m = 4e-3;    // gel fills half of that between face and skin, not all
 
 void sonde_gel_put(sonde_gel *gel, sonde_vec3 centre_m, double radius_m, double volume_m3) {
   SONDE_ASSERT(radius_m >= 0.0 && volume_m3 >= 0.0 && v_finite(centre_m));
@@ -128,22 +131,59 @@ sonde_friction sonde_gel_friction(const sonde_gel *gel, const sonde_vec3 *contac
   return friction;
 }
 
+// What sonde_gel_coupling_of() looks at.
+typedef struct look {
+  const sonde_gel *gel;
+  const double *film_m;
+  const sonde_vec3 *skin_m, *contact_n;
+} look;
+
+// Skin ends its touch halfway from a node that touches to one that does not.
+static double enter(const look *at, const uint32_t corner[3], const double weight[3]) {
+  double touching = 0.0, sum = 0.0;
+  for (int k = 0; k < 3; ++k) {
+    if (!(v_norm2(at->contact_n[corner[k]]) > 0.0)) continue;
+    touching += weight[k];
+    sum += weight[k] * -expm1(-at->film_m[corner[k]] / at->gel->def.lubricating_m);
+  }
+  return touching > 0.5 ? sum / touching : 2.0 * sum;
+}
+
+// At the place nearest to a point on the faces around a node.
+static double share_around(const look *at, uint32_t node, sonde_vec3 point_m) {
+  const sonde_topology *topology = &at->gel->model->topology;
+  double nearest2 = INFINITY, share = 0.0;
+  for (uint32_t k = topology->face_start[node]; k < topology->face_start[node + 1]; ++k) {
+    const uint32_t *corner = at->gel->model->surface.faces[topology->face_list[k]];
+    const sonde_vec3 *x = at->skin_m;
+    double weight[3];
+    sonde_triangle_closest(point_m, x[corner[0]], x[corner[1]], x[corner[2]], weight);
+    sonde_vec3 gap = v_sub(v_scale(x[corner[0]], weight[0]), point_m);
+    gap = v_madd(v_madd(gap, weight[1], x[corner[1]]), weight[2], x[corner[2]]);
+    double gap2 = v_norm2(gap);
+    if (gap2 >= nearest2) continue;
+    nearest2 = gap2;
+    share = enter(at, corner, weight);
+  }
+  return share * fmax(fmin(2.0 * (1.0 - sqrt(nearest2) / reach_m), 1.0), 0.0);
+}
+
 void sonde_gel_coupling_of(const sonde_gel *gel, const double *film_m, uint32_t *touched,
                            const sonde_vec3 *skin_m, const sonde_vec3 *contact_n,
                            const sonde_vec3 *point_m, uint32_t count, float *share) {
   SONDE_ASSERT(skin_m != NULL && contact_n != NULL && (count == 0 || (point_m && share)));
+  const look at = {gel, film_m, skin_m, contact_n};
   uint32_t touching = 0;
   for (uint32_t i = 0; i < gel->model->surface.vertex_count; ++i)
     if (v_norm2(contact_n[i]) > 0.0) touched[touching++] = i;
   for (uint32_t k = 0; k < count; ++k) {
-    double weight = 0.0, sum = 0.0;
+    double nearest2 = INFINITY;
+    uint32_t node = 0;
     for (uint32_t t = 0; t < touching; ++t) {
-      double near = 1.0 - v_distance(skin_m[touched[t]], point_m[k]) / reach_m;
-      if (near <= 0.0) continue;
-      weight += near;
-      sum += near * -expm1(-film_m[touched[t]] / gel->def.lubricating_m);
+      double gap2 = v_norm2(v_sub(skin_m[touched[t]], point_m[k]));
+      if (gap2 < nearest2) nearest2 = gap2, node = touched[t];
     }
-    share[k] = weight > 0.0 ? (float)(sum / weight) : 0.0f;
+    share[k] = touching > 0 ? (float)share_around(&at, node, point_m[k]) : 0.0f;
   }
 }
 
