@@ -50,7 +50,7 @@ SONDE_API sonde_friction sonde_gel_friction(const sonde_gel *gel, const sonde_ve
                                             const sonde_friction *dry);
 /**
  * Share of sound that enters at points of the probe's face, 0..1: one value per line of the image.
- * Without skin that touches within 4 mm there is air: 0.
+ * Gel fills gaps up to 2 mm; without skin that touches within 4 mm there is air: 0.
  * @param skin_m [nodes] deformed, sonde_state_positions() @param point_m [count] @param[out] share
  * [count] @thread tick
  */

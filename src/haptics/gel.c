@@ -37,7 +37,7 @@ void sonde_gel_destroy(sonde_gel *gel) {
   sonde_free(gel->push_pa);
   sonde_free(gel->drag);
   sonde_free(gel->half_m);
-  sonde_free(gel->touched);
+  sonde_free(gel->near);
   sonde_free(gel);
 }
 
@@ -74,9 +74,9 @@ sonde_status sonde_gel_create(const sonde_model *model, const sonde_gel_def *def
   gel->push_pa = SONDE_NEW(double, nodes);
   gel->drag = SONDE_NEW(double, topology->edge_count);
   gel->half_m = SONDE_NEW(double, topology->edge_count);
-  gel->touched = SONDE_NEW(uint32_t, nodes);
+  gel->near = SONDE_NEW(uint32_t, nodes);
   if (!gel->film_m || !gel->moisture || !gel->change_m3 || !gel->push_pa || !gel->drag ||
-      !gel->half_m || !gel->touched) {
+      !gel->half_m || !gel->near) {
     sonde_gel_destroy(gel);
     return sonde_fail_memory(error);
   }

@@ -13,7 +13,7 @@ struct sonde_gel {
   double *push_pa;   // [nodes] scratch of a step: pressure of the probe
   double *drag;      // [edges] flow (m^3/s) per film^3 and pressure difference
   double *half_m;    // [edges] half the edge's width over its length
-  uint32_t *touched; // [nodes] scratch of a coupling
+  uint32_t *near;    // [nodes] scratch of a coupling
 };
 
 // One of the parts of sonde_gel_step(), to be taken in turn: what a tick can afford. The probe's
@@ -21,7 +21,7 @@ struct sonde_gel {
 void sonde_gel_part(sonde_gel *gel, const sonde_vec3 *contact_n, sonde_vec3 probe_m_s, double dt_s,
                     uint32_t part, uint32_t parts);
 // sonde_gel_coupling() with another film [nodes] and scratch [nodes] of the caller.
-void sonde_gel_coupling_of(const sonde_gel *gel, const double *film_m, uint32_t *touched,
+void sonde_gel_coupling_of(const sonde_gel *gel, const double *film_m, uint32_t *near,
                            const sonde_vec3 *skin_m, const sonde_vec3 *contact_n,
                            const sonde_vec3 *point_m, uint32_t count, float *share);
 

@@ -11,8 +11,9 @@
 // flow:       volume over an edge in a step.
 // begin, finish: pressures before, films after.
 // dry:        loss to the air; skin that loses its film stays moist for a while.
-// enter:        share of sound at a place of a face of the skin.
-// share_around: at the place nearest to a point.
+// touches, enter: whether the probe does; share of sound at a place of a face of the skin.
+// share_around: at the place nearest to a point, on the faces around a node.
+// gather:     the nodes that may be nearest.
 #include "base/base.h"
 #include "base/maths.h"
 #include "geometry/triangle.h"
@@ -138,11 +139,13 @@ typedef struct look {
   const sonde_vec3 *skin_m, *contact_n;
 } look;
 
+static bool touches(const look *at, uint32_t node) { return v_norm2(at->contact_n[node]) > 0.0; }
+
 // Skin ends its touch halfway from a node that touches to one that does not.
 static double enter(const look *at, const uint32_t corner[3], const double weight[3]) {
   double touching = 0.0, sum = 0.0;
   for (int k = 0; k < 3; ++k) {
-    if (!(v_norm2(at->contact_n[corner[k]]) > 0.0)) continue;
+    if (!touches(at, corner[k])) continue;
     touching += weight[k];
     sum += weight[k] * -expm1(-at->film_m[corner[k]] / at->gel->def.lubricating_m);
   }
@@ -168,28 +171,44 @@ static double share_around(const look *at, uint32_t node, sonde_vec3 point_m) {
   return share * fmax(fmin(2.0 * (1.0 - sqrt(nearest2) / reach_m), 1.0), 0.0);
 }
 
-void sonde_gel_coupling_of(const sonde_gel *gel, const double *film_m, uint32_t *touched,
+// Nodes of the faces with a corner that touches, each once: one beside several comes with the first
+// of them. Returns their number.
+static uint32_t gather(const look *at, uint32_t *near) {
+  const sonde_topology *topology = &at->gel->model->topology;
+  uint32_t count = 0;
+  for (uint32_t i = 0; i < topology->vertex_count; ++i) {
+    if (!touches(at, i)) continue;
+    near[count++] = i;
+    for (uint32_t k = topology->start[i]; k < topology->start[i + 1]; ++k) {
+      uint32_t beside = topology->neighbour[k], first = topology->start[beside];
+      if (touches(at, beside)) continue;
+      while (!touches(at, topology->neighbour[first])) ++first;
+      if (topology->neighbour[first] == i) near[count++] = beside;
+    }
+  }
+  return count;
+}
+
+void sonde_gel_coupling_of(const sonde_gel *gel, const double *film_m, uint32_t *near,
                            const sonde_vec3 *skin_m, const sonde_vec3 *contact_n,
                            const sonde_vec3 *point_m, uint32_t count, float *share) {
   SONDE_ASSERT(skin_m != NULL && contact_n != NULL && (count == 0 || (point_m && share)));
   const look at = {gel, film_m, skin_m, contact_n};
-  uint32_t touching = 0;
-  for (uint32_t i = 0; i < gel->model->surface.vertex_count; ++i)
-    if (v_norm2(contact_n[i]) > 0.0) touched[touching++] = i;
+  uint32_t nodes = gather(&at, near);
   for (uint32_t k = 0; k < count; ++k) {
     double nearest2 = INFINITY;
     uint32_t node = 0;
-    for (uint32_t t = 0; t < touching; ++t) {
-      double gap2 = v_norm2(v_sub(skin_m[touched[t]], point_m[k]));
-      if (gap2 < nearest2) nearest2 = gap2, node = touched[t];
+    for (uint32_t t = 0; t < nodes; ++t) {
+      double gap2 = v_norm2(v_sub(skin_m[near[t]], point_m[k]));
+      if (gap2 < nearest2) nearest2 = gap2, node = near[t];
     }
-    share[k] = touching > 0 ? (float)share_around(&at, node, point_m[k]) : 0.0f;
+    share[k] = nodes > 0 ? (float)share_around(&at, node, point_m[k]) : 0.0f;
   }
 }
 
 void sonde_gel_coupling(const sonde_gel *gel, const sonde_vec3 *skin_m, const sonde_vec3 *contact_n,
                         const sonde_vec3 *point_m, uint32_t count, float *share) {
-  sonde_gel_coupling_of(gel, gel->film_m, gel->touched, skin_m, contact_n, point_m, count, share);
+  sonde_gel_coupling_of(gel, gel->film_m, gel->near, skin_m, contact_n, point_m, count, share);
 }
 
 const double *sonde_gel_film(const sonde_gel *gel) { return gel->film_m; }

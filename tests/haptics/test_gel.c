@@ -129,6 +129,59 @@ static void one_film_drives_friction_and_image(void **state) {
   tear_down(&s);
 }
 
+// Where skin at rest goes when it stretches about the site.
+static sonde_vec3 stretched(sonde_vec3 rest, double stretch) {
+  return vec3(rest.x, stretch * rest.y, stretch * rest.z);
+}
+
+// Pressed skin stretches: nodes move apart, below the probe it touches as before. The share follows
+// the skin between its nodes without a step until the touch ends.
+static void skin_touches_between_its_nodes(void **state) {
+  (void)state;
+  enum { STEPS = 400 };
+  scene s = set_up(0.0);
+  uint32_t nodes = s.model->surface.vertex_count;
+  sonde_vec3 *skin_m = SONDE_NEW(sonde_vec3, nodes), point_m[STEPS];
+  float share[STEPS];
+  sonde_gel_put(s.gel, vec3(0.06, 0, 0), 0.04, 1e-6);
+  for (double stretch = 1.0; stretch < 2.2; stretch += 0.25)
+    for (int way = 0; way < 12; ++way) {
+      for (uint32_t i = 0; i < nodes; ++i)
+        skin_m[i] = stretched(s.model->surface.vertices[i], stretch);
+      for (int k = 0; k < STEPS; ++k) {
+        double r = 0.03 * k / STEPS, turn = r * cos(0.5 * way) / 0.06;
+        sonde_vec3 rest = vec3(0.06 * cos(turn), 0.06 * sin(turn), r * sin(0.5 * way));
+        point_m[k] = stretched(rest, stretch);
+      }
+      sonde_gel_coupling(s.gel, skin_m, s.contact_n, point_m, STEPS, share);
+      for (int k = 1; k < STEPS; ++k) {
+        if (k < STEPS * 7 / 30) assert_true(share[k] > 0.98f); // all around is pressed
+        if (k > STEPS * 17 / 30) assert_true(share[k] <= 0.0f);
+        assert_true(fabsf(share[k] - share[k - 1]) < 0.1f);
+      }
+    }
+  sonde_free(skin_m);
+  tear_down(&s);
+}
+
+// A narrow gap between face and skin is gel, a wide one is air.
+static void a_gap_fades_the_image(void **state) {
+  (void)state;
+  scene s = set_up(0.0);
+  sonde_gel_put(s.gel, vec3(0.06, 0, 0), 0.04, 1e-6);
+  double last = 1.0;
+  for (double gap_m = 0.0; gap_m < 6e-3; gap_m += 1e-4) {
+    const sonde_vec3 point_m = vec3(0.06 + gap_m, 0, 0);
+    float share;
+    sonde_gel_coupling(s.gel, s.model->surface.vertices, s.contact_n, &point_m, 1, &share);
+    assert_true((double)share <= last + 1e-6 && (double)share > last - 0.1);
+    if (gap_m < 1.5e-3) assert_true(share > 0.98f);
+    if (gap_m > 4.2e-3) assert_true(share <= 0.0f);
+    last = (double)share;
+  }
+  tear_down(&s);
+}
+
 // A film that dries leaves moist skin, stickier than dry skin; that in turn dries.
 static void moist_skin_sticks_more(void **state) {
   (void)state;
@@ -174,6 +227,8 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(volume_only_changes_hands),
       cmocka_unit_test(one_film_drives_friction_and_image),
+      cmocka_unit_test(skin_touches_between_its_nodes),
+      cmocka_unit_test(a_gap_fades_the_image),
       cmocka_unit_test(moist_skin_sticks_more),
       cmocka_unit_test(a_slide_takes_gel_along),
       cmocka_unit_test(bad_definitions_are_named),
