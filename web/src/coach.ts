@@ -18,13 +18,15 @@ const there = (exam: Exam): boolean => {
   return target !== null && offset_mm !== null && offset_mm <= target.radius_mm;
 };
 const away = (exam: Exam): boolean => exam.step.target !== null && !there(exam);
-const pressed = (exam: Exam): boolean => exam.presses.some((p) => p.result === "complete" || p.result === "open");
+const judged = (state: string | undefined): boolean => state === "complete" || state === "open";
+// From here on the bar says to let go.
+const pressed = (exam: Exam): boolean => judged(exam.compression?.state) || exam.presses.some((p) => judged(p.result));
 const asked = (exam: Exam): boolean => exam.step.segment !== "";
 const decided = (exam: Exam): boolean => exam.segments.some((s) => s.decision !== "");
 
 const MARKS: Mark[] = [
   { id: "move", anchor: "stage", text: "Drag the probe along the leg into the ring.", due: away, done: there },
-  { id: "press", anchor: "press", text: "Pull this slider up, slowly, until the white bar reaches the bracket. Watch the vein in the image: do its walls touch? Then press Let go below.", due: there, done: pressed },
+  { id: "press", anchor: "press", text: "Pull this slider up slowly, until the white bar reaches the bracket. Watch the vein in the image: do its walls touch? Then press Let go below.", due: there, done: pressed },
   { id: "decide", anchor: "decide", text: "Did the walls touch? Then the vein is compressible. Did it stay open? Then there is a clot. After this the bar leads you on.", due: asked, done: decided },
 ];
 
@@ -62,8 +64,9 @@ export class Coach {
     const b = this.box.getBoundingClientRect();
     const [x, y] =
       mark.id === "move" ? [a.left + (a.width - b.width) / 2, a.bottom - b.height - 64]
-      : mark.id === "press" ? [a.left - b.width - 14, a.top + a.height * 0.4]
+      : mark.id === "press" ? [a.left - b.width - 14, a.bottom - b.height - 10]
       : [Math.min(a.left + 10, innerWidth - b.width - 12), a.bottom + 12];
     Object.assign(this.box.style, { left: `${Math.max(8, x)}px`, top: `${Math.max(8, y)}px` });
+    this.box.style.setProperty("--tip", `${a.left + Math.min(a.width, 200) / 2 - Math.max(8, x)}px`);
   }
 }

@@ -18,6 +18,7 @@ export class ForceBar {
   private comfort_n = 20;
   private corridor: [number, number] | null = null;
   private force_n = 0;
+  private touching = false;
   private rendered_n = 0;
   private drawn = "";
   private readonly c: CanvasRenderingContext2D;
@@ -45,6 +46,7 @@ export class ForceBar {
 
   show(s: Snapshot): void {
     this.force_n = Math.max(0, s.force_normal_n);
+    this.touching = s.contact_area_mm2 > 0;
     this.rendered_n = Math.hypot(...s.rendered_force_n);
     find("force-value").replaceChildren(this.force_n.toFixed(1), make("small", "", "N"));
     const word = this.word();
@@ -60,7 +62,8 @@ export class ForceBar {
     if (this.corridor && this.force_n > this.corridor[1]) return "too hard";
     if (this.corridor && this.force_n >= this.corridor[0]) return "right"; // asked for, comfortable or not
     if (this.force_n > this.comfort_n) return "uncomfortable";
-    return this.force_n > 0.3 ? "comfortable" : "no contact";
+    if (this.force_n > 0.3) return "comfortable";
+    return this.touching ? "touching" : "no contact";
   }
 
   private paint(): void {

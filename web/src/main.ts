@@ -22,6 +22,7 @@ import { ThighScene } from "./scene";
 import { StartDialog } from "./start";
 import { EchoTools } from "./tools";
 import { Traces } from "./traces";
+import { letGo } from "./words";
 
 const HOME_SITE = 27;
 const NEAR_MM = 20; // farther from a site its curve says nothing about this place
@@ -332,6 +333,7 @@ class App {
     if (phase !== "practice") this.patient.openTissue(false);
     this.input.enabled = this.hands;
     for (const id of ["depth-slider", "depth-less", "depth-more", "ease", "home"]) find<HTMLButtonElement>(id).disabled = !this.hands;
+    find("ease").classList.toggle("primary", phase === "running" && letGo(this.exam?.compression ?? null));
     this.coach.show(this.exam, this.hands);
   }
 

@@ -47,7 +47,7 @@ export class Traces {
       padding: [8, 16, 0, 0],
       scales: { x: { time: false, range }, n: { range: () => [0, this.top_n] }, vein: { range: () => [0, 120] } },
       axes: [
-        { ...axis, size: 22, gap: 2, splits: () => [0, 3, 6, 9, 12].map((s) => range()[1] - s).reverse(),
+        { ...axis, size: 22, gap: 2, align: 2, splits: () => [0, 3, 6, 9, 12].map((s) => range()[1] - s).reverse(),
           values: (_u, ticks) => ticks.map((t) => { const ago = Math.round(range()[1] - t); return ago === 0 ? "now" : `${ago} s`; }) },
         { ...axis, scale: "n", size: 38, gap: 4, stroke: INK.force, values: last("N") },
         { ...axis, scale: "vein", side: 1, size: 44, gap: 4, stroke: INK.vein, grid: { show: false }, splits: [0, 50, 100], values: last("%") },

@@ -26,6 +26,9 @@ export const GUIDANCE: Record<Guidance, [string, string]> = {
   exam: ["None", "As in an exam: the protocol and your own eyes."],
 };
 
+/** The press of now has shown what it can. */
+export const letGo = (c: Compression | null): boolean => c?.state === "complete" || c?.state === "open" || c?.state === "too_hard";
+
 /** What to say of the compression of now; empty when nothing. */
 export function compressionWords(c: Compression | null): string {
   if (!c) return "";
