@@ -1,0 +1,47 @@
+#!/bin/sh
+# Makes the pictures of docs/gallery.md anew. Usage: docs/gallery.sh SONDE MODEL OUT_DIR
+# MODEL is the bundled thigh. Tells each picture's numbers, as sonde image does.
+set -eu
+if [ $# -ne 3 ]; then
+  echo "usage: docs/gallery.sh SONDE MODEL OUT_DIR" >&2
+  exit 2
+fi
+sonde=$1 model=$2 out=$3
+models=$(mktemp -d)
+trap 'rm -rf "$models"' EXIT
+mkdir -p "$out"
+
+# shoot NAME MODEL OPTIONS...
+shoot() {
+  name=$1 of=$2
+  shift 2
+  "$sonde" image "$of" --size 320x320 -o "$out/gallery_$name.png" "$@"
+}
+
+for state in healthy acute:acute_occlusive chronic:chronic_occlusive; do
+  set -- "$model" --site 27 --depth-mm 50 --case "${state#*:}"
+  shoot "${state%:*}_rest" "$@" --force-n 0.5
+  shoot "${state%:*}_pressed" "$@" --force-n 12
+done
+shoot healthy_along "$model" --site 27 --depth-mm 50 --turn-deg 90 --force-n 2
+shoot healthy_curved "$model" --site 27 --curved-mm 60 --aperture-mm 60 --frequency-mhz 4 \
+  --focus-mm 40 --depth-mm 90 --force-n 2
+
+"$sonde" generate --seed 3 --sex female --fat-mm 26 -o "$models/fat"
+"$sonde" generate --seed 3 --sex male --fat-mm 5 -o "$models/lean"
+shoot fat_rest "$models/fat" --site 12 --depth-mm 70
+shoot fat_pressed "$models/fat" --site 12 --depth-mm 70 --force-n 14
+shoot lean_rest "$models/lean" --site 12 --depth-mm 50
+shoot lean_pressed "$models/lean" --site 12 --depth-mm 50 --force-n 14
+
+"$sonde" generate --seed 7 --second-vein 1 -o "$models/more"
+set -- "$models/more" --site 12 --depth-mm 50
+shoot node "$@" --lesion node:5:12:13:8
+shoot cyst "$@" --lesion cyst:8:30:16:10
+shoot haematoma "$@" --lesion haematoma:-8:32:18:12
+shoot saphenous_rest "$@" --clot great_saphenous:acute
+shoot saphenous_pressed "$@" --clot great_saphenous:acute --force-n 8
+shoot oedema "$@" --oedema 0.8
+set -- "$models/more" --site 22 --depth-mm 50 --case chronic --webs 1
+shoot webs "$@"
+shoot webs_pressed "$@" --force-n 14
