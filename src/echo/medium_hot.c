@@ -16,7 +16,7 @@
 
 #include <string.h>
 
-static const float air_gap_m = 1.5e-3f;
+static const float air_gap_m = 2e-3f;
 
 // Echo of an interface over the rms of muscle speckle: decibels at normal incidence, the angle's
 // tangent at which the specular part has fallen by 1/e, the diffuse share that stays, and what the
