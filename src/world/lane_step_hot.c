@@ -242,6 +242,7 @@ static bool linearise(sonde_state *state, iteration *now) {
   double start = sonde_clock_now(), sums[3];
   sonde_vec3 reaction = lanes->reaction_n;
   bool sweep = !now->tied && !lanes->stiff;
+  lanes->tied = now->tied;
   lanes->kernels->linearise(lanes, sweep, sums);
   if (now->local)
     lanes->reaction_n = reaction;

@@ -140,7 +140,7 @@ struct sonde_lanes {
   // For the neighbours, of every row where it is evaluated
   float *record; // [rows][8] of springs: u + h ve, ve
   float *slide;  // [rows][4] of layers: tangential displacement, indentation
-  // and of the directions: z; its tangential part and N.z for layers.
+  // and of the directions: z, for springs and ties; its tangential part and N.z for layers.
   float *direction, *layer_direction; // [rows][4]
   uint32_t *awake;                    // slices that take part
   uint32_t awake_count;
@@ -148,6 +148,7 @@ struct sonde_lanes {
   uint64_t *face_marked; // [slices of faces / 64] bits
   float *speed2;         // [slices] largest square of a node's speed
   float *way2;           // [slices] and displacement
+  float *roam;           // [slices] farthest from rest that a node is looked for
   float *unrest2;     // [slices] largest square of unbalanced force over the anchors' stiffness: no
                       // node is farther from its equilibrium
   uint8_t *published; // [slices] the doubles of the state are up to date
@@ -157,6 +158,7 @@ struct sonde_lanes {
   uint32_t slot_total;  // of the waking slices
   uint64_t bytes_moved; // by the last step, see count_bytes()
   bool stiff;           // too stiff for sweeps
+  bool tied;            // ties take part in the linear system at hand
   bool stale;           // the doubles of the state are newer
 };
 

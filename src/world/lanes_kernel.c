@@ -235,7 +235,7 @@ INLINE void publish_direction(sonde_lanes *lanes, uint32_t s, const sonde_lane z
   const sonde_lane *n = lanes->model[s].normal;
   size_t first = (size_t)s * SONDE_LANES * SONDE_QUAD;
   const sonde_lane whole[4] = {z[0], z[1], z[2], {0}};
-  write_records(lanes->direction + first, SONDE_QUAD, whole);
+  if (lanes->law.springs || lanes->tied) write_records(lanes->direction + first, SONDE_QUAD, whole);
   if (!lanes->law.layered) return;
   sonde_lane along = dot(n, z), parts[4];
   for (int c = 0; c < 3; ++c) parts[c] = z[c] - along * n[c];
@@ -498,12 +498,13 @@ INLINE bool reaches(const sonde_slice_model *fixed, const sonde_slice *at, float
 }
 
 static void near(sonde_lanes *lanes, const float low[3], const float high[3], float edges) {
-  float h = lanes->law.dt;
-  uint32_t count = 0;
-  for (uint32_t s = 0; s < lanes->slice_count; ++s) {
+  float h = lanes->law.dt, *roam = lanes->roam;
+  uint32_t count = 0, slices = lanes->slice_count;
+  for (uint32_t s = 0; s < slices; ++s)
+    roam[s] = __builtin_sqrtf(lanes->way2[s]) + 3 * h * __builtin_sqrtf(lanes->speed2[s]);
+  for (uint32_t s = 0; s < slices; ++s) {
     const sonde_slice_box *box = &lanes->box[s];
-    float margin = edges * box->reach, way = margin + 1e-4f;
-    way += __builtin_sqrtf(lanes->way2[s]) + 3 * h * __builtin_sqrtf(lanes->speed2[s]);
+    float margin = edges * box->reach, way = margin + 1e-4f + roam[s];
     bool apart = false;
     for (int c = 0; c < 3; ++c) apart |= box->low[c] - way > high[c] || box->high[c] + way < low[c];
     if (apart || !reaches(&lanes->model[s], &lanes->slice[s], h, low, high, margin)) continue;
