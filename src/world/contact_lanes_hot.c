@@ -21,12 +21,6 @@ static bool by_nodes(const sonde_state *state) {
   return state->def.contact_law == SONDE_CONTACT_NODES;
 }
 
-// High and low parts of a number as two floats.
-static void split(double a, float *high, float *low) {
-  *high = (float)a;
-  *low = (float)(a - (double)*high);
-}
-
 static void set_vector(float to[3], sonde_vec3 a) {
   to[0] = (float)a.x, to[1] = (float)a.y, to[2] = (float)a.z;
 }
@@ -49,7 +43,7 @@ static void set_probe(sonde_state *state, const sonde_box *box, const sonde_moti
   sonde_lane_probe *to = &state->lanes->probe;
   const sonde_vec3 o = state->origin, turn = motion->spin;
   const double origin[3] = {o.x, o.y, o.z};
-  for (int c = 0; c < 3; ++c) split(origin[c], &to->origin[c], &to->origin_low[c]);
+  for (int c = 0; c < 3; ++c) sonde_split(origin[c], &to->origin[c], &to->origin_low[c]);
   to->radius = (float)state->ball_radius;
   to->plane_count = 0;
   if (!(state->ball_radius > 0)) set_planes(state, to);

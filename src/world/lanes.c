@@ -175,8 +175,9 @@ static void fill_slice(sonde_lanes *lanes, const sonde_model *model, uint32_t s)
     sonde_vec3 x = model->surface.vertices[i];
     const double at[3] = {x.x, x.y, x.z};
     for (int c = 0; c < 3; ++c) {
-      float p = fixed->place[c][l] = (float)at[c];
-      fixed->place_low[c][l] = (float)(at[c] - (double)p);
+      float p, low;
+      sonde_split(at[c], &p, &low);
+      fixed->place[c][l] = p, fixed->place_low[c][l] = low;
       box->low[c] = l == 0 || p < box->low[c] ? p : box->low[c];
       box->high[c] = l == 0 || p > box->high[c] ? p : box->high[c];
     }

@@ -10,6 +10,14 @@ enum { SONDE_LANES = 16, SONDE_RECORD = 8, SONDE_QUAD = 4 };
 typedef float sonde_lane __attribute__((vector_size(64)));
 typedef int32_t sonde_lane_index __attribute__((vector_size(64)));
 
+// High and low parts of a number. Where gcc 12 makes vectors of it, it takes (double)(float)a for
+// a: hence volatile.
+static inline void sonde_split(double a, float *high, float *low) {
+  volatile float rounded = (float)a;
+  *high = rounded;
+  *low = (float)(a - (double)*high);
+}
+
 // What the contact adds to a slice: forces, xx xy xz yy yz zz of the diagonal blocks, and what ties
 // make of the directions.
 typedef struct sonde_slice_press {
