@@ -28,8 +28,8 @@ static void list_slices(sonde_lanes *lanes, const uint8_t *take) {
 
 static void list_awake(sonde_lanes *lanes) { list_slices(lanes, lanes->is_awake); }
 
-// Lists the touched slices and those beside them; the others stand still for now.
-static void list_touched(sonde_lanes *lanes) {
+// Marks the touched slices and those beside them that are awake.
+static void mark_near(sonde_lanes *lanes) {
   uint8_t *take = lanes->is_near;
   memset(take, 0, lanes->slice_count);
   for (uint32_t k = 0; k < lanes->press_count; ++k) {
@@ -38,9 +38,15 @@ static void list_touched(sonde_lanes *lanes) {
     take[lanes->pressed[k]] = 1;
     for (uint32_t n = 0; n < fixed->near_count; ++n) take[near[n]] = lanes->is_awake[near[n]];
   }
+  lanes->near_count = 0;
+  for (uint32_t s = 0; s < lanes->slice_count; ++s) lanes->near_count += take[s];
+}
+
+// Lists these; the others stand still for now.
+static void list_near(sonde_lanes *lanes) {
   for (uint32_t s = 0; s < lanes->slice_count; ++s)
-    if (lanes->is_awake[s] && !take[s]) sonde_lanes_still(lanes, s, 1);
-  list_slices(lanes, take);
+    if (lanes->is_awake[s] && !lanes->is_near[s]) sonde_lanes_still(lanes, s, 1);
+  list_slices(lanes, lanes->is_near);
 }
 
 static void wake(sonde_lanes *lanes, uint32_t s) {
@@ -139,12 +145,27 @@ static void conjugate(sonde_state *state, bool tied, double target, double sums[
   }
 }
 
+// How a Newton iteration is made.
+typedef struct iteration {
+  uint32_t number; // from 1
+  bool tied;       // with ties
+  bool local;      // touched slices and those beside them only
+  bool may_leave;  // what these need more sweeps for may be left to the next, local iteration,
+  bool left;       // and was
+  double force2;   // (h F)^2 of the last one of all slices: extrapolation makes the first large
+} iteration;
+
+// A sweep of all slices for the sake of a few costs more than the next iteration of these alone.
+enum { FEW = 3 };
+static const double FAR_SHARE = 0.5; // of the square of what the solver may leave
+
 // sums: of the linearisation. From the residual that the first sweep found on; what a sweep leaves
 // is what it found times the pace. Without sweeps by conjugate gradients at once. False when there
 // was nothing left to solve.
-static bool solve(sonde_state *state, bool tied, bool sweep, const double sums[3],
+static bool solve(sonde_state *state, iteration *now, bool sweep, const double sums[3],
                   double reference) {
   sonde_lanes *lanes = state->lanes;
+  bool may_leave = now->may_leave && lanes->awake_count > FEW * lanes->near_count;
   const sonde_pcg_options *options = &state->def.pcg;
   double found = sqrt(sums[0]), products[2] = {sums[2], sums[0]};
   sonde_pcg_result result = {.reference = reference, .residual = found};
@@ -153,17 +174,20 @@ static bool solve(sonde_state *state, bool tied, bool sweep, const double sums[3
   uint32_t sweeps = 0;
   while (result.residual > target && sweeps < options->max_iterations && !slow) {
     double before = found;
-    found = sqrt(lanes->kernels->sweep(lanes));
+    double far2;
+    found = sqrt(lanes->kernels->sweep(lanes, &far2));
     sweeps++;
     result.residual = found * fmin(found / before, 1);
     slow = is_slow(before, found, target);
+    now->left = result.residual > target && may_leave && far2 <= FAR_SHARE * target * target;
+    if (now->left) break;
   }
   result.iterations = sweeps;
-  if (result.residual > target) {
+  if (result.residual > target && !now->left) {
     if (sweep) lanes->kernels->restart(lanes, products);
-    conjugate(state, tied, target, products, &result);
+    conjugate(state, now->tied, target, products, &result);
   }
-  result.converged = result.residual <= target;
+  result.converged = result.residual <= target || now->left;
   if (!result.converged) state->flags |= SONDE_FLAG_NOT_CONVERGED;
   count_bytes(lanes, sweeps, result.iterations - sweeps);
   result.iterations += state->solver.iterations;
@@ -181,14 +205,6 @@ static void publish_increments(sonde_state *state, bool clear) {
     if (clear) state->velocity[i] = v_add(state->velocity[i], x);
   }
 }
-
-// How a Newton iteration is made.
-typedef struct iteration {
-  uint32_t number; // from 1
-  bool tied;       // with ties
-  bool local;      // touched slices and those beside them only
-  double force2;   // (h F)^2 of the last one of all slices: extrapolation makes the first large
-} iteration;
 
 // Of what the linear solver may leave: what is not seen adds up from step to step.
 static const double BENT_SHARE = 0.1;
@@ -249,7 +265,7 @@ static bool linearise(sonde_state *state, iteration *now) {
   else
     now->force2 = sums[1];
   double assembled = sonde_clock_now();
-  bool solved = solve(state, now->tied, sweep, sums, sqrt(now->force2));
+  bool solved = solve(state, now, sweep, sums, sqrt(now->force2));
   state->times.assembly_s += assembled - start;
   state->times.solve_s += sonde_clock_now() - assembled;
   return solved;
@@ -262,14 +278,17 @@ static bool iterate(sonde_state *state, const sonde_probe *probe, sonde_pose pos
   double start = sonde_clock_now();
   now->tied = now->number > 1 && state->def.contact_law == SONDE_CONTACT_FOUNDATION;
   touch(state, probe, pose, motion);
-  if (now->local) list_touched(state->lanes);
+  mark_near(state->lanes);
+  if (now->local) list_near(state->lanes);
   double detected = sonde_clock_now();
+  now->may_leave = !last && now->number == 1;
+  now->left = false;
   bool solved = linearise(state, now);
   double left = sonde_clock_now();
   publish_increments(state, false);
   bool open = solved && !last;
   double surprise2 = sonde_press_meet(state, open);
-  bool again = open && is_bent(state, surprise2, now);
+  bool again = open && (is_bent(state, surprise2, now) || now->left);
   publish_increments(state, true);
   state->times.contact_s += detected - start + (sonde_clock_now() - left);
   return again;

@@ -79,7 +79,8 @@ typedef struct sonde_lane_kernels {
   // r = h F - M (ve - v), matrix; r.r, (h F)^2, r.z; reaction. `sweep`: x = D^-1 r slice by slice,
   // and each sees where those before it went; else the matrix is symmetric, x = 0, z = D^-1 r
   void (*linearise)(sonde_lanes *lanes, bool sweep, double sums[3]);
-  double (*sweep)(sonde_lanes *lanes); // x += D^-1 r, slice by slice; r.r as each slice found it
+  // x += D^-1 r, slice by slice; r.r as each slice found it, far2: of those that is_near leaves out
+  double (*sweep)(sonde_lanes *lanes, double *far2);
   void (*restart)(sonde_lanes *lanes, double sums[2]); // r after the sweeps, z = D^-1 r; r.z, r.r
   double (*multiply)(sonde_lanes *lanes, bool first);  // w = A z, the first time q; returns z.w
   // p = z + beta p, q = w + beta q, x += alpha p, r -= alpha q, z = D^-1 r; r.z, r.r. The first
@@ -144,7 +145,9 @@ struct sonde_lanes {
   float *direction, *layer_direction; // [rows][4]
   uint32_t *awake;                    // slices that take part
   uint32_t awake_count;
-  uint8_t *is_awake, *calm, *is_near;
+  uint8_t *is_awake, *calm;
+  uint8_t *is_near;      // touched slices and those beside them that are awake
+  uint32_t near_count;   // of these
   uint64_t *face_marked; // [slices of faces / 64] bits
   float *speed2;         // [slices] largest square of a node's speed
   float *way2;           // [slices] and displacement

@@ -341,8 +341,8 @@ INLINE void couple(sonde_lanes *lanes, uint32_t s, sonde_lane q[3]) {
 }
 
 // After a slice was solved for itself its residual is what its neighbours have moved since.
-static double sweep(sonde_lanes *lanes) {
-  lane_double rr = {0};
+static double sweep(sonde_lanes *lanes, double *far2) {
+  lane_double rr[2] = {{0}, {0}};
   SONDE_ASSERT(lanes->awake_count <= lanes->slice_count);
   for (uint32_t a = 0; a < lanes->awake_count; ++a) {
     uint32_t s = lanes->awake[a];
@@ -352,10 +352,12 @@ static double sweep(sonde_lanes *lanes) {
     for (int c = 0; c < 3; ++c) r[c] = -q[c];
     divide(at->factor, r, z);
     for (int c = 0; c < 3; ++c) at->x[c] += z[c];
-    rr += widen(dot(r, r));
+    lane_double *sum = &rr[lanes->is_near[s] != 0];
+    *sum += widen(dot(r, r));
     publish_direction(lanes, s, z);
   }
-  return total(rr);
+  *far2 = total(rr[0]);
+  return *far2 + total(rr[1]);
 }
 
 static void restart(sonde_lanes *lanes, double sums[2]) {
