@@ -412,7 +412,7 @@ static void choose_samples(const sonde_echo *echo, double wide, double high, int
                            int *down) {
   double most = echo->cell_m * echo->cell_m - sampling_m * sampling_m, fewest = INFINITY;
   *across = *down = MOST_PIECES;
-  for (int a = 1; a <= MOST_PIECES; ++a) {
+  for (int a = 1; a <= MOST_PIECES && a < fewest; ++a) {
     double left = most - wide * wide / (a * a);
     if (!(left > 0) && a < MOST_PIECES) continue;
     double d = clamp(ceil(high / sqrt(fmax(left, 1e-9))), 1, MOST_PIECES);
