@@ -1,7 +1,8 @@
 // From the newest surface to a frame: skin, inside, vessels, image, all of one tick.
 // penetration:        depth of the probe's face below the rest skin.
 // update_interior:    the inside and the vessels at this surface.
-// choose_beam:        the one asked for when it is due, else the last one.
+// choose_beam, prepare_beam: the one asked for when it is due, else the last one; a share of it.
+// work_ahead:         in real time, between two images.
 // couple, volume:     what the gel does to the image, and how much there is.
 // fill_frame:         everything into one slot.
 // count_latency:      how old the frame's pose is when the frame is finished.
@@ -16,6 +17,8 @@
 #include "haptics/gel.h"
 
 #include <string.h>
+
+enum { BEAM_STEPS = 3 }; // of a new beam per image
 
 // Along the axis from well outside: the first crossing is the skin above the probe's face, whether
 // the face is above or below it. Beside the thigh the signed closest distance takes over.
@@ -61,20 +64,25 @@ static sonde_echo_settings with_beam(const sonde_session_beam *beam, sonde_echo_
   return rest;
 }
 
+static void prepare_beam(sonde_session *session, const sonde_echo_settings *asked, uint32_t steps) {
+  if (!session->building) return;
+  sonde_echo_settings coming = with_beam(&session->coming, *asked);
+  (void)sonde_echo_prepare(session->echo, session->coming.aperture_m, &coming, steps);
+}
+
 // A new beam is built over several images, which go on with the old one: none of them comes late.
 // One under way is finished first, so that a slider that keeps moving shows where it has been. The
 // number of images is the same for every beam, whatever was built before: a replay that starts
 // anywhere changes beams at the same image.
 static void choose_beam(sonde_session *session, const sonde_echo_settings *asked,
                         double aperture_m) {
-  const uint32_t steps = 3, images = (SONDE_ECHO_PREPARE_STEPS + steps - 1) / steps;
+  const uint32_t images = (SONDE_ECHO_PREPARE_STEPS + BEAM_STEPS - 1) / BEAM_STEPS;
   const sonde_session_beam now = {aperture_m, asked->frequency_hz, asked->depth_m, asked->focus_m};
   if (!(session->beam.aperture_m > 0)) session->beam = now;
   if (!session->building && memcmp(&now, &session->beam, sizeof now) != 0)
     session->coming = now, session->building = true, session->beam_images = 0;
   if (!session->building) return;
-  sonde_echo_settings coming = with_beam(&session->coming, *asked);
-  (void)sonde_echo_prepare(session->echo, session->coming.aperture_m, &coming, steps);
+  if (!session->realtime) prepare_beam(session, asked, BEAM_STEPS);
   if (++session->beam_images < images) return;
   session->beam = session->coming;
   session->building = false;
@@ -189,10 +197,19 @@ void sonde_session_draw(sonde_session *session) {
   sonde_mailbox_publish(session->frame_box);
 }
 
+// What later images need, when this one is out and the pose of the next is not yet taken; a little
+// more than an image's share, so that nothing is left when it is due.
+static void work_ahead(sonde_session *session) {
+  const sonde_surface_slot *head = (const void *)session->surface;
+  sonde_interior_build_ahead(session->interior);
+  prepare_beam(session, &head->controls.echo, BEAM_STEPS + 1);
+}
+
 bool sonde_session_show(sonde_session *session) {
   if (!sonde_session_follow(session)) return false;
   sonde_session_draw(session);
   count_latency(session, ((const sonde_surface_slot *)session->surface)->pose_s);
+  if (session->realtime) work_ahead(session);
   uint64_t images = atomic_load_explicit(&session->images, memory_order_relaxed);
   atomic_store_explicit(&session->images, images + 1, memory_order_release);
   atomic_store_explicit(&session->surface_pending, false, memory_order_release);

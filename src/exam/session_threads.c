@@ -1,5 +1,5 @@
 // The threads of a session in real time, and the lockstep tick.
-// image_main, record_main: look for a surface every half millisecond, for records every five, so
+// image_main, record_main: look for a surface every 0.2 ms, for records every 5, so
 //                          that the tick never has to wake anyone.
 // write_records, write_key: rings and mailboxes to the files.
 // sonde_session_drain:     all of that.
@@ -15,7 +15,7 @@ static void *image_main(void *argument) {
   sonde_session *session = argument;
   while (!atomic_load_explicit(&session->stop_image, memory_order_acquire)) {
     if (sonde_session_show(session)) continue;
-    sonde_clock_sleep_until(sonde_clock_now() + 0.5e-3);
+    sonde_clock_sleep_until(sonde_clock_now() + 0.2e-3);
   }
   return NULL;
 }

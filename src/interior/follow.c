@@ -3,7 +3,8 @@
 // sonde_interior_follow  keeps a window under the probe and solves it
 // place_of               where a window for this probe would be
 // distance               between two places, in units of what a window tolerates
-// prepare                starts, continues and swaps
+// prepare, build         starts, continues and swaps
+// sonde_interior_build_ahead  continues between two updates
 // sonde_interior_remember, _recall  the state between two updates
 // sonde_interior_keep_windows, _next_window  factored windows of other places
 #include "base/base.h"
@@ -49,12 +50,21 @@ static void swap(sonde_interior *in) {
 }
 
 // A window takes the same number of updates everywhere; the work may be done earlier (from the
-// shelf) or later (after a recall).
+// shelf, or between updates) or later (after a recall).
 static bool build(sonde_interior *in, bool at_once) {
-  bool due = ++in->built >= in->whole || at_once;
-  if (!in->next->ready && !sonde_window_step(in->next, due ? UINT64_MAX : SONDE_WINDOW_BUDGET))
-    return false;
-  return due || !in->next->ready;
+  bool due = ++in->built >= in->whole || at_once, ahead = in->ahead;
+  in->ahead = false;
+  if (!in->next->ready && (due || !ahead))
+    (void)sonde_window_step(in->next, due ? UINT64_MAX : SONDE_WINDOW_BUDGET);
+  return due;
+}
+
+// A little more than an update's share: all is done before the window is due.
+void sonde_interior_build_ahead(sonde_interior *in) {
+  SONDE_ASSERT(in != NULL);
+  in->ahead = true;
+  if (in->building && !in->next->ready)
+    (void)sonde_window_step(in->next, SONDE_WINDOW_BUDGET / 8 * 9);
 }
 
 // At rest in time (dt < 0) the window is made at once, in a running session bit by bit.
