@@ -5,6 +5,7 @@
 // splat_some the same, with or without checks at the grid's border
 // lay        one vector of them, in order
 // stream     blood along its streamlines
+// spread_taps, tap_of  kernels' numbers over vectors
 // lateral    symmetric complex kernels of rank three on one row
 // axial      real kernels down the rows, noise, compensation, modulus, logarithm
 // tissue     in kernel_tissue.h
@@ -132,32 +133,50 @@ static void stream(const stream_job *job) {
   }
 }
 
-INLINE void add_taps(const float tap[SONDE_RANK][2], vf x, vf y, vf sum[RING_PLANES]) {
+// Where it takes more than a load to spread a number over a vector, taps are spread once per job.
+enum { SPREAD = W == 4 };
+
+typedef struct taps {
+  const float *from;
+  vf spread[SPREAD ? 2 * SONDE_RANK * (SONDE_MOST_TAPS + 1) : 1];
+} taps;
+
+INLINE void spread_taps(const float *from, int count, taps *out) {
+  SONDE_ASSERT(count <= 2 * SONDE_RANK * (SONDE_MOST_TAPS + 1));
+  out->from = from;
+  for (int i = 0; SPREAD && i < count; ++i) out->spread[i] = all(from[i]);
+}
+INLINE vf tap_of(const taps *t, int i) { return SPREAD ? t->spread[i] : all(t->from[i]); }
+
+INLINE void add_taps(const taps *tap, int first, vf x, vf y, vf sum[RING_PLANES]) {
   for (int k = 0; k < SONDE_RANK; ++k) {
-    sum[2 * k] = sum[2 * k] + tap[k][0] * x - tap[k][1] * y;
-    sum[2 * k + 1] = sum[2 * k + 1] + tap[k][0] * y + tap[k][1] * x;
+    vf re = tap_of(tap, first + 2 * k), im = tap_of(tap, first + 2 * k + 1);
+    sum[2 * k] = sum[2 * k] + re * x - im * y;
+    sum[2 * k + 1] = sum[2 * k + 1] + re * y + im * x;
   }
 }
 
 static void lateral(const lateral_job *job) {
   SONDE_ASSERT(job->half >= 0 && job->half <= SONDE_MOST_TAPS);
+  taps tap;
+  spread_taps(&job->tap[0][0][0], RING_PLANES * (job->half + 1), &tap);
   for (uint32_t l = 0; l < job->lines; l += W) {
     vf sum[RING_PLANES];
     for (int k = 0; k < RING_PLANES; ++k) sum[k] = all(0);
-    add_taps(job->tap[0], load(job->re[0] + l), load(job->im[0] + l), sum);
+    add_taps(&tap, 0, load(job->re[0] + l), load(job->im[0] + l), sum);
     for (int t = 1; t <= job->half; ++t) {
       const float *re = job->re[t % 2] + l, *im = job->im[t % 2] + l;
       int left = (t + 1) / 2, right = t / 2;
-      add_taps(job->tap[t], load(re - left) + load(re + right), load(im - left) + load(im + right),
-               sum);
+      add_taps(&tap, RING_PLANES * t, load(re - left) + load(re + right),
+               load(im - left) + load(im + right), sum);
     }
     for (int k = 0; k < RING_PLANES; ++k) store(job->out + (uint32_t)k * job->lines + l, sum[k]);
   }
 }
 
-INLINE void add_axial(const float tap[SONDE_RANK], const vf row[RING_PLANES], vf sum[RING_PLANES]) {
+INLINE void add_axial(const taps *tap, int first, const vf row[RING_PLANES], vf sum[RING_PLANES]) {
   for (int k = 0; k < SONDE_RANK; ++k) {
-    vf v = all(tap[k]);
+    vf v = tap_of(tap, first + k);
     sum[2 * k] += v * row[2 * k], sum[2 * k + 1] += v * row[2 * k + 1];
   }
 }
@@ -173,7 +192,7 @@ INLINE void finish_axial(const axial_job *job, int sample, uint32_t l, const vf 
 }
 
 // Samples share the rows they read; each is summed from its first row to its last.
-INLINE void axial_some(const axial_job *job, uint32_t l, int from, int samples) {
+INLINE void axial_some(const axial_job *job, const taps *tap, uint32_t l, int from, int samples) {
   const uint32_t n = job->lines;
   vf sum[AXIAL_MOST][RING_PLANES], row[RING_PLANES]; // apart: sums need not wait for each other
   for (int s = 0; s < samples; ++s)
@@ -181,7 +200,7 @@ INLINE void axial_some(const axial_job *job, uint32_t l, int from, int samples) 
   for (int t = 0; t < job->count + samples - 1; ++t) {
     for (uint32_t k = 0; k < RING_PLANES; ++k) row[k] = load(job->rows[from + t] + k * n + l);
     for (int s = 0; s < samples; ++s)
-      if (t >= s && t - s < job->count) add_axial(job->tap[t - s], row, sum[s]);
+      if (t >= s && t - s < job->count) add_axial(tap, SONDE_RANK * (t - s), row, sum[s]);
   }
   for (int s = 0; s < samples; ++s) finish_axial(job, from + s, l, sum[s]);
 }
@@ -192,10 +211,12 @@ enum { AT_ONCE = W == 16 ? AXIAL_MOST : 2 };
 static void axial(const axial_job *job) {
   SONDE_ASSERT(job->count > 0 && job->lines % ECHO_ALIGN == 0);
   SONDE_ASSERT(job->samples > 0 && job->samples <= AXIAL_MOST);
+  taps tap;
+  spread_taps(&job->tap[0][0], SONDE_RANK * job->count, &tap);
   for (uint32_t l = 0; l < job->lines; l += W) {
     int from = 0;
-    for (; from + AT_ONCE <= job->samples; from += AT_ONCE) axial_some(job, l, from, AT_ONCE);
-    for (; from < job->samples; ++from) axial_some(job, l, from, 1);
+    for (; from + AT_ONCE <= job->samples; from += AT_ONCE) axial_some(job, &tap, l, from, AT_ONCE);
+    for (; from < job->samples; ++from) axial_some(job, &tap, l, from, 1);
   }
 }
 
