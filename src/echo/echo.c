@@ -4,6 +4,7 @@
 // sonde_echo_create   buffers and random tables
 // sonde_echo_destroy
 // carve               one block of memory for what vectors read
+// forget_textures     what they remember
 // fill_tables         scatterers, streamlines of the blood, noise
 // sonde_echo_flow_default, sonde_echo_set_flow, sonde_echo_set_coupling
 // sonde_echo_set_radius, sonde_echo_set_kernels
@@ -13,6 +14,7 @@
 #include "echo/echo.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 enum {
   LINES = 192,
@@ -126,6 +128,7 @@ static size_t carve(sonde_echo *echo, char *block) {
   CARVE(echo->row, lines * MOST_FIELDS);
   CARVE(echo->level[0], lines * MOST_LEVELS);
   CARVE(echo->level[1], lines * MOST_LEVELS);
+  CARVE(echo->knots, lines * TEXTURES * KNOT_FLOATS);
   CARVE(echo->scatter, lines);
   CARVE(echo->loss, lines);
   CARVE(echo->gain, (most_lines / SONDE_FINE + ECHO_ALIGN) * SONDE_MEDIUM_ROWS);
@@ -159,6 +162,11 @@ static bool allocate(sonde_echo *echo) {
   echo->seen = SONDE_NEW(uint64_t, (size_t)SONDE_BOX_SIDE * SONDE_BOX_SIDE * SONDE_BOX_SIDE / 64);
   return echo->block && echo->psf && echo->spare && echo->node && echo->plane && echo->air &&
          echo->echoes && echo->first_echo && echo->seen;
+}
+
+// Each set of kernels has its own order.
+static void forget_textures(sonde_echo *echo) {
+  memset(echo->knots, 0xff, sizeof *echo->knots * echo->padded * TEXTURES * KNOT_FLOATS);
 }
 
 static sonde_status check_def(const sonde_echo_def *def, sonde_error *error) {
@@ -204,6 +212,7 @@ sonde_status sonde_echo_create(const sonde_interior *interior, const sonde_echo_
     return sonde_fail_memory(error);
   }
   fill_tables(made);
+  forget_textures(made);
   sonde_echo_set_coupling(made, NULL);
   *echo = made;
   return SONDE_OK;
@@ -270,6 +279,7 @@ sonde_status sonde_echo_set_kernels(sonde_echo *echo, const char *name, sonde_er
     return sonde_fail(error, SONDE_NOT_FOUND,
                       "no kernels '%s' here; expected avx512, avx2, base or plain", name);
   echo->kernels = found;
+  forget_textures(echo);
   return SONDE_OK;
 }
 

@@ -96,6 +96,7 @@ struct sonde_echo {
   float *wide;             // [2][fields][padded] two coarse rows, per line
   float *row;              // [fields][padded], one row of the march
   float *level[2];         // [levels][padded] of this row and the last
+  float *knots;            // [padded][TEXTURES][KNOT_FLOATS] of the textures, kernel.h
   float *scatter;          // [padded] of this row
   float *loss;             // [padded] of this row
   float *gain;     // [MEDIUM_ROWS][gain_stride] of the grid's even columns: beside the outer lines

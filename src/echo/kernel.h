@@ -12,6 +12,8 @@ enum {
   SONDE_MOST_LINES = 512,
   ECHO_ALIGN = 16,  // lines and batches are padded to whole vectors
   LAYER_LEVELS = 4, // skin, dermis, fascia, cortex; the vessels' walls and the lesions follow
+  TEXTURES = 13,    // one more than the last texture's salt
+  KNOT_FLOATS = 11, // that a texture remembers per line
   MOST_LEVELS = LAYER_LEVELS + MOST_VESSELS + MOST_LESIONS,
   RING_PLANES = 2 * SONDE_RANK,
   SONDE_FINE = 2, // columns of the grid per scan line
@@ -104,6 +106,7 @@ typedef struct tissue_job {
   float bone_radius_m;
   float webs, oedema; // 0..1
   bool plain;
+  float *memory; // [lines][TEXTURES][KNOT_FLOATS], of one set of kernels; all bits set: empty
   float *scatter, *loss; // amplitude over muscle, dB/m/MHz one way
   float *level;          // [levels][lines] signed: sign changes are interfaces
   const float *before;   // the same of the row above

@@ -1,7 +1,7 @@
 // Textures in tissue coordinates: angle around the leg, way along it, depth below the skin.
 // Included by kernel_tissue.h only.
 //
-// cell_value, texture     value noise
+// cell_value, find_corners, texture  value noise
 // sheet                   bright layers at whole values
 // septa, bundles, fascia  fat and muscle
 // clefts                  fluid between the lobules of the fat
@@ -28,19 +28,40 @@ INLINE vi wrap(vi i, int32_t n) {
   return i - ((i >= n) & n);
 }
 
-// Value noise in [-1, 1]; periodic around the leg with `turns` cells.
-INLINE vf texture(vf theta, vf along, vf depth, int32_t turns, int32_t salt) {
+// Lattice cells of one texture in which the lines were when it was last asked for, and the values
+// at their corners: from row to row most of them stay.
+typedef struct knots {
+  vi a, b, c;
+  vf corner[8];
+} knots;
+
+_Static_assert(sizeof(knots) == KNOT_FLOATS * sizeof(vf), "room for each line");
+
+INLINE void find_corners(knots *k, int32_t turns) {
+  vu a = (vu)k->a * 0x9e3779b1u, a1 = (vu)wrap(k->a + 1, turns) * 0x9e3779b1u;
+  vu b = (vu)k->b * 0x85ebca77u, b1 = b + 0x85ebca77u;
+  vu c = (vu)k->c * 0xc2b2ae3du, c1 = c + 0xc2b2ae3du;
+  k->corner[0] = cell_value(a, b, c), k->corner[1] = cell_value(a1, b, c);
+  k->corner[2] = cell_value(a, b1, c), k->corner[3] = cell_value(a1, b1, c);
+  k->corner[4] = cell_value(a, b, c1), k->corner[5] = cell_value(a1, b, c1);
+  k->corner[6] = cell_value(a, b1, c1), k->corner[7] = cell_value(a1, b1, c1);
+}
+
+// Value noise in [-1, 1]; periodic around the leg with `turns` cells. A salt belongs to one
+// texture.
+INLINE vf texture(knots *memory, vf theta, vf along, vf depth, int32_t turns, int32_t salt) {
+  knots *k = memory + salt;
   vf u = theta * ((float)turns * 0.159154943f);
   vf fu = below(u), fv = below(along), fw = below(depth);
-  vi a = wrap(whole(fu), turns), a1 = wrap(a + 1, turns);
-  vu ka = (vu)a * 0x9e3779b1u, ka1 = (vu)a1 * 0x9e3779b1u;
-  vu b = (vu)(whole(fv) + 1000 * salt) * 0x85ebca77u, b1 = b + 0x85ebca77u;
-  vu c = (vu)whole(fw) * 0xc2b2ae3du, c1 = c + 0xc2b2ae3du;
+  vi a = wrap(whole(fu), turns), b = whole(fv) + 1000 * salt, c = whole(fw);
+  if (any((a != k->a) | (b != k->b) | (c != k->c))) {
+    k->a = a, k->b = b, k->c = c;
+    find_corners(k, turns);
+  }
   vf tu = smooth(u - fu), tv = smooth(along - fv), tw = smooth(depth - fw);
-  vf p = cell_value(ka, b, c), q = cell_value(ka, b1, c);
-  p += tu * (cell_value(ka1, b, c) - p), q += tu * (cell_value(ka1, b1, c) - q);
-  vf r = cell_value(ka, b, c1), s = cell_value(ka, b1, c1);
-  r += tu * (cell_value(ka1, b, c1) - r), s += tu * (cell_value(ka1, b1, c1) - s);
+  const vf *at = k->corner;
+  vf p = at[0] + tu * (at[1] - at[0]), q = at[2] + tu * (at[3] - at[2]);
+  vf r = at[4] + tu * (at[5] - at[4]), s = at[6] + tu * (at[7] - at[6]);
   p += tv * (q - p), r += tv * (s - r);
   return p + tw * (r - p);
 }
@@ -53,16 +74,16 @@ INLINE vf sheet(vf layer, float share) {
 }
 
 // Septa of the fat: broken sheets roughly along the skin, bent by the lobules.
-INLINE vf septa(vf theta, vf s, vf depth) {
-  vf bend = texture(theta, s * 70, depth * 250, TURNS_FAT, 1);
-  vf strength = texture(theta, s * 110, depth * 500, 2 * TURNS_FAT, 4);
+INLINE vf septa(knots *memory, vf theta, vf s, vf depth) {
+  vf bend = texture(memory, theta, s * 70, depth * 250, TURNS_FAT, 1);
+  vf strength = texture(memory, theta, s * 110, depth * 500, 2 * TURNS_FAT, 4);
   return larger(sheet(depth * 420 + 1.3f * bend, 0.30f) * (0.55f + strength), all(0));
 }
 
 // Oedema: fluid in clefts around lobules of 6 by 8 mm, 0..1.
-INLINE vf clefts(vf theta, vf s, vf depth, float oedema) {
-  vf bend = texture(theta, s * 70, depth * 250, TURNS_FAT, 1);
-  vf sway = texture(theta, s * 60, depth * 160, TURNS_FAT, 8);
+INLINE vf clefts(knots *memory, vf theta, vf s, vf depth, float oedema) {
+  vf bend = texture(memory, theta, s * 70, depth * 250, TURNS_FAT, 1);
+  vf sway = texture(memory, theta, s * 60, depth * 160, TURNS_FAT, 8);
   float share = 0.12f + 0.2f * oedema;
   vf along = sheet(depth * 170 + 0.9f * bend, share);
   vf across = sheet(theta * (TURNS_FAT * 0.159154943f) + depth * 40 + 0.8f * sway, share);
@@ -71,26 +92,26 @@ INLINE vf clefts(vf theta, vf s, vf depth, float oedema) {
 }
 
 // Bright bands along the flow in a clot that has been there for long.
-INLINE vf webs(vf theta, vf s, vf depth, vf along) {
-  vf bend = texture(theta, s * 90, depth * 400, 2 * TURNS_FAT, 9);
-  vf strength = texture(theta, s * 110, depth * 500, 2 * TURNS_FAT, 10);
+INLINE vf webs(knots *memory, vf theta, vf s, vf depth, vf along) {
+  vf bend = texture(memory, theta, s * 90, depth * 400, 2 * TURNS_FAT, 9);
+  vf strength = texture(memory, theta, s * 110, depth * 500, 2 * TURNS_FAT, 10);
   return 2.6f * sheet(along * 1.2f + 0.7f * bend, 0.4f) * (0.8f + 0.6f * strength);
 }
 
 // Bundles of muscle, in decibels: dark fascicles between short bright connective streaks that run
 // at a small angle to the skin and far along the leg.
-INLINE vf bundles(vf theta, vf s, vf depth) {
+INLINE vf bundles(knots *memory, vf theta, vf s, vf depth) {
   vf slant = depth + 0.012f * theta;
-  vf bend = texture(theta, s * 40, depth * 130, TURNS_MUSCLE / 3, 2);
-  vf fine = texture(theta, s * 90, slant * 900, TURNS_MUSCLE, 3);
-  vf strength = texture(theta, s * 60, slant * 700, TURNS_MUSCLE, 5);
+  vf bend = texture(memory, theta, s * 40, depth * 130, TURNS_MUSCLE / 3, 2);
+  vf fine = texture(memory, theta, s * 90, slant * 900, TURNS_MUSCLE, 3);
+  vf strength = texture(memory, theta, s * 60, slant * 700, TURNS_MUSCLE, 5);
   vf bright = sheet(slant * 420 + 1.4f * bend, 0.5f) * (0.2f + strength);
   return 2.5f * fine + 3.5f * bend + 19 * larger(bright, all(0)) - 5;
 }
 
 // Connective tissue within half a millimetre of the fascia.
-INLINE vf fascia(vf theta, vf s, vf away) {
-  vf patch = texture(theta, s * 120, all(0.5f), 2 * TURNS_FAT, 7);
+INLINE vf fascia(knots *memory, vf theta, vf s, vf away) {
+  vf patch = texture(memory, theta, s * 120, all(0.5f), 2 * TURNS_FAT, 7);
   vf height = larger(1 - size_of(away) * (1 / 0.7e-3f), all(0));
   return height * (1.6f + 0.9f * patch);
 }

@@ -40,21 +40,22 @@ INLINE void mark_both(vi mask, vf scatter, vf loss, vf out[2]) {
 }
 
 // Layer by layer; levels 1 and 2 are the depths below dermis and fascia.
-INLINE void layers(const tissue_job *job, const vf *level, vf theta, vf s, vf depth, vf out[2]) {
+INLINE void layers(const tissue_job *job, knots *memory, const vf *level, vf theta, vf s, vf depth,
+                   vf out[2]) {
   vi in_fat = (level[1] >= 0) & (level[2] < 0), in_muscle = (level[1] >= 0) & (level[2] >= 0);
   vf fat_scatter = all(fat_tissue[0]), muscle_scatter = all(job->plain ? 1 : muscle_tissue[0]);
   vf fat_loss = all(fat_tissue[1]);
-  if (!job->plain && any(in_fat)) fat_scatter += 2.2f * septa(theta, s, depth);
+  if (!job->plain && any(in_fat)) fat_scatter += 2.2f * septa(memory, theta, s, depth);
   if (job->oedema > 0 && any(in_fat)) {
-    vf fluid = clefts(theta, s, depth, job->oedema);
+    vf fluid = clefts(memory, theta, s, depth, job->oedema);
     fat_scatter = (fat_scatter * (1 + job->oedema)) * (1 - fluid) + fluid_tissue[0] * fluid;
     fat_loss += fluid * (fluid_tissue[1] - fat_loss);
   }
   if (!job->plain && any(in_muscle))
-    muscle_scatter = muscle_scatter * power2(bundles(theta, s, depth) * 0.16609640474f);
+    muscle_scatter = muscle_scatter * power2(bundles(memory, theta, s, depth) * 0.16609640474f);
   vi sheath = (level[1] >= 0) & (size_of(level[2]) < 0.7e-3f);
   if (!job->plain && any(sheath)) {
-    vf more = fascia(theta, s, level[2]);
+    vf more = fascia(memory, theta, s, level[2]);
     fat_scatter += more, muscle_scatter += more;
   }
   mark_both(in_fat, fat_scatter, fat_loss, out);
@@ -73,8 +74,8 @@ INLINE vf lesion_distance(const tissue_lesion *lesion, const vf q[3]) {
 }
 
 // Rim and hilum, fluid, or clotted and liquid parts; a thin capsule.
-INLINE void lesion(const tissue_lesion *it, const vf q[3], vf away, vf theta, vf s, vf depth,
-                   vf out[2]) {
+INLINE void lesion(const tissue_lesion *it, knots *memory, const vf q[3], vf away, vf theta, vf s,
+                   vf depth, vf out[2]) {
   vi in = away < 0;
   if (!any(away < capsule_m)) return;
   if (it->kind != TISSUE_HAEMATOMA)
@@ -83,7 +84,7 @@ INLINE void lesion(const tissue_lesion *it, const vf q[3], vf away, vf theta, vf
     mark(in, larger(all(it->scatter), all(fluid_tissue[0])), fluid_tissue[1], out);
     return;
   }
-  vf grain = texture(theta, s * 400, depth * 500, 4 * TURNS_MUSCLE, 11);
+  vf grain = texture(memory, theta, s * 400, depth * 500, 4 * TURNS_MUSCLE, 11);
   vf scatter = it->scatter * (1 + 0.3f * grain);
   if (it->kind == TISSUE_NODE) {
     vf hilum = q[0] * q[0] * 7 + q[1] * q[1] * 7 + q[2] * q[2] * 2 + 0.4f * grain;
@@ -91,14 +92,15 @@ INLINE void lesion(const tissue_lesion *it, const vf q[3], vf away, vf theta, vf
     mark(in, scatter + share * (hilum_scatter - scatter), node_loss, out);
     return;
   }
-  vf lump = texture(theta, s * 150, depth * 200, 2 * TURNS_MUSCLE, 12) + 0.5f * grain;
+  vf lump = texture(memory, theta, s * 150, depth * 200, 2 * TURNS_MUSCLE, 12) + 0.5f * grain;
   vf liquid = smooth(smaller(larger(0.1f - 3 * lump, all(0)), all(1)));
   mark(in, scatter * power2(1.5f * lump) * (1 - liquid) + fluid_tissue[0] * liquid, haematoma_loss,
        out);
 }
 
 // Walls hide lesions, lumina walls: branches begin in the lumen of their parents. Clot last.
-INLINE void vessels(const tissue_job *job, const float *f, const vf *level, vf out[2]) {
+INLINE void vessels(const tissue_job *job, knots *memory, const float *f, const vf *level,
+                    vf out[2]) {
   const uint32_t n = job->lines;
   for (uint32_t v = job->vessels; v-- > 0;) {
     mark(level[v] < job->vessel[v].wall_m, all(wall_tissue[0]), wall_tissue[1], out);
@@ -116,7 +118,7 @@ INLINE void vessels(const tissue_job *job, const float *f, const vf *level, vf o
     vf scatter = all(it->clot_scatter);
     if (v == 0 && job->webs > 0 && any(clot))
       scatter = scatter * (1 - 0.6f * job->webs) +
-                job->webs * webs(load(f + PLANE_THETA * n), load(f + PLANE_S * n),
+                job->webs * webs(memory, load(f + PLANE_THETA * n), load(f + PLANE_S * n),
                                  load(f + PLANE_DEPTH * n), load(at));
     mark(clot, scatter, clot_loss, out);
   }
@@ -125,6 +127,7 @@ INLINE void vessels(const tissue_job *job, const float *f, const vf *level, vf o
 // Returns the lanes in which a level changed sign since the row above.
 INLINE vi paint(const tissue_job *job, uint32_t l) {
   const float *f = job->row + l;
+  knots *memory = (knots *)(void *)(job->memory + (size_t)l * KNOT_FLOATS * TEXTURES);
   const uint32_t n = job->lines, levels = LAYER_LEVELS + job->vessels + job->lesions;
   vf depth = load(f + PLANE_DEPTH * n), fat = load(f + PLANE_FAT * n);
   vf muscle = load(f + PLANE_MUSCLE * n), r = load(f + PLANE_R * n);
@@ -137,14 +140,14 @@ INLINE vi paint(const tissue_job *job, uint32_t l) {
     wall[v] = wall_distance(load(at), load(at + n), load(half), load(half + n));
   }
   vf tissue[2] = {all(skin_tissue[0]), all(skin_tissue[1])};
-  layers(job, level, theta, s, depth, tissue);
+  layers(job, memory, level, theta, s, depth, tissue);
   for (uint32_t k = 0; k < job->lesions; ++k) {
     const float *at = f + lesion_field_at(job->vessels, k, 0) * n;
     vf q[3] = {load(at), load(at + n), load(at + 2 * n)};
     edge[k] = lesion_distance(&job->lesion[k], q);
-    lesion(&job->lesion[k], q, edge[k], theta, s, depth, tissue);
+    lesion(&job->lesion[k], memory, q, edge[k], theta, s, depth, tissue);
   }
-  vessels(job, f, wall, tissue);
+  vessels(job, memory, f, wall, tissue);
   mark(level[3] > 0, all(bone_tissue[0]), bone_tissue[1], tissue);
   mark(level[0] < 0, all(0), outside_loss, tissue);
   store(job->scatter + l, tissue[0]), store(job->loss + l, tissue[1]);

@@ -244,6 +244,7 @@ void sonde_echo_medium(sonde_echo *echo) {
                     .lines = lines,
                     .bone_radius_m = (float)echo->interior->bone_radius_m,
                     .plain = echo->plain,
+                    .memory = echo->knots,
                     .scatter = echo->scatter,
                     .loss = echo->loss,
                     .crossed = crossed};
