@@ -1,6 +1,7 @@
 // Laws of the interior displacement: boundary values, volume, inversion, labels; error against
 // independent finite-element fields.
 #include "interior/tube.h"
+#include "interior/window.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -354,12 +355,60 @@ static void finite_element_fields(void **state) {
   sonde_free(nodes);
 }
 
+// Over the skin at a height along the leg, looking in; nothing is touched.
+static void hover(sonde_interior *in, const tube *t, double z_m, double dt_s) {
+  const uint32_t n = t->model.surface.vertex_count;
+  sonde_pathology p = healthy();
+  sonde_vec3 *none = SONDE_NEW(sonde_vec3, n), beam = vec3(0, -1, 0), along = vec3(0, 0, 1);
+  sonde_pose pose = {vec3(0, 0.08, z_m),
+                     q_from_matrix(m_columns(v_cross(along, beam), along, beam))};
+  sonde_interior_update(in, &(sonde_interior_input){.positions_m = t->model.surface.vertices,
+                                                    .contact_forces_n = none,
+                                                    .world_from_probe = pose,
+                                                    .pathology = &p,
+                                                    .dt_s = dt_s,
+                                                    .tick = 7,
+                                                    .face_half_x_m = 30e-3,
+                                                    .face_half_y_m = 6e-3});
+  sonde_free(none);
+}
+
+// A window whose work is done between the updates comes into use at the same one, and none of it is
+// left for that.
+static void work_ahead_changes_no_update(void **state) {
+  (void)state;
+  tube t = tube_create(0.08, 0.014, 0.3, 0.012, 200, 120);
+  sonde_interior *in[2] = {interior_of(&t), interior_of(&t)};
+  for (int k = 0; k < 2; ++k) {
+    hover(in[k], &t, 0.15, -1);
+    hover(in[k], &t, 0.155, 0.03);
+    assert_true(in[k]->building && in[k]->whole > 10);
+  }
+  for (uint32_t i = 1; i < in[0]->whole; ++i) {
+    assert_true(in[0]->building && in[1]->building);
+    sonde_interior_build_ahead(in[1]);
+    hover(in[0], &t, 0.155, 0.03);
+    if (i + 1 < in[0]->whole) hover(in[1], &t, 0.155, 0.03);
+  }
+  assert_false(in[0]->building);
+  assert_true(in[1]->building && in[1]->next->ready);
+  hover(in[1], &t, 0.155, 0.03);
+  assert_false(in[1]->building);
+  assert_memory_equal(&in[0]->live->place, &in[1]->live->place, sizeof in[0]->live->place);
+  const size_t near = 3 * (size_t)SONDE_WINDOW_NEAR;
+  assert_memory_equal(in[0]->live->compliance, in[1]->live->compliance,
+                      near * near * sizeof(double));
+  for (int k = 0; k < 2; ++k) sonde_interior_destroy(in[k]);
+  tube_clear(&t);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(skin_moves_with_the_surface_and_bone_rests),
       cmocka_unit_test(the_field_keeps_volume),
       cmocka_unit_test(rest_point_inverts_the_displacement),
       cmocka_unit_test(labels_follow_the_layers),
+      cmocka_unit_test(work_ahead_changes_no_update),
       cmocka_unit_test(finite_element_fields),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
