@@ -28,18 +28,34 @@ static void list_slices(sonde_lanes *lanes, const uint8_t *take) {
 
 static void list_awake(sonde_lanes *lanes) { list_slices(lanes, lanes->is_awake); }
 
-// Marks the touched slices and those beside them that are awake.
-static void mark_near(sonde_lanes *lanes) {
-  uint8_t *take = lanes->is_near;
-  memset(take, 0, lanes->slice_count);
-  for (uint32_t k = 0; k < lanes->press_count; ++k) {
-    const sonde_slice_model *fixed = &lanes->model[lanes->pressed[k]];
+// Adds the slices beside the marked ones to the list of `count`; returns the new count.
+static uint32_t add_ring(sonde_lanes *lanes, uint32_t count) {
+  uint32_t end = count;
+  for (uint32_t k = 0; k < count; ++k) {
+    const sonde_slice_model *fixed = &lanes->model[lanes->near_list[k]];
     const uint32_t *near = lanes->near + fixed->first_near;
-    take[lanes->pressed[k]] = 1;
-    for (uint32_t n = 0; n < fixed->near_count; ++n) take[near[n]] = lanes->is_awake[near[n]];
+    for (uint32_t n = 0; n < fixed->near_count; ++n) {
+      if (lanes->is_near[near[n]] || !lanes->is_awake[near[n]]) continue;
+      lanes->is_near[near[n]] = 1;
+      lanes->near_list[end++] = near[n];
+    }
   }
-  lanes->near_count = 0;
-  for (uint32_t s = 0; s < lanes->slice_count; ++s) lanes->near_count += take[s];
+  SONDE_ASSERT(end <= lanes->slice_count);
+  return end;
+}
+
+// Marks the touched slices and NEAR_RINGS of those around them that are awake. With one ring the
+// skin beside the probe gave way too little, and deep presses went over into a fold.
+enum { NEAR_RINGS = 2 };
+static void mark_near(sonde_lanes *lanes) {
+  memset(lanes->is_near, 0, lanes->slice_count);
+  for (uint32_t k = 0; k < lanes->press_count; ++k) {
+    lanes->near_list[k] = lanes->pressed[k];
+    lanes->is_near[lanes->pressed[k]] = 1;
+  }
+  lanes->near_count = lanes->press_count;
+  for (int ring = 0; ring < NEAR_RINGS; ++ring)
+    lanes->near_count = add_ring(lanes, lanes->near_count);
 }
 
 // Lists these; the others stand still for now.
@@ -156,7 +172,7 @@ typedef struct iteration {
 } iteration;
 
 // A sweep of all slices for the sake of a few costs more than the next iteration of these alone.
-enum { FEW = 3 };
+enum { FEW = 2 };
 static const double FAR_SHARE = 0.5; // of the square of what the solver may leave
 
 // sums: of the linearisation. From the residual that the first sweep found on; what a sweep leaves

@@ -33,7 +33,8 @@ static size_t carve(sonde_lanes *l, uint32_t faces, char *base) {
   CARVE(layer_direction, l->law.layered ? rows * SONDE_QUAD : 0);
   CARVE(awake, l->slice_count);
   CARVE(is_awake, l->slice_count), CARVE(calm, l->slice_count);
-  CARVE(face_marked, mark_words(l)), CARVE(is_near, l->slice_count), CARVE(speed2, l->slice_count);
+  CARVE(face_marked, mark_words(l)), CARVE(is_near, l->slice_count),
+      CARVE(near_list, l->slice_count), CARVE(speed2, l->slice_count);
   CARVE(way2, l->slice_count), CARVE(roam, l->slice_count), CARVE(unrest2, l->slice_count),
       CARVE(published, l->slice_count);
   CARVE(near_probe, l->slice_count), CARVE(touched_rows, l->slice_count);

@@ -146,8 +146,9 @@ struct sonde_lanes {
   uint32_t *awake;                    // slices that take part
   uint32_t awake_count;
   uint8_t *is_awake, *calm;
-  uint8_t *is_near;      // touched slices and those beside them that are awake
-  uint32_t near_count;   // of these
+  uint8_t *is_near;    // touched slices and waking ones around them
+  uint32_t *near_list; // these
+  uint32_t near_count;
   uint64_t *face_marked; // [slices of faces / 64] bits
   float *speed2;         // [slices] largest square of a node's speed
   float *way2;           // [slices] and displacement
