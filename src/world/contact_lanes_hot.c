@@ -1,15 +1,10 @@
-// The contact of the fast engine (docs/world.md): the kernels press 16 faces or nodes at a time, and
-// what these add to nodes is summed up here, in ascending order.
-// set_probe:    the probe as the kernels see it.
-// find_near:    slices of nodes near the probe.
-// sonde_lanes_mark_faces: slices of faces with a corner in such slices.
-// press_at:     where the contact with a slice of nodes is gathered.
-// touch:        a node that the probe touches.
-// add_faces, add_nodes: what a pressed slice adds.
-// add_ties:     what couples the corners of a face.
-// list_touched: touched nodes, ascending.
-// detect, meet: a Newton iteration's contact before and after the solution.
-// carry:        the ties' part of a product, for the solver.
+// The contact of the fast engine (docs/world.md): the kernels press 16 faces or nodes at a time,
+// and what these add to nodes is summed up here, in ascending order. set_probe:  the probe as the
+// kernels see it. find_near:  slices of nodes near the probe; mark_faces: slices of faces with a
+// corner there. press_at:   where the contact with a slice of nodes is gathered. touch:      a node
+// that the probe touches. add_faces, add_nodes: what a pressed slice adds. add_ties:   what couples
+// the corners of a face. list_touched: touched nodes, ascending. detect, meet: a Newton iteration's
+// contact before and after the solution. carry:      the ties' part of a product, for the solver.
 #include "world/contact.h"
 #include "world/lanes.h"
 
@@ -151,7 +146,7 @@ static void add_ties(sonde_lanes *lanes, const sonde_pressed_slice *at,
 }
 
 static void corners_of(const sonde_lanes *lanes, uint32_t faces, uint32_t l, uint32_t v[3]) {
-  for (int k = 0; k < 3; ++k) v[k] = (uint32_t)lanes->face[faces][k][l];
+  for (int k = 0; k < 3; ++k) v[k] = (uint32_t)lanes->face[faces].node[k][l];
 }
 
 static void add_faces(sonde_state *state, const sonde_pressed_slice *at,

@@ -240,12 +240,12 @@ INLINE void press_points(const sonde_lanes *lanes, const seen_point *points, con
 
 static bool press_faces(const sonde_lanes *lanes, uint32_t index, sonde_pressed_slice *at,
                         sonde_press_corners *to) {
-  const sonde_lane_index *node = lanes->face[index];
+  const sonde_face_slice *face = &lanes->face[index];
   sonde_lane x[4][3], v[4][3], near[3], unused[3];
   SONDE_ASSERT(index < lanes->face_slice_count);
   seen_point points[SONDE_FACE_POINTS];
   depths by;
-  vectors_at_points(lanes->probe_place, node, x, near);
+  vectors_at_points(lanes->probe_place, face->node, x, near);
   at->area = lanes->point_area[index];
   sonde_lane_index counts = (near[0] * near[1] * near[2] * at->area) > 0;
   for (int q = 0; q < SONDE_FACE_POINTS; ++q) {
@@ -253,7 +253,7 @@ static bool press_faces(const sonde_lanes *lanes, uint32_t index, sonde_pressed_
     for (int c = 0; c < 3; ++c) points[q].x[c] = x[q][c];
   }
   if (!least_depth(&lanes->probe, SONDE_FACE_POINTS, points, &by)) return false;
-  vectors_at_points(lanes->probe_motion, node, v, unused);
+  vectors_at_points(lanes->probe_motion, face->node, v, unused);
   for (int q = 0; q < SONDE_FACE_POINTS; ++q)
     for (int c = 0; c < 3; ++c) points[q].v[c] = v[q][c];
   press_points(lanes, points, &by, at, to);
@@ -304,7 +304,7 @@ INLINE void go_on(const sonde_lanes *lanes, const sonde_lane way[3], seen_point 
 
 static void meet_faces(const sonde_lanes *lanes, const sonde_pressed_slice *at, bool surprise,
                        sonde_meet_corners *to) {
-  const sonde_lane_index *node = lanes->face[at->index];
+  const sonde_lane_index *node = lanes->face[at->index].node;
   sonde_lane way[4][3], force[4][3], x[4][3], v[4][3], unused[3];
   vectors_at_points(lanes->probe_way, node, way, unused);
   for (int q = 0; q < SONDE_FACE_POINTS; ++q) {
