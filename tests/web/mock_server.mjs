@@ -12,6 +12,9 @@ import { Trainer } from "./mock_trainer.mjs";
 
 const TYPES = { html: "text/html; charset=utf-8", css: "text/css", js: "text/javascript" };
 const MOST_UNSEEN = 2; // frames that a client has not acknowledged
+const SIZE_AT = 12;
+const NODES_AT = 32; // in a frame: their number,
+const DISPLACEMENTS_AT = 140; // and 6 bytes for each
 
 /** Forwards a running program's thigh, images and forces. */
 class ProgramThigh {
@@ -63,13 +66,24 @@ class ProgramThigh {
   }
 }
 
+/** The same frame of a skin with fewer nodes. */
+function withoutNodes(frame, count) {
+  const [nodes, at] = [frame.readUInt32LE(NODES_AT), DISPLACEMENTS_AT];
+  const fewer = Buffer.concat([frame.subarray(0, at + 6 * (nodes - count)), frame.subarray(at + 6 * nodes)]);
+  fewer.writeUInt32LE(fewer.length, SIZE_AT);
+  fewer.writeUInt32LE(nodes - count, NODES_AT);
+  return fewer;
+}
+
 /** Starts a mock; resolves to {address, trainer, thigh, drop(ms), close()}. */
 export async function startMock({ webDir, port = 0, program = null, list = [] }) {
   const { WebSocketServer, WebSocket } = createRequire(path.join(webDir, "package.json"))("ws");
   const clients = new Set();
   const text = (m) => JSON.stringify(m);
   let away = false;
+  let latest = null;
   const toAll = (frame) => {
+    latest = frame;
     trainer.frame(frame);
     const shown = trainer.replay?.frame ? Buffer.from(trainer.replay.frame) : frame;
     shown.writeUInt32LE(frame.readUInt32LE(8), 8); // a replayed frame keeps its content only
@@ -84,6 +98,8 @@ export async function startMock({ webDir, port = 0, program = null, list = [] })
     for (const part of thigh.geometry()) c.socket.send(part);
     c.socket.send(text(role(c)));
     for (const m of trainer.state()) c.socket.send(text(m));
+    // A frame of the patient before, who had fewer nodes, may come after the new skin.
+    if (latest) c.socket.send(withoutNodes(latest, 8));
   };
   const prepare = (truth) => {
     thigh.receive({ type: "controls", case: truth });

@@ -352,6 +352,7 @@ export class ThighScene {
   // ---- a frame ---------------------------------------------------------------------------------
 
   show(frame: Frame): void {
+    if (frame.displacements.length !== this.skin?.points.length) return; // of the patient before this one
     this.deform(frame);
     this.moveDots(frame);
     this.placeProbe(frame.snapshot.probe, frame.snapshot.position_mm, frame.snapshot.rotation);
