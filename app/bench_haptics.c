@@ -20,7 +20,7 @@ typedef struct bench {
   haptics_rig rig;
   size_t capacity;
   _Atomic size_t count;
-  double *woken_s, *compute_s, *scratch;
+  double *woken_s, *compute_s, *cpu_s, *scratch; // wall clock, and the thread's own time
 } bench;
 
 static void tick(void *user) {
@@ -28,7 +28,9 @@ static void tick(void *user) {
   size_t k = atomic_load(&b->count);
   if (k >= b->capacity) return;
   b->woken_s[k] = app_seconds(CLOCK_MONOTONIC);
+  double cpu_s = app_seconds(CLOCK_THREAD_CPUTIME_ID);
   haptics_rig_tick(&b->rig);
+  b->cpu_s[k] = app_seconds(CLOCK_THREAD_CPUTIME_ID) - cpu_s;
   b->compute_s[k] = app_seconds(CLOCK_MONOTONIC) - b->woken_s[k];
   atomic_store(&b->count, k + 1);
 }
@@ -65,6 +67,7 @@ static void print_json(bench *b, const sonde_loop_stats *stats) {
   app_json_text("device", b->rig.def.limits->name);
   app_json_integer("ticks", (long long)b->count);
   print_times("compute_us", b->compute_s, b->count);
+  print_times("cpu_us", b->cpu_s, b->count);
   print_times("lateness_us", b->woken_s, b->count);
   app_json_integer("deadline_misses", (long long)stats->deadline_misses);
   app_json_real("energy_j", b->rig.render.energy_j);
@@ -83,11 +86,11 @@ static void print_json(bench *b, const sonde_loop_stats *stats) {
 
 static void print_table(bench *b, const sonde_loop_stats *stats) {
   static const double share[] = {0.5, 0.99, 0.999, 1.0};
-  const char *const names[] = {"compute", "lateness"};
-  double *const lists[] = {b->compute_s, b->woken_s};
+  const char *const names[] = {"compute", "cpu", "lateness"};
+  double *const lists[] = {b->compute_s, b->cpu_s, b->woken_s};
   printf("%s held by a hand of %g kg, %zu ticks of 1 ms\n", b->rig.def.limits->product,
          b->rig.def.mass_kg, (size_t)b->count);
-  for (int i = 0; i < 2; ++i) {
+  for (int i = 0; i < 3; ++i) {
     printf("  %-9s", names[i]);
     for (int q = 0; q < 4; ++q)
       printf("  %s %7.0f us", (const char *const[]){"p50", "p99", "p99.9", "max"}[q],
@@ -101,6 +104,16 @@ static void print_table(bench *b, const sonde_loop_stats *stats) {
   printf("  tissue force is rendered times %.3f; %s\n", b->rig.render.def.force_scale,
          sonde_fault_text(b->rig.safety.fault));
   if (stats->priority_note[0]) printf("  %s\n", stats->priority_note);
+}
+
+static sonde_status write_csv(const bench *b, const char *path, sonde_error *error) {
+  sonde_file *file;
+  sonde_status status = sonde_file_create(path, &file, error);
+  if (status) return status;
+  sonde_file_printf(file, "tick,compute_us,cpu_us\n");
+  for (size_t k = 0; k < b->count; ++k)
+    sonde_file_printf(file, "%zu,%.3f,%.3f\n", k, 1e6 * b->compute_s[k], 1e6 * b->cpu_s[k]);
+  return sonde_file_commit(file, error);
 }
 
 static sonde_status run(bench *b, const haptics_rig_def *def, double seconds,
@@ -122,27 +135,49 @@ static sonde_status run(bench *b, const haptics_rig_def *def, double seconds,
   return status;
 }
 
-int bench_haptics(const char *model_path, const char *device, double seconds, bool json) {
+static bool make_room(bench *b, double seconds) {
+  b->capacity = (size_t)(seconds * 1e3) + 1000;
+  b->woken_s = calloc(b->capacity, sizeof(double));
+  b->compute_s = calloc(b->capacity, sizeof(double));
+  b->cpu_s = calloc(b->capacity, sizeof(double));
+  b->scratch = calloc(b->capacity, sizeof(double));
+  return b->woken_s && b->compute_s && b->cpu_s && b->scratch;
+}
+
+static void clear(bench *b) {
+  free(b->woken_s);
+  free(b->compute_s);
+  free(b->cpu_s);
+  free(b->scratch);
+}
+
+static sonde_status measure(bench *b, const haptics_rig_def *def, double seconds, bool json,
+                            const char *csv, sonde_error *error) {
+  sonde_loop_stats stats = {0};
+  app_catch_interrupt();
+  sonde_status status = run(b, def, seconds, &stats, error);
+  if (!status && csv) status = write_csv(b, csv, error); // before quantiles sort
+  if (status || b->count == 0) return status;
+  lateness(b->woken_s, b->scratch, b->count);
+  (json ? print_json : print_table)(b, &stats);
+  return SONDE_OK;
+}
+
+int bench_haptics(const char *model_path, const char *device, double seconds, bool json,
+                  const char *csv) {
   const sonde_device_limits *limits = sonde_device_limits_find(device);
   if (!limits || !(limits->force_peak_n > 0.0))
     return app_usage_error("bench",
                            "no known limits of a device '%s', expected touch, touch_x, "
                            "premium_1.5, omega.3, omega.6 or falcon",
                            device);
-  bench *b = calloc(1, sizeof *b);
+  bench b = {0};
   sonde_error error = {0};
   sonde_model *model = NULL;
   sonde_probe probe = {0};
-  sonde_loop_stats stats = {0};
   sonde_status status = sonde_model_load(model_path, &model, &error);
   if (!status) status = sonde_probe_create("linear", &probe, &error);
-  if (!status && b) {
-    b->capacity = (size_t)(seconds * 1e3) + 1000;
-    b->woken_s = calloc(b->capacity, sizeof(double));
-    b->compute_s = calloc(b->capacity, sizeof(double));
-    b->scratch = calloc(b->capacity, sizeof(double));
-  }
-  if (!status && (!b || !b->woken_s || !b->compute_s || !b->scratch)) status = SONDE_MEMORY;
+  if (!status && !make_room(&b, seconds)) status = SONDE_MEMORY;
   if (!status) {
     const sonde_site *site = sonde_model_site(model, 27);
     haptics_rig_def def = {.model = model,
@@ -152,19 +187,9 @@ int bench_haptics(const char *model_path, const char *device, double seconds, bo
                            .mass_kg = 0.5,
                            .damping_n_s_m = 2.0,
                            .depth_m = 0.02};
-    app_catch_interrupt();
-    status = run(b, &def, seconds, &stats, &error);
+    status = measure(&b, &def, seconds, json, csv, &error);
   }
-  if (!status && b->count > 0) {
-    lateness(b->woken_s, b->scratch, b->count);
-    (json ? print_json : print_table)(b, &stats);
-  }
-  if (b) {
-    free(b->woken_s);
-    free(b->compute_s);
-    free(b->scratch);
-  }
-  free(b);
+  clear(&b);
   sonde_probe_clear(&probe);
   sonde_model_destroy(model);
   return status ? app_fail("bench", &error) : APP_OK;

@@ -39,7 +39,8 @@ static const char HELP[] =
     "  --dt-ms H      time step, 0.1 to 20; default 1\n"
     "  --dt S         the same in seconds\n"
     "  --repeat N     timed runs, the fastest median is reported; default 3\n"
-    "  --csv FILE     write one row per step: time, total and per-stage milliseconds, iterations\n"
+    "  --csv FILE     write one row per step: time, total and per-stage milliseconds, iterations;\n"
+    "                 with --haptics wall clock and processor time\n"
     "  --no-reference skip the converged run; relative_error is then null\n"
     "  --haptics      the whole 1 kHz loop in real time instead: a simulated hand presses to\n"
     "                 20 mm through a device's limits, for --seconds (default 5)\n"
@@ -428,7 +429,8 @@ int cmd_bench(int argc, char **argv) {
                .reference = true};
   int code = read_options(argc, argv, &o);
   if (code >= 0) return code;
-  if (o.haptics) return bench_haptics(o.model, o.device ? o.device : "touch", o.seconds, o.json);
+  if (o.haptics)
+    return bench_haptics(o.model, o.device ? o.device : "touch", o.seconds, o.json, o.csv);
   bench b = {.o = &o, .steps = (uint32_t)(o.seconds / o.dt_s + 0.5)};
   sonde_error error = {0};
   sonde_model *model = NULL;
