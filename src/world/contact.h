@@ -26,8 +26,8 @@ void sonde_contact_touch(sonde_state *state, uint32_t i);
 void sonde_contact_join(sonde_state *state, uint32_t a, uint32_t b);
 // Joins the regions of touched nodes beside one another. @thread tick
 void sonde_nodes_join(sonde_state *state);
-// Parts of sonde_contact_detect() and sonde_contact_apply() for the fast engine: no node is touched;
-// the probe's planes in the world frame; touched nodes are awake; regions. @thread tick
+// Parts of sonde_contact_detect() and sonde_contact_apply() for the fast engine: no node is
+// touched; the probe's planes in the world frame; touched nodes are awake; regions. @thread tick
 void sonde_contact_forget(sonde_state *state);
 void sonde_contact_place(sonde_state *state, const sonde_probe *probe, sonde_pose pose);
 void sonde_contact_wake(sonde_state *state);
@@ -39,7 +39,5 @@ void sonde_press_detect(sonde_state *state, const sonde_probe *probe, sonde_pose
 // contact_force[] at the end of the step by the linear system; with `surprise` the square of the
 // difference between these pushes and the ones that nodes meet where they go. @thread tick
 double sonde_press_meet(sonde_state *state, bool surprise);
-// What the ties take from the product of the matrix with vectors [rows][4], into carry[] of press[].
-void sonde_press_carry(struct sonde_lanes *lanes, const float *vectors);
 
 #endif

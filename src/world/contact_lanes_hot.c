@@ -1,10 +1,14 @@
 // The contact of the fast engine (docs/world.md): the kernels press 16 faces or nodes at a time,
-// and what these add to nodes is summed up here, in ascending order. set_probe:  the probe as the
-// kernels see it. find_near:  slices of nodes near the probe; mark_faces: slices of faces with a
-// corner there. press_at:   where the contact with a slice of nodes is gathered. touch:      a node
-// that the probe touches. add_faces, add_nodes: what a pressed slice adds. add_ties:   what couples
-// the corners of a face. list_touched: touched nodes, ascending. detect, meet: a Newton iteration's
-// contact before and after the solution. carry:      the ties' part of a product, for the solver.
+// and what these add to nodes is summed up here, in ascending order.
+// set_probe:    the probe as the kernels see it.
+// find_near:    slices of nodes near the probe.
+// mark_faces:   slices of faces with a corner in such slices.
+// press_at:     where the contact with a slice of nodes is gathered.
+// touch:        a node that the probe touches.
+// add_faces, add_nodes: what a pressed slice adds.
+// add_ties:     what couples the corners of a face.
+// list_touched: touched nodes, ascending.
+// detect, meet: a Newton iteration's contact before and after the solution.
 #include "world/contact.h"
 #include "world/lanes.h"
 
@@ -70,14 +74,20 @@ static void find_near(sonde_state *state, const sonde_box *box) {
   state->lanes->kernels->near(state->lanes, low, high, by_nodes(state) ? 0 : 1.5f);
 }
 
-void sonde_lanes_mark_faces(sonde_lanes *lanes, const uint32_t *slices, uint32_t count) {
-  SONDE_ASSERT(count <= lanes->slice_count);
+// Slices of faces with a corner near the probe. Where all these corners are beyond one of the
+// probe's planes, none of their faces can meet it.
+static void mark_faces(sonde_lanes *lanes) {
+  SONDE_ASSERT(lanes->near_probe_count <= lanes->slice_count);
   memset(lanes->face_marked, 0, (lanes->face_slice_count / 64 + 1) * sizeof *lanes->face_marked);
-  for (uint32_t k = 0; k < count; ++k) {
-    const sonde_slice_model *fixed = &lanes->model[slices[k]];
+  for (uint32_t k = 0; k < lanes->near_probe_count; ++k) {
+    const sonde_slice_model *fixed = &lanes->model[lanes->near_probe[k]];
     const uint32_t *faces = lanes->face_near + fixed->first_face;
-    for (uint32_t f = 0; f < fixed->face_count; ++f)
-      lanes->face_marked[faces[f] / 64] |= (uint64_t)1 << faces[f] % 64;
+    for (uint32_t f = 0; f < fixed->face_count; ++f) {
+      uint64_t *word = &lanes->face_marked[faces[f] / 64], bit = (uint64_t)1 << faces[f] % 64;
+      uint32_t before = *word & bit ? lanes->face_code[faces[f]] : UINT32_MAX;
+      lanes->face_code[faces[f]] = before & lanes->near_code[k];
+      *word |= bit;
+    }
   }
 }
 
@@ -119,8 +129,11 @@ static void add_areas(sonde_state *state, const sonde_press_corners *from, int c
 
 static void add_tie(sonde_lanes *lanes, const uint32_t v[3], const float slope[3],
                     const float tie[3]) {
-  sonde_press_tie *to = &lanes->tie[lanes->tie_count++];
-  for (int c = 0; c < 3; ++c) to->row[c] = v[c], to->slope[c] = slope[c], to->tie[c] = tie[c];
+  uint32_t l = lanes->tie_count++ % SONDE_LANES;
+  sonde_press_ties *to = &lanes->tie[(lanes->tie_count - 1) / SONDE_LANES];
+  if (l == 0) memset(to, 0, sizeof *to);
+  for (int c = 0; c < 3; ++c)
+    to->row[c][l] = (int32_t)v[c], to->slope[c][l] = slope[c], to->tie[c][l] = tie[c];
 }
 
 // One of the whole face where its points push along one slope, else one per point.
@@ -146,7 +159,7 @@ static void add_ties(sonde_lanes *lanes, const sonde_pressed_slice *at,
 }
 
 static void corners_of(const sonde_lanes *lanes, uint32_t faces, uint32_t l, uint32_t v[3]) {
-  for (int k = 0; k < 3; ++k) v[k] = (uint32_t)lanes->face[faces].node[k][l];
+  for (int k = 0; k < 3; ++k) v[k] = (uint32_t)lanes->face[faces][k][l];
 }
 
 static void add_faces(sonde_state *state, const sonde_pressed_slice *at,
@@ -191,10 +204,12 @@ static void press_near(sonde_state *state) {
     return;
   }
   lanes->kernels->locate(lanes);
-  sonde_lanes_mark_faces(lanes, lanes->near_probe, lanes->near_probe_count);
+  mark_faces(lanes);
   for (uint32_t word = 0; word <= lanes->face_slice_count / 64; ++word)
-    for (uint64_t rest = lanes->face_marked[word]; rest; rest &= rest - 1)
-      press_slice(state, word * 64 + (uint32_t)__builtin_ctzll(rest));
+    for (uint64_t rest = lanes->face_marked[word]; rest; rest &= rest - 1) {
+      uint32_t index = word * 64 + (uint32_t)__builtin_ctzll(rest);
+      if (lanes->face_code[index] == 0) press_slice(state, index);
+    }
 }
 
 // Slices near the probe are in ascending order.
@@ -281,26 +296,4 @@ double sonde_press_meet(sonde_state *state, bool surprise) {
   for (uint32_t k = 0; surprise && k < state->touched_count; ++k)
     sum2 += v_norm2(state->right[state->touched[k]]);
   return sum2;
-}
-
-void sonde_press_carry(sonde_lanes *lanes, const float *vectors) {
-  for (uint32_t k = 0; k < lanes->press_count; ++k)
-    for (int c = 0; c < 3; ++c) lanes->press[k].carry[c] = (sonde_lane){0};
-  for (uint32_t k = 0; k < lanes->tie_count; ++k) {
-    const sonde_press_tie *tie = &lanes->tie[k];
-    float along[3];
-    for (int c = 0; c < 3; ++c) {
-      const float *z = vectors + (size_t)tie->row[c] * SONDE_QUAD;
-      along[c] = tie->slope[0] * z[0] + tie->slope[1] * z[1] + tie->slope[2] * z[2];
-    }
-    float part[3];
-    for (int c = 0; c < 3; ++c) part[c] = tie->tie[c] * (along[c] - along[(c + 1) % 3]);
-    for (int c = 0; c < 3; ++c) {
-      uint32_t s = tie->row[c] / SONDE_LANES, l = tie->row[c] % SONDE_LANES;
-      SONDE_ASSERT(lanes->press_of[s] > 0);
-      sonde_slice_press *press = &lanes->press[lanes->press_of[s] - 1];
-      float push = part[c] - part[(c + 2) % 3];
-      for (int d = 0; d < 3; ++d) press->carry[d][l] += push * tie->slope[d];
-    }
-  }
 }

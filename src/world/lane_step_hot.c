@@ -16,42 +16,55 @@
 
 #include <string.h>
 
-// Faces with a corner in the listed slices.
-static void list_faces(sonde_lanes *lanes) {
-  lanes->face_list_count = 0;
-  if (!(lanes->law.shear > 0)) return;
-  sonde_lanes_mark_faces(lanes, lanes->awake, lanes->awake_count);
-  for (uint32_t word = 0; word <= lanes->face_slice_count / 64; ++word)
-    for (uint64_t rest = lanes->face_marked[word]; rest; rest &= rest - 1)
-      lanes->faces[lanes->face_list_count++] = word * 64 + (uint32_t)__builtin_ctzll(rest);
-}
-
 // Lists the slices that `take` marks.
 static void list_slices(sonde_lanes *lanes, const uint8_t *take) {
-  lanes->awake_count = lanes->slot_total = 0;
+  uint32_t count = 0, slots = 0;
   for (uint32_t s = 0; s < lanes->slice_count; ++s) {
-    lanes->awake[lanes->awake_count] = s;
-    lanes->awake_count += take[s];
-    lanes->slot_total += take[s] ? lanes->model[s].slot_count : 0;
+    lanes->awake[count] = s;
+    count += take[s];
+    slots += take[s] ? lanes->slots_of[s] : 0;
   }
-  list_faces(lanes);
+  lanes->awake_count = count;
+  lanes->slot_total = slots;
 }
 
 static void list_awake(sonde_lanes *lanes) { list_slices(lanes, lanes->is_awake); }
 
-// Lists the touched slices and those beside them; the others stand still for now.
-static void list_touched(sonde_lanes *lanes) {
-  uint8_t *take = lanes->is_near;
-  memset(take, 0, lanes->slice_count);
-  for (uint32_t k = 0; k < lanes->press_count; ++k) {
-    const sonde_slice_model *fixed = &lanes->model[lanes->pressed[k]];
+// Adds the slices beside the marked ones to the list of `count`; returns the new count.
+static uint32_t add_ring(sonde_lanes *lanes, uint32_t count) {
+  uint32_t end = count;
+  for (uint32_t k = 0; k < count; ++k) {
+    const sonde_slice_model *fixed = &lanes->model[lanes->near_list[k]];
     const uint32_t *near = lanes->near + fixed->first_near;
-    take[lanes->pressed[k]] = 1;
-    for (uint32_t n = 0; n < fixed->near_count; ++n) take[near[n]] = lanes->is_awake[near[n]];
+    for (uint32_t n = 0; n < fixed->near_count; ++n) {
+      if (lanes->is_near[near[n]] || !lanes->is_awake[near[n]]) continue;
+      lanes->is_near[near[n]] = 1;
+      lanes->near_list[end++] = near[n];
+    }
   }
+  SONDE_ASSERT(end <= lanes->slice_count);
+  return end;
+}
+
+// Marks the touched slices and NEAR_RINGS of those around them that are awake. With one ring the
+// skin beside the probe gave way too little, and deep presses went over into a fold.
+enum { NEAR_RINGS = 2 };
+static void mark_near(sonde_lanes *lanes) {
+  memset(lanes->is_near, 0, lanes->slice_count);
+  for (uint32_t k = 0; k < lanes->press_count; ++k) {
+    lanes->near_list[k] = lanes->pressed[k];
+    lanes->is_near[lanes->pressed[k]] = 1;
+  }
+  lanes->near_count = lanes->press_count;
+  for (int ring = 0; ring < NEAR_RINGS; ++ring)
+    lanes->near_count = add_ring(lanes, lanes->near_count);
+}
+
+// Lists these; the others stand still for now.
+static void list_near(sonde_lanes *lanes) {
   for (uint32_t s = 0; s < lanes->slice_count; ++s)
-    if (lanes->is_awake[s] && !take[s]) sonde_lanes_still(lanes, s, 1);
-  list_slices(lanes, take);
+    if (lanes->is_awake[s] && !lanes->is_near[s]) sonde_lanes_still(lanes, s, 1);
+  list_slices(lanes, lanes->is_near);
 }
 
 static void wake(sonde_lanes *lanes, uint32_t s) {
@@ -97,12 +110,11 @@ static void couple_friction(sonde_state *state) {
 
 // Vectors that the kernels read and write at least once, per slice and per slot: those of one
 // evaluation (linearise, the records of accept or update), of one sweep and of one iteration
-// (multiply, advance). Records of neighbours count once per slot; the faces of the shear layer and
-// the contact do not count.
+// (multiply, advance). Records of neighbours count once per slot; the contact does not count.
 enum {
   EVALUATED_PER_SLICE = 39,
   EVALUATED_PER_SPRING = 16,
-  EVALUATED_PER_LAYERED = 13,
+  EVALUATED_PER_LAYERED = 12,
   SWEPT_PER_SLICE = 19,
   ITERATED_PER_SLICE = 44,
   MULTIPLIED_PER_SPRING = 10,
@@ -138,7 +150,7 @@ static void conjugate(sonde_state *state, bool tied, double target, double sums[
   result->residual = sqrt(sums[1]);
   uint32_t most = state->def.pcg.max_iterations;
   for (bool first = true; result->residual > target && result->iterations < most; first = false) {
-    if (tied) sonde_press_carry(lanes, lanes->direction);
+    if (tied) lanes->kernels->carry(lanes, lanes->direction);
     double curvature = lanes->kernels->multiply(lanes, first);
     if (!first) curvature -= beta * sums[0] / alpha;
     if (!(curvature > 0)) break;
@@ -151,31 +163,50 @@ static void conjugate(sonde_state *state, bool tied, double target, double sums[
   }
 }
 
+// How a Newton iteration is made.
+typedef struct iteration {
+  uint32_t number; // from 1
+  bool tied;       // with ties
+  bool local;      // touched slices and those beside them only
+  bool may_leave;  // what these need more sweeps for may be left to the next, local iteration,
+  bool left;       // and was
+  double force2;   // (h F)^2 of the last one of all slices: extrapolation makes the first large
+} iteration;
+
+// A sweep of all slices for the sake of a few costs more than the next iteration of these alone.
+enum { FEW = 2 };
+static const double FAR_SHARE = 0.5; // of the square of what the solver may leave
+// So far above what the solver may leave they stay above it after a sweep.
+static const double HOPELESS = 30;
+
 // sums: of the linearisation. From the residual that the first sweep found on; what a sweep leaves
 // is what it found times the pace. Without sweeps by conjugate gradients at once. False when there
 // was nothing left to solve.
-static bool solve(sonde_state *state, bool tied, bool sweep, const double sums[3],
+static bool solve(sonde_state *state, iteration *now, bool sweep, const double sums[4],
                   double reference) {
   sonde_lanes *lanes = state->lanes;
+  bool may_leave = now->may_leave && lanes->awake_count > FEW * lanes->near_count;
   const sonde_pcg_options *options = &state->def.pcg;
   double found = sqrt(sums[0]), products[2] = {sums[2], sums[0]};
   sonde_pcg_result result = {.reference = reference, .residual = found};
   double target = fmax(options->relative_residual * reference, options->absolute_residual);
   bool solved = result.residual > target, slow = !sweep;
   uint32_t sweeps = 0;
-  while (result.residual > target && sweeps < options->max_iterations && !slow) {
-    double before = found;
-    found = sqrt(lanes->kernels->sweep(lanes));
+  now->left = may_leave && sums[3] <= FAR_SHARE * target * target && found > HOPELESS * target;
+  while (result.residual > target && sweeps < options->max_iterations && !slow && !now->left) {
+    double before = found, far2;
+    found = sqrt(lanes->kernels->sweep(lanes, &far2));
     sweeps++;
     result.residual = found * fmin(found / before, 1);
     slow = is_slow(before, found, target);
+    now->left = result.residual > target && may_leave && far2 <= FAR_SHARE * target * target;
   }
   result.iterations = sweeps;
-  if (result.residual > target) {
+  if (result.residual > target && !now->left) {
     if (sweep) lanes->kernels->restart(lanes, products);
-    conjugate(state, tied, target, products, &result);
+    conjugate(state, now->tied, target, products, &result);
   }
-  result.converged = result.residual <= target;
+  result.converged = result.residual <= target || now->left;
   if (!result.converged) state->flags |= SONDE_FLAG_NOT_CONVERGED;
   count_bytes(lanes, sweeps, result.iterations - sweeps);
   result.iterations += state->solver.iterations;
@@ -194,14 +225,6 @@ static void publish_increments(sonde_state *state, bool clear) {
   }
 }
 
-// How a Newton iteration is made.
-typedef struct iteration {
-  uint32_t number; // from 1
-  bool tied;       // with ties
-  bool local;      // touched slices and those beside them only
-  double force2;   // (h F)^2 of the last one of all slices: extrapolation makes the first large
-} iteration;
-
 // Of what the linear solver may leave: what is not seen adds up from step to step.
 static const double BENT_SHARE = 0.1;
 
@@ -209,11 +232,11 @@ static const double BENT_SHARE = 0.1;
 static double untied2(sonde_state *state) {
   sonde_lanes *lanes = state->lanes;
   double sum = 0;
-  sonde_press_carry(lanes, lanes->probe_way);
+  lanes->kernels->carry(lanes, lanes->probe_way);
   for (uint32_t k = 0; k < lanes->press_count; ++k)
     for (int c = 0; c < 3; ++c)
       for (int l = 0; l < SONDE_LANES; ++l) {
-        double carry = (double)lanes->press[k].carry[c][l];
+        double carry = (double)lanes->press[k].carry[l][c];
         sum += carry * carry;
       }
   return sum;
@@ -251,17 +274,17 @@ static void touch(sonde_state *state, const sonde_probe *probe, sonde_pose pose,
 // left to solve.
 static bool linearise(sonde_state *state, iteration *now) {
   sonde_lanes *lanes = state->lanes;
-  double start = sonde_clock_now(), sums[3];
+  double start = sonde_clock_now(), sums[4];
   sonde_vec3 reaction = lanes->reaction_n;
-  lanes->kernels->shear(lanes);
   bool sweep = !now->tied && !lanes->stiff;
+  lanes->tied = now->tied;
   lanes->kernels->linearise(lanes, sweep, sums);
   if (now->local)
     lanes->reaction_n = reaction;
   else
     now->force2 = sums[1];
   double assembled = sonde_clock_now();
-  bool solved = solve(state, now->tied, sweep, sums, sqrt(now->force2));
+  bool solved = solve(state, now, sweep, sums, sqrt(now->force2));
   state->times.assembly_s += assembled - start;
   state->times.solve_s += sonde_clock_now() - assembled;
   return solved;
@@ -274,14 +297,16 @@ static bool iterate(sonde_state *state, const sonde_probe *probe, sonde_pose pos
   double start = sonde_clock_now();
   now->tied = now->number > 1 && state->def.contact_law == SONDE_CONTACT_FOUNDATION;
   touch(state, probe, pose, motion);
-  if (now->local) list_touched(state->lanes);
+  mark_near(state->lanes);
+  if (now->local) list_near(state->lanes);
   double detected = sonde_clock_now();
+  now->may_leave = !last && now->number == 1;
   bool solved = linearise(state, now);
   double left = sonde_clock_now();
   publish_increments(state, false);
   bool open = solved && !last;
   double surprise2 = sonde_press_meet(state, open);
-  bool again = open && is_bent(state, surprise2, now);
+  bool again = open && (is_bent(state, surprise2, now) || now->left);
   publish_increments(state, true);
   state->times.contact_s += detected - start + (sonde_clock_now() - left);
   return again;

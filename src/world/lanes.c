@@ -1,8 +1,8 @@
 // Laying out a model for the fast engine; cold.
 // carve:       all arrays in one block; measured and placed by the same code.
-// fill_slots:  neighbours of every row, padded to the slice's largest number.
+// fill_row:    neighbours of every row, padded to the slice's largest number.
 // fill_springs, fill_shear: what a tuning changes.
-// fill_faces:  faces in slices of 16, and which corner each slot reads.
+// fill_faces:  faces in slices of 16, for the contact.
 // list_near:   slices that share an edge, and slices of faces that touch a slice.
 #include "tissue/two_layer.h"
 #include "world/lanes.h"
@@ -16,32 +16,38 @@
 // Of face_marked.
 static size_t mark_words(const sonde_lanes *l) { return l->face_slice_count / 64 + 1; }
 
+static size_t box_count(const sonde_lanes *l) {
+  return (l->slice_count + SONDE_LANES - 1) / SONDE_LANES;
+}
+
 #define CARVE(field, count) (l->field = sonde_carve(base, &offset, (count), sizeof *l->field))
 
 static size_t carve(sonde_lanes *l, uint32_t faces, char *base) {
   size_t offset = 0, rows = (size_t)l->slice_count * SONDE_LANES;
-  CARVE(model, l->slice_count), CARVE(box, l->slice_count), CARVE(slice, l->slice_count);
+  CARVE(model, l->slice_count), CARVE(box, box_count(l)), CARVE(slice, l->slice_count);
   CARVE(slot, l->slot_count), CARVE(tangent, l->slot_count), CARVE(share, l->slot_count);
   CARVE(slot_layer, l->law.layered ? l->slot_count : 0);
+  CARVE(slot_face, l->law.layered ? l->slot_count : 0);
+  CARVE(slot_from, l->law.layered ? l->slot_count : 0);
   CARVE(press, l->slice_count), CARVE(press_of, l->slice_count), CARVE(pressed, l->slice_count);
-  // One more slice of faces stays zero: what slots without a face read.
-  CARVE(face, l->face_slice_count), CARVE(face_value, l->face_slice_count + 1);
-  CARVE(point_area, l->face_slice_count);
+  CARVE(face, l->face_slice_count), CARVE(point_area, l->face_slice_count);
   CARVE(near, l->near_total), CARVE(face_near, l->face_total);
   CARVE(record, l->law.springs ? rows * SONDE_RECORD : 0), CARVE(direction, rows * SONDE_QUAD);
-  CARVE(indentation, l->law.layered ? rows : 0);
-  CARVE(slide, l->law.layered ? rows * SONDE_QUAD : 0);
+  CARVE(slide, l->law.layered ? rows * SONDE_RECORD : 0);
   CARVE(layer_direction, l->law.layered ? rows * SONDE_QUAD : 0);
-  CARVE(awake, l->slice_count), CARVE(faces, l->face_slice_count);
+  CARVE(awake, l->slice_count);
   CARVE(is_awake, l->slice_count), CARVE(calm, l->slice_count);
-  CARVE(face_marked, mark_words(l)), CARVE(is_near, l->slice_count), CARVE(speed2, l->slice_count);
-  CARVE(way2, l->slice_count), CARVE(unrest2, l->slice_count), CARVE(published, l->slice_count);
-  CARVE(near_probe, l->slice_count), CARVE(touched_rows, l->slice_count);
+  CARVE(face_marked, mark_words(l)), CARVE(face_code, l->face_slice_count);
+  CARVE(is_near, l->slice_count), CARVE(near_list, l->slice_count), CARVE(slots_of, l->slice_count);
+  CARVE(speed2, l->slice_count), CARVE(way2, l->slice_count), CARVE(unrest2, l->slice_count);
+  CARVE(published, l->slice_count), CARVE(touched_rows, l->slice_count);
+  CARVE(near_probe, l->slice_count), CARVE(near_code, l->slice_count);
   CARVE(probe_place, rows * SONDE_QUAD), CARVE(probe_motion, rows * SONDE_QUAD);
   CARVE(probe_way, rows * SONDE_QUAD);
   CARVE(probe.plane, SONDE_MAX_PROBE_PLANES), CARVE(probe.slope, SONDE_MAX_PROBE_PLANES);
   CARVE(pressed_slice, l->slice_count > l->face_slice_count ? l->slice_count : l->face_slice_count);
-  CARVE(press_corners, 1), CARVE(meet_corners, 1), CARVE(tie, SONDE_FACE_POINTS * (size_t)faces);
+  CARVE(press_corners, 1), CARVE(meet_corners, 1), CARVE(carried, 3 * SONDE_LANES);
+  CARVE(tie, SONDE_FACE_POINTS * (size_t)faces / SONDE_LANES + 1);
   return offset;
 }
 
@@ -49,42 +55,100 @@ static uint32_t valence(const sonde_topology *t, uint32_t i) {
   return i < t->vertex_count ? t->start[i + 1] - t->start[i] : 0;
 }
 
-static uint32_t count_slots(const sonde_topology *t, uint32_t slice) {
+// The order of a row's slots: around it where faces matter.
+static void order_slots(const sonde_model *model, bool layered, uint32_t i, sonde_fan *fan) {
+  const sonde_topology *t = &model->topology;
+  fan->count = fan->turn = 0;
+  fan->last = i;
+  if (i >= t->vertex_count) return;
+  if (layered) {
+    sonde_lanes_fan(model, i, fan);
+    return;
+  }
+  for (uint32_t k = t->start[i]; k < t->start[i + 1]; ++k)
+    fan->node[fan->count++] = t->neighbour[k];
+}
+
+static uint32_t count_slots(const sonde_model *model, bool layered, uint32_t slice,
+                            sonde_fan *fan) {
   uint32_t most = 0;
   for (uint32_t l = 0; l < SONDE_LANES; ++l) {
-    uint32_t here = valence(t, slice * SONDE_LANES + l);
-    if (here > most) most = here;
+    order_slots(model, layered, slice * SONDE_LANES + l, fan);
+    if (fan->count > most) most = fan->count;
   }
   return most;
 }
 
-static void fill_row(sonde_lanes *lanes, const sonde_model *model, uint32_t i) {
-  const sonde_topology *t = &model->topology;
-  uint32_t s = i / SONDE_LANES, l = i % SONDE_LANES;
-  sonde_slice_model *fixed = &lanes->model[s];
-  int32_t nothing = (int32_t)(lanes->face_slice_count * 3 * SONDE_LANES);
+static uint32_t edge_between(const sonde_topology *t, uint32_t i, uint32_t j) {
+  uint32_t k = t->start[i];
+  while (k < t->start[i + 1] && t->neighbour[k] != j) ++k;
+  SONDE_ASSERT(k < t->start[i + 1]);
+  return t->neighbour_edge[k];
+}
+
+// The spring to the neighbour of slot k; one that has a slot already has no spring here.
+static void fill_spring(sonde_lanes *lanes, const sonde_model *model, uint32_t i, uint32_t k,
+                        const sonde_fan *fan) {
+  uint32_t l = i % SONDE_LANES;
+  sonde_slice_model *fixed = &lanes->model[i / SONDE_LANES];
+  sonde_slot *slot = &lanes->slot[fixed->first_slot + k];
+  bool used = k < fan->count;
+  uint32_t j = used ? fan->node[k] : i;
+  sonde_vec3 d = vec3(1, 0, 0);
+  double length = 1, share = used;
+  if (used) {
+    uint32_t e = edge_between(&model->topology, i, j);
+    if (model->edge_share) share = model->edge_share[e];
+    d = v_sub(model->surface.vertices[j], model->surface.vertices[i]);
+    length = model->edge_rest_m[e];
+  }
+  for (uint32_t before = 0; used && before < k; ++before)
+    if (fan->node[before] == j) share = 0;
+  lanes->tangent[fixed->first_slot + k].node[l] = (int32_t)j;
+  slot->rest[0][l] = (float)d.x, slot->rest[1][l] = (float)d.y, slot->rest[2][l] = (float)d.z;
+  slot->length[l] = (float)length;
+  lanes->share[fixed->first_slot + k][l] = (float)share;
+  if (share != 1 && k < fixed->whole_count) fixed->whole_count = k;
+}
+
+static void fill_shear(sonde_slot_face *slot, const sonde_model *model, uint32_t f, uint32_t lane) {
+  double shear, limit;
+  sonde_tissue_face_law(model, f, &shear, &limit);
+  slot->shear[lane] = (float)shear;
+  slot->bend[lane] = shear > 0 ? (float)(1 / (limit * limit * model->face_area_m2[f])) : 0;
+}
+
+// Both layers in slot k, whose face also weighs on the slot before.
+static void fill_layers(sonde_lanes *lanes, const sonde_model *model, uint32_t i, uint32_t k,
+                        const sonde_fan *fan) {
+  uint32_t l = i % SONDE_LANES, f = k < fan->count ? fan->face[k] : SONDE_NO_FACE;
+  sonde_slice_model *fixed = &lanes->model[i / SONDE_LANES];
+  sonde_slot_layer *layer = &lanes->slot_layer[fixed->first_slot + k];
+  lanes->slot_from[fixed->first_slot + k][l] = (int32_t)f;
+  layer->node[l] = (int32_t)(k < fan->count ? fan->node[k] : i);
+  if (f == SONDE_NO_FACE) return;
+  const uint32_t *v = model->surface.faces[f];
+  uint32_t own = v[0] == i ? 0 : v[1] == i ? 1 : 2;
+  sonde_slot_face *slot = &lanes->slot_face[fixed->first_slot + k];
+  for (uint32_t c = 0; c < 3; ++c)
+    slot->cot[c][l] = (float)model->face_half_cotangent[f][(own + c) % 3];
+  fill_shear(slot, model, f, l);
+  layer->weight[l] += slot->cot[1][l];
+  sonde_slot_layer *before = &lanes->slot_layer[fixed->first_slot + (k > 0 ? k : fan->turn) - 1];
+  before->weight[l] += slot->cot[2][l];
+  fixed->weight[l] += slot->cot[1][l] + slot->cot[2][l];
+}
+
+static void fill_row(sonde_lanes *lanes, const sonde_model *model, uint32_t i, sonde_fan *fan) {
+  uint32_t l = i % SONDE_LANES;
+  sonde_slice_model *fixed = &lanes->model[i / SONDE_LANES];
+  order_slots(model, lanes->law.layered, i, fan);
+  fixed->last[l] = (int32_t)fan->last;
+  fixed->turn[l] = (int32_t)fan->turn;
   if (l == 0) fixed->whole_count = fixed->slot_count;
   for (uint32_t k = 0; k < fixed->slot_count; ++k) {
-    sonde_slot *slot = &lanes->slot[fixed->first_slot + k];
-    sonde_slot_layer *layer = &lanes->slot_layer[fixed->first_slot + k];
-    bool used = k < valence(t, i);
-    uint32_t j = used ? t->neighbour[t->start[i] + k] : i;
-    sonde_vec3 d = vec3(1, 0, 0);
-    double length = 1, share = used;
-    if (used && model->edge_share) share = model->edge_share[t->neighbour_edge[t->start[i] + k]];
-    if (used) {
-      d = v_sub(model->surface.vertices[j], model->surface.vertices[i]);
-      length = model->edge_rest_m[t->neighbour_edge[t->start[i] + k]];
-    }
-    lanes->tangent[fixed->first_slot + k].node[l] = (int32_t)j;
-    if (lanes->law.layered) {
-      layer->left[l] = nothing;
-      layer->right[l] = nothing * SONDE_CORNER;
-    }
-    slot->rest[0][l] = (float)d.x, slot->rest[1][l] = (float)d.y, slot->rest[2][l] = (float)d.z;
-    slot->length[l] = (float)length;
-    lanes->share[fixed->first_slot + k][l] = (float)share;
-    if (share != 1 && k < fixed->whole_count) fixed->whole_count = k;
+    fill_spring(lanes, model, i, k, fan);
+    if (lanes->law.layered) fill_layers(lanes, model, i, k, fan);
   }
 }
 
@@ -95,10 +159,19 @@ static void fill_springs(sonde_slice_model *fixed, const sonde_model *model, uin
   fixed->yield[l] = (float)(1 / (model->area_m2[i] * (tangent > 0 ? fmin(tangent, k0) : k0)));
 }
 
+static void empty_boxes(sonde_lanes *lanes) {
+  for (size_t k = 0; k < box_count(lanes) * SONDE_LANES; ++k)
+    for (int c = 0; c < 3; ++c) {
+      lanes->box[k / SONDE_LANES].low[c][k % SONDE_LANES] = 1e30f;
+      lanes->box[k / SONDE_LANES].high[c][k % SONDE_LANES] = -1e30f;
+    }
+}
+
 static void fill_slice(sonde_lanes *lanes, const sonde_model *model, uint32_t s) {
   uint32_t n = model->surface.vertex_count;
   sonde_slice_model *fixed = &lanes->model[s];
-  sonde_slice_box *box = &lanes->box[s];
+  sonde_slice_boxes *box = &lanes->box[s / SONDE_LANES];
+  uint32_t own = s % SONDE_LANES;
   for (uint32_t l = 0; l < SONDE_LANES; ++l) {
     uint32_t i = s * SONDE_LANES + l;
     fixed->k0[l] = fixed->area[l] = 0;
@@ -120,65 +193,26 @@ static void fill_slice(sonde_lanes *lanes, const sonde_model *model, uint32_t s)
       float p, low;
       sonde_split(at[c], &p, &low);
       fixed->place[c][l] = p, fixed->place_low[c][l] = low;
-      box->low[c] = l == 0 || p < box->low[c] ? p : box->low[c];
-      box->high[c] = l == 0 || p > box->high[c] ? p : box->high[c];
+      box->low[c][own] = fminf(box->low[c][own], p);
+      box->high[c][own] = fmaxf(box->high[c][own], p);
     }
     const sonde_topology *t = &model->topology;
     for (uint32_t k = t->start[i]; k < t->start[i + 1]; ++k) {
       float rest = (float)model->edge_rest_m[t->neighbour_edge[k]];
-      box->reach = fmaxf(box->reach, rest);
+      box->reach[own] = fmaxf(box->reach[own], rest);
       fixed->bend = fmaxf(fixed->bend, 1 / rest);
     }
     fixed->used = l + 1;
   }
 }
 
-static sonde_slot_layer *slot_of(sonde_lanes *lanes, const sonde_topology *t, uint32_t i,
-                                 uint32_t j) {
-  uint32_t k = 0;
-  while (k < valence(t, i) && t->neighbour[t->start[i] + k] != j) ++k;
-  SONDE_ASSERT(k < valence(t, i));
-  return &lanes->slot_layer[lanes->model[i / SONDE_LANES].first_slot + k];
-}
-
-static void fill_shear(sonde_face_slice *face, const sonde_model *model, uint32_t f,
-                       uint32_t lane) {
-  double shear, limit;
-  sonde_tissue_face_law(model, f, &shear, &limit);
-  face->shear[lane] = (float)shear;
-  face->limit[lane] = (float)limit;
-  face->inverse_limit[lane] = (float)(1 / limit);
-}
-
-static void fill_face(sonde_lanes *lanes, const sonde_model *model, uint32_t at) {
-  uint32_t f = lanes->face_order[at], lane = at % SONDE_LANES;
-  const uint32_t *v = model->surface.faces[f];
-  SONDE_ASSERT(at / SONDE_LANES < lanes->face_slice_count);
-  sonde_face_slice *face = &lanes->face[at / SONDE_LANES];
-  lanes->point_area[at / SONDE_LANES][lane] = (float)(model->face_area_m2[f] / SONDE_FACE_POINTS);
-  for (uint32_t k = 0; k < 3; ++k) face->node[k][lane] = (int32_t)v[k];
-  if (!lanes->law.layered) return;
-  face->inverse_area[lane] = (float)(1 / model->face_area_m2[f]);
-  fill_shear(face, model, f, lane);
-  for (uint32_t k = 0; k < 3; ++k) {
-    uint32_t i = v[k], next = v[(k + 1) % 3], before = v[(k + 2) % 3], row = i % SONDE_LANES;
-    int32_t corner = (int32_t)((at / SONDE_LANES * 3 + k) * SONDE_LANES + lane);
-    face->half_cotangent[k][lane] = (float)model->face_half_cotangent[f][k];
-    const double *half = model->face_half_cotangent[f];
-    sonde_slot_layer *ahead = slot_of(lanes, &model->topology, i, next);
-    sonde_slot_layer *behind = slot_of(lanes, &model->topology, i, before);
-    ahead->left[row] = corner;
-    behind->right[row] = corner * SONDE_CORNER + SONDE_CORNER_BEFORE;
-    ahead->weight[row] += (float)half[(k + 2) % 3];
-    behind->weight[row] += (float)half[(k + 1) % 3];
-    lanes->model[i / SONDE_LANES].weight[row] += (float)(half[(k + 1) % 3] + half[(k + 2) % 3]);
-  }
-}
-
 static void fill_faces(sonde_lanes *lanes, const sonde_model *model) {
-  for (uint32_t s = 0; s < lanes->face_slice_count; ++s)
-    for (int l = 0; l < SONDE_LANES; ++l) lanes->face[s].limit[l] = 1;
-  for (uint32_t k = 0; k < model->surface.face_count; ++k) fill_face(lanes, model, k);
+  for (uint32_t at = 0; at < model->surface.face_count; ++at) {
+    uint32_t f = lanes->face_order[at], s = at / SONDE_LANES, l = at % SONDE_LANES;
+    SONDE_ASSERT(s < lanes->face_slice_count);
+    lanes->point_area[s][l] = (float)(model->face_area_m2[f] / SONDE_FACE_POINTS);
+    for (int k = 0; k < 3; ++k) lanes->face[s][k][l] = (int32_t)model->surface.faces[f][k];
+  }
 }
 
 // Adds value to the list that starts at first unless it is there; returns the new count.
@@ -242,48 +276,54 @@ void sonde_lanes_tune(sonde_lanes *lanes, const sonde_model *tuned, const sonde_
   lanes->stiff = is_stiff(tuned, &lanes->law);
   for (uint32_t i = 0; i < lanes->node_count; ++i)
     fill_springs(&lanes->model[i / SONDE_LANES], tuned, i);
-  for (uint32_t k = 0; lanes->law.shear > 0 && k < tuned->surface.face_count; ++k)
-    fill_shear(&lanes->face[k / SONDE_LANES], tuned, lanes->face_order[k], k % SONDE_LANES);
+  for (uint32_t k = 0; lanes->law.shear > 0 && k < lanes->slot_count; ++k)
+    for (uint32_t l = 0; l < SONDE_LANES; ++l)
+      if (lanes->slot_from[k][l] >= 0)
+        fill_shear(&lanes->slot_face[k], tuned, (uint32_t)lanes->slot_from[k][l], l);
 }
 
-// Sizes that need a pass over the mesh: slots and lists per slice.
-static sonde_status measure(sonde_lanes *lanes, const sonde_model *model, const uint32_t *place,
-                            sonde_slice_model *sizes, sonde_error *error) {
-  const sonde_topology *t = &model->topology;
+// Most neighbours or faces around a node.
+static uint32_t most_around(const sonde_topology *t) {
   uint32_t most = 0;
   for (uint32_t i = 0; i < t->vertex_count; ++i) {
     uint32_t faces = t->face_start[i + 1] - t->face_start[i];
     most = valence(t, i) > most ? valence(t, i) : most;
     most = faces > most ? faces : most;
   }
-  uint32_t *scratch = SONDE_NEW(uint32_t, 2 * (size_t)most * SONDE_LANES + 2);
-  if (!scratch) return sonde_fail_memory(error);
+  return most;
+}
+
+// Sizes that need a pass over the mesh: slots and lists per slice. lists: room for two of 16 nodes.
+static void measure(sonde_lanes *lanes, const sonde_model *model, const uint32_t *place,
+                    sonde_slice_model *sizes, uint32_t *lists, sonde_fan *fan) {
+  const sonde_topology *t = &model->topology;
+  size_t most = (size_t)most_around(t) * SONDE_LANES + 1;
   lanes->model = sizes;
   for (uint32_t s = 0; s < lanes->slice_count; ++s) {
     uint32_t left = t->vertex_count - s * SONDE_LANES;
     sizes[s].used = left < SONDE_LANES ? left : SONDE_LANES;
     sizes[s].first_slot = lanes->slot_count;
-    sizes[s].slot_count = count_slots(t, s);
-    list_near(lanes, model, place, s, scratch, scratch + (size_t)most * SONDE_LANES + 1);
+    sizes[s].slot_count = count_slots(model, lanes->law.layered, s, fan);
+    list_near(lanes, model, place, s, lists, lists + most);
     sizes[s].first_near = lanes->near_total;
     sizes[s].first_face = lanes->face_total;
     lanes->slot_count += sizes[s].slot_count;
     lanes->near_total += sizes[s].near_count;
     lanes->face_total += sizes[s].face_count;
   }
-  sonde_free(scratch);
-  return SONDE_OK;
 }
 
 static void fill(sonde_lanes *lanes, const sonde_model *model, const uint32_t *place,
-                 const sonde_slice_model *sizes) {
+                 const sonde_slice_model *sizes, sonde_fan *fan) {
   memcpy(lanes->model, sizes, lanes->slice_count * sizeof *sizes);
+  empty_boxes(lanes);
   for (uint32_t s = 0; s < lanes->slice_count; ++s) {
     const sonde_slice_model *fixed = &lanes->model[s];
+    lanes->slots_of[s] = fixed->slot_count;
     fill_slice(lanes, model, s);
     list_near(lanes, model, place, s, lanes->near + fixed->first_near,
               lanes->face_near + fixed->first_face);
-    for (uint32_t l = 0; l < SONDE_LANES; ++l) fill_row(lanes, model, s * SONDE_LANES + l);
+    for (uint32_t l = 0; l < SONDE_LANES; ++l) fill_row(lanes, model, s * SONDE_LANES + l, fan);
   }
   fill_faces(lanes, model);
 }
@@ -298,36 +338,70 @@ static sonde_status allocate(sonde_lanes *lanes, uint32_t faces, sonde_error *er
   return SONDE_OK;
 }
 
+// What laying out needs for itself.
+typedef struct workshop {
+  char *room; // sizes
+  sonde_slice_model *sizes;
+  uint32_t *place; // [faces] along the curve
+  uint32_t *lists;
+  sonde_fan fan;
+} workshop;
+
+static sonde_status open_workshop(workshop *shop, const sonde_model *model, uint32_t slices,
+                                  const uint32_t *face_order, sonde_error *error) {
+  size_t around = 2 * ((size_t)most_around(&model->topology) * SONDE_LANES + 1);
+  uint32_t faces = model->surface.face_count;
+  shop->room = sonde_calloc(slices + 1, sizeof(sonde_slice_model));
+  shop->sizes = (void *)sonde_whole_lines(shop->room);
+  shop->place = SONDE_NEW(uint32_t, faces);
+  shop->lists = SONDE_NEW(uint32_t, around);
+  shop->fan.node = SONDE_NEW(uint32_t, around);
+  shop->fan.face = SONDE_NEW(uint32_t, around);
+  if (!shop->room || !shop->place || !shop->lists || !shop->fan.node || !shop->fan.face)
+    return sonde_fail_memory(error);
+  for (uint32_t k = 0; k < faces; ++k) shop->place[face_order[k]] = k;
+  return SONDE_OK;
+}
+
+static void close_workshop(workshop *shop) {
+  sonde_free(shop->room);
+  sonde_free(shop->place);
+  sonde_free(shop->lists);
+  sonde_free(shop->fan.node);
+  sonde_free(shop->fan.face);
+}
+
+static void begin(sonde_lanes *lanes, const sonde_model *model, const sonde_world_def *def,
+                  const uint32_t *face_order) {
+  uint32_t n = model->surface.vertex_count, faces = model->surface.face_count;
+  lanes->slice_count = (n + SONDE_LANES - 1) / SONDE_LANES;
+  lanes->face_slice_count = (faces + SONDE_LANES - 1) / SONDE_LANES;
+  lanes->node_count = n;
+  lanes->face_order = face_order;
+  lanes->law = law_of(&model->law, def);
+  lanes->stiff = is_stiff(model, &lanes->law);
+  lanes->kernels = sonde_lane_kernels_find(NULL);
+}
+
 sonde_status sonde_lanes_create(const sonde_model *model, const sonde_world_def *def,
                                 const uint32_t *face_order, sonde_lanes **out, sonde_error *error) {
   *out = NULL;
-  uint32_t n = model->surface.vertex_count, faces = model->surface.face_count;
-  uint32_t slices = (n + SONDE_LANES - 1) / SONDE_LANES;
+  workshop shop = {0};
   sonde_lanes *lanes = SONDE_NEW(sonde_lanes, 1);
-  char *room = sonde_calloc(slices + 1, sizeof(sonde_slice_model));
-  sonde_slice_model *sizes = (void *)sonde_whole_lines(room);
-  uint32_t *place = SONDE_NEW(uint32_t, faces);
-  sonde_status status = lanes && room && place ? SONDE_OK : sonde_fail_memory(error);
-  for (uint32_t k = 0; !status && k < faces; ++k) place[face_order[k]] = k;
+  if (!lanes) return sonde_fail_memory(error);
+  begin(lanes, model, def, face_order);
+  sonde_status status = open_workshop(&shop, model, lanes->slice_count, face_order, error);
   if (!status) {
-    lanes->slice_count = slices;
-    lanes->face_slice_count = (faces + SONDE_LANES - 1) / SONDE_LANES;
-    lanes->node_count = n;
-    lanes->face_order = face_order;
-    lanes->law = law_of(&model->law, def);
-    lanes->stiff = is_stiff(model, &lanes->law);
-    lanes->kernels = sonde_lane_kernels_find(NULL);
-    status = measure(lanes, model, place, sizes, error);
+    measure(lanes, model, shop.place, shop.sizes, shop.lists, &shop.fan);
+    status = allocate(lanes, model->surface.face_count, error);
   }
-  if (!status) status = allocate(lanes, faces, error);
   if (!status) {
-    fill(lanes, model, place, sizes);
+    fill(lanes, model, shop.place, shop.sizes, &shop.fan);
     *out = lanes;
   } else {
     sonde_lanes_destroy(lanes);
   }
-  sonde_free(room);
-  sonde_free(place);
+  close_workshop(&shop);
   return status;
 }
 
@@ -351,11 +425,11 @@ void sonde_lanes_record(sonde_lanes *lanes, uint32_t i) {
     lanes->record[(size_t)i * SONDE_RECORD + 3 + (size_t)c] = at->ve[c][l];
   }
   if (!lanes->law.layered) return;
-  float indentation = -(normal[0] + normal[1] + normal[2]),
-        *slide = lanes->slide + (size_t)i * SONDE_QUAD;
-  lanes->indentation[i] = indentation;
+  float indentation = -(normal[0] + normal[1] + normal[2]);
+  float *slide = lanes->slide + (size_t)i * SONDE_RECORD;
   for (int c = 0; c < 3; ++c) slide[c] = ue[c] + indentation * fixed->normal[c][l];
-  slide[3] = 0;
+  slide[3] = indentation;
+  slide[4] = 0;
 }
 
 static void import_slice(sonde_lanes *lanes, uint32_t s, const sonde_vec3 *rest,

@@ -14,12 +14,19 @@ typedef struct sonde_slot {
   sonde_lane length;  // at rest
 } sonde_slot;
 
-// The same slot in the layers.
+// The face between a row, the neighbour of the slot before and this one, which follow one another
+// around the row; zero where there is none. Before the first slot is the row's `last`.
+typedef struct sonde_slot_face {
+  sonde_lane cot[3]; // half the cotangents at the row, the neighbour before, this one
+  sonde_lane bend;   // 1/(gm^2 area) and G of the shear layer
+  sonde_lane shear;
+} sonde_slot_face;
+
+// Both layers between a row and its neighbour: all that a product reads of a slot.
 typedef struct sonde_slot_layer {
-  sonde_lane_index left;  // this row's corner of the face to the left of the edge
-  sonde_lane_index right; // and of the face to its right: the coupling with the corner before
-  sonde_lane coupling;    // s of the block s N_i N_j^T of the shear layer
-  sonde_lane weight;      // half the cotangents of both faces: of the in-plane layer
+  sonde_lane_index node;
+  sonde_lane coupling; // s of the block s N_i N_j^T of the shear layer
+  sonde_lane weight;   // half the cotangents of both faces: of the in-plane layer
 } sonde_slot_layer;
 
 // The neighbour and the edge's block of the matrix, -(along n n^T + lateral I): all that a product
@@ -31,20 +38,22 @@ typedef struct sonde_slot_tangent {
 
 typedef struct sonde_slice_model {
   sonde_lane normal[3], place[3], area, k0, xm, limit, mass, yield;
-  sonde_lane weight; // sum of its slots' weights
+  sonde_lane weight;           // sum of its slots' weights
+  sonde_lane_index last, turn; // the neighbour before the first slot, and the slots up to it
   uint32_t first_slot, slot_count;
   uint32_t whole_count;            // slots from the front whose shares are all 1
   uint32_t first_near, near_count; // slices that share an edge with this one
-  uint32_t first_face, face_count; // slices of faces with a corner in this one
+  uint32_t first_face, face_count; // slices of faces with a corner in this one, for the contact
   uint32_t used;                   // rows that are nodes, from the front
   float bend;                      // 1 over the shortest edge at a node, at rest
   sonde_lane place_low[3];         // what single precision leaves of `place`
 } sonde_slice_model;
 
-// At rest: box of a slice's nodes, longest edge at one of them.
-typedef struct sonde_slice_box {
-  float low[3], high[3], reach;
-} sonde_slice_box;
+// Of 16 slices at rest: boxes of their nodes, longest edges at one of them. Beyond the last slice
+// boxes are inside out.
+typedef struct sonde_slice_boxes {
+  sonde_lane low[3], high[3], reach;
+} sonde_slice_boxes;
 
 typedef struct sonde_slice {
   sonde_lane u[3], v[3]; // at the start of the step: displacement, velocity
@@ -52,18 +61,6 @@ typedef struct sonde_slice {
   sonde_lane factor[6]; // of the diagonal blocks D = L E L^T: l21 l31 l32, 1/e1 1/e2 1/e3
   sonde_lane x[3], r[3], z[3], w[3], p[3], q[3]; // of the conjugate gradients; D z = r
 } sonde_slice;
-
-typedef struct sonde_face_slice {
-  sonde_lane_index node[3];
-  sonde_lane half_cotangent[3], inverse_area;
-  sonde_lane shear, limit, inverse_limit; // of the shear layer
-} sonde_face_slice;
-
-// Per corner of 16 faces: force along N, coupling with the next corner and with the one before.
-enum { SONDE_CORNER = 4, SONDE_CORNER_BEFORE = 2 };
-typedef struct sonde_face_value {
-  float corner[3][SONDE_LANES][SONDE_CORNER];
-} sonde_face_value;
 
 // Numbers of the law and of the step, in single precision.
 typedef struct sonde_lane_law {
@@ -80,11 +77,12 @@ typedef struct sonde_lanes sonde_lanes;
 // Kernels of one instruction set; every set gives the same bits.
 typedef struct sonde_lane_kernels {
   const char *name;
-  void (*shear)(sonde_lanes *lanes); // faces' forces and couplings
-  // r = h F - M (ve - v), matrix; r.r, (h F)^2, r.z; reaction. `sweep`: x = D^-1 r slice by slice,
-  // and each sees where those before it went; else the matrix is symmetric, x = 0, z = D^-1 r
-  void (*linearise)(sonde_lanes *lanes, bool sweep, double sums[3]);
-  double (*sweep)(sonde_lanes *lanes); // x += D^-1 r, slice by slice; r.r as each slice found it
+  // r = h F - M (ve - v), matrix; r.r, (h F)^2, r.z, r.r of what is_near leaves out; reaction.
+  // `sweep`: x = D^-1 r slice by slice, and each sees where those before it went; else the matrix
+  // is symmetric, x = 0, z = D^-1 r
+  void (*linearise)(sonde_lanes *lanes, bool sweep, double sums[4]);
+  // x += D^-1 r, slice by slice; r.r as each slice found it, far2: of those that is_near leaves out
+  double (*sweep)(sonde_lanes *lanes, double *far2);
   void (*restart)(sonde_lanes *lanes, double sums[2]); // r after the sweeps, z = D^-1 r; r.z, r.r
   double (*multiply)(sonde_lanes *lanes, bool first);  // w = A z, the first time q; returns z.w
   // p = z + beta p, q = w + beta q, x += alpha p, r -= alpha q, z = D^-1 r; r.z, r.r. The first
@@ -96,7 +94,8 @@ typedef struct sonde_lane_kernels {
                                         // step; not finite: NaN
   // near_probe: slices with a node in the box, which grows by `edges` times their reach
   void (*near)(sonde_lanes *lanes, const float low[3], const float high[3], float edges);
-  void (*locate)(sonde_lanes *lanes);  // nodes of these slices from the probe, for their faces
+  // Nodes of these slices from the probe, for their faces; near_code
+  void (*locate)(sonde_lanes *lanes);
   void (*hand_on)(sonde_lanes *lanes); // and their solution
   // Pushes where the nodes are evaluated; false where none of the slice is inside.
   bool (*press_faces)(const sonde_lanes *lanes, uint32_t index, sonde_pressed_slice *at,
@@ -107,6 +106,9 @@ typedef struct sonde_lane_kernels {
                      sonde_meet_corners *to);
   void (*meet_nodes)(const sonde_lanes *lanes, const sonde_pressed_slice *at, bool surprise,
                      sonde_meet_corners *to);
+  // What the ties take from the product of the matrix with vectors [rows][4], into carry[] of
+  // press[]
+  void (*carry)(sonde_lanes *lanes, const float *vectors);
 } sonde_lane_kernels;
 
 struct sonde_lanes {
@@ -116,17 +118,19 @@ struct sonde_lanes {
   sonde_lane_law law;
   const sonde_lane_kernels *kernels;
   sonde_slice_model *model;
-  sonde_slice_box *box;
+  sonde_slice_boxes *box; // [slices / 16]
   sonde_slice *slice;
   sonde_slot *slot;
   sonde_slot_tangent *tangent;
-  sonde_slot_layer *slot_layer; // of layered models
+  sonde_slot_face *slot_face;   // of layered models
+  sonde_slot_layer *slot_layer; // as well
+  sonde_lane_index *slot_from;  // the same: which face, SONDE_NO_FACE for none
   sonde_lane *share;            // [slots] of a spring: 1, 0 for padding
   sonde_slice_press *press;     // of touched slices, which press_of counts from 1
   uint32_t *press_of;           // [slices] 0: not touched
   uint32_t *pressed;            // those slices
   uint32_t press_count;
-  sonde_press_tie *tie; // [4 faces]
+  sonde_press_ties *tie; // [4 faces / 16]
   uint32_t tie_count;
   sonde_lane_probe probe;
   float *probe_place;  // [rows][4] from the probe's origin; 1 for nodes of near_probe, else 0
@@ -136,32 +140,40 @@ struct sonde_lanes {
   uint32_t pressed_slice_count;
   sonde_press_corners *press_corners; // [1] of the slice at hand
   sonde_meet_corners *meet_corners;   // [1]
+  sonde_quad *carried;                // [3][16] scratch of carry()
   uint16_t *touched_rows;             // [slices] lanes that the probe touches
-  sonde_face_slice *face;
-  sonde_lane *point_area; // [slices of faces] a quarter of a face's at rest; 0: no face
-  sonde_face_value *face_value;
+  sonde_lane_index (*face)[3];        // [slices of faces] their corners
+  sonde_lane *point_area;             // [slices of faces] a quarter of a face's at rest; 0: no face
   uint32_t *near, *face_near;
   // For the neighbours, of every row where it is evaluated
-  float *record;      // [rows][8] of springs: u + h ve, ve
-  float *indentation; // [rows] of layers
-  float *slide;       // [rows][4] tangential displacement; N.x of what it moved since they looked
-  // and of the directions: z; its tangential part and N.z for layers.
+  float *record; // [rows][8] of springs: u + h ve, ve
+  // [rows][8] of layers: tangential displacement, indentation, N.x of what it moved since they
+  // looked
+  float *slide;
+  // and of the directions: z, for springs and ties; its tangential part and N.z for layers.
   float *direction, *layer_direction; // [rows][4]
-  uint32_t *awake, *faces;            // lists of slices that take part
-  uint32_t awake_count, face_list_count;
-  uint8_t *is_awake, *calm, *is_near;
-  uint64_t *face_marked; // [slices of faces / 64] bits
+  uint32_t *awake;                    // slices that take part
+  uint32_t awake_count;
+  uint8_t *is_awake, *calm;
+  uint8_t *is_near;    // touched slices and waking ones around them
+  uint32_t *near_list; // these
+  uint32_t near_count;
+  uint64_t *face_marked; // [slices of faces / 64] bits: with a corner near the probe
+  uint32_t *face_code;   // [slices of faces] of these: planes that all such corners are beyond
   float *speed2;         // [slices] largest square of a node's speed
   float *way2;           // [slices] and displacement
   float *unrest2;     // [slices] largest square of unbalanced force over the anchors' stiffness: no
                       // node is farther from its equilibrium
   uint8_t *published; // [slices] the doubles of the state are up to date
   uint32_t *near_probe; // slices that the contact looks at
+  uint32_t *near_code;  // of these: planes of the probe that all of the slice's nodes are beyond
   uint32_t near_probe_count;
   sonde_vec3 reaction_n;
+  uint32_t *slots_of;   // [slices] their slot_count
   uint32_t slot_total;  // of the waking slices
   uint64_t bytes_moved; // by the last step, see count_bytes()
   bool stiff;           // too stiff for sweeps
+  bool tied;            // ties take part in the linear system at hand
   bool stale;           // the doubles of the state are newer
 };
 
@@ -169,6 +181,16 @@ struct sonde_lanes {
 static inline sonde_vec3 sonde_lane_vector(const sonde_lane a[3], uint32_t lane) {
   return (sonde_vec3){(double)a[0][lane], (double)a[1][lane], (double)a[2][lane]};
 }
+
+// The neighbours of node i around it: where face[k] is one, its corners are i, node[k-1] and
+// node[k]; `last` is the one before the first, whose own slot is turn - 1. Room for twice as many
+// as there are faces around i.
+#define SONDE_NO_FACE UINT32_MAX
+typedef struct sonde_fan {
+  uint32_t count, last, turn;
+  uint32_t *node, *face;
+} sonde_fan;
+void sonde_lanes_fan(const sonde_model *model, uint32_t i, sonde_fan *fan);
 
 // Lays out the model; NULL where memory is out.
 // face_order: faces along a space-filling curve, borrowed; slices of faces follow it.
@@ -185,8 +207,6 @@ void sonde_lanes_import(sonde_lanes *lanes, const sonde_vec3 *rest, const sonde_
 void sonde_lanes_still(sonde_lanes *lanes, uint32_t first, uint32_t count);
 // The record of one row where it is evaluated. @thread tick
 void sonde_lanes_record(sonde_lanes *lanes, uint32_t i);
-// Marks slices of faces with a corner in one of the slices. @thread tick
-void sonde_lanes_mark_faces(sonde_lanes *lanes, const uint32_t *slices, uint32_t count);
 // Writes positions and velocities that are not up to date as doubles. @thread tick
 void sonde_lanes_publish(sonde_lanes *lanes, const sonde_vec3 *rest, sonde_vec3 *position,
                          sonde_vec3 *velocity);

@@ -1,6 +1,5 @@
 // Kernels of the fast engine (docs/world.md); lanes_*_hot.c include this file once per instruction
 // set. Every sum has a fixed order: all sets give the same bits.
-// shear:     slopes, forces and couplings of the faces.
 // linearise: springs and layers to the neighbours, normal and tangential springs, contact, matrix,
 // and the
 //            first sweep: every slice is solved for itself and goes on before the next one looks;
@@ -17,69 +16,36 @@
 
 #include "base/base.h"
 
-// Where slice s is after a step at velocity v; and how much of the velocity along N the neighbours
-// have not seen.
-INLINE void publish_record(sonde_lanes *lanes, uint32_t s, const sonde_lane v[3],
-                           sonde_lane unseen) {
-  const sonde_slice *at = &lanes->slice[s];
+// Where slice s is after a step at velocity v: for springs, and for layers.
+INLINE void publish_place(sonde_lanes *lanes, uint32_t s, const sonde_lane v[3],
+                          const sonde_lane ue[3]) {
+  const sonde_lane low[4] = {ue[0], ue[1], ue[2], v[0]}, high[4] = {v[1], v[2], {0}, {0}};
+  size_t first = (size_t)s * SONDE_LANES * SONDE_RECORD;
+  write_records(lanes->record + first, SONDE_RECORD, low);
+  write_records(lanes->record + first + 4, SONDE_RECORD, high);
+}
+
+// indentation: where faces are evaluated; unseen: N.x of what was added since.
+INLINE void publish_slide(sonde_lanes *lanes, uint32_t s, const sonde_lane ue[3],
+                          sonde_lane indentation, sonde_lane unseen) {
   const sonde_lane *n = lanes->model[s].normal;
-  size_t first = (size_t)s * SONDE_LANES;
+  sonde_lane along = dot(n, ue), slide[4];
+  for (int c = 0; c < 3; ++c) slide[c] = ue[c] - along * n[c];
+  slide[3] = indentation;
+  const sonde_lane rest[4] = {unseen, {0}, {0}, {0}};
+  float *record = lanes->slide + (size_t)s * SONDE_LANES * SONDE_RECORD;
+  write_records(record, SONDE_RECORD, slide);
+  write_records(record + 4, SONDE_RECORD, rest);
+}
+
+INLINE void publish_record(sonde_lanes *lanes, uint32_t s, const sonde_lane v[3]) {
+  const sonde_slice *at = &lanes->slice[s];
   float h = lanes->law.dt;
   sonde_lane ue[3];
   for (int c = 0; c < 3; ++c) ue[c] = at->u[c] + h * v[c];
-  if (lanes->law.springs) {
-    const sonde_lane low[4] = {ue[0], ue[1], ue[2], v[0]}, high[4] = {v[1], v[2], {0}, {0}};
-    write_records(lanes->record + first * SONDE_RECORD, SONDE_RECORD, low);
-    write_records(lanes->record + first * SONDE_RECORD + 4, SONDE_RECORD, high);
-  }
-  if (!lanes->law.layered) return;
-  sonde_lane indentation = -dot(n, ue), slide[4];
-  for (int c = 0; c < 3; ++c) slide[c] = ue[c] + indentation * n[c];
-  slide[3] = unseen;
-  *(sonde_lane *)(lanes->indentation + first) = indentation;
-  write_records(lanes->slide + first * SONDE_QUAD, SONDE_QUAD, slide);
-}
-
-// Secant modulus m = q/g of the shear layer and (q' - m)/g^2, without the cancellation of q' - m.
-INLINE void shear_law(const sonde_face_slice *face, sonde_lane g, sonde_lane *modulus,
-                      sonde_lane *beyond) {
-  sonde_lane limit = 0.95f * face->limit, rate = face->inverse_limit, x = smaller(g, limit) * rate;
-  sonde_lane inverse = 1 / (1 - x * x), secant = face->shear * inverse;
-  sonde_lane steep = 2 * secant * inverse, slope = secant + steep * x * x;
-  sonde_lane_index past = g > limit;
-  sonde_lane safe = larger(g, limit), share = 1 / safe;
-  sonde_lane mean = (secant * limit + slope * (safe - limit)) * share;
-  *modulus = pick(past, mean, secant);
-  *beyond = pick(past, (slope - mean) * share * share, steep * rate * rate);
-}
-
-static void shear(sonde_lanes *lanes) {
-  SONDE_ASSERT(lanes->face_list_count <= lanes->face_slice_count);
-  float scale = lanes->law.stiffness_scale;
-  for (uint32_t a = 0; a < lanes->face_list_count; ++a) {
-    const sonde_face_slice *face = &lanes->face[lanes->faces[a]];
-    sonde_face_value *value = &lanes->face_value[lanes->faces[a]];
-    sonde_lane s[3], across[3], flux[3], coupling[3], sum = {0}, modulus, beyond;
-    for (int k = 0; k < 3; ++k) s[k] = gather(lanes->indentation, face->node[k]);
-    for (int k = 0; k < 3; ++k) {
-      sonde_lane d = s[(k + 1) % 3] - s[(k + 2) % 3];
-      across[k] = face->half_cotangent[k] * d;
-      sum += across[k] * d;
-    }
-    for (int k = 0; k < 3; ++k) flux[k] = across[(k + 2) % 3] - across[(k + 1) % 3];
-    sonde_lane slope2 = larger(sum * face->inverse_area, all(1e-30f));
-    shear_law(face, slope2 * inverse_root(slope2), &modulus, &beyond);
-    beyond = beyond * face->inverse_area;
-    for (int k = 0; k < 3; ++k) {
-      int i = (k + 1) % 3, j = (k + 2) % 3;
-      coupling[k] = scale * (beyond * flux[i] * flux[j] - modulus * face->half_cotangent[k]);
-    }
-    for (int k = 0; k < 3; ++k) {
-      const sonde_lane out[4] = {
-          modulus * flux[k], coupling[(k + 2) % 3], coupling[(k + 1) % 3], {0}};
-      write_records(&value->corner[k][0][0], SONDE_CORNER, out);
-    }
-  }
+  if (lanes->law.springs) publish_place(lanes, s, v, ue);
+  if (lanes->law.layered)
+    publish_slide(lanes, s, ue, -dot(lanes->model[s].normal, ue), (sonde_lane){0});
 }
 
 // By what neighbours are coupled.
@@ -90,8 +56,8 @@ typedef struct coupled {
 typedef struct node_sum {
   sonde_lane force[3], block[6];    // xx xy xz yy yz zz
   sonde_lane shear_force, coupling; // along N
-  sonde_lane pending;               // along N: what neighbours that went on do by the shear layer
   sonde_lane slide[3];              // the neighbours' tangential displacements times their weights
+  sonde_lane pending;               // along N: what neighbours that went on do by the shear layer
 } node_sum;
 
 INLINE void add_rank_one(sonde_lane block[6], const sonde_lane n[3], sonde_lane scale,
@@ -140,19 +106,71 @@ INLINE void add_spring(const sonde_lane_law *law, const sonde_slot *slot, sonde_
   tangent->lateral = flat;
 }
 
-// Both layers of an edge.
-INLINE void add_layers(const sonde_lanes *lanes, const sonde_lane_index *node,
-                       sonde_slot_layer *slot, node_sum *sum) {
-  const float *values = (const float *)lanes->face_value;
-  sonde_lane corner[4], other[4];
-  read_quads(values, &slot->left, corner);
-  read_quads(lanes->slide, node, other);
-  sonde_lane coupling = corner[1] + gather(values, slot->right);
-  sum->shear_force += corner[0];
-  sum->coupling += coupling;
-  sum->pending += coupling * other[3];
-  slot->coupling = coupling;
-  for (int c = 0; c < 3; ++c) sum->slide[c] += slot->weight * other[c];
+// Of the shear layer in a face: the secant modulus m = q/g and (q' - m)/(g^2 A), without the
+// cancellation of q' - m; from x^2 = (g/gm)^2, in which there is no root below the guard.
+INLINE void shear_law(const sonde_slot_face *face, sonde_lane x2, sonde_lane *modulus,
+                      sonde_lane *beyond) {
+  const float most = 0.95f, most2 = most * most;
+  sonde_lane held = smaller(x2, all(most2)), inverse = 1 / (1 - held);
+  sonde_lane secant = face->shear * inverse, steep = 2 * secant * inverse;
+  *modulus = secant;
+  *beyond = steep * face->bend;
+  sonde_lane_index past = x2 > most2;
+  if (bits(past) == 0) return;
+  sonde_lane safe = larger(x2, all(most2)), x = safe * inverse_root(safe);
+  sonde_lane slope = secant + steep * most2;
+  sonde_lane mean = (secant * most + slope * (x - most)) / x;
+  *modulus = pick(past, mean, secant);
+  *beyond = pick(past, (slope - mean) / safe, steep) * face->bend;
+}
+
+// What a face does along N to the row, and how it couples the row to both neighbours.
+typedef struct face_part {
+  sonde_lane force, before, here;
+} face_part;
+
+INLINE face_part shear_face(float scale, const sonde_slot_face *face, sonde_lane own,
+                            sonde_lane before, sonde_lane here) {
+  const sonde_lane d[3] = {before - here, here - own, own - before};
+  sonde_lane across[3], modulus, beyond;
+  for (int k = 0; k < 3; ++k) across[k] = face->cot[k] * d[k];
+  sonde_lane sum = across[0] * d[0] + across[1] * d[1] + across[2] * d[2];
+  shear_law(face, sum * face->bend, &modulus, &beyond);
+  sonde_lane flux = across[2] - across[1], steep = beyond * flux;
+  return (face_part){.force = modulus * flux,
+                     .before = scale * (steep * (across[0] - across[2]) - modulus * face->cot[2]),
+                     .here = scale * (steep * (across[1] - across[0]) - modulus * face->cot[1])};
+}
+
+// Both layers around the rows of a slice. A slot's coupling is of its own face and the next one's;
+// the face of the first slot goes round to the slot `turn` - 1. All faces are evaluated at one
+// state, or their corners would feel forces that do not cancel: what neighbours have moved since
+// counts by the matrix.
+INLINE void add_layers(sonde_lanes *lanes, const sonde_slice_model *fixed, sonde_lane own,
+                       node_sum *sum) {
+  float scale = lanes->law.stiffness_scale;
+  sonde_slot_layer *slot = lanes->slot_layer + fixed->first_slot;
+  const sonde_slot_face *face = lanes->slot_face + fixed->first_slot;
+  sonde_lane other[6], before, moved_before, open = {0}, round = {0};
+  read_records(lanes->slide, &fixed->last, other);
+  before = other[3], moved_before = other[4];
+  for (uint32_t k = 0; k < fixed->slot_count; ++k) {
+    read_records(lanes->slide, &slot[k].node, other);
+    face_part part = shear_face(scale, &face[k], own, before, other[3]);
+    for (int c = 0; c < 3; ++c) sum->slide[c] += slot[k].weight * other[c];
+    sum->shear_force += part.force;
+    sum->coupling += part.before + part.here;
+    sum->pending += part.before * moved_before + part.here * other[4];
+    if (k == 0)
+      round = part.before;
+    else
+      slot[k - 1].coupling = open + (part.before + pick(fixed->turn == (int32_t)k, round, all(0)));
+    open = part.here;
+    before = other[3], moved_before = other[4];
+  }
+  uint32_t count = fixed->slot_count;
+  if (count > 0)
+    slot[count - 1].coupling = open + pick(fixed->turn == (int32_t)count, round, all(0));
 }
 
 // The part of a across the unit vector n.
@@ -199,12 +217,10 @@ INLINE void add_anchor(const sonde_lane_law *law, const sonde_slice_model *fixed
 INLINE void add_springs(sonde_lanes *lanes, const sonde_slice_model *fixed, coupled by,
                         const place *at, node_sum *sum) {
   uint32_t first = fixed->first_slot, whole = fixed->whole_count;
-  for (uint32_t k = first; k < first + fixed->slot_count; ++k) {
-    if (by.springs)
-      add_spring(&lanes->law, &lanes->slot[k], k < first + whole ? all(1) : lanes->share[k],
-                 lanes->record, at, sum, &lanes->tangent[k]);
-    if (by.layers) add_layers(lanes, &lanes->tangent[k].node, &lanes->slot_layer[k], sum);
-  }
+  for (uint32_t k = first; by.springs && k < first + fixed->slot_count; ++k)
+    add_spring(&lanes->law, &lanes->slot[k], k < first + whole ? all(1) : lanes->share[k],
+               lanes->record, at, sum, &lanes->tangent[k]);
+  if (by.layers) add_layers(lanes, fixed, -dot(fixed->normal, at->ue), sum);
   add_anchor(&lanes->law, fixed, at, sum);
 }
 
@@ -235,7 +251,8 @@ INLINE void publish_direction(sonde_lanes *lanes, uint32_t s, const sonde_lane z
   const sonde_lane *n = lanes->model[s].normal;
   size_t first = (size_t)s * SONDE_LANES * SONDE_QUAD;
   const sonde_lane whole[4] = {z[0], z[1], z[2], {0}};
-  write_records(lanes->direction + first, SONDE_QUAD, whole);
+  if (lanes->law.springs || (lanes->tied && lanes->press_of[s]))
+    write_records(lanes->direction + first, SONDE_QUAD, whole);
   if (!lanes->law.layered) return;
   sonde_lane along = dot(n, z), parts[4];
   for (int c = 0; c < 3; ++c) parts[c] = z[c] - along * n[c];
@@ -250,7 +267,7 @@ INLINE float most(sonde_lane a) {
 }
 
 typedef struct sums_of_rows {
-  lane_double rr, ff, rz, reaction[3];
+  lane_double rr[2], ff, rz, reaction[3]; // rr: far from and near the probe
 } sums_of_rows;
 
 INLINE void linearise_slice(sonde_lanes *lanes, uint32_t s, coupled by, bool moves,
@@ -258,7 +275,7 @@ INLINE void linearise_slice(sonde_lanes *lanes, uint32_t s, coupled by, bool mov
   const sonde_slice_model *fixed = &lanes->model[s];
   sonde_slice *at = &lanes->slice[s];
   float h = lanes->law.dt;
-  node_sum sum = {{{0}}, {{0}}, {0}, {0}, {0}, {{0}}};
+  node_sum sum = {{{0}}, {{0}}, {0}, {0}, {{0}}, {0}};
   place here;
   for (int c = 0; c < 3; ++c) here.ve[c] = at->ve[c], here.ue[c] = at->u[c] + h * at->ve[c];
   add_springs(lanes, fixed, by, &here, &sum);
@@ -270,24 +287,28 @@ INLINE void linearise_slice(sonde_lanes *lanes, uint32_t s, coupled by, bool mov
     r[c] = force[c] - fixed->mass * (here.ve[c] - at->v[c]);
     if (by.layers) r[c] -= sum.pending * fixed->normal[c];
   }
+  sonde_lane indentation = -dot(fixed->normal, here.ue);
   sonde_lane yield = fixed->yield / h, force2 = dot(force, force);
   lanes->unrest2[s] = most(force2 * (yield * yield));
   factorise(sum.block, at->factor);
   divide(at->factor, r, x);
   for (int c = 0; c < 3; ++c) {
     at->x[c] = moves ? x[c] : (sonde_lane){0}, here.ve[c] += x[c];
+    here.ue[c] = at->u[c] + h * here.ve[c];
     if (!moves) at->r[c] = r[c], at->z[c] = x[c];
   }
-  sums->rr += widen(dot(r, r));
+  lane_double *rr = &sums->rr[lanes->is_near[s]];
+  *rr += widen(dot(r, r));
   sums->rz += widen(dot(r, x));
   sums->ff += widen(force2);
-  if (moves) publish_record(lanes, s, here.ve, dot(fixed->normal, x));
+  if (moves && by.springs) publish_place(lanes, s, here.ve, here.ue);
+  if (moves && by.layers) publish_slide(lanes, s, here.ue, indentation, dot(fixed->normal, x));
   publish_direction(lanes, s, x);
 }
 
-static void linearise(sonde_lanes *lanes, bool moves, double sums[3]) {
+static void linearise(sonde_lanes *lanes, bool moves, double sums[4]) {
   const sonde_lane_law *law = &lanes->law;
-  sums_of_rows all_rows = {{0}, {0}, {0}, {{0}}};
+  sums_of_rows all_rows = {{{0}}, {0}, {0}, {{0}}};
   for (uint32_t a = 0; a < lanes->awake_count; ++a) {
     if (law->springs && law->layered)
       linearise_slice(lanes, lanes->awake[a], (coupled){true, true}, moves, &all_rows);
@@ -296,7 +317,8 @@ static void linearise(sonde_lanes *lanes, bool moves, double sums[3]) {
     else
       linearise_slice(lanes, lanes->awake[a], (coupled){true, false}, moves, &all_rows);
   }
-  sums[0] = total(all_rows.rr);
+  sums[3] = total(all_rows.rr[0]);
+  sums[0] = sums[3] + total(all_rows.rr[1]);
   sums[1] = total(all_rows.ff);
   sums[2] = total(all_rows.rz);
   const lane_double *reaction = all_rows.reaction;
@@ -309,16 +331,16 @@ INLINE void multiply_slice(sonde_lanes *lanes, const sonde_slice_model *fixed, c
   uint32_t first = fixed->first_slot;
   sonde_lane along = {0}, slide[3] = {{0}, {0}, {0}};
   for (uint32_t k = first; k < first + fixed->slot_count; ++k) {
-    const sonde_slot_tangent *tangent = &lanes->tangent[k];
     sonde_lane p[4];
     if (by.springs) {
+      const sonde_slot_tangent *tangent = &lanes->tangent[k];
       read_quads(lanes->direction, &tangent->node, p);
       sonde_lane pull = tangent->along * dot(tangent->n, p);
       for (int c = 0; c < 3; ++c) q[c] -= pull * tangent->n[c] + tangent->lateral * p[c];
     }
     if (!by.layers) continue;
     const sonde_slot_layer *layer = &lanes->slot_layer[k];
-    read_quads(lanes->layer_direction, &tangent->node, p);
+    read_quads(lanes->layer_direction, &layer->node, p);
     along += layer->coupling * p[3];
     for (int c = 0; c < 3; ++c) slide[c] += layer->weight * p[c];
   }
@@ -338,12 +360,15 @@ INLINE void couple(sonde_lanes *lanes, uint32_t s, sonde_lane q[3]) {
     multiply_slice(lanes, &lanes->model[s], (coupled){true, false}, q);
   if (lanes->press_of[s] == 0) return;
   const sonde_slice_press *press = &lanes->press[lanes->press_of[s] - 1];
-  for (int c = 0; c < 3; ++c) q[c] -= press->carry[c];
+  const sonde_lane_index rows = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+  sonde_lane carried[4];
+  read_quads((const float *)press->carry, &rows, carried);
+  for (int c = 0; c < 3; ++c) q[c] -= carried[c];
 }
 
 // After a slice was solved for itself its residual is what its neighbours have moved since.
-static double sweep(sonde_lanes *lanes) {
-  lane_double rr = {0};
+static double sweep(sonde_lanes *lanes, double *far2) {
+  lane_double rr[2] = {{0}, {0}};
   SONDE_ASSERT(lanes->awake_count <= lanes->slice_count);
   for (uint32_t a = 0; a < lanes->awake_count; ++a) {
     uint32_t s = lanes->awake[a];
@@ -353,10 +378,12 @@ static double sweep(sonde_lanes *lanes) {
     for (int c = 0; c < 3; ++c) r[c] = -q[c];
     divide(at->factor, r, z);
     for (int c = 0; c < 3; ++c) at->x[c] += z[c];
-    rr += widen(dot(r, r));
+    lane_double *sum = &rr[lanes->is_near[s]];
+    *sum += widen(dot(r, r));
     publish_direction(lanes, s, z);
   }
-  return total(rr);
+  *far2 = total(rr[0]);
+  return *far2 + total(rr[1]);
 }
 
 static void restart(sonde_lanes *lanes, double sums[2]) {
@@ -446,7 +473,7 @@ static void accept(sonde_lanes *lanes) {
   for (uint32_t a = 0; a < lanes->awake_count; ++a) {
     sonde_slice *at = &lanes->slice[lanes->awake[a]];
     for (int c = 0; c < 3; ++c) at->ve[c] += at->x[c], at->x[c] = (sonde_lane){0};
-    publish_record(lanes, lanes->awake[a], at->ve, (sonde_lane){0});
+    publish_record(lanes, lanes->awake[a], at->ve);
   }
 }
 
@@ -481,7 +508,7 @@ static double update(sonde_lanes *lanes) {
     lanes->speed2[s] = most(speed2);
     lanes->way2[s] = most(way2);
     lanes->published[s] = 0;
-    publish_record(lanes, s, at->ve, (sonde_lane){0});
+    publish_record(lanes, s, at->ve);
     sum += widen(speed2 + way2);
   }
   return total(sum);
@@ -498,24 +525,36 @@ INLINE bool reaches(const sonde_slice_model *fixed, const sonde_slice *at, float
   return bits(inside) != 0;
 }
 
+// Of 16 slices those whose nodes may be inside: bits. A node moves by less than three times its
+// way at its speed.
+INLINE uint32_t nearby(const sonde_lanes *lanes, uint32_t group, const float low[3],
+                       const float high[3], float edges) {
+  const sonde_slice_boxes *box = &lanes->box[group];
+  const sonde_lane least = all(1e-20f);
+  sonde_lane way2 = larger(*(const sonde_lane *)(lanes->way2 + group * SONDE_LANES), least);
+  sonde_lane speed2 = larger(*(const sonde_lane *)(lanes->speed2 + group * SONDE_LANES), least);
+  sonde_lane way = edges * box->reach + 1e-4f + way2 * inverse_root(way2) +
+                   3 * lanes->law.dt * (speed2 * inverse_root(speed2));
+  sonde_lane_index apart = {0};
+  for (int c = 0; c < 3; ++c)
+    apart |= (box->low[c] - way > high[c]) | (box->high[c] + way < low[c]);
+  return bits(~apart);
+}
+
 static void near(sonde_lanes *lanes, const float low[3], const float high[3], float edges) {
-  float h = lanes->law.dt;
   uint32_t count = 0;
-  for (uint32_t s = 0; s < lanes->slice_count; ++s) {
-    const sonde_slice_box *box = &lanes->box[s];
-    float margin = edges * box->reach, way = margin + 1e-4f;
-    way += __builtin_sqrtf(lanes->way2[s]) + 3 * h * __builtin_sqrtf(lanes->speed2[s]);
-    bool apart = false;
-    for (int c = 0; c < 3; ++c) apart |= box->low[c] - way > high[c] || box->high[c] + way < low[c];
-    if (apart || !reaches(&lanes->model[s], &lanes->slice[s], h, low, high, margin)) continue;
-    lanes->near_probe[count++] = s;
-  }
+  for (uint32_t group = 0; group * SONDE_LANES < lanes->slice_count; ++group)
+    for (uint32_t rest = nearby(lanes, group, low, high, edges); rest; rest &= rest - 1) {
+      uint32_t l = (uint32_t)__builtin_ctz(rest), s = group * SONDE_LANES + l;
+      float margin = edges * lanes->box[group].reach[l];
+      if (reaches(&lanes->model[s], &lanes->slice[s], lanes->law.dt, low, high, margin))
+        lanes->near_probe[count++] = s;
+    }
   SONDE_ASSERT(count <= lanes->slice_count);
   lanes->near_probe_count = count;
 }
 
 const sonde_lane_kernels SONDE_KERNELS = {.name = SONDE_KERNELS_NAME,
-                                          .shear = shear,
                                           .linearise = linearise,
                                           .sweep = sweep,
                                           .restart = restart,
@@ -530,4 +569,5 @@ const sonde_lane_kernels SONDE_KERNELS = {.name = SONDE_KERNELS_NAME,
                                           .press_faces = press_faces,
                                           .press_nodes = press_nodes,
                                           .meet_faces = meet_faces,
-                                          .meet_nodes = meet_nodes};
+                                          .meet_nodes = meet_nodes,
+                                          .carry = carry};

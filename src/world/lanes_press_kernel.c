@@ -1,12 +1,13 @@
 // The contact of 16 faces or nodes at a time (docs/world.md); part of lanes_kernel.c. Places count
 // from the probe's origin, which single precision resolves to some nanometres.
 // seen:          a slice's nodes from the probe, where they are evaluated or go.
-// locate, hand_on: records that the faces read.
+// beyond, locate, hand_on: what the faces read.
 // to_points, to_corners: from the corners of a face to its four points, and back.
 // least_depth:   the plane of the least weighted distance of points inside the probe.
 // push_at:       pushes of points inside; never a pull.
 // press_faces, press_nodes: where the nodes are evaluated, and their part of the matrix.
 // meet_faces, meet_nodes:   where the solution brings them.
+// carry:         the ties' part of a product, for the solver.
 #include "world/lanes_vector.h"
 
 #include "base/base.h"
@@ -41,6 +42,18 @@ INLINE seen_point seen(const sonde_lanes *lanes, uint32_t s, bool moved) {
   return p;
 }
 
+// Planes that all of a slice's nodes are beyond, by more than points between them are rounded.
+INLINE uint32_t beyond(const sonde_lane_probe *probe, const seen_point *p) {
+  const float rounded = 1e-6f;
+  uint32_t code = 0, count = probe->plane_count < 32 ? probe->plane_count : 32;
+  for (uint32_t k = 0; k < count; ++k) {
+    const float *n = probe->plane[k];
+    sonde_lane t = n[3] - (n[0] * p->x[0] + n[1] * p->x[1] + n[2] * p->x[2]);
+    code |= (uint32_t)(bits(t < -rounded) == 0xffff) << k;
+  }
+  return code;
+}
+
 static void locate(sonde_lanes *lanes) {
   SONDE_ASSERT(lanes->near_probe_count <= lanes->slice_count);
   for (uint32_t k = 0; k < lanes->near_probe_count; ++k) {
@@ -49,6 +62,7 @@ static void locate(sonde_lanes *lanes) {
     const sonde_lane x[4] = {p.x[0], p.x[1], p.x[2], all(1)}, v[4] = {p.v[0], p.v[1], p.v[2], {0}};
     write_records(lanes->probe_place + first, SONDE_QUAD, x);
     write_records(lanes->probe_motion + first, SONDE_QUAD, v);
+    lanes->near_code[k] = beyond(&lanes->probe, &p);
   }
 }
 
@@ -240,12 +254,12 @@ INLINE void press_points(const sonde_lanes *lanes, const seen_point *points, con
 
 static bool press_faces(const sonde_lanes *lanes, uint32_t index, sonde_pressed_slice *at,
                         sonde_press_corners *to) {
-  const sonde_face_slice *face = &lanes->face[index];
+  const sonde_lane_index *node = lanes->face[index];
   sonde_lane x[4][3], v[4][3], near[3], unused[3];
   SONDE_ASSERT(index < lanes->face_slice_count);
   seen_point points[SONDE_FACE_POINTS];
   depths by;
-  vectors_at_points(lanes->probe_place, face->node, x, near);
+  vectors_at_points(lanes->probe_place, node, x, near);
   at->area = lanes->point_area[index];
   sonde_lane_index counts = (near[0] * near[1] * near[2] * at->area) > 0;
   for (int q = 0; q < SONDE_FACE_POINTS; ++q) {
@@ -253,7 +267,7 @@ static bool press_faces(const sonde_lanes *lanes, uint32_t index, sonde_pressed_
     for (int c = 0; c < 3; ++c) points[q].x[c] = x[q][c];
   }
   if (!least_depth(&lanes->probe, SONDE_FACE_POINTS, points, &by)) return false;
-  vectors_at_points(lanes->probe_motion, face->node, v, unused);
+  vectors_at_points(lanes->probe_motion, node, v, unused);
   for (int q = 0; q < SONDE_FACE_POINTS; ++q)
     for (int c = 0; c < 3; ++c) points[q].v[c] = v[q][c];
   press_points(lanes, points, &by, at, to);
@@ -304,7 +318,7 @@ INLINE void go_on(const sonde_lanes *lanes, const sonde_lane way[3], seen_point 
 
 static void meet_faces(const sonde_lanes *lanes, const sonde_pressed_slice *at, bool surprise,
                        sonde_meet_corners *to) {
-  const sonde_lane_index *node = lanes->face[at->index].node;
+  const sonde_lane_index *node = lanes->face[at->index];
   sonde_lane way[4][3], force[4][3], x[4][3], v[4][3], unused[3];
   vectors_at_points(lanes->probe_way, node, way, unused);
   for (int q = 0; q < SONDE_FACE_POINTS; ++q) {
@@ -341,4 +355,37 @@ static void meet_nodes(const sonde_lanes *lanes, const sonde_pressed_slice *at, 
   if (!node_depth(&lanes->probe, &point, &by)) return;
   sonde_lane met = push_at(&lanes->probe, at->area, &by, 0, &point);
   for (int c = 0; c < 3; ++c) to->surprise[0][c] += met * by.slope[0][c];
+}
+
+// What a group of ties makes of vectors goes to carried[], corner by corner.
+INLINE void carry_ties(const sonde_lanes *lanes, const sonde_press_ties *tie,
+                       const float *vectors) {
+  sonde_lane along[3], part[3];
+  for (int c = 0; c < 3; ++c) {
+    sonde_lane z[4];
+    read_quads(vectors, &tie->row[c], z);
+    along[c] = dot(tie->slope, z);
+  }
+  for (int c = 0; c < 3; ++c) part[c] = tie->tie[c] * (along[c] - along[(c + 1) % 3]);
+  for (int c = 0; c < 3; ++c) {
+    sonde_lane push = part[c] - part[(c + 2) % 3];
+    const sonde_lane out[4] = {
+        push * tie->slope[0], push * tie->slope[1], push * tie->slope[2], {0}};
+    write_records((float *)(lanes->carried + c * SONDE_LANES), SONDE_QUAD, out);
+  }
+}
+
+static void carry(sonde_lanes *lanes, const float *vectors) {
+  for (uint32_t k = 0; k < lanes->press_count; ++k)
+    for (int l = 0; l < SONDE_LANES; ++l) lanes->press[k].carry[l] = (sonde_quad){0};
+  for (uint32_t k = 0; k < lanes->tie_count; ++k) {
+    const sonde_press_ties *tie = &lanes->tie[k / SONDE_LANES];
+    uint32_t l = k % SONDE_LANES;
+    if (l == 0) carry_ties(lanes, tie, vectors);
+    for (uint32_t c = 0; c < 3; ++c) {
+      uint32_t row = (uint32_t)tie->row[c][l], at = lanes->press_of[row / SONDE_LANES];
+      SONDE_ASSERT(at > 0);
+      lanes->press[at - 1].carry[row % SONDE_LANES] += lanes->carried[c * SONDE_LANES + l];
+    }
+  }
 }

@@ -57,28 +57,6 @@ INLINE uint32_t bits(sonde_lane_index mask) {
 #endif
 }
 
-// base[index * stride + offset] for each lane.
-INLINE sonde_lane gather(const float *base, sonde_lane_index index) {
-#if defined(__AVX512F__)
-  return (sonde_lane)_mm512_i32gather_ps((__m512i)index, base, 4);
-#elif defined(__AVX2__)
-  union {
-    sonde_lane_index whole;
-    __m256i part[2];
-  } at = {index};
-  union {
-    __m256 part[2];
-    sonde_lane whole;
-  } v;
-  for (int k = 0; k < 2; ++k) v.part[k] = _mm256_i32gather_ps(base, at.part[k], 4);
-  return v.whole;
-#else
-  sonde_lane v;
-  for (int k = 0; k < SONDE_LANES; ++k) v[k] = base[index[k]];
-  return v;
-#endif
-}
-
 // Columns of four rows of four numbers each, per 128 bits: out[c] = the c-th numbers.
 #if defined(__AVX512F__) || defined(__AVX2__)
 #if defined(__AVX512F__)

@@ -8,6 +8,7 @@
 enum { SONDE_LANES = 16, SONDE_RECORD = 8, SONDE_QUAD = 4 };
 
 typedef float sonde_lane __attribute__((vector_size(64)));
+typedef float sonde_quad __attribute__((vector_size(16)));
 typedef int32_t sonde_lane_index __attribute__((vector_size(64)));
 
 // High and low parts of a number. Where gcc 12 makes vectors of it, it takes (double)(float)a for
@@ -18,18 +19,20 @@ static inline void sonde_split(double a, float *high, float *low) {
   *low = (float)(a - (double)*high);
 }
 
-// What the contact adds to a slice: forces, xx xy xz yy yz zz of the diagonal blocks, and what ties
-// make of the directions.
+// What the contact adds to a slice: forces, xx xy xz yy yz zz of the diagonal blocks, and, row by
+// row, what ties make of the directions.
 typedef struct sonde_slice_press {
-  sonde_lane force[3], block[6], carry[3];
+  sonde_lane force[3], block[6];
+  sonde_quad carry[SONDE_LANES];
 } sonde_slice_press;
 
 // A pressed face couples its corners along the slope of the depth. A diagonal block holds the whole
-// row; a tie takes back what is too much when two corners part: it acts on their difference.
-typedef struct sonde_press_tie {
-  uint32_t row[3];
-  float slope[3], tie[3]; // of corners 0 1, 1 2, 2 0
-} sonde_press_tie;
+// row; a tie takes back what is too much when two corners part: it acts on their difference. 16 at
+// a time; beyond the last they are zero.
+typedef struct sonde_press_ties {
+  sonde_lane_index row[3];
+  sonde_lane slope[3], tie[3]; // of corners 0 1, 1 2, 2 0
+} sonde_press_ties;
 
 // The probe, places from its origin.
 typedef struct sonde_lane_probe {

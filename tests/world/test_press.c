@@ -1,5 +1,5 @@
 // Laws of the fast engine's contact: what the probe does to each node, and the matrix of it, are
-// those of the double engine.
+// those of the double engine. And of the order of a node's neighbours.
 #include "../fixture.h"
 #include "tissue/model.h"
 #include "world/contact.h"
@@ -50,7 +50,8 @@ static sonde_vec3 product_of(const sonde_lanes *lanes, uint32_t i, sonde_vec3 z)
   sonde_vec3 whole =
       vec3(m[0] * z.x + m[1] * z.y + m[2] * z.z, m[1] * z.x + m[3] * z.y + m[4] * z.z,
            m[2] * z.x + m[4] * z.y + m[5] * z.z);
-  return v_sub(whole, sonde_lane_vector(lanes->press[at - 1].carry, l));
+  sonde_quad carry = lanes->press[at - 1].carry[l];
+  return v_sub(whole, vec3((double)carry[0], (double)carry[1], (double)carry[2]));
 }
 
 // The double engine clips faces to find shares of the volume, the fast one counts points.
@@ -91,7 +92,7 @@ static void compare_products(const bench *b) {
     const double c[3] = {z[i].x, z[i].y, z[i].z};
     for (int k = 0; k < 3; ++k) lanes->probe_way[i * SONDE_QUAD + (uint32_t)k] = (float)c[k];
   }
-  sonde_press_carry(lanes, lanes->probe_way);
+  lanes->kernels->carry(lanes, lanes->probe_way);
   sonde_active_set all = {b->precise->rows, n, b->precise->pairs, b->precise->pair_count};
   sonde_block_multiply(b->precise->matrix, &all, NULL, 0, z, out);
   for (uint32_t i = 0; i < n; ++i) {
@@ -146,7 +147,64 @@ static void presses_like_the_double_engine(void **state) {
   press_once("ball:20", SONDE_CONTACT_NODES, 0.012, 0);
 }
 
+static sonde_fan fan_of(const sonde_model *model, uint32_t i, uint32_t room[2][64]) {
+  sonde_fan fan = {.node = room[0], .face = room[1]};
+  sonde_lanes_fan(model, i, &fan);
+  return fan;
+}
+
+// Every face around a node is in its fan once, between its two other corners.
+static void check_fan(const sonde_model *model, uint32_t i) {
+  uint32_t room[2][64], found = 0;
+  sonde_fan fan = fan_of(model, i, room);
+  const sonde_topology *t = &model->topology;
+  for (uint32_t k = 0; k < fan.count; ++k) {
+    if (fan.face[k] == SONDE_NO_FACE) continue;
+    const uint32_t *v = model->surface.faces[fan.face[k]];
+    uint32_t own = v[0] == i ? 0 : v[1] == i ? 1 : 2, before = k > 0 ? fan.node[k - 1] : fan.last;
+    assert_int_equal(v[own], i);
+    assert_int_equal(v[(own + 1) % 3], before);
+    assert_int_equal(v[(own + 2) % 3], fan.node[k]);
+    for (uint32_t p = 0; p < k; ++p) assert_int_not_equal(fan.face[p], fan.face[k]);
+    found++;
+  }
+  assert_int_equal(found, t->face_start[i + 1] - t->face_start[i]);
+  if (fan.count > 0 && fan.face[0] != SONDE_NO_FACE)
+    assert_int_equal(fan.node[fan.turn - 1], fan.last);
+  for (uint32_t e = t->start[i]; e < t->start[i + 1]; ++e) {
+    uint32_t seen = 0;
+    for (uint32_t k = 0; k < fan.count; ++k) seen += fan.node[k] == t->neighbour[e];
+    assert_true(seen > 0);
+  }
+}
+
+static void check_fans(uint32_t nodes, uint32_t count, uint32_t faces[][3]) {
+  sonde_model model = {.surface = {.vertex_count = nodes, .face_count = count, .faces = faces}};
+  model.surface.vertices = calloc(nodes, sizeof *model.surface.vertices);
+  for (uint32_t i = 0; i < nodes; ++i)
+    model.surface.vertices[i] = vec3(cos(i * 1.3), sin(i * 1.3), 0.1 * i);
+  assert_int_equal(sonde_topology_build(&model.surface, &model.topology, NULL), SONDE_OK);
+  for (uint32_t i = 0; i < nodes; ++i) check_fan(&model, i);
+  sonde_topology_clear(&model.topology);
+  free(model.surface.vertices);
+}
+
+static void fans_go_round_every_node(void **state) {
+  (void)state;
+  sonde_model *ball = fixture_model(2, NULL);
+  check_fans(ball->surface.vertex_count, ball->surface.face_count, ball->surface.faces);
+  sonde_model_destroy(ball);
+  uint32_t strip[][3] = {{0, 1, 2}, {2, 1, 3}, {2, 3, 4}};
+  check_fans(5, 3, strip);
+  // Two sheets, and two closed cones, that meet in one node.
+  uint32_t tie[][3] = {{0, 1, 2}, {0, 2, 3}, {0, 4, 5}};
+  check_fans(6, 3, tie);
+  uint32_t glass[][3] = {{0, 1, 2}, {0, 2, 3}, {0, 3, 1}, {0, 4, 5}, {0, 5, 6}, {0, 6, 4}};
+  check_fans(7, 6, glass);
+}
+
 int main(void) {
-  const struct CMUnitTest tests[] = {cmocka_unit_test(presses_like_the_double_engine)};
+  const struct CMUnitTest tests[] = {cmocka_unit_test(presses_like_the_double_engine),
+                                     cmocka_unit_test(fans_go_round_every_node)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
