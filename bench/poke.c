@@ -129,6 +129,9 @@ static const char *look_at_nodes(poke_watch *watch, const sonde_state *state) {
   return NULL;
 }
 
+// A push straight to the side points ahead by this share where single precision rounds it.
+static const double ROUNDED = 1e-6;
+
 // The probe pushes forwards at every node; with friction the sum may be drawn in by mu_static
 // times the normal push.
 static const char *forward(poke_watch *watch, const sonde_state *state, sonde_vec3 inward) {
@@ -140,13 +143,13 @@ static const char *forward(poke_watch *watch, const sonde_state *state, sonde_ve
     double size = norm(f[i]), ahead = dot(f[i], inward);
     push += size;
     sum += ahead;
-    drawn |= !(mu > 0) && ahead < -1e-7 * size;
+    drawn |= !(mu > 0) && ahead < -ROUNDED * size;
   }
   double most = fmax(push, watch->push_n);
   watch->push_n = push;
   if (push > 1e-3) watch->least_forward = fmin(watch->least_forward, sum / most);
   if (drawn) return "a node is pulled out of the skin";
-  if (sum < -(mu + 1e-7) * most) return "the probe is drawn into the skin";
+  if (sum < -(mu + ROUNDED) * most) return "the probe is drawn into the skin";
   return NULL;
 }
 
