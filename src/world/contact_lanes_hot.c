@@ -127,6 +127,16 @@ static void add_areas(sonde_state *state, const sonde_press_corners *from, int c
   for (int k = 0; k < corners; ++k) state->contact.volume_m3 += (double)from->share[k][l];
 }
 
+// The part of node i's row that stands for its neighbours along the slope n.
+static void add_tied(sonde_lanes *lanes, uint32_t i, const float n[3], float scale) {
+  sonde_slice_press *press = press_at(lanes, i / SONDE_LANES);
+  uint32_t row = i % SONDE_LANES;
+  float x = scale * n[0], y = scale * n[1], z = scale * n[2];
+  press->tied[0][row] += x * n[0], press->tied[1][row] += x * n[1];
+  press->tied[2][row] += x * n[2], press->tied[3][row] += y * n[1];
+  press->tied[4][row] += y * n[2], press->tied[5][row] += z * n[2];
+}
+
 static void add_tie(sonde_lanes *lanes, const uint32_t v[3], const float slope[3],
                     const float tie[3]) {
   uint32_t l = lanes->tie_count++ % SONDE_LANES;
@@ -134,6 +144,7 @@ static void add_tie(sonde_lanes *lanes, const uint32_t v[3], const float slope[3
   if (l == 0) memset(to, 0, sizeof *to);
   for (int c = 0; c < 3; ++c)
     to->row[c][l] = (int32_t)v[c], to->slope[c][l] = slope[c], to->tie[c][l] = tie[c];
+  for (int c = 0; c < 3; ++c) add_tied(lanes, v[c], slope, tie[c] + tie[(c + 2) % 3]);
 }
 
 // One of the whole face where its points push along one slope, else one per point.

@@ -150,7 +150,7 @@ static void conjugate(sonde_state *state, bool tied, double target, double sums[
   result->residual = sqrt(sums[1]);
   uint32_t most = state->def.pcg.max_iterations;
   for (bool first = true; result->residual > target && result->iterations < most; first = false) {
-    if (tied) lanes->kernels->carry(lanes, lanes->direction);
+    if (tied) lanes->kernels->carry(lanes, lanes->direction, false);
     double curvature = lanes->kernels->multiply(lanes, first);
     if (!first) curvature -= beta * sums[0] / alpha;
     if (!(curvature > 0)) break;
@@ -166,18 +166,49 @@ static void conjugate(sonde_state *state, bool tied, double target, double sums[
 // How a Newton iteration is made.
 typedef struct iteration {
   uint32_t number; // from 1
+  bool last;       // none may follow
   bool tied;       // with ties
   bool local;      // touched slices and those beside them only
-  bool may_leave;  // what these need more sweeps for may be left to the next, local iteration,
-  bool left;       // and was
+  bool left;       // something was left to the next, local iteration
   double force2;   // (h F)^2 of the last one of all slices: extrapolation makes the first large
 } iteration;
 
 // A sweep of all slices for the sake of a few costs more than the next iteration of these alone.
 enum { FEW = 2 };
 static const double FAR_SHARE = 0.5; // of the square of what the solver may leave
-// So far above what the solver may leave they stay above it after a sweep.
+// So far above what the solver may leave they stay above it after a sweep; and a local iteration
+// has touched nodes to gain or to lose, so that the next one begins anew.
 static const double HOPELESS = 30;
+static const double ROUGH = 0.1; // of its first residual is what such an iteration may leave
+
+// Sweeps until little is left, or little beside what the next iteration does; returns their number.
+static uint32_t sweep_all(sonde_state *state, iteration *now, const double sums[4], double target,
+                          sonde_pcg_result *result) {
+  sonde_lanes *lanes = state->lanes;
+  bool may_leave = !now->last && now->number == 1 && lanes->awake_count > FEW * lanes->near_count;
+  double found = result->residual, far2 = sums[3];
+  bool slow = false;
+  uint32_t sweeps = 0, most = state->def.pcg.max_iterations;
+  now->left = may_leave && far2 <= FAR_SHARE * target * target && found > HOPELESS * target;
+  while (result->residual > target && sweeps < most && !slow && !now->left) {
+    double before = found;
+    found = sqrt(lanes->kernels->sweep(lanes, &far2));
+    sweeps++;
+    result->residual = found * fmin(found / before, 1);
+    slow = is_slow(before, found, target);
+    now->left = result->residual > target && may_leave && far2 <= FAR_SHARE * target * target;
+  }
+  return sweeps;
+}
+
+// Conjugate gradients for what is left.
+static void finish(sonde_state *state, iteration *now, double target, double sums[2],
+                   sonde_pcg_result *result) {
+  double rough = ROUGH * result->residual;
+  bool may_leave = now->local && !now->last && result->residual > HOPELESS * target;
+  conjugate(state, now->tied, may_leave ? rough : target, sums, result);
+  now->left = may_leave && result->residual > target && result->residual <= rough;
+}
 
 // sums: of the linearisation. From the residual that the first sweep found on; what a sweep leaves
 // is what it found times the pace. Without sweeps by conjugate gradients at once. False when there
@@ -185,26 +216,17 @@ static const double HOPELESS = 30;
 static bool solve(sonde_state *state, iteration *now, bool sweep, const double sums[4],
                   double reference) {
   sonde_lanes *lanes = state->lanes;
-  bool may_leave = now->may_leave && lanes->awake_count > FEW * lanes->near_count;
   const sonde_pcg_options *options = &state->def.pcg;
-  double found = sqrt(sums[0]), products[2] = {sums[2], sums[0]};
-  sonde_pcg_result result = {.reference = reference, .residual = found};
+  double products[2] = {sums[2], sums[0]};
+  sonde_pcg_result result = {.reference = reference, .residual = sqrt(sums[0])};
   double target = fmax(options->relative_residual * reference, options->absolute_residual);
-  bool solved = result.residual > target, slow = !sweep;
-  uint32_t sweeps = 0;
-  now->left = may_leave && sums[3] <= FAR_SHARE * target * target && found > HOPELESS * target;
-  while (result.residual > target && sweeps < options->max_iterations && !slow && !now->left) {
-    double before = found, far2;
-    found = sqrt(lanes->kernels->sweep(lanes, &far2));
-    sweeps++;
-    result.residual = found * fmin(found / before, 1);
-    slow = is_slow(before, found, target);
-    now->left = result.residual > target && may_leave && far2 <= FAR_SHARE * target * target;
-  }
+  bool solved = result.residual > target;
+  now->left = false;
+  uint32_t sweeps = sweep ? sweep_all(state, now, sums, target, &result) : 0;
   result.iterations = sweeps;
   if (result.residual > target && !now->left) {
     if (sweep) lanes->kernels->restart(lanes, products);
-    conjugate(state, now->tied, target, products, &result);
+    finish(state, now, target, products, &result);
   }
   result.converged = result.residual <= target || now->left;
   if (!result.converged) state->flags |= SONDE_FLAG_NOT_CONVERGED;
@@ -232,7 +254,7 @@ static const double BENT_SHARE = 0.1;
 static double untied2(sonde_state *state) {
   sonde_lanes *lanes = state->lanes;
   double sum = 0;
-  lanes->kernels->carry(lanes, lanes->probe_way);
+  lanes->kernels->carry(lanes, lanes->probe_way, true);
   for (uint32_t k = 0; k < lanes->press_count; ++k)
     for (int c = 0; c < 3; ++c)
       for (int l = 0; l < SONDE_LANES; ++l) {
@@ -300,7 +322,7 @@ static bool iterate(sonde_state *state, const sonde_probe *probe, sonde_pose pos
   mark_near(state->lanes);
   if (now->local) list_near(state->lanes);
   double detected = sonde_clock_now();
-  now->may_leave = !last && now->number == 1;
+  now->last = last;
   bool solved = linearise(state, now);
   double left = sonde_clock_now();
   publish_increments(state, false);

@@ -107,8 +107,8 @@ typedef struct sonde_lane_kernels {
   void (*meet_nodes)(const sonde_lanes *lanes, const sonde_pressed_slice *at, bool surprise,
                      sonde_meet_corners *to);
   // What the ties take from the product of the matrix with vectors [rows][4], into carry[] of
-  // press[]
-  void (*carry)(sonde_lanes *lanes, const float *vectors);
+  // press[]: from that of whole rows, or of what tied[] leaves of them
+  void (*carry)(sonde_lanes *lanes, const float *vectors, bool whole);
 } sonde_lane_kernels;
 
 struct sonde_lanes {

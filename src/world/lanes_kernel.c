@@ -224,9 +224,11 @@ INLINE void add_springs(sonde_lanes *lanes, const sonde_slice_model *fixed, coup
   add_anchor(&lanes->law, fixed, at, sum);
 }
 
-INLINE void add_press(const sonde_slice_press *press, node_sum *sum) {
+// tied: ties couple neighbours; else a row's own block stands for all of them.
+INLINE void add_press(const sonde_slice_press *press, bool tied, node_sum *sum) {
   for (int c = 0; c < 3; ++c) sum->force[c] += press->force[c];
-  for (int c = 0; c < 6; ++c) sum->block[c] += press->block[c];
+  for (int c = 0; c < 6; ++c)
+    sum->block[c] += tied ? press->block[c] - press->tied[c] : press->block[c];
 }
 
 // L E L^T without pivoting: stable for positive definite blocks however long and thin.
@@ -280,7 +282,7 @@ INLINE void linearise_slice(sonde_lanes *lanes, uint32_t s, coupled by, bool mov
   for (int c = 0; c < 3; ++c) here.ve[c] = at->ve[c], here.ue[c] = at->u[c] + h * at->ve[c];
   add_springs(lanes, fixed, by, &here, &sum);
   for (int c = 0; c < 3; ++c) sums->reaction[c] += widen(sum.force[c]);
-  if (lanes->press_of[s]) add_press(&lanes->press[lanes->press_of[s] - 1], &sum);
+  if (lanes->press_of[s]) add_press(&lanes->press[lanes->press_of[s] - 1], lanes->tied, &sum);
   sonde_lane force[3], r[3], x[3];
   for (int c = 0; c < 3; ++c) {
     force[c] = h * sum.force[c];

@@ -358,30 +358,31 @@ static void meet_nodes(const sonde_lanes *lanes, const sonde_pressed_slice *at, 
 }
 
 // What a group of ties makes of vectors goes to carried[], corner by corner.
-INLINE void carry_ties(const sonde_lanes *lanes, const sonde_press_ties *tie,
-                       const float *vectors) {
-  sonde_lane along[3], part[3];
+INLINE void carry_ties(const sonde_lanes *lanes, const sonde_press_ties *tie, const float *vectors,
+                       bool whole) {
+  sonde_lane along[3];
   for (int c = 0; c < 3; ++c) {
     sonde_lane z[4];
     read_quads(vectors, &tie->row[c], z);
     along[c] = dot(tie->slope, z);
   }
-  for (int c = 0; c < 3; ++c) part[c] = tie->tie[c] * (along[c] - along[(c + 1) % 3]);
   for (int c = 0; c < 3; ++c) {
-    sonde_lane push = part[c] - part[(c + 2) % 3];
+    int i = (c + 1) % 3, j = (c + 2) % 3;
+    sonde_lane own = whole ? along[c] : all(0);
+    sonde_lane push = tie->tie[c] * (own - along[i]) + tie->tie[j] * (own - along[j]);
     const sonde_lane out[4] = {
         push * tie->slope[0], push * tie->slope[1], push * tie->slope[2], {0}};
     write_records((float *)(lanes->carried + c * SONDE_LANES), SONDE_QUAD, out);
   }
 }
 
-static void carry(sonde_lanes *lanes, const float *vectors) {
+static void carry(sonde_lanes *lanes, const float *vectors, bool whole) {
   for (uint32_t k = 0; k < lanes->press_count; ++k)
     for (int l = 0; l < SONDE_LANES; ++l) lanes->press[k].carry[l] = (sonde_quad){0};
   for (uint32_t k = 0; k < lanes->tie_count; ++k) {
     const sonde_press_ties *tie = &lanes->tie[k / SONDE_LANES];
     uint32_t l = k % SONDE_LANES;
-    if (l == 0) carry_ties(lanes, tie, vectors);
+    if (l == 0) carry_ties(lanes, tie, vectors, whole);
     for (uint32_t c = 0; c < 3; ++c) {
       uint32_t row = (uint32_t)tie->row[c][l], at = lanes->press_of[row / SONDE_LANES];
       SONDE_ASSERT(at > 0);

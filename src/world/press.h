@@ -19,10 +19,11 @@ static inline void sonde_split(double a, float *high, float *low) {
   *low = (float)(a - (double)*high);
 }
 
-// What the contact adds to a slice: forces, xx xy xz yy yz zz of the diagonal blocks, and, row by
-// row, what ties make of the directions.
+// What the contact adds to a slice: forces, xx xy xz yy yz zz of the diagonal blocks, which hold
+// whole rows, what of these belongs to neighbours, and, row by row, what ties make of the
+// directions.
 typedef struct sonde_slice_press {
-  sonde_lane force[3], block[6];
+  sonde_lane force[3], block[6], tied[6];
   sonde_quad carry[SONDE_LANES];
 } sonde_slice_press;
 

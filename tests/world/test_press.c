@@ -92,7 +92,7 @@ static void compare_products(const bench *b) {
     const double c[3] = {z[i].x, z[i].y, z[i].z};
     for (int k = 0; k < 3; ++k) lanes->probe_way[i * SONDE_QUAD + (uint32_t)k] = (float)c[k];
   }
-  lanes->kernels->carry(lanes, lanes->probe_way);
+  lanes->kernels->carry(lanes, lanes->probe_way, true);
   sonde_active_set all = {b->precise->rows, n, b->precise->pairs, b->precise->pair_count};
   sonde_block_multiply(b->precise->matrix, &all, NULL, 0, z, out);
   for (uint32_t i = 0; i < n; ++i) {
