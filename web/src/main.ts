@@ -478,7 +478,7 @@ class App {
   private show(frame: Frame): void {
     const s = frame.snapshot;
     this.snapshot = s;
-    ++this.frames;
+    if (++this.frames === 1) performance.mark("first image");
     this.pixels = frame.pixels;
     this.scene.show(frame);
     this.echo.show(frame);
