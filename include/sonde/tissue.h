@@ -107,7 +107,7 @@ typedef struct sonde_model {
   sonde_vessel vein, artery; /**< femoral vessels */
   /** NULL, or named anatomy (sonde/tissue_anatomy.h); released with the model by sonde_free. */
   struct sonde_thigh_anatomy *anatomy;
-  uint64_t checksum;         /**< of the file's content; 0 before it is saved or loaded */
+  uint64_t checksum; /**< of the file's content; 0 before it is saved or loaded */
 } sonde_model;
 
 /** What a model is built from; zero means default where a default is named. */

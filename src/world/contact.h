@@ -20,8 +20,6 @@ static inline sonde_vec3 plane_slope(const sonde_state *state, uint32_t k) {
   return v_scale(state->plane_normal[k], -state->plane_weight[k]);
 }
 
-// Makes a node one of the touched; before its share and gradient are added to. @thread tick
-void sonde_contact_touch(sonde_state *state, uint32_t i);
 // Joins the regions of two touched nodes. @thread tick
 void sonde_contact_join(sonde_state *state, uint32_t a, uint32_t b);
 // Joins the regions of touched nodes beside one another. @thread tick

@@ -61,7 +61,7 @@ void sonde_contact_join(sonde_state *state, uint32_t a, uint32_t b) {
     state->parent[x] = y;
 }
 
-void sonde_contact_touch(sonde_state *state, uint32_t i) {
+static void touch(sonde_state *state, uint32_t i) {
   const sonde_vec3 *g = &state->gradient[i];
   if (state->share_m3[i] != 0 || g->x != 0 || g->y != 0 || g->z != 0) return;
   state->parent[i] = i;
@@ -133,7 +133,7 @@ static void clip_face(sonde_state *state, uint32_t face) {
                            state->inward, &clip))
     return;
   if (!(clip.area_m2 > 0)) return;
-  for (int k = 0; k < 3; ++k) sonde_contact_touch(state, v[k]);
+  for (int k = 0; k < 3; ++k) touch(state, v[k]);
   for (int k = 0; k < 3; ++k) {
     state->share_m3[v[k]] += clip.share_m3[k];
     state->gradient[v[k]] = v_add(state->gradient[v[k]], clip.gradient[k]);

@@ -183,8 +183,6 @@ static void add_faces(sonde_state *state, const sonde_pressed_slice *at,
     sonde_contact_join(state, v[1], v[2]);
     add_areas(state, from, 3, l);
     add_ties(state->lanes, at, from, l, v);
-    state->touched_faces[state->touched_face_count++] =
-        state->lanes->face_order[at->index * SONDE_LANES + l];
   }
 }
 

@@ -227,7 +227,6 @@ INLINE void press_points(const sonde_lanes *lanes, const seen_point *points, con
       count = {0};
   for (int q = 0; q < SONDE_FACE_POINTS; ++q) {
     at->push[q] = push_at(&lanes->probe, at->area, by, q, &points[q]);
-    at->plane[q] = by->plane[q];
     steep[q] = steepness(lanes, at->area, at->push[q]);
     share[q] = at->area * by->depth[q];
     sonde_lane outward = pick(by->inside[q], at->area * by->unit[q], all(0));

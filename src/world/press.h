@@ -52,7 +52,6 @@ enum { SONDE_FACE_POINTS = 4 };
 typedef struct sonde_pressed_slice {
   uint32_t index, inside; // slice; its lanes with a point inside
   sonde_lane area;        // of a point
-  sonde_lane_index plane[SONDE_FACE_POINTS];
   sonde_lane push[SONDE_FACE_POINTS], slope[SONDE_FACE_POINTS][3]; // where they are evaluated
 } sonde_pressed_slice;
 
