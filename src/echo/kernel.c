@@ -3,7 +3,8 @@
 // splat      scatterers through one affine map onto two columns and three samples each, carrier
 //            phase included
 // splat_some the same, with or without checks at the grid's border
-// lay        one vector of them, in order
+// make_parcel, lay_batch, lay_rest  those within the slab, closed up
+// lay, lay_one  one vector of them, in order
 // stream     blood along its streamlines
 // spread_taps, tap_of  kernels' numbers over vectors
 // lateral    symmetric complex kernels of rank three on one row
@@ -37,17 +38,19 @@ typedef struct parcel {
   float up[W], down[W];
 } parcel;
 
+INLINE void lay_one(float *grid, uint32_t stride, const parcel *p, int lane) {
+  const int place = lane % 4 * (W / 4) + lane / 4; // see records()
+  float *here = grid + p->cell[lane], *above = here - stride, *below = here + stride;
+  v4 value = load4(p->record + 4 * place);
+  v4 up = p->up[lane] * value, down = p->down[lane] * value;
+  store4(above, load4(above) + up);
+  store4(here, load4(here) + (value - up - down));
+  store4(below, load4(below) + down);
+}
+
 INLINE void lay(float *grid, uint32_t stride, const parcel *p) {
   for (int block = 0; block < W / 4; ++block)
-    for (int k = 0; k < 4; ++k) { // lane order, see records()
-      int j = 4 * block + k;
-      float *here = grid + p->cell[j], *above = here - stride, *below = here + stride;
-      v4 value = load4(p->record + 4 * (k * (W / 4) + block));
-      v4 up = p->up[j] * value, down = p->down[j] * value;
-      store4(above, load4(above) + up);
-      store4(here, load4(here) + (value - up - down));
-      store4(below, load4(below) + down);
-    }
+    for (int k = 0; k < 4; ++k) lay_one(grid, stride, p, 4 * block + k);
 }
 
 // One coordinate of a map, spread over lanes.
@@ -62,41 +65,68 @@ INLINE vf along(const form *f, vf x, vf y, vf z) {
   return f->m[0] + f->m[1] * x + f->m[2] * y + f->m[3] * z;
 }
 
-// Vectors whose arithmetic goes on before the first of them is laid: it has long chains.
-enum { BATCH = 128 / W };
+// Scatterers within the slab, closed up, and vectors of them whose arithmetic goes on before the
+// first of them is laid: it has long chains.
+enum { FLOCK = 128, BATCH = FLOCK / W };
+
+typedef struct flock {
+  uint32_t count;
+  float line[FLOCK + W], depth[FLOCK + W], weight[FLOCK + W];
+} flock;
+
+INLINE void make_parcel(const splat_job *job, const flock *f, uint32_t from, parcel *p) {
+  vf line = load(f->line + from), depth = load(f->depth + from), weight = load(f->weight + from);
+  vi l = whole(line), n = whole(depth + 0.5f);
+  vf a = line - real(l), b = depth - real(n), up = 0.5f - b, down = 0.5f + b, c, s;
+  turn(depth * job->turns, &c, &s);
+  vf re = weight * c, im = weight * s, re1 = a * re, im1 = a * im;
+  vi at = n * (int32_t)job->stride + 2 * l;
+  records(p->record, re - re1, im1 - im, re1, -im1);
+  memcpy(p->cell, &at, sizeof at);
+  store(p->up, 0.5f * up * up), store(p->down, 0.5f * down * down);
+}
+
+// A whole batch; what is more than that stays.
+INLINE void lay_batch(const splat_job *job, flock *f) {
+  parcel batch[BATCH];
+  for (uint32_t k = 0; k < BATCH; ++k) make_parcel(job, f, k * W, &batch[k]);
+  for (uint32_t k = 0; k < BATCH; ++k) lay(job->grid, job->stride, &batch[k]);
+  f->count -= FLOCK;
+  store(f->line, load(f->line + FLOCK)), store(f->depth, load(f->depth + FLOCK));
+  store(f->weight, load(f->weight + FLOCK));
+}
+
+// Lanes beyond the last scatterer are numbers, but are not laid.
+INLINE void lay_rest(const splat_job *job, flock *f) {
+  parcel batch[BATCH];
+  const uint32_t count = f->count, whole_ones = count / W;
+  store(f->line + count, all(0)), store(f->depth + count, all(1));
+  store(f->weight + count, all(0));
+  for (uint32_t k = 0; k * W < count; ++k) make_parcel(job, f, k * W, &batch[k]);
+  for (uint32_t k = 0; k < whole_ones; ++k) lay(job->grid, job->stride, &batch[k]);
+  for (uint32_t i = whole_ones * W; i < count; ++i)
+    lay_one(job->grid, job->stride, &batch[whole_ones], (int)(i % W));
+}
 
 INLINE void splat_some(const splat_job *job, bool inside) {
-  parcel batch[BATCH];
-  uint32_t kept = 0;
+  flock f;
+  f.count = 0;
   const float *px = job->x, *py = job->y, *pz = job->z, *sign = job->sign;
-  float *grid = job->grid, turns = job->turns, right = job->right, bottom = job->bottom;
+  const float right = job->right, bottom = job->bottom;
   const form to_line = form_of(job, 0), to_side = form_of(job, 1), to_depth = form_of(job, 2);
-  const uint32_t stride = job->stride, count = job->count;
+  const uint32_t count = job->count;
   for (uint32_t i = 0; i < count; i += W) {
     vf x = load(px + i), y = load(py + i), z = load(pz + i);
     vf side = along(&to_side, x, y, z), height = 1 - side * side;
     vi in = height > 0;
     if (!any(in)) continue;
-    vf line = along(&to_line, x, y, z), depth = along(&to_depth, x, y, z), c, s;
-    if (!inside) {
-      in = in & (line >= 0) & (line < right) & (depth >= 1) & (depth < bottom);
-      line = only(in, line), depth = pick(in, depth, all(1));
-    }
-    vf weight = only(in, load(sign + i) * height);
-    vi l = whole(line), n = whole(depth + 0.5f);
-    vf a = line - real(l), b = depth - real(n), up = 0.5f - b, down = 0.5f + b;
-    turn(depth * turns, &c, &s);
-    vf re = weight * c, im = weight * s, re1 = a * re, im1 = a * im;
-    vi at = n * (int32_t)stride + 2 * l;
-    parcel *p = &batch[kept++];
-    records(p->record, re - re1, im1 - im, re1, -im1);
-    memcpy(p->cell, &at, sizeof at);
-    store(p->up, 0.5f * up * up), store(p->down, 0.5f * down * down);
-    if (kept < BATCH) continue;
-    for (kept = 0; kept < BATCH; ++kept) lay(grid, stride, &batch[kept]);
-    kept = 0;
+    vf line = along(&to_line, x, y, z), depth = along(&to_depth, x, y, z);
+    if (!inside) in = in & (line >= 0) & (line < right) & (depth >= 1) & (depth < bottom);
+    f.count += pack(in, line, f.line + f.count, depth, f.depth + f.count, load(sign + i) * height,
+                    f.weight + f.count);
+    if (f.count >= FLOCK) lay_batch(job, &f);
   }
-  for (uint32_t k = 0; k < kept; ++k) lay(grid, stride, &batch[k]);
+  lay_rest(job, &f);
 }
 
 // A map whose cube lies inside the grid needs no check per scatterer.

@@ -100,6 +100,29 @@ INLINE vf gather(const float *base, vi index) {
 #endif
 }
 
+// Lanes of three vectors that a mask keeps, closed up; writes whole vectors. Returns their number.
+INLINE uint32_t pack(vi mask, vf a, float *to_a, vf b, float *to_b, vf c, float *to_c) {
+#if defined(__AVX512F__)
+  const __mmask16 kept = _mm512_movepi32_mask((__m512i)mask);
+  _mm512_storeu_ps(to_a, _mm512_maskz_compress_ps(kept, (__m512)a));
+  _mm512_storeu_ps(to_b, _mm512_maskz_compress_ps(kept, (__m512)b));
+  _mm512_storeu_ps(to_c, _mm512_maskz_compress_ps(kept, (__m512)c));
+  return (uint32_t)__builtin_popcount(kept);
+#else
+  uint32_t count = 0, kept = 0;
+  for (int k = 0; k < W; ++k) kept += (uint32_t)-mask[k];
+  if (kept == W) {
+    store(to_a, a), store(to_b, b), store(to_c, c);
+    return W;
+  }
+  for (int k = 0; k < W; ++k) {
+    to_a[count] = a[k], to_b[count] = b[k], to_c[count] = c[k];
+    count += (uint32_t)-mask[k];
+  }
+  return count;
+#endif
+}
+
 // Lanes of four vectors as records of four numbers: record 4 i + k
 // at place k * (W / 4) + i.
 INLINE void records(float *out, vf a, vf b, vf c, vf d) {
