@@ -9,6 +9,7 @@
 // spread_taps, tap_of  kernels' numbers over vectors
 // lateral    symmetric complex kernels of rank three on one row
 // axial      real kernels down the rows, noise, compensation, modulus, logarithm
+// add_row, add_parts, add_both  its sums, as the registers allow
 // tissue     in kernel_tissue.h
 // merge      a row of the grid, times its gain, to even and odd columns
 // widen, mix rows of the coarse plane, per line and between two
@@ -186,22 +187,34 @@ INLINE void add_taps(const taps *tap, int first, vf x, vf y, vf sum[RING_PLANES]
   }
 }
 
+// As many vectors of lines at once as there are registers for their sums.
+enum { ABREAST = W == 16 ? 2 : 1 };
+
+INLINE void lateral_some(const lateral_job *job, const taps *tap, uint32_t l, uint32_t vectors) {
+  vf sum[ABREAST][RING_PLANES];
+  for (uint32_t v = 0; v < vectors; ++v) {
+    for (int k = 0; k < RING_PLANES; ++k) sum[v][k] = all(0);
+    add_taps(tap, 0, load(job->re[0] + l + v * W), load(job->im[0] + l + v * W), sum[v]);
+  }
+  for (int t = 1; t <= job->half; ++t) {
+    const float *re = job->re[t % 2] + l, *im = job->im[t % 2] + l;
+    int left = (t + 1) / 2, right = t / 2;
+    for (uint32_t v = 0; v < vectors; ++v, re += W, im += W)
+      add_taps(tap, RING_PLANES * t, load(re - left) + load(re + right),
+               load(im - left) + load(im + right), sum[v]);
+  }
+  for (uint32_t v = 0; v < vectors; ++v)
+    for (uint32_t k = 0; k < RING_PLANES; ++k)
+      store(job->out + k * job->lines + l + v * W, sum[v][k]);
+}
+
 static void lateral(const lateral_job *job) {
   SONDE_ASSERT(job->half >= 0 && job->half <= SONDE_MOST_TAPS);
   taps tap;
   spread_taps(&job->tap[0][0][0], RING_PLANES * (job->half + 1), &tap);
-  for (uint32_t l = 0; l < job->lines; l += W) {
-    vf sum[RING_PLANES];
-    for (int k = 0; k < RING_PLANES; ++k) sum[k] = all(0);
-    add_taps(&tap, 0, load(job->re[0] + l), load(job->im[0] + l), sum);
-    for (int t = 1; t <= job->half; ++t) {
-      const float *re = job->re[t % 2] + l, *im = job->im[t % 2] + l;
-      int left = (t + 1) / 2, right = t / 2;
-      add_taps(&tap, RING_PLANES * t, load(re - left) + load(re + right),
-               load(im - left) + load(im + right), sum);
-    }
-    for (int k = 0; k < RING_PLANES; ++k) store(job->out + (uint32_t)k * job->lines + l, sum[k]);
-  }
+  uint32_t l = 0;
+  for (; l + ABREAST * W <= job->lines; l += ABREAST * W) lateral_some(job, &tap, l, ABREAST);
+  for (; l < job->lines; l += W) lateral_some(job, &tap, l, 1);
 }
 
 INLINE void add_axial(const taps *tap, int first, const vf row[RING_PLANES], vf sum[RING_PLANES]) {
@@ -221,32 +234,66 @@ INLINE void finish_axial(const axial_job *job, int sample, uint32_t l, const vf 
   store(job->grey[sample] + l, smaller(larger(grey, all(0)), all(255)));
 }
 
-// Samples share the rows they read; each is summed from its first row to its last.
-INLINE void axial_some(const axial_job *job, const taps *tap, uint32_t l, int from, int samples) {
-  const uint32_t n = job->lines;
-  vf sum[AXIAL_MOST][RING_PLANES], row[RING_PLANES]; // apart: sums need not wait for each other
-  for (int s = 0; s < samples; ++s)
-    for (int k = 0; k < RING_PLANES; ++k) sum[s][k] = all(0);
+// Row t of the first sample's, for samples `first` up to `end`; real parts or imaginary ones.
+INLINE void add_row(const axial_job *job, const taps *tap, const float *row, int t, int part,
+                    int first, int end, vf sum[AXIAL_MOST][RING_PLANES]) {
+  for (int k = 0; k < SONDE_RANK; ++k) {
+    const int plane = 2 * k + part;
+    vf number = load(row + (uint32_t)plane * job->lines);
+    for (int s = first; s < end; ++s)
+      sum[s][plane] += tap_of(tap, SONDE_RANK * (t - s) + k) * number;
+  }
+}
+
+// In sixteen registers: one part after the other, and what only some of the samples read before and
+// behind the loop.
+INLINE void add_parts(const axial_job *job, const taps *tap, uint32_t l, int from, int samples,
+                      vf sum[AXIAL_MOST][RING_PLANES]) {
+  const float *const *rows = job->rows + from;
+  const int count = job->count;
+  for (int part = 0; part < 2; ++part) {
+    for (int t = 0; t + 1 < samples; ++t) add_row(job, tap, rows[t] + l, t, part, 0, t + 1, sum);
+    for (int t = samples - 1; t < count; ++t)
+      add_row(job, tap, rows[t] + l, t, part, 0, samples, sum);
+    for (int s = 1; s < samples; ++s)
+      add_row(job, tap, rows[count - 1 + s] + l, count - 1 + s, part, s, samples, sum);
+  }
+}
+
+// In thirty-two: both parts at once.
+INLINE void add_both(const axial_job *job, const taps *tap, uint32_t l, int from, int samples,
+                     vf sum[AXIAL_MOST][RING_PLANES]) {
+  vf row[RING_PLANES];
   for (int t = 0; t < job->count + samples - 1; ++t) {
-    for (uint32_t k = 0; k < RING_PLANES; ++k) row[k] = load(job->rows[from + t] + k * n + l);
+    for (uint32_t k = 0; k < RING_PLANES; ++k)
+      row[k] = load(job->rows[from + t] + k * job->lines + l);
     for (int s = 0; s < samples; ++s)
       if (t >= s && t - s < job->count) add_axial(tap, SONDE_RANK * (t - s), row, sum[s]);
   }
+}
+
+// Samples share the rows they read; each is summed from its first row to its last.
+INLINE void axial_some(const axial_job *job, const taps *tap, uint32_t l, int from, int samples) {
+  vf sum[AXIAL_MOST][RING_PLANES]; // apart: sums need not wait for each other
+  for (int s = 0; s < samples; ++s)
+    for (int k = 0; k < RING_PLANES; ++k) sum[s][k] = all(0);
+  if (W == 16)
+    add_both(job, tap, l, from, samples, sum);
+  else
+    add_parts(job, tap, l, from, samples, sum);
   for (int s = 0; s < samples; ++s) finish_axial(job, from + s, l, sum[s]);
 }
 
-// As many as there are registers for.
-enum { AT_ONCE = W == 16 ? AXIAL_MOST : 2 };
-
 static void axial(const axial_job *job) {
-  SONDE_ASSERT(job->count > 0 && job->lines % ECHO_ALIGN == 0);
+  SONDE_ASSERT(job->count >= AXIAL_MOST && job->lines % ECHO_ALIGN == 0);
   SONDE_ASSERT(job->samples > 0 && job->samples <= AXIAL_MOST);
   taps tap;
   spread_taps(&job->tap[0][0], SONDE_RANK * job->count, &tap);
   for (uint32_t l = 0; l < job->lines; l += W) {
-    int from = 0;
-    for (; from + AT_ONCE <= job->samples; from += AT_ONCE) axial_some(job, &tap, l, from, AT_ONCE);
-    for (; from < job->samples; ++from) axial_some(job, &tap, l, from, 1);
+    if (job->samples == AXIAL_MOST)
+      axial_some(job, &tap, l, 0, AXIAL_MOST);
+    else
+      for (int s = 0; s < job->samples; ++s) axial_some(job, &tap, l, s, 1);
   }
 }
 
