@@ -12,7 +12,7 @@
 
 enum {
   SONDE_PLANE_COLUMNS = 25, // coarse nodes across the lines
-  SONDE_PLANE_ROWS = 57,    // and down
+  SONDE_PLANE_ROWS = 57,    // and down, at most
   SONDE_PLANE_NODES = SONDE_PLANE_COLUMNS * SONDE_PLANE_ROWS,
   SONDE_MEDIUM_ROWS = 256,                  // steps of the march along the lines
   SONDE_MAX_ECHOES = 24 * SONDE_MOST_LINES, // specular echoes
@@ -82,7 +82,8 @@ struct sonde_echo {
   double theta_centre;
   int32_t line_column[SONDE_MOST_LINES];  // coarse column left of each line
   float line_share[SONDE_MOST_LINES];     // way to the next
-  double lines_per_column, depth_per_row; // of the coarse plane; depth in m
+  uint32_t plane_rows;                    // of the coarse plane
+  double lines_per_column, depth_per_row; // of it; depth in m
   bool vessels;                           // any
   uint32_t shown[MOST_VESSELS];           // vessels in view: the femoral ones, then branches
   uint32_t shown_count;

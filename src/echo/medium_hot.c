@@ -51,7 +51,7 @@ static void place_lines(sonde_echo *echo) {
 
 // A coarse row, per line.
 static void widen(sonde_echo *echo, uint32_t coarse, float *wide) {
-  SONDE_ASSERT(coarse < SONDE_PLANE_ROWS);
+  SONDE_ASSERT(coarse < echo->plane_rows);
   widen_job job = {.column = echo->line_column, .share = echo->line_share, .lines = echo->padded};
   for (uint32_t field = 0; field < echo->fields; ++field) {
     job.in = echo->plane + field * SONDE_PLANE_NODES + coarse * SONDE_PLANE_COLUMNS;
@@ -62,8 +62,9 @@ static void widen(sonde_echo *echo, uint32_t coarse, float *wide) {
 
 // Fields of a row; coarse rows are widened when the march reaches them.
 static void next_row(sonde_echo *echo, uint32_t row, uint32_t *reached) {
-  float y = (float)row * (SONDE_PLANE_ROWS - 1) / (SONDE_MEDIUM_ROWS - 1);
-  uint32_t j = (uint32_t)y < SONDE_PLANE_ROWS - 2 ? (uint32_t)y : SONDE_PLANE_ROWS - 2;
+  const uint32_t last = echo->plane_rows - 2;
+  float y = (float)(row * (last + 1)) / (SONDE_MEDIUM_ROWS - 1);
+  uint32_t j = (uint32_t)y < last ? (uint32_t)y : last;
   uint32_t size = echo->fields * echo->padded;
   for (; *reached < j + 2; ++*reached) widen(echo, *reached, echo->wide + *reached % 2 * size);
   echo->kernels->mix(echo->wide + j % 2 * size, echo->wide + (j + 1) % 2 * size, y - (float)j,

@@ -22,6 +22,9 @@ enum { FIRST_ITERATIONS = 24, ITERATIONS = 8, NEWTON_ITERATIONS = 4 };
 _Static_assert((int)SONDE_PSF_STEPS == SONDE_ECHO_PREPARE_STEPS, "steps of a beam");
 
 static const double far_away = 50; // in semi-axes
+// Rows a little closer than the columns of a linear probe (1.7 mm), which set the error between,
+// and not so few that a shallow picture, all of it near the face, is off by more.
+static const double row_m = 1.6e-3, fewest_rows = 37;
 static const double step_beside = 1e-3;
 static const double tolerance_m = 1e-7;
 static const double view_margin_m = 8e-3; // slab, a cube and the step between two stations
@@ -115,7 +118,8 @@ void sonde_echo_frame(sonde_echo *echo, sonde_pose world_from_probe, double aper
     echo->slab_m[k] = half[0] + t * (half[1] - half[0]);
   }
   echo->lines_per_column = (echo->lines - 1 + 2 * f->edge_lines) / (SONDE_PLANE_COLUMNS - 1);
-  echo->depth_per_row = f->depth_m / (SONDE_PLANE_ROWS - 1);
+  echo->plane_rows = (uint32_t)clamp(ceil(f->depth_m / row_m) + 1, fewest_rows, SONDE_PLANE_ROWS);
+  echo->depth_per_row = f->depth_m / (echo->plane_rows - 1);
 }
 
 const sonde_pathology *sonde_echo_pathology(const sonde_echo *echo, uint32_t which) {
@@ -295,7 +299,7 @@ static void place_node(sonde_echo *echo, uint32_t i, uint32_t j, sonde_vec3 loca
 // The inverse of the steps.
 static void turn_node(sonde_echo *echo, uint32_t i, uint32_t j) {
   plane_node *node = &echo->node[j * SONDE_PLANE_COLUMNS + i];
-  sonde_mat3 steps = steps_at(echo, i, j, SONDE_PLANE_ROWS - 1);
+  sonde_mat3 steps = steps_at(echo, i, j, echo->plane_rows - 1);
   sonde_vec3 a = m_column(&steps, 0), c = m_column(&steps, 1), b = m_column(&steps, 2);
   node->beside = c;
   // Rows of the inverse are the crossed columns over the volume.
@@ -315,9 +319,9 @@ void sonde_echo_plane(sonde_echo *echo) {
   (void)sonde_interior_locate(echo->interior, f->probe.position, &centre);
   echo->theta_centre = centre.theta;
   choose_view(echo);
-  for (uint32_t j = 0; j < SONDE_PLANE_ROWS; ++j)
+  for (uint32_t j = 0; j < echo->plane_rows; ++j)
     for (uint32_t i = 0; i < SONDE_PLANE_COLUMNS; ++i)
       place_node(echo, i, j, sonde_echo_place(f, line_of(echo, i), depth_of(echo, j)));
-  for (uint32_t j = 0; j < SONDE_PLANE_ROWS; ++j)
+  for (uint32_t j = 0; j < echo->plane_rows; ++j)
     for (uint32_t i = 0; i < SONDE_PLANE_COLUMNS; ++i) turn_node(echo, i, j);
 }

@@ -39,10 +39,10 @@ typedef struct spot {
 } spot;
 
 static spot spot_at(const sonde_echo *echo, double column, double row) {
-  double a = clamp(column, 0, SONDE_PLANE_COLUMNS - 1.0), b = clamp(row, 0, SONDE_PLANE_ROWS - 1.0);
+  double a = clamp(column, 0, SONDE_PLANE_COLUMNS - 1.0), b = clamp(row, 0, echo->plane_rows - 1.0);
   uint32_t i = (uint32_t)a, j = (uint32_t)b;
   if (i > SONDE_PLANE_COLUMNS - 2) i = SONDE_PLANE_COLUMNS - 2;
-  if (j > SONDE_PLANE_ROWS - 2) j = SONDE_PLANE_ROWS - 2;
+  if (j > echo->plane_rows - 2) j = echo->plane_rows - 2;
   a -= i, b -= j;
   return (spot){&echo->node[j * SONDE_PLANE_COLUMNS + i],
                 {(1 - a) * (1 - b), a * (1 - b), (1 - a) * b, a * b}};
@@ -73,7 +73,7 @@ static sonde_mat3 turn_at(const spot *s) {
 static sonde_vec3 locate(const sonde_echo *echo, sonde_vec3 rest, sonde_vec3 at, sonde_mat3 *in) {
   for (int step = 0; step < NEWTON; ++step) {
     double a = clamp(at.x, 0, SONDE_PLANE_COLUMNS - 1.0),
-           b = clamp(at.z, 0, SONDE_PLANE_ROWS - 1.0);
+           b = clamp(at.z, 0, echo->plane_rows - 1.0);
     spot s = spot_at(echo, a, b);
     *in = step + 1 < NEWTON ? s.node->in : turn_at(&s); // close enough for the first
     sonde_vec3 change = m_mul_v(*in, v_sub(rest, rest_at(&s)));
@@ -358,7 +358,7 @@ static void place_cell(sonde_echo *echo, const int32_t cell[3], sonde_vec3 guess
 // The box of cubes around the slab at rest, none of them visited.
 static void clear_seen(sonde_echo *echo) {
   double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-  for (uint32_t k = 0; k < SONDE_PLANE_NODES; ++k) {
+  for (uint32_t k = 0; k < echo->plane_rows * SONDE_PLANE_COLUMNS; ++k) {
     const plane_node *n = &echo->node[k];
     double half = sonde_echo_elevation(echo, k / SONDE_PLANE_COLUMNS * echo->depth_per_row) + 1e-3;
     const double at[3] = {n->rest.x, n->rest.y, n->rest.z};
@@ -447,7 +447,7 @@ void sonde_echo_scatter(sonde_echo *echo) {
   clear_seen(echo);
   bound_vessels(echo);
   echo->cell_count = echo->moved = 0;
-  for (uint32_t j = 0; j + 1 < SONDE_PLANE_ROWS; ++j)
+  for (uint32_t j = 0; j + 1 < echo->plane_rows; ++j)
     for (uint32_t i = 0; i + 1 < SONDE_PLANE_COLUMNS; ++i) visit_quad(echo, i, j);
 }
 
