@@ -2,9 +2,9 @@
 //   M (v1 - v0) = h F(x0 + h v1, v1)
 // from v1 = v0 in single precision, its linear systems by sweeps, or by conjugate gradients where
 // these are faster.
-// list:      slices that take part.
+// list_slices, list_near: slices that take part; mark_near: those around the probe.
 // couple_friction: forces and blocks found in double precision.
-// conjugate, solve: the rest of a linear system that a first sweep began.
+// sweep_all, finish, solve: the rest of a linear system that a first sweep began; conjugate.
 // touch, linearise, iterate: one Newton iteration; is_bent: whether it needs another.
 // rest:      slices that stopped moving fall asleep, movers wake their neighbours.
 #include "world/contact.h"

@@ -1,9 +1,8 @@
 // Kernels of the fast engine (docs/world.md); lanes_*_hot.c include this file once per instruction
 // set. Every sum has a fixed order: all sets give the same bits.
-// linearise: springs and layers to the neighbours, normal and tangential springs, contact, matrix,
-// and the
-//            first sweep: every slice is solved for itself and goes on before the next one looks;
-//            or the start of the conjugate gradients.
+// linearise: springs and layers to the neighbours, normal and tangential springs, contact, matrix;
+//            and the first sweep, in which every slice is solved for itself and goes on before the
+//            next one looks, or the start of the conjugate gradients.
 // sweep:     block Gauss-Seidel: the same with what the neighbours have moved since.
 // restart:   residual after the sweeps.
 // multiply, advance: parts of the conjugate gradients of Chronopoulos and Gear (1989), which
