@@ -72,7 +72,7 @@ export class ThighScene {
   skin: Skin | null = null;
   rangeChanged: (range_mm: number) => void = () => undefined;
   readonly orbit: OrbitControls;
-  private readonly renderer: THREE.WebGLRenderer;
+  private renderer: THREE.WebGLRenderer | null = null;
   private readonly scene = new THREE.Scene();
   private readonly camera = new THREE.PerspectiveCamera(27, 1, 10, 3000);
   private readonly skinMaterial = skinMaterial();
@@ -100,8 +100,6 @@ export class ThighScene {
     private readonly canvas: HTMLCanvasElement,
     private readonly low: boolean,
   ) {
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !low, alpha: true, powerPreference: "high-performance" });
-    this.renderer.setPixelRatio(low ? 1 : Math.min(2, window.devicePixelRatio));
     this.ring = new THREE.Mesh(
       new THREE.RingGeometry(4.2, 5, 40),
       new THREE.MeshBasicMaterial({ color: COLOUR.mark, transparent: true, opacity: 0.8, side: THREE.DoubleSide, depthTest: false }),
@@ -166,7 +164,7 @@ export class ThighScene {
   private resize(): void {
     const { clientWidth: w, clientHeight: h } = this.canvas;
     if (w === 0 || h === 0) return;
-    this.renderer.setSize(w, h, false);
+    this.renderer?.setSize(w, h, false);
     this.camera.aspect = w / h;
     this.camera.updateProjectionMatrix();
     this.dirty = true;
@@ -460,9 +458,21 @@ export class ThighScene {
     this.dirty = true;
   }
 
+  /** Takes up to half a second, so only the first picture asks for it: the echo image goes before. */
+  private makeRenderer(): THREE.WebGLRenderer {
+    const { canvas, low } = this;
+    const renderer = new THREE.WebGLRenderer({ canvas, antialias: !low, alpha: true, powerPreference: "high-performance" });
+    renderer.setPixelRatio(low ? 1 : Math.min(2, window.devicePixelRatio));
+    return renderer;
+  }
+
   render(): void {
     if (!this.dirty) return;
     this.dirty = false;
+    if (!this.renderer) {
+      this.renderer = this.makeRenderer();
+      this.resize();
+    }
     this.renderer.render(this.scene, this.camera);
   }
 
