@@ -129,8 +129,10 @@ static const char *look_at_nodes(poke_watch *watch, const sonde_state *state) {
   return NULL;
 }
 
-// A push straight to the side points ahead by this share where single precision rounds it.
-static const double ROUNDED = 1e-6;
+// A push straight to the side points ahead by this share where it is rounded.
+static double rounded(const sonde_state *state) {
+  return sonde_state_def(state)->engine == SONDE_ENGINE_FAST ? 5e-7 : 1e-7;
+}
 
 // The probe pushes forwards at every node; with friction the sum may be drawn in by mu_static
 // times the normal push.
@@ -138,18 +140,19 @@ static const char *forward(poke_watch *watch, const sonde_state *state, sonde_ve
   uint32_t nodes = sonde_state_model(state)->surface.vertex_count;
   const sonde_vec3 *f = sonde_state_contact_forces(state);
   double mu = sonde_state_def(state)->friction.mu_static, push = 0, sum = 0;
+  double share = rounded(state);
   bool drawn = false;
   for (uint32_t i = 0; i < nodes; ++i) {
     double size = norm(f[i]), ahead = dot(f[i], inward);
     push += size;
     sum += ahead;
-    drawn |= !(mu > 0) && ahead < -ROUNDED * size;
+    drawn |= !(mu > 0) && ahead < -share * size;
   }
   double most = fmax(push, watch->push_n);
   watch->push_n = push;
   if (push > 1e-3) watch->least_forward = fmin(watch->least_forward, sum / most);
   if (drawn) return "a node is pulled out of the skin";
-  if (sum < -(mu + ROUNDED) * most) return "the probe is drawn into the skin";
+  if (sum < -(mu + share) * most) return "the probe is drawn into the skin";
   return NULL;
 }
 

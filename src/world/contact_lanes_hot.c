@@ -144,7 +144,8 @@ static void add_tie(sonde_lanes *lanes, const uint32_t v[3], const float slope[3
   if (l == 0) memset(to, 0, sizeof *to);
   for (int c = 0; c < 3; ++c)
     to->row[c][l] = (int32_t)v[c], to->slope[c][l] = slope[c], to->tie[c][l] = tie[c];
-  for (int c = 0; c < 3; ++c) add_tied(lanes, v[c], slope, tie[c] + tie[(c + 2) % 3]);
+  for (int c = 0; lanes->tied && c < 3; ++c)
+    add_tied(lanes, v[c], slope, tie[c] + tie[(c + 2) % 3]);
 }
 
 // One of the whole face where its points push along one slope, else one per point.

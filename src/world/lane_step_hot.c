@@ -18,14 +18,12 @@
 
 // Lists the slices that `take` marks.
 static void list_slices(sonde_lanes *lanes, const uint8_t *take) {
-  uint32_t count = 0, slots = 0;
+  uint32_t count = 0;
   for (uint32_t s = 0; s < lanes->slice_count; ++s) {
     lanes->awake[count] = s;
     count += take[s];
-    slots += take[s] ? lanes->slots_of[s] : 0;
   }
   lanes->awake_count = count;
-  lanes->slot_total = slots;
 }
 
 static void list_awake(sonde_lanes *lanes) { list_slices(lanes, lanes->is_awake); }
@@ -143,14 +141,13 @@ static bool is_slow(double before, double now, double target) {
 // Conjugate gradients from r and z, whose products are r.z and r.r. They begin at x = 0 when no
 // sweep went before: each of their steps then is one downhill, however early they end, while a
 // first sweep may overshoot where springs are stiff.
-static void conjugate(sonde_state *state, bool tied, double target, double sums[2],
-                      sonde_pcg_result *result) {
+static void conjugate(sonde_state *state, double target, double sums[2], sonde_pcg_result *result) {
   sonde_lanes *lanes = state->lanes;
   double next[2], alpha = 0, beta = 0;
   result->residual = sqrt(sums[1]);
   uint32_t most = state->def.pcg.max_iterations;
   for (bool first = true; result->residual > target && result->iterations < most; first = false) {
-    if (tied) lanes->kernels->carry(lanes, lanes->direction, false);
+    if (lanes->tied) lanes->kernels->carry(lanes, lanes->direction);
     double curvature = lanes->kernels->multiply(lanes, first);
     if (!first) curvature -= beta * sums[0] / alpha;
     if (!(curvature > 0)) break;
@@ -167,7 +164,6 @@ static void conjugate(sonde_state *state, bool tied, double target, double sums[
 typedef struct iteration {
   uint32_t number; // from 1
   bool last;       // none may follow
-  bool tied;       // with ties
   bool local;      // touched slices and those beside them only
   bool left;       // something was left to the next, local iteration
   double force2;   // (h F)^2 of the last one of all slices: extrapolation makes the first large
@@ -206,7 +202,7 @@ static void finish(sonde_state *state, iteration *now, double target, double sum
                    sonde_pcg_result *result) {
   double rough = ROUGH * result->residual;
   bool may_leave = now->local && !now->last && result->residual > HOPELESS * target;
-  conjugate(state, now->tied, may_leave ? rough : target, sums, result);
+  conjugate(state, may_leave ? rough : target, sums, result);
   now->left = may_leave && result->residual > target && result->residual <= rough;
 }
 
@@ -254,7 +250,7 @@ static const double BENT_SHARE = 0.1;
 static double untied2(sonde_state *state) {
   sonde_lanes *lanes = state->lanes;
   double sum = 0;
-  lanes->kernels->carry(lanes, lanes->probe_way, true);
+  lanes->kernels->carry(lanes, lanes->probe_way);
   for (uint32_t k = 0; k < lanes->press_count; ++k)
     for (int c = 0; c < 3; ++c)
       for (int l = 0; l < SONDE_LANES; ++l) {
@@ -276,7 +272,7 @@ static bool is_bent(sonde_state *state, double surprise2, iteration *now) {
   double limit2 = fmax(BENT_SHARE * BENT_SHARE * share * now->force2, rest2);
   now->local = bent2 <= limit2 && !state->lanes->stiff;
   if (contact2 + bent2 > limit2) return true;
-  return !now->tied && untied2(state) > fmax(share * now->force2, rest2);
+  return !state->lanes->tied && untied2(state) > fmax(share * now->force2, rest2);
 }
 
 // Finds the contact where the nodes are expected.
@@ -298,8 +294,7 @@ static bool linearise(sonde_state *state, iteration *now) {
   sonde_lanes *lanes = state->lanes;
   double start = sonde_clock_now(), sums[4];
   sonde_vec3 reaction = lanes->reaction_n;
-  bool sweep = !now->tied && !lanes->stiff;
-  lanes->tied = now->tied;
+  bool sweep = !lanes->tied && !lanes->stiff;
   lanes->kernels->linearise(lanes, sweep, sums);
   if (now->local)
     lanes->reaction_n = reaction;
@@ -317,7 +312,7 @@ static bool linearise(sonde_state *state, iteration *now) {
 static bool iterate(sonde_state *state, const sonde_probe *probe, sonde_pose pose,
                     const sonde_motion *motion, iteration *now, bool last) {
   double start = sonde_clock_now();
-  now->tied = now->number > 1 && state->def.contact_law == SONDE_CONTACT_FOUNDATION;
+  state->lanes->tied = now->number > 1 && state->def.contact_law == SONDE_CONTACT_FOUNDATION;
   touch(state, probe, pose, motion);
   mark_near(state->lanes);
   if (now->local) list_near(state->lanes);

@@ -16,15 +16,15 @@
 // Of face_marked.
 static size_t mark_words(const sonde_lanes *l) { return l->face_slice_count / 64 + 1; }
 
-static size_t box_count(const sonde_lanes *l) {
-  return (l->slice_count + SONDE_LANES - 1) / SONDE_LANES;
-}
+// Vectors for so many numbers.
+static uint32_t vectors_of(uint32_t count) { return (count + SONDE_LANES - 1) / SONDE_LANES; }
 
 #define CARVE(field, count) (l->field = sonde_carve(base, &offset, (count), sizeof *l->field))
 
 static size_t carve(sonde_lanes *l, uint32_t faces, char *base) {
   size_t offset = 0, rows = (size_t)l->slice_count * SONDE_LANES;
-  CARVE(model, l->slice_count), CARVE(box, box_count(l)), CARVE(slice, l->slice_count);
+  CARVE(model, l->slice_count), CARVE(box, vectors_of(l->slice_count)),
+      CARVE(slice, l->slice_count);
   CARVE(slot, l->slot_count), CARVE(tangent, l->slot_count), CARVE(share, l->slot_count);
   CARVE(slot_layer, l->law.layered ? l->slot_count : 0);
   CARVE(slot_face, l->law.layered ? l->slot_count : 0);
@@ -38,7 +38,7 @@ static size_t carve(sonde_lanes *l, uint32_t faces, char *base) {
   CARVE(awake, l->slice_count);
   CARVE(is_awake, l->slice_count), CARVE(calm, l->slice_count);
   CARVE(face_marked, mark_words(l)), CARVE(face_code, l->face_slice_count);
-  CARVE(is_near, l->slice_count), CARVE(near_list, l->slice_count), CARVE(slots_of, l->slice_count);
+  CARVE(is_near, l->slice_count), CARVE(near_list, l->slice_count);
   CARVE(speed2, l->slice_count), CARVE(way2, l->slice_count), CARVE(unrest2, l->slice_count);
   CARVE(published, l->slice_count), CARVE(touched_rows, l->slice_count);
   CARVE(near_probe, l->slice_count), CARVE(near_code, l->slice_count);
@@ -46,7 +46,7 @@ static size_t carve(sonde_lanes *l, uint32_t faces, char *base) {
   CARVE(probe_way, rows * SONDE_QUAD);
   CARVE(probe.plane, SONDE_MAX_PROBE_PLANES), CARVE(probe.slope, SONDE_MAX_PROBE_PLANES);
   CARVE(pressed_slice, l->slice_count > l->face_slice_count ? l->slice_count : l->face_slice_count);
-  CARVE(press_corners, 1), CARVE(meet_corners, 1), CARVE(carried, 3 * SONDE_LANES);
+  CARVE(press_corners, 1), CARVE(meet_corners, 1);
   CARVE(tie, SONDE_FACE_POINTS * (size_t)faces / SONDE_LANES + 1);
   return offset;
 }
@@ -160,11 +160,10 @@ static void fill_springs(sonde_slice_model *fixed, const sonde_model *model, uin
 }
 
 static void empty_boxes(sonde_lanes *lanes) {
-  for (size_t k = 0; k < box_count(lanes) * SONDE_LANES; ++k)
-    for (int c = 0; c < 3; ++c) {
-      lanes->box[k / SONDE_LANES].low[c][k % SONDE_LANES] = 1e30f;
-      lanes->box[k / SONDE_LANES].high[c][k % SONDE_LANES] = -1e30f;
-    }
+  for (uint32_t k = 0; k < vectors_of(lanes->slice_count); ++k)
+    for (int c = 0; c < 3; ++c)
+      for (int l = 0; l < SONDE_LANES; ++l)
+        lanes->box[k].low[c][l] = 1e30f, lanes->box[k].high[c][l] = -1e30f;
 }
 
 static void fill_slice(sonde_lanes *lanes, const sonde_model *model, uint32_t s) {
@@ -319,7 +318,6 @@ static void fill(sonde_lanes *lanes, const sonde_model *model, const uint32_t *p
   empty_boxes(lanes);
   for (uint32_t s = 0; s < lanes->slice_count; ++s) {
     const sonde_slice_model *fixed = &lanes->model[s];
-    lanes->slots_of[s] = fixed->slot_count;
     fill_slice(lanes, model, s);
     list_near(lanes, model, place, s, lanes->near + fixed->first_near,
               lanes->face_near + fixed->first_face);
@@ -374,8 +372,8 @@ static void close_workshop(workshop *shop) {
 static void begin(sonde_lanes *lanes, const sonde_model *model, const sonde_world_def *def,
                   const uint32_t *face_order) {
   uint32_t n = model->surface.vertex_count, faces = model->surface.face_count;
-  lanes->slice_count = (n + SONDE_LANES - 1) / SONDE_LANES;
-  lanes->face_slice_count = (faces + SONDE_LANES - 1) / SONDE_LANES;
+  lanes->slice_count = vectors_of(n);
+  lanes->face_slice_count = vectors_of(faces);
   lanes->node_count = n;
   lanes->face_order = face_order;
   lanes->law = law_of(&model->law, def);

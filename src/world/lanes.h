@@ -107,8 +107,8 @@ typedef struct sonde_lane_kernels {
   void (*meet_nodes)(const sonde_lanes *lanes, const sonde_pressed_slice *at, bool surprise,
                      sonde_meet_corners *to);
   // What the ties take from the product of the matrix with vectors [rows][4], into carry[] of
-  // press[]: from that of whole rows, or of what tied[] leaves of them
-  void (*carry)(sonde_lanes *lanes, const float *vectors, bool whole);
+  // press[]: from that of whole rows, or, where they are tied, of what tied[] leaves of them
+  void (*carry)(sonde_lanes *lanes, const float *vectors);
 } sonde_lane_kernels;
 
 struct sonde_lanes {
@@ -140,7 +140,6 @@ struct sonde_lanes {
   uint32_t pressed_slice_count;
   sonde_press_corners *press_corners; // [1] of the slice at hand
   sonde_meet_corners *meet_corners;   // [1]
-  sonde_quad *carried;                // [3][16] scratch of carry()
   uint16_t *touched_rows;             // [slices] lanes that the probe touches
   sonde_lane_index (*face)[3];        // [slices of faces] their corners
   sonde_lane *point_area;             // [slices of faces] a quarter of a face's at rest; 0: no face
@@ -169,8 +168,7 @@ struct sonde_lanes {
   uint32_t *near_code;  // of these: planes of the probe that all of the slice's nodes are beyond
   uint32_t near_probe_count;
   sonde_vec3 reaction_n;
-  uint32_t *slots_of;   // [slices] their slot_count
-  uint32_t slot_total;  // of the waking slices
+  uint32_t slot_total;  // of the slices last linearised
   uint64_t bytes_moved; // by the last step, see count_bytes()
   bool stiff;           // too stiff for sweeps
   bool tied;            // ties take part in the linear system at hand

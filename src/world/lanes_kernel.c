@@ -70,9 +70,9 @@ INLINE void add_rank_one(sonde_lane block[6], const sonde_lane n[3], sonde_lane 
   block[5] += scale * n[2] * n[2] + flat;
 }
 
-// The motion of a slice's rows where it is evaluated.
+// The motion of a slice's rows where it is evaluated, and their indentation there.
 typedef struct place {
-  sonde_lane ue[3], ve[3];
+  sonde_lane ue[3], ve[3], indentation;
 } place;
 
 // The spring-damper of an edge, seen from the row; the neighbour finds the opposite, bit for bit.
@@ -196,7 +196,7 @@ INLINE sonde_lane normal_pressure(const sonde_slice_model *fixed, int exponent, 
 INLINE void add_anchor(const sonde_lane_law *law, const sonde_slice_model *fixed, const place *at,
                        node_sum *sum) {
   const sonde_lane *n = fixed->normal;
-  sonde_lane s = -dot(n, at->ue), rate = dot(n, at->ve), slope;
+  sonde_lane s = at->indentation, rate = dot(n, at->ve), slope;
   sonde_lane pressure = normal_pressure(fixed, law->exponent, s, &slope);
   sonde_lane damper = law->normal_damping_s * fixed->k0 * fixed->area;
   sonde_lane tangent = law->tangential * fixed->area, slow = law->normal_damping_s * tangent;
@@ -219,7 +219,7 @@ INLINE void add_springs(sonde_lanes *lanes, const sonde_slice_model *fixed, coup
   for (uint32_t k = first; by.springs && k < first + fixed->slot_count; ++k)
     add_spring(&lanes->law, &lanes->slot[k], k < first + whole ? all(1) : lanes->share[k],
                lanes->record, at, sum, &lanes->tangent[k]);
-  if (by.layers) add_layers(lanes, fixed, -dot(fixed->normal, at->ue), sum);
+  if (by.layers) add_layers(lanes, fixed, at->indentation, sum);
   add_anchor(&lanes->law, fixed, at, sum);
 }
 
@@ -279,6 +279,7 @@ INLINE void linearise_slice(sonde_lanes *lanes, uint32_t s, coupled by, bool mov
   node_sum sum = {{{0}}, {{0}}, {0}, {0}, {{0}}, {0}};
   place here;
   for (int c = 0; c < 3; ++c) here.ve[c] = at->ve[c], here.ue[c] = at->u[c] + h * at->ve[c];
+  here.indentation = -dot(fixed->normal, here.ue);
   add_springs(lanes, fixed, by, &here, &sum);
   for (int c = 0; c < 3; ++c) sums->reaction[c] += widen(sum.force[c]);
   if (lanes->press_of[s]) add_press(&lanes->press[lanes->press_of[s] - 1], lanes->tied, &sum);
@@ -288,7 +289,6 @@ INLINE void linearise_slice(sonde_lanes *lanes, uint32_t s, coupled by, bool mov
     r[c] = force[c] - fixed->mass * (here.ve[c] - at->v[c]);
     if (by.layers) r[c] -= sum.pending * fixed->normal[c];
   }
-  sonde_lane indentation = -dot(fixed->normal, here.ue);
   sonde_lane yield = fixed->yield / h, force2 = dot(force, force);
   lanes->unrest2[s] = most(force2 * (yield * yield));
   factorise(sum.block, at->factor);
@@ -303,14 +303,16 @@ INLINE void linearise_slice(sonde_lanes *lanes, uint32_t s, coupled by, bool mov
   sums->rz += widen(dot(r, x));
   sums->ff += widen(force2);
   if (moves && by.springs) publish_place(lanes, s, here.ve, here.ue);
-  if (moves && by.layers) publish_slide(lanes, s, here.ue, indentation, dot(fixed->normal, x));
+  if (moves && by.layers) publish_slide(lanes, s, here.ue, here.indentation, dot(fixed->normal, x));
   publish_direction(lanes, s, x);
 }
 
 static void linearise(sonde_lanes *lanes, bool moves, double sums[4]) {
   const sonde_lane_law *law = &lanes->law;
   sums_of_rows all_rows = {{{0}}, {0}, {0}, {{0}}};
+  lanes->slot_total = 0;
   for (uint32_t a = 0; a < lanes->awake_count; ++a) {
+    lanes->slot_total += lanes->model[lanes->awake[a]].slot_count;
     if (law->springs && law->layered)
       linearise_slice(lanes, lanes->awake[a], (coupled){true, true}, moves, &all_rows);
     else if (law->layered)

@@ -356,9 +356,10 @@ static void meet_nodes(const sonde_lanes *lanes, const sonde_pressed_slice *at, 
   for (int c = 0; c < 3; ++c) to->surprise[0][c] += met * by.slope[0][c];
 }
 
-// What a group of ties makes of vectors goes to carried[], corner by corner.
-INLINE void carry_ties(const sonde_lanes *lanes, const sonde_press_ties *tie, const float *vectors,
-                       bool whole) {
+// What a group of ties makes of vectors, corner by corner: with ties in the system the diagonal
+// blocks have the corners' own part.
+INLINE void carry_ties(const sonde_press_ties *tie, const float *vectors, bool tied,
+                       sonde_quad pushes[3][SONDE_LANES]) {
   sonde_lane along[3];
   for (int c = 0; c < 3; ++c) {
     sonde_lane z[4];
@@ -367,25 +368,26 @@ INLINE void carry_ties(const sonde_lanes *lanes, const sonde_press_ties *tie, co
   }
   for (int c = 0; c < 3; ++c) {
     int i = (c + 1) % 3, j = (c + 2) % 3;
-    sonde_lane own = whole ? along[c] : all(0);
+    sonde_lane own = tied ? all(0) : along[c];
     sonde_lane push = tie->tie[c] * (own - along[i]) + tie->tie[j] * (own - along[j]);
     const sonde_lane out[4] = {
         push * tie->slope[0], push * tie->slope[1], push * tie->slope[2], {0}};
-    write_records((float *)(lanes->carried + c * SONDE_LANES), SONDE_QUAD, out);
+    write_records((float *)pushes[c], SONDE_QUAD, out);
   }
 }
 
-static void carry(sonde_lanes *lanes, const float *vectors, bool whole) {
+static void carry(sonde_lanes *lanes, const float *vectors) {
+  sonde_quad pushes[3][SONDE_LANES];
   for (uint32_t k = 0; k < lanes->press_count; ++k)
     for (int l = 0; l < SONDE_LANES; ++l) lanes->press[k].carry[l] = (sonde_quad){0};
   for (uint32_t k = 0; k < lanes->tie_count; ++k) {
     const sonde_press_ties *tie = &lanes->tie[k / SONDE_LANES];
     uint32_t l = k % SONDE_LANES;
-    if (l == 0) carry_ties(lanes, tie, vectors, whole);
+    if (l == 0) carry_ties(tie, vectors, lanes->tied, pushes);
     for (uint32_t c = 0; c < 3; ++c) {
       uint32_t row = (uint32_t)tie->row[c][l], at = lanes->press_of[row / SONDE_LANES];
       SONDE_ASSERT(at > 0);
-      lanes->press[at - 1].carry[row % SONDE_LANES] += lanes->carried[c * SONDE_LANES + l];
+      lanes->press[at - 1].carry[row % SONDE_LANES] += pushes[c][l];
     }
   }
 }
