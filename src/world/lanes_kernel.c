@@ -389,13 +389,17 @@ static double sweep(sonde_lanes *lanes, double *far2) {
   return *far2 + total(rr[1]);
 }
 
+// The last sweep left a slice what those after it and its own rows moved since: moves of slices
+// before it, which it saw, are taken back before it looks.
 static void restart(sonde_lanes *lanes, double sums[2]) {
   lane_double rz = {0}, rr = {0};
+  const sonde_lane none[3] = {{0}, {0}, {0}};
   for (uint32_t a = 0; a < lanes->awake_count; ++a) {
     sonde_slice *at = &lanes->slice[lanes->awake[a]];
     sonde_lane q[3] = {{0}, {0}, {0}};
     couple(lanes, lanes->awake[a], q);
     for (int c = 0; c < 3; ++c) at->r[c] = -q[c];
+    publish_direction(lanes, lanes->awake[a], none);
   }
   for (uint32_t a = 0; a < lanes->awake_count; ++a) {
     sonde_slice *at = &lanes->slice[lanes->awake[a]];

@@ -5,6 +5,8 @@
 #include "world/lanes.h"
 #include "world/state.h"
 
+#include "base/random.h"
+
 typedef struct scene {
   sonde_model *model;
   sonde_state *state;
@@ -151,6 +153,55 @@ static void rests_in_equilibrium(void **state) {
   clear(&s);
 }
 
+// A body at rest whose nodes move at random, all of it taking part.
+static void stir(scene *s) {
+  sonde_lanes *lanes = s->state->lanes;
+  const sonde_vec3 *rest = s->model->surface.vertices;
+  sonde_vec3 *velocity = calloc(s->n, sizeof *velocity);
+  assert_non_null(velocity);
+  for (uint32_t i = 0; i < s->n; ++i)
+    velocity[i] = v_scale(
+        vec3(sonde_random_normal(3, i), sonde_random_normal(4, i), sonde_random_normal(5, i)),
+        1e-3);
+  sonde_lanes_import(lanes, rest, rest, velocity, true);
+  free(velocity);
+  lanes->awake_count = lanes->slice_count;
+  for (uint32_t k = 0; k < lanes->slice_count; ++k) lanes->awake[k] = k, lanes->is_near[k] = 0;
+}
+
+// What sweeps leave, as conjugate gradients take it over, is the residual of their solution.
+static void sweeps_leave_the_residual_of_their_solution(void **state) {
+  (void)state;
+  const couplings strong[] = {
+      {800, 0, 0}, {800, 150, 700}, {0, 150, 700}, {0, 0, 700}, {0, 150, 0}};
+  for (size_t kind = 0; kind < SONDE_COUNT_OF(strong); ++kind) {
+    sonde_world_def def = fast_def();
+    scene s = make_coupled(strong[kind], 4, "point", &def);
+    sonde_lanes *lanes = s.state->lanes;
+    double sums[4], far2, product[2], off2 = 0, left2 = 0;
+    lanes->law.edge_compression = 1; // linear about the place at rest
+    stir(&s);
+    lanes->kernels->linearise(lanes, true, sums);
+    for (int k = 0; k < 2; ++k) (void)lanes->kernels->sweep(lanes, &far2);
+    lanes->kernels->restart(lanes, product);
+    sonde_vec3 *left = calloc(s.n, sizeof *left);
+    assert_non_null(left);
+    for (uint32_t i = 0; i < s.n; ++i)
+      left[i] = sonde_lane_vector(lanes->slice[i / SONDE_LANES].r, i % SONDE_LANES);
+    lanes->kernels->accept(lanes);
+    lanes->kernels->linearise(lanes, false, sums);
+    for (uint32_t i = 0; i < s.n; ++i) {
+      sonde_vec3 r = sonde_lane_vector(lanes->slice[i / SONDE_LANES].r, i % SONDE_LANES);
+      off2 += v_norm2(v_sub(r, left[i])), left2 += v_norm2(left[i]);
+    }
+    assert_true(left2 > 0);
+    assert_near(product[1], left2, 1e-5 * left2);
+    assert_true(sqrt(off2 / left2) < 0.01);
+    free(left);
+    clear(&s);
+  }
+}
+
 // Newton's method of at most `most` iterations: how far a run is from one solved to the end.
 static double distance_from_solved(uint32_t most, double stop_m, int steps) {
   sonde_world_def def = fast_def();
@@ -290,6 +341,7 @@ int main(void) {
       cmocka_unit_test(instruction_sets_agree_to_the_bit),
       cmocka_unit_test(follows_the_double_engine),
       cmocka_unit_test(rests_in_equilibrium),
+      cmocka_unit_test(sweeps_leave_the_residual_of_their_solution),
       cmocka_unit_test(iterates_where_one_is_not_enough),
       cmocka_unit_test(iterates_once_where_that_is_enough),
       cmocka_unit_test(sleeping_is_harmless_and_ends),
