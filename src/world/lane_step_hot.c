@@ -8,7 +8,7 @@
 // touch, linearise, iterate: one Newton iteration; is_bent: whether it needs another.
 // rest:      slices that stopped moving fall asleep, movers wake their neighbours.
 #include "world/contact.h"
-#include "world/lanes.h"
+#include "world/lane_parts.h"
 
 #include "base/base.h"
 #include "base/clock.h"
@@ -19,9 +19,12 @@
 // Lists the slices that `take` marks.
 static void list_slices(sonde_lanes *lanes, const uint8_t *take) {
   uint32_t count = 0;
-  for (uint32_t s = 0; s < lanes->slice_count; ++s) {
-    lanes->awake[count] = s;
-    count += take[s];
+  for (uint32_t part = 0; part < SONDE_PARTS; ++part) {
+    for (uint32_t s = lanes->part_slice[part]; s < lanes->part_slice[part + 1]; ++s) {
+      lanes->awake[count] = s;
+      count += take[s];
+    }
+    lanes->part_awake[part + 1] = count;
   }
   lanes->awake_count = count;
 }
@@ -141,21 +144,22 @@ static bool is_slow(double before, double now, double target) {
 // Conjugate gradients from r and z, whose products are r.z and r.r. They begin at x = 0 when no
 // sweep went before: each of their steps then is one downhill, however early they end, while a
 // first sweep may overshoot where springs are stiff.
-static void conjugate(sonde_state *state, double target, double sums[2], sonde_pcg_result *result) {
+static void conjugate(sonde_state *state, double target, sonde_lane_sums sums,
+                      sonde_pcg_result *result) {
   sonde_lanes *lanes = state->lanes;
-  double next[2], alpha = 0, beta = 0;
-  result->residual = sqrt(sums[1]);
+  double alpha = 0, beta = 0;
+  result->residual = sqrt(sums.left2);
   uint32_t most = state->def.pcg.max_iterations;
   for (bool first = true; result->residual > target && result->iterations < most; first = false) {
     if (lanes->tied) lanes->kernels->carry(lanes, lanes->direction);
-    double curvature = lanes->kernels->multiply(lanes, first);
-    if (!first) curvature -= beta * sums[0] / alpha;
+    double curvature = sonde_parts_multiply(lanes, first);
+    if (!first) curvature -= beta * sums.product / alpha;
     if (!(curvature > 0)) break;
-    alpha = sums[0] / curvature;
-    lanes->kernels->advance(lanes, first, (float)alpha, (float)beta, next);
-    beta = next[0] / sums[0];
-    sums[0] = next[0];
-    result->residual = sqrt(next[1]);
+    alpha = sums.product / curvature;
+    sonde_lane_sums next = sonde_parts_advance(lanes, first, (float)alpha, (float)beta);
+    beta = next.product / sums.product;
+    sums = next;
+    result->residual = sqrt(next.left2);
     result->iterations++;
   }
 }
@@ -178,27 +182,28 @@ static const double HOPELESS = 30;
 static const double ROUGH = 0.1; // of its first residual is what such an iteration may leave
 
 // Sweeps until little is left, or little beside what the next iteration does; returns their number.
-static uint32_t sweep_all(sonde_state *state, iteration *now, const double sums[4], double target,
+static uint32_t sweep_all(sonde_state *state, iteration *now, sonde_lane_sums sums, double target,
                           sonde_pcg_result *result) {
   sonde_lanes *lanes = state->lanes;
   bool may_leave = !now->last && now->number == 1 && lanes->awake_count > FEW * lanes->near_count;
-  double found = result->residual, far2 = sums[3];
+  double found = result->residual;
   bool slow = false;
   uint32_t sweeps = 0, most = state->def.pcg.max_iterations;
-  now->left = may_leave && far2 <= FAR_SHARE * target * target && found > HOPELESS * target;
+  now->left = may_leave && sums.far2 <= FAR_SHARE * target * target && found > HOPELESS * target;
   while (result->residual > target && sweeps < most && !slow && !now->left) {
     double before = found;
-    found = sqrt(lanes->kernels->sweep(lanes, &far2));
+    sums = sonde_parts_sweep(lanes);
+    found = sqrt(sums.left2);
     sweeps++;
     result->residual = found * fmin(found / before, 1);
     slow = is_slow(before, found, target);
-    now->left = result->residual > target && may_leave && far2 <= FAR_SHARE * target * target;
+    now->left = result->residual > target && may_leave && sums.far2 <= FAR_SHARE * target * target;
   }
   return sweeps;
 }
 
 // Conjugate gradients for what is left.
-static void finish(sonde_state *state, iteration *now, double target, double sums[2],
+static void finish(sonde_state *state, iteration *now, double target, sonde_lane_sums sums,
                    sonde_pcg_result *result) {
   double rough = ROUGH * result->residual;
   bool may_leave = now->local && !now->last && result->residual > HOPELESS * target;
@@ -209,20 +214,19 @@ static void finish(sonde_state *state, iteration *now, double target, double sum
 // sums: of the linearisation. From the residual that the first sweep found on; what a sweep leaves
 // is what it found times the pace. Without sweeps by conjugate gradients at once. False when there
 // was nothing left to solve.
-static bool solve(sonde_state *state, iteration *now, bool sweep, const double sums[4],
+static bool solve(sonde_state *state, iteration *now, bool sweep, sonde_lane_sums sums,
                   double reference) {
   sonde_lanes *lanes = state->lanes;
   const sonde_pcg_options *options = &state->def.pcg;
-  double products[2] = {sums[2], sums[0]};
-  sonde_pcg_result result = {.reference = reference, .residual = sqrt(sums[0])};
+  sonde_pcg_result result = {.reference = reference, .residual = sqrt(sums.left2)};
   double target = fmax(options->relative_residual * reference, options->absolute_residual);
   bool solved = result.residual > target;
   now->left = false;
   uint32_t sweeps = sweep ? sweep_all(state, now, sums, target, &result) : 0;
   result.iterations = sweeps;
   if (result.residual > target && !now->left) {
-    if (sweep) lanes->kernels->restart(lanes, products);
-    finish(state, now, target, products, &result);
+    if (sweep) sums = sonde_parts_restart(lanes);
+    finish(state, now, target, sums, &result);
   }
   result.converged = result.residual <= target || now->left;
   if (!result.converged) state->flags |= SONDE_FLAG_NOT_CONVERGED;
@@ -267,7 +271,7 @@ static bool is_bent(sonde_state *state, double surprise2, iteration *now) {
   double h = state->def.dt_s, rest2 = state->def.pcg.absolute_residual;
   double share = state->def.pcg.relative_residual * state->def.pcg.relative_residual;
   double contact2 = h * h * surprise2;
-  double bent2 = state->lanes->kernels->bend(state->lanes);
+  double bent2 = sonde_parts_bend(state->lanes);
   rest2 *= rest2;
   double limit2 = fmax(BENT_SHARE * BENT_SHARE * share * now->force2, rest2);
   now->local = bent2 <= limit2 && !state->lanes->stiff;
@@ -292,14 +296,14 @@ static void touch(sonde_state *state, const sonde_probe *probe, sonde_pose pose,
 // left to solve.
 static bool linearise(sonde_state *state, iteration *now) {
   sonde_lanes *lanes = state->lanes;
-  double start = sonde_clock_now(), sums[4];
+  double start = sonde_clock_now();
   sonde_vec3 reaction = lanes->reaction_n;
   bool sweep = !lanes->tied && !lanes->stiff;
-  lanes->kernels->linearise(lanes, sweep, sums);
+  sonde_lane_sums sums = sonde_parts_linearise(lanes, sweep);
   if (now->local)
     lanes->reaction_n = reaction;
   else
-    now->force2 = sums[1];
+    now->force2 = sums.force2;
   double assembled = sonde_clock_now();
   bool solved = solve(state, now, sweep, sums, sqrt(now->force2));
   state->times.assembly_s += assembled - start;
@@ -416,7 +420,7 @@ bool sonde_lane_step(sonde_state *state, const sonde_probe *probe, sonde_pose po
   iteration now = {.number = 1};
   uint32_t most = state->def.newton_iterations;
   for (; iterate(state, probe, pose, motion, &now, now.number >= most); now.number++) {
-    lanes->kernels->accept(lanes);
+    sonde_parts_accept(lanes);
     list_awake(lanes);
   }
   list_awake(lanes);
@@ -424,7 +428,7 @@ bool sonde_lane_step(sonde_state *state, const sonde_probe *probe, sonde_pose po
   if (probe) sonde_friction_advance(state, motion);
   sonde_contact_wrench(state, pose.position);
   state->contact.reaction_n = lanes->reaction_n;
-  double size = lanes->kernels->update(lanes);
+  double size = sonde_parts_update(lanes);
   lanes->bytes_moved += sizeof(sonde_lane) * UPDATED_PER_SLICE * lanes->awake_count;
   bool finite = isfinite(size) && v_finite(state->contact.force_n);
   if (finite) rest(state);

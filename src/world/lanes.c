@@ -1,10 +1,12 @@
 // Laying out a model for the fast engine; cold.
 // carve:       all arrays in one block; measured and placed by the same code.
+// list_seen:   rows at the border between the two parts of a large body.
 // fill_row:    neighbours of every row, padded to the slice's largest number.
 // fill_springs, fill_shear: what a tuning changes.
 // fill_faces:  faces in slices of 16, for the contact.
 // list_near:   slices that share an edge, and slices of faces that touch a slice.
 #include "tissue/two_layer.h"
+#include "world/crew.h"
 #include "world/lanes.h"
 
 #include "base/base.h"
@@ -22,7 +24,7 @@ static uint32_t vectors_of(uint32_t count) { return (count + SONDE_LANES - 1) / 
 #define CARVE(field, count) (l->field = sonde_carve(base, &offset, (count), sizeof *l->field))
 
 static size_t carve(sonde_lanes *l, uint32_t faces, char *base) {
-  size_t offset = 0, rows = (size_t)l->slice_count * SONDE_LANES;
+  size_t offset = 0, rows = (size_t)l->slice_count * SONDE_LANES, all = rows + l->seen_count;
   CARVE(model, l->slice_count), CARVE(box, vectors_of(l->slice_count)),
       CARVE(slice, l->slice_count);
   CARVE(slot, l->slot_count), CARVE(tangent, l->slot_count), CARVE(share, l->slot_count);
@@ -32,9 +34,10 @@ static size_t carve(sonde_lanes *l, uint32_t faces, char *base) {
   CARVE(press, l->slice_count), CARVE(press_of, l->slice_count), CARVE(pressed, l->slice_count);
   CARVE(face, l->face_slice_count), CARVE(point_area, l->face_slice_count);
   CARVE(near, l->near_total), CARVE(face_near, l->face_total);
-  CARVE(record, l->law.springs ? rows * SONDE_RECORD : 0), CARVE(direction, rows * SONDE_QUAD);
-  CARVE(slide, l->law.layered ? rows * SONDE_RECORD : 0);
-  CARVE(layer_direction, l->law.layered ? rows * SONDE_QUAD : 0);
+  CARVE(record, l->law.springs ? all * SONDE_RECORD : 0), CARVE(direction, all * SONDE_QUAD);
+  CARVE(slide, l->law.layered ? all * SONDE_RECORD : 0);
+  CARVE(layer_direction, l->law.layered ? all * SONDE_QUAD : 0);
+  CARVE(seen, l->seen_count), CARVE(seen_at, l->seen_count > 0 ? rows : 0);
   CARVE(awake, l->slice_count);
   CARVE(is_awake, l->slice_count), CARVE(calm, l->slice_count);
   CARVE(face_marked, mark_words(l)), CARVE(face_code, l->face_slice_count);
@@ -86,6 +89,36 @@ static uint32_t edge_between(const sonde_topology *t, uint32_t i, uint32_t j) {
   return t->neighbour_edge[k];
 }
 
+// Which part a row belongs to.
+static uint32_t part_of(const sonde_lanes *lanes, uint32_t row) {
+  return lanes->part_count > 1 && row / SONDE_LANES >= lanes->part_slice[1];
+}
+
+static bool is_seen(const sonde_lanes *lanes, const sonde_topology *t, uint32_t i) {
+  for (uint32_t k = t->start[i]; k < t->start[i + 1]; ++k)
+    if (part_of(lanes, t->neighbour[k]) != part_of(lanes, i)) return true;
+  return false;
+}
+
+// Rows that the other part sees; those of the last part, which the first one sees, come last.
+static void list_seen(sonde_lanes *lanes, const sonde_topology *t) {
+  uint32_t count = 0, half = 0;
+  if (lanes->seen_count == 0) return;
+  for (uint32_t i = 0; i < t->vertex_count; ++i) {
+    if (!is_seen(lanes, t, i)) continue;
+    half += part_of(lanes, i) == 0;
+    lanes->seen[count] = i;
+    lanes->seen_at[i] = lanes->slice_count * SONDE_LANES + count++;
+  }
+  SONDE_ASSERT(count == lanes->seen_count);
+  lanes->part_seen[1] = half, lanes->part_seen[2] = count;
+}
+
+// Where row i reads what row j has published.
+static int32_t seen_from(const sonde_lanes *lanes, uint32_t i, uint32_t j) {
+  return (int32_t)(part_of(lanes, i) == part_of(lanes, j) ? j : lanes->seen_at[j]);
+}
+
 // The spring to the neighbour of slot k; one that has a slot already has no spring here.
 static void fill_spring(sonde_lanes *lanes, const sonde_model *model, uint32_t i, uint32_t k,
                         const sonde_fan *fan) {
@@ -104,7 +137,7 @@ static void fill_spring(sonde_lanes *lanes, const sonde_model *model, uint32_t i
   }
   for (uint32_t before = 0; used && before < k; ++before)
     if (fan->node[before] == j) share = 0;
-  lanes->tangent[fixed->first_slot + k].node[l] = (int32_t)j;
+  lanes->tangent[fixed->first_slot + k].node[l] = seen_from(lanes, i, j);
   slot->rest[0][l] = (float)d.x, slot->rest[1][l] = (float)d.y, slot->rest[2][l] = (float)d.z;
   slot->length[l] = (float)length;
   lanes->share[fixed->first_slot + k][l] = (float)share;
@@ -125,7 +158,7 @@ static void fill_layers(sonde_lanes *lanes, const sonde_model *model, uint32_t i
   sonde_slice_model *fixed = &lanes->model[i / SONDE_LANES];
   sonde_slot_layer *layer = &lanes->slot_layer[fixed->first_slot + k];
   lanes->slot_from[fixed->first_slot + k][l] = (int32_t)f;
-  layer->node[l] = (int32_t)(k < fan->count ? fan->node[k] : i);
+  layer->node[l] = seen_from(lanes, i, k < fan->count ? fan->node[k] : i);
   if (f == SONDE_NO_FACE) return;
   const uint32_t *v = model->surface.faces[f];
   uint32_t own = v[0] == i ? 0 : v[1] == i ? 1 : 2;
@@ -143,7 +176,7 @@ static void fill_row(sonde_lanes *lanes, const sonde_model *model, uint32_t i, s
   uint32_t l = i % SONDE_LANES;
   sonde_slice_model *fixed = &lanes->model[i / SONDE_LANES];
   order_slots(model, lanes->law.layered, i, fan);
-  fixed->last[l] = (int32_t)fan->last;
+  fixed->last[l] = seen_from(lanes, i, fan->last);
   fixed->turn[l] = (int32_t)fan->turn;
   if (l == 0) fixed->whole_count = fixed->slot_count;
   for (uint32_t k = 0; k < fixed->slot_count; ++k) {
@@ -298,6 +331,8 @@ static void measure(sonde_lanes *lanes, const sonde_model *model, const uint32_t
   const sonde_topology *t = &model->topology;
   size_t most = (size_t)most_around(t) * SONDE_LANES + 1;
   lanes->model = sizes;
+  for (uint32_t i = 0; lanes->part_count > 1 && i < t->vertex_count; ++i)
+    lanes->seen_count += is_seen(lanes, t, i);
   for (uint32_t s = 0; s < lanes->slice_count; ++s) {
     uint32_t left = t->vertex_count - s * SONDE_LANES;
     sizes[s].used = left < SONDE_LANES ? left : SONDE_LANES;
@@ -316,6 +351,7 @@ static void fill(sonde_lanes *lanes, const sonde_model *model, const uint32_t *p
                  const sonde_slice_model *sizes, sonde_fan *fan) {
   memcpy(lanes->model, sizes, lanes->slice_count * sizeof *sizes);
   empty_boxes(lanes);
+  list_seen(lanes, &model->topology);
   for (uint32_t s = 0; s < lanes->slice_count; ++s) {
     const sonde_slice_model *fixed = &lanes->model[s];
     fill_slice(lanes, model, s);
@@ -374,6 +410,9 @@ static void begin(sonde_lanes *lanes, const sonde_model *model, const sonde_worl
   uint32_t n = model->surface.vertex_count, faces = model->surface.face_count;
   lanes->slice_count = vectors_of(n);
   lanes->face_slice_count = vectors_of(faces);
+  lanes->part_count = n < SONDE_PART_NODES ? 1 : SONDE_PARTS;
+  for (uint32_t k = 1; k <= SONDE_PARTS; ++k)
+    lanes->part_slice[k] = k < lanes->part_count ? lanes->slice_count / 2 : lanes->slice_count;
   lanes->node_count = n;
   lanes->face_order = face_order;
   lanes->law = law_of(&model->law, def);
@@ -388,7 +427,9 @@ sonde_status sonde_lanes_create(const sonde_model *model, const sonde_world_def 
   sonde_lanes *lanes = SONDE_NEW(sonde_lanes, 1);
   if (!lanes) return sonde_fail_memory(error);
   begin(lanes, model, def, face_order);
-  sonde_status status = open_workshop(&shop, model, lanes->slice_count, face_order, error);
+  sonde_status status = SONDE_OK;
+  if (def->threads > 1 && lanes->part_count > 1) status = sonde_crew_create(&lanes->crew, error);
+  if (!status) status = open_workshop(&shop, model, lanes->slice_count, face_order, error);
   if (!status) {
     measure(lanes, model, shop.place, shop.sizes, shop.lists, &shop.fan);
     status = allocate(lanes, model->surface.face_count, error);
@@ -405,6 +446,7 @@ sonde_status sonde_lanes_create(const sonde_model *model, const sonde_world_def 
 
 void sonde_lanes_destroy(sonde_lanes *lanes) {
   if (!lanes) return;
+  sonde_crew_destroy(lanes->crew);
   sonde_free(lanes->block);
   sonde_free(lanes);
 }

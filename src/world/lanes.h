@@ -74,24 +74,39 @@ typedef struct sonde_lane_law {
 
 typedef struct sonde_lanes sonde_lanes;
 
-// Kernels of one instruction set; every set gives the same bits.
+// Two parts of a large body, halves of its slices, are stepped beside each other. Within a part
+// slices see what those before them moved; of the other part they see the rows that they touch as
+// these were when the kernel began, copied behind the body's own rows.
+enum { SONDE_PARTS = 2, SONDE_PART_NODES = 16384 };
+
+// What a kernel sums up over the rows of a part.
+typedef struct sonde_lane_sums {
+  double left2, far2; // r.r, and of what is_near leaves out; of sweeps as each slice found it
+  double force2;      // (h F)^2
+  double product;     // r.z
+  sonde_vec3 reaction_n;
+  uint32_t slots;
+} sonde_lane_sums;
+
+// Kernels of one instruction set, the first ones over one part; every set gives the same bits.
 typedef struct sonde_lane_kernels {
   const char *name;
-  // r = h F - M (ve - v), matrix; r.r, (h F)^2, r.z, r.r of what is_near leaves out; reaction.
-  // `sweep`: x = D^-1 r slice by slice, and each sees where those before it went; else the matrix
-  // is symmetric, x = 0, z = D^-1 r
-  void (*linearise)(sonde_lanes *lanes, bool sweep, double sums[4]);
-  // x += D^-1 r, slice by slice; r.r as each slice found it, far2: of those that is_near leaves out
-  double (*sweep)(sonde_lanes *lanes, double *far2);
-  void (*restart)(sonde_lanes *lanes, double sums[2]); // r after the sweeps, z = D^-1 r; r.z, r.r
-  double (*multiply)(sonde_lanes *lanes, bool first);  // w = A z, the first time q; returns z.w
-  // p = z + beta p, q = w + beta q, x += alpha p, r -= alpha q, z = D^-1 r; r.z, r.r. The first
-  // time p = z.
-  void (*advance)(sonde_lanes *lanes, bool first, float alpha, float beta, double sums[2]);
-  double (*bend)(sonde_lanes *lanes);   // square of what x leaves unbalanced, see lanes_kernel.c
-  void (*accept)(sonde_lanes *lanes);   // ve += x, records
-  double (*update)(sonde_lanes *lanes); // u, v at the end with ve + x, ve and records for the next
-                                        // step; not finite: NaN
+  // r = h F - M (ve - v), matrix. `sweep`: x = D^-1 r slice by slice, and each sees where those
+  // before it went; else the matrix is symmetric, x = 0, z = D^-1 r
+  void (*linearise)(sonde_lanes *lanes, uint32_t part, bool sweep, sonde_lane_sums *sums);
+  void (*sweep)(sonde_lanes *lanes, uint32_t part, sonde_lane_sums *sums); // x += D^-1 r
+  // r after the sweeps, z = D^-1 r
+  void (*restart)(sonde_lanes *lanes, uint32_t part, sonde_lane_sums *sums);
+  // w = A z, the first time q; returns z.w
+  double (*multiply)(sonde_lanes *lanes, uint32_t part, bool first);
+  // p = z + beta p, q = w + beta q, x += alpha p, r -= alpha q, z = D^-1 r. The first time p = z.
+  void (*advance)(sonde_lanes *lanes, uint32_t part, bool first, float alpha, float beta,
+                  sonde_lane_sums *sums);
+  // Square of what x leaves unbalanced, see lanes_kernel.c
+  double (*bend)(sonde_lanes *lanes, uint32_t part);
+  void (*accept)(sonde_lanes *lanes, uint32_t part); // ve += x, records
+  // u, v at the end with ve + x, ve and records for the next step; not finite: NaN
+  double (*update)(sonde_lanes *lanes, uint32_t part);
   // near_probe: slices with a node in the box, which grows by `edges` times their reach
   void (*near)(sonde_lanes *lanes, const float low[3], const float high[3], float edges);
   // Nodes of these slices from the probe, for their faces; near_code
@@ -151,8 +166,16 @@ struct sonde_lanes {
   float *slide;
   // and of the directions: z, for springs and ties; its tangential part and N.z for layers.
   float *direction, *layer_direction; // [rows][4]
-  uint32_t *awake;                    // slices that take part
+  uint32_t part_count;
+  uint32_t part_slice[SONDE_PARTS + 1]; // first slices
+  uint32_t part_seen[SONDE_PARTS + 1];  // of seen[]: those that a part sees of the other
+  uint32_t *seen;                       // rows, copied to the rows from slice_count * 16 on
+  uint32_t seen_count;
+  uint32_t *seen_at; // [rows] where the other part sees a row
+  uint32_t *awake;   // slices that take part, ascending
   uint32_t awake_count;
+  uint32_t part_awake[SONDE_PARTS + 1]; // of awake[]
+  struct sonde_crew *crew;              // NULL: one thread
   uint8_t *is_awake, *calm;
   uint8_t *is_near;    // touched slices and waking ones around them
   uint32_t *near_list; // these

@@ -307,12 +307,12 @@ INLINE void linearise_slice(sonde_lanes *lanes, uint32_t s, coupled by, bool mov
   publish_direction(lanes, s, x);
 }
 
-static void linearise(sonde_lanes *lanes, bool moves, double sums[4]) {
+static void linearise(sonde_lanes *lanes, uint32_t part, bool moves, sonde_lane_sums *sums) {
   const sonde_lane_law *law = &lanes->law;
   sums_of_rows all_rows = {{{0}}, {0}, {0}, {{0}}};
-  lanes->slot_total = 0;
-  for (uint32_t a = 0; a < lanes->awake_count; ++a) {
-    lanes->slot_total += lanes->model[lanes->awake[a]].slot_count;
+  sums->slots = 0;
+  for (uint32_t a = lanes->part_awake[part]; a < lanes->part_awake[part + 1]; ++a) {
+    sums->slots += lanes->model[lanes->awake[a]].slot_count;
     if (law->springs && law->layered)
       linearise_slice(lanes, lanes->awake[a], (coupled){true, true}, moves, &all_rows);
     else if (law->layered)
@@ -320,12 +320,12 @@ static void linearise(sonde_lanes *lanes, bool moves, double sums[4]) {
     else
       linearise_slice(lanes, lanes->awake[a], (coupled){true, false}, moves, &all_rows);
   }
-  sums[3] = total(all_rows.rr[0]);
-  sums[0] = sums[3] + total(all_rows.rr[1]);
-  sums[1] = total(all_rows.ff);
-  sums[2] = total(all_rows.rz);
+  sums->far2 = total(all_rows.rr[0]);
+  sums->left2 = sums->far2 + total(all_rows.rr[1]);
+  sums->force2 = total(all_rows.ff);
+  sums->product = total(all_rows.rz);
   const lane_double *reaction = all_rows.reaction;
-  lanes->reaction_n = (sonde_vec3){total(reaction[0]), total(reaction[1]), total(reaction[2])};
+  sums->reaction_n = (sonde_vec3){total(reaction[0]), total(reaction[1]), total(reaction[2])};
 }
 
 // q += A p without the diagonal blocks.
@@ -370,10 +370,10 @@ INLINE void couple(sonde_lanes *lanes, uint32_t s, sonde_lane q[3]) {
 }
 
 // After a slice was solved for itself its residual is what its neighbours have moved since.
-static double sweep(sonde_lanes *lanes, double *far2) {
+static void sweep(sonde_lanes *lanes, uint32_t part, sonde_lane_sums *sums) {
   lane_double rr[2] = {{0}, {0}};
   SONDE_ASSERT(lanes->awake_count <= lanes->slice_count);
-  for (uint32_t a = 0; a < lanes->awake_count; ++a) {
+  for (uint32_t a = lanes->part_awake[part]; a < lanes->part_awake[part + 1]; ++a) {
     uint32_t s = lanes->awake[a];
     sonde_slice *at = &lanes->slice[s];
     sonde_lane q[3] = {{0}, {0}, {0}}, r[3], z[3];
@@ -385,37 +385,37 @@ static double sweep(sonde_lanes *lanes, double *far2) {
     *sum += widen(dot(r, r));
     publish_direction(lanes, s, z);
   }
-  *far2 = total(rr[0]);
-  return *far2 + total(rr[1]);
+  sums->far2 = total(rr[0]);
+  sums->left2 = sums->far2 + total(rr[1]);
 }
 
 // The last sweep left a slice what those after it and its own rows moved since: moves of slices
 // before it, which it saw, are taken back before it looks.
-static void restart(sonde_lanes *lanes, double sums[2]) {
+static void restart(sonde_lanes *lanes, uint32_t part, sonde_lane_sums *sums) {
   lane_double rz = {0}, rr = {0};
   const sonde_lane none[3] = {{0}, {0}, {0}};
-  for (uint32_t a = 0; a < lanes->awake_count; ++a) {
+  for (uint32_t a = lanes->part_awake[part]; a < lanes->part_awake[part + 1]; ++a) {
     sonde_slice *at = &lanes->slice[lanes->awake[a]];
     sonde_lane q[3] = {{0}, {0}, {0}};
     couple(lanes, lanes->awake[a], q);
     for (int c = 0; c < 3; ++c) at->r[c] = -q[c];
     publish_direction(lanes, lanes->awake[a], none);
   }
-  for (uint32_t a = 0; a < lanes->awake_count; ++a) {
+  for (uint32_t a = lanes->part_awake[part]; a < lanes->part_awake[part + 1]; ++a) {
     sonde_slice *at = &lanes->slice[lanes->awake[a]];
     divide(at->factor, at->r, at->z);
     rz += widen(dot(at->r, at->z));
     rr += widen(dot(at->r, at->r));
     publish_direction(lanes, lanes->awake[a], at->z);
   }
-  sums[0] = total(rz);
-  sums[1] = total(rr);
+  sums->product = total(rz);
+  sums->left2 = total(rr);
 }
 
 // The diagonal blocks' part of A z is r.
-static double multiply(sonde_lanes *lanes, bool first) {
+static double multiply(sonde_lanes *lanes, uint32_t part, bool first) {
   lane_double sum = {0};
-  for (uint32_t a = 0; a < lanes->awake_count; ++a) {
+  for (uint32_t a = lanes->part_awake[part]; a < lanes->part_awake[part + 1]; ++a) {
     uint32_t s = lanes->awake[a];
     sonde_slice *at = &lanes->slice[s];
     sonde_lane q[3] = {at->r[0], at->r[1], at->r[2]}, *out = first ? at->q : at->w;
@@ -437,9 +437,10 @@ INLINE void advance_slice(sonde_slice *at, bool first, float alpha, float beta) 
   }
 }
 
-static void advance(sonde_lanes *lanes, bool first, float alpha, float beta, double sums[2]) {
+static void advance(sonde_lanes *lanes, uint32_t part, bool first, float alpha, float beta,
+                    sonde_lane_sums *sums) {
   lane_double rz = {0}, rr = {0};
-  for (uint32_t a = 0; a < lanes->awake_count; ++a) {
+  for (uint32_t a = lanes->part_awake[part]; a < lanes->part_awake[part + 1]; ++a) {
     sonde_slice *at = &lanes->slice[lanes->awake[a]];
     if (first)
       advance_slice(at, true, alpha, beta);
@@ -452,18 +453,18 @@ static void advance(sonde_lanes *lanes, bool first, float alpha, float beta, dou
     rr += widen(dot(r, r));
     publish_direction(lanes, lanes->awake[a], z);
   }
-  sums[0] = total(rz);
-  sums[1] = total(rr);
+  sums->product = total(rz);
+  sums->left2 = total(rr);
 }
 
 // What the linear system does not see of the move d = h x: an edge of length L that is left
 // sideways by d pulls by k d^2/2L, and the normal springs' slope changes. As squares of impulses,
 // like the residual's.
-static double bend(sonde_lanes *lanes) {
+static double bend(sonde_lanes *lanes, uint32_t part) {
   const sonde_lane_law *law = &lanes->law;
   float h = law->dt;
   lane_double sum = {0};
-  for (uint32_t a = 0; a < lanes->awake_count; ++a) {
+  for (uint32_t a = lanes->part_awake[part]; a < lanes->part_awake[part + 1]; ++a) {
     const sonde_slice_model *fixed = &lanes->model[lanes->awake[a]];
     const sonde_slice *at = &lanes->slice[lanes->awake[a]];
     sonde_lane way2 = h * h * dot(at->x, at->x);
@@ -476,8 +477,8 @@ static double bend(sonde_lanes *lanes) {
   return total(sum);
 }
 
-static void accept(sonde_lanes *lanes) {
-  for (uint32_t a = 0; a < lanes->awake_count; ++a) {
+static void accept(sonde_lanes *lanes, uint32_t part) {
+  for (uint32_t a = lanes->part_awake[part]; a < lanes->part_awake[part + 1]; ++a) {
     sonde_slice *at = &lanes->slice[lanes->awake[a]];
     for (int c = 0; c < 3; ++c) at->ve[c] += at->x[c], at->x[c] = (sonde_lane){0};
     publish_record(lanes, lanes->awake[a], at->ve);
@@ -496,11 +497,11 @@ INLINE void bound(const sonde_slice_model *fixed, float h, const sonde_slice *at
   }
 }
 
-static double update(sonde_lanes *lanes) {
+static double update(sonde_lanes *lanes, uint32_t part) {
   float h = lanes->law.dt;
   SONDE_ASSERT(h > 0);
   lane_double sum = {0};
-  for (uint32_t a = 0; a < lanes->awake_count; ++a) {
+  for (uint32_t a = lanes->part_awake[part]; a < lanes->part_awake[part + 1]; ++a) {
     uint32_t s = lanes->awake[a];
     sonde_slice *at = &lanes->slice[s];
     sonde_lane move[3], v[3];

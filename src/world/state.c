@@ -20,7 +20,8 @@ sonde_world_def sonde_world_def_default(void) {
                            .contact_stiffness_n_m3 = 5e8,
                            .contact_damping_n_s_m3 = 1e5,
                            .sleep_displacement_m = 5e-6,
-                           .friction = {.stribeck_speed_m_s = 0.01, .mu_gel = 0.05}};
+                           .friction = {.stribeck_speed_m_s = 0.01, .mu_gel = 0.05},
+                           .threads = 1};
 }
 
 static sonde_status check_friction(const sonde_friction *f, sonde_error *error) {
@@ -52,6 +53,7 @@ static sonde_status check(const sonde_world_def *def, sonde_error *error) {
                {"pcg.max_iterations", def->pcg.max_iterations, 1, 1e6},
                {"contact_law", def->contact_law, 0, SONDE_CONTACT_NODES},
                {"engine", def->engine, 0, SONDE_ENGINE_FAST},
+               {"threads", def->threads, 0, fast ? 2 : 1},
                {"contact_stiffness_n_m3", def->contact_stiffness_n_m3, 0, 1e12},
                {"contact_damping_n_s_m3", def->contact_damping_n_s_m3, 0, 1e10},
                {"sleep_displacement_m", def->sleep_displacement_m, 0, 1e-3}};

@@ -1,0 +1,32 @@
+#ifndef SONDE_SRC_CREW_INSIDE_H
+#define SONDE_SRC_CREW_INSIDE_H
+
+#include "world/crew.h"
+
+#include <pthread.h>
+#include <semaphore.h>
+#include <stdatomic.h>
+
+struct sonde_crew {
+  pthread_t thread;
+  sem_t wake;
+  void (*work)(void *with, uint32_t part);
+  void *with;
+  char before[64];   // what one thread writes apart from what the other writes
+  atomic_uint asked; // pieces of work
+  atomic_bool over;
+  char between[64];
+  atomic_uint done;
+  atomic_bool asleep; // or about to be: whoever clears it says whether it is woken
+};
+
+// Tells the processor that this is a loop that waits.
+static inline void sonde_crew_pause(void) {
+#if defined(__x86_64__)
+  __builtin_ia32_pause();
+#elif defined(__aarch64__)
+  __asm__ volatile("yield");
+#endif
+}
+
+#endif
