@@ -24,6 +24,7 @@ static void *serve(void *with) {
   for (unsigned last = 0;;) {
     last = wait_for_work(crew, last);
     if (atomic_load_explicit(&crew->over, memory_order_relaxed)) return NULL;
+    if (!sonde_crew_take(crew, last)) continue;
     crew->work(crew->with, 1);
     atomic_store_explicit(&crew->done, last, memory_order_release);
   }

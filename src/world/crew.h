@@ -11,8 +11,9 @@ typedef struct sonde_crew sonde_crew;
 sonde_status sonde_crew_create(sonde_crew **crew, sonde_error *error);
 // NULL is ignored. @thread owner
 void sonde_crew_destroy(sonde_crew *crew);
-// work(with, 0) on this thread and work(with, 1) on the other, or one after the other for NULL;
-// returns when both have ended. @thread tick, one at a time
+// work(with, 0) on this thread and work(with, 1) on the other, or, where that one has not begun by
+// then, and for NULL, one after the other; returns when both have ended. @thread tick, one at a
+// time
 void sonde_crew_run(sonde_crew *crew, void (*work)(void *with, uint32_t part), void *with);
 
 #endif

@@ -16,9 +16,16 @@ struct sonde_crew {
   atomic_uint asked; // pieces of work
   atomic_bool over;
   char between[64];
-  atomic_uint done;
+  atomic_uint taken;  // pieces whose second part has somebody who does it
+  atomic_uint done;   // the last one that the second thread did
   atomic_bool asleep; // or about to be: whoever clears it says whether it is woken
 };
+
+// The second part of a piece of work goes to whoever comes first.
+static inline bool sonde_crew_take(sonde_crew *crew, unsigned piece) {
+  unsigned before = piece - 1;
+  return atomic_compare_exchange_strong(&crew->taken, &before, piece);
+}
 
 // Tells the processor that this is a loop that waits.
 static inline void sonde_crew_pause(void) {
