@@ -129,9 +129,10 @@ static const char *look_at_nodes(poke_watch *watch, const sonde_state *state) {
   return NULL;
 }
 
-// A push straight to the side points ahead by this share where it is rounded.
+// A push straight to the side points ahead by this share where it is rounded, and by more of what
+// is left where pushes to both sides cancel.
 static double rounded(const sonde_state *state) {
-  return sonde_state_def(state)->engine == SONDE_ENGINE_FAST ? 5e-7 : 1e-7;
+  return sonde_state_def(state)->engine == SONDE_ENGINE_FAST ? 1e-5 : 1e-7;
 }
 
 // The probe pushes forwards at every node; with friction the sum may be drawn in by mu_static
