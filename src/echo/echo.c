@@ -11,6 +11,7 @@
 #include "base/base.h"
 #include "base/random.h"
 #include "base/vector.h"
+#include "echo/cubes.h"
 #include "echo/echo.h"
 
 #include <stdlib.h>
@@ -84,8 +85,10 @@ static void fill_pools(sonde_echo *echo) {
     for (uint32_t layer = 0; layer < layers; ++layer)
       qsort(echo->pool.z + i + 64 * layer, 64, sizeof(float), by_value);
   }
+  scatter_pool loose = {echo->pool.x + SONDE_POOL, echo->pool.y + SONDE_POOL,
+                        echo->pool.z + SONDE_POOL, echo->pool.sign + SONDE_POOL};
   for (uint32_t i = 0; i + each <= SONDE_LOOSE; i += each)
-    fill_share(&echo->loose, echo->seed + 5, i, 2, each / 16);
+    fill_share(&loose, echo->seed + 5, i, 2, each / 16);
 }
 
 // Streamlines evenly over a round section of unit width, so that the first n fill it for any n;
@@ -144,8 +147,8 @@ static size_t carve(sonde_echo *echo, char *block) {
   CARVE(echo->flat_envelope, image);
   CARVE(echo->grey, image);
   CARVE(echo->noise, SONDE_NOISE);
-  used = carve_pool(&echo->pool, block, used, SONDE_POOL);
-  used = carve_pool(&echo->loose, block, used, SONDE_LOOSE);
+  CARVE(echo->cubes, 1);
+  used = carve_pool(&echo->pool, block, used, SONDE_POOL + SONDE_LOOSE);
   return carve_pool(&echo->blood, block, used, SONDE_BLOOD);
 }
 

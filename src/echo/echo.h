@@ -16,8 +16,8 @@ enum {
   SONDE_PLANE_NODES = SONDE_PLANE_COLUMNS * SONDE_PLANE_ROWS,
   SONDE_MEDIUM_ROWS = 256,                  // steps of the march along the lines
   SONDE_MAX_ECHOES = 24 * SONDE_MOST_LINES, // specular echoes
-  SONDE_POOL = 16384,                       // random scatterers shared by all cells
-  SONDE_LOOSE = 8192,                       // the same for pieces of cells
+  SONDE_POOL = 16384,                       // random scatterers shared by all cubes
+  SONDE_LOOSE = 8192,                       // the same for pieces of cubes
   SONDE_BLOOD = 16384,                      // streamlines of one vessel
   SONDE_NOISE = 65536,
   SONDE_BOX_SIDE = 128, // cubes along a side of the box around the slab
@@ -116,8 +116,7 @@ struct sonde_echo {
   float *envelope;      // [samples][padded]
   float *flat_envelope; // [samples][lines], what readers see
   float *grey;          // [samples][padded]
-  scatter_pool pool;    // [POOL] sorted by z within each cell's share
-  scatter_pool loose;   // [LOOSE] unsorted
+  scatter_pool pool;    // [POOL + LOOSE] sorted by z within each cube's share; then unsorted ones
   scatter_pool blood;   // [BLOOD] streamlines: place in a lumen of unit width, speed over the mean
   sonde_echo_flow flow;
   float *noise;         // [NOISE]
@@ -125,9 +124,8 @@ struct sonde_echo {
   uint32_t box_size[3];
   uint64_t *seen;                     // [BOX_SIDE^3 / 64] a bit per cube of the box, x fastest
   double slab_m[SONDE_SLAB_ROWS + 1]; // half height, depths in even steps
-  sonde_vec3 vessel_low[MOST_VESSELS],
-      vessel_high[MOST_VESSELS];    // cubes beside that box stay whole
-  uint32_t cell_count, moved, bled; // cells and scatterers of the last frame
+  struct sonde_cubes *cubes;          // cubes.h
+  uint32_t cell_count, moved, bled;   // cells and scatterers of the last frame
   sonde_echo_times times;
 };
 
@@ -160,6 +158,9 @@ sonde_vec3 sonde_echo_to_world(const sonde_echo *echo, sonde_vec3 at);
 sonde_vec3 sonde_echo_from_world(const sonde_echo *echo, sonde_vec3 point_m);
 // Half height of the slab at a depth.
 double sonde_echo_elevation(const sonde_echo *echo, double depth_m);
+// Scatterers of maps of a pool into the grid.
+void sonde_echo_splat(sonde_echo *echo, const scatter_pool *pool, const splat_map *first,
+                      uint32_t maps, const splat_lumen *lumen);
 // Scatterers `from`.. of a pool through one map into the grid; a multiple of ECHO_ALIGN.
 void sonde_echo_lay(sonde_echo *echo, const map *m, const scatter_pool *pool, uint32_t from,
                     uint32_t count);

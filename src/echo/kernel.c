@@ -1,8 +1,9 @@
 // Inner loops of the image; kernel_*_hot.c include this file once per instruction set.
 //
-// splat      scatterers through one affine map onto two columns and three samples each, carrier
-//            phase included
-// splat_some the same, with or without checks at the grid's border
+// splat      scatterers through affine maps onto two columns and three samples each, carrier phase
+//            included
+// splat_some those of one map, with or without checks at the grid's border
+// in_lumina  which of them belong to the blood
 // make_parcel, lay_batch, lay_rest  those within the slab, closed up
 // lay, lay_one  one vector of them, in order
 // stream     blood along its streamlines
@@ -10,7 +11,7 @@
 // lateral    symmetric complex kernels of rank three on one row
 // axial      real kernels down the rows, noise, compensation, modulus, logarithm
 // add_row, add_parts, add_both  its sums, as the registers allow
-// tissue     in kernel_tissue.h
+// carry, tissue  in kernel_carry.h, kernel_tissue.h
 // merge      a row of the grid, times its gain, to even and odd columns
 // widen, mix rows of the coarse plane, per line and between two
 // fade       attenuation of a row
@@ -19,6 +20,7 @@
 
 #include "base/base.h"
 #include "echo/kernel.h"
+#include "echo/kernel_carry.h"
 #include "echo/kernel_tissue.h"
 
 // cos and sin of 2 pi t for t >= 0, error 3e-4.
@@ -59,8 +61,8 @@ typedef struct form {
   vf m[4];
 } form;
 
-INLINE form form_of(const splat_job *job, int c) {
-  return (form){{all(job->m[0][c]), all(job->m[1][c]), all(job->m[2][c]), all(job->m[3][c])}};
+INLINE form form_of(const float m[4][4], int c) {
+  return (form){{all(m[0][c]), all(m[1][c]), all(m[2][c]), all(m[3][c])}};
 }
 INLINE vf along(const form *f, vf x, vf y, vf z) {
   return f->m[0] + f->m[1] * x + f->m[2] * y + f->m[3] * z;
@@ -109,13 +111,24 @@ INLINE void lay_rest(const splat_job *job, flock *f) {
     lay_one(job->grid, job->stride, &batch[whole_ones], (int)(i % W));
 }
 
-INLINE void splat_some(const splat_job *job, bool inside) {
-  flock f;
-  f.count = 0;
-  const float *px = job->x, *py = job->y, *pz = job->z, *sign = job->sign;
-  const float right = job->right, bottom = job->bottom;
-  const form to_line = form_of(job, 0), to_side = form_of(job, 1), to_depth = form_of(job, 2);
-  const uint32_t count = job->count;
+// Lanes whose place at rest is in a lumen.
+INLINE vi in_lumina(const splat_job *job, const splat_map *map, vf x, vf y, vf z) {
+  vi in = all_of(0);
+  for (const splat_lumen *l = job->lumen + map->lumen; l < job->lumen + map->lumen + map->lumens;
+       ++l) {
+    vf a = l->along[0] + l->along[1] * x + l->along[2] * y + l->along[3] * z;
+    vf b = l->across[0] + l->across[1] * x + l->across[2] * y + l->across[3] * z;
+    in |= (a * a + b * b < 1) & (a >= -l->chord);
+  }
+  return in;
+}
+
+INLINE void splat_some(const splat_job *job, const splat_map *map, bool inside, flock *f) {
+  const float *px = job->x + map->from, *py = job->y + map->from, *pz = job->z + map->from;
+  const float *sign = job->sign + map->from, right = job->right, bottom = job->bottom;
+  const form to_line = form_of(map->m, 0), to_side = form_of(map->m, 1),
+             to_depth = form_of(map->m, 2);
+  const uint32_t count = map->count;
   for (uint32_t i = 0; i < count; i += W) {
     vf x = load(px + i), y = load(py + i), z = load(pz + i);
     vf side = along(&to_side, x, y, z), height = 1 - side * side;
@@ -123,25 +136,30 @@ INLINE void splat_some(const splat_job *job, bool inside) {
     if (!any(in)) continue;
     vf line = along(&to_line, x, y, z), depth = along(&to_depth, x, y, z);
     if (!inside) in = in & (line >= 0) & (line < right) & (depth >= 1) & (depth < bottom);
-    f.count += pack(in, line, f.line + f.count, depth, f.depth + f.count, load(sign + i) * height,
-                    f.weight + f.count);
-    if (f.count >= FLOCK) lay_batch(job, &f);
+    if (map->lumens) in = in & ~in_lumina(job, map, x, y, z);
+    f->count += pack(in, line, f->line + f->count, depth, f->depth + f->count,
+                     load(sign + i) * height, f->weight + f->count);
+    if (f->count >= FLOCK) lay_batch(job, f);
   }
-  lay_rest(job, &f);
 }
 
 // A map whose cube lies inside the grid needs no check per scatterer.
 static void splat(const splat_job *job) {
-  SONDE_ASSERT(job->count % ECHO_ALIGN == 0);
-  const float(*m)[3] = job->m;
-  float line = 0.5f * (size1(m[1][0]) + size1(m[2][0]) + size1(m[3][0])) + 0.01f;
-  float depth = 0.5f * (size1(m[1][2]) + size1(m[2][2]) + size1(m[3][2])) + 0.01f;
-  bool inside = job->cube && m[0][0] > line && m[0][0] + line < job->right && m[0][2] > depth + 1 &&
-                m[0][2] + depth < job->bottom;
-  if (inside)
-    splat_some(job, true);
-  else
-    splat_some(job, false);
+  flock f;
+  f.count = 0;
+  for (const splat_map *map = job->map; map < job->map + job->maps; ++map) {
+    SONDE_ASSERT(map->count % ECHO_ALIGN == 0);
+    const float(*m)[4] = map->m;
+    float line = 0.5f * (size1(m[1][0]) + size1(m[2][0]) + size1(m[3][0])) + 0.01f;
+    float depth = 0.5f * (size1(m[1][2]) + size1(m[2][2]) + size1(m[3][2])) + 0.01f;
+    bool inside = job->cube && m[0][0] > line && m[0][0] + line < job->right &&
+                  m[0][2] > depth + 1 && m[0][2] + depth < job->bottom;
+    if (inside)
+      splat_some(job, map, true, &f);
+    else
+      splat_some(job, map, false, &f);
+  }
+  lay_rest(job, &f);
 }
 
 // Streamlines are apart from each other: the compiler makes vectors of this.
@@ -451,5 +469,15 @@ static void fade(const float *scatter, const float *loss_db, float *gain, uint32
   }
 }
 
-const echo_kernels SONDE_KERNELS = {
-    SONDE_KERNELS_NAME, splat, stream, lateral, axial, tissue, merge, widen, mix, fade, convert};
+const echo_kernels SONDE_KERNELS = {SONDE_KERNELS_NAME,
+                                    splat,
+                                    carry,
+                                    stream,
+                                    lateral,
+                                    axial,
+                                    tissue,
+                                    merge,
+                                    widen,
+                                    mix,
+                                    fade,
+                                    convert};

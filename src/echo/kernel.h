@@ -20,18 +20,61 @@ enum {
   AXIAL_MOST = 4, // samples summed at once
 };
 
+// A lumen over one map: forms of its scatterers' coordinates, 1 on the wall at rest. Clot fills
+// what lies beyond a chord on the far side.
+typedef struct splat_lumen {
+  float along[4], across[4], chord;
+} splat_lumen;
+
 // Scatterers of one affine map: (column, elevation over its reach, sample) =
 // m[0] + m[1] x + m[2] y + m[3] z.
+typedef struct splat_map {
+  float m[4][4];          // the last of each is not used
+  uint32_t from, count;   // scatterers; the count is a multiple of ECHO_ALIGN
+  uint32_t lumen, lumens; // first and number of those that it leaves empty
+} splat_map;
+
 typedef struct splat_job {
   const float *x, *y, *z, *sign;
-  uint32_t count; // multiple of ECHO_ALIGN
-  bool cube;      // x, y and z lie within +-1/2
-  float m[4][3];
+  const splat_map *map; // [maps]
+  const splat_lumen *lumen;
+  uint32_t maps;
+  bool cube;           // x, y and z lie within +-1/2
   float turns;         // carrier periods per sample
   float right, bottom; // last column with a neighbour, half a sample before the last sample
   float *grid;         // [sample][column][re, im]
   uint32_t stride;     // floats per sample
 } splat_job;
+
+// State of a vessel beside some points. Vectors of the cross-section are of unit length.
+typedef enum wall_field {
+  WALL_REST,                   // centre at rest, m
+  WALL_SHIFT = WALL_REST + 3,  // way of the centre, m
+  WALL_AXIS = WALL_SHIFT + 3,  // along the vessel
+  WALL_FLAT = WALL_AXIS + 3,   // short axis
+  WALL_ACROSS = WALL_FLAT + 3, // long axis
+  WALL_RADIUS = WALL_ACROSS + 3,
+  WALL_LOST,  // share of the area
+  WALL_SHORT, // semi-axes, m
+  WALL_LONG,
+  WALL_ENGAGED, // 0..1: how firmly the wall leads; 0: no vessel
+  WALL_FIELDS
+} wall_field;
+
+enum {
+  CARRY_GROUPS = 64,
+  CARRY_POINTS = 4 * CARRY_GROUPS,
+  WALL_ROOM = CARRY_GROUPS + ECHO_ALIGN // whole vectors read beyond the last
+};
+
+// Points of the tissue, in groups of four that share the vessels beside them: where those take
+// them.
+typedef struct carry_job {
+  uint32_t groups, walls;
+  const float (*wall)[WALL_FIELDS][WALL_ROOM]; // [walls]
+  const float (*rest)[CARRY_POINTS];           // [3]
+  float (*place)[CARRY_POINTS];                // [3] by the field alone; replaced
+} carry_job;
 
 // A row of the grid, times a gain, to even and odd columns; leaves zeros.
 typedef struct merge_job {
@@ -127,6 +170,7 @@ typedef struct convert_job {
 typedef struct echo_kernels {
   const char *name;
   void (*splat)(const splat_job *job);
+  void (*carry)(const carry_job *job);
   void (*stream)(const stream_job *job);
   void (*lateral)(const lateral_job *job);
   void (*axial)(const axial_job *job);

@@ -1,32 +1,79 @@
 // The inner loops without vectors and with the library's functions: what the others are tested
 // against. The tissue's row comes from the base set.
 //
-// splat, stream, lateral, axial (sample by sample), merge, widen, mix, fade, convert
+// splat, carry, stream, lateral, axial (sample by sample), merge, widen, mix, fade, convert
 #include "base/base.h"
 #include "echo/kernel.h"
+#include "interior/interior.h"
 
 #include <math.h>
 
+static bool in_lumen(const splat_lumen *l, double x, double y, double z) {
+  const float *p = l->along, *q = l->across;
+  double a = (double)p[0] + (double)p[1] * x + (double)p[2] * y + (double)p[3] * z;
+  double b = (double)q[0] + (double)q[1] * x + (double)q[2] * y + (double)q[3] * z;
+  return a * a + b * b < 1 && a >= -(double)l->chord;
+}
+
+static void lay_point(const splat_job *job, const double at[3], double sign) {
+  double height = 1 - at[1] * at[1];
+  if (!(height > 0 && at[0] >= 0 && at[0] < (double)job->right && at[2] >= 1 &&
+        at[2] < (double)job->bottom))
+    return;
+  double weight = sign * height, l = floor(at[0]), n = floor(at[2] + 0.5);
+  double turn = 6.283185307179586 * at[2] * (double)job->turns, b = at[2] - n;
+  const double deep[3] = {0.5 * (0.5 - b) * (0.5 - b), 0.75 - b * b, 0.5 * (0.5 + b) * (0.5 + b)};
+  for (size_t corner = 0; corner < 6; ++corner) {
+    double a = corner & 1 ? at[0] - l : 1 - (at[0] - l), size = a * deep[corner / 2] * weight;
+    float *g =
+        job->grid + ((size_t)n + corner / 2 - 1) * job->stride + 2 * ((size_t)l + (corner & 1));
+    g[0] += (float)(size * cos(turn)), g[1] -= (float)(size * sin(turn));
+  }
+}
+
 static void splat(const splat_job *job) {
-  SONDE_ASSERT(job->count % ECHO_ALIGN == 0);
-  for (uint32_t i = 0; i < job->count; ++i) {
-    double at[3];
-    for (int c = 0; c < 3; ++c)
-      at[c] = (double)job->m[0][c] + (double)job->m[1][c] * (double)job->x[i] +
-              (double)job->m[2][c] * (double)job->y[i] + (double)job->m[3][c] * (double)job->z[i];
-    double height = 1 - at[1] * at[1];
-    if (!(height > 0 && at[0] >= 0 && at[0] < (double)job->right && at[2] >= 1 &&
-          at[2] < (double)job->bottom))
-      continue;
-    double weight = (double)job->sign[i] * height, l = floor(at[0]), n = floor(at[2] + 0.5);
-    double turn = 6.283185307179586 * at[2] * (double)job->turns, b = at[2] - n;
-    const double deep[3] = {0.5 * (0.5 - b) * (0.5 - b), 0.75 - b * b, 0.5 * (0.5 + b) * (0.5 + b)};
-    for (size_t corner = 0; corner < 6; ++corner) {
-      double a = corner & 1 ? at[0] - l : 1 - (at[0] - l), size = a * deep[corner / 2] * weight;
-      float *g =
-          job->grid + ((size_t)n + corner / 2 - 1) * job->stride + 2 * ((size_t)l + (corner & 1));
-      g[0] += (float)(size * cos(turn)), g[1] -= (float)(size * sin(turn));
+  for (const splat_map *map = job->map; map < job->map + job->maps; ++map)
+    for (uint32_t i = map->from; i < map->from + map->count; ++i) {
+      double x = (double)job->x[i], y = (double)job->y[i], z = (double)job->z[i], at[3];
+      bool empty = false;
+      for (uint32_t k = 0; k < map->lumens; ++k)
+        empty = empty || in_lumen(&job->lumen[map->lumen + k], x, y, z);
+      for (int c = 0; c < 3; ++c)
+        at[c] = (double)map->m[0][c] + (double)map->m[1][c] * x + (double)map->m[2][c] * y +
+                (double)map->m[3][c] * z;
+      if (!empty) lay_point(job, at, (double)job->sign[i]);
     }
+}
+
+static sonde_vec3 vector_of(const float (*wall)[WALL_ROOM], int field, uint32_t group) {
+  return vec3((double)wall[field][group], (double)wall[field + 1][group],
+              (double)wall[field + 2][group]);
+}
+
+static sonde_vessel_state vessel_of(const float (*wall)[WALL_ROOM], uint32_t group) {
+  sonde_vessel_state v = {.rest_centre_m = vector_of(wall, WALL_REST, group),
+                          .axis = vector_of(wall, WALL_AXIS, group),
+                          .flat_axis = vector_of(wall, WALL_FLAT, group),
+                          .rest_radius_m = (double)wall[WALL_RADIUS][group],
+                          .area_ratio = 1 - (double)wall[WALL_LOST][group],
+                          .half_short_m = (double)wall[WALL_SHORT][group],
+                          .half_long_m = (double)wall[WALL_LONG][group]};
+  v.centre_m = v_add(v.rest_centre_m, vector_of(wall, WALL_SHIFT, group));
+  return v;
+}
+
+static void carry(const carry_job *job) {
+  for (uint32_t i = 0; i < 4 * job->groups; ++i) {
+    sonde_vessel_state near[MOST_VESSELS];
+    uint32_t count = 0;
+    for (uint32_t k = 0; k < job->walls; ++k)
+      if (job->wall[k][WALL_ENGAGED][i / 4] > 0) near[count++] = vessel_of(job->wall[k], i / 4);
+    double at[2][3];
+    for (int c = 0; c < 3; ++c)
+      at[0][c] = (double)job->rest[c][i], at[1][c] = (double)job->place[c][i] - at[0][c];
+    sonde_vec3 u = sonde_vessels_move(near, count, vec3(at[0][0], at[0][1], at[0][2]),
+                                      vec3(at[1][0], at[1][1], at[1][2]));
+    for (int c = 0; c < 3; ++c) job->place[c][i] = (float)(at[0][c] + v_coordinate(u, c));
   }
 }
 
@@ -142,5 +189,5 @@ static void convert(const convert_job *job) {
   }
 }
 
-const echo_kernels sonde_echo_kernels_plain = {"plain", splat, stream, lateral, axial,  tissue,
-                                               merge,   widen, mix,    fade,    convert};
+const echo_kernels sonde_echo_kernels_plain = {"plain", splat, carry, stream, lateral, axial,
+                                               tissue,  merge, widen, mix,    fade,    convert};

@@ -3,15 +3,11 @@
 #ifndef SONDE_SRC_ECHO_KERNEL_VECTOR_H
 #define SONDE_SRC_ECHO_KERNEL_VECTOR_H
 
-#include "base/vector.h"
+#include "echo/four.h"
 
 #include <stdbool.h>
 #include <stdint.h>
 #include <string.h>
-
-#if defined(__SSE2__)
-#include <immintrin.h>
-#endif
 
 // Without optimisation gcc's intrinsics are macros whose masks it then warns about.
 #if defined(__GNUC__) && !defined(__clang__) && !defined(__OPTIMIZE__)
@@ -26,13 +22,9 @@ typedef int32_t vi __attribute__((vector_size(VECTOR_BYTES)));
 typedef uint32_t vu __attribute__((vector_size(VECTOR_BYTES)));
 typedef uint8_t vb __attribute__((vector_size(VECTOR_BYTES / 4)));
 typedef float vf_near __attribute__((vector_size(VECTOR_BYTES), aligned(4), may_alias));
-typedef float v4 __attribute__((vector_size(16)));
-typedef float v4_near __attribute__((vector_size(16), aligned(4), may_alias));
 
 INLINE vf load(const float *p) { return *(const vf_near *)p; }
 INLINE void store(float *p, vf a) { *(vf_near *)p = a; }
-INLINE v4 load4(const float *p) { return *(const v4_near *)p; }
-INLINE void store4(float *p, v4 a) { *(v4_near *)p = a; }
 INLINE vf all(float a) { return a - (vf){0}; }
 INLINE vi all_of(int32_t a) { return a - (vi){0}; }
 INLINE vi whole(vf a) { return __builtin_convertvector(a, vi); }
@@ -97,6 +89,19 @@ INLINE vf gather(const float *base, vi index) {
   vf v;
   for (int k = 0; k < W; ++k) v[k] = base[index[k]];
   return v;
+#endif
+}
+
+// p[0] in the first four lanes, p[1] in the next four, and so on; reads a whole vector.
+INLINE vf each4(const float *p) {
+#if defined(__AVX512F__)
+  const vi from = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3};
+  return (vf)_mm512_permutexvar_ps((__m512i)from, (__m512)load(p));
+#elif defined(__AVX2__)
+  const vi from = {0, 0, 0, 0, 1, 1, 1, 1};
+  return (vf)_mm256_permutevar8x32_ps((__m256)load(p), (__m256i)from);
+#else
+  return all(*p);
 #endif
 }
 

@@ -9,8 +9,7 @@
 #include "base/base.h"
 #include "interior/interior.h"
 
-static const double reach = 3.0;         // rest radii over which a wall's motion fades
-static const double engaged_loss = 0.05; // share of the area from which the wall leads fully
+static const double reach = 3.0; // rest radii over which a wall's motion fades
 
 typedef struct pulled {
   double weight;
@@ -24,7 +23,7 @@ static pulled pull(const sonde_vessel_state *v, sonde_vec3 rest, sonde_vec3 fiel
   sonde_vec3 d = v_sub(rest, v->rest_centre_m), across = v_cross(v->axis, v->flat_axis);
   double a = v_dot(d, v->flat_axis), b = v_dot(d, across), a1 = a, b1 = b;
   double t = (sqrt(a * a + b * b) / v->rest_radius_m - 1) / reach;
-  double engaged = clamp(fabs(1 - v->area_ratio) / engaged_loss, 0, 1);
+  double engaged = clamp(fabs(1 - v->area_ratio) / sonde_engaged_loss, 0, 1);
   if (t >= 1 || !(engaged > 0)) return none;
   t = fmax(t, 0);
   sonde_vessel_carry(v, &a1, &b1);
@@ -100,7 +99,8 @@ void sonde_interior_displacements(const sonde_interior *in, uint32_t count, cons
 static bool within_lumen(const sonde_interior *in, uint32_t which, sonde_vec3 point, double s,
                          sonde_vec3 *rest) {
   sonde_vessel_state v;
-  if (!sonde_vessel_at(in, which, s, &v) || fabs(1 - v.area_ratio) < engaged_loss) return false;
+  if (!sonde_vessel_at(in, which, s, &v) || fabs(1 - v.area_ratio) < sonde_engaged_loss)
+    return false;
   sonde_vec3 d = v_sub(point, v.centre_m), across = v_cross(v.axis, v.flat_axis);
   double a = v_dot(d, v.flat_axis) / v.half_short_m, b = v_dot(d, across) / v.half_long_m;
   if (a * a + b * b > 1) return false;

@@ -44,6 +44,9 @@ typedef struct sonde_column_point {
 // Shear moduli of the layers around the vessels (docs/interior.md).
 static const double sonde_fat_pa = 1.5e3, sonde_muscle_pa = 3.6e3;
 
+// Share of a vessel's area from whose loss on its wall leads the tissue beside it fully.
+static const double sonde_engaged_loss = 0.05;
+
 struct sonde_window;
 
 // Axes of a lesion at rest over its semi-axes: dot products with the way from its centre are
@@ -108,6 +111,10 @@ sonde_vec3 sonde_interior_invert(const sonde_interior *interior, sonde_vec3 poin
 bool sonde_interior_locate(const sonde_interior *interior, sonde_vec3 rest_m,
                            sonde_column_point *at);
 
+// Stations i and i + 1 of a vessel around axial position s and the way between them, 0..1; false
+// beyond the vessel's ends. @thread any
+bool sonde_vessel_stations(const sonde_interior *interior, uint32_t which, double s_m, uint32_t *i,
+                           double *share);
 // State of a vessel interpolated at axial position s. @thread any
 bool sonde_vessel_at(const sonde_interior *interior, uint32_t which, double s_m,
                      sonde_vessel_state *state);

@@ -7,7 +7,7 @@
 // solid_pressure                  effective pressure on the wall from the solid's stress
 // rectangle_pressure              the same below a rectangle on a half space
 // update_station                  dynamics and shape
-// sonde_vessel_at                 state between stations
+// sonde_vessel_stations, sonde_vessel_at  state between stations
 // sonde_vessel_carry              where the moving wall takes the tissue around it
 // sonde_interior_vessel_at_plane  where the image plane cuts
 #include "base/base.h"
@@ -222,9 +222,9 @@ static sonde_vessel_state blend_states(const sonde_vessel_state *a, const sonde_
   return v;
 }
 
-// Stations i and i + 1 around s and the way between them; false beyond the vessel's ends.
-static bool find_stations(const sonde_interior *in, uint32_t which, double s, uint32_t *at,
-                          double *share) {
+bool sonde_vessel_stations(const sonde_interior *in, uint32_t which, double s, uint32_t *at,
+                           double *share) {
+  SONDE_ASSERT(which < in->vessel_count && at != NULL && share != NULL);
   uint32_t count = in->station_count[which];
   const sonde_station *station = in->station[which];
   if (count < 2 || s < station[0].s_m || s > station[count - 1].s_m) return false;
@@ -242,7 +242,7 @@ bool sonde_vessel_at(const sonde_interior *in, uint32_t which, double s,
   SONDE_ASSERT(which < in->vessel_count);
   uint32_t i;
   double t;
-  if (!find_stations(in, which, s, &i, &t)) return false;
+  if (!sonde_vessel_stations(in, which, s, &i, &t)) return false;
   *state = blend_states(&in->state[which][i], &in->state[which][i + 1], t);
   return true;
 }
@@ -252,7 +252,7 @@ bool sonde_vessel_reaches(const sonde_interior *in, uint32_t which, double s, so
   SONDE_ASSERT(which < in->vessel_count && beyond_m >= 0);
   uint32_t i;
   double t;
-  if (!find_stations(in, which, s, &i, &t)) return false;
+  if (!sonde_vessel_stations(in, which, s, &i, &t)) return false;
   const sonde_vessel_state *a = &in->state[which][i], *b = a + 1;
   sonde_vec3 d = v_sub(rest, v_lerp(a->rest_centre_m, b->rest_centre_m, t));
   double slant = fabs(v_dot(d, a->axis)); // lies along the vessel, not beside it
