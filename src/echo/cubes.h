@@ -4,7 +4,7 @@
 #define SONDE_SRC_ECHO_CUBES_H
 
 #include "echo/echo.h"
-#include "echo/four.h"
+#include "base/four.h"
 
 enum {
   CUBES_AT_ONCE = 64,

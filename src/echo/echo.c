@@ -13,6 +13,7 @@
 #include "base/vector.h"
 #include "echo/cubes.h"
 #include "echo/echo.h"
+#include "interior/fields.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -148,6 +149,7 @@ static size_t carve(sonde_echo *echo, char *block) {
   CARVE(echo->grey, image);
   CARVE(echo->noise, SONDE_NOISE);
   CARVE(echo->cubes, 1);
+  CARVE(echo->motion, 1);
   used = carve_pool(&echo->pool, block, used, SONDE_POOL + SONDE_LOOSE);
   return carve_pool(&echo->blood, block, used, SONDE_BLOOD);
 }

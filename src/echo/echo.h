@@ -125,6 +125,7 @@ struct sonde_echo {
   uint64_t *seen;                     // [BOX_SIDE^3 / 64] a bit per cube of the box, x fastest
   double slab_m[SONDE_SLAB_ROWS + 1]; // half height, depths in even steps
   struct sonde_cubes *cubes;          // cubes.h
+  struct sonde_fields *motion;        // of this frame
   uint32_t cell_count, moved, bled;   // cells and scatterers of the last frame
   sonde_echo_times times;
 };

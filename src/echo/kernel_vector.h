@@ -3,7 +3,7 @@
 #ifndef SONDE_SRC_ECHO_KERNEL_VECTOR_H
 #define SONDE_SRC_ECHO_KERNEL_VECTOR_H
 
-#include "echo/four.h"
+#include "base/four.h"
 
 #include <stdbool.h>
 #include <stdint.h>

@@ -1,7 +1,7 @@
 // Vectors of four floats, for code that is compiled once: points and their coordinates, four at a
 // time. Every operation is one IEEE operation per lane.
-#ifndef SONDE_SRC_ECHO_FOUR_H
-#define SONDE_SRC_ECHO_FOUR_H
+#ifndef SONDE_SRC_FOUR_H
+#define SONDE_SRC_FOUR_H
 
 #include "base/maths.h"
 #include "base/vector.h"
@@ -51,13 +51,46 @@ INLINE v4 smaller4(v4 a, v4 b) {
   return (v4)((mask & (i4)a) | (~mask & (i4)b));
 #endif
 }
-// Every lane of the mask.
-INLINE bool all_set4(i4 mask) {
+// A bit per lane of the mask.
+INLINE uint32_t bits4(i4 mask) {
 #if defined(__SSE2__)
-  return _mm_movemask_ps((__m128)mask) == 15;
+  return (uint32_t)_mm_movemask_ps((__m128)mask);
 #else
-  return (mask[0] & mask[1] & mask[2] & mask[3]) != 0;
+  return (uint32_t)((mask[0] & 1) | (mask[1] & 2) | (mask[2] & 4) | (mask[3] & 8));
 #endif
+}
+// Every lane of the mask.
+INLINE bool all_set4(i4 mask) { return bits4(mask) == 15; }
+INLINE v4 root4(v4 a) {
+#if defined(__SSE2__)
+  return (v4)_mm_sqrt_ps((__m128)a);
+#else
+  for (int k = 0; k < 4; ++k) a[k] = sqrtf(a[k]);
+  return a;
+#endif
+}
+INLINE v4 pick4(i4 mask, v4 yes, v4 no) { return (v4)((mask & (i4)yes) | (~mask & (i4)no)); }
+// Four points as their x, y and z.
+INLINE void coordinates4(const v4 point[4], v4 c[3]) {
+#if defined(__SSE2__)
+  __m128 low = _mm_unpacklo_ps((__m128)point[0], (__m128)point[1]),
+         high = _mm_unpacklo_ps((__m128)point[2], (__m128)point[3]),
+         deep = _mm_unpackhi_ps((__m128)point[0], (__m128)point[1]),
+         deeper = _mm_unpackhi_ps((__m128)point[2], (__m128)point[3]);
+  c[0] = (v4)_mm_movelh_ps(low, high), c[1] = (v4)_mm_movehl_ps(high, low);
+  c[2] = (v4)_mm_movelh_ps(deep, deeper);
+#else
+  for (int k = 0; k < 3; ++k) c[k] = (v4){point[0][k], point[1][k], point[2][k], point[3][k]};
+#endif
+}
+// Angle of (x, y), error 4e-7 rad: a quarter of it has a tangent below 0.42.
+INLINE v4 angle4(v4 x, v4 y) {
+  v4 r = root4(x * x + y * y), half = size4(y) / larger4(r + size4(x), all4(1e-30f));
+  v4 t = half / (1 + root4(1 + half * half)), u = t * t;
+  v4 p = 0.19961517305842502f + u * (-0.13722131260315293f + u * 0.07586774308787624f);
+  v4 angle = 4 * t * (0.9999999631898905f + u * (-0.33332396678715026f + u * p));
+  angle = pick4(x < 0, (float)SONDE_PI - angle, angle);
+  return pick4(y < 0, -angle, angle);
 }
 // x, y and z of four points as four points.
 INLINE void points4(const v4 c[3], v4 point[4]) {
