@@ -54,10 +54,12 @@ static void lateral_row(sonde_echo *echo, uint32_t sample, bool tissue) {
                      .out = ring_row(echo, sample)};
   double low = scale * (1 - t), high = scale * t;
   for (int l = 0; l <= job.half; ++l)
-    for (int k = 0; k < SONDE_RANK; ++k)
-      for (int c = 0; c < 2; ++c)
-        job.tap[l][k][c] =
-            (float)(low * psf->lateral[band][k][l][c] + high * psf->lateral[band + 1][k][l][c]);
+    for (int k = 0; k < SONDE_RANK; ++k) {
+      const double *top = psf->lateral[band][k][l], *next = psf->lateral[band + 1][k][l];
+      double re = low * top[0] + high * next[0], im = low * top[1] + high * next[1];
+      job.tap[l][k][0] = (float)re;
+      job.tap[l][k][1] = (float)(im - re), job.tap[l][k][2] = (float)(re + im);
+    }
   for (int k = 0; k < SONDE_FINE; ++k) {
     job.re[k] = echo->line_re[k] + echo->pad_lines / SONDE_FINE;
     job.im[k] = echo->line_im[k] + echo->pad_lines / SONDE_FINE;

@@ -183,53 +183,53 @@ static void stream(const stream_job *job) {
 }
 
 // Where it takes more than a load to spread a number over a vector, taps are spread once per job.
-enum { SPREAD = W == 4 };
+enum { SPREAD = W == 4, LATERAL_SUMS = LATERAL_PARTS * SONDE_RANK };
 
 typedef struct taps {
   const float *from;
-  vf spread[SPREAD ? 2 * SONDE_RANK * (SONDE_MOST_TAPS + 1) : 1];
+  vf spread[SPREAD ? LATERAL_SUMS * (SONDE_MOST_TAPS + 1) : 1];
 } taps;
 
 INLINE void spread_taps(const float *from, int count, taps *out) {
-  SONDE_ASSERT(count <= 2 * SONDE_RANK * (SONDE_MOST_TAPS + 1));
+  SONDE_ASSERT(count <= LATERAL_SUMS * (SONDE_MOST_TAPS + 1));
   out->from = from;
   for (int i = 0; SPREAD && i < count; ++i) out->spread[i] = all(from[i]);
 }
 INLINE vf tap_of(const taps *t, int i) { return SPREAD ? t->spread[i] : all(t->from[i]); }
 
-INLINE void add_taps(const taps *tap, int first, vf x, vf y, vf sum[RING_PLANES]) {
-  for (int k = 0; k < SONDE_RANK; ++k) {
-    vf re = tap_of(tap, first + 2 * k), im = tap_of(tap, first + 2 * k + 1);
-    sum[2 * k] = sum[2 * k] + re * x - im * y;
-    sum[2 * k + 1] = sum[2 * k + 1] + re * y + im * x;
-  }
+INLINE void add_taps(const taps *tap, int first, vf x, vf y, vf sum[LATERAL_SUMS]) {
+  const vf part[LATERAL_PARTS] = {x + y, x, y};
+  for (int k = 0; k < LATERAL_SUMS; ++k) sum[k] += tap_of(tap, first + k) * part[k % LATERAL_PARTS];
 }
 
 // As many vectors of lines at once as there are registers for their sums.
 enum { ABREAST = W == 16 ? 2 : 1 };
 
 INLINE void lateral_some(const lateral_job *job, const taps *tap, uint32_t l, uint32_t vectors) {
-  vf sum[ABREAST][RING_PLANES];
+  vf sum[ABREAST][LATERAL_SUMS];
   for (uint32_t v = 0; v < vectors; ++v) {
-    for (int k = 0; k < RING_PLANES; ++k) sum[v][k] = all(0);
+    for (int k = 0; k < LATERAL_SUMS; ++k) sum[v][k] = all(0);
     add_taps(tap, 0, load(job->re[0] + l + v * W), load(job->im[0] + l + v * W), sum[v]);
   }
   for (int t = 1; t <= job->half; ++t) {
     const float *re = job->re[t % 2] + l, *im = job->im[t % 2] + l;
     int left = (t + 1) / 2, right = t / 2;
     for (uint32_t v = 0; v < vectors; ++v, re += W, im += W)
-      add_taps(tap, RING_PLANES * t, load(re - left) + load(re + right),
+      add_taps(tap, LATERAL_SUMS * t, load(re - left) + load(re + right),
                load(im - left) + load(im + right), sum[v]);
   }
   for (uint32_t v = 0; v < vectors; ++v)
-    for (uint32_t k = 0; k < RING_PLANES; ++k)
-      store(job->out + k * job->lines + l + v * W, sum[v][k]);
+    for (uint32_t k = 0; k < SONDE_RANK; ++k) {
+      const vf *of = sum[v] + LATERAL_PARTS * k;
+      float *out = job->out + 2 * k * job->lines + l + v * W;
+      store(out, of[0] - of[2]), store(out + job->lines, of[0] + of[1]);
+    }
 }
 
 static void lateral(const lateral_job *job) {
   SONDE_ASSERT(job->half >= 0 && job->half <= SONDE_MOST_TAPS);
   taps tap;
-  spread_taps(&job->tap[0][0][0], RING_PLANES * (job->half + 1), &tap);
+  spread_taps(&job->tap[0][0][0], LATERAL_SUMS * (job->half + 1), &tap);
   uint32_t l = 0;
   for (; l + ABREAST * W <= job->lines; l += ABREAST * W) lateral_some(job, &tap, l, ABREAST);
   for (; l < job->lines; l += W) lateral_some(job, &tap, l, 1);

@@ -16,8 +16,9 @@ enum {
   KNOT_FLOATS = 11, // that a texture remembers per line
   MOST_LEVELS = LAYER_LEVELS + MOST_VESSELS + MOST_LESIONS,
   RING_PLANES = 2 * SONDE_RANK,
-  SONDE_FINE = 2, // columns of the grid per scan line
-  AXIAL_MOST = 4, // samples summed at once
+  SONDE_FINE = 2,    // columns of the grid per scan line
+  AXIAL_MOST = 4,    // samples summed at once
+  LATERAL_PARTS = 3, // numbers of a complex tap
 };
 
 // A lumen over one map: forms of its scatterers' coordinates, 1 on the wall at rest. Clot fills
@@ -100,7 +101,9 @@ typedef struct lateral_job {
   const float *re[SONDE_FINE], *im[SONDE_FINE]; // columns on lines, columns between; as merged
   uint32_t lines;                               // multiple of ECHO_ALIGN
   int half;
-  float tap[SONDE_MOST_TAPS + 1][SONDE_RANK][2];
+  // re, im - re, re + im: with z = x + i y, sums of re (x + y), (im - re) x and (re + im) y take
+  // three multiplications instead of four
+  float tap[SONDE_MOST_TAPS + 1][SONDE_RANK][LATERAL_PARTS];
   float *out; // [RING_PLANES][lines] re, im of each term
 } lateral_job;
 

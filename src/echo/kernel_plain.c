@@ -101,7 +101,8 @@ static void lateral(const lateral_job *job) {
       for (int t = -job->half; t <= job->half; ++t) {
         const float *u = job->tap[t < 0 ? -t : t][k];
         double x = column(job->re, (int)l, t), y = column(job->im, (int)l, t);
-        re += (double)u[0] * x - (double)u[1] * y, im += (double)u[0] * y + (double)u[1] * x;
+        double tap_im = (double)u[1] + (double)u[0];
+        re += (double)u[0] * x - tap_im * y, im += (double)u[0] * y + tap_im * x;
       }
       job->out[2 * k * job->lines + l] = (float)re;
       job->out[(2 * k + 1) * job->lines + l] = (float)im;
