@@ -5,9 +5,9 @@
 // sonde_echo_prepare, begin_spare, take_beam  the beam of new settings, built beside the one in use
 // sonde_echo_place, sonde_echo_unplace  image coordinates of a flat or curved face
 // sonde_echo_plane   all nodes
-// place_row, place_beside  rest points of a row, and where a step beside the plane leads
-// find_first, find_row  the rest points from what the rows above give
-// seek, refine       one of them
+// find_row           rest points of a row
+// seek, refine, relax  one of them
+// place_beside       where a step beside the plane leads
 // steps_at           derivative at a node
 // choose_view, in_view  branches and lesions near the plane
 // store_node, store_vessel, store_lesions  fields of one node
@@ -244,29 +244,38 @@ static sonde_mat3 steps_at(const sonde_echo *echo, uint32_t i, uint32_t j, uint3
   return m_columns(a, c, b);
 }
 
-// A node on the way to its rest point.
+// A node of a row on the way to its rest point.
 typedef struct seeker {
-  uint32_t node;
   sonde_vec3 local, point, from; // probe frame, world, image
   sonde_mat3 steps;              // that turn a miss in the image into a correction
   sonde_vec3 q, best;
-  double least;
+  double least, damping;
 } seeker;
 
+// Two rows above give a first guess and the derivative that turns a miss into a correction. The
+// first row starts from the point itself, the second a step below the first.
 static seeker seek(const sonde_echo *echo, uint32_t i, uint32_t j) {
   const frame *f = &echo->frame;
-  const plane_node *above = &echo->node[(j - 1) * SONDE_PLANE_COLUMNS + i];
-  seeker s = {.node = j * SONDE_PLANE_COLUMNS + i,
-              .local = sonde_echo_place(f, line_of(echo, i), depth_of(echo, j)),
-              .steps = steps_at(echo, i, j - 1, j - 1),
-              .least = INFINITY};
+  const uint32_t above = (j - 1) * SONDE_PLANE_COLUMNS + i;
+  seeker s = {.local = sonde_echo_place(f, line_of(echo, i), depth_of(echo, j)),
+              .least = INFINITY,
+              .damping = 1};
   s.point = pose_apply(f->probe, s.local), s.from = sonde_echo_unplace(f, s.local);
-  s.q = v_add(above->rest, v_sub(above->rest, (above - SONDE_PLANE_COLUMNS)->rest));
+  s.q = s.point;
+  if (j == 1) {
+    sonde_vec3 up = sonde_echo_place(f, line_of(echo, i), depth_of(echo, 0));
+    s.q = v_add(echo->node[above].rest, q_rotate(f->probe.rotation, v_sub(s.local, up)));
+  } else if (j > 1) {
+    sonde_vec3 rest = echo->node[above].rest;
+    s.steps = steps_at(echo, i, j - 1, j - 1);
+    s.q = v_add(rest, v_sub(rest, echo->node[above - SONDE_PLANE_COLUMNS].rest));
+  }
   s.best = s.q;
   return s;
 }
 
-// A step from where the field takes the guess; false when that is near enough or does not lead on.
+// A step of Newton's from where the field takes the guess; false when that is near enough or does
+// not lead on.
 static bool refine(const sonde_echo *echo, seeker *s, sonde_vec3 field) {
   const frame *f = &echo->frame;
   sonde_vec3 miss = v_sub(v_add(s->q, field), s->point);
@@ -281,6 +290,19 @@ static bool refine(const sonde_echo *echo, seeker *s, sonde_vec3 field) {
   return true;
 }
 
+// The same without a derivative, as sonde_interior_invert does it.
+static bool relax(const sonde_echo *echo, seeker *s, sonde_vec3 field) {
+  sonde_vec3 miss = v_sub(v_add(s->q, field), s->point);
+  double size = v_norm(miss);
+  (void)echo;
+  if (size < s->least)
+    s->least = size, s->best = s->q;
+  else
+    s->damping *= 0.5;
+  s->q = v_madd(s->q, -s->damping, miss);
+  return !(size < tolerance_m);
+}
+
 static void fields_at(sonde_echo *echo, uint32_t count, const v4 *rest, sonde_vec3 *out) {
   v4 field[SONDE_PLANE_COLUMNS];
   SONDE_ASSERT(count <= SONDE_PLANE_COLUMNS);
@@ -289,46 +311,34 @@ static void fields_at(sonde_echo *echo, uint32_t count, const v4 *rest, sonde_ve
     out[k] = vec3((double)field[k][0], (double)field[k][1], (double)field[k][2]);
 }
 
-// Two rows above give a first guess and the derivative that turns a miss into a correction. Where
-// that does not lead to the point, the plain iteration goes on from the best so far.
-static void find_row(sonde_echo *echo, uint32_t j) {
-  seeker seekers[SONDE_PLANE_COLUMNS];
+// Rest points of a row. Where Newton's steps do not lead to the point, the plain iteration goes on
+// from the best so far.
+static void find_row(sonde_echo *echo, uint32_t j, seeker row[SONDE_PLANE_COLUMNS]) {
+  const int steps = j > 1 ? NEWTON_ITERATIONS : j > 0 ? ITERATIONS : FIRST_ITERATIONS;
+  bool (*advance)(const sonde_echo *, seeker *, sonde_vec3) = j > 1 ? refine : relax;
   uint32_t on_way[SONDE_PLANE_COLUMNS], count = SONDE_PLANE_COLUMNS;
   v4 rest[SONDE_PLANE_COLUMNS];
   sonde_vec3 field[SONDE_PLANE_COLUMNS];
-  for (uint32_t i = 0; i < count; ++i) seekers[i] = seek(echo, i, j), on_way[i] = i;
-  for (int step = 0; step < NEWTON_ITERATIONS && count > 0; ++step) {
-    for (uint32_t k = 0; k < count; ++k)
-      rest[k] = v4_of(v_sub(seekers[on_way[k]].q, echo->motion->corner));
-    fields_at(echo, count, rest, field);
+  for (uint32_t i = 0; i < count; ++i) row[i] = seek(echo, i, j), on_way[i] = i;
+  for (int step = 0; step < steps && count > 0; ++step) {
     uint32_t left = 0;
     for (uint32_t k = 0; k < count; ++k)
-      if (refine(echo, &seekers[on_way[k]], field[k])) on_way[left++] = on_way[k];
+      rest[k] = v4_of(v_sub(row[on_way[k]].q, echo->motion->corner));
+    fields_at(echo, count, rest, field);
+    for (uint32_t k = 0; k < count; ++k)
+      if (advance(echo, &row[on_way[k]], field[k])) on_way[left++] = on_way[k];
     count = left;
   }
-  for (seeker *s = seekers; s < seekers + SONDE_PLANE_COLUMNS; ++s)
-    echo->node[s->node].rest =
-        s->least < tolerance_m
-            ? s->best
-            : sonde_interior_invert(echo->interior, s->point, s->best, ITERATIONS, NULL);
-}
-
-// The first two rows: from the point itself, and a step from the row above.
-static sonde_vec3 find_first(const sonde_echo *echo, uint32_t i, uint32_t j, sonde_vec3 local,
-                             sonde_vec3 point) {
-  const frame *f = &echo->frame;
-  sonde_vec3 guess = point;
-  if (j > 0) {
-    sonde_vec3 above = sonde_echo_place(f, line_of(echo, i), depth_of(echo, j - 1.0));
-    sonde_vec3 step = q_rotate(f->probe.rotation, v_sub(local, above));
-    guess = v_add(echo->node[(j - 1) * SONDE_PLANE_COLUMNS + i].rest, step);
+  for (uint32_t i = 0; i < SONDE_PLANE_COLUMNS; ++i) {
+    seeker *s = &row[i];
+    if (j > 1 && !(s->least < tolerance_m)) // the first rows may lie in the air
+      s->best = sonde_interior_invert(echo->interior, s->point, s->best, ITERATIONS, NULL);
+    echo->node[j * SONDE_PLANE_COLUMNS + i].rest = s->best;
   }
-  return sonde_interior_invert(echo->interior, point, guess, j > 0 ? ITERATIONS : FIRST_ITERATIONS,
-                               NULL);
 }
 
 // Where a step beside the plane leads from each node of a row, and the fields there.
-static void place_beside(sonde_echo *echo, uint32_t j) {
+static void place_beside(sonde_echo *echo, uint32_t j, const seeker row[SONDE_PLANE_COLUMNS]) {
   const frame *f = &echo->frame;
   plane_node *node = &echo->node[j * SONDE_PLANE_COLUMNS];
   const sonde_vec3 beside = v_scale(q_rotate(f->probe.rotation, vec3(0, 1, 0)), step_beside);
@@ -338,28 +348,15 @@ static void place_beside(sonde_echo *echo, uint32_t j) {
     rest[i] = v4_of(v_sub(v_add(node[i].rest, beside), echo->motion->corner));
   fields_at(echo, SONDE_PLANE_COLUMNS, rest, there);
   for (uint32_t i = 0; i < SONDE_PLANE_COLUMNS; ++i) {
-    sonde_vec3 local = sonde_echo_place(f, line_of(echo, i), depth_of(echo, j));
-    sonde_vec3 point = pose_apply(f->probe, local);
-    sonde_vec3 here = v_sub(point, node[i].rest); // what the inversion converged to
+    const seeker *s = &row[i];
+    sonde_vec3 here = v_sub(s->point, node[i].rest); // what the inversion converged to
     sonde_vec3 moved = v_add(beside, v_sub(there[i], here));
-    sonde_vec3 end = v_add(local, m_mul_v(f->from_world, moved));
-    sonde_vec3 at = sonde_echo_unplace(f, end), from = sonde_echo_unplace(f, local);
-    node[i].side =
-        vec3((at.x - from.x) / echo->lines_per_column / step_beside, (at.y - from.y) / step_beside,
-             (at.z - from.z) / echo->depth_per_row / step_beside);
-    store_node(echo, j * SONDE_PLANE_COLUMNS + i, point, echo->theta_centre);
+    sonde_vec3 at = sonde_echo_unplace(f, v_add(s->local, m_mul_v(f->from_world, moved)));
+    node[i].side = vec3((at.x - s->from.x) / echo->lines_per_column / step_beside,
+                        (at.y - s->from.y) / step_beside,
+                        (at.z - s->from.z) / echo->depth_per_row / step_beside);
+    store_node(echo, j * SONDE_PLANE_COLUMNS + i, s->point, echo->theta_centre);
   }
-}
-
-static void place_row(sonde_echo *echo, uint32_t j) {
-  const frame *f = &echo->frame;
-  if (j > 1) find_row(echo, j);
-  for (uint32_t i = 0; i < SONDE_PLANE_COLUMNS && j < 2; ++i) {
-    sonde_vec3 local = sonde_echo_place(f, line_of(echo, i), depth_of(echo, j));
-    echo->node[j * SONDE_PLANE_COLUMNS + i].rest =
-        find_first(echo, i, j, local, pose_apply(f->probe, local));
-  }
-  place_beside(echo, j);
 }
 
 // The inverse of the steps.
@@ -386,7 +383,11 @@ void sonde_echo_plane(sonde_echo *echo) {
   echo->theta_centre = centre.theta;
   choose_view(echo);
   sonde_fields_begin(echo->motion, echo->interior, f->probe.position);
-  for (uint32_t j = 0; j < echo->plane_rows; ++j) place_row(echo, j);
+  seeker row[SONDE_PLANE_COLUMNS];
+  for (uint32_t j = 0; j < echo->plane_rows; ++j) {
+    find_row(echo, j, row);
+    place_beside(echo, j, row);
+  }
   for (uint32_t j = 0; j < echo->plane_rows; ++j)
     for (uint32_t i = 0; i < SONDE_PLANE_COLUMNS; ++i) turn_node(echo, i, j);
 }
