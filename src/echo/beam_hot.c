@@ -2,6 +2,7 @@
 // kernels, receiver noise, time-gain compensation.
 //
 // sonde_echo_beam  all stages, row by row
+// window_row       a row of the grid
 // merge_row        one row of the field times what tissue and losses leave
 // lateral_row      lateral kernels at its depth, normalised to unit speckle
 // add_specular     echoes of interfaces, carrier phase included
@@ -28,13 +29,22 @@ static double field_rms(const sonde_echo *echo, double depth_m, double half_m) {
   return sqrt(density * pitch / SONDE_FINE * f->step_m * half_m * 16.0 / 15.0);
 }
 
+// The row of the window; what lies in its other part beside the window is added.
+static float *window_row(sonde_echo *echo, uint32_t sample) {
+  const uint32_t last = echo->window_rows, row = 1 + sample % last, stride = echo->grid_stride;
+  float *here = echo->grid + (size_t)row * stride;
+  if (row > 1 && row < last) return here;
+  float *other = row == 1 ? here + (size_t)last * stride : echo->grid;
+  for (uint32_t i = 0; i < stride; ++i) here[i] += other[i], other[i] = 0;
+  return here;
+}
+
 static void merge_row(sonde_echo *echo, uint32_t sample, bool tissue) {
   double at = ((double)sample - echo->pad_samples) / (echo->samples - 1) * (SONDE_MEDIUM_ROWS - 1);
   at = clamp(at, 0, SONDE_MEDIUM_ROWS - 1.001);
   uint32_t row = (uint32_t)at;
   const float *top = echo->gain + (size_t)row * echo->gain_stride;
-  merge_job job = {.grid = echo->grid + (size_t)sample * echo->grid_stride,
-                   .count = echo->grid_lines / SONDE_FINE};
+  merge_job job = {.grid = window_row(echo, sample), .count = echo->grid_lines / SONDE_FINE};
   if (tissue) job.top = top, job.low = top + echo->gain_stride, job.share = (float)(at - row);
   for (int k = 0; k < SONDE_FINE; ++k) job.re[k] = echo->line_re[k], job.im[k] = echo->line_im[k];
   SONDE_ASSERT(job.count < echo->gain_stride);
@@ -122,10 +132,11 @@ static axial_job axial_of(const sonde_echo *echo, bool tissue) {
   return job;
 }
 
-void sonde_echo_beam(sonde_echo *echo, bool tissue) {
-  SONDE_ASSERT(echo->pad_lines % SONDE_FINE == 0);
+void sonde_echo_beam(sonde_echo *echo, uint32_t tier, bool tissue) {
+  SONDE_ASSERT(echo->pad_lines % SONDE_FINE == 0 && tier < echo->tier_count);
   axial_job job = axial_of(echo, tissue);
-  for (uint32_t n = 0; n < echo->grid_samples; ++n) {
+  const uint32_t first = tier * echo->tier_rows, end = first + echo->tier_rows;
+  for (uint32_t n = first; n < end && n < echo->grid_samples; ++n) {
     lateral_row(echo, n, tissue);
     if (tissue) add_specular(echo, n);
     if (n < 2 * echo->pad_samples) continue;
@@ -134,6 +145,9 @@ void sonde_echo_beam(sonde_echo *echo, bool tissue) {
     if (before + 1 == AXIAL_MOST || sample + 1 == echo->samples)
       axial_rows(echo, &job, sample - before, (int)before + 1, tissue);
   }
+}
+
+void sonde_echo_beam_end(sonde_echo *echo) {
   if (echo->padded == echo->lines) return;
   for (uint32_t n = 0; n < echo->samples; ++n)
     memcpy(echo->flat_envelope + (size_t)n * echo->lines, echo->envelope + (size_t)n * echo->padded,

@@ -9,10 +9,11 @@
 // beats_of           mean share of the pulse up to a time
 // travelled          way of the mean flow in a vessel
 // segment_map        one segment's lumen in image coordinates
-// lay_segment, outside_clot  scatterers on the streamlines of one segment
-// flow               all segments of a vessel
+// sonde_blood_lay, outside_clot  scatterers on the streamlines of one segment
+// form_of            its map
+// flow               all segments of a vessel, which then wait for their tiers
 #include "base/base.h"
-#include "echo/echo.h"
+#include "echo/tiers.h"
 
 #include <string.h>
 
@@ -78,25 +79,45 @@ static uint32_t outside_clot(scatter_pool *some, uint32_t count, double solid) {
   return kept;
 }
 
-// @param solid share of the short axis that clot fills, from the far side; its scatterers belong to
-// the tissue
-static void lay_segment(sonde_echo *echo, const map *m, uint32_t count, int32_t segment,
-                        uint32_t salt, double way, double solid) {
+void sonde_blood_lay(sonde_echo *echo, const blood_segment *s, splat_limits rows) {
   float x[BATCH], y[BATCH], z[BATCH], sign[BATCH];
   const scatter_pool *blood = &echo->blood;
-  SONDE_ASSERT(count <= SONDE_BLOOD && solid < 1);
-  for (uint32_t i = 0; i < count; i += BATCH) {
-    uint32_t kept = count - i < BATCH ? count - i : BATCH;
+  SONDE_ASSERT(s->count <= SONDE_BLOOD && s->solid < 1);
+  splat_map form = s->map;
+  for (uint32_t i = 0; i < s->count; i += BATCH) {
+    uint32_t kept = s->count - i < BATCH ? s->count - i : BATCH;
     scatter_pool some = {x, y, z, sign};
-    stream_job job = {blood->z + i, blood->sign + i, kept, i, way, segment, salt, z, sign};
+    stream_job job = {blood->z + i, blood->sign + i, kept, i, s->way, s->segment, s->salt, z, sign};
     echo->kernels->stream(&job);
     memcpy(x, blood->x + i, kept * sizeof *x);
     memcpy(y, blood->y + i, kept * sizeof *y);
-    if (solid > 0) kept = outside_clot(&some, kept, solid);
-    echo->bled += kept;
+    if (s->solid > 0) kept = outside_clot(&some, kept, s->solid);
     for (; kept % ECHO_ALIGN; ++kept) x[kept] = y[kept] = z[kept] = sign[kept] = 0;
-    if (kept > 0) sonde_echo_lay(echo, m, &some, 0, kept);
+    form.count = kept;
+    if (kept > 0) sonde_echo_splat(echo, &some, &form, 1, NULL, rows);
   }
+}
+
+// Streamlines of so many that clot leaves: as outside_clot() counts them.
+static uint32_t flowing(const sonde_echo *echo, uint32_t count, double solid) {
+  uint32_t kept = 0;
+  for (uint32_t i = 0; i < count; ++i) kept += !(-2 * (double)echo->blood.x[i] > 1 - 2 * solid);
+  return kept;
+}
+
+// False beside the slab.
+static bool form_of(const sonde_echo *echo, const map *m, splat_map *out) {
+  double half = sonde_echo_elevation(echo, m->origin.z * echo->depth_per_row);
+  const double unit[3] = {echo->lines_per_column * SONDE_FINE, 1 / half,
+                          echo->depth_per_row / echo->frame.step_m};
+  *out = (splat_map){0};
+  for (int k = 0; k < 4; ++k) {
+    sonde_vec3 v = k == 0 ? m->origin : m->axis[k - 1];
+    for (int c = 0; c < 3; ++c) out->m[k][c] = (float)(v_coordinate(v, c) * unit[c]);
+  }
+  out->m[0][2] += (float)echo->pad_samples;
+  float reach = 0.5f * (fabsf(out->m[1][1]) + fabsf(out->m[2][1]) + fabsf(out->m[3][1]));
+  return fabsf(out->m[0][1]) <= 1 + reach;
 }
 
 static void flow(sonde_echo *echo, uint32_t which) {
@@ -114,10 +135,14 @@ static void flow(sonde_echo *echo, uint32_t which) {
   for (int32_t k = first; k < last && known; ++k, low = high) {
     known = sonde_vessel_at(interior, which, (k + 1) * segment_m, &high);
     double solid = sonde_echo_solid(echo, which, low.rest_centre_m.z), volume = 0;
-    map m;
+    map m = {0};
     if (known && solid < 1) volume = segment_map(echo, &low, &high, &m);
     uint32_t count = (uint32_t)fmin(density * volume, SONDE_BLOOD);
-    if (count > 0) lay_segment(echo, &m, count, k, salt, way, solid);
+    blood_segment one = {.way = way, .solid = solid, .count = count, .salt = salt, .segment = k};
+    if (count == 0 || !form_of(echo, &m, &one.map)) continue;
+    uint32_t kept = solid > 0 ? flowing(echo, count, solid) : count;
+    echo->bled += kept, echo->moved += kept;
+    sonde_tiers_add_segment(echo, &one);
   }
 }
 

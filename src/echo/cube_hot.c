@@ -9,13 +9,13 @@
 // sonde_cubes_add    one cube: place, walls beside it, points that they carry
 // locate             image coordinates of its middle, and the derivative there
 // find_walls, store_wall, add_points  vessels beside it
-// sonde_cubes_end, lay_some, lay_cube, lay_pieces  carried points, maps of all that wait
-// add_map            one map
+// sonde_cubes_end, place_some, place_cube, place_pieces  carried points, maps of some cubes
+// make_map, add_map  one map, which then waits for its tier
 // find_lumina, shift_form, add_lumina  the lumina that it leaves empty
-// sonde_echo_splat   maps into the grid
 #include "base/base.h"
 #include "base/random.h"
 #include "echo/cubes.h"
+#include "echo/tiers.h"
 
 #include <string.h>
 
@@ -81,7 +81,7 @@ static void bound_vessel(const sonde_echo *echo, sonde_cubes *s, uint32_t k, dou
 void sonde_cubes_begin(sonde_echo *echo) {
   sonde_cubes *s = echo->cubes;
   double first = INFINITY, last = -INFINITY, h = echo->cell_m;
-  s->count = s->groups = s->walls = s->maps = s->lumens = 0;
+  s->count = s->groups = s->walls = 0;
   s->corner = vec3(h * echo->box_first[0], h * echo->box_first[1], h * echo->box_first[2]);
   store_nodes(echo, s);
   store_frame(echo, s);
@@ -217,11 +217,11 @@ static uint64_t cell_key(const int32_t cell[3]) {
   return (uint64_t)(uint16_t)cell[0] << 32 | (uint64_t)(uint16_t)cell[1] << 16 | (uint16_t)cell[2];
 }
 
-static void lay_some(sonde_echo *echo);
+static void place_some(sonde_echo *echo);
 
 void sonde_cubes_add(sonde_echo *echo, const int32_t cell[3], v4 rest, v4 at) {
   sonde_cubes *s = echo->cubes;
-  if (s->count == CUBES_AT_ONCE || s->groups + 2 > CARRY_GROUPS) lay_some(echo);
+  if (s->count == CUBES_AT_ONCE || s->groups + 2 > CARRY_GROUPS) place_some(echo);
   cube *c = &s->cube[s->count++];
   c->rest = rest;
   c->bits = sonde_random_bits(echo->seed + 2, cell_key(cell));
@@ -234,47 +234,24 @@ void sonde_cubes_add(sonde_echo *echo, const int32_t cell[3], v4 rest, v4 at) {
 
 // ---- maps -----------------------------------------------------------------------------------
 
-void sonde_echo_splat(sonde_echo *echo, const scatter_pool *pool, const splat_map *first,
-                      uint32_t maps, const splat_lumen *lumen) {
-  const frame *f = &echo->frame;
-  const splat_job job = {.x = pool->x,
-                         .y = pool->y,
-                         .z = pool->z,
-                         .sign = pool->sign,
-                         .map = first,
-                         .maps = maps,
-                         .lumen = lumen,
-                         .cube = true,
-                         .grid = echo->grid,
-                         .stride = echo->grid_stride,
-                         .turns = (float)(2 * f->step_m / f->wavelength_m),
-                         .right = (float)(echo->grid_lines - 1),
-                         .bottom = (float)echo->grid_samples - 1.5f};
-  echo->kernels->splat(&job);
-}
-
-static void lay_maps(sonde_echo *echo) {
-  sonde_cubes *s = echo->cubes;
-  if (s->maps > 0) sonde_echo_splat(echo, &echo->pool, s->map, s->maps, s->lumen);
-  s->maps = s->lumens = 0;
-}
-
-// NULL when it lies beside the slab.
-static splat_map *add_map(sonde_echo *echo, v4 origin, const v4 axis[3], uint32_t from,
-                          uint32_t count) {
-  sonde_cubes *s = echo->cubes;
-  if (s->maps == MAPS_AT_ONCE || s->lumens + MOST_VESSELS > LUMENS_AT_ONCE) lay_maps(echo);
+// False when it lies beside the slab.
+static bool make_map(const sonde_echo *echo, v4 origin, const v4 axis[3], uint32_t from,
+                     uint32_t count, splat_map *one) {
+  const sonde_cubes *s = echo->cubes;
   v4 unit = s->unit;
   unit[1] = (float)(1 / sonde_echo_elevation(echo, (double)origin[2] * echo->depth_per_row));
   const v4 first = origin * unit + s->pad, m[3] = {axis[0] * unit, axis[1] * unit, axis[2] * unit};
   float reach = 0.5f * (fabsf(m[0][1]) + fabsf(m[1][1]) + fabsf(m[2][1]));
-  if (fabsf(first[1]) > 1 + reach) return NULL;
-  splat_map *one = &s->map[s->maps++];
+  if (fabsf(first[1]) > 1 + reach) return false;
   store4(one->m[0], first);
   for (int k = 0; k < 3; ++k) store4(one->m[k + 1], m[k]);
-  one->from = from, one->count = count, one->lumen = s->lumens, one->lumens = 0;
-  echo->moved += count;
-  return one;
+  one->from = from, one->count = count, one->lumen = echo->tiers->lumens, one->lumens = 0;
+  return true;
+}
+
+static void add_map(sonde_echo *echo, const splat_map *one) {
+  echo->moved += one->count;
+  sonde_tiers_add_map(echo, one);
 }
 
 // Whether a form exceeds 1 for all coordinates of +-1/2.
@@ -308,14 +285,15 @@ static void shift_form(const float form[4], v4 offset, float out[4]) {
   for (int i = 1; i < 4; ++i) out[i] = 0.5f * form[i];
 }
 
-static void add_lumina(sonde_cubes *s, splat_map *one, const splat_lumen *lumen, uint32_t count,
+static void add_lumina(sonde_tiers *tiers, splat_map *one, const splat_lumen *lumen, uint32_t count,
                        v4 offset) {
-  for (uint32_t k = 0; k < count; ++k) {
-    splat_lumen *l = &s->lumen[s->lumens];
-    shift_form(lumen[k].along, offset, l->along);
-    shift_form(lumen[k].across, offset, l->across);
-    l->chord = lumen[k].chord;
-    if (!is_beyond(l->along) && !is_beyond(l->across)) ++s->lumens, ++one->lumens;
+  for (uint32_t k = 0; k < count && tiers->lumens < MOST_LUMENS; ++k) {
+    splat_lumen l = {.chord = lumen[k].chord};
+    shift_form(lumen[k].along, offset, l.along);
+    shift_form(lumen[k].across, offset, l.across);
+    if (is_beyond(l.along) || is_beyond(l.across)) continue;
+    sonde_tiers_add_lumen(tiers, &l);
+    ++one->lumens;
   }
 }
 
@@ -340,7 +318,7 @@ static void carried_points(const sonde_echo *echo, uint32_t group, v4 at[4]) {
 
 // The middles of two neighbours are as far apart as a piece is long: one carried point per piece
 // gives all the maps.
-static void lay_pieces(sonde_echo *echo, const cube *c) {
+static void place_pieces(sonde_echo *echo, const cube *c) {
   const uint32_t each = echo->per_piece, shares = SONDE_LOOSE / each;
   v4 at[8];
   splat_lumen lumen[MOST_VESSELS];
@@ -350,14 +328,16 @@ static void lay_pieces(sonde_echo *echo, const cube *c) {
     const uint32_t share = (uint32_t)(c->bits >> 32) + part;
     const v4 axis[3] = {at[part | 1] - at[part & ~1u], at[part | 2] - at[part & ~2u],
                         at[part | 4] - at[part & ~4u]};
-    splat_map *one = add_map(echo, at[part], axis, SONDE_POOL + share % shares * each, each);
     const v4 offset = {part & 1 ? quarter : -quarter, part & 2 ? quarter : -quarter,
                        part & 4 ? quarter : -quarter, 0};
-    if (one) add_lumina(echo->cubes, one, lumen, lumens, offset);
+    splat_map one;
+    if (!make_map(echo, at[part], axis, SONDE_POOL + share % shares * each, each, &one)) continue;
+    add_lumina(echo->tiers, &one, lumen, lumens, offset);
+    add_map(echo, &one);
   }
 }
 
-static void lay_cube(sonde_echo *echo, const cube *c) {
+static void place_cube(sonde_echo *echo, const cube *c) {
   const uint32_t patterns = SONDE_POOL / echo->per_cell;
   v4 origin = c->at, axis[3] = {c->axis[0], c->axis[1], c->axis[2]}, at[4];
   if (c->carried) {
@@ -367,25 +347,23 @@ static void lay_cube(sonde_echo *echo, const cube *c) {
   }
   for (int k = 0; k < 3; ++k) // mirrored patterns look new
     if (c->bits >> (61 + k) & 1) axis[k] = -axis[k];
-  (void)add_map(echo, origin, axis, (uint32_t)(c->bits % patterns) * echo->per_cell,
-                echo->per_cell);
+  const uint32_t from = (uint32_t)(c->bits % patterns) * echo->per_cell;
+  splat_map one;
+  if (make_map(echo, origin, axis, from, echo->per_cell, &one)) add_map(echo, &one);
 }
 
-static void lay_some(sonde_echo *echo) {
+static void place_some(sonde_echo *echo) {
   sonde_cubes *s = echo->cubes;
   const carry_job job = {s->groups, s->walls, (const float(*)[WALL_FIELDS][WALL_ROOM])s->wall,
                          (const float(*)[CARRY_POINTS])s->rest, s->moved};
   if (s->walls > 0) echo->kernels->carry(&job);
   for (const cube *c = s->cube; c < s->cube + s->count; ++c) {
     if (c->close)
-      lay_pieces(echo, c);
+      place_pieces(echo, c);
     else
-      lay_cube(echo, c);
+      place_cube(echo, c);
   }
   s->count = s->groups = s->walls = 0;
 }
 
-void sonde_cubes_end(sonde_echo *echo) {
-  lay_some(echo);
-  lay_maps(echo);
-}
+void sonde_cubes_end(sonde_echo *echo) { place_some(echo); }

@@ -8,8 +8,6 @@
 
 enum {
   CUBES_AT_ONCE = 64,
-  MAPS_AT_ONCE = 128,
-  LUMENS_AT_ONCE = 256,
 };
 
 // A node of the coarse plane: place at rest, and the columns of plane_node.in.
@@ -48,19 +46,17 @@ typedef struct sonde_cubes {
   v4 unit, pad;                             // image coordinates to the grid's
   v4 low[MOST_VESSELS], high[MOST_VESSELS]; // cubes beside that box stay whole
   cube_station station[MOST_VESSELS][SONDE_STATIONS]; // of the vessels in view, near the slab
-  uint32_t count, groups, walls, maps, lumens;
+  uint32_t count, groups, walls;
   cube cube[CUBES_AT_ONCE];
   float wall[MOST_VESSELS][WALL_FIELDS][WALL_ROOM];
   float rest[3][CARRY_POINTS], moved[3][CARRY_POINTS];
-  splat_map map[MAPS_AT_ONCE];
-  splat_lumen lumen[LUMENS_AT_ONCE];
 } sonde_cubes;
 
 // The box is known, no cube has been added.
 void sonde_cubes_begin(sonde_echo *echo);
 // @param at image coordinates to within a millimetre
 void sonde_cubes_add(sonde_echo *echo, const int32_t cell[3], v4 rest, v4 at);
-// Lays what is left.
+// Maps of what is left.
 void sonde_cubes_end(sonde_echo *echo);
 
 #endif

@@ -13,6 +13,7 @@
 #include "base/vector.h"
 #include "echo/cubes.h"
 #include "echo/echo.h"
+#include "echo/tiers.h"
 #include "interior/fields.h"
 
 #include <stdlib.h>
@@ -27,7 +28,7 @@ enum {
 };
 
 static const double default_density_m3 = 32e9;
-static const double cell_size_m = 2e-3;
+static const double cell_size_m = 2e-3, least_depth_m = 0.02;
 
 sonde_echo_settings sonde_echo_settings_default(void) {
   return (sonde_echo_settings){.frequency_hz = 7.5e6,
@@ -46,7 +47,7 @@ sonde_echo_settings sonde_echo_settings_clamp(sonde_echo_settings s) {
   sonde_echo_settings d = sonde_echo_settings_default();
   return (sonde_echo_settings){
       .frequency_hz = bounded(s.frequency_hz, 1e6, 12e6, d.frequency_hz),
-      .depth_m = bounded(s.depth_m, 0.02, 0.15, d.depth_m),
+      .depth_m = bounded(s.depth_m, least_depth_m, 0.15, d.depth_m),
       .gain_db = bounded(s.gain_db, -30, 30, d.gain_db),
       .dynamic_range_db = bounded(s.dynamic_range_db, 30, 90, d.dynamic_range_db),
       .focus_m = bounded(s.focus_m, 5e-3, 0.15, d.focus_m),
@@ -138,7 +139,9 @@ static size_t carve(sonde_echo *echo, char *block) {
   CARVE(echo->gain, (most_lines / SONDE_FINE + ECHO_ALIGN) * SONDE_MEDIUM_ROWS);
   CARVE(echo->loss_db, lines);
   CARVE(echo->coupling, lines);
-  CARVE(echo->grid, (2 * most_lines + 16) * (echo->samples + 2 * SONDE_MOST_TAPS));
+  const double finest_m = least_depth_m / (double)(echo->samples - 1);
+  CARVE(echo->grid,
+        (2 * most_lines + 16) * (sonde_tiers_window(cell_size_m, finest_m) + (size_t)2));
   for (int k = 0; k < SONDE_FINE; ++k) {
     CARVE(echo->line_re[k], most_lines / SONDE_FINE);
     CARVE(echo->line_im[k], most_lines / SONDE_FINE);
@@ -149,6 +152,7 @@ static size_t carve(sonde_echo *echo, char *block) {
   CARVE(echo->grey, image);
   CARVE(echo->noise, SONDE_NOISE);
   CARVE(echo->cubes, 1);
+  CARVE(echo->tiers, 1);
   CARVE(echo->motion, 1);
   used = carve_pool(&echo->pool, block, used, SONDE_POOL + SONDE_LOOSE);
   return carve_pool(&echo->blood, block, used, SONDE_BLOOD);

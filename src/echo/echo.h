@@ -74,6 +74,7 @@ struct sonde_echo {
   uint32_t padded;                                           // lines in whole vectors
   uint32_t grid_stride, gain_stride;                         // floats per row of the grid, gains
   uint32_t grid_lines, grid_samples, pad_lines, pad_samples; // lines: columns of the grid
+  uint32_t window_rows, tier_rows, tier_count;               // of the grid's rows, tiers.h
   double density_m3, cell_m;
   uint32_t per_cell, per_piece; // scatterers of a cube and of an eighth of it
   uint64_t seed;
@@ -109,7 +110,7 @@ struct sonde_echo {
   specular *echoes; // [MAX_ECHOES]
   uint32_t echo_count;
   int32_t *first_echo; // [samples] list of the echoes between this sample and the next
-  float *grid;         // [grid_samples][grid_stride] scattered field, kernel.h; zero between frames
+  float *grid; // [window_rows + 2][grid_stride] scattered field, kernel.h; zero between frames
   float *line_re[SONDE_FINE]; // one row of it with its gain: [grid_lines / FINE]
   float *line_im[SONDE_FINE];
   float *ring;          // [2*MOST_TAPS+AXIAL_MOST][RING_PLANES][padded]
@@ -125,6 +126,7 @@ struct sonde_echo {
   uint64_t *seen;                     // [BOX_SIDE^3 / 64] a bit per cube of the box, x fastest
   double slab_m[SONDE_SLAB_ROWS + 1]; // half height, depths in even steps
   struct sonde_cubes *cubes;          // cubes.h
+  struct sonde_tiers *tiers;          // tiers.h
   struct sonde_fields *motion;        // of this frame
   uint32_t cell_count, moved, bled;   // cells and scatterers of the last frame
   sonde_echo_times times;
@@ -138,10 +140,16 @@ void sonde_echo_frame(sonde_echo *echo, sonde_pose world_from_probe, double aper
                       const sonde_echo_settings *settings);
 void sonde_echo_plane(sonde_echo *echo);
 void sonde_echo_medium(sonde_echo *echo);
+// Tissue and blood, which then wait for their tiers.
 void sonde_echo_scatter(sonde_echo *echo);
 void sonde_echo_blood(sonde_echo *echo);
-void sonde_echo_scatter_points(sonde_echo *echo, const sonde_echo_point *points, uint32_t count);
-void sonde_echo_beam(sonde_echo *echo, bool tissue);
+// Those of the points that belong to a tier.
+void sonde_echo_scatter_points(sonde_echo *echo, const sonde_echo_point *points, uint32_t count,
+                               uint32_t tier);
+// The rows of a tier that has been laid.
+void sonde_echo_beam(sonde_echo *echo, uint32_t tier, bool tissue);
+// After the last one.
+void sonde_echo_beam_end(sonde_echo *echo);
 void sonde_echo_picture(sonde_echo *echo, sonde_image *image);
 
 // Point of the image in the probe frame: line, depth.
@@ -161,10 +169,9 @@ sonde_vec3 sonde_echo_from_world(const sonde_echo *echo, sonde_vec3 point_m);
 double sonde_echo_elevation(const sonde_echo *echo, double depth_m);
 // Scatterers of maps of a pool into the grid.
 void sonde_echo_splat(sonde_echo *echo, const scatter_pool *pool, const splat_map *first,
-                      uint32_t maps, const splat_lumen *lumen);
-// Scatterers `from`.. of a pool through one map into the grid; a multiple of ECHO_ALIGN.
-void sonde_echo_lay(sonde_echo *echo, const map *m, const scatter_pool *pool, uint32_t from,
-                    uint32_t count);
+                      uint32_t maps, const splat_lumen *lumen, splat_limits rows);
+// What the jobs of all of them have in common.
+splat_job sonde_echo_splat_job(sonde_echo *echo);
 
 static const float sonde_white_db = 40; // white over the rms of muscle speckle
 // Speed of sound that the scanner assumes, m/s.

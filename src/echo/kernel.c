@@ -83,7 +83,7 @@ INLINE void make_parcel(const splat_job *job, const flock *f, uint32_t from, par
   vf a = line - real(l), b = depth - real(n), up = 0.5f - b, down = 0.5f + b, c, s;
   turn(depth * job->turns, &c, &s);
   vf re = weight * c, im = weight * s, re1 = a * re, im1 = a * im;
-  vi at = n * (int32_t)job->stride + 2 * l;
+  vi at = ((n & (int32_t)job->mask) + 1) * (int32_t)job->stride + 2 * l;
   records(p->record, re - re1, im1 - im, re1, -im1);
   memcpy(p->cell, &at, sizeof at);
   store(p->up, 0.5f * up * up), store(p->down, 0.5f * down * down);
@@ -125,7 +125,8 @@ INLINE vi in_lumina(const splat_job *job, const splat_map *map, vf x, vf y, vf z
 
 INLINE void splat_some(const splat_job *job, const splat_map *map, bool inside, flock *f) {
   const float *px = job->x + map->from, *py = job->y + map->from, *pz = job->z + map->from;
-  const float *sign = job->sign + map->from, right = job->right, bottom = job->bottom;
+  const float *sign = job->sign + map->from, right = job->right;
+  const splat_limits rows = job->rows;
   const form to_line = form_of(map->m, 0), to_side = form_of(map->m, 1),
              to_depth = form_of(map->m, 2);
   const uint32_t count = map->count;
@@ -135,7 +136,10 @@ INLINE void splat_some(const splat_job *job, const splat_map *map, bool inside, 
     vi in = height > 0;
     if (!any(in)) continue;
     vf line = along(&to_line, x, y, z), depth = along(&to_depth, x, y, z);
-    if (!inside) in = in & (line >= 0) & (line < right) & (depth >= 1) & (depth < bottom);
+    if (!inside) {
+      vf row = depth + 0.5f; // as in make_parcel
+      in = in & (line >= 0) & (line < right) & (row >= rows.first) & (row < rows.last);
+    }
     if (map->lumens) in = in & ~in_lumina(job, map, x, y, z);
     f->count += pack(in, line, f->line + f->count, depth, f->depth + f->count,
                      load(sign + i) * height, f->weight + f->count);
@@ -152,8 +156,9 @@ static void splat(const splat_job *job) {
     const float(*m)[4] = map->m;
     float line = 0.5f * (size1(m[1][0]) + size1(m[2][0]) + size1(m[3][0])) + 0.01f;
     float depth = 0.5f * (size1(m[1][2]) + size1(m[2][2]) + size1(m[3][2])) + 0.01f;
+    float row = m[0][2] + 0.5f;
     bool inside = job->cube && m[0][0] > line && m[0][0] + line < job->right &&
-                  m[0][2] > depth + 1 && m[0][2] + depth < job->bottom;
+                  row - depth > job->rows.first && row + depth < job->rows.last;
     if (inside)
       splat_some(job, map, true, &f);
     else

@@ -35,16 +35,25 @@ typedef struct splat_map {
   uint32_t lumen, lumens; // first and number of those that it leaves empty
 } splat_map;
 
+// Rows that scatterers may be nearest to: first <= row < last.
+typedef struct splat_limits {
+  float first, last;
+} splat_limits;
+
 typedef struct splat_job {
   const float *x, *y, *z, *sign;
   const splat_map *map; // [maps]
   const splat_lumen *lumen;
   uint32_t maps;
-  bool cube;           // x, y and z lie within +-1/2
-  float turns;         // carrier periods per sample
-  float right, bottom; // last column with a neighbour, half a sample before the last sample
-  float *grid;         // [sample][column][re, im]
-  uint32_t stride;     // floats per sample
+  bool cube;   // x, y and z lie within +-1/2
+  float turns; // carrier periods per sample
+  float right; // last column with a neighbour
+  splat_limits rows;
+  // [row][column][re, im]: row n of the image is row 1 + n & mask. The rows before the first and
+  // behind the last are parts of the last and the first.
+  float *grid;
+  uint32_t stride; // floats per row
+  uint32_t mask;
 } splat_job;
 
 // State of a vessel beside some points. Vectors of the cross-section are of unit length.

@@ -17,16 +17,17 @@ static bool in_lumen(const splat_lumen *l, double x, double y, double z) {
 
 static void lay_point(const splat_job *job, const double at[3], double sign) {
   double height = 1 - at[1] * at[1];
-  if (!(height > 0 && at[0] >= 0 && at[0] < (double)job->right && at[2] >= 1 &&
-        at[2] < (double)job->bottom))
+  double nearest = floor(at[2] + 0.5);
+  if (!(height > 0 && at[0] >= 0 && at[0] < (double)job->right &&
+        nearest >= (double)job->rows.first && nearest < (double)job->rows.last))
     return;
-  double weight = sign * height, l = floor(at[0]), n = floor(at[2] + 0.5);
-  double turn = 6.283185307179586 * at[2] * (double)job->turns, b = at[2] - n;
+  double weight = sign * height, l = floor(at[0]);
+  double turn = 6.283185307179586 * at[2] * (double)job->turns, b = at[2] - nearest;
   const double deep[3] = {0.5 * (0.5 - b) * (0.5 - b), 0.75 - b * b, 0.5 * (0.5 + b) * (0.5 + b)};
   for (size_t corner = 0; corner < 6; ++corner) {
     double a = corner & 1 ? at[0] - l : 1 - (at[0] - l), size = a * deep[corner / 2] * weight;
-    float *g =
-        job->grid + ((size_t)n + corner / 2 - 1) * job->stride + 2 * ((size_t)l + (corner & 1));
+    size_t row = ((size_t)nearest & job->mask) + corner / 2;
+    float *g = job->grid + row * job->stride + 2 * ((size_t)l + (corner & 1));
     g[0] += (float)(size * cos(turn)), g[1] -= (float)(size * sin(turn));
   }
 }

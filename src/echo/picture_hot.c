@@ -4,7 +4,7 @@
 // sonde_echo_default_tgc_db_per_m  compensation of the mean soft tissue
 // sonde_echo_picture               scan conversion: bilinear, square pixels, black beside the lines
 #include "base/base.h"
-#include "echo/echo.h"
+#include "echo/tiers.h"
 
 #include <time.h>
 
@@ -72,8 +72,14 @@ void sonde_echo_render(sonde_echo *echo, sonde_pose world_from_probe, double ape
   sonde_echo_scatter(echo);
   sonde_echo_blood(echo);
   t->scatter_s = lap(&start);
-  sonde_echo_beam(echo, true);
-  t->beam_s = lap(&start);
+  t->beam_s = 0;
+  for (uint32_t tier = 0; tier < echo->tier_count; ++tier) {
+    sonde_tiers_lay(echo, tier);
+    t->scatter_s += lap(&start);
+    sonde_echo_beam(echo, tier, true);
+    t->beam_s += lap(&start);
+  }
+  sonde_echo_beam_end(echo);
   sonde_echo_picture(echo, image);
   t->picture_s = lap(&start);
   t->scatterers = echo->moved;
@@ -90,6 +96,9 @@ void sonde_echo_render_points(sonde_echo *echo, double aperture_m,
                               uint32_t count) {
   SONDE_ASSERT(echo != NULL && (points != NULL || count == 0));
   sonde_echo_frame(echo, (sonde_pose){.rotation = {.w = 1}}, aperture_m, settings);
-  sonde_echo_scatter_points(echo, points, count);
-  sonde_echo_beam(echo, false);
+  for (uint32_t tier = 0; tier < echo->tier_count; ++tier) {
+    sonde_echo_scatter_points(echo, points, count, tier);
+    sonde_echo_beam(echo, tier, false);
+  }
+  sonde_echo_beam_end(echo);
 }

@@ -15,6 +15,7 @@
 // turn_node          inverse derivative at a node
 #include "base/base.h"
 #include "echo/echo.h"
+#include "echo/tiers.h"
 #include "interior/fields.h"
 
 #include <string.h>
@@ -122,6 +123,8 @@ void sonde_echo_frame(sonde_echo *echo, sonde_pose world_from_probe, double aper
   echo->lines_per_column = (echo->lines - 1 + 2 * f->edge_lines) / (SONDE_PLANE_COLUMNS - 1);
   echo->plane_rows = (uint32_t)clamp(ceil(f->depth_m / row_m) + 1, fewest_rows, SONDE_PLANE_ROWS);
   echo->depth_per_row = f->depth_m / (echo->plane_rows - 1);
+  sonde_tiers_measure(echo);
+  sonde_tiers_begin(echo);
 }
 
 const sonde_pathology *sonde_echo_pathology(const sonde_echo *echo, uint32_t which) {

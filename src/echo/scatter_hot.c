@@ -9,11 +9,10 @@
 // clear_seen, find    each cube once
 // sonde_echo_to_world, sonde_echo_from_world  image coordinates
 // sonde_echo_elevation  half height of the slab
-// sonde_echo_lay      scatterers of one map into the grid
 // sonde_echo_scatter_points  given points instead of tissue
 #include "base/base.h"
 #include "echo/cubes.h"
-#include "echo/echo.h"
+#include "echo/tiers.h"
 
 #include <string.h>
 
@@ -37,32 +36,12 @@ sonde_vec3 sonde_echo_from_world(const sonde_echo *echo, sonde_vec3 p) {
   return vec3((at.x + f->edge_lines) / echo->lines_per_column, at.y, at.z / echo->depth_per_row);
 }
 
-// ---- laying ---------------------------------------------------------------------------------
+// ---- the slab -------------------------------------------------------------------------------
 
 double sonde_echo_elevation(const sonde_echo *echo, double depth_m) {
   double at = clamp(depth_m / echo->frame.depth_m, 0, 1) * SONDE_SLAB_ROWS;
   uint32_t k = at < SONDE_SLAB_ROWS ? (uint32_t)at : SONDE_SLAB_ROWS - 1;
   return echo->slab_m[k] + (at - k) * (echo->slab_m[k + 1] - echo->slab_m[k]);
-}
-
-void sonde_echo_lay(sonde_echo *echo, const map *m, const scatter_pool *pool, uint32_t from,
-                    uint32_t count) {
-  SONDE_ASSERT(count % ECHO_ALIGN == 0);
-  double half = sonde_echo_elevation(echo, m->origin.z * echo->depth_per_row);
-  const double unit[3] = {echo->lines_per_column * SONDE_FINE, 1 / half,
-                          echo->depth_per_row / echo->frame.step_m};
-  splat_map out = {.from = from, .count = count};
-  for (int k = 0; k < 4; ++k) {
-    sonde_vec3 v = k == 0 ? m->origin : m->axis[k - 1];
-    out.m[k][0] = (float)(v.x * unit[0]);
-    out.m[k][1] = (float)(v.y * unit[1]);
-    out.m[k][2] = (float)(v.z * unit[2]);
-  }
-  out.m[0][2] += (float)echo->pad_samples;
-  float reach = 0.5f * (fabsf(out.m[1][1]) + fabsf(out.m[2][1]) + fabsf(out.m[3][1]));
-  if (fabsf(out.m[0][1]) > 1 + reach) return;
-  echo->moved += count;
-  sonde_echo_splat(echo, pool, &out, 1, NULL);
 }
 
 // ---- cubes ----------------------------------------------------------------------------------
@@ -183,29 +162,24 @@ void sonde_echo_scatter(sonde_echo *echo) {
 }
 
 // Points of the probe frame, in blocks of one vector.
-void sonde_echo_scatter_points(sonde_echo *echo, const sonde_echo_point *points, uint32_t count) {
+void sonde_echo_scatter_points(sonde_echo *echo, const sonde_echo_point *points, uint32_t count,
+                               uint32_t tier) {
   const frame *f = &echo->frame;
   float x[ECHO_ALIGN], y[ECHO_ALIGN], z[ECHO_ALIGN], size[ECHO_ALIGN];
   const splat_map one = {.m = {{0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, .count = ECHO_ALIGN};
-  splat_job job = {.x = x,
-                   .y = y,
-                   .z = z,
-                   .sign = size,
-                   .map = &one,
-                   .maps = 1,
-                   .grid = echo->grid,
-                   .stride = echo->grid_stride,
-                   .turns = (float)(2 * f->step_m / f->wavelength_m),
-                   .right = (float)(echo->grid_lines - 1),
-                   .bottom = (float)echo->grid_samples - 1.5f};
+  splat_job job = sonde_echo_splat_job(echo);
+  job.x = x, job.y = y, job.z = z, job.sign = size, job.map = &one, job.maps = 1;
+  job.rows = sonde_tiers_limits(echo, tier);
+  uint32_t k = 0;
   for (uint32_t i = 0; i < count; ++i) {
     sonde_vec3 at = sonde_echo_unplace(f, vec3(points[i].x_m, points[i].y_m, points[i].z_m));
-    uint32_t k = i % ECHO_ALIGN;
     x[k] = (float)(at.x * SONDE_FINE + echo->pad_lines),
     z[k] = (float)(at.z / f->step_m + echo->pad_samples);
     y[k] = (float)(at.y / sonde_echo_elevation(echo, at.z)), size[k] = (float)points[i].amplitude;
-    if (k + 1 < ECHO_ALIGN && i + 1 < count) continue;
-    for (uint32_t rest = k + 1; rest < ECHO_ALIGN; ++rest) x[rest] = -1, size[rest] = 0;
-    echo->kernels->splat(&job);
+    if (z[k] >= job.rows.first - 1 && z[k] < job.rows.last + 1) ++k;
+    if (k == ECHO_ALIGN) echo->kernels->splat(&job), k = 0;
   }
+  for (uint32_t rest = k; rest < ECHO_ALIGN; ++rest)
+    x[rest] = -1, y[rest] = z[rest] = size[rest] = 0;
+  if (k > 0) echo->kernels->splat(&job);
 }
