@@ -11,6 +11,7 @@ static bool runs(const char *set) {
     return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
            __builtin_cpu_supports("avx512bw");
   if (strcmp(set, "avx2") == 0) return __builtin_cpu_supports("avx2");
+  if (strcmp(set, "sse4") == 0) return __builtin_cpu_supports("sse4.2");
 #endif
   return strcmp(set, "base") == 0 || strcmp(set, "plain") == 0;
 }

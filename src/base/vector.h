@@ -1,5 +1,5 @@
-// Kernels that are compiled once for each instruction set: "avx512" (F, DQ and BW), "avx2", "base"
-// (what the compiler takes without asking) and, where there are such, "plain" loops.
+// Kernels that are compiled once for each instruction set: "avx512" (F, DQ and BW), "avx2", "sse4"
+// (4.2), "base" (what the compiler takes without asking) and, where there are such, "plain" loops.
 #ifndef SONDE_SRC_VECTOR_H
 #define SONDE_SRC_VECTOR_H
 

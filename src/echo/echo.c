@@ -273,7 +273,7 @@ sonde_status sonde_echo_set_radius(sonde_echo *echo, double radius_m, sonde_erro
 const echo_kernels *sonde_echo_kernels_find(const char *name) {
   const echo_kernels *known[] = {
 #ifdef __x86_64__
-      &sonde_echo_kernels_avx512, &sonde_echo_kernels_avx2,
+      &sonde_echo_kernels_avx512, &sonde_echo_kernels_avx2, &sonde_echo_kernels_sse4,
 #endif
       &sonde_echo_kernels_base, &sonde_echo_kernels_plain};
   for (size_t k = 0; k < SONDE_COUNT_OF(known); ++k)
@@ -286,7 +286,7 @@ sonde_status sonde_echo_set_kernels(sonde_echo *echo, const char *name, sonde_er
   const echo_kernels *found = sonde_echo_kernels_find(name);
   if (found == NULL)
     return sonde_fail(error, SONDE_NOT_FOUND,
-                      "no kernels '%s' here; expected avx512, avx2, base or plain", name);
+                      "no kernels '%s' here; expected avx512, avx2, sse4, base or plain", name);
   echo->kernels = found;
   forget_textures(echo);
   return SONDE_OK;

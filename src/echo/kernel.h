@@ -195,11 +195,13 @@ typedef struct echo_kernels {
   void (*convert)(const convert_job *job);
 } echo_kernels;
 
-// The widest kernels that this processor runs, or those called `name`: avx512, avx2, base, plain.
+// The widest kernels that this processor runs, or those called `name`: avx512, avx2, sse4, base,
+// plain.
 const echo_kernels *sonde_echo_kernels_find(const char *name);
 extern const echo_kernels sonde_echo_kernels_plain, sonde_echo_kernels_base;
 #ifdef __x86_64__
-extern const echo_kernels sonde_echo_kernels_avx2, sonde_echo_kernels_avx512;
+extern const echo_kernels sonde_echo_kernels_sse4, sonde_echo_kernels_avx2,
+    sonde_echo_kernels_avx512;
 #endif
 
 #endif

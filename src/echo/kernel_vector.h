@@ -29,7 +29,13 @@ INLINE vf all(float a) { return a - (vf){0}; }
 INLINE vi all_of(int32_t a) { return a - (vi){0}; }
 INLINE vi whole(vf a) { return __builtin_convertvector(a, vi); }
 INLINE vf real(vi a) { return __builtin_convertvector(a, vf); }
-INLINE vf pick(vi mask, vf yes, vf no) { return (vf)((mask & (vi)yes) | (~mask & (vi)no)); }
+INLINE vf pick(vi mask, vf yes, vf no) {
+#if defined(__SSE4_1__) && !defined(__AVX2__)
+  return (vf)_mm_blendv_ps((__m128)no, (__m128)yes, (__m128)mask);
+#else
+  return (vf)((mask & (vi)yes) | (~mask & (vi)no));
+#endif
+}
 INLINE vi pick_of(vi mask, vi yes, vi no) { return (mask & yes) | (~mask & no); }
 INLINE vf only(vi mask, vf a) { return (vf)(mask & (vi)a); }
 // b where either is no number or both are equal, as the instructions have it.
@@ -53,8 +59,12 @@ INLINE vf smaller(vf a, vf b) {
 }
 INLINE vf size_of(vf a) { return (vf)((vi)a & 0x7fffffff); }
 INLINE vf below(vf a) { // largest whole number not above
+#if defined(__SSE4_1__) && !defined(__AVX2__)
+  return (vf)_mm_floor_ps((__m128)a);
+#else
   vf i = real(whole(a));
   return i - only(i > a, all(1));
+#endif
 }
 
 INLINE bool any(vi mask) {
@@ -105,6 +115,33 @@ INLINE vf each4(const float *p) {
 #endif
 }
 
+#if defined(__SSE4_2__) && !defined(__AVX512F__)
+// The bytes of lane k, and those of the lanes that four bits keep, closed up.
+#define LANE(k) (0x03020100u + 0x04040404u * (k))
+static const _Alignas(16) uint32_t closed_up[16][4] = {{0},
+                                                       {LANE(0)},
+                                                       {LANE(1)},
+                                                       {LANE(0), LANE(1)},
+                                                       {LANE(2)},
+                                                       {LANE(0), LANE(2)},
+                                                       {LANE(1), LANE(2)},
+                                                       {LANE(0), LANE(1), LANE(2)},
+                                                       {LANE(3)},
+                                                       {LANE(0), LANE(3)},
+                                                       {LANE(1), LANE(3)},
+                                                       {LANE(0), LANE(1), LANE(3)},
+                                                       {LANE(2), LANE(3)},
+                                                       {LANE(0), LANE(2), LANE(3)},
+                                                       {LANE(1), LANE(2), LANE(3)},
+                                                       {LANE(0), LANE(1), LANE(2), LANE(3)}};
+#undef LANE
+
+INLINE void close_up(uint32_t bits, __m128 a, float *to) {
+  __m128i order = _mm_load_si128((const __m128i *)(const void *)closed_up[bits]);
+  _mm_storeu_si128((__m128i *)(void *)to, _mm_shuffle_epi8(_mm_castps_si128(a), order));
+}
+#endif
+
 // Lanes of three vectors that a mask keeps, closed up; writes whole vectors. Returns their number.
 INLINE uint32_t pack(vi mask, vf a, float *to_a, vf b, float *to_b, vf c, float *to_c) {
 #if defined(__AVX512F__)
@@ -113,6 +150,20 @@ INLINE uint32_t pack(vi mask, vf a, float *to_a, vf b, float *to_b, vf c, float 
   _mm512_storeu_ps(to_b, _mm512_maskz_compress_ps(kept, (__m512)b));
   _mm512_storeu_ps(to_c, _mm512_maskz_compress_ps(kept, (__m512)c));
   return (uint32_t)__builtin_popcount(kept);
+#elif defined(__AVX2__)
+  const uint32_t bits = (uint32_t)_mm256_movemask_ps((__m256)mask), low = bits & 15;
+  const uint32_t first = (uint32_t)__builtin_popcount(low);
+  const vf *from[] = {&a, &b, &c};
+  float *to[] = {to_a, to_b, to_c};
+  for (int k = 0; k < 3; ++k) {
+    close_up(low, _mm256_castps256_ps128((__m256)*from[k]), to[k]);
+    close_up(bits >> 4, _mm256_extractf128_ps((__m256)*from[k], 1), to[k] + first);
+  }
+  return (uint32_t)__builtin_popcount(bits);
+#elif defined(__SSE4_2__)
+  const uint32_t bits = (uint32_t)_mm_movemask_ps((__m128)mask);
+  close_up(bits, (__m128)a, to_a), close_up(bits, (__m128)b, to_b), close_up(bits, (__m128)c, to_c);
+  return (uint32_t)__builtin_popcount(bits);
 #else
   uint32_t count = 0, kept = 0;
   for (int k = 0; k < W; ++k) kept += (uint32_t)-mask[k];

@@ -6,8 +6,8 @@
 
 #include <stdlib.h>
 
-static const char *const sets[] = {"base", "avx2", "avx512", "plain"};
-enum { SETS = 4, PLAIN = 3 };
+static const char *const sets[] = {"base", "sse4", "avx2", "avx512", "plain"};
+enum { SETS = 5, PLAIN = 4 };
 
 static float between(double low, double high, uint64_t *draw) {
   return (float)(low + (high - low) * sonde_random_uniform(11, (*draw)++));

@@ -185,7 +185,7 @@ static void all_loops_agree(void **state) {
   size_t size = (size_t)s.b.image.width * s.b.image.height;
   uint8_t *widest = SONDE_NEW(uint8_t, size);
   memcpy(widest, s.b.image.pixels, size);
-  const char *const sets[] = {"avx512", "avx2", "base"};
+  const char *const sets[] = {"avx512", "avx2", "sse4", "base"};
   for (size_t k = 0; k < SONDE_COUNT_OF(sets); ++k) {
     if (sonde_echo_set_kernels(s.b.echo, sets[k], NULL)) continue;
     look(&s.b, NULL);
