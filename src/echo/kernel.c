@@ -149,6 +149,7 @@ INLINE void splat_some(const splat_job *job, const splat_map *map, bool inside, 
 
 // A map whose cube lies inside the grid needs no check per scatterer.
 static void splat(const splat_job *job) {
+  SONDE_ASSERT(((job->mask + 1) & job->mask) == 0 && job->rows.first >= 1);
   flock f;
   f.count = 0;
   for (const splat_map *map = job->map; map < job->map + job->maps; ++map) {

@@ -67,6 +67,7 @@ static bool tier_of(const sonde_echo *echo, reach r, uint32_t *tier) {
 }
 
 static void append(tier_list *list, int32_t *next, uint32_t tier, int32_t which) {
+  SONDE_ASSERT(tier < MOST_TIERS && which >= 0);
   next[which] = -1;
   if (list->first[tier] < 0)
     list->first[tier] = which;
@@ -78,6 +79,7 @@ static void append(tier_list *list, int32_t *next, uint32_t tier, int32_t which)
 void sonde_tiers_add_map(sonde_echo *echo, const splat_map *one) {
   sonde_tiers *t = echo->tiers;
   uint32_t tier;
+  SONDE_ASSERT(one->count % ECHO_ALIGN == 0 && one->lumen + one->lumens <= t->lumens);
   if (t->maps == MOST_MAPS || !tier_of(echo, reach_of(one), &tier)) return;
   t->map[t->maps] = *one;
   append(&t->tissue, t->next_map, tier, (int32_t)t->maps++);
@@ -91,6 +93,7 @@ void sonde_tiers_add_lumen(sonde_tiers *tiers, const splat_lumen *lumen) {
 void sonde_tiers_add_segment(sonde_echo *echo, const blood_segment *segment) {
   sonde_tiers *t = echo->tiers;
   uint32_t tier;
+  SONDE_ASSERT(segment->count > 0 && segment->solid < 1);
   if (t->segments == MOST_SEGMENTS || !tier_of(echo, reach_of(&segment->map), &tier)) return;
   t->segment[t->segments] = *segment;
   append(&t->blood, t->next_segment, tier, (int32_t)t->segments++);
@@ -175,6 +178,7 @@ static void lay_segments(sonde_echo *echo, uint32_t tier) {
 }
 
 void sonde_tiers_lay(sonde_echo *echo, uint32_t tier) {
+  SONDE_ASSERT(tier < echo->tier_count);
   lay_maps(echo, tier);
   lay_segments(echo, tier);
 }
