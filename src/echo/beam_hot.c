@@ -62,14 +62,11 @@ static void lateral_row(sonde_echo *echo, uint32_t sample, bool tissue) {
   lateral_job job = {.lines = echo->padded,
                      .half = half[0] > half[1] ? half[0] : half[1],
                      .out = ring_row(echo, sample)};
-  double low = scale * (1 - t), high = scale * t;
-  for (int l = 0; l <= job.half; ++l)
-    for (int k = 0; k < SONDE_RANK; ++k) {
-      const double *top = psf->lateral[band][k][l], *next = psf->lateral[band + 1][k][l];
-      double re = low * top[0] + high * next[0], im = low * top[1] + high * next[1];
-      job.tap[l][k][0] = (float)re;
-      job.tap[l][k][1] = (float)(im - re), job.tap[l][k][2] = (float)(re + im);
-    }
+  const float *top = &psf->lateral[band][0][0][0], *next = &psf->lateral[band + 1][0][0][0];
+  const float low = (float)(scale * (1 - t)), high = (float)(scale * t);
+  float *tap = &job.tap[0][0][0];
+  for (int i = 0; i < LATERAL_PARTS * SONDE_RANK * (job.half + 1); ++i)
+    tap[i] = low * top[i] + high * next[i];
   for (int k = 0; k < SONDE_FINE; ++k) {
     job.re[k] = echo->line_re[k] + echo->pad_lines / SONDE_FINE;
     job.im[k] = echo->line_im[k] + echo->pad_lines / SONDE_FINE;

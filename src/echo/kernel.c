@@ -10,7 +10,7 @@
 // spread_taps, tap_of  kernels' numbers over vectors
 // lateral    symmetric complex kernels of rank three on one row
 // axial      real kernels down the rows, noise, compensation, modulus, logarithm
-// add_row, add_parts, add_both  its sums, as the registers allow
+// add_row, add_rows  its sums, as the registers allow
 // carry, tissue  in kernel_carry.h, kernel_tissue.h
 // merge      a row of the grid, times its gain, to even and odd columns
 // widen, mix rows of the coarse plane, per line and between two
@@ -37,13 +37,14 @@ INLINE void turn(vf t, vf *c, vf *s) {
 // above and below; the nearest one gets the rest: a quadratic spline.
 typedef struct parcel {
   _Alignas(sizeof(vf)) float record[4 * W];
-  int32_t cell[W];
+  uint32_t cell[W];
   float up[W], down[W];
 } parcel;
 
 INLINE void lay_one(float *grid, uint32_t stride, const parcel *p, int lane) {
   const int place = lane % 4 * (W / 4) + lane / 4; // see records()
-  float *here = grid + p->cell[lane], *above = here - stride, *below = here + stride;
+  const uint32_t cell = p->cell[lane];             // of the row above
+  float *above = grid + cell, *here = grid + stride + cell, *below = grid + 2 * stride + cell;
   v4 value = load4(p->record + 4 * place);
   v4 up = p->up[lane] * value, down = p->down[lane] * value;
   store4(above, load4(above) + up);
@@ -83,7 +84,7 @@ INLINE void make_parcel(const splat_job *job, const flock *f, uint32_t from, par
   vf a = line - real(l), b = depth - real(n), up = 0.5f - b, down = 0.5f + b, c, s;
   turn(depth * job->turns, &c, &s);
   vf re = weight * c, im = weight * s, re1 = a * re, im1 = a * im;
-  vi at = ((n & (int32_t)job->mask) + 1) * (int32_t)job->stride + 2 * l;
+  vi at = (n & (int32_t)job->mask) * (int32_t)job->stride + 2 * l;
   records(p->record, re - re1, im1 - im, re1, -im1);
   memcpy(p->cell, &at, sizeof at);
   store(p->up, 0.5f * up * up), store(p->down, 0.5f * down * down);
@@ -241,13 +242,6 @@ static void lateral(const lateral_job *job) {
   for (; l < job->lines; l += W) lateral_some(job, &tap, l, 1);
 }
 
-INLINE void add_axial(const taps *tap, int first, const vf row[RING_PLANES], vf sum[RING_PLANES]) {
-  for (int k = 0; k < SONDE_RANK; ++k) {
-    vf v = tap_of(tap, first + k);
-    sum[2 * k] += v * row[2 * k], sum[2 * k + 1] += v * row[2 * k + 1];
-  }
-}
-
 INLINE void finish_axial(const axial_job *job, int sample, uint32_t l, const vf *sum) {
   const float *noise = job->noise[sample] + l;
   vf re = job->noise_size * load(noise) + sum[0] + sum[2] + sum[4];
@@ -258,42 +252,31 @@ INLINE void finish_axial(const axial_job *job, int sample, uint32_t l, const vf 
   store(job->grey[sample] + l, smaller(larger(grey, all(0)), all(255)));
 }
 
-// Row t of the first sample's, for samples `first` up to `end`; real parts or imaginary ones.
+// Row t of the first sample's, for samples `first` up to `end`; parts: 0 real, 1 imaginary.
 INLINE void add_row(const axial_job *job, const taps *tap, const float *row, int t, int part,
-                    int first, int end, vf sum[AXIAL_MOST][RING_PLANES]) {
-  for (int k = 0; k < SONDE_RANK; ++k) {
-    const int plane = 2 * k + part;
-    vf number = load(row + (uint32_t)plane * job->lines);
-    for (int s = first; s < end; ++s)
-      sum[s][plane] += tap_of(tap, SONDE_RANK * (t - s) + k) * number;
+                    int parts, int first, int end, vf sum[AXIAL_MOST][RING_PLANES]) {
+  UNROLL for (int k = 0; k < SONDE_RANK; ++k) {
+    vf number[2];
+    UNROLL for (int p = part; p < parts; ++p) number[p] =
+        load(row + (uint32_t)(2 * k + p) * job->lines);
+    UNROLL for (int s = first; s < end; ++s) {
+      const vf u = tap_of(tap, SONDE_RANK * (t - s) + k);
+      UNROLL for (int p = part; p < parts; ++p) sum[s][2 * k + p] += u * number[p];
+    }
   }
 }
 
-// In sixteen registers: one part after the other, and what only some of the samples read before and
-// behind the loop.
-INLINE void add_parts(const axial_job *job, const taps *tap, uint32_t l, int from, int samples,
-                      vf sum[AXIAL_MOST][RING_PLANES]) {
+// Rows that only some of the samples read come before and behind the loop.
+INLINE void add_rows(const axial_job *job, const taps *tap, uint32_t l, int from, int samples,
+                     int part, int parts, vf sum[AXIAL_MOST][RING_PLANES]) {
   const float *const *rows = job->rows + from;
   const int count = job->count;
-  for (int part = 0; part < 2; ++part) {
-    for (int t = 0; t + 1 < samples; ++t) add_row(job, tap, rows[t] + l, t, part, 0, t + 1, sum);
-    for (int t = samples - 1; t < count; ++t)
-      add_row(job, tap, rows[t] + l, t, part, 0, samples, sum);
-    for (int s = 1; s < samples; ++s)
-      add_row(job, tap, rows[count - 1 + s] + l, count - 1 + s, part, s, samples, sum);
-  }
-}
-
-// In thirty-two: both parts at once.
-INLINE void add_both(const axial_job *job, const taps *tap, uint32_t l, int from, int samples,
-                     vf sum[AXIAL_MOST][RING_PLANES]) {
-  vf row[RING_PLANES];
-  for (int t = 0; t < job->count + samples - 1; ++t) {
-    for (uint32_t k = 0; k < RING_PLANES; ++k)
-      row[k] = load(job->rows[from + t] + k * job->lines + l);
-    for (int s = 0; s < samples; ++s)
-      if (t >= s && t - s < job->count) add_axial(tap, SONDE_RANK * (t - s), row, sum[s]);
-  }
+  UNROLL for (int t = 0; t + 1 < samples; ++t)
+      add_row(job, tap, rows[t] + l, t, part, parts, 0, t + 1, sum);
+  for (int t = samples - 1; t < count; ++t)
+    add_row(job, tap, rows[t] + l, t, part, parts, 0, samples, sum);
+  UNROLL for (int s = 1; s < samples; ++s)
+      add_row(job, tap, rows[count - 1 + s] + l, count - 1 + s, part, parts, s, samples, sum);
 }
 
 // Samples share the rows they read; each is summed from its first row to its last.
@@ -301,10 +284,12 @@ INLINE void axial_some(const axial_job *job, const taps *tap, uint32_t l, int fr
   vf sum[AXIAL_MOST][RING_PLANES]; // apart: sums need not wait for each other
   for (int s = 0; s < samples; ++s)
     for (int k = 0; k < RING_PLANES; ++k) sum[s][k] = all(0);
-  if (W == 16)
-    add_both(job, tap, l, from, samples, sum);
-  else
-    add_parts(job, tap, l, from, samples, sum);
+  if (W == 16) { // thirty-two registers hold both parts, sixteen one
+    add_rows(job, tap, l, from, samples, 0, 2, sum);
+  } else {
+    add_rows(job, tap, l, from, samples, 0, 1, sum);
+    add_rows(job, tap, l, from, samples, 1, 2, sum);
+  }
   for (int s = 0; s < samples; ++s) finish_axial(job, from + s, l, sum[s]);
 }
 

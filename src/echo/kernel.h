@@ -18,7 +18,6 @@ enum {
   RING_PLANES = 2 * SONDE_RANK,
   SONDE_FINE = 2,    // columns of the grid per scan line
   AXIAL_MOST = 4,    // samples summed at once
-  LATERAL_PARTS = 3, // numbers of a complex tap
 };
 
 // A lumen over one map: forms of its scatterers' coordinates, 1 on the wall at rest. Clot fills

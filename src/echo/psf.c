@@ -189,7 +189,8 @@ static void project(beam_psf *psf, int b) {
       double re = 0, im = 0;
       for (int i = 0; i < rows; ++i)
         re += p[2 * i] * psf->axial[k][i], im += p[2 * i + 1] * psf->axial[k][i];
-      psf->lateral[b][k][l][0] = re, psf->lateral[b][k][l][1] = im;
+      float *tap = psf->lateral[b][l][k];
+      tap[0] = (float)re, tap[1] = (float)(im - re), tap[2] = (float)(re + im);
       kept[l] += weight_of(l) * (re * re + im * im);
     }
     energy += kept[l];

@@ -8,7 +8,8 @@ enum {
   SONDE_RANK = 3,
   SONDE_BANDS = 40,     // depths at which the response is known
   SONDE_MOST_TAPS = 48, // half width of a kernel, lines or samples
-  SONDE_PSF_STEPS = SONDE_BANDS + 2
+  SONDE_PSF_STEPS = SONDE_BANDS + 2,
+  LATERAL_PARTS = 3, // numbers of a complex tap
 };
 
 // What a beam depends on.
@@ -17,14 +18,15 @@ typedef struct beam_key {
 } beam_key;
 
 // Around a scatterer between lines and samples the response is
-// sum over k of lateral[band][k][|line|] axial[k][sample]; the axial kernels are the same
+// sum over k of lateral[band][|line|][k] axial[k][sample]; the axial kernels are the same
 // everywhere, so the lateral ones interpolate between bands.
 typedef struct beam_psf {
   beam_key key;
   int half_lines, half_rows; // reach of the kernels
   double depth_m[SONDE_BANDS], elevation_m[SONDE_BANDS];
   int half[SONDE_BANDS]; // lines needed at that depth
-  double lateral[SONDE_BANDS][SONDE_RANK][SONDE_MOST_TAPS + 1][2];
+  // re, im - re, re + im of each: kernel.h
+  float lateral[SONDE_BANDS][SONDE_MOST_TAPS + 1][SONDE_RANK][LATERAL_PARTS];
   double axial[SONDE_RANK][2 * SONDE_MOST_TAPS + 1]; // orthonormal
   double pulse[SONDE_RANK];                          // of a plain pulse with peak 1
   double share[SONDE_BANDS];                         // energy of the response that rank 3 keeps
