@@ -17,11 +17,16 @@
 
 enum { W = VECTOR_BYTES / 4 };
 
-// Of short loops whose bounds are known, so that their arrays stay in registers.
-#if defined(__clang__)
-#define UNROLL _Pragma("unroll")
-#else
+// Of short loops whose bounds are known, so that their arrays stay in registers. Instrumented code
+// would take minutes to compile.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define UNROLL
+#elif !defined(__clang__)
 #define UNROLL _Pragma("GCC unroll 4")
+#elif __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
+#define UNROLL
+#else
+#define UNROLL _Pragma("unroll")
 #endif
 
 typedef float vf __attribute__((vector_size(VECTOR_BYTES)));
