@@ -130,10 +130,11 @@ INLINE vi paint(const tissue_job *job, uint32_t l) {
   knots *memory = (knots *)(void *)(job->memory + (size_t)l * KNOT_FLOATS * TEXTURES);
   const uint32_t n = job->lines, levels = LAYER_LEVELS + job->vessels + job->lesions;
   vf depth = load(f + PLANE_DEPTH * n), fat = load(f + PLANE_FAT * n);
-  vf muscle = load(f + PLANE_MUSCLE * n), r = load(f + PLANE_R * n);
+  vf muscle = load(f + PLANE_MUSCLE * n);
+  vf across = load(f + PLANE_ACROSS * n), up = load(f + PLANE_UP * n);
   vf theta = load(f + PLANE_THETA * n), s = load(f + PLANE_S * n), level[MOST_LEVELS];
   level[0] = depth, level[1] = depth - fat, level[2] = depth - muscle;
-  level[3] = job->bone_radius_m - r;
+  level[3] = job->bone_radius_m - root(across * across + up * up);
   vf *wall = level + LAYER_LEVELS, *edge = wall + job->vessels;
   for (uint32_t v = 0; v < job->vessels; ++v) {
     const float *at = f + vessel_field_at(v, VESSEL_SHORT) * n, *half = at + VESSEL_HALF_SHORT * n;

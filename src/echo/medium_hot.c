@@ -81,7 +81,8 @@ static float knot(int32_t a, int32_t b, uint32_t salt) {
 // Value noise in [-1, 1] along a surface, cells of 1.3 mm.
 static float roughness(const sonde_echo *echo, uint32_t l, uint32_t salt) {
   const float *row = echo->row;
-  float round = row[PLANE_THETA * echo->padded + l] * row[PLANE_R * echo->padded + l];
+  float r = hypotf(row[PLANE_ACROSS * echo->padded + l], row[PLANE_UP * echo->padded + l]);
+  float round = row[PLANE_THETA * echo->padded + l] * r;
   float u = round * 750, v = row[PLANE_S * echo->padded + l] * 750;
   float fu = floorf(u), fv = floorf(v), a = u - fu, b = v - fv;
   int32_t i = (int32_t)fu, j = (int32_t)fv;

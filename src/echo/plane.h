@@ -10,7 +10,8 @@ typedef enum plane_field {
   PLANE_DEPTH,
   PLANE_FAT,
   PLANE_MUSCLE,
-  PLANE_R,
+  PLANE_ACROSS, // from the leg's axis at rest, m: the distance itself bends too much at the bone
+  PLANE_UP,
   PLANE_LAYERS // vessels follow, then lesions
 } plane_field;
 

@@ -220,7 +220,8 @@ static void store_node(sonde_echo *echo, uint32_t node, sonde_vec3 point, double
   p[PLANE_DEPTH * count + node] = within ? (float)at.depth_m : -1;
   p[PLANE_FAT * count + node] = (float)at.fat_m;
   p[PLANE_MUSCLE * count + node] = (float)at.muscle_m;
-  p[PLANE_R * count + node] = (float)at.r;
+  p[PLANE_ACROSS * count + node] = (float)(at.r * cos(at.theta));
+  p[PLANE_UP * count + node] = (float)(at.r * sin(at.theta));
   for (uint32_t k = 0; k < echo->shown_count; ++k) store_vessel(echo, k, at.s, point, p, node);
   store_lesions(echo, echo->node[node].rest, p, node);
 }

@@ -335,8 +335,48 @@ static void settings_are_clamped(void **state) {
   assert_int_equal(sonde_image_create(0, 5, &image, NULL), SONDE_ARGUMENT);
 }
 
+// Where a line meets the bone: in the probe frame the leg's axis is `axis_z` below the face.
+static double bone_depth(const bench *b, uint32_t line, double axis_z, double radius) {
+  double low = 0, high = 0;
+  for (double d = 0; d < b->settings.depth_m && high <= 0; d += 1e-4) {
+    sonde_vec3 at = sonde_echo_place(&b->echo->frame, line, d);
+    if (hypot(at.x, at.z - axis_z) < radius) low = d - 1e-4, high = d;
+  }
+  for (int i = 0; i < 30 && high > 0; ++i) {
+    sonde_vec3 at = sonde_echo_place(&b->echo->frame, line, 0.5 * (low + high));
+    if (hypot(at.x, at.z - axis_z) < radius)
+      high = 0.5 * (low + high);
+    else
+      low = 0.5 * (low + high);
+  }
+  return high;
+}
+
+// The cortex is a circle, not a polygon, although the coarse plane's columns are 3 mm apart there.
+static void bone_is_round(void **state) {
+  (void)state;
+  bench b;
+  bench_create(&b, leg_radius, 0.014, 0.012, true, false);
+  assert_int_equal(sonde_echo_set_radius(b.echo, 0.06, NULL), SONDE_OK);
+  look(&b, NULL);
+  double worst = 0;
+  uint32_t lines = 0;
+  for (uint32_t l = 0; l < b.echo->lines; ++l) {
+    double due = bone_depth(&b, l, leg_radius - 3e-3, 0.014), least = 1;
+    if (!(due > 0) || due > 0.066) continue; // beyond, the cortex is too steep to echo
+    for (uint32_t e = 0; e < b.echo->echo_count; ++e)
+      if (b.echo->echoes[e].line == l)
+        least = fmin(least, fabs((double)b.echo->echoes[e].depth_m - due));
+    worst = fmax(worst, least), ++lines;
+  }
+  print_message("%u lines meet the bone, %.3f mm off at most\n", lines, worst * 1e3);
+  assert_true(lines > 20 && worst < 0.05e-3);
+  bench_clear(&b);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
+      cmocka_unit_test(bone_is_round),
       cmocka_unit_test(speckle_is_fully_developed),
       cmocka_unit_test(attenuation_follows_the_frequency),
       cmocka_unit_test(lumen_is_dark_bone_shadows),
