@@ -37,6 +37,16 @@ static bool wait_force(rig *r, fake_control *fake_, int axis, double force_n) {
   return false;
 }
 
+// Ticks until the driver has exchanged so many times more, however the machine shares its cores.
+static bool wait_exchanges(rig *r, uint64_t more) {
+  uint64_t before = sonde_device_link_of(&r->device).exchanges;
+  for (int i = 0; i < 10000; ++i) {
+    tick(r);
+    if (sonde_device_link_of(&r->device).exchanges >= before + more) return true;
+  }
+  return false;
+}
+
 static fake_control *hold(const char *path, void **library) {
   *library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
   assert_non_null(*library);
@@ -51,6 +61,7 @@ static void live(const char *name, fake_control *control, sonde_device_open_def 
                  bool feels_force, bool steers) {
   rig r = {.push_n = vec3(0, 0, 2)};
   sonde_error error;
+  def.silence_s = 10.0; // absent means lost: a driver's thread that waits for a core is not silent
   assert_int_equal(sonde_device_open(name, &def, &r.device, &error), SONDE_DEVICE);
   assert_true(strlen(error.message) > 10 && r.device.self == NULL);
   control->plugged = true;
@@ -61,7 +72,7 @@ static void live(const char *name, fake_control *control, sonde_device_open_def 
   for (int cycle = 0; cycle < 2; ++cycle) {
     assert_true(wait_present(&r, true));
     if (feels_force) assert_true(wait_force(&r, control, 2, 2.0));
-    for (int i = 0; i < 50; ++i) tick(&r);
+    assert_true(wait_exchanges(&r, 50));
     assert_true(r.sample.present && v_finite(r.sample.world_from_probe.position));
     if (!steers) {
       assert_true(fabs(r.sample.world_from_probe.position.x - 0.02) < 1e-9);
@@ -77,7 +88,7 @@ static void live(const char *name, fake_control *control, sonde_device_open_def 
   }
   assert_true(wait_present(&r, true));
   sonde_device_link link = sonde_device_link_of(&r.device);
-  assert_true(link.connected && link.losses == 2 && link.exchanges > 100);
+  assert_true(link.connected && link.losses == 2 && link.exchanges >= 100);
   r.device.destroy(r.device.self);
   double left_n = control->force_n[2];
   if (feels_force) assert_true(fabs(left_n) < 1e-12);
