@@ -221,6 +221,7 @@ INLINE void lateral_some(const lateral_job *job, const taps *tap, uint32_t l, ui
   for (int t = 1; t <= job->half; ++t) {
     const float *re = job->re[t % 2] + l, *im = job->im[t % 2] + l;
     int left = (t + 1) / 2, right = t / 2;
+    AFRESH;
     for (uint32_t v = 0; v < vectors; ++v, re += W, im += W)
       add_taps(tap, LATERAL_SUMS * t, load(re - left) + load(re + right),
                load(im - left) + load(im + right), sum[v]);
@@ -255,6 +256,7 @@ INLINE void finish_axial(const axial_job *job, int sample, uint32_t l, const vf 
 // Row t of the first sample's, for samples `first` up to `end`; parts: 0 real, 1 imaginary.
 INLINE void add_row(const axial_job *job, const taps *tap, const float *row, int t, int part,
                     int parts, int first, int end, vf sum[AXIAL_MOST][RING_PLANES]) {
+  AFRESH;
   UNROLL for (int k = 0; k < SONDE_RANK; ++k) {
     vf number[2];
     UNROLL for (int p = part; p < parts; ++p) number[p] =

@@ -29,6 +29,10 @@ enum { W = VECTOR_BYTES / 4 };
 #define UNROLL _Pragma("unroll")
 #endif
 
+// What was read before is read again: where sums fill the registers, kept numbers would push them
+// out.
+#define AFRESH __asm__ volatile("" ::: "memory")
+
 typedef float vf __attribute__((vector_size(VECTOR_BYTES)));
 typedef int32_t vi __attribute__((vector_size(VECTOR_BYTES)));
 typedef uint32_t vu __attribute__((vector_size(VECTOR_BYTES)));
