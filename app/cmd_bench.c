@@ -22,8 +22,8 @@ static const char HELP[] =
     "                 point  the same with the point probe\n"
     "                 slide  press to 12 mm, then slide 40 mm along the leg\n"
     "                 ellipsoid  the scene that engines are compared on: a ball of 30 mm pressed\n"
-    "                        20 mm into a soft ellipsoid in 0.1 s, held to 0.3 s, slid to 0.5 s;\n"
-    "                        no model is read\n"
+    "                        20 mm into a soft ellipsoid in 0.1 s, held to 0.3 s, where the\n"
+    "                        runs are compared, slid to 0.5 s; no model is read\n"
     "                 image  echographic frames; sonde bench --scene image --help\n"
     "  --nodes N      of the ellipsoid, 42 to 1000000; default 7842\n"
     "  --stiffness K  of its surface springs, 1 to 1e6 N/m; default 200\n"
@@ -35,6 +35,8 @@ static const char HELP[] =
     "  --sleep-um D   nodes nearer than this to balance may sleep, 0 to 1000; default 20\n"
     "  --tolerance R  of the linear solver, 1e-12 to 0.5; default 1e-2,\n"
     "                 ellipsoid 0.1\n"
+    "  --disturb-nm D move every node at random by up to D, 0 to 1e6, once at 50 ms, but not in\n"
+    "                 the converged run: what noise alone makes of the scene; default 0\n"
     "  --seconds S    simulated time, 0.05 to 60; default 1, ellipsoid 0.5\n"
     "  --dt-ms H      time step, 0.1 to 20; default 1\n"
     "  --dt S         the same in seconds\n"
@@ -67,7 +69,7 @@ typedef struct options {
   sonde_engine engine;
   long newton, newton_reference;
   double tolerance;
-  double sleep_um;
+  double sleep_um, disturb_nm;
   double seconds, dt_s;
   long repeat, threads;
   const char *csv;
@@ -120,6 +122,7 @@ static const struct option LONG[] = {{"scene", required_argument, NULL, 's'},
                                      {"reference-newton", required_argument, NULL, 'I'},
                                      {"sleep-um", required_argument, NULL, 'u'},
                                      {"tolerance", required_argument, NULL, 'T'},
+                                     {"disturb-nm", required_argument, NULL, 'm'},
                                      {"seconds", required_argument, NULL, 't'},
                                      {"dt-ms", required_argument, NULL, 'd'},
                                      {"dt", required_argument, NULL, 'q'},
@@ -146,6 +149,7 @@ static bool read_number(options *o, int option, const char *text) {
     return app_parse_integer("bench", "--reference-newton", text, 1, 100, &o->newton_reference);
   case 'u': return app_parse_real("bench", "--sleep-um", text, 0, 1000, &o->sleep_um);
   case 'T': return app_parse_real("bench", "--tolerance", text, 1e-12, 0.5, &o->tolerance);
+  case 'm': return app_parse_real("bench", "--disturb-nm", text, 0, 1e6, &o->disturb_nm);
   case 't': return app_parse_real("bench", "--seconds", text, 0.05, 60, &o->seconds);
   case 'q': return app_parse_real("bench", "--dt", text, 1e-4, 0.02, &o->dt_s);
   case 'r': return app_parse_integer("bench", "--repeat", text, 1, 1000, &o->repeat);
@@ -206,17 +210,42 @@ static sonde_pose pose_at(const bench *b, double time_s) {
 // Processor time of this thread: other work on the machine does not count.
 static double now(void) { return app_seconds(CLOCK_THREAD_CPUTIME_ID); }
 
-// Runs the scene from rest; fills samples when given, and keeps the positions at the time of
-// comparison: 0.3 s for the ellipsoid, else the end.
-static void run(const bench *b, sonde_state *state, sample *samples, sonde_vec3 *kept) {
-  uint32_t compared = is_ellipsoid(b->o) ? (uint32_t)(0.3 / b->o->dt_s + 0.5) : b->steps;
+// Moves every node at random by up to a way; scratch: [nodes].
+static void disturb(sonde_state *state, double way_m, sonde_vec3 *scratch) {
+  uint32_t nodes = sonde_state_model(state)->surface.vertex_count;
+  memcpy(scratch, sonde_state_positions(state), nodes * sizeof *scratch);
+  unsigned short seed[3] = {0};
+  for (uint32_t i = 0; i < nodes; ++i) {
+    scratch[i].x += way_m * (2 * erand48(seed) - 1);
+    scratch[i].y += way_m * (2 * erand48(seed) - 1);
+    scratch[i].z += way_m * (2 * erand48(seed) - 1);
+  }
+  sonde_state_set(state, scratch, NULL);
+}
+
+static uint32_t steps_to(const bench *b, double time_s) {
+  return (uint32_t)(time_s / b->o->dt_s + 0.5);
+}
+
+// The runs are compared after this many steps: at 0.3 s for the ellipsoid, else at the end.
+static uint32_t compared_step(const bench *b) {
+  uint32_t held = is_ellipsoid(b->o) ? steps_to(b, 0.3) : b->steps;
+  return held < b->steps ? held : b->steps;
+}
+
+// Runs the scene from rest, disturbed or not; fills samples when given, and keeps the positions at
+// the time of comparison. kept: [nodes].
+static void run(const bench *b, sonde_state *state, double way_m, sample *samples,
+                sonde_vec3 *kept) {
+  uint32_t compared = compared_step(b), disturbed = steps_to(b, 0.05);
   sonde_state_reset(state);
   for (uint32_t k = 0; k < b->steps; ++k) {
+    if (way_m > 0 && k == disturbed) disturb(state, way_m, kept);
     sonde_pose pose = pose_at(b, (k + 1) * b->o->dt_s);
     double start = now();
     sonde_step(state, &b->probe, pose);
     double total = now() - start;
-    if (kept && k + 1 == compared)
+    if (k + 1 == compared)
       memcpy(kept, sonde_state_positions(state), b->model->surface.vertex_count * sizeof *kept);
     if (!samples) continue;
     sonde_stage_times t = sonde_state_times(state);
@@ -286,7 +315,7 @@ static bool time_runs(bench *b, sonde_state *state, sonde_vec3 *kept) {
   sample *scratch = calloc(b->steps, sizeof *scratch);
   double best = INFINITY;
   for (long r = 0; scratch && r < b->o->repeat; ++r) {
-    run(b, state, scratch, kept);
+    run(b, state, b->o->disturb_nm * 1e-9, scratch, kept);
     sample *other = b->samples;
     b->samples = scratch;
     double median = quantile(b, offsetof(sample, total_s), 0.5);
@@ -310,7 +339,7 @@ static sonde_status measure(bench *b, double *error_ratio, sonde_error *error) {
   *error_ratio = NAN;
   bool done = !status && kept && time_runs(b, state, kept);
   if (done && b->o->reference) {
-    run(b, reference, NULL, kept + nodes);
+    run(b, reference, 0, NULL, kept + nodes);
     *error_ratio = relative_error(b->model, kept, kept + nodes);
   }
   if (!status && !done) status = SONDE_MEMORY;
@@ -437,7 +466,8 @@ int cmd_bench(int argc, char **argv) {
   if (code >= 0) return code;
   if (o.haptics)
     return bench_haptics(o.model, o.device ? o.device : "touch", o.seconds, o.json, o.csv);
-  bench b = {.o = &o, .steps = (uint32_t)(o.seconds / o.dt_s + 0.5)};
+  bench b = {.o = &o};
+  b.steps = steps_to(&b, o.seconds);
   sonde_error error = {0};
   sonde_model *model = NULL;
   double error_ratio = NAN;
