@@ -107,7 +107,7 @@ static sonde_status reference(report *r) {
     note(r, name, likeness, 0.98, 1, ">= 0.98");
   }
   double axial = 0, lateral = 0, flicker = 1;
-  for (double z = 0.012; z < 0.06 && !status; z += r->quick ? 0.011 : 0.004) {
+  for (double z = 0.012; z < 0.06 && !status; z += 0.004) {
     sonde_echo_widths fast, exact;
     status = sonde_echo_point_widths(&s.view, z, &fast, &exact, &r->error);
     axial = fmax(axial, fabs(fast.axial_m / exact.axial_m - 1));

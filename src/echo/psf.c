@@ -8,7 +8,7 @@
 // sonde_psf_begin, sonde_psf_step  all of it, band by band, then the kernels
 // tabulate          exact responses of a band
 // sharpen           takes off what the splat widens
-// add_band          response of one band
+// depth_of_band, add_band  response of one band
 // add_gram, mirror_gram, iterate  shared axial kernels
 // orthonormalise    Gram-Schmidt
 // project           lateral kernels of a band, their reach
@@ -221,10 +221,19 @@ void sonde_psf_begin(beam_psf *psf, const beam_key *key) {
   memset(psf->gram, 0, sizeof psf->gram);
 }
 
+// Bands lie at even steps up to a knee before the focus, below which the response changes most, and
+// from there on at steps that grow with the power 3/2 of the depth.
+static double depth_of_band(const beam_key *key, int b) {
+  double knee = fmax(0.7 * key->focus_m, 0.125 * key->depth_m);
+  double first = first_depth_m / knee, last = key->depth_m / knee;
+  if (last > 1) last = 3 - 2 / sqrt(last);
+  double u = first + (last - first) * b / (SONDE_BANDS - 1);
+  return knee * (u < 1 ? u : 4 / ((3 - u) * (3 - u)));
+}
+
 static void add_band(beam_psf *psf, int b) {
   sonde_array array = sonde_beam_array(&psf->key);
-  double t = (double)b / (SONDE_BANDS - 1);
-  psf->depth_m[b] = first_depth_m + (psf->key.depth_m - first_depth_m) * t * sqrt(t);
+  psf->depth_m[b] = depth_of_band(&psf->key, b);
   psf->elevation_m[b] = sonde_array_elevation_half(&array, psf->depth_m[b]);
   tabulate(psf, &array, b);
   normalise(psf, b);
