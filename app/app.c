@@ -10,7 +10,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 // ---- messages
@@ -18,7 +17,7 @@
 // Whether the caller can mend it by giving other input.
 static bool is_bad_input(sonde_status status) {
   return status != SONDE_MEMORY && status != SONDE_CONVERGENCE && status != SONDE_DEVICE &&
-         status != SONDE_CANCELLED;
+         status != SONDE_CANCELLED && status != SONDE_DISK;
 }
 
 int app_fail(const char *verb, const sonde_error *error) {
@@ -35,14 +34,6 @@ sonde_status app_error(sonde_error *error, sonde_status status, const char *form
   vsnprintf(error->message, sizeof error->message, format, arguments);
   va_end(arguments);
   return status;
-}
-
-sonde_status app_make_directory(const char *path, mode_t mode, sonde_error *error) {
-  struct stat facts;
-  if (mkdir(path, mode) == 0) return SONDE_OK;
-  if (errno == EEXIST && stat(path, &facts) == 0 && S_ISDIR(facts.st_mode)) return SONDE_OK;
-  return app_error(error, SONDE_IO, "%.300s: %s", path,
-                   strerror(errno == EEXIST ? ENOTDIR : errno));
 }
 
 int app_usage_error(const char *verb, const char *format, ...) {

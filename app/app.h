@@ -39,8 +39,6 @@ int app_usage_error(const char *verb, const char *format, ...)
 // Fills the error and returns the status.
 sonde_status app_error(sonde_error *error, sonde_status status, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
-// Makes a directory when it is absent; its parents are there.
-sonde_status app_make_directory(const char *path, mode_t mode, sonde_error *error);
 // Parses a real number of an option within [low, high]; false after printing what was expected.
 bool app_parse_real(const char *verb, const char *option, const char *text, double low, double high,
                     double *value);

@@ -146,7 +146,8 @@ static int examine(const arguments *a, const exam_library *library,
   sonde_exam_def def = sonde_exam_def_default();
   if (exam_find_case(library, a->patient, &patient, directory, sizeof directory, &error))
     return app_fail(VERB, &error);
-  if (a->directory && app_make_directory(a->directory, 0777, &error)) return app_fail(VERB, &error);
+  if (a->directory && sonde_directory_make(a->directory, 0777, false, &error))
+    return app_fail(VERB, &error);
   def.patient = &patient;
   def.protocol = protocol;
   def.operator_name = a->operator_name;

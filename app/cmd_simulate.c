@@ -5,15 +5,12 @@
 #include "app.h"
 #include "scene_figure.h"
 
-#include <errno.h>
 #include <getopt.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <time.h>
-#include <unistd.h>
 
 static const char VERB[] = "simulate";
 static const char HELP[] =
@@ -45,7 +42,7 @@ typedef struct simulation {
   sonde_scene *scene;
   sonde_scene_state *state;
   uint64_t steps, every, start; // steps in all, and where this run began
-  FILE *bodies, *contacts;
+  sonde_file *bodies, *contacts;
   double seconds;
   uint64_t solver_iterations, most_points;
   bool cancelled;
@@ -109,8 +106,8 @@ static const char CONTACTS_HEAD[] =
 
 static double norm(sonde_vec3 v) { return sqrt(v.x * v.x + v.y * v.y + v.z * v.z); }
 
-static void put_vector(FILE *table, sonde_vec3 v) {
-  fprintf(table, ",%.12g,%.12g,%.12g", v.x, v.y, v.z);
+static void put_vector(sonde_file *table, sonde_vec3 v) {
+  sonde_file_printf(table, ",%.12g,%.12g,%.12g", v.x, v.y, v.z);
 }
 
 static void put_rows(simulation *s) {
@@ -118,53 +115,55 @@ static void put_rows(simulation *s) {
   double time_s = sonde_scene_time(s->state);
   for (uint32_t b = 0; b < sonde_scene_body_count(s->scene); ++b) {
     sonde_body_measure m = sonde_scene_measure(s->state, b);
-    fprintf(s->bodies, "%llu,%.12g,%s", step, time_s, sonde_scene_body(s->scene, b).name);
+    sonde_file_printf(s->bodies, "%llu,%.12g,%s", step, time_s, sonde_scene_body(s->scene, b).name);
     put_vector(s->bodies, m.centre_m);
     put_vector(s->bodies, m.velocity_m_s);
     put_vector(s->bodies, m.spin_rad_s);
     put_vector(s->bodies, m.momentum_kg_m_s);
     put_vector(s->bodies, m.angular_kg_m2_s);
-    fprintf(s->bodies, ",%.12g,%.12g,%.12g\n", m.kinetic_j, m.elastic_j, m.gravity_j);
+    sonde_file_printf(s->bodies, ",%.12g,%.12g,%.12g\n", m.kinetic_j, m.elastic_j, m.gravity_j);
   }
   for (uint32_t t = 0; t < sonde_scene_pair_count(s->scene); ++t) {
     sonde_scene_pair pair = sonde_scene_pair_at(s->scene, t);
     sonde_pair_measure m = sonde_scene_pair_measure(s->state, t);
-    fprintf(s->contacts, "%llu,%.12g,%s,%s", step, time_s, sonde_scene_body(s->scene, pair.a).name,
-            sonde_scene_body(s->scene, pair.b).name);
+    sonde_file_printf(s->contacts, "%llu,%.12g,%s,%s", step, time_s,
+                      sonde_scene_body(s->scene, pair.a).name,
+                      sonde_scene_body(s->scene, pair.b).name);
     put_vector(s->contacts, m.force_n);
     put_vector(s->contacts, m.torque_n_m);
-    fprintf(s->contacts, ",%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%u\n", m.normal_n,
-            norm(m.friction_n), m.volume_m3, m.area_m2, m.depth_m, m.energy_j, m.region_count);
+    sonde_file_printf(s->contacts, ",%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%u\n", m.normal_n,
+                      norm(m.friction_n), m.volume_m3, m.area_m2, m.depth_m, m.energy_j,
+                      m.region_count);
   }
 }
 
-// Where the rows of later steps begin; -1 when the table is none of ours.
-static long keep_until(FILE *table, const char *head, uint64_t step) {
-  char line[1024];
-  if (!fgets(line, sizeof line, table) || strcmp(line, head) != 0) return -1;
-  long end = ftell(table);
-  while (fgets(line, sizeof line, table)) {
-    bool whole = strchr(line, '\n') != NULL;
-    if (!whole || strtoull(line, NULL, 10) > step) break;
-    end = ftell(table);
-  }
-  return end;
+// Bytes before the rows of later steps; -1 when the table is none of ours. `text` ends with a 0.
+static long keep_until(const char *text, const char *head, uint64_t step) {
+  size_t length = strlen(head);
+  if (strncmp(text, head, length) != 0) return -1;
+  const char *row = text + length;
+  for (const char *end; (end = strchr(row, '\n')); row = end + 1)
+    if (strtoull(row, NULL, 10) > step) break;
+  return row - text;
 }
 
 // A new table, or the old one without the rows of steps that will be made again.
 static sonde_status open_table(const simulation *s, const char *name, const char *head,
-                               FILE **table, sonde_error *error) {
-  char path[1100];
+                               sonde_file **table, sonde_error *error) {
+  char path[1100], *text = NULL;
+  size_t count = 0;
+  long keep = 0;
   path_of(s, name, path, sizeof path);
-  *table = fopen(path, s->a.resume ? "r+" : "w");
-  if (!*table) return fail(error, SONDE_IO, path, strerror(errno));
-  if (!s->a.resume)
-    return fputs(head, *table) < 0 ? fail(error, SONDE_IO, path, strerror(errno)) : SONDE_OK;
-  long end = keep_until(*table, head, s->start);
-  if (end < 0) return fail(error, SONDE_FORMAT, path, "not a table of sonde simulate");
-  if (ftruncate(fileno(*table), end) != 0 || fseek(*table, end, SEEK_SET) != 0)
-    return fail(error, SONDE_IO, path, strerror(errno));
-  return SONDE_OK;
+  if (s->a.resume) {
+    sonde_status status = sonde_file_load(path, &text, &count, error);
+    if (status) return status;
+    keep = keep_until(text, head, s->start);
+    sonde_free(text);
+    if (keep < 0) return fail(error, SONDE_FORMAT, path, "not a table of sonde simulate");
+  }
+  sonde_status status = sonde_file_extend(path, (uint64_t)keep, table, error);
+  if (!status && !s->a.resume) sonde_file_printf(*table, "%s", head);
+  return status;
 }
 
 // ---- frames
@@ -217,9 +216,9 @@ static sonde_status write_frame(simulation *s, sonde_error *error) {
   sonde_status status = s->a.no_frames ? SONDE_OK : save_surfaces(s, error);
   if (status) return status;
   put_rows(s);
-  if (fflush(s->bodies) != 0 || fflush(s->contacts) != 0)
-    return fail(error, SONDE_IO, s->a.directory, strerror(errno));
-  return save_snapshot(s, error);
+  status = sonde_file_flush(s->bodies, error);
+  if (!status) status = sonde_file_flush(s->contacts, error);
+  return status ? status : save_snapshot(s, error);
 }
 
 // ---- run
@@ -237,9 +236,9 @@ static sonde_status prepare(simulation *s, sonde_error *error) {
   path_of(s, "state.snapshot", path, sizeof path);
   if (s->a.resume) status = sonde_scene_state_load(s->state, path, error);
   s->start = sonde_scene_tick(s->state);
-  if (!status) status = app_make_directory(s->a.directory, 0777, error);
+  if (!status) status = sonde_directory_make(s->a.directory, 0777, false, error);
   path_of(s, "frames", path, sizeof path);
-  if (!status && !s->a.no_frames) status = app_make_directory(path, 0777, error);
+  if (!status && !s->a.no_frames) status = sonde_directory_make(path, 0777, false, error);
   if (!status) status = open_table(s, "bodies.csv", BODIES_HEAD, &s->bodies, error);
   if (!status) status = open_table(s, "contacts.csv", CONTACTS_HEAD, &s->contacts, error);
   return status;
@@ -317,8 +316,8 @@ int cmd_simulate(int argc, char **argv) {
   if (!status && s.cancelled)
     fprintf(stderr, "sonde simulate: cancelled at step %llu of %llu; --resume goes on\n",
             (unsigned long long)sonde_scene_tick(s.state), (unsigned long long)s.steps);
-  if (s.bodies) fclose(s.bodies);
-  if (s.contacts) fclose(s.contacts);
+  sonde_file_discard(s.bodies);
+  sonde_file_discard(s.contacts);
   sonde_scene_state_destroy(s.state);
   sonde_scene_destroy(s.scene);
   if (status) return app_fail(VERB, &error);

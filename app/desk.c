@@ -11,7 +11,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 static const double TELL_EVERY_S = 0.2;
 
@@ -218,25 +217,12 @@ void desk_turn(desk *d) {
 
 // ---- the desk
 
-// With its parents.
-static sonde_status make_directory(const char *path, sonde_error *error) {
-  char part[4096];
-  snprintf(part, sizeof part, "%s", path);
-  for (char *c = part + 1; *c; ++c) {
-    if (*c != '/') continue;
-    *c = 0;
-    mkdir(part, 0700);
-    *c = '/';
-  }
-  return app_make_directory(path, 0700, error);
-}
-
 static sonde_status create_library(desk *d, sonde_error *error) {
   char path[DESK_PATH];
   sonde_status status = sonde_case_list(d->cases, &d->case_list, &d->case_count, error);
   if (!status)
     status = sonde_exam_protocol_list(d->protocols, &d->protocol_list, &d->protocol_count, error);
-  if (!status) status = make_directory(d->exams, error);
+  if (!status) status = sonde_directory_make(d->exams, 0700, true, error);
   if (status) return status;
   return sonde_exam_log_open(desk_path(path, d->exams, "exams.sqlite"), &d->log, error);
 }

@@ -204,7 +204,8 @@ int exam_compare(const compare_options *options) {
   sonde_status status = load(&t, &error);
   if (!status && t.case_count == 0)
     status = app_error(&error, SONDE_NOT_FOUND, "no cases in '%.300s'", options->library->cases);
-  if (!status && options->directory) status = app_make_directory(options->directory, 0777, &error);
+  if (!status && options->directory)
+    status = sonde_directory_make(options->directory, 0777, false, &error);
   size_t exams = (size_t)t.case_count * OPERATORS * (size_t)options->seeds;
   if (!status && !(t.score = calloc(exams, sizeof *t.score))) status = error.status = SONDE_MEMORY;
   for (uint32_t of = 0; of < t.case_count && !status; ++of)

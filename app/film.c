@@ -18,8 +18,9 @@
 extern char **environ;
 
 struct film {
-  char path[4096], part[4200];
-  int pipe; // -1: ffmpeg went away
+  const char *path; // the caller's
+  sonde_file *file; // ffmpeg writes its temporary file
+  int pipe;         // -1: ffmpeg went away
   pid_t child;
   size_t bytes; // of a picture
   uint64_t frames;
@@ -35,11 +36,14 @@ static int start(film *f, uint32_t width, uint32_t height, int frames_per_s, int
   char size[32], rate[16];
   snprintf(size, sizeof size, "%ux%u", width, height);
   snprintf(rate, sizeof rate, "%d", frames_per_s);
-  const char *arguments[] = {"ffmpeg",      "-hide_banner", "-loglevel",  "error",    "-nostdin",
-                             "-y",          "-f",           "rawvideo",   "-pix_fmt", "gray",
-                             "-video_size", size,           "-framerate", rate,       "-i",
-                             "pipe:0",      "-an",          "-pix_fmt",   "yuv420p",  "-movflags",
-                             "+faststart",  "-f",           "mp4",        f->part,    NULL};
+  const char *arguments[] = {
+      "ffmpeg",     "-hide_banner", "-loglevel",   "error",
+      "-nostdin",   "-y",           "-f",          "rawvideo",
+      "-pix_fmt",   "gray",         "-video_size", size,
+      "-framerate", rate,           "-i",          "pipe:0",
+      "-an",        "-pix_fmt",     "yuv420p",     "-movflags",
+      "+faststart", "-f",           "mp4",         sonde_file_temporary(f->file),
+      NULL};
   posix_spawn_file_actions_t actions;
   posix_spawnattr_t attributes;
   sigset_t pipe_signal;
@@ -64,13 +68,18 @@ sonde_status film_open(const char *path, uint32_t width, uint32_t height, int fr
   *out = NULL;
   film *f = calloc(1, sizeof *f);
   if (!f) return fail(error, SONDE_MEMORY, "out of memory", path);
-  if (strlen(path) >= sizeof f->path || pipe2(ends, O_CLOEXEC)) {
+  f->path = path;
+  sonde_status status = sonde_file_create(path, &f->file, error);
+  if (!status && !sonde_file_temporary(f->file))
+    status =
+        fail(error, SONDE_IO, "a film is written back and forth, expected a regular file", path);
+  if (!status && pipe2(ends, O_CLOEXEC)) status = fail(error, SONDE_DISK, strerror(errno), path);
+  if (status) {
+    sonde_file_discard(f->file);
     free(f);
-    return fail(error, SONDE_IO, "the film cannot be written", path);
+    return status;
   }
   signal(SIGPIPE, SIG_IGN); // an ffmpeg that gives up is told by write()
-  snprintf(f->path, sizeof f->path, "%s", path);
-  snprintf(f->part, sizeof f->part, "%s.part-%ld", path, (long)getpid());
   f->bytes = (size_t)width * height;
   int failure = start(f, width, height, frames_per_s, ends[0]);
   close(ends[0]);
@@ -80,6 +89,7 @@ sonde_status film_open(const char *path, uint32_t width, uint32_t height, int fr
     return SONDE_OK;
   }
   close(ends[1]);
+  sonde_file_discard(f->file);
   free(f);
   if (failure == ENOENT)
     return fail(error, SONDE_NOT_FOUND,
@@ -119,11 +129,11 @@ sonde_status film_close(film *f, sonde_error *error) {
   }
   sonde_status status = SONDE_OK;
   bool good = !broken && WIFEXITED(code) && WEXITSTATUS(code) == 0;
-  if (!good)
-    status = fail(error, SONDE_IO, "ffmpeg failed; what it said stands above", f->path);
-  else if (f->frames > 0 && rename(f->part, f->path))
-    status = fail(error, SONDE_IO, strerror(errno), f->path);
-  if (status || f->frames == 0) unlink(f->part);
+  if (!good) status = fail(error, SONDE_DISK, "ffmpeg failed; what it said stands above", f->path);
+  if (good && f->frames > 0)
+    status = sonde_file_commit(f->file, error);
+  else
+    sonde_file_discard(f->file);
   free(f);
   return status;
 }

@@ -4,8 +4,11 @@
 // edit_distance   letters to change between two short words
 // suggestion      the verb that an unknown word most resembles
 // print_help      list of commands
+// told            whether standard output took what was printed
 #include "app.h"
 
+#include <errno.h>
+#include <signal.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -108,8 +111,16 @@ static void print_remark(sonde_log_level level, const char *message, void *user)
   if (level >= SONDE_LOG_WARNING) fprintf(stderr, "sonde: %s\n", message);
 }
 
+// A result that did not reach standard output is a failure.
+static int told(int code) {
+  if (fflush(stdout) == 0 && !ferror(stdout)) return code;
+  fprintf(stderr, "sonde: standard output cannot be written: %s\n", strerror(errno));
+  return code == APP_OK ? APP_FAILED : code;
+}
+
 int main(int argc, char **argv) {
   sonde_set_log(print_remark, NULL);
+  signal(SIGXFSZ, SIG_IGN); // a file beyond the limit is told by write()
   if (argc < 2) {
     print_help(stderr);
     return APP_BAD_INPUT;
@@ -117,13 +128,13 @@ int main(int argc, char **argv) {
   const char *word = argv[1];
   if (strcmp(word, "--version") == 0) {
     printf("sonde %s\n", sonde_version());
-    return APP_OK;
+    return told(APP_OK);
   }
   if (strcmp(word, "--help") == 0 || strcmp(word, "-h") == 0 || strcmp(word, "help") == 0) {
-    if (argc > 2) return help_of(argv[2]);
+    if (argc > 2) return told(help_of(argv[2]));
     print_help(stdout);
-    return APP_OK;
+    return told(APP_OK);
   }
   const command *found = find_command(word);
-  return found ? found->run(argc - 1, argv + 1) : unknown(word);
+  return told(found ? found->run(argc - 1, argv + 1) : unknown(word));
 }

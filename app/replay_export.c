@@ -7,12 +7,10 @@
 // replay_export_run:  plays and writes.
 #include "replay_export.h"
 
-#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 enum { FRAMES_PER_S = 25, CAPTION_SCALE = 2, STRIP = 2 * (CAPTION_HEIGHT * CAPTION_SCALE + 6) };
 
@@ -224,14 +222,9 @@ static sonde_status open_film(output *o, sonde_error *error) {
 
 static sonde_status open_all(output *o, sonde_error *error) {
   replay_export *what = o->what;
-  if (what->frames && mkdir(what->frames, 0777) && errno != EEXIST) {
-    *error = (sonde_error){.status = SONDE_IO};
-    snprintf(error->message, sizeof error->message, "%.200s: cannot be made: %.200s", what->frames,
-             strerror(errno));
-    return SONDE_IO;
-  }
   sonde_status status = SONDE_OK;
-  if (what->csv) status = sonde_file_create(what->csv, &o->csv, error);
+  if (what->frames) status = sonde_directory_make(what->frames, 0777, false, error);
+  if (!status && what->csv) status = sonde_file_create(what->csv, &o->csv, error);
   if (!status && what->json) status = sonde_file_create(what->json, &o->json, error);
   if (!status && what->video) status = open_film(o, error);
   if (!status) print_heads(o);

@@ -43,7 +43,8 @@ extern "C" {
   X(DEVICE, "a device is absent or failed")                                                        \
   X(PORT, "a network port could not be opened")                                                    \
   X(CANCELLED, "the work was cancelled; what was finished is kept")                                \
-  X(MISMATCH, "two inputs do not belong together")
+  X(MISMATCH, "two inputs do not belong together")                                                 \
+  X(DISK, "the disk is full or failed")
 
 /** Result of every cold function; 0 is success. */
 typedef enum sonde_status {
@@ -120,28 +121,58 @@ SONDE_API double sonde_parse_real(const char *text, const char **end);
 /** FNV-1a 64-bit hash of bytes, continued from seed (0 starts a new one). @thread any */
 SONDE_API uint64_t sonde_hash(uint64_t seed, const void *bytes, size_t count);
 
-/** Size of data whose writing is not finished, published by rename. */
+/** An output file that is being written. */
 typedef struct sonde_file sonde_file;
 
 /**
- * Opens a file for atomic writing: bytes go to a temporary neighbour of `path`,
- * sonde_file_commit() renames it, sonde_file_discard() removes it.
+ * Opens a file for atomic writing: bytes go to a temporary file beside the place that `path` leads
+ * to, sonde_file_commit() renames it onto that place, sonde_file_discard() removes it. Symbolic
+ * links are followed and stay; the mode of a file that is replaced stays. What is not a regular
+ * file (a pipe, a terminal, /dev/null, /dev/stdout) is written into as it is.
  * @param[out] file owned by the caller until commit or discard
+ * @return IO for a path that cannot be used (no such directory, no permission, a directory), DISK
+ *   for a full or failing disk
  * @thread owner
  */
 SONDE_API sonde_status sonde_file_create(const char *path, sonde_file **file, sonde_error *error);
-/** Appends bytes; a failure is remembered and reported by the commit. @thread owner */
+/**
+ * Opens a file for writing at its end, made when it is absent: bytes of it beyond the first `keep`
+ * are cut off. There is no temporary file: commit and discard leave what was written.
+ * @param keep at most the file's size
+ * @return IO, DISK
+ * @thread owner
+ */
+SONDE_API sonde_status sonde_file_extend(const char *path, uint64_t keep, sonde_file **file,
+                                         sonde_error *error);
+/** Appends bytes; a failure is remembered and reported by flush and commit. @thread owner */
 SONDE_API void sonde_file_write(sonde_file *file, const void *bytes, size_t count);
-/** printf onto the file; a failure is remembered and reported by the commit. @thread owner */
+/** printf onto the file; a failure is remembered and reported by flush and commit. @thread owner */
 SONDE_API void sonde_file_printf(sonde_file *file, const char *format, ...)
     __attribute__((format(printf, 2, 3)));
 /** Hands what was written to the system, so that the end of the program cannot lose it.
- * @thread owner */
-SONDE_API void sonde_file_flush(sonde_file *file);
-/** Flushes, renames over `path` and frees; on failure nothing is left behind. @thread owner */
+ * @return the first failure so far, as sonde_file_create() @thread owner */
+SONDE_API sonde_status sonde_file_flush(sonde_file *file, sonde_error *error);
+/** Path of the temporary file, for a program that writes it instead; NULL when there is none.
+ * Valid until commit or discard. @thread owner */
+SONDE_API const char *sonde_file_temporary(const sonde_file *file);
+/** Flushes, syncs, renames onto the target and frees; after a failure the target is as it was and
+ * the temporary file is gone. @return as sonde_file_create() @thread owner */
 SONDE_API sonde_status sonde_file_commit(sonde_file *file, sonde_error *error);
 /** Removes the temporary file and frees; NULL is ignored. @thread owner */
 SONDE_API void sonde_file_discard(sonde_file *file);
+
+/** An output file in memory, for text that becomes part of something else; sonde_file_take() ends
+ * it. @return MEMORY @thread owner */
+SONDE_API sonde_status sonde_file_in_memory(sonde_file **file, sonde_error *error);
+/** Gives what was written to such a file, with a terminating 0 beyond `*count`, and frees the file.
+ * @param[out] bytes freed by sonde_free() @return MEMORY @thread owner */
+SONDE_API sonde_status sonde_file_take(sonde_file *file, char **bytes, size_t *count,
+                                       sonde_error *error);
+
+/** Makes a directory when it is absent. @param mode of mkdir(2) @param parents also those above it
+ * @return IO, DISK @thread owner */
+SONDE_API sonde_status sonde_directory_make(const char *path, unsigned mode, bool parents,
+                                            sonde_error *error);
 
 /** Reads a whole file; `*bytes` gets a terminating 0 beyond `*count` and is freed by sonde_free. */
 SONDE_API sonde_status sonde_file_load(const char *path, char **bytes, size_t *count,

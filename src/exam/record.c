@@ -68,7 +68,7 @@ static void close_block(sonde_recorder *recorder) {
   put_u64(&w, recorder->ticks);
   SONDE_ASSERT(w.at == bytes + sizeof bytes);
   emit(recorder, bytes, sizeof bytes);
-  sonde_file_flush(recorder->file);
+  (void)sonde_file_flush(recorder->file, NULL);
 }
 
 void sonde_recorder_write(sonde_recorder *recorder, const sonde_record *record) {
@@ -159,7 +159,7 @@ sonde_status sonde_recorder_create(const char *path, const sonde_record_head *he
   emit(recorder, magic, strlen(magic));
   emit(recorder, json, strlen(json));
   emit(recorder, "\n", 1);
-  sonde_file_flush(recorder->file);
+  (void)sonde_file_flush(recorder->file, NULL);
   *out = recorder;
   recorder = NULL;
 done:

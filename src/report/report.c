@@ -1,20 +1,8 @@
-// make_directory: the directory, unless it is there.
 // write_text:     one file, whole or not at all.
 // write_files:    the figures, then the page.
 #include "report/view.h"
 
-#include <errno.h>
 #include <string.h>
-#include <sys/stat.h>
-
-static sonde_status make_directory(const char *directory, sonde_error *error) {
-  struct stat info;
-  int failed = mkdir(directory, 0777) ? errno : 0;
-  if (failed == EEXIST && stat(directory, &info) == 0) failed = S_ISDIR(info.st_mode) ? 0 : ENOTDIR;
-  if (!failed) return SONDE_OK;
-  return sonde_fail(error, SONDE_IO, "%s: cannot be made or used as a directory: %s", directory,
-                    strerror(failed));
-}
 
 static sonde_status write_text(const char *directory, const char *name, const char *extension,
                                const sonde_text *text, sonde_error *error) {
@@ -41,7 +29,8 @@ static sonde_status write_files(sonde_report_view *view, const char *directory,
                                 sonde_error *error) {
   sonde_text page = {0};
   sonde_page_write(view, &page);
-  sonde_status status = page.failed ? sonde_fail_memory(error) : make_directory(directory, error);
+  sonde_status status =
+      page.failed ? sonde_fail_memory(error) : sonde_directory_make(directory, 0777, false, error);
   for (uint32_t i = 0; i < view->figure_count && !status; ++i) {
     sonde_text figure = {0};
     sonde_svg_write(&figure, &view->figures[i], true);

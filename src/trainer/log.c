@@ -102,6 +102,8 @@ static sonde_status sql_fail(const sonde_exam_log *log, sonde_error *error) {
   case SQLITE_LOCKED:
     return sonde_fail(error, SONDE_IO, "%s: another program kept the log for more than %d s",
                       log->path, WAIT_MS / 1000);
+  case SQLITE_FULL:
+  case SQLITE_IOERR: return sonde_fail(error, SONDE_DISK, "%s: %s", log->path, words);
   default: return sonde_fail(error, SONDE_IO, "%s: %s", log->path, words);
   }
 }
