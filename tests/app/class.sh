@@ -28,7 +28,7 @@ free_port() { # of a run of six that look free
 
 wait_for() { # WORDS: until the class has said them
   local i
-  for ((i = 0; i < 300; ++i)); do
+  for ((i = 0; i < 6000; ++i)); do
     grep -qE -- "$1" "$out" && return
     sleep 0.1
   done
@@ -51,7 +51,7 @@ checks=$((checks + 1))
 read -r first _ <"pid.$((port + 1))"
 kill -KILL "$first"
 wait_for 'Bo: was ended by signal 9 after [0-9]+ s; starting again \(1 of 3\)'
-for ((i = 0; i < 300; ++i)); do
+for ((i = 0; i < 6000; ++i)); do
   [[ $(grep -c "Bo: exam" "$out") -ge 2 ]] && break
   sleep 0.1
 done

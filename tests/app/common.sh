@@ -16,7 +16,7 @@ wrong() {
 
 run() { # ARGUMENTS: runs sonde, keeps its output, sets status
   status=0
-  timeout 120 "$SONDE" "$@" >"$out" 2>"$err" </dev/null || status=$?
+  timeout 900 "$SONDE" "$@" >"$out" 2>"$err" </dev/null || status=$?
 }
 
 # A fingerprint of everything that a command might have touched.

@@ -13,13 +13,11 @@ static int tear_down(void **state) {
   return 0;
 }
 
-// Reads frames for a while, and until there are two; every one must be whole and newer than the
-// last.
-static uint64_t watch(sonde_session *session, double seconds) {
-  uint64_t seen = 0, last = 0;
-  const double patience_s = 60;
-  double end_s = sonde_clock_now() + seconds, now_s;
-  while ((now_s = sonde_clock_now()) < end_s || (seen < 2 && now_s < end_s + patience_s)) {
+// Reads frames until the session has made so many more ticks and there are two frames; every frame
+// must be whole and newer than the last.
+static uint64_t watch(sonde_session *session, uint64_t ticks) {
+  uint64_t seen = 0, last = 0, end = sonde_session_ticks(session) + ticks;
+  while (sonde_session_ticks(session) < end || seen < 2) {
     sonde_frame frame;
     if (!sonde_session_frame(session, &frame)) {
       sonde_clock_sleep_until(sonde_clock_now() + 2e-3);
@@ -58,17 +56,16 @@ static void realtime_run_replays_in_lockstep(void **state) {
   assert_int_equal(sonde_session_start(session, NULL), SONDE_OK); // already running
   assert_true(sonde_session_hash(session) == 0);
   sonde_session_controls c = sonde_session_controls_now(session);
-  uint64_t seen = watch(session, 0.7);
+  uint64_t seen = watch(session, 700);
   c.probe = 2;
   sonde_session_control(session, &c);
-  seen += watch(session, 0.5);
+  seen += watch(session, 500);
   sonde_session_stop(session);
   sonde_loop_stats stats = sonde_session_loop(session);
   assert_int_equal(stats.ticks, sonde_session_ticks(session));
   assert_true(seen > 0 && seen <= sonde_session_images(session));
   double median_s = sonde_session_latency(session, 0.5), most_s = sonde_session_latency(session, 1);
   assert_true(median_s > 0 && median_s <= most_s);
-  assert_true(stats.ticks > 50);
   for (int i = 0; i < 30; ++i) sonde_session_tick(session); // lockstep goes on where it stopped
   uint64_t hash = sonde_session_hash(session);
   close_session(session);
@@ -88,8 +85,8 @@ static void two_trainees_in_one_process(void **state) {
     assert_int_equal(sonde_session_start(session[i], NULL), SONDE_OK);
   }
   sonde_device_page_goal(sonde_session_device(session[1]), sonde_site_pose(&site, 0.01));
-  watch(session[0], 0.3);
-  watch(session[1], 0.3);
+  watch(session[0], 300);
+  watch(session[1], 300);
   uint64_t hash[2];
   for (int i = 0; i < 2; ++i) {
     sonde_session_stop(session[i]);
@@ -118,10 +115,7 @@ static void a_long_gap_trips_and_is_counted(void **state) {
   sonde_session *session =
       open_session(&def, (sonde_device){"sleepy", &nap_s, sleepy_read, write_nowhere, NULL});
   assert_int_equal(sonde_session_start(session, NULL), SONDE_OK);
-  for (double end_s = sonde_clock_now() + 20.0; sonde_clock_now() < end_s;) {
-    if (sonde_session_ticks(session) > 200) break;
-    sonde_clock_sleep_until(sonde_clock_now() + 0.01);
-  }
+  while (sonde_session_ticks(session) <= 200) sonde_clock_sleep_until(sonde_clock_now() + 0.01);
   sonde_session_stop(session);
   assert_int_equal(session->safety.fault, SONDE_FAULT_STALE);
   assert_true(sonde_session_loop(session).deadline_misses >= 390);

@@ -9,7 +9,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
 #include <cmocka.h>
@@ -134,13 +133,6 @@ static inline sonde_mesh_report shape_report(const sonde_mesh *mesh) {
   sonde_mesh_report report;
   assert_ok(sonde_mesh_inspect(mesh, &report, &shape_error));
   return report;
-}
-
-// Processor time of this thread: other programs on the machine do not count.
-static inline double shape_seconds(void) {
-  struct timespec now;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
 // Least squares slope of log(y) over log(x).

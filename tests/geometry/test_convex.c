@@ -245,21 +245,18 @@ static void test_real_probe(void **state) {
   if (access(path, R_OK)) skip();
   sonde_mesh mesh;
   assert_ok(sonde_mesh_load(path, 1e-3, &mesh, &shape_error));
-  double start = shape_seconds();
   sonde_probe p = make_probe(path);
-  double seconds = shape_seconds() - start;
   sonde_vec3 low = mesh.vertices[0], high = low;
   for (uint32_t v = 0; v < mesh.vertex_count; ++v) {
     sonde_vec3 x = mesh.vertices[v];
     low = vec3(fmin(low.x, x.x), fmin(low.y, x.y), fmin(low.z, x.z));
     high = vec3(fmax(high.x, x.x), fmax(high.y, x.y), fmax(high.z, x.z));
   }
-  print_message("%u faces, box %.1f x %.1f x %.1f mm: hull of %u faces, %u planes in %.0f ms, "
+  print_message("%u faces, box %.1f x %.1f x %.1f mm: hull of %u faces, %u planes, "
                 "contact face %.1f x %.1f mm\n",
                 mesh.face_count, (high.x - low.x) * 1e3, (high.y - low.y) * 1e3,
-                (high.z - low.z) * 1e3, p.body.hull.face_count, p.body.plane_count, seconds * 1e3,
+                (high.z - low.z) * 1e3, p.body.hull.face_count, p.body.plane_count,
                 p.half_x_m * 2e3, p.half_y_m * 2e3);
-  assert_true(seconds < 1);
   assert_near(top(&p.body), 0, 1e-12);
   // In every direction the hull is as wide as the file's points, within what it may leave out.
   uint64_t seed = 3;

@@ -355,29 +355,13 @@ static void test_bad_arguments(void **state) {
   sonde_mesh_clear(&box);
 }
 
-static void test_speed(void **state) {
-  (void)state;
-  sonde_mesh ball = shape_sphere(34, 0.08), back; // 9,248 faces
-  assert_ok(sonde_mesh_save(file_path("a.ply"), 1e-3, &ball, &shape_error));
-  double best = 1;
-  for (int k = 0; k < 5; ++k) {
-    double start = shape_seconds();
-    assert_ok(sonde_mesh_load(file_path("a.ply"), 1e-3, &back, &shape_error));
-    best = fmin(best, shape_seconds() - start);
-    sonde_mesh_clear(&back);
-  }
-  print_message("%u faces read in %.1f ms\n", ball.face_count, best * 1e3);
-  assert_true(best < 0.05);
-  sonde_mesh_clear(&ball);
-}
-
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_round_trip),       cmocka_unit_test(test_foreign_locale),
       cmocka_unit_test(test_dialects),         cmocka_unit_test(test_stl_ascii),
       cmocka_unit_test(test_stl_zeros),        cmocka_unit_test(test_damaged_text),
       cmocka_unit_test(test_truncated_binary), cmocka_unit_test(test_flipped_bytes),
-      cmocka_unit_test(test_bad_arguments),    cmocka_unit_test(test_speed),
+      cmocka_unit_test(test_bad_arguments),
   };
   return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -207,24 +207,6 @@ static void test_inside_sharp(void **state) {
   sonde_mesh_clear(&mesh);
 }
 
-static void test_speed(void **state) {
-  (void)state;
-  sonde_mesh mesh = wavy_ball(34); // 9,248 faces
-  double start = shape_seconds();
-  sonde_surface_index *index = make_index(&mesh);
-  double built = shape_seconds() - start;
-  uint64_t seed = 1;
-  int count = 20000, inside = 0;
-  start = shape_seconds();
-  for (int k = 0; k < count; ++k) inside += sonde_surface_inside(index, shape_point(&seed, 1.2));
-  double each = (shape_seconds() - start) / count;
-  print_message("%u faces: index in %.1f ms, inside test %.2f us\n", mesh.face_count, built * 1e3,
-                each * 1e6);
-  assert_true(inside > 0 && each < 100e-6);
-  sonde_surface_index_destroy(index);
-  sonde_mesh_clear(&mesh);
-}
-
 static void test_faults(void **state) {
   (void)state;
   sonde_mesh box = shape_box(1, 1, 1);
@@ -243,7 +225,7 @@ int main(void) {
       cmocka_unit_test(test_closest),       cmocka_unit_test(test_raycast),
       cmocka_unit_test(test_raycast_edges), cmocka_unit_test(test_inside),
       cmocka_unit_test(test_box_symmetry),  cmocka_unit_test(test_inside_sharp),
-      cmocka_unit_test(test_speed),         cmocka_unit_test(test_faults),
+      cmocka_unit_test(test_faults),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

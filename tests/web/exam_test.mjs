@@ -7,7 +7,7 @@ import { mkdirSync, mkdtempSync, readdirSync, readFileSync, rmSync } from "node:
 import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
-import { browserPath, goTo, openBrowser, ready } from "./drive.mjs";
+import { PATIENCE_MS, browserPath, goTo, openBrowser, ready } from "./drive.mjs";
 
 const [sonde, web, out] = process.argv.slice(2).map((p) => resolve(p));
 if (!browserPath) {
@@ -37,7 +37,7 @@ function start(port) {
 }
 
 const state = (page) => page.evaluate(() => ({ exam: window.sonde.exam, replay: window.sonde.replay, snapshot: window.sonde.snapshot, sum: window.sonde.imageSum }));
-const until = (page, condition, argument, timeout = 60000) => page.waitForFunction(condition, argument, { timeout });
+const until = (page, condition, argument) => page.waitForFunction(condition, argument, { timeout: PATIENCE_MS });
 
 async function begin(page, guidance) {
   const again = page.getByRole("button", { name: "Start an exam", exact: true });
@@ -49,14 +49,21 @@ async function begin(page, guidance) {
   await until(page, () => window.sonde.snapshot?.tick > 0 && window.sonde.exam.elapsed_s > 0);
 }
 
+/** The probe is at the depth, or has been on its way for 3 s of the simulation; then 0.25 s of it more. */
+async function held(page, depth) {
+  const start = await page.evaluate(() => window.sonde.snapshot.tick);
+  await until(page, ([d, t]) => window.sonde.snapshot.penetration_mm > d - 0.5 || window.sonde.snapshot.tick > t + 3000, [depth, start]);
+  const there = await page.evaluate(() => window.sonde.snapshot.tick);
+  await until(page, (t) => window.sonde.snapshot.tick > t + 250, there);
+}
+
 /** Presses deeper and deeper until the program calls it something, then lets go. */
 async function press(page) {
   const before = (await state(page)).exam.presses.length;
   const named = () => ["complete", "open", "too_hard"].includes(window.sonde.exam.compression?.state);
   for (let depth = 16; depth <= 45; depth += 1.5) {
     await page.evaluate((d) => window.sonde.setDepth(d), depth);
-    await page.waitForFunction((d) => window.sonde.snapshot.penetration_mm > d - 0.5, depth, { timeout: 5000 }).catch(() => null);
-    await page.waitForTimeout(250);
+    await held(page, depth);
     if (await page.evaluate(named)) break;
   }
   await page.evaluate(() => window.sonde.setDepth(-4));
@@ -103,6 +110,7 @@ async function finish(page) {
 
 async function readReport(browser, port, exam) {
   const page = await browser.newPage();
+  page.setDefaultTimeout(PATIENCE_MS);
   const errors = [];
   page.on("console", (m) => m.type() === "error" && errors.push(m.text()));
   const answer = await page.goto(`http://127.0.0.1:${port}${exam.result.report}`);
@@ -143,6 +151,7 @@ async function replay(page, exam) {
 
 async function killed(browser, running) {
   const page = await browser.newPage({ viewport: { width: 1440, height: 900 } });
+  page.setDefaultTimeout(PATIENCE_MS);
   await page.goto(`http://127.0.0.1:${running.port}/?quality=low`);
   await ready(page);
   await begin(page, /^None/);
@@ -165,6 +174,7 @@ async function main() {
   running = await start(0);
   const browser = await openBrowser(chromium);
   const page = await browser.newPage({ viewport: { width: 1440, height: 900 } });
+  page.setDefaultTimeout(PATIENCE_MS);
   const errors = [];
   page.on("console", (m) => m.type() === "error" && errors.push(m.text()));
   page.on("pageerror", (e) => errors.push(String(e)));

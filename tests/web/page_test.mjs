@@ -7,6 +7,7 @@ import { createRequire } from "node:module";
 import { existsSync, mkdirSync, mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import path from "node:path";
+import { PATIENCE_MS } from "./drive.mjs";
 
 const [, , program, model, webDir, outDir] = process.argv;
 const { chromium } = createRequire(path.join(webDir, "package.json"))("playwright-core");
@@ -37,7 +38,6 @@ function startProgram() {
     child.stdout.on("data", listen);
     child.stderr.on("data", listen);
     child.on("exit", (code) => reject(new Error(`sonde run ended with ${code}: ${said}`)));
-    setTimeout(() => reject(new Error(`sonde run did not start: ${said}`)), 30000).unref();
   });
   const ended = new Promise((resolve) => child.on("exit", (code, signal) => resolve(signal ?? code)));
   let interrupted = false; // a second Ctrl-C would kill it
@@ -45,13 +45,14 @@ function startProgram() {
     if (!interrupted) child.kill("SIGINT");
     interrupted = true;
   };
-  return { child, address, ended, interrupt };
+  process.on("exit", () => child.kill("SIGKILL"));
+  return { address, ended, interrupt };
 }
 
 /** Holds the probe at a depth until it is there and the force is steady; returns the snapshot. */
 async function press(page, depth_mm) {
   await page.evaluate((d) => window.sonde.setDepth(d), depth_mm);
-  await page.waitForFunction((d) => Math.abs(window.sonde.snapshot.penetration_mm - d) < 0.3, depth_mm, { timeout: 30000 });
+  await page.waitForFunction((d) => Math.abs(window.sonde.snapshot.penetration_mm - d) < 0.3, depth_mm, { timeout: PATIENCE_MS });
   let last = NaN;
   for (let i = 0; i < 60; ++i) {
     const s = await nextSnapshot(page);
@@ -64,7 +65,7 @@ async function press(page, depth_mm) {
 /** A snapshot of at least 300 ticks later. */
 async function nextSnapshot(page) {
   const tick = await page.evaluate(() => window.sonde.snapshot.tick);
-  await page.waitForFunction((t) => window.sonde.snapshot.tick > t + 300, tick, { timeout: 30000 });
+  await page.waitForFunction((t) => window.sonde.snapshot.tick > t + 300, tick, { timeout: PATIENCE_MS });
   return page.evaluate(() => window.sonde.snapshot);
 }
 
@@ -165,7 +166,7 @@ async function testLayout(page) {
 
 async function testLoss(page, server) {
   server.interrupt();
-  await page.waitForFunction(() => !document.getElementById("banner").hidden, null, { timeout: 15000 });
+  await page.waitForFunction(() => !document.getElementById("banner").hidden, null, { timeout: PATIENCE_MS });
   check((await page.locator("#banner").textContent()).includes("lost"), "a lost connection is said");
 }
 
@@ -184,7 +185,7 @@ async function main() {
         "--disable-component-update", "--disable-sync"],
     });
     const page = await browser.newPage();
-    page.setDefaultTimeout(60000);
+    page.setDefaultTimeout(PATIENCE_MS);
     const errors = [];
     page.on("console", (m) => m.type() === "error" && errors.push(m.text()));
     page.on("pageerror", (e) => errors.push(e.message));
@@ -201,8 +202,7 @@ async function main() {
   } finally {
     await browser?.close();
     server.interrupt();
-    const ending = await Promise.race([server.ended, new Promise((r) => setTimeout(() => r("still running"), 15000))]);
-    if (ending === "still running") server.child.kill("SIGKILL");
+    const ending = await server.ended;
     check(ending === 0, `the program ends cleanly: ${ending}`);
     rmSync(profile, { recursive: true, force: true });
   }

@@ -34,12 +34,20 @@ export class Client {
     this.open = new Promise((done, fail) => {
       this.socket.once("error", fail);
       if (!reads) this.socket.once("connect", () => (this.socket.pause(), done()));
-      else this.socket.once("data", (bytes) => {
-        const head = bytes.indexOf("\r\n\r\n") + 4;
-        this.socket.on("data", (more) => this.hear(more));
-        this.hear(bytes.subarray(head));
-        done();
-      });
+      else {
+        // The head of the answer may come in several pieces.
+        let head = Buffer.alloc(0);
+        const readHead = (bytes) => {
+          head = Buffer.concat([head, bytes]);
+          const end = head.indexOf("\r\n\r\n");
+          if (end < 0) return;
+          this.socket.off("data", readHead);
+          this.socket.on("data", (more) => this.hear(more));
+          this.hear(head.subarray(end + 4));
+          done();
+        };
+        this.socket.on("data", readHead);
+      }
     });
   }
 
@@ -62,6 +70,12 @@ export class Client {
     this.sequences.push(sequence);
     this.socket.write(masked(JSON.stringify({ type: "ack", frame: sequence })));
     this.woken?.();
+  }
+
+  /** Resolves once so many more frames have come. */
+  async frames(count) {
+    const end = this.sequences.length + count;
+    while (this.sequences.length < end) await new Promise((done) => (this.woken = done));
   }
 
   /** Frames received of the next `published` that the program made: 1 when none was left out. */

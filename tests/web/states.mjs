@@ -5,7 +5,7 @@ import { createRequire } from "node:module";
 import { mkdirSync } from "node:fs";
 import path from "node:path";
 import { startMock } from "./mock_server.mjs";
-import { exams, goTo, openBrowser, pressAndRelease, ready } from "./drive.mjs";
+import { PATIENCE_MS, exams, goTo, openBrowser, pressAndRelease, ready } from "./drive.mjs";
 
 const [, , webDir, out] = process.argv;
 const option = (name) => (process.argv.includes(name) ? process.argv[process.argv.indexOf(name) + 1] : null);
@@ -18,7 +18,7 @@ const { chromium } = createRequire(path.join(webDir, "package.json"))("playwrigh
 const mock = await startMock({ webDir, program: option("--program"), list: exams() });
 const browser = await openBrowser(chromium);
 const page = await browser.newPage({ viewport: { width, height } });
-page.setDefaultTimeout(120000);
+page.setDefaultTimeout(PATIENCE_MS);
 page.on("pageerror", (e) => console.log(e.stack));
 let count = 0;
 const shot = async (name, wait = 400) => {

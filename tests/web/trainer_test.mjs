@@ -4,14 +4,13 @@
 import { createRequire } from "node:module";
 import { mkdirSync, statSync } from "node:fs";
 import path from "node:path";
-import { browserPath, exams, goTo, openBrowser, ready } from "./drive.mjs";
+import { PATIENCE_MS, browserPath, exams, goTo, openBrowser, ready } from "./drive.mjs";
 import { contrastFaults, layoutFaults, nameFaults } from "./inspect.mjs";
 import { startMock } from "./mock_server.mjs";
 
 const [, , webDir, outDir] = process.argv;
 const SKIPPED = 77;
 const CLOSED_MM = 15; // closes the mock's vein
-const PATIENCE_MS = 120000; // a busy machine draws slowly
 const SMALL = { width: 1024, height: 700 };
 if (!browserPath) {
   console.log("skipped: /usr/bin/chromium is not installed");
@@ -239,6 +238,7 @@ async function testGuidance(page) {
 
 async function testWatch(page, mock) {
   const second = await page.context().newPage();
+  second.setDefaultTimeout(PATIENCE_MS);
   await second.goto(`${mock.address}?quality=low`);
   await ready(second);
   check(await second.locator("#watching").isVisible(), "a second page says that it watches");

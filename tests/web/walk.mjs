@@ -5,7 +5,7 @@ import { mkdirSync, mkdtempSync, rmSync } from "node:fs";
 import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
-import { openBrowser, ready } from "./drive.mjs";
+import { PATIENCE_MS, openBrowser, ready } from "./drive.mjs";
 
 const [sonde, web, out] = process.argv.slice(2, 5).map((p) => resolve(p));
 const [width, height] = (process.argv[5] ?? "1280x800").split("x").map(Number);
@@ -19,7 +19,7 @@ const address = await new Promise((done) => child.stdout.on("data", (text) => {
 }));
 const browser = await openBrowser(chromium);
 const page = await browser.newPage({ viewport: { width, height } });
-page.setDefaultTimeout(120000);
+page.setDefaultTimeout(PATIENCE_MS);
 const started = Date.now();
 await page.goto(address);
 await ready(page);
