@@ -48,6 +48,11 @@ int app_usage_error(const char *verb, const char *format, ...) {
 
 // ---- numbers
 
+int app_check_output(const char *verb, const char *path) {
+  sonde_error error = {0};
+  return path && sonde_file_check(path, &error) ? app_fail(verb, &error) : APP_OK;
+}
+
 bool app_parse_real(const char *verb, const char *option, const char *text, double low, double high,
                     double *value) {
   const char *end = text;

@@ -45,6 +45,10 @@ bool app_parse_real(const char *verb, const char *option, const char *text, doub
 bool app_parse_integer(const char *verb, const char *option, const char *text, long low, long high,
                        long *value);
 
+// Asks before long work whether an output file (NULL: none) can be written: APP_OK, or the exit code
+// after printing why not.
+int app_check_output(const char *verb, const char *path);
+
 // Progress on a terminal (stderr), silent in a pipe; Ctrl-C cancels.
 sonde_progress app_progress(void);
 void app_progress_end(void);

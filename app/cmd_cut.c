@@ -94,7 +94,8 @@ static int read_arguments(int argc, char **argv, arguments *a) {
     return app_usage_error(VERB, "no bundled model found (looked at %s)", searched);
   if (!a->model) a->model = a->found;
   if (!a->probe) a->probe = "linear";
-  return -1;
+  int unwritable = app_check_output(VERB, a->output);
+  return unwritable ? unwritable : -1;
 }
 
 // "x,y,z" in mm up to a character of `last` or the end; NULL when it is not that.

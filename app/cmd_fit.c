@@ -459,6 +459,8 @@ int cmd_fit(int argc, char **argv) {
   }
   fit_outcome out = {0};
   if (!parse_fit(&arguments, &def, &skin, &out.checks)) return APP_BAD_INPUT;
+  int unwritable = app_check_output(VERB, arguments.output);
+  if (unwritable) return unwritable;
   keep_command_line(argc, argv, &arguments);
   fit_inputs inputs = {0};
   sonde_error error = {0};

@@ -355,6 +355,8 @@ int cmd_identify(int argc, char **argv) {
   if (!parse_site(&a, &site) || (a.simulate && !make_protocol(&a, &protocol))) return APP_BAD_INPUT;
   if (a.threads && !app_parse_integer(VERB, "--threads", a.threads, 1, 64, &threads))
     return APP_BAD_INPUT;
+  int unwritable = app_check_output(VERB, a.output);
+  if (unwritable) return unwritable;
   sonde_status status = a.preset ? sonde_preset_load(a.preset, &preset, &error) : SONDE_OK;
   if (!status) status = sonde_model_load(a.model, &model, &error);
   if (!status) status = sonde_preset_apply(&preset, model, &world, &error);

@@ -333,6 +333,11 @@ int cmd_measure(int argc, char **argv) {
     return APP_OK;
   }
   if (!parse_def(&arguments, &def) || !parse_sites(&arguments, &sites_def)) return APP_BAD_INPUT;
+  const char *const outputs[] = {arguments.output, arguments.log, arguments.save_sites};
+  for (size_t i = 0; i < sizeof outputs / sizeof *outputs; ++i) {
+    int unwritable = app_check_output(VERB, outputs[i]);
+    if (unwritable) return unwritable;
+  }
   sonde_model *model = NULL;
   sonde_site_table sites = {0};
   sonde_error error = {0};

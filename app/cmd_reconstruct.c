@@ -87,7 +87,8 @@ static int read_arguments(int argc, char **argv, arguments *a) {
   int ways = (a->output != NULL) + a->leave_one_out + (a->copy != NULL);
   if (ways != 1)
     return app_usage_error(VERB, "expected one of -o, --leave-one-out and --copy, got %d", ways);
-  return -1;
+  int unwritable = app_check_output(VERB, a->output ? a->output : a->copy);
+  return unwritable ? unwritable : -1;
 }
 
 static void print_likeness(const char *name, const sonde_likeness *l) {

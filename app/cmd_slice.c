@@ -168,7 +168,9 @@ static int check(arguments *a) {
     return app_usage_error(VERB, "--stack belongs to --frame or --hold-out, without --compare");
   if (a->press.model && (a->compare || a->stack))
     return app_usage_error(VERB, "--press does not go with --compare or --stack");
-  return press_check(VERB, &a->press) && parse_numbers(a) ? -1 : APP_BAD_INPUT;
+  if (!press_check(VERB, &a->press) || !parse_numbers(a)) return APP_BAD_INPUT;
+  int unwritable = app_check_output(VERB, a->output);
+  return unwritable ? unwritable : -1;
 }
 
 static int read_arguments(int argc, char **argv, arguments *a) {

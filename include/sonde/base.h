@@ -136,6 +136,12 @@ typedef struct sonde_file sonde_file;
  */
 SONDE_API sonde_status sonde_file_create(const char *path, sonde_file **file, sonde_error *error);
 /**
+ * Whether sonde_file_create() could write there: asked before long work, so that its result has a
+ * place. Changes nothing.
+ * @return SONDE_OK, or what sonde_file_create() would fail with @thread owner
+ */
+SONDE_API sonde_status sonde_file_check(const char *path, sonde_error *error);
+/**
  * Opens a file for writing at its end, made when it is absent: bytes of it beyond the first `keep`
  * are cut off. There is no temporary file: commit and discard leave what was written.
  * @param keep at most the file's size

@@ -133,6 +133,23 @@ sonde_status sonde_file_create(const char *path, sonde_file **out, sonde_error *
   return failure == ENOMEM ? sonde_fail_memory(error) : fail_to_write(path, failure, error);
 }
 
+sonde_status sonde_file_check(const char *path, sonde_error *error) {
+  SONDE_ASSERT(path);
+  char target[PATH_MAX];
+  struct stat info;
+  int own = -1, failure = sonde_disk_follow(path, target, &own);
+  if (!failure && own < 0) {
+    bool exists = stat(target, &info) == 0;
+    if (exists && S_ISDIR(info.st_mode)) failure = EISDIR;
+    if (exists && !failure && access(target, W_OK) != 0) failure = errno;
+    if (!failure && (!exists || S_ISREG(info.st_mode))) { // a temporary file will stand beside it
+      strrchr(target, '/')[1] = 0;
+      if (access(target, W_OK | X_OK) != 0) failure = errno;
+    }
+  }
+  return failure ? fail_to_write(path, failure, error) : SONDE_OK;
+}
+
 sonde_status sonde_file_extend(const char *path, uint64_t keep, sonde_file **out,
                                sonde_error *error) {
   SONDE_ASSERT(path && out);

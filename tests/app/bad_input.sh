@@ -100,6 +100,12 @@ rejects 'port' run "$MODEL" --port 70000
 rejects 'missing/' press "$MODEL" --site 27 --probe linear --depth-mm 2 --image missing/a.png
 rejects 'missing/' measure "$MODEL" --sites "$DATA/sites.csv" --probe linear --step-mm 10 --limit-n 1 \
   -o missing/out.csv
+# Long work asks for the place of its result before it reads its input.
+rejects 'missing/out' measure absent.sonde --sites absent.csv --probe linear -o missing/out.csv
+rejects 'missing/out' fit absent.csv --surface absent.ply --sites absent.csv -o missing/out.sonde
+rejects 'missing/out' identify absent.sonde --slide absent.csv --site 1 -o missing/out.json
+rejects 'missing/out' reconstruct absent.mha -o missing/out.mha
+rejects 'missing/out' slice absent.igs.mha --frame 1.5 -o missing/out.png
 rejects 'missing/' run "$MODEL" --headless --seconds 0.2 --record missing/a.rec
 rejects 'missing/' fit "$DATA/indentation.csv" --surface "$in/skin.ply" --sites "$DATA/sites.csv" \
   --stages 1 -o missing/model.sonde

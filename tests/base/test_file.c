@@ -363,6 +363,33 @@ static void large_files_come_back_whole(void **state) {
 
 #define FILE_TEST(name) cmocka_unit_test_setup_teardown(name, set_up, tear_down)
 
+// sonde_file_check() says of every path what sonde_file_create() then does, and changes nothing.
+static void a_check_foresees_whether_a_file_can_be_made(void **state) {
+  (void)state;
+  write_all("old");
+  char missing[320], inside[320], link[320], loop[320];
+  snprintf(missing, sizeof missing, "%s/missing/file", directory);
+  snprintf(inside, sizeof inside, "%s/file", target); // its parent is no directory
+  snprintf(link, sizeof link, "%s/link", directory);
+  snprintf(loop, sizeof loop, "%s/loop", directory);
+  assert_int_equal(symlink(missing, link), 0);
+  assert_int_equal(symlink(loop, loop), 0);
+  const char *const paths[] = {target,      missing,     inside,        link, loop, directory,
+                               "/dev/null", "/dev/full", "/dev/stdout", "",   "/"};
+  for (size_t i = 0; i < SONDE_COUNT_OF(paths); ++i) {
+    sonde_error checked = {0}, created = {0};
+    sonde_file *file;
+    int entries = count_entries();
+    sonde_status expected = sonde_file_check(paths[i], &checked);
+    assert_int_equal(count_entries(), entries);
+    assert_int_equal(sonde_file_create(paths[i], &file, &created), expected);
+    assert_string_equal(checked.message, created.message);
+    sonde_file_discard(file);
+  }
+  unlink(link);
+  unlink(loop);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       FILE_TEST(commit_publishes_the_whole),
@@ -380,6 +407,7 @@ int main(void) {
       FILE_TEST(full_disk_is_reported_and_leaves_the_old_file),
       FILE_TEST(load_names_what_it_cannot_read),
       FILE_TEST(large_files_come_back_whole),
+      FILE_TEST(a_check_foresees_whether_a_file_can_be_made),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
