@@ -1,7 +1,7 @@
 // Processes of a class: start, watch, stop.
 //
 // child_arguments   PROGRAM run --port N and what the user added
-// child_environment the parent's, with the learner's name
+// child_environment the parent's, with the learner's name and token
 // attributes        signals as if started from a shell
 // files             no input, no output, errors to a pipe
 // hear              keeps the last line that a program said
@@ -42,11 +42,14 @@ static bool child_arguments(const class_room *room, const char *port, const char
   return true;
 }
 
-static void child_environment(char *name, char *list[VARIABLES]) {
+// The token goes by the environment, which no other user can read, not by the command line.
+static void child_environment(char *name, char *token, char *list[VARIABLES]) {
   int count = 0;
   list[count++] = name;
+  list[count++] = token;
   for (char **p = environ; *p && count < VARIABLES - 1; ++p)
-    if (strncmp(*p, "SONDE_TRAINEE=", 14) != 0) list[count++] = *p;
+    if (strncmp(*p, "SONDE_TRAINEE=", 14) != 0 && strncmp(*p, "SONDE_PAGE_TOKEN=", 17) != 0)
+      list[count++] = *p;
   list[count] = NULL;
 }
 
@@ -73,7 +76,7 @@ static int files(posix_spawn_file_actions_t *actions, int errors) {
 }
 
 static int spawn(const class_room *room, class_learner *learner, int errors) {
-  char port[8], name[CLASS_NAME + 16];
+  char port[8], name[CLASS_NAME + 16], token[SONDE_PAGE_TOKEN + 20];
   const char *argument[ARGUMENTS];
   char *variable[VARIABLES];
   posix_spawnattr_t attribute;
@@ -81,7 +84,8 @@ static int spawn(const class_room *room, class_learner *learner, int errors) {
   snprintf(port, sizeof port, "%u", (unsigned)learner->port);
   snprintf(name, sizeof name, "SONDE_TRAINEE=%s", learner->name);
   if (!child_arguments(room, port, argument)) return E2BIG;
-  child_environment(name, variable);
+  snprintf(token, sizeof token, "SONDE_PAGE_TOKEN=%s", learner->token);
+  child_environment(name, token, variable);
   int code = attributes(&attribute);
   if (code) return code;
   code = files(&actions, errors);

@@ -45,13 +45,13 @@ static void finish(question *q) {
   q->poll.fd = -1;
 }
 
-static void advance(question *q, uint16_t port) {
+static void advance(question *q, const class_learner *learner) {
   if (!q->sent) {
-    char request[160];
+    char request[256];
     int size = snprintf(request, sizeof request,
                         "GET /status.json HTTP/1.1\r\nHost: 127.0.0.1:%u\r\nConnection: close\r\n"
-                        "Accept: application/json\r\n\r\n",
-                        (unsigned)port);
+                        "Accept: application/json\r\nAuthorization: Bearer %s\r\n\r\n",
+                        (unsigned)learner->port, learner->token);
     q->sent = send(q->poll.fd, request, (size_t)size, MSG_NOSIGNAL) == size;
     q->poll.events = POLLIN;
     if (!q->sent) finish(q);
@@ -101,7 +101,7 @@ void class_ask(class_room *room) {
     }
     if (!open || poll(polls, room->count, (int)(1e3 * left_s) + 1) < 0) break;
     for (uint32_t i = 0; i < room->count; ++i)
-      if (polls[i].fd >= 0 && polls[i].revents) advance(&all[i], room->learner[i].port);
+      if (polls[i].fd >= 0 && polls[i].revents) advance(&all[i], &room->learner[i]);
   }
   for (uint32_t i = 0; i < room->count; ++i) {
     if (all[i].poll.fd >= 0) finish(&all[i]);

@@ -23,7 +23,8 @@ static const char HELP[] =
     "\n"
     "Starts `sonde run` for each of N learners, each with a page of its own, and shows how they\n"
     "are doing. A program that dies is started again, three times at most. Open a learner's\n"
-    "address in a second window to watch. Ctrl-C ends them all.\n"
+    "address in a second window to watch. An address has a secret: whoever has it can take part.\n"
+    "Ctrl-C ends them all.\n"
     "\n"
     "  --learners N    how many (1 to 16); default: as many as names\n"
     "  --names A,B,C   what to call them; default: Learner 1, Learner 2, ...\n"
@@ -173,24 +174,24 @@ static void cell(const char *text, int width) {
   printf("%.*s%*s ", (int)(p - text), text, width - used, "");
 }
 
-static void draw_row(const char *name, const char *address, const char *state, const char *patient,
+static void draw_row(const char *name, const char *port, const char *state, const char *patient,
                      const char *elapsed, const char *score) {
-  cell(name, 15); // 79 characters in all: a line that wraps would spoil the table
-  cell(address, 23);
+  cell(name, 20); // 79 characters in all: a line that wraps would spoil the table
+  cell(port, 6);
   cell(state, 10);
-  cell(patient, 15);
+  cell(patient, 27);
   printf("%6.6s %5.5s\n", elapsed, score);
 }
 
 static void draw(const class_room *room) {
   wipe();
-  draw_row("learner", "address", "state", "case", "time", "score");
+  draw_row("learner", "port", "state", "case", "time", "score");
   for (uint32_t i = 0; i < room->count; ++i) {
     const class_learner *learner = &room->learner[i];
-    char address[32], elapsed[16], score[16];
-    snprintf(address, sizeof address, "http://127.0.0.1:%u/", (unsigned)learner->port);
+    char port[8], elapsed[16], score[16];
+    snprintf(port, sizeof port, "%u", (unsigned)learner->port);
     numbers_of(&learner->status, elapsed, score);
-    draw_row(learner->name, address, state_of(learner),
+    draw_row(learner->name, port, state_of(learner),
              learner->status.patient[0] ? learner->status.patient : "-", elapsed, score);
   }
   screen.lines = screen.terminal ? room->count + 1 : 0;
@@ -212,15 +213,33 @@ static void tell_changes(const class_room *room, char told[CLASS_LEARNERS][128])
 
 // ---- a class
 
+// A learner keeps the token when the program is started again, and so the page finds it.
+static int make_tokens(class_room *room) {
+  for (uint32_t i = 0; i < room->count; ++i) {
+    sonde_error error = {0};
+    if (sonde_page_token_make(room->learner[i].token, &error)) return app_fail(VERB, &error);
+  }
+  return APP_OK;
+}
+
+static void print_addresses(const class_room *room) {
+  printf("%u learners. Open an address in a second window to watch. Ctrl-C ends them all.\n",
+         room->count);
+  for (uint32_t i = 0; i < room->count; ++i)
+    printf("%s: http://127.0.0.1:%u/#%s\n", room->learner[i].name, (unsigned)room->learner[i].port,
+           room->learner[i].token);
+}
+
 static int run_class(class_room *room) {
   static char told[CLASS_LEARNERS][128];
   double ask_s = 0;
   bool alive = true;
   app_catch_interrupt();
   screen.terminal = isatty(STDOUT_FILENO) == 1;
+  int code = make_tokens(room);
+  if (code != APP_OK) return code;
   for (uint32_t i = 0; i < room->count; ++i) class_start(room, &room->learner[i], say);
-  printf("%u learners; open an address in a second window to watch. Ctrl-C ends them all.\n",
-         room->count);
+  print_addresses(room);
   draw(room);
   while (!app_interrupted() && alive) {
     alive = class_watch(room, say);

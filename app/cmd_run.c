@@ -247,8 +247,9 @@ static void sleep_s(double seconds) {
   nanosleep(&pause, NULL);
 }
 
-static void announce(uint16_t port) {
-  printf("Sonde is running: http://127.0.0.1:%u/  (Ctrl-C stops)\n", (unsigned)port);
+// Whoever reads the address controls the page.
+static void announce(const char *address) {
+  printf("Sonde is running: %s  (Ctrl-C stops)\n", address);
   fflush(stdout);
 }
 
@@ -264,7 +265,9 @@ static sonde_status run_page(const settings *s, const sonde_session_def *session
   if (status) return status;
   status = sonde_session_start(session, error);
   if (!status) {
-    announce(sonde_page_port(server));
+    char address[SONDE_PAGE_ADDRESS];
+    sonde_page_address(server, address);
+    announce(address);
     while (!app_interrupted()) sleep_s(0.1);
   }
   sonde_page_stop(server);
@@ -310,7 +313,9 @@ static sonde_status run_desk(const settings *s, const sonde_model *model,
   sonde_status status = run_device_site(&s->device, model, &def.start, error);
   if (!status) status = desk_create(&def, &d, error);
   if (status) return status;
-  announce(desk_port(d));
+  char address[SONDE_PAGE_ADDRESS];
+  desk_address(d, address);
+  announce(address);
   while (!app_interrupted()) {
     desk_turn(d);
     sleep_s(0.01);

@@ -7,6 +7,7 @@
 // create_*                parts of a desk, in this order
 // desk_create, desk_turn, desk_destroy
 #include "desk_parts.h"
+#include "page_token.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -243,14 +244,18 @@ static sonde_status create_probes(desk *d, sonde_error *error) {
 }
 
 static sonde_status create_page(desk *d, sonde_error *error) {
+  char token[SONDE_PAGE_TOKEN];
+  sonde_status status = page_token_find(d->exams, "page.token", "SONDE_PAGE_TOKEN", token, error);
+  if (status) return status;
   sonde_page_def page = {.port = d->def.port,
+                         .token = token,
                          .model_path = d->def.model_path,
                          .force_limit_n = d->def.force_limit_n,
                          .exams_directory = d->exams,
                          .user = d,
                          .observe = watch,
                          .request = take_request};
-  sonde_status status = sonde_page_start(&page, d->session, &d->server, error);
+  status = sonde_page_start(&page, d->session, &d->server, error);
   if (status) return status;
   desk_recover(d);
   desk_tell_greeting(d);
@@ -279,7 +284,9 @@ sonde_status desk_create(const desk_def *def, desk **out, sonde_error *error) {
   return status;
 }
 
-uint16_t desk_port(const desk *d) { return sonde_page_port(d->server); }
+void desk_address(const desk *d, char address[SONDE_PAGE_ADDRESS]) {
+  sonde_page_address(d->server, address);
+}
 
 sonde_status desk_destroy(desk *d, sonde_error *error) {
   if (!d) return SONDE_OK;

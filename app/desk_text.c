@@ -40,6 +40,13 @@ static void publish(desk *d, sonde_page_topic topic, cJSON *root) {
   cJSON_Delete(root);
 }
 
+// The address of an exam's report, with the key that opens it.
+static void link_report(const desk *d, const char *id, char link[SONDE_PAGE_LINK]) {
+  char path[SONDE_LOG_TEXT + 16];
+  snprintf(path, sizeof path, "/report/%s", id);
+  sonde_page_link(d->server, path, link);
+}
+
 // ---- hello
 
 static const char *level_name(sonde_case_level level) {
@@ -176,13 +183,13 @@ static void add_presses(cJSON *root, const desk_exam *exam) {
   }
 }
 
-static void add_result(cJSON *root, const desk_exam *exam) {
+static void add_result(cJSON *root, const desk *d, const desk_exam *exam) {
   if (!exam->scored) {
     cJSON_AddNullToObject(root, "result");
     return;
   }
-  char report[96];
-  snprintf(report, sizeof report, "/report/%s", exam->id);
+  char report[SONDE_PAGE_LINK];
+  link_report(d, exam->id, report);
   cJSON *result = cJSON_AddObjectToObject(root, "result");
   add_real(result, "score", exam->score.score, 0.1);
   cJSON_AddBoolToObject(result, "passed", exam->score.passed);
@@ -212,7 +219,7 @@ static void add_exam(cJSON *root, const desk *d, const desk_exam *exam) {
   add_compression(root, exam, full || hinted);
   add_segments(root, exam);
   add_presses(root, exam);
-  add_result(root, exam);
+  add_result(root, d, exam);
 }
 
 // The same keys when there is no exam.
@@ -272,8 +279,8 @@ void desk_tell_exam(desk *d) {
 // ---- kept exams
 
 static cJSON *kept(const desk *d, const sonde_log_entry *entry) {
-  char report[SONDE_LOG_TEXT + 16];
-  snprintf(report, sizeof report, "/report/%s", entry->id);
+  char report[SONDE_PAGE_LINK];
+  link_report(d, entry->id, report);
   cJSON *item = cJSON_CreateObject();
   cJSON_AddStringToObject(item, "id", entry->id);
   cJSON_AddStringToObject(item, "trainee", entry->trainee);

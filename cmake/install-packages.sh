@@ -22,7 +22,6 @@ build_packages() {
   need_command cmake cmake
   need_command ninja ninja-build
   need_command pkg-config pkg-config
-  need_library - libcivetweb-dev # ships no .pc file
   need_library libcjson libcjson-dev
   need_library libpng libpng-dev
   need_library sqlite3 libsqlite3-dev

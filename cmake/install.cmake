@@ -13,7 +13,7 @@ configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/sondeConfig.cmake.in
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/sondeConfigVersion.cmake
   COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/sondeConfig.cmake ${PROJECT_BINARY_DIR}/sondeConfigVersion.cmake
-  ${PROJECT_SOURCE_DIR}/cmake/FindCivetWeb.cmake DESTINATION ${package_dir})
+  DESTINATION ${package_dir})
 # Relative to the .pc file, so that the tree may be moved.
 file(RELATIVE_PATH SONDE_PREFIX_FROM_PC
   ${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig ${CMAKE_INSTALL_PREFIX})

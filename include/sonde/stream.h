@@ -13,6 +13,17 @@ extern "C" {
 
 typedef struct sonde_page_server sonde_page_server;
 
+enum {
+  SONDE_PAGE_TOKEN = 33,   /**< bytes of a token with its end: 128 bits in hexadecimal */
+  SONDE_PAGE_ADDRESS = 64, /**< bytes of a page's address with its end */
+  SONDE_PAGE_LINK = 208    /**< bytes of a link with its end */
+};
+
+/** A new token from the kernel's random numbers. @return IO when there are none @thread any */
+SONDE_API sonde_status sonde_page_token_make(char token[SONDE_PAGE_TOKEN], sonde_error *error);
+/** Whether a text has the form of a token: 32 digits from 0-9a-f. NULL: false. @thread any */
+SONDE_API bool sonde_page_token_valid(const char *token);
+
 /** What the page asks of the program beside probe and scanner (docs/page_protocol.md). */
 typedef enum sonde_page_ask {
   SONDE_PAGE_START_EXAM, /**< id (case), protocol, guidance, name (trainee) */
@@ -48,6 +59,7 @@ typedef enum sonde_page_topic {
 
 typedef struct sonde_page_def {
   uint16_t port;               /**< 0: any free port */
+  const char *token;           /**< secret of the address; NULL: a new one */
   const char *data_directory;  /**< serve the page from here instead of memory (development) */
   const char *model_path;      /**< for recordings and titles; may be NULL */
   double force_limit_n;        /**< shown on the page; 0: sonde_safety_limits_default() */
@@ -63,7 +75,9 @@ typedef struct sonde_page_def {
 
 /** Serves the embedded page and one WebSocket (/ws) for a session: sends model, frames and images
  *  (latest frame wins, acknowledged by the client), takes probe goals and controls.
- *  Binds to 127.0.0.1 and checks Origin. @return SONDE_PORT when the port is in use */
+ *  Binds to 127.0.0.1 and checks Origin. Anyone may load the page itself; data and the WebSocket
+ *  are for who knows the token of its address (docs/page_protocol.md).
+ *  @return PORT when the port is in use, ARGUMENT for a token of another form */
 SONDE_API sonde_status sonde_page_start(const sonde_page_def *def, sonde_session *session,
                                         sonde_page_server **server, sonde_error *error);
 /** Shows another session from now on: every client gets its thigh. After the return the server does
@@ -88,6 +102,13 @@ SONDE_API sonde_status sonde_page_publish(sonde_page_server *server, sonde_page_
 SONDE_API void sonde_page_conceal(sonde_page_server *server, bool pathology, bool areas);
 /** A sentence for all clients. @thread any */
 SONDE_API void sonde_page_tell(sonde_page_server *server, const char *sentence);
+/** The address to open, with the token; who reads it controls the page. @thread any */
+SONDE_API void sonde_page_address(const sonde_page_server *server,
+                                  char address[SONDE_PAGE_ADDRESS]);
+/** The address of a document ("/report/ID", "/exam/ID.csv") with a key that opens this document
+ *  and nothing else, relative to the page's. @param path less than 160 characters @thread any */
+SONDE_API void sonde_page_link(const sonde_page_server *server, const char *path,
+                               char link[SONDE_PAGE_LINK]);
 SONDE_API uint16_t sonde_page_port(const sonde_page_server *server);
 SONDE_API uint32_t sonde_page_clients(const sonde_page_server *server);
 /** Closes all connections and joins the threads. */

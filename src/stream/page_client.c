@@ -1,24 +1,22 @@
-// One WebSocket client: what it may say, and its sender.
+// One WebSocket client: what it may say, and what it is told.
 //
 // page_client_controls, page_client_wants_frame   its role and its room for a frame
-// find, claim, let_go       slots; a slot is found by its connection
 // take_token                the rate limit
 // acknowledge               a frame reached the screen
-// next_job, do_job, run     the sender: one message at a time, the socket never under the lock
-// page_client_*             civetweb's WebSocket handlers
+// greet, send_geometry, take_frame, do_job   one message each
+// page_client_join, page_client_leave        slots
+// page_client_next, page_client_hear         what goes out, what comes in
 #include "stream/page_server.h"
 
 #include "base/clock.h"
 
 #include <string.h>
 
-enum { WS_TEXT = 1, WS_BINARY = 2, WS_CLOSE = 8 };
-
 bool page_client_controls(const page_client *client) {
   const sonde_page_server *server = client->server;
   for (int i = 0; i < PAGE_CLIENTS; ++i) {
     const page_client *other = &server->client[i];
-    if (other->connection && other->joined < client->joined) return false;
+    if (other->here && other->joined < client->joined) return false;
   }
   return true;
 }
@@ -28,7 +26,7 @@ bool page_client_greeted(const page_client *client) {
 }
 
 bool page_client_wants_frame(const page_client *client) {
-  return client->connection && page_client_greeted(client) && !client->leaving &&
+  return client->here && page_client_greeted(client) && !client->leaving &&
          client->sent[PAGE_IN_FLIGHT - 1] <= client->acked;
 }
 
@@ -44,12 +42,6 @@ bool page_buffer_reserve(page_buffer *buffer, size_t capacity) {
 void page_client_note(page_client *client, const char *sentence) {
   snprintf(client->note, sizeof client->note, "%.*s", (int)sizeof client->note - 1, sentence);
   client->note_due = true;
-}
-
-static page_client *find(sonde_page_server *server, const struct mg_connection *connection) {
-  for (int i = 0; i < PAGE_CLIENTS; ++i)
-    if (server->client[i].connection == connection) return &server->client[i];
-  return NULL;
 }
 
 // Messages come from a bucket that refills at PAGE_RATE_PER_S.
@@ -70,6 +62,7 @@ static void acknowledge(page_client *client, uint32_t sequence) {
 typedef enum job {
   JOB_NONE,
   JOB_GREET,
+  JOB_GEOMETRY,
   JOB_CONTROLS,
   JOB_TOPIC,
   JOB_NOTE,
@@ -88,6 +81,7 @@ static int due_topic(const page_client *client) {
 static job next_job(const page_client *client) {
   const sonde_page_server *server = client->server;
   if (!page_client_greeted(client)) return JOB_GREET;
+  if (client->scene && client->scene_next < client->scene->message_count) return JOB_GEOMETRY;
   if (client->told_serial != server->controls_serial ||
       client->told_control != page_client_controls(client))
     return JOB_CONTROLS;
@@ -100,23 +94,32 @@ static job next_job(const page_client *client) {
   return JOB_NONE;
 }
 
-static bool send_message(page_client *client, int opcode, const void *bytes, size_t size) {
-  SONDE_ASSERT(client->connection);
-  return mg_websocket_write(client->connection, opcode, bytes, size) > 0;
+void page_out_frame(page_out *out, int opcode, const void *body, size_t size, void *owned) {
+  unsigned char head[PAGE_WS_HEAD_BYTES];
+  *out = (page_out){.body = body, .body_size = size, .owned = owned};
+  out->head_size = page_ws_write(head, opcode, size);
+  memcpy(out->head, head, out->head_size);
 }
 
-// Sends and frees the text; false when it could not be built or sent.
-static bool send_text(page_client *client, page_text *text) {
-  bool sent = !text->failed && text->text && send_message(client, WS_TEXT, text->text, text->count);
-  page_text_clear(text);
-  return sent;
+// Hands the text over; false when it could not be built.
+static bool send_text(page_out *out, page_text *text) {
+  bool whole = !text->failed && text->text;
+  if (whole)
+    page_out_frame(out, PAGE_WS_TEXT, text->text, text->count, text->text);
+  else
+    page_text_clear(text);
+  return whole;
 }
 
-// The lock is held only while the hello is written.
-static bool greet(page_client *client) {
+static void drop_scene(page_client *client) {
+  if (client->scene) page_scene_unref(client->scene);
+  client->scene = NULL;
+}
+
+// The hello; the geometry follows, message by message.
+static bool greet(page_client *client, page_out *out) {
   sonde_page_server *server = client->server;
   const page_source *source = &server->source;
-  page_scene *scene = server->scene;
   page_hello hello = {source->model,
                       source->probes,
                       source->probe_count,
@@ -127,14 +130,17 @@ static bool greet(page_client *client) {
   page_write_hello(&text, &hello);
   client->greeted = server->generation;
   client->told_serial = 0;
-  ++scene->references;
-  pthread_mutex_unlock(&server->lock);
-  bool good = send_text(client, &text);
-  for (uint32_t i = 0; good && i < scene->message_count; ++i)
-    good = send_message(client, WS_BINARY, scene->messages[i].bytes, scene->messages[i].size);
-  pthread_mutex_lock(&server->lock);
-  page_scene_unref(scene);
-  return good;
+  drop_scene(client);
+  client->scene = server->scene;
+  client->scene_next = 0;
+  ++client->scene->references;
+  return send_text(out, &text);
+}
+
+static bool send_geometry(page_client *client, page_out *out) {
+  const page_buffer *message = &client->scene->messages[client->scene_next++];
+  page_out_frame(out, PAGE_WS_BINARY, message->bytes, message->size, NULL);
+  return true;
 }
 
 static const char *probe_name(const sonde_page_server *server, uint32_t probe) {
@@ -153,12 +159,19 @@ static bool take_frame(page_client *client) {
   return true;
 }
 
-// Called with the lock held; it is released while the socket is written and held again on return.
-static bool do_job(page_client *client, job what) {
+// Under the lock.
+static bool do_job(page_client *client, job what, page_out *out) {
   sonde_page_server *server = client->server;
   page_text text = {0};
-  if (what == JOB_GREET) return greet(client);
-  bool good = true, controls = page_client_controls(client);
+  if (what == JOB_GREET) return greet(client, out);
+  if (what == JOB_GEOMETRY) return send_geometry(client, out);
+  drop_scene(client); // all of it is sent
+  if (what == JOB_FRAME) {
+    if (!take_frame(client)) return false;
+    page_out_frame(out, PAGE_WS_BINARY, client->out.bytes, client->out.size, NULL);
+    return true;
+  }
+  bool controls = page_client_controls(client);
   if (what == JOB_CONTROLS) {
     page_write_controls(&text, &server->controls, probe_name(server, server->controls.probe),
                         server->hide_case, server->gel_m3, controls);
@@ -171,61 +184,40 @@ static bool do_job(page_client *client, job what) {
   } else if (what == JOB_NOTE) {
     page_write_note(&text, "error", client->note);
     client->note_due = false;
-  } else if (what == JOB_PONG) {
+  } else {
+    SONDE_ASSERT(what == JOB_PONG);
     page_write_pong(&text, client->pong_id);
     client->pong_due = false;
-  } else if (what == JOB_FRAME) {
-    good = take_frame(client);
   }
-  pthread_mutex_unlock(&server->lock);
-  if (what != JOB_FRAME)
-    good = send_text(client, &text);
-  else if (good)
-    good = send_message(client, WS_BINARY, client->out.bytes, client->out.size);
-  pthread_mutex_lock(&server->lock);
-  return good;
+  return send_text(out, &text);
 }
 
-static void *run(void *argument) {
-  page_client *client = argument;
+bool page_client_next(page_client *client, page_out *out) {
   sonde_page_server *server = client->server;
   pthread_mutex_lock(&server->lock);
-  while (!client->leaving && !server->stopping) {
-    job what = next_job(client);
-    if (what == JOB_NONE)
-      pthread_cond_wait(&server->news, &server->lock);
-    else if (!do_job(client, what))
-      client->leaving = true;
+  job what = client->leaving ? JOB_NONE : next_job(client);
+  if (what != JOB_NONE && !do_job(client, what, out)) {
+    client->leaving = true;
+    what = JOB_NONE;
   }
-  bool say_goodbye = server->stopping && !client->leaving;
   pthread_mutex_unlock(&server->lock);
-  static const char GOING_AWAY[2] = {0x03, (char)0xE9}; // status 1001
-  if (say_goodbye) send_message(client, WS_CLOSE, GOING_AWAY, sizeof GOING_AWAY);
-  return NULL;
+  return what != JOB_NONE;
 }
 
-int page_client_connect(const struct mg_connection *connection, void *argument) {
-  sonde_page_server *server = argument;
-  if (!page_origin_allowed(mg_get_header(connection, "Origin"), server->port)) return 1;
+page_client *page_client_join(sonde_page_server *server) {
   pthread_mutex_lock(&server->lock);
-  bool full = !find(server, NULL) || server->stopping;
-  pthread_mutex_unlock(&server->lock);
-  return full ? 1 : 0;
-}
-
-void page_client_ready(struct mg_connection *connection, void *argument) {
-  sonde_page_server *server = argument;
-  pthread_mutex_lock(&server->lock);
-  page_client *client = server->stopping ? NULL : find(server, NULL);
+  page_client *client = NULL;
+  for (int i = 0; i < PAGE_CLIENTS && !client; ++i)
+    if (!server->client[i].here) client = &server->client[i];
   if (client) {
     page_buffer kept = client->out; // the buffer serves the next client of the slot
-    *client = (page_client){.server = server, .connection = connection, .out = kept};
+    *client = (page_client){.server = server, .here = true, .out = kept};
     client->joined = ++server->joined;
     client->tokens = PAGE_BURST;
     client->tokens_at_s = sonde_clock_now();
-    if (pthread_create(&client->sender, NULL, run, client) != 0) client->connection = NULL;
   }
   pthread_mutex_unlock(&server->lock);
+  return client;
 }
 
 // Under the lock. @return false to close the connection
@@ -238,7 +230,7 @@ static bool hear(sonde_page_server *server, page_client *client, const char *dat
   sonde_error problem = {0};
   if (page_parse_command(data, size, &command, &problem)) {
     page_client_note(client, problem.message);
-    return size <= PAGE_COMMAND_BYTES;
+    return true;
   }
   if (command.type == PAGE_COMMAND_ACK) {
     acknowledge(client, command.id);
@@ -251,32 +243,18 @@ static bool hear(sonde_page_server *server, page_client *client, const char *dat
   return true;
 }
 
-int page_client_data(struct mg_connection *connection, int bits, char *data, size_t size,
-                     void *argument) {
-  sonde_page_server *server = argument;
-  int opcode = bits & 0x0f;
-  if (opcode >= WS_CLOSE) return opcode == WS_CLOSE ? 0 : 1; // ping and pong: civetweb answers
-  bool whole = (bits & 0x80) != 0;
+bool page_client_hear(page_client *client, const char *data, size_t size) {
+  sonde_page_server *server = client->server;
   pthread_mutex_lock(&server->lock);
-  page_client *client = find(server, connection);
-  bool keep =
-      client && !client->leaving && whole && opcode == WS_TEXT && hear(server, client, data, size);
-  pthread_cond_broadcast(&server->news);
+  bool keep = !client->leaving && hear(server, client, data, size);
   pthread_mutex_unlock(&server->lock);
-  return keep ? 1 : 0;
+  return keep;
 }
 
-void page_client_close(const struct mg_connection *connection, void *argument) {
-  sonde_page_server *server = argument;
+void page_client_leave(page_client *client) {
+  sonde_page_server *server = client->server;
   pthread_mutex_lock(&server->lock);
-  page_client *client = find(server, connection);
-  if (client) client->leaving = true;
-  pthread_cond_broadcast(&server->news);
-  pthread_mutex_unlock(&server->lock);
-  if (!client) return;
-  pthread_join(client->sender, NULL); // the connection is invalid after this handler
-  pthread_mutex_lock(&server->lock);
-  client->connection = NULL;
-  pthread_cond_broadcast(&server->news); // the next one may control now
+  drop_scene(client);
+  client->here = false;
   pthread_mutex_unlock(&server->lock);
 }

@@ -1,17 +1,19 @@
-// The HTTP side: loopback names only, the page, the exams, strict headers.
+// The HTTP side: loopback names only, the page for everyone, everything else for who has the token.
 //
 // is_local            "127.0.0.1" or "localhost" followed by our port
 // send_head           status line and security headers
 // send_refusal        a short text answer
 // send_file           a built-in file, or one from the development directory
+// knows_token, knows_key   who may have what
 // read_id, send_document, answer_document   report and data of an exam
 // send_status         what the program says of itself
-// page_http_request   everything but the WebSocket
+// offers, upgrade     the WebSocket's handshake
+// page_http_answer    a request
 #include "stream/page_data.h"
 #include "stream/page_server.h"
 
-#include <inttypes.h>
 #include <string.h>
+#include <strings.h>
 
 // host[:port]; the port may be missing only when it is the default of HTTP.
 static bool is_local(const char *authority, uint16_t port) {
@@ -38,55 +40,99 @@ static const char PAGE_POLICY[] =
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
     "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-static void send_head(struct mg_connection *connection, int code, const char *reason,
-                      const char *type, size_t size, bool gzip, const char *policy) {
-  mg_printf(connection,
-            "HTTP/1.1 %d %s\r\n"
-            "Content-Type: %s\r\n"
-            "Content-Length: %zu\r\n"
-            "%s"
-            "Cache-Control: no-store\r\n"
-            "Content-Security-Policy: %s\r\n"
-            "X-Content-Type-Options: nosniff\r\n"
-            "Referrer-Policy: no-referrer\r\n"
-            "Cross-Origin-Resource-Policy: same-origin\r\n"
-            "Cross-Origin-Opener-Policy: same-origin\r\n"
-            "Connection: close\r\n\r\n",
-            code, reason, type, size, gzip ? "Content-Encoding: gzip\r\n" : "", policy);
+// Body of an answer. `policy` NULL: the page's own; `owned` is freed when all is sent, NULL:
+// nothing.
+typedef struct page_body {
+  const char *type, *policy;
+  const void *bytes;
+  size_t size;
+  void *owned;
+  bool gzip;
+} page_body;
+
+static void send_head(page_out *out, int code, const char *reason, const page_body *body) {
+  int size =
+      snprintf(out->head, sizeof out->head,
+               "HTTP/1.1 %d %s\r\n"
+               "Content-Type: %s\r\n"
+               "Content-Length: %zu\r\n"
+               "%s"
+               "Cache-Control: no-store\r\n"
+               "Content-Security-Policy: %s\r\n"
+               "X-Content-Type-Options: nosniff\r\n"
+               "Referrer-Policy: no-referrer\r\n"
+               "Cross-Origin-Resource-Policy: same-origin\r\n"
+               "Cross-Origin-Opener-Policy: same-origin\r\n"
+               "Connection: close\r\n\r\n",
+               code, reason, body->type, body->size, body->gzip ? "Content-Encoding: gzip\r\n" : "",
+               body->policy ? body->policy : PAGE_POLICY);
+  SONDE_ASSERT(size > 0 && (size_t)size < sizeof out->head);
+  out->head_size = (size_t)size;
+  out->body = body->bytes;
+  out->body_size = body->size;
+  out->owned = body->owned;
+  out->done = 0;
 }
 
-static int send_refusal(struct mg_connection *connection, int code, const char *reason,
-                        const char *sentence) {
-  send_head(connection, code, reason, "text/plain; charset=utf-8", strlen(sentence), false,
-            PAGE_POLICY);
-  mg_write(connection, sentence, strlen(sentence));
-  return code;
+static void send_refusal(page_out *out, int code, const char *reason, const char *sentence) {
+  send_head(out, code, reason,
+            &(page_body){
+                .type = "text/plain; charset=utf-8", .bytes = sentence, .size = strlen(sentence)});
 }
 
-static int send_bytes(struct mg_connection *connection, const page_file *file, const void *bytes,
-                      size_t size, bool gzip) {
-  send_head(connection, 200, "OK", file->type, size, gzip, PAGE_POLICY);
-  if (strcmp(mg_get_request_info(connection)->request_method, "HEAD") != 0)
-    mg_write(connection, bytes, size);
-  return 200;
+void page_http_refuse(page_out *out, int code) {
+  const char *reason = code == 431   ? "Request Header Fields Too Large"
+                       : code == 414 ? "URI Too Long"
+                       : code == 505 ? "HTTP Version Not Supported"
+                                     : "Bad Request";
+  send_refusal(out, code, reason, "this is not a request that the page makes\n");
 }
 
 // `file` names one of the built-in files, so no request can reach outside of the directory.
-static int send_file(const sonde_page_server *server, struct mg_connection *connection,
-                     const page_file *file) {
-  if (!server->data_directory[0] && !file->bytes)
-    return send_refusal(connection, 404, "Not Found", "this build has no page\n");
-  if (!server->data_directory[0])
-    return send_bytes(connection, file, file->bytes, file->size, file->gzip);
-  char path[640], *bytes = NULL;
-  size_t size = 0;
-  snprintf(path, sizeof path, "%s/%s", server->data_directory, file->name);
-  if (sonde_file_load(path, &bytes, &size, NULL))
-    return send_refusal(connection, 404, "Not Found", "the file is not in the page's directory\n");
-  int code = send_bytes(connection, file, bytes, size, false);
-  sonde_free(bytes);
-  return code;
+static void send_file(const sonde_page_server *server, const page_file *file, page_out *out) {
+  page_body body = {
+      .type = file->type, .bytes = file->bytes, .size = file->size, .gzip = file->gzip};
+  if (!server->data_directory[0] && !file->bytes) {
+    send_refusal(out, 404, "Not Found", "this build has no page\n");
+    return;
+  }
+  if (server->data_directory[0]) {
+    char path[640], *bytes = NULL;
+    snprintf(path, sizeof path, "%s/%s", server->data_directory, file->name);
+    if (sonde_file_load(path, &bytes, &body.size, NULL)) {
+      send_refusal(out, 404, "Not Found", "the file is not in the page's directory\n");
+      return;
+    }
+    body.bytes = body.owned = bytes;
+    body.gzip = false;
+  }
+  send_head(out, 200, "OK", &body);
 }
+
+// ---- who may have what
+
+static bool knows_token(const sonde_page_server *server, const page_request *request) {
+  static const char SCHEME[] = "Bearer ";
+  const char *field = request->field[PAGE_AUTHORIZATION];
+  if (strncasecmp(field, SCHEME, sizeof SCHEME - 1) != 0) return false;
+  return page_secret_equal(server->token, field + sizeof SCHEME - 1);
+}
+
+// The address of a document says its own key, so that it opens in another tab and opens nothing
+// else.
+static bool knows_key(const sonde_page_server *server, const page_request *request) {
+  char given[64], key[PAGE_SECRET_TEXT];
+  if (!page_request_parameter(request, "key", given, sizeof given)) return false;
+  page_document_key(server->token, request->path, key);
+  return page_secret_equal(key, given);
+}
+
+static void send_stranger(page_out *out) {
+  send_refusal(out, 401, "Unauthorized",
+               "open the address that the program printed: it has the token that this asks for\n");
+}
+
+// ---- exams
 
 // Scripts stay forbidden in a report; its style is its own.
 static const char REPORT_POLICY[] =
@@ -100,8 +146,8 @@ typedef struct exam_document {
 
 static const exam_document DOCUMENTS[] = {
     {"/report/", "", "report.html", "text/html; charset=utf-8", REPORT_POLICY},
-    {"/exam/", ".json", "exam.json", "application/json", PAGE_POLICY},
-    {"/exam/", ".csv", "exam.csv", "text/csv; charset=utf-8", PAGE_POLICY},
+    {"/exam/", ".json", "exam.json", "application/json", NULL},
+    {"/exam/", ".csv", "exam.csv", "text/csv; charset=utf-8", NULL},
 };
 
 // An id is lower-case letters, digits and '-', so that it names one directory and nothing else.
@@ -114,39 +160,50 @@ static bool read_id(const char *uri, const exam_document *document, char *id, si
   return strspn(id, "abcdefghijklmnopqrstuvwxyz0123456789-") == strlen(id);
 }
 
-static int send_document(const sonde_page_server *server, struct mg_connection *connection,
-                         const exam_document *document, const char *id) {
+static void send_document(const sonde_page_server *server, const exam_document *document,
+                          const char *id, page_out *out) {
   char path[640], *bytes = NULL;
   size_t size = 0;
   snprintf(path, sizeof path, "%s/%s/%s", server->exams_directory, id, document->name);
-  if (sonde_file_load(path, &bytes, &size, NULL))
-    return send_refusal(connection, 404, "Not Found", "there is no such exam\n");
-  send_head(connection, 200, "OK", document->type, size, false, document->policy);
-  if (strcmp(mg_get_request_info(connection)->request_method, "HEAD") != 0)
-    mg_write(connection, bytes, size);
-  sonde_free(bytes);
-  return 200;
+  if (sonde_file_load(path, &bytes, &size, NULL)) {
+    send_refusal(out, 404, "Not Found", "there is no such exam\n");
+    return;
+  }
+  send_head(out, 200, "OK",
+            &(page_body){.type = document->type,
+                         .policy = document->policy,
+                         .bytes = bytes,
+                         .size = size,
+                         .owned = bytes});
 }
 
-// 0 when the address is not one of an exam.
-static int answer_document(const sonde_page_server *server, struct mg_connection *connection,
-                           const char *uri) {
+// False when the address is not one of an exam.
+static bool answer_document(const sonde_page_server *server, const page_request *request,
+                            page_out *out) {
   char id[64];
-  for (size_t i = 0; server->exams_directory[0] && i < SONDE_COUNT_OF(DOCUMENTS); ++i)
-    if (read_id(uri, &DOCUMENTS[i], id, sizeof id))
-      return send_document(server, connection, &DOCUMENTS[i], id);
-  return 0;
+  for (size_t i = 0; server->exams_directory[0] && i < SONDE_COUNT_OF(DOCUMENTS); ++i) {
+    if (!read_id(request->path, &DOCUMENTS[i], id, sizeof id)) continue;
+    if (knows_token(server, request) || knows_key(server, request))
+      send_document(server, &DOCUMENTS[i], id, out);
+    else
+      send_stranger(out);
+    return true;
+  }
+  return false;
 }
 
-static int send_status(sonde_page_server *server, struct mg_connection *connection) {
-  char text[1024];
+static void send_status(sonde_page_server *server, page_out *out) {
   pthread_mutex_lock(&server->lock);
   const char *newest = server->topic[SONDE_PAGE_STATUS].text;
-  snprintf(text, sizeof text, "%s", newest ? newest : "{}");
+  size_t size = newest ? strlen(newest) : 2;
+  char *text = SONDE_NEW(char, size);
+  if (text) memcpy(text, newest ? newest : "{}", size);
   pthread_mutex_unlock(&server->lock);
-  send_head(connection, 200, "OK", "application/json", strlen(text), false, PAGE_POLICY);
-  mg_write(connection, text, strlen(text));
-  return 200;
+  if (!text)
+    send_refusal(out, 503, "Service Unavailable", "out of memory\n");
+  else
+    send_head(out, 200, "OK",
+              &(page_body){.type = "application/json", .bytes = text, .size = size, .owned = text});
 }
 
 static const page_file *find_file(const char *uri) {
@@ -159,28 +216,85 @@ static const page_file *find_file(const char *uri) {
   return NULL;
 }
 
-int page_http_request(struct mg_connection *connection) {
-  const struct mg_request_info *request = mg_get_request_info(connection);
-  sonde_page_server *server = request->user_data;
-  const char *uri = request->local_uri;
-  SONDE_ASSERT(server && uri && request->request_method);
-  if (!page_host_allowed(mg_get_header(connection, "Host"), server->port))
-    return send_refusal(connection, 403, "Forbidden",
-                        "this server answers only to 127.0.0.1 and localhost\n");
-  if (strcmp(uri, "/ws") == 0) {
-    if (mg_get_header(connection, "Upgrade")) return 0; // on to the WebSocket handlers
-    return send_refusal(connection, 426, "Upgrade Required", "/ws is a WebSocket\n");
+// ---- the WebSocket
+
+// The token is one of the subprotocols that the client offers: a browser cannot send it in another
+// field, and an address would be written down. Every offer is compared, whatever came before.
+static bool offers(const sonde_page_server *server, const char *list) {
+  bool known = false;
+  for (const char *p = list; *p;) {
+    size_t count = strcspn(p, ", ");
+    char word[PAGE_FIELD_TEXT];
+    snprintf(word, sizeof word, "%.*s", (int)count, p);
+    if (page_secret_equal(server->token, word)) known = true;
+    p += count + strspn(p + count, ", ");
   }
-  if (strcmp(request->request_method, "GET") != 0 && strcmp(request->request_method, "HEAD") != 0)
-    return send_refusal(connection, 405, "Method Not Allowed", "only GET and HEAD\n");
-  if (strcmp(uri, "/favicon.ico") == 0) {
-    send_head(connection, 204, "No Content", "image/x-icon", 0, false, PAGE_POLICY);
-    return 204;
+  return known;
+}
+
+static void upgrade(sonde_page_server *server, const page_request *request, page_out *out,
+                    page_client **client) {
+  const char *origin = request->given[PAGE_ORIGIN] ? request->field[PAGE_ORIGIN] : NULL;
+  const char *key = request->field[PAGE_WS_KEY];
+  if (!page_origin_allowed(origin, server->port)) {
+    send_refusal(out, 403, "Forbidden", "only this server's own page may connect\n");
+  } else if (!offers(server, request->field[PAGE_WS_PROTOCOL])) {
+    send_stranger(out);
+  } else if (strcasecmp(request->field[PAGE_UPGRADE], "websocket") != 0 || strlen(key) != 24 ||
+             strcmp(request->field[PAGE_WS_VERSION], "13") != 0) {
+    page_http_refuse(out, 400);
+  } else if (!(*client = page_client_join(server))) {
+    send_refusal(out, 503, "Service Unavailable", "no more pages can connect\n");
+  } else {
+    char accept[PAGE_ACCEPT_TEXT];
+    page_accept_key(key, accept);
+    int size = snprintf(out->head, sizeof out->head,
+                        "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\n"
+                        "Connection: Upgrade\r\nSec-WebSocket-Accept: %s\r\n"
+                        "Sec-WebSocket-Protocol: sonde\r\n\r\n",
+                        accept);
+    out->head_size = (size_t)size;
   }
-  if (strcmp(uri, "/status.json") == 0) return send_status(server, connection);
-  int answered = answer_document(server, connection, uri);
-  if (answered) return answered;
-  const page_file *file = find_file(uri);
-  if (!file) return send_refusal(connection, 404, "Not Found", "there is no such file\n");
-  return send_file(server, connection, file);
+}
+
+// ---- a request
+
+static void answer(sonde_page_server *server, const page_request *request, page_out *out,
+                   page_client **client) {
+  if (!page_host_allowed(request->field[PAGE_HOST], server->port)) {
+    send_refusal(out, 403, "Forbidden", "this server answers only to 127.0.0.1 and localhost\n");
+  } else if (strcmp(request->method, "GET") != 0 && strcmp(request->method, "HEAD") != 0) {
+    send_refusal(out, 405, "Method Not Allowed", "only GET and HEAD\n");
+  } else if (strcmp(request->path, "/ws") == 0) {
+    if (request->given[PAGE_UPGRADE])
+      upgrade(server, request, out, client);
+    else
+      send_refusal(out, 426, "Upgrade Required", "/ws is a WebSocket\n");
+  } else if (strcmp(request->path, "/favicon.ico") == 0) {
+    send_head(out, 204, "No Content", &(page_body){.type = "image/x-icon"});
+  } else if (strcmp(request->path, "/status.json") == 0) {
+    if (knows_token(server, request))
+      send_status(server, out);
+    else
+      send_stranger(out);
+  } else if (!answer_document(server, request, out)) {
+    const page_file *file = find_file(request->path);
+    if (file)
+      send_file(server, file, out);
+    else
+      send_refusal(out, 404, "Not Found", "there is no such file\n");
+  }
+}
+
+void page_http_answer(sonde_page_server *server, const char *head, size_t size, page_out *out,
+                      page_client **client) {
+  page_request request;
+  SONDE_ASSERT(server && head && out && client && !*client);
+  *out = (page_out){0};
+  int refused = page_request_parse(head, size, &request);
+  if (refused)
+    page_http_refuse(out, refused);
+  else
+    answer(server, &request, out, client);
+  if (strcmp(request.method, "HEAD") == 0 && !*client) out->body_size = 0;
 }

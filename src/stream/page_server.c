@@ -4,8 +4,6 @@
 // publish_frame          a frame -> encoded -> `latest`
 // pump_once, pump_run    newest frame of the source, observed and published
 // apply_*                what a command changes
-// bind_problem           why a port cannot be opened, in words
-// start_http             civetweb on the loopback address
 // page_server_show       another source; sonde_page_show_model: one without a session
 // sonde_page_post, sonde_page_publish, sonde_page_tell   frames and texts of the program
 // page_server_start, sonde_page_stop
@@ -13,11 +11,8 @@
 
 #include "base/clock.h"
 
-#include <arpa/inet.h>
-#include <errno.h>
 #include <math.h>
 #include <string.h>
-#include <unistd.h>
 
 static bool anyone_waits(sonde_page_server *server) {
   bool waits = false;
@@ -57,7 +52,7 @@ static bool publish_frame(sonde_page_server *server, const sonde_frame *whole) {
   *spare = server->latest;
   server->latest = newest;
   ++server->sequence;
-  pthread_cond_broadcast(&server->news);
+  page_wake(server);
   pthread_mutex_unlock(&server->lock);
   return true;
 }
@@ -176,79 +171,6 @@ static void release_model(void *self) {
   sonde_free(self);
 }
 
-// errno of an attempt to open the port, 0 when it works.
-static int bind_problem(uint16_t port) {
-  struct sockaddr_in address = {.sin_family = AF_INET, .sin_port = htons(port)};
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  int probe = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  if (probe < 0) return errno;
-  int reuse = 1, problem = 0;
-  setsockopt(probe, SOL_SOCKET, SO_REUSEADDR, &reuse, sizeof reuse);
-  if (bind(probe, (struct sockaddr *)&address, sizeof address) != 0 || listen(probe, 1) != 0)
-    problem = errno;
-  close(probe);
-  return problem;
-}
-
-static sonde_status port_failure(uint16_t port, sonde_error *error) {
-  int problem = bind_problem(port);
-  if (problem == EADDRINUSE)
-    return sonde_fail(error, SONDE_PORT,
-                      "port %u on 127.0.0.1 is in use by another program; expected a free port, "
-                      "or 0 for any free one",
-                      (unsigned)port);
-  if (problem)
-    return sonde_fail(error, SONDE_PORT, "port %u on 127.0.0.1 cannot be opened: %s",
-                      (unsigned)port, strerror(problem));
-  return sonde_fail(error, SONDE_PORT, "the page's server could not be started on port %u",
-                    (unsigned)port);
-}
-
-static int swallow_message(const struct mg_connection *connection, const char *message) {
-  (void)connection;
-  (void)message;
-  return 1; // the library never prints; what matters is told by port_failure()
-}
-
-static void initialise_civetweb(void) { mg_init_library(0); }
-
-static sonde_status start_http(sonde_page_server *server, uint16_t port, sonde_error *error) {
-  static pthread_once_t once = PTHREAD_ONCE_INIT;
-  pthread_once(&once, initialise_civetweb);
-  char address[32];
-  snprintf(address, sizeof address, "127.0.0.1:%u", (unsigned)port);
-  const char *options[] = {"listening_ports",
-                           address,
-                           "num_threads",
-                           "10",
-                           "request_timeout_ms",
-                           "5000",
-                           "websocket_timeout_ms",
-                           "10000",
-                           "enable_websocket_ping_pong",
-                           "yes",
-                           "enable_keep_alive",
-                           "no",
-                           "enable_directory_listing",
-                           "no",
-                           "tcp_nodelay",
-                           "1",
-                           "access_control_allow_origin",
-                           "",
-                           NULL};
-  struct mg_callbacks callbacks = {.begin_request = page_http_request,
-                                   .log_message = swallow_message};
-  server->http = mg_start(&callbacks, server, options);
-  if (!server->http) return port_failure(port, error);
-  struct mg_server_port opened = {0};
-  int count = mg_get_server_ports(server->http, 1, &opened);
-  SONDE_ASSERT(count == 1 && opened.port > 0);
-  server->port = (uint16_t)opened.port;
-  mg_set_websocket_handler(server->http, "/ws", page_client_connect, page_client_ready,
-                           page_client_data, page_client_close, server);
-  return SONDE_OK;
-}
-
 // The scene is encoded before the locks are taken; a frame of the scene before is never shown with
 // this one.
 sonde_status page_server_show(sonde_page_server *server, const page_source *source,
@@ -265,7 +187,7 @@ sonde_status page_server_show(sonde_page_server *server, const page_source *sour
   server->latest.size = 0;
   if (source->controls_now) server->controls = source->controls_now(source->self);
   ++server->controls_serial;
-  pthread_cond_broadcast(&server->news);
+  page_wake(server);
   pthread_mutex_unlock(&server->lock);
   pthread_mutex_unlock(&server->source_lock);
   if (before.release) before.release(before.self);
@@ -321,7 +243,7 @@ sonde_status sonde_page_publish(sonde_page_server *server, sonde_page_topic topi
     slot->text = copy;
     ++slot->serial;
     copy = before;
-    pthread_cond_broadcast(&server->news);
+    page_wake(server);
   }
   pthread_mutex_unlock(&server->lock);
   sonde_free(copy);
@@ -334,7 +256,7 @@ void sonde_page_conceal(sonde_page_server *server, bool pathology, bool areas) {
   server->hide_case = pathology;
   server->hide_areas = areas;
   ++server->controls_serial;
-  pthread_cond_broadcast(&server->news);
+  page_wake(server);
   pthread_mutex_unlock(&server->lock);
   pthread_mutex_unlock(&server->source_lock);
 }
@@ -342,8 +264,8 @@ void sonde_page_conceal(sonde_page_server *server, bool pathology, bool areas) {
 void sonde_page_tell(sonde_page_server *server, const char *sentence) {
   pthread_mutex_lock(&server->lock);
   for (int i = 0; i < PAGE_CLIENTS; ++i)
-    if (server->client[i].connection) page_client_note(&server->client[i], sentence);
-  pthread_cond_broadcast(&server->news);
+    if (server->client[i].here) page_client_note(&server->client[i], sentence);
+  page_wake(server);
   pthread_mutex_unlock(&server->lock);
 }
 
@@ -354,6 +276,18 @@ static void keep_def(sonde_page_server *server, const sonde_page_def *def) {
   if (def->exams_directory)
     snprintf(server->exams_directory, sizeof server->exams_directory, "%s", def->exams_directory);
   server->def.data_directory = server->def.exams_directory = server->def.model_path = NULL;
+  server->def.token = NULL;
+  server->patience =
+      (page_patience){.ask_s = 10, .answer_s = 30, .end_s = 2, .ping_s = 2, .silent_s = 6};
+}
+
+static sonde_status keep_token(sonde_page_server *server, const char *token, sonde_error *error) {
+  if (!token) return sonde_page_token_make(server->token, error);
+  if (!sonde_page_token_valid(token))
+    return sonde_fail(error, SONDE_ARGUMENT, "a page's token must have %d digits from 0-9a-f",
+                      SONDE_PAGE_TOKEN - 1);
+  snprintf(server->token, sizeof server->token, "%s", token);
+  return SONDE_OK;
 }
 
 sonde_status page_server_start(const sonde_page_def *def, const page_source *source,
@@ -365,9 +299,12 @@ sonde_status page_server_start(const sonde_page_def *def, const page_source *sou
   keep_def(server, def);
   pthread_mutex_init(&server->lock, NULL);
   pthread_mutex_init(&server->source_lock, NULL);
-  pthread_cond_init(&server->news, NULL);
-  sonde_status status = page_server_show(server, source, error);
-  if (!status) status = start_http(server, def->port, error);
+  server->listener = server->wake = -1;
+  for (int i = 0; i < PAGE_CONNECTIONS; ++i) server->connection[i].socket = -1;
+  sonde_status status = keep_token(server, def->token, error);
+  if (!status) status = page_net_open(server, def->port, error);
+  if (!status) status = page_server_show(server, source, error);
+  if (!status) status = page_net_start(server, error);
   if (!status) {
     server->pump_runs = pthread_create(&server->pump, NULL, pump_run, server) == 0;
     if (!server->pump_runs) status = sonde_fail(error, SONDE_MEMORY, "a thread could not start");
@@ -381,6 +318,20 @@ sonde_status page_server_start(const sonde_page_def *def, const page_source *sou
   return status;
 }
 
+void sonde_page_address(const sonde_page_server *server, char address[SONDE_PAGE_ADDRESS]) {
+  SONDE_ASSERT(server && address);
+  snprintf(address, SONDE_PAGE_ADDRESS, "http://127.0.0.1:%u/#%s", (unsigned)server->port,
+           server->token);
+}
+
+void sonde_page_link(const sonde_page_server *server, const char *path,
+                     char link[SONDE_PAGE_LINK]) {
+  char key[PAGE_SECRET_TEXT];
+  SONDE_ASSERT(server && path && link && strlen(path) < PAGE_PATH_TEXT);
+  page_document_key(server->token, path, key);
+  snprintf(link, SONDE_PAGE_LINK, "%s?key=%s", path, key);
+}
+
 uint16_t sonde_page_port(const sonde_page_server *server) {
   SONDE_ASSERT(server);
   return server->port;
@@ -392,7 +343,7 @@ uint32_t sonde_page_clients(const sonde_page_server *server) {
   uint32_t count = 0;
   pthread_mutex_lock(lock);
   for (int i = 0; i < PAGE_CLIENTS; ++i)
-    if (server->client[i].connection) ++count;
+    if (server->client[i].here) ++count;
   pthread_mutex_unlock(lock);
   return count;
 }
@@ -401,14 +352,12 @@ void sonde_page_stop(sonde_page_server *server) {
   if (!server) return;
   pthread_mutex_lock(&server->lock);
   server->stopping = true;
-  pthread_cond_broadcast(&server->news);
   pthread_mutex_unlock(&server->lock);
   if (server->pump_runs) pthread_join(server->pump, NULL);
-  if (server->http) mg_stop(server->http); // runs the close handlers, which join the senders
+  page_net_stop(server);
   for (int i = 0; i < PAGE_CLIENTS; ++i) sonde_free(server->client[i].out.bytes);
   sonde_free(server->latest.bytes);
   sonde_free(server->spare.bytes);
-  pthread_cond_destroy(&server->news);
   pthread_mutex_destroy(&server->lock);
   pthread_mutex_destroy(&server->source_lock);
   page_scene_unref(server->scene);

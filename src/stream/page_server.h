@@ -1,20 +1,24 @@
 // Inside of the page server: who sends what when. The lock guards everything below it.
 //
-// Threads: the server's workers (HTTP and one per WebSocket) parse and set marks; one pump takes
-// the session's newest frame and encodes it; one sender per client writes to its socket, so that a
-// slow client blocks nobody. A client holds at most PAGE_IN_FLIGHT unacknowledged frames; newer
-// frames replace the one in `latest`, so no queue can grow.
+// Threads: one takes the session's newest frame and encodes it (the pump); one owns every socket
+// and never waits for a single one of them (page_net.c), so that no client blocks another. A client
+// holds at most PAGE_IN_FLIGHT unacknowledged frames; newer frames replace the one in `latest`, so
+// no queue can grow. A connection buffers at most PAGE_HEAD_BYTES of what it receives.
 #ifndef SONDE_SRC_STREAM_PAGE_SERVER_H
 #define SONDE_SRC_STREAM_PAGE_SERVER_H
 
 #include "sonde/stream.h"
+#include "stream/page_frame.h"
 #include "stream/page_message.h"
+#include "stream/page_request.h"
+#include "stream/page_secret.h"
 
-#include <civetweb.h>
 #include <pthread.h>
 
 enum {
   PAGE_CLIENTS = 4,
+  PAGE_CONNECTIONS = 128, // of all kinds; the oldest that is no client makes room for another
+  PAGE_REPLY_HEAD = 1024, // bytes, head of an answer
   PAGE_IN_FLIGHT = 2,
   PAGE_RATE_PER_S = 300,   // messages per second that a client may send
   PAGE_BURST = 600,        // and at once
@@ -47,13 +51,22 @@ typedef struct page_scene {
   page_buffer *messages; // [message_count]
 } page_scene;
 
+// What a socket is being sent: a head, then a body. The body is borrowed unless `owned` is set.
+typedef struct page_out {
+  char head[PAGE_REPLY_HEAD];
+  size_t head_size, body_size, done; // bytes; `done` counts head and body
+  const void *body;
+  void *owned; // freed when all is sent
+} page_out;
+
 typedef struct page_client {
   sonde_page_server *server;
-  struct mg_connection *connection; // NULL: free slot
-  pthread_t sender;
-  bool leaving;
+  bool here;            // false: free slot
+  bool leaving;         // to be closed
   uint64_t joined;      // order of arrival; the smallest controls
-  uint32_t greeted;     // generation whose hello and geometry were sent; 0: none
+  uint32_t greeted;     // generation whose hello was sent; 0: none
+  page_scene *scene;    // geometry under way; one reference; NULL: none
+  uint32_t scene_next;  // its message to be sent next
   uint32_t told_serial; // of the controls
   uint32_t told_topic[SONDE_PAGE_TOPICS];
   bool told_control; // what it was told about its role
@@ -63,10 +76,39 @@ typedef struct page_client {
   uint32_t sent[PAGE_IN_FLIGHT]; // sequence numbers, newest first
   uint32_t acked;
   uint64_t frames;            // sent in all
-  page_buffer out;            // the sender's own copy of a frame
+  page_buffer out;            // its own copy of a frame
   double tokens, tokens_at_s; // of the rate limit
   uint32_t refused;
 } page_client;
+
+// What a connection does: it asks (the head of its request comes), it is answered, it talks (a
+// WebSocket), or it ends: nothing is sent to it any more, what it still sends is thrown away.
+typedef enum page_stage { PAGE_ASKS, PAGE_ANSWERED, PAGE_TALKS, PAGE_ENDS } page_stage;
+
+// A socket. Belongs to the thread of page_net.c.
+typedef struct page_connection {
+  int socket; // -1: free
+  page_stage stage;
+  double stage_s, heard_s, pinged_s; // when the stage began, a byte came, a ping was sent
+  uint64_t accepted;                 // order of arrival
+  unsigned char *in;                 // [PAGE_HEAD_BYTES] received, not yet used
+  size_t in_count;
+  page_out out;
+  page_client *client;     // of a WebSocket
+  bool pong_due;           // answer to a ping
+  unsigned char pong[128]; // its payload
+  size_t pong_size;
+  int close_due; // status to close with; 0: none
+} page_connection;
+
+// How long a connection may take, s.
+typedef struct page_patience {
+  double ask_s;    // for the head of a request
+  double answer_s; // to take the answer
+  double end_s;    // to close
+  double ping_s;   // a client that said nothing for so long is asked whether it is there
+  double silent_s; // one that said nothing for so long is closed
+} page_patience;
 
 // Newest text of a topic.
 typedef struct page_topic {
@@ -84,12 +126,13 @@ struct sonde_page_server {
   page_topic topic[SONDE_PAGE_TOPICS];
   char exams_directory[512]; // empty: none
   char data_directory[512];  // empty: serve from memory
-  struct mg_context *http;
+  char token[PAGE_SECRET_TEXT];
+  page_patience patience;
+  int listener, wake;     // sockets; `wake` ends a wait of the sockets' thread
   uint16_t port;
-  pthread_t pump;
+  pthread_t pump, net;
   pthread_mutex_t lock;
-  pthread_cond_t news;
-  bool stopping, pump_runs;
+  bool stopping, pump_runs, net_runs;
   page_buffer latest, spare; // newest encoded frame (size 0: none of this scene); the pump writes
                              // into spare and swaps
   uint32_t sequence;         // of latest; 0: none yet
@@ -99,6 +142,8 @@ struct sonde_page_server {
   uint32_t controls_serial;
   uint64_t joined;
   page_client client[PAGE_CLIENTS];
+  uint64_t accepted;                            // belongs to page_net.c, as do
+  page_connection connection[PAGE_CONNECTIONS]; // these
 };
 
 // Encodes the geometry of a source; one reference. NULL without memory.
@@ -113,20 +158,35 @@ sonde_status page_server_show(sonde_page_server *server, const page_source *sour
 sonde_status page_server_start(const sonde_page_def *def, const page_source *source,
                                sonde_page_server **server, sonde_error *error);
 
-// Answers requests other than the WebSocket (civetweb's begin_request callback).
-int page_http_request(struct mg_connection *connection);
+// Wakes the sockets' thread: there is something to send. @thread any
+void page_wake(sonde_page_server *server);
+
+// page_net.c: opens the port, then starts and ends the thread of the sockets.
+sonde_status page_net_open(sonde_page_server *server, uint16_t port, sonde_error *error);
+sonde_status page_net_start(sonde_page_server *server, sonde_error *error);
+void page_net_stop(sonde_page_server *server);
+
+// page_http.c: the answer to a whole head of a request; a request of the WebSocket that may come in
+// is answered by 101 and sets *client, which then belongs to the connection.
+void page_http_answer(sonde_page_server *server, const char *head, size_t size, page_out *out,
+                      page_client **client);
+// Refuses a request that is not even a head.
+void page_http_refuse(page_out *out, int code);
 // Only the loopback names with our port pass; a browser that was lured by a foreign name sends that
 // name as Host (DNS rebinding).
 bool page_host_allowed(const char *host, uint16_t port);
 // An absent Origin (not a browser) passes; a present one must be this very page.
 bool page_origin_allowed(const char *origin, uint16_t port);
 
-// WebSocket handlers.
-int page_client_connect(const struct mg_connection *connection, void *server);
-void page_client_ready(struct mg_connection *connection, void *server);
-int page_client_data(struct mg_connection *connection, int bits, char *data, size_t size,
-                     void *server);
-void page_client_close(const struct mg_connection *connection, void *server);
+// page_client.c. A new client, NULL when there is no free slot. Takes the lock.
+page_client *page_client_join(sonde_page_server *server);
+// A whole text message of a client; false ends the connection. Takes the lock.
+bool page_client_hear(page_client *client, const char *data, size_t size);
+// The message that is to be sent next; false when there is none. Takes the lock.
+bool page_client_next(page_client *client, page_out *out);
+// The connection is gone. Takes the lock.
+void page_client_leave(page_client *client);
+void page_out_frame(page_out *out, int opcode, const void *body, size_t size, void *owned);
 
 // Under the lock.
 bool page_client_controls(const page_client *client);

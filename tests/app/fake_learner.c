@@ -1,5 +1,5 @@
 // fake_learner run --port N [--die]: stands for `sonde run` in tests of `sonde class`. Writes its
-// process id to pid.N, answers every request on the port with a status, or says a sentence and ends
+// process id to pid.N, answers who has its token with a status, or says a sentence and ends
 // with 3 at once. With --hang it accepts connections and never answers.
 #include <arpa/inet.h>
 #include <netinet/in.h>
@@ -30,7 +30,10 @@ static void answer(int client, int port) {
            "{\"trainee\":\"%s\",\"phase\":\"exam\",\"case\":\"case-%d\",\"elapsed_s\":83.2,"
            "\"score\":null}",
            getenv("SONDE_TRAINEE") ? getenv("SONDE_TRAINEE") : "?", port);
-  bool asked = strncmp(request, "GET /status.json HTTP/1.1\r\n", 27) == 0;
+  char token[64];
+  snprintf(token, sizeof token, "Authorization: Bearer %.32s\r\n",
+           getenv("SONDE_PAGE_TOKEN") ? getenv("SONDE_PAGE_TOKEN") : "none");
+  bool asked = strncmp(request, "GET /status.json HTTP/1.1\r\n", 27) == 0 && strstr(request, token);
   int size = snprintf(reply, sizeof reply,
                       "HTTP/1.1 %s\r\nContent-Length: %zu\r\nConnection: close\r\n\r\n%s",
                       asked ? "200 OK" : "404 Not Found", strlen(body), body);

@@ -10,7 +10,7 @@
 #include <sys/time.h>
 #include <unistd.h>
 
-static int tcp_connect(uint16_t port, int receive_buffer) {
+static inline int tcp_connect(uint16_t port, int receive_buffer) {
   int s = socket(AF_INET, SOCK_STREAM, 0);
   assert_true(s >= 0);
   struct timeval limit = {.tv_sec = 120}; // what never comes fails the test
@@ -22,7 +22,7 @@ static int tcp_connect(uint16_t port, int receive_buffer) {
   return s;
 }
 
-static bool read_all(int s, void *bytes, size_t count) {
+static inline bool read_all(int s, void *bytes, size_t count) {
   unsigned char *at = bytes;
   while (count > 0) {
     ssize_t got = recv(s, at, count, 0);
@@ -34,7 +34,7 @@ static bool read_all(int s, void *bytes, size_t count) {
 }
 
 // Sends a request and reads the head of the answer (at most size - 1 bytes). Returns the code.
-static int http_head(int s, const char *request, char *head, size_t size) {
+static inline int http_head(int s, const char *request, char *head, size_t size) {
   assert_int_equal(send(s, request, strlen(request), MSG_NOSIGNAL), strlen(request));
   size_t count = 0;
   while (count + 1 < size && recv(s, head + count, 1, 0) == 1) {
@@ -45,28 +45,42 @@ static int http_head(int s, const char *request, char *head, size_t size) {
   return count > 12 ? atoi(head + 9) : 0;
 }
 
-// Opens a WebSocket with the given Host and Origin lines (Origin may be NULL). -1: refused.
-static int ws_open_as(uint16_t port, const char *host, const char *origin, int receive_buffer) {
-  char request[512], line[128] = "", head[1024];
-  if (origin) snprintf(line, sizeof line, "Origin: %s\r\n", origin);
+static const char WS_TOKEN[] = "00112233445566778899aabbccddeeff"; // of the servers in these tests
+
+// Opens a WebSocket with the given header lines. @return socket, or minus the HTTP code that
+// refused
+static inline int ws_open_with(uint16_t port, const char *host, const char *lines,
+                               int receive_buffer) {
+  char request[640], head[1024];
   snprintf(request, sizeof request,
            "GET /ws HTTP/1.1\r\nHost: %s\r\n%sUpgrade: websocket\r\nConnection: Upgrade\r\n"
            "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n\r\n",
-           host, line);
-  int s = tcp_connect(port, receive_buffer);
-  if (http_head(s, request, head, sizeof head) == 101) return s;
+           host, lines);
+  int s = tcp_connect(port, receive_buffer), code = http_head(s, request, head, sizeof head);
+  // RFC 6455, 1.3: the answer to the key of its example
+  if (code == 101 && strstr(head, "Sec-WebSocket-Accept: s3pPLMBiTxaQ9kYGzzhZRbK+xOo=\r\n"))
+    return s;
   close(s);
-  return -1;
+  return code == 101 ? -1 : -code;
 }
 
-static int ws_open(uint16_t port) {
+// With the token and the given Host and Origin (which may be NULL).
+static inline int ws_open_as(uint16_t port, const char *host, const char *origin,
+                             int receive_buffer) {
+  char lines[256], origin_line[128] = "";
+  if (origin) snprintf(origin_line, sizeof origin_line, "Origin: %s\r\n", origin);
+  snprintf(lines, sizeof lines, "%sSec-WebSocket-Protocol: sonde, %s\r\n", origin_line, WS_TOKEN);
+  return ws_open_with(port, host, lines, receive_buffer);
+}
+
+static inline int ws_open(uint16_t port) {
   char host[32];
   snprintf(host, sizeof host, "127.0.0.1:%u", (unsigned)port);
   return ws_open_as(port, host, NULL, 0);
 }
 
 // One masked frame. `first` is the first byte: FIN and opcode.
-static void ws_send_frame(int s, unsigned first, const char *data, size_t count) {
+static inline void ws_send_frame(int s, unsigned first, const char *data, size_t count) {
   static const unsigned char MASK[4] = {0x12, 0x34, 0x56, 0x78};
   unsigned char *frame = malloc(count + 8), *at = frame;
   assert_non_null(frame);
@@ -86,10 +100,10 @@ static void ws_send_frame(int s, unsigned first, const char *data, size_t count)
   free(frame);
 }
 
-static void ws_say(int s, const char *text) { ws_send_frame(s, 0x81, text, strlen(text)); }
+static inline void ws_say(int s, const char *text) { ws_send_frame(s, 0x81, text, strlen(text)); }
 
 // One message from the server, freed by the caller. *opcode 8 or 0: closed.
-static unsigned char *ws_read(int s, int *opcode, size_t *count) {
+static inline unsigned char *ws_read(int s, int *opcode, size_t *count) {
   unsigned char head[2], more[8];
   *opcode = 0;
   *count = 0;
@@ -114,7 +128,7 @@ static unsigned char *ws_read(int s, int *opcode, size_t *count) {
 }
 
 // Reads until a text message that contains `needle`; false when the connection ends first.
-static bool ws_expect(int s, const char *needle) {
+static inline bool ws_expect(int s, const char *needle) {
   for (;;) {
     int opcode;
     size_t count;
@@ -124,6 +138,19 @@ static bool ws_expect(int s, const char *needle) {
     free(data);
     if (found) return true;
     if (opcode == 8) return false;
+  }
+}
+
+// The status with which the server closes the connection, 0 when it ends without one.
+static inline int ws_close_status(int s) {
+  for (;;) {
+    int opcode;
+    size_t count;
+    unsigned char *data = ws_read(s, &opcode, &count);
+    if (!data) return 0;
+    int status = opcode == 8 && count >= 2 ? data[0] << 8 | data[1] : 0;
+    free(data);
+    if (opcode == 8) return status;
   }
 }
 

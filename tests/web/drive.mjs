@@ -9,6 +9,15 @@ export const browserPath = ["/usr/bin/chromium", "/usr/bin/chromium-browser"].fi
 export const openBrowser = (chromium) =>
   chromium.launch({ executablePath: browserPath, args: ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"] });
 
+/** The address that the program prints, in its parts; null when the text has none. */
+export function findAddress(text) {
+  const found = /(http:\/\/127\.0\.0\.1:(\d+)\/)#([0-9a-f]{32})/.exec(text);
+  return found && { origin: found[1], port: Number(found[2]), token: found[3] };
+}
+
+/** What to open: the address with a query. */
+export const addressOf = (at, query = "") => `${at.origin}${query}#${at.token}`;
+
 export const ready = (page) => page.waitForFunction(() => (window.sonde?.frames ?? 0) > 2 && window.sonde.exam !== null);
 
 /** Puts the probe, lifted, onto the target by dragging there. */

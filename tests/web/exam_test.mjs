@@ -3,11 +3,11 @@
 // again. Usage: exam_test.mjs SONDE WEB_DIR OUT_DIR
 import assert from "node:assert/strict";
 import { spawn } from "node:child_process";
-import { mkdirSync, mkdtempSync, readdirSync, readFileSync, rmSync } from "node:fs";
+import { mkdirSync, mkdtempSync, readdirSync, readFileSync, rmSync, statSync } from "node:fs";
 import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
-import { PATIENCE_MS, browserPath, goTo, openBrowser, ready } from "./drive.mjs";
+import { addressOf, browserPath, findAddress, goTo, openBrowser, PATIENCE_MS, ready } from "./drive.mjs";
 
 const [sonde, web, out] = process.argv.slice(2).map((p) => resolve(p));
 if (!browserPath) {
@@ -29,8 +29,8 @@ function start(port) {
   const child = spawn(sonde, ["run", "--port", String(port), "--exams", exams], { stdio: ["ignore", "pipe", "inherit"] });
   return new Promise((done, fail) => {
     child.stdout.on("data", (text) => {
-      const at = /http:\/\/127\.0\.0\.1:(\d+)\//.exec(String(text));
-      if (at) done({ child, port: Number(at[1]) });
+      const at = findAddress(String(text));
+      if (at) done({ child, ...at });
     });
     child.on("exit", (code) => fail(new Error(`sonde run ended with ${code}`)));
   });
@@ -115,6 +115,8 @@ async function readReport(browser, port, exam) {
   page.on("console", (m) => m.type() === "error" && errors.push(m.text()));
   const answer = await page.goto(`http://127.0.0.1:${port}${exam.result.report}`);
   check(answer.status() === 200, "the report is served");
+  const bare = await fetch(`http://127.0.0.1:${port}${exam.result.report.split("?")[0]}`);
+  check(bare.status === 401, "but not without its key");
   await page.screenshot({ path: join(out, "real_report.png"), fullPage: true });
   check((await page.locator("img").count()) > 0, "the report shows the learner's own images");
   check(errors.length === 0, `the report has no console error ${errors.join(" ")}`);
@@ -152,7 +154,7 @@ async function replay(page, exam) {
 async function killed(browser, running) {
   const page = await browser.newPage({ viewport: { width: 1440, height: 900 } });
   page.setDefaultTimeout(PATIENCE_MS);
-  await page.goto(`http://127.0.0.1:${running.port}/?quality=low`);
+  await page.goto(addressOf(running, "?quality=low"));
   await ready(page);
   await begin(page, /^None/);
   await page.evaluate(() => window.sonde.setDepth(10));
@@ -161,7 +163,9 @@ async function killed(browser, running) {
   running.child.kill("SIGKILL");
   const again = await start(running.port);
   await until(page, () => window.sonde.connected && window.sonde.exam?.phase === "practice");
-  check(true, "the page finds the program again");
+  check(again.token === running.token, "the token outlives the program, and the page finds it again");
+  const file = statSync(join(exams, "page.token"));
+  check((file.mode & 0o777) === 0o600, "only its owner can read the file with the token");
   const kept = readdirSync(exams, { withFileTypes: true }).filter((e) => e.isDirectory()).map((e) => readdirSync(join(exams, e.name)));
   check(kept.some((files) => files.includes("exam.rec") && !files.includes("exam.json")), "the killed exam's recording is kept");
   await page.close();
@@ -178,7 +182,7 @@ async function main() {
   const errors = [];
   page.on("console", (m) => m.type() === "error" && errors.push(m.text()));
   page.on("pageerror", (e) => errors.push(String(e)));
-  await page.goto(`http://127.0.0.1:${running.port}/?quality=low`);
+  await page.goto(addressOf(running, "?quality=low"));
   await ready(page);
   await begin(page, /^Full/);
   await guidedExam(page);

@@ -1,12 +1,13 @@
 // A stand-in for `sonde run` that speaks version 2 of the page's protocol: serves the built page, a
 // thigh (its own, or that of a running program) and the trainer. For tests and for work on the page.
-// Usage: node mock_server.mjs WEB_DIR [--port N] [--program http://127.0.0.1:8642/]
-// WEB_DIR has package.json, node_modules and dist/.
+// Usage: node mock_server.mjs WEB_DIR [--port N] [--program ADDRESS]
+// WEB_DIR has package.json, node_modules and dist/; ADDRESS is what sonde run prints.
 import http from "node:http";
 import { createRequire } from "node:module";
 import { existsSync, readFileSync, realpathSync } from "node:fs";
 import path from "node:path";
 import { fileURLToPath } from "node:url";
+import { findAddress } from "./drive.mjs";
 import { SyntheticThigh } from "./mock_thigh.mjs";
 import { Trainer } from "./mock_trainer.mjs";
 
@@ -21,7 +22,8 @@ class ProgramThigh {
   constructor(WebSocket, address, toAll) {
     this.parts = [];
     this.ready = new Promise((resolve) => (this.resolve = resolve));
-    this.socket = new WebSocket(`${address.replace(/^http/, "ws")}ws`);
+    const at = findAddress(address);
+    this.socket = new WebSocket(`ws://127.0.0.1:${at.port}/ws`, ["sonde", at.token]);
     this.socket.on("message", (data, binary) => this.message(data, binary, toAll));
     this.extra = { posture: "supine", valsalva: false, gel: true, gel_ml: 0, stiffness_scale: 1, damping_scale: 1, friction_scale: 1 };
   }

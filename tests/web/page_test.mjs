@@ -7,7 +7,7 @@ import { createRequire } from "node:module";
 import { existsSync, mkdirSync, mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import path from "node:path";
-import { PATIENCE_MS } from "./drive.mjs";
+import { addressOf, findAddress, PATIENCE_MS } from "./drive.mjs";
 
 const [, , program, model, webDir, outDir] = process.argv;
 const { chromium } = createRequire(path.join(webDir, "package.json"))("playwright-core");
@@ -32,8 +32,8 @@ function startProgram() {
   const address = new Promise((resolve, reject) => {
     const listen = (chunk) => {
       said += chunk;
-      const found = /http:\/\/127\.0\.0\.1:\d+\//.exec(said);
-      if (found) resolve(found[0]);
+      const found = findAddress(said);
+      if (found) resolve(found);
     };
     child.stdout.on("data", listen);
     child.stderr.on("data", listen);
@@ -156,6 +156,24 @@ async function testDrag(page) {
   check(moved > 3, `dragging moves the probe: ${moved.toFixed(1)} mm`);
 }
 
+/** The token is out of sight, survives a reload, and is asked of everyone. */
+async function testAccess(page, browser, { origin, token }) {
+  check(!page.url().includes(token), `the token is taken out of the visible address: ${page.url()}`);
+  await page.reload();
+  await page.waitForFunction(() => (window.sonde?.frames ?? 0) > 3);
+  check(true, "a page that is loaded anew still has access");
+  const stranger = await browser.newPage();
+  await stranger.goto(origin);
+  await stranger.waitForFunction(() => document.getElementById("banner").textContent.includes("no access"));
+  check((await stranger.evaluate(() => window.sonde.frames)) === 0, "a page without the token gets nothing and says what to do");
+  await stranger.goto(`${origin}#${token}`);
+  await stranger.waitForFunction(() => window.sonde.connected);
+  check(true, "the whole address lets it in");
+  await stranger.close();
+  const status = async (headers) => (await fetch(`${origin}status.json`, { headers })).status;
+  check((await status({})) === 401 && (await status({ Authorization: `Bearer ${token}` })) === 200, "data is for who has the token");
+}
+
 async function testLayout(page) {
   const size = await page.evaluate(() => {
     const e = document.documentElement;
@@ -189,9 +207,10 @@ async function main() {
     const errors = [];
     page.on("console", (m) => m.type() === "error" && errors.push(m.text()));
     page.on("pageerror", (e) => errors.push(e.message));
-    await page.goto(`${address}?site=27&depth=0&probe=linear&case=healthy&quality=low`);
+    await page.goto(addressOf(address, "?site=27&depth=0&probe=linear&case=healthy&quality=low"));
     await page.waitForFunction(() => (window.sonde?.frames ?? 0) > 3 && Math.abs(window.sonde.snapshot.penetration_mm) < 0.5);
     check(true, "the page connects and receives frames");
+    await testAccess(page, browser, address);
     await testLayout(page);
     await testVein(page);
     await testControls(page);

@@ -3,6 +3,7 @@
 import { spawn } from "node:child_process";
 import { createRequire } from "node:module";
 import path from "node:path";
+import { addressOf, findAddress } from "./drive.mjs";
 
 const [, , program, model, webDir, out, depth] = process.argv;
 const { chromium } = createRequire(path.join(webDir, "package.json"))("playwright-core");
@@ -11,8 +12,8 @@ const address = await new Promise((resolve, reject) => {
   let said = "";
   sonde.stdout.on("data", (chunk) => {
     said += chunk;
-    const found = /http:\/\/127\.0\.0\.1:\d+\//.exec(said);
-    if (found) resolve(found[0]);
+    const found = findAddress(said);
+    if (found) resolve(found);
   });
   sonde.on("exit", () => reject(new Error(said)));
 });
@@ -21,7 +22,7 @@ const browser = await chromium.launch({
   args: ["--no-sandbox", "--disable-gpu", "--disable-quic", "--disable-background-networking"],
 });
 const page = await browser.newPage({ viewport: { width: 1600, height: 900 } });
-await page.goto(`${address}?site=27&depth=0`);
+await page.goto(addressOf(address, "?site=27&depth=0"));
 await page.waitForFunction(() => (window.sonde?.frames ?? 0) > 3);
 let at = 0;
 const closed = () => page.evaluate(() => window.sonde.snapshot.vein_area_ratio < 0.12);

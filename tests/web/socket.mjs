@@ -24,13 +24,13 @@ function message(bytes) {
 
 export class Client {
   /** reads: acknowledges every frame at once; otherwise it asks for everything and reads nothing. */
-  constructor(port, reads) {
+  constructor({ port, token }, reads) {
     this.sequences = [];
     this.parts = [];
     this.size = 0;
     this.wanted = 2;
     this.socket = connect(port, "127.0.0.1");
-    this.socket.write(`GET /ws HTTP/1.1\r\nHost: 127.0.0.1:${port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n\r\n`);
+    this.socket.write(`GET /ws HTTP/1.1\r\nHost: 127.0.0.1:${port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Protocol: sonde, ${token}\r\n\r\n`);
     this.open = new Promise((done, fail) => {
       this.socket.once("error", fail);
       if (!reads) this.socket.once("connect", () => (this.socket.pause(), done()));

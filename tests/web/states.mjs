@@ -1,6 +1,6 @@
 // Takes a picture of every state of the page, to be looked at. Against the mock, or with --program
 // against the mock in front of a running program (real thigh and images).
-// Usage: node states.mjs WEB_DIR OUT_DIR [--size 1440x900] [--program http://127.0.0.1:8642/]
+// Usage: node states.mjs WEB_DIR OUT_DIR [--size 1440x900] [--program ADDRESS]
 import { createRequire } from "node:module";
 import { mkdirSync } from "node:fs";
 import path from "node:path";

@@ -9,7 +9,7 @@ import { createRequire } from "node:module";
 import { createServer } from "node:net";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
-import { PATIENCE_MS, browserPath, goTo, openBrowser, ready } from "./drive.mjs";
+import { addressOf, browserPath, findAddress, goTo, openBrowser, PATIENCE_MS, ready } from "./drive.mjs";
 import { Client } from "./socket.mjs";
 
 const [sonde, web, out] = process.argv.slice(2).map((p) => resolve(p));
@@ -41,25 +41,33 @@ async function freePair() {
 
 const until = (page, condition, argument) => page.waitForFunction(condition, argument, { timeout: PATIENCE_MS });
 const exam = (page) => page.evaluate(() => window.sonde.exam);
-const status = async (port) => (await fetch(`http://127.0.0.1:${port}/status.json`)).json();
+const status = async (at) => (await fetch(`${at.origin}status.json`, { headers: { Authorization: `Bearer ${at.token}` } })).json();
 
 /** Both programs, once they answer. */
 async function startClass(port) {
-  const child = spawn(sonde, ["class", "--names", "Ada,Bo", "--port", String(port), "--", "--exams", exams], { stdio: ["ignore", "ignore", "inherit"] });
-  for (const p of [port, port + 1])
-    while (!(await status(p).catch(() => null))) {
+  const child = spawn(sonde, ["class", "--names", "Ada,Bo", "--port", String(port), "--", "--exams", exams], { stdio: ["ignore", "pipe", "inherit"] });
+  let said = "";
+  child.stdout.on("data", (text) => (said += text));
+  const places = [];
+  for (const name of ["Ada", "Bo"])
+    for (;;) {
+      const at = findAddress(said.split("\n").find((line) => line.startsWith(`${name}: http`)) ?? "");
+      if (at && (await status(at).catch(() => null))) {
+        places.push(at);
+        break;
+      }
       assert.ok(child.exitCode === null, "sonde class has ended");
       await new Promise((done) => setTimeout(done, 100));
     }
-  return child;
+  return [child, ...places];
 }
 
-async function visit(browser, port, errors) {
+async function visit(browser, at, errors) {
   const page = await browser.newPage({ viewport: { width: 1280, height: 800 } });
   page.setDefaultTimeout(PATIENCE_MS);
   page.on("console", (m) => m.type() === "error" && errors.push(m.text()));
   page.on("pageerror", (e) => errors.push(String(e)));
-  await page.goto(`http://127.0.0.1:${port}/?quality=low`);
+  await page.goto(addressOf(at, "?quality=low"));
   await ready(page);
   return page;
 }
@@ -80,7 +88,7 @@ async function press(page, depth) {
 }
 
 /** Ada presses twice and decides; Bo presses once; neither sees anything of the other. */
-async function apart(ada, bo, port) {
+async function apart(ada, bo, places) {
   await begin(ada, /^Full/, 0);
   await begin(bo, /^None/, 3);
   const [first, second] = [await exam(ada), await exam(bo)];
@@ -97,7 +105,9 @@ async function apart(ada, bo, port) {
   await ada.locator(".finding.clot").click();
   await until(ada, (id) => window.sonde.exam.segments.find((s) => s.id === id).decision === "clot", needed.id);
   check((await exam(bo)).segments.every((s) => s.decision === ""), "a finding belongs to who gave it");
-  const told = [await status(port), await status(port + 1)];
+  const told = [await status(places[0]), await status(places[1])];
+  const foreign = await fetch(`${places[1].origin}status.json`, { headers: { Authorization: `Bearer ${places[0].token}` } });
+  check(foreign.status === 401, "one learner's token does not open the other's page");
   check(told[0].trainee === "Ada" && told[1].trainee === "Bo" && told[0].case === first.title && told[1].case === second.title, "the teacher's overview has each with the own case");
 }
 
@@ -116,10 +126,10 @@ async function ends(ada, bo) {
 }
 
 /** A client that never reads holds up nobody: frames go on coming to one that reads and to the page. */
-async function stuck(bo, port) {
-  const silent = new Client(port, false);
+async function stuck(bo, at) {
+  const silent = new Client(at, false);
   await silent.open;
-  const reader = new Client(port, true);
+  const reader = new Client(at, true);
   await reader.open;
   const before = await bo.evaluate(() => window.sonde.frames);
   await reader.frames(MORE_FRAMES);
@@ -134,13 +144,14 @@ process.on("exit", () => programs?.kill("SIGINT")); // whatever ends this test e
 
 async function main() {
   const port = await freePair();
-  programs = await startClass(port);
+  const [child, first, second] = await startClass(port);
+  programs = child;
   const browser = await openBrowser(chromium);
   const errors = [];
-  const [ada, bo] = [await visit(browser, port, errors), await visit(browser, port + 1, errors)];
-  await apart(ada, bo, port);
+  const [ada, bo] = [await visit(browser, first, errors), await visit(browser, second, errors)];
+  await apart(ada, bo, [first, second]);
   await ends(ada, bo);
-  await stuck(bo, port + 1);
+  await stuck(bo, second);
   check(errors.length === 0, `no console error ${errors.join("; ")}`);
   await browser.close();
   programs.kill("SIGINT");

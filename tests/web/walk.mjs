@@ -5,7 +5,7 @@ import { mkdirSync, mkdtempSync, rmSync } from "node:fs";
 import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
-import { PATIENCE_MS, openBrowser, ready } from "./drive.mjs";
+import { addressOf, findAddress, openBrowser, PATIENCE_MS, ready } from "./drive.mjs";
 
 const [sonde, web, out] = process.argv.slice(2, 5).map((p) => resolve(p));
 const [width, height] = (process.argv[5] ?? "1280x800").split("x").map(Number);
@@ -14,8 +14,8 @@ mkdirSync(out, { recursive: true });
 const exams = mkdtempSync(join(tmpdir(), "sonde-walk-"));
 const child = spawn(sonde, ["run", "--port", "0", "--exams", exams], { stdio: ["ignore", "pipe", "inherit"] });
 const address = await new Promise((done) => child.stdout.on("data", (text) => {
-  const at = /http:\/\/127\.0\.0\.1:\d+\//.exec(String(text));
-  if (at) done(at[0]);
+  const at = findAddress(String(text));
+  if (at) done(addressOf(at));
 }));
 const browser = await openBrowser(chromium);
 const page = await browser.newPage({ viewport: { width, height } });

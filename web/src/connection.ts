@@ -1,5 +1,6 @@
 // The WebSocket: connects, says when the connection is lost and tries again.
 
+import { isStranger, takeToken, token } from "./access";
 import {
   decode,
   type Decision,
@@ -18,6 +19,8 @@ export interface ConnectionEvents {
   geometry(part: Mesh | Line): void;
   frame(frame: Frame): void;
   state(connected: boolean, retryInS: number): void;
+  /** the program is there, but this page has not got its token */
+  refused(): void;
 }
 
 export type EchoKey = "gain_db" | "depth_mm" | "frequency_mhz" | "dynamic_range_db" | "focus_mm" | "tgc_db_per_cm";
@@ -37,9 +40,12 @@ export class Connection {
   private retry = 0;
   private pingId = 0;
   private pingSent = 0;
+  private timer = 0;
 
   constructor(private readonly events: ConnectionEvents) {
+    takeToken();
     this.open();
+    window.addEventListener("hashchange", () => takeToken() && !this.connected && this.open());
     window.setInterval(() => this.ping(), 1000);
   }
 
@@ -105,7 +111,7 @@ export class Connection {
   }
 
   private send(message: object): void {
-    if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(message));
+    if (this.connected) this.socket!.send(JSON.stringify(message));
   }
 
   private ping(): void {
@@ -113,23 +119,33 @@ export class Connection {
     this.send({ type: "ping", id: ++this.pingId });
   }
 
+  private get connected(): boolean {
+    return this.socket?.readyState === WebSocket.OPEN;
+  }
+
   private open(): void {
-    const socket = new WebSocket(`ws://${location.host}/ws`);
+    window.clearTimeout(this.timer);
+    if (this.socket) this.socket.onclose = null;
+    const socket = new WebSocket(`ws://${location.host}/ws`, token() ? ["sonde", token()] : ["sonde"]);
+    let greeted = false;
     socket.binaryType = "arraybuffer";
     socket.onopen = () => {
+      greeted = true;
       this.retry = 0;
       this.events.state(true, 0);
     };
     socket.onmessage = (event: MessageEvent<string | ArrayBuffer>) => this.receive(event.data);
-    socket.onclose = () => this.closed();
+    socket.onclose = () => void this.closed(socket, greeted);
     this.socket = socket;
   }
 
-  private closed(): void {
+  private async closed(socket: WebSocket, greeted: boolean): Promise<void> {
     this.latency_ms = NaN;
+    if (!greeted && (await isStranger())) return this.events.refused();
+    if (socket !== this.socket) return; // another one was opened meanwhile
     const wait_s = Math.min(4, 0.5 * 2 ** this.retry++);
     this.events.state(false, wait_s);
-    window.setTimeout(() => this.open(), wait_s * 1000);
+    this.timer = window.setTimeout(() => this.open(), wait_s * 1000);
   }
 
   private receive(data: string | ArrayBuffer): void {

@@ -80,6 +80,7 @@ class App {
       geometry: (part) => this.scene.setPart(part),
       frame: (frame) => (this.pending = frame),
       state: (connected, wait_s) => this.setConnected(connected, wait_s),
+      refused: () => this.refused(),
     }));
     this.patient = new PatientTools(connection);
     this.examBar = new ExamBar({
@@ -288,6 +289,11 @@ class App {
       const running = this.phase === "running" ? " Your exam goes on when it is back." : " Is the program running?";
       this.say(`The connection to Sonde is lost. Trying again in ${wait_s.toFixed(1)} s.${running}`, 0);
     }
+  }
+
+  private refused(): void {
+    this.setConnected(false, 0);
+    this.say("This page has no access. Open the whole address that the program printed: it ends with # and 32 characters.", 0);
   }
 
   private sayTimer = 0;

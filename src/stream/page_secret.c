@@ -1,0 +1,130 @@
+// Token, document keys and handshake: see page_secret.h.
+//
+// block, page_sha1, page_hmac_sha1   the hash and its keyed form
+// page_accept_key, page_document_key what is made of them
+// sonde_page_token_make              128 bits of the kernel
+#include "stream/page_secret.h"
+
+#include "sonde/stream.h"
+
+#include <errno.h>
+#include <string.h>
+#include <sys/random.h>
+
+enum { BLOCK = 64, LONGEST = 512 }; // bytes of a block; of a text that is hashed with a key
+
+static uint32_t turn(uint32_t x, int by) { return x << by | x >> (32 - by); }
+
+static void block(uint32_t h[5], const unsigned char *bytes) {
+  uint32_t w[80];
+  for (size_t i = 0; i < 16; ++i)
+    w[i] = (uint32_t)bytes[4 * i] << 24 | (uint32_t)bytes[4 * i + 1] << 16 |
+           (uint32_t)bytes[4 * i + 2] << 8 | (uint32_t)bytes[4 * i + 3];
+  for (size_t i = 16; i < 80; ++i) w[i] = turn(w[i - 3] ^ w[i - 8] ^ w[i - 14] ^ w[i - 16], 1);
+  uint32_t a = h[0], b = h[1], c = h[2], d = h[3], e = h[4];
+  for (size_t i = 0; i < 80; ++i) {
+    uint32_t f = i < 20   ? (b & c) | (~b & d)
+                 : i < 40 ? b ^ c ^ d
+                 : i < 60 ? (b & c) | (b & d) | (c & d)
+                          : b ^ c ^ d;
+    static const uint32_t K[4] = {0x5a827999, 0x6ed9eba1, 0x8f1bbcdc, 0xca62c1d6};
+    uint32_t next = turn(a, 5) + f + e + K[i / 20] + w[i];
+    e = d;
+    d = c;
+    c = turn(b, 30);
+    b = a;
+    a = next;
+  }
+  h[0] += a;
+  h[1] += b;
+  h[2] += c;
+  h[3] += d;
+  h[4] += e;
+}
+
+void page_sha1(const void *bytes, size_t count, unsigned char digest[PAGE_SHA1_BYTES]) {
+  SONDE_ASSERT(bytes && digest);
+  uint32_t h[5] = {0x67452301, 0xefcdab89, 0x98badcfe, 0x10325476, 0xc3d2e1f0};
+  const unsigned char *at = bytes;
+  size_t left = count;
+  for (; left >= BLOCK; left -= BLOCK, at += BLOCK) block(h, at);
+  unsigned char last[2 * BLOCK] = {0};
+  memcpy(last, at, left);
+  last[left] = 0x80;
+  size_t size = left + 9 <= BLOCK ? BLOCK : 2 * BLOCK;
+  for (size_t i = 0; i < 8; ++i)
+    last[size - 1 - i] = (unsigned char)((uint64_t)count * 8 >> (8 * i) & 0xff);
+  for (size_t i = 0; i < size; i += BLOCK) block(h, last + i);
+  for (size_t i = 0; i < PAGE_SHA1_BYTES; ++i)
+    digest[i] = (unsigned char)(h[i / 4] >> (24 - 8 * (i % 4)) & 0xff);
+}
+
+void page_hmac_sha1(const char *key, const char *text, unsigned char digest[PAGE_SHA1_BYTES]) {
+  size_t key_size = strlen(key), text_size = strlen(text);
+  SONDE_ASSERT(key_size <= BLOCK && text_size <= LONGEST);
+  unsigned char inner[BLOCK + LONGEST], outer[BLOCK + PAGE_SHA1_BYTES];
+  for (size_t i = 0; i < BLOCK; ++i) {
+    unsigned char k = i < key_size ? (unsigned char)key[i] : 0;
+    inner[i] = k ^ 0x36;
+    outer[i] = k ^ 0x5c;
+  }
+  memcpy(inner + BLOCK, text, text_size);
+  page_sha1(inner, BLOCK + text_size, outer + BLOCK);
+  page_sha1(outer, sizeof outer, digest);
+}
+
+void page_accept_key(const char *key, char accept[PAGE_ACCEPT_TEXT]) {
+  static const char GUID[] = "258EAFA5-E914-47DA-95CA-C5AB0DC85B11";
+  static const char DIGITS[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  char text[64 + sizeof GUID];
+  unsigned char digest[PAGE_SHA1_BYTES + 1] = {0}; // a zero completes the last three bytes
+  SONDE_ASSERT(strlen(key) <= 64);
+  int size = snprintf(text, sizeof text, "%s%s", key, GUID);
+  page_sha1(text, (size_t)size, digest);
+  for (size_t i = 0; i < 7; ++i) {
+    const unsigned char *d = digest + 3 * i;
+    uint32_t bits = (uint32_t)d[0] << 16 | (uint32_t)d[1] << 8 | d[2];
+    for (size_t k = 0; k < 4; ++k) accept[4 * i + k] = DIGITS[bits >> (18 - 6 * k) & 63];
+  }
+  accept[27] = '='; // of the last three bytes two are the digest's
+  accept[28] = 0;
+}
+
+static void write_digits(const unsigned char *bytes, char text[PAGE_SECRET_TEXT]) {
+  for (size_t i = 0; i < (PAGE_SECRET_TEXT - 1) / 2; ++i)
+    snprintf(text + 2 * i, 3, "%02x", (unsigned)bytes[i]);
+}
+
+void page_document_key(const char *token, const char *path, char key[PAGE_SECRET_TEXT]) {
+  unsigned char digest[PAGE_SHA1_BYTES];
+  page_hmac_sha1(token, path, digest);
+  write_digits(digest, key);
+}
+
+bool page_secret_equal(const char *secret, const char *given) {
+  if (!secret || !given) return false;
+  size_t size = strlen(secret), count = strlen(given);
+  unsigned difference = size == count ? 0 : 1;
+  for (size_t i = 0; i < count; ++i) // every character of `given`, whatever came before
+    difference |=
+        (unsigned)(unsigned char)given[i] ^ (unsigned)(unsigned char)secret[size ? i % size : 0];
+  return difference == 0 && size > 0;
+}
+
+sonde_status sonde_page_token_make(char token[SONDE_PAGE_TOKEN], sonde_error *error) {
+  unsigned char bytes[(SONDE_PAGE_TOKEN - 1) / 2];
+  _Static_assert((int)SONDE_PAGE_TOKEN == (int)PAGE_SECRET_TEXT,
+                 "a token is 128 bits in hexadecimal");
+  SONDE_ASSERT(token);
+  ssize_t got = getrandom(bytes, sizeof bytes, 0);
+  if (got != (ssize_t)sizeof bytes)
+    return sonde_fail(error, SONDE_IO, "the kernel gave no random bytes for the page's token: %s",
+                      strerror(errno));
+  write_digits(bytes, token);
+  return SONDE_OK;
+}
+
+bool sonde_page_token_valid(const char *token) {
+  return token && strlen(token) == SONDE_PAGE_TOKEN - 1 &&
+         strspn(token, "0123456789abcdef") == SONDE_PAGE_TOKEN - 1;
+}
