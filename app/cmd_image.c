@@ -17,13 +17,15 @@ static const char HELP[] =
     "\n"
     "Writes the echographic picture that a probe sees, and tells what it shows.\n"
     "\n"
-    "  --pose LIST        world from probe: mm and unit quaternion; z is the beam\n"
+    "  --pose LIST        world from probe: mm, each -2000 to 2000, and unit quaternion; z is\n"
+    "                     the beam\n"
     "  --site K           above this site of the model instead\n"
     "  --turn-deg A       about the beam, -180 to 180; 90 looks along the leg; default 0\n"
     "  --force-n F        press along the beam until the settled force is F (0.01 to 200)\n"
     "  --press-mm D       or press so deep below the rest skin (-10 to 60)\n"
     "  --probe NAME       point, linear, square, sphere, or a mesh file (mm); default linear\n"
-    "  --aperture-mm W    width of the array, 5 to 200; default that of the probe\n"
+    "  --aperture-mm W    width of the array, 5 to 200; default that of the probe; of a curved\n"
+    "                     face along the arc, at most half a circle\n"
     "  --curved-mm R      radius of a curved face, 20 to 1000; default flat\n"
     "  --case NAME        healthy, partial_mural, acute_occlusive, subacute_occlusive,\n"
     "                     chronic_occlusive; default healthy\n"
@@ -107,6 +109,9 @@ static const struct option LONG[] = {{"pose", required_argument, NULL, POSE},
                                      {"help", no_argument, NULL, 'h'},
                                      {NULL, 0, NULL, 0}};
 
+// The farthest that a probe may be from the model's origin, as for the page's goals.
+static const double FAR_MM = 2000;
+
 static bool read_pose(options *o, const char *text) {
   double v[7];
   char end;
@@ -117,6 +122,11 @@ static bool read_pose(options *o, const char *text) {
   if (read != 7 || !(fabs(norm - 1) < 1e-2) || !isfinite(v[0] + v[1] + v[2])) {
     app_usage_error("image",
                     "--pose expects X,Y,Z in mm and a unit quaternion QW,QX,QY,QZ, got '%s'", text);
+    return false;
+  }
+  if (!(fabs(v[0]) <= FAR_MM && fabs(v[1]) <= FAR_MM && fabs(v[2]) <= FAR_MM)) {
+    app_usage_error("image", "--pose expects X, Y and Z from %g to %g mm, got '%s'", -FAR_MM,
+                    FAR_MM, text);
     return false;
   }
   norm = sqrt(norm);
@@ -195,6 +205,12 @@ static int read_options(int argc, char **argv, options *o) {
   if (o->posed == (o->site >= 0)) return app_usage_error("image", "give either --pose or --site");
   if (!isnan(o->force_n) && !isnan(o->press_m))
     return app_usage_error("image", "give --force-n or --press-mm, not both");
+  double arc_rad = o->aperture_m / o->radius_m; // NaN unless both are given
+  if (arc_rad > acos(-1))
+    return app_usage_error("image",
+                           "--aperture-mm %g is an arc of %.0f degrees of --curved-mm %g, expected "
+                           "at most 180",
+                           1e3 * o->aperture_m, 45 * arc_rad / atan(1), 1e3 * o->radius_m);
   if (!o->out) return app_usage_error("image", "-o PNG is missing");
   if (!app_model_argument("image", argc, argv, o->model, sizeof o->model)) return APP_BAD_INPUT;
   return -1;

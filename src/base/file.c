@@ -1,5 +1,4 @@
 // Output files: whole or not at all beside their place, or straight into what cannot be replaced.
-// Whole-file input.
 //
 // open_beside          a temporary file in the directory of the target
 // put                  what the buffer holds, to the system
@@ -320,48 +319,4 @@ sonde_status sonde_directory_make(const char *path, unsigned mode, bool parents,
   }
   sonde_free(part);
   return status ? status : make_one(path, mode, error);
-}
-
-// ---- reading --------------------------------------------------------------------------------
-
-static sonde_status read_all(FILE *stream, const char *path, char **bytes, size_t *count,
-                             sonde_error *error) {
-  size_t used = 0, room = 1 << 16;
-  char *buffer = SONDE_NEW(char, room + 1);
-  while (buffer) {
-    used += fread(buffer + used, 1, room - used, stream);
-    SONDE_ASSERT(used <= room);
-    if (used < room) break;
-    char *grown = sonde_realloc(buffer, room, 2 * room + 1);
-    if (!grown) sonde_free(buffer);
-    buffer = grown;
-    room *= 2;
-  }
-  if (!buffer) return sonde_fail_memory(error);
-  if (ferror(stream)) {
-    sonde_free(buffer);
-    return sonde_fail(error, sonde_disk_status(errno), "%s: cannot be read: %s", path,
-                      strerror(errno));
-  }
-  buffer[used] = 0;
-  *bytes = buffer;
-  *count = used;
-  return SONDE_OK;
-}
-
-sonde_status sonde_file_load(const char *path, char **bytes, size_t *count, sonde_error *error) {
-  *bytes = NULL;
-  *count = 0;
-  struct stat info;
-  FILE *stream = fopen(path, "rb");
-  if (!stream)
-    return sonde_fail(error, sonde_disk_status(errno), "%s: cannot be opened: %s", path,
-                      strerror(errno));
-  if (fstat(fileno(stream), &info) == 0 && S_ISDIR(info.st_mode)) {
-    fclose(stream);
-    return sonde_fail(error, SONDE_IO, "%s: is a directory, expected a file", path);
-  }
-  sonde_status status = read_all(stream, path, bytes, count, error);
-  fclose(stream);
-  return status;
 }

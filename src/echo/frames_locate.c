@@ -11,6 +11,8 @@
 // sonde_sequence_locate
 #include "echo/frames.h"
 
+#include "base/bounds.h"
+
 #include <string.h>
 
 enum { NAME_MAX_BYTES = 32, NAMES_MAX = 24, EDGES_MAX = 40 };
@@ -50,16 +52,10 @@ static bool attribute(const char *element, const char *end, const char *name, ch
   return false;
 }
 
-static uint32_t line_of(const char *bytes, const char *at) {
-  uint32_t line = 1;
-  for (; bytes < at; ++bytes) line += *bytes == '\n';
-  return line;
-}
-
 static sonde_status read_transform(const char *path, const char *bytes, const char *element,
                                    const char *end, sonde_calibration *c, sonde_error *error) {
   char matrix[1024];
-  uint32_t line = line_of(bytes, element);
+  uint32_t line = sonde_line_of(bytes, element);
   if (c->count == SONDE_COUNT_OF(c->transforms))
     return sonde_fail(error, SONDE_FORMAT, "%.200s:%u: expected at most %zu transforms", path, line,
                       SONDE_COUNT_OF(c->transforms));
@@ -94,7 +90,7 @@ static sonde_status read_clip(const char *path, const char *bytes, const char *e
   return sonde_fail(error, SONDE_FORMAT,
                     "%.200s:%u: ClipRectangleOrigin and ClipRectangleSize: expected two whole "
                     "numbers of pixels each",
-                    path, line_of(bytes, element));
+                    path, sonde_line_of(bytes, element));
 }
 
 // Only elements that begin with these names matter; comments are skipped.
@@ -106,7 +102,7 @@ static sonde_status read_elements(const char *path, const char *bytes, const cha
     const char *end = comment ? strstr(at, "-->") : memchr(at, '>', (size_t)(stop - at));
     if (!end)
       return sonde_fail(error, SONDE_FORMAT, "%.200s:%u: the file ends inside an element", path,
-                        line_of(bytes, at));
+                        sonde_line_of(bytes, at));
     if (strncmp(at, "<Transform", 10) == 0 && is_blank(at[10]))
       status = read_transform(path, bytes, at, end, c, error);
     if (strncmp(at, "<VolumeReconstruction", 21) == 0 && is_blank(at[21]))
@@ -121,7 +117,7 @@ sonde_status sonde_calibration_load(const char *path, sonde_calibration *c, sond
   *c = (sonde_calibration){0};
   char *bytes;
   size_t count;
-  sonde_status status = sonde_file_load(path, &bytes, &count, error);
+  sonde_status status = sonde_bounded_load_text(path, &sonde_limits_xml, &bytes, &count, error);
   if (status) return status;
   status = read_elements(path, bytes, bytes + count, c, error);
   if (!status && c->count == 0)
@@ -246,8 +242,9 @@ static sonde_status choose_world(const sonde_sequence *s, const sonde_calibratio
   sonde_free(g);
   if (!status && !located->world[0])
     status = sonde_fail(error, SONDE_MISMATCH,
-                        "no transforms lead from Image to Reference, Tracker, World or Probe; is "
-                        "the calibration (ImageToProbe) missing?");
+                        "no transforms lead from Image to Reference, Tracker, World or Probe; the "
+                        "file has no ImageToProbe: give the PLUS configuration that holds it "
+                        "(--config)");
   return status;
 }
 

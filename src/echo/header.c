@@ -12,6 +12,8 @@
 // sonde_pixels_pack     the way back
 #include "echo/frames.h"
 
+#include "base/bounds.h"
+
 #include <limits.h>
 #include <string.h>
 #include <zlib.h>
@@ -75,6 +77,9 @@ sonde_status sonde_header_line(sonde_header *h, char **line, sonde_error *error)
 }
 
 sonde_status sonde_header_add(sonde_header *h, char *key, char *value, sonde_error *error) {
+  if (h->entry_count == sonde_limits_image.most_items)
+    return sonde_fail(error, SONDE_FORMAT, "%.200s:%u: expected at most %llu fields", h->path,
+                      h->lines, (unsigned long long)sonde_limits_image.most_items);
   if (h->entry_count == h->entry_room) {
     uint32_t room = h->entry_room ? 2 * h->entry_room : 256;
     void *grown =
@@ -153,7 +158,7 @@ sonde_status sonde_header_reals(const sonde_header *h, const char *key, uint32_t
 sonde_status sonde_header_load(const char *path, sonde_header *h, sonde_error *error) {
   SONDE_ASSERT(path != NULL && h != NULL);
   *h = (sonde_header){.path = path, .list_axis = -1, .mm_from_voxel = affine_identity()};
-  sonde_status status = sonde_file_load(path, &h->bytes, &h->count, error);
+  sonde_status status = sonde_bounded_load(path, &sonde_limits_image, &h->bytes, &h->count, error);
   if (status) return status;
   h->nrrd = h->count >= 4 && memcmp(h->bytes, "NRRD", 4) == 0;
   status = h->nrrd ? sonde_nrrd_parse(h, error) : sonde_metaimage_parse(h, error);
@@ -217,6 +222,9 @@ sonde_status sonde_pixels_read(const sonde_header *h, size_t expected, uint8_t *
         "%.200s: %zu bytes of %s follow line %u, expected %s%zu; is the file cut off?", h->path,
         h->packed, raw ? "pixels" : "packed pixels", h->lines, raw ? "" : "what unpacks to ",
         expected);
+  if (expected > SONDE_MOST_UNPACKED_BYTES)
+    return sonde_fail(error, SONDE_FORMAT, "%.200s:%u: %zu bytes of pixels, expected at most %llu",
+                      h->path, h->lines, expected, (unsigned long long)SONDE_MOST_UNPACKED_BYTES);
   uint8_t *out = SONDE_NEW(uint8_t, expected);
   if (!out) return sonde_fail_memory(error);
   sonde_status status = SONDE_OK;

@@ -63,14 +63,19 @@ static sonde_status make_grid(work *w, sonde_reconstruct_report *report, sonde_e
     return sonde_fail(error, SONDE_MISMATCH,
                       "no frame with pixels and a pose, nothing to reconstruct from");
   uint32_t size[3];
-  bool fits = true;
   for (int k = 0; k < 3; ++k) {
-    double voxels = floor((high[k] - low[k]) / step + 1e-9) + 2;
-    fits = fits && voxels <= SONDE_SIDE_MAX;
-    size[k] = fits ? (uint32_t)voxels : 1;
-    room *= voxels, space *= high[k] - low[k] + step;
+    double length = high[k] - low[k], voxels = floor(length / step + 1e-9) + 2;
+    if (!(voxels <= SONDE_SIDE_MAX))
+      return sonde_fail(error, SONDE_ARGUMENT,
+                        "a grid of %.3g mm has %.6g voxels along %c, where the frames reach %.4g "
+                        "mm; expected at most %d voxels along an axis: try a spacing of %.2g mm or "
+                        "fewer frames",
+                        step * 1e3, voxels, "xyz"[k], length * 1e3, SONDE_SIDE_MAX,
+                        1.1e3 * length / SONDE_SIDE_MAX);
+    size[k] = (uint32_t)voxels;
+    room *= voxels, space *= length + step;
   }
-  if (!fits || room > (double)w->options.most_voxels)
+  if (room > (double)w->options.most_voxels)
     return sonde_fail(error, SONDE_ARGUMENT,
                       "a grid of %.3g mm has %.3g voxels and needs %.3g GB, expected at most %.3g "
                       "voxels: try a spacing of %.2g mm or fewer frames",

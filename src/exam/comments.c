@@ -5,7 +5,7 @@
 // sonde_comments_*:     the interface.
 #include "sonde/exam_player.h"
 
-#include "base/base.h"
+#include "base/bounds.h"
 
 #include <cjson/cJSON.h>
 #include <math.h>
@@ -13,7 +13,6 @@
 #include <unistd.h>
 
 static const double longest_s = 1e6;
-enum { LARGEST_FILE = 8 << 20 };
 
 static char *path_of(const char *recording) {
   size_t bytes = strlen(recording) + sizeof ".comments.json";
@@ -106,14 +105,14 @@ sonde_status sonde_comments_load(const char *recording, sonde_comments *comments
   cJSON *root = NULL;
   sonde_status status = path && comments->list ? SONDE_OK : sonde_fail_memory(error);
   if (status || access(path, F_OK) != 0) goto done;
-  status = sonde_file_load(path, &bytes, &size, error);
+  status = sonde_bounded_load_text(path, &sonde_limits_json, &bytes, &size, error);
+  if (!status) status = sonde_bounded_json(path, bytes, size, &sonde_limits_json, error);
   if (status) goto done;
-  root = size <= LARGEST_FILE ? cJSON_ParseWithLength(bytes, size) : NULL;
+  root = cJSON_ParseWithLength(bytes, size);
   if (root)
     status = read_all(path, root, comments, error);
   else
-    status = sonde_fail(error, SONDE_FORMAT, "%s: not a JSON object of at most %d bytes", path,
-                        LARGEST_FILE);
+    status = sonde_fail(error, SONDE_FORMAT, "%s: is not a JSON object", path);
 done:
   cJSON_Delete(root);
   sonde_free(bytes);

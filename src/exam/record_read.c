@@ -7,7 +7,7 @@
 // check_records:                     walks all of them.
 #include "exam/record.h"
 
-#include "base/base.h"
+#include "base/bounds.h"
 #include "base/maths.h"
 #include "exam/bytes.h"
 #include "haptics/motion.h"
@@ -152,6 +152,9 @@ static sonde_status read_header(const source *s) {
   const char *line = r->bytes + r->at;
   const char *end = memchr(line, '\n', r->end - r->at);
   if (!end) return sonde_fail(s->error, SONDE_FORMAT, "%s:2: the header does not end", s->path);
+  sonde_status shape =
+      sonde_bounded_json(s->path, line, (size_t)(end - line), &sonde_limits_recording, s->error);
+  if (shape) return shape;
   cJSON *root = cJSON_ParseWithLength(line, (size_t)(end - line));
   if (!root)
     return sonde_fail(s->error, SONDE_FORMAT, "%s:2: the header is not a JSON object", s->path);
@@ -195,7 +198,7 @@ static sonde_status read_end(const source *s) {
   if (r->version >= 4) told->images = get_u64(&reader), told->image_hash = get_u64(&reader);
   told->crc = get_u32(&reader);
   uint32_t crc = (uint32_t)crc32_z(0, (const unsigned char *)r->bytes, r->end - 8);
-  if (crc != told->crc)
+  if (!sonde_checksum_fits(told->crc, crc))
     return sonde_fail(s->error, SONDE_CHECKSUM,
                       "%s: the recording is damaged: its CRC-32 is %08x, expected %08x", s->path,
                       crc, told->crc);
@@ -293,7 +296,7 @@ static sonde_status read_blocks(const source *s) {
     crc = crc32_z(crc, (const unsigned char *)r->bytes + summed, at - summed);
     summed = at;
     byte_reader reader = {(const unsigned char *)r->bytes + at + 4};
-    if (get_u32(&reader) != (uint32_t)crc) break;
+    if (!sonde_checksum_fits(get_u32(&reader), (uint32_t)crc)) break;
     whole = at + bytes;
     r->told.crc = (uint32_t)crc;
   }
@@ -335,7 +338,8 @@ sonde_status sonde_recording_load(const char *path, bool recover, sonde_recordin
   SONDE_ASSERT(path != NULL && recording != NULL);
   *recording = (sonde_recording){0};
   source s = {path, recording, error};
-  sonde_status status = sonde_file_load(path, &recording->bytes, &recording->end, error);
+  sonde_status status =
+      sonde_bounded_load(path, &sonde_limits_recording, &recording->bytes, &recording->end, error);
   if (!status) status = read_magic(&s);
   sonde_status ended = status ? status : read_end(&s);
   if (!status && !recover) status = ended;

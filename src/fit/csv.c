@@ -4,6 +4,8 @@
 // read_header: names of the columns, all different.
 #include "fit/csv.h"
 
+#include "base/bounds.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -72,12 +74,11 @@ static sonde_status read_header(sonde_csv *csv, sonde_error *error) {
 sonde_status sonde_csv_open(sonde_csv *csv, const char *path, sonde_error *error) {
   *csv = (sonde_csv){.path = path};
   size_t bytes;
-  sonde_status status = sonde_file_load(path, &csv->text, &bytes, error);
+  sonde_status status =
+      sonde_bounded_load_text(path, &sonde_limits_table, &csv->text, &bytes, error);
   if (status) return status;
   csv->cursor = csv->text;
   csv->end = csv->text + bytes;
-  if (memchr(csv->text, 0, bytes))
-    return sonde_fail(error, SONDE_FORMAT, "%s: contains a zero byte, expected text", path);
   if (bytes >= 3 && !memcmp(csv->text, "\xEF\xBB\xBF", 3)) csv->cursor += 3;
   return read_header(csv, error);
 }

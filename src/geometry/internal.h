@@ -43,7 +43,7 @@ typedef struct sonde_mesh_builder {
   double scale;
 } sonde_mesh_builder;
 
-// False when out of memory (or beyond 2^31 items).
+// False when out of memory or when the mesh has sonde_limits_mesh.most_items of them.
 bool sonde_builder_vertex(sonde_mesh_builder *builder, sonde_vec3 point);
 bool sonde_builder_face(sonde_mesh_builder *builder, uint32_t a, uint32_t b, uint32_t c);
 

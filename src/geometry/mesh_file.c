@@ -5,6 +5,8 @@
 //   write_stl         binary, single precision
 #include "geometry/internal.h"
 
+#include "base/bounds.h"
+
 #include <locale.h>
 #include <string.h>
 #include <strings.h>
@@ -47,8 +49,13 @@ sonde_status sonde_mesh_load(const char *path, double metres_per_unit, sonde_mes
   size_t count = 0;
   sonde_mesh_builder builder = {.scale = metres_per_unit};
   sonde_status status = check_arguments(path, metres_per_unit, error);
-  if (!status) status = sonde_file_load(path, &bytes, &count, error);
+  if (!status) status = sonde_bounded_load(path, &sonde_limits_mesh, &bytes, &count, error);
   if (!status) status = read_bytes(path, bytes, count, &builder, error);
+  uint64_t most = sonde_limits_mesh.most_items;
+  if (status == SONDE_MEMORY &&
+      (builder.mesh.vertex_count >= most || builder.mesh.face_count >= most))
+    status = sonde_fail(error, SONDE_FORMAT, "%s: expected at most %llu vertices and faces", path,
+                        (unsigned long long)most);
   if (!status && !builder.mesh.face_count)
     status = sonde_fail(error, SONDE_FORMAT, "%s: expected at least one face, found none", path);
   for (uint32_t v = 0; v < builder.mesh.vertex_count && !status; ++v)

@@ -1,6 +1,8 @@
 // Tokens of a text file, line by line, and the mesh that a reader fills.
 #include "geometry/internal.h"
 
+#include "base/bounds.h"
+
 #include <string.h>
 
 static bool blank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f'; }
@@ -79,8 +81,8 @@ sonde_status sonde_text_expected(sonde_text *text, sonde_error *error, const cha
 // Makes room for one more item of `size` bytes.
 static bool grow(void **items, uint32_t count, uint32_t *room, size_t size) {
   SONDE_ASSERT(count <= *room && size > 0);
+  if (count >= sonde_limits_mesh.most_items) return false;
   if (count < *room) return true;
-  if (count > UINT32_MAX / 4) return false;
   uint32_t wanted = *room ? 2 * *room : 1024;
   void *grown = sonde_realloc(*items, *room * size, wanted * size);
   if (!grown) return false;

@@ -162,10 +162,29 @@ static void seat(sonde_mesh *mesh, sonde_probe *probe) {
   probe->half_y_m = (high.y - low.y) / 2;
 }
 
+// The largest extent of a probe in a file, and the smallest of the largest.
+static const double WIDEST_M = 0.5, NARROWEST_M = 1e-3;
+
+static sonde_status check_size(const char *path, const sonde_mesh *mesh, sonde_error *error) {
+  sonde_vec3 low = mesh->vertices[0], high = low;
+  for (uint32_t k = 1; k < mesh->vertex_count; ++k) {
+    sonde_vec3 p = mesh->vertices[k];
+    low = vec3(fmin(low.x, p.x), fmin(low.y, p.y), fmin(low.z, p.z));
+    high = vec3(fmax(high.x, p.x), fmax(high.y, p.y), fmax(high.z, p.z));
+  }
+  double size_m = fmax(high.x - low.x, fmax(high.y - low.y, high.z - low.z));
+  if (size_m >= NARROWEST_M && size_m <= WIDEST_M) return SONDE_OK;
+  return sonde_fail(error, SONDE_ARGUMENT,
+                    "%s: the probe is %.6g mm wide, expected at %s %g; is it in millimetres?", path,
+                    1e3 * size_m, size_m > WIDEST_M ? "most" : "least",
+                    1e3 * (size_m > WIDEST_M ? WIDEST_M : NARROWEST_M));
+}
+
 static sonde_status make_from_file(const char *path, sonde_probe *probe, sonde_error *error) {
   sonde_mesh mesh = {0};
   sonde_error cause = {0};
   sonde_status status = sonde_mesh_load(path, 1e-3, &mesh, error);
+  if (!status) status = check_size(path, &mesh, error);
   if (!status) {
     seat(&mesh, probe);
     status = sonde_convex_hull_within(mesh.vertices, mesh.vertex_count, FILE_TOLERANCE_M,

@@ -2,6 +2,7 @@
 // line_of:  line of a key in the text, for messages.
 // check:    the ranges, for files and for presets made by hand.
 // load, save, apply.
+#include "base/bounds.h"
 #include "base/maths.h"
 #include "identify/forward.h"
 
@@ -50,9 +51,7 @@ static int line_of(const char *text, const char *key) {
   char quoted[80];
   snprintf(quoted, sizeof quoted, "\"%.70s\"", key);
   const char *at = text ? strstr(text, quoted) : NULL;
-  int line = 1;
-  for (const char *c = text; at && c < at; ++c) line += *c == '\n';
-  return line;
+  return at ? (int)sonde_line_of(text, at) : 1;
 }
 
 // Where a preset came from, for messages: "path:line: " or nothing.
@@ -136,16 +135,19 @@ sonde_status sonde_preset_load(const char *path, sonde_preset *preset, sonde_err
   *preset = sonde_preset_default();
   char *text = NULL;
   size_t bytes;
-  sonde_status status = sonde_file_load(path, &text, &bytes, error);
-  if (status) return status;
+  sonde_status status = sonde_bounded_load_text(path, &sonde_limits_json, &text, &bytes, error);
+  if (!status) status = sonde_bounded_json(path, text, bytes, &sonde_limits_json, error);
+  if (status) {
+    sonde_free(text);
+    return status;
+  }
   const char *stop = text;
   cJSON *root = cJSON_ParseWithOpts(text, &stop, 1);
   if (root) {
     status = read_root(&(source){path, text}, root, preset, error);
   } else {
-    int line = 1;
-    for (const char *c = text; stop && c < stop; ++c) line += *c == '\n';
-    status = sonde_fail(error, SONDE_FORMAT, "%s:%d: is not JSON", path, line);
+    status = sonde_fail(error, SONDE_FORMAT, "%s:%u: is not JSON", path,
+                        stop ? sonde_line_of(text, stop) : 1);
   }
   cJSON_Delete(root);
   sonde_free(text);

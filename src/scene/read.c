@@ -7,7 +7,7 @@
 // check_touching: bodies that touch have to bound a solid.
 #include "scene/scene.h"
 
-#include "base/base.h"
+#include "base/bounds.h"
 #include "base/maths.h"
 
 #include <string.h>
@@ -402,9 +402,7 @@ sonde_status sonde_scene_load(const char *path, const char *thigh, sonde_scene *
   char *text = NULL;
   size_t count;
   *scene = NULL;
-  sonde_status status = sonde_file_load(path, &text, &count, error);
-  if (!status && strlen(text) != count)
-    status = sonde_fail(error, SONDE_FORMAT, "%s: a byte 0 in the text, expected YAML", path);
+  sonde_status status = sonde_bounded_load_text(path, &sonde_limits_yaml, &text, &count, error);
   if (!status) status = sonde_scene_parse(text, path, thigh, scene, error);
   sonde_free(text);
   return status;

@@ -12,10 +12,17 @@
 #include "base/maths.h"
 #include "scene/scene.h"
 
-static uint32_t cells(double length_m, double edge_m, uint32_t most) {
-  if (!(edge_m > 0)) return 1;
-  double wanted = ceil(length_m / edge_m - 1e-9);
-  return wanted < 1 ? 1 : wanted > most ? most : (uint32_t)wanted;
+// Cells of at most edge_m along a length; one cell when edge_m is 0.
+static sonde_status cells(double length_m, double edge_m, uint32_t most, uint32_t *count,
+                          sonde_error *error) {
+  double wanted = edge_m > 0 ? fmax(1, ceil(length_m / edge_m - 1e-9)) : 1;
+  if (!(wanted <= most))
+    return sonde_fail(error, SONDE_ARGUMENT,
+                      "edge_mm is %g, which makes %.6g edges along %g mm; expected at most %u, an "
+                      "edge_mm of %.3g or more",
+                      edge_m * 1e3, wanted, length_m * 1e3, most, 1.005e3 * length_m / most);
+  *count = (uint32_t)wanted;
+  return SONDE_OK;
 }
 
 uint32_t sonde_grid_index(const uint32_t n[3], const uint32_t at[3]) {
@@ -94,10 +101,11 @@ sonde_status sonde_grid_skin(const uint32_t n[3], sonde_mesh *mesh, uint32_t **p
 
 sonde_status sonde_shape_box(sonde_vec3 size, double edge_m, sonde_mesh *mesh, sonde_error *error) {
   SONDE_ASSERT(size.x > 0 && size.y > 0 && size.z > 0);
-  const uint32_t n[3] = {cells(size.x, edge_m, 400), cells(size.y, edge_m, 400),
-                         cells(size.z, edge_m, 400)};
-  uint32_t *place = NULL;
-  sonde_status status = sonde_grid_skin(n, mesh, &place, error);
+  const double length_m[3] = {size.x, size.y, size.z};
+  uint32_t n[3], *place = NULL;
+  sonde_status status = SONDE_OK;
+  for (int k = 0; k < 3 && !status; ++k) status = cells(length_m[k], edge_m, 400, &n[k], error);
+  if (!status) status = sonde_grid_skin(n, mesh, &place, error);
   if (status) return status;
   sonde_free(place);
   for (uint32_t i = 0; i < mesh->vertex_count; ++i) {
@@ -115,11 +123,14 @@ sonde_status sonde_shape_ellipsoid(sonde_vec3 radii, double edge_m, sonde_mesh *
                                    sonde_error *error) {
   SONDE_ASSERT(radii.x > 0 && radii.y > 0 && radii.z > 0);
   double largest = fmax(radii.x, fmax(radii.y, radii.z));
-  uint32_t side = edge_m > 0 ? cells(0.5 * SONDE_PI * largest, edge_m, 200) : 8;
+  uint32_t side = 8;
+  sonde_status status =
+      edge_m > 0 ? cells(0.5 * SONDE_PI * largest, edge_m, 200, &side, error) : SONDE_OK;
+  if (status) return status;
   if (side < 2) side = 2;
   const uint32_t n[3] = {side, side, side};
   uint32_t *place = NULL;
-  sonde_status status = sonde_grid_skin(n, mesh, &place, error);
+  status = sonde_grid_skin(n, mesh, &place, error);
   if (status) return status;
   sonde_free(place);
   for (uint32_t i = 0; i < mesh->vertex_count; ++i) {
@@ -179,16 +190,16 @@ static void cap(cylinder *c, uint32_t rim, double z_m, bool bottom) {
 sonde_status sonde_shape_cylinder(double radius_m, double length_m, double edge_m, sonde_mesh *mesh,
                                   sonde_error *error) {
   SONDE_ASSERT(radius_m > 0 && length_m > 0);
-  cylinder c = {.around = edge_m > 0 ? cells(2 * SONDE_PI * radius_m, edge_m, 2000) : 48,
-                .along = cells(length_m, edge_m, 2000),
-                .rings = cells(radius_m, edge_m, 400),
-                .radius_m = radius_m,
-                .length_m = length_m,
-                .mesh = mesh};
+  cylinder c = {.around = 48, .radius_m = radius_m, .length_m = length_m, .mesh = mesh};
+  sonde_status status = cells(length_m, edge_m, 2000, &c.along, error);
+  if (!status) status = cells(radius_m, edge_m, 400, &c.rings, error);
+  if (!status && edge_m > 0)
+    status = cells(2 * SONDE_PI * radius_m, edge_m, 2000, &c.around, error);
+  if (status) return status;
   if (c.around < 12) c.around = 12;
   uint32_t vertices = c.around * (c.along + 1 + 2 * (c.rings - 1)) + 2;
   uint32_t faces = 2 * c.around * (c.along + 2 * (c.rings - 1)) + 2 * c.around;
-  sonde_status status = sonde_mesh_create(mesh, vertices, faces, error);
+  status = sonde_mesh_create(mesh, vertices, faces, error);
   if (status) return status;
   uint32_t bottom = ring(&c, radius_m, -0.5 * length_m), lower = bottom;
   for (uint32_t k = 1; k <= c.along; ++k) {

@@ -2,7 +2,8 @@
 // The numbers are written as this machine holds them (little-endian IEEE 754).
 #include "scene/state.h"
 
-#include "base/base.h"
+#include "base/bounds.h"
+#include "base/maths.h"
 
 #include <string.h>
 
@@ -47,15 +48,47 @@ static sonde_status check(const sonde_scene_state *state, const char *path, cons
   return SONDE_OK;
 }
 
+static bool within(const sonde_vec3 *list, uint32_t count, double most) {
+  for (uint32_t i = 0; i < count; ++i)
+    if (!(v_norm(list[i]) <= most)) return false;
+  return true;
+}
+
+// Numbers that no scene reaches would break what the steps rely on.
+static sonde_status check_numbers(const sonde_scene_state *state, const sonde_kept *kept,
+                                  const char *path, sonde_error *error) {
+  const double FAR_M = 1e4, FAST = 1e5;
+  const sonde_scene *scene = state->scene;
+  bool good = within(kept->position, scene->slot_count, FAR_M) &&
+              within(kept->velocity, scene->slot_count, FAST) &&
+              within(kept->increment, scene->slot_count, FAST) &&
+              within(kept->hint, scene->touch_count, 1 + 1e-6) &&
+              within(kept->bond, state->bond_count, FAR_M);
+  good = good && kept->head->level <= 16 && kept->head->time_s >= 0 && kept->head->time_s <= 1e9;
+  for (uint32_t k = 0; k < scene->body_count && good; ++k) {
+    sonde_quat q = kept->rotation[k];
+    good = fabs(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z - 1) <= 1e-6;
+  }
+  for (uint32_t k = 0; k < state->bond_count && good; ++k)
+    good = kept->slip[k] >= 0 && kept->slip[k] <= FAST;
+  if (good) return SONDE_OK;
+  return sonde_fail(error, SONDE_FORMAT,
+                    "%s: expected positions within %g m, velocities within %g m/s and unit "
+                    "quaternions",
+                    path, FAR_M, FAST);
+}
+
 sonde_status sonde_scene_state_load(sonde_scene_state *state, const char *path,
                                     sonde_error *error) {
   char *bytes = NULL;
   size_t count;
-  sonde_status status = sonde_file_load(path, &bytes, &count, error);
+  sonde_status status = sonde_bounded_load(path, &sonde_limits_snapshot, &bytes, &count, error);
   if (!status) status = check(state, path, bytes, count, error);
   if (!status) {
     SONDE_ASSERT(count == sizeof(header) + state->now.bytes);
-    memcpy(state->now.block, bytes + sizeof(header), state->now.bytes);
+    memcpy(state->undo.block, bytes + sizeof(header), state->undo.bytes);
+    status = check_numbers(state, &state->undo, path, error);
+    if (!status) sonde_kept_copy(&state->now, &state->undo);
   }
   sonde_free(bytes);
   return status;

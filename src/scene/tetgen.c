@@ -10,7 +10,7 @@
 // Poisson's ratio 1/4 and modulus E.
 #include "scene/lattice.h"
 
-#include "base/base.h"
+#include "base/bounds.h"
 #include "base/maths.h"
 
 #include <stdlib.h>
@@ -244,7 +244,8 @@ static sonde_status open_text(const sonde_scene_source *source, const char *name
   snprintf(file, sizeof file, "%s%s", name, ending);
   sonde_source_path(source, file, t->path, sizeof t->path);
   size_t count;
-  sonde_status status = sonde_file_load(t->path, &t->bytes, &count, error);
+  sonde_status status =
+      sonde_bounded_load_text(t->path, &sonde_limits_mesh, &t->bytes, &count, error);
   t->at = t->bytes;
   t->line = 1;
   return status;

@@ -3,11 +3,13 @@
 // remember:     keeps the first error.
 // list_keys:    the keys that were expected, for messages.
 // check_key:    refuses unknown and repeated keys.
-// parse:        builds the document; libyaml's own complaint becomes the message.
+// fail_parser:  libyaml's own complaint becomes the message.
+// check_shape:  one document, within the limits of size, nesting and number of values.
+// build:        the document.
 // sonde_read_*: typed values with ranges.
 #include "scene/yaml.h"
 
-#include "base/base.h"
+#include "base/bounds.h"
 #include "base/maths.h"
 
 #include <stdarg.h>
@@ -56,18 +58,84 @@ void sonde_reader_pass(sonde_reader *reader, sonde_place at, const sonde_error *
   sonde_reader_fail(reader, at, error->status, "%s", error->message);
 }
 
-static void parse(sonde_reader *reader, const char *text) {
+// The parser's own complaint, or that there is no memory.
+static void fail_parser(sonde_reader *reader, const yaml_parser_t *parser) {
+  if (parser->error == YAML_MEMORY_ERROR)
+    sonde_fail_memory(&reader->error);
+  else
+    sonde_fail_at(&reader->error, SONDE_FORMAT, "sonde_reader", "%s:%d: not YAML: %s", reader->name,
+                  (int)parser->problem_mark.line + 1,
+                  parser->problem ? parser->problem : "unreadable text");
+}
+
+static void fail_event(sonde_reader *reader, const yaml_event_t *event, const char *format,
+                       unsigned long long most) {
+  char text[200];
+  snprintf(text, sizeof text, format, most);
+  sonde_fail_at(&reader->error, SONDE_FORMAT, "sonde_reader", "%s:%d: %s", reader->name,
+                (int)event->start_mark.line + 1, text);
+}
+
+// What has been counted of a stream of events.
+typedef struct shape {
+  uint32_t documents, depth;
+  uint64_t items;
+} shape;
+
+static void count_event(sonde_reader *reader, const yaml_event_t *event, shape *seen) {
+  const sonde_input_limits *bounds = &sonde_limits_yaml;
+  bool opens = event->type == YAML_MAPPING_START_EVENT || event->type == YAML_SEQUENCE_START_EVENT;
+  bool closes = event->type == YAML_MAPPING_END_EVENT || event->type == YAML_SEQUENCE_END_EVENT;
+  seen->documents += event->type == YAML_DOCUMENT_START_EVENT;
+  seen->items += opens || event->type == YAML_SCALAR_EVENT || event->type == YAML_ALIAS_EVENT;
+  seen->depth += opens;
+  seen->depth -= closes && seen->depth > 0;
+  if (seen->documents > 1)
+    fail_event(reader, event, "a second document begins, expected %llu", 1);
+  else if (seen->depth > bounds->most_depth)
+    fail_event(reader, event, "expected at most %llu levels of nesting", bounds->most_depth);
+  else if (seen->items > bounds->most_items)
+    fail_event(reader, event, "expected at most %llu values", bounds->most_items);
+}
+
+// Goes over the whole text once without keeping it, so that building the document is bounded.
+static void check_shape(sonde_reader *reader, const char *text, size_t count) {
+  yaml_parser_t parser;
+  yaml_event_t event;
+  shape seen = {0};
+  if (count > sonde_limits_yaml.most_bytes) {
+    sonde_fail_at(&reader->error, SONDE_FORMAT, "sonde_reader",
+                  "%s:1: %zu bytes of YAML, expected at most %llu", reader->name, count,
+                  (unsigned long long)sonde_limits_yaml.most_bytes);
+    return;
+  }
+  if (!yaml_parser_initialize(&parser)) {
+    sonde_fail_memory(&reader->error);
+    return;
+  }
+  yaml_parser_set_input_string(&parser, (const unsigned char *)text, count);
+  for (bool more = true; more && sonde_reader_good(reader);) {
+    if (!yaml_parser_parse(&parser, &event)) {
+      fail_parser(reader, &parser);
+      break;
+    }
+    count_event(reader, &event, &seen);
+    more = event.type != YAML_STREAM_END_EVENT;
+    yaml_event_delete(&event);
+  }
+  yaml_parser_delete(&parser);
+}
+
+static void build(sonde_reader *reader, const char *text, size_t count) {
   yaml_parser_t parser;
   if (!yaml_parser_initialize(&parser)) {
     sonde_fail_memory(&reader->error);
     return;
   }
-  yaml_parser_set_input_string(&parser, (const unsigned char *)text, strlen(text));
+  yaml_parser_set_input_string(&parser, (const unsigned char *)text, count);
   reader->has_document = yaml_parser_load(&parser, &reader->document) == 1;
   if (!reader->has_document)
-    sonde_fail_at(&reader->error, SONDE_FORMAT, "sonde_reader", "%s:%d: not YAML: %s", reader->name,
-                  (int)parser.problem_mark.line + 1,
-                  parser.problem ? parser.problem : "out of memory");
+    fail_parser(reader, &parser);
   else if (!yaml_document_get_root_node(&reader->document))
     sonde_fail_at(&reader->error, SONDE_FORMAT, "sonde_reader",
                   "%s:1: the file is empty, expected a map", reader->name);
@@ -80,7 +148,8 @@ sonde_status sonde_reader_create(const char *text, const char *name, sonde_reade
   sonde_reader *reader = *out = SONDE_NEW(sonde_reader, 1);
   if (!reader) return sonde_fail_memory(error);
   reader->name = name;
-  parse(reader, text);
+  check_shape(reader, text, strlen(text));
+  if (sonde_reader_good(reader)) build(reader, text, strlen(text));
   sonde_status status = sonde_reader_status(reader, error);
   if (status) {
     sonde_reader_destroy(reader);
@@ -135,7 +204,8 @@ static void check_key(sonde_reader *reader, const yaml_node_t *map, const yaml_n
                       key ? key : "(not a word)", what, expected);
     return;
   }
-  for (const yaml_node_pair_t *other = map->data.mapping.pairs.start; other < pair; ++other) {
+  for (const yaml_node_pair_t *other = map->data.mapping.pairs.start;
+       other < pair && sonde_reader_good(reader); ++other) {
     const char *before = scalar(reader, other->key);
     if (before && strcmp(before, key) == 0)
       sonde_reader_fail(reader, pair->key, SONDE_FORMAT, "key '%s' is given twice in %s", key,
@@ -156,7 +226,8 @@ void sonde_read_keys(sonde_reader *reader, sonde_place at, const char *what,
     return;
   }
   const yaml_node_pair_t *end = map->data.mapping.pairs.top;
-  for (const yaml_node_pair_t *p = map->data.mapping.pairs.start; p < end; ++p)
+  for (const yaml_node_pair_t *p = map->data.mapping.pairs.start;
+       p < end && sonde_reader_good(reader); ++p)
     check_key(reader, map, p, what, keys);
 }
 

@@ -8,6 +8,7 @@
 // parse_*       one command each
 #include "stream/page_message.h"
 
+#include "base/bounds.h"
 #include "base/maths.h"
 
 #include <cjson/cJSON.h>
@@ -15,38 +16,15 @@
 
 static const double REACH_MM = 2000; // farthest goal from the model's origin
 
-// Depth of nesting counted outside of strings, so that the recursive parser stays shallow.
-static bool shallow(const char *bytes, size_t count) {
-  int depth = 0;
-  bool quoted = false;
-  for (size_t i = 0; i < count; ++i) {
-    char c = bytes[i];
-    if (quoted) {
-      if (c == '\\')
-        ++i;
-      else if (c == '"')
-        quoted = false;
-    } else if (c == '"') {
-      quoted = true;
-    } else if (c == '{' || c == '[') {
-      if (++depth > PAGE_COMMAND_DEPTH) return false;
-    } else if (c == '}' || c == ']') {
-      --depth;
-    }
-  }
-  return true;
-}
-
 static sonde_status check_shape(const char *bytes, size_t count, sonde_error *error) {
   if (count == 0 || count > PAGE_COMMAND_BYTES)
     return sonde_fail(error, SONDE_FORMAT, "a message must have 1 to %d bytes, not %zu",
                       PAGE_COMMAND_BYTES, count);
   if (memchr(bytes, 0, count))
     return sonde_fail(error, SONDE_FORMAT, "a message must not contain a zero byte");
-  if (!shallow(bytes, count))
-    return sonde_fail(error, SONDE_FORMAT, "a message must not nest deeper than %d levels",
-                      PAGE_COMMAND_DEPTH);
-  return SONDE_OK;
+  static const sonde_input_limits MESSAGE = {"a message", PAGE_COMMAND_BYTES, PAGE_COMMAND_BYTES,
+                                             PAGE_COMMAND_DEPTH};
+  return sonde_bounded_json(NULL, bytes, count, &MESSAGE, error);
 }
 
 // Leaves *value as it is when the key is absent.

@@ -6,7 +6,7 @@
 #include "tissue/model_file.h"
 #include "tissue/model.h"
 
-#include "base/base.h"
+#include "base/bounds.h"
 #include "base/maths.h"
 
 #include <cjson/cJSON.h>
@@ -552,9 +552,10 @@ sonde_status sonde_model_load(const char *path, sonde_model **out, sonde_error *
   sonde_error scratch = {0};
   cJSON *header = NULL;
   sonde_model *model = SONDE_NEW(sonde_model, 1);
-  sonde_status status =
-      model ? sonde_file_load(path, &bytes, &count, error) : sonde_fail_memory(error);
+  sonde_status status = model ? sonde_bounded_load(path, &sonde_limits_model, &bytes, &count, error)
+                              : sonde_fail_memory(error);
   if (!status) status = split(path, bytes, count, &text, &blob, &start, error);
+  if (!status) status = sonde_bounded_json(path, bytes + start, text, &sonde_limits_model, error);
   if (!status) {
     header = cJSON_ParseWithLength(bytes + start, text);
     reader r = {path, header, bytes + start + text, blob, &scratch};

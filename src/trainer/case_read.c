@@ -6,6 +6,8 @@
 // check_id, sonde_case_check:      what no single key can tell.
 #include "trainer/case.h"
 
+#include "base/bounds.h"
+
 #include <ctype.h>
 #include <string.h>
 
@@ -338,9 +340,7 @@ sonde_status sonde_case_parse(const char *text, const char *name, sonde_case *ou
 sonde_status sonde_case_load(const char *path, sonde_case *out, sonde_error *error) {
   char *text = NULL;
   size_t count;
-  sonde_status status = sonde_file_load(path, &text, &count, error);
-  if (!status && strlen(text) != count)
-    status = sonde_fail(error, SONDE_FORMAT, "%s: has zero bytes, expected text", path);
+  sonde_status status = sonde_bounded_load_text(path, &sonde_limits_yaml, &text, &count, error);
   if (!status) status = sonde_case_parse(text, path, out, error);
   sonde_free(text);
   return status;

@@ -4,6 +4,8 @@
 // add_point, add_stop:      places on a thigh.
 #include "trainer/trainer.h"
 
+#include "base/bounds.h"
+
 #include <string.h>
 
 static const double DEGREE = SONDE_PI / 180, SAME_M = 1e-6;
@@ -110,9 +112,7 @@ sonde_status sonde_exam_protocol_load(const char *path, sonde_exam_protocol *out
                                       sonde_error *error) {
   char *text = NULL;
   size_t count;
-  sonde_status status = sonde_file_load(path, &text, &count, error);
-  if (!status && strlen(text) != count)
-    status = sonde_fail(error, SONDE_FORMAT, "%s: has zero bytes, expected text", path);
+  sonde_status status = sonde_bounded_load_text(path, &sonde_limits_yaml, &text, &count, error);
   if (!status) status = sonde_exam_protocol_parse(text, path, out, error);
   sonde_free(text);
   return status;

@@ -59,6 +59,16 @@ static const bad_scene BAD[] = {
     {"sonde_scene: 1\nstep: {lambda: 1, method: explicit}\nbodies:\n" BALL, SONDE_FORMAT,
      "lambda belongs to the implicit method"},
     {HEAD "- {name: t, kind: two_layer, model: thigh}\n", SONDE_NOT_FOUND, ":3: the bundled thigh"},
+    {HEAD BALL "---\n" HEAD BALL, SONDE_FORMAT, ":4: a second document begins, expected 1"},
+    {HEAD BALL "...\n{\n", SONDE_FORMAT, ":5: "},
+    {"title: [[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[", SONDE_FORMAT,
+     ":1: expected at most 32 levels of nesting"},
+    {HEAD "- {name: a, shape: {sphere_mm: 50, edge_mm: 0.01}, mass_kg: 1}\n", SONDE_ARGUMENT,
+     ":3: edge_mm is 0.01, which makes 7854 edges along 78.5398 mm; expected at most 200"},
+    {HEAD "- {name: a, shape: {box_mm: [80, 1, 1], edge_mm: 0.1}, mass_kg: 1}\n", SONDE_ARGUMENT,
+     ":3: edge_mm is 0.1, which makes 800 edges along 80 mm"},
+    {HEAD "- {name: a, shape: {cylinder_mm: {radius: 9, length: 9}, edge_mm: 0.02}, mass_kg: 1}\n",
+     SONDE_ARGUMENT, ":3: edge_mm is 0.02"},
     {HEAD "- {name: 'a/b', shape: {sphere_mm: 5}, mass_kg: 1}\n", SONDE_FORMAT, "letters"},
 };
 
