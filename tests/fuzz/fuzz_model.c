@@ -1,48 +1,11 @@
-// Model files: the input is a list of edits (three bytes of place, one byte of value) to a valid
-// file, whose checksum is then made right again so that the reader goes on. It has to refuse the
-// file or hand out a model whose indices and sizes hold.
+// Model files. The first byte chooses: an even one is followed by a list of edits (three bytes of
+// place, one byte of value) to a valid file, an odd one by the file itself. The checksum is made
+// right so that the reader goes on. The reader has to refuse the file or hand out a model whose
+// indices and sizes hold; the model is pressed and seen.
 #include "fuzz.h"
 
 #include <math.h>
 #include <zlib.h>
-
-static char *valid;
-static size_t valid_count;
-
-// A small closed skin: a box of 8 vertices, big enough for the default vessels.
-static void make_skin(sonde_mesh *skin, sonde_error *error) {
-  static const uint32_t faces[12][3] = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6},
-                                        {0, 1, 4}, {1, 5, 4}, {2, 6, 3}, {3, 6, 7},
-                                        {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
-  FUZZ_CHECK(sonde_mesh_create(skin, 8, 12, error) == SONDE_OK);
-  for (uint32_t i = 0; i < 8; ++i)
-    skin->vertices[i] = (sonde_vec3){i & 1 ? 0.08 : -0.08, i & 2 ? 0.08 : -0.08, i & 4 ? 0.2 : 0.0};
-  memcpy(skin->faces, faces, sizeof faces);
-}
-
-static void make_valid(void) {
-  sonde_error error = {SONDE_OK, "", ""};
-  sonde_mesh skin;
-  make_skin(&skin, &error);
-  sonde_site site = {1, {0.08, 0, 0.1}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, 2e5, 0.05, 1.2, 0.9};
-  sonde_model_def def = sonde_model_def_default();
-  def.name = "box";
-  def.provenance = "made for the fuzzer";
-  def.skin = &skin;
-  def.sites = &site;
-  def.site_count = 1;
-  def.fine_edge_m = 0.05;
-  sonde_model *model = NULL;
-  sonde_status status = sonde_model_build(&def, &model, &error);
-  if (status) fprintf(stderr, "%s\n", error.message);
-  FUZZ_CHECK(status == SONDE_OK);
-  const char *path = fuzz_file("sonde", (const uint8_t *)"", 0);
-  FUZZ_CHECK(sonde_model_save(model, path, &error) == SONDE_OK);
-  FUZZ_CHECK(sonde_file_load(path, &valid, &valid_count, &error) == SONDE_OK);
-  unlink(path);
-  sonde_model_destroy(model);
-  sonde_mesh_clear(&skin);
-}
 
 static void check_model(const sonde_model *model) {
   uint32_t nodes = model->surface.vertex_count;
@@ -57,29 +20,44 @@ static void check_model(const sonde_model *model) {
   FUZZ_CHECK(memchr(model->name, 0, sizeof model->name) != NULL);
 }
 
-int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t count) {
-  if (!valid) make_valid();
-  uint8_t *file = malloc(valid_count);
+// The file that the input means; *size receives its length, freed by the caller.
+static uint8_t *file_of(const uint8_t *bytes, size_t count, size_t *size) {
+  static char *valid;
+  static size_t valid_count;
+  sonde_error error = {SONDE_OK, "", ""};
+  if (!valid)
+    FUZZ_CHECK(sonde_file_load(fuzz_leg_file(), &valid, &valid_count, &error) == SONDE_OK);
+  bool whole = bytes[0] % 2;
+  *size = whole ? count - 1 : valid_count;
+  uint8_t *file = malloc(*size + 4);
   FUZZ_CHECK(file);
-  memcpy(file, valid, valid_count);
-  for (size_t i = 0; i + 4 <= count; i += 4) {
+  memcpy(file, whole ? bytes + 1 : (const uint8_t *)valid, *size);
+  for (size_t i = 1; !whole && i + 4 <= count; i += 4) {
     size_t place = (size_t)bytes[i] | (size_t)bytes[i + 1] << 8 | (size_t)bytes[i + 2] << 16;
     file[place % (valid_count - 4)] = bytes[i + 3];
   }
-  uint32_t sum = (uint32_t)crc32(0, file, (uInt)(valid_count - 4));
-  memcpy(file + valid_count - 4, &sum, 4);
-  const char *path = fuzz_file("sonde", file, valid_count);
+  return file;
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t count) {
+  if (count < 1) return 0;
+  size_t size;
+  uint8_t *file = file_of(bytes, count, &size);
+  if (size >= 4) {
+    uint32_t sum = (uint32_t)crc32(0, file, (uInt)(size - 4));
+    memcpy(file + size - 4, &sum, 4);
+  }
+  const char *path = fuzz_file("model.sonde", file, size);
+  free(file);
   sonde_model *model = NULL;
   sonde_error error = {SONDE_OK, "", ""};
-  sonde_status status = sonde_model_load(path, &model, &error);
-  if (count < 4)
-    FUZZ_CHECK(status == SONDE_OK); // the untouched file: the checksum is where we think
-  if (status)
-    fuzz_check_error(status, &error);
-  else
+  if (fuzz_checked(sonde_model_load(path, &model, &error), &error)) {
+    sonde_pathology healthy;
+    FUZZ_CHECK(sonde_pathology_preset("healthy", &healthy, &error) == SONDE_OK);
     check_model(model);
+    fuzz_step_model(model, NULL);
+    if ((bytes[0] & 2) && fuzz_chosen(bytes, count, 8)) fuzz_picture(model, &healthy, NULL);
+  }
   sonde_model_destroy(model);
-  unlink(path);
-  free(file);
   return 0;
 }
