@@ -11,6 +11,7 @@ static const char VERB[] = "exam";
 static const char HELP[] =
     "usage: sonde exam --case ID|FILE [options]\n"
     "       sonde exam --compare [options]\n"
+    "       sonde exam --recover DIR [--json]\n"
     "\n"
     "Lets a scripted operator examine a case in lockstep and scores the exam. The operator sees\n"
     "what a trainee sees, never the truth. Formulas: docs/trainer.md.\n"
@@ -21,6 +22,9 @@ static const char HELP[] =
     "  --seed N          of the operator's hand (0 to 4294967295); default 1\n"
     "  --compare         every case by every operator, and each metric's separation\n"
     "  --seeds N         exams of each operator on each case when comparing (1 to 100); default 1\n"
+    "  --recover DIR     of a directory of exams kept by sonde run: adds to its log the exams "
+    "whose\n"
+    "                    program was killed, makes missing results and reports from the journals\n"
     "  --solid           the inside by finite elements, as in real time; slower\n"
     "  --cases DIR       cases from there\n"
     "  --protocols DIR   protocols from there\n"
@@ -29,7 +33,7 @@ static const char HELP[] =
     "  --help            this text\n";
 
 typedef struct arguments {
-  const char *patient, *protocol, *operator_name, *cases, *protocols, *directory;
+  const char *patient, *protocol, *operator_name, *cases, *protocols, *directory, *recover;
   long seed, seeds;
   bool compare, solid, json, help;
 } arguments;
@@ -46,6 +50,7 @@ static bool read_option(int option, arguments *a) {
   case 'o': a->directory = optarg; return true;
   case 'x': return a->compare = true;
   case 'S': return a->solid = true;
+  case 'R': a->recover = optarg; return true;
   case 'j': return a->json = true;
   case 'h': return a->help = true;
   default: return false;
@@ -63,6 +68,7 @@ static bool read_arguments(int argc, char **argv, arguments *a) {
                                        {"output", required_argument, NULL, 'o'},
                                        {"compare", no_argument, NULL, 'x'},
                                        {"solid", no_argument, NULL, 'S'},
+                                       {"recover", required_argument, NULL, 'R'},
                                        {"json", no_argument, NULL, 'j'},
                                        {"help", no_argument, NULL, 'h'},
                                        {NULL, 0, NULL, 0}};
@@ -73,7 +79,7 @@ static bool read_arguments(int argc, char **argv, arguments *a) {
     app_usage_error(VERB, "unexpected argument '%s'", argv[optind]);
     return false;
   }
-  if (a->compare || a->patient) return true;
+  if (a->compare || a->patient || a->recover) return true;
   app_usage_error(VERB, "--case is missing");
   return false;
 }
@@ -191,6 +197,7 @@ int cmd_exam(int argc, char **argv) {
   }
   if (!known_operator(a.operator_name)) return APP_BAD_INPUT;
   exam_library library = exam_library_find(a.cases, a.protocols);
+  if (a.recover) return exam_recover(&library, a.recover, a.json);
   sonde_exam_protocol protocol;
   sonde_error error = {0};
   sonde_status status = exam_find_protocol(&library, a.protocol, &protocol, &error);

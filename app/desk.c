@@ -1,6 +1,6 @@
 // Practice, exams and replays behind one page.
 //
-// take_request, watch     what the page's threads leave
+// take_request            what the page's threads leave
 // end_session             the session before, with its recording
 // desk_run_session        another thigh
 // answer                  one request
@@ -34,13 +34,6 @@ static bool next_request(desk *d, sonde_page_request *request) {
   }
   pthread_mutex_unlock(&d->lock);
   return any;
-}
-
-static void watch(void *user, const sonde_frame *frame) {
-  desk *d = user;
-  pthread_mutex_lock(&d->lock);
-  if (d->phase == DESK_RUNNING && d->exam) desk_exam_observe(d->exam, frame);
-  pthread_mutex_unlock(&d->lock);
 }
 
 const char *desk_path(char path[DESK_PATH], const char *directory, const char *name) {
@@ -88,11 +81,14 @@ static sonde_status make_session(desk *d, sonde_session_def *def, const sonde_si
   return status;
 }
 
-// The server must not show it any more. A recording that could not be written is told.
+// The server must not show it any more. An exam that the log lacks by then gets its row.
 static void end_session(desk *d, sonde_session *session) {
   sonde_error error = {0};
+  desk_recovered found;
+  bool recorded = sonde_session_recording(session).recording;
   sonde_session_stop(session);
   if (sonde_session_destroy(session, &error)) sonde_page_tell(d->server, error.message);
+  if (recorded) desk_recover(d->exams, d->log, &found);
 }
 
 void desk_end_session(desk *d) {
@@ -152,6 +148,17 @@ sonde_status desk_practice(desk *d, sonde_error *error) {
 
 // ---- requests
 
+// A note of the exam that runs, at the last image that the judge saw.
+static sonde_status note(desk *d, sonde_note_kind kind, cJSON *root, uint64_t tick,
+                         sonde_error *error) {
+  char *text = cJSON_PrintUnformatted(root);
+  cJSON_Delete(root);
+  if (!text) return app_error(error, SONDE_MEMORY, "out of memory");
+  sonde_status status = sonde_session_note(d->session, kind, tick, text, error);
+  cJSON_free(text);
+  return status;
+}
+
 static sonde_status decide(desk *d, const sonde_page_request *request, sonde_error *error) {
   sonde_decision decision;
   if (d->phase != DESK_RUNNING)
@@ -162,8 +169,13 @@ static sonde_status decide(desk *d, const sonde_page_request *request, sonde_err
   pthread_mutex_lock(&d->lock);
   uint32_t segment = sonde_vein_segment(&d->exam->setup.map, request->id);
   sonde_status status = sonde_judge_decide(d->exam->judge, segment, decision, error);
+  uint64_t tick = d->exam->seen_tick;
   pthread_mutex_unlock(&d->lock);
-  return status;
+  if (status) return status;
+  cJSON *root = cJSON_CreateObject();
+  cJSON_AddStringToObject(root, "segment", request->id);
+  cJSON_AddStringToObject(root, "decision", request->text);
+  return note(d, SONDE_NOTE_DECISION, root, tick, error);
 }
 
 static sonde_status hint(desk *d, sonde_error *error) {
@@ -171,8 +183,9 @@ static sonde_status hint(desk *d, sonde_error *error) {
     return app_error(error, SONDE_ARGUMENT, "hints belong to an exam with hints");
   pthread_mutex_lock(&d->lock);
   sonde_judge_hint(d->exam->judge);
+  uint64_t tick = d->exam->seen_tick;
   pthread_mutex_unlock(&d->lock);
-  return SONDE_OK;
+  return note(d, SONDE_NOTE_HINT, cJSON_CreateObject(), tick, error);
 }
 
 static sonde_status play(desk *d, const sonde_page_request *request, sonde_error *error) {
@@ -209,6 +222,8 @@ void desk_turn(desk *d) {
     asked = true;
   }
   if (d->phase == DESK_REPLAY) desk_replay_turn(d);
+  desk_watch_disk(d);
+  desk_keep(d);
   double now_s = app_seconds(CLOCK_MONOTONIC);
   if (!asked && now_s - d->published_s < TELL_EVERY_S) return;
   d->published_s = now_s;
@@ -253,11 +268,19 @@ static sonde_status create_page(desk *d, sonde_error *error) {
                          .force_limit_n = d->def.force_limit_n,
                          .exams_directory = d->exams,
                          .user = d,
-                         .observe = watch,
                          .request = take_request};
   status = sonde_page_start(&page, d->session, &d->server, error);
   if (status) return status;
-  desk_recover(d);
+  desk_recovered found;
+  desk_recover(d->exams, d->log, &found);
+  if (found.unreadable)
+    fprintf(stderr, "sonde run: %u of %u exams in %s cannot be read: %s\n", found.unreadable,
+            found.exams, d->exams, found.worst);
+  if (found.finished)
+    fprintf(stderr,
+            "sonde run: %u finished exams were not in the log; "
+            "sonde exam --recover %s makes their reports\n",
+            found.finished, d->exams);
   desk_tell_greeting(d);
   desk_tell_exam(d);
   return sonde_session_start(d->session, error);
@@ -290,6 +313,8 @@ void desk_address(const desk *d, char address[SONDE_PAGE_ADDRESS]) {
 
 sonde_status desk_destroy(desk *d, sonde_error *error) {
   if (!d) return SONDE_OK;
+  if (d->exam) d->exam->again_s = 0;
+  desk_keep(d); // the last attempt
   sonde_page_stop(d->server);
   if (d->session) sonde_session_stop(d->session);
   sonde_status status = sonde_session_destroy(d->session, error);

@@ -1,19 +1,17 @@
 // An exam at the desk: begun on a case's thigh, watched frame by frame, judged, kept.
 //
 // name_exam            id, directory and date
-// prepare, begin       thigh, plan, judge, session
-// keep_start           what a replay needs beside the recording
+// desk_exam_prepare, begin   thigh, plan, judge, session
+// watch                every image, on the session's image thread
 // shrink, keep_pictures   the learner's own pictures of a press
 // desk_exam_observe    one frame
 // desk_exam_finish     judged and kept
 #include "desk_parts.h"
 
-#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 static sonde_status name_exam(desk *d, desk_exam *exam, sonde_error *error) {
@@ -27,62 +25,38 @@ static sonde_status name_exam(desk *d, desk_exam *exam, sonde_error *error) {
   unsigned mark = (unsigned)(now.tv_nsec / 1000 ^ (long)getpid()) & 0xffff;
   snprintf(exam->id, sizeof exam->id, "%s-%04x", stamp, mark);
   desk_path(exam->directory, d->exams, exam->id);
-  if (mkdir(exam->directory, 0700) == 0) return SONDE_OK;
-  return app_error(error, SONDE_IO, "%.300s cannot be made: %s", exam->directory, strerror(errno));
+  return sonde_directory_make(exam->directory, 0700, false, error);
 }
 
-static sonde_status prepare(desk *d, desk_exam *exam, sonde_error *error) {
-  const char *bundled = d->def.bundled_path ? d->def.bundled_path : d->def.model_path;
-  sonde_status status = sonde_case_build(&exam->patient, bundled, d->cases, &exam->setup, error);
+sonde_status desk_exam_prepare(desk_exam *exam, const char *bundled, const char *cases,
+                               sonde_error *error) {
+  sonde_status status = sonde_case_build(&exam->patient, bundled, cases, &exam->setup, error);
   if (!status)
     status = sonde_plan_make(exam->protocol, &exam->setup.map, &exam->patient.criteria, &exam->plan,
                              error);
   if (!status) status = sonde_judge_create(&exam->setup.map, &exam->plan, &exam->judge, error);
   if (!status && !(exam->sample = calloc(DESK_SAMPLES, sizeof *exam->sample)))
-    status = error->status = SONDE_MEMORY;
+    status = app_error(error, SONDE_MEMORY, "out of memory");
   return status;
 }
 
-static sonde_status write_json(const char *directory, const char *name, const cJSON *root,
-                               sonde_error *error) {
-  char path[DESK_PATH], *text = cJSON_Print(root);
-  sonde_file *file = NULL;
-  desk_path(path, directory, name);
-  sonde_status status = text ? sonde_file_create(path, &file, error) : SONDE_MEMORY;
-  if (!status) {
-    sonde_file_write(file, text, strlen(text));
-    status = sonde_file_commit(file, error);
-  }
-  cJSON_free(text);
-  return status;
+static void watch(void *user, const sonde_frame *frame) {
+  desk_exam *exam = user;
+  pthread_mutex_lock(exam->lock);
+  desk_exam_observe(exam, frame);
+  pthread_mutex_unlock(exam->lock);
 }
 
-// The case as it was, so that a replay does not depend on the library of cases.
-static sonde_status keep_start(const desk_exam *exam, sonde_error *error) {
-  char path[DESK_PATH];
-  desk_path(path, exam->directory, "case.yaml");
-  sonde_status status = sonde_case_save(&exam->patient, path, error);
-  if (status) return status;
-  cJSON *root = cJSON_CreateObject();
-  cJSON_AddStringToObject(root, "exam", exam->id);
-  cJSON_AddStringToObject(root, "trainee", exam->trainee);
-  cJSON_AddStringToObject(root, "case", exam->patient.id);
-  cJSON_AddStringToObject(root, "title", exam->patient.title);
-  cJSON_AddStringToObject(root, "protocol", exam->protocol->id);
-  cJSON_AddStringToObject(root, "guidance", exam->guidance);
-  cJSON_AddStringToObject(root, "date", exam->date);
-  status = write_json(exam->directory, "start.json", root, error);
-  cJSON_Delete(root);
-  return status;
-}
-
-static sonde_status run(desk *d, desk_exam *exam, sonde_error *error) {
+static sonde_status run(desk *d, desk_exam *exam, const char *setup, sonde_error *error) {
   char recording[DESK_PATH];
   desk_path(recording, exam->directory, "exam.rec");
   sonde_session_def def = d->def.practice;
   sonde_case_session(&exam->setup, &def);
   def.model_path = exam->patient.thigh == SONDE_CASE_BUNDLED ? d->def.model_path : NULL;
   def.record_path = recording;
+  def.record_setup = setup;
+  def.watch = watch;
+  def.watch_user = exam;
   sonde_vein_point first = sonde_vein_at(&exam->setup.map, 0.0);
   sonde_site site = {.position_m = first.skin_m, .normal = first.normal, .u = first.across};
   return desk_run_session(d, &def, &site, error);
@@ -92,13 +66,15 @@ static void copy_text(char *to, size_t size, const char *from) { snprintf(to, si
 
 // The learner is told nothing before the session is shown.
 static sonde_status begin(desk *d, desk_exam *exam, sonde_error *error) {
-  sonde_status status = prepare(d, exam, error);
+  char *setup = NULL;
+  const char *bundled = d->def.bundled_path ? d->def.bundled_path : d->def.model_path;
+  sonde_status status = desk_exam_prepare(exam, bundled, d->cases, error);
   if (!status) status = name_exam(d, exam, error);
-  if (!status) exam->held = desk_hold(exam->directory);
-  if (!status) status = keep_start(exam, error);
+  if (!status) status = desk_exam_setup_text(exam, &setup, error);
   if (status) return status;
   sonde_page_conceal(d->server, true, strcmp(exam->guidance, "full") != 0);
-  status = run(d, exam, error);
+  status = run(d, exam, setup, error);
+  free(setup);
   if (status) sonde_page_conceal(d->server, false, false);
   return status;
 }
@@ -111,7 +87,7 @@ sonde_status desk_exam_start(desk *d, const sonde_page_request *request, sonde_e
                      patient ? "protocol" : "case");
   desk_exam *exam = calloc(1, sizeof *exam);
   if (!exam) return app_error(error, SONDE_MEMORY, "out of memory");
-  exam->held = -1;
+  exam->lock = &d->lock;
   exam->patient = *patient;
   exam->protocol = protocol;
   copy_text(exam->guidance, sizeof exam->guidance, request->guidance);
@@ -119,10 +95,13 @@ sonde_status desk_exam_start(desk *d, const sonde_page_request *request, sonde_e
   copy_text(d->trainee, sizeof d->trainee, request->name);
   desk_phase before = d->phase;
   desk_set_phase(d, DESK_PREPARING, "The patient is being prepared.");
+  const sonde_session *session = d->session;
   sonde_status status = begin(d, exam, error);
   if (status) {
+    bool bare = d->session != session || !session; // what ran before is gone
+    if (bare) desk_end_session(d);
     desk_exam_destroy(exam);
-    desk_set_phase(d, before, error->message);
+    if (!bare || desk_practice(d, NULL)) desk_set_phase(d, before, error->message);
     return status;
   }
   desk_change(d, exam, NULL);
@@ -189,25 +168,26 @@ static void watch_curve(desk_exam *exam, const sonde_snapshot *s) {
 
 void desk_exam_observe(desk_exam *exam, const sonde_frame *frame) {
   sonde_judge_feed(exam->judge, &frame->snapshot);
+  exam->seen_tick = frame->snapshot.tick;
   watch_pictures(exam, frame);
   watch_curve(exam, &frame->snapshot);
 }
 
 // ---- the end
 
+// What the disk does not take is told and tried again by desk_keep().
 sonde_status desk_exam_finish(desk *d, sonde_error *error) {
   desk_exam *exam = d->exam;
   if (d->phase != DESK_RUNNING)
     return app_error(error, SONDE_ARGUMENT, "there is no exam to finish");
-  desk_set_phase(d, DESK_DONE, ""); // from here on nothing is watched
-  sonde_session_stop(d->session);
+  desk_set_phase(d, DESK_DONE, "");
+  sonde_session_stop(d->session); // from here on nothing is watched
   sonde_judge_finish(exam->judge);
   sonde_judge_score(exam->judge, &exam->patient, &exam->score);
-  sonde_status status = desk_exam_save(d, exam, error);
   exam->scored = true;
+  desk_keep(d);
   desk_tell_exam(d);
-  desk_tell_exams(d);
-  return status;
+  return SONDE_OK;
 }
 
 void desk_exam_destroy(desk_exam *exam) {
@@ -219,7 +199,6 @@ void desk_exam_destroy(desk_exam *exam) {
   sonde_image_clear(&exam->open.image);
   sonde_image_clear(&exam->closed.image);
   free(exam->sample);
-  if (exam->held >= 0) close(exam->held);
   sonde_judge_destroy(exam->judge);
   sonde_case_setup_clear(&exam->setup);
   free(exam);

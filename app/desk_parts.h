@@ -44,14 +44,30 @@ typedef struct desk_exam {
   bool scored;
   sonde_score score;
   char date[32];
-  int held; // file that says that the exam runs, locked; < 0: none
+  bool noted, in_journal, filed, logged; // the score is a note; on the disk: inputs; files; row
+  bool gap_told;                         // that inputs are missing
+  double again_s;                        // clock of the next attempt
+  pthread_mutex_t *lock;                 // the desk's
   // under the lock
+  uint64_t seen_tick; // of the last image that the judge saw
   uint32_t picture_count, presses_seen;
   sonde_exam_picture picture[DESK_PICTURES]; // owned here
   desk_picture open, closed;                 // of the press under way
   sonde_exam_sample *sample;                 // [DESK_SAMPLES] ten a second
   uint32_t sample_count;
 } desk_exam;
+
+// Where cases and thighs are.
+typedef struct desk_library {
+  const char *bundled, *cases, *protocols;
+} desk_library;
+
+typedef struct desk_recovered {
+  uint32_t exams, finished, interrupted, running; // journals in the directory
+  uint32_t added, unreadable;
+  uint32_t never_began;      // the disk did not take the setup, and the learner was told so
+  char worst[DESK_SENTENCE]; // why the last unreadable one is
+} desk_recovered;
 
 typedef struct desk_replay {
   char id[64], title[96], recording[DESK_PATH];
@@ -81,6 +97,8 @@ struct desk {
   desk_exam *exam;     // NULL: none
   desk_replay *replay; // NULL: none
   double published_s;
+  bool disk_told; // that the disk does not take the recording
+  double disk_told_s;
 
   pthread_mutex_t lock;
   sonde_page_request request[DESK_REQUESTS]; // ring
@@ -94,18 +112,33 @@ void desk_tell_exams(desk *d);
 void desk_tell_replay(desk *d);
 
 // desk_exam.c
+// Thigh, plan and judge of a case that the exam has.
+sonde_status desk_exam_prepare(desk_exam *exam, const char *bundled, const char *cases,
+                               sonde_error *error);
 sonde_status desk_exam_start(desk *d, const sonde_page_request *request, sonde_error *error);
 void desk_exam_observe(desk_exam *exam, const sonde_frame *frame); // under the lock
 sonde_status desk_exam_finish(desk *d, sonde_error *error);
 // The session must be gone.
 void desk_exam_destroy(desk_exam *exam);
 
-// desk_keep.c: data, report and log of an exam that is over.
-sonde_status desk_exam_save(desk *d, desk_exam *exam, sonde_error *error);
-// Exams whose program ended before them: their recordings get names, and rows in the log.
-void desk_recover(desk *d);
-// Says that an exam runs, until the descriptor is closed.
-int desk_hold(const char *directory);
+// desk_keep.c: data, report and log of an exam that is over, derived from what the judge saw.
+// The text of the journal's note that says what the exam is about; freed by free().
+sonde_status desk_exam_setup_text(const desk_exam *exam, char **text, sonde_error *error);
+// Writes what is missing of the files and the log's row.
+sonde_status desk_exam_save(sonde_exam_log *log, desk_exam *exam, sonde_error *error);
+// Brings an exam that is over to the disk, as far as the disk takes it; later turns try again.
+void desk_keep(desk *d);
+// Says when the disk does not take the recording, and when it does again.
+void desk_watch_disk(desk *d);
+
+// desk_recover.c: exams that the log lacks.
+// Adds them to the log: with their score, or as interrupted.
+void desk_recover(const char *exams, sonde_exam_log *log, desk_recovered *found);
+// Plays the journal of a finished exam to a judge and writes the files that are missing.
+sonde_status desk_derive(const desk_library *library, const char *exams, const char *id,
+                         sonde_exam_log *log, bool *derived, sonde_error *error);
+// What a journal's setup says; the strings are owned by `root`, which cJSON_Delete() frees.
+bool desk_read_setup(const char *recording, cJSON **root);
 
 // desk_replay.c
 sonde_status desk_replay_open(desk *d, const char *id, sonde_error *error);

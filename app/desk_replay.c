@@ -50,8 +50,16 @@ static sonde_status load_thigh(desk *d, desk_replay *replay, const char *directo
                                sonde_error *error) {
   char path[DESK_PATH];
   sonde_case patient;
-  desk_path(path, directory, "case.yaml");
-  sonde_status status = sonde_case_load(path, &patient, error);
+  cJSON *setup = NULL;
+  sonde_status status;
+  const char *text = NULL;
+  if (desk_read_setup(desk_path(path, directory, "exam.rec"), &setup))
+    text = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(setup, "patient"));
+  if (text)
+    status = sonde_case_parse(text, path, &patient, error);
+  else // an exam from before the journal
+    status = sonde_case_load(desk_path(path, directory, "case.yaml"), &patient, error);
+  cJSON_Delete(setup);
   if (status) return status;
   snprintf(replay->title, sizeof replay->title, "%s", patient.title);
   const char *bundled = d->def.bundled_path ? d->def.bundled_path : d->def.model_path;

@@ -29,4 +29,7 @@ typedef struct compare_options {
 // Every case by every operator; prints the table and each metric's separation.
 int exam_compare(const compare_options *options);
 
+// Brings the log, results and reports of a directory of exams up to what their journals say.
+int exam_recover(const exam_library *library, const char *directory, bool json);
+
 #endif

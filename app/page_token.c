@@ -61,7 +61,8 @@ sonde_status page_token_find(const char *directory, const char *name, const char
   sonde_status status = sonde_page_token_make(token, error);
   if (status) return status;
   if (!write_token(path, token))
-    return app_error(error, SONDE_IO, "%.300s cannot be written: %s", path, strerror(errno));
+    return app_error(error, errno == EACCES || errno == EROFS ? SONDE_IO : SONDE_DISK,
+                     "%.300s cannot be written: %s", path, strerror(errno));
   return read_token(path, token)
              ? SONDE_OK
              : app_error(error, SONDE_IO, "%.300s is not a file that only you can read", path);

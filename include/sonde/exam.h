@@ -5,6 +5,7 @@
 #ifndef SONDE_EXAM_H
 #define SONDE_EXAM_H
 
+#include "sonde/exam_journal.h"
 #include "sonde/echo.h"
 #include "sonde/haptics_render.h"
 #include "sonde/identify.h"
@@ -37,6 +38,8 @@ typedef struct sonde_session_controls {
 
 enum { SONDE_SESSION_PRESETS = 2 };
 
+typedef struct sonde_frame sonde_frame;
+
 typedef struct sonde_session_def {
   const sonde_model *model;       /**< borrowed */
   const char *model_path;         /**< written into the recording; may be NULL */
@@ -54,7 +57,14 @@ typedef struct sonde_session_def {
   uint32_t image_width, image_height; /**< default 512 x 512 */
   uint32_t ticks_per_image;           /**< lockstep: an image every so many ticks; real time: no
                                            more often, when the image thread is free; default 20 */
-  const char *record_path;            /**< NULL: no recording; format: docs/recording.md */
+  const char *record_path;            /**< NULL: no recording; format: docs/recording.md. A file
+                                           that is there gets the name PATH.old */
+  const char *record_setup;           /**< text of a SONDE_NOTE_SETUP that is on the disk before the
+                                           first tick; NULL: none */
+  /** Gets every image, also those that no reader of sonde_session_frame() sees; NULL: nobody.
+   *  @thread image thread, or the owner's in lockstep and in sonde_session_stop() */
+  void (*watch)(void *user, const sonde_frame *frame);
+  void *watch_user;
 } sonde_session_def;
 
 /** Healthy vein, first probe, default limits and world, no gel, constant pressures. @thread any */
@@ -94,11 +104,25 @@ typedef struct sonde_session sonde_session;
  *  @thread owner */
 SONDE_API sonde_status sonde_session_create(const sonde_session_def *def, sonde_device *device,
                                             sonde_session **session, sonde_error *error);
-/** Stops the threads, closes the recording, frees; NULL is ignored. A session without a single tick
- *  leaves no recording.
- *  @return SONDE_IO when the recording could not be written or the disk was too slow for it
+/** Stops the threads, ends the recording, frees; NULL is ignored. A session without a single tick
+ *  and without a setup leaves no recording.
+ *  @return as sonde_session_finish(); what the disk did not take is lost then
  *  @thread owner */
 SONDE_API sonde_status sonde_session_destroy(sonde_session *session, sonde_error *error);
+
+/** Adds a note to the recording, if there is one: on the disk some milliseconds later in real time,
+ *  after the next tick or the end in lockstep.
+ *  @param tick ticks before what it is about @param text one JSON object, copied
+ *  @return ARGUMENT for a text that is too long; MEMORY @thread one thread at a time */
+SONDE_API sonde_status sonde_session_note(sonde_session *session, sonde_note_kind kind,
+                                          uint64_t tick, const char *text, sonde_error *error);
+/** Stops the threads, ends the recording and brings it to the disk. No tick may follow. After DISK
+ * or IO everything that the disk did not take still waits in memory, and another call tries again.
+ *  @return DISK also when inputs were lost before (sonde_session_recording() tells)
+ *  @thread owner */
+SONDE_API sonde_status sonde_session_finish(sonde_session *session, sonde_error *error);
+/** How the recording goes. @thread owner */
+SONDE_API sonde_recording_state sonde_session_recording(const sonde_session *session);
 
 /** One tick in lockstep: device, world, limits, recorder; every ticks_per_image-th tick also the
  *  inside and the image. @thread owner, only while no loop runs */
@@ -124,13 +148,13 @@ SONDE_API const sonde_probe *sonde_session_probe(const sonde_session *session, u
 SONDE_API const sonde_model *sonde_session_model(const sonde_session *session);
 
 /** Newest finished frame: snapshot, skin and image of one and the same tick. */
-typedef struct sonde_frame {
+struct sonde_frame {
   sonde_snapshot snapshot;
   const float *skin_m;   /**< [nodes*3] deformed positions */
   const uint8_t *pixels; /**< [height*width] */
   uint32_t width, height;
   double width_m, height_m;
-} sonde_frame;
+};
 /** Newest frame since the last call, false when nothing is new; the pointers stay valid until the
  *  next call. @thread one reader */
 SONDE_API bool sonde_session_frame(sonde_session *session, sonde_frame *frame);

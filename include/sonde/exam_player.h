@@ -103,15 +103,21 @@ typedef struct sonde_comments {
   sonde_comment *list; /**< [count] by time */
 } sonde_comments;
 
-/** Reads RECORDING.comments.json; none when there is no such file. @thread owner
- *  @return SONDE_FORMAT naming the comment that is not one */
+/** Reads the comments of a recording, also those in RECORDING.comments.json beside one from before
+ *  version 8. @thread owner
+ *  @return SONDE_FORMAT naming the comment of that file that is not one */
 SONDE_API sonde_status sonde_comments_load(const char *recording, sonde_comments *comments,
                                            sonde_error *error);
-/** Adds a comment to the file, which is replaced as a whole.
- *  @return SONDE_ARGUMENT: no text, a time that is not one, text that is not UTF-8, too many
- *  @thread owner, one program at a time */
+/** Adds a comment to a recording that nobody writes any more (sonde_notes_add()), or to
+ *  RECORDING.comments.json.
+ *  @return SONDE_ARGUMENT: no text, a time that is not one, text that is not UTF-8, too many; as
+ *    sonde_notes_add()
+ *  @thread owner */
 SONDE_API sonde_status sonde_comments_add(const char *recording, const sonde_comment *comment,
                                           sonde_error *error);
+/** A comment as the text of a SONDE_NOTE_COMMENT, e.g. for sonde_session_note(); freed by
+ *  sonde_free(); NULL with the error filled. @thread any */
+SONDE_API char *sonde_comment_json(const sonde_comment *comment, sonde_error *error);
 SONDE_API void sonde_comments_clear(sonde_comments *comments);
 
 #ifdef __cplusplus

@@ -33,6 +33,7 @@
 #include "sonde/haptics_local.h"
 #include "sonde/haptics_render.h"
 #include "sonde/exam.h"
+#include "sonde/exam_journal.h"
 #include "sonde/exam_player.h"
 #include "sonde/trainer.h"
 #include "sonde/trainer_protocol.h"

@@ -64,10 +64,7 @@ typedef struct sonde_page_def {
   const char *model_path;      /**< for recordings and titles; may be NULL */
   double force_limit_n;        /**< shown on the page; 0: sonde_safety_limits_default() */
   const char *exams_directory; /**< with ID/report.html, exam.json, exam.csv; NULL: none */
-  void *user;                  /**< for the two functions below; either may be NULL */
-  /** Every frame of the session, whether a client sees it or not. Called by one thread at a time;
-   *  must be quick. */
-  void (*observe)(void *user, const sonde_frame *frame);
+  void *user;                  /**< for the function below, which may be NULL */
   /** A request of the client that controls. Called by one thread at a time while the server's
    *  clients wait: copy it and return; call nothing of this header from it. */
   void (*request)(void *user, const sonde_page_request *request);

@@ -61,6 +61,19 @@ SONDE_API void sonde_exam_log_close(sonde_exam_log *log);
 SONDE_API sonde_status sonde_exam_log_add(sonde_exam_log *log, const sonde_log_entry *entry,
                                           sonde_error *error);
 
+/** Whether an exam of that id is in the log. @thread owner */
+SONDE_API sonde_status sonde_exam_log_has(sonde_exam_log *log, const char *id, bool *found,
+                                          sonde_error *error);
+
+/** An entry as one JSON object with the names of the log's columns, e.g. for a journal.
+ *  @param[out] text freed by sonde_free() @return MEMORY @thread any */
+SONDE_API sonde_status sonde_log_entry_text(const sonde_log_entry *entry, char **text,
+                                            sonde_error *error);
+/** The same read back; members that are missing are empty, 0 or NaN.
+ *  @return FORMAT when the text is not an object or could not be added to a log @thread any */
+SONDE_API sonde_status sonde_log_entry_parse(const char *text, sonde_log_entry *entry,
+                                             sonde_error *error);
+
 /** Newest first (by date, then by order of adding).
  *  @param trainee NULL: all @param most 0: all
  *  @param[out] entries [*count] freed by sonde_free; NULL when *count is 0

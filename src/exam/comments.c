@@ -1,8 +1,10 @@
-// Comments of a teacher: RECORDING.comments.json.
+// Comments of a teacher: notes of the recording; RECORDING.comments.json of old ones.
 // is_text:              UTF-8 without control characters but line ends and tabs.
-// read_comment, read_all: the file.
+// read_comment, read_all, load_file: the file of an old recording.
+// take_notes:           those of a journal.
 // write_all:            the file as a whole.
 // sonde_comments_*:     the interface.
+#include "sonde/exam_journal.h"
 #include "sonde/exam_player.h"
 
 #include "base/bounds.h"
@@ -96,14 +98,12 @@ static sonde_status read_all(const char *path, const cJSON *root, sonde_comments
   return SONDE_OK;
 }
 
-sonde_status sonde_comments_load(const char *recording, sonde_comments *comments,
-                                 sonde_error *error) {
-  SONDE_ASSERT(recording != NULL && comments != NULL);
-  *comments = (sonde_comments){.list = SONDE_NEW(sonde_comment, SONDE_MAX_COMMENTS + 1)};
+// Those of a file from before version 8.
+static sonde_status load_file(const char *recording, sonde_comments *comments, sonde_error *error) {
   char *path = path_of(recording), *bytes = NULL;
   size_t size = 0;
   cJSON *root = NULL;
-  sonde_status status = path && comments->list ? SONDE_OK : sonde_fail_memory(error);
+  sonde_status status = path ? SONDE_OK : sonde_fail_memory(error);
   if (status || access(path, F_OK) != 0) goto done;
   status = sonde_bounded_load_text(path, &sonde_limits_json, &bytes, &size, error);
   if (!status) status = sonde_bounded_json(path, bytes, size, &sonde_limits_json, error);
@@ -117,19 +117,68 @@ done:
   cJSON_Delete(root);
   sonde_free(bytes);
   sonde_free(path);
+  return status;
+}
+
+// A comment of a journal that is not one is left out: the recording is whole without it.
+static void take_notes(const sonde_notes *notes, sonde_comments *comments) {
+  for (uint32_t i = 0; i < notes->count && comments->count < SONDE_MAX_COMMENTS; ++i) {
+    sonde_comment comment;
+    if (notes->list[i].kind != SONDE_NOTE_COMMENT) continue;
+    cJSON *root = cJSON_Parse(notes->list[i].text);
+    read_comment(root, &comment);
+    if (!fault_of(&comment)) insert(comments, &comment);
+    cJSON_Delete(root);
+  }
+}
+
+sonde_status sonde_comments_load(const char *recording, sonde_comments *comments,
+                                 sonde_error *error) {
+  SONDE_ASSERT(recording != NULL && comments != NULL);
+  *comments = (sonde_comments){.list = SONDE_NEW(sonde_comment, SONDE_MAX_COMMENTS + 1)};
+  if (!comments->list) return sonde_fail_memory(error);
+  sonde_notes notes = {0};
+  sonde_status status = load_file(recording, comments, error);
+  if (!status && access(recording, F_OK) == 0) {
+    (void)sonde_notes_load(recording, &notes, NULL); // who plays the recording says what ails it
+    take_notes(&notes, comments);
+    sonde_notes_clear(&notes);
+  }
   if (status) sonde_comments_clear(comments);
   return status;
 }
 
+static cJSON *item_of(const sonde_comment *comment) {
+  cJSON *item = cJSON_CreateObject();
+  cJSON_AddNumberToObject(item, "time_s", comment->time_s);
+  cJSON_AddStringToObject(item, "author", comment->author);
+  cJSON_AddStringToObject(item, "text", comment->text);
+  return item;
+}
+
+char *sonde_comment_json(const sonde_comment *comment, sonde_error *error) {
+  const char *fault = fault_of(comment);
+  if (fault) {
+    sonde_fail(error, SONDE_ARGUMENT, "the comment %s", fault);
+    return NULL;
+  }
+  cJSON *item = item_of(comment);
+  char *printed = cJSON_PrintUnformatted(item);
+  size_t bytes = printed ? strlen(printed) + 1 : 0;
+  char *text = printed ? SONDE_NEW(char, bytes) : NULL;
+  if (text)
+    memcpy(text, printed, bytes);
+  else
+    sonde_fail_memory(error);
+  cJSON_free(printed);
+  cJSON_Delete(item);
+  return text;
+}
+
 static char *json_of(const sonde_comments *comments) {
   cJSON *root = cJSON_CreateObject(), *list = cJSON_AddArrayToObject(root, "comments");
-  for (uint32_t k = 0; k < comments->count; ++k) {
-    cJSON *item = cJSON_CreateObject();
-    cJSON_AddNumberToObject(item, "time_s", comments->list[k].time_s);
-    cJSON_AddStringToObject(item, "author", comments->list[k].author);
-    cJSON_AddStringToObject(item, "text", comments->list[k].text);
-    cJSON_AddItemToArray(list, item);
-  }
+  for (uint32_t k = 0; k < comments->count; ++k)
+    cJSON_AddItemToArray(list, item_of(&comments->list[k]));
   char *text = cJSON_Print(root);
   cJSON_Delete(root);
   return text;
@@ -150,22 +199,33 @@ static sonde_status write_all(const char *recording, const sonde_comments *comme
   return status;
 }
 
+// Into the journal; into a file of its own beside a recording from before version 8.
+static sonde_status add_one(const char *recording, sonde_comments *comments,
+                            const sonde_comment *comment, const char *text, sonde_error *error) {
+  sonde_error own = {0};
+  sonde_status status = sonde_notes_add(recording, SONDE_NOTE_COMMENT, text, &own);
+  if (status == SONDE_VERSION) {
+    insert(comments, comment);
+    return write_all(recording, comments, error);
+  }
+  if (status && error) *error = own;
+  return status;
+}
+
 sonde_status sonde_comments_add(const char *recording, const sonde_comment *comment,
                                 sonde_error *error) {
   SONDE_ASSERT(recording != NULL && comment != NULL);
-  const char *fault = fault_of(comment);
-  if (fault) return sonde_fail(error, SONDE_ARGUMENT, "the comment %s", fault);
-  sonde_comments comments;
-  sonde_status status = sonde_comments_load(recording, &comments, error);
-  if (status) return status;
-  if (comments.count >= SONDE_MAX_COMMENTS)
-    status = sonde_fail(error, SONDE_ARGUMENT, "%s has %d comments already", recording,
+  sonde_comments comments = {0};
+  sonde_error own = {0};
+  char *text = sonde_comment_json(comment, &own);
+  sonde_status status = text ? sonde_comments_load(recording, &comments, &own) : own.status;
+  if (!status && comments.count >= SONDE_MAX_COMMENTS)
+    status = sonde_fail(&own, SONDE_ARGUMENT, "%s has %d comments already", recording,
                         SONDE_MAX_COMMENTS);
-  if (!status) {
-    insert(&comments, comment);
-    status = write_all(recording, &comments, error);
-  }
+  if (!status) status = add_one(recording, &comments, comment, text, &own);
+  if (status && error) *error = own;
   sonde_comments_clear(&comments);
+  sonde_free(text);
   return status;
 }
 

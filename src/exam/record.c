@@ -1,27 +1,41 @@
-// Writing a recording: a text header, fixed-size records, an end with hash and CRC-32.
-// emit:             bytes to the file and into the CRC.
+// Writing a recording: a text header, records, blocks that close off what came before.
+// emit:             bytes to the journal and into the CRC.
 // put_*:            one record as bytes.
 // close_block:      a block record; what came before survives the program.
+// publish:          how the writing goes.
+// end_inputs:       when one is missing, those behind it are of no use.
 // json_*, header_json: the header line.
 // sonde_recorder_*: the interface.
 #include "exam/record.h"
 
 #include "base/base.h"
+#include "base/clock.h"
+#include "base/disk.h"
 #include "exam/bytes.h"
 
 #include <cjson/cJSON.h>
 #include <math.h>
+#include <stdatomic.h>
+#include <string.h>
 #include <zlib.h>
 
 struct sonde_recorder {
-  sonde_file *file;
+  sonde_journal *journal;
   uLong crc;
   uint64_t ticks, images, block_ticks;
+  double synced_s;
+  bool broken; // an input is missing
+  uint32_t notes;
+  char path[SONDE_RECORD_PATH_BYTES];
+  atomic_int trouble;
+  _Atomic uint64_t safe_ticks, lost;
+  atomic_uint safe_notes;
 };
 
-static void emit(sonde_recorder *recorder, const void *bytes, size_t count) {
-  sonde_file_write(recorder->file, bytes, count);
+static bool emit(sonde_recorder *recorder, const void *bytes, size_t count, bool important) {
+  if (!sonde_journal_append(recorder->journal, bytes, count, important)) return false;
   recorder->crc = crc32_z(recorder->crc, bytes, count);
+  return true;
 }
 
 static void put_tick(byte_writer *w, const sonde_record *record) {
@@ -60,20 +74,52 @@ static void put_check(byte_writer *w, const sonde_record *record) {
   put_u64(w, record->check.hash);
 }
 
-static void close_block(sonde_recorder *recorder) {
-  unsigned char bytes[16];
+void sonde_record_put_block(unsigned char *bytes, uint32_t crc, uint64_t ticks) {
   byte_writer w = {bytes};
   put_u32(&w, SONDE_RECORD_BLOCK);
-  put_u32(&w, (uint32_t)recorder->crc);
-  put_u64(&w, recorder->ticks);
-  SONDE_ASSERT(w.at == bytes + sizeof bytes);
-  emit(recorder, bytes, sizeof bytes);
-  (void)sonde_file_flush(recorder->file, NULL);
+  put_u32(&w, crc);
+  put_u64(&w, ticks);
+}
+
+size_t sonde_record_put_note(unsigned char *bytes, sonde_note_kind kind, uint64_t tick,
+                             size_t text_bytes) {
+  SONDE_ASSERT(text_bytes <= SONDE_NOTE_MOST_BYTES);
+  byte_writer w = {bytes};
+  put_u32(&w, SONDE_RECORD_NOTE);
+  put_u32(&w, kind);
+  put_u64(&w, tick);
+  put_u32(&w, (uint32_t)text_bytes);
+  put_u32(&w, 0);
+  return (size_t)(w.at - bytes);
+}
+
+static void publish(sonde_recorder *recorder, int trouble, bool synced) {
+  if (!trouble && synced) atomic_store(&recorder->safe_notes, recorder->notes);
+  atomic_store(&recorder->trouble, trouble);
+  if (!trouble) atomic_store(&recorder->safe_ticks, recorder->ticks);
+}
+
+static void close_block(sonde_recorder *recorder, bool sync) {
+  unsigned char bytes[16];
+  double now_s = sonde_clock_now();
+  sonde_record_put_block(bytes, (uint32_t)recorder->crc, recorder->ticks);
+  if (!emit(recorder, bytes, sizeof bytes, true)) return;
+  sync |= now_s - recorder->synced_s >= SONDE_RECORD_SYNC_S;
+  int trouble = sonde_journal_flush(recorder->journal, sync, false);
+  if (sync && !trouble) recorder->synced_s = now_s;
+  publish(recorder, trouble, sync);
+}
+
+// The first one that is missing is the last one that matters.
+static void end_inputs(sonde_recorder *recorder) {
+  recorder->broken = true;
+  atomic_fetch_add(&recorder->lost, 1);
 }
 
 void sonde_recorder_write(sonde_recorder *recorder, const sonde_record *record) {
   unsigned char bytes[SONDE_RECORD_MOST_BYTES];
   byte_writer w = {bytes};
+  bool is_tick = record->tag == SONDE_RECORD_TICK;
   switch (record->tag) {
   case SONDE_RECORD_TICK: put_tick(&w, record); break;
   case SONDE_RECORD_CONTROLS: put_controls(&w, record); break;
@@ -81,10 +127,40 @@ void sonde_recorder_write(sonde_recorder *recorder, const sonde_record *record) 
   default: put_check(&w, record); break;
   }
   SONDE_ASSERT(w.at - bytes == (ptrdiff_t)sonde_record_bytes(SONDE_RECORD_VERSION, record->tag));
-  emit(recorder, bytes, (size_t)(w.at - bytes));
+  bool is_check = record->tag == SONDE_RECORD_CHECK;
+  bool follows = is_check ? record->tick <= recorder->ticks : record->tick == recorder->ticks;
+  if (recorder->broken || !follows || !emit(recorder, bytes, (size_t)(w.at - bytes), false)) {
+    end_inputs(recorder);
+    return;
+  }
   recorder->images += record->tag == SONDE_RECORD_IMAGE;
-  if (record->tag != SONDE_RECORD_TICK) return;
-  if (++recorder->ticks % recorder->block_ticks == 0) close_block(recorder);
+  if (is_tick && ++recorder->ticks % recorder->block_ticks == 0) close_block(recorder, false);
+}
+
+void sonde_recorder_note(sonde_recorder *recorder, sonde_note_kind kind, uint64_t tick,
+                         const char *text) {
+  size_t length = strlen(text), padded = SONDE_RECORD_NOTE_BYTES + ((length + 7) & ~(size_t)7);
+  unsigned char *bytes = SONDE_NEW(unsigned char, padded);
+  if (bytes) {
+    size_t head = sonde_record_put_note(bytes, kind, tick, length);
+    memcpy(bytes + head, text, length);
+  }
+  if (bytes && emit(recorder, bytes, padded, true))
+    recorder->notes++;
+  else
+    atomic_fetch_add(&recorder->lost, 1);
+  sonde_free(bytes);
+  close_block(recorder, true);
+}
+
+void sonde_recorder_retry(sonde_recorder *recorder) {
+  if (!atomic_load(&recorder->trouble)) return;
+  publish(recorder, sonde_journal_flush(recorder->journal, true, false), true);
+}
+
+sonde_recorder_state sonde_recorder_look(const sonde_recorder *recorder) {
+  return (sonde_recorder_state){atomic_load(&recorder->trouble), atomic_load(&recorder->safe_ticks),
+                                atomic_load(&recorder->lost), atomic_load(&recorder->safe_notes)};
 }
 
 // 64-bit numbers do not fit a JSON number.
@@ -151,28 +227,36 @@ sonde_status sonde_recorder_create(const char *path, const sonde_record_head *he
     status = sonde_fail_memory(error);
     goto done;
   }
-  status = sonde_file_create(path, &recorder->file, error);
+  snprintf(recorder->path, sizeof recorder->path, "%s", path);
+  status = sonde_journal_create(path, &recorder->journal, error);
   if (status) goto done;
   recorder->block_ticks = (uint64_t)ceil(SONDE_RECORD_BLOCK_S / head->world.dt_s);
   char magic[40];
   snprintf(magic, sizeof magic, "%s %d\n", SONDE_RECORD_MAGIC, SONDE_RECORD_VERSION);
-  emit(recorder, magic, strlen(magic));
-  emit(recorder, json, strlen(json));
-  emit(recorder, "\n", 1);
-  (void)sonde_file_flush(recorder->file, NULL);
-  *out = recorder;
-  recorder = NULL;
+  if (emit(recorder, magic, strlen(magic), true) && emit(recorder, json, strlen(json), true) &&
+      emit(recorder, "\n", 1, true)) {
+    *out = recorder;
+    recorder = NULL;
+  } else {
+    sonde_journal_undo(recorder->journal);
+    status = sonde_fail_memory(error);
+  }
 done:
   cJSON_free(json);
   sonde_free(recorder);
   return status;
 }
 
-sonde_status sonde_recorder_close(sonde_recorder *recorder, sonde_record_end *end,
-                                  sonde_error *error) {
+bool sonde_recorder_is_file(const sonde_recorder *recorder) {
+  return sonde_journal_is_file(recorder->journal);
+}
+
+void sonde_recorder_end(sonde_recorder *recorder, sonde_record_end *end) {
   unsigned char bytes[SONDE_RECORD_MOST_BYTES];
   byte_writer w = {bytes};
   end->ticks = recorder->ticks, end->images = recorder->images;
+  end->lost += atomic_load(&recorder->lost);
+  end->crc = (uint32_t)recorder->crc;
   put_u32(&w, SONDE_RECORD_END);
   put_u32(&w, 0);
   put_u64(&w, end->ticks);
@@ -180,20 +264,28 @@ sonde_status sonde_recorder_close(sonde_recorder *recorder, sonde_record_end *en
   put_u64(&w, end->lost);
   put_u64(&w, end->images);
   put_u64(&w, end->image_hash);
-  emit(recorder, bytes, (size_t)(w.at - bytes));
-  end->crc = (uint32_t)recorder->crc;
-  put_u32(&w, end->crc);
-  put_u32(&w, 0);
   SONDE_ASSERT(w.at - bytes ==
                (ptrdiff_t)sonde_record_bytes(SONDE_RECORD_VERSION, SONDE_RECORD_END));
-  sonde_file_write(recorder->file, w.at - 8, 8);
-  sonde_status status = sonde_file_commit(recorder->file, error);
+  (void)emit(recorder, bytes, (size_t)(w.at - bytes), true);
+  close_block(recorder, true);
+}
+
+sonde_status sonde_recorder_sync(sonde_recorder *recorder, sonde_error *error) {
+  int trouble = sonde_journal_flush(recorder->journal, true, true);
+  publish(recorder, trouble, true);
+  if (!trouble) return SONDE_OK;
+  return sonde_fail(error, sonde_disk_status(trouble), "%s: cannot be written: %s", recorder->path,
+                    strerror(trouble));
+}
+
+void sonde_recorder_close(sonde_recorder *recorder) {
+  if (!recorder) return;
+  sonde_journal_close(recorder->journal);
   sonde_free(recorder);
-  return status;
 }
 
 void sonde_recorder_discard(sonde_recorder *recorder) {
   if (!recorder) return;
-  sonde_file_discard(recorder->file);
+  sonde_journal_undo(recorder->journal);
   sonde_free(recorder);
 }

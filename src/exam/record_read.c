@@ -3,7 +3,8 @@
 // read_model, read_probes, read_world: parts of the header.
 // read_magic, read_header, read_end: the three parts of the file.
 // sonde_record_bytes, decode_*:      one record.
-// read_blocks:                       of a file that was cut off, as far as it is whole.
+// read_blocks:                       of an old file that was cut off, as far as it is whole.
+// walk_blocks, read_journal:         of a file from version 8 on.
 // check_records:                     walks all of them.
 #include "exam/record.h"
 
@@ -174,10 +175,11 @@ size_t sonde_record_bytes(int version, uint32_t tag) {
   switch (tag) {
   case SONDE_RECORD_TICK: return SONDE_RECORD_TICK_BYTES;
   case SONDE_RECORD_CONTROLS: return 16 + sonde_controls_bytes(version);
-  case SONDE_RECORD_END: return version < 4 ? 40 : 56;
+  case SONDE_RECORD_END: return version < 4 ? 40 : version < SONDE_RECORD_JOURNAL ? 56 : 48;
   case SONDE_RECORD_IMAGE: return version < 4 ? 0 : 40;
   case SONDE_RECORD_CHECK: return version < 4 ? 0 : 24;
   case SONDE_RECORD_BLOCK: return version < 4 ? 0 : 16;
+  case SONDE_RECORD_NOTE: return version < SONDE_RECORD_JOURNAL ? 0 : SONDE_RECORD_NOTE_BYTES;
   default: return 0;
   }
 }
@@ -239,13 +241,23 @@ static void decode_check(byte_reader *reader, sonde_record *record) {
   record->check.hash = get_u64(reader);
 }
 
-// The tag at a place and the record's bytes; 0 when no whole record is there.
-static size_t record_at(const sonde_recording *r, size_t at, uint32_t *tag) {
-  if (r->end - at < 4) return 0;
+// The tag at a place before `end` and the record's bytes; 0 when no whole record is there.
+static size_t record_at(const sonde_recording *r, size_t at, size_t end, uint32_t *tag) {
+  if (end - at < 4) return 0;
   byte_reader reader = {(const unsigned char *)r->bytes + at};
   *tag = get_u32(&reader);
   size_t bytes = sonde_record_bytes(r->version, *tag);
-  return *tag == SONDE_RECORD_END || bytes > r->end - at ? 0 : bytes;
+  if (bytes > end - at || (*tag == SONDE_RECORD_END && r->version < SONDE_RECORD_JOURNAL)) return 0;
+  if (*tag != SONDE_RECORD_NOTE) return bytes;
+  reader.at += 12;
+  size_t text = get_u32(&reader);
+  if (text > SONDE_NOTE_MOST_BYTES) return 0;
+  bytes += (text + 7) & ~(size_t)7;
+  return bytes > end - at ? 0 : bytes;
+}
+
+static bool is_input(uint32_t tag) {
+  return tag != SONDE_RECORD_BLOCK && tag != SONDE_RECORD_NOTE && tag != SONDE_RECORD_END;
 }
 
 bool sonde_recording_next(sonde_recording *r, sonde_record *record) {
@@ -253,7 +265,7 @@ bool sonde_recording_next(sonde_recording *r, sonde_record *record) {
   memset(record, 0, sizeof *record);
   uint32_t tag;
   size_t bytes;
-  while ((bytes = record_at(r, r->at, &tag)) > 0 && tag == SONDE_RECORD_BLOCK) r->at += bytes;
+  while ((bytes = record_at(r, r->at, r->end, &tag)) > 0 && !is_input(tag)) r->at += bytes;
   if (bytes == 0) return false;
   record->tag = tag;
   byte_reader reader = {(const unsigned char *)r->bytes + r->at + 4};
@@ -265,6 +277,21 @@ bool sonde_recording_next(sonde_recording *r, sonde_record *record) {
   }
   r->at += bytes;
   return true;
+}
+
+bool sonde_recording_next_note(const sonde_recording *r, size_t *at, sonde_record_note *note) {
+  uint32_t tag;
+  for (size_t bytes; (bytes = record_at(r, *at, r->notes_end, &tag)) > 0; *at += bytes) {
+    if (tag != SONDE_RECORD_NOTE) continue;
+    byte_reader reader = {(const unsigned char *)r->bytes + *at + 4};
+    note->kind = (sonde_note_kind)get_u32(&reader);
+    note->tick = get_u64(&reader);
+    note->bytes = get_u32(&reader);
+    note->text = r->bytes + *at + SONDE_RECORD_NOTE_BYTES;
+    *at += bytes;
+    return true;
+  }
+  return false;
 }
 
 // What is wrong with a record, NULL when nothing is. `tick`: ticks before it.
@@ -290,7 +317,7 @@ static sonde_status read_blocks(const source *s) {
   uLong crc = 0;
   uint32_t tag;
   r->told = (sonde_record_end){0};
-  for (; (bytes = record_at(r, at, &tag)) > 0; at += bytes) {
+  for (; (bytes = record_at(r, at, r->end, &tag)) > 0; at += bytes) {
     if (r->version < 4) whole = at + bytes;
     if (tag != SONDE_RECORD_BLOCK) continue;
     crc = crc32_z(crc, (const unsigned char *)r->bytes + summed, at - summed);
@@ -300,22 +327,100 @@ static sonde_status read_blocks(const source *s) {
     whole = at + bytes;
     r->told.crc = (uint32_t)crc;
   }
-  r->end = whole;
+  r->end = r->notes_end = whole;
   if (whole > r->start) return SONDE_OK;
   return sonde_fail(s->error, SONDE_FORMAT,
                     "%s: the recording was cut off before its first whole block (%g s)", s->path,
                     SONDE_RECORD_BLOCK_S);
 }
 
-static sonde_status check_records(const source *s) {
+// What a walk over the blocks of a journal found.
+typedef struct journal_walk {
+  size_t at, whole; // where it stands; end of the last whole block
+  uint64_t ticks, whole_ticks;
+  bool ended, damaged; // the inputs have an end; a block does not fit what it closes off
+  size_t end_at;       // of the end record
+  uint32_t end_crc;
+} journal_walk;
+
+static journal_walk walk_blocks(const sonde_recording *r) {
+  journal_walk w = {.at = r->start, .whole = r->start};
+  size_t summed = 0, end_at = 0, bytes;
+  uLong crc = 0;
+  uint32_t tag, end_crc = 0;
+  for (; (bytes = record_at(r, w.at, r->end, &tag)) > 0; w.at += bytes) {
+    bool is_end = tag == SONDE_RECORD_END;
+    if (is_end && end_at) break; // there is one end
+    w.ticks += tag == SONDE_RECORD_TICK;
+    if (!is_end && tag != SONDE_RECORD_BLOCK) continue;
+    crc = crc32_z(crc, (const unsigned char *)r->bytes + summed, w.at - summed);
+    summed = w.at;
+    if (is_end) {
+      end_at = w.at;
+      end_crc = (uint32_t)crc;
+      continue;
+    }
+    byte_reader reader = {(const unsigned char *)r->bytes + w.at + 4};
+    w.damaged =
+        !sonde_checksum_fits(get_u32(&reader), (uint32_t)crc) || get_u64(&reader) != w.ticks;
+    if (w.damaged) break;
+    w.whole = w.at + bytes;
+    w.whole_ticks = w.ticks;
+    if (end_at) w.ended = true, w.end_at = end_at, w.end_crc = end_crc;
+  }
+  return w;
+}
+
+static sonde_status read_journal_end(const source *s, const journal_walk *w) {
+  sonde_recording *r = s->recording;
+  byte_reader reader = {(const unsigned char *)r->bytes + w->end_at + 8};
+  sonde_record_end *told = &r->told;
+  told->ticks = get_u64(&reader);
+  told->hash = get_u64(&reader);
+  told->lost = get_u64(&reader);
+  told->images = get_u64(&reader);
+  told->image_hash = get_u64(&reader);
+  told->crc = w->end_crc;
+  r->ended = true;
+  r->end = w->end_at;
+  return SONDE_OK;
+}
+
+// A journal is whole up to its last whole block; what follows was torn off while it was written.
+static sonde_status read_journal(const source *s, bool recover) {
+  sonde_recording *r = s->recording;
+  journal_walk w = walk_blocks(r);
+  if (w.damaged && !recover)
+    return sonde_fail(
+        s->error, SONDE_CHECKSUM,
+        "%s: the recording is damaged: the CRC-32 of the block at byte %zu does not fit", s->path,
+        w.at);
+  if (!w.ended && !recover)
+    return sonde_fail(s->error, SONDE_FORMAT,
+                      "%s: the recording has no end: it was cut off or not finished", s->path);
+  if (w.whole == r->start)
+    return sonde_fail(s->error, SONDE_FORMAT,
+                      "%s: the recording was cut off before its first block", s->path);
+  r->notes_end = w.whole;
+  r->block_ticks = w.whole_ticks;
+  r->crc = (uint32_t)crc32_z(0, (const unsigned char *)r->bytes, w.whole);
+  if (w.ended) return read_journal_end(s, &w);
+  r->end = w.whole;
+  r->told.crc = r->crc;
+  return SONDE_OK;
+}
+
+static sonde_status check_records(const source *s, bool recover) {
   sonde_recording *r = s->recording;
   uint64_t tick = 0, images = 0;
   sonde_record record;
+  if (r->told.lost && recover) r->ended = false, r->told = (sonde_record_end){.crc = r->told.crc};
   if (r->told.lost)
-    return sonde_fail(s->error, SONDE_FORMAT,
-                      "%s: %llu records were lost while it was written (the disk was too slow): it "
-                      "cannot be replayed",
-                      s->path, (unsigned long long)r->told.lost);
+    return sonde_fail(
+        s->error, SONDE_FORMAT,
+        "%s: %llu records were lost while it was written (the disk was full or too slow): it "
+        "can be played with --recover, up to the loss",
+        s->path, (unsigned long long)r->told.lost);
   while (sonde_recording_next(r, &record)) {
     const char *fault = fault_of(r, &record, tick);
     if (fault)
@@ -341,11 +446,14 @@ sonde_status sonde_recording_load(const char *path, bool recover, sonde_recordin
   sonde_status status =
       sonde_bounded_load(path, &sonde_limits_recording, &recording->bytes, &recording->end, error);
   if (!status) status = read_magic(&s);
-  sonde_status ended = status ? status : read_end(&s);
+  bool journal = recording->version >= SONDE_RECORD_JOURNAL;
+  sonde_status ended = status || journal ? status : read_end(&s);
   if (!status && !recover) status = ended;
   if (!status) status = read_header(&s);
-  if (!status && ended) status = read_blocks(&s);
-  if (!status) status = check_records(&s);
+  if (!status && journal) status = read_journal(&s, recover);
+  if (!status && !journal && ended) status = read_blocks(&s);
+  if (!status && !journal && !ended) recording->notes_end = recording->end;
+  if (!status) status = check_records(&s, recover);
   if (status) sonde_recording_clear(recording);
   return status;
 }

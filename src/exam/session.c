@@ -1,6 +1,6 @@
 // Life of a session.
 // check:           the definition.
-// create_probes, create_boxes, create_lines, create_recording: parts of a session, in this order.
+// create_probes, create_boxes, create_lines, create_parts: parts of a session, in this order.
 // release:         frees whatever exists.
 // sonde_session_*: the interface; ticks are in session_hot.c, threads in session_threads.c.
 #include "exam/keys.h"
@@ -8,8 +8,6 @@
 #include "base/base.h"
 #include "base/maths.h"
 #include "haptics/motion.h"
-
-enum { RING_RECORDS = 8192, RING_CHECKS = 256 }; // 8 s of ticks while the disk does not answer
 
 sonde_session_def sonde_session_def_default(void) {
   sonde_session_def def = {.world = sonde_world_def_default(),
@@ -121,46 +119,6 @@ static sonde_status create_lines(sonde_session *session, sonde_error *error) {
   return sonde_fail_memory(error);
 }
 
-// Keyframes beside the recording; without them it is whole as well.
-static void create_keys(sonde_session *session, const char *record_path) {
-  char *path = sonde_keys_path(record_path);
-  if (path) (void)sonde_keys_create(path, session->subject, &session->keys, NULL);
-  sonde_free(path);
-}
-
-static sonde_status create_recording(sonde_session *session, const sonde_session_def *def,
-                                     sonde_error *error) {
-  if (!def->record_path) return SONDE_OK;
-  size_t world_bytes = sizeof(sonde_world_slot) + sonde_subject_size(session->subject);
-  sonde_status status =
-      sonde_ring_create(sizeof(sonde_record), RING_RECORDS, &session->records, error);
-  if (!status)
-    status =
-        sonde_ring_create(sizeof(sonde_record_check), RING_CHECKS, &session->image_checks, error);
-  if (!status) status = sonde_mailbox_create(world_bytes, &session->world_box, error);
-  if (!status)
-    status = sonde_mailbox_create(sizeof(sonde_inside_slot), &session->inside_box, error);
-  if (status) return status;
-  sonde_record_head head = {.model_path = def->model_path,
-                            .model_name = def->model->name,
-                            .model_checksum = def->model->checksum,
-                            .world = *sonde_state_def(session->state),
-                            .setup = session->subject->setup,
-                            .image_width = session->image_width,
-                            .image_height = session->image_height,
-                            .ticks_per_image = session->ticks_per_image,
-                            .probe_count = session->probe_count,
-                            .probes = session->probes,
-                            .probe_names = probe_names(def)};
-  status = sonde_recorder_create(def->record_path, &head, &session->recorder, error);
-  if (status) return status;
-  sonde_record first = {.tag = SONDE_RECORD_CONTROLS};
-  first.controls = session->controls;
-  sonde_recorder_write(session->recorder, &first);
-  create_keys(session, def->record_path);
-  return SONDE_OK;
-}
-
 static sonde_status create_parts(sonde_session *session, const sonde_session_def *def,
                                  sonde_error *error) {
   sonde_status status = create_probes(session, probe_names(def), error);
@@ -182,16 +140,11 @@ static sonde_status create_parts(sonde_session *session, const sonde_session_def
   session->state = session->subject->state;
   sonde_shared_controls_set(&session->requested, &session->controls);
   if (session->controls.stop) sonde_safety_trip(&session->safety, SONDE_FAULT_STOPPED);
-  return create_recording(session, def, error);
+  return sonde_session_create_recording(session, def, probe_names(def), error);
 }
 
 static void release(sonde_session *session) {
-  sonde_recorder_discard(session->recorder);
-  sonde_keys_discard(session->keys);
-  sonde_ring_destroy(session->records);
-  sonde_ring_destroy(session->image_checks);
-  sonde_mailbox_destroy(session->world_box);
-  sonde_mailbox_destroy(session->inside_box);
+  sonde_session_release_recording(session);
   sonde_mailbox_destroy(session->control_box);
   sonde_mailbox_destroy(session->surface_box);
   sonde_mailbox_destroy(session->frame_box);
@@ -215,6 +168,9 @@ sonde_status sonde_session_create(const sonde_session_def *def, sonde_device *de
   if (status) return status;
   sonde_session *session = SONDE_NEW(sonde_session, 1);
   if (!session) return sonde_fail_memory(error);
+  pthread_mutex_init(&session->note_lock, NULL);
+  session->watch = def->watch;
+  session->watch_user = def->watch_user;
   session->model = def->model;
   session->nodes = def->model->surface.vertex_count;
   session->dt_s = def->world.dt_s;
@@ -242,32 +198,12 @@ sonde_status sonde_session_create(const sonde_session_def *def, sonde_device *de
   return SONDE_OK;
 }
 
-// A session without a single tick leaves no file (and an older one as it was).
-static sonde_status close_recording(sonde_session *session, sonde_error *error) {
-  if (!session->recorder || sonde_session_ticks(session) == 0) return SONDE_OK;
-  uint64_t lost = atomic_load(&session->lost_records);
-  sonde_recorder *recorder = session->recorder;
-  session->recorder = NULL;
-  sonde_record_end end = {
-      .hash = sonde_state_hash(session->state), .lost = lost, .image_hash = session->images_hash};
-  sonde_status status = sonde_recorder_close(recorder, &end, error);
-  if (session->keys && !status && !lost)
-    (void)sonde_keys_commit(session->keys, end.crc, NULL);
-  else
-    sonde_keys_discard(session->keys);
-  session->keys = NULL;
-  if (!status && lost)
-    status = sonde_fail(error, SONDE_IO,
-                        "the disk was too slow: the recording lacks %llu records and cannot be "
-                        "replayed",
-                        (unsigned long long)lost);
-  return status;
-}
-
 sonde_status sonde_session_destroy(sonde_session *session, sonde_error *error) {
   if (!session) return SONDE_OK;
   sonde_session_stop(session);
-  sonde_status status = close_recording(session, error);
+  sonde_status status = SONDE_OK;
+  if (sonde_session_ticks(session) > 0 || session->keep_recording)
+    status = sonde_session_finish(session, error);
   if (session->device.destroy) session->device.destroy(session->device.self);
   release(session);
   return status;

@@ -84,6 +84,8 @@ typedef struct sonde_inside_slot {
 // probe touches nothing.
 #define SONDE_KEY_PERIOD_S 0.25
 
+typedef struct sonde_queued_note sonde_queued_note;
+
 struct sonde_session {
   // set up once
   const sonde_model *model;
@@ -133,8 +135,15 @@ struct sonde_session {
   uint64_t images_hash;                   // of all pixels so far, with a recording
   _Atomic uint32_t latency[LATENCY_BINS]; // images by age of their pose when finished
 
-  // recorder; NULL without a recording
+  void (*watch)(void *user, const sonde_frame *frame); // NULL: nobody
+  void *watch_user;
+
+  // recorder; NULL without a recording and after its end
   sonde_recorder *recorder;
+  bool keep_recording, ended; // also one without ticks; its end was written
+  sonde_record_end end;
+  pthread_mutex_t note_lock; // of notes; the tick never takes it
+  sonde_queued_note *notes;
   struct sonde_keys_file *keys;
   const sonde_world_slot *world_part; // of the next keyframe, until both parts are there
   const sonde_inside_slot *inside_part;
@@ -184,6 +193,10 @@ sonde_status sonde_session_recall(sonde_session *session, const sonde_tick_memor
 bool sonde_session_show(sonde_session *session);
 bool sonde_session_follow(sonde_session *session);
 void sonde_session_draw(sonde_session *session);
+// The journal of the definition, if it asks for one, and what leads to it.
+sonde_status sonde_session_create_recording(sonde_session *session, const sonde_session_def *def,
+                                            const char *const *probe_names, sonde_error *error);
+void sonde_session_release_recording(sonde_session *session);
 // Moves everything in the rings and keyframes to their files. Recorder thread or lockstep.
 void sonde_session_drain(sonde_session *session);
 

@@ -194,6 +194,7 @@ void sonde_session_draw(sonde_session *session) {
   sonde_frame *frame = (void *)sonde_mailbox_write_slot(session->frame_box);
   fill_frame(session, session->surface, (unsigned char *)frame);
   check_image(session, frame);
+  if (session->watch) session->watch(session->watch_user, frame);
   sonde_mailbox_publish(session->frame_box);
 }
 

@@ -1,10 +1,8 @@
 // The threads of a session in real time, and the lockstep tick.
 // image_main, record_main: look for a surface every 0.2 ms, for records every 5, so
 //                          that the tick never has to wake anyone.
-// write_records, write_key: rings and mailboxes to the files.
-// sonde_session_drain:     all of that.
 // sonde_session_start/stop/tick: the interface.
-#include "exam/keys.h"
+#include "exam/session.h"
 
 #include "base/base.h"
 #include "base/clock.h"
@@ -18,53 +16,6 @@ static void *image_main(void *argument) {
     sonde_clock_sleep_until(sonde_clock_now() + 0.2e-3);
   }
   return NULL;
-}
-
-static void write_records(sonde_session *session) {
-  sonde_record record;
-  while (sonde_ring_pop(session->records, &record))
-    sonde_recorder_write(session->recorder, &record);
-}
-
-static void write_check(sonde_session *session, const sonde_record_check *check) {
-  sonde_record record = {.tag = SONDE_RECORD_CHECK, .tick = check->tick};
-  record.check = *check;
-  sonde_recorder_write(session->recorder, &record);
-}
-
-// When the world and the inside of the same image are there; a newer one may overtake either.
-static void write_key(sonde_session *session) {
-  const sonde_world_slot *world = session->world_part;
-  const sonde_inside_slot *inside = session->inside_part;
-  if (!world || !inside || world->tick != inside->tick) return;
-  sonde_key key = {.tick = world->tick,
-                   .inputs = &world->memory,
-                   .inside = &inside->memory,
-                   .world = world + 1,
-                   .world_bytes = world->bytes};
-  if (session->keys) sonde_keys_write(session->keys, &key);
-  write_check(session,
-              &(sonde_record_check){SONDE_CHECK_STATE, world->tick,
-                                    sonde_subject_saved_hash(session->subject, world + 1)});
-  session->world_part = NULL, session->inside_part = NULL;
-}
-
-// The hashes come behind the records of their ticks: what is seen before the ring is emptied has
-// its records in it.
-void sonde_session_drain(sonde_session *session) {
-  if (!session->recorder) return;
-  const void *world = sonde_mailbox_read(session->world_box);
-  const void *inside = sonde_mailbox_read(session->inside_box);
-  sonde_record_check check;
-  bool checked = sonde_ring_pop(session->image_checks, &check);
-  write_records(session);
-  if (world) session->world_part = world;
-  if (inside) session->inside_part = inside;
-  write_key(session);
-  for (; checked; checked = sonde_ring_pop(session->image_checks, &check)) {
-    write_records(session);
-    write_check(session, &check);
-  }
 }
 
 static void *record_main(void *argument) {

@@ -2,7 +2,7 @@
 //
 // tell_gel               how much is on the skin
 // publish_frame          a frame -> encoded -> `latest`
-// pump_once, pump_run    newest frame of the source, observed and published
+// pump_once, pump_run    newest frame of the source, published
 // apply_*                what a command changes
 // page_server_show       another source; sonde_page_show_model: one without a session
 // sonde_page_post, sonde_page_publish, sonde_page_tell   frames and texts of the program
@@ -57,15 +57,11 @@ static bool publish_frame(sonde_page_server *server, const sonde_frame *whole) {
   return true;
 }
 
-// Under the source's lock. A watched session gives every frame, another only those that are waited
-// for.
+// Under the source's lock. Only frames that are waited for are taken.
 static bool pump_once(sonde_page_server *server) {
   sonde_frame frame;
-  bool waits = anyone_waits(server);
-  if (!server->source.frame || !(waits || server->def.observe)) return false;
-  if (!server->source.frame(server->source.self, &frame)) return false;
-  if (server->def.observe) server->def.observe(server->def.user, &frame);
-  return !waits || publish_frame(server, &frame);
+  if (!server->source.frame || !anyone_waits(server)) return false;
+  return server->source.frame(server->source.self, &frame) && publish_frame(server, &frame);
 }
 
 static void *pump_run(void *argument) {

@@ -106,13 +106,7 @@ static void put_truth(sonde_file *file, const sonde_case *c) {
   }
 }
 
-sonde_status sonde_case_save(const sonde_case *from, const char *path, sonde_error *error) {
-  SONDE_ASSERT(from && path);
-  sonde_status status = sonde_case_check(from, error);
-  if (status) return status;
-  sonde_file *file;
-  status = sonde_file_create(path, &file, error);
-  if (status) return status;
+static void put_case(sonde_file *file, const sonde_case *from) {
   sonde_file_printf(file, "sonde_case: %d\n", SONDE_CASE_VERSION);
   put_text(file, "id", from->id);
   put_text(file, "title", from->title);
@@ -127,5 +121,26 @@ sonde_status sonde_case_save(const sonde_case *from, const char *path, sonde_err
   put_findings(file, from);
   put_criteria(file, &from->criteria);
   put_truth(file, from);
+}
+
+sonde_status sonde_case_save(const sonde_case *from, const char *path, sonde_error *error) {
+  SONDE_ASSERT(from && path);
+  sonde_file *file;
+  sonde_status status = sonde_case_check(from, error);
+  if (!status) status = sonde_file_create(path, &file, error);
+  if (status) return status;
+  put_case(file, from);
   return sonde_file_commit(file, error);
+}
+
+sonde_status sonde_case_text(const sonde_case *from, char **text, sonde_error *error) {
+  SONDE_ASSERT(from && text);
+  sonde_file *file;
+  size_t count;
+  *text = NULL;
+  sonde_status status = sonde_case_check(from, error);
+  if (!status) status = sonde_file_in_memory(&file, error);
+  if (status) return status;
+  put_case(file, from);
+  return sonde_file_take(file, text, &count, error);
 }

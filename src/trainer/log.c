@@ -13,9 +13,13 @@
 // bind_value, read_value  one member of an entry to and from a statement
 // is_date         a date of our form
 // check_entry     what the table could not say in words
+// put_member, get_member  one member of an entry to and from JSON
 // grow            room for one more item of an array
 #include "trainer/log.h"
 
+#include "base/disk.h"
+
+#include <cjson/cJSON.h>
 #include <sqlite3.h>
 #include <string.h>
 
@@ -104,8 +108,11 @@ static sonde_status sql_fail(const sonde_exam_log *log, sonde_error *error) {
                       log->path, WAIT_MS / 1000);
   case SQLITE_FULL:
   case SQLITE_IOERR: return sonde_fail(error, SONDE_DISK, "%s: %s", log->path, words);
-  default: return sonde_fail(error, SONDE_IO, "%s: %s", log->path, words);
+  default: break;
   }
+  int failure = sqlite3_system_errno(log->base);
+  return sonde_fail(error, failure ? sonde_disk_status(failure) : SONDE_IO, "%s: %s%s%s", log->path,
+                    words, failure ? ": " : "", failure ? strerror(failure) : "");
 }
 
 static sonde_status run(sonde_exam_log *log, const char *sql, sonde_error *error) {
@@ -360,6 +367,71 @@ sonde_status sonde_exam_log_add(sonde_exam_log *log, const sonde_log_entry *entr
   }
   sqlite3_finalize(statement);
   return status;
+}
+
+sonde_status sonde_exam_log_has(sonde_exam_log *log, const char *id, bool *found,
+                                sonde_error *error) {
+  SONDE_ASSERT(log && id && found);
+  sqlite3_stmt *statement = NULL;
+  sonde_status status = prepare(log, "SELECT 1 FROM exams WHERE id = ?1", &statement, error);
+  if (status) return status;
+  int code = sqlite3_bind_text(statement, 1, id, -1, SQLITE_STATIC);
+  if (!code) code = sqlite3_step(statement);
+  *found = code == SQLITE_ROW;
+  if (code != SQLITE_ROW && code != SQLITE_DONE) status = sql_fail(log, error);
+  sqlite3_finalize(statement);
+  return status;
+}
+
+// ---- entries as text ----------------------------------------------------------------------------
+
+static void put_member(cJSON *root, const column *c, const char *member) {
+  if (c->kind == COLUMN_TEXT) cJSON_AddStringToObject(root, c->name, member);
+  if (c->kind == COLUMN_FLAG) cJSON_AddBoolToObject(root, c->name, *(const bool *)member);
+  if (c->kind == COLUMN_COUNT)
+    cJSON_AddNumberToObject(root, c->name, *(const uint32_t *)(const void *)member);
+  double value = c->kind == COLUMN_REAL ? *(const double *)(const void *)member : 0;
+  if (c->kind == COLUMN_REAL && isfinite(value)) cJSON_AddNumberToObject(root, c->name, value);
+}
+
+static void get_member(const cJSON *root, const column *c, char *member) {
+  const cJSON *item = cJSON_GetObjectItemCaseSensitive(root, c->name);
+  double number = cJSON_IsNumber(item) ? item->valuedouble : (double)NAN;
+  if (c->kind == COLUMN_TEXT)
+    sonde_log_copy(member, c->size, cJSON_IsString(item) ? item->valuestring : "");
+  else if (c->kind == COLUMN_FLAG)
+    *(bool *)member = cJSON_IsTrue(item);
+  else if (c->kind == COLUMN_COUNT)
+    *(uint32_t *)(void *)member = number >= 0 && number <= UINT32_MAX ? (uint32_t)number : 0;
+  else
+    *(double *)(void *)member = number;
+}
+
+sonde_status sonde_log_entry_text(const sonde_log_entry *entry, char **text, sonde_error *error) {
+  SONDE_ASSERT(entry && text);
+  cJSON *root = cJSON_CreateObject();
+  for (uint32_t i = 0; i < COLUMN_TOTAL; ++i)
+    put_member(root, &COLUMNS[i], (const char *)entry + COLUMNS[i].offset);
+  char *printed = cJSON_PrintUnformatted(root);
+  size_t bytes = printed ? strlen(printed) + 1 : 0;
+  *text = printed ? SONDE_NEW(char, bytes) : NULL;
+  if (*text) memcpy(*text, printed, bytes);
+  cJSON_free(printed);
+  cJSON_Delete(root);
+  return *text ? SONDE_OK : sonde_fail_memory(error);
+}
+
+sonde_status sonde_log_entry_parse(const char *text, sonde_log_entry *entry, sonde_error *error) {
+  SONDE_ASSERT(text && entry);
+  *entry = (sonde_log_entry){0};
+  cJSON *root = cJSON_Parse(text);
+  for (uint32_t i = 0; i < COLUMN_TOTAL; ++i)
+    get_member(root, &COLUMNS[i], (char *)entry + COLUMNS[i].offset);
+  bool is_object = cJSON_IsObject(root);
+  cJSON_Delete(root);
+  if (!is_object)
+    return sonde_fail(error, SONDE_FORMAT, "an entry of the log of exams is not a JSON object");
+  return check_entry(entry, error) ? SONDE_FORMAT : SONDE_OK;
 }
 
 // Makes room for item number `count`; false when out of memory.

@@ -35,9 +35,19 @@ static void play(const char *path) {
   sonde_player_close(player);
 }
 
+static void read_notes(const char *path) {
+  sonde_notes notes;
+  sonde_error error = {SONDE_OK, "", ""};
+  if (!fuzz_checked(sonde_notes_load(path, &notes, &error), &error)) return;
+  for (uint32_t k = 0; k < notes.count; ++k)
+    FUZZ_CHECK(strlen(notes.list[k].text) <= SONDE_NOTE_MOST_BYTES);
+  sonde_notes_clear(&notes);
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t count) {
   const char *path = fuzz_file("exam.rec", bytes, count);
   inspect(path, false);
+  read_notes(path);
   if (inspect(path, true) && fuzz_chosen(bytes, count, 16)) play(path);
   return 0;
 }

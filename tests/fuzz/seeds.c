@@ -200,7 +200,8 @@ static void seed_log(void) {
   put_file("log", "three_exams", 0, fuzz_path("log.sqlite"));
 }
 
-// A recording of a press with changed controls, as the recorder leaves it, and its comments.
+// A recording of a press with changed controls, as the recorder leaves it and with a comment; the
+// comments beside an old one.
 static void seed_recording(void) {
   const char *path = fuzz_path("seed.rec");
   sonde_device device;
@@ -219,7 +220,9 @@ static void seed_recording(void) {
   put_file("recording", "whole", 0, path);
   sonde_comment comment = {.time_s = 0.1, .author = "teacher", .text = "well pressed"};
   MUST(sonde_comments_add(path, &comment, &error));
-  put_file("comments", "one", 0, fuzz_path("seed.rec.comments.json"));
+  put_file("recording", "commented", 0, path);
+  put_text("comments", "one", 0,
+           "{\"comments\":[{\"time_s\":0.1,\"author\":\"teacher\",\"text\":\"well pressed\"}]}");
 }
 
 static void seed_messages(void) {

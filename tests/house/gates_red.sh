@@ -37,7 +37,7 @@ expect() { # green|red WHAT COMMAND...
 
 includes=("$house/includes.sh" "$tree") sizes=("$house/sizes.sh" "$tree")
 hot=("$house/hot_symbols.sh" "$tree" "$tree/build" "$objdump")
-api=("$house/api.sh" "$tree" "$tree/lib.so" "$nm")
+api=("$house/api.sh" "$tree" "$tree/lib.so" "$nm") disk=("$house/disk.sh" "$tree")
 
 fresh
 expect green "includes, clean tree" "${includes[@]}"
@@ -48,6 +48,11 @@ fresh; echo '#include "sonde/stream.h"' >>"$tree/include/sonde/world.h"
 expect red "a public header that includes a lower one" "${includes[@]}"
 fresh; echo '#include "base/base.h"' >>"$tree/app/main.c"
 expect red "an app file that looks inside" "${includes[@]}"
+
+fresh; echo 'int sonde_disk(void);' >"$tree/src/base/disk.c"
+expect green "disk, clean tree" "${disk[@]}"
+echo 'void f(void) { rename("a", "b"); }' >>"$tree/app/main.c"
+expect red "a call that changes the disk elsewhere" "${disk[@]}"
 
 fresh
 { echo 'int long_one(int a) {'; for i in {1..79}; do echo "  a += $i;"; done; echo '}'; } \

@@ -130,6 +130,32 @@ static void what_was_not_measured_stays_so(void **state) {
   sonde_exam_log_close(log);
 }
 
+// As a journal keeps an entry; and the log says whether it has one.
+static void entries_survive_as_text(void **state) {
+  (void)state;
+  sonde_exam_log *log = opened();
+  bool found = true;
+  sonde_log_entry in = entry_of("text", "Ann \"\xc3\xa9\"\n", 7), out;
+  in.metrics.smoothness = (double)NAN;
+  in.score = 100.0 / 3.0;
+  char *text = NULL;
+  assert_int_equal(sonde_log_entry_text(&in, &text, NULL), SONDE_OK);
+  assert_int_equal(sonde_log_entry_parse(text, &out, NULL), SONDE_OK);
+  sonde_free(text);
+  assert_true(isnan(out.metrics.smoothness) && out.score == in.score);
+  out.metrics.smoothness = in.metrics.smoothness = 0;
+  assert_same(&in, &out);
+  assert_int_equal(sonde_exam_log_has(log, "text", &found, NULL), SONDE_OK);
+  assert_false(found);
+  add(log, &out);
+  assert_int_equal(sonde_exam_log_has(log, "text", &found, NULL), SONDE_OK);
+  assert_true(found);
+  const char *const bad[] = {"", "[]", "{}", "{\"id\":\"x\"}"};
+  for (size_t k = 0; k < SONDE_COUNT_OF(bad); ++k)
+    assert_int_equal(sonde_log_entry_parse(bad[k], &out, NULL), SONDE_FORMAT);
+  sonde_exam_log_close(log);
+}
+
 static void wrong_entries_are_refused(void **state) {
   (void)state;
   sonde_exam_log *log = opened();
@@ -451,6 +477,7 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       TEST(entries_come_back),
       TEST(what_was_not_measured_stays_so),
+      TEST(entries_survive_as_text),
       TEST(wrong_entries_are_refused),
       TEST(texts_are_cut_between_characters),
       TEST(dates_are_universal_time),

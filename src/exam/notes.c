@@ -1,0 +1,105 @@
+// Notes of a recording that nobody writes any more.
+// copy_notes:    out of the file's bytes.
+// append:        one note and the block that closes it off.
+// sonde_notes_*: the interface.
+#include "exam/record.h"
+
+#include "base/base.h"
+#include "base/disk.h"
+
+#include <errno.h>
+#include <string.h>
+#include <zlib.h>
+
+static sonde_status copy_notes(const sonde_recording *r, sonde_notes *notes, sonde_error *error) {
+  sonde_record_note note;
+  uint32_t count = 0;
+  size_t bytes = 1;
+  for (size_t at = r->start; sonde_recording_next_note(r, &at, &note); bytes += note.bytes + 1)
+    ++count;
+  notes->list = SONDE_NEW(sonde_note, count);
+  notes->texts = SONDE_NEW(char, bytes);
+  if (!notes->list || !notes->texts) return sonde_fail_memory(error);
+  char *text = notes->texts;
+  for (size_t at = r->start; sonde_recording_next_note(r, &at, &note); text += note.bytes + 1) {
+    memcpy(text, note.text, note.bytes);
+    notes->list[notes->count++] = (sonde_note){note.kind, note.tick, text};
+  }
+  SONDE_ASSERT(notes->count == count);
+  return SONDE_OK;
+}
+
+sonde_status sonde_notes_load(const char *path, sonde_notes *notes, sonde_error *error) {
+  SONDE_ASSERT(path && notes);
+  sonde_recording recording;
+  *notes = (sonde_notes){0};
+  sonde_status status = sonde_recording_load(path, true, &recording, error);
+  if (status) return status;
+  status = copy_notes(&recording, notes, error);
+  sonde_recording_clear(&recording);
+  if (status) sonde_notes_clear(notes);
+  return status;
+}
+
+void sonde_notes_clear(sonde_notes *notes) {
+  sonde_free(notes->list);
+  sonde_free(notes->texts);
+  *notes = (sonde_notes){0};
+}
+
+const sonde_note *sonde_notes_last(const sonde_notes *notes, sonde_note_kind kind) {
+  for (uint32_t i = notes->count; i > 0; --i)
+    if (notes->list[i - 1].kind == kind) return &notes->list[i - 1];
+  return NULL;
+}
+
+// The recording is read when its file is locked: another program may have added to it meanwhile.
+static int append(sonde_journal *journal, const sonde_recording *r, sonde_note_kind kind,
+                  const char *text) {
+  static const char zeros[8];
+  unsigned char head[SONDE_RECORD_NOTE_BYTES], block[16];
+  size_t length = strlen(text), pad = -length & 7;
+  (void)sonde_record_put_note(head, kind, r->told.ticks, length);
+  uLong crc = crc32_z(r->crc, head, sizeof head);
+  crc = crc32_z(crc, (const unsigned char *)text, length);
+  crc = crc32_z(crc, (const unsigned char *)zeros, pad);
+  sonde_record_put_block(block, (uint32_t)crc, r->block_ticks);
+  int failure = sonde_journal_keep(journal, r->notes_end);
+  if (failure) return failure;
+  bool taken = sonde_journal_append(journal, head, sizeof head, true) &&
+               sonde_journal_append(journal, text, length, true) &&
+               sonde_journal_append(journal, zeros, pad, true) &&
+               sonde_journal_append(journal, block, sizeof block, true);
+  failure = taken ? sonde_journal_flush(journal, true, true) : ENOMEM;
+  if (failure) sonde_journal_forget(journal);
+  return failure;
+}
+
+sonde_status sonde_notes_add(const char *path, sonde_note_kind kind, const char *text,
+                             sonde_error *error) {
+  SONDE_ASSERT(path && text && kind >= SONDE_NOTE_SETUP && kind <= SONDE_NOTE_COMMENT);
+  sonde_journal *journal;
+  sonde_recording recording;
+  if (strlen(text) >= SONDE_NOTE_MOST_BYTES)
+    return sonde_fail(error, SONDE_ARGUMENT, "a note of %zu bytes, expected less than %d",
+                      strlen(text), SONDE_NOTE_MOST_BYTES);
+  sonde_status status = sonde_journal_extend(path, &journal, error);
+  if (status) return status;
+  status = sonde_recording_load(path, true, &recording, error);
+  if (!status) {
+    int failure = 0;
+    if (recording.version < SONDE_RECORD_JOURNAL)
+      status = sonde_fail(error, SONDE_VERSION, "%s: version %d of a recording takes no notes",
+                          path, recording.version);
+    else
+      failure = append(journal, &recording, kind, text);
+    if (failure)
+      status = sonde_fail(error, sonde_disk_status(failure), "%s: cannot be written: %s", path,
+                          strerror(failure));
+    sonde_recording_clear(&recording);
+  }
+  sonde_journal_close(journal);
+  return status;
+}
+
+bool sonde_recording_is_open(const char *recording) { return sonde_journal_is_open(recording); }
