@@ -7,6 +7,7 @@
 // kind_of, look   what file this is, at one moment
 // is_new, check_kind, check_whole  empty file; a log of this version; nothing in it is damaged
 // make_tables     schema of a new log, once, whoever comes first
+// fail_to_open    why a file cannot be opened
 // configure       waiting, distrust of the file's own code
 // sonde_exam_log_open, sonde_exam_log_close
 // put_columns     names of all columns, or as many numbered places, with commas between
@@ -20,6 +21,7 @@
 #include "base/disk.h"
 
 #include <cjson/cJSON.h>
+#include <fcntl.h>
 #include <sqlite3.h>
 #include <string.h>
 
@@ -244,10 +246,21 @@ static void configure(sonde_exam_log *log) {
   sqlite3_db_config(log->base, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, NULL);
 }
 
+// SQLite does not say why: the same attempt does. What succeeds at the second one was the
+// machine's.
+static sonde_status fail_to_open(const char *path, sonde_error *error) {
+  int descriptor, failure = sonde_disk_open(path, O_RDWR | O_CREAT, 0666, &descriptor);
+  if (!failure) (void)sonde_disk_close(descriptor);
+  return sonde_fail(error, failure ? sonde_disk_status(failure) : SONDE_DISK,
+                    "%s: the log of exams cannot be opened: %s", path,
+                    failure ? strerror(failure) : "the disk failed once");
+}
+
 static sonde_status open_and_check(sonde_exam_log *log, const char *path, sonde_error *error) {
   file_kind kind = {0};
   int code = sqlite3_open_v2(path, &log->base, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE, NULL);
   if (!log->base) return sonde_fail_memory(error);
+  if (code == SQLITE_CANTOPEN) return fail_to_open(path, error);
   if (code) return sql_fail(log, error);
   configure(log);
   sonde_status status = look(log, &kind, error);

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# crash.sh quick|full [exam|generate|fit|cases|class]...: a program is killed at its disk calls, a
+# crash.sh quick|full|N [exam|generate|fit|cases|class]...: a program is killed at its disk calls, a
 # write is torn, the disk is full from a call on, one call fails. Then the journals are recovered:
 # no exam is lost that had begun, no decision that was told to be on the disk, no old output.
-# quick takes some of the calls, full all of them.
+# quick takes some of the calls, full all of them, N every N-th.
 set -euo pipefail
 : "${SONDE:?}" "${EXAM_ONCE:?}" "${FAULTS:?}" "${MODEL:?}" "${DATA:?}" "${LIBRARY:?}"
 mode=${1:-quick}
@@ -101,7 +101,8 @@ calls_of() { cat "$work/count"; }
 over() {
   local calls=$1 hows=$2 every=1 k how
   shift 2
-  [[ $mode == full ]] || every=$((calls * $(wc -w <<<"$hows") / 6 + 1))
+  [[ $mode != quick ]] || every=$((calls * $(wc -w <<<"$hows") / 6 + 1))
+  [[ ! $mode =~ ^[0-9]+$ ]] || every=$mode
   local n=0
   for ((k = 0; k < calls; ++k)); do
     for how in $hows; do
