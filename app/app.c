@@ -1,11 +1,9 @@
-// Shared by the subcommands: messages and exit codes, numbers of options, progress and Ctrl-C, the
-// bundled model.
+// Shared by the subcommands: messages and exit codes, numbers of options, the bundled model.
 #include "app.h"
 
 #include <errno.h>
 #include <getopt.h>
 #include <math.h>
-#include <signal.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -80,61 +78,6 @@ bool app_parse_integer(const char *verb, const char *option, const char *text, l
   app_usage_error(verb, "%s expects a whole number from %ld to %ld, got '%s'", option, low, high,
                   text ? text : "nothing");
   return false;
-}
-
-// ---- Ctrl-C and progress
-
-static volatile sig_atomic_t interrupted;
-
-static void on_interrupt(int number) {
-  (void)number;
-  interrupted = 1;
-}
-
-void app_catch_interrupt(void) {
-  struct sigaction action;
-  memset(&action, 0, sizeof action);
-  action.sa_handler = on_interrupt;
-  action.sa_flags = (int)SA_RESETHAND; // the second one acts as usual
-  sigemptyset(&action.sa_mask);
-  sigaction(SIGINT, &action, NULL);
-  sigaction(SIGTERM, &action, NULL);
-}
-
-bool app_interrupted(void) { return interrupted != 0; }
-
-typedef struct progress_line {
-  bool terminal, shown;
-  int percent;
-} progress_line;
-
-static progress_line line;
-
-static bool report(double fraction, const char *what, void *user) {
-  progress_line *p = user;
-  enum { BAR = 30 };
-  int percent = fraction > 0 ? (int)(100.0 * fmin(fraction, 1.0)) : 0;
-  if (p->terminal && (percent != p->percent || !p->shown)) {
-    static const char FULL[] = "##############################";
-    int full = percent * BAR / 100;
-    fprintf(stderr, "\r\033[K[%.*s%*s] %3d %% %s", full, FULL, BAR - full, "", percent,
-            what ? what : "");
-    fflush(stderr);
-    p->percent = percent;
-    p->shown = true;
-  }
-  return !interrupted;
-}
-
-sonde_progress app_progress(void) {
-  app_catch_interrupt();
-  line = (progress_line){isatty(STDERR_FILENO) == 1, false, -1};
-  return (sonde_progress){report, &line};
-}
-
-void app_progress_end(void) {
-  if (line.shown) fprintf(stderr, "\r\033[K");
-  line.shown = false;
 }
 
 // ---- bundled model

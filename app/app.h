@@ -45,12 +45,19 @@ bool app_parse_real(const char *verb, const char *option, const char *text, doub
 bool app_parse_integer(const char *verb, const char *option, const char *text, long low, long high,
                        long *value);
 
-// Asks before long work whether an output file (NULL: none) can be written: APP_OK, or the exit code
-// after printing why not.
+// Asks before long work whether an output file (NULL: none) can be written: APP_OK, or the exit
+// code after printing why not.
 int app_check_output(const char *verb, const char *path);
 
-// Progress on a terminal (stderr), silent in a pipe; Ctrl-C cancels.
+// Progress on a terminal (stderr), silent in a pipe; Ctrl-C cancels. The line shows what is done,
+// its share in per cent and the time; the time goes on while nothing is reported. One piece of work
+// at a time; app_progress_end() comes before anything is printed.
 sonde_progress app_progress(void);
+// The same for work that reports no share and cannot be cancelled but by ending the program: the
+// line says what is done and for how long.
+void app_progress_begin(const char *what);
+// The fractions reported from here on fill the bar from one share to another: work in parts.
+void app_progress_part(double from, double to);
 void app_progress_end(void);
 
 // From here on the first Ctrl-C (or SIGTERM) only sets a flag, the second one ends the program.

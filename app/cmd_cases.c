@@ -140,7 +140,10 @@ static int check(const arguments *a, const exam_library *library, const sonde_ca
   sonde_error error = {0};
   sonde_case_setup setup;
   const char *bundled = library->has_bundled ? library->bundled : NULL;
-  if (sonde_case_build(c, bundled, directory, &setup, &error)) return app_fail(VERB, &error);
+  app_progress_begin("building the case");
+  sonde_status status = sonde_case_build(c, bundled, directory, &setup, &error);
+  app_progress_end();
+  if (status) return app_fail(VERB, &error);
   if (a->output && sonde_case_save(c, a->output, &error)) {
     sonde_case_setup_clear(&setup);
     return app_fail(VERB, &error);

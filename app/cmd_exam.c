@@ -171,6 +171,7 @@ static int examine(const arguments *a, const exam_library *library,
   }
   sonde_score score;
   sonde_progress progress = app_progress();
+  progress.report(0, "building the case", progress.user);
   sonde_status status = sonde_exam_run(&def, NULL, &progress, &score, &error);
   app_progress_end();
   if (status) return app_fail(VERB, &error);

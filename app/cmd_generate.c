@@ -250,7 +250,9 @@ int cmd_generate(int argc, char **argv) {
   if (code >= 0) return code;
   work w = {0};
   sonde_error error = {0};
+  app_progress_begin("making the thigh");
   sonde_status status = make(&a, &w, &error);
+  app_progress_end();
   if (!status) print(&a, &w);
   sonde_model_destroy(w.model);
   sonde_thigh_shape_destroy(w.shape);

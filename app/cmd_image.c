@@ -324,10 +324,12 @@ int cmd_image(int argc, char **argv) {
   sonde_image image = {0};
   sonde_pathology pathology;
   sonde_error error = {0};
+  app_progress_begin("pressing and drawing");
   sonde_status status = sonde_pathology_preset(o.pathology, &pathology, &error);
   if (!status) status = settled_open(&s, o.model, o.probe, NULL, &error);
   if (!status) status = place(&s, &o, &error);
   if (!status) status = draw(&s, &o, &pathology, &image, &error);
+  app_progress_end();
   if (!status) print(&s, &o, &image);
   sonde_image_clear(&image);
   settled_close(&s);

@@ -211,6 +211,7 @@ static sonde_status prepare(press *p, const options *o, sonde_error *error) {
   sonde_status status = sonde_pathology_preset(o->pathology, &p->pathology, error);
   if (!status) set_vein(p, o);
   if (!status && o->preset) status = sonde_preset_load(o->preset, &preset, error);
+  app_progress_begin("pressing");
   if (!status) status = settled_open(&p->scene, o->model, o->probe, &preset, error);
   return status ? status : settled_site(&p->scene, o->model, o->site, &p->start, error);
 }
@@ -241,6 +242,7 @@ int cmd_press(int argc, char **argv) {
   sonde_status status = prepare(&p, &o, &error);
   if (!status) status = press_on(&p, &o, &error);
   if (!status) status = look(&p, o.image, &error);
+  app_progress_end();
   if (!status) print(&p, &o);
   settled_close(&p.scene);
   return status ? app_fail("press", &error) : APP_OK;

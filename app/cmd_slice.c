@@ -373,7 +373,9 @@ int cmd_slice(int argc, char **argv) {
   if (code >= 0) return code;
   work w = {0};
   sonde_error error = {0};
+  app_progress_begin("slicing");
   sonde_status status = a.volume ? slice_volume(&a, &w, &error) : slice_sequence(&a, &w, &error);
+  app_progress_end();
   if (!status) print(&a, &w);
   sonde_slicer_destroy(w.slicer);
   sonde_image_clear(&w.image);

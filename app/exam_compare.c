@@ -64,6 +64,13 @@ static sonde_score *cell(const table *t, uint32_t of, uint32_t op, long seed) {
   return &t->score[(of * OPERATORS + op) * (uint32_t)t->o->seeds + (uint32_t)seed];
 }
 
+// The bar runs over all exams; the shares that one exam reports fill its part.
+static void show_part(const table *t, uint32_t of, uint32_t op, long seed) {
+  double seeds = (double)t->o->seeds, all = (double)t->case_count * OPERATORS * seeds;
+  double before = (double)(of * OPERATORS + op) * seeds + (double)seed;
+  app_progress_part(before / all, (before + 1) / all);
+}
+
 static sonde_status run_case(table *t, uint32_t of, const sonde_progress *progress,
                              sonde_error *error) {
   const compare_options *o = t->o;
@@ -74,6 +81,7 @@ static sonde_status run_case(table *t, uint32_t of, const sonde_progress *progre
   for (uint32_t op = 0; op < OPERATORS && !status; ++op)
     for (long seed = 0; seed < o->seeds && !status; ++seed) {
       char json[PATH_SIZE], csv[PATH_SIZE];
+      show_part(t, of, op, seed);
       sonde_exam_def def = sonde_exam_def_default();
       def.patient = &t->cases[of];
       def.protocol = o->protocol;

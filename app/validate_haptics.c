@@ -469,7 +469,7 @@ static sonde_status measure(work *w) {
 
 static int run(const options *o) {
   sonde_error error = {0};
-  work w = {.o = o, .error = &error, .list.json = o->json};
+  work w = {.o = o, .error = &error, .list = {.json = o->json, .working = "haptics"}};
   sonde_world_def world = haptics_world();
   sonde_status status = sonde_model_load(o->model, &w.model, &error);
   if (!status) status = sonde_probe_create("linear", &w.probe, &error);
@@ -478,6 +478,7 @@ static int run(const options *o) {
     w.site = sonde_model_site(w.model, 27);
     if (!w.site) w.site = &w.model->sites[w.model->site_count / 2];
     app_catch_interrupt();
+    app_progress_begin(w.list.working);
     status = measure(&w);
   }
   sonde_state_destroy(w.state);

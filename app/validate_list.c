@@ -24,6 +24,7 @@ void validate_note(validate_list *l, const char *name, double value, double leas
   app_progress_end();
   printf("%-34s %12.5g   %-36s %s\n", name, value, m->target, m->pass ? "pass" : "FAIL");
   fflush(stdout);
+  if (l->working) app_progress_begin(l->working);
 }
 
 static void print_json(const validate_list *l) {
@@ -44,6 +45,7 @@ static void print_json(const validate_list *l) {
 }
 
 bool validate_end(const validate_list *l) {
+  app_progress_end();
   if (l->json)
     print_json(l);
   else

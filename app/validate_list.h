@@ -14,6 +14,7 @@ typedef struct validate_measure {
 
 typedef struct validate_list {
   bool json;
+  const char *working; // what the progress line says between two measures; NULL: nothing
   int count, failed;
   validate_measure list[VALIDATE_MOST];
 } validate_list;

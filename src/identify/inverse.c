@@ -1,6 +1,7 @@
 // Levenberg-Marquardt over forward simulations.
 // simulate:     one parameter vector on one record, an item of the parallel loop.
 // simulate_all: several vectors on all records.
+// note_share, report_shares: how far the simulations of a batch are, for progress.
 // weigh:        Huber weights about the scale of the residuals.
 // normal_equations, solve_small: at most four unknowns.
 // descend:      a damped step, tried and accepted or refused.
@@ -30,8 +31,16 @@ typedef struct workspace {
   double start[P];
   double *weight; // [residuals]
   uint32_t residuals;
-  double noise; // robust scale of the residuals
+  atomic_uint *share; // [VECTORS * records] of each simulation, in thousandths
+  double noise;       // robust scale of the residuals
 } workspace;
+
+// A simulation takes up to minutes: its own share is told, not only its end.
+static bool note_share(double fraction, const char *what, void *user) {
+  (void)what;
+  atomic_store((atomic_uint *)user, (unsigned)(1000 * clamp(fraction, 0, 1)));
+  return true;
+}
 
 static sonde_status simulate(void *user, uint32_t worker, uint32_t item, const atomic_bool *stop,
                              sonde_error *error) {
@@ -50,7 +59,8 @@ static sonde_status simulate(void *user, uint32_t worker, uint32_t item, const a
   if (!status) {
     model.law = law;
     sonde_law_scale(&model.law, scale);
-    status = sonde_drive_run(&w->drive[r], &model, &def, stop, NULL, force, force + record->count,
+    const sonde_progress share = {note_share, &w->share[item]};
+    status = sonde_drive_run(&w->drive[r], &model, &def, stop, &share, force, force + record->count,
                              error);
   }
   if (!status)
@@ -73,14 +83,33 @@ static sonde_status simulate_item(void *user, uint32_t worker, uint32_t item,
   return simulate(b->w, worker, item + b->from * b->w->in->record_count, stop, error);
 }
 
+// Progress of a batch: the mean of its simulations' shares.
+typedef struct batch_progress {
+  const workspace *w;
+  uint32_t first, items;
+  char what[64];
+} batch_progress;
+
+static bool report_shares(double fraction, const char *what, void *user) {
+  (void)fraction, (void)what;
+  const batch_progress *b = user;
+  double sum = 0;
+  for (uint32_t k = 0; k < b->items; ++k) sum += atomic_load(&b->w->share[b->first + k]);
+  return sonde_progress_report(b->w->in->progress, sum / (1000.0 * b->items), b->what);
+}
+
 static sonde_status simulate_all(workspace *w, uint32_t from, uint32_t to, const char *what,
                                  sonde_error *error) {
   SONDE_ASSERT(from < to && to <= VECTORS);
   uint32_t items = (to - from) * w->in->record_count;
   batch b = {w, from};
+  batch_progress shares = {.w = w, .first = from * w->in->record_count, .items = items};
+  snprintf(shares.what, sizeof shares.what, "round %u, %s", w->in->iterations + 1, what);
+  for (uint32_t k = 0; k < items; ++k) atomic_store(&w->share[shares.first + k], 0);
   w->in->simulations += items;
   return sonde_parallel_run(items, sonde_parallel_workers(w->in->options->threads, items),
-                            simulate_item, &b, w->in->progress, what, error);
+                            simulate_item, &b, &(sonde_progress){report_shares, &shares}, what,
+                            error);
 }
 
 // Scale from the median of |r| (samples that do not count are 0); beyond 2.5 of it a residual
@@ -250,7 +279,8 @@ static sonde_status prepare(workspace *w, sonde_error *error) {
     return sonde_fail(error, SONDE_ARGUMENT, "the records give %u values for %u parameters",
                       w->residuals, in->parameter_count);
   w->weight = SONDE_NEW(double, w->residuals);
-  bool ok = w->weight != NULL;
+  w->share = SONDE_NEW(atomic_uint, VECTORS * in->record_count);
+  bool ok = w->weight != NULL && w->share != NULL;
   for (uint32_t v = 0; v <= in->parameter_count; ++v) {
     w->residual[v] = SONDE_NEW(double, w->residuals);
     ok &= w->residual[v] != NULL;
@@ -265,6 +295,7 @@ static void clear(workspace *w) {
   for (uint32_t v = 0; v < VECTORS; ++v) sonde_free(w->residual[v]);
   sonde_free(w->drive);
   sonde_free(w->first);
+  sonde_free(w->share);
   sonde_free(w->weight);
 }
 

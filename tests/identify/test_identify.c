@@ -93,6 +93,35 @@ static void work_can_be_cancelled(void **unused) {
 }
 
 // The push at the end of a long hold is that of the settled probe.
+// What a single simulation of a long record reports; stops at the first share within it, or behind
+// its end.
+static bool stop_within(double fraction, const char *what, void *user) {
+  bool *seen = user, first = strstr(what, "first simulation") != NULL;
+  *seen |= first && fraction > 0 && fraction < 1;
+  return first && !*seen;
+}
+
+static void one_simulation_tells_its_share(void **unused) {
+  (void)unused;
+  sonde_model *model = fixture_model(4, NULL);
+  sonde_protocol p = sonde_protocol_default(SONDE_PROTOCOL_RAMP_HOLD);
+  p.depth_m = 2e-3;
+  p.speed_m_s[0] = 0.08;
+  p.speed_count = 1;
+  p.hold_s = 60; // far longer than a report takes
+  p.rate_hz = 100;
+  sonde_motion_record record = make(model, NULL, p, 1);
+  sonde_damping_result found;
+  sonde_error error = {0};
+  bool seen = false;
+  sonde_progress progress = {stop_within, &seen};
+  assert_int_equal(sonde_identify_damping(model, &record, 1, NULL, &progress, &found, &error),
+                   SONDE_CANCELLED);
+  assert_true(seen);
+  sonde_motion_record_clear(&record);
+  sonde_model_destroy(model);
+}
+
 static void presses_to_the_force_asked_for(void **unused) {
   (void)unused;
   sonde_model *model = fixture_model(4, NULL);
@@ -117,6 +146,7 @@ static void presses_to_the_force_asked_for(void **unused) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(damping_comes_back), cmocka_unit_test(friction_comes_back),
-      cmocka_unit_test(work_can_be_cancelled), cmocka_unit_test(presses_to_the_force_asked_for)};
+      cmocka_unit_test(work_can_be_cancelled), cmocka_unit_test(one_simulation_tells_its_share),
+      cmocka_unit_test(presses_to_the_force_asked_for)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
