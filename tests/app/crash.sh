@@ -156,6 +156,7 @@ class_at() {
   timeout -s INT 12 env LD_PRELOAD="$FAULTS" DISK_FAULTS_HOW="$1" DISK_FAULTS_AT="$2" \
     "$SONDE" class --learners 1 --port $((20000 + RANDOM % 20000)) --program "$work/learner" \
     >"$work/class" 2>"$work/err" </dev/null || true
+  sleep 1 # the learners' programs are ending
   tried=$((tried + 1))
   cat "$work"/told.* >"$work/told" 2>/dev/null || true
   rm -f "$work"/told.*
