@@ -101,7 +101,7 @@ static void print_text(const sonde_case *patient, const sonde_score *s) {
          s->truth);
   print_segments(s);
   printf("\nparts (0..1):");
-#define PRINT_PART(name, weight, text) printf(" %s %.2f", #name, s->name);
+#define PRINT_PART(name, weight, title, text) printf(" %s %.2f", #name, s->name);
   SONDE_SCORE_LIST(PRINT_PART)
 #undef PRINT_PART
   printf("\ncoverage %.0f %%, largest gap %.0f mm, completeness %.2f\npresses:", 100 * m->coverage,
@@ -124,7 +124,7 @@ static void print_json(const sonde_case *patient, const char *protocol, const ch
   app_json_bool("correct", s->correct);
   app_json_text("diagnosis", s->asked);
   app_json_text("truth", s->truth);
-#define JSON_PART(part, weight, text) app_json_real(#part, s->part);
+#define JSON_PART(part, weight, title, text) app_json_real(#part, s->part);
   SONDE_SCORE_LIST(JSON_PART)
 #undef JSON_PART
   app_json_real("gap_mm", 1e3 * m->gap_m);

@@ -1,7 +1,7 @@
 // An exam at the desk: begun on a case's thigh, watched frame by frame, judged, kept.
 //
 // name_exam            id, directory and date
-// desk_exam_prepare, begin   thigh, plan, judge, session
+// desk_exam_prepare, begin   thigh, plan with its forces, judge, session
 // watch                every image, on the session's image thread
 // shrink, keep_pictures   the learner's own pictures of a press
 // desk_exam_observe    one frame
@@ -28,12 +28,19 @@ static sonde_status name_exam(desk *d, desk_exam *exam, sonde_error *error) {
   return sonde_directory_make(exam->directory, 0700, false, error);
 }
 
+static bool show_progress(double fraction, const char *what, void *user) {
+  desk *d = user;
+  (void)what;
+  d->progress = fraction;
+  desk_tell_exam(d);
+  return true;
+}
+
 sonde_status desk_exam_prepare(desk_exam *exam, const char *bundled, const char *cases,
-                               sonde_error *error) {
+                               const sonde_progress *progress, sonde_error *error) {
   sonde_status status = sonde_case_build(&exam->patient, bundled, cases, &exam->setup, error);
-  if (!status)
-    status = sonde_plan_make(exam->protocol, &exam->setup.map, &exam->patient.criteria, &exam->plan,
-                             error);
+  if (!status) status = sonde_plan_make(exam->protocol, &exam->setup.map, &exam->plan, error);
+  if (!status) status = sonde_plan_find_targets(&exam->plan, &exam->setup, progress, error);
   if (!status) status = sonde_judge_create(&exam->setup.map, &exam->plan, &exam->judge, error);
   if (!status && !(exam->sample = calloc(DESK_SAMPLES, sizeof *exam->sample)))
     status = app_error(error, SONDE_MEMORY, "out of memory");
@@ -68,7 +75,9 @@ static void copy_text(char *to, size_t size, const char *from) { snprintf(to, si
 static sonde_status begin(desk *d, desk_exam *exam, sonde_error *error) {
   char *setup = NULL;
   const char *bundled = d->def.bundled_path ? d->def.bundled_path : d->def.model_path;
-  sonde_status status = desk_exam_prepare(exam, bundled, d->cases, error);
+  sonde_progress progress = {show_progress, d};
+  sonde_status status = desk_exam_prepare(exam, bundled, d->cases, &progress, error);
+  d->progress = 0;
   if (!status) status = name_exam(d, exam, error);
   if (!status) status = desk_exam_setup_text(exam, &setup, error);
   if (status) return status;
@@ -94,7 +103,7 @@ sonde_status desk_exam_start(desk *d, const sonde_page_request *request, sonde_e
   copy_text(exam->trainee, sizeof exam->trainee, request->name);
   copy_text(d->trainee, sizeof d->trainee, request->name);
   desk_phase before = d->phase;
-  desk_set_phase(d, DESK_PREPARING, "The patient is being prepared.");
+  desk_set_phase(d, DESK_PREPARING, "The patient is being prepared: this takes some seconds.");
   const sonde_session *session = d->session;
   sonde_status status = begin(d, exam, error);
   if (status) {

@@ -99,6 +99,7 @@ struct desk {
   double published_s;
   bool disk_told; // that the disk does not take the recording
   double disk_told_s;
+  double progress; // of preparing an exam, 0 to 1
 
   pthread_mutex_t lock;
   sonde_page_request request[DESK_REQUESTS]; // ring
@@ -114,7 +115,7 @@ void desk_tell_replay(desk *d);
 // desk_exam.c
 // Thigh, plan and judge of a case that the exam has.
 sonde_status desk_exam_prepare(desk_exam *exam, const char *bundled, const char *cases,
-                               sonde_error *error);
+                               const sonde_progress *progress, sonde_error *error);
 sonde_status desk_exam_start(desk *d, const sonde_page_request *request, sonde_error *error);
 void desk_exam_observe(desk_exam *exam, const sonde_frame *frame); // under the lock
 sonde_status desk_exam_finish(desk *d, sonde_error *error);

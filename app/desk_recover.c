@@ -183,7 +183,7 @@ static sonde_status fill(desk_exam *exam, const cJSON *setup, const desk_library
   if (!status) *protocol = all[k];
   sonde_free(all);
   exam->protocol = protocol;
-  return status ? status : desk_exam_prepare(exam, library->bundled, library->cases, error);
+  return status ? status : desk_exam_prepare(exam, library->bundled, library->cases, NULL, error);
 }
 
 static void apply(desk_exam *exam, const sonde_note *note) {

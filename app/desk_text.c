@@ -113,9 +113,9 @@ static void add_guides(cJSON *to, const desk_exam *exam, const sonde_guidance *g
     add_target(to, exam, &exam->plan.point[g->point]);
   else
     cJSON_AddNullToObject(to, "target");
-  if (shown)
-    cJSON_AddItemToObject(to, "force_n",
-                          cJSON_CreateDoubleArray((double[]){g->force_low_n, g->force_high_n}, 2));
+  if (shown && isfinite(g->force.limit_n))
+    cJSON_AddItemToObject(
+        to, "force_n", cJSON_CreateDoubleArray((double[]){g->force.firm_n, g->force.limit_n}, 2));
   else
     cJSON_AddNullToObject(to, "force_n");
   add_real(to, "offset_mm", shown ? g->offset_m * 1e3 : (double)NAN, 1);
@@ -183,6 +183,23 @@ static void add_presses(cJSON *root, const desk_exam *exam) {
   }
 }
 
+// The score part by part, and where its points went.
+static void add_parts(cJSON *result, const desk_exam *exam) {
+  uint32_t count;
+  const sonde_compression *press = sonde_judge_compressions(exam->judge, &count);
+  sonde_score_part part[SONDE_SCORE_PARTS];
+  sonde_score_explain(&exam->score, &exam->plan, press, count, part);
+  cJSON *list = cJSON_AddArrayToObject(result, "parts");
+  for (int i = 0; i < SONDE_SCORE_PARTS; ++i) {
+    cJSON *item = cJSON_CreateObject();
+    cJSON_AddStringToObject(item, "title", part[i].title);
+    add_real(item, "points", part[i].points, 0.1);
+    cJSON_AddNumberToObject(item, "of", part[i].of);
+    cJSON_AddStringToObject(item, "lost", part[i].lost);
+    cJSON_AddItemToArray(list, item);
+  }
+}
+
 static void add_result(cJSON *root, const desk *d, const desk_exam *exam) {
   if (!exam->scored) {
     cJSON_AddNullToObject(root, "result");
@@ -197,6 +214,7 @@ static void add_result(cJSON *root, const desk *d, const desk_exam *exam) {
   cJSON_AddStringToObject(result, "summary", exam->score.summary);
   cJSON_AddStringToObject(result, "note", exam->patient.note);
   cJSON_AddStringToObject(result, "report", report);
+  add_parts(result, exam);
   cJSON *diagnosis = cJSON_AddObjectToObject(result, "diagnosis");
   cJSON_AddStringToObject(diagnosis, "asked", exam->score.asked);
   cJSON_AddStringToObject(diagnosis, "truth", exam->score.truth);
@@ -265,7 +283,7 @@ void desk_tell_exam(desk *d) {
   cJSON_AddStringToObject(root, "type", "exam");
   cJSON_AddStringToObject(root, "phase", phase_name(d->phase));
   cJSON_AddStringToObject(root, "message", d->message);
-  cJSON_AddNumberToObject(root, "progress", 0); // a thigh takes a second: no bar is worth it
+  cJSON_AddNumberToObject(root, "progress", d->progress);
   if (d->exam)
     add_exam(root, d, d->exam);
   else

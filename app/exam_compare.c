@@ -75,9 +75,12 @@ static sonde_status run_case(table *t, uint32_t of, const sonde_progress *progre
                              sonde_error *error) {
   const compare_options *o = t->o;
   sonde_case_setup setup;
+  sonde_plan plan;
   const char *bundled = o->library->has_bundled ? o->library->bundled : NULL;
   sonde_status status = sonde_case_build(&t->cases[of], bundled, o->library->cases, &setup, error);
   if (status) return status;
+  status = sonde_plan_make(o->protocol, &setup.map, &plan, error);
+  if (!status) status = sonde_plan_find_targets(&plan, &setup, progress, error);
   for (uint32_t op = 0; op < OPERATORS && !status; ++op)
     for (long seed = 0; seed < o->seeds && !status; ++seed) {
       char json[PATH_SIZE], csv[PATH_SIZE];
@@ -85,6 +88,7 @@ static sonde_status run_case(table *t, uint32_t of, const sonde_progress *progre
       sonde_exam_def def = sonde_exam_def_default();
       def.patient = &t->cases[of];
       def.protocol = o->protocol;
+      def.plan = &plan;
       def.operator_name = sonde_operator_names()[op];
       def.seed = (uint64_t)(o->seed + seed);
       def.solid = o->solid;

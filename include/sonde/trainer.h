@@ -29,8 +29,12 @@ typedef struct sonde_vein_point {
 
 /** Course and segments of the femoral vein; nothing of a case's pathology. Plain data. */
 typedef struct sonde_vein_map {
-  uint32_t segment_count, point_count;
+  uint32_t segment_count, point_count, branch_count;
   sonde_segment segment[SONDE_SEGMENTS]; /**< from the groin to the knee */
+  char branch[SONDE_BRANCHES][32];       /**< names of the vessels beside the femoral ones */
+  uint32_t landmark_count;
+  char landmark[SONDE_LANDMARKS][32]; /**< names of the model's landmarks */
+  double landmark_z_m[SONDE_LANDMARKS];
   sonde_vein_point point[SONDE_VESSEL_POINTS];
   double length_m;
 } sonde_vein_map;
@@ -44,26 +48,30 @@ SONDE_API sonde_status sonde_vein_map_make(const sonde_model *model, sonde_vein_
 SONDE_API sonde_vein_point sonde_vein_at(const sonde_vein_map *map, double along_m);
 /** Distance from the groin end of the point with that model z (clamped). @thread any */
 SONDE_API double sonde_vein_along(const sonde_vein_map *map, double z_m);
+/** Whether the thigh has a branch of that name. @thread any */
+SONDE_API bool sonde_vein_has_branch(const sonde_vein_map *map, const char *name);
 /** Index of a segment by name or of the one at a model z; SONDE_SEGMENTS when there is none. */
 SONDE_API uint32_t sonde_vein_segment(const sonde_vein_map *map, const char *name);
 SONDE_API uint32_t sonde_vein_segment_at(const sonde_vein_map *map, double z_m);
 /** Title of a segment for people, e.g. "Common femoral vein". @thread any */
 SONDE_API const char *sonde_segment_title(const char *name);
 
-/** A place in a file: a share of a segment, or (segment empty) millimetres from the groin end. */
+/** A place in a file: a share of a segment, a landmark, or (both empty) millimetres from the groin
+ *  end. */
 typedef struct sonde_station {
-  char segment[32];
+  char segment[32], landmark[32];
   double share;   /**< 0 at the groin end of the segment, 1 at the other */
   double shift_m; /**< added, towards the knee */
 } sonde_station;
 
-/** @return NOT_FOUND naming the segments of the model; ARGUMENT beyond the vein @thread any */
+/** @return NOT_FOUND for a segment or landmark that the thigh has not; ARGUMENT beyond the vein
+ * @thread any */
 SONDE_API sonde_status sonde_station_find(const sonde_station *station, const sonde_vein_map *map,
                                           double *along_m, sonde_error *error);
 
 /* ---- cases -------------------------------------------------------------------------------- */
 
-enum { SONDE_CASE_VERSION = 1, SONDE_LOOK_ALIKES = 4 };
+enum { SONDE_CASE_VERSION = 2, SONDE_LOOK_ALIKES = 4 };
 
 typedef enum sonde_case_level {
   SONDE_CASE_FIRST,
@@ -111,12 +119,6 @@ typedef struct sonde_case_branch {
   sonde_case_extent extent;
 } sonde_case_branch;
 
-/** What a protocol's criteria are replaced by where a thigh needs it; NaN: as the protocol. */
-typedef struct sonde_case_criteria {
-  double force_low_n, force_high_n, force_limit_n;
-  double artery_ratio;
-} sonde_case_criteria;
-
 /** A patient with a question, and the answer. Plain data: a struct copy is a copy. */
 typedef struct sonde_case {
   char id[48], title[96];
@@ -134,7 +136,6 @@ typedef struct sonde_case {
   sonde_case_lesion lesion[SONDE_LESIONS];
   sonde_case_branch branch[SONDE_BRANCHES];
   double webs, oedema;
-  sonde_case_criteria criteria;
   uint32_t truth_count;
   char truth_segment[SONDE_SEGMENTS][32];
   sonde_decision truth[SONDE_SEGMENTS]; /**< compressible or clot */

@@ -12,13 +12,13 @@
 extern "C" {
 #endif
 
-enum { SONDE_SCORE_VERSION = 2, SONDE_COMPRESSIONS = 4096, SONDE_HINT_S = 10 };
+enum { SONDE_SCORE_VERSION = 3, SONDE_COMPRESSIONS = 4096, SONDE_HINT_S = 10 };
 
 typedef enum sonde_press_result {
   SONDE_PRESS_COMPLETE,     /**< walls touch, transverse, not too hard */
-  SONDE_PRESS_OPEN,         /**< the artery deforms and the vein stays open: a finding */
+  SONDE_PRESS_OPEN,         /**< pressed firmly, and the vein stays open: a finding */
   SONDE_PRESS_INSUFFICIENT, /**< neither */
-  SONDE_PRESS_TOO_HARD,     /**< artery crushed or force beyond the limit */
+  SONDE_PRESS_TOO_HARD,     /**< force beyond the place's limit */
   SONDE_PRESS_OFF_AXIS,     /**< image plane not transverse, or the vein left it */
   SONDE_PRESS_RESULTS
 } sonde_press_result;
@@ -31,6 +31,7 @@ typedef struct sonde_compression {
   sonde_press_result result;
   uint32_t segment;    /**< of the map; SONDE_SEGMENTS when the vein was not in view */
   uint32_t point;      /**< nearest of the plan within reach; SONDE_PLAN_POINTS: none */
+  uint32_t place;      /**< nearest of the plan, in reach or not: its force target applies */
   double z_m, along_m; /**< where the image plane cut the vein when it began */
   double force_peak_n;
   double vein_ratio, artery_ratio; /**< least of the vein; the artery's at the same time */
@@ -96,7 +97,7 @@ typedef struct sonde_guidance {
   double offset_m;             /**< of the probe's face from the target along the skin */
   double angle_rad;            /**< of the image plane from transverse there */
   bool angle_ok;
-  double force_low_n, force_high_n;
+  sonde_force_target force; /**< of the press under way, else of the target */
   uint32_t undecided; /**< segment to decide next: the one pressed last, else the first that waits;
                            SONDE_SEGMENTS: none */
 } sonde_guidance;
@@ -133,17 +134,18 @@ typedef struct sonde_segment_verdict {
   uint32_t points, done;
 } sonde_segment_verdict;
 
-/** Parts of the score, each 0..1, and their weights in points. */
+/** Parts of the score, each 0..1: name, weight in points, title, meaning. */
 #define SONDE_SCORE_LIST(X)                                                                        \
-  X(decisions, 40, "right and supported decisions on the plan's segments")                         \
-  X(coverage, 25, "coverage of the plan's stretch of vein")                                        \
-  X(technique, 20, "valid share of the presses")                                                   \
-  X(force, 10, "forces within the limits")                                                         \
-  X(economy, 5, "time")
+  X(decisions, 40, "Findings",                                                                     \
+    "Planned segments answered rightly, each shown by a press of the right kind there.")           \
+  X(coverage, 25, "Coverage", "How much of the planned vein lies near a good press.")              \
+  X(technique, 20, "Technique", "Share of the presses that closed the vein, or showed it open.")   \
+  X(force, 10, "Force", "Planned places examined without a press above the place's limit.")        \
+  X(economy, 5, "Time", "Little time for what was examined.")
 
 typedef struct sonde_score {
   sonde_metrics metrics;
-#define SONDE_SCORE_MEMBER(name, weight, text) double name;
+#define SONDE_SCORE_MEMBER(name, weight, title, text) double name;
   SONDE_SCORE_LIST(SONDE_SCORE_MEMBER)
 #undef SONDE_SCORE_MEMBER
   double score; /**< 0..100 */
@@ -158,6 +160,19 @@ typedef struct sonde_score {
 /** @param truth whose map is the judge's @thread reader */
 SONDE_API void sonde_judge_score(const sonde_judge *judge, const sonde_case *truth,
                                  sonde_score *score);
+
+enum { SONDE_SCORE_PARTS = 5, SONDE_SCORE_WORDS = 480 };
+/** One part of the score, in points, and in words where they went. */
+typedef struct sonde_score_part {
+  const char *name, *title, *meaning; /**< static */
+  double points, of;
+  char lost[SONDE_SCORE_WORDS]; /**< what was lost, where and why; empty exactly when nothing was */
+} sonde_score_part;
+/** The parts in the order of SONDE_SCORE_LIST.
+ *  @param presses [count] of the exam that was scored, in the order of time @thread any */
+SONDE_API void sonde_score_explain(const sonde_score *score, const sonde_plan *plan,
+                                   const sonde_compression *presses, uint32_t count,
+                                   sonde_score_part part[SONDE_SCORE_PARTS]);
 
 /** What a result file says beside the score; texts may be NULL. */
 typedef struct sonde_score_note {

@@ -37,13 +37,15 @@ SONDE_API sonde_decision sonde_operator_decision(const sonde_operator *op, uint3
 typedef struct sonde_exam_def {
   const sonde_case *patient;
   const sonde_exam_protocol *protocol;
-  const char *operator_name;        /**< default expert */
-  uint64_t seed;                    /**< of the operator's hand */
-  const char *bundled;              /**< path of the bundled model */
-  const char *directory;            /**< of the case file, for model paths */
-  double limit_s;                   /**< of simulated time; default 1200 */
-  bool solid;                       /**< the inside by finite elements, as in real time; default
-                                         columns: half the time, ratios within 0.06 */
+  const sonde_plan *plan;    /**< of the protocol on the setup's thigh with its targets, borrowed;
+                                  NULL: made and its targets found for this exam */
+  const char *operator_name; /**< default expert */
+  uint64_t seed;             /**< of the operator's hand */
+  const char *bundled;       /**< path of the bundled model */
+  const char *directory;     /**< of the case file, for model paths */
+  double limit_s;            /**< of simulated time; default 1200 */
+  bool solid;                /**< the inside by finite elements, as in real time; default
+                                  columns: half the time, ratios within 0.06 */
   const char *json_path, *csv_path; /**< NULL: not written */
 } sonde_exam_def;
 SONDE_API sonde_exam_def sonde_exam_def_default(void);

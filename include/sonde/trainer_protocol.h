@@ -13,22 +13,30 @@ extern "C" {
 
 enum { SONDE_EXAM_PROTOCOL_VERSION = 1, SONDE_EXAM_STOPS = 16, SONDE_PLAN_POINTS = 64 };
 
-/** What a valid compression is (docs/trainer.md). */
+/** What a valid compression is (docs/trainer.md). The forces are those of a place:
+ *  sonde_force_target. */
 typedef struct sonde_criteria {
-  double tilt_rad;                  /**< most between image plane and transverse; 20 degrees */
-  double closed_ratio;              /**< the vein's walls touch: area ratio at most this; 0.10 */
-  double open_ratio;                /**< the vein stays open: at least this left; 0.25 */
-  double artery_ratio;              /**< the artery deforms: at most this left */
-  double crushed_ratio;             /**< less left of the artery is too hard */
-  double force_low_n, force_high_n; /**< corridor shown to the learner */
-  double force_limit_n;             /**< more is too hard */
-  double reach_m;                   /**< a press this near to a point examines it */
+  double tilt_rad;     /**< most between image plane and transverse; 20 degrees */
+  double closed_ratio; /**< the vein's walls touch: area ratio at most this; 0.10 */
+  double open_ratio;   /**< the vein stays open: at least this left; 0.30 */
+  double reach_m;      /**< a press this near to a point examines it */
 } sonde_criteria;
 SONDE_API sonde_criteria sonde_criteria_default(void);
+
+/** The force of one place of the exam: what the page shows, the judge applies, the score and the
+ *  report name. Whole newtons, so that the number shown is the number that counts. */
+typedef struct sonde_force_target {
+  double closes_n; /**< force at which a healthy vein there falls to closed_ratio */
+  double firm_n;   /**< closes_n rounded up: a vein that stays open at this force is a finding */
+  double limit_n;  /**< 1.2 closes_n + 2 N rounded up: a press above it is too hard */
+} sonde_force_target;
+/** @param closes_n more than 0 @thread any */
+SONDE_API sonde_force_target sonde_force_target_make(double closes_n);
 
 /** One place, or places every so often between two. */
 typedef struct sonde_exam_stop {
   char title[64], text[256];
+  char needs[32]; /**< branch of the thigh without which the place is left out; empty: none */
   sonde_station from, to;
   double every_m; /**< 0: one place, `from` */
 } sonde_exam_stop;
@@ -54,22 +62,36 @@ typedef struct sonde_plan_point {
   char title[64], text[256];
   uint32_t segment; /**< of the map */
   sonde_vein_point at;
+  sonde_force_target target; /**< NaN before sonde_plan_find_targets() */
 } sonde_plan_point;
 
-/** A protocol on one thigh, with a case's criteria. Plain data. */
+/** A protocol on one thigh. Plain data. */
 typedef struct sonde_plan {
   sonde_criteria criteria;
   uint32_t count;
   sonde_plan_point point[SONDE_PLAN_POINTS]; /**< in the order of the exam */
 } sonde_plan;
 
-/** @param criteria of the case, NULL: the protocol's
+/** The places, without their forces. A place that needs a branch which the thigh has not is left
+ *  out.
  *  @return NOT_FOUND for a place that the thigh has not; ARGUMENT for more than SONDE_PLAN_POINTS
+ * or none at all
  *  @thread any */
 SONDE_API sonde_status sonde_plan_make(const sonde_exam_protocol *protocol,
-                                       const sonde_vein_map *map,
-                                       const sonde_case_criteria *criteria, sonde_plan *plan,
+                                       const sonde_vein_map *map, sonde_plan *plan,
                                        sonde_error *error);
+
+/** Finds the force of every place by pressing a healthy vein there: the case's thigh, posture and
+ *  oedema, the linear probe straight above the vein at 12 mm/s, the inside by finite elements as in
+ * a session; no clot, breath or strain. About 0.3 s of a core's time for each place.
+ *  @param setup of the case whose map the plan was made with
+ *  @return MISMATCH for a place where the healthy vein does not close at 60 N, or 60 mm deep;
+ *    CANCELLED; MEMORY @thread owner */
+SONDE_API sonde_status sonde_plan_find_targets(sonde_plan *plan, const sonde_case_setup *setup,
+                                               const sonde_progress *progress, sonde_error *error);
+/** The place of the plan that is nearest along the vein, in reach or not; SONDE_PLAN_POINTS when
+ * the plan is empty. @thread any */
+SONDE_API uint32_t sonde_plan_nearest(const sonde_plan *plan, double along_m);
 
 #ifdef __cplusplus
 }

@@ -30,13 +30,11 @@ static void draw_person(draw *d, sonde_case *c) {
   c->thigh = SONDE_CASE_GENERATED;
   c->seed = d->seed & UINT32_MAX;
   c->known.sex = below(d, 2) ? SONDE_SEX_FEMALE : SONDE_SEX_MALE;
-  double fat_mm = rounded(c->level == SONDE_CASE_HARD ? uniform(d, 6, 8.5) : uniform(d, 5, 8), 10);
+  double fat_mm = rounded(c->level == SONDE_CASE_HARD ? uniform(d, 4, 6) : uniform(d, 4, 6.5), 10);
   c->known.fat_front_m = 1e-3 * fat_mm;
   c->known.second_vein = c->level == SONDE_CASE_HARD && below(d, 4) == 0;
   if (c->level == SONDE_CASE_HARD && below(d, 4) == 0)
     c->circulation.posture = SONDE_POSTURE_SITTING;
-  bool sitting = c->circulation.posture == SONDE_POSTURE_SITTING;
-  c->criteria = (sonde_case_criteria){18, sitting ? 36 : 34, sitting ? 42 : 40, (double)NAN};
 }
 
 static void draw_clot(draw *d, sonde_case *c) {

@@ -45,8 +45,7 @@ double *sonde_thigh_member(sonde_thigh *thigh, const sonde_thigh_parameter *para
 sonde_case sonde_case_default(void) {
   sonde_case c = {.known = sonde_thigh_unknown(),
                   .circulation = sonde_circulation_default(),
-                  .extent.whole = true,
-                  .criteria = {UNKNOWN, UNKNOWN, UNKNOWN, UNKNOWN}};
+                  .extent.whole = true};
   sonde_status status = sonde_pathology_preset("healthy", &c.pathology, NULL);
   SONDE_ASSERT(status == SONDE_OK);
   return c;
@@ -207,20 +206,6 @@ static void read_findings(sonde_reader *reader, sonde_place root, sonde_case *c)
     read_branch(reader, sonde_read_item(reader, branches, i), &c->branch[i]);
 }
 
-static void read_criteria(sonde_reader *reader, sonde_place root, sonde_case_criteria *criteria) {
-  static const char *const KEYS[] = {"force_low_n", "force_high_n", "force_limit_n", "artery_ratio",
-                                     NULL};
-  sonde_place at = sonde_read_find(reader, root, "criteria");
-  if (!at) return;
-  sonde_read_keys(reader, at, "criteria", KEYS);
-  double *to[] = {&criteria->force_low_n, &criteria->force_high_n, &criteria->force_limit_n};
-  for (int i = 0; i < 3; ++i)
-    if (sonde_read_find(reader, at, KEYS[i]))
-      *to[i] = sonde_read_real(reader, at, KEYS[i], 1, 60, UNKNOWN);
-  if (sonde_read_find(reader, at, KEYS[3]))
-    criteria->artery_ratio = sonde_read_real(reader, at, KEYS[3], 0.3, 0.95, UNKNOWN);
-}
-
 // ---- the answer
 
 static void read_segments(sonde_reader *reader, sonde_place at, sonde_case *c) {
@@ -269,19 +254,8 @@ static sonde_status check_id(const char *id, sonde_error *error) {
   return id[0] ? SONDE_OK : sonde_fail(error, SONDE_FORMAT, "the case has no id");
 }
 
-static sonde_status check_criteria(const sonde_case_criteria *c, sonde_error *error) {
-  double low = c->force_low_n, high = c->force_high_n, limit = c->force_limit_n;
-  if (low > high || high > limit || low > limit)
-    return sonde_fail(error, SONDE_ARGUMENT,
-                      "criteria of %g, %g and %g N, expected force_low_n <= force_high_n <= "
-                      "force_limit_n",
-                      low, high, limit);
-  return SONDE_OK;
-}
-
 sonde_status sonde_case_check(const sonde_case *of, sonde_error *error) {
   sonde_status status = check_id(of->id, error);
-  if (!status) status = check_criteria(&of->criteria, error);
   if (status) return status;
   bool clot = false;
   for (uint32_t i = 0; i < of->truth_count; ++i) clot |= of->truth[i] == SONDE_DECISION_CLOT;
@@ -295,17 +269,18 @@ sonde_status sonde_case_check(const sonde_case *of, sonde_error *error) {
 }
 
 static void read_case(sonde_reader *reader, sonde_case *c) {
-  static const char *const KEYS[] = {"sonde_case", "id",    "title",       "level", "history",
-                                     "note",       "thigh", "circulation", "vein",  "findings",
-                                     "criteria",   "truth", NULL};
+  const char *keys[] = {"sonde_case",  "id",   "title",    "level", "history", "note", "thigh",
+                        "circulation", "vein", "findings", "truth", NULL,      NULL};
   sonde_place root = sonde_reader_root(reader);
-  sonde_read_keys(reader, root, "a case", KEYS);
-  if (!sonde_read_find(reader, root, "sonde_case"))
-    sonde_reader_fail(reader, root, SONDE_FORMAT, "sonde_case: 1 is missing");
   double version = sonde_read_real(reader, root, "sonde_case", 0, 1e6, 0);
-  if (version != SONDE_CASE_VERSION)
+  // Files of version 1 may set forces; the forces of a place come from its thigh.
+  if (version == 1) keys[SONDE_COUNT_OF(keys) - 2] = "criteria";
+  sonde_read_keys(reader, root, "a case", keys);
+  if (!sonde_read_find(reader, root, "sonde_case"))
+    sonde_reader_fail(reader, root, SONDE_FORMAT, "sonde_case: 2 is missing");
+  if (version != 1 && version != SONDE_CASE_VERSION)
     sonde_reader_fail(reader, sonde_read_find(reader, root, "sonde_case"), SONDE_VERSION,
-                      "case of version %g, expected %d", version, SONDE_CASE_VERSION);
+                      "case of version %g, expected 1 or %d", version, SONDE_CASE_VERSION);
   sonde_read_member(reader, root, "id", true, c->id, sizeof c->id);
   sonde_error error = {0};
   if (sonde_reader_good(reader) && check_id(c->id, &error))
@@ -318,7 +293,6 @@ static void read_case(sonde_reader *reader, sonde_case *c) {
   read_circulation(reader, sonde_read_find(reader, root, "circulation"), &c->circulation);
   read_vein(reader, root, c);
   read_findings(reader, root, c);
-  read_criteria(reader, root, &c->criteria);
   read_truth(reader, root, c);
   if (sonde_reader_good(reader) && sonde_case_check(c, &error))
     sonde_reader_pass(reader, sonde_read_find(reader, root, "truth"), &error);

@@ -11,7 +11,10 @@ static void put_text(sonde_file *file, const char *key, const char *text) {
 }
 
 static void put_station(sonde_file *file, const char *key, const sonde_station *s) {
-  if (!s->segment[0])
+  if (s->landmark[0])
+    sonde_file_printf(file, "%s: {landmark: %s, shift_mm: %.12g}", key, s->landmark,
+                      1e3 * s->shift_m);
+  else if (!s->segment[0])
     sonde_file_printf(file, "%s: %.12g", key, 1e3 * s->shift_m);
   else
     sonde_file_printf(file, "%s: {segment: %s, share: %.12g, shift_mm: %.12g}", key, s->segment,
@@ -81,17 +84,6 @@ static void put_findings(sonde_file *file, const sonde_case *c) {
   }
 }
 
-static void put_criteria(sonde_file *file, const sonde_case_criteria *c) {
-  const double value[] = {c->force_low_n, c->force_high_n, c->force_limit_n, c->artery_ratio};
-  static const char *const KEY[] = {"force_low_n", "force_high_n", "force_limit_n", "artery_ratio"};
-  bool any = false;
-  for (size_t i = 0; i < SONDE_COUNT_OF(value); ++i) {
-    if (!isfinite(value[i])) continue;
-    sonde_file_printf(file, "%s  %s: %.12g\n", any ? "" : "criteria:\n", KEY[i], value[i]);
-    any = true;
-  }
-}
-
 static void put_truth(sonde_file *file, const sonde_case *c) {
   sonde_file_printf(file, "truth:\n  thrombosis: %s\n  ", c->thrombosis ? "true" : "false");
   put_text(file, "diagnosis", c->diagnosis);
@@ -119,7 +111,6 @@ static void put_case(sonde_file *file, const sonde_case *from) {
   put_clot(file, "\n  ", &from->pathology, &from->extent);
   sonde_file_printf(file, "\n  webs: %.12g\n", from->webs);
   put_findings(file, from);
-  put_criteria(file, &from->criteria);
   put_truth(file, from);
 }
 

@@ -71,6 +71,18 @@ void sonde_judge_destroy(sonde_judge *judge) {
 
 // ---- one press
 
+// The place nearest to the vein in view, to the probe when none is: its force applies.
+static void settle_place(sonde_judge *judge, double z_m) {
+  judge->now.place = sonde_plan_nearest(&judge->plan, sonde_vein_along(&judge->map, z_m));
+}
+
+sonde_force_target sonde_press_target(const sonde_judge *judge) {
+  const double none = (double)NAN;
+  uint32_t place = judge->now.place;
+  if (place >= judge->plan.count) return (sonde_force_target){none, none, none};
+  return judge->plan.point[place].target;
+}
+
 static void begin(sonde_judge *judge, const sonde_snapshot *s) {
   judge->pressing = true;
   judge->seen_at_peak = false;
@@ -83,6 +95,7 @@ static void begin(sonde_judge *judge, const sonde_snapshot *s) {
                                    .artery_ratio = (double)NAN,
                                    .artery_least = (double)NAN,
                                    .tilt_rad = (double)NAN};
+  settle_place(judge, s->world_from_probe.position.z);
 }
 
 // fmin() leaves out what is not a number.
@@ -97,27 +110,26 @@ static void look(sonde_judge *judge, const sonde_snapshot *s) {
   p->end_s = s->time_s - judge->first_s;
   p->artery_least = fmin(p->artery_least, s->artery_area_ratio);
   // where the probe was put: under the press tissue moves along the leg
-  if (seen && isnan(p->z_m)) p->z_m = s->vein_rest_m.z;
+  if (seen && isnan(p->z_m)) {
+    p->z_m = s->vein_rest_m.z;
+    settle_place(judge, p->z_m);
+  }
   if (!seen || s->vein_area_ratio >= (isnan(p->vein_ratio) ? INFINITY : p->vein_ratio)) return;
   p->vein_ratio = s->vein_area_ratio;
   p->artery_ratio = s->artery_area_ratio;
   p->tilt_rad = s->vein_tilt_rad;
 }
 
-// Comparisons with NaN are false: an artery that is not in view is neither crushed nor deformed.
+// Comparisons with NaN are false: without a force target nothing is too hard, and nothing firm.
 sonde_press_result sonde_press_classify(const sonde_judge *judge) {
   const sonde_compression *p = &judge->now;
   const sonde_criteria *c = &judge->plan.criteria;
-  if (p->force_peak_n > c->force_limit_n || p->artery_least < c->crushed_ratio)
-    return SONDE_PRESS_TOO_HARD;
+  sonde_force_target target = sonde_press_target(judge);
+  if (p->force_peak_n > target.limit_n) return SONDE_PRESS_TOO_HARD;
   if (!judge->seen_at_peak || !(p->tilt_rad <= c->tilt_rad)) return SONDE_PRESS_OFF_AXIS;
   if (p->vein_ratio <= c->closed_ratio) return SONDE_PRESS_COMPLETE;
-  if (p->vein_ratio >= c->open_ratio && p->artery_least <= c->artery_ratio) return SONDE_PRESS_OPEN;
+  if (p->vein_ratio >= c->open_ratio && p->force_peak_n >= target.firm_n) return SONDE_PRESS_OPEN;
   return SONDE_PRESS_INSUFFICIENT;
-}
-
-static bool is_valid(sonde_press_result result) {
-  return result == SONDE_PRESS_COMPLETE || result == SONDE_PRESS_OPEN;
 }
 
 static void locate(const sonde_judge *judge, sonde_compression *p) {
@@ -141,7 +153,11 @@ bool sonde_press_is_astray(const sonde_judge *judge) {
 // Every place within reach is examined, not only the nearest one: presses in any order do the same.
 static void cover(sonde_judge *judge, const sonde_compression *p) {
   judge->result_count[p->result]++;
-  if (!is_valid(p->result) || !isfinite(p->along_m)) return;
+  if (p->place < judge->plan.count) {
+    judge->at_place[p->place]++;
+    judge->hard_at_place[p->place] += p->result == SONDE_PRESS_TOO_HARD;
+  }
+  if (!sonde_press_is_valid(p->result) || !isfinite(p->along_m)) return;
   double reach = judge->plan.criteria.reach_m;
   mark(judge, judge->covered, p->along_m - reach - COVER_EXTRA_M,
        p->along_m + reach + COVER_EXTRA_M);

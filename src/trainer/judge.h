@@ -45,6 +45,7 @@ struct sonde_judge {
   uint32_t result_count[SONDE_PRESS_RESULTS];
   double closed_sum; // of 1 - ratio, complete presses
   bool done[SONDE_PLAN_POINTS];
+  uint32_t at_place[SONDE_PLAN_POINTS], hard_at_place[SONDE_PLAN_POINTS]; // presses by place
   uint32_t open[SONDE_SEGMENTS], complete[SONDE_SEGMENTS];
   uint32_t seen; // segment of the last valid press, SONDE_SEGMENTS: none
   bool covered[JUDGE_BINS], wanted[JUDGE_BINS];
@@ -63,8 +64,16 @@ struct sonde_judge {
   sonde_motion motion;
 };
 
+// An examination takes full points for its time up to this.
+static const double SONDE_SCORE_TIME_S = 600;
+
+static inline bool sonde_press_is_valid(sonde_press_result result) {
+  return result == SONDE_PRESS_COMPLETE || result == SONDE_PRESS_OPEN;
+}
 // What a press is so far.
 sonde_press_result sonde_press_classify(const sonde_judge *judge);
+// The force of the place where the press under way is, NaN without a place.
+sonde_force_target sonde_press_target(const sonde_judge *judge);
 // A press is under way within reach of no place of the plan.
 bool sonde_press_is_astray(const sonde_judge *judge);
 

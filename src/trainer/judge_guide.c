@@ -58,7 +58,6 @@ static void say_move(sonde_guidance *g, bool pressing, const char *title, double
 }
 
 static void say_press(const sonde_judge *judge, sonde_guidance *g) {
-  const sonde_criteria *c = &judge->plan.criteria;
   if (!g->angle_ok) {
     snprintf(g->text, sizeof g->text,
              "Turn the probe by %.0f degrees, so that it lies straight across the leg.",
@@ -67,7 +66,7 @@ static void say_press(const sonde_judge *judge, sonde_guidance *g) {
   }
   static const char *const OTHER[] = {
       [SONDE_PRESS_STATE_COMPLETE] = "The vein is closed: let go.",
-      [SONDE_PRESS_STATE_OPEN] = "The vein stays open though the artery gives way: let go.",
+      [SONDE_PRESS_STATE_OPEN] = "Pressed firmly, and the vein stays open: let go.",
       [SONDE_PRESS_STATE_TOO_HARD] = "Too hard: let go and press again with less force.",
       [SONDE_PRESS_STATE_OFF_AXIS] = "The vein is not cut straight across: let go and tilt back."};
   sonde_press_state state = sonde_judge_state(judge).state;
@@ -75,8 +74,9 @@ static void say_press(const sonde_judge *judge, sonde_guidance *g) {
     snprintf(g->text, sizeof g->text, "%s", OTHER[state]);
   else if (state == SONDE_PRESS_STATE_PRESSING)
     snprintf(g->text, sizeof g->text,
-             "Press on slowly until the walls of the vein touch (%.0f to %.0f N).", c->force_low_n,
-             c->force_high_n);
+             "Press on slowly until the walls of the vein touch, at most %.0f N. If it is still "
+             "open at %.0f N, it stays open.",
+             g->force.limit_n, g->force.firm_n);
   else
     snprintf(g->text, sizeof g->text, "Here: press until the walls of the vein touch.");
 }
@@ -113,13 +113,14 @@ static void ask(const sonde_judge *judge, sonde_guidance *g) {
 }
 
 sonde_guidance sonde_judge_guidance(const sonde_judge *judge) {
-  const sonde_criteria *c = &judge->plan.criteria;
+  const double none = (double)NAN;
   sonde_guidance g = {.point = next_point(judge),
-                      .offset_m = (double)NAN,
-                      .angle_rad = (double)NAN,
-                      .force_low_n = c->force_low_n,
-                      .force_high_n = c->force_high_n,
+                      .offset_m = none,
+                      .angle_rad = none,
+                      .force = {none, none, none},
                       .undecided = undecided(judge)};
+  if (g.point < judge->plan.count) g.force = judge->plan.point[g.point].target;
+  if (judge->pressing) g.force = sonde_press_target(judge);
   say_next(judge, &g);
   if (g.undecided < SONDE_SEGMENTS && !judge->pressing) ask(judge, &g);
   return g;

@@ -21,7 +21,7 @@ typedef struct habit {
   double force_from_n, force_to_n;   // stops at a force drawn from here, 0: by the image
   double beyond_from_n, beyond_to_n; // the same above the limit of force
   double closed_ratio, open_ratio;   // of the vein: called closed, called open
-  double artery_below;               // the criterion: ends a press on an open vein; 0: goes on
+  double past_firm_n;                // above the place's firm force: ends a press on an open vein
   double pause_s, wander_m;          // looks for the vein before a press; how far it sways then
   double past_m;                     // a travel goes past its place by this spread, then back
   double rate_n_s;                   // slows down where the force rises faster
@@ -40,7 +40,7 @@ static const habit HABIT[] = {
      .travel_m_s = 0.08,
      .closed_ratio = 0.08,
      .open_ratio = 0.33,
-     .artery_below = 0.04,
+     .past_firm_n = 0.5,
      .pause_s = 0.2,
      .wander_m = 0,
      .rate_n_s = 12,
@@ -120,8 +120,8 @@ struct sonde_operator {
   double aim_m, aim_across_m, aim_twist_rad;    // at this attempt
   double beyond_m;                              // the travel goes there first
   double stop_n, wait_s, last_s;
-  double ratio, artery, peak_n; // of this press; NaN: not seen
-  double felt_n, felt_depth_m;  // at the last look
+  double ratio, peak_n;        // of this press; NaN: not seen
+  double felt_n, felt_depth_m; // at the last look
   bool started;
 };
 
@@ -146,12 +146,11 @@ static void aim(sonde_operator *op) {
   op->aim_m = op->plan.point[op->place].at.along_m + calm * spread(op, h->along_m);
   op->aim_across_m = calm * spread(op, h->across_m);
   op->aim_twist_rad = calm * spread(op, h->twist_rad);
-  const sonde_criteria *c = &op->plan.criteria;
-  op->stop_n = NEAR_LIMIT * c->force_limit_n;
+  double limit_n = op->plan.point[op->place].target.limit_n;
+  op->stop_n = NEAR_LIMIT * limit_n;
   if (h->force_to_n > 0) op->stop_n = uniform(op, h->force_from_n, h->force_to_n);
-  if (h->beyond_to_n > 0)
-    op->stop_n = c->force_limit_n + uniform(op, h->beyond_from_n, h->beyond_to_n);
-  op->ratio = op->artery = (double)NAN;
+  if (h->beyond_to_n > 0) op->stop_n = limit_n + uniform(op, h->beyond_from_n, h->beyond_to_n);
+  op->ratio = (double)NAN;
   op->peak_n = op->felt_n = 0;
   op->felt_depth_m = -INFINITY;
   op->wait_s = h->pause_s * uniform(op, 0.5, 1.5);
@@ -240,8 +239,8 @@ static bool too_far(const sonde_operator *op, const sonde_snapshot *s) {
   if (h->force_to_n > 0 || h->beyond_to_n > 0) return false;
   double vein = sonde_vein_ratio(s);
   if (vein <= h->closed_ratio) return true;
-  double artery = op->plan.criteria.artery_ratio - h->artery_below;
-  return h->artery_below > 0 && s->artery_area_ratio <= artery && vein >= h->open_ratio;
+  double firm_n = op->plan.point[op->place].target.firm_n + h->past_firm_n;
+  return s->force_normal_n >= firm_n && vein >= h->open_ratio;
 }
 
 static void press(sonde_operator *op, const sonde_snapshot *s, double dt_s) {
@@ -260,7 +259,6 @@ static void press(sonde_operator *op, const sonde_snapshot *s, double dt_s) {
 
 static void watch(sonde_operator *op, const sonde_snapshot *s) {
   op->ratio = fmin(op->ratio, sonde_vein_ratio(s));
-  op->artery = fmin(op->artery, s->artery_area_ratio);
   op->peak_n = fmax(op->peak_n, s->force_normal_n);
 }
 
@@ -270,7 +268,8 @@ static void weigh(sonde_operator *op) {
   uint32_t segment = op->plan.point[op->place].segment;
   bool by_image = !(h->force_to_n > 0);
   bool closed = op->ratio <= h->closed_ratio + (by_image ? 0.02 : 0);
-  bool firm = by_image ? op->artery <= op->plan.criteria.artery_ratio : op->peak_n >= CALL_FORCE_N;
+  double firm_n = by_image ? op->plan.point[op->place].target.firm_n : CALL_FORCE_N;
+  bool firm = op->peak_n >= firm_n;
   bool open = !closed && op->ratio >= h->open_ratio && firm;
   op->attempt++;
   op->opens += open;

@@ -10,50 +10,31 @@
 
 static const double DEGREE = SONDE_PI / 180, SAME_M = 1e-6;
 
-// Ratios: docs/trainer.md. Forces: what closes a healthy vein 15 to 25 mm below the skin of the
-// bundled thigh.
 sonde_criteria sonde_criteria_default(void) {
-  return (sonde_criteria){.tilt_rad = 20 * DEGREE,
-                          .closed_ratio = 0.10,
-                          .open_ratio = 0.30,
-                          .artery_ratio = 0.70,
-                          .crushed_ratio = 0.45,
-                          .force_low_n = 16,
-                          .force_high_n = 28,
-                          .force_limit_n = 32,
-                          .reach_m = 0.010};
+  return (sonde_criteria){
+      .tilt_rad = 20 * DEGREE, .closed_ratio = 0.10, .open_ratio = 0.30, .reach_m = 0.010};
 }
 
 static void read_criteria(sonde_reader *reader, sonde_place root, sonde_criteria *c) {
-  static const char *const KEYS[] = {
-      "tilt_deg",    "closed_ratio", "open_ratio",    "artery_ratio", "crushed_ratio",
-      "force_low_n", "force_high_n", "force_limit_n", "reach_mm",     NULL};
+  static const char *const KEYS[] = {"tilt_deg", "closed_ratio", "open_ratio", "reach_mm", NULL};
   sonde_place at = sonde_read_find(reader, root, "criteria");
   if (!at) return;
   sonde_read_keys(reader, at, "criteria", KEYS);
   c->tilt_rad = DEGREE * sonde_read_real(reader, at, "tilt_deg", 1, 80, c->tilt_rad / DEGREE);
-  double *ratio[] = {&c->closed_ratio, &c->open_ratio, &c->artery_ratio, &c->crushed_ratio};
-  for (int i = 0; i < 4; ++i) *ratio[i] = sonde_read_real(reader, at, KEYS[1 + i], 0, 1, *ratio[i]);
-  double *force[] = {&c->force_low_n, &c->force_high_n, &c->force_limit_n};
-  for (int i = 0; i < 3; ++i)
-    *force[i] = sonde_read_real(reader, at, KEYS[5 + i], 0, 60, *force[i]);
+  c->closed_ratio = sonde_read_real(reader, at, "closed_ratio", 0, 1, c->closed_ratio);
+  c->open_ratio = sonde_read_real(reader, at, "open_ratio", 0, 1, c->open_ratio);
   c->reach_m = 1e-3 * sonde_read_real(reader, at, "reach_mm", 1, 50, 1e3 * c->reach_m);
   if (!(c->closed_ratio < c->open_ratio))
     sonde_reader_fail(reader, at, SONDE_ARGUMENT,
                       "closed_ratio is %g, expected less than open_ratio (%g)", c->closed_ratio,
                       c->open_ratio);
-  if (!(c->crushed_ratio < c->artery_ratio))
-    sonde_reader_fail(reader, at, SONDE_ARGUMENT,
-                      "crushed_ratio is %g, expected less than artery_ratio (%g)", c->crushed_ratio,
-                      c->artery_ratio);
-  if (!(c->force_low_n <= c->force_high_n && c->force_high_n <= c->force_limit_n))
-    sonde_reader_fail(reader, at, SONDE_ARGUMENT,
-                      "expected force_low_n <= force_high_n <= force_limit_n");
 }
 
 static void read_stop(sonde_reader *reader, sonde_place at, sonde_exam_stop *stop) {
-  static const char *const KEYS[] = {"title", "text", "at", "from", "to", "every_mm", NULL};
+  static const char *const KEYS[] = {"title", "text", "needs",    "at",
+                                     "from",  "to",   "every_mm", NULL};
   sonde_read_keys(reader, at, "a place", KEYS);
+  sonde_read_member(reader, at, "needs", false, stop->needs, sizeof stop->needs);
   sonde_read_member(reader, at, "title", true, stop->title, sizeof stop->title);
   sonde_read_member(reader, at, "text", true, stop->text, sizeof stop->text);
   sonde_place one = sonde_read_find(reader, at, "at"), from = sonde_read_find(reader, at, "from");
@@ -157,6 +138,7 @@ static sonde_status add_point(const sonde_exam_stop *stop, const sonde_vein_map 
   const char *segment = sonde_segment_title(map->segment[point->segment].name);
   snprintf(point->title, sizeof point->title, "%s", stop->every_m > 0 ? segment : stop->title);
   memcpy(point->text, stop->text, sizeof point->text);
+  point->target = (sonde_force_target){(double)NAN, (double)NAN, (double)NAN};
   plan->count++;
   return SONDE_OK;
 }
@@ -176,24 +158,17 @@ static sonde_status add_stop(const sonde_exam_stop *stop, const sonde_vein_map *
 }
 
 sonde_status sonde_plan_make(const sonde_exam_protocol *protocol, const sonde_vein_map *map,
-                             const sonde_case_criteria *criteria, sonde_plan *plan,
-                             sonde_error *error) {
+                             sonde_plan *plan, sonde_error *error) {
   SONDE_ASSERT(protocol && map && plan);
   *plan = (sonde_plan){.criteria = protocol->criteria};
-  if (criteria) {
-    sonde_criteria *c = &plan->criteria;
-    if (isfinite(criteria->force_low_n)) c->force_low_n = criteria->force_low_n;
-    if (isfinite(criteria->force_high_n)) c->force_high_n = criteria->force_high_n;
-    if (isfinite(criteria->force_limit_n)) c->force_limit_n = criteria->force_limit_n;
-    if (isfinite(criteria->artery_ratio)) c->artery_ratio = criteria->artery_ratio;
-    if (c->artery_ratio <= c->crushed_ratio)
-      return sonde_fail(error, SONDE_ARGUMENT,
-                        "the case's artery_ratio is %g, expected more than the protocol's "
-                        "crushed_ratio (%g)",
-                        c->artery_ratio, c->crushed_ratio);
-  }
   sonde_status status = SONDE_OK;
-  for (uint32_t i = 0; i < protocol->stop_count && !status; ++i)
-    status = add_stop(&protocol->stop[i], map, plan, error);
+  for (uint32_t i = 0; i < protocol->stop_count && !status; ++i) {
+    const sonde_exam_stop *stop = &protocol->stop[i];
+    if (stop->needs[0] && !sonde_vein_has_branch(map, stop->needs)) continue;
+    status = add_stop(stop, map, plan, error);
+  }
+  if (!status && plan->count == 0)
+    status = sonde_fail(error, SONDE_ARGUMENT, "the thigh has no place of the protocol '%s'",
+                        protocol->id);
   return status;
 }

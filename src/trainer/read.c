@@ -28,14 +28,20 @@ void sonde_read_member(sonde_reader *reader, sonde_place map, const char *key, b
 void sonde_read_station(sonde_reader *reader, sonde_place at, const char *what,
                         sonde_station *station) {
   static const char *const KEYS[] = {"segment", "share", "shift_mm", NULL};
+  static const char *const MARK[] = {"landmark", "shift_mm", NULL};
   *station = (sonde_station){0};
   if (sonde_read_is_text(reader, at)) {
     station->shift_m = 1e-3 * sonde_read_real_at(reader, at, what, 0, 1000);
     return;
   }
-  sonde_read_keys(reader, at, what, KEYS);
-  sonde_read_member(reader, at, "segment", true, station->segment, sizeof station->segment);
-  station->share = sonde_read_real(reader, at, "share", 0, 1, 0.5);
+  bool mark = sonde_read_find(reader, at, "landmark") != 0;
+  sonde_read_keys(reader, at, what, mark ? MARK : KEYS);
+  if (mark) {
+    sonde_read_member(reader, at, "landmark", true, station->landmark, sizeof station->landmark);
+  } else {
+    sonde_read_member(reader, at, "segment", true, station->segment, sizeof station->segment);
+    station->share = sonde_read_real(reader, at, "share", 0, 1, 0.5);
+  }
   station->shift_m = 1e-3 * sonde_read_real(reader, at, "shift_mm", -1000, 1000, 0);
 }
 

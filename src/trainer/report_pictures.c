@@ -166,7 +166,9 @@ sonde_status sonde_debrief_pictures(sonde_debrief *page, sonde_error *error) {
   sonde_text_format(
       &page->out,
       "<p class=\"quiet\">%s%u of your %u presses: the image before and at the peak. "
-      "In a complete press the vein's walls touch; the artery beside it stays round.</p>"
+      "In a complete press the vein's walls touch. In this simulator the artery beside it gives "
+      "way "
+      "too and keeps four to six tenths of its area; in a patient it keeps its shape.</p>"
       "\n<div class=\"pictures\">\n",
       shown < r->press_count ? "" : "All ", shown, r->press_count);
   for (uint32_t i = 0; i < shown && !status; ++i) status = put_pair(page, &r->pictures[i], error);

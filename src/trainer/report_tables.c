@@ -1,6 +1,6 @@
 // Score, measures and presses as tables.
 //
-// part_row         one part of the score with its bar
+// part_row         one part of the score with its bar, and where its points went
 // cap              why the score is less than its parts
 // measure          one line of the measures
 // number, percent  a value with its unit; a dash where nothing was done
@@ -11,31 +11,21 @@
 
 // ---- score --------------------------------------------------------------------------------------
 
-typedef struct part {
-  const char *name, *title, *meaning;
-} part;
-
-static const part PARTS[] = {
-    {"decisions", "Decisions",
-     "Planned segments answered rightly, each shown by a press of the right kind there."},
-    {"coverage", "Coverage", "How much of the planned vein lies near a good press."},
-    {"technique", "Technique", "Share of the presses that closed the vein, or showed it open."},
-    {"force", "Force", "Enough and not more: forces within the limits."},
-    {"economy", "Time", "Little time for what was examined."}};
-
-static void part_row(sonde_text *out, const char *name, double weight, double share,
-                     const char *text) {
-  const part *found = NULL;
-  for (size_t i = 0; i < SONDE_COUNT_OF(PARTS); ++i)
-    if (strcmp(PARTS[i].name, name) == 0) found = &PARTS[i];
-  double kept = isfinite(share) ? clamp(share, 0, 1) : 0;
-  sonde_text_format(out, "<tr><th scope=\"row\">%s</th><td>", found ? found->title : name);
-  sonde_text_escape(out, found ? found->meaning : text);
+static void part_row(sonde_text *out, const sonde_score_part *part) {
+  double kept = part->points / part->of;
+  sonde_text_format(out, "<tr><th scope=\"row\">%s</th><td>", part->title);
+  sonde_text_escape(out, part->meaning);
+  if (part->lost[0]) {
+    sonde_text_format(out, "<br/><b>\u2212%s of %s:</b> ",
+                      sonde_fixed(part->of - part->points, 1).s, sonde_fixed(part->of, 0).s);
+    sonde_text_escape(out, part->lost);
+    sonde_text_put(out, ".");
+  }
   sonde_text_format(out,
                     "<span class=\"bar\"><i style=\"width:%s%%\"></i></span></td>"
                     "<td class=\"n\">%s of %s</td></tr>\n",
-                    sonde_coordinate(100 * kept).s, sonde_fixed(weight * kept, 1).s,
-                    sonde_fixed(weight, 0).s);
+                    sonde_coordinate(100 * clamp(kept, 0, 1)).s, sonde_fixed(part->points, 1).s,
+                    sonde_fixed(part->of, 0).s);
 }
 
 static void cap(sonde_text *out, const sonde_score *score, double sum) {
@@ -52,14 +42,15 @@ void sonde_debrief_score(sonde_debrief *page) {
   sonde_text *out = &page->out;
   double sum = 0;
   sonde_debrief_section(page, "score", "The score");
-  sonde_text_put(out,
-                 "<table>\n<thead><tr><th>Part</th><th>What it means</th><th class=\"n\">Points"
-                 "</th></tr></thead>\n<tbody>\n");
-#define PART(name, weight, text)                                                                   \
-  part_row(out, #name, weight, score->name, text);                                                 \
-  sum += isfinite(score->name) ? (weight)*score->name : 0;
-  SONDE_SCORE_LIST(PART)
-#undef PART
+  sonde_text_put(out, "<table>\n<thead><tr><th>Part</th><th>What it means, and where points "
+                      "went</th><th class=\"n\">Points"
+                      "</th></tr></thead>\n<tbody>\n");
+  sonde_score_part part[SONDE_SCORE_PARTS];
+  sonde_score_explain(score, page->in->plan, page->in->presses, page->in->press_count, part);
+  for (int k = 0; k < SONDE_SCORE_PARTS; ++k) {
+    part_row(out, &part[k]);
+    sum += part[k].points;
+  }
   sonde_text_format(out,
                     "<tr class=\"this\"><th scope=\"row\">Score</th><td></td><td class=\"n\"><b>%s"
                     " of 100</b></td></tr>\n</tbody></table>\n",
@@ -120,7 +111,7 @@ void sonde_debrief_measures(sonde_debrief *page) {
   measure(out, "Time on the skin", duration(m->contact_s).s, "With the probe pressing.");
   measure(out, "Path of the probe", with_unit(m->path_m, 1, 2, "m").s, "Shorter is calmer.");
   measure(out, "Smoothness", sonde_fixed(m->smoothness, 1).s,
-          "Log dimensionless jerk: nearer to zero is smoother.");
+          "How evenly the probe moved between presses: nearer to zero is smoother.");
   sonde_text_put(out, "</tbody></table></div>\n</section>\n");
 }
 

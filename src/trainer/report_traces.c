@@ -53,12 +53,30 @@ static void bands(const sonde_debrief *page, const sonde_chart *chart, double sc
   }
 }
 
+// During each press the limit of its place.
+static void limits(const sonde_debrief *page, const sonde_chart *chart, double scale) {
+  const sonde_exam_report *r = page->in;
+  for (uint32_t i = 0; i < r->press_count; ++i) {
+    const sonde_compression *p = &r->presses[i];
+    if (p->place >= r->plan->count) continue;
+    double limit_n = r->plan->point[p->place].target.limit_n;
+    double from = fmax(p->start_s * scale, chart->x.low),
+           to = fmin(p->end_s * scale, chart->x.high);
+    if (!isfinite(limit_n) || !(from < to)) continue;
+    double y = sonde_chart_y(chart, limit_n);
+    sonde_svg_line(chart->out, sonde_chart_x(chart, from), y, sonde_chart_x(chart, to), y,
+                   "stroke='#c2410c' stroke-width='1.6'");
+  }
+}
+
 static void draw_traces(sonde_debrief *page, traces *t, sonde_text *out) {
-  const sonde_criteria *c = &page->in->plan->criteria;
+  const sonde_plan *plan = page->in->plan;
   double last = t->time[t->count - 1], scale = last - t->time[0] > 180 ? 1.0 / 60 : 1;
   for (uint32_t i = 0; i < t->count; ++i) t->time[i] *= scale;
   sonde_axis time = sonde_axis_tight(t->time[0], t->time[t->count - 1], 10);
-  double limit = isfinite(c->force_limit_n) ? 1.1 * c->force_limit_n : 1;
+  double limit = 1;
+  for (uint32_t i = 0; i < plan->count; ++i)
+    limit = fmax(limit, 1.1 * plan->point[i].target.limit_n);
   sonde_chart force = {.out = out,
                        .left = 58,
                        .top = 26,
@@ -73,7 +91,7 @@ static void draw_traces(sonde_debrief *page, traces *t, sonde_text *out) {
   bands(page, &force, scale);
   bands(page, &vein, scale);
   sonde_chart_frame(&force, "Force", NULL, "N");
-  sonde_chart_across(&force, c->force_limit_n, "stroke='#c2410c' stroke-dasharray='6 4'");
+  limits(page, &force, scale);
   sonde_chart_frame(&vein, "Area of the vein", scale < 1 ? "minutes" : "seconds", "% of rest");
   sonde_chart_clip(&force);
   sonde_chart_line(&force, t->time, t->force, t->count, "#1b2126", NULL);
@@ -97,8 +115,8 @@ sonde_status sonde_debrief_traces(sonde_debrief *page, sonde_error *error) {
   sonde_debrief_section(page, "traces", "Force and vein over time");
   sonde_debrief_drawing(
       page, &figure,
-      "Shaded: presses, in the colours of the vein's drawing. Dashed: the force above "
-      "which a press is too hard. The blue line is broken where the vein was not in "
+      "Shaded: presses, in the colours of the vein's drawing. Red: the limit of the "
+      "place, above which a press is too hard. The blue line is broken where the vein was not in "
       "the image.");
   sonde_text_put(&page->out, "</section>\n");
   sonde_free(t);

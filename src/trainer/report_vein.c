@@ -171,6 +171,7 @@ static void draw_tube(sonde_debrief *page, sonde_text *out) {
   draw_runs(page, out, true, false, MISSED);
   draw_runs(page, out, true, true, COVERED);
   sonde_svg_words(out, LEFT - 8, TUBE_TOP + 17, "class='end'", "groin");
+  sonde_svg_words(out, PAGE_WIDTH - RIGHT, TUBE_TOP - 6, "class='end'", "knee");
 }
 
 static void draw_clot(sonde_debrief *page, sonde_text *out) {
@@ -215,10 +216,26 @@ static void draw_gap(sonde_debrief *page, sonde_text *out) {
   sonde_svg_text(out, middle, y + 16, "class='middle' style=\"fill:#9a3412\"", words);
 }
 
+// The force of a place: from what closes a healthy vein to the limit, within reach of the place.
+static void draw_target(const sonde_chart *chart, const sonde_plan *plan, uint32_t i) {
+  const sonde_plan_point *point = &plan->point[i];
+  double from = 1e2 * (point->at.along_m - plan->criteria.reach_m);
+  double to = 1e2 * (point->at.along_m + plan->criteria.reach_m);
+  double firm_n = point->target.firm_n, limit_n = point->target.limit_n;
+  if (!isfinite(firm_n)) return;
+  from = fmax(from, chart->x.low);
+  to = fmin(to, chart->x.high);
+  sonde_chart_box(chart, from, to, firm_n, limit_n, "fill='#d9f0e6'");
+  double y = sonde_chart_y(chart, limit_n);
+  sonde_svg_line(chart->out, sonde_chart_x(chart, from), y, sonde_chart_x(chart, to), y,
+                 "stroke='#c2410c' stroke-width='1.6'");
+}
+
 static void draw_presses(sonde_debrief *page, sonde_text *out) {
   const sonde_exam_report *r = page->in;
-  const sonde_criteria *c = &r->plan->criteria;
-  double most = isfinite(c->force_limit_n) ? 1.15 * c->force_limit_n : 0;
+  double most = 0;
+  for (uint32_t i = 0; i < r->plan->count; ++i)
+    most = fmax(most, 1.15 * r->plan->point[i].target.limit_n);
   for (uint32_t i = 0; i < r->press_count; ++i) most = fmax(most, r->presses[i].force_peak_n);
   sonde_chart chart = {.out = out,
                        .left = LEFT,
@@ -227,14 +244,9 @@ static void draw_presses(sonde_debrief *page, sonde_text *out) {
                        .height = PLOT_HEIGHT,
                        .x = sonde_axis_tight(0, 1e2 * r->map->length_m, 10),
                        .y = sonde_axis_make(0, most > 0 ? most : 10, 5)};
-  sonde_chart_box(&chart, chart.x.low, chart.x.high, c->force_low_n, c->force_high_n,
-                  "fill='#e6f4ee'");
+  for (uint32_t i = 0; i < r->plan->count; ++i) draw_target(&chart, r->plan, i);
   sonde_chart_frame(&chart, NULL, "centimetres along the vein, from the groin to the knee",
                     "force (N)");
-  sonde_chart_across(&chart, c->force_limit_n, "stroke='#c2410c' stroke-dasharray='6 4'");
-  if (isfinite(c->force_limit_n))
-    sonde_svg_words(out, PAGE_WIDTH - RIGHT - 4, sonde_chart_y(&chart, c->force_limit_n) - 4,
-                    "class='tick end halo' style=\"fill:#9a3412\"", "too hard above this");
   for (uint32_t i = 0; i < r->press_count; ++i) {
     const sonde_compression *p = &r->presses[i];
     if (!sonde_chart_holds(&chart, 1e2 * p->along_m, p->force_peak_n)) continue;
@@ -287,12 +299,13 @@ static void draw(sonde_debrief *page) {
   legend(page, out);
   uint32_t hidden = 0;
   for (uint32_t i = 0; i < r->press_count; ++i) hidden += isfinite(r->presses[i].along_m) ? 0 : 1;
-  char caption[400];
+  char caption[520];
   int used =
       snprintf(caption, sizeof caption,
                "Above, the vein from the groin to the knee, with what was examined%s. Below, "
-               "each press by its place and its greatest force; the shaded band is the force "
-               "to aim for.",
+               "each press by its place and its greatest force. A green box reaches from the force "
+               "that closes a healthy vein at a place to the red line, the limit there: above "
+               "it a press is too hard.",
                page->vein.clot_to_m > page->vein.clot_from_m ? " and what is there" : "");
   if (hidden && used > 0)
     snprintf(caption + used, sizeof caption - (size_t)used,
@@ -343,6 +356,7 @@ void sonde_debrief_along(sonde_debrief *page) {
   sonde_text_put(&page->out,
                  "</tbody></table></div>\n<p class=\"quiet\">An answer is shown when "
                  "a press of the right kind in that segment supports it: one that closed "
-                 "the vein, or one that left it open while the artery deformed.</p>\n"
+                 "the vein, or one that left it open at the force that closes a healthy "
+                 "vein there.</p>\n"
                  "</section>\n");
 }

@@ -98,13 +98,14 @@ static void why_missed(const sonde_exam_report *r, const sonde_segment_verdict *
   if (total == 0)
     snprintf(out, size, "The segment was never pressed.");
   else if (open > 0)
-    snprintf(out, size,
-             "%u press%s left the vein open while the artery already deformed: that is the sign.",
-             open, plural(open));
+    snprintf(
+        out, size,
+        "%u press%s at the force that closes a healthy vein there left it open: that is the sign.",
+        open, plural(open));
   else
     snprintf(out, size,
-             "None of the %u press%s there met the clot hard enough for the artery to begin to "
-             "deform: press on until it does, and move in smaller steps.",
+             "None of the %u press%s there reached the force that closes a healthy vein: press on "
+             "until then, and move in smaller steps.",
              total, plural(total));
 }
 
@@ -123,7 +124,7 @@ static void work_segment(advice *a, const sonde_segment_verdict *v) {
     uint32_t closed = presses_in(r, segment_of(r, v->name), SONDE_PRESS_COMPLETE);
     add(a, title, "was called a clot, but the vein there closes. %s",
         closed ? "One of your own presses closed it."
-               : "Press until the artery begins to deform before calling the vein open.");
+               : "Press with the force that closes a healthy vein there before calling it open.");
   } else if (v->needed && v->decision == SONDE_DECISION_NONE) {
     add(a, title, "was left undecided; a segment without an answer cannot count.");
   } else if (v->needed && !v->correct) {
@@ -170,8 +171,8 @@ static void work_presses(advice *a) {
         "place.");
   if (hard)
     add(a, "Too hard",
-        "%u of %u presses. Stay below %s N and stop when the artery begins to deform.", hard,
-        m->press_count, sonde_fixed(c->force_limit_n, 0).s);
+        "%u of %u presses were above the limit of their place. Stop as soon as the walls touch.",
+        hard, m->press_count);
   if (tilted)
     add(a, "Off axis",
         "%u of %u presses. Keep the image plane across the vein, within %s degrees, and the vein "
@@ -180,8 +181,8 @@ static void work_presses(advice *a) {
         tilted, m->press_count, sonde_fixed(c->tilt_rad * 180 / SONDE_PI, 0).s);
   if (little)
     add(a, "Not far enough",
-        "%u of %u presses. Press until the walls touch, or until the artery begins to deform.",
-        little, m->press_count);
+        "%u of %u presses. Press until the walls touch, or to the force of the place.", little,
+        m->press_count);
   if (m->hints) add(a, "Hints", "you asked for %u; try the next one without.", m->hints);
 }
 

@@ -2,6 +2,7 @@
 // SONDE_SCORE_VERSION.
 // judge_segments:  right and supported decisions.
 // overall:         the diagnosis that the decisions amount to.
+// gentle:          places examined without pressing too hard.
 // parts:           the weighted parts, each 0..1.
 // total:           the sum, and what caps it.
 // tell:            one sentence.
@@ -11,7 +12,7 @@
 
 // A wrong or missing diagnosis scores at most this, below what passes.
 static const double CAP = 49, PASS = 70;
-static const double TIME_FULL_S = 600, TIME_NONE_S = 1200;
+static const double TIME_NONE_S = 1200;
 
 static void judge_segments(const sonde_judge *judge, const sonde_case *truth, sonde_score *score) {
   score->segment_count = judge->map.segment_count;
@@ -61,25 +62,29 @@ static double decided(const sonde_score *score) {
   return needed ? sum / needed : 0;
 }
 
-// What restraint earns counts only for the vein that was examined: doing nothing earns nothing.
+// What restraint earns counts only for the places that were examined: doing nothing earns nothing.
+static double gentle(const sonde_judge *judge) {
+  double sum = 0;
+  for (uint32_t i = 0; i < judge->plan.count; ++i) {
+    double presses = fmax(1, judge->at_place[i]);
+    if (judge->done[i]) sum += 1 - judge->hard_at_place[i] / presses;
+  }
+  return judge->plan.count ? sum / judge->plan.count : 0;
+}
+
 static void parts(const sonde_judge *judge, sonde_score *score) {
   const sonde_metrics *m = &score->metrics;
-  const sonde_criteria *c = &judge->plan.criteria;
   score->decisions = decided(score);
   score->coverage = m->coverage;
   score->technique = m->press_count ? m->valid_share : 0;
-  double over = (m->force_p95_n - c->force_high_n) / (c->force_limit_n - c->force_high_n);
-  bool measured = isfinite(m->force_p95_n) && c->force_limit_n > c->force_high_n;
-  double gentle = measured ? clamp(1 - over, 0, 1) : 1;
-  if (m->force_peak_n > c->force_limit_n) gentle *= 0.5;
-  score->force = gentle * m->coverage;
-  score->economy =
-      m->coverage * clamp((TIME_NONE_S - m->time_s) / (TIME_NONE_S - TIME_FULL_S), 0, 1);
+  score->force = gentle(judge);
+  double left_s = TIME_NONE_S - m->time_s;
+  score->economy = m->coverage * clamp(left_s / (TIME_NONE_S - SONDE_SCORE_TIME_S), 0, 1);
 }
 
 static void total(sonde_score *score) {
   score->score = 0;
-#define SONDE_SCORE_ADD(name, weight, text) score->score += (weight)*score->name;
+#define SONDE_SCORE_ADD(name, weight, title, text) score->score += (weight)*score->name;
   SONDE_SCORE_LIST(SONDE_SCORE_ADD)
 #undef SONDE_SCORE_ADD
   SONDE_ASSERT(score->score >= 0 && score->score <= 100 + 1e-9);

@@ -1,6 +1,6 @@
 // An exam's result as JSON, its presses as CSV.
 // open_map, key: a member of a JSON object.
-// put_note, put_metrics, put_score, put_segments, put_presses: parts of the object.
+// put_note, put_metrics, put_score, put_lost, put_segments, put_places, put_presses: parts of it.
 #include "trainer/judge.h"
 
 static const double DEG = 180 / SONDE_PI;
@@ -63,7 +63,7 @@ static void put_score(sonde_file *file, const sonde_score *s) {
   bool first = true;
   real(file, &first, "version", SONDE_SCORE_VERSION);
   real(file, &first, "score", s->score);
-#define SONDE_SCORE_PUT(name, weight, what) real(file, &first, #name, s->name);
+#define SONDE_SCORE_PUT(name, weight, title, what) real(file, &first, #name, s->name);
   SONDE_SCORE_LIST(SONDE_SCORE_PUT)
 #undef SONDE_SCORE_PUT
   boolean(file, &first, "passed", s->passed);
@@ -74,6 +74,30 @@ static void put_score(sonde_file *file, const sonde_score *s) {
   text(file, &first, "diagnosis", s->asked);
   text(file, &first, "truth", s->truth);
   text(file, &first, "summary", s->summary);
+}
+
+static void put_lost(sonde_file *file, const sonde_judge *judge, const sonde_score *s) {
+  sonde_score_part part[SONDE_SCORE_PARTS];
+  sonde_score_explain(s, &judge->plan, judge->press, judge->press_count, part);
+  bool first = true;
+  for (int k = 0; k < SONDE_SCORE_PARTS; ++k) text(file, &first, part[k].name, part[k].lost);
+}
+
+static void put_places(sonde_file *file, const sonde_judge *judge) {
+  for (uint32_t i = 0; i < judge->plan.count; ++i) {
+    const sonde_plan_point *p = &judge->plan.point[i];
+    sonde_file_printf(file, "%s\n    {\"title\": ", i ? "," : "");
+    sonde_json_text(file, p->title);
+    const double value[] = {1e3 * p->at.along_m, 1e3 * p->at.depth_m, p->target.closes_n,
+                            p->target.firm_n, p->target.limit_n};
+    static const char *const KEYS[] = {"along_mm", "vein_depth_mm", "closes_n", "firm_n",
+                                       "limit_n"};
+    for (size_t k = 0; k < SONDE_COUNT_OF(KEYS); ++k) {
+      sonde_file_printf(file, ", \"%s\": ", KEYS[k]);
+      sonde_json_real(file, value[k]);
+    }
+    sonde_file_printf(file, "}");
+  }
 }
 
 static void put_segments(sonde_file *file, const sonde_score *s) {
@@ -122,10 +146,14 @@ static sonde_status save_json(const sonde_judge *judge, const sonde_case *truth,
   put_note(file, truth, note);
   sonde_file_printf(file, "\n  },\n  \"score\": {");
   put_score(file, score);
+  sonde_file_printf(file, "\n  },\n  \"lost\": {");
+  put_lost(file, judge, score);
   sonde_file_printf(file, "\n  },\n  \"metrics\": {");
   put_metrics(file, &score->metrics);
   sonde_file_printf(file, "\n  },\n  \"segments\": [");
   put_segments(file, score);
+  sonde_file_printf(file, "\n  ],\n  \"places\": [");
+  put_places(file, judge);
   sonde_file_printf(file, "\n  ],\n  \"presses\": [");
   put_presses(file, judge);
   sonde_file_printf(file, "\n  ]\n}\n");

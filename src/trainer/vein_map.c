@@ -3,6 +3,7 @@
 // find_skin:     skin above every point; directions are averaged along the vein.
 // set_frame:     normal and across of a point.
 // cut_segments:  the model's segments within the course.
+// name_places:   the model's branches and landmarks.
 // name_segments: segments of a model that names none.
 #include "trainer/trainer.h"
 
@@ -18,7 +19,7 @@ static const struct {
                {"femoral_proximal", "Femoral vein, upper third", 0.40},
                {"femoral_mid", "Femoral vein, middle", 0.65},
                {"femoral_distal", "Femoral vein, lower third", 0.88},
-               {"popliteal_near", "Popliteal vein, near the knee", 1.0}};
+               {"popliteal_near", "Femoral vein above the knee", 1.0}};
 
 const char *sonde_segment_title(const char *name) {
   for (size_t i = 0; i < SONDE_COUNT_OF(SEGMENT); ++i)
@@ -91,6 +92,17 @@ static void cut_segments(const sonde_thigh_anatomy *anatomy, sonde_vein_map *map
   }
 }
 
+static void name_places(const sonde_thigh_anatomy *anatomy, sonde_vein_map *map) {
+  map->branch_count = anatomy->branch_count;
+  for (uint32_t i = 0; i < map->branch_count; ++i)
+    memcpy(map->branch[i], anatomy->branch[i].name, sizeof map->branch[i]);
+  map->landmark_count = anatomy->landmark_count;
+  for (uint32_t i = 0; i < map->landmark_count; ++i) {
+    memcpy(map->landmark[i], anatomy->landmark[i].name, sizeof map->landmark[i]);
+    map->landmark_z_m[i] = anatomy->landmark[i].vein_m.z;
+  }
+}
+
 static void name_segments(sonde_vein_map *map) {
   double first = map->point[0].z_m, last = map->point[map->point_count - 1].z_m, from = first;
   for (size_t i = 0; i < SONDE_COUNT_OF(SEGMENT); ++i) {
@@ -119,7 +131,10 @@ sonde_status sonde_vein_map_make(const sonde_model *model, sonde_vein_map *map,
   }
   sonde_status status = find_skin(model, map, error);
   for (uint32_t k = 0; k < map->point_count && !status; ++k) set_frame(model, map, k);
-  if (!status && model->anatomy) cut_segments(model->anatomy, map);
+  if (!status && model->anatomy) {
+    cut_segments(model->anatomy, map);
+    name_places(model->anatomy, map);
+  }
   if (!status && map->segment_count == 0) name_segments(map);
   return status;
 }
@@ -155,6 +170,12 @@ double sonde_vein_along(const sonde_vein_map *map, double z_m) {
   return map->length_m;
 }
 
+bool sonde_vein_has_branch(const sonde_vein_map *map, const char *name) {
+  for (uint32_t i = 0; i < map->branch_count; ++i)
+    if (strcmp(map->branch[i], name) == 0) return true;
+  return false;
+}
+
 uint32_t sonde_vein_segment(const sonde_vein_map *map, const char *name) {
   for (uint32_t i = 0; i < map->segment_count; ++i)
     if (strcmp(map->segment[i].name, name) == 0) return i;
@@ -179,7 +200,14 @@ sonde_status sonde_station_find(const sonde_station *station, const sonde_vein_m
                                 double *along_m, sonde_error *error) {
   SONDE_ASSERT(along_m != NULL);
   double base = 0;
-  if (station->segment[0]) {
+  if (station->landmark[0]) {
+    uint32_t i = 0;
+    while (i < map->landmark_count && strcmp(map->landmark[i], station->landmark) != 0) ++i;
+    if (i == map->landmark_count)
+      return sonde_fail(error, SONDE_NOT_FOUND, "the thigh has no landmark '%s'",
+                        station->landmark);
+    base = sonde_vein_along(map, map->landmark_z_m[i]);
+  } else if (station->segment[0]) {
     uint32_t i = sonde_vein_segment(map, station->segment);
     if (i == SONDE_SEGMENTS)
       return sonde_fail(error, SONDE_NOT_FOUND, "the thigh has no segment '%s' (it begins with %s)",

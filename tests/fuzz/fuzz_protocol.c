@@ -9,7 +9,7 @@ static void plan(const sonde_exam_protocol *protocol) {
   static sonde_plan made;
   sonde_error error = {SONDE_OK, "", ""};
   if (!map.point_count) FUZZ_CHECK(sonde_vein_map_make(fuzz_leg(), &map, &error) == SONDE_OK);
-  sonde_status status = sonde_plan_make(protocol, &map, NULL, &made, &error);
+  sonde_status status = sonde_plan_make(protocol, &map, &made, &error);
   if (status) {
     FUZZ_CHECK(error.status == status && error.message[0]);
     return;

@@ -2,7 +2,7 @@
 // truth must fit, and writing and reading agree.
 #include "trainer_test.h"
 
-static const char GOOD[] = "sonde_case: 1\n"
+static const char GOOD[] = "sonde_case: 2\n"
                            "id: one\n"
                            "title: One\n"
                            "level: easy\n"
@@ -53,7 +53,8 @@ static void mistakes_are_named_with_their_line(void **state) {
     const char *from, *to, *says;
     int line;
   } MISTAKE[] = {
-      {"sonde_case: 1", "sonde_case: 7", "version 7", 1},
+      {"sonde_case: 2", "sonde_case: 7", "version 7", 1},
+      {"level: easy", "criteria: {force_low_n: 3}", "unknown key 'criteria'", 4},
       {"id: one", "id: One", "'O'", 2},
       {"id: one\n", "", "id is missing", 1},
       {"title: One", "titel: One", "unknown key 'titel'", 3},
@@ -228,13 +229,39 @@ static void drawn_cases_are_good(void **state) {
   assert_true(sick > count / 4 && sick < 3 * count / 4);
 }
 
-// Those of a generated thigh are built too; the bundled thigh belongs to another test.
+static bool says(const char *text, const char *word) {
+  for (const char *at = text; (at = strstr(at, word)); ++at)
+    if (at == text || !((at[-1] >= 'a' && at[-1] <= 'z') || (at[-1] >= 'A' && at[-1] <= 'Z')))
+      return true;
+  return false;
+}
+
+// Sex of the history and of the thigh; no part of the leg is named that the thigh has not. Every
+// generated thigh ends above the knee: no popliteal vein, no calf to examine.
+static void check_texts(const sonde_case *c, const sonde_vein_map *map) {
+  bool woman = says(c->history, "Woman, "), man = says(c->history, "Man, ");
+  unsigned age = 0;
+  const char *told[] = {c->title, c->note, c->diagnosis};
+  assert_int_equal(woman + man, 1);
+  assert_int_equal(c->known.sex, woman ? SONDE_SEX_FEMALE : SONDE_SEX_MALE);
+  assert_int_equal(sscanf(strchr(c->history, ' '), "%u", &age), 1);
+  assert_true(age >= 18 && age <= 100);
+  for (size_t k = 0; k < SONDE_COUNT_OF(told); ++k) {
+    assert_false(says(told[k], "popliteal") || says(told[k], "Popliteal"));
+    if (says(told[k], "saphenous")) assert_true(sonde_vein_has_branch(map, "great_saphenous"));
+    if (says(told[k], "double")) assert_true(sonde_vein_has_branch(map, "second_femoral_vein"));
+  }
+}
+
+// Each has a thigh of its own, is built, and has every place of every protocol.
 static void the_cases_that_ship_are_good(void **state) {
   (void)state;
   sonde_case *cases;
-  uint32_t count, sick = 0;
+  sonde_exam_protocol *protocols;
+  uint32_t count, sick = 0, ways;
   sonde_error error = {0};
-  if (sonde_case_list(SONDE_SOURCE_DIR "/data/cases", &cases, &count, &error))
+  if (sonde_case_list(SONDE_SOURCE_DIR "/data/cases", &cases, &count, &error) ||
+      sonde_exam_protocol_list(SONDE_SOURCE_DIR "/data/protocols", &protocols, &ways, &error))
     fail_msg("%s", error.message);
   assert_true(count >= 12);
   for (uint32_t i = 0; i < count; ++i) {
@@ -242,13 +269,22 @@ static void the_cases_that_ship_are_good(void **state) {
     sick += cases[i].thrombosis;
     assert_true(strlen(cases[i].history) > 40 && strlen(cases[i].note) > 40);
     if (i > 0) assert_true(cases[i].level >= cases[i - 1].level);
-    if (cases[i].thigh != SONDE_CASE_GENERATED) continue;
+    assert_int_equal(cases[i].thigh, SONDE_CASE_GENERATED);
+    for (uint32_t k = 0; k < i; ++k)
+      if (cases[k].seed == cases[i].seed)
+        fail_msg("%s and %s are the same leg", cases[k].id, cases[i].id);
     sonde_case_setup setup;
     if (build(&cases[i], &setup, &error)) fail_msg("%s", error.message);
+    check_texts(&cases[i], &setup.map);
+    for (uint32_t k = 0; k < ways; ++k) {
+      sonde_plan plan = plan_of(&protocols[k], &setup.map);
+      assert_true(plan.count >= protocols[k].stop_count);
+    }
     sonde_case_setup_clear(&setup);
   }
   assert_true(sick >= 4 && count - sick >= 4);
   sonde_free(cases);
+  sonde_free(protocols);
   assert_int_equal(sonde_case_list("/nonexistent", &cases, &count, &error), SONDE_IO);
 }
 

@@ -7,7 +7,6 @@ static sonde_case patient(bool sick) {
   c.thigh = SONDE_CASE_GENERATED;
   c.seed = 3;
   c.known.fat_front_m = 0.006;
-  c.criteria = (sonde_case_criteria){18, 36, 42, (double)NAN};
   if (!sick) return c;
   assert_int_equal(sonde_pathology_preset("acute", &c.pathology, NULL), SONDE_OK);
   c.extent = (sonde_case_extent){.from = {.segment = "femoral_proximal"},
@@ -96,15 +95,52 @@ static void an_exam_can_be_cancelled(void **state) {
   sonde_progress progress = {cancel, NULL};
   sonde_score score;
   assert_int_equal(sonde_exam_run(&def, NULL, &progress, &score, NULL), SONDE_CANCELLED);
+  sonde_case_setup setup;
+  assert_int_equal(sonde_case_build(&healthy, NULL, NULL, &setup, NULL), SONDE_OK);
+  sonde_plan plan = plan_of(&protocol, &setup.map);
+  def.plan = &plan;
   def.operator_name = "nobody";
-  assert_int_equal(sonde_exam_run(&def, NULL, NULL, &score, NULL), SONDE_NOT_FOUND);
+  assert_int_equal(sonde_exam_run(&def, &setup, NULL, &score, NULL), SONDE_NOT_FOUND);
   def.operator_name = "expert";
   def.limit_s = 0.5;
-  assert_int_equal(sonde_exam_run(&def, NULL, NULL, &score, NULL), SONDE_CONVERGENCE);
+  assert_int_equal(sonde_exam_run(&def, &setup, NULL, &score, NULL), SONDE_CONVERGENCE);
+  sonde_case_setup_clear(&setup);
+}
+
+// The force of a place follows the patient: more pressure in the vein takes more force, so does a
+// second vein or a thicker layer of fat above it; a clot changes nothing, since the force is that
+// of a healthy vein.
+static void forces_follow_the_patient(void **state) {
+  (void)state;
+  sonde_exam_protocol protocol = protocol_of(
+      "{sonde_protocol: 1, id: one, title: One, text: One, places: [{title: A, text: a, at: "
+      "{segment: common_femoral, share: 0.3}}, {title: B, text: b, at: {segment: femoral_mid}}]}");
+  enum { LYING, SITTING, CLOT, FAT, KINDS };
+  sonde_plan plan[KINDS];
+  for (int k = 0; k < KINDS; ++k) {
+    sonde_case c = patient(k == CLOT);
+    if (k == SITTING) c.circulation.posture = SONDE_POSTURE_SITTING;
+    if (k == FAT) c.known.fat_front_m = 0.009;
+    sonde_case_setup setup;
+    sonde_error error = {0};
+    if (sonde_case_build(&c, NULL, NULL, &setup, &error)) fail_msg("%s", error.message);
+    if (sonde_plan_make(&protocol, &setup.map, &plan[k], &error)) fail_msg("%s", error.message);
+    assert_true(isnan(plan[k].point[0].target.firm_n));
+    if (sonde_plan_find_targets(&plan[k], &setup, NULL, &error)) fail_msg("%s", error.message);
+    sonde_case_setup_clear(&setup);
+  }
+  for (int i = 0; i < 2; ++i) {
+    double lying_n = plan[LYING].point[i].target.closes_n;
+    assert_true(lying_n > 10 && lying_n < 40);
+    assert_true(plan[SITTING].point[i].target.closes_n > 1.05 * lying_n);
+    assert_true(plan[FAT].point[i].target.closes_n > 1.03 * lying_n);
+    assert_true(plan[CLOT].point[i].target.closes_n == lying_n);
+  }
 }
 
 int main(void) {
   const struct CMUnitTest tests[] = {
+      cmocka_unit_test(forces_follow_the_patient),
       cmocka_unit_test(expert_and_novice),
       cmocka_unit_test(the_other_vein_counts),
       cmocka_unit_test(an_exam_can_be_cancelled),

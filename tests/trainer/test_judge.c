@@ -22,15 +22,65 @@ static void a_press_is_named(void **state) {
   assert_int_equal(result_of(closing(0.1)), SONDE_PRESS_COMPLETE);
   assert_int_equal(result_of(staying_open(0.1)), SONDE_PRESS_OPEN);
   assert_int_equal(result_of((test_press){0.1, 8, 0.6, 0.92, 0.1}), SONDE_PRESS_INSUFFICIENT);
-  // half closed while the artery deforms: neither closed nor clearly open
+  // half closed at a firm press: neither closed nor clearly open
   assert_int_equal(result_of((test_press){0.1, 20, 0.2, 0.66, 0.1}), SONDE_PRESS_INSUFFICIENT);
-  // the vein is still open, but nothing shows that enough was pressed
-  assert_int_equal(result_of((test_press){0.1, 20, 0.8, 0.9, 0.1}), SONDE_PRESS_INSUFFICIENT);
+  // the vein is still open, but a healthy one would be as well
+  assert_int_equal(result_of((test_press){0.1, 17, 0.8, 0.6, 0.1}), SONDE_PRESS_INSUFFICIENT);
+  // the artery decides nothing: crushed, untouched, or not in view
+  assert_int_equal(result_of((test_press){0.1, 22, 0.01, 0.3, 0.1}), SONDE_PRESS_COMPLETE);
+  assert_int_equal(result_of((test_press){0.1, 20, 0.8, 0.99, 0.1}), SONDE_PRESS_OPEN);
+  assert_int_equal(result_of((test_press){0.1, 20, 0.8, unseen, 0.1}), SONDE_PRESS_OPEN);
   assert_int_equal(result_of((test_press){0.1, 22, 0.03, 0.66, 0.6}), SONDE_PRESS_OFF_AXIS);
   assert_int_equal(result_of((test_press){0.1, 22, unseen, 0.66, 0.1}), SONDE_PRESS_OFF_AXIS);
   assert_int_equal(result_of((test_press){0.1, 45, 0.01, 0.66, 0.1}), SONDE_PRESS_TOO_HARD);
-  assert_int_equal(result_of((test_press){0.1, 22, 0.01, 0.3, 0.1}), SONDE_PRESS_TOO_HARD);
-  assert_int_equal(result_of((test_press){0.1, 20, 0.8, unseen, 0.1}), SONDE_PRESS_INSUFFICIENT);
+  assert_int_equal(result_of((test_press){0.1, 24.5, 0.01, 0.6, 0.1}), SONDE_PRESS_TOO_HARD);
+}
+
+// Where each place has a force of its own, a press is judged by that of the nearest one, and the
+// guidance shows just these two numbers while it lasts: whatever is said closed or open lies at or
+// below the limit shown, whatever is called too hard above it.
+static void what_is_shown_is_what_is_judged(void **state) {
+  (void)state;
+  sonde_vein_map map = straight_map();
+  sonde_exam_protocol protocol = every_20_mm();
+  sonde_plan plan = plan_of(&protocol, &map);
+  for (uint32_t i = 0; i < plan.count; ++i)
+    plan.point[i].target = sonde_force_target_make(12 + 2.3 * i);
+  unsigned noise = 7, seen[SONDE_PRESS_RESULTS] = {0};
+  for (int trial = 0; trial < 200; ++trial) {
+    double draw[3];
+    for (int k = 0; k < 3; ++k) {
+      noise = noise * 1664525u + 1013904223u;
+      draw[k] = (noise >> 8) / (double)(1u << 24);
+    }
+    test_press press = {0.2 * draw[0], 45 * draw[1], draw[2] * draw[2], 0.6, 0.1};
+    sonde_judge *judge = judge_of(&plan);
+    for (double t = 0; t < 2.4; t += 0.03) {
+      sonde_snapshot s = press_at(&press, 0, t);
+      assert_true(sonde_judge_feed(judge, &s));
+      sonde_press_state now = sonde_judge_state(judge).state;
+      if (now == SONDE_PRESS_STATE_NONE) continue;
+      sonde_force_target shown = sonde_judge_guidance(judge).force;
+      double limit = plan.point[sonde_plan_nearest(&plan, press.z_m)].target.limit_n;
+      assert_true(shown.limit_n == limit);
+      if (now == SONDE_PRESS_STATE_COMPLETE || now == SONDE_PRESS_STATE_OPEN)
+        assert_true(s.force_normal_n <= shown.limit_n);
+      if (s.force_normal_n > shown.limit_n) assert_int_equal(now, SONDE_PRESS_STATE_TOO_HARD);
+    }
+    uint32_t count;
+    const sonde_compression *presses = sonde_judge_compressions(judge, &count);
+    for (uint32_t i = 0; i < count; ++i) {
+      sonde_force_target target = plan.point[presses[i].place].target;
+      seen[presses[i].result]++;
+      assert_int_equal(presses[i].result == SONDE_PRESS_TOO_HARD,
+                       presses[i].force_peak_n > target.limit_n);
+      if (presses[i].result == SONDE_PRESS_OPEN)
+        assert_true(presses[i].force_peak_n >= target.firm_n);
+    }
+    sonde_judge_destroy(judge);
+  }
+  assert_true(seen[SONDE_PRESS_COMPLETE] > 5 && seen[SONDE_PRESS_OPEN] > 5);
+  assert_true(seen[SONDE_PRESS_TOO_HARD] > 5 && seen[SONDE_PRESS_INSUFFICIENT] > 5);
 }
 
 // The second femoral vein with a clot: the first closes alone.
@@ -406,6 +456,7 @@ static void smoothness_is_that_of_the_way_to_a_press(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(a_press_is_named),
+      cmocka_unit_test(what_is_shown_is_what_is_judged),
       cmocka_unit_test(a_double_vein_is_closed_when_both_are),
       cmocka_unit_test(the_order_does_not_matter),
       cmocka_unit_test(coverage_adds_up),

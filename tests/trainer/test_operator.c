@@ -79,7 +79,7 @@ static void faults_show_where_they_belong(void **state) {
   assert_true(m[TIMID].presses[SONDE_PRESS_INSUFFICIENT] >= 9);
   assert_true(m[TIMID].force_peak_n < 12 && m[EXPERT].force_peak_n > 15);
   assert_true(m[FORCEFUL].presses[SONDE_PRESS_TOO_HARD] >= 9);
-  assert_true(m[FORCEFUL].force_peak_n > 32);
+  assert_true(m[FORCEFUL].force_peak_n > 24);
   assert_true(m[NOVICE].presses[SONDE_PRESS_OFF_AXIS] >= 1);
   assert_true(m[NOVICE].gap_m > 0.03 && m[EXPERT].gap_m == 0);
   assert_int_equal(m[EXPERT].presses[SONDE_PRESS_OFF_AXIS], 0);

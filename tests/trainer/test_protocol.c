@@ -11,7 +11,7 @@ static void the_protocols_that_ship(void **state) {
   assert_int_equal(count, 3);
   assert_string_equal(all[0].id, "two_point");
   assert_string_equal(all[2].id, "extended");
-  sonde_vein_map map = straight_map();
+  sonde_vein_map map = straight_map(); // without the saphenous vein: its place is left out
   uint32_t before = 0;
   for (uint32_t i = 0; i < count; ++i) {
     sonde_plan plan = plan_of(&all[i], &map);
@@ -39,20 +39,36 @@ static void a_stretch_is_divided_evenly(void **state) {
     assert_near(plan.point[k].at.along_m, 0.02 + 0.055 / 3 * k, 1e-12);
 }
 
-static void a_case_replaces_criteria(void **state) {
+// A place that needs a branch is there exactly when the thigh has it, at the branch's landmark.
+static void a_place_needs_its_branch(void **state) {
   (void)state;
   sonde_vein_map map = straight_map();
-  sonde_exam_protocol p = every_20_mm();
-  sonde_case_criteria own = {(double)NAN, 31, 44, 0.6};
-  sonde_plan plan;
-  assert_int_equal(sonde_plan_make(&p, &map, &own, &plan, NULL), SONDE_OK);
-  assert_true(plan.criteria.force_low_n == p.criteria.force_low_n);
-  assert_true(plan.criteria.force_high_n == 31 && plan.criteria.force_limit_n == 44);
-  assert_true(plan.criteria.artery_ratio == 0.6);
-  own.artery_ratio = p.criteria.crushed_ratio;
-  sonde_error error;
-  assert_int_equal(sonde_plan_make(&p, &map, &own, &plan, &error), SONDE_ARGUMENT);
-  assert_non_null(strstr(error.message, "crushed_ratio"));
+  sonde_exam_protocol p = protocol_of(
+      "{sonde_protocol: 1, id: a, title: A, text: a, places: [{title: B, text: b, at: 20}, {title: "
+      "C, text: c, needs: great_saphenous, at: {landmark: junction, shift_mm: 4}}]}");
+  assert_int_equal(plan_of(&p, &map).count, 1);
+  map.branch_count = map.landmark_count = 1;
+  snprintf(map.branch[0], sizeof map.branch[0], "great_saphenous");
+  snprintf(map.landmark[0], sizeof map.landmark[0], "junction");
+  map.landmark_z_m[0] = 0.06;
+  sonde_plan plan = plan_of(&p, &map);
+  assert_int_equal(plan.count, 2);
+  assert_near(plan.point[1].at.along_m, 0.064, 1e-12);
+  map.landmark_count = 0;
+  sonde_error error = {0};
+  assert_int_equal(sonde_plan_make(&p, &map, &plan, &error), SONDE_NOT_FOUND);
+  assert_non_null(strstr(error.message, "junction"));
+}
+
+// Whole newtons, the limit a fifth and two newtons above what closes the vein, never less.
+static void the_force_of_a_place(void **state) {
+  (void)state;
+  for (double closes_n = 2; closes_n < 60; closes_n += 0.37) {
+    sonde_force_target t = sonde_force_target_make(closes_n);
+    assert_true(t.firm_n >= closes_n && t.firm_n < closes_n + 1 && t.firm_n == floor(t.firm_n));
+    assert_true(t.limit_n > t.firm_n + 1 && t.limit_n == floor(t.limit_n));
+    assert_near(t.limit_n, 1.2 * closes_n + 2.5, 0.5 + 1e-9);
+  }
 }
 
 static void mistakes_are_named(void **state) {
@@ -86,22 +102,21 @@ static void mistakes_are_named(void **state) {
   sonde_error error = {0};
   sonde_exam_protocol p = protocol_of("{sonde_protocol: 1, id: a, title: A, text: a, places: [{"
                                       "title: B, text: b, at: {segment: calf}}]}");
-  assert_int_equal(sonde_plan_make(&p, &map, NULL, &plan, &error), SONDE_NOT_FOUND);
+  assert_int_equal(sonde_plan_make(&p, &map, &plan, &error), SONDE_NOT_FOUND);
   assert_non_null(strstr(error.message, "calf"));
   p = protocol_of("{sonde_protocol: 1, id: a, title: A, text: a, places: [{title: B, text: b, at: "
                   "300}]}");
-  assert_int_equal(sonde_plan_make(&p, &map, NULL, &plan, &error), SONDE_ARGUMENT);
+  assert_int_equal(sonde_plan_make(&p, &map, &plan, &error), SONDE_ARGUMENT);
   p = protocol_of(
       "{sonde_protocol: 1, id: a, title: A, text: a, places: [{title: B, text: b, from: "
       "0, to: 200, every_mm: 2}]}");
-  assert_int_equal(sonde_plan_make(&p, &map, NULL, &plan, &error), SONDE_ARGUMENT);
+  assert_int_equal(sonde_plan_make(&p, &map, &plan, &error), SONDE_ARGUMENT);
 }
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(the_protocols_that_ship),
-      cmocka_unit_test(a_stretch_is_divided_evenly),
-      cmocka_unit_test(a_case_replaces_criteria),
+      cmocka_unit_test(the_protocols_that_ship),  cmocka_unit_test(a_stretch_is_divided_evenly),
+      cmocka_unit_test(a_place_needs_its_branch), cmocka_unit_test(the_force_of_a_place),
       cmocka_unit_test(mistakes_are_named),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

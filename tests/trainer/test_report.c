@@ -54,6 +54,7 @@ static void make_plan(void) {
     p->at = sonde_vein_at(&made.map, 0.01 + 0.02 * i);
     p->segment = sonde_vein_segment_at(&made.map, p->at.z_m);
     snprintf(p->title, sizeof p->title, "%u cm below the groin", 1 + 2 * i);
+    p->target = sonde_force_target_make(14 + 0.5 * i);
   }
   made.protocol = (sonde_exam_protocol){.id = "extended", .title = "Extended compression"};
   snprintf(made.protocol.text, sizeof made.protocol.text,
@@ -106,6 +107,7 @@ static void make_presses(uint32_t count) {
     p->end_s = p->start_s + 2.4 * fmin(1, 60.0 / count);
     p->z_m = 0.4 - p->along_m;
     p->segment = sonde_vein_segment_at(&made.map, p->z_m);
+    p->place = sonde_plan_nearest(&made.plan, p->along_m);
   }
   if (count > 5) made.presses[5].along_m = made.presses[5].vein_ratio = NAN;
   if (count > 5) made.presses[5].segment = SONDE_SEGMENTS;

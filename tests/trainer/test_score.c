@@ -50,6 +50,64 @@ static void a_wrong_diagnosis_never_passes(void **state) {
   assert_true(passed >= 32);
 }
 
+// Exams of random presses and decisions: a part that is not full says what was lost, one that is
+// full says nothing; the force part is not full exactly when a press was too hard or a place was
+// missed, and names one of these with its place.
+static void every_lost_point_is_named(void **state) {
+  (void)state;
+  sonde_vein_map map = straight_map();
+  sonde_exam_protocol protocol = every_20_mm();
+  sonde_plan plan = plan_of(&protocol, &map);
+  for (uint32_t i = 0; i < plan.count; ++i) {
+    plan.point[i].target = sonde_force_target_make(14 + i);
+    snprintf(plan.point[i].title, sizeof plan.point[i].title, "Place %u", i);
+  }
+  unsigned noise = 3, hard_only = 0, lost_parts[SONDE_SCORE_PARTS] = {0};
+  for (int trial = 0; trial < 150; ++trial) {
+    sonde_judge *judge = judge_of(&plan);
+    for (uint32_t i = 0; i < plan.count; ++i) {
+      noise = noise * 1664525u + 1013904223u;
+      unsigned luck = (noise >> 16) % 40;
+      if (trial % 3 == 2 && luck < 8) continue; // left out
+      test_press press = closing(plan.point[i].at.z_m);
+      press.force_n = plan.point[i].target.firm_n + 0.5;
+      if (luck == 1) press.vein = 0.5;
+      if (luck == 3) press.tilt_rad = 0.6;
+      feed_press(judge, &press, 6.0 * i, 0.04);
+      press.force_n = plan.point[i].target.limit_n + 3;
+      if (luck == 2) feed_press(judge, &press, 6.0 * i + 3, 0.04);
+    }
+    for (uint32_t i = 0; i < 5; ++i)
+      sonde_judge_decide(judge, i, trial % 4 ? SONDE_DECISION_COMPRESSIBLE : SONDE_DECISION_NONE,
+                         NULL);
+    sonde_case truth = truth_of(trial % 5 ? 0 : 4);
+    sonde_score score = score_of(judge, &truth);
+    uint32_t count;
+    const sonde_compression *presses = sonde_judge_compressions(judge, &count);
+    sonde_score_part part[SONDE_SCORE_PARTS];
+    sonde_score_explain(&score, &plan, presses, count, part);
+    double sum = 0;
+    for (int k = 0; k < SONDE_SCORE_PARTS; ++k) {
+      bool full = part[k].points >= part[k].of - 1e-9;
+      assert_int_equal(part[k].lost[0] == 0, full);
+      lost_parts[k] += !full;
+      sum += part[k].points;
+    }
+    if (score.correct) assert_near(sum, score.score, 1e-9);
+    const sonde_score_part *force = &part[3];
+    assert_string_equal(force->name, "force");
+    uint32_t hard = score.metrics.presses[SONDE_PRESS_TOO_HARD];
+    bool missed = score.metrics.points_done < score.metrics.points;
+    assert_int_equal(force->lost[0] != 0, hard > 0 || missed);
+    if (force->lost[0]) assert_non_null(strstr(force->lost, "Place "));
+    if (hard) assert_non_null(strstr(force->lost, " N, limit "));
+    if (missed) assert_non_null(strstr(force->lost, "not examined"));
+    hard_only += hard && !missed;
+    sonde_judge_destroy(judge);
+  }
+  assert_true(hard_only > 3 && lost_parts[0] && lost_parts[1] && lost_parts[2]);
+}
+
 static unsigned right_code(unsigned clots) {
   unsigned code = 0;
   for (unsigned i = 5; i-- > 0;)
@@ -180,6 +238,7 @@ static void files_say_the_same(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(a_wrong_diagnosis_never_passes),
+      cmocka_unit_test(every_lost_point_is_named),
       cmocka_unit_test(a_flawless_exam_has_all_points),
       cmocka_unit_test(the_score_grows_with_coverage),
       cmocka_unit_test(guesses_earn_nothing),

@@ -59,10 +59,12 @@ static inline sonde_exam_protocol every_20_mm(void) {
                      "Vein, text: Press., from: 10, to: 190, every_mm: 20}]}");
 }
 
+// Every place takes 18 N: 18 is firm, 24 the limit.
 static inline sonde_plan plan_of(const sonde_exam_protocol *protocol, const sonde_vein_map *map) {
   sonde_plan plan;
   sonde_error error = {0};
-  if (sonde_plan_make(protocol, map, NULL, &plan, &error)) fail_msg("%s", error.message);
+  if (sonde_plan_make(protocol, map, &plan, &error)) fail_msg("%s", error.message);
+  for (uint32_t i = 0; i < plan.count; ++i) plan.point[i].target = sonde_force_target_make(18);
   return plan;
 }
 
@@ -104,7 +106,7 @@ static inline void feed_press(sonde_judge *judge, const test_press *p, double st
 }
 
 static inline test_press closing(double z_m) { return (test_press){z_m, 22, 0.03, 0.66, 0.1}; }
-static inline test_press staying_open(double z_m) { return (test_press){z_m, 24, 0.80, 0.62, 0.1}; }
+static inline test_press staying_open(double z_m) { return (test_press){z_m, 22, 0.80, 0.62, 0.1}; }
 
 // A case whose truth is a clot in the segments of the mask.
 static inline sonde_case truth_of(unsigned mask) {

@@ -163,6 +163,7 @@ function learn(trainer, parts) {
 
 function serve(webDir, trainer, request, response) {
   const uri = new URL(request.url, "http://x").pathname;
+  if (uri === "/status.json") return response.writeHead(200, { "Content-Type": "application/json" }).end("{}");
   const report = /^\/report\/(.+)$/.exec(uri);
   if (report) {
     const e = trainer.list.find((x) => x.id === report[1]);

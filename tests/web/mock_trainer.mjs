@@ -27,14 +27,13 @@ const SEGMENTS = [
   ["femoral_upper", "Femoral, upper", 65, 120],
   ["femoral_middle", "Femoral, middle", 120, 180],
   ["femoral_lower", "Femoral, lower", 180, 225],
-  ["popliteal", "Popliteal", 225, 270],
+  ["popliteal", "Femoral, above the knee", 225, 270],
 ].map(([id, title, from_mm, to_mm]) => ({ id, title, from_mm, to_mm }));
 const NEEDED = { two_point: [0, 4], three_point: [0, 2, 4], extended: [0, 1, 2, 3, 4] };
 const POINTS = { two_point: 1, three_point: 1, extended: 3 };
 
 const TOUCH_N = 0.5;
-const CORRIDOR_N = [6, 14];
-const HARD_N = 25;
+const TARGET_N = [12, 25]; // from what closes a healthy vein to the limit
 const CLOSED = 0.15;
 const OFF_AXIS_DEG = 20;
 const RADIUS_MM = 14;
@@ -162,6 +161,11 @@ export class Trainer {
     e.phase = "done";
     e.result = {
       score, passed: correct && score >= 70, correct, report: `/report/${e.exam}`,
+      note: `What ${e.title} teaches.`,
+      parts: [
+        { title: "Findings", points: 40 * told, of: 40, lost: told < 1 ? `${names(needed.filter((s) => !s.decision))}: no finding` : "" },
+        { title: "Force", points: 10 * covered, of: 10, lost: covered < 1 ? `${names(missed)}: not examined` : "" },
+      ],
       summary: missed.length ? `No valid compression at: ${names(missed)}.` : `Every point of the protocol was compressed${bad ? `; ${bad} of ${e.presses.length} presses were not valid` : ""}.`,
       diagnosis: { asked: said ? `Clot at: ${names(needed.filter((s) => s.decision === "clot"))}` : "No clot", truth: sick ? "Clot in every segment" : "No clot: the vein closes everywhere" },
     };
@@ -206,16 +210,16 @@ export class Trainer {
     let state = "none";
     if (s.force > TOUCH_N) state = "pressing";
     if (s.force > 2 && s.angle > OFF_AXIS_DEG) state = "off_axis";
-    else if (s.force > HARD_N) state = "too_hard";
+    else if (s.force > TARGET_N[1]) state = "too_hard";
     else if (s.vein < CLOSED) state = "complete";
-    else if (s.force > CORRIDOR_N[1] - 2) state = "open";
+    else if (s.force >= TARGET_N[0]) state = "open";
     return { state, vein: nullable(s.vein), artery: nullable(s.artery) };
   }
 
   release(p) {
     this.press = null;
     const s = this.exam.segments.find((x) => p.z >= x.from_mm && p.z < x.to_mm);
-    const result = p.angle > OFF_AXIS_DEG ? "off_axis" : p.force > HARD_N ? "too_hard" : p.vein < CLOSED ? "complete" : p.force >= CORRIDOR_N[0] ? "open" : "insufficient";
+    const result = p.angle > OFF_AXIS_DEG ? "off_axis" : p.force > TARGET_N[1] ? "too_hard" : p.vein < CLOSED ? "complete" : p.force >= TARGET_N[0] ? "open" : "insufficient";
     if (p.force > 1) this.exam.presses.push({ t_s: p.t_s, z_mm: p.z, segment: s?.id ?? "", result, force_n: p.force });
     if (s && (result === "complete" || result === "open") && s.done < s.points) s.done++;
     if (s && (result === "complete" || result === "open")) this.seen = s.id; // asked for first
@@ -258,9 +262,9 @@ export class Trainer {
       const height = off.reduce((sum, v, i) => sum + v * at.normal[i], 0);
       step.offset_mm = Math.hypot(...off.map((v, i) => v - height * at.normal[i]));
       step.target = { name: next.title, ...at, radius_mm: RADIUS_MM };
-      step.force_n = CORRIDOR_N;
+      step.force_n = TARGET_N;
       if (pending) step.detail = `Then compress the vein ${this.where(next)}.`;
-      else step.detail = step.offset_mm > RADIUS_MM ? "Move the probe into the ring, across the leg." : "Press until the walls touch and the artery just begins to deform, then let go.";
+      else step.detail = step.offset_mm > RADIUS_MM ? "Move the probe into the ring, across the leg." : "Press until the walls touch, then let go.";
     }
   }
 

@@ -83,6 +83,9 @@ async function testPointerExam(page) {
   const result = (await exam(page)).result;
   check(result.passed && result.correct, `an exam by pointer passes: ${result.score}`);
   check((await page.locator("#result").textContent()).includes("Right diagnosis"), "the result says that the diagnosis is right");
+  const shown = await page.locator("#result").textContent();
+  check(shown.includes("What First walk teaches."), "the result shows what the case teaches");
+  check(shown.includes("nothing lost") && shown.includes("Where points went"), "the result shows where points went");
   await inspect(page, "result");
   const [report] = await Promise.all([page.context().waitForEvent("page"), page.getByRole("link", { name: "Open the report" }).click()]);
   await report.waitForLoadState();
@@ -195,7 +198,7 @@ async function testAsked(page) {
     await page.locator("#ease").click();
     await asked(id);
   }
-  check((await chosen(page)) === "Popliteal", "who decided nothing is asked for what was pressed last, and it is selected");
+  check((await chosen(page)) === "Femoral, above the knee", "who decided nothing is asked for what was pressed last, and it is selected");
   await page.keyboard.press("j");
   await asked("common_femoral");
   check((await chosen(page)) === "Common femoral", "then for the first that waits");

@@ -4,7 +4,7 @@
 import { find, press, recall, remember } from "./dom";
 import type { Exam } from "./protocol";
 
-interface Mark {
+export interface Mark {
   id: string;
   anchor: string;
   text: string;
@@ -21,14 +21,23 @@ const away = (exam: Exam): boolean => exam.step.target !== null && !there(exam);
 const judged = (state: string | undefined): boolean => state === "complete" || state === "open";
 // From here on the bar says to let go.
 const pressed = (exam: Exam): boolean => judged(exam.compression?.state) || exam.presses.some((p) => judged(p.result));
+// The bar says to let go and press again; the coach says nothing else beside it.
+const spoiled = (exam: Exam): boolean => exam.compression?.state === "too_hard" || exam.compression?.state === "off_axis";
 const asked = (exam: Exam): boolean => exam.step.segment !== "";
 const decided = (exam: Exam): boolean => exam.segments.some((s) => s.decision !== "");
 
 const MARKS: Mark[] = [
   { id: "move", anchor: "stage", text: "Drag the probe along the leg into the ring.", due: away, done: there },
-  { id: "press", anchor: "press", text: "Pull this slider up slowly, until the white bar reaches the bracket. Watch the vein in the image: do its walls touch? Then press Let go below.", due: there, done: pressed },
+  { id: "press", anchor: "press", text: "Pull this slider up slowly and watch the vein in the image. As soon as its walls touch, press Let go below. A healthy vein has closed when the white bar reaches the bracket; above the bracket is too hard.", due: (exam) => there(exam) && !spoiled(exam), done: pressed },
   { id: "decide", anchor: "decide", text: "Did the walls touch? Then the vein is compressible. Did it stay open? Then there is a clot. After this the bar leads you on.", due: asked, done: decided },
 ];
+
+/** The sentence that is due: the first that was neither seen nor done, when there is something to do
+ *  for it just now. */
+export function dueMark(exam: Exam, seen: ReadonlySet<string>): Mark | null {
+  const next = MARKS.find((m) => !seen.has(m.id) && !m.done(exam));
+  return next?.due(exam) ? next : null;
+}
 
 export class Coach {
   private readonly box = find("coach");
@@ -50,8 +59,7 @@ export class Coach {
     const coaching = exam !== null && exam.phase === "running" && exam.guidance === "full" && controls;
     if (!coaching) return this.place(null);
     if (this.now?.done(exam)) this.close(); // done while it was in view
-    const next = MARKS.find((m) => !this.seen.has(m.id) && !m.done(exam));
-    this.place(next?.due(exam) ? next : null);
+    this.place(dueMark(exam, this.seen));
   }
 
   private place(mark: Mark | null): void {

@@ -3,7 +3,8 @@
 
 import { announce, button, find, make, press } from "./dom";
 import type { Decision, Exam, Segment } from "./protocol";
-import { compressionWords, finding, FINDINGS } from "./words";
+import type { Feedback } from "./feedback";
+import { finding, FINDINGS } from "./words";
 
 export interface ExamActions {
   decide(segment: string, decision: Decision): void;
@@ -47,11 +48,6 @@ export class ExamBar {
     this.exam = exam;
     this.controls = controls;
     this.sayStep(exam);
-    const tag = find("compression");
-    const words = compressionWords(exam.compression);
-    tag.hidden = words === "";
-    tag.textContent = words;
-    tag.dataset.state = exam.compression?.state ?? "none";
     find("hint-button").hidden = exam.guidance !== "hints";
     for (const id of ["leave-button", "finish-button", "decide"]) find(id).hidden = !controls;
     if (!controls) find("hint-button").hidden = true;
@@ -61,6 +57,14 @@ export class ExamBar {
     this.obey(exam);
     if (!exam.segments.some((s) => s.id === this.chosen)) this.chosen = exam.segments[0]?.id ?? "";
     this.mark(exam.segments);
+  }
+
+  /** The tag of the press under way. */
+  tell(said: Feedback): void {
+    const tag = find("compression");
+    tag.hidden = said.tag === "";
+    if (tag.textContent !== said.tag) tag.textContent = said.tag;
+    tag.dataset.state = said.state;
   }
 
   /** The segment that the guidance asks for is chosen, once: the learner may choose another. */

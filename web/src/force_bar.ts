@@ -2,7 +2,8 @@
 // a guided compression asks for. True newtons; what a device renders, when that is less, is a notch.
 
 import { find, make } from "./dom";
-import type { Snapshot } from "./protocol";
+import { feedback, type Feedback } from "./feedback";
+import type { Compression, Snapshot } from "./protocol";
 
 const TOP_PX = 10;
 const FOOT_PX = 8;
@@ -18,7 +19,6 @@ export class ForceBar {
   private comfort_n = 20;
   private corridor: [number, number] | null = null;
   private force_n = 0;
-  private touching = false;
   private rendered_n = 0;
   private drawn = "";
   private readonly c: CanvasRenderingContext2D;
@@ -44,26 +44,21 @@ export class ForceBar {
     this.paint();
   }
 
-  show(s: Snapshot): void {
+  /** Shows the force and says what it means, with the judge's word on the press (null: not shown). */
+  show(s: Snapshot, compression: Compression | null): Feedback {
     this.force_n = Math.max(0, s.force_normal_n);
-    this.touching = s.contact_area_mm2 > 0;
     this.rendered_n = Math.hypot(...s.rendered_force_n);
-    find("force-value").replaceChildren(this.force_n.toFixed(1), make("small", "", "N"));
-    const word = this.word();
+    const touching = s.contact_area_mm2 > 0;
+    const said = feedback({ force_n: this.force_n, touching, target_n: this.corridor, limit_n: this.limit_n, comfort_n: this.comfort_n, compression });
+    const air = !touching && this.force_n < 0.05;
+    find("force-value").replaceChildren(air ? "–" : this.force_n.toFixed(1), ...(air ? [] : [make("small", "", "N")]));
+    const word = said.word;
     find("force-word").textContent = word;
-    find("force-head").dataset.state = word.split(" ")[0] ?? "";
+    find("force-head").dataset.tone = said.tone;
     this.canvas.setAttribute("aria-valuenow", this.force_n.toFixed(1));
     this.canvas.setAttribute("aria-valuetext", `${this.force_n.toFixed(1)} newtons, ${word}`);
     this.paint();
-  }
-
-  private word(): string {
-    if (this.force_n >= 0.98 * this.limit_n) return "limit";
-    if (this.corridor && this.force_n > this.corridor[1]) return "too hard";
-    if (this.corridor && this.force_n >= this.corridor[0]) return "right"; // asked for, comfortable or not
-    if (this.force_n > this.comfort_n) return "uncomfortable";
-    if (this.force_n > 0.3) return "comfortable";
-    return this.touching ? "touching" : "no contact";
+    return said;
   }
 
   private paint(): void {

@@ -177,7 +177,7 @@ class App {
     this.fresh = true;
     this.hello = hello;
     find("about").textContent =
-      `Sonde ${hello.program}. Trains and simulates; not a medical device. ${hello.nodes} skin nodes. ${hello.provenance}`;
+      `Sonde ${hello.program}. Trains and simulates; not a medical device. Patients, images and forces are computed.`;
     this.patient.greet(hello);
     this.start.greet(hello);
     this.forceBar.limits(hello.force_limit_n, hello.comfort_n ?? COMFORT * hello.force_limit_n);
@@ -348,7 +348,7 @@ class App {
     const own = exam !== null && phase !== "practice" && exam.title !== "";
     const played = phase === "replay" ? (this.replay?.title ?? "") : "";
     find("case-title").textContent = own ? exam.title : played || label(this.hello?.model ?? "");
-    find("case-history").textContent = own ? exam.history : played ? "" : (this.hello?.provenance ?? "");
+    find("case-history").textContent = own ? exam.history : played ? "" : "A simulated thigh, to practise on";
     find("case").title = find("case-history").textContent ?? "";
     find("watching").hidden = this.controls?.controls ?? true;
     const device = this.hello?.device ?? "page";
@@ -446,8 +446,8 @@ class App {
     const near = nearestSite(this.hello?.sites ?? [], this.hold.point);
     const useful = near !== null && near.distance_mm < NEAR_MM;
     const points = useful ? (near.site.curves[probe] ?? []) : [];
-    const where = near ? `site ${near.site.id}${near.distance_mm >= 0.5 ? `, ${near.distance_mm.toFixed(0)} mm away` : ""}` : "";
-    const none = useful ? `not measured with the ${label(probe).toLowerCase()} probe` : "no measured site nearby";
+    const where = near ? `place ${near.site.id}${near.distance_mm >= 0.5 ? `, ${near.distance_mm.toFixed(0)} mm away` : ""}` : "";
+    const none = useful ? `not computed for the ${label(probe).toLowerCase()} probe` : "no computed curve nearby";
     find("plot-site").textContent = points.length ? `${label(probe)} probe, ${where}` : none;
     find("key-measured").hidden = points.length === 0;
     const key = points.length ? `${near!.site.id} ${probe}` : "";
@@ -489,7 +489,8 @@ class App {
     this.scene.show(frame);
     this.echo.show(frame);
     this.readouts.show(s);
-    this.forceBar.show(s);
+    const running = this.phase === "running";
+    this.examBar.tell(this.forceBar.show(s, running ? (this.exam?.compression ?? null) : null));
     this.traces.add(s);
     find("echo-note").hidden = s.penetration_mm > LIFTED_NOTE_MM;
     find("traces-note").hidden = this.phase !== "replay" || this.traces.drawn;

@@ -50,7 +50,7 @@ interface SliderInfo {
 
 const SLIDERS: SliderInfo[] = [
   { key: "gain_db", name: "Gain", unit: "dB", low: -30, high: 30, step: 1 },
-  { key: "depth_mm", name: "Depth", unit: "mm", low: 30, high: 120, step: 5 },
+  { key: "depth_mm", name: "Image depth", unit: "mm", low: 30, high: 120, step: 5 },
   { key: "frequency_mhz", name: "Frequency", unit: "MHz", low: 2, high: 12, step: 0.5 },
   { key: "dynamic_range_db", name: "Range", unit: "dB", low: 30, high: 90, step: 5 },
   { key: "focus_mm", name: "Focus", unit: "mm", low: 5, high: 115, step: 1 },
@@ -102,16 +102,16 @@ interface Gauge {
   value: HTMLElement;
 }
 
-/** A line of numbers: depth, contact, vein, artery. */
+/** A line of numbers: how far the probe is pressed in, vein, artery; dashes while it is in the air. */
 export class Readouts {
-  private readonly depth: Gauge;
+  private readonly pressed: Gauge;
   private readonly vein: Gauge;
   private readonly diameter: Gauge;
   private readonly artery: Gauge;
   private vessels = true;
 
   constructor(private readonly box: HTMLElement) {
-    this.depth = this.gauge("Depth");
+    this.pressed = this.gauge("Pressed in");
     this.vein = this.gauge("Vein area", "vein");
     this.diameter = this.gauge("Vein diameter", "vein");
     this.artery = this.gauge("Artery area", "artery");
@@ -132,18 +132,19 @@ export class Readouts {
     for (const g of [this.vein, this.diameter, this.artery]) g.row.hidden = !on;
   }
 
-  private static number(gauge: Gauge, value: number, digits: number, unit: string): void {
-    const away = !Number.isFinite(value);
+  private static number(gauge: Gauge, value: number, digits: number, unit: string, touching: boolean): void {
+    const away = !touching || !Number.isFinite(value);
     gauge.row.classList.toggle("away", away);
-    gauge.value.replaceChildren(away ? "not in view" : value.toFixed(digits), ...(away ? [] : [make("small", "", unit)]));
+    const word = touching ? "not in view" : "–";
+    gauge.value.replaceChildren(away ? word : value.toFixed(digits), ...(away ? [] : [make("small", "", unit)]));
   }
 
   show(s: Snapshot): void {
-    const above = s.penetration_mm < -0.05;
-    Readouts.number(this.depth, Math.abs(s.penetration_mm), 1, above ? "mm above" : "mm");
-    Readouts.number(this.vein, 100 * s.vein_area_ratio, 0, "% of rest");
-    Readouts.number(this.diameter, Number.isNaN(s.vein_area_ratio) ? NaN : s.vein_short_mm, 1, "mm");
-    Readouts.number(this.artery, 100 * s.artery_area_ratio, 0, "% of rest");
+    const touching = s.contact_area_mm2 > 0;
+    Readouts.number(this.pressed, Math.max(0, s.penetration_mm), 1, "mm", touching);
+    Readouts.number(this.vein, 100 * s.vein_area_ratio, 0, "% of rest", touching);
+    Readouts.number(this.diameter, Number.isNaN(s.vein_area_ratio) ? NaN : s.vein_short_mm, 1, "mm", touching);
+    Readouts.number(this.artery, 100 * s.artery_area_ratio, 0, "% of rest", touching);
   }
 }
 

@@ -20,7 +20,7 @@ export class ForcePlot {
 
   constructor(private readonly box: HTMLElement) {
     this.plot = new uPlot(this.options(), [[0], [0]], box);
-    nameDrawing(box, "Force in newtons against penetration in millimetres: now, and as measured");
+    nameDrawing(box, "Force in newtons against how far the probe is pressed in, in millimetres: now, and as computed beforehand");
     new ResizeObserver(() => this.resize()).observe(box);
     this.resize();
   }

@@ -131,12 +131,23 @@ export interface Press {
   force_n: number;
 }
 
+export interface ScorePart {
+  title: string;
+  points: number;
+  of: number;
+  /** where the missing points went; empty when none are missing */
+  lost: string;
+}
+
 export interface Result {
   score: number;
   passed: boolean;
   correct: boolean;
   summary: string;
   report: string;
+  /** what the case teaches */
+  note?: string;
+  parts?: ScorePart[];
   diagnosis: { asked: string; truth: string };
 }
 

@@ -2,7 +2,7 @@
 // go from here.
 
 import { button, draw, find, make } from "./dom";
-import type { Exam, PressResult, Result } from "./protocol";
+import type { Exam, PressResult, Result, ScorePart } from "./protocol";
 import { finding, PRESS_WORDS } from "./words";
 
 export interface ResultActions {
@@ -56,6 +56,22 @@ function segments(exam: Exam): HTMLElement {
   return table;
 }
 
+/** The score part by part: what was lost, where and why. */
+function parts(list: ScorePart[]): HTMLElement {
+  const table = make("table", "parts");
+  const head = make("tr");
+  for (const name of ["Score", "Points", "Where points went"]) head.append(make("th", "", name));
+  table.append(head);
+  for (const p of list) {
+    const row = make("tr");
+    const full = p.lost === "";
+    const lost = full ? "nothing lost" : `−${(p.of - p.points).toFixed(1)}: ${p.lost}`;
+    row.append(make("td", "", p.title), make("td", full ? "good" : "warn", `${p.points.toFixed(1)} of ${p.of}`), make("td", "", lost));
+    table.append(row);
+  }
+  return table;
+}
+
 export class ResultDialog {
   private readonly box = find<HTMLDialogElement>("result");
   private shown = "";
@@ -80,7 +96,10 @@ export class ResultDialog {
     words.append(head, make("p", "case-name", exam.title), make("p", "summary", beyondVerdict(result.summary)));
     const top = make("div", "top");
     top.append(ring(result), words);
-    this.box.replaceChildren(top, this.diagnosis(result), segments(exam), make("p", "tally", `Compressions: ${tally(exam)}.`), this.foot(exam, result, controls));
+    const body: HTMLElement[] = [top, this.diagnosis(result)];
+    if (result.note) body.push(make("p", "note", result.note));
+    if (result.parts) body.push(parts(result.parts));
+    this.box.replaceChildren(...body, segments(exam), make("p", "tally", `Compressions: ${tally(exam)}.`), this.foot(exam, result, controls));
     if (!this.box.open) this.box.showModal();
     this.box.querySelector<HTMLElement>("a.primary")?.focus();
   }

@@ -7,6 +7,7 @@ import { toCreasedNormals } from "three/examples/jsm/utils/BufferGeometryUtils.j
 import { nextRange, SHADES, SHADE_TABLE } from "./colour";
 import { Gel } from "./gel";
 import { Skin } from "./pose";
+import { Sides } from "./sides";
 import { TargetMark } from "./target";
 import { PART, type Frame, type Line, type Mesh, type ProbeInfo, type Quat, type Site, type Target, type Vec3 } from "./protocol";
 
@@ -89,6 +90,7 @@ export class ThighScene {
   private dots: THREE.InstancedMesh | null = null;
   private readonly gel = new Gel();
   private readonly target = new TargetMark();
+  private readonly sides = new Sides();
   private probes: readonly ProbeInfo[] = [];
   private gelled = false;
   private dotInfo: SiteDot[] = [];
@@ -114,7 +116,7 @@ export class ThighScene {
     this.plane.renderOrder = 2.5; // after the skin, so that it shows through at full brightness
     this.plane.rotation.set(Math.PI / 2, 0, 0);
     this.probe.add(this.plane);
-    this.scene.add(this.inside, this.probe, this.ring, this.target.group);
+    this.scene.add(this.inside, this.probe, this.ring, this.target.group, this.sides.group);
     this.addLights();
     this.camera.up.set(0, 1, 0);
     this.orbit = new OrbitControls(this.camera, canvas);
@@ -211,6 +213,7 @@ export class ThighScene {
     const colours = new Float32Array((mesh.points.length / 3) * 4).fill(CALM_ALPHA);
     for (let i = 0; i < colours.length; i += 4) colours.set(SHADE_TABLE.subarray(0, 3), i);
     g.setAttribute("color", new THREE.BufferAttribute(colours, 4));
+    this.sides.place(mesh.points);
     this.gel.resize(mesh.points.length / 3);
     g.setAttribute("wet", new THREE.BufferAttribute(this.gel.wet, 1));
     this.surface?.geometry.dispose();
@@ -473,6 +476,7 @@ export class ThighScene {
       this.renderer = this.makeRenderer();
       this.resize();
     }
+    this.sides.face(this.camera);
     this.renderer.render(this.scene, this.camera);
   }
 

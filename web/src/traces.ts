@@ -78,7 +78,7 @@ export class Traces {
     if (last !== undefined && (s.time_s < last || s.time_s > last + JUMP_S)) this.clear();
     this.times.push(s.time_s);
     this.forces.push(Math.max(0, s.force_normal_n));
-    this.veins.push(Number.isNaN(s.vein_area_ratio) ? null : Math.min(120, 100 * s.vein_area_ratio));
+    this.veins.push(Number.isNaN(s.vein_area_ratio) || !(s.contact_area_mm2 > 0) ? null : Math.min(120, 100 * s.vein_area_ratio));
     while (this.times[0]! < s.time_s - SPAN_S) for (const list of [this.times, this.forces, this.veins]) list.shift();
     if (s.time_s - this.drawn_s < REDRAW_S || this.box.clientWidth === 0) return;
     this.drawn_s = s.time_s;

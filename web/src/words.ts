@@ -4,7 +4,7 @@ import type { CaseInfo, Compression, Decision, Guidance, PressResult } from "./p
 
 export const FINDINGS: { decision: Exclude<Decision, "">; name: string; help: string; key: string; code: string }[] = [
   { decision: "compressible", name: "Compressible", help: "The walls of the vein touched: no clot here", key: "J", code: "KeyJ" },
-  { decision: "clot", name: "Clot", help: "Pressed firmly, the vein stayed open", key: "K", code: "KeyK" },
+  { decision: "clot", name: "Clot", help: "Pressed with the force that closes a healthy vein, it stayed open", key: "K", code: "KeyK" },
   { decision: "not_seen", name: "Not seen", help: "The vein was not seen well enough to tell", key: "L", code: "KeyL" },
 ];
 
@@ -13,9 +13,9 @@ export const finding = (d: Decision): string => FINDINGS.find((f) => f.decision 
 export const PRESS_WORDS: Record<PressResult, string> = {
   complete: "vein closed",
   open: "vein stayed open",
-  insufficient: "not hard enough",
+  insufficient: "not far enough",
   too_hard: "too hard",
-  off_axis: "off axis",
+  off_axis: "not straight across the vein",
 };
 
 export const LEVELS: Record<CaseInfo["level"], string> = { first: "First exam", easy: "Easy", hard: "Hard" };
@@ -28,18 +28,3 @@ export const GUIDANCE: Record<Guidance, [string, string]> = {
 
 /** The press of now has shown what it can. */
 export const letGo = (c: Compression | null): boolean => c?.state === "complete" || c?.state === "open" || c?.state === "too_hard";
-
-/** What to say of the compression of now; empty when nothing. */
-export function compressionWords(c: Compression | null): string {
-  if (!c) return "";
-  const vein = c.vein === null ? "" : `: vein ${(100 * c.vein).toFixed(0)} % open`;
-  const words: Record<Compression["state"], string> = {
-    none: "",
-    pressing: `Pressing${vein}`,
-    complete: "Vein closed. Let go",
-    open: "Firm, and the vein stays open",
-    too_hard: "Too hard: ease off",
-    off_axis: "Turn the probe across the vein",
-  };
-  return words[c.state];
-}

@@ -1,0 +1,72 @@
+// A thigh under a probe without a session.
+// look_inside: vessels at the image plane, into a snapshot.
+#include "trainer/bench.h"
+
+#include "exam/vessels.h"
+
+// A force beyond this is no hand's: the inside is not asked then. A lighter touch than the other
+// does not move it.
+static const double FORCE_MAX_N = 150, TOUCH_N = 0.5;
+
+sonde_status sonde_bench_open(sonde_bench *bench, const sonde_case_setup *setup,
+                              const sonde_findings *findings, bool solid, sonde_error *error) {
+  sonde_world_def world = sonde_session_def_default().world;
+  SONDE_ASSERT(world.dt_s == BENCH_STEP_S); // its residuals belong to it
+  *bench = (sonde_bench){.circulation = setup->circulation, .pathology = setup->pathology};
+  sonde_status status = sonde_probe_create("linear", &bench->probe, error);
+  if (!status) status = sonde_state_create(setup->model, &world, &bench->state, error);
+  if (!status) status = sonde_interior_create(setup->model, &bench->interior, error);
+  if (!status) status = sonde_interior_set_findings(bench->interior, findings, error);
+  if (!status && !solid) sonde_interior_set_method(bench->interior, SONDE_INTERIOR_COLUMNS);
+  return status;
+}
+
+void sonde_bench_close(sonde_bench *bench) {
+  sonde_interior_destroy(bench->interior);
+  sonde_state_destroy(bench->state);
+  sonde_probe_clear(&bench->probe);
+}
+
+void sonde_bench_step(sonde_bench *bench, sonde_pose probe) {
+  sonde_step(bench->state, &bench->probe, probe);
+  bench->tick++;
+}
+
+static void look_inside(sonde_bench *bench, sonde_snapshot *s) {
+  sonde_pathology pathology = bench->pathology;
+  sonde_circulation_apply(&bench->circulation, bench->tick, BENCH_STEP_S, &pathology);
+  double since_s = (double)(bench->tick - bench->looked_tick) * BENCH_STEP_S;
+  sonde_interior_input input = {.positions_m = sonde_state_positions(bench->state),
+                                .contact_forces_n = sonde_state_contact_forces(bench->state),
+                                .world_from_probe = s->world_from_probe,
+                                .pathology = &pathology,
+                                .dt_s = bench->looked ? since_s : -1,
+                                .tick = bench->tick,
+                                .face_half_x_m = bench->probe.half_x_m,
+                                .face_half_y_m = bench->probe.half_y_m};
+  sonde_interior_update(bench->interior, &input);
+  bench->looked_tick = bench->tick;
+  sonde_snapshot_read_vessels(bench->interior, s);
+}
+
+sonde_snapshot sonde_bench_look(sonde_bench *bench, sonde_pose probe) {
+  const double nan_m = (double)NAN;
+  const sonde_contact *contact = sonde_state_contact(bench->state);
+  sonde_vec3 beam = q_rotate(probe.rotation, vec3(0, 0, 1));
+  sonde_snapshot s = {.tick = bench->tick,
+                      .time_s = (double)bench->tick * BENCH_STEP_S,
+                      .world_from_probe = probe,
+                      .force_n = contact->force_n,
+                      .force_normal_n = -v_dot(contact->force_n, beam),
+                      .penetration_m = nan_m,
+                      .vein_area_ratio = nan_m,
+                      .artery_area_ratio = nan_m,
+                      .other_vein_ratio = nan_m,
+                      .vein_short_m = nan_m,
+                      .vein_rest_m = {nan_m, nan_m, nan_m},
+                      .vein_tilt_rad = nan_m};
+  bool pressing = s.force_normal_n > TOUCH_N && s.force_normal_n < FORCE_MAX_N;
+  if (pressing) look_inside(bench, &s);
+  bench->looked = pressing;
+  return s;
+}

@@ -1,0 +1,83 @@
+// The force of each place: what closes a healthy vein there.
+// straight_above: the probe over a point of the vein, across it, at a depth below the skin at rest.
+// press:          a healthy vein is pressed until its walls touch.
+#include "trainer/bench.h"
+
+// The probe starts above the skin and presses as a careful hand does, looked at 40 times a second.
+static const double LIFT_M = 0.002, SPEED_M_S = 0.012, DEEPEST_M = 0.060, FORCE_MOST_N = 60;
+enum { TICKS_PER_LOOK = 25 };
+static const double ROOM = 1.2, ROOM_N = 2; // from the target to the limit
+
+sonde_force_target sonde_force_target_make(double closes_n) {
+  SONDE_ASSERT(closes_n > 0);
+  return (sonde_force_target){
+      .closes_n = closes_n, .firm_n = ceil(closes_n), .limit_n = ceil(ROOM * closes_n + ROOM_N)};
+}
+
+uint32_t sonde_plan_nearest(const sonde_plan *plan, double along_m) {
+  uint32_t nearest = SONDE_PLAN_POINTS;
+  double least = INFINITY;
+  for (uint32_t i = 0; i < plan->count; ++i) {
+    double distance = fabs(plan->point[i].at.along_m - along_m);
+    if (distance < least) least = distance, nearest = i;
+  }
+  return nearest;
+}
+
+static sonde_pose straight_above(const sonde_vein_point *p, double depth_m) {
+  sonde_vec3 z = v_neg(p->normal), x = p->across;
+  return (sonde_pose){v_madd(p->skin_m, -depth_m, p->normal),
+                      q_from_matrix(m_columns(x, v_cross(z, x), z))};
+}
+
+// The force at which the ratio passes `closed_ratio`, between two looks; NaN: it never does.
+static double press(sonde_bench *bench, const sonde_vein_point *at, double closed_ratio) {
+  double depth_m = -LIFT_M, before_n = 0, before = 1;
+  while (depth_m < DEEPEST_M) {
+    sonde_pose pose = straight_above(at, depth_m);
+    for (int k = 0; k < TICKS_PER_LOOK; ++k) {
+      depth_m += SPEED_M_S * BENCH_STEP_S;
+      pose = straight_above(at, depth_m);
+      sonde_bench_step(bench, pose);
+    }
+    sonde_snapshot s = sonde_bench_look(bench, pose);
+    double ratio = sonde_vein_ratio(&s);
+    if (s.force_normal_n > FORCE_MOST_N) break;
+    if (!isfinite(ratio)) continue;
+    if (ratio <= closed_ratio) {
+      double share = before > ratio ? (before - closed_ratio) / (before - ratio) : 1;
+      return before_n + clamp(share, 0, 1) * (s.force_normal_n - before_n);
+    }
+    before = ratio;
+    before_n = s.force_normal_n;
+  }
+  return (double)NAN;
+}
+
+sonde_status sonde_plan_find_targets(sonde_plan *plan, const sonde_case_setup *setup,
+                                     const sonde_progress *progress, sonde_error *error) {
+  SONDE_ASSERT(plan && setup && setup->model);
+  sonde_case_setup healthy = *setup;
+  healthy.circulation.breath_pa = 0;
+  healthy.circulation.valsalva_from_s = healthy.circulation.valsalva_to_s = 0;
+  sonde_status status = sonde_pathology_preset("healthy", &healthy.pathology, error);
+  sonde_findings findings = {.oedema = setup->findings.oedema};
+  for (uint32_t i = 0; i < plan->count && !status; ++i) {
+    sonde_plan_point *point = &plan->point[i];
+    if (!sonde_progress_report(progress, (double)i / plan->count, point->title))
+      return sonde_fail(error, SONDE_CANCELLED, "cancelled");
+    sonde_bench bench;
+    status = sonde_bench_open(&bench, &healthy, &findings, true, error);
+    double closes_n = status ? 0 : press(&bench, &point->at, plan->criteria.closed_ratio);
+    sonde_bench_close(&bench);
+    if (status) return status;
+    if (!isfinite(closes_n))
+      return sonde_fail(
+          error, SONDE_MISMATCH,
+          "'%s': a healthy vein of this thigh, %.0f mm below the skin, does not close "
+          "at %.0f N; compression decides nothing there",
+          point->title, 1e3 * point->at.depth_m, FORCE_MOST_N);
+    point->target = sonde_force_target_make(closes_n);
+  }
+  return status;
+}

@@ -1,0 +1,65 @@
+// Names of the thigh's ends and sides, in the picture of the thigh.
+
+import * as THREE from "three";
+
+const HEIGHT_PX = 44; // of the drawn letters; shown at a third
+const SIZE = 0.032; // of the picture's height
+const AWAY_MM = 14; // from the skin
+const INK = "#c9d6e4";
+
+function words(text: string): THREE.Sprite {
+  const canvas = document.createElement("canvas");
+  const c = canvas.getContext("2d")!;
+  const font = `600 ${HEIGHT_PX * 0.7}px system-ui, sans-serif`;
+  c.font = font;
+  canvas.width = Math.ceil(c.measureText(text).width) + 16;
+  canvas.height = HEIGHT_PX;
+  c.font = font;
+  c.textBaseline = "middle";
+  c.lineWidth = 7;
+  c.strokeStyle = "#10161d";
+  c.fillStyle = INK;
+  c.strokeText(text, 8, HEIGHT_PX / 2);
+  c.fillText(text, 8, HEIGHT_PX / 2);
+  const map = new THREE.CanvasTexture(canvas);
+  map.colorSpace = THREE.SRGBColorSpace;
+  const sprite = new THREE.Sprite(new THREE.SpriteMaterial({ map, depthTest: false, sizeAttenuation: false }));
+  sprite.scale.set((SIZE * canvas.width) / canvas.height, SIZE, 1);
+  sprite.renderOrder = 6;
+  sprite.name = text;
+  return sprite;
+}
+
+/** x points to the inner side, y to the front, z from the groin to the knee. */
+export class Sides {
+  readonly group = new THREE.Group();
+  private middle_x = 0;
+
+  /** Around a thigh with these skin points, mm. */
+  place(points: Float32Array): void {
+    const box = new THREE.Box3().setFromArray(points);
+    const middle = box.getCenter(new THREE.Vector3());
+    const at: [string, number, number, number, number][] = [
+      ["Groin", middle.x, box.max.y + AWAY_MM, box.min.z, 0],
+      ["Knee", middle.x, box.max.y + AWAY_MM, box.max.z, 0],
+      ["inner side", box.max.x + AWAY_MM, middle.y, middle.z, 1],
+      ["outer side", box.min.x - AWAY_MM, middle.y, middle.z, -1],
+    ];
+    this.group.clear();
+    for (const [text, x, y, z, side] of at) {
+      const sprite = words(text);
+      sprite.position.set(x, y, z);
+      sprite.userData.side = side;
+      this.group.add(sprite);
+    }
+    this.middle_x = middle.x;
+  }
+
+  /** A side is named where the viewer sees it, not through the leg. */
+  face(camera: THREE.Camera): void {
+    for (const sprite of this.group.children) {
+      const side = sprite.userData.side as number;
+      sprite.visible = side === 0 || side * (camera.position.x - this.middle_x) > 0;
+    }
+  }
+}
