@@ -116,6 +116,7 @@ static sonde_status make_echo(bench *b, const options *o, double density, sonde_
   sonde_echo_def def = {(uint32_t)o->lines, (uint32_t)o->samples, density, 1, false};
   sonde_status status = sonde_echo_create(b->scene.interior, &def, &b->echo, error);
   if (!status && o->kernels) status = sonde_echo_set_kernels(b->echo, o->kernels, error);
+  if (!status) status = sonde_echo_check_view(2 * b->scene.probe.half_x_m, o->radius_m, error);
   return status ? status : sonde_echo_set_radius(b->echo, o->radius_m, error);
 }
 

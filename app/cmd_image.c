@@ -251,11 +251,16 @@ static sonde_status draw(const settled *s, const options *o, const sonde_patholo
   sonde_echo_def def = {.seed = (uint64_t)o->seed};
   double aperture = isnan(o->aperture_m) ? 2 * s->probe.half_x_m : o->aperture_m;
   settled_update(s, pathology, sonde_state_tick(s->state));
-  sonde_status status = sonde_echo_create(s->interior, &def, &echo, error);
+  sonde_status status =
+      sonde_echo_check_view(aperture, isnan(o->radius_m) ? 0 : o->radius_m, error);
+  if (!status) status = sonde_echo_create(s->interior, &def, &echo, error);
   if (!status) status = sonde_echo_set_radius(echo, isnan(o->radius_m) ? 0 : o->radius_m, error);
   if (!status) status = sonde_image_create((uint32_t)o->width, (uint32_t)o->height, image, error);
   if (!status) {
     sonde_echo_render(echo, s->pose, aperture, pathology, &o->settings, image);
+    uint32_t lost = sonde_echo_last_times(echo).lost;
+    if (lost)
+      fprintf(stderr, "sonde image: %u pieces of tissue are missing in the picture\n", lost);
     status = sonde_image_save_png(image, o->out, error);
   }
   sonde_echo_destroy(echo);

@@ -2,6 +2,7 @@
 // note:        one measure with its target.
 // stage_*:     a synthetic leg, an interior and a renderer.
 // reference:   likeness, widths, flicker against the exact reference.
+// deep, compensation: tissue to the set depth, brightness to the receiver's noise.
 // speckle, attenuation, interfaces, enhancement, shadow, closure: on round synthetic legs.
 #include "app.h"
 #include "validate.h"
@@ -303,6 +304,91 @@ static sonde_status vein(report *r) {
   return status;
 }
 
+typedef struct face {
+  const char *name;
+  double aperture_m, radius_m, depth_m;
+} face;
+
+// Deepest depth above which each eighth of the face shows speckle within 3 dB of the mean.
+static double speckle_depth(const stage *s, const float *e) {
+  enum { PARTS = 8 };
+  const double first = 0.01, band = 5e-3, part = s->view.aperture_m / PARTS;
+  const double depth = s->view.settings.depth_m, half = 0.5 * s->view.aperture_m;
+  const double mean = db(intensity(s, e, (region){-half, half, first, depth}, NULL));
+  double z = first;
+  for (; z + band < depth + 1e-6; z += band)
+    for (int k = 0; k < PARTS; ++k) {
+      region at = {k * part - half, (k + 1) * part - half, z, z + band};
+      if (!(fabs(db(intensity(s, e, at, NULL)) - mean) < 3)) return z;
+    }
+  return z;
+}
+
+// Tissue down to the set depth below each face; 3 MHz, compensation by the tissue's own loss.
+static sonde_status deep(report *r) {
+  static const face FACES[] = {
+      {"linear_50", 0.04, 0, 0.05},       {"linear_100", 0.04, 0, 0.1},
+      {"linear_150", 0.04, 0, 0.15},      {"wide_150", 0.2, 0, 0.15},
+      {"curved_60_100", 0.06, 0.06, 0.1}, {"curved_60_150", 0.06, 0.06, 0.15},
+      {"curved_40_150", 0.06, 0.04, 0.15}};
+  const double radius = 0.4, mhz = 3;
+  stage s;
+  sonde_status status = stage_open(&s, radius, 0.014, 2.5e-3, 0, false, &r->error);
+  s.view.settings.frequency_hz = mhz * 1e6;
+  s.view.settings.tgc_db_per_m = 2 * 100 * mhz - sonde_echo_default_tgc_db_per_m(mhz * 1e6);
+  uint32_t lost = 0;
+  for (size_t k = 0; k < sizeof FACES / sizeof *FACES && !status; ++k) {
+    const face *f = &FACES[k];
+    // All of the face below the skin.
+    double half = 0.5 * f->aperture_m, sink = radius - sqrt(radius * radius - half * half);
+    if (f->radius_m > 0) sink = f->radius_m * (1 - cos(half / f->radius_m));
+    char name[48];
+    s.view.aperture_m = f->aperture_m, s.view.settings.depth_m = f->depth_m;
+    s.pose = validate_leg_pose(radius - 6e-3 - sink, 0.15);
+    status = sonde_echo_check_view(f->aperture_m, f->radius_m, &r->error);
+    if (!status) status = sonde_echo_set_radius(s.view.echo, f->radius_m, &r->error);
+    if (status) break;
+    const float *e = look(&s, 1);
+    lost += sonde_echo_last_times(s.view.echo).lost;
+    snprintf(name, sizeof name, "speckle_to_depth_mm_%s", f->name);
+    note(r, name, 1e3 * speckle_depth(&s, e), 1e3 * f->depth_m - 1e-3, 1e3 * f->depth_m + 1e-3,
+         "the set depth");
+  }
+  note(r, "pieces_not_drawn", lost, 0, 0, "none");
+  stage_close(&s);
+  return status;
+}
+
+// Homogeneous muscle down to where it is 6 dB above the receiver's noise, and the share of white
+// pixels at the default compensation.
+static sonde_status compensation(report *r) {
+  static const double MHZ[] = {5, 7.5, 12};
+  const double noise_db = -118, radius = 0.4, band = 5e-3, first = 0.01;
+  stage s;
+  sonde_status status = stage_open(&s, radius, 0.014, 2.5e-3, 0, false, &r->error);
+  double off = 0, white = 0;
+  for (size_t k = 0; k < sizeof MHZ / sizeof *MHZ && !status; ++k) {
+    const double end = (-noise_db - 6) / (2 * 100 * MHZ[k]);
+    s.view.settings.frequency_hz = MHZ[k] * 1e6, s.view.settings.depth_m = 0.15;
+    s.view.settings.tgc_db_per_m = 0;
+    (void)look(&s, 1);
+    size_t saturated = 0, pixels = (size_t)s.image.width * s.image.height;
+    for (size_t i = 0; i < pixels; ++i) saturated += s.image.pixels[i] == 255;
+    white = fmax(white, (double)saturated / (double)pixels);
+    s.view.settings.tgc_db_per_m =
+        2 * 100 * MHZ[k] - sonde_echo_default_tgc_db_per_m(s.view.settings.frequency_hz);
+    const float *e = look(&s, 1);
+    double mean = db(intensity(&s, e, (region){-0.018, 0.018, first, end}, NULL));
+    for (double z = first; z + band < end; z += band)
+      off =
+          fmax(off, fabs(db(intensity(&s, e, (region){-0.018, 0.018, z, z + band}, NULL)) - mean));
+  }
+  note(r, "evenness_to_noise_plus_6_db", off, 0, 1, "<= 1 dB");
+  note(r, "white_share", white, 0, 0.01, "<= 0.01 of the pixels");
+  stage_close(&s);
+  return status;
+}
+
 static sonde_status times(report *r) {
   enum { FRAMES = 30 };
   stage s;
@@ -324,8 +410,8 @@ static sonde_status times(report *r) {
 int validate_image(int argc, char **argv) {
   static const struct option LONG[] = {
       {"quick", no_argument, NULL, 'q'}, {"json", no_argument, NULL, 'j'}, {NULL, 0, NULL, 0}};
-  static sonde_status (*const PARTS[])(report *) = {reference,   speckle, attenuation, bone,
-                                                    enhancement, vein,    times};
+  static sonde_status (*const PARTS[])(report *) = {
+      reference, speckle, attenuation, bone, enhancement, vein, deep, compensation, times};
   report r = {0};
   for (int c; (c = getopt_long(argc, argv, "", LONG, NULL)) != -1;) switch (c) {
     case 'q': r.quick = true; break;

@@ -19,7 +19,9 @@ typedef struct sonde_echo_settings {
   double gain_db;          /**< overall gain, -30..30; default 0 */
   double dynamic_range_db; /**< 30-90; default 60 */
   double focus_m;          /**< default 25 mm */
-  double tgc_db_per_m;     /**< time-gain compensation on top of the default, default 0 */
+  double tgc_db_per_m;     /**< slope of the time-gain compensation on top of the default's, default
+                                0; the compensation ends at 112 dB, where muscle is 6 dB above the
+                                receiver's noise, and falls by 10 dB behind that depth */
 } sonde_echo_settings;
 
 SONDE_API sonde_echo_settings sonde_echo_settings_default(void);
@@ -88,6 +90,8 @@ SONDE_API bool sonde_echo_prepare(sonde_echo *echo, double aperture_m,
 typedef struct sonde_echo_times {
   double settings_s, plane_s, medium_s, scatter_s, beam_s, picture_s;
   uint32_t scatterers, blood; /**< blood: those of them in the lumina */
+  uint32_t lost; /**< pieces of tissue in view that were not drawn for want of room; 0 in every
+                      view that sonde_echo_check_view() allows */
 } sonde_echo_times;
 SONDE_API sonde_echo_times sonde_echo_last_times(const sonde_echo *echo);
 
@@ -111,6 +115,11 @@ SONDE_API void sonde_echo_set_coupling(sonde_echo *echo, const float *coupling);
 /** Radius of a curved face (m, 20 mm and more), its aperture measured along the arc; 0: flat.
  *  @return SONDE_ARGUMENT @thread as sonde_echo_render */
 SONDE_API sonde_status sonde_echo_set_radius(sonde_echo *echo, double radius_m, sonde_error *error);
+/** Whether a face can be drawn whole to every depth: an array of 5 to 200 mm, flat or on an arc of
+ *  at most 100 degrees. @param radius_m of a curved face, 0: flat
+ *  @return SONDE_ARGUMENT @thread any */
+SONDE_API sonde_status sonde_echo_check_view(double aperture_m, double radius_m,
+                                             sonde_error *error);
 /** Chooses the inner loops: "avx512", "avx2", "base" (the widest that runs here is the default) or
  *  "plain" without vectors. @return SONDE_NOT_FOUND when this processor lacks them */
 SONDE_API sonde_status sonde_echo_set_kernels(sonde_echo *echo, const char *name,

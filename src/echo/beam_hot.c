@@ -6,6 +6,7 @@
 // merge_row        one row of the field times what tissue and losses leave
 // lateral_row      lateral kernels at its depth, normalised to unit speckle
 // add_specular     echoes of interfaces, carrier phase included
+// sonde_echo_compensation_db  time-gain compensation at a depth
 // axial_rows       pulse, noise, compensation, modulus
 #include "base/base.h"
 #include "base/random.h"
@@ -13,7 +14,10 @@
 
 #include <string.h>
 
-static const float noise_db = -118; // receiver noise below muscle at the skin, before TGC
+static const double noise_db = -118; // receiver noise below muscle at the skin, before TGC
+// Compensation follows the tissue's losses until its echo is this far above the receiver's noise,
+// and is turned down behind: the noise stays dark grain.
+static const double least_signal_db = 6, turn_down_db = 10, turn_down_db_per_m = 400;
 
 static float *ring_row(const sonde_echo *echo, uint32_t row) {
   uint32_t rows = 2 * echo->pad_samples + AXIAL_MOST;
@@ -96,6 +100,14 @@ static void add_specular(sonde_echo *echo, uint32_t sample) {
   }
 }
 
+// Gain at a depth, dB. The slope is the operator's; the ceiling is the scanner's.
+double sonde_echo_compensation_db(const frame *f, double depth_m) {
+  const double most = -least_signal_db - noise_db;
+  double end_m = most / sonde_echo_default_tgc_db_per_m(f->frequency_hz);
+  double down = clamp(turn_down_db_per_m * (depth_m - end_m), 0, turn_down_db);
+  return fmin(f->tgc_db_per_m * depth_m, most - down);
+}
+
 // Samples from there on.
 static void axial_rows(sonde_echo *echo, axial_job *job, uint32_t first, int samples, bool tissue) {
   const frame *f = &echo->frame;
@@ -106,8 +118,8 @@ static void axial_rows(sonde_echo *echo, axial_job *job, uint32_t first, int sam
     uint32_t sample = first + (uint32_t)k;
     uint64_t draw = sonde_random_bits(echo->seed + 3 + sonde_interior_tick(echo->interior), sample);
     job->noise[k] = echo->noise + draw % (SONDE_NOISE - 2 * SONDE_MOST_LINES);
-    job->compensation[k] =
-        tissue ? amplitude_of_db((float)(sample * f->step_m * f->tgc_db_per_m)) : 1;
+    double gain_db = tissue ? sonde_echo_compensation_db(f, sample * f->step_m) : 0;
+    job->compensation[k] = amplitude_of_db((float)gain_db);
     job->envelope[k] = echo->envelope + (size_t)sample * echo->padded;
     job->grey[k] = echo->grey + (size_t)sample * echo->padded;
   }
@@ -119,7 +131,7 @@ static axial_job axial_of(const sonde_echo *echo, bool tissue) {
   const sonde_echo_settings *s = &echo->frame.settings;
   float range = (float)s->dynamic_range_db;
   axial_job job = {.count = 2 * (int)echo->pad_samples + 1,
-                   .noise_size = tissue ? amplitude_of_db(noise_db) : 0,
+                   .noise_size = tissue ? amplitude_of_db((float)noise_db) : 0,
                    .offset_db = (float)s->gain_db - sonde_white_db + range,
                    .grey_per_db = 255 / range,
                    .lines = echo->padded};

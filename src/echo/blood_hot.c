@@ -116,6 +116,7 @@ static bool form_of(const sonde_echo *echo, const map *m, splat_map *out) {
     for (int c = 0; c < 3; ++c) out->m[k][c] = (float)(v_coordinate(v, c) * unit[c]);
   }
   out->m[0][2] += (float)echo->pad_samples;
+  out->m[0][3] = 1;
   float reach = 0.5f * (fabsf(out->m[1][1]) + fabsf(out->m[2][1]) + fabsf(out->m[3][1]));
   return fabsf(out->m[0][1]) <= 1 + reach;
 }

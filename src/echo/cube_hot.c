@@ -11,6 +11,7 @@
 // find_walls, store_wall, add_points  vessels beside it
 // sonde_cubes_end, place_some, place_cube, place_pieces  carried points, maps of some cubes
 // make_map, add_map  one map, which then waits for its tier
+// add_part, add_share  fewer scatterers where the resolution cell is large
 // find_lumina, shift_form, add_lumina  the lumina that it leaves empty
 #include "base/base.h"
 #include "base/random.h"
@@ -243,7 +244,7 @@ static bool make_map(const sonde_echo *echo, v4 origin, const v4 axis[3], uint32
   const v4 first = origin * unit + s->pad, m[3] = {axis[0] * unit, axis[1] * unit, axis[2] * unit};
   float reach = 0.5f * (fabsf(m[0][1]) + fabsf(m[1][1]) + fabsf(m[2][1]));
   if (fabsf(first[1]) > 1 + reach) return false;
-  store4(one->m[0], first);
+  store4(one->m[0], first), one->m[0][3] = 1;
   for (int k = 0; k < 3; ++k) store4(one->m[k + 1], m[k]);
   one->from = from, one->count = count, one->lumen = echo->tiers->lumens, one->lumens = 0;
   return true;
@@ -285,13 +286,18 @@ static void shift_form(const float form[4], v4 offset, float out[4]) {
   for (int i = 1; i < 4; ++i) out[i] = 0.5f * form[i];
 }
 
-static void add_lumina(sonde_tiers *tiers, splat_map *one, const splat_lumen *lumen, uint32_t count,
+static void add_lumina(sonde_echo *echo, splat_map *one, const splat_lumen *lumen, uint32_t count,
                        v4 offset) {
-  for (uint32_t k = 0; k < count && tiers->lumens < MOST_LUMENS; ++k) {
+  sonde_tiers *tiers = echo->tiers;
+  for (uint32_t k = 0; k < count; ++k) {
     splat_lumen l = {.chord = lumen[k].chord};
     shift_form(lumen[k].along, offset, l.along);
     shift_form(lumen[k].across, offset, l.across);
     if (is_beyond(l.along) || is_beyond(l.across)) continue;
+    if (tiers->lumens == MOST_LUMENS) {
+      ++echo->lost;
+      return;
+    }
     sonde_tiers_add_lumen(tiers, &l);
     ++one->lumens;
   }
@@ -332,8 +338,41 @@ static void place_pieces(sonde_echo *echo, const cube *c) {
                        part & 4 ? quarter : -quarter, 0};
     splat_map one;
     if (!make_map(echo, at[part], axis, SONDE_POOL + share % shares * each, each, &one)) continue;
-    add_lumina(echo->tiers, &one, lumen, lumens, offset);
+    add_lumina(echo, &one, lumen, lumens, offset);
     add_map(echo, &one);
+  }
+}
+
+static void add_part(sonde_echo *echo, const splat_map *whole, uint32_t first, uint32_t count,
+                     double amplitude) {
+  splat_map one = *whole;
+  one.from = SONDE_POOL + SONDE_LOOSE + whole->from + first;
+  one.count = count, one.m[0][3] = (float)amplitude;
+  add_map(echo, &one);
+}
+
+// Where resolution cells hold more scatterers than speckle needs, half of a share, or three fourths
+// of it, fade out with depth, while the others take over their energy: tissue that moves through
+// these depths does not change its speckle at once.
+static void add_share(sonde_echo *echo, const splat_map *whole, float row) {
+  const uint32_t half = whole->count / 2, fourth = whole->count / 4;
+  double at = clamp((double)row / (echo->plane_rows - 1), 0, 1) * SONDE_SLAB_ROWS;
+  double spare = echo->spare_octaves[(uint32_t)at];
+  if (spare >= 2) {
+    add_part(echo, whole, 0, fourth, 2);
+    return;
+  }
+  double left = clamp(2 * (1 - (spare - floor(spare))), 0, 1), more = sqrt(2 - left * left);
+  if (spare >= 1 && left >= 1) {
+    add_part(echo, whole, 0, half, sqrt(2));
+  } else if (spare >= 1) {
+    add_part(echo, whole, 0, fourth, sqrt(2) * more);
+    add_part(echo, whole, fourth, fourth, sqrt(2) * left);
+  } else if (spare > 0 && left < 1) {
+    add_part(echo, whole, 0, half, more);
+    add_part(echo, whole, half, half, left);
+  } else {
+    add_map(echo, whole);
   }
 }
 
@@ -349,7 +388,7 @@ static void place_cube(sonde_echo *echo, const cube *c) {
     if (c->bits >> (61 + k) & 1) axis[k] = -axis[k];
   const uint32_t from = (uint32_t)(c->bits % patterns) * echo->per_cell;
   splat_map one;
-  if (make_map(echo, origin, axis, from, echo->per_cell, &one)) add_map(echo, &one);
+  if (make_map(echo, origin, axis, from, echo->per_cell, &one)) add_share(echo, &one, origin[2]);
 }
 
 static void place_some(sonde_echo *echo) {

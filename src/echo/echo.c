@@ -77,6 +77,22 @@ static int by_value(const void *a, const void *b) {
   return (x > y) - (x < y);
 }
 
+// The same share in parts that are evenly spread each: of the four scatterers in two by two boxes
+// of a layer one goes to the first quarter, one to the second, two to the half. Order of z is kept.
+static void fill_parts(sonde_echo *echo, uint32_t from, uint32_t to) {
+  const scatter_pool *p = &echo->pool;
+  const uint32_t quarter = echo->per_cell / 4;
+  uint32_t end[3] = {to, to + quarter, to + 2 * quarter};
+  for (uint32_t i = 0; i < echo->per_cell; ++i) {
+    const uint32_t layer = i / 64, square = i % 16, member = i / 16 % 4; // see fill_share()
+    const uint64_t draw =
+        sonde_random_bits(echo->seed + 7, ((uint64_t)from + 64 * layer) * 16 + square);
+    const uint32_t place = (member + (uint32_t)(draw >> 40)) % 4, at = end[place < 2 ? place : 2]++;
+    p->x[at] = p->x[from + i], p->y[at] = p->y[from + i], p->z[at] = p->z[from + i];
+    p->sign[at] = p->sign[from + i];
+  }
+}
+
 // In each cube's share the scatterers come in order of z, along the leg: the slab of a transverse
 // plane then takes or leaves whole vectors of them. Within a layer the other coordinates do not
 // depend on z, so that z alone is sorted.
@@ -87,6 +103,8 @@ static void fill_pools(sonde_echo *echo) {
     for (uint32_t layer = 0; layer < layers; ++layer)
       qsort(echo->pool.z + i + 64 * layer, 64, sizeof(float), by_value);
   }
+  for (uint32_t i = 0; i + echo->per_cell <= SONDE_POOL; i += echo->per_cell)
+    fill_parts(echo, i, SONDE_POOL + SONDE_LOOSE + i);
   scatter_pool loose = {echo->pool.x + SONDE_POOL, echo->pool.y + SONDE_POOL,
                         echo->pool.z + SONDE_POOL, echo->pool.sign + SONDE_POOL};
   for (uint32_t i = 0; i + each <= SONDE_LOOSE; i += each)
@@ -154,7 +172,7 @@ static size_t carve(sonde_echo *echo, char *block) {
   CARVE(echo->cubes, 1);
   CARVE(echo->tiers, 1);
   CARVE(echo->motion, 1);
-  used = carve_pool(&echo->pool, block, used, SONDE_POOL + SONDE_LOOSE);
+  used = carve_pool(&echo->pool, block, used, 2 * SONDE_POOL + SONDE_LOOSE);
   return carve_pool(&echo->blood, block, used, SONDE_BLOOD);
 }
 
@@ -168,7 +186,7 @@ static bool allocate(sonde_echo *echo) {
   echo->air = SONDE_NEW(uint8_t, echo->padded);
   echo->echoes = SONDE_NEW(specular, SONDE_MAX_ECHOES);
   echo->first_echo = SONDE_NEW(int32_t, echo->samples);
-  echo->seen = SONDE_NEW(uint64_t, (size_t)SONDE_BOX_SIDE * SONDE_BOX_SIDE * SONDE_BOX_SIDE / 64);
+  echo->seen = SONDE_NEW(uint64_t, SONDE_BOX_CUBES / 64);
   return echo->block && echo->psf && echo->spare && echo->node && echo->plane && echo->air &&
          echo->echoes && echo->first_echo && echo->seen;
 }
@@ -267,6 +285,20 @@ sonde_status sonde_echo_set_radius(sonde_echo *echo, double radius_m, sonde_erro
     return sonde_fail(error, SONDE_ARGUMENT, "face of radius %g m; expected 0 or 0.02 to 1",
                       radius_m);
   echo->frame.radius_m = radius_m;
+  return SONDE_OK;
+}
+
+sonde_status sonde_echo_check_view(double aperture_m, double radius_m, sonde_error *error) {
+  const double widest = 100;
+  if (!(aperture_m >= 5e-3 && aperture_m <= 0.2))
+    return sonde_fail(error, SONDE_ARGUMENT, "array of %g mm; expected 5 to 200 mm",
+                      1e3 * aperture_m);
+  double arc = radius_m > 0 ? aperture_m / radius_m * 180 / SONDE_PI : 0;
+  if (!(radius_m == 0 || radius_m > 0) || arc > widest)
+    return sonde_fail(error, SONDE_ARGUMENT,
+                      "an array of %g mm on a radius of %g mm spans %.0f degrees; expected at most "
+                      "%.0f: choose a narrower array or a larger radius",
+                      1e3 * aperture_m, 1e3 * radius_m, arc, widest);
   return SONDE_OK;
 }
 

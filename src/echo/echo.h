@@ -20,8 +20,10 @@ enum {
   SONDE_LOOSE = 8192,                       // the same for pieces of cubes
   SONDE_BLOOD = 16384,                      // streamlines of one vessel
   SONDE_NOISE = 65536,
-  SONDE_BOX_SIDE = 128, // cubes along a side of the box around the slab
-  SONDE_MAX_CELLS = 12000,
+  SONDE_BOX_CUBES = 1 << 24, // cubes of the box around the slab
+  // Cubes that the slab touches. The widest view that sonde_echo_check_view() allows is a sector of
+  // 0.05 m^2, its slab at most 16 mm thick with a cube's width: 100,000 cubes of 2 mm.
+  SONDE_MAX_CELLS = 1 << 17,
   SONDE_SLAB_ROWS = 256, // depths at which the slab's height is tabulated
 };
 
@@ -117,18 +119,22 @@ struct sonde_echo {
   float *envelope;      // [samples][padded]
   float *flat_envelope; // [samples][lines], what readers see
   float *grey;          // [samples][padded]
-  scatter_pool pool;    // [POOL + LOOSE] sorted by z within each cube's share; then unsorted ones
-  scatter_pool blood;   // [BLOOD] streamlines: place in a lumen of unit width, speed over the mean
+  // [POOL + LOOSE + POOL] sorted by z within each cube's share; then unsorted ones for pieces; then
+  // the shares again, each in the order of its parts: a quarter, a quarter, a half.
+  scatter_pool pool;
+  scatter_pool blood; // [BLOOD] streamlines: place in a lumen of unit width, speed over the mean
   sonde_echo_flow flow;
   float *noise;         // [NOISE]
   int32_t box_first[3]; // cubes of the box around the slab at rest
   uint32_t box_size[3];
-  uint64_t *seen;                     // [BOX_SIDE^3 / 64] a bit per cube of the box, x fastest
+  uint64_t *seen;                     // [BOX_CUBES / 64] a bit per cube of the box, x fastest
   double slab_m[SONDE_SLAB_ROWS + 1]; // half height, depths in even steps
-  struct sonde_cubes *cubes;          // cubes.h
-  struct sonde_tiers *tiers;          // tiers.h
-  struct sonde_fields *motion;        // of this frame
-  uint32_t cell_count, moved, bled;   // cells and scatterers of the last frame
+  double spare_octaves[SONDE_SLAB_ROWS + 1]; // of scatterers there, beyond what speckle needs
+  struct sonde_cubes *cubes;                 // cubes.h
+  struct sonde_tiers *tiers;                 // tiers.h
+  struct sonde_fields *motion;               // of this frame
+  uint32_t cell_count, moved, bled;          // cells and scatterers of the last frame
+  uint32_t lost;                             // cells, maps and lumina for which there was no room
   sonde_echo_times times;
 };
 
@@ -148,6 +154,8 @@ void sonde_echo_scatter_points(sonde_echo *echo, const sonde_echo_point *points,
                                uint32_t tier);
 // The rows of a tier that has been laid.
 void sonde_echo_beam(sonde_echo *echo, uint32_t tier, bool tissue);
+// Time-gain compensation at a depth, dB: the operator's slope up to the scanner's ceiling.
+double sonde_echo_compensation_db(const frame *f, double depth_m);
 // After the last one.
 void sonde_echo_beam_end(sonde_echo *echo);
 void sonde_echo_picture(sonde_echo *echo, sonde_image *image);

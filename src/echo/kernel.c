@@ -131,6 +131,7 @@ INLINE void splat_some(const splat_job *job, const splat_map *map, bool inside, 
   const form to_line = form_of(map->m, 0), to_side = form_of(map->m, 1),
              to_depth = form_of(map->m, 2);
   const uint32_t count = map->count;
+  const float amplitude = map->m[0][3];
   for (uint32_t i = 0; i < count; i += W) {
     vf x = load(px + i), y = load(py + i), z = load(pz + i);
     vf side = along(&to_side, x, y, z), height = 1 - side * side;
@@ -143,7 +144,7 @@ INLINE void splat_some(const splat_job *job, const splat_map *map, bool inside, 
     }
     if (map->lumens) in = in & ~in_lumina(job, map, x, y, z);
     f->count += pack(in, line, f->line + f->count, depth, f->depth + f->count,
-                     load(sign + i) * height, f->weight + f->count);
+                     load(sign + i) * height * amplitude, f->weight + f->count);
     if (f->count >= FLOCK) lay_batch(job, f);
   }
 }

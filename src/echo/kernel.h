@@ -16,8 +16,8 @@ enum {
   KNOT_FLOATS = 11, // that a texture remembers per line
   MOST_LEVELS = LAYER_LEVELS + MOST_VESSELS + MOST_LESIONS,
   RING_PLANES = 2 * SONDE_RANK,
-  SONDE_FINE = 2,    // columns of the grid per scan line
-  AXIAL_MOST = 4,    // samples summed at once
+  SONDE_FINE = 2, // columns of the grid per scan line
+  AXIAL_MOST = 4, // samples summed at once
 };
 
 // A lumen over one map: forms of its scatterers' coordinates, 1 on the wall at rest. Clot fills
@@ -29,8 +29,8 @@ typedef struct splat_lumen {
 // Scatterers of one affine map: (column, elevation over its reach, sample) =
 // m[0] + m[1] x + m[2] y + m[3] z.
 typedef struct splat_map {
-  float m[4][4];          // the last of each is not used
-  uint32_t from, count;   // scatterers; the count is a multiple of ECHO_ALIGN
+  float m[4][4];        // m[0][3] is the amplitude of the scatterers, the others' last are not used
+  uint32_t from, count; // scatterers; the count is a multiple of ECHO_ALIGN
   uint32_t lumen, lumens; // first and number of those that it leaves empty
 } splat_map;
 

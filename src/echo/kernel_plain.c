@@ -42,7 +42,7 @@ static void splat(const splat_job *job) {
       for (int c = 0; c < 3; ++c)
         at[c] = (double)map->m[0][c] + (double)map->m[1][c] * x + (double)map->m[2][c] * y +
                 (double)map->m[3][c] * z;
-      if (!empty) lay_point(job, at, (double)job->sign[i]);
+      if (!empty) lay_point(job, at, (double)job->sign[i] * (double)map->m[0][3]);
     }
 }
 

@@ -84,6 +84,7 @@ void sonde_echo_render(sonde_echo *echo, sonde_pose world_from_probe, double ape
   t->picture_s = lap(&start);
   t->scatterers = echo->moved;
   t->blood = echo->bled;
+  t->lost = echo->lost;
 }
 
 sonde_echo_times sonde_echo_last_times(const sonde_echo *echo) {

@@ -30,6 +30,7 @@ static const double far_away = 50; // in semi-axes
 static const double row_m = 1.6e-3, fewest_rows = 37;
 static const double step_beside = 1e-3;
 static const double tolerance_m = 1e-7;
+static const double fewest_per_cell = 10; // scatterers that make developed speckle
 static const double view_margin_m = 8e-3; // slab, a cube and the step between two stations
 
 sonde_vec3 sonde_echo_place(const frame *f, double line, double depth_m) {
@@ -97,6 +98,26 @@ static void take_beam(sonde_echo *echo, const beam_key *key) {
   echo->spare = old;
 }
 
+// Height of the slab, and how many times more scatterers a resolution cell holds than it needs, as
+// a logarithm of base two. A cell's extent along each axis is (sum p)^2 / sum p^2 of the intensity:
+// 1.0645 half widths of a Gaussian pulse, 1.4 half heights of the elevation's (1 - u^2)^2.
+static void measure_slab(sonde_echo *echo) {
+  const frame *f = &echo->frame;
+  const beam_psf *psf = echo->psf;
+  const double density = echo->per_cell / (echo->cell_m * echo->cell_m * echo->cell_m);
+  const sonde_array array = sonde_beam_array(&psf->key);
+  const double along = 1.0645 * array.pulse_wavelengths * f->wavelength_m;
+  for (int k = 0; k <= SONDE_SLAB_ROWS; ++k) {
+    int band;
+    double depth = f->depth_m * k / SONDE_SLAB_ROWS, t = sonde_psf_band(psf, depth, &band);
+    const double *half = psf->elevation_m + band, *wide = psf->cell_columns + band;
+    double column = f->pitch_m / SONDE_FINE * (f->radius_m > 0 ? 1 + depth / f->radius_m : 1);
+    echo->slab_m[k] = half[0] + t * (half[1] - half[0]);
+    double cell = along * 1.4 * echo->slab_m[k] * (wide[0] + t * (wide[1] - wide[0])) * column;
+    echo->spare_octaves[k] = log2(density * cell / fewest_per_cell);
+  }
+}
+
 void sonde_echo_frame(sonde_echo *echo, sonde_pose world_from_probe, double aperture_m,
                       const sonde_echo_settings *settings) {
   sonde_echo_geometry(echo, aperture_m, settings);
@@ -114,12 +135,7 @@ void sonde_echo_frame(sonde_echo *echo, sonde_pose world_from_probe, double aper
   echo->gain_stride = echo->grid_lines / SONDE_FINE + ECHO_ALIGN;
   echo->grid_samples = echo->samples + 2 * echo->pad_samples;
   f->edge_lines = (double)echo->pad_lines / SONDE_FINE;
-  for (int k = 0; k <= SONDE_SLAB_ROWS; ++k) {
-    int band;
-    double t = sonde_psf_band(echo->psf, f->depth_m * k / SONDE_SLAB_ROWS, &band);
-    const double *half = echo->psf->elevation_m + band;
-    echo->slab_m[k] = half[0] + t * (half[1] - half[0]);
-  }
+  measure_slab(echo);
   echo->lines_per_column = (echo->lines - 1 + 2 * f->edge_lines) / (SONDE_PLANE_COLUMNS - 1);
   echo->plane_rows = (uint32_t)clamp(ceil(f->depth_m / row_m) + 1, fewest_rows, SONDE_PLANE_ROWS);
   echo->depth_per_row = f->depth_m / (echo->plane_rows - 1);

@@ -196,6 +196,9 @@ static void project(beam_psf *psf, int b) {
     energy += kept[l];
   }
   psf->share[b] = energy / whole;
+  double square = 0;
+  for (int l = 0; l <= psf->half_lines; ++l) square += kept[l] * kept[l] / weight_of(l);
+  psf->cell_columns[b] = energy * energy / square;
   double beyond = 0;
   int half = psf->half_lines;
   while (half > 1 && beyond + kept[half] < lost * energy) beyond += kept[half--];

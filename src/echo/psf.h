@@ -25,6 +25,9 @@ typedef struct beam_psf {
   int half_lines, half_rows; // reach of the kernels
   double depth_m[SONDE_BANDS], elevation_m[SONDE_BANDS];
   int half[SONDE_BANDS]; // lines needed at that depth
+  // Width of the resolution cell across the lines, in columns: (sum p)^2 / sum p^2 of the
+  // intensity.
+  double cell_columns[SONDE_BANDS];
   // re, im - re, re + im of each: kernel.h
   float lateral[SONDE_BANDS][SONDE_MOST_TAPS + 1][SONDE_RANK][LATERAL_PARTS];
   double axial[SONDE_RANK][2 * SONDE_MOST_TAPS + 1]; // orthonormal

@@ -64,14 +64,15 @@ static void clear_seen(sonde_echo *echo) {
       high[c] = fmax(high[c], at[c] + half * fabs(side[c]));
     }
   }
-  uint32_t cubes = 1;
+  double cubes = 1;
   for (int c = 0; c < 3; ++c) {
     echo->box_first[c] = below(low[c] / echo->cell_m);
-    double size = floor(high[c] / echo->cell_m) - echo->box_first[c] + 1;
-    echo->box_size[c] = (uint32_t)clamp(size, 1, SONDE_BOX_SIDE);
+    double size = floor(high[c] / echo->cell_m) - echo->box_first[c] + 1, room = SONDE_BOX_CUBES;
+    echo->box_size[c] = (uint32_t)clamp(size, 1, floor(room / cubes));
+    if (size > echo->box_size[c]) ++echo->lost;
     cubes *= echo->box_size[c];
   }
-  memset(echo->seen, 0, (cubes + 63) / 64 * sizeof *echo->seen);
+  memset(echo->seen, 0, ((size_t)cubes + 63) / 64 * sizeof *echo->seen);
 }
 
 // True the first time in a frame; `place` counts along the box, x fastest.
@@ -100,7 +101,11 @@ static void visit(sonde_echo *echo, const probe *p, v4 first, v4 step, int count
     uint32_t place = ((uint32_t)at[2] * size[1] + (uint32_t)at[1]) * size[0] + (uint32_t)at[0];
     if (place == last) continue;
     last = place;
-    if (!find(echo, place) || echo->cell_count >= SONDE_MAX_CELLS) continue;
+    if (!find(echo, place)) continue;
+    if (echo->cell_count == SONDE_MAX_CELLS) {
+      ++echo->lost;
+      continue;
+    }
     ++echo->cell_count;
     const int32_t *corner = echo->box_first;
     const int32_t cell[3] = {corner[0] + at[0], corner[1] + at[1], corner[2] + at[2]};
@@ -150,14 +155,22 @@ static void visit_quad(sonde_echo *echo, uint32_t i, uint32_t j) {
     }
 }
 
+// Outside the leg nothing scatters: its depth there is negative.
+static bool has_tissue(const sonde_echo *echo, uint32_t i, uint32_t j) {
+  const float *depth = echo->plane + (size_t)PLANE_DEPTH * SONDE_PLANE_NODES;
+  const float *top = depth + j * SONDE_PLANE_COLUMNS + i, *low = top + SONDE_PLANE_COLUMNS;
+  return top[0] >= 0 || top[1] >= 0 || low[0] >= 0 || low[1] >= 0;
+}
+
 void sonde_echo_scatter(sonde_echo *echo) {
   SONDE_ASSERT(echo->per_cell % ECHO_ALIGN == 0 && echo->per_cell <= SONDE_POOL);
   SONDE_ASSERT(echo->per_piece % ECHO_ALIGN == 0 && echo->per_piece <= SONDE_LOOSE);
+  echo->cell_count = echo->moved = echo->lost = 0;
   clear_seen(echo);
   sonde_cubes_begin(echo);
-  echo->cell_count = echo->moved = 0;
   for (uint32_t j = 0; j + 1 < echo->plane_rows; ++j)
-    for (uint32_t i = 0; i + 1 < SONDE_PLANE_COLUMNS; ++i) visit_quad(echo, i, j);
+    for (uint32_t i = 0; i + 1 < SONDE_PLANE_COLUMNS; ++i)
+      if (has_tissue(echo, i, j)) visit_quad(echo, i, j);
   sonde_cubes_end(echo);
 }
 
@@ -166,7 +179,7 @@ void sonde_echo_scatter_points(sonde_echo *echo, const sonde_echo_point *points,
                                uint32_t tier) {
   const frame *f = &echo->frame;
   float x[ECHO_ALIGN], y[ECHO_ALIGN], z[ECHO_ALIGN], size[ECHO_ALIGN];
-  const splat_map one = {.m = {{0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, .count = ECHO_ALIGN};
+  const splat_map one = {.m = {{0, 0, 0, 1}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, .count = ECHO_ALIGN};
   splat_job job = sonde_echo_splat_job(echo);
   job.x = x, job.y = y, job.z = z, job.sign = size, job.map = &one, job.maps = 1;
   job.rows = sonde_tiers_limits(echo, tier);

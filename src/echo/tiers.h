@@ -8,8 +8,8 @@
 
 enum {
   MOST_TIERS = 256,
-  MOST_MAPS = 8 * SONDE_MAX_CELLS,
-  MOST_LUMENS = MOST_MAPS / 2,
+  MOST_MAPS = 3 * SONDE_MAX_CELLS, // of cubes near vessels eight, of others one
+  MOST_LUMENS = SONDE_MAX_CELLS,
   MOST_SEGMENTS = 256 * MOST_VESSELS,
   MAPS_AT_ONCE = 128,
 };

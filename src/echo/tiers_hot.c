@@ -80,7 +80,11 @@ void sonde_tiers_add_map(sonde_echo *echo, const splat_map *one) {
   sonde_tiers *t = echo->tiers;
   uint32_t tier;
   SONDE_ASSERT(one->count % ECHO_ALIGN == 0 && one->lumen + one->lumens <= t->lumens);
-  if (t->maps == MOST_MAPS || !tier_of(echo, reach_of(one), &tier)) return;
+  if (!tier_of(echo, reach_of(one), &tier)) return;
+  if (t->maps == MOST_MAPS) {
+    ++echo->lost;
+    return;
+  }
   t->map[t->maps] = *one;
   append(&t->tissue, t->next_map, tier, (int32_t)t->maps++);
 }
@@ -94,7 +98,11 @@ void sonde_tiers_add_segment(sonde_echo *echo, const blood_segment *segment) {
   sonde_tiers *t = echo->tiers;
   uint32_t tier;
   SONDE_ASSERT(segment->count > 0 && segment->solid < 1);
-  if (t->segments == MOST_SEGMENTS || !tier_of(echo, reach_of(&segment->map), &tier)) return;
+  if (!tier_of(echo, reach_of(&segment->map), &tier)) return;
+  if (t->segments == MOST_SEGMENTS) {
+    ++echo->lost;
+    return;
+  }
   t->segment[t->segments] = *segment;
   append(&t->blood, t->next_segment, tier, (int32_t)t->segments++);
 }

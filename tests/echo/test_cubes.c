@@ -100,9 +100,9 @@ static double energy(const laid *l) {
 // Three maps: inside the grid, over its border, and one with two lumina, the second with clot.
 static void lay_with(const char *set, laid *l) {
   const splat_map maps[] = {
-      {{{30, 0, 40}, {9, 0.5f, 2}, {-3, 1, 8}, {2, 1.5f, 4}}, 0, 256, 0, 0},
-      {{{60, 0.2f, 3}, {9, 0.5f, 2}, {-3, 1, 8}, {2, 1.5f, 4}}, 256, 128, 0, 0},
-      {{{20, -0.3f, 60}, {9, 0.5f, 2}, {-3, 1, 8}, {2, 1.5f, 4}}, 384, 128, 0, 2}};
+      {{{30, 0, 40, 1}, {9, 0.5f, 2}, {-3, 1, 8}, {2, 1.5f, 4}}, 0, 256, 0, 0},
+      {{{60, 0.2f, 3, 1}, {9, 0.5f, 2}, {-3, 1, 8}, {2, 1.5f, 4}}, 256, 128, 0, 0},
+      {{{20, -0.3f, 60, 1.5f}, {9, 0.5f, 2}, {-3, 1, 8}, {2, 1.5f, 4}}, 384, 128, 0, 2}};
   const splat_lumen lumen[] = {{{0.2f, 2, 0.1f, 0.3f}, {0, 0.4f, 3, 0.2f}, 1},
                                {{-0.7f, 2.2f, 0, 0}, {0.5f, 0, 0.3f, 2}, 0.2f}};
   const splat_job job = {.x = l->x,
