@@ -102,6 +102,7 @@ static void add_specular(sonde_echo *echo, uint32_t sample) {
 
 // Gain at a depth, dB. The slope is the operator's; the ceiling is the scanner's.
 double sonde_echo_compensation_db(const frame *f, double depth_m) {
+  SONDE_ASSERT(f != NULL && f->frequency_hz > 0 && depth_m >= 0);
   const double most = -least_signal_db - noise_db;
   double end_m = most / sonde_echo_default_tgc_db_per_m(f->frequency_hz);
   double down = clamp(turn_down_db_per_m * (depth_m - end_m), 0, turn_down_db);

@@ -9,11 +9,12 @@
 // beats_of           mean share of the pulse up to a time
 // travelled          way of the mean flow in a vessel
 // segment_map        one segment's lumen in image coordinates
-// sonde_blood_lay, outside_clot  scatterers on the streamlines of one segment
+// sonde_blood_lay, in_clot, outside_clot  scatterers on the streamlines of one segment
 // form_of            its map
 // flow               all segments of a vessel, which then wait for their tiers
 #include "base/base.h"
 #include "echo/tiers.h"
+#include "interior/clot.h"
 
 #include <string.h>
 
@@ -68,11 +69,19 @@ static double segment_map(const sonde_echo *echo, const sonde_vessel_state *low,
   return SONDE_PI * half_short * half_long * length;
 }
 
+// Whether a place of a segment lies in clot: coordinates in the segment's unit lumen.
+static bool in_clot(const blood_segment *s, float x, float y, float z) {
+  SONDE_ASSERT(s != NULL && fabsf(z) <= 1);
+  double along_m = (s->segment + 0.5 + (double)z) * segment_m;
+  double surface = sonde_clot_surface(s->vessel, along_m, 2 * (double)y);
+  return s->solid > 0 && -2 * (double)x > 1 - 2 * s->solid + surface;
+}
+
 // Drops the streamlines of a batch that clot fills.
-static uint32_t outside_clot(scatter_pool *some, uint32_t count, double solid) {
+static uint32_t outside_clot(const blood_segment *s, scatter_pool *some, uint32_t count) {
   uint32_t kept = 0;
   for (uint32_t i = 0; i < count; ++i) {
-    if (-2 * (double)some->x[i] > 1 - 2 * solid) continue;
+    if (in_clot(s, some->x[i], some->y[i], some->z[i])) continue;
     some->x[kept] = some->x[i], some->y[kept] = some->y[i];
     some->z[kept] = some->z[i], some->sign[kept++] = some->sign[i];
   }
@@ -91,7 +100,7 @@ void sonde_blood_lay(sonde_echo *echo, const blood_segment *s, splat_limits rows
     echo->kernels->stream(&job);
     memcpy(x, blood->x + i, kept * sizeof *x);
     memcpy(y, blood->y + i, kept * sizeof *y);
-    if (s->solid > 0) kept = outside_clot(&some, kept, s->solid);
+    if (s->solid > 0) kept = outside_clot(s, &some, kept);
     for (; kept % ECHO_ALIGN; ++kept) x[kept] = y[kept] = z[kept] = sign[kept] = 0;
     form.count = kept;
     if (kept > 0) sonde_echo_splat(echo, &some, &form, 1, NULL, rows);
@@ -99,9 +108,12 @@ void sonde_blood_lay(sonde_echo *echo, const blood_segment *s, splat_limits rows
 }
 
 // Streamlines of so many that clot leaves: as outside_clot() counts them.
-static uint32_t flowing(const sonde_echo *echo, uint32_t count, double solid) {
+static uint32_t flowing(const sonde_echo *echo, const blood_segment *s) {
+  SONDE_ASSERT(s->count <= SONDE_BLOOD);
+  const scatter_pool *blood = &echo->blood;
   uint32_t kept = 0;
-  for (uint32_t i = 0; i < count; ++i) kept += !(-2 * (double)echo->blood.x[i] > 1 - 2 * solid);
+  for (uint32_t i = 0; i < s->count; ++i)
+    kept += !in_clot(s, blood->x[i], blood->y[i], blood->z[i] - 0.5f);
   return kept;
 }
 
@@ -116,7 +128,7 @@ static bool form_of(const sonde_echo *echo, const map *m, splat_map *out) {
     for (int c = 0; c < 3; ++c) out->m[k][c] = (float)(v_coordinate(v, c) * unit[c]);
   }
   out->m[0][2] += (float)echo->pad_samples;
-  out->m[0][3] = 1;
+  out->m[0][3] = sqrtf(1 - sonde_clutter(echo) * sonde_clutter(echo));
   float reach = 0.5f * (fabsf(out->m[1][1]) + fabsf(out->m[2][1]) + fabsf(out->m[3][1]));
   return fabsf(out->m[0][1]) <= 1 + reach;
 }
@@ -139,9 +151,10 @@ static void flow(sonde_echo *echo, uint32_t which) {
     map m = {0};
     if (known && solid < 1) volume = segment_map(echo, &low, &high, &m);
     uint32_t count = (uint32_t)fmin(density * volume, SONDE_BLOOD);
-    blood_segment one = {.way = way, .solid = solid, .count = count, .salt = salt, .segment = k};
+    blood_segment one = {
+        .way = way, .solid = solid, .count = count, .salt = salt, .segment = k, .vessel = which};
     if (count == 0 || !form_of(echo, &m, &one.map)) continue;
-    uint32_t kept = solid > 0 ? flowing(echo, count, solid) : count;
+    uint32_t kept = solid > 0 ? flowing(echo, &one) : count;
     echo->bled += kept, echo->moved += kept;
     sonde_tiers_add_segment(echo, &one);
   }

@@ -2,7 +2,8 @@
 //
 // Every point goes where sonde_interior_displacement takes it, walls included. Per cube one affine
 // map takes its scatterers straight to lines and samples; close to a vessel eight maps per cube
-// follow its wall, from the carried middles of its eight pieces. The lumen is left to the blood.
+// follow its wall, from the carried middles of its eight pieces. The lumen belongs to the blood;
+// the tissue's scatterers are the clutter in it.
 //
 // sonde_cubes_begin  nodes, stations and units of a frame
 // bound_vessel       what a vessel can reach
@@ -125,7 +126,8 @@ static void find_wall(const sonde_echo *echo, cube *c, sonde_vec3 centre, uint32
   const uint32_t which = echo->shown[k];
   uint32_t i;
   double t;
-  if (!sonde_vessel_stations(in, which, v_dot(v_sub(centre, in->origin), in->axis), &i, &t)) return;
+  const double along_m = v_dot(v_sub(centre, in->origin), in->axis);
+  if (!sonde_vessel_stations(in, which, along_m, &i, &t)) return;
   const sonde_vessel_state *a = &in->state[which][i], *b = a + 1;
   sonde_vec3 middle = v_lerp(a->rest_centre_m, b->rest_centre_m, t);
   double radius = a->rest_radius_m + t * (b->rest_radius_m - a->rest_radius_m);
@@ -133,7 +135,7 @@ static void find_wall(const sonde_echo *echo, cube *c, sonde_vec3 centre, uint32
   c->close = c->close || distance < (which < 2 ? close_m : fmin(close_m, close_radii * radius));
   if (!(distance < reach_radii * radius + echo->cell_m)) return;
   double solid = sonde_echo_solid(echo, which, middle.z);
-  c->wall[c->walls++] = (cube_wall){k, i, (float)t, (float)solid};
+  c->wall[c->walls++] = (cube_wall){k, i, (float)t, (float)solid, along_m};
   bool still = a->area_ratio >= 1 && a->area_ratio <= 1 && b->area_ratio >= 1 && b->area_ratio <= 1;
   c->carried = c->carried || !still;
 }
@@ -260,9 +262,11 @@ static bool is_beyond(const float form[4]) {
   return fabsf(form[0]) > 1 + 0.5f * (fabsf(form[1]) + fabsf(form[2]) + fabsf(form[3]));
 }
 
-// The lumina that a cube touches, over its coordinates; solid clot belongs to the tissue.
+// The lumina that a cube touches, over its coordinates; solid clot belongs to the tissue. The fewer
+// the area, the denser the tissue's scatterers are in it: clutter keeps its power.
 static uint32_t find_lumina(const sonde_echo *echo, const cube *c, splat_lumen out[MOST_VESSELS]) {
   uint32_t found = 0;
+  const v4 along = v4_of(echo->interior->axis);
   for (uint32_t k = 0; k < c->walls; ++k) {
     const float(*w)[WALL_ROOM] = echo->cubes->wall[k];
     const uint32_t g = c->group;
@@ -274,7 +278,11 @@ static uint32_t find_lumina(const sonde_echo *echo, const cube *c, splat_lumen o
     splat_lumen *l = &out[found];
     *l = (splat_lumen){{dot3(d, flat), edge * flat[0], edge * flat[1], edge * flat[2]},
                        {dot3(d, across), edge * across[0], edge * across[1], edge * across[2]},
-                       1 - 2 * c->wall[k].solid};
+                       {(float)c->wall[k].along_m, (float)echo->cell_m * along[0],
+                        (float)echo->cell_m * along[1], (float)echo->cell_m * along[2]},
+                       c->wall[k].solid > 0 ? 1 - 2 * c->wall[k].solid : 1,
+                       sonde_clutter(echo) * sqrtf(fmaxf(1 - w[WALL_LOST][g], 0)),
+                       echo->shown[c->wall[k].vessel]};
     if (c->wall[k].solid < 1 && !is_beyond(l->along) && !is_beyond(l->across)) ++found;
   }
   return found;
@@ -290,9 +298,10 @@ static void add_lumina(sonde_echo *echo, splat_map *one, const splat_lumen *lume
                        v4 offset) {
   sonde_tiers *tiers = echo->tiers;
   for (uint32_t k = 0; k < count; ++k) {
-    splat_lumen l = {.chord = lumen[k].chord};
+    splat_lumen l = lumen[k];
     shift_form(lumen[k].along, offset, l.along);
     shift_form(lumen[k].across, offset, l.across);
+    shift_form(lumen[k].way, offset, l.way);
     if (is_beyond(l.along) || is_beyond(l.across)) continue;
     if (tiers->lumens == MOST_LUMENS) {
       ++echo->lost;
@@ -356,6 +365,7 @@ static void add_part(sonde_echo *echo, const splat_map *whole, uint32_t first, u
 // these depths does not change its speckle at once.
 static void add_share(sonde_echo *echo, const splat_map *whole, float row) {
   const uint32_t half = whole->count / 2, fourth = whole->count / 4;
+  SONDE_ASSERT(fourth % ECHO_ALIGN == 0 && half == 2 * fourth);
   double at = clamp((double)row / (echo->plane_rows - 1), 0, 1) * SONDE_SLAB_ROWS;
   double spare = echo->spare_octaves[(uint32_t)at];
   if (spare >= 2) {

@@ -26,6 +26,7 @@ typedef struct cube_wall {
   uint32_t vessel, station; // in view; before it
   float share;              // of the way to the next station
   float solid;              // share of the short axis that clot fills, from the far side
+  double along_m;           // of the cube's middle, as the stations count
 } cube_wall;
 
 typedef struct cube {

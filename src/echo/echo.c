@@ -81,6 +81,7 @@ static int by_value(const void *a, const void *b) {
 // of a layer one goes to the first quarter, one to the second, two to the half. Order of z is kept.
 static void fill_parts(sonde_echo *echo, uint32_t from, uint32_t to) {
   const scatter_pool *p = &echo->pool;
+  SONDE_ASSERT(echo->per_cell % 64 == 0 && from + echo->per_cell <= SONDE_POOL);
   const uint32_t quarter = echo->per_cell / 4;
   uint32_t end[3] = {to, to + quarter, to + 2 * quarter};
   for (uint32_t i = 0; i < echo->per_cell; ++i) {
@@ -156,6 +157,7 @@ static size_t carve(sonde_echo *echo, char *block) {
   CARVE(echo->loss, lines);
   CARVE(echo->gain, (most_lines / SONDE_FINE + ECHO_ALIGN) * SONDE_MEDIUM_ROWS);
   CARVE(echo->loss_db, lines);
+  CARVE(echo->tail, lines);
   CARVE(echo->coupling, lines);
   const double finest_m = least_depth_m / (double)(echo->samples - 1);
   CARVE(echo->grid,

@@ -106,6 +106,7 @@ struct sonde_echo {
   float *gain;     // [MEDIUM_ROWS][gain_stride] of the grid's even columns: beside the outer lines
                    // those go on
   float *loss_db;  // [padded] accumulated
+  float *tail;     // [padded] power that reverberates, kernel.h
   uint8_t *air;    // [padded]
   float *coupling; // [padded] share of the amplitude that passes the face, 0..1
   bool some_air;
@@ -180,6 +181,10 @@ void sonde_echo_splat(sonde_echo *echo, const scatter_pool *pool, const splat_ma
                       uint32_t maps, const splat_lumen *lumen, splat_limits rows);
 // What the jobs of all of them have in common.
 splat_job sonde_echo_splat_job(sonde_echo *echo);
+
+// Share of the amplitude in a lumen that is clutter and moves with the tissue; the blood has the
+// rest of the power. Measurements without texture are without clutter.
+static inline float sonde_clutter(const sonde_echo *echo) { return echo->plain ? 0 : 0.7f; }
 
 static const float sonde_white_db = 40; // white over the rms of muscle speckle
 // Speed of sound that the scanner assumes, m/s.

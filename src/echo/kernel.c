@@ -3,7 +3,7 @@
 // splat      scatterers through affine maps onto two columns and three samples each, carrier phase
 //            included
 // splat_some those of one map, with or without checks at the grid's border
-// in_lumina  which of them belong to the blood
+// in_lumina  how much of them shows in the lumina
 // make_parcel, lay_batch, lay_rest  those within the slab, closed up
 // lay, lay_one  one vector of them, in order
 // stream     blood along its streamlines
@@ -14,7 +14,7 @@
 // carry, tissue  in kernel_carry.h, kernel_tissue.h
 // merge      a row of the grid, times its gain, to even and odd columns
 // widen, mix rows of the coarse plane, per line and between two
-// fade       attenuation of a row
+// fade       attenuation and clutter of a row
 // convert    bilinear scan conversion of one row of pixels
 #include "echo/kernel_vector.h"
 
@@ -22,16 +22,6 @@
 #include "echo/kernel.h"
 #include "echo/kernel_carry.h"
 #include "echo/kernel_tissue.h"
-
-// cos and sin of 2 pi t for t >= 0, error 3e-4.
-INLINE void turn(vf t, vf *c, vf *s) {
-  vf f = t - real(whole(t + 0.5f)), u = f * f;
-  *c = 0.9999590208378121f +
-       u * (-19.73094236686188f +
-            u * (64.6714417761651f + u * (-82.39080631177367f + u * 45.62105110286211f)));
-  *s = f * (6.282137314937016f +
-            u * (-41.205783568541634f + u * (78.82674122450844f + u * -58.13524213160963f)));
-}
 
 // A vector of scatterers: what each adds to its two columns, where, and the shares of the samples
 // above and below; the nearest one gets the rest: a quadratic spline.
@@ -112,16 +102,21 @@ INLINE void lay_rest(const splat_job *job, flock *f) {
     lay_one(job->grid, job->stride, &batch[whole_ones], (int)(i % W));
 }
 
-// Lanes whose place at rest is in a lumen.
-INLINE vi in_lumina(const splat_job *job, const splat_map *map, vf x, vf y, vf z) {
-  vi in = all_of(0);
+// Amplitude at places at rest: lumina show less of the tissue's scatterers.
+INLINE vf in_lumina(const splat_job *job, const splat_map *map, vf x, vf y, vf z) {
+  vf size = all(1);
   for (const splat_lumen *l = job->lumen + map->lumen; l < job->lumen + map->lumen + map->lumens;
        ++l) {
     vf a = l->along[0] + l->along[1] * x + l->along[2] * y + l->along[3] * z;
     vf b = l->across[0] + l->across[1] * x + l->across[2] * y + l->across[3] * z;
-    in |= (a * a + b * b < 1) & (a >= -l->chord);
+    vi in = a * a + b * b < 1;
+    if (l->chord < 1) {
+      vf way = l->way[0] + l->way[1] * x + l->way[2] * y + l->way[3] * z;
+      in = in & (a >= -l->chord - clot_surface(l->vessel, way, b));
+    }
+    size = pick(in, all(l->amplitude), size);
   }
-  return in;
+  return size;
 }
 
 INLINE void splat_some(const splat_job *job, const splat_map *map, bool inside, flock *f) {
@@ -142,9 +137,10 @@ INLINE void splat_some(const splat_job *job, const splat_map *map, bool inside, 
       vf row = depth + 0.5f; // as in make_parcel
       in = in & (line >= 0) & (line < right) & (row >= rows.first) & (row < rows.last);
     }
-    if (map->lumens) in = in & ~in_lumina(job, map, x, y, z);
-    f->count += pack(in, line, f->line + f->count, depth, f->depth + f->count,
-                     load(sign + i) * height * amplitude, f->weight + f->count);
+    vf weight = load(sign + i) * height * amplitude;
+    if (map->lumens) weight = weight * in_lumina(job, map, x, y, z);
+    f->count += pack(in, line, f->line + f->count, depth, f->depth + f->count, weight,
+                     f->weight + f->count);
     if (f->count >= FLOCK) lay_batch(job, f);
   }
 }
@@ -454,12 +450,15 @@ static void widen(const widen_job *job) {
   }
 }
 
-// What is left of the scattered amplitude behind the losses.
-static void fade(const float *scatter, const float *loss_db, float *gain, uint32_t lines) {
-  SONDE_ASSERT(lines % ECHO_ALIGN == 0);
-  for (uint32_t l = 0; l < lines; l += W) {
-    vf loss = smaller(load(loss_db + l), all(600));
-    store(gain + l, load(scatter + l) * power2(loss * -0.16609640474f));
+// What is left of the scattered amplitude behind the losses, and the clutter beside it.
+static void fade(const fade_job *job) {
+  SONDE_ASSERT(job->lines % ECHO_ALIGN == 0);
+  SONDE_ASSERT(job->clutter >= 0 && job->kept <= 1);
+  for (uint32_t l = 0; l < job->lines; l += W) {
+    vf loss = smaller(load(job->loss_db + l), all(600)), tail = load(job->tail + l);
+    vf own = load(job->scatter + l) * power2(loss * -0.16609640474f), power = own * own;
+    store(job->gain + l, root(power + job->clutter * tail));
+    store(job->tail + l, job->kept * (tail + job->fresh * (power - tail)));
   }
 }
 

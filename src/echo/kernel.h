@@ -12,7 +12,7 @@ enum {
   SONDE_MOST_LINES = 512,
   ECHO_ALIGN = 16,  // lines and batches are padded to whole vectors
   LAYER_LEVELS = 4, // skin, dermis, fascia, cortex; the vessels' walls and the lesions follow
-  TEXTURES = 13,    // one more than the last texture's salt
+  TEXTURES = 14,    // one more than the last texture's salt
   KNOT_FLOATS = 11, // that a texture remembers per line
   MOST_LEVELS = LAYER_LEVELS + MOST_VESSELS + MOST_LESIONS,
   RING_PLANES = 2 * SONDE_RANK,
@@ -20,10 +20,13 @@ enum {
   AXIAL_MOST = 4, // samples summed at once
 };
 
-// A lumen over one map: forms of its scatterers' coordinates, 1 on the wall at rest. Clot fills
-// what lies beyond a chord on the far side.
+// A lumen over one map: forms of its scatterers' coordinates, 1 on the wall at rest, and of the way
+// along the vessel, m. A mural clot fills what lies beyond its free surface on the far side.
 typedef struct splat_lumen {
-  float along[4], across[4], chord;
+  float along[4], across[4], way[4];
+  float chord;     // of the clot's share, in radii; 1: no clot
+  float amplitude; // of the scatterers in the lumen: what clutter shows of them
+  uint32_t vessel; // whose clot it is
 } splat_lumen;
 
 // Scatterers of one affine map: (column, elevation over its reach, sample) =
@@ -31,7 +34,7 @@ typedef struct splat_lumen {
 typedef struct splat_map {
   float m[4][4];        // m[0][3] is the amplitude of the scatterers, the others' last are not used
   uint32_t from, count; // scatterers; the count is a multiple of ECHO_ALIGN
-  uint32_t lumen, lumens; // first and number of those that it leaves empty
+  uint32_t lumen, lumens; // first and number of those that it reaches into
 } splat_map;
 
 // Rows that scatterers may be nearest to: first <= row < last.
@@ -131,6 +134,9 @@ typedef struct axial_job {
 // What a vessel in view is made of.
 typedef struct tissue_vessel {
   float wall_m, clot_fraction, clot_scatter;
+  float clot_loss;           // dB/m/MHz one way
+  float lumps_db, layers_db; // unevenness of the clot
+  uint32_t number;           // among the leg's vessels
 } tissue_vessel;
 
 typedef enum tissue_lesion_kind { TISSUE_NODE, TISSUE_CYST, TISSUE_HAEMATOMA } tissue_lesion_kind;
@@ -167,6 +173,16 @@ typedef struct tissue_job {
   uint8_t *crossed;      // [lines / ECHO_ALIGN] whether any sign of these lines changed
 } tissue_job;
 
+// Gain of a row of the march: what scatters there and is left behind the losses, and clutter.
+typedef struct fade_job {
+  const float *scatter, *loss_db; // [lines]
+  float *tail;       // [lines] power that reverberates above this row; moves on to the next
+  float *gain;       // [lines] amplitude
+  float clutter;     // share of the power that comes late
+  float fresh, kept; // of the tail per row: what joins it, what the way leaves of it
+  uint32_t lines;    // multiple of ECHO_ALIGN
+} fade_job;
+
 // A row of pixels from [samples][lines] grey values.
 typedef struct convert_job {
   const float *grey;
@@ -190,7 +206,7 @@ typedef struct echo_kernels {
   void (*widen)(const widen_job *job);
   // out = top + share (low - top); count is a multiple of ECHO_ALIGN
   void (*mix)(const float *top, const float *low, float share, float *out, uint32_t count);
-  void (*fade)(const float *scatter, const float *loss_db, float *gain, uint32_t lines);
+  void (*fade)(const fade_job *job);
   void (*convert)(const convert_job *job);
 } echo_kernels;
 

@@ -4,15 +4,19 @@
 // splat, carry, stream, lateral, axial (sample by sample), merge, widen, mix, fade, convert
 #include "base/base.h"
 #include "echo/kernel.h"
+#include "interior/clot.h"
 #include "interior/interior.h"
 
 #include <math.h>
 
+static double form_at(const float form[4], double x, double y, double z) {
+  return (double)form[0] + (double)form[1] * x + (double)form[2] * y + (double)form[3] * z;
+}
+
 static bool in_lumen(const splat_lumen *l, double x, double y, double z) {
-  const float *p = l->along, *q = l->across;
-  double a = (double)p[0] + (double)p[1] * x + (double)p[2] * y + (double)p[3] * z;
-  double b = (double)q[0] + (double)q[1] * x + (double)q[2] * y + (double)q[3] * z;
-  return a * a + b * b < 1 && a >= -(double)l->chord;
+  double a = form_at(l->along, x, y, z), b = form_at(l->across, x, y, z), chord = (double)l->chord;
+  if (chord < 1) chord += sonde_clot_surface(l->vessel, form_at(l->way, x, y, z), b);
+  return a * a + b * b < 1 && a >= -chord;
 }
 
 static void lay_point(const splat_job *job, const double at[3], double sign) {
@@ -36,13 +40,15 @@ static void splat(const splat_job *job) {
   for (const splat_map *map = job->map; map < job->map + job->maps; ++map)
     for (uint32_t i = map->from; i < map->from + map->count; ++i) {
       double x = (double)job->x[i], y = (double)job->y[i], z = (double)job->z[i], at[3];
-      bool empty = false;
-      for (uint32_t k = 0; k < map->lumens; ++k)
-        empty = empty || in_lumen(&job->lumen[map->lumen + k], x, y, z);
+      double size = (double)job->sign[i] * (double)map->m[0][3], shown = 1;
+      for (uint32_t k = 0; k < map->lumens; ++k) {
+        const splat_lumen *l = &job->lumen[map->lumen + k];
+        if (in_lumen(l, x, y, z)) shown = (double)l->amplitude;
+      }
       for (int c = 0; c < 3; ++c)
         at[c] = (double)map->m[0][c] + (double)map->m[1][c] * x + (double)map->m[2][c] * y +
                 (double)map->m[3][c] * z;
-      if (!empty) lay_point(job, at, (double)job->sign[i] * (double)map->m[0][3]);
+      lay_point(job, at, size * shown);
     }
 }
 
@@ -162,9 +168,13 @@ static void mix(const float *top, const float *low, float share, float *out, uin
   for (uint32_t i = 0; i < count; ++i) out[i] = top[i] + share * (low[i] - top[i]);
 }
 
-static void fade(const float *scatter, const float *loss_db, float *gain, uint32_t lines) {
-  for (uint32_t l = 0; l < lines; ++l)
-    gain[l] = (float)((double)scatter[l] * pow(10, -fmin((double)loss_db[l], 600) / 20));
+static void fade(const fade_job *job) {
+  for (uint32_t l = 0; l < job->lines; ++l) {
+    double own = (double)job->scatter[l] * pow(10, -fmin((double)job->loss_db[l], 600) / 20);
+    double power = own * own, tail = (double)job->tail[l];
+    job->gain[l] = (float)sqrt(power + (double)job->clutter * tail);
+    job->tail[l] = (float)((double)job->kept * (tail + (double)job->fresh * (power - tail)));
+  }
 }
 
 // Grey value between four samples.

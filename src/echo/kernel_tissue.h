@@ -3,6 +3,7 @@
 //
 // wall_distance        signed distance to a vessel's inner wall
 // lesion_distance, lesion  node, cyst, haematoma
+// clot_surface, clot_grain  a clot's free surface and unevenness
 // vessels            walls, lumina, clots
 // layers             skin, fat, muscle
 // paint              one vector of lines
@@ -11,12 +12,13 @@
 
 #include "echo/kernel.h"
 #include "echo/kernel_texture.h"
+#include "interior/clot.h"
 
 // Backscatter over muscle (amplitude) and attenuation (dB/m/MHz one way); docs/echo.md.
 static const float skin_tissue[2] = {2.2f, 100}, fat_tissue[2] = {0.40f, 50},
                    muscle_tissue[2] = {0.85f, 100}, wall_tissue[2] = {1.9f, 110},
-                   blood_tissue[2] = {0.006f, 18}, bone_tissue[2] = {0.02f, 200};
-static const float clot_loss = 45, outside_loss = 0.2f;
+                   blood_tissue[2] = {0.06f, 18}, bone_tissue[2] = {0.02f, 200};
+static const float outside_loss = 0.2f;
 static const float node_loss = 60, haematoma_loss = 45, fluid_tissue[2] = {0.006f, 5};
 static const float capsule_m = 0.3e-3f, capsule_scatter = 1.4f, hilum_scatter = 1.2f;
 
@@ -29,6 +31,25 @@ INLINE vf wall_distance(vf a, vf b, vf half_a, vf half_b) {
   vf beyond = (size_of(b) - 1) * half_b; // bounds the estimate beside a flat ellipse's tips
   distance = pick((beyond > 0) & (beyond > distance), beyond, distance);
   return pick(square > 400, all(1), distance);
+}
+
+// sonde_clot_surface() for a vector of places.
+INLINE vf clot_surface(uint32_t vessel, vf along, vf across) {
+  vf sum = clot_bend * (clot_level - across * across), c, s;
+  for (uint32_t k = 0; k < CLOT_WAVES; ++k) {
+    const clot_wave *w = &clot_waves[k];
+    vf turns = w->across * across + w->per_m * along + sonde_clot_start(vessel, k);
+    turn(turns - below(turns), &c, &s);
+    sum += w->height * c;
+  }
+  return sum;
+}
+
+// Unevenness of a clot, dB: lumps of 2 mm and finer grain, and the layers in which it grew.
+INLINE vf clot_grain(const tissue_vessel *it, knots *memory, vf theta, vf s, vf depth, vf inward) {
+  vf lump = texture(memory, theta, s * 400, depth * 600, 4 * TURNS_MUSCLE, 13);
+  vf layer = sheet(inward * 2.2f + 0.6f * lump, 0.6f);
+  return it->lumps_db * lump + it->layers_db * (layer - 0.3f);
 }
 
 INLINE void mark(vi mask, vf scatter, float loss, vf out[2]) {
@@ -113,14 +134,19 @@ INLINE void vessels(const tissue_job *job, knots *memory, const float *f, const 
     if (!(it->clot_fraction > 0)) continue;
     const float *at = f + vessel_field_at(v, VESSEL_SHORT) * n;
     vi clot = (level[v] <= 0) & (load(at + VESSEL_CLOT * n) >= 0.5f);
-    // Chord that bounds a mural clot on the deep side, in semi-axes.
-    if (it->clot_fraction < 1) clot &= -load(at) > 1 - 2 * it->clot_fraction;
+    vf theta = load(f + PLANE_THETA * n), s = load(f + PLANE_S * n),
+       depth = load(f + PLANE_DEPTH * n);
+    if (!any(clot)) continue;
+    if (it->clot_fraction < 1)
+      clot &= -load(at) > 1 - 2 * it->clot_fraction + clot_surface(it->number, s, load(at + n));
     vf scatter = all(it->clot_scatter);
+    if (!job->plain)
+      scatter =
+          scatter * power2(clot_grain(it, memory, theta, s, depth, load(at)) * 0.16609640474f);
     if (v == 0 && job->webs > 0 && any(clot))
-      scatter = scatter * (1 - 0.6f * job->webs) +
-                job->webs * webs(memory, load(f + PLANE_THETA * n), load(f + PLANE_S * n),
-                                 load(f + PLANE_DEPTH * n), load(at));
-    mark(clot, scatter, clot_loss, out);
+      scatter =
+          scatter * (1 - 0.6f * job->webs) + job->webs * webs(memory, theta, s, depth, load(at));
+    mark(clot, scatter, it->clot_loss, out);
   }
 }
 

@@ -9,7 +9,7 @@
 // materials          of what is in view
 // mark_air           lines whose face does not touch the skin
 // store_gain         of a row
-// blur_loss          an aperture looks past small obstacles
+// blur               an aperture looks past small obstacles
 #include "base/base.h"
 #include "base/random.h"
 #include "echo/echo.h"
@@ -17,6 +17,9 @@
 #include <string.h>
 
 static const float air_gap_m = 2e-3f;
+// Clutter: echoes that come late after several ways between the layers above, and side lobes. Its
+// power over that of the tissue above, and the depth over which it fades.
+static const float clutter_power = 0.02f, clutter_m = 5e-3f;
 
 // Echo of an interface over the rms of muscle speckle: decibels at normal incidence, the angle's
 // tangent at which the specular part has fallen by 1/e, the diffuse share that stays, and what the
@@ -182,23 +185,24 @@ static void mark_air(sonde_echo *echo) {
   }
 }
 
-// The aperture looks past small obstacles: what a line has lost mixes with its neighbours'. Lines
-// in air send nothing and take no part.
-static void blur_loss(sonde_echo *echo) {
+// The aperture looks past small obstacles: what a line has lost, and what reverberates in it, mixes
+// with its neighbours'. Lines in air send nothing and take no part.
+static void blur(const sonde_echo *echo, float *value) {
   const uint8_t *air = echo->air;
-  float *loss = echo->loss_db, out[SONDE_MOST_LINES];
+  float out[SONDE_MOST_LINES];
   uint32_t last = echo->lines - 1;
+  SONDE_ASSERT(value != NULL && last >= 1 && last < SONDE_MOST_LINES);
   if (!echo->some_air) {
     for (uint32_t l = 1; l < last; ++l)
-      out[l] = loss[l] + 0.15f * (loss[l - 1] - 2 * loss[l] + loss[l + 1]);
+      out[l] = value[l] + 0.15f * (value[l - 1] - 2 * value[l] + value[l + 1]);
   } else {
     for (uint32_t l = 1; l < last; ++l) {
-      float here = loss[l], left = air[l - 1] ? here : loss[l - 1];
-      float right = air[l + 1] ? here : loss[l + 1];
+      float here = value[l], left = air[l - 1] ? here : value[l - 1];
+      float right = air[l + 1] ? here : value[l + 1];
       out[l] = here + 0.15f * (left - 2 * here + right);
     }
   }
-  memcpy(loss + 1, out + 1, (last - 1) * sizeof *loss);
+  memcpy(value + 1, out + 1, (last - 1) * sizeof *value);
 }
 
 // Beside the outer lines those go on.
@@ -206,13 +210,35 @@ static void store_gain(sonde_echo *echo, uint32_t row) {
   float *gain = echo->gain + (size_t)row * echo->gain_stride;
   const uint32_t first = echo->pad_lines / SONDE_FINE, last = first + echo->lines - 1;
   SONDE_ASSERT(first + echo->padded <= echo->gain_stride);
-  echo->kernels->fade(echo->scatter, echo->loss_db, gain + first, echo->padded);
+  const float dz = (float)(echo->frame.depth_m / (SONDE_MEDIUM_ROWS - 1));
+  const fade_job job = {
+      .scatter = echo->scatter,
+      .loss_db = echo->loss_db,
+      .tail = echo->tail,
+      .gain = gain + first,
+      .clutter = echo->plain ? 0 : clutter_power,
+      .fresh = 1 - expf(-dz / clutter_m),
+      .kept =
+          expf(-0.2302585f * dz * (float)sonde_echo_default_tgc_db_per_m(echo->frame.frequency_hz)),
+      .lines = echo->padded};
+  echo->kernels->fade(&job);
   for (uint32_t l = 0; l < first; ++l) gain[l] = gain[first];
   for (uint32_t l = last + 1; l < echo->gain_stride; ++l) gain[l] = gain[last];
 }
 
-static float clot_scatter(const sonde_pathology *p) {
-  return 0.12f + 0.9f * (float)p->echogenicity;
+// A fresh clot (echogenicity 0.25) scatters as blood does and is as even; old ones are brighter,
+// with lumps and layers.
+static tissue_vessel vessel_of(const sonde_pathology *p, uint32_t which, float wall_m_here,
+                               bool vein) {
+  const float fresh = 0.25f, fresh_db = -24.4f, db_per_echogenicity = 24;
+  float more = (float)p->echogenicity - fresh, age = fminf(fmaxf(more / 0.7f, 0), 1);
+  return (tissue_vessel){.wall_m = wall_m_here,
+                         .clot_fraction = vein ? (float)p->thrombus_fraction : 0,
+                         .clot_scatter = amplitude_of_db(fresh_db + db_per_echogenicity * more),
+                         .clot_loss = 18 + 40 * age,
+                         .lumps_db = 1.5f + 4 * age,
+                         .layers_db = 8 * age,
+                         .number = which};
 }
 
 static void materials(const sonde_echo *echo, tissue_job *job) {
@@ -225,7 +251,7 @@ static void materials(const sonde_echo *echo, tissue_job *job) {
     bool vein = in->kind[which] == SONDE_VESSEL_VEIN;
     float wall = wall_m[in->kind[which]];
     if (which >= 2) wall = fminf(wall, thin_wall * (float)in->station[which][0].radius_m);
-    job->vessel[k] = (tissue_vessel){wall, vein ? (float)p->thrombus_fraction : 0, clot_scatter(p)};
+    job->vessel[k] = vessel_of(p, which, wall, vein);
   }
   for (uint32_t k = 0; k < job->lesions; ++k) {
     const sonde_lesion *l = &in->findings.lesion[echo->lesion[k]];
@@ -252,6 +278,7 @@ void sonde_echo_medium(sonde_echo *echo) {
                     .crossed = crossed};
   materials(echo, &job);
   memset(echo->loss_db, 0, lines * sizeof *echo->loss_db);
+  memset(echo->tail, 0, lines * sizeof *echo->tail);
   echo->echo_count = 0;
   place_lines(echo);
   for (uint32_t n = 0; n < echo->samples; ++n) echo->first_echo[n] = -1;
@@ -260,7 +287,8 @@ void sonde_echo_medium(sonde_echo *echo) {
     job.level = echo->level[row % 2], job.before = echo->level[(row + 1) % 2];
     echo->kernels->tissue(&job);
     if (row == 0) mark_air(echo);
-    blur_loss(echo);
+    blur(echo, echo->loss_db);
+    blur(echo, echo->tail);
     if (row > 0) cross_levels(echo, row, crossed);
     for (uint32_t l = 0; l < lines && echo->some_air; ++l)
       if (echo->air[l]) echo->scatter[l] = 0;

@@ -104,6 +104,7 @@ static void take_beam(sonde_echo *echo, const beam_key *key) {
 static void measure_slab(sonde_echo *echo) {
   const frame *f = &echo->frame;
   const beam_psf *psf = echo->psf;
+  SONDE_ASSERT(psf->step == SONDE_PSF_STEPS && echo->cell_m > 0);
   const double density = echo->per_cell / (echo->cell_m * echo->cell_m * echo->cell_m);
   const sonde_array array = sonde_beam_array(&psf->key);
   const double along = 1.0645 * array.pulse_wavelengths * f->wavelength_m;

@@ -157,6 +157,7 @@ static void visit_quad(sonde_echo *echo, uint32_t i, uint32_t j) {
 
 // Outside the leg nothing scatters: its depth there is negative.
 static bool has_tissue(const sonde_echo *echo, uint32_t i, uint32_t j) {
+  SONDE_ASSERT(i + 1 < SONDE_PLANE_COLUMNS && j + 1 < echo->plane_rows);
   const float *depth = echo->plane + (size_t)PLANE_DEPTH * SONDE_PLANE_NODES;
   const float *top = depth + j * SONDE_PLANE_COLUMNS + i, *low = top + SONDE_PLANE_COLUMNS;
   return top[0] >= 0 || top[1] >= 0 || low[0] >= 0 || low[1] >= 0;

@@ -20,7 +20,7 @@ typedef struct blood_segment {
   double way;     // of the mean flow, in segments
   double solid;   // share of the short axis that clot fills, from the far side
   uint32_t count; // streamlines
-  uint32_t salt;
+  uint32_t salt, vessel;
   int32_t segment;
 } blood_segment;
 

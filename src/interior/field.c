@@ -18,6 +18,7 @@
 // sonde_interior_locate        column coordinates and layers
 // sonde_interior_label         tissue
 #include "base/base.h"
+#include "interior/clot.h"
 #include "interior/interior.h"
 #include "interior/window.h"
 
@@ -210,12 +211,14 @@ sonde_vec3 sonde_interior_invert(const sonde_interior *in, sonde_vec3 point, son
   return best;
 }
 
-// A mural clot fills the deep side of the lumen up to the chord that bounds its share.
-static sonde_label lumen_label(const sonde_interior *in, uint32_t which, sonde_vec3 rest,
-                               double deep) {
+// A mural clot fills the deep side of the lumen up to its free surface.
+static sonde_label lumen_label(const sonde_interior *in, uint32_t which, sonde_vec3 rest, double s,
+                               double deep, double across) {
   if (in->kind[which] == SONDE_VESSEL_ARTERY) return SONDE_LABEL_ARTERY;
   const sonde_pathology *p = &in->pathology[which];
-  bool clot = sonde_pathology_clot(p, rest.z) && deep > 1 - 2 * p->thrombus_fraction;
+  const double fraction = p->thrombus_fraction;
+  bool clot = sonde_pathology_clot(p, rest.z) && fraction > 0;
+  if (clot && fraction < 1) clot = deep > 1 - 2 * fraction + sonde_clot_surface(which, s, across);
   return clot ? SONDE_LABEL_THROMBUS : SONDE_LABEL_VEIN;
 }
 
@@ -234,7 +237,8 @@ static sonde_label vessel_label(const sonde_interior *in, sonde_vec3 rest, doubl
     if (which >= 2) thick = fmin(thick, wall_share * v.rest_radius_m);
     if (r > v.rest_radius_m + thick) continue;
     if (r <= v.rest_radius_m)
-      return lumen_label(in, which, rest, -v_dot(d, v.flat_axis) / v.rest_radius_m);
+      return lumen_label(in, which, rest, s, -v_dot(d, v.flat_axis) / v.rest_radius_m,
+                         v_dot(d, v_cross(v.axis, v.flat_axis)) / v.rest_radius_m);
     if (wall != SONDE_LABEL_COUNT) continue;
     wall = in->kind[which] == SONDE_VESSEL_ARTERY ? SONDE_LABEL_ARTERY_WALL : SONDE_LABEL_VEIN_WALL;
   }

@@ -42,8 +42,8 @@ static double likeness(const bench *b, const float *before, double x, double z, 
 
 static const double vein_z = 0.015; // the face is 3 mm below the skin
 
-// From one frame to the next at 30 Hz nothing of the blood's speckle is left, everything of the
-// muscle's; the same time gives the same picture.
+// From one frame to the next at 30 Hz nothing of the blood's speckle is left, of that in the lumen
+// the clutter, everything of the muscle's; the same time gives the same picture.
 static void blood_moves_muscle_stays(void **state) {
   (void)state;
   bench b;
@@ -61,7 +61,7 @@ static void blood_moves_muscle_stays(void **state) {
   }
   print_message("vein %.3f, artery %.3f alike after a frame\n", vein, artery);
   assert_true(same == 1 || fabs(same - 1) < 1e-12);
-  assert_true(vein < 0.2 && artery < 0.2);
+  assert_true(vein < 0.4 && artery < 0.4); // clutter is half of the power
   sonde_free(before);
   bench_clear(&b);
 }
@@ -71,7 +71,7 @@ static void blood_moves_muscle_stays(void **state) {
 static void profile_is_parabolic(void **state) {
   (void)state;
   bench b;
-  bench_create(&b, leg_radius, 0.014, 0.012, false, true);
+  bench_create(&b, leg_radius, 0.014, 0.012, true, true); // blood without clutter
   b.settings.focus_m = vein_z;
   sonde_mat3 along = m_columns(vec3(0, 0, 1), vec3(-1, 0, 0), vec3(0, -1, 0));
   b.pose.rotation = q_from_matrix(along);

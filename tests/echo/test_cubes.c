@@ -1,5 +1,6 @@
 // Cubes of tissue on their way into the grid: their maps against the field, the kernels behind them
 // against each other and against the scalar twin.
+#include "interior/clot.h"
 #include "base/random.h"
 #include "echo/bench.h"
 #include "echo/cubes.h"
@@ -103,8 +104,9 @@ static void lay_with(const char *set, laid *l) {
       {{{30, 0, 40, 1}, {9, 0.5f, 2}, {-3, 1, 8}, {2, 1.5f, 4}}, 0, 256, 0, 0},
       {{{60, 0.2f, 3, 1}, {9, 0.5f, 2}, {-3, 1, 8}, {2, 1.5f, 4}}, 256, 128, 0, 0},
       {{{20, -0.3f, 60, 1.5f}, {9, 0.5f, 2}, {-3, 1, 8}, {2, 1.5f, 4}}, 384, 128, 0, 2}};
-  const splat_lumen lumen[] = {{{0.2f, 2, 0.1f, 0.3f}, {0, 0.4f, 3, 0.2f}, 1},
-                               {{-0.7f, 2.2f, 0, 0}, {0.5f, 0, 0.3f, 2}, 0.2f}};
+  const splat_lumen lumen[] = {
+      {{0.2f, 2, 0.1f, 0.3f}, {0, 0.4f, 3, 0.2f}, {0}, 1, 0, 0},
+      {{-0.7f, 2.2f, 0, 0}, {0.5f, 0, 0.3f, 2}, {0.1f, 0, 0, 2e-3f}, 0.2f, 0, 1}};
   const splat_job job = {.x = l->x,
                          .y = l->y,
                          .z = l->z,
@@ -150,7 +152,8 @@ static void maps_are_laid_alike(void **state) {
   for (uint32_t i = 384; i < POINTS; ++i) { // of the third map
     double x = (double)l->x[i], y = (double)l->y[i], z = (double)l->z[i];
     if (!in_lumen(0.2 + 2 * x + 0.1 * y + 0.3 * z, 0.4 * x + 3 * y + 0.2 * z, 1) &&
-        !in_lumen(-0.7 + 2.2 * x, 0.5 + 0.3 * y + 2 * z, 0.2))
+        !in_lumen(-0.7 + 2.2 * x, 0.5 + 0.3 * y + 2 * z,
+                  0.2 + sonde_clot_surface(1, 0.1 + 2e-3 * z, 0.5 + 0.3 * y + 2 * z)))
       continue;
     for (int k = 0; k < SETS; ++k) l[k].sign[i] = 0;
     ++inside;
