@@ -21,6 +21,9 @@ extern const sonde_input_limits sonde_limits_yaml, sonde_limits_json, sonde_limi
 // such as pixels that are packed.
 #define SONDE_MOST_UNPACKED_BYTES ((uint64_t)8 << 30)
 
+// A body of a file reaches no farther from its origin; more is a wrong unit.
+#define SONDE_FARTHEST_M 1e4
+
 // Reads a whole file within the limits as sonde_file_load(); a longer one, or a stream that does
 // not end, is refused after at most most_bytes. @thread owner
 // @return FORMAT naming the limit; IO

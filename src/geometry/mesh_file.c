@@ -59,9 +59,10 @@ sonde_status sonde_mesh_load(const char *path, double metres_per_unit, sonde_mes
   if (!status && !builder.mesh.face_count)
     status = sonde_fail(error, SONDE_FORMAT, "%s: expected at least one face, found none", path);
   for (uint32_t v = 0; v < builder.mesh.vertex_count && !status; ++v)
-    if (!v_finite(builder.mesh.vertices[v]))
-      status =
-          sonde_fail(error, SONDE_FORMAT, "%s: vertex %u is out of the range of numbers", path, v);
+    if (!(v_norm(builder.mesh.vertices[v]) <= SONDE_FARTHEST_M))
+      status = sonde_fail(error, SONDE_FORMAT,
+                          "%s: vertex %u lies %.3g m from the origin, expected at most %g", path, v,
+                          v_norm(builder.mesh.vertices[v]), SONDE_FARTHEST_M);
   if (!status)
     *mesh = builder.mesh;
   else

@@ -73,6 +73,8 @@ static sonde_status read_nodes(text *t, double unit_m, tetrahedra *tets, sonde_e
     if (index != tets->first + i || tets->first > 1) return wrong(t, "nodes in order", error);
     if (!next_number(t, &x) || !next_number(t, &y) || !next_number(t, &z))
       return wrong(t, "three coordinates", error);
+    if (!(fmax(fabs(x), fmax(fabs(y), fabs(z))) * unit_m <= SONDE_FARTHEST_M))
+      return wrong(t, "three coordinates within 10 km", error);
     tets->node[i] = v_scale(vec3(x, y, z), unit_m);
     skip_line(t);
   }

@@ -126,13 +126,14 @@ static void test_bad_meshes(void **unused) {
   unlink(path);
 }
 
+#define NODES "# two tetrahedra\n5 3 0 0\n1 0 0 0\n2 10 0 0\n3 0 10 0\n4 0 0 10\n5 10 10 10\n"
+
 // A tetrahedron of TetGen: six springs, a quarter of the mass per corner, an outward skin.
 static void test_tetrahedra_of_a_file(void **unused) {
   (void)unused;
   char directory[] = "/tmp/sonde_tet_XXXXXX", path[128], text[512];
   assert_non_null(mkdtemp(directory));
   snprintf(path, sizeof path, "%s/a.node", directory);
-  put_text(path, "# two tetrahedra\n5 3 0 0\n1 0 0 0\n2 10 0 0\n3 0 10 0\n4 0 0 10\n5 10 10 10\n");
   char elements[128];
   snprintf(elements, sizeof elements, "%s/a.ele", directory);
   put_text(elements, "2 4 0\n1 1 2 3 4\n2 2 3 4 5\n");
@@ -140,6 +141,9 @@ static void test_tetrahedra_of_a_file(void **unused) {
            HEAD "- {name: t, kind: lattice, lattice: {tetrahedra: %s/a, youngs_pa: 1e5}, "
                 "density_kg_m3: 1000}\n",
            directory);
+  put_text(path, "4 3 0 0\n1 0 0 1e30\n");
+  refuse(text, SONDE_FORMAT, "a.node:2: expected three coordinates within 10 km");
+  put_text(path, NODES);
   world w = world_of(text);
   sonde_body_info info = sonde_scene_body(w.scene, 0);
   assert_int_equal(info.node_count, 5);
