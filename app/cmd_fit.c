@@ -4,7 +4,9 @@
 // fit_model:   build, estimate, set the parameters, save, look at the result from other sides.
 #include "fit_checks.h"
 #include "fit_common.h"
+#include "fit_doubts.h"
 #include "fit_report.h"
+#include "fit_tables.h"
 
 #include <stdlib.h>
 #include <unistd.h>
@@ -57,7 +59,13 @@ static const char HELP[] =
     "  --seed S          of the random points; default 1\n"
     "  --report DIR      write DIR/index.html with figures, tables and intervals; after stage 3\n"
     "                    with --profile and --identifiability\n"
+    "  --estimate-zero   estimate the contact zero of every curve in stage 3\n"
+    "  --estimate-tare   estimate the force that the sensor reads in the air, of every curve\n"
+    "  --zero-sd-mm SD   its standard deviation beforehand; default 5. Implies --estimate-zero\n"
+    "  --tare-sd-n SD    likewise; default 2. Implies --estimate-tare\n"
     "  --fine-mm L       longest skin edge near footprints; default 3\n"
+    "  --accept-implausible  fit measurements outside what is known of tissue, with a warning;\n"
+    "                    a table in other units is refused all the same\n"
     "  --json            one JSON object instead of the table\n"
     "  --help            this text\n";
 
@@ -66,8 +74,9 @@ static const char *const HOLD_OUTS[] = {"sites", "probe", "depth", NULL};
 typedef struct fit_arguments {
   const char *measurements, *surface, *sites, *output, *femur, *fat, *muscle, *name, *provenance;
   const char *stages, *weights, *loss, *fine_mm, *exponent, *report, *hold_out, *smoothness;
-  const char *starts, *seed, *also, *inplane, *tangential;
-  bool json, help, pretension, cold_start, profile, identify, layers, uniform_shear;
+  const char *starts, *seed, *also, *inplane, *tangential, *zero_sd, *tare_sd;
+  bool zero, tare;
+  bool json, help, pretension, cold_start, profile, identify, layers, uniform_shear, accept;
   char command_line[1024]; // as typed
 } fit_arguments;
 
@@ -81,6 +90,7 @@ typedef struct fit_outcome {
   sonde_fit_result result;
   sonde_error_report hold_out, also;
   fit_checks checks;
+  sonde_doubts doubts;
 } fit_outcome;
 
 typedef struct fit_inputs {
@@ -118,6 +128,11 @@ static bool parse_arguments(int argc, char **argv, fit_arguments *a) {
                                 {"--layers", NULL, &a->layers},
                                 {"--pretension", NULL, &a->pretension},
                                 {"--cold-start", NULL, &a->cold_start},
+                                {"--accept-implausible", NULL, &a->accept},
+                                {"--estimate-zero", NULL, &a->zero},
+                                {"--estimate-tare", NULL, &a->tare},
+                                {"--zero-sd-mm", &a->zero_sd, NULL},
+                                {"--tare-sd-n", &a->tare_sd, NULL},
                                 {"--json", NULL, &a->json},
                                 {"--help", NULL, &a->help}};
   if (!app_take_options(VERB, argc, argv, options, sizeof options / sizeof *options,
@@ -137,6 +152,20 @@ static void keep_command_line(int argc, char **argv, fit_arguments *a) {
     used += (size_t)snprintf(a->command_line + used, sizeof a->command_line - used, " %s%s%s",
                              quote, argv[k], quote);
   }
+}
+
+// Standard deviations of contact zero and tare; 0: not estimated.
+static bool parse_offsets(const fit_arguments *a, long stages, sonde_fit_def *def) {
+  double zero_mm = a->zero ? 5 : 0, tare_n = a->tare ? 2 : 0;
+  if (a->zero_sd && !app_parse_real(VERB, "--zero-sd-mm", a->zero_sd, 0.01, 20, &zero_mm))
+    return false;
+  if (a->tare_sd && !app_parse_real(VERB, "--tare-sd-n", a->tare_sd, 1e-3, 20, &tare_n))
+    return false;
+  def->zero_sd_m = 1e-3 * zero_mm;
+  def->tare_sd_n = tare_n;
+  if (stages == 3 || !(zero_mm > 0 || tare_n > 0)) return true;
+  app_usage_error(VERB, "--estimate-zero and --estimate-tare need --stages 3");
+  return false;
 }
 
 static bool parse_checks(const fit_arguments *a, long stages, fit_checks *checks) {
@@ -194,6 +223,7 @@ static bool parse_fit(const fit_arguments *a, sonde_fit_def *def, fit_skin *skin
     app_usage_error(VERB, "--also needs --hold-out sites or --layers");
     return false;
   }
+  if (!parse_offsets(a, stages, def)) return false;
   def->normal_exponent = (double)exponent;
   def->uniform_shear = a->uniform_shear;
   def->stages = (uint32_t)stages;
@@ -304,10 +334,31 @@ static sonde_status write_report(const fit_arguments *a, const fit_inputs *in,
                                  .hold_out_name = name,
                                  .hold_out = a->hold_out ? &out->hold_out : NULL,
                                  .also = out->also.all.count ? &out->also : NULL,
-                                 .checks = &out->checks};
+                                 .checks = &out->checks,
+                                 .doubts = &out->doubts,
+                                 .path = a->measurements};
   sonde_progress progress = app_progress();
   sonde_status status = fit_report_write(&findings, a->report, &progress, error);
   app_progress_end();
+  return status;
+}
+
+// Before the fit.
+static sonde_status examine_measurements(const fit_arguments *a, const fit_inputs *in,
+                                         fit_outcome *out, sonde_error *error) {
+  sonde_status status = sonde_measurements_examine(&in->measurements, &out->doubts, error);
+  if (!status) status = fit_doubts_decide(&out->doubts, a->measurements, a->accept, error);
+  if (!status) fit_doubts_print(&out->doubts, 0, a->measurements);
+  return status;
+}
+
+static sonde_status examine_result(const fit_arguments *a, const fit_inputs *in,
+                                   const sonde_model *model, fit_outcome *out, sonde_error *error) {
+  uint32_t before = out->doubts.count;
+  sonde_status status =
+      sonde_fit_examine(model, &in->measurements, &out->result, &out->doubts, error);
+  if (!status) status = fit_doubts_decide(&out->doubts, a->measurements, a->accept, error);
+  if (!status) fit_doubts_print(&out->doubts, before, a->measurements);
   return status;
 }
 
@@ -321,9 +372,11 @@ static sonde_status fit_model(const fit_arguments *a, const fit_inputs *in,
   if (!status)
     status = sonde_fit(model, &in->sites, &in->measurements, def, &progress, result, error);
   app_progress_end();
+  if (!status) status = examine_result(a, in, model, out, error);
   if (!status)
     status =
         sonde_model_set_parameters(model, &result->law, result->sites, result->site_count, error);
+  if (!status) fit_tables_correct(result, model);
   if (!status) status = sonde_model_save(model, a->output, error);
   if (!status && a->hold_out) status = leave_out(a, in, model, def, out, error);
   out->checks.also = a->also ? &in->also : NULL;
@@ -375,7 +428,8 @@ static void print_json_stages(const sonde_fit_result *r) {
   }
 }
 
-static void print_json(const fit_arguments *a, const fit_outcome *out, double seconds) {
+static void print_json(const fit_arguments *a, const sonde_measurements *data,
+                       const sonde_fit_def *def, const fit_outcome *out, double seconds) {
   const sonde_fit_result *r = &out->result;
   app_json_begin();
   if (r->stage3.all.count > 0)
@@ -397,6 +451,8 @@ static void print_json(const fit_arguments *a, const fit_outcome *out, double se
     app_json_close();
   }
   fit_checks_print_json(&out->checks);
+  fit_tables_print_json(data, def, r);
+  fit_doubts_print_json(&out->doubts, a->measurements);
   app_json_integer("parameters", r->parameters);
   app_json_text("model", a->output);
   app_json_real("edge_stiffness_n_m", r->law.edge_stiffness_n_m);
@@ -408,7 +464,8 @@ static void print_json(const fit_arguments *a, const fit_outcome *out, double se
   app_json_end();
 }
 
-static void print_table(const fit_arguments *a, const fit_outcome *out, double seconds) {
+static void print_table(const fit_arguments *a, const sonde_measurements *data,
+                        const sonde_fit_def *def, const fit_outcome *out, double seconds) {
   const sonde_fit_result *r = &out->result;
   char title[128];
   snprintf(title, sizeof title, "stage 1, every curve by itself: %u parameters",
@@ -444,6 +501,7 @@ static void print_table(const fit_arguments *a, const fit_outcome *out, double s
       app_print_report("never fitted, predicted at the sites left out", &out->also);
   }
   fit_checks_print(&out->checks);
+  fit_tables_print(data, def, r);
   printf("wrote %s in %.2f s\n", a->output, seconds);
 }
 
@@ -465,14 +523,15 @@ int cmd_fit(int argc, char **argv) {
   fit_inputs inputs = {0};
   sonde_error error = {0};
   sonde_status status = load_inputs(&arguments, &inputs, &error);
+  if (!status) status = examine_measurements(&arguments, &inputs, &out, &error);
   if (!status) status = fit_model(&arguments, &inputs, &def, &skin, &out, &error);
   int code = APP_OK;
   if (status)
     code = app_fail(VERB, &error);
   else if (arguments.json)
-    print_json(&arguments, &out, app_seconds(CLOCK_MONOTONIC) - start);
+    print_json(&arguments, &inputs.measurements, &def, &out, app_seconds(CLOCK_MONOTONIC) - start);
   else
-    print_table(&arguments, &out, app_seconds(CLOCK_MONOTONIC) - start);
+    print_table(&arguments, &inputs.measurements, &def, &out, app_seconds(CLOCK_MONOTONIC) - start);
   if (!status && !out.result.converged)
     fprintf(stderr, "sonde fit: the last stage reached its iteration limit before it converged\n");
   sonde_fit_result_clear(&out.result);

@@ -4,13 +4,15 @@
 // fit_report_write: all of it.
 #include "fit_report.h"
 
+#include "fit_doubts.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
 
-enum { STAGES = 5, HOLDOUTS = 3 * SONDE_FIT_PROBES, NOTES = 5 };
+enum { STAGES = 5, HOLDOUTS = 3 * SONDE_FIT_PROBES, NOTES = 5 + SONDE_DOUBTS };
 
 typedef struct builder {
   const fit_findings *in;
@@ -26,7 +28,7 @@ typedef struct builder {
   double correlation[16];
   double *stage2_full_n, *linear_n;
   const char *note[NOTES];
-  char date[32], text[NOTES][400];
+  char date[32], text[NOTES][900];
 } builder;
 
 static void add_stage(builder *b, const char *name, uint32_t parameters, const double *model_n,
@@ -211,6 +213,13 @@ static void add_notes(builder *b) {
   }
   if (b->in->checks->layers) {
     describe_layers(b->in->checks, b->text[count], sizeof b->text[0]);
+    b->note[count] = b->text[count];
+    ++count;
+  }
+  for (uint32_t k = 0; k < b->in->doubts->count; ++k) {
+    int used = snprintf(b->text[count], sizeof b->text[0], "Warning: ");
+    fit_doubts_sentence(&b->in->doubts->doubt[k], b->in->path, b->text[count] + used,
+                        sizeof b->text[0] - (size_t)used);
     b->note[count] = b->text[count];
     ++count;
   }

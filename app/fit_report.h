@@ -14,6 +14,8 @@ typedef struct fit_findings {
   const sonde_error_report *hold_out; // NULL: none
   const sonde_error_report *also;     // probes that were never fitted, in the same folds; or NULL
   const fit_checks *checks;
+  const sonde_doubts *doubts;
+  const char *path; // of the measurements
 } fit_findings;
 
 // Settles the models of stage 2 and 3 in full, fits linear springs, and writes the page.

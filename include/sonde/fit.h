@@ -22,10 +22,13 @@ typedef struct sonde_site_table {
 /** Force against penetration, one row per robot step; released by sonde_measurements_clear(). */
 typedef struct sonde_measurements {
   uint32_t count;
-  sonde_datum *data;      /**< [count] */
-  sonde_vec3 *position_m; /**< [count] of the site */
-  sonde_vec3 *normal;     /**< [count] outward, unit */
-  char remark[160];       /**< saved as a first line '# ...' when not empty; not read back */
+  sonde_datum *data;           /**< [count] */
+  sonde_vec3 *position_m;      /**< [count] of the site */
+  sonde_vec3 *normal;          /**< [count] outward, unit */
+  char remark[160];            /**< saved as a first line '# ...' when not empty; not read back */
+  double *scatter_n;           /**< [count] standard deviation of the mean of repeats; NULL: none */
+  uint32_t *line;              /**< [count] of the file that it was read from; NULL: none */
+  uint32_t repeats, unloading; /**< most repeats of a curve; rows of unloading, left out */
 } sonde_measurements;
 
 /**
@@ -52,7 +55,9 @@ SONDE_API sonde_status sonde_sites_check_on_surface(const sonde_model *model,
 /**
  * Reads `site,probe,x_mm,y_mm,z_mm,nx,ny,nz,penetration_mm,force_n` under the same rules. Probes
  * must be built-in names or rect:AxB. Rejects NaN, negative penetrations, repeated (site, probe,
- * penetration) and a negative mean force; rows may stand in any order.
+ * penetration) and a negative mean force; rows may stand in any order. A column `phase` (loading or
+ * unloading) keeps the rows of loading; with a column `repeat` (a number) the repeats of a curve
+ * become their mean.
  * @param sites NULL, or the sites that may occur: a missing one is SONDE_FORMAT, one that lies
  *   elsewhere (more than 5 mm away) is SONDE_MISMATCH
  * @thread owner
@@ -126,6 +131,8 @@ typedef struct sonde_fit_def {
   double smoothness_sd;       /**< of ln k0 and ln xm per site spacing; 0 (default): by leave-out */
   double shear_smoothness_sd; /**< of ln G and ln gm; 0 (default): by leave-out, or the same when
                                    smoothness_sd is given */
+  double zero_sd_m;           /**< sd of each curve's contact zero; 0 (default): not estimated */
+  double tare_sd_n;           /**< likewise, of the force that the sensor reads in the air */
   bool uniform_shear;         /**< one G and gm for the whole skin; default false */
   uint32_t threads;           /**< of stage 3; 0 (default): one per online core */
 } sonde_fit_def;
@@ -138,6 +145,7 @@ typedef struct sonde_curve_fit {
   char probe[24];
   uint32_t count, iterations;
   double k0_n_m3, xm_m, mae_n;
+  double zero_m, tare_n; /**< estimated by stage 3 when asked for; else 0 */
   bool converged;
 } sonde_curve_fit;
 

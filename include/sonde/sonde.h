@@ -15,6 +15,7 @@
 #include "sonde/scene.h"
 #include "sonde/fit.h"
 #include "sonde/fit_confidence.h"
+#include "sonde/fit_plausible.h"
 #include "sonde/robot.h"
 #include "sonde/identify.h"
 #include "sonde/report.h"

@@ -2,6 +2,7 @@
 // sonde_again_create: both and the refit. sonde_again_run: the refit from theta.
 // sonde_again_factor / sonde_again_spread: variances from the curvature at its end.
 #include "fit/again.h"
+#include "fit/refit_offset.h"
 #include "sparse/dense.h"
 
 #include "base/maths.h"
@@ -48,6 +49,7 @@ sonde_status sonde_again_create(const sonde_model *model, const sonde_site_table
   status = sonde_refit_create(model, sites, m, &a->plan, &a->def, REFIT_REACH_M, &a->refit, error);
   if (!status && !allocate(a)) status = sonde_fail_memory(error);
   if (!status) {
+    sonde_offsets_set(a->refit, result->curves);
     optimum_of(a, result, a->optimum);
     memcpy(a->theta, a->optimum, a->parameters * sizeof *a->theta);
     return SONDE_OK;

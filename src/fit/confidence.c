@@ -239,7 +239,8 @@ static void add_prior_spread(const sonde_refit *r, linear *l, double *covariance
   for (uint32_t from = 0; from < rows; from += most) {
     uint32_t count = rows - from < most ? rows - from : most;
     for (uint32_t k = 0; k < count; ++k)
-      l->error_n[k] = sonde_refit_prior_row(r, r->smoothness, from + k, &l->forward[(size_t)k * n]);
+      l->error_n[k] = sonde_refit_prior_row(r, r->smoothness, from + k, &l->forward[(size_t)k * n],
+                                            &(double){0});
     solve_rows(l, count);
     sonde_add_outers(covariance, n, l->forward, count, l->error_n);
   }

@@ -37,6 +37,11 @@ static sonde_status check_def(const sonde_fit_def *def, sonde_error *error) {
                       def->kept_edge_n_m);
   if ((unsigned)def->weights > SONDE_WEIGHTS_RELATIVE || (unsigned)def->loss > SONDE_LOSS_STUDENT)
     return sonde_fail(error, SONDE_ARGUMENT, "unknown weights or loss");
+  if (!(def->zero_sd_m >= 0 && def->zero_sd_m <= 0.1 && def->tare_sd_n >= 0 &&
+        def->tare_sd_n <= 100))
+    return sonde_fail(error, SONDE_ARGUMENT,
+                      "zero_sd_m is %g and tare_sd_n %g, expected 0 to 0.1 m and 0 to 100 N",
+                      def->zero_sd_m, def->tare_sd_n);
   if (!(def->loss_scale >= 0) || def->max_iterations < 1)
     return sonde_fail(error, SONDE_ARGUMENT,
                       "loss_scale is %g and max_iterations %u, expected >= 0 and >= 1",
@@ -279,7 +284,9 @@ static sonde_status refit_sites(const sonde_model *model, const sonde_site_table
   if (!status) status = sonde_refit_minimise(refit, theta, force_n, progress, &found, error);
   if (!status) {
     set_refitted(def, theta, &found, result);
-    for (uint32_t r = 0; r < plan->row_count; ++r) result->model_n[plan->row[r]] = force_n[r];
+    sonde_refit_offsets(refit, result->curves);
+    for (uint32_t r = 0; r < plan->row_count; ++r)
+      result->model_n[plan->row[r]] = force_n[r] + result->curves[plan->row_curve[r]].tare_n;
     status = sonde_error_report_of(m->data, result->model_n, m->count, &result->stage3, error);
   }
   sonde_refit_destroy(refit);

@@ -213,7 +213,8 @@ sonde_status sonde_fit_plan_create(const sonde_site_table *sites, const sonde_me
   if (status) sonde_fit_plan_clear(plan);
   if (!status && plan->probe_count == 1)
     sonde_log(SONDE_LOG_WARNING,
-              "one probe only (%s): edge stiffness and local springs are not told apart",
+              "one probe only (%s): edge stiffness, or shear layer, and local springs are not told "
+              "apart; stage 3 keeps the layer near a thigh's",
               plan->probe[0]);
   return status;
 }

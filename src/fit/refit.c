@@ -8,6 +8,7 @@
 #include "sparse/dense.h"
 #include "fit/parallel.h"
 #include "fit/refit_inside.h"
+#include "fit/refit_offset.h"
 #include "fit/site_field.h"
 
 #include "base/maths.h"
@@ -35,7 +36,8 @@ double sonde_refit_sd_n(const sonde_refit *r, uint32_t row) {
   double mean_n = r->plan->mean_force_n[r->plan->row_probe[row]];
   double force_n = r->m->data[r->plan->row[row]].force_n;
   SONDE_ASSERT(mean_n > 0);
-  return DATA_SD * (MEAN_SHARE * mean_n + (1 - MEAN_SHARE) * fmax(force_n, 0));
+  double sd_n = DATA_SD * (MEAN_SHARE * mean_n + (1 - MEAN_SHARE) * fmax(force_n, 0));
+  return r->m->scatter_n ? hypot(sd_n, r->m->scatter_n[r->plan->row[row]]) : sd_n;
 }
 
 static void spread(sonde_refit *r, const double *theta) {
@@ -142,7 +144,7 @@ static sonde_status work_on_curve(void *user, uint32_t worker, uint32_t curve,
   for (uint32_t k = r->plan->curve_start[curve]; k < r->plan->curve_start[curve + 1]; ++k) {
     if (!sonde_refit_uses(r, k)) continue;
     if (atomic_load(stop)) return sonde_fail(error, SONDE_CANCELLED, "cancelled");
-    double depth = r->m->data[r->plan->row[k]].penetration_m;
+    double depth = sonde_offsets_depth(r, k);
     double *s = r->indentation_m + r->first_place[k];
     sonde_error inner;
     status = settle_datum(r, solver, k, rough, depth, &before, s, &inner);
@@ -153,6 +155,8 @@ static sonde_status work_on_curve(void *user, uint32_t worker, uint32_t curve,
       return sonde_fail(error, status, "site %u, probe %s: %s",
                         r->sites->sites[r->plan->curve_site[curve]].id,
                         r->plan->probe[r->plan->curve_probe[curve]], inner.message);
+    if (at->jacobian && r->offsets)
+      r->offsets->slope_n_m[k] = sonde_patch_stiffness(solver, solver->multiplier);
     if (at->jacobian) carry_to_sites(r, patch, me, at->jacobian + (size_t)k * parameters);
     before = (depth_before){s, depth, at->jacobian != NULL};
   }
@@ -180,6 +184,13 @@ sonde_status sonde_refit_forces(sonde_refit *r, const double *theta, double *for
                    jacobian};
   return sonde_parallel_run(r->plan->curve_count, r->workers, work_on_curve, &at, progress,
                             "stage 3", error);
+}
+
+void sonde_refit_offsets(const sonde_refit *r, sonde_curve_fit *curves) {
+  for (uint32_t c = 0; r->offsets && c < r->plan->curve_count; ++c) {
+    curves[c].zero_m = r->offsets->kept[c][OFFSET_ZERO];
+    curves[c].tare_n = r->offsets->kept[c][OFFSET_TARE];
+  }
 }
 
 void sonde_refit_forget(sonde_refit *r) { memset(r->settled, 0, r->plan->row_count); }
@@ -296,6 +307,7 @@ sonde_status sonde_refit_create(const sonde_model *model, const sonde_site_table
   if (!status) status = sonde_site_basis(model, sites, r->basis, error);
   if (!status) status = sonde_site_roughness(sites, r->roughness, error);
   if (!status) status = create_patches(r, reach_m, error);
+  if (!status) status = sonde_offsets_create(r, &r->offsets, error);
   if (!status) status = create_starts(r, error);
   if (!status) status = create_crew(r, def->threads, error);
   if (!status) return SONDE_OK;
@@ -314,6 +326,7 @@ void sonde_refit_destroy(sonde_refit *r) {
     for (int f = 0; f < 4; ++f) sonde_free(r->crew[w].gradient.by_place[f]);
   }
   sonde_free(r->crew);
+  sonde_offsets_destroy(r->offsets);
   sonde_free(r->patch);
   sonde_free(r->basis);
   sonde_free(r->roughness);

@@ -41,6 +41,9 @@ sonde_status sonde_refit_minimise(sonde_refit *refit, double *theta, double *for
 // Where the minimisation puts what is known about its result; NULL: not wanted.
 void sonde_refit_want_confidence(sonde_refit *refit, sonde_fit_confidence *confidence);
 
+// Contact zero and tare of the curves [curve_count] at the end of the minimisation.
+void sonde_refit_offsets(const sonde_refit *refit, sonde_curve_fit *curves);
+
 // The next equilibria start afresh.
 void sonde_refit_forget(sonde_refit *refit);
 

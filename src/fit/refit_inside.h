@@ -5,6 +5,7 @@
 #include "fit/refit.h"
 
 typedef struct sonde_normal sonde_normal;
+typedef struct sonde_offsets sonde_offsets;
 
 // Standard deviations of the sites' logarithms per site spacing: of k0 and xm, of G and gm.
 typedef struct sonde_smoothness {
@@ -35,6 +36,7 @@ struct sonde_refit {
   sonde_refit_worker *crew;
   sonde_smoothness smoothness;
   sonde_fit_confidence *confidence; // NULL: not wanted
+  sonde_offsets *offsets;           // contact zero and tare of the curves; NULL: none
   const bool *left_out;             // [row_count] rows that do not take part; NULL: none
   const bool *fixed;                // [parameters] that keep their start; NULL: none
   sonde_normal *curvature; // receives the normal equations at the optimum; NULL: not wanted
@@ -79,10 +81,12 @@ sonde_refit_row sonde_refit_weigh(const sonde_refit *refit, uint32_t row, double
 double sonde_refit_add_rows(const sonde_refit *refit, uint32_t first, uint32_t end,
                             const double *force_n, const double *jacobian, sonde_normal *normal);
 // What is known beforehand, one equation after another: each site follows its neighbours, its share
-// of the shear layer is near 1, and the shares' mean is 1.
+// of the shear layer is near 1, the shares' mean is 1; with one probe, which cannot tell the layer
+// from the springs below it, also G over the mean k0 and gm are near those of a thigh.
 uint32_t sonde_refit_prior_rows(const sonde_refit *refit);
-// Row [n] of equation k; returns its weight.
-double sonde_refit_prior_row(const sonde_refit *refit, sonde_smoothness s, uint32_t k, double *row);
+// Row [n] of equation k and its right-hand side; returns its weight.
+double sonde_refit_prior_row(const sonde_refit *refit, sonde_smoothness s, uint32_t k, double *row,
+                             double *target);
 // Adds all of them; returns their cost. row [n] is scratch.
 double sonde_refit_add_prior(const sonde_refit *refit, const double *theta, sonde_smoothness s,
                              double *row, sonde_normal *normal);

@@ -6,6 +6,7 @@
 // iterate:   Levenberg-Marquardt with Marquardt's scaling. descend: the same from its first point.
 // sonde_refit_minimise: on few depths, then on all.
 #include "fit/refit_inside.h"
+#include "fit/refit_offset.h"
 
 #include "base/maths.h"
 
@@ -16,6 +17,7 @@ static const double LONGEST_STEP = 0.7;   // of a logarithm
 static const double NOTHING = 1e-5;       // fall of an exact fit
 static const double SMALL_DAMPING = 1e-3; // a nearly full Gauss-Newton step
 static const double DAMPING_FALL = 0.1, DAMPING_LEAST = 1e-9, DAMPING_MOST = 1e9;
+static const double FLAT = 2e-2; // rise of the cost that rough equilibria may cause
 enum { MOST_ITERATIONS = 40 };
 
 // stride: every so many depths; enough: relative fall of the cost that is not worth a step; choose:
@@ -30,7 +32,7 @@ static const stage COARSE = {4, 1, 1e-2, false}, WHOLE = {1, 1e-3, 1e-4, false};
 // Cost at theta with the trial's forces.
 static double cost_of(const sonde_refit *r, sonde_refit_workspace *w, const double *theta) {
   return sonde_refit_add_rows(r, 0, w->rows, w->force_n, NULL, NULL) +
-         sonde_refit_add_prior(r, theta, r->smoothness, w->line, NULL);
+         sonde_refit_add_prior(r, theta, r->smoothness, w->line, NULL) + sonde_offsets_cost(r);
 }
 
 // A fixed parameter gets an equation of its own, whose solution is no step.
@@ -45,8 +47,8 @@ static void fix(const sonde_refit *r, sonde_normal *normal) {
 }
 
 // How far the cost of the quadratic falls along the step of its damped equations.
-static double promised(const sonde_refit_workspace *w, double damping) {
-  double fall = 0;
+static double promised(const sonde_refit *r, const sonde_refit_workspace *w, double damping) {
+  double fall = r->offsets ? r->offsets->fall : 0;
   for (uint32_t i = 0; i < w->n; ++i) {
     double diagonal = w->normal.matrix[(size_t)i * w->n + i];
     fall += 0.5 * w->step[i] * (damping * diagonal * w->step[i] - w->normal.gradient[i]);
@@ -109,21 +111,36 @@ static sonde_status try_point(sonde_refit *r, sonde_refit_workspace *w, stepwise
 }
 
 // The normal equations at the accepted point.
-static void linearise(const sonde_refit *r, sonde_refit_workspace *w, const double *theta,
+static void linearise(sonde_refit *r, sonde_refit_workspace *w, const double *theta,
                       const double *force_n) {
   sonde_normal_clear(&w->normal);
   sonde_refit_add_rows(r, 0, w->rows, force_n, w->kept_jacobian, &w->normal);
   sonde_refit_add_prior(r, theta, r->smoothness, w->line, &w->normal);
+  sonde_offsets_eliminate(r, force_n, w->kept_jacobian, &w->normal);
   fix(r, &w->normal);
 }
 
-static void accept(const sonde_refit *r, sonde_refit_workspace *w, double *theta, double *force_n) {
+static void accept(sonde_refit *r, sonde_refit_workspace *w, double *theta, double *force_n) {
   memcpy(theta, w->trial, w->n * sizeof *theta);
   memcpy(force_n, w->force_n, w->rows * sizeof *force_n);
   double *swap = w->kept_jacobian;
   w->kept_jacobian = w->jacobian;
   w->jacobian = swap;
+  sonde_offsets_accept(r);
   linearise(r, w, theta, force_n);
+}
+
+// Where the cost is flat, equilibria that are settled roughly make it rise along steps that would
+// lower it: from there on they are exact, and the accepted point is evaluated again.
+static sonde_status sharpen(sonde_refit *r, sonde_refit_workspace *w, double *theta,
+                            double *force_n, stepwise *at, double *cost, sonde_error *error) {
+  SONDE_ASSERT(r->rough && cost);
+  r->rough = false;
+  memcpy(w->trial, theta, w->n * sizeof *theta);
+  sonde_status status = try_point(r, w, at, cost, error);
+  if (!status && !isfinite(*cost)) status = SONDE_CONVERGENCE; // error says where
+  if (!status) accept(r, w, theta, force_n);
+  return status;
 }
 
 static sonde_status iterate(sonde_refit *r, sonde_refit_workspace *w, stage goal, double *theta,
@@ -141,16 +158,23 @@ static sonde_status iterate(sonde_refit *r, sonde_refit_workspace *w, stage goal
     }
     double size = longest(w->step, w->n), share = size > LONGEST_STEP ? LONGEST_STEP / size : 1;
     double enough = goal.enough * result->cost + NOTHING;
-    result->converged = damping <= SMALL_DAMPING && promised(w, damping) <= enough;
+    result->converged = damping <= SMALL_DAMPING && promised(r, w, damping) <= enough;
     if (result->converged) break;
     for (uint32_t i = 0; i < w->n; ++i) w->trial[i] = theta[i] + share * w->step[i];
+    sonde_offsets_try(r, w->step, share);
     double cost;
     sonde_status status = try_point(r, w, at, &cost, error);
     if (status) return status;
     result->iterations++;
     if (!(cost < result->cost)) {
+      sonde_offsets_return(r);
       result->converged = damping <= SMALL_DAMPING && cost - result->cost <= enough;
       if (result->converged) break;
+      if (r->rough && cost - result->cost <= FLAT * result->cost) {
+        status = sharpen(r, w, theta, force_n, at, &result->cost, error);
+        if (status) return status;
+        continue;
+      }
       damping = fmax(10 * damping, 1e-6);
       continue;
     }

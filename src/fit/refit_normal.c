@@ -5,6 +5,7 @@
 #include "fit/arrow.h"
 #include "sparse/dense.h"
 #include "fit/refit_inside.h"
+#include "fit/refit_offset.h"
 
 #include "base/maths.h"
 
@@ -14,6 +15,9 @@
 static const double SHARE_SD = 0.3;
 // Of the mean of these logarithms: nothing, so that G and gm are the leg's geometric means.
 static const double MEAN_SD = 3e-3;
+// Of one probe's fit: sqrt(G/k0), over which a dent dies away, and gm, with the standard deviations
+// of their logarithms (of G/k0): about the bundled thigh's 8.3 mm and 1.10, generously.
+static const double DENT_LENGTH_M = 8.3e-3, DENT_SD = 0.5, LIMIT_MIDDLE = 1.1, LIMIT_SD = 0.2;
 enum { CHUNK = 64 };
 
 bool sonde_normal_create(sonde_normal *normal, uint32_t n) {
@@ -77,7 +81,7 @@ static double loss_scale(const sonde_refit *r, uint32_t row) {
 sonde_refit_row sonde_refit_weigh(const sonde_refit *r, uint32_t row, double force_n) {
   double sd_n = sonde_refit_sd_n(r, row), weight;
   SONDE_ASSERT(row < r->plan->row_count && sd_n > 0);
-  double error_n = force_n - r->m->data[r->plan->row[row]].force_n;
+  double error_n = force_n + sonde_offsets_tare(r, row) - r->m->data[r->plan->row[row]].force_n;
   double loss = sonde_loss(r->def->loss, loss_scale(r, row) / sd_n, error_n / sd_n, &weight);
   return (sonde_refit_row){error_n, weight / (sd_n * sd_n), loss};
 }
@@ -102,16 +106,35 @@ double sonde_refit_add_rows(const sonde_refit *r, uint32_t first, uint32_t end,
   return loss;
 }
 
-uint32_t sonde_refit_prior_rows(const sonde_refit *r) {
+static uint32_t layer_rows(const sonde_refit *r) {
+  return r->plan->probe_count == 1 && !r->membrane ? 2 : 0;
+}
+
+static uint32_t field_rows(const sonde_refit *r) {
   uint32_t shares = r->fields - 2;
   return r->fields * r->sites->count + shares * (r->sites->count + 1);
 }
 
-double sonde_refit_prior_row(const sonde_refit *r, sonde_smoothness s, uint32_t k, double *row) {
+uint32_t sonde_refit_prior_rows(const sonde_refit *r) { return field_rows(r) + layer_rows(r); }
+
+// ln G - mean ln k0, then ln gm.
+static double layer_row(const sonde_refit *r, bool limit, double *row, double *target) {
+  uint32_t count = r->sites->count, n = sonde_refit_parameters(r);
+  row[limit ? n - 1 : n - 2] = 1;
+  for (uint32_t t = 0; t < count && !limit; ++t) row[t] = -1.0 / count;
+  *target = limit ? log(LIMIT_MIDDLE) : 2 * log(DENT_LENGTH_M);
+  double sd = limit ? LIMIT_SD : DENT_SD;
+  return 1 / (sd * sd);
+}
+
+double sonde_refit_prior_row(const sonde_refit *r, sonde_smoothness s, uint32_t k, double *row,
+                             double *target) {
   uint32_t count = r->sites->count, field = k / count, at = k % count;
   SONDE_ASSERT(k < sonde_refit_prior_rows(r));
   memset(row, 0, sonde_refit_parameters(r) * sizeof *row);
-  uint32_t last = sonde_refit_prior_rows(r) - k; // the means of the shares come last
+  *target = 0;
+  if (k >= field_rows(r)) return layer_row(r, k > field_rows(r), row, target);
+  uint32_t last = field_rows(r) - k; // the means of the shares come last
   if (r->fields > 2 && last <= r->fields - 2) {
     for (uint32_t t = 0; t < count; ++t) row[(r->fields - last) * count + t] = 1.0 / count;
     return 1 / (MEAN_SD * MEAN_SD);
@@ -125,21 +148,27 @@ double sonde_refit_prior_row(const sonde_refit *r, sonde_smoothness s, uint32_t 
   return 1 / (sd * sd);
 }
 
-// Where row k of the prior has entries: in one field.
-static uint32_t prior_begins(const sonde_refit *r, uint32_t k) {
-  uint32_t count = r->sites->count, field = k / count, last = sonde_refit_prior_rows(r) - k;
-  if (r->fields > 2 && last <= r->fields - 2) return (r->fields - last) * count;
-  return (field < r->fields ? field : field - r->fields + 2) * count;
+// Where row k of the prior has entries: in one field, or anywhere.
+static void prior_span(const sonde_refit *r, uint32_t k, uint32_t *begin, uint32_t *end) {
+  uint32_t count = r->sites->count, field = k / count, last = field_rows(r) - k;
+  *begin = 0, *end = sonde_refit_parameters(r);
+  if (k >= field_rows(r)) return;
+  if (r->fields > 2 && last <= r->fields - 2)
+    *begin = (r->fields - last) * count;
+  else
+    *begin = (field < r->fields ? field : field - r->fields + 2) * count;
+  *end = *begin + count;
 }
 
 double sonde_refit_add_prior(const sonde_refit *r, const double *theta, sonde_smoothness s,
                              double *row, sonde_normal *normal) {
-  uint32_t n = sonde_refit_parameters(r), count = r->sites->count;
+  uint32_t n = sonde_refit_parameters(r);
   double cost = 0;
   SONDE_ASSERT(!normal || normal->n == n);
   for (uint32_t k = 0; k < sonde_refit_prior_rows(r); ++k) {
-    double weight = sonde_refit_prior_row(r, s, k, row), residual = 0;
-    uint32_t begin = prior_begins(r, k), end = begin + count;
+    double target, weight = sonde_refit_prior_row(r, s, k, row, &target), residual = -target;
+    uint32_t begin, end;
+    prior_span(r, k, &begin, &end);
     for (uint32_t t = begin; t < end; ++t) residual += row[t] * theta[t];
     cost += 0.5 * weight * residual * residual;
     for (uint32_t i = begin; normal && i < end; ++i) {

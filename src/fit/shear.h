@@ -99,6 +99,9 @@ double sonde_patch_assemble(sonde_patch_solver *solver, const double *s, double 
 sonde_status sonde_patch_settle(sonde_patch_solver *solver, double depth_m, double relative,
                                 uint32_t max_iterations, double *s_m, sonde_error *error);
 
+// Change of the force per depth at the last assembly, mu the motion of all places per depth.
+double sonde_patch_stiffness(const sonde_patch_solver *solver, const double *mu);
+
 // Derivatives of the force.
 typedef struct sonde_patch_gradient {
   double *by_place[4];             // [place_count] by ln k0, ln xm, ln shares of G and gm there

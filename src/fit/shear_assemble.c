@@ -207,3 +207,21 @@ void sonde_patch_differentiate(const sonde_patch_solver *solver, const double *s
   for (uint32_t i = 0; i < p->place_count; ++i)
     by[2][i] *= solver->shear_share[i], by[3][i] *= solver->limit_share[i];
 }
+
+// mu^T K mu: the free places' part of it vanishes, since mu is their motion in equilibrium.
+double sonde_patch_stiffness(const sonde_patch_solver *solver, const double *mu) {
+  const sonde_patch *p = solver->patch;
+  SONDE_ASSERT(p && solver->settled_m && mu);
+  double sum = p->drag_n_m;
+  for (uint32_t i = 0; i < p->place_count; ++i) sum += solver->normal_slope[i] * mu[i] * mu[i];
+  for (uint32_t f = 0; f < p->face_count; ++f) {
+    const sonde_patch_face *face = &p->face[f];
+    const double *half = face->half_cotangent;
+    double a = mu[face->place[0]], b = mu[face->place[1]], c = mu[face->place[2]], along = 0;
+    double square =
+        half[0] * (b - c) * (b - c) + half[1] * (c - a) * (c - a) + half[2] * (a - b) * (a - b);
+    for (int k = 0; k < 3; ++k) along += mu[face->place[k]] * solver->flux[f][k];
+    sum += solver->secant[f] * square + solver->beyond[f] * along * along;
+  }
+  return sum;
+}

@@ -7,6 +7,7 @@
 #include "base/maths.h"
 #include "fit/csv.h"
 #include "fit/fit_inside.h"
+#include "fit/repeats.h"
 #include "geometry/internal.h"
 
 #include <string.h>
@@ -252,6 +253,7 @@ static sonde_status load_row(const sonde_csv *csv, const uint32_t *columns,
   if (!status) status = sonde_csv_real(csv, columns[ROW_DEPTH], &datum->penetration_m, error);
   if (!status) status = sonde_csv_real(csv, columns[ROW_FORCE], &datum->force_n, error);
   if (status) return status;
+  m->line[row] = csv->line;
   m->position_m[row] = v_scale(m->position_m[row], METRES_PER_MM);
   datum->penetration_m *= METRES_PER_MM;
   if (datum->penetration_m < 0 || datum->penetration_m > DEPTH_LIMIT_M)
@@ -269,7 +271,7 @@ static sonde_status load_row(const sonde_csv *csv, const uint32_t *columns,
 // What identifies a row, with the line it stands on.
 typedef struct row_key {
   const sonde_datum *datum;
-  uint32_t line;
+  uint32_t line, repeat;
 } row_key;
 
 static int compare_data(const sonde_datum *a, const sonde_datum *b) {
@@ -282,6 +284,7 @@ static int compare_data(const sonde_datum *a, const sonde_datum *b) {
 static int compare_keys(const void *a, const void *b) {
   const row_key *p = a, *q = b;
   int order = compare_data(p->datum, q->datum);
+  if (!order) order = (p->repeat > q->repeat) - (p->repeat < q->repeat);
   return order ? order : (p->line > q->line) - (p->line < q->line);
 }
 
@@ -290,10 +293,10 @@ static sonde_status check_repeats(const char *path, row_key *keys, uint32_t coun
   qsort(keys, count, sizeof *keys, compare_keys);
   for (uint32_t i = 1; i < count; ++i) {
     const sonde_datum *d = keys[i].datum;
-    if (compare_data(keys[i - 1].datum, d) == 0)
+    if (compare_data(keys[i - 1].datum, d) == 0 && keys[i - 1].repeat == keys[i].repeat)
       return sonde_fail(error, SONDE_FORMAT,
                         "%s:%u: repeats line %u: site %u, probe %s, penetration_mm %.4f, expected "
-                        "each once",
+                        "each once, or a column repeat or phase that tells them apart",
                         path, keys[i].line, keys[i - 1].line, d->site, d->probe,
                         d->penetration_m * 1e3);
   }
@@ -312,24 +315,60 @@ static sonde_status check_sign(const char *path, const sonde_measurements *m, so
                     path, sum_n / m->count);
 }
 
+// Columns that tell rows of one curve apart; UINT32_MAX: absent.
+typedef struct row_kinds {
+  uint32_t phase, repeat;
+} row_kinds;
+
+static sonde_status read_kind(const sonde_csv *csv, const row_kinds *kinds, bool *loading,
+                              uint32_t *repeat, sonde_error *error) {
+  *loading = true, *repeat = 0;
+  if (kinds->phase != UINT32_MAX && !sonde_phase_of(csv->cell[kinds->phase], loading))
+    return sonde_fail(error, SONDE_FORMAT,
+                      "%s:%u: column phase: expected loading or unloading, found '%.40s'",
+                      csv->path, csv->line, csv->cell[kinds->phase]);
+  return kinds->repeat == UINT32_MAX ? SONDE_OK
+                                     : sonde_csv_index(csv, kinds->repeat, repeat, error);
+}
+
+static sonde_status average(const row_key *keys, sonde_measurements *m, sonde_error *error) {
+  uint32_t count = m->count;
+  sonde_repeat_row *row = SONDE_NEW(sonde_repeat_row, count);
+  if (!row) return sonde_fail_memory(error);
+  for (uint32_t i = 0; i < count; ++i) {
+    size_t at = (size_t)(keys[i].datum - m->data);
+    row[i] = (sonde_repeat_row){m->data[at], m->position_m[at], m->normal[at], keys[i].line,
+                                keys[i].repeat};
+  }
+  sonde_status status = sonde_measurements_average(row, count, m, error);
+  sonde_free(row);
+  return status;
+}
+
 static sonde_status load_rows(sonde_csv *csv, const sonde_site_table *sites, row_key *keys,
                               sonde_measurements *m, sonde_error *error) {
   uint32_t columns[ROW_COLUMNS];
+  const row_kinds kinds = {sonde_csv_column(csv, "phase"), sonde_csv_column(csv, "repeat")};
   sonde_status status = sonde_csv_require(csv, ROW_NAMES, ROW_COLUMNS, columns, error);
-  bool found = !status;
+  bool found = !status, loading;
   while (!status) {
+    row_key *key = &keys[m->count];
     status = sonde_csv_next(csv, &found, error);
     if (status || !found) break;
+    *key = (row_key){&m->data[m->count], csv->line, 0};
     status = load_row(csv, columns, sites, m->count, m, error);
-    keys[m->count] = (row_key){&m->data[m->count], csv->line};
-    ++m->count;
+    if (!status) status = read_kind(csv, &kinds, &loading, &key->repeat, error);
+    if (status) break;
+    m->count += loading;
+    m->unloading += !loading;
   }
   if (status) return status;
   if (!m->count)
     return sonde_fail(error, SONDE_FORMAT, "%s: has no rows, expected at least one measurement",
                       csv->path);
   status = check_repeats(csv->path, keys, m->count, error);
-  return status ? status : check_sign(csv->path, m, error);
+  if (!status) status = check_sign(csv->path, m, error);
+  return status || kinds.repeat == UINT32_MAX ? status : average(keys, m, error);
 }
 
 sonde_status sonde_measurements_create(sonde_measurements *m, uint32_t room, sonde_error *error) {
@@ -337,7 +376,8 @@ sonde_status sonde_measurements_create(sonde_measurements *m, uint32_t room, son
   m->data = SONDE_NEW(sonde_datum, room);
   m->position_m = SONDE_NEW(sonde_vec3, room);
   m->normal = SONDE_NEW(sonde_vec3, room);
-  if (m->data && m->position_m && m->normal) return SONDE_OK;
+  m->line = SONDE_NEW(uint32_t, room);
+  if (m->data && m->position_m && m->normal && m->line) return SONDE_OK;
   sonde_measurements_clear(m);
   return sonde_fail_memory(error);
 }
@@ -383,5 +423,7 @@ void sonde_measurements_clear(sonde_measurements *m) {
   sonde_free(m->data);
   sonde_free(m->position_m);
   sonde_free(m->normal);
+  sonde_free(m->scatter_n);
+  sonde_free(m->line);
   *m = (sonde_measurements){0};
 }
