@@ -410,14 +410,13 @@ static void take_text(const reader *r, const char *key, char *to, size_t size) {
   snprintf(to, size, "%s", text ? text : "");
 }
 
-// Every number of the model is finite and the sizes are positive: a file may be whole and yet
-// wrong.
-static bool finite_numbers(const reader *r, const char *name, const double *values, size_t count,
-                           double low) {
+// Every number of the model is that of a body: a file may be whole and yet wrong.
+static bool numbers_within(const reader *r, const char *name, const double *values, size_t count,
+                           double low, double high) {
   for (size_t k = 0; k < count; ++k)
-    if (!isfinite(values[k]) || values[k] < low) {
-      sonde_fail(r->error, SONDE_FORMAT, "%s: %s[%zu] is %g, expected a finite number from %g",
-                 r->path, name, k, values[k], low);
+    if (!(values[k] >= low && values[k] <= high)) {
+      sonde_fail(r->error, SONDE_FORMAT, "%s: %s[%zu] is %g, expected a number from %g to %g",
+                 r->path, name, k, values[k], low, high);
       return false;
     }
   return true;
@@ -426,9 +425,9 @@ static bool finite_numbers(const reader *r, const char *name, const double *valu
 static bool check_vessel(const reader *r, const char *name, const sonde_vessel *vessel) {
   for (uint32_t k = 0; k < vessel->count; ++k) {
     const sonde_vessel_point *p = &vessel->point[k];
-    if (!finite_numbers(r, name, &p->centre_m.x, 3, -100) ||
-        !finite_numbers(r, name, &p->radius_m, 1, 1e-6) ||
-        !finite_numbers(r, name, &p->depth_m, 1, 0))
+    if (!numbers_within(r, name, &p->centre_m.x, 3, -100, 100) ||
+        !numbers_within(r, name, &p->radius_m, 1, 1e-6, 100) ||
+        !numbers_within(r, name, &p->depth_m, 1, 0, 100))
       return false;
   }
   return true;
@@ -436,25 +435,26 @@ static bool check_vessel(const reader *r, const char *name, const sonde_vessel *
 
 static bool check_numbers(const reader *r, const sonde_model *model) {
   size_t n = model->surface.vertex_count;
-  bool ok = finite_numbers(r, "surface_vertices", &model->surface.vertices[0].x, 3 * n, -100) &&
-            finite_numbers(r, "femur_vertices", &model->femur.vertices[0].x,
-                           3 * (size_t)model->femur.vertex_count, -100) &&
-            finite_numbers(r, "node_k0", model->k0_n_m3, n, 1e-6) &&
-            finite_numbers(r, "node_xm", model->xm_m, n, 1e-6) &&
-            finite_numbers(r, "node_shear_share", model->shear_share, n, 1e-6) &&
-            finite_numbers(r, "node_limit_share", model->limit_share, n, 1e-6) &&
-            finite_numbers(r, "node_fat_depth", model->fat_depth_m, n, 0) &&
-            finite_numbers(r, "node_muscle_depth", model->muscle_depth_m, n, 0) &&
-            finite_numbers(r, "node_bone_depth", model->bone_depth_m, n, 0);
+  bool ok =
+      numbers_within(r, "surface_vertices", &model->surface.vertices[0].x, 3 * n, -100, 100) &&
+      numbers_within(r, "femur_vertices", &model->femur.vertices[0].x,
+                     3 * (size_t)model->femur.vertex_count, -100, 100) &&
+      numbers_within(r, "node_k0", model->k0_n_m3, n, 1e-6, 1e12) &&
+      numbers_within(r, "node_xm", model->xm_m, n, 1e-6, 100) &&
+      numbers_within(r, "node_shear_share", model->shear_share, n, 1e-6, 1e12) &&
+      numbers_within(r, "node_limit_share", model->limit_share, n, 1e-6, 1e12) &&
+      numbers_within(r, "node_fat_depth", model->fat_depth_m, n, 0, 100) &&
+      numbers_within(r, "node_muscle_depth", model->muscle_depth_m, n, 0, 100) &&
+      numbers_within(r, "node_bone_depth", model->bone_depth_m, n, 0, 100);
   for (uint32_t k = 0; ok && k < model->site_count; ++k) {
     const sonde_site *site = &model->sites[k];
-    ok = finite_numbers(r, "site", &site->position_m.x, 12, -100) &&
-         finite_numbers(r, "site", &site->k0_n_m3, 1, 1e-6) &&
-         finite_numbers(r, "site", &site->xm_m, 1, 1e-6) &&
-         finite_numbers(r, "site_share", &site->shear_share, 2, 0);
+    ok = numbers_within(r, "site", &site->position_m.x, 12, -100, 100) &&
+         numbers_within(r, "site", &site->k0_n_m3, 1, 1e-6, 1e12) &&
+         numbers_within(r, "site", &site->xm_m, 1, 1e-6, 100) &&
+         numbers_within(r, "site_share", &site->shear_share, 2, 0, 100);
   }
   for (uint32_t k = 0; ok && k < model->datum_count; ++k)
-    ok = finite_numbers(r, "datum", &model->data[k].penetration_m, 2, -1e6);
+    ok = numbers_within(r, "datum", &model->data[k].penetration_m, 2, -1e6, 1e6);
   return ok && check_vessel(r, "vein", &model->vein) && check_vessel(r, "artery", &model->artery);
 }
 

@@ -203,6 +203,28 @@ static void damage_is_refused(void **state) {
   sonde_model_destroy(model);
 }
 
+// A whole file whose numbers are those of no body, each at the end of its range.
+static void absurd_numbers_are_refused(void **state) {
+  (void)state;
+  sonde_model *model = fixture_model(1, NULL), *loaded;
+  double *const number[] = {
+      &model->surface.vertices[0].x, &model->femur.vertices[0].z, &model->xm_m[0],
+      &model->bone_depth_m[0],       &model->sites[0].k0_n_m3,    &model->vein.point[0].radius_m};
+  const char *const name[] = {"surface_vertices[0]", "femur_vertices[2]", "node_xm[0]",
+                              "node_bone_depth[0]",  "site[0]",           "vein[0]"};
+  for (int k = 0; k < 6; ++k) {
+    sonde_error error = {0};
+    double right = *number[k];
+    *number[k] = 1e13;
+    assert_int_equal(sonde_model_save(model, FILE_NAME, NULL), SONDE_OK);
+    assert_int_equal(sonde_model_load(FILE_NAME, &loaded, &error), SONDE_FORMAT);
+    if (!strstr(error.message, name[k])) fail_msg("%s is not in %s", name[k], error.message);
+    *number[k] = right;
+  }
+  unlink(FILE_NAME);
+  sonde_model_destroy(model);
+}
+
 static void open_skin_is_refused(void **state) {
   (void)state;
   sonde_mesh skin = fixture_sphere(2, FIXTURE_RADIUS_M);
@@ -240,6 +262,7 @@ int main(void) {
                                      cmocka_unit_test(file_returns_the_same_model),
                                      cmocka_unit_test(older_files_have_simpler_layers),
                                      cmocka_unit_test(damage_is_refused),
+                                     cmocka_unit_test(absurd_numbers_are_refused),
                                      cmocka_unit_test(open_skin_is_refused),
                                      cmocka_unit_test(bad_law_is_refused)};
   return cmocka_run_group_tests(tests, NULL, NULL);
