@@ -1,7 +1,7 @@
 // Processes of a class: start, watch, stop.
 //
 // child_arguments   PROGRAM run --port N and what the user added
-// child_environment the parent's, with the learner's name and token
+// child_environment the parent's, with the learner's name and the tokens
 // attributes        signals as if started from a shell
 // files             no input, no output, errors to a pipe
 // hear              keeps the last line that a program said
@@ -42,13 +42,15 @@ static bool child_arguments(const class_room *room, const char *port, const char
   return true;
 }
 
-// The token goes by the environment, which no other user can read, not by the command line.
-static void child_environment(char *name, char *token, char *list[VARIABLES]) {
+// The tokens go by the environment, which no other user can read, not by the command line.
+static void child_environment(char *name, char *token, char *teacher, char *list[VARIABLES]) {
   int count = 0;
   list[count++] = name;
   list[count++] = token;
+  list[count++] = teacher;
   for (char **p = environ; *p && count < VARIABLES - 1; ++p)
-    if (strncmp(*p, "SONDE_TRAINEE=", 14) != 0 && strncmp(*p, "SONDE_PAGE_TOKEN=", 17) != 0)
+    if (strncmp(*p, "SONDE_TRAINEE=", 14) != 0 && strncmp(*p, "SONDE_PAGE_TOKEN=", 17) != 0 &&
+        strncmp(*p, "SONDE_TEACHER_TOKEN=", 20) != 0)
       list[count++] = *p;
   list[count] = NULL;
 }
@@ -76,7 +78,7 @@ static int files(posix_spawn_file_actions_t *actions, int errors) {
 }
 
 static int spawn(const class_room *room, class_learner *learner, int errors) {
-  char port[8], name[CLASS_NAME + 16], token[SONDE_PAGE_TOKEN + 20];
+  char port[8], name[CLASS_NAME + 16], token[SONDE_PAGE_TOKEN + 20], teacher[SONDE_PAGE_TOKEN + 24];
   const char *argument[ARGUMENTS];
   char *variable[VARIABLES];
   posix_spawnattr_t attribute;
@@ -85,7 +87,8 @@ static int spawn(const class_room *room, class_learner *learner, int errors) {
   snprintf(name, sizeof name, "SONDE_TRAINEE=%s", learner->name);
   if (!child_arguments(room, port, argument)) return E2BIG;
   snprintf(token, sizeof token, "SONDE_PAGE_TOKEN=%s", learner->token);
-  child_environment(name, token, variable);
+  snprintf(teacher, sizeof teacher, "SONDE_TEACHER_TOKEN=%s", learner->teacher_token);
+  child_environment(name, token, teacher, variable);
   int code = attributes(&attribute);
   if (code) return code;
   code = files(&actions, errors);

@@ -18,8 +18,8 @@ typedef struct class_status {
 typedef struct class_learner {
   char name[CLASS_NAME];
   uint16_t port;
-  char token[SONDE_PAGE_TOKEN]; // of its page
-  pid_t process;                // 0: not running
+  char token[SONDE_PAGE_TOKEN], teacher_token[SONDE_PAGE_TOKEN]; // of its page
+  pid_t process;                                                 // 0: not running
   double started_s, start_again_s;
   uint32_t restarts; // since it last ran for long
   bool gave_up;

@@ -22,9 +22,9 @@ static const char HELP[] =
     "usage: sonde class --learners N [--names A,B,C] [--port P] [-- RUN OPTIONS]\n"
     "\n"
     "Starts `sonde run` for each of N learners, each with a page of its own, and shows how they\n"
-    "are doing. A program that dies is started again, three times at most. Open a learner's\n"
-    "address in a second window to watch. An address has a secret: whoever has it can take part.\n"
-    "Ctrl-C ends them all.\n"
+    "are doing. A program that dies is started again, three times at most. Each learner\n"
+    "has two addresses: the learner's own, and the teacher's, to watch, comment and take control.\n"
+    "An address has a secret: who has it can take part. Ctrl-C ends them all.\n"
     "\n"
     "  --learners N    how many (1 to 16); default: as many as names\n"
     "  --names A,B,C   what to call them; default: Learner 1, Learner 2, ...\n"
@@ -217,17 +217,28 @@ static void tell_changes(const class_room *room, char told[CLASS_LEARNERS][128])
 static int make_tokens(class_room *room) {
   for (uint32_t i = 0; i < room->count; ++i) {
     sonde_error error = {0};
-    if (sonde_page_token_make(room->learner[i].token, &error)) return app_fail(VERB, &error);
+    if (sonde_page_token_make(room->learner[i].token, &error) ||
+        sonde_page_token_make(room->learner[i].teacher_token, &error))
+      return app_fail(VERB, &error);
   }
   return APP_OK;
 }
 
+static void print_address(const char *whose, uint16_t port, const char *token) {
+  printf("%s: http://127.0.0.1:%u/#%s\n", whose, (unsigned)port, token);
+}
+
 static void print_addresses(const class_room *room) {
-  printf("%u learners. Open an address in a second window to watch. Ctrl-C ends them all.\n",
+  printf("%u learners. A teacher's address is to watch, comment and take control. Ctrl-C ends "
+         "them all.\n",
          room->count);
   for (uint32_t i = 0; i < room->count; ++i)
-    printf("%s: http://127.0.0.1:%u/#%s\n", room->learner[i].name, (unsigned)room->learner[i].port,
-           room->learner[i].token);
+    print_address(room->learner[i].name, room->learner[i].port, room->learner[i].token);
+  for (uint32_t i = 0; i < room->count; ++i) {
+    char whose[CLASS_NAME + 16];
+    snprintf(whose, sizeof whose, "Teacher of %s", room->learner[i].name);
+    print_address(whose, room->learner[i].port, room->learner[i].teacher_token);
+  }
 }
 
 static int run_class(class_room *room) {

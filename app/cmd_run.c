@@ -247,9 +247,10 @@ static void sleep_s(double seconds) {
   nanosleep(&pause, NULL);
 }
 
-// Whoever reads the address controls the page.
-static void announce(const char *address) {
-  printf("Sonde is running: %s  (Ctrl-C stops)\n", address);
+// Who reads an address can take part.
+static void announce(const char *learner, const char *teacher) {
+  printf("Sonde is running: %s  (Ctrl-C stops)\n", learner);
+  printf("For a teacher:    %s\n", teacher);
   fflush(stdout);
 }
 
@@ -265,9 +266,10 @@ static sonde_status run_page(const settings *s, const sonde_session_def *session
   if (status) return status;
   status = sonde_session_start(session, error);
   if (!status) {
-    char address[SONDE_PAGE_ADDRESS];
-    sonde_page_address(server, address);
-    announce(address);
+    char learner[SONDE_PAGE_ADDRESS], teacher[SONDE_PAGE_ADDRESS];
+    sonde_page_address(server, false, learner);
+    sonde_page_address(server, true, teacher);
+    announce(learner, teacher);
     while (!app_interrupted()) sleep_s(0.1);
   }
   sonde_page_stop(server);
@@ -313,9 +315,10 @@ static sonde_status run_desk(const settings *s, const sonde_model *model,
   sonde_status status = run_device_site(&s->device, model, &def.start, error);
   if (!status) status = desk_create(&def, &d, error);
   if (status) return status;
-  char address[SONDE_PAGE_ADDRESS];
-  desk_address(d, address);
-  announce(address);
+  char learner[SONDE_PAGE_ADDRESS], teacher[SONDE_PAGE_ADDRESS];
+  desk_address(d, false, learner);
+  desk_address(d, true, teacher);
+  announce(learner, teacher);
   while (!app_interrupted()) {
     desk_turn(d);
     sleep_s(0.01);

@@ -209,7 +209,7 @@ static sonde_status answer(desk *d, const sonde_page_request *request, sonde_err
   case SONDE_PAGE_OPEN_REPLAY: return desk_replay_open(d, request->id, error);
   case SONDE_PAGE_SEEK: return desk_replay_seek(d, request->time_s, error);
   case SONDE_PAGE_PLAY: return play(d, request, error);
-  default: return desk_replay_comment(d, request, error);
+  default: return desk_comment(d, request, error);
   }
 }
 
@@ -259,11 +259,14 @@ static sonde_status create_probes(desk *d, sonde_error *error) {
 }
 
 static sonde_status create_page(desk *d, sonde_error *error) {
-  char token[SONDE_PAGE_TOKEN];
+  char token[SONDE_PAGE_TOKEN], teacher[SONDE_PAGE_TOKEN];
   sonde_status status = page_token_find(d->exams, "page.token", "SONDE_PAGE_TOKEN", token, error);
+  if (!status)
+    status = page_token_find(d->exams, "teacher.token", "SONDE_TEACHER_TOKEN", teacher, error);
   if (status) return status;
   sonde_page_def page = {.port = d->def.port,
                          .token = token,
+                         .teacher_token = teacher,
                          .model_path = d->def.model_path,
                          .force_limit_n = d->def.force_limit_n,
                          .exams_directory = d->exams,
@@ -307,8 +310,8 @@ sonde_status desk_create(const desk_def *def, desk **out, sonde_error *error) {
   return status;
 }
 
-void desk_address(const desk *d, char address[SONDE_PAGE_ADDRESS]) {
-  sonde_page_address(d->server, address);
+void desk_address(const desk *d, bool teacher, char address[SONDE_PAGE_ADDRESS]) {
+  sonde_page_address(d->server, teacher, address);
 }
 
 sonde_status desk_destroy(desk *d, sonde_error *error) {

@@ -31,8 +31,8 @@ typedef struct desk_def {
 sonde_status desk_create(const desk_def *def, desk **out, sonde_error *error);
 // Ends what runs; an exam under way is kept without a score.
 sonde_status desk_destroy(desk *d, sonde_error *error);
-// The page's address with its token.
-void desk_address(const desk *d, char address[SONDE_PAGE_ADDRESS]);
+// The page's address with the learner's or the teacher's token.
+void desk_address(const desk *d, bool teacher, char address[SONDE_PAGE_ADDRESS]);
 // Does what was asked for since the last turn; call it every 10 ms or so.
 void desk_turn(desk *d);
 

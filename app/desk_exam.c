@@ -208,6 +208,7 @@ void desk_exam_destroy(desk_exam *exam) {
   sonde_image_clear(&exam->open.image);
   sonde_image_clear(&exam->closed.image);
   free(exam->sample);
+  free(exam->comments.list);
   sonde_judge_destroy(exam->judge);
   sonde_case_setup_clear(&exam->setup);
   free(exam);

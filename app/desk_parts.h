@@ -33,6 +33,7 @@ typedef struct desk_picture {
 
 // An exam, running or done.
 typedef struct desk_exam {
+  sonde_comments comments; // made while it ran; the list is realloc()'s
   char id[64], directory[DESK_PATH], trainee[164];
   sonde_case patient;
   const sonde_exam_protocol *protocol;
@@ -145,7 +146,8 @@ bool desk_read_setup(const char *recording, cJSON **root);
 sonde_status desk_replay_open(desk *d, const char *id, sonde_error *error);
 void desk_replay_turn(desk *d);
 sonde_status desk_replay_seek(desk *d, double time_s, sonde_error *error);
-sonde_status desk_replay_comment(desk *d, const sonde_page_request *request, sonde_error *error);
+// To the replay that is shown, or to the exam that runs, at its present time.
+sonde_status desk_comment(desk *d, const sonde_page_request *request, sonde_error *error);
 void desk_replay_destroy(desk_replay *replay);
 
 // desk.c

@@ -164,17 +164,51 @@ sonde_status desk_replay_seek(desk *d, double time_s, sonde_error *error) {
   return status;
 }
 
-sonde_status desk_replay_comment(desk *d, const sonde_page_request *request, sonde_error *error) {
-  desk_replay *replay = d->replay;
-  if (!replay) return app_error(error, SONDE_ARGUMENT, "there is no replay to comment on");
-  sonde_comment comment = {.time_s = request->time_s};
+static sonde_comment comment_of(const sonde_page_request *request, double time_s) {
+  sonde_comment comment = {.time_s = time_s};
   snprintf(comment.author, sizeof comment.author, "%.*s", (int)sizeof comment.author - 1,
            request->name);
   snprintf(comment.text, sizeof comment.text, "%.*s", (int)sizeof comment.text - 1, request->text);
+  return comment;
+}
+
+static sonde_status comment_replay(desk_replay *replay, const sonde_page_request *request,
+                                   sonde_error *error) {
+  sonde_comment comment = comment_of(request, request->time_s);
   sonde_status status = sonde_comments_add(replay->recording, &comment, error);
   if (status) return status;
   sonde_comments_clear(&replay->comments);
   return sonde_comments_load(replay->recording, &replay->comments, error);
+}
+
+// Into the recording that is being made.
+static sonde_status comment_exam(desk *d, const sonde_page_request *request, sonde_error *error) {
+  desk_exam *exam = d->exam;
+  sonde_comments *all = &exam->comments;
+  pthread_mutex_lock(&d->lock);
+  double time_s = sonde_judge_state(exam->judge).time_s;
+  uint64_t tick = exam->seen_tick;
+  pthread_mutex_unlock(&d->lock);
+  if (all->count == SONDE_MAX_COMMENTS)
+    return app_error(error, SONDE_ARGUMENT, "an exam takes at most %d comments",
+                     SONDE_MAX_COMMENTS);
+  sonde_comment comment = comment_of(request, time_s);
+  char *text = sonde_comment_json(&comment, error);
+  if (!text) return error->status;
+  sonde_status status = sonde_session_note(d->session, SONDE_NOTE_COMMENT, tick, text, error);
+  sonde_free(text);
+  if (status) return status;
+  sonde_comment *list = realloc(all->list, (all->count + 1) * sizeof *list);
+  if (!list) return app_error(error, SONDE_MEMORY, "out of memory");
+  all->list = list;
+  list[all->count++] = comment;
+  return SONDE_OK;
+}
+
+sonde_status desk_comment(desk *d, const sonde_page_request *request, sonde_error *error) {
+  if (d->replay) return comment_replay(d->replay, request, error);
+  if (d->phase == DESK_RUNNING && d->session) return comment_exam(d, request, error);
+  return app_error(error, SONDE_ARGUMENT, "there is no exam to comment on");
 }
 
 void desk_replay_destroy(desk_replay *replay) {

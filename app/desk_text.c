@@ -220,6 +220,17 @@ static void add_result(cJSON *root, const desk *d, const desk_exam *exam) {
   cJSON_AddStringToObject(diagnosis, "truth", exam->score.truth);
 }
 
+static void add_comments(cJSON *root, const sonde_comments *comments) {
+  cJSON *list = cJSON_AddArrayToObject(root, "comments");
+  for (uint32_t i = 0; i < comments->count; ++i) {
+    cJSON *item = cJSON_CreateObject();
+    add_real(item, "t_s", comments->list[i].time_s, 0.01);
+    cJSON_AddStringToObject(item, "text", comments->list[i].text);
+    cJSON_AddStringToObject(item, "author", comments->list[i].author);
+    cJSON_AddItemToArray(list, item);
+  }
+}
+
 // Under the lock.
 static void add_exam(cJSON *root, const desk *d, const desk_exam *exam) {
   bool hinted = false, full = strcmp(exam->guidance, "full") == 0;
@@ -238,6 +249,7 @@ static void add_exam(cJSON *root, const desk *d, const desk_exam *exam) {
   add_segments(root, exam);
   add_presses(root, exam);
   add_result(root, d, exam);
+  add_comments(root, &exam->comments);
 }
 
 // The same keys when there is no exam.
@@ -258,6 +270,7 @@ static void add_no_exam(cJSON *root) {
   cJSON_AddArrayToObject(root, "segments");
   cJSON_AddArrayToObject(root, "presses");
   cJSON_AddNullToObject(root, "result");
+  cJSON_AddArrayToObject(root, "comments");
 }
 
 static const char *phase_name(desk_phase phase) {
@@ -330,17 +343,6 @@ void desk_tell_exams(desk *d) {
 }
 
 // ---- replay
-
-static void add_comments(cJSON *root, const sonde_comments *comments) {
-  cJSON *list = cJSON_AddArrayToObject(root, "comments");
-  for (uint32_t i = 0; i < comments->count; ++i) {
-    cJSON *item = cJSON_CreateObject();
-    add_real(item, "t_s", comments->list[i].time_s, 0.01);
-    cJSON_AddStringToObject(item, "text", comments->list[i].text);
-    cJSON_AddStringToObject(item, "author", comments->list[i].author);
-    cJSON_AddItemToArray(list, item);
-  }
-}
 
 void desk_tell_replay(desk *d) {
   const desk_replay *replay = d->replay;

@@ -59,14 +59,16 @@ typedef enum sonde_page_topic {
 
 typedef struct sonde_page_def {
   uint16_t port;               /**< 0: any free port */
-  const char *token;           /**< secret of the address; NULL: a new one */
+  const char *token;           /**< secret of the learner's address; NULL: a new one */
+  const char *teacher_token;   /**< of the teacher's address; NULL: a new one */
   const char *data_directory;  /**< serve the page from here instead of memory (development) */
   const char *model_path;      /**< for recordings and titles; may be NULL */
   double force_limit_n;        /**< shown on the page; 0: sonde_safety_limits_default() */
   const char *exams_directory; /**< with ID/report.html, exam.json, exam.csv; NULL: none */
   void *user;                  /**< for the function below, which may be NULL */
-  /** A request of the client that controls. Called by one thread at a time while the server's
-   *  clients wait: copy it and return; call nothing of this header from it. */
+  /** A request of the client that controls; a comment or the list of exams, of any. Called by one
+   *  thread at a time while the server's clients wait: copy it and return; call nothing of this
+   *  header from it. */
   void (*request)(void *user, const sonde_page_request *request);
 } sonde_page_def;
 
@@ -99,8 +101,9 @@ SONDE_API sonde_status sonde_page_publish(sonde_page_server *server, sonde_page_
 SONDE_API void sonde_page_conceal(sonde_page_server *server, bool pathology, bool areas);
 /** A sentence for all clients. @thread any */
 SONDE_API void sonde_page_tell(sonde_page_server *server, const char *sentence);
-/** The address to open, with the token; who reads it controls the page. @thread any */
-SONDE_API void sonde_page_address(const sonde_page_server *server,
+/** The address to open, with the learner's or the teacher's token: who reads it can take part.
+ *  @thread any */
+SONDE_API void sonde_page_address(const sonde_page_server *server, bool teacher,
                                   char address[SONDE_PAGE_ADDRESS]);
 /** The address of a document ("/report/ID", "/exam/ID.csv") with a key that opens this document
  *  and nothing else, relative to the page's. @param path less than 160 characters @thread any */

@@ -1,6 +1,6 @@
 // One WebSocket client: what it may say, and what it is told.
 //
-// page_client_controls, page_client_wants_frame   its role and its room for a frame
+// page_client_wants_frame   its room for a frame
 // take_token                the rate limit
 // acknowledge               a frame reached the screen
 // greet, send_geometry, take_frame, do_job   one message each
@@ -12,13 +12,8 @@
 
 #include <string.h>
 
-bool page_client_controls(const page_client *client) {
-  const sonde_page_server *server = client->server;
-  for (int i = 0; i < PAGE_CLIENTS; ++i) {
-    const page_client *other = &server->client[i];
-    if (other->here && other->joined < client->joined) return false;
-  }
-  return true;
+static bool same_role(page_role a, page_role b) {
+  return a.is == b.is && a.holder == b.holder && a.may == b.may && a.controls == b.controls;
 }
 
 bool page_client_greeted(const page_client *client) {
@@ -83,7 +78,7 @@ static job next_job(const page_client *client) {
   if (!page_client_greeted(client)) return JOB_GREET;
   if (client->scene && client->scene_next < client->scene->message_count) return JOB_GEOMETRY;
   if (client->told_serial != server->controls_serial ||
-      client->told_control != page_client_controls(client))
+      !same_role(client->told_role, page_client_role(client)))
     return JOB_CONTROLS;
   if (due_topic(client) < SONDE_PAGE_TOPICS) return JOB_TOPIC;
   if (client->note_due) return JOB_NOTE;
@@ -171,12 +166,12 @@ static bool do_job(page_client *client, job what, page_out *out) {
     page_out_frame(out, PAGE_WS_BINARY, client->out.bytes, client->out.size, NULL);
     return true;
   }
-  bool controls = page_client_controls(client);
+  page_role role = page_client_role(client);
   if (what == JOB_CONTROLS) {
     page_write_controls(&text, &server->controls, probe_name(server, server->controls.probe),
-                        server->hide_case, server->gel_m3, controls);
+                        server->hide_case, server->gel_m3, role);
     client->told_serial = server->controls_serial;
-    client->told_control = controls;
+    client->told_role = role;
   } else if (what == JOB_TOPIC) {
     int topic = due_topic(client);
     page_write_raw(&text, server->topic[topic].text);
@@ -204,7 +199,7 @@ bool page_client_next(page_client *client, page_out *out) {
   return what != JOB_NONE;
 }
 
-page_client *page_client_join(sonde_page_server *server) {
+page_client *page_client_join(sonde_page_server *server, const char *id, bool teacher) {
   pthread_mutex_lock(&server->lock);
   page_client *client = NULL;
   for (int i = 0; i < PAGE_CLIENTS && !client; ++i)
@@ -213,6 +208,9 @@ page_client *page_client_join(sonde_page_server *server) {
     page_buffer kept = client->out; // the buffer serves the next client of the slot
     *client = (page_client){.server = server, .here = true, .out = kept};
     client->joined = ++server->joined;
+    client->teacher = teacher;
+    snprintf(client->id, sizeof client->id, "%s", id);
+    page_roles_join(client);
     client->tokens = PAGE_BURST;
     client->tokens_at_s = sonde_clock_now();
   }
@@ -251,10 +249,10 @@ bool page_client_hear(page_client *client, const char *data, size_t size) {
   return keep;
 }
 
-void page_client_leave(page_client *client) {
+void page_client_leave(page_client *client, double heard_s) {
   sonde_page_server *server = client->server;
   pthread_mutex_lock(&server->lock);
   drop_scene(client);
-  client->here = false;
+  page_roles_leave(client, heard_s);
   pthread_mutex_unlock(&server->lock);
 }

@@ -41,6 +41,7 @@ void page_ws_unmask(unsigned char *payload, size_t count, const unsigned char ma
 }
 
 size_t page_ws_write(unsigned char head[PAGE_WS_HEAD_BYTES], int opcode, size_t payload) {
+  SONDE_ASSERT(opcode > 0 && opcode <= PAGE_WS_PONG && head);
   size_t extra = payload <= SHORT_MAX ? 0 : payload < 65536 ? 2 : 8;
   head[0] = (unsigned char)(FIN | opcode);
   head[1] = (unsigned char)(extra == 0 ? payload : extra == 2 ? 126 : 127);

@@ -115,7 +115,9 @@ static bool knows_token(const sonde_page_server *server, const page_request *req
   static const char SCHEME[] = "Bearer ";
   const char *field = request->field[PAGE_AUTHORIZATION];
   if (strncasecmp(field, SCHEME, sizeof SCHEME - 1) != 0) return false;
-  return page_secret_equal(server->token, field + sizeof SCHEME - 1);
+  const char *given = field + sizeof SCHEME - 1;
+  bool learner = page_secret_equal(server->token, given);
+  return page_secret_equal(server->teacher_token, given) || learner;
 }
 
 // The address of a document says its own key, so that it opens in another tab and opens nothing
@@ -220,13 +222,14 @@ static const page_file *find_file(const char *uri) {
 
 // The token is one of the subprotocols that the client offers: a browser cannot send it in another
 // field, and an address would be written down. Every offer is compared, whatever came before.
-static bool offers(const sonde_page_server *server, const char *list) {
-  bool known = false;
+static page_who offers(const sonde_page_server *server, const char *list) {
+  page_who known = PAGE_NOBODY;
   for (const char *p = list; *p;) {
     size_t count = strcspn(p, ", ");
     char word[PAGE_FIELD_TEXT];
     snprintf(word, sizeof word, "%.*s", (int)count, p);
-    if (page_secret_equal(server->token, word)) known = true;
+    if (page_secret_equal(server->token, word)) known = PAGE_LEARNER;
+    if (page_secret_equal(server->teacher_token, word)) known = PAGE_TEACHER;
     p += count + strspn(p + count, ", ");
   }
   return known;
@@ -236,14 +239,18 @@ static void upgrade(sonde_page_server *server, const page_request *request, page
                     page_client **client) {
   const char *origin = request->given[PAGE_ORIGIN] ? request->field[PAGE_ORIGIN] : NULL;
   const char *key = request->field[PAGE_WS_KEY];
+  page_who who = offers(server, request->field[PAGE_WS_PROTOCOL]);
+  char id[PAGE_SECRET_TEXT];
+  if (!page_request_parameter(request, "client", id, sizeof id) || !sonde_page_token_valid(id))
+    id[0] = 0;
   if (!page_origin_allowed(origin, server->port)) {
     send_refusal(out, 403, "Forbidden", "only this server's own page may connect\n");
-  } else if (!offers(server, request->field[PAGE_WS_PROTOCOL])) {
+  } else if (who == PAGE_NOBODY) {
     send_stranger(out);
   } else if (strcasecmp(request->field[PAGE_UPGRADE], "websocket") != 0 || strlen(key) != 24 ||
              strcmp(request->field[PAGE_WS_VERSION], "13") != 0) {
     page_http_refuse(out, 400);
-  } else if (!(*client = page_client_join(server))) {
+  } else if (!(*client = page_client_join(server, id, who == PAGE_TEACHER))) {
     send_refusal(out, 503, "Service Unavailable", "no more pages can connect\n");
   } else {
     char accept[PAGE_ACCEPT_TEXT];

@@ -8,7 +8,7 @@
 #include "sonde/stream.h"
 
 enum {
-  PAGE_VERSION = 2,
+  PAGE_VERSION = 3,
   PAGE_HEADER_BYTES = 16,
   PAGE_MESH_FIXED_BYTES = 24,   // header and counts, before the points
   PAGE_FRAME_FIXED_BYTES = 140, // header and snapshot, before the displacements
@@ -58,11 +58,20 @@ typedef struct page_hello {
   bool controls;    // this client may move the probe
 } page_hello;
 
+typedef enum page_who { PAGE_NOBODY, PAGE_LEARNER, PAGE_WATCHER, PAGE_TEACHER } page_who;
+typedef enum page_may { PAGE_MAY_NOTHING, PAGE_MAY_TAKE, PAGE_MAY_GIVE, PAGE_MAY_RETURN } page_may;
+
+// What a client is told about control.
+typedef struct page_role {
+  page_who is, holder; // the client; who controls
+  page_may may;        // the one thing that it may ask for
+  bool controls;
+} page_role;
+
 void page_write_hello(page_text *text, const page_hello *hello);
 // @param hide_case a learner may not be told its name @param gel_m3 on the skin
 void page_write_controls(page_text *text, const sonde_session_controls *controls,
-                         const char *probe_name, bool hide_case, double gel_m3,
-                         bool client_controls);
+                         const char *probe_name, bool hide_case, double gel_m3, page_role role);
 bool page_posture_parse(const char *name, sonde_posture *posture);
 // `kind` is "error" or another message type with one text.
 void page_write_note(page_text *text, const char *kind, const char *sentence);
@@ -77,6 +86,7 @@ typedef enum page_command_type {
   PAGE_COMMAND_ACK,
   PAGE_COMMAND_PING,
   PAGE_COMMAND_GEL,
+  PAGE_COMMAND_ROLE,
   PAGE_COMMAND_REQUEST
 } page_command_type;
 
@@ -90,7 +100,8 @@ typedef struct page_command {
   char posture[16];
   int strain; // 1, 0; -1: as it is
   bool gel_put, gel_wipe;
-  uint32_t id; // of the acknowledged frame or of the ping
+  page_may action; // of a role
+  uint32_t id;     // of the acknowledged frame or of the ping
   sonde_page_request request;
 } page_command;
 

@@ -80,7 +80,7 @@ static void clear_out(page_connection *c) {
 }
 
 static void drop(page_connection *c) {
-  if (c->client) page_client_leave(c->client);
+  if (c->client) page_client_leave(c->client, c->heard_s);
   clear_out(c);
   sonde_free(c->in);
   close(c->socket);
@@ -90,7 +90,8 @@ static void drop(page_connection *c) {
 // Nothing more is sent. Reading goes on for a moment: closing a socket with unread bytes would
 // destroy what was sent last.
 static void end_connection(page_connection *c) {
-  if (c->client) page_client_leave(c->client);
+  SONDE_ASSERT(c->socket >= 0 && c->stage != PAGE_ENDS);
+  if (c->client) page_client_leave(c->client, c->heard_s);
   c->client = NULL;
   clear_out(c);
   shutdown(c->socket, SHUT_WR);
@@ -111,6 +112,7 @@ static bool idle(const page_connection *c) {
 // False when the connection is lost. A full socket leaves the rest for later.
 static bool send_out(page_connection *c) {
   page_out *out = &c->out;
+  SONDE_ASSERT(out->head_size <= sizeof out->head && (out->body || !out->body_size));
   while (!idle(c)) {
     size_t head = out->done < out->head_size ? out->head_size - out->done : 0;
     size_t body = out->done < out->head_size ? 0 : out->done - out->head_size;
@@ -331,6 +333,7 @@ static void say_goodbye(sonde_page_server *server) {
 static bool goes_on(sonde_page_server *server, page_patience *patience) {
   pthread_mutex_lock(&server->lock);
   bool stopping = server->stopping;
+  page_roles_turn(server);
   *patience = server->patience;
   pthread_mutex_unlock(&server->lock);
   return !stopping;

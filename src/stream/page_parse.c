@@ -146,6 +146,17 @@ static sonde_status parse_gel(const cJSON *root, page_command *command, sonde_er
   return status;
 }
 
+static sonde_status parse_role(const cJSON *root, page_command *command, sonde_error *error) {
+  static const char *const ACTIONS[] = {"", "take", "give", "return"};
+  char action[8] = "";
+  sonde_status status = read_name(root, "action", action, sizeof action, error);
+  for (size_t i = 1; i < SONDE_COUNT_OF(ACTIONS); ++i)
+    if (strcmp(action, ACTIONS[i]) == 0) command->action = (page_may)i;
+  if (!status && command->action == PAGE_MAY_NOTHING)
+    status = sonde_fail(error, SONDE_ARGUMENT, "\"action\" must be take, give or return");
+  return status;
+}
+
 // UTF-8 text without control characters; `least` 0 allows it to be absent.
 static sonde_status read_text(const cJSON *object, const char *key, size_t least, size_t most,
                               char *text, size_t size, sonde_error *error) {
@@ -224,9 +235,9 @@ static sonde_status parse_request(const cJSON *root, sonde_page_ask ask, sonde_p
 
 // Requests of the program after the page's own commands, in the order of sonde_page_ask.
 static const char *const TYPES[] = {
-    "goal",       "controls",    "stop",   "resume", "ack",         "ping",
-    "gel",        "start_exam",  "decide", "hint",   "finish_exam", "leave_exam",
-    "list_exams", "open_replay", "seek",   "play",   "comment"};
+    "goal",       "controls",   "stop",        "resume", "ack",  "ping",
+    "gel",        "role",       "start_exam",  "decide", "hint", "finish_exam",
+    "leave_exam", "list_exams", "open_replay", "seek",   "play", "comment"};
 _Static_assert(SONDE_COUNT_OF(TYPES) == PAGE_COMMAND_REQUEST + (int)SONDE_PAGE_ASKS, "a type each");
 
 static sonde_status parse_object(const cJSON *root, page_command *command, sonde_error *error) {
@@ -238,7 +249,7 @@ static sonde_status parse_object(const cJSON *root, page_command *command, sonde
   if (which == SONDE_COUNT_OF(TYPES))
     return sonde_fail(
         error, SONDE_NOT_FOUND,
-        "\"type\" must be goal, controls, stop, resume, ack, ping, gel or a request of "
+        "\"type\" must be goal, controls, stop, resume, ack, ping, gel, role or a request of "
         "docs/page_protocol.md");
   if (which >= PAGE_COMMAND_REQUEST) {
     command->type = PAGE_COMMAND_REQUEST;
@@ -252,6 +263,7 @@ static sonde_status parse_object(const cJSON *root, page_command *command, sonde
   case PAGE_COMMAND_ACK: return read_id(root, "frame", &command->id, error);
   case PAGE_COMMAND_PING: return read_id(root, "id", &command->id, error);
   case PAGE_COMMAND_GEL: return parse_gel(root, command, error);
+  case PAGE_COMMAND_ROLE: return parse_role(root, command, error);
   default: return SONDE_OK; // stop, resume
   }
 }

@@ -90,6 +90,7 @@ int page_request_parse(const char *bytes, size_t size, page_request *request) {
 
 bool page_request_parameter(const page_request *request, const char *name, char *value,
                             size_t size) {
+  SONDE_ASSERT(request && name[0] && value && size > 0);
   size_t length = strlen(name);
   for (const char *p = request->query; *p;) {
     size_t count = strcspn(p, "&");

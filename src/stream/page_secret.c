@@ -97,6 +97,7 @@ static void write_digits(const unsigned char *bytes, char text[PAGE_SECRET_TEXT]
 
 void page_document_key(const char *token, const char *path, char key[PAGE_SECRET_TEXT]) {
   unsigned char digest[PAGE_SHA1_BYTES];
+  SONDE_ASSERT(token && path && key);
   page_hmac_sha1(token, path, digest);
   write_digits(digest, key);
 }

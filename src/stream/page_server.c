@@ -124,12 +124,23 @@ static void apply_controls(sonde_page_server *server, page_client *client,
   server->controls = next;
 }
 
-// Anyone may stop; only the client that controls may do the rest.
+// What everyone may do who was let in; the rest is for the client that controls.
+static bool is_free(const page_command *command) {
+  if (command->type == PAGE_COMMAND_REQUEST)
+    return command->request.ask == SONDE_PAGE_COMMENT ||
+           command->request.ask == SONDE_PAGE_LIST_EXAMS;
+  return command->type == PAGE_COMMAND_STOP || command->type == PAGE_COMMAND_ROLE;
+}
+
 void page_command_apply(sonde_page_server *server, page_client *client,
                         const page_command *command) {
   const page_source *source = &server->source;
-  if (command->type != PAGE_COMMAND_STOP && !page_client_controls(client)) {
+  if (!is_free(command) && !page_client_controls(client)) {
     page_client_note(client, "another page controls the probe; this one only watches");
+    return;
+  }
+  if (command->type == PAGE_COMMAND_ROLE) {
+    page_roles_act(client, command->action);
     return;
   }
   if (command->type == PAGE_COMMAND_REQUEST) {
@@ -272,17 +283,17 @@ static void keep_def(sonde_page_server *server, const sonde_page_def *def) {
   if (def->exams_directory)
     snprintf(server->exams_directory, sizeof server->exams_directory, "%s", def->exams_directory);
   server->def.data_directory = server->def.exams_directory = server->def.model_path = NULL;
-  server->def.token = NULL;
-  server->patience =
-      (page_patience){.ask_s = 10, .answer_s = 30, .end_s = 2, .ping_s = 2, .silent_s = 6};
+  server->def.token = server->def.teacher_token = NULL;
+  server->patience = (page_patience){
+      .ask_s = 10, .answer_s = 30, .end_s = 2, .ping_s = 2, .silent_s = 6, .return_s = 60};
 }
 
-static sonde_status keep_token(sonde_page_server *server, const char *token, sonde_error *error) {
-  if (!token) return sonde_page_token_make(server->token, error);
+static sonde_status keep_token(char kept[PAGE_SECRET_TEXT], const char *token, sonde_error *error) {
+  if (!token) return sonde_page_token_make(kept, error);
   if (!sonde_page_token_valid(token))
     return sonde_fail(error, SONDE_ARGUMENT, "a page's token must have %d digits from 0-9a-f",
                       SONDE_PAGE_TOKEN - 1);
-  snprintf(server->token, sizeof server->token, "%s", token);
+  snprintf(kept, PAGE_SECRET_TEXT, "%s", token);
   return SONDE_OK;
 }
 
@@ -297,7 +308,8 @@ sonde_status page_server_start(const sonde_page_def *def, const page_source *sou
   pthread_mutex_init(&server->source_lock, NULL);
   server->listener = server->wake = -1;
   for (int i = 0; i < PAGE_CONNECTIONS; ++i) server->connection[i].socket = -1;
-  sonde_status status = keep_token(server, def->token, error);
+  sonde_status status = keep_token(server->token, def->token, error);
+  if (!status) status = keep_token(server->teacher_token, def->teacher_token, error);
   if (!status) status = page_net_open(server, def->port, error);
   if (!status) status = page_server_show(server, source, error);
   if (!status) status = page_net_start(server, error);
@@ -314,10 +326,11 @@ sonde_status page_server_start(const sonde_page_def *def, const page_source *sou
   return status;
 }
 
-void sonde_page_address(const sonde_page_server *server, char address[SONDE_PAGE_ADDRESS]) {
+void sonde_page_address(const sonde_page_server *server, bool teacher,
+                        char address[SONDE_PAGE_ADDRESS]) {
   SONDE_ASSERT(server && address);
   snprintf(address, SONDE_PAGE_ADDRESS, "http://127.0.0.1:%u/#%s", (unsigned)server->port,
-           server->token);
+           teacher ? server->teacher_token : server->token);
 }
 
 void sonde_page_link(const sonde_page_server *server, const char *path,

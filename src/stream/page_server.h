@@ -61,15 +61,17 @@ typedef struct page_out {
 
 typedef struct page_client {
   sonde_page_server *server;
-  bool here;            // false: free slot
-  bool leaving;         // to be closed
-  uint64_t joined;      // order of arrival; the smallest controls
-  uint32_t greeted;     // generation whose hello was sent; 0: none
-  page_scene *scene;    // geometry under way; one reference; NULL: none
-  uint32_t scene_next;  // its message to be sent next
-  uint32_t told_serial; // of the controls
+  bool here;                 // false: free slot
+  bool leaving;              // to be closed
+  uint64_t joined;           // order of arrival
+  char id[PAGE_SECRET_TEXT]; // that its page chose, the same after a reload; empty: none
+  bool teacher;              // came with the teacher's token
+  uint32_t greeted;          // generation whose hello was sent; 0: none
+  page_scene *scene;         // geometry under way; one reference; NULL: none
+  uint32_t scene_next;       // its message to be sent next
+  uint32_t told_serial;      // of the controls
   uint32_t told_topic[SONDE_PAGE_TOPICS];
-  bool told_control; // what it was told about its role
+  page_role told_role;
   bool pong_due, note_due;
   uint32_t pong_id;
   char note[200];
@@ -108,6 +110,7 @@ typedef struct page_patience {
   double end_s;    // to close
   double ping_s;   // a client that said nothing for so long is asked whether it is there
   double silent_s; // one that said nothing for so long is closed
+  double return_s; // for the learner's page to come back, since it was heard last
 } page_patience;
 
 // Newest text of a topic.
@@ -126,9 +129,13 @@ struct sonde_page_server {
   page_topic topic[SONDE_PAGE_TOPICS];
   char exams_directory[512]; // empty: none
   char data_directory[512];  // empty: serve from memory
-  char token[PAGE_SECRET_TEXT];
+  char token[PAGE_SECRET_TEXT], teacher_token[PAGE_SECRET_TEXT];
+  page_client *owner;              // the learner's; NULL: gone
+  page_client *borrower;           // who controls in the owner's place; NULL: nobody does
+  char owner_id[PAGE_SECRET_TEXT]; // of the owner, also when it is gone
+  double owner_until_s;            // how long it is waited for
   page_patience patience;
-  int listener, wake;     // sockets; `wake` ends a wait of the sockets' thread
+  int listener, wake; // sockets; `wake` ends a wait of the sockets' thread
   uint16_t port;
   pthread_t pump, net;
   pthread_mutex_t lock;
@@ -179,17 +186,22 @@ bool page_host_allowed(const char *host, uint16_t port);
 bool page_origin_allowed(const char *origin, uint16_t port);
 
 // page_client.c. A new client, NULL when there is no free slot. Takes the lock.
-page_client *page_client_join(sonde_page_server *server);
+page_client *page_client_join(sonde_page_server *server, const char *id, bool teacher);
 // A whole text message of a client; false ends the connection. Takes the lock.
 bool page_client_hear(page_client *client, const char *data, size_t size);
 // The message that is to be sent next; false when there is none. Takes the lock.
 bool page_client_next(page_client *client, page_out *out);
-// The connection is gone. Takes the lock.
-void page_client_leave(page_client *client);
+// The connection, which was heard last at that time, is gone. Takes the lock.
+void page_client_leave(page_client *client, double heard_s);
 void page_out_frame(page_out *out, int opcode, const void *body, size_t size, void *owned);
 
 // Under the lock.
 bool page_client_controls(const page_client *client);
+page_role page_client_role(const page_client *client);
+void page_roles_join(page_client *client);
+void page_roles_leave(page_client *client, double heard_s);
+void page_roles_turn(sonde_page_server *server); // now and then: a wait may be over
+void page_roles_act(page_client *client, page_may action);
 bool page_client_greeted(const page_client *client);
 bool page_client_wants_frame(const page_client *client);
 bool page_buffer_reserve(page_buffer *buffer, size_t capacity);

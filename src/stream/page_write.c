@@ -242,12 +242,16 @@ static void put_patient(page_text *text, const sonde_session_controls *controls,
 }
 
 void page_write_controls(page_text *text, const sonde_session_controls *controls,
-                         const char *probe_name, bool hide_case, double gel_m3,
-                         bool client_controls) {
+                         const char *probe_name, bool hide_case, double gel_m3, page_role role) {
+  static const char *const WHO[] = {"nobody", "learner", "watcher", "teacher"};
+  static const char *const MAY[] = {"", "take", "give", "return"};
   const sonde_echo_settings *echo = &controls->echo;
   put(text, "{");
   put_named_text(text, "type", "controls");
-  put_named_bool(text, "controls", client_controls);
+  put_named_bool(text, "controls", role.controls);
+  put_named_text(text, "role", WHO[role.is]);
+  put_named_text(text, "holder", WHO[role.holder]);
+  put_named_text(text, "may", MAY[role.may]);
   put_named_text(text, "probe", probe_name);
   put_named_text(text, "case", hide_case ? "" : controls->pathology.name);
   put_named_bool(text, "stop", controls->stop);

@@ -45,7 +45,7 @@ wait_for "Anna: exam, case case-$port,"
 wait_for "Bo: exam, case case-$((port + 1)),"
 wait_for "C D: exam, case case-$((port + 2)),"
 grep -qE "^C D: http://127.0.0.1:$((port + 2))/#[0-9a-f]{32}\$" "$out" || wrong "no address of the third learner"
-(($(grep -oE '#[0-9a-f]{32}$' "$out" | sort -u | wc -l) == 3)) || wrong "learners share a token"
+(($(grep -oE '#[0-9a-f]{32}$' "$out" | sort -u | wc -l) == 6)) || wrong "learners share a token"
 read -r first _ <"pid.$port"
 if tr '\0' ' ' <"/proc/$first/cmdline" | grep -qE '[0-9a-f]{32}'; then wrong "the token is in the command line, for all to see"; fi
 [[ $(cut -d' ' -f2- "pid.$((port + 2))") == 'C D' ]] || wrong "the name did not reach the program"

@@ -14,7 +14,7 @@ static void mesh_has_golden_bytes(void **state) {
   uint32_t faces[1][3] = {{0, 1, 2}};
   sonde_mesh mesh = {3, 1, points, faces};
   static const unsigned char EXPECTED[72] = {
-      'S', 'N', 'D',  'E',  2, 0, 1, 0,    3, 0, 0,    0,
+      'S', 'N', 'D',  'E',  3, 0, 1, 0,    3, 0, 0,    0,
       72,  0,   0,    0,                                     // header: version, type, part
       3,   0,   0,    0,    1, 0, 0, 0,                      // counts
       0,   0,   0,    0,    0, 0, 0, 0,    0, 0, 0,    0,    // 0 0 0
@@ -47,7 +47,7 @@ static void line_has_golden_bytes(void **state) {
   sonde_vessel vessel = {.count = 1};
   vessel.point[0] = (sonde_vessel_point){{0.004, 0, -0.001}, 0.0055, 0.018};
   static const unsigned char EXPECTED[40] = {
-      'S', 'N', 'D', 'E', 2, 0, 2,    0,    2, 0, 0, 0, 40, 0, 0,    0,    1, 0, 0,    0,
+      'S', 'N', 'D', 'E', 3, 0, 2,    0,    2, 0, 0, 0, 40, 0, 0,    0,    1, 0, 0,    0,
       0,   0,   0,   0,   0, 0, 0x80, 0x40, 0, 0, 0, 0, 0,  0, 0x80, 0xbf, 0, 0, 0xb0, 0x40};
   unsigned char bytes[40];
   assert_int_equal(page_encode_line(&vessel, PAGE_VEIN, bytes, sizeof bytes), 40);
@@ -91,7 +91,7 @@ static void frame_fields_stand_where_the_protocol_says(void **state) {
   unsigned char b[160] = {0};
   assert_int_equal(small_frame(b, sizeof b), 140 + 12 + 2);
   static const unsigned char HEAD[48] = {
-      'S', 'N', 'D', 'E', 2,   0, 3,    0,
+      'S', 'N', 'D', 'E', 3,   0, 3,    0,
       9,   0,   0,   0,   154, 0, 0,    0, // header
       8,   7,   6,   5,   4,   3, 2,    1,
       0,   0,   0,   0,   0,   0, 0xf8, 0x3f, // tick, 1.5 s
@@ -166,7 +166,8 @@ static void the_hello_can_be_read_by_a_json_parser(void **state) {
 static double written(double gain_db) {
   sonde_session_controls controls = {.echo = {.gain_db = gain_db}};
   page_text text = {0};
-  page_write_controls(&text, &controls, "point", false, 0, false);
+  page_write_controls(&text, &controls, "point", false, 0,
+                      (page_role){PAGE_WATCHER, PAGE_LEARNER, PAGE_MAY_NOTHING, false});
   cJSON *root = cJSON_ParseWithOpts(text.text, NULL, 1);
   assert_non_null(root);
   const cJSON *gain = cJSON_GetObjectItem(root, "gain_db");

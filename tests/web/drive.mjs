@@ -6,8 +6,8 @@ export const PATIENCE_MS = 1200000;
 
 export const browserPath = ["/usr/bin/chromium", "/usr/bin/chromium-browser"].find(existsSync);
 
-export const openBrowser = (chromium) =>
-  chromium.launch({ executablePath: browserPath, args: ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"] });
+export const openBrowser = (chromium, more = []) =>
+  chromium.launch({ executablePath: browserPath, args: ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync", ...more] });
 
 /** The address that the program prints, in its parts; null when the text has none. */
 export function findAddress(text) {

@@ -60,11 +60,14 @@ export function layoutFaults() {
     : [...document.querySelectorAll("header, #bar > div, #step, #findings, #segments, #decisions, #replay-head, #replay-track, .tools, #sliders, .slider, #press, #press-slider, #press-foot, #bottom-head, #readouts, main, #left, #right, #comment-form")];
   for (const group of groups.filter(seen)) {
     const box = group.getBoundingClientRect();
+    const scrolls = /auto|scroll/.test(getComputedStyle(group).overflowX + getComputedStyle(group).overflowY);
+    if (group.closest("main") !== group && [...document.querySelectorAll("main")].some((m) => m.contains(group) && m.scrollHeight > m.clientHeight + 1 && box.bottom > m.getBoundingClientRect().bottom)) continue; // reached by scrolling
+    if (getComputedStyle(group).display === "contents") continue;
     if (box.left < -0.5 || box.top < -0.5 || box.right > innerWidth + 0.5 || box.bottom > innerHeight + 0.5) faults.push(`${name(group)} leaves the window`);
     const parts = [...group.children].filter((e) => seen(e) && !e.closest(".unseen") && getComputedStyle(e).position !== "fixed");
     parts.forEach((a, i) => {
       const p = a.getBoundingClientRect();
-      if (p.right > box.right + 1.5 || p.left < box.left - 1.5 || p.bottom > box.bottom + 1.5 || p.top < box.top - 1.5) faults.push(`${name(a)} leaves ${name(group)}`);
+      if (!scrolls && (p.right > box.right + 1.5 || p.left < box.left - 1.5 || p.bottom > box.bottom + 1.5 || p.top < box.top - 1.5)) faults.push(`${name(a)} leaves ${name(group)}`);
       for (const b of parts.slice(i + 1)) {
         const q = b.getBoundingClientRect();
         const [w, h] = [Math.min(p.right, q.right) - Math.max(p.left, q.left), Math.min(p.bottom, q.bottom) - Math.max(p.top, q.top)];

@@ -137,11 +137,14 @@ export async function startMock({ webDir, port = 0, program = null, list = [] })
   await new Promise((resolve) => server.listen(port, "127.0.0.1", resolve));
   return {
     address: `http://127.0.0.1:${server.address().port}/`, trainer, thigh, clients,
-    /** The program is away for so long; what it knows is kept. */
-    drop(ms) {
+    /** The program is away for so long, or until it is back; what it knows is kept. */
+    drop(ms = 0) {
       away = true;
       clients.forEach((c) => c.socket.terminate());
-      setTimeout(() => (away = false), ms);
+      if (ms) setTimeout(() => (away = false), ms);
+    },
+    back() {
+      away = false;
     },
     close() {
       clearInterval(trainer.player);

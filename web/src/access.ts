@@ -2,6 +2,7 @@
 // that nobody reads it over a shoulder or in a copied link, and kept for this tab.
 
 const KEY = "sonde.token";
+const CLIENT_KEY = "sonde.client";
 const FORM = /^#([0-9a-f]{32})$/;
 
 let kept = "";
@@ -18,6 +19,18 @@ export function takeToken(): boolean {
   }
   history.replaceState(null, "", location.pathname + location.search);
   return true;
+}
+
+/** What this page calls itself, the same after a reload: so it gets back what was its own. */
+export function clientId(): string {
+  const fresh = [...crypto.getRandomValues(new Uint8Array(16))].map((b) => b.toString(16).padStart(2, "0")).join("");
+  try {
+    const known = sessionStorage.getItem(CLIENT_KEY) ?? fresh;
+    sessionStorage.setItem(CLIENT_KEY, known);
+    return known;
+  } catch {
+    return fresh;
+  }
 }
 
 /** Empty when this tab was never given one. */

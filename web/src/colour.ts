@@ -23,6 +23,9 @@ function at(t: number): Rgb {
   return STOPS[0]![1];
 }
 
+/** The colour of a share of the largest displacement, brightened or darkened, for CSS. */
+export const shade = (t: number, light: number): string => `rgb(${at(t).map((c) => Math.min(255, Math.round(c * light))).join(",")})`;
+
 const linear = (c: number): number => {
   const s = c / 255;
   return s <= 0.04045 ? s / 12.92 : ((s + 0.055) / 1.055) ** 2.4;

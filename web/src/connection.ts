@@ -1,6 +1,6 @@
 // The WebSocket: connects, says when the connection is lost and tries again.
 
-import { isStranger, takeToken, token } from "./access";
+import { clientId, isStranger, takeToken, token } from "./access";
 import {
   decode,
   type Decision,
@@ -10,6 +10,7 @@ import {
   type Mesh,
   type Posture,
   type Quat,
+  type RoleAction,
   type TextMessage,
   type Vec3,
 } from "./protocol";
@@ -41,6 +42,7 @@ export class Connection {
   private pingId = 0;
   private pingSent = 0;
   private timer = 0;
+  private readonly id = clientId();
 
   constructor(private readonly events: ConnectionEvents) {
     takeToken();
@@ -69,6 +71,9 @@ export class Connection {
   }
   gel(action: "put" | "wipe"): void {
     this.send({ type: "gel", action });
+  }
+  role(action: RoleAction): void {
+    this.send({ type: "role", action });
   }
   stop(): void {
     this.send({ type: "stop" });
@@ -126,7 +131,7 @@ export class Connection {
   private open(): void {
     window.clearTimeout(this.timer);
     if (this.socket) this.socket.onclose = null;
-    const socket = new WebSocket(`ws://${location.host}/ws`, token() ? ["sonde", token()] : ["sonde"]);
+    const socket = new WebSocket(`ws://${location.host}/ws?client=${this.id}`, token() ? ["sonde", token()] : ["sonde"]);
     let greeted = false;
     socket.binaryType = "arraybuffer";
     socket.onopen = () => {

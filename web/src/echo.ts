@@ -10,6 +10,7 @@ const CURVE_PX = 26; // gain over depth, left of the image
 const PAD_PX = 10;
 const GAP_PX = 14;
 const TOP_PX = 16;
+const NARROW_PX = 480;
 const FULL_DB = 30; // at the edge of the gain curve
 const INK = { scale: "#98a5b5", focus: "#e6b450", mark: "#5cc8c2" };
 
@@ -196,29 +197,31 @@ export class EchoView {
   private layout(): void {
     const { clientWidth: w, clientHeight: h } = this.box;
     const panes = this.compared ? [this.kept, this.live] : [this.live];
-    const room = w - RULER_PX - CURVE_PX - 2 * PAD_PX - GAP_PX * (panes.length - 1);
+    const curve = this.compared && w < NARROW_PX ? 0 : CURVE_PX; // two images need the room
+    const room = w - RULER_PX - curve - 2 * PAD_PX - GAP_PX * (panes.length - 1);
     const wide = panes.reduce((sum, p) => sum + p.width_mm, 0);
     const high = Math.max(...panes.map((p) => p.height_mm));
     const scale = Math.min(room / wide, (h - TOP_PX - PAD_PX) / high);
     if (!(scale > 0)) return;
-    const first = PAD_PX + CURVE_PX + (room - wide * scale) / 2;
+    const first = PAD_PX + curve + (room - wide * scale) / 2;
     let left = first;
     for (const pane of panes) {
       pane.place(left, TOP_PX, scale);
       left += pane.width_mm * scale + GAP_PX;
     }
-    this.placeText(first, TOP_PX + high * scale, h);
+    this.placeText(first, left - GAP_PX, TOP_PX + high * scale, h);
     const ratio = window.devicePixelRatio;
     this.overlay.width = Math.round(w * ratio);
     this.overlay.height = Math.round(h * ratio);
     this.marks.setTransform(ratio, 0, 0, ratio, 0, 0);
-    this.drawMarks(first, left - GAP_PX, scale);
+    this.drawMarks(first, left - GAP_PX, scale, curve > 0);
   }
 
   /** Under the pictures when there is room, else over their foot; measurements above the caption. */
-  private placeText(left: number, foot: number, h: number): void {
+  private placeText(left: number, right: number, foot: number, h: number): void {
     const top = Math.min(foot + 6, h - this.text.offsetHeight - 8);
     this.text.style.left = `${left + 6}px`;
+    this.text.style.maxWidth = `${Math.max(90, right - left - 8)}px`;
     this.text.style.top = `${top}px`;
     const below = top + this.text.offsetHeight + 8;
     const roomy = below + this.values.offsetHeight < h;
@@ -226,7 +229,7 @@ export class EchoView {
     this.values.style.top = `${roomy ? below : top - this.values.offsetHeight - 4}px`;
   }
 
-  private drawMarks(left: number, right: number, scale: number): void {
+  private drawMarks(left: number, right: number, scale: number, curve: boolean): void {
     const c = this.marks;
     const height_mm = this.live.height_mm;
     c.clearRect(0, 0, this.overlay.width, this.overlay.height);
@@ -244,7 +247,7 @@ export class EchoView {
     c.stroke();
     c.fillText("cm", right + 14, TOP_PX + 1);
     this.drawFocus(right, scale);
-    this.drawGain(left, scale);
+    if (curve) this.drawGain(left, scale);
     c.fillStyle = INK.mark; // the side of the probe's own mark
     c.beginPath();
     c.arc(left + 5, TOP_PX - 7, 3.5, 0, 2 * Math.PI);

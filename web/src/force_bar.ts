@@ -44,6 +44,18 @@ export class ForceBar {
     this.paint();
   }
 
+  /** Nothing is measured while there is no connection. */
+  lost(on: boolean): void {
+    if (!on) return;
+    this.force_n = this.rendered_n = 0;
+    find("force-value").replaceChildren("–", make("small", "", "N"));
+    find("force-word").textContent = "not connected";
+    find("force-head").dataset.tone = "lost";
+    this.canvas.removeAttribute("aria-valuenow");
+    this.canvas.setAttribute("aria-valuetext", "not connected");
+    this.paint();
+  }
+
   /** Shows the force and says what it means, with the judge's word on the press (null: not shown). */
   show(s: Snapshot, compression: Compression | null): Feedback {
     this.force_n = Math.max(0, s.force_normal_n);

@@ -22,7 +22,7 @@ import { ThighScene } from "./scene";
 import { StartDialog } from "./start";
 import { EchoTools } from "./tools";
 import { Traces } from "./traces";
-import { letGo } from "./words";
+import { letGo, ROLE_ACTIONS, roleWords } from "./words";
 
 const HOME_SITE = 27;
 const NEAR_MM = 20; // farther from a site its curve says nothing about this place
@@ -106,8 +106,8 @@ class App {
     this.input = this.wireInput();
     this.wireButtons();
     const loop = (now: number): void => {
+      requestAnimationFrame(loop); // first: whatever goes wrong in one picture, the next one comes
       this.animate(now / 1000);
-      requestAnimationFrame(loop);
     };
     requestAnimationFrame(loop);
   }
@@ -130,12 +130,14 @@ class App {
   private wireButtons(): void {
     fillHelp(find("help").querySelector<HTMLElement>(".keys")!);
     find("legend-bar").style.background = gradient();
+    this.scene.flatChanged = (flat) => (find("flat-note").hidden = !flat);
     this.scene.rangeChanged = (mm) => (find("legend-top").textContent = `${mm} mm`);
     press("stop", () => this.connection.stop());
     press("resume", () => this.connection.resume());
     press("help-button", () => find<HTMLDialogElement>("help").showModal());
     press("start-button", () => this.start.open());
     press("exams-button", () => this.openHistory());
+    press("role-button", () => this.controls?.may && this.connection.role(this.controls.may));
     press("status", () => this.rates.toggle());
     press("see-through", () => this.toggleThrough());
     press("home", () => this.reset());
@@ -282,6 +284,9 @@ class App {
 
   private setConnected(connected: boolean, wait_s: number): void {
     this.connected = connected;
+    if (!connected) this.pending = null; // a picture that came too late is no sign of life
+    if (!connected) this.live(false);
+    find<HTMLButtonElement>("stop").disabled = !connected;
     find("status").classList.toggle("off", !connected);
     if (connected) find("banner").hidden = true;
     else {
@@ -289,6 +294,18 @@ class App {
       const running = this.phase === "running" ? " Your exam goes on when it is back." : " Is the program running?";
       this.say(`The connection to Sonde is lost. Trying again in ${wait_s.toFixed(1)} s.${running}`, 0);
     }
+  }
+
+  private isLive = false;
+  /** What was measured last is not what is now: without a connection image and numbers are greyed out. */
+  private live(on: boolean): void {
+    if (this.isLive === on) return;
+    this.isLive = on;
+    document.body.classList.toggle("offline", !on);
+    find("echo-lost").hidden = on || this.frames === 0;
+    this.readouts.lost(!on);
+    this.forceBar.lost(!on);
+    this.showMode();
   }
 
   private refused(): void {
@@ -311,7 +328,7 @@ class App {
   /** This page's hand moves the probe: not when watching, with another device, or in a replay. */
   private get hands(): boolean {
     const device = this.hello?.device ?? "page";
-    return (this.controls?.controls ?? false) && device === "page" && this.phase !== "replay" && this.phase !== "preparing";
+    return this.isLive && (this.controls?.controls ?? false) && device === "page" && this.phase !== "replay" && this.phase !== "preparing";
   }
 
   private showMode(): void {
@@ -323,8 +340,9 @@ class App {
     find("practice-bar").hidden = examining || phase === "replay";
     find("exam-bar").hidden = !examining;
     find("replay-bar").hidden = phase !== "replay";
-    find("comments").hidden = phase !== "replay";
-    find("sliders").hidden = phase === "replay";
+    find("comments").hidden = !this.comments;
+    find("sliders").hidden = this.comments;
+    if (phase !== "replay") this.replayBar.live(this.comments ? this.exam : null);
     this.header(phase);
     this.preparing();
     const bare = judged && guidance === "exam";
@@ -350,7 +368,7 @@ class App {
     find("case-title").textContent = own ? exam.title : played || label(this.hello?.model ?? "");
     find("case-history").textContent = own ? exam.history : played ? "" : "A simulated thigh, to practise on";
     find("case").title = find("case-history").textContent ?? "";
-    find("watching").hidden = this.controls?.controls ?? true;
+    this.showRole();
     const device = this.hello?.device ?? "page";
     if (device !== "page" && this.controls?.controls) find("hint").textContent = `The probe is moved by: ${device}.`;
     const clock = find("clock");
@@ -358,6 +376,21 @@ class App {
     clock.classList.toggle("recording", phase === "running" && (exam?.recording ?? false));
     clock.title = exam?.recording ? "This exam is recorded" : "This exam is not recorded";
     find("clock-text").textContent = minutes(exam?.elapsed_s ?? 0);
+  }
+
+  private showRole(): void {
+    const words = this.controls ? roleWords(this.controls) : "";
+    find("watching").hidden = words === "";
+    find("watching").textContent = words;
+    const may = this.controls?.may ?? "";
+    const button = find<HTMLButtonElement>("role-button");
+    button.hidden = may === "" || !this.isLive;
+    if (may) [button.textContent, button.title] = ROLE_ACTIONS[may];
+  }
+
+  /** Who does not examine may comment on what is seen, while the exam runs and after it. */
+  private get comments(): boolean {
+    return this.phase === "replay" || (this.phase === "running" && this.controls?.role !== undefined && this.controls.role !== "learner" && !this.controls.controls);
   }
 
   private preparing(): void {
@@ -474,16 +507,17 @@ class App {
     const frame = this.pending;
     this.pending = null;
     if (frame) this.show(frame);
+    if (frame) this.connection.ack(frame.sequence); // before the thigh: image and force do not wait for it
     if (this.imaged) this.scene.render(); // its first picture takes long: the image goes before it
     this.imaged = this.frames > 0;
     this.nameTarget();
-    if (frame) this.connection.ack(frame.sequence);
     this.rates.update(now_s, frame !== null, this.snapshot?.tick ?? 0, this.connected, this.connection.latency_ms);
   }
 
   private show(frame: Frame): void {
     const s = frame.snapshot;
     this.snapshot = s;
+    this.live(true);
     if (++this.frames === 1) performance.mark("first image");
     this.pixels = frame.pixels;
     this.scene.show(frame);

@@ -132,6 +132,15 @@ export class Readouts {
     for (const g of [this.vein, this.diameter, this.artery]) g.row.hidden = !on;
   }
 
+  /** Nothing is measured while there is no connection. */
+  lost(on: boolean): void {
+    if (!on) return;
+    for (const g of [this.pressed, this.vein, this.diameter, this.artery]) {
+      g.row.classList.add("away");
+      g.value.replaceChildren("–");
+    }
+  }
+
   private static number(gauge: Gauge, value: number, digits: number, unit: string, touching: boolean): void {
     const away = !touching || !Number.isFinite(value);
     gauge.row.classList.toggle("away", away);

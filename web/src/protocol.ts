@@ -61,6 +61,12 @@ export interface ProtocolInfo {
 export interface Controls {
   type: "controls";
   controls: boolean;
+  // version 3
+  role?: Role;
+  /** who controls */
+  holder?: Role | "nobody";
+  /** the one thing about control that this page may ask for */
+  may?: "" | RoleAction;
   probe: string;
   case: string;
   stop: boolean;
@@ -80,6 +86,8 @@ export interface Controls {
   friction_scale?: number;
 }
 
+export type Role = "learner" | "watcher" | "teacher";
+export type RoleAction = "take" | "give" | "return";
 export type Posture = "supine" | "sitting" | "standing";
 export type Guidance = "full" | "hints" | "exam";
 export type Decision = "" | "compressible" | "clot" | "not_seen";
@@ -171,6 +179,8 @@ export interface Exam {
   hint: string;
   hints_used: number;
   result: Result | null;
+  // version 3
+  comments?: Comment[];
 }
 
 export interface ExamEntry {
@@ -265,7 +275,7 @@ export interface Frame {
 
 export const PART = { skin: 0, femur: 1, vein: 2, artery: 3, probe: 16 } as const;
 /** versions of the protocol that this page speaks; 1 has no trainer */
-export const VERSIONS = [1, 2];
+export const VERSIONS = [1, 2, 3];
 
 const HEADER = 16;
 const MESH_FIXED = 24;

@@ -1,7 +1,7 @@
 // The replay's bar: scrub along the presses, play, speed, and a teacher's comments.
 
 import { announce, button, draw, find, make, minutes, press, recall, release, remember } from "./dom";
-import type { Press, PressResult, Replay } from "./protocol";
+import type { Comment, Exam, Press, PressResult, Replay } from "./protocol";
 import { PRESS_WORDS } from "./words";
 
 const SEEK_MS = 80; // while the slider is dragged
@@ -15,6 +15,7 @@ export interface ReplayActions {
 
 export class ReplayBar {
   private replay: Replay | null = null;
+  private exam: Exam | null = null; // that runs and may be commented on
   private held = false; // the slider is in the hand
   private sent_ms = 0;
   private marksKey = "";
@@ -40,15 +41,26 @@ export class ReplayBar {
     find("replay-key").append(...(Object.keys(PRESS_WORDS) as PressResult[]).map((r) => make("span", r, PRESS_WORDS[r])), make("span", "comment", "comment"));
   }
 
+  /** While an exam runs a teacher or watcher comments on what is seen now. */
+  live(exam: Exam | null): void {
+    this.exam = exam;
+    if (!exam) return;
+    const key = JSON.stringify(["live", exam.exam, exam.comments]);
+    if (key === this.marksKey) return;
+    this.marksKey = key;
+    this.comments(exam.comments ?? [], false);
+  }
+
   show(replay: Replay, controls: boolean): void {
     this.replay = replay;
+    this.exam = null;
     find("replay-title").textContent = replay.title;
     this.scrub.max = String(replay.duration_s);
     if (!this.held) this.scrub.value = String(replay.time_s);
     this.time(this.held ? this.scrub.valueAsNumber : replay.time_s);
     find("replay-play").textContent = replay.playing ? "Pause" : "Play";
     if (document.activeElement !== this.speed) this.speed.value = String(replay.speed);
-    for (const id of ["replay-play", "replay-leave", "replay-comment", "scrub", "replay-speed"])
+    for (const id of ["replay-play", "replay-leave", "scrub", "replay-speed"])
       find<HTMLButtonElement>(id).disabled = !controls;
     this.marks(replay, controls);
   }
@@ -99,11 +111,11 @@ export class ReplayBar {
     const note = (t_s: number): SVGElement => draw("path", { d: `M${x(t_s) - 5} 0h10l-5 8z`, class: "comment" });
     svg.append(...replay.presses.map(mark), ...replay.comments.map((c) => note(c.t_s)));
     find("scrub-marks").replaceChildren(svg);
-    this.comments(replay, controls);
+    this.comments(replay.comments, controls);
   }
 
-  private comments(replay: Replay, controls: boolean): void {
-    const rows = replay.comments.map((c) => {
+  private comments(list: readonly Comment[], controls: boolean): void {
+    const rows = list.map((c) => {
       const row = make("li");
       const go = button(minutes(c.t_s), () => this.actions.seek(c.t_s), "time");
       go.setAttribute("aria-label", `Go to ${minutes(c.t_s)}`);
@@ -115,12 +127,11 @@ export class ReplayBar {
     });
     const none = make("li", "none", "No comment yet. A remark stands at its time in the exam, for the learner to find.");
     find("comment-list").replaceChildren(...(rows.length ? rows : [none]));
-    for (const e of find("comment-form").querySelectorAll<HTMLInputElement>("input, button")) e.disabled = !controls;
   }
 
   private write(): void {
     const r = this.replay;
-    if (r?.playing) this.actions.play(false, r.speed);
+    if (r?.playing && !find<HTMLButtonElement>("replay-play").disabled) this.actions.play(false, r.speed);
     find("comment-text").focus();
   }
 
@@ -128,10 +139,11 @@ export class ReplayBar {
     e.preventDefault();
     const text = find<HTMLInputElement>("comment-text");
     const author = find<HTMLInputElement>("comment-author").value.trim();
-    if (!text.value.trim() || !this.replay) return text.focus();
-    this.actions.comment(this.replay.time_s, text.value.trim(), author);
+    const time_s = this.replay?.time_s ?? this.exam?.elapsed_s;
+    if (!text.value.trim() || time_s === undefined) return text.focus();
+    this.actions.comment(time_s, text.value.trim(), author);
     remember("author", author);
-    announce(`Comment added at ${minutes(this.replay.time_s)}`);
+    announce(`Comment added at ${minutes(time_s)}`);
     text.value = "";
   }
 }

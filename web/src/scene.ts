@@ -4,7 +4,9 @@
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { toCreasedNormals } from "three/examples/jsm/utils/BufferGeometryUtils.js";
+import { find } from "./dom";
 import { nextRange, SHADES, SHADE_TABLE } from "./colour";
+import { FlatView, movedShare, type FlatVessel } from "./flat";
 import { Gel } from "./gel";
 import { Skin } from "./pose";
 import { Sides } from "./sides";
@@ -12,6 +14,8 @@ import { TargetMark } from "./target";
 import { PART, type Frame, type Line, type Mesh, type ProbeInfo, type Quat, type Site, type Target, type Vec3 } from "./protocol";
 
 const COLOUR = { vein: 0x5b8def, artery: 0xe0604d, bone: 0xe7dfcb, probe: 0xd3dae2, mark: 0x5cc8c2 };
+const FOV_DEG = 27;
+const WIDE = 1.3; // width over height in which the whole leg is seen
 const CALM_ALPHA = 0.4; // of see-through skin at rest; displaced skin is up to MOVED_ALPHA
 const MOVED_ALPHA = 0.86;
 const CREASE_RAD = 0.6; // sharper edges are drawn sharp
@@ -75,7 +79,7 @@ export class ThighScene {
   readonly orbit: OrbitControls;
   private renderer: THREE.WebGLRenderer | null = null;
   private readonly scene = new THREE.Scene();
-  private readonly camera = new THREE.PerspectiveCamera(27, 1, 10, 3000);
+  private readonly camera = new THREE.PerspectiveCamera(FOV_DEG, 1, 10, 3000);
   private readonly skinMaterial = skinMaterial();
   private readonly inside = new THREE.Group();
   private readonly probe = new THREE.Group();
@@ -97,6 +101,12 @@ export class ThighScene {
   private range_mm = 10;
   private through = true;
   private dirty = true;
+  private flat: FlatView | null = null; // draws while there is no WebGL
+  private readonly vessels = new Map<number, FlatVessel>();
+  private sites: readonly Site[] = [];
+  private frame: Frame | null = null;
+  /** whether the thigh is drawn without WebGL from now on */
+  flatChanged: (flat: boolean) => void = () => undefined;
 
   constructor(
     private readonly canvas: HTMLCanvasElement,
@@ -125,6 +135,9 @@ export class ThighScene {
     new ResizeObserver(() => this.resize()).observe(canvas);
     this.resize();
     this.seeThrough(true);
+    // three.js restores its own state; until then the plain view takes its place.
+    canvas.addEventListener("webglcontextlost", (e) => (e.preventDefault(), this.setFlat(true)));
+    canvas.addEventListener("webglcontextrestored", () => this.setFlat(false));
   }
 
   private addLights(): void {
@@ -168,6 +181,8 @@ export class ThighScene {
     if (w === 0 || h === 0) return;
     this.renderer?.setSize(w, h, false);
     this.camera.aspect = w / h;
+    const narrow = Math.max(1, WIDE / this.camera.aspect); // the leg lies across: a narrow picture looks wider
+    this.camera.fov = THREE.MathUtils.radToDeg(2 * Math.atan(narrow * Math.tan(THREE.MathUtils.degToRad(FOV_DEG / 2))));
     this.camera.updateProjectionMatrix();
     this.dirty = true;
   }
@@ -209,6 +224,8 @@ export class ThighScene {
   private setSkin(mesh: Mesh): void {
     this.skin = new Skin(mesh.points.slice(), mesh.faces);
     this.restMesh = new THREE.Mesh(ThighScene.geometry(mesh));
+    this.vessels.clear();
+    this.frame = null;
     const g = ThighScene.geometry(mesh);
     const colours = new Float32Array((mesh.points.length / 3) * 4).fill(CALM_ALPHA);
     for (let i = 0; i < colours.length; i += 4) colours.set(SHADE_TABLE.subarray(0, 3), i);
@@ -248,6 +265,7 @@ export class ThighScene {
       radius += line.points[i + 3]!;
     }
     if (points.length < 2) return;
+    this.vessels.set(line.part, { points: line.points.slice(), vein: line.part === PART.vein });
     const tube = new THREE.TubeGeometry(new THREE.CatmullRomCurve3(points), 96, radius / points.length, 16);
     const colour = line.part === PART.vein ? COLOUR.vein : COLOUR.artery;
     const material = new THREE.MeshStandardMaterial({ color: colour, roughness: 0.55, emissive: colour, emissiveIntensity: 0.25 });
@@ -285,6 +303,7 @@ export class ThighScene {
   setSites(sites: readonly Site[]): void {
     const skin = this.skin;
     if (!skin) return;
+    this.sites = sites;
     this.dots?.removeFromParent();
     const material = new THREE.MeshBasicMaterial({ color: 0xc9d4e2, transparent: true, opacity: 0.55 });
     this.dots = new THREE.InstancedMesh(new THREE.SphereGeometry(0.95, 10, 8), material, sites.length);
@@ -354,6 +373,7 @@ export class ThighScene {
 
   show(frame: Frame): void {
     if (frame.displacements.length !== this.skin?.points.length) return; // of the patient before this one
+    this.frame = frame;
     this.deform(frame);
     this.moveDots(frame);
     this.placeProbe(frame.snapshot.probe, frame.snapshot.position_mm, frame.snapshot.rotation);
@@ -461,23 +481,64 @@ export class ThighScene {
     this.dirty = true;
   }
 
-  /** Takes up to half a second, so only the first picture asks for it: the echo image goes before. */
-  private makeRenderer(): THREE.WebGLRenderer {
+  /** Takes up to half a second, so only the first picture asks for it: the echo image goes before. Null: this
+   *  browser has no WebGL, or gave it up. */
+  private makeRenderer(): THREE.WebGLRenderer | null {
     const { canvas, low } = this;
-    const renderer = new THREE.WebGLRenderer({ canvas, antialias: !low, alpha: true, powerPreference: "high-performance" });
-    renderer.setPixelRatio(low ? 1 : Math.min(2, window.devicePixelRatio));
-    return renderer;
+    const settings = { antialias: !low, alpha: true, powerPreference: "high-performance" } as const;
+    try {
+      const context = canvas.getContext("webgl2", settings) as WebGL2RenderingContext | null; // three.js would say on the console that there is none
+      if (!context) return null;
+      const renderer = new THREE.WebGLRenderer({ canvas, context, ...settings });
+      renderer.setPixelRatio(low ? 1 : Math.min(2, window.devicePixelRatio));
+      return renderer;
+    } catch {
+      return null;
+    }
+  }
+
+  get isFlat(): boolean {
+    return this.flat !== null && !this.flat.canvas.hidden;
+  }
+
+  private setFlat(on: boolean): void {
+    const canvas = find<HTMLCanvasElement>("scene-flat");
+    if (on) this.flat ??= new FlatView(canvas);
+    canvas.hidden = !on;
+    this.canvas.classList.toggle("unlit", on);
+    this.dirty = true;
+    this.flatChanged(on);
+  }
+
+  private drawFlat(flat: FlatView): void {
+    const surface = this.surface;
+    const points = surface?.geometry.getAttribute("position").array as Float32Array | undefined;
+    const info = this.frame ? this.probes[this.frame.snapshot.probe] : undefined;
+    this.probe.updateMatrixWorld();
+    const drawn = flat.draw({
+      camera: this.camera,
+      skin: points && this.skin ? { points, faces: surface!.geometry.getIndex()!.array, moved: movedShare(this.skin.points, points, this.range_mm) } : null,
+      vessels: [...this.vessels.values()],
+      sites: this.dots?.visible ? this.sites : [],
+      probe: info ? { info, frame: this.probe.matrixWorld } : null,
+      image_mm: this.frame ? [this.frame.width_mm, this.frame.height_mm] : [0, 0],
+      target: this.target.shown,
+      through: this.through,
+    });
+    if (!drawn) this.dirty = true;
   }
 
   render(): void {
     if (!this.dirty) return;
     this.dirty = false;
-    if (!this.renderer) {
+    if (!this.renderer && !this.isFlat) {
       this.renderer = this.makeRenderer();
+      if (!this.renderer) this.setFlat(true);
       this.resize();
     }
     this.sides.face(this.camera);
-    this.renderer.render(this.scene, this.camera);
+    if (this.isFlat) this.drawFlat(this.flat!);
+    else this.renderer?.render(this.scene, this.camera);
   }
 
   get quality(): "low" | "high" {

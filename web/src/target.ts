@@ -13,6 +13,8 @@ export class TargetMark {
   private readonly material = new THREE.MeshBasicMaterial({ transparent: true, opacity: 0.95, side: THREE.DoubleSide, depthTest: false });
   private readonly faint = new THREE.MeshBasicMaterial({ transparent: true, opacity: 0.16, side: THREE.DoubleSide, depthTest: false });
   private key = "";
+  /** what is shown, for a view without WebGL */
+  shown: { target: Target; reached: boolean } | null = null;
 
   constructor() {
     this.group.visible = false;
@@ -24,6 +26,7 @@ export class TargetMark {
     if (key === this.key) return false;
     this.key = key;
     this.group.visible = target !== null;
+    this.shown = target && { target, reached };
     if (target) this.build(target, reached);
     return true;
   }

@@ -29,6 +29,7 @@ export class EchoTools {
   private compare(): void {
     this.echo.compare(!this.echo.isCompared);
     pressed("compare", this.echo.isCompared);
+    document.body.classList.toggle("comparing", this.echo.isCompared); // the panel grows: two images stand in it
     if (!this.echo.isCompared && this.echo.isFrozen) this.freeze();
   }
 

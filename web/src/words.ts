@@ -1,6 +1,6 @@
 // What the page calls results, findings and levels.
 
-import type { CaseInfo, Compression, Decision, Guidance, PressResult } from "./protocol";
+import type { CaseInfo, Compression, Controls, Decision, Guidance, PressResult, RoleAction } from "./protocol";
 
 export const FINDINGS: { decision: Exclude<Decision, "">; name: string; help: string; key: string; code: string }[] = [
   { decision: "compressible", name: "Compressible", help: "The walls of the vein touched: no clot here", key: "J", code: "KeyJ" },
@@ -17,6 +17,20 @@ export const PRESS_WORDS: Record<PressResult, string> = {
   too_hard: "too hard",
   off_axis: "not straight across the vein",
 };
+
+export const ROLE_ACTIONS: Record<RoleAction, [string, string]> = {
+  take: ["Take control", "You move the probe; the one who has control now watches"],
+  give: ["Give control", "To the teacher, or to who watches longest"],
+  return: ["Give control back", "To the learner"],
+};
+
+/** What a page says about control; empty for a learner who has it. */
+export function roleWords(c: Controls): string {
+  if (c.controls) return c.role === "teacher" ? "Teacher: you have control" : c.role === "watcher" ? "You have control" : "";
+  const has = c.holder === "teacher" ? "The teacher has control" : c.holder === "watcher" ? "A watcher has control" : c.holder === "nobody" ? "Nobody has control" : "";
+  if (c.role === "learner") return has || "Watching";
+  return `${c.role === "teacher" ? "Teacher, watching" : "Watching"}${has && c.holder !== c.role ? `. ${has}` : ""}`;
+}
 
 export const LEVELS: Record<CaseInfo["level"], string> = { first: "First exam", easy: "Easy", hard: "Hard" };
 
