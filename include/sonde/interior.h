@@ -76,6 +76,13 @@ typedef struct sonde_vessel_state {
   double outside_pa;                /**< effective pressure on the wall */
   double area_ratio;                /**< current / rest, dynamic */
   double half_short_m, half_long_m; /**< semi-axes of the ellipse */
+  double lead;                      /**< how firmly the wall leads the tissue beside it, 0..1 */
+  /** Gradient of the tissue's motion across the vessel, as it would be without the vessel: a turn
+   *  from the flat axis towards the other by an angle of which tissue_turn is the tangent of the
+   *  half, then (short, long) -> (tissue_short short, tissue_shear short + tissue_long long).
+   *  0, 1, 0, 1 at rest. */
+  double tissue_turn, tissue_short, tissue_shear, tissue_long;
+  double tissue_even; /**< share of the motion beyond that gradient which ends at the wall, 0..1 */
 } sonde_vessel_state;
 
 typedef struct sonde_interior sonde_interior;

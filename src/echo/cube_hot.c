@@ -8,7 +8,8 @@
 // sonde_cubes_begin  nodes, stations and units of a frame
 // bound_vessel       what a vessel can reach
 // sonde_cubes_add    one cube: place, walls beside it, points that they carry
-// locate             image coordinates of its middle, and the derivative there
+// locate, place_of, step_on  image coordinates of its middle, and the derivative there
+// move_points        where the field takes the points that the walls gathered
 // find_walls, store_wall, add_points  vessels beside it
 // sonde_cubes_end, place_some, place_cube, place_pieces  carried points, maps of some cubes
 // make_map, add_map  one map, which then waits for its tier
@@ -25,6 +26,7 @@ static const double close_m = 10e-3; // rest distance within which a cube goes i
 static const double close_radii = 3; // of a branch
 static const double reach_radii = 4; // of the vessel, over which a wall moves the tissue
 static const double margin_m = 1e-6; // of boxes in single precision
+enum { STEPS = 2 };                  // of Newton's, from a foot within a millimetre or two
 
 // ---- a frame --------------------------------------------------------------------------------
 
@@ -54,11 +56,17 @@ static void store_frame(const sonde_echo *echo, sonde_cubes *s) {
 }
 
 static cube_station station_of(const sonde_cubes *s, const sonde_vessel_state *v) {
-  const v4 size = {(float)v->rest_radius_m, (float)(1 - v->area_ratio), (float)v->half_short_m,
+  const v4 size = {(float)v->rest_radius_m, (float)v->lead, (float)v->half_short_m,
                    (float)v->half_long_m};
+  const v4 tissue = {(float)v->tissue_turn, (float)v->tissue_short, (float)v->tissue_shear,
+                     (float)v->tissue_long};
   return (cube_station){v4_of(v_sub(v->rest_centre_m, s->corner)),
-                        v4_of(v_sub(v->centre_m, v->rest_centre_m)), v4_of(v->axis),
-                        v4_of(v->flat_axis), size};
+                        v4_of(v_sub(v->centre_m, v->rest_centre_m)),
+                        v4_of(v->axis),
+                        v4_of(v->flat_axis),
+                        size,
+                        tissue,
+                        (float)v->tissue_even};
 }
 
 // Its stations from s = `first` to `last` along the leg.
@@ -99,9 +107,15 @@ void sonde_cubes_begin(sonde_echo *echo) {
 
 // ---- one cube -------------------------------------------------------------------------------
 
-// A Newton step of the foot in the plane; beside it the tissue continues along the derivative.
-static void locate(const sonde_echo *echo, cube *c, v4 at) {
-  const float most = (float)(echo->plane_rows - 1), cell = (float)echo->cell_m;
+// A place in the coarse plane: what its nodes give for a foot.
+typedef struct foot {
+  v4 at, miss; // image coordinates in the plane; from there to the point, at rest
+  v4 in[3];    // the derivative there
+} foot;
+
+// The foot that is nearest to image coordinates `at`, and what is left to a rest point.
+static foot step_on(const sonde_echo *echo, v4 rest, v4 at) {
+  const float most = (float)(echo->plane_rows - 1);
   float a = fminf(fmaxf(at[0], 0), SONDE_PLANE_COLUMNS - 1), b = fminf(fmaxf(at[2], 0), most);
   uint32_t i = (uint32_t)a, j = (uint32_t)b;
   if (i > SONDE_PLANE_COLUMNS - 2) i = SONDE_PLANE_COLUMNS - 2;
@@ -113,10 +127,24 @@ static void locate(const sonde_echo *echo, cube *c, v4 at) {
 #define BLEND(field)                                                                               \
   (share[0] * top[0].field + share[1] * top[1].field + share[2] * low[0].field +                   \
    share[3] * low[1].field)
-  const v4 miss = c->rest - BLEND(rest), in[3] = {BLEND(in[0]), BLEND(in[1]), BLEND(in[2])};
+  return (foot){{a, 0, b, 0}, rest - BLEND(rest), {BLEND(in[0]), BLEND(in[1]), BLEND(in[2])}};
 #undef BLEND
-  c->at = (v4){a, 0, b, 0} + times4(in, miss);
-  for (int k = 0; k < 3; ++k) c->axis[k] = in[k] * cell;
+}
+
+// Image coordinates of a rest point: Newton steps of its foot in the plane; beside the plane the
+// tissue continues along the derivative.
+static v4 place_of(const sonde_echo *echo, v4 rest, v4 at, foot *on) {
+  for (int step = 0; step < STEPS; ++step) {
+    *on = step_on(echo, rest, at);
+    at = on->at + times4(on->in, on->miss);
+  }
+  return at;
+}
+
+static void locate(const sonde_echo *echo, cube *c, v4 at) {
+  foot on;
+  c->at = place_of(echo, c->rest, at, &on);
+  for (int k = 0; k < 3; ++k) c->axis[k] = on.in[k] * (float)echo->cell_m;
 }
 
 // Whether a cube goes in pieces depends on the tissue at rest alone: its scatterers stay the same
@@ -135,9 +163,10 @@ static void find_wall(const sonde_echo *echo, cube *c, sonde_vec3 centre, uint32
   c->close = c->close || distance < (which < 2 ? close_m : fmin(close_m, close_radii * radius));
   if (!(distance < reach_radii * radius + echo->cell_m)) return;
   double solid = sonde_echo_solid(echo, which, middle.z);
+  bool closed = fmin(a->area_ratio, b->area_ratio) < sonde_least_lumen;
+  if (closed && fmin(a->lead, b->lead) < 1) solid = 1; // its walls touch and lead no gap
   c->wall[c->walls++] = (cube_wall){k, i, (float)t, (float)solid, along_m};
-  bool still = a->area_ratio >= 1 && a->area_ratio <= 1 && b->area_ratio >= 1 && b->area_ratio <= 1;
-  c->carried = c->carried || !still;
+  c->carried = c->carried || a->lead > 0 || b->lead > 0;
 }
 
 static void find_walls(const sonde_echo *echo, cube *c, const int32_t cell[3]) {
@@ -153,42 +182,55 @@ static void store_wall(sonde_cubes *s, const cube_wall *w, uint32_t k, uint32_t 
                        uint32_t groups) {
   const cube_station *a = &s->station[w->vessel][w->station], *b = a + 1;
   const v4 t = all4(w->share), u = 1 - t, size = u * a->size + t * b->size;
+  const v4 tissue = u * a->tissue + t * b->tissue;
+  const float even = a->even + w->share * (b->even - a->even);
   const v4 axis = unit4(u * a->axis + t * b->axis, a->axis), mean = u * a->flat + t * b->flat;
   const v4 flat = unit4(mean - all4(dot3(mean, axis)) * axis, a->flat);
   const v4 vector[] = {u * a->rest + t * b->rest, u * a->shift + t * b->shift, axis, flat,
                        cross4(axis, flat)};
-  const float engaged = fminf(fabsf(size[1]) * (float)(1 / sonde_engaged_loss), 1);
   for (uint32_t g = group; g < group + groups; ++g) {
     for (int f = 0; f < WALL_RADIUS; ++f) s->wall[k][f][g] = vector[f / 3][f % 3];
     for (int f = 0; f < 4; ++f) s->wall[k][WALL_RADIUS + f][g] = size[f];
-    s->wall[k][WALL_ENGAGED][g] = engaged;
+    for (int f = 0; f < 4; ++f) s->wall[k][WALL_TURN + f][g] = tissue[f];
+    s->wall[k][WALL_EVEN][g] = even;
   }
 }
 
 static void store_none(sonde_cubes *s, uint32_t k, uint32_t group, uint32_t groups) {
   for (uint32_t g = group; g < group + groups; ++g) {
-    for (int f = WALL_RADIUS; f < WALL_ENGAGED; ++f) s->wall[k][f][g] = 1;
-    s->wall[k][WALL_ENGAGED][g] = 0;
+    for (int f = WALL_RADIUS; f < WALL_FIELDS; ++f) s->wall[k][f][g] = 1;
+    s->wall[k][WALL_LEAD][g] = 0;
   }
 }
 
 // Four points at offsets from the middle, in edges.
 static void add_points(const sonde_echo *echo, const cube *c, uint32_t group, const v4 offset[3]) {
   sonde_cubes *s = echo->cubes;
-  v4 at[3];
-  for (int k = 0; k < 3; ++k) {
-    at[k] = c->at[k] + offset[0] * c->axis[0][k] + offset[1] * c->axis[1][k] +
-            offset[2] * c->axis[2][k];
+  for (int k = 0; k < 3; ++k)
     store4(s->rest[k] + 4 * group, c->rest[k] + offset[k] * (float)echo->cell_m);
+}
+
+// Where the field takes the four gathered points of a group.
+static void move_points(const sonde_echo *echo, const cube *c, uint32_t group) {
+  sonde_cubes *s = echo->cubes;
+  const float per_cell = (float)(1 / echo->cell_m);
+  v4 at[4], image[3];
+  for (uint32_t i = 0; i < 4; ++i) {
+    foot on;
+    const uint32_t n = 4 * group + i;
+    const v4 rest = {s->gathered[0][n], s->gathered[1][n], s->gathered[2][n], 0};
+    at[i] = place_of(echo, rest, c->at + times4(c->axis, (rest - c->rest) * per_cell), &on);
   }
   if (!(echo->frame.radius_m > 0)) {
+    coordinates4(at, image);
     for (int k = 0; k < 3; ++k)
-      store4(s->moved[k] + 4 * group, s->place[k] + at[0] * s->to_place[0][k] +
-                                          at[1] * s->to_place[1][k] + at[2] * s->to_place[2][k]);
+      store4(s->moved[k] + 4 * group, s->place[k] + image[0] * s->to_place[0][k] +
+                                          image[1] * s->to_place[1][k] +
+                                          image[2] * s->to_place[2][k]);
     return;
   }
   for (int i = 0; i < 4; ++i) {
-    sonde_vec3 p = vec3((double)at[0][i], (double)at[1][i], (double)at[2][i]);
+    sonde_vec3 p = vec3((double)at[i][0], (double)at[i][1], (double)at[i][2]);
     p = v_sub(sonde_echo_to_world(echo, p), s->corner);
     for (int k = 0; k < 3; ++k) s->moved[k][4 * group + (uint32_t)i] = (float)v_coordinate(p, k);
   }
@@ -281,7 +323,7 @@ static uint32_t find_lumina(const sonde_echo *echo, const cube *c, splat_lumen o
                        {(float)c->wall[k].along_m, (float)echo->cell_m * along[0],
                         (float)echo->cell_m * along[1], (float)echo->cell_m * along[2]},
                        c->wall[k].solid > 0 ? 1 - 2 * c->wall[k].solid : 1,
-                       sonde_clutter(echo) * sqrtf(fmaxf(1 - w[WALL_LOST][g], 0)),
+                       sonde_clutter(echo) * sqrtf(w[WALL_SHORT][g] * w[WALL_LONG][g]) * scale,
                        echo->shown[c->wall[k].vessel]};
     if (c->wall[k].solid < 1 && !is_beyond(l->along) && !is_beyond(l->across)) ++found;
   }
@@ -403,9 +445,17 @@ static void place_cube(sonde_echo *echo, const cube *c) {
 
 static void place_some(sonde_echo *echo) {
   sonde_cubes *s = echo->cubes;
-  const carry_job job = {s->groups, s->walls, (const float(*)[WALL_FIELDS][WALL_ROOM])s->wall,
-                         (const float(*)[CARRY_POINTS])s->rest, s->moved};
-  if (s->walls > 0) echo->kernels->carry(&job);
+  const carry_job job = {s->groups,
+                         s->walls,
+                         (const float(*)[WALL_FIELDS][WALL_ROOM])s->wall,
+                         (const float(*)[CARRY_POINTS])s->rest,
+                         s->gathered,
+                         s->moved};
+  echo->kernels->gather(&job);
+  for (const cube *c = s->cube; c < s->cube + s->count; ++c)
+    for (uint32_t g = 0; c->carried && g < (c->close ? 2 : 1); ++g)
+      move_points(echo, c, c->group + g);
+  echo->kernels->even(&job);
   for (const cube *c = s->cube; c < s->cube + s->count; ++c) {
     if (c->close)
       place_pieces(echo, c);

@@ -18,7 +18,9 @@ typedef struct cube_node {
 // A vessel's station.
 typedef struct cube_station {
   v4 rest, shift, axis, flat;
-  v4 size; // radius, share of the area that is lost, short and long semi-axis
+  v4 size;   // radius, lead, short and long semi-axis
+  v4 tissue; // turn, short, shear and long of the gradient across it
+  float even;
 } cube_station;
 
 // A vessel beside a cube.
@@ -50,7 +52,7 @@ typedef struct sonde_cubes {
   uint32_t count, groups, walls;
   cube cube[CUBES_AT_ONCE];
   float wall[MOST_VESSELS][WALL_FIELDS][WALL_ROOM];
-  float rest[3][CARRY_POINTS], moved[3][CARRY_POINTS];
+  float rest[3][CARRY_POINTS], gathered[3][CARRY_POINTS], moved[3][CARRY_POINTS];
 } sonde_cubes;
 
 // The box is known, no cube has been added.

@@ -11,7 +11,7 @@
 // lateral    symmetric complex kernels of rank three on one row
 // axial      real kernels down the rows, noise, compensation, modulus, logarithm
 // add_row, add_rows  its sums, as the registers allow
-// carry, tissue  in kernel_carry.h, kernel_tissue.h
+// gather_tissue, even_tissue, tissue  in kernel_carry.h, kernel_tissue.h
 // merge      a row of the grid, times its gain, to even and odd columns
 // widen, mix rows of the coarse plane, per line and between two
 // fade       attenuation and clutter of a row
@@ -464,7 +464,8 @@ static void fade(const fade_job *job) {
 
 const echo_kernels SONDE_KERNELS = {SONDE_KERNELS_NAME,
                                     splat,
-                                    carry,
+                                    gather_tissue,
+                                    even_tissue,
                                     stream,
                                     lateral,
                                     axial,

@@ -66,10 +66,14 @@ typedef enum wall_field {
   WALL_FLAT = WALL_AXIS + 3,   // short axis
   WALL_ACROSS = WALL_FLAT + 3, // long axis
   WALL_RADIUS = WALL_ACROSS + 3,
-  WALL_LOST,  // share of the area
+  WALL_LEAD,  // 0..1: how firmly the wall leads; 0: no vessel
   WALL_SHORT, // semi-axes, m
   WALL_LONG,
-  WALL_ENGAGED, // 0..1: how firmly the wall leads; 0: no vessel
+  WALL_TURN, // the tissue's gradient across the vessel, as sonde_vessel_state has it
+  WALL_TISSUE_SHORT,
+  WALL_SHEAR,
+  WALL_TISSUE_LONG,
+  WALL_EVEN,
   WALL_FIELDS
 } wall_field;
 
@@ -79,13 +83,15 @@ enum {
   WALL_ROOM = CARRY_GROUPS + ECHO_ALIGN // whole vectors read beyond the last
 };
 
-// Points of the tissue, in groups of four that share the vessels beside them: where those take
-// them.
+// Points of the tissue, in groups of four that share the vessels beside them: where those gather
+// them before the field moves them, and where they even it out.
 typedef struct carry_job {
   uint32_t groups, walls;
   const float (*wall)[WALL_FIELDS][WALL_ROOM]; // [walls]
   const float (*rest)[CARRY_POINTS];           // [3]
-  float (*place)[CARRY_POINTS];                // [3] by the field alone; replaced
+  float (*gathered)[CARRY_POINTS];             // [3] of gather(); read by even()
+  float (*place)[CARRY_POINTS];                // [3] of even(): of the gathered point by the field
+                                               // alone; replaced
 } carry_job;
 
 // A row of the grid, times a gain, to even and odd columns; leaves zeros.
@@ -197,7 +203,8 @@ typedef struct convert_job {
 typedef struct echo_kernels {
   const char *name;
   void (*splat)(const splat_job *job);
-  void (*carry)(const carry_job *job);
+  void (*gather)(const carry_job *job);
+  void (*even)(const carry_job *job);
   void (*stream)(const stream_job *job);
   void (*lateral)(const lateral_job *job);
   void (*axial)(const axial_job *job);

@@ -1,13 +1,16 @@
-// Where the vessels' walls take the tissue around them: sonde_vessels_move for many points in
-// single precision. Included by kernel.c only.
+// Where the vessels' walls take the tissue around them: sonde_vessels_gather and
+// sonde_vessels_even for many points in single precision. Included by kernel.c only.
 //
-// pull   where one vessel wants the points, and how firmly
-// carry  several vessels: each is exact on its own wall
+// find_reach      offset from a vessel, and how firmly it leads
+// gathered_by     where one vessel gathers the points
+// share_of        of a wall beside others
+// gather_tissue, even_tissue  all of them
 #ifndef SONDE_SRC_ECHO_KERNEL_CARRY_H
 #define SONDE_SRC_ECHO_KERNEL_CARRY_H
 
 #include "echo/kernel.h"
 #include "echo/kernel_vector.h"
+#include "interior/interior.h"
 
 typedef struct vf3 {
   vf x, y, z;
@@ -31,57 +34,110 @@ INLINE vf fade_out(vf t) {
   return left * left * (1 + 2 * t);
 }
 
-// Circles become ellipses: in the lumen those of the wall, outside it such as keep the tissue's
-// area, up to four radii. The motion along the vessel stays the field's.
-INLINE vf pull(const float (*wall)[WALL_ROOM], uint32_t group, vf3 rest, vf3 field, vf3 *move) {
-  vf3 flat = wall_vector(wall, WALL_FLAT, group), across = wall_vector(wall, WALL_ACROSS, group);
-  vf3 axis = wall_vector(wall, WALL_AXIS, group);
+// A point of a cross-section.
+typedef struct vf2 {
+  vf x, y;
+} vf2;
+
+typedef struct reach {
+  vf2 at;             // from the vessel's centre
+  vf r, fade, weight; // weight: how firmly the wall leads, 0 beyond its reach
+} reach;
+
+INLINE reach find_reach(const float (*wall)[WALL_ROOM], uint32_t group, vf3 rest) {
   vf3 d = minus3(rest, wall_vector(wall, WALL_REST, group));
-  vf radius = wall_at(wall, WALL_RADIUS, group), half_short = wall_at(wall, WALL_SHORT, group);
-  vf half_long = wall_at(wall, WALL_LONG, group), lost = wall_at(wall, WALL_LOST, group);
-  vf a = dot(d, flat), b = dot(d, across), square = a * a + b * b, r = root(square);
-  vf t = (r / radius - 1) * (1.0f / 3);
-  vf fade = fade_out(larger(t, all(0))), c = 0.5f * (half_long - half_short) * fade;
-  vf mean = root(larger(square - radius * radius * lost * fade + c * c, all(0)));
-  vi inside = r <= radius;
-  vf nearest = larger(r, 1e-3f * radius); // not used inside
-  vf of_short = pick(inside, half_short / radius, (mean - c) / nearest);
-  vf of_long = pick(inside, half_long / radius, (mean + c) / nearest);
-  vf3 to = madd3(wall_vector(wall, WALL_SHIFT, group), a * (of_short - 1), flat);
-  to = madd3(to, b * (of_long - 1), across);
-  *move = madd3(to, dot(minus3(field, to), axis), axis);
-  return only(t < 1, wall_at(wall, WALL_ENGAGED, group) * fade);
+  reach p = {.at = {dot(d, wall_vector(wall, WALL_FLAT, group)),
+                    dot(d, wall_vector(wall, WALL_ACROSS, group))}};
+  p.r = root(p.at.x * p.at.x + p.at.y * p.at.y);
+  vf t = (p.r / wall_at(wall, WALL_RADIUS, group) - 1) * (1.0f / 3);
+  t = smaller(larger(t, all(0)), all(1));
+  p.fade = fade_out(t);
+  p.weight = only(t < 1, wall_at(wall, WALL_LEAD, group) * p.fade);
+  return p;
 }
 
-// Weights w_k prod (1 - w_j), j not k, over their sum with prod (1 - w_j). Added up one vessel
-// after the other: `free` is the product so far, `share` what the vessels so far have together.
-static void carry(const carry_job *job) {
+INLINE vf2 turned(vf2 p, vf half) {
+  vf whole = 2 / (1 + half * half), cosine = whole - 1, sine = half * whole;
+  return (vf2){cosine * p.x - sine * p.y, sine * p.x + cosine * p.y};
+}
+
+INLINE vf2 gathered_by(const float (*wall)[WALL_ROOM], uint32_t group, reach p) {
+  vf radius = wall_at(wall, WALL_RADIUS, group), turn = wall_at(wall, WALL_TURN, group);
+  vf tissue_long = wall_at(wall, WALL_TISSUE_LONG, group);
+  vf half_short = wall_at(wall, WALL_SHORT, group) / wall_at(wall, WALL_TISSUE_SHORT, group);
+  vf half_long = wall_at(wall, WALL_LONG, group) / tissue_long;
+  half_short = larger(half_short, (float)sonde_least_lumen * radius);
+  vf c = 0.5f * (half_long - half_short) * p.fade;
+  vf square = p.r * p.r - (radius * radius - half_short * half_long) * p.fade + c * c;
+  vf mean = root(larger(square, all(0))), per = 1 / larger(p.r, 1e-3f * radius);
+  vi inside = p.r <= radius;
+  vf2 q = turned(p.at, turn * (1 - p.fade));
+  q = (vf2){pick(inside, p.at.x * (half_short / radius), q.x * ((mean - c) * per)),
+            pick(inside, p.at.y * (half_long / radius), q.y * ((mean + c) * per))};
+  q.y -= p.fade * wall_at(wall, WALL_SHEAR, group) / tissue_long * q.x;
+  return turned(q, -turn);
+}
+
+// 1 on the wall, 0 on another, o beyond its reach, with o the product of 1 - w of the others.
+INLINE vf share_of(const vf *weight, uint32_t walls, uint32_t k) {
+  vf others = all(1);
+  for (uint32_t j = 0; j < walls; ++j)
+    if (j != k) others *= 1 - weight[j];
+  return others / larger(others + (1 - weight[k]) * (1 - others), all(1e-9f));
+}
+
+INLINE vf3 load3(const float (*from)[CARRY_POINTS], uint32_t i) {
+  return (vf3){load(from[0] + i), load(from[1] + i), load(from[2] + i)};
+}
+INLINE void store3(float (*to)[CARRY_POINTS], uint32_t i, vf3 a) {
+  store(to[0] + i, a.x), store(to[1] + i, a.y), store(to[2] + i, a.z);
+}
+
+static void gather_tissue(const carry_job *job) {
+  SONDE_ASSERT(job->groups <= CARRY_GROUPS && job->walls <= MOST_VESSELS);
+  for (uint32_t group = 0; group < job->groups; group += W / 4) {
+    vf3 rest = load3(job->rest, 4 * group), at = rest;
+    vf weight[MOST_VESSELS];
+    vf2 way[MOST_VESSELS];
+    for (uint32_t k = 0; k < job->walls; ++k) {
+      reach p = find_reach(job->wall[k], group, rest);
+      vf2 to = gathered_by(job->wall[k], group, p);
+      vf lead = only(p.weight > 0, wall_at(job->wall[k], WALL_LEAD, group));
+      weight[k] = p.weight, way[k] = (vf2){lead * (to.x - p.at.x), lead * (to.y - p.at.y)};
+    }
+    for (uint32_t k = 0; k < job->walls; ++k) {
+      vf share = share_of(weight, job->walls, k);
+      at = madd3(at, share * way[k].x, wall_vector(job->wall[k], WALL_FLAT, group));
+      at = madd3(at, share * way[k].y, wall_vector(job->wall[k], WALL_ACROSS, group));
+    }
+    store3(job->gathered, 4 * group, at);
+  }
+}
+
+// The motion along a vessel stays the field's.
+static void even_tissue(const carry_job *job) {
   SONDE_ASSERT(job->groups <= CARRY_GROUPS && job->walls <= MOST_VESSELS);
   for (uint32_t group = 0; group < job->groups; group += W / 4) {
     const uint32_t i = 4 * group;
-    vf3 rest = {load(job->rest[0] + i), load(job->rest[1] + i), load(job->rest[2] + i)};
-    vf3 place = {load(job->place[0] + i), load(job->place[1] + i), load(job->place[2] + i)};
-    vf3 field = minus3(place, rest), sum = {all(0), all(0), all(0)}, first = field;
-    vf free = all(1), share = all(0);
-    vi none = all_of(-1); // nothing pulls yet
+    vf3 rest = load3(job->rest, i), place = load3((const float(*)[CARRY_POINTS])job->place, i);
+    vf3 gathered = load3((const float(*)[CARRY_POINTS])job->gathered, i), at = place;
+    vf weight[MOST_VESSELS];
+    for (uint32_t k = 0; k < job->walls; ++k)
+      weight[k] = find_reach(job->wall[k], group, rest).weight;
     for (uint32_t k = 0; k < job->walls; ++k) {
-      vf3 move;
-      vf weight = pull(job->wall[k], group, rest, field, &move), left = 1 - weight;
-      vf3 way = minus3(move, field);
-      vi begins = none & (weight > 0);
-      first = (vf3){pick(begins, move.x, first.x), pick(begins, move.y, first.y),
-                    pick(begins, move.z, first.z)};
-      none &= ~begins;
-      vf own = weight * free;
-      sum =
-          (vf3){sum.x * left + own * way.x, sum.y * left + own * way.y, sum.z * left + own * way.z};
-      share = share * left + own, free = free * left;
+      const float(*wall)[WALL_ROOM] = job->wall[k];
+      vf3 flat = wall_vector(wall, WALL_FLAT, group),
+          across = wall_vector(wall, WALL_ACROSS, group);
+      vf3 centre = wall_vector(wall, WALL_REST, group), d = minus3(gathered, centre);
+      vf3 off = minus3(minus3(place, centre), wall_vector(wall, WALL_SHIFT, group));
+      vf2 q = turned((vf2){dot(d, flat), dot(d, across)}, wall_at(wall, WALL_TURN, group));
+      vf on_short = wall_at(wall, WALL_TISSUE_SHORT, group) * q.x - dot(off, flat);
+      vf on_long = wall_at(wall, WALL_TISSUE_LONG, group) * q.y +
+                   wall_at(wall, WALL_SHEAR, group) * q.x - dot(off, across);
+      vf firm = weight[k] * share_of(weight, job->walls, k) * wall_at(wall, WALL_EVEN, group);
+      at = madd3(madd3(at, firm * on_short, flat), firm * on_long, across);
     }
-    vf whole_share = free + share, scale = 1 / larger(whole_share, all(1e-9f));
-    vi mixed = whole_share > 1e-9f;
-    store(job->place[0] + i, rest.x + pick(mixed, field.x + scale * sum.x, first.x));
-    store(job->place[1] + i, rest.y + pick(mixed, field.y + scale * sum.y, first.y));
-    store(job->place[2] + i, rest.z + pick(mixed, field.z + scale * sum.z, first.z));
+    store3(job->place, i, at);
   }
 }
 

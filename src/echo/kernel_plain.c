@@ -1,7 +1,7 @@
 // The inner loops without vectors and with the library's functions: what the others are tested
 // against. The tissue's row comes from the base set.
 //
-// splat, carry, stream, lateral, axial (sample by sample), merge, widen, mix, fade, convert
+// splat, gather, even, stream, lateral, axial (sample by sample), merge, widen, mix, fade, convert
 #include "base/base.h"
 #include "echo/kernel.h"
 #include "interior/clot.h"
@@ -62,25 +62,47 @@ static sonde_vessel_state vessel_of(const float (*wall)[WALL_ROOM], uint32_t gro
                           .axis = vector_of(wall, WALL_AXIS, group),
                           .flat_axis = vector_of(wall, WALL_FLAT, group),
                           .rest_radius_m = (double)wall[WALL_RADIUS][group],
-                          .area_ratio = 1 - (double)wall[WALL_LOST][group],
+                          .lead = (double)wall[WALL_LEAD][group],
                           .half_short_m = (double)wall[WALL_SHORT][group],
-                          .half_long_m = (double)wall[WALL_LONG][group]};
+                          .half_long_m = (double)wall[WALL_LONG][group],
+                          .tissue_turn = (double)wall[WALL_TURN][group],
+                          .tissue_short = (double)wall[WALL_TISSUE_SHORT][group],
+                          .tissue_shear = (double)wall[WALL_SHEAR][group],
+                          .tissue_long = (double)wall[WALL_TISSUE_LONG][group],
+                          .tissue_even = (double)wall[WALL_EVEN][group]};
   v.centre_m = v_add(v.rest_centre_m, vector_of(wall, WALL_SHIFT, group));
   return v;
 }
 
-static void carry(const carry_job *job) {
+static uint32_t vessels_near(const carry_job *job, uint32_t group,
+                             sonde_vessel_state near[MOST_VESSELS]) {
+  uint32_t count = 0;
+  for (uint32_t k = 0; k < job->walls; ++k)
+    if (job->wall[k][WALL_LEAD][group] > 0) near[count++] = vessel_of(job->wall[k], group);
+  return count;
+}
+
+static sonde_vec3 point_of(const float (*from)[CARRY_POINTS], uint32_t i) {
+  return vec3((double)from[0][i], (double)from[1][i], (double)from[2][i]);
+}
+
+static void gather(const carry_job *job) {
   for (uint32_t i = 0; i < 4 * job->groups; ++i) {
     sonde_vessel_state near[MOST_VESSELS];
-    uint32_t count = 0;
-    for (uint32_t k = 0; k < job->walls; ++k)
-      if (job->wall[k][WALL_ENGAGED][i / 4] > 0) near[count++] = vessel_of(job->wall[k], i / 4);
-    double at[2][3];
-    for (int c = 0; c < 3; ++c)
-      at[0][c] = (double)job->rest[c][i], at[1][c] = (double)job->place[c][i] - at[0][c];
-    sonde_vec3 u = sonde_vessels_move(near, count, vec3(at[0][0], at[0][1], at[0][2]),
-                                      vec3(at[1][0], at[1][1], at[1][2]));
-    for (int c = 0; c < 3; ++c) job->place[c][i] = (float)(at[0][c] + v_coordinate(u, c));
+    uint32_t count = vessels_near(job, i / 4, near);
+    sonde_vec3 at = sonde_vessels_gather(near, count, point_of(job->rest, i));
+    for (int c = 0; c < 3; ++c) job->gathered[c][i] = (float)v_coordinate(at, c);
+  }
+}
+
+static void even(const carry_job *job) {
+  for (uint32_t i = 0; i < 4 * job->groups; ++i) {
+    sonde_vessel_state near[MOST_VESSELS];
+    uint32_t count = vessels_near(job, i / 4, near);
+    sonde_vec3 gathered = point_of((const float(*)[CARRY_POINTS])job->gathered, i);
+    sonde_vec3 place = point_of((const float(*)[CARRY_POINTS])job->place, i);
+    sonde_vec3 at = sonde_vessels_even(near, count, point_of(job->rest, i), gathered, place);
+    for (int c = 0; c < 3; ++c) job->place[c][i] = (float)v_coordinate(at, c);
   }
 }
 
@@ -201,5 +223,5 @@ static void convert(const convert_job *job) {
   }
 }
 
-const echo_kernels sonde_echo_kernels_plain = {"plain", splat, carry, stream, lateral, axial,
-                                               tissue,  merge, widen, mix,    fade,    convert};
+const echo_kernels sonde_echo_kernels_plain = {"plain", splat, gather, even, stream, lateral, axial,
+                                               tissue,  merge, widen,  mix,  fade,   convert};

@@ -3,82 +3,94 @@
 // sonde_interior_displacement  field and vessels; zero outside and in bone
 // sonde_interior_displacements the same for many points
 // sonde_interior_rest_point    inverse: exact in a lumen, iterated elsewhere
-// sonde_vessels_move           the same from a known field and the vessels' states
-// pull                         where one vessel wants a point, and how firmly
-// combine, combine_two         several vessels: each is exact on its own wall
+// invert, invert_from_afar, newton_step  the iteration
+// sonde_vessels_gather, sonde_vessels_even  before and behind the field
+// sonde_vessels_displace       both with the field between them
+// within_reach, share_of       how firmly a wall leads a point, beside others
 #include "base/base.h"
 #include "interior/interior.h"
 
 static const double reach = 3.0; // rest radii over which a wall's motion fades
+static const double least_share = 1e-9;
+static const double probing_m = 1e-6, longest_m = 4e-3; // of a step of Newton's
+static const double least_volume = 1e-3;                // of the derivative
+static const double good_enough_m = 1e-6;               // of an inverse
 
+// What one wall asks of a point.
 typedef struct pulled {
-  double weight;
-  sonde_vec3 move;
+  double weight; // 1 on the wall, 0 beyond its reach
+  sonde_vec3 way;
 } pulled;
 
-// Offsets in the cross-section go to the ellipse (and its area-preserving surroundings); the motion
-// along the vessel stays the field's.
-static pulled pull(const sonde_vessel_state *v, sonde_vec3 rest, sonde_vec3 field) {
-  pulled none = {0, field};
-  sonde_vec3 d = v_sub(rest, v->rest_centre_m), across = v_cross(v->axis, v->flat_axis);
-  double a = v_dot(d, v->flat_axis), b = v_dot(d, across), a1 = a, b1 = b;
-  double t = (sqrt(a * a + b * b) / v->rest_radius_m - 1) / reach;
-  double engaged = clamp(fabs(1 - v->area_ratio) / sonde_engaged_loss, 0, 1);
-  if (t >= 1 || !(engaged > 0)) return none;
-  t = fmax(t, 0);
-  sonde_vessel_carry(v, &a1, &b1);
-  sonde_vec3 move = v_sub(v->centre_m, v->rest_centre_m);
-  move = v_madd(v_madd(move, a1 - a, v->flat_axis), b1 - b, across);
-  move = v_madd(move, v_dot(v_sub(field, move), v->axis), v->axis);
-  return (pulled){engaged * (1 - t) * (1 - t) * (1 + 2 * t), move};
+// Offset from a vessel's centre at rest, in its cross-section; false beyond the reach of its wall.
+static bool within_reach(const sonde_vessel_state *v, sonde_vec3 rest, sonde_vec3 across, double *a,
+                         double *b, double *weight) {
+  sonde_vec3 d = v_sub(rest, v->rest_centre_m);
+  *a = v_dot(d, v->flat_axis), *b = v_dot(d, across);
+  double t = fmax((sqrt(*a * *a + *b * *b) / v->rest_radius_m - 1) / reach, 0);
+  *weight = v->lead * (1 - t) * (1 - t) * (1 + 2 * t);
+  return t < 1 && v->lead > 0;
 }
 
-static sonde_vec3 combine_two(sonde_vec3 field, pulled a, pulled b) {
-  double both = 1 - a.weight * b.weight;
-  if (!(both > 1e-9)) return a.move;
-  double wa = a.weight * (1 - b.weight) / both, wb = b.weight * (1 - a.weight) / both;
-  sonde_vec3 u = v_madd(field, wa, v_sub(a.move, field));
-  return v_madd(u, wb, v_sub(b.move, field));
+// Share of a wall: 1 on it, 0 on another, o beyond its reach, with o the product of 1 - w of the
+// others.
+static double share_of(const pulled *p, uint32_t count, uint32_t k) {
+  double others = 1;
+  for (uint32_t j = 0; j < count; ++j)
+    if (j != k) others *= 1 - p[j].weight;
+  return others / fmax(others + (1 - p[k].weight) * (1 - others), least_share);
 }
 
-// Weights w_k prod (1 - w_j), j not k, over their sum with prod (1 - w_j): for two vessels the same
-// as above.
-static sonde_vec3 combine(sonde_vec3 field, const pulled *p, uint32_t count) {
-  double sum = 1, share[SONDE_VESSELS];
-  for (uint32_t k = 0; k < count; ++k) sum *= 1 - p[k].weight;
-  for (uint32_t k = 0; k < count; ++k) {
-    share[k] = p[k].weight;
-    for (uint32_t j = 0; j < count; ++j)
-      if (j != k) share[k] *= 1 - p[j].weight;
-    sum += share[k];
-  }
-  sonde_vec3 u = field;
-  if (!(sum > 1e-9)) return p[0].move;
-  for (uint32_t k = 0; k < count; ++k) u = v_madd(u, share[k] / sum, v_sub(p[k].move, field));
-  return u;
-}
-
-sonde_vec3 sonde_vessels_move(const sonde_vessel_state *near, uint32_t count, sonde_vec3 rest,
-                              sonde_vec3 field) {
-  SONDE_ASSERT(count <= SONDE_VESSELS);
-  pulled p[SONDE_VESSELS + 2];
+sonde_vec3 sonde_vessels_gather(const sonde_vessel_state *near, uint32_t count, sonde_vec3 rest) {
+  SONDE_ASSERT(count <= SONDE_VESSELS && (count == 0 || near != NULL));
+  pulled p[SONDE_VESSELS];
   uint32_t kept = 0;
   for (uint32_t k = 0; k < count; ++k) {
-    p[kept] = pull(&near[k], rest, field);
-    if (p[kept].weight > 0) ++kept;
+    const sonde_vessel_state *v = &near[k];
+    sonde_vec3 across = v_cross(v->axis, v->flat_axis);
+    double a, b;
+    if (!within_reach(v, rest, across, &a, &b, &p[kept].weight)) continue;
+    double x = a, y = b;
+    sonde_vessel_gather(v, &x, &y);
+    p[kept++].way = v_madd(v_scale(v->flat_axis, v->lead * (x - a)), v->lead * (y - b), across);
   }
-  if (kept > 2) return combine(field, p, kept);
-  for (uint32_t k = kept; k < 2; ++k) p[k] = (pulled){0, field};
-  return combine_two(field, p[0], p[1]);
+  sonde_vec3 at = rest;
+  for (uint32_t k = 0; k < kept; ++k) at = v_madd(at, share_of(p, kept, k), p[k].way);
+  return at;
 }
 
-static sonde_vec3 displace(const sonde_interior *in, sonde_vec3 rest, double s) {
+// The motion along a vessel stays the field's.
+sonde_vec3 sonde_vessels_even(const sonde_vessel_state *near, uint32_t count, sonde_vec3 rest,
+                              sonde_vec3 gathered, sonde_vec3 place) {
+  SONDE_ASSERT(count <= SONDE_VESSELS && (count == 0 || near != NULL));
+  pulled p[SONDE_VESSELS];
+  uint32_t kept = 0;
+  for (uint32_t k = 0; k < count; ++k) {
+    const sonde_vessel_state *v = &near[k];
+    sonde_vec3 across = v_cross(v->axis, v->flat_axis);
+    double a, b;
+    if (!within_reach(v, rest, across, &a, &b, &p[kept].weight)) continue;
+    sonde_vec3 d = v_sub(gathered, v->rest_centre_m), bend = v_sub(v->centre_m, place);
+    a = v_dot(d, v->flat_axis), b = v_dot(d, across);
+    sonde_vessel_tissue(v, &a, &b);
+    bend = v_madd(v_madd(bend, a, v->flat_axis), b, across);
+    bend = v_madd(bend, -v_dot(bend, v->axis), v->axis);
+    p[kept++].way = v_scale(bend, v->tissue_even);
+  }
+  sonde_vec3 at = place;
+  for (uint32_t k = 0; k < kept; ++k) at = v_madd(at, p[k].weight * share_of(p, kept, k), p[k].way);
+  return at;
+}
+
+sonde_vec3 sonde_vessels_displace(const sonde_interior *in, sonde_vec3 rest, double s) {
   sonde_vessel_state near[SONDE_VESSELS];
   uint32_t count = 0;
   for (uint32_t which = 0; which < in->vessel_count; ++which)
     if (which < 2 || sonde_vessel_reaches(in, which, s, rest, 0))
       count += sonde_vessel_at(in, which, s, &near[count]);
-  return sonde_vessels_move(near, count, rest, sonde_interior_field(in, rest));
+  sonde_vec3 at = sonde_vessels_gather(near, count, rest);
+  sonde_vec3 place = v_add(at, sonde_interior_field(in, at));
+  return v_sub(sonde_vessels_even(near, count, rest, at, place), rest);
 }
 
 sonde_vec3 sonde_interior_displacement(const sonde_interior *in, sonde_vec3 rest) {
@@ -86,7 +98,7 @@ sonde_vec3 sonde_interior_displacement(const sonde_interior *in, sonde_vec3 rest
   sonde_column_point at;
   if (!in->ready || !sonde_interior_locate(in, rest, &at)) return vec3(0, 0, 0);
   if (at.depth_m < 0 || at.r <= in->bone_radius_m) return vec3(0, 0, 0);
-  return displace(in, rest, at.s);
+  return sonde_vessels_displace(in, rest, at.s);
 }
 
 void sonde_interior_displacements(const sonde_interior *in, uint32_t count, const sonde_vec3 *rest,
@@ -95,38 +107,84 @@ void sonde_interior_displacements(const sonde_interior *in, uint32_t count, cons
   for (uint32_t i = 0; i < count; ++i) out[i] = sonde_interior_displacement(in, rest[i]);
 }
 
-// The rest point when `point` lies in the lumen of the vessel, whose map is known both ways.
+static sonde_vec3 miss_at(const sonde_interior *in, sonde_vec3 rest, sonde_vec3 point) {
+  sonde_column_point at;
+  (void)sonde_interior_locate(in, rest, &at);
+  return v_sub(v_add(rest, sonde_vessels_displace(in, rest, at.s)), point);
+}
+
+// The rest point when `point` lies in the lumen of the vessel, whose map across is known both ways;
+// along the vessel the field moves it.
 static bool within_lumen(const sonde_interior *in, uint32_t which, sonde_vec3 point, double s,
                          sonde_vec3 *rest) {
   sonde_vessel_state v;
-  if (!sonde_vessel_at(in, which, s, &v) || fabs(1 - v.area_ratio) < sonde_engaged_loss)
-    return false;
+  if (!sonde_vessel_at(in, which, s, &v) || v.lead < 1 || v.tissue_even < 1) return false;
   sonde_vec3 d = v_sub(point, v.centre_m), across = v_cross(v.axis, v.flat_axis);
   double a = v_dot(d, v.flat_axis) / v.half_short_m, b = v_dot(d, across) / v.half_long_m;
   if (a * a + b * b > 1) return false;
   *rest = v_madd(v_madd(v.rest_centre_m, a * v.rest_radius_m, v.flat_axis), b * v.rest_radius_m,
                  across);
   *rest = v_madd(*rest, v_dot(d, v.axis), v.axis);
+  for (int i = 0; i < 6; ++i)
+    *rest = v_madd(*rest, -v_dot(miss_at(in, *rest, point), v.axis), v.axis);
   return true;
 }
 
-// Fixed point q <- q - (q + u(q) - p); a step that does not shrink the mismatch is halved.
-static sonde_vec3 invert(const sonde_interior *in, sonde_vec3 point, sonde_vec3 guess) {
-  sonde_vec3 q = guess, best = guess;
-  double damping = 1, least = INFINITY;
-  for (int i = 0; i < 60; ++i) {
-    sonde_column_point at;
-    (void)sonde_interior_locate(in, q, &at);
-    sonde_vec3 miss = v_sub(v_add(q, displace(in, q, at.s)), point);
-    double size = v_norm(miss);
-    if (size < least)
-      least = size, best = q;
-    else
-      damping *= 0.5;
-    if (size < 1e-7) break;
-    q = v_madd(q, -damping, miss);
+// The correction that turns a miss into none where the map's derivative at q goes on; false where
+// it does not.
+static bool newton_step(const sonde_interior *in, sonde_vec3 q, sonde_vec3 point, sonde_vec3 miss,
+                        sonde_vec3 *step) {
+  sonde_vec3 slope[3];
+  for (int k = 0; k < 3; ++k) {
+    sonde_vec3 next =
+        v_add(q, vec3(k == 0 ? probing_m : 0, k == 1 ? probing_m : 0, k == 2 ? probing_m : 0));
+    slope[k] = v_scale(v_sub(miss_at(in, next, point), miss), 1 / probing_m);
   }
-  return best;
+  sonde_vec3 cross = v_cross(slope[1], slope[2]);
+  double volume = v_dot(slope[0], cross);
+  if (!(volume > least_volume)) return false;
+  *step = v_scale(vec3(v_dot(miss, cross), v_dot(miss, v_cross(slope[2], slope[0])),
+                       v_dot(miss, v_cross(slope[0], slope[1]))),
+                  -1 / volume);
+  return true;
+}
+
+// Newton's steps, halved until they shrink the miss; where none does, or the derivative is no use,
+// a part of the miss. Returns what is left of it.
+static double invert(const sonde_interior *in, sonde_vec3 point, sonde_vec3 *rest) {
+  sonde_vec3 q = *rest, miss = miss_at(in, q, point);
+  double size = v_norm(miss);
+  for (int i = 0; i < 40 && size > 1e-7; ++i) {
+    sonde_vec3 step;
+    if (!newton_step(in, q, point, miss, &step)) step = v_neg(miss);
+    double share = fmin(1, longest_m / fmax(v_norm(step), 1e-12));
+    sonde_vec3 next = q, left = miss;
+    for (int half = 0; half < 8; ++half, share *= 0.5) {
+      next = v_madd(q, share, step), left = miss_at(in, next, point);
+      if (v_norm(left) < size) break;
+    }
+    if (!(v_norm(left) < size)) break;
+    q = next, miss = left, size = v_norm(left);
+  }
+  *rest = q;
+  return size;
+}
+
+// From places that the tissue at `point` may have come from: the map has one inverse, but Newton's
+// way to it may be barred by a layer that is squeezed thin.
+static sonde_vec3 invert_from_afar(const sonde_interior *in, sonde_vec3 point, sonde_vec3 rest,
+                                   double left) {
+  enum { STARTS = 12 };
+  sonde_column_point at;
+  (void)sonde_interior_locate(in, point, &at);
+  sonde_vec3 out = v_add(v_scale(in->e1, cos(at.theta)), v_scale(in->e2, sin(at.theta)));
+  for (int k = 0; k < STARTS && left > good_enough_m; ++k) {
+    double r = in->bone_radius_m + (at.radius_m - in->bone_radius_m) * (k + 0.5) / STARTS;
+    sonde_vec3 start = v_madd(point, r - at.r, out);
+    double got = invert(in, point, &start);
+    if (got < left) left = got, rest = start;
+  }
+  return rest;
 }
 
 sonde_vec3 sonde_interior_rest_point(const sonde_interior *in, sonde_vec3 point) {
@@ -137,7 +195,9 @@ sonde_vec3 sonde_interior_rest_point(const sonde_interior *in, sonde_vec3 point)
   (void)sonde_interior_locate(in, bare, &at);
   for (uint32_t which = 0; which < in->vessel_count; ++which)
     if (within_lumen(in, which, point, at.s, &rest)) return rest;
-  rest = invert(in, point, bare);
+  rest = bare;
+  double left = invert(in, point, &rest);
+  if (left > good_enough_m) rest = invert_from_afar(in, point, rest, left);
   bool within = sonde_interior_locate(in, rest, &at);
   return within && at.depth_m >= -1e-6 ? rest : point;
 }

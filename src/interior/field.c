@@ -20,6 +20,7 @@
 #include "base/base.h"
 #include "interior/clot.h"
 #include "interior/interior.h"
+#include "interior/unfold.h"
 #include "interior/window.h"
 
 #include <string.h>
@@ -156,7 +157,11 @@ sonde_vec3 sonde_interior_column_field(const sonde_interior *in, sonde_vec3 rest
 // Beyond the ends of the window the solid is at rest.
 sonde_vec3 sonde_interior_field(const sonde_interior *in, sonde_vec3 rest) {
   polar q = to_polar(in, rest);
-  if (!in->solid) return column_field(in, q);
+  if (!in->solid) {
+    sonde_vec3 kept, plain = column_field(in, q);
+    double share = sonde_bend_at(in->bend, q.theta, q.s, q.r, &kept);
+    return share > 0 ? v_lerp(plain, kept, share) : plain;
+  }
   double u[3];
   (void)sonde_window_field(in->live, q.theta, q.s, q.r, u);
   return v_madd(v_madd(v_scale(in->e1, u[0]), u[1], in->e2), u[2], in->axis);

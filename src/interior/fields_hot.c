@@ -18,16 +18,17 @@ void sonde_fields_begin(sonde_fields *f, const sonde_interior *in, sonde_vec3 co
   f->interior = in, f->corner = corner, f->rows = 0;
   if (!in->solid) return;
   const sonde_window *w = in->live;
-  double cosine = cos(w->place.theta), sine = sin(w->place.theta);
+  double cosine = cos(w->grid.place.theta), sine = sin(w->grid.place.theta);
   sonde_vec3 x = v_madd(v_scale(in->e1, cosine), sine, in->e2);
   sonde_vec3 y = v_madd(v_scale(in->e2, cosine), -sine, in->e1), from = v_sub(corner, in->origin);
-  f->first = v4_of(vec3(v_dot(from, x), v_dot(from, y), v_dot(from, in->axis) - w->place.s));
+  f->first = v4_of(vec3(v_dot(from, x), v_dot(from, y), v_dot(from, in->axis) - w->grid.place.s));
   for (int c = 0; c < 3; ++c)
     f->turned[c] = v4_of(vec3(v_coordinate(x, c), v_coordinate(y, c), v_coordinate(in->axis, c)));
-  for (int i = 0; i <= NT; ++i) f->theta[i] = (float)w->theta[i];
-  for (int i = 0; i < NT; ++i) f->per_theta[i] = (float)(1 / (w->theta[i + 1] - w->theta[i]));
-  for (int j = 0; j < NS; ++j) f->s[j] = (float)(w->s[j] - w->place.s);
-  for (int j = 0; j + 1 < NS; ++j) f->per_s[j] = (float)(1 / (w->s[j + 1] - w->s[j]));
+  for (int i = 0; i <= NT; ++i) f->theta[i] = (float)w->grid.theta[i];
+  for (int i = 0; i < NT; ++i)
+    f->per_theta[i] = (float)(1 / (w->grid.theta[i + 1] - w->grid.theta[i]));
+  for (int j = 0; j < NS; ++j) f->s[j] = (float)(w->grid.s[j] - w->grid.place.s);
+  for (int j = 0; j + 1 < NS; ++j) f->per_s[j] = (float)(1 / (w->grid.s[j + 1] - w->grid.s[j]));
 }
 
 static void store_row(sonde_fields *f, uint32_t j) {
@@ -38,7 +39,7 @@ static void store_row(sonde_fields *f, uint32_t j) {
   f->rows |= 1u << j;
   for (uint32_t k = j * NT; k < (j + 1) * NT; ++k) {
     sonde_field_column *c = &f->column[k];
-    c->radius[0] = load4(w->radius[k]), c->radius[1] = load4(w->radius[k] + 4);
+    c->radius[0] = load4(w->grid.radius[k]), c->radius[1] = load4(w->grid.radius[k] + 4);
     for (uint32_t l = 0; l < NL; ++l) {
       uint32_t at = w->solid.unknown[k * NL + l];
       const float *u = w->solid.x + 3 * (size_t)at;
@@ -86,7 +87,7 @@ static v4 field_of(sonde_fields *f, float turn, float s, float r, uint32_t cell[
 static void by_columns(const sonde_fields *f, uint32_t count, const v4 *rest, v4 *field) {
   for (uint32_t k = 0; k < count; ++k) {
     sonde_vec3 way = vec3((double)rest[k][0], (double)rest[k][1], (double)rest[k][2]);
-    field[k] = v4_of(sonde_interior_column_field(f->interior, v_add(f->corner, way)));
+    field[k] = v4_of(sonde_interior_field(f->interior, v_add(f->corner, way)));
   }
 }
 

@@ -1,7 +1,6 @@
 // The window follows the probe: two solids, one in use, one that is factored bit by bit.
 //
 // sonde_interior_follow  keeps a window under the probe and solves it
-// place_of               where a window for this probe would be
 // distance               between two places, in units of what a window tolerates
 // prepare, build         starts, continues and swaps
 // sonde_interior_build_ahead  continues between two updates
@@ -13,26 +12,8 @@
 
 #include <string.h>
 
-static const double default_half_x_m = 30e-3, default_half_y_m = 6e-3;
-static const double far_m = 60e-3; // a probe this far above the skin needs no window yet
 static const double slack_t_m = 9e-3, slack_s_m = 7e-3, slack_half_m = 6e-3;
 static const double start_at = 0.5, exact = 0.05; // of the slack
-
-static bool place_of(const sonde_interior *in, const sonde_interior_input *input,
-                     sonde_window_place *place) {
-  sonde_mat3 r = q_matrix(input->world_from_probe.rotation);
-  sonde_vec3 x = m_column(&r, 0), y = m_column(&r, 1);
-  double hx = input->face_half_x_m > 0 ? input->face_half_x_m : default_half_x_m;
-  double hy = input->face_half_y_m > 0 ? input->face_half_y_m : default_half_y_m;
-  sonde_column_point at;
-  bool within = sonde_interior_locate(in, input->world_from_probe.position, &at);
-  *place = (sonde_window_place){.theta = at.theta, .s = at.s};
-  place->half_s_m = fabs(v_dot(x, in->axis)) * hx + fabs(v_dot(y, in->axis)) * hy;
-  double across_x = sqrt(fmax(0, 1 - v_dot(x, in->axis) * v_dot(x, in->axis)));
-  double across_y = sqrt(fmax(0, 1 - v_dot(y, in->axis) * v_dot(y, in->axis)));
-  place->half_theta_m = across_x * hx + across_y * hy;
-  return within && at.depth_m > -far_m;
-}
 
 static double distance(const sonde_interior *in, sonde_window_place a, sonde_window_place b) {
   sonde_column_point at;
@@ -70,8 +51,8 @@ void sonde_interior_build_ahead(sonde_interior *in) {
 // At rest in time (dt < 0) the window is made at once, in a running session bit by bit.
 static void prepare(sonde_interior *in, sonde_window_place place, bool at_once) {
   SONDE_ASSERT(in->live != NULL && in->next != NULL);
-  double off = in->live->ready ? distance(in, in->live->place, place) : INFINITY;
-  if (in->building && distance(in, in->next->place, place) > 1) in->building = false;
+  double off = in->live->ready ? distance(in, in->live->grid.place, place) : INFINITY;
+  if (in->building && distance(in, in->next->grid.place, place) > 1) in->building = false;
   if (!in->building && off > (at_once ? exact : start_at)) {
     const double at[4] = {place.theta, place.s, place.half_theta_m, place.half_s_m};
     sonde_interior_next_window(in, at);
@@ -86,9 +67,9 @@ static void prepare(sonde_interior *in, sonde_window_place place, bool at_once) 
 
 bool sonde_interior_follow(sonde_interior *in, const sonde_interior_input *input) {
   sonde_window_place place;
-  if (in->method != SONDE_INTERIOR_SOLID || !place_of(in, input, &place)) return false;
+  if (in->method != SONDE_INTERIOR_SOLID || !sonde_grid_place(in, input, &place)) return false;
   prepare(in, place, input->dt_s < 0);
-  if (!in->live->ready || distance(in, in->live->place, place) > 1) return false;
+  if (!in->live->ready || distance(in, in->live->grid.place, place) > 1) return false;
   return sonde_window_update(in->live, in, input);
 }
 
@@ -103,7 +84,7 @@ static void place_to(const sonde_window_place *place, double p[4]) {
 }
 
 static bool is_at(const struct sonde_window *window, const sonde_window_place *place) {
-  return window->ready && memcmp(&window->place, place, sizeof *place) == 0;
+  return window->ready && memcmp(&window->grid.place, place, sizeof *place) == 0;
 }
 
 sonde_status sonde_interior_keep_windows(sonde_interior *in, uint32_t count, sonde_error *error) {
@@ -147,8 +128,8 @@ void sonde_interior_remember(const sonde_interior *in, sonde_interior_memory *me
   memory->tick = in->tick;
   memory->ready = in->ready, memory->live_ready = in->live->ready;
   memory->building = in->building, memory->built = in->built;
-  if (in->live->ready) place_to(&in->live->place, memory->live);
-  if (in->building) place_to(&in->next->place, memory->next);
+  if (in->live->ready) place_to(&in->live->grid.place, memory->live);
+  if (in->building) place_to(&in->next->grid.place, memory->next);
   for (int which = 0; which < 2; ++which)
     for (uint32_t i = 0; i < in->station_count[which]; ++i) {
       memory->area_ratio[which][i] = in->state[which][i].area_ratio;

@@ -27,6 +27,8 @@ sonde_status sonde_interior_create(const sonde_model *model, sonde_interior **in
   for (uint32_t k = 1; k < SONDE_VESSELS; ++k) made->pathology[k] = made->pathology[0];
   if (status == SONDE_OK) status = sonde_columns_create(made, error);
   if (status == SONDE_OK) status = sonde_stations_create(made, error);
+  made->bend = SONDE_NEW(struct sonde_bend, 1);
+  if (status == SONDE_OK && made->bend == NULL) status = sonde_fail_memory(error);
   if (status == SONDE_OK) status = sonde_window_create(&made->live, error);
   if (status == SONDE_OK) status = sonde_window_create(&made->next, error);
   if (status == SONDE_OK) made->whole = sonde_window_steps(made->live, SONDE_WINDOW_BUDGET);
@@ -47,6 +49,7 @@ void sonde_interior_destroy(sonde_interior *interior) {
   sonde_ldl_destroy(interior->ldl);
   sonde_free(interior->column);
   sonde_free(interior->field);
+  sonde_free(interior->bend);
   sonde_free(interior->potential);
   sonde_free(interior->scratch);
   sonde_free(interior);

@@ -46,8 +46,11 @@ static const double sonde_fat_pa = 1.5e3, sonde_muscle_pa = 3.6e3;
 
 // Share of a vessel's area from whose loss on its wall leads the tissue beside it fully.
 static const double sonde_engaged_loss = 0.05;
+// Thinnest gap between touching walls that the tissue around them leaves, over the rest radius.
+static const double sonde_least_lumen = 0.03;
 
 struct sonde_window;
+struct sonde_bend;
 
 // Axes of a lesion at rest over its semi-axes: dot products with the way from its centre are
 // coordinates in which it is the unit ball.
@@ -62,6 +65,7 @@ typedef struct sonde_station {
   double radius_m, depth_m;
   double hold;     // shear modulus around it over that of muscle
   double tissue_m; // from the skin to the bone
+  double lead;     // of the tissue by its wall: 0 where it opens into another vessel, 1 beyond
 } sonde_station;
 
 struct sonde_interior {
@@ -76,6 +80,7 @@ struct sonde_interior {
   sonde_column_field *field; // same shape
   sonde_ldl *ldl;
   double *potential, *scratch;
+  struct sonde_bend *bend;          // keeps the columns' field from folding
   struct sonde_window *live, *next; // the solid in use and the one that is being factored
   bool building;                    // next has a place and is not in use yet
   bool ahead;                       // the coming update's share of it is done
@@ -90,7 +95,8 @@ struct sonde_interior {
   uint32_t station_count[SONDE_VESSELS]; // 0: a leg without this vessel
   sonde_station station[SONDE_VESSELS][SONDE_STATIONS];
   sonde_vessel_state state[SONDE_VESSELS][SONDE_STATIONS];
-  sonde_pathology pathology[SONDE_VESSELS]; // of the last update
+  bool strained[SONDE_VESSELS][SONDE_STATIONS]; // walls beside which the tissue may fold
+  sonde_pathology pathology[SONDE_VESSELS];     // of the last update
   sonde_findings findings;
   lesion_frame lesion[SONDE_LESIONS];
   bool ready; // an update has happened
@@ -118,14 +124,21 @@ bool sonde_vessel_stations(const sonde_interior *interior, uint32_t which, doubl
 // State of a vessel interpolated at axial position s. @thread any
 bool sonde_vessel_at(const sonde_interior *interior, uint32_t which, double s_m,
                      sonde_vessel_state *state);
-// Where the wall carries a point given relative to the centre of the undisturbed cross-section
-// (rest + field): area-preserving, fading out with distance. @thread any
-void sonde_vessel_carry(const sonde_vessel_state *state, double *short_m, double *long_m);
-
-// Displacement of a rest point whose field is known, with the vessels near it. What
-// sonde_interior_displacement gives inside the tissue. @thread any
-sonde_vec3 sonde_vessels_move(const sonde_vessel_state *near, uint32_t count, sonde_vec3 rest_m,
-                              sonde_vec3 field_m);
+// Where the wall gathers a point given relative to the centre of the undisturbed cross-section,
+// at rest: the tissue's gradient takes a point of the lumen from there to the lumen as it is.
+// Keeps orientation, fades out with distance. @thread any
+void sonde_vessel_gather(const sonde_vessel_state *state, double *short_m, double *long_m);
+// Where the tissue's gradient carries it. @thread any
+void sonde_vessel_tissue(const sonde_vessel_state *state, double *short_m, double *long_m);
+// A point goes first to where the walls near it gather the tissue, at rest still, then with the
+// field, and last to where the walls even out the field's bends: the place of a rest point that was
+// gathered to `gathered_m` and that the field took to `place_m`. @thread any
+sonde_vec3 sonde_vessels_gather(const sonde_vessel_state *near, uint32_t count, sonde_vec3 rest_m);
+sonde_vec3 sonde_vessels_even(const sonde_vessel_state *near, uint32_t count, sonde_vec3 rest_m,
+                              sonde_vec3 gathered_m, sonde_vec3 place_m);
+// Displacement of a rest point at axial position s, vessels included; it goes on beyond the skin.
+// @thread any
+sonde_vec3 sonde_vessels_displace(const sonde_interior *interior, sonde_vec3 rest_m, double s_m);
 // Whether the wall of a branch can move a point; cheaper than its state. @thread any
 bool sonde_vessel_reaches(const sonde_interior *interior, uint32_t which, double s_m,
                           sonde_vec3 rest_m, double beyond_m);

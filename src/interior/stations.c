@@ -5,6 +5,7 @@
 // resample               points at equal arc length, ascending along the femur's axis
 // place_station          facts of one station
 // raise_fascia           keeps the femoral vessels below the fat
+// find_leads             where a branch opens into another vessel
 // lay_branches           further vessels of the model's anatomy
 #include "base/base.h"
 #include "interior/interior.h"
@@ -12,6 +13,7 @@
 static const double spacing_m = 5e-3;
 static const double artery_aside_m = 11e-3; // between the middles, when they are placed
 static const double least_advance_m = 1e-3;
+static const double full_gap = 0.25; // radii of a branch
 static const double clearance_m = 1.5e-3, bump_radius_m = 20e-3;
 
 static double line_length(const sonde_vessel *line) {
@@ -44,7 +46,7 @@ static void place_station(const sonde_interior *in, sonde_station *station) {
   station->s_m = at.s;
   station->tissue_m = at.radius_m - in->bone_radius_m;
   if (!(station->depth_m > 0)) station->depth_m = at.depth_m;
-  station->hold = 1;
+  station->hold = station->lead = 1;
 }
 
 static void find_axes(const sonde_interior *in, sonde_station *station, uint32_t count) {
@@ -118,7 +120,10 @@ static void rest_state(sonde_interior *in, uint32_t which) {
                                                .rest_radius_m = r,
                                                .area_ratio = 1,
                                                .half_short_m = r,
-                                               .half_long_m = r};
+                                               .half_long_m = r,
+                                               .tissue_short = 1,
+                                               .tissue_long = 1,
+                                               .tissue_even = 1};
   }
 }
 
@@ -143,6 +148,22 @@ static void find_hold(const sonde_interior *in, sonde_station *station, uint32_t
   }
 }
 
+// Where a branch opens into another vessel two walls would lead the same tissue: there that of the
+// branch does not, and beyond it leads the more the farther the two walls are apart.
+static void find_leads(sonde_interior *in, uint32_t which) {
+  for (uint32_t i = 0; i < in->station_count[which]; ++i) {
+    sonde_station *station = &in->station[which][i];
+    for (uint32_t other = 0; other < which; ++other) {
+      sonde_vessel_state v;
+      if (!sonde_vessel_at(in, other, station->s_m, &v)) continue;
+      sonde_vec3 d = v_sub(station->rest_m, v.rest_centre_m);
+      d = v_madd(d, -v_dot(d, v.axis), v.axis);
+      double gap = v_norm(d) - v.rest_radius_m - station->radius_m;
+      station->lead = fmin(station->lead, clamp(gap / (full_gap * station->radius_m), 0, 1));
+    }
+  }
+}
+
 static sonde_status lay_branches(sonde_interior *in, sonde_error *error) {
   const sonde_thigh_anatomy *anatomy = in->model->anatomy;
   sonde_status status = SONDE_OK;
@@ -153,6 +174,7 @@ static sonde_status lay_branches(sonde_interior *in, sonde_error *error) {
     status = resample(in, which, &anatomy->branch[b].line, error);
     find_hold(in, in->station[which], in->station_count[which]);
     rest_state(in, which);
+    find_leads(in, which);
   }
   return status;
 }

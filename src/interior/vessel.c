@@ -8,7 +8,7 @@
 // rectangle_pressure              the same below a rectangle on a half space
 // update_station                  dynamics and shape
 // sonde_vessel_stations, sonde_vessel_at  state between stations
-// sonde_vessel_carry              where the moving wall takes the tissue around it
+// sonde_vessel_gather, sonde_vessel_tissue  the tissue around a moving wall
 // sonde_interior_vessel_at_plane  where the image plane cuts
 #include "base/base.h"
 #include "interior/interior.h"
@@ -24,6 +24,14 @@ static const double least_depth_m = 3e-3;
 static const double bone_start = 0.30, bone_rise = 1.75; // rigid base, docs/interior.md
 static const double carry_reach = 3.0; // rest radii over which the wall's motion fades
 static const double plane_reach_m = 40e-3;
+static const double gradient_reach = 1.5, bend_reach = 2.5; // rest radii: where the field is read
+static const double most_squeeze = 2.2; // a lumen's semi-axis over the tissue's stretch, rest radii
+static const double least_tissue = 0.1, most_turn = 0.5; // of the gradient beside a wall
+static const double gap_share = 0.4, side_by_side = 0.7;
+static const double gentle_squeeze = 0.45, gentle_bend = 0.08, probing_m = 0.1e-3;
+static const double least_area_share = 0.06;
+enum { PASSES = 10 };
+static const double bend_share = 0.4; // of the tissue's least stretch that a bend may take
 
 // Equivalent load of a probe on the skin, in the probe frame.
 typedef struct load {
@@ -161,6 +169,7 @@ static void update_station(sonde_interior *in, uint32_t which, uint32_t i, const
   double blend = input->dt_s < 0 || !in->ready ? 1 : 1 - exp(-input->dt_s / relaxation_s);
   v->outside_pa = outside;
   v->area_ratio = fmax(v->area_ratio + (goal - v->area_ratio) * blend, least_ratio);
+  v->lead = station->lead * clamp(fabs(1 - v->area_ratio) / sonde_engaged_loss, 0, 1);
   v->rest_radius_m = station->radius_m * c->scale[clot];
   double half_short, half_long;
   sonde_vessel_shape(c->kind, &c->of[clot], clot, v->area_ratio, &half_short, &half_long);
@@ -168,6 +177,125 @@ static void update_station(sonde_interior *in, uint32_t which, uint32_t i, const
   v->half_long_m = half_long * v->rest_radius_m;
   v->rest_centre_m = station->rest_m;
   v->centre_m = v_add(station->rest_m, sonde_interior_field(in, station->rest_m));
+}
+
+// Gradient f of the field across a vessel, over points on both sides of it, as a turn and a lower
+// triangle. A wall that keeps its shape in tissue that is squeezed flat bounds the squeeze.
+static void split_gradient(double f[2][2], sonde_vessel_state *v) {
+  SONDE_ASSERT(v->rest_radius_m > 0);
+  double least_short = v->half_short_m / (most_squeeze * v->rest_radius_m);
+  double least_long = v->half_long_m / (most_squeeze * v->rest_radius_m);
+  double size = hypot(f[0][0], f[0][1]);
+  double half = clamp(-f[0][1] / fmax(size + f[0][0], 1e-3), -most_turn, most_turn);
+  double whole = 2 / (1 + half * half), cosine = whole - 1, sine = half * whole;
+  v->tissue_turn = half;
+  v->tissue_short = fmax(size, fmax(least_short, least_tissue));
+  v->tissue_long = fmax(f[1][0] * sine + f[1][1] * cosine, fmax(least_long, least_tissue));
+  v->tissue_shear = f[1][0] * cosine - f[1][1] * sine;
+}
+
+// The field beside a wall differs from its gradient by a bend that ends at the wall. Where tissue
+// is squeezed so thin that a bend which ends so soon would fold it, less of the bend ends. Returns
+// whether the tissue may be close to folding.
+static bool find_tissue(const sonde_interior *in, sonde_vessel_state *v) {
+  enum { SIDES = 8 };
+  v->tissue_short = v->tissue_long = v->tissue_even = 1, v->tissue_shear = v->tissue_turn = 0;
+  if (!(v->lead > 0)) return false;
+  double f[2][2], most = 0;
+  sonde_vec3 side[2] = {v->flat_axis, v_cross(v->axis, v->flat_axis)};
+  const double near = gradient_reach * v->rest_radius_m, far = bend_reach * v->rest_radius_m;
+  for (int k = 0; k < 2; ++k) {
+    sonde_vec3 low = sonde_interior_field(in, v_madd(v->rest_centre_m, -near, side[k]));
+    sonde_vec3 high = sonde_interior_field(in, v_madd(v->rest_centre_m, near, side[k]));
+    sonde_vec3 slope = v_scale(v_sub(high, low), 0.5 / near);
+    for (int i = 0; i < 2; ++i) f[i][k] = (i == k) + v_dot(slope, side[i]);
+  }
+  split_gradient(f, v);
+  for (int k = 0; k < SIDES; ++k) {
+    double x = far * cos(2 * SONDE_PI * k / SIDES), y = far * sin(2 * SONDE_PI * k / SIDES);
+    double a = x, b = y;
+    sonde_vec3 at = v_madd(v_madd(v->rest_centre_m, x, side[0]), y, side[1]);
+    sonde_vec3 u = v_sub(sonde_interior_field(in, at), v_sub(v->centre_m, v->rest_centre_m));
+    sonde_vessel_tissue(v, &a, &b);
+    most = fmax(most, hypot(v_dot(u, side[0]) - a + x, v_dot(u, side[1]) - b + y));
+  }
+  double bound = bend_share * fmin(v->tissue_short, v->tissue_long) * far;
+  if (most > bound) v->tissue_even = bound / most;
+  return fmin(v->tissue_short, v->tissue_long) < gentle_squeeze || most > gentle_bend * far;
+}
+
+// Two vessels side by side leave tissue between them: a lumen takes a share of the gap at rest, as
+// the tissue's gradient stretches it, and is as much thicker; its area stays.
+static void keep_clear(sonde_interior *in, uint32_t which, uint32_t other) {
+  for (uint32_t i = 0; i < in->station_count[which]; ++i) {
+    sonde_vessel_state *v = &in->state[which][i], beside;
+    if (!(v->lead > 0) || !sonde_vessel_at(in, other, in->station[which][i].s_m, &beside)) continue;
+    sonde_vec3 d = v_sub(beside.rest_centre_m, v->rest_centre_m);
+    sonde_vec3 across = v_cross(v->axis, v->flat_axis);
+    d = v_madd(d, -v_dot(d, v->axis), v->axis);
+    double apart = v_norm(d), gap = apart - v->rest_radius_m - beside.rest_radius_m;
+    if (!(gap > 0) || fabs(v_dot(d, across)) < side_by_side * apart) continue;
+    double most = v->tissue_long * (v->rest_radius_m + gap_share * gap);
+    double round = sqrt(v->half_short_m * v->half_long_m), bound = fmax(most, round);
+    if (v->half_long_m <= bound) continue;
+    v->half_short_m *= v->half_long_m / bound, v->half_long_m = bound;
+  }
+}
+
+// Least area in the cross-section, over the area at rest, of the tissue beside a station.
+static double least_area_beside(const sonde_interior *in, uint32_t which, uint32_t i) {
+  enum { SIDES = 12, RINGS = 3 };
+  static const double ring[RINGS] = {1.25, 2.2, 3.1}; // rest radii
+  const sonde_vessel_state *v = &in->state[which][i];
+  const sonde_vec3 side[2] = {v->flat_axis, v_cross(v->axis, v->flat_axis)};
+  const double s = in->station[which][i].s_m;
+  double least = INFINITY;
+  for (int k = 0; k < SIDES * RINGS; ++k) {
+    double a = 2 * SONDE_PI * (k % SIDES) / SIDES, r = ring[k / SIDES] * v->rest_radius_m, g[2][2];
+    sonde_vec3 at = v_madd(v_madd(v->rest_centre_m, r * cos(a), side[0]), r * sin(a), side[1]);
+    sonde_vec3 u = sonde_vessels_displace(in, at, s);
+    for (int c = 0; c < 2; ++c) {
+      sonde_vec3 next = sonde_vessels_displace(in, v_madd(at, probing_m, side[c]), s);
+      sonde_vec3 slope = v_scale(v_sub(next, u), 1 / probing_m);
+      for (int d = 0; d < 2; ++d) g[d][c] = (c == d) + v_dot(slope, side[d]);
+    }
+    least = fmin(least, g[0][0] * g[1][1] - g[0][1] * g[1][0]);
+  }
+  return least;
+}
+
+// Less of the bends ends at a wall, and a lumen that stands up against the squeeze goes half the
+// way to where the tissue's gradient takes it.
+static void give_way(sonde_vessel_state *v, bool all) {
+  SONDE_ASSERT(v->rest_radius_m > 0 && v->tissue_short > 0 && v->tissue_long > 0);
+  double with_short = v->tissue_short * v->rest_radius_m;
+  double with_long = v->tissue_long * v->rest_radius_m;
+  v->tissue_even *= 0.5;
+  if (all || v->half_short_m > with_short) v->lead *= 0.5;
+  if (v->half_short_m <= with_short) return;
+  v->half_short_m += 0.5 * (with_short - v->half_short_m);
+  v->half_long_m += 0.5 * (with_long - v->half_long_m);
+}
+
+// Where walls would fold a layer that is squeezed very thin, or the tissue between two of them,
+// they give way to it.
+static void yield_to_squeeze(sonde_interior *in) {
+  bool changed = true;
+  for (int pass = 0; pass < PASSES && changed; ++pass) {
+    changed = false;
+    for (uint32_t which = 0; which < in->vessel_count; ++which)
+      for (uint32_t i = 0; i < in->station_count[which]; ++i) {
+        if (!in->strained[which][i]) continue;
+        if (least_area_beside(in, which, i) > least_area_share) continue;
+        changed = true;
+        for (uint32_t other = 0; other < in->vessel_count; ++other) {
+          uint32_t at;
+          double share;
+          if (!sonde_vessel_stations(in, other, in->station[which][i].s_m, &at, &share)) continue;
+          give_way(&in->state[other][at + (share > 0.5)], pass >= PASSES / 2);
+        }
+      }
+  }
 }
 
 void sonde_interior_vessels(sonde_interior *in, const sonde_interior_input *input) {
@@ -184,6 +312,19 @@ void sonde_interior_vessels(sonde_interior *in, const sonde_interior_input *inpu
       if (v_norm2(up) > 1e-4) v[i].flat_axis = v_unit(up, v[i].flat_axis);
     }
   }
+  for (uint32_t which = 0; which < in->vessel_count; ++which)
+    for (uint32_t i = 0; i < in->station_count[which]; ++i)
+      in->strained[which][i] = find_tissue(in, &in->state[which][i]);
+  for (uint32_t which = 0; which < in->vessel_count; ++which)
+    for (uint32_t other = 0; other < in->vessel_count; ++other)
+      if (other != which) keep_clear(in, which, other);
+  yield_to_squeeze(in);
+  for (uint32_t which = 0; which < in->vessel_count; ++which)
+    for (uint32_t i = 0; i < in->station_count[which]; ++i) {
+      sonde_vessel_state *v = &in->state[which][i];
+      double thin = sonde_least_lumen * v->rest_radius_m * v->tissue_short;
+      v->half_short_m = fmax(v->half_short_m, thin);
+    }
 }
 
 void sonde_interior_update(sonde_interior *in, const sonde_interior_input *input) {
@@ -191,7 +332,10 @@ void sonde_interior_update(sonde_interior *in, const sonde_interior_input *input
   SONDE_ASSERT(input->positions_m != NULL && input->contact_forces_n != NULL);
   sonde_findings_apply(in, input->pathology);
   in->solid = sonde_interior_follow(in, input);
-  if (!in->solid) sonde_interior_solve(in, input->positions_m);
+  if (!in->solid) {
+    sonde_interior_solve(in, input->positions_m);
+    sonde_bend_update(in->bend, in, input);
+  }
   sonde_interior_vessels(in, input);
   in->tick = input->tick;
   in->ready = true;
@@ -219,6 +363,12 @@ static sonde_vessel_state blend_states(const sonde_vessel_state *a, const sonde_
   v.area_ratio += t * (b->area_ratio - a->area_ratio);
   v.half_short_m += t * (b->half_short_m - a->half_short_m);
   v.half_long_m += t * (b->half_long_m - a->half_long_m);
+  v.tissue_short += t * (b->tissue_short - a->tissue_short);
+  v.tissue_long += t * (b->tissue_long - a->tissue_long);
+  v.tissue_shear += t * (b->tissue_shear - a->tissue_shear);
+  v.tissue_turn += t * (b->tissue_turn - a->tissue_turn);
+  v.tissue_even += t * (b->tissue_even - a->tissue_even);
+  v.lead += t * (b->lead - a->lead);
   return v;
 }
 
@@ -260,24 +410,43 @@ bool sonde_vessel_reaches(const sonde_interior *in, uint32_t which, double s, so
   return v_norm(d) < reach + slant;
 }
 
-// Outside the lumen circles become ellipses of half axes m - c and m + c whose area is that of the
-// circle less what the lumen lost; both the loss and c fade out.
-void sonde_vessel_carry(const sonde_vessel_state *v, double *short_m, double *long_m) {
+// Turns a point by an angle of which `half` is the tangent of the half.
+static void turn_point(double half, double *x, double *y) {
+  double whole = 2 / (1 + half * half), cosine = whole - 1, sine = half * whole, x0 = *x;
+  *x = cosine * x0 - sine * *y;
+  *y = sine * x0 + cosine * *y;
+}
+
+// The lumen goes to the ellipse from which the tissue's gradient leads to its present one. Outside
+// circles become ellipses of half axes m - c and m + c whose area is that of the circle less what
+// the lumen lost; loss, c, turn and shear fade out. Both half axes grow with the circle, and a turn
+// or shear that depends on it alone keeps areas: no two points meet. A lumen that is pressed flat
+// keeps a line of that thickness.
+void sonde_vessel_gather(const sonde_vessel_state *v, double *short_m, double *long_m) {
   SONDE_ASSERT(v->rest_radius_m > 0 && v->half_short_m > 0);
   double rest = v->rest_radius_m, x = *short_m, y = *long_m, r = sqrt(x * x + y * y);
+  double t = clamp((r / rest - 1) / carry_reach, 0, 1), fade = (1 - t) * (1 - t) * (1 + 2 * t);
+  double half_short = fmax(v->half_short_m / v->tissue_short, sonde_least_lumen * rest);
+  double half_long = v->half_long_m / v->tissue_long;
   if (r <= rest) {
-    *short_m = x * v->half_short_m / rest;
-    *long_m = y * v->half_long_m / rest;
-    return;
+    x *= half_short / rest, y *= half_long / rest;
+  } else {
+    double c = 0.5 * (half_long - half_short) * fade;
+    double mean = sqrt(r * r - (rest * rest - half_short * half_long) * fade + c * c);
+    turn_point(v->tissue_turn * (1 - fade), &x, &y);
+    x *= (mean - c) / r, y *= (mean + c) / r;
   }
-  double t = (r / rest - 1) / carry_reach;
-  if (t >= 1) return;
-  double fade = (1 - t) * (1 - t) * (1 + 2 * t);
-  double c = 0.5 * (v->half_long_m - v->half_short_m) * fade;
-  double area = r * r - rest * rest * (1 - v->area_ratio) * fade;
-  double mean = sqrt(area + c * c);
-  *short_m = x / r * (mean - c);
-  *long_m = y / r * (mean + c);
+  y -= fade * v->tissue_shear / v->tissue_long * x;
+  turn_point(-v->tissue_turn, &x, &y);
+  *short_m = x, *long_m = y;
+}
+
+void sonde_vessel_tissue(const sonde_vessel_state *v, double *short_m, double *long_m) {
+  SONDE_ASSERT(v != NULL && short_m != NULL && long_m != NULL);
+  double a = *short_m, b = *long_m;
+  turn_point(v->tissue_turn, &a, &b);
+  *short_m = v->tissue_short * a;
+  *long_m = v->tissue_long * b + v->tissue_shear * a;
 }
 
 // The image plane is y = 0 of the probe frame.

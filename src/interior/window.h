@@ -13,27 +13,14 @@
 #ifndef SONDE_SRC_WINDOW_H
 #define SONDE_SRC_WINDOW_H
 
-#include "interior/interior.h"
+#include "interior/grid.h"
 #include "interior/solid.h"
+#include "interior/unfold.h"
 
 enum {
-  SONDE_WINDOW_THETA = 27, // columns around
-  SONDE_WINDOW_S = 19,     // rows along
-  SONDE_WINDOW_LEVELS = 8, // skin .. bone
-  SONDE_WINDOW_FAT = 2,    // level of the fat/muscle interface
-  SONDE_WINDOW_NEAR_T =
-      15, // columns and rows whose skin can be touched: first columns, middle rows
-  SONDE_WINDOW_NEAR_S = 9,
   SONDE_WINDOW_NEAR = SONDE_WINDOW_NEAR_T * SONDE_WINDOW_NEAR_S,
-  SONDE_WINDOW_NODES = SONDE_WINDOW_THETA * SONDE_WINDOW_S * SONDE_WINDOW_LEVELS,
   SONDE_WINDOW_TOUCHED = 512 // points of contact that are used
 };
-
-// Where a window is: middle and half extents of the probe's face on the leg.
-typedef struct sonde_window_place {
-  double theta, s;
-  double half_theta_m, half_s_m;
-} sonde_window_place;
 
 enum { SONDE_WINDOW_BUDGET = 4000000 }; // multiplications per update of a running session
 
@@ -54,11 +41,7 @@ typedef struct sonde_answer {
 
 typedef struct sonde_window {
   sonde_solid solid;
-  sonde_window_place place;
-  double
-      theta[SONDE_WINDOW_THETA + 1]; // offsets from place.theta, ascending; the last is the first
-  double s[SONDE_WINDOW_S];
-  float radius[SONDE_WINDOW_S * SONDE_WINDOW_THETA][SONDE_WINDOW_LEVELS];
+  sonde_grid grid;
   double *compliance; // [3 near][3 near] of the near skin nodes
   bool ready;         // factored
   uint32_t touched_count;
@@ -69,6 +52,7 @@ typedef struct sonde_window {
   double stress_scale;    // contact force over the reaction to the unit motion
   sonde_mat3 *stress;     // [hexes] under a unit motion, where felt
   bool *felt;             // [hexes] those around the vessels
+  sonde_unfold unfold;
   bool loaded;
   uint32_t iterations;
 } sonde_window;

@@ -1,7 +1,6 @@
 // The solid of a leg at every update.
 //
 // sonde_window_update   touched points, forces, recovery
-// find_cell             cell of the ring and local coordinates
 // touch                 one vertex of the skin that carries contact force
 // apply, comply         displacement of the touched points under forces on them
 // sample_patch          an even press of the touched rectangle
@@ -24,48 +23,22 @@ static const double sample_start_m = 0.08; // above the face
 static const double face_edge_m = 0.3e-3;
 static const double tolerance = 2e-3; // of the prescribed motion
 
-// ---- cells --------------------------------------------------------------------------------
-
-typedef struct cell {
-  uint32_t i, j;
-  double a, b; // 0..1
-} cell;
-
-static bool find_cell(const sonde_window *w, double theta, double s, cell *c) {
-  if (s < w->s[0] || s > w->s[NS - 1]) return false;
-  double turn = fmod(theta - w->place.theta - w->theta[0], 2 * SONDE_PI);
-  if (turn < 0) turn += 2 * SONDE_PI;
-  turn += w->theta[0];
-  c->i = 0, c->j = 0;
-  while (c->i + 1 < NT && w->theta[c->i + 1] <= turn) ++c->i;
-  while (c->j + 2 < NS && w->s[c->j + 1] <= s) ++c->j;
-  c->a = clamp((turn - w->theta[c->i]) / (w->theta[c->i + 1] - w->theta[c->i]), 0, 1);
-  c->b = (s - w->s[c->j]) / (w->s[c->j + 1] - w->s[c->j]);
-  return true;
-}
-
-static void corners(const cell *c, uint32_t column[4], double weight[4]) {
-  uint32_t next = (c->i + 1) % NT;
-  column[0] = c->j * NT + c->i, column[1] = c->j * NT + next;
-  column[2] = column[1] + NT, column[3] = column[0] + NT;
-  weight[0] = (1 - c->a) * (1 - c->b), weight[1] = c->a * (1 - c->b);
-  weight[2] = c->a * c->b, weight[3] = (1 - c->a) * c->b;
-}
-
 // ---- contact ------------------------------------------------------------------------------
 
 static void touch(sonde_window *w, const sonde_interior *in, sonde_vec3 rest, sonde_vec3 move) {
   sonde_vec3 d = v_sub(rest, in->origin);
-  uint32_t column[4], first = (NS - SONDE_WINDOW_NEAR_S) / 2;
-  cell c;
-  if (!find_cell(w, atan2(v_dot(d, in->e2), v_dot(d, in->e1)), v_dot(d, in->axis), &c)) return;
+  const uint32_t first = SONDE_WINDOW_NEAR_FIRST;
+  sonde_grid_cell c;
+  double theta = atan2(v_dot(d, in->e2), v_dot(d, in->e1));
+  if (!sonde_grid_columns(&w->grid, theta, v_dot(d, in->axis), &c)) return;
   if (c.i + 1 >= SONDE_WINDOW_NEAR_T || c.j < first || c.j + 1 >= first + SONDE_WINDOW_NEAR_S)
     return;
   if (w->touched_count == SONDE_WINDOW_TOUCHED) return;
   sonde_touched *t = &w->touched[w->touched_count++];
-  corners(&c, column, t->weight);
-  for (int k = 0; k < 4; ++k)
-    t->near[k] = (column[k] / NT - first) * SONDE_WINDOW_NEAR_T + column[k] % NT;
+  for (int k = 0; k < 4; ++k) {
+    t->weight[k] = c.weight[k];
+    t->near[k] = (c.column[k] / NT - first) * SONDE_WINDOW_NEAR_T + c.column[k] % NT;
+  }
   t->move[0] = v_dot(move, in->e1), t->move[1] = v_dot(move, in->e2);
   t->move[2] = v_dot(move, in->axis);
 }
@@ -191,9 +164,9 @@ static bool under_face(const sonde_interior_input *input, sonde_vec3 now) {
 // the table whose whole triangle is touched count as points of contact too.
 static void touch_columns(sonde_window *w, const sonde_interior *in,
                           const sonde_interior_input *input, sonde_vec3 beam) {
-  uint32_t first = (NS - SONDE_WINDOW_NEAR_S) / 2, last = first + SONDE_WINDOW_NEAR_S - 1;
-  double low = (w->s[first] - in->s_first_m) / in->s_step_m,
-         high = (w->s[last] - in->s_first_m) / in->s_step_m;
+  uint32_t first = SONDE_WINDOW_NEAR_FIRST, last = first + SONDE_WINDOW_NEAR_S - 1;
+  double low = (w->grid.s[first] - in->s_first_m) / in->s_step_m,
+         high = (w->grid.s[last] - in->s_first_m) / in->s_step_m;
   uint32_t from = (uint32_t)fmax(ceil(low), 0), to = (uint32_t)fmin(high, in->s_count - 1);
   for (uint32_t k = from * in->theta_count; k < (to + 1) * in->theta_count; ++k) {
     const sonde_column *c = &in->column[k];
@@ -280,37 +253,16 @@ static bool respond(sonde_window *w, contact *c, const double along[3], sonde_an
 
 // ---- reading ------------------------------------------------------------------------------
 
-// Level below which the radius lies, and the fraction of the way to the next.
-static double find_level(const double radius[NL], double r, uint32_t *level) {
-  uint32_t l = 0;
-  while (l + 2 < NL && radius[l + 1] >= r) ++l;
-  *level = l;
-  return clamp((radius[l] - r) / (radius[l] - radius[l + 1]), 0, 1);
-}
-
-static void blend_radii(const sonde_window *w, const uint32_t column[4], const double weight[4],
-                        double radius[NL]) {
-  for (uint32_t l = 0; l < NL; ++l) {
-    radius[l] = 0;
-    for (int k = 0; k < 4; ++k) radius[l] += weight[k] * (double)w->radius[column[k]][l];
-  }
-}
-
 bool sonde_window_field(const sonde_window *w, double theta, double s, double r, double u[3]) {
-  uint32_t column[4], level;
-  double weight[4], radius[NL];
-  cell c;
+  sonde_grid_cell c;
   u[0] = u[1] = u[2] = 0;
-  if (!find_cell(w, theta, s, &c)) return false;
-  corners(&c, column, weight);
-  blend_radii(w, column, weight, radius);
-  double t = find_level(radius, r, &level);
+  if (!sonde_grid_find(&w->grid, theta, s, r, &c)) return false;
   for (int k = 0; k < 4; ++k)
     for (uint32_t l = 0; l < 2; ++l) {
-      uint32_t at = w->solid.unknown[column[k] * NL + level + l];
+      uint32_t at = w->solid.unknown[c.column[k] * NL + c.level + l];
       if (at == SONDE_FRONT_NONE) continue;
       const float *x = w->solid.x + 3 * (size_t)at;
-      double share = weight[k] * (l ? t : 1 - t);
+      double share = c.weight[k] * (l ? c.t : 1 - c.t);
       for (int axis = 0; axis < 3; ++axis) u[axis] += share * (double)x[axis];
     }
   return true;
@@ -335,19 +287,15 @@ static uint32_t layer_within(uint32_t level, uint32_t d) {
 // The 27 elements around a point that share in its stress; false beyond the ends.
 static bool list_elements(const sonde_window *w, double theta, double s, double r,
                           uint32_t element[27], double share[27]) {
-  uint32_t column[4], level;
-  double weight[4], radius[NL], f[3][3];
-  cell c;
-  if (!find_cell(w, theta, s, &c)) return false;
-  corners(&c, column, weight);
-  blend_radii(w, column, weight, radius);
-  double t = find_level(radius, r, &level);
+  double f[3][3];
+  sonde_grid_cell c;
+  if (!sonde_grid_find(&w->grid, theta, s, r, &c)) return false;
   element_weights(c.a, f[0]);
   element_weights(c.b, f[1]);
-  element_weights(t, f[2]);
+  element_weights(c.t, f[2]);
   for (uint32_t k = 0; k < 27; ++k) {
     uint32_t di = k % 3, dj = k / 3 % 3, dl = k / 9;
-    uint32_t i = (c.i + di + NT - 1) % NT, j = c.j + dj, l = layer_within(level, dl);
+    uint32_t i = (c.i + di + NT - 1) % NT, j = c.j + dj, l = layer_within(c.level, dl);
     j = j < 1 ? 0 : j - 1 > NS - 2 ? NS - 2 : j - 1;
     element[k] = (j * NT + i) * (NL - 1) + l;
     share[k] = f[0][di] * f[1][dj] * f[2][dl];
@@ -389,6 +337,20 @@ bool sonde_window_stress(const sonde_window *w, double theta, double s, double r
 
 // ---- update -------------------------------------------------------------------------------
 
+// The linear solid's displacements, kept from folding.
+static void keep_apart(sonde_window *w) {
+  sonde_solid *s = &w->solid;
+  for (uint32_t n = 0; n < SONDE_WINDOW_NODES; ++n)
+    w->unfold.now[n] = v_add(w->grid.node[n], sonde_solid_moved(s, n));
+  if (!sonde_unfold_nodes(&w->unfold, &w->grid)) return;
+  for (uint32_t n = 0; n < SONDE_WINDOW_NODES; ++n) {
+    if (s->unknown[n] == SONDE_FRONT_NONE) continue;
+    sonde_vec3 u = v_sub(w->unfold.now[n], w->grid.node[n]);
+    float *x = s->x + 3 * (size_t)s->unknown[n];
+    x[0] = (float)u.x, x[1] = (float)u.y, x[2] = (float)u.z;
+  }
+}
+
 bool sonde_window_update(sonde_window *w, const sonde_interior *in,
                          const sonde_interior_input *input) {
   SONDE_ASSERT(w != NULL && w->ready && input != NULL);
@@ -404,11 +366,13 @@ bool sonde_window_update(sonde_window *w, const sonde_interior *in,
   if (!w->loaded) return false;
   float *fresh[2];
   uint32_t count = 0;
-  if (respond(w, &c, along, &w->moved)) fresh[count++] = w->moved.x;
+  bool moved = respond(w, &c, along, &w->moved);
+  if (moved) fresh[count++] = w->moved.x;
   sample_patch(w, in, input->world_from_probe, &r, beam); // stress per newton: it moves as one
   bool pressed = respond(w, &c, along, &w->pressed);
   if (pressed && w->pressed.count > 0) fresh[count++] = w->pressed.x;
   sonde_fronts_recover(w->solid.fronts, fresh, count); // all other nodes
+  if (moved) keep_apart(w);
   if (pressed) feel_vessels(w, in);
   w->stress_scale = w->pressed.reaction_n > 0 ? force / w->pressed.reaction_n : 0;
   return true;

@@ -15,7 +15,8 @@ static float between(double low, double high, uint64_t *draw) {
 }
 
 typedef struct carried {
-  float wall[3][WALL_FIELDS][WALL_ROOM], rest[3][CARRY_POINTS], place[3][CARRY_POINTS];
+  float wall[3][WALL_FIELDS][WALL_ROOM], rest[3][CARRY_POINTS], gathered[3][CARRY_POINTS],
+      place[3][CARRY_POINTS];
 } carried;
 
 // A vessel of 2 to 6 mm within 8 mm of the origin, pressed to an ellipse, or none.
@@ -24,6 +25,8 @@ static void draw_wall(carried *c, uint32_t k, uint32_t g, uint64_t *draw) {
   sonde_vec3 flat = v_unit(v_cross(axis, vec3((double)between(-1, 1, draw), 1, 0)), vec3(1, 0, 0));
   sonde_vec3 across = v_cross(axis, flat);
   float radius = between(2e-3, 6e-3, draw), lost = between(-0.2, 0.97, draw);
+  const float tissue[5] = {between(-0.2, 0.2, draw), between(0.5, 1, draw),
+                           between(-0.3, 0.3, draw), between(1, 1.5, draw), between(0, 1, draw)};
   float half_long = radius * between(1, 1.3, draw);
   for (int i = 0; i < 3; ++i) {
     c->wall[k][WALL_REST + i][g] = between(-8e-3, 8e-3, draw);
@@ -32,11 +35,12 @@ static void draw_wall(carried *c, uint32_t k, uint32_t g, uint64_t *draw) {
     c->wall[k][WALL_FLAT + i][g] = (float)v_coordinate(flat, i);
     c->wall[k][WALL_ACROSS + i][g] = (float)v_coordinate(across, i);
   }
-  c->wall[k][WALL_RADIUS][g] = radius, c->wall[k][WALL_LOST][g] = lost;
+  c->wall[k][WALL_RADIUS][g] = radius;
+  for (int i = 0; i < 5; ++i) c->wall[k][WALL_TURN + i][g] = tissue[i];
   c->wall[k][WALL_LONG][g] = half_long;
   c->wall[k][WALL_SHORT][g] = radius * radius * (1 - lost) / half_long;
   float engaged = fminf(fabsf(lost) / (float)sonde_engaged_loss, 1);
-  c->wall[k][WALL_ENGAGED][g] = (g + k) % 5 ? engaged : 0;
+  c->wall[k][WALL_LEAD][g] = (g + k) % 5 ? engaged : 0;
 }
 
 static void draw_points(carried *c) {
@@ -53,12 +57,17 @@ static void draw_points(carried *c) {
 }
 
 static void carry_with(const char *set, uint32_t walls, carried *c) {
-  const carry_job job = {CARRY_GROUPS, walls, (const float(*)[WALL_FIELDS][WALL_ROOM])c->wall,
-                         (const float(*)[CARRY_POINTS])c->rest, c->place};
-  sonde_echo_kernels_find(set)->carry(&job);
+  const carry_job job = {CARRY_GROUPS,
+                         walls,
+                         (const float(*)[WALL_FIELDS][WALL_ROOM])c->wall,
+                         (const float(*)[CARRY_POINTS])c->rest,
+                         c->gathered,
+                         c->place};
+  sonde_echo_kernels_find(set)->gather(&job);
+  sonde_echo_kernels_find(set)->even(&job);
 }
 
-// All sets carry points to the same bits, and within 50 nm of where sonde_vessels_move does; away
+// All sets carry points to the same bits, and within 50 nm of where the vessels take them; away
 // from the vessels the field's own motion stays.
 static void walls_carry_alike(void **state) {
   (void)state;
@@ -71,6 +80,7 @@ static void walls_carry_alike(void **state) {
       if (sonde_echo_kernels_find(sets[k]) == NULL) continue;
       carry_with(sets[k], walls, &c[k]);
       if (k < PLAIN) assert_memory_equal(c[k].place, c[0].place, sizeof c[k].place);
+      if (k < PLAIN) assert_memory_equal(c[k].gathered, c[0].gathered, sizeof c[k].gathered);
     }
     for (int k = 0; k < 3; ++k)
       for (uint32_t i = 0; i < CARRY_POINTS; ++i) {

@@ -1,0 +1,85 @@
+// The grid of a leg around the probe: columns from the skin to the femur, fine under the probe and
+// growing away from it. It carries the elements of the solid (window.h) and the map that keeps
+// tissue from folding (unfold.h).
+#ifndef SONDE_SRC_GRID_H
+#define SONDE_SRC_GRID_H
+
+#include "interior/interior.h"
+
+enum {
+  SONDE_WINDOW_THETA = 27, // columns around
+  SONDE_WINDOW_S = 19,     // rows along
+  SONDE_WINDOW_LEVELS = 8, // skin .. bone
+  SONDE_WINDOW_FAT = 2,    // level of the fat/muscle interface
+  SONDE_WINDOW_NEAR_T =
+      15, // columns and rows whose skin can be touched: first columns, middle rows
+  SONDE_WINDOW_NEAR_S = 9,
+  SONDE_WINDOW_NEAR_FIRST = (SONDE_WINDOW_S - SONDE_WINDOW_NEAR_S) / 2,
+  SONDE_WINDOW_NODES = SONDE_WINDOW_THETA * SONDE_WINDOW_S * SONDE_WINDOW_LEVELS,
+  SONDE_GRID_HEXES = SONDE_WINDOW_THETA * (SONDE_WINDOW_S - 1) * (SONDE_WINDOW_LEVELS - 1),
+};
+
+// Where a grid is: middle and half extents of the probe's face on the leg.
+typedef struct sonde_window_place {
+  double theta, s;
+  double half_theta_m, half_s_m;
+} sonde_window_place;
+
+typedef struct sonde_grid {
+  sonde_window_place place;
+  double
+      theta[SONDE_WINDOW_THETA + 1]; // offsets from place.theta, ascending; the last is the first
+  double s[SONDE_WINDOW_S];
+  float radius[SONDE_WINDOW_S * SONDE_WINDOW_THETA][SONDE_WINDOW_LEVELS];
+  sonde_vec3 node[SONDE_WINDOW_NODES]; // at rest, leg frame: e1, e2, along the axis
+  // Of the corners of each element: one over what the three edges from there span at rest.
+  double per_volume[SONDE_GRID_HEXES][8];
+} sonde_grid;
+
+static inline uint32_t sonde_grid_node(uint32_t i, uint32_t j, uint32_t level) {
+  return (j * SONDE_WINDOW_THETA + i) * SONDE_WINDOW_LEVELS + level;
+}
+
+// Node of a corner of an element and the next along, across and below it.
+static inline void sonde_grid_corner(uint32_t hex, uint32_t corner, uint32_t node[4]) {
+  uint32_t l = hex % (SONDE_WINDOW_LEVELS - 1);
+  uint32_t i = hex / (SONDE_WINDOW_LEVELS - 1) % SONDE_WINDOW_THETA;
+  uint32_t j = hex / (SONDE_WINDOW_LEVELS - 1) / SONDE_WINDOW_THETA;
+  uint32_t di = corner & 1, dj = corner >> 1 & 1, dl = corner >> 2;
+  uint32_t right = i + 1 < SONDE_WINDOW_THETA ? i + 1 : 0;
+  uint32_t own = di ? right : i, next = di ? i : right;
+  node[0] = sonde_grid_node(own, j + dj, l + dl);
+  node[1] = sonde_grid_node(next, j + dj, l + dl);
+  node[2] = sonde_grid_node(own, j + 1 - dj, l + dl);
+  node[3] = sonde_grid_node(own, j + dj, l + 1 - dl);
+}
+
+// What the edges from the first of these nodes span; g: its derivatives by the ends of the edges.
+static inline double sonde_grid_volume(const sonde_vec3 *p, const uint32_t node[4],
+                                       sonde_vec3 g[3]) {
+  sonde_vec3 a = v_sub(p[node[1]], p[node[0]]), b = v_sub(p[node[2]], p[node[0]]);
+  sonde_vec3 c = v_sub(p[node[3]], p[node[0]]);
+  g[0] = v_cross(b, c), g[1] = v_cross(c, a), g[2] = v_cross(a, b);
+  return v_dot(a, g[0]);
+}
+
+// Where a point lies in a grid: four columns and the level above it.
+typedef struct sonde_grid_cell {
+  uint32_t i, j, level;
+  uint32_t column[4];
+  double a, b, t;   // 0..1 around, along, from the level to the next
+  double weight[4]; // of the columns
+} sonde_grid_cell;
+
+// Columns and rows for a place on the leg.
+void sonde_grid_begin(sonde_grid *grid, const sonde_interior *in, sonde_window_place place);
+// Place for a probe; false when it is beyond the leg's ends or far above the skin.
+bool sonde_grid_place(const sonde_interior *in, const sonde_interior_input *input,
+                      sonde_window_place *place);
+// The columns around an angle and a row; false beyond the ends.
+bool sonde_grid_columns(const sonde_grid *grid, double theta, double s, sonde_grid_cell *cell);
+// The same with the level; a radius outside the skin or in the bone counts as on it.
+bool sonde_grid_find(const sonde_grid *grid, double theta, double s, double r,
+                     sonde_grid_cell *cell);
+
+#endif

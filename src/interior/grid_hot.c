@@ -1,0 +1,140 @@
+// Placing a grid on a leg and finding points in it.
+//
+// sonde_grid_place                        where a grid for this probe would be
+// sonde_grid_begin                        rows, columns and nodes of a place
+// spread_rows, spread_columns             distances that grow from the fine part to an end
+// place_column                            nodes of one column
+// sonde_grid_columns, sonde_grid_find     cell of a point and its share in it
+#include "base/base.h"
+#include "interior/grid.h"
+
+enum { NT = SONDE_WINDOW_THETA, NS = SONDE_WINDOW_S, NL = SONDE_WINDOW_LEVELS };
+
+static const double default_half_x_m = 30e-3, default_half_y_m = 6e-3;
+static const double far_m = 60e-3; // a probe this far above the skin needs no grid yet
+static const double margin_t_m = 12e-3, margin_s_m = 10e-3; // fine part beyond the face
+static const double reach_m = 75e-3;                        // grid beyond the fine part
+static const double muscle_level[NL] = {0, 0, 0, 0.12, 0.27, 0.46, 0.70, 1};
+static const double grow_s[5] = {1.4, 2, 3, 4.5, 6.5};
+static const double grow_t[12] = {1.5, 2.3, 3.6, 5.5, 7.5, 9, 9, 7.5, 5.5, 3.6, 2.3, 1.5};
+
+bool sonde_grid_place(const sonde_interior *in, const sonde_interior_input *input,
+                      sonde_window_place *place) {
+  SONDE_ASSERT(in != NULL && input != NULL && place != NULL);
+  sonde_mat3 r = q_matrix(input->world_from_probe.rotation);
+  sonde_vec3 x = m_column(&r, 0), y = m_column(&r, 1);
+  double hx = input->face_half_x_m > 0 ? input->face_half_x_m : default_half_x_m;
+  double hy = input->face_half_y_m > 0 ? input->face_half_y_m : default_half_y_m;
+  sonde_column_point at;
+  bool within = sonde_interior_locate(in, input->world_from_probe.position, &at);
+  *place = (sonde_window_place){.theta = at.theta, .s = at.s};
+  place->half_s_m = fabs(v_dot(x, in->axis)) * hx + fabs(v_dot(y, in->axis)) * hy;
+  double across_x = sqrt(fmax(0, 1 - v_dot(x, in->axis) * v_dot(x, in->axis)));
+  double across_y = sqrt(fmax(0, 1 - v_dot(y, in->axis) * v_dot(y, in->axis)));
+  place->half_theta_m = across_x * hx + across_y * hy;
+  return within && at.depth_m > -far_m;
+}
+
+// ---- a place ------------------------------------------------------------------------------
+
+static double sum_of(const double *d, uint32_t count) {
+  double sum = 0;
+  for (uint32_t i = 0; i < count; ++i) sum += d[i];
+  return sum;
+}
+
+static void spread_rows(sonde_grid *g, double low, double high) {
+  double half = g->place.half_s_m + margin_s_m;
+  half = fmin(half, 0.4 * (high - low));
+  double s = clamp(g->place.s, low + half, high - half),
+         step = 2 * half / (SONDE_WINDOW_NEAR_S - 1);
+  double down = fmin(reach_m, s - half - low), up = fmin(reach_m, high - s - half);
+  uint32_t first = SONDE_WINDOW_NEAR_FIRST, last = first + SONDE_WINDOW_NEAR_S - 1;
+  for (uint32_t k = 0; k < SONDE_WINDOW_NEAR_S; ++k) g->s[first + k] = s - half + step * k;
+  double all = sum_of(grow_s, 5);
+  for (uint32_t k = 0; k < 5; ++k) {
+    // A grid that ends with the leg still has rows of some height.
+    g->s[last + k + 1] = g->s[last + k] + fmax(up, 5e-3) * grow_s[k] / all;
+    g->s[first - k - 1] = g->s[first - k] - fmax(down, 5e-3) * grow_s[k] / all;
+  }
+}
+
+static void spread_columns(sonde_grid *g, double radius) {
+  double half = fmin((g->place.half_theta_m + margin_t_m) / radius, 1.2);
+  double step = 2 * half / (SONDE_WINDOW_NEAR_T - 1), rest = 2 * SONDE_PI - 2 * half;
+  double all = sum_of(grow_t, 12) + grow_t[5];
+  for (uint32_t k = 0; k < SONDE_WINDOW_NEAR_T; ++k) g->theta[k] = -half + step * k;
+  for (uint32_t k = SONDE_WINDOW_NEAR_T; k <= NT; ++k) {
+    uint32_t n = k - SONDE_WINDOW_NEAR_T; // thirteen gaps, the middle one counted twice
+    double share = grow_t[n < 6 ? n : n - 1];
+    g->theta[k] = g->theta[k - 1] + rest * share / all;
+  }
+}
+
+static void place_column(sonde_grid *g, const sonde_interior *in, uint32_t i, uint32_t j) {
+  double theta = g->place.theta + g->theta[i], s = g->s[j];
+  sonde_column_point at;
+  sonde_interior_column(in, theta, s, &at);
+  double height = at.radius_m - in->bone_radius_m;
+  double fat = clamp(at.muscle_m / at.cosine, 2.5e-3, 0.6 * height);
+  for (uint32_t l = 0; l < NL; ++l) {
+    double depth =
+        l <= SONDE_WINDOW_FAT ? fat * l / SONDE_WINDOW_FAT : fat + (height - fat) * muscle_level[l];
+    double r = at.radius_m - depth;
+    g->radius[j * NT + i][l] = (float)r;
+    g->node[sonde_grid_node(i, j, l)] = vec3(r * cos(theta), r * sin(theta), s);
+  }
+}
+
+void sonde_grid_begin(sonde_grid *g, const sonde_interior *in, sonde_window_place place) {
+  SONDE_ASSERT(g != NULL && in != NULL && isfinite(place.theta) && isfinite(place.s));
+  sonde_column_point at;
+  g->place = place;
+  sonde_interior_column(in, place.theta, place.s, &at);
+  spread_rows(g, in->s_low_m, in->s_high_m);
+  spread_columns(g, at.radius_m);
+  for (uint32_t j = 0; j < NS; ++j)
+    for (uint32_t i = 0; i < NT; ++i) place_column(g, in, i, j);
+  for (uint32_t h = 0; h < SONDE_GRID_HEXES; ++h)
+    for (uint32_t corner = 0; corner < 8; ++corner) {
+      uint32_t node[4];
+      sonde_vec3 slope[3];
+      sonde_grid_corner(h, corner, node);
+      g->per_volume[h][corner] = 1 / sonde_grid_volume(g->node, node, slope);
+    }
+}
+
+// ---- cells --------------------------------------------------------------------------------
+
+bool sonde_grid_columns(const sonde_grid *g, double theta, double s, sonde_grid_cell *c) {
+  SONDE_ASSERT(g != NULL && c != NULL);
+  if (s < g->s[0] || s > g->s[NS - 1]) return false;
+  double turn = fmod(theta - g->place.theta - g->theta[0], 2 * SONDE_PI);
+  if (turn < 0) turn += 2 * SONDE_PI;
+  turn += g->theta[0];
+  c->i = 0, c->j = 0;
+  while (c->i + 1 < NT && g->theta[c->i + 1] <= turn) ++c->i;
+  while (c->j + 2 < NS && g->s[c->j + 1] <= s) ++c->j;
+  c->a = clamp((turn - g->theta[c->i]) / (g->theta[c->i + 1] - g->theta[c->i]), 0, 1);
+  c->b = (s - g->s[c->j]) / (g->s[c->j + 1] - g->s[c->j]);
+  uint32_t next = (c->i + 1) % NT;
+  c->column[0] = c->j * NT + c->i, c->column[1] = c->j * NT + next;
+  c->column[2] = c->column[1] + NT, c->column[3] = c->column[0] + NT;
+  c->weight[0] = (1 - c->a) * (1 - c->b), c->weight[1] = c->a * (1 - c->b);
+  c->weight[2] = c->a * c->b, c->weight[3] = (1 - c->a) * c->b;
+  return true;
+}
+
+bool sonde_grid_find(const sonde_grid *g, double theta, double s, double r, sonde_grid_cell *c) {
+  SONDE_ASSERT(g != NULL && isfinite(r));
+  double radius[NL];
+  if (!sonde_grid_columns(g, theta, s, c)) return false;
+  for (uint32_t l = 0; l < NL; ++l) {
+    radius[l] = 0;
+    for (int k = 0; k < 4; ++k) radius[l] += c->weight[k] * (double)g->radius[c->column[k]][l];
+  }
+  c->level = 0;
+  while (c->level + 2 < NL && radius[c->level + 1] >= r) ++c->level;
+  c->t = clamp((radius[c->level] - r) / (radius[c->level] - radius[c->level + 1]), 0, 1);
+  return true;
+}
