@@ -85,7 +85,8 @@ bool app_data_directory(const char *name, char *path, size_t size);
 // null.
 void app_json_begin(void);
 void app_json_object(const char *key); // nested
-void app_json_close(void);             // closes the innermost object
+void app_json_array(const char *key);  // nested; the keys of its members are not written
+void app_json_close(void);             // closes the innermost object or array
 void app_json_real(const char *key, double value);
 void app_json_integer(const char *key, long long value);
 void app_json_bool(const char *key, bool value);

@@ -185,14 +185,13 @@ static sonde_status press(const arguments *a, const work *w, const sonde_model *
   sonde_status status = sonde_probe_create(a->probe, &probe, error);
   if (!status) status = sonde_state_create(model, NULL, &state, error);
   if (!status) {
-    for (double d = 2e-3; d < a->depth_m; d += 2e-3)
-      sonde_settle(state, &probe, sonde_site_pose(w->site, d), 1e-6, 400);
-    sonde_settle_result r =
-        sonde_settle(state, &probe, sonde_site_pose(w->site, a->depth_m), 1e-9, 400);
-    *force_n = r.contact_n;
-    if (!r.converged)
-      status = app_error(error, SONDE_CONVERGENCE, "the probe did not come to rest: residual %.2g",
-                         r.residual);
+    sonde_path_result r;
+    status = sonde_settle_path(state, &probe, sonde_site_pose(w->site, 0),
+                               sonde_site_pose(w->site, a->depth_m), NULL, NULL, &r, error);
+    *force_n = r.settled.contact_n;
+    if (r.jump_count)
+      fprintf(stderr, "sonde cut: the skin jumped at %.2f mm: another equilibrium may be met\n",
+              r.jump[0].from_m * 1e3);
   }
   sonde_state_destroy(state);
   sonde_probe_clear(&probe);

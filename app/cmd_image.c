@@ -239,10 +239,11 @@ static sonde_status place(settled *s, const options *o, sonde_error *error) {
   s->pose = start;
   status = image_findings_apply(&o->findings, start, s->interior, error);
   if (status) return status;
-  if (!isnan(o->force_n)) return settled_force(s, start, o->force_n, error);
-  for (double d = 0; pressed && d < o->press_m; d += 0.002) settled_at(s, start, d, 1e-6);
-  if (pressed) settled_at(s, start, o->press_m, 1e-8);
-  return SONDE_OK;
+  if (!pressed) return SONDE_OK;
+  status = !isnan(o->force_n) ? settled_force(s, start, o->force_n, error)
+                              : settled_press(s, start, o->press_m, INFINITY, error);
+  settled_warn(s, "image");
+  return status;
 }
 
 static sonde_status draw(const settled *s, const options *o, const sonde_pathology *pathology,
@@ -303,6 +304,7 @@ static void print(const settled *s, const options *o, const sonde_image *image) 
   app_json_real("width_mm", image->width_m * 1e3);
   app_json_real("height_mm", image->height_m * 1e3);
   app_json_real("force_n", s->force_n);
+  settled_json_jumps(s);
   app_json_text("case", o->pathology);
   app_json_real("vein_short_mm", v ? 2e3 * vein.half_short_m : NAN);
   app_json_real("vein_area_ratio", v ? vein.area_ratio : NAN);

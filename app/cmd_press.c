@@ -1,5 +1,5 @@
 // sonde press: settles a probe at a site to a force or a depth and reports what is felt and seen.
-// press_on:   to a force, or in steps to a depth.
+// press_on:   to a force or to a depth.
 // look:       vessels and picture of the settled state.
 #include "app.h"
 #include "settled.h"
@@ -176,6 +176,7 @@ static void print(const press *p, const options *o) {
     app_json_real("vein_short_mm", p->cut[0] ? p->vessel[0].half_short_m * 2e3 : NAN);
     app_json_real("residual", s->result.residual);
     app_json_integer("steps", s->iterations);
+    settled_json_jumps(s);
     app_json_text("case", p->pathology.name);
     app_json_text("probe", s->probe.name);
     app_json_integer("site", o->site);
@@ -216,13 +217,12 @@ static sonde_status prepare(press *p, const options *o, sonde_error *error) {
   return status ? status : settled_site(&p->scene, o->model, o->site, &p->start, error);
 }
 
-// To a force, or in steps to a depth.
 static sonde_status press_on(press *p, const options *o, sonde_error *error) {
-  if (!isnan(o->force_n)) return settled_force(&p->scene, p->start, o->force_n, error);
-  for (double d = fmin(0.002, o->depth_m); d < o->depth_m; d += 0.002)
-    settled_at(&p->scene, p->start, d, 1e-6);
-  settled_at(&p->scene, p->start, o->depth_m, 1e-9);
-  return SONDE_OK;
+  sonde_status status = !isnan(o->force_n)
+                            ? settled_force(&p->scene, p->start, o->force_n, error)
+                            : settled_press(&p->scene, p->start, o->depth_m, INFINITY, error);
+  settled_warn(&p->scene, "press");
+  return status;
 }
 
 int cmd_press(int argc, char **argv) {

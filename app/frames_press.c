@@ -92,6 +92,7 @@ static sonde_status deform(const press_options *o, work *w, sonde_image *image, 
   update(w); // at rest
   sonde_status status = place(o, w, &press, error);
   if (!status) status = settled_force(scene, w->rest_pose, w->target_n, error);
+  settled_warn(scene, "slice");
   if (!status) status = sonde_image_create(image->width, image->height, &out, error);
   if (status) return status;
   update(w);

@@ -1,12 +1,13 @@
 // Minimal JSON object writer on stdout (RFC 8259): one object, nested objects, escaped text,
-// numbers that are not finite as null.
+// numbers that are not finite as null; arrays of objects.
 #include "app.h"
 
 #include <math.h>
 #include <stdio.h>
 
-static int depth;   // open objects
-static bool filled; // the innermost object has a member already
+static int depth;       // open objects and arrays
+static bool filled;     // the innermost one has a member already
+static uint64_t arrays; // bit `depth`: the one at that depth is an array
 
 static void write_text(const char *text) {
   putchar('"');
@@ -27,14 +28,16 @@ static void write_text(const char *text) {
 
 static void write_key(const char *key) {
   printf("%s\n%*s", filled ? "," : "", 2 * depth, "");
+  filled = true;
+  if (arrays >> depth & 1) return;
   write_text(key);
   fputs(": ", stdout);
-  filled = true;
 }
 
 void app_json_begin(void) {
   putchar('{');
   depth = 1;
+  arrays = 0;
   filled = false;
 }
 
@@ -45,10 +48,18 @@ void app_json_object(const char *key) {
   filled = false;
 }
 
+void app_json_array(const char *key) {
+  write_key(key);
+  putchar('[');
+  arrays |= 1ull << ++depth;
+  filled = false;
+}
+
 void app_json_close(void) {
-  depth--;
+  bool array = arrays >> depth & 1;
+  arrays &= ~(1ull << depth--);
   if (filled) printf("\n%*s", 2 * depth, "");
-  putchar('}');
+  putchar(array ? ']' : '}');
   filled = true;
 }
 

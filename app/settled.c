@@ -1,7 +1,6 @@
 // A probe settled on a model.
 // beam_of:         axis of a pose, in the world.
-// bracket, refine: steps out, then the Illinois form of regula falsi.
-// settled_force:   both, and exact at its end.
+// settled_press, settled_force: a slow press to a depth or a force, and what it says of jumps.
 #include "settled.h"
 
 #include "app.h"
@@ -11,8 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const double COARSE = 1e-6, RESIDUAL = 1e-9; // relative residual on the way and at the end
-static const double DEEPEST_M = 0.06, STEP_M = 0.002, CLOSE = 1e-4, ENOUGH = 5e-3;
+static const double DEEPEST_M = 0.06; // how far a press to a force goes
 
 sonde_status settled_open(settled *s, const char *model, const char *probe,
                           const sonde_preset *preset, sonde_error *error) {
@@ -81,70 +79,50 @@ void settled_at(settled *s, sonde_pose start, double depth_m, double residual) {
   s->force_n = -(f.x * z.x + f.y * z.y + f.z * z.z);
 }
 
-// Skin of the deepest state known that has less than the force: every trial is pressed on from
-// there, since a skin that comes back from deeper may settle elsewhere.
-typedef struct way {
-  settled *scene;
-  sonde_pose start;
-  double force_n, low, low_f, high, high_f;
-  sonde_vec3 *skin;
-} way;
-
-static void keep_low(way *w) {
-  const settled *s = w->scene;
-  w->low = s->depth_m, w->low_f = s->force_n - w->force_n;
-  memcpy(w->skin, sonde_state_positions(s->state),
-         s->model->surface.vertex_count * sizeof *w->skin);
-}
-
-// Steps out to a bracket; false when cancelled.
-static bool bracket(way *w, const sonde_progress *progress) {
-  settled *s = w->scene;
-  for (w->high = STEP_M;; w->high += STEP_M) {
-    settled_at(s, w->start, w->high, COARSE);
-    w->high_f = s->force_n - w->force_n;
-    double fraction = fmin(s->force_n / w->force_n, 1);
-    if (!progress->report(fraction, "pressing", progress->user)) return false;
-    if (w->high_f >= 0 || w->high >= DEEPEST_M) return true;
-    keep_low(w);
-  }
-}
-
-static void refine(way *w) {
-  settled *s = w->scene;
-  for (int k = 0; k < 60 && fabs(s->force_n - w->force_n) > CLOSE * w->force_n; ++k) {
-    double depth = w->low - w->low_f * (w->high - w->low) / (w->high_f - w->low_f);
-    sonde_state_set(s->state, w->skin, NULL);
-    settled_at(s, w->start, depth, COARSE);
-    if (s->force_n < w->force_n) {
-      keep_low(w);
-      w->high_f *= k % 3 == 2 ? 0.5 : 1;
-    } else {
-      w->high = depth, w->high_f = s->force_n - w->force_n;
-      w->low_f *= k % 3 == 2 ? 0.5 : 1;
-    }
-  }
+sonde_status settled_press(settled *s, sonde_pose start, double depth_m, double force_n,
+                           sonde_error *error) {
+  sonde_progress progress = app_progress();
+  sonde_path_def def = sonde_path_def_default();
+  def.force_n = force_n;
+  sonde_status status =
+      sonde_settle_path(s->state, &s->probe, start, settled_advance(start, depth_m), &def,
+                        &progress, &s->path, error);
+  app_progress_end();
+  s->depth_m = depth_m < 0 ? depth_m : s->path.way_m;
+  s->pose = s->path.pose;
+  s->result = s->path.settled;
+  s->force_n = s->path.force_n;
+  s->iterations = s->path.iterations;
+  return status;
 }
 
 sonde_status settled_force(settled *s, sonde_pose start, double force_n, sonde_error *error) {
-  sonde_progress progress = app_progress();
-  size_t nodes = s->model->surface.vertex_count;
-  way w = {.scene = s, .start = start, .force_n = force_n, .low_f = -force_n};
-  w.skin = malloc(nodes * sizeof *w.skin);
-  if (!w.skin) return error->status = SONDE_MEMORY;
-  memcpy(w.skin, sonde_state_positions(s->state), nodes * sizeof *w.skin);
-  bool done = bracket(&w, &progress);
-  if (done && w.high_f >= 0) refine(&w);
-  app_progress_end();
-  free(w.skin);
-  if (!done) return SONDE_CANCELLED;
-  settled_at(s, start, s->depth_m, RESIDUAL);
-  if (fabs(s->force_n - force_n) <= ENOUGH * force_n && s->result.converged) return SONDE_OK;
-  error->status = SONDE_CONVERGENCE;
-  snprintf(error->message, sizeof error->message,
-           "%g N was not reached: %g N at %g mm, residual %.2g", force_n, s->force_n,
-           s->depth_m * 1e3, s->result.residual);
-  return SONDE_CONVERGENCE;
+  return settled_press(s, start, DEEPEST_M, force_n, error);
+}
+
+void settled_warn(const settled *s, const char *verb) {
+  const sonde_path_result *p = &s->path;
+  for (uint32_t k = 0; k < p->jump_count && k < SONDE_PATH_JUMPS; ++k)
+    fprintf(stderr,
+            "sonde %s: the skin jumped between %.2f and %.2f mm (%.3f N before, then %.3f or "
+            "%.3f N by the step): the force from there on is that of one of several equilibria\n",
+            verb, p->jump[k].from_m * 1e3, p->jump[k].to_m * 1e3, p->jump[k].before_n,
+            p->jump[k].whole_n, p->jump[k].two_n);
+}
+
+void settled_json_jumps(const settled *s) {
+  const sonde_path_result *p = &s->path;
+  app_json_array("branch_jumps");
+  for (uint32_t k = 0; k < p->jump_count && k < SONDE_PATH_JUMPS; ++k) {
+    app_json_object(NULL);
+    app_json_real("from_mm", p->jump[k].from_m * 1e3);
+    app_json_real("to_mm", p->jump[k].to_m * 1e3);
+    app_json_real("force_before_n", p->jump[k].before_n);
+    app_json_real("force_one_step_n", p->jump[k].whole_n);
+    app_json_real("force_two_steps_n", p->jump[k].two_n);
+    app_json_close();
+  }
+  app_json_close();
 }
 
 void settled_update(const settled *s, const sonde_pathology *pathology, uint64_t tick) {

@@ -14,7 +14,8 @@ typedef struct settled {
   double depth_m;  // along the beam from where the press began
   double force_n;  // along the beam, onto the skin
   sonde_settle_result result;
-  uint32_t iterations; // of all settling
+  sonde_path_result path; // of the last press
+  uint32_t iterations;    // of all settling
 } settled;
 
 // preset: of damping and friction; NULL: none
@@ -26,11 +27,18 @@ sonde_status settled_site(const settled *s, const char *model, long number, sond
                           sonde_error *error);
 // Where a pose's beam meets the rest skin, the pose moved there; false when it misses.
 bool settled_on_skin(const settled *s, sonde_pose *pose);
-// Settles with the face `depth_m` along the beam from `start`, coming from the last settled state.
+// Settles with the face `depth_m` along the beam from `start`, hardly moved since the last
+// settling.
 void settled_at(settled *s, sonde_pose start, double depth_m, double residual);
-// Presses along the beam from `start` on the skin until the settled force is force_n, to 1e-4;
-// shows progress. @return SONDE_CONVERGENCE when it is not met, CANCELLED
+// Presses slowly along the beam from `start`, on the skin at rest, to a depth or until the force is
+// force_n (INFINITY: to the depth); shows progress. @return as sonde_settle_path()
+sonde_status settled_press(settled *s, sonde_pose start, double depth_m, double force_n,
+                           sonde_error *error);
+// The same to a force, at most 60 mm deep.
 sonde_status settled_force(settled *s, sonde_pose start, double force_n, sonde_error *error);
+// Says on stderr where the last press met a jump of the skin; the same as a list in the JSON.
+void settled_warn(const settled *s, const char *verb);
+void settled_json_jumps(const settled *s);
 // The interior at the settled state.
 void settled_update(const settled *s, const sonde_pathology *pathology, uint64_t tick);
 sonde_pose settled_advance(sonde_pose pose, double along_beam_m);

@@ -21,14 +21,18 @@ int main(int argc, char **argv) {
     fprintf(stderr, "%s\n", error.message);
     goto done;
   }
-  sonde_pose pose = sonde_site_pose(&model->sites[0], 0.008);
-  sonde_settle_result settled = sonde_settle(state, &probe, pose, 1e-9, 200);
+  const sonde_site *site = &model->sites[0];
+  sonde_path_result press;
+  sonde_status status = sonde_settle_path(state, &probe, sonde_site_pose(site, 0),
+                                          sonde_site_pose(site, 0.008), NULL, NULL, &press, &error);
+  if (status) fprintf(stderr, "%s\n", error.message);
+  sonde_settle_result settled = press.settled;
   const sonde_contact *contact = sonde_state_contact(state);
-  printf("%s after %u iterations\n", settled.converged ? "at rest" : "not at rest",
-         settled.iterations);
+  printf("%s after %u iterations, %u jumps\n", settled.converged ? "at rest" : "not at rest",
+         press.iterations, press.jump_count);
   printf("probe %.3f N, tissue %.3f N, contact area %.1f mm^2\n", settled.contact_n,
          settled.reaction_n, contact->area_m2 * 1e6);
-  result = settled.converged ? 0 : 1;
+  result = status ? 1 : 0;
 done:
   sonde_state_destroy(state);
   sonde_probe_clear(&probe);

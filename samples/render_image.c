@@ -25,9 +25,13 @@ static sonde_status build(scene *s, const char *path, sonde_error *error) {
 }
 
 // One state for all three: skin, inside and picture show the same moment.
-static void render(scene *s, const sonde_pathology *pathology) {
-  sonde_pose pose = sonde_site_pose(&s->model->sites[0], 0.006);
-  sonde_settle(s->state, &s->probe, pose, 1e-6, 200);
+static sonde_status render(scene *s, const sonde_pathology *pathology, sonde_error *error) {
+  const sonde_site *site = &s->model->sites[0];
+  sonde_pose pose = sonde_site_pose(site, 0.006);
+  sonde_path_result press;
+  sonde_status status = sonde_settle_path(s->state, &s->probe, sonde_site_pose(site, 0), pose, NULL,
+                                          NULL, &press, error);
+  if (status) return status;
   sonde_interior_input input = {sonde_state_positions(s->state),
                                 sonde_state_contact_forces(s->state),
                                 pose,
@@ -39,6 +43,7 @@ static void render(scene *s, const sonde_pathology *pathology) {
   sonde_interior_update(s->interior, &input);
   sonde_echo_settings settings = sonde_echo_settings_default();
   sonde_echo_render(s->echo, pose, 2 * s->probe.half_x_m, pathology, &settings, &s->image);
+  return SONDE_OK;
 }
 
 int main(int argc, char **argv) {
@@ -51,10 +56,8 @@ int main(int argc, char **argv) {
   sonde_pathology healthy;
   sonde_status status = build(&s, argv[1], &error);
   if (!status) status = sonde_pathology_preset("healthy", &healthy, &error);
-  if (!status) {
-    render(&s, &healthy);
-    status = sonde_image_save_png(&s.image, argv[2], &error);
-  }
+  if (!status) status = render(&s, &healthy, &error);
+  if (!status) status = sonde_image_save_png(&s.image, argv[2], &error);
   if (!status)
     printf("%s: %u x %u\n", argv[2], s.image.width, s.image.height);
   else

@@ -232,7 +232,8 @@ SONDE_API const char *const *sonde_probe_names(void);
  * Builds a probe by name, or from a mesh file (path with .ply/.obj/.stl, mm; the convex hull is
  * used, leaving out detail below 0.05 mm; +z of the file points into the tissue and the file's
  * lowest-z end is the handle). The file's highest z becomes 0 and the middle of the vertices within
- * 1 mm of it the origin; their box gives the half extents.
+ * 1 mm of it the origin; the box of the hull within 1 mm of it gives the half extents, which are
+ * more than 0 for a tip or an edge too.
  * point 6x6 mm, linear 60x12 mm, square 24x24 mm, rect:AxB with sides A (x) and B (y) from 0.1 to
  * 200 mm (flat boxes); sphere radius 15 mm, ball:R a true ball of radius R, 1 to 200 mm.
  * @return SONDE_NOT_FOUND for an unknown name, listing the known ones

@@ -119,7 +119,10 @@ typedef struct sonde_interior_input {
   const sonde_pathology *pathology;
   double dt_s; /**< since the last update; < 0: vessels in equilibrium */
   uint64_t tick;
-  double face_half_x_m, face_half_y_m; /**< of the probe's face; 0: as wide as the contact */
+  /** Of the probe's face, as sonde_probe.half_x_m and half_y_m; more than 0 (asserted: without a
+   * face the vein would close otherwise). INFINITY: forces that no probe gave, as wide as they are.
+   */
+  double face_half_x_m, face_half_y_m;
 } sonde_interior_input;
 
 /** New surface state: solves the field, the stress at the vessels and their areas.

@@ -12,6 +12,7 @@
 #include "sonde/tissue.h"
 #include "sonde/tissue_anatomy.h"
 #include "sonde/world.h"
+#include "sonde/world_path.h"
 #include "sonde/scene.h"
 #include "sonde/fit.h"
 #include "sonde/fit_confidence.h"

@@ -124,16 +124,26 @@ SONDE_API void sonde_step(sonde_state *state, const sonde_probe *probe,
 
 /** Result of a search for static equilibrium. */
 typedef struct sonde_settle_result {
-  bool converged;
+  bool converged;      /**< |unbalanced force| is within the residual: *an* equilibrium */
   uint32_t iterations; /**< Newton iterations */
   double residual;     /**< |unbalanced force| / |contact force| */
   double contact_n;    /**< |force on the probe| */
   double reaction_n;   /**< |tissue reaction| */
+  /** Deepest place of the skin inside the probe before the first iteration (0 without a probe).
+   * Beyond SONDE_SETTLE_NEAR_M the probe came from far: skin deep inside it may be pushed out at
+   * its sides, and the force is that of one of several equilibria, 10 to 30 % off. */
+  double start_depth_m;
 } sonde_settle_result;
 
+/** sonde_settle_result.start_depth_m up to which the equilibrium is that of a slow press. */
+#define SONDE_SETTLE_NEAR_M 1e-3
+
 /**
- * Static equilibrium with the probe held still: Newton with line search on the total energy, all
- * nodes awake, velocities zeroed, without friction.
+ * *An* equilibrium with the probe held still, near the present positions: Newton with line search
+ * on the total energy, all nodes awake, velocities zeroed, without friction. A pressed skin has
+ * several equilibria; which one is found depends on where the search starts. For the one that a
+ * hand meets use sonde_settle_path(); this function is for a probe that has hardly moved since the
+ * state was last at rest (start_depth_m says whether it was so).
  * @param relative_residual e.g. 1e-9
  * @thread owner of the state
  */

@@ -3,6 +3,7 @@
 #include "fit/press.h"
 
 #include "base/maths.h"
+#include "sonde/world_path.h"
 
 sonde_status sonde_press_create(const sonde_model *model, double relative_residual,
                                 uint32_t max_iterations, sonde_press *press, sonde_error *error) {
@@ -112,10 +113,14 @@ static sonde_pose probe_pose(const sonde_site *site, double depth_m) {
 }
 
 double sonde_press_probe(sonde_press *press, const sonde_site *site, const sonde_probe *probe,
-                         double depth_m) {
-  SONDE_ASSERT(depth_m >= 0);
-  sonde_settle_result result = sonde_settle(press->state, probe, probe_pose(site, depth_m),
-                                            press->relative_residual, press->max_iterations);
-  if (!result.converged) return NAN;
-  return v_dot(sonde_state_contact(press->state)->force_n, site->normal);
+                         double from_m, double to_m) {
+  SONDE_ASSERT(from_m >= 0 && to_m >= from_m);
+  sonde_path_def def = sonde_path_def_default();
+  def.relative_residual = press->relative_residual;
+  def.max_iterations = press->max_iterations;
+  sonde_path_result result;
+  if (sonde_settle_path(press->state, probe, probe_pose(site, from_m), probe_pose(site, to_m), &def,
+                        NULL, &result, NULL))
+    return NAN;
+  return result.force_n;
 }

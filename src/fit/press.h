@@ -44,9 +44,9 @@ void sonde_bonded_clear(sonde_bonded *bonded);
 // the last equilibrium. NaN when none is found.
 double sonde_bonded_force(sonde_bonded *bonded, double depth_m);
 
-// Force along the normal with the convex body's face centred at the site moved by -depth normal;
-// starts from the state's present positions. NaN when no equilibrium is found.
+// Force along the normal with the convex body's face centred at the site moved by -to_m normal,
+// pressed on slowly from the equilibrium at from_m. NaN when no equilibrium is found.
 double sonde_press_probe(sonde_press *press, const sonde_site *site, const sonde_probe *probe,
-                         double depth_m);
+                         double from_m, double to_m);
 
 #endif

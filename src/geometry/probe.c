@@ -144,7 +144,7 @@ static sonde_status make_ball(const char *name, sonde_probe *probe, sonde_error 
 // ---- files --------------------------------------------------------------------------------
 
 // Moves the points so that their highest z is 0 and the middle of the contact end is the origin.
-static void seat(sonde_mesh *mesh, sonde_probe *probe) {
+static void seat(sonde_mesh *mesh) {
   SONDE_ASSERT(mesh->vertex_count > 0);
   double top = -INFINITY;
   for (uint32_t k = 0; k < mesh->vertex_count; ++k) top = fmax(top, mesh->vertices[k].z);
@@ -158,8 +158,25 @@ static void seat(sonde_mesh *mesh, sonde_probe *probe) {
   sonde_vec3 middle = v_lerp(low, high, 0.5);
   for (uint32_t k = 0; k < mesh->vertex_count; ++k)
     mesh->vertices[k] = v_sub(mesh->vertices[k], middle);
+}
+
+// Half extents of the part of the body within CONTACT_BAND_M of its contact end: corners there, and
+// where the plane at that height cuts an edge. So a tip or an edge has a face too.
+static void measure_face(sonde_probe *probe) {
+  const sonde_convex *body = &probe->body;
+  sonde_vec3 low = vec3(INFINITY, INFINITY, 0), high = vec3(-INFINITY, -INFINITY, 0);
+  for (uint32_t e = 0; e < body->topology.edge_count; ++e) {
+    sonde_vec3 a = body->hull.vertices[body->topology.edges[e][0]];
+    sonde_vec3 b = body->hull.vertices[body->topology.edges[e][1]];
+    if (fmax(a.z, b.z) < -CONTACT_BAND_M) continue;
+    if (a.z < -CONTACT_BAND_M) a = v_lerp(b, a, (b.z + CONTACT_BAND_M) / (b.z - a.z));
+    if (b.z < -CONTACT_BAND_M) b = v_lerp(a, b, (a.z + CONTACT_BAND_M) / (a.z - b.z));
+    low = vec3(fmin(low.x, fmin(a.x, b.x)), fmin(low.y, fmin(a.y, b.y)), 0);
+    high = vec3(fmax(high.x, fmax(a.x, b.x)), fmax(high.y, fmax(a.y, b.y)), 0);
+  }
   probe->half_x_m = (high.x - low.x) / 2;
   probe->half_y_m = (high.y - low.y) / 2;
+  SONDE_ASSERT(probe->half_x_m > 0 && probe->half_y_m > 0);
 }
 
 // The largest extent of a probe in a file, and the smallest of the largest.
@@ -186,7 +203,7 @@ static sonde_status make_from_file(const char *path, sonde_probe *probe, sonde_e
   sonde_status status = sonde_mesh_load(path, 1e-3, &mesh, error);
   if (!status) status = check_size(path, &mesh, error);
   if (!status) {
-    seat(&mesh, probe);
+    seat(&mesh);
     status = sonde_convex_hull_within(mesh.vertices, mesh.vertex_count, FILE_TOLERANCE_M,
                                       &probe->body, &cause);
     if (status)
@@ -195,6 +212,7 @@ static sonde_status make_from_file(const char *path, sonde_probe *probe, sonde_e
   if (!status && probe->body.plane_count > SONDE_MAX_PROBE_PLANES)
     status = sonde_fail(error, SONDE_MESH, "%s: its hull has %u planes, expected at most %d", path,
                         probe->body.plane_count, SONDE_MAX_PROBE_PLANES);
+  if (!status) measure_face(probe);
   sonde_mesh_clear(&mesh);
   return status;
 }

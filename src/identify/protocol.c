@@ -1,10 +1,10 @@
 // check:        ranges of a protocol.
-// find_depth:   depth of a static force, by settling deeper and deeper.
+// find_depth:   where a slow press meets a force.
 // plan_ramps:   knots of ramp-and-hold. plan_slides: knots of the slide.
 // sample:       the plan driven over the model, sensors with noise.
 #include "base/maths.h"
 #include "base/random.h"
-#include "fit/press.h"
+#include "sonde/world_path.h"
 #include "identify/forward.h"
 
 #include <string.h>
@@ -60,33 +60,24 @@ static sonde_status check(const sonde_protocol *p, double dt_s, sonde_error *err
   return SONDE_OK;
 }
 
-// Steps of 2 mm to a bracket, then bisection to 10 um; the force grows with depth.
+// Where a slow press meets the force.
 static sonde_status find_depth(const sonde_model *model, const sonde_drive *drive, double force_n,
                                double *depth_m, sonde_error *error) {
-  sonde_press press;
-  sonde_status status = sonde_press_create(model, 1e-6, 300, &press, error);
+  const sonde_site *site = drive->site;
+  sonde_vec3 z = v_neg(site->normal), y = v_cross(z, site->u);
+  sonde_pose above = {site->position_m, q_from_matrix(m_columns(site->u, y, z))}, deep = above;
+  deep.position = v_madd(site->position_m, -DEEPEST_M, site->normal);
+  sonde_path_def def = sonde_path_def_default();
+  def.force_n = force_n;
+  def.relative_residual = 1e-6;
+  sonde_path_result result = {0};
+  sonde_state *state;
+  sonde_status status = sonde_state_create(model, NULL, &state, error);
   if (status) return status;
-  double low = 0, high = 0, reached = 0;
-  while (reached < force_n && high < DEEPEST_M) {
-    low = high;
-    high += 2e-3;
-    reached = sonde_press_probe(&press, drive->site, &drive->probe, high);
-    if (isnan(reached)) break;
-  }
-  bool found = reached >= force_n;
-  while (found && high - low > 1e-5) {
-    double middle = 0.5 * (low + high);
-    double f = sonde_press_probe(&press, drive->site, &drive->probe, middle);
-    if (f < force_n)
-      low = middle;
-    else
-      high = middle;
-  }
-  *depth_m = high;
-  sonde_press_clear(&press);
-  return found ? SONDE_OK
-               : sonde_fail(error, SONDE_CONVERGENCE, "%g N was not reached: %g N at %g mm",
-                            force_n, reached, high * 1e3);
+  status = sonde_settle_path(state, &drive->probe, above, deep, &def, NULL, &result, error);
+  *depth_m = result.way_m;
+  sonde_state_destroy(state);
+  return status;
 }
 
 // Both coordinates get a knot at the same time.

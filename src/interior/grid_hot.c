@@ -23,8 +23,8 @@ bool sonde_grid_place(const sonde_interior *in, const sonde_interior_input *inpu
   SONDE_ASSERT(in != NULL && input != NULL && place != NULL);
   sonde_mat3 r = q_matrix(input->world_from_probe.rotation);
   sonde_vec3 x = m_column(&r, 0), y = m_column(&r, 1);
-  double hx = input->face_half_x_m > 0 ? input->face_half_x_m : default_half_x_m;
-  double hy = input->face_half_y_m > 0 ? input->face_half_y_m : default_half_y_m;
+  double hx = isfinite(input->face_half_x_m) ? input->face_half_x_m : default_half_x_m;
+  double hy = isfinite(input->face_half_y_m) ? input->face_half_y_m : default_half_y_m;
   sonde_column_point at;
   bool within = sonde_interior_locate(in, input->world_from_probe.position, &at);
   *place = (sonde_window_place){.theta = at.theta, .s = at.s};

@@ -62,7 +62,7 @@ static void add_node(sums *t, double f, double x, double y, double least) {
 static double half_side(double moment, double low, double high, double face) {
   double half = sqrt(3 * fmax(0, moment)), reach = 0.5 * fmax(0, high - low);
   half = fmax(half + reach_share * fmax(reach - half, 0), least_half_m);
-  return (face > 0 ? fmin(half, face) : half) + skin_spread_m;
+  return fmin(half, face) + skin_spread_m;
 }
 
 static load measure_load(const sonde_model *model, const sonde_interior_input *input) {
@@ -330,6 +330,7 @@ void sonde_interior_vessels(sonde_interior *in, const sonde_interior_input *inpu
 void sonde_interior_update(sonde_interior *in, const sonde_interior_input *input) {
   SONDE_ASSERT(in != NULL && input != NULL && input->pathology != NULL);
   SONDE_ASSERT(input->positions_m != NULL && input->contact_forces_n != NULL);
+  SONDE_ASSERT(input->face_half_x_m > 0 && input->face_half_y_m > 0);
   sonde_findings_apply(in, input->pathology);
   in->solid = sonde_interior_follow(in, input);
   if (!in->solid) {

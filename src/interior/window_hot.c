@@ -157,7 +157,7 @@ static void move_near(const sonde_window *w, const contact *c, float *x) {
 static bool under_face(const sonde_interior_input *input, sonde_vec3 now) {
   sonde_vec3 q = pose_apply_inverse(input->world_from_probe, now);
   double x = input->face_half_x_m, y = input->face_half_y_m;
-  return !(x > 0) || !(y > 0) || (fabs(q.x) <= x + face_edge_m && fabs(q.y) <= y + face_edge_m);
+  return fabs(q.x) <= x + face_edge_m && fabs(q.y) <= y + face_edge_m;
 }
 
 // A mesh coarser than the elements would leave the skin free between its vertices: the columns of
@@ -208,8 +208,8 @@ static double read_contact(sonde_window *w, const sonde_interior *in,
   }
   touch_columns(w, in, input, beam);
   double x = input->face_half_x_m, y = input->face_half_y_m;
-  if (x > 0) r->low_x = fmax(r->low_x, -x), r->high_x = fmin(r->high_x, x);
-  if (y > 0) r->low_y = fmax(r->low_y, -y), r->high_y = fmin(r->high_y, y);
+  r->low_x = fmax(r->low_x, -x), r->high_x = fmin(r->high_x, x);
+  r->low_y = fmax(r->low_y, -y), r->high_y = fmin(r->high_y, y);
   return force;
 }
 

@@ -91,7 +91,7 @@ static double press_once(robot *r, sonde_press *press, uint32_t index, sonde_bon
   const sonde_site *site = &r->sites->sites[index];
   sonde_robot_visit *visit = &r->visits[index];
   if (r->bonded) return sonde_bonded_force(bonded, depth_m);
-  double force_n = sonde_press_probe(press, site, &r->probe, depth_m);
+  double force_n = sonde_press_probe(press, site, &r->probe, depth_m - r->def->step_m, depth_m);
   if (!isnan(force_n))
     visit->area_m2 = fmax(visit->area_m2, sonde_state_contact(press->state)->area_m2);
   return force_n;

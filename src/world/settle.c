@@ -142,6 +142,8 @@ static sonde_settle_result iterate(problem *p, double relative, uint32_t limit) 
   sonde_state *state = p->state;
   sonde_settle_result result = {0};
   double load, residual = evaluate(p, &load);
+  for (uint32_t r = 0; p->probe && r < state->contact.region_count; ++r)
+    result.start_depth_m = fmax(result.start_depth_m, state->contact.region[r].depth_max_m);
   pace at = {1, residual, 0};
   while (result.iterations < limit) {
     result.converged = residual <= relative * load || residual <= 1e-12;

@@ -62,6 +62,18 @@ rejects 'metres\.obj: the probe is .* mm wide, expected at least 1; is it in mil
 box "$in/good.obj" 20
 gives 'penetration_mm=2 probe=good force_n>=0.3 force_n<=0.6' press "$MODEL" --site 27 --probe "$in/good.obj" --depth-mm 2 --json
 
+# Probes that end in a tip have a picture too; none of them ends the program.
+tip() { # FILE X LENGTH: a pyramid 30 mm wide with its tip at x = X
+  printf 'v -15 -15 -%s\nv 15 -15 -%s\nv 15 15 -%s\nv -15 15 -%s\nv %s 0 0\n' "$3" "$3" "$3" "$3" "$2" >"$1"
+  printf 'f 1 4 3 2\nf 1 2 5\nf 2 3 5\nf 3 4 5\nf 4 1 5\n' >>"$1"
+}
+tip "$in/upright.obj" 0 40
+tip "$in/leaning.obj" 30 40
+for name in upright leaning; do
+  gives "penetration_mm=3 probe=$name" press "$MODEL" --site 27 --probe "$in/$name.obj" --depth-mm 3 \
+    --image "$in/tip.png" --json
+done
+
 # Frames: the limit that was passed is the one that is named, and so is the option that helps.
 sequence() { # FILE TRANSFORM: two frames of 4 x 4 pixels 100 m apart
   printf 'ObjectType = Image\nNDims = 3\nDimSize = 4 4 2\nElementType = MET_UCHAR\n'

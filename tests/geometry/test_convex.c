@@ -277,6 +277,28 @@ static void test_real_probe(void **state) {
   sonde_probe_clear(&p);
 }
 
+// A tip and an edge have a face: the body's section 1 mm above them, by similar triangles. Upright
+// and leaning the apex over one side.
+static void test_pointed_probes(void **state) {
+  (void)state;
+  const double apex_x_mm[] = {0, 0, 15}, apex_y_mm[] = {0, 12, 12}; // half lengths of a top edge
+  const char *path = "pointed_probe.obj";
+  for (int k = 0; k < 3; ++k) {
+    FILE *file = fopen(path, "w");
+    assert_non_null(file);
+    double y = apex_y_mm[k], x = apex_x_mm[k];
+    fprintf(file, "v -15 -12 -40\nv 15 -12 -40\nv 15 12 -40\nv -15 12 -40\n");
+    fprintf(file, "v %g %g 0\nv %g %g 0\nf 1 2 5\nf 2 3 6\nf 3 4 6\nf 4 1 5\n", x, -y, x, y + 1e-3);
+    fprintf(file, "f 1 4 3\nf 1 3 2\nf 2 6 5\nf 4 5 6\n");
+    assert_int_equal(fclose(file), 0);
+    sonde_probe p = make_probe(path);
+    assert_near(p.half_x_m, 15e-3 / 40, 2e-6);
+    assert_near(p.half_y_m, y * 1e-3 + (12 - y) * 1e-3 / 40, 2e-6);
+    sonde_probe_clear(&p);
+    assert_int_equal(remove(path), 0);
+  }
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_random_hulls),  cmocka_unit_test(test_grid_hulls),
@@ -284,7 +306,7 @@ int main(void) {
       cmocka_unit_test(test_support),       cmocka_unit_test(test_probes),
       cmocka_unit_test(test_sphere_probe),  cmocka_unit_test(test_rectangle_probe),
       cmocka_unit_test(test_unknown_probe), cmocka_unit_test(test_file_probe),
-      cmocka_unit_test(test_real_probe),
+      cmocka_unit_test(test_real_probe),    cmocka_unit_test(test_pointed_probes),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

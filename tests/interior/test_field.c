@@ -27,7 +27,9 @@ static void update(sonde_interior *in, const sonde_vec3 *positions, uint32_t cou
                                                     .world_from_probe = {.rotation = {1, 0, 0, 0}},
                                                     .pathology = &p,
                                                     .dt_s = -1,
-                                                    .tick = 7});
+                                                    .tick = 7,
+                                                    .face_half_x_m = INFINITY,
+                                                    .face_half_y_m = INFINITY});
   sonde_free(none);
 }
 

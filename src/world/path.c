@@ -1,0 +1,263 @@
+// The equilibrium at the end of a slow press: follows the probe's way in steps.
+//
+// pose_at, ride           where the probe is, and where the skin in touch with it would be
+// settle_from             equilibrium one step on from a known one
+// take_step               one step against two half steps; shorter until they agree
+// meet_force              the place within the last step where the force is the one asked for
+// sonde_settle_path       steps from the start to the goal, or until the force is met
+#include "base/base.h"
+#include "base/maths.h"
+#include "world/state.h"
+
+#include "sonde/world_path.h"
+
+#include <string.h>
+
+static const double forgiven_n = 2e-3; // a difference of force that is no disagreement
+static const double quick = 1e-3;      // relative residual of a step that is only compared
+static const double on_the_way = 1e-4; // and of one that the press goes on from
+static const double met = 1e-4;        // of the force asked for
+
+// An equilibrium on the way.
+typedef struct mark {
+  double share; // of the way
+  double force_n;
+  sonde_settle_result settled;
+  sonde_vec3 *position; // [nodes]
+  uint8_t *touched;     // [nodes] pushed by the probe
+} mark;
+
+typedef struct path {
+  sonde_state *state;
+  const sonde_probe *probe;
+  const sonde_path_def *def;
+  sonde_pose from, to;
+  double length_m; // of the way of the face's farthest corner
+  sonde_path_result *result;
+  mark here, half, whole, end; // the step's start; after half, in one, and after two halves
+} path;
+
+static uint32_t nodes(const path *p) { return p->state->model->surface.vertex_count; }
+
+// Angle between two orientations.
+static double turn(sonde_quat a, sonde_quat b) {
+  return 2 * acos(fmin(1, fabs(a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z)));
+}
+
+static sonde_pose pose_at(const path *p, double share) {
+  sonde_quat a = p->from.rotation, b = p->to.rotation;
+  double sign = a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z < 0 ? -share : share,
+         rest = 1 - share;
+  sonde_quat q = {rest * a.w + sign * b.w, rest * a.x + sign * b.x, rest * a.y + sign * b.y,
+                  rest * a.z + sign * b.z};
+  return (sonde_pose){v_lerp(p->from.position, p->to.position, share), q_unit(q)};
+}
+
+static double push_along_beam(const path *p, sonde_pose pose) {
+  return -v_dot(p->state->contact.force_n, q_rotate(pose.rotation, vec3(0, 0, 1)));
+}
+
+// The touched skin goes along with the probe, as it does under a slow press. Left behind it would
+// lie deep inside the probe, where some of it is nearer to a side than to the face.
+static void ride(path *p, const mark *from, double share) {
+  sonde_pose was = pose_at(p, from->share), is = pose_at(p, share);
+  memcpy(p->state->position, from->position, nodes(p) * sizeof *from->position);
+  for (uint32_t i = 0; i < nodes(p); ++i) {
+    if (!from->touched[i]) continue;
+    const sonde_vec3 at = from->position[i];
+    sonde_vec3 move = v_sub(pose_apply(is, pose_apply_inverse(was, at)), at);
+    p->state->position[i] = v_add(at, sonde_bounded_move(p->state->model, i, at, move));
+  }
+}
+
+static void settle_from(path *p, const mark *from, double share, double residual, mark *to) {
+  sonde_state *state = p->state;
+  sonde_pose pose = pose_at(p, share);
+  SONDE_ASSERT(share >= 0 && share <= 1);
+  sonde_state_publish(state);
+  ride(p, from, share);
+  to->settled = sonde_settle(state, p->probe, pose, residual, p->def->max_iterations);
+  to->share = share;
+  to->force_n = push_along_beam(p, pose);
+  memcpy(to->position, state->position, nodes(p) * sizeof *to->position);
+  for (uint32_t i = 0; i < nodes(p); ++i) to->touched[i] = v_norm2(state->contact_force[i]) > 0;
+  p->result->iterations += to->settled.iterations;
+}
+
+static void swap(mark *a, mark *b) {
+  SONDE_ASSERT(a != b);
+  mark c = *a;
+  *a = *b, *b = c;
+}
+
+static void copy(const path *p, const mark *from, mark *to) {
+  to->share = from->share, to->force_n = from->force_n, to->settled = from->settled;
+  memcpy(to->position, from->position, nodes(p) * sizeof *to->position);
+  memcpy(to->touched, from->touched, nodes(p));
+}
+
+static bool agree(const path *p) {
+  double least = fmax(p->def->tolerance * fabs(p->end.force_n), forgiven_n);
+  return p->whole.settled.converged && p->half.settled.converged && p->end.settled.converged &&
+         fabs(p->whole.force_n - p->end.force_n) <= least;
+}
+
+static void note_jump(path *p) {
+  sonde_path_result *r = p->result;
+  double way_m = v_distance(p->from.position, p->to.position);
+  if (r->jump_count < SONDE_PATH_JUMPS)
+    r->jump[r->jump_count] = (sonde_path_jump){p->here.share * way_m, p->end.share * way_m,
+                                               p->here.force_n, p->whole.force_n, p->end.force_n};
+  ++r->jump_count;
+}
+
+// From `here`, at most *step_m on; `end` is the new equilibrium. The first half of a step that was
+// too long is the next, shorter one taken at once.
+static void take_step(path *p, double *step_m) {
+  double step = *step_m, left = (1 - p->here.share) * p->length_m;
+  SONDE_ASSERT(step > 0 && left > 0);
+  for (bool known = false;; known = true) {
+    double share = step >= 0.999 * left ? 1 : p->here.share + step / p->length_m;
+    double middle = 0.5 * (p->here.share + share);
+    if (!known) settle_from(p, &p->here, share, quick, &p->whole);
+    settle_from(p, &p->here, middle, on_the_way, &p->half);
+    settle_from(p, &p->half, share, on_the_way, &p->end);
+    step = fmin(step, left);
+    bool same = agree(p);
+    if (same || 0.5 * step < p->def->least_step_m) {
+      if (!same) note_jump(p);
+      *step_m = same ? fmin(2 * step, p->def->step_m) : step;
+      ++p->result->steps;
+      return;
+    }
+    swap(&p->whole, &p->half);
+    step *= 0.5;
+  }
+}
+
+// Between `here`, which has less than the force, and `end`, which has as much: the Illinois form of
+// regula falsi, each trial pressed on from below, since skin that comes back from deeper may settle
+// elsewhere.
+static void meet_force(path *p) {
+  double wanted = p->def->force_n, high = p->end.share;
+  SONDE_ASSERT(isfinite(wanted) && p->here.share < high);
+  double low_f = p->here.force_n - wanted, high_f = p->end.force_n - wanted;
+  for (int k = 0; k < 60 && fabs(p->end.force_n - wanted) > met * wanted; ++k) {
+    double low = p->here.share;
+    settle_from(p, &p->here, low - low_f * (high - low) / (high_f - low_f), on_the_way, &p->end);
+    double weight = k % 3 == 2 ? 0.5 : 1;
+    if (p->end.force_n < wanted) {
+      copy(p, &p->end, &p->here);
+      low_f = p->here.force_n - wanted, high_f *= weight;
+    } else {
+      high = p->end.share, high_f = p->end.force_n - wanted, low_f *= weight;
+    }
+  }
+}
+
+static double done(const path *p) {
+  double force = isfinite(p->def->force_n) ? p->here.force_n / p->def->force_n : 0;
+  return clamp(fmax(p->here.share, force), 0, 1);
+}
+
+// False when cancelled.
+static bool follow(path *p, const sonde_progress *progress) {
+  double step_m = p->def->step_m;
+  settle_from(p, &p->here, 0, on_the_way, &p->end);
+  while (p->end.settled.converged && p->end.share < 1 && p->end.force_n < p->def->force_n &&
+         p->length_m > 0) {
+    swap(&p->here, &p->end);
+    if (!sonde_progress_report(progress, done(p), "pressing")) return false;
+    take_step(p, &step_m);
+  }
+  return true;
+}
+
+static sonde_status check(const sonde_path_def *d, sonde_error *error) {
+  const struct {
+    const char *name;
+    double value, low, high;
+  } range[] = {{"step_m", d->step_m, 1e-6, 0.1},
+               {"least_step_m", d->least_step_m, 1e-7, d->step_m},
+               {"tolerance", d->tolerance, 1e-6, 1},
+               {"force_n", d->force_n, 1e-6, INFINITY},
+               {"relative_residual", d->relative_residual, 1e-14, 0.1},
+               {"max_iterations", d->max_iterations, 1, 1e6}};
+  for (size_t k = 0; k < SONDE_COUNT_OF(range); ++k)
+    if (!(range[k].value >= range[k].low && range[k].value <= range[k].high))
+      return sonde_fail(error, SONDE_ARGUMENT, "%s is %g, expected %g to %g", range[k].name,
+                        range[k].value, range[k].low, range[k].high);
+  return SONDE_OK;
+}
+
+sonde_path_def sonde_path_def_default(void) {
+  return (sonde_path_def){.step_m = 1e-3,
+                          .least_step_m = 0.125e-3,
+                          .tolerance = 0.01,
+                          .force_n = INFINITY,
+                          .relative_residual = 1e-9,
+                          .max_iterations = 400};
+}
+
+static sonde_status create_marks(path *p, sonde_error *error) {
+  mark *all[] = {&p->here, &p->half, &p->whole, &p->end};
+  for (size_t k = 0; k < SONDE_COUNT_OF(all); ++k) {
+    all[k]->position = SONDE_NEW(sonde_vec3, nodes(p));
+    all[k]->touched = SONDE_NEW(uint8_t, nodes(p));
+    if (!all[k]->position || !all[k]->touched) return sonde_fail_memory(error);
+  }
+  return SONDE_OK;
+}
+
+static void destroy_marks(path *p) {
+  mark *all[] = {&p->here, &p->half, &p->whole, &p->end};
+  for (size_t k = 0; k < SONDE_COUNT_OF(all); ++k) {
+    sonde_free(all[k]->position);
+    sonde_free(all[k]->touched);
+  }
+}
+
+// Exact at the end; says why when that is not where the press was to go.
+static sonde_status conclude(path *p, sonde_error *error) {
+  sonde_path_result *r = p->result;
+  double share = p->end.share, way_m = share * v_distance(p->from.position, p->to.position);
+  settle_from(p, &p->end, share, p->def->relative_residual, &p->end);
+  r->settled = p->end.settled;
+  r->pose = pose_at(p, share);
+  r->way_m = way_m;
+  r->force_n = p->end.force_n;
+  if (!r->settled.converged)
+    return sonde_fail(error, SONDE_CONVERGENCE,
+                      "no equilibrium was found %.2f mm down the press: residual %.2g of %.3g N",
+                      way_m * 1e3, r->settled.residual, r->force_n);
+  if (isfinite(p->def->force_n) && fabs(r->force_n - p->def->force_n) > 50 * met * p->def->force_n)
+    return sonde_fail(error, SONDE_CONVERGENCE, "%g N was not reached: %.4g N at %.2f mm%s",
+                      p->def->force_n, r->force_n, way_m * 1e3,
+                      r->jump_count ? ", after a jump of the skin" : "");
+  return SONDE_OK;
+}
+
+sonde_status sonde_settle_path(sonde_state *state, const sonde_probe *probe, sonde_pose from,
+                               sonde_pose to, const sonde_path_def *def,
+                               const sonde_progress *progress, sonde_path_result *result,
+                               sonde_error *error) {
+  const sonde_path_def usual = sonde_path_def_default();
+  SONDE_ASSERT(state && probe && result && v_finite(from.position) && v_finite(to.position));
+  *result = (sonde_path_result){.pose = from};
+  path p = {.state = state, .probe = probe, .def = def ? def : &usual};
+  p.from = from, p.to = to, p.result = result;
+  p.length_m = v_distance(from.position, to.position) +
+               turn(from.rotation, to.rotation) * hypot(probe->half_x_m, probe->half_y_m);
+  sonde_status status = check(p.def, error);
+  if (!status) status = create_marks(&p, error);
+  if (!status) {
+    sonde_state_publish(state);
+    memcpy(p.here.position, state->position, nodes(&p) * sizeof *p.here.position);
+    if (!follow(&p, progress)) status = sonde_fail(error, SONDE_CANCELLED, "cancelled");
+  }
+  if (!status && p.end.settled.converged && p.end.force_n >= p.def->force_n && p.end.share > 0)
+    meet_force(&p);
+  if (!status) status = conclude(&p, error);
+  destroy_marks(&p);
+  return status;
+}
