@@ -125,7 +125,7 @@ static sonde_status prepare(bench *b, const options *o, sonde_error *error) {
   const double known_m3 = 16e9;
   b->settings = sonde_echo_settings_default();
   sonde_status status = sonde_pathology_preset("healthy", &b->pathology, error);
-  if (!status) status = settled_open(&b->scene, o->model, "linear", NULL, error);
+  if (!status) status = settled_open(&b->scene, o->model, "linear", NULL, true, error);
   if (!status && settled_site(&b->scene, o->model, 27, &b->start, error))
     b->start = sonde_site_pose(&b->scene.model->sites[b->scene.model->site_count / 2], 0);
   if (!status)

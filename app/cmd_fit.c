@@ -5,7 +5,9 @@
 #include "fit_checks.h"
 #include "fit_common.h"
 #include "fit_doubts.h"
+#include "fit_open.h"
 #include "fit_report.h"
+#include "fit_sample.h"
 #include "fit_tables.h"
 
 #include <stdlib.h>
@@ -14,6 +16,7 @@
 static const char VERB[] = "fit";
 static const char HELP[] =
     "usage: sonde fit MEASUREMENTS.csv --surface SKIN.ply --sites SITES.csv -o MODEL [options]\n"
+    "       sonde fit --sample TABLE.csv [--exponent 1|2|3] [--area-mm2 A --height-mm H] [--json]\n"
     "\n"
     "Estimates the normal springs f(x) = x/(a x + b) of every site (stage 1: every curve by "
     "itself;\n"
@@ -28,7 +31,11 @@ static const char HELP[] =
     "  --stages 1|2|3    last stage; default 2. With 1 the model has one pair per site, no edges\n"
     "                    in the estimation and the law's default edge stiffness. Only 3 gives a\n"
     "                    model whose forces follow the measurements when it moves freely\n"
-    "  --femur FILE      default: femur.ply beside the skin\n"
+    "  --femur FILE      default: femur.ply beside the skin; without one a limb gets a rod along\n"
+    "                    the middles of its sections, another body no bone\n"
+    "  --body KIND       limb (default) or other: no bone unless --femur is given, no vessels, "
+    "and\n"
+    "                    so no image\n"
     "  --fat FILE        skin/fat interface; default: fat_skin_interface.ply beside the skin\n"
     "  --muscle FILE     fat/muscle interface; default: muscle_surface.ply beside the skin\n"
     "  --name TEXT       name in the model file; default thigh\n"
@@ -64,6 +71,10 @@ static const char HELP[] =
     "  --zero-sd-mm SD   its standard deviation beforehand; default 5. Implies --estimate-zero\n"
     "  --tare-sd-n SD    likewise; default 2. Implies --estimate-tare\n"
     "  --fine-mm L       longest skin edge near footprints; default 3\n"
+    "  --sample TABLE    force against compression of one specimen instead: the springs of n = 1,\n"
+    "                    2, 3 and a free n, the chosen one by its error on what was left out\n"
+    "  --area-mm2 A      the specimen's cross-section; default: from the table's first lines\n"
+    "  --height-mm H     its height, likewise\n"
     "  --accept-implausible  fit measurements outside what is known of tissue, with a warning;\n"
     "                    a table in other units is refused all the same\n"
     "  --json            one JSON object instead of the table\n"
@@ -74,7 +85,8 @@ static const char *const HOLD_OUTS[] = {"sites", "probe", "depth", NULL};
 typedef struct fit_arguments {
   const char *measurements, *surface, *sites, *output, *femur, *fat, *muscle, *name, *provenance;
   const char *stages, *weights, *loss, *fine_mm, *exponent, *report, *hold_out, *smoothness;
-  const char *starts, *seed, *also, *inplane, *tangential, *zero_sd, *tare_sd;
+  const char *sample, *area, *height, *body, *starts, *seed, *also, *inplane, *tangential, *zero_sd,
+      *tare_sd;
   bool zero, tare;
   bool json, help, pretension, cold_start, profile, identify, layers, uniform_shear, accept;
   char command_line[1024]; // as typed
@@ -83,6 +95,7 @@ typedef struct fit_arguments {
 // Of the model that is fitted.
 typedef struct fit_skin {
   double fine_mm, inplane_n_m, tangential_n_m3;
+  bool other; // no limb
 } fit_skin;
 
 // All that was found.
@@ -106,6 +119,10 @@ static bool parse_arguments(int argc, char **argv, fit_arguments *a) {
                                 {"--output", &a->output, NULL},
                                 {"--stages", &a->stages, NULL},
                                 {"--femur", &a->femur, NULL},
+                                {"--body", &a->body, NULL},
+                                {"--sample", &a->sample, NULL},
+                                {"--area-mm2", &a->area, NULL},
+                                {"--height-mm", &a->height, NULL},
                                 {"--fat", &a->fat, NULL},
                                 {"--muscle", &a->muscle, NULL},
                                 {"--name", &a->name, NULL},
@@ -138,7 +155,7 @@ static bool parse_arguments(int argc, char **argv, fit_arguments *a) {
   if (!app_take_options(VERB, argc, argv, options, sizeof options / sizeof *options,
                         &a->measurements))
     return false;
-  if (a->help) return true;
+  if (a->help || a->sample) return true;
   return app_require(VERB, "MEASUREMENTS.csv", a->measurements) &&
          app_require(VERB, "--surface", a->surface) && app_require(VERB, "--sites", a->sites) &&
          app_require(VERB, "-o MODEL", a->output);
@@ -207,6 +224,10 @@ static bool parse_fit(const fit_arguments *a, sonde_fit_def *def, fit_skin *skin
   if (a->tangential &&
       !app_parse_real(VERB, "--tangential-n-m3", a->tangential, 0, 1e8, &skin->tangential_n_m3))
     return false;
+  static const char *const BODIES[] = {"limb", "other", NULL};
+  int body = 0;
+  if (a->body && !app_parse_word(VERB, "--body", a->body, BODIES, &body)) return false;
+  skin->other = body == 1;
   *def = sonde_fit_def_default();
   long exponent = (long)def->normal_exponent;
   if (a->exponent && !app_parse_integer(VERB, "--exponent", a->exponent, 1, 3, &exponent))
@@ -255,7 +276,9 @@ static sonde_status load_inputs(const fit_arguments *a, fit_inputs *in, sonde_er
     status = sonde_measurements_load(a->measurements, &in->sites, &in->measurements, error);
   if (!status && a->also) status = sonde_measurements_load(a->also, &in->sites, &in->also, error);
   if (!status) status = sonde_mesh_load(a->surface, 1e-3, &in->skin, error);
-  if (!status) status = load_layer(a->femur, a->surface, "femur.ply", &in->femur, error);
+  bool other = a->body && strcmp(a->body, "other") == 0; // of which only what is named counts
+  if (!status && (a->femur || !other))
+    status = load_layer(a->femur, a->surface, "femur.ply", &in->femur, error);
   if (!status) status = load_layer(a->fat, a->surface, "fat_skin_interface.ply", &in->fat, error);
   if (!status) status = load_layer(a->muscle, a->surface, "muscle_surface.ply", &in->muscle, error);
   return status;
@@ -283,7 +306,7 @@ static sonde_status build_model(const fit_arguments *a, const fit_inputs *in, co
   def.provenance = a->provenance ? a->provenance : provenance;
   if (a->name) def.name = a->name;
   def.skin = &in->skin;
-  def.femur = given(&in->femur);
+  def.femur = skin->other ? &in->femur : given(&in->femur);
   def.fat_interface = given(&in->fat);
   def.muscle_interface = given(&in->muscle);
   def.sites = in->sites.sites;
@@ -293,7 +316,9 @@ static sonde_status build_model(const fit_arguments *a, const fit_inputs *in, co
   def.fine_edge_m = 1e-3 * skin->fine_mm;
   def.law.inplane_stiffness_n_m = skin->inplane_n_m;
   def.law.tangential_stiffness_n_m3 = skin->tangential_n_m3;
-  return sonde_model_build(&def, model, error);
+  sonde_status status = sonde_model_build(&def, model, error);
+  if (!status && skin->other) (*model)->vein.count = (*model)->artery.count = 0;
+  return status;
 }
 
 static sonde_status leave_out(const fit_arguments *a, const fit_inputs *in,
@@ -377,7 +402,9 @@ static sonde_status fit_model(const fit_arguments *a, const fit_inputs *in,
     status =
         sonde_model_set_parameters(model, &result->law, result->sites, result->site_count, error);
   if (!status) fit_tables_correct(result, model);
+  if (!status) status = fit_open_check(model, in->measurements.data[0].probe, error);
   if (!status) status = sonde_model_save(model, a->output, error);
+  if (!status) status = fit_open_written(model, a->output, error);
   if (!status && a->hold_out) status = leave_out(a, in, model, def, out, error);
   out->checks.also = a->also ? &in->also : NULL;
   if (!status)
@@ -505,16 +532,35 @@ static void print_table(const fit_arguments *a, const sonde_measurements *data,
   printf("wrote %s in %.2f s\n", a->output, seconds);
 }
 
+static int run_sample(const fit_arguments *a) {
+  long exponent = 0;
+  double area_mm2 = 0, height_mm = 0;
+  if (a->measurements || a->surface || a->sites || a->output)
+    return app_usage_error(VERB, "--sample goes without measurements, surface, sites and model");
+  if ((a->exponent && !app_parse_integer(VERB, "--exponent", a->exponent, 1, 3, &exponent)) ||
+      (a->area && !app_parse_real(VERB, "--area-mm2", a->area, 1, 1e6, &area_mm2)) ||
+      (a->height && !app_parse_real(VERB, "--height-mm", a->height, 0.1, 1e3, &height_mm)))
+    return APP_BAD_INPUT;
+  const fit_sample_options options = {.path = a->sample,
+                                      .exponent = (double)exponent,
+                                      .area_m2 = 1e-6 * area_mm2,
+                                      .height_m = 1e-3 * height_mm,
+                                      .accept_implausible = a->accept,
+                                      .json = a->json};
+  return fit_sample_run(&options);
+}
+
 int cmd_fit(int argc, char **argv) {
   fit_arguments arguments = {0};
   sonde_fit_def def;
-  fit_skin skin = {3, SONDE_SKIN_INPLANE_N_M, SONDE_SKIN_TANGENTIAL_N_M3};
+  fit_skin skin = {3, SONDE_SKIN_INPLANE_N_M, SONDE_SKIN_TANGENTIAL_N_M3, false};
   double start = app_seconds(CLOCK_MONOTONIC);
   if (!parse_arguments(argc, argv, &arguments)) return APP_BAD_INPUT;
   if (arguments.help) {
     fputs(HELP, stdout);
     return APP_OK;
   }
+  if (arguments.sample) return run_sample(&arguments);
   fit_outcome out = {0};
   if (!parse_fit(&arguments, &def, &skin, &out.checks)) return APP_BAD_INPUT;
   int unwritable = app_check_output(VERB, arguments.output);

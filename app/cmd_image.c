@@ -333,7 +333,7 @@ int cmd_image(int argc, char **argv) {
   sonde_error error = {0};
   app_progress_begin("pressing and drawing");
   sonde_status status = sonde_pathology_preset(o.pathology, &pathology, &error);
-  if (!status) status = settled_open(&s, o.model, o.probe, NULL, &error);
+  if (!status) status = settled_open(&s, o.model, o.probe, NULL, true, &error);
   if (!status) status = place(&s, &o, &error);
   if (!status) status = draw(&s, &o, &pathology, &image, &error);
   app_progress_end();

@@ -122,6 +122,7 @@ static sonde_status look(press *p, const char *image_path, sonde_error *error) {
   sonde_echo *echo = NULL;
   sonde_image image = {0};
   sonde_status status = SONDE_OK;
+  if (!interior) return SONDE_OK; // a model without a bone
   if (!isnan(p->vein_depth_m)) {
     const sonde_vec3 at = p->start.position;
     status = sonde_interior_set_vein_depth(interior, at, p->vein_depth_m, error);
@@ -207,13 +208,19 @@ static void set_vein(press *p, const options *o) {
   p->pathology.thrombus_modulus_pa = 3 * o->thrombus_pa; // Young's, incompressible
 }
 
+static bool needs_vessels(const options *o) {
+  return o->image || !isnan(o->vein_depth_m) || !isnan(o->venous_pa) || !isnan(o->wall_pa) ||
+         !isnan(o->thrombus_pa);
+}
+
 static sonde_status prepare(press *p, const options *o, sonde_error *error) {
   sonde_preset preset = sonde_preset_default();
   sonde_status status = sonde_pathology_preset(o->pathology, &p->pathology, error);
   if (!status) set_vein(p, o);
   if (!status && o->preset) status = sonde_preset_load(o->preset, &preset, error);
   app_progress_begin("pressing");
-  if (!status) status = settled_open(&p->scene, o->model, o->probe, &preset, error);
+  if (!status)
+    status = settled_open(&p->scene, o->model, o->probe, &preset, needs_vessels(o), error);
   return status ? status : settled_site(&p->scene, o->model, o->site, &p->start, error);
 }
 

@@ -48,7 +48,7 @@ static sonde_status prepare(const char *verb, const press_options *o, work *w, s
   sonde_status status =
       sonde_pathology_preset(o->pathology ? o->pathology : "healthy", &w->pathology, error);
   if (!status)
-    status = settled_open(&w->scene, o->model, o->probe ? o->probe : "linear", NULL, error);
+    status = settled_open(&w->scene, o->model, o->probe ? o->probe : "linear", NULL, true, error);
   if (status) return status;
   (void)parse(verb, o, &site, w);
   if (o->venous) w->pathology.venous_pressure_pa = atof(o->venous) * 133.322387415;

@@ -13,13 +13,14 @@
 static const double DEEPEST_M = 0.06; // how far a press to a force goes
 
 sonde_status settled_open(settled *s, const char *model, const char *probe,
-                          const sonde_preset *preset, sonde_error *error) {
+                          const sonde_preset *preset, bool needs_interior, sonde_error *error) {
   sonde_world_def world = sonde_world_def_default();
   sonde_status status = sonde_probe_create(probe, &s->probe, error);
   if (!status) status = sonde_model_load(model, &s->model, error);
   if (!status && preset) status = sonde_preset_apply(preset, s->model, &world, error);
   if (!status) status = sonde_state_create(s->model, &world, &s->state, error);
-  return status ? status : sonde_interior_create(s->model, &s->interior, error);
+  if (status || (!needs_interior && !s->model->femur.vertex_count)) return status;
+  return sonde_interior_create(s->model, &s->interior, error);
 }
 
 void settled_close(settled *s) {
@@ -126,6 +127,7 @@ void settled_json_jumps(const settled *s) {
 }
 
 void settled_update(const settled *s, const sonde_pathology *pathology, uint64_t tick) {
+  if (!s->interior) return;
   sonde_interior_update(s->interior, &(sonde_interior_input){sonde_state_positions(s->state),
                                                              sonde_state_contact_forces(s->state),
                                                              s->pose, pathology, -1, tick,

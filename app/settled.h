@@ -18,9 +18,10 @@ typedef struct settled {
   uint32_t iterations;    // of all settling
 } settled;
 
-// preset: of damping and friction; NULL: none
+// preset: of damping and friction; NULL: none. needs_interior: a model without a bone is refused;
+// else its interior is NULL.
 sonde_status settled_open(settled *s, const char *model, const char *probe,
-                          const sonde_preset *preset, sonde_error *error);
+                          const sonde_preset *preset, bool needs_interior, sonde_error *error);
 void settled_close(settled *s);
 // A site of the model, and the pose at rest there. @return SONDE_NOT_FOUND naming the model's file
 sonde_status settled_site(const settled *s, const char *model, long number, sonde_pose *above,

@@ -17,6 +17,7 @@
 #include "sonde/fit.h"
 #include "sonde/fit_confidence.h"
 #include "sonde/fit_plausible.h"
+#include "sonde/fit_sample.h"
 #include "sonde/robot.h"
 #include "sonde/identify.h"
 #include "sonde/report.h"

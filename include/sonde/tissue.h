@@ -117,7 +117,7 @@ typedef struct sonde_model_def {
   const sonde_mesh *skin;             /**< closed, outward, m */
   const sonde_mesh *fat_interface;    /**< skin/fat; NULL: 1.8 mm below the skin */
   const sonde_mesh *muscle_interface; /**< fat/muscle; NULL: 12 mm below the skin */
-  const sonde_mesh *femur;            /**< NULL: a cylinder of 14 mm along the long axis */
+  const sonde_mesh *femur;            /**< NULL: a rod inside a limb, else none; empty: none */
   const sonde_site *sites;
   uint32_t site_count;
   const sonde_datum *data;

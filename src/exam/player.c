@@ -38,7 +38,8 @@ static sonde_status create_session(sonde_player *player, const sonde_model *mode
   if (!status) status = sonde_session_create(&def, &device, &player->session, error);
   if (device.destroy) device.destroy(device.self);
   sonde_free(names);
-  if (!status) status = sonde_interior_keep_windows(player->session->interior, SHELF, error);
+  if (!status && player->session->interior)
+    status = sonde_interior_keep_windows(player->session->interior, SHELF, error);
   return status;
 }
 

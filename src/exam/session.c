@@ -111,7 +111,7 @@ static sonde_status create_boxes(sonde_session *session, sonde_error *error) {
 // One coupling per line of the image.
 static sonde_status create_lines(sonde_session *session, sonde_error *error) {
   uint32_t samples;
-  sonde_echo_envelope(session->echo, &session->lines, &samples);
+  if (session->echo) sonde_echo_envelope(session->echo, &session->lines, &samples);
   session->line_m = SONDE_NEW(sonde_vec3, session->lines);
   session->line_coupling = SONDE_NEW(float, session->lines);
   session->touched = SONDE_NEW(uint32_t, session->nodes);
@@ -124,9 +124,13 @@ static sonde_status create_parts(sonde_session *session, const sonde_session_def
   sonde_status status = create_probes(session, probe_names(def), error);
   if (!status)
     status = sonde_surface_index_create(&def->model->surface, &session->rest_skin, error);
-  if (!status) status = sonde_interior_create(def->model, &session->interior, error);
-  if (!status) status = sonde_interior_set_findings(session->interior, def->findings, error);
-  if (!status)
+  bool inside = def->model->femur.face_count > 0; // else forces only
+  if (!status && !inside && def->findings)
+    return sonde_fail(error, SONDE_MESH, "the model has no bone and no vessels for findings");
+  if (!status && inside) status = sonde_interior_create(def->model, &session->interior, error);
+  if (!status && inside)
+    status = sonde_interior_set_findings(session->interior, def->findings, error);
+  if (!status && inside)
     status = sonde_echo_create(session->interior, &(sonde_echo_def){0}, &session->echo, error);
   if (!status) status = create_boxes(session, error);
   if (!status) status = create_lines(session, error);

@@ -4,6 +4,7 @@
 // choose_beam, prepare_beam: the one asked for when it is due, else the last one; a share of it.
 // work_ahead:         in real time, between two images.
 // couple, volume:     what the gel does to the image, and how much there is.
+// render:             the image; a model without a bone has a black one.
 // fill_frame:         everything into one slot.
 // count_latency:      how old the frame's pose is when the frame is finished.
 // check_image:        hash of the pixels for the recording.
@@ -36,6 +37,7 @@ static double penetration(const sonde_session *session, sonde_pose pose) {
 
 static void update_interior(sonde_session *session, const unsigned char *slot) {
   const sonde_surface_slot *head = (const void *)slot;
+  if (!session->interior) return;
   const sonde_pathology *pathology = &head->controls.pathology;
   // another vein, not the same one in motion or under another pressure: it starts in equilibrium
   bool same =
@@ -65,7 +67,7 @@ static sonde_echo_settings with_beam(const sonde_session_beam *beam, sonde_echo_
 }
 
 static void prepare_beam(sonde_session *session, const sonde_echo_settings *asked, uint32_t steps) {
-  if (!session->building) return;
+  if (!session->building || !session->echo) return;
   sonde_echo_settings coming = with_beam(&session->coming, *asked);
   (void)sonde_echo_prepare(session->echo, session->coming.aperture_m, &coming, steps);
 }
@@ -91,6 +93,7 @@ static void choose_beam(sonde_session *session, const sonde_echo_settings *asked
 // Gel and air below each line of the image in use; returns their mean, NaN without gel.
 static double couple(sonde_session *session, const unsigned char *slot) {
   const sonde_surface_slot *head = (const void *)slot;
+  if (!session->echo) return (double)NAN;
   if (!head->controls.gel) {
     sonde_echo_set_coupling(session->echo, NULL);
     return (double)NAN;
@@ -118,6 +121,17 @@ static double volume(const sonde_session *session, const unsigned char *slot) {
   return sum;
 }
 
+static void render(sonde_session *session, const sonde_surface_slot *head, sonde_image *image) {
+  sonde_echo_settings settings = with_beam(&session->beam, head->controls.echo);
+  sonde_echo_flow flow = sonde_echo_flow_default();
+  flow.t_s = (double)head->snapshot.tick * session->dt_s;
+  if (session->subject->setup.circulate) flow.circulation = head->circulation;
+  sonde_echo_set_flow(session->echo, &flow);
+  sonde_echo_render(session->echo, head->snapshot.world_from_probe, session->beam.aperture_m,
+                    &head->pathology, &settings, image);
+  SONDE_ASSERT(sonde_interior_tick(session->interior) == head->snapshot.tick);
+}
+
 static void fill_frame(sonde_session *session, const unsigned char *slot, unsigned char *out) {
   const sonde_surface_slot *head = (const void *)slot;
   const sonde_vec3 *positions_m = (const void *)(slot + session->positions_at);
@@ -131,14 +145,10 @@ static void fill_frame(sonde_session *session, const unsigned char *slot, unsign
                        .height = session->image_height,
                        .pixels = out + session->pixels_at};
   double coupling = couple(session, slot);
-  sonde_echo_settings settings = with_beam(&session->beam, head->controls.echo);
-  sonde_echo_flow flow = sonde_echo_flow_default();
-  flow.t_s = (double)head->snapshot.tick * session->dt_s;
-  if (session->subject->setup.circulate) flow.circulation = head->circulation;
-  sonde_echo_set_flow(session->echo, &flow);
-  sonde_echo_render(session->echo, head->snapshot.world_from_probe, session->beam.aperture_m,
-                    &head->pathology, &settings, &image);
-  SONDE_ASSERT(sonde_interior_tick(session->interior) == head->snapshot.tick);
+  if (session->echo)
+    render(session, head, &image);
+  else
+    memset(image.pixels, 0, (size_t)image.width * image.height);
   sonde_frame *frame = (sonde_frame *)(void *)out;
   *frame = (sonde_frame){.snapshot = head->snapshot,
                          .skin_m = skin_m,
@@ -152,7 +162,7 @@ static void fill_frame(sonde_session *session, const unsigned char *slot, unsign
   frame->snapshot.venous_pressure_pa = head->pathology.venous_pressure_pa;
   frame->snapshot.arterial_pressure_pa = head->pathology.arterial_pressure_pa;
   frame->snapshot.penetration_m = penetration(session, head->snapshot.world_from_probe);
-  sonde_snapshot_read_vessels(session->interior, &frame->snapshot);
+  if (session->interior) sonde_snapshot_read_vessels(session->interior, &frame->snapshot);
 }
 
 static void count_latency(sonde_session *session, double pose_s) {
@@ -202,7 +212,7 @@ void sonde_session_draw(sonde_session *session) {
 // more than an image's share, so that nothing is left when it is due.
 static void work_ahead(sonde_session *session) {
   const sonde_surface_slot *head = (const void *)session->surface;
-  sonde_interior_build_ahead(session->interior);
+  if (session->interior) sonde_interior_build_ahead(session->interior);
   prepare_beam(session, &head->controls.echo, BEAM_STEPS + 1);
 }
 

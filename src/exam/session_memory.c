@@ -15,7 +15,7 @@ void sonde_session_remember_image(const sonde_session *session, sonde_image_memo
   memory->beam_images = session->beam_images, memory->shown_tick = session->shown_tick;
   memory->shown_pathology = session->shown_pathology;
   memory->beam = session->beam, memory->coming = session->coming;
-  sonde_interior_remember(session->interior, &memory->interior);
+  if (session->interior) sonde_interior_remember(session->interior, &memory->interior);
 }
 
 static bool beam_usable(const sonde_session_beam *beam, bool any) {
@@ -36,7 +36,8 @@ sonde_status sonde_session_recall(sonde_session *session, const sonde_tick_memor
       !beam_usable(&inside->beam, inside->shown) || !beam_usable(&inside->coming, inside->building))
     return sonde_fail(error, SONDE_FORMAT, "the keyframe is damaged");
   sonde_status status = sonde_subject_recall(session->subject, world, world_bytes, error);
-  if (!status) status = sonde_interior_recall(session->interior, &inside->interior, error);
+  if (!status && session->interior)
+    status = sonde_interior_recall(session->interior, &inside->interior, error);
   if (status) return status;
   session->controls =
       sonde_controls_clean(&inputs->controls, &session->controls, session->probe_count);

@@ -71,7 +71,7 @@ static sonde_status read_header(sonde_csv *csv, sonde_error *error) {
   return SONDE_OK;
 }
 
-sonde_status sonde_csv_open(sonde_csv *csv, const char *path, sonde_error *error) {
+static sonde_status load(sonde_csv *csv, const char *path, sonde_error *error) {
   *csv = (sonde_csv){.path = path};
   size_t bytes;
   sonde_status status =
@@ -80,7 +80,21 @@ sonde_status sonde_csv_open(sonde_csv *csv, const char *path, sonde_error *error
   csv->cursor = csv->text;
   csv->end = csv->text + bytes;
   if (bytes >= 3 && !memcmp(csv->text, "\xEF\xBB\xBF", 3)) csv->cursor += 3;
-  return read_header(csv, error);
+  return SONDE_OK;
+}
+
+sonde_status sonde_csv_open(sonde_csv *csv, const char *path, sonde_error *error) {
+  sonde_status status = load(csv, path, error);
+  return status ? status : read_header(csv, error);
+}
+
+sonde_status sonde_csv_open_after(sonde_csv *csv, const char *path,
+                                  bool (*is_header)(const sonde_csv *csv, void *user), void *user,
+                                  sonde_error *error) {
+  sonde_status status = load(csv, path, error);
+  if (!status) status = read_header(csv, error);
+  while (!status && !is_header(csv, user)) status = read_header(csv, error);
+  return status;
 }
 
 void sonde_csv_close(sonde_csv *csv) {

@@ -18,6 +18,11 @@ typedef struct sonde_csv {
 
 // Loads the file and reads the header line. Close also after a failure.
 sonde_status sonde_csv_open(sonde_csv *csv, const char *path, sonde_error *error);
+// The same for a table whose header follows other lines: the first line whose cells (in csv->name)
+// is_header() accepts. FORMAT when there is none.
+sonde_status sonde_csv_open_after(sonde_csv *csv, const char *path,
+                                  bool (*is_header)(const sonde_csv *csv, void *user), void *user,
+                                  sonde_error *error);
 void sonde_csv_close(sonde_csv *csv);
 // Column of a name; UINT32_MAX when there is none.
 uint32_t sonde_csv_column(const sonde_csv *csv, const char *name);

@@ -6,6 +6,7 @@
 // judge_zero:       forces extrapolated to zero depth, by probe.
 #include "fit/plausible.h"
 #include "fit/fit_inside.h"
+#include "sonde/fit_sample.h"
 
 #include "base/maths.h"
 #include "base/order.h"
@@ -441,5 +442,25 @@ sonde_status sonde_measurements_examine(const sonde_measurements *m, sonde_doubt
     judge_zero(&list, doubts);
   }
   clear_list(&list);
+  return status;
+}
+
+sonde_status sonde_sample_examine(const sonde_sample *sample, sonde_doubts *doubts,
+                                  sonde_error *error) {
+  sonde_measurements m = {.count = sample->count, .data = SONDE_NEW(sonde_datum, sample->count)};
+  courses list;
+  if (!m.data) return sonde_fail_memory(error);
+  for (uint32_t i = 0; i < m.count; ++i)
+    m.data[i] = (sonde_datum){
+        .penetration_m = sample->compression_m[i], .force_n = sample->force_n[i], .probe = "point"};
+  sonde_status status = curve_list(&m, &list, error);
+  uint32_t before = doubts->count;
+  for (uint32_t k = 0; k < list.count && !status; ++k) {
+    judge_course(&m, &list.curve[k], doubts);
+    if (doubts->count == before) judge_stiffening(&m, &list.curve[k], doubts);
+  }
+  for (uint32_t k = before; k < doubts->count; ++k) doubts->doubt[k].site = UINT32_MAX;
+  clear_list(&list);
+  sonde_free(m.data);
   return status;
 }

@@ -2,7 +2,7 @@
 //
 // sonde_columns_create  all of the below
 // find_axis             femur axis and radius from the moments of its surface
-// find_extent           rows of the table between the leg's ends
+// find_extent           rows of the table between the leg's ends, where the axis is inside
 // cast_columns          skin point of every column
 // slope_columns         derivatives of R, outward flux vectors
 // store_field           the constant half of the evaluation's table
@@ -73,6 +73,32 @@ static sonde_status find_axis(sonde_interior *in, sonde_error *error) {
   return SONDE_OK;
 }
 
+static sonde_vec3 spoke(const sonde_interior *in, double theta) {
+  return v_add(v_scale(in->e1, cos(theta)), v_scale(in->e2, sin(theta)));
+}
+
+// Whether the axis is inside the skin at s, with room for the bone to all sides.
+static bool holds_bone(const sonde_interior *in, double s) {
+  enum { RAYS = THETA_COUNT / 2 };
+  sonde_vec3 from = v_madd(in->origin, s, in->axis);
+  if (!sonde_surface_inside(in->skin, from)) return false;
+  for (int k = 0; k < RAYS; ++k) {
+    sonde_surface_point hit;
+    if (!sonde_surface_raycast(in->skin, from, spoke(in, 2 * SONDE_PI * k / RAYS), 1.0, &hit))
+      return false;
+    if (!(hit.distance_m > in->bone_radius_m * 1.1)) return false;
+  }
+  return true;
+}
+
+// The skin of a whole leg bends away from the axis of a part: only as far as the axis stays inside.
+static double clip_end(const sonde_interior *in, double end) {
+  double step = end < 0 ? -row_step_m : row_step_m, last = end - copysign(end_margin_m, end);
+  for (double s = 0; fabs(s) < fabs(last); s += step)
+    if (!holds_bone(in, s)) return s;
+  return holds_bone(in, last) ? end : last;
+}
+
 static sonde_status find_extent(sonde_interior *in, sonde_error *error) {
   const sonde_mesh *skin = &in->model->surface;
   double low = INFINITY, high = -INFINITY;
@@ -80,6 +106,7 @@ static sonde_status find_extent(sonde_interior *in, sonde_error *error) {
     double s = v_dot(v_sub(skin->vertices[v], in->origin), in->axis);
     low = fmin(low, s), high = fmax(high, s);
   }
+  low = clip_end(in, low), high = clip_end(in, high);
   if (!(high - low > 4 * end_margin_m))
     return sonde_fail(error, SONDE_MESH, "the skin is shorter than %g m along the femur",
                       4 * end_margin_m);
@@ -93,10 +120,6 @@ static sonde_status find_extent(sonde_interior *in, sonde_error *error) {
   in->theta_count = THETA_COUNT;
   in->theta_step = 2 * SONDE_PI / THETA_COUNT;
   return SONDE_OK;
-}
-
-static sonde_vec3 spoke(const sonde_interior *in, double theta) {
-  return v_add(v_scale(in->e1, cos(theta)), v_scale(in->e2, sin(theta)));
 }
 
 static sonde_status cast_columns(sonde_interior *in, sonde_error *error) {

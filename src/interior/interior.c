@@ -9,6 +9,9 @@
 static sonde_status check_model(const sonde_model *model, sonde_error *error) {
   if (model == NULL || model->surface.face_count == 0)
     return sonde_fail(error, SONDE_ARGUMENT, "expected a model with a skin");
+  if (model->femur.face_count == 0)
+    return sonde_fail(error, SONDE_MESH,
+                      "the model has no bone, and so no vessels and no image: fit it with --femur");
   if (model->fat_depth_m == NULL || model->muscle_depth_m == NULL)
     return sonde_fail(error, SONDE_ARGUMENT, "expected a model with layer depths per node");
   return SONDE_OK;

@@ -188,40 +188,6 @@ static sonde_status copy_sites(sonde_model *model, const sonde_model_def *def, s
   return SONDE_OK;
 }
 
-// A straight rod along the examined leg, used when no femur is given.
-static sonde_status default_femur(sonde_model *model, sonde_error *error) {
-  enum { SIDES = 24 };
-  const double radius_m = 0.014;
-  sonde_leg_axis axis = sonde_model_axis(model);
-  double low = 0, high = 0;
-  for (uint32_t i = 0; i < model->surface.vertex_count; ++i) {
-    double along = v_dot(v_sub(model->surface.vertices[i], axis.origin), axis.direction);
-    low = fmin(low, along);
-    high = fmax(high, along);
-  }
-  sonde_status status = sonde_mesh_create(&model->femur, 2 * SIDES + 2, 4 * SIDES, error);
-  if (status) return status;
-  sonde_vec3 p = v_unit(v_cross(axis.direction, vec3(1, 0.1, 0)), vec3(0, 1, 0));
-  sonde_vec3 q = v_cross(axis.direction, p);
-  sonde_vec3 end[2] = {v_madd(axis.origin, low, axis.direction),
-                       v_madd(axis.origin, high, axis.direction)};
-  for (uint32_t k = 0; k < SIDES; ++k) {
-    double angle = 2 * SONDE_PI * k / SIDES;
-    sonde_vec3 r = v_add(v_scale(p, radius_m * cos(angle)), v_scale(q, radius_m * sin(angle)));
-    uint32_t next = (k + 1) % SIDES, f = 4 * k;
-    for (uint32_t side = 0; side < 2; ++side)
-      model->femur.vertices[2 * k + side] = v_add(end[side], r);
-    const uint32_t face[4][3] = {{2 * k, 2 * next, 2 * k + 1},
-                                 {2 * next, 2 * next + 1, 2 * k + 1},
-                                 {2 * SIDES, 2 * next, 2 * k},
-                                 {2 * SIDES + 1, 2 * k + 1, 2 * next + 1}};
-    memcpy(model->femur.faces[f], face, sizeof face);
-  }
-  model->femur.vertices[2 * SIDES] = end[0];
-  model->femur.vertices[2 * SIDES + 1] = end[1];
-  return SONDE_OK;
-}
-
 // Numbers the vertices along a space-filling curve, so that neighbours lie together in memory.
 static sonde_status order_vertices(sonde_mesh *mesh, sonde_error *error) {
   uint32_t n = mesh->vertex_count;
@@ -251,6 +217,7 @@ static sonde_status fill(sonde_model *model, const sonde_model_def *def, sonde_e
   snprintf(model->provenance, sizeof model->provenance, "%s",
            def->provenance ? def->provenance : "");
   model->law = def->law;
+  model->vein.count = model->artery.count = 0;
   sonde_status status = check_skin(def->skin, error);
   if (!status) status = copy_sites(model, def, error);
   if (!status)
@@ -261,11 +228,12 @@ static sonde_status fill(sonde_model *model, const sonde_model_def *def, sonde_e
   if (!status) status = sonde_model_derive(model, error);
   if (!status)
     status = def->femur ? sonde_mesh_copy(def->femur, &model->femur, error)
-                        : default_femur(model, error);
+                        : sonde_model_place_rod(model, error);
   if (!status)
     status = sonde_model_measure_layers(model, def->fat_interface, def->muscle_interface, error);
   if (!status) status = sonde_model_interpolate(model, error);
-  if (!status) status = sonde_model_place_vessels(model, error);
+  if (!status && model->femur.vertex_count)
+    status = sonde_model_place_vessels(model, def->femur == NULL, error);
   return status;
 }
 

@@ -15,8 +15,11 @@ sonde_status sonde_model_measure_layers(sonde_model *model, const sonde_mesh *fa
                                         const sonde_mesh *muscle, sonde_error *error);
 // The sites' parameters carried to every node by kriging of their logarithms.
 sonde_status sonde_model_interpolate(sonde_model *model, sonde_error *error);
-// Femoral vein and artery below the examined area.
-sonde_status sonde_model_place_vessels(sonde_model *model, sonde_error *error);
+// Femoral vein and artery below the examined area; beside_bone: no farther than the bone reaches.
+sonde_status sonde_model_place_vessels(sonde_model *model, bool beside_bone, sonde_error *error);
+// A rod for a bone, along the middles of the sections near the sites and inside the skin; a warning
+// and no bone where the body is no limb.
+sonde_status sonde_model_place_rod(sonde_model *model, sonde_error *error);
 // Middle line of the leg through the femur (or the skin when there is none).
 typedef struct sonde_leg_axis {
   sonde_vec3 origin, direction;

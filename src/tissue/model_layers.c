@@ -31,8 +31,25 @@ static sonde_status measure_interface(sonde_model *model, const sonde_mesh *mesh
   return SONDE_OK;
 }
 
+// Without a bone: half the way to the other side of the body.
+static sonde_status measure_body(sonde_model *model, sonde_error *error) {
+  const double skip_m = 1e-4, far_m = 1;
+  sonde_surface_index *index;
+  sonde_status status = sonde_surface_index_create(&model->surface, &index, error);
+  if (status) return status;
+  for (uint32_t i = 0; i < model->surface.vertex_count; ++i) {
+    sonde_vec3 in = v_neg(model->normal[i]), p = model->surface.vertices[i];
+    sonde_surface_point hit;
+    bool found = sonde_surface_raycast(index, v_madd(p, skip_m, in), in, far_m, &hit);
+    model->bone_depth_m[i] = found ? 0.5 * (hit.distance_m + skip_m) : skip_m;
+  }
+  sonde_surface_index_destroy(index);
+  return SONDE_OK;
+}
+
 static sonde_status measure_bone(sonde_model *model, sonde_error *error) {
   sonde_surface_index *index;
+  if (!model->femur.vertex_count) return measure_body(model, error);
   sonde_status status = sonde_surface_index_create(&model->femur, &index, error);
   if (status) return status;
   for (uint32_t i = 0; i < model->surface.vertex_count; ++i)
@@ -140,7 +157,7 @@ static double along_axis(const sonde_leg_axis *axis, sonde_vec3 point) {
   return v_dot(v_sub(point, axis->origin), axis->direction);
 }
 
-sonde_status sonde_model_place_vessels(sonde_model *model, sonde_error *error) {
+sonde_status sonde_model_place_vessels(sonde_model *model, bool beside_bone, sonde_error *error) {
   sonde_surface_index *skin;
   sonde_status status = sonde_surface_index_create(&model->surface, &skin, error);
   if (status) return status;
@@ -154,9 +171,10 @@ sonde_status sonde_model_place_vessels(sonde_model *model, sonde_error *error) {
     low = fmin(low, along_axis(&c.axis, model->sites[k].position_m));
     high = fmax(high, along_axis(&c.axis, model->sites[k].position_m));
   }
-  for (uint32_t i = 0; i < model->surface.vertex_count; ++i) {
-    end_low = fmin(end_low, along_axis(&c.axis, model->surface.vertices[i]));
-    end_high = fmax(end_high, along_axis(&c.axis, model->surface.vertices[i]));
+  const sonde_mesh *ends = beside_bone ? &model->femur : &model->surface;
+  for (uint32_t i = 0; i < ends->vertex_count; ++i) {
+    end_low = fmin(end_low, along_axis(&c.axis, ends->vertices[i]));
+    end_high = fmax(end_high, along_axis(&c.axis, ends->vertices[i]));
   }
   double from = fmax(low - 0.04, end_low + 0.005), to = fmin(high + 0.04, end_high - 0.005);
   model->vein.count = model->artery.count = 0;
