@@ -16,7 +16,7 @@
 static const char VERB[] = "fit";
 static const char HELP[] =
     "usage: sonde fit MEASUREMENTS.csv --surface SKIN.ply --sites SITES.csv -o MODEL [options]\n"
-    "       sonde fit --sample TABLE.csv [--exponent 1|2|3] [--area-mm2 A --height-mm H] [--json]\n"
+    "       sonde fit --sample TABLE.csv [--exponent N] [--area-mm2 A --height-mm H] [--json]\n"
     "\n"
     "Estimates the normal springs f(x) = x/(a x + b) of every site (stage 1: every curve by "
     "itself;\n"
@@ -44,8 +44,8 @@ static const char HELP[] =
     "  --loss KIND       squares (default), huber or student\n"
     "  --pretension      estimate an edge pre-tension too\n"
     "  --cold-start      start stage 2 from generic values instead of stage 1\n"
-    "  --exponent N      of the normal springs k0 x/(1 - (x/xm)^N) in stage 3: 1, 2 (default) or "
-    "3\n"
+    "  --exponent N      of the normal springs k0 x/(1 - (x/xm)^N) in stage 3: 1, 2 (default),\n"
+    "                    3, or auto: the one with the least error on sites left out\n"
     "  --inplane-n-m K   in-plane stiffness of the skin in stage 3, 0 to 1e4; default 35, chosen\n"
     "  --tangential-n-m3 G  stiffness per area against sliding along the skin, 0 to 1e8; default\n"
     "                    1e5, chosen\n"
@@ -98,12 +98,15 @@ typedef struct fit_skin {
   bool other; // no limb
 } fit_skin;
 
+static const char CHOOSE[] = "auto"; // of --exponent
+
 // All that was found.
 typedef struct fit_outcome {
   sonde_fit_result result;
   sonde_error_report hold_out, also;
   fit_checks checks;
   sonde_doubts doubts;
+  sonde_fit_exponent tried[SONDE_FIT_EXPONENTS]; // with --exponent auto
 } fit_outcome;
 
 typedef struct fit_inputs {
@@ -208,6 +211,10 @@ static bool parse_checks(const fit_arguments *a, long stages, fit_checks *checks
   return true;
 }
 
+static bool chooses_exponent(const fit_arguments *a) {
+  return a->exponent && strcmp(a->exponent, CHOOSE) == 0;
+}
+
 static bool parse_fit(const fit_arguments *a, sonde_fit_def *def, fit_skin *skin,
                       fit_checks *checks) {
   static const char *const WEIGHTS[] = {"absolute", "relative", NULL};
@@ -230,7 +237,12 @@ static bool parse_fit(const fit_arguments *a, sonde_fit_def *def, fit_skin *skin
   skin->other = body == 1;
   *def = sonde_fit_def_default();
   long exponent = (long)def->normal_exponent;
-  if (a->exponent && !app_parse_integer(VERB, "--exponent", a->exponent, 1, 3, &exponent))
+  if (chooses_exponent(a) && stages < 3) {
+    app_usage_error(VERB, "--exponent auto needs --stages 3");
+    return false;
+  }
+  if (a->exponent && !chooses_exponent(a) &&
+      !app_parse_integer(VERB, "--exponent", a->exponent, 1, 3, &exponent))
     return false;
   if (a->smoothness &&
       !app_parse_real(VERB, "--smoothness", a->smoothness, 1e-4, 10, &def->smoothness_sd))
@@ -387,15 +399,20 @@ static sonde_status examine_result(const fit_arguments *a, const fit_inputs *in,
   return status;
 }
 
-static sonde_status fit_model(const fit_arguments *a, const fit_inputs *in,
-                              const sonde_fit_def *def, const fit_skin *skin, fit_outcome *out,
-                              sonde_error *error) {
+// def's exponent becomes the chosen one, which the checks after the fit need.
+static sonde_status fit_model(const fit_arguments *a, const fit_inputs *in, sonde_fit_def *def,
+                              const fit_skin *skin, fit_outcome *out, sonde_error *error) {
   sonde_model *model = NULL;
   sonde_fit_result *result = &out->result;
   sonde_progress progress = app_progress();
   sonde_status status = build_model(a, in, skin, &model, error);
-  if (!status)
+  if (!status && chooses_exponent(a)) {
+    status = sonde_fit_exponents(model, &in->sites, &in->measurements, def, &progress, out->tried,
+                                 result, error);
+    if (!status) def->normal_exponent = result->law.normal_exponent;
+  } else if (!status) {
     status = sonde_fit(model, &in->sites, &in->measurements, def, &progress, result, error);
+  }
   app_progress_end();
   if (!status) status = examine_result(a, in, model, out, error);
   if (!status)
@@ -477,6 +494,19 @@ static void print_json(const fit_arguments *a, const sonde_measurements *data,
     }
     app_json_close();
   }
+  if (out->tried[0].exponent > 0) {
+    static const char *const KEY[SONDE_FIT_EXPONENTS] = {"n1", "n2", "n3"};
+    app_json_object("exponents");
+    for (int k = 0; k < SONDE_FIT_EXPONENTS; ++k) {
+      app_json_object(KEY[k]);
+      app_json_real("mae_percent", out->tried[k].mae_percent);
+      app_json_real("held_out_percent", out->tried[k].held_out_percent);
+      app_json_bool("converged", out->tried[k].converged);
+      app_json_close();
+    }
+    app_json_close();
+  }
+  app_json_real("normal_exponent", r->law.normal_exponent);
   fit_checks_print_json(&out->checks);
   fit_tables_print_json(data, def, r);
   fit_doubts_print_json(&out->doubts, a->measurements);
@@ -515,6 +545,10 @@ static void print_table(const fit_arguments *a, const sonde_measurements *data,
              c->tried_percent[k]);
     if (c->tried_count) printf("\n");
     app_print_report("one site left out (linearised)", &c->one_out);
+    for (int k = 0; k < SONDE_FIT_EXPONENTS && out->tried[0].exponent > 0; ++k)
+      printf("exponent %g: %.2f %%, one site left out %.2f %%%s\n", out->tried[k].exponent,
+             out->tried[k].mae_percent, out->tried[k].held_out_percent,
+             out->tried[k].exponent == r->law.normal_exponent ? " (kept)" : "");
     printf("shear stiffness %.3f N/m, limit %.3f, in-plane stiffness %.3g N/m, %u iterations\n",
            r->law.shear_stiffness_n_m, r->law.shear_limit, r->law.inplane_stiffness_n_m,
            r->iterations);
@@ -537,7 +571,8 @@ static int run_sample(const fit_arguments *a) {
   double area_mm2 = 0, height_mm = 0;
   if (a->measurements || a->surface || a->sites || a->output)
     return app_usage_error(VERB, "--sample goes without measurements, surface, sites and model");
-  if ((a->exponent && !app_parse_integer(VERB, "--exponent", a->exponent, 1, 3, &exponent)) ||
+  if ((a->exponent && !chooses_exponent(a) &&
+       !app_parse_integer(VERB, "--exponent", a->exponent, 1, 3, &exponent)) ||
       (a->area && !app_parse_real(VERB, "--area-mm2", a->area, 1, 1e6, &area_mm2)) ||
       (a->height && !app_parse_real(VERB, "--height-mm", a->height, 0.1, 1e3, &height_mm)))
     return APP_BAD_INPUT;

@@ -145,6 +145,28 @@ SONDE_API sonde_status sonde_fit_layers(const sonde_model *model, const sonde_si
                                         const sonde_progress *progress, sonde_fit_layer *layers,
                                         sonde_error *error);
 
+enum { SONDE_FIT_EXPONENTS = 3 };
+/** Stage 3 with springs of one exponent n = 1, 2, 3. */
+typedef struct sonde_fit_exponent {
+  double exponent;
+  double mae_percent;      /**< mean over the probes of MAE over the probe's mean force */
+  double held_out_percent; /**< the same, each site predicted without its own rows (linearised) */
+  bool converged;
+} sonde_fit_exponent;
+
+/**
+ * Fits all three stages with each exponent and keeps the result with the least held-out error; its
+ * law has that exponent. docs/fit.md.
+ * @param def stages and normal_exponent are not used
+ * @param tried [SONDE_FIT_EXPONENTS] in the order n = 1, 2, 3
+ * @return as sonde_fit() @thread owner
+ */
+SONDE_API sonde_status sonde_fit_exponents(const sonde_model *model, const sonde_site_table *sites,
+                                           const sonde_measurements *measurements,
+                                           const sonde_fit_def *def, const sonde_progress *progress,
+                                           sonde_fit_exponent *tried, sonde_fit_result *result,
+                                           sonde_error *error);
+
 #ifdef __cplusplus
 }
 #endif

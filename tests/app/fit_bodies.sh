@@ -22,6 +22,13 @@ for body in forearm leg; do
 done
 fit dome dome.sonde
 fit forearm other.sonde --body other
+# The exponent kept by `--exponent auto` is the one of the least held-out error, and the model's.
+gives 'exponents.n1.held_out_percent>=0 exponents.n3.held_out_percent>=0 normal_exponent>=1' fit "$work/in/forearm/ind.csv" \
+  --surface "$work/in/forearm/skin.ply" --sites "$work/in/forearm/sites.csv" --stages 3 --exponent auto \
+  --smoothness 0.1 --fine-mm 6 --json -o auto.sonde
+rm -f auto.sonde
+rejects 'auto needs --stages 3' fit "$work/in/forearm/ind.csv" --surface "$work/in/forearm/skin.ply" \
+  --sites "$work/in/forearm/sites.csv" --exponent auto -o never.sonde
 rm -f ./*.png
 for model in dome other; do
   usable $model.sonde
