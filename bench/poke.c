@@ -1,5 +1,5 @@
 // Random poking (poke.h).
-// uniform:    numbers that repeat.
+// poke_uniform:   numbers that repeat.
 // turn, aim:  rotations as quaternions; z of the probe looks into the skin.
 // choose:     the next move: press, slide, tilt, lift, hold, tremble or jump.
 // forward:    the law of the push.
@@ -9,7 +9,7 @@
 
 poke_def poke_def_default(void) { return (poke_def){1e-3, 1, 0.05, 100}; }
 
-static double uniform(poke *p, double low, double high) {
+double poke_uniform(poke *p, double low, double high) {
   p->random = p->random * 6364136223846793005u + 1442695040888963407u;
   return low + (high - low) * (double)(p->random >> 11) / 9007199254740992.0;
 }
@@ -55,10 +55,10 @@ static sonde_pose pose_of(const poke *p) {
 
 // Above another place, or already in it.
 static void jump(poke *p, double depth_m) {
-  p->site = &p->model->sites[(uint32_t)uniform(p, 0, p->model->site_count)];
+  p->site = &p->model->sites[(uint32_t)poke_uniform(p, 0, p->model->site_count)];
   p->at[0] = p->goal[0] = depth_m;
   for (int k = 1; k < 6; ++k)
-    p->at[k] = p->goal[k] = k < 3 ? uniform(p, -0.02, 0.02) : uniform(p, -0.5, 0.5);
+    p->at[k] = p->goal[k] = k < 3 ? poke_uniform(p, -0.02, 0.02) : poke_uniform(p, -0.5, 0.5);
 }
 
 // The ticks that the way takes at a speed; turns count 5 cm per radian.
@@ -69,26 +69,26 @@ static void start_move(poke *p, double speed_m_s) {
 }
 
 static void choose(poke *p) {
-  double fastest = p->def.fastest_m_s, speed = fastest * pow(0.01, uniform(p, 0, 1));
+  double fastest = p->def.fastest_m_s, speed = fastest * pow(0.01, poke_uniform(p, 0, 1));
   double deepest = p->def.deepest_m;
-  int kind = (int)uniform(p, 0, 12);
+  int kind = (int)poke_uniform(p, 0, 12);
   if (kind < 4) {
-    p->goal[0] = uniform(p, -0.005, deepest);
+    p->goal[0] = poke_uniform(p, -0.005, deepest);
   } else if (kind < 6) {
-    for (int k = 1; k < 3; ++k) p->goal[k] = uniform(p, -0.04, 0.04);
+    for (int k = 1; k < 3; ++k) p->goal[k] = poke_uniform(p, -0.04, 0.04);
   } else if (kind < 8) {
-    for (int k = 3; k < 6; ++k) p->goal[k] = uniform(p, -0.7, 0.7);
+    for (int k = 3; k < 6; ++k) p->goal[k] = poke_uniform(p, -0.7, 0.7);
   } else if (kind == 8) {
     p->goal[0] = -0.01, speed = fastest;
   } else if (kind == 9) {
-    p->left = (uint32_t)uniform(p, 1, 200);
+    p->left = (uint32_t)poke_uniform(p, 1, 200);
     return;
   } else if (kind == 10) {
-    for (int k = 0; k < 3; ++k) p->goal[k] = p->at[k] + uniform(p, -0.001, 0.001);
+    for (int k = 0; k < 3; ++k) p->goal[k] = p->at[k] + poke_uniform(p, -0.001, 0.001);
     speed = fastest;
   } else {
-    jump(p, uniform(p, -0.005, 0.3 * deepest));
-    p->left = (uint32_t)uniform(p, 1, 50);
+    jump(p, poke_uniform(p, -0.005, 0.3 * deepest));
+    p->left = (uint32_t)poke_uniform(p, 1, 50);
     return;
   }
   start_move(p, speed);
@@ -96,7 +96,7 @@ static void choose(poke *p) {
 
 poke poke_begin(const sonde_model *model, const poke_def *def, uint64_t seed) {
   poke p = {.model = model, .def = *def, .random = seed * 0x9e3779b97f4a7c15u + 1};
-  for (int k = 0; k < 8; ++k) uniform(&p, 0, 1);
+  for (int k = 0; k < 8; ++k) poke_uniform(&p, 0, 1);
   jump(&p, -0.005);
   return p;
 }

@@ -25,6 +25,8 @@ typedef struct poke {
 poke_def poke_def_default(void);
 // Starts 5 mm above a random site. @param model borrowed
 poke poke_begin(const sonde_model *model, const poke_def *def, uint64_t seed);
+// The next number of the path's own sequence, from low to high.
+double poke_uniform(poke *path, double low, double high);
 // Pose of the next tick, after the force of the last was felt.
 sonde_pose poke_next(poke *path, double felt_n);
 

@@ -21,7 +21,7 @@
 #include <string.h>
 
 enum { NT = SONDE_WINDOW_THETA, NS = SONDE_WINDOW_S, NL = SONDE_WINDOW_LEVELS };
-enum { SWEEPS = 80, STEPS = 12 };
+enum { SWEEPS = 160, STEPS = 12 };
 
 static const double stiff_from = 0.55;   // compressive strain beyond which a layer stiffens
 static const double least_column = 0.12; // of a column's height at rest

@@ -27,11 +27,13 @@ static const double plane_reach_m = 40e-3;
 static const double gradient_reach = 1.5, bend_reach = 2.5; // rest radii: where the field is read
 static const double most_squeeze = 2.2; // a lumen's semi-axis over the tissue's stretch, rest radii
 static const double least_tissue = 0.1, most_turn = 0.5; // of the gradient beside a wall
+static const double most_shear = 1;                      // over the stretch along the other axis
 static const double gap_share = 0.4, side_by_side = 0.7;
 static const double gentle_squeeze = 0.45, gentle_bend = 0.08, probing_m = 0.1e-3;
 static const double least_area_share = 0.06;
 enum { PASSES = 10 };
-static const double bend_share = 0.4; // of the tissue's least stretch that a bend may take
+static const double bend_share = 0.2;   // of the tissue's least stretch that a bend may take
+static const double beyond_share = 0.5; // of the way to where the field is read: the next ring
 
 // Equivalent load of a probe on the skin, in the probe frame.
 typedef struct load {
@@ -180,7 +182,9 @@ static void update_station(sonde_interior *in, uint32_t which, uint32_t i, const
 }
 
 // Gradient f of the field across a vessel, over points on both sides of it, as a turn and a lower
-// triangle. A wall that keeps its shape in tissue that is squeezed flat bounds the squeeze.
+// triangle. A wall that keeps its shape in tissue that is squeezed flat bounds the squeeze. The
+// shear ends beside the wall: its bound keeps the tissue there, which it shears unevenly, from
+// folding.
 static void split_gradient(double f[2][2], sonde_vessel_state *v) {
   SONDE_ASSERT(v->rest_radius_m > 0);
   double least_short = v->half_short_m / (most_squeeze * v->rest_radius_m);
@@ -191,7 +195,10 @@ static void split_gradient(double f[2][2], sonde_vessel_state *v) {
   v->tissue_turn = half;
   v->tissue_short = fmax(size, fmax(least_short, least_tissue));
   v->tissue_long = fmax(f[1][0] * sine + f[1][1] * cosine, fmax(least_long, least_tissue));
-  v->tissue_shear = f[1][0] * cosine - f[1][1] * sine;
+  double bound = most_shear * v->tissue_long;
+  double narrow = least_short / v->tissue_short * v->tissue_long / least_long;
+  if (narrow > 1) bound /= narrow;
+  v->tissue_shear = clamp(f[1][0] * cosine - f[1][1] * sine, -bound, bound);
 }
 
 // The field beside a wall differs from its gradient by a bend that ends at the wall. Where tissue
@@ -201,7 +208,7 @@ static bool find_tissue(const sonde_interior *in, sonde_vessel_state *v) {
   enum { SIDES = 8 };
   v->tissue_short = v->tissue_long = v->tissue_even = 1, v->tissue_shear = v->tissue_turn = 0;
   if (!(v->lead > 0)) return false;
-  double f[2][2], most = 0;
+  double f[2][2], most = 0, thin = INFINITY;
   sonde_vec3 side[2] = {v->flat_axis, v_cross(v->axis, v->flat_axis)};
   const double near = gradient_reach * v->rest_radius_m, far = bend_reach * v->rest_radius_m;
   for (int k = 0; k < 2; ++k) {
@@ -215,11 +222,15 @@ static bool find_tissue(const sonde_interior *in, sonde_vessel_state *v) {
     double x = far * cos(2 * SONDE_PI * k / SIDES), y = far * sin(2 * SONDE_PI * k / SIDES);
     double a = x, b = y;
     sonde_vec3 at = v_madd(v_madd(v->rest_centre_m, x, side[0]), y, side[1]);
-    sonde_vec3 u = v_sub(sonde_interior_field(in, at), v_sub(v->centre_m, v->rest_centre_m));
+    sonde_vec3 beyond = v_madd(v_madd(at, beyond_share * x, side[0]), beyond_share * y, side[1]);
+    sonde_vec3 field = sonde_interior_field(in, at);
+    sonde_vec3 u = v_sub(field, v_sub(v->centre_m, v->rest_centre_m));
+    sonde_vec3 apart = v_add(v_sub(beyond, at), v_sub(sonde_interior_field(in, beyond), field));
+    thin = fmin(thin, v_norm(apart) / (beyond_share * far));
     sonde_vessel_tissue(v, &a, &b);
     most = fmax(most, hypot(v_dot(u, side[0]) - a + x, v_dot(u, side[1]) - b + y));
   }
-  double bound = bend_share * fmin(v->tissue_short, v->tissue_long) * far;
+  double bound = bend_share * fmin(thin, fmin(v->tissue_short, v->tissue_long)) * far;
   if (most > bound) v->tissue_even = bound / most;
   return fmin(v->tissue_short, v->tissue_long) < gentle_squeeze || most > gentle_bend * far;
 }
