@@ -158,7 +158,7 @@ SONDE_API sonde_status sonde_case_save(const sonde_case *from, const char *path,
                                        sonde_error *error);
 /** The text of such a file. @param[out] text freed by sonde_free() @thread owner */
 SONDE_API sonde_status sonde_case_text(const sonde_case *from, char **text, sonde_error *error);
-/** All *.yaml of a directory, by level, then id. @param cases [*count] freed by sonde_free
+/** All *.yaml of a directory, by level, then title. @param cases [*count] freed by sonde_free
  *  @return what the first unreadable file says; ARGUMENT for an id that is there twice
  *  @thread owner */
 SONDE_API sonde_status sonde_case_list(const char *directory, sonde_case **cases, uint32_t *count,

@@ -1,6 +1,6 @@
 // The cases of a directory.
 // load_one:  a file into an item of the list.
-// compare:   by level, then id.
+// compare:   by level, then title, then id: the order in which a learner reads them.
 #include "trainer/trainer.h"
 
 #include <string.h>
@@ -12,7 +12,8 @@ static sonde_status load_one(const char *path, void *item, sonde_error *error) {
 static int compare(const void *a, const void *b) {
   const sonde_case *x = a, *y = b;
   if (x->level != y->level) return x->level < y->level ? -1 : 1;
-  return strcmp(x->id, y->id);
+  int titles = strcmp(x->title, y->title);
+  return titles ? titles : strcmp(x->id, y->id);
 }
 
 sonde_status sonde_case_list(const char *directory, sonde_case **cases, uint32_t *count,

@@ -60,7 +60,7 @@ static void say_move(sonde_guidance *g, bool pressing, const char *title, double
 static void say_press(const sonde_judge *judge, sonde_guidance *g) {
   if (!g->angle_ok) {
     snprintf(g->text, sizeof g->text,
-             "Turn the probe by %.0f degrees, so that it lies straight across the leg.",
+             "Turn the probe by %.0f degrees, so that it lies straight across the vein.",
              g->angle_rad * 180 / SONDE_PI);
     return;
   }

@@ -38,6 +38,20 @@ export async function goTo(page) {
   }
 }
 
+/** Turns the probe by keys as the page asks, until it lies across the vein. */
+export async function turnAcross(page) {
+  const angle = () => page.evaluate(() => window.sonde.exam.step);
+  let key = "e";
+  for (let before = await angle(); before.target && before.angle_ok === false; ) {
+    const start = await page.evaluate(() => window.sonde.snapshot.tick);
+    await page.keyboard.press(key);
+    await page.waitForFunction((t) => window.sonde.snapshot.tick > t + 400, start);
+    const now = await angle();
+    if (now.angle_deg > before.angle_deg) key = key === "e" ? "q" : "e";
+    before = now;
+  }
+}
+
 /** Presses to a depth and lets go; waits until the press is counted. */
 export async function pressAndRelease(page, depth_mm) {
   const before = await page.evaluate(() => window.sonde.exam.presses.length);

@@ -7,7 +7,7 @@ import { mkdirSync, mkdtempSync, readdirSync, readFileSync, rmSync, statSync } f
 import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
-import { addressOf, browserPath, findAddress, goTo, openBrowser, PATIENCE_MS, ready } from "./drive.mjs";
+import { addressOf, browserPath, findAddress, goTo, openBrowser, PATIENCE_MS, ready, turnAcross } from "./drive.mjs";
 
 const [sonde, web, out] = process.argv.slice(2).map((p) => resolve(p));
 if (!browserPath) {
@@ -78,6 +78,7 @@ async function guidedExam(page) {
     const { exam } = await state(page);
     if (exam.step.target === null) break;
     await goTo(page);
+    await turnAcross(page);
     await press(page);
   }
   const { exam } = await state(page);

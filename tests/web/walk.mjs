@@ -5,7 +5,7 @@ import { mkdirSync, mkdtempSync, rmSync } from "node:fs";
 import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
-import { addressOf, findAddress, openBrowser, PATIENCE_MS, ready } from "./drive.mjs";
+import { addressOf, findAddress, openBrowser, PATIENCE_MS, ready, turnAcross } from "./drive.mjs";
 
 const [sonde, web, out] = process.argv.slice(2, 5).map((p) => resolve(p));
 const [width, height] = (process.argv[5] ?? "1280x800").split("x").map(Number);
@@ -84,6 +84,7 @@ for (let i = 0; i < 6; ++i) {
   if (!s.target && !s.segment) break;
   if (s.target) {
     await intoRing();
+    await turnAcross(page);
     await shot(`place${i}_there`);
     const before = await page.evaluate(() => window.sonde.exam.presses.length);
     await pressSlowly(`place${i}`);

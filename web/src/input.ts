@@ -142,6 +142,11 @@ export class Input {
     if (point) this.place(point);
   }
 
+  /** Turns the probe about its beam by steps of a key. */
+  turnBy(steps: number): void {
+    if (this.enabled) this.turn({ rotation: steps * STEP_RAD });
+  }
+
   private turn(change: Partial<Pick<Hold, "rotation" | "tiltX" | "tiltY">>): void {
     for (const [axis, by] of Object.entries(change) as ["rotation" | "tiltX" | "tiltY", number][]) {
       const limit = axis === "rotation" ? Math.PI : Math.PI / 4;

@@ -18,6 +18,7 @@ import { VERSIONS, type Controls, type Exam, type Frame, type Hello, type Phase,
 import { Rates } from "./rates";
 import { ReplayBar } from "./replay";
 import { ResultDialog } from "./result";
+import { Route } from "./route";
 import { ThighScene } from "./scene";
 import { StartDialog } from "./start";
 import { EchoTools } from "./tools";
@@ -45,6 +46,7 @@ class App {
   /** pixels of the last frame */
   pixels: Uint8Array = new Uint8Array(0);
   readonly hold = new Hold();
+  private readonly route = new Route();
   readonly scene = new ThighScene(find<HTMLCanvasElement>("scene"), query.get("quality") === "low");
   readonly echo = new EchoView(find("echo-box"), find<HTMLCanvasElement>("echo-marks"), find("echo-text"), find("measures"));
   readonly connection: Connection;
@@ -141,6 +143,8 @@ class App {
     press("status", () => this.rates.toggle());
     press("see-through", () => this.toggleThrough());
     press("home", () => this.reset());
+    press("turn-left", () => this.input.turnBy(-1));
+    press("turn-right", () => this.input.turnBy(1));
     press("depth-less", () => this.setDepth(this.hold.depth_mm - 1));
     press("depth-more", () => this.setDepth(this.hold.depth_mm + 1));
     press("ease", () => this.setDepth(EASED_MM));
@@ -356,7 +360,7 @@ class App {
     if (phase !== "practice") this.chart(true);
     if (phase !== "practice") this.patient.openTissue(false);
     this.input.enabled = this.hands;
-    for (const id of ["depth-slider", "depth-less", "depth-more", "ease", "home"]) find<HTMLButtonElement>(id).disabled = !this.hands;
+    for (const id of ["depth-slider", "depth-less", "depth-more", "ease", "home", "turn-left", "turn-right"]) find<HTMLButtonElement>(id).disabled = !this.hands;
     find("ease").classList.toggle("primary", phase === "running" && letGo(this.exam?.compression ?? null));
     this.coach.show(this.exam, this.hands);
   }
@@ -417,6 +421,7 @@ class App {
 
   private moved(): void {
     this.goalDue = true;
+    if (this.snapshot) this.route.to(this.scene.skin, this.snapshot.position_mm, this.hold.point);
     if (this.snapshot && this.snapshot.tick > 0 && this.hold.depth_mm > 0) find("hint").classList.add("gone");
     find("depth-value").textContent = `${this.hold.depth_mm.toFixed(1).replace(/\.0$/, "")} mm`;
     find<HTMLInputElement>("depth-slider").value = String(this.hold.depth_mm);
@@ -499,9 +504,10 @@ class App {
 
   private animate(now_s: number): void {
     this.input.tick(now_s);
+    if (this.snapshot && this.route.passed(this.scene.skin, this.snapshot.position_mm)) this.goalDue = true;
     if (this.goalDue && this.hands) {
       this.goalDue = false;
-      const pose = this.hold.pose();
+      const pose = this.route.pose(this.scene.skin, this.hold.pose());
       this.connection.goal(pose.position_mm, pose.rotation);
     }
     const frame = this.pending;
