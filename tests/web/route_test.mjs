@@ -55,9 +55,13 @@ for (const from of [5, 20, 700, 1450, 2030, 2800])
         const x = rotate(pose.rotation, [1, 0, 0]);
         for (const side of [-1, 0, 1]) deepest = Math.max(deepest, depthInside(at.map((c, i) => c + side * HALF_X_MM * x[i])));
       }
-      probe = pose.position_mm;
-      last = probe.join();
-      route.passed(skin, probe);
+      last = pose.position_mm.join();
+      // It goes on to the next pose as soon as the route says so, here at every tenth of the way.
+      const from = probe;
+      for (let s = 0.1; s <= 1.001; s += 0.1) {
+        probe = from.map((c, i) => c + s * (pose.position_mm[i] - c));
+        if (route.passed(skin, probe)) break;
+      }
     }
     const error = Math.hypot(...probe.map((c, i) => c - hold.pose().position_mm[i]));
     if (error > 1e-6) {

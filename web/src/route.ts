@@ -4,10 +4,10 @@
 import { add, dot, Hold, length, sub, unit, type Pose, type Skin } from "./pose";
 import type { Vec3 } from "./protocol";
 
-const FAR_MM = 30;    // a goal nearer than this is gone to straight
-const STEP_MM = 15;   // along the skin from one waypoint to the next
-const CLEAR_MM = 20;  // of the probe's face from the skin at a waypoint
-const REACHED_MM = 8;
+const FAR_MM = 40;     // a goal nearer than this is gone to straight
+const STEP_MM = 20;    // along the skin from one waypoint to the next
+const CLEAR_MM = 20;   // of the probe's face from the skin at a waypoint
+const REACHED_MM = 14; // nearer to a waypoint than this the probe goes on to the next
 const STEPS_MAX = 80;
 
 /** Nearest of the skin's points. */
