@@ -28,10 +28,31 @@ static void layers_are_ordered(void **state) {
   sonde_model_destroy(model);
 }
 
+// A limb with two cut ends: the fixture's sphere three times as long, cut at 1.8 radii, with a site
+// in the middle. Only a limb gets the default bone and vessels.
+static sonde_model *limb_model(int levels) {
+  sonde_mesh skin = fixture_sphere(levels, FIXTURE_RADIUS_M);
+  double cut_m = 1.8 * FIXTURE_RADIUS_M;
+  for (uint32_t i = 0; i < skin.vertex_count; ++i)
+    skin.vertices[i].z = clamp(3 * skin.vertices[i].z, -cut_m, cut_m);
+  sonde_site site = fixture_site();
+  sonde_model_def def = sonde_model_def_default();
+  def.name = "limb";
+  def.skin = &skin;
+  def.sites = &site;
+  def.site_count = 1;
+  def.fine_edge_m = 1;
+  sonde_model *model = NULL;
+  sonde_error error = {0};
+  if (sonde_model_build(&def, &model, &error)) fail_msg("%s", error.message);
+  sonde_mesh_clear(&skin);
+  return model;
+}
+
 // The default femur is closed and outward, and the nearest node sees it at radius minus 14 mm.
 static void default_femur_is_a_rod(void **state) {
   (void)state;
-  sonde_model *model = fixture_model(3, NULL);
+  sonde_model *model = limb_model(3);
   sonde_mesh_report report;
   assert_int_equal(sonde_mesh_inspect(&model->femur, &report, NULL), SONDE_OK);
   assert_true(report.closed && report.outward);
@@ -43,7 +64,7 @@ static void default_femur_is_a_rod(void **state) {
 
 static void vein_passes_below_the_site(void **state) {
   (void)state;
-  sonde_model *model = fixture_model(4, NULL);
+  sonde_model *model = limb_model(4);
   double nearest = INFINITY, depth = 0;
   for (uint32_t k = 0; k < model->vein.count; ++k) {
     sonde_vec3 c = model->vein.point[k].centre_m;
@@ -206,7 +227,7 @@ static void damage_is_refused(void **state) {
 // A whole file whose numbers are those of no body, each at the end of its range.
 static void absurd_numbers_are_refused(void **state) {
   (void)state;
-  sonde_model *model = fixture_model(1, NULL), *loaded;
+  sonde_model *model = limb_model(3), *loaded;
   double *const number[] = {
       &model->surface.vertices[0].x, &model->femur.vertices[0].z, &model->xm_m[0],
       &model->bone_depth_m[0],       &model->sites[0].k0_n_m3,    &model->vein.point[0].radius_m};
