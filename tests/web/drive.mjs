@@ -38,11 +38,12 @@ export async function goTo(page) {
   }
 }
 
-/** Turns the probe by keys as the page asks, until it lies across the vein. */
+/** Turns the probe by keys as the page asks, until it lies across the vein: once round at most. */
 export async function turnAcross(page) {
   const angle = () => page.evaluate(() => window.sonde.exam.step);
   let key = "e";
-  for (let before = await angle(); before.target && before.angle_ok === false; ) {
+  let before = await angle();
+  for (let turns = 0; turns < 72 && before.target && before.angle_ok === false; ++turns) {
     const start = await page.evaluate(() => window.sonde.snapshot.tick);
     await page.keyboard.press(key);
     await page.waitForFunction((t) => window.sonde.snapshot.tick > t + 400, start);

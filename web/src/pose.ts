@@ -3,6 +3,7 @@
 
 import type { Quat, Site, Vec3 } from "./protocol";
 
+const CUT_END = 0.9; // a face whose normal is this much along the leg
 export const DEPTH_MIN_MM = -20;
 export const DEPTH_MAX_MM = 45;
 
@@ -64,6 +65,7 @@ export class Skin {
 
   private addFace(a: number, b: number, c: number): void {
     const n = cross(sub(this.point(b), this.point(a)), sub(this.point(c), this.point(a)));
+    if (Math.abs(n[2]) > CUT_END * length(n)) return; // a cut end of the leg (z is its axis) is no skin
     for (const i of [a, b, c]) for (let k = 0; k < 3; ++k) this.normals[3 * i + k]! += n[k]!;
   }
 
