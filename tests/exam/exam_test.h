@@ -11,6 +11,7 @@
 #include "base/base.h"
 #include "base/maths.h"
 #include "exam/session.h"
+#include "../barrel_mesh.h"
 
 #include <string.h>
 #include <unistd.h>
@@ -29,18 +30,7 @@ static inline void barrel_mesh(sonde_mesh *mesh) {
       mesh->vertices[2 + i * AROUND + k] =
           vec3(radius_m * cos(turn), radius_m * sin(turn), 0.15 * t);
     }
-  uint32_t face = 0;
-  for (uint32_t k = 0; k < AROUND; ++k) {
-    uint32_t next = (k + 1) % AROUND, top = 2 + (RINGS - 1) * AROUND;
-    memcpy(mesh->faces[face++], (uint32_t[3]){0, 2 + next, 2 + k}, sizeof mesh->faces[0]);
-    memcpy(mesh->faces[face++], (uint32_t[3]){1, top + k, top + next}, sizeof mesh->faces[0]);
-    for (uint32_t i = 0; i + 1 < RINGS; ++i) {
-      uint32_t a = 2 + i * AROUND + k, b = 2 + i * AROUND + next, up = AROUND;
-      memcpy(mesh->faces[face++], (uint32_t[3]){a, b, b + up}, sizeof mesh->faces[0]);
-      memcpy(mesh->faces[face++], (uint32_t[3]){a, b + up, a + up}, sizeof mesh->faces[0]);
-    }
-  }
-  assert_int_equal(face, mesh->face_count);
+  assert_int_equal(barrel_mesh_faces(mesh, RINGS, AROUND), mesh->face_count);
 }
 
 static inline sonde_site barrel_site(void) {

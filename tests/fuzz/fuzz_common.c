@@ -3,6 +3,8 @@
 // barrel             skin of the leg
 #include "fuzz.h"
 
+#include "../barrel_mesh.h"
+
 #include "base/maths.h"
 
 #include <dirent.h>
@@ -67,24 +69,13 @@ static void barrel(sonde_mesh *mesh) {
   FUZZ_CHECK(sonde_mesh_create(mesh, 2 + RINGS * AROUND, 2 * AROUND * RINGS, &error) == SONDE_OK);
   mesh->vertices[0] = vec3(0, 0, -0.12);
   mesh->vertices[1] = vec3(0, 0, 0.12);
-  uint32_t face = 0;
   for (uint32_t i = 0; i < RINGS; ++i)
     for (uint32_t k = 0; k < AROUND; ++k) {
       double turn = 2 * SONDE_PI * k / AROUND;
       mesh->vertices[2 + i * AROUND + k] =
           vec3(0.06 * cos(turn), 0.06 * sin(turn), 0.24 * i / (RINGS - 1) - 0.12);
     }
-  for (uint32_t k = 0; k < AROUND; ++k) {
-    uint32_t next = (k + 1) % AROUND, top = 2 + (RINGS - 1) * AROUND;
-    memcpy(mesh->faces[face++], (uint32_t[3]){0, 2 + next, 2 + k}, sizeof mesh->faces[0]);
-    memcpy(mesh->faces[face++], (uint32_t[3]){1, top + k, top + next}, sizeof mesh->faces[0]);
-    for (uint32_t i = 0; i + 1 < RINGS; ++i) {
-      uint32_t a = 2 + i * AROUND + k, b = 2 + i * AROUND + next, up = AROUND;
-      memcpy(mesh->faces[face++], (uint32_t[3]){a, b, b + up}, sizeof mesh->faces[0]);
-      memcpy(mesh->faces[face++], (uint32_t[3]){a, b + up, a + up}, sizeof mesh->faces[0]);
-    }
-  }
-  FUZZ_CHECK(face == mesh->face_count);
+  FUZZ_CHECK(barrel_mesh_faces(mesh, RINGS, AROUND) == mesh->face_count);
 }
 
 sonde_model *fuzz_leg(void) {

@@ -1,5 +1,6 @@
 // The film of gel: volume is kept, it leaves where it is pressed, and one film drives two effects.
 #include "test.h"
+#include "../barrel_mesh.h"
 
 #include "sonde/haptics_gel.h"
 
@@ -14,17 +15,7 @@ static void leg_mesh(sonde_mesh *mesh) {
       double turn = 2 * SONDE_PI * k / AROUND, z = -0.08 + 0.004 * i;
       mesh->vertices[2 + i * AROUND + k] = vec3(0.06 * cos(turn), 0.06 * sin(turn), z);
     }
-  uint32_t face = 0;
-  for (uint32_t k = 0; k < AROUND; ++k) {
-    uint32_t next = (k + 1) % AROUND, top = 2 + (RINGS - 1) * AROUND, up = AROUND;
-    memcpy(mesh->faces[face++], (uint32_t[3]){0, 2 + next, 2 + k}, sizeof mesh->faces[0]);
-    memcpy(mesh->faces[face++], (uint32_t[3]){1, top + k, top + next}, sizeof mesh->faces[0]);
-    for (uint32_t i = 0; i + 1 < RINGS; ++i) {
-      uint32_t a = 2 + i * AROUND + k, b = 2 + i * AROUND + next;
-      memcpy(mesh->faces[face++], (uint32_t[3]){a, b, b + up}, sizeof mesh->faces[0]);
-      memcpy(mesh->faces[face++], (uint32_t[3]){a, b + up, a + up}, sizeof mesh->faces[0]);
-    }
-  }
+  assert_int_equal(barrel_mesh_faces(mesh, RINGS, AROUND), mesh->face_count);
 }
 
 static sonde_model *leg(void) {
