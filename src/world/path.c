@@ -1,10 +1,11 @@
-// The equilibrium at the end of a slow press: follows the probe's way in steps.
+// The static equilibrium that a slow press ends in: the probe follows a straight way in steps.
 //
-// pose_at, ride           where the probe is, and where the skin in touch with it would be
-// settle_from             equilibrium one step on from a known one
-// take_step               one step against two half steps; shorter until they agree
-// meet_force              the place within the last step where the force is the one asked for
-// sonde_settle_path       steps from the start to the goal, or until the force is met
+// pose_at             pose of the probe after a share of the way
+// move_touched_skin   moves the skin that the probe touches along with it
+// settle_from         finds the equilibrium one step on from another
+// take_step           compares one step with two half steps and halves the step until they agree
+// meet_force          finds the place within the last step where the force is the one asked for
+// sonde_settle_path   goes from step to step until the goal is reached or the force is met
 #include "base/base.h"
 #include "base/maths.h"
 #include "world/state.h"
@@ -13,19 +14,19 @@
 
 #include <string.h>
 
-static const double forgiven_n = 2e-3; // a difference of force that is no disagreement
-static const double quick = 1e-3;      // relative residual of a step that is only compared
-static const double on_the_way = 1e-4; // and of one that the press goes on from
-static const double met = 1e-4;        // of the force asked for
+static const double forgiven_n = 2e-3; // two forces that differ by less agree
+static const double quick = 1e-3;      // relative residual of an equilibrium that is only compared
+static const double on_the_way = 1e-4; // relative residual of one from which the press goes on
+static const double met = 1e-4;        // a force is met within this share of the force asked for
 
 // An equilibrium on the way.
-typedef struct mark {
+typedef struct equilibrium {
   double share; // of the way
   double force_n;
   sonde_settle_result settled;
   sonde_vec3 *position; // [nodes]
   uint8_t *touched;     // [nodes] pushed by the probe
-} mark;
+} equilibrium;
 
 typedef struct path {
   sonde_state *state;
@@ -34,7 +35,7 @@ typedef struct path {
   sonde_pose from, to;
   double length_m; // of the way of the face's farthest corner
   sonde_path_result *result;
-  mark here, half, whole, end; // the step's start; after half, in one, and after two halves
+  equilibrium here, half, whole, end; // the step's start; after half, in one, and after two halves
 } path;
 
 static uint32_t nodes(const path *p) { return p->state->model->surface.vertex_count; }
@@ -59,7 +60,7 @@ static double push_along_beam(const path *p, sonde_pose pose) {
 
 // The touched skin goes along with the probe, as it does under a slow press. Left behind it would
 // lie deep inside the probe, where some of it is nearer to a side than to the face.
-static void ride(path *p, const mark *from, double share) {
+static void move_touched_skin(path *p, const equilibrium *from, double share) {
   sonde_pose was = pose_at(p, from->share), is = pose_at(p, share);
   memcpy(p->state->position, from->position, nodes(p) * sizeof *from->position);
   for (uint32_t i = 0; i < nodes(p); ++i) {
@@ -70,12 +71,13 @@ static void ride(path *p, const mark *from, double share) {
   }
 }
 
-static void settle_from(path *p, const mark *from, double share, double residual, mark *to) {
+static void settle_from(path *p, const equilibrium *from, double share, double residual,
+                        equilibrium *to) {
   sonde_state *state = p->state;
   sonde_pose pose = pose_at(p, share);
   SONDE_ASSERT(share >= 0 && share <= 1);
   sonde_state_publish(state);
-  ride(p, from, share);
+  move_touched_skin(p, from, share);
   to->settled = sonde_settle(state, p->probe, pose, residual, p->def->max_iterations);
   to->share = share;
   to->force_n = push_along_beam(p, pose);
@@ -84,19 +86,19 @@ static void settle_from(path *p, const mark *from, double share, double residual
   p->result->iterations += to->settled.iterations;
 }
 
-static void swap(mark *a, mark *b) {
+static void swap_equilibria(equilibrium *a, equilibrium *b) {
   SONDE_ASSERT(a != b);
-  mark c = *a;
+  equilibrium c = *a;
   *a = *b, *b = c;
 }
 
-static void copy(const path *p, const mark *from, mark *to) {
+static void copy_equilibrium(const path *p, const equilibrium *from, equilibrium *to) {
   to->share = from->share, to->force_n = from->force_n, to->settled = from->settled;
   memcpy(to->position, from->position, nodes(p) * sizeof *to->position);
   memcpy(to->touched, from->touched, nodes(p));
 }
 
-static bool agree(const path *p) {
+static bool forces_agree(const path *p) {
   double least = fmax(p->def->tolerance * fabs(p->end.force_n), forgiven_n);
   return p->whole.settled.converged && p->half.settled.converged && p->end.settled.converged &&
          fabs(p->whole.force_n - p->end.force_n) <= least;
@@ -123,14 +125,14 @@ static void take_step(path *p, double *step_m) {
     settle_from(p, &p->here, middle, on_the_way, &p->half);
     settle_from(p, &p->half, share, on_the_way, &p->end);
     step = fmin(step, left);
-    bool same = agree(p);
+    bool same = forces_agree(p);
     if (same || 0.5 * step < p->def->least_step_m) {
       if (!same) note_jump(p);
       *step_m = same ? fmin(2 * step, p->def->step_m) : step;
       ++p->result->steps;
       return;
     }
-    swap(&p->whole, &p->half);
+    swap_equilibria(&p->whole, &p->half);
     step *= 0.5;
   }
 }
@@ -147,7 +149,7 @@ static void meet_force(path *p) {
     settle_from(p, &p->here, low - low_f * (high - low) / (high_f - low_f), on_the_way, &p->end);
     double weight = k % 3 == 2 ? 0.5 : 1;
     if (p->end.force_n < wanted) {
-      copy(p, &p->end, &p->here);
+      copy_equilibrium(p, &p->end, &p->here);
       low_f = p->here.force_n - wanted, high_f *= weight;
     } else {
       high = p->end.share, high_f = p->end.force_n - wanted, low_f *= weight;
@@ -155,7 +157,7 @@ static void meet_force(path *p) {
   }
 }
 
-static double done(const path *p) {
+static double share_done(const path *p) {
   double force = isfinite(p->def->force_n) ? p->here.force_n / p->def->force_n : 0;
   return clamp(fmax(p->here.share, force), 0, 1);
 }
@@ -166,14 +168,14 @@ static bool follow(path *p, const sonde_progress *progress) {
   settle_from(p, &p->here, 0, on_the_way, &p->end);
   while (p->end.settled.converged && p->end.share < 1 && p->end.force_n < p->def->force_n &&
          p->length_m > 0) {
-    swap(&p->here, &p->end);
-    if (!sonde_progress_report(progress, done(p), "pressing")) return false;
+    swap_equilibria(&p->here, &p->end);
+    if (!sonde_progress_report(progress, share_done(p), "pressing")) return false;
     take_step(p, &step_m);
   }
   return true;
 }
 
-static sonde_status check(const sonde_path_def *d, sonde_error *error) {
+static sonde_status check_def(const sonde_path_def *d, sonde_error *error) {
   const struct {
     const char *name;
     double value, low, high;
@@ -199,8 +201,8 @@ sonde_path_def sonde_path_def_default(void) {
                           .max_iterations = 400};
 }
 
-static sonde_status create_marks(path *p, sonde_error *error) {
-  mark *all[] = {&p->here, &p->half, &p->whole, &p->end};
+static sonde_status create_equilibria(path *p, sonde_error *error) {
+  equilibrium *all[] = {&p->here, &p->half, &p->whole, &p->end};
   for (size_t k = 0; k < SONDE_COUNT_OF(all); ++k) {
     all[k]->position = SONDE_NEW(sonde_vec3, nodes(p));
     all[k]->touched = SONDE_NEW(uint8_t, nodes(p));
@@ -209,8 +211,8 @@ static sonde_status create_marks(path *p, sonde_error *error) {
   return SONDE_OK;
 }
 
-static void destroy_marks(path *p) {
-  mark *all[] = {&p->here, &p->half, &p->whole, &p->end};
+static void destroy_equilibria(path *p) {
+  equilibrium *all[] = {&p->here, &p->half, &p->whole, &p->end};
   for (size_t k = 0; k < SONDE_COUNT_OF(all); ++k) {
     sonde_free(all[k]->position);
     sonde_free(all[k]->touched);
@@ -248,8 +250,8 @@ sonde_status sonde_settle_path(sonde_state *state, const sonde_probe *probe, son
   p.from = from, p.to = to, p.result = result;
   p.length_m = v_distance(from.position, to.position) +
                turn(from.rotation, to.rotation) * hypot(probe->half_x_m, probe->half_y_m);
-  sonde_status status = check(p.def, error);
-  if (!status) status = create_marks(&p, error);
+  sonde_status status = check_def(p.def, error);
+  if (!status) status = create_equilibria(&p, error);
   if (!status) {
     sonde_state_publish(state);
     memcpy(p.here.position, state->position, nodes(&p) * sizeof *p.here.position);
@@ -258,6 +260,6 @@ sonde_status sonde_settle_path(sonde_state *state, const sonde_probe *probe, son
   if (!status && p.end.settled.converged && p.end.force_n >= p.def->force_n && p.end.share > 0)
     meet_force(&p);
   if (!status) status = conclude(&p, error);
-  destroy_marks(&p);
+  destroy_equilibria(&p);
   return status;
 }
