@@ -48,7 +48,7 @@ for (const from of [5, 20, 700, 1450, 2030, 2800])
     let probe = lifted.pose().position_mm;
     let last = null;
     for (let k = 0; k < 200 && last !== hold.pose().position_mm.join(); ++k) {
-      const pose = route.pose(skin, hold.pose());
+      const pose = route.pose(hold.pose());
       // The probe goes straight from pose to pose; its face is as wide as the linear probe's.
       for (let s = 0; s <= 1; s += 0.1) {
         const at = probe.map((c, i) => c + s * (pose.position_mm[i] - c));
@@ -60,7 +60,7 @@ for (const from of [5, 20, 700, 1450, 2030, 2800])
       const from = probe;
       for (let s = 0.1; s <= 1.001; s += 0.1) {
         probe = from.map((c, i) => c + s * (pose.position_mm[i] - c));
-        if (route.passed(skin, probe)) break;
+        if (route.passed(probe)) break;
       }
     }
     const error = Math.hypot(...probe.map((c, i) => c - hold.pose().position_mm[i]));

@@ -504,10 +504,10 @@ class App {
 
   private animate(now_s: number): void {
     this.input.tick(now_s);
-    if (this.snapshot && this.route.passed(this.scene.skin, this.snapshot.position_mm)) this.goalDue = true;
+    if (this.snapshot && this.route.passed(this.snapshot.position_mm)) this.goalDue = true;
     if (this.goalDue && this.hands) {
       this.goalDue = false;
-      const pose = this.route.pose(this.scene.skin, this.hold.pose());
+      const pose = this.route.pose(this.hold.pose());
       this.connection.goal(pose.position_mm, pose.rotation);
     }
     const frame = this.pending;

@@ -38,34 +38,35 @@ export function overSkin(skin: Skin, from: Vec3, to: Vec3): Vec3[] {
   return points;
 }
 
+/** Where the probe is held at a waypoint. */
+function above(skin: Skin, point: Vec3): Pose {
+  const hold = new Hold();
+  hold.at(point, skin.normalAt(point));
+  hold.setDepth(-CLEAR_MM);
+  return hold.pose();
+}
+
 /** What is sent to the program: the goal, or the next waypoint to it. */
 export class Route {
-  private waypoints: Vec3[] = [];
+  private waypoints: Pose[] = [];
 
   /** The operator holds the probe elsewhere: a far place is reached over the skin. */
   to(skin: Skin | null, probe: Vec3, goal: Vec3): void {
     const last = this.waypoints[this.waypoints.length - 1];
-    if (last && length(sub(last, goal)) < 2 * STEP_MM) return; // on its way there
-    this.waypoints = skin && length(sub(goal, probe)) > FAR_MM ? overSkin(skin, probe, goal) : [];
+    if (last && length(sub(last.position_mm, goal)) < 2 * STEP_MM + CLEAR_MM) return; // on its way there
+    const far = skin && length(sub(goal, probe)) > FAR_MM;
+    this.waypoints = far ? overSkin(skin, probe, goal).map((point) => above(skin, point)) : [];
   }
 
   /** True when the probe has reached a waypoint, so that the next pose is due. */
-  passed(skin: Skin | null, probe: Vec3): boolean {
+  passed(probe: Vec3): boolean {
     const next = this.waypoints[0];
-    if (!next || !skin || length(sub(this.above(skin, next).position_mm, probe)) > REACHED_MM) return false;
+    if (!next || length(sub(next.position_mm, probe)) > REACHED_MM) return false;
     this.waypoints.shift();
     return true;
   }
 
-  pose(skin: Skin | null, goal: Pose): Pose {
-    const next = this.waypoints[0];
-    return next && skin ? this.above(skin, next) : goal;
-  }
-
-  private above(skin: Skin, point: Vec3): Pose {
-    const hold = new Hold();
-    hold.at(point, skin.normalAt(point));
-    hold.setDepth(-CLEAR_MM);
-    return hold.pose();
+  pose(goal: Pose): Pose {
+    return this.waypoints[0] ?? goal;
   }
 }

@@ -5,6 +5,7 @@ import * as THREE from "three";
 const HEIGHT_PX = 44; // of the drawn letters; shown at a third
 const SIZE = 0.032; // of the picture's height
 const AWAY_MM = 14; // from the skin
+const END_MM = 15; // of the leg that belongs to an end
 const INK = "#c9d6e4";
 
 function words(text: string): THREE.Sprite {
@@ -30,6 +31,13 @@ function words(text: string): THREE.Sprite {
   return sprite;
 }
 
+/** How far the skin reaches to the front near an end: the leg is thinner at the knee than at the groin. */
+function topNear(points: Float32Array, end_z: number): number {
+  let top = -Infinity;
+  for (let i = 0; i < points.length; i += 3) if (Math.abs(points[i + 2]! - end_z) < END_MM) top = Math.max(top, points[i + 1]!);
+  return top;
+}
+
 /** x points to the inner side, y to the front, z from the groin to the knee. */
 export class Sides {
   readonly group = new THREE.Group();
@@ -40,8 +48,8 @@ export class Sides {
     const box = new THREE.Box3().setFromArray(points);
     const middle = box.getCenter(new THREE.Vector3());
     const at: [string, number, number, number, number][] = [
-      ["Groin", middle.x, box.max.y + AWAY_MM, box.min.z, 0],
-      ["Knee", middle.x, box.max.y + AWAY_MM, box.max.z, 0],
+      ["Groin", middle.x, topNear(points, box.min.z) + AWAY_MM, box.min.z, 0],
+      ["Knee", middle.x, topNear(points, box.max.z) + AWAY_MM, box.max.z, 0],
       ["inner side", box.max.x + AWAY_MM, middle.y, middle.z, 1],
       ["outer side", box.min.x - AWAY_MM, middle.y, middle.z, -1],
     ];
