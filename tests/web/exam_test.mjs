@@ -2,12 +2,12 @@
 // finished, reported, replayed; then the program is killed in the middle of another one and started
 // again. Usage: exam_test.mjs SONDE WEB_DIR OUT_DIR
 import assert from "node:assert/strict";
-import { spawn } from "node:child_process";
 import { mkdirSync, mkdtempSync, readdirSync, readFileSync, rmSync, statSync } from "node:fs";
 import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
-import { addressOf, browserPath, findAddress, goTo, openBrowser, PATIENCE_MS, ready, turnAcross } from "./drive.mjs";
+import { addressOf, browserPath, goTo, openBrowser, PATIENCE_MS, ready, turnAcross } from "./drive.mjs";
+import { startRun } from "./program.mjs";
 
 const [sonde, web, out] = process.argv.slice(2).map((p) => resolve(p));
 if (!browserPath) {
@@ -24,17 +24,7 @@ const check = (condition, what) => {
   console.log(`ok ${what}`);
 };
 
-/** The program, once it says where it is. */
-function start(port) {
-  const child = spawn(sonde, ["run", "--port", String(port), "--exams", exams], { stdio: ["ignore", "pipe", "inherit"] });
-  return new Promise((done, fail) => {
-    child.stdout.on("data", (text) => {
-      const at = findAddress(String(text));
-      if (at) done({ child, ...at });
-    });
-    child.on("exit", (code) => fail(new Error(`sonde run ended with ${code}`)));
-  });
-}
+const start = (port) => startRun(sonde, ["--port", String(port), "--exams", exams]);
 
 const state = (page) => page.evaluate(() => ({ exam: window.sonde.exam, replay: window.sonde.replay, snapshot: window.sonde.snapshot, sum: window.sonde.imageSum }));
 const until = (page, condition, argument) => page.waitForFunction(condition, argument, { timeout: PATIENCE_MS });
@@ -155,16 +145,15 @@ async function replay(page, exam) {
 async function killed(browser, running) {
   const page = await browser.newPage({ viewport: { width: 1440, height: 900 } });
   page.setDefaultTimeout(PATIENCE_MS);
-  await page.goto(addressOf(running, "?quality=low"));
+  await page.goto(addressOf(running.learner, "?quality=low"));
   await ready(page);
   await begin(page, /^None/);
   await page.evaluate(() => window.sonde.setDepth(10));
   await page.waitForTimeout(2500);
-  running.child.removeAllListeners("exit");
   running.child.kill("SIGKILL");
-  const again = await start(running.port);
+  const again = await start(running.learner.port);
   await until(page, () => window.sonde.connected && window.sonde.exam?.phase === "practice");
-  check(again.token === running.token, "the token outlives the program, and the page finds it again");
+  check(again.learner.token === running.learner.token, "the token outlives the program, and the page finds it again");
   const file = statSync(join(exams, "page.token"));
   check((file.mode & 0o777) === 0o600, "only its owner can read the file with the token");
   const kept = readdirSync(exams, { withFileTypes: true }).filter((e) => e.isDirectory()).map((e) => readdirSync(join(exams, e.name)));
@@ -173,17 +162,15 @@ async function killed(browser, running) {
   return again;
 }
 
-let running = null;
-
 async function main() {
-  running = await start(0);
+  let running = await start(0);
   const browser = await openBrowser(chromium);
   const page = await browser.newPage({ viewport: { width: 1440, height: 900 } });
   page.setDefaultTimeout(PATIENCE_MS);
   const errors = [];
   page.on("console", (m) => m.type() === "error" && errors.push(m.text()));
   page.on("pageerror", (e) => errors.push(String(e)));
-  await page.goto(addressOf(running, "?quality=low"));
+  await page.goto(addressOf(running.learner, "?quality=low"));
   await ready(page);
   await begin(page, /^Full/);
   await guidedExam(page);
@@ -191,15 +178,14 @@ async function main() {
   const exam = await finish(page);
   console.log(`score ${exam.result.score}, ${exam.result.summary}`);
   check(exam.result.passed && exam.result.correct, "who follows the guidance passes");
-  await readReport(browser, running.port, exam);
+  await readReport(browser, running.learner.port, exam);
   await replay(page, exam);
   check(errors.length === 0, `no console error ${errors.join("; ")}`);
   await page.close();
   running = await killed(browser, running);
   await browser.close();
-  running.child.removeAllListeners("exit");
-  running.child.kill("SIGINT");
-  await new Promise((done) => running.child.on("exit", done));
+  running.interrupt();
+  await running.ended;
   rmSync(exams, { recursive: true });
   console.log(`${checks} checks`);
 }
@@ -208,7 +194,6 @@ main().then(
   () => process.exit(0),
   (problem) => {
     console.error(problem);
-    running?.child.kill("SIGKILL");
     process.exit(1);
   },
 );

@@ -2,12 +2,12 @@
 // Checks that force rises with depth, that the healthy vein closes and the chronic one does not,
 // that the image changes, that Stop and Resume work, that everything fits at 1280 x 720 and that the
 // console stays free of errors. Usage: node page_test.mjs SONDE MODEL WEB_BUILD_DIR OUT_DIR
-import { spawn } from "node:child_process";
 import { createRequire } from "node:module";
 import { existsSync, mkdirSync, mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import path from "node:path";
-import { addressOf, findAddress, PATIENCE_MS } from "./drive.mjs";
+import { addressOf, PATIENCE_MS } from "./drive.mjs";
+import { startRun } from "./program.mjs";
 
 const [, , program, model, webDir, outDir] = process.argv;
 const { chromium } = createRequire(path.join(webDir, "package.json"))("playwright-core");
@@ -23,30 +23,6 @@ const failures = [];
 function check(good, what) {
   console.log(`${good ? "ok    " : "FAILED"} ${what}`);
   if (!good) failures.push(what);
-}
-
-/** Starts `sonde run` on a free port; resolves to the address that it prints. */
-function startProgram() {
-  const child = spawn(program, ["run", model, "--port", "0"], { stdio: ["ignore", "pipe", "pipe"] });
-  let said = "";
-  const address = new Promise((resolve, reject) => {
-    const listen = (chunk) => {
-      said += chunk;
-      const found = findAddress(said);
-      if (found) resolve(found);
-    };
-    child.stdout.on("data", listen);
-    child.stderr.on("data", listen);
-    child.on("exit", (code) => reject(new Error(`sonde run ended with ${code}: ${said}`)));
-  });
-  const ended = new Promise((resolve) => child.on("exit", (code, signal) => resolve(signal ?? code)));
-  let interrupted = false; // a second Ctrl-C would kill it
-  const interrupt = () => {
-    if (!interrupted) child.kill("SIGINT");
-    interrupted = true;
-  };
-  process.on("exit", () => child.kill("SIGKILL"));
-  return { address, ended, interrupt };
 }
 
 /** Holds the probe at a depth until it is there and the force is steady; returns the snapshot. */
@@ -191,10 +167,10 @@ async function testLoss(page, server) {
 async function main() {
   mkdirSync(outDir, { recursive: true });
   const profile = mkdtempSync(path.join(tmpdir(), "sonde-web-"));
-  const server = startProgram();
+  const server = await startRun(program, [model, "--port", "0"]);
+  const address = server.learner;
   let browser = null;
   try {
-    const address = await server.address;
     browser = await chromium.launchPersistentContext(profile, {
       executablePath: browserPath,
       headless: true,

@@ -2,12 +2,12 @@
 // and gives it back, a watcher comments while the exam runs and after it.
 // Usage: roles_test.mjs SONDE WEB_DIR OUT_DIR
 import assert from "node:assert/strict";
-import { spawn } from "node:child_process";
 import { mkdirSync, mkdtempSync, rmSync } from "node:fs";
 import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
-import { addressOf, browserPath, findAddress, openBrowser, PATIENCE_MS, ready } from "./drive.mjs";
+import { addressOf, browserPath, openBrowser, PATIENCE_MS, ready } from "./drive.mjs";
+import { startRun } from "./program.mjs";
 
 const [sonde, web, out] = process.argv.slice(2).map((p) => resolve(p));
 if (!browserPath) {
@@ -21,19 +21,6 @@ const check = (condition, what) => {
   assert.ok(condition, what);
   console.log(`ok ${what}`);
 };
-
-/** The program with its two addresses. */
-function start() {
-  const child = spawn(sonde, ["run", "--port", "0", "--exams", exams], { stdio: ["ignore", "pipe", "inherit"] });
-  let said = "";
-  return new Promise((done, fail) => {
-    child.stdout.on("data", (text) => {
-      const lines = (said += text).split("\n").map(findAddress).filter(Boolean);
-      if (lines.length === 2) done({ child, learner: lines[0], teacher: lines[1] });
-    });
-    child.on("exit", (code) => fail(new Error(`sonde run ended with ${code}`)));
-  });
-}
 
 async function visit(browser, at, errors) {
   const page = await (await browser.newContext({ viewport: { width: 1280, height: 800 } })).newPage();
@@ -103,11 +90,8 @@ async function testComments(learner, watcher) {
   await learner.locator("#replay-leave").click();
 }
 
-let program = null;
-
 async function main() {
-  const running = await start();
-  program = running.child;
+  const running = await startRun(sonde, ["--port", "0", "--exams", exams]);
   const browser = await openBrowser(chromium);
   const errors = [];
   const learner = await visit(browser, running.learner, errors);
@@ -121,9 +105,8 @@ async function main() {
   await testComments(learner, watcher);
   check(errors.length === 0, `nothing fails in a page ${errors.join("; ")}`);
   await browser.close();
-  program.removeAllListeners("exit");
-  program.kill("SIGINT");
-  await new Promise((done) => program.on("exit", done));
+  running.interrupt();
+  await running.ended;
   rmSync(exams, { recursive: true });
 }
 
@@ -131,7 +114,6 @@ main().then(
   () => process.exit(0),
   (problem) => {
     console.error(problem);
-    program?.kill("SIGKILL");
     process.exit(1);
   },
 );

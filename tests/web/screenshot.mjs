@@ -1,28 +1,19 @@
 // Takes the picture of the README: the page at 1600 x 900, pressed at site 27 until the healthy vein
 // is nearly closed. Usage: node screenshot.mjs SONDE MODEL WEB_BUILD_DIR OUT.png [DEPTH_MM]
-import { spawn } from "node:child_process";
 import { createRequire } from "node:module";
 import path from "node:path";
-import { addressOf, findAddress } from "./drive.mjs";
+import { addressOf } from "./drive.mjs";
+import { startRun } from "./program.mjs";
 
 const [, , program, model, webDir, out, depth] = process.argv;
-const { chromium } = createRequire(path.join(webDir, "package.json"))("playwright-core");
-const sonde = spawn(program, ["run", model, "--port", "0"], { stdio: ["ignore", "pipe", "inherit"] });
-const address = await new Promise((resolve, reject) => {
-  let said = "";
-  sonde.stdout.on("data", (chunk) => {
-    said += chunk;
-    const found = findAddress(said);
-    if (found) resolve(found);
-  });
-  sonde.on("exit", () => reject(new Error(said)));
-});
+const { chromium } = createRequire(path.resolve(webDir, "package.json"))("playwright-core");
+const sonde = await startRun(program, [model, "--port", "0"]);
 const browser = await chromium.launch({
   executablePath: "/usr/bin/chromium",
   args: ["--no-sandbox", "--disable-gpu", "--disable-quic", "--disable-background-networking"],
 });
 const page = await browser.newPage({ viewport: { width: 1600, height: 900 } });
-await page.goto(addressOf(address, "?site=27&depth=0"));
+await page.goto(addressOf(sonde.learner, "?site=27&depth=0"));
 await page.waitForFunction(() => (window.sonde?.frames ?? 0) > 3);
 let at = 0;
 const closed = () => page.evaluate(() => window.sonde.snapshot.vein_area_ratio < 0.12);
@@ -36,4 +27,4 @@ await page.waitForTimeout(2500);
 console.log(at, await page.evaluate(() => JSON.stringify(window.sonde.snapshot)));
 await page.screenshot({ path: out });
 await browser.close();
-sonde.kill("SIGINT");
+sonde.interrupt();

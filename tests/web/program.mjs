@@ -1,0 +1,28 @@
+// Starts the program for tests, pictures and benchmarks of the page.
+import { spawn } from "node:child_process";
+import { findAddress } from "./drive.mjs";
+
+/**
+ * `sonde run` with these arguments, once it has printed the learner's and the teacher's address:
+ * {child, learner, teacher, ended, interrupt}. `ended` gives the signal or the exit code. The program
+ * dies with this process.
+ */
+export function startRun(sonde, args) {
+  const child = spawn(sonde, ["run", ...args], { stdio: ["ignore", "pipe", "inherit"] });
+  process.on("exit", () => child.kill("SIGKILL"));
+  const ended = new Promise((done) => child.on("exit", (code, signal) => done(signal ?? code)));
+  let interrupted = false; // a second SIGINT would end the program at once
+  const interrupt = () => {
+    if (!interrupted) child.kill("SIGINT");
+    interrupted = true;
+  };
+  let said = "";
+  return new Promise((done, fail) => {
+    child.stdout.on("data", (text) => {
+      said += text;
+      const [learner, teacher] = said.split("\n").slice(0, -1).map(findAddress).filter(Boolean);
+      if (teacher) done({ child, learner, teacher, ended, interrupt });
+    });
+    ended.then((how) => fail(new Error(`sonde run ended with ${how} before it told its addresses: ${said}`)));
+  });
+}
