@@ -137,6 +137,7 @@ static void print_json(const sonde_case *patient, const char *protocol, const ch
   app_json_real("time_s", m->time_s);
   app_json_real("path_mm", 1e3 * m->path_m);
   app_json_real("smoothness", m->smoothness);
+  app_json_integer("taken_off", m->restores);
   app_json_object("segments");
   for (uint32_t i = 0; i < s->segment_count; ++i)
     app_json_text(s->segment[i].name, sonde_decision_name(s->segment[i].decision));

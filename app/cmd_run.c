@@ -71,6 +71,7 @@ typedef struct summary {
   double wall_s, force_max_n, rendered_max_n, penetration_max_m, vein_ratio_min, force_scale;
   double gel_volume_m3, gel_coupling;
   uint32_t faults; // latched one after the other
+  uint32_t restores;
   sonde_fault fault;
   sonde_device_link link;
   double latency_s[2]; // from pose to image: median, 99 %; NaN in lockstep
@@ -334,6 +335,7 @@ static void look(sonde_session *session, summary *seen) {
   seen->vein_ratio_min = fmin(seen->vein_ratio_min, frame.snapshot.vein_area_ratio);
   sonde_vec3 f = frame.snapshot.rendered_force_n;
   seen->rendered_max_n = fmax(seen->rendered_max_n, sqrt(f.x * f.x + f.y * f.y + f.z * f.z));
+  seen->restores = frame.snapshot.restores;
   seen->gel_volume_m3 = frame.snapshot.gel_volume_m3;
   seen->gel_coupling = frame.snapshot.gel_coupling;
 }
@@ -428,6 +430,7 @@ static void print_json(const settings *s, const summary *seen) {
   app_json_real("rendered_force_max_n", seen->rendered_max_n);
   app_json_integer("faults", seen->faults);
   app_json_text("fault", sonde_fault_text(seen->fault));
+  app_json_integer("taken_off", seen->restores);
   if (seen->link.exchanges) {
     app_json_integer("device_exchanges", (long long)seen->link.exchanges);
     app_json_integer("device_losses", (long long)seen->link.losses);
@@ -465,6 +468,11 @@ static void print_summary(const settings *s, const summary *seen) {
            (unsigned long long)seen->link.exchanges, (unsigned long long)seen->link.losses);
   printf("\nstate hash %016llx\n", (unsigned long long)seen->hash);
   if (seen->loop.priority_note[0]) printf("note: %s\n", seen->loop.priority_note);
+  if (seen->restores)
+    printf(
+        "the probe was led through the leg %u times: it was taken off until it had left the leg, "
+        "with no force and no image\n",
+        seen->restores);
   if (s->record) printf("recorded to %s\n", s->record);
 }
 

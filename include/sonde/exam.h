@@ -92,6 +92,8 @@ typedef struct sonde_snapshot {
   double gel_coupling;     /**< mean over the lines of the image, 0..1; likewise */
   double venous_pressure_pa, arterial_pressure_pa; /**< in the vessels */
   uint32_t awake_nodes, solver_iterations, flags;
+  uint32_t restores; /**< times the probe was taken off and the skin restored to rest, because the
+                          probe's path would have turned it inside out (docs/exam.md) */
   sonde_fault fault;
 } sonde_snapshot;
 

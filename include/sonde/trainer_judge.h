@@ -121,6 +121,7 @@ typedef struct sonde_metrics {
   double path_m;     /**< of the probe */
   double smoothness; /**< log dimensionless jerk of the way to a press, mean; higher is smoother */
   uint32_t hints;
+  uint32_t restores; /**< times the probe was taken off (sonde_snapshot.restores) */
 } sonde_metrics;
 SONDE_API sonde_metrics sonde_judge_metrics(const sonde_judge *judge);
 

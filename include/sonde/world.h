@@ -87,7 +87,11 @@ enum {
   SONDE_FLAG_NON_FINITE = 1u << 0,    /**< state was restored to rest, force is zero */
   SONDE_FLAG_NOT_CONVERGED = 1u << 1, /**< linear solver hit its iteration limit */
   SONDE_FLAG_CONTACT_FULL = 1u << 2,  /**< more contacts than the fixed capacity */
+  SONDE_FLAG_INSIDE_OUT = 1u << 3,    /**< pushed skin rests more than CARRIED beside the probe's
+                                           box, or all of it more than CAUGHT (docs/world.md) */
 };
+#define SONDE_CARRIED_M 40e-3 /**< a press carries skin along by some 3 mm, a slide by 10 */
+#define SONDE_CAUGHT_M 10e-3
 
 /** Time spent per stage of the last step, seconds. */
 typedef struct sonde_stage_times {

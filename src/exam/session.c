@@ -122,8 +122,6 @@ static sonde_status create_lines(sonde_session *session, sonde_error *error) {
 static sonde_status create_parts(sonde_session *session, const sonde_session_def *def,
                                  sonde_error *error) {
   sonde_status status = create_probes(session, probe_names(def), error);
-  if (!status)
-    status = sonde_surface_index_create(&def->model->surface, &session->rest_skin, error);
   bool inside = def->model->femur.face_count > 0; // else forces only
   if (!status && !inside && def->findings)
     return sonde_fail(error, SONDE_MESH, "the model has no bone and no vessels for findings");
@@ -154,7 +152,6 @@ static void release(sonde_session *session) {
   sonde_mailbox_destroy(session->frame_box);
   sonde_echo_destroy(session->echo);
   sonde_interior_destroy(session->interior);
-  sonde_surface_index_destroy(session->rest_skin);
   sonde_subject_destroy(session->subject);
   sonde_free(session->line_m);
   sonde_free(session->line_coupling);

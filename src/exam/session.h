@@ -114,7 +114,6 @@ struct sonde_session {
   _Atomic uint64_t lost_records;
 
   // image
-  sonde_surface_index *rest_skin;
   sonde_interior *interior;
   sonde_echo *echo;
   sonde_pathology shown_pathology; // of the controls

@@ -95,7 +95,8 @@ static void fill_snapshot(const sonde_session *session, sonde_snapshot *snapshot
       .gel_coupling = (double)NAN,
       .awake_nodes = sonde_state_awake(session->state),
       .solver_iterations = sonde_state_solver(session->state).iterations,
-      .flags = sonde_state_flags(session->state),
+      .flags = sonde_subject_flags(session->subject),
+      .restores = session->subject->now.restores,
       .fault = session->safety.fault,
   };
 }

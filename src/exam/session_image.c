@@ -28,11 +28,11 @@ static double penetration(const sonde_session *session, sonde_pose pose) {
   sonde_vec3 axis = q_rotate(pose.rotation, vec3(0, 0, 1));
   sonde_vec3 outside = v_madd(pose.position, -back_m, axis);
   sonde_surface_point hit;
-  bool clear = !sonde_surface_inside(session->rest_skin, outside);
-  if (clear && sonde_surface_raycast(session->rest_skin, outside, axis, reach_m, &hit))
+  bool clear = !sonde_surface_inside(session->subject->rest_skin, outside);
+  if (clear && sonde_surface_raycast(session->subject->rest_skin, outside, axis, reach_m, &hit))
     return back_m - v_dot(v_sub(hit.point_m, outside), axis);
-  double distance = sonde_surface_closest(session->rest_skin, pose.position).distance_m;
-  return sonde_surface_inside(session->rest_skin, pose.position) ? distance : -distance;
+  double distance = sonde_surface_closest(session->subject->rest_skin, pose.position).distance_m;
+  return sonde_surface_inside(session->subject->rest_skin, pose.position) ? distance : -distance;
 }
 
 static void update_interior(sonde_session *session, const unsigned char *slot) {
@@ -145,10 +145,13 @@ static void fill_frame(sonde_session *session, const unsigned char *slot, unsign
                        .height = session->image_height,
                        .pixels = out + session->pixels_at};
   double coupling = couple(session, slot);
-  if (session->echo)
+  bool off = head->snapshot.flags & SONDE_FLAG_INSIDE_OUT; // the probe sees no body
+  if (session->echo && !off)
     render(session, head, &image);
   else
     memset(image.pixels, 0, (size_t)image.width * image.height);
+  if (session->echo && off)
+    image.width_m = session->beam.aperture_m, image.height_m = session->beam.depth_m;
   sonde_frame *frame = (sonde_frame *)(void *)out;
   *frame = (sonde_frame){.snapshot = head->snapshot,
                          .skin_m = skin_m,
@@ -162,7 +165,7 @@ static void fill_frame(sonde_session *session, const unsigned char *slot, unsign
   frame->snapshot.venous_pressure_pa = head->pathology.venous_pressure_pa;
   frame->snapshot.arterial_pressure_pa = head->pathology.arterial_pressure_pa;
   frame->snapshot.penetration_m = penetration(session, head->snapshot.world_from_probe);
-  if (session->interior) sonde_snapshot_read_vessels(session->interior, &frame->snapshot);
+  if (session->interior && !off) sonde_snapshot_read_vessels(session->interior, &frame->snapshot);
 }
 
 static void count_latency(sonde_session *session, double pose_s) {

@@ -58,6 +58,7 @@ sonde_status sonde_subject_create(const sonde_setup *setup, const sonde_model *m
   subject->now.circulation = setup->circulation;
   sonde_status status = sonde_state_create(model, world, &subject->state, error);
   if (!status) status = sonde_gel_create(model, NULL, &subject->gel, error);
+  if (!status) status = sonde_surface_index_create(&model->surface, &subject->rest_skin, error);
   if (status) {
     sonde_subject_destroy(subject);
     return status;
@@ -72,6 +73,7 @@ sonde_status sonde_subject_create(const sonde_setup *setup, const sonde_model *m
 
 void sonde_subject_destroy(sonde_subject *subject) {
   if (!subject) return;
+  sonde_surface_index_destroy(subject->rest_skin);
   sonde_gel_destroy(subject->gel);
   sonde_state_destroy(subject->state);
   sonde_free(subject);

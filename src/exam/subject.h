@@ -16,6 +16,10 @@ typedef struct sonde_subject_moment {
   sonde_pose pose;                 // of the probe in the last tick
   sonde_vec3 drift_m_s;            // of the probe, mean over about a step of the gel
   bool placed, touching;
+  bool carried;      // the last step turned skin inside out
+  bool off;          // the probe is taken off until it has left the body
+  uint32_t restores; // times the skin was restored to rest for it
+  uint64_t off_tick; // last tick without the probe
 } sonde_subject_moment;
 
 typedef struct sonde_subject {
@@ -24,6 +28,7 @@ typedef struct sonde_subject {
   double dt_s;
   sonde_state *state;
   sonde_gel *gel;
+  sonde_surface_index *rest_skin;
   sonde_subject_moment now;
 } sonde_subject;
 
@@ -35,8 +40,14 @@ sonde_status sonde_subject_create(const sonde_setup *setup, const sonde_model *m
 void sonde_subject_destroy(sonde_subject *subject);
 // Other controls from the next step on. @thread tick
 void sonde_subject_control(sonde_subject *subject, const sonde_session_controls *controls);
-// One tick of world and gel. @thread tick
+// One tick of world and gel. A probe that is led where no press leads is taken off. @thread tick
 void sonde_subject_step(sonde_subject *subject, const sonde_probe *probe, sonde_pose pose);
+// Flags of the last step; INSIDE_OUT also while the probe is off and for half a second afterwards,
+// so that a viewer of some of the ticks sees it. @thread tick
+uint32_t sonde_subject_flags(const sonde_subject *subject);
+// Whether the probe is off in this tick; on the tick when it is taken off the skin goes back to
+// rest (guard_hot.c). @thread tick
+bool sonde_subject_guard(sonde_subject *subject, const sonde_probe *probe, sonde_pose pose);
 // The case with the pressures of this tick. @thread tick
 sonde_pathology sonde_subject_pathology(const sonde_subject *subject);
 // Tissue and friction that controls ask for.

@@ -82,9 +82,11 @@ void sonde_subject_step(sonde_subject *subject, const sonde_probe *probe, sonde_
   sonde_vec3 way = now->placed ? v_sub(pose.position, now->pose.position) : vec3(0, 0, 0);
   sonde_vec3 speed = v_scale(way, 1 / subject->dt_s);
   now->drift_m_s = v_madd(now->drift_m_s, 1.0 / SONDE_GEL_TICKS, v_sub(speed, now->drift_m_s));
+  bool off = sonde_subject_guard(subject, probe, pose);
   now->pose = pose;
   now->placed = true;
-  sonde_step(subject->state, probe, pose);
+  sonde_step(subject->state, off ? NULL : probe, pose);
+  now->carried = sonde_state_flags(subject->state) & SONDE_FLAG_INSIDE_OUT;
   if (now->controls.gel) step_gel(subject);
 }
 

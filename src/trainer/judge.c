@@ -232,6 +232,7 @@ bool sonde_judge_feed(sonde_judge *judge, const sonde_snapshot *snapshot) {
   else
     judge->first_s = s->time_s;
   judge->force_peak_n = fmax(judge->force_peak_n, s->force_normal_n);
+  judge->restores = s->restores;
   sonde_motion_feed(&judge->motion, s->time_s, s->world_from_probe.position);
   bool kept = watch(judge, s);
   judge->last = *s;

@@ -61,6 +61,7 @@ struct sonde_judge {
   sonde_snapshot last;
   double force_s[FORCE_BINS]; // contact time by force
   double force_peak_n, contact_s;
+  uint32_t restores;
   sonde_motion motion;
 };
 

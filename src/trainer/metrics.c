@@ -30,7 +30,8 @@ static double percentile(const sonde_judge *judge, double share) {
 }
 
 sonde_metrics sonde_judge_metrics(const sonde_judge *judge) {
-  sonde_metrics m = {.points = judge->plan.count, .hints = judge->hints};
+  sonde_metrics m = {
+      .points = judge->plan.count, .hints = judge->hints, .restores = judge->restores};
   stretches(judge, &m);
   for (uint32_t i = 0; i < judge->plan.count; ++i) m.points_done += judge->done[i];
   for (int k = 0; k < SONDE_PRESS_RESULTS; ++k)

@@ -112,6 +112,11 @@ void sonde_debrief_measures(sonde_debrief *page) {
   measure(out, "Path of the probe", with_unit(m->path_m, 1, 2, "m").s, "Shorter is calmer.");
   measure(out, "Smoothness", sonde_fixed(m->smoothness, 1).s,
           "How evenly the probe moved between presses: nearer to zero is smoother.");
+  char times[16];
+  snprintf(times, sizeof times, "%u", m->restores);
+  if (m->restores)
+    measure(out, "Probe taken off", times,
+            "Times the probe was led through the leg: it was taken off until it had left the leg.");
   sonde_text_put(out, "</tbody></table></div>\n</section>\n");
 }
 

@@ -57,6 +57,7 @@ static void put_metrics(sonde_file *file, const sonde_metrics *m) {
   real(file, &first, "path_mm", 1e3 * m->path_m);
   real(file, &first, "smoothness_ldlj", m->smoothness);
   real(file, &first, "hints", m->hints);
+  real(file, &first, "taken_off", m->restores);
 }
 
 static void put_score(sonde_file *file, const sonde_score *s) {

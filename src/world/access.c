@@ -85,6 +85,13 @@ void sonde_state_reset(sonde_state *state) {
                        !(state->def.sleep_displacement_m > 0));
 }
 
+void sonde_state_relax(sonde_state *state) {
+  uint64_t tick = state->tick, count = state->flag_count;
+  sonde_state_reset(state);
+  state->tick = tick;
+  state->flag_count = count;
+}
+
 const sonde_model *sonde_state_model(const sonde_state *state) { return state->model; }
 const sonde_world_def *sonde_state_def(const sonde_state *state) { return &state->def; }
 uint64_t sonde_state_tick(const sonde_state *state) { return state->tick; }

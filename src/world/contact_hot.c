@@ -4,6 +4,7 @@
 // apply:    regions, pushes of the chosen law, terms of the implicit matrix.
 // advance:  the pushes at the end of the step by the same linearisation.
 // wrench:   force and torque on the probe, region by region.
+// carries:  whether the probe holds skin that rests elsewhere.
 #include "world/contact.h"
 #include "world/state.h"
 
@@ -490,4 +491,22 @@ void sonde_contact_wrench(sonde_state *state, sonde_vec3 origin) {
     if (contact->region[r].force_n > 0)
       contact->region[r].centre_m =
           v_scale(contact->region[r].centre_m, 1.0 / contact->region[r].force_n);
+}
+
+static double distance_to_box(const sonde_box *box, sonde_vec3 p) {
+  return v_norm(v_sub(p, v_max(box->low, v_min(box->high, p))));
+}
+
+// Greatest and least distance from the box around the probe to where the skin that it pushes rests.
+bool sonde_contact_carries(const sonde_state *state, const sonde_probe *probe, sonde_pose pose) {
+  double most = 0, least = INFINITY;
+  sonde_box box = sonde_contact_box(probe, pose);
+  for (uint32_t k = 0; k < state->touched_count; ++k) {
+    uint32_t i = state->touched[k];
+    if (!(v_norm2(state->contact_force[i]) > 0)) continue;
+    double distance = distance_to_box(&box, state->model->surface.vertices[i]);
+    most = fmax(most, distance);
+    least = fmin(least, distance);
+  }
+  return most > SONDE_CARRIED_M || (least > SONDE_CAUGHT_M && isfinite(least));
 }

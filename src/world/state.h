@@ -67,8 +67,8 @@ struct sonde_state {
   uint32_t term_count;
   sonde_vec3 *plane_normal; // [max planes] of the probe in the world frame
   double *plane_offset;
-  double *plane_weight;   // of its distance in the depth: see depth_at()
-  sonde_vec3 origin;      // of the probe
+  double *plane_weight; // of its distance in the depth: see depth_at()
+  sonde_vec3 origin;    // of the probe
   uint32_t plane_count;
   sonde_vec3 ball_centre; // of a ball
   double ball_radius;     // > 0 for a ball
@@ -110,6 +110,8 @@ sonde_status sonde_state_create_ordered(const sonde_model *model, const sonde_wo
 void sonde_state_publish(const sonde_state *state);
 // Wakes every node. @thread tick
 void sonde_state_wake_all(sonde_state *state);
+// Back to rest in the midst of a run: tick and count of flags go on. @thread tick
+void sonde_state_relax(sonde_state *state);
 // Lists of awake rows, edges and pairs from awake[]. @thread tick
 void sonde_state_list_awake(sonde_state *state);
 
@@ -139,6 +141,9 @@ void sonde_contact_apply(sonde_state *state, const sonde_motion *probe,
 void sonde_contact_advance(sonde_state *state, const sonde_motion *probe, double lambda, double h);
 // Box of the probe in the world. @thread tick
 sonde_box sonde_contact_box(const sonde_probe *probe, sonde_pose pose);
+// After a step: whether the probe holds skin that rests elsewhere (SONDE_FLAG_INSIDE_OUT). @thread
+// tick
+bool sonde_contact_carries(const sonde_state *state, const sonde_probe *probe, sonde_pose pose);
 // Depth of a point inside the probe and its gradient; false outside. @thread tick
 bool sonde_contact_depth(const sonde_state *state, sonde_vec3 x, double *depth, sonde_vec3 *slope);
 // The law at the nodes: touched nodes whose point is inside `box`, their pushes, and their pushes

@@ -199,11 +199,8 @@ static void linear_step(sonde_state *state, const sonde_probe *probe, sonde_pose
 }
 
 static void recover(sonde_state *state) {
-  uint64_t tick = state->tick, count = state->flag_count;
-  sonde_state_reset(state);
-  state->tick = tick;
+  sonde_state_relax(state);
   state->flags = SONDE_FLAG_NON_FINITE;
-  state->flag_count = count;
 }
 
 static void finish(sonde_state *state, const sonde_probe *probe, sonde_pose pose, bool finite) {
@@ -211,6 +208,8 @@ static void finish(sonde_state *state, const sonde_probe *probe, sonde_pose pose
     recover(state);
   else if (!state->lanes)
     rest(state);
+  if (finite && probe && sonde_contact_carries(state, probe, pose))
+    state->flags |= SONDE_FLAG_INSIDE_OUT;
   state->tick++;
   state->flag_count += state->flags != 0;
   state->probe_pose = pose;

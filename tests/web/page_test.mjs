@@ -118,6 +118,20 @@ async function testStop(page) {
   check(await page.locator("#fault").isHidden(), "Resume goes on");
 }
 
+// Deeper than the skin at the knee gives way: no force, no image, and a word about it.
+async function testThrough(page) {
+  const [site, depth] = await page.evaluate(() => [window.sonde.hello.sites.at(-1).id, window.sonde.depth]);
+  await page.evaluate((id) => (window.sonde.setSite(id), window.sonde.setDepth(45)), site);
+  await page.waitForFunction(() => window.sonde.snapshot.flags & 8);
+  check(await page.locator("#fault").isVisible() && /lift the probe/i.test(await page.locator("#fault").innerText()), "a path through the leg is said");
+  await page.waitForFunction(() => Math.hypot(...window.sonde.snapshot.force_n) === 0 && window.sonde.imageSum === 0);
+  check(await page.locator("#resume").isHidden(), "there is nothing to resume");
+  await page.evaluate(() => window.sonde.setDepth(-15));
+  await page.waitForFunction(() => (window.sonde.snapshot.flags & 8) === 0);
+  check(await page.locator("#fault").isHidden(), "lifted off, the probe acts again");
+  await page.evaluate((mm) => (window.sonde.setSite(27), window.sonde.setDepth(mm)), depth);
+}
+
 async function testDrag(page) {
   const box = await page.locator("#scene").boundingBox();
   await page.evaluate(() => window.sonde.setDepth(2));
@@ -191,6 +205,7 @@ async function main() {
     await testVein(page);
     await testControls(page);
     await testStop(page);
+    await testThrough(page);
     await testDrag(page);
     check(errors.length === 0, `no errors on the console${errors.map((e) => `\n       ${e}`).join("")}`);
     await testLoss(page, server);

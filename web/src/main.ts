@@ -14,7 +14,7 @@ import { fillHelp, Readouts, Sliders } from "./panel";
 import { ForcePlot } from "./plot";
 import { Hold, nearestSite } from "./pose";
 import { PatientTools } from "./practice";
-import { VERSIONS, type Controls, type Exam, type Frame, type Hello, type Phase, type Replay, type Snapshot, type TextMessage } from "./protocol";
+import { FLAG_INSIDE_OUT, VERSIONS, type Controls, type Exam, type Frame, type Hello, type Phase, type Replay, type Snapshot, type TextMessage } from "./protocol";
 import { Rates } from "./rates";
 import { ReplayBar } from "./replay";
 import { ResultDialog } from "./result";
@@ -537,7 +537,7 @@ class App {
     this.examBar.follow(s.position_mm[2], s.penetration_mm > 0);
     if (!this.hands) this.follow(s);
     if (s.penetration_mm > -1) this.plot.add(s.penetration_mm, Math.max(0, s.force_normal_n));
-    this.showFault(s.fault);
+    this.showFault(s.fault, (s.flags & FLAG_INSIDE_OUT) !== 0);
   }
 
   /** A watching page takes over the hold that it sees, so that nothing jumps when it may control. */
@@ -559,18 +559,22 @@ class App {
   }
 
   private shownFault = -1;
-  private showFault(fault: number): void {
+  private shownOff = false;
+  /** `off`: the probe was led through the leg and is taken off. */
+  private showFault(fault: number, off: boolean): void {
     const stopped = fault !== 0 || (this.controls?.stop ?? false);
     find("resume").hidden = !stopped || !(this.controls?.controls ?? false);
-    if (fault === this.shownFault) return;
+    if (fault === this.shownFault && off === this.shownOff) return;
     this.shownFault = fault;
+    this.shownOff = off;
     const box = find("fault");
-    box.hidden = fault === 0;
-    const sentence = this.hello?.faults[fault] ?? "";
+    box.hidden = fault === 0 && !off;
+    const sentence = fault ? (this.hello?.faults[fault] ?? "") : "No probe can be pressed that far";
+    const next = fault ? "Press Resume to go on." : "Lift the probe off the leg to go on.";
     const advice = document.createElement("small");
-    advice.textContent = "The force has faded to zero. Press Resume to go on.";
+    advice.textContent = `The force has faded to zero. ${next}`;
     box.replaceChildren(`${label(sentence)}.`, document.createElement("br"), advice);
-    if (fault) announce(`${sentence}. Press Resume to go on.`);
+    if (fault || off) announce(`${sentence}. ${next}`);
   }
 }
 

@@ -238,6 +238,9 @@ export interface Line {
   points: Float32Array;
 }
 
+/** Bit of Snapshot.flags: the probe was led through the leg and is taken off until it has left it. */
+export const FLAG_INSIDE_OUT = 8;
+
 export interface Snapshot {
   tick: number;
   time_s: number;
