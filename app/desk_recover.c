@@ -3,7 +3,7 @@
 //
 // copy_member, entry_of_setup, read_old_start   what an exam is about
 // copy, take_old_part  the recording of a program that kept it under another name until its end
-// never_began, read_entry, find   one directory
+// never_began, read_entry, sweep, find   one directory
 // desk_recover         all of them
 // fill, apply, play    a journal to a judge
 // desk_derive          its files
@@ -132,6 +132,14 @@ static bool read_entry(const char *directory, const char *id, sonde_log_entry *e
   return known;
 }
 
+// Keyframes, result and report are made again; of what a killed program had begun nothing is left.
+static void sweep(const char *directory) {
+  static const char *const NAMES[] = {"exam.rec.keys", "exam.json", "report.html"};
+  char path[DESK_PATH];
+  for (size_t k = 0; k < sizeof NAMES / sizeof NAMES[0]; ++k)
+    (void)sonde_file_sweep(desk_path(path, directory, NAMES[k]));
+}
+
 static void find(const char *exams, const char *id, sonde_exam_log *log, desk_recovered *found) {
   char directory[DESK_PATH], path[DESK_PATH];
   sonde_log_entry entry = {0};
@@ -144,6 +152,7 @@ static void find(const char *exams, const char *id, sonde_exam_log *log, desk_re
     found->running++;
     return;
   }
+  sweep(directory);
   if (sonde_exam_log_has(log, id, &there, &error) || there) return;
   if (!read_entry(directory, id, &entry, found)) return;
   if (sonde_exam_log_add(log, &entry, &error))

@@ -1,18 +1,21 @@
 // Output files: whole or not at all beside their place, or straight into what cannot be replaced.
 //
 // open_beside          a temporary file in the directory of the target
+// is_temporary, is_abandoned  names and locks of such files
 // put                  what the buffer holds, to the system
 // sonde_file_*         the interface
 // sonde_directory_make
 #include "base/base.h"
 #include "base/disk.h"
 
+#include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
 #include <stdarg.h>
 #include <stdatomic.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
@@ -70,7 +73,8 @@ static int open_beside(sonde_file *file, const struct stat *old) {
     failure =
         sonde_disk_open(file->temporary, O_WRONLY | O_CREAT | O_EXCL, 0666, &file->descriptor);
   }
-  if (!failure && old) { // neither is worth a failure
+  if (!failure) (void)flock(file->descriptor, LOCK_EX | LOCK_NB); // says that it is being written
+  if (!failure && old) {                                          // neither is worth a failure
     (void)!fchown(file->descriptor, old->st_uid, old->st_gid);
     (void)!fchmod(file->descriptor, old->st_mode & 0777);
   }
@@ -264,6 +268,42 @@ void sonde_file_discard(sonde_file *file) {
   if (file->keep) put_buffer(file);
   if (file->temporary) (void)sonde_disk_remove(file->temporary);
   destroy(file);
+}
+
+// NAME.part-xxxxxx
+static bool is_temporary(const char *entry, const char *name) {
+  size_t kept = strlen(name);
+  kept = kept < NAME_KEPT ? kept : NAME_KEPT;
+  return strncmp(entry, name, kept) == 0 && strncmp(entry + kept, ".part-", 6) == 0 &&
+         strspn(entry + kept + 6, "0123456789abcdef") == 6 && entry[kept + 12] == 0;
+}
+
+// Its writer holds the lock as long as it lives.
+static bool is_abandoned(const char *path) {
+  int descriptor = open(path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW);
+  bool free_now = descriptor >= 0 && flock(descriptor, LOCK_EX | LOCK_NB) == 0;
+  if (descriptor >= 0) (void)close(descriptor);
+  return free_now;
+}
+
+uint32_t sonde_file_sweep(const char *path) {
+  SONDE_ASSERT(path);
+  char target[PATH_MAX];
+  int own = -1;
+  uint32_t removed = 0;
+  if (sonde_disk_follow(path, target, &own) || own >= 0) return 0;
+  char *name = strrchr(target, '/');
+  if (!name) return 0;
+  *name++ = 0;
+  DIR *list = opendir(target[0] ? target : "/");
+  for (const struct dirent *entry; list && (entry = readdir(list));) {
+    char part[2 * PATH_MAX];
+    snprintf(part, sizeof part, "%s/%s", target, entry->d_name);
+    if (is_temporary(entry->d_name, name) && is_abandoned(part))
+      removed += sonde_disk_remove(part) == 0;
+  }
+  if (list) closedir(list);
+  return removed;
 }
 
 sonde_status sonde_file_in_memory(sonde_file **out, sonde_error *error) {

@@ -10,6 +10,7 @@
 #include <signal.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 static char directory[256], target[300];
@@ -52,6 +53,41 @@ static void write_all(const char *text) {
   assert_int_equal(sonde_file_create(target, &file, NULL), SONDE_OK);
   sonde_file_write(file, text, strlen(text));
   assert_int_equal(sonde_file_commit(file, NULL), SONDE_OK);
+}
+
+// A child that is killed leaves its temporary file; what lives is not touched, nor other names.
+static void sweep_takes_what_the_dead_left(void **state) {
+  (void)state;
+  char other[320];
+  snprintf(other, sizeof other, "%s/target.bin.part-of", directory);
+  int pipe_of[2];
+  char byte;
+  assert_int_equal(pipe(pipe_of), 0);
+  pid_t child = fork();
+  if (child == 0) {
+    sonde_file *file;
+    bool good = sonde_file_create(target, &file, NULL) == SONDE_OK;
+    good = good && write(pipe_of[1], "x", 1) == 1;
+    alarm(20); // a failing test leaves no child
+    for (; good;) pause();
+    _exit(1);
+  }
+  assert_int_equal(read(pipe_of[0], &byte, 1), 1);
+  assert_int_equal(sonde_file_sweep(target), 0); // it lives
+  assert_int_equal(count_entries(), 1);
+  kill(child, SIGKILL);
+  assert_int_equal(waitpid(child, NULL, 0), child);
+  sonde_file *mine;
+  assert_int_equal(sonde_file_create(target, &mine, NULL), SONDE_OK);
+  fclose(fopen(other, "w"));
+  assert_int_equal(sonde_file_sweep(target), 1);
+  assert_int_equal(count_entries(), 2);
+  assert_int_equal(sonde_file_sweep("/nonexistent-directory/x"), 0);
+  sonde_file_write(mine, "mine", 4);
+  assert_int_equal(sonde_file_commit(mine, NULL), SONDE_OK);
+  expect_content("mine");
+  close(pipe_of[0]), close(pipe_of[1]);
+  assert_int_equal(unlink(other), 0);
 }
 
 static void commit_publishes_the_whole(void **state) {
@@ -392,6 +428,7 @@ static void a_check_foresees_whether_a_file_can_be_made(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
+      FILE_TEST(sweep_takes_what_the_dead_left),
       FILE_TEST(commit_publishes_the_whole),
       FILE_TEST(commit_replaces_and_keeps_the_usual_mode),
       FILE_TEST(discard_leaves_the_old_file),
