@@ -358,6 +358,12 @@ static sonde_status leave_out(const fit_arguments *a, const fit_inputs *in,
   return status;
 }
 
+// Who says the exponent of stage 3.
+static const char *exponent_from(const fit_arguments *a) {
+  if (chooses_exponent(a)) return "chosen by the held-out error";
+  return a->exponent ? "given" : "given (default)";
+}
+
 static sonde_status write_report(const fit_arguments *a, const fit_inputs *in,
                                  const sonde_model *model, const fit_outcome *out,
                                  sonde_error *error) {
@@ -368,6 +374,7 @@ static sonde_status write_report(const fit_arguments *a, const fit_inputs *in,
                                  .data = &in->measurements,
                                  .result = &out->result,
                                  .command_line = a->command_line,
+                                 .exponent_from = exponent_from(a),
                                  .hold_out_name = name,
                                  .hold_out = a->hold_out ? &out->hold_out : NULL,
                                  .also = out->also.all.count ? &out->also : NULL,
@@ -507,6 +514,7 @@ static void print_json(const fit_arguments *a, const sonde_measurements *data,
     app_json_close();
   }
   app_json_real("normal_exponent", r->law.normal_exponent);
+  if (def->stages >= 3) app_json_text("normal_exponent_from", exponent_from(a));
   fit_checks_print_json(&out->checks);
   fit_tables_print_json(data, def, r);
   fit_doubts_print_json(&out->doubts, a->measurements);
@@ -548,7 +556,7 @@ static void print_table(const fit_arguments *a, const sonde_measurements *data,
     for (int k = 0; k < SONDE_FIT_EXPONENTS && out->tried[0].exponent > 0; ++k)
       printf("exponent %g: %.2f %%, one site left out %.2f %%%s\n", out->tried[k].exponent,
              out->tried[k].mae_percent, out->tried[k].held_out_percent,
-             out->tried[k].exponent == r->law.normal_exponent ? " (kept)" : "");
+             out->tried[k].exponent == r->law.normal_exponent ? " (chosen)" : "");
     printf("shear stiffness %.3f N/m, limit %.3f, in-plane stiffness %.3g N/m, %u iterations\n",
            r->law.shear_stiffness_n_m, r->law.shear_limit, r->law.inplane_stiffness_n_m,
            r->iterations);

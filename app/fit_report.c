@@ -73,14 +73,15 @@ static void add_parameters(builder *b) {
     b->parameter[count++] =
         (sonde_report_parameter){"shear stiffness G", "N/m", g, "bootstrap over sites, linearised"};
     b->parameter[count++] = (sonde_report_parameter){"shear limit gm", "slope", gm, NULL};
-    b->parameter[count++] = (sonde_report_parameter){
-        "exponent of the normal springs", "", sonde_report_value(r->law.normal_exponent), "chosen"};
+    b->parameter[count++] =
+        (sonde_report_parameter){"exponent of the normal springs", "",
+                                 sonde_report_value(r->law.normal_exponent), b->in->exponent_from};
     b->parameter[count++] = (sonde_report_parameter){
         "tangential stiffness", "N/m3", sonde_report_value(r->law.tangential_stiffness_n_m3),
-        "chosen: these data do not determine it"};
-    b->parameter[count++] =
-        (sonde_report_parameter){"in-plane stiffness of the skin", "N/m",
-                                 sonde_report_value(r->law.inplane_stiffness_n_m), "chosen"};
+        "given: these data do not determine it"};
+    b->parameter[count++] = (sonde_report_parameter){
+        "in-plane stiffness of the skin", "N/m", sonde_report_value(r->law.inplane_stiffness_n_m),
+        "given: these data do not determine it"};
     b->parameter[count++] =
         (sonde_report_parameter){"smoothness of ln k0 and ln xm per site spacing", "",
                                  sonde_report_value(c->smoothness_sd), "by leaving sites out"};

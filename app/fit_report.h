@@ -10,6 +10,7 @@ typedef struct fit_findings {
   const sonde_measurements *data;
   const sonde_fit_result *result;
   const char *command_line;
+  const char *exponent_from;          // who says the exponent of the normal springs
   const char *hold_out_name;          // NULL: none
   const sonde_error_report *hold_out; // NULL: none
   const sonde_error_report *also;     // probes that were never fitted, in the same folds; or NULL
