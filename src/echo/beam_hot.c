@@ -1,11 +1,10 @@
-// From the scattered field to the envelope: local gain, lateral kernels, specular echoes, axial
-// kernels, receiver noise, time-gain compensation.
+// From the scattered field to the envelope: local gain, interfaces, lateral kernels, axial kernels,
+// receiver noise, time-gain compensation.
 //
 // sonde_echo_beam  all stages, row by row
 // window_row       a row of the grid
 // merge_row        one row of the field times what tissue and losses leave
 // lateral_row      lateral kernels at its depth, normalised to unit speckle
-// add_specular     echoes of interfaces, carrier phase included
 // sonde_echo_compensation_db  time-gain compensation at a depth
 // axial_rows       pulse, noise, compensation, modulus
 #include "base/base.h"
@@ -76,28 +75,10 @@ static void lateral_row(sonde_echo *echo, uint32_t sample, bool tissue) {
     job.im[k] = echo->line_im[k] + echo->pad_lines / SONDE_FINE;
   }
   merge_row(echo, sample, tissue);
+  const double *sheet = psf->sheet + band;
+  if (tissue)
+    sonde_sheet_lay(echo, sample, (float)(1 / (scale * (sheet[0] + t * (sheet[1] - sheet[0])))));
   echo->kernels->lateral(&job);
-}
-
-// A sheet is smooth along the lines: its echo enters after the lateral kernel, one per line.
-// Roughness comes with the tissue's own speckle beside it.
-static void add_specular(sonde_echo *echo, uint32_t sample) {
-  const frame *f = &echo->frame;
-  float *row = ring_row(echo, sample);
-  int64_t place = (int64_t)sample - echo->pad_samples;
-  for (int64_t list = place - 1; list <= place; ++list) {
-    if (list < 0 || list >= echo->samples) continue;
-    for (int32_t e = echo->first_echo[list]; e >= 0; e = echo->echoes[e].next) {
-      const specular *s = &echo->echoes[e];
-      double depth = (double)s->depth_m, share = 1 - fabs(depth / f->step_m - (double)place);
-      double angle = -4 * SONDE_PI * depth / f->wavelength_m, size = share * (double)s->amplitude;
-      for (uint32_t k = 0; k < SONDE_RANK; ++k) {
-        double pulse = size * echo->psf->pulse[k];
-        row[2 * k * echo->padded + s->line] += (float)(pulse * cos(angle));
-        row[(2 * k + 1) * echo->padded + s->line] += (float)(pulse * sin(angle));
-      }
-    }
-  }
 }
 
 // Gain at a depth, dB. The slope is the operator's; the ceiling is the scanner's.
@@ -148,7 +129,6 @@ void sonde_echo_beam(sonde_echo *echo, uint32_t tier, bool tissue) {
   const uint32_t first = tier * echo->tier_rows, end = first + echo->tier_rows;
   for (uint32_t n = first; n < end && n < echo->grid_samples; ++n) {
     lateral_row(echo, n, tissue);
-    if (tissue) add_specular(echo, n);
     if (n < 2 * echo->pad_samples) continue;
     uint32_t sample = n - 2 * echo->pad_samples; // the newest that has all its rows
     uint32_t before = sample % AXIAL_MOST;

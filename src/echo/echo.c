@@ -155,6 +155,7 @@ static size_t carve(sonde_echo *echo, char *block) {
   CARVE(echo->knots, lines * TEXTURES * KNOT_FLOATS);
   CARVE(echo->scatter, lines);
   CARVE(echo->loss, lines);
+  CARVE(echo->rough, lines);
   CARVE(echo->gain, (most_lines / SONDE_FINE + ECHO_ALIGN) * SONDE_MEDIUM_ROWS);
   CARVE(echo->loss_db, lines);
   CARVE(echo->tail, lines);
@@ -186,11 +187,11 @@ static bool allocate(sonde_echo *echo) {
   echo->node = SONDE_NEW(plane_node, SONDE_PLANE_NODES);
   echo->plane = SONDE_NEW(float, SONDE_PLANE_NODES *MOST_FIELDS + 2 * ECHO_ALIGN);
   echo->air = SONDE_NEW(uint8_t, echo->padded);
-  echo->echoes = SONDE_NEW(specular, SONDE_MAX_ECHOES);
-  echo->first_echo = SONDE_NEW(int32_t, echo->samples);
+  echo->sheet = SONDE_NEW(sheet_point, SONDE_SHEET_POINTS);
+  echo->first_sheet = SONDE_NEW(int32_t, echo->samples + 2 * SONDE_MOST_TAPS);
   echo->seen = SONDE_NEW(uint64_t, SONDE_BOX_CUBES / 64);
   return echo->block && echo->psf && echo->spare && echo->node && echo->plane && echo->air &&
-         echo->echoes && echo->first_echo && echo->seen;
+         echo->sheet && echo->first_sheet && echo->seen;
 }
 
 // Each set of kernels has its own order.
@@ -249,8 +250,8 @@ sonde_status sonde_echo_create(const sonde_interior *interior, const sonde_echo_
 
 void sonde_echo_destroy(sonde_echo *echo) {
   if (echo == NULL) return;
-  void *parts[] = {echo->block, echo->psf,        echo->spare,  echo->node, echo->plane,
-                   echo->air,   echo->first_echo, echo->echoes, echo->seen};
+  void *parts[] = {echo->block, echo->psf,         echo->spare, echo->node, echo->plane,
+                   echo->air,   echo->first_sheet, echo->sheet, echo->seen};
   for (size_t i = 0; i < SONDE_COUNT_OF(parts); ++i) sonde_free(parts[i]);
   sonde_free(echo);
 }

@@ -14,11 +14,11 @@ enum {
   SONDE_PLANE_COLUMNS = 25, // coarse nodes across the lines
   SONDE_PLANE_ROWS = 57,    // and down, at most
   SONDE_PLANE_NODES = SONDE_PLANE_COLUMNS * SONDE_PLANE_ROWS,
-  SONDE_MEDIUM_ROWS = 256,                  // steps of the march along the lines
-  SONDE_MAX_ECHOES = 24 * SONDE_MOST_LINES, // specular echoes
-  SONDE_POOL = 16384,                       // random scatterers shared by all cubes
-  SONDE_LOOSE = 8192,                       // the same for pieces of cubes
-  SONDE_BLOOD = 16384,                      // streamlines of one vessel
+  SONDE_MEDIUM_ROWS = 256,                    // steps of the march along the lines
+  SONDE_SHEET_POINTS = 64 * SONDE_MOST_LINES, // of the interfaces
+  SONDE_POOL = 16384,                         // random scatterers shared by all cubes
+  SONDE_LOOSE = 8192,                         // the same for pieces of cubes
+  SONDE_BLOOD = 16384,                        // streamlines of one vessel
   SONDE_NOISE = 65536,
   SONDE_BOX_CUBES = 1 << 24, // cubes of the box around the slab
   // Cubes that the slab touches. The widest view that sonde_echo_check_view() allows is a sector of
@@ -30,11 +30,13 @@ enum {
 _Static_assert((int)MOST_VESSELS == (int)SONDE_VESSELS, "vessels in view");
 _Static_assert((int)MOST_LESIONS == (int)SONDE_LESIONS, "lesions in view");
 
-typedef struct specular {
-  float depth_m, amplitude;
-  uint32_t line;
-  int32_t next; // in the list of its sample, -1 at the end
-} specular;
+// An interface on one column of the grid, carrier phase included.
+typedef struct sheet_point {
+  float re, im;
+  float beyond; // its depth beyond the row nearest to it, rows
+  uint32_t column;
+  int32_t next; // in the list of its row, -1 at the end
+} sheet_point;
 
 // What the stages of one frame share.
 typedef struct frame {
@@ -103,6 +105,7 @@ struct sonde_echo {
   float *knots;            // [padded][TEXTURES][KNOT_FLOATS] of the textures, kernel.h
   float *scatter;          // [padded] of this row
   float *loss;             // [padded] of this row
+  float *rough;            // [padded] of this row
   float *gain;     // [MEDIUM_ROWS][gain_stride] of the grid's even columns: beside the outer lines
                    // those go on
   float *loss_db;  // [padded] accumulated
@@ -110,9 +113,9 @@ struct sonde_echo {
   uint8_t *air;    // [padded]
   float *coupling; // [padded] share of the amplitude that passes the face, 0..1
   bool some_air;
-  specular *echoes; // [MAX_ECHOES]
-  uint32_t echo_count;
-  int32_t *first_echo; // [samples] list of the echoes between this sample and the next
+  sheet_point *sheet; // [SHEET_POINTS]
+  uint32_t sheet_count;
+  int32_t *first_sheet; // [samples + 2 MOST_TAPS] list of those nearest to each row of the grid
   float *grid; // [window_rows + 2][grid_stride] scattered field, kernel.h; zero between frames
   float *line_re[SONDE_FINE]; // one row of it with its gain: [grid_lines / FINE]
   float *line_im[SONDE_FINE];
@@ -147,6 +150,12 @@ void sonde_echo_frame(sonde_echo *echo, sonde_pose world_from_probe, double aper
                       const sonde_echo_settings *settings);
 void sonde_echo_plane(sonde_echo *echo);
 void sonde_echo_medium(sonde_echo *echo);
+// Interfaces: none; one that crosses a line, `rise_m` deeper on each column to the right, its echo
+// where it is level over the rms of muscle speckle; those near one row, times a gain, into the
+// row's columns.
+void sonde_sheet_begin(sonde_echo *echo);
+void sonde_sheet_add(sonde_echo *echo, uint32_t line, float depth_m, float rise_m, float amplitude);
+void sonde_sheet_lay(sonde_echo *echo, uint32_t row, float gain);
 // Tissue and blood, which then wait for their tiers.
 void sonde_echo_scatter(sonde_echo *echo);
 void sonde_echo_blood(sonde_echo *echo);

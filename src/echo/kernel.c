@@ -456,8 +456,9 @@ static void fade(const fade_job *job) {
   SONDE_ASSERT(job->clutter >= 0 && job->kept <= 1);
   for (uint32_t l = 0; l < job->lines; l += W) {
     vf loss = smaller(load(job->loss_db + l), all(600)), tail = load(job->tail + l);
-    vf own = load(job->scatter + l) * power2(loss * -0.16609640474f), power = own * own;
-    store(job->gain + l, root(power + job->clutter * tail));
+    vf left = power2(loss * -0.16609640474f), facets = load(job->rough + l) * left;
+    vf own = load(job->scatter + l) * left, power = own * own;
+    store(job->gain + l, root(power + facets * facets + job->clutter * tail));
     store(job->tail + l, job->kept * (tail + job->fresh * (power - tail)));
   }
 }

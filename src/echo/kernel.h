@@ -170,10 +170,13 @@ typedef struct tissue_job {
   tissue_vessel vessel[MOST_VESSELS]; // branches after their parents
   tissue_lesion lesion[MOST_LESIONS];
   float bone_radius_m;
-  float webs, oedema; // 0..1
+  float webs, oedema;        // 0..1
+  float rough_bone, rough_m; // amplitude over muscle on a level cortex, fading over so far above it
+  float rows_per_m;          // of the march, 0 in its first row
   bool plain;
   float *memory; // [lines][TEXTURES][KNOT_FLOATS], of one set of kernels; all bits set: empty
   float *scatter, *loss; // amplitude over muscle, dB/m/MHz one way
+  float *rough;          // what the cortex's facets scatter besides
   float *level;          // [levels][lines] signed: sign changes are interfaces
   const float *before;   // the same of the row above
   uint8_t *crossed;      // [lines / ECHO_ALIGN] whether any sign of these lines changed
@@ -181,7 +184,7 @@ typedef struct tissue_job {
 
 // Gain of a row of the march: what scatters there and is left behind the losses, and clutter.
 typedef struct fade_job {
-  const float *scatter, *loss_db; // [lines]
+  const float *scatter, *rough, *loss_db; // [lines]; facets send nothing back that comes late
   float *tail;       // [lines] power that reverberates above this row; moves on to the next
   float *gain;       // [lines] amplitude
   float clutter;     // share of the power that comes late

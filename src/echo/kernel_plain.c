@@ -192,9 +192,10 @@ static void mix(const float *top, const float *low, float share, float *out, uin
 
 static void fade(const fade_job *job) {
   for (uint32_t l = 0; l < job->lines; ++l) {
-    double own = (double)job->scatter[l] * pow(10, -fmin((double)job->loss_db[l], 600) / 20);
+    double left = pow(10, -fmin((double)job->loss_db[l], 600) / 20);
+    double own = (double)job->scatter[l] * left, facets = (double)job->rough[l] * left;
     double power = own * own, tail = (double)job->tail[l];
-    job->gain[l] = (float)sqrt(power + (double)job->clutter * tail);
+    job->gain[l] = (float)sqrt(power + facets * facets + (double)job->clutter * tail);
     job->tail[l] = (float)((double)job->kept * (tail + (double)job->fresh * (power - tail)));
   }
 }

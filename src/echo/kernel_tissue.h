@@ -6,6 +6,7 @@
 // clot_surface, clot_grain  a clot's free surface and unevenness
 // vessels            walls, lumina, clots
 // layers             skin, fat, muscle
+// periosteum         the cortex's roughness
 // paint              one vector of lines
 #ifndef SONDE_SRC_ECHO_KERNEL_TISSUE_H
 #define SONDE_SRC_ECHO_KERNEL_TISSUE_H
@@ -18,6 +19,7 @@
 static const float skin_tissue[2] = {2.2f, 100}, fat_tissue[2] = {0.40f, 50},
                    muscle_tissue[2] = {0.85f, 100}, wall_tissue[2] = {1.9f, 110},
                    blood_tissue[2] = {0.06f, 18}, bone_tissue[2] = {0.02f, 200};
+static const float rough_tangent = 0.4f; // angle at which fewer facets by 1/e look at the probe
 static const float outside_loss = 0.2f;
 static const float node_loss = 60, haematoma_loss = 45, fluid_tissue[2] = {0.006f, 5};
 static const float capsule_m = 0.3e-3f, capsule_scatter = 1.4f, hilum_scatter = 1.2f;
@@ -150,6 +152,18 @@ INLINE void vessels(const tissue_job *job, knots *memory, const float *f, const 
   }
 }
 
+// Facets of the cortex scatter towards the probe; the fewer, the more the cortex is inclined. The
+// distance to it grows along a line with the cosine of the angle between line and normal.
+INLINE vf periosteum(const tissue_job *job, vf inside, vf before) {
+  vi near = (inside <= 0) & (inside > -job->rough_m);
+  if (!any(near)) return all(0);
+  vf cosine = smaller(larger((inside - before) * job->rows_per_m, all(0.05f)), all(1));
+  vf square = 1 / (cosine * cosine) - 1;                              // of the tangent
+  vf fewer = square * (-1.442695f / (rough_tangent * rough_tangent)); // octaves
+  vf size = power2(larger(fewer, all(-60)));
+  return only(near, job->rough_bone * size * (1 + inside / job->rough_m));
+}
+
 // Returns the lanes in which a level changed sign since the row above.
 INLINE vi paint(const tissue_job *job, uint32_t l) {
   const float *f = job->row + l;
@@ -178,6 +192,7 @@ INLINE vi paint(const tissue_job *job, uint32_t l) {
   mark(level[3] > 0, all(bone_tissue[0]), bone_tissue[1], tissue);
   mark(level[0] < 0, all(0), outside_loss, tissue);
   store(job->scatter + l, tissue[0]), store(job->loss + l, tissue[1]);
+  store(job->rough + l, periosteum(job, level[3], load(job->before + 3 * n + l)));
   vi changed = all_of(0);
   for (uint32_t k = 0; k < levels; ++k) {
     changed |= (level[k] < 0) ^ (load(job->before + k * n + l) < 0);

@@ -1,5 +1,5 @@
-// March along the scan lines through the deformed tissue: backscatter, attenuation, specular
-// echoes at interfaces, shadow of the bone, air. Constants and sources: docs/echo.md.
+// March along the scan lines through the deformed tissue: backscatter, attenuation, interfaces,
+// shadow of the bone, air. Constants and sources: docs/echo.md.
 //
 // sonde_echo_medium  all rows of the march
 // place_lines, widen, next_row    coarse plane -> one row, per line
@@ -21,24 +21,26 @@ static const float air_gap_m = 2e-3f;
 // power over that of the tissue above, and the depth over which it fades.
 static const float clutter_power = 0.02f, clutter_m = 5e-3f;
 
-// Echo of an interface over the rms of muscle speckle: decibels at normal incidence, the angle's
-// tangent at which the specular part has fallen by 1/e, the diffuse share that stays, and what the
-// passage costs beyond, dB.
+// Echo of an interface at normal incidence over the rms of muscle speckle, and what the passage
+// costs beyond, dB. At other angles the beam decides what comes back.
 typedef struct interface {
-  float db, tangent, diffuse, loss_db;
+  float db, loss_db;
 } interface;
 static const interface interfaces[LAYER_LEVELS] = {
-    {18, 0.5f, 0.3f, 0},   // skin
-    {10, 0.3f, 0.2f, 0},   // dermis and fat
-    {21, 0.22f, 0.12f, 0}, // fascia
-    {36, 0.4f, 0.02f, 55}, // cortex
+    {18, 0},  // skin
+    {10, 0},  // dermis and fat
+    {21, 0},  // fascia
+    {36, 55}, // cortex
 };
-static const interface vessel_wall = {17, 0.5f, 0.12f, 0};
+static const interface vessel_wall = {20, 0};
 static const interface lesion_edges[SONDE_LESION_KINDS] = {
-    {9, 0.5f, 0.2f, 0},   // capsule of a node
-    {15, 0.5f, 0.12f, 0}, // cyst
-    {3, 0.5f, 0.4f, 0},   // haematoma
+    {9, 0},  // capsule of a node
+    {15, 0}, // cyst
+    {3, 0},  // haematoma
 };
+// Scatterers of the cortex's facets: their echo where it is level over the smooth cortex's, and how
+// thick they lie on it.
+static const float rough_share = 0.3f, rough_m = 0.4e-3f;
 static const float wall_m[2] = {0.6e-3f, 0.9e-3f}, thin_wall = 0.25f; // of a branch's radius
 
 static void place_lines(sonde_echo *echo) {
@@ -94,17 +96,6 @@ static float roughness(const sonde_echo *echo, uint32_t l, uint32_t salt) {
   return top + b * (low - top);
 }
 
-// Into the list of the sample above it.
-static void record(sonde_echo *echo, uint32_t l, float depth_m, float amplitude) {
-  SONDE_ASSERT(l < echo->lines);
-  float at = depth_m / (float)echo->frame.step_m;
-  if (echo->echo_count >= SONDE_MAX_ECHOES || !(amplitude > 0) || !(at >= 0)) return;
-  if (at >= (float)(echo->samples - 1)) return;
-  int32_t *first = echo->first_echo + (uint32_t)at;
-  echo->echoes[echo->echo_count] = (specular){depth_m, amplitude, l, *first};
-  *first = (int32_t)echo->echo_count++;
-}
-
 static const interface *interface_of(const sonde_echo *echo, uint32_t level) {
   if (level < LAYER_LEVELS) return &interfaces[level];
   level -= LAYER_LEVELS;
@@ -145,15 +136,10 @@ static void cross(sonde_echo *echo, uint32_t row, uint32_t l, uint32_t which) {
   float dz = (float)(echo->frame.depth_m / (SONDE_MEDIUM_ROWS - 1));
   float t = before / (before - now[l]), slope = (now[l] - before) / dz;
   float across = (now[right] - now[left]) / (float)(right - left);
-  float pitch = (float)(echo->frame.pitch_m); // at the depth of the crossing
-  float depth = ((float)row - 1 + t) * dz;
-  if (echo->frame.radius_m > 0) pitch *= 1 + depth / (float)echo->frame.radius_m;
-  float tangent = across / pitch / (fabsf(slope) > 1e-6f ? slope : 1e-6f);
-  float q = tangent / kind->tangent;
-  float shape = kind->diffuse + (1 - kind->diffuse) * expf(-q * q);
+  float rise = -across / (SONDE_FINE * (fabsf(slope) > 1e-6f ? slope : 1e-6f));
   float rough = echo->plain ? 0 : 4 * roughness(echo, l, salt_of(echo, which));
-  shape *= echo->coupling[l];
-  record(echo, l, depth, amplitude_of_db(kind->db + rough - echo->loss_db[l]) * shape);
+  float amplitude = echo->coupling[l] * amplitude_of_db(kind->db + rough - echo->loss_db[l]);
+  sonde_sheet_add(echo, l, ((float)row - 1 + t) * dz, rise, amplitude);
   echo->loss_db[l] += kind->loss_db;
 }
 
@@ -173,7 +159,8 @@ static void cross_levels(sonde_echo *echo, uint32_t row, const uint8_t *crossed)
 // Bands at multiples of the face's own thickness, fading; as loud as what does not couple in.
 static void reverberate(sonde_echo *echo, uint32_t l, float loudness) {
   for (int k = 0; k < 6; ++k)
-    record(echo, l, 0.4e-3f + 1.3e-3f * (float)k, loudness * 6.0f * exp2f(-1.4f * (float)k));
+    sonde_sheet_add(echo, l, 0.4e-3f + 1.3e-3f * (float)k, 0,
+                    loudness * 6.0f * exp2f(-1.4f * (float)k));
 }
 
 static void mark_air(sonde_echo *echo) {
@@ -213,6 +200,7 @@ static void store_gain(sonde_echo *echo, uint32_t row) {
   const float dz = (float)(echo->frame.depth_m / (SONDE_MEDIUM_ROWS - 1));
   const fade_job job = {
       .scatter = echo->scatter,
+      .rough = echo->rough,
       .loss_db = echo->loss_db,
       .tail = echo->tail,
       .gain = gain + first,
@@ -239,6 +227,16 @@ static tissue_vessel vessel_of(const sonde_pathology *p, uint32_t which, float w
                          .lumps_db = 1.5f + 4 * age,
                          .layers_db = 8 * age,
                          .number = which};
+}
+
+// Facets lie thinner than the pulse is long, which they fill only in part. The energy of a tent is
+// a third of its height's over its width; that of the pulse is 0.83 wavelengths of its peak's.
+static void roughen(const sonde_echo *echo, tissue_job *job) {
+  const float row_m = (float)(echo->frame.depth_m / (SONDE_MEDIUM_ROWS - 1));
+  job->rough_m = fmaxf(rough_m, row_m);
+  float filled = 0.83f * (float)echo->frame.wavelength_m / (job->rough_m / 3);
+  job->rough_bone = echo->plain ? 0 : rough_share * amplitude_of_db(interfaces[3].db);
+  job->rough_bone *= sqrtf(1 + filled);
 }
 
 static void materials(const sonde_echo *echo, tissue_job *job) {
@@ -275,24 +273,27 @@ void sonde_echo_medium(sonde_echo *echo) {
                     .memory = echo->knots,
                     .scatter = echo->scatter,
                     .loss = echo->loss,
+                    .rough = echo->rough,
                     .crossed = crossed};
   materials(echo, &job);
+  roughen(echo, &job);
   memset(echo->loss_db, 0, lines * sizeof *echo->loss_db);
   memset(echo->tail, 0, lines * sizeof *echo->tail);
-  echo->echo_count = 0;
+  sonde_sheet_begin(echo);
   place_lines(echo);
-  for (uint32_t n = 0; n < echo->samples; ++n) echo->first_echo[n] = -1;
   for (uint32_t row = 0; row < SONDE_MEDIUM_ROWS; ++row) {
     next_row(echo, row, &reached);
     job.level = echo->level[row % 2], job.before = echo->level[(row + 1) % 2];
     echo->kernels->tissue(&job);
+    job.rows_per_m = (float)((SONDE_MEDIUM_ROWS - 1) / f->depth_m);
     if (row == 0) mark_air(echo);
     blur(echo, echo->loss_db);
     blur(echo, echo->tail);
     if (row > 0) cross_levels(echo, row, crossed);
     for (uint32_t l = 0; l < lines && echo->some_air; ++l)
-      if (echo->air[l]) echo->scatter[l] = 0;
-    for (uint32_t l = 0; l < lines; ++l) echo->scatter[l] *= echo->coupling[l];
+      if (echo->air[l]) echo->scatter[l] = echo->rough[l] = 0;
+    for (uint32_t l = 0; l < lines; ++l)
+      echo->scatter[l] *= echo->coupling[l], echo->rough[l] *= echo->coupling[l];
     store_gain(echo, row);
     for (uint32_t l = 0; l < lines; ++l) echo->loss_db[l] += echo->loss[l] * step;
   }

@@ -123,6 +123,7 @@ void sonde_echo_frame(sonde_echo *echo, sonde_pose world_from_probe, double aper
                       const sonde_echo_settings *settings) {
   sonde_echo_geometry(echo, aperture_m, settings);
   frame *f = &echo->frame;
+  echo->lost = 0;
   f->probe = world_from_probe;
   f->from_world = m_transpose(q_matrix(world_from_probe.rotation));
   beam_key key = sonde_echo_key(f);

@@ -11,6 +11,7 @@
 // depth_of_band, add_band  response of one band
 // add_gram, mirror_gram, iterate  shared axial kernels
 // orthonormalise    Gram-Schmidt
+// measure_sheet     what a level sheet echoes
 // project           lateral kernels of a band, their reach
 #include "echo/psf.h"
 
@@ -23,7 +24,8 @@
 enum { ROWS = 2 * SONDE_MOST_TAPS + 1, ITERATIONS = 40 };
 
 static const double first_depth_m = 1.5e-3;
-static const double lost = 1e-3; // energy share beyond the kernel's reach
+static const double lost = 1e-3;        // energy share beyond the kernel's reach
+static const double sheet_weight = 0.2; // of a level sheet's echo against a point's
 
 sonde_array sonde_beam_array(const beam_key *key) {
   sonde_array a = sonde_array_default();
@@ -127,6 +129,14 @@ static void add_gram(beam_psf *psf, int b) {
       for (int j = 0; j <= i; ++j)
         psf->gram[i][j] += w * (p[2 * i] * p[2 * j] + p[2 * i + 1] * p[2 * j + 1]);
   }
+  // Interfaces are the brightest echoes: what a level sheet echoes, the sum over the lines, counts
+  // besides.
+  double sum[2 * ROWS] = {0};
+  for (int l = 0; l <= psf->half_lines; ++l)
+    for (int i = 0; i < 2 * rows; ++i) sum[i] += weight_of(l) * psf->table[b][l][i];
+  for (int i = 0; i < rows; ++i)
+    for (int j = 0; j <= i; ++j)
+      psf->gram[i][j] += sheet_weight * (sum[2 * i] * sum[2 * j] + sum[2 * i + 1] * sum[2 * j + 1]);
 }
 
 static void mirror_gram(beam_psf *psf) {
@@ -149,11 +159,15 @@ static void orthonormalise(double v[SONDE_RANK][ROWS], int rows) {
   }
 }
 
+// Standard deviation of the pulse, rows.
+static double pulse_rows(const beam_psf *psf) {
+  sonde_array a = sonde_beam_array(&psf->key);
+  return a.pulse_wavelengths * a.sound_m_s / a.frequency_hz / 2.35482 / psf->key.step_m;
+}
+
 static void iterate(beam_psf *psf) {
   int rows = 2 * psf->half_rows + 1;
-  double product[SONDE_RANK][ROWS];
-  sonde_array a = sonde_beam_array(&psf->key);
-  double sigma = a.pulse_wavelengths * a.sound_m_s / a.frequency_hz / 2.35482 / psf->key.step_m;
+  double product[SONDE_RANK][ROWS], sigma = pulse_rows(psf);
   for (int i = 0; i < rows; ++i) {
     double x = (i - psf->half_rows) / sigma, e = exp(-0.5 * x * x);
     psf->axial[0][i] = e, psf->axial[1][i] = x * e, psf->axial[2][i] = (x * x - 1) * e;
@@ -169,13 +183,33 @@ static void iterate(beam_psf *psf) {
     memcpy(psf->axial, product, sizeof product);
     orthonormalise(psf->axial, rows);
   }
+}
+
+// Every column of a level sheet holds 1 on a row: the lateral kernels add up, and the echo's energy
+// along the rows is that of a plain pulse whose peak is the sheet's echo. Of the three rows that a
+// point is shared between, the middle one holds 3/4.
+static void measure_sheet(beam_psf *psf, int b) {
+  const double beside = 0.125, middle = 0.75;
+  double sum[SONDE_RANK][2], energy = 0, before[2] = {0}, here[2] = {0};
   for (int k = 0; k < SONDE_RANK; ++k) {
-    psf->pulse[k] = 0;
-    for (int i = 0; i < rows; ++i) {
-      double x = (i - psf->half_rows) / sigma;
-      psf->pulse[k] += psf->axial[k][i] * exp(-0.5 * x * x);
+    sum[k][0] = sum[k][1] = 0;
+    for (int l = 0; l <= psf->half[b]; ++l) {
+      const float *tap = psf->lateral[b][l][k];
+      sum[k][0] += weight_of(l) * (double)tap[0];
+      sum[k][1] += weight_of(l) * ((double)tap[2] - (double)tap[0]);
     }
   }
+  for (int i = 0; i <= 2 * psf->half_rows + 2; ++i) {
+    double next[2] = {0};
+    for (int k = 0; k < SONDE_RANK && i <= 2 * psf->half_rows; ++k)
+      next[0] += sum[k][0] * psf->axial[k][i], next[1] += sum[k][1] * psf->axial[k][i];
+    for (int part = 0; part < 2; ++part) {
+      double echo = beside * before[part] + middle * here[part] + beside * next[part];
+      energy += echo * echo, before[part] = here[part], here[part] = next[part];
+    }
+  }
+  psf->sheet[b] = sqrt(energy / (pulse_rows(psf) * sqrt(SONDE_PI)));
+  SONDE_ASSERT(psf->sheet[b] > 0);
 }
 
 static void project(beam_psf *psf, int b) {
@@ -253,7 +287,7 @@ bool sonde_psf_step(beam_psf *psf) {
     mirror_gram(psf);
     iterate(psf);
   } else {
-    for (int b = 0; b < SONDE_BANDS; ++b) project(psf, b);
+    for (int b = 0; b < SONDE_BANDS; ++b) project(psf, b), measure_sheet(psf, b);
   }
   return ++psf->step == SONDE_PSF_STEPS;
 }

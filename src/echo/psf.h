@@ -31,7 +31,7 @@ typedef struct beam_psf {
   // re, im - re, re + im of each: kernel.h
   float lateral[SONDE_BANDS][SONDE_MOST_TAPS + 1][SONDE_RANK][LATERAL_PARTS];
   double axial[SONDE_RANK][2 * SONDE_MOST_TAPS + 1]; // orthonormal
-  double pulse[SONDE_RANK];                          // of a plain pulse with peak 1
+  double sheet[SONDE_BANDS];                         // echo of a level sheet of 1 per column
   double share[SONDE_BANDS];                         // energy of the response that rank 3 keeps
   int step; // of the build, SONDE_PSF_STEPS when it is ready
   // scratch of the build: Gram matrix of all responses' rows, response at [lines 0..][rows][2]

@@ -166,7 +166,7 @@ static bool has_tissue(const sonde_echo *echo, uint32_t i, uint32_t j) {
 void sonde_echo_scatter(sonde_echo *echo) {
   SONDE_ASSERT(echo->per_cell % ECHO_ALIGN == 0 && echo->per_cell <= SONDE_POOL);
   SONDE_ASSERT(echo->per_piece % ECHO_ALIGN == 0 && echo->per_piece <= SONDE_LOOSE);
-  echo->cell_count = echo->moved = echo->lost = 0;
+  echo->cell_count = echo->moved = 0;
   clear_seen(echo);
   sonde_cubes_begin(echo);
   for (uint32_t j = 0; j + 1 < echo->plane_rows; ++j)

@@ -358,15 +358,19 @@ static void bone_is_round(void **state) {
   bench b;
   bench_create(&b, leg_radius, 0.014, 0.012, true, false);
   assert_int_equal(sonde_echo_set_radius(b.echo, 0.06, NULL), SONDE_OK);
+  b.settings.frequency_hz = 3e6;
   look(&b, NULL);
   double worst = 0;
   uint32_t lines = 0;
   for (uint32_t l = 0; l < b.echo->lines; ++l) {
     double due = bone_depth(&b, l, leg_radius - 3e-3, 0.014), least = 1;
-    if (!(due > 0) || due > 0.066) continue; // beyond, the cortex is too steep to echo
-    for (uint32_t e = 0; e < b.echo->echo_count; ++e)
-      if (b.echo->echoes[e].line == l)
-        least = fmin(least, fabs((double)b.echo->echoes[e].depth_m - due));
+    if (!(due > 0) || due > 0.0643) continue; // beyond, the columns cannot hold the cortex's slope
+    for (uint32_t n = 0; n < b.echo->grid_samples; ++n)
+      for (int32_t k = b.echo->first_sheet[n]; k >= 0; k = b.echo->sheet[k].next) {
+        if (b.echo->sheet[k].column != b.echo->pad_lines + SONDE_FINE * l) continue;
+        double row = n + (double)b.echo->sheet[k].beyond - b.echo->pad_samples;
+        least = fmin(least, fabs(row * b.echo->frame.step_m - due));
+      }
     worst = fmax(worst, least), ++lines;
   }
   print_message("%u lines meet the bone, %.3f mm off at most\n", lines, worst * 1e3);
