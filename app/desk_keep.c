@@ -45,6 +45,8 @@ static sonde_status write_report(sonde_exam_log *log, desk_exam *exam, sonde_err
                               .picture_count = exam->picture_count,
                               .samples = exam->sample,
                               .sample_count = exam->sample_count,
+                              .comments = exam->comments.list,
+                              .comment_count = exam->comments.count,
                               .recording = "exam.rec"};
   report.presses = sonde_judge_compressions(exam->judge, &report.press_count);
   sonde_status status =

@@ -5,7 +5,7 @@
 // copy, take_old_part  the recording of a program that kept it under another name until its end
 // never_began, read_entry, sweep, find   one directory
 // desk_recover         all of them
-// fill, apply, play    a journal to a judge
+// fill, apply, take_comments, play    a journal to a judge
 // desk_derive          its files
 #include "desk_parts.h"
 
@@ -209,6 +209,21 @@ static void apply(desk_exam *exam, const sonde_note *note) {
                              NULL);
 }
 
+static sonde_status take_comments(desk_exam *exam, const char *recording, sonde_error *error) {
+  sonde_comments found;
+  sonde_status status = sonde_comments_load(recording, &found, error);
+  if (status) return status;
+  size_t bytes = found.count * sizeof *found.list;
+  if (found.count && !(exam->comments.list = malloc(bytes)))
+    status = app_error(error, SONDE_MEMORY, "out of memory");
+  if (!status && found.count) {
+    memcpy(exam->comments.list, found.list, bytes);
+    exam->comments.count = found.count;
+  }
+  sonde_comments_clear(&found);
+  return status;
+}
+
 // Image by image as the exam was judged, each note after the last image before it.
 static sonde_status play(desk_exam *exam, const char *path, const sonde_notes *notes,
                          sonde_error *error) {
@@ -262,6 +277,7 @@ static sonde_status derive(desk_exam *exam, const desk_library *library, sonde_e
   cJSON *root = setup && score ? cJSON_Parse(setup->text) : NULL;
   if (root) { // an interrupted exam has no result
     status = fill(exam, root, library, &protocol, error);
+    if (!status) status = take_comments(exam, path, error);
     if (!status) status = play(exam, path, &notes, error);
     if (!status) {
       sonde_judge_finish(exam->judge);

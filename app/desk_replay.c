@@ -181,7 +181,20 @@ static sonde_status comment_replay(desk_replay *replay, const sonde_page_request
   return sonde_comments_load(replay->recording, &replay->comments, error);
 }
 
-// Into the recording that is being made.
+// Into the recording that is being made, or that was ended with the exam.
+static sonde_status put_comment(desk *d, const sonde_comment *comment, uint64_t tick,
+                                sonde_error *error) {
+  char path[DESK_PATH];
+  if (d->exam->in_journal)
+    return sonde_comments_add(desk_path(path, d->exam->directory, "exam.rec"), comment, error);
+  char *text = sonde_comment_json(comment, error);
+  if (!text) return error->status;
+  sonde_status status = sonde_session_note(d->session, SONDE_NOTE_COMMENT, tick, text, error);
+  sonde_free(text);
+  return status;
+}
+
+// While the exam runs and while its result is shown; the report is then written again.
 static sonde_status comment_exam(desk *d, const sonde_page_request *request, sonde_error *error) {
   desk_exam *exam = d->exam;
   sonde_comments *all = &exam->comments;
@@ -193,21 +206,20 @@ static sonde_status comment_exam(desk *d, const sonde_page_request *request, son
     return app_error(error, SONDE_ARGUMENT, "an exam takes at most %d comments",
                      SONDE_MAX_COMMENTS);
   sonde_comment comment = comment_of(request, time_s);
-  char *text = sonde_comment_json(&comment, error);
-  if (!text) return error->status;
-  sonde_status status = sonde_session_note(d->session, SONDE_NOTE_COMMENT, tick, text, error);
-  sonde_free(text);
-  if (status) return status;
   sonde_comment *list = realloc(all->list, (all->count + 1) * sizeof *list);
   if (!list) return app_error(error, SONDE_MEMORY, "out of memory");
   all->list = list;
+  sonde_status status = put_comment(d, &comment, tick, error);
+  if (status) return status;
   list[all->count++] = comment;
+  exam->filed = false;
   return SONDE_OK;
 }
 
 sonde_status desk_comment(desk *d, const sonde_page_request *request, sonde_error *error) {
   if (d->replay) return comment_replay(d->replay, request, error);
-  if (d->phase == DESK_RUNNING && d->session) return comment_exam(d, request, error);
+  bool shown = d->phase == DESK_RUNNING || d->phase == DESK_DONE;
+  if (shown && d->exam && d->session) return comment_exam(d, request, error);
   return app_error(error, SONDE_ARGUMENT, "there is no exam to comment on");
 }
 

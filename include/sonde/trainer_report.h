@@ -9,6 +9,7 @@
 #define SONDE_TRAINER_REPORT_H
 
 #include "sonde/echo.h"
+#include "sonde/exam_player.h"
 #include "sonde/trainer_log.h"
 
 #ifdef __cplusplus
@@ -53,6 +54,8 @@ typedef struct sonde_exam_report {
   const sonde_log_entry *earlier; /**< [earlier_count] of this trainee, newest first; this exam is
                                        left out by its id */
   uint32_t earlier_count;
+  const sonde_comment *comments; /**< [comment_count] of who watched, by time */
+  uint32_t comment_count;
   const char *recording; /**< file to replay; NULL: none was kept */
 } sonde_exam_report;
 

@@ -252,6 +252,7 @@ static sonde_status compose(sonde_debrief *page, sonde_error *error) {
   sonde_debrief_question(page);
   sonde_debrief_advice(page);
   teaching_note(page);
+  sonde_debrief_comments(page);
   sonde_debrief_score(page);
   sonde_debrief_along(page);
   sonde_status status = sonde_debrief_pictures(page, error);

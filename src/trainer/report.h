@@ -47,6 +47,7 @@ void sonde_debrief_advice(sonde_debrief *page);
 void sonde_debrief_along(sonde_debrief *page);
 sonde_status sonde_debrief_pictures(sonde_debrief *page, sonde_error *error);
 sonde_status sonde_debrief_traces(sonde_debrief *page, sonde_error *error);
+void sonde_debrief_comments(sonde_debrief *page);
 sonde_status sonde_debrief_earlier(sonde_debrief *page, sonde_error *error);
 void sonde_debrief_measures(sonde_debrief *page);
 void sonde_debrief_presses(sonde_debrief *page);

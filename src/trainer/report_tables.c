@@ -86,6 +86,23 @@ static void measure(sonde_text *out, const char *title, const char *value, const
       title, value, meaning);
 }
 
+void sonde_debrief_comments(sonde_debrief *page) {
+  const sonde_exam_report *r = page->in;
+  sonde_text *out = &page->out;
+  if (!r->comment_count) return;
+  sonde_debrief_section(page, "comments", "Comments");
+  sonde_text_put(out, "<div class=\"wide\"><table>\n<tbody>\n");
+  for (uint32_t i = 0; i < r->comment_count; ++i) {
+    const sonde_comment *c = &r->comments[i];
+    sonde_text_format(out, "<tr><th scope=\"row\">%s</th><td>", duration(c->time_s).s);
+    sonde_text_escape(out, c->text);
+    sonde_text_put(out, "</td><td class=\"quiet\">");
+    sonde_text_escape(out, c->author);
+    sonde_text_put(out, "</td></tr>\n");
+  }
+  sonde_text_put(out, "</tbody></table></div>\n</section>\n");
+}
+
 void sonde_debrief_measures(sonde_debrief *page) {
   const sonde_metrics *m = &page->in->score->metrics;
   sonde_text *out = &page->out;

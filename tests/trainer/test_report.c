@@ -21,6 +21,7 @@ static struct {
   sonde_exam_picture pictures[PAIRS];
   sonde_exam_sample samples[SAMPLES];
   sonde_log_entry earlier[EARLIER];
+  sonde_comment comments[2];
   uint8_t open[SIDE * SIDE], closed[SIDE * SIDE];
 } made;
 
@@ -269,6 +270,10 @@ static sonde_exam_report hostile(void) {
   snprintf(made.earlier[1].date, sizeof made.earlier[1].date, "%.20s", NASTY);
   r.note = (sonde_score_note){NASTY, NASTY, NASTY, NASTY, NASTY};
   r.recording = NASTY;
+  snprintf(made.comments[0].author, sizeof made.comments[0].author, "%.60s", NASTY);
+  snprintf(made.comments[0].text, sizeof made.comments[0].text, "%s", NASTY);
+  r.comments = made.comments;
+  r.comment_count = 1;
   return r;
 }
 
@@ -465,6 +470,26 @@ static void only_earlier_exams_are_compared(void **state) {
   sonde_free(page);
 }
 
+// Who watched said it at a time; without comments there is no place for them.
+static void comments_stand_in_the_page(void **state) {
+  (void)state;
+  sonde_exam_report r = exam(12, true);
+  char *page = write_page(&r);
+  assert_null(strstr(page, "id=\"comments\""));
+  sonde_free(page);
+  made.comments[0] = (sonde_comment){83.4, "Dr. Keller", "Slower here."};
+  made.comments[1] = (sonde_comment){121, "", "Well done & quick."};
+  r.comments = made.comments;
+  r.comment_count = 2;
+  page = write_page(&r);
+  const char *first = strstr(page, "Slower here."),
+             *second = strstr(page, "Well done &amp; quick.");
+  assert_true(first && second && first < second);
+  assert_int_equal(times(page, "1:23 min"), 1);
+  assert_int_equal(times(page, "Dr. Keller"), 1);
+  sonde_free(page);
+}
+
 static uint32_t decode(const char *text, uint8_t *bytes, uint32_t room) {
   static const char DIGITS[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   uint32_t count = 0, held = 0, bits = 0;
@@ -610,6 +635,7 @@ int main(int argc, char **argv) {
       cmocka_unit_test(equal_reports_give_equal_bytes),
       cmocka_unit_test(missing_parts_are_left_out),
       cmocka_unit_test(words_say_what_was_missed),
+      cmocka_unit_test(comments_stand_in_the_page),
       cmocka_unit_test(only_earlier_exams_are_compared),
       cmocka_unit_test(images_come_back),
       cmocka_unit_test(choice_shows_every_kind_all_along),

@@ -78,14 +78,27 @@ async function testComments(learner, watcher) {
   await learner.locator("#finish-button").click();
   await learner.getByRole("button", { name: "Finish and see the result" }).click();
   await learner.waitForFunction(() => window.sonde.exam.result);
+  await watcher.locator("#result").getByRole("button", { name: "Comment" }).click();
+  await comment(watcher, "Look at <your> second press again.");
+  await watcher.waitForFunction(() => window.sonde.exam.comments.length === 2);
+  check(await learner.locator("#result").getByRole("button", { name: "Comment" }).isHidden(), "the learner does not comment on itself");
+  const report = await learner.evaluate(async () => {
+    for (let k = 0; k < 100; ++k) {
+      const text = await (await fetch(window.sonde.exam.result.report)).text();
+      if (text.includes("second press again")) return text;
+      await new Promise((done) => setTimeout(done, 100));
+    }
+    return "";
+  });
+  check(report.includes("Look at &lt;your&gt; second press again.") && report.includes("Here you press too fast."), "comments made while the result is shown stand in the report");
   await learner.getByRole("button", { name: "Watch the replay" }).click();
-  await learner.waitForFunction(() => window.sonde.replay?.comments.length === 1);
+  await learner.waitForFunction(() => window.sonde.replay?.comments.length === 2);
   const kept = await learner.evaluate(() => window.sonde.replay.comments[0]);
   check(kept.text === "Here you press too fast." && kept.author === "Dr. Keller" && kept.t_s > 0, `it stands in the replay at its time: ${kept.t_s.toFixed(1)} s`);
   await watcher.waitForFunction(() => window.sonde.exam.phase === "replay" && window.sonde.replay);
   await watcher.evaluate(() => document.getElementById("result").open && document.querySelector("#result button:last-child").click());
   await comment(watcher, "And this was well done.");
-  await learner.waitForFunction(() => window.sonde.replay.comments.length === 2);
+  await learner.waitForFunction(() => window.sonde.replay.comments.length === 3);
   check(true, "a watcher comments on the replay");
   await learner.locator("#replay-leave").click();
 }

@@ -103,6 +103,7 @@ class App {
       again: (id) => (this.result.hide(), this.start.again(id)),
       next: (id) => (this.result.hide(), connection.leaveExam(), this.start.open(this.start.next(id))),
       close: () => connection.leaveExam(),
+      comment: () => this.replayBar.write(),
     });
     this.history = new HistoryDialog((exam) => connection.openReplay(exam));
     this.input = this.wireInput();
@@ -245,7 +246,7 @@ class App {
     if (exam.phase === "running" && before !== "running") this.begin(before);
     if (exam.phase === "practice" && exam.message && before !== "practice") this.say(exam.message, 8000);
     if (exam.phase === "running" || exam.phase === "done") this.examBar.show(exam, this.controls?.controls ?? false);
-    if (exam.phase === "done") this.result.show(exam, this.controls?.controls ?? false);
+    if (exam.phase === "done") this.result.show(exam, this.controls?.controls ?? false, this.comments);
     else this.result.hide();
     if (exam.phase !== "replay") this.replayBar.leave();
     this.guide(exam);
@@ -394,7 +395,8 @@ class App {
 
   /** Who does not examine may comment on what is seen, while the exam runs and after it. */
   private get comments(): boolean {
-    return this.phase === "replay" || (this.phase === "running" && this.controls?.role !== undefined && this.controls.role !== "learner" && !this.controls.controls);
+    const watches = this.controls?.role !== undefined && this.controls.role !== "learner";
+    return this.phase === "replay" || (watches && (this.phase === "done" || (this.phase === "running" && !this.controls!.controls)));
   }
 
   private preparing(): void {

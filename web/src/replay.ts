@@ -41,7 +41,7 @@ export class ReplayBar {
     find("replay-key").append(...(Object.keys(PRESS_WORDS) as PressResult[]).map((r) => make("span", r, PRESS_WORDS[r])), make("span", "comment", "comment"));
   }
 
-  /** While an exam runs a teacher or watcher comments on what is seen now. */
+  /** While an exam runs, and at its result, a teacher or watcher comments on what is seen now. */
   live(exam: Exam | null): void {
     this.exam = exam;
     if (!exam) return;
@@ -129,7 +129,7 @@ export class ReplayBar {
     find("comment-list").replaceChildren(...(rows.length ? rows : [none]));
   }
 
-  private write(): void {
+  write(): void {
     const r = this.replay;
     if (r?.playing && !find<HTMLButtonElement>("replay-play").disabled) this.actions.play(false, r.speed);
     find("comment-text").focus();

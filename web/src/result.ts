@@ -10,6 +10,7 @@ export interface ResultActions {
   again(caseId: string): void;
   next(caseId: string): void;
   close(): void;
+  comment(): void;
 }
 
 function ring(result: Result): HTMLElement {
@@ -85,9 +86,10 @@ export class ResultDialog {
     this.box.close();
   }
 
-  show(exam: Exam, controls: boolean): void {
+  /** `comments`: who sees it may comment on the exam. */
+  show(exam: Exam, controls: boolean, comments: boolean): void {
     const result = exam.result;
-    const key = `${exam.exam} ${controls}`;
+    const key = `${exam.exam} ${controls} ${comments}`;
     if (!result || key === this.shown) return;
     this.shown = key;
     const head = make("h2", result.passed ? "good" : "bad", result.passed ? "Passed" : "Not passed");
@@ -99,7 +101,7 @@ export class ResultDialog {
     const body: HTMLElement[] = [top, this.diagnosis(result)];
     if (result.note) body.push(make("p", "note", result.note));
     if (result.parts) body.push(parts(result.parts));
-    this.box.replaceChildren(...body, segments(exam), make("p", "tally", `Compressions: ${tally(exam)}.`), this.foot(exam, result, controls));
+    this.box.replaceChildren(...body, segments(exam), make("p", "tally", `Compressions: ${tally(exam)}.`), this.foot(exam, result, controls, comments));
     if (!this.box.open) this.box.showModal();
     this.box.querySelector<HTMLElement>("a.primary")?.focus();
   }
@@ -112,7 +114,7 @@ export class ResultDialog {
     return box;
   }
 
-  private foot(exam: Exam, result: Result, controls: boolean): HTMLElement {
+  private foot(exam: Exam, result: Result, controls: boolean, comments: boolean): HTMLElement {
     const row = make("div", "actions");
     const report = make("a", "primary button", "Open the report");
     Object.assign(report, { href: result.report, target: "_blank", rel: "noopener" });
@@ -123,6 +125,7 @@ export class ResultDialog {
     ];
     later[0]!.disabled = !exam.recording;
     for (const b of later) b.disabled ||= !controls;
+    if (comments) later.push(button("Comment", () => (this.box.close(), this.actions.comment())));
     row.append(report, ...later, make("span", "spring"), button("Close", () => (this.box.close(), controls && this.actions.close())));
     return row;
   }
