@@ -171,7 +171,7 @@ typedef struct tissue_job {
   tissue_lesion lesion[MOST_LESIONS];
   float bone_radius_m;
   float webs, oedema;        // 0..1
-  float rough_bone, rough_m; // amplitude over muscle on a level cortex, fading over so far above it
+  float rough_bone, rough_m; // amplitude over muscle on a level cortex, fading over so far from it
   float rows_per_m;          // of the march, 0 in its first row
   bool plain;
   float *memory; // [lines][TEXTURES][KNOT_FLOATS], of one set of kernels; all bits set: empty

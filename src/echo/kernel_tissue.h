@@ -155,13 +155,14 @@ INLINE void vessels(const tissue_job *job, knots *memory, const float *f, const 
 // Facets of the cortex scatter towards the probe; the fewer, the more the cortex is inclined. The
 // distance to it grows along a line with the cosine of the angle between line and normal.
 INLINE vf periosteum(const tissue_job *job, vf inside, vf before) {
-  vi near = (inside <= 0) & (inside > -job->rough_m);
+  vf away = size_of(inside);
+  vi near = away < job->rough_m;
   if (!any(near)) return all(0);
   vf cosine = smaller(larger((inside - before) * job->rows_per_m, all(0.05f)), all(1));
   vf square = 1 / (cosine * cosine) - 1;                              // of the tangent
   vf fewer = square * (-1.442695f / (rough_tangent * rough_tangent)); // octaves
   vf size = power2(larger(fewer, all(-60)));
-  return only(near, job->rough_bone * size * (1 + inside / job->rough_m));
+  return only(near, job->rough_bone * size * (1 - away / job->rough_m));
 }
 
 // Returns the lanes in which a level changed sign since the row above.

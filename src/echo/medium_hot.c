@@ -26,6 +26,7 @@ static const float clutter_power = 0.02f, clutter_m = 5e-3f;
 typedef struct interface {
   float db, loss_db;
 } interface;
+enum { CORTEX = 3 };
 static const interface interfaces[LAYER_LEVELS] = {
     {18, 0},  // skin
     {10, 0},  // dermis and fat
@@ -116,7 +117,7 @@ static uint32_t salt_of(const sonde_echo *echo, uint32_t level) {
 // Layers end at vessels and lesions, lesions at vessels, and branches open into their parents.
 static bool hidden(const sonde_echo *echo, const float *now, uint32_t l, uint32_t level) {
   const uint32_t n = echo->padded, walls = LAYER_LEVELS, edges = walls + echo->shown_count;
-  if (level == 0 || level == 3) return false;
+  if (level == 0 || level == CORTEX) return false;
   for (uint32_t k = walls; k < edges; ++k) {
     if (k == level || !(now[k * n + l] < 0)) continue;
     bool femoral = k < walls + 2 && level >= walls && level < walls + 2;
@@ -141,6 +142,8 @@ static void cross(sonde_echo *echo, uint32_t row, uint32_t l, uint32_t which) {
   float amplitude = echo->coupling[l] * amplitude_of_db(kind->db + rough - echo->loss_db[l]);
   sonde_sheet_add(echo, l, ((float)row - 1 + t) * dz, rise, amplitude);
   echo->loss_db[l] += kind->loss_db;
+  if (which == CORTEX)
+    echo->rough[l] *= amplitude_of_db(kind->loss_db); // facets lie above the loss
 }
 
 static void cross_levels(sonde_echo *echo, uint32_t row, const uint8_t *crossed) {
@@ -230,12 +233,13 @@ static tissue_vessel vessel_of(const sonde_pathology *p, uint32_t which, float w
 }
 
 // Facets lie thinner than the pulse is long, which they fill only in part. The energy of a tent is
-// a third of its height's over its width; that of the pulse is 0.83 wavelengths of its peak's.
+// two thirds of its height's over its half width; that of the pulse is 0.83 wavelengths of its
+// peak's.
 static void roughen(const sonde_echo *echo, tissue_job *job) {
   const float row_m = (float)(echo->frame.depth_m / (SONDE_MEDIUM_ROWS - 1));
   job->rough_m = fmaxf(rough_m, row_m);
-  float filled = 0.83f * (float)echo->frame.wavelength_m / (job->rough_m / 3);
-  job->rough_bone = echo->plain ? 0 : rough_share * amplitude_of_db(interfaces[3].db);
+  float filled = 0.83f * (float)echo->frame.wavelength_m / (job->rough_m * 2 / 3);
+  job->rough_bone = echo->plain ? 0 : rough_share * amplitude_of_db(interfaces[CORTEX].db);
   job->rough_bone *= sqrtf(1 + filled);
 }
 
