@@ -158,6 +158,14 @@ static bool read_real(int option, double low, double high, double unit, double *
   return true;
 }
 
+// A setting of the scanner, which the page has under the same key.
+static bool read_scanner(int option, const char *key, sonde_echo_settings *settings) {
+  const sonde_echo_range *range = sonde_echo_ranges(), *end = range + SONDE_ECHO_SETTINGS;
+  while (range < end && strcmp(range->key, key) != 0) ++range;
+  double *value = range < end ? (double *)(void *)((char *)settings + range->offset) : NULL;
+  return value && read_real(option, range->low, range->high, range->si, value);
+}
+
 static bool read_setting(options *o, int option) {
   sonde_echo_settings *s = &o->settings;
   switch (option) {
@@ -168,12 +176,12 @@ static bool read_setting(options *o, int option) {
   case WEBS: return read_real(option, 0, 1, 1, &o->findings.rest.webs);
   case OEDEMA: return read_real(option, 0, 1, 1, &o->findings.rest.oedema);
   case CURVED: return read_real(option, 20, 1000, 1e-3, &o->radius_m);
-  case DEPTH: return read_real(option, 20, 150, 1e-3, &s->depth_m);
-  case FREQUENCY: return read_real(option, 1, 12, 1e6, &s->frequency_hz);
-  case FOCUS: return read_real(option, 5, 150, 1e-3, &s->focus_m);
-  case GAIN: return read_real(option, -30, 30, 1, &s->gain_db);
-  case TGC: return read_real(option, -50, 50, 100, &s->tgc_db_per_m);
-  case RANGE: return read_real(option, 30, 90, 1, &s->dynamic_range_db);
+  case DEPTH: return read_scanner(option, "depth_mm", s);
+  case FREQUENCY: return read_scanner(option, "frequency_mhz", s);
+  case FOCUS: return read_scanner(option, "focus_mm", s);
+  case GAIN: return read_scanner(option, "gain_db", s);
+  case TGC: return read_scanner(option, "tgc_db_per_cm", s);
+  case RANGE: return read_scanner(option, "dynamic_range_db", s);
   default: return false;
   }
 }

@@ -89,7 +89,7 @@ static bool parse_device(int option, settings *s) {
   case 'y': d->library = optarg; return true;
   case 'o': return app_parse_integer("run", "--device-port", optarg, 1, 65535, &d->port);
   case 'k': return app_parse_integer("run", "--clutch", optarg, 0, 32, &d->clutch);
-  default: return app_parse_real("run", "--force-scale", optarg, 1e-4, 10, &d->force_scale);
+  default: return app_parse_real("run", "--force-scale", optarg, 1e-3, 10, &d->force_scale);
   }
 }
 

@@ -25,6 +25,15 @@ typedef struct sonde_echo_settings {
 } sonde_echo_settings;
 
 SONDE_API sonde_echo_settings sonde_echo_settings_default(void);
+/** Range of one setting, in the unit in which the page and the command line give it. */
+typedef struct sonde_echo_range {
+  const char *key;      /**< with the unit, e.g. "depth_mm" */
+  double low, high, si; /**< si: factor to the unit of the member */
+  size_t offset;        /**< of the member in sonde_echo_settings */
+} sonde_echo_range;
+enum { SONDE_ECHO_SETTINGS = 6 };
+/** All settings. @return [SONDE_ECHO_SETTINGS] @thread any */
+SONDE_API const sonde_echo_range *sonde_echo_ranges(void);
 /** Clamps every field into its range and replaces NaN by the default. @thread any */
 SONDE_API sonde_echo_settings sonde_echo_settings_clamp(sonde_echo_settings settings);
 

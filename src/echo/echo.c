@@ -1,6 +1,6 @@
 // Life of a renderer, the operator's settings.
 //
-// sonde_echo_settings_default, sonde_echo_settings_clamp
+// sonde_echo_settings_default, sonde_echo_ranges, sonde_echo_settings_clamp
 // sonde_echo_create   buffers and random tables
 // sonde_echo_destroy
 // carve               one block of memory for what vectors read
@@ -16,6 +16,7 @@
 #include "echo/tiers.h"
 #include "interior/fields.h"
 
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -28,7 +29,8 @@ enum {
 };
 
 static const double default_density_m3 = 32e9;
-static const double cell_size_m = 2e-3, least_depth_m = 0.02;
+#define LEAST_DEPTH_M 0.02
+static const double cell_size_m = 2e-3;
 
 sonde_echo_settings sonde_echo_settings_default(void) {
   return (sonde_echo_settings){.frequency_hz = 7.5e6,
@@ -43,15 +45,31 @@ static double bounded(double value, double low, double high, double otherwise) {
   return isnan(value) ? otherwise : clamp(value, low, high);
 }
 
+#define RANGE(key, low, high, si, member)                                                          \
+  { key, low, high, si, offsetof(sonde_echo_settings, member) }
+static const sonde_echo_range ranges[] = {
+    RANGE("gain_db", -30, 30, 1, gain_db),
+    RANGE("depth_mm", 1e3 * LEAST_DEPTH_M, 150, 1e-3, depth_m),
+    RANGE("frequency_mhz", 1, 12, 1e6, frequency_hz),
+    RANGE("dynamic_range_db", 30, 90, 1, dynamic_range_db),
+    RANGE("focus_mm", 5, 150, 1e-3, focus_m),
+    RANGE("tgc_db_per_cm", -50, 50, 1e2, tgc_db_per_m),
+};
+#undef RANGE
+_Static_assert(SONDE_COUNT_OF(ranges) == SONDE_ECHO_SETTINGS, "a range per setting");
+_Static_assert(SONDE_ECHO_SETTINGS * sizeof(double) == sizeof(sonde_echo_settings), "all of them");
+
+const sonde_echo_range *sonde_echo_ranges(void) { return ranges; }
+
 sonde_echo_settings sonde_echo_settings_clamp(sonde_echo_settings s) {
-  sonde_echo_settings d = sonde_echo_settings_default();
-  return (sonde_echo_settings){
-      .frequency_hz = bounded(s.frequency_hz, 1e6, 12e6, d.frequency_hz),
-      .depth_m = bounded(s.depth_m, least_depth_m, 0.15, d.depth_m),
-      .gain_db = bounded(s.gain_db, -30, 30, d.gain_db),
-      .dynamic_range_db = bounded(s.dynamic_range_db, 30, 90, d.dynamic_range_db),
-      .focus_m = bounded(s.focus_m, 5e-3, 0.15, d.focus_m),
-      .tgc_db_per_m = bounded(s.tgc_db_per_m, -5000, 5000, d.tgc_db_per_m)};
+  const sonde_echo_settings d = sonde_echo_settings_default();
+  for (size_t k = 0; k < SONDE_ECHO_SETTINGS; ++k) {
+    const sonde_echo_range *r = &ranges[k];
+    double *value = (double *)(void *)((char *)&s + r->offset);
+    double otherwise = *(const double *)(const void *)((const char *)&d + r->offset);
+    *value = bounded(*value, r->low * r->si, r->high * r->si, otherwise);
+  }
+  return s;
 }
 
 // Jittered grid: one scatterer per box of layers of 2^bits x 2^bits boxes. Fewer by chance in one
@@ -160,7 +178,7 @@ static size_t carve(sonde_echo *echo, char *block) {
   CARVE(echo->loss_db, lines);
   CARVE(echo->tail, lines);
   CARVE(echo->coupling, lines);
-  const double finest_m = least_depth_m / (double)(echo->samples - 1);
+  const double finest_m = LEAST_DEPTH_M / (double)(echo->samples - 1);
   CARVE(echo->grid,
         (2 * most_lines + 16) * (sonde_tiers_window(cell_size_m, finest_m) + (size_t)2));
   for (int k = 0; k < SONDE_FINE; ++k) {

@@ -225,7 +225,10 @@ static moments integrate(const sonde_mesh *mesh, sonde_vec3 origin) {
 sonde_status sonde_mesh_mass(const sonde_mesh *mesh, double density_kg_m3, sonde_mass *mass,
                              sonde_error *error) {
   *mass = (sonde_mass){0};
-  SONDE_ASSERT(mesh != NULL && density_kg_m3 >= 0);
+  SONDE_ASSERT(mesh != NULL);
+  if (!(density_kg_m3 >= 0 && isfinite(density_kg_m3)))
+    return sonde_fail(error, SONDE_ARGUMENT, "density %g kg/m^3, expected 0 or more",
+                      density_kg_m3);
   sonde_mesh_report report;
   sonde_status status = sonde_mesh_inspect(mesh, &report, error);
   if (status) return status;

@@ -5,6 +5,8 @@
 #include "base/maths.h"
 
 // Every number finite and the quaternion long enough to be a rotation.
+// Meshes lie within 10 km of the origin; a probe farther away would have speeds without number.
+#define SONDE_POSE_REACH_M 1e5
 bool sonde_pose_usable(sonde_pose pose);
 // Angle of the rotation that takes a to b along the short arc, 0..pi.
 double sonde_quat_angle(sonde_quat a, sonde_quat b);

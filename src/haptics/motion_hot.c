@@ -18,7 +18,8 @@ static sonde_quat q_sum(sonde_quat a, double s, sonde_quat b, double t) {
 
 bool sonde_pose_usable(sonde_pose pose) {
   double n2 = q_dot(pose.rotation, pose.rotation);
-  return v_finite(pose.position) && isfinite(n2) && n2 > 1e-12;
+  bool near = v_finite(pose.position) && v_norm(pose.position) <= SONDE_POSE_REACH_M;
+  return near && isfinite(n2) && n2 > 1e-12;
 }
 
 double sonde_quat_angle(sonde_quat a, sonde_quat b) {

@@ -95,7 +95,7 @@ typedef struct page_command {
   page_command_type type;
   sonde_pose goal;
   char probe[64], pathology[32];
-  double gain_db, depth_m, frequency_hz, dynamic_range_db, focus_m, tgc_db_per_m;
+  sonde_echo_settings echo; // likewise
   double stiffness_scale, damping_scale, friction_scale;
   char posture[16];
   int strain; // 1, 0; -1: as it is

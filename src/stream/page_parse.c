@@ -103,32 +103,53 @@ static sonde_status read_strain(const cJSON *root, page_command *command, sonde_
   return SONDE_OK;
 }
 
-typedef struct control_field {
-  const char *key;
-  double low, high, si; // range in the page's unit, factor to SI
-  double *target;
-} control_field;
+// In the page's unit; NaN when it is absent.
+static sonde_status read_setting(const cJSON *root, const sonde_echo_range *range, double *target,
+                                 sonde_error *error) {
+  double value = (double)NAN;
+  sonde_status status = read_real(root, range->key, range->low, range->high, &value, error);
+  *target = value * range->si;
+  return status;
+}
+
+static sonde_status read_settings(const cJSON *root, page_command *command, sonde_error *error) {
+  static const sonde_echo_range BENCH[] = {{"stiffness_scale", 0.5, 2, 1, 0},
+                                           {"damping_scale", 0.25, 4, 1, 0},
+                                           {"friction_scale", 0, 2, 1, 0}};
+  double *const bench[] = {&command->stiffness_scale, &command->damping_scale,
+                           &command->friction_scale};
+  const sonde_echo_range *range = sonde_echo_ranges();
+  sonde_status status = SONDE_OK;
+  for (size_t i = 0; i < SONDE_ECHO_SETTINGS && !status; ++i)
+    status = read_setting(root, &range[i],
+                          (double *)(void *)((char *)&command->echo + range[i].offset), error);
+  for (size_t i = 0; i < SONDE_COUNT_OF(BENCH) && !status; ++i)
+    status = read_setting(root, &BENCH[i], bench[i], error);
+  return status;
+}
+
+// A key that is none is a mistake of the page: what it asks for would not happen, unseen.
+static sonde_status check_keys(const cJSON *root, sonde_error *error) {
+  static const char *const OTHERS[] = {"type",     "probe",          "case",
+                                       "posture",  "damping_scale",  "friction_scale",
+                                       "valsalva", "stiffness_scale"};
+  for (const cJSON *item = root->child; item; item = item->next) {
+    bool known = false;
+    for (size_t k = 0; k < SONDE_ECHO_SETTINGS; ++k)
+      known = known || strcmp(item->string, sonde_echo_ranges()[k].key) == 0;
+    for (size_t k = 0; k < SONDE_COUNT_OF(OTHERS); ++k)
+      known = known || strcmp(item->string, OTHERS[k]) == 0;
+    if (!known)
+      return sonde_fail(error, SONDE_ARGUMENT, "there is no control \"%.40s\"", item->string);
+  }
+  return SONDE_OK;
+}
 
 static sonde_status parse_controls(const cJSON *root, page_command *command, sonde_error *error) {
-  const control_field fields[] = {
-      {"gain_db", -30, 30, 1, &command->gain_db},
-      {"depth_mm", 20, 150, 1e-3, &command->depth_m},
-      {"frequency_mhz", 1, 12, 1e6, &command->frequency_hz},
-      {"dynamic_range_db", 30, 90, 1, &command->dynamic_range_db},
-      {"focus_mm", 5, 150, 1e-3, &command->focus_m},
-      {"tgc_db_per_cm", -10, 10, 1e2, &command->tgc_db_per_m},
-      {"stiffness_scale", 0.5, 2, 1, &command->stiffness_scale},
-      {"damping_scale", 0.25, 4, 1, &command->damping_scale},
-      {"friction_scale", 0, 2, 1, &command->friction_scale},
-  };
-  for (size_t i = 0; i < SONDE_COUNT_OF(fields); ++i) {
-    double value = (double)NAN;
-    sonde_status status =
-        read_real(root, fields[i].key, fields[i].low, fields[i].high, &value, error);
-    if (status) return status;
-    *fields[i].target = value * fields[i].si;
-  }
-  sonde_status status = read_name(root, "probe", command->probe, sizeof command->probe, error);
+  sonde_status status = check_keys(root, error);
+  if (!status) status = read_settings(root, command, error);
+  if (status) return status;
+  status = read_name(root, "probe", command->probe, sizeof command->probe, error);
   if (!status)
     status = read_name(root, "case", command->pathology, sizeof command->pathology, error);
   if (!status)

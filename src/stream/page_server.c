@@ -110,12 +110,12 @@ static void apply_controls(sonde_page_server *server, page_client *client,
     page_client_note(client, "a posture is supine, sitting or standing");
     return;
   }
-  take(command->gain_db, &next.echo.gain_db);
-  take(command->depth_m, &next.echo.depth_m);
-  take(command->frequency_hz, &next.echo.frequency_hz);
-  take(command->dynamic_range_db, &next.echo.dynamic_range_db);
-  take(command->focus_m, &next.echo.focus_m);
-  take(command->tgc_db_per_m, &next.echo.tgc_db_per_m);
+  take(command->echo.gain_db, &next.echo.gain_db);
+  take(command->echo.depth_m, &next.echo.depth_m);
+  take(command->echo.frequency_hz, &next.echo.frequency_hz);
+  take(command->echo.dynamic_range_db, &next.echo.dynamic_range_db);
+  take(command->echo.focus_m, &next.echo.focus_m);
+  take(command->echo.tgc_db_per_m, &next.echo.tgc_db_per_m);
   take(command->stiffness_scale, &next.stiffness_scale);
   take(command->damping_scale, &next.damping_scale);
   take(command->friction_scale, &next.friction_scale);

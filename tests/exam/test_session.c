@@ -27,6 +27,14 @@ static void rejects_bad_definitions(void **state) {
   bad.image_width = 0;
   assert_int_equal(sonde_session_create(&bad, &device, &session, &error), SONDE_ARGUMENT);
   bad = good;
+  bad.limits.force_n = (double)NAN;
+  assert_int_equal(sonde_session_create(&bad, &device, &session, &error), SONDE_ARGUMENT);
+  assert_non_null(strstr(error.message, "limits.force_n"));
+  bad = good;
+  bad.rendering.force_scale = 5e-4; // would have been rendered as 1
+  assert_int_equal(sonde_session_create(&bad, &device, &session, &error), SONDE_ARGUMENT);
+  assert_non_null(strstr(error.message, "rendering.force_scale"));
+  bad = good;
   bad.ticks_per_image = 0;
   assert_int_equal(sonde_session_create(&bad, &device, &session, &error), SONDE_ARGUMENT);
   bad = good;

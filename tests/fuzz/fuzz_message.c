@@ -23,12 +23,12 @@ static void apply(const page_command *command) {
     start = sonde_session_controls_now(session);
   }
   sonde_session_controls c = start;
-  set(command->gain_db, &c.echo.gain_db);
-  set(command->depth_m, &c.echo.depth_m);
-  set(command->frequency_hz, &c.echo.frequency_hz);
-  set(command->dynamic_range_db, &c.echo.dynamic_range_db);
-  set(command->focus_m, &c.echo.focus_m);
-  set(command->tgc_db_per_m, &c.echo.tgc_db_per_m);
+  set(command->echo.gain_db, &c.echo.gain_db);
+  set(command->echo.depth_m, &c.echo.depth_m);
+  set(command->echo.frequency_hz, &c.echo.frequency_hz);
+  set(command->echo.dynamic_range_db, &c.echo.dynamic_range_db);
+  set(command->echo.focus_m, &c.echo.focus_m);
+  set(command->echo.tgc_db_per_m, &c.echo.tgc_db_per_m);
   set(command->stiffness_scale, &c.stiffness_scale);
   set(command->damping_scale, &c.damping_scale);
   set(command->friction_scale, &c.friction_scale);

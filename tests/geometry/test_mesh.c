@@ -67,6 +67,11 @@ static void test_mass(void **state) {
   shape_move(&box, pose);
   sonde_mass m;
   assert_ok(sonde_mesh_mass(&box, 1000, &m, &shape_error));
+  const double none[] = {-1, (double)NAN, (double)INFINITY};
+  for (int k = 0; k < 3; ++k) {
+    sonde_mass other;
+    assert_int_equal(sonde_mesh_mass(&box, none[k], &other, NULL), SONDE_ARGUMENT);
+  }
   assert_near(m.mass_kg, 6000, 1e-9);
   assert_near(v_distance(m.centre_m, pose.position), 0, 1e-13);
   double principal[3] = {6000 * (4 + 9) / 12.0, 6000 * (1 + 9) / 12.0, 6000 * (1 + 4) / 12.0};

@@ -214,9 +214,9 @@ static void controls_leave_out_what_is_absent(void **state) {
                          "\"case\":\"healthy\"}",
                          &c),
                    SONDE_OK);
-  assert_float_equal(c.depth_m, 0.08, 1e-12);
-  assert_float_equal(c.frequency_hz, 5e6, 1e-3);
-  assert_true(isnan(c.gain_db) && isnan(c.dynamic_range_db) && isnan(c.focus_m));
+  assert_float_equal(c.echo.depth_m, 0.08, 1e-12);
+  assert_float_equal(c.echo.frequency_hz, 5e6, 1e-3);
+  assert_true(isnan(c.echo.gain_db) && isnan(c.echo.dynamic_range_db) && isnan(c.echo.focus_m));
   assert_string_equal(c.pathology, "healthy");
   assert_string_equal(c.probe, "");
 }
@@ -244,6 +244,7 @@ static void bad_commands_are_refused(void **state) {
       "{\"type\":\"goal\",\"position_mm\":[1,2,3],\"rotation\":[0,0,0,0]}",
       "{\"type\":\"goal\",\"position_mm\":[1,2,3],\"rotation\":[2,2,2,2]}",
       "{\"type\":\"controls\",\"gain_db\":31}",
+      "{\"type\":\"controls\",\"gain\":3}",
       "{\"type\":\"controls\",\"gain_db\":\"1\"}",
       "{\"type\":\"controls\",\"depth_mm\":19.9}",
       "{\"type\":\"controls\",\"probe\":\"\"}",
@@ -275,6 +276,38 @@ static void size_zero_bytes_and_depth_are_bounded(void **state) {
   assert_int_equal(page_parse_command(big, PAGE_COMMAND_BYTES, &c, &error), SONDE_FORMAT);
 }
 
+static sonde_status say(const char *key, double value, page_command *c, sonde_error *error) {
+  char text[100];
+  snprintf(text, sizeof text, "{\"type\":\"controls\",\"%s\":%.12g}", key, value);
+  return page_parse_command(text, strlen(text), c, error);
+}
+
+// A control at the end of its range is taken as it is, also by the scanner; what lies beyond is
+// refused, and the error names the control and the range.
+static void controls_out_of_range_are_refused_by_name(void **state) {
+  (void)state;
+  const sonde_echo_range *r = sonde_echo_ranges();
+  page_command c;
+  sonde_error error;
+  for (uint32_t k = 0; k < SONDE_ECHO_SETTINGS; ++k, ++r) {
+    const double ends[] = {r->low, r->high}, width = r->high - r->low;
+    for (int end = 0; end < 2; ++end) {
+      assert_int_equal(say(r->key, ends[end], &c, &error), SONDE_OK);
+      double taken = *(const double *)(const void *)((const char *)&c.echo + r->offset);
+      assert_true(fabs(taken - ends[end] * r->si) <= 1e-12 * r->si * r->high);
+      sonde_echo_settings clean = sonde_echo_settings_clamp(c.echo);
+      assert_true(*(const double *)(const void *)((const char *)&clean + r->offset) == taken);
+      double beyond = ends[end] + (end ? 1e-3 : -1e-3) * width;
+      assert_int_equal(say(r->key, beyond, &c, &error), SONDE_ARGUMENT);
+      char high[24];
+      snprintf(high, sizeof high, "to %g", r->high);
+      assert_true(strstr(error.message, r->key) && strstr(error.message, high));
+    }
+  }
+  assert_int_equal(say("gain", 3, &c, &error), SONDE_ARGUMENT);
+  assert_non_null(strstr(error.message, "\"gain\""));
+}
+
 // Whatever passes is within the ranges that the session was promised.
 static void check_accepted(const page_command *c) {
   assert_true(c->type <= PAGE_COMMAND_PING);
@@ -283,8 +316,9 @@ static void check_accepted(const page_command *c) {
     assert_true(fabs(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z - 1) < 1e-9);
     assert_true(fabs(c->goal.position.x) <= 2 && fabs(c->goal.position.y) <= 2);
   } else if (c->type == PAGE_COMMAND_CONTROLS) {
-    assert_true(isnan(c->gain_db) || fabs(c->gain_db) <= 30);
-    assert_true(isnan(c->depth_m) || (c->depth_m >= 0.02 - 1e-9 && c->depth_m <= 0.15 + 1e-9));
+    assert_true(isnan(c->echo.gain_db) || fabs(c->echo.gain_db) <= 30);
+    assert_true(isnan(c->echo.depth_m) ||
+                (c->echo.depth_m >= 0.02 - 1e-9 && c->echo.depth_m <= 0.15 + 1e-9));
     assert_non_null(memchr(c->probe, 0, sizeof c->probe));
   }
 }
@@ -334,6 +368,7 @@ int main(void) {
       cmocka_unit_test(controls_leave_out_what_is_absent),
       cmocka_unit_test(bad_commands_are_refused),
       cmocka_unit_test(size_zero_bytes_and_depth_are_bounded),
+      cmocka_unit_test(controls_out_of_range_are_refused_by_name),
       cmocka_unit_test(mangled_messages_do_no_harm),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
