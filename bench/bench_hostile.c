@@ -1,8 +1,9 @@
-// bench_hostile CASES [PICTURES [SEED [OUT.csv]]]: random presses of all cases of a directory, each
-// on the legs of ten seeds; looks in every picture for tissue that is folded, that is where the map
-// from rest to the picture does not keep orientation. PICTURES per leg and case (default 3) differ
-// in site, way off it, tilt (to 20 degrees), turn, probe, speed and force (0 to 40 N). Half of them
-// are taken while the probe moves, half at equilibrium of the vessels.
+// bench_hostile CASES [PICTURES [SEED [OUT.csv [LEG]]]]: random presses of all cases of a
+// directory, each on the legs of ten seeds, or of one; looks in every picture for tissue that is
+// folded, that is where the map from rest to the picture does not keep orientation. PICTURES per
+// leg and case (default 3) differ in site, way off it, tilt (to 20 degrees), turn, probe, speed and
+// force (0 to 40 N). Half of them are taken while the probe moves, half at equilibrium of the
+// vessels.
 //
 // The tissue that lies in the image plane is looked at in steps of 0.3 mm at rest, the scanner's
 // resolution cell: two folded points side by side make a folded picture, a single one is counted.
@@ -255,8 +256,9 @@ static int tell(const totals *t) {
 
 int main(int argc, char **argv) {
   long pictures = argc > 2 ? atol(argv[2]) : 3;
-  if (argc < 2 || argc > 5 || pictures < 1) {
-    fprintf(stderr, "usage: bench_hostile CASES [PICTURES [SEED [OUT.csv]]]\n");
+  uint64_t only = argc > 5 ? strtoull(argv[5], NULL, 10) : 0;
+  if (argc < 2 || argc > 6 || pictures < 1 || only > LEGS) {
+    fprintf(stderr, "usage: bench_hostile CASES [PICTURES [SEED [OUT.csv [LEG]]]], LEG 1 to 10\n");
     return 2;
   }
   uint64_t seed = argc > 3 ? strtoull(argv[3], NULL, 10) : 1;
@@ -272,7 +274,7 @@ int main(int argc, char **argv) {
   fprintf(csv, "leg,case,probe,site,tilt_u_deg,tilt_v_deg,turn_deg,speed_m_s,moving,method,force_n,"
                "points,folded,adjacent,least_volume,x_mm,z_mm,inverses,lost,worst_mm\n");
   for (uint64_t leg = 1; leg <= LEGS; ++leg)
-    for (uint32_t k = 0; k < count; ++k) {
+    for (uint32_t k = 0; k < count && (only == 0 || leg == only); ++k) {
       uint64_t first = ((seed * LEGS + leg) * count + k) * (uint64_t)pictures;
       if (!play(&cases[k], leg, pictures, first, &t, csv, &error)) continue;
       t.skipped++,

@@ -82,15 +82,27 @@ sonde_vec3 sonde_vessels_even(const sonde_vessel_state *near, uint32_t count, so
   return at;
 }
 
-sonde_vec3 sonde_vessels_displace(const sonde_interior *in, sonde_vec3 rest, double s) {
-  sonde_vessel_state near[SONDE_VESSELS];
+uint32_t sonde_vessels_near(const sonde_interior *in, sonde_vec3 rest, double s,
+                            sonde_vessel_state near[SONDE_VESSELS]) {
   uint32_t count = 0;
   for (uint32_t which = 0; which < in->vessel_count; ++which)
     if (which < 2 || sonde_vessel_reaches(in, which, s, rest, 0))
       count += sonde_vessel_at(in, which, s, &near[count]);
-  sonde_vec3 at = sonde_vessels_gather(near, count, rest);
-  sonde_vec3 place = v_add(at, sonde_interior_field(in, at));
-  return v_sub(sonde_vessels_even(near, count, rest, at, place), rest);
+  return count;
+}
+
+sonde_carried sonde_vessels_carry(const sonde_interior *in, const sonde_vessel_state *near,
+                                  uint32_t count, sonde_vec3 rest) {
+  sonde_carried c = {.gathered_m = sonde_vessels_gather(near, count, rest)};
+  c.place_m = v_add(c.gathered_m, sonde_interior_field(in, c.gathered_m));
+  c.even_m = sonde_vessels_even(near, count, rest, c.gathered_m, c.place_m);
+  return c;
+}
+
+sonde_vec3 sonde_vessels_displace(const sonde_interior *in, sonde_vec3 rest, double s) {
+  sonde_vessel_state near[SONDE_VESSELS];
+  uint32_t count = sonde_vessels_near(in, rest, s, near);
+  return v_sub(sonde_vessels_carry(in, near, count, rest).even_m, rest);
 }
 
 sonde_vec3 sonde_interior_displacement(const sonde_interior *in, sonde_vec3 rest) {

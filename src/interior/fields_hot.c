@@ -78,7 +78,9 @@ static v4 field_of(sonde_fields *f, float turn, float s, float r, uint32_t cell[
   // Radii fall from the skin inwards: levels 1 to 6 that are not below the point.
   uint32_t above = (bits4(part[0] >= r) | bits4(part[1] >= r) << 4) >> 1 & 63;
   const uint32_t l = (uint32_t)__builtin_ctz(~above);
-  const float t = within((radius[l] - r) / (radius[l] - radius[l + 1]));
+  const float share = (radius[l] - r) / (radius[l] - radius[l + 1]),
+              low_t = (float)sonde_grid_beyond;
+  const float t = l == 0 && share < 0 ? (share < low_t ? low_t : share) : within(share);
   v4 low = all4(0), high = all4(0);
   for (int k = 0; k < 4; ++k) low += w[k] * c[k]->move[l], high += w[k] * c[k]->move[l + 1];
   return low + t * (high - low);

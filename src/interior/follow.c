@@ -67,7 +67,10 @@ static void prepare(sonde_interior *in, sonde_window_place place, bool at_once) 
 
 bool sonde_interior_follow(sonde_interior *in, const sonde_interior_input *input) {
   sonde_window_place place;
-  if (in->method != SONDE_INTERIOR_SOLID || !sonde_grid_place(in, input, &place)) return false;
+  bool within;
+  if (in->method != SONDE_INTERIOR_SOLID || !sonde_grid_place(in, input, &place, &within) ||
+      !within)
+    return false;
   prepare(in, place, input->dt_s < 0);
   if (!in->live->ready || distance(in, in->live->grid.place, place) > 1) return false;
   return sonde_window_update(in->live, in, input);

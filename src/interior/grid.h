@@ -73,12 +73,14 @@ typedef struct sonde_grid_cell {
 
 // Columns and rows for a place on the leg.
 void sonde_grid_begin(sonde_grid *grid, const sonde_interior *in, sonde_window_place place);
-// Place for a probe; false when it is beyond the leg's ends or far above the skin.
+// Place for a probe; false when it is far above the skin. *within: not beyond the leg's ends.
 bool sonde_grid_place(const sonde_interior *in, const sonde_interior_input *input,
-                      sonde_window_place *place);
+                      sonde_window_place *place, bool *within);
 // The columns around an angle and a row; false beyond the ends.
 bool sonde_grid_columns(const sonde_grid *grid, double theta, double s, sonde_grid_cell *cell);
-// The same with the level; a radius outside the skin or in the bone counts as on it.
+// Faces of elements cut the skin's corners: the outermost element goes on by this share of a layer.
+static const double sonde_grid_beyond = -0.15;
+// The same with the level; a radius farther outside the skin or in the bone counts as on it.
 bool sonde_grid_find(const sonde_grid *grid, double theta, double s, double r,
                      sonde_grid_cell *cell);
 

@@ -19,20 +19,21 @@ static const double grow_s[5] = {1.4, 2, 3, 4.5, 6.5};
 static const double grow_t[12] = {1.5, 2.3, 3.6, 5.5, 7.5, 9, 9, 7.5, 5.5, 3.6, 2.3, 1.5};
 
 bool sonde_grid_place(const sonde_interior *in, const sonde_interior_input *input,
-                      sonde_window_place *place) {
-  SONDE_ASSERT(in != NULL && input != NULL && place != NULL);
+                      sonde_window_place *place, bool *within) {
+  SONDE_ASSERT(in != NULL && input != NULL && place != NULL && within != NULL);
   sonde_mat3 r = q_matrix(input->world_from_probe.rotation);
   sonde_vec3 x = m_column(&r, 0), y = m_column(&r, 1);
   double hx = isfinite(input->face_half_x_m) ? input->face_half_x_m : default_half_x_m;
   double hy = isfinite(input->face_half_y_m) ? input->face_half_y_m : default_half_y_m;
   sonde_column_point at;
-  bool within = sonde_interior_locate(in, input->world_from_probe.position, &at);
+  bool on_leg = sonde_interior_locate(in, input->world_from_probe.position, &at);
   *place = (sonde_window_place){.theta = at.theta, .s = at.s};
   place->half_s_m = fabs(v_dot(x, in->axis)) * hx + fabs(v_dot(y, in->axis)) * hy;
   double across_x = sqrt(fmax(0, 1 - v_dot(x, in->axis) * v_dot(x, in->axis)));
   double across_y = sqrt(fmax(0, 1 - v_dot(y, in->axis) * v_dot(y, in->axis)));
   place->half_theta_m = across_x * hx + across_y * hy;
-  return within && at.depth_m > -far_m;
+  *within = on_leg;
+  return at.depth_m > -far_m;
 }
 
 // ---- a place ------------------------------------------------------------------------------
@@ -135,6 +136,7 @@ bool sonde_grid_find(const sonde_grid *g, double theta, double s, double r, sond
   }
   c->level = 0;
   while (c->level + 2 < NL && radius[c->level + 1] >= r) ++c->level;
-  c->t = clamp((radius[c->level] - r) / (radius[c->level] - radius[c->level + 1]), 0, 1);
+  c->t = (radius[c->level] - r) / (radius[c->level] - radius[c->level + 1]);
+  c->t = clamp(c->t, c->level > 0 ? 0 : sonde_grid_beyond, 1);
   return true;
 }

@@ -136,6 +136,16 @@ void sonde_vessel_tissue(const sonde_vessel_state *state, double *short_m, doubl
 sonde_vec3 sonde_vessels_gather(const sonde_vessel_state *near, uint32_t count, sonde_vec3 rest_m);
 sonde_vec3 sonde_vessels_even(const sonde_vessel_state *near, uint32_t count, sonde_vec3 rest_m,
                               sonde_vec3 gathered_m, sonde_vec3 place_m);
+// Vessels whose walls can move a rest point at axial position s; their number. @thread any
+uint32_t sonde_vessels_near(const sonde_interior *interior, sonde_vec3 rest_m, double s_m,
+                            sonde_vessel_state near[SONDE_VESSELS]);
+// The steps of a rest point beside these vessels: gathered, moved by the field, evened out.
+typedef struct sonde_carried {
+  sonde_vec3 gathered_m, place_m, even_m;
+} sonde_carried;
+// @thread any
+sonde_carried sonde_vessels_carry(const sonde_interior *interior, const sonde_vessel_state *near,
+                                  uint32_t count, sonde_vec3 rest_m);
 // Displacement of a rest point at axial position s, vessels included; it goes on beyond the skin.
 // @thread any
 sonde_vec3 sonde_vessels_displace(const sonde_interior *interior, sonde_vec3 rest_m, double s_m);

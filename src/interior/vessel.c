@@ -25,12 +25,14 @@ static const double bone_start = 0.30, bone_rise = 1.75; // rigid base, docs/int
 static const double carry_reach = 3.0; // rest radii over which the wall's motion fades
 static const double plane_reach_m = 40e-3;
 static const double gradient_reach = 1.5, bend_reach = 2.5; // rest radii: where the field is read
-static const double most_squeeze = 2.2; // a lumen's semi-axis over the tissue's stretch, rest radii
+static const double most_squeeze = 1.6; // a lumen's semi-axis over the tissue's stretch, rest radii
 static const double least_tissue = 0.1, most_turn = 0.5; // of the gradient beside a wall
 static const double most_shear = 1;                      // over the stretch along the other axis
-static const double gap_share = 0.4, side_by_side = 0.7;
-static const double gentle_squeeze = 0.45, gentle_bend = 0.08, probing_m = 0.1e-3;
-static const double least_area_share = 0.06;
+static const double gap_share = 0.2;
+static const double gentle_squeeze = 0.45, gentle_bend = 0.02, probing_m = 0.1e-3;
+static const double least_gathered = 0.2; // volume of the gathered tissue over that at rest
+static const double most_lean = 0.4; // tangent of the angle between a vessel and itself at rest
+static const double safe_share = 0.2, even_step = 0.15, lead_step = 0.25;
 enum { PASSES = 10 };
 static const double bend_share = 0.2;   // of the tissue's least stretch that a bend may take
 static const double beyond_share = 0.5; // of the way to where the field is read: the next ring
@@ -235,61 +237,141 @@ static bool find_tissue(const sonde_interior *in, sonde_vessel_state *v) {
   return fmin(v->tissue_short, v->tissue_long) < gentle_squeeze || most > gentle_bend * far;
 }
 
-// Two vessels side by side leave tissue between them: a lumen takes a share of the gap at rest, as
-// the tissue's gradient stretches it, and is as much thicker; its area stays.
+// Two vessels side by side leave tissue between them: towards the other a lumen takes a share of
+// the gap at rest, as the tissue's gradient stretches it, and is as much larger across; its area
+// stays.
 static void keep_clear(sonde_interior *in, uint32_t which, uint32_t other) {
   for (uint32_t i = 0; i < in->station_count[which]; ++i) {
     sonde_vessel_state *v = &in->state[which][i], beside;
     if (!(v->lead > 0) || !sonde_vessel_at(in, other, in->station[which][i].s_m, &beside)) continue;
     sonde_vec3 d = v_sub(beside.rest_centre_m, v->rest_centre_m);
-    sonde_vec3 across = v_cross(v->axis, v->flat_axis);
     d = v_madd(d, -v_dot(d, v->axis), v->axis);
     double apart = v_norm(d), gap = apart - v->rest_radius_m - beside.rest_radius_m;
-    if (!(gap > 0) || fabs(v_dot(d, across)) < side_by_side * apart) continue;
-    double most = v->tissue_long * (v->rest_radius_m + gap_share * gap);
-    double round = sqrt(v->half_short_m * v->half_long_m), bound = fmax(most, round);
-    if (v->half_long_m <= bound) continue;
-    v->half_short_m *= v->half_long_m / bound, v->half_long_m = bound;
+    if (!(gap > 0)) continue;
+    double cosine = v_dot(d, v->flat_axis) / apart, sine2 = fmax(0, 1 - cosine * cosine);
+    double a = v->half_short_m / v->tissue_short, b = v->half_long_m / v->tissue_long;
+    double toward = a * a * cosine * cosine + b * b * sine2;
+    double bound = v->rest_radius_m + gap_share * gap;
+    if (toward <= bound * bound) continue;
+    double share = bound / sqrt(toward);
+    bool by_long = b * b * sine2 > a * a * cosine * cosine;
+    v->half_long_m *= by_long ? share : 1 / share;
+    v->half_short_m *= by_long ? 1 / share : share;
   }
 }
 
-// Least area in the cross-section, over the area at rest, of the tissue beside a station.
-static double least_area_beside(const sonde_interior *in, uint32_t which, uint32_t i) {
-  enum { SIDES = 12, RINGS = 3 };
-  static const double ring[RINGS] = {1.25, 2.2, 3.1}; // rest radii
+// What walls do to the tissue beside a station.
+typedef struct strain {
+  double gathered; // least volume after gathering
+  double even;     // largest share of the present evening out that surely folds nothing
+} strain;
+
+static sonde_mat3 per_step(const sonde_vec3 at[4], double step) {
+  return m_scale(m_columns(v_sub(at[1], at[0]), v_sub(at[2], at[0]), v_sub(at[3], at[0])),
+                 1 / step);
+}
+
+static double volume_of(const sonde_mat3 *m) {
+  sonde_vec3 a = m_column(m, 0), b = m_column(m, 1), c = m_column(m, 2);
+  return v_dot(a, v_cross(b, c));
+}
+
+// A bound from below of the least stretch under a gradient: its volume over the size of its
+// cofactors.
+static double least_stretch(const sonde_mat3 *m) {
+  sonde_vec3 a = m_column(m, 0), b = m_column(m, 1), c = m_column(m, 2);
+  sonde_vec3 bc = v_cross(b, c), ca = v_cross(c, a), ab = v_cross(a, b);
+  return v_dot(a, bc) / sqrt(v_norm2(bc) + v_norm2(ca) + v_norm2(ab));
+}
+
+static double size_of(const sonde_mat3 *m) {
+  sonde_vec3 a = m_column(m, 0), b = m_column(m, 1), c = m_column(m, 2);
+  return sqrt(v_norm2(a) + v_norm2(b) + v_norm2(c));
+}
+
+// At a place of rest, by differences over a step: stations before and after it differ. The tissue's
+// gradient without evening out is M, evening out adds B: no fold where e times the size of B stays
+// below the least stretch under M.
+static void strain_at(const sonde_interior *in, sonde_vec3 at, double s, double step,
+                      strain *least) {
+  sonde_vec3 gathered[4], place[4], even[4];
+  sonde_vessel_state near[SONDE_VESSELS];
+  uint32_t count = sonde_vessels_near(in, at, s, near);
+  for (int c = 0; c < 4; ++c) {
+    sonde_vec3 side = c == 1 ? in->e1 : c == 2 ? in->e2 : in->axis;
+    sonde_vec3 from = c > 0 ? v_madd(at, step, side) : at;
+    if (c == 3) count = sonde_vessels_near(in, from, s + step, near);
+    sonde_carried to = sonde_vessels_carry(in, near, count, from);
+    gathered[c] = to.gathered_m, place[c] = to.place_m, even[c] = v_sub(to.even_m, to.place_m);
+  }
+  const sonde_mat3 turn = m_transpose(m_columns(in->e1, in->e2, in->axis));
+  sonde_mat3 g = m_mul(per_step(gathered, step), turn), m = m_mul(per_step(place, step), turn);
+  sonde_mat3 b = per_step(even, step);
+  least->gathered = fmin(least->gathered, volume_of(&g));
+  double room = safe_share * fmax(0, least_stretch(&m));
+  least->even = fmin(least->even, room / fmax(size_of(&b), 1e-9));
+}
+
+// Around a station, and between its wall and those of other vessels.
+static strain strain_beside(const sonde_interior *in, uint32_t which, uint32_t i) {
+  enum { SIDES = 10, RINGS = 3, WAYS = 3 };
+  static const double ring[RINGS] = {1.1, 1.9, 3.1}; // rest radii
   const sonde_vessel_state *v = &in->state[which][i];
   const sonde_vec3 side[2] = {v->flat_axis, v_cross(v->axis, v->flat_axis)};
   const double s = in->station[which][i].s_m;
-  double least = INFINITY;
+  strain least = {INFINITY, INFINITY};
   for (int k = 0; k < SIDES * RINGS; ++k) {
-    double a = 2 * SONDE_PI * (k % SIDES) / SIDES, r = ring[k / SIDES] * v->rest_radius_m, g[2][2];
-    sonde_vec3 at = v_madd(v_madd(v->rest_centre_m, r * cos(a), side[0]), r * sin(a), side[1]);
-    sonde_vec3 u = sonde_vessels_displace(in, at, s);
-    for (int c = 0; c < 2; ++c) {
-      sonde_vec3 next = sonde_vessels_displace(in, v_madd(at, probing_m, side[c]), s);
-      sonde_vec3 slope = v_scale(v_sub(next, u), 1 / probing_m);
-      for (int d = 0; d < 2; ++d) g[d][c] = (c == d) + v_dot(slope, side[d]);
+    double a = 2 * SONDE_PI * (k % SIDES) / SIDES, r = ring[k / SIDES] * v->rest_radius_m;
+    sonde_vec3 way = v_madd(v_scale(side[0], r * cos(a)), r * sin(a), side[1]);
+    strain_at(in, v_add(v->rest_centre_m, way), s + v_dot(way, in->axis),
+              k % 2 ? probing_m : -probing_m, &least);
+  }
+  for (uint32_t other = 0; other < in->vessel_count; ++other) {
+    sonde_vessel_state beside;
+    if (other == which || !sonde_vessel_at(in, other, s, &beside)) continue;
+    sonde_vec3 d = v_sub(beside.rest_centre_m, v->rest_centre_m);
+    double apart = v_norm(d), gap = apart - v->rest_radius_m - beside.rest_radius_m;
+    if (!(gap > 0) || gap > 2 * (v->rest_radius_m + beside.rest_radius_m)) continue;
+    for (int k = 0; k < WAYS * 5; ++k) {
+      double r = (v->rest_radius_m + gap * (k % WAYS + 1) / (WAYS + 1)) / apart;
+      sonde_vec3 across = v_unit(v_cross(d, in->axis), side[1]);
+      sonde_vec3 way = v_madd(v_scale(d, r), (k / WAYS - 2) * 0.4 * v->rest_radius_m, across);
+      strain_at(in, v_add(v->rest_centre_m, way), s + v_dot(way, in->axis),
+                k % 2 ? probing_m : -probing_m, &least);
     }
-    least = fmin(least, g[0][0] * g[1][1] - g[0][1] * g[1][0]);
   }
   return least;
 }
 
-// Less of the bends ends at a wall, and a lumen that stands up against the squeeze goes half the
-// way to where the tissue's gradient takes it.
-static void give_way(sonde_vessel_state *v, bool all) {
+// A wall leads less, and a lumen that stands up against the squeeze goes half the way to where the
+// tissue's gradient takes it.
+static void give_way(sonde_vessel_state *v) {
   SONDE_ASSERT(v->rest_radius_m > 0 && v->tissue_short > 0 && v->tissue_long > 0);
   double with_short = v->tissue_short * v->rest_radius_m;
   double with_long = v->tissue_long * v->rest_radius_m;
-  v->tissue_even *= 0.5;
-  if (all || v->half_short_m > with_short) v->lead *= 0.5;
+  v->lead *= 0.5;
   if (v->half_short_m <= with_short) return;
   v->half_short_m += 0.5 * (with_short - v->half_short_m);
   v->half_long_m += 0.5 * (with_long - v->half_long_m);
 }
 
+// From one station to the next a share changes by so much at most: what a wall does ends gently
+// along its vessel as well.
+static void spread_along(sonde_interior *in, uint32_t which) {
+  const uint32_t count = in->station_count[which];
+  for (uint32_t n = 1; n < 2 * count; ++n) {
+    bool back = n >= count;
+    uint32_t i = back ? 2 * count - 1 - n : n, from = back ? i + 1 : i - 1;
+    if (from >= count) continue;
+    sonde_vessel_state *v = &in->state[which][i], *w = &in->state[which][from];
+    const double most = in->station[which][i].lead, beside = in->station[which][from].lead;
+    v->tissue_even = fmin(v->tissue_even, w->tissue_even + even_step);
+    if (beside > 0) v->lead = fmin(v->lead, most * fmin(1, w->lead / beside + lead_step));
+  }
+}
+
 // Where walls would fold a layer that is squeezed very thin, or the tissue between two of them,
-// they give way to it.
+// they give way to it, and less of the bends ends at them.
 static void yield_to_squeeze(sonde_interior *in) {
   bool changed = true;
   for (int pass = 0; pass < PASSES && changed; ++pass) {
@@ -297,16 +379,31 @@ static void yield_to_squeeze(sonde_interior *in) {
     for (uint32_t which = 0; which < in->vessel_count; ++which)
       for (uint32_t i = 0; i < in->station_count[which]; ++i) {
         if (!in->strained[which][i]) continue;
-        if (least_area_beside(in, which, i) > least_area_share) continue;
-        changed = true;
+        strain least = strain_beside(in, which, i);
+        in->strained[which][i] = least.gathered < least_gathered; // to be looked at again
+        if (least.gathered >= least_gathered && least.even >= 1) continue;
         for (uint32_t other = 0; other < in->vessel_count; ++other) {
           uint32_t at;
           double share;
           if (!sonde_vessel_stations(in, other, in->station[which][i].s_m, &at, &share)) continue;
-          give_way(&in->state[other][at + (share > 0.5)], pass >= PASSES / 2);
+          sonde_vessel_state *v = &in->state[other][at + (share > 0.5)];
+          v->tissue_even *= fmin(least.even, 1);
+          if (least.gathered < least_gathered) give_way(v), changed = true;
         }
       }
+    for (uint32_t which = 0; which < in->vessel_count; ++which) spread_along(in, which);
   }
+}
+
+// The direction of a vessel that runs along `way`, at most so far from where it runs at rest: its
+// cross-sections stay apart.
+static sonde_vec3 lean(sonde_vec3 rest, sonde_vec3 way) {
+  sonde_vec3 axis = v_unit(way, rest);
+  double along = v_dot(axis, rest);
+  sonde_vec3 aside = v_madd(axis, -along, rest);
+  double across = v_norm(aside), most = most_lean * fmax(along, 0);
+  if (along > 0 && across <= most) return axis;
+  return v_unit(v_madd(rest, most_lean / fmax(across, 1e-9), aside), rest);
 }
 
 void sonde_interior_vessels(sonde_interior *in, const sonde_interior_input *input) {
@@ -318,7 +415,7 @@ void sonde_interior_vessels(sonde_interior *in, const sonde_interior_input *inpu
     for (uint32_t i = 0; i < count; ++i) update_station(in, which, i, &c, &l, input);
     for (uint32_t i = 0; i < count; ++i) {
       uint32_t a = i > 0 ? i - 1 : 0, b = i + 1 < count ? i + 1 : i;
-      v[i].axis = v_unit(v_sub(v[b].centre_m, v[a].centre_m), in->station[which][i].axis);
+      v[i].axis = lean(in->station[which][i].axis, v_sub(v[b].centre_m, v[a].centre_m));
       sonde_vec3 up = v_madd(v_neg(l.beam), v_dot(l.beam, v[i].axis), v[i].axis);
       if (v_norm2(up) > 1e-4) v[i].flat_axis = v_unit(up, v[i].flat_axis);
     }

@@ -20,6 +20,8 @@ enum { SIDE = 3 * SONDE_WINDOW_NEAR, MOST_ITERATIONS = 80 };
 
 static const double give = 0.02; // of the points' mean compliance: dense points do not fight
 static const double sample_start_m = 0.08; // above the face
+static const double held_share =
+    0.25; // of a touched point's weight: the skin node goes with the face
 static const double face_edge_m = 0.3e-3;
 static const double tolerance = 2e-3; // of the prescribed motion
 
@@ -342,6 +344,14 @@ static void keep_apart(sonde_window *w) {
   sonde_solid *s = &w->solid;
   for (uint32_t n = 0; n < SONDE_WINDOW_NODES; ++n)
     w->unfold.now[n] = v_add(w->grid.node[n], sonde_solid_moved(s, n));
+  memset(w->unfold.held, 0, sizeof w->unfold.held);
+  for (uint32_t p = 0; p < w->moved.count; ++p)
+    for (int k = 0; k < 4; ++k) {
+      const sonde_touched *t = &w->moved.touched[p];
+      uint32_t row = t->near[k] / SONDE_WINDOW_NEAR_T + SONDE_WINDOW_NEAR_FIRST;
+      if (t->weight[k] > held_share)
+        w->unfold.held[row * NT + t->near[k] % SONDE_WINDOW_NEAR_T] = true;
+    }
   if (!sonde_unfold_nodes(&w->unfold, &w->grid)) return;
   for (uint32_t n = 0; n < SONDE_WINDOW_NODES; ++n) {
     if (s->unknown[n] == SONDE_FRONT_NONE) continue;
