@@ -132,9 +132,9 @@ static bool read_entry(const char *directory, const char *id, sonde_log_entry *e
   return known;
 }
 
-// Keyframes, result and report are made again; of what a killed program had begun nothing is left.
+// Keyframes, result, table and report are made again; of what a killed program had begun nothing is left.
 static void sweep(const char *directory) {
-  static const char *const NAMES[] = {"exam.rec.keys", "exam.json", "report.html"};
+  static const char *const NAMES[] = {"exam.rec.keys", "exam.json", "exam.csv", "report.html"};
   char path[DESK_PATH];
   for (size_t k = 0; k < sizeof NAMES / sizeof NAMES[0]; ++k)
     (void)sonde_file_sweep(desk_path(path, directory, NAMES[k]));
