@@ -22,6 +22,7 @@
 
 #include <cjson/cJSON.h>
 #include <fcntl.h>
+#include <errno.h>
 #include <sqlite3.h>
 #include <string.h>
 
@@ -113,6 +114,10 @@ static sonde_status sql_fail(const sonde_exam_log *log, sonde_error *error) {
   default: break;
   }
   int failure = sqlite3_system_errno(log->base);
+  // The log is open, so its directory is there: SQLite could not make the journal beside it and
+  // then looked whether there is one.
+  if ((sqlite3_errcode(log->base) & 0xff) == SQLITE_CANTOPEN && failure == ENOENT)
+    return sonde_fail(error, SONDE_DISK, "%s: its journal cannot be written", log->path);
   return sonde_fail(error, failure ? sonde_disk_status(failure) : SONDE_IO, "%s: %s%s%s", log->path,
                     words, failure ? ": " : "", failure ? strerror(failure) : "");
 }

@@ -53,7 +53,8 @@ check_exam() { # WHAT
     complain "$what: kept, but there is no report"
     lost=$((lost + 1))
   fi
-  [[ -z $(find "$work/d" -name '*.part-*') ]] || complain "$what: $(find "$work/d" -name '*.part-*') is left"
+  [[ -z $(find "$work/d" -mindepth 2 -name '*.part-*') ]] ||
+    complain "$what: $(find "$work/d" -mindepth 2 -name '*.part-*') is left"
   # A second look finds nothing new: the log has them all.
   "$SONDE" exam --recover "$work/d" --cases "$LIBRARY/cases" --protocols "$LIBRARY/protocols" --json \
     >"$work/json" 2>"$work/err" || complain "$what: second recovery failed"
