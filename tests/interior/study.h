@@ -1,4 +1,4 @@
-// The finite-element study of vessels (shared/data/vein_compression): its prismatic thigh, its
+// The finite-element study of vessels (tests/data/vein_compression): its prismatic thigh, its
 // bonded probe, its tables.
 #ifndef SONDE_TEST_STUDY_H
 #define SONDE_TEST_STUDY_H

@@ -9,7 +9,7 @@ typedef struct stress_row {
 } stress_row;
 
 static uint32_t read_stress(stress_row *rows, uint32_t capacity) {
-  FILE *file = fopen(SONDE_SOURCE_DIR "/../shared/data/vein_compression/stress_no_vessel.csv", "r");
+  FILE *file = fopen(SONDE_SOURCE_DIR "/tests/data/vein_compression/stress_no_vessel.csv", "r");
   char line[512];
   uint32_t count = 0;
   while (file != NULL && count < capacity && fgets(line, sizeof line, file) != NULL) {
@@ -37,7 +37,7 @@ static void stress_follows_the_study(void **state) {
   (void)state;
   static stress_row rows[200];
   uint32_t count = read_stress(rows, 200), used = 0;
-  if (count == 0) skip();
+  assert_true(count > 0);
   sonde_pathology p;
   assert_int_equal(sonde_pathology_preset("healthy", &p, NULL), SONDE_OK);
   double sum = 0, worst = 0;
@@ -79,7 +79,7 @@ typedef struct area_row {
 } area_row;
 
 static uint32_t read_areas(area_row *rows, uint32_t capacity) {
-  FILE *file = fopen(SONDE_SOURCE_DIR "/../shared/data/vein_compression/area_force.csv", "r");
+  FILE *file = fopen(SONDE_SOURCE_DIR "/tests/data/vein_compression/area_force.csv", "r");
   char line[512];
   uint32_t count = 0;
   while (file != NULL && count < capacity && fgets(line, sizeof line, file) != NULL) {
@@ -148,7 +148,7 @@ static void areas_follow_the_study(void **state) {
   (void)state;
   static area_row rows[300];
   uint32_t count = read_areas(rows, 300), from = 0;
-  if (count == 0) skip();
+  assert_true(count > 0);
   for (uint32_t i = 0; i < count; ++i) press_row(&rows[i]);
   while (from < count) {
     uint32_t to = from, used = 0;
