@@ -132,7 +132,8 @@ static bool read_entry(const char *directory, const char *id, sonde_log_entry *e
   return known;
 }
 
-// Keyframes, result, table and report are made again; of what a killed program had begun nothing is left.
+// Keyframes, result, table and report are made again; nothing is left of what a killed program had
+// begun.
 static void sweep(const char *directory) {
   static const char *const NAMES[] = {"exam.rec.keys", "exam.json", "exam.csv", "report.html"};
   char path[DESK_PATH];

@@ -33,8 +33,8 @@ SONDE_API sonde_status sonde_device_open(const char *name, const sonde_device_op
                                          sonde_device *device, sonde_error *error);
 
 /** Frame of a driver's device on a table in front of its user, at a probe: to the right is the
- *  probe's x, up is away from the skin, towards the user is the probe's y. Its origin is the probe's.
- *  @return world_from_base; for another name as for openhaptics @thread any */
+ *  probe's x, up is away from the skin, towards the user is the probe's y. Its origin is at the
+ *  probe's. @return world_from_base; for another name as for openhaptics @thread any */
 SONDE_API sonde_pose sonde_device_base(const char *name, sonde_pose world_from_probe);
 
 /** How a handle takes hold of the probe; zero means default. */

@@ -308,8 +308,7 @@ static void who_may_add_notes(void **state) {
     char from[512];
     sonde_recording_info info;
     sonde_comments comments;
-    snprintf(from, sizeof from, "cp %s/tests/exam/old/%s %s", SONDE_SOURCE_DIR, old[k],
-             path);
+    snprintf(from, sizeof from, "cp %s/tests/exam/old/%s %s", SONDE_SOURCE_DIR, old[k], path);
     assert_int_equal(system(from), 0);
     assert_int_equal(sonde_recording_inspect(path, false, &info, NULL), SONDE_OK);
     assert_int_equal(info.version, old[k][8] - '0');

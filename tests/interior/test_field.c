@@ -179,8 +179,7 @@ typedef struct fe_node {
 static uint32_t read_field(int site, int penetration_mm, fe_node *nodes, uint32_t capacity) {
   char path[512], line[256];
   snprintf(path, sizeof path,
-           SONDE_SOURCE_DIR "/tests/data/fields_A/displacement_site%02d_linear.csv",
-           site);
+           SONDE_SOURCE_DIR "/tests/data/fields_A/displacement_site%02d_linear.csv", site);
   FILE *file = fopen(path, "r");
   uint32_t count = 0;
   if (file == NULL) return 0;
@@ -251,8 +250,8 @@ static void fe_layers(tube *t) {
   sonde_mesh muscle = {0};
   sonde_surface_index *index = NULL;
   sonde_error error;
-  if (sonde_mesh_load(SONDE_SOURCE_DIR "/data/thigh/muscle_surface.ply",
-                      1e-3, &muscle, &error) != SONDE_OK)
+  if (sonde_mesh_load(SONDE_SOURCE_DIR "/data/thigh/muscle_surface.ply", 1e-3, &muscle, &error) !=
+      SONDE_OK)
     fail_msg("%s", error.message);
   assert_int_equal(sonde_surface_index_create(&muscle, &index, NULL), SONDE_OK);
   for (uint32_t i = 0; i < t->model.surface.vertex_count; ++i) {
@@ -393,7 +392,8 @@ static void work_ahead_changes_no_update(void **state) {
   assert_true(in[1]->building && in[1]->next->ready);
   hover(in[1], &t, 0.155, 0.03);
   assert_false(in[1]->building);
-  assert_memory_equal(&in[0]->live->grid.place, &in[1]->live->grid.place, sizeof in[0]->live->grid.place);
+  assert_memory_equal(&in[0]->live->grid.place, &in[1]->live->grid.place,
+                      sizeof in[0]->live->grid.place);
   const size_t near = 3 * (size_t)SONDE_WINDOW_NEAR;
   assert_memory_equal(in[0]->live->compliance, in[1]->live->compliance,
                       near * near * sizeof(double));
