@@ -35,6 +35,7 @@ test_packages() {
   need_library cmocka libcmocka-dev
   need_library ccd libccd-dev
   need_command clang clang
+  need_command clang-format-14 clang-format-14
   if has clang; then
     local runtime
     runtime=$(clang -print-file-name=libclang_rt.asan-x86_64.a)

@@ -38,6 +38,8 @@ expect() { # green|red WHAT COMMAND...
 includes=("$house/includes.sh" "$tree") sizes=("$house/sizes.sh" "$tree")
 hot=("$house/hot_symbols.sh" "$tree" "$tree/build" "$objdump")
 api=("$house/api.sh" "$tree" "$tree/lib.so" "$nm") disk=("$house/disk.sh" "$tree")
+format=("$house/format.sh" "$tree")
+cp "$house/../../.clang-format" "$tree"
 
 fresh
 expect green "includes, clean tree" "${includes[@]}"
@@ -53,6 +55,13 @@ fresh; echo 'int sonde_disk(void);' >"$tree/src/base/disk.c"
 expect green "disk, clean tree" "${disk[@]}"
 echo 'void f(void) { rename("a", "b"); }' >>"$tree/app/main.c"
 expect red "a call that changes the disk elsewhere" "${disk[@]}"
+
+fresh
+expect green "format, clean tree" "${format[@]}"
+echo 'int  wide(void);' >>"$tree/app/main.c"
+expect red "a line with two blanks where one belongs" "${format[@]}"
+fresh; echo 'int *a; int *b;' >>"$tree/src/base/base.h"
+expect red "a header with two declarations on a line" "${format[@]}"
 
 fresh
 { echo 'int long_one(int a) {'; for i in {1..79}; do echo "  a += $i;"; done; echo '}'; } \
