@@ -17,6 +17,13 @@ fresh() { # a tree that keeps every rule
   echo '#include "sonde/base.h"' >"$tree/src/base/base.h"
   echo '#include "sonde/world.h"' >"$tree/app/main.c"
   : >"$tree/tests/house/hot_objects.txt"
+  printf '%s\n' '# group room | does | read' 'sonde base | memory | docs/base.md' \
+    'sonde world | the step | docs/base.md' 'sonde-exam stream | the page | include/sonde/base.h' \
+    >"$tree/src/rooms.txt"
+  mkdir -p "$tree/docs"
+  : >"$tree/docs/base.md"
+  printf '%s\n' '# Rooms' '<!-- rooms: -->' '<!-- end of rooms -->' >"$tree/docs/architecture.md"
+  "$house/../../docs/rooms.sh" "$tree"
 }
 compile() { # ROOM FILE TEXT: the object where the gate looks for it
   local object=$tree/build/src/$1/CMakeFiles/sonde_$1.dir/$2.o
@@ -35,7 +42,8 @@ expect() { # green|red WHAT COMMAND...
   fi
 }
 
-includes=("$house/includes.sh" "$tree") sizes=("$house/sizes.sh" "$tree")
+includes=("$house/includes.sh" "$tree") rooms=("$house/rooms.sh" "$tree")
+sizes=("$house/sizes.sh" "$tree")
 hot=("$house/hot_symbols.sh" "$tree" "$tree/build" "$objdump")
 api=("$house/api.sh" "$tree" "$tree/lib.so" "$nm") disk=("$house/disk.sh" "$tree")
 format=("$house/format.sh" "$tree")
@@ -50,6 +58,23 @@ fresh; echo '#include "sonde/stream.h"' >>"$tree/include/sonde/world.h"
 expect red "a public header that includes a lower one" "${includes[@]}"
 fresh; echo '#include "base/base.h"' >>"$tree/app/main.c"
 expect red "an app file that looks inside" "${includes[@]}"
+
+fresh
+expect green "rooms, clean tree" "${rooms[@]}"
+sed -i '/stream/d' "$tree/docs/architecture.md"
+expect red "a table of rooms that lacks one of the list" "${rooms[@]}"
+fresh; sed -i 's/the step/many steps/' "$tree/src/rooms.txt"
+expect red "a room that does something else in the table" "${rooms[@]}"
+fresh; sed -i '/end of rooms/d' "$tree/docs/architecture.md"
+expect red "a page without the place of the table" "${rooms[@]}"
+fresh; mkdir "$tree/src/other"
+expect red "a directory of src that is not listed" "${rooms[@]}"
+for fault in '$a sonde other | rests | docs/base.md' '$a sonde base | memory | docs/base.md' \
+  's/^sonde base/library base/' '/^sonde base/s/base.md/other.md/' '/^sonde base/s/[|].*/| |/'; do
+  fresh; sed -i "$fault" "$tree/src/rooms.txt"
+  "$house/../../docs/rooms.sh" "$tree"
+  expect red "the list of rooms after $fault" "${rooms[@]}"
+done
 
 fresh; echo 'int sonde_disk(void);' >"$tree/src/base/disk.c"
 expect green "disk, clean tree" "${disk[@]}"

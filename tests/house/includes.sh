@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# includes.sh ROOT: a room includes only itself and the rooms above it in the list; app/ and samples/
-# include public headers only.
+# includes.sh ROOT: a room includes only itself and the rooms above it in src/rooms.txt; app/ and
+# samples/ include public headers only.
 set -euo pipefail
 root=$1
-rooms=(base geometry contact sparse tissue world scene fit robot identify report anatomy interior echo haptics exam trainer stream)
+mapfile -t rooms < <(sed -nE 's/^[^# ]+ +([a-z_]+) .*/\1/p' "$root/src/rooms.txt")
 bad=0
 
 rank() {
