@@ -8,7 +8,7 @@
 // bridge_slab          one layer of the volume, for the workers
 // sonde_reconstruct
 #include "echo/frames.h"
-#include "fit/parallel.h"
+#include "base/parallel.h"
 
 #include <string.h>
 

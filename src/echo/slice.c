@@ -17,7 +17,7 @@
 #include "echo/slice.h"
 
 #include "base/vector.h"
-#include "fit/parallel.h"
+#include "base/parallel.h"
 
 #include <string.h>
 

@@ -3,7 +3,7 @@
 // sonde_predict: curves in parallel.
 #include "base/maths.h"
 #include "fit/fit_inside.h"
-#include "fit/parallel.h"
+#include "base/parallel.h"
 #include "fit/press.h"
 
 sonde_predict_def sonde_predict_def_default(void) {

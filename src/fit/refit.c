@@ -6,7 +6,7 @@
 // sonde_refit_start: nominal area enlarged by a rim of surrounding skin.
 #include "fit/refit.h"
 #include "sparse/dense.h"
-#include "fit/parallel.h"
+#include "base/parallel.h"
 #include "fit/refit_inside.h"
 #include "fit/refit_offset.h"
 #include "fit/site_field.h"

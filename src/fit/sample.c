@@ -7,7 +7,7 @@
 
 #include "base/maths.h"
 #include "fit/arrow.h"
-#include "fit/csv.h"
+#include "base/csv.h"
 
 #include <ctype.h>
 #include <string.h>

@@ -5,7 +5,7 @@
 // check_sign: on the whole the forces press.
 // place_on_surface / fail_off: how far a site is from the skin and its normal, and the sentence.
 #include "base/maths.h"
-#include "fit/csv.h"
+#include "base/csv.h"
 #include "fit/fit_inside.h"
 #include "fit/repeats.h"
 #include "geometry/internal.h"

@@ -13,7 +13,7 @@
 
 #include "base/maths.h"
 #include "base/order.h"
-#include "fit/parallel.h"
+#include "base/parallel.h"
 
 #include <string.h>
 

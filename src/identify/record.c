@@ -2,7 +2,7 @@
 // read_rows:     samples in time order.
 // load and save: the file of a record (docs/identify.md).
 #include "base/maths.h"
-#include "fit/csv.h"
+#include "base/csv.h"
 #include "sonde/identify.h"
 
 #include <string.h>

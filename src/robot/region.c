@@ -2,7 +2,7 @@
 // load_patch:   a mesh cut out of the skin.
 // angle_of:     a point's angle around the axis, within a turn that starts at some angle.
 // sonde_region_holds: distance from the patch, or crossings of the outline in (angle, z).
-#include "fit/csv.h"
+#include "base/csv.h"
 #include "robot/sites_inside.h"
 
 #include <string.h>

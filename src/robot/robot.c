@@ -6,7 +6,7 @@
 #include "base/maths.h"
 #include "base/random.h"
 #include "fit/fit_inside.h"
-#include "fit/parallel.h"
+#include "base/parallel.h"
 #include "fit/press.h"
 #include "sonde/robot.h"
 

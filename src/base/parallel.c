@@ -1,7 +1,7 @@
 // worker_main: takes the next item until none is left or the run stops.
 // wait_and_report: the caller reports progress ten times a second.
 // sonde_parallel_run: starts, waits, joins.
-#include "fit/parallel.h"
+#include "base/parallel.h"
 
 #include <pthread.h>
 #include <time.h>

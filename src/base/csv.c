@@ -2,7 +2,7 @@
 // split: cuts a line into trimmed cells.
 // next_content: the next line that is neither empty nor a comment.
 // read_header: names of the columns, all different.
-#include "fit/csv.h"
+#include "base/csv.h"
 
 #include "base/bounds.h"
 

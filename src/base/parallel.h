@@ -1,6 +1,6 @@
 // Independent items shared among threads; the outcome does not depend on their number.
-#ifndef SONDE_SRC_FIT_PARALLEL_H
-#define SONDE_SRC_FIT_PARALLEL_H
+#ifndef SONDE_SRC_PARALLEL_H
+#define SONDE_SRC_PARALLEL_H
 
 #include "base/base.h"
 

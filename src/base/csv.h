@@ -1,6 +1,6 @@
 // Comma separated text with a header line: cells by column name, errors with file, line and column.
-#ifndef SONDE_SRC_FIT_CSV_H
-#define SONDE_SRC_FIT_CSV_H
+#ifndef SONDE_SRC_CSV_H
+#define SONDE_SRC_CSV_H
 
 #include "base/base.h"
 

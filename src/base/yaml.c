@@ -7,7 +7,7 @@
 // check_shape:  one document, within the limits of size, nesting and number of values.
 // build:        the document.
 // sonde_read_*: typed values with ranges.
-#include "scene/yaml.h"
+#include "base/yaml.h"
 
 #include "base/bounds.h"
 #include "base/maths.h"

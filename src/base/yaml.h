@@ -1,7 +1,7 @@
 // Reading a YAML document with the line of every mistake. A reader keeps the first error: after it
 // every call does nothing and returns a default, so that callers check once.
-#ifndef SONDE_SRC_SCENE_YAML_H
-#define SONDE_SRC_SCENE_YAML_H
+#ifndef SONDE_SRC_YAML_H
+#define SONDE_SRC_YAML_H
 
 #include "sonde/base.h"
 
