@@ -9,7 +9,7 @@
 // leave_each_out
 // make_work, clear_work
 // sonde_sequence_leave_one_out
-#include "echo/slice.h"
+#include "sweep/slice.h"
 
 #include <string.h>
 

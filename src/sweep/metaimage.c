@@ -7,7 +7,7 @@
 // read_grid                       spacing, offset and axes of a volume
 // sonde_metaimage_write_sequence  header as IGSIO writes it
 // sonde_metaimage_write_volume
-#include "echo/frames.h"
+#include "sweep/frames.h"
 
 #include <string.h>
 

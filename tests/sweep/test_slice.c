@@ -1,7 +1,7 @@
 // Pictures between tracked frames and volumes from them: laws, a phantom whose truth is known, a
 // real sweep.
 #include "fixture.h"
-#include "sonde/echo_volume.h"
+#include "sonde/sweep_volume.h"
 
 #include <stdio.h>
 #include <unistd.h>

@@ -1,13 +1,13 @@
 /**
- * @file echo_frames.h
+ * @file sweep_frames.h
  * Tracked image sequences: reading and writing them, an image at any pose between their frames,
- * and how like two images are. Volumes are in echo_volume.h.
+ * and how like two images are. Volumes are in sweep_volume.h.
  *
  * Memory holds metres; the files hold millimetres. Pixel (u, v) means the centre of the pixel in
  * column u and row v; u grows towards the marked side of the probe, v away from the probe (MF).
  */
-#ifndef SONDE_ECHO_FRAMES_H
-#define SONDE_ECHO_FRAMES_H
+#ifndef SONDE_SWEEP_FRAMES_H
+#define SONDE_SWEEP_FRAMES_H
 
 #include "sonde/echo.h"
 

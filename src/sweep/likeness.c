@@ -4,7 +4,7 @@
 // window_ssim      one window
 // mean_ssim        uniform windows of 7 x 7, constants of Wang et al. 2004
 // sonde_image_likeness
-#include "echo/frames.h"
+#include "sweep/frames.h"
 
 enum { WINDOW = 7, SUMS = 6 }; // known, a, b, aa, bb, ab
 

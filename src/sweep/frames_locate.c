@@ -9,7 +9,7 @@
 // reach                     spreads from Image over the edges, either way round
 // choose_world              the first of the usual names that is reached
 // sonde_sequence_locate
-#include "echo/frames.h"
+#include "sweep/frames.h"
 
 #include "base/bounds.h"
 

@@ -5,11 +5,11 @@
 // load_voxels       the eight greys around each
 // sum_of_products, mix_voxels   trilinear
 // voxel_cell
-#ifndef SONDE_SRC_ECHO_SLICE_VOXEL_KERNEL_H
-#define SONDE_SRC_ECHO_SLICE_VOXEL_KERNEL_H
+#ifndef SONDE_SRC_SWEEP_SLICE_VOXEL_KERNEL_H
+#define SONDE_SRC_SWEEP_SLICE_VOXEL_KERNEL_H
 
 #include "echo/kernel_vector.h"
-#include "echo/slice_mix.h"
+#include "sweep/slice_mix.h"
 
 enum { LANES = SLICE_CELL_WIDE, CELL = SLICE_CELL_WIDE * SLICE_CELL_HIGH };
 

@@ -1,4 +1,4 @@
 // Kernels of the slicer for one instruction set.
 #define SLICE_KERNELS sonde_slice_kernels_avx512
 #define SLICE_KERNELS_NAME "avx512"
-#include "echo/slice_kernel.c"
+#include "sweep/slice_kernel.c"

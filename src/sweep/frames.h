@@ -1,10 +1,10 @@
 // Inside of the tracked sequences: headers of image files, their pixels, affine maps.
-#ifndef SONDE_SRC_ECHO_FRAMES_H
-#define SONDE_SRC_ECHO_FRAMES_H
+#ifndef SONDE_SRC_SWEEP_FRAMES_H
+#define SONDE_SRC_SWEEP_FRAMES_H
 
 #include "base/base.h"
 #include "base/maths.h"
-#include "sonde/echo_volume.h"
+#include "sonde/sweep_volume.h"
 
 enum {
   SONDE_SIDE_MAX = 16384,     // pixels or voxels along an axis

@@ -10,7 +10,7 @@
 // inflate_all           unpacks into a block of known size
 // sonde_pixels_read     raw or packed pixels of exactly the expected size
 // sonde_pixels_pack     the way back
-#include "echo/frames.h"
+#include "sweep/frames.h"
 
 #include "base/bounds.h"
 

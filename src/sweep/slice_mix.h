@@ -1,9 +1,9 @@
 // What the kernels of pictures from frames and from volumes share.
-#ifndef SONDE_SRC_ECHO_SLICE_MIX_H
-#define SONDE_SRC_ECHO_SLICE_MIX_H
+#ifndef SONDE_SRC_SWEEP_SLICE_MIX_H
+#define SONDE_SRC_SWEEP_SLICE_MIX_H
 
 #include "echo/kernel_vector.h"
-#include "echo/slice.h"
+#include "sweep/slice.h"
 
 #include <string.h>
 

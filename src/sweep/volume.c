@@ -3,7 +3,7 @@
 // sonde_volume_create, sonde_volume_clear
 // read_volume                            header and voxels
 // sonde_volume_load, sonde_volume_save
-#include "echo/frames.h"
+#include "sweep/frames.h"
 
 #include <string.h>
 

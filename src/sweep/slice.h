@@ -2,7 +2,7 @@
 #ifndef SONDE_SRC_SLICE_H
 #define SONDE_SRC_SLICE_H
 
-#include "echo/frames.h"
+#include "sweep/frames.h"
 
 enum { SLICE_TILE = 16, SLICE_BLOCK = 64 }; // pixels along a side
 

@@ -1,5 +1,5 @@
 // Kriging between frames, pictures from volumes at rest and deformed, and the kernels' twins.
-#include "echo/slice.h"
+#include "sweep/slice.h"
 #include "fixture.h"
 
 #include <stdlib.h>

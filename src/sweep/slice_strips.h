@@ -15,11 +15,11 @@
 // find_strips         of a block
 // count_planes        in front of all and of some of a tile's pixels
 // fill_lanes, find_limits, fill_table   a tile's strips
-#ifndef SONDE_SRC_ECHO_SLICE_STRIPS_H
-#define SONDE_SRC_ECHO_SLICE_STRIPS_H
+#ifndef SONDE_SRC_SWEEP_SLICE_STRIPS_H
+#define SONDE_SRC_SWEEP_SLICE_STRIPS_H
 
 #include "echo/kernel_vector.h"
-#include "echo/slice_mix.h"
+#include "sweep/slice_mix.h"
 
 enum { STRIPS = SLICE_STRIPS, TILE_PIXELS = SLICE_TILE * SLICE_TILE };
 

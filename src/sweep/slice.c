@@ -14,7 +14,7 @@
 // sonde_slicer_render
 // sonde_slice_plane             picture of a probe's pose
 // sonde_slice_kernels_find
-#include "echo/slice.h"
+#include "sweep/slice.h"
 
 #include "base/vector.h"
 #include "base/parallel.h"

@@ -7,7 +7,7 @@
 // bridge_voxel         shortest line between two touched voxels through an empty one
 // bridge_slab          one layer of the volume, for the workers
 // sonde_reconstruct
-#include "echo/frames.h"
+#include "sweep/frames.h"
 #include "base/parallel.h"
 
 #include <string.h>

@@ -2,7 +2,7 @@
 // picture.
 #include "interior/interior.h"
 #include "interior/tube.h"
-#include "sonde/echo_volume.h"
+#include "sonde/sweep_volume.h"
 
 #include <stdlib.h>
 

@@ -6,7 +6,7 @@
 // read_vector, read_grid     directions and origin of a volume
 // sonde_nrrd_write_sequence  three axes as IGSIO writes, or four as Slicer wants
 // sonde_nrrd_write_volume
-#include "echo/frames.h"
+#include "sweep/frames.h"
 
 #include <string.h>
 

@@ -10,10 +10,10 @@
 // mix_apart, mix_row_of bilinear, then between both frames
 // put_row
 // fill_evenly           a tile that strips cover, or none
-#ifndef SONDE_SRC_ECHO_SLICE_STRIP_KERNEL_H
-#define SONDE_SRC_ECHO_SLICE_STRIP_KERNEL_H
+#ifndef SONDE_SRC_SWEEP_SLICE_STRIP_KERNEL_H
+#define SONDE_SRC_SWEEP_SLICE_STRIP_KERNEL_H
 
-#include "echo/slice_strips.h"
+#include "sweep/slice_strips.h"
 
 typedef struct strip_work {
   int32_t met[TILE_PIXELS]; // -1 where the strip speaks

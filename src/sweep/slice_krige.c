@@ -26,7 +26,7 @@
 // sonde_slicer_krige
 // choose, place_frames, map_frames   frames around a place of the sweep
 // sonde_slicer_render_place
-#include "echo/slice.h"
+#include "sweep/slice.h"
 
 #include <string.h>
 

@@ -43,8 +43,8 @@
 //
 // Compiled once for each instruction set with SLICE_KERNELS defined; every operation is one IEEE
 // operation per lane, so that all give the same bits.
-#include "echo/slice_strip_kernel.h"
-#include "echo/slice_voxel_kernel.h"
+#include "sweep/slice_strip_kernel.h"
+#include "sweep/slice_voxel_kernel.h"
 
 enum { PAIRS = 16 }; // pairs of frames remembered in a tile
 

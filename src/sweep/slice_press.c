@@ -8,7 +8,7 @@
 // grey_at                bilinear
 // press_row
 // sonde_image_pressed
-#include "echo/frames.h"
+#include "sweep/frames.h"
 #include "interior/interior.h"
 
 enum { NODE = 2, NODES = 64 }; // pixels between nodes; nodes held at once along a row

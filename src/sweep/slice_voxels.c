@@ -15,7 +15,7 @@
 // sonde_volume_slice_with, sonde_volume_slice, sonde_volume_slice_warped
 // fill_bricks              voxels into lines of memory
 // sonde_volume_slicer_create, sonde_volume_slicer_destroy, sonde_volume_slicer_render
-#include "echo/slice.h"
+#include "sweep/slice.h"
 
 #include <string.h>
 

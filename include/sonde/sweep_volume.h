@@ -1,12 +1,12 @@
 /**
- * @file echo_volume.h
+ * @file sweep_volume.h
  * Volumes from tracked frames, their files, pictures of them at rest and deformed, and pictures
  * pressed as the mechanical model presses the thigh.
  */
-#ifndef SONDE_ECHO_VOLUME_H
-#define SONDE_ECHO_VOLUME_H
+#ifndef SONDE_SWEEP_VOLUME_H
+#define SONDE_SWEEP_VOLUME_H
 
-#include "sonde/echo_frames.h"
+#include "sonde/sweep_frames.h"
 
 #ifdef __cplusplus
 extern "C" {

@@ -11,7 +11,7 @@
 // gather_list_first            frames that run fastest -> one after the other
 // mirror                       between the file's orientation and MF
 // sonde_sequence_load, sonde_sequence_save
-#include "echo/frames.h"
+#include "sweep/frames.h"
 
 #include <string.h>
 
