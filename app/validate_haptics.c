@@ -366,8 +366,7 @@ static void friction(work *w) {
 }
 
 // Film under the probe, friction and image of one tick.
-static void gel_effects(const work *w, const sonde_gel *gel, sonde_pose pose, double *mu,
-                        double *image) {
+static void gel_effects(const work *w, sonde_gel *gel, sonde_pose pose, double *mu, double *image) {
   const sonde_friction dry = {
       .mu_static = 0.5, .mu_kinetic = 0.36, .stribeck_speed_m_s = 0.01, .mu_gel = 0.05};
   const sonde_vec3 *contact = sonde_state_contact_forces(w->state);

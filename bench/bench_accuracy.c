@@ -68,7 +68,7 @@ static sonde_status run(const study *s, const method *m, long steps, double resi
   return status;
 }
 
-static double error_of(const study *s, const sonde_state *state) {
+static double error_of(const study *s, sonde_state *state) {
   const sonde_vec3 *x = sonde_state_positions(state), *y = s->exact,
                    *r = s->model->surface.vertices;
   double difference = 0, size = 0;

@@ -20,7 +20,7 @@ typedef struct outcome {
 
 static double size_of(sonde_vec3 a) { return sqrt(a.x * a.x + a.y * a.y + a.z * a.z); }
 
-static void look(const sonde_state *state, outcome *seen) {
+static void look(sonde_state *state, outcome *seen) {
   const sonde_model *model = sonde_state_model(state);
   const sonde_vec3 *x = sonde_state_positions(state), *rest = model->surface.vertices;
   for (uint32_t i = 0; i < model->surface.vertex_count; ++i) {

@@ -114,7 +114,7 @@ sonde_pose poke_next(poke *p, double felt_n) {
 
 static bool finite3(sonde_vec3 a) { return isfinite(a.x + a.y + a.z); }
 
-static const char *look_at_nodes(poke_watch *watch, const sonde_state *state) {
+static const char *look_at_nodes(poke_watch *watch, sonde_state *state) {
   const sonde_model *model = sonde_state_model(state);
   const sonde_vec3 *x = sonde_state_positions(state), *v = sonde_state_velocities(state);
   for (uint32_t i = 0; i < model->surface.vertex_count; ++i) {
@@ -157,7 +157,7 @@ static const char *forward(poke_watch *watch, const sonde_state *state, sonde_ve
   return NULL;
 }
 
-const char *poke_check(poke_watch *watch, const sonde_state *state, sonde_pose pose) {
+const char *poke_check(poke_watch *watch, sonde_state *state, sonde_pose pose) {
   const sonde_contact *contact = sonde_state_contact(state);
   double force = norm(contact->force_n);
   uint32_t flags = sonde_state_flags(state);

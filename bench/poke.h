@@ -43,6 +43,6 @@ typedef struct poke_watch {
 // NON_FINITE flag is set; no region pushes the wrong way; the probe is not drawn into the skin,
 // apart from friction (which is at most mu_static times the normal push, of this tick or the last);
 // no node is at its asymptote or has left the scene.
-const char *poke_check(poke_watch *watch, const sonde_state *state, sonde_pose pose);
+const char *poke_check(poke_watch *watch, sonde_state *state, sonde_pose pose);
 
 #endif

@@ -84,7 +84,7 @@ SONDE_API sonde_status sonde_thigh_check(const sonde_thigh *thigh, sonde_error *
 
 /** Skin, femur and fat of a thigh as tables over angle and height. */
 typedef struct sonde_thigh_shape sonde_thigh_shape;
-SONDE_API void sonde_thigh_shape_destroy(sonde_thigh_shape *shape);
+SONDE_API void sonde_thigh_shape_destroy(sonde_thigh_shape *shape); /**< @thread owner */
 
 /**
  * The shape that the parameters describe: a section with two harmonics whose girth is exact, fat
@@ -131,7 +131,7 @@ typedef struct sonde_thigh_def {
   double edge_m;      /**< away from the vessels; default 6 mm */
   double fine_edge_m; /**< along the vein's course; default 3 mm */
 } sonde_thigh_def;
-SONDE_API sonde_thigh_def sonde_thigh_def_default(void);
+SONDE_API sonde_thigh_def sonde_thigh_def_default(void); /**< @thread any */
 
 /** Columns of sites beside the vein and rows along it; the middle column is above it. */
 enum { SONDE_THIGH_COLUMNS = 5, SONDE_THIGH_ROWS = 12 };
@@ -147,7 +147,8 @@ SONDE_API sonde_status sonde_thigh_build(const sonde_thigh *thigh, const sonde_t
                                          const sonde_thigh_def *def, sonde_model **model,
                                          sonde_error *error);
 
-/** The rule: stiffness (N/m^3) and asymptote (m) of the springs above layers of that thickness. */
+/** The rule: stiffness (N/m^3) and asymptote (m) of the springs above layers of that thickness.
+ *  @thread any */
 SONDE_API void sonde_thigh_springs(double fat_m, double muscle_m, double stiffness, double *k0_n_m3,
                                    double *xm_m);
 

@@ -183,7 +183,8 @@ SONDE_API sonde_status sonde_file_take(sonde_file *file, char **bytes, size_t *c
 SONDE_API sonde_status sonde_directory_make(const char *path, unsigned mode, bool parents,
                                             sonde_error *error);
 
-/** Reads a whole file; `*bytes` gets a terminating 0 beyond `*count` and is freed by sonde_free. */
+/** Reads a whole file; `*bytes` gets a terminating 0 beyond `*count` and is freed by sonde_free.
+ *  @thread any */
 SONDE_API sonde_status sonde_file_load(const char *path, char **bytes, size_t *count,
                                        sonde_error *error);
 /** Releases memory handed out by the library; NULL is ignored. @thread any */

@@ -26,7 +26,7 @@ typedef struct sonde_sweep sonde_sweep;
 /** @param capacity the most boxes that will be given @thread owner */
 SONDE_API sonde_status sonde_sweep_create(uint32_t capacity, sonde_sweep **sweep,
                                           sonde_error *error);
-SONDE_API void sonde_sweep_destroy(sonde_sweep *sweep);
+SONDE_API void sonde_sweep_destroy(sonde_sweep *sweep); /**< @thread owner */
 /**
  * Pairs of boxes that overlap or touch, ascending, each with the smaller index first.
  * @param pairs [capacity] receives them; further ones are counted but not written
@@ -47,7 +47,7 @@ typedef struct sonde_face_tree sonde_face_tree;
  */
 SONDE_API sonde_status sonde_face_tree_create(const sonde_mesh *mesh, sonde_face_tree **tree,
                                               sonde_error *error);
-SONDE_API void sonde_face_tree_destroy(sonde_face_tree *tree);
+SONDE_API void sonde_face_tree_destroy(sonde_face_tree *tree); /**< @thread owner */
 /**
  * Fits the boxes to new positions in time proportional to the faces.
  * @param vertices [vertex_count of the mesh] world (m); borrowed until the next refit: the calls
@@ -137,7 +137,7 @@ typedef struct sonde_overlap sonde_overlap;
 SONDE_API sonde_status sonde_overlap_create(const sonde_face_tree *a, const sonde_face_tree *b,
                                             const sonde_overlap_config *config,
                                             sonde_overlap **overlap, sonde_error *error);
-SONDE_API void sonde_overlap_destroy(sonde_overlap *overlap);
+SONDE_API void sonde_overlap_destroy(sonde_overlap *overlap); /**< @thread owner */
 /**
  * Common volume of the bodies at the positions of their trees. Exact for closed outward meshes,
  * concave or not. With face i of A and j of B that cover each other along k, s = +1 for a face that

@@ -24,7 +24,7 @@ typedef struct sonde_echo_settings {
                                 receiver's noise, and falls by 10 dB behind that depth */
 } sonde_echo_settings;
 
-SONDE_API sonde_echo_settings sonde_echo_settings_default(void);
+SONDE_API sonde_echo_settings sonde_echo_settings_default(void); /**< @thread any */
 /** Range of one setting, in the unit in which the page and the command line give it. */
 typedef struct sonde_echo_range {
   const char *key;      /**< with the unit, e.g. "depth_mm" */
@@ -50,8 +50,8 @@ typedef struct sonde_image {
 } sonde_image;
 
 SONDE_API sonde_status sonde_image_create(uint32_t width, uint32_t height, sonde_image *image,
-                                          sonde_error *error);
-SONDE_API void sonde_image_clear(sonde_image *image);
+                                          sonde_error *error); /**< @thread owner */
+SONDE_API void sonde_image_clear(sonde_image *image);          /**< @thread owner */
 /** Writes an 8-bit grey PNG atomically. @thread owner */
 SONDE_API sonde_status sonde_image_save_png(const sonde_image *image, const char *path,
                                             sonde_error *error);
@@ -70,13 +70,13 @@ typedef struct sonde_echo_def {
 /** @param interior borrowed, its updates feed the images @thread owner */
 SONDE_API sonde_status sonde_echo_create(const sonde_interior *interior, const sonde_echo_def *def,
                                          sonde_echo **echo, sonde_error *error);
-SONDE_API void sonde_echo_destroy(sonde_echo *echo);
+SONDE_API void sonde_echo_destroy(sonde_echo *echo); /**< @thread owner */
 
 /**
  * Renders the image plane (x-z) of the probe from the interior's current state. Lines above air
  * (no contact) stay dark with reverberation at the face.
  * @param aperture_m lateral width of the array, e.g. 2*probe->half_x_m
- * @thread one at a time per echo, not while the interior updates; no allocation
+ * @thread owner of the echo, not while the interior updates; no allocation
  */
 SONDE_API void sonde_echo_render(sonde_echo *echo, sonde_pose world_from_probe, double aperture_m,
                                  const sonde_pathology *pathology,
@@ -90,7 +90,7 @@ SONDE_API void sonde_echo_render(sonde_echo *echo, sonde_pose world_from_probe, 
  * or before it is ready, the next render with these settings does what is left. Asking for another
  * beam drops the one under way.
  * @return true when a render with these settings finds its beam ready
- * @thread as sonde_echo_render; no allocation
+ * @thread owner of the echo; no allocation
  */
 SONDE_API bool sonde_echo_prepare(sonde_echo *echo, double aperture_m,
                                   const sonde_echo_settings *settings, uint32_t steps);
@@ -102,7 +102,7 @@ typedef struct sonde_echo_times {
   uint32_t lost; /**< pieces of tissue in view that were not drawn for want of room; 0 in every
                       view that sonde_echo_check_view() allows */
 } sonde_echo_times;
-SONDE_API sonde_echo_times sonde_echo_last_times(const sonde_echo *echo);
+SONDE_API sonde_echo_times sonde_echo_last_times(const sonde_echo *echo); /**< @thread owner */
 
 /** Motion of the blood, a function of the time alone. Speeds are means over the section and over
  *  time; the profile is parabolic. The artery's speed follows its pulse above the diastolic
@@ -112,17 +112,17 @@ typedef struct sonde_echo_flow {
   double vein_m_s, artery_m_s;   /**< default 0.08 and 0.13 */
   sonde_circulation circulation; /**< gives the pulse */
 } sonde_echo_flow;
-SONDE_API sonde_echo_flow sonde_echo_flow_default(void);
-/** Blood of the following renders; finite fields. @thread as sonde_echo_render */
+SONDE_API sonde_echo_flow sonde_echo_flow_default(void); /**< @thread any */
+/** Blood of the following renders; finite fields. @thread owner */
 SONDE_API void sonde_echo_set_flow(sonde_echo *echo, const sonde_echo_flow *flow);
 
 /** Gel or air below each line of the following renders: the share of the echoes' amplitude that
  *  passes, 0..1 (NaN: 0); the rest reverberates at the face. NULL (default): all, wherever the skin
- *  touches. @param coupling [line_count] copied @thread as sonde_echo_render */
+ *  touches. @param coupling [line_count] copied @thread owner */
 SONDE_API void sonde_echo_set_coupling(sonde_echo *echo, const float *coupling);
 
 /** Radius of a curved face (m, 20 mm and more), its aperture measured along the arc; 0: flat.
- *  @return SONDE_ARGUMENT @thread as sonde_echo_render */
+ *  @return SONDE_ARGUMENT @thread owner */
 SONDE_API sonde_status sonde_echo_set_radius(sonde_echo *echo, double radius_m, sonde_error *error);
 /** Whether a face can be drawn whole to every depth: an array of 5 to 200 mm, flat or on an arc of
  *  at most 100 degrees. @param radius_m of a curved face, 0: flat
@@ -130,12 +130,13 @@ SONDE_API sonde_status sonde_echo_set_radius(sonde_echo *echo, double radius_m, 
 SONDE_API sonde_status sonde_echo_check_view(double aperture_m, double radius_m,
                                              sonde_error *error);
 /** Chooses the inner loops: "avx512", "avx2", "base" (the widest that runs here is the default) or
- *  "plain" without vectors. @return SONDE_NOT_FOUND when this processor lacks them */
+ *  "plain" without vectors. @return SONDE_NOT_FOUND when this processor lacks them @thread owner */
 SONDE_API sonde_status sonde_echo_set_kernels(sonde_echo *echo, const char *name,
                                               sonde_error *error);
-SONDE_API const char *sonde_echo_kernels(const sonde_echo *echo);
+SONDE_API const char *sonde_echo_kernels(const sonde_echo *echo); /**< @thread owner */
 
-/** Envelope before log compression of the last render: [sample_count*line_count], sample-major. */
+/** Envelope before log compression of the last render: [sample_count*line_count], sample-major.
+ *  @thread owner */
 SONDE_API const float *sonde_echo_envelope(const sonde_echo *echo, uint32_t *lines,
                                            uint32_t *samples);
 

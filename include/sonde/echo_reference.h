@@ -25,7 +25,8 @@ typedef struct sonde_array {
   uint32_t most_elements;       /**< of an aperture */
 } sonde_array;
 
-/** 7.5 MHz, 1540 m/s, focus 25 mm at F/2.5, receive F/2, pitch 0.3 mm, pulse 1.1 wavelengths. */
+/** 7.5 MHz, 1540 m/s, focus 25 mm at F/2.5, receive F/2, pitch 0.3 mm, pulse 1.1 wavelengths.
+ *  @thread any */
 SONDE_API sonde_array sonde_array_default(void);
 
 /** Complex baseband echo of a unit scatterer at (x, z) seen by the line at the depth of one sample:
@@ -36,7 +37,8 @@ SONDE_API void sonde_array_echo(const sonde_array *array, double x_m, double z_m
                                 double echo[2]);
 
 /** The same for `count` samples from first_m on, by tabulating the transmitted wave at the
- *  scatterer; agrees with sonde_array_echo() to 1e-3 of the peak. @param echo [2*count] */
+ *  scatterer; agrees with sonde_array_echo() to 1e-3 of the peak. @param echo [2*count]
+ *  @thread any */
 SONDE_API void sonde_array_line(const sonde_array *array, double x_m, double z_m, double first_m,
                                 double step_m, uint32_t count, double *echo);
 
@@ -44,7 +46,8 @@ SONDE_API void sonde_array_line(const sonde_array *array, double x_m, double z_m
  *  lens-focused elevation aperture, squared. @thread any */
 SONDE_API double sonde_array_elevation(const sonde_array *array, double y_m, double z_m);
 
-/** Half width h of the kernel 1 - (y/h)^2 with the half values of sonde_array_elevation(). */
+/** Half width h of the kernel 1 - (y/h)^2 with the half values of sonde_array_elevation().
+ *  @thread any */
 SONDE_API double sonde_array_elevation_half(const sonde_array *array, double z_m);
 
 /** A unit scatterer in the plane or beside it, probe frame. */
@@ -53,14 +56,14 @@ typedef struct sonde_echo_point {
 } sonde_echo_point;
 
 /** Image of points without tissue, noise and compensation by the fast chain of a renderer; read it
- *  with sonde_echo_envelope(). @thread as sonde_echo_render */
+ *  with sonde_echo_envelope(). @thread owner */
 SONDE_API void sonde_echo_render_points(sonde_echo *echo, double aperture_m,
                                         const sonde_echo_settings *settings,
                                         const sonde_echo_point *points, uint32_t count);
 
 /** The same by sonde_array_line(): envelope [sample_count*line_count], sample-major, of the lines
  *  first_line to last_line and samples first_sample to last_sample, zero elsewhere. Elevation by
- *  sonde_array_elevation(). Slow. @return SONDE_MEMORY */
+ *  sonde_array_elevation(). Slow. @return SONDE_MEMORY @thread owner */
 SONDE_API sonde_status sonde_echo_reference_points(const sonde_echo *echo, double aperture_m,
                                                    const sonde_echo_settings *settings,
                                                    const sonde_echo_point *points, uint32_t count,

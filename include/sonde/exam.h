@@ -115,7 +115,7 @@ SONDE_API sonde_status sonde_session_destroy(sonde_session *session, sonde_error
 /** Adds a note to the recording, if there is one: on the disk some milliseconds later in real time,
  *  after the next tick or the end in lockstep.
  *  @param tick ticks before what it is about @param text one JSON object, copied
- *  @return ARGUMENT for a text that is too long; MEMORY @thread one thread at a time */
+ *  @return ARGUMENT for a text that is too long; MEMORY @thread any */
 SONDE_API sonde_status sonde_session_note(sonde_session *session, sonde_note_kind kind,
                                           uint64_t tick, const char *text, sonde_error *error);
 /** Stops the threads, ends the recording and brings it to the disk. No tick may follow. After DISK
@@ -145,9 +145,10 @@ SONDE_API sonde_session_controls sonde_session_controls_now(const sonde_session 
 SONDE_API sonde_preset sonde_session_preset(const sonde_session *session);
 /** For sonde_device_page_goal(). @thread any */
 SONDE_API sonde_device *sonde_session_device(sonde_session *session);
-SONDE_API uint32_t sonde_session_probe_count(const sonde_session *session);
+SONDE_API uint32_t sonde_session_probe_count(const sonde_session *session); /**< @thread any */
+/** @thread any */
 SONDE_API const sonde_probe *sonde_session_probe(const sonde_session *session, uint32_t index);
-SONDE_API const sonde_model *sonde_session_model(const sonde_session *session);
+SONDE_API const sonde_model *sonde_session_model(const sonde_session *session); /**< @thread any */
 
 /** Newest finished frame: snapshot, skin and image of one and the same tick. */
 struct sonde_frame {
@@ -158,20 +159,20 @@ struct sonde_frame {
   double width_m, height_m;
 };
 /** Newest frame since the last call, false when nothing is new; the pointers stay valid until the
- *  next call. @thread one reader */
+ *  next call. @thread any, one reader */
 SONDE_API bool sonde_session_frame(sonde_session *session, sonde_frame *frame);
 
 /** Fault that is latched, e.g. to resume when a lost device is back. @thread any */
 SONDE_API sonde_fault sonde_session_fault(const sonde_session *session);
 /** Ticks and images so far. @thread any */
 SONDE_API uint64_t sonde_session_ticks(const sonde_session *session);
-SONDE_API uint64_t sonde_session_images(const sonde_session *session);
+SONDE_API uint64_t sonde_session_images(const sonde_session *session); /**< @thread any */
 /** Age of the pose that a finished image shows, seconds: `fraction` of the images since the
  * creation are at most so old, to 0.25 ms; NaN before the first in real time. From the tick's
  * reading of the device to the frame that sonde_session_frame() gives. @thread any */
 SONDE_API double sonde_session_latency(const sonde_session *session, double fraction);
 /** State hash now; 0 while the loop runs. @thread owner */
-SONDE_API uint64_t sonde_session_hash(const sonde_session *session);
+SONDE_API uint64_t sonde_session_hash(sonde_session *session);
 /** Counters of the running loop, or of the last one. @thread owner and any one other while the
  *  session runs */
 SONDE_API sonde_loop_stats sonde_session_loop(const sonde_session *session);

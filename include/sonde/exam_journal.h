@@ -44,7 +44,7 @@ typedef struct sonde_notes {
  *  @return FORMAT, CHECKSUM, VERSION for a file that is no recording; IO @thread owner */
 SONDE_API sonde_status sonde_notes_load(const char *recording, sonde_notes *notes,
                                         sonde_error *error);
-SONDE_API void sonde_notes_clear(sonde_notes *notes);
+SONDE_API void sonde_notes_clear(sonde_notes *notes); /**< @thread owner */
 /** The newest note of a kind; NULL: none. @thread any */
 SONDE_API const sonde_note *sonde_notes_last(const sonde_notes *notes, sonde_note_kind kind);
 

@@ -46,6 +46,7 @@ SONDE_API sonde_status sonde_player_open(const sonde_player_def *def, sonde_play
 /** Keeps the keyframes of a recording that was played through beside it; frees. NULL is ignored.
  *  @thread owner of the player */
 SONDE_API void sonde_player_close(sonde_player *player);
+/** @thread any */
 SONDE_API const sonde_recording_info *sonde_player_info(const sonde_player *player);
 
 /** Goes to the last tick at or before time_s (clamped to the exam), back or forth, from the nearest
@@ -66,10 +67,12 @@ SONDE_API bool sonde_player_frame(sonde_player *player, sonde_frame *frame);
 
 /** Where the player stands. @thread owner of the player */
 SONDE_API double sonde_player_time(const sonde_player *player);
-SONDE_API uint64_t sonde_player_tick(const sonde_player *player);
-SONDE_API uint64_t sonde_player_hash(const sonde_player *player); /**< sonde_state_hash() */
+SONDE_API uint64_t sonde_player_tick(const sonde_player *player); /**< @thread owner */
+/** sonde_state_hash() @thread owner */
+SONDE_API uint64_t sonde_player_hash(sonde_player *player);
+/** @thread owner */
 SONDE_API sonde_session_controls sonde_player_controls(const sonde_player *player);
-SONDE_API const sonde_probe *sonde_player_probe(const sonde_player *player);
+SONDE_API const sonde_probe *sonde_player_probe(const sonde_player *player); /**< @thread owner */
 
 /** A change of the controls during the exam; the first one is the start. */
 typedef struct sonde_player_event {
@@ -118,7 +121,7 @@ SONDE_API sonde_status sonde_comments_add(const char *recording, const sonde_com
 /** A comment as the text of a SONDE_NOTE_COMMENT, e.g. for sonde_session_note(); freed by
  *  sonde_free(); NULL with the error filled. @thread any */
 SONDE_API char *sonde_comment_json(const sonde_comment *comment, sonde_error *error);
-SONDE_API void sonde_comments_clear(sonde_comments *comments);
+SONDE_API void sonde_comments_clear(sonde_comments *comments); /**< @thread owner */
 
 #ifdef __cplusplus
 }

@@ -43,7 +43,7 @@ SONDE_API sonde_status sonde_site_table_load(const char *path, sonde_site_table 
 /** Writes the same columns atomically. @thread owner */
 SONDE_API sonde_status sonde_site_table_save(const char *path, const sonde_site_table *table,
                                              sonde_error *error);
-SONDE_API void sonde_site_table_clear(sonde_site_table *table);
+SONDE_API void sonde_site_table_clear(sonde_site_table *table); /**< @thread owner */
 /**
  * Whether every site lies within tolerance_m (e.g. 5 mm) of the model's skin, with a normal at most
  * 30 degrees off the skin's. @return MISMATCH naming the first that does not @thread any
@@ -69,7 +69,7 @@ SONDE_API sonde_status sonde_measurements_load(const char *path, const sonde_sit
 SONDE_API sonde_status sonde_measurements_save(const char *path,
                                                const sonde_measurements *measurements,
                                                sonde_error *error);
-SONDE_API void sonde_measurements_clear(sonde_measurements *measurements);
+SONDE_API void sonde_measurements_clear(sonde_measurements *measurements); /**< @thread owner */
 
 /** Of the error e = model - measurement; rows whose model value is not finite are left out. */
 typedef struct sonde_error_statistics {
@@ -100,7 +100,7 @@ typedef struct sonde_error_report {
 SONDE_API sonde_status sonde_error_statistics_of(const double *model_n, const double *measured_n,
                                                  uint32_t count, sonde_error_statistics *statistics,
                                                  sonde_error *error);
-/** The same per probe. @return ARGUMENT when there are too many probes */
+/** The same per probe. @return ARGUMENT when there are too many probes @thread any */
 SONDE_API sonde_status sonde_error_report_of(const sonde_datum *data, const double *model_n,
                                              uint32_t count, sonde_error_report *report,
                                              sonde_error *error);
@@ -137,7 +137,7 @@ typedef struct sonde_fit_def {
   uint32_t threads;           /**< of stage 3; 0 (default): one per online core */
 } sonde_fit_def;
 
-SONDE_API sonde_fit_def sonde_fit_def_default(void);
+SONDE_API sonde_fit_def sonde_fit_def_default(void); /**< @thread any */
 
 /** Eq. (1) of one site and probe: F = A k0 s/(1 - s/xm), A the nominal footprint area. */
 typedef struct sonde_curve_fit {
@@ -216,7 +216,7 @@ SONDE_API sonde_status sonde_fit(const sonde_model *model, const sonde_site_tabl
                                  const sonde_measurements *measurements, const sonde_fit_def *def,
                                  const sonde_progress *progress, sonde_fit_result *result,
                                  sonde_error *error);
-SONDE_API void sonde_fit_result_clear(sonde_fit_result *result);
+SONDE_API void sonde_fit_result_clear(sonde_fit_result *result); /**< @thread owner */
 
 /* ---- prediction -------------------------------------------------------------------------- */
 
@@ -232,7 +232,7 @@ typedef struct sonde_predict_def {
   uint32_t threads;         /**< 0: one per online core */
 } sonde_predict_def;
 
-SONDE_API sonde_predict_def sonde_predict_def_default(void);
+SONDE_API sonde_predict_def sonde_predict_def_default(void); /**< @thread any */
 
 /**
  * The model's force for each measurement, footprint bonded; the same for any number of threads.

@@ -28,7 +28,7 @@ typedef struct sonde_sample {
  */
 SONDE_API sonde_status sonde_sample_load(const char *path, sonde_sample *sample,
                                          sonde_error *error);
-SONDE_API void sonde_sample_clear(sonde_sample *sample);
+SONDE_API void sonde_sample_clear(sonde_sample *sample); /**< @thread owner */
 
 /** The spring of one exponent. n = 1: the paper's f = x/(a x + b), a = -1/(K x_m), b = 1/K. */
 typedef struct sonde_sample_law {

@@ -63,7 +63,7 @@ typedef struct sonde_mass {
   sonde_vec3 centre_m;
   sonde_mat3 inertia_kg_m2; /**< about the centre */
 } sonde_mass;
-/** Exact polyhedral integrals (divergence theorem). @return SONDE_MESH when not closed. */
+/** Exact polyhedral integrals. @return SONDE_MESH when not closed. @thread owner */
 SONDE_API sonde_status sonde_mesh_mass(const sonde_mesh *mesh, double density_kg_m3,
                                        sonde_mass *mass, sonde_error *error);
 
@@ -79,8 +79,8 @@ typedef struct sonde_topology {
   uint32_t (*edge_faces)[2]; /**< [edge_count] the faces beside; UINT32_MAX where none */
 } sonde_topology;
 SONDE_API sonde_status sonde_topology_build(const sonde_mesh *mesh, sonde_topology *topology,
-                                            sonde_error *error);
-SONDE_API void sonde_topology_clear(sonde_topology *topology);
+                                            sonde_error *error); /**< @thread owner */
+SONDE_API void sonde_topology_clear(sonde_topology *topology);   /**< @thread owner */
 
 /** Area-weighted outward vertex normals, unit. @param normals [vertex_count] @thread any */
 SONDE_API void sonde_mesh_normals(const sonde_mesh *mesh, sonde_vec3 *normals);
@@ -107,9 +107,10 @@ SONDE_API sonde_status sonde_mesh_refine(const sonde_mesh *mesh,
  */
 typedef struct sonde_surface_index sonde_surface_index;
 
+/** @thread owner */
 SONDE_API sonde_status sonde_surface_index_create(const sonde_mesh *mesh,
                                                   sonde_surface_index **index, sonde_error *error);
-SONDE_API void sonde_surface_index_destroy(sonde_surface_index *index);
+SONDE_API void sonde_surface_index_destroy(sonde_surface_index *index); /**< @thread owner */
 
 /** A point on a mesh. */
 typedef struct sonde_surface_point {
@@ -150,13 +151,13 @@ typedef struct sonde_convex {
   sonde_topology topology;  /**< of the hull, for hill climbing support */
   double radius_m;          /**< bounding sphere about the origin */
 } sonde_convex;
-/** Builds from a closed convex mesh. @return SONDE_MESH when it is open or not convex (1e-8). */
+/** From a closed convex mesh. @return SONDE_MESH when open or not convex (1e-8). @thread owner */
 SONDE_API sonde_status sonde_convex_create(const sonde_mesh *mesh, sonde_convex *convex,
                                            sonde_error *error);
 /** Convex hull of a point cloud (>= 4 points not in one plane, else SONDE_MESH). @thread owner */
 SONDE_API sonde_status sonde_convex_hull(const sonde_vec3 *points, uint32_t count,
                                          sonde_convex *convex, sonde_error *error);
-SONDE_API void sonde_convex_clear(sonde_convex *convex);
+SONDE_API void sonde_convex_clear(sonde_convex *convex); /**< @thread owner */
 
 /** Farthest vertex along a direction, climbing from `start` (0 when unknown). @thread tick */
 SONDE_API uint32_t sonde_convex_support(const sonde_convex *convex, sonde_vec3 direction,
@@ -241,7 +242,7 @@ SONDE_API const char *const *sonde_probe_names(void);
  */
 SONDE_API sonde_status sonde_probe_create(const char *name_or_path, sonde_probe *probe,
                                           sonde_error *error);
-SONDE_API void sonde_probe_clear(sonde_probe *probe);
+SONDE_API void sonde_probe_clear(sonde_probe *probe); /**< @thread owner */
 
 #ifdef __cplusplus
 }

@@ -82,7 +82,7 @@ typedef struct sonde_gate {
 SONDE_API void sonde_gate_init(sonde_gate *gate, const sonde_safety_limits *limits);
 /** One exchange. A command is held for 15 ms and then fades to zero within 30 ms more; one with a
  *  number that is not finite counts as none. The result, within norm and slew, is in gate->force_n.
- *  @param fresh a command came since the last call @thread the driver's */
+ *  @param fresh a command came since the last call @thread owner: the driver's */
 SONDE_API void sonde_gate_apply(sonde_gate *gate, bool fresh, sonde_vec3 force_n,
                                 sonde_vec3 torque_n_m, double dt_s);
 

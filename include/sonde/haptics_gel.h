@@ -30,7 +30,7 @@ typedef struct sonde_gel sonde_gel;
  *  @return ARGUMENT naming the member that is out of range, MEMORY @thread owner */
 SONDE_API sonde_status sonde_gel_create(const sonde_model *model, const sonde_gel_def *def,
                                         sonde_gel **gel, sonde_error *error);
-SONDE_API void sonde_gel_destroy(sonde_gel *gel);
+SONDE_API void sonde_gel_destroy(sonde_gel *gel); /**< @thread owner */
 /** Puts a volume on a disc, evenly; on the nearest node when the disc holds none.
  *  @param centre_m on the skin at rest @thread tick */
 SONDE_API void sonde_gel_put(sonde_gel *gel, sonde_vec3 centre_m, double radius_m,
@@ -54,7 +54,7 @@ SONDE_API sonde_friction sonde_gel_friction(const sonde_gel *gel, const sonde_ve
  * @param skin_m [nodes] deformed, sonde_state_positions() @param point_m [count] @param[out] share
  * [count] @thread tick
  */
-SONDE_API void sonde_gel_coupling(const sonde_gel *gel, const sonde_vec3 *skin_m,
+SONDE_API void sonde_gel_coupling(sonde_gel *gel, const sonde_vec3 *skin_m,
                                   const sonde_vec3 *contact_n, const sonde_vec3 *point_m,
                                   uint32_t count, float *share);
 /** Film per node, m [nodes]. @thread tick */

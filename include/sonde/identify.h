@@ -59,7 +59,7 @@ typedef struct sonde_protocol {
   uint64_t seed;
 } sonde_protocol;
 
-SONDE_API sonde_protocol sonde_protocol_default(sonde_protocol_kind kind);
+SONDE_API sonde_protocol sonde_protocol_default(sonde_protocol_kind kind); /**< @thread any */
 
 /** The world of protocols and identification: five Newton iterations per step. @thread any */
 SONDE_API sonde_world_def sonde_identify_world(void);
@@ -89,7 +89,7 @@ SONDE_API sonde_status sonde_motion_record_load(const char *path, sonde_motion_r
 /** Writes the same atomically. @thread owner */
 SONDE_API sonde_status sonde_motion_record_save(const char *path, const sonde_motion_record *record,
                                                 sonde_error *error);
-SONDE_API void sonde_motion_record_clear(sonde_motion_record *record);
+SONDE_API void sonde_motion_record_clear(sonde_motion_record *record); /**< @thread owner */
 
 /** One hold of a record without any model: F(t) = static + sum amplitude_k e^(-t/tau_k). */
 typedef struct sonde_relaxation {
@@ -136,7 +136,7 @@ typedef struct sonde_identify_options {
   sonde_world_def world;   /**< of the forward simulations */
 } sonde_identify_options;
 
-SONDE_API sonde_identify_options sonde_identify_options_default(void);
+SONDE_API sonde_identify_options sonde_identify_options_default(void); /**< @thread any */
 
 typedef struct sonde_damping_result {
   sonde_estimate normal_damping_s, stiffness_scale;
@@ -190,7 +190,7 @@ typedef struct sonde_preset {
   sonde_friction friction;                 /**< default none */
 } sonde_preset;
 
-SONDE_API sonde_preset sonde_preset_default(void);
+SONDE_API sonde_preset sonde_preset_default(void); /**< @thread any */
 /** Reads a preset (JSON, docs/identify.md). @return FORMAT naming file, line, key and range; IO
  * @thread owner */
 SONDE_API sonde_status sonde_preset_load(const char *path, sonde_preset *preset,

@@ -47,19 +47,20 @@ typedef struct sonde_pathology {
  *  chronic_occlusive. @thread any */
 SONDE_API const char *const *sonde_pathology_names(void);
 /** Preset by name; '-' and ' ' count as '_', and unique first words (e.g. "chronic") are accepted.
- *  @return SONDE_NOT_FOUND listing the known names */
+ *  @return SONDE_NOT_FOUND listing the known names @thread any */
 SONDE_API sonde_status sonde_pathology_preset(const char *name, sonde_pathology *pathology,
                                               sonde_error *error);
 
 /** Normal stresses (Pa, compression positive) below a uniformly loaded rectangle on an
  *  incompressible half space: lateral x, axial y, normal z (docs/interior.md, superposed corners).
- *  @param half_x,half_y rectangle @param x,y,z point, z > 0 depth */
+ *  @param half_x,half_y rectangle @param x,y,z point, z > 0 depth @thread any */
 SONDE_API sonde_vec3 sonde_rectangle_stress(double pressure_pa, double half_x_m, double half_y_m,
                                             double x_m, double y_m, double z_m);
 
 /** Area of the vein relative to its rest area at an effective outside pressure (Pa), for a lumen
  *  pressure and thrombus (tube law, docs/interior.md). Monotone, > 0. @thread any */
 SONDE_API double sonde_vein_area_ratio(const sonde_pathology *pathology, double outside_pa);
+/** @thread any */
 SONDE_API double sonde_artery_area_ratio(const sonde_pathology *pathology, double outside_pa);
 
 /** Pressure inside an empty vein's wall (Pa) that holds it at `area_ratio` of its stress-free area
@@ -91,7 +92,7 @@ typedef struct sonde_interior sonde_interior;
  *  @param model borrowed @thread owner */
 SONDE_API sonde_status sonde_interior_create(const sonde_model *model, sonde_interior **interior,
                                              sonde_error *error);
-SONDE_API void sonde_interior_destroy(sonde_interior *interior);
+SONDE_API void sonde_interior_destroy(sonde_interior *interior); /**< @thread owner */
 
 /** How the inside follows the skin. */
 typedef enum sonde_interior_method {
@@ -126,7 +127,7 @@ typedef struct sonde_interior_input {
 } sonde_interior_input;
 
 /** New surface state: solves the field, the stress at the vessels and their areas.
- *  @thread one thread at a time per interior; no allocation */
+ *  @thread owner of the interior; no allocation */
 SONDE_API void sonde_interior_update(sonde_interior *interior, const sonde_interior_input *input);
 
 /** Displacement (m) of the rest point, zero outside and in bone. After an update. @thread any */
@@ -149,14 +150,16 @@ SONDE_API sonde_label sonde_interior_label(const sonde_interior *interior, sonde
 SONDE_API uint32_t sonde_interior_vessel_count(const sonde_interior *interior);
 /** femoral_vein, femoral_artery or the branch's name. @thread any */
 SONDE_API const char *sonde_interior_vessel_name(const sonde_interior *interior, int which);
-/** Stations of the vein (0), the artery (1) or a branch; 0 when the leg lacks it. */
+/** Stations of the vein (0), the artery (1) or a branch; 0 when the leg lacks it.
+ *  @thread any, not during an update */
 SONDE_API const sonde_vessel_state *sonde_interior_vessel(const sonde_interior *interior, int which,
                                                           uint32_t *count);
 /** State of the vein (0), the artery (1) or a branch where the probe's image plane cuts it; false
- *  when it does not pass within 40 mm of the beam axis. */
+ *  when it does not pass within 40 mm of the beam axis. @thread any, not during an update */
 SONDE_API bool sonde_interior_vessel_at_plane(const sonde_interior *interior, int which,
                                               sonde_pose world_from_probe,
                                               sonde_vessel_state *state);
+/** @thread any, not during an update */
 SONDE_API uint64_t sonde_interior_tick(const sonde_interior *interior);
 
 /** Posture of the leg. */

@@ -27,7 +27,7 @@ typedef struct sonde_sites_def {
   double smoothing_m; /**< normals are means over the skin with this standard deviation; 5 mm */
 } sonde_sites_def;
 
-SONDE_API sonde_sites_def sonde_sites_def_default(void);
+SONDE_API sonde_sites_def sonde_sites_def_default(void); /**< @thread any */
 
 /** Distances of sites to their nearest neighbour. */
 typedef struct sonde_site_spacing {
@@ -75,7 +75,7 @@ typedef struct sonde_robot_def {
   uint32_t threads;         /**< 0: one per online core */
 } sonde_robot_def;
 
-SONDE_API sonde_robot_def sonde_robot_def_default(void);
+SONDE_API sonde_robot_def sonde_robot_def_default(void); /**< @thread any */
 
 /** Why the robot left a site. */
 typedef enum sonde_robot_end {
@@ -100,7 +100,7 @@ typedef struct sonde_robot_log {
   sonde_robot_visit *visits; /**< [count] in table order */
 } sonde_robot_log;
 
-SONDE_API void sonde_robot_log_clear(sonde_robot_log *log);
+SONDE_API void sonde_robot_log_clear(sonde_robot_log *log); /**< @thread owner */
 
 /** With fewer rows a site that was under way is not kept when the robot is cancelled. */
 enum { SONDE_ROBOT_LEAST_ROWS = 3 };

@@ -50,7 +50,7 @@ typedef struct sonde_scene_step {
   double substep_tolerance_m; /**< wanted error of a step, by step doubling; 0: no substeps */
   uint32_t substep_halvings;  /**< smallest substep is dt/2^this; default 8, at most 16 */
 } sonde_scene_step;
-SONDE_API sonde_scene_step sonde_scene_step_default(void);
+SONDE_API sonde_scene_step sonde_scene_step_default(void); /**< @thread any */
 
 /** A compiled scene: constant but for the step's options. */
 typedef struct sonde_scene sonde_scene;
@@ -67,7 +67,7 @@ SONDE_API sonde_status sonde_scene_load(const char *path, const char *thigh, son
  * @thread owner */
 SONDE_API sonde_status sonde_scene_parse(const char *text, const char *name, const char *thigh,
                                          sonde_scene **scene, sonde_error *error);
-SONDE_API void sonde_scene_destroy(sonde_scene *scene);
+SONDE_API void sonde_scene_destroy(sonde_scene *scene); /**< @thread owner */
 
 /** What a body is. */
 typedef struct sonde_body_info {
@@ -79,16 +79,17 @@ typedef struct sonde_body_info {
   const sonde_mesh *surface; /**< at rest; of a rigid body about its centre */
   sonde_mass mass;           /**< inertia of rigid bodies only */
 } sonde_body_info;
-SONDE_API uint32_t sonde_scene_body_count(const sonde_scene *scene);
+SONDE_API uint32_t sonde_scene_body_count(const sonde_scene *scene); /**< @thread any */
+/** @thread any */
 SONDE_API sonde_body_info sonde_scene_body(const sonde_scene *scene, uint32_t body);
-/** Index of a body, UINT32_MAX when absent. */
+/** Index of a body, UINT32_MAX when absent. @thread any */
 SONDE_API uint32_t sonde_scene_find(const sonde_scene *scene, const char *name);
-SONDE_API const char *sonde_scene_title(const sonde_scene *scene);
-/** `duration_s` of the file: how long a run is meant to be; 1 s when absent. */
+SONDE_API const char *sonde_scene_title(const sonde_scene *scene); /**< @thread any */
+/** `duration_s` of the file: how long a run is meant to be; 1 s when absent. @thread any */
 SONDE_API double sonde_scene_duration(const sonde_scene *scene);
-/** Acceleration of gravity (m/s^2); zero when the file gives none. */
+/** Acceleration of gravity (m/s^2); zero when the file gives none. @thread any */
 SONDE_API sonde_vec3 sonde_scene_gravity(const sonde_scene *scene);
-/** Hash of the text and of the meshes that the scene was compiled from. */
+/** Hash of the text and of the meshes that the scene was compiled from. @thread any */
 SONDE_API uint64_t sonde_scene_checksum(const sonde_scene *scene);
 
 /** Two bodies that may touch; indices of bodies. */
@@ -98,10 +99,11 @@ typedef struct sonde_scene_pair {
   double stiffness, damping; /**< N/m^3 and N s/m^3; of the energy law N/m^5 and N s/m^5 */
   double mu_static, mu_kinetic;
 } sonde_scene_pair;
-SONDE_API uint32_t sonde_scene_pair_count(const sonde_scene *scene);
+SONDE_API uint32_t sonde_scene_pair_count(const sonde_scene *scene); /**< @thread any */
+/** @thread any */
 SONDE_API sonde_scene_pair sonde_scene_pair_at(const sonde_scene *scene, uint32_t pair);
 
-SONDE_API sonde_scene_step sonde_scene_get_step(const sonde_scene *scene);
+SONDE_API sonde_scene_step sonde_scene_get_step(const sonde_scene *scene); /**< @thread owner */
 /** @return ARGUMENT naming the value out of range @thread owner, while no state steps */
 SONDE_API sonde_status sonde_scene_set_step(sonde_scene *scene, const sonde_scene_step *step,
                                             sonde_error *error);
@@ -112,8 +114,8 @@ typedef struct sonde_scene_state sonde_scene_state;
 /** Start of a scene. @param scene borrowed, must outlive the state @thread owner */
 SONDE_API sonde_status sonde_scene_state_create(const sonde_scene *scene, sonde_scene_state **state,
                                                 sonde_error *error);
-SONDE_API void sonde_scene_state_destroy(sonde_scene_state *state);
-SONDE_API void sonde_scene_state_reset(sonde_scene_state *state);
+SONDE_API void sonde_scene_state_destroy(sonde_scene_state *state); /**< @thread owner */
+SONDE_API void sonde_scene_state_reset(sonde_scene_state *state);   /**< @thread owner */
 
 /** Bits of sonde_scene_report.flags; trouble is flagged and counted, never fatal. */
 enum {
@@ -138,20 +140,20 @@ typedef struct sonde_scene_report {
 
 /** Advances by dt. @thread tick (no allocation, no locks, no I/O) */
 SONDE_API void sonde_scene_advance(sonde_scene_state *state);
-SONDE_API sonde_scene_report sonde_scene_last(const sonde_scene_state *state);
-/** Steps with any flag since the start. */
+SONDE_API sonde_scene_report sonde_scene_last(const sonde_scene_state *state); /**< @thread tick */
+/** Steps with any flag since the start. @thread tick */
 SONDE_API uint64_t sonde_scene_flag_count(const sonde_scene_state *state);
-/** All flags since the start. */
+/** All flags since the start. @thread tick */
 SONDE_API uint32_t sonde_scene_all_flags(const sonde_scene_state *state);
-SONDE_API uint64_t sonde_scene_tick(const sonde_scene_state *state);
-SONDE_API double sonde_scene_time(const sonde_scene_state *state);
+SONDE_API uint64_t sonde_scene_tick(const sonde_scene_state *state); /**< @thread tick */
+SONDE_API double sonde_scene_time(const sonde_scene_state *state);   /**< @thread tick */
 /** Hash of everything that moves: equal runs have equal hashes. @thread owner */
 SONDE_API uint64_t sonde_scene_hash(const sonde_scene_state *state);
 
-/** Nodes of a deformable body, world (m, m/s); NULL for a rigid body. */
+/** Nodes of a deformable body, world (m, m/s); NULL for a rigid body. @thread tick */
 SONDE_API const sonde_vec3 *sonde_scene_nodes(const sonde_scene_state *state, uint32_t body);
 SONDE_API const sonde_vec3 *sonde_scene_node_velocities(const sonde_scene_state *state,
-                                                        uint32_t body);
+                                                        uint32_t body); /**< @thread tick */
 /** Overwrites the nodes of a deformable body; either may be NULL. @thread owner */
 SONDE_API void sonde_scene_set_nodes(sonde_scene_state *state, uint32_t body,
                                      const sonde_vec3 *positions, const sonde_vec3 *velocities);
@@ -167,6 +169,7 @@ typedef struct sonde_body_measure {
   sonde_vec3 momentum_kg_m_s, angular_kg_m2_s; /**< angular about the world's origin */
   double kinetic_j, elastic_j, gravity_j;
 } sonde_body_measure;
+/** @thread tick */
 SONDE_API sonde_body_measure sonde_scene_measure(const sonde_scene_state *state, uint32_t body);
 
 /** A pair's contact in the last step. */
@@ -180,7 +183,7 @@ typedef struct sonde_pair_measure {
   uint32_t region_count, point_count;
 } sonde_pair_measure;
 SONDE_API sonde_pair_measure sonde_scene_pair_measure(const sonde_scene_state *state,
-                                                      uint32_t pair);
+                                                      uint32_t pair); /**< @thread tick */
 
 /** Writes the full state atomically; a state loaded from it goes on bit by bit as this one.
  * @thread owner */

@@ -28,7 +28,7 @@ typedef struct sonde_block_matrix {
 SONDE_API sonde_status sonde_block_matrix_create(uint32_t rows, uint32_t pair_count,
                                                  const uint32_t (*pairs)[2],
                                                  sonde_block_matrix **matrix, sonde_error *error);
-SONDE_API void sonde_block_matrix_destroy(sonde_block_matrix *matrix);
+SONDE_API void sonde_block_matrix_destroy(sonde_block_matrix *matrix); /**< @thread owner */
 /** Bytes of the stored numbers (for the memory table). @thread any */
 SONDE_API size_t sonde_block_matrix_bytes(const sonde_block_matrix *matrix);
 
@@ -104,10 +104,10 @@ SONDE_API sonde_status sonde_ldl_create(uint32_t n, const uint32_t *row_start,
 SONDE_API sonde_status sonde_ldl_refactor(sonde_ldl *ldl, const double *value, sonde_error *error);
 /** Solves in place, `columns` right-hand sides interleaved x[row*columns + c]. @thread tick */
 SONDE_API void sonde_ldl_solve(const sonde_ldl *ldl, uint32_t columns, double *x, double *scratch);
-/** Doubles needed as scratch by a solve. */
+/** Doubles needed as scratch by a solve. @thread any */
 SONDE_API size_t sonde_ldl_scratch(const sonde_ldl *ldl, uint32_t columns);
-SONDE_API size_t sonde_ldl_nonzeros(const sonde_ldl *ldl);
-SONDE_API void sonde_ldl_destroy(sonde_ldl *ldl);
+SONDE_API size_t sonde_ldl_nonzeros(const sonde_ldl *ldl); /**< @thread any */
+SONDE_API void sonde_ldl_destroy(sonde_ldl *ldl);          /**< @thread owner */
 
 #ifdef __cplusplus
 }

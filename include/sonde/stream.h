@@ -76,7 +76,7 @@ typedef struct sonde_page_def {
  *  (latest frame wins, acknowledged by the client), takes probe goals and controls.
  *  Binds to 127.0.0.1 and checks Origin. Anyone may load the page itself; data and the WebSocket
  *  are for who knows the token of its address (docs/page_protocol.md).
- *  @return PORT when the port is in use, ARGUMENT for a token of another form */
+ *  @return PORT when the port is in use, ARGUMENT for a token of another form @thread owner */
 SONDE_API sonde_status sonde_page_start(const sonde_page_def *def, sonde_session *session,
                                         sonde_page_server **server, sonde_error *error);
 /** Shows another session from now on: every client gets its thigh. After the return the server does
@@ -109,9 +109,9 @@ SONDE_API void sonde_page_address(const sonde_page_server *server, bool teacher,
  *  and nothing else, relative to the page's. @param path less than 160 characters @thread any */
 SONDE_API void sonde_page_link(const sonde_page_server *server, const char *path,
                                char link[SONDE_PAGE_LINK]);
-SONDE_API uint16_t sonde_page_port(const sonde_page_server *server);
-SONDE_API uint32_t sonde_page_clients(const sonde_page_server *server);
-/** Closes all connections and joins the threads. */
+SONDE_API uint16_t sonde_page_port(const sonde_page_server *server); /**< @thread any */
+SONDE_API uint32_t sonde_page_clients(sonde_page_server *server);    /**< @thread any */
+/** Closes all connections and joins the threads. @thread owner */
 SONDE_API void sonde_page_stop(sonde_page_server *server);
 
 #ifdef __cplusplus

@@ -48,11 +48,13 @@ typedef struct sonde_sequence {
 /** Black frames without fields. @thread owner */
 SONDE_API sonde_status sonde_sequence_create(uint32_t width, uint32_t height, uint32_t count,
                                              sonde_sequence *sequence, sonde_error *error);
-SONDE_API void sonde_sequence_clear(sonde_sequence *sequence);
-/** Sets or replaces a field; key and value are copied. @param frame or SONDE_WHOLE_FILE */
+SONDE_API void sonde_sequence_clear(sonde_sequence *sequence); /**< @thread owner */
+/** Sets or replaces a field; key and value are copied. @param frame or SONDE_WHOLE_FILE
+ *  @thread owner */
 SONDE_API sonde_status sonde_sequence_set(sonde_sequence *sequence, uint32_t frame, const char *key,
                                           const char *value, sonde_error *error);
-/** Sets "<name>Transform" to 16 numbers in mm and its status to OK. @param a_from_b in mm */
+/** Sets "<name>Transform" to 16 numbers in mm and its status to OK. @param a_from_b in mm
+ *  @thread owner */
 SONDE_API sonde_status sonde_sequence_set_transform(sonde_sequence *sequence, uint32_t frame,
                                                     const char *name, const sonde_affine *a_from_b,
                                                     sonde_error *error);
@@ -134,7 +136,7 @@ typedef struct sonde_slicer_options {
                   the same */
 } sonde_slicer_options;
 
-SONDE_API sonde_slicer_options sonde_slicer_options_default(void);
+SONDE_API sonde_slicer_options sonde_slicer_options_default(void); /**< @thread any */
 
 typedef struct sonde_slicer sonde_slicer;
 
@@ -143,7 +145,7 @@ typedef struct sonde_slicer sonde_slicer;
 SONDE_API sonde_status sonde_slicer_create(const sonde_sequence *sequence,
                                            const sonde_slicer_options *options,
                                            sonde_slicer **slicer, sonde_error *error);
-SONDE_API void sonde_slicer_destroy(sonde_slicer *slicer);
+SONDE_API void sonde_slicer_destroy(sonde_slicer *slicer); /**< @thread owner */
 /** Whether frames are joined pixel to pixel: as asked for, or as KRIGE chose. @thread any */
 SONDE_API bool sonde_slicer_is_along_sweep(const sonde_slicer *slicer);
 /**
@@ -153,7 +155,7 @@ SONDE_API bool sonde_slicer_is_along_sweep(const sonde_slicer *slicer);
  * to the same pixel of the other.
  * @param known [height*width] 1 where frames reach, else 0 (and the pixel is black); may be NULL
  * @return pixels that frames reach
- * @thread one at a time per slicer
+ * @thread owner
  */
 SONDE_API uint64_t sonde_slicer_render(sonde_slicer *slicer, const sonde_affine *world_from_pixel,
                                        sonde_image *image, uint8_t *known);
@@ -164,6 +166,7 @@ SONDE_API uint64_t sonde_slicer_render(sonde_slicer *slicer, const sonde_affine 
  * foretells the frames of the sweep best.
  * @param place frame number, 7.5 lies between frames 7 and 8
  * @return pixels that frames reach
+ * @thread owner
  */
 SONDE_API uint64_t sonde_slicer_render_place(sonde_slicer *slicer, double place,
                                              const sonde_affine *world_from_pixel,

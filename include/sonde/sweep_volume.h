@@ -20,8 +20,8 @@ typedef struct sonde_volume {
 } sonde_volume;
 
 SONDE_API sonde_status sonde_volume_create(const uint32_t size[3], sonde_volume *volume,
-                                           sonde_error *error);
-SONDE_API void sonde_volume_clear(sonde_volume *volume);
+                                           sonde_error *error); /**< @thread owner */
+SONDE_API void sonde_volume_clear(sonde_volume *volume);        /**< @thread owner */
 /** MetaImage or NRRD with three axes, 8 bits. @thread owner */
 SONDE_API sonde_status sonde_volume_load(const char *path, sonde_volume *volume,
                                          sonde_error *error);
@@ -41,7 +41,7 @@ typedef struct sonde_reconstruct_options {
   uint64_t most_voxels; /**< default 2^28; five bytes of work memory each */
 } sonde_reconstruct_options;
 
-SONDE_API sonde_reconstruct_options sonde_reconstruct_options_default(void);
+SONDE_API sonde_reconstruct_options sonde_reconstruct_options_default(void); /**< @thread any */
 
 typedef struct sonde_reconstruct_report {
   uint32_t frames;
@@ -58,8 +58,8 @@ SONDE_API sonde_status sonde_reconstruct(const sonde_sequence *sequence,
                                          sonde_volume *volume, sonde_reconstruct_report *report,
                                          const sonde_progress *progress, sonde_error *error);
 
-/** Picture of a plane of a volume, trilinear or nearest voxel; as sonde_slicer_render(). @thread
- * any, one per image */
+/** Picture of a plane of a volume, trilinear or nearest voxel; as sonde_slicer_render().
+ *  @thread any, one per image */
 SONDE_API uint64_t sonde_volume_slice(const sonde_volume *volume, bool nearest,
                                       const sonde_affine *world_from_pixel, sonde_image *image,
                                       uint8_t *known);
@@ -75,7 +75,7 @@ typedef struct sonde_warp {
 /** Zero offsets, nodes 1 m apart. @thread owner */
 SONDE_API sonde_status sonde_warp_create(const uint32_t size[3], sonde_warp *warp,
                                          sonde_error *error);
-SONDE_API void sonde_warp_clear(sonde_warp *warp);
+SONDE_API void sonde_warp_clear(sonde_warp *warp); /**< @thread owner */
 /** Picture of a deformed volume, trilinear; the field is read every 16 x 8 pixels and bilinear
  *  between. @thread any, one per image */
 SONDE_API uint64_t sonde_volume_slice_warped(const sonde_volume *volume, const sonde_warp *warp,
@@ -92,7 +92,7 @@ typedef struct sonde_volume_slicer sonde_volume_slicer;
  */
 SONDE_API sonde_status sonde_volume_slicer_create(const sonde_volume *volume,
                                                   sonde_volume_slicer **slicer, sonde_error *error);
-SONDE_API void sonde_volume_slicer_destroy(sonde_volume_slicer *slicer);
+SONDE_API void sonde_volume_slicer_destroy(sonde_volume_slicer *slicer); /**< @thread owner */
 /** The same picture as sonde_volume_slice(), or sonde_volume_slice_warped() with a field, sooner.
  *  @param warp NULL at rest @thread any, one per image */
 SONDE_API uint64_t sonde_volume_slicer_render(const sonde_volume_slicer *slicer,

@@ -142,11 +142,12 @@ SONDE_API sonde_status sonde_model_build(const sonde_model_def *def, sonde_model
 SONDE_API sonde_status sonde_model_set_parameters(sonde_model *model, const sonde_surface_law *law,
                                                   const sonde_site *sites, uint32_t count,
                                                   sonde_error *error);
-SONDE_API void sonde_model_destroy(sonde_model *model);
+SONDE_API void sonde_model_destroy(sonde_model *model); /**< @thread owner */
 
 /** Reads a model file; CHECKSUM when a byte is wrong, VERSION, FORMAT. @thread owner */
 SONDE_API sonde_status sonde_model_load(const char *path, sonde_model **model, sonde_error *error);
-/** Writes a model file atomically; sets model->checksum. Format: docs/model_file.md. */
+/** Writes a model file atomically; sets model->checksum. Format: docs/model_file.md.
+ *  @thread owner */
 SONDE_API sonde_status sonde_model_save(sonde_model *model, const char *path, sonde_error *error);
 
 /** What a cut did. Nodes and faces that were there keep their numbers. */
@@ -184,13 +185,15 @@ SONDE_API void sonde_cut_map_clear(sonde_cut_map *map);
 /** The site with that id, NULL when absent. @thread any */
 SONDE_API const sonde_site *sonde_model_site(const sonde_model *model, uint32_t id);
 
-/** Pressure of a normal spring of exponent n and its slope at indentation s, guard included. */
+/** Pressure of a normal spring of exponent n and its slope at indentation s, guard included.
+ *  @thread any (tick) */
 SONDE_API double sonde_normal_pressure(double exponent, double k0_n_m3, double xm_m, double guard,
                                        double s_m, double *slope_n_m3);
 /** Energy per area of the same spring. @thread any */
 SONDE_API double sonde_normal_energy(double exponent, double k0_n_m3, double xm_m, double guard,
                                      double s_m);
-/** Force per length of the shear layer at slope g = |grad s| >= 0; *slope = dq/dg. */
+/** Force per length of the shear layer at slope g = |grad s| >= 0; *slope = dq/dg.
+ *  @thread any (tick) */
 SONDE_API double sonde_shear_force(double shear_n_m, double limit, double g, double *slope);
 /** Energy per area of the shear layer. @thread any */
 SONDE_API double sonde_shear_energy(double shear_n_m, double limit, double g);

@@ -81,7 +81,7 @@ SONDE_API double sonde_anatomy_fascia(const sonde_thigh_anatomy *anatomy, sonde_
 SONDE_API const sonde_landmark *sonde_anatomy_landmark(const sonde_thigh_anatomy *anatomy,
                                                        const char *name);
 SONDE_API const sonde_branch *sonde_anatomy_branch(const sonde_thigh_anatomy *anatomy,
-                                                   const char *name);
+                                                   const char *name); /**< @thread any */
 
 #ifdef __cplusplus
 }

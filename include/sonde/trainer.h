@@ -50,9 +50,10 @@ SONDE_API sonde_vein_point sonde_vein_at(const sonde_vein_map *map, double along
 SONDE_API double sonde_vein_along(const sonde_vein_map *map, double z_m);
 /** Whether the thigh has a branch of that name. @thread any */
 SONDE_API bool sonde_vein_has_branch(const sonde_vein_map *map, const char *name);
-/** Index of a segment by name or of the one at a model z; SONDE_SEGMENTS when there is none. */
+/** Index of a segment by name or of the one at a model z; SONDE_SEGMENTS when there is none.
+ *  @thread any */
 SONDE_API uint32_t sonde_vein_segment(const sonde_vein_map *map, const char *name);
-SONDE_API uint32_t sonde_vein_segment_at(const sonde_vein_map *map, double z_m);
+SONDE_API uint32_t sonde_vein_segment_at(const sonde_vein_map *map, double z_m); /**< @thread any */
 /** Title of a segment for people, e.g. "Common femoral vein". @thread any */
 SONDE_API const char *sonde_segment_title(const char *name);
 
@@ -186,7 +187,7 @@ typedef struct sonde_case_setup {
 SONDE_API sonde_status sonde_case_build(const sonde_case *from, const char *bundled,
                                         const char *directory, sonde_case_setup *setup,
                                         sonde_error *error);
-SONDE_API void sonde_case_setup_clear(sonde_case_setup *setup);
+SONDE_API void sonde_case_setup_clear(sonde_case_setup *setup); /**< @thread owner */
 /** Model, pathology, findings, posture and circulation of a session; the setup must outlive it.
  *  @thread owner */
 SONDE_API void sonde_case_session(const sonde_case_setup *setup, sonde_session_def *def);

@@ -55,17 +55,17 @@ typedef struct sonde_judge sonde_judge;
 /** @param map,plan copied @param[out] judge released by sonde_judge_destroy() @thread owner */
 SONDE_API sonde_status sonde_judge_create(const sonde_vein_map *map, const sonde_plan *plan,
                                           sonde_judge **judge, sonde_error *error);
-SONDE_API void sonde_judge_destroy(sonde_judge *judge);
+SONDE_API void sonde_judge_destroy(sonde_judge *judge); /**< @thread owner */
 
 /** The next snapshot; one that is not newer than the last is ignored. Time is the snapshot's, so
  *  that its rate does not matter. Up to SONDE_COMPRESSIONS presses are kept, further ones are
  * counted.
- *  @return false when a press could not be kept for want of memory @thread one reader */
+ *  @return false when a press could not be kept for want of memory @thread owner */
 SONDE_API bool sonde_judge_feed(sonde_judge *judge, const sonde_snapshot *snapshot);
-/** Ends a press under way. @thread reader */
+/** Ends a press under way. @thread owner */
 SONDE_API bool sonde_judge_finish(sonde_judge *judge);
 
-/** Finished presses; valid until the next feed. @thread reader */
+/** Finished presses; valid until the next feed. @thread owner */
 SONDE_API const sonde_compression *sonde_judge_compressions(const sonde_judge *judge,
                                                             uint32_t *count);
 
@@ -75,7 +75,7 @@ typedef struct sonde_judge_now {
   double vein_ratio, artery_ratio; /**< NaN when not in view */
   double force_n, time_s;
 } sonde_judge_now;
-SONDE_API sonde_judge_now sonde_judge_state(const sonde_judge *judge);
+SONDE_API sonde_judge_now sonde_judge_state(const sonde_judge *judge); /**< @thread owner */
 
 /** A segment in the exam. */
 typedef struct sonde_segment_status {
@@ -84,9 +84,9 @@ typedef struct sonde_segment_status {
   uint32_t open;         /**< presses that found the vein open */
   sonde_decision decision;
 } sonde_segment_status;
-/** @param segment of the map @thread reader */
+/** @param segment of the map @thread owner */
 SONDE_API sonde_segment_status sonde_judge_segment(const sonde_judge *judge, uint32_t segment);
-/** @return ARGUMENT for an unknown segment @thread reader */
+/** @return ARGUMENT for an unknown segment @thread owner */
 SONDE_API sonde_status sonde_judge_decide(sonde_judge *judge, uint32_t segment,
                                           sonde_decision decision, sonde_error *error);
 
@@ -101,10 +101,10 @@ typedef struct sonde_guidance {
   uint32_t undecided; /**< segment to decide next: the one pressed last, else the first that waits;
                            SONDE_SEGMENTS: none */
 } sonde_guidance;
-SONDE_API sonde_guidance sonde_judge_guidance(const sonde_judge *judge);
-/** The same, counted; force and target may be shown for SONDE_HINT_S. @thread reader */
+SONDE_API sonde_guidance sonde_judge_guidance(const sonde_judge *judge); /**< @thread owner */
+/** The same, counted; force and target may be shown for SONDE_HINT_S. @thread owner */
 SONDE_API sonde_guidance sonde_judge_hint(sonde_judge *judge);
-/** Hints so far, and whether the last one is still to be shown. @thread reader */
+/** Hints so far, and whether the last one is still to be shown. @thread owner */
 SONDE_API uint32_t sonde_judge_hints(const sonde_judge *judge, bool *showing);
 
 /** What was measured, few and defined; NaN where nothing was done. */
@@ -123,7 +123,7 @@ typedef struct sonde_metrics {
   uint32_t hints;
   uint32_t restores; /**< times the probe was taken off (sonde_snapshot.restores) */
 } sonde_metrics;
-SONDE_API sonde_metrics sonde_judge_metrics(const sonde_judge *judge);
+SONDE_API sonde_metrics sonde_judge_metrics(const sonde_judge *judge); /**< @thread owner */
 
 /** Verdict on one segment. */
 typedef struct sonde_segment_verdict {
@@ -158,7 +158,7 @@ typedef struct sonde_score {
   char asked[160], truth[160], summary[256];
 } sonde_score;
 
-/** @param truth whose map is the judge's @thread reader */
+/** @param truth whose map is the judge's @thread owner */
 SONDE_API void sonde_judge_score(const sonde_judge *judge, const sonde_case *truth,
                                  sonde_score *score);
 
@@ -191,11 +191,12 @@ typedef struct sonde_series {
   uint32_t true_positive, false_positive, true_negative, false_negative;
   double score_sum;
 } sonde_series;
-/** An exam without an answer counts as missed when there was a clot, else as unanswered only. */
+/** An exam without an answer counts as missed when there was a clot, else as unanswered only.
+ *  @thread owner */
 SONDE_API void sonde_series_add(sonde_series *series, const sonde_score *score);
 /** NaN without a case of the kind. @thread any */
 SONDE_API double sonde_series_sensitivity(const sonde_series *series);
-SONDE_API double sonde_series_specificity(const sonde_series *series);
+SONDE_API double sonde_series_specificity(const sonde_series *series); /**< @thread any */
 
 #ifdef __cplusplus
 }

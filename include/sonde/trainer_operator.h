@@ -25,12 +25,12 @@ SONDE_API sonde_status sonde_operator_create(const char *name, uint64_t seed,
                                              const sonde_vein_map *map, const sonde_plan *plan,
                                              double dt_s, sonde_operator **out,
                                              sonde_device *device, sonde_error *error);
-SONDE_API void sonde_operator_destroy(sonde_operator *op);
-/** Shows the newest snapshot: the operator moves on. @thread reader, while no tick runs */
+SONDE_API void sonde_operator_destroy(sonde_operator *op); /**< @thread owner */
+/** Shows the newest snapshot: the operator moves on. @thread owner, while no tick runs */
 SONDE_API void sonde_operator_see(sonde_operator *op, const sonde_snapshot *snapshot);
-/** Whether the exam is over for the operator. @thread reader */
+/** Whether the exam is over for the operator. @thread owner */
 SONDE_API bool sonde_operator_done(const sonde_operator *op);
-/** What the operator thinks of a segment of the map. @thread reader */
+/** What the operator thinks of a segment of the map. @thread owner */
 SONDE_API sonde_decision sonde_operator_decision(const sonde_operator *op, uint32_t segment);
 
 /** A whole exam without a person. */
@@ -48,7 +48,7 @@ typedef struct sonde_exam_def {
                                   columns: half the time, ratios within 0.06 */
   const char *json_path, *csv_path; /**< NULL: not written */
 } sonde_exam_def;
-SONDE_API sonde_exam_def sonde_exam_def_default(void);
+SONDE_API sonde_exam_def sonde_exam_def_default(void); /**< @thread any */
 
 /** Builds the case, lets the operator examine it in lockstep, judges.
  *  @param setup of this case, borrowed; NULL: built for this exam

@@ -21,7 +21,7 @@ typedef struct sonde_criteria {
   double open_ratio;   /**< the vein stays open: at least this left; 0.30 */
   double reach_m;      /**< a press this near to a point examines it */
 } sonde_criteria;
-SONDE_API sonde_criteria sonde_criteria_default(void);
+SONDE_API sonde_criteria sonde_criteria_default(void); /**< @thread any */
 
 /** The force of one place of the exam: what the page shows, the judge applies, the score and the
  *  report name. Whole newtons, so that the number shown is the number that counts. */
@@ -49,7 +49,8 @@ typedef struct sonde_exam_protocol {
 } sonde_exam_protocol;
 
 SONDE_API sonde_status sonde_exam_protocol_load(const char *path, sonde_exam_protocol *out,
-                                                sonde_error *error);
+                                                sonde_error *error); /**< @thread owner */
+/** The same of a text; name: what messages call it. @thread owner */
 SONDE_API sonde_status sonde_exam_protocol_parse(const char *text, const char *name,
                                                  sonde_exam_protocol *out, sonde_error *error);
 /** As sonde_case_list(), by number of places, then id. @thread owner */

@@ -68,7 +68,7 @@ typedef struct sonde_world_def {
                          steps follow one another. Smaller bodies are stepped by one */
 } sonde_world_def;
 
-SONDE_API sonde_world_def sonde_world_def_default(void);
+SONDE_API sonde_world_def sonde_world_def_default(void); /**< @thread any */
 
 /** A connected patch of skin inside the probe. */
 typedef struct sonde_contact_region {
@@ -114,7 +114,7 @@ typedef struct sonde_state sonde_state;
 /** Rest state of a model. @param model borrowed, must outlive the state @thread owner */
 SONDE_API sonde_status sonde_state_create(const sonde_model *model, const sonde_world_def *def,
                                           sonde_state **state, sonde_error *error);
-SONDE_API void sonde_state_destroy(sonde_state *state);
+SONDE_API void sonde_state_destroy(sonde_state *state); /**< @thread owner */
 /** Back to rest, tick 0, no probe history. @thread owner of the state */
 SONDE_API void sonde_state_reset(sonde_state *state);
 
@@ -189,35 +189,36 @@ SONDE_API sonde_status sonde_state_tune(sonde_state *state, const sonde_tuning *
  * Cuts the skin between two steps (sonde_model_cut) along a path on the skin as it is now. The new
  * state goes on where the old one is: positions, velocities, contact memory, tick, probe; mass,
  * momentum and energy are equal. Both stay as they are when the cut fails.
- * @param before stays as it is; no longer needed afterwards, nor is its model
+ * @param before goes on as it is; no longer needed afterwards, nor is its model
  * @param[out] model,after new, owned by the caller; `after` borrows `model`
  * @param[out] map NULL, or filled; sonde_cut_map_clear()
  * @return ARGUMENT as sonde_model_cut, MEMORY
  * @thread owner, between steps
  */
-SONDE_API sonde_status sonde_state_cut(const sonde_state *before, const sonde_vec3 *path_m,
+SONDE_API sonde_status sonde_state_cut(sonde_state *before, const sonde_vec3 *path_m,
                                        uint32_t count, sonde_model **model, sonde_state **after,
                                        sonde_cut_map *map, sonde_error *error);
 
-SONDE_API const sonde_model *sonde_state_model(const sonde_state *state);
-SONDE_API const sonde_world_def *sonde_state_def(const sonde_state *state);
-SONDE_API uint64_t sonde_state_tick(const sonde_state *state);
-SONDE_API double sonde_state_time(const sonde_state *state);
-SONDE_API const sonde_vec3 *sonde_state_positions(const sonde_state *state);  /**< [nodes] m */
-SONDE_API const sonde_vec3 *sonde_state_velocities(const sonde_state *state); /**< [nodes] m/s */
-/** Overwrites the motion (tests, snapshots); wakes every node. Either may be NULL. */
+SONDE_API const sonde_model *sonde_state_model(const sonde_state *state);   /**< @thread any */
+SONDE_API const sonde_world_def *sonde_state_def(const sonde_state *state); /**< @thread tick */
+SONDE_API uint64_t sonde_state_tick(const sonde_state *state);              /**< @thread tick */
+SONDE_API double sonde_state_time(const sonde_state *state);                /**< @thread tick */
+/** [nodes] m; may bring them up to date in the state first. @thread tick */
+SONDE_API const sonde_vec3 *sonde_state_positions(sonde_state *state);
+/** The same for velocities, [nodes] m/s. @thread tick */
+SONDE_API const sonde_vec3 *sonde_state_velocities(sonde_state *state);
+/** Overwrites the motion (tests, snapshots); wakes every node. Either may be NULL. @thread owner */
 SONDE_API void sonde_state_set(sonde_state *state, const sonde_vec3 *positions,
                                const sonde_vec3 *velocities);
-SONDE_API const sonde_contact *sonde_state_contact(const sonde_state *state);
-/** Force of the probe on each node at the last step, world (N). [nodes] */
+SONDE_API const sonde_contact *sonde_state_contact(const sonde_state *state); /**< @thread tick */
+/** Force of the probe on each node at the last step, world (N). [nodes] @thread tick */
 SONDE_API const sonde_vec3 *sonde_state_contact_forces(const sonde_state *state);
-SONDE_API sonde_pcg_result sonde_state_solver(const sonde_state *state);
-SONDE_API uint32_t sonde_state_awake(const sonde_state *state);
-SONDE_API uint32_t sonde_state_flags(const sonde_state *state);
-SONDE_API uint64_t sonde_state_flag_count(const sonde_state *state);
-SONDE_API sonde_stage_times sonde_state_times(const sonde_state *state);
-/** Bytes that the fast engine's kernels read and wrote in the last step, at the least; 0 for
- * DOUBLE. */
+SONDE_API sonde_pcg_result sonde_state_solver(const sonde_state *state); /**< @thread tick */
+SONDE_API uint32_t sonde_state_awake(const sonde_state *state);          /**< @thread tick */
+SONDE_API uint32_t sonde_state_flags(const sonde_state *state);          /**< @thread tick */
+SONDE_API uint64_t sonde_state_flag_count(const sonde_state *state);     /**< @thread tick */
+SONDE_API sonde_stage_times sonde_state_times(const sonde_state *state); /**< @thread tick */
+/** Bytes that the fast engine's kernels moved in the last step, at least; else 0. @thread tick */
 SONDE_API uint64_t sonde_state_bytes_moved(const sonde_state *state);
 /** Most bytes that sonde_state_save() writes for this state. @thread any */
 SONDE_API size_t sonde_state_size(const sonde_state *state);
@@ -241,7 +242,7 @@ SONDE_API sonde_status sonde_state_restore(sonde_state *state, const void *blob,
  * @thread any */
 SONDE_API uint64_t sonde_state_saved_hash(const sonde_model *model, const void *blob);
 /** Hash of positions, velocities and tick: equal runs have equal hashes. @thread owner */
-SONDE_API uint64_t sonde_state_hash(const sonde_state *state);
+SONDE_API uint64_t sonde_state_hash(sonde_state *state);
 
 #ifdef __cplusplus
 }

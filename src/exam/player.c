@@ -321,7 +321,7 @@ double sonde_player_time(const sonde_player *player) {
   return (double)tick_of(player) * player->info.dt_s;
 }
 
-uint64_t sonde_player_hash(const sonde_player *player) {
+uint64_t sonde_player_hash(sonde_player *player) {
   return sonde_state_hash(player->session->state);
 }
 

@@ -38,7 +38,7 @@ sonde_status sonde_recording_fits(const sonde_recording *recording, const char *
 }
 
 // A state hash on the way; those of images are the player's.
-static void compare(const sonde_record_check *check, const sonde_state *state,
+static void compare(const sonde_record_check *check, sonde_state *state,
                     sonde_replay_result *result) {
   if (check->kind != SONDE_CHECK_STATE || check->tick != sonde_state_tick(state)) return;
   result->checks++;

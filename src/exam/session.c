@@ -286,6 +286,6 @@ uint64_t sonde_session_images(const sonde_session *session) {
   return atomic_load_explicit(&session->images, memory_order_acquire);
 }
 
-uint64_t sonde_session_hash(const sonde_session *session) {
+uint64_t sonde_session_hash(sonde_session *session) {
   return atomic_load(&session->loop) ? 0 : sonde_state_hash(session->state);
 }

@@ -206,7 +206,7 @@ void sonde_gel_coupling_of(const sonde_gel *gel, const double *film_m, uint32_t 
   }
 }
 
-void sonde_gel_coupling(const sonde_gel *gel, const sonde_vec3 *skin_m, const sonde_vec3 *contact_n,
+void sonde_gel_coupling(sonde_gel *gel, const sonde_vec3 *skin_m, const sonde_vec3 *contact_n,
                         const sonde_vec3 *point_m, uint32_t count, float *share) {
   sonde_gel_coupling_of(gel, gel->film_m, gel->near, skin_m, contact_n, point_m, count, share);
 }

@@ -346,14 +346,13 @@ uint16_t sonde_page_port(const sonde_page_server *server) {
   return server->port;
 }
 
-uint32_t sonde_page_clients(const sonde_page_server *server) {
+uint32_t sonde_page_clients(sonde_page_server *server) {
   SONDE_ASSERT(server);
-  pthread_mutex_t *lock = (pthread_mutex_t *)&server->lock; // the lock itself is not state
   uint32_t count = 0;
-  pthread_mutex_lock(lock);
+  pthread_mutex_lock(&server->lock);
   for (int i = 0; i < PAGE_CLIENTS; ++i)
     if (server->client[i].here) ++count;
-  pthread_mutex_unlock(lock);
+  pthread_mutex_unlock(&server->lock);
   return count;
 }
 

@@ -8,7 +8,7 @@
 
 #include <string.h>
 
-void sonde_state_publish(const sonde_state *state) {
+void sonde_state_publish(sonde_state *state) {
   if (state->lanes && !state->lanes->stale)
     sonde_lanes_publish(state->lanes, state->model->surface.vertices, state->position,
                         state->velocity);
@@ -96,11 +96,11 @@ const sonde_model *sonde_state_model(const sonde_state *state) { return state->m
 const sonde_world_def *sonde_state_def(const sonde_state *state) { return &state->def; }
 uint64_t sonde_state_tick(const sonde_state *state) { return state->tick; }
 double sonde_state_time(const sonde_state *state) { return (double)state->tick * state->def.dt_s; }
-const sonde_vec3 *sonde_state_positions(const sonde_state *state) {
+const sonde_vec3 *sonde_state_positions(sonde_state *state) {
   sonde_state_publish(state);
   return state->position;
 }
-const sonde_vec3 *sonde_state_velocities(const sonde_state *state) {
+const sonde_vec3 *sonde_state_velocities(sonde_state *state) {
   sonde_state_publish(state);
   return state->velocity;
 }
@@ -129,7 +129,7 @@ uint64_t sonde_state_bytes_moved(const sonde_state *state) {
   return state->lanes ? state->lanes->bytes_moved : 0;
 }
 
-uint64_t sonde_state_hash(const sonde_state *state) {
+uint64_t sonde_state_hash(sonde_state *state) {
   size_t bytes = state->model->surface.vertex_count * sizeof *state->position;
   sonde_state_publish(state);
   uint64_t hash = sonde_hash(0, &state->tick, sizeof state->tick);

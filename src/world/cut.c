@@ -10,7 +10,7 @@
 #include <string.h>
 
 typedef struct carrier {
-  const sonde_state *from;
+  sonde_state *from;
   sonde_state *to;
   const sonde_cut_map *map;
 } carrier;
@@ -130,7 +130,7 @@ static void carry(const carrier *c, sonde_vec3 *moved) {
   sonde_state_list_awake(c->to);
 }
 
-sonde_status sonde_state_cut(const sonde_state *before, const sonde_vec3 *path_m, uint32_t count,
+sonde_status sonde_state_cut(sonde_state *before, const sonde_vec3 *path_m, uint32_t count,
                              sonde_model **model, sonde_state **after, sonde_cut_map *map,
                              sonde_error *error) {
   *model = NULL;

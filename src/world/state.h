@@ -107,7 +107,7 @@ sonde_status sonde_state_create_ordered(const sonde_model *model, const sonde_wo
                                         const uint32_t *face_order, sonde_state **state,
                                         sonde_error *error);
 // Brings position[] and velocity[] up to date with the fast engine. @thread tick
-void sonde_state_publish(const sonde_state *state);
+void sonde_state_publish(sonde_state *state);
 // Wakes every node. @thread tick
 void sonde_state_wake_all(sonde_state *state);
 // Back to rest in the midst of a run: tick and count of flags go on. @thread tick

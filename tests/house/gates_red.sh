@@ -10,7 +10,7 @@ wrong=0
 fresh() { # a tree that keeps every rule
   rm -rf "${tree:?}"/*
   mkdir -p "$tree"/src/{base,world,stream} "$tree"/include/sonde "$tree"/app "$tree"/tests/house
-  echo 'SONDE_API int sonde_one(int a);' >"$tree/include/sonde/base.h"
+  printf '/** @thread any */\nSONDE_API int sonde_one(int a);\n' >"$tree/include/sonde/base.h"
   echo '#include "sonde/base.h"' >"$tree/include/sonde/world.h"
   printf '#include "base/base.h"\nint sonde_step(int a) {\n  SONDE_ASSERT(a);\n  return a;\n}\n' \
     >"$tree/src/world/step_hot.c"
@@ -47,6 +47,7 @@ sizes=("$house/sizes.sh" "$tree")
 hot=("$house/hot_symbols.sh" "$tree" "$tree/build" "$objdump")
 api=("$house/api.sh" "$tree" "$tree/lib.so" "$nm") disk=("$house/disk.sh" "$tree")
 format=("$house/format.sh" "$tree")
+callers=("$house/callers.sh" "$tree")
 cp "$house/../../.clang-format" "$tree"
 
 fresh
@@ -80,6 +81,17 @@ fresh; echo 'int sonde_disk(void);' >"$tree/src/base/disk.c"
 expect green "disk, clean tree" "${disk[@]}"
 echo 'void f(void) { rename("a", "b"); }' >>"$tree/app/main.c"
 expect red "a call that changes the disk elsewhere" "${disk[@]}"
+
+fresh
+expect green "callers, clean tree" "${callers[@]}"
+echo 'SONDE_API int sonde_two(int a); /**< a @thread tick */' >>"$tree/include/sonde/base.h"
+expect green "a caller behind the declaration" "${callers[@]}"
+echo 'SONDE_API int sonde_three(int a);' >>"$tree/include/sonde/base.h"
+expect red "a function without a comment below one that has one" "${callers[@]}"
+fresh; sed -i 's/any/reader/' "$tree/include/sonde/base.h"
+expect red "a caller that is none of the three" "${callers[@]}"
+fresh; sed -i 's/ @thread any//; s/;/; \/**< a *\//' "$tree/include/sonde/base.h"
+expect red "a comment that names no caller" "${callers[@]}"
 
 fresh
 expect green "format, clean tree" "${format[@]}"

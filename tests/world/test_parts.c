@@ -74,7 +74,7 @@ static void one_thread_and_two_give_the_same_bits(void **state) {
   }
 }
 
-static double farthest(const sonde_state *a, const sonde_state *b) {
+static double farthest(sonde_state *a, sonde_state *b) {
   const sonde_vec3 *x = sonde_state_positions(a), *y = sonde_state_positions(b);
   double most = 0;
   for (uint32_t i = 0; i < sonde_state_model(a)->surface.vertex_count; ++i)
