@@ -141,5 +141,18 @@ expect red "library that exports more" "${api[@]}"
 library 'int sonde_other(int a) { return a; }'
 expect red "library that lacks a declared function" "${api[@]}"
 
+if command -v node >/dev/null; then
+  figures=(node "$house/../../bench/figures.mjs" check "$tree")
+  fresh; mkdir -p "$tree/bench/figures" "$tree/docs"
+  echo '{"date": "", "sources": ["src/base"], "digest": "", "values": {"one": {"ms": 1234.56}}}' \
+    >"$tree/bench/figures/group.json"
+  echo 'It takes <!--group.one.ms 1-->1,234.6<!----> ms.' >"$tree/docs/a.md"
+  expect green "a document with the figure that was measured" "${figures[@]}"
+  echo 'It takes <!--group.one.ms 1-->1,234.5<!----> ms.' >"$tree/docs/a.md"
+  expect red "a document with another figure" "${figures[@]}"
+  echo 'It takes <!--group.two.ms 1-->1<!----> ms.' >"$tree/docs/a.md"
+  expect red "a document with a figure that nobody measured" "${figures[@]}"
+fi
+
 echo "$wrong gates of the wrong colour"
 ((wrong == 0))

@@ -1,0 +1,158 @@
+// Figures of the documents: measured by commands, kept in bench/figures, inserted by a command.
+//
+//   node bench/figures.mjs measure BIN [GROUP...]   runs the group's commands from BIN (build/release/bin)
+//                                                   and writes bench/figures/GROUP.json
+//   node bench/figures.mjs insert                   writes the figures into README.md and docs/*.md
+//   node bench/figures.mjs check [ROOT]             exit 1 when a document differs from its figures or
+//                                                   names one that is not there; tells figures whose
+//                                                   sources have changed since they were measured
+//
+// A document holds a figure between two comments, its name and its decimals in the first:
+//   <!--image.avx512.frame_ms 1-->4.5<!---->
+import { execFileSync } from 'node:child_process'
+import { createHash } from 'node:crypto'
+import { existsSync, mkdirSync, readFileSync, readdirSync, statSync, writeFileSync } from 'node:fs'
+import { cpus } from 'node:os'
+import { dirname, join, relative } from 'node:path'
+import { fileURLToPath } from 'node:url'
+
+const HOME = join(dirname(fileURLToPath(import.meta.url)), '..')
+const FIGURE = /<!--([a-z]\w*(?:\.\w+)+) (\d)-->(.*?)<!---->/gs
+
+const run = (bin, program, ...options) =>
+  execFileSync(join(bin, program), options, { encoding: 'utf8', cwd: HOME, maxBuffer: 1 << 26 })
+const spread = (runs, of) => {
+  const all = runs.map(of).sort((a, b) => a - b)
+  return { least: all[0], median: all[all.length >> 1], most: all[all.length - 1] }
+}
+
+// What a group measures: the sources that its figures depend on, and its values by name.
+const GROUPS = {
+  image: {
+    sources: ['src/echo', 'src/interior'],
+    measure(bin) {
+      const values = {}
+      for (const kernels of ['avx512', 'avx2', 'sse4', 'base']) {
+        const text = run(bin, 'sonde', 'bench', '--scene', 'image', '--frames', '100', '--kernels', kernels, '--json')
+        const r = JSON.parse(text)
+        values[kernels] = { frame_ms: r.frame_ms.median, p99_ms: r.frame_ms.p99, ...r.stages_ms }
+        values.scatterers = r.scatterers
+      }
+      return values
+    },
+  },
+  session: {
+    sources: ['src/world', 'src/haptics', 'src/exam', 'src/echo', 'src/interior'],
+    measure(bin) {
+      const runs = []
+      for (let k = 0; k < 3; ++k)
+        runs.push(JSON.parse(run(bin, 'sonde', 'run', '--headless', '--seconds', '8', '--json')))
+      return {
+        ticks: spread(runs, r => r.ticks),
+        late: spread(runs, r => r.deadline_misses),
+        tick_mean_ms: spread(runs, r => r.tick_mean_ms),
+        tick_max_ms: spread(runs, r => r.tick_max_ms),
+        images_per_s: spread(runs, r => r.images / r.wall_s),
+        pose_to_image_ms: spread(runs, r => r.pose_to_image_ms.median),
+        pose_to_image_p99_ms: spread(runs, r => r.pose_to_image_ms.p99),
+      }
+    },
+  },
+  hostile: {
+    sources: ['src/interior', 'src/world'],
+    measure(bin) {
+      const sum = { pictures: 0, folded: 0, points: 0, folded_points: 0, inverses: 0, lost: 0, misfits: 0, most_n: 0 }
+      for (const seed of ['1', '2', '3']) {
+        let text
+        try {
+          text = run(bin, 'bench_hostile', 'data/cases', '1', seed)
+        } catch (failed) {
+          text = failed.stdout
+        }
+        const [, pictures, force, folded] = /(\d+) pictures, force to ([\d.]+) N: (\d+) folded/.exec(text).map(Number)
+        const [, foldedPoints, points] = /(\d+) of (\d+) points folded/.exec(text).map(Number)
+        const [, lost, inverses] = /(\d+) of (\d+) inverses off/.exec(text).map(Number)
+        const [, misfits] = /(\d+) cases did not fit/.exec(text).map(Number)
+        sum.pictures += pictures, sum.folded += folded, sum.points += points, sum.folded_points += foldedPoints
+        sum.inverses += inverses, sum.lost += lost, sum.misfits = misfits, sum.most_n = Math.max(sum.most_n, force)
+      }
+      return sum
+    },
+  },
+}
+
+// Of the names and contents of all files below the sources.
+function digest(root, sources) {
+  const hash = createHash('sha256')
+  const visit = path => {
+    if (statSync(path).isDirectory()) for (const name of readdirSync(path).sort()) visit(join(path, name))
+    else hash.update(relative(root, path)).update('\0').update(readFileSync(path)).update('\0')
+  }
+  for (const source of sources) if (existsSync(join(root, source))) visit(join(root, source))
+  return hash.digest('hex')
+}
+
+function measure(bin, names) {
+  mkdirSync(join(HOME, 'bench/figures'), { recursive: true })
+  for (const name of names.length ? names : Object.keys(GROUPS)) {
+    const group = GROUPS[name]
+    if (!group) throw new Error(`no group "${name}": ${Object.keys(GROUPS).join(', ')}`)
+    const record = {
+      machine: `${cpus()[0].model}, ${cpus().length} processors`,
+      date: new Date().toISOString().slice(0, 10),
+      sources: group.sources,
+      digest: digest(HOME, group.sources),
+      values: group.measure(bin),
+    }
+    writeFileSync(join(HOME, 'bench/figures', `${name}.json`), JSON.stringify(record, null, 2) + '\n')
+    console.log(`bench/figures/${name}.json`)
+  }
+}
+
+function load(root) {
+  const folder = join(root, 'bench/figures'), figures = {}
+  for (const file of existsSync(folder) ? readdirSync(folder) : [])
+    if (file.endsWith('.json')) figures[file.slice(0, -5)] = JSON.parse(readFileSync(join(folder, file), 'utf8'))
+  return figures
+}
+
+function shown(figures, name, decimals) {
+  const [group, ...path] = name.split('.')
+  const value = path.reduce((at, key) => at?.[key], figures[group]?.values)
+  if (typeof value !== 'number') return undefined
+  return value.toLocaleString('en-US', { minimumFractionDigits: decimals, maximumFractionDigits: decimals })
+}
+
+const documents = root => [
+  ...['README.md'].filter(name => existsSync(join(root, name))),
+  ...(existsSync(join(root, 'docs')) ? readdirSync(join(root, 'docs')) : [])
+    .filter(name => name.endsWith('.md')).sort().map(name => join('docs', name)),
+]
+
+function insert(root, write) {
+  const figures = load(root)
+  let wrong = 0
+  for (const name of documents(root)) {
+    const path = join(root, name), before = readFileSync(path, 'utf8')
+    const after = before.replace(FIGURE, (whole, figure, decimals, was) => {
+      const now = shown(figures, figure, Number(decimals))
+      if (now === undefined) console.log(`${name}: no figure "${figure}" in bench/figures`), ++wrong
+      else if (now !== was && !write) console.log(`${name}: ${figure} is "${was}", measured "${now}"`), ++wrong
+      return now === undefined ? whole : `<!--${figure} ${decimals}-->${now}<!---->`
+    })
+    if (write && after !== before) writeFileSync(path, after)
+  }
+  for (const [name, record] of Object.entries(figures))
+    if (digest(root, record.sources) !== record.digest)
+      console.log(`bench/figures/${name}.json (${record.date}) is older than ${record.sources.join(', ')}`)
+  return wrong
+}
+
+const [verb, ...rest] = process.argv.slice(2)
+if (verb === 'measure' && rest.length) measure(rest[0], rest.slice(1))
+else if (verb === 'insert' && !rest.length) process.exitCode = insert(HOME, true) ? 1 : 0
+else if (verb === 'check' && rest.length < 2) process.exitCode = insert(rest[0] ?? HOME, false) ? 1 : 0
+else {
+  console.error('usage: node bench/figures.mjs measure BIN [GROUP...] | insert | check [ROOT]')
+  process.exitCode = 2
+}
