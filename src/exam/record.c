@@ -11,7 +11,7 @@
 #include "base/base.h"
 #include "base/clock.h"
 #include "base/disk.h"
-#include "exam/bytes.h"
+#include "base/bytes.h"
 
 #include <cjson/cJSON.h>
 #include <math.h>
@@ -38,59 +38,61 @@ static bool emit(sonde_recorder *recorder, const void *bytes, size_t count, bool
   return true;
 }
 
-static void put_tick(byte_writer *w, const sonde_record *record) {
+static void put_tick(bytes_cursor *w, const sonde_record *record) {
   sonde_pose pose = record->sample.world_from_probe;
   const double numbers[7] = {pose.position.x, pose.position.y, pose.position.z, pose.rotation.w,
                              pose.rotation.x, pose.rotation.y, pose.rotation.z};
-  put_u32(w, SONDE_RECORD_TICK);
-  put_u32(w, record->sample.present ? 1 : 0);
-  put_u64(w, record->tick);
-  put_u32(w, record->sample.buttons);
-  put_u32(w, 0);
-  for (int i = 0; i < 7; ++i) put_real(w, numbers[i]);
+  bytes_u32(w, SONDE_RECORD_TICK);
+  bytes_u32(w, record->sample.present ? 1 : 0);
+  bytes_u64(w, record->tick);
+  bytes_u32(w, record->sample.buttons);
+  bytes_u32(w, 0);
+  for (int i = 0; i < 7; ++i) bytes_f64(w, numbers[i]);
 }
 
-static void put_controls(byte_writer *w, const sonde_record *record) {
-  put_u32(w, SONDE_RECORD_CONTROLS);
-  put_u32(w, record->controls.probe);
-  put_u64(w, record->tick);
+static void put_controls(bytes_cursor *w, const sonde_record *record) {
+  bytes_u32(w, SONDE_RECORD_CONTROLS);
+  bytes_u32(w, record->controls.probe);
+  bytes_u64(w, record->tick);
   sonde_controls_put(w, &record->controls);
 }
 
-static void put_image(byte_writer *w, const sonde_record *record) {
+static void put_image(bytes_cursor *w, const sonde_record *record) {
   const sonde_record_image *image = &record->image;
-  put_u32(w, SONDE_RECORD_IMAGE);
-  put_u32(w, image->fault);
-  put_u64(w, record->tick);
-  put_real(w, image->rendered_force_n.x);
-  put_real(w, image->rendered_force_n.y);
-  put_real(w, image->rendered_force_n.z);
+  bytes_u32(w, SONDE_RECORD_IMAGE);
+  bytes_u32(w, image->fault);
+  bytes_u64(w, record->tick);
+  bytes_f64(w, image->rendered_force_n.x);
+  bytes_f64(w, image->rendered_force_n.y);
+  bytes_f64(w, image->rendered_force_n.z);
 }
 
-static void put_check(byte_writer *w, const sonde_record *record) {
-  put_u32(w, SONDE_RECORD_CHECK);
-  put_u32(w, record->check.kind);
-  put_u64(w, record->check.tick);
-  put_u64(w, record->check.hash);
+static void put_check(bytes_cursor *w, const sonde_record *record) {
+  bytes_u32(w, SONDE_RECORD_CHECK);
+  bytes_u32(w, record->check.kind);
+  bytes_u64(w, record->check.tick);
+  bytes_u64(w, record->check.hash);
 }
 
 void sonde_record_put_block(unsigned char *bytes, uint32_t crc, uint64_t ticks) {
-  byte_writer w = {bytes};
-  put_u32(&w, SONDE_RECORD_BLOCK);
-  put_u32(&w, crc);
-  put_u64(&w, ticks);
+  bytes_cursor w = {bytes, 16, 0};
+  bytes_u32(&w, SONDE_RECORD_BLOCK);
+  bytes_u32(&w, crc);
+  bytes_u64(&w, ticks);
+  SONDE_ASSERT(bytes_fit(&w));
 }
 
 size_t sonde_record_put_note(unsigned char *bytes, sonde_note_kind kind, uint64_t tick,
                              size_t text_bytes) {
   SONDE_ASSERT(text_bytes <= SONDE_NOTE_MOST_BYTES);
-  byte_writer w = {bytes};
-  put_u32(&w, SONDE_RECORD_NOTE);
-  put_u32(&w, kind);
-  put_u64(&w, tick);
-  put_u32(&w, (uint32_t)text_bytes);
-  put_u32(&w, 0);
-  return (size_t)(w.at - bytes);
+  bytes_cursor w = {bytes, 24, 0};
+  bytes_u32(&w, SONDE_RECORD_NOTE);
+  bytes_u32(&w, kind);
+  bytes_u64(&w, tick);
+  bytes_u32(&w, (uint32_t)text_bytes);
+  bytes_u32(&w, 0);
+  SONDE_ASSERT(bytes_fit(&w));
+  return w.count;
 }
 
 static void publish(sonde_recorder *recorder, int trouble, bool synced) {
@@ -118,7 +120,7 @@ static void end_inputs(sonde_recorder *recorder) {
 
 void sonde_recorder_write(sonde_recorder *recorder, const sonde_record *record) {
   unsigned char bytes[SONDE_RECORD_MOST_BYTES];
-  byte_writer w = {bytes};
+  bytes_cursor w = {bytes, sizeof bytes, 0};
   bool is_tick = record->tag == SONDE_RECORD_TICK;
   switch (record->tag) {
   case SONDE_RECORD_TICK: put_tick(&w, record); break;
@@ -126,10 +128,10 @@ void sonde_recorder_write(sonde_recorder *recorder, const sonde_record *record) 
   case SONDE_RECORD_IMAGE: put_image(&w, record); break;
   default: put_check(&w, record); break;
   }
-  SONDE_ASSERT(w.at - bytes == (ptrdiff_t)sonde_record_bytes(SONDE_RECORD_VERSION, record->tag));
+  SONDE_ASSERT(w.count == sonde_record_bytes(SONDE_RECORD_VERSION, record->tag) && bytes_fit(&w));
   bool is_check = record->tag == SONDE_RECORD_CHECK;
   bool follows = is_check ? record->tick <= recorder->ticks : record->tick == recorder->ticks;
-  if (recorder->broken || !follows || !emit(recorder, bytes, (size_t)(w.at - bytes), false)) {
+  if (recorder->broken || !follows || !emit(recorder, bytes, w.count, false)) {
     end_inputs(recorder);
     return;
   }
@@ -253,20 +255,19 @@ bool sonde_recorder_is_file(const sonde_recorder *recorder) {
 
 void sonde_recorder_end(sonde_recorder *recorder, sonde_record_end *end) {
   unsigned char bytes[SONDE_RECORD_MOST_BYTES];
-  byte_writer w = {bytes};
+  bytes_cursor w = {bytes, sizeof bytes, 0};
   end->ticks = recorder->ticks, end->images = recorder->images;
   end->lost += atomic_load(&recorder->lost);
   end->crc = (uint32_t)recorder->crc;
-  put_u32(&w, SONDE_RECORD_END);
-  put_u32(&w, 0);
-  put_u64(&w, end->ticks);
-  put_u64(&w, end->hash);
-  put_u64(&w, end->lost);
-  put_u64(&w, end->images);
-  put_u64(&w, end->image_hash);
-  SONDE_ASSERT(w.at - bytes ==
-               (ptrdiff_t)sonde_record_bytes(SONDE_RECORD_VERSION, SONDE_RECORD_END));
-  (void)emit(recorder, bytes, (size_t)(w.at - bytes), true);
+  bytes_u32(&w, SONDE_RECORD_END);
+  bytes_u32(&w, 0);
+  bytes_u64(&w, end->ticks);
+  bytes_u64(&w, end->hash);
+  bytes_u64(&w, end->lost);
+  bytes_u64(&w, end->images);
+  bytes_u64(&w, end->image_hash);
+  SONDE_ASSERT(w.count == sonde_record_bytes(SONDE_RECORD_VERSION, SONDE_RECORD_END));
+  (void)emit(recorder, bytes, w.count, true);
   close_block(recorder, true);
 }
 

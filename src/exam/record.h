@@ -5,7 +5,7 @@
 #include "sonde/exam_journal.h"
 #include "sonde/exam_player.h"
 
-#include "exam/bytes.h"
+#include "base/bytes.h"
 #include "exam/journal.h"
 #include "exam/setup.h"
 
@@ -78,8 +78,8 @@ typedef struct sonde_record_end {
 size_t sonde_record_bytes(int version, uint32_t tag);
 // What follows the tick in a controls record.
 size_t sonde_controls_bytes(int version);
-void sonde_controls_put(byte_writer *writer, const sonde_session_controls *controls);
-void sonde_controls_get(byte_reader *reader, int version, sonde_session_controls *controls);
+void sonde_controls_put(bytes_cursor *writer, const sonde_session_controls *controls);
+void sonde_controls_get(bytes_reader *reader, int version, sonde_session_controls *controls);
 
 typedef struct sonde_recorder sonde_recorder;
 

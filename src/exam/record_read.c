@@ -10,7 +10,7 @@
 
 #include "base/bounds.h"
 #include "base/maths.h"
-#include "exam/bytes.h"
+#include "base/bytes.h"
 #include "haptics/motion.h"
 
 #include <cjson/cJSON.h>
@@ -189,16 +189,17 @@ static sonde_status read_end(const source *s) {
   sonde_recording *r = s->recording;
   size_t bytes = sonde_record_bytes(r->version, SONDE_RECORD_END);
   size_t start = r->end < bytes ? 0 : r->end - bytes;
-  byte_reader reader = {(const unsigned char *)r->bytes + start};
-  if (start < r->at || get_u32(&reader) != SONDE_RECORD_END || get_u32(&reader) != 0)
+  bytes_reader reader = {(const unsigned char *)r->bytes + start};
+  if (start < r->at || bytes_take_u32(&reader) != SONDE_RECORD_END || bytes_take_u32(&reader) != 0)
     return sonde_fail(s->error, SONDE_FORMAT,
                       "%s: the recording has no end: it was cut off or not finished", s->path);
   sonde_record_end *told = &r->told;
-  told->ticks = get_u64(&reader);
-  told->hash = get_u64(&reader);
-  told->lost = get_u64(&reader);
-  if (r->version >= 4) told->images = get_u64(&reader), told->image_hash = get_u64(&reader);
-  told->crc = get_u32(&reader);
+  told->ticks = bytes_take_u64(&reader);
+  told->hash = bytes_take_u64(&reader);
+  told->lost = bytes_take_u64(&reader);
+  if (r->version >= 4)
+    told->images = bytes_take_u64(&reader), told->image_hash = bytes_take_u64(&reader);
+  told->crc = bytes_take_u32(&reader);
   uint32_t crc = (uint32_t)crc32_z(0, (const unsigned char *)r->bytes, r->end - 8);
   if (!sonde_checksum_fits(told->crc, crc))
     return sonde_fail(s->error, SONDE_CHECKSUM,
@@ -209,48 +210,49 @@ static sonde_status read_end(const source *s) {
   return SONDE_OK;
 }
 
-static void decode_tick(byte_reader *reader, sonde_record *record) {
-  record->sample.present = get_u32(reader) & 1;
-  record->tick = get_u64(reader);
-  record->sample.buttons = get_u32(reader);
-  (void)get_u32(reader);
+static void decode_tick(bytes_reader *reader, sonde_record *record) {
+  record->sample.present = bytes_take_u32(reader) & 1;
+  record->tick = bytes_take_u64(reader);
+  record->sample.buttons = bytes_take_u32(reader);
+  (void)bytes_take_u32(reader);
   double n[7];
-  for (int i = 0; i < 7; ++i) n[i] = get_real(reader);
+  for (int i = 0; i < 7; ++i) n[i] = bytes_take_f64(reader);
   record->sample.world_from_probe = (sonde_pose){{n[0], n[1], n[2]}, {n[3], n[4], n[5], n[6]}};
 }
 
-static void decode_controls(byte_reader *reader, int version, sonde_record *record) {
-  uint32_t probe = get_u32(reader);
-  record->tick = get_u64(reader);
+static void decode_controls(bytes_reader *reader, int version, sonde_record *record) {
+  uint32_t probe = bytes_take_u32(reader);
+  record->tick = bytes_take_u64(reader);
   sonde_controls_get(reader, version, &record->controls);
   record->controls.probe = probe;
 }
 
-static void decode_image(byte_reader *reader, sonde_record *record) {
-  uint32_t fault = get_u32(reader);
-  record->tick = get_u64(reader);
+static void decode_image(bytes_reader *reader, sonde_record *record) {
+  uint32_t fault = bytes_take_u32(reader);
+  record->tick = bytes_take_u64(reader);
   record->image.fault = fault < SONDE_FAULT_COUNT ? (sonde_fault)fault : SONDE_FAULT_COUNT;
   sonde_vec3 *force_n = &record->image.rendered_force_n;
-  force_n->x = get_real(reader), force_n->y = get_real(reader), force_n->z = get_real(reader);
+  force_n->x = bytes_take_f64(reader), force_n->y = bytes_take_f64(reader),
+  force_n->z = bytes_take_f64(reader);
 }
 
-static void decode_check(byte_reader *reader, sonde_record *record) {
-  uint32_t kind = get_u32(reader);
+static void decode_check(bytes_reader *reader, sonde_record *record) {
+  uint32_t kind = bytes_take_u32(reader);
   record->check.kind = kind == SONDE_CHECK_STATE ? SONDE_CHECK_STATE : SONDE_CHECK_IMAGES;
-  record->check.tick = record->tick = get_u64(reader);
-  record->check.hash = get_u64(reader);
+  record->check.tick = record->tick = bytes_take_u64(reader);
+  record->check.hash = bytes_take_u64(reader);
 }
 
 // The tag at a place before `end` and the record's bytes; 0 when no whole record is there.
 static size_t record_at(const sonde_recording *r, size_t at, size_t end, uint32_t *tag) {
   if (end - at < 4) return 0;
-  byte_reader reader = {(const unsigned char *)r->bytes + at};
-  *tag = get_u32(&reader);
+  bytes_reader reader = {(const unsigned char *)r->bytes + at};
+  *tag = bytes_take_u32(&reader);
   size_t bytes = sonde_record_bytes(r->version, *tag);
   if (bytes > end - at || (*tag == SONDE_RECORD_END && r->version < SONDE_RECORD_JOURNAL)) return 0;
   if (*tag != SONDE_RECORD_NOTE) return bytes;
   reader.at += 12;
-  size_t text = get_u32(&reader);
+  size_t text = bytes_take_u32(&reader);
   if (text > SONDE_NOTE_MOST_BYTES) return 0;
   bytes += (text + 7) & ~(size_t)7;
   return bytes > end - at ? 0 : bytes;
@@ -268,7 +270,7 @@ bool sonde_recording_next(sonde_recording *r, sonde_record *record) {
   while ((bytes = record_at(r, r->at, r->end, &tag)) > 0 && !is_input(tag)) r->at += bytes;
   if (bytes == 0) return false;
   record->tag = tag;
-  byte_reader reader = {(const unsigned char *)r->bytes + r->at + 4};
+  bytes_reader reader = {(const unsigned char *)r->bytes + r->at + 4};
   switch (tag) {
   case SONDE_RECORD_TICK: decode_tick(&reader, record); break;
   case SONDE_RECORD_CONTROLS: decode_controls(&reader, r->version, record); break;
@@ -283,10 +285,10 @@ bool sonde_recording_next_note(const sonde_recording *r, size_t *at, sonde_recor
   uint32_t tag;
   for (size_t bytes; (bytes = record_at(r, *at, r->notes_end, &tag)) > 0; *at += bytes) {
     if (tag != SONDE_RECORD_NOTE) continue;
-    byte_reader reader = {(const unsigned char *)r->bytes + *at + 4};
-    note->kind = (sonde_note_kind)get_u32(&reader);
-    note->tick = get_u64(&reader);
-    note->bytes = get_u32(&reader);
+    bytes_reader reader = {(const unsigned char *)r->bytes + *at + 4};
+    note->kind = (sonde_note_kind)bytes_take_u32(&reader);
+    note->tick = bytes_take_u64(&reader);
+    note->bytes = bytes_take_u32(&reader);
     note->text = r->bytes + *at + SONDE_RECORD_NOTE_BYTES;
     *at += bytes;
     return true;
@@ -322,8 +324,8 @@ static sonde_status read_blocks(const source *s) {
     if (tag != SONDE_RECORD_BLOCK) continue;
     crc = crc32_z(crc, (const unsigned char *)r->bytes + summed, at - summed);
     summed = at;
-    byte_reader reader = {(const unsigned char *)r->bytes + at + 4};
-    if (!sonde_checksum_fits(get_u32(&reader), (uint32_t)crc)) break;
+    bytes_reader reader = {(const unsigned char *)r->bytes + at + 4};
+    if (!sonde_checksum_fits(bytes_take_u32(&reader), (uint32_t)crc)) break;
     whole = at + bytes;
     r->told.crc = (uint32_t)crc;
   }
@@ -360,9 +362,9 @@ static journal_walk walk_blocks(const sonde_recording *r) {
       end_crc = (uint32_t)crc;
       continue;
     }
-    byte_reader reader = {(const unsigned char *)r->bytes + w.at + 4};
-    w.damaged =
-        !sonde_checksum_fits(get_u32(&reader), (uint32_t)crc) || get_u64(&reader) != w.ticks;
+    bytes_reader reader = {(const unsigned char *)r->bytes + w.at + 4};
+    w.damaged = !sonde_checksum_fits(bytes_take_u32(&reader), (uint32_t)crc) ||
+                bytes_take_u64(&reader) != w.ticks;
     if (w.damaged) break;
     w.whole = w.at + bytes;
     w.whole_ticks = w.ticks;
@@ -373,13 +375,13 @@ static journal_walk walk_blocks(const sonde_recording *r) {
 
 static sonde_status read_journal_end(const source *s, const journal_walk *w) {
   sonde_recording *r = s->recording;
-  byte_reader reader = {(const unsigned char *)r->bytes + w->end_at + 8};
+  bytes_reader reader = {(const unsigned char *)r->bytes + w->end_at + 8};
   sonde_record_end *told = &r->told;
-  told->ticks = get_u64(&reader);
-  told->hash = get_u64(&reader);
-  told->lost = get_u64(&reader);
-  told->images = get_u64(&reader);
-  told->image_hash = get_u64(&reader);
+  told->ticks = bytes_take_u64(&reader);
+  told->hash = bytes_take_u64(&reader);
+  told->lost = bytes_take_u64(&reader);
+  told->images = bytes_take_u64(&reader);
+  told->image_hash = bytes_take_u64(&reader);
   told->crc = w->end_crc;
   r->ended = true;
   r->end = w->end_at;

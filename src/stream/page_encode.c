@@ -6,7 +6,7 @@
 // put_snapshot    the scalar fields of a frame
 // quantise        a displacement as a signed 16-bit count of PAGE_QUANTUM_M
 // page_encode_frame   snapshot, skin and image of one tick
-#include "stream/bytes.h"
+#include "base/bytes.h"
 #include "stream/page_message.h"
 
 #include "base/maths.h"

@@ -264,12 +264,12 @@ static void controls_survive_the_bytes(void **state) {
   c.stiffness_scale = 1.0 / 0.7, c.damping_scale = 1.0 / 3.0, c.friction_scale = 0.1;
   c.pathology.wall_shear_pa = 12345.678;
   unsigned char bytes[SONDE_RECORD_MOST_BYTES];
-  byte_writer w = {bytes};
+  bytes_cursor w = {bytes, sizeof bytes, 0};
   sonde_controls_put(&w, &c);
-  byte_reader r = {bytes};
+  bytes_reader r = {bytes};
   back.probe = 0;
   sonde_controls_get(&r, 4, &back);
-  assert_true(r.at == w.at);
+  assert_true(r.at == bytes + w.count);
   assert_memory_equal(&back.pathology, &c.pathology, sizeof c.pathology);
   assert_true(back.gel && back.valsalva && back.gel_put == 3 && back.gel_wipe == 4);
   assert_true(back.preset == 1 && back.posture == SONDE_POSTURE_STANDING);

@@ -1,6 +1,7 @@
-// Bounded little-endian writer: a cursor that never passes the end of its buffer.
-#ifndef SONDE_SRC_STREAM_BYTES_H
-#define SONDE_SRC_STREAM_BYTES_H
+// Little-endian numbers in byte buffers, whatever the machine's order: a writer that never passes
+// the end of its buffer, and a reader.
+#ifndef SONDE_SRC_BASE_BYTES_H
+#define SONDE_SRC_BASE_BYTES_H
 
 #include "base/base.h"
 
@@ -50,6 +51,27 @@ static inline void bytes_f64(bytes_cursor *cursor, double value) {
   uint64_t bits;
   memcpy(&bits, &value, sizeof bits);
   bytes_u64(cursor, bits);
+}
+
+// A place in a buffer; the caller has checked that enough bytes follow.
+typedef struct bytes_reader {
+  const unsigned char *at;
+} bytes_reader;
+
+static inline uint64_t bytes_take(bytes_reader *reader, int bytes) {
+  uint64_t value = 0;
+  for (int i = 0; i < bytes; ++i) value |= (uint64_t)*reader->at++ << (8 * i);
+  return value;
+}
+static inline uint32_t bytes_take_u32(bytes_reader *reader) {
+  return (uint32_t)bytes_take(reader, 4);
+}
+static inline uint64_t bytes_take_u64(bytes_reader *reader) { return bytes_take(reader, 8); }
+static inline double bytes_take_f64(bytes_reader *reader) {
+  uint64_t bits = bytes_take_u64(reader);
+  double value;
+  memcpy(&value, &bits, sizeof value);
+  return value;
 }
 
 #endif
