@@ -56,12 +56,19 @@ void sonde_block_multiply(const sonde_block_matrix *matrix, const sonde_active_s
   for (uint32_t t = 0; t < term_count; ++t) multiply_rank_one(&terms[t], x, y);
 }
 
-// Adjugate over determinant of a symmetric 3x3 block.
+// Adjugate over determinant of a symmetric 3x3 block. A block whose determinant rounds to no
+// positive number (one stiffness is 1e16 times another) counts as its mean stiffness in all
+// directions.
 static void invert_symmetric(const double (*d)[3], double *inverse) {
   double a = d[0][0], b = d[0][1], c = d[0][2], e = d[1][1], f = d[1][2], g = d[2][2];
   double xx = e * g - f * f, xy = c * f - b * g, xz = b * f - c * e;
   double determinant = a * xx + b * xy + c * xz;
-  SONDE_ASSERT(determinant > 0 || determinant != determinant);
+  if (determinant <= 0) {
+    double mean = (a + e + g) / 3;
+    for (int k = 0; k < 6; ++k) inverse[k] = 0;
+    inverse[0] = inverse[3] = inverse[5] = mean > 0 ? 1 / mean : 1;
+    return;
+  }
   double s = 1.0 / determinant;
   inverse[0] = xx * s;
   inverse[1] = xy * s;

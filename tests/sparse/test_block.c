@@ -161,6 +161,21 @@ static void gradients_equal_elimination(void **state) {
   sonde_block_matrix_destroy(s.matrix);
 }
 
+// Stiff along one direction alone, beyond what numbers resolve: the preconditioner stays positive.
+static void block_without_volume_is_inverted(void **state) {
+  (void)state;
+  static system_t s;
+  make(&s);
+  for (int i = 0; i < 3; ++i)
+    for (int k = 0; k < 3; ++k) s.matrix->diagonal[0].m[i][k] = 1e20;
+  sonde_block_invert_diagonal(s.matrix, NULL);
+  static const int diagonal[] = {0, 3, 5};
+  for (int k = 0; k < 3; ++k)
+    assert_true((double)s.matrix->inverse[0][diagonal[k]] > 0 &&
+                (double)s.matrix->inverse[0][diagonal[k]] < 1);
+  sonde_block_matrix_destroy(s.matrix);
+}
+
 static void limit_of_iterations_is_reported(void **state) {
   (void)state;
   static system_t s;
@@ -202,6 +217,7 @@ int main(void) {
                                      cmocka_unit_test(rank_one_term_is_added),
                                      cmocka_unit_test(active_rows_are_the_submatrix),
                                      cmocka_unit_test(gradients_equal_elimination),
+                                     cmocka_unit_test(block_without_volume_is_inverted),
                                      cmocka_unit_test(limit_of_iterations_is_reported),
                                      cmocka_unit_test(memory_is_linear),
                                      cmocka_unit_test(unordered_pairs_are_refused)};
