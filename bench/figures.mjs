@@ -29,7 +29,7 @@ const spread = (runs, of) => {
 // What a group measures: the sources that its figures depend on, and its values by name.
 const GROUPS = {
   image: {
-    sources: ['src/echo', 'src/interior'],
+    sources: ['src/sonde/echo', 'src/sonde/interior'],
     measure(bin) {
       const values = {}
       for (const kernels of ['avx512', 'avx2', 'sse4', 'base']) {
@@ -42,7 +42,7 @@ const GROUPS = {
     },
   },
   session: {
-    sources: ['src/world', 'src/haptics', 'src/exam', 'src/echo', 'src/interior'],
+    sources: ['src/sonde/world', 'src/sonde/haptics', 'src/sonde-exam/exam', 'src/sonde/echo', 'src/sonde/interior'],
     measure(bin) {
       const runs = []
       for (let k = 0; k < 3; ++k)
@@ -59,7 +59,7 @@ const GROUPS = {
     },
   },
   hostile: {
-    sources: ['src/interior', 'src/world'],
+    sources: ['src/sonde/interior', 'src/sonde/world'],
     measure(bin) {
       const sum = { pictures: 0, folded: 0, points: 0, folded_points: 0, inverses: 0, lost: 0, misfits: 0, most_n: 0 }
       for (const seed of ['1', '2', '3']) {

@@ -18,13 +18,13 @@ trim() { sed -E 's/^ +| +$//g' <<<"$1"; }
 table() {
   local group room does pages page links
   echo
-  echo '| room | does | read |'
-  echo '|---|---|---|'
+  echo '| library | room | does | read |'
+  echo '|---|---|---|---|'
   while IFS='|' read -r room does pages; do
     read -r group room <<<"$room"
     links=
     for page in $pages; do links+="${links:+, }$(link "$page")"; done
-    echo "| \`$(trim "$room")\` | $(trim "$does") | $links |"
+    echo "| \`$group\` | \`$(trim "$room")\` | $(trim "$does") | $links |"
   done < <(grep -vE '^(#|$)' "$root/src/rooms.txt")
   echo
 }

@@ -9,12 +9,12 @@ wrong=0
 
 fresh() { # a tree that keeps every rule
   rm -rf "${tree:?}"/*
-  mkdir -p "$tree"/src/{base,world,stream} "$tree"/include/sonde "$tree"/app "$tree"/tests/house
+  mkdir -p "$tree"/src/sonde/{base,world} "$tree"/src/sonde-exam/stream "$tree"/include/sonde "$tree"/app "$tree"/tests/house
   printf '/** @thread any */\nSONDE_API int sonde_one(int a);\n' >"$tree/include/sonde/base.h"
   echo '#include "sonde/base.h"' >"$tree/include/sonde/world.h"
   printf '#include "base/base.h"\nint sonde_step(int a) {\n  SONDE_ASSERT(a);\n  return a;\n}\n' \
-    >"$tree/src/world/step_hot.c"
-  echo '#include "sonde/base.h"' >"$tree/src/base/base.h"
+    >"$tree/src/sonde/world/step_hot.c"
+  echo '#include "sonde/base.h"' >"$tree/src/sonde/base/base.h"
   echo '#include "sonde/world.h"' >"$tree/app/main.c"
   : >"$tree/tests/house/hot_objects.txt"
   printf '%s\n' '# group room | does | read' 'sonde base | memory | docs/base.md' \
@@ -26,7 +26,7 @@ fresh() { # a tree that keeps every rule
   "$house/../../docs/rooms.sh" "$tree"
 }
 compile() { # ROOM FILE TEXT: the object where the gate looks for it
-  local object=$tree/build/src/$1/CMakeFiles/sonde_$1.dir/$2.o
+  local object=$tree/build/src/sonde/$1/CMakeFiles/sonde_$1.dir/$2.o
   mkdir -p "$(dirname "$object")"
   printf '%s\n' "$3" | "$cc" -O2 -x c -c -o "$object" -
 }
@@ -53,7 +53,7 @@ cp "$house/../../.clang-format" "$tree"
 fresh
 expect green "includes, clean tree" "${includes[@]}"
 expect green "sizes, clean tree" "${sizes[@]}"
-echo '#include "stream/x.h"' >>"$tree/src/world/step_hot.c"
+echo '#include "stream/x.h"' >>"$tree/src/sonde/world/step_hot.c"
 expect red "a room that includes a lower room" "${includes[@]}"
 fresh; echo '#include "sonde/stream.h"' >>"$tree/include/sonde/world.h"
 expect red "a public header that includes a lower one" "${includes[@]}"
@@ -68,7 +68,7 @@ fresh; sed -i 's/the step/many steps/' "$tree/src/rooms.txt"
 expect red "a room that does something else in the table" "${rooms[@]}"
 fresh; sed -i '/end of rooms/d' "$tree/docs/architecture.md"
 expect red "a page without the place of the table" "${rooms[@]}"
-fresh; mkdir "$tree/src/other"
+fresh; mkdir "$tree/src/sonde/other"
 expect red "a directory of src that is not listed" "${rooms[@]}"
 for fault in '$a sonde other | rests | docs/base.md' '$a sonde base | memory | docs/base.md' \
   's/^sonde base/library base/' '/^sonde base/s/base.md/other.md/' '/^sonde base/s/[|].*/| |/'; do
@@ -77,7 +77,7 @@ for fault in '$a sonde other | rests | docs/base.md' '$a sonde base | memory | d
   expect red "the list of rooms after $fault" "${rooms[@]}"
 done
 
-fresh; echo 'int sonde_disk(void);' >"$tree/src/base/disk.c"
+fresh; echo 'int sonde_disk(void);' >"$tree/src/sonde/base/disk.c"
 expect green "disk, clean tree" "${disk[@]}"
 echo 'void f(void) { rename("a", "b"); }' >>"$tree/app/main.c"
 expect red "a call that changes the disk elsewhere" "${disk[@]}"
@@ -97,7 +97,7 @@ fresh
 expect green "format, clean tree" "${format[@]}"
 echo 'int  wide(void);' >>"$tree/app/main.c"
 expect red "a line with two blanks where one belongs" "${format[@]}"
-fresh; echo 'int *a; int *b;' >>"$tree/src/base/base.h"
+fresh; echo 'int *a; int *b;' >>"$tree/src/sonde/base/base.h"
 expect red "a header with two declarations on a line" "${format[@]}"
 
 fresh
@@ -108,7 +108,7 @@ fresh; for _ in {1..801}; do echo '//'; done >"$tree/app/long.c"
 expect red "a file of 801 lines" "${sizes[@]}"
 fresh; for _ in {1..251}; do echo '//'; done >"$tree/app/long.h"
 expect red "a header of 251 lines" "${sizes[@]}"
-fresh; sed -i /ASSERT/d "$tree/src/world/step_hot.c"
+fresh; sed -i /ASSERT/d "$tree/src/sonde/world/step_hot.c"
 expect red "no asserts" "${sizes[@]}"
 
 fresh
@@ -129,7 +129,7 @@ expect green "hot object that calls what computes" "${hot[@]}"
 compile base far.c 'int puts(const char *); static __attribute__((noinline)) int near(int a) {
     puts("x"); return a; } int sonde_far(int a) { return near(a) + 1; }'
 expect red "hot object that calls what prints further on" "${hot[@]}"
-echo 'src/base/far.c puts' >"$tree/tests/house/hot_objects.txt"
+echo 'src/sonde/base/far.c puts' >"$tree/tests/house/hot_objects.txt"
 expect green "the same with an exception" "${hot[@]}"
 rm -r "$tree/build"
 expect red "hot object that was not built" "${hot[@]}"
@@ -144,7 +144,7 @@ expect red "library that lacks a declared function" "${api[@]}"
 if command -v node >/dev/null; then
   figures=(node "$house/../../bench/figures.mjs" check "$tree")
   fresh; mkdir -p "$tree/bench/figures" "$tree/docs"
-  echo '{"date": "", "sources": ["src/base"], "digest": "", "values": {"one": {"ms": 1234.56}}}' \
+  echo '{"date": "", "sources": ["src/sonde/base"], "digest": "", "values": {"one": {"ms": 1234.56}}}' \
     >"$tree/bench/figures/group.json"
   echo 'It takes <!--group.one.ms 1-->1,234.6<!----> ms.' >"$tree/docs/a.md"
   expect green "a document with the figure that was measured" "${figures[@]}"

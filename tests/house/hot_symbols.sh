@@ -11,9 +11,10 @@ forbidden+='|_*(v|f|s|n|d|a)*printf(_chk)?|puts|putc|putchar|fputs|fputc|fwrite|
 forbidden+='|fflush|perror|write|read|open(64)?|close|ioctl|syslog|nanosleep|clock_nanosleep|usleep'
 forbidden+='|sleep|poll|select|sched_yield|exit|abort|system|getenv|qsort|std(out|err|in))$'
 
-object_of() { # src/<room>/<rest>.c
-  local rest=${1#src/}
-  echo "$build/src/${rest%%/*}/CMakeFiles/sonde_${rest%%/*}.dir/${rest#*/}.o"
+object_of() { # src/<library>/<room>/<rest>.c
+  local rest=${1#src/*/*/}
+  local folder=${1%"/$rest"}
+  echo "$build/$folder/CMakeFiles/sonde_${folder##*/}.dir/$rest.o"
 }
 
 # "object symbol..." per hot file: the object, then what this file may use all the same.

@@ -4,6 +4,7 @@
 set -euo pipefail
 root=$1
 mapfile -t rooms < <(sed -nE 's/^[^# ]+ +([a-z_]+) .*/\1/p' "$root/src/rooms.txt")
+mapfile -t folders < <(sed -nE 's/^([^# ]+) +([a-z_]+) .*/\1\/\2/p' "$root/src/rooms.txt")
 bad=0
 
 rank() {
@@ -56,7 +57,7 @@ for i in "${!rooms[@]}"; do
   while read -r file; do
     check_room_file "$file" "$i"
     files=$((files + 1))
-  done < <(find "$root/src/${rooms[i]}" "$root/include/sonde/${rooms[i]}.h" \
+  done < <(find "$root/src/${folders[i]}" "$root/include/sonde/${rooms[i]}.h" \
     "$root/include/sonde/${rooms[i]}_"*.h -name '*.[ch]' 2>/dev/null)
 done
 while read -r file; do
