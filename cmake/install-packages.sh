@@ -36,6 +36,8 @@ test_packages() {
   need_library ccd libccd-dev
   need_command clang clang
   need_command clang-format-14 clang-format-14
+  need_command clang-tidy-14 clang-tidy-14
+  need_command doxygen doxygen
   if has clang; then
     local runtime
     runtime=$(clang -print-file-name=libclang_rt.asan-x86_64.a)

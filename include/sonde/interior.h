@@ -53,7 +53,7 @@ SONDE_API sonde_status sonde_pathology_preset(const char *name, sonde_pathology 
 
 /** Normal stresses (Pa, compression positive) below a uniformly loaded rectangle on an
  *  incompressible half space: lateral x, axial y, normal z (docs/interior.md, superposed corners).
- *  @param half_x,half_y rectangle @param x,y,z point, z > 0 depth @thread any */
+ *  @param half_x_m,half_y_m rectangle @param x_m,y_m,z_m point, z_m > 0 depth @thread any */
 SONDE_API sonde_vec3 sonde_rectangle_stress(double pressure_pa, double half_x_m, double half_y_m,
                                             double x_m, double y_m, double z_m);
 

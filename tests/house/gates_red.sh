@@ -101,6 +101,23 @@ fresh; echo 'int *a; int *b;' >>"$tree/src/sonde/base/base.h"
 expect red "a header with two declarations on a line" "${format[@]}"
 
 fresh
+cp "$house/../../.clang-tidy" "$tree"
+tidy=("$house/tidy.sh" "$tree" "$tree")
+printf '%s\n' '[{"directory": "'"$tree"'", "command": "cc -c app/main.c",' \
+  '"file": "'"$tree"'/app/main.c"}]' >"$tree/compile_commands.json"
+echo 'int equal(int a);' >"$tree/app/main.c"
+expect green "clang-tidy, clean tree" "${tidy[@]}"
+echo 'int equal(int a) { return a == a; }' >>"$tree/app/main.c"
+expect red "a comparison of a number with itself" "${tidy[@]}"
+fresh; cp "$house/../../Doxyfile" "$tree"; mkdir -p "$tree/bench" "$tree/data/thigh"
+for page in README.md CONTRIBUTING.md bench/README.md data/thigh/CARD.md; do
+  echo '# Page' >"$tree/$page"
+done
+expect green "doxygen, clean tree" "$house/doxygen.sh" "$tree"
+sed -i 's/@thread any/@param b number @thread any/' "$tree/include/sonde/base.h"
+expect red "a docstring of a parameter that is not there" "$house/doxygen.sh" "$tree"
+
+fresh
 { echo 'int long_one(int a) {'; for i in {1..79}; do echo "  a += $i;"; done; echo '}'; } \
   >>"$tree/app/main.c"
 expect red "a function of 81 lines" "${sizes[@]}"
