@@ -67,6 +67,7 @@ const GROUPS = {
         try {
           text = run(bin, 'bench_hostile', 'data/cases', '1', seed)
         } catch (failed) {
+          if (failed.status !== 1) throw failed // 1: it ran and found folds
           text = failed.stdout
         }
         const [, pictures, force, folded] = /(\d+) pictures, force to ([\d.]+) N: (\d+) folded/.exec(text).map(Number)
@@ -92,11 +93,18 @@ function digest(root, sources) {
   return hash.digest('hex')
 }
 
+function complain(text) {
+  console.error(`figures: ${text}`)
+  process.exitCode = 2
+}
+
 function measure(bin, names) {
+  const unknown = names.find(name => !GROUPS[name])
+  if (unknown !== undefined) return complain(`no group "${unknown}"; expected ${Object.keys(GROUPS).join(', ')}`)
+  if (!existsSync(join(bin, 'sonde'))) return complain(`${bin}: no program sonde there; expected build/release/bin`)
   mkdirSync(join(HOME, 'bench/figures'), { recursive: true })
   for (const name of names.length ? names : Object.keys(GROUPS)) {
     const group = GROUPS[name]
-    if (!group) throw new Error(`no group "${name}": ${Object.keys(GROUPS).join(', ')}`)
     const record = {
       machine: `${cpus()[0].model}, ${cpus().length} processors`,
       date: new Date().toISOString().slice(0, 10),
@@ -129,7 +137,9 @@ const documents = root => [
     .filter(name => name.endsWith('.md')).sort().map(name => join('docs', name)),
 ]
 
-function insert(root, write) {
+// Compares the documents' figures with the measured ones and, with `write`, puts the measured ones in.
+// Returns how many are wrong: without a measurement, or (without `write`) another number.
+function compareDocuments(root, write) {
   const figures = load(root)
   let wrong = 0
   for (const name of documents(root)) {
@@ -150,8 +160,8 @@ function insert(root, write) {
 
 const [verb, ...rest] = process.argv.slice(2)
 if (verb === 'measure' && rest.length) measure(rest[0], rest.slice(1))
-else if (verb === 'insert' && !rest.length) process.exitCode = insert(HOME, true) ? 1 : 0
-else if (verb === 'check' && rest.length < 2) process.exitCode = insert(rest[0] ?? HOME, false) ? 1 : 0
+else if (verb === 'insert' && !rest.length) process.exitCode = compareDocuments(HOME, true) ? 1 : 0
+else if (verb === 'check' && rest.length < 2) process.exitCode = compareDocuments(rest[0] ?? HOME, false) ? 1 : 0
 else {
   console.error('usage: node bench/figures.mjs measure BIN [GROUP...] | insert | check [ROOT]')
   process.exitCode = 2
