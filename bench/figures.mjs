@@ -11,8 +11,8 @@
 //   <!--image.avx512.frame_ms 1-->4.5<!---->
 import { execFileSync } from 'node:child_process'
 import { createHash } from 'node:crypto'
-import { existsSync, mkdirSync, readFileSync, readdirSync, statSync, writeFileSync } from 'node:fs'
-import { cpus } from 'node:os'
+import { existsSync, mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, statSync, writeFileSync } from 'node:fs'
+import { cpus, tmpdir } from 'node:os'
 import { dirname, join, relative } from 'node:path'
 import { fileURLToPath } from 'node:url'
 
@@ -26,8 +26,74 @@ const spread = (runs, of) => {
   return { least: all[0], median: all[all.length >> 1], most: all[all.length - 1] }
 }
 
+const json = (bin, ...options) => JSON.parse(run(bin, 'sonde', ...options, '--json'))
+const engine = ['src/sonde/world', 'src/sonde/tissue', 'src/sonde/sparse']
+const thigh = ['--surface', 'data/thigh/skin.ply', '--sites', 'data/thigh/sites.csv']
+
 // What a group measures: the sources that its figures depend on, and its values by name.
 const GROUPS = {
+  fit: {
+    sources: ['src/sonde-fit/fit', ...engine, 'data/thigh'],
+    measure(bin) {
+      const folder = mkdtempSync(join(tmpdir(), 'sonde-figures-'))
+      const values = {}
+      for (const [name, ...options] of [['stage1', '--stages', '1'], ['stage2', '--stages', '2'], ['stage3', '--stages', '3'],
+        ['hold_out', '--stages', '3', '--hold-out', 'sites']])
+        values[name] = json(bin, 'fit', 'data/thigh/indentation.csv', ...thigh, ...options, '-o', join(folder, `${name}.sonde`))
+      rmSync(folder, { recursive: true })
+      return values
+    },
+  },
+  closure: {
+    sources: ['src/sonde/interior', 'src/sonde-fit/fit', ...engine, 'data/thigh'],
+    measure(bin) {
+      const values = {}
+      for (const force of ['8', '16', '20']) {
+        const press = name => json(bin, 'press', '--site', '27', '--probe', 'linear', '--force-n', force, '--case', name)
+        const healthy = press('healthy')
+        values[`at_${force}_n`] = { healthy: healthy.vein_area_ratio, artery: healthy.artery_area_ratio, chronic: press('chronic_occlusive').vein_area_ratio }
+      }
+      return values
+    },
+  },
+  likeness: {
+    sources: ['src/sonde/echo'],
+    measure(bin) {
+      const result = json(bin, 'validate', 'image', '--quick'), values = {}
+      for (const [name, entry] of Object.entries(result)) values[name] = entry.value
+      const all = Object.entries(values).filter(([name]) => name.startsWith('likeness_')).map(([, value]) => value)
+      return { ...values, least: Math.min(...all), most: Math.max(...all) }
+    },
+  },
+  operators: {
+    sources: ['src/sonde-exam', 'src/sonde/interior', ...engine, 'data/cases', 'data/protocols'],
+    measure: bin => json(bin, 'exam', '--compare', '--protocol', 'three_point', '-o', mkdtempSync(join(tmpdir(), 'sonde-figures-'))),
+  },
+  step: {
+    sources: [...engine, 'src/sonde/haptics'],
+    measure(bin) {
+      const values = {}
+      for (const scene of ['press', 'slide', 'point']) {
+        const runs = Array.from({ length: 5 }, () => json(bin, 'bench', '--scene', scene))
+        values[scene] = {
+          steps_per_s: spread(runs, r => r.steps_per_s), median_ms: spread(runs, r => r.step_ms.median), p99_ms: spread(runs, r => r.step_ms.p99),
+          max_ms: spread(runs, r => r.step_ms.max), error_percent: 100 * runs[0].relative_error, iterations: runs[0].iterations,
+        }
+      }
+      return values
+    },
+  },
+  ellipsoid: {
+    sources: engine,
+    measure(bin) {
+      const values = {}
+      for (const [nodes, sleep] of [['1962', '50'], ['7842', '10'], ['32492', '50']]) {
+        const r = json(bin, 'bench', '--scene', 'ellipsoid', '--nodes', nodes, '--sleep-um', sleep, '--repeat', '5')
+        values[`nodes_${nodes}`] = { steps_per_s: r.steps_per_s, error_percent: 100 * r.relative_error, awake: r.awake_nodes, iterations: r.iterations }
+      }
+      return values
+    },
+  },
   image: {
     sources: ['src/sonde/echo', 'src/sonde/interior'],
     measure(bin) {
