@@ -4,9 +4,12 @@ include(CMakePackageConfigHelpers)
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/sonde)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/include/sonde
   DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
-install(TARGETS sonde_lib_static sonde_lib_shared EXPORT sondeTargets
-  ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
-install(EXPORT sondeTargets NAMESPACE sonde:: DESTINATION ${package_dir})
+foreach(library IN LISTS SONDE_LIBRARIES)
+  string(REPLACE "-" "_" target ${library})
+  install(TARGETS ${target}_lib_static ${target}_lib_shared EXPORT ${library}Targets
+    ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  install(EXPORT ${library}Targets NAMESPACE sonde:: DESTINATION ${package_dir})
+endforeach()
 
 configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/sondeConfig.cmake.in
   ${PROJECT_BINARY_DIR}/sondeConfig.cmake INSTALL_DESTINATION ${package_dir})
@@ -17,9 +20,20 @@ install(FILES ${PROJECT_BINARY_DIR}/sondeConfig.cmake ${PROJECT_BINARY_DIR}/sond
 # Relative to the .pc file, so that the tree may be moved.
 file(RELATIVE_PATH SONDE_PREFIX_FROM_PC
   ${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig ${CMAKE_INSTALL_PREFIX})
-configure_file(${PROJECT_SOURCE_DIR}/cmake/sonde.pc.in
-  ${PROJECT_BINARY_DIR}/sonde.pc @ONLY)
-install(FILES ${PROJECT_BINARY_DIR}/sonde.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+# sonde_pc(library OF house... OTHERS modules...): the .pc file of one library.
+function(sonde_pc SONDE_PC_NAME)
+  cmake_parse_arguments(PARSE_ARGV 1 pc "" "" "OF;OTHERS")
+  list(JOIN pc_OF " " SONDE_PC_HOUSE)
+  list(JOIN pc_OTHERS " " SONDE_PC_OTHERS)
+  configure_file(${PROJECT_SOURCE_DIR}/cmake/sonde.pc.in ${PROJECT_BINARY_DIR}/${SONDE_PC_NAME}.pc @ONLY)
+  install(FILES ${PROJECT_BINARY_DIR}/${SONDE_PC_NAME}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+endfunction()
+sonde_pc(sonde OTHERS zlib libcjson)
+sonde_pc(sonde-files OF sonde OTHERS libpng yaml-0.1)
+sonde_pc(sonde-sweep OF sonde OTHERS zlib)
+sonde_pc(sonde-scene OF sonde-files sonde)
+sonde_pc(sonde-fit OF sonde OTHERS libcjson)
+sonde_pc(sonde-exam OF sonde-fit sonde-files sonde OTHERS sqlite3 zlib libcjson)
 
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs/man/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1
   FILES_MATCHING PATTERN "*.1")

@@ -52,9 +52,6 @@ typedef struct sonde_image {
 SONDE_API sonde_status sonde_image_create(uint32_t width, uint32_t height, sonde_image *image,
                                           sonde_error *error); /**< @thread owner */
 SONDE_API void sonde_image_clear(sonde_image *image);          /**< @thread owner */
-/** Writes an 8-bit grey PNG atomically. @thread owner */
-SONDE_API sonde_status sonde_image_save_png(const sonde_image *image, const char *path,
-                                            sonde_error *error);
 
 typedef struct sonde_echo sonde_echo;
 

@@ -206,10 +206,6 @@ SONDE_API sonde_status sonde_device_recording(const char *path, sonde_device *de
 SONDE_API sonde_status sonde_replay_inspect(const char *path, char *model_path, size_t size,
                                             uint64_t *model_checksum, sonde_error *error);
 
-/** Pose of a probe that looks into the tissue at a site: origin on the rest skin moved by depth
- *  along -normal, z = -normal, x = the site's u. @thread any */
-SONDE_API sonde_pose sonde_site_pose(const sonde_site *site, double depth_m);
-
 #ifdef __cplusplus
 }
 #endif

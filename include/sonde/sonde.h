@@ -35,6 +35,7 @@
 #include "sonde/haptics_hand.h"
 #include "sonde/haptics_local.h"
 #include "sonde/haptics_render.h"
+#include "sonde/files.h"
 #include "sonde/exam.h"
 #include "sonde/exam_journal.h"
 #include "sonde/exam_player.h"

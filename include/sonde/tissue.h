@@ -184,6 +184,9 @@ SONDE_API void sonde_cut_map_clear(sonde_cut_map *map);
 
 /** The site with that id, NULL when absent. @thread any */
 SONDE_API const sonde_site *sonde_model_site(const sonde_model *model, uint32_t id);
+/** Pose of a probe that looks into the tissue at a site: origin on the rest skin moved by depth
+ *  along -normal, z = -normal, x = the site's u. @thread any */
+SONDE_API sonde_pose sonde_site_pose(const sonde_site *site, double depth_m);
 
 /** Pressure of a normal spring of exponent n and its slope at indentation s, guard included.
  *  @thread any (tick) */

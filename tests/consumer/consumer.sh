@@ -29,12 +29,21 @@ cd "$work"
 }
 [[ $(pkg-config --modversion sonde) == "$(./pc_static | sed 's/^libsonde \([^:]*\):.*/\1/')" ]]
 
+echo "-- a program that steps needs libm, libz and libc only"
+# shellcheck disable=SC2046
+cc "$source_dir/../../samples/step_loop.c" -o step $(pkg-config --cflags sonde) -Wl,-Bstatic -L"$libdir" \
+  -lsonde -Wl,-Bdynamic $(pkg-config --static --libs sonde | sed 's/-lsonde//')
+readelf -d step | sed -n 's/.*NEEDED.*\[\(.*\)\]/\1/p' >needed
+if grep -vE '^lib(m|z|c)\.so|^ld-linux|^libcjson' needed; then echo "the step needs more than libm, libz, libc"; exit 1; fi
+
 echo "-- find_package"
 cmake -S "$source_dir" -B cm -G Ninja -DCMAKE_PREFIX_PATH="$prefix" >cm.log 2>&1 || { cat cm.log; exit 1; }
 cmake --build cm >cm.log 2>&1 || { cat cm.log; exit 1; }
 cm/consumer_static
 cm/consumer_shared
 cm/consumer_cxx
+cm/consumer_parts_static
+cm/consumer_parts_shared
 
 echo "-- installed program"
 cd /

@@ -30,7 +30,9 @@ compile() { # ROOM FILE TEXT: the object where the gate looks for it
   mkdir -p "$(dirname "$object")"
   printf '%s\n' "$3" | "$cc" -O2 -x c -c -o "$object" -
 }
-library() { printf '%s\n' "$1" | "$cc" -x c -shared -fPIC -nostdlib -o "$tree/lib.so" -; }
+library() { # TEXT [NAME]: a shared library, lib.so without a NAME
+  printf '%s\n' "$1" | "$cc" -x c -shared -fPIC -nostdlib -o "$tree/${2:-lib}.so" -
+}
 
 expect() { # green|red WHAT COMMAND...
   local colour=$1 what=$2 got=green
@@ -45,7 +47,7 @@ expect() { # green|red WHAT COMMAND...
 includes=("$house/includes.sh" "$tree") rooms=("$house/rooms.sh" "$tree")
 sizes=("$house/sizes.sh" "$tree")
 hot=("$house/hot_symbols.sh" "$tree" "$tree/build" "$objdump")
-api=("$house/api.sh" "$tree" "$tree/lib.so" "$nm") disk=("$house/disk.sh" "$tree")
+api=("$house/api.sh" "$tree" "$nm" "$tree/lib.so" "$tree/user.so") disk=("$house/disk.sh" "$tree")
 format=("$house/format.sh" "$tree")
 callers=("$house/callers.sh" "$tree")
 cp "$house/../../.clang-format" "$tree"
@@ -152,11 +154,21 @@ rm -r "$tree/build"
 expect red "hot object that was not built" "${hot[@]}"
 
 fresh; library 'int sonde_one(int a) { return a; }'
+library 'int sonde_one(int); int sonde_user(int a) { return sonde_one(a); }' user
+echo 'SONDE_API int sonde_user(int a);' >>"$tree/include/sonde/base.h"
 expect green "library that keeps to its headers" "${api[@]}"
 library 'int sonde_one(int a) { return a; } int helper(int a) { return a; }'
 expect red "library that exports more" "${api[@]}"
 library 'int sonde_other(int a) { return a; }'
 expect red "library that lacks a declared function" "${api[@]}"
+library 'int sonde_one(int a) { return a; } int sonde_link(int a) { return a; }'
+echo 'SONDE_LINK int sonde_link(int a);' >>"$tree/src/sonde/base/base.h"
+expect red "function for another library that no library calls" "${api[@]}"
+library 'int sonde_one(int); int sonde_link(int); int sonde_user(int a) { return sonde_one(a) + sonde_link(a); }' user
+expect green "function for another library that calls it" "${api[@]}"
+library 'int sonde_link(int); int sonde_one(int a); int sonde_user(int a) { return sonde_link(a); }
+  __attribute__((weak)) int sonde_one(int a) { return a; }' user
+expect red "function that two libraries export" "${api[@]}"
 
 if command -v node >/dev/null; then
   figures=(node "$house/../../bench/figures.mjs" check "$tree")

@@ -7,7 +7,7 @@
 // put_base64       bytes as text
 // put_image        one side of a pair
 // put_pair         both sides and what the press was
-#include "echo/png.h"
+#include "files/png.h"
 #include "trainer/report.h"
 
 // ---- which --------------------------------------------------------------------------------------

@@ -4,7 +4,7 @@
 
 #include "base/base.h"
 #include "base/maths.h"
-#include "base/yaml.h"
+#include "files/yaml.h"
 #include "sonde/trainer_operator.h"
 
 // Copies a text of a map into a member of `size` bytes; too long a text is an error.

@@ -4,7 +4,7 @@
 
 #include "sonde/scene.h"
 
-#include "base/yaml.h"
+#include "files/yaml.h"
 
 // A spring-damper between two nodes: force (stiffness * (length - rest) + damper * rate) along it.
 typedef struct sonde_spring {

@@ -2,6 +2,7 @@
 #ifndef SONDE_SRC_BASE_H
 #define SONDE_SRC_BASE_H
 
+#include "base/link.h"
 #include "sonde/base.h"
 
 #include <stdio.h>
@@ -14,14 +15,14 @@
 #define SONDE_ASSERT(condition)                                                                    \
   ((condition) ? (void)0 : sonde_assert_failed(#condition, __FILE__, __LINE__))
 #endif
-_Noreturn void sonde_assert_failed(const char *condition, const char *file, int line);
+SONDE_LINK _Noreturn void sonde_assert_failed(const char *condition, const char *file, int line);
 
 #define SONDE_COUNT_OF(array) (sizeof(array) / sizeof((array)[0]))
 
 // Zeroed memory for count items; NULL when out of memory or when the size overflows.
 // A count of 0 returns a valid unique pointer.
-void *sonde_calloc(size_t count, size_t size);
-void *sonde_realloc(void *pointer, size_t old_bytes, size_t new_bytes);
+SONDE_LINK void *sonde_calloc(size_t count, size_t size);
+SONDE_LINK void *sonde_realloc(void *pointer, size_t old_bytes, size_t new_bytes);
 
 // Typed helpers: `double *x = SONDE_NEW(double, n);`
 #define SONDE_NEW(type, count) ((type *)sonde_calloc((count), sizeof(type)))
@@ -40,16 +41,18 @@ static inline char *sonde_whole_lines(void *memory) {
 }
 
 // Fills error (when not NULL) and returns status: `return sonde_fail(error, SONDE_IO, "...", ...)`.
-sonde_status sonde_fail_at(sonde_error *error, sonde_status status, const char *where,
-                           const char *format, ...) __attribute__((format(printf, 4, 5)));
+SONDE_LINK sonde_status sonde_fail_at(sonde_error *error, sonde_status status, const char *where,
+                                      const char *format, ...)
+    __attribute__((format(printf, 4, 5)));
 #define sonde_fail(error, status, ...) sonde_fail_at((error), (status), __func__, __VA_ARGS__)
 #define sonde_fail_memory(error)                                                                   \
   sonde_fail_at((error), SONDE_MEMORY, __func__, "out of memory in %s", __func__)
 
-void sonde_log(sonde_log_level level, const char *format, ...)
+SONDE_LINK void sonde_log(sonde_log_level level, const char *format, ...)
     __attribute__((format(printf, 2, 3)));
 
 // Reports progress; true means go on. A NULL progress always goes on.
-bool sonde_progress_report(const sonde_progress *progress, double fraction, const char *what);
+SONDE_LINK bool sonde_progress_report(const sonde_progress *progress, double fraction,
+                                      const char *what);
 
 #endif

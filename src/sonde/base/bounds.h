@@ -3,6 +3,7 @@
 #ifndef SONDE_SRC_BOUNDS_H
 #define SONDE_SRC_BOUNDS_H
 
+#include "base/link.h"
 #include "base/base.h"
 
 // Limits of one kind of input.
@@ -13,9 +14,14 @@ typedef struct sonde_input_limits {
   uint32_t most_depth; // levels of nesting; 0: the format does not nest
 } sonde_input_limits;
 
-extern const sonde_input_limits sonde_limits_yaml, sonde_limits_json, sonde_limits_xml,
-    sonde_limits_table, sonde_limits_mesh, sonde_limits_image, sonde_limits_model,
-    sonde_limits_recording, sonde_limits_snapshot;
+SONDE_LINK extern const sonde_input_limits sonde_limits_yaml;
+SONDE_LINK extern const sonde_input_limits sonde_limits_json;
+SONDE_LINK extern const sonde_input_limits sonde_limits_xml;
+SONDE_LINK extern const sonde_input_limits sonde_limits_mesh;
+SONDE_LINK extern const sonde_input_limits sonde_limits_image;
+SONDE_LINK extern const sonde_input_limits sonde_limits_recording;
+SONDE_LINK extern const sonde_input_limits sonde_limits_snapshot;
+extern const sonde_input_limits sonde_limits_table, sonde_limits_model;
 
 // Most bytes that one reader may allocate for what a file describes but does not hold byte by byte,
 // such as pixels that are packed.
@@ -27,19 +33,19 @@ extern const sonde_input_limits sonde_limits_yaml, sonde_limits_json, sonde_limi
 // Reads a whole file within the limits as sonde_file_load(); a longer one, or a stream that does
 // not end, is refused after at most most_bytes. @thread owner
 // @return FORMAT naming the limit; IO
-sonde_status sonde_bounded_load(const char *path, const sonde_input_limits *bounds, char **bytes,
-                                size_t *count, sonde_error *error);
+SONDE_LINK sonde_status sonde_bounded_load(const char *path, const sonde_input_limits *bounds,
+                                           char **bytes, size_t *count, sonde_error *error);
 // The same for a text: a byte 0 is refused with its line.
-sonde_status sonde_bounded_load_text(const char *path, const sonde_input_limits *bounds,
-                                     char **text, size_t *count, sonde_error *error);
+SONDE_LINK sonde_status sonde_bounded_load_text(const char *path, const sonde_input_limits *bounds,
+                                                char **text, size_t *count, sonde_error *error);
 
 // Checks size, nesting and number of items of a JSON text before a recursive parser sees it.
 // @param name of the text in messages; NULL: messages without file and line @thread any
-sonde_status sonde_bounded_json(const char *name, const char *bytes, size_t count,
-                                const sonde_input_limits *bounds, sonde_error *error);
+SONDE_LINK sonde_status sonde_bounded_json(const char *name, const char *bytes, size_t count,
+                                           const sonde_input_limits *bounds, sonde_error *error);
 
 // Line of a place in a text, from 1. @thread any
-uint32_t sonde_line_of(const char *text, const char *at);
+SONDE_LINK uint32_t sonde_line_of(const char *text, const char *at);
 
 // Whether the checksum that a file tells is that of its bytes. In a libFuzzer build every checksum
 // counts as right, so that changed bytes reach what lies behind it.

@@ -2,11 +2,13 @@
 #ifndef SONDE_SRC_CLOCK_H
 #define SONDE_SRC_CLOCK_H
 
+#include "base/link.h"
+
 // Seconds since an arbitrary moment; never goes back. @thread any (tick)
-double sonde_clock_now(void);
+SONDE_LINK double sonde_clock_now(void);
 
 // Sleeps until sonde_clock_now() reaches `seconds`; returns at once when that is in the past.
 // @thread any but the tick itself: only the scheduler around it
-void sonde_clock_sleep_until(double seconds);
+SONDE_LINK void sonde_clock_sleep_until(double seconds);
 
 #endif

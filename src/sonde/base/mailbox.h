@@ -4,6 +4,7 @@
 #ifndef SONDE_SRC_MAILBOX_H
 #define SONDE_SRC_MAILBOX_H
 
+#include "base/link.h"
 #include "base/base.h"
 
 #include <stdatomic.h>
@@ -19,9 +20,10 @@ typedef struct sonde_mailbox {
 enum { SONDE_MAILBOX_ALIGN = 64, SONDE_MAILBOX_FRESH = 4 };
 
 // Three zeroed slots of `bytes` each. @thread owner
-sonde_status sonde_mailbox_create(size_t bytes, sonde_mailbox **mailbox, sonde_error *error);
+SONDE_LINK sonde_status sonde_mailbox_create(size_t bytes, sonde_mailbox **mailbox,
+                                             sonde_error *error);
 // NULL is ignored; neither thread may use the mailbox any more. @thread owner
-void sonde_mailbox_destroy(sonde_mailbox *mailbox);
+SONDE_LINK void sonde_mailbox_destroy(sonde_mailbox *mailbox);
 
 // Slot to fill before the next publish; holds an old state until then. @thread writer (tick)
 static inline void *sonde_mailbox_write_slot(sonde_mailbox *mailbox) {

@@ -3,6 +3,7 @@
 #ifndef SONDE_SRC_RING_H
 #define SONDE_SRC_RING_H
 
+#include "base/link.h"
 #include "base/base.h"
 
 #include <stdatomic.h>
@@ -25,10 +26,10 @@ typedef struct sonde_ring {
 } sonde_ring;
 
 // A ring for `capacity` records (a power of two) of `record_bytes` each. @thread owner
-sonde_status sonde_ring_create(size_t record_bytes, size_t capacity, sonde_ring **ring,
-                               sonde_error *error);
+SONDE_LINK sonde_status sonde_ring_create(size_t record_bytes, size_t capacity, sonde_ring **ring,
+                                          sonde_error *error);
 // NULL is ignored; neither thread may use the ring any more. @thread owner
-void sonde_ring_destroy(sonde_ring *ring);
+SONDE_LINK void sonde_ring_destroy(sonde_ring *ring);
 
 // Copies one record in; false when the ring is full. @thread writer (tick)
 static inline bool sonde_ring_push(sonde_ring *ring, const void *record) {

@@ -3,6 +3,8 @@
 #ifndef SONDE_SRC_VECTOR_H
 #define SONDE_SRC_VECTOR_H
 
+#include "base/link.h"
+
 #include <stdbool.h>
 
 #define INLINE static inline __attribute__((always_inline))
@@ -20,6 +22,6 @@
 typedef double lot __attribute__((vector_size(VECTOR_BYTES), aligned(8), may_alias));
 
 // This processor runs the set, and `wanted` is its name or NULL for any.
-bool sonde_vectors_serve(const char *set, const char *wanted);
+SONDE_LINK bool sonde_vectors_serve(const char *set, const char *wanted);
 
 #endif

@@ -2,6 +2,7 @@
 #ifndef SONDE_SRC_GEOMETRY_INTERNAL_H
 #define SONDE_SRC_GEOMETRY_INTERNAL_H
 
+#include "base/link.h"
 #include "base/base.h"
 #include "base/maths.h"
 #include "sonde/geometry.h"
@@ -84,10 +85,10 @@ sonde_status sonde_hull_mesh(const sonde_vec3 *points, uint32_t count, double to
                              sonde_mesh *hull, sonde_error *error);
 
 // Half sides of the rectangle that a probe's name rect:AxB (mm) asks for; false for other names.
-bool sonde_probe_rectangle(const char *name, double *half_x_m, double *half_y_m);
+SONDE_LINK bool sonde_probe_rectangle(const char *name, double *half_x_m, double *half_y_m);
 
 // Hill climbing that adds the dot products it evaluated to *work.
-uint32_t sonde_convex_climb(const sonde_convex *convex, sonde_vec3 direction, uint32_t start,
-                            uint32_t *work);
+SONDE_LINK uint32_t sonde_convex_climb(const sonde_convex *convex, sonde_vec3 direction,
+                                       uint32_t start, uint32_t *work);
 
 #endif

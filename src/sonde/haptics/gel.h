@@ -2,6 +2,7 @@
 #ifndef SONDE_SRC_GEL_H
 #define SONDE_SRC_GEL_H
 
+#include "base/link.h"
 #include "sonde/haptics_gel.h"
 
 struct sonde_gel {
@@ -18,11 +19,11 @@ struct sonde_gel {
 
 // One of the parts of sonde_gel_step(), to be taken in turn: what a tick can afford. The probe's
 // pressure is that of the first part. @thread tick
-void sonde_gel_part(sonde_gel *gel, const sonde_vec3 *contact_n, sonde_vec3 probe_m_s, double dt_s,
-                    uint32_t part, uint32_t parts);
+SONDE_LINK void sonde_gel_part(sonde_gel *gel, const sonde_vec3 *contact_n, sonde_vec3 probe_m_s,
+                               double dt_s, uint32_t part, uint32_t parts);
 // sonde_gel_coupling() with another film [nodes] and scratch [nodes] of the caller.
-void sonde_gel_coupling_of(const sonde_gel *gel, const double *film_m, uint32_t *near,
-                           const sonde_vec3 *skin_m, const sonde_vec3 *contact_n,
-                           const sonde_vec3 *point_m, uint32_t count, float *share);
+SONDE_LINK void sonde_gel_coupling_of(const sonde_gel *gel, const double *film_m, uint32_t *near,
+                                      const sonde_vec3 *skin_m, const sonde_vec3 *contact_n,
+                                      const sonde_vec3 *point_m, uint32_t count, float *share);
 
 #endif

@@ -2,12 +2,13 @@
 #ifndef SONDE_SRC_MOTION_H
 #define SONDE_SRC_MOTION_H
 
+#include "base/link.h"
 #include "base/maths.h"
 
 // Every number finite and the quaternion long enough to be a rotation.
 // Meshes lie within 10 km of the origin; a probe farther away would have speeds without number.
 #define SONDE_POSE_REACH_M 1e5
-bool sonde_pose_usable(sonde_pose pose);
+SONDE_LINK bool sonde_pose_usable(sonde_pose pose);
 // Angle of the rotation that takes a to b along the short arc, 0..pi.
 double sonde_quat_angle(sonde_quat a, sonde_quat b);
 // Along the short arc from a (t = 0) to b (t = 1).

@@ -5,6 +5,7 @@
 #ifndef SONDE_SRC_INTERIOR_H
 #define SONDE_SRC_INTERIOR_H
 
+#include "base/link.h"
 #include "base/maths.h"
 #include "sonde/interior.h"
 #include "sonde/interior_findings.h"
@@ -176,17 +177,19 @@ typedef struct sonde_interior_memory {
 
 // The next update's share of a window that is being built, so that the update is quicker; nothing
 // else changes. @thread owner
-void sonde_interior_build_ahead(sonde_interior *in);
+SONDE_LINK void sonde_interior_build_ahead(sonde_interior *in);
 
 // No allocation. @thread of the updates
-void sonde_interior_remember(const sonde_interior *interior, sonde_interior_memory *memory);
+SONDE_LINK void sonde_interior_remember(const sonde_interior *interior,
+                                        sonde_interior_memory *memory);
 // Goes on from there. Factors the window in use unless it or one like it on the shelf is at hand;
 // one that was being built is made when it is due. @return FORMAT @thread owner
-sonde_status sonde_interior_recall(sonde_interior *interior, const sonde_interior_memory *memory,
-                                   sonde_error *error);
+SONDE_LINK sonde_status sonde_interior_recall(sonde_interior *interior,
+                                              const sonde_interior_memory *memory,
+                                              sonde_error *error);
 // Room for factored windows that are not in use. @thread owner
-sonde_status sonde_interior_keep_windows(sonde_interior *interior, uint32_t count,
-                                         sonde_error *error);
+SONDE_LINK sonde_status sonde_interior_keep_windows(sonde_interior *interior, uint32_t count,
+                                                    sonde_error *error);
 // Makes in->next a window for a place: from the shelf when it is there. Without a shelf no
 // allocation.
 void sonde_interior_next_window(sonde_interior *interior, const double place[4]);

@@ -4,6 +4,8 @@
 #ifndef SONDE_SRC_DENSE_H
 #define SONDE_SRC_DENSE_H
 
+#include "base/link.h"
+
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -20,7 +22,7 @@ typedef struct sonde_product {
   const double *weight; // [depth]; NULL: all one
   bool subtract;
 } sonde_product;
-void sonde_multiply(const sonde_product *product);
+SONDE_LINK void sonde_multiply(const sonde_product *product);
 
 // For one instruction set. Columns of a piece: `own` of them with `rows` numbers each, the triangle
 // at the top; rows are a multiple of 8, those behind the last used one zero.
@@ -45,18 +47,20 @@ extern const sonde_dense_kernels sonde_dense_kernels_avx2;
 
 // Cholesky factor in the lower triangle of a [n * n], in place; the upper one is scratch. @return
 // false: not positive definite
-bool sonde_cholesky(double *a, uint32_t n);
+SONDE_LINK bool sonde_cholesky(double *a, uint32_t n);
 // Solves L x = b in place.
 void sonde_cholesky_forward(const double *factor, uint32_t n, double *x);
 // Solves L L^T x = b in place.
-void sonde_cholesky_solve(const double *factor, uint32_t n, double *x);
+SONDE_LINK void sonde_cholesky_solve(const double *factor, uint32_t n, double *x);
 // The same for many right-hand sides x [n][columns].
-void sonde_cholesky_forward_many(const double *factor, uint32_t n, double *x, uint32_t columns);
-void sonde_cholesky_solve_many(const double *factor, uint32_t n, double *x, uint32_t columns);
+SONDE_LINK void sonde_cholesky_forward_many(const double *factor, uint32_t n, double *x,
+                                            uint32_t columns);
+SONDE_LINK void sonde_cholesky_solve_many(const double *factor, uint32_t n, double *x,
+                                          uint32_t columns);
 // Adds weight[k] row row^T of rows [count][n] to the lower triangle of a.
-void sonde_add_outers(double *a, uint32_t n, const double *rows, uint32_t count,
-                      const double *weight);
+SONDE_LINK void sonde_add_outers(double *a, uint32_t n, const double *rows, uint32_t count,
+                                 const double *weight);
 // to [columns][rows] = from [rows][columns]
-void sonde_transpose(const double *from, uint32_t rows, uint32_t columns, double *to);
+SONDE_LINK void sonde_transpose(const double *from, uint32_t rows, uint32_t columns, double *to);
 
 #endif

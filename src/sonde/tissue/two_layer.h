@@ -2,6 +2,7 @@
 #ifndef SONDE_SRC_TWO_LAYER_H
 #define SONDE_SRC_TWO_LAYER_H
 
+#include "base/link.h"
 #include "sonde/sparse.h"
 #include "sonde/tissue.h"
 
@@ -38,11 +39,11 @@ typedef struct sonde_tissue_scales {
 // (K v) and the matrix. All rows of the part are overwritten; rows outside are untouched in
 // `matrix`' upper blocks; `scratch` has one entry per node.
 // @thread tick (no allocation)
-void sonde_tissue_linearise(const sonde_model *model, const sonde_tissue_part *part,
-                            const sonde_vec3 *position, const sonde_vec3 *velocity,
-                            const sonde_tissue_scales *scales, sonde_vec3 *force,
-                            sonde_vec3 *stiffness_velocity, sonde_block_matrix *matrix,
-                            sonde_tissue_node *scratch);
+SONDE_LINK void sonde_tissue_linearise(const sonde_model *model, const sonde_tissue_part *part,
+                                       const sonde_vec3 *position, const sonde_vec3 *velocity,
+                                       const sonde_tissue_scales *scales, sonde_vec3 *force,
+                                       sonde_vec3 *stiffness_velocity, sonde_block_matrix *matrix,
+                                       sonde_tissue_node *scratch);
 
 // G (N/m) and gm of a face: the law's times the mean share of its corners. @thread tick
 void sonde_tissue_face_law(const sonde_model *model, uint32_t f, double *shear_n_m, double *limit);
@@ -53,6 +54,6 @@ static inline bool sonde_tissue_is_layered(const sonde_surface_law *law) {
 }
 
 // Total elastic energy of all springs (J); tests and line searches.
-double sonde_tissue_energy(const sonde_model *model, const sonde_vec3 *position);
+SONDE_LINK double sonde_tissue_energy(const sonde_model *model, const sonde_vec3 *position);
 
 #endif

@@ -2,6 +2,7 @@
 #ifndef SONDE_SRC_STATE_H
 #define SONDE_SRC_STATE_H
 
+#include "base/link.h"
 #include "sonde/world.h"
 
 enum { SONDE_FACES_PER_BLOCK = 32, SONDE_REFIT_PERIOD = 8 };
@@ -99,8 +100,8 @@ enum { SONDE_CALM_TICKS = 20, SONDE_TRIAL_PERIOD = 32 };
 
 // sonde_state_tune() and another friction with values in their ranges; the friction of a probe that
 // slips stays that of a slipping one. @thread tick
-void sonde_state_retune(sonde_state *state, const sonde_tuning *tuning);
-void sonde_state_rub(sonde_state *state, const sonde_friction *friction);
+SONDE_LINK void sonde_state_retune(sonde_state *state, const sonde_tuning *tuning);
+SONDE_LINK void sonde_state_rub(sonde_state *state, const sonde_friction *friction);
 
 // sonde_state_create() with the order of the faces known, NULL: found here.
 sonde_status sonde_state_create_ordered(const sonde_model *model, const sonde_world_def *def,
@@ -111,7 +112,7 @@ void sonde_state_publish(sonde_state *state);
 // Wakes every node. @thread tick
 void sonde_state_wake_all(sonde_state *state);
 // Back to rest in the midst of a run: tick and count of flags go on. @thread tick
-void sonde_state_relax(sonde_state *state);
+SONDE_LINK void sonde_state_relax(sonde_state *state);
 // Lists of awake rows, edges and pairs from awake[]. @thread tick
 void sonde_state_list_awake(sonde_state *state);
 

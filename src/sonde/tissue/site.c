@@ -1,5 +1,5 @@
 // Poses of a probe at measured sites.
-#include "sonde/exam.h"
+#include "sonde/tissue.h"
 
 #include "base/base.h"
 #include "base/maths.h"

@@ -7,7 +7,7 @@
 // check_shape:  one document, within the limits of size, nesting and number of values.
 // build:        the document.
 // sonde_read_*: typed values with ranges.
-#include "base/yaml.h"
+#include "files/yaml.h"
 
 #include "base/bounds.h"
 #include "base/maths.h"

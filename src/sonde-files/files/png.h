@@ -1,0 +1,13 @@
+// PNG files in memory.
+#ifndef SONDE_SRC_FILES_PNG_H
+#define SONDE_SRC_FILES_PNG_H
+
+#include "base/link.h"
+#include "base/base.h"
+#include "sonde/files.h"
+
+// An 8-bit grey PNG. *bytes [*count] freed by sonde_free.
+SONDE_LINK sonde_status sonde_png_encode(const sonde_image *image, uint8_t **bytes, size_t *count,
+                                         sonde_error *error);
+
+#endif
