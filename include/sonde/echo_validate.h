@@ -5,7 +5,7 @@
 #ifndef SONDE_ECHO_VALIDATE_H
 #define SONDE_ECHO_VALIDATE_H
 
-#include "sonde/echo_reference.h"
+#include "sonde/echo.h"
 
 #ifdef __cplusplus
 extern "C" {

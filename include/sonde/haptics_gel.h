@@ -59,8 +59,6 @@ SONDE_API void sonde_gel_coupling(sonde_gel *gel, const sonde_vec3 *skin_m,
                                   uint32_t count, float *share);
 /** Film per node, m [nodes]. @thread tick */
 SONDE_API const double *sonde_gel_film(const sonde_gel *gel);
-/** Volume on the skin, m^3. @thread tick */
-SONDE_API double sonde_gel_volume(const sonde_gel *gel);
 
 #ifdef __cplusplus
 }

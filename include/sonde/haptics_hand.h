@@ -38,8 +38,6 @@ typedef struct sonde_hand_preset {
   const char *name; /**< child, light, firm, heavy, loose, bare */
   double mass_kg, damping_n_s_m;
 } sonde_hand_preset;
-/** @param count receives their number @thread any */
-SONDE_API const sonde_hand_preset *sonde_hand_presets(uint32_t *count);
 
 /** A hand whose goal follows keys as sonde_device_script() does; it starts at rest at the first.
  *  @param keys [count], copied
@@ -47,11 +45,6 @@ SONDE_API const sonde_hand_preset *sonde_hand_presets(uint32_t *count);
 SONDE_API sonde_status sonde_device_hand(const sonde_hand_def *def, const sonde_script_key *keys,
                                          uint32_t count, double dt_s, sonde_device *device,
                                          sonde_error *error);
-/** Where the hand really is, without the rounding of its report.
- *  @param velocity_m_s may be NULL @return the position; zero for another family @thread tick */
-SONDE_API sonde_vec3 sonde_hand_position(const sonde_device *device, sonde_vec3 *velocity_m_s);
-/** Kinetic and spring energy, J, about the goal of the last tick. @thread tick */
-SONDE_API double sonde_hand_energy(const sonde_device *device);
 
 #ifdef __cplusplus
 }

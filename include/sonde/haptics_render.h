@@ -25,8 +25,6 @@ typedef struct sonde_device_limits {
   const char *source;   /**< where the numbers come from */
 } sonde_device_limits;
 
-/** @param count receives the number of rows @thread any */
-SONDE_API const sonde_device_limits *sonde_device_limits_list(uint32_t *count);
 /** Row of a name, NULL when there is none. @thread any */
 SONDE_API const sonde_device_limits *sonde_device_limits_find(const char *name);
 /** Safety limits of a device: 0.8 of its peak force, from zero to the peak in 4 ms, its continuous

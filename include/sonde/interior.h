@@ -51,22 +51,6 @@ SONDE_API const char *const *sonde_pathology_names(void);
 SONDE_API sonde_status sonde_pathology_preset(const char *name, sonde_pathology *pathology,
                                               sonde_error *error);
 
-/** Normal stresses (Pa, compression positive) below a uniformly loaded rectangle on an
- *  incompressible half space: lateral x, axial y, normal z (docs/interior.md, superposed corners).
- *  @param half_x_m,half_y_m rectangle @param x_m,y_m,z_m point, z_m > 0 depth @thread any */
-SONDE_API sonde_vec3 sonde_rectangle_stress(double pressure_pa, double half_x_m, double half_y_m,
-                                            double x_m, double y_m, double z_m);
-
-/** Area of the vein relative to its rest area at an effective outside pressure (Pa), for a lumen
- *  pressure and thrombus (tube law, docs/interior.md). Monotone, > 0. @thread any */
-SONDE_API double sonde_vein_area_ratio(const sonde_pathology *pathology, double outside_pa);
-/** @thread any */
-SONDE_API double sonde_artery_area_ratio(const sonde_pathology *pathology, double outside_pa);
-
-/** Pressure inside an empty vein's wall (Pa) that holds it at `area_ratio` of its stress-free area
- *  inside muscle, for a wall of that shear modulus (docs/interior.md). Monotone. @thread any */
-SONDE_API double sonde_vein_tube_pressure(double area_ratio, double wall_shear_pa);
-
 /** Cross-section of a vessel at one station of its centre line. */
 typedef struct sonde_vessel_state {
   sonde_vec3 rest_centre_m;
@@ -132,14 +116,6 @@ SONDE_API void sonde_interior_update(sonde_interior *interior, const sonde_inter
 
 /** Displacement (m) of the rest point, zero outside and in bone. After an update. @thread any */
 SONDE_API sonde_vec3 sonde_interior_displacement(const sonde_interior *interior, sonde_vec3 rest_m);
-/** The same for many points. @param rest_m,out_m [count] @thread any */
-SONDE_API void sonde_interior_displacements(const sonde_interior *interior, uint32_t count,
-                                            const sonde_vec3 *rest_m, sonde_vec3 *out_m);
-/** Cauchy stress (Pa, tension positive, world axes) at a rest point, scaled so that the solid's
- *  reaction is the contact force; without vessels. @return false (zero stress) where the solid does
- *  not reach: no contact, outside the leg or its window, in bone. @thread any */
-SONDE_API bool sonde_interior_stress(const sonde_interior *interior, sonde_vec3 rest_m,
-                                     sonde_mat3 *stress);
 /** Rest point that is now at `point` (fixed-point inversion). @thread any */
 SONDE_API sonde_vec3 sonde_interior_rest_point(const sonde_interior *interior, sonde_vec3 point_m);
 /** Static tissue label and depth below the skin of a rest point. @thread any */
@@ -150,10 +126,6 @@ SONDE_API sonde_label sonde_interior_label(const sonde_interior *interior, sonde
 SONDE_API uint32_t sonde_interior_vessel_count(const sonde_interior *interior);
 /** femoral_vein, femoral_artery or the branch's name. @thread any */
 SONDE_API const char *sonde_interior_vessel_name(const sonde_interior *interior, int which);
-/** Stations of the vein (0), the artery (1) or a branch; 0 when the leg lacks it.
- *  @thread any, not during an update */
-SONDE_API const sonde_vessel_state *sonde_interior_vessel(const sonde_interior *interior, int which,
-                                                          uint32_t *count);
 /** State of the vein (0), the artery (1) or a branch where the probe's image plane cuts it; false
  *  when it does not pass within 40 mm of the beam axis. @thread any, not during an update */
 SONDE_API bool sonde_interior_vessel_at_plane(const sonde_interior *interior, int which,
@@ -183,12 +155,6 @@ SONDE_API sonde_circulation sonde_circulation_default(void);
 /** Begins or ends a strain at time t, from whatever share of one is in force: the pressure has no
  *  step. @thread any */
 SONDE_API void sonde_circulation_strain(sonde_circulation *circulation, double t_s, bool on);
-/** Pressure in the common femoral vein (Pa) at time t: posture, breath, Valsalva
- *  (docs/interior.md). A function of t only. @thread any */
-SONDE_API double sonde_venous_pressure(const sonde_circulation *circulation, double t_s);
-/** Pressure in the femoral artery (Pa) at time t: between diastolic and systolic, periodic.
- *  @thread any */
-SONDE_API double sonde_arterial_pressure(const sonde_circulation *circulation, double t_s);
 /** Both pressures of a pathology at a tick of `dt_s`. @thread any */
 SONDE_API void sonde_circulation_apply(const sonde_circulation *circulation, uint64_t tick,
                                        double dt_s, sonde_pathology *pathology);

@@ -25,7 +25,6 @@
 #include "sonde/interior.h"
 #include "sonde/interior_findings.h"
 #include "sonde/echo.h"
-#include "sonde/echo_reference.h"
 #include "sonde/echo_validate.h"
 #include "sonde/sweep_frames.h"
 #include "sonde/sweep_volume.h"

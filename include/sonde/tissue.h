@@ -192,14 +192,6 @@ SONDE_API sonde_pose sonde_site_pose(const sonde_site *site, double depth_m);
  *  @thread any (tick) */
 SONDE_API double sonde_normal_pressure(double exponent, double k0_n_m3, double xm_m, double guard,
                                        double s_m, double *slope_n_m3);
-/** Energy per area of the same spring. @thread any */
-SONDE_API double sonde_normal_energy(double exponent, double k0_n_m3, double xm_m, double guard,
-                                     double s_m);
-/** Force per length of the shear layer at slope g = |grad s| >= 0; *slope = dq/dg.
- *  @thread any (tick) */
-SONDE_API double sonde_shear_force(double shear_n_m, double limit, double g, double *slope);
-/** Energy per area of the shear layer. @thread any */
-SONDE_API double sonde_shear_energy(double shear_n_m, double limit, double g);
 
 #ifdef __cplusplus
 }

@@ -70,18 +70,9 @@ typedef struct sonde_thigh_anatomy {
   double fascia_medial_m, fascia_lateral_m;
 } sonde_thigh_anatomy;
 
-/** The compartment at a point of the muscle. @thread any */
-SONDE_API sonde_compartment sonde_anatomy_compartment(const sonde_thigh_anatomy *anatomy,
-                                                      sonde_vec3 rest_m);
-/** Unit direction of the muscle fibres there, towards the knee. @thread any */
-SONDE_API sonde_vec3 sonde_anatomy_fibre(const sonde_thigh_anatomy *anatomy, sonde_vec3 rest_m);
-/** Thickness of the fascia lata above a point. @thread any */
-SONDE_API double sonde_anatomy_fascia(const sonde_thigh_anatomy *anatomy, sonde_vec3 rest_m);
 /** The landmark or branch with that name, NULL when absent. @thread any */
 SONDE_API const sonde_landmark *sonde_anatomy_landmark(const sonde_thigh_anatomy *anatomy,
                                                        const char *name);
-SONDE_API const sonde_branch *sonde_anatomy_branch(const sonde_thigh_anatomy *anatomy,
-                                                   const char *name); /**< @thread any */
 
 #ifdef __cplusplus
 }

@@ -1,5 +1,6 @@
 // Depth and first touch of convex bodies: closed forms, enumeration of all axes, libccd.
 #include "contact/bodies.h"
+#include "geometry/internal.h"
 
 #ifdef SONDE_TEST_CCD
 #include <ccd/ccd.h>

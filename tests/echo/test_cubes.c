@@ -4,6 +4,7 @@
 #include "base/random.h"
 #include "echo/bench.h"
 #include "echo/cubes.h"
+#include "interior/interior.h"
 
 #include <stdlib.h>
 

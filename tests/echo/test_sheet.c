@@ -2,7 +2,7 @@
 // and nothing of an interface lies beyond the beam's lateral band.
 #include "echo/bench.h"
 #include "echo/echo.h"
-#include "sonde/echo_reference.h"
+#include "echo/reference.h"
 
 static const double sheet_radius = 0.24, skin_radius = 0.3; // fascia and skin of a great leg
 static const double fascia_db = 21, fat_loss = 50;          // echo over muscle; dB/m/MHz one way

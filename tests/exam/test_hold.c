@@ -2,6 +2,7 @@
 // waits for a minute. What it drifts stays below the default tremor of a hand, 50 um.
 #include "exam_test.h"
 #include "sonde/haptics_hand.h"
+#include "haptics/devices/hand.h"
 
 static sonde_device pulling_hand(const sonde_device_limits *limits) {
   sonde_site site = barrel_site();

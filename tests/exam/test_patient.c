@@ -2,6 +2,7 @@
 // recordings that keep it.
 #include "exam_test.h"
 #include "haptics/gel.h"
+#include "interior/interior.h"
 
 static const char path[] = "test_patient.rec";
 

@@ -6,6 +6,7 @@
 
 #include "base/base.h"
 #include "fit/fit_inside.h"
+#include "geometry/internal.h"
 
 // A flat open plate of 2 mm squares in z = 0, outward +z, cut by one diagonal each. No site centre
 // or footprint border passes through a node.

@@ -15,6 +15,7 @@
 
 #include "base/base.h"
 #include "base/maths.h"
+#include "geometry/internal.h"
 #include "sonde/geometry.h"
 
 #define SHAPE_DATA SONDE_SOURCE_DIR "/../shared/data/"

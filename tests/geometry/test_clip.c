@@ -2,6 +2,7 @@
 #include "base/random.h"
 #include "../sanitized.h"
 #include "geometry/shapes.h"
+#include "geometry/internal.h"
 
 // A skin patch: z = shape(x, y) over a square grid, outward normal +z; tissue below.
 typedef double (*shape_fn)(double x, double y);

@@ -1,5 +1,6 @@
 // Convex bodies, hulls and probes.
 #include "geometry/shapes.h"
+#include "geometry/internal.h"
 
 // All points behind all planes; every plane touched by at least three hull vertices.
 static void check_hull(const sonde_convex *c, const sonde_vec3 *points, uint32_t count,

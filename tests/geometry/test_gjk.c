@@ -1,6 +1,7 @@
 // Distance of convex bodies against enumeration of all features, and its cost.
 #include "../sanitized.h"
 #include "geometry/shapes.h"
+#include "geometry/internal.h"
 
 // ---- oracle -------------------------------------------------------------------------------
 

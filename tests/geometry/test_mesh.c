@@ -1,5 +1,6 @@
 // Measures of meshes against closed forms, topology, and behaviour without memory.
 #include "geometry/shapes.h"
+#include "geometry/internal.h"
 
 static const double tau = 2 * SONDE_PI;
 

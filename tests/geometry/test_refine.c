@@ -1,5 +1,6 @@
 // Laws of local refinement.
 #include "geometry/shapes.h"
+#include "geometry/internal.h"
 
 typedef struct wish {
   sonde_vec3 centre;

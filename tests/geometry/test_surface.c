@@ -1,5 +1,6 @@
 // Closest point, rays and inside tests against brute force and closed forms.
 #include "geometry/shapes.h"
+#include "geometry/internal.h"
 
 static sonde_surface_index *make_index(const sonde_mesh *mesh) {
   sonde_surface_index *index = NULL;

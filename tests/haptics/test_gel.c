@@ -3,6 +3,7 @@
 #include "../barrel_mesh.h"
 
 #include "sonde/haptics_gel.h"
+#include "haptics/gel.h"
 
 // Round leg along z, closed, 60 mm in radius and 160 mm long.
 enum { RINGS = 41, AROUND = 72 };

@@ -2,6 +2,7 @@
 #include "test.h"
 
 #include "sonde/haptics_hand.h"
+#include "haptics/devices/hand.h"
 
 static const double dt_s = 1e-3;
 

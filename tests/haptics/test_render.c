@@ -4,6 +4,8 @@
 
 #include "sonde/haptics_hand.h"
 #include "sonde/haptics_render.h"
+#include "haptics/devices/hand.h"
+#include "haptics/bounds.h"
 
 static const double dt_s = 1e-3;
 

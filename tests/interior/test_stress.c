@@ -1,6 +1,7 @@
 // Stress of the solid against the finite-element study of vessels, and vessels driven by it.
 #include "interior/study.h"
 #include "interior/window.h"
+#include "interior/interior.h"
 
 typedef struct stress_row {
   double penetration_m, force_n;

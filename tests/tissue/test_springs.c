@@ -1,5 +1,6 @@
 // Laws of the single springs.
 #include "../fixture.h"
+#include "tissue/two_layer.h"
 
 static const double K0 = 180000, XM = 0.05, GUARD = 0.999;
 

@@ -5,6 +5,7 @@
 #include "world/contact.h"
 #include "world/lanes.h"
 #include "world/state.h"
+#include "geometry/internal.h"
 
 typedef struct bench {
   sonde_state *precise, *fast;

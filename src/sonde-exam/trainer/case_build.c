@@ -6,6 +6,7 @@
 // clot_in:         how much of a segment has a clot.
 // check_truth:     every segment is called what its vein is.
 #include "trainer/case.h"
+#include "tissue/anatomy.h"
 
 #include <string.h>
 

@@ -4,6 +4,7 @@
 // sonde_footprint_edges: what those edges add at a depth.
 #include "base/maths.h"
 #include "fit/fit_inside.h"
+#include "geometry/internal.h"
 
 #include <string.h>
 

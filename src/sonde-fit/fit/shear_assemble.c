@@ -6,6 +6,7 @@
 #include "fit/shear.h"
 
 #include "base/maths.h"
+#include "tissue/two_layer.h"
 
 #include <string.h>
 

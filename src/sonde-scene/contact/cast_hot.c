@@ -13,6 +13,7 @@
 //   swept          box of all that a body passes
 #include "contact/difference.h"
 #include "contact/tree.h"
+#include "geometry/internal.h"
 
 enum { MAX_ADVANCES = 512 };
 

@@ -13,6 +13,7 @@
 //   follow           displacements until the depth stays
 //   search           from several first directions
 #include "contact/difference.h"
+#include "geometry/internal.h"
 
 enum { MAX_CORRECTIONS = 24, STARTS = 6 };
 

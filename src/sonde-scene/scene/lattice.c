@@ -14,6 +14,7 @@
 #include "base/base.h"
 #include "base/maths.h"
 #include "scene/shape.h"
+#include "geometry/internal.h"
 
 #include <string.h>
 

@@ -15,6 +15,7 @@
 #include "base/base.h"
 #include "echo/tiers.h"
 #include "interior/clot.h"
+#include "interior/interior.h"
 
 #include <string.h>
 

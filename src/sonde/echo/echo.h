@@ -8,7 +8,7 @@
 #include "echo/psf.h"
 #include "interior/interior.h"
 #include "sonde/echo.h"
-#include "sonde/echo_reference.h"
+#include "echo/reference.h"
 
 enum {
   SONDE_PLANE_COLUMNS = 25, // coarse nodes across the lines

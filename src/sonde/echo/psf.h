@@ -2,7 +2,7 @@
 #ifndef SONDE_SRC_ECHO_PSF_H
 #define SONDE_SRC_ECHO_PSF_H
 
-#include "sonde/echo_reference.h"
+#include "echo/reference.h"
 
 enum {
   SONDE_RANK = 3,

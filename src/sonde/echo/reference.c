@@ -10,7 +10,7 @@
 #include "base/base.h"
 #include "base/maths.h"
 #include "echo/echo.h"
-#include "sonde/echo_reference.h"
+#include "echo/reference.h"
 
 enum { MOST = 257, TABLE = 4096, PER_SIGMA = 24, STRIPS = 64 };
 

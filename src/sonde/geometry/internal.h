@@ -91,4 +91,56 @@ SONDE_LINK bool sonde_probe_rectangle(const char *name, double *half_x_m, double
 SONDE_LINK uint32_t sonde_convex_climb(const sonde_convex *convex, sonde_vec3 direction,
                                        uint32_t start, uint32_t *work);
 
+// Clips one skin triangle by a convex body and integrates the columns between skin and body.
+// Inside tissue lies below the triangle (opposite its outward normal); from each clipped skin
+// point a column runs along `direction` (unit, into the tissue) until it leaves the body. Volume,
+// shares and gradient are exact for the piecewise linear depth. docs/world.md. Summed over a
+// surface they are the common volume and its derivative when no column enters the body below the
+// skin: for a box, along its beam axis.
+// @param planes_n,planes_d the body's planes in the frame of the triangle's points
+// @param corners three vertices, counter-clockwise from outside
+// @return false when nothing is clipped (result zeroed)
+// @thread tick (no allocation)
+bool sonde_clip_triangle(const sonde_vec3 *planes_n, const double *planes_d, uint32_t plane_count,
+                         const sonde_vec3 corners[3], sonde_vec3 direction,
+                         sonde_clip_result *result);
+// Farthest vertex along a direction, climbing from `start` (0 when unknown). @thread tick
+uint32_t sonde_convex_support(const sonde_convex *convex, sonde_vec3 direction, uint32_t start);
+// Convex hull of a point cloud (>= 4 points not in one plane, else SONDE_MESH). @thread owner
+sonde_status sonde_convex_hull(const sonde_vec3 *points, uint32_t count, sonde_convex *convex,
+                               sonde_error *error);
+// From a closed convex mesh. @return SONDE_MESH when open or not convex (1e-8). @thread owner
+sonde_status sonde_convex_create(const sonde_mesh *mesh, sonde_convex *convex, sonde_error *error);
+void sonde_convex_clear(sonde_convex *convex); // @thread owner
+// GJK distance with warm start (`cache` may be NULL). Within 1e-9 m of the exact distance; closer
+// than 1e-10 m counts as touching. Without cache linear time. Gilbert, Johnson and Keerthi 1988.
+// @thread tick (no allocation)
+SONDE_LINK sonde_gjk_result sonde_gjk_distance(const sonde_convex *a, sonde_pose world_from_a,
+                                               const sonde_convex *b, sonde_pose world_from_b,
+                                               sonde_gjk_cache *cache);
+// Area of the mesh vertex cells (a third of each face) covered by the rectangle |u|<=hu, |v|<=hv
+// around `centre`, seen along the normal: exact clipping of each face's cell share. Faces whose
+// normal turns away from `normal`, or farther than `reach_m` along it, do not count.
+// @param covered_m2 [vertex_count] receives the covered area per vertex (sum = covered area)
+// @thread owner
+SONDE_LINK void sonde_mesh_footprint(const sonde_mesh *mesh, sonde_vec3 centre, sonde_vec3 normal,
+                                     sonde_vec3 u, sonde_vec3 v, double hu_m, double hv_m,
+                                     double reach_m, double *covered_m2);
+// Refines where `target` asks for shorter edges, without hanging vertices. An edge is halved while
+// it is longer than 1.42 times the target at its middle: halving a shorter one would overshoot.
+// Longest edges go first, so that no angle falls below half the smallest given; slivers around a
+// vertex with more than 24 faces (a flat cap's centre) are first replaced by rings of faces. New
+// vertices lie on the smooth surface of the vertex normals (PN-triangle edges); creases above 45
+// degrees stay sharp. Vertices of `mesh` keep index and place. docs/geometry.md.
+// @param target returns the wanted edge length (m) at a point, more than 0
+// @return SONDE_ARGUMENT for a target that is not positive or asks for over 2 million vertices;
+//         SONDE_MESH when an edge has more than two faces
+// @thread owner
+sonde_status sonde_mesh_refine(const sonde_mesh *mesh,
+                               double (*target)(sonde_vec3 point, void *user), void *user,
+                               sonde_mesh *refined, sonde_error *error);
+SONDE_LINK sonde_status sonde_topology_build(const sonde_mesh *mesh, sonde_topology *topology,
+                                             sonde_error *error); // @thread owner
+SONDE_LINK void sonde_topology_clear(sonde_topology *topology);   // @thread owner
+
 #endif

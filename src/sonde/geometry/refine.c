@@ -14,6 +14,7 @@
 //   split_face        the new faces of one face
 //   refine_once       one pass
 #include "geometry/refine.h"
+#include "geometry/internal.h"
 
 #include <string.h>
 

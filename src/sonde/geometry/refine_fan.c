@@ -11,6 +11,7 @@
 //   zip             faces between two rings, always taking the shorter diagonal
 //   spread_fan      one fan
 #include "geometry/refine.h"
+#include "geometry/internal.h"
 
 #include <string.h>
 

@@ -1,8 +1,9 @@
 // Vectors kept within bounds: shared by the two gates before a hand; hot.
-#ifndef SONDE_SRC_BOUNDS_H
-#define SONDE_SRC_BOUNDS_H
+#ifndef SONDE_SRC_HAPTICS_BOUNDS_H
+#define SONDE_SRC_HAPTICS_BOUNDS_H
 
 #include "base/maths.h"
+#include "sonde/haptics_render.h"
 
 // Vector cut to a norm; *acted becomes true when it was longer.
 static inline sonde_vec3 sonde_bound_norm(sonde_vec3 wanted, double limit, bool *acted) {
@@ -27,5 +28,8 @@ static inline sonde_vec3 sonde_bound_step(sonde_vec3 last, sonde_vec3 target, do
   *acted = true;
   return v_madd(last, reach / norm, change);
 }
+
+// @param count receives the number of rows @thread any
+const sonde_device_limits *sonde_device_limits_list(uint32_t *count);
 
 #endif

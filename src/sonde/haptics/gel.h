@@ -26,4 +26,7 @@ SONDE_LINK void sonde_gel_coupling_of(const sonde_gel *gel, const double *film_m
                                       const sonde_vec3 *skin_m, const sonde_vec3 *contact_n,
                                       const sonde_vec3 *point_m, uint32_t count, float *share);
 
+// Volume on the skin, m^3. @thread tick
+double sonde_gel_volume(const sonde_gel *gel);
+
 #endif

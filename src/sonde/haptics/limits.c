@@ -2,6 +2,7 @@
 #include "sonde/haptics_render.h"
 
 #include "base/base.h"
+#include "haptics/bounds.h"
 
 #include <math.h>
 #include <string.h>

@@ -213,4 +213,36 @@ double sonde_artery_rest_scale(const sonde_pathology *pathology);
 // True where a thrombus lies.
 bool sonde_pathology_clot(const sonde_pathology *pathology, double z_m);
 
+// Area of the vein relative to its rest area at an effective outside pressure (Pa), for a lumen
+// pressure and thrombus (tube law, docs/interior.md). Monotone, > 0. @thread any
+double sonde_vein_area_ratio(const sonde_pathology *pathology, double outside_pa);
+// Area of the artery relative to its rest area at an effective outside pressure (Pa). @thread any
+double sonde_artery_area_ratio(const sonde_pathology *pathology, double outside_pa);
+// Pressure inside an empty vein's wall (Pa) that holds it at `area_ratio` of its stress-free area
+// inside muscle, for a wall of that shear modulus (docs/interior.md). Monotone. @thread any
+double sonde_vein_tube_pressure(double area_ratio, double wall_shear_pa);
+// Normal stresses (Pa, compression positive) below a uniformly loaded rectangle on an
+// incompressible half space: lateral x, axial y, normal z (docs/interior.md, superposed corners).
+// @param half_x_m,half_y_m rectangle @param x_m,y_m,z_m point, z_m > 0 depth @thread any
+sonde_vec3 sonde_rectangle_stress(double pressure_pa, double half_x_m, double half_y_m, double x_m,
+                                  double y_m, double z_m);
+// Displacement (m) of many points, as sonde_interior_displacement(). @param rest_m,out_m [count]
+// @thread any
+void sonde_interior_displacements(const sonde_interior *interior, uint32_t count,
+                                  const sonde_vec3 *rest_m, sonde_vec3 *out_m);
+// Cauchy stress (Pa, tension positive, world axes) at a rest point, scaled so that the solid's
+// reaction is the contact force; without vessels. @return false (zero stress) where the solid does
+// not reach: no contact, outside the leg or its window, in bone. @thread any
+bool sonde_interior_stress(const sonde_interior *interior, sonde_vec3 rest_m, sonde_mat3 *stress);
+// Stations of the vein (0), the artery (1) or a branch; 0 when the leg lacks it.
+// @thread any, not during an update
+const sonde_vessel_state *sonde_interior_vessel(const sonde_interior *interior, int which,
+                                                uint32_t *count);
+// Pressure in the common femoral vein (Pa) at time t: posture, breath, Valsalva
+// (docs/interior.md). A function of t only. @thread any
+double sonde_venous_pressure(const sonde_circulation *circulation, double t_s);
+// Pressure in the femoral artery (Pa) at time t: between diastolic and systolic, periodic.
+// @thread any
+double sonde_arterial_pressure(const sonde_circulation *circulation, double t_s);
+
 #endif

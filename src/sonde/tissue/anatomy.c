@@ -5,6 +5,7 @@
 
 #include "base/base.h"
 #include "base/maths.h"
+#include "tissue/anatomy.h"
 
 #include <string.h>
 

@@ -8,6 +8,7 @@
 #include "base/base.h"
 #include "base/maths.h"
 #include "base/morton.h"
+#include "geometry/internal.h"
 
 #include <string.h>
 

@@ -8,6 +8,7 @@
 
 #include "base/base.h"
 #include "base/maths.h"
+#include "tissue/two_layer.h"
 
 static const double SHEAR_GUARD = 0.95;
 

@@ -9,6 +9,7 @@
 #include "world/state.h"
 
 #include "base/base.h"
+#include "geometry/internal.h"
 
 static const double STEEP_WEIGHT = 4;
 

@@ -22,4 +22,12 @@ typedef struct sonde_hand {
 void sonde_hand_read(void *self, uint64_t tick, sonde_device_sample *sample);
 void sonde_hand_write(void *self, sonde_vec3 force_n, sonde_vec3 torque_n_m);
 
+// Kinetic and spring energy, J, about the goal of the last tick. @thread tick
+double sonde_hand_energy(const sonde_device *device);
+// Where the hand really is, without the rounding of its report.
+// @param velocity_m_s may be NULL @return the position; zero for another family @thread tick
+sonde_vec3 sonde_hand_position(const sonde_device *device, sonde_vec3 *velocity_m_s);
+// @param count receives their number @thread any
+const sonde_hand_preset *sonde_hand_presets(uint32_t *count);
+
 #endif
