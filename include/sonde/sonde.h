@@ -6,6 +6,7 @@
 #define SONDE_SONDE_H
 
 #include "sonde/base.h"
+#include "sonde/base_json.h"
 #include "sonde/geometry.h"
 #include "sonde/contact.h"
 #include "sonde/sparse.h"

@@ -15,31 +15,39 @@ static const char *const KIND[] = {"vein", "artery"};
 
 /* ---- writing ------------------------------------------------------------------------------ */
 
-static bool put_names(cJSON *section, const sonde_thigh_anatomy *a) {
-  cJSON *vessels = cJSON_AddArrayToObject(section, "vessels");
-  cJSON *landmarks = cJSON_AddArrayToObject(section, "landmarks");
-  cJSON *segments = cJSON_AddArrayToObject(section, "segments");
-  bool ok = vessels && landmarks && segments;
-  for (uint32_t k = 0; ok && k < a->branch_count; ++k) {
-    cJSON *entry = cJSON_CreateObject();
-    ok = cJSON_AddItemToArray(vessels, entry) &&
-         cJSON_AddStringToObject(entry, "name", a->branch[k].name) &&
-         cJSON_AddStringToObject(entry, "kind", KIND[a->branch[k].kind]) &&
-         cJSON_AddNumberToObject(entry, "points", a->branch[k].line.count);
+void sonde_anatomy_put_section(sonde_json_out *header, const sonde_thigh_anatomy *a) {
+  SONDE_ASSERT(a->segment_count <= SONDE_SEGMENTS);
+  sonde_json_begin_object(header, "anatomy");
+  sonde_json_put_integer(header, "version", SECTION_VERSION);
+  sonde_json_begin_list(header, "vessels");
+  for (uint32_t k = 0; k < a->branch_count; ++k) {
+    sonde_json_begin_object(header, NULL);
+    sonde_json_put_text(header, "name", a->branch[k].name);
+    sonde_json_put_text(header, "kind", KIND[a->branch[k].kind]);
+    sonde_json_put_integer(header, "points", a->branch[k].line.count);
+    sonde_json_end(header);
   }
-  for (uint32_t k = 0; ok && k < a->landmark_count; ++k)
-    ok = cJSON_AddItemToArray(landmarks, cJSON_CreateString(a->landmark[k].name));
-  for (uint32_t k = 0; ok && k < a->segment_count; ++k) {
-    cJSON *entry = cJSON_CreateObject();
-    ok = cJSON_AddItemToArray(segments, entry) &&
-         cJSON_AddStringToObject(entry, "name", a->segment[k].name) &&
-         cJSON_AddNumberToObject(entry, "from_m", a->segment[k].from_m) &&
-         cJSON_AddNumberToObject(entry, "to_m", a->segment[k].to_m);
+  sonde_json_end(header);
+  sonde_json_begin_list(header, "landmarks");
+  for (uint32_t k = 0; k < a->landmark_count; ++k)
+    sonde_json_put_text(header, NULL, a->landmark[k].name);
+  sonde_json_end(header);
+  sonde_json_begin_list(header, "segments");
+  for (uint32_t k = 0; k < a->segment_count; ++k) {
+    sonde_json_begin_object(header, NULL);
+    sonde_json_put_text(header, "name", a->segment[k].name);
+    sonde_json_put_real(header, "from_m", a->segment[k].from_m, 0);
+    sonde_json_put_real(header, "to_m", a->segment[k].to_m, 0);
+    sonde_json_end(header);
   }
-  return ok && cJSON_AddNumberToObject(section, "fascia_medial_m", a->fascia_medial_m) &&
-         cJSON_AddNumberToObject(section, "fascia_lateral_m", a->fascia_lateral_m) &&
-         cJSON_AddItemToObject(section, "pennation_rad",
-                               cJSON_CreateDoubleArray(a->pennation_rad, SONDE_COMPARTMENTS));
+  sonde_json_end(header);
+  sonde_json_put_real(header, "fascia_medial_m", a->fascia_medial_m, 0);
+  sonde_json_put_real(header, "fascia_lateral_m", a->fascia_lateral_m, 0);
+  sonde_json_begin_list(header, "pennation_rad");
+  for (int k = 0; k < SONDE_COMPARTMENTS; ++k)
+    sonde_json_put_real(header, NULL, a->pennation_rad[k], 0);
+  sonde_json_end(header);
+  sonde_json_end(header);
 }
 
 static void put_points(sonde_model_writer *w, const sonde_thigh_anatomy *a) {
@@ -61,7 +69,9 @@ static void put_points(sonde_model_writer *w, const sonde_thigh_anatomy *a) {
   sonde_free(row);
 }
 
-static void put_numbers(sonde_model_writer *w, const sonde_thigh_anatomy *a) {
+void sonde_anatomy_put_arrays(sonde_model_writer *w, const sonde_thigh_anatomy *a) {
+  SONDE_ASSERT(a->branch_count <= SONDE_BRANCHES && a->landmark_count <= SONDE_LANDMARKS);
+  SONDE_ASSERT(a->level_count <= SONDE_LEVELS);
   double mark[SONDE_LANDMARKS][9], level[SONDE_LEVELS][LEVEL_COLUMNS];
   uint32_t site[SONDE_LANDMARKS];
   for (uint32_t k = 0; k < a->landmark_count; ++k) {
@@ -84,25 +94,14 @@ static void put_numbers(sonde_model_writer *w, const sonde_thigh_anatomy *a) {
                   LEVEL_COLUMNS, level);
 }
 
-void sonde_anatomy_put(sonde_model_writer *w, cJSON *header, const sonde_model *model) {
-  const sonde_thigh_anatomy *a = model->anatomy;
-  if (!a) return;
-  SONDE_ASSERT(a->branch_count <= SONDE_BRANCHES && a->landmark_count <= SONDE_LANDMARKS);
-  SONDE_ASSERT(a->segment_count <= SONDE_SEGMENTS && a->level_count <= SONDE_LEVELS);
-  cJSON *section = cJSON_AddObjectToObject(header, "anatomy");
-  w->failed |= !section || !cJSON_AddNumberToObject(section, "version", SECTION_VERSION) ||
-               !put_names(section, a);
-  if (!w->failed) put_numbers(w, a);
-}
-
 /* ---- reading ------------------------------------------------------------------------------ */
 
 static sonde_status wrong(const sonde_model_reader *r, const char *what) {
   return sonde_fail(r->error, SONDE_FORMAT, "%s: anatomy: %s", r->path, what);
 }
 
-static bool take_name(const cJSON *text, char to[32]) {
-  const char *name = cJSON_GetStringValue(text);
+static bool take_name(const sonde_json *text, char to[32]) {
+  const char *name = sonde_json_as_text(text);
   if (name) snprintf(to, 32, "%s", name);
   return name && name[0];
 }
@@ -114,10 +113,9 @@ static bool finite_row(const double *row, int count) {
 }
 
 // A number of entries from 0 to `room`.
-static bool take_count(const cJSON *list, uint32_t room, uint32_t *count) {
-  int entries = cJSON_GetArraySize(list);
-  *count = (uint32_t)entries;
-  return cJSON_IsArray(list) && entries >= 0 && (uint32_t)entries <= room;
+static bool take_count(const sonde_json *list, uint32_t room, uint32_t *count) {
+  *count = sonde_json_count(list);
+  return sonde_json_kind_of(list) == SONDE_JSON_LIST && *count <= room;
 }
 
 // Points [points] of a branch from consecutive rows.
@@ -132,19 +130,19 @@ static bool take_line(const char *row, uint32_t points, sonde_vessel *line) {
   return true;
 }
 
-static sonde_status take_vessels(const sonde_model_reader *r, const cJSON *section,
+static sonde_status take_vessels(const sonde_model_reader *r, const sonde_json *section,
                                  sonde_thigh_anatomy *a) {
-  const cJSON *list = cJSON_GetObjectItem(section, "vessels"), *entry = NULL;
+  const sonde_json *list = sonde_json_member(section, "vessels"), *entry = sonde_json_first(list);
   uint32_t rows, used = 0, b = 0;
   const char *row = sonde_model_take(r, "anatomy_vessels", "f64", POINT_COLUMNS, &rows);
   if (!row) return SONDE_FORMAT;
   if (!take_count(list, SONDE_BRANCHES, &a->branch_count)) return wrong(r, "too many vessels");
-  cJSON_ArrayForEach(entry, list) {
+  for (; entry; entry = sonde_json_next(entry)) {
     sonde_branch *branch = &a->branch[b++];
-    const char *kind = cJSON_GetStringValue(cJSON_GetObjectItem(entry, "kind"));
-    double points = cJSON_GetNumberValue(cJSON_GetObjectItem(entry, "points"));
+    const char *kind = sonde_json_as_text(sonde_json_member(entry, "kind"));
+    double points = sonde_json_as_number(sonde_json_member(entry, "points"));
     bool artery = kind && strcmp(kind, KIND[SONDE_VESSEL_ARTERY]) == 0;
-    if (!take_name(cJSON_GetObjectItem(entry, "name"), branch->name) || !kind ||
+    if (!take_name(sonde_json_member(entry, "name"), branch->name) || !kind ||
         (!artery && strcmp(kind, KIND[SONDE_VESSEL_VEIN]) != 0))
       return wrong(r, "a vessel lacks its name or kind");
     branch->kind = artery ? SONDE_VESSEL_ARTERY : SONDE_VESSEL_VEIN;
@@ -157,9 +155,9 @@ static sonde_status take_vessels(const sonde_model_reader *r, const cJSON *secti
   return SONDE_OK;
 }
 
-static sonde_status take_landmarks(const sonde_model_reader *r, const cJSON *section,
+static sonde_status take_landmarks(const sonde_model_reader *r, const sonde_json *section,
                                    sonde_thigh_anatomy *a) {
-  const cJSON *list = cJSON_GetObjectItem(section, "landmarks"), *entry = NULL;
+  const sonde_json *list = sonde_json_member(section, "landmarks"), *entry = sonde_json_first(list);
   uint32_t rows, sites, k = 0;
   const char *row = sonde_model_take(r, "anatomy_landmarks", "f64", 9, &rows);
   const char *site = row ? sonde_model_take(r, "anatomy_landmark_sites", "u32", 1, &sites) : NULL;
@@ -167,7 +165,7 @@ static sonde_status take_landmarks(const sonde_model_reader *r, const cJSON *sec
   if (!take_count(list, SONDE_LANDMARKS, &a->landmark_count) || a->landmark_count != rows ||
       rows != sites)
     return wrong(r, "landmarks do not match their rows");
-  cJSON_ArrayForEach(entry, list) {
+  for (; entry; entry = sonde_json_next(entry)) {
     sonde_landmark *mark = &a->landmark[k];
     double x[9];
     memcpy(x, row + (size_t)k * sizeof x, sizeof x);
@@ -182,16 +180,16 @@ static sonde_status take_landmarks(const sonde_model_reader *r, const cJSON *sec
   return SONDE_OK;
 }
 
-static sonde_status take_segments(const sonde_model_reader *r, const cJSON *section,
+static sonde_status take_segments(const sonde_model_reader *r, const sonde_json *section,
                                   sonde_thigh_anatomy *a) {
-  const cJSON *list = cJSON_GetObjectItem(section, "segments"), *entry = NULL;
+  const sonde_json *list = sonde_json_member(section, "segments"), *entry = sonde_json_first(list);
   if (!take_count(list, SONDE_SEGMENTS, &a->segment_count)) return wrong(r, "too many segments");
   uint32_t k = 0;
-  cJSON_ArrayForEach(entry, list) {
+  for (; entry; entry = sonde_json_next(entry)) {
     sonde_segment *s = &a->segment[k++];
-    s->from_m = cJSON_GetNumberValue(cJSON_GetObjectItem(entry, "from_m"));
-    s->to_m = cJSON_GetNumberValue(cJSON_GetObjectItem(entry, "to_m"));
-    if (!take_name(cJSON_GetObjectItem(entry, "name"), s->name) || !finite_row(&s->from_m, 2))
+    s->from_m = sonde_json_as_number(sonde_json_member(entry, "from_m"));
+    s->to_m = sonde_json_as_number(sonde_json_member(entry, "to_m"));
+    if (!take_name(sonde_json_member(entry, "name"), s->name) || !finite_row(&s->from_m, 2))
       return wrong(r, "a segment lacks its name or ends");
   }
   return SONDE_OK;
@@ -214,23 +212,23 @@ static sonde_status take_levels(const sonde_model_reader *r, sonde_thigh_anatomy
   return SONDE_OK;
 }
 
-static sonde_status take_scalars(const sonde_model_reader *r, const cJSON *section,
+static sonde_status take_scalars(const sonde_model_reader *r, const sonde_json *section,
                                  sonde_thigh_anatomy *a) {
-  const cJSON *angle = cJSON_GetObjectItem(section, "pennation_rad");
-  for (int k = 0; k < SONDE_COMPARTMENTS; ++k)
-    a->pennation_rad[k] = cJSON_GetNumberValue(cJSON_GetArrayItem(angle, k));
-  a->fascia_medial_m = cJSON_GetNumberValue(cJSON_GetObjectItem(section, "fascia_medial_m"));
-  a->fascia_lateral_m = cJSON_GetNumberValue(cJSON_GetObjectItem(section, "fascia_lateral_m"));
+  const sonde_json *angle = sonde_json_first(sonde_json_member(section, "pennation_rad"));
+  for (int k = 0; k < SONDE_COMPARTMENTS; ++k, angle = sonde_json_next(angle))
+    a->pennation_rad[k] = sonde_json_as_number(angle);
+  a->fascia_medial_m = sonde_json_as_number(sonde_json_member(section, "fascia_medial_m"));
+  a->fascia_lateral_m = sonde_json_as_number(sonde_json_member(section, "fascia_lateral_m"));
   bool ok = finite_row(a->pennation_rad, SONDE_COMPARTMENTS) && a->fascia_medial_m >= 0 &&
             a->fascia_lateral_m >= 0 && finite_row(&a->fascia_medial_m, 2);
   return ok ? SONDE_OK : wrong(r, "pennation or fascia is missing or out of range");
 }
 
 sonde_status sonde_anatomy_take(const sonde_model_reader *r, sonde_model *model) {
-  const cJSON *section = cJSON_GetObjectItem(r->header, "anatomy");
+  const sonde_json *section = sonde_json_member(r->header, "anatomy");
   if (!section) return SONDE_OK;
   SONDE_ASSERT(!model->anatomy);
-  double version = cJSON_GetNumberValue(cJSON_GetObjectItem(section, "version"));
+  double version = sonde_json_as_number(sonde_json_member(section, "version"));
   if (!(version == SECTION_VERSION))
     return sonde_fail(r->error, SONDE_VERSION, "%s: anatomy has version %g, expected %d", r->path,
                       version, SECTION_VERSION);

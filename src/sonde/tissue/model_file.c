@@ -9,7 +9,6 @@
 #include "base/bounds.h"
 #include "base/maths.h"
 
-#include <cjson/cJSON.h>
 #include <string.h>
 #include <zlib.h>
 
@@ -34,18 +33,17 @@ void sonde_model_put(writer *w, const char *name, const char *type, const char *
     w->room = blob ? room : 0;
     if (!blob) w->failed = true;
   }
-  cJSON *entry = cJSON_CreateObject();
-  if (w->failed || !entry || !cJSON_AddItemToArray(w->arrays, entry)) {
-    w->failed = true;
-    return;
-  }
-  const int shape[2] = {(int)rows, (int)columns};
-  bool ok = cJSON_AddStringToObject(entry, "name", name) &&
-            cJSON_AddStringToObject(entry, "type", type) &&
-            cJSON_AddStringToObject(entry, "unit", unit) &&
-            cJSON_AddItemToObject(entry, "shape", cJSON_CreateIntArray(shape, 2)) &&
-            cJSON_AddNumberToObject(entry, "offset", (double)w->used);
-  w->failed |= !ok;
+  if (w->failed) return;
+  sonde_json_begin_object(&w->header, NULL);
+  sonde_json_put_text(&w->header, "name", name);
+  sonde_json_put_text(&w->header, "type", type);
+  sonde_json_put_text(&w->header, "unit", unit);
+  sonde_json_begin_list(&w->header, "shape");
+  sonde_json_put_integer(&w->header, NULL, rows);
+  sonde_json_put_integer(&w->header, NULL, columns);
+  sonde_json_end(&w->header);
+  sonde_json_put_integer(&w->header, "offset", (int64_t)w->used);
+  sonde_json_end(&w->header);
   if (count) memcpy(w->blob + w->used, bytes, count);
   w->used += count;
 }
@@ -102,23 +100,14 @@ static void put_sites(writer *w, const sonde_model *model) {
   sonde_free(share);
 }
 
-// Index of a probe name in the header's list, added when it is new.
-static uint32_t probe_index(cJSON *names, const char *probe) {
-  int count = cJSON_GetArraySize(names);
-  for (int k = 0; k < count; ++k)
-    if (strcmp(cJSON_GetArrayItem(names, k)->valuestring, probe) == 0) return (uint32_t)k;
-  cJSON_AddItemToArray(names, cJSON_CreateString(probe));
-  return (uint32_t)count;
-}
-
-static void put_data(writer *w, cJSON *names, const sonde_model *model) {
+static void put_data(writer *w, const uint32_t *probe, const sonde_model *model) {
   uint32_t n = model->datum_count;
   uint32_t(*key)[2] = sonde_calloc(n, sizeof *key);
   double(*value)[2] = sonde_calloc(n, sizeof *value);
   if (key && value) {
     for (uint32_t k = 0; k < n; ++k) {
       key[k][0] = model->data[k].site;
-      key[k][1] = probe_index(names, model->data[k].probe);
+      key[k][1] = probe[k];
       value[k][0] = model->data[k].penetration_m;
       value[k][1] = model->data[k].force_n;
     }
@@ -173,32 +162,46 @@ static double *law_field(sonde_surface_law *law, int index, const char **name) {
   return field[index];
 }
 
-static cJSON *make_header(writer *w, const sonde_model *model) {
-  cJSON *header = cJSON_CreateObject();
-  cJSON *law = header ? cJSON_AddObjectToObject(header, "law") : NULL;
-  cJSON *names = header ? cJSON_AddArrayToObject(header, "probes") : NULL;
-  w->arrays = header ? cJSON_AddArrayToObject(header, "arrays") : NULL;
-  if (!law || !names || !w->arrays) {
-    cJSON_Delete(header);
-    return NULL;
+// Lists each probe of the data by name in the header; probe[datum] is its index in that list.
+static void put_probes(writer *w, uint32_t *probe, const sonde_model *model) {
+  uint32_t count = 0;
+  sonde_json_begin_list(&w->header, "probes");
+  for (uint32_t k = 0; k < model->datum_count; ++k) {
+    uint32_t first = 0;
+    while (strcmp(model->data[first].probe, model->data[k].probe) != 0) ++first;
+    SONDE_ASSERT(first <= k);
+    if (first == k) sonde_json_put_text(&w->header, NULL, model->data[k].probe);
+    probe[k] = first == k ? count++ : probe[first];
   }
-  cJSON_AddStringToObject(header, "name", model->name);
-  cJSON_AddStringToObject(header, "provenance", model->provenance);
-  cJSON_AddStringToObject(header, "written_by", "sonde " SONDE_VERSION_STRING);
+  sonde_json_end(&w->header);
+}
+
+static void put_model(writer *w, uint32_t *probe, const sonde_model *model) {
+  sonde_json_out *header = &w->header;
   sonde_surface_law copy = model->law;
   const char *name;
+  sonde_json_begin_object(header, NULL);
+  sonde_json_begin_object(header, "law");
   for (int k = 0; law_field(&copy, k, &name); ++k)
-    cJSON_AddNumberToObject(law, name, *law_field(&copy, k, &name));
+    sonde_json_put_real(header, name, *law_field(&copy, k, &name), 0);
+  sonde_json_end(header);
+  put_probes(w, probe, model);
+  sonde_json_begin_list(header, "arrays");
   put_mesh(w, "surface_vertices", "surface_faces", &model->surface);
   put_mesh(w, "femur_vertices", "femur_faces", &model->femur);
   put_nodes(w, model);
   put_cuts(w, model);
   put_sites(w, model);
-  put_data(w, names, model);
+  put_data(w, probe, model);
   put_vessel(w, "vein", &model->vein);
   put_vessel(w, "artery", &model->artery);
-  sonde_anatomy_put(w, header, model);
-  return header;
+  if (model->anatomy) sonde_anatomy_put_arrays(w, model->anatomy);
+  sonde_json_end(header);
+  sonde_json_put_text(header, "name", model->name);
+  sonde_json_put_text(header, "provenance", model->provenance);
+  sonde_json_put_text(header, "written_by", "sonde " SONDE_VERSION_STRING);
+  if (model->anatomy) sonde_anatomy_put_section(header, model->anatomy);
+  sonde_json_end(header);
 }
 
 static sonde_status write_parts(const char *path, const char *text, const writer *w,
@@ -223,23 +226,30 @@ static sonde_status write_parts(const char *path, const char *text, const writer
 }
 
 sonde_status sonde_model_save(sonde_model *model, const char *path, sonde_error *error) {
-  writer w = {0};
-  cJSON *header = make_header(&w, model);
-  char *text = header && !w.failed ? cJSON_Print(header) : NULL;
-  sonde_status status =
-      text ? write_parts(path, text, &w, &model->checksum, error) : sonde_fail_memory(error);
-  cJSON_free(text);
-  cJSON_Delete(header);
+  writer w = {.header = {.layout = SONDE_JSON_TABS}};
+  char *text = NULL;
+  size_t count;
+  uint32_t *probe = SONDE_NEW(uint32_t, model->datum_count);
+  sonde_status status = probe ? SONDE_OK : sonde_fail_memory(error);
+  if (!status) status = sonde_file_in_memory(&w.header.file, error);
+  if (!status) {
+    put_model(&w, probe, model);
+    status = sonde_file_take(w.header.file, &text, &count, error);
+  }
+  if (!status && w.failed) status = sonde_fail_memory(error);
+  if (!status) status = write_parts(path, text, &w, &model->checksum, error);
+  sonde_free(text);
+  sonde_free(probe);
   sonde_free(w.blob);
   return status;
 }
 
 /* ---- reader ------------------------------------------------------------------------------- */
 
-static const cJSON *find_array(const reader *r, const char *name) {
-  const cJSON *entry = NULL;
-  cJSON_ArrayForEach(entry, cJSON_GetObjectItem(r->header, "arrays")) {
-    const char *found = cJSON_GetStringValue(cJSON_GetObjectItem(entry, "name"));
+static const sonde_json *find_array(const reader *r, const char *name) {
+  const sonde_json *entry = sonde_json_first(sonde_json_member(r->header, "arrays"));
+  for (; entry; entry = sonde_json_next(entry)) {
+    const char *found = sonde_json_as_text(sonde_json_member(entry, "name"));
     if (found && strcmp(found, name) == 0) return entry;
   }
   return NULL;
@@ -248,12 +258,12 @@ static const cJSON *find_array(const reader *r, const char *name) {
 // Bytes of a named array with `columns` columns; NULL after setting the error.
 const void *sonde_model_take(const reader *r, const char *name, const char *type, uint32_t columns,
                              uint32_t *rows) {
-  const cJSON *entry = find_array(r, name);
-  const cJSON *shape = cJSON_GetObjectItem(entry, "shape");
-  const char *kind = cJSON_GetStringValue(cJSON_GetObjectItem(entry, "type"));
-  double height = cJSON_GetNumberValue(cJSON_GetArrayItem(shape, 0));
-  double width = cJSON_GetNumberValue(cJSON_GetArrayItem(shape, 1));
-  double offset = cJSON_GetNumberValue(cJSON_GetObjectItem(entry, "offset"));
+  const sonde_json *entry = find_array(r, name);
+  const sonde_json *shape = sonde_json_first(sonde_json_member(entry, "shape"));
+  const char *kind = sonde_json_as_text(sonde_json_member(entry, "type"));
+  double height = sonde_json_as_number(shape);
+  double width = sonde_json_as_number(sonde_json_next(shape));
+  double offset = sonde_json_as_number(sonde_json_member(entry, "offset"));
   size_t item = strcmp(type, "f64") == 0 ? 8 : 4;
   bool ok = entry && kind && strcmp(kind, type) == 0 && width == (double)columns && height >= 0 &&
             height < 1e8 && offset >= 0 &&
@@ -358,7 +368,7 @@ static bool take_data(const reader *r, sonde_model *model) {
   const char *key = sonde_model_take(r, "datum_key", "u32", 2, &n);
   const char *value = key ? sonde_model_take(r, "datum", "f64", 2, &m) : NULL;
   if (!value || n != m) return false;
-  const cJSON *names = cJSON_GetObjectItem(r->header, "probes");
+  const sonde_json *names = sonde_json_member(r->header, "probes");
   model->data = SONDE_NEW(sonde_datum, n);
   if (!model->data) return false;
   model->datum_count = n;
@@ -369,8 +379,10 @@ static bool take_data(const reader *r, sonde_model *model) {
     memcpy(&probe, key + 4, 4);
     memcpy(&d->penetration_m, value, 8);
     memcpy(&d->force_n, value + 8, 8);
-    const char *name = cJSON_GetStringValue(cJSON_GetArrayItem(names, (int)(probe & 0xffff)));
-    snprintf(d->probe, sizeof d->probe, "%s", name ? name : "?");
+    const sonde_json *name = sonde_json_first(names);
+    for (uint32_t i = probe & 0xffff; name && i > 0; --i) name = sonde_json_next(name);
+    const char *text = sonde_json_as_text(name);
+    snprintf(d->probe, sizeof d->probe, "%s", text ? text : "?");
   }
   return true;
 }
@@ -390,23 +402,23 @@ static bool take_vessel(const reader *r, const char *name, sonde_vessel *vessel)
 }
 
 static bool take_law(const reader *r, sonde_surface_law *law) {
-  const cJSON *object = cJSON_GetObjectItem(r->header, "law");
+  const sonde_json *object = sonde_json_member(r->header, "law");
   const char *name;
   double *field;
   for (int k = 0; (field = law_field(law, k, &name)) != NULL; ++k) {
-    const cJSON *item = cJSON_GetObjectItem(object, name);
+    const sonde_json *item = sonde_json_member(object, name);
     if (!item && field == &law->inplane_stiffness_n_m) continue; // files before version 4 have none
-    if (!cJSON_IsNumber(item)) {
+    if (sonde_json_kind_of(item) != SONDE_JSON_NUMBER) {
       sonde_fail(r->error, SONDE_FORMAT, "%s: law.%s is missing, expected a number", r->path, name);
       return false;
     }
-    *field = item->valuedouble;
+    *field = sonde_json_as_number(item);
   }
   return true;
 }
 
 static void take_text(const reader *r, const char *key, char *to, size_t size) {
-  const char *text = cJSON_GetStringValue(cJSON_GetObjectItem(r->header, key));
+  const char *text = sonde_json_as_text(sonde_json_member(r->header, key));
   snprintf(to, size, "%s", text ? text : "");
 }
 
@@ -550,17 +562,17 @@ sonde_status sonde_model_load(const char *path, sonde_model **out, sonde_error *
   char *bytes = NULL;
   size_t count = 0, text = 0, blob = 0, start = 0;
   sonde_error scratch = {0};
-  cJSON *header = NULL;
+  sonde_json *header = NULL;
   sonde_model *model = SONDE_NEW(sonde_model, 1);
   sonde_status status = model ? sonde_bounded_load(path, &sonde_limits_model, &bytes, &count, error)
                               : sonde_fail_memory(error);
   if (!status) status = split(path, bytes, count, &text, &blob, &start, error);
-  if (!status) status = sonde_bounded_json(path, bytes + start, text, &sonde_limits_model, error);
+  const sonde_json_source source = {path, 2, sonde_limits_model.most_depth,
+                                    (uint32_t)sonde_limits_model.most_items};
+  if (!status) status = sonde_json_parse(bytes + start, text, &source, &header, error);
   if (!status) {
-    header = cJSON_ParseWithLength(bytes + start, text);
     reader r = {path, header, bytes + start + text, blob, &scratch};
-    status = header ? read_model(&r, model)
-                    : sonde_fail(&scratch, SONDE_FORMAT, "%s:2: the header is not JSON", path);
+    status = read_model(&r, model);
     if (status && error) *error = scratch;
   }
   if (!status) {
@@ -568,7 +580,7 @@ sonde_status sonde_model_load(const char *path, sonde_model **out, sonde_error *
     *out = model;
     model = NULL;
   }
-  cJSON_Delete(header);
+  sonde_json_free(header);
   sonde_free(bytes);
   sonde_model_destroy(model);
   return status;

@@ -2,12 +2,11 @@
 #ifndef SONDE_SRC_MODEL_FILE_H
 #define SONDE_SRC_MODEL_FILE_H
 
+#include "sonde/base_json.h"
 #include "sonde/tissue_anatomy.h"
 
-#include <cjson/cJSON.h>
-
 typedef struct sonde_model_writer {
-  cJSON *arrays;
+  sonde_json_out header; // within its list `arrays`
   char *blob;
   size_t used, room;
   bool failed;
@@ -15,7 +14,7 @@ typedef struct sonde_model_writer {
 
 typedef struct sonde_model_reader {
   const char *path;
-  const cJSON *header;
+  const sonde_json *header;
   const char *blob;
   size_t size;
   sonde_error *error;
@@ -28,8 +27,9 @@ void sonde_model_put(sonde_model_writer *w, const char *name, const char *type, 
 const void *sonde_model_take(const sonde_model_reader *r, const char *name, const char *type,
                              uint32_t columns, uint32_t *rows);
 
-// The section `anatomy` of the header and its arrays; a model without anatomy has none.
-void sonde_anatomy_put(sonde_model_writer *w, cJSON *header, const sonde_model *model);
+// The arrays of the anatomy, and its section of the header; a model without anatomy has neither.
+void sonde_anatomy_put_arrays(sonde_model_writer *w, const sonde_thigh_anatomy *anatomy);
+void sonde_anatomy_put_section(sonde_json_out *header, const sonde_thigh_anatomy *anatomy);
 sonde_status sonde_anatomy_take(const sonde_model_reader *r, sonde_model *model);
 
 #endif

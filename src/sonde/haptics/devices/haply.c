@@ -9,8 +9,9 @@
 #include "base/clock.h"
 #include "base/maths.h"
 #include "haptics/devices/websocket.h"
+#include "sonde/base_json.h"
 
-#include <cjson/cJSON.h>
+#include <string.h>
 
 static const double silence_s = 0.1;
 
@@ -29,48 +30,50 @@ static sonde_status bind(void *self, const sonde_device_open_def *def, sonde_err
   return status;
 }
 
-static bool read_vector(const cJSON *object, const char *name, sonde_vec3 *v) {
-  const cJSON *o = cJSON_GetObjectItemCaseSensitive(object, name);
-  const cJSON *x = cJSON_GetObjectItemCaseSensitive(o, "x");
-  const cJSON *y = cJSON_GetObjectItemCaseSensitive(o, "y");
-  const cJSON *z = cJSON_GetObjectItemCaseSensitive(o, "z");
-  if (!cJSON_IsNumber(x) || !cJSON_IsNumber(y) || !cJSON_IsNumber(z)) return false;
-  *v = vec3(x->valuedouble, y->valuedouble, z->valuedouble);
+static bool read_vector(const sonde_json *object, const char *name, sonde_vec3 *v) {
+  const sonde_json *o = sonde_json_member(object, name);
+  *v = vec3(sonde_json_as_number(sonde_json_member(o, "x")),
+            sonde_json_as_number(sonde_json_member(o, "y")),
+            sonde_json_as_number(sonde_json_member(o, "z")));
   return v_finite(*v);
 }
 
 // The grip is optional: without it the last rotation stays.
-static void read_grip(haply *h, const cJSON *root, sonde_device_sample *sample) {
+static void read_grip(haply *h, const sonde_json *root, sonde_device_sample *sample) {
   static const char *const kinds[] = {"wireless_verse_grip", "verse_grip"};
   static const char *const buttons[] = {"a", "b", "c"};
   for (size_t k = 0; k < SONDE_COUNT_OF(kinds); ++k) {
-    const cJSON *grip = cJSON_GetArrayItem(cJSON_GetObjectItemCaseSensitive(root, kinds[k]), 0);
-    const cJSON *state = cJSON_GetObjectItemCaseSensitive(grip, "state");
+    const sonde_json *grip = sonde_json_first(sonde_json_member(root, kinds[k]));
+    const sonde_json *state = sonde_json_member(grip, "state");
     sonde_vec3 v;
-    const cJSON *w = cJSON_GetObjectItemCaseSensitive(
-        cJSON_GetObjectItemCaseSensitive(state, "orientation"), "w");
-    if (cJSON_IsNumber(w) && read_vector(state, "orientation", &v))
-      h->rotation = q_unit((sonde_quat){w->valuedouble, v.x, v.y, v.z});
-    const cJSON *pressed = cJSON_GetObjectItemCaseSensitive(state, "buttons");
+    double w =
+        sonde_json_as_number(sonde_json_member(sonde_json_member(state, "orientation"), "w"));
+    if (isfinite(w) && read_vector(state, "orientation", &v))
+      h->rotation = q_unit((sonde_quat){w, v.x, v.y, v.z});
+    const sonde_json *pressed = sonde_json_member(state, "buttons");
     for (size_t b = 0; b < SONDE_COUNT_OF(buttons); ++b)
-      if (cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(pressed, buttons[b])))
+      if (sonde_json_kind_of(sonde_json_member(pressed, buttons[b])) == SONDE_JSON_TRUE)
         sample->buttons |= 1u << b;
   }
 }
 
 // Torn or foreign messages are dropped: silence, not nonsense, decides that a device is lost.
 static bool read_state(haply *h, sonde_device_sample *sample) {
-  cJSON *root = cJSON_Parse(h->socket.message);
-  const cJSON *device = cJSON_GetArrayItem(cJSON_GetObjectItemCaseSensitive(root, "inverse3"), 0);
-  const char *id = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(device, "device_id"));
-  const cJSON *state = cJSON_GetObjectItemCaseSensitive(device, "state");
-  bool known = id && read_vector(state, "cursor_position", &sample->world_from_probe.position);
+  sonde_json *root = NULL;
+  const char *message = h->socket.message;
+  if (sonde_json_parse(message, strlen(message), NULL, &root, NULL)) return false;
+  const sonde_json *device = sonde_json_first(sonde_json_member(root, "inverse3"));
+  const char *id = sonde_json_as_text(sonde_json_member(device, "device_id"));
+  const sonde_json *state = sonde_json_member(device, "state");
+  sonde_vec3 position;
+  bool known = id && read_vector(state, "cursor_position", &position);
   if (known) {
+    sample->world_from_probe.position = position;
     snprintf(h->device, sizeof h->device, "%s", id);
     read_grip(h, root, sample);
     sample->world_from_probe.rotation = h->rotation;
   }
-  cJSON_Delete(root);
+  sonde_json_free(root);
   return known;
 }
 
