@@ -8,7 +8,6 @@
 #include "sonde/base.h"
 #include "sonde/base_json.h"
 #include "sonde/geometry.h"
-#include "sonde/contact.h"
 #include "sonde/sparse.h"
 #include "sonde/tissue.h"
 #include "sonde/tissue_anatomy.h"

@@ -3,7 +3,7 @@
 #define SONDE_TESTS_CONTACT_BODIES_H
 
 #include "geometry/shapes.h"
-#include "sonde/contact.h"
+#include "contact/contact.h"
 
 static inline sonde_face_tree *body_tree(const sonde_mesh *mesh) {
   sonde_face_tree *tree = NULL;

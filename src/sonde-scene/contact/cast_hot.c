@@ -7,10 +7,6 @@
 //
 // for the rest of the motion, r the largest distance of a body's points from its origin, so that s
 // divided by this speed may pass without a touch.
-//
-//   advance        the loop
-//   face_body      a face as a convex body without inside
-//   swept          box of all that a body passes
 #include "contact/difference.h"
 #include "contact/tree.h"
 #include "geometry/internal.h"
@@ -26,13 +22,6 @@ sonde_pose sonde_motion_pose(const sonde_motion *motion, double time_s) {
   sonde_vec3 axis = v_scale(motion->spin_rad_s, sin(half) / spin);
   pose.rotation = q_mul((sonde_quat){cos(half), axis.x, axis.y, axis.z}, pose.rotation);
   return pose;
-}
-
-static double closing_speed(const sonde_convex *a, const sonde_motion *ma, const sonde_convex *b,
-                            const sonde_motion *mb, sonde_vec3 n) {
-  double speed = v_dot(v_sub(ma->velocity_m_s, mb->velocity_m_s), n);
-  speed += v_norm(v_cross(ma->spin_rad_s, n)) * a->radius_m;
-  return speed + v_norm(v_cross(mb->spin_rad_s, n)) * b->radius_m;
 }
 
 sonde_cast_result sonde_convex_cast(const sonde_convex *a, const sonde_motion *motion_a,
@@ -52,7 +41,10 @@ sonde_cast_result sonde_convex_cast(const sonde_convex *a, const sonde_motion *m
     if (!g.overlap) r.direction = v_unit(v_sub(g.point_b_m, g.point_a_m), vec3(0, 0, 0));
     r.hit = g.distance_m <= margin_m || r.iterations == MAX_ADVANCES;
     if (r.hit || r.time_s >= duration_s) return r;
-    double speed = closing_speed(a, motion_a, b, motion_b, r.direction);
+    // No point of A nears B faster than this speed.
+    double speed = v_dot(v_sub(motion_a->velocity_m_s, motion_b->velocity_m_s), r.direction);
+    speed += v_norm(v_cross(motion_a->spin_rad_s, r.direction)) * a->radius_m;
+    speed += v_norm(v_cross(motion_b->spin_rad_s, r.direction)) * b->radius_m;
     double gap = g.distance_m - 0.5 * margin_m, left = duration_s - r.time_s;
     r.time_s = gap < speed * left ? r.time_s + gap / speed : duration_s;
   }
@@ -67,56 +59,26 @@ typedef struct face_body {
   sonde_motion rest; // at its first corner
 } face_body;
 
-static void make_face(face_body *body, const sonde_face_tree *tree, uint32_t i) {
-  *body = (face_body){.start = {0, 2, 4, 6}, .neighbour = {1, 2, 0, 2, 0, 1}};
-  sonde_vec3 origin = tree->vertices[tree->corners[i][0]];
-  for (int k = 0; k < 3; ++k)
-    body->vertices[k] = v_sub(tree->vertices[tree->corners[i][k]], origin);
-  body->convex.hull.vertex_count = 3;
-  body->convex.hull.vertices = body->vertices;
-  body->convex.topology.vertex_count = 3;
-  body->convex.topology.start = body->start;
-  body->convex.topology.neighbour = body->neighbour;
-  body->rest.start = (sonde_pose){origin, {1, 0, 0, 0}};
-}
-
-static sonde_bounds swept(const sonde_convex *a, const sonde_motion *motion, double duration_s,
-                          double margin) {
-  sonde_bounds box = bounds_none();
-  sonde_vec3 r = vec3(a->radius_m, a->radius_m, a->radius_m), m = vec3(margin, margin, margin);
-  sonde_vec3 shift = v_scale(motion->velocity_m_s, duration_s);
-  if (v_norm2(motion->spin_rad_s) > 0) {
-    box = (sonde_bounds){v_sub(motion->start.position, r), v_add(motion->start.position, r)};
-  } else {
-    sonde_mat3 turn = q_matrix(motion->start.rotation);
-    for (uint32_t v = 0; v < a->hull.vertex_count; ++v)
-      box = bounds_add(box, v_add(m_mul_v(turn, a->hull.vertices[v]), motion->start.position));
-  }
-  box = bounds_join(box, (sonde_bounds){v_add(box.low, shift), v_add(box.high, shift)});
-  return (sonde_bounds){v_sub(box.low, m), v_add(box.high, m)};
-}
-
-// Keeps the earlier touch of the body with face i.
-static void cast_face(const sonde_convex *a, const sonde_motion *motion,
-                      const sonde_face_tree *tree, uint32_t i, double margin_m,
-                      sonde_cast_result *best) {
-  face_body face;
-  make_face(&face, tree, i);
-  sonde_cast_result r =
-      sonde_convex_cast(a, motion, &face.convex, &face.rest, best->time_s, margin_m);
-  r.iterations += best->iterations;
-  r.support_calls += best->support_calls;
-  if (r.hit && (!best->hit || r.time_s < best->time_s)) *best = r;
-  best->iterations = r.iterations;
-  best->support_calls = r.support_calls;
-}
-
 sonde_cast_result sonde_convex_cast_faces(const sonde_convex *a, const sonde_motion *motion_a,
                                           const sonde_face_tree *b, double duration_s,
                                           double margin_m) {
   SONDE_ASSERT(b != NULL && margin_m > 0 && duration_s >= 0);
   sonde_cast_result best = {.time_s = duration_s, .distance_m = INFINITY};
-  sonde_bounds box = swept(a, motion_a, duration_s, margin_m);
+  // The box holds all that the body passes.
+  sonde_bounds box = bounds_none();
+  double radius = a->radius_m;
+  sonde_vec3 reach = vec3(radius, radius, radius), margin = vec3(margin_m, margin_m, margin_m);
+  sonde_vec3 shift = v_scale(motion_a->velocity_m_s, duration_s);
+  if (v_norm2(motion_a->spin_rad_s) > 0) {
+    box = (sonde_bounds){v_sub(motion_a->start.position, reach),
+                         v_add(motion_a->start.position, reach)};
+  } else {
+    sonde_mat3 turn = q_matrix(motion_a->start.rotation);
+    for (uint32_t v = 0; v < a->hull.vertex_count; ++v)
+      box = bounds_add(box, v_add(m_mul_v(turn, a->hull.vertices[v]), motion_a->start.position));
+  }
+  box = bounds_join(box, (sonde_bounds){v_add(box.low, shift), v_add(box.high, shift)});
+  box = (sonde_bounds){v_sub(box.low, margin), v_add(box.high, margin)};
   uint32_t stack[TREE_STACK], depth = 0;
   stack[depth++] = 0;
   while (depth) {
@@ -129,8 +91,27 @@ sonde_cast_result sonde_convex_cast_faces(const sonde_convex *a, const sonde_mot
       stack[depth++] = at + 1;
       continue;
     }
-    for (uint32_t i = node->first; i < node->first + node->count; ++i)
-      cast_face(a, motion_a, b, i, margin_m, &best);
+    for (uint32_t i = node->first; i < node->first + node->count; ++i) {
+      face_body face;
+      // A face is a convex body without inside, at rest at its first corner.
+      face = (face_body){.start = {0, 2, 4, 6}, .neighbour = {1, 2, 0, 2, 0, 1}};
+      sonde_vec3 origin = b->vertices[b->corners[i][0]];
+      for (int k = 0; k < 3; ++k) face.vertices[k] = v_sub(b->vertices[b->corners[i][k]], origin);
+      face.convex.hull.vertex_count = 3;
+      face.convex.hull.vertices = face.vertices;
+      face.convex.topology.vertex_count = 3;
+      face.convex.topology.start = face.start;
+      face.convex.topology.neighbour = face.neighbour;
+      face.rest.start = (sonde_pose){origin, {1, 0, 0, 0}};
+      sonde_cast_result r =
+          sonde_convex_cast(a, motion_a, &face.convex, &face.rest, best.time_s, margin_m);
+      // The earliest touch of all faces remains, with the sum of the work.
+      r.iterations += best.iterations;
+      r.support_calls += best.support_calls;
+      if (r.hit && (!best.hit || r.time_s < best.time_s)) best = r;
+      best.iterations = r.iterations;
+      best.support_calls = r.support_calls;
+    }
   }
   return best;
 }

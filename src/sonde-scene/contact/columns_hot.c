@@ -4,25 +4,7 @@
 // centroid and second moments: they integrate products of two linear functions exactly and lie
 // inside every convex polygon, for the ellipse through them is sqrt(2) times the one of its
 // standard deviations (Kannan, Lovasz and Simonovits 1995).
-//
-//   region_box       of the common part of a region's touched faces
-//   emit             points of one polygon
-//   add_columns      a pair of faces above each other
-//   blocked          does another face lie in between?
-//   drop_blocked     keeps the columns without a gap
 #include "contact/overlap.h"
-
-static sonde_bounds region_box(const sonde_overlap *overlap, const sonde_overlap_region *r) {
-  sonde_bounds box[2];
-  for (int side = 0; side < 2; ++side) {
-    const overlap_body *b = &overlap->body[side];
-    box[side] = bounds_none();
-    for (uint32_t i = 0; i < r->entry_count[side]; ++i)
-      box[side] =
-          bounds_add(box[side], b->tree->vertices[b->entries[r->first_entry[side] + i].vertex]);
-  }
-  return bounds_common(box[0], box[1]);
-}
 
 static void emit(sonde_overlap *overlap, const seen_face *a, const seen_face *b, double u, double v,
                  double area) {
@@ -39,22 +21,17 @@ static void emit(sonde_overlap *overlap, const seen_face *a, const seen_face *b,
   p->depth_m = fmax(depth, 0);
 }
 
-// Whether the faces bound the region whose columns are made.
-static bool belongs(const sonde_overlap *overlap, const seen_face *a, const seen_face *b) {
-  uint32_t own = overlap->column_region;
-  SONDE_ASSERT(own < overlap->region_count);
-  uint32_t ra = overlap->body[0].region[a->face], rb = overlap->body[1].region[b->face];
-  uint32_t family = overlap->family[own];
-  if (overlap->family[ra] != family || overlap->family[rb] != family) return false;
-  if (overlap->split_by[own] == 0) return ra == own;
-  return overlap->split_by[own] == 1 ? rb == own : true;
-}
-
 static void add_columns(sonde_overlap *overlap, const view *w, const seen_face *a,
                         const seen_face *b, const covered *polygon, double low) {
   (void)w;
   (void)low;
-  if (!belongs(overlap, a, b)) return;
+  // The faces bound the region whose columns are made, or they are passed over.
+  uint32_t own = overlap->column_region, family = overlap->family[own];
+  SONDE_ASSERT(own < overlap->region_count);
+  uint32_t region[2] = {overlap->body[0].region[a->face], overlap->body[1].region[b->face]};
+  if (overlap->family[region[0]] != family || overlap->family[region[1]] != family) return;
+  int split_by = overlap->split_by[own];
+  if (split_by >= 0 && region[split_by] != own) return;
   if (a->twice_area < 0 || b->twice_area > 0) {
     overlap->layered = true;
     return;
@@ -87,16 +64,6 @@ typedef struct column {
   uint32_t skip; // face that it begins or ends on
 } column;
 
-static bool box_meets(const sonde_bounds *box, const column *c) {
-  const view *w = c->view;
-  sonde_vec3 half = v_scale(v_sub(box->high, box->low), 0.5);
-  sonde_vec3 middle = v_sub(v_scale(v_add(box->low, box->high), 0.5), c->foot);
-  double z = v_dot(middle, w->k), reach = v_dot(half, w->abs_k);
-  return fabs(v_dot(middle, w->u)) <= v_dot(half, w->abs_u) &&
-         fabs(v_dot(middle, w->v)) <= v_dot(half, w->abs_v) && z + reach >= 0 &&
-         z - reach <= c->length;
-}
-
 // Whether the face is met strictly inside the column.
 static bool face_meets(const sonde_face_tree *tree, uint32_t i, const column *c) {
   sonde_vec3 p[3];
@@ -121,7 +88,15 @@ static bool blocked(sonde_overlap *overlap, const sonde_face_tree *tree, const c
     const tree_node *node = &tree->nodes[stack[--depth]];
     uint32_t at = (uint32_t)(node - tree->nodes);
     ++overlap->result.box_tests;
-    if (!box_meets(&node->box, c)) continue;
+    // The box is compared with the column in the axes of the view.
+    const view *w = c->view;
+    sonde_vec3 half = v_scale(v_sub(node->box.high, node->box.low), 0.5);
+    sonde_vec3 middle = v_sub(v_scale(v_add(node->box.low, node->box.high), 0.5), c->foot);
+    double z = v_dot(middle, w->k), reach = v_dot(half, w->abs_k);
+    if (!(fabs(v_dot(middle, w->u)) <= v_dot(half, w->abs_u) &&
+          fabs(v_dot(middle, w->v)) <= v_dot(half, w->abs_v) && z + reach >= 0 &&
+          z - reach <= c->length))
+      continue;
     if (!node->count) {
       SONDE_ASSERT(depth + 2 <= TREE_STACK);
       stack[depth++] = node->first;
@@ -134,41 +109,49 @@ static bool blocked(sonde_overlap *overlap, const sonde_face_tree *tree, const c
   return false;
 }
 
-// A column that passes through another face joins two parts of the common volume across a gap.
-static void drop_blocked(sonde_overlap *overlap, const view *w, const sonde_overlap_region *r) {
-  uint32_t kept = r->first_point;
-  for (uint32_t i = r->first_point; i < overlap->point_count; ++i) {
-    const sonde_overlap_point *p = &overlap->points[i];
-    const overlap_body *b = &overlap->body[1];
-    column c = {.view = w, .direction = r->direction, .length = p->depth_m, .skip = p->face_b};
-    for (int k = 0; k < 3; ++k)
-      c.foot = v_madd(c.foot, p->weight_b[k], b->tree->vertices[b->corner[p->face_b][k]]);
-    if (blocked(overlap, b->tree, &c)) continue;
-    c.skip = p->face_a;
-    if (blocked(overlap, overlap->body[0].tree, &c)) continue;
-    overlap->points[kept++] = *p;
-  }
-  overlap->point_count = kept;
-}
-
 void sonde_overlap_columns(sonde_overlap *overlap) {
   if (overlap->config.points_per_piece == UINT32_MAX) return;
   for (uint32_t k = 0; k < overlap->region_count; ++k) {
     sonde_overlap_region *r = &overlap->regions[k];
     r->first_point = overlap->point_count;
     if (!r->entry_count[0] || !r->entry_count[1]) continue;
-    sonde_bounds box = region_box(overlap, r);
+    // The columns run within the common box of the vertices that bound the region.
+    sonde_bounds ends[2];
+    for (int side = 0; side < 2; ++side) {
+      const overlap_body *b = &overlap->body[side];
+      ends[side] = bounds_none();
+      for (uint32_t i = 0; i < r->entry_count[side]; ++i)
+        ends[side] =
+            bounds_add(ends[side], b->tree->vertices[b->entries[r->first_entry[side] + i].vertex]);
+    }
+    sonde_bounds box = bounds_common(ends[0], ends[1]);
     if (box.low.x > box.high.x || box.low.y > box.high.y || box.low.z > box.high.z) continue;
     view w = sonde_view_make(r->direction, box);
     overlap->column_region = k;
     overlap->layered = false;
     overlap->deepest = 0;
     sonde_view_pairs(overlap, &w, true, add_columns);
-    if (overlap->layered) drop_blocked(overlap, &w, r);
+    if (overlap->layered) {
+      // A column that passes through another face joins two parts of the common volume across a
+      // gap: it is dropped.
+      uint32_t whole = r->first_point;
+      overlap->deepest = 0;
+      for (uint32_t i = r->first_point; i < overlap->point_count; ++i) {
+        const sonde_overlap_point *p = &overlap->points[i];
+        const sonde_face_tree *above = overlap->body[0].tree, *below = overlap->body[1].tree;
+        const uint32_t *corner = overlap->body[1].corner[p->face_b];
+        column c = {.view = &w, .direction = r->direction, .length = p->depth_m, .skip = p->face_b};
+        for (int e = 0; e < 3; ++e)
+          c.foot = v_madd(c.foot, p->weight_b[e], below->vertices[corner[e]]);
+        if (blocked(overlap, below, &c)) continue;
+        c.skip = p->face_a;
+        if (blocked(overlap, above, &c)) continue;
+        overlap->deepest = fmax(overlap->deepest, p->depth_m);
+        overlap->points[whole++] = *p;
+      }
+      overlap->point_count = whole;
+    }
     r->point_count = overlap->point_count - r->first_point;
-    if (overlap->layered) overlap->deepest = 0;
-    for (uint32_t i = 0; i < r->point_count && overlap->layered; ++i)
-      overlap->deepest = fmax(overlap->deepest, overlap->points[r->first_point + i].depth_m);
     if (r->point_count) r->depth_m = overlap->deepest;
   }
 }

@@ -5,7 +5,7 @@
 #include "base/base.h"
 #include "base/maths.h"
 #include "geometry/internal.h"
-#include "sonde/contact.h"
+#include "contact/contact.h"
 
 typedef struct difference {
   const sonde_convex *a, *b;

@@ -5,13 +5,6 @@
 // d.x, B moved by y = (h(d) + m) d is clear of A. GJK gives the point p of D closest to y and the
 // normal n there; then h(n) = p.n = y.n - |y - p| <= h(d), for |y - p| >= m. So the normal of the
 // gap is a better direction until it no longer changes, and every h is an upper bound of the depth.
-//
-//   middle           of a body's vertices
-//   towards          a first direction
-//   correct          one displacement
-//   nudge            off an unstable direction
-//   follow           displacements until the depth stays
-//   search           from several first directions
 #include "contact/difference.h"
 #include "geometry/internal.h"
 
@@ -24,12 +17,6 @@ static sonde_vec3 middle(const sonde_convex *convex) {
   return v_scale(sum, 1.0 / convex->hull.vertex_count);
 }
 
-static sonde_vec3 towards(difference *d) {
-  sonde_vec3 b = v_add(m_mul_v(d->a_from_b, middle(d->b)), d->offset);
-  d->work += d->a->hull.vertex_count + d->b->hull.vertex_count;
-  return v_unit(v_sub(b, middle(d->a)), vec3(0, 0, 1));
-}
-
 typedef struct trial {
   sonde_vec3 direction, on_a; // in A's frame
   double depth;
@@ -40,20 +27,6 @@ static trial try_direction(difference *d, sonde_vec3 direction) {
   trial t = {.direction = direction};
   t.depth = v_dot(difference_support(d, direction, &t.on_a), direction);
   return t;
-}
-
-// The direction of the gap after the displacement; false when GJK finds none.
-static bool correct(difference *d, sonde_pose b_at, const trial *now, sonde_gjk_cache *cache,
-                    trial *next) {
-  const sonde_pose a_at = {{0, 0, 0}, {1, 0, 0, 0}};
-  double clear = 1.05 * now->depth + 1e-6 * (d->a->radius_m + d->b->radius_m);
-  b_at.position = v_madd(b_at.position, clear, now->direction);
-  sonde_gjk_result gap = sonde_gjk_distance(d->a, a_at, d->b, b_at, cache);
-  d->work += gap.support_calls;
-  if (gap.overlap || !(gap.distance_m > 0)) return false;
-  sonde_vec3 way = v_sub(gap.point_b_m, gap.point_a_m);
-  *next = try_direction(d, v_unit(way, now->direction));
-  return true;
 }
 
 // A direction through a corner of D is where the corrections stand still although every other is
@@ -78,43 +51,21 @@ static bool follow(difference *d, sonde_pose b_at, trial *best, uint32_t *rounds
   // GJK starts at the vertices just found: nothing but the first direction looks at all of them.
   sonde_gjk_cache cache = {.count = 1, .a = {d->last_a}, .b = {d->last_b}};
   for (uint32_t k = 0; k < MAX_CORRECTIONS && best->depth > 0; ++k) {
-    trial next;
     ++*rounds;
-    if (!correct(d, b_at, best, &cache, &next)) return false;
+    // The next direction is that of the gap after the displacement.
+    const sonde_pose a_at = {{0, 0, 0}, {1, 0, 0, 0}};
+    double clear = 1.05 * best->depth + 1e-6 * (d->a->radius_m + d->b->radius_m);
+    sonde_pose moved = {v_madd(b_at.position, clear, best->direction), b_at.rotation};
+    sonde_gjk_result gap = sonde_gjk_distance(d->a, a_at, d->b, moved, &cache);
+    d->work += gap.support_calls;
+    if (gap.overlap || !(gap.distance_m > 0)) return false;
+    sonde_vec3 way = v_sub(gap.point_b_m, gap.point_a_m);
+    trial next = try_direction(d, v_unit(way, best->direction));
     bool stands = !(next.depth < best->depth * (1 - 1e-9));
     if (next.depth < best->depth) *best = next;
     if (stands && !nudge(d, best)) return true;
   }
   return false;
-}
-
-static void keep(trial starts[STARTS], trial t) {
-  for (int k = 0; k < STARTS; ++k) {
-    if (!(t.depth < starts[k].depth)) continue;
-    trial swap = starts[k];
-    starts[k] = t;
-    t = swap;
-  }
-}
-
-// The best after correction of the first direction and of the shallowest of 26 around.
-static bool search(difference *d, sonde_pose b_at, sonde_vec3 first, trial *best,
-                   uint32_t *rounds) {
-  trial starts[STARTS];
-  for (int k = 0; k < STARTS; ++k) starts[k] = (trial){.depth = INFINITY};
-  for (int k = 0; k < 27; ++k) {
-    sonde_vec3 way = vec3(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1);
-    if (v_norm2(way) > 0) keep(starts, try_direction(d, v_unit(way, way)));
-  }
-  *best = try_direction(d, first);
-  bool converged = follow(d, b_at, best, rounds);
-  for (int k = 0; k < STARTS && best->depth > 0; ++k) {
-    bool done = follow(d, b_at, &starts[k], rounds);
-    if (!(starts[k].depth < best->depth)) continue;
-    *best = starts[k];
-    converged = done;
-  }
-  return converged;
 }
 
 sonde_depth_result sonde_convex_displace(const sonde_convex *a, sonde_pose world_from_a,
@@ -125,9 +76,36 @@ sonde_depth_result sonde_convex_displace(const sonde_convex *a, sonde_pose world
   sonde_pose b_at = pose_mul(pose_inverse(world_from_a), world_from_b);
   sonde_vec3 first = q_rotate(q_conj(world_from_a.rotation), direction);
   sonde_depth_result r = {0};
-  trial best;
-  first = v_norm2(first) > 0 ? v_unit(first, first) : towards(&d);
-  r.converged = search(&d, b_at, first, &best, &r.iterations);
+  if (v_norm2(first) > 0) {
+    first = v_unit(first, first);
+  } else { // along the line between the middles of the bodies
+    sonde_vec3 middle_b = v_add(m_mul_v(d.a_from_b, middle(b)), d.offset);
+    d.work += a->hull.vertex_count + b->hull.vertex_count;
+    first = v_unit(v_sub(middle_b, middle(a)), vec3(0, 0, 1));
+  }
+  // The depth is the least one that the corrections reach from the first direction and from the
+  // shallowest of 26 around.
+  trial starts[STARTS];
+  for (int k = 0; k < STARTS; ++k) starts[k] = (trial){.depth = INFINITY};
+  for (int k = 0; k < 27; ++k) {
+    sonde_vec3 way = vec3(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1);
+    if (!(v_norm2(way) > 0)) continue;
+    trial t = try_direction(&d, v_unit(way, way));
+    for (int i = 0; i < STARTS; ++i) {
+      if (!(t.depth < starts[i].depth)) continue;
+      trial swap = starts[i];
+      starts[i] = t;
+      t = swap;
+    }
+  }
+  trial best = try_direction(&d, first);
+  r.converged = follow(&d, b_at, &best, &r.iterations);
+  for (int k = 0; k < STARTS && best.depth > 0; ++k) {
+    bool done = follow(&d, b_at, &starts[k], &r.iterations);
+    if (!(starts[k].depth < best.depth)) continue;
+    best = starts[k];
+    r.converged = done;
+  }
   r.support_calls = d.work;
   if (!(best.depth > 0))
     return (sonde_depth_result){.iterations = r.iterations, .support_calls = d.work};

@@ -2,12 +2,6 @@
 // 2001). The face whose plane is nearest to 0 bounds the depth from below, the support along its
 // normal from above; as long as they differ the support point is added to the polytope. While 0 is
 // still outside, that face has a negative offset and is the one to expand as well.
-//
-//   add_face      plane of three points; one without area is never nearest nor visible
-//   begin         a tetrahedron of support points
-//   nearest       the face with the least offset
-//   remove_seen   faces that the new point sees, and the edges around them
-//   finish        the point of A from the weights of the face's corners
 #include "contact/difference.h"
 
 enum { MAX_POINTS = 256, MAX_FACES = 2 * MAX_POINTS, MAX_EDGES = 3 * MAX_FACES };
@@ -80,14 +74,6 @@ static bool begin(polytope *p) {
          add_face(p, 1, 3, 2);
 }
 
-static const facet *nearest(const polytope *p) {
-  const facet *best = &p->faces[0];
-  SONDE_ASSERT(p->face_count > 0);
-  for (uint32_t f = 1; f < p->face_count; ++f)
-    if (p->faces[f].offset < best->offset) best = &p->faces[f];
-  return best;
-}
-
 // Puts the edge into the list, or takes its opposite out.
 static bool toggle_edge(polytope *p, uint32_t a, uint32_t b) {
   for (uint32_t e = 0; e < p->edge_count; ++e) {
@@ -103,27 +89,23 @@ static bool toggle_edge(polytope *p, uint32_t a, uint32_t b) {
   return true;
 }
 
-static bool remove_seen(polytope *p, sonde_vec3 w) {
+static bool expand(polytope *p, point q) {
+  if (p->point_count == MAX_POINTS || p->face_count + 16 > MAX_FACES) return false;
+  uint32_t added = p->point_count++;
+  p->points[added] = q;
+  // Faces that the new point sees are removed; the edges around them remain in the list.
   uint32_t kept = 0;
   bool room = true;
   p->edge_count = 0;
   for (uint32_t f = 0; f < p->face_count; ++f) {
     const facet *face = &p->faces[f];
-    if (v_dot(face->normal, w) > face->offset + 1e-14 * p->size)
+    if (v_dot(face->normal, q.w) > face->offset + 1e-14 * p->size)
       for (int k = 0; k < 3; ++k)
         room &= toggle_edge(p, face->corner[k], face->corner[(k + 1) % 3]);
     else
       p->faces[kept++] = *face;
   }
   p->face_count = kept;
-  return room;
-}
-
-static bool expand(polytope *p, point q) {
-  if (p->point_count == MAX_POINTS || p->face_count + 16 > MAX_FACES) return false;
-  uint32_t added = p->point_count++;
-  p->points[added] = q;
-  bool room = remove_seen(p, q.w);
   for (uint32_t e = 0; e < p->edge_count && room; ++e)
     room = add_face(p, p->edges[e][0], p->edges[e][1], added);
   SONDE_ASSERT(p->face_count <= MAX_FACES);
@@ -158,7 +140,11 @@ sonde_depth_result sonde_convex_expand(const sonde_convex *a, sonde_pose world_f
   facet best = p.faces[0];
   sonde_vec3 on_a = point_of_a(&p, &best);
   for (bool going = true; going;) {
-    const facet *face = nearest(&p);
+    // The face with the least offset bounds the depth from below.
+    const facet *face = &p.faces[0];
+    SONDE_ASSERT(p.face_count > 0);
+    for (uint32_t f = 1; f < p.face_count; ++f)
+      if (p.faces[f].offset < face->offset) face = &p.faces[f];
     point q = support(&p, face->normal);
     double reach = v_dot(face->normal, q.w);
     ++r.iterations;

@@ -74,6 +74,7 @@ typedef struct overlap_group {
 } overlap_group;
 
 struct sonde_overlap {
+  void *block; // all arrays below and those of the bodies
   sonde_overlap_config config;
   overlap_body body[2];
   piece *pieces;

@@ -1,9 +1,4 @@
 // Common volume of two meshes by the column method (docs/contact.md).
-//
-//   see_row / add_piece   a pair of faces above each other
-//   approach              direction for the columns when none is given
-//   tilted                that direction off the faces that it may run along
-//   gather                all pieces, again along another tilt where a face runs along k
 #include "contact/overlap.h"
 
 // Off the axes, so that faces along or across the hint are seen at an angle; further ones in case
@@ -29,13 +24,6 @@ static void see_row(sonde_overlap *overlap, int side, const view *w, const seen_
   b->seen[b->seen_count++] = f;
 }
 
-static double mean_depth(const view *w, const seen_face *a, const seen_face *b, const piece *p) {
-  (void)w;
-  double depth = 0;
-  for (int k = 0; k < 3; ++k) depth += p->weight[0][k] * a->p[k].z - p->weight[1][k] * b->p[k].z;
-  return depth;
-}
-
 static void add_piece(sonde_overlap *overlap, const view *w, const seen_face *a, const seen_face *b,
                       const covered *polygon, double low) {
   moments m = sonde_covered_moments(polygon);
@@ -50,28 +38,14 @@ static void add_piece(sonde_overlap *overlap, const view *w, const seen_face *a,
   p->side[1] = b->twice_area > 0 ? 1 : -1;
   sonde_seen_weights(a, m.u, m.v, p->weight[0]);
   sonde_seen_weights(b, m.u, m.v, p->weight[1]);
-  p->depth = mean_depth(w, a, b, p);
+  // The depth is z_a - z_b, the mean over the polygon: its value at the centroid.
+  for (int k = 0; k < 3; ++k) p->depth += p->weight[0][k] * a->p[k].z - p->weight[1][k] * b->p[k].z;
   p->crossing = low <= 1e-12 * (fabs(a->box.high.z) + fabs(b->box.low.z));
   see_row(overlap, 0, w, a);
   see_row(overlap, 1, w, b);
   overlap->volume_m3 -= p->side[0] * p->side[1] * p->area * p->depth;
   overlap->body[0].net[a->face] -= p->side[1] * p->area;
   overlap->body[1].net[b->face] += p->side[0] * p->area;
-}
-
-// Axis along which the boxes overlap least, towards B's middle.
-static sonde_vec3 approach(const sonde_bounds *a, const sonde_bounds *b, sonde_bounds common) {
-  sonde_vec3 size = v_sub(common.high, common.low);
-  sonde_vec3 way = v_sub(v_add(b->low, b->high), v_add(a->low, a->high));
-  if (size.x <= size.y && size.x <= size.z) return vec3(way.x < 0 ? -1 : 1, 0, 0);
-  if (size.y <= size.z) return vec3(0, way.y < 0 ? -1 : 1, 0);
-  return vec3(0, 0, way.z < 0 ? -1 : 1);
-}
-
-static sonde_vec3 tilted(sonde_vec3 k, uint32_t turn) {
-  sonde_bounds point = {{0, 0, 0}, {0, 0, 0}};
-  view w = sonde_view_make(k, point);
-  return v_unit(v_madd(v_madd(k, tilts[turn][0], w.u), tilts[turn][1], w.v), k);
 }
 
 static void forget(sonde_overlap *overlap) {
@@ -81,34 +55,6 @@ static void forget(sonde_overlap *overlap) {
   overlap->steep = false;
   overlap->result.flags = 0;
   overlap->body[0].seen_count = overlap->body[1].seen_count = 0;
-}
-
-static sonde_vec3 gather(sonde_overlap *overlap, sonde_vec3 hint, sonde_bounds common) {
-  sonde_vec3 k = hint;
-  for (uint32_t turn = 0; turn < SONDE_COUNT_OF(tilts); ++turn) {
-    forget(overlap);
-    k = tilted(hint, turn);
-    view w = sonde_view_make(k, common);
-    bool last = turn + 1 == SONDE_COUNT_OF(tilts);
-    overlap->patient = last;
-    sonde_view_pairs(overlap, &w, false, add_piece);
-    if (!overlap->steep) break;
-  }
-  return k;
-}
-
-static void publish(sonde_overlap *overlap) {
-  sonde_overlap_result *r = &overlap->result;
-  SONDE_ASSERT(overlap->region_count <= overlap->config.max_regions);
-  r->volume_m3 = overlap->volume_m3;
-  r->region_count = overlap->region_count;
-  r->point_count = overlap->point_count;
-  r->regions = overlap->regions;
-  r->points = overlap->points;
-  for (int k = 0; k < 2; ++k) {
-    r->entries[k] = overlap->body[k].entries;
-    r->entry_count[k] = overlap->body[k].entry_count;
-  }
 }
 
 bool sonde_overlap_compute(sonde_overlap *overlap, const sonde_face_tree *a,
@@ -124,12 +70,44 @@ bool sonde_overlap_compute(sonde_overlap *overlap, const sonde_face_tree *a,
   sonde_bounds box_a = a->nodes[0].box, box_b = b->nodes[0].box;
   if (bounds_meet(&box_a, &box_b, 0)) {
     sonde_bounds common = bounds_common(box_a, box_b);
-    if (!(v_norm2(hint) > 0)) hint = approach(&box_a, &box_b, common);
-    sonde_vec3 k = gather(overlap, v_unit(hint, vec3(0, 0, 1)), common);
+    if (!(v_norm2(hint) > 0)) {
+      // The hint defaults to the axis along which the boxes overlap least, towards B's middle.
+      sonde_vec3 size = v_sub(common.high, common.low);
+      sonde_vec3 way = v_sub(v_add(box_b.low, box_b.high), v_add(box_a.low, box_a.high));
+      if (size.x <= size.y && size.x <= size.z)
+        hint = vec3(way.x < 0 ? -1 : 1, 0, 0);
+      else if (size.y <= size.z)
+        hint = vec3(0, way.y < 0 ? -1 : 1, 0);
+      else
+        hint = vec3(0, 0, way.z < 0 ? -1 : 1);
+    }
+    hint = v_unit(hint, vec3(0, 0, 1));
+    view around = sonde_view_make(hint, (sonde_bounds){{0, 0, 0}, {0, 0, 0}});
+    sonde_vec3 k = hint;
+    // The view is turned off the hint by a few degrees, otherwise where a face runs along it.
+    for (uint32_t turn = 0; turn < SONDE_COUNT_OF(tilts); ++turn) {
+      forget(overlap);
+      k = v_madd(v_madd(hint, tilts[turn][0], around.u), tilts[turn][1], around.v);
+      k = v_unit(k, hint);
+      view w = sonde_view_make(k, common);
+      overlap->patient = turn + 1 == SONDE_COUNT_OF(tilts);
+      sonde_view_pairs(overlap, &w, false, add_piece);
+      if (!overlap->steep) break;
+    }
     sonde_overlap_regions(overlap, k);
     sonde_overlap_columns(overlap);
   }
-  publish(overlap);
+  sonde_overlap_result *r = &overlap->result;
+  SONDE_ASSERT(overlap->region_count <= overlap->config.max_regions);
+  r->volume_m3 = overlap->volume_m3;
+  r->region_count = overlap->region_count;
+  r->point_count = overlap->point_count;
+  r->regions = overlap->regions;
+  r->points = overlap->points;
+  for (int k = 0; k < 2; ++k) {
+    r->entries[k] = overlap->body[k].entries;
+    r->entry_count[k] = overlap->body[k].entry_count;
+  }
   return overlap->region_count > 0;
 }
 

@@ -4,16 +4,6 @@
 // A and parts of B; parts whose faces touch each other make a group. A group is one region, except
 // where the parts of one body lie side by side over large faces of the other, as hills under a
 // plate: there each part makes a region.
-//
-//   find / join       union-find; the smaller node is the root
-//   join_parts        touched faces within a body
-//   join_groups       across the bodies
-//   check_splits      whether parts lie side by side
-//   judge_groups      which groups to split, and by whose parts
-//   number_regions    by their first vertex
-//   bucket            pieces by region, for each side
-//   accumulate        entries of a region
-//   summarise         area, direction, volume, centre
 #include "contact/overlap.h"
 
 // A face counts as touched when more than this share of its size^2 is inside.
@@ -76,15 +66,6 @@ static void join_parts(sonde_overlap *overlap, int side) {
   }
 }
 
-static void join_groups(sonde_overlap *overlap) {
-  for (uint32_t i = 0; i < overlap->piece_count; ++i) {
-    const piece *p = &overlap->pieces[i];
-    if (!p->crossing || !touched(overlap, 0, p->face[0]) || !touched(overlap, 1, p->face[1]))
-      continue;
-    join(overlap->group, part_of(overlap, 0, p->face[0]), part_of(overlap, 1, p->face[1]));
-  }
-}
-
 // Lists the parts of a body in `touched` of the body, ascending; returns how many.
 static uint32_t list_parts(sonde_overlap *overlap, int side) {
   overlap_body *b = &overlap->body[side];
@@ -115,22 +96,6 @@ static bool piece_before(sonde_overlap *overlap, int side, uint32_t a, uint32_t 
   return p->part != q->part ? p->part < q->part : a < b;
 }
 
-static void sort_pieces(sonde_overlap *overlap, int side, uint32_t *list, uint32_t count) {
-  for (uint32_t gap = count / 2; gap > 0; gap /= 2)
-    for (uint32_t k = gap; k < count; ++k) {
-      uint32_t value = list[k], at = k;
-      for (; at >= gap && piece_before(overlap, side, value, list[at - gap]); at -= gap)
-        list[at] = list[at - gap];
-      list[at] = value;
-    }
-}
-
-static overlap_group *candidate_of(sonde_overlap *overlap, int side, const piece *p) {
-  if (!touched(overlap, side, p->face[side])) return NULL;
-  overlap_group *g = facts_of(overlap, part_of(overlap, side, p->face[side]));
-  return g->split_by == 1 - side ? g : NULL;
-}
-
 // A group stays whole when a face of this side has more of it inside the other body than the
 // other's parts in the group cover one by one: then it joins parts, as where one body pierces the
 // other. Each part's cover has to be positive and nothing else may cover the face.
@@ -139,8 +104,9 @@ static void check_splits(sonde_overlap *overlap, int side) {
   uint32_t count = 0;
   for (uint32_t i = 0; i < overlap->piece_count; ++i) {
     piece *p = &overlap->pieces[i];
-    const overlap_group *g = candidate_of(overlap, side, p);
-    if (!g) continue;
+    if (!touched(overlap, side, p->face[side])) continue;
+    const overlap_group *g = facts_of(overlap, part_of(overlap, side, p->face[side]));
+    if (g->split_by != 1 - side) continue;
     uint32_t other = p->face[1 - side];
     p->part = SONDE_NO_REGION;
     if (touched(overlap, 1 - side, other)) {
@@ -149,7 +115,14 @@ static void check_splits(sonde_overlap *overlap, int side) {
     }
     b->order[count++] = i;
   }
-  sort_pieces(overlap, side, b->order, count);
+  // The pieces are sorted by the face of this side, then by the other side's part.
+  for (uint32_t gap = count / 2; gap > 0; gap /= 2)
+    for (uint32_t k = gap; k < count; ++k) {
+      uint32_t value = b->order[k], at = k;
+      for (; at >= gap && piece_before(overlap, side, value, b->order[at - gap]); at -= gap)
+        b->order[at] = b->order[at - gap];
+      b->order[at] = value;
+    }
   for (uint32_t i = 0, next; i < count; i = next) {
     const piece *p = &overlap->pieces[b->order[i]];
     double cover = 0, slack = 1e-9 * b->scale[p->face[side]];
@@ -163,6 +136,7 @@ static void check_splits(sonde_overlap *overlap, int side) {
   }
 }
 
+// Which groups are split, and by the parts of which side.
 static void judge_groups(sonde_overlap *overlap, const uint32_t parts[2]) {
   bool candidates = false;
   for (int side = 0; side < 2; ++side)
@@ -185,27 +159,24 @@ static void judge_groups(sonde_overlap *overlap, const uint32_t parts[2]) {
     }
 }
 
-static uint32_t new_region(sonde_overlap *overlap, overlap_group *group) {
-  uint32_t number = overlap->region_count;
-  if (number == overlap->config.max_regions) {
-    overlap->result.flags |= SONDE_OVERLAP_REGIONS_FULL;
-    --number;
-  } else {
-    ++overlap->region_count;
-    overlap->family[number] = group->region == SONDE_NO_REGION ? number : group->region;
-    overlap->split_by[number] = group->split_by;
-  }
-  if (group->region == SONDE_NO_REGION) group->region = number;
-  return number;
-}
-
+// Regions are numbered by their first vertex.
 static void number_regions(sonde_overlap *overlap, const uint32_t parts[2]) {
   for (int side = 0; side < 2; ++side)
     for (uint32_t i = 0; i < parts[side]; ++i) {
       uint32_t part = overlap->body[side].touched[i];
       overlap_group *g = facts_of(overlap, part);
-      if (g->split_by == side || (g->split_by < 0 && g->region == SONDE_NO_REGION))
-        overlap->part_region[part] = new_region(overlap, g);
+      if (g->split_by != side && (g->split_by >= 0 || g->region != SONDE_NO_REGION)) continue;
+      uint32_t number = overlap->region_count;
+      if (number == overlap->config.max_regions) {
+        overlap->result.flags |= SONDE_OVERLAP_REGIONS_FULL;
+        --number;
+      } else {
+        ++overlap->region_count;
+        overlap->family[number] = g->region == SONDE_NO_REGION ? number : g->region;
+        overlap->split_by[number] = g->split_by;
+      }
+      if (g->region == SONDE_NO_REGION) g->region = number;
+      overlap->part_region[part] = number;
     }
   for (int side = 0; side < 2; ++side) {
     overlap_body *b = &overlap->body[side];
@@ -245,31 +216,30 @@ static void bucket(sonde_overlap *overlap, int side) {
   first[0] = 0;
 }
 
-static void add_gradient(overlap_body *b, uint64_t stamp, uint32_t vertex, sonde_vec3 g,
-                         uint32_t *count) {
-  if (b->vertex_stamp[vertex] != stamp) {
-    b->vertex_stamp[vertex] = stamp;
-    b->gradient[vertex] = vec3(0, 0, 0);
-    b->touched[(*count)++] = vertex;
-  }
-  b->gradient[vertex] = v_add(b->gradient[vertex], g);
-}
-
+// The gradients of a region at the vertices of one side.
 static void accumulate(sonde_overlap *overlap, int side, uint32_t region) {
   SONDE_ASSERT(region < overlap->region_count);
   overlap_body *b = &overlap->body[side];
   sonde_overlap_region *r = &overlap->regions[region];
   uint32_t count = 0;
-  ++overlap->stamp_vertices;
+  uint64_t stamp = UINT64_MAX - ++overlap->stamp_vertices;
   for (uint32_t i = b->first[region]; i < b->first[region + 1]; ++i) {
     const piece *p = &overlap->pieces[b->order[i]];
     uint32_t f = p->face[side];
     if (b->counted[f] != region) ++r->face_count[side];
     b->counted[f] = region;
     double area = p->area * (side ? p->side[0] : -p->side[1]);
-    for (int k = 0; k < 3; ++k)
-      add_gradient(b, UINT64_MAX - overlap->stamp_vertices, b->corner[f][k],
-                   v_scale(b->area_per_shadow[f], area * p->weight[side][k]), &count);
+    for (int k = 0; k < 3; ++k) {
+      // The gradient of a vertex begins at 0 where the region meets the vertex first.
+      uint32_t v = b->corner[f][k];
+      if (b->vertex_stamp[v] != stamp) {
+        b->vertex_stamp[v] = stamp;
+        b->gradient[v] = vec3(0, 0, 0);
+        b->touched[count++] = v;
+      }
+      sonde_vec3 g = v_scale(b->area_per_shadow[f], area * p->weight[side][k]);
+      b->gradient[v] = v_add(b->gradient[v], g);
+    }
   }
   sort(b->touched, count);
   r->first_entry[side] = b->entry_count;
@@ -302,6 +272,7 @@ static sonde_vec3 side_centre(const sonde_overlap *overlap, const sonde_overlap_
   return sum > 1e-3 * size ? v_scale(centre, 1 / sum) : mean;
 }
 
+// Area, direction, centre, volume and mean depth of a region from its gradients.
 static void summarise(sonde_overlap *overlap, sonde_overlap_region *r, sonde_vec3 k) {
   sonde_vec3 sum = vec3(0, 0, 0);
   double size = 0;
@@ -330,7 +301,13 @@ void sonde_overlap_regions(sonde_overlap *overlap, sonde_vec3 k) {
   SONDE_ASSERT(overlap->region_count == 0);
   join_parts(overlap, 0);
   join_parts(overlap, 1);
-  join_groups(overlap);
+  // Parts of A and of B whose faces touch each other belong to one group.
+  for (uint32_t i = 0; i < overlap->piece_count; ++i) {
+    const piece *p = &overlap->pieces[i];
+    if (!p->crossing || !touched(overlap, 0, p->face[0]) || !touched(overlap, 1, p->face[1]))
+      continue;
+    join(overlap->group, part_of(overlap, 0, p->face[0]), part_of(overlap, 1, p->face[1]));
+  }
   uint32_t parts[2] = {list_parts(overlap, 0), list_parts(overlap, 1)};
   judge_groups(overlap, parts);
   number_regions(overlap, parts);

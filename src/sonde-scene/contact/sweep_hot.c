@@ -1,18 +1,18 @@
 // Which boxes overlap: sorted by their lower x, each is compared with those that begin before it
 // ends. The last order is nearly right, so that insertion sorts it in linear time.
-//
-//   sort          boxes by lower x, equal ones by index
-//   sort_pairs    the pairs by their first, then second index
-#include "contact/sweep.h"
+#include "contact/tree.h"
 
-static uint64_t sort(sonde_sweep *sweep, const sonde_bounds *boxes, uint32_t count) {
-  uint64_t moves = 0;
+uint32_t sonde_sweep_pairs(sonde_sweep *sweep, const sonde_bounds *boxes, uint32_t count,
+                           uint32_t (*pairs)[2], uint32_t capacity, uint64_t *work) {
+  SONDE_ASSERT(sweep != NULL && count <= sweep->capacity);
+  // The boxes are sorted by their lower x, equal ones by index.
+  uint64_t tests = 0;
   if (count != sweep->count)
     for (uint32_t k = 0; k < count; ++k) sweep->order[k] = k;
   sweep->count = count;
   for (uint32_t k = 1; k < count; ++k) {
     uint32_t box = sweep->order[k], at = k;
-    for (; at > 0; --at, ++moves) {
+    for (; at > 0; --at, ++tests) {
       uint32_t other = sweep->order[at - 1];
       double x = boxes[box].low.x, y = boxes[other].low.x;
       if (y < x || (y == x && other < box)) break;
@@ -20,30 +20,6 @@ static uint64_t sort(sonde_sweep *sweep, const sonde_bounds *boxes, uint32_t cou
     }
     sweep->order[at] = box;
   }
-  return moves;
-}
-
-static bool before(const uint32_t a[2], const uint32_t b[2]) {
-  return a[0] != b[0] ? a[0] < b[0] : a[1] < b[1];
-}
-
-static void sort_pairs(uint32_t (*pairs)[2], uint32_t count) {
-  for (uint32_t gap = count / 2; gap > 0; gap /= 2)
-    for (uint32_t k = gap; k < count; ++k) {
-      uint32_t pair[2] = {pairs[k][0], pairs[k][1]}, at = k;
-      for (; at >= gap && before(pair, pairs[at - gap]); at -= gap) {
-        pairs[at][0] = pairs[at - gap][0];
-        pairs[at][1] = pairs[at - gap][1];
-      }
-      pairs[at][0] = pair[0];
-      pairs[at][1] = pair[1];
-    }
-}
-
-uint32_t sonde_sweep_pairs(sonde_sweep *sweep, const sonde_bounds *boxes, uint32_t count,
-                           uint32_t (*pairs)[2], uint32_t capacity, uint64_t *work) {
-  SONDE_ASSERT(sweep != NULL && count <= sweep->capacity);
-  uint64_t tests = sort(sweep, boxes, count);
   uint32_t found = 0;
   for (uint32_t k = 0; k < count; ++k) {
     uint32_t a = sweep->order[k];
@@ -59,7 +35,20 @@ uint32_t sonde_sweep_pairs(sonde_sweep *sweep, const sonde_bounds *boxes, uint32
       ++found;
     }
   }
-  sort_pairs(pairs, found < capacity ? found : capacity);
+  // The pairs are sorted by their first, then by their second index.
+  uint32_t written = found < capacity ? found : capacity;
+  for (uint32_t gap = written / 2; gap > 0; gap /= 2)
+    for (uint32_t k = gap; k < written; ++k) {
+      uint32_t first = pairs[k][0], second = pairs[k][1], at = k;
+      for (; at >= gap; at -= gap) {
+        const uint32_t *other = pairs[at - gap];
+        if (other[0] != first ? other[0] < first : other[1] <= second) break;
+        pairs[at][0] = other[0];
+        pairs[at][1] = other[1];
+      }
+      pairs[at][0] = first;
+      pairs[at][1] = second;
+    }
   if (work) *work += tests;
   return found;
 }

@@ -1,10 +1,10 @@
-// Layout of the face tree, shared by its builder (cold) and its users (hot).
+// Layout of the face tree and of the list of sorted boxes.
 #ifndef SONDE_SRC_CONTACT_TREE_H
 #define SONDE_SRC_CONTACT_TREE_H
 
 #include "base/base.h"
 #include "base/maths.h"
-#include "sonde/contact.h"
+#include "contact/contact.h"
 
 enum { TREE_LEAF_FACES = 4, TREE_STACK = 160 };
 
@@ -21,6 +21,11 @@ struct sonde_face_tree {
   uint32_t (*corners)[3];     // [face_count] in leaf order
   uint32_t *face;             // [face_count] the mesh's number of each
   tree_node *nodes;           // [node_count]
+};
+
+struct sonde_sweep {
+  uint32_t capacity, count;
+  uint32_t *order; // [capacity] boxes by their lower x at the last call
 };
 
 static inline sonde_vec3 v_low(sonde_vec3 a, sonde_vec3 b) {

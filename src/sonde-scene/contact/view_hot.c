@@ -1,11 +1,4 @@
 // Pairs of faces that cover each other along a direction.
-//
-//   project_node/node_seen   may faces of two boxes cover each other with A above B, in the window?
-//   see_face                 a face in the view's coordinates
-//   clip                     a polygon by a linear function
-//   cover                    the common polygon of two faces in the window
-//   meet                     the part of it with A above
-//   moments                  area, centroid and second moments
 #include "contact/overlap.h"
 
 // Faces steeper than this to the view are refused.
@@ -103,61 +96,49 @@ static void clip(covered *polygon, const double *f) {
   polygon->count = kept;
 }
 
-// Keeps the side of the line p -> q on which the inside of a counter-clockwise polygon lies.
-static void clip_side(covered *polygon, sonde_vec3 p, sonde_vec3 q) {
-  double f[POLYGON_CORNERS];
-  double du = q.x - p.x, dv = q.y - p.y;
-  for (uint32_t k = 0; k < polygon->count; ++k)
-    f[k] = du * (polygon->v[k] - p.y) - dv * (polygon->u[k] - p.x);
-  clip(polygon, f);
-}
-
-static void clip_window(covered *polygon, const sonde_bounds *window) {
-  double f[POLYGON_CORNERS];
-  for (int side = 0; side < 4 && polygon->count; ++side) {
-    for (uint32_t k = 0; k < polygon->count; ++k) {
-      double low = side < 2 ? polygon->u[k] - window->low.x : polygon->v[k] - window->low.y;
-      double high = side < 2 ? window->high.x - polygon->u[k] : window->high.y - polygon->v[k];
-      f[k] = side % 2 ? high : low;
-    }
-    clip(polygon, f);
-  }
-}
-
 static bool within(const sonde_bounds *box, const sonde_bounds *window) {
   return box->low.x >= window->low.x && box->high.x <= window->high.x &&
          box->low.y >= window->low.y && box->high.y <= window->high.y;
 }
 
-// The common polygon of two faces in the window, depth at its corners.
-static void cover(const view *w, const seen_face *a, const seen_face *b, covered *polygon) {
-  bool turned = a->twice_area < 0;
-  polygon->count = 3;
-  for (int k = 0; k < 3; ++k) {
-    const sonde_vec3 *p = &a->p[turned ? 2 - k : k];
-    polygon->u[k] = p->x;
-    polygon->v[k] = p->y;
-    polygon->depth[k] = p->z;
-  }
-  turned = b->twice_area < 0;
-  for (int k = 0; k < 3 && polygon->count; ++k) {
-    int next = (k + 1) % 3;
-    clip_side(polygon, b->p[turned ? 2 - k : k], b->p[turned ? 2 - next : next]);
-  }
-  if (!within(&a->box, &w->window) && !within(&b->box, &w->window))
-    clip_window(polygon, &w->window);
-  for (uint32_t k = 0; k < polygon->count; ++k) {
-    double weight[3];
-    sonde_seen_weights(b, polygon->u[k], polygon->v[k], weight);
-    polygon->depth[k] -= weight[0] * b->p[0].z + weight[1] * b->p[1].z + weight[2] * b->p[2].z;
-  }
-}
-
 static void meet(sonde_overlap *overlap, const view *w, const seen_face *a, const seen_face *b,
                  sonde_pair_fn fn) {
   covered polygon;
+  double f[POLYGON_CORNERS]; // the function that clips, at the corners
   ++overlap->result.face_pairs;
-  cover(w, a, b, &polygon);
+  // The common polygon of the two faces in the window carries z_a - z_b at its corners.
+  bool turned = a->twice_area < 0;
+  polygon.count = 3;
+  for (int k = 0; k < 3; ++k) {
+    const sonde_vec3 *p = &a->p[turned ? 2 - k : k];
+    polygon.u[k] = p->x;
+    polygon.v[k] = p->y;
+    polygon.depth[k] = p->z;
+  }
+  turned = b->twice_area < 0;
+  for (int k = 0; k < 3 && polygon.count; ++k) {
+    int next = (k + 1) % 3;
+    // The side of B's edge is kept on which the inside of B lies.
+    sonde_vec3 p = b->p[turned ? 2 - k : k], q = b->p[turned ? 2 - next : next];
+    double du = q.x - p.x, dv = q.y - p.y;
+    for (uint32_t i = 0; i < polygon.count; ++i)
+      f[i] = du * (polygon.v[i] - p.y) - dv * (polygon.u[i] - p.x);
+    clip(&polygon, f);
+  }
+  if (!within(&a->box, &w->window) && !within(&b->box, &w->window)) {
+    for (int side = 0; side < 4 && polygon.count; ++side) {
+      const double *at = side < 2 ? polygon.u : polygon.v;
+      double least = side < 2 ? w->window.low.x : w->window.low.y;
+      double most = side < 2 ? w->window.high.x : w->window.high.y;
+      for (uint32_t k = 0; k < polygon.count; ++k) f[k] = side % 2 ? most - at[k] : at[k] - least;
+      clip(&polygon, f);
+    }
+  }
+  for (uint32_t k = 0; k < polygon.count; ++k) {
+    double weight[3];
+    sonde_seen_weights(b, polygon.u[k], polygon.v[k], weight);
+    polygon.depth[k] -= weight[0] * b->p[0].z + weight[1] * b->p[1].z + weight[2] * b->p[2].z;
+  }
   if (polygon.count < 3) return;
   double low = INFINITY, high = -INFINITY;
   for (uint32_t k = 0; k < polygon.count; ++k) {
@@ -166,7 +147,6 @@ static void meet(sonde_overlap *overlap, const view *w, const seen_face *a, cons
   }
   if (!(high > 0)) return;
   if (low < 0) {
-    double f[POLYGON_CORNERS];
     for (uint32_t k = 0; k < polygon.count; ++k) f[k] = polygon.depth[k];
     clip(&polygon, f);
   }
@@ -214,16 +194,6 @@ static uint32_t see_leaf(sonde_overlap *overlap, const view *w, int body, const 
   return count;
 }
 
-static void compare_leaves(sonde_overlap *overlap, const view *w, const tree_node *na,
-                           const tree_node *nb, bool marked, sonde_pair_fn fn) {
-  seen_face a[TREE_LEAF_FACES], b[TREE_LEAF_FACES];
-  uint32_t count_a = see_leaf(overlap, w, 0, na, marked, a);
-  uint32_t count_b = count_a ? see_leaf(overlap, w, 1, nb, marked, b) : 0;
-  for (uint32_t i = 0; i < count_a; ++i)
-    for (uint32_t j = 0; j < count_b; ++j)
-      if (covers(&a[i].box, &b[j].box)) meet(overlap, w, &a[i], &b[j], fn);
-}
-
 void sonde_view_pairs(sonde_overlap *overlap, const view *w, bool marked, sonde_pair_fn fn) {
   const sonde_face_tree *a = overlap->body[0].tree, *b = overlap->body[1].tree;
   SONDE_ASSERT(a != NULL && b != NULL);
@@ -238,6 +208,12 @@ void sonde_view_pairs(sonde_overlap *overlap, const view *w, bool marked, sonde_
     sonde_bounds box_b = project_node(w, &nb->box);
     if (!in_window(w, &box_b, false) || !covers(&box_a, &box_b)) continue;
     if (tree_open(&stack, a, at_a, b, at_b)) continue;
-    compare_leaves(overlap, w, na, nb, marked, fn);
+    // The faces of two leaves are compared one by one.
+    seen_face seen_a[TREE_LEAF_FACES], seen_b[TREE_LEAF_FACES];
+    uint32_t count_a = see_leaf(overlap, w, 0, na, marked, seen_a);
+    uint32_t count_b = count_a ? see_leaf(overlap, w, 1, nb, marked, seen_b) : 0;
+    for (uint32_t i = 0; i < count_a; ++i)
+      for (uint32_t j = 0; j < count_b; ++j)
+        if (covers(&seen_a[i].box, &seen_b[j].box)) meet(overlap, w, &seen_a[i], &seen_b[j], fn);
   }
 }

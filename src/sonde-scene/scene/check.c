@@ -7,7 +7,7 @@
 
 #include "base/base.h"
 #include "base/maths.h"
-#include "sonde/contact.h"
+#include "contact/contact.h"
 
 sonde_status sonde_mesh_check_areas(const sonde_mesh *mesh, sonde_error *error) {
   for (uint32_t f = 0; f < mesh->face_count; ++f) {

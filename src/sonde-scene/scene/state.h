@@ -4,7 +4,7 @@
 #define SONDE_SRC_SCENE_STATE_H
 
 #include "scene/scene.h"
-#include "sonde/contact.h"
+#include "contact/contact.h"
 #include "tissue/two_layer.h"
 
 // What a step hands to the next, in one block: copied for substeps, written by snapshots.

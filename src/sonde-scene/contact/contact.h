@@ -4,15 +4,11 @@
  * meshes with its exact gradient, regions and columns, and the depth and the first touch of convex
  * bodies. Nothing that is marked `@thread tick` allocates. docs/contact.md.
  */
-#ifndef SONDE_CONTACT_H
-#define SONDE_CONTACT_H
+#ifndef SONDE_SRC_CONTACT_CONTACT_H
+#define SONDE_SRC_CONTACT_CONTACT_H
 
 #include "sonde/base.h"
 #include "sonde/geometry.h"
-
-#ifdef __cplusplus
-extern "C" {
-#endif
 
 /* ---- boxes and trees --------------------------------------------------------------------- */
 
@@ -24,9 +20,8 @@ typedef struct sonde_bounds {
 /** Finds which of several boxes overlap; remembers the last order to sort quickly. */
 typedef struct sonde_sweep sonde_sweep;
 /** @param capacity the most boxes that will be given @thread owner */
-SONDE_API sonde_status sonde_sweep_create(uint32_t capacity, sonde_sweep **sweep,
-                                          sonde_error *error);
-SONDE_API void sonde_sweep_destroy(sonde_sweep *sweep); /**< @thread owner */
+sonde_status sonde_sweep_create(uint32_t capacity, sonde_sweep **sweep, sonde_error *error);
+void sonde_sweep_destroy(sonde_sweep *sweep); /**< @thread owner */
 /**
  * Pairs of boxes that overlap or touch, ascending, each with the smaller index first.
  * @param pairs [capacity] receives them; further ones are counted but not written
@@ -34,8 +29,8 @@ SONDE_API void sonde_sweep_destroy(sonde_sweep *sweep); /**< @thread owner */
  * @return how many pairs there are, also when that is more than `capacity`
  * @thread tick
  */
-SONDE_API uint32_t sonde_sweep_pairs(sonde_sweep *sweep, const sonde_bounds *boxes, uint32_t count,
-                                     uint32_t (*pairs)[2], uint32_t capacity, uint64_t *work);
+uint32_t sonde_sweep_pairs(sonde_sweep *sweep, const sonde_bounds *boxes, uint32_t count,
+                           uint32_t (*pairs)[2], uint32_t capacity, uint64_t *work);
 
 /** Tree of boxes over the faces of a mesh whose vertices move. */
 typedef struct sonde_face_tree sonde_face_tree;
@@ -45,18 +40,18 @@ typedef struct sonde_face_tree sonde_face_tree;
  * @return SONDE_MESH when there is no face or a face names a missing vertex
  * @thread owner
  */
-SONDE_API sonde_status sonde_face_tree_create(const sonde_mesh *mesh, sonde_face_tree **tree,
-                                              sonde_error *error);
-SONDE_API void sonde_face_tree_destroy(sonde_face_tree *tree); /**< @thread owner */
+sonde_status sonde_face_tree_create(const sonde_mesh *mesh, sonde_face_tree **tree,
+                                    sonde_error *error);
+void sonde_face_tree_destroy(sonde_face_tree *tree); /**< @thread owner */
 /**
  * Fits the boxes to new positions in time proportional to the faces.
  * @param vertices [vertex_count of the mesh] world (m); borrowed until the next refit: the calls
  *        that take the tree read them
  * @thread tick
  */
-SONDE_API void sonde_face_tree_refit(sonde_face_tree *tree, const sonde_vec3 *vertices);
+void sonde_face_tree_refit(sonde_face_tree *tree, const sonde_vec3 *vertices);
 /** Box of the whole mesh. @thread any (read only) */
-SONDE_API sonde_bounds sonde_face_tree_bounds(const sonde_face_tree *tree);
+sonde_bounds sonde_face_tree_bounds(const sonde_face_tree *tree);
 /**
  * Pairs of faces whose boxes, each grown by half of `margin_m`, overlap. Always in the same order.
  * @param pairs [capacity] receives (face of a, face of b); further ones are counted only
@@ -64,9 +59,8 @@ SONDE_API sonde_bounds sonde_face_tree_bounds(const sonde_face_tree *tree);
  * @return how many pairs there are, also when that is more than `capacity`
  * @thread tick
  */
-SONDE_API uint32_t sonde_face_tree_pairs(const sonde_face_tree *a, const sonde_face_tree *b,
-                                         double margin_m, uint32_t (*pairs)[2], uint32_t capacity,
-                                         uint64_t *work);
+uint32_t sonde_face_tree_pairs(const sonde_face_tree *a, const sonde_face_tree *b, double margin_m,
+                               uint32_t (*pairs)[2], uint32_t capacity, uint64_t *work);
 
 /* ---- common volume of two closed meshes --------------------------------------------------- */
 
@@ -134,10 +128,10 @@ typedef struct sonde_overlap_result {
 
 typedef struct sonde_overlap sonde_overlap;
 /** @param a,b trees of the two bodies, for their sizes only @thread owner */
-SONDE_API sonde_status sonde_overlap_create(const sonde_face_tree *a, const sonde_face_tree *b,
-                                            const sonde_overlap_config *config,
-                                            sonde_overlap **overlap, sonde_error *error);
-SONDE_API void sonde_overlap_destroy(sonde_overlap *overlap); /**< @thread owner */
+sonde_status sonde_overlap_create(const sonde_face_tree *a, const sonde_face_tree *b,
+                                  const sonde_overlap_config *config, sonde_overlap **overlap,
+                                  sonde_error *error);
+void sonde_overlap_destroy(sonde_overlap *overlap); /**< @thread owner */
 /**
  * Common volume of the bodies at the positions of their trees. Exact for closed outward meshes,
  * concave or not. With face i of A and j of B that cover each other along k, s = +1 for a face that
@@ -152,17 +146,17 @@ SONDE_API void sonde_overlap_destroy(sonde_overlap *overlap); /**< @thread owner
  * @return whether anything overlaps
  * @thread tick
  */
-SONDE_API bool sonde_overlap_compute(sonde_overlap *overlap, const sonde_face_tree *a,
-                                     const sonde_face_tree *b, sonde_vec3 hint);
+bool sonde_overlap_compute(sonde_overlap *overlap, const sonde_face_tree *a,
+                           const sonde_face_tree *b, sonde_vec3 hint);
 /** Result of the last compute. @thread tick */
-SONDE_API const sonde_overlap_result *sonde_overlap_get(const sonde_overlap *overlap);
+const sonde_overlap_result *sonde_overlap_get(const sonde_overlap *overlap);
 /**
  * Rate of a region's volume (m^3/s): sum of gradient . velocity over both bodies.
  * @param velocity_a,velocity_b per vertex (m/s); NULL for a body at rest
  * @thread tick
  */
-SONDE_API double sonde_overlap_rate(const sonde_overlap_result *result, uint32_t region,
-                                    const sonde_vec3 *velocity_a, const sonde_vec3 *velocity_b);
+double sonde_overlap_rate(const sonde_overlap_result *result, uint32_t region,
+                          const sonde_vec3 *velocity_a, const sonde_vec3 *velocity_b);
 
 /* ---- convex bodies ------------------------------------------------------------------------ */
 
@@ -185,17 +179,17 @@ typedef struct sonde_depth_result {
  *        the line between the centres
  * @thread tick
  */
-SONDE_API sonde_depth_result sonde_convex_displace(const sonde_convex *a, sonde_pose world_from_a,
-                                                   const sonde_convex *b, sonde_pose world_from_b,
-                                                   sonde_vec3 direction);
+sonde_depth_result sonde_convex_displace(const sonde_convex *a, sonde_pose world_from_a,
+                                         const sonde_convex *b, sonde_pose world_from_b,
+                                         sonde_vec3 direction);
 /**
  * Depth by an expanding polytope of fixed room (van den Bergen 2001): within `tolerance_m` of the
  * least distance that parts the bodies, unless `converged` says otherwise.
  * @thread tick
  */
-SONDE_API sonde_depth_result sonde_convex_expand(const sonde_convex *a, sonde_pose world_from_a,
-                                                 const sonde_convex *b, sonde_pose world_from_b,
-                                                 double tolerance_m);
+sonde_depth_result sonde_convex_expand(const sonde_convex *a, sonde_pose world_from_a,
+                                       const sonde_convex *b, sonde_pose world_from_b,
+                                       double tolerance_m);
 
 /** Motion of a rigid body from a pose, with constant velocity of its origin and constant spin. */
 typedef struct sonde_motion {
@@ -204,7 +198,7 @@ typedef struct sonde_motion {
   sonde_vec3 spin_rad_s;
 } sonde_motion;
 /** Pose after a time. @thread any */
-SONDE_API sonde_pose sonde_motion_pose(const sonde_motion *motion, double time_s);
+sonde_pose sonde_motion_pose(const sonde_motion *motion, double time_s);
 
 /** First touch of two moving bodies. */
 typedef struct sonde_cast_result {
@@ -222,20 +216,16 @@ typedef struct sonde_cast_result {
  * @param margin_m more than 0: being closer than that is a touch
  * @thread tick
  */
-SONDE_API sonde_cast_result sonde_convex_cast(const sonde_convex *a, const sonde_motion *motion_a,
-                                              const sonde_convex *b, const sonde_motion *motion_b,
-                                              double duration_s, double margin_m);
+sonde_cast_result sonde_convex_cast(const sonde_convex *a, const sonde_motion *motion_a,
+                                    const sonde_convex *b, const sonde_motion *motion_b,
+                                    double duration_s, double margin_m);
 /**
  * The same of a convex body A against the faces of a mesh B at the positions of its tree, which
  * stand still. A body wholly inside the mesh touches nothing.
  * @thread tick
  */
-SONDE_API sonde_cast_result sonde_convex_cast_faces(const sonde_convex *a,
-                                                    const sonde_motion *motion_a,
-                                                    const sonde_face_tree *b, double duration_s,
-                                                    double margin_m);
+sonde_cast_result sonde_convex_cast_faces(const sonde_convex *a, const sonde_motion *motion_a,
+                                          const sonde_face_tree *b, double duration_s,
+                                          double margin_m);
 
-#ifdef __cplusplus
-}
-#endif
 #endif
