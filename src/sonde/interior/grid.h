@@ -32,7 +32,7 @@ typedef struct sonde_grid {
   double s[SONDE_WINDOW_S];
   float radius[SONDE_WINDOW_S * SONDE_WINDOW_THETA][SONDE_WINDOW_LEVELS];
   sonde_vec3 node[SONDE_WINDOW_NODES]; // at rest, leg frame: e1, e2, along the axis
-  // Of the corners of each element: one over what the three edges from there span at rest.
+  // Of the corners of each element: one over the volume that the three edges there span at rest.
   double per_volume[SONDE_GRID_HEXES][8];
 } sonde_grid;
 
@@ -40,27 +40,29 @@ static inline uint32_t sonde_grid_node(uint32_t i, uint32_t j, uint32_t level) {
   return (j * SONDE_WINDOW_THETA + i) * SONDE_WINDOW_LEVELS + level;
 }
 
-// Node of a corner of an element and the next along, across and below it.
-static inline void sonde_grid_corner(uint32_t hex, uint32_t corner, uint32_t node[4]) {
+// Nodes of an element: bits 0, 1 and 2 of a corner's number tell its ends around, along and
+// inwards.
+static inline void sonde_grid_nodes(uint32_t hex, uint32_t node[8]) {
   uint32_t l = hex % (SONDE_WINDOW_LEVELS - 1);
   uint32_t i = hex / (SONDE_WINDOW_LEVELS - 1) % SONDE_WINDOW_THETA;
   uint32_t j = hex / (SONDE_WINDOW_LEVELS - 1) / SONDE_WINDOW_THETA;
-  uint32_t di = corner & 1, dj = corner >> 1 & 1, dl = corner >> 2;
-  uint32_t right = i + 1 < SONDE_WINDOW_THETA ? i + 1 : 0;
-  uint32_t own = di ? right : i, next = di ? i : right;
-  node[0] = sonde_grid_node(own, j + dj, l + dl);
-  node[1] = sonde_grid_node(next, j + dj, l + dl);
-  node[2] = sonde_grid_node(own, j + 1 - dj, l + dl);
-  node[3] = sonde_grid_node(own, j + dj, l + 1 - dl);
+  for (uint32_t k = 0; k < 8; ++k)
+    node[k] = sonde_grid_node((i + (k & 1)) % SONDE_WINDOW_THETA, j + (k >> 1 & 1), l + (k >> 2));
 }
 
-// What the edges from the first of these nodes span; g: its derivatives by the ends of the edges.
-static inline double sonde_grid_volume(const sonde_vec3 *p, const uint32_t node[4],
-                                       sonde_vec3 g[3]) {
-  sonde_vec3 a = v_sub(p[node[1]], p[node[0]]), b = v_sub(p[node[2]], p[node[0]]);
-  sonde_vec3 c = v_sub(p[node[3]], p[node[0]]);
-  g[0] = v_cross(b, c), g[1] = v_cross(c, a), g[2] = v_cross(a, b);
-  return v_dot(a, g[0]);
+// Edges of an element along its three axes: around, along the leg, inwards.
+typedef struct sonde_grid_edges {
+  sonde_vec3 x[2][2], y[2][2], z[2][2]; // by the ends along the other two axes, in the axes' order
+} sonde_grid_edges;
+
+static inline void sonde_grid_read_edges(const sonde_vec3 *place, const uint32_t node[8],
+                                         sonde_grid_edges *e) {
+  for (uint32_t i = 0; i < 2; ++i)
+    for (uint32_t j = 0; j < 2; ++j) {
+      e->x[i][j] = v_sub(place[node[1 + 2 * i + 4 * j]], place[node[2 * i + 4 * j]]);
+      e->y[i][j] = v_sub(place[node[2 + i + 4 * j]], place[node[i + 4 * j]]);
+      e->z[i][j] = v_sub(place[node[4 + i + 2 * j]], place[node[i + 2 * j]]);
+    }
 }
 
 // Where a point lies in a grid: four columns and the level above it.

@@ -1,9 +1,8 @@
-// Placing a grid on a leg and finding points in it.
+// Placing a grid on a leg and finding points in it. Rows and columns are even under the probe's
+// face; beyond it the distances grow towards the ends of the leg and the far side.
 //
 // sonde_grid_place                        where a grid for this probe would be
 // sonde_grid_begin                        rows, columns and nodes of a place
-// spread_rows, spread_columns             distances that grow from the fine part to an end
-// place_column                            nodes of one column
 // sonde_grid_columns, sonde_grid_find     cell of a point and its share in it
 #include "base/base.h"
 #include "interior/grid.h"
@@ -44,65 +43,64 @@ static double sum_of(const double *d, uint32_t count) {
   return sum;
 }
 
-static void spread_rows(sonde_grid *g, double low, double high) {
-  double half = g->place.half_s_m + margin_s_m;
-  half = fmin(half, 0.4 * (high - low));
-  double s = clamp(g->place.s, low + half, high - half),
-         step = 2 * half / (SONDE_WINDOW_NEAR_S - 1);
-  double down = fmin(reach_m, s - half - low), up = fmin(reach_m, high - s - half);
-  uint32_t first = SONDE_WINDOW_NEAR_FIRST, last = first + SONDE_WINDOW_NEAR_S - 1;
-  for (uint32_t k = 0; k < SONDE_WINDOW_NEAR_S; ++k) g->s[first + k] = s - half + step * k;
-  double all = sum_of(grow_s, 5);
-  for (uint32_t k = 0; k < 5; ++k) {
-    // A grid that ends with the leg still has rows of some height.
-    g->s[last + k + 1] = g->s[last + k] + fmax(up, 5e-3) * grow_s[k] / all;
-    g->s[first - k - 1] = g->s[first - k] - fmax(down, 5e-3) * grow_s[k] / all;
-  }
-}
-
-static void spread_columns(sonde_grid *g, double radius) {
-  double half = fmin((g->place.half_theta_m + margin_t_m) / radius, 1.2);
-  double step = 2 * half / (SONDE_WINDOW_NEAR_T - 1), rest = 2 * SONDE_PI - 2 * half;
-  double all = sum_of(grow_t, 12) + grow_t[5];
-  for (uint32_t k = 0; k < SONDE_WINDOW_NEAR_T; ++k) g->theta[k] = -half + step * k;
-  for (uint32_t k = SONDE_WINDOW_NEAR_T; k <= NT; ++k) {
-    uint32_t n = k - SONDE_WINDOW_NEAR_T; // thirteen gaps, the middle one counted twice
-    double share = grow_t[n < 6 ? n : n - 1];
-    g->theta[k] = g->theta[k - 1] + rest * share / all;
-  }
-}
-
-static void place_column(sonde_grid *g, const sonde_interior *in, uint32_t i, uint32_t j) {
-  double theta = g->place.theta + g->theta[i], s = g->s[j];
-  sonde_column_point at;
-  sonde_interior_column(in, theta, s, &at);
-  double height = at.radius_m - in->bone_radius_m;
-  double fat = clamp(at.muscle_m / at.cosine, 2.5e-3, 0.6 * height);
-  for (uint32_t l = 0; l < NL; ++l) {
-    double depth =
-        l <= SONDE_WINDOW_FAT ? fat * l / SONDE_WINDOW_FAT : fat + (height - fat) * muscle_level[l];
-    double r = at.radius_m - depth;
-    g->radius[j * NT + i][l] = (float)r;
-    g->node[sonde_grid_node(i, j, l)] = vec3(r * cos(theta), r * sin(theta), s);
-  }
-}
-
 void sonde_grid_begin(sonde_grid *g, const sonde_interior *in, sonde_window_place place) {
   SONDE_ASSERT(g != NULL && in != NULL && isfinite(place.theta) && isfinite(place.s));
   sonde_column_point at;
   g->place = place;
   sonde_interior_column(in, place.theta, place.s, &at);
-  spread_rows(g, in->s_low_m, in->s_high_m);
-  spread_columns(g, at.radius_m);
-  for (uint32_t j = 0; j < NS; ++j)
-    for (uint32_t i = 0; i < NT; ++i) place_column(g, in, i, j);
-  for (uint32_t h = 0; h < SONDE_GRID_HEXES; ++h)
-    for (uint32_t corner = 0; corner < 8; ++corner) {
-      uint32_t node[4];
-      sonde_vec3 slope[3];
-      sonde_grid_corner(h, corner, node);
-      g->per_volume[h][corner] = 1 / sonde_grid_volume(g->node, node, slope);
+
+  // Rows along the leg: even under the face, then growing to the reach or the leg's ends. A grid
+  // that ends with the leg still has rows of some height.
+  const double low = in->s_low_m, high = in->s_high_m;
+  const double half_s = fmin(place.half_s_m + margin_s_m, 0.4 * (high - low));
+  const double middle = clamp(place.s, low + half_s, high - half_s);
+  const double down = fmax(fmin(reach_m, middle - half_s - low), 5e-3);
+  const double up = fmax(fmin(reach_m, high - middle - half_s), 5e-3);
+  const double step_s = 2 * half_s / (SONDE_WINDOW_NEAR_S - 1), all_s = sum_of(grow_s, 5);
+  const uint32_t first = SONDE_WINDOW_NEAR_FIRST, last = first + SONDE_WINDOW_NEAR_S - 1;
+  for (uint32_t k = 0; k < SONDE_WINDOW_NEAR_S; ++k) g->s[first + k] = middle - half_s + step_s * k;
+  for (uint32_t k = 0; k < 5; ++k) {
+    g->s[last + k + 1] = g->s[last + k] + up * grow_s[k] / all_s;
+    g->s[first - k - 1] = g->s[first - k] - down * grow_s[k] / all_s;
+  }
+
+  // Angles of the columns: even under the face; the rest of the circle has thirteen gaps, the
+  // middle one counted twice.
+  const double half = fmin((place.half_theta_m + margin_t_m) / at.radius_m, 1.2);
+  const double step = 2 * half / (SONDE_WINDOW_NEAR_T - 1), rest = 2 * SONDE_PI - 2 * half;
+  const double all = sum_of(grow_t, 12) + grow_t[5];
+  for (uint32_t k = 0; k < SONDE_WINDOW_NEAR_T; ++k) g->theta[k] = -half + step * k;
+  for (uint32_t k = SONDE_WINDOW_NEAR_T; k <= NT; ++k) {
+    uint32_t n = k - SONDE_WINDOW_NEAR_T;
+    g->theta[k] = g->theta[k - 1] + rest * grow_t[n < 6 ? n : n - 1] / all;
+  }
+
+  // Radii and places of the nodes: the levels of fat and of muscle share the depth of their layer.
+  for (uint32_t c = 0; c < NS * NT; ++c) {
+    const double theta = place.theta + g->theta[c % NT], s = g->s[c / NT];
+    sonde_interior_column(in, theta, s, &at);
+    const double height = at.radius_m - in->bone_radius_m;
+    const double fat = clamp(at.muscle_m / at.cosine, 2.5e-3, 0.6 * height);
+    for (uint32_t l = 0; l < NL; ++l) {
+      double depth = l <= SONDE_WINDOW_FAT ? fat * l / SONDE_WINDOW_FAT
+                                           : fat + (height - fat) * muscle_level[l];
+      double r = at.radius_m - depth;
+      g->radius[c][l] = (float)r;
+      g->node[c * NL + l] = vec3(r * cos(theta), r * sin(theta), s);
     }
+  }
+
+  // Volumes at the corners of the elements. Around, along and inwards is a left-handed order.
+  for (uint32_t h = 0; h < SONDE_GRID_HEXES; ++h) {
+    uint32_t node[8];
+    sonde_grid_edges e;
+    sonde_grid_nodes(h, node);
+    sonde_grid_read_edges(g->node, node, &e);
+    for (uint32_t k = 0; k < 8; ++k) {
+      uint32_t i = k & 1, j = k >> 1 & 1, l = k >> 2;
+      g->per_volume[h][k] = -1 / v_dot(e.x[j][l], v_cross(e.y[i][l], e.z[i][j]));
+    }
+  }
 }
 
 // ---- cells --------------------------------------------------------------------------------

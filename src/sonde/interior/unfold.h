@@ -9,8 +9,7 @@ typedef struct sonde_unfold {
   sonde_vec3 now[SONDE_WINDOW_NODES]; // places of the nodes: in by the field alone, out kept apart
   bool held[SONDE_WINDOW_S * SONDE_WINDOW_THETA]; // columns whose skin stays where it is
   unsigned char awake[SONDE_GRID_HEXES];          // sweeps that an element is looked at for
-  double relaxation;                              // of the sweep under way
-  uint32_t sweeps, folded, left; // of the last call: corners that were too small before and after
+
 } sonde_unfold;
 
 // True when nodes have moved. @param grid at rest

@@ -20,11 +20,13 @@ enum { SWEEPS = 400, FAST = 200, STEPS = 12 };
 
 static const double stiff_from = 0.55;   // compressive strain beyond which a layer stiffens
 static const double least_column = 0.12; // of a column's height at rest
-static const double least_volume = 0.06, aim = 0.10;  // of a volume at rest
-static const double fast = 1.3;                       // relaxation of the first sweeps
-static const double most_change = 0.2;                // of an edge at rest
-static const double calm_from = 0.35, calm_to = 0.15; // least corner of the columns' field
-static const double quiet_m = 1e-3;                   // displacement that folds nothing
+static const double least_volume = 0.06, aim = 0.10; // of a volume at rest
+static const double fast = 1.3;                      // relaxation of the first sweeps
+static const double most_change = 0.2;               // of an edge at rest
+// Least Bernstein coefficient of the columns' field below which the grid takes part, and from which
+// it leads alone.
+static const double calm_from = 0.35, calm_to = 0.15;
+static const double quiet_m = 1e-3; // displacement that folds nothing
 
 // ---- columns ------------------------------------------------------------------------------
 
@@ -38,24 +40,8 @@ static double stretch_of(double strain, double *slope) {
   return left * share;
 }
 
-// How much more than under the linear field the layers that are shortened have to be, so that the
-// column's height is `goal`.
-static double share_out(const double height[NL], const double strain[NL], double goal) {
-  double more = 1;
-  for (int n = 0; n < STEPS; ++n) {
-    double sum = 0, change = 0, slope;
-    for (int l = 0; l + 1 < NL; ++l) {
-      bool shorter = strain[l] > 0;
-      sum += height[l] * stretch_of(shorter ? more * strain[l] : strain[l], &slope);
-      if (shorter) change += height[l] * slope * strain[l];
-    }
-    double step = (goal - sum) / change;
-    more += step;
-    if (fabs(step) < 1e-4 * more) break;
-  }
-  return more;
-}
-
+// Heights of a column's layers after stiffening. Under the linear field times `more` the layers
+// that are shortened give the column the height it has under the field itself, or the least one.
 static bool stretch_column(sonde_vec3 *now, const sonde_vec3 *rest) {
   double height[NL], strain[NL], most = 0, goal = 0, tall = 0, at = 0, slope;
   double r = hypot(rest[0].x, rest[0].y), cosine = rest[0].x / r, sine = rest[0].y / r;
@@ -67,7 +53,19 @@ static bool stretch_column(sonde_vec3 *now, const sonde_vec3 *rest) {
     most = fmax(most, strain[l]), goal += rise, tall += height[l];
   }
   if (!(most > stiff_from)) return false;
-  double more = share_out(height, strain, fmax(goal, least_column * tall));
+  goal = fmax(goal, least_column * tall);
+  double more = 1;
+  for (int n = 0; n < STEPS; ++n) { // Newton's
+    double sum = 0, change = 0;
+    for (int l = 0; l + 1 < NL; ++l) {
+      bool shorter = strain[l] > 0;
+      sum += height[l] * stretch_of(shorter ? more * strain[l] : strain[l], &slope);
+      if (shorter) change += height[l] * slope * strain[l];
+    }
+    double step = (goal - sum) / change;
+    more += step;
+    if (fabs(step) < 1e-4 * more) break;
+  }
   for (int l = NL - 2; l >= 0; --l) {
     at += height[l] * stretch_of(strain[l] > 0 ? more * strain[l] : strain[l], &slope);
     double is = (now[l].x - now[NL - 1].x) * cosine + (now[l].y - now[NL - 1].y) * sine;
@@ -78,22 +76,10 @@ static bool stretch_column(sonde_vec3 *now, const sonde_vec3 *rest) {
 
 // ---- elements -----------------------------------------------------------------------------
 
-// Edges of an element along its three axes: around, along the leg, inwards.
-typedef struct edges {
-  sonde_vec3 x[2][2], y[2][2], z[2][2]; // of the other two axes' places, in the axes' order
-} edges;
-
-static void read_edges(const sonde_vec3 *p, const uint32_t node[8], edges *e) {
-  for (uint32_t i = 0; i < 2; ++i)
-    for (uint32_t j = 0; j < 2; ++j) {
-      e->x[i][j] = v_sub(p[node[1 + 2 * i + 4 * j]], p[node[2 * i + 4 * j]]);
-      e->y[i][j] = v_sub(p[node[2 + i + 4 * j]], p[node[i + 4 * j]]);
-      e->z[i][j] = v_sub(p[node[4 + i + 2 * j]], p[node[i + 2 * j]]);
-    }
-}
-
-// One Bernstein coefficient of an element's volume, {a, b, c} each 0, 1 or 2: the mean of what
-// edges span whose places along each axis add up to it.
+// A Bernstein coefficient of the determinant of an element's trilinear map, which is quadratic
+// along each axis: {a, b, c} are its indices there, 0, 1 or 2. It is the mean of the triple
+// products x.(y x z) of edges whose ends along each axis add up to its index. No point's volume is
+// smaller than the least coefficient.
 typedef struct coefficient {
   uint32_t a, b, c;
 } coefficient;
@@ -103,32 +89,20 @@ typedef struct coefficient {
     for (uint32_t j = (q).b > 1; j <= ((q).b > 0); ++j)                                            \
       for (uint32_t k = (q).c > 1; k <= ((q).c > 0); ++k)
 
-// Over the element's volume at rest there.
-static double scale_of(const sonde_grid *grid, uint32_t hex, coefficient q) {
-  double sum = 0, count = 0;
-  FOR_EDGES(q) sum += fabs(grid->per_volume[hex][i + 2 * j + 4 * k]), ++count;
-  return -sum / (count * count);
-}
+// An element: its nodes and, for each coefficient, what scales the sum of its triple products to
+// a share of the volume at rest there.
+typedef struct element {
+  uint32_t node[8];
+  double scale[27];
+} element;
 
-static double share_in(const edges *e, coefficient q, double scale) {
+static coefficient coefficient_of(uint32_t k) { return (coefficient){k % 3, k / 3 % 3, k / 9}; }
+
+static double share_in(const sonde_grid_edges *e, coefficient q, double scale) {
   double sum = 0;
   FOR_EDGES(q)
   sum += v_dot(e->x[j][k], v_cross(e->y[i][q.c - k], e->z[q.a - i][q.b - j]));
   return sum * scale;
-}
-
-// Derivative of share_in by the element's nodes.
-static void slope_of(const edges *e, coefficient q, double scale, sonde_vec3 g[8]) {
-  for (int n = 0; n < 8; ++n) g[n] = vec3(0, 0, 0);
-  FOR_EDGES(q) {
-    const sonde_vec3 *x = &e->x[j][k], *y = &e->y[i][q.c - k], *z = &e->z[q.a - i][q.b - j];
-    const sonde_vec3 by[3] = {v_cross(*y, *z), v_cross(*z, *x), v_cross(*x, *y)};
-    const uint32_t from[3] = {2 * j + 4 * k, i + 4 * (q.c - k), (q.a - i) + 2 * (q.b - j)};
-    for (int axis = 0; axis < 3; ++axis) {
-      g[from[axis]] = v_madd(g[from[axis]], -scale, by[axis]);
-      g[from[axis] + (1u << axis)] = v_madd(g[from[axis] + (1u << axis)], scale, by[axis]);
-    }
-  }
 }
 
 static bool is_free(const sonde_unfold *u, uint32_t node) {
@@ -136,50 +110,51 @@ static bool is_free(const sonde_unfold *u, uint32_t node) {
   return level + 1 < NL && (level > 0 || !u->held[node / NL]);
 }
 
-// Moves an element's nodes until this coefficient is `aim`.
-static void widen(sonde_unfold *u, const uint32_t node[8], coefficient q, double scale) {
-  edges e;
-  sonde_vec3 g[8];
-  read_edges(u->now, node, &e);
+// Moves an element's nodes along the derivative of this coefficient until it is `aim`.
+static void widen(sonde_unfold *u, const element *of, uint32_t which, double relaxation) {
+  const coefficient q = coefficient_of(which);
+  const double scale = of->scale[which];
+  sonde_grid_edges e;
+  sonde_vec3 g[8] = {{0, 0, 0}};
+  sonde_grid_read_edges(u->now, of->node, &e);
   double share = share_in(&e, q, scale), sum = 0;
   if (share >= aim) return;
-  slope_of(&e, q, scale, g);
-  for (int k = 0; k < 8; ++k)
-    if (is_free(u, node[k])) sum += v_norm2(g[k]);
-  double step = sum > 0 ? u->relaxation * (aim - share) / sum : 0;
-  for (int k = 0; k < 8; ++k)
-    if (is_free(u, node[k])) u->now[node[k]] = v_madd(u->now[node[k]], step, g[k]);
-}
-
-static void list_nodes(uint32_t hex, uint32_t node[8]) {
-  uint32_t corner[4];
-  for (uint32_t k = 0; k < 8; ++k) sonde_grid_corner(hex, k, corner), node[k] = corner[0];
-}
-
-// Whether an element's edges are so near what they are at rest that it can't be small.
-static bool is_little_bent(const sonde_unfold *u, const sonde_grid *grid, const uint32_t node[8]) {
-  for (uint32_t axis = 0; axis < 3; ++axis)
-    for (uint32_t k = 0; k < 8; ++k) {
-      if (k >> axis & 1) continue;
-      uint32_t from = node[k], to = node[k + (1u << axis)];
-      sonde_vec3 rest = v_sub(grid->node[to], grid->node[from]);
-      sonde_vec3 change = v_sub(v_sub(u->now[to], u->now[from]), rest);
-      if (v_norm2(change) > most_change * most_change * v_norm2(rest)) return false;
+  FOR_EDGES(q) {
+    const sonde_vec3 *x = &e.x[j][k], *y = &e.y[i][q.c - k], *z = &e.z[q.a - i][q.b - j];
+    const sonde_vec3 by[3] = {v_cross(*y, *z), v_cross(*z, *x), v_cross(*x, *y)};
+    const uint32_t from[3] = {2 * j + 4 * k, i + 4 * (q.c - k), (q.a - i) + 2 * (q.b - j)};
+    for (int axis = 0; axis < 3; ++axis) {
+      g[from[axis]] = v_madd(g[from[axis]], -scale, by[axis]);
+      g[from[axis] + (1u << axis)] = v_madd(g[from[axis] + (1u << axis)], scale, by[axis]);
     }
-  return true;
+  }
+  for (int k = 0; k < 8; ++k)
+    if (is_free(u, of->node[k])) sum += v_norm2(g[k]);
+  double step = sum > 0 ? relaxation * (aim - share) / sum : 0;
+  for (int k = 0; k < 8; ++k)
+    if (is_free(u, of->node[k])) u->now[of->node[k]] = v_madd(u->now[of->node[k]], step, g[k]);
 }
 
-// The element's coefficients that are below `bound`; *least receives the least so far.
+// Reads an element and counts its coefficients below `bound`; *least receives the least so far. An
+// element whose edges are nearly what they are at rest can't be small: it is not read.
 static uint32_t count_below(const sonde_unfold *u, const sonde_grid *grid, uint32_t hex,
-                            double bound, double *least) {
-  uint32_t node[8], count = 0;
-  edges e;
-  list_nodes(hex, node);
-  if (is_little_bent(u, grid, node)) return 0;
-  read_edges(u->now, node, &e);
-  for (uint32_t k = 0; k < 27; ++k) {
-    const coefficient q = {k % 3, k / 3 % 3, k / 9};
-    double share = share_in(&e, q, scale_of(grid, hex, q));
+                            double bound, element *of, double *least) {
+  sonde_grid_edges e, rest;
+  sonde_grid_nodes(hex, of->node);
+  sonde_grid_read_edges(u->now, of->node, &e);
+  sonde_grid_read_edges(grid->node, of->node, &rest);
+  const sonde_vec3 *now = (const sonde_vec3 *)&e, *was = (const sonde_vec3 *)&rest;
+  bool bent = false;
+  for (uint32_t k = 0; k < 12 && !bent; ++k)
+    bent = v_norm2(v_sub(now[k], was[k])) > most_change * most_change * v_norm2(was[k]);
+  if (!bent) return 0;
+  uint32_t count = 0;
+  for (uint32_t n = 0; n < 27; ++n) {
+    const coefficient q = coefficient_of(n);
+    double sum = 0, corners = 0;
+    FOR_EDGES(q) sum += grid->per_volume[hex][i + 2 * j + 4 * k], ++corners;
+    of->scale[n] = -sum / (corners * corners); // left-handed
+    double share = share_in(&e, q, of->scale[n]);
     *least = fmin(*least, share), count += share < bound;
   }
   return count;
@@ -195,58 +170,34 @@ static void wake(sonde_unfold *u, uint32_t hex) {
         u->awake[(b * NT + a % NT) * (NL - 1) + c] = 3;
 }
 
-static uint32_t sweep(sonde_unfold *u, const sonde_grid *grid) {
-  uint32_t small = 0;
-  for (uint32_t h = 0; h < SONDE_GRID_HEXES; ++h) {
-    if (u->awake[h] == 0) continue;
-    uint32_t node[8];
-    double least = INFINITY;
-    --u->awake[h];
-    if (count_below(u, grid, h, aim, &least) == 0) continue;
-    list_nodes(h, node);
-    for (uint32_t k = 0; k < 27; ++k) {
-      const coefficient q = {k % 3, k / 3 % 3, k / 9};
-      widen(u, node, q, scale_of(grid, h, q));
-    }
-    wake(u, h), small += least < 0.5 * (least_volume + aim);
-  }
-  return small;
-}
-
 bool sonde_unfold_nodes(sonde_unfold *u, const sonde_grid *grid) {
   SONDE_ASSERT(u != NULL && grid != NULL);
-  bool moved = false, quiet = true;
+  bool moved = false, quiet = true, folded = false;
+  element of;
   double least = INFINITY;
-  u->sweeps = u->folded = u->left = 0;
   for (uint32_t n = 0; n < SONDE_WINDOW_NODES && quiet; ++n)
     quiet = v_distance(u->now[n], grid->node[n]) < quiet_m;
   if (quiet) return false;
   for (uint32_t c = 0; c < NS * NT; ++c)
     if (stretch_column(u->now + c * NL, grid->node + c * NL)) moved = true;
   memset(u->awake, 0, sizeof u->awake);
-  for (uint32_t h = 0; h < SONDE_GRID_HEXES; ++h) {
-    uint32_t small = count_below(u, grid, h, least_volume, &least);
-    u->folded += small;
-    if (small) wake(u, h);
-  }
-  if (u->folded == 0) return moved;
-  for (; u->sweeps < SWEEPS; ++u->sweeps) {
-    u->relaxation = u->sweeps < FAST ? fast : 1;
-    if (sweep(u, grid) == 0) break;
-  }
   for (uint32_t h = 0; h < SONDE_GRID_HEXES; ++h)
-    u->left += count_below(u, grid, h, least_volume, &least);
+    if (count_below(u, grid, h, least_volume, &of, &least) > 0) wake(u, h), folded = true;
+  if (!folded) return moved;
+  for (uint32_t sweep = 0, small = 1; sweep < SWEEPS && small > 0; ++sweep) {
+    small = 0;
+    for (uint32_t h = 0; h < SONDE_GRID_HEXES; ++h) {
+      if (u->awake[h] == 0) continue;
+      --u->awake[h], least = INFINITY;
+      if (count_below(u, grid, h, aim, &of, &least) == 0) continue;
+      for (uint32_t k = 0; k < 27; ++k) widen(u, &of, k, sweep < FAST ? fast : 1);
+      wake(u, h), small += least < 0.5 * (least_volume + aim);
+    }
+  }
   return true;
 }
 
 // ---- the columns' field -------------------------------------------------------------------
-
-// 0 where the field is far from folding, 1 where it is about to.
-static double strength_of(const sonde_unfold *u, const sonde_grid *grid) {
-  double least = INFINITY;
-  for (uint32_t h = 0; h < SONDE_GRID_HEXES; ++h) (void)count_below(u, grid, h, 0, &least);
-  return clamp((calm_from - least) / (calm_from - calm_to), 0, 1);
-}
 
 void sonde_bend_update(sonde_bend *b, const sonde_interior *in, const sonde_interior_input *input) {
   SONDE_ASSERT(b != NULL && in != NULL && input != NULL);
@@ -263,7 +214,11 @@ void sonde_bend_update(sonde_bend *b, const sonde_interior *in, const sonde_inte
     b->unfold.now[n] = v_add(b->grid.node[n], u);
   }
   memset(b->unfold.held, 1, sizeof b->unfold.held);
-  b->strength = strength_of(&b->unfold, &b->grid);
+  element of;
+  double least = INFINITY; // where the field is far from folding it stays as it is
+  for (uint32_t h = 0; h < SONDE_GRID_HEXES; ++h)
+    (void)count_below(&b->unfold, &b->grid, h, 0, &of, &least);
+  b->strength = clamp((calm_from - least) / (calm_from - calm_to), 0, 1);
   if (!(b->strength > 0)) return;
   (void)sonde_unfold_nodes(&b->unfold, &b->grid);
   for (uint32_t n = 0; n < SONDE_WINDOW_NODES; ++n)
