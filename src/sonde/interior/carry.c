@@ -1,12 +1,9 @@
 // Tissue around the vessels: what the solid knows nothing of.
 //
-// sonde_interior_displacement  field and vessels; zero outside and in bone
-// sonde_interior_displacements the same for many points
-// sonde_interior_rest_point    inverse: exact in a lumen, iterated elsewhere
-// invert, invert_from_afar, newton_step  the iteration
 // sonde_vessels_gather, sonde_vessels_even  before and behind the field
 // sonde_vessels_displace       both with the field between them
-// within_reach, share_of       how firmly a wall leads a point, beside others
+// sonde_interior_displacement  field and vessels; zero outside and in bone
+// sonde_interior_rest_point    inverse: exact in a lumen, iterated elsewhere
 #include "base/base.h"
 #include "interior/interior.h"
 
@@ -125,50 +122,24 @@ static sonde_vec3 miss_at(const sonde_interior *in, sonde_vec3 rest, sonde_vec3 
   return v_sub(v_add(rest, sonde_vessels_displace(in, rest, at.s)), point);
 }
 
-// The rest point when `point` lies in the lumen of the vessel, whose map across is known both ways;
-// along the vessel the field moves it.
-static bool within_lumen(const sonde_interior *in, uint32_t which, sonde_vec3 point, double s,
-                         sonde_vec3 *rest) {
-  sonde_vessel_state v;
-  if (!sonde_vessel_at(in, which, s, &v) || v.lead < 1 || v.tissue_even < 1) return false;
-  sonde_vec3 d = v_sub(point, v.centre_m), across = v_cross(v.axis, v.flat_axis);
-  double a = v_dot(d, v.flat_axis) / v.half_short_m, b = v_dot(d, across) / v.half_long_m;
-  if (a * a + b * b > 1) return false;
-  *rest = v_madd(v_madd(v.rest_centre_m, a * v.rest_radius_m, v.flat_axis), b * v.rest_radius_m,
-                 across);
-  *rest = v_madd(*rest, v_dot(d, v.axis), v.axis);
-  for (int i = 0; i < 6; ++i)
-    *rest = v_madd(*rest, -v_dot(miss_at(in, *rest, point), v.axis), v.axis);
-  return true;
-}
-
-// The correction that turns a miss into none where the map's derivative at q goes on; false where
-// it does not.
-static bool newton_step(const sonde_interior *in, sonde_vec3 q, sonde_vec3 point, sonde_vec3 miss,
-                        sonde_vec3 *step) {
-  sonde_vec3 slope[3];
-  for (int k = 0; k < 3; ++k) {
-    sonde_vec3 next =
-        v_add(q, vec3(k == 0 ? probing_m : 0, k == 1 ? probing_m : 0, k == 2 ? probing_m : 0));
-    slope[k] = v_scale(v_sub(miss_at(in, next, point), miss), 1 / probing_m);
-  }
-  sonde_vec3 cross = v_cross(slope[1], slope[2]);
-  double volume = v_dot(slope[0], cross);
-  if (!(volume > least_volume)) return false;
-  *step = v_scale(vec3(v_dot(miss, cross), v_dot(miss, v_cross(slope[2], slope[0])),
-                       v_dot(miss, v_cross(slope[0], slope[1]))),
-                  -1 / volume);
-  return true;
-}
-
-// Newton's steps, halved until they shrink the miss; where none does, or the derivative is no use,
-// a part of the miss. Returns what is left of it.
+// Newton's steps, halved until they shrink the miss; where none does, or the map's derivative is no
+// use, a part of the miss. Returns what is left of it.
 static double invert(const sonde_interior *in, sonde_vec3 point, sonde_vec3 *rest) {
   sonde_vec3 q = *rest, miss = miss_at(in, q, point);
   double size = v_norm(miss);
   for (int i = 0; i < 40 && size > 1e-7; ++i) {
-    sonde_vec3 step;
-    if (!newton_step(in, q, point, miss, &step)) step = v_neg(miss);
+    sonde_vec3 slope[3], step = v_neg(miss);
+    for (int k = 0; k < 3; ++k) {
+      sonde_vec3 probe =
+          vec3(k == 0 ? probing_m : 0, k == 1 ? probing_m : 0, k == 2 ? probing_m : 0);
+      slope[k] = v_scale(v_sub(miss_at(in, v_add(q, probe), point), miss), 1 / probing_m);
+    }
+    sonde_vec3 cross = v_cross(slope[1], slope[2]);
+    double volume = v_dot(slope[0], cross);
+    if (volume > least_volume)
+      step = v_scale(vec3(v_dot(miss, cross), v_dot(miss, v_cross(slope[2], slope[0])),
+                          v_dot(miss, v_cross(slope[0], slope[1]))),
+                     -1 / volume);
     double share = fmin(1, longest_m / fmax(v_norm(step), 1e-12));
     sonde_vec3 next = q, left = miss;
     for (int half = 0; half < 8; ++half, share *= 0.5) {
@@ -182,12 +153,30 @@ static double invert(const sonde_interior *in, sonde_vec3 point, sonde_vec3 *res
   return size;
 }
 
-// From places that the tissue at `point` may have come from: the map has one inverse, but Newton's
-// way to it may be barred by a layer that is squeezed thin.
-static sonde_vec3 invert_from_afar(const sonde_interior *in, sonde_vec3 point, sonde_vec3 rest,
-                                   double left) {
-  enum { STARTS = 12 };
+sonde_vec3 sonde_interior_rest_point(const sonde_interior *in, sonde_vec3 point) {
+  SONDE_ASSERT(in != NULL);
+  if (!in->ready) return point;
   sonde_column_point at;
+  sonde_vec3 rest = sonde_interior_invert(in, point, point, 40, NULL);
+  (void)sonde_interior_locate(in, rest, &at);
+  // In a lumen the map across is known both ways; along the vessel the field moves the point.
+  for (uint32_t which = 0; which < in->vessel_count; ++which) {
+    sonde_vessel_state v;
+    if (!sonde_vessel_at(in, which, at.s, &v) || v.lead < 1 || v.tissue_even < 1) continue;
+    sonde_vec3 d = v_sub(point, v.centre_m), across = v_cross(v.axis, v.flat_axis);
+    double a = v_dot(d, v.flat_axis) / v.half_short_m, b = v_dot(d, across) / v.half_long_m;
+    if (a * a + b * b > 1) continue;
+    rest = v_madd(v_madd(v.rest_centre_m, a * v.rest_radius_m, v.flat_axis), b * v.rest_radius_m,
+                  across);
+    rest = v_madd(rest, v_dot(d, v.axis), v.axis);
+    for (int i = 0; i < 6; ++i)
+      rest = v_madd(rest, -v_dot(miss_at(in, rest, point), v.axis), v.axis);
+    return rest;
+  }
+  double left = invert(in, point, &rest);
+  // The map has one inverse, but Newton's way to it may be barred by a layer that is squeezed thin:
+  // other starts are places along the column that the tissue may have come from.
+  enum { STARTS = 12 };
   (void)sonde_interior_locate(in, point, &at);
   sonde_vec3 out = v_add(v_scale(in->e1, cos(at.theta)), v_scale(in->e2, sin(at.theta)));
   for (int k = 0; k < STARTS && left > good_enough_m; ++k) {
@@ -196,20 +185,6 @@ static sonde_vec3 invert_from_afar(const sonde_interior *in, sonde_vec3 point, s
     double got = invert(in, point, &start);
     if (got < left) left = got, rest = start;
   }
-  return rest;
-}
-
-sonde_vec3 sonde_interior_rest_point(const sonde_interior *in, sonde_vec3 point) {
-  SONDE_ASSERT(in != NULL);
-  if (!in->ready) return point;
-  sonde_column_point at;
-  sonde_vec3 bare = sonde_interior_invert(in, point, point, 40, NULL), rest;
-  (void)sonde_interior_locate(in, bare, &at);
-  for (uint32_t which = 0; which < in->vessel_count; ++which)
-    if (within_lumen(in, which, point, at.s, &rest)) return rest;
-  rest = bare;
-  double left = invert(in, point, &rest);
-  if (left > good_enough_m) rest = invert_from_afar(in, point, rest, left);
   bool within = sonde_interior_locate(in, rest, &at);
   return within && at.depth_m >= -1e-6 ? rest : point;
 }

@@ -2,8 +2,6 @@
 //
 // sonde_venous_pressure    posture + breath + Valsalva
 // sonde_arterial_pressure  a pulse of two waves between diastolic and systolic
-// rising_for               inverse of the rise
-// strain_share             rise, plateau and fall of a Valsalva manoeuvre
 #include "base/base.h"
 #include "interior/interior.h"
 
@@ -54,17 +52,13 @@ double sonde_venous_pressure(const sonde_circulation *c, double t) {
          strain * c->valsalva_pa;
 }
 
-// Systolic wave, dicrotic wave; the sum spans exactly 0..1 over a beat.
-static double pulse(double phase) {
-  double rise = smooth(phase / 0.14), fall = 1 - smooth((phase - 0.14) / 0.42);
-  double echo = 0.18 * smooth((phase - 0.40) / 0.10) * (1 - smooth((phase - 0.50) / 0.5));
-  return fmin(rise * fall + echo, 1);
-}
-
+// The systolic and the dicrotic wave add up to a pulse that spans exactly 0..1 over a beat.
 double sonde_arterial_pressure(const sonde_circulation *c, double t) {
   SONDE_ASSERT(c != NULL && isfinite(t));
   double beats = c->heart_rate_hz * t, phase = beats - floor(beats);
-  return c->diastolic_pa + (c->systolic_pa - c->diastolic_pa) * pulse(phase);
+  double rise = smooth(phase / 0.14), fall = 1 - smooth((phase - 0.14) / 0.42);
+  double echo = 0.18 * smooth((phase - 0.40) / 0.10) * (1 - smooth((phase - 0.50) / 0.5));
+  return c->diastolic_pa + (c->systolic_pa - c->diastolic_pa) * fmin(rise * fall + echo, 1);
 }
 
 void sonde_circulation_apply(const sonde_circulation *c, uint64_t tick, double dt_s,

@@ -1,11 +1,10 @@
 // The column table: built once from the rest skin and the femur.
 //
-// sonde_columns_create  all of the below
-// find_axis             femur axis and radius from the moments of its surface
-// find_extent           rows of the table between the leg's ends, where the axis is inside
-// cast_columns          skin point of every column
-// slope_columns         derivatives of R, outward flux vectors
-// store_field           the constant half of the evaluation's table
+// find_axis       femur axis and radius from the moments of its surface
+// find_extent     rows of the table between the leg's ends, where the axis is inside
+// cast_columns    skin point of every column, derivatives of R, outward flux vectors
+// store_layers    layer depths in the evaluation's table
+// factor_surface  five-point Laplacian of the skin in (theta, s), zero at both ends
 // factor_surface        five-point Laplacian of the skin in (theta, s), zero at both ends
 #include "base/base.h"
 #include "interior/interior.h"
@@ -28,29 +27,9 @@ static double face_area(const sonde_mesh *mesh, uint32_t f) {
   return 0.5 * v_norm(v_cross(v_sub(mesh->vertices[v[1]], a), v_sub(mesh->vertices[v[2]], a)));
 }
 
-static double signed_volume(const sonde_mesh *mesh, sonde_vec3 origin) {
-  double sum = 0;
-  for (uint32_t f = 0; f < mesh->face_count; ++f) {
-    const uint32_t *v = mesh->faces[f];
-    sum += v_dot(v_sub(mesh->vertices[v[0]], origin),
-                 v_cross(v_sub(mesh->vertices[v[1]], origin), v_sub(mesh->vertices[v[2]], origin)));
-  }
-  return sum / 6;
-}
-
-// Largest principal direction of the surface's second moments, by power iteration.
-static sonde_vec3 principal_direction(const sonde_mesh *mesh, sonde_vec3 centre) {
-  sonde_mat3 moment = m_zero();
-  for (uint32_t f = 0; f < mesh->face_count; ++f)
-    moment = m_add(moment, m_rank1(v_sub(face_centre(mesh, f), centre), face_area(mesh, f), 0));
-  sonde_vec3 axis = v_unit(vec3(0.1, 0.1, 1), vec3(0, 0, 1));
-  for (int i = 0; i < 200; ++i) axis = v_unit(m_mul_v(moment, axis), axis);
-  return axis.z < 0 ? v_neg(axis) : axis;
-}
-
 static sonde_status find_axis(sonde_interior *in, sonde_error *error) {
   const sonde_mesh *femur = &in->model->femur;
-  double area = 0, low = INFINITY, high = -INFINITY;
+  double area = 0, low = INFINITY, high = -INFINITY, volume = 0;
   sonde_vec3 centre = vec3(0, 0, 0);
   for (uint32_t f = 0; f < femur->face_count; ++f) {
     centre = v_madd(centre, face_area(femur, f), face_centre(femur, f));
@@ -58,12 +37,26 @@ static sonde_status find_axis(sonde_interior *in, sonde_error *error) {
   }
   if (!(area > 0)) return sonde_fail(error, SONDE_MESH, "the model's femur has no surface");
   in->origin = v_scale(centre, 1 / area);
-  in->axis = principal_direction(femur, in->origin);
+  // Axis: the largest principal direction of the surface's second moments, by power iteration.
+  sonde_mat3 moment = m_zero();
+  for (uint32_t f = 0; f < femur->face_count; ++f)
+    moment =
+        m_add(moment, m_rank1(v_sub(face_centre(femur, f), in->origin), face_area(femur, f), 0));
+  sonde_vec3 axis = v_unit(vec3(0.1, 0.1, 1), vec3(0, 0, 1));
+  for (int i = 0; i < 200; ++i) axis = v_unit(m_mul_v(moment, axis), axis);
+  in->axis = axis.z < 0 ? v_neg(axis) : axis;
+  // Radius: of the cylinder of the femur's volume and length.
   for (uint32_t v = 0; v < femur->vertex_count; ++v) {
     double s = v_dot(v_sub(femur->vertices[v], in->origin), in->axis);
     low = fmin(low, s), high = fmax(high, s);
   }
-  double volume = fabs(signed_volume(femur, in->origin));
+  for (uint32_t f = 0; f < femur->face_count; ++f) {
+    const uint32_t *v = femur->faces[f];
+    volume += v_dot(v_sub(femur->vertices[v[0]], in->origin),
+                    v_cross(v_sub(femur->vertices[v[1]], in->origin),
+                            v_sub(femur->vertices[v[2]], in->origin)));
+  }
+  volume = fabs(volume / 6);
   if (!(high > low) || !(volume > 0))
     return sonde_fail(error, SONDE_MESH, "the model's femur encloses no volume");
   in->bone_radius_m = sqrt(volume / (SONDE_PI * (high - low)));
@@ -142,11 +135,7 @@ static sonde_status cast_columns(sonde_interior *in, sonde_error *error) {
         return sonde_fail(error, SONDE_MESH, "the femur reaches the skin at %.4f m", s);
     }
   }
-  return SONDE_OK;
-}
-
-static void slope_columns(sonde_interior *in) {
-  uint32_t n = in->theta_count;
+  const uint32_t n = in->theta_count;
   for (uint32_t j = 0; j < in->s_count; ++j) {
     uint32_t below = j > 0 ? j - 1 : 0, above = j + 1 < in->s_count ? j + 1 : j;
     for (uint32_t i = 0; i < n; ++i) {
@@ -161,8 +150,14 @@ static void slope_columns(sonde_interior *in) {
       sonde_vec3 flux = v_scale(e, c->radius_m);
       flux = v_madd(flux, -c->slope_theta, c->round);
       c->flux_normal = v_madd(flux, -c->radius_m * c->slope_s, in->axis);
+      sonde_column_field *f = &in->field[j * n + i];
+      f->radius_m = (float)c->radius_m;
+      f->slope_theta_m = (float)c->slope_theta;
+      f->slope_s = (float)c->slope_s;
+      f->cosine = (float)(c->radius_m / v_norm(c->flux_normal));
     }
   }
+  return SONDE_OK;
 }
 
 static double at_column(const sonde_column *c, const double *per_node) {
@@ -171,16 +166,10 @@ static double at_column(const sonde_column *c, const double *per_node) {
   return sum;
 }
 
-static void store_field(sonde_interior *in) {
+static void store_layers(sonde_interior *in) {
   for (uint32_t k = 0; k < in->theta_count * in->s_count; ++k) {
-    const sonde_column *c = &in->column[k];
-    sonde_column_field *f = &in->field[k];
-    f->radius_m = (float)c->radius_m;
-    f->slope_theta_m = (float)c->slope_theta;
-    f->slope_s = (float)c->slope_s;
-    f->fat_m = (float)at_column(c, in->model->fat_depth_m);
-    f->muscle_m = (float)at_column(c, in->model->muscle_depth_m);
-    f->cosine = (float)(c->radius_m / v_norm(c->flux_normal));
+    in->field[k].fat_m = (float)at_column(&in->column[k], in->model->fat_depth_m);
+    in->field[k].muscle_m = (float)at_column(&in->column[k], in->model->muscle_depth_m);
   }
 }
 
@@ -196,34 +185,12 @@ static double along(const sonde_interior *in, uint32_t i, uint32_t j) {
   return r * in->theta_step / in->s_step_m;
 }
 
-// One row of the matrix with ascending columns; beyond the ends the potential is zero.
-static uint32_t fill_row(const sonde_interior *in, uint32_t i, uint32_t j, uint32_t *column,
-                         double *value) {
-  uint32_t n = in->theta_count, count = 0;
-  double down = along(in, i, j > 0 ? j - 1 : 0), up = along(in, i, j);
-  double left = around(in, (i + n - 1) % n, j), right = around(in, i, j);
-  uint32_t at[3] = {j * n + (i + n - 1) % n, j * n + i, j * n + (i + 1) % n};
-  double of[3] = {-left, down + up + left + right, -right};
-  if (j > 0) column[count] = (j - 1) * n + i, value[count++] = -down;
-  for (int k = 0; k < 3; ++k) { // ascending although the circle wraps
-    uint32_t place = count + (uint32_t)k;
-    column[place] = at[k], value[place] = of[k];
-    for (; place > count && column[place] < column[place - 1]; --place) {
-      uint32_t c = column[place];
-      double v = value[place];
-      column[place] = column[place - 1], value[place] = value[place - 1];
-      column[place - 1] = c, value[place - 1] = v;
-    }
-  }
-  count += 3;
-  if (j + 1 < in->s_count) column[count] = (j + 1) * n + i, value[count++] = -up;
-  return count;
-}
-
+// Rows of the matrix have ascending columns; beyond the ends the potential is zero.
 static sonde_status factor_surface(sonde_interior *in, sonde_error *error) {
   SONDE_ASSERT(in->ldl == NULL && in->s_count >= 4);
   sonde_status status = SONDE_OK;
-  uint32_t count = in->theta_count * in->s_count, filled = 0;
+  const uint32_t n = in->theta_count, count = n * in->s_count;
+  uint32_t filled = 0;
   uint32_t *start = SONDE_NEW(uint32_t, count + 1),
            *column = SONDE_NEW(uint32_t, 5 * (size_t)count);
   double *value = SONDE_NEW(double, 5 * (size_t)count);
@@ -233,8 +200,17 @@ static sonde_status factor_surface(sonde_interior *in, sonde_error *error) {
     goto done;
   }
   for (uint32_t k = 0; k < count; ++k) {
-    filled +=
-        fill_row(in, k % in->theta_count, k / in->theta_count, column + filled, value + filled);
+    const uint32_t i = k % n, j = k / n, last = (i + n - 1) % n, next = (i + 1) % n;
+    const double down = along(in, i, j > 0 ? j - 1 : 0), up = along(in, i, j);
+    const double left = around(in, last, j), right = around(in, i, j);
+    if (j > 0) column[filled] = k - n, value[filled++] = -down;
+    // The circle wraps: the first column's left neighbour is the row's last, and the other way.
+    if (next == 0) column[filled] = j * n, value[filled++] = -right;
+    if (i > 0) column[filled] = j * n + last, value[filled++] = -left;
+    column[filled] = k, value[filled++] = down + up + left + right;
+    if (next > 0) column[filled] = j * n + next, value[filled++] = -right;
+    if (i == 0) column[filled] = j * n + last, value[filled++] = -left;
+    if (j + 1 < in->s_count) column[filled] = k + n, value[filled++] = -up;
     start[k + 1] = filled;
     points[k] = in->column[k].rest_m;
   }
@@ -263,14 +239,13 @@ sonde_status sonde_columns_create(sonde_interior *in, sonde_error *error) {
   if (!in->column || !in->field || !in->potential) return sonde_fail_memory(error);
   status = cast_columns(in, error);
   if (status != SONDE_OK) return status;
-  slope_columns(in);
-  store_field(in);
+  store_layers(in);
   return factor_surface(in, error);
 }
 
 void sonde_columns_refresh(sonde_interior *in) {
   SONDE_ASSERT(in != NULL && in->field != NULL);
-  store_field(in);
+  store_layers(in);
   in->live->ready = in->next->ready = in->building = in->solid = false;
   for (uint32_t k = 0; k < in->shelf_count; ++k)
     if (in->shelf[k]) in->shelf[k]->ready = false;
