@@ -72,6 +72,14 @@ fresh; sed -i '/end of rooms/d' "$tree/docs/architecture.md"
 expect red "a page without the place of the table" "${rooms[@]}"
 fresh; mkdir "$tree/src/sonde/other"
 expect red "a directory of src that is not listed" "${rooms[@]}"
+docs=("$house/docs.sh" "$tree")
+fresh; : >"$tree/README.md"; : >"$tree/CONTRIBUTING.md"; mkdir "$tree/docs/decisions"; : >"$tree/docs/decisions/1.md"
+echo '[one](base.md) `src/sonde/world/step_hot.c` `sonde_step`' >"$tree/docs/a.md"
+expect green "docs that name what is there" "${docs[@]}"
+for fault in 's/step_hot/step/' 's/`sonde_step`/`sonde_stop`/' 's/base.md/other.md/'; do
+  sed "$fault" "$tree/docs/a.md" >"$tree/docs/b.md"
+  expect red "docs after $fault" "${docs[@]}"
+done
 for fault in '$a sonde other | rests | docs/base.md' '$a sonde base | memory | docs/base.md' \
   's/^sonde base/library base/' '/^sonde base/s/base.md/other.md/' '/^sonde base/s/[|].*/| |/'; do
   fresh; sed -i "$fault" "$tree/src/rooms.txt"
