@@ -137,6 +137,17 @@ fresh; for _ in {1..251}; do echo '//'; done >"$tree/app/long.h"
 expect red "a header of 251 lines" "${sizes[@]}"
 fresh; sed -i /ASSERT/d "$tree/src/sonde/world/step_hot.c"
 expect red "no asserts" "${sizes[@]}"
+once='static int sonde_a(int a) {\n  return a;\n}\nint sonde_b(int a) { return sonde_a(a); }\n'
+twice='int sonde_c(int a) { return sonde_a(a); }\n'
+fresh; printf "$once$twice" >"$tree/src/sonde/world/once.c"
+expect green "a helper with two uses" "${sizes[@]}"
+fresh; printf "$once" >"$tree/src/sonde/world/once.c"
+expect red "a helper with a single use" "${sizes[@]}"
+fresh; { for i in {1..46}; do echo "// $i"; done; echo 'int sonde_a(int a);'; } >"$tree/app/head.c"
+expect red "a head of 46 lines" "${sizes[@]}"
+fresh; for i in {1..50}; do echo 'SONDE_ASSERT(1);'; done >"$tree/src/sonde/base/many.c"
+for i in {1..400}; do echo "int sonde_$i;"; done >"$tree/src/sonde/world/few.c"
+expect red "a room with few asserts" "${sizes[@]}"
 
 fresh
 compile world step_hot.c 'double sin(double); double f(double a) { return sin(a); }'
