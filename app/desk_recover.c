@@ -138,7 +138,7 @@ static void sweep(const char *directory) {
   static const char *const NAMES[] = {"exam.rec.keys", "exam.json", "exam.csv", "report.html"};
   char path[DESK_PATH];
   for (size_t k = 0; k < sizeof NAMES / sizeof NAMES[0]; ++k)
-    (void)sonde_file_sweep(desk_path(path, directory, NAMES[k]));
+    (void)sonde_file_remove_abandoned(desk_path(path, directory, NAMES[k]));
 }
 
 static void find(const char *exams, const char *id, sonde_exam_log *log, desk_recovered *found) {

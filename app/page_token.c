@@ -9,6 +9,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -28,17 +29,19 @@ static bool read_token(const char *path, char token[SONDE_PAGE_TOKEN]) {
 }
 
 static bool write_token(const char *path, const char *token) {
+  // The writer locks the temporary file as long as it lives; without a lock it is a killed
+  // program's.
   char part[PATH + 32];
-  snprintf(part, sizeof part, "%s.part-%d", path, (int)getpid());
-  unlink(part);
+  snprintf(part, sizeof part, "%s.part-%06x", path, (unsigned)getpid() & 0xffffff);
   int file = open(part, O_CREAT | O_EXCL | O_WRONLY | O_NOFOLLOW | O_CLOEXEC, 0600);
   if (file < 0) return false;
+  (void)flock(file, LOCK_EX);
   bool whole = write(file, token, strlen(token)) == (ssize_t)strlen(token) && fsync(file) == 0;
-  if (close(file)) whole = false;
   // Another program of the same user may have been first: then its token is the one to use.
   if (whole && link(part, path) && errno != EEXIST) whole = false;
   int problem = errno;
   unlink(part);
+  close(file);
   errno = problem;
   return whole;
 }
@@ -56,6 +59,7 @@ sonde_status page_token_find(const char *directory, const char *name, const char
   }
   if (snprintf(path, sizeof path, "%s/%s", directory, name) >= PATH)
     return app_error(error, SONDE_IO, "%.300s: the path is too long", directory);
+  (void)sonde_file_remove_abandoned(path);
   if (read_token(path, token)) return SONDE_OK;
   unlink(path); // cut short, or not private
   sonde_status status = sonde_page_token_make(token, error);

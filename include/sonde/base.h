@@ -168,7 +168,7 @@ SONDE_API sonde_status sonde_file_commit(sonde_file *file, sonde_error *error);
 SONDE_API void sonde_file_discard(sonde_file *file);
 /** Removes the temporary files of `path` whose program was killed; those that are being written
  * stay. @return how many were removed @thread any */
-SONDE_API uint32_t sonde_file_sweep(const char *path);
+SONDE_API uint32_t sonde_file_remove_abandoned(const char *path);
 
 /** An output file in memory, for text that becomes part of something else; sonde_file_take() ends
  * it. @return MEMORY @thread owner */

@@ -73,16 +73,16 @@ static void sweep_takes_what_the_dead_left(void **state) {
     _exit(1);
   }
   assert_int_equal(read(pipe_of[0], &byte, 1), 1);
-  assert_int_equal(sonde_file_sweep(target), 0); // it lives
+  assert_int_equal(sonde_file_remove_abandoned(target), 0); // it lives
   assert_int_equal(count_entries(), 1);
   kill(child, SIGKILL);
   assert_int_equal(waitpid(child, NULL, 0), child);
   sonde_file *mine;
   assert_int_equal(sonde_file_create(target, &mine, NULL), SONDE_OK);
   fclose(fopen(other, "w"));
-  assert_int_equal(sonde_file_sweep(target), 1);
+  assert_int_equal(sonde_file_remove_abandoned(target), 1);
   assert_int_equal(count_entries(), 2);
-  assert_int_equal(sonde_file_sweep("/nonexistent-directory/x"), 0);
+  assert_int_equal(sonde_file_remove_abandoned("/nonexistent-directory/x"), 0);
   sonde_file_write(mine, "mine", 4);
   assert_int_equal(sonde_file_commit(mine, NULL), SONDE_OK);
   expect_content("mine");

@@ -5,10 +5,6 @@
 #include "base/maths.h"
 #include "stream/page_message.h"
 
-static void set(double value, double *control) {
-  if (!isnan(value)) *control = value;
-}
-
 // One session serves all inputs: making its inside takes most of a second. Every input begins with
 // the controls of the start and the probe off the skin.
 static void apply(const page_command *command) {
@@ -23,15 +19,7 @@ static void apply(const page_command *command) {
     start = sonde_session_controls_now(session);
   }
   sonde_session_controls c = start;
-  set(command->echo.gain_db, &c.echo.gain_db);
-  set(command->echo.depth_m, &c.echo.depth_m);
-  set(command->echo.frequency_hz, &c.echo.frequency_hz);
-  set(command->echo.dynamic_range_db, &c.echo.dynamic_range_db);
-  set(command->echo.focus_m, &c.echo.focus_m);
-  set(command->echo.tgc_db_per_m, &c.echo.tgc_db_per_m);
-  set(command->stiffness_scale, &c.stiffness_scale);
-  set(command->damping_scale, &c.damping_scale);
-  set(command->friction_scale, &c.friction_scale);
+  if (command->type == PAGE_COMMAND_CONTROLS) page_command_take(command, &c);
   if (command->gel_put) c.gel = true, ++c.gel_put;
   sonde_session_control(session, &c);
   sonde_pose goal = command->type == PAGE_COMMAND_GOAL ? command->goal : off;

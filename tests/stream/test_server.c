@@ -349,6 +349,8 @@ static void another_source_takes_the_place_of_the_first(void **state) {
   ws_say(s, "{\"type\":\"ping\",\"id\":9}");
   assert_true(ws_expect(s, "\"id\":9"));
   assert_int_equal(atomic_load(&f->source.goals), 0); // nothing to move
+  ws_say(s, "{\"type\":\"controls\",\"gain_db\":3}");
+  assert_true(ws_expect(s, "no control acts on it"));
   page_source first = source_of(&f->source);
   assert_int_equal(page_server_show(f->server, &first, NULL), SONDE_OK);
   assert_int_equal(first_point_count(s), NODES);

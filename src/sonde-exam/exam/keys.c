@@ -89,7 +89,7 @@ sonde_status sonde_keys_create(const char *path, const sonde_subject *subject,
   keys->raw = sonde_calloc(1, keys->raw_room);
   keys->packed = sonde_calloc(1, compressBound(keys->raw_room));
   sonde_status status = keys->raw && keys->packed ? SONDE_OK : sonde_fail_memory(error);
-  (void)sonde_file_sweep(path); // what a killed program left
+  (void)sonde_file_remove_abandoned(path); // what a killed program left
   if (!status) status = sonde_file_create(path, &keys->file, error);
   if (status) {
     free_writer(keys);

@@ -8,6 +8,7 @@
 #include "base/base.h"
 #include "base/maths.h"
 #include "haptics/motion.h"
+#include "haptics/ranges.h"
 
 sonde_session_def sonde_session_def_default(void) {
   sonde_session_def def = {.world = sonde_world_def_default(),
@@ -53,39 +54,6 @@ static sonde_status check_patient(const sonde_session_def *def, sonde_error *err
   return status;
 }
 
-// What the limiter would replace by its defaults: no other force may reach a hand than was asked
-// for.
-static sonde_status check_hand(const sonde_session_def *def, sonde_error *error) {
-  const sonde_safety_limits *l = &def->limits;
-  const sonde_render_def *r = &def->rendering;
-  const double most = 1e300;
-  const struct {
-    const char *name;
-    double value, low, high;
-  } range[] = {{"limits.force_n", l->force_n, 0, most},
-               {"limits.torque_n_m", l->torque_n_m, 0, most},
-               {"limits.slew_n_s", l->slew_n_s, 0, most},
-               {"limits.fade_s", l->fade_s, 0, most},
-               {"limits.soft_start_s", l->soft_start_s, 0, most},
-               {"limits.stale_s", l->stale_s, 0, most},
-               {"limits.continuous_n", l->continuous_n, 0, most},
-               {"limits.thermal_s", l->thermal_s, 0, most},
-               {"limits.velocity_m_s", l->velocity_m_s, 0, most},
-               {"limits.impulse_n_s", l->impulse_n_s, 0, most},
-               {"rendering.force_scale", r->force_scale, 1e-3, 100},
-               {"rendering.stiffness_n_m", r->stiffness_n_m, 0, 1e5},
-               {"rendering.damping_n_s_m", r->damping_n_s_m, 0, 1e3},
-               {"rendering.probe_mass_kg", r->probe_mass_kg, 1e-3, 10},
-               {"rendering.filter_rad_s", r->filter_rad_s, 1, 1e5},
-               {"rendering.controller_max_n_s_m", r->controller_max_n_s_m, 0, 1e3},
-               {"rendering.reserve_j", r->reserve_j, 0, 1}};
-  for (size_t k = 0; k < SONDE_COUNT_OF(range); ++k)
-    if (!(range[k].value >= range[k].low && range[k].value <= range[k].high))
-      return sonde_fail(error, SONDE_ARGUMENT, "session: %s is %g, expected %g to %g",
-                        range[k].name, range[k].value, range[k].low, range[k].high);
-  return SONDE_OK;
-}
-
 static sonde_status check(const sonde_session_def *def, const sonde_device *device,
                           sonde_error *error) {
   uint32_t probes = 0;
@@ -102,7 +70,7 @@ static sonde_status check(const sonde_session_def *def, const sonde_device *devi
                       def->image_width, def->image_height);
   if (def->ticks_per_image == 0)
     return sonde_fail(error, SONDE_ARGUMENT, "session: 0 ticks per image, expected 1 or more");
-  sonde_status status = check_hand(def, error);
+  sonde_status status = sonde_hand_check(&def->limits, &def->rendering, error);
   return status ? status : check_patient(def, error);
 }
 

@@ -110,4 +110,8 @@ typedef struct page_command {
 sonde_status page_parse_command(const char *bytes, size_t count, page_command *command,
                                 sonde_error *error);
 
+// Takes a command's numbers and straining over into the controls; the image's settings are clamped
+// to their ranges. @thread any
+void page_command_take(const page_command *command, sonde_session_controls *controls);
+
 #endif

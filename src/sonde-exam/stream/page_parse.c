@@ -6,6 +6,7 @@
 // read_vector   an array of finite numbers
 // read_text, read_bool, read_time   the same for requests
 // parse_*       one command each
+// page_command_take   its numbers into controls
 #include "stream/page_message.h"
 
 #include "base/bounds.h"
@@ -303,4 +304,21 @@ sonde_status page_parse_command(const char *bytes, size_t count, page_command *c
   status = parse_object(root, command, error);
   cJSON_Delete(root);
   return status;
+}
+
+static void take(double value, double *control) {
+  if (!isnan(value)) *control = value;
+}
+
+void page_command_take(const page_command *command, sonde_session_controls *controls) {
+  SONDE_ASSERT(command && controls);
+  const sonde_echo_range *range = sonde_echo_ranges();
+  for (size_t k = 0; k < SONDE_ECHO_SETTINGS; ++k)
+    take(*(const double *)(const void *)((const char *)&command->echo + range[k].offset),
+         (double *)(void *)((char *)&controls->echo + range[k].offset));
+  take(command->stiffness_scale, &controls->stiffness_scale);
+  take(command->damping_scale, &controls->damping_scale);
+  take(command->friction_scale, &controls->friction_scale);
+  if (command->strain >= 0) controls->valsalva = command->strain > 0;
+  controls->echo = sonde_echo_settings_clamp(controls->echo);
 }

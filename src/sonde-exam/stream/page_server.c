@@ -87,10 +87,6 @@ static bool find_probe(const sonde_page_server *server, const char *name, uint32
   return false;
 }
 
-static void take(double value, double *target) {
-  if (!isnan(value)) *target = value;
-}
-
 static void apply_controls(sonde_page_server *server, page_client *client,
                            const page_command *command) {
   sonde_session_controls next = server->controls;
@@ -110,17 +106,7 @@ static void apply_controls(sonde_page_server *server, page_client *client,
     page_client_note(client, "a posture is supine, sitting or standing");
     return;
   }
-  take(command->echo.gain_db, &next.echo.gain_db);
-  take(command->echo.depth_m, &next.echo.depth_m);
-  take(command->echo.frequency_hz, &next.echo.frequency_hz);
-  take(command->echo.dynamic_range_db, &next.echo.dynamic_range_db);
-  take(command->echo.focus_m, &next.echo.focus_m);
-  take(command->echo.tgc_db_per_m, &next.echo.tgc_db_per_m);
-  take(command->stiffness_scale, &next.stiffness_scale);
-  take(command->damping_scale, &next.damping_scale);
-  take(command->friction_scale, &next.friction_scale);
-  if (command->strain >= 0) next.valsalva = command->strain > 0;
-  next.echo = sonde_echo_settings_clamp(next.echo);
+  page_command_take(command, &next);
   server->controls = next;
 }
 
@@ -147,9 +133,12 @@ void page_command_apply(sonde_page_server *server, page_client *client,
     if (server->def.request) server->def.request(server->def.user, &command->request);
     return;
   }
-  if (!source->goal) return; // nothing to control
-  if (command->type == PAGE_COMMAND_GOAL) {
-    source->goal(source->self, command->goal);
+  if (command->type == PAGE_COMMAND_GOAL) { // a goal of the moment before is no mistake
+    if (source->goal) source->goal(source->self, command->goal);
+    return;
+  }
+  if (!source->control) {
+    page_client_note(client, "what is shown is a replay or a thigh at rest: no control acts on it");
     return;
   }
   if (command->type == PAGE_COMMAND_CONTROLS) {

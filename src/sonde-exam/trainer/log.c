@@ -21,8 +21,8 @@
 #include "base/disk.h"
 
 #include <cjson/cJSON.h>
-#include <fcntl.h>
 #include <errno.h>
+#include <fcntl.h>
 #include <sqlite3.h>
 #include <string.h>
 

@@ -286,7 +286,7 @@ static bool is_abandoned(const char *path) {
   return free_now;
 }
 
-uint32_t sonde_file_sweep(const char *path) {
+uint32_t sonde_file_remove_abandoned(const char *path) {
   SONDE_ASSERT(path);
   char target[PATH_MAX];
   int own = -1;

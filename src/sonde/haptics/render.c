@@ -5,6 +5,7 @@
 
 #include "base/base.h"
 #include "base/maths.h"
+#include "haptics/ranges.h"
 
 sonde_render_def sonde_render_def_default(void) {
   return (sonde_render_def){.dt_s = 1e-3,
@@ -16,22 +17,10 @@ sonde_render_def sonde_render_def_default(void) {
                             .reserve_j = 2e-5};
 }
 
-static double within(double value, double low, double high, double fallback) {
-  return value >= low && value <= high ? value : fallback;
-}
-
 void sonde_render_init(sonde_render *render, const sonde_render_def *def) {
   SONDE_ASSERT(render != NULL);
-  sonde_render_def d = sonde_render_def_default(), clean = def ? *def : d;
-  clean.dt_s = within(clean.dt_s, 1e-5, 0.1, d.dt_s);
-  clean.force_scale = within(clean.force_scale, 1e-3, 100.0, d.force_scale);
-  clean.stiffness_n_m = within(clean.stiffness_n_m, 0.0, 1e5, 0.0);
-  clean.damping_n_s_m = within(clean.damping_n_s_m, 0.0, 1e3, 0.0);
-  clean.probe_mass_kg = within(clean.probe_mass_kg, 1e-3, 10.0, d.probe_mass_kg);
-  clean.filter_rad_s = within(clean.filter_rad_s, 1.0, 1e5, d.filter_rad_s);
-  clean.controller_max_n_s_m = within(clean.controller_max_n_s_m, 0.0, 1e3, d.controller_max_n_s_m);
-  clean.reserve_j = within(clean.reserve_j, 0.0, 1.0, d.reserve_j);
-  *render = (sonde_render){.def = clean};
+  *render = (sonde_render){.def = def ? *def : sonde_render_def_default()};
+  sonde_render_def_clean(&render->def);
   SONDE_ASSERT(!render->started);
 }
 
