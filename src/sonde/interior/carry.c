@@ -7,7 +7,6 @@
 #include "base/base.h"
 #include "interior/interior.h"
 
-static const double reach = 3.0; // rest radii over which a wall's motion fades
 static const double least_share = 1e-9;
 static const double probing_m = 1e-6, longest_m = 4e-3; // of a step of Newton's
 static const double least_volume = 1e-3;                // of the derivative
@@ -24,7 +23,7 @@ static bool within_reach(const sonde_vessel_state *v, sonde_vec3 rest, sonde_vec
                          double *b, double *weight) {
   sonde_vec3 d = v_sub(rest, v->rest_centre_m);
   *a = v_dot(d, v->flat_axis), *b = v_dot(d, across);
-  double t = fmax((sqrt(*a * *a + *b * *b) / v->rest_radius_m - 1) / reach, 0);
+  double t = fmax((sqrt(*a * *a + *b * *b) / v->rest_radius_m - 1) / sonde_wall_reach, 0);
   *weight = v->lead * (1 - t) * (1 - t) * (1 + 2 * t);
   return t < 1 && v->lead > 0;
 }

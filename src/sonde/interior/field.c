@@ -1,22 +1,14 @@
-// The displacement field: one solve per update, closed evaluation anywhere.
+// The displacement field: one solve per update, closed evaluation anywhere (docs/interior.md).
 //
 // With p(theta, s, zeta) the column map, J = H r its volume density and U a field without
 // divergence in (theta, s, zeta), u = (1/J) (U^zeta dp/dzeta + U^theta dp/dtheta + U^s dp/ds) has
-// no divergence in space, whatever the shape of the leg. Two such fields are added:
-// - inflow: U^zeta = g W, U^i = g' V^i with d_i V^i = -W. g = 1 - 3 z^2 + 2 z^3.
-// - slide: U^i = g S^i + g'/2 V'^i, U^zeta = -(z - 3/2 z^2 + z^4/2) D, with S^i = H R t^i the
-// skin's
-//   motion along itself, D = d_i S^i, d_i V'^i = D: what follows the skin below it comes back
-//   at mid-depth. V + V'/2 = -grad Phi takes one solve.
-// At the skin the first carries the flux through it and the second what is left, which is
-// tangential; at the bone both vanish.
-//
-// sonde_interior_solve         reads the skin, solves for Phi, stores the fluxes
-// sonde_interior_field         displacement at a point: the solid's, or the columns'
-// sonde_interior_stress        the solid's
-// sonde_interior_invert        rest point by iteration
-// sonde_interior_locate        column coordinates and layers
-// sonde_interior_label         tissue
+// none in space, whatever the shape of the leg. Two such fields are added; at the bone both vanish:
+// - inflow, the flux through the skin: U^zeta = g W, U^i = g' V^i with d_i V^i = -W.
+//   g = 1 - 3 z^2 + 2 z^3.
+// - slide, the skin's motion along itself: U^i = g S^i + g'/2 V'^i with S^i = H R t^i,
+//   U^zeta = -(z - 3/2 z^2 + z^4/2) D, D = d_i S^i = d_i V'^i: what follows the skin below it comes
+//   back at mid-depth.
+// V + V'/2 = -grad Phi takes one solve.
 #include "base/base.h"
 #include "interior/clot.h"
 #include "interior/interior.h"
@@ -32,8 +24,10 @@ static const double most_slide_strain = 0.05;
 
 // ---- update -------------------------------------------------------------------------------
 
-static void read_skin(sonde_interior *in, const sonde_vec3 *positions) {
-  uint32_t count = in->theta_count * in->s_count;
+void sonde_interior_solve(sonde_interior *in, const sonde_vec3 *positions) {
+  SONDE_ASSERT(positions != NULL && in->ldl != NULL);
+  const uint32_t n = in->theta_count, count = n * in->s_count;
+  // Motion of the skin at each column, through it and along it.
   for (uint32_t k = 0; k < count; ++k) {
     const sonde_column *c = &in->column[k];
     sonde_vec3 now = vec3(0, 0, 0);
@@ -44,49 +38,32 @@ static void read_skin(sonde_interior *in, const sonde_vec3 *positions) {
     in->field[k].slide_theta = (float)(height * v_dot(move, c->round));
     in->field[k].slide_s = (float)(height * c->radius_m * v_dot(move, in->axis));
   }
-}
-
-// Divergence of the slide, and the source of the potential.
-static void spread_slide(sonde_interior *in) {
-  uint32_t n = in->theta_count;
-  double cell = in->theta_step * in->s_step_m;
-  for (uint32_t j = 0; j < in->s_count; ++j) {
-    uint32_t below = j > 0 ? j - 1 : 0, above = j + 1 < in->s_count ? j + 1 : j;
-    double ds = (above - below) * in->s_step_m;
+  // Divergence of the slide, and the source of the potential.
+  const double cell = in->theta_step * in->s_step_m;
+  for (uint32_t k = 0; k < count; ++k) {
+    const uint32_t i = k % n, j = k / n;
+    const uint32_t below = j > 0 ? j - 1 : 0, above = j + 1 < in->s_count ? j + 1 : j;
     const sonde_column_field *row = in->field + j * n;
-    for (uint32_t i = 0; i < n; ++i) {
-      double a = row[(i + 1) % n].slide_theta - row[(i + n - 1) % n].slide_theta;
-      double b = in->field[above * n + i].slide_s - in->field[below * n + i].slide_s;
-      const sonde_column *c = &in->column[j * n + i];
-      double bound = most_slide_strain * (c->radius_m - in->bone_radius_m) * c->radius_m;
-      double spread = clamp(a / (2 * in->theta_step) + b / ds, -bound, bound);
-      in->field[j * n + i].spread = (float)spread;
-      in->potential[j * n + i] = (0.5 * spread - row[i].inflow) * cell;
-    }
+    const sonde_column *c = &in->column[k];
+    double a = row[(i + 1) % n].slide_theta - row[(i + n - 1) % n].slide_theta;
+    double b = in->field[above * n + i].slide_s - in->field[below * n + i].slide_s;
+    double bound = most_slide_strain * (c->radius_m - in->bone_radius_m) * c->radius_m;
+    double ds = (above - below) * in->s_step_m;
+    double spread = clamp(a / (2 * in->theta_step) + b / ds, -bound, bound);
+    in->field[k].spread = (float)spread;
+    in->potential[k] = (0.5 * spread - row[i].inflow) * cell;
   }
-}
-
-// V at i+1/2 and j+1/2 from the potential; zero potential beyond both ends.
-static void store_fluxes(sonde_interior *in) {
-  uint32_t n = in->theta_count;
-  for (uint32_t j = 0; j < in->s_count; ++j)
-    for (uint32_t i = 0; i < n; ++i) {
-      uint32_t k = j * n + i, right = j * n + (i + 1) % n, up = k + n;
-      bool last = j + 1 == in->s_count;
-      double phi = in->potential[k], beyond = last ? 0 : in->potential[up];
-      double ra = 0.5 * (in->column[k].radius_m + in->column[right].radius_m);
-      double rb = 0.5 * (in->column[k].radius_m + in->column[last ? k : up].radius_m);
-      in->field[k].flux_theta = (float)((phi - in->potential[right]) / (ra * in->theta_step));
-      in->field[k].flux_s = (float)((phi - beyond) * rb / in->s_step_m);
-    }
-}
-
-void sonde_interior_solve(sonde_interior *in, const sonde_vec3 *positions) {
-  SONDE_ASSERT(positions != NULL && in->ldl != NULL);
-  read_skin(in, positions);
-  spread_slide(in);
   sonde_ldl_solve(in->ldl, 1, in->potential, in->scratch);
-  store_fluxes(in);
+  // V at i+1/2 and j+1/2; the potential is zero beyond both ends.
+  for (uint32_t k = 0; k < count; ++k) {
+    const uint32_t right = k / n * n + (k + 1) % n, up = k + n;
+    const bool last = up >= count;
+    double phi = in->potential[k], beyond = last ? 0 : in->potential[up];
+    double ra = 0.5 * (in->column[k].radius_m + in->column[right].radius_m);
+    double rb = 0.5 * (in->column[k].radius_m + in->column[last ? k : up].radius_m);
+    in->field[k].flux_theta = (float)((phi - in->potential[right]) / (ra * in->theta_step));
+    in->field[k].flux_s = (float)((phi - beyond) * rb / in->s_step_m);
+  }
 }
 
 // ---- evaluation ---------------------------------------------------------------------------
@@ -216,23 +193,14 @@ sonde_vec3 sonde_interior_invert(const sonde_interior *in, sonde_vec3 point, son
   return best;
 }
 
-// A mural clot fills the deep side of the lumen up to its free surface.
-static sonde_label lumen_label(const sonde_interior *in, uint32_t which, sonde_vec3 rest, double s,
-                               double deep, double across) {
-  if (in->kind[which] == SONDE_VESSEL_ARTERY) return SONDE_LABEL_ARTERY;
-  const sonde_pathology *p = &in->pathology[which];
-  const double fraction = p->thrombus_fraction;
-  bool clot = sonde_pathology_clot(p, rest.z) && fraction > 0;
-  if (clot && fraction < 1) clot = deep > 1 - 2 * fraction + sonde_clot_surface(which, s, across);
-  return clot ? SONDE_LABEL_THROMBUS : SONDE_LABEL_VEIN;
-}
-
 // Vessel label of a rest point, LABEL_COUNT when it lies in none. A branch begins in the lumen of
-// its parent: lumina hide walls.
+// its parent: lumina hide walls. A mural clot fills the deep side of the lumen up to its free
+// surface.
 static sonde_label vessel_label(const sonde_interior *in, sonde_vec3 rest, double s) {
   static const double wall_m[2] = {0.7e-3, 0.9e-3}, wall_share = 0.25;
   sonde_label wall = SONDE_LABEL_COUNT;
   for (uint32_t which = 0; which < in->vessel_count; ++which) {
+    const bool artery = in->kind[which] == SONDE_VESSEL_ARTERY;
     sonde_vessel_state v;
     if (which >= 2 && !sonde_vessel_reaches(in, which, s, rest, 0)) continue;
     if (!sonde_vessel_at(in, which, s, &v)) continue;
@@ -241,11 +209,19 @@ static sonde_label vessel_label(const sonde_interior *in, sonde_vec3 rest, doubl
     double r = v_norm(d), thick = wall_m[in->kind[which]];
     if (which >= 2) thick = fmin(thick, wall_share * v.rest_radius_m);
     if (r > v.rest_radius_m + thick) continue;
-    if (r <= v.rest_radius_m)
-      return lumen_label(in, which, rest, s, -v_dot(d, v.flat_axis) / v.rest_radius_m,
-                         v_dot(d, v_cross(v.axis, v.flat_axis)) / v.rest_radius_m);
-    if (wall != SONDE_LABEL_COUNT) continue;
-    wall = in->kind[which] == SONDE_VESSEL_ARTERY ? SONDE_LABEL_ARTERY_WALL : SONDE_LABEL_VEIN_WALL;
+    if (r > v.rest_radius_m) {
+      if (wall == SONDE_LABEL_COUNT)
+        wall = artery ? SONDE_LABEL_ARTERY_WALL : SONDE_LABEL_VEIN_WALL;
+      continue;
+    }
+    if (artery) return SONDE_LABEL_ARTERY;
+    const sonde_pathology *p = &in->pathology[which];
+    if (!sonde_pathology_clot(p, rest.z)) return SONDE_LABEL_VEIN;
+    if (p->thrombus_fraction >= 1) return SONDE_LABEL_THROMBUS;
+    double deep = -v_dot(d, v.flat_axis) / v.rest_radius_m;
+    double across = v_dot(d, v_cross(v.axis, v.flat_axis)) / v.rest_radius_m;
+    bool clot = deep > 1 - 2 * p->thrombus_fraction + sonde_clot_surface(which, s, across);
+    return clot ? SONDE_LABEL_THROMBUS : SONDE_LABEL_VEIN;
   }
   return wall;
 }

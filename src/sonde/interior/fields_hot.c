@@ -3,9 +3,8 @@
 //
 // sonde_fields_begin  what the window's coordinates need
 // store_row           nodes of one row of the window, when it is first asked for
-// sonde_fields_at     all points
-// field_of            one, from its window coordinates
-// find_cell           from the cell of the point before it
+// field_of            displacement of one point from its window coordinates
+// sonde_fields_at     of all points
 #include "base/base.h"
 #include "interior/fields.h"
 
@@ -86,21 +85,14 @@ static v4 field_of(sonde_fields *f, float turn, float s, float r, uint32_t cell[
   return low + t * (high - low);
 }
 
-static void by_columns(const sonde_fields *f, uint32_t count, const v4 *rest, v4 *field) {
-  for (uint32_t k = 0; k < count; ++k) {
-    sonde_vec3 way = vec3((double)rest[k][0], (double)rest[k][1], (double)rest[k][2]);
-    field[k] = v4_of(sonde_interior_field(f->interior, v_add(f->corner, way)));
-  }
-}
-
 void sonde_fields_at(sonde_fields *f, uint32_t count, const v4 *rest, v4 *field) {
   SONDE_ASSERT(f->interior != NULL && (count == 0 || (rest != NULL && field != NULL)));
   uint32_t cell[2] = {0, 0};
-  if (!f->interior->solid) {
-    by_columns(f, count, rest, field);
-    return;
+  for (uint32_t k = 0; k < count && !f->interior->solid; ++k) {
+    sonde_vec3 way = vec3((double)rest[k][0], (double)rest[k][1], (double)rest[k][2]);
+    field[k] = v4_of(sonde_interior_field(f->interior, v_add(f->corner, way)));
   }
-  for (uint32_t k = 0; k < count; k += 4) {
+  for (uint32_t k = 0; k < count && f->interior->solid; k += 4) {
     const uint32_t some = count - k < 4 ? count - k : 4;
     v4 at[4], leg[3];
     for (uint32_t i = 0; i < 4; ++i)

@@ -1,12 +1,8 @@
 // What a case adds to a leg: checked once, applied at every update.
 //
 // sonde_interior_set_findings  lesions, clots in branches, webs, oedema
-// check_lesion                 inside the soft tissue
-// check_clot                   a pathology of a branch
-// find_branch                  the vessel with that name
-// frame_of                     axes of a lesion over its semi-axes
 // sonde_findings_apply         what each vessel holds during an update
-// sonde_lesion_point, sonde_lesion_label
+// sonde_lesion_point, sonde_lesion_label  a rest point in the lesions
 #include "base/base.h"
 #include "interior/interior.h"
 
@@ -49,38 +45,30 @@ static bool in_tissue(const sonde_interior *in, sonde_vec3 rest) {
   return label != SONDE_LABEL_OUTSIDE && label != SONDE_LABEL_BONE;
 }
 
-// Middle and the six ends of its axes.
-static bool fits(const sonde_interior *in, const sonde_lesion *l) {
-  lesion_frame f = frame_of(in, l);
-  const sonde_vec3 over[3] = {f.x, f.y, f.z};
-  if (!in_tissue(in, l->centre_m)) return false;
-  for (int k = 0; k < 6; ++k) {
-    sonde_vec3 axis = over[k / 2];
-    double way = (k % 2 ? 1 : -1) / v_norm2(axis);
-    if (!in_tissue(in, v_madd(l->centre_m, way, axis))) return false;
-  }
-  return true;
-}
-
+// A lesion lies inside the soft tissue: its middle and the six ends of its axes do.
 static sonde_status check_lesion(const sonde_interior *in, uint32_t k, const sonde_lesion *l,
                                  sonde_error *error) {
-  double length = v_norm(l->axis);
-  bool sizes = within(l->half_m.x, least_half_m, most_half_m) &&
-               within(l->half_m.y, least_half_m, most_half_m) &&
-               within(l->half_m.z, least_half_m, most_half_m);
   if ((uint32_t)l->kind >= SONDE_LESION_KINDS)
     return sonde_fail(error, SONDE_ARGUMENT, "lesion %u is of unknown kind %d", k, (int)l->kind);
-  if (!sizes)
+  if (!within(l->half_m.x, least_half_m, most_half_m) ||
+      !within(l->half_m.y, least_half_m, most_half_m) ||
+      !within(l->half_m.z, least_half_m, most_half_m))
     return sonde_fail(error, SONDE_ARGUMENT, "lesion %u: semi-axes of %g to %g mm expected", k,
                       least_half_m * 1e3, most_half_m * 1e3);
-  if (!within(length, 0.99, 1.01) || !within(l->echogenicity, 0, 1))
+  if (!within(v_norm(l->axis), 0.99, 1.01) || !within(l->echogenicity, 0, 1))
     return sonde_fail(error, SONDE_ARGUMENT,
                       "lesion %u: a unit axis and an echogenicity of 0 to 1 expected", k);
-  if (!v_finite(l->centre_m) || !fits(in, l))
-    return sonde_fail(error, SONDE_ARGUMENT,
-                      "lesion %u at (%.1f, %.1f, %.1f) mm is not inside the soft tissue", k,
-                      l->centre_m.x * 1e3, l->centre_m.y * 1e3, l->centre_m.z * 1e3);
-  return SONDE_OK;
+  bool fits = v_finite(l->centre_m) && in_tissue(in, l->centre_m);
+  for (int end = 0; end < 6 && fits; ++end) {
+    const lesion_frame f = frame_of(in, l);
+    const sonde_vec3 axis = end < 2 ? f.x : end < 4 ? f.y : f.z;
+    double way = (end % 2 ? 1 : -1) / v_norm2(axis);
+    fits = in_tissue(in, v_madd(l->centre_m, way, axis));
+  }
+  if (fits) return SONDE_OK;
+  return sonde_fail(error, SONDE_ARGUMENT,
+                    "lesion %u at (%.1f, %.1f, %.1f) mm is not inside the soft tissue", k,
+                    l->centre_m.x * 1e3, l->centre_m.y * 1e3, l->centre_m.z * 1e3);
 }
 
 // SONDE_VESSELS when the leg has none of that name.

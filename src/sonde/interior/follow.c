@@ -1,8 +1,6 @@
 // The window follows the probe: two solids, one in use, one that is factored bit by bit.
 //
 // sonde_interior_follow  keeps a window under the probe and solves it
-// distance               between two places, in units of what a window tolerates
-// prepare, build         starts, continues and swaps
 // sonde_interior_build_ahead  continues between two updates
 // sonde_interior_remember, _recall  the state between two updates
 // sonde_interior_keep_windows, _next_window  factored windows of other places
@@ -30,16 +28,6 @@ static void swap(sonde_interior *in) {
   in->building = false;
 }
 
-// A window takes the same number of updates everywhere; the work may be done earlier (from the
-// shelf, or between updates) or later (after a recall).
-static bool build(sonde_interior *in, bool at_once) {
-  bool due = ++in->built >= in->whole || at_once, ahead = in->ahead;
-  in->ahead = false;
-  if (!in->next->ready && (due || !ahead))
-    (void)sonde_window_step(in->next, due ? UINT64_MAX : SONDE_WINDOW_BUDGET);
-  return due;
-}
-
 // A little more than an update's share: all is done before the window is due.
 void sonde_interior_build_ahead(sonde_interior *in) {
   SONDE_ASSERT(in != NULL);
@@ -48,9 +36,17 @@ void sonde_interior_build_ahead(sonde_interior *in) {
     (void)sonde_window_step(in->next, SONDE_WINDOW_BUDGET / 8 * 9);
 }
 
-// At rest in time (dt < 0) the window is made at once, in a running session bit by bit.
-static void prepare(sonde_interior *in, sonde_window_place place, bool at_once) {
+// A window takes the same number of updates everywhere; the work may be done earlier (from the
+// shelf, or between updates) or later (after a recall). At rest in time (dt < 0) it is made at
+// once.
+bool sonde_interior_follow(sonde_interior *in, const sonde_interior_input *input) {
   SONDE_ASSERT(in->live != NULL && in->next != NULL);
+  const bool at_once = input->dt_s < 0;
+  sonde_window_place place;
+  bool within;
+  if (in->method != SONDE_INTERIOR_SOLID || !sonde_grid_place(in, input, &place, &within) ||
+      !within)
+    return false;
   double off = in->live->ready ? distance(in, in->live->grid.place, place) : INFINITY;
   if (in->building && distance(in, in->next->grid.place, place) > 1) in->building = false;
   if (!in->building && off > (at_once ? exact : start_at)) {
@@ -58,20 +54,14 @@ static void prepare(sonde_interior *in, sonde_window_place place, bool at_once) 
     sonde_interior_next_window(in, at);
     in->building = true, in->built = 0;
   }
-  if (!in->building || !build(in, at_once)) return;
-  if (in->next->ready)
-    swap(in);
-  else
-    in->building = false;
-}
-
-bool sonde_interior_follow(sonde_interior *in, const sonde_interior_input *input) {
-  sonde_window_place place;
-  bool within;
-  if (in->method != SONDE_INTERIOR_SOLID || !sonde_grid_place(in, input, &place, &within) ||
-      !within)
-    return false;
-  prepare(in, place, input->dt_s < 0);
+  if (in->building) {
+    const bool due = ++in->built >= in->whole || at_once, ahead = in->ahead;
+    in->ahead = false;
+    if (!in->next->ready && (due || !ahead))
+      (void)sonde_window_step(in->next, due ? UINT64_MAX : SONDE_WINDOW_BUDGET);
+    if (due && in->next->ready) swap(in);
+    if (due) in->building = false;
+  }
   if (!in->live->ready || distance(in, in->live->grid.place, place) > 1) return false;
   return sonde_window_update(in->live, in, input);
 }
@@ -106,13 +96,6 @@ static void exchange(sonde_interior *in, uint32_t from) {
   in->next = taken;
 }
 
-// The oldest of the shelf makes room for next; without memory next is written over.
-static void put_away(sonde_interior *in) {
-  uint32_t last = in->shelf_count - 1;
-  if (!in->shelf[last]) (void)sonde_window_create(&in->shelf[last], NULL);
-  if (in->shelf[last]) exchange(in, last);
-}
-
 void sonde_interior_next_window(sonde_interior *in, const double at[4]) {
   sonde_window_place place = place_at(at);
   if (is_at(in->next, &place)) return;
@@ -121,7 +104,12 @@ void sonde_interior_next_window(sonde_interior *in, const double at[4]) {
       exchange(in, k);
       return;
     }
-  if (in->shelf_count > 0 && in->next->ready) put_away(in);
+  if (in->shelf_count > 0 && in->next->ready) {
+    // The oldest of the shelf makes room for next; without memory next is written over.
+    uint32_t last = in->shelf_count - 1;
+    if (!in->shelf[last]) (void)sonde_window_create(&in->shelf[last], NULL);
+    if (in->shelf[last]) exchange(in, last);
+  }
   sonde_window_begin(in->next, in, place);
 }
 
@@ -140,45 +128,37 @@ void sonde_interior_remember(const sonde_interior *in, sonde_interior_memory *me
     }
 }
 
-static bool usable(const sonde_interior_memory *m) {
-  bool good = m->ready <= 1 && m->live_ready <= 1 && m->building <= 1;
-  for (int k = 0; k < 4; ++k) {
-    bool extent = k < 2 || (m->live[k] >= 0 && m->live[k] < 1 && m->next[k] >= 0 && m->next[k] < 1);
-    good = good && extent && fabs(m->live[k]) < 1e3 && fabs(m->next[k]) < 1e3;
-  }
-  for (int which = 0; which < 2; ++which)
-    for (uint32_t i = 0; i < SONDE_STATIONS; ++i)
-      good = good && fabs(m->area_ratio[which][i]) < 1e6 && v_finite(m->flat_axis[which][i]);
-  return good;
-}
-
-// False when the solid cannot be factored there.
-static bool recall_live(sonde_interior *in, const double at[4]) {
-  sonde_window_place place = place_at(at);
-  if (is_at(in->live, &place)) return true;
-  sonde_interior_next_window(in, at);
-  if (!in->next->ready) (void)sonde_window_step(in->next, UINT64_MAX);
-  if (in->next->ready) swap(in);
-  return in->live->ready;
-}
-
 sonde_status sonde_interior_recall(sonde_interior *in, const sonde_interior_memory *memory,
                                    sonde_error *error) {
   SONDE_ASSERT(in != NULL && memory != NULL);
-  if (!usable(memory))
-    return sonde_fail(error, SONDE_FORMAT, "not a state of the inside that was saved");
+  const sonde_interior_memory *m = memory;
+  bool usable = m->ready <= 1 && m->live_ready <= 1 && m->building <= 1;
+  for (int k = 0; k < 4; ++k) {
+    bool extent = k < 2 || (m->live[k] >= 0 && m->live[k] < 1 && m->next[k] >= 0 && m->next[k] < 1);
+    usable = usable && extent && fabs(m->live[k]) < 1e3 && fabs(m->next[k]) < 1e3;
+  }
+  for (int which = 0; which < 2; ++which)
+    for (uint32_t i = 0; i < SONDE_STATIONS; ++i)
+      usable = usable && fabs(m->area_ratio[which][i]) < 1e6 && v_finite(m->flat_axis[which][i]);
+  if (!usable) return sonde_fail(error, SONDE_FORMAT, "not a state of the inside that was saved");
   in->building = false;
-  if (!memory->live_ready)
+  const sonde_window_place place = place_at(m->live);
+  if (!m->live_ready) {
     in->live->ready = false;
-  else if (!recall_live(in, memory->live))
-    return sonde_fail(error, SONDE_FORMAT, "the saved inside has no solid at its place");
-  if (memory->building) sonde_interior_next_window(in, memory->next);
-  in->building = memory->building, in->built = memory->built;
-  in->ready = memory->ready, in->tick = memory->tick, in->solid = false;
+  } else if (!is_at(in->live, &place)) {
+    sonde_interior_next_window(in, m->live);
+    if (!in->next->ready) (void)sonde_window_step(in->next, UINT64_MAX);
+    if (in->next->ready) swap(in);
+    if (!in->live->ready)
+      return sonde_fail(error, SONDE_FORMAT, "the saved inside has no solid at its place");
+  }
+  if (m->building) sonde_interior_next_window(in, m->next);
+  in->building = m->building, in->built = m->built;
+  in->ready = m->ready, in->tick = m->tick, in->solid = false;
   for (int which = 0; which < 2; ++which)
     for (uint32_t i = 0; i < in->station_count[which]; ++i) {
-      in->state[which][i].area_ratio = memory->area_ratio[which][i];
-      in->state[which][i].flat_axis = memory->flat_axis[which][i];
+      in->state[which][i].area_ratio = m->area_ratio[which][i];
+      in->state[which][i].flat_axis = m->flat_axis[which][i];
     }
   return SONDE_OK;
 }

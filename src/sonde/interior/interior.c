@@ -6,7 +6,10 @@
 #include "interior/interior.h"
 #include "interior/window.h"
 
-static sonde_status check_model(const sonde_model *model, sonde_error *error) {
+sonde_status sonde_interior_create(const sonde_model *model, sonde_interior **interior,
+                                   sonde_error *error) {
+  SONDE_ASSERT(interior != NULL);
+  *interior = NULL;
   if (model == NULL || model->surface.face_count == 0)
     return sonde_fail(error, SONDE_ARGUMENT, "expected a model with a skin");
   if (model->femur.face_count == 0)
@@ -14,19 +17,10 @@ static sonde_status check_model(const sonde_model *model, sonde_error *error) {
                       "the model has no bone, and so no vessels and no image: fit it with --femur");
   if (model->fat_depth_m == NULL || model->muscle_depth_m == NULL)
     return sonde_fail(error, SONDE_ARGUMENT, "expected a model with layer depths per node");
-  return SONDE_OK;
-}
-
-sonde_status sonde_interior_create(const sonde_model *model, sonde_interior **interior,
-                                   sonde_error *error) {
-  SONDE_ASSERT(interior != NULL);
-  *interior = NULL;
-  sonde_status status = check_model(model, error);
-  if (status != SONDE_OK) return status;
   sonde_interior *made = SONDE_NEW(sonde_interior, 1);
   if (made == NULL) return sonde_fail_memory(error);
   made->model = model;
-  status = sonde_pathology_preset("healthy", &made->pathology[0], error);
+  sonde_status status = sonde_pathology_preset("healthy", &made->pathology[0], error);
   for (uint32_t k = 1; k < SONDE_VESSELS; ++k) made->pathology[k] = made->pathology[0];
   if (status == SONDE_OK) status = sonde_columns_create(made, error);
   if (status == SONDE_OK) status = sonde_stations_create(made, error);

@@ -47,6 +47,8 @@ static const double sonde_fat_pa = 1.5e3, sonde_muscle_pa = 3.6e3;
 
 // Share of a vessel's area from whose loss on its wall leads the tissue beside it fully.
 static const double sonde_engaged_loss = 0.05;
+// Rest radii over which a wall's motion fades.
+static const double sonde_wall_reach = 3.0;
 // Thinnest gap between touching walls that the tissue around them leaves, over the rest radius.
 static const double sonde_least_lumen = 0.03;
 
@@ -96,7 +98,7 @@ struct sonde_interior {
   uint32_t station_count[SONDE_VESSELS]; // 0: a leg without this vessel
   sonde_station station[SONDE_VESSELS][SONDE_STATIONS];
   sonde_vessel_state state[SONDE_VESSELS][SONDE_STATIONS];
-  bool strained[SONDE_VESSELS][SONDE_STATIONS]; // walls beside which the tissue may fold
+  bool strained[SONDE_VESSELS][SONDE_STATIONS]; // of the update: tissue beside it may fold
   sonde_pathology pathology[SONDE_VESSELS];     // of the last update
   sonde_findings findings;
   lesion_frame lesion[SONDE_LESIONS];

@@ -6,9 +6,6 @@
 //                          solid part
 // sonde_artery_area_ratio  exponential law
 // sonde_vessel_shape       semi-axes of the ellipse
-// ring_pressure            of the wall alone
-// open_area                inverse of the tube law with the tail of touching walls
-// solid_ratio              area of a clot
 // sonde_artery_rest_scale  how the artery's pressure widens it
 #include "base/base.h"
 #include "interior/interior.h"
@@ -21,21 +18,20 @@ static const double least_area = 1e-6;             // of the artery under any pr
 static const double artery_reference_pa = 12665.6; // 95 mmHg
 static const double reference_pa = 1333.22387415; // 10 mmHg: the pressure the model's radii hold at
 
-// Stress below the corner of a rectangle a x b (signed sides) at depth z, over the pressure.
-static sonde_vec3 corner_stress(double a, double b, double z) {
-  double ra = a * a + z * z, rb = b * b + z * z, r = sqrt(a * a + b * b + z * z);
-  double angle = atan2(a * b, z * r), turn = a * b * z / r;
-  return v_scale(vec3(angle - turn / ra, angle - turn / rb, angle + turn * (1 / ra + 1 / rb)),
-                 1 / (2 * SONDE_PI));
-}
-
+// Superposed stresses below the corners of four rectangles a x b (signed sides) at depth z.
 sonde_vec3 sonde_rectangle_stress(double pressure_pa, double half_x_m, double half_y_m, double x_m,
                                   double y_m, double z_m) {
   SONDE_ASSERT(half_x_m > 0 && half_y_m > 0 && z_m > 0);
   sonde_vec3 sum = vec3(0, 0, 0);
-  for (int sx = -1; sx <= 1; sx += 2)
-    for (int sy = -1; sy <= 1; sy += 2)
-      sum = v_add(sum, corner_stress(half_x_m + sx * x_m, half_y_m + sy * y_m, z_m));
+  for (int corner = 0; corner < 4; ++corner) {
+    const double a = half_x_m + (corner < 2 ? -1 : 1) * x_m, z = z_m;
+    const double b = half_y_m + (corner % 2 == 0 ? -1 : 1) * y_m;
+    const double ra = a * a + z * z, rb = b * b + z * z, r = sqrt(a * a + b * b + z * z);
+    const double angle = atan2(a * b, z * r), turn = a * b * z / r;
+    const sonde_vec3 stress =
+        vec3(angle - turn / ra, angle - turn / rb, angle + turn * (1 / ra + 1 / rb));
+    sum = v_add(sum, v_scale(stress, 1 / (2 * SONDE_PI)));
+  }
   return v_scale(sum, pressure_pa);
 }
 
@@ -88,13 +84,6 @@ static double open_area(double transmural_pa, double wall_pa, double hold) {
   return a;
 }
 
-// A clot keeps its volume; the tissue that is squeezed out along the vessel stretches it.
-static double solid_ratio(double modulus_pa, double outside_pa) {
-  double e = outside_pa > 0 ? outside_pa * 1e-3 : 0;
-  double k = 0.0431 * pow(fmax(modulus_pa, 1e3) / 24e3, -0.13);
-  return 1 / (1 + k * e / (1 + 0.0558 * e));
-}
-
 double sonde_vein_area_ratio(const sonde_pathology *pathology, double outside_pa) {
   return sonde_vein_area_in(pathology, outside_pa, 1);
 }
@@ -107,8 +96,11 @@ double sonde_vein_area_in(const sonde_pathology *pathology, double outside_pa, d
     double rest = open_area(pathology->venous_pressure_pa, wall, hold);
     ratio += (1 - solid) * open_area(pathology->venous_pressure_pa - outside_pa, wall, hold) / rest;
   }
-  if (solid > 0) ratio += solid * solid_ratio(pathology->thrombus_modulus_pa, outside_pa);
-  return ratio;
+  if (!(solid > 0)) return ratio;
+  // A clot keeps its volume; the tissue that is squeezed out along the vessel stretches it.
+  double e = outside_pa > 0 ? outside_pa * 1e-3 : 0;
+  double k = 0.0431 * pow(fmax(pathology->thrombus_modulus_pa, 1e3) / 24e3, -0.13);
+  return ratio + solid * (1 / (1 + k * e / (1 + 0.0558 * e)));
 }
 
 double sonde_artery_area_ratio(const sonde_pathology *pathology, double outside_pa) {

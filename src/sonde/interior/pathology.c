@@ -39,25 +39,20 @@ static const sonde_pathology presets[] = {
 
 const char *const *sonde_pathology_names(void) { return names; }
 
-// Same letters, '-' and ' ' read as '_'. *whole tells whether `name` was spelt to its end.
-static bool matches(const char *text, const char *name, bool *whole) {
-  size_t i = 0;
-  for (; text[i] != 0; ++i) {
-    char c = text[i] == '-' || text[i] == ' ' ? '_' : (char)tolower((unsigned char)text[i]);
-    if (c != name[i]) return false;
-  }
-  *whole = name[i] == 0;
-  return i > 0 && (*whole || name[i] == '_');
-}
-
 sonde_status sonde_pathology_preset(const char *name, sonde_pathology *pathology,
                                     sonde_error *error) {
   SONDE_ASSERT(pathology != NULL);
   SONDE_ASSERT(SONDE_COUNT_OF(presets) + 1 == SONDE_COUNT_OF(names));
-  for (size_t i = 0; name != NULL && i < SONDE_COUNT_OF(presets); ++i) {
-    bool whole;
-    if (!matches(name, presets[i].name, &whole)) continue;
-    *pathology = presets[i];
+  for (size_t k = 0; name != NULL && k < SONDE_COUNT_OF(presets); ++k) {
+    // Same letters, '-' and ' ' read as '_'; a name may stop before a '_'.
+    const char *known = presets[k].name;
+    size_t i = 0;
+    for (; name[i] != 0; ++i) {
+      char c = name[i] == '-' || name[i] == ' ' ? '_' : (char)tolower((unsigned char)name[i]);
+      if (c != known[i]) break;
+    }
+    if (name[i] != 0 || i == 0 || (known[i] != 0 && known[i] != '_')) continue;
+    *pathology = presets[k];
     pathology->venous_pressure_pa = VENOUS_MMHG * SONDE_PA_PER_MMHG;
     pathology->arterial_pressure_pa = ARTERIAL_MMHG * SONDE_PA_PER_MMHG;
     return SONDE_OK;

@@ -5,10 +5,7 @@
 // would leave no motion.
 //
 // sonde_solid_connect   numbers of the unknowns, order, analysis
-// gradients             of the eight shape functions at a point
-// add_point             shape change at one integration point
-// add_volume            mean dilatation
-// add_skin              in-plane stiffness of the outer face
+// sonde_solid_matrix    stiffness: shape change, mean dilatation, in-plane stiffness of the skin
 // sonde_solid_stress    mean over the element
 #include "interior/solid.h"
 
@@ -93,75 +90,33 @@ static double gradients(const sonde_solid *s, const sonde_solid_hex *h, double a
   return fabs(det);
 }
 
-static void to_array(const sonde_vec3 g[8], double d[8][3]) {
-  for (int n = 0; n < 8; ++n) d[n][0] = g[n].x, d[n][1] = g[n].y, d[n][2] = g[n].z;
-}
-
-static void add_point(const sonde_vec3 g[8], double shear, double bulk, double (*k)[24]) {
-  double d[8][3];
-  to_array(g, d);
-  for (int a = 0; a < 8; ++a)
-    for (int b = 0; b < 8; ++b) {
-      double dot = shear * v_dot(g[a], g[b]);
-      for (int i = 0; i < 3; ++i) {
-        for (int j = 0; j < 3; ++j)
-          k[3 * a + i][3 * b + j] +=
-              shear * d[a][j] * d[b][i] + (bulk - 2 * shear / 3) * d[a][i] * d[b][j];
-        k[3 * a + i][3 * b + i] += dot;
-      }
-    }
-}
-
-static void add_volume(const sonde_vec3 mean[8], double bulk, double (*k)[24]) {
-  double d[24];
-  for (int n = 0; n < 8; ++n)
-    d[3 * n] = mean[n].x, d[3 * n + 1] = mean[n].y, d[3 * n + 2] = mean[n].z;
-  for (int i = 0; i < 24; ++i)
-    for (int j = 0; j < 24; ++j) k[i][j] += bulk * d[i] * d[j];
-}
-
-// Gradients of the four corner functions in the plane of the outer face; returns the area density.
-static double face_gradients(const sonde_solid *s, const sonde_solid_hex *h, double a, double b,
-                             sonde_vec3 g[4], sonde_vec3 *normal) {
-  sonde_vec3 t[2] = {{0, 0, 0}, {0, 0, 0}};
-  double local[4][2];
+// Plane stress of an incompressible sheet on the outer face: energy mu t (e:e + (tr e)^2).
+static void add_skin(const sonde_solid *s, const sonde_solid_hex *h, double a, double b,
+                     double (*k)[24]) {
+  // Gradients of the four corner functions in the plane of the face.
+  sonde_vec3 g[4], t[2] = {{0, 0, 0}, {0, 0, 0}};
+  double local[4][2], d[4][3];
   for (int n = 0; n < 4; ++n) {
     local[n][0] = sign[n][0] * (1 + sign[n][1] * b) / 4;
     local[n][1] = (1 + sign[n][0] * a) * sign[n][1] / 4;
-    for (int k = 0; k < 2; ++k) t[k] = v_madd(t[k], local[n][k], s->node[h->node[n]]);
+    for (int c = 0; c < 2; ++c) t[c] = v_madd(t[c], local[n][c], s->node[h->node[n]]);
   }
   sonde_vec3 cross = v_cross(t[0], t[1]);
-  double area = v_norm(cross);
-  *normal = v_scale(cross, 1 / area);
-  sonde_vec3 dual[2] = {v_scale(v_cross(t[1], *normal), 1 / area),
-                        v_scale(v_cross(*normal, t[0]), 1 / area)};
-  for (int n = 0; n < 4; ++n) g[n] = v_madd(v_scale(dual[0], local[n][0]), local[n][1], dual[1]);
-  return area;
-}
-
-// Plane stress of an incompressible sheet: energy mu t (e:e + (tr e)^2).
-static void add_skin(const sonde_solid *s, const sonde_solid_hex *h, double a, double b,
-                     double (*k)[24]) {
-  sonde_vec3 g[4], normal;
-  double weight = h->skin_n_m * face_gradients(s, h, a, b, g, &normal), d[4][3];
+  double area = v_norm(cross), weight = h->skin_n_m * area;
+  sonde_vec3 normal = v_scale(cross, 1 / area);
+  sonde_vec3 dual[2] = {v_scale(v_cross(t[1], normal), 1 / area),
+                        v_scale(v_cross(normal, t[0]), 1 / area)};
+  for (int n = 0; n < 4; ++n) {
+    g[n] = v_madd(v_scale(dual[0], local[n][0]), local[n][1], dual[1]);
+    d[n][0] = g[n].x, d[n][1] = g[n].y, d[n][2] = g[n].z;
+  }
   sonde_mat3 plane = m_rank1(normal, -1, 1);
-  for (int n = 0; n < 4; ++n) d[n][0] = g[n].x, d[n][1] = g[n].y, d[n][2] = g[n].z;
   for (int p = 0; p < 4; ++p)
     for (int q = 0; q < 4; ++q)
       for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j)
           k[3 * p + i][3 * q + j] += weight * (v_dot(g[p], g[q]) * plane.m[i][j] +
                                                d[p][j] * d[q][i] + 2 * d[p][i] * d[q][j]);
-}
-
-static void hold(const sonde_solid *s, const sonde_solid_hex *h, double (*k)[24]) {
-  for (int n = 0; n < 8; ++n)
-    for (int axis = 0; axis < 3; ++axis) {
-      if (!(s->held[h->node[n]] >> axis & 1)) continue;
-      int row = 3 * n + axis;
-      for (int i = 0; i < 24; ++i)
-        if (i != row) k[row][i] = k[i][row] = 0;
-    }
 }
 
 void sonde_solid_matrix(const void *user, uint32_t hex, double (*k)[24]) {
@@ -172,16 +127,37 @@ void sonde_solid_matrix(const void *user, uint32_t hex, double (*k)[24]) {
   double volume = 0;
   memset(k, 0, 24 * sizeof *k);
   memset(mean, 0, sizeof mean);
+  // Shape change at one integration point after the other.
   for (int p = 0; p < 8; ++p) {
     double w = gradients(s, h, gauss * sign[p][0], gauss * sign[p][1], gauss * sign[p][2], g);
-    add_point(g, w * h->shear_pa, s->plain ? w * h->bulk_pa : 0, k);
+    double shear = w * h->shear_pa, bulk = s->plain ? w * h->bulk_pa : 0, d[8][3];
+    for (int n = 0; n < 8; ++n) d[n][0] = g[n].x, d[n][1] = g[n].y, d[n][2] = g[n].z;
+    for (int a = 0; a < 8; ++a)
+      for (int b = 0; b < 8; ++b) {
+        double dot = shear * v_dot(g[a], g[b]);
+        for (int i = 0; i < 3; ++i) {
+          for (int j = 0; j < 3; ++j)
+            k[3 * a + i][3 * b + j] +=
+                shear * d[a][j] * d[b][i] + (bulk - 2 * shear / 3) * d[a][i] * d[b][j];
+          k[3 * a + i][3 * b + i] += dot;
+        }
+      }
     for (int n = 0; n < 8; ++n) mean[n] = v_madd(mean[n], w, g[n]);
     volume += w;
   }
-  if (!s->plain) add_volume(mean, h->bulk_pa / volume, k);
+  // Mean dilatation.
+  double e[24];
+  const double bulk = h->bulk_pa / volume;
+  for (int n = 0; n < 8; ++n)
+    e[3 * n] = mean[n].x, e[3 * n + 1] = mean[n].y, e[3 * n + 2] = mean[n].z;
+  for (int i = 0; i < 24 && !s->plain; ++i)
+    for (int j = 0; j < 24; ++j) k[i][j] += bulk * e[i] * e[j];
   for (int p = 0; p < 4 && h->skin_n_m > 0; ++p)
     add_skin(s, h, gauss * sign[p][0], gauss * sign[p][1], k);
-  hold(s, h, k);
+  // Nodes that stay where they are answer to nothing.
+  for (int row = 0; row < 24; ++row)
+    for (int i = 0; i < 24 && (s->held[h->node[row / 3]] >> row % 3 & 1); ++i)
+      if (i != row) k[row][i] = k[i][row] = 0;
 }
 
 bool sonde_solid_factor(sonde_solid *s) {

@@ -3,10 +3,7 @@
 // sonde_stations_create  femoral vessels and branches
 // sonde_interior_set_vein_depth  moves the femoral ones
 // resample               points at equal arc length, ascending along the femur's axis
-// place_station          facts of one station
-// raise_fascia           keeps the femoral vessels below the fat
-// find_leads             where a branch opens into another vessel
-// lay_branches           further vessels of the model's anatomy
+// lay_out                the femoral vessels, with the fascia above them
 #include "base/base.h"
 #include "interior/interior.h"
 
@@ -16,44 +13,9 @@ static const double least_advance_m = 1e-3;
 static const double full_gap = 0.25; // radii of a branch
 static const double clearance_m = 1.5e-3, bump_radius_m = 20e-3;
 
-static double line_length(const sonde_vessel *line) {
-  double sum = 0;
-  for (uint32_t i = 1; i < line->count; ++i)
-    sum += v_distance(line->point[i].centre_m, line->point[i - 1].centre_m);
-  return sum;
-}
-
-static sonde_vessel_point point_at(const sonde_vessel *line, double arc) {
-  SONDE_ASSERT(line->count >= 2 && arc >= 0);
-  for (uint32_t i = 1; i < line->count; ++i) {
-    const sonde_vessel_point *a = &line->point[i - 1], *b = &line->point[i];
-    double piece = v_distance(a->centre_m, b->centre_m);
-    if (arc > piece && i + 1 < line->count) {
-      arc -= piece;
-      continue;
-    }
-    double t = piece > 0 ? clamp(arc / piece, 0, 1) : 0;
-    return (sonde_vessel_point){v_lerp(a->centre_m, b->centre_m, t),
-                                a->radius_m + t * (b->radius_m - a->radius_m),
-                                a->depth_m + t * (b->depth_m - a->depth_m)};
-  }
-  return line->point[0];
-}
-
-static void place_station(const sonde_interior *in, sonde_station *station) {
-  sonde_column_point at;
-  (void)sonde_interior_locate(in, station->rest_m, &at);
-  station->s_m = at.s;
-  station->tissue_m = at.radius_m - in->bone_radius_m;
-  if (!(station->depth_m > 0)) station->depth_m = at.depth_m;
-  station->hold = station->lead = 1;
-}
-
-static void find_axes(const sonde_interior *in, sonde_station *station, uint32_t count) {
-  for (uint32_t i = 0; i < count; ++i) {
-    uint32_t a = i > 0 ? i - 1 : 0, b = i + 1 < count ? i + 1 : i;
-    station[i].axis = v_unit(v_sub(station[b].rest_m, station[a].rest_m), in->axis);
-  }
+// Length of the piece that ends at point i of a line.
+static double piece_of(const sonde_vessel *line, uint32_t i) {
+  return v_distance(line->point[i].centre_m, line->point[i - 1].centre_m);
 }
 
 // A branch may leave its parent across the leg: stations that do not advance along it are left out.
@@ -62,47 +24,43 @@ static sonde_status resample(sonde_interior *in, uint32_t which, const sonde_ves
   in->station_count[which] = 0;
   if (line->count < 2) return SONDE_OK; // a leg without this vessel
   SONDE_ASSERT(line->count <= SONDE_VESSEL_POINTS);
-  double length = line_length(line);
-  uint32_t count = (uint32_t)fmax(2, ceil(length / spacing_m) + 1);
+  double length = 0;
+  for (uint32_t i = 1; i < line->count; ++i) length += piece_of(line, i);
+  uint32_t count = (uint32_t)fmax(2, ceil(length / spacing_m) + 1), kept = 0;
   if (count > SONDE_STATIONS) count = SONDE_STATIONS;
   sonde_vec3 along = v_sub(line->point[line->count - 1].centre_m, line->point[0].centre_m);
-  bool backward = v_dot(along, in->axis) < 0;
+  const bool backward = v_dot(along, in->axis) < 0;
   sonde_station *station = in->station[which];
-  uint32_t kept = 0;
   for (uint32_t i = 0; i < count; ++i) {
     double arc = length * (backward ? count - 1 - i : i) / (count - 1);
-    sonde_vessel_point p = point_at(line, arc);
-    if (!(p.radius_m > 0) || !v_finite(p.centre_m))
+    uint32_t end = 1;
+    for (; arc > piece_of(line, end) && end + 1 < line->count; ++end) arc -= piece_of(line, end);
+    const sonde_vessel_point *a = &line->point[end - 1], *b = &line->point[end];
+    double piece = piece_of(line, end), t = piece > 0 ? clamp(arc / piece, 0, 1) : 0;
+    sonde_station one = {.rest_m = v_lerp(a->centre_m, b->centre_m, t),
+                         .radius_m = a->radius_m + t * (b->radius_m - a->radius_m),
+                         .depth_m = a->depth_m + t * (b->depth_m - a->depth_m),
+                         .hold = 1,
+                         .lead = 1};
+    if (!(one.radius_m > 0) || !v_finite(one.rest_m))
       return sonde_fail(error, SONDE_ARGUMENT, "vessel %u has a point without radius", which);
-    station[kept] = (sonde_station){.rest_m = p.centre_m, .radius_m = p.radius_m};
-    station[kept].depth_m = p.depth_m;
-    place_station(in, &station[kept]);
-    double advance = kept > 0 ? station[kept].s_m - station[kept - 1].s_m : INFINITY;
+    sonde_column_point at;
+    (void)sonde_interior_locate(in, one.rest_m, &at);
+    one.s_m = at.s;
+    one.tissue_m = at.radius_m - in->bone_radius_m;
+    if (!(one.depth_m > 0)) one.depth_m = at.depth_m;
+    double advance = kept > 0 ? one.s_m - station[kept - 1].s_m : INFINITY;
     if (which < 2 && !(advance > 0))
       return sonde_fail(error, SONDE_ARGUMENT, "vessel %u turns back along the leg", which);
+    station[kept] = one;
     if (which < 2 || advance > least_advance_m) ++kept;
   }
-  find_axes(in, station, kept);
+  for (uint32_t i = 0; i < kept; ++i) {
+    uint32_t a = i > 0 ? i - 1 : 0, b = i + 1 < kept ? i + 1 : i;
+    station[i].axis = v_unit(v_sub(station[b].rest_m, station[a].rest_m), in->axis);
+  }
   in->station_count[which] = kept < 2 ? 0 : kept;
   return SONDE_OK;
-}
-
-// The fascia passes above the vessels, as it does in a thigh: the fat is thinner there. `clearance`
-// leaves room for a dilated vein and its wall.
-static void raise_fascia(sonde_interior *in, uint32_t which) {
-  for (uint32_t j = 0; j < in->s_count; ++j)
-    for (uint32_t i = 0; i < in->theta_count; ++i) {
-      sonde_vessel_state v;
-      sonde_column_point at;
-      double s = in->s_first_m + in->s_step_m * j, theta = i * in->theta_step;
-      if (!sonde_vessel_at(in, which, s, &v)) continue;
-      (void)sonde_interior_locate(in, v.rest_centre_m, &at);
-      double turn = remainder(theta - at.theta, 2 * SONDE_PI), y = at.r * turn;
-      double limit = at.depth_m - 1.2 * v.rest_radius_m - clearance_m + y * y / (2 * bump_radius_m);
-      sonde_column_field *f = &in->field[j * in->theta_count + i];
-      limit = fmax(limit, f->fat_m);
-      if (limit < f->muscle_m) f->muscle_m = (float)limit;
-    }
 }
 
 static void rest_state(sonde_interior *in, uint32_t which) {
@@ -135,70 +93,66 @@ static sonde_status lay_out(sonde_interior *in, const sonde_vessel *vein,
   in->kind[0] = SONDE_VESSEL_VEIN, in->kind[1] = SONDE_VESSEL_ARTERY;
   in->vessel_count = 2;
   for (uint32_t which = 0; which < 2; ++which) rest_state(in, which);
-  for (uint32_t which = 0; which < 2; ++which) raise_fascia(in, which);
+  // The fascia passes above the vessels, as it does in a thigh: the fat is thinner there. The
+  // clearance leaves room for a dilated vein and its wall.
+  for (uint32_t k = 0; k < 2 * in->s_count * in->theta_count; ++k) {
+    const uint32_t which = k / (in->s_count * in->theta_count);
+    const uint32_t column = k % (in->s_count * in->theta_count);
+    const uint32_t i = column % in->theta_count, j = column / in->theta_count;
+    sonde_vessel_state v;
+    sonde_column_point at;
+    if (!sonde_vessel_at(in, which, in->s_first_m + in->s_step_m * j, &v)) continue;
+    (void)sonde_interior_locate(in, v.rest_centre_m, &at);
+    double turn = remainder(i * in->theta_step - at.theta, 2 * SONDE_PI), y = at.r * turn;
+    double limit = at.depth_m - 1.2 * v.rest_radius_m - clearance_m + y * y / (2 * bump_radius_m);
+    sonde_column_field *f = &in->field[column];
+    limit = fmax(limit, f->fat_m);
+    if (limit < f->muscle_m) f->muscle_m = (float)limit;
+  }
   return SONDE_OK;
 }
 
-// A vein in the fat gives way sooner than one in muscle.
-static void find_hold(const sonde_interior *in, sonde_station *station, uint32_t count) {
-  for (uint32_t i = 0; i < count; ++i) {
-    sonde_column_point at;
-    (void)sonde_interior_locate(in, station[i].rest_m, &at);
-    if (at.depth_m < at.muscle_m) station[i].hold = sonde_fat_pa / sonde_muscle_pa;
-  }
-}
-
-// Where a branch opens into another vessel two walls would lead the same tissue: there that of the
-// branch does not, and beyond it leads the more the farther the two walls are apart.
-static void find_leads(sonde_interior *in, uint32_t which) {
-  for (uint32_t i = 0; i < in->station_count[which]; ++i) {
-    sonde_station *station = &in->station[which][i];
-    for (uint32_t other = 0; other < which; ++other) {
-      sonde_vessel_state v;
-      if (!sonde_vessel_at(in, other, station->s_m, &v)) continue;
-      sonde_vec3 d = v_sub(station->rest_m, v.rest_centre_m);
-      d = v_madd(d, -v_dot(d, v.axis), v.axis);
-      double gap = v_norm(d) - v.rest_radius_m - station->radius_m;
-      station->lead = fmin(station->lead, clamp(gap / (full_gap * station->radius_m), 0, 1));
-    }
-  }
-}
-
-static sonde_status lay_branches(sonde_interior *in, sonde_error *error) {
+sonde_status sonde_stations_create(sonde_interior *in, sonde_error *error) {
   const sonde_thigh_anatomy *anatomy = in->model->anatomy;
-  sonde_status status = SONDE_OK;
+  sonde_status status = lay_out(in, &in->model->vein, &in->model->artery, error);
   for (uint32_t b = 0; anatomy != NULL && b < anatomy->branch_count && !status; ++b) {
-    uint32_t which = in->vessel_count++;
+    const uint32_t which = in->vessel_count++;
     SONDE_ASSERT(which < SONDE_VESSELS);
     in->kind[which] = anatomy->branch[b].kind;
     status = resample(in, which, &anatomy->branch[b].line, error);
-    find_hold(in, in->station[which], in->station_count[which]);
     rest_state(in, which);
-    find_leads(in, which);
+    for (uint32_t i = 0; i < in->station_count[which]; ++i) {
+      sonde_station *station = &in->station[which][i];
+      sonde_column_point at;
+      (void)sonde_interior_locate(in, station->rest_m, &at);
+      // A vein in the fat gives way sooner than one in muscle.
+      if (at.depth_m < at.muscle_m) station->hold = sonde_fat_pa / sonde_muscle_pa;
+      // Where a branch opens into another vessel two walls would lead the same tissue: there that
+      // of the branch does not, and beyond it leads the more the farther the two walls are apart.
+      for (uint32_t other = 0; other < which; ++other) {
+        sonde_vessel_state v;
+        if (!sonde_vessel_at(in, other, station->s_m, &v)) continue;
+        sonde_vec3 d = v_sub(station->rest_m, v.rest_centre_m);
+        d = v_madd(d, -v_dot(d, v.axis), v.axis);
+        double gap = v_norm(d) - v.rest_radius_m - station->radius_m;
+        station->lead = fmin(station->lead, clamp(gap / (full_gap * station->radius_m), 0, 1));
+      }
+    }
   }
   return status;
 }
 
-sonde_status sonde_stations_create(sonde_interior *in, sonde_error *error) {
-  sonde_status status = lay_out(in, &in->model->vein, &in->model->artery, error);
-  return status ? status : lay_branches(in, error);
-}
-
-// Point at angle theta and row s, `depth` below the skin.
-static sonde_vec3 below_skin(const sonde_interior *in, double theta, double s, double depth) {
-  sonde_column_point at;
-  sonde_interior_column(in, theta, s, &at);
-  double r = at.radius_m - depth / at.cosine;
-  sonde_vec3 p = v_madd(in->origin, s, in->axis);
-  return v_madd(v_madd(p, r * cos(theta), in->e1), r * sin(theta), in->e2);
-}
-
-// The line keeps its course and its radii, turned about the femur's axis by `turn`.
+// The line keeps its course and its radii, at `depth` below the skin and turned about the femur's
+// axis by `turn`.
 static void move_line(const sonde_interior *in, sonde_vessel *line, double turn, double depth) {
   for (uint32_t i = 0; i < line->count; ++i) {
     sonde_column_point at;
     (void)sonde_interior_locate(in, line->point[i].centre_m, &at);
-    line->point[i].centre_m = below_skin(in, at.theta + turn, at.s, depth);
+    const double theta = at.theta + turn, s = at.s;
+    sonde_interior_column(in, theta, s, &at);
+    double r = at.radius_m - depth / at.cosine;
+    sonde_vec3 p = v_madd(in->origin, s, in->axis);
+    line->point[i].centre_m = v_madd(v_madd(p, r * cos(theta), in->e1), r * sin(theta), in->e2);
     line->point[i].depth_m = depth;
   }
 }

@@ -1,15 +1,14 @@
-// Vessels under the probe: load on the skin -> stress at the vessel -> area -> ellipse.
+// Vessels under the probe: load on the skin -> stress at the vessel -> area -> ellipse -> tissue
+// around it (docs/interior.md).
 //
 // sonde_interior_update           field, then vessels
-// sonde_interior_vessels          all stations of all vessels
-// find_course                     what a vessel holds this time
-// measure_load, half_side         equivalent uniform rectangle of the contact forces
-// solid_pressure                  effective pressure on the wall from the solid's stress
-// rectangle_pressure              the same below a rectangle on a half space
-// update_station                  dynamics and shape
+// measure_load                    equivalent uniform rectangle of the contact forces
+// pressure_on                     effective pressure on a wall
+// update_vessel                   area, shape and course
+// find_tissue, keep_clear         gradient of the field around a wall; room between two of them
+// yield_at                        a wall that would fold the tissue gives way
 // sonde_vessel_stations, sonde_vessel_at  state between stations
 // sonde_vessel_gather, sonde_vessel_tissue  the tissue around a moving wall
-// sonde_interior_vessel_at_plane  where the image plane cuts
 #include "base/base.h"
 #include "interior/interior.h"
 #include "interior/window.h"
@@ -22,7 +21,6 @@ static const double least_half_m = 1.5e-3;  // a point probe still has a face
 static const double least_share = 0.03;     // of the largest nodal force: belongs to the contact
 static const double least_depth_m = 3e-3;
 static const double bone_start = 0.30, bone_rise = 1.75; // rigid base, docs/interior.md
-static const double carry_reach = 3.0; // rest radii over which the wall's motion fades
 static const double plane_reach_m = 40e-3;
 static const double gradient_reach = 1.5, bend_reach = 2.5; // rest radii: where the field is read
 static const double most_squeeze = 1.6; // a lumen's semi-axis over the tissue's stretch, rest radii
@@ -32,8 +30,16 @@ static const double gap_share = 0.2;
 static const double gentle_squeeze = 0.45, gentle_bend = 0.02, probing_m = 0.1e-3;
 static const double least_gathered = 0.2; // volume of the gathered tissue over that at rest
 static const double most_lean = 0.4; // tangent of the angle between a vessel and itself at rest
-static const double safe_share = 0.2, even_step = 0.15, lead_step = 0.25;
+static const double safe_share = 0.2;
+// From one station to the next a share changes by so much at most: what a wall does ends gently
+// along its vessel as well.
+static const double even_step = 0.15, lead_step = 0.25;
 enum { PASSES = 10 };
+// Tissue around a station is probed on rings within the reach of its wall, and between two walls at
+// thirds of the gap: on the line between their middles and to both sides of it, where the gap is
+// still narrow. A gap wider than twice the radii together is probed by the rings of both walls.
+enum { RING_SIDES = 10, RINGS = 3, GAP_WAYS = 3, GAP_SIDES = 5 };
+static const double ring_radii[RINGS] = {1.1, 1.9, 3.1}, gap_side_radii = 0.4, most_gap_radii = 2;
 static const double bend_share = 0.2;   // of the tissue's least stretch that a bend may take
 static const double beyond_share = 0.5; // of the way to where the field is read: the next ring
 
@@ -44,20 +50,6 @@ typedef struct load {
   double half_x_m, half_y_m, pressure_pa;
   sonde_vec3 x, y, beam; // probe axes, world
 } load;
-
-// Sums over the loaded nodes, probe frame.
-typedef struct sums {
-  double force, x, y, xx, yy;
-  double low_x, high_x, low_y, high_y; // extent of the nodes that carry a share
-} sums;
-
-static void add_node(sums *t, double f, double x, double y, double least) {
-  t->force += f;
-  t->x += f * x, t->y += f * y, t->xx += f * x * x, t->yy += f * y * y;
-  if (f < least) return;
-  t->low_x = fmin(t->low_x, x), t->high_x = fmax(t->high_x, x);
-  t->low_y = fmin(t->low_y, y), t->high_y = fmax(t->high_y, y);
-}
 
 // Half side of the uniform strip that stands for the load: between the one with the same second
 // moment and the reach of the contact. The moment alone takes the peak under the middle of a flat
@@ -72,34 +64,30 @@ static double half_side(double moment, double low, double high, double face) {
 static load measure_load(const sonde_model *model, const sonde_interior_input *input) {
   sonde_mat3 r = q_matrix(input->world_from_probe.rotation);
   load l = {.x = m_column(&r, 0), .y = m_column(&r, 1), .beam = m_column(&r, 2)};
-  sums t = {.low_x = INFINITY, .high_x = -INFINITY, .low_y = INFINITY, .high_y = -INFINITY};
-  double largest = 0;
+  double low_x = INFINITY, high_x = -INFINITY, low_y = INFINITY, high_y = -INFINITY, largest = 0;
+  double force = 0, sum_x = 0, sum_y = 0, sum_xx = 0, sum_yy = 0;
   for (uint32_t i = 0; i < model->surface.vertex_count; ++i)
     largest = fmax(largest, v_dot(input->contact_forces_n[i], l.beam));
   for (uint32_t i = 0; i < model->surface.vertex_count; ++i) {
     double f = v_dot(input->contact_forces_n[i], l.beam);
     if (!(f > 0)) continue;
     sonde_vec3 d = v_sub(input->positions_m[i], input->world_from_probe.position);
-    add_node(&t, f, v_dot(d, l.x), v_dot(d, l.y), least_share * largest);
+    double x = v_dot(d, l.x), y = v_dot(d, l.y);
+    force += f;
+    sum_x += f * x, sum_y += f * y, sum_xx += f * x * x, sum_yy += f * y * y;
     l.centre_m = v_madd(l.centre_m, f, model->surface.vertices[i]);
+    if (f < least_share * largest) continue;
+    low_x = fmin(low_x, x), high_x = fmax(high_x, x);
+    low_y = fmin(low_y, y), high_y = fmax(high_y, y);
   }
-  if (!(t.force > 1e-6)) return (load){.x = l.x, .y = l.y, .beam = l.beam};
-  double s = 1 / t.force;
-  l.force_n = t.force;
+  if (!(force > 1e-6)) return (load){.x = l.x, .y = l.y, .beam = l.beam};
+  double s = 1 / force;
+  l.force_n = force;
   l.centre_m = v_scale(l.centre_m, s);
-  l.half_x_m = half_side(t.xx * s - t.x * s * t.x * s, t.low_x, t.high_x, input->face_half_x_m);
-  l.half_y_m = half_side(t.yy * s - t.y * s * t.y * s, t.low_y, t.high_y, input->face_half_y_m);
+  l.half_x_m = half_side(sum_xx * s - sum_x * s * sum_x * s, low_x, high_x, input->face_half_x_m);
+  l.half_y_m = half_side(sum_yy * s - sum_y * s * sum_y * s, low_y, high_y, input->face_half_y_m);
   l.pressure_pa = l.force_n / (4 * l.half_x_m * l.half_y_m);
   return l;
-}
-
-// Depth of a rest point below the rest skin against the beam.
-static double depth_along_beam(const sonde_interior *in, const sonde_station *station,
-                               sonde_vec3 beam) {
-  sonde_surface_point hit;
-  if (!sonde_surface_raycast(in->skin, station->rest_m, v_neg(beam), 0.1, &hit))
-    return station->depth_m;
-  return v_distance(hit.point_m, station->rest_m);
 }
 
 // (4 s2 - s_axial)/3 with s2 the mean normal stress in the vessel's cross-section, compression
@@ -108,23 +96,22 @@ static double effective(double trace, double axial) {
   return fmax(0, (4 * 0.5 * (trace - axial) - axial) / 3);
 }
 
-// From the solid's stress; false where it has none.
-static bool solid_pressure(const sonde_interior *in, const sonde_station *station, double *out) {
-  sonde_mat3 s;
-  if (!in->solid || !(in->live->stress_scale > 0)) return false;
-  *out = 0;
-  if (!sonde_interior_stress(in, station->rest_m, &s)) return true;
-  double axial = -v_dot(station->axis, m_mul_v(s, station->axis));
-  *out = effective(-(s.m[0][0] + s.m[1][1] + s.m[2][2]), axial);
-  return true;
-}
-
-// From the half space under the equivalent rectangle, until the solid is factored.
-static double rectangle_pressure(const sonde_interior *in, const sonde_station *station,
-                                 const load *l) {
+// Effective pressure on a vessel's wall: from the solid's stress, and until the solid is factored
+// from the half space under the equivalent rectangle.
+static double pressure_on(const sonde_interior *in, const sonde_station *station, const load *l) {
+  if (in->solid && in->live->stress_scale > 0) {
+    sonde_mat3 s;
+    if (!sonde_interior_stress(in, station->rest_m, &s)) return 0;
+    double axial = -v_dot(station->axis, m_mul_v(s, station->axis));
+    return effective(-(s.m[0][0] + s.m[1][1] + s.m[2][2]), axial);
+  }
   sonde_vec3 d = v_sub(station->rest_m, l->centre_m);
   if (!(l->force_n > 0) || v_norm2(d) > 0.12 * 0.12) return 0;
-  double z = fmax(depth_along_beam(in, station, l->beam), least_depth_m);
+  sonde_surface_point hit; // of the rest skin, against the beam
+  double z = station->depth_m;
+  if (sonde_surface_raycast(in->skin, station->rest_m, v_neg(l->beam), 0.1, &hit))
+    z = v_distance(hit.point_m, station->rest_m);
+  z = fmax(z, least_depth_m);
   sonde_vec3 s = sonde_rectangle_stress(l->pressure_pa, l->half_x_m, l->half_y_m, v_dot(d, l->x),
                                         v_dot(d, l->y), z);
   sonde_vec3 a =
@@ -134,82 +121,63 @@ static double rectangle_pressure(const sonde_interior *in, const sonde_station *
   return base * effective(s.x + s.y + s.z, axial);
 }
 
-// A vessel's state with and without clot, and the radii over the model's that belong to them.
-typedef struct course {
-  sonde_vessel_kind kind;
-  const sonde_pathology *all;
-  sonde_pathology of[2]; // [clot]
-  double scale[2];
-} course;
-
-static course find_course(const sonde_interior *in, uint32_t which) {
-  const sonde_pathology *p = &in->pathology[which];
-  course c = {.kind = in->kind[which], .all = p, .of = {*p, *p}};
-  c.of[0].thrombus_fraction = 0;
-  if (c.kind == SONDE_VESSEL_ARTERY) {
-    c.scale[0] = c.scale[1] = sonde_artery_rest_scale(p);
-  } else {
-    c.scale[0] = sonde_vein_rest_scale(&c.of[0], false);
-    c.scale[1] = p->thrombus_fraction > 0 ? sonde_vein_rest_scale(p, true) : c.scale[0];
+// Areas follow the pressures with the time constant of emptying; directions follow the middles.
+static void update_vessel(sonde_interior *in, uint32_t which, const load *l,
+                          const sonde_interior_input *input) {
+  const bool artery = in->kind[which] == SONDE_VESSEL_ARTERY;
+  const sonde_pathology *all = &in->pathology[which];
+  const uint32_t count = in->station_count[which];
+  sonde_vessel_state *state = in->state[which];
+  // What it holds without and with clot, and its radius at rest over the model's.
+  sonde_pathology held[2] = {*all, *all};
+  held[0].thrombus_fraction = 0;
+  double scale[2], blend = 1;
+  scale[0] = artery ? sonde_artery_rest_scale(all) : sonde_vein_rest_scale(&held[0], false);
+  scale[1] = artery || !(all->thrombus_fraction > 0) ? scale[0] : sonde_vein_rest_scale(all, true);
+  if (!(input->dt_s < 0) && in->ready) blend = 1 - exp(-input->dt_s / relaxation_s);
+  for (uint32_t i = 0; i < count; ++i) {
+    const sonde_station *station = &in->station[which][i];
+    sonde_vessel_state *v = &state[i];
+    const bool clot = !artery && sonde_pathology_clot(all, station->rest_m.z);
+    double half_short, half_long, goal = 1; // most stations, most of the time
+    v->outside_pa = pressure_on(in, station, l);
+    if (artery)
+      goal = sonde_artery_area_ratio(&held[clot], v->outside_pa);
+    else if (v->outside_pa > 0 || clot)
+      goal = sonde_vein_area_in(&held[clot], v->outside_pa, station->hold);
+    v->area_ratio = fmax(v->area_ratio + (goal - v->area_ratio) * blend, least_ratio);
+    v->lead = station->lead * clamp(fabs(1 - v->area_ratio) / sonde_engaged_loss, 0, 1);
+    v->rest_radius_m = station->radius_m * scale[clot];
+    sonde_vessel_shape(in->kind[which], &held[clot], clot, v->area_ratio, &half_short, &half_long);
+    v->half_short_m = half_short * v->rest_radius_m;
+    v->half_long_m = half_long * v->rest_radius_m;
+    v->rest_centre_m = station->rest_m;
+    v->centre_m = v_add(station->rest_m, sonde_interior_field(in, station->rest_m));
   }
-  return c;
+  // A vessel leans away from its course at rest by so much at most: its cross-sections stay apart.
+  for (uint32_t i = 0; i < count; ++i) {
+    const uint32_t a = i > 0 ? i - 1 : 0, b = i + 1 < count ? i + 1 : i;
+    const sonde_vec3 rest = in->station[which][i].axis;
+    sonde_vec3 axis = v_unit(v_sub(state[b].centre_m, state[a].centre_m), rest);
+    double along = v_dot(axis, rest);
+    sonde_vec3 aside = v_madd(axis, -along, rest);
+    double across = v_norm(aside);
+    if (!(along > 0 && across <= most_lean * fmax(along, 0)))
+      axis = v_unit(v_madd(rest, most_lean / fmax(across, 1e-9), aside), rest);
+    state[i].axis = axis;
+    sonde_vec3 up = v_madd(v_neg(l->beam), v_dot(l->beam, axis), axis);
+    if (v_norm2(up) > 1e-4) state[i].flat_axis = v_unit(up, state[i].flat_axis);
+  }
 }
 
-static double area_goal(const course *c, bool clot, double outside, double hold) {
-  const sonde_pathology *p = &c->of[clot];
-  if (c->kind == SONDE_VESSEL_ARTERY) return sonde_artery_area_ratio(p, outside);
-  if (!(outside > 0) && !clot) return 1; // most stations, most of the time
-  return sonde_vein_area_in(p, outside, hold);
-}
-
-static void update_station(sonde_interior *in, uint32_t which, uint32_t i, const course *c,
-                           const load *l, const sonde_interior_input *input) {
-  const sonde_station *station = &in->station[which][i];
-  sonde_vessel_state *v = &in->state[which][i];
-  bool clot = c->kind == SONDE_VESSEL_VEIN && sonde_pathology_clot(c->all, station->rest_m.z);
-  double outside;
-  if (!solid_pressure(in, station, &outside)) outside = rectangle_pressure(in, station, l);
-  double goal = area_goal(c, clot, outside, station->hold);
-  double blend = input->dt_s < 0 || !in->ready ? 1 : 1 - exp(-input->dt_s / relaxation_s);
-  v->outside_pa = outside;
-  v->area_ratio = fmax(v->area_ratio + (goal - v->area_ratio) * blend, least_ratio);
-  v->lead = station->lead * clamp(fabs(1 - v->area_ratio) / sonde_engaged_loss, 0, 1);
-  v->rest_radius_m = station->radius_m * c->scale[clot];
-  double half_short, half_long;
-  sonde_vessel_shape(c->kind, &c->of[clot], clot, v->area_ratio, &half_short, &half_long);
-  v->half_short_m = half_short * v->rest_radius_m;
-  v->half_long_m = half_long * v->rest_radius_m;
-  v->rest_centre_m = station->rest_m;
-  v->centre_m = v_add(station->rest_m, sonde_interior_field(in, station->rest_m));
-}
-
-// Gradient f of the field across a vessel, over points on both sides of it, as a turn and a lower
-// triangle. A wall that keeps its shape in tissue that is squeezed flat bounds the squeeze. The
-// shear ends beside the wall: its bound keeps the tissue there, which it shears unevenly, from
-// folding.
-static void split_gradient(double f[2][2], sonde_vessel_state *v) {
-  SONDE_ASSERT(v->rest_radius_m > 0);
-  double least_short = v->half_short_m / (most_squeeze * v->rest_radius_m);
-  double least_long = v->half_long_m / (most_squeeze * v->rest_radius_m);
-  double size = hypot(f[0][0], f[0][1]);
-  double half = clamp(-f[0][1] / fmax(size + f[0][0], 1e-3), -most_turn, most_turn);
-  double whole = 2 / (1 + half * half), cosine = whole - 1, sine = half * whole;
-  v->tissue_turn = half;
-  v->tissue_short = fmax(size, fmax(least_short, least_tissue));
-  v->tissue_long = fmax(f[1][0] * sine + f[1][1] * cosine, fmax(least_long, least_tissue));
-  double bound = most_shear * v->tissue_long;
-  double narrow = least_short / v->tissue_short * v->tissue_long / least_long;
-  if (narrow > 1) bound /= narrow;
-  v->tissue_shear = clamp(f[1][0] * cosine - f[1][1] * sine, -bound, bound);
-}
-
-// The field beside a wall differs from its gradient by a bend that ends at the wall. Where tissue
-// is squeezed so thin that a bend which ends so soon would fold it, less of the bend ends. Returns
+// Gradient of the field across a vessel, over points on both sides of it, as a turn and a lower
+// triangle; and how much of the bend by which the field differs from it ends at the wall. Returns
 // whether the tissue may be close to folding.
 static bool find_tissue(const sonde_interior *in, sonde_vessel_state *v) {
   enum { SIDES = 8 };
   v->tissue_short = v->tissue_long = v->tissue_even = 1, v->tissue_shear = v->tissue_turn = 0;
   if (!(v->lead > 0)) return false;
+  SONDE_ASSERT(v->rest_radius_m > 0);
   double f[2][2], most = 0, thin = INFINITY;
   sonde_vec3 side[2] = {v->flat_axis, v_cross(v->axis, v->flat_axis)};
   const double near = gradient_reach * v->rest_radius_m, far = bend_reach * v->rest_radius_m;
@@ -219,7 +187,22 @@ static bool find_tissue(const sonde_interior *in, sonde_vessel_state *v) {
     sonde_vec3 slope = v_scale(v_sub(high, low), 0.5 / near);
     for (int i = 0; i < 2; ++i) f[i][k] = (i == k) + v_dot(slope, side[i]);
   }
-  split_gradient(f, v);
+  // A wall that keeps its shape in tissue that is squeezed flat bounds the squeeze. The shear ends
+  // beside the wall: its bound keeps the tissue there, which it shears unevenly, from folding.
+  double least_short = v->half_short_m / (most_squeeze * v->rest_radius_m);
+  double least_long = v->half_long_m / (most_squeeze * v->rest_radius_m);
+  double size = hypot(f[0][0], f[0][1]);
+  double half = clamp(-f[0][1] / fmax(size + f[0][0], 1e-3), -most_turn, most_turn);
+  double whole = 2 / (1 + half * half), cosine = whole - 1, sine = half * whole;
+  v->tissue_turn = half;
+  v->tissue_short = fmax(size, fmax(least_short, least_tissue));
+  v->tissue_long = fmax(f[1][0] * sine + f[1][1] * cosine, fmax(least_long, least_tissue));
+  double most_sheared = most_shear * v->tissue_long;
+  double narrow = least_short / v->tissue_short * v->tissue_long / least_long;
+  if (narrow > 1) most_sheared /= narrow;
+  v->tissue_shear = clamp(f[1][0] * cosine - f[1][1] * sine, -most_sheared, most_sheared);
+  // Where tissue is squeezed so thin that a bend which ends at the wall would fold it, less of the
+  // bend ends there.
   for (int k = 0; k < SIDES; ++k) {
     double x = far * cos(2 * SONDE_PI * k / SIDES), y = far * sin(2 * SONDE_PI * k / SIDES);
     double a = x, b = y;
@@ -240,10 +223,10 @@ static bool find_tissue(const sonde_interior *in, sonde_vessel_state *v) {
 // Two vessels side by side leave tissue between them: towards the other a lumen takes a share of
 // the gap at rest, as the tissue's gradient stretches it, and is as much larger across; its area
 // stays.
-static void keep_clear(sonde_interior *in, uint32_t which, uint32_t other) {
-  for (uint32_t i = 0; i < in->station_count[which]; ++i) {
-    sonde_vessel_state *v = &in->state[which][i], beside;
-    if (!(v->lead > 0) || !sonde_vessel_at(in, other, in->station[which][i].s_m, &beside)) continue;
+static void keep_clear(sonde_interior *in, uint32_t which, uint32_t i) {
+  sonde_vessel_state *v = &in->state[which][i], beside;
+  for (uint32_t other = 0; other < in->vessel_count && v->lead > 0; ++other) {
+    if (other == which || !sonde_vessel_at(in, other, in->station[which][i].s_m, &beside)) continue;
     sonde_vec3 d = v_sub(beside.rest_centre_m, v->rest_centre_m);
     d = v_madd(d, -v_dot(d, v->axis), v->axis);
     double apart = v_norm(d), gap = apart - v->rest_radius_m - beside.rest_radius_m;
@@ -271,29 +254,15 @@ static sonde_mat3 per_step(const sonde_vec3 at[4], double step) {
                  1 / step);
 }
 
-static double volume_of(const sonde_mat3 *m) {
-  sonde_vec3 a = m_column(m, 0), b = m_column(m, 1), c = m_column(m, 2);
-  return v_dot(a, v_cross(b, c));
-}
-
-// A bound from below of the least stretch under a gradient: its volume over the size of its
-// cofactors.
-static double least_stretch(const sonde_mat3 *m) {
-  sonde_vec3 a = m_column(m, 0), b = m_column(m, 1), c = m_column(m, 2);
-  sonde_vec3 bc = v_cross(b, c), ca = v_cross(c, a), ab = v_cross(a, b);
-  return v_dot(a, bc) / sqrt(v_norm2(bc) + v_norm2(ca) + v_norm2(ab));
-}
-
-static double size_of(const sonde_mat3 *m) {
-  sonde_vec3 a = m_column(m, 0), b = m_column(m, 1), c = m_column(m, 2);
-  return sqrt(v_norm2(a) + v_norm2(b) + v_norm2(c));
-}
-
-// At a place of rest, by differences over a step: stations before and after it differ. The tissue's
-// gradient without evening out is M, evening out adds B: no fold where e times the size of B stays
-// below the least stretch under M.
-static void strain_at(const sonde_interior *in, sonde_vec3 at, double s, double step,
-                      strain *least) {
+// At a place of rest beside a station, by differences over a step, to both sides of the station in
+// turn. The tissue's gradient without evening out is M, evening out adds B: no fold where e times
+// the size of B stays below the least stretch under M, which is at least M's volume over the size
+// of its cofactors.
+static void strain_at(const sonde_interior *in, const sonde_vessel_state *v, double station_s,
+                      sonde_vec3 way, int number, strain *least) {
+  const double step = number % 2 ? probing_m : -probing_m;
+  const double s = station_s + v_dot(way, in->axis);
+  const sonde_vec3 at = v_add(v->rest_centre_m, way);
   sonde_vec3 gathered[4], place[4], even[4];
   sonde_vessel_state near[SONDE_VESSELS];
   uint32_t count = sonde_vessels_near(in, at, s, near);
@@ -306,129 +275,97 @@ static void strain_at(const sonde_interior *in, sonde_vec3 at, double s, double 
   }
   const sonde_mat3 turn = m_transpose(m_columns(in->e1, in->e2, in->axis));
   sonde_mat3 g = m_mul(per_step(gathered, step), turn), m = m_mul(per_step(place, step), turn);
-  sonde_mat3 b = per_step(even, step);
-  least->gathered = fmin(least->gathered, volume_of(&g));
-  double room = safe_share * fmax(0, least_stretch(&m));
-  least->even = fmin(least->even, room / fmax(size_of(&b), 1e-9));
+  sonde_mat3 bend = per_step(even, step);
+  sonde_vec3 a = m_column(&g, 0), b = m_column(&g, 1), c = m_column(&g, 2);
+  least->gathered = fmin(least->gathered, v_dot(a, v_cross(b, c)));
+  a = m_column(&m, 0), b = m_column(&m, 1), c = m_column(&m, 2);
+  sonde_vec3 bc = v_cross(b, c), ca = v_cross(c, a), ab = v_cross(a, b);
+  double stretch = v_dot(a, bc) / sqrt(v_norm2(bc) + v_norm2(ca) + v_norm2(ab));
+  a = m_column(&bend, 0), b = m_column(&bend, 1), c = m_column(&bend, 2);
+  double size = sqrt(v_norm2(a) + v_norm2(b) + v_norm2(c));
+  least->even = fmin(least->even, safe_share * fmax(0, stretch) / fmax(size, 1e-9));
 }
 
-// Around a station, and between its wall and those of other vessels.
-static strain strain_beside(const sonde_interior *in, uint32_t which, uint32_t i) {
-  enum { SIDES = 10, RINGS = 3, WAYS = 3 };
-  static const double ring[RINGS] = {1.1, 1.9, 3.1}; // rest radii
+// Where walls would fold a layer that is squeezed very thin around a station, or the tissue between
+// two of them, they give way to it, and less of the bends ends at them. True when walls gave way.
+static bool yield_at(sonde_interior *in, uint32_t which, uint32_t i) {
   const sonde_vessel_state *v = &in->state[which][i];
   const sonde_vec3 side[2] = {v->flat_axis, v_cross(v->axis, v->flat_axis)};
   const double s = in->station[which][i].s_m;
   strain least = {INFINITY, INFINITY};
-  for (int k = 0; k < SIDES * RINGS; ++k) {
-    double a = 2 * SONDE_PI * (k % SIDES) / SIDES, r = ring[k / SIDES] * v->rest_radius_m;
+  for (int k = 0; k < RING_SIDES * RINGS; ++k) {
+    double a = 2 * SONDE_PI * (k % RING_SIDES) / RING_SIDES;
+    double r = ring_radii[k / RING_SIDES] * v->rest_radius_m;
     sonde_vec3 way = v_madd(v_scale(side[0], r * cos(a)), r * sin(a), side[1]);
-    strain_at(in, v_add(v->rest_centre_m, way), s + v_dot(way, in->axis),
-              k % 2 ? probing_m : -probing_m, &least);
+    strain_at(in, v, s, way, k, &least);
   }
   for (uint32_t other = 0; other < in->vessel_count; ++other) {
     sonde_vessel_state beside;
     if (other == which || !sonde_vessel_at(in, other, s, &beside)) continue;
     sonde_vec3 d = v_sub(beside.rest_centre_m, v->rest_centre_m);
     double apart = v_norm(d), gap = apart - v->rest_radius_m - beside.rest_radius_m;
-    if (!(gap > 0) || gap > 2 * (v->rest_radius_m + beside.rest_radius_m)) continue;
-    for (int k = 0; k < WAYS * 5; ++k) {
-      double r = (v->rest_radius_m + gap * (k % WAYS + 1) / (WAYS + 1)) / apart;
-      sonde_vec3 across = v_unit(v_cross(d, in->axis), side[1]);
-      sonde_vec3 way = v_madd(v_scale(d, r), (k / WAYS - 2) * 0.4 * v->rest_radius_m, across);
-      strain_at(in, v_add(v->rest_centre_m, way), s + v_dot(way, in->axis),
-                k % 2 ? probing_m : -probing_m, &least);
+    if (!(gap > 0) || gap > most_gap_radii * (v->rest_radius_m + beside.rest_radius_m)) continue;
+    sonde_vec3 across = v_unit(v_cross(d, in->axis), side[1]);
+    for (int k = 0; k < GAP_WAYS * GAP_SIDES; ++k) {
+      double r = (v->rest_radius_m + gap * (k % GAP_WAYS + 1) / (GAP_WAYS + 1)) / apart;
+      double aside = (k / GAP_WAYS - GAP_SIDES / 2) * gap_side_radii * v->rest_radius_m;
+      strain_at(in, v, s, v_madd(v_scale(d, r), aside, across), k, &least);
     }
   }
-  return least;
-}
-
-// A wall leads less, and a lumen that stands up against the squeeze goes half the way to where the
-// tissue's gradient takes it.
-static void give_way(sonde_vessel_state *v) {
-  SONDE_ASSERT(v->rest_radius_m > 0 && v->tissue_short > 0 && v->tissue_long > 0);
-  double with_short = v->tissue_short * v->rest_radius_m;
-  double with_long = v->tissue_long * v->rest_radius_m;
-  v->lead *= 0.5;
-  if (v->half_short_m <= with_short) return;
-  v->half_short_m += 0.5 * (with_short - v->half_short_m);
-  v->half_long_m += 0.5 * (with_long - v->half_long_m);
-}
-
-// From one station to the next a share changes by so much at most: what a wall does ends gently
-// along its vessel as well.
-static void spread_along(sonde_interior *in, uint32_t which) {
-  const uint32_t count = in->station_count[which];
-  for (uint32_t n = 1; n < 2 * count; ++n) {
-    bool back = n >= count;
-    uint32_t i = back ? 2 * count - 1 - n : n, from = back ? i + 1 : i - 1;
-    if (from >= count) continue;
-    sonde_vessel_state *v = &in->state[which][i], *w = &in->state[which][from];
-    const double most = in->station[which][i].lead, beside = in->station[which][from].lead;
-    v->tissue_even = fmin(v->tissue_even, w->tissue_even + even_step);
-    if (beside > 0) v->lead = fmin(v->lead, most * fmin(1, w->lead / beside + lead_step));
+  const bool folding = least.gathered < least_gathered;
+  in->strained[which][i] = folding; // to be looked at again
+  if (!folding && least.even >= 1) return false;
+  for (uint32_t other = 0; other < in->vessel_count; ++other) {
+    uint32_t at;
+    double share;
+    if (!sonde_vessel_stations(in, other, s, &at, &share)) continue;
+    sonde_vessel_state *w = &in->state[other][at + (share > 0.5)];
+    SONDE_ASSERT(w->rest_radius_m > 0 && w->tissue_short > 0 && w->tissue_long > 0);
+    w->tissue_even *= fmin(least.even, 1);
+    if (!folding) continue;
+    // The wall leads less, and a lumen that stands up against the squeeze goes half the way to
+    // where the tissue's gradient takes it.
+    double with_short = w->tissue_short * w->rest_radius_m;
+    double with_long = w->tissue_long * w->rest_radius_m;
+    w->lead *= 0.5;
+    if (w->half_short_m <= with_short) continue;
+    w->half_short_m += 0.5 * (with_short - w->half_short_m);
+    w->half_long_m += 0.5 * (with_long - w->half_long_m);
   }
+  return folding;
 }
 
-// Where walls would fold a layer that is squeezed very thin, or the tissue between two of them,
-// they give way to it, and less of the bends ends at them.
-static void yield_to_squeeze(sonde_interior *in) {
-  bool changed = true;
-  for (int pass = 0; pass < PASSES && changed; ++pass) {
-    changed = false;
-    for (uint32_t which = 0; which < in->vessel_count; ++which)
-      for (uint32_t i = 0; i < in->station_count[which]; ++i) {
-        if (!in->strained[which][i]) continue;
-        strain least = strain_beside(in, which, i);
-        in->strained[which][i] = least.gathered < least_gathered; // to be looked at again
-        if (least.gathered >= least_gathered && least.even >= 1) continue;
-        for (uint32_t other = 0; other < in->vessel_count; ++other) {
-          uint32_t at;
-          double share;
-          if (!sonde_vessel_stations(in, other, in->station[which][i].s_m, &at, &share)) continue;
-          sonde_vessel_state *v = &in->state[other][at + (share > 0.5)];
-          v->tissue_even *= fmin(least.even, 1);
-          if (least.gathered < least_gathered) give_way(v), changed = true;
-        }
-      }
-    for (uint32_t which = 0; which < in->vessel_count; ++which) spread_along(in, which);
-  }
-}
-
-// The direction of a vessel that runs along `way`, at most so far from where it runs at rest: its
-// cross-sections stay apart.
-static sonde_vec3 lean(sonde_vec3 rest, sonde_vec3 way) {
-  sonde_vec3 axis = v_unit(way, rest);
-  double along = v_dot(axis, rest);
-  sonde_vec3 aside = v_madd(axis, -along, rest);
-  double across = v_norm(aside), most = most_lean * fmax(along, 0);
-  if (along > 0 && across <= most) return axis;
-  return v_unit(v_madd(rest, most_lean / fmax(across, 1e-9), aside), rest);
+// Bounds a station's shares by those of its neighbour.
+static void bound_by(sonde_interior *in, uint32_t which, uint32_t i, uint32_t from) {
+  sonde_vessel_state *v = &in->state[which][i];
+  const sonde_vessel_state *w = &in->state[which][from];
+  const double most = in->station[which][i].lead, beside = in->station[which][from].lead;
+  v->tissue_even = fmin(v->tissue_even, w->tissue_even + even_step);
+  if (beside > 0) v->lead = fmin(v->lead, most * fmin(1, w->lead / beside + lead_step));
 }
 
 void sonde_interior_vessels(sonde_interior *in, const sonde_interior_input *input) {
   load l = measure_load(in->model, input);
-  for (uint32_t which = 0; which < in->vessel_count; ++which) {
-    uint32_t count = in->station_count[which];
-    sonde_vessel_state *v = in->state[which];
-    course c = find_course(in, which);
-    for (uint32_t i = 0; i < count; ++i) update_station(in, which, i, &c, &l, input);
-    for (uint32_t i = 0; i < count; ++i) {
-      uint32_t a = i > 0 ? i - 1 : 0, b = i + 1 < count ? i + 1 : i;
-      v[i].axis = lean(in->station[which][i].axis, v_sub(v[b].centre_m, v[a].centre_m));
-      sonde_vec3 up = v_madd(v_neg(l.beam), v_dot(l.beam, v[i].axis), v[i].axis);
-      if (v_norm2(up) > 1e-4) v[i].flat_axis = v_unit(up, v[i].flat_axis);
+  const uint32_t *count = in->station_count;
+  for (uint32_t which = 0; which < in->vessel_count; ++which) update_vessel(in, which, &l, input);
+  for (uint32_t which = 0; which < in->vessel_count; ++which)
+    for (uint32_t i = 0; i < count[which]; ++i)
+      in->strained[which][i] = find_tissue(in, &in->state[which][i]);
+  for (uint32_t which = 0; which < in->vessel_count; ++which)
+    for (uint32_t i = 0; i < count[which]; ++i) keep_clear(in, which, i);
+  bool changed = true;
+  for (int pass = 0; pass < PASSES && changed; ++pass) {
+    changed = false;
+    for (uint32_t which = 0; which < in->vessel_count; ++which)
+      for (uint32_t i = 0; i < count[which]; ++i)
+        if (in->strained[which][i] && yield_at(in, which, i)) changed = true;
+    for (uint32_t which = 0; which < in->vessel_count; ++which) {
+      for (uint32_t i = 1; i < count[which]; ++i) bound_by(in, which, i, i - 1);
+      for (uint32_t i = count[which]; i-- > 1;) bound_by(in, which, i - 1, i);
     }
   }
   for (uint32_t which = 0; which < in->vessel_count; ++which)
-    for (uint32_t i = 0; i < in->station_count[which]; ++i)
-      in->strained[which][i] = find_tissue(in, &in->state[which][i]);
-  for (uint32_t which = 0; which < in->vessel_count; ++which)
-    for (uint32_t other = 0; other < in->vessel_count; ++other)
-      if (other != which) keep_clear(in, which, other);
-  yield_to_squeeze(in);
-  for (uint32_t which = 0; which < in->vessel_count; ++which)
-    for (uint32_t i = 0; i < in->station_count[which]; ++i) {
+    for (uint32_t i = 0; i < count[which]; ++i) {
       sonde_vessel_state *v = &in->state[which][i];
       double thin = sonde_least_lumen * v->rest_radius_m * v->tissue_short;
       v->half_short_m = fmax(v->half_short_m, thin);
@@ -515,7 +452,7 @@ bool sonde_vessel_reaches(const sonde_interior *in, uint32_t which, double s, so
   const sonde_vessel_state *a = &in->state[which][i], *b = a + 1;
   sonde_vec3 d = v_sub(rest, v_lerp(a->rest_centre_m, b->rest_centre_m, t));
   double slant = fabs(v_dot(d, a->axis)); // lies along the vessel, not beside it
-  double reach = (1 + carry_reach) * fmax(a->rest_radius_m, b->rest_radius_m) + beyond_m;
+  double reach = (1 + sonde_wall_reach) * fmax(a->rest_radius_m, b->rest_radius_m) + beyond_m;
   return v_norm(d) < reach + slant;
 }
 
@@ -534,7 +471,7 @@ static void turn_point(double half, double *x, double *y) {
 void sonde_vessel_gather(const sonde_vessel_state *v, double *short_m, double *long_m) {
   SONDE_ASSERT(v->rest_radius_m > 0 && v->half_short_m > 0);
   double rest = v->rest_radius_m, x = *short_m, y = *long_m, r = sqrt(x * x + y * y);
-  double t = clamp((r / rest - 1) / carry_reach, 0, 1), fade = (1 - t) * (1 - t) * (1 + 2 * t);
+  double t = clamp((r / rest - 1) / sonde_wall_reach, 0, 1), fade = (1 - t) * (1 - t) * (1 + 2 * t);
   double half_short = fmax(v->half_short_m / v->tissue_short, sonde_least_lumen * rest);
   double half_long = v->half_long_m / v->tissue_long;
   if (r <= rest) {

@@ -17,21 +17,16 @@ enum { NT = SONDE_WINDOW_THETA, NS = SONDE_WINDOW_S, NL = SONDE_WINDOW_LEVELS };
 static const double skin_pa = 40e3;
 static const double bulk_over_shear = 100;
 
-static void list_hexes(sonde_solid *s) {
-  uint32_t h = 0;
-  for (uint32_t j = 0; j + 1 < NS; ++j)
-    for (uint32_t i = 0; i < NT; ++i)
-      for (uint32_t l = 0; l + 1 < NL; ++l, ++h)
-        for (uint32_t c = 0; c < 4; ++c) {
-          uint32_t a = (i + (c == 1 || c == 2)) % NT, b = j + (c >= 2);
-          s->hex[h].node[c] = sonde_grid_node(a, b, l);
-          s->hex[h].node[c + 4] = sonde_grid_node(a, b, l + 1);
-        }
-}
-
-// The order is found on a regular stand-in of the ring; it depends on the topology only.
+// Elements and their order, which is found on a regular stand-in of the ring: it depends on the
+// topology only.
 static sonde_status connect(sonde_window *w, sonde_error *error) {
+  static const uint32_t round[8] = {0, 1, 3, 2, 4, 5, 7, 6};
   sonde_solid *s = &w->solid;
+  for (uint32_t h = 0; h < s->hex_count; ++h) {
+    uint32_t node[8];
+    sonde_grid_nodes(h, node);
+    for (uint32_t c = 0; c < 8; ++c) s->hex[h].node[c] = node[round[c]];
+  }
   sonde_vec3 *points = SONDE_NEW(sonde_vec3, SONDE_WINDOW_NODES);
   unsigned char *last = SONDE_NEW(unsigned char, SONDE_WINDOW_NODES);
   sonde_status status = points && last ? SONDE_OK : sonde_fail_memory(error);
@@ -55,7 +50,7 @@ sonde_status sonde_window_create(sonde_window **window, sonde_error *error) {
   if (w == NULL) return sonde_fail_memory(error);
   size_t side = 3 * (size_t)SONDE_WINDOW_NEAR;
   sonde_status status =
-      sonde_solid_allocate(&w->solid, SONDE_WINDOW_NODES, (NS - 1) * NT * (NL - 1), error);
+      sonde_solid_allocate(&w->solid, SONDE_WINDOW_NODES, SONDE_GRID_HEXES, error);
   w->compliance = SONDE_NEW(double, 2 * side * side);
   w->touched = SONDE_NEW(sonde_touched, SONDE_WINDOW_TOUCHED);
   w->scratch = SONDE_NEW(double, 12 * SONDE_WINDOW_TOUCHED + 2 * side);
@@ -68,10 +63,7 @@ sonde_status sonde_window_create(sonde_window **window, sonde_error *error) {
   if (!status && (!w->stress || !w->felt || !w->pressed.x || !w->pressed.touched ||
                   !w->moved.touched || !w->compliance || !w->touched || !w->scratch))
     status = sonde_fail_memory(error);
-  if (!status) {
-    list_hexes(&w->solid);
-    status = connect(w, error);
-  }
+  if (!status) status = connect(w, error);
   if (status)
     sonde_window_destroy(w);
   else
@@ -114,20 +106,6 @@ void sonde_window_begin(sonde_window *w, const sonde_interior *in, sonde_window_
   sonde_fronts_begin(w->solid.fronts);
 }
 
-// Row k of the compliance is the answer to a force on unknown k.
-static bool comply(sonde_window *w) {
-  const size_t side = 3 * (size_t)SONDE_WINDOW_NEAR;
-  double *c = w->compliance;
-  if (!sonde_fronts_compliance(w->solid.fronts, c, c + side * side)) return false;
-  for (size_t i = 0; i < side; ++i)
-    for (size_t j = 0; j < i; ++j) {
-      double kept = c[i * side + j];
-      c[i * side + j] = c[j * side + i];
-      c[j * side + i] = kept;
-    }
-  return true;
-}
-
 uint32_t sonde_window_steps(const sonde_window *w, uint64_t budget) {
   SONDE_ASSERT(w != NULL && budget > 0);
   return sonde_fronts_steps(w->solid.fronts, budget);
@@ -135,7 +113,17 @@ uint32_t sonde_window_steps(const sonde_window *w, uint64_t budget) {
 
 bool sonde_window_step(sonde_window *w, uint64_t budget) {
   SONDE_ASSERT(w != NULL && !w->ready);
+  const size_t side = 3 * (size_t)SONDE_WINDOW_NEAR;
+  double *c = w->compliance;
   if (!sonde_fronts_step(w->solid.fronts, sonde_solid_matrix, &w->solid, budget)) return false;
-  w->ready = !sonde_fronts_failed(w->solid.fronts) && comply(w);
+  w->ready = !sonde_fronts_failed(w->solid.fronts) &&
+             sonde_fronts_compliance(w->solid.fronts, c, c + side * side);
+  // Row k of the compliance is the answer to a force on unknown k.
+  for (size_t i = 0; i < side && w->ready; ++i)
+    for (size_t j = 0; j < i; ++j) {
+      double lower = c[i * side + j];
+      c[i * side + j] = c[j * side + i];
+      c[j * side + i] = lower;
+    }
   return true;
 }
