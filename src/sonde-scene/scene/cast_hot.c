@@ -1,12 +1,5 @@
 // Conservative advancement inside a step: no pair moves past its first touch by more than a share
 // of the thinner body's thickness at once, so that nothing passes through (docs/scene.md).
-// thickness:     volume over area of a surface.
-// ways_of:       box of the ways of a body's vertices, chords of turning included.
-// guess, made:   ways that the velocities at the start announce; those that a step has made.
-// bounds_of:     box of a body at the start of the step.
-// free_share:    share of the ways that two boxes can go before they meet.
-// safe_share:    share of the ways that all pairs may go.
-// guarded:       steps of the size that is safe, undone and halved when they went further.
 //
 // Thickness V/A is a third of a ball's radius, a sixth of a cube's edge and half of a sheet's
 // thickness. A column that grows by less than that per step never reaches the far side of either
@@ -35,8 +28,6 @@ double sonde_scene_thickness(const sonde_mesh *surface) {
   return area > 0 && volume > 0 ? volume / area : 0;
 }
 
-static sonde_bounds no_way(void) { return (sonde_bounds){vec3(0, 0, 0), vec3(0, 0, 0)}; }
-
 static sonde_bounds widen(sonde_vec3 way, double by) {
   sonde_vec3 more = vec3(by, by, by);
   return (sonde_bounds){v_sub(way, more), v_add(way, more)};
@@ -47,7 +38,7 @@ static sonde_bounds guess(const sonde_scene_state *state, uint32_t b, double h) 
   const sonde_body *body = &state->scene->bodies[b];
   const sonde_vec3 *v = state->now.velocity + body->first_slot;
   sonde_vec3 fall = v_scale(state->scene->gravity_m_s2, h * h);
-  if (body->motion == SONDE_BODY_FIXED) return no_way();
+  if (body->motion == SONDE_BODY_FIXED) return (sonde_bounds){vec3(0, 0, 0), vec3(0, 0, 0)};
   if (body->motion == SONDE_BODY_DRIVEN) fall = vec3(0, 0, 0);
   if (sonde_body_is_rigid(body))
     return widen(v_madd(fall, h, v[0]), state->reach_m[b] * fmin(2, h * v_norm(v[1])));
@@ -88,54 +79,29 @@ static sonde_bounds bounds_of(const sonde_scene_state *state, const sonde_kept *
   return box;
 }
 
-// Along one axis: low and high of a gap between two boxes and how much of it the ways close.
-static double axis_share(double gap, double closing) {
-  if (!(gap > 0)) return 0;
-  return closing > gap ? gap / closing : 1;
-}
-
-static double free_share(const sonde_bounds *a, const sonde_bounds *way_a, const sonde_bounds *b,
-                         const sonde_bounds *way_b) {
-  double most = 0;
-  const double gap[6] = {b->low.x - a->high.x, b->low.y - a->high.y, b->low.z - a->high.z,
-                         a->low.x - b->high.x, a->low.y - b->high.y, a->low.z - b->high.z};
-  const double closing[6] = {way_a->high.x - way_b->low.x, way_a->high.y - way_b->low.y,
-                             way_a->high.z - way_b->low.z, way_b->high.x - way_a->low.x,
-                             way_b->high.y - way_a->low.y, way_b->high.z - way_a->low.z};
-  for (int k = 0; k < 6; ++k) most = fmax(most, axis_share(gap[k], closing[k]));
-  return most;
-}
-
-// Longest way of a point of a as a point of b sees it.
-static double relative_way(const sonde_bounds *a, const sonde_bounds *b) {
-  sonde_vec3 p = v_sub(a->high, b->low), q = v_sub(b->high, a->low);
-  return v_norm(vec3(fmax(p.x, q.x), fmax(p.y, q.y), fmax(p.z, q.z)));
-}
-
+// Share of the ways that all pairs may go: to where their boxes meet and a thickness further.
 static double safe_share(const sonde_scene_state *state, const sonde_kept *from, double allowed) {
   const sonde_scene *scene = state->scene;
   double share = 1;
   for (uint32_t t = 0; t < scene->touch_count; ++t) {
     uint32_t a = scene->touches[t].a, b = scene->touches[t].b;
-    double way = relative_way(&state->way[a], &state->way[b]);
+    // The longest way is that of a point of a as a point of b sees it.
+    const sonde_bounds *way_a = &state->way[a], *way_b = &state->way[b];
+    sonde_vec3 p = v_sub(way_a->high, way_b->low), q = v_sub(way_b->high, way_a->low);
+    double way = v_norm(vec3(fmax(p.x, q.x), fmax(p.y, q.y), fmax(p.z, q.z)));
     double most = allowed * fmin(state->thickness_m[a], state->thickness_m[b]);
     if (!(way > share * most)) continue;
     sonde_bounds box_a = bounds_of(state, from, a), box_b = bounds_of(state, from, b);
-    double apart = free_share(&box_a, &state->way[a], &box_b, &state->way[b]);
+    // The ways close the gap along each axis, from either side, by p and q.
+    sonde_vec3 ab = v_sub(box_b.low, box_a.high), ba = v_sub(box_a.low, box_b.high);
+    const double gap[6] = {ab.x, ab.y, ab.z, ba.x, ba.y, ba.z};
+    const double closing[6] = {p.x, p.y, p.z, q.x, q.y, q.z};
+    double apart = 0;
+    for (int k = 0; k < 6; ++k)
+      if (gap[k] > 0) apart = fmax(apart, closing[k] > gap[k] ? gap[k] / closing[k] : 1);
     share = fmin(share, apart + most / way);
   }
   return share;
-}
-
-static double planned_share(sonde_scene_state *state, double h) {
-  sonde_rigid_begin(state, h); // velocities of driven bodies
-  for (uint32_t b = 0; b < state->scene->body_count; ++b) state->way[b] = guess(state, b, h);
-  return safe_share(state, &state->now, PLANNED);
-}
-
-static double made_share(sonde_scene_state *state) {
-  for (uint32_t b = 0; b < state->scene->body_count; ++b) state->way[b] = made(state, b);
-  return safe_share(state, &state->undo, MADE);
 }
 
 void sonde_step_guarded(sonde_scene_state *state, double h) {
@@ -144,15 +110,19 @@ void sonde_step_guarded(sonde_scene_state *state, double h) {
     sonde_step_once(state, h);
     return;
   }
+  uint32_t bodies = state->scene->body_count;
   double start = state->now.head->time_s, done = 0, least = ldexp(h, -CUTS);
   while (done < h) {
-    // equal parts: a short one after a deep one would throw the bodies apart
-    double left = h - done, parts = ceil(1 / fmax(planned_share(state, left), least / left));
+    double left = h - done;
+    sonde_rigid_begin(state, left); // velocities of driven bodies
+    for (uint32_t b = 0; b < bodies; ++b) state->way[b] = guess(state, b, left);
+    // The parts are equal: a short one after a deep one would throw the bodies apart.
+    double parts = ceil(1 / fmax(safe_share(state, &state->now, PLANNED), least / left));
     double part = parts > 1 ? left / parts : left;
     for (;;) {
       sonde_step_once(state, part);
-      bool far = made_share(state) < 1 && part > least;
-      if (!far) break;
+      for (uint32_t b = 0; b < bodies; ++b) state->way[b] = made(state, b);
+      if (!(safe_share(state, &state->undo, MADE) < 1 && part > least)) break;
       sonde_kept_copy(&state->now, &state->undo);
       part *= 0.5;
     }

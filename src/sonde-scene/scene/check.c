@@ -1,8 +1,4 @@
 // Flaws of meshes that have to bound a solid.
-// crosses:    whether a segment passes through the inside of a triangle.
-// shared:     common corners of two triangles.
-// intersects: whether two triangles that are not neighbours cut each other.
-// candidates: pairs of faces whose boxes overlap.
 #include "scene/scene.h"
 
 #include "base/base.h"
@@ -22,39 +18,29 @@ sonde_status sonde_mesh_check_areas(const sonde_mesh *mesh, sonde_error *error) 
   return SONDE_OK;
 }
 
-// Signs of volumes: the ends lie on different sides, and the line passes within the three edges.
-static bool crosses(sonde_vec3 p, sonde_vec3 q, const sonde_vec3 t[3]) {
-  sonde_vec3 d = v_sub(q, p), n = v_cross(v_sub(t[1], t[0]), v_sub(t[2], t[0]));
-  double from = v_dot(n, v_sub(p, t[0])), to = v_dot(n, v_sub(q, t[0]));
-  if (!(from * to < 0)) return false;
-  double side[3];
-  for (int k = 0; k < 3; ++k) side[k] = v_dot(d, v_cross(v_sub(t[k], p), v_sub(t[(k + 1) % 3], p)));
-  return (side[0] > 0 && side[1] > 0 && side[2] > 0) || (side[0] < 0 && side[1] < 0 && side[2] < 0);
-}
-
-static int shared(const uint32_t a[3], const uint32_t b[3]) {
-  int count = 0;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) count += a[i] == b[j];
-  return count;
-}
-
+// Whether an edge of a passes through the inside of b, by signs of volumes: its ends lie on
+// different sides, and its line passes within the three edges of b.
 static bool edges_cross(const sonde_mesh *mesh, const uint32_t a[3], const uint32_t b[3]) {
   const sonde_vec3 *x = mesh->vertices;
   const sonde_vec3 t[3] = {x[b[0]], x[b[1]], x[b[2]]};
   for (int k = 0; k < 3; ++k) {
     uint32_t p = a[k], q = a[(k + 1) % 3];
     bool touches = p == b[0] || p == b[1] || p == b[2] || q == b[0] || q == b[1] || q == b[2];
-    if (!touches && crosses(x[p], x[q], t)) return true;
+    if (touches) continue;
+    sonde_vec3 d = v_sub(x[q], x[p]), n = v_cross(v_sub(t[1], t[0]), v_sub(t[2], t[0]));
+    if (!(v_dot(n, v_sub(x[p], t[0])) * v_dot(n, v_sub(x[q], t[0])) < 0)) continue;
+    int left = 0, right = 0;
+    for (int i = 0; i < 3; ++i) {
+      double side = v_dot(d, v_cross(v_sub(t[i], x[p]), v_sub(t[(i + 1) % 3], x[p])));
+      left += side > 0;
+      right += side < 0;
+    }
+    if (left == 3 || right == 3) return true;
   }
   return false;
 }
 
-static bool intersects(const sonde_mesh *mesh, uint32_t f, uint32_t g) {
-  const uint32_t *a = mesh->faces[f], *b = mesh->faces[g];
-  return shared(a, b) < 2 && (edges_cross(mesh, a, b) || edges_cross(mesh, b, a));
-}
-
+// Pairs of triangles with less than two corners in common must not cross.
 static sonde_status find_intersection(const sonde_mesh *mesh, const sonde_face_tree *tree,
                                       sonde_error *error) {
   uint32_t count = sonde_face_tree_pairs(tree, tree, 0, NULL, 0, NULL);
@@ -62,10 +48,15 @@ static sonde_status find_intersection(const sonde_mesh *mesh, const sonde_face_t
   if (!pairs) return sonde_fail_memory(error);
   sonde_face_tree_pairs(tree, tree, 0, pairs, count, NULL);
   sonde_status status = SONDE_OK;
-  for (uint32_t k = 0; k < count && !status; ++k)
-    if (pairs[k][0] < pairs[k][1] && intersects(mesh, pairs[k][0], pairs[k][1]))
+  for (uint32_t k = 0; k < count && !status; ++k) {
+    if (pairs[k][0] >= pairs[k][1]) continue;
+    const uint32_t *a = mesh->faces[pairs[k][0]], *b = mesh->faces[pairs[k][1]];
+    int common = 0;
+    for (int i = 0; i < 9; ++i) common += a[i / 3] == b[i % 3];
+    if (common < 2 && (edges_cross(mesh, a, b) || edges_cross(mesh, b, a)))
       status = sonde_fail(error, SONDE_MESH, "the surface cuts itself: triangles %u and %u",
                           pairs[k][0], pairs[k][1]);
+  }
   sonde_free(pairs);
   return status;
 }

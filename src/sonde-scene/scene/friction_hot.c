@@ -1,11 +1,4 @@
 // Coulomb friction with bonds, on every column of a contact (docs/scene.md).
-// across:        part of a vector across a normal.
-// coefficient:   Stribeck curve.
-// grip_begin:    the way of a column's bond from those of the vertices of its face.
-// stick, slip:   the bond as a spring-damper; its limit as a constant force.
-// grip_predict:  force at the end of the step.
-// new_way:       return mapping.
-// bonds_advance: what the columns' ways gained goes to the vertices.
 //
 // A bond's way z is how far the two surfaces have moved past each other since they met, less what
 // slipped. Its force is -P mu_s z/d for |z| up to d mu/mu_s, P the column's push and d the way
@@ -20,12 +13,6 @@
 
 static sonde_vec3 across(sonde_vec3 a, sonde_vec3 n) { return v_madd(a, -v_dot(a, n), n); }
 
-static double coefficient(const sonde_touch *touch, double slip_m_s) {
-  SONDE_ASSERT(touch->stribeck_m_s > 0);
-  double x = slip_m_s / touch->stribeck_m_s;
-  return touch->mu_kinetic + (touch->mu_static - touch->mu_kinetic) * exp(-x * x);
-}
-
 void sonde_grip_begin(sonde_scene_state *state, sonde_grip *grip) {
   const sonde_touch *touch = &state->scene->touches[grip->touch];
   if (!(touch->mu_static > 0)) return;
@@ -37,32 +24,10 @@ void sonde_grip_begin(sonde_scene_state *state, sonde_grip *grip) {
     slip += grip->bond_weight[k] * state->now.slip[grip->bond[k]];
   }
   grip->way = across(way, grip->normal);
-  grip->mu = coefficient(touch, slip);
-}
-
-// Two directions across the normal.
-static void stick(sonde_grip *grip, double stiffness, double damper, sonde_vec3 resisted) {
-  sonde_vec3 n = grip->normal;
-  sonde_vec3 axis = fabs(n.x) < 0.6 ? vec3(1, 0, 0) : vec3(0, 1, 0);
-  grip->tangent[0] = v_unit(across(axis, n), axis);
-  grip->tangent[1] = v_cross(n, grip->tangent[0]);
-  grip->term_count = 2;
-  grip->stiffness = stiffness;
-  grip->damper = damper;
-  grip->force = v_neg(resisted);
-}
-
-// The force keeps its size; across the slip its direction turns with the way.
-static void slide(sonde_grip *grip, double stiffness, double damper, sonde_vec3 resisted,
-                  double most) {
-  SONDE_ASSERT(most >= 0);
-  double size = v_norm(resisted), share = most / size;
-  sonde_vec3 along = v_scale(resisted, 1 / size);
-  grip->tangent[0] = v_cross(grip->normal, along);
-  grip->term_count = 1;
-  grip->stiffness = stiffness * share;
-  grip->damper = damper * share;
-  grip->force = v_scale(resisted, -share);
+  // The coefficient falls from static to kinetic along Stribeck's curve.
+  SONDE_ASSERT(touch->stribeck_m_s > 0);
+  double x = slip / touch->stribeck_m_s;
+  grip->mu = touch->mu_kinetic + (touch->mu_static - touch->mu_kinetic) * exp(-x * x);
 }
 
 void sonde_grip_evaluate(sonde_scene_state *state, sonde_grip *grip, double moved_s) {
@@ -77,10 +42,27 @@ void sonde_grip_evaluate(sonde_scene_state *state, sonde_grip *grip, double move
   sonde_vec3 way = v_madd(grip->way, moved_s, slip);
   sonde_vec3 resisted = v_madd(v_scale(way, stiffness), damper, slip);
   double most = push * grip->mu;
-  if (v_norm2(resisted) <= most * most)
-    stick(grip, stiffness, damper, resisted);
-  else
-    slide(grip, stiffness, damper, resisted, most);
+  if (v_norm2(resisted) <= most * most) {
+    // Two directions across the normal resist as long as the bond holds.
+    sonde_vec3 n = grip->normal;
+    sonde_vec3 axis = fabs(n.x) < 0.6 ? vec3(1, 0, 0) : vec3(0, 1, 0);
+    grip->tangent[0] = v_unit(across(axis, n), axis);
+    grip->tangent[1] = v_cross(n, grip->tangent[0]);
+    grip->term_count = 2;
+    grip->stiffness = stiffness;
+    grip->damper = damper;
+    grip->force = v_neg(resisted);
+  } else {
+    // The force keeps its size; across the slip its direction turns with the way.
+    SONDE_ASSERT(most >= 0);
+    double size = v_norm(resisted), share = most / size;
+    sonde_vec3 along = v_scale(resisted, 1 / size);
+    grip->tangent[0] = v_cross(grip->normal, along);
+    grip->term_count = 1;
+    grip->stiffness = stiffness * share;
+    grip->damper = damper * share;
+    grip->force = v_scale(resisted, -share);
+  }
 }
 
 void sonde_grip_predict(sonde_scene_state *state, sonde_grip *grip) {
@@ -95,29 +77,6 @@ void sonde_grip_predict(sonde_scene_state *state, sonde_grip *grip) {
   }
 }
 
-// Way at the end of the step, cut back to where the bond holds; *slipped is what was cut.
-static sonde_vec3 new_way(const sonde_scene_state *state, const sonde_grip *grip, double h,
-                          double *slipped) {
-  const sonde_touch *touch = &state->scene->touches[grip->touch];
-  sonde_vec3 slip = across(sonde_grip_slip(state, grip, state->mean_velocity), grip->normal);
-  sonde_vec3 way = v_madd(grip->way, h, slip);
-  double limit = touch->bond_m * grip->mu / touch->mu_static, length = v_norm(way);
-  *slipped = length > limit ? length - limit : 0;
-  return length > limit ? v_scale(way, limit / length) : way;
-}
-
-static void advance_grip(sonde_scene_state *state, const sonde_grip *grip, double push, double h) {
-  double slipped;
-  sonde_vec3 gained = v_sub(new_way(state, grip, h, &slipped), grip->way);
-  for (int c = 0; c < 3; ++c) {
-    double load = push * fmax(grip->bond_weight[c], 0);
-    uint32_t i = grip->bond[c];
-    state->bond_load[i] += load;
-    state->slip_sum[i] += load * slipped / h;
-    state->bond_sum[i] = v_madd(state->bond_sum[i], load, gained);
-  }
-}
-
 void sonde_bonds_advance(sonde_scene_state *state, double h) {
   SONDE_ASSERT(h > 0);
   memset(state->bond_load, 0, state->bond_count * sizeof *state->bond_load);
@@ -126,8 +85,22 @@ void sonde_bonds_advance(sonde_scene_state *state, double h) {
   for (uint32_t k = 0; k < state->grip_count; ++k) {
     const sonde_grip *grip = &state->grips[k];
     double push = state->pushes[grip->push].end_force * grip->share;
-    if (state->scene->touches[grip->touch].mu_static > 0 && push > 0)
-      advance_grip(state, grip, push, h);
+    const sonde_touch *touch = &state->scene->touches[grip->touch];
+    if (!(touch->mu_static > 0 && push > 0)) continue;
+    // The way at the end of the step is returned to where the bond holds; the rest has slipped.
+    sonde_vec3 slip = across(sonde_grip_slip(state, grip, state->mean_velocity), grip->normal);
+    sonde_vec3 way = v_madd(grip->way, h, slip);
+    double limit = touch->bond_m * grip->mu / touch->mu_static, length = v_norm(way);
+    double slipped = length > limit ? length - limit : 0;
+    if (length > limit) way = v_scale(way, limit / length);
+    sonde_vec3 gained = v_sub(way, grip->way);
+    for (int c = 0; c < 3; ++c) {
+      double load = push * fmax(grip->bond_weight[c], 0);
+      uint32_t i = grip->bond[c];
+      state->bond_load[i] += load;
+      state->slip_sum[i] += load * slipped / h;
+      state->bond_sum[i] = v_madd(state->bond_sum[i], load, gained);
+    }
   }
   for (uint32_t i = 0; i < state->bond_count; ++i) {
     double load = state->bond_load[i];

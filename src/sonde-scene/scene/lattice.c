@@ -1,9 +1,4 @@
 // Bodies of springs: surfaces from edges, lattices from cubes or from tetrahedra of a file.
-// allocate:      the arrays of a deformable body.
-// lump_areas:    the mass of a surface by its vertices' areas.
-// cells_around:  how many cells contain a grid point and its neighbour along a direction.
-// count_springs, add_springs: the springs of a cubic lattice.
-// read_cells:    a cubic lattice in a box.
 // (tetrahedra: tetgen.c)
 //
 // A cube of edge s with springs k/4 along its 12 edges and k/2 along its 12 face diagonals has the
@@ -63,50 +58,45 @@ static double read_surface_mass(sonde_reader *reader, sonde_place at, const sond
   return value * report.volume_m3;
 }
 
-// Shares by area; the last node takes what rounding left, so that the sum is the mass.
-static void lump_areas(sonde_body *body, double mass_kg) {
-  SONDE_ASSERT(mass_kg > 0 && body->node_count > 0);
-  sonde_mesh_areas(&body->surface, body->node_mass_kg);
-  double area = 0, sum = 0;
-  for (uint32_t i = 0; i < body->node_count; ++i) area += body->node_mass_kg[i];
-  for (uint32_t i = 0; i < body->node_count; ++i) {
-    body->node_mass_kg[i] *= mass_kg / area;
-    sum += body->node_mass_kg[i];
-  }
-  body->node_mass_kg[body->node_count - 1] += mass_kg - sum;
-}
-
-static void fill_surface(const sonde_scene_source *source, sonde_place at,
-                         const sonde_topology *topology, sonde_body *body) {
+void sonde_read_springs(const sonde_scene_source *source, sonde_place at, sonde_body *body) {
   static const char *const KEYS[] = {"stiffness_n_m", "damping_n_s_m", "bulk_n_m5", NULL};
   sonde_reader *reader = source->reader;
-  sonde_place springs = sonde_read_find(reader, at, "springs");
-  if (!springs) sonde_reader_fail(reader, at, SONDE_FORMAT, "springs is missing");
-  sonde_read_keys(reader, springs, "springs", KEYS);
-  double stiffness = sonde_read_real(reader, springs, "stiffness_n_m", 0, 1e9, NAN);
-  double damper = sonde_read_real(reader, springs, "damping_n_s_m", 0, 1e6, 0);
-  body->bulk_n_m5 = sonde_read_real(reader, springs, "bulk_n_m5", 0, 1e18, 0);
-  memcpy(body->node, body->surface.vertices, body->node_count * sizeof *body->node);
-  for (uint32_t e = 0; e < body->spring_count; ++e) {
-    const uint32_t *pair = topology->edges[e];
-    memcpy(body->pairs[e], pair, sizeof body->pairs[e]);
-    body->spring[e] =
-        (sonde_spring){v_distance(body->node[pair[0]], body->node[pair[1]]), stiffness, damper};
-  }
-  double mass_kg = read_surface_mass(reader, at, body);
-  if (sonde_reader_good(reader)) lump_areas(body, mass_kg);
-}
-
-void sonde_read_springs(const sonde_scene_source *source, sonde_place at, sonde_body *body) {
   sonde_topology topology = {0};
   sonde_error error = {0};
   sonde_status status = sonde_topology_build(&body->surface, &topology, &error);
   if (!status)
     status = sonde_body_allocate(body, body->surface.vertex_count, topology.edge_count, &error);
   if (status)
-    sonde_reader_pass(source->reader, at, &error);
-  else
-    fill_surface(source, at, &topology, body);
+    sonde_reader_pass(reader, at, &error);
+  else {
+    sonde_place springs = sonde_read_find(reader, at, "springs");
+    if (!springs) sonde_reader_fail(reader, at, SONDE_FORMAT, "springs is missing");
+    sonde_read_keys(reader, springs, "springs", KEYS);
+    double stiffness = sonde_read_real(reader, springs, "stiffness_n_m", 0, 1e9, NAN);
+    double damper = sonde_read_real(reader, springs, "damping_n_s_m", 0, 1e6, 0);
+    body->bulk_n_m5 = sonde_read_real(reader, springs, "bulk_n_m5", 0, 1e18, 0);
+    memcpy(body->node, body->surface.vertices, body->node_count * sizeof *body->node);
+    for (uint32_t e = 0; e < body->spring_count; ++e) {
+      const uint32_t *pair = topology.edges[e];
+      memcpy(body->pairs[e], pair, sizeof body->pairs[e]);
+      body->spring[e] =
+          (sonde_spring){v_distance(body->node[pair[0]], body->node[pair[1]]), stiffness, damper};
+    }
+    double mass_kg = read_surface_mass(reader, at, body);
+    if (sonde_reader_good(reader)) {
+      // The mass is shared by area; the last node takes what rounding left, so that the sum is the
+      // mass.
+      SONDE_ASSERT(mass_kg > 0 && body->node_count > 0);
+      sonde_mesh_areas(&body->surface, body->node_mass_kg);
+      double area = 0, sum = 0;
+      for (uint32_t i = 0; i < body->node_count; ++i) area += body->node_mass_kg[i];
+      for (uint32_t i = 0; i < body->node_count; ++i) {
+        body->node_mass_kg[i] *= mass_kg / area;
+        sum += body->node_mass_kg[i];
+      }
+      body->node_mass_kg[body->node_count - 1] += mass_kg - sum;
+    }
+  }
   sonde_topology_clear(&topology);
 }
 
@@ -131,48 +121,6 @@ static uint32_t cells_around(const cubes *c, const uint32_t at[3], const int d[3
   return cells;
 }
 
-static uint32_t count_springs(const cubes *c) {
-  SONDE_ASSERT(c->n[0] && c->n[1] && c->n[2]);
-  uint32_t count = 0, other[3];
-  for (uint32_t z = 0; z <= c->n[2]; ++z)
-    for (uint32_t y = 0; y <= c->n[1]; ++y)
-      for (uint32_t x = 0; x <= c->n[0]; ++x)
-        for (int d = 0; d < 9; ++d)
-          count += cells_around(c, (const uint32_t[3]){x, y, z}, DIRECTION[d], other) > 0;
-  return count;
-}
-
-// The springs that start at one grid point, and the point itself.
-static void add_point(const cubes *c, const uint32_t at[3], sonde_body *body, uint32_t *used) {
-  uint32_t i = sonde_grid_index(c->n, at), other[3];
-  body->node[i] = vec3((at[0] - 0.5 * c->n[0]) * c->side_m, (at[1] - 0.5 * c->n[1]) * c->side_m,
-                       (at[2] - 0.5 * c->n[2]) * c->side_m);
-  static const int HERE[3] = {0, 0, 0};
-  double cube_kg = c->density_kg_m3 * c->side_m * c->side_m * c->side_m;
-  body->node_mass_kg[i] = cube_kg / 8 * cells_around(c, at, HERE, other);
-  for (int d = 0; d < 9; ++d) {
-    uint32_t cells = cells_around(c, at, DIRECTION[d], other);
-    if (!cells) continue;
-    uint32_t j = sonde_grid_index(c->n, other);
-    double k = (d < 3 ? 0.1 : 0.2) * c->youngs_pa * c->side_m * cells;
-    double rest = c->side_m * (d < 3 ? 1 : sqrt(2.0));
-    body->pairs[*used][0] = i < j ? i : j;
-    body->pairs[*used][1] = i < j ? j : i;
-    body->spring[(*used)++] = (sonde_spring){rest, k, k * c->damping_s};
-  }
-}
-
-static void fill_cells(const cubes *c, sonde_body *body) {
-  uint32_t used = 0;
-  for (uint32_t z = 0; z <= c->n[2]; ++z)
-    for (uint32_t y = 0; y <= c->n[1]; ++y)
-      for (uint32_t x = 0; x <= c->n[0]; ++x)
-        add_point(c, (const uint32_t[3]){x, y, z}, body, &used);
-  SONDE_ASSERT(used == body->spring_count);
-  for (uint32_t i = 0; i < body->surface.vertex_count; ++i)
-    body->surface.vertices[i] = body->node[body->surface_node[i]];
-}
-
 // Cells along each side; the box has to be made of whole cubes.
 static bool read_grid(sonde_reader *reader, sonde_place at, sonde_place lattice, cubes *c) {
   sonde_place shape = sonde_read_find(reader, at, "shape");
@@ -182,7 +130,7 @@ static bool read_grid(sonde_reader *reader, sonde_place at, sonde_place lattice,
                       "a lattice needs shape: {box_mm: [x, y, z]} or lattice: {tetrahedra: FILE}");
     return false;
   }
-  sonde_vec3 size = sonde_read_vector_at(reader, box, "box_mm", 1e5);
+  sonde_vec3 size = sonde_read_vector_at(reader, box, "box_mm", SONDE_SCENE_FAR_MM);
   double side = sonde_read_real(reader, lattice, "cell_mm", 1e-3, 1e4, NAN);
   const double length[3] = {size.x, size.y, size.z};
   double points = 1;
@@ -201,17 +149,52 @@ static bool read_grid(sonde_reader *reader, sonde_place at, sonde_place lattice,
   return sonde_reader_good(reader);
 }
 
+// The springs that start at one grid point; with a body, they are added to it.
+static uint32_t point_springs(const cubes *c, const uint32_t at[3], sonde_body *body,
+                              uint32_t used) {
+  uint32_t i = sonde_grid_index(c->n, at), count = 0, other[3];
+  for (int d = 0; d < 9; ++d) {
+    uint32_t cells = cells_around(c, at, DIRECTION[d], other);
+    if (!cells) continue;
+    uint32_t e = used + count++, j = sonde_grid_index(c->n, other);
+    if (!body) continue;
+    double k = (d < 3 ? 0.1 : 0.2) * c->youngs_pa * c->side_m * cells;
+    double rest = c->side_m * (d < 3 ? 1 : sqrt(2.0));
+    body->pairs[e][0] = i < j ? i : j;
+    body->pairs[e][1] = i < j ? j : i;
+    body->spring[e] = (sonde_spring){rest, k, k * c->damping_s};
+  }
+  return count;
+}
+
 static void read_cells(const sonde_scene_source *source, sonde_place at, sonde_place lattice,
                        cubes *c, sonde_body *body) {
+  static const int HERE[3] = {0, 0, 0};
   if (!read_grid(source->reader, at, lattice, c)) return;
+  SONDE_ASSERT(c->n[0] && c->n[1] && c->n[2]);
   sonde_error error = {0};
-  uint32_t points = (c->n[0] + 1) * (c->n[1] + 1) * (c->n[2] + 1);
+  uint32_t rows = c->n[0] + 1, layers = rows * (c->n[1] + 1), points = layers * (c->n[2] + 1);
+  uint32_t count = 0, used = 0, other[3];
+  for (uint32_t i = 0; i < points; ++i)
+    count +=
+        point_springs(c, (const uint32_t[3]){i % rows, i % layers / rows, i / layers}, NULL, 0);
   sonde_status status = sonde_grid_skin(c->n, &body->surface, &body->surface_node, &error);
-  if (!status) status = sonde_body_allocate(body, points, count_springs(c), &error);
-  if (status)
+  if (!status) status = sonde_body_allocate(body, points, count, &error);
+  if (status) {
     sonde_reader_pass(source->reader, at, &error);
-  else
-    fill_cells(c, body);
+    return;
+  }
+  double side = c->side_m, cube_kg = c->density_kg_m3 * side * side * side;
+  for (uint32_t i = 0; i < points; ++i) {
+    const uint32_t p[3] = {i % rows, i % layers / rows, i / layers};
+    body->node[i] = vec3((p[0] - 0.5 * c->n[0]) * side, (p[1] - 0.5 * c->n[1]) * side,
+                         (p[2] - 0.5 * c->n[2]) * side);
+    body->node_mass_kg[i] = cube_kg / 8 * cells_around(c, p, HERE, other);
+    used += point_springs(c, p, body, used);
+  }
+  SONDE_ASSERT(used == body->spring_count);
+  for (uint32_t i = 0; i < body->surface.vertex_count; ++i)
+    body->surface.vertices[i] = body->node[body->surface_node[i]];
 }
 
 void sonde_read_lattice(const sonde_scene_source *source, sonde_place at, sonde_body *body) {

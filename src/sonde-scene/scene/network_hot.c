@@ -1,7 +1,4 @@
 // Springs of surfaces and lattices, and the bulk of a closed surface (docs/scene.md).
-// add_spring:    force, matrix blocks and K v of one spring-damper.
-// add_bulk:      pressure of the enclosed volume as a rank-one term.
-// volume:        of the closed surface, by tetrahedra to its first vertex.
 #include "scene/state.h"
 
 #include "base/base.h"

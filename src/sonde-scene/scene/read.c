@@ -1,10 +1,4 @@
 // A scene file: the step, materials, bodies, pairs that may touch.
-// read_step:      options of the integrator.
-// read_material:  contact and friction of a body's skin.
-// add_touch:      a pair from the materials of its bodies.
-// read_touch:     a pair that the file names, with its own values.
-// number_slots:   places of the bodies in the vectors of the solver.
-// check_touching: bodies that touch have to bound a solid.
 #include "scene/scene.h"
 
 #include "base/bounds.h"
@@ -51,8 +45,8 @@ static void read_step(sonde_reader *reader, sonde_place at, sonde_scene *scene) 
     sonde_reader_fail(reader, at, SONDE_FORMAT, "lambda belongs to the implicit method");
   step->lambda = method ? 0 : sonde_read_real(reader, at, "lambda", 0, 1, step->lambda);
   step->symplectic = method == 2;
-  step->dt_s = sonde_read_real(reader, at, "dt_s", 1e-9, 1, step->dt_s);
-  step->newton_iterations = sonde_read_integer(reader, at, "newton", 1, 1000, 1);
+  step->dt_s = sonde_read_real(reader, at, "dt_s", SONDE_SCENE_SHORTEST_DT_S, 1, step->dt_s);
+  step->newton_iterations = sonde_read_integer(reader, at, "newton", 1, SONDE_SCENE_MOST_NEWTON, 1);
   step->newton_residual =
       sonde_read_real(reader, at, "newton_residual", 0, 1, step->newton_residual);
   step->line_search = sonde_read_bool(reader, at, "line_search", step->line_search);
@@ -63,32 +57,32 @@ static void read_step(sonde_reader *reader, sonde_place at, sonde_scene *scene) 
   step->solver.max_iterations =
       sonde_read_integer(reader, at, "solver_iterations", 1, 1000000, step->solver.max_iterations);
   step->substep_tolerance_m = 1e-3 * sonde_read_real(reader, at, "substep_tolerance_mm", 0, 1e3, 0);
-  step->substep_halvings =
-      sonde_read_integer(reader, at, "substep_halvings", 1, 16, step->substep_halvings);
+  step->substep_halvings = sonde_read_integer(reader, at, "substep_halvings", 1,
+                                              SONDE_SCENE_MOST_HALVINGS, step->substep_halvings);
 }
 
 sonde_status sonde_scene_set_step(sonde_scene *scene, const sonde_scene_step *step,
                                   sonde_error *error) {
   SONDE_ASSERT(scene && step);
-  if (!(step->dt_s >= 1e-9 && step->dt_s <= 1))
-    return sonde_fail(error, SONDE_ARGUMENT, "dt_s is %g, expected 1e-9 to 1", step->dt_s);
+  if (!(step->dt_s >= SONDE_SCENE_SHORTEST_DT_S && step->dt_s <= 1))
+    return sonde_fail(error, SONDE_ARGUMENT, "dt_s is %g, expected %g to 1", step->dt_s,
+                      SONDE_SCENE_SHORTEST_DT_S);
   if (!(step->lambda >= 0 && step->lambda <= 1))
     return sonde_fail(error, SONDE_ARGUMENT, "lambda is %g, expected 0 to 1", step->lambda);
   if (step->symplectic && step->lambda > 0)
     return sonde_fail(error, SONDE_ARGUMENT, "symplectic needs lambda = 0, got %g", step->lambda);
-  if (step->newton_iterations < 1 || step->newton_iterations > 1000)
-    return sonde_fail(error, SONDE_ARGUMENT, "%u Newton iterations, expected 1 to 1000",
-                      step->newton_iterations);
+  if (step->newton_iterations < 1 || step->newton_iterations > SONDE_SCENE_MOST_NEWTON)
+    return sonde_fail(error, SONDE_ARGUMENT, "%u Newton iterations, expected 1 to %d",
+                      step->newton_iterations, SONDE_SCENE_MOST_NEWTON);
   if (!(step->newton_residual >= 0) || !(step->substep_tolerance_m >= 0) || !(step->sleep_m >= 0))
     return sonde_fail(error, SONDE_ARGUMENT, "a tolerance is negative");
   if (!(step->solver.relative_residual >= 0) || !(step->solver.absolute_residual >= 0) ||
       step->solver.max_iterations < 1)
     return sonde_fail(error, SONDE_ARGUMENT,
-                      "the solver needs a residual of 0 or more and at "
-                      "least one iteration");
-  if (step->substep_halvings < 1 || step->substep_halvings > 16)
-    return sonde_fail(error, SONDE_ARGUMENT, "%u halvings, expected 1 to 16",
-                      step->substep_halvings);
+                      "the solver needs a residual of 0 or more and at least one iteration");
+  if (step->substep_halvings < 1 || step->substep_halvings > SONDE_SCENE_MOST_HALVINGS)
+    return sonde_fail(error, SONDE_ARGUMENT, "%u halvings, expected 1 to %d",
+                      step->substep_halvings, SONDE_SCENE_MOST_HALVINGS);
   scene->step = *step;
   return SONDE_OK;
 }
@@ -103,20 +97,6 @@ static void read_friction(sonde_reader *reader, sonde_place map, double *mu_stat
     sonde_reader_fail(reader, map, SONDE_ARGUMENT,
                       "friction_kinetic is %g, expected friction_static (%g) or less", *mu_kinetic,
                       most);
-}
-
-static void read_material(sonde_reader *reader, sonde_place at, sonde_material *material) {
-  static const char *const KEYS[] = {
-      "name", "contact_stiffness_n_m3", "contact_damping_s", "friction_static", "friction_kinetic",
-      NULL};
-  *material = PLAIN;
-  sonde_read_keys(reader, at, "a material", KEYS);
-  const char *name = sonde_read_text(reader, at, "name", true);
-  snprintf(material->name, sizeof material->name, "%s", name ? name : "");
-  material->stiffness_n_m3 =
-      sonde_read_real(reader, at, "contact_stiffness_n_m3", 1, 1e15, PLAIN.stiffness_n_m3);
-  material->damping_s = sonde_read_real(reader, at, "contact_damping_s", 0, 1e3, PLAIN.damping_s);
-  read_friction(reader, at, &material->mu_static, &material->mu_kinetic);
 }
 
 // Two foundations in series; friction by the geometric mean.
@@ -156,37 +136,16 @@ static void add_touch(sonde_scene *scene, sonde_touch touch) {
   scene->touches[scene->touch_count++] = touch;
 }
 
-static uint32_t find_body(const sonde_scene *scene, const char *name) {
-  for (uint32_t i = 0; i < scene->body_count; ++i)
-    if (strcmp(scene->bodies[i].name, name) == 0) return i;
-  return UINT32_MAX;
-}
-
 static uint32_t read_end(sonde_reader *reader, sonde_place list, uint32_t index,
                          const sonde_scene *scene) {
   sonde_place at = sonde_read_item(reader, list, index);
   const char *name = sonde_read_text_at(reader, at, "a body's name");
-  uint32_t body = name ? find_body(scene, name) : 0;
+  uint32_t body = name ? sonde_scene_find(scene, name) : 0;
   if (body == UINT32_MAX) {
     sonde_reader_fail(reader, at, SONDE_NOT_FOUND, "no body '%s'", name);
     return 0;
   }
   return body;
-}
-
-// The energy law's stiffness is per volume squared.
-static void read_law(sonde_reader *reader, sonde_place at, sonde_touch *touch) {
-  static const char *const LAWS[] = {"foundation", "volume", "energy", NULL};
-  touch->law = (sonde_touch_law)sonde_read_choice(reader, at, "law", LAWS, SONDE_TOUCH_FOUNDATION);
-  bool energy = touch->law == SONDE_TOUCH_ENERGY;
-  const char *used = energy ? "stiffness_n_m5" : "stiffness_n_m3";
-  const char *other = energy ? "stiffness_n_m3" : "stiffness_n_m5";
-  sonde_place wrong = sonde_read_find(reader, at, other);
-  if (wrong)
-    sonde_reader_fail(reader, wrong, SONDE_FORMAT, "this law takes %s, not %s", used, other);
-  double time = touch->damping / touch->stiffness;
-  touch->stiffness = sonde_read_real(reader, at, used, 1, 1e20, energy ? NAN : touch->stiffness);
-  touch->damping = touch->stiffness * sonde_read_real(reader, at, "damping_s", 0, 1e3, time);
 }
 
 static void read_touch(sonde_reader *reader, sonde_place at, sonde_scene *scene) {
@@ -221,7 +180,18 @@ static void read_touch(sonde_reader *reader, sonde_place at, sonde_scene *scene)
   if (!sonde_reader_good(reader)) return;
   sonde_touch touch = touch_of(scene, a, b);
   if (!plain) {
-    read_law(reader, at, &touch);
+    // The energy law's stiffness is per volume squared.
+    static const char *const LAWS[] = {"foundation", "volume", "energy", NULL};
+    touch.law = (sonde_touch_law)sonde_read_choice(reader, at, "law", LAWS, SONDE_TOUCH_FOUNDATION);
+    bool energy = touch.law == SONDE_TOUCH_ENERGY;
+    const char *used = energy ? "stiffness_n_m5" : "stiffness_n_m3";
+    const char *other = energy ? "stiffness_n_m3" : "stiffness_n_m5";
+    sonde_place wrong = sonde_read_find(reader, at, other);
+    if (wrong)
+      sonde_reader_fail(reader, wrong, SONDE_FORMAT, "this law takes %s, not %s", used, other);
+    double time = touch.damping / touch.stiffness;
+    touch.stiffness = sonde_read_real(reader, at, used, 1, 1e20, energy ? NAN : touch.stiffness);
+    touch.damping = touch.stiffness * sonde_read_real(reader, at, "damping_s", 0, 1e3, time);
     read_friction(reader, at, &touch.mu_static, &touch.mu_kinetic);
     touch.stribeck_m_s = sonde_read_real(reader, at, "stribeck_m_s", 1e-6, 1e3, touch.stribeck_m_s);
     touch.bond_m = 1e-3 * sonde_read_real(reader, at, "bond_mm", 1e-6, 10, touch.bond_m * 1e3);
@@ -243,10 +213,8 @@ static void read_touches(sonde_reader *reader, sonde_place root, sonde_scene *sc
   if (!sonde_reader_good(reader)) return;
   uint32_t most = all ? n * (n - 1) / 2 : listed;
   scene->touches = SONDE_NEW(sonde_touch, most);
-  sonde_error error = {0};
   if (!scene->touches) {
-    sonde_fail_memory(&error);
-    sonde_reader_pass(reader, root, &error);
+    sonde_reader_fail(reader, root, SONDE_MEMORY, "out of memory");
     return;
   }
   for (uint32_t a = 0; all && a < n; ++a)
@@ -257,20 +225,6 @@ static void read_touches(sonde_reader *reader, sonde_place root, sonde_scene *sc
   SONDE_ASSERT(scene->touch_count <= most);
 }
 
-static void check_touching(sonde_reader *reader, const sonde_scene *scene) {
-  for (uint32_t i = 0; i < scene->body_count; ++i) {
-    const sonde_body *body = &scene->bodies[i];
-    bool touches = false;
-    for (uint32_t t = 0; t < scene->touch_count; ++t)
-      touches |= scene->touches[t].a == i || scene->touches[t].b == i;
-    sonde_error error = {0};
-    if (!touches || sonde_body_is_rigid(body) || !sonde_reader_good(reader)) continue;
-    if (sonde_mesh_check_solid(&body->surface, &error))
-      sonde_reader_fail(reader, body->place, error.status, "'%s' may touch others: %.300s",
-                        body->name, error.message);
-  }
-}
-
 static void read_bodies(const sonde_scene_source *source, sonde_place root, sonde_scene *scene) {
   sonde_reader *reader = source->reader;
   sonde_place list = sonde_read_find(reader, root, "bodies");
@@ -278,10 +232,8 @@ static void read_bodies(const sonde_scene_source *source, sonde_place root, sond
   if (!count) sonde_reader_fail(reader, root, SONDE_FORMAT, "bodies is missing or empty");
   if (!sonde_reader_good(reader)) return;
   scene->bodies = SONDE_NEW(sonde_body, count);
-  sonde_error error = {0};
   if (!scene->bodies) {
-    sonde_fail_memory(&error);
-    sonde_reader_pass(reader, root, &error);
+    sonde_reader_fail(reader, root, SONDE_MEMORY, "out of memory");
     return;
   }
   for (uint32_t i = 0; i < count && sonde_reader_good(reader); ++i) {
@@ -289,24 +241,36 @@ static void read_bodies(const sonde_scene_source *source, sonde_place root, sond
     body->material = PLAIN;
     sonde_place at = sonde_read_item(reader, list, i);
     sonde_read_body(source, at, scene, body);
-    if (find_body(scene, body->name) != UINT32_MAX)
+    if (sonde_scene_find(scene, body->name) != UINT32_MAX)
       sonde_reader_fail(reader, at, SONDE_FORMAT, "two bodies are named '%s'", body->name);
     scene->body_count++;
   }
 }
 
+// Contact and friction of the bodies' skins.
 static void read_materials(sonde_reader *reader, sonde_place root, sonde_scene *scene) {
+  static const char *const KEYS[] = {
+      "name", "contact_stiffness_n_m3", "contact_damping_s", "friction_static", "friction_kinetic",
+      NULL};
   sonde_place list = sonde_read_find(reader, root, "materials");
   uint32_t count = sonde_read_count(reader, list);
   scene->materials = SONDE_NEW(sonde_material, count);
-  sonde_error error = {0};
   if (!scene->materials) {
-    sonde_fail_memory(&error);
-    sonde_reader_pass(reader, root, &error);
+    sonde_reader_fail(reader, root, SONDE_MEMORY, "out of memory");
     return;
   }
-  for (uint32_t i = 0; i < count; ++i)
-    read_material(reader, sonde_read_item(reader, list, i), &scene->materials[i]);
+  for (uint32_t i = 0; i < count; ++i) {
+    sonde_place at = sonde_read_item(reader, list, i);
+    sonde_material *material = &scene->materials[i];
+    *material = PLAIN;
+    sonde_read_keys(reader, at, "a material", KEYS);
+    const char *name = sonde_read_text(reader, at, "name", true);
+    snprintf(material->name, sizeof material->name, "%s", name ? name : "");
+    material->stiffness_n_m3 =
+        sonde_read_real(reader, at, "contact_stiffness_n_m3", 1, 1e15, PLAIN.stiffness_n_m3);
+    material->damping_s = sonde_read_real(reader, at, "contact_damping_s", 0, 1e3, PLAIN.damping_s);
+    read_friction(reader, at, &material->mu_static, &material->mu_kinetic);
+  }
   scene->material_count = count;
 }
 
@@ -335,18 +299,6 @@ static sonde_status number_slots(sonde_scene *scene, sonde_error *error) {
   return SONDE_OK;
 }
 
-static uint64_t hash_scene(const sonde_scene *scene, const char *text) {
-  uint64_t hash = sonde_hash(0, text, strlen(text));
-  for (uint32_t i = 0; i < scene->body_count; ++i) {
-    const sonde_body *b = &scene->bodies[i];
-    hash = sonde_hash(hash, b->surface.vertices, b->surface.vertex_count * sizeof(sonde_vec3));
-    hash = sonde_hash(hash, b->surface.faces, b->surface.face_count * sizeof *b->surface.faces);
-    hash = sonde_hash(hash, b->node, b->node_count * sizeof *b->node);
-    if (b->model) hash = sonde_hash(hash, &b->model->checksum, sizeof b->model->checksum);
-  }
-  return hash;
-}
-
 static void read_scene(const sonde_scene_source *source, sonde_scene *scene) {
   static const char *const KEYS[] = {"sonde_scene", "title",  "gravity_m_s2", "duration_s", "step",
                                      "materials",   "bodies", "contacts",     NULL};
@@ -360,12 +312,23 @@ static void read_scene(const sonde_scene_source *source, sonde_scene *scene) {
   const char *title = sonde_read_text(reader, root, "title", false);
   snprintf(scene->title, sizeof scene->title, "%s", title ? title : "");
   scene->gravity_m_s2 = sonde_read_vector(reader, root, "gravity_m_s2", 1e3, vec3(0, 0, 0));
-  scene->duration_s = sonde_read_real(reader, root, "duration_s", 0, 1e6, 1);
+  scene->duration_s = sonde_read_real(reader, root, "duration_s", 0, SONDE_SCENE_LONGEST_S, 1);
   read_step(reader, sonde_read_find(reader, root, "step"), scene);
   read_materials(reader, root, scene);
   read_bodies(source, root, scene);
   if (sonde_reader_good(reader)) read_touches(reader, root, scene);
-  check_touching(reader, scene);
+  // Bodies that may touch have to bound a solid.
+  for (uint32_t i = 0; i < scene->body_count; ++i) {
+    const sonde_body *body = &scene->bodies[i];
+    bool touches = false;
+    for (uint32_t t = 0; t < scene->touch_count; ++t)
+      touches |= scene->touches[t].a == i || scene->touches[t].b == i;
+    sonde_error error = {0};
+    if (!touches || sonde_body_is_rigid(body) || !sonde_reader_good(reader)) continue;
+    if (sonde_mesh_check_solid(&body->surface, &error))
+      sonde_reader_fail(reader, body->place, error.status, "'%s' may touch others: %.300s",
+                        body->name, error.message);
+  }
 }
 
 sonde_status sonde_scene_parse(const char *text, const char *name, const char *thigh,
@@ -385,7 +348,16 @@ sonde_status sonde_scene_parse(const char *text, const char *name, const char *t
     read_scene(&source, scene);
     status = sonde_reader_status(source.reader, error);
     if (!status) status = number_slots(scene, error);
-    if (!status) scene->checksum = hash_scene(scene, text);
+    // The checksum covers the text and all geometry that other files hold.
+    uint64_t hash = sonde_hash(0, text, strlen(text));
+    for (uint32_t i = 0; i < scene->body_count && !status; ++i) {
+      const sonde_body *b = &scene->bodies[i];
+      hash = sonde_hash(hash, b->surface.vertices, b->surface.vertex_count * sizeof(sonde_vec3));
+      hash = sonde_hash(hash, b->surface.faces, b->surface.face_count * sizeof *b->surface.faces);
+      hash = sonde_hash(hash, b->node, b->node_count * sizeof *b->node);
+      if (b->model) hash = sonde_hash(hash, &b->model->checksum, sizeof b->model->checksum);
+    }
+    scene->checksum = hash;
   } else
     status = sonde_fail_memory(error);
   sonde_reader_destroy(source.reader);

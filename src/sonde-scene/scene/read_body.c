@@ -1,20 +1,10 @@
 // One body of a scene file.
-// read_box:       two corners of a box.
-// read_solid:     a shape's only key and what it holds.
-// read_pose:      position and rotation.
-// read_path:      poses with times of a driven body.
-// read_rigid:     mass, centre, inertia from the closed mesh; the surface moves to the centre.
-// read_two_layer: the model file, moved to its place.
-// place:          moves a deformable body's nodes to its place and gives them its velocity.
-// hold, load:     nodes inside boxes are held or loaded.
 #include "scene/scene.h"
 
 #include "base/base.h"
 #include "base/maths.h"
 
 #include <string.h>
-
-static const double FAR_MM = 1e5;
 
 void sonde_source_path(const sonde_scene_source *source, const char *name, char *path,
                        size_t size) {
@@ -23,65 +13,35 @@ void sonde_source_path(const sonde_scene_source *source, const char *name, char 
   snprintf(path, size, "%s%s", rooted ? "" : source->directory, name);
 }
 
-static void read_mesh_file(const sonde_scene_source *source, sonde_place at, sonde_mesh *mesh) {
-  static const char *const KEYS[] = {"file", "unit_mm", NULL};
-  sonde_reader *reader = source->reader;
-  sonde_read_keys(reader, at, "mesh", KEYS);
-  const char *file = sonde_read_text(reader, at, "file", true);
-  double unit_mm = sonde_read_real(reader, at, "unit_mm", 1e-6, 1e6, 1);
-  if (!sonde_reader_good(reader)) return;
-  char path[1024];
-  sonde_error error = {0};
-  sonde_source_path(source, file, path, sizeof path);
-  if (sonde_mesh_load(path, unit_mm * 1e-3, mesh, &error)) sonde_reader_pass(reader, at, &error);
-}
-
-static void read_probe(const sonde_scene_source *source, sonde_place at, sonde_mesh *mesh) {
-  const char *name = sonde_read_text_at(source->reader, at, "probe");
-  if (!name) return;
-  sonde_probe probe = {0};
-  sonde_error error = {0};
-  char path[1024];
-  bool is_file = strchr(name, '.') != NULL;
-  if (is_file) sonde_source_path(source, name, path, sizeof path);
-  sonde_status status = sonde_probe_create(is_file ? path : name, &probe, &error);
-  if (!status) status = sonde_mesh_copy(&probe.body.hull, mesh, &error);
-  if (status) sonde_reader_pass(source->reader, at, &error);
-  sonde_probe_clear(&probe);
-}
-
 static sonde_vec3 positive_size(sonde_reader *reader, sonde_place at, const char *what) {
-  sonde_vec3 size = sonde_read_vector_at(reader, at, what, FAR_MM);
+  sonde_vec3 size = sonde_read_vector_at(reader, at, what, SONDE_SCENE_FAR_MM);
   if (!(size.x > 0 && size.y > 0 && size.z > 0))
     sonde_reader_fail(reader, at, SONDE_ARGUMENT, "%s must be three numbers above 0", what);
   return v_scale(size, 1e-3);
 }
 
-// The primitives; false for another key.
-static bool read_primitive(sonde_reader *reader, const char *key, sonde_place value, double edge_m,
+static void read_primitive(sonde_reader *reader, const char *key, sonde_place value, double edge_m,
                            sonde_mesh *mesh, sonde_error *error) {
   static const char *const CYLINDER[] = {"radius", "length", NULL};
   if (strcmp(key, "box_mm") == 0 || strcmp(key, "slab_mm") == 0) {
     sonde_vec3 size = positive_size(reader, value, key);
-    if (!sonde_reader_good(reader)) return true;
+    if (!sonde_reader_good(reader)) return;
     sonde_shape_box(size, edge_m, mesh, error);
     bool slab = key[0] == 's'; // its top lies at z = 0
     for (uint32_t i = 0; slab && i < mesh->vertex_count; ++i) mesh->vertices[i].z -= 0.5 * size.z;
   } else if (strcmp(key, "sphere_mm") == 0) {
-    double radius = 1e-3 * sonde_read_real_at(reader, value, key, 1e-3, FAR_MM);
+    double radius = 1e-3 * sonde_read_real_at(reader, value, key, 1e-3, SONDE_SCENE_FAR_MM);
     if (sonde_reader_good(reader))
       sonde_shape_ellipsoid(vec3(radius, radius, radius), edge_m, mesh, error);
   } else if (strcmp(key, "ellipsoid_mm") == 0) {
     sonde_vec3 radii = positive_size(reader, value, key);
     if (sonde_reader_good(reader)) sonde_shape_ellipsoid(radii, edge_m, mesh, error);
-  } else if (strcmp(key, "cylinder_mm") == 0) {
+  } else {
     sonde_read_keys(reader, value, key, CYLINDER);
-    double radius = 1e-3 * sonde_read_real(reader, value, "radius", 1e-3, FAR_MM, NAN);
-    double length = 1e-3 * sonde_read_real(reader, value, "length", 1e-3, FAR_MM, NAN);
+    double radius = 1e-3 * sonde_read_real(reader, value, "radius", 1e-3, SONDE_SCENE_FAR_MM, NAN);
+    double length = 1e-3 * sonde_read_real(reader, value, "length", 1e-3, SONDE_SCENE_FAR_MM, NAN);
     if (sonde_reader_good(reader)) sonde_shape_cylinder(radius, length, edge_m, mesh, error);
-  } else
-    return false;
-  return true;
+  }
 }
 
 void sonde_read_shape(const sonde_scene_source *source, sonde_place at, sonde_mesh *mesh) {
@@ -89,8 +49,9 @@ void sonde_read_shape(const sonde_scene_source *source, sonde_place at, sonde_me
   static const char *const KEYS[] = {"box_mm",       "slab_mm",     "sphere_mm",
                                      "ellipsoid_mm", "cylinder_mm", "mesh",
                                      "probe",        "edge_mm",     NULL};
+  static const char *const MESH_KEYS[] = {"file", "unit_mm", NULL};
   sonde_read_keys(reader, at, "shape", KEYS);
-  double edge_m = 1e-3 * sonde_read_real(reader, at, "edge_mm", 0, FAR_MM, 0);
+  double edge_m = 1e-3 * sonde_read_real(reader, at, "edge_mm", 0, SONDE_SCENE_FAR_MM, 0);
   const char *found = NULL;
   for (int k = 0; k < 7 && sonde_reader_good(reader); ++k)
     if (sonde_read_find(reader, at, KEYS[k])) {
@@ -102,36 +63,47 @@ void sonde_read_shape(const sonde_scene_source *source, sonde_place at, sonde_me
   if (!sonde_reader_good(reader)) return;
   sonde_place value = sonde_read_find(reader, at, found);
   sonde_error error = {0};
-  if (strcmp(found, "mesh") == 0)
-    read_mesh_file(source, value, mesh);
-  else if (strcmp(found, "probe") == 0)
-    read_probe(source, value, mesh);
-  else
+  char path[1024];
+  if (strcmp(found, "mesh") == 0) {
+    sonde_read_keys(reader, value, "mesh", MESH_KEYS);
+    const char *file = sonde_read_text(reader, value, "file", true);
+    double unit_mm = sonde_read_real(reader, value, "unit_mm", 1e-6, 1e6, 1);
+    if (!sonde_reader_good(reader)) return;
+    sonde_source_path(source, file, path, sizeof path);
+    sonde_mesh_load(path, unit_mm * 1e-3, mesh, &error);
+  } else if (strcmp(found, "probe") == 0) {
+    const char *name = sonde_read_text_at(reader, value, "probe");
+    if (!name) return;
+    sonde_probe probe = {0};
+    bool is_file = strchr(name, '.') != NULL;
+    if (is_file) sonde_source_path(source, name, path, sizeof path);
+    if (!sonde_probe_create(is_file ? path : name, &probe, &error))
+      sonde_mesh_copy(&probe.body.hull, mesh, &error);
+    sonde_probe_clear(&probe);
+  } else
     read_primitive(reader, found, value, edge_m, mesh, &error);
   if (error.status) sonde_reader_pass(reader, value, &error);
   if (sonde_reader_good(reader) && sonde_mesh_check_areas(mesh, &error))
     sonde_reader_pass(reader, value, &error);
 }
 
-// rotation: {axis: [x, y, z], angle_deg: a}
-static sonde_quat read_rotation(sonde_reader *reader, sonde_place map) {
+// A pose is position_mm: [x, y, z] and rotation: {axis: [x, y, z], angle_deg: a}.
+static sonde_pose read_pose(sonde_reader *reader, sonde_place map) {
   static const char *const KEYS[] = {"axis", "angle_deg", NULL};
+  sonde_vec3 position = v_scale(
+      sonde_read_vector(reader, map, "position_mm", SONDE_SCENE_FAR_MM, vec3(0, 0, 0)), 1e-3);
   sonde_place at = sonde_read_find(reader, map, "rotation");
-  if (!at) return quat_identity();
+  if (!at) return (sonde_pose){position, quat_identity()};
   sonde_read_keys(reader, at, "rotation", KEYS);
   sonde_vec3 axis = sonde_read_vector(reader, at, "axis", 1e6, vec3(0, 0, 0));
   double half = sonde_read_real(reader, at, "angle_deg", -3600, 3600, NAN) * SONDE_PI / 360;
   if (!(v_norm(axis) > 0))
     sonde_reader_fail(reader, at, SONDE_ARGUMENT, "axis is missing or has no length");
   axis = v_scale(v_unit(axis, vec3(0, 0, 1)), sin(half));
-  return (sonde_quat){cos(half), axis.x, axis.y, axis.z};
+  return (sonde_pose){position, {cos(half), axis.x, axis.y, axis.z}};
 }
 
-static sonde_pose read_pose(sonde_reader *reader, sonde_place map) {
-  sonde_vec3 position = sonde_read_vector(reader, map, "position_mm", FAR_MM, vec3(0, 0, 0));
-  return (sonde_pose){v_scale(position, 1e-3), read_rotation(reader, map)};
-}
-
+// Poses with times of a driven body.
 static void read_path(sonde_reader *reader, sonde_place at, sonde_body *body) {
   static const char *const KEYS[] = {"time_s", "position_mm", "rotation", NULL};
   sonde_place list = sonde_read_find(reader, at, "path");
@@ -141,17 +113,15 @@ static void read_path(sonde_reader *reader, sonde_place at, sonde_body *body) {
   if (!sonde_reader_good(reader)) return;
   body->path.time_s = SONDE_NEW(double, count);
   body->path.pose = SONDE_NEW(sonde_pose, count);
-  sonde_error error = {0};
   if (!body->path.time_s || !body->path.pose) {
-    sonde_fail_memory(&error);
-    sonde_reader_pass(reader, list, &error);
+    sonde_reader_fail(reader, list, SONDE_MEMORY, "out of memory");
     return;
   }
   body->path.count = count;
   for (uint32_t i = 0; i < count; ++i) {
     sonde_place entry = sonde_read_item(reader, list, i);
     sonde_read_keys(reader, entry, "path", KEYS);
-    body->path.time_s[i] = sonde_read_real(reader, entry, "time_s", 0, 1e6, NAN);
+    body->path.time_s[i] = sonde_read_real(reader, entry, "time_s", 0, SONDE_SCENE_LONGEST_S, NAN);
     body->path.pose[i] = read_pose(reader, entry);
     if (i && !(body->path.time_s[i] > body->path.time_s[i - 1]))
       sonde_reader_fail(reader, entry, SONDE_ARGUMENT, "time_s must grow along the path");
@@ -221,7 +191,58 @@ static void read_two_layer(const sonde_scene_source *source, sonde_place at, son
   memcpy(body->node_mass_kg, body->model->mass_kg, nodes * sizeof *body->node_mass_kg);
 }
 
-static void place(sonde_reader *reader, sonde_place at, sonde_body *body) {
+typedef struct box {
+  sonde_vec3 low, high;
+  uint32_t nodes; // of the body in it
+} box;
+
+// Boxes reach 1e-9 m further, so that a face of a body can be named by its own coordinate.
+static bool is_within(const box *b, sonde_vec3 p) {
+  const double grow = 1e-9;
+  return p.x >= b->low.x - grow && p.y >= b->low.y - grow && p.z >= b->low.z - grow &&
+         p.x <= b->high.x + grow && p.y <= b->high.y + grow && p.z <= b->high.z + grow;
+}
+
+// A box that holds nodes of the body, by its lower and its upper corner.
+static box read_box(sonde_reader *reader, sonde_place at, const sonde_body *body) {
+  box found = {{0, 0, 0}, {0, 0, 0}, 0};
+  if (sonde_read_count(reader, at) != 2) {
+    sonde_reader_fail(reader, at, SONDE_FORMAT, "a box must be two corners [[x,y,z], [x,y,z]]");
+    return found;
+  }
+  sonde_vec3 corner[2];
+  for (uint32_t k = 0; k < 2; ++k)
+    corner[k] = sonde_read_vector_at(reader, sonde_read_item(reader, at, k), "a corner",
+                                     SONDE_SCENE_FAR_MM);
+  sonde_vec3 a = corner[0], b = corner[1];
+  if (!(a.x <= b.x && a.y <= b.y && a.z <= b.z))
+    sonde_reader_fail(reader, at, SONDE_ARGUMENT,
+                      "the first corner of a box must be the lower one");
+  found.low = v_scale(a, 1e-3);
+  found.high = v_scale(b, 1e-3);
+  for (uint32_t i = 0; i < body->node_count; ++i) found.nodes += is_within(&found, body->node[i]);
+  if (!found.nodes) sonde_reader_fail(reader, at, SONDE_ARGUMENT, "the box holds no node");
+  return found;
+}
+
+static void read_deformable(const sonde_scene_source *source, sonde_place at, sonde_body *body) {
+  static const char *const LOAD_KEYS[] = {"box_mm", "force_n", NULL};
+  sonde_reader *reader = source->reader;
+  sonde_place lattice = sonde_read_find(reader, at, "lattice");
+  if (body->motion == SONDE_BODY_DRIVEN)
+    sonde_reader_fail(reader, at, SONDE_FORMAT, "only a rigid body can be driven");
+  if (body->kind == SONDE_BODY_TWO_LAYER)
+    read_two_layer(source, at, body);
+  else if (body->kind == SONDE_BODY_LATTICE)
+    sonde_read_lattice(source, at, body);
+  else {
+    sonde_read_shape(source, sonde_read_find(reader, at, "shape"), &body->surface);
+    if (sonde_reader_good(reader)) sonde_read_springs(source, at, body);
+  }
+  if (lattice && body->kind != SONDE_BODY_LATTICE)
+    sonde_reader_fail(reader, lattice, SONDE_FORMAT, "lattice belongs to a body of kind lattice");
+  if (!sonde_reader_good(reader)) return;
+  // The body moves to its place.
   for (uint32_t i = 0; i < body->node_count; ++i)
     body->node[i] = pose_apply(body->start, body->node[i]);
   for (uint32_t i = 0; i < body->surface.vertex_count; ++i)
@@ -242,97 +263,25 @@ static void place(sonde_reader *reader, sonde_place at, sonde_body *body) {
   if (sonde_mesh_inspect(&body->surface, &report, &error)) sonde_reader_pass(reader, at, &error);
   body->closed = report.closed && report.outward;
   body->rest_volume_m3 = report.volume_m3;
-}
-
-typedef struct box {
-  sonde_vec3 low, high;
-} box;
-
-static box read_box(sonde_reader *reader, sonde_place at) {
-  if (sonde_read_count(reader, at) != 2) {
-    sonde_reader_fail(reader, at, SONDE_FORMAT, "a box must be two corners [[x,y,z], [x,y,z]]");
-    return (box){{0, 0, 0}, {0, 0, 0}};
-  }
-  sonde_vec3 a = sonde_read_vector_at(reader, sonde_read_item(reader, at, 0), "a corner", FAR_MM);
-  sonde_vec3 b = sonde_read_vector_at(reader, sonde_read_item(reader, at, 1), "a corner", FAR_MM);
-  if (!(a.x <= b.x && a.y <= b.y && a.z <= b.z))
-    sonde_reader_fail(reader, at, SONDE_ARGUMENT,
-                      "the first corner of a box must be the lower one");
-  return (box){v_scale(a, 1e-3), v_scale(b, 1e-3)};
-}
-
-// Boxes reach 1e-9 m further, so that a face of a body can be named by its own coordinate.
-static bool is_within(box b, sonde_vec3 p) {
-  const double grow = 1e-9;
-  return p.x >= b.low.x - grow && p.y >= b.low.y - grow && p.z >= b.low.z - grow &&
-         p.x <= b.high.x + grow && p.y <= b.high.y + grow && p.z <= b.high.z + grow;
-}
-
-static void hold_nodes(sonde_reader *reader, sonde_place at, sonde_body *body) {
-  sonde_place list = sonde_read_find(reader, at, "held_mm");
-  for (uint32_t k = 0, count = sonde_read_count(reader, list); k < count; ++k) {
-    sonde_place entry = sonde_read_item(reader, list, k);
-    box b = read_box(reader, entry);
-    uint32_t inside = 0;
-    for (uint32_t i = 0; i < body->node_count; ++i)
-      if (is_within(b, body->node[i])) body->held[i] = 1, ++inside;
-    if (!inside) sonde_reader_fail(reader, entry, SONDE_ARGUMENT, "the box holds no node");
-  }
-  for (uint32_t i = 0; body->motion == SONDE_BODY_FIXED && i < body->node_count; ++i)
-    body->held[i] = 1;
-}
-
-static void load_nodes(sonde_reader *reader, sonde_place at, sonde_body *body) {
-  static const char *const KEYS[] = {"box_mm", "force_n", NULL};
-  sonde_place list = sonde_read_find(reader, at, "loads");
-  for (uint32_t k = 0, count = sonde_read_count(reader, list); k < count; ++k) {
-    sonde_place entry = sonde_read_item(reader, list, k);
-    sonde_read_keys(reader, entry, "loads", KEYS);
-    box b = read_box(reader, sonde_read_find(reader, entry, "box_mm"));
-    sonde_vec3 force = sonde_read_vector(reader, entry, "force_n", 1e9, vec3(0, 0, 0));
-    uint32_t inside = 0;
-    for (uint32_t i = 0; i < body->node_count; ++i) inside += is_within(b, body->node[i]);
-    if (!inside) sonde_reader_fail(reader, entry, SONDE_ARGUMENT, "the box holds no node");
-    for (uint32_t i = 0; inside && i < body->node_count; ++i)
-      if (is_within(b, body->node[i]))
-        body->load_n[i] = v_madd(body->load_n[i], 1.0 / inside, force);
-  }
-}
-
-static void read_deformable(const sonde_scene_source *source, sonde_place at, sonde_body *body) {
-  sonde_reader *reader = source->reader;
-  sonde_place lattice = sonde_read_find(reader, at, "lattice");
-  if (body->motion == SONDE_BODY_DRIVEN)
-    sonde_reader_fail(reader, at, SONDE_FORMAT, "only a rigid body can be driven");
-  if (body->kind == SONDE_BODY_TWO_LAYER)
-    read_two_layer(source, at, body);
-  else if (body->kind == SONDE_BODY_LATTICE)
-    sonde_read_lattice(source, at, body);
-  else {
-    sonde_read_shape(source, sonde_read_find(reader, at, "shape"), &body->surface);
-    if (sonde_reader_good(reader)) sonde_read_springs(source, at, body);
-  }
-  if (lattice && body->kind != SONDE_BODY_LATTICE)
-    sonde_reader_fail(reader, lattice, SONDE_FORMAT, "lattice belongs to a body of kind lattice");
-  if (!sonde_reader_good(reader)) return;
-  place(reader, at, body);
   if (body->bulk_n_m5 > 0 && !body->closed)
     sonde_reader_fail(reader, at, SONDE_MESH, "bulk_n_m5 needs a closed mesh");
-  hold_nodes(reader, at, body);
-  load_nodes(reader, at, body);
-}
-
-static void find_material(sonde_reader *reader, sonde_place at, const sonde_scene *scene,
-                          sonde_body *body) {
-  const char *name = sonde_read_text(reader, at, "material", false);
-  if (!name) return;
-  for (uint32_t i = 0; i < scene->material_count; ++i)
-    if (strcmp(scene->materials[i].name, name) == 0) {
-      body->material = scene->materials[i];
-      return;
-    }
-  sonde_reader_fail(reader, sonde_read_find(reader, at, "material"), SONDE_NOT_FOUND,
-                    "no material '%s'", name);
+  sonde_place held = sonde_read_find(reader, at, "held_mm");
+  for (uint32_t k = 0, count = sonde_read_count(reader, held); k < count; ++k) {
+    sonde_place entry = sonde_read_item(reader, held, k);
+    box b = read_box(reader, entry, body);
+    for (uint32_t i = 0; i < body->node_count; ++i) body->held[i] |= is_within(&b, body->node[i]);
+  }
+  if (body->motion == SONDE_BODY_FIXED) memset(body->held, 1, body->node_count);
+  sonde_place loads = sonde_read_find(reader, at, "loads");
+  for (uint32_t k = 0, count = sonde_read_count(reader, loads); k < count; ++k) {
+    sonde_place entry = sonde_read_item(reader, loads, k);
+    sonde_read_keys(reader, entry, "loads", LOAD_KEYS);
+    box b = read_box(reader, sonde_read_find(reader, entry, "box_mm"), body);
+    sonde_vec3 force = sonde_read_vector(reader, entry, "force_n", 1e9, vec3(0, 0, 0));
+    for (uint32_t i = 0; b.nodes && i < body->node_count; ++i)
+      if (is_within(&b, body->node[i]))
+        body->load_n[i] = v_madd(body->load_n[i], 1.0 / b.nodes, force);
+  }
 }
 
 void sonde_read_body(const sonde_scene_source *source, sonde_place at, const sonde_scene *scene,
@@ -360,9 +309,19 @@ void sonde_read_body(const sonde_scene_source *source, sonde_place at, const son
   body->motion =
       (sonde_body_motion)sonde_read_choice(reader, at, "motion", MOTIONS, SONDE_BODY_FREE);
   body->start = read_pose(reader, at);
-  body->velocity_m_s = sonde_read_vector(reader, at, "velocity_m_s", 1e4, vec3(0, 0, 0));
-  body->spin_rad_s = sonde_read_vector(reader, at, "spin_rad_s", 1e4, vec3(0, 0, 0));
-  find_material(reader, at, scene, body);
+  body->velocity_m_s =
+      sonde_read_vector(reader, at, "velocity_m_s", SONDE_SCENE_FASTEST, vec3(0, 0, 0));
+  body->spin_rad_s =
+      sonde_read_vector(reader, at, "spin_rad_s", SONDE_SCENE_FASTEST, vec3(0, 0, 0));
+  const char *material = sonde_read_text(reader, at, "material", false);
+  for (uint32_t i = 0; i < scene->material_count && material; ++i)
+    if (strcmp(scene->materials[i].name, material) == 0) {
+      body->material = scene->materials[i];
+      material = NULL;
+    }
+  if (material)
+    sonde_reader_fail(reader, sonde_read_find(reader, at, "material"), SONDE_NOT_FOUND,
+                      "no material '%s'", material);
   if (body->motion == SONDE_BODY_DRIVEN) read_path(reader, at, body);
   if (!sonde_reader_good(reader)) return;
   if (sonde_body_is_rigid(body))

@@ -1,10 +1,4 @@
 // Motion of rigid bodies and the points at which a step evaluates forces (docs/scene.md).
-// quat_turn:     exponential map.
-// spin_of:       velocity and spin that carry one pose to another in a time.
-// drive:         slots of a driven body over the step.
-// rigid_turn:    fixed point for the spin whose angular momentum is given at the orientation
-// reached. stage_rigid:   position, rotation and velocities of a rigid body at a stage.
-// finish_rigid:  the same at the end of the step.
 //
 // The unknown of a free rigid body's second slot is the change of angular momentum, as I dw with
 // the inertia I at the start of the step. Gyroscopic terms never appear: the momentum is carried
@@ -26,6 +20,15 @@ sonde_mat3 sonde_inertia_world(sonde_mat3 inertia, sonde_quat rotation) {
   return m_mul(m_mul(r, inertia), m_transpose(r));
 }
 
+// Spin that turns one orientation into another in a time, the shorter way.
+static sonde_vec3 spin_between(sonde_quat from, sonde_quat to, double time_s) {
+  sonde_quat turn = q_mul(to, q_conj(from));
+  double sign = turn.w < 0 ? -1 : 1;
+  sonde_vec3 axis = vec3(sign * turn.x, sign * turn.y, sign * turn.z);
+  double angle = 2 * atan2(v_norm(axis), sign * turn.w);
+  return v_scale(v_unit(axis, vec3(0, 0, 1)), angle / time_s);
+}
+
 // Pose of a body's frame along its path; between two poses straight and at constant spin.
 sonde_pose sonde_path_pose(const sonde_path *path, double time_s) {
   SONDE_ASSERT(path->count > 0);
@@ -35,11 +38,7 @@ sonde_pose sonde_path_pose(const sonde_path *path, double time_s) {
   while (path->time_s[i + 1] <= time_s) ++i;
   double span = path->time_s[i + 1] - path->time_s[i], t = (time_s - path->time_s[i]) / span;
   sonde_quat q = path->pose[i].rotation;
-  sonde_quat turn = q_mul(path->pose[i + 1].rotation, q_conj(q));
-  double sign = turn.w < 0 ? -1 : 1;
-  sonde_vec3 axis = vec3(sign * turn.x, sign * turn.y, sign * turn.z);
-  double angle = 2 * atan2(v_norm(axis), sign * turn.w);
-  sonde_vec3 spin = v_scale(v_unit(axis, vec3(0, 0, 1)), angle);
+  sonde_vec3 spin = spin_between(q, path->pose[i + 1].rotation, 1);
   return (sonde_pose){v_lerp(path->pose[i].position, path->pose[i + 1].position, t),
                       sonde_quat_turn(q, spin, t)};
 }
@@ -51,26 +50,19 @@ static sonde_pose centre_pose(const sonde_body *body, double time_s) {
   return (sonde_pose){pose_apply(pose, body->mass.centre_m), pose.rotation};
 }
 
-static void drive(sonde_scene_state *state, uint32_t b, double h) {
-  SONDE_ASSERT(h > 0 && state->scene->bodies[b].path.count > 0);
-  const sonde_body *body = &state->scene->bodies[b];
-  double t = state->now.head->time_s;
-  sonde_pose to = centre_pose(body, t + h);
-  sonde_vec3 from = state->now.position[body->first_slot];
-  state->now.velocity[body->first_slot] = v_scale(v_sub(to.position, from), 1 / h);
-  sonde_quat turn = q_mul(to.rotation, q_conj(state->now.rotation[b]));
-  double sign = turn.w < 0 ? -1 : 1;
-  sonde_vec3 axis = vec3(sign * turn.x, sign * turn.y, sign * turn.z);
-  double angle = 2 * atan2(v_norm(axis), sign * turn.w);
-  state->now.velocity[body->first_slot + 1] = v_scale(v_unit(axis, vec3(0, 0, 1)), angle / h);
-}
-
 void sonde_rigid_begin(sonde_scene_state *state, double h) {
   SONDE_ASSERT(h > 0);
   for (uint32_t b = 0; b < state->scene->body_count; ++b) {
     const sonde_body *body = &state->scene->bodies[b];
     if (!sonde_body_is_rigid(body)) continue;
-    if (body->motion == SONDE_BODY_DRIVEN) drive(state, b, h);
+    if (body->motion == SONDE_BODY_DRIVEN) {
+      // A driven body's velocity and spin are those that bring it to its path's pose in time h.
+      SONDE_ASSERT(body->path.count > 0);
+      sonde_vec3 *velocity = &state->now.velocity[body->first_slot];
+      sonde_pose to = centre_pose(body, state->now.head->time_s + h);
+      velocity[0] = v_scale(v_sub(to.position, state->now.position[body->first_slot]), 1 / h);
+      velocity[1] = spin_between(state->now.rotation[b], to.rotation, h);
+    }
     sonde_mat3 inertia = sonde_inertia_world(body->mass.inertia_kg_m2, state->now.rotation[b]);
     state->inertia[b].start = inertia;
     state->inertia[b].angular = m_mul_v(inertia, state->now.velocity[body->first_slot + 1]);
@@ -114,20 +106,6 @@ static sonde_vec3 angular_at(const sonde_scene_state *state, uint32_t b, sonde_v
   return v_madd(state->inertia[b].angular, share, m_mul_v(state->inertia[b].start, dw));
 }
 
-static void stage_rotation(sonde_scene_state *state, uint32_t b, const sonde_vec3 *dv, double h) {
-  const sonde_body *body = &state->scene->bodies[b];
-  uint32_t spin = body->first_slot + 1;
-  double lambda = state->scene->step.lambda;
-  sonde_quat from = state->now.rotation[b];
-  state->stage_position[spin] = vec3(0, 0, 0);
-  if (body->motion == SONDE_BODY_FREE)
-    state->stage_rotation[b] =
-        sonde_rigid_turn(state, b, from, angular_at(state, b, dv[spin], lambda), lambda * h,
-                         &state->stage_velocity[spin]);
-  else
-    state->stage_rotation[b] = sonde_quat_turn(from, state->now.velocity[spin], lambda * h);
-}
-
 void sonde_stage_at(sonde_scene_state *state, const sonde_vec3 *dv, double h) {
   double lambda = state->scene->step.lambda;
   SONDE_ASSERT(lambda >= 0 && lambda <= 1);
@@ -136,22 +114,19 @@ void sonde_stage_at(sonde_scene_state *state, const sonde_vec3 *dv, double h) {
     state->stage_velocity[i] = v;
     state->stage_position[i] = v_madd(state->now.position[i], lambda * h, v);
   }
-  for (uint32_t b = 0; b < state->scene->body_count; ++b)
-    if (sonde_body_is_rigid(&state->scene->bodies[b])) stage_rotation(state, b, dv, h);
-}
-
-// x1 = x0 + h w with w the spin at the stage (for a symplectic step at the end).
-static void finish_rotation(sonde_scene_state *state, uint32_t b, const sonde_vec3 *dv, double h) {
-  const sonde_body *body = &state->scene->bodies[b];
-  uint32_t spin = body->first_slot + 1;
-  const sonde_scene_step *step = &state->scene->step;
-  sonde_quat from = state->now.rotation[b];
-  sonde_vec3 w, end = angular_at(state, b, dv[spin], 1);
-  double lambda = step->symplectic ? 1 : step->lambda;
-  sonde_rigid_turn(state, b, from, angular_at(state, b, dv[spin], lambda), lambda * h, &w);
-  state->now.rotation[b] = sonde_quat_turn(from, w, h);
-  state->now.velocity[spin] = spin_at(state, b, state->now.rotation[b], end);
-  state->now.position[spin] = vec3(0, 0, 0);
+  for (uint32_t b = 0; b < state->scene->body_count; ++b) {
+    const sonde_body *body = &state->scene->bodies[b];
+    if (!sonde_body_is_rigid(body)) continue;
+    uint32_t spin = body->first_slot + 1;
+    sonde_quat from = state->now.rotation[b];
+    state->stage_position[spin] = vec3(0, 0, 0);
+    if (body->motion == SONDE_BODY_FREE)
+      state->stage_rotation[b] =
+          sonde_rigid_turn(state, b, from, angular_at(state, b, dv[spin], lambda), lambda * h,
+                           &state->stage_velocity[spin]);
+    else
+      state->stage_rotation[b] = sonde_quat_turn(from, state->now.velocity[spin], lambda * h);
+  }
 }
 
 bool sonde_stage_finish(sonde_scene_state *state, const sonde_vec3 *dv, double h) {
@@ -167,18 +142,22 @@ bool sonde_stage_finish(sonde_scene_state *state, const sonde_vec3 *dv, double h
   for (uint32_t b = 0; b < state->scene->body_count; ++b) {
     const sonde_body *body = &state->scene->bodies[b];
     if (!sonde_body_is_rigid(body)) continue;
+    uint32_t spin = body->first_slot + 1;
     if (body->motion == SONDE_BODY_FREE) {
-      // the loop above has moved the spin; it follows from the momentum instead
-      state->now.velocity[body->first_slot + 1] =
-          v_sub(state->now.velocity[body->first_slot + 1], dv[body->first_slot + 1]);
-      finish_rotation(state, b, dv, h);
+      // The orientation follows q1 = exp(h w) q0 with w the spin at the stage (for a symplectic
+      // step at the end), and the spin follows from the momentum.
+      sonde_quat from = state->now.rotation[b];
+      sonde_vec3 w, end = angular_at(state, b, dv[spin], 1);
+      sonde_rigid_turn(state, b, from, angular_at(state, b, dv[spin], lambda), lambda * h, &w);
+      state->now.rotation[b] = sonde_quat_turn(from, w, h);
+      state->now.velocity[spin] = spin_at(state, b, state->now.rotation[b], end);
     } else {
       sonde_pose to = centre_pose(body, state->now.head->time_s + h);
       state->now.position[body->first_slot] = to.position;
-      state->now.position[body->first_slot + 1] = vec3(0, 0, 0);
       state->now.rotation[b] = to.rotation;
     }
-    sum += v_norm2(state->now.velocity[body->first_slot + 1]);
+    state->now.position[spin] = vec3(0, 0, 0);
+    sum += v_norm2(state->now.velocity[spin]);
   }
   return isfinite(sum);
 }

@@ -6,6 +6,15 @@
 
 #include "files/yaml.h"
 
+// Limits of what a scene file and a snapshot may say; a step keeps to those of its options.
+#define SONDE_SCENE_FAR_MM 1e5    // positions and sizes of a file
+#define SONDE_SCENE_REACH_M 1e7   // positions of a motion
+#define SONDE_SCENE_FASTEST 1e4   // m/s and rad/s
+#define SONDE_SCENE_LONGEST_S 1e6 // of a file
+#define SONDE_SCENE_LATEST_S 1e9  // of a motion
+#define SONDE_SCENE_SHORTEST_DT_S 1e-9
+enum { SONDE_SCENE_MOST_NEWTON = 1000, SONDE_SCENE_MOST_HALVINGS = 16 };
+
 // A spring-damper between two nodes: force (stiffness * (length - rest) + damper * rate) along it.
 typedef struct sonde_spring {
   double rest_m, stiffness_n_m, damper_n_s_m;

@@ -1,11 +1,5 @@
 // Primitive bodies as closed triangle meshes.
-// cells:       grid cells along a side.
-// grid:        the skin of a block of grid cells: vertices by their place in the grid, two
-// triangles
 //              per square, whose diagonals alternate.
-// spread:      a cube's coordinate moved so that its image on the sphere is evenly spaced.
-// ring:        one circle of vertices.
-// cap, side:   triangles of a cylinder.
 #include "scene/shape.h"
 
 #include "base/base.h"
@@ -37,17 +31,6 @@ typedef struct grid {
   sonde_mesh *mesh;
 } grid;
 
-static uint32_t vertex_at(grid *g, const uint32_t at[3]) {
-  uint32_t index = sonde_grid_index(g->n, at);
-  if (!g->number[index]) {
-    SONDE_ASSERT(g->vertices < g->mesh->vertex_count);
-    g->mesh->vertices[g->vertices] = vec3(at[0], at[1], at[2]);
-    g->place[g->vertices] = index;
-    g->number[index] = ++g->vertices;
-  }
-  return g->number[index] - 1;
-}
-
 static void add_face(grid *g, uint32_t a, uint32_t b, uint32_t c) {
   SONDE_ASSERT(a != b && b != c && g->faces < g->mesh->face_count);
   uint32_t *f = g->mesh->faces[g->faces++];
@@ -65,7 +48,14 @@ static void add_side(grid *g, int a, bool high) {
         at[a] = high ? g->n[a] : 0;
         at[u] = i + (k == 1 || k == 2);
         at[v] = j + (k >= 2);
-        corner[k] = vertex_at(g, at);
+        uint32_t index = sonde_grid_index(g->n, at);
+        if (!g->number[index]) {
+          SONDE_ASSERT(g->vertices < g->mesh->vertex_count);
+          g->mesh->vertices[g->vertices] = vec3(at[0], at[1], at[2]);
+          g->place[g->vertices] = index;
+          g->number[index] = ++g->vertices;
+        }
+        corner[k] = g->number[index] - 1;
       }
       uint32_t turn = (i + j + at[a]) & 1u;
       add_face(g, corner[turn], corner[turn + 1], corner[(turn + 2) & 3u]);

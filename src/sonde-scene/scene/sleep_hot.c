@@ -1,13 +1,6 @@
 // Nodes at rest of anchored tissues sleep (docs/scene.md).
-// moves:        whether a slot has an unknown.
-// list_part:    rows, edges and faces of a tissue with a waking node; the sleepers beside them.
-// list_body:    the solver's rows and pairs of a body.
-// unrest:       how far the unbalanced force would move a node against its anchors.
-// rest_node:    counts calm steps; movers wake their neighbours.
-// try_border:   sleepers beside waking nodes are tried for a step in turn.
 //
 // A tissue's node falls asleep when for CALM steps it was slow and the forces on it, contact
-// included, could not move it by more than sleep_m: the anchors alone would stop it earlier. It
 // then stays where it is, and its neighbours feel its springs. What touches others never sleeps.
 #include "scene/state.h"
 
@@ -60,27 +53,23 @@ static void list_part(sonde_scene_state *state, uint32_t b, uint32_t first_face)
   state->part[b] = part;
 }
 
-static void list_body(sonde_scene_state *state, uint32_t b) {
-  const sonde_scene *scene = state->scene;
-  const sonde_body *body = &scene->bodies[b];
-  for (uint32_t k = 0; k < body->slot_count; ++k)
-    if (moves(state, body, k)) state->active_rows[state->active_row_count++] = body->first_slot + k;
-  uint32_t end = b + 1 < scene->body_count ? body[1].first_pair : scene->pair_count;
-  for (uint32_t e = body->first_pair; e < end; ++e)
-    if (moves(state, body, scene->pairs[e][0] - body->first_slot) &&
-        moves(state, body, scene->pairs[e][1] - body->first_slot))
-      state->active_pairs[state->active_pair_count++] = e;
-}
-
 void sonde_sleep_list(sonde_scene_state *state) {
   const sonde_scene *scene = state->scene;
   uint32_t face = 0;
   state->active_row_count = state->active_pair_count = 0;
   for (uint32_t b = 0; b < scene->body_count; ++b) {
-    list_body(state, b);
-    if (!scene->bodies[b].model) continue;
+    const sonde_body *body = &scene->bodies[b];
+    for (uint32_t k = 0; k < body->slot_count; ++k)
+      if (moves(state, body, k))
+        state->active_rows[state->active_row_count++] = body->first_slot + k;
+    uint32_t end = b + 1 < scene->body_count ? body[1].first_pair : scene->pair_count;
+    for (uint32_t e = body->first_pair; e < end; ++e)
+      if (moves(state, body, scene->pairs[e][0] - body->first_slot) &&
+          moves(state, body, scene->pairs[e][1] - body->first_slot))
+        state->active_pairs[state->active_pair_count++] = e;
+    if (!body->model) continue;
     list_part(state, b, face);
-    face += scene->bodies[b].surface.face_count;
+    face += body->surface.face_count;
   }
   SONDE_ASSERT(state->active_row_count <= scene->slot_count);
 }
@@ -109,53 +98,39 @@ bool sonde_sleep_wake_touched(sonde_scene_state *state) {
   return woke;
 }
 
-static double unrest(const sonde_scene_state *state, const sonde_body *body, uint32_t i) {
-  const sonde_model *model = body->model;
-  uint32_t s = body->first_slot + i;
-  sonde_vec3 n = model->normal[i], f = v_add(state->force[s], state->contact_force[s]);
-  double along = v_dot(n, f), area = model->area_m2[i];
-  double across = v_norm(v_madd(f, -along, n));
-  SONDE_ASSERT(area > 0);
-  double normal = along / (model->k0_n_m3[i] * area);
-  double tangent = across > 0 ? across / (model->law.tangential_stiffness_n_m3 * area) : 0;
-  return sqrt(normal * normal + tangent * tangent);
-}
-
-static void wake_neighbours(sonde_scene_state *state, const sonde_body *body, uint32_t i) {
-  const sonde_topology *t = &body->model->topology;
-  uint8_t *calm = state->now.calm + body->first_slot;
-  for (uint32_t k = t->start[i]; k < t->start[i + 1]; ++k)
-    if (calm[t->neighbour[k]] >= CALM) calm[t->neighbour[k]] = 0;
-}
-
-static void rest_node(sonde_scene_state *state, const sonde_body *body, uint32_t i) {
-  uint32_t s = body->first_slot + i;
-  double way = state->scene->step.sleep_m, still = way / STILL_S;
-  double speed = v_norm(state->now.velocity[s]);
-  if (speed > 2 * still) wake_neighbours(state, body, i);
-  if (!body->held[i] && !(speed <= still && unrest(state, body, i) <= way))
-    state->now.calm[s] = 0;
-  else if (++state->now.calm[s] >= CALM)
-    state->now.velocity[s] = state->now.increment[s] = vec3(0, 0, 0);
-}
-
-// Their neighbours may have crept away from where the sleepers found balance.
-static void try_border(sonde_scene_state *state, const sonde_body *body,
-                       const sonde_tissue_part *part) {
-  uint8_t *calm = state->now.calm + body->first_slot;
-  for (uint32_t r = 0; r < part->rim_count; ++r) {
-    uint32_t i = part->rim[r];
-    bool turn = (i + state->now.head->tick) % TRIAL_PERIOD == 0;
-    if (turn && calm[i] >= CALM) calm[i] = CALM - 1;
-  }
-}
-
 void sonde_sleep_rest(sonde_scene_state *state) {
+  double way = state->scene->step.sleep_m, still = way / STILL_S;
   for (uint32_t b = 0; b < state->scene->body_count; ++b) {
     const sonde_body *body = &state->scene->bodies[b];
+    const sonde_model *model = body->model;
     const sonde_tissue_part *part = &state->part[b];
     if (!may_sleep(state, body)) continue;
-    for (uint32_t r = 0; r < part->row_count; ++r) rest_node(state, body, part->rows[r]);
-    try_border(state, body, part);
+    uint8_t *calm = state->now.calm + body->first_slot;
+    for (uint32_t r = 0; r < part->row_count; ++r) {
+      uint32_t i = part->rows[r], s = body->first_slot + i;
+      double speed = v_norm(state->now.velocity[s]);
+      const sonde_topology *t = &model->topology;
+      for (uint32_t k = t->start[i]; k < t->start[i + 1] && speed > 2 * still; ++k)
+        if (calm[t->neighbour[k]] >= CALM) calm[t->neighbour[k]] = 0;
+      // The unbalanced force would move the node by (normal, tangent) against its anchors.
+      sonde_vec3 n = model->normal[i], f = v_add(state->force[s], state->contact_force[s]);
+      double along = v_dot(n, f), area = model->area_m2[i];
+      double across = v_norm(v_madd(f, -along, n));
+      SONDE_ASSERT(area > 0);
+      double normal = along / (model->k0_n_m3[i] * area);
+      double tangent = across > 0 ? across / (model->law.tangential_stiffness_n_m3 * area) : 0;
+      bool at_rest = speed <= still && sqrt(normal * normal + tangent * tangent) <= way;
+      if (!body->held[i] && !at_rest)
+        calm[i] = 0;
+      else if (++calm[i] >= CALM)
+        state->now.velocity[s] = state->now.increment[s] = vec3(0, 0, 0);
+    }
+    // Sleepers beside waking nodes are tried in turn: their neighbours may have crept away from
+    // where the sleepers found balance.
+    for (uint32_t r = 0; r < part->rim_count; ++r) {
+      uint32_t i = part->rim[r];
+      bool turn = (i + state->now.head->tick) % TRIAL_PERIOD == 0;
+      if (turn && calm[i] >= CALM) calm[i] = CALM - 1;
+    }
   }
 }

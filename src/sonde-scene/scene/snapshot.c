@@ -32,22 +32,6 @@ sonde_status sonde_scene_state_save(const sonde_scene_state *state, const char *
   return sonde_file_commit(file, error);
 }
 
-static sonde_status check(const sonde_scene_state *state, const char *path, const char *bytes,
-                          size_t count, sonde_error *error) {
-  header h;
-  if (count < sizeof h || memcmp(bytes, MAGIC, sizeof MAGIC) != 0)
-    return sonde_fail(error, SONDE_FORMAT, "%s: not a snapshot of a scene", path);
-  memcpy(&h, bytes, sizeof h);
-  if (h.version != SNAPSHOT_VERSION)
-    return sonde_fail(error, SONDE_VERSION, "%s: version %llu, expected %d", path,
-                      (unsigned long long)h.version, SNAPSHOT_VERSION);
-  if (h.scene != state->scene->checksum || h.bytes != state->now.bytes)
-    return sonde_fail(error, SONDE_MISMATCH, "%s: a snapshot of another scene", path);
-  if (count != sizeof h + h.bytes || sonde_hash(0, bytes + sizeof h, h.bytes) != h.hash)
-    return sonde_fail(error, SONDE_CHECKSUM, "%s: the snapshot is damaged", path);
-  return SONDE_OK;
-}
-
 static bool within(const sonde_vec3 *list, uint32_t count, double most) {
   for (uint32_t i = 0; i < count; ++i)
     if (!(v_norm(list[i]) <= most)) return false;
@@ -57,39 +41,50 @@ static bool within(const sonde_vec3 *list, uint32_t count, double most) {
 // Numbers that no scene reaches would break what the steps rely on.
 static sonde_status check_numbers(const sonde_scene_state *state, const sonde_kept *kept,
                                   const char *path, sonde_error *error) {
-  const double FAR_M = 1e7, FAST = 1e4; // a quarter of an hour of free fall
   const sonde_scene *scene = state->scene;
-  bool good = within(kept->position, scene->slot_count, FAR_M) &&
-              within(kept->velocity, scene->slot_count, FAST) &&
-              within(kept->increment, scene->slot_count, FAST) &&
+  bool good = within(kept->position, scene->slot_count, SONDE_SCENE_REACH_M) &&
+              within(kept->velocity, scene->slot_count, SONDE_SCENE_FASTEST) &&
+              within(kept->increment, scene->slot_count, SONDE_SCENE_FASTEST) &&
               within(kept->hint, scene->touch_count, 1 + 1e-6) &&
-              within(kept->bond, state->bond_count, FAR_M);
-  good = good && kept->head->level <= 16 && kept->head->time_s >= 0 && kept->head->time_s <= 1e9;
+              within(kept->bond, state->bond_count, SONDE_SCENE_REACH_M);
+  good = good && kept->head->level <= SONDE_SCENE_MOST_HALVINGS && kept->head->time_s >= 0 &&
+         kept->head->time_s <= SONDE_SCENE_LATEST_S;
   for (uint32_t k = 0; k < scene->body_count && good; ++k) {
     sonde_quat q = kept->rotation[k];
     good = fabs(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z - 1) <= 1e-6;
   }
   for (uint32_t k = 0; k < state->bond_count && good; ++k)
-    good = kept->slip[k] >= 0 && kept->slip[k] <= FAST;
+    good = kept->slip[k] >= 0 && kept->slip[k] <= SONDE_SCENE_FASTEST;
   if (good) return SONDE_OK;
   return sonde_fail(error, SONDE_FORMAT,
                     "%s: expected positions within %g m, velocities within %g m/s and unit "
                     "quaternions",
-                    path, FAR_M, FAST);
+                    path, SONDE_SCENE_REACH_M, SONDE_SCENE_FASTEST);
 }
 
 sonde_status sonde_scene_state_load(sonde_scene_state *state, const char *path,
                                     sonde_error *error) {
   char *bytes = NULL;
   size_t count;
+  header h = {.version = 0};
   sonde_status status = sonde_bounded_load(path, &sonde_limits_snapshot, &bytes, &count, error);
-  if (!status) status = check(state, path, bytes, count, error);
-  if (!status) {
-    SONDE_ASSERT(count == sizeof(header) + state->now.bytes);
-    memcpy(state->undo.block, bytes + sizeof(header), state->undo.bytes);
+  if (status) return status;
+  if (count >= sizeof h) memcpy(&h, bytes, sizeof h);
+  const char *block = bytes + sizeof h;
+  if (memcmp(h.magic, MAGIC, sizeof MAGIC) != 0)
+    status = sonde_fail(error, SONDE_FORMAT, "%s: not a snapshot of a scene", path);
+  else if (h.version != SNAPSHOT_VERSION)
+    status = sonde_fail(error, SONDE_VERSION, "%s: version %llu, expected %d", path,
+                        (unsigned long long)h.version, SNAPSHOT_VERSION);
+  else if (h.scene != state->scene->checksum || h.bytes != state->now.bytes)
+    status = sonde_fail(error, SONDE_MISMATCH, "%s: a snapshot of another scene", path);
+  else if (count != sizeof h + h.bytes || sonde_hash(0, block, h.bytes) != h.hash)
+    status = sonde_fail(error, SONDE_CHECKSUM, "%s: the snapshot is damaged", path);
+  else {
+    memcpy(state->undo.block, block, state->undo.bytes);
     status = check_numbers(state, &state->undo, path, error);
-    if (!status) sonde_kept_copy(&state->now, &state->undo);
   }
+  if (!status) sonde_kept_copy(&state->now, &state->undo);
   sonde_free(bytes);
   return status;
 }

@@ -1,11 +1,4 @@
 // A scene's motion: memory, start, measures.
-// carve:        places arrays one after another in a block.
-// lay_kept:     arrays that a step hands to the next.
-// lay_arrays:   all other arrays.
-// make_contact: trees, overlaps, the sweep and the table of pairs.
-// make_solver:  the matrix and the rows and pairs that may move.
-// reset:        the start of the scene.
-// measure_*:    a body's motion as one.
 #include "scene/state.h"
 
 #include "base/base.h"
@@ -27,123 +20,71 @@ static void *carve(carver *c, size_t count, size_t size) {
   return c->block ? c->block + at : NULL;
 }
 
+#define CARVE(at, count) ((at) = carve(c, (count), sizeof *(at)))
+
 static void lay_kept(const sonde_scene_state *state, carver *c, sonde_kept *kept) {
   const sonde_scene *scene = state->scene;
-  kept->head = carve(c, 1, sizeof *kept->head);
-  kept->position = carve(c, scene->slot_count, sizeof(sonde_vec3));
-  kept->velocity = carve(c, scene->slot_count, sizeof(sonde_vec3));
-  kept->increment = carve(c, scene->slot_count, sizeof(sonde_vec3));
-  kept->rotation = carve(c, scene->body_count, sizeof(sonde_quat));
-  kept->hint = carve(c, scene->touch_count, sizeof(sonde_vec3));
-  kept->bond = carve(c, state->bond_count, sizeof(sonde_vec3));
-  kept->slip = carve(c, state->bond_count, sizeof(double));
-  kept->calm = carve(c, scene->slot_count, sizeof(uint8_t));
-}
-
-static sonde_status make_kept(const sonde_scene_state *state, sonde_kept *kept,
-                              sonde_error *error) {
-  carver c = {0};
-  lay_kept(state, &c, kept);
-  kept->bytes = c.used;
-  kept->block = c.block = sonde_calloc(1, c.used);
-  if (!kept->block) return sonde_fail_memory(error);
-  c.used = 0;
-  lay_kept(state, &c, kept);
-  SONDE_ASSERT(c.used == kept->bytes);
-  return SONDE_OK;
-}
-
-static void lay_slots(sonde_scene_state *s, carver *c) {
-  size_t slots = s->scene->slot_count, vec = sizeof(sonde_vec3);
-  sonde_vec3 **const all[] = {
-      &s->stage_position,  &s->stage_velocity, &s->force,     &s->product,   &s->contact_force,
-      &s->contact_product, &s->right,          &s->change,    &s->move,      &s->gain,
-      &s->mean_velocity,   &s->scratch.r,      &s->scratch.z, &s->scratch.p, &s->scratch.q};
-  for (size_t k = 0; k < SONDE_COUNT_OF(all); ++k) *all[k] = carve(c, slots, vec);
-  s->plain_diagonal = carve(c, slots, sizeof(sonde_mat3));
-  s->active_rows = carve(c, slots, sizeof(uint32_t));
-  s->active_pairs = carve(c, s->scene->pair_count, sizeof(uint32_t));
-  s->part_rows = carve(c, slots, sizeof(uint32_t));
-  s->part_rim = carve(c, slots, sizeof(uint32_t));
-  s->part_edges = carve(c, s->scene->pair_count, sizeof(uint32_t));
-  s->in_rim = carve(c, slots, sizeof(uint8_t));
-  uint32_t most = 0, faces = 0;
-  for (uint32_t b = 0; b < s->scene->body_count; ++b)
-    faces += s->scene->bodies[b].surface.face_count;
-  s->part_faces = carve(c, faces, sizeof(uint32_t));
-  for (uint32_t b = 0; b < s->scene->body_count; ++b)
-    if (s->scene->bodies[b].model && s->scene->bodies[b].node_count > most)
-      most = s->scene->bodies[b].node_count;
-  s->tissue_nodes = carve(c, most, sizeof *s->tissue_nodes);
+  CARVE(kept->head, 1);
+  CARVE(kept->position, scene->slot_count);
+  CARVE(kept->velocity, scene->slot_count);
+  CARVE(kept->increment, scene->slot_count);
+  CARVE(kept->rotation, scene->body_count);
+  CARVE(kept->hint, scene->touch_count);
+  CARVE(kept->bond, state->bond_count);
+  CARVE(kept->slip, state->bond_count);
+  CARVE(kept->calm, scene->slot_count);
 }
 
 static void lay_arrays(sonde_scene_state *s, carver *c) {
   const sonde_scene *scene = s->scene;
   size_t bodies = scene->body_count, touches = scene->touch_count;
-  lay_slots(s, c);
-  s->stage_rotation = carve(c, bodies, sizeof(sonde_quat));
-  s->surface = carve(c, s->surface_count, sizeof(sonde_vec3));
-  s->surface_first = carve(c, bodies, sizeof(uint32_t));
-  s->bond_first = carve(c, touches, sizeof(uint32_t));
-  s->inertia = carve(c, bodies, sizeof *s->inertia);
-  s->reach_m = carve(c, bodies, sizeof(double));
-  s->thickness_m = carve(c, bodies, sizeof(double));
-  s->way = carve(c, bodies, sizeof(sonde_bounds));
-  s->body_inverse = carve(c, bodies, sizeof(sonde_mat3));
-  s->part = carve(c, bodies, sizeof *s->part);
-  s->island = carve(c, bodies, sizeof(uint32_t));
-  s->loose = carve(c, bodies, sizeof(bool));
-  s->tree = carve(c, bodies, sizeof(sonde_face_tree *));
-  s->overlap = carve(c, touches, sizeof(sonde_overlap *));
-  s->touch_of = carve(c, bodies * bodies, sizeof(uint32_t));
-  s->near = carve(c, s->near_capacity, sizeof *s->near);
-  s->bounds = carve(c, bodies, sizeof(sonde_bounds));
-  s->pushes = carve(c, s->push_capacity, sizeof(sonde_push));
-  s->grips = carve(c, s->grip_capacity, sizeof(sonde_grip));
-  s->terms = carve(c, s->term_capacity, sizeof(sonde_rank_one));
-  s->rows = carve(c, s->row_capacity, sizeof(uint32_t));
-  s->g = carve(c, s->row_capacity, sizeof(sonde_vec3));
-  s->bond_load = carve(c, s->bond_count, sizeof(double));
-  s->slip_sum = carve(c, s->bond_count, sizeof(double));
-  s->bond_sum = carve(c, s->bond_count, sizeof(sonde_vec3));
-  s->pair = carve(c, touches, sizeof(sonde_pair_measure));
-}
-
-// Room for contact: columns with a push and two tangents each, regions over all vertices twice.
-static void size_arrays(sonde_scene_state *s) {
-  const sonde_scene *scene = s->scene;
-  uint32_t points = 0, bulk = 0;
+  size_t slots = scene->slot_count;
+  sonde_vec3 **const all[] = {
+      &s->stage_position,  &s->stage_velocity, &s->force,     &s->product,   &s->contact_force,
+      &s->contact_product, &s->right,          &s->change,    &s->move,      &s->gain,
+      &s->mean_velocity,   &s->scratch.r,      &s->scratch.z, &s->scratch.p, &s->scratch.q};
+  for (size_t k = 0; k < SONDE_COUNT_OF(all); ++k) *all[k] = carve(c, slots, sizeof(sonde_vec3));
+  CARVE(s->plain_diagonal, slots);
+  CARVE(s->active_rows, slots);
+  CARVE(s->active_pairs, scene->pair_count);
+  CARVE(s->part_rows, slots);
+  CARVE(s->part_rim, slots);
+  CARVE(s->part_edges, scene->pair_count);
+  CARVE(s->in_rim, slots);
+  uint32_t most = 0, faces = 0;
   for (uint32_t b = 0; b < scene->body_count; ++b) {
-    s->surface_count += scene->bodies[b].surface.vertex_count;
-    bulk += scene->bodies[b].node_count;
+    const sonde_body *body = &scene->bodies[b];
+    faces += body->surface.face_count;
+    if (body->model && body->node_count > most) most = body->node_count;
   }
-  for (uint32_t t = 0; t < scene->touch_count; ++t) {
-    const sonde_body *a = &scene->bodies[scene->touches[t].a];
-    const sonde_body *b = &scene->bodies[scene->touches[t].b];
-    uint32_t here = 16 * (a->surface.face_count + b->surface.face_count);
-    if (here > POINTS_MOST) here = POINTS_MOST;
-    points = points + here < POINTS_MOST ? points + here : POINTS_MOST;
-    s->bond_count += (scene->touches[t].bond_side ? b : a)->surface.vertex_count;
-  }
-  if (scene->touch_count && points < 2048) points = 2048;
-  s->grip_capacity = points;
-  s->push_capacity = points + 64 * scene->touch_count;
-  s->term_capacity = s->push_capacity + 2 * points + scene->body_count;
-  s->row_capacity = bulk + 3 * 8 * points + 2 * s->surface_count + 4 * s->push_capacity;
-  s->near_capacity = scene->body_count * (scene->body_count - 1) / 2;
-}
-
-static sonde_overlap_config overlap_config(const sonde_scene *scene, const sonde_touch *touch) {
-  uint32_t faces =
-      scene->bodies[touch->a].surface.face_count + scene->bodies[touch->b].surface.face_count;
-  bool large_faces = sonde_body_is_rigid(&scene->bodies[touch->a]) &&
-                     sonde_body_is_rigid(&scene->bodies[touch->b]);
-  sonde_overlap_config config = {.points_per_piece = 1};
-  if (touch->law == SONDE_TOUCH_FOUNDATION && large_faces) config.points_per_piece = 3;
-  config.max_pieces = 16 * faces < 4096 ? 4096 : 16 * faces;
-  if (config.max_pieces > PIECES_MOST) config.max_pieces = PIECES_MOST;
-  config.max_points = 2 * config.max_pieces;
-  return config;
+  CARVE(s->part_faces, faces);
+  CARVE(s->tissue_nodes, most);
+  CARVE(s->stage_rotation, bodies);
+  CARVE(s->surface, s->surface_count);
+  CARVE(s->surface_first, bodies);
+  CARVE(s->bond_first, touches);
+  CARVE(s->inertia, bodies);
+  CARVE(s->reach_m, bodies);
+  CARVE(s->thickness_m, bodies);
+  CARVE(s->way, bodies);
+  CARVE(s->body_inverse, bodies);
+  CARVE(s->part, bodies);
+  CARVE(s->island, bodies);
+  CARVE(s->loose, bodies);
+  CARVE(s->tree, bodies);
+  CARVE(s->overlap, touches);
+  CARVE(s->touch_of, bodies * bodies);
+  CARVE(s->near, s->near_capacity);
+  CARVE(s->bounds, bodies);
+  CARVE(s->pushes, s->push_capacity);
+  CARVE(s->grips, s->grip_capacity);
+  CARVE(s->terms, s->term_capacity);
+  CARVE(s->rows, s->row_capacity);
+  CARVE(s->g, s->row_capacity);
+  CARVE(s->bond_load, s->bond_count);
+  CARVE(s->slip_sum, s->bond_count);
+  CARVE(s->bond_sum, s->bond_count);
+  CARVE(s->pair, touches);
 }
 
 static sonde_status make_tree(sonde_scene_state *state, uint32_t b, sonde_error *error) {
@@ -164,7 +105,15 @@ static sonde_status make_contact(sonde_scene_state *state, sonde_error *error) {
     state->bounds[b] = (sonde_bounds){{1e9 + 10 * b, 1e9, 1e9}, {1e9 + 10 * b + 1, 1e9, 1e9}};
   for (uint32_t t = 0; t < scene->touch_count && !status; ++t) {
     const sonde_touch *touch = &scene->touches[t];
-    sonde_overlap_config config = overlap_config(scene, touch);
+    uint32_t faces =
+        scene->bodies[touch->a].surface.face_count + scene->bodies[touch->b].surface.face_count;
+    bool large_faces = sonde_body_is_rigid(&scene->bodies[touch->a]) &&
+                       sonde_body_is_rigid(&scene->bodies[touch->b]);
+    sonde_overlap_config config = {.points_per_piece = 1};
+    if (touch->law == SONDE_TOUCH_FOUNDATION && large_faces) config.points_per_piece = 3;
+    config.max_pieces = 16 * faces < 4096 ? 4096 : 16 * faces;
+    if (config.max_pieces > PIECES_MOST) config.max_pieces = PIECES_MOST;
+    config.max_points = 2 * config.max_pieces;
     status = make_tree(state, touch->a, error);
     if (!status) status = make_tree(state, touch->b, error);
     if (!status)
@@ -175,32 +124,45 @@ static sonde_status make_contact(sonde_scene_state *state, sonde_error *error) {
   return status;
 }
 
-static sonde_status make_solver(sonde_scene_state *state, sonde_error *error) {
+static sonde_status allocate(sonde_scene_state *state, sonde_error *error) {
+  // Room for contact: columns with a push and two tangents each, regions over all vertices twice.
   const sonde_scene *scene = state->scene;
-  sonde_status status =
-      sonde_block_matrix_create(scene->slot_count, scene->pair_count,
-                                (const uint32_t(*)[2])scene->pairs, &state->matrix, error);
-  if (status) return status;
+  uint32_t points = 0, bulk = 0;
   for (uint32_t b = 0; b < scene->body_count; ++b) {
-    const sonde_body *body = &scene->bodies[b];
-    state->loose[b] = body->motion == SONDE_BODY_FREE && !body->model;
-    for (uint32_t k = 0; k < body->node_count; ++k) state->loose[b] &= !body->held[k];
+    state->surface_count += scene->bodies[b].surface.vertex_count;
+    bulk += scene->bodies[b].node_count;
   }
-  sonde_sleep_list(state);
-  return SONDE_OK;
-}
-
-static sonde_mat3 inverse_symmetric(sonde_mat3 a) {
-  sonde_vec3 r[3];
-  for (int i = 0; i < 3; ++i) r[i] = vec3(a.m[i][0], a.m[i][1], a.m[i][2]);
-  double determinant = v_dot(r[0], v_cross(r[1], r[2]));
-  SONDE_ASSERT(determinant > 0);
-  sonde_mat3 inverse = m_columns(v_cross(r[1], r[2]), v_cross(r[2], r[0]), v_cross(r[0], r[1]));
-  return m_scale(inverse, 1 / determinant);
-}
-
-static void number_arrays(sonde_scene_state *state) {
-  const sonde_scene *scene = state->scene;
+  for (uint32_t t = 0; t < scene->touch_count; ++t) {
+    const sonde_body *a = &scene->bodies[scene->touches[t].a];
+    const sonde_body *b = &scene->bodies[scene->touches[t].b];
+    uint32_t here = 16 * (a->surface.face_count + b->surface.face_count);
+    if (here > POINTS_MOST) here = POINTS_MOST;
+    points = points + here < POINTS_MOST ? points + here : POINTS_MOST;
+    state->bond_count += (scene->touches[t].bond_side ? b : a)->surface.vertex_count;
+  }
+  if (scene->touch_count && points < 2048) points = 2048;
+  state->grip_capacity = points;
+  state->push_capacity = points + 64 * scene->touch_count;
+  state->term_capacity = state->push_capacity + 2 * points + scene->body_count;
+  state->row_capacity = bulk + 3 * 8 * points + 2 * state->surface_count + 4 * state->push_capacity;
+  state->near_capacity = scene->body_count * (scene->body_count - 1) / 2;
+  sonde_kept *const kept[] = {&state->now, &state->undo, &state->saved, &state->whole};
+  for (size_t k = 0; k < SONDE_COUNT_OF(kept); ++k) {
+    carver c = {0};
+    lay_kept(state, &c, kept[k]);
+    kept[k]->bytes = c.used;
+    kept[k]->block = c.block = sonde_calloc(1, c.used);
+    if (!kept[k]->block) return sonde_fail_memory(error);
+    c.used = 0;
+    lay_kept(state, &c, kept[k]);
+    SONDE_ASSERT(c.used == kept[k]->bytes);
+  }
+  carver arrays = {0};
+  lay_arrays(state, &arrays);
+  state->block = arrays.block = sonde_calloc(1, arrays.used);
+  if (!state->block) return sonde_fail_memory(error);
+  arrays.used = 0;
+  lay_arrays(state, &arrays);
   uint32_t surface = 0, bond = 0;
   for (uint32_t b = 0; b < scene->body_count; ++b) {
     const sonde_body *body = &scene->bodies[b];
@@ -208,7 +170,16 @@ static void number_arrays(sonde_scene_state *state) {
     surface += body->surface.vertex_count;
     state->thickness_m[b] = sonde_scene_thickness(&body->surface);
     if (!sonde_body_is_rigid(body)) continue;
-    state->body_inverse[b] = inverse_symmetric(body->mass.inertia_kg_m2);
+    // The inertia is symmetric: the columns of its inverse are the cross products of its rows.
+    sonde_vec3 r[3];
+    for (int i = 0; i < 3; ++i) {
+      const double *row = body->mass.inertia_kg_m2.m[i];
+      r[i] = vec3(row[0], row[1], row[2]);
+    }
+    double determinant = v_dot(r[0], v_cross(r[1], r[2]));
+    SONDE_ASSERT(determinant > 0);
+    sonde_mat3 inverse = m_columns(v_cross(r[1], r[2]), v_cross(r[2], r[0]), v_cross(r[0], r[1]));
+    state->body_inverse[b] = m_scale(inverse, 1 / determinant);
     for (uint32_t i = 0; i < body->surface.vertex_count; ++i)
       state->reach_m[b] = fmax(state->reach_m[b], v_norm(body->surface.vertices[i]));
   }
@@ -218,22 +189,6 @@ static void number_arrays(sonde_scene_state *state) {
     bond += scene->bodies[touch->bond_side ? touch->b : touch->a].surface.vertex_count;
   }
   SONDE_ASSERT(surface == state->surface_count && bond == state->bond_count);
-}
-
-static sonde_status allocate(sonde_scene_state *state, sonde_error *error) {
-  size_arrays(state);
-  sonde_kept *const kept[] = {&state->now, &state->undo, &state->saved, &state->whole};
-  for (size_t k = 0; k < SONDE_COUNT_OF(kept); ++k) {
-    sonde_status status = make_kept(state, kept[k], error);
-    if (status) return status;
-  }
-  carver c = {0};
-  lay_arrays(state, &c);
-  state->block = c.block = sonde_calloc(1, c.used);
-  if (!state->block) return sonde_fail_memory(error);
-  c.used = 0;
-  lay_arrays(state, &c);
-  number_arrays(state);
   return SONDE_OK;
 }
 
@@ -249,12 +204,21 @@ sonde_status sonde_scene_state_create(const sonde_scene *scene, sonde_scene_stat
     sonde_scene_state_reset(state);
     status = make_contact(state, error);
   }
-  if (!status) status = make_solver(state, error);
-  if (status)
+  if (!status)
+    status = sonde_block_matrix_create(scene->slot_count, scene->pair_count,
+                                       (const uint32_t(*)[2])scene->pairs, &state->matrix, error);
+  if (status) {
     sonde_scene_state_destroy(state);
-  else
-    *out = state;
-  return status;
+    return status;
+  }
+  for (uint32_t b = 0; b < scene->body_count; ++b) {
+    const sonde_body *body = &scene->bodies[b];
+    state->loose[b] = body->motion == SONDE_BODY_FREE && !body->model;
+    for (uint32_t k = 0; k < body->node_count; ++k) state->loose[b] &= !body->held[k];
+  }
+  sonde_sleep_list(state);
+  *out = state;
+  return SONDE_OK;
 }
 
 void sonde_scene_state_destroy(sonde_scene_state *state) {
@@ -273,17 +237,6 @@ void sonde_scene_state_destroy(sonde_scene_state *state) {
   sonde_free(state);
 }
 
-static void reset_rigid(sonde_scene_state *state, uint32_t b) {
-  SONDE_ASSERT(state->scene->bodies[b].slot_count == 2);
-  const sonde_body *body = &state->scene->bodies[b];
-  uint32_t s = body->first_slot;
-  state->now.position[s] = pose_apply(body->start, body->mass.centre_m);
-  state->now.rotation[b] = body->start.rotation;
-  if (body->motion != SONDE_BODY_FREE) return;
-  state->now.velocity[s] = body->velocity_m_s;
-  state->now.velocity[s + 1] = body->spin_rad_s;
-}
-
 void sonde_scene_state_reset(sonde_scene_state *state) {
   memset(state->now.block, 0, state->now.bytes);
   state->report = (sonde_scene_report){0};
@@ -292,7 +245,13 @@ void sonde_scene_state_reset(sonde_scene_state *state) {
     const sonde_body *body = &state->scene->bodies[b];
     state->now.rotation[b] = quat_identity();
     if (sonde_body_is_rigid(body)) {
-      reset_rigid(state, b);
+      SONDE_ASSERT(body->slot_count == 2);
+      uint32_t s = body->first_slot;
+      state->now.position[s] = pose_apply(body->start, body->mass.centre_m);
+      state->now.rotation[b] = body->start.rotation;
+      if (body->motion != SONDE_BODY_FREE) continue;
+      state->now.velocity[s] = body->velocity_m_s;
+      state->now.velocity[s + 1] = body->spin_rad_s;
       continue;
     }
     for (uint32_t i = 0; i < body->node_count; ++i) {
@@ -353,45 +312,36 @@ sonde_pair_measure sonde_scene_pair_measure(const sonde_scene_state *state, uint
   return state->pair[pair];
 }
 
-static void measure_rigid(const sonde_scene_state *state, uint32_t b, sonde_body_measure *m) {
-  const sonde_body *body = &state->scene->bodies[b];
-  m->centre_m = state->now.position[body->first_slot];
-  m->velocity_m_s = state->now.velocity[body->first_slot];
-  m->spin_rad_s = state->now.velocity[body->first_slot + 1];
-  m->rotation = state->now.rotation[b];
-  sonde_vec3 angular =
-      m_mul_v(sonde_inertia_world(body->mass.inertia_kg_m2, m->rotation), m->spin_rad_s);
-  m->momentum_kg_m_s = v_scale(m->velocity_m_s, body->mass.mass_kg);
-  m->angular_kg_m2_s = v_add(angular, v_cross(m->centre_m, m->momentum_kg_m_s));
-  m->kinetic_j = 0.5 * (v_dot(m->velocity_m_s, m->momentum_kg_m_s) + v_dot(m->spin_rad_s, angular));
-}
-
-static void measure_nodes(const sonde_scene_state *state, uint32_t b, sonde_body_measure *m) {
-  const sonde_body *body = &state->scene->bodies[b];
-  const sonde_vec3 *x = state->now.position + body->first_slot;
-  const sonde_vec3 *v = state->now.velocity + body->first_slot;
-  sonde_vec3 sum = vec3(0, 0, 0);
-  for (uint32_t i = 0; i < body->node_count; ++i) {
-    sonde_vec3 p = v_scale(v[i], body->node_mass_kg[i]);
-    sum = v_madd(sum, body->node_mass_kg[i], x[i]);
-    m->momentum_kg_m_s = v_add(m->momentum_kg_m_s, p);
-    m->angular_kg_m2_s = v_add(m->angular_kg_m2_s, v_cross(x[i], p));
-    m->kinetic_j += 0.5 * v_dot(v[i], p);
-  }
-  m->centre_m = v_scale(sum, 1 / body->mass.mass_kg);
-  m->velocity_m_s = v_scale(m->momentum_kg_m_s, 1 / body->mass.mass_kg);
-  m->rotation = quat_identity();
-  m->elastic_j = body->model ? sonde_tissue_energy(body->model, x) : sonde_network_energy(body, x);
-}
-
 sonde_body_measure sonde_scene_measure(const sonde_scene_state *state, uint32_t b) {
   SONDE_ASSERT(b < state->scene->body_count);
   const sonde_body *body = &state->scene->bodies[b];
   sonde_body_measure m = {0};
-  if (sonde_body_is_rigid(body))
-    measure_rigid(state, b, &m);
-  else
-    measure_nodes(state, b, &m);
+  if (sonde_body_is_rigid(body)) {
+    m.centre_m = state->now.position[body->first_slot];
+    m.velocity_m_s = state->now.velocity[body->first_slot];
+    m.spin_rad_s = state->now.velocity[body->first_slot + 1];
+    m.rotation = state->now.rotation[b];
+    sonde_vec3 angular =
+        m_mul_v(sonde_inertia_world(body->mass.inertia_kg_m2, m.rotation), m.spin_rad_s);
+    m.momentum_kg_m_s = v_scale(m.velocity_m_s, body->mass.mass_kg);
+    m.angular_kg_m2_s = v_add(angular, v_cross(m.centre_m, m.momentum_kg_m_s));
+    m.kinetic_j = 0.5 * (v_dot(m.velocity_m_s, m.momentum_kg_m_s) + v_dot(m.spin_rad_s, angular));
+  } else {
+    const sonde_vec3 *x = state->now.position + body->first_slot;
+    const sonde_vec3 *v = state->now.velocity + body->first_slot;
+    sonde_vec3 sum = vec3(0, 0, 0);
+    for (uint32_t i = 0; i < body->node_count; ++i) {
+      sonde_vec3 p = v_scale(v[i], body->node_mass_kg[i]);
+      sum = v_madd(sum, body->node_mass_kg[i], x[i]);
+      m.momentum_kg_m_s = v_add(m.momentum_kg_m_s, p);
+      m.angular_kg_m2_s = v_add(m.angular_kg_m2_s, v_cross(x[i], p));
+      m.kinetic_j += 0.5 * v_dot(v[i], p);
+    }
+    m.centre_m = v_scale(sum, 1 / body->mass.mass_kg);
+    m.velocity_m_s = v_scale(m.momentum_kg_m_s, 1 / body->mass.mass_kg);
+    m.rotation = quat_identity();
+    m.elastic_j = body->model ? sonde_tissue_energy(body->model, x) : sonde_network_energy(body, x);
+  }
   if (body->motion == SONDE_BODY_FREE)
     m.gravity_j = -body->mass.mass_kg * v_dot(state->scene->gravity_m_s2, m.centre_m);
   return m;

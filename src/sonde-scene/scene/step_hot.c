@@ -1,16 +1,4 @@
 // One implicit step for all bodies of a scene (docs/scene.md).
-// linearise:      forces, matrix and K v of the bodies at the stage.
-// evaluate:       the same with contacts.
-// precondition:   inverse of the diagonal blocks, contact terms included.
-// solve:          conjugate gradients over the slots that may move; explicit: by mass.
-// first_right:    right-hand side of eq. (4).
-// residual:       g = h F - M dv at the stage of dv.
-// moves_since:    way and change of velocity since the evaluation, for the linearised forces.
-// first_solve:    eq. (4); pushes that would pull are dropped and it is solved again.
-// search:         shortens a Newton step while the slope along it has changed its sign too far.
-// newton:         further iterations.
-// balance:        momentum of bodies that nothing outside holds, freed of the solver's remainder.
-// undo:           a step that is not finite leaves the state as it was, at rest.
 #include "scene/state.h"
 
 #include "base/base.h"
@@ -24,57 +12,42 @@ static sonde_tissue_scales scales_of(const sonde_scene_state *state, double h) {
   return (sonde_tissue_scales){1, lambda * h, lambda * lambda * h * h};
 }
 
-static void linearise_rigid(sonde_scene_state *state, uint32_t b) {
-  const sonde_body *body = &state->scene->bodies[b];
-  for (uint32_t k = 0; k < 2; ++k) {
-    uint32_t s = body->first_slot + k;
-    state->force[s] = state->product[s] = vec3(0, 0, 0);
-  }
-  state->matrix->diagonal[body->first_slot] = m_diag(body->mass.mass_kg);
-  state->matrix->diagonal[body->first_slot + 1] = state->inertia[b].start;
-  state->force[body->first_slot] = v_scale(state->scene->gravity_m_s2, body->mass.mass_kg);
-}
-
-// The part of the matrix that belongs to one body.
-static void linearise_tissue(sonde_scene_state *state, const sonde_body *body,
-                             const sonde_tissue_part *waking, const sonde_tissue_scales *scales) {
-  uint32_t first = body->first_slot;
-  sonde_block_matrix part = {.row_count = body->node_count,
-                             .pair_count = body->model->topology.edge_count,
-                             .pairs = (const uint32_t(*)[2])body->model->topology.edges,
-                             .diagonal = state->matrix->diagonal + first,
-                             .upper = state->matrix->upper + body->first_pair,
-                             .inverse = state->matrix->inverse + first};
-  sonde_tissue_linearise(body->model, waking->row_count < body->node_count ? waking : NULL,
-                         state->stage_position + first, state->stage_velocity + first, scales,
-                         state->force + first, state->product + first, &part, state->tissue_nodes);
-}
-
-static void add_load(sonde_scene_state *state, const sonde_body *body, uint32_t i) {
-  sonde_vec3 *f = &state->force[body->first_slot + i];
-  *f = v_add(v_madd(*f, body->node_mass_kg[i], state->scene->gravity_m_s2), body->load_n[i]);
-}
-
-// The forces of sleepers are not made anew.
-static void add_loads(sonde_scene_state *state, const sonde_body *body,
-                      const sonde_tissue_part *waking) {
-  uint32_t count = body->model ? waking->row_count : body->node_count;
-  for (uint32_t r = 0; r < count; ++r) add_load(state, body, body->model ? waking->rows[r] : r);
-}
-
 static void linearise(sonde_scene_state *state, const sonde_tissue_scales *scales) {
   state->row_count = state->term_count = 0;
   for (uint32_t b = 0; b < state->scene->body_count; ++b) {
     const sonde_body *body = &state->scene->bodies[b];
     if (sonde_body_is_rigid(body)) {
-      linearise_rigid(state, b);
+      for (uint32_t k = 0; k < 2; ++k) {
+        uint32_t s = body->first_slot + k;
+        state->force[s] = state->product[s] = vec3(0, 0, 0);
+      }
+      state->matrix->diagonal[body->first_slot] = m_diag(body->mass.mass_kg);
+      state->matrix->diagonal[body->first_slot + 1] = state->inertia[b].start;
+      state->force[body->first_slot] = v_scale(state->scene->gravity_m_s2, body->mass.mass_kg);
       continue;
     }
-    if (body->model)
-      linearise_tissue(state, body, &state->part[b], scales);
-    else
+    if (body->model) {
+      // The part of the matrix that belongs to one body.
+      uint32_t first = body->first_slot;
+      sonde_block_matrix part = {.row_count = body->node_count,
+                                 .pair_count = body->model->topology.edge_count,
+                                 .pairs = (const uint32_t(*)[2])body->model->topology.edges,
+                                 .diagonal = state->matrix->diagonal + first,
+                                 .upper = state->matrix->upper + body->first_pair,
+                                 .inverse = state->matrix->inverse + first};
+      sonde_tissue_linearise(
+          body->model, state->part[b].row_count < body->node_count ? &state->part[b] : NULL,
+          state->stage_position + first, state->stage_velocity + first, scales,
+          state->force + first, state->product + first, &part, state->tissue_nodes);
+    } else
       sonde_network_linearise(state, b, scales);
-    add_loads(state, body, &state->part[b]);
+    // The forces of sleepers are not made anew.
+    uint32_t count = body->model ? state->part[b].row_count : body->node_count;
+    for (uint32_t r = 0; r < count; ++r) {
+      uint32_t i = body->model ? state->part[b].rows[r] : r;
+      sonde_vec3 *f = &state->force[body->first_slot + i];
+      *f = v_add(v_madd(*f, body->node_mass_kg[i], state->scene->gravity_m_s2), body->load_n[i]);
+    }
   }
   state->bulk_terms = state->term_count;
 }
@@ -94,8 +67,11 @@ static void evaluate(sonde_scene_state *state, double h, double moved_s) {
   state->report.contact_s += sonde_clock_now() - linearised;
 }
 
-// The diagonal blocks of the contact terms count as well, but the matrix keeps its own.
-static void precondition(sonde_scene_state *state) {
+static void solve(sonde_scene_state *state, sonde_vec3 *x) {
+  double start = sonde_clock_now();
+  const sonde_scene_step *step = &state->scene->step;
+  // The diagonal blocks of the contact terms count for the preconditioner, but the matrix keeps its
+  // own.
   sonde_block_matrix *matrix = state->matrix;
   sonde_active_set active = {state->active_rows, state->active_row_count, state->active_pairs,
                              state->active_pair_count};
@@ -109,45 +85,23 @@ static void precondition(sonde_scene_state *state) {
   }
   sonde_block_invert_diagonal(matrix, &active);
   memcpy(matrix->diagonal, state->plain_diagonal, matrix->row_count * sizeof *matrix->diagonal);
-}
-
-// Without stiffness the matrix is the mass: block by block.
-static void divide_by_mass(sonde_scene_state *state, sonde_vec3 *x) {
-  for (uint32_t r = 0; r < state->active_row_count; ++r) {
-    uint32_t i = state->active_rows[r];
-    const double *d = state->matrix->inverse[i];
-    sonde_vec3 b = state->right[i];
-    x[i] = vec3(d[0] * b.x + d[1] * b.y + d[2] * b.z, d[1] * b.x + d[3] * b.y + d[4] * b.z,
-                d[2] * b.x + d[4] * b.y + d[5] * b.z);
-  }
-}
-
-static void solve(sonde_scene_state *state, sonde_vec3 *x) {
-  double start = sonde_clock_now();
-  const sonde_scene_step *step = &state->scene->step;
-  sonde_active_set active = {state->active_rows, state->active_row_count, state->active_pairs,
-                             state->active_pair_count};
-  precondition(state);
   if (step->lambda > 0) {
     memset(state->scratch.q, 0, state->scene->slot_count * sizeof(sonde_vec3));
-    sonde_pcg_result result =
-        sonde_pcg_solve(state->matrix, &active, state->terms, state->term_count, state->right, x,
-                        &state->scratch, &step->solver);
+    sonde_pcg_result result = sonde_pcg_solve(matrix, &active, state->terms, state->term_count,
+                                              state->right, x, &state->scratch, &step->solver);
     state->report.solver_iterations += result.iterations;
     if (!result.converged) state->report.flags |= SONDE_SCENE_NOT_CONVERGED;
-  } else
-    divide_by_mass(state, x);
-  state->report.solve_s += sonde_clock_now() - start;
-}
-
-// b = h (F0 - lambda h K v0)
-static void first_right(sonde_scene_state *state, double h) {
-  double scale = -h * h * state->scene->step.lambda;
-  for (uint32_t i = 0; i < state->scene->slot_count; ++i) {
-    sonde_vec3 f = v_add(state->force[i], state->contact_force[i]);
-    sonde_vec3 kv = v_add(state->product[i], state->contact_product[i]);
-    state->right[i] = v_madd(v_scale(f, h), scale, kv);
+  } else {
+    // Without stiffness the matrix is the mass: it is divided by block by block.
+    for (uint32_t r = 0; r < state->active_row_count; ++r) {
+      uint32_t i = state->active_rows[r];
+      const double *d = matrix->inverse[i];
+      sonde_vec3 b = state->right[i];
+      x[i] = vec3(d[0] * b.x + d[1] * b.y + d[2] * b.z, d[1] * b.x + d[3] * b.y + d[4] * b.z,
+                  d[2] * b.x + d[4] * b.y + d[5] * b.z);
+    }
   }
+  state->report.solve_s += sonde_clock_now() - start;
 }
 
 static double norm_active(const sonde_scene_state *state, const sonde_vec3 *x) {
@@ -192,20 +146,6 @@ static void moves_since(sonde_scene_state *state, const sonde_vec3 *from, const 
   }
 }
 
-static void first_solve(sonde_scene_state *state, double h) {
-  enum { PASSES = 4 };
-  sonde_tissue_scales scales = scales_of(state, h);
-  sonde_vec3 *dv = state->now.increment;
-  for (int pass = 0; pass < PASSES; ++pass) {
-    sonde_touch_gather(state, &scales);
-    first_right(state, h);
-    solve(state, dv);
-    moves_since(state, NULL, dv, h);
-    uint32_t dropped = sonde_touch_predict(state);
-    if (!dropped || !(scales.damping > 0)) break;
-  }
-}
-
 static void evaluate_at(sonde_scene_state *state, const sonde_vec3 *dv, double h) {
   sonde_tissue_scales scales = scales_of(state, h);
   sonde_stage_at(state, dv, h);
@@ -214,28 +154,17 @@ static void evaluate_at(sonde_scene_state *state, const sonde_vec3 *dv, double h
   residual(state, dv, h);
 }
 
-// The slope of the incremental potential along p is -g.p. It starts at -slope < 0 and vanishes at
-// the minimum; a step past it by more than half is halved. Friction and dampers have no potential,
-// but their forces have this slope all the same.
-static void search(sonde_scene_state *state, sonde_vec3 *dv, double slope, double h) {
-  SONDE_ASSERT(h > 0);
-  enum { MOST = 8 };
-  double length = 1;
-  for (int k = 0;; ++k) {
-    evaluate_at(state, dv, h);
-    double now = dot_active(state, state->right, state->change);
-    bool overshot = now < -0.5 * slope || !isfinite(now);
-    if (!state->scene->step.line_search || !overshot || k == MOST) return;
-    length *= 0.5;
-    for (uint32_t r = 0; r < state->active_row_count; ++r) {
-      uint32_t i = state->active_rows[r];
-      dv[i] = v_madd(dv[i], -length, state->change[i]);
-    }
-    state->report.line_halvings++;
+static void move_active(const sonde_scene_state *state, sonde_vec3 *dv, double length) {
+  for (uint32_t r = 0; r < state->active_row_count; ++r) {
+    uint32_t i = state->active_rows[r];
+    dv[i] = v_madd(dv[i], length, state->change[i]);
   }
 }
 
+// Further iterations after the linear step of eq. (4).
 static void newton(sonde_scene_state *state, double h) {
+  enum { MOST_HALVINGS = 8 };
+  SONDE_ASSERT(h > 0);
   const sonde_scene_step *step = &state->scene->step;
   sonde_vec3 *dv = state->now.increment;
   double reference = norm_active(state, state->right);
@@ -246,12 +175,20 @@ static void newton(sonde_scene_state *state, double h) {
     if (!(size > step->newton_residual * reference)) break;
     memset(state->change, 0, state->scene->slot_count * sizeof *state->change);
     solve(state, state->change);
-    double slope = dot_active(state, state->right, state->change);
-    for (uint32_t r = 0; r < state->active_row_count; ++r) {
-      uint32_t i = state->active_rows[r];
-      dv[i] = v_add(dv[i], state->change[i]);
+    double slope = dot_active(state, state->right, state->change), length = 1;
+    move_active(state, dv, 1);
+    // The slope of the incremental potential along p is -g.p. It starts at -slope < 0 and vanishes
+    // at the minimum; a step past it by more than half is halved. Friction and dampers have no
+    // potential, but their forces have this slope all the same.
+    for (int halvings = 0;; ++halvings) {
+      evaluate_at(state, dv, h);
+      double now = dot_active(state, state->right, state->change);
+      bool overshot = now < -0.5 * slope || !isfinite(now);
+      if (!step->line_search || !overshot || halvings == MOST_HALVINGS) break;
+      length *= 0.5;
+      move_active(state, dv, -length);
+      state->report.line_halvings++;
     }
-    search(state, dv, slope, h);
     state->report.newton_iterations++;
   }
   moves_since(state, dv, dv, h); // the last evaluation was where the step ended
@@ -263,9 +200,11 @@ static uint32_t island_of(const uint32_t *island, uint32_t b) {
   return b;
 }
 
-// Bodies joined by contacts; one that something outside holds is marked.
-static void find_islands(sonde_scene_state *state) {
+// The sum of all equations of an island that nothing outside holds is its momentum: inner forces
+// cancel. What the solver left of it is a translation, which K and C do not feel.
+static void balance(sonde_scene_state *state, sonde_vec3 *dv, double h) {
   const sonde_scene *scene = state->scene;
+  // Bodies joined by contacts share an island.
   for (uint32_t b = 0; b < scene->body_count; ++b) state->island[b] = b;
   for (uint32_t t = 0; t < scene->touch_count; ++t) {
     if (!state->pair[t].point_count) continue;
@@ -273,13 +212,6 @@ static void find_islands(sonde_scene_state *state) {
     uint32_t b = island_of(state->island, scene->touches[t].b);
     state->island[a > b ? a : b] = a > b ? b : a;
   }
-}
-
-// The sum of all equations of an island that nothing outside holds is its momentum: inner forces
-// cancel. What the solver left of it is a translation, which K and C do not feel.
-static void balance(sonde_scene_state *state, sonde_vec3 *dv, double h) {
-  const sonde_scene *scene = state->scene;
-  find_islands(state);
   residual(state, dv, h);
   for (uint32_t root = 0; root < scene->body_count; ++root) {
     sonde_vec3 sum = vec3(0, 0, 0);
@@ -318,20 +250,6 @@ static void undo(sonde_scene_state *state, double h) {
   state->report.flags |= SONDE_SCENE_NON_FINITE;
 }
 
-static void mean_velocities(sonde_scene_state *state) {
-  const sonde_scene_step *step = &state->scene->step;
-  double lambda = step->symplectic ? 1 : step->lambda;
-  for (uint32_t i = 0; i < state->scene->slot_count; ++i)
-    state->mean_velocity[i] = v_madd(state->now.velocity[i], lambda, state->now.increment[i]);
-}
-
-static bool good_forces(const sonde_scene_state *state) {
-  bool good = true;
-  for (uint32_t t = 0; t < state->scene->touch_count; ++t)
-    good &= v_finite(state->pair[t].force_n) && v_finite(state->pair[t].torque_n_m);
-  return good;
-}
-
 void sonde_step_once(sonde_scene_state *state, double h) {
   SONDE_ASSERT(h > 0);
   sonde_kept_copy(&state->undo, &state->now);
@@ -339,13 +257,36 @@ void sonde_step_once(sonde_scene_state *state, double h) {
   sonde_rigid_begin(state, h);
   sonde_stage_start(state);
   evaluate(state, h, 0);
-  first_solve(state, h);
+  // The linear step solves eq. (4); where a push would pull at its end, it is dropped and the step
+  // is solved anew.
+  enum { PASSES = 4 };
+  sonde_tissue_scales scales = scales_of(state, h);
+  sonde_vec3 *dv = state->now.increment;
+  for (int pass = 0; pass < PASSES; ++pass) {
+    sonde_touch_gather(state, &scales);
+    // b = h (F0 - lambda h K v0)
+    double scale = -h * h * state->scene->step.lambda;
+    for (uint32_t i = 0; i < state->scene->slot_count; ++i) {
+      sonde_vec3 f = v_add(state->force[i], state->contact_force[i]);
+      sonde_vec3 kv = v_add(state->product[i], state->contact_product[i]);
+      state->right[i] = v_madd(v_scale(f, h), scale, kv);
+    }
+    solve(state, dv);
+    moves_since(state, NULL, dv, h);
+    uint32_t dropped = sonde_touch_predict(state);
+    if (!dropped || !(scales.damping > 0)) break;
+  }
   state->report.newton_iterations++;
   if (state->scene->step.newton_iterations > 1 && state->scene->step.lambda > 0) newton(state, h);
   if (state->scene->step.lambda > 0) balance(state, state->now.increment, h);
-  mean_velocities(state);
+  const sonde_scene_step *step = &state->scene->step;
+  double lambda = step->symplectic ? 1 : step->lambda;
+  for (uint32_t i = 0; i < state->scene->slot_count; ++i)
+    state->mean_velocity[i] = v_madd(state->now.velocity[i], lambda, state->now.increment[i]);
   sonde_touch_finish(state, h);
-  bool finite = good_forces(state);
+  bool finite = true;
+  for (uint32_t t = 0; t < state->scene->touch_count; ++t)
+    finite &= v_finite(state->pair[t].force_n) && v_finite(state->pair[t].torque_n_m);
   finite = sonde_stage_finish(state, state->now.increment, h) && finite;
   state->report.awake = state->active_row_count;
   if (!finite) {

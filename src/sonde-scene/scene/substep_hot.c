@@ -1,7 +1,4 @@
 // A step of the scene, whole or in substeps chosen by step doubling (docs/scene.md).
-// difference:  largest distance between two states' places.
-// try_double:  one step of h against two of h/2.
-// adaptive:    steps of dt/2^level, finer where the error asks for it, coarser where it allows it.
 #include "scene/state.h"
 
 #include "base/base.h"
@@ -14,34 +11,7 @@ void sonde_kept_copy(sonde_kept *to, const sonde_kept *from) {
   memcpy(to->block, from->block, to->bytes);
 }
 
-// Vertices of rigid bodies move with centre and rotation: their reach times the turn.
-static double difference(const sonde_scene_state *state) {
-  const sonde_kept *a = &state->now, *b = &state->whole;
-  double most = 0;
-  for (uint32_t i = 0; i < state->scene->slot_count; ++i)
-    most = fmax(most, v_distance(a->position[i], b->position[i]));
-  for (uint32_t k = 0; k < state->scene->body_count; ++k) {
-    const sonde_body *body = &state->scene->bodies[k];
-    if (!sonde_body_is_rigid(body)) continue;
-    sonde_quat turn = q_mul(a->rotation[k], q_conj(b->rotation[k]));
-    most = fmax(most, 2 * v_norm(vec3(turn.x, turn.y, turn.z)) * state->reach_m[k]);
-  }
-  return most;
-}
-
-// Leaves the finer of the two results; returns how far the coarser one is from it, over 2^p - 1.
-static double try_double(sonde_scene_state *state, double h) {
-  SONDE_ASSERT(h > 0);
-  double order_factor = state->scene->step.lambda == 0.5 ? 3 : 1;
-  sonde_kept_copy(&state->saved, &state->now);
-  sonde_step_guarded(state, h);
-  sonde_kept_copy(&state->whole, &state->now);
-  sonde_kept_copy(&state->now, &state->saved);
-  sonde_step_guarded(state, 0.5 * h);
-  sonde_step_guarded(state, 0.5 * h);
-  return difference(state) / order_factor;
-}
-
+// Steps of dt/2^level, finer where the error asks for it, coarser where it allows it.
 static void adaptive(sonde_scene_state *state) {
   const sonde_scene_step *step = &state->scene->step;
   double tolerance = step->substep_tolerance_m, worst = 0;
@@ -50,7 +20,27 @@ static void adaptive(sonde_scene_state *state) {
   if (level > step->substep_halvings) level = step->substep_halvings;
   while (done < finest) {
     uint32_t size = finest >> level;
-    double error = try_double(state, step->dt_s * size / finest);
+    // The error of two steps of h/2 is their distance from one of h, over 2^p - 1.
+    double h = step->dt_s * size / finest, order_factor = step->lambda == 0.5 ? 3 : 1;
+    SONDE_ASSERT(h > 0);
+    sonde_kept_copy(&state->saved, &state->now);
+    sonde_step_guarded(state, h);
+    sonde_kept_copy(&state->whole, &state->now);
+    sonde_kept_copy(&state->now, &state->saved);
+    sonde_step_guarded(state, 0.5 * h);
+    sonde_step_guarded(state, 0.5 * h);
+    // Vertices of rigid bodies move with centre and rotation: their reach times the turn.
+    const sonde_kept *a = &state->now, *b = &state->whole;
+    double most = 0;
+    for (uint32_t i = 0; i < state->scene->slot_count; ++i)
+      most = fmax(most, v_distance(a->position[i], b->position[i]));
+    for (uint32_t k = 0; k < state->scene->body_count; ++k) {
+      const sonde_body *body = &state->scene->bodies[k];
+      if (!sonde_body_is_rigid(body)) continue;
+      sonde_quat turn = q_mul(a->rotation[k], q_conj(b->rotation[k]));
+      most = fmax(most, 2 * v_norm(vec3(turn.x, turn.y, turn.z)) * state->reach_m[k]);
+    }
+    double error = most / order_factor;
     if (error > tolerance && level < step->substep_halvings) {
       sonde_kept_copy(&state->now, &state->saved);
       state->report.rejected++;

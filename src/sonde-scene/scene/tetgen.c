@@ -1,9 +1,4 @@
 // Tetrahedra of a pair of TetGen files, as a body of springs.
-// next_number:   the next number of a file, over comments.
-// read_nodes:    NAME.node: "count 3 ..." and "index x y z ..." per line.
-// read_elements: NAME.ele: "count 4 ..." and "index a b c d ..." per line.
-// collect:       one record per edge of every tetrahedron, merged by sorting.
-// skin:          faces that only one tetrahedron has.
 //
 // Every tetrahedron shares E V/L^2 out to each of its edges of length L (Van Gelder 1998). Then
 // sum k L^2 = 6 E V, which for edges without a preferred direction is an isotropic solid with
@@ -133,28 +128,6 @@ static void sort_key(uint32_t key[3]) {
       }
 }
 
-static void add_edges(const tetrahedra *tets, double youngs_pa, uint32_t t, record *out) {
-  static const int EDGE[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
-  const uint32_t *c = tets->corner[t];
-  double volume = six_volumes(tets, c) / 6;
-  for (int e = 0; e < 6; ++e) {
-    uint32_t a = c[EDGE[e][0]], b = c[EDGE[e][1]];
-    record *r = &out[e];
-    r->key[0] = a, r->key[1] = b, r->key[2] = UINT32_MAX;
-    sort_key(r->key);
-    r->stiffness = youngs_pa * volume / v_norm2(v_sub(tets->node[a], tets->node[b]));
-  }
-}
-
-static void add_faces(const tetrahedra *tets, uint32_t t, record *out) {
-  static const int FACE[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
-  for (int f = 0; f < 4; ++f) {
-    for (int k = 0; k < 3; ++k) out[f].face[k] = out[f].key[k] = tets->corner[t][FACE[f][k]];
-    sort_key(out[f].key);
-    out[f].stiffness = t;
-  }
-}
-
 static bool same(const record *a, const record *b) {
   return memcmp(a->key, b->key, sizeof a->key) == 0;
 }
@@ -218,13 +191,28 @@ static sonde_status add_skin(record *faces, uint32_t count, sonde_body *body, so
 
 static sonde_status build(const tetrahedra *tets, sonde_solid solid, sonde_body *body,
                           sonde_error *error) {
+  static const int EDGE[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
+  static const int FACE[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
   SONDE_ASSERT(tets->count > 0 && tets->node_count >= 4);
   record *edges = SONDE_NEW(record, 6 * (size_t)tets->count);
   record *faces = SONDE_NEW(record, 4 * (size_t)tets->count);
   sonde_status status = edges && faces ? SONDE_OK : sonde_fail_memory(error);
   for (uint32_t t = 0; t < tets->count && !status; ++t) {
-    add_edges(tets, solid.youngs_pa, t, &edges[6 * t]);
-    add_faces(tets, t, &faces[4 * t]);
+    const uint32_t *c = tets->corner[t];
+    double volume = six_volumes(tets, c) / 6;
+    for (uint32_t e = 0; e < 6; ++e) {
+      uint32_t a = c[EDGE[e][0]], b = c[EDGE[e][1]];
+      record *r = &edges[6 * t + e];
+      r->key[0] = a, r->key[1] = b, r->key[2] = UINT32_MAX;
+      sort_key(r->key);
+      r->stiffness = solid.youngs_pa * volume / v_norm2(v_sub(tets->node[a], tets->node[b]));
+    }
+    for (uint32_t f = 0; f < 4; ++f) {
+      record *r = &faces[4 * t + f];
+      for (int k = 0; k < 3; ++k) r->face[k] = r->key[k] = c[FACE[f][k]];
+      sort_key(r->key);
+      r->stiffness = t;
+    }
   }
   if (!status) {
     qsort(edges, 6 * (size_t)tets->count, sizeof *edges, compare);

@@ -1,17 +1,4 @@
 // Contact between any two bodies, every step (docs/scene.md).
-// near_pairs:    bodies whose boxes overlap.
-// lever:         how a body's slots move a point of its surface.
-// grip_*:        rows, relative velocity and forces of a column's two points.
-// tilt:          a point beside a face as its nodes move it.
-// meet:          one point for the friction of both bodies.
-// add_column:    a column: its grip, and under the foundation law its push.
-// add_rows:      one side of a volume's gradient as rows of slots.
-// add_region:    a region's push under the volume laws; share_out gives it to the columns.
-// find_touch:    pushes and grips of one pair of bodies.
-// gather_*:      forces, K v and matrix terms over the slots.
-// predict:       forces at the end of the step; drops pushes that would pull.
-// measure_*:     what readers see of a pair.
-// keep_hint:     the direction that the next search starts with.
 #include "scene/state.h"
 
 #include "base/base.h"
@@ -21,26 +8,6 @@
 
 static const sonde_body *body_of(const sonde_scene_state *state, uint32_t b) {
   return &state->scene->bodies[b];
-}
-
-static bool is_still(const sonde_body *body) { return body->motion == SONDE_BODY_FIXED; }
-
-// Fits the trees of what moves; a resting body's tree was fitted when the state was made.
-static uint32_t near_pairs(sonde_scene_state *state) {
-  uint32_t count = state->scene->body_count;
-  for (uint32_t b = 0; b < count; ++b) {
-    sonde_vec3 *surface = state->surface + state->surface_first[b];
-    if (!state->tree[b]) continue;
-    if (!is_still(body_of(state, b))) {
-      sonde_surface_at(state, b, state->stage_position, state->stage_rotation, surface);
-      sonde_face_tree_refit(state->tree[b], surface);
-    }
-    state->bounds[b] = sonde_face_tree_bounds(state->tree[b]);
-  }
-  uint32_t found = sonde_sweep_pairs(state->sweep, state->bounds, count, state->near,
-                                     state->near_capacity, NULL);
-  SONDE_ASSERT(found <= state->near_capacity);
-  return found;
 }
 
 // How the slots of a body move a point of a face: a rigid body's centre and spin, or three nodes.
@@ -167,23 +134,6 @@ static void tilt(const sonde_scene_state *state, uint32_t b, uint32_t face, sond
   grip->point[side] = v_madd(grip->point[side], aside, n);
 }
 
-// The two ends of a column lie a depth apart, and forces across it would turn the bodies. A rigid
-// body is held at the other's end instead, two bodies of one kind half way.
-static void meet(const sonde_scene_state *state, const sonde_touch *touch,
-                 const sonde_overlap_point *point, sonde_grip *grip) {
-  bool rigid[2] = {rigid_side(state, grip, 0), rigid_side(state, grip, 1)};
-  sonde_vec3 middle = v_lerp(grip->point[0], grip->point[1], 0.5);
-  const uint32_t body[2] = {touch->a, touch->b}, face[2] = {point->face_a, point->face_b};
-  sonde_vec3 other[2] = {grip->point[1], grip->point[0]};
-  for (int s = 0; s < 2; ++s) {
-    if (!rigid[s] && !rigid[!s]) tilt(state, body[s], face[s], middle, grip, s);
-    if (!rigid[s]) continue;
-    grip->point[s] = rigid[!s] ? middle : other[s];
-    uint32_t centre = body_of(state, body[s])->first_slot;
-    grip->arm[s] = v_sub(grip->point[s], state->stage_position[centre]);
-  }
-}
-
 // @param push of the point's region; UINT32_MAX: the column pushes by itself
 static void add_column(sonde_scene_state *state, uint32_t t, const sonde_overlap_region *region,
                        const sonde_overlap_point *point, uint32_t region_push) {
@@ -198,12 +148,25 @@ static void add_column(sonde_scene_state *state, uint32_t t, const sonde_overlap
   grip->normal = region->direction;
   grip->slot_count = lever(state, touch->a, point->face_a, point->weight_a, 1, grip, 0);
   grip->slot_count = lever(state, touch->b, point->face_b, point->weight_b, -1, grip, 1);
-  meet(state, touch, point, grip);
-  uint32_t side = touch->bond_side ? touch->b : touch->a;
-  uint32_t face = touch->bond_side ? point->face_b : point->face_a;
+  // The two ends of a column lie a depth apart, and forces across it would turn the bodies. A rigid
+  // body is held at the other's end instead, two bodies of one kind half way.
+  bool rigid[2] = {rigid_side(state, grip, 0), rigid_side(state, grip, 1)};
+  sonde_vec3 middle = v_lerp(grip->point[0], grip->point[1], 0.5);
+  const uint32_t body[2] = {touch->a, touch->b}, face[2] = {point->face_a, point->face_b};
+  const double *const weight[2] = {point->weight_a, point->weight_b};
+  sonde_vec3 other[2] = {grip->point[1], grip->point[0]};
+  for (int s = 0; s < 2; ++s) {
+    if (!rigid[s] && !rigid[!s]) tilt(state, body[s], face[s], middle, grip, s);
+    if (!rigid[s]) continue;
+    grip->point[s] = rigid[!s] ? middle : other[s];
+    uint32_t centre = body_of(state, body[s])->first_slot;
+    grip->arm[s] = v_sub(grip->point[s], state->stage_position[centre]);
+  }
+  int side = touch->bond_side;
+  const uint32_t *vertex = body_of(state, body[side])->surface.faces[face[side]];
   for (int k = 0; k < 3; ++k) {
-    grip->bond[k] = state->bond_first[t] + body_of(state, side)->surface.faces[face][k];
-    grip->bond_weight[k] = touch->bond_side ? point->weight_b[k] : point->weight_a[k];
+    grip->bond[k] = state->bond_first[t] + vertex[k];
+    grip->bond_weight[k] = weight[side][k];
   }
   grip->push = region_push;
   grip->share = region_push == UINT32_MAX ? 1 : point->area_m2;
@@ -280,14 +243,6 @@ static uint32_t add_region(sonde_scene_state *state, uint32_t t, const sonde_ove
   return state->push_count - 1;
 }
 
-// A region's push is shared out over its columns by their area, in newtons per unit of f.
-static void share_out(sonde_scene_state *state, uint32_t first, double newtons) {
-  double area = 0;
-  for (uint32_t k = first; k < state->grip_count; ++k) area += state->grips[k].share;
-  for (uint32_t k = first; k < state->grip_count; ++k)
-    state->grips[k].share *= area > 0 ? newtons / area : 0;
-}
-
 static void find_touch(sonde_scene_state *state, uint32_t t) {
   const sonde_touch *touch = &state->scene->touches[t];
   sonde_pair_measure *pair = &state->pair[t];
@@ -310,7 +265,12 @@ static void find_touch(sonde_scene_state *state, uint32_t t) {
     }
     for (uint32_t k = 0; k < region->point_count; ++k)
       add_column(state, t, region, &found->points[region->first_point + k], push);
-    if (push != UINT32_MAX) share_out(state, before, state->pushes[push].newtons);
+    if (push == UINT32_MAX) continue;
+    // The region's push is shared out over its columns by their area, in newtons per unit of f.
+    double area = 0, newtons = state->pushes[push].newtons;
+    for (uint32_t k = before; k < state->grip_count; ++k) area += state->grips[k].share;
+    for (uint32_t k = before; k < state->grip_count; ++k)
+      state->grips[k].share *= area > 0 ? newtons / area : 0;
   }
 }
 
@@ -319,7 +279,19 @@ void sonde_touch_find(sonde_scene_state *state) {
   state->push_count = state->grip_count = 0;
   if (!scene->touch_count) return;
   memset(state->pair, 0, scene->touch_count * sizeof *state->pair);
-  uint32_t count = near_pairs(state);
+  // The trees of what moves are fitted; a resting body's tree was fitted when the state was made.
+  for (uint32_t b = 0; b < scene->body_count; ++b) {
+    sonde_vec3 *surface = state->surface + state->surface_first[b];
+    if (!state->tree[b]) continue;
+    if (scene->bodies[b].motion != SONDE_BODY_FIXED) {
+      sonde_surface_at(state, b, state->stage_position, state->stage_rotation, surface);
+      sonde_face_tree_refit(state->tree[b], surface);
+    }
+    state->bounds[b] = sonde_face_tree_bounds(state->tree[b]);
+  }
+  uint32_t count = sonde_sweep_pairs(state->sweep, state->bounds, scene->body_count, state->near,
+                                     state->near_capacity, NULL);
+  SONDE_ASSERT(count <= state->near_capacity);
   for (uint32_t k = 0; k < count; ++k) {
     uint32_t t = state->touch_of[state->near[k][0] * scene->body_count + state->near[k][1]];
     if (t) find_touch(state, t - 1);
@@ -362,44 +334,40 @@ static void add_term(sonde_scene_state *state, double scale, uint32_t first, uin
       (sonde_rank_one){scale, count, state->rows + first, state->g + first};
 }
 
-static void gather_push(sonde_scene_state *state, const sonde_push *push,
-                        const sonde_tissue_scales *scales) {
-  if (push->dropped) return;
-  double kv = push->stiffness * along_rows(state, push, state->stage_velocity);
-  for (uint32_t k = push->first_row; k < push->first_row + push->row_count; ++k) {
-    uint32_t s = state->rows[k];
-    state->contact_force[s] = v_madd(state->contact_force[s], -push->force, state->g[k]);
-    state->contact_product[s] = v_madd(state->contact_product[s], kv, state->g[k]);
-  }
-  add_term(state, scales->damping * push->damper + scales->stiffness * push->stiffness,
-           push->first_row, push->row_count);
-}
-
-// Bonds resist along their tangents.
-static void gather_grip(sonde_scene_state *state, const sonde_grip *grip,
-                        const sonde_tissue_scales *scales) {
-  if (!grip->term_count || state->pushes[grip->push].dropped) return;
-  sonde_grip_spread(state, grip, grip->force, state->contact_force);
-  sonde_vec3 slip = sonde_grip_slip(state, grip, state->stage_velocity);
-  double scale = scales->damping * grip->damper + scales->stiffness * grip->stiffness;
-  for (uint32_t k = 0; k < grip->term_count; ++k) {
-    sonde_vec3 t = grip->tangent[k];
-    uint32_t first, count;
-    sonde_grip_spread(state, grip, v_scale(t, grip->stiffness * v_dot(slip, t)),
-                      state->contact_product);
-    if (scale > 0 && sonde_grip_rows(state, grip, t, &first, &count))
-      add_term(state, scale, first, count);
-  }
-}
-
 void sonde_touch_gather(sonde_scene_state *state, const sonde_tissue_scales *scales) {
   size_t bytes = state->scene->slot_count * sizeof(sonde_vec3);
   memset(state->contact_force, 0, bytes);
   memset(state->contact_product, 0, bytes);
   state->term_count = state->bulk_terms;
   uint32_t rows = state->row_count;
-  for (uint32_t k = 0; k < state->push_count; ++k) gather_push(state, &state->pushes[k], scales);
-  for (uint32_t k = 0; k < state->grip_count; ++k) gather_grip(state, &state->grips[k], scales);
+  for (uint32_t k = 0; k < state->push_count; ++k) {
+    const sonde_push *push = &state->pushes[k];
+    if (push->dropped) continue;
+    double kv = push->stiffness * along_rows(state, push, state->stage_velocity);
+    for (uint32_t r = push->first_row; r < push->first_row + push->row_count; ++r) {
+      uint32_t s = state->rows[r];
+      state->contact_force[s] = v_madd(state->contact_force[s], -push->force, state->g[r]);
+      state->contact_product[s] = v_madd(state->contact_product[s], kv, state->g[r]);
+    }
+    add_term(state, scales->damping * push->damper + scales->stiffness * push->stiffness,
+             push->first_row, push->row_count);
+  }
+  for (uint32_t k = 0; k < state->grip_count; ++k) {
+    const sonde_grip *grip = &state->grips[k];
+    if (!grip->term_count || state->pushes[grip->push].dropped) continue;
+    sonde_grip_spread(state, grip, grip->force, state->contact_force);
+    sonde_vec3 slip = sonde_grip_slip(state, grip, state->stage_velocity);
+    double scale = scales->damping * grip->damper + scales->stiffness * grip->stiffness;
+    // A bond resists along its tangents.
+    for (uint32_t i = 0; i < grip->term_count; ++i) {
+      sonde_vec3 t = grip->tangent[i];
+      uint32_t first, count;
+      sonde_grip_spread(state, grip, v_scale(t, grip->stiffness * v_dot(slip, t)),
+                        state->contact_product);
+      if (scale > 0 && sonde_grip_rows(state, grip, t, &first, &count))
+        add_term(state, scale, first, count);
+    }
+  }
   state->row_count = rows; // rows of tangents are made anew by the next gathering
 }
 
@@ -421,59 +389,52 @@ uint32_t sonde_touch_predict(sonde_scene_state *state) {
   return dropped;
 }
 
-// Forces and torques about the world's origin, from the rows of a's and b's slots.
-static void measure_push(sonde_scene_state *state, const sonde_push *push) {
-  const sonde_touch *touch = &state->scene->touches[push->touch];
-  sonde_pair_measure *pair = &state->pair[push->touch];
-  const sonde_body *a = body_of(state, touch->a), *b = body_of(state, touch->b);
-  pair->normal_n += push->end_force * push->newtons;
-  if (push->end_value > 0)
-    pair->energy_j += 0.5 * push->stiffness * push->end_value * push->end_value;
-  for (uint32_t k = push->first_row; k < push->first_row + push->row_count; ++k) {
-    uint32_t s = state->rows[k];
-    sonde_vec3 force = v_scale(state->g[k], -push->end_force);
-    bool of_a = s >= a->first_slot && s - a->first_slot < a->slot_count;
-    const sonde_body *body = of_a ? a : b;
-    sonde_vec3 *torque = of_a ? &pair->torque_n_m : &pair->torque_b_n_m;
-    if (sonde_body_is_rigid(body) && s == body->first_slot + 1) {
-      *torque = v_add(*torque, force);
-      continue;
-    }
-    *torque = v_add(*torque, v_cross(state->stage_position[s], force));
-    if (of_a) pair->force_n = v_add(pair->force_n, force);
-  }
-}
-
-static void measure_grip(sonde_scene_state *state, const sonde_grip *grip) {
-  if (state->pushes[grip->push].dropped) return;
-  sonde_pair_measure *pair = &state->pair[grip->touch];
-  sonde_vec3 f = grip->end_force;
-  pair->friction_n = v_add(pair->friction_n, f);
-  pair->torque_n_m = v_add(pair->torque_n_m, v_cross(grip->point[0], f));
-  pair->torque_b_n_m = v_sub(pair->torque_b_n_m, v_cross(grip->point[1], f));
-}
-
-// The direction of the largest region is where the next search starts.
-static void keep_hint(sonde_scene_state *state, uint32_t t) {
-  state->now.hint[t] = vec3(0, 0, 0);
-  if (!state->pair[t].region_count) return;
-  const sonde_overlap_result *found = sonde_overlap_get(state->overlap[t]);
-  double most = 0;
-  for (uint32_t r = 0; r < found->region_count; ++r)
-    if (found->regions[r].volume_m3 > most) {
-      most = found->regions[r].volume_m3;
-      state->now.hint[t] = found->regions[r].direction;
-    }
-}
-
 void sonde_touch_finish(sonde_scene_state *state, double h) {
   SONDE_ASSERT(h > 0);
-  for (uint32_t k = 0; k < state->push_count; ++k) measure_push(state, &state->pushes[k]);
-  for (uint32_t k = 0; k < state->grip_count; ++k) measure_grip(state, &state->grips[k]);
+  // Forces and torques about the world's origin follow from the rows of a's and b's slots.
+  for (uint32_t k = 0; k < state->push_count; ++k) {
+    const sonde_push *push = &state->pushes[k];
+    const sonde_touch *touch = &state->scene->touches[push->touch];
+    sonde_pair_measure *pair = &state->pair[push->touch];
+    const sonde_body *a = body_of(state, touch->a), *b = body_of(state, touch->b);
+    pair->normal_n += push->end_force * push->newtons;
+    if (push->end_value > 0)
+      pair->energy_j += 0.5 * push->stiffness * push->end_value * push->end_value;
+    for (uint32_t r = push->first_row; r < push->first_row + push->row_count; ++r) {
+      uint32_t s = state->rows[r];
+      sonde_vec3 force = v_scale(state->g[r], -push->end_force);
+      bool of_a = s >= a->first_slot && s - a->first_slot < a->slot_count;
+      const sonde_body *body = of_a ? a : b;
+      sonde_vec3 *torque = of_a ? &pair->torque_n_m : &pair->torque_b_n_m;
+      if (sonde_body_is_rigid(body) && s == body->first_slot + 1) {
+        *torque = v_add(*torque, force);
+        continue;
+      }
+      *torque = v_add(*torque, v_cross(state->stage_position[s], force));
+      if (of_a) pair->force_n = v_add(pair->force_n, force);
+    }
+  }
+  for (uint32_t k = 0; k < state->grip_count; ++k) {
+    const sonde_grip *grip = &state->grips[k];
+    if (state->pushes[grip->push].dropped) continue;
+    sonde_pair_measure *pair = &state->pair[grip->touch];
+    sonde_vec3 f = grip->end_force;
+    pair->friction_n = v_add(pair->friction_n, f);
+    pair->torque_n_m = v_add(pair->torque_n_m, v_cross(grip->point[0], f));
+    pair->torque_b_n_m = v_sub(pair->torque_b_n_m, v_cross(grip->point[1], f));
+  }
   for (uint32_t t = 0; t < state->scene->touch_count; ++t) {
     sonde_pair_measure *pair = &state->pair[t];
     pair->force_n = v_add(pair->force_n, pair->friction_n);
-    keep_hint(state, t);
+    // The direction of the largest region is where the next search starts.
+    const sonde_overlap_result *found = sonde_overlap_get(state->overlap[t]);
+    double most = 0;
+    state->now.hint[t] = vec3(0, 0, 0);
+    for (uint32_t r = 0; r < found->region_count && pair->region_count; ++r)
+      if (found->regions[r].volume_m3 > most) {
+        most = found->regions[r].volume_m3;
+        state->now.hint[t] = found->regions[r].direction;
+      }
   }
   sonde_bonds_advance(state, h);
 }

@@ -5,68 +5,41 @@
 #include "base/base.h"
 #include "base/maths.h"
 
-// Velocity of a surface vertex.
-static sonde_vec3 velocity_of(const sonde_scene_state *state, uint32_t b, uint32_t vertex,
-                              sonde_vec3 place) {
-  const sonde_body *body = &state->scene->bodies[b];
-  const sonde_vec3 *v = state->now.velocity + body->first_slot;
-  if (!sonde_body_is_rigid(body))
-    return v[body->surface_node ? body->surface_node[vertex] : vertex];
-  sonde_vec3 arm = v_sub(place, state->now.position[body->first_slot]);
-  return v_add(v[0], v_cross(v[1], arm));
-}
-
-static sonde_vec3 start_of(const sonde_body *body, uint32_t vertex) {
-  sonde_vec3 p = body->surface.vertices[vertex];
-  return sonde_body_is_rigid(body) ? pose_apply(body->start, v_add(p, body->mass.centre_m)) : p;
-}
-
-static void begin_array(sonde_file *file, const char *name) {
+// Three numbers per point.
+static void put_array(sonde_file *file, const char *name, const sonde_vec3 *values,
+                      uint32_t count) {
   sonde_file_printf(file,
                     "<DataArray type=\"Float32\" Name=\"%s\" NumberOfComponents=\"3\" "
                     "format=\"ascii\">\n",
                     name);
-}
-
-static void put(sonde_file *file, sonde_vec3 p) {
-  sonde_file_printf(file, "%.7g %.7g %.7g\n", p.x, p.y, p.z);
-}
-
-static void put_points(sonde_file *file, const sonde_scene_state *state, uint32_t b,
-                       const sonde_vec3 *place) {
-  const sonde_body *body = &state->scene->bodies[b];
-  uint32_t count = body->surface.vertex_count;
-  sonde_file_printf(file, "<PointData Vectors=\"velocity_m_s\">\n");
-  begin_array(file, "velocity_m_s");
-  for (uint32_t i = 0; i < count; ++i) put(file, velocity_of(state, b, i, place[i]));
+  for (uint32_t i = 0; i < count; ++i)
+    sonde_file_printf(file, "%.7g %.7g %.7g\n", values[i].x, values[i].y, values[i].z);
   sonde_file_printf(file, "</DataArray>\n");
-  begin_array(file, "displacement_m");
-  for (uint32_t i = 0; i < count; ++i) put(file, v_sub(place[i], start_of(body, i)));
-  sonde_file_printf(file, "</DataArray>\n</PointData>\n<Points>\n");
-  begin_array(file, "points_m");
-  for (uint32_t i = 0; i < count; ++i) put(file, place[i]);
-  sonde_file_printf(file, "</DataArray>\n</Points>\n");
-}
-
-static void put_faces(sonde_file *file, const sonde_mesh *mesh) {
-  SONDE_ASSERT(mesh->face_count > 0);
-  sonde_file_printf(file, "<Polys>\n<DataArray type=\"Int32\" Name=\"connectivity\" "
-                          "format=\"ascii\">\n");
-  for (uint32_t f = 0; f < mesh->face_count; ++f)
-    sonde_file_printf(file, "%u %u %u\n", mesh->faces[f][0], mesh->faces[f][1], mesh->faces[f][2]);
-  sonde_file_printf(file, "</DataArray>\n<DataArray type=\"Int32\" Name=\"offsets\" "
-                          "format=\"ascii\">\n");
-  for (uint32_t f = 0; f < mesh->face_count; ++f) sonde_file_printf(file, "%u\n", 3 * (f + 1));
-  sonde_file_printf(file, "</DataArray>\n</Polys>\n");
 }
 
 sonde_status sonde_scene_save_vtp(const sonde_scene_state *state, uint32_t b, const char *path,
                                   sonde_error *error) {
   SONDE_ASSERT(b < state->scene->body_count);
-  const sonde_mesh *mesh = &state->scene->bodies[b].surface;
-  sonde_vec3 *place = SONDE_NEW(sonde_vec3, mesh->vertex_count);
+  const sonde_body *body = &state->scene->bodies[b];
+  const sonde_mesh *mesh = &body->surface;
+  const sonde_vec3 *node_velocity = state->now.velocity + body->first_slot;
+  uint32_t count = mesh->vertex_count;
+  bool rigid = sonde_body_is_rigid(body);
+  SONDE_ASSERT(mesh->face_count > 0);
+  sonde_vec3 *place = SONDE_NEW(sonde_vec3, 3 * (size_t)count);
   if (!place) return sonde_fail_memory(error);
+  sonde_vec3 *velocity = place + count, *displacement = velocity + count;
   sonde_scene_surface(state, b, place);
+  for (uint32_t i = 0; i < count; ++i) {
+    sonde_vec3 start = mesh->vertices[i];
+    if (rigid) {
+      sonde_vec3 arm = v_sub(place[i], state->now.position[body->first_slot]);
+      velocity[i] = v_add(node_velocity[0], v_cross(node_velocity[1], arm));
+      start = pose_apply(body->start, v_add(start, body->mass.centre_m));
+    } else
+      velocity[i] = node_velocity[body->surface_node ? body->surface_node[i] : i];
+    displacement[i] = v_sub(place[i], start);
+  }
   sonde_file *file = NULL;
   sonde_status status = sonde_file_create(path, &file, error);
   if (!status) {
@@ -74,11 +47,21 @@ sonde_status sonde_scene_save_vtp(const sonde_scene_state *state, uint32_t b, co
                       "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"0.1\" "
                       "byte_order=\"LittleEndian\">\n<PolyData>\n<Piece NumberOfPoints=\"%u\" "
                       "NumberOfVerts=\"0\" NumberOfLines=\"0\" NumberOfStrips=\"0\" "
-                      "NumberOfPolys=\"%u\">\n",
-                      mesh->vertex_count, mesh->face_count);
-    put_points(file, state, b, place);
-    put_faces(file, mesh);
-    sonde_file_printf(file, "</Piece>\n</PolyData>\n</VTKFile>\n");
+                      "NumberOfPolys=\"%u\">\n<PointData Vectors=\"velocity_m_s\">\n",
+                      count, mesh->face_count);
+    put_array(file, "velocity_m_s", velocity, count);
+    put_array(file, "displacement_m", displacement, count);
+    sonde_file_printf(file, "</PointData>\n<Points>\n");
+    put_array(file, "points_m", place, count);
+    sonde_file_printf(file, "</Points>\n<Polys>\n<DataArray type=\"Int32\" "
+                            "Name=\"connectivity\" format=\"ascii\">\n");
+    for (uint32_t f = 0; f < mesh->face_count; ++f)
+      sonde_file_printf(file, "%u %u %u\n", mesh->faces[f][0], mesh->faces[f][1],
+                        mesh->faces[f][2]);
+    sonde_file_printf(file, "</DataArray>\n<DataArray type=\"Int32\" Name=\"offsets\" "
+                            "format=\"ascii\">\n");
+    for (uint32_t f = 0; f < mesh->face_count; ++f) sonde_file_printf(file, "%u\n", 3 * (f + 1));
+    sonde_file_printf(file, "</DataArray>\n</Polys>\n</Piece>\n</PolyData>\n</VTKFile>\n");
     status = sonde_file_commit(file, error);
   }
   sonde_free(place);
