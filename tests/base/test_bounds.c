@@ -1,4 +1,4 @@
-// Limits of input: a file, a stream without an end and a JSON text cost no more than they allow.
+// Limits of input: a file and a stream without an end cost no more than they allow.
 #include "test.h"
 
 #include "base/bounds.h"
@@ -77,32 +77,11 @@ static void a_zero_byte_is_told_with_its_line(void **unused) {
   unlink(path);
 }
 
-static sonde_status shape(const char *text, sonde_error *error) {
-  return sonde_bounded_json("x.json", text, strlen(text), &SMALL, error);
-}
-
-static void json_is_bounded_before_it_is_parsed(void **unused) {
-  (void)unused;
-  sonde_error error = {0};
-  assert_int_equal(shape("{\"a\": [[1]]}", &error), SONDE_OK);
-  assert_int_equal(shape("{\"a\":\n[[[1]]]}", &error), SONDE_FORMAT);
-  assert_string_equal(error.message, "x.json:2: expected at most 3 levels of nesting");
-  assert_int_equal(shape("[1,2,3,4,5]", &error), SONDE_OK);
-  assert_int_equal(shape("[1,2,3,4,5,6]", &error), SONDE_FORMAT);
-  assert_string_equal(error.message, "x.json:1: expected at most 5 values");
-  // brackets within texts do not count, nor does a quote behind a backslash end a text
-  assert_int_equal(shape("[\"[[[[[[\\\"[[[,,,,,,\"]", &error), SONDE_OK);
-  // what is not JSON is the parser's to refuse, not to be read beyond its end
-  assert_int_equal(shape("\"\\", &error), SONDE_OK);
-  assert_int_equal(shape("]]]][", &error), SONDE_OK);
-}
-
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(a_file_is_read_up_to_its_limit),
       cmocka_unit_test(a_stream_without_end_is_refused),
       cmocka_unit_test(a_zero_byte_is_told_with_its_line),
-      cmocka_unit_test(json_is_bounded_before_it_is_parsed),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

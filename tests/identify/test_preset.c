@@ -39,7 +39,7 @@ static void refuse(const char *text, sonde_status expected, const char *word) {
 
 static void bad_files_are_refused(void **unused) {
   (void)unused;
-  refuse("{\n\"format\": \n", SONDE_FORMAT, "not JSON");
+  refuse("{\n\"format\": \n", SONDE_FORMAT, ":3: the text ends where a value was expected");
   refuse("[]", SONDE_FORMAT, "sonde-preset");
   refuse("{\"format\": \"sonde-preset\", \"version\": 9}", SONDE_VERSION, "\"version\": 1");
   refuse(HEAD ",\n\"mu_static\": 9}", SONDE_FORMAT, ":4: mu_static is 9, expected 0 to 5");

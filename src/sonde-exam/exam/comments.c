@@ -1,6 +1,6 @@
 // Comments of a teacher: notes of the recording; RECORDING.comments.json of old ones.
 // is_text:              UTF-8 without control characters but line ends and tabs.
-// read_comment, read_all, load_file: the file of an old recording.
+// read_comment, load_file: the file of an old recording.
 // take_notes:           those of a journal.
 // write_all:            the file as a whole.
 // sonde_comments_*:     the interface.
@@ -8,8 +8,8 @@
 #include "sonde/exam_player.h"
 
 #include "base/bounds.h"
+#include "sonde/base_json.h"
 
-#include <cjson/cJSON.h>
 #include <math.h>
 #include <string.h>
 #include <unistd.h>
@@ -55,18 +55,16 @@ static const char *fault_of(const sonde_comment *c) {
   return c->text[0] ? NULL : "has no text";
 }
 
-static void copy_text(const cJSON *object, const char *key, char *to, size_t size) {
-  const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, key);
-  bool fits = cJSON_IsString(item) && strlen(item->valuestring) < size;
-  if (fits)
-    snprintf(to, size, "%s", item->valuestring);
+static void copy_text(const sonde_json *object, const char *key, char *to, size_t size) {
+  const char *text = sonde_json_as_text(sonde_json_member(object, key));
+  if (text && strlen(text) < size)
+    snprintf(to, size, "%s", text);
   else
     memset(to, 0xff, size); // no text: fault_of() says so
 }
 
-static void read_comment(const cJSON *object, sonde_comment *comment) {
-  const cJSON *time = cJSON_GetObjectItemCaseSensitive(object, "time_s");
-  comment->time_s = cJSON_IsNumber(time) ? time->valuedouble : (double)NAN;
+static void read_comment(const sonde_json *object, sonde_comment *comment) {
+  comment->time_s = sonde_json_as_number(sonde_json_member(object, "time_s"));
   copy_text(object, "author", comment->author, sizeof comment->author);
   copy_text(object, "text", comment->text, sizeof comment->text);
 }
@@ -80,41 +78,33 @@ static void insert(sonde_comments *comments, const sonde_comment *comment) {
   comments->count++;
 }
 
-static sonde_status read_all(const char *path, const cJSON *root, sonde_comments *comments,
-                             sonde_error *error) {
-  const cJSON *list = cJSON_GetObjectItemCaseSensitive(root, "comments"), *item;
-  int count = cJSON_GetArraySize(list), at = 0;
-  if (!cJSON_IsArray(list) || count > SONDE_MAX_COMMENTS)
-    return sonde_fail(error, SONDE_FORMAT, "%s: expected a list \"comments\" of at most %d", path,
-                      SONDE_MAX_COMMENTS);
-  cJSON_ArrayForEach(item, list) {
-    sonde_comment comment;
-    read_comment(item, &comment);
-    const char *fault = fault_of(&comment);
-    if (fault) return sonde_fail(error, SONDE_FORMAT, "%s: comment %d %s", path, at, fault);
-    insert(comments, &comment);
-    ++at;
-  }
-  return SONDE_OK;
-}
-
 // Those of a file from before version 8.
 static sonde_status load_file(const char *recording, sonde_comments *comments, sonde_error *error) {
   char *path = path_of(recording), *bytes = NULL;
   size_t size = 0;
-  cJSON *root = NULL;
+  sonde_json *root = NULL;
   sonde_status status = path ? SONDE_OK : sonde_fail_memory(error);
   if (status || access(path, F_OK) != 0) goto done;
   status = sonde_bounded_load_text(path, &sonde_limits_json, &bytes, &size, error);
-  if (!status) status = sonde_bounded_json(path, bytes, size, &sonde_limits_json, error);
+  if (!status)
+    status = sonde_json_parse(bytes, size, &(sonde_json_source){.name = path}, &root, error);
   if (status) goto done;
-  root = cJSON_ParseWithLength(bytes, size);
-  if (root)
-    status = read_all(path, root, comments, error);
-  else
-    status = sonde_fail(error, SONDE_FORMAT, "%s: is not a JSON object", path);
+  const sonde_json *list = sonde_json_member(root, "comments");
+  if (sonde_json_kind_of(list) != SONDE_JSON_LIST || sonde_json_count(list) > SONDE_MAX_COMMENTS)
+    status = sonde_fail(error, SONDE_FORMAT, "%s: expected a list \"comments\" of at most %d", path,
+                        SONDE_MAX_COMMENTS);
+  const sonde_json *item = status ? NULL : sonde_json_first(list);
+  for (int at = 0; item && !status; ++at, item = sonde_json_next(item)) {
+    sonde_comment comment;
+    read_comment(item, &comment);
+    const char *fault = fault_of(&comment);
+    if (fault)
+      status = sonde_fail(error, SONDE_FORMAT, "%s: comment %d %s", path, at, fault);
+    else
+      insert(comments, &comment);
+  }
 done:
-  cJSON_Delete(root);
+  sonde_json_free(root);
   sonde_free(bytes);
   sonde_free(path);
   return status;
@@ -123,12 +113,14 @@ done:
 // A comment of a journal that is not one is left out: the recording is whole without it.
 static void take_notes(const sonde_notes *notes, sonde_comments *comments) {
   for (uint32_t i = 0; i < notes->count && comments->count < SONDE_MAX_COMMENTS; ++i) {
+    const sonde_note *note = &notes->list[i];
     sonde_comment comment;
-    if (notes->list[i].kind != SONDE_NOTE_COMMENT) continue;
-    cJSON *root = cJSON_Parse(notes->list[i].text);
+    sonde_json *root = NULL;
+    if (note->kind != SONDE_NOTE_COMMENT) continue;
+    if (sonde_json_parse(note->text, strlen(note->text), NULL, &root, NULL)) continue;
     read_comment(root, &comment);
     if (!fault_of(&comment)) insert(comments, &comment);
-    cJSON_Delete(root);
+    sonde_json_free(root);
   }
 }
 
@@ -148,53 +140,44 @@ sonde_status sonde_comments_load(const char *recording, sonde_comments *comments
   return status;
 }
 
-static cJSON *item_of(const sonde_comment *comment) {
-  cJSON *item = cJSON_CreateObject();
-  cJSON_AddNumberToObject(item, "time_s", comment->time_s);
-  cJSON_AddStringToObject(item, "author", comment->author);
-  cJSON_AddStringToObject(item, "text", comment->text);
-  return item;
+static void put_comment(sonde_json_out *out, const sonde_comment *comment) {
+  sonde_json_begin_object(out, NULL);
+  sonde_json_put_real(out, "time_s", comment->time_s, 0);
+  sonde_json_put_text(out, "author", comment->author);
+  sonde_json_put_text(out, "text", comment->text);
+  sonde_json_end(out);
 }
 
 char *sonde_comment_json(const sonde_comment *comment, sonde_error *error) {
   const char *fault = fault_of(comment);
+  sonde_json_out out = {.layout = SONDE_JSON_COMPACT};
+  char *text = NULL;
+  size_t count;
   if (fault) {
     sonde_fail(error, SONDE_ARGUMENT, "the comment %s", fault);
     return NULL;
   }
-  cJSON *item = item_of(comment);
-  char *printed = cJSON_PrintUnformatted(item);
-  size_t bytes = printed ? strlen(printed) + 1 : 0;
-  char *text = printed ? SONDE_NEW(char, bytes) : NULL;
-  if (text)
-    memcpy(text, printed, bytes);
-  else
-    sonde_fail_memory(error);
-  cJSON_free(printed);
-  cJSON_Delete(item);
-  return text;
-}
-
-static char *json_of(const sonde_comments *comments) {
-  cJSON *root = cJSON_CreateObject(), *list = cJSON_AddArrayToObject(root, "comments");
-  for (uint32_t k = 0; k < comments->count; ++k)
-    cJSON_AddItemToArray(list, item_of(&comments->list[k]));
-  char *text = cJSON_Print(root);
-  cJSON_Delete(root);
+  if (sonde_file_in_memory(&out.file, error)) return NULL;
+  put_comment(&out, comment);
+  (void)sonde_file_take(out.file, &text, &count, error);
   return text;
 }
 
 static sonde_status write_all(const char *recording, const sonde_comments *comments,
                               sonde_error *error) {
-  char *path = path_of(recording), *text = json_of(comments);
-  sonde_file *file = NULL;
-  sonde_status status = path && text ? SONDE_OK : sonde_fail_memory(error);
-  if (!status) status = sonde_file_create(path, &file, error);
+  char *path = path_of(recording);
+  sonde_json_out out = {.layout = SONDE_JSON_TABS};
+  sonde_status status = path ? SONDE_OK : sonde_fail_memory(error);
+  if (!status) status = sonde_file_create(path, &out.file, error);
   if (!status) {
-    sonde_file_printf(file, "%s\n", text);
-    status = sonde_file_commit(file, error);
+    sonde_json_begin_object(&out, NULL);
+    sonde_json_begin_list(&out, "comments");
+    for (uint32_t k = 0; k < comments->count; ++k) put_comment(&out, &comments->list[k]);
+    sonde_json_end(&out);
+    sonde_json_end(&out);
+    sonde_file_printf(out.file, "\n");
+    status = sonde_file_commit(out.file, error);
   }
-  cJSON_free(text);
   sonde_free(path);
   return status;
 }

@@ -4,7 +4,7 @@
 // close_block:      a block record; what came before survives the program.
 // publish:          how the writing goes.
 // end_inputs:       when one is missing, those behind it are of no use.
-// json_*, header_json: the header line.
+// put_hex, put_world, write_header: the header line.
 // sonde_recorder_*: the interface.
 #include "exam/record.h"
 
@@ -13,7 +13,6 @@
 #include "base/disk.h"
 #include "base/bytes.h"
 
-#include <cjson/cJSON.h>
 #include <math.h>
 #include <stdatomic.h>
 #include <string.h>
@@ -166,50 +165,59 @@ sonde_recorder_state sonde_recorder_look(const sonde_recorder *recorder) {
 }
 
 // 64-bit numbers do not fit a JSON number.
-static void json_hex(cJSON *object, const char *key, uint64_t value) {
+static void put_hex(sonde_json_out *out, const char *key, uint64_t value) {
   char text[17];
   snprintf(text, sizeof text, "%016llx", (unsigned long long)value);
-  cJSON_AddStringToObject(object, key, text);
+  sonde_json_put_text(out, key, text);
 }
 
-static void json_world(cJSON *root, const sonde_world_def *def) {
-  cJSON *world = cJSON_AddObjectToObject(root, "world");
-  cJSON_AddNumberToObject(world, "dt_s", def->dt_s);
-  cJSON_AddNumberToObject(world, "implicitness", def->implicitness);
-  cJSON_AddNumberToObject(world, "newton_iterations", def->newton_iterations);
-  cJSON_AddNumberToObject(world, "pcg_relative", def->pcg.relative_residual);
-  cJSON_AddNumberToObject(world, "pcg_absolute", def->pcg.absolute_residual);
-  cJSON_AddNumberToObject(world, "pcg_iterations", def->pcg.max_iterations);
-  cJSON_AddNumberToObject(world, "contact_law", (double)def->contact_law);
-  cJSON_AddNumberToObject(world, "contact_stiffness_n_m3", def->contact_stiffness_n_m3);
-  cJSON_AddNumberToObject(world, "contact_damping_n_s_m3", def->contact_damping_n_s_m3);
-  cJSON_AddNumberToObject(world, "engine", (double)def->engine);
-  cJSON_AddNumberToObject(world, "sleep_displacement_m", def->sleep_displacement_m);
+static void put_world(sonde_json_out *out, const sonde_world_def *def) {
+  sonde_json_begin_object(out, "world");
+  sonde_json_put_real(out, "dt_s", def->dt_s, 0);
+  sonde_json_put_real(out, "implicitness", def->implicitness, 0);
+  sonde_json_put_integer(out, "newton_iterations", def->newton_iterations);
+  sonde_json_put_real(out, "pcg_relative", def->pcg.relative_residual, 0);
+  sonde_json_put_real(out, "pcg_absolute", def->pcg.absolute_residual, 0);
+  sonde_json_put_integer(out, "pcg_iterations", def->pcg.max_iterations);
+  sonde_json_put_integer(out, "contact_law", def->contact_law);
+  sonde_json_put_real(out, "contact_stiffness_n_m3", def->contact_stiffness_n_m3, 0);
+  sonde_json_put_real(out, "contact_damping_n_s_m3", def->contact_damping_n_s_m3, 0);
+  sonde_json_put_integer(out, "engine", def->engine);
+  sonde_json_put_real(out, "sleep_displacement_m", def->sleep_displacement_m, 0);
+  sonde_json_end(out);
 }
 
-static char *header_json(const sonde_record_head *head) {
-  cJSON *root = cJSON_CreateObject();
-  cJSON *model = cJSON_AddObjectToObject(root, "model");
+// The header line with its end.
+static sonde_status write_header(const sonde_record_head *head, char **text, size_t *count,
+                                 sonde_error *error) {
+  sonde_json_out out = {.layout = SONDE_JSON_COMPACT};
+  sonde_status status = sonde_file_in_memory(&out.file, error);
+  if (status) return status;
   bool fits = head->model_path && strlen(head->model_path) < SONDE_RECORD_PATH_BYTES;
-  cJSON_AddStringToObject(model, "path", fits ? head->model_path : "");
-  cJSON_AddStringToObject(model, "name", head->model_name);
-  json_hex(model, "checksum", head->model_checksum);
-  cJSON *probes = cJSON_AddArrayToObject(root, "probes");
+  sonde_json_begin_object(&out, NULL);
+  sonde_json_begin_object(&out, "model");
+  sonde_json_put_text(&out, "path", fits ? head->model_path : "");
+  sonde_json_put_text(&out, "name", head->model_name);
+  put_hex(&out, "checksum", head->model_checksum);
+  sonde_json_end(&out);
+  sonde_json_begin_list(&out, "probes");
   for (uint32_t i = 0; i < head->probe_count; ++i) {
-    cJSON *probe = cJSON_CreateObject();
-    cJSON_AddStringToObject(probe, "name", head->probe_names[i]);
-    json_hex(probe, "hash", sonde_probe_hash(&head->probes[i]));
-    cJSON_AddItemToArray(probes, probe);
+    sonde_json_begin_object(&out, NULL);
+    sonde_json_put_text(&out, "name", head->probe_names[i]);
+    put_hex(&out, "hash", sonde_probe_hash(&head->probes[i]));
+    sonde_json_end(&out);
   }
-  json_world(root, &head->world);
-  sonde_setup_write(root, &head->setup);
-  cJSON *image = cJSON_AddObjectToObject(root, "image");
-  cJSON_AddNumberToObject(image, "width", head->image_width);
-  cJSON_AddNumberToObject(image, "height", head->image_height);
-  cJSON_AddNumberToObject(image, "ticks_per_image", head->ticks_per_image);
-  char *text = cJSON_PrintUnformatted(root);
-  cJSON_Delete(root);
-  return text;
+  sonde_json_end(&out);
+  put_world(&out, &head->world);
+  sonde_setup_write(&out, &head->setup);
+  sonde_json_begin_object(&out, "image");
+  sonde_json_put_integer(&out, "width", head->image_width);
+  sonde_json_put_integer(&out, "height", head->image_height);
+  sonde_json_put_integer(&out, "ticks_per_image", head->ticks_per_image);
+  sonde_json_end(&out);
+  sonde_json_end(&out);
+  sonde_file_printf(out.file, "\n");
+  return sonde_file_take(out.file, text, count, error);
 }
 
 uint64_t sonde_probe_hash(const sonde_probe *probe) {
@@ -222,21 +230,19 @@ uint64_t sonde_probe_hash(const sonde_probe *probe) {
 sonde_status sonde_recorder_create(const char *path, const sonde_record_head *head,
                                    sonde_recorder **out, sonde_error *error) {
   *out = NULL;
-  sonde_status status = SONDE_OK;
-  char *json = header_json(head);
+  char *header = NULL;
+  size_t count = 0;
   sonde_recorder *recorder = SONDE_NEW(sonde_recorder, 1);
-  if (!json || !recorder) {
-    status = sonde_fail_memory(error);
-    goto done;
-  }
+  sonde_status status = recorder ? SONDE_OK : sonde_fail_memory(error);
+  if (!status) status = write_header(head, &header, &count, error);
+  if (status) goto done;
   snprintf(recorder->path, sizeof recorder->path, "%s", path);
   status = sonde_journal_create(path, &recorder->journal, error);
   if (status) goto done;
   recorder->block_ticks = (uint64_t)ceil(SONDE_RECORD_BLOCK_S / head->world.dt_s);
   char magic[40];
   snprintf(magic, sizeof magic, "%s %d\n", SONDE_RECORD_MAGIC, SONDE_RECORD_VERSION);
-  if (emit(recorder, magic, strlen(magic), true) && emit(recorder, json, strlen(json), true) &&
-      emit(recorder, "\n", 1, true)) {
+  if (emit(recorder, magic, strlen(magic), true) && emit(recorder, header, count, true)) {
     *out = recorder;
     recorder = NULL;
   } else {
@@ -244,7 +250,7 @@ sonde_status sonde_recorder_create(const char *path, const sonde_record_head *he
     status = sonde_fail_memory(error);
   }
 done:
-  cJSON_free(json);
+  sonde_free(header);
   sonde_free(recorder);
   return status;
 }

@@ -13,7 +13,6 @@
 #include "base/bytes.h"
 #include "haptics/motion.h"
 
-#include <cjson/cJSON.h>
 #include <stdlib.h>
 #include <zlib.h>
 
@@ -28,22 +27,21 @@ static sonde_status fail_header(const source *s, const char *what) {
   return sonde_fail(s->error, SONDE_FORMAT, "%s:2: the header has no usable \"%s\"", s->path, what);
 }
 
-static sonde_status text_of(const source *s, const cJSON *object, const char *key, char *text,
+static sonde_status text_of(const source *s, const sonde_json *object, const char *key, char *text,
                             size_t size) {
-  const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, key);
-  if (!cJSON_IsString(item) || strlen(item->valuestring) >= size) return fail_header(s, key);
-  snprintf(text, size, "%s", item->valuestring);
+  const char *found = sonde_json_as_text(sonde_json_member(object, key));
+  if (!found || strlen(found) >= size) return fail_header(s, key);
+  snprintf(text, size, "%s", found);
   return SONDE_OK;
 }
 
-static sonde_status real_of(const source *s, const cJSON *object, const char *key, double *value) {
-  const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, key);
-  if (!cJSON_IsNumber(item)) return fail_header(s, key);
-  *value = item->valuedouble;
-  return SONDE_OK;
+static sonde_status real_of(const source *s, const sonde_json *object, const char *key,
+                            double *value) {
+  *value = sonde_json_as_number(sonde_json_member(object, key));
+  return isnan(*value) ? fail_header(s, key) : SONDE_OK;
 }
 
-static sonde_status count_of(const source *s, const cJSON *object, const char *key,
+static sonde_status count_of(const source *s, const sonde_json *object, const char *key,
                              uint32_t *value) {
   double real = 0.0;
   sonde_status status = real_of(s, object, key, &real);
@@ -53,7 +51,7 @@ static sonde_status count_of(const source *s, const cJSON *object, const char *k
   return SONDE_OK;
 }
 
-static sonde_status hash_of(const source *s, const cJSON *object, const char *key,
+static sonde_status hash_of(const source *s, const sonde_json *object, const char *key,
                             uint64_t *value) {
   char text[17], *end = NULL;
   sonde_status status = text_of(s, object, key, text, sizeof text);
@@ -62,26 +60,25 @@ static sonde_status hash_of(const source *s, const cJSON *object, const char *ke
   return end == text || *end ? fail_header(s, key) : SONDE_OK;
 }
 
-static sonde_status read_model(const source *s, const cJSON *root) {
+static sonde_status read_model(const source *s, const sonde_json *root) {
   sonde_recording *r = s->recording;
-  const cJSON *model = cJSON_GetObjectItemCaseSensitive(root, "model");
+  const sonde_json *model = sonde_json_member(root, "model");
   sonde_status status = text_of(s, model, "path", r->model_path, sizeof r->model_path);
   if (!status) status = text_of(s, model, "name", r->model_name, sizeof r->model_name);
   if (!status) status = hash_of(s, model, "checksum", &r->model_checksum);
   return status;
 }
 
-static sonde_status read_probes(const source *s, const cJSON *root) {
+static sonde_status read_probes(const source *s, const sonde_json *root) {
   sonde_recording *r = s->recording;
-  const cJSON *probes = cJSON_GetObjectItemCaseSensitive(root, "probes");
-  int count = cJSON_GetArraySize(probes);
-  if (!cJSON_IsArray(probes) || count < 1) return fail_header(s, "probes");
-  r->probe_names = sonde_calloc((size_t)count, sizeof *r->probe_names);
-  r->probe_hashes = SONDE_NEW(uint64_t, (size_t)count);
+  const sonde_json *probes = sonde_json_member(root, "probes");
+  uint32_t count = sonde_json_count(probes);
+  if (sonde_json_kind_of(probes) != SONDE_JSON_LIST || count == 0) return fail_header(s, "probes");
+  r->probe_names = sonde_calloc(count, sizeof *r->probe_names);
+  r->probe_hashes = SONDE_NEW(uint64_t, count);
   if (!r->probe_names || !r->probe_hashes) return sonde_fail_memory(s->error);
   sonde_status status = SONDE_OK;
-  const cJSON *probe;
-  cJSON_ArrayForEach(probe, probes) {
+  for (const sonde_json *probe = sonde_json_first(probes); probe; probe = sonde_json_next(probe)) {
     uint32_t i = r->probe_count++;
     if (!status) status = text_of(s, probe, "name", r->probe_names[i], sizeof r->probe_names[i]);
     if (!status) status = hash_of(s, probe, "hash", &r->probe_hashes[i]);
@@ -89,8 +86,8 @@ static sonde_status read_probes(const source *s, const cJSON *root) {
   return status;
 }
 
-static sonde_status read_world(const source *s, const cJSON *root) {
-  const cJSON *world = cJSON_GetObjectItemCaseSensitive(root, "world");
+static sonde_status read_world(const source *s, const sonde_json *root) {
+  const sonde_json *world = sonde_json_member(root, "world");
   sonde_world_def def = sonde_world_def_default();
   uint32_t law = 0, engine = 0;
   const struct {
@@ -119,8 +116,8 @@ static sonde_status read_world(const source *s, const cJSON *root) {
 }
 
 // Came with version 4.
-static sonde_status read_image(const source *s, const cJSON *root) {
-  const cJSON *image = cJSON_GetObjectItemCaseSensitive(root, "image");
+static sonde_status read_image(const source *s, const sonde_json *root) {
+  const sonde_json *image = sonde_json_member(root, "image");
   sonde_recording *r = s->recording;
   sonde_status status = count_of(s, image, "width", &r->image_width);
   if (!status) status = count_of(s, image, "height", &r->image_height);
@@ -153,20 +150,18 @@ static sonde_status read_header(const source *s) {
   const char *line = r->bytes + r->at;
   const char *end = memchr(line, '\n', r->end - r->at);
   if (!end) return sonde_fail(s->error, SONDE_FORMAT, "%s:2: the header does not end", s->path);
-  sonde_status shape =
-      sonde_bounded_json(s->path, line, (size_t)(end - line), &sonde_limits_recording, s->error);
-  if (shape) return shape;
-  cJSON *root = cJSON_ParseWithLength(line, (size_t)(end - line));
-  if (!root)
-    return sonde_fail(s->error, SONDE_FORMAT, "%s:2: the header is not a JSON object", s->path);
-  sonde_status status = read_model(s, root);
+  const sonde_json_source from = {s->path, 2, sonde_limits_recording.most_depth,
+                                  (uint32_t)sonde_limits_recording.most_items};
+  sonde_json *root = NULL;
+  sonde_status status = sonde_json_parse(line, (size_t)(end - line), &from, &root, s->error);
+  if (!status) status = read_model(s, root);
   if (!status) status = read_probes(s, root);
   if (!status) status = read_world(s, root);
   r->image_width = r->image_height = 512, r->ticks_per_image = 20;
   if (!status && !sonde_setup_read(root, &r->setup)) status = fail_header(s, "setup");
   r->world.friction = r->setup.friction;
   if (!status && r->version >= 4) status = read_image(s, root);
-  cJSON_Delete(root);
+  sonde_json_free(root);
   r->at = r->start = (size_t)(end + 1 - r->bytes);
   return status;
 }

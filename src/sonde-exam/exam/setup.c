@@ -1,6 +1,6 @@
 // What a session starts with, as a member of a recording's header.
 // add_friction, list_preset, list_circulation: its numbers by name; the same list writes and reads.
-// write_real, write_list, read_list: such a list in a JSON object.
+// write_list, read_list: such a list in a JSON object.
 // read_presets, read_circulation: parts of it.
 #include "exam/setup.h"
 
@@ -71,54 +71,49 @@ static uint32_t list_circulation(number *list, sonde_circulation *c) {
   return SONDE_COUNT_OF(own);
 }
 
-// With all its digits, which cJSON does not always write, whatever the program's locale.
-static void write_real(cJSON *object, const char *key, double value) {
-  char text[40];
-  snprintf(text, sizeof text, "%.17g", value);
-  for (char *c = text; *c; ++c)
-    if (*c == ',') *c = '.';
-  cJSON_AddRawToObject(object, key, text);
-}
-
-static void write_list(cJSON *object, const number *list, uint32_t count) {
+static void write_list(sonde_json_out *out, const number *list, uint32_t count) {
   for (uint32_t i = 0; i < count; ++i)
-    if (isfinite(*list[i].value)) write_real(object, list[i].key, *list[i].value);
+    if (isfinite(*list[i].value)) sonde_json_put_real(out, list[i].key, *list[i].value, 17);
 }
 
-static void read_list(const cJSON *object, const number *list, uint32_t count) {
-  for (uint32_t i = 0; i < count; ++i) {
-    const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, list[i].key);
-    *list[i].value = cJSON_IsNumber(item) ? item->valuedouble : (double)NAN;
-  }
+static void read_list(const sonde_json *object, const number *list, uint32_t count) {
+  for (uint32_t i = 0; i < count; ++i)
+    *list[i].value = sonde_json_as_number(sonde_json_member(object, list[i].key));
 }
 
-void sonde_setup_write(cJSON *header, const sonde_setup *setup) {
+void sonde_setup_write(sonde_json_out *header, const sonde_setup *setup) {
   SONDE_ASSERT(setup->preset_count <= SONDE_SESSION_PRESETS);
   sonde_setup s = *setup;
   number list[MOST_NUMBERS];
-  cJSON *object = cJSON_AddObjectToObject(header, "setup");
-  write_list(cJSON_AddObjectToObject(object, "friction"), list, add_friction(list, 0, &s.friction));
-  write_real(object, "gel_m3", s.gel_m3);
-  cJSON *presets = cJSON_AddArrayToObject(object, "presets");
+  sonde_json_begin_object(header, "setup");
+  sonde_json_begin_object(header, "friction");
+  write_list(header, list, add_friction(list, 0, &s.friction));
+  sonde_json_end(header);
+  sonde_json_put_real(header, "gel_m3", s.gel_m3, 17);
+  sonde_json_begin_list(header, "presets");
   for (uint32_t i = 0; i < s.preset_count; ++i) {
-    cJSON *preset = cJSON_CreateObject();
-    cJSON_AddStringToObject(preset, "name", s.presets[i].name);
-    write_list(preset, list, list_preset(list, &s.presets[i]));
-    cJSON_AddItemToArray(presets, preset);
+    sonde_json_begin_object(header, NULL);
+    sonde_json_put_text(header, "name", s.presets[i].name);
+    write_list(header, list, list_preset(list, &s.presets[i]));
+    sonde_json_end(header);
   }
-  if (!s.circulate) return;
-  cJSON *circulation = cJSON_AddObjectToObject(object, "circulation");
-  cJSON_AddNumberToObject(circulation, "posture", s.circulation.posture);
-  write_list(circulation, list, list_circulation(list, &s.circulation));
+  sonde_json_end(header);
+  if (s.circulate) {
+    sonde_json_begin_object(header, "circulation");
+    sonde_json_put_integer(header, "posture", s.circulation.posture);
+    write_list(header, list, list_circulation(list, &s.circulation));
+    sonde_json_end(header);
+  }
+  sonde_json_end(header);
 }
 
-static bool read_presets(const cJSON *object, sonde_setup *setup) {
-  const cJSON *presets = cJSON_GetObjectItemCaseSensitive(object, "presets"), *item;
-  if (cJSON_GetArraySize(presets) > SONDE_SESSION_PRESETS) return false;
+static bool read_presets(const sonde_json *object, sonde_setup *setup) {
+  const sonde_json *presets = sonde_json_member(object, "presets");
+  if (sonde_json_count(presets) > SONDE_SESSION_PRESETS) return false;
   number list[MOST_NUMBERS];
-  cJSON_ArrayForEach(item, presets) {
+  for (const sonde_json *item = sonde_json_first(presets); item; item = sonde_json_next(item)) {
     sonde_preset *preset = &setup->presets[setup->preset_count++];
-    const char *name = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(item, "name"));
+    const char *name = sonde_json_as_text(sonde_json_member(item, "name"));
     snprintf(preset->name, sizeof preset->name, "%.60s", name ? name : "");
     read_list(item, list, list_preset(list, preset));
     if (sonde_preset_apply(preset, NULL, NULL, NULL)) return false;
@@ -126,15 +121,14 @@ static bool read_presets(const cJSON *object, sonde_setup *setup) {
   return true;
 }
 
-static bool read_circulation(const cJSON *object, sonde_setup *setup) {
-  const cJSON *circulation = cJSON_GetObjectItemCaseSensitive(object, "circulation");
+static bool read_circulation(const sonde_json *object, sonde_setup *setup) {
+  const sonde_json *circulation = sonde_json_member(object, "circulation");
   if (!circulation) return true;
-  const cJSON *posture = cJSON_GetObjectItemCaseSensitive(circulation, "posture");
-  if (!cJSON_IsNumber(posture) || posture->valueint < 0 || posture->valueint >= SONDE_POSTURE_COUNT)
-    return false;
+  double posture = sonde_json_as_number(sonde_json_member(circulation, "posture"));
+  if (!(posture >= 0 && posture < SONDE_POSTURE_COUNT)) return false;
   number list[MOST_NUMBERS];
   setup->circulate = true;
-  setup->circulation.posture = (sonde_posture)posture->valueint;
+  setup->circulation.posture = (sonde_posture)(int)posture;
   uint32_t count = list_circulation(list, &setup->circulation);
   read_list(circulation, list, count);
   for (uint32_t i = 0; i < count; ++i)
@@ -142,17 +136,15 @@ static bool read_circulation(const cJSON *object, sonde_setup *setup) {
   return true;
 }
 
-bool sonde_setup_read(const cJSON *header, sonde_setup *setup) {
+bool sonde_setup_read(const sonde_json *header, sonde_setup *setup) {
   *setup = sonde_setup_default();
-  const cJSON *object = cJSON_GetObjectItemCaseSensitive(header, "setup");
+  const sonde_json *object = sonde_json_member(header, "setup");
   if (!object) return true;
   number list[MOST_NUMBERS];
   sonde_preset friction = sonde_preset_default();
-  read_list(cJSON_GetObjectItemCaseSensitive(object, "friction"), list,
-            add_friction(list, 0, &friction.friction));
-  const cJSON *gel = cJSON_GetObjectItemCaseSensitive(object, "gel_m3");
-  if (!cJSON_IsNumber(gel) || !(gel->valuedouble >= 0 && gel->valuedouble <= 1e-3)) return false;
-  setup->gel_m3 = gel->valuedouble;
+  read_list(sonde_json_member(object, "friction"), list, add_friction(list, 0, &friction.friction));
+  setup->gel_m3 = sonde_json_as_number(sonde_json_member(object, "gel_m3"));
+  if (!(setup->gel_m3 >= 0 && setup->gel_m3 <= 1e-3)) return false;
   setup->friction = friction.friction;
   return sonde_preset_apply(&friction, NULL, NULL, NULL) == SONDE_OK &&
          read_presets(object, setup) && read_circulation(object, setup);

@@ -2,9 +2,8 @@
 #ifndef SONDE_SRC_SETUP_H
 #define SONDE_SRC_SETUP_H
 
+#include "sonde/base_json.h"
 #include "sonde/exam.h"
-
-#include <cjson/cJSON.h>
 
 // What holds for a whole session.
 typedef struct sonde_setup {
@@ -21,8 +20,8 @@ sonde_setup sonde_setup_of(const sonde_session_def *def);
 // Into the definition of a session that is to start alike.
 void sonde_setup_apply(const sonde_setup *setup, sonde_session_def *def);
 // Adds "setup" to the header of a recording. @thread owner
-void sonde_setup_write(cJSON *header, const sonde_setup *setup);
+void sonde_setup_write(sonde_json_out *header, const sonde_setup *setup);
 // The default when the header has none (version 3). @return false: it has one that is not usable
-bool sonde_setup_read(const cJSON *header, sonde_setup *setup);
+bool sonde_setup_read(const sonde_json *header, sonde_setup *setup);
 
 #endif

@@ -1,6 +1,5 @@
 // JSON commands from the page: everything is bounded and checked before it reaches the session.
 //
-// check_shape   size, printable bytes and nesting, before the JSON parser sees the text
 // read_real     a finite number within a range, or absent
 // read_name     a short plain name, or absent
 // read_vector   an array of finite numbers
@@ -9,67 +8,54 @@
 // page_command_take   its numbers into controls
 #include "stream/page_message.h"
 
-#include "base/bounds.h"
 #include "base/maths.h"
+#include "sonde/base_json.h"
 
-#include <cjson/cJSON.h>
 #include <string.h>
 
 static const double REACH_MM = 2000; // farthest goal from the model's origin
 
-static sonde_status check_shape(const char *bytes, size_t count, sonde_error *error) {
-  if (count == 0 || count > PAGE_COMMAND_BYTES)
-    return sonde_fail(error, SONDE_FORMAT, "a message must have 1 to %d bytes, not %zu",
-                      PAGE_COMMAND_BYTES, count);
-  if (memchr(bytes, 0, count))
-    return sonde_fail(error, SONDE_FORMAT, "a message must not contain a zero byte");
-  static const sonde_input_limits MESSAGE = {"a message", PAGE_COMMAND_BYTES, PAGE_COMMAND_BYTES,
-                                             PAGE_COMMAND_DEPTH};
-  return sonde_bounded_json(NULL, bytes, count, &MESSAGE, error);
-}
-
 // Leaves *value as it is when the key is absent.
-static sonde_status read_real(const cJSON *object, const char *key, double low, double high,
+static sonde_status read_real(const sonde_json *object, const char *key, double low, double high,
                               double *value, sonde_error *error) {
-  const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, key);
+  const sonde_json *item = sonde_json_member(object, key);
   if (!item) return SONDE_OK;
-  if (!cJSON_IsNumber(item) || !isfinite(item->valuedouble) || item->valuedouble < low ||
-      item->valuedouble > high)
+  double found = sonde_json_as_number(item);
+  if (!(found >= low && found <= high))
     return sonde_fail(error, SONDE_ARGUMENT, "\"%s\" must be a number from %g to %g", key, low,
                       high);
-  *value = item->valuedouble;
+  *value = found;
   return SONDE_OK;
 }
 
-static sonde_status read_name(const cJSON *object, const char *key, char *name, size_t size,
+static sonde_status read_name(const sonde_json *object, const char *key, char *name, size_t size,
                               sonde_error *error) {
-  const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, key);
+  const sonde_json *item = sonde_json_member(object, key);
   if (!item) return SONDE_OK;
-  if (!cJSON_IsString(item) || !item->valuestring[0] || strlen(item->valuestring) >= size)
+  const char *text = sonde_json_as_text(item);
+  if (!text || !text[0] || strlen(text) >= size)
     return sonde_fail(error, SONDE_ARGUMENT, "\"%s\" must be a name of 1 to %zu characters", key,
                       size - 1);
-  snprintf(name, size, "%s", item->valuestring);
+  snprintf(name, size, "%s", text);
   return SONDE_OK;
 }
 
-static sonde_status read_vector(const cJSON *object, const char *key, int count, double limit,
-                                double *values, sonde_error *error) {
-  const cJSON *array = cJSON_GetObjectItemCaseSensitive(object, key);
-  if (!cJSON_IsArray(array) || cJSON_GetArraySize(array) != count)
-    return sonde_fail(error, SONDE_ARGUMENT, "\"%s\" must be an array of %d numbers", key, count);
-  int i = 0;
-  for (const cJSON *item = array->child; item; item = item->next, ++i) {
-    SONDE_ASSERT(i < count);
-    double value = item->valuedouble;
-    if (!cJSON_IsNumber(item) || !isfinite(value) || fabs(value) > limit)
+static sonde_status read_vector(const sonde_json *object, const char *key, uint32_t count,
+                                double limit, double *values, sonde_error *error) {
+  const sonde_json *array = sonde_json_member(object, key);
+  if (sonde_json_kind_of(array) != SONDE_JSON_LIST || sonde_json_count(array) != count)
+    return sonde_fail(error, SONDE_ARGUMENT, "\"%s\" must be an array of %u numbers", key, count);
+  const sonde_json *item = sonde_json_first(array);
+  for (uint32_t i = 0; i < count; ++i, item = sonde_json_next(item)) {
+    values[i] = sonde_json_as_number(item);
+    if (!(fabs(values[i]) <= limit))
       return sonde_fail(error, SONDE_ARGUMENT, "\"%s\" must hold numbers from -%g to %g", key,
                         limit, limit);
-    values[i] = value;
   }
   return SONDE_OK;
 }
 
-static sonde_status read_id(const cJSON *object, const char *key, uint32_t *id,
+static sonde_status read_id(const sonde_json *object, const char *key, uint32_t *id,
                             sonde_error *error) {
   double value = -1;
   sonde_status status = read_real(object, key, 0, UINT32_MAX, &value, error);
@@ -80,7 +66,7 @@ static sonde_status read_id(const cJSON *object, const char *key, uint32_t *id,
   return SONDE_OK;
 }
 
-static sonde_status parse_goal(const cJSON *root, page_command *command, sonde_error *error) {
+static sonde_status parse_goal(const sonde_json *root, page_command *command, sonde_error *error) {
   double p[3], q[4];
   sonde_status status = read_vector(root, "position_mm", 3, REACH_MM, p, error);
   if (!status) status = read_vector(root, "rotation", 4, 2, q, error);
@@ -93,27 +79,36 @@ static sonde_status parse_goal(const cJSON *root, page_command *command, sonde_e
   return SONDE_OK;
 }
 
+static sonde_status read_bool(const sonde_json *object, const char *key, bool *value,
+                              sonde_error *error) {
+  sonde_json_kind kind = sonde_json_kind_of(sonde_json_member(object, key));
+  *value = kind == SONDE_JSON_TRUE;
+  if (kind == SONDE_JSON_TRUE || kind == SONDE_JSON_FALSE) return SONDE_OK;
+  return sonde_fail(error, SONDE_ARGUMENT, "\"%s\" must be true or false", key);
+}
+
 // -1 when it is absent.
-static sonde_status read_strain(const cJSON *root, page_command *command, sonde_error *error) {
-  const cJSON *item = cJSON_GetObjectItemCaseSensitive(root, "valsalva");
+static sonde_status read_strain(const sonde_json *root, page_command *command, sonde_error *error) {
+  bool strains = false;
+  sonde_status status = SONDE_OK;
   command->strain = -1;
-  if (!item) return SONDE_OK;
-  if (!cJSON_IsBool(item))
-    return sonde_fail(error, SONDE_ARGUMENT, "\"valsalva\" must be true or false");
-  command->strain = cJSON_IsTrue(item) ? 1 : 0;
-  return SONDE_OK;
+  if (!sonde_json_member(root, "valsalva")) return SONDE_OK;
+  status = read_bool(root, "valsalva", &strains, error);
+  if (!status) command->strain = strains ? 1 : 0;
+  return status;
 }
 
 // In the page's unit; NaN when it is absent.
-static sonde_status read_setting(const cJSON *root, const sonde_echo_range *range, double *target,
-                                 sonde_error *error) {
+static sonde_status read_setting(const sonde_json *root, const sonde_echo_range *range,
+                                 double *target, sonde_error *error) {
   double value = (double)NAN;
   sonde_status status = read_real(root, range->key, range->low, range->high, &value, error);
   *target = value * range->si;
   return status;
 }
 
-static sonde_status read_settings(const cJSON *root, page_command *command, sonde_error *error) {
+static sonde_status read_settings(const sonde_json *root, page_command *command,
+                                  sonde_error *error) {
   static const sonde_echo_range BENCH[] = {{"stiffness_scale", 0.5, 2, 1, 0},
                                            {"damping_scale", 0.25, 4, 1, 0},
                                            {"friction_scale", 0, 2, 1, 0}};
@@ -130,23 +125,24 @@ static sonde_status read_settings(const cJSON *root, page_command *command, sond
 }
 
 // A key that is none is a mistake of the page: what it asks for would not happen, unseen.
-static sonde_status check_keys(const cJSON *root, sonde_error *error) {
+static sonde_status check_keys(const sonde_json *root, sonde_error *error) {
   static const char *const OTHERS[] = {"type",     "probe",          "case",
                                        "posture",  "damping_scale",  "friction_scale",
                                        "valsalva", "stiffness_scale"};
-  for (const cJSON *item = root->child; item; item = item->next) {
+  for (const sonde_json *item = sonde_json_first(root); item; item = sonde_json_next(item)) {
+    const char *key = sonde_json_key(item);
     bool known = false;
     for (size_t k = 0; k < SONDE_ECHO_SETTINGS; ++k)
-      known = known || strcmp(item->string, sonde_echo_ranges()[k].key) == 0;
+      known = known || strcmp(key, sonde_echo_ranges()[k].key) == 0;
     for (size_t k = 0; k < SONDE_COUNT_OF(OTHERS); ++k)
-      known = known || strcmp(item->string, OTHERS[k]) == 0;
-    if (!known)
-      return sonde_fail(error, SONDE_ARGUMENT, "there is no control \"%.40s\"", item->string);
+      known = known || strcmp(key, OTHERS[k]) == 0;
+    if (!known) return sonde_fail(error, SONDE_ARGUMENT, "there is no control \"%.40s\"", key);
   }
   return SONDE_OK;
 }
 
-static sonde_status parse_controls(const cJSON *root, page_command *command, sonde_error *error) {
+static sonde_status parse_controls(const sonde_json *root, page_command *command,
+                                   sonde_error *error) {
   sonde_status status = check_keys(root, error);
   if (!status) status = read_settings(root, command, error);
   if (status) return status;
@@ -158,7 +154,7 @@ static sonde_status parse_controls(const cJSON *root, page_command *command, son
   return status ? status : read_strain(root, command, error);
 }
 
-static sonde_status parse_gel(const cJSON *root, page_command *command, sonde_error *error) {
+static sonde_status parse_gel(const sonde_json *root, page_command *command, sonde_error *error) {
   char action[8] = "";
   sonde_status status = read_name(root, "action", action, sizeof action, error);
   command->gel_put = strcmp(action, "put") == 0;
@@ -168,7 +164,7 @@ static sonde_status parse_gel(const cJSON *root, page_command *command, sonde_er
   return status;
 }
 
-static sonde_status parse_role(const cJSON *root, page_command *command, sonde_error *error) {
+static sonde_status parse_role(const sonde_json *root, page_command *command, sonde_error *error) {
   static const char *const ACTIONS[] = {"", "take", "give", "return"};
   char action[8] = "";
   sonde_status status = read_name(root, "action", action, sizeof action, error);
@@ -180,35 +176,27 @@ static sonde_status parse_role(const cJSON *root, page_command *command, sonde_e
 }
 
 // UTF-8 text without control characters; `least` 0 allows it to be absent.
-static sonde_status read_text(const cJSON *object, const char *key, size_t least, size_t most,
+static sonde_status read_text(const sonde_json *object, const char *key, size_t least, size_t most,
                               char *text, size_t size, sonde_error *error) {
-  const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, key);
+  const sonde_json *item = sonde_json_member(object, key);
   if (!item && least == 0) return SONDE_OK;
   size_t count = 0;
-  bool plain = cJSON_IsString(item);
-  for (const char *c = plain ? item->valuestring : ""; *c; ++c) {
+  const char *found = sonde_json_as_text(item);
+  bool plain = found != NULL;
+  for (const char *c = plain ? found : ""; *c; ++c) {
     if ((unsigned char)*c < 0x20 && *c != '\n') plain = false;
     if ((*c & 0xc0) != 0x80) ++count;
   }
-  if (!plain || count < least || count > most || strlen(item->valuestring) >= size)
+  if (!plain || count < least || count > most || strlen(found) >= size)
     return sonde_fail(error, SONDE_ARGUMENT, "\"%s\" must be a text of %zu to %zu characters", key,
                       least, most);
-  snprintf(text, size, "%s", item->valuestring);
-  return SONDE_OK;
-}
-
-static sonde_status read_bool(const cJSON *object, const char *key, bool *value,
-                              sonde_error *error) {
-  const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, key);
-  if (!cJSON_IsBool(item))
-    return sonde_fail(error, SONDE_ARGUMENT, "\"%s\" must be true or false", key);
-  *value = cJSON_IsTrue(item);
+  snprintf(text, size, "%s", found);
   return SONDE_OK;
 }
 
 static const double LONGEST_S = 86400;
 
-static sonde_status read_time(const cJSON *root, sonde_page_request *r, sonde_error *error) {
+static sonde_status read_time(const sonde_json *root, sonde_page_request *r, sonde_error *error) {
   r->time_s = (double)NAN;
   sonde_status status = read_real(root, "time_s", 0, LONGEST_S, &r->time_s, error);
   if (!status && isnan(r->time_s))
@@ -216,7 +204,7 @@ static sonde_status read_time(const cJSON *root, sonde_page_request *r, sonde_er
   return status;
 }
 
-static sonde_status parse_start(const cJSON *root, sonde_page_request *r, sonde_error *error) {
+static sonde_status parse_start(const sonde_json *root, sonde_page_request *r, sonde_error *error) {
   static const char *const LEVELS[] = {"full", "hints", "exam"};
   sonde_status status = read_text(root, "case", 1, 47, r->id, sizeof r->id, error);
   if (!status) status = read_text(root, "protocol", 1, 47, r->protocol, sizeof r->protocol, error);
@@ -228,14 +216,15 @@ static sonde_status parse_start(const cJSON *root, sonde_page_request *r, sonde_
   return sonde_fail(error, SONDE_ARGUMENT, "\"guidance\" must be full, hints or exam");
 }
 
-static sonde_status parse_comment(const cJSON *root, sonde_page_request *r, sonde_error *error) {
+static sonde_status parse_comment(const sonde_json *root, sonde_page_request *r,
+                                  sonde_error *error) {
   sonde_status status = read_time(root, r, error);
   if (!status) status = read_text(root, "text", 1, 400, r->text, sizeof r->text, error);
   if (!status) status = read_text(root, "author", 0, 40, r->name, sizeof r->name, error);
   return status;
 }
 
-static sonde_status parse_request(const cJSON *root, sonde_page_ask ask, sonde_page_request *r,
+static sonde_status parse_request(const sonde_json *root, sonde_page_ask ask, sonde_page_request *r,
                                   sonde_error *error) {
   sonde_status status = SONDE_OK;
   r->ask = ask;
@@ -262,12 +251,12 @@ static const char *const TYPES[] = {
     "leave_exam", "list_exams", "open_replay", "seek",   "play", "comment"};
 _Static_assert(SONDE_COUNT_OF(TYPES) == PAGE_COMMAND_REQUEST + (int)SONDE_PAGE_ASKS, "a type each");
 
-static sonde_status parse_object(const cJSON *root, page_command *command, sonde_error *error) {
-  const cJSON *type = cJSON_GetObjectItemCaseSensitive(root, "type");
-  if (!cJSON_IsObject(root) || !cJSON_IsString(type))
-    return sonde_fail(error, SONDE_FORMAT, "a message must be an object with a \"type\"");
+static sonde_status parse_object(const sonde_json *root, page_command *command,
+                                 sonde_error *error) {
+  const char *type = sonde_json_as_text(sonde_json_member(root, "type"));
+  if (!type) return sonde_fail(error, SONDE_FORMAT, "a message must be an object with a \"type\"");
   size_t which = 0;
-  while (which < SONDE_COUNT_OF(TYPES) && strcmp(type->valuestring, TYPES[which]) != 0) ++which;
+  while (which < SONDE_COUNT_OF(TYPES) && strcmp(type, TYPES[which]) != 0) ++which;
   if (which == SONDE_COUNT_OF(TYPES))
     return sonde_fail(
         error, SONDE_NOT_FOUND,
@@ -294,15 +283,17 @@ sonde_status page_parse_command(const char *bytes, size_t count, page_command *c
                                 sonde_error *error) {
   SONDE_ASSERT(bytes && command);
   *command = (page_command){0};
-  sonde_status status = check_shape(bytes, count, error);
-  if (status) return status;
-  char text[PAGE_COMMAND_BYTES + 1];
-  memcpy(text, bytes, count);
-  text[count] = 0;
-  cJSON *root = cJSON_ParseWithOpts(text, NULL, 1);
-  if (!root) return sonde_fail(error, SONDE_FORMAT, "a message must be one JSON object");
+  if (count == 0 || count > PAGE_COMMAND_BYTES)
+    return sonde_fail(error, SONDE_FORMAT, "a message must have 1 to %d bytes, not %zu",
+                      PAGE_COMMAND_BYTES, count);
+  const sonde_json_source source = {.most_depth = PAGE_COMMAND_DEPTH};
+  sonde_error wrong = {0};
+  sonde_json *root = NULL;
+  sonde_status status = sonde_json_parse(bytes, count, &source, &root, &wrong);
+  if (status)
+    return sonde_fail(error, status, "a message must be one JSON object: %s", wrong.message);
   status = parse_object(root, command, error);
-  cJSON_Delete(root);
+  sonde_json_free(root);
   return status;
 }
 

@@ -14,13 +14,13 @@
 // bind_value, read_value  one member of an entry to and from a statement
 // is_date         a date of our form
 // check_entry     what the table could not say in words
-// put_member, get_member  one member of an entry to and from JSON
 // grow            room for one more item of an array
 #include "trainer/log.h"
 
 #include "base/disk.h"
+#include "base/maths.h"
+#include "sonde/base_json.h"
 
-#include <cjson/cJSON.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <sqlite3.h>
@@ -403,52 +403,47 @@ sonde_status sonde_exam_log_has(sonde_exam_log *log, const char *id, bool *found
 
 // ---- entries as text ----------------------------------------------------------------------------
 
-static void put_member(cJSON *root, const column *c, const char *member) {
-  if (c->kind == COLUMN_TEXT) cJSON_AddStringToObject(root, c->name, member);
-  if (c->kind == COLUMN_FLAG) cJSON_AddBoolToObject(root, c->name, *(const bool *)member);
-  if (c->kind == COLUMN_COUNT)
-    cJSON_AddNumberToObject(root, c->name, *(const uint32_t *)(const void *)member);
-  double value = c->kind == COLUMN_REAL ? *(const double *)(const void *)member : 0;
-  if (c->kind == COLUMN_REAL && isfinite(value)) cJSON_AddNumberToObject(root, c->name, value);
-}
-
-static void get_member(const cJSON *root, const column *c, char *member) {
-  const cJSON *item = cJSON_GetObjectItemCaseSensitive(root, c->name);
-  double number = cJSON_IsNumber(item) ? item->valuedouble : (double)NAN;
-  if (c->kind == COLUMN_TEXT)
-    sonde_log_copy(member, c->size, cJSON_IsString(item) ? item->valuestring : "");
-  else if (c->kind == COLUMN_FLAG)
-    *(bool *)member = cJSON_IsTrue(item);
-  else if (c->kind == COLUMN_COUNT)
-    *(uint32_t *)(void *)member = number >= 0 && number <= UINT32_MAX ? (uint32_t)number : 0;
-  else
-    *(double *)(void *)member = number;
-}
-
 sonde_status sonde_log_entry_text(const sonde_log_entry *entry, char **text, sonde_error *error) {
   SONDE_ASSERT(entry && text);
-  cJSON *root = cJSON_CreateObject();
-  for (uint32_t i = 0; i < COLUMN_TOTAL; ++i)
-    put_member(root, &COLUMNS[i], (const char *)entry + COLUMNS[i].offset);
-  char *printed = cJSON_PrintUnformatted(root);
-  size_t bytes = printed ? strlen(printed) + 1 : 0;
-  *text = printed ? SONDE_NEW(char, bytes) : NULL;
-  if (*text) memcpy(*text, printed, bytes);
-  cJSON_free(printed);
-  cJSON_Delete(root);
-  return *text ? SONDE_OK : sonde_fail_memory(error);
+  sonde_json_out out = {.layout = SONDE_JSON_COMPACT};
+  size_t count;
+  *text = NULL;
+  sonde_status status = sonde_file_in_memory(&out.file, error);
+  if (status) return status;
+  sonde_json_begin_object(&out, NULL);
+  for (const column *c = COLUMNS; c < COLUMNS + COLUMN_TOTAL; ++c) {
+    const void *member = (const char *)entry + c->offset;
+    if (c->kind == COLUMN_TEXT) sonde_json_put_text(&out, c->name, member);
+    if (c->kind == COLUMN_FLAG) sonde_json_put_bool(&out, c->name, *(const bool *)member);
+    if (c->kind == COLUMN_COUNT) sonde_json_put_integer(&out, c->name, *(const uint32_t *)member);
+    if (c->kind == COLUMN_REAL && isfinite(*(const double *)member))
+      sonde_json_put_real(&out, c->name, *(const double *)member, 0);
+  }
+  sonde_json_end(&out);
+  return sonde_file_take(out.file, text, &count, error);
 }
 
 sonde_status sonde_log_entry_parse(const char *text, sonde_log_entry *entry, sonde_error *error) {
   SONDE_ASSERT(text && entry);
   *entry = (sonde_log_entry){0};
-  cJSON *root = cJSON_Parse(text);
-  for (uint32_t i = 0; i < COLUMN_TOTAL; ++i)
-    get_member(root, &COLUMNS[i], (char *)entry + COLUMNS[i].offset);
-  bool is_object = cJSON_IsObject(root);
-  cJSON_Delete(root);
-  if (!is_object)
+  sonde_json *root = NULL;
+  if (sonde_json_parse(text, strlen(text), NULL, &root, NULL) ||
+      sonde_json_kind_of(root) != SONDE_JSON_OBJECT) {
+    sonde_json_free(root);
     return sonde_fail(error, SONDE_FORMAT, "an entry of the log of exams is not a JSON object");
+  }
+  for (const column *c = COLUMNS; c < COLUMNS + COLUMN_TOTAL; ++c) {
+    void *member = (char *)entry + c->offset;
+    const sonde_json *item = sonde_json_member(root, c->name);
+    const char *found = sonde_json_as_text(item);
+    double number = sonde_json_as_number(item);
+    if (c->kind == COLUMN_TEXT) sonde_log_copy(member, c->size, found ? found : "");
+    if (c->kind == COLUMN_FLAG) *(bool *)member = sonde_json_kind_of(item) == SONDE_JSON_TRUE;
+    if (c->kind == COLUMN_COUNT)
+      *(uint32_t *)member = number >= 0 && number <= UINT32_MAX ? (uint32_t)number : 0;
+    if (c->kind == COLUMN_REAL) *(double *)member = number;
+  }
+  sonde_json_free(root);
   return check_entry(entry, error) ? SONDE_FORMAT : SONDE_OK;
 }
 

@@ -1,12 +1,11 @@
 // FIELDS:   keys of the file, their units and ranges.
-// line_of:  line of a key in the text, for messages.
 // check:    the ranges, for files and for presets made by hand.
 // load, save, apply.
 #include "base/bounds.h"
 #include "base/maths.h"
 #include "identify/forward.h"
+#include "sonde/base_json.h"
 
-#include <cjson/cJSON.h>
 #include <string.h>
 
 enum { VERSION = 1 };
@@ -46,22 +45,16 @@ static double *value_of(sonde_preset *preset, const field *f) {
   return (double *)(void *)((char *)preset + f->offset);
 }
 
-// cJSON keeps no places: the first line with the key in quotes, 1 when there is none.
-static int line_of(const char *text, const char *key) {
-  char quoted[80];
-  snprintf(quoted, sizeof quoted, "\"%.70s\"", key);
-  const char *at = text ? strstr(text, quoted) : NULL;
-  return at ? (int)sonde_line_of(text, at) : 1;
-}
-
 // Where a preset came from, for messages: "path:line: " or nothing.
 typedef struct source {
-  const char *path, *text;
+  const char *path;
+  const sonde_json *root;
 } source;
 
 static void place_of(const source *from, const char *key, char place[200]) {
+  const sonde_json *item = from ? sonde_json_member(from->root, key) : NULL;
   place[0] = 0;
-  if (from) snprintf(place, 200, "%.150s:%d: ", from->path, line_of(from->text, key));
+  if (from) snprintf(place, 200, "%.150s:%u: ", from->path, item ? sonde_json_line(item) : 1);
 }
 
 static sonde_status check(const sonde_preset *preset, const source *from, sonde_error *error) {
@@ -83,49 +76,43 @@ static sonde_status check(const sonde_preset *preset, const source *from, sonde_
                     preset->friction.mu_kinetic, preset->friction.mu_static);
 }
 
-static const field *field_of(const char *key) {
-  for (size_t k = 0; k < SONDE_COUNT_OF(FIELDS); ++k)
-    if (!strcmp(key, FIELDS[k].key)) return &FIELDS[k];
-  return NULL;
-}
-
-static sonde_status read_item(const source *from, const cJSON *item, sonde_preset *preset,
+static sonde_status read_item(const char *path, const sonde_json *item, sonde_preset *preset,
                               sonde_error *error) {
-  const field *f = field_of(item->string);
-  int line = line_of(from->text, item->string);
-  if (f) {
-    if (!cJSON_IsNumber(item) || !isfinite(item->valuedouble))
-      return sonde_fail(error, SONDE_FORMAT, "%s:%d: %s: expected a number from %g to %g",
-                        from->path, line, f->key, f->low, f->high);
-    *value_of(preset, f) = item->valuedouble * f->unit;
+  const char *key = sonde_json_key(item), *text = sonde_json_as_text(item);
+  unsigned line = sonde_json_line(item);
+  for (size_t k = 0; k < SONDE_COUNT_OF(FIELDS); ++k) {
+    const field *f = &FIELDS[k];
+    if (strcmp(key, f->key) != 0) continue;
+    if (sonde_json_kind_of(item) != SONDE_JSON_NUMBER)
+      return sonde_fail(error, SONDE_FORMAT, "%s:%u: %s: expected a number from %g to %g", path,
+                        line, key, f->low, f->high);
+    *value_of(preset, f) = sonde_json_as_number(item) * f->unit;
     return SONDE_OK;
   }
-  if (!strcmp(item->string, "name") && cJSON_IsString(item)) {
-    snprintf(preset->name, sizeof preset->name, "%s", item->valuestring);
+  if (!strcmp(key, "name") && text) {
+    snprintf(preset->name, sizeof preset->name, "%s", text);
     return SONDE_OK;
   }
-  if (!strcmp(item->string, "format") || !strcmp(item->string, "version")) return SONDE_OK;
+  if (!strcmp(key, "format") || !strcmp(key, "version")) return SONDE_OK;
   return sonde_fail(
       error, SONDE_FORMAT,
-      "%s:%d: '%.40s' is not a key of a preset (or not of its kind); docs/identify.md "
+      "%s:%u: '%.40s' is not a key of a preset (or not of its kind); docs/identify.md "
       "lists them",
-      from->path, line, item->string);
+      path, line, key);
 }
 
-static sonde_status read_root(const source *from, const cJSON *root, sonde_preset *preset,
-                              sonde_error *error) {
-  const char *format = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(root, "format"));
-  const cJSON *version = cJSON_GetObjectItemCaseSensitive(root, "version");
-  if (!cJSON_IsObject(root) || !format || strcmp(format, FORMAT_NAME) != 0)
+static sonde_status read_root(const source *from, sonde_preset *preset, sonde_error *error) {
+  const char *format = sonde_json_as_text(sonde_json_member(from->root, "format"));
+  char place[200];
+  place_of(from, "format", place);
+  if (!format || strcmp(format, FORMAT_NAME) != 0)
     return sonde_fail(error, SONDE_FORMAT,
-                      "%s:%d: expected an object with \"format\": \"" FORMAT_NAME "\"", from->path,
-                      line_of(from->text, "format"));
-  if (!cJSON_IsNumber(version) || version->valueint != VERSION)
-    return sonde_fail(error, SONDE_VERSION, "%s:%d: expected \"version\": %d", from->path,
-                      line_of(from->text, "version"), VERSION);
-  const cJSON *item;
-  cJSON_ArrayForEach(item, root) {
-    sonde_status status = read_item(from, item, preset, error);
+                      "%sexpected an object with \"format\": \"" FORMAT_NAME "\"", place);
+  place_of(from, "version", place);
+  if (sonde_json_as_number(sonde_json_member(from->root, "version")) != VERSION)
+    return sonde_fail(error, SONDE_VERSION, "%sexpected \"version\": %d", place, VERSION);
+  for (const sonde_json *v = sonde_json_first(from->root); v; v = sonde_json_next(v)) {
+    sonde_status status = read_item(from->path, v, preset, error);
     if (status) return status;
   }
   return check(preset, from, error);
@@ -136,48 +123,36 @@ sonde_status sonde_preset_load(const char *path, sonde_preset *preset, sonde_err
   char *text = NULL;
   size_t bytes;
   sonde_status status = sonde_bounded_load_text(path, &sonde_limits_json, &text, &bytes, error);
-  if (!status) status = sonde_bounded_json(path, text, bytes, &sonde_limits_json, error);
-  if (status) {
-    sonde_free(text);
-    return status;
-  }
-  const char *stop = text;
-  cJSON *root = cJSON_ParseWithOpts(text, &stop, 1);
-  if (root) {
-    status = read_root(&(source){path, text}, root, preset, error);
-  } else {
-    status = sonde_fail(error, SONDE_FORMAT, "%s:%u: is not JSON", path,
-                        stop ? sonde_line_of(text, stop) : 1);
-  }
-  cJSON_Delete(root);
+  sonde_json *root = NULL;
+  if (!status)
+    status = sonde_json_parse(text, bytes, &(sonde_json_source){.name = path}, &root, error);
+  if (!status) status = read_root(&(source){path, root}, preset, error);
+  sonde_json_free(root);
   sonde_free(text);
   return status;
 }
 
-// A JSON string: quotes and backslashes escaped, control characters left out.
-static void write_name(sonde_file *file, const char *name) {
-  sonde_file_printf(file, "  \"name\": \"");
-  for (const char *c = name; *c; ++c) {
-    if (*c == '"' || *c == '\\') sonde_file_printf(file, "\\");
-    if ((unsigned char)*c >= 0x20) sonde_file_write(file, c, 1);
-  }
-  sonde_file_printf(file, "\"");
-}
-
 sonde_status sonde_preset_save(const char *path, const sonde_preset *preset, sonde_error *error) {
   sonde_preset copy = *preset;
-  sonde_file *file;
+  sonde_json_out out = {.layout = SONDE_JSON_LINES};
   sonde_status status = check(preset, NULL, error);
-  if (!status) status = sonde_file_create(path, &file, error);
+  if (!status) status = sonde_file_create(path, &out.file, error);
   if (status) return status;
-  sonde_file_printf(file, "{\n  \"format\": \"" FORMAT_NAME "\",\n  \"version\": %d,\n", VERSION);
-  write_name(file, preset->name);
+  size_t used = 0; // the name without control characters
+  for (const char *c = preset->name; *c; ++c)
+    if ((unsigned char)*c >= 0x20) copy.name[used++] = *c;
+  copy.name[used] = 0;
+  sonde_json_begin_object(&out, NULL);
+  sonde_json_put_text(&out, "format", FORMAT_NAME);
+  sonde_json_put_integer(&out, "version", VERSION);
+  sonde_json_put_text(&out, "name", copy.name);
   for (size_t k = 0; k < SONDE_COUNT_OF(FIELDS); ++k) {
     double value = *value_of(&copy, &FIELDS[k]) / FIELDS[k].unit;
-    if (!isnan(value)) sonde_file_printf(file, ",\n  \"%s\": %.9g", FIELDS[k].key, value);
+    if (!isnan(value)) sonde_json_put_real(&out, FIELDS[k].key, value, 9);
   }
-  sonde_file_printf(file, "\n}\n");
-  return sonde_file_commit(file, error);
+  sonde_json_end(&out);
+  sonde_file_printf(out.file, "\n");
+  return sonde_file_commit(out.file, error);
 }
 
 static void apply_to_model(const sonde_preset *preset, sonde_model *model) {

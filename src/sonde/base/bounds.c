@@ -1,6 +1,4 @@
-// Limits of input, the bounded reading of files, the shape of JSON texts.
-// read_all        the stream's bytes up to a limit
-// skip_string     the end of a quoted text
+// Limits of input and the bounded reading of files.
 #include "base/bounds.h"
 
 #include "base/disk.h"
@@ -102,35 +100,4 @@ sonde_status sonde_bounded_load_text(const char *path, const sonde_input_limits 
   *text = NULL;
   *count = 0;
   return status;
-}
-
-// The quote that ends a text whose first quote is at `from`, or the end of the bytes.
-static size_t skip_string(const char *bytes, size_t count, size_t from) {
-  size_t at = from + 1;
-  while (at < count && bytes[at] != '"') at += bytes[at] == '\\' ? 2 : 1;
-  return at;
-}
-
-sonde_status sonde_bounded_json(const char *name, const char *bytes, size_t count,
-                                const sonde_input_limits *bounds, sonde_error *error) {
-  SONDE_ASSERT(bytes && bounds->most_depth > 0);
-  uint32_t depth = 0;
-  uint64_t items = 0;
-  for (size_t i = 0; i < count; ++i) {
-    bool opens = bytes[i] == '{' || bytes[i] == '[';
-    if (bytes[i] == '"') i = skip_string(bytes, count, i);
-    if (i >= count) break;
-    items += opens || bytes[i] == ',';
-    depth += opens;
-    if (depth > 0 && (bytes[i] == '}' || bytes[i] == ']')) --depth;
-    if (depth <= bounds->most_depth && items <= bounds->most_items) continue;
-    char where[340] = "";
-    if (name) snprintf(where, sizeof where, "%.300s:%u: ", name, sonde_line_of(bytes, bytes + i));
-    if (depth > bounds->most_depth)
-      return sonde_fail(error, SONDE_FORMAT, "%sexpected at most %u levels of nesting", where,
-                        bounds->most_depth);
-    return sonde_fail(error, SONDE_FORMAT, "%sexpected at most %llu values", where,
-                      (unsigned long long)bounds->most_items);
-  }
-  return SONDE_OK;
 }

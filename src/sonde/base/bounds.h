@@ -39,11 +39,6 @@ SONDE_LINK sonde_status sonde_bounded_load(const char *path, const sonde_input_l
 SONDE_LINK sonde_status sonde_bounded_load_text(const char *path, const sonde_input_limits *bounds,
                                                 char **text, size_t *count, sonde_error *error);
 
-// Checks size, nesting and number of items of a JSON text before a recursive parser sees it.
-// @param name of the text in messages; NULL: messages without file and line @thread any
-SONDE_LINK sonde_status sonde_bounded_json(const char *name, const char *bytes, size_t count,
-                                           const sonde_input_limits *bounds, sonde_error *error);
-
 // Line of a place in a text, from 1. @thread any
 SONDE_LINK uint32_t sonde_line_of(const char *text, const char *at);
 
