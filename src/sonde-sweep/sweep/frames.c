@@ -1,16 +1,4 @@
 // Sequences in memory and their files.
-//
-// sonde_sequence_create, sonde_sequence_clear
-// find_field, owner_of         where a text stands
-// sonde_sequence_set           one text
-// check_text                   what a file can hold
-// read_geometry                sizes, and which axis runs over the frames
-// read_orientation             MF and its relatives
-// split_frame_key              "Seq_Frame0012_Name" -> 12, "Name"
-// read_fields                  entries of the header -> texts
-// gather_list_first            frames that run fastest -> one after the other
-// mirror                       between the file's orientation and MF
-// sonde_sequence_load, sonde_sequence_save
 #include "sweep/frames.h"
 
 #include <string.h>
@@ -68,17 +56,6 @@ const char *sonde_sequence_get(const sonde_sequence *s, uint32_t frame, const ch
   return field ? field->value : NULL;
 }
 
-static bool grow(sonde_tracked_frame *owner) {
-  if (owner->field_count < owner->field_room) return true;
-  uint32_t room = owner->field_room ? 2 * owner->field_room : 8;
-  void *grown = sonde_realloc(owner->fields, owner->field_room * sizeof *owner->fields,
-                              room * sizeof *owner->fields);
-  if (!grown) return false;
-  owner->fields = grown;
-  owner->field_room = room;
-  return true;
-}
-
 static sonde_status check_text(const char *text, const char *forbidden, sonde_error *error) {
   size_t length = strlen(text);
   bool good = length <= SONDE_VALUE_MAX / 2 && text[strcspn(text, forbidden)] == 0;
@@ -104,11 +81,16 @@ sonde_status sonde_sequence_set(sonde_sequence *s, uint32_t frame, const char *k
     return sonde_fail(error, SONDE_ARGUMENT, "field '%.60s': expected at most %d fields", key,
                       SONDE_FIELDS_MAX);
   size_t key_bytes = strlen(key) + 1, value_bytes = strlen(value) + 1;
-  char *text = SONDE_NEW(char, key_bytes + value_bytes);
-  if (!text || (!field && !grow(owner))) {
-    sonde_free(text);
-    return sonde_fail_memory(error);
+  if (!field && owner->field_count == owner->field_room) {
+    uint32_t room = owner->field_room ? 2 * owner->field_room : 8;
+    void *grown = sonde_realloc(owner->fields, owner->field_room * sizeof *owner->fields,
+                                room * sizeof *owner->fields);
+    if (!grown) return sonde_fail_memory(error);
+    owner->fields = grown;
+    owner->field_room = room;
   }
+  char *text = SONDE_NEW(char, key_bytes + value_bytes);
+  if (!text) return sonde_fail_memory(error);
   memcpy(text, key, key_bytes);
   memcpy(text + key_bytes, value, value_bytes);
   if (field) sonde_free(field->key);
@@ -130,32 +112,6 @@ sonde_status sonde_sequence_set_transform(sonde_sequence *s, uint32_t frame, con
   sonde_status status = sonde_sequence_set(s, frame, key, value, error);
   snprintf(key, sizeof key, "%.70sTransformStatus", name);
   return status ? status : sonde_sequence_set(s, frame, key, "OK", error);
-}
-
-// Width, height, frames; *first tells that the frames run fastest.
-static sonde_status read_geometry(const sonde_header *h, uint32_t size[3], bool *first,
-                                  sonde_error *error) {
-  int last = (int)h->dimension - 1, list = h->list_axis < 0 ? last : h->list_axis;
-  SONDE_ASSERT(last >= 2 && last < 4 && list <= last);
-  *first = list == 0;
-  const uint32_t *spatial = h->size + (*first ? 1 : 0);
-  size[0] = spatial[0], size[1] = spatial[1], size[2] = h->size[list];
-  if ((list != 0 && list != last) || (h->dimension == 4 && spatial[2] != 1))
-    return sonde_fail(error, SONDE_FORMAT,
-                      "%.200s: expected the frames on the first or the last axis and single slices "
-                      "(domain domain [domain of size 1] list)",
-                      h->path);
-  return SONDE_OK;
-}
-
-static sonde_status read_orientation(const sonde_header *h, sonde_sequence *s, sonde_error *error) {
-  static const char *const known[] = {"MF", "MFA", "UF", "UFA", "MN", "MNA",
-                                      "UN", "UNA", "XX", "XXX", NULL};
-  const char *key = h->nrrd ? "ultrasound image orientation" : "UltrasoundImageOrientation";
-  const sonde_header_entry *e = sonde_header_find(h, key);
-  sonde_status status = sonde_header_only(h, key, false, known, error);
-  snprintf(s->orientation, sizeof s->orientation, "%s", e && !status ? e->value : "");
-  return status;
 }
 
 // False when the key is not one of a frame; *number may then hold anything.
@@ -213,17 +169,6 @@ static sonde_status read_field(const sonde_header *h, const sonde_header_entry *
   return status ? status : check_transform(h, e, error);
 }
 
-static sonde_status gather_list_first(sonde_sequence *s, sonde_error *error) {
-  uint8_t *sorted = SONDE_NEW(uint8_t, pixel_count(s));
-  if (!sorted) return sonde_fail_memory(error);
-  size_t pixels = (size_t)s->width * s->height;
-  for (size_t p = 0; p < pixels; ++p)
-    for (uint32_t i = 0; i < s->count; ++i) sorted[i * pixels + p] = s->pixels[p * s->count + i];
-  sonde_free(s->pixels);
-  s->pixels = sorted;
-  return SONDE_OK;
-}
-
 // Its own inverse: U mirrors columns, N mirrors rows.
 static void mirror(const sonde_sequence *s, uint8_t *pixels) {
   bool columns = s->orientation[0] == 'U', rows = s->orientation[1] == 'N';
@@ -242,18 +187,28 @@ static void mirror(const sonde_sequence *s, uint8_t *pixels) {
 }
 
 static sonde_status read_sequence(const sonde_header *h, sonde_sequence *s, sonde_error *error) {
+  static const char *const known[] = {"MF", "MFA", "UF", "UFA", "MN", "MNA",
+                                      "UN", "UNA", "XX", "XXX", NULL};
   uint32_t size[3];
-  bool first;
-  sonde_status status = read_geometry(h, size, &first, error);
-  if (status) return status;
+  // The file tells width, height and frames; the frames run fastest, or last.
+  int last = (int)h->dimension - 1, list = h->list_axis < 0 ? last : h->list_axis;
+  SONDE_ASSERT(last >= 2 && last < 4 && list <= last);
+  bool first = list == 0;
+  const uint32_t *spatial = h->size + (first ? 1 : 0);
+  size[0] = spatial[0], size[1] = spatial[1], size[2] = h->size[list];
+  if ((list != 0 && list != last) || (h->dimension == 4 && spatial[2] != 1))
+    return sonde_fail(error, SONDE_FORMAT,
+                      "%.200s: expected the frames on the first or the last axis and single slices "
+                      "(domain domain [domain of size 1] list)",
+                      h->path);
   size_t expected = (size_t)size[0] * size[1] * size[2];
   if (size[0] > SONDE_SIDE_MAX || size[1] > SONDE_SIDE_MAX || size[2] < 1)
     return sonde_fail(error, SONDE_FORMAT,
                       "%.200s: %u frames of %u x %u pixels, expected at least one frame of at most "
                       "%d x %d",
                       h->path, size[2], size[0], size[1], SONDE_SIDE_MAX, SONDE_SIDE_MAX);
-  uint8_t *pixels; // first, so that a lying header costs no memory
-  status = sonde_pixels_read(h, expected, &pixels, error);
+  uint8_t *pixels; // read before the rest, so that a lying header costs no memory
+  sonde_status status = sonde_pixels_read(h, expected, &pixels, error);
   if (status) return status;
   *s = (sonde_sequence){.width = size[0],
                         .height = size[1],
@@ -262,9 +217,21 @@ static sonde_status read_sequence(const sonde_header *h, sonde_sequence *s, sond
                         .clip = {0, 0, size[0], size[1]}};
   s->frames = SONDE_NEW(sonde_tracked_frame, s->count);
   if (!s->frames) return sonde_fail_memory(error);
-  status = read_orientation(h, s, error);
-  if (!status && first) status = gather_list_first(s, error);
-  if (!status) mirror(s, s->pixels);
+  const char *key = h->nrrd ? "ultrasound image orientation" : "UltrasoundImageOrientation";
+  const sonde_header_entry *orientation = sonde_header_find(h, key);
+  status = sonde_header_only(h, key, false, known, error);
+  if (status) return status;
+  snprintf(s->orientation, sizeof s->orientation, "%s", orientation ? orientation->value : "");
+  if (first) { // frames that run fastest are put one after the other
+    uint8_t *sorted = SONDE_NEW(uint8_t, expected);
+    if (!sorted) return sonde_fail_memory(error);
+    size_t area = (size_t)s->width * s->height;
+    for (size_t p = 0; p < area; ++p)
+      for (uint32_t i = 0; i < s->count; ++i) sorted[i * area + p] = pixels[p * s->count + i];
+    sonde_free(pixels);
+    s->pixels = sorted;
+  }
+  mirror(s, s->pixels);
   for (uint32_t i = 0; i < h->entry_count && !status; ++i)
     status = read_field(h, &h->entries[i], s, error);
   return status;
@@ -282,38 +249,15 @@ sonde_status sonde_sequence_load(const char *path, sonde_sequence *s, sonde_erro
   return status;
 }
 
-static void write_header(sonde_file *file, const char *path, const sonde_sequence *s,
-                         bool compressed, size_t packed_count) {
-  if (sonde_text_ends(path, ".mha"))
-    sonde_metaimage_write_sequence(file, s, compressed ? packed_count : 0);
-  else
-    sonde_nrrd_write_sequence(file, s, compressed, sonde_text_ends(path, ".seq.nrrd"));
-}
-
 sonde_status sonde_sequence_save(const char *path, const sonde_sequence *s, bool compressed,
                                  sonde_error *error) {
   SONDE_ASSERT(path != NULL && s != NULL && s->frames != NULL);
-  bool mha = sonde_text_ends(path, ".mha");
-  if (!mha && !sonde_text_ends(path, ".nrrd"))
-    return sonde_fail(error, SONDE_ARGUMENT, "%.200s: expected a name that ends in .mha or .nrrd",
-                      path);
-  size_t count = pixel_count(s), packed_count = 0;
-  uint8_t *packed = NULL, *turned = SONDE_NEW(uint8_t, count);
-  sonde_file *file = NULL;
-  sonde_status status = turned ? SONDE_OK : sonde_fail_memory(error);
-  if (status) return status;
+  size_t count = pixel_count(s);
+  uint8_t *turned = SONDE_NEW(uint8_t, count);
+  if (!turned) return sonde_fail_memory(error);
   if (count) memcpy(turned, s->pixels, count);
   mirror(s, turned);
-  if (compressed)
-    status = sonde_pixels_pack(turned, count, mha ? SONDE_PACKING_ZLIB : SONDE_PACKING_GZIP,
-                               &packed, &packed_count, error);
-  if (!status) status = sonde_file_create(path, &file, error);
-  if (!status) {
-    write_header(file, path, s, compressed, packed_count);
-    sonde_file_write(file, compressed ? packed : turned, compressed ? packed_count : count);
-    status = sonde_file_commit(file, error);
-  }
-  sonde_free(packed);
+  sonde_status status = sonde_pixels_save(path, s, NULL, turned, count, compressed, error);
   sonde_free(turned);
   return status;
 }

@@ -54,6 +54,15 @@ sonde_status sonde_header_add(sonde_header *header, char *key, char *value, sond
 const sonde_header_entry *sonde_header_find(const sonde_header *header, const char *key);
 sonde_status sonde_header_only(const sonde_header *header, const char *key, bool required,
                                const char *const *words, sonde_error *error);
+// An entry that must be there, be one of some words (none: anything), or both.
+typedef struct sonde_header_rule {
+  const char *key;
+  bool required;
+  const char *words[6];
+} sonde_header_rule;
+sonde_status sonde_header_rules(const sonde_header *header, const sonde_header_rule *rules,
+                                size_t count, sonde_error *error);
+bool sonde_header_among(const char *key, const char *const *names, size_t count);
 sonde_status sonde_header_whole(const sonde_header *header, const sonde_header_entry *entry,
                                 uint32_t count, uint32_t low, uint32_t high, uint32_t *values,
                                 sonde_error *error);
@@ -69,8 +78,10 @@ bool sonde_text_ends(const char *text, const char *end);
 // The pixels, unpacked; exactly `expected` bytes.
 sonde_status sonde_pixels_read(const sonde_header *header, size_t expected, uint8_t **pixels,
                                sonde_error *error);
-sonde_status sonde_pixels_pack(const uint8_t *pixels, size_t count, sonde_packing packing,
-                               uint8_t **packed, size_t *packed_count, sonde_error *error);
+// Writes a sequence or a volume, the other one NULL; the name's end tells the format.
+sonde_status sonde_pixels_save(const char *path, const sonde_sequence *sequence,
+                               const sonde_volume *volume, const uint8_t *pixels, size_t count,
+                               bool compressed, sonde_error *error);
 
 // Headers of a sequence, up to the first byte of the pixels.
 void sonde_metaimage_write_sequence(sonde_file *file, const sonde_sequence *sequence,

@@ -1,14 +1,6 @@
 // From the transforms of a frame and the calibration to its pose.
 //
-// attribute                 value of name="..." inside an XML element
 // read_transform, read_clip elements of a PLUS configuration
-// sonde_calibration_load
-// split_name                "ProbeToTracker" -> Probe, Tracker
-// add_edge                  one transform into the graph
-// frame_edges               transforms of a frame and whether they may be used
-// reach                     spreads from Image over the edges, either way round
-// choose_world              the first of the usual names that is reached
-// sonde_sequence_locate
 #include "sweep/frames.h"
 
 #include "base/bounds.h"
@@ -189,10 +181,20 @@ static sonde_status frame_edges(const sonde_sequence *s, uint32_t frame, bool al
   return SONDE_OK;
 }
 
-static void reach(graph *g) {
+// All that holds for a frame, spread from Image; edges of the calibration come first.
+static sonde_status frame_graph(const sonde_sequence *s, const sonde_calibration *c, uint32_t frame,
+                                bool all, graph *g, sonde_error *error) {
+  *g = (graph){0};
+  sonde_status status = SONDE_OK;
+  for (uint32_t i = 0; c && i < c->count && !status; ++i)
+    status = add_edge(g, c->transforms[i].from, c->transforms[i].to, &c->transforms[i].to_from_from,
+                      error);
+  if (!status) status = frame_edges(s, SONDE_WHOLE_FILE, all, g, error);
+  if (!status) status = frame_edges(s, frame, all, g, error);
+  if (status) return status;
+  // The names are reached from Image over the edges, either way round.
   uint32_t image = name_index(g, "Image");
-  memset(g->reached, 0, sizeof g->reached);
-  if (image == NAMES_MAX) return;
+  if (image == NAMES_MAX) return SONDE_OK;
   g->reached[image] = true;
   g->from_image[image] = affine_identity();
   for (bool changed = true; changed;) {
@@ -205,20 +207,7 @@ static void reach(graph *g) {
       g->reached[new] = changed = true;
     }
   }
-}
-
-// All that holds for a frame, spread from Image; edges of the calibration come first.
-static sonde_status frame_graph(const sonde_sequence *s, const sonde_calibration *c, uint32_t frame,
-                                bool all, graph *g, sonde_error *error) {
-  *g = (graph){0};
-  sonde_status status = SONDE_OK;
-  for (uint32_t i = 0; c && i < c->count && !status; ++i)
-    status = add_edge(g, c->transforms[i].from, c->transforms[i].to, &c->transforms[i].to_from_from,
-                      error);
-  if (!status) status = frame_edges(s, SONDE_WHOLE_FILE, all, g, error);
-  if (!status) status = frame_edges(s, frame, all, g, error);
-  if (!status) reach(g);
-  return status;
+  return SONDE_OK;
 }
 
 // Index of the name when it is reached, else NAMES_MAX.
@@ -248,19 +237,15 @@ static sonde_status choose_world(const sonde_sequence *s, const sonde_calibratio
   return status;
 }
 
-static bool image_is_good(const sonde_sequence *s, uint32_t frame) {
-  const char *status = sonde_sequence_get(s, frame, "ImageStatus");
-  if (!status) status = sonde_sequence_get(s, frame, "Status");
-  return !status || strcmp(status, "OK") == 0;
-}
-
 static sonde_status locate_frame(sonde_sequence *s, const sonde_calibration *c, uint32_t frame,
                                  graph *g, sonde_located *located, sonde_error *error) {
   sonde_status status = frame_graph(s, c, frame, false, g, error);
   if (status) return status;
   sonde_tracked_frame *f = &s->frames[frame];
   uint32_t world = reached_name(g, located->world);
-  f->used = world != NAMES_MAX && image_is_good(s, frame);
+  const char *word = sonde_sequence_get(s, frame, "ImageStatus");
+  if (!word) word = sonde_sequence_get(s, frame, "Status");
+  f->used = world != NAMES_MAX && (!word || strcmp(word, "OK") == 0);
   if (f->used) {
     f->world_from_pixel = affine_scale(g->from_image[world], 1e-3);
     ++located->used;
@@ -272,25 +257,22 @@ static sonde_status locate_frame(sonde_sequence *s, const sonde_calibration *c, 
   return status;
 }
 
-static sonde_status apply_clip(sonde_sequence *s, const uint32_t clip[4], sonde_error *error) {
-  if (clip[2] < 1 || clip[3] < 1 || clip[0] > s->width || clip[2] > s->width - clip[0] ||
-      clip[1] > s->height || clip[3] > s->height - clip[1])
-    return sonde_fail(error, SONDE_MISMATCH,
-                      "clip rectangle of %u x %u pixels at (%u, %u): expected one within frames of "
-                      "%u x %u",
-                      clip[2], clip[3], clip[0], clip[1], s->width, s->height);
-  memcpy(s->clip, clip, sizeof s->clip);
-  return SONDE_OK;
-}
-
 sonde_status sonde_sequence_locate(sonde_sequence *s, const sonde_calibration *c, const char *world,
                                    sonde_located *out, sonde_error *error) {
   SONDE_ASSERT(s != NULL && s->frames != NULL);
   sonde_located located = {0};
   sonde_status status = SONDE_OK;
   for (uint32_t i = 0; i < s->count; ++i) s->frames[i].used = false;
-  if (c && c->has_clip) status = apply_clip(s, c->clip, error);
-  if (status) return status;
+  if (c && c->has_clip) {
+    const uint32_t *clip = c->clip;
+    if (clip[2] < 1 || clip[3] < 1 || clip[0] > s->width || clip[2] > s->width - clip[0] ||
+        clip[1] > s->height || clip[3] > s->height - clip[1])
+      return sonde_fail(error, SONDE_MISMATCH,
+                        "clip rectangle of %u x %u pixels at (%u, %u): expected one within frames "
+                        "of %u x %u",
+                        clip[2], clip[3], clip[0], clip[1], s->width, s->height);
+    memcpy(s->clip, clip, sizeof s->clip);
+  }
   if (world)
     snprintf(located.world, sizeof located.world, "%.31s", world);
   else

@@ -1,15 +1,4 @@
 // What the headers of MetaImage and NRRD share, and the pixels behind them.
-//
-// sonde_header_load     whole file, kind by its first bytes
-// sonde_header_line     next line, checked to be text
-// sonde_header_add      one entry
-// sonde_header_find     entry of a key
-// sonde_header_only     an entry must be one of some words
-// sonde_header_whole    whole numbers of an entry
-// sonde_header_reals    real numbers of an entry
-// inflate_all           unpacks into a block of known size
-// sonde_pixels_read     raw or packed pixels of exactly the expected size
-// sonde_pixels_pack     the way back
 #include "sweep/frames.h"
 
 #include "base/bounds.h"
@@ -107,15 +96,13 @@ static sonde_status fail_value(const sonde_header *h, const sonde_header_entry *
                     h->path, e->line, e->key, expected, e->value);
 }
 
-static sonde_status fail_missing(const sonde_header *h, const char *key, sonde_error *error) {
-  return sonde_fail(error, SONDE_FORMAT, "%.200s:%u: the header ends without '%s'", h->path,
-                    h->lines, key);
-}
-
 sonde_status sonde_header_only(const sonde_header *h, const char *key, bool required,
                                const char *const *words, sonde_error *error) {
   const sonde_header_entry *e = sonde_header_find(h, key);
-  if (!e) return required ? fail_missing(h, key, error) : SONDE_OK;
+  if (!e && required)
+    return sonde_fail(error, SONDE_FORMAT, "%.200s:%u: the header ends without '%s'", h->path,
+                      h->lines, key);
+  if (!e) return SONDE_OK;
   char known[128] = "";
   for (; *words; ++words) {
     if (strcmp(e->value, *words) == 0) return SONDE_OK;
@@ -123,6 +110,21 @@ sonde_status sonde_header_only(const sonde_header *h, const char *key, bool requ
     snprintf(known + used, sizeof known - used, "%s%s", used ? " or " : "", *words);
   }
   return fail_value(h, e, known, error);
+}
+
+sonde_status sonde_header_rules(const sonde_header *h, const sonde_header_rule *rules, size_t count,
+                                sonde_error *error) {
+  sonde_status status = SONDE_OK;
+  for (size_t i = 0; i < count && !status; ++i)
+    if (rules[i].words[0] || !sonde_header_find(h, rules[i].key))
+      status = sonde_header_only(h, rules[i].key, rules[i].required, rules[i].words, error);
+  return status;
+}
+
+bool sonde_header_among(const char *key, const char *const *names, size_t count) {
+  for (size_t i = 0; i < count; ++i)
+    if (strcmp(names[i], key) == 0) return true;
+  return false;
 }
 
 sonde_status sonde_header_whole(const sonde_header *h, const sonde_header_entry *e, uint32_t count,
@@ -195,22 +197,6 @@ static size_t inflate_all(const sonde_header *h, uint8_t *out, size_t expected, 
   return written;
 }
 
-static sonde_status unpack(const sonde_header *h, uint8_t *out, size_t expected,
-                           sonde_error *error) {
-  int code;
-  size_t written = inflate_all(h, out, expected, &code);
-  if (code == Z_STREAM_END && written == expected) return SONDE_OK;
-  if (code == Z_MEM_ERROR) return sonde_fail_memory(error);
-  if (code == Z_DATA_ERROR || code == Z_NEED_DICT)
-    return sonde_fail(error, SONDE_FORMAT,
-                      "%.200s: the packed pixels after line %u are damaged behind byte %zu of %zu",
-                      h->path, h->lines, written, expected);
-  return sonde_fail(error, SONDE_FORMAT,
-                    "%.200s: the pixels after line %u unpack to %s%zu bytes, expected %zu", h->path,
-                    h->lines, written > expected ? "more than " : "",
-                    written > expected ? expected : written, expected);
-}
-
 sonde_status sonde_pixels_read(const sonde_header *h, size_t expected, uint8_t **pixels,
                                sonde_error *error) {
   SONDE_ASSERT(h->packed <= h->count - h->data);
@@ -228,17 +214,28 @@ sonde_status sonde_pixels_read(const sonde_header *h, size_t expected, uint8_t *
   uint8_t *out = SONDE_NEW(uint8_t, expected);
   if (!out) return sonde_fail_memory(error);
   sonde_status status = SONDE_OK;
-  if (raw && expected)
-    memcpy(out, h->bytes + h->data, expected);
-  else if (!raw)
-    status = unpack(h, out, expected, error);
+  if (raw && expected) memcpy(out, h->bytes + h->data, expected);
+  int code = Z_STREAM_END;
+  size_t written = raw ? expected : inflate_all(h, out, expected, &code);
+  if (code == Z_MEM_ERROR)
+    status = sonde_fail_memory(error);
+  else if (code == Z_DATA_ERROR || code == Z_NEED_DICT)
+    status =
+        sonde_fail(error, SONDE_FORMAT,
+                   "%.200s: the packed pixels after line %u are damaged behind byte %zu of %zu",
+                   h->path, h->lines, written, expected);
+  else if (code != Z_STREAM_END || written != expected)
+    status = sonde_fail(error, SONDE_FORMAT,
+                        "%.200s: the pixels after line %u unpack to %s%zu bytes, expected %zu",
+                        h->path, h->lines, written > expected ? "more than " : "",
+                        written > expected ? expected : written, expected);
   if (status) sonde_free(out);
   *pixels = status ? NULL : out;
   return status;
 }
 
-sonde_status sonde_pixels_pack(const uint8_t *pixels, size_t count, sonde_packing packing,
-                               uint8_t **packed, size_t *packed_count, sonde_error *error) {
+static sonde_status pack_pixels(const uint8_t *pixels, size_t count, sonde_packing packing,
+                                uint8_t **packed, size_t *packed_count, sonde_error *error) {
   SONDE_ASSERT(packing != SONDE_PACKING_RAW && (pixels != NULL || count == 0));
   z_stream z = {0};
   size_t room = count + count / 1000 + 1024, used = 0, taken = 0;
@@ -263,4 +260,32 @@ sonde_status sonde_pixels_pack(const uint8_t *pixels, size_t count, sonde_packin
   *packed = out;
   *packed_count = used;
   return SONDE_OK;
+}
+
+sonde_status sonde_pixels_save(const char *path, const sonde_sequence *s, const sonde_volume *v,
+                               const uint8_t *pixels, size_t count, bool compressed,
+                               sonde_error *error) {
+  SONDE_ASSERT((s == NULL) != (v == NULL));
+  bool mha = sonde_text_ends(path, ".mha");
+  if (!mha && !sonde_text_ends(path, ".nrrd"))
+    return sonde_fail(error, SONDE_ARGUMENT, "%.200s: expected a name that ends in .mha or .nrrd",
+                      path);
+  uint8_t *packed = NULL;
+  sonde_file *file = NULL;
+  sonde_status status = SONDE_OK;
+  if (compressed)
+    status = pack_pixels(pixels, count, mha ? SONDE_PACKING_ZLIB : SONDE_PACKING_GZIP, &packed,
+                         &count, error);
+  if (!status) status = sonde_file_create(path, &file, error);
+  if (!status) {
+    if (s && mha) sonde_metaimage_write_sequence(file, s, compressed ? count : 0);
+    if (s && !mha)
+      sonde_nrrd_write_sequence(file, s, compressed, sonde_text_ends(path, ".seq.nrrd"));
+    if (v && mha) sonde_metaimage_write_volume(file, v, compressed ? count : 0);
+    if (v && !mha) sonde_nrrd_write_volume(file, v, compressed);
+    sonde_file_write(file, compressed ? packed : pixels, count);
+    status = sonde_file_commit(file, error);
+  }
+  sonde_free(packed);
+  return status;
 }

@@ -1,14 +1,4 @@
 // Each frame made again from the others.
-//
-// mark_lit             pixels that some frame shows brighter than black
-// neighbour_mean       frames before and after, pixel by pixel
-// keep_common          pixels that all ways reach
-// render, make_all     ways of making a frame
-// add, finish          sums and means over frames
-// leave_out            one frame
-// leave_each_out
-// make_work, clear_work
-// sonde_sequence_leave_one_out
 #include "sweep/slice.h"
 
 #include <string.h>
@@ -25,19 +15,6 @@ typedef struct work {
 
 static const uint8_t *frame_of(const work *w, uint32_t frame) {
   return w->sequence->pixels + frame * w->pixels;
-}
-
-static void mark_lit(work *w) {
-  for (uint32_t i = 0; i < w->sequence->count; ++i) {
-    if (!w->sequence->frames[i].used) continue;
-    const uint8_t *frame = frame_of(w, i);
-    for (size_t p = 0; p < w->pixels; ++p) w->lit[p] |= frame[p] > 0;
-  }
-}
-
-static void neighbour_mean(work *w, uint32_t before, uint32_t after) {
-  const uint8_t *a = frame_of(w, before), *b = frame_of(w, after);
-  for (size_t p = 0; p < w->pixels; ++p) w->mean[p] = (uint8_t)((a[p] + b[p] + 1) / 2);
 }
 
 enum { AT_PLACE, KRIGED, BRACKETED, NEAREST, WAYS };
@@ -68,53 +45,32 @@ static sonde_status render(work *w, uint32_t frame, sonde_slice_method method, i
   return SONDE_OK;
 }
 
-static void add(sonde_likeness *sum, const sonde_likeness *l) {
-  sum->count += l->count;
-  sum->rms_grey += l->rms_grey * l->rms_grey * (double)l->count;
-  sum->mae_grey += l->mae_grey * (double)l->count;
-  sum->psnr_db += l->psnr_db, sum->ncc += l->ncc, sum->ssim += l->ssim;
-}
-
-static void finish(sonde_likeness *sum, uint32_t frames) {
-  SONDE_ASSERT(frames > 0 && sum->count > 0);
-  sum->rms_grey = sqrt(sum->rms_grey / (double)sum->count);
-  sum->mae_grey /= (double)sum->count;
-  sum->psnr_db /= frames, sum->ncc /= frames, sum->ssim /= frames;
-}
-
-static sonde_status compare(const work *w, uint32_t frame, const uint8_t *made, sonde_likeness *sum,
-                            sonde_error *error) {
-  sonde_likeness l;
-  sonde_status status = sonde_image_likeness(frame_of(w, frame), made, w->known, w->sequence->width,
-                                             w->sequence->height, &l, error);
-  if (!status) add(sum, &l);
-  return status;
-}
-
-// The ways of making a frame; marks the pixels that all reach.
-static sonde_status make_all(work *w, uint32_t frame, uint64_t *left, bool *along_sweep,
-                             sonde_error *error) {
-  memcpy(w->known, w->lit, w->pixels);
-  sonde_status status = render(w, frame, SONDE_SLICE_KRIGE, KRIGED, along_sweep, error);
-  if (!status) status = render(w, frame, SONDE_SLICE_BRACKET, BRACKETED, NULL, error);
-  if (!status) status = render(w, frame, SONDE_SLICE_NEAREST, NEAREST, NULL, error);
-  if (status) return status;
-  *left = 0;
-  for (size_t p = 0; p < w->pixels; ++p) *left += w->known[p];
-  return SONDE_OK;
-}
-
 static sonde_status leave_out(work *w, uint32_t k, sonde_left_out *result, sonde_error *error) {
   uint32_t frame = w->used[k], step = 1 + w->options.left_out_beside;
-  uint64_t left;
+  uint64_t left = 0;
   bool along_sweep = false;
-  sonde_status status = make_all(w, frame, &left, &along_sweep, error);
+  // The pixels that count are those that all ways of making the frame reach.
+  memcpy(w->known, w->lit, w->pixels);
+  sonde_status status = render(w, frame, SONDE_SLICE_KRIGE, KRIGED, &along_sweep, error);
+  if (!status) status = render(w, frame, SONDE_SLICE_BRACKET, BRACKETED, NULL, error);
+  if (!status) status = render(w, frame, SONDE_SLICE_NEAREST, NEAREST, NULL, error);
+  for (size_t p = 0; p < w->pixels; ++p) left += w->known[p];
   if (status || !left) return status; // the others do not reach this frame: not counted
-  neighbour_mean(w, w->used[k - step], w->used[k + step]);
+  // The mean of the frames before and after is taken pixel by pixel.
+  const uint8_t *a = frame_of(w, w->used[k - step]), *b = frame_of(w, w->used[k + step]);
+  for (size_t p = 0; p < w->pixels; ++p) w->mean[p] = (uint8_t)((a[p] + b[p] + 1) / 2);
   sonde_likeness *sums[WAYS + 1] = {&result->place, &result->krige, &result->bracket,
                                     &result->nearest, &result->neighbours};
-  for (int i = 0; i <= WAYS && !status; ++i)
-    status = compare(w, frame, i < WAYS ? w->images[i].pixels : w->mean, sums[i], error);
+  for (int i = 0; i <= WAYS && !status; ++i) {
+    sonde_likeness l, *sum = sums[i];
+    status = sonde_image_likeness(frame_of(w, frame), i < WAYS ? w->images[i].pixels : w->mean,
+                                  w->known, w->sequence->width, w->sequence->height, &l, error);
+    if (status) break;
+    sum->count += l.count;
+    sum->rms_grey += l.rms_grey * l.rms_grey * (double)l.count;
+    sum->mae_grey += l.mae_grey * (double)l.count;
+    sum->psnr_db += l.psnr_db, sum->ncc += l.ncc, sum->ssim += l.ssim;
+  }
   result->along_sweep += along_sweep;
   ++result->frames;
   return status;
@@ -135,11 +91,15 @@ static sonde_status leave_each_out(work *w, sonde_left_out *result, const sonde_
                       "%u frames with a pose, none of which lies between others; expected at least "
                       "%u in a sweep",
                       w->count, 2 * step + 1);
-  finish(&result->place, result->frames);
-  finish(&result->krige, result->frames);
-  finish(&result->bracket, result->frames);
-  finish(&result->nearest, result->frames);
-  finish(&result->neighbours, result->frames);
+  sonde_likeness *sums[] = {&result->place, &result->krige, &result->bracket, &result->nearest,
+                            &result->neighbours};
+  for (size_t i = 0; i < SONDE_COUNT_OF(sums); ++i) {
+    sonde_likeness *sum = sums[i];
+    SONDE_ASSERT(sum->count > 0);
+    sum->rms_grey = sqrt(sum->rms_grey / (double)sum->count);
+    sum->mae_grey /= (double)sum->count;
+    sum->psnr_db /= result->frames, sum->ncc /= result->frames, sum->ssim /= result->frames;
+  }
   return SONDE_OK;
 }
 
@@ -157,18 +117,15 @@ static sonde_status make_work(work *w, sonde_error *error) {
     status = sonde_fail_memory(error);
   for (uint32_t i = 0; i < s->count && !status; ++i)
     if (s->frames[i].used) w->used[w->count++] = i;
-  if (!status) mark_lit(w);
+  if (!status) {
+    // A pixel counts where some frame shows it brighter than black.
+    for (uint32_t i = 0; i < w->sequence->count; ++i) {
+      if (!w->sequence->frames[i].used) continue;
+      const uint8_t *frame = frame_of(w, i);
+      for (size_t p = 0; p < w->pixels; ++p) w->lit[p] |= frame[p] > 0;
+    }
+  }
   return status ? status : sonde_slice_bank_create(s, &w->bank, error);
-}
-
-static void clear_work(work *w) {
-  for (int k = 0; k < WAYS; ++k) sonde_image_clear(&w->images[k]);
-  sonde_slice_bank_destroy(w->bank);
-  sonde_free(w->lit);
-  sonde_free(w->known);
-  sonde_free(w->other_known);
-  sonde_free(w->mean);
-  sonde_free(w->used);
 }
 
 sonde_status sonde_sequence_leave_one_out(const sonde_sequence *s,
@@ -182,6 +139,12 @@ sonde_status sonde_sequence_leave_one_out(const sonde_sequence *s,
   sonde_status status = sonde_slicer_check(s, &w.options, error);
   if (!status) status = make_work(&w, error);
   if (!status) status = leave_each_out(&w, result, progress, error);
-  clear_work(&w);
+  for (int k = 0; k < WAYS; ++k) sonde_image_clear(&w.images[k]);
+  sonde_slice_bank_destroy(w.bank);
+  sonde_free(w.lit);
+  sonde_free(w.known);
+  sonde_free(w.other_known);
+  sonde_free(w.mean);
+  sonde_free(w.used);
   return status;
 }

@@ -1,12 +1,6 @@
 // MetaImage: "Key = Value" lines, the last one ElementDataFile = LOCAL, then the pixels.
 //
-// read_lines                      header into entries
-// check_words                     keys that only have one meaning here
-// read_sizes                      DimSize
-// read_packing                    CompressedData, CompressedDataSize
-// read_grid                       spacing, offset and axes of a volume
 // sonde_metaimage_write_sequence  header as IGSIO writes it
-// sonde_metaimage_write_volume
 #include "sweep/frames.h"
 
 #include <string.h>
@@ -38,9 +32,7 @@ static const char *const OWNED[] = {"ObjectType",
                                     "CustomFrameFieldNames"};
 
 bool sonde_metaimage_owns(const char *key) {
-  for (size_t i = 0; i < SONDE_COUNT_OF(OWNED); ++i)
-    if (strcmp(OWNED[i], key) == 0) return true;
-  return false;
+  return sonde_header_among(key, OWNED, SONDE_COUNT_OF(OWNED));
 }
 
 static sonde_status read_lines(sonde_header *h, sonde_error *error) {
@@ -69,23 +61,17 @@ static sonde_status read_lines(sonde_header *h, sonde_error *error) {
 }
 
 static sonde_status check_words(const sonde_header *h, sonde_error *error) {
-  static const struct {
-    const char *key;
-    bool required;
-    const char *words[3];
-  } rules[] = {{"ObjectType", false, {"Image"}},
-               {"NDims", true, {"3"}},
-               {"BinaryData", false, {"True"}},
-               {"ElementNumberOfChannels", false, {"1"}},
-               {"ElementType", true, {"MET_UCHAR"}},
-               {"CompressedData", false, {"True", "False"}},
-               {"DimSize", true, {NULL}},
-               {"ElementDataFile", true, {"LOCAL"}}};
-  sonde_status status = SONDE_OK;
+  static const sonde_header_rule rules[] = {{"ObjectType", false, {"Image"}},
+                                            {"NDims", true, {"3"}},
+                                            {"BinaryData", false, {"True"}},
+                                            {"ElementNumberOfChannels", false, {"1"}},
+                                            {"ElementType", true, {"MET_UCHAR"}},
+                                            {"CompressedData", false, {"True", "False"}},
+                                            {"DimSize", true, {NULL}},
+                                            {"ElementDataFile", true, {"LOCAL"}}};
+  sonde_status status = sonde_header_rules(h, rules, SONDE_COUNT_OF(rules), error);
   for (size_t i = 0; i < SONDE_COUNT_OF(rules) && !status; ++i) {
     const sonde_header_entry *e = sonde_header_find(h, rules[i].key);
-    if (!e || rules[i].words[0])
-      status = sonde_header_only(h, rules[i].key, rules[i].required, rules[i].words, error);
     for (const sonde_header_entry *f = e; f && !status && ++f < h->entries + h->entry_count;)
       if (strcmp(e->key, f->key) == 0)
         status = sonde_fail(error, SONDE_FORMAT, "%.200s:%u: %s repeats line %u", h->path, f->line,
@@ -94,35 +80,31 @@ static sonde_status check_words(const sonde_header *h, sonde_error *error) {
   return status;
 }
 
-static sonde_status read_sizes(sonde_header *h, sonde_error *error) {
+sonde_status sonde_metaimage_parse(sonde_header *h, sonde_error *error) {
+  double spacing[3] = {1, 1, 1}, offset[3] = {0}, axes[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  sonde_status status = read_lines(h, error);
+  if (!status) status = check_words(h, error);
+  if (status) return status;
   h->dimension = 3;
   h->list_axis = 2;
-  return sonde_header_whole(h, sonde_header_find(h, "DimSize"), 3, 0, SONDE_FRAMES_MAX, h->size,
-                            error);
-}
-
-static sonde_status read_packing(sonde_header *h, sonde_error *error) {
-  const sonde_header_entry *packed = sonde_header_find(h, "CompressedData");
-  const sonde_header_entry *size = sonde_header_find(h, "CompressedDataSize");
   h->packed = h->count - h->data;
-  if (!packed || strcmp(packed->value, "True") != 0) return SONDE_OK;
-  h->packing = SONDE_PACKING_ZLIB;
-  if (!size) return SONDE_OK;
-  uint32_t bytes;
-  sonde_status status = sonde_header_whole(h, size, 1, 0, UINT32_MAX, &bytes, error);
-  if (!status && bytes > h->packed)
-    return sonde_fail(error, SONDE_FORMAT,
-                      "%.200s:%u: CompressedDataSize: expected %u bytes after line %u, found %zu; "
-                      "is the file cut off?",
-                      h->path, size->line, bytes, h->lines, h->packed);
-  if (!status) h->packed = bytes;
-  return status;
-}
-
-// TransformMatrix holds the direction of one axis after the other.
-static sonde_status read_grid(sonde_header *h, sonde_error *error) {
-  double spacing[3] = {1, 1, 1}, offset[3] = {0}, axes[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
-  sonde_status status = sonde_header_reals(h, "ElementSpacing", 3, spacing, error);
+  status = sonde_header_whole(h, sonde_header_find(h, "DimSize"), 3, 0, SONDE_FRAMES_MAX, h->size,
+                              error);
+  const sonde_header_entry *compressed = sonde_header_find(h, "CompressedData");
+  const sonde_header_entry *size = sonde_header_find(h, "CompressedDataSize");
+  if (compressed && strcmp(compressed->value, "True") == 0) h->packing = SONDE_PACKING_ZLIB;
+  if (size && h->packing == SONDE_PACKING_ZLIB) {
+    uint32_t bytes = 0;
+    if (!status) status = sonde_header_whole(h, size, 1, 0, UINT32_MAX, &bytes, error);
+    if (!status && bytes > h->packed)
+      status = sonde_fail(error, SONDE_FORMAT,
+                          "%.200s:%u: CompressedDataSize: expected %u bytes after line %u, found "
+                          "%zu; is the file cut off?",
+                          h->path, size->line, bytes, h->lines, h->packed);
+    if (!status) h->packed = bytes;
+  }
+  // TransformMatrix holds the direction of one axis after the other.
+  if (!status) status = sonde_header_reals(h, "ElementSpacing", 3, spacing, error);
   if (!status) status = sonde_header_reals(h, "Offset", 3, offset, error);
   if (!status) status = sonde_header_reals(h, "TransformMatrix", 9, axes, error);
   for (int i = 0; i < 3; ++i) {
@@ -130,14 +112,6 @@ static sonde_status read_grid(sonde_header *h, sonde_error *error) {
     h->mm_from_voxel.m[i][3] = offset[i];
   }
   return status;
-}
-
-sonde_status sonde_metaimage_parse(sonde_header *h, sonde_error *error) {
-  sonde_status status = read_lines(h, error);
-  if (!status) status = check_words(h, error);
-  if (!status) status = read_sizes(h, error);
-  if (!status) status = read_packing(h, error);
-  return status ? status : read_grid(h, error);
 }
 
 static void write_start(sonde_file *file, size_t packed) {

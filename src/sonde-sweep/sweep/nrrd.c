@@ -1,11 +1,6 @@
 // NRRD: a magic line, "field: value" and "key:=value" lines, an empty line, then the pixels.
 //
-// read_lines                 header into entries
-// check_words                fields that only have one meaning here
-// read_sizes                 dimension, sizes, and which axis runs over the frames
-// read_vector, read_grid     directions and origin of a volume
 // sonde_nrrd_write_sequence  three axes as IGSIO writes, or four as Slicer wants
-// sonde_nrrd_write_volume
 #include "sweep/frames.h"
 
 #include <string.h>
@@ -46,9 +41,7 @@ static const char *const OWNED[] = {"dimension",
                                     "axis 3 index values"};
 
 bool sonde_nrrd_owns(const char *key) {
-  for (size_t i = 0; i < SONDE_COUNT_OF(OWNED); ++i)
-    if (strcmp(OWNED[i], key) == 0) return true;
-  return false;
+  return sonde_header_among(key, OWNED, SONDE_COUNT_OF(OWNED));
 }
 
 // The first of ": " and ":=" divides a line.
@@ -87,20 +80,14 @@ static sonde_status read_lines(sonde_header *h, sonde_error *error) {
 }
 
 static sonde_status check_words(sonde_header *h, sonde_error *error) {
-  static const struct {
-    const char *key;
-    bool required;
-    const char *words[6];
-  } rules[] = {{"type", true, {"unsigned char", "uchar", "uint8", "uint8_t"}},
-               {"dimension", true, {"3", "4"}},
-               {"encoding", true, {"raw", "gzip", "gz"}},
-               {"sizes", true, {NULL}},
-               {"line skip", false, {"0"}},
-               {"byte skip", false, {"0"}}};
-  sonde_status status = SONDE_OK;
-  for (size_t i = 0; i < SONDE_COUNT_OF(rules) && !status; ++i)
-    if (rules[i].words[0] || !sonde_header_find(h, rules[i].key))
-      status = sonde_header_only(h, rules[i].key, rules[i].required, rules[i].words, error);
+  static const sonde_header_rule rules[] = {
+      {"type", true, {"unsigned char", "uchar", "uint8", "uint8_t"}},
+      {"dimension", true, {"3", "4"}},
+      {"encoding", true, {"raw", "gzip", "gz"}},
+      {"sizes", true, {NULL}},
+      {"line skip", false, {"0"}},
+      {"byte skip", false, {"0"}}};
+  sonde_status status = sonde_header_rules(h, rules, SONDE_COUNT_OF(rules), error);
   const sonde_header_entry *apart = sonde_header_find(h, "data file");
   if (!apart) apart = sonde_header_find(h, "datafile");
   if (!status && apart)
@@ -108,31 +95,6 @@ static sonde_status check_words(sonde_header *h, sonde_error *error) {
                         "%.200s:%u: data file: the pixels are expected in the same file", h->path,
                         apart->line);
   return status;
-}
-
-static int list_axis(const sonde_header *h) {
-  const sonde_header_entry *e = sonde_header_find(h, "kinds");
-  const char *text = e ? e->value : "";
-  for (int axis = 0; *text; ++axis) {
-    text += strspn(text, " \t");
-    size_t length = strcspn(text, " \t");
-    if (length == 4 && (memcmp(text, "list", 4) == 0 || memcmp(text, "time", 4) == 0)) return axis;
-    text += length;
-  }
-  return -1;
-}
-
-static sonde_status read_sizes(sonde_header *h, sonde_error *error) {
-  h->dimension = (uint32_t)(sonde_header_find(h, "dimension")->value[0] - '0');
-  h->list_axis = list_axis(h);
-  if (h->list_axis >= (int)h->dimension)
-    return sonde_fail(error, SONDE_FORMAT, "%.200s:%u: kinds: expected %u words, one per axis",
-                      h->path, sonde_header_find(h, "kinds")->line, h->dimension);
-  h->packed = h->count - h->data;
-  h->packing = strcmp(sonde_header_find(h, "encoding")->value, "raw") == 0 ? SONDE_PACKING_RAW
-                                                                           : SONDE_PACKING_GZIP;
-  return sonde_header_whole(h, sonde_header_find(h, "sizes"), h->dimension, 1, SONDE_FRAMES_MAX,
-                            h->size, error);
 }
 
 // "(a,b,c)"; moves on; false when it is something else.
@@ -175,13 +137,27 @@ static sonde_status read_grid(sonde_header *h, sonde_error *error) {
 sonde_status sonde_nrrd_parse(sonde_header *h, sonde_error *error) {
   sonde_status status = read_lines(h, error);
   if (!status) status = check_words(h, error);
-  if (!status) status = read_sizes(h, error);
+  if (status) return status;
+  h->dimension = (uint32_t)(sonde_header_find(h, "dimension")->value[0] - '0');
+  h->packed = h->count - h->data;
+  bool raw = strcmp(sonde_header_find(h, "encoding")->value, "raw") == 0;
+  h->packing = raw ? SONDE_PACKING_RAW : SONDE_PACKING_GZIP;
+  // The first kind that is a list or a time tells the axis of the frames.
+  const sonde_header_entry *kinds = sonde_header_find(h, "kinds");
+  const char *text = kinds ? kinds->value : "";
+  for (int axis = 0; *text && h->list_axis < 0; ++axis) {
+    text += strspn(text, " \t");
+    size_t length = strcspn(text, " \t");
+    if (length == 4 && (memcmp(text, "list", 4) == 0 || memcmp(text, "time", 4) == 0))
+      h->list_axis = axis;
+    text += length;
+  }
+  if (h->list_axis >= (int)h->dimension)
+    return sonde_fail(error, SONDE_FORMAT, "%.200s:%u: kinds: expected %u words, one per axis",
+                      h->path, kinds->line, h->dimension);
+  status = sonde_header_whole(h, sonde_header_find(h, "sizes"), h->dimension, 1, SONDE_FRAMES_MAX,
+                              h->size, error);
   return status ? status : read_grid(h, error);
-}
-
-// File-wide names are words with spaces here.
-static const char *key_here(const char *key) {
-  return strcmp(key, "UltrasoundImageType") == 0 ? "ultrasound image type" : key;
 }
 
 static void write_start(sonde_file *file, int dimension, bool packed) {
@@ -192,34 +168,32 @@ static void write_start(sonde_file *file, int dimension, bool packed) {
                     dimension, packed ? "gzip" : "raw");
 }
 
-static void write_axes(sonde_file *file, const sonde_sequence *s, bool four) {
-  if (!four) {
-    sonde_file_printf(file,
-                      "kinds: domain domain list\nsizes: %u %u %u\nspace dimension: 2\n"
-                      "space directions: (1,0) (0,1) none\nspace origin: (0,0)\n",
-                      s->width, s->height, s->count);
-    return;
-  }
-  sonde_file_printf(file,
-                    "kinds: domain domain domain list\nlabels: \"x\" \"y\" \"z\" \"frame\"\n"
-                    "sizes: %u %u 1 %u\nspace dimension: 3\n"
-                    "space directions: (1,0,0) (0,1,0) (0,0,1) none\nspace origin: (0,0,0)\n"
-                    "DataNodeClassName:=vtkMRMLScalarVolumeNode\naxis 3 index type:=numeric\n"
-                    "axis 3 index values:=",
-                    s->width, s->height, s->count);
-  for (uint32_t i = 0; i < s->count; ++i) sonde_file_printf(file, i ? " %u" : "%u", i);
-  sonde_file_printf(file, "\n");
-}
-
 void sonde_nrrd_write_sequence(sonde_file *file, const sonde_sequence *s, bool packed,
                                bool four_axes) {
   SONDE_ASSERT(file != NULL && s != NULL);
   write_start(file, four_axes ? 4 : 3, packed);
-  write_axes(file, s, four_axes);
+  if (four_axes) {
+    sonde_file_printf(file,
+                      "kinds: domain domain domain list\nlabels: \"x\" \"y\" \"z\" \"frame\"\n"
+                      "sizes: %u %u 1 %u\nspace dimension: 3\n"
+                      "space directions: (1,0,0) (0,1,0) (0,0,1) none\nspace origin: (0,0,0)\n"
+                      "DataNodeClassName:=vtkMRMLScalarVolumeNode\naxis 3 index type:=numeric\n"
+                      "axis 3 index values:=",
+                      s->width, s->height, s->count);
+    for (uint32_t i = 0; i < s->count; ++i) sonde_file_printf(file, i ? " %u" : "%u", i);
+    sonde_file_printf(file, "\n");
+  } else
+    sonde_file_printf(file,
+                      "kinds: domain domain list\nsizes: %u %u %u\nspace dimension: 2\n"
+                      "space directions: (1,0) (0,1) none\nspace origin: (0,0)\n",
+                      s->width, s->height, s->count);
   if (s->orientation[0])
     sonde_file_printf(file, "ultrasound image orientation:=%s\n", s->orientation);
-  for (uint32_t i = 0; i < s->file.field_count; ++i)
-    sonde_file_printf(file, "%s:=%s\n", key_here(s->file.fields[i].key), s->file.fields[i].value);
+  for (uint32_t i = 0; i < s->file.field_count; ++i) { // file-wide names are words with spaces
+    const char *key = s->file.fields[i].key;
+    if (strcmp(key, "UltrasoundImageType") == 0) key = "ultrasound image type";
+    sonde_file_printf(file, "%s:=%s\n", key, s->file.fields[i].value);
+  }
   for (uint32_t i = 0; i < s->count; ++i)
     for (uint32_t k = 0; k < s->frames[i].field_count; ++k)
       sonde_file_printf(file, "Seq_Frame%04u_%s:=%s\n", i, s->frames[i].fields[k].key,

@@ -1,12 +1,4 @@
 // A volume from tracked frames: grid, splat of every pixel, mean, bridging of holes.
-//
-// extend, find_box     box around the corners of all used frames
-// make_grid            voxels along the world's axes
-// splat_frame          pixels of one frame into sums and weights
-// average              sums over weights
-// bridge_voxel         shortest line between two touched voxels through an empty one
-// bridge_slab          one layer of the volume, for the workers
-// sonde_reconstruct
 #include "sweep/frames.h"
 #include "base/parallel.h"
 
@@ -33,33 +25,26 @@ sonde_reconstruct_options sonde_reconstruct_options_default(void) {
       .spacing_m = 0.5e-3, .hole_fill_m = 3e-3, .most_voxels = (uint64_t)1 << 28};
 }
 
-static void extend(sonde_vec3 p, double low[3], double high[3]) {
-  const double v[3] = {p.x, p.y, p.z};
-  for (int k = 0; k < 3; ++k) {
-    if (v[k] < low[k]) low[k] = v[k];
-    if (v[k] > high[k]) high[k] = v[k];
-  }
-}
-
-static uint32_t find_box(const sonde_sequence *s, double low[3], double high[3]) {
-  uint32_t used = 0;
+static sonde_status make_grid(work *w, sonde_reconstruct_report *report, sonde_error *error) {
+  const sonde_sequence *s = w->sequence;
+  double low[3], high[3], room = 1, space = 1, step = w->options.spacing_m;
+  // The box holds the corners of all used frames.
   for (int k = 0; k < 3; ++k) low[k] = (double)INFINITY, high[k] = -(double)INFINITY;
   for (uint32_t i = 0; i < s->count; ++i) {
     if (!s->frames[i].used) continue;
-    ++used;
+    ++report->frames;
     for (int corner = 0; corner < 4; ++corner) {
       double u = s->clip[0] + (corner & 1 ? s->clip[2] - 1 : 0);
       double v = s->clip[1] + (corner & 2 ? s->clip[3] - 1 : 0);
-      extend(affine_apply(&s->frames[i].world_from_pixel, vec3(u, v, 0)), low, high);
+      sonde_vec3 p = affine_apply(&s->frames[i].world_from_pixel, vec3(u, v, 0));
+      const double xyz[3] = {p.x, p.y, p.z};
+      for (int k = 0; k < 3; ++k) {
+        if (xyz[k] < low[k]) low[k] = xyz[k];
+        if (xyz[k] > high[k]) high[k] = xyz[k];
+      }
     }
   }
-  return used;
-}
-
-static sonde_status make_grid(work *w, sonde_reconstruct_report *report, sonde_error *error) {
-  double low[3], high[3], room = 1, space = 1, step = w->options.spacing_m;
-  report->frames = find_box(w->sequence, low, high);
-  if (!report->frames || !w->sequence->width || !w->sequence->height)
+  if (!report->frames || !s->width || !s->height)
     return sonde_fail(error, SONDE_MISMATCH,
                       "no frame with pixels and a pose, nothing to reconstruct from");
   uint32_t size[3];
@@ -89,64 +74,44 @@ static sonde_status make_grid(work *w, sonde_reconstruct_report *report, sonde_e
   return SONDE_OK;
 }
 
-static inline void add_linear(work *w, sonde_vec3 p, float value) {
-  const uint32_t *size = w->volume->size;
-  const double v[3] = {p.x, p.y, p.z};
-  size_t index[3];
-  float t[3];
-  for (int k = 0; k < 3; ++k) {
-    double x = clamp(v[k], 0, size[k] - 1.0);
-    index[k] = (size_t)x < size[k] - 2 ? (size_t)x : size[k] - 2;
-    t[k] = (float)(x - (double)index[k]);
-  }
-  size_t base = (index[2] * size[1] + index[1]) * size[0] + index[0];
-  for (int corner = 0; corner < 8; ++corner) {
-    float share = (corner & 1 ? t[0] : 1 - t[0]) * (corner & 2 ? t[1] : 1 - t[1]) *
-                  (corner & 4 ? t[2] : 1 - t[2]);
-    size_t i = base + (corner & 1 ? 1 : 0) + (corner & 2 ? size[0] : 0) +
-               (corner & 4 ? (size_t)size[0] * size[1] : 0);
-    w->sum[i] += share * value;
-    w->weight[i] += share;
-  }
-}
-
-static inline void add_nearest(work *w, sonde_vec3 p, float value) {
-  const uint32_t *size = w->volume->size;
-  size_t i = (size_t)clamp(p.x + 0.5, 0, size[0] - 1.0),
-         j = (size_t)clamp(p.y + 0.5, 0, size[1] - 1.0);
-  size_t k = (size_t)clamp(p.z + 0.5, 0, size[2] - 1.0), at = (k * size[1] + j) * size[0] + i;
-  w->sum[at] += value;
-  w->weight[at] += 1;
-}
-
 static void splat_frame(work *w, uint32_t frame) {
   const sonde_sequence *s = w->sequence;
   sonde_affine map = affine_mul(&w->voxel_from_world, &s->frames[frame].world_from_pixel);
   sonde_vec3 du = affine_column(&map, 0);
+  const uint32_t *size = w->volume->size;
   bool linear = w->options.method == SONDE_RECONSTRUCT_LINEAR;
   for (uint32_t v = s->clip[1]; v < s->clip[1] + s->clip[3]; ++v) {
     const uint8_t *row = s->pixels + ((size_t)frame * s->height + v) * s->width;
     sonde_vec3 start = affine_apply(&map, vec3(0, v, 0));
     for (uint32_t u = s->clip[0]; u < s->clip[0] + s->clip[2]; ++u) {
       sonde_vec3 p = v_madd(start, u, du);
-      if (linear)
-        add_linear(w, p, row[u]);
-      else
-        add_nearest(w, p, row[u]);
+      if (linear) {
+        const double xyz[3] = {p.x, p.y, p.z};
+        size_t index[3];
+        float t[3];
+        for (int k = 0; k < 3; ++k) {
+          double x = clamp(xyz[k], 0, size[k] - 1.0);
+          index[k] = (size_t)x < size[k] - 2 ? (size_t)x : size[k] - 2;
+          t[k] = (float)(x - (double)index[k]);
+        }
+        size_t base = (index[2] * size[1] + index[1]) * size[0] + index[0];
+        for (int corner = 0; corner < 8; ++corner) {
+          float share = (corner & 1 ? t[0] : 1 - t[0]) * (corner & 2 ? t[1] : 1 - t[1]) *
+                        (corner & 4 ? t[2] : 1 - t[2]);
+          size_t i = base + (corner & 1 ? 1 : 0) + (corner & 2 ? size[0] : 0) +
+                     (corner & 4 ? (size_t)size[0] * size[1] : 0);
+          w->sum[i] += share * row[u];
+          w->weight[i] += share;
+        }
+      } else {
+        size_t i = (size_t)clamp(p.x + 0.5, 0, size[0] - 1.0);
+        size_t j = (size_t)clamp(p.y + 0.5, 0, size[1] - 1.0);
+        size_t k = (size_t)clamp(p.z + 0.5, 0, size[2] - 1.0), at = (k * size[1] + j) * size[0] + i;
+        w->sum[at] += row[u];
+        w->weight[at] += 1;
+      }
     }
   }
-}
-
-// A voxel that got less than a thousandth of a pixel counts as empty.
-static uint64_t average(work *w, uint64_t voxels) {
-  uint64_t touched = 0;
-  for (uint64_t i = 0; i < voxels; ++i) {
-    bool enough = w->weight[i] > 1e-3f;
-    w->volume->voxels[i] = enough ? (uint8_t)(w->sum[i] / w->weight[i] + 0.5f) : 0;
-    if (!enough) w->weight[i] = 0;
-    touched += enough;
-  }
-  return touched;
 }
 
 // Steps to the first touched voxel from (at) along sign * direction; 0 when none within reach.
@@ -166,29 +131,6 @@ static int look(const work *w, const int at[3], const int direction[3], int sign
   return 0;
 }
 
-// Along the shortest line that ends in touched voxels on both sides, weighted by distance;
-// lines of one length share.
-static bool bridge_voxel(const work *w, const int at[3], uint8_t *value) {
-  double shortest = (double)INFINITY, sum = 0;
-  int lines = 0;
-  for (int d = 0; d < 13; ++d) {
-    size_t a, b;
-    const int *direction = DIRECTIONS[d];
-    int ahead = look(w, at, direction, 1, w->reach[d] - 1, &a);
-    int behind = ahead ? look(w, at, direction, -1, w->reach[d] - ahead, &b) : 0;
-    if (!behind) continue;
-    double step = sqrt(abs(direction[0]) + abs(direction[1]) + abs(direction[2]));
-    double length = step * (ahead + behind);
-    if (length > shortest + 1e-9) continue;
-    if (length < shortest - 1e-9) shortest = length, sum = 0, lines = 0;
-    sum += (behind * (double)w->volume->voxels[a] + ahead * (double)w->volume->voxels[b]) /
-           (ahead + behind);
-    ++lines;
-  }
-  *value = lines ? (uint8_t)(sum / lines + 0.5) : 0;
-  return lines > 0;
-}
-
 static sonde_status bridge_slab(void *user, uint32_t worker, uint32_t k, const atomic_bool *stop,
                                 sonde_error *error) {
   work *w = user;
@@ -199,25 +141,27 @@ static sonde_status bridge_slab(void *user, uint32_t worker, uint32_t k, const a
       size_t index = ((size_t)k * size[1] + j) * size[0] + i;
       if (w->weight[index] > 0) continue;
       const int at[3] = {(int)i, (int)j, (int)k};
-      w->filled[k] += bridge_voxel(w, at, &w->bridged[index]);
+      // The grey lies on the shortest line that ends in touched voxels on both sides, weighted by
+      // distance; lines of one length share.
+      double shortest = (double)INFINITY, sum = 0;
+      int lines = 0;
+      for (int d = 0; d < 13; ++d) {
+        size_t a, b;
+        const int *direction = DIRECTIONS[d];
+        int ahead = look(w, at, direction, 1, w->reach[d] - 1, &a);
+        int behind = ahead ? look(w, at, direction, -1, w->reach[d] - ahead, &b) : 0;
+        if (!behind) continue;
+        double step = sqrt(abs(direction[0]) + abs(direction[1]) + abs(direction[2]));
+        double length = step * (ahead + behind);
+        if (length > shortest + 1e-9) continue;
+        if (length < shortest - 1e-9) shortest = length, sum = 0, lines = 0;
+        sum += (behind * (double)w->volume->voxels[a] + ahead * (double)w->volume->voxels[b]) /
+               (ahead + behind);
+        ++lines;
+      }
+      w->bridged[index] = lines ? (uint8_t)(sum / lines + 0.5) : 0;
+      w->filled[k] += lines > 0;
     }
-  return SONDE_OK;
-}
-
-static sonde_status bridge_holes(work *w, sonde_reconstruct_report *report,
-                                 const sonde_progress *progress, sonde_error *error) {
-  uint32_t layers = w->volume->size[2];
-  for (int d = 0; d < 13; ++d) {
-    const int *n = DIRECTIONS[d];
-    double step = w->options.spacing_m * sqrt(abs(n[0]) + abs(n[1]) + abs(n[2]));
-    w->reach[d] = (int)floor(w->options.hole_fill_m / step + 1e-9);
-  }
-  sonde_status status = sonde_parallel_run(layers, sonde_parallel_workers(0, layers), bridge_slab,
-                                           w, progress, "bridge holes", error);
-  if (status) return status;
-  for (uint64_t i = 0; i < report->voxels; ++i)
-    if (w->weight[i] <= 0) w->volume->voxels[i] = w->bridged[i];
-  for (uint32_t k = 0; k < layers; ++k) report->bridged += w->filled[k];
   return SONDE_OK;
 }
 
@@ -239,8 +183,27 @@ static sonde_status fill_grid(work *w, sonde_reconstruct_report *report,
                         report->frames);
     splat_frame(w, i);
   }
-  report->touched = average(w, report->voxels);
-  return w->options.hole_fill_m > 0 ? bridge_holes(w, report, progress, error) : SONDE_OK;
+  // A voxel that got less than a thousandth of a pixel counts as empty.
+  for (uint64_t i = 0; i < report->voxels; ++i) {
+    bool enough = w->weight[i] > 1e-3f;
+    w->volume->voxels[i] = enough ? (uint8_t)(w->sum[i] / w->weight[i] + 0.5f) : 0;
+    if (!enough) w->weight[i] = 0;
+    report->touched += enough;
+  }
+  if (!(w->options.hole_fill_m > 0)) return SONDE_OK;
+  uint32_t layers = w->volume->size[2];
+  for (int d = 0; d < 13; ++d) {
+    const int *n = DIRECTIONS[d];
+    double step = w->options.spacing_m * sqrt(abs(n[0]) + abs(n[1]) + abs(n[2]));
+    w->reach[d] = (int)floor(w->options.hole_fill_m / step + 1e-9);
+  }
+  sonde_status status = sonde_parallel_run(layers, sonde_parallel_workers(0, layers), bridge_slab,
+                                           w, progress, "bridge holes", error);
+  if (status) return status;
+  for (uint64_t i = 0; i < report->voxels; ++i)
+    if (w->weight[i] <= 0) w->volume->voxels[i] = w->bridged[i];
+  for (uint32_t k = 0; k < layers; ++k) report->bridged += w->filled[k];
+  return SONDE_OK;
 }
 
 sonde_status sonde_reconstruct(const sonde_sequence *sequence,

@@ -1,19 +1,4 @@
 // Creating a slicer and rendering with it.
-//
-// plane_of                      map from the world onto a frame
-// make_strips, make_room, make_rooms, clear_room   scratch of the workers
-// fill_lines, lay_out           frames where many pictures read them fast
-// used_between                  frames counted between two
-// sonde_slice_is_left_out
-// fill_planes                   all used frames, normals to one side
-// start_bank                    what kriging needs
-// sonde_slicer_create, sonde_slicer_create_with, sonde_slicer_destroy
-// sonde_slicer_is_along_sweep
-// prepare                       the forms of every plane for a picture
-// block_row                     one row of blocks, for the workers
-// sonde_slicer_render
-// sonde_slice_plane             picture of a probe's pose
-// sonde_slice_kernels_find
 #include "sweep/slice.h"
 
 #include "base/vector.h"
@@ -25,37 +10,16 @@ sonde_slicer_options sonde_slicer_options_default(void) {
   return (sonde_slicer_options){.gap_m = 10e-3, .reach_m = 1e-3, .left_out = SONDE_WHOLE_FILE};
 }
 
-static sonde_status plane_of(const sonde_sequence *s, uint32_t frame, sonde_vec3 *previous,
-                             slice_plane *plane, sonde_error *error) {
-  const sonde_affine *a = &s->frames[frame].world_from_pixel;
-  sonde_vec3 u = affine_column(a, 0), v = affine_column(a, 1);
-  sonde_vec3 n = v_unit(v_cross(u, v), vec3(0, 0, 0));
-  if (v_dot(n, *previous) < 0) n = v_neg(n); // one side for the whole sweep
-  sonde_affine world_from_local = affine_columns(u, v, n, affine_column(a, 3));
-  if (!affine_inverse(&world_from_local, &plane->local_from_world))
-    return sonde_fail(error, SONDE_ARGUMENT,
-                      "frame %u: its columns and rows run the same way, expected a plane", frame);
-  *previous = plane->normal = n;
-  plane->world_from_pixel = *a;
-  plane->pixel_m[0] = v_norm(u), plane->pixel_m[1] = v_norm(v);
-  plane->pixels = s->pixels + (size_t)frame * s->width * s->height;
-  return SONDE_OK;
-}
-
-// Used frames that lie between two frames, the second one counted.
-static uint32_t used_between(const sonde_sequence *s, uint32_t low, uint32_t high) {
-  uint32_t count = 0;
-  for (uint32_t i = low + 1; i <= high; ++i) count += s->frames[i].used;
-  return count;
-}
-
 bool sonde_slice_is_left_out(const sonde_sequence *s, const sonde_slicer_options *o,
                              uint32_t frame) {
   if (o->left_out >= s->count || frame == o->left_out) return frame == o->left_out;
   if (!o->left_out_beside) return false;
   uint32_t low = frame < o->left_out ? frame : o->left_out;
   uint32_t high = frame < o->left_out ? o->left_out : frame;
-  return used_between(s, low, high) <= o->left_out_beside;
+  // The used frames between the two are counted, the second one included.
+  uint32_t count = 0;
+  for (uint32_t i = low + 1; i <= high; ++i) count += s->frames[i].used;
+  return count <= o->left_out_beside;
 }
 
 static sonde_status fill_planes(const sonde_sequence *s, sonde_slicer *slicer, sonde_error *error) {
@@ -63,8 +27,18 @@ static sonde_status fill_planes(const sonde_sequence *s, sonde_slicer *slicer, s
   for (uint32_t i = 0; i < s->count; ++i) {
     if (!s->frames[i].used || sonde_slice_is_left_out(s, &slicer->options, i)) continue;
     slice_plane *plane = &slicer->planes[slicer->count];
-    sonde_status status = plane_of(s, i, &previous, plane, error);
-    if (status) return status;
+    const sonde_affine *a = &s->frames[i].world_from_pixel;
+    sonde_vec3 u = affine_column(a, 0), v = affine_column(a, 1);
+    sonde_vec3 n = v_unit(v_cross(u, v), vec3(0, 0, 0));
+    if (v_dot(n, previous) < 0) n = v_neg(n); // one side for the whole sweep
+    sonde_affine world_from_local = affine_columns(u, v, n, affine_column(a, 3));
+    if (!affine_inverse(&world_from_local, &plane->local_from_world))
+      return sonde_fail(error, SONDE_ARGUMENT,
+                        "frame %u: its columns and rows run the same way, expected a plane", i);
+    previous = plane->normal = n;
+    plane->world_from_pixel = *a;
+    plane->pixel_m[0] = v_norm(u), plane->pixel_m[1] = v_norm(v);
+    plane->pixels = s->pixels + (size_t)i * s->width * s->height;
     plane->frame = i;
     plane->pyramid = slicer->bank ? &slicer->bank->pyramids[i] : NULL;
     ++slicer->count;
@@ -117,16 +91,6 @@ static bool make_room(slice_room *room, uint32_t count) {
   room->spans.high = numbers ? numbers + 4 * (size_t)count : NULL;
   bool strips = make_strips(&room->strips, count);
   return room->candidates && room->block && room->tile && strips && numbers;
-}
-
-static void clear_room(slice_room *room) {
-  sonde_free(room->candidates);
-  sonde_free(room->block);
-  sonde_free(room->tile);
-  sonde_free(room->spans.form[0]);
-  sonde_free(room->strips.forms[0][0]);
-  sonde_free(room->strips.steps[0][0]);
-  sonde_free(room->strips.place[0]);
 }
 
 static bool make_rooms(sonde_slicer *slicer, uint32_t count) {
@@ -186,15 +150,6 @@ static sonde_status lay_out(const sonde_sequence *s, sonde_slicer *slicer, sonde
   return SONDE_OK;
 }
 
-// The tables of kriging; takes the caller's bank or makes its own.
-static sonde_status start_bank(const sonde_sequence *s, slice_bank *bank, sonde_slicer *slicer,
-                               sonde_error *error) {
-  slicer->bank = bank;
-  if (bank || slicer->options.method != SONDE_SLICE_KRIGE) return SONDE_OK;
-  slicer->owns_bank = true;
-  return sonde_slice_bank_create(s, &slicer->bank, error);
-}
-
 sonde_status sonde_slicer_create(const sonde_sequence *s, const sonde_slicer_options *options,
                                  sonde_slicer **out, sonde_error *error) {
   return sonde_slicer_create_with(s, options, NULL, out, error);
@@ -220,7 +175,10 @@ sonde_status sonde_slicer_create_with(const sonde_sequence *s, const sonde_slice
   slicer->planes = SONDE_NEW(slice_plane, s->count);
   slicer->reached = SONDE_NEW(uint64_t, slicer->workers);
   bool enough = slicer->planes && slicer->reached && make_rooms(slicer, s->count);
-  status = enough ? start_bank(s, bank, slicer, error) : sonde_fail_memory(error);
+  if (!enough) status = sonde_fail_memory(error);
+  slicer->bank = bank;
+  slicer->owns_bank = !bank && o.method == SONDE_SLICE_KRIGE;
+  if (!status && slicer->owns_bank) status = sonde_slice_bank_create(s, &slicer->bank, error);
   if (!status) status = fill_planes(s, slicer, error);
   if (!status) status = lay_out(s, slicer, error);
   if (!status && o.method == SONDE_SLICE_KRIGE) status = sonde_slicer_krige(slicer, error);
@@ -232,7 +190,16 @@ sonde_status sonde_slicer_create_with(const sonde_sequence *s, const sonde_slice
 void sonde_slicer_destroy(sonde_slicer *slicer) {
   if (!slicer) return;
   sonde_free(slicer->planes);
-  for (uint32_t k = 0; slicer->rooms && k < slicer->workers; ++k) clear_room(&slicer->rooms[k]);
+  for (uint32_t k = 0; slicer->rooms && k < slicer->workers; ++k) {
+    slice_room *room = &slicer->rooms[k];
+    sonde_free(room->candidates);
+    sonde_free(room->block);
+    sonde_free(room->tile);
+    sonde_free(room->spans.form[0]);
+    sonde_free(room->strips.forms[0][0]);
+    sonde_free(room->strips.steps[0][0]);
+    sonde_free(room->strips.place[0]);
+  }
   sonde_free(slicer->rooms);
   sonde_free(slicer->every);
   sonde_free(slicer->forms);
@@ -247,20 +214,6 @@ void sonde_slicer_destroy(sonde_slicer *slicer) {
 bool sonde_slicer_is_along_sweep(const sonde_slicer *slicer) {
   SONDE_ASSERT(slicer != NULL);
   return slicer->options.along_sweep;
-}
-
-static void prepare(sonde_slicer *slicer, const sonde_affine *world_from_pixel) {
-  for (uint32_t i = 0; i < slicer->count; ++i) {
-    slice_plane *plane = &slicer->planes[i];
-    sonde_affine local = affine_mul(&plane->local_from_world, world_from_pixel);
-    double *forms[3] = {plane->forms.u, plane->forms.v, plane->forms.d};
-    for (int k = 0; k < 3; ++k) {
-      forms[k][0] = local.m[k][3];
-      forms[k][1] = local.m[k][0];
-      forms[k][2] = local.m[k][1];
-    }
-    for (uint32_t k = 0; k < 3; ++k) slicer->forms[k * slicer->count + i] = plane->forms.d[k];
-  }
 }
 
 static sonde_status block_row(void *user, uint32_t worker, uint32_t item, const atomic_bool *stop,
@@ -279,7 +232,18 @@ uint64_t sonde_slicer_render(sonde_slicer *slicer, const sonde_affine *world_fro
   slicer->image = image;
   slicer->known = known;
   memset(slicer->reached, 0, slicer->workers * sizeof *slicer->reached);
-  prepare(slicer, world_from_pixel);
+  // The forms of every plane are linear in the pixels of this picture.
+  for (uint32_t i = 0; i < slicer->count; ++i) {
+    slice_plane *plane = &slicer->planes[i];
+    sonde_affine local = affine_mul(&plane->local_from_world, world_from_pixel);
+    double *forms[3] = {plane->forms.u, plane->forms.v, plane->forms.d};
+    for (int k = 0; k < 3; ++k) {
+      forms[k][0] = local.m[k][3];
+      forms[k][1] = local.m[k][0];
+      forms[k][2] = local.m[k][1];
+    }
+    for (uint32_t k = 0; k < 3; ++k) slicer->forms[k * slicer->count + i] = plane->forms.d[k];
+  }
   uint32_t rows = (image->height + SLICE_BLOCK - 1) / SLICE_BLOCK;
   uint32_t workers = slicer->workers < rows ? slicer->workers : rows;
   if (workers > 1)

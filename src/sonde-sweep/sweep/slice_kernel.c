@@ -16,30 +16,7 @@
 // frame, the normals serve again. In local coordinates (u, v, d) of a frame the direction is (e_u,
 // e_v, e_d), and the line meets the frame at u - d e_u / e_d.
 //
-// covers, touches        a plane and the tile
-// start_at               a form from a tile's first pixel on
-// plane_covers, find_hiding, reach_of, gather_planes   planes that may be nearest in a rectangle
-// nearest_of_row         for each pixel of a row the nearest candidate on either side
 // outline_of, is_outside where no frame can be
-// has_foot, distance_at, nearest_of_sorted   for one pixel, among sorted candidates
-// sweep_way              from a pixel to the same pixel of the other frame
-// is_steep               a way that does not graze the plane
-// blend                  pair constants of two planes
-// pixel_of, sample       bilinear
-// sample_foot            a frame straight below a pixel
-// foot, follow           where a line through a pixel meets a frame
-// meet                   the points on both frames
-// sample_level, sample_levels   of a frame's pyramid, weighted
-// krige                  up to four frames, every scale by its own weight
-// between                two frames and their weights
-// value_at               one pixel
-// find_pair              remembered
-// meet_row, find_pixels, mix_row, bracket_row   between two frames, a row of a tile at a time
-// put_pixel, fill_tile   by search alone
-// search_pixel, fill_edge   where strips do not speak for every pixel
-// is_still, slice_sum_all   a picture of the sweep's own
-// start_candidate, search_tile, search_edge
-// gather_block, slice_block
 //
 // Compiled once for each instruction set with SLICE_KERNELS defined; every operation is one IEEE
 // operation per lane, so that all give the same bits.
@@ -63,15 +40,6 @@ typedef struct pair {
   float up_way[3][3], down_way[3][3]; // along the sweep
 } pair;
 
-static inline bool covers(const sonde_slicer *s, bounds u, bounds v) {
-  return u.low >= s->low[0] && u.high <= s->high[0] && v.low >= s->low[1] && v.high <= s->high[1];
-}
-
-static inline bool touches(const sonde_slicer *s, bounds u, bounds v) {
-  return u.high >= s->low[0] - SLACK && u.low <= s->high[0] + SLACK &&
-         v.high >= s->low[1] - SLACK && v.low <= s->high[1] + SLACK;
-}
-
 static void start_at(const double form[3], const rectangle *r, float out[3]) {
   out[0] = (float)(form[0] + form[1] * r->column + form[2] * r->row);
   out[1] = (float)form[1];
@@ -79,7 +47,8 @@ static void start_at(const double form[3], const rectangle *r, float out[3]) {
 }
 
 static bool plane_covers(const sonde_slicer *s, const rectangle *r, const slice_plane *plane) {
-  return covers(s, span(plane->forms.u, r), span(plane->forms.v, r));
+  bounds u = span(plane->forms.u, r), v = span(plane->forms.v, r);
+  return u.low >= s->low[0] && u.high <= s->high[0] && v.low >= s->low[1] && v.high <= s->high[1];
 }
 
 // Far bounds of the nearest planes that cover a rectangle: all d >= 0, and all d < 0. The nearest
@@ -127,7 +96,10 @@ static uint32_t gather_planes(const sonde_slicer *s, const rectangle *r,
     if (!((high >= 0 && low <= hiding.high) || (low < 0 && high >= hiding.low))) continue;
     if (low > reach || high < -reach) continue;
     const slice_forms *f = &from[i]->forms;
-    if (touches(s, span(f->u, r), span(f->v, r))) out[found++] = from[i];
+    bounds u = span(f->u, r), v = span(f->v, r);
+    if (u.high >= s->low[0] - SLACK && u.low <= s->high[0] + SLACK && v.high >= s->low[1] - SLACK &&
+        v.low <= s->high[1] + SLACK)
+      out[found++] = from[i];
   }
   return found;
 }
@@ -626,25 +598,20 @@ static uint64_t search_edge(const sonde_slicer *s, const rectangle *tile, uint32
   return fill_edge(s, tile, room->candidates, count, &o, &work);
 }
 
-// Planes of a block, sorted where they make strips.
-static uint32_t gather_block(const sonde_slicer *s, const rectangle *block, slice_room *room) {
-  slice_spans spans = room->spans;
-  for (uint32_t k = 0; k < 3; ++k) spans.form[k] = s->forms + k * s->count;
-  span_all(&spans, s->count, block);
-  uint32_t all = gather_planes(s, block, s->every, s->count, &spans, room->block);
-  find_strips(s, block, all, room);
-  for (uint32_t i = 0; i < all; ++i)
-    for (int k = 0; k < 3; ++k) room->spans.form[k][i] = room->block[i]->forms.d[k];
-  return all;
-}
-
 // Planes of the block first, then of each tile in it.
 static uint64_t slice_block(const sonde_slicer *s, uint32_t column, uint32_t row,
                             slice_room *room) {
   SONDE_ASSERT(s->image != NULL && column < s->image->width && row < s->image->height);
   rectangle block = {column, row, at_most(SLICE_BLOCK, s->image->width - column),
                      at_most(SLICE_BLOCK, s->image->height - row)};
-  uint32_t all = gather_block(s, &block, room);
+  // Planes of a block, sorted where they make strips.
+  slice_spans spans = room->spans;
+  for (uint32_t k = 0; k < 3; ++k) spans.form[k] = s->forms + k * s->count;
+  span_all(&spans, s->count, &block);
+  uint32_t all = gather_planes(s, &block, s->every, s->count, &spans, room->block);
+  find_strips(s, &block, all, room);
+  for (uint32_t i = 0; i < all; ++i)
+    for (int k = 0; k < 3; ++k) room->spans.form[k][i] = room->block[i]->forms.d[k];
   uint64_t reached = 0;
   strip_table table = {.count = 0};
   for (uint32_t y = 0; y < block.high; y += SLICE_TILE)

@@ -6,26 +6,6 @@
 // then gives the weights of least expected square error for each scale: fine grain, which no other
 // frame shares, fades away from the frames; coarse structure is interpolated smoothly. The mean of
 // the coarsest scale is not known: its weights add up to one.
-//
-// halve, halve_shares         next level of a pyramid
-// build_pyramid
-// mark_changing               pixels that are not surround
-// scales_at                   all scales of a frame at a point
-// middle, apart               distance of two frames
-// foot_map                    pixels of a frame on another
-// changes, compare            products over the grid
-// measure_pairs
-// build_pyramids
-// sonde_slice_bank_create, sonde_slice_bank_destroy
-// product, variance_of        from the bank
-// collect, misfit, fit        decay of one scale
-// solve                       small linear system
-// krige_scale, weights_at     weights at a place
-// foretell, make_model        a model and how well it makes frames again
-// make_join, make_far         tables for any pose
-// sonde_slicer_krige
-// choose, place_frames, map_frames   frames around a place of the sweep
-// sonde_slicer_render_place
 #include "sweep/slice.h"
 
 #include <string.h>
@@ -43,10 +23,6 @@ typedef slice_decay decay;
 typedef struct bin {
   double log_m, likeness, weight;
 } bin;
-
-typedef struct grid {
-  uint32_t step, columns, rows;
-} grid;
 
 static const uint32_t BINOMIAL[5] = {1, 4, 6, 4, 1};
 
@@ -87,33 +63,6 @@ static void halve_shares(const slice_bank *bank, int k, uint8_t *to) {
                  from[(size_t)bounded((int)(2 * y) + j - 2, high) * wide +
                       bounded((int)(2 * x) + i - 2, wide)];
       to[(size_t)y * w2 + x] = (uint8_t)((sum + 255) >> 8); // what has any keeps some
-    }
-}
-
-static void build_pyramid(slice_bank *bank, uint32_t frame, uint8_t *levels) {
-  const sonde_sequence *s = bank->sequence;
-  slice_pyramid *p = &bank->pyramids[frame];
-  p->level[0] = s->pixels + ((size_t)frame * s->height + s->clip[1]) * s->width + s->clip[0];
-  for (int k = 1; k < SLICE_LEVELS; ++k) {
-    halve(bank, k - 1, p->level[k - 1], levels);
-    p->level[k] = levels;
-    levels += bank->stride[k] * bank->high[k];
-  }
-}
-
-// What never changes by more than a few grey levels is surround or writing, not tissue.
-static void mark_changing(slice_bank *bank) {
-  const sonde_sequence *s = bank->sequence;
-  for (uint32_t y = 0; y < bank->high[0]; ++y)
-    for (uint32_t x = 0; x < bank->wide[0]; ++x) {
-      size_t at = (size_t)(y + s->clip[1]) * s->width + x + s->clip[0];
-      int low = 255, high = 0;
-      for (uint32_t i = 0; i < s->count; ++i) {
-        if (!s->frames[i].used) continue;
-        int grey = s->pixels[(size_t)i * s->width * s->height + at];
-        low = grey < low ? grey : low, high = grey > high ? grey : high;
-      }
-      bank->shares[0][(size_t)y * bank->wide[0] + x] = high - low > STILL ? 255 : 0;
     }
 }
 
@@ -172,14 +121,6 @@ static bool foot_map(const sonde_sequence *s, uint32_t a, uint32_t b, float map[
   return true;
 }
 
-static grid grid_of(const slice_bank *bank) {
-  grid g = {.step = 1};
-  uint32_t most = (uint32_t)clamp(ALL_POINTS / (bank->used + 1.0), FEWEST_POINTS, MOST_POINTS);
-  while ((bank->wide[0] / g.step) * (bank->high[0] / g.step) > most) ++g.step;
-  g.columns = bank->wide[0] / g.step, g.rows = bank->high[0] / g.step;
-  return g;
-}
-
 // Inside of the frames and not a pixel that stands still.
 static inline bool changes(const slice_bank *bank, float u, float v) {
   if (!(u >= 0 && v >= 0 && u <= (float)(bank->wide[0] - 1) && v <= (float)(bank->high[0] - 1)))
@@ -190,13 +131,16 @@ static inline bool changes(const slice_bank *bank, float u, float v) {
 // Mean products of frames a and b; of b at the same pixel or at the foot.
 static void compare(const slice_bank *bank, slice_likeness *pair) {
   const sonde_sequence *s = bank->sequence;
-  grid g = grid_of(bank);
+  uint32_t most = (uint32_t)clamp(ALL_POINTS / (bank->used + 1.0), FEWEST_POINTS, MOST_POINTS);
+  uint32_t step = 1; // of the grid of points, pixels
+  while ((bank->wide[0] / step) * (bank->high[0] / step) > most) ++step;
+  uint32_t columns = bank->wide[0] / step, rows = bank->high[0] / step;
   float map[2][3], own[SLICE_LEVELS], other[SLICE_LEVELS];
   double sum[2][SLICE_LEVELS] = {{0}}, count[2] = {0};
   bool flat = !foot_map(s, pair->a, pair->b, map);
-  for (uint32_t i = 0; i < g.columns * g.rows; ++i) {
-    float u = (float)(i % g.columns * g.step + g.step / 2);
-    float v = (float)(i / g.columns * g.step + g.step / 2);
+  for (uint32_t i = 0; i < columns * rows; ++i) {
+    float u = (float)(i % columns * step + step / 2);
+    float v = (float)(i / columns * step + step / 2);
     float x = u + (float)s->clip[0], y = v + (float)s->clip[1];
     if (!changes(bank, u, v)) continue;
     scales_at(bank, pair->a, u, v, own);
@@ -238,33 +182,47 @@ static sonde_status measure_pairs(slice_bank *bank, sonde_error *error) {
   return SONDE_OK;
 }
 
-// Bytes of the levels above 0.
-static size_t measure_levels(slice_bank *bank) {
-  size_t bytes = 0;
-  bank->wide[0] = bank->sequence->clip[2], bank->high[0] = bank->sequence->clip[3];
-  bank->stride[0] = bank->sequence->width;
+static sonde_status build_pyramids(slice_bank *bank, sonde_error *error) {
+  const sonde_sequence *s = bank->sequence;
+  size_t bytes = 0; // of the levels above 0
+  bank->wide[0] = s->clip[2], bank->high[0] = s->clip[3], bank->stride[0] = s->width;
   for (int k = 1; k < SLICE_LEVELS; ++k) {
     bank->wide[k] = (bank->wide[k - 1] + 1) / 2, bank->high[k] = (bank->high[k - 1] + 1) / 2;
     bank->stride[k] = bank->wide[k];
     bytes += bank->stride[k] * bank->high[k];
   }
-  return bytes;
-}
-
-static sonde_status build_pyramids(slice_bank *bank, sonde_error *error) {
-  const sonde_sequence *s = bank->sequence;
-  size_t bytes = measure_levels(bank), own = (size_t)bank->wide[0] * bank->high[0];
+  size_t own = (size_t)bank->wide[0] * bank->high[0];
   bank->levels = SONDE_NEW(uint8_t, bytes * bank->used + 1);
   bank->pyramids = SONDE_NEW(slice_pyramid, s->count);
   bank->shares[0] = SONDE_NEW(uint8_t, own + bytes);
   if (!bank->levels || !bank->pyramids || !bank->shares[0]) return sonde_fail_memory(error);
-  mark_changing(bank);
+  // What never changes by more than a few grey levels is surround or writing, not tissue.
+  for (uint32_t y = 0; y < bank->high[0]; ++y)
+    for (uint32_t x = 0; x < bank->wide[0]; ++x) {
+      size_t at = (size_t)(y + s->clip[1]) * s->width + x + s->clip[0];
+      int low = 255, high = 0;
+      for (uint32_t i = 0; i < s->count; ++i) {
+        if (!s->frames[i].used) continue;
+        int grey = s->pixels[(size_t)i * s->width * s->height + at];
+        low = grey < low ? grey : low, high = grey > high ? grey : high;
+      }
+      bank->shares[0][(size_t)y * bank->wide[0] + x] = high - low > STILL ? 255 : 0;
+    }
   for (int k = 1; k < SLICE_LEVELS; ++k) {
     bank->shares[k] = bank->shares[k - 1] + (size_t)bank->wide[k - 1] * bank->high[k - 1];
     halve_shares(bank, k - 1, bank->shares[k]);
   }
-  for (uint32_t i = 0, n = 0; i < s->count; ++i)
-    if (s->frames[i].used) build_pyramid(bank, i, bank->levels + bytes * n++);
+  uint8_t *levels = bank->levels;
+  for (uint32_t i = 0; i < s->count; ++i) {
+    if (!s->frames[i].used) continue;
+    slice_pyramid *p = &bank->pyramids[i];
+    p->level[0] = s->pixels + ((size_t)i * s->height + s->clip[1]) * s->width + s->clip[0];
+    for (int k = 1; k < SLICE_LEVELS; ++k) {
+      halve(bank, k - 1, p->level[k - 1], levels);
+      p->level[k] = levels;
+      levels += bank->stride[k] * bank->high[k];
+    }
+  }
   return SONDE_OK;
 }
 
@@ -304,13 +262,6 @@ static double product(const slice_bank *bank, uint32_t a, uint32_t b, int way, i
   return (double)bank->pairs[low * (LAGS + 1) + high - low].mean[way][level];
 }
 
-static double variance_of(const sonde_slicer *s, int level) {
-  double sum = 0, count = 0;
-  for (uint32_t i = 0; i < s->bank->used; ++i)
-    if (!is_out(s, s->bank->frames[i])) sum += product(s->bank, i, i, 1, level), count += 1;
-  return count > 0 ? sum / count : 0;
-}
-
 // Likeness of the frames in use, 1 - variogram / variance, in bins of the logarithm of the
 // distance.
 static void collect(const sonde_slicer *s, const slice_model *m, int level, bin bins[BINS]) {
@@ -340,22 +291,15 @@ static double likeness_at(const decay *d, double distance_m) {
   return distance_m > 0 ? exp(-pow(distance_m / d->length_m, d->power)) : 1;
 }
 
-// Of the variogram, relative as Cressie weighs it: short distances, where frames are most alike,
-// count as much as long ones.
-static double misfit(const bin bins[BINS], const decay *d) {
-  double sum = 0, log_m = log(d->length_m);
-  for (int i = 0; i < BINS; ++i) {
-    if (!(bins[i].weight > 0)) continue;
-    double unlike = -expm1(-exp(d->power * (bins[i].log_m - log_m)));
-    double error = (1 - bins[i].likeness) / fmax(unlike, 1e-6) - 1;
-    sum += bins[i].weight * error * error;
-  }
-  return sum;
-}
-
 static void fit(const sonde_slicer *slicer, slice_model *m, int level) {
   bin bins[BINS];
-  decay best = {variance_of(slicer, level), LONGEST_M, 1};
+  double sum = 0, count = 0;
+  for (uint32_t i = 0; i < slicer->bank->used; ++i) {
+    if (is_out(slicer, slicer->bank->frames[i])) continue;
+    sum += product(slicer->bank, i, i, 1, level);
+    count += 1;
+  }
+  decay best = {count > 0 ? sum / count : 0, LONGEST_M, 1};
   m->decays[level] = best;
   if (!(best.variance > 0)) return;
   collect(slicer, m, level, bins);
@@ -364,7 +308,15 @@ static void fit(const sonde_slicer *slicer, slice_model *m, int level) {
     for (int j = 0; j < POWERS; ++j) {
       decay d = {best.variance, SHORTEST_M * pow(LONGEST_M / SHORTEST_M, i / (LENGTHS - 1.0)),
                  FIRST_POWER + POWER_STEP * j};
-      double error = misfit(bins, &d);
+      // The misfit is that of the variogram, relative as Cressie weighs it: short distances, where
+      // frames are most alike, count as much as long ones.
+      double error = 0, log_m = log(d.length_m);
+      for (int b = 0; b < BINS; ++b) {
+        if (!(bins[b].weight > 0)) continue;
+        double unlike = -expm1(-exp(d.power * (bins[b].log_m - log_m)));
+        double off = (1 - bins[b].likeness) / fmax(unlike, 1e-6) - 1;
+        error += bins[b].weight * off * off;
+      }
       if (error < least) least = error, best = d;
     }
   m->decays[level] = best;
@@ -453,15 +405,6 @@ static bool foretell(const sonde_slicer *s, const slice_model *m, uint32_t i, do
   return true;
 }
 
-static slice_model make_model(const sonde_slicer *s, bool along_sweep, bool by_order) {
-  slice_model m = {.along_sweep = along_sweep, .by_order = by_order};
-  double sum = 0, count = 0;
-  for (int level = 0; level < SLICE_LEVELS; ++level) fit(s, &m, level);
-  for (uint32_t i = 0; i < s->bank->used; ++i) count += foretell(s, &m, i, &sum);
-  m.error = count > 0 ? sum / count : m.decays[0].variance * along_sweep;
-  return m;
-}
-
 static uint32_t frame_of(const sonde_slicer *slicer, int32_t plane) {
   return slicer->planes[plane].frame;
 }
@@ -493,7 +436,7 @@ static void make_join(sonde_slicer *s, int32_t lower, const decay decays[SLICE_L
   join->before = before ? lower - 1 : -1, join->behind = behind ? upper + 1 : -1;
   make_map(s, lower, join->before, join->to_before);
   make_map(s, upper, join->behind, join->to_behind);
-  double at[SLICE_JOINED];
+  double at[SLICE_JOINED] = {0};
   int slots[SLICE_JOINED], n = 0;
   if (before) at[n] = -beyond[0], slots[n++] = 0;
   at[n] = 0, slots[n++] = 1;
@@ -503,91 +446,66 @@ static void make_join(sonde_slicer *s, int32_t lower, const decay decays[SLICE_L
     weights_at(decays, n, at, slots, gap * t / SLICE_STEPS, &join->steps[t]);
 }
 
-static void make_far(sonde_slicer *s, const decay decays[SLICE_LEVELS]) {
-  for (int k = 0; k < SLICE_FAR; ++k) {
-    double gap = s->options.gap_m * (k + 0.5) / SLICE_FAR, at[2] = {0, gap};
-    for (int t = 0; t <= SLICE_STEPS; ++t)
-      weights_at(decays, 2, at, (const int[]){1, 2}, gap * t / SLICE_STEPS,
-                 &s->far[k * (SLICE_STEPS + 1) + t]);
-  }
-}
-
 sonde_status sonde_slicer_krige(sonde_slicer *s, sonde_error *error) {
   SONDE_ASSERT(s->bank != NULL && s->count > 0);
   s->joins = SONDE_NEW(slice_join, s->count);
   s->far = SONDE_NEW(slice_weights, SLICE_FAR * (SLICE_STEPS + 1));
   if (!s->joins || !s->far) return sonde_fail_memory(error);
   for (int k = 0; k < 4; ++k) {
-    slice_model m = make_model(s, k & 1, k & 2);
+    slice_model m = {.along_sweep = k & 1, .by_order = k & 2};
+    double sum = 0, count = 0;
+    for (int level = 0; level < SLICE_LEVELS; ++level) fit(s, &m, level);
+    for (uint32_t i = 0; i < s->bank->used; ++i) count += foretell(s, &m, i, &sum);
+    m.error = count > 0 ? sum / count : m.decays[0].variance * m.along_sweep;
     if (k == 0 || m.error < s->model.error) s->model = m;
     if (k == 0 || (k == 1 && m.error < s->pose_model.error)) s->pose_model = m;
   }
   s->options.along_sweep = s->pose_model.along_sweep;
   for (uint32_t i = 0; i + 1 < s->count; ++i) make_join(s, (int32_t)i, s->pose_model.decays);
-  make_far(s, s->pose_model.decays);
+  for (int k = 0; k < SLICE_FAR; ++k) {
+    double gap = s->options.gap_m * (k + 0.5) / SLICE_FAR, at[2] = {0, gap};
+    for (int t = 0; t <= SLICE_STEPS; ++t)
+      weights_at(s->pose_model.decays, 2, at, (const int[]){1, 2}, gap * t / SLICE_STEPS,
+                 &s->far[k * (SLICE_STEPS + 1) + t]);
+  }
   return SONDE_OK;
 }
 
 // ---- a picture of the sweep's own ------------------------------------------------------------
 
-typedef struct own {
-  int n, slots[SLICE_JOINED];
-  double at[SLICE_JOINED];
-  const slice_plane *planes[SLICE_JOINED];
-  float maps[SLICE_JOINED][2][3]; // pixel of the picture -> of the frame
-  slice_weights weights;
-} own;
-
-// Two planes before the place and two behind it, as far as there are; none twice.
-static void choose(const sonde_slicer *s, double place, own *o) {
+uint64_t sonde_slicer_render_place(sonde_slicer *s, double place,
+                                   const sonde_affine *world_from_pixel, const uint32_t corner[2],
+                                   sonde_image *image, uint8_t *known) {
+  SONDE_ASSERT(s != NULL && s->bank != NULL && image != NULL && s->count > 0);
+  slice_sum sum = {.slicer = s, .image = image, .known = known};
+  // Two planes lie before the place and two behind it, as far as there are; none twice.
+  int slots[SLICE_JOINED];
   int32_t upper = 0;
   while (upper < (int32_t)s->count && s->planes[upper].frame <= place) ++upper;
   if (upper == (int32_t)s->count && upper > 1) --upper; // the last frame itself
   for (int k = 0; k < SLICE_JOINED; ++k) {
     int32_t plane = upper - 2 + k;
     if (plane < 0 || plane >= (int32_t)s->count) continue;
-    o->planes[o->n] = &s->planes[plane];
-    o->slots[o->n++] = k;
+    sum.planes[sum.n] = &s->planes[plane];
+    slots[sum.n++] = k;
   }
-}
-
-static void place_frames(const sonde_slicer *s, double place, const sonde_affine *world_from_pixel,
-                         const sonde_image *image, own *o) {
+  // Their distances from the picture's middle give the weights; the maps lead from its pixels.
+  double at[SLICE_JOINED] = {0};
   sonde_vec3 here =
       affine_apply(world_from_pixel, vec3(0.5 * (image->width - 1), 0.5 * (image->height - 1), 0));
-  for (int k = 0; k < o->n; ++k) {
-    const slice_plane *p = o->planes[k];
-    double side = p->frame <= place ? -1 : 1;
+  for (int k = 0; k < sum.n; ++k) {
+    const slice_plane *p = sum.planes[k];
     double d = fabs(affine_apply(&p->local_from_world, here).z);
-    o->at[k] = s->model.by_order ? ORDER_M * (p->frame - place) : side * d;
-  }
-}
-
-static void map_frames(const sonde_slicer *s, const sonde_affine *world_from_pixel,
-                       const uint32_t corner[2], own *o) {
-  for (int k = 0; k < o->n; ++k) {
-    sonde_affine m = affine_mul(&o->planes[k]->local_from_world, world_from_pixel);
+    at[k] = s->model.by_order ? ORDER_M * (p->frame - place) : (p->frame <= place ? -1 : 1) * d;
+    sonde_affine m = affine_mul(&p->local_from_world, world_from_pixel);
     for (int i = 0; i < 2; ++i)
       for (int j = 0; j < 3; ++j)
-        o->maps[k][i][j] = s->model.along_sweep ? (j == 2 ? (float)corner[i] : i == j)
-                                                : (float)m.m[i][j == 2 ? 3 : j];
+        sum.maps[k][i][j] = s->model.along_sweep ? (j == 2 ? (float)corner[i] : i == j)
+                                                 : (float)m.m[i][j == 2 ? 3 : j];
   }
-}
-
-uint64_t sonde_slicer_render_place(sonde_slicer *s, double place,
-                                   const sonde_affine *world_from_pixel, const uint32_t corner[2],
-                                   sonde_image *image, uint8_t *known) {
-  SONDE_ASSERT(s != NULL && s->bank != NULL && image != NULL && s->count > 0);
-  own o = {0};
-  choose(s, place, &o);
-  place_frames(s, place, world_from_pixel, image, &o);
-  map_frames(s, world_from_pixel, corner, &o);
-  weights_at(s->model.decays, o.n, o.at, o.slots, 0, &o.weights);
-  slice_sum sum = {.slicer = s, .image = image, .known = known, .n = o.n};
-  for (int k = 0; k < o.n; ++k) {
-    sum.planes[k] = o.planes[k];
-    memcpy(sum.maps[k], o.maps[k], sizeof o.maps[k]);
-    memcpy(sum.weights[k], o.weights.of[o.slots[k]], sizeof sum.weights[k]);
-  }
+  slice_weights weights;
+  weights_at(s->model.decays, sum.n, at, slots, 0, &weights);
+  for (int k = 0; k < sum.n; ++k)
+    memcpy(sum.weights[k], weights.of[slots[k]], sizeof sum.weights[k]);
   return s->kernels->sum(&sum);
 }

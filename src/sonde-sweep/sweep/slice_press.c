@@ -3,11 +3,6 @@
 // The rest point of a place of the pressed probe's plane is found at nodes every NODE pixels and is
 // bilinear between them: a lumen is tens of pixels wide. Only its part in the rest picture's plane
 // counts; what moves through the plane is seen as if the tissue went on alike.
-//
-// node_places            places in the rest picture, a row of nodes
-// grey_at                bilinear
-// press_row
-// sonde_image_pressed
 #include "sweep/frames.h"
 #include "interior/interior.h"
 

@@ -1,15 +1,6 @@
 // Pixels of a tile by its strips: part of slice_kernel.c.
 //
-// look_up               a number of 16 pixels' strips
-// find_index            the strip of each pixel of a row
-// place_pixels          where in the frame, and how far between its pixels
-// check                 pixels for which the strip speaks
-// place_row             a row of a tile
-// load_greys, ask_for   four pixels of a frame around each place
-// place_tile
 // mix_apart, mix_row_of bilinear, then between both frames
-// put_row
-// fill_evenly           a tile that strips cover, or none
 #ifndef SONDE_SRC_SWEEP_SLICE_STRIP_KERNEL_H
 #define SONDE_SRC_SWEEP_SLICE_STRIP_KERNEL_H
 

@@ -5,16 +5,6 @@
 // linear: the distances and the points on both frames. A tile's strips stand in a table, a strip
 // in a lane. The number of planes in front of a pixel is its strip, and one permutation fetches a
 // number for 16 pixels. Pixels whose frames might end nearby are left to the full search.
-//
-// sort_planes         by distance at the block's middle
-// are_ordered         planes that nowhere come closer than a micrometre
-// shift_between       direction that joins two planes
-// make_strip          what is linear between two planes
-// widest              distance of two planes
-// strips_cover        every line meets both frames well within
-// find_strips         of a block
-// count_planes        in front of all and of some of a tile's pixels
-// fill_lanes, find_limits, fill_table   a tile's strips
 #ifndef SONDE_SRC_SWEEP_SLICE_STRIPS_H
 #define SONDE_SRC_SWEEP_SLICE_STRIPS_H
 

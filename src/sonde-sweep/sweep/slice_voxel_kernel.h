@@ -1,10 +1,4 @@
 // Pixels of a picture from a volume; part of slice_kernel.c.
-//
-// is_within         a cell whose pixels all lie in the volume
-// find_voxels, find_cell       places of a row, of a cell
-// load_voxels       the eight greys around each
-// sum_of_products, mix_voxels   trilinear
-// voxel_cell
 #ifndef SONDE_SRC_SWEEP_SLICE_VOXEL_KERNEL_H
 #define SONDE_SRC_SWEEP_SLICE_VOXEL_KERNEL_H
 

@@ -3,18 +3,7 @@
 // The field is read at the corners of cells of 16 x 8 pixels; between them the places in the volume
 // are bilinear. A field that is linear over a cell comes out exactly.
 //
-// sonde_warp_create, sonde_warp_clear
-// sonde_warp_at            trilinear in the field, its edge beyond it
-// find_maps                from pixels to nodes and voxels
-// place_of                 of a pixel in the volume
-// cell_of, triple, offset_at   sonde_warp_at() in single precision, for the corners of cells
-// places_of_row            places in the volume at the corners of a row of cells
-// slice_cells
 // voxel_at, slice_plainly  pixel by pixel: the nearest voxel, flat and very large volumes
-// blacken, slice_voxels_with
-// sonde_volume_slice_with, sonde_volume_slice, sonde_volume_slice_warped
-// fill_bricks              voxels into lines of memory
-// sonde_volume_slicer_create, sonde_volume_slicer_destroy, sonde_volume_slicer_render
 #include "sweep/slice.h"
 
 #include <string.h>
@@ -79,12 +68,6 @@ static bool find_maps(const sonde_affine *world_from_voxel, const sonde_warp *wa
   if (!affine_inverse(&warp->world_from_node, &m->node_from_world)) return false;
   m->node_from_pixel = affine_mul(&m->node_from_world, world_from_pixel);
   return true;
-}
-
-static sonde_vec3 place_of(const maps *m, double u, double v) {
-  sonde_vec3 p = affine_apply(&m->world_from_pixel, vec3(u, v, 0));
-  if (m->warp) p = v_add(p, sonde_warp_at(m->warp, affine_apply(&m->node_from_world, p)));
-  return affine_apply(&m->voxel_from_world, p);
 }
 
 typedef float four __attribute__((vector_size(16)));
@@ -156,40 +139,38 @@ static uint64_t slice_cells(const slice_kernels *kernels, const slice_voxels *v,
   return reached;
 }
 
-static double voxel_at(const sonde_volume *v, bool nearest, const double at[3]) {
-  double value = 0, t[3];
-  size_t step[3] = {1, v->size[0], (size_t)v->size[0] * v->size[1]}, from = 0;
-  for (int k = 0; k < 3; ++k) {
-    double x = clamp(at[k], 0, v->size[k] - 1.0);
-    if (nearest) x = floor(x + 0.5);
-    double i = floor(fmin(x, fmax(v->size[k] - 2.0, 0)));
-    t[k] = x - i;
-    from += (size_t)i * step[k];
-  }
-  for (int corner = 0; corner < 8; ++corner) {
-    size_t place = from;
-    double w = 1;
-    for (int k = 0; k < 3; ++k) {
-      bool high = corner >> k & 1;
-      place += high && t[k] > 0 ? step[k] : 0;
-      w *= high ? t[k] : 1 - t[k];
-    }
-    if (w > 0) value += w * v->voxels[place];
-  }
-  return value;
-}
-
 static uint64_t slice_plainly(const sonde_volume *v, bool nearest, const maps *m,
                               sonde_image *image, uint8_t *known) {
   uint64_t reached = 0;
   for (uint32_t row = 0; row < image->height; ++row)
     for (uint32_t x = 0; x < image->width; ++x) {
-      sonde_vec3 p = place_of(m, x, row);
+      sonde_vec3 p = affine_apply(&m->world_from_pixel, vec3(x, row, 0));
+      if (m->warp) p = v_add(p, sonde_warp_at(m->warp, affine_apply(&m->node_from_world, p)));
+      p = affine_apply(&m->voxel_from_world, p);
       const double at[3] = {p.x, p.y, p.z};
       bool inside = true;
       for (int k = 0; k < 3; ++k) inside &= at[k] >= -1e-3 && at[k] <= v->size[k] - 1 + 1e-3;
       size_t i = (size_t)row * image->width + x;
-      image->pixels[i] = inside ? (uint8_t)(voxel_at(v, nearest, at) + 0.5) : 0;
+      double value = 0, t[3];
+      size_t step[3] = {1, v->size[0], (size_t)v->size[0] * v->size[1]}, from = 0;
+      for (int k = 0; k < 3; ++k) {
+        double corner_at = clamp(at[k], 0, v->size[k] - 1.0);
+        if (nearest) corner_at = floor(corner_at + 0.5);
+        double cell = floor(fmin(corner_at, fmax(v->size[k] - 2.0, 0)));
+        t[k] = corner_at - cell;
+        from += (size_t)cell * step[k];
+      }
+      for (int corner = 0; corner < 8; ++corner) {
+        size_t corner_at = from;
+        double w = 1;
+        for (int k = 0; k < 3; ++k) {
+          bool high = corner >> k & 1;
+          corner_at += high && t[k] > 0 ? step[k] : 0;
+          w *= high ? t[k] : 1 - t[k];
+        }
+        if (w > 0) value += w * v->voxels[corner_at];
+      }
+      image->pixels[i] = inside ? (uint8_t)(value + 0.5) : 0;
       if (known) known[i] = inside;
       reached += inside;
     }
@@ -244,23 +225,6 @@ struct sonde_volume_slicer {
   slice_voxels voxels; // without a picture
 };
 
-static void fill_bricks(const sonde_volume *volume, const uint32_t bricks[3], uint8_t *line) {
-  const uint32_t *n = volume->size, step = SLICE_BRICK - 1;
-  for (uint32_t z = 0; z < bricks[2]; ++z)
-    for (uint32_t y = 0; y < bricks[1]; ++y)
-      for (uint32_t x = 0; x < bricks[0]; ++x, line += SLICE_LINE)
-        for (uint32_t k = 0; k < SLICE_BRICK && step * z + k < n[2]; ++k)
-          for (uint32_t j = 0; j < SLICE_BRICK && step * y + j < n[1]; ++j) {
-            const uint8_t *from =
-                volume->voxels + ((size_t)(step * z + k) * n[1] + step * y + j) * n[0] + step * x;
-            uint8_t *to = line + (SLICE_BRICK * k + j) * SLICE_BRICK;
-            if (step * x + SLICE_BRICK <= n[0])
-              memcpy(to, from, SLICE_BRICK);
-            else
-              memcpy(to, from, n[0] - step * x);
-          }
-}
-
 sonde_status sonde_volume_slicer_create(const sonde_volume *volume, sonde_volume_slicer **out,
                                         sonde_error *error) {
   SONDE_ASSERT(volume != NULL && volume->voxels != NULL && out != NULL);
@@ -294,7 +258,21 @@ sonde_status sonde_volume_slicer_create(const sonde_volume *volume, sonde_volume
                                        .line_step = {SLICE_LINE - lose, row - lose * SLICE_BRICK,
                                                      sheet - lose * SLICE_BRICK * SLICE_BRICK}}};
   memcpy(slicer->voxels.size, n, sizeof slicer->voxels.size);
-  fill_bricks(volume, bricks, lines);
+  uint8_t *line = lines;
+  const uint32_t step = SLICE_BRICK - 1;
+  for (uint32_t z = 0; z < bricks[2]; ++z)
+    for (uint32_t y = 0; y < bricks[1]; ++y)
+      for (uint32_t x = 0; x < bricks[0]; ++x, line += SLICE_LINE)
+        for (uint32_t k = 0; k < SLICE_BRICK && step * z + k < n[2]; ++k)
+          for (uint32_t j = 0; j < SLICE_BRICK && step * y + j < n[1]; ++j) {
+            const uint8_t *from =
+                volume->voxels + ((size_t)(step * z + k) * n[1] + step * y + j) * n[0] + step * x;
+            uint8_t *to = line + (SLICE_BRICK * k + j) * SLICE_BRICK;
+            if (step * x + SLICE_BRICK <= n[0])
+              memcpy(to, from, SLICE_BRICK);
+            else
+              memcpy(to, from, n[0] - step * x);
+          }
   *out = slicer;
   return SONDE_OK;
 }

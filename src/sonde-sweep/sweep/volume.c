@@ -1,8 +1,4 @@
 // Volumes in memory and their files.
-//
-// sonde_volume_create, sonde_volume_clear
-// read_volume                            header and voxels
-// sonde_volume_load, sonde_volume_save
 #include "sweep/frames.h"
 
 #include <string.h>
@@ -30,33 +26,29 @@ void sonde_volume_clear(sonde_volume *v) {
   *v = (sonde_volume){0};
 }
 
-static sonde_status read_volume(const sonde_header *h, sonde_volume *v, sonde_error *error) {
-  bool good = h->dimension == 3;
-  for (uint32_t k = 0; k < 3 && good; ++k) good = h->size[k] >= 1 && h->size[k] <= SONDE_SIDE_MAX;
-  if (!good)
-    return sonde_fail(error, SONDE_FORMAT,
-                      "%.200s: %u axes of %u x %u x %u voxels, expected three of 1 to %d voxels",
-                      h->path, h->dimension, h->size[0], h->size[1], h->size[2], SONDE_SIDE_MAX);
-  memcpy(v->size, h->size, sizeof v->size);
-  v->world_from_voxel = affine_scale(h->mm_from_voxel, 1e-3);
-  sonde_affine inverse;
-  if (!affine_inverse(&v->world_from_voxel, &inverse))
-    return sonde_fail(
-        error, SONDE_FORMAT,
-        "%.200s: the axes of the volume are flat, expected three directions that span "
-        "space",
-        h->path);
-  return sonde_pixels_read(h, voxel_count(v), &v->voxels, error);
-}
-
 sonde_status sonde_volume_load(const char *path, sonde_volume *v, sonde_error *error) {
   SONDE_ASSERT(path != NULL && v != NULL);
   *v = (sonde_volume){0};
-  sonde_header header;
-  sonde_status status = sonde_header_load(path, &header, error);
+  sonde_header h;
+  sonde_affine inverse;
+  sonde_status status = sonde_header_load(path, &h, error);
   if (status) return status;
-  status = read_volume(&header, v, error);
-  sonde_header_clear(&header);
+  bool good = h.dimension == 3;
+  for (uint32_t k = 0; k < 3 && good; ++k) good = h.size[k] >= 1 && h.size[k] <= SONDE_SIDE_MAX;
+  memcpy(v->size, h.size, sizeof v->size);
+  v->world_from_voxel = affine_scale(h.mm_from_voxel, 1e-3);
+  if (!good)
+    status = sonde_fail(error, SONDE_FORMAT,
+                        "%.200s: %u axes of %u x %u x %u voxels, expected three of 1 to %d voxels",
+                        path, h.dimension, h.size[0], h.size[1], h.size[2], SONDE_SIDE_MAX);
+  else if (!affine_inverse(&v->world_from_voxel, &inverse))
+    status = sonde_fail(error, SONDE_FORMAT,
+                        "%.200s: the axes of the volume are flat, expected three directions that "
+                        "span space",
+                        path);
+  else
+    status = sonde_pixels_read(&h, voxel_count(v), &v->voxels, error);
+  sonde_header_clear(&h);
   if (status) sonde_volume_clear(v);
   return status;
 }
@@ -64,26 +56,5 @@ sonde_status sonde_volume_load(const char *path, sonde_volume *v, sonde_error *e
 sonde_status sonde_volume_save(const char *path, const sonde_volume *v, bool compressed,
                                sonde_error *error) {
   SONDE_ASSERT(path != NULL && v != NULL && v->voxels != NULL);
-  bool mha = sonde_text_ends(path, ".mha");
-  if (!mha && !sonde_text_ends(path, ".nrrd"))
-    return sonde_fail(error, SONDE_ARGUMENT, "%.200s: expected a name that ends in .mha or .nrrd",
-                      path);
-  uint8_t *packed = NULL;
-  size_t count = voxel_count(v);
-  sonde_file *file = NULL;
-  sonde_status status = SONDE_OK;
-  if (compressed)
-    status = sonde_pixels_pack(v->voxels, count, mha ? SONDE_PACKING_ZLIB : SONDE_PACKING_GZIP,
-                               &packed, &count, error);
-  if (!status) status = sonde_file_create(path, &file, error);
-  if (!status) {
-    if (mha)
-      sonde_metaimage_write_volume(file, v, compressed ? count : 0);
-    else
-      sonde_nrrd_write_volume(file, v, compressed);
-    sonde_file_write(file, compressed ? packed : v->voxels, count);
-    status = sonde_file_commit(file, error);
-  }
-  sonde_free(packed);
-  return status;
+  return sonde_pixels_save(path, NULL, v, v->voxels, voxel_count(v), compressed, error);
 }
