@@ -1,9 +1,11 @@
 // The gel film: creation.
-// check: the definition. measure_edges: what flows across each.
 #include "haptics/gel.h"
 
 #include "base/base.h"
 #include "base/maths.h"
+#include "haptics/ranges.h"
+
+#include <stddef.h>
 
 sonde_gel_def sonde_gel_def_default(void) {
   return (sonde_gel_def){.viscosity_pa_s = 10.0,
@@ -13,21 +15,11 @@ sonde_gel_def sonde_gel_def_default(void) {
                          .moist_stickiness = 0.8};
 }
 
-static sonde_status check(const sonde_gel_def *def, sonde_error *error) {
-  const struct {
-    const char *name;
-    double value, low, high;
-  } range[] = {{"viscosity_pa_s", def->viscosity_pa_s, 1e-3, 1e4},
-               {"lubricating_m", def->lubricating_m, 1e-7, 1e-2},
-               {"drying_m_s", def->drying_m_s, 0, 1e-3},
-               {"moist_s", def->moist_s, 1e-3, 1e6},
-               {"moist_stickiness", def->moist_stickiness, 0, 10}};
-  for (size_t i = 0; i < SONDE_COUNT_OF(range); ++i)
-    if (!(range[i].value >= range[i].low && range[i].value <= range[i].high))
-      return sonde_fail(error, SONDE_ARGUMENT, "gel: %s is %g, expected %g to %g", range[i].name,
-                        range[i].value, range[i].low, range[i].high);
-  return SONDE_OK;
-}
+#define RANGE(member, low, high)                                                                   \
+  { #member, offsetof(sonde_gel_def, member), low, high }
+static const sonde_range RANGES[] = {RANGE(viscosity_pa_s, 1e-3, 1e4),
+                                     RANGE(lubricating_m, 1e-7, 1e-2), RANGE(drying_m_s, 0, 1e-3),
+                                     RANGE(moist_s, 1e-3, 1e6), RANGE(moist_stickiness, 0, 10)};
 
 void sonde_gel_destroy(sonde_gel *gel) {
   if (!gel) return;
@@ -41,25 +33,12 @@ void sonde_gel_destroy(sonde_gel *gel) {
   sonde_free(gel);
 }
 
-// The width of an edge's flow: a third of the area around it per direction.
-static void measure_edges(sonde_gel *gel) {
-  const sonde_topology *topology = &gel->model->topology;
-  const sonde_vec3 *x = gel->model->surface.vertices;
-  for (uint32_t e = 0; e < topology->edge_count; ++e) {
-    uint32_t i = topology->edges[e][0], j = topology->edges[e][1];
-    double length = fmax(v_distance(x[i], x[j]), 1e-6);
-    double width = 0.3 * (gel->model->area_m2[i] + gel->model->area_m2[j]) / length;
-    gel->drag[e] = width / (12.0 * gel->def.viscosity_pa_s * length);
-    gel->half_m[e] = 0.5 * width / length;
-  }
-}
-
 sonde_status sonde_gel_create(const sonde_model *model, const sonde_gel_def *def, sonde_gel **out,
                               sonde_error *error) {
   SONDE_ASSERT(model != NULL && out != NULL);
   *out = NULL;
   sonde_gel_def wanted = def ? *def : sonde_gel_def_default();
-  sonde_status status = check(&wanted, error);
+  sonde_status status = sonde_ranges_check("gel", &wanted, RANGES, SONDE_COUNT_OF(RANGES), error);
   if (status) return status;
   const sonde_topology *topology = &model->topology;
   size_t nodes = model->surface.vertex_count;
@@ -80,7 +59,15 @@ sonde_status sonde_gel_create(const sonde_model *model, const sonde_gel_def *def
     sonde_gel_destroy(gel);
     return sonde_fail_memory(error);
   }
-  measure_edges(gel);
+  // The width of an edge's flow is a third of the area around it per direction.
+  const sonde_vec3 *x = gel->model->surface.vertices;
+  for (uint32_t e = 0; e < topology->edge_count; ++e) {
+    uint32_t i = topology->edges[e][0], j = topology->edges[e][1];
+    double length = fmax(v_distance(x[i], x[j]), 1e-6);
+    double width = 0.3 * (gel->model->area_m2[i] + gel->model->area_m2[j]) / length;
+    gel->drag[e] = width / (12.0 * gel->def.viscosity_pa_s * length);
+    gel->half_m[e] = 0.5 * width / length;
+  }
   *out = gel;
   return SONDE_OK;
 }

@@ -7,13 +7,6 @@
 // touches, h the film of the node that gives. Volume only changes hands; no node gives more than a
 // sixteenth of what it has per edge and step, so that films stay positive and rough steps stay
 // stable.
-//
-// flow:       volume over an edge in a step.
-// begin, finish: pressures before, films after.
-// dry:        loss to the air; skin that loses its film stays moist for a while.
-// touches, enter: whether the probe does; share of sound at a place of a face of the skin.
-// share_around: at the place nearest to a point, on the faces around a node.
-// gather:     the nodes that may be nearest.
 #include "base/base.h"
 #include "base/maths.h"
 #include "geometry/triangle.h"
@@ -66,33 +59,18 @@ static double flow(const sonde_gel *gel, sonde_vec3 probe_m_s, uint32_t edge, do
   return volume > most ? most : volume < -most ? -most : volume;
 }
 
-static void begin(sonde_gel *gel, const sonde_vec3 *contact_n) {
-  for (uint32_t i = 0; i < gel->model->surface.vertex_count; ++i) {
-    double n2 = v_norm2(contact_n[i]);
-    gel->push_pa[i] = n2 > 0.0 ? sqrt(n2) / gel->model->area_m2[i] : 0.0;
-    gel->change_m3[i] = 0.0;
-  }
-}
-
-static void finish(sonde_gel *gel) {
-  for (uint32_t i = 0; i < gel->model->surface.vertex_count; ++i)
-    if (gel->change_m3[i] < 0.0 || gel->change_m3[i] > 0.0)
-      gel->film_m[i] = fmax(gel->film_m[i] + gel->change_m3[i] / gel->model->area_m2[i], 0.0);
-}
-
-static void dry(sonde_gel *gel, double dt_s) {
-  double keep = exp(-dt_s / gel->def.moist_s), loss = gel->def.drying_m_s * dt_s;
-  for (uint32_t i = 0; i < gel->model->surface.vertex_count; ++i) {
-    gel->film_m[i] = fmax(gel->film_m[i] - loss, 0.0);
-    gel->moisture[i] = gel->film_m[i] > 0.0 ? 1.0 : gel->moisture[i] * keep;
-  }
-}
-
 void sonde_gel_part(sonde_gel *gel, const sonde_vec3 *contact_n, sonde_vec3 probe_m_s, double dt_s,
                     uint32_t part, uint32_t parts) {
   SONDE_ASSERT(contact_n != NULL && dt_s > 0.0 && v_finite(probe_m_s) && part < parts);
   const sonde_topology *topology = &gel->model->topology;
-  if (part == 0) begin(gel, contact_n);
+  if (part == 0) {
+    // The pressures before the flow are those of the probe.
+    for (uint32_t i = 0; i < gel->model->surface.vertex_count; ++i) {
+      double n2 = v_norm2(contact_n[i]);
+      gel->push_pa[i] = n2 > 0.0 ? sqrt(n2) / gel->model->area_m2[i] : 0.0;
+      gel->change_m3[i] = 0.0;
+    }
+  }
   uint32_t from = (uint32_t)((uint64_t)topology->edge_count * part / parts);
   uint32_t to = (uint32_t)((uint64_t)topology->edge_count * (part + 1) / parts);
   for (uint32_t e = from; e < to; ++e) {
@@ -101,8 +79,15 @@ void sonde_gel_part(sonde_gel *gel, const sonde_vec3 *contact_n, sonde_vec3 prob
     gel->change_m3[topology->edges[e][1]] += volume;
   }
   if (part + 1 < parts) return;
-  finish(gel);
-  dry(gel, dt_s);
+  for (uint32_t i = 0; i < gel->model->surface.vertex_count; ++i)
+    if (gel->change_m3[i] < 0.0 || gel->change_m3[i] > 0.0)
+      gel->film_m[i] = fmax(gel->film_m[i] + gel->change_m3[i] / gel->model->area_m2[i], 0.0);
+  // Films lose gel to the air; skin that loses its film stays moist for a while.
+  double keep = exp(-dt_s / gel->def.moist_s), loss = gel->def.drying_m_s * dt_s;
+  for (uint32_t i = 0; i < gel->model->surface.vertex_count; ++i) {
+    gel->film_m[i] = fmax(gel->film_m[i] - loss, 0.0);
+    gel->moisture[i] = gel->film_m[i] > 0.0 ? 1.0 : gel->moisture[i] * keep;
+  }
 }
 
 void sonde_gel_step(sonde_gel *gel, const sonde_vec3 *contact_n, sonde_vec3 probe_m_s,
@@ -141,18 +126,7 @@ typedef struct look {
 
 static bool touches(const look *at, uint32_t node) { return v_norm2(at->contact_n[node]) > 0.0; }
 
-// Skin ends its touch halfway from a node that touches to one that does not.
-static double enter(const look *at, const uint32_t corner[3], const double weight[3]) {
-  double touching = 0.0, sum = 0.0;
-  for (int k = 0; k < 3; ++k) {
-    if (!touches(at, corner[k])) continue;
-    touching += weight[k];
-    sum += weight[k] * -expm1(-at->film_m[corner[k]] / at->gel->def.lubricating_m);
-  }
-  return touching > 0.5 ? sum / touching : 2.0 * sum;
-}
-
-// At the place nearest to a point on the faces around a node.
+// Share of sound at the place nearest to a point on the faces around a node.
 static double share_around(const look *at, uint32_t node, sonde_vec3 point_m) {
   const sonde_topology *topology = &at->gel->model->topology;
   double nearest2 = INFINITY, share = 0.0;
@@ -166,27 +140,16 @@ static double share_around(const look *at, uint32_t node, sonde_vec3 point_m) {
     double gap2 = v_norm2(gap);
     if (gap2 >= nearest2) continue;
     nearest2 = gap2;
-    share = enter(at, corner, weight);
+    // Skin ends its touch halfway from a node that touches to one that does not.
+    double touching = 0.0, sum = 0.0;
+    for (int c = 0; c < 3; ++c) {
+      if (!touches(at, corner[c])) continue;
+      touching += weight[c];
+      sum += weight[c] * -expm1(-at->film_m[corner[c]] / at->gel->def.lubricating_m);
+    }
+    share = touching > 0.5 ? sum / touching : 2.0 * sum;
   }
   return share * fmax(fmin(2.0 * (1.0 - sqrt(nearest2) / reach_m), 1.0), 0.0);
-}
-
-// Nodes of the faces with a corner that touches, each once: one beside several comes with the first
-// of them. Returns their number.
-static uint32_t gather(const look *at, uint32_t *near) {
-  const sonde_topology *topology = &at->gel->model->topology;
-  uint32_t count = 0;
-  for (uint32_t i = 0; i < topology->vertex_count; ++i) {
-    if (!touches(at, i)) continue;
-    near[count++] = i;
-    for (uint32_t k = topology->start[i]; k < topology->start[i + 1]; ++k) {
-      uint32_t beside = topology->neighbour[k], first = topology->start[beside];
-      if (touches(at, beside)) continue;
-      while (!touches(at, topology->neighbour[first])) ++first;
-      if (topology->neighbour[first] == i) near[count++] = beside;
-    }
-  }
-  return count;
 }
 
 void sonde_gel_coupling_of(const sonde_gel *gel, const double *film_m, uint32_t *near,
@@ -194,7 +157,20 @@ void sonde_gel_coupling_of(const sonde_gel *gel, const double *film_m, uint32_t 
                            const sonde_vec3 *point_m, uint32_t count, float *share) {
   SONDE_ASSERT(skin_m != NULL && contact_n != NULL && (count == 0 || (point_m && share)));
   const look at = {gel, film_m, skin_m, contact_n};
-  uint32_t nodes = gather(&at, near);
+  // Nodes of the faces with a corner that touches are gathered once each: one beside several comes
+  // with the first of them.
+  const sonde_topology *topology = &gel->model->topology;
+  uint32_t nodes = 0;
+  for (uint32_t i = 0; i < topology->vertex_count; ++i) {
+    if (!touches(&at, i)) continue;
+    near[nodes++] = i;
+    for (uint32_t k = topology->start[i]; k < topology->start[i + 1]; ++k) {
+      uint32_t beside = topology->neighbour[k], first = topology->start[beside];
+      if (touches(&at, beside)) continue;
+      while (!touches(&at, topology->neighbour[first])) ++first;
+      if (topology->neighbour[first] == i) near[nodes++] = beside;
+    }
+  }
   for (uint32_t k = 0; k < count; ++k) {
     double nearest2 = INFINITY;
     uint32_t node = 0;

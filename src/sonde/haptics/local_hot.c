@@ -8,17 +8,6 @@
 // K and a damping B are measured by recursive least squares from the differences between two
 // answers, dF = K d + B dv, forgetting at a rate of one half per 3 answers: no extra solve of the
 // scene.
-//
-// A new answer does not step the force: the difference to the old model at that tick is kept as an
-// offset and blended out over a period. Without answers the model extrapolates for two periods
-// and then decays.
-//
-// clean:        a definition with every member usable.
-// measure:      one step of the least squares.
-// measure_across: the spring across the normal.
-// evaluate:     the model at a position and velocity.
-// start_contact: state of a fresh contact.
-// sonde_local_*: the interface.
 #include "base/base.h"
 #include "base/maths.h"
 #include "sonde/haptics_local.h"
@@ -71,14 +60,6 @@ static void measure(sonde_local *local, double d, double dv, double df) {
   p[1] = clamp(p[1], -sqrt(p[0] * p[2]), sqrt(p[0] * p[2]));
 }
 
-static void measure_across(sonde_local *local, sonde_vec3 moved, sonde_vec3 gained) {
-  double m2 = v_norm2(moved);
-  if (m2 < 1e-10) return; // less than 10 um
-  double slope = -v_dot(moved, gained) / m2;
-  double weight = m2 / (m2 + 1e-7);
-  local->across_n_m += 0.5 * weight * (clamp(slope, 0.0, stiffness_max) - local->across_n_m);
-}
-
 static sonde_vec3 across(sonde_vec3 a, sonde_vec3 normal) {
   return v_madd(a, -v_dot(a, normal), normal);
 }
@@ -94,6 +75,8 @@ static sonde_vec3 evaluate(const sonde_local *local, sonde_vec3 at_m, sonde_vec3
   return v_madd(v_scale(n, along), -local->across_n_m, across(moved, n));
 }
 
+// A new answer does not step the force: the difference to the old model at that tick is an offset
+// that is blended out over a period.
 void sonde_local_feed(sonde_local *local, sonde_vec3 at_m, sonde_vec3 velocity_m_s,
                       sonde_vec3 force_n) {
   SONDE_ASSERT(local->def.period_s > 0.0);
@@ -109,7 +92,13 @@ void sonde_local_feed(sonde_local *local, sonde_vec3 at_m, sonde_vec3 velocity_m
     local->depth_m = fmax(local->depth_m + d, 0.0);
     if (touched) {
       measure(local, d, -v_dot(faster, n), v_dot(gained, n));
-      measure_across(local, across(moved, n), across(gained, n));
+      // The slope of the spring across the normal counts from moves of 10 um on.
+      sonde_vec3 aside = across(moved, n);
+      double m2 = v_norm2(aside), weight = m2 / (m2 + 1e-7);
+      if (!(m2 < 1e-10)) {
+        double slope = clamp(-v_dot(aside, across(gained, n)) / m2, 0.0, stiffness_max);
+        local->across_n_m += 0.5 * weight * (slope - local->across_n_m);
+      }
     }
     double bend = local->stiffness_n_m * local->depth_m / now_n - 1.0;
     local->room_m = bend > 1e-3 ? local->depth_m / bend : (double)INFINITY;
@@ -124,6 +113,7 @@ void sonde_local_feed(sonde_local *local, sonde_vec3 at_m, sonde_vec3 velocity_m
   local->offset_n = v_sub(local->output_n, evaluate(local, local->last_m, local->velocity_m_s));
 }
 
+// Without answers the model extrapolates for two periods and then decays.
 sonde_vec3 sonde_local_force(sonde_local *local, sonde_vec3 position_m) {
   const sonde_local_def *def = &local->def;
   SONDE_ASSERT(def->dt_s > 0.0 && def->period_s > 0.0);

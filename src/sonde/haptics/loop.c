@@ -1,9 +1,4 @@
 // Start and stop of the real-time loop.
-// raise_priority: SCHED_FIFO when the system allows it.
-// memory_small:   whether locking everything mapped is harmless on this machine.
-// lock_memory:    mlockall of what is mapped now; counted, so that the last loop releases it.
-// thread_main:    body of the thread.
-// sonde_loop_*:   the interface.
 #include "haptics/loop.h"
 
 #include "base/base.h"
@@ -17,44 +12,20 @@
 // mlockall acts on the process; loops of several sessions share it.
 static atomic_int memory_locks;
 
-static bool raise_priority(void) {
-  struct sched_param param = {.sched_priority = 40};
-  return pthread_setschedparam(pthread_self(), SCHED_FIFO, &param) == 0;
-}
-
-// Locking faults in every mapped page (untouched stacks too): only below a quarter of the memory.
-static bool memory_small(void) {
+// Locking faults in every mapped page (untouched stacks too): it is harmless only below a quarter
+// of the machine's memory. MCL_FUTURE is left out: beyond RLIMIT_MEMLOCK it would make later
+// allocations fail.
+static bool lock_memory(void) {
   unsigned long pages = 0;
   FILE *file = fopen("/proc/self/statm", "r");
   if (!file) return false;
   bool known = fscanf(file, "%lu", &pages) == 1;
   fclose(file);
   long total = sysconf(_SC_PHYS_PAGES);
-  return known && total > 0 && pages < (unsigned long)total / 4;
-}
-
-// MCL_FUTURE is left out: beyond RLIMIT_MEMLOCK it would make later allocations fail.
-static bool lock_memory(void) {
-  if (!memory_small() || mlockall(MCL_CURRENT) != 0) return false;
+  bool small = known && total > 0 && pages < (unsigned long)total / 4;
+  if (!small || mlockall(MCL_CURRENT) != 0) return false;
   atomic_fetch_add(&memory_locks, 1);
   return true;
-}
-
-static void unlock_memory(const sonde_loop *loop) {
-  if (loop->memory_locked && atomic_fetch_sub(&memory_locks, 1) == 1) munlockall();
-}
-
-static void write_note(sonde_loop *loop) {
-  const char *what = NULL;
-  if (!loop->realtime_priority && !loop->memory_locked)
-    what = "real-time priority and memory locking were";
-  else if (!loop->realtime_priority)
-    what = "real-time priority was";
-  else if (!loop->memory_locked)
-    what = "memory locking was";
-  if (what)
-    snprintf(loop->note, sizeof loop->note,
-             "%s refused by the system: ticks may wake late (see docs/haptics.md)", what);
 }
 
 typedef struct launch {
@@ -69,25 +40,21 @@ static void *thread_main(void *argument) {
   launch *start = argument;
   sonde_loop *loop = start->loop;
   pthread_mutex_lock(&start->mutex);
-  loop->realtime_priority = raise_priority();
+  struct sched_param param = {.sched_priority = 40};
+  loop->realtime_priority = pthread_setschedparam(pthread_self(), SCHED_FIFO, &param) == 0;
   loop->memory_locked = lock_memory();
-  write_note(loop);
+  static const char *const refused[2][2] = {
+      {"real-time priority and memory locking were", "real-time priority was"},
+      {"memory locking was", NULL}};
+  const char *what = refused[loop->realtime_priority][loop->memory_locked];
+  if (what)
+    snprintf(loop->note, sizeof loop->note,
+             "%s refused by the system: ticks may wake late (see docs/haptics.md)", what);
   start->ready = true;
   pthread_cond_signal(&start->condition);
   pthread_mutex_unlock(&start->mutex);
   sonde_loop_run(loop);
   return NULL;
-}
-
-static int launch_thread(sonde_loop *loop) {
-  launch start = {loop, PTHREAD_MUTEX_INITIALIZER, PTHREAD_COND_INITIALIZER, false};
-  int failure = pthread_create(&loop->thread, NULL, thread_main, &start);
-  pthread_mutex_lock(&start.mutex);
-  while (!failure && !start.ready) pthread_cond_wait(&start.condition, &start.mutex);
-  pthread_mutex_unlock(&start.mutex);
-  pthread_mutex_destroy(&start.mutex);
-  pthread_cond_destroy(&start.condition);
-  return failure;
 }
 
 sonde_status sonde_loop_start(double period_s, sonde_tick_fn tick, void *user, sonde_loop **out,
@@ -102,7 +69,13 @@ sonde_status sonde_loop_start(double period_s, sonde_tick_fn tick, void *user, s
   loop->period_s = period_s;
   loop->tick = tick;
   loop->user = user;
-  int failure = launch_thread(loop);
+  launch start = {loop, PTHREAD_MUTEX_INITIALIZER, PTHREAD_COND_INITIALIZER, false};
+  int failure = pthread_create(&loop->thread, NULL, thread_main, &start);
+  pthread_mutex_lock(&start.mutex);
+  while (!failure && !start.ready) pthread_cond_wait(&start.condition, &start.mutex);
+  pthread_mutex_unlock(&start.mutex);
+  pthread_mutex_destroy(&start.mutex);
+  pthread_cond_destroy(&start.condition);
   if (failure) {
     sonde_free(loop);
     return sonde_fail(error, SONDE_MEMORY, "loop: the thread could not be started: %s",
@@ -118,7 +91,7 @@ void sonde_loop_stop(sonde_loop *loop, sonde_loop_stats *stats) {
   atomic_store_explicit(&loop->stop, true, memory_order_release);
   pthread_join(loop->thread, NULL);
   if (stats) *stats = sonde_loop_read(loop);
-  unlock_memory(loop);
+  if (loop->memory_locked && atomic_fetch_sub(&memory_locks, 1) == 1) munlockall();
   sonde_free(loop);
 }
 

@@ -1,8 +1,4 @@
 // The loop around the tick.
-// sonde_loop_lateness_bin: which bin of the histogram a lateness belongs to.
-// add:                     one more in a counter that only this thread writes.
-// count:                   what one tick adds to the counters.
-// sonde_loop_run:          absolute wake-ups; a late tick loses periods but keeps the phase.
 #include "haptics/loop.h"
 
 #include "base/base.h"
@@ -23,15 +19,6 @@ static void add(_Atomic uint64_t *counter, uint64_t amount) {
   atomic_store_explicit(counter, value + amount, memory_order_relaxed);
 }
 
-static void count(sonde_loop *loop, double lateness_s, double compute_s) {
-  add(&loop->lateness[sonde_loop_lateness_bin(lateness_s)], 1);
-  double sum = atomic_load_explicit(&loop->compute_sum_s, memory_order_relaxed);
-  atomic_store_explicit(&loop->compute_sum_s, sum + compute_s, memory_order_relaxed);
-  if (compute_s > atomic_load_explicit(&loop->compute_max_s, memory_order_relaxed))
-    atomic_store_explicit(&loop->compute_max_s, compute_s, memory_order_relaxed);
-  add(&loop->ticks, 1);
-}
-
 void sonde_loop_run(sonde_loop *loop) {
   SONDE_ASSERT(loop->period_s > 0.0 && loop->tick != NULL);
   double start_s = sonde_clock_now();
@@ -41,8 +28,13 @@ void sonde_loop_run(sonde_loop *loop) {
     sonde_clock_sleep_until(due_s);
     double woken_s = sonde_clock_now();
     loop->tick(loop->user);
-    double done_s = sonde_clock_now();
-    count(loop, woken_s - due_s, done_s - woken_s);
+    double done_s = sonde_clock_now(), compute_s = done_s - woken_s;
+    add(&loop->lateness[sonde_loop_lateness_bin(woken_s - due_s)], 1);
+    double sum = atomic_load_explicit(&loop->compute_sum_s, memory_order_relaxed);
+    atomic_store_explicit(&loop->compute_sum_s, sum + compute_s, memory_order_relaxed);
+    if (compute_s > atomic_load_explicit(&loop->compute_max_s, memory_order_relaxed))
+      atomic_store_explicit(&loop->compute_max_s, compute_s, memory_order_relaxed);
+    add(&loop->ticks, 1);
     period++;
     double behind = (done_s - start_s) / loop->period_s - (double)period;
     if (behind > 0.0) {

@@ -5,9 +5,11 @@
 #include "base/link.h"
 #include "base/maths.h"
 
-// Every number finite and the quaternion long enough to be a rotation.
-// Meshes lie within 10 km of the origin; a probe farther away would have speeds without number.
+// A probe's distance from the origin stays below this: meshes lie within 10 km of it, and a probe
+// farther away would have speeds without number.
 #define SONDE_POSE_REACH_M 1e5
+// Whether every number is finite, the position within reach and the quaternion long enough to be a
+// rotation.
 SONDE_LINK bool sonde_pose_usable(sonde_pose pose);
 // Angle of the rotation that takes a to b along the short arc, 0..pi.
 double sonde_quat_angle(sonde_quat a, sonde_quat b);

@@ -1,9 +1,4 @@
 // Small motions of poses.
-// sonde_pose_usable:   guard against NaN and null quaternions.
-// sonde_quat_angle:    angle between two rotations.
-// sonde_quat_slerp:    uniform turn along the short arc; q and -q are the same rotation.
-// sonde_pose_blend:    a share of the way to another pose.
-// sonde_pose_approach: a bounded step towards another pose.
 #include "haptics/motion.h"
 
 #include "base/base.h"

@@ -5,6 +5,16 @@
 #include "base/link.h"
 #include "sonde/haptics_render.h"
 
+// A member of a definition, a double, and the range in which it has to lie.
+typedef struct sonde_range {
+  const char *name;
+  size_t offset;
+  double low, high;
+} sonde_range;
+// First member out of its range: ARGUMENT with its name. @thread any
+sonde_status sonde_ranges_check(const char *what, const void *def, const sonde_range *list,
+                                size_t count, sonde_error *error);
+
 // A number outside of its range is replaced by `otherwise`, the default definition's member.
 void sonde_limits_clean(sonde_safety_limits *limits);
 void sonde_render_def_clean(sonde_render_def *def);

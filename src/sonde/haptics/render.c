@@ -1,6 +1,4 @@
 // Set-up of the rendering, and the margins of its loop; one tick is in render_hot.c.
-// response:        loop of hand and coupling at a frequency: magnitude and phase.
-// crossing:        frequency at which a falling function of it passes zero.
 #include "sonde/haptics_render.h"
 
 #include "base/base.h"

@@ -8,10 +8,6 @@
 // Heat. The motors' heat follows (f / continuous)^2 with a time constant. Between 0.8 and 1 of what
 // the continuous force leads to, the norm limit falls from force_n to continuous_n: at rest there
 // it stays, since a force above it would raise the heat further.
-//
-// cap_n:       norm limit of this tick, lower when the motors are hot.
-// apply_fade:  one tick of a latched fault.
-// apply_force: one healthy tick.
 #include "sonde/haptics.h"
 
 #include "base/base.h"
@@ -65,38 +61,30 @@ static double cap_n(sonde_safety *safety, double dt_s) {
               limits->continuous_n + cool * fmax(limits->force_n - limits->continuous_n, 0.0));
 }
 
-static void apply_fade(sonde_safety *safety, double dt_s) {
-  double step = safety->limits.fade_s > 0.0 ? dt_s / safety->limits.fade_s : 1.0;
-  // a remainder of rounding is zero, so that the last tick of the fade is exact
-  safety->gain = safety->gain > step * (1.0 + 1e-9) ? safety->gain - step : 0.0;
-  safety->force_n = v_scale(safety->fade_force_n, safety->gain);
-  safety->torque_n_m = v_scale(safety->fade_torque_n_m, safety->gain);
-}
-
-static void apply_force(sonde_safety *safety, sonde_vec3 force_n, sonde_vec3 torque_n_m, double cap,
-                        double dt_s) {
-  const sonde_safety_limits *limits = &safety->limits;
-  bool acted = false;
-  double step = limits->soft_start_s > 0.0 ? dt_s / limits->soft_start_s : 1.0;
-  safety->gain = fmin(1.0, safety->gain + step);
-  force_n = v_scale(sonde_bound_norm(force_n, cap, &acted), safety->gain);
-  torque_n_m = v_scale(sonde_bound_norm(torque_n_m, limits->torque_n_m, &acted), safety->gain);
-  double reach_n = limits->slew_n_s * dt_s;
-  double reach_n_m = limits->force_n > 0.0 ? reach_n * limits->torque_n_m / limits->force_n : 0.0;
-  safety->force_n = sonde_bound_step(safety->force_n, force_n, reach_n, &acted);
-  safety->torque_n_m = sonde_bound_step(safety->torque_n_m, torque_n_m, reach_n_m, &acted);
-  safety->limited_ticks += acted;
-}
-
 void sonde_safety_apply(sonde_safety *safety, sonde_vec3 force_n, sonde_vec3 torque_n_m,
                         double dt_s) {
   SONDE_ASSERT(dt_s > 0.0);
   if (!v_finite(force_n) || !v_finite(torque_n_m))
     sonde_safety_trip(safety, SONDE_FAULT_NON_FINITE);
   double cap = cap_n(safety, dt_s);
-  if (safety->fault == SONDE_FAULT_NONE)
-    apply_force(safety, force_n, torque_n_m, cap, dt_s);
-  else
-    apply_fade(safety, dt_s);
+  if (safety->fault == SONDE_FAULT_NONE) {
+    const sonde_safety_limits *limits = &safety->limits;
+    bool acted = false;
+    double step = limits->soft_start_s > 0.0 ? dt_s / limits->soft_start_s : 1.0;
+    safety->gain = fmin(1.0, safety->gain + step);
+    force_n = v_scale(sonde_bound_norm(force_n, cap, &acted), safety->gain);
+    torque_n_m = v_scale(sonde_bound_norm(torque_n_m, limits->torque_n_m, &acted), safety->gain);
+    double reach_n = limits->slew_n_s * dt_s;
+    double reach_n_m = limits->force_n > 0.0 ? reach_n * limits->torque_n_m / limits->force_n : 0.0;
+    safety->force_n = sonde_bound_step(safety->force_n, force_n, reach_n, &acted);
+    safety->torque_n_m = sonde_bound_step(safety->torque_n_m, torque_n_m, reach_n_m, &acted);
+    safety->limited_ticks += acted;
+  } else {
+    double step = safety->limits.fade_s > 0.0 ? dt_s / safety->limits.fade_s : 1.0;
+    // a remainder of rounding is zero, so that the last tick of the fade is exact
+    safety->gain = safety->gain > step * (1.0 + 1e-9) ? safety->gain - step : 0.0;
+    safety->force_n = v_scale(safety->fade_force_n, safety->gain);
+    safety->torque_n_m = v_scale(safety->fade_torque_n_m, safety->gain);
+  }
   SONDE_ASSERT(v_finite(safety->force_n) && v_finite(safety->torque_n_m));
 }

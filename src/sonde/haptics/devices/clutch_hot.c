@@ -1,15 +1,7 @@
 // A clutch between a handle and the probe: one tick.
-// take_hold: the hold that leaves the probe where it is.
 #include "haptics/devices/devices.h"
 
 #include "haptics/motion.h"
-
-static void take_hold(sonde_clutch_device *clutch, sonde_pose handle) {
-  clutch->offset_m = v_sub(clutch->probe.position, handle.position);
-  clutch->grip = q_mul(q_conj(handle.rotation), clutch->probe.rotation);
-  clutch->gain = 0.0;
-  clutch->holds = true;
-}
 
 void sonde_clutch_read(void *self, uint64_t tick, sonde_device_sample *sample) {
   sonde_clutch_device *clutch = self;
@@ -22,7 +14,13 @@ void sonde_clutch_read(void *self, uint64_t tick, sonde_device_sample *sample) {
   if (!sample->present || (sample->buttons & clutch->buttons)) {
     clutch->holds = false;
   } else {
-    if (!clutch->holds) take_hold(clutch, handle);
+    if (!clutch->holds) {
+      // The hold leaves the probe where it is.
+      clutch->offset_m = v_sub(clutch->probe.position, handle.position);
+      clutch->grip = q_mul(q_conj(handle.rotation), clutch->probe.rotation);
+      clutch->gain = 0.0;
+      clutch->holds = true;
+    }
     clutch->probe.position = v_add(handle.position, clutch->offset_m);
     clutch->probe.rotation = q_unit(q_mul(handle.rotation, clutch->grip));
     clutch->gain = fmin(clutch->gain + clutch->gain_step, 1.0);

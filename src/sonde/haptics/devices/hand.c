@@ -1,13 +1,12 @@
 // The simulated operator: creation.
-// exponential: matrix exponential by scaling and squaring of its Taylor sum.
-// discretise:  exact step of the arm for a load that is constant over a tick.
-// check:       ranges of the definition.
 #include "haptics/devices/hand.h"
 
 #include "base/base.h"
 #include "base/maths.h"
 #include "base/random.h"
+#include "haptics/ranges.h"
 
+#include <stddef.h>
 #include <string.h>
 
 static const sonde_hand_preset presets[] = {
@@ -30,26 +29,12 @@ sonde_hand_def sonde_hand_def_default(void) {
                           .tremor_hz = 9.0};
 }
 
-static sonde_status check(const sonde_hand_def *def, double dt_s, sonde_error *error) {
-  const struct {
-    const char *name;
-    double value, low, high;
-  } range[] = {{"mass_kg", def->mass_kg, 1e-3, 100},
-               {"damping_n_s_m", def->damping_n_s_m, 0, 1e4},
-               {"stiffness_n_m", def->stiffness_n_m, 0, 1e5},
-               {"delay_s", def->delay_s, 0, 1},
-               {"tremor_m", def->tremor_m, 0, 0.1},
-               {"tremor_hz", def->tremor_hz, 0, 100},
-               {"resolution_m", def->resolution_m, 0, 0.01},
-               {"force_limit_n", def->force_limit_n, 0, 1e4},
-               {"latency_ticks", def->latency_ticks, 0, SONDE_HAND_LATENCY},
-               {"a tick, s,", dt_s, 1e-5, 0.1}};
-  for (size_t i = 0; i < SONDE_COUNT_OF(range); ++i)
-    if (!(range[i].value >= range[i].low && range[i].value <= range[i].high))
-      return sonde_fail(error, SONDE_ARGUMENT, "hand: %s is %g, expected %g to %g", range[i].name,
-                        range[i].value, range[i].low, range[i].high);
-  return SONDE_OK;
-}
+#define RANGE(member, low, high)                                                                   \
+  { #member, offsetof(sonde_hand_def, member), low, high }
+static const sonde_range RANGES[] = {RANGE(mass_kg, 1e-3, 100),    RANGE(damping_n_s_m, 0, 1e4),
+                                     RANGE(stiffness_n_m, 0, 1e5), RANGE(delay_s, 0, 1),
+                                     RANGE(tremor_m, 0, 0.1),      RANGE(tremor_hz, 0, 100),
+                                     RANGE(resolution_m, 0, 0.01), RANGE(force_limit_n, 0, 1e4)};
 
 typedef struct square {
   double m[3][3];
@@ -82,22 +67,6 @@ static square exponential(square a) {
   return sum;
 }
 
-// (x, v h, load)' h = ((0 1 0) (-k h^2/m -b h/m h^2/m) (0 0 0)) (x, v h, load); with v h the
-// entries are balanced, so that little is lost in the squarings.
-static void discretise(sonde_hand *hand) {
-  const sonde_hand_def *def = &hand->def;
-  double m = def->mass_kg, h = hand->dt_s;
-  square rate = {
-      {{0, 1, 0}, {-def->stiffness_n_m * h * h / m, -def->damping_n_s_m * h / m, h * h / m}}};
-  square step = exponential(rate);
-  hand->a[0][0] = step.m[0][0];
-  hand->a[0][1] = step.m[0][1] * h;
-  hand->a[1][0] = step.m[1][0] / h;
-  hand->a[1][1] = step.m[1][1];
-  hand->b[0] = step.m[0][2];
-  hand->b[1] = step.m[1][2] / h;
-}
-
 static void destroy(void *self) {
   sonde_hand *hand = self;
   if (!hand) return;
@@ -110,8 +79,13 @@ sonde_status sonde_device_hand(const sonde_hand_def *def, const sonde_script_key
                                sonde_error *error) {
   SONDE_ASSERT(def != NULL && device != NULL);
   *device = (sonde_device){0};
-  sonde_status status = check(def, dt_s, error);
+  sonde_status status = sonde_ranges_check("hand", def, RANGES, SONDE_COUNT_OF(RANGES), error);
   if (status) return status;
+  if (def->latency_ticks > SONDE_HAND_LATENCY)
+    return sonde_fail(error, SONDE_ARGUMENT, "hand: latency_ticks is %u, expected 0 to %d",
+                      def->latency_ticks, SONDE_HAND_LATENCY);
+  if (!(dt_s >= 1e-5 && dt_s <= 0.1))
+    return sonde_fail(error, SONDE_ARGUMENT, "hand: a tick, s, is %g, expected 1e-5 to 0.1", dt_s);
   sonde_hand *hand = SONDE_NEW(sonde_hand, 1);
   if (!hand) return sonde_fail_memory(error);
   status = sonde_device_script(keys, count, dt_s, &hand->goal, error);
@@ -126,7 +100,18 @@ sonde_status sonde_device_hand(const sonde_hand_def *def, const sonde_script_key
   hand->rotation = q_unit(keys[0].world_from_probe.rotation);
   for (uint64_t i = 0; i < 3; ++i)
     hand->phase_rad[i] = 2.0 * SONDE_PI * sonde_random_uniform(def->seed, i);
-  discretise(hand);
+  // (x, v h, load)' h = ((0 1 0) (-k h^2/m -b h/m h^2/m) (0 0 0)) (x, v h, load) is integrated
+  // exactly; with v h the entries are balanced, so that little is lost in the squarings.
+  double m = def->mass_kg, h = dt_s;
+  square rate = {
+      {{0, 1, 0}, {-def->stiffness_n_m * h * h / m, -def->damping_n_s_m * h / m, h * h / m}}};
+  square step = exponential(rate);
+  hand->a[0][0] = step.m[0][0];
+  hand->a[0][1] = step.m[0][1] * h;
+  hand->a[1][0] = step.m[1][0] / h;
+  hand->a[1][1] = step.m[1][1];
+  hand->b[0] = step.m[0][2];
+  hand->b[1] = step.m[1][2] / h;
   *device = (sonde_device){"hand", hand, sonde_hand_read, sonde_hand_write, destroy};
   return SONDE_OK;
 }

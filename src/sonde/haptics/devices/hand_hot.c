@@ -1,7 +1,4 @@
 // The simulated operator: one tick.
-// tremor:   a sum of two sines per axis, incommensurable, so that it never repeats.
-// advance:  the exact step of the arm under the force that acted over the last tick.
-// reported: the position rounded to the encoder's resolution.
 #include "haptics/devices/hand.h"
 
 #include "base/base.h"
@@ -12,18 +9,6 @@ static double tremor(const sonde_hand *hand, int axis, double time_s) {
   return hand->def.tremor_m * (0.7 * sin(w * time_s + p) + 0.3 * sin(1.618 * w * time_s + 2.0 * p));
 }
 
-static void advance(sonde_hand *hand) {
-  double k = hand->def.stiffness_n_m;
-  double *x = &hand->x_m.x, *v = &hand->v_m_s.x;
-  const double *f = &hand->queue_n[0].x, *goal = &hand->load_m.x;
-  for (int i = 0; i < 3; ++i) {
-    double load = f[i] + k * goal[i], x0 = x[i], v0 = v[i];
-    x[i] = hand->a[0][0] * x0 + hand->a[0][1] * v0 + hand->b[0] * load;
-    v[i] = hand->a[1][0] * x0 + hand->a[1][1] * v0 + hand->b[1] * load;
-  }
-  for (uint32_t i = 0; i < hand->def.latency_ticks; ++i) hand->queue_n[i] = hand->queue_n[i + 1];
-}
-
 static double reported(double x_m, double resolution_m) {
   return resolution_m > 0.0 ? resolution_m * floor(x_m / resolution_m + 0.5) : x_m;
 }
@@ -32,7 +17,18 @@ static double reported(double x_m, double resolution_m) {
 void sonde_hand_read(void *self, uint64_t tick, sonde_device_sample *sample) {
   sonde_hand *hand = self;
   SONDE_ASSERT(hand->def.mass_kg > 0.0);
-  if (tick > 0) advance(hand);
+  if (tick > 0) {
+    // The arm makes its exact step under the force that acted over the last tick.
+    double k = hand->def.stiffness_n_m;
+    double *x = &hand->x_m.x, *v = &hand->v_m_s.x;
+    const double *f = &hand->queue_n[0].x, *held = &hand->load_m.x;
+    for (int i = 0; i < 3; ++i) {
+      double load = f[i] + k * held[i], x0 = x[i], v0 = v[i];
+      x[i] = hand->a[0][0] * x0 + hand->a[0][1] * v0 + hand->b[0] * load;
+      v[i] = hand->a[1][0] * x0 + hand->a[1][1] * v0 + hand->b[1] * load;
+    }
+    for (uint32_t i = 0; i < hand->def.latency_ticks; ++i) hand->queue_n[i] = hand->queue_n[i + 1];
+  }
   sonde_device_sample goal;
   uint64_t late = tick > hand->delay_ticks ? tick - hand->delay_ticks : 0;
   hand->goal.read(hand->goal.self, late, &goal);

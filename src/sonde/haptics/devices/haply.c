@@ -1,8 +1,5 @@
 // Haply Inverse3 through the service of its maker: JSON over WebSocket on this machine. One state
 // comes back for every command; a command that is not repeated is forgotten by the service.
-// bind:        the connection to the service.
-// read_vector: three numbers of an object.
-// read_state:  what a message says about the device.
 #include "haptics/devices/pump.h"
 
 #include "base/base.h"
@@ -38,25 +35,6 @@ static bool read_vector(const sonde_json *object, const char *name, sonde_vec3 *
   return v_finite(*v);
 }
 
-// The grip is optional: without it the last rotation stays.
-static void read_grip(haply *h, const sonde_json *root, sonde_device_sample *sample) {
-  static const char *const kinds[] = {"wireless_verse_grip", "verse_grip"};
-  static const char *const buttons[] = {"a", "b", "c"};
-  for (size_t k = 0; k < SONDE_COUNT_OF(kinds); ++k) {
-    const sonde_json *grip = sonde_json_first(sonde_json_member(root, kinds[k]));
-    const sonde_json *state = sonde_json_member(grip, "state");
-    sonde_vec3 v;
-    double w =
-        sonde_json_as_number(sonde_json_member(sonde_json_member(state, "orientation"), "w"));
-    if (isfinite(w) && read_vector(state, "orientation", &v))
-      h->rotation = q_unit((sonde_quat){w, v.x, v.y, v.z});
-    const sonde_json *pressed = sonde_json_member(state, "buttons");
-    for (size_t b = 0; b < SONDE_COUNT_OF(buttons); ++b)
-      if (sonde_json_kind_of(sonde_json_member(pressed, buttons[b])) == SONDE_JSON_TRUE)
-        sample->buttons |= 1u << b;
-  }
-}
-
 // Torn or foreign messages are dropped: silence, not nonsense, decides that a device is lost.
 static bool read_state(haply *h, sonde_device_sample *sample) {
   sonde_json *root = NULL;
@@ -70,7 +48,22 @@ static bool read_state(haply *h, sonde_device_sample *sample) {
   if (known) {
     sample->world_from_probe.position = position;
     snprintf(h->device, sizeof h->device, "%s", id);
-    read_grip(h, root, sample);
+    // The grip is optional: without it the last rotation stays.
+    static const char *const kinds[] = {"wireless_verse_grip", "verse_grip"};
+    static const char *const buttons[] = {"a", "b", "c"};
+    for (size_t k = 0; k < SONDE_COUNT_OF(kinds); ++k) {
+      const sonde_json *grip = sonde_json_first(sonde_json_member(root, kinds[k]));
+      const sonde_json *held = sonde_json_member(grip, "state");
+      sonde_vec3 v;
+      double w =
+          sonde_json_as_number(sonde_json_member(sonde_json_member(held, "orientation"), "w"));
+      if (isfinite(w) && read_vector(held, "orientation", &v))
+        h->rotation = q_unit((sonde_quat){w, v.x, v.y, v.z});
+      const sonde_json *pressed = sonde_json_member(held, "buttons");
+      for (size_t b = 0; b < SONDE_COUNT_OF(buttons); ++b)
+        if (sonde_json_kind_of(sonde_json_member(pressed, buttons[b])) == SONDE_JSON_TRUE)
+          sample->buttons |= 1u << b;
+    }
     sample->world_from_probe.rotation = h->rotation;
   }
   sonde_json_free(root);

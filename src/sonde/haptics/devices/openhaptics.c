@@ -1,5 +1,4 @@
 // 3D Systems devices through libHD, opened at run time. Millimetres and newtons there.
-// frame:    runs inside the vendor's scheduler: force out, pose and buttons in.
 #include "haptics/devices/pump.h"
 
 #include "base/base.h"

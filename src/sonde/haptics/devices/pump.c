@@ -1,11 +1,4 @@
 // What all hardware drivers share: opening, the thread, the list.
-// clean:        a definition with its defaults.
-// turn:         one exchange with the vendor behind the gate.
-// bring_up:     library or service, then the device.
-// reopen:       after a loss, a few times a second.
-// thread_main:  the driver's thread.
-// find_driver:  by name.
-// describe:     one line of the list.
 #include "haptics/devices/devices.h"
 #include "haptics/devices/pump.h"
 
@@ -67,12 +60,6 @@ static sonde_device_open_def clean(const sonde_device_open_def *def) {
   return c;
 }
 
-static void publish_loss(sonde_pump *pump) {
-  sonde_device_sample *slot = sonde_mailbox_write_slot(pump->samples);
-  *slot = (sonde_device_sample){{vec3(0, 0, 0), quat_identity()}, 0, false};
-  sonde_mailbox_publish(pump->samples);
-}
-
 static void lose(sonde_pump *pump) {
   pump->driver->close(pump->vendor);
   atomic_store(&pump->connected, false);
@@ -80,7 +67,9 @@ static void lose(sonde_pump *pump) {
   // whatever comes back starts from no force
   sonde_safety_limits limits = pump->gate.limits;
   sonde_gate_init(&pump->gate, &limits);
-  publish_loss(pump);
+  sonde_device_sample *slot = sonde_mailbox_write_slot(pump->samples);
+  *slot = (sonde_device_sample){{vec3(0, 0, 0), quat_identity()}, 0, false};
+  sonde_mailbox_publish(pump->samples);
 }
 
 static void turn(sonde_pump *pump) {
@@ -111,11 +100,6 @@ static sonde_status bring_up(const sonde_driver *driver, void *vendor,
   return status;
 }
 
-static void reopen(sonde_pump *pump) {
-  if (bring_up(pump->driver, pump->vendor, &pump->def, NULL) == SONDE_OK)
-    atomic_store(&pump->connected, true);
-}
-
 static void *thread_main(void *self) {
   sonde_pump *pump = self;
   struct sched_param param = {.sched_priority = 41}; // when allowed, just above the tick
@@ -126,7 +110,8 @@ static void *thread_main(void *self) {
       turn(pump);
       retry_s = sonde_clock_now() + reopen_s;
     } else if (sonde_clock_now() >= retry_s) {
-      reopen(pump);
+      if (bring_up(pump->driver, pump->vendor, &pump->def, NULL) == SONDE_OK)
+        atomic_store(&pump->connected, true);
       retry_s = sonde_clock_now() + reopen_s;
     }
     due_s = fmax(due_s + period_s, sonde_clock_now()); // no burst after a stall
@@ -221,27 +206,26 @@ sonde_device_link sonde_device_link_of(const sonde_device *device) {
                              .connected = atomic_load(&pump->connected)};
 }
 
-static void describe(const sonde_driver *driver, bool probe, sonde_device_info *info) {
-  *info = (sonde_device_info){driver->name, driver->description, false, ""};
-  sonde_device_open_def def = clean(NULL);
-  sonde_error error = {0};
-  void *vendor = sonde_calloc(1, driver->bytes);
-  sonde_status status = vendor ? SONDE_OK : sonde_fail_memory(&error);
-  if (!status)
-    status = probe ? bring_up(driver, vendor, &def, &error) : driver->bind(vendor, &def, &error);
-  if (vendor) driver->close(vendor);
-  sonde_free(vendor);
-  info->available = !status;
-  const char *found = probe ? "the device answered" : "found; --probe opens the device";
-  snprintf(info->reason, sizeof info->reason, "%.159s", status ? error.message : found);
-}
-
 uint32_t sonde_devices_find(bool probe, sonde_device_info *info, uint32_t capacity) {
   SONDE_ASSERT(info != NULL);
   uint32_t builtin = 0, count = 0;
   const sonde_device_info *first = sonde_devices(&builtin);
   for (uint32_t i = 0; i < builtin && count < capacity; ++i) info[count++] = first[i];
-  for (size_t i = 0; i < SONDE_COUNT_OF(drivers) && count < capacity; ++i)
-    describe(drivers[i], probe, &info[count++]);
+  for (size_t i = 0; i < SONDE_COUNT_OF(drivers) && count < capacity; ++i) {
+    const sonde_driver *driver = drivers[i];
+    sonde_device_info *line = &info[count++];
+    *line = (sonde_device_info){driver->name, driver->description, false, ""};
+    sonde_device_open_def def = clean(NULL);
+    sonde_error error = {0};
+    void *vendor = sonde_calloc(1, driver->bytes);
+    sonde_status status = vendor ? SONDE_OK : sonde_fail_memory(&error);
+    if (!status)
+      status = probe ? bring_up(driver, vendor, &def, &error) : driver->bind(vendor, &def, &error);
+    if (vendor) driver->close(vendor);
+    sonde_free(vendor);
+    line->available = !status;
+    const char *found = probe ? "the device answered" : "found; --probe opens the device";
+    snprintf(line->reason, sizeof line->reason, "%.159s", status ? error.message : found);
+  }
   return count;
 }

@@ -1,7 +1,4 @@
 // The device that follows keys: creation.
-// check:  finite poses, strictly ascending times.
-// slope:  slope of the monotone cubic at a knot in one coordinate.
-// slopes: slopes of all knots.
 #include "haptics/devices/devices.h"
 
 #include "haptics/motion.h"
@@ -40,16 +37,6 @@ static double slope(double secant_l, double secant_r, double width_l, double wid
   return (weight_l + weight_r) / (weight_l / secant_l + weight_r / secant_r);
 }
 
-static void slopes(sonde_script_knot *knots, uint32_t count) {
-  for (uint32_t i = 1; i + 1 < count; ++i) {
-    double l = knots[i].time_s - knots[i - 1].time_s, r = knots[i + 1].time_s - knots[i].time_s;
-    SONDE_ASSERT(l > 0.0 && r > 0.0);
-    sonde_vec3 a = v_scale(v_sub(knots[i].pose.position, knots[i - 1].pose.position), 1.0 / l);
-    sonde_vec3 b = v_scale(v_sub(knots[i + 1].pose.position, knots[i].pose.position), 1.0 / r);
-    knots[i].slope_m_s = vec3(slope(a.x, b.x, l, r), slope(a.y, b.y, l, r), slope(a.z, b.z, l, r));
-  }
-}
-
 sonde_status sonde_device_script(const sonde_script_key *keys, uint32_t count, double dt_s,
                                  sonde_device *device, sonde_error *error) {
   SONDE_ASSERT(device != NULL);
@@ -69,7 +56,14 @@ sonde_status sonde_device_script(const sonde_script_key *keys, uint32_t count, d
     script->knots[i].time_s = keys[i].time_s;
     script->knots[i].pose = (sonde_pose){pose.position, q_unit(pose.rotation)};
   }
-  slopes(script->knots, count);
+  for (uint32_t i = 1; i + 1 < count; ++i) {
+    sonde_script_knot *knot = &script->knots[i];
+    double l = knot->time_s - knot[-1].time_s, r = knot[1].time_s - knot->time_s;
+    SONDE_ASSERT(l > 0.0 && r > 0.0);
+    sonde_vec3 a = v_scale(v_sub(knot->pose.position, knot[-1].pose.position), 1.0 / l);
+    sonde_vec3 b = v_scale(v_sub(knot[1].pose.position, knot->pose.position), 1.0 / r);
+    knot->slope_m_s = vec3(slope(a.x, b.x, l, r), slope(a.y, b.y, l, r), slope(a.z, b.z, l, r));
+  }
   *device =
       (sonde_device){"script", script, sonde_script_read, sonde_device_write_nothing, destroy};
   return SONDE_OK;

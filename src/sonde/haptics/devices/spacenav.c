@@ -52,15 +52,6 @@ static sonde_status open_device(void *self, const sonde_device_open_def *def, so
   return SONDE_OK;
 }
 
-static void take(spacenav *nav, const spnav_event *event) {
-  if (event->type == SPNAV_MOTION)
-    for (int i = 0; i < 6; ++i) nav->axis[i] = event->motion.axis[i] / 350.0; // its full deflection
-  if (event->type == SPNAV_BUTTON && event->button.number >= 0 && event->button.number < 32) {
-    uint32_t bit = 1u << event->button.number;
-    nav->buttons = event->button.press ? nav->buttons | bit : nav->buttons & ~bit;
-  }
-}
-
 static int exchange(void *self, sonde_vec3 force_n, sonde_vec3 torque_n_m,
                     sonde_device_sample *sample) {
   spacenav *nav = self;
@@ -68,7 +59,14 @@ static int exchange(void *self, sonde_vec3 force_n, sonde_vec3 torque_n_m,
   (void)torque_n_m;
   SONDE_ASSERT(nav->opened);
   spnav_event event = {0};
-  for (int i = 0; i < 64 && nav->poll(&event) > 0; ++i) take(nav, &event);
+  for (int polls = 0; polls < 64 && nav->poll(&event) > 0; ++polls) {
+    for (int i = 0; i < 6 && event.type == SPNAV_MOTION; ++i)
+      nav->axis[i] = event.motion.axis[i] / 350.0; // its full deflection
+    if (event.type == SPNAV_BUTTON && event.button.number >= 0 && event.button.number < 32) {
+      uint32_t bit = 1u << event.button.number;
+      nav->buttons = event.button.press ? nav->buttons | bit : nav->buttons & ~bit;
+    }
+  }
   if (nav->fd() < 0) return -1; // the daemon has gone
   sonde_steer(&nav->pose, nav->axis, 1e-3);
   sample->world_from_probe = nav->pose;

@@ -1,9 +1,4 @@
 // A WebSocket client for a service on this machine.
-// connect_to: TCP connection with a deadline.
-// shake:      HTTP upgrade.
-// send_frame: one masked frame, whole or not at all.
-// fill:       what has arrived.
-// take_frame: the first whole frame of the buffer.
 #include "haptics/devices/websocket.h"
 
 #include "base/base.h"
