@@ -1,12 +1,13 @@
-// Reads a surface in millimetres and says what it is.  usage: sample_load_mesh FILE
+// Reads a surface in millimetres, says what it is and may write it again in metres.
+// usage: sample_load_mesh FILE [COPY]
 #include "sonde/sonde.h"
 
 #include <math.h>
 #include <stdio.h>
 
 int main(int argc, char **argv) {
-  if (argc != 2) {
-    fprintf(stderr, "usage: %s FILE.ply|.obj|.stl\n", argv[0]);
+  if (argc != 2 && argc != 3) {
+    fprintf(stderr, "usage: %s FILE.ply|.obj|.stl [COPY.ply]\n", argv[0]);
     return 2;
   }
   sonde_error error;
@@ -29,6 +30,7 @@ int main(int argc, char **argv) {
     status = sonde_mesh_mass(&mesh, 1000.0, &mass, &error);
     if (status == SONDE_OK) printf("filled with water: %.3f kg\n", mass.mass_kg);
   }
+  if (status == SONDE_OK && argc == 3) status = sonde_mesh_save(argv[2], 1.0, &mesh, &error);
   if (status != SONDE_OK) fprintf(stderr, "%s\n", error.message);
   sonde_mesh_clear(&mesh);
   return status == SONDE_OK ? 0 : 1;
