@@ -94,6 +94,13 @@ read -r _ total once < <(tail -1 "$list")
 echo "$once of $total static functions have a single use"
 ((once * 100 <= MOST_SINGLE * total)) || fail "$once of $total static functions have a single use, expected $MOST_SINGLE % or fewer"
 
+for room in "$root"/src/*/*/ "$root/app/"; do
+  mapfile -t inside < <(find "$room" -name '*.c')
+  ((${#inside[@]} > 0)) || continue
+  single "${inside[@]}" | awk -v room="${room#"$root"/}" '
+    END { if ($2) printf "%s: %d of %d static functions (%d %%) have a single use\n", room, $3, $2, 100 * $3 / $2 }'
+done
+
 # The comment at the head of a file says what the file does; a table of its functions is no help.
 for file in "${bodies[@]}"; do
   head=$(awk '!/^\/\// && !/^ ?\*/ && !/^\/\*/ { exit } { n++ } END { print n + 0 }' "$file")
