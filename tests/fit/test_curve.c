@@ -122,7 +122,7 @@ static void bundled_curves_meet_two_percent(void **state) {
   print_message("stage 1 MAE: linear %.2f %%, point %.2f %%, pooled %.2f %% (%g rows)\n", linear,
                 point, pooled, rows[0] + rows[1]);
   assert_true(pooled <= 2.0);
-  assert_true(linear <= 1.0 && point <= 5.0);
+  assert_true(linear <= 0.9 && point <= 5.0);
   sonde_measurements_clear(&m);
 }
 

@@ -300,7 +300,7 @@ static void noisy_data_are_fitted(void **state) {
   sonde_fit_result r;
   assert_ok(sonde_fit(b.model, &b.sites, &b.m, &def, NULL, &r, NULL), NULL);
   print_message("noisy stage 1: %.3f N, %.2f %%\n", r.stage1.all.mae_n, r.stage1.all.mae_percent);
-  assert_true(r.stage1.all.mae_percent <= 4.0);
+  assert_true(r.stage1.all.mae_percent <= 2.7); // measured 2.15
   assert_int_equal(r.stage2.all.count, 0);
   assert_near(r.law.edge_stiffness_n_m, b.model->law.edge_stiffness_n_m, 0);
   sonde_fit_result_clear(&r);

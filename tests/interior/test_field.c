@@ -104,7 +104,7 @@ static void the_field_keeps_volume(void **state) {
   update(in, p, t.model.surface.vertex_count);
   double local = divergence(in, 0.08);
   print_message("divergence over strain, rms: %.4f\n", local);
-  assert_true(local < 0.03);
+  assert_true(local < 0.0145); // measured 0.0111
   // Volume of a box below the dent: flux of the displacement through its sides.
   double box[3] = {0.02, 0.02, 0.02}, h = 5e-4, net = 0, gross = 0;
   sonde_vec3 c = vec3(0.004, 0.05, 0.147);
@@ -119,7 +119,7 @@ static void the_field_keeps_volume(void **state) {
           net += f, gross += fabs(f);
         }
   print_message("box: net flux over gross %.5f\n", net / gross);
-  assert_true(fabs(net / gross) < 0.005);
+  assert_true(fabs(net / gross) < 0.00095); // measured 0.00073
   sonde_free(p);
   sonde_interior_destroy(in);
   tube_clear(&t);
@@ -348,8 +348,8 @@ static void finite_element_fields(void **state) {
   print_message("image plane: solid %.3f (worst %.3f), columns %.3f of the penetration; moving "
                 "nodes: %.3f and %.3f of the motion\n",
                 plane[0], worst, plane[1], all[0] / move, all[1] / move);
-  assert_true(worst < 0.08);
-  assert_true(all[1] / move < 0.45);
+  assert_true(worst < 0.076);                                // measured 0.059
+  assert_true(all[0] / move < 0.29 && all[1] / move < 0.45); // measured 0.224, 0.392
   sonde_free(nodes);
 }
 

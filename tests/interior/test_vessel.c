@@ -106,7 +106,7 @@ static void areas_follow_the_finite_element_study(void **state) {
                 vein, thrombus, artery);
   assert_true(used > 40 && clots > 20);
   assert_true(vein < 0.09);
-  assert_true(thrombus < 0.015);
+  assert_true(thrombus < 0.004); // measured 0.003
   assert_true(artery < 0.03);
 }
 
@@ -120,7 +120,7 @@ static void closure_at_the_nominal_load(void **state) {
   assert_true(at8 > 0.2 && at8 < 0.6 && at16 > 0.2 && at16 < 0.6 && at20 < 0.1);
   assert_true(sonde_vein_area_ratio(&chronic, nominal_outside(20, 0.018, 0)) > 0.7);
   assert_true(sonde_artery_area_ratio(&healthy, nominal_outside(20, 0.018, 11e-3)) > 0.65);
-  // The artery barely notices what half closes the vein (acceptance row 51).
+  // The artery barely notices what half closes the vein.
   assert_true(sonde_artery_area_ratio(&healthy, nominal_outside(8, 0.018, 11e-3)) > 0.9);
 }
 

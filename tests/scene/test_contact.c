@@ -30,8 +30,8 @@ static void total(const world *w, sonde_vec3 *momentum, sonde_vec3 *angular, dou
   }
 }
 
-// Rows 36, 37: nothing while apart; over several steps; forces and torques are equal and opposite;
-// with lambda = 1/2 angular momentum stays as well.
+// Eq. (2) pushes nothing while bodies are apart, lasts for several steps, and forces and torques
+// are equal and opposite; with lambda = 1/2 angular momentum stays as well.
 static void clash(const char *law, double lambda, double angular_tolerance) {
   char text[2048];
   snprintf(text, sizeof text, "%scontacts:\n- {between: [ball, brick], %s}\n", CLASH, law);
@@ -319,7 +319,7 @@ static const char DEMO[] =
     "  {time_s: 0.1, position_mm: [0, 25, -4], rotation: {axis: [1, 0, 0], angle_deg: 180}},\n"
     "  {time_s: 0.2, position_mm: [0, 20, -4], rotation: {axis: [1, 0, 0], angle_deg: 180}}]}\n";
 
-// Rows 25 and 7 of determinism: four kinds in one scene, run twice and through a snapshot.
+// Four kinds of bodies in one scene, run twice and through a snapshot.
 static void test_four_kinds(void **unused) {
   (void)unused;
   char path[] = "/tmp/sonde_scene_XXXXXX";

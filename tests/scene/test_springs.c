@@ -34,7 +34,7 @@ static void pull(world *w, double way_m) {
   sonde_scene_set_nodes(w->state, 0, x, NULL);
 }
 
-// Frequency and decay of m x'' + 1.5 c x' + 1.5 k x = 0 (row 30).
+// Frequency and decay of m x'' + 1.5 c x' + 1.5 k x = 0.
 static void test_frequency_and_decay(void **unused) {
   (void)unused;
   world w = oscillator();
@@ -202,7 +202,8 @@ static double shaken_error(double dt_s, double lambda, uint32_t newton, sonde_ve
   return sqrt(sum);
 }
 
-// Row 39: order 1 for lambda = 1 (also with one Newton iteration, eq. (4)), order 2 for 1/2.
+// The step converges with order 1 for lambda = 1 (also with one Newton iteration, eq. (4)), order 2
+// for 1/2.
 static void test_order_of_convergence(void **unused) {
   (void)unused;
   sonde_vec3 exact[400], end[400];
@@ -214,7 +215,7 @@ static void test_order_of_convergence(void **unused) {
   assert_near(log2(coarse / fine), 2, 0.15);
 }
 
-// Row 43: conjugate gradients against Gaussian elimination on the matrix of a scene in contact.
+// Conjugate gradients agree with Gaussian elimination on the matrix of a scene in contact.
 static void multiply_dense(const sonde_scene_state *state, const sonde_active_set *active,
                            uint32_t column, double *out) {
   uint32_t n = state->scene->slot_count;
