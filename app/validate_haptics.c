@@ -382,7 +382,8 @@ static void gel_effects(const work *w, sonde_gel *gel, sonde_pose pose, double *
 // Pressed with 1 ml; wiped off while held. Both effects have to change in the tick of the wipe.
 static sonde_status gel_film(work *w) {
   sonde_gel *gel = NULL;
-  sonde_status status = sonde_gel_create(w->model, NULL, &gel, w->error);
+  sonde_gel_def def = sonde_gel_def_default();
+  sonde_status status = sonde_gel_create(w->model, &def, &gel, w->error);
   if (status) return status;
   sonde_state_reset(w->state);
   sonde_gel_put(gel, w->site->position_m, 0.03, 1e-6);

@@ -96,8 +96,6 @@ SONDE_API void sonde_json_put_real(sonde_json_out *out, const char *key, double 
 SONDE_API void sonde_json_put_integer(sonde_json_out *out, const char *key, int64_t value);
 /** @thread owner */
 SONDE_API void sonde_json_put_bool(sonde_json_out *out, const char *key, bool value);
-/** @thread owner */
-SONDE_API void sonde_json_put_null(sonde_json_out *out, const char *key);
 
 #ifdef __cplusplus
 }

@@ -38,9 +38,6 @@ typedef struct sonde_device_info {
   char reason[160]; /**< one sentence: why it is or is not available */
 } sonde_device_info;
 
-/** Lists the known families. @param count receives their number @thread owner */
-SONDE_API const sonde_device_info *sonde_devices(uint32_t *count);
-
 /** Stands still at a pose.
  *  @param[out] device filled; release with device->destroy(device->self) unless a session took it
  *  @return SONDE_ARGUMENT for a pose that is not finite @thread owner */

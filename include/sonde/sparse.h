@@ -48,10 +48,6 @@ typedef struct sonde_rank_one {
   const sonde_vec3 *g;
 } sonde_rank_one;
 
-/** y = A x over the active rows. @thread tick */
-SONDE_API void sonde_block_multiply(const sonde_block_matrix *matrix,
-                                    const sonde_active_set *active, const sonde_rank_one *terms,
-                                    uint32_t term_count, const sonde_vec3 *x, sonde_vec3 *y);
 /** Inverts the diagonal blocks (the block-Jacobi preconditioner). @thread tick */
 SONDE_API void sonde_block_invert_diagonal(sonde_block_matrix *matrix,
                                            const sonde_active_set *active);
@@ -85,29 +81,6 @@ SONDE_API sonde_pcg_result sonde_pcg_solve(const sonde_block_matrix *matrix,
                                            const sonde_vec3 *b, sonde_vec3 *x,
                                            const sonde_pcg_scratch *scratch,
                                            const sonde_pcg_options *options);
-
-/** Sparse LDL^T of a symmetric positive definite scalar matrix, factored once. */
-typedef struct sonde_ldl sonde_ldl;
-
-/**
- * Orders (nested dissection by `points`, without them breadth-first levels reversed), analyses and
- * factors. The matrix is given by its full pattern in CSR with ascending columns.
- * @param points [n] positions for the ordering, or NULL
- * @return SONDE_CONVERGENCE when a pivot is not positive
- * @thread owner
- */
-SONDE_API sonde_status sonde_ldl_create(uint32_t n, const uint32_t *row_start,
-                                        const uint32_t *column, const double *value,
-                                        const sonde_vec3 *points, sonde_ldl **ldl,
-                                        sonde_error *error);
-/** Numbers again on the same pattern. @thread owner */
-SONDE_API sonde_status sonde_ldl_refactor(sonde_ldl *ldl, const double *value, sonde_error *error);
-/** Solves in place, `columns` right-hand sides interleaved x[row*columns + c]. @thread tick */
-SONDE_API void sonde_ldl_solve(const sonde_ldl *ldl, uint32_t columns, double *x, double *scratch);
-/** Doubles needed as scratch by a solve. @thread any */
-SONDE_API size_t sonde_ldl_scratch(const sonde_ldl *ldl, uint32_t columns);
-SONDE_API size_t sonde_ldl_nonzeros(const sonde_ldl *ldl); /**< @thread any */
-SONDE_API void sonde_ldl_destroy(sonde_ldl *ldl);          /**< @thread owner */
 
 #ifdef __cplusplus
 }

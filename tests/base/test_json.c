@@ -166,7 +166,7 @@ static void write_both(uint64_t *r, sonde_json_out *out, const char *key, cJSON 
   uint64_t kind = next(r) % (depth < 4 ? 7 : 5);
   double number = random_number(r);
   switch (kind) {
-  case 0: sonde_json_put_null(out, key), item = cJSON_CreateNull(); break;
+  case 0: sonde_json_put_real(out, key, NAN, 0), item = cJSON_CreateNull(); break;
   case 1: sonde_json_put_bool(out, key, number > 0), item = cJSON_CreateBool(number > 0); break;
   case 2:
     sonde_json_put_text(out, key, random_text(r, text)), item = cJSON_CreateString(text);

@@ -2,7 +2,7 @@
 #include "test.h"
 
 #include "haptics/motion.h"
-#include "sonde/haptics.h"
+#include "sonde/haptics_devices.h"
 
 #include <pthread.h>
 
@@ -17,10 +17,10 @@ static sonde_device_sample read_at(sonde_device *device, uint64_t tick) {
 static void families_have_sentences(void **state) {
   (void)state;
   static const char *const expected[] = {"null", "hand", "script", "replay", "page"};
-  uint32_t count = 0;
-  const sonde_device_info *info = sonde_devices(&count);
-  assert_int_equal(count, SONDE_COUNT_OF(expected));
-  for (uint32_t i = 0; i < count; ++i) {
+  sonde_device_info info[SONDE_COUNT_OF(expected)];
+  assert_int_equal(sonde_devices_find(false, info, SONDE_COUNT_OF(expected)),
+                   SONDE_COUNT_OF(expected));
+  for (uint32_t i = 0; i < SONDE_COUNT_OF(expected); ++i) {
     assert_string_equal(info[i].name, expected[i]);
     assert_true(info[i].available);
     assert_true(strlen(info[i].reason) > 10 && strlen(info[i].description) > 10);

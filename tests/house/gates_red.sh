@@ -47,7 +47,7 @@ expect() { # green|red WHAT COMMAND...
 includes=("$house/includes.sh" "$tree") rooms=("$house/rooms.sh" "$tree")
 sizes=("$house/sizes.sh" "$tree")
 hot=("$house/hot_symbols.sh" "$tree" "$tree/build" "$objdump")
-api=("$house/api.sh" "$tree" "$nm" "$tree/lib.so" "$tree/user.so") disk=("$house/disk.sh" "$tree")
+api=("$house/api.sh" "$tree" "$nm" "$tree/lib.so" "$tree/user.so" -- "$tree/app") disk=("$house/disk.sh" "$tree")
 format=("$house/format.sh" "$tree")
 callers=("$house/callers.sh" "$tree")
 cp "$house/../../.clang-format" "$tree"
@@ -176,6 +176,25 @@ fresh; library 'int sonde_one(int a) { return a; }'
 library 'int sonde_one(int); int sonde_user(int a) { return sonde_one(a); }' user
 echo 'SONDE_API int sonde_user(int a);' >>"$tree/include/sonde/base.h"
 expect green "library that keeps to its headers" "${api[@]}"
+library 'int sonde_user(int a) { return a; }' user
+expect red "public function that nobody calls" "${api[@]}"
+echo 'int sonde_one(int); int main(void) { return sonde_one(1); }' | "$cc" -x c -c -o "$tree/app/main.o" -
+expect green "public function that a program calls" "${api[@]}"
+cp "$tree/include/sonde/base.h" "$tree/base.h"
+many=$(for i in {2..201}; do echo "int sonde_n$i(int);"; done)
+sed 's/^/SONDE_API /' <<<"$many" >>"$tree/include/sonde/base.h"
+{ echo 'int sonde_one(int a) { return a; }'; sed 's/(int)/(int a)/; s/;$/ { return a; }/' <<<"$many"; } |
+  "$cc" -x c -shared -fPIC -nostdlib -o "$tree/lib.so" -
+{ echo "$many"; echo 'int sonde_one(int); int main(void) { return sonde_one(1)'; sed 's/int \(.*\)(int);/+ \1(1)/' <<<"$many"; echo '; }'; } |
+  "$cc" -x c -c -o "$tree/app/main.o" -
+expect red "library of 201 public functions" "${api[@]}"
+sed -i '/sonde_n201/d' "$tree/include/sonde/base.h"
+{ echo 'int sonde_one(int a) { return a; }'; grep -v n201 <<<"$many" | sed 's/(int)/(int a)/; s/;$/ { return a; }/'; } |
+  "$cc" -x c -shared -fPIC -nostdlib -o "$tree/lib.so" -
+expect green "library of 200 public functions" "${api[@]}"
+mv "$tree/base.h" "$tree/include/sonde/base.h"; rm "$tree/app/main.o"
+library 'int sonde_one(int a) { return a; }'
+library 'int sonde_one(int); int sonde_user(int a) { return sonde_one(a); }' user
 library 'int sonde_one(int a) { return a; } int helper(int a) { return a; }'
 expect red "library that exports more" "${api[@]}"
 library 'int sonde_other(int a) { return a; }'

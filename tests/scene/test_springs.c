@@ -2,6 +2,7 @@
 // direct solution, the half space.
 #include "scene/state.h"
 #include "scene_fixture.h"
+#include "sparse/block.h"
 
 // Two held corners and a free one: along y the springs have 2 k cos^2(30 deg) = 1.5 k.
 static const char OSCILLATOR[] =

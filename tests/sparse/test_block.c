@@ -1,5 +1,6 @@
 // The block matrix against dense arithmetic, and the conjugate gradients against elimination.
 #include "../fixture.h"
+#include "sparse/block.h"
 
 enum { N = 24, PAIRS = 60 };
 

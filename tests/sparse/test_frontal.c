@@ -1,7 +1,7 @@
 // The multifrontal solver: residuals, equality with the other direct solver, the same bits from all
 // instruction sets, new numbers on an old analysis, what is not positive definite.
 #include "base/base.h"
-#include "sonde/sparse.h"
+#include "sparse/ldl.h"
 #include "sparse/frontal.h"
 
 #include <setjmp.h>

@@ -2,7 +2,7 @@
 #include "base/base.h"
 #include "base/maths.h"
 #include "base/random.h"
-#include "sonde/sparse.h"
+#include "sparse/ldl.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,5 +1,6 @@
 // The tissue's forces against its energy, its matrix against its forces.
 #include "../fixture.h"
+#include "sparse/block.h"
 #include "tissue/two_layer.h"
 
 typedef struct bench {

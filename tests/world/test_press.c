@@ -1,6 +1,7 @@
 // Laws of the fast engine's contact: what the probe does to each node, and the matrix of it, are
 // those of the double engine. And of the order of a node's neighbours.
 #include "../fixture.h"
+#include "sparse/block.h"
 #include "tissue/model.h"
 #include "world/contact.h"
 #include "world/lanes.h"

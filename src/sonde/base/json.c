@@ -426,8 +426,3 @@ void sonde_json_put_bool(sonde_json_out *out, const char *key, bool value) {
   put_key(out, key);
   put(out, value ? "true" : "false");
 }
-
-void sonde_json_put_null(sonde_json_out *out, const char *key) {
-  put_key(out, key);
-  put(out, "null");
-}

@@ -8,6 +8,7 @@
 #include "base/link.h"
 #include "base/maths.h"
 #include "sonde/interior.h"
+#include "sparse/ldl.h"
 #include "sonde/interior_findings.h"
 
 enum { SONDE_STATIONS = 160, SONDE_VESSELS = 2 + SONDE_BRANCHES };

@@ -1,7 +1,7 @@
 // Hot kernels of the block matrix.
 // multiply: y = A x over the active rows and pairs, plus rank-one terms.
 // invert:   inverse of each symmetric diagonal block for the preconditioner.
-#include "sonde/sparse.h"
+#include "sparse/block.h"
 
 #include "base/base.h"
 #include "base/maths.h"

@@ -3,7 +3,7 @@
 // start:      first residual and direction.
 // advance:    solution, residual and preconditioned residual in one pass.
 // solve:      the iteration of Hestenes and Stiefel with a warm start.
-#include "sonde/sparse.h"
+#include "sparse/block.h"
 
 #include "base/base.h"
 #include "base/maths.h"

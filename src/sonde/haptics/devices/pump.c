@@ -11,6 +11,13 @@
 
 static const double period_s = 1e-3, reopen_s = 0.25;
 
+static const sonde_device_info builtin[] = {
+    {"null", "stands still at one pose", true, "built in; needs no hardware"},
+    {"hand", "simulated operator that feels the force", true, "built in; needs no hardware"},
+    {"script", "follows a list of poses in time", true, "built in; needs no hardware"},
+    {"replay", "plays recorded poses again", true, "built in; needs a recording"},
+    {"page", "mouse and keys in the browser", true, "built in; started by `sonde run`"},
+};
 static const sonde_driver *const drivers[] = {&sonde_driver_openhaptics,
                                               &sonde_driver_forcedimension, &sonde_driver_haply,
                                               &sonde_driver_spacenav, &sonde_driver_gamepad};
@@ -208,9 +215,9 @@ sonde_device_link sonde_device_link_of(const sonde_device *device) {
 
 uint32_t sonde_devices_find(bool probe, sonde_device_info *info, uint32_t capacity) {
   SONDE_ASSERT(info != NULL);
-  uint32_t builtin = 0, count = 0;
-  const sonde_device_info *first = sonde_devices(&builtin);
-  for (uint32_t i = 0; i < builtin && count < capacity; ++i) info[count++] = first[i];
+  uint32_t count = 0;
+  for (size_t i = 0; i < SONDE_COUNT_OF(builtin) && count < capacity; ++i)
+    info[count++] = builtin[i];
   for (size_t i = 0; i < SONDE_COUNT_OF(drivers) && count < capacity; ++i) {
     const sonde_driver *driver = drivers[i];
     sonde_device_info *line = &info[count++];
