@@ -9,6 +9,10 @@
 //
 // A document holds a figure between two comments, its name and its decimals in the first:
 //   <!--image.avx512.frame_ms 1-->4.5<!---->
+// and a table, or the output of a program word for word, between two comments on lines of their own:
+//   <!--block fit_errors-->
+//   ...
+//   <!--end block-->
 import { execFileSync } from 'node:child_process'
 import { createHash } from 'node:crypto'
 import { existsSync, mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, statSync, writeFileSync } from 'node:fs'
@@ -17,6 +21,7 @@ import { dirname, join, relative } from 'node:path'
 import { fileURLToPath } from 'node:url'
 
 const HOME = join(dirname(fileURLToPath(import.meta.url)), '..')
+const BLOCK = /<!--block (\w+)-->\n(.*?)<!--end block-->/gs
 const FIGURE = /<!--([a-z]\w*(?:\.\w+)+) (\d)-->(.*?)<!---->/gs
 
 const run = (bin, program, ...options) =>
@@ -69,6 +74,10 @@ const GROUPS = {
     sources: ['src/sonde-exam', 'src/sonde/interior', ...engine, 'data/cases', 'data/protocols'],
     measure: bin => json(bin, 'exam', '--compare', '--protocol', 'three_point', '-o', mkdtempSync(join(tmpdir(), 'sonde-figures-'))),
   },
+  // Programs that print tables; the documents show what they print.
+  solver: { sources: [...engine, 'bench/bench_solver.c'], measure: bin => ({ output: run(bin, 'bench_solver') }) },
+  sweep: { sources: [...engine, 'bench/bench_sweep.c'], measure: bin => ({ output: summary(run(bin, 'bench_sweep')), once: summary(run(bin, 'bench_sweep', '3', '1')) }) },
+  accuracy: { sources: [...engine, 'bench/bench_accuracy.c'], measure: bin => ({ output: run(bin, 'bench_accuracy', '1962') }) },
   step: {
     sources: [...engine, 'src/sonde/haptics'],
     measure(bin) {
@@ -148,6 +157,43 @@ const GROUPS = {
   },
 }
 
+// The last line of a program that prints a table.
+function summary(text) {
+  return text.trim().split('\n').at(-1)
+}
+
+const table = (head, rows) =>
+  [head, head.map(() => '---'), ...rows].map(row => `| ${row.join(' | ')} |`).join('\n')
+const fenced = text => '```\n' + text.trimEnd() + '\n```'
+const fixed = (value, decimals) => value.toLocaleString('en-US', { minimumFractionDigits: decimals, maximumFractionDigits: decimals })
+
+// What the blocks of the documents show, from the groups' values; undefined where a group is not measured.
+const BLOCKS = {
+  fit_errors({ fit }) {
+    const rows = [
+      ['stage 1, every curve by itself', fit.stage1.parameters, fit.stage1],
+      ['stage 2, simplified interaction', fit.stage2.parameters, fit.stage2],
+      ['stage 3, full equilibrium', fit.stage3.parameters, fit.stage3],
+      ['stage 3, one site left out (linearised)', '', fit.stage3.stage3.one_site_out],
+      ['stage 3, eight folds of sites left out, refitted', '', fit.hold_out.hold_out],
+    ]
+    const cell = e => `${fixed(e.mae_n, 3)} / ${fixed(e.sd_n, 3)} N, ${fixed(e.mae_percent, 2)} %`
+    return table(['', 'parameters', 'linear MAE / SD', 'point MAE / SD', 'both MAE / SD'],
+      rows.map(([name, parameters, e]) => [name, parameters, cell(e.probes.linear), cell(e.probes.point), cell(e.all)]))
+  },
+  ellipsoid: ({ ellipsoid }) => table(['nodes', 'steps/s', 'error', 'nodes awake', 'iterations per step'],
+    Object.entries(ellipsoid).map(([name, e]) =>
+      [fixed(Number(name.slice(6)), 0), fixed(e.steps_per_s, 0), `${fixed(e.error_percent, 2)} %`, fixed(e.awake, 0), fixed(e.iterations, 1)])),
+  step: ({ step }) => table(['`sonde bench --scene`', 'steps/s', 'median, ms', '99 %, ms', 'most, ms', 'error'],
+    Object.entries(step).map(([name, e]) => [`\`${name}\``, fixed(e.steps_per_s.median, 0), fixed(e.median_ms.median, 3),
+      fixed(e.p99_ms.median, 2), fixed(e.max_ms.median, 2), `${fixed(e.error_percent, 2)} %`])),
+  frame: ({ image }) => table(['kernels', 'frame', '99 %', 'plane', 'medium', 'scatterers', 'beam', 'picture'],
+    ['avx512', 'avx2', 'sse4', 'base'].map(name => [name, ...['frame_ms', 'p99_ms'].map(key => fixed(image[name][key], 1)),
+      ...['plane', 'medium', 'scatter', 'beam', 'picture'].map(key => fixed(image[name][key], 2))])),
+  solver: ({ solver }) => fenced(solver.output),
+  accuracy: ({ accuracy }) => fenced(accuracy.output),
+}
+
 // Of the names and contents of all files below the sources.
 function digest(root, sources) {
   const hash = createHash('sha256')
@@ -210,7 +256,15 @@ function compareDocuments(root, write) {
   let wrong = 0
   for (const name of documents(root)) {
     const path = join(root, name), before = readFileSync(path, 'utf8')
-    const after = before.replace(FIGURE, (whole, figure, decimals, was) => {
+    const values = Object.fromEntries(Object.entries(figures).map(([group, record]) => [group, record.values]))
+    const blocks = before.replace(BLOCK, (whole, block, was) => {
+      let now
+      try { now = BLOCKS[block]?.(values) } catch { now = undefined } // a group that is not measured
+      if (now === undefined) return console.log(`${name}: no values for the block "${block}" in bench/figures`), ++wrong, whole
+      if (`${now}\n` !== was && !write) console.log(`${name}: the block "${block}" differs from bench/figures`), ++wrong
+      return `<!--block ${block}-->\n${now}\n<!--end block-->`
+    })
+    const after = blocks.replace(FIGURE, (whole, figure, decimals, was) => {
       const now = shown(figures, figure, Number(decimals))
       if (now === undefined) console.log(`${name}: no figure "${figure}" in bench/figures`), ++wrong
       else if (now !== was && !write) console.log(`${name}: ${figure} is "${was}", measured "${now}"`), ++wrong

@@ -1,7 +1,7 @@
 /**
  * @file fit.h
  * Measurement and site tables, error statistics, estimation in up to three stages, prediction of
- * the measurements by a model. Formulas: docs/fit.md.
+ * the measurements by a model. Formulas: docs/estimation.md.
  */
 #ifndef SONDE_FIT_H
 #define SONDE_FIT_H
@@ -150,7 +150,7 @@ typedef struct sonde_curve_fit {
 } sonde_curve_fit;
 
 /**
- * Fits eq. (1) to one curve by Levenberg-Marquardt in logarithms. docs/fit.md.
+ * Fits eq. (1) to one curve by Levenberg-Marquardt in logarithms. docs/estimation.md.
  * @param start NULL for the closed-form start, else (k0, xm)
  * @return ARGUMENT with fewer than 3 points or no positive penetration @thread any
  */
@@ -206,7 +206,7 @@ typedef struct sonde_fit_result {
 /**
  * Stage 1 per curve; then one (k0, xm) per site for all its probes, without edges (stages == 1) or
  * with the simplified interaction and a uniform edge stiffness (2); then the refit on the full
- * equilibrium with a uniform shear layer and smooth site parameters (3). Formulas: docs/fit.md.
+ * equilibrium with a uniform shear layer and smooth site parameters (3). Formulas: docs/estimation.md.
  * @param model gives the refined skin, its normals and the law (guard, compression); unchanged
  * @return CANCELLED by progress; ARGUMENT for a probe without rectangular footprint or a curve of
  *   fewer than 3 points

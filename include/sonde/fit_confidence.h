@@ -1,7 +1,7 @@
 /**
  * @file fit_confidence.h
  * What an estimation of stage 3 is worth: data left out, the likelihood of the shear stiffness,
- * what each probe alone determines, other starts. Formulas: docs/fit.md.
+ * what each probe alone determines, other starts. Formulas: docs/estimation.md.
  */
 #ifndef SONDE_FIT_CONFIDENCE_H
 #define SONDE_FIT_CONFIDENCE_H
@@ -134,7 +134,7 @@ typedef struct sonde_fit_layer {
 /**
  * Fits stage 3 with the model's own law of the layer, with pre-tension ("T") and with pre-tension
  * and stiffening ("J"), each with fields, smoothness and equilibria of its own, the skin moving
- * along its normals. Only the first is a law of the dynamic model. docs/fit.md.
+ * along its normals. Only the first is a law of the dynamic model. docs/estimation.md.
  * @param also measurements with other probes that are predicted only; may be NULL
  * @param layers [SONDE_FIT_LAYERS] @thread owner
  */
@@ -156,7 +156,7 @@ typedef struct sonde_fit_exponent {
 
 /**
  * Fits all three stages with each exponent and keeps the result with the least held-out error; its
- * law has that exponent. docs/fit.md.
+ * law has that exponent. docs/estimation.md.
  * @param def stages and normal_exponent are not used
  * @param tried [SONDE_FIT_EXPONENTS] in the order n = 1, 2, 3
  * @return as sonde_fit() @thread owner

@@ -219,6 +219,11 @@ if command -v node >/dev/null; then
   expect red "a document with another figure" "${figures[@]}"
   echo 'It takes <!--group.two.ms 1-->1<!----> ms.' >"$tree/docs/a.md"
   expect red "a document with a figure that nobody measured" "${figures[@]}"
+  echo '{"date": "", "sources": ["src/sonde/base"], "digest": "", "values": {"output": "1 2"}}' >"$tree/bench/figures/solver.json"
+  printf '<!--block solver-->\n```\n1 2\n```\n<!--end block-->\n' >"$tree/docs/a.md"
+  expect green "a document with the table that was measured" "${figures[@]}"
+  printf '<!--block solver-->\n```\n1 3\n```\n<!--end block-->\n' >"$tree/docs/a.md"
+  expect red "a document with another table" "${figures[@]}"
 fi
 
 echo "$wrong gates of the wrong colour"
