@@ -29,10 +29,10 @@ function(sonde_pc SONDE_PC_NAME)
   install(FILES ${PROJECT_BINARY_DIR}/${SONDE_PC_NAME}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 endfunction()
 sonde_pc(sonde OTHERS zlib libcjson)
-sonde_pc(sonde-files OF sonde OTHERS libpng yaml-0.1)
+sonde_pc(sonde-files OF sonde OTHERS libpng yaml-0.1 zlib)
 sonde_pc(sonde-sweep OF sonde OTHERS zlib)
 sonde_pc(sonde-scene OF sonde-files sonde)
-sonde_pc(sonde-fit OF sonde OTHERS libcjson)
+sonde_pc(sonde-fit OF sonde-files sonde OTHERS libcjson)
 sonde_pc(sonde-exam OF sonde-fit sonde-files sonde OTHERS sqlite3 zlib libcjson)
 
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs/man/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1

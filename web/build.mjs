@@ -1,6 +1,6 @@
-// Bundles the page into dist/ (or the directory given as the first argument): index.html, style.css
-// and app.js, and each of them as .gz for embedding. The licences of three.js and uPlot stay at the
-// end of app.js.
+// Bundles the page and the reports into dist/ (or the directory given as the first argument): index.html,
+// style.css, app.js and report.html, and each of them as .gz for embedding. The licences of three.js and
+// uPlot stay at the end of the scripts that hold them.
 import { build } from "esbuild";
 import { mkdir, readFile, writeFile } from "node:fs/promises";
 import { gzipSync } from "node:zlib";
@@ -10,29 +10,48 @@ const here = import.meta.dirname ?? path.dirname(new URL(import.meta.url).pathna
 const out = path.resolve(process.argv[2] ?? process.env.SONDE_WEB_OUT ?? path.join(here, "dist"));
 await mkdir(out, { recursive: true });
 
-await build({
-  entryPoints: [path.join(here, "src/main.ts")],
-  outfile: path.join(out, "app.js"),
-  bundle: true,
-  minify: true,
-  format: "iife",
-  target: "es2020",
-  legalComments: "eof",
-  logLevel: "warning",
-});
-
-const plotStyle = await readFile(path.join(here, "node_modules/uplot/dist/uPlot.min.css"), "utf8");
-const licence = await readFile(path.join(here, "node_modules/uplot/LICENSE"), "utf8");
-const style = await readFile(path.join(here, "style.css"), "utf8");
-await writeFile(path.join(out, "style.css"), `${style}\n/*! uPlot\n${licence}*/\n${plotStyle}`);
-await writeFile(path.join(out, "index.html"), await readFile(path.join(here, "index.html")));
+const read = (name) => readFile(path.join(here, name), "utf8");
+const bundle = (entry, outfile) =>
+  build({
+    entryPoints: [path.join(here, "src", entry)],
+    outfile: path.join(out, outfile),
+    bundle: true,
+    minify: true,
+    format: "iife",
+    target: "es2020",
+    legalComments: "eof",
+    logLevel: "warning",
+    metafile: true,
+  });
 
 // One licence text per bundled library, whatever the minifier kept of the comments.
-const script = path.join(out, "app.js");
-const three = await readFile(path.join(here, "node_modules/three/LICENSE"), "utf8");
-await writeFile(script, `${await readFile(script, "utf8")}\n/*! three.js\n${three}*/\n/*! uPlot\n${licence}*/\n`);
+async function licences(inputs) {
+  const held = ["three", "uplot"].filter((name) => Object.keys(inputs).some((file) => file.includes(`node_modules/${name}/`)));
+  const texts = await Promise.all(held.map(async (name) => `/*! ${name}\n${await read(`node_modules/${name}/LICENSE`)}*/\n`));
+  return texts.join("");
+}
 
-for (const name of ["index.html", "style.css", "app.js"]) {
+const page = await bundle("main.ts", "app.js");
+const script = path.join(out, "app.js");
+await writeFile(script, `${await readFile(script, "utf8")}\n${await licences(page.metafile.inputs)}`);
+const plotStyle = `/*! uPlot\n${await read("node_modules/uplot/LICENSE")}*/\n${await read("node_modules/uplot/dist/uPlot.min.css")}`;
+await writeFile(path.join(out, "style.css"), `${await read("style.css")}\n${plotStyle}`);
+await writeFile(path.join(out, "index.html"), await read("index.html"));
+
+// A report is one file: template, style and script. The marks of title and data stay for the program.
+const report = await bundle("report/main.ts", "report.js");
+const parts = {
+  STYLE: `${await read("src/report/style.css")}\n${plotStyle}`,
+  FIGURE_STYLE: await read("src/report/figure.css"),
+  SCRIPT: `${await readFile(path.join(out, "report.js"), "utf8")}\n${await licences(report.metafile.inputs)}`,
+};
+if (/<\/script|<!--/i.test(parts.SCRIPT)) throw new Error("report.js holds what would end its script element");
+const template = (await read("report.html")).replace(/@SONDE_(STYLE|FIGURE_STYLE|SCRIPT)@/g, (_all, name) => parts[name]);
+for (const mark of ["@SONDE_TITLE@", "@SONDE_DATA@"])
+  if (template.split(mark).length !== 2) throw new Error(`report.html must hold ${mark} once`);
+await writeFile(path.join(out, "report.html"), template);
+
+for (const name of ["index.html", "style.css", "app.js", "report.html"]) {
   const file = path.join(out, name);
   await writeFile(`${file}.gz`, gzipSync(await readFile(file), { level: 9 }));
 }

@@ -1,26 +1,18 @@
-// The page in memory: the bundle that the build made (SONDE_PAGE_DIR names its directory), or one
+// The page in memory: the bundle that the build made (SONDE_WEB_DIR names its directory), or one
 // page that says that it was not built.
 #include "stream/page_data.h"
+
+#include "base/embed.h"
 
 static const char HTML[] = "text/html; charset=utf-8";
 static const char CSS[] = "text/css; charset=utf-8";
 static const char JS[] = "text/javascript; charset=utf-8";
 
-#ifdef SONDE_PAGE_DIR
+#ifdef SONDE_WEB_DIR
 
-// .incbin needs only the assembler; gcc and clang have no #embed here.
-#define EMBED(symbol, file)                                                                        \
-  __asm__(".pushsection .rodata\n"                                                                 \
-          ".balign 16\n" #symbol "_begin:\n"                                                       \
-          ".incbin \"" SONDE_PAGE_DIR "/" file "\"\n" #symbol "_end:\n"                            \
-          ".byte 0\n"                                                                              \
-          ".popsection\n");                                                                        \
-  extern const unsigned char symbol##_begin[] __attribute__((visibility("hidden")));               \
-  extern const unsigned char symbol##_end[] __attribute__((visibility("hidden")))
-
-EMBED(sonde_page_html, "index.html.gz");
-EMBED(sonde_page_css, "style.css.gz");
-EMBED(sonde_page_js, "app.js.gz");
+SONDE_EMBED(sonde_page_html, SONDE_WEB_DIR "/index.html.gz");
+SONDE_EMBED(sonde_page_css, SONDE_WEB_DIR "/style.css.gz");
+SONDE_EMBED(sonde_page_js, SONDE_WEB_DIR "/app.js.gz");
 
 static page_file files[] = {{"index.html", HTML, sonde_page_html_begin, 0, true},
                             {"style.css", CSS, sonde_page_css_begin, 0, true},

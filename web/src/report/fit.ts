@@ -1,0 +1,7 @@
+// The report of kind "fit".
+
+import { plain } from "./plain";
+
+export function fit(data: unknown): void {
+  plain(data);
+}

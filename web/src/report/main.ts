@@ -1,0 +1,19 @@
+// A report: the document holds its data as JSON, whose member "kind" names the view that draws them.
+
+import { classReport } from "./class";
+import { exam } from "./exam";
+import { fit } from "./fit";
+import { h } from "./dom";
+import { plain } from "./plain";
+import { scene } from "./scene";
+import { section } from "./section";
+
+const VIEWS: Record<string, (data: unknown) => void> = { fit, scene, section, exam, class: classReport };
+
+try {
+  const data = JSON.parse(document.getElementById("report")?.textContent ?? "") as { kind?: string };
+  (VIEWS[data.kind ?? ""] ?? plain)(data);
+} catch (error) {
+  document.body.append(h("p", { class: "notes" }, `This report cannot be drawn: ${String(error)}`));
+  throw error;
+}

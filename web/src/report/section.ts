@@ -1,0 +1,7 @@
+// The report of kind "section".
+
+import { plain } from "./plain";
+
+export function section(data: unknown): void {
+  plain(data);
+}
