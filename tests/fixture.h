@@ -23,6 +23,16 @@
       fail_msg("%s is %.17g, expected %.17g within %.3g", #got, got_, expected_, tolerance_);      \
   } while (0)
 
+// The fitted bundled thigh: of the build at hand, or SONDE_TEST_MODEL (sanitizer builds fit none).
+static inline sonde_model *bundled_thigh(void) {
+  const char *chosen = getenv("SONDE_TEST_MODEL");
+  const char *path = chosen ? chosen : SONDE_BINARY_DIR "/share/sonde/thigh.sonde";
+  sonde_model *model = NULL;
+  if (sonde_model_load(path, &model, NULL))
+    fail_msg("%s is not there: build the target thigh or set SONDE_TEST_MODEL", path);
+  return model;
+}
+
 static inline uint32_t fixture_middle(sonde_mesh *mesh, uint32_t *count, uint32_t a, uint32_t b) {
   sonde_vec3 m = v_unit(v_add(mesh->vertices[a], mesh->vertices[b]), vec3(1, 0, 0));
   for (uint32_t i = 0; i < *count; ++i)

@@ -96,9 +96,7 @@ static void press(scene *s, const sonde_site *site, const char *probe) {
 
 static void open_scene(scene *s) {
   const sonde_world_def def = sonde_world_def_default();
-  const char *path = SONDE_BINARY_DIR "/share/sonde/thigh.sonde";
-  *s = (scene){.least = INFINITY};
-  assert_int_equal(sonde_model_load(path, &s->model, NULL), SONDE_OK);
+  *s = (scene){.least = INFINITY, .model = bundled_thigh()};
   assert_int_equal(sonde_state_create(s->model, &def, &s->state, NULL), SONDE_OK);
   assert_int_equal(sonde_interior_create(s->model, &s->interior, NULL), SONDE_OK);
   assert_int_equal(sonde_pathology_preset("healthy", &s->pathology, NULL), SONDE_OK);
