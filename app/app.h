@@ -10,27 +10,6 @@
 // Exit codes of every command.
 enum { APP_OK = 0, APP_FAILED = 1, APP_BAD_INPUT = 2 };
 
-// Every command gets its own verb as argv[0] and its arguments after it.
-int cmd_run(int argc, char **argv);
-int cmd_fit(int argc, char **argv);
-int cmd_generate(int argc, char **argv);
-int cmd_predict(int argc, char **argv);
-int cmd_measure(int argc, char **argv);
-int cmd_identify(int argc, char **argv);
-int cmd_press(int argc, char **argv);
-int cmd_image(int argc, char **argv);
-int cmd_cut(int argc, char **argv);
-int cmd_replay(int argc, char **argv);
-int cmd_bench(int argc, char **argv);
-int cmd_simulate(int argc, char **argv);
-int cmd_reconstruct(int argc, char **argv);
-int cmd_slice(int argc, char **argv);
-int cmd_validate(int argc, char **argv);
-int cmd_devices(int argc, char **argv);
-int cmd_class(int argc, char **argv);
-int cmd_exam(int argc, char **argv);
-int cmd_cases(int argc, char **argv);
-
 // Prints "sonde <verb>: <message>" on stderr and returns the exit code that fits the status.
 int app_fail(const char *verb, const sonde_error *error);
 // The same for a wrong command line; always APP_BAD_INPUT.
@@ -81,11 +60,10 @@ double app_quantile(double *list, size_t count, double share);
 // is none.
 bool app_data_directory(const char *name, char *path, size_t size);
 
-// Minimal JSON object writer on stdout: keys in call order, numbers with up to 9 digits, NaN as
-// null.
+// The JSON object on standard output: keys in call order, numbers of 9 digits, NaN as null.
 void app_json_begin(void);
 void app_json_object(const char *key); // nested
-void app_json_array(const char *key);  // nested; the keys of its members are not written
+void app_json_array(const char *key);  // nested; its members have no keys
 void app_json_close(void);             // closes the innermost object or array
 void app_json_real(const char *key, double value);
 void app_json_integer(const char *key, long long value);

@@ -451,7 +451,8 @@ static sonde_status load(const options *o, sonde_model **model, sonde_error *err
                          : sonde_model_load(o->model, model, error);
 }
 
-int cmd_bench(int argc, char **argv) {
+int old_bench(int argc, char **argv);
+int old_bench(int argc, char **argv) {
   if (bench_image_asked(argc, argv)) return bench_image(argc, argv);
   options o = {.scene = &SCENES[0],
                .ellipsoid = {7842, 200, 1},

@@ -153,7 +153,8 @@ static int check(const arguments *a, const exam_library *library, const sonde_ca
   return code;
 }
 
-int cmd_cases(int argc, char **argv) {
+int old_cases(int argc, char **argv);
+int old_cases(int argc, char **argv) {
   arguments a = {.seed = -1, .level = SONDE_CASE_EASY};
   if (!read_arguments(argc, argv, &a)) return APP_BAD_INPUT;
   if (a.help) {

@@ -272,7 +272,8 @@ static int run_class(class_room *room) {
   return alive ? APP_OK : APP_FAILED;
 }
 
-int cmd_class(int argc, char **argv) {
+int old_class(int argc, char **argv);
+int old_class(int argc, char **argv) {
   settings s = {.port = 8642};
   static class_room room;
   char program[4096];

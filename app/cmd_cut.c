@@ -1,44 +1,39 @@
 // sonde cut: cuts the skin of a model along a path and writes the cut model.
-//
-// read_triple    "x,y,z" in millimetres
-// read_file      a path from a CSV file
-// site_line      a straight path beside a site, laid onto the skin
-// press          force on a settled probe at the site
-// print          what the cut did
-#include "fit_common.h"
+#include "options.h"
 
+#include <assert.h>
 #include <math.h>
-#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
 
 static const char VERB[] = "cut";
-static const char HELP[] =
-    "usage: sonde cut [MODEL] (--line A:B | --path FILE | --site K --length-mm L) -o FILE\n"
-    "\n"
-    "Cuts the skin along a path and writes the model with the cut. The skin opens along edges of\n"
-    "the mesh near the path; mass, area and stiffness stay. MODEL defaults to the bundled thigh.\n"
-    "\n"
-    "  --line A:B       from A to B on the skin at rest, each x,y,z in mm\n"
-    "  --path FILE      CSV with x_mm,y_mm,z_mm, 2 to 1024 points on the skin at rest\n"
-    "  --site K         a straight cut beside site K ...\n"
-    "  --length-mm L    ... of this length (5 to 200) ...\n"
-    "  --offset-mm O    ... O away from the site (-60 to 60; default 15) ...\n"
-    "  --turn-deg T     ... at this angle: 0 around the leg, 90 along it; default 0\n"
-    "  --depth-mm D     with --site: press at the site before and after, D below the skin (0.1 to "
-    "30)\n"
-    "  --probe NAME     with --depth-mm: the probe; default linear\n"
-    "  -o FILE          the cut model\n"
-    "  --json           print one JSON object\n"
-    "  --help           this text\n";
 
 enum { MOST_POINTS = 1024 };
 
-typedef struct arguments {
-  const char *model, *line, *path, *site, *length, *offset, *turn, *depth, *probe, *output;
-  bool json, help;
-  long site_id;
+typedef struct options {
+  const char *model, *line, *path, *probe, *output;
+  bool json;
+  long site;
   double length_m, offset_m, turn_rad, depth_m; // depth NaN: no press
-  char found[1024];
-} arguments;
+} options;
+
+static const options DEFAULTS = {
+    .probe = "linear", .length_m = NAN, .offset_m = 0.015, .depth_m = NAN};
+
+static const app_option TABLE[] = {
+    OPT_MODEL(model),
+    OPT_TEXT(line, "line", "A:B", "from A to B on the skin at rest, each x,y,z in mm"),
+    OPT_TEXT(path, "path", "FILE", "CSV with x_mm,y_mm,z_mm, 2 to 1024 points on the skin at rest"),
+    OPT_INTEGER(site, "site", "K", 0, 1000000, "a straight cut beside site K"),
+    OPT_REAL(length_m, "length-mm", "L", 5, 200, 1e-3, "with --site: its length"),
+    OPT_REAL(offset_m, "offset-mm", "O", -60, 60, 1e-3, "with --site: how far away from the site"),
+    OPT_REAL(turn_rad, "turn-deg", "T", -360, 360, 3.14159265358979323846 / 180,
+             "with --site: its angle, 0 around the leg, 90 along it"),
+    OPT_REAL(depth_m, "depth-mm", "D", 0.1, 30, 1e-3,
+             "with --site: press at the site before and after, D below the skin"),
+    OPT_TEXT(probe, "probe", "NAME", "with --depth-mm: the probe"),
+    OPT_OUTPUT(output, "o", "FILE", "the cut model"),
+    OPT_JSON(json)};
 
 typedef struct work {
   sonde_model *model, *cut;
@@ -49,53 +44,11 @@ typedef struct work {
   double before_n, after_n, seconds;
 } work;
 
-static bool parse_numbers(arguments *a) {
-  double mm = 15, degrees = 0;
-  if (a->site && (!app_parse_integer(VERB, "--site", a->site, 0, 1000000, &a->site_id) ||
-                  !app_require(VERB, "--length-mm", a->length)))
-    return false;
-  if (a->length && !app_parse_real(VERB, "--length-mm", a->length, 5, 200, &a->length_m))
-    return false;
-  if (a->offset && !app_parse_real(VERB, "--offset-mm", a->offset, -60, 60, &mm)) return false;
-  if (a->turn && !app_parse_real(VERB, "--turn-deg", a->turn, -360, 360, &degrees)) return false;
-  a->depth_m = NAN;
-  if (a->depth && !app_parse_real(VERB, "--depth-mm", a->depth, 0.1, 30, &a->depth_m)) return false;
-  a->length_m *= 1e-3;
-  a->offset_m = mm * 1e-3;
-  a->depth_m *= 1e-3;
-  a->turn_rad = degrees * 3.14159265358979323846 / 180;
-  return true;
-}
-
-// Returns -1 to go on, else the exit code.
-static int read_arguments(int argc, char **argv, arguments *a) {
-  const app_option options[] = {
-      {"--line", &a->line, NULL},        {"--path", &a->path, NULL},
-      {"--site", &a->site, NULL},        {"--length-mm", &a->length, NULL},
-      {"--offset-mm", &a->offset, NULL}, {"--turn-deg", &a->turn, NULL},
-      {"--depth-mm", &a->depth, NULL},   {"--probe", &a->probe, NULL},
-      {"-o", &a->output, NULL},          {"--json", NULL, &a->json},
-      {"--help", NULL, &a->help}};
-  if (!app_take_options(VERB, argc, argv, options, sizeof options / sizeof *options, &a->model))
-    return APP_BAD_INPUT;
-  if (a->help) {
-    fputs(HELP, stdout);
-    return APP_OK;
-  }
-  int ways = (a->line != NULL) + (a->path != NULL) + (a->site != NULL);
-  if (ways != 1)
-    return app_usage_error(VERB, "expected one of --line, --path and --site, got %d", ways);
-  if (!a->site && (a->length || a->offset || a->turn || a->depth || a->probe))
-    return app_usage_error(VERB, "--length-mm, --offset-mm, --turn-deg, --depth-mm and --probe "
-                                 "belong to --site");
-  if (!app_require(VERB, "-o", a->output) || !parse_numbers(a)) return APP_BAD_INPUT;
-  char searched[1024];
-  if (!a->model && !app_bundled_model(a->found, sizeof a->found, searched, sizeof searched))
-    return app_usage_error(VERB, "no bundled model found (looked at %s)", searched);
-  if (!a->model) a->model = a->found;
-  if (!a->probe) a->probe = "linear";
-  int unwritable = app_check_output(VERB, a->output);
-  return unwritable ? unwritable : -1;
+static int check(void *from) {
+  const options *o = from;
+  if (app_option_given("site") && isnan(o->length_m))
+    return app_usage_error(VERB, "--length-mm is missing");
+  return APP_OK;
 }
 
 // "x,y,z" in mm up to a character of `last` or the end; NULL when it is not that.
@@ -155,7 +108,7 @@ static sonde_vec3 along(sonde_vec3 from, double a, sonde_vec3 u, double b, sonde
 }
 
 // 33 points on the tangent plane of the site, each moved to the skin below it.
-static sonde_status site_line(const arguments *a, work *w, sonde_error *error) {
+static sonde_status site_line(const options *a, work *w, sonde_error *error) {
   enum { POINTS = 33 };
   const sonde_site *s = w->site;
   sonde_surface_index *skin;
@@ -172,13 +125,13 @@ static sonde_status site_line(const arguments *a, work *w, sonde_error *error) {
       w->path[w->count] = hit.point_m;
     else
       status = app_error(error, SONDE_ARGUMENT, "the cut leaves the skin %.1f mm beside site %ld",
-                         sqrt(t * t + o * o) * 1e3, a->site_id);
+                         sqrt(t * t + o * o) * 1e3, a->site);
   }
   sonde_surface_index_destroy(skin);
   return status;
 }
 
-static sonde_status press(const arguments *a, const work *w, const sonde_model *model,
+static sonde_status press(const options *a, const work *w, const sonde_model *model,
                           double *force_n, sonde_error *error) {
   sonde_probe probe = {0};
   sonde_state *state = NULL;
@@ -204,7 +157,7 @@ static double sum(const double *values, uint32_t count) {
   return total;
 }
 
-static void print(const arguments *a, const work *w) {
+static void print(const options *a, const work *w) {
   uint32_t nodes = w->model->surface.vertex_count, after = w->cut->surface.vertex_count;
   double mass = sum(w->model->mass_kg, nodes), mass_after = sum(w->cut->mass_kg, after);
   if (a->json) {
@@ -227,22 +180,22 @@ static void print(const arguments *a, const work *w) {
          w->map.split_edges, w->map.closed ? ", closed" : "", w->seconds * 1e3);
   printf("nodes         %8u, were %u\n", after, nodes);
   printf("mass          %8.4f kg, changed by %.1g of it\n", mass_after, mass_after / mass - 1);
-  if (a->depth)
+  if (!isnan(a->depth_m))
     printf("force         %8.3f N at %g mm, was %.3f N\n", w->after_n, a->depth_m * 1e3,
            w->before_n);
   printf("model         %s\n", a->output);
 }
 
-static sonde_status find_path(const arguments *a, work *w, sonde_error *error) {
+static sonde_status find_path(const options *a, work *w, sonde_error *error) {
   if (a->line) return read_line(a->line, w, error);
   if (a->path) return read_file(a->path, w, error);
-  w->site = sonde_model_site(w->model, (uint32_t)a->site_id);
+  w->site = sonde_model_site(w->model, (uint32_t)a->site);
   if (w->site) return site_line(a, w, error);
   return app_error(error, SONDE_NOT_FOUND, "%.400s: no site %ld, the model has %u sites", a->model,
-                   a->site_id, w->model->site_count);
+                   a->site, w->model->site_count);
 }
 
-static sonde_status cut(const arguments *a, work *w, sonde_error *error) {
+static sonde_status cut(const options *a, work *w, sonde_error *error) {
   sonde_status status = sonde_model_load(a->model, &w->model, error);
   if (!status) status = find_path(a, w, error);
   if (status) return status;
@@ -250,8 +203,8 @@ static sonde_status cut(const arguments *a, work *w, sonde_error *error) {
   status = sonde_model_cut(w->model, NULL, w->path, w->count, &w->cut, &w->map, error);
   w->seconds = app_seconds(CLOCK_MONOTONIC) - start;
   w->before_n = w->after_n = NAN;
-  if (!status && a->depth) status = press(a, w, w->model, &w->before_n, error);
-  if (!status && a->depth) status = press(a, w, w->cut, &w->after_n, error);
+  if (!status && !isnan(a->depth_m)) status = press(a, w, w->model, &w->before_n, error);
+  if (!status && !isnan(a->depth_m)) status = press(a, w, w->cut, &w->after_n, error);
   if (status) return status;
   size_t used = strlen(w->cut->provenance);
   snprintf(w->cut->provenance + used, sizeof w->cut->provenance - used, "%scut along %.1f mm",
@@ -259,17 +212,32 @@ static sonde_status cut(const arguments *a, work *w, sonde_error *error) {
   return sonde_model_save(w->cut, a->output, error);
 }
 
-int cmd_cut(int argc, char **argv) {
-  arguments a = {0};
-  int code = read_arguments(argc, argv, &a);
-  if (code >= 0) return code;
+static int run(void *from, int argc, char **argv) {
+  (void)argc, (void)argv;
+  const options *a = from;
+  assert(a->output);
   static work w;
   w = (work){0};
   sonde_error error = {0};
-  sonde_status status = cut(&a, &w, &error);
-  if (!status) print(&a, &w);
+  sonde_status status = cut(a, &w, &error);
+  if (!status) print(a, &w);
   sonde_cut_map_clear(&w.map);
   sonde_model_destroy(w.cut);
   sonde_model_destroy(w.model);
   return status ? app_fail(VERB, &error) : APP_OK;
 }
+
+const app_command cmd_cut = {
+    .verb = "cut",
+    .summary = "cut the skin along a path and write the cut model",
+    .usage = "[MODEL] (--line A:B | --path FILE | --site K --length-mm L) -o FILE [options]",
+    .text = "Cuts the skin along a path and writes the model with the cut. The skin opens along "
+            "edges of the mesh near the path; mass, area and stiffness stay.",
+    OPT_TABLE(TABLE),
+    .size = sizeof(options),
+    .defaults = &DEFAULTS,
+    .required = "o",
+    .one_of = "line path site",
+    .needs = "length-mm>site offset-mm>site turn-deg>site depth-mm>site probe>site",
+    .check = check,
+    .run = run};

@@ -1,61 +1,49 @@
 // sonde devices: the input devices of this machine.
-#include "app.h"
+#include "options.h"
 
-#include <getopt.h>
+#include <assert.h>
 #include <stdio.h>
 
-static const char help[] =
-    "usage: sonde devices [--probe] [--json]\n"
-    "\n"
-    "Lists the input devices that hold the probe and whether this machine has them.\n"
-    "\n"
-    "  --probe  open each device for a moment instead of only looking for its library\n"
-    "  --json   print one JSON object\n"
-    "  --help   this text\n";
+typedef struct options {
+  bool probe, json;
+} options;
 
-static void print_json(const sonde_device_info *info, uint32_t count) {
-  app_json_begin();
-  for (uint32_t i = 0; i < count; ++i) {
-    app_json_object(info[i].name);
-    app_json_text("description", info[i].description);
-    app_json_bool("available", info[i].available);
-    app_json_text("reason", info[i].reason);
+static const app_option TABLE[] = {
+    OPT_FLAG(probe, "probe",
+             "open each device for a moment instead of only looking for its library"),
+    OPT_JSON(json)};
+
+static int run(void *from, int argc, char **argv) {
+  (void)argc, (void)argv;
+  const options *o = from;
+  sonde_device_info info[32];
+  uint32_t count = sonde_devices_find(o->probe, info, 32);
+  assert(count <= 32);
+  if (o->json)
+    app_json_begin();
+  else
+    printf("%-14s %-9s %-48s %s\n", "device", "available", "what it does", "why");
+  for (const sonde_device_info *d = info; d < info + count; ++d) {
+    if (!o->json) {
+      printf("%-14s %-9s %-48s %s\n", d->name, d->available ? "yes" : "no", d->description,
+             d->reason);
+      continue;
+    }
+    app_json_object(d->name);
+    app_json_text("description", d->description);
+    app_json_bool("available", d->available);
+    app_json_text("reason", d->reason);
     app_json_close();
   }
-  app_json_end();
-}
-
-static void print_table(const sonde_device_info *info, uint32_t count) {
-  printf("%-14s %-9s %-48s %s\n", "device", "available", "what it does", "why");
-  for (uint32_t i = 0; i < count; ++i)
-    printf("%-14s %-9s %-48s %s\n", info[i].name, info[i].available ? "yes" : "no",
-           info[i].description, info[i].reason);
-}
-
-int cmd_devices(int argc, char **argv) {
-  static const struct option options[] = {{"json", no_argument, NULL, 'j'},
-                                          {"probe", no_argument, NULL, 'p'},
-                                          {"help", no_argument, NULL, 'h'},
-                                          {NULL, 0, NULL, 0}};
-  bool json = false, probe = false;
-  int option;
-  opterr = 0;
-  while ((option = getopt_long(argc, argv, ":h", options, NULL)) != -1) {
-    if (option == 'h') {
-      fputs(help, stdout);
-      return APP_OK;
-    }
-    if (option != 'j' && option != 'p')
-      return app_usage_error("devices", "unknown option '%s'", argv[optind - 1]);
-    json |= option == 'j';
-    probe |= option == 'p';
-  }
-  if (optind < argc) return app_usage_error("devices", "unexpected argument '%s'", argv[optind]);
-  sonde_device_info info[32];
-  uint32_t count = sonde_devices_find(probe, info, 32);
-  if (json)
-    print_json(info, count);
-  else
-    print_table(info, count);
+  if (o->json) app_json_end();
   return APP_OK;
 }
+
+const app_command cmd_devices = {
+    .verb = "devices",
+    .summary = "list the input devices of this machine",
+    .usage = "[--probe] [--json]",
+    .text = "Lists the input devices that hold the probe and whether this machine has them.",
+    OPT_TABLE(TABLE),
+    .size = sizeof(options),
+    .run = run};

@@ -190,7 +190,8 @@ static bool known_operator(const char *name) {
   return false;
 }
 
-int cmd_exam(int argc, char **argv) {
+int old_exam(int argc, char **argv);
+int old_exam(int argc, char **argv) {
   arguments a = {.protocol = "extended", .operator_name = "expert", .seed = 1, .seeds = 1};
   if (!read_arguments(argc, argv, &a)) return APP_BAD_INPUT;
   if (a.help) {

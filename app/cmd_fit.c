@@ -593,7 +593,8 @@ static int run_sample(const fit_arguments *a) {
   return fit_sample_run(&options);
 }
 
-int cmd_fit(int argc, char **argv) {
+int old_fit(int argc, char **argv);
+int old_fit(int argc, char **argv) {
   fit_arguments arguments = {0};
   sonde_fit_def def;
   fit_skin skin = {3, SONDE_SKIN_INPLANE_N_M, SONDE_SKIN_TANGENTIAL_N_M3, false};

@@ -243,7 +243,8 @@ static void print(const arguments *a, work *w) {
   printf("%s\n", a->output);
 }
 
-int cmd_generate(int argc, char **argv) {
+int old_generate(int argc, char **argv);
+int old_generate(int argc, char **argv) {
   arguments a = {.seed = 1, .fat_mm = NAN, .edge_mm = 6, .fine_edge_mm = 3};
   a.known = sonde_thigh_unknown();
   int code = read_arguments(argc, argv, &a);

@@ -338,7 +338,8 @@ static int identify(const arguments *a, const sonde_model *model, const sonde_pr
   return APP_OK;
 }
 
-int cmd_identify(int argc, char **argv) {
+int old_identify(int argc, char **argv);
+int old_identify(int argc, char **argv) {
   arguments a = {0};
   sonde_protocol protocol;
   sonde_preset preset = sonde_preset_default();

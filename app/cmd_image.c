@@ -322,7 +322,8 @@ static void print(const settled *s, const options *o, const sonde_image *image) 
   app_json_end();
 }
 
-int cmd_image(int argc, char **argv) {
+int old_image(int argc, char **argv);
+int old_image(int argc, char **argv) {
   options o = {.probe = "linear",
                .pathology = "healthy",
                .site = -1,

@@ -323,7 +323,8 @@ static int save_sites_only(const measure_arguments *a, const sonde_site_table *s
   return APP_OK;
 }
 
-int cmd_measure(int argc, char **argv) {
+int old_measure(int argc, char **argv);
+int old_measure(int argc, char **argv) {
   measure_arguments arguments = {0};
   sonde_robot_def def;
   sonde_sites_def sites_def;

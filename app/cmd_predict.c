@@ -136,7 +136,8 @@ static sonde_status predict(const predict_arguments *a, const sonde_predict_def 
   return status;
 }
 
-int cmd_predict(int argc, char **argv) {
+int old_predict(int argc, char **argv);
+int old_predict(int argc, char **argv) {
   predict_arguments arguments = {0};
   sonde_predict_def def;
   if (!parse_arguments(argc, argv, &arguments)) return APP_BAD_INPUT;

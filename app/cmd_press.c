@@ -1,46 +1,52 @@
 // sonde press: settles a probe at a site to a force or a depth and reports what is felt and seen.
-// press_on:   to a force or to a depth.
-// look:       vessels and picture of the settled state.
-#include "app.h"
+#include "options.h"
 #include "settled.h"
 
-#include <getopt.h>
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
-static const char HELP[] =
-    "usage: sonde press [MODEL] --site K --probe NAME|FILE (--force-n F | --depth-mm D) [options]\n"
-    "\n"
-    "Presses a probe on the thigh until everything is at rest and reports the force, the\n"
-    "penetration and the state of the vein and the artery below it.\n"
-    "\n"
-    "  --site K          number of the site to press at\n"
-    "  --probe NAME      point, linear, square, sphere, or a mesh file (mm); default linear\n"
-    "  --force-n F       press until the settled force is F newtons (0.01 to 200)\n"
-    "  --depth-mm D      press D millimetres below the rest skin (-10 to 60)\n"
-    "  --case NAME       healthy, partial_mural, acute_occlusive, subacute_occlusive,\n"
-    "                    chronic_occlusive; default healthy\n"
-    "  --vein-depth-mm D    put the vein D below the site, the artery 11 mm beside it (8 to 50)\n"
-    "  --venous-mmhg P      pressure in the vein (0 to 80); default 10\n"
-    "  --thrombus-kpa MU    fill the vein with a clot of this shear modulus (0.5 to 100)\n"
-    "  --wall-kpa W         shear modulus of the vein's wall (10 to 300); default 30\n"
-    "  --preset FILE     damping, stiffness and friction (sonde-identify(1)); a settled probe\n"
-    "                    feels the stiffness only\n"
-    "  --image PNG       write the echographic image of the settled state (512 x 512)\n"
-    "  --json            print one JSON object\n"
-    "  --help            this text\n"
-    "MODEL defaults to the bundled thigh.\n";
+static const double PA_PER_MMHG = 133.322387415;
 
 typedef struct options {
-  char model[1024];
+  const char *model, *probe, *pathology, *image, *preset;
   long site;
-  const char *probe, *pathology, *image, *preset;
   double force_n, depth_m; // NaN when not asked for, as all below
   double vein_depth_m, venous_pa, thrombus_pa, wall_pa;
   bool json;
 } options;
+
+static const options DEFAULTS = {.probe = "linear",
+                                 .pathology = "healthy",
+                                 .force_n = NAN,
+                                 .depth_m = NAN,
+                                 .vein_depth_m = NAN,
+                                 .venous_pa = NAN,
+                                 .thrombus_pa = NAN,
+                                 .wall_pa = NAN};
+
+static const app_option TABLE[] = {
+    OPT_MODEL(model),
+    OPT_INTEGER(site, "site", "K", 0, 1000000, "number of the site to press at"),
+    OPT_TEXT(probe, "probe", "NAME|FILE",
+             "point, linear, square, sphere, or a mesh file in millimetres"),
+    OPT_REAL(force_n, "force-n", "F", 0.01, 200, 1, "press until the settled force is F newtons"),
+    OPT_REAL(depth_m, "depth-mm", "D", -10, 60, 1e-3, "press D millimetres below the rest skin"),
+    OPT_TEXT(pathology, "case", "NAME",
+             "healthy, partial_mural, acute_occlusive, subacute_occlusive or chronic_occlusive"),
+    OPT_REAL(vein_depth_m, "vein-depth-mm", "D", 8, 50, 1e-3,
+             "put the vein D below the site along its whole course, the artery 11 mm beside it"),
+    OPT_REAL(venous_pa, "venous-mmhg", "P", 0, 80, PA_PER_MMHG, "pressure in the vein; default 10"),
+    OPT_REAL(thrombus_pa, "thrombus-kpa", "MU", 0.5, 100, 1e3,
+             "fill the vein with a clot of this shear modulus"),
+    OPT_REAL(wall_pa, "wall-kpa", "W", 10, 300, 1e3,
+             "shear modulus of the vein's wall; default 30"),
+    OPT_TEXT(preset, "preset", "FILE",
+             "damping, stiffness and friction, see sonde-identify(1); a settled probe feels the "
+             "stiffness only"),
+    OPT_OUTPUT(image, "image", "PNG",
+               "write the echographic image of the settled state, 512 x 512 pixels"),
+    OPT_JSON(json)};
 
 typedef struct press {
   settled scene;
@@ -50,71 +56,6 @@ typedef struct press {
   sonde_vessel_state vessel[2]; // vein, artery
   bool cut[2];                  // the image plane meets it
 } press;
-
-// A number within bounds, scaled to SI; false after a message.
-static bool read_real(const char *name, double low, double high, double scale, double *to) {
-  if (!app_parse_real("press", name, optarg, low, high, to)) return false;
-  *to *= scale;
-  return true;
-}
-
-// The vessel options; false after a message.
-static bool read_vessel_option(int c, options *o) {
-  const double pa_per_mmhg = 133.322387415;
-  switch (c) {
-  case 'D': return read_real("--vein-depth-mm", 8, 50, 1e-3, &o->vein_depth_m);
-  case 'V': return read_real("--venous-mmhg", 0, 80, pa_per_mmhg, &o->venous_pa);
-  case 'T': return read_real("--thrombus-kpa", 0.5, 100, 1e3, &o->thrombus_pa);
-  default: return read_real("--wall-kpa", 10, 300, 1e3, &o->wall_pa);
-  }
-}
-
-// Returns -1 to go on, else the exit code.
-static int read_options(int argc, char **argv, options *o) {
-  static const struct option LONG[] = {{"site", required_argument, NULL, 's'},
-                                       {"probe", required_argument, NULL, 'p'},
-                                       {"force-n", required_argument, NULL, 'f'},
-                                       {"depth-mm", required_argument, NULL, 'd'},
-                                       {"case", required_argument, NULL, 'c'},
-                                       {"image", required_argument, NULL, 'i'},
-                                       {"preset", required_argument, NULL, 'P'},
-                                       {"json", no_argument, NULL, 'j'},
-                                       {"vein-depth-mm", required_argument, NULL, 'D'},
-                                       {"venous-mmhg", required_argument, NULL, 'V'},
-                                       {"thrombus-kpa", required_argument, NULL, 'T'},
-                                       {"wall-kpa", required_argument, NULL, 'W'},
-                                       {"help", no_argument, NULL, 'h'},
-                                       {NULL, 0, NULL, 0}};
-  for (int c; (c = getopt_long(argc, argv, "", LONG, NULL)) != -1;) switch (c) {
-    case 's':
-      if (!app_parse_integer("press", "--site", optarg, 0, 1000000, &o->site)) return APP_BAD_INPUT;
-      break;
-    case 'p': o->probe = optarg; break;
-    case 'f':
-      if (!read_real("--force-n", 0.01, 200, 1, &o->force_n)) return APP_BAD_INPUT;
-      break;
-    case 'd':
-      if (!read_real("--depth-mm", -10, 60, 1e-3, &o->depth_m)) return APP_BAD_INPUT;
-      break;
-    case 'D':
-    case 'V':
-    case 'T':
-    case 'W':
-      if (!read_vessel_option(c, o)) return APP_BAD_INPUT;
-      break;
-    case 'c': o->pathology = optarg; break;
-    case 'i': o->image = optarg; break;
-    case 'P': o->preset = optarg; break;
-    case 'j': o->json = true; break;
-    case 'h': fputs(HELP, stdout); return APP_OK;
-    default: return APP_BAD_INPUT;
-    }
-  if (isnan(o->force_n) == isnan(o->depth_m))
-    return app_usage_error("press", "give either --force-n or --depth-mm");
-  if (o->site < 0) return app_usage_error("press", "--site is missing");
-  if (!app_model_argument("press", argc, argv, o->model, sizeof o->model)) return APP_BAD_INPUT;
-  return -1;
-}
 
 static sonde_status look(press *p, const char *image_path, sonde_error *error) {
   settled *scene = &p->scene;
@@ -199,58 +140,57 @@ static void print(const press *p, const options *o) {
   if (o->image) printf("image         %s\n", o->image);
 }
 
-static void set_vein(press *p, const options *o) {
-  p->vein_depth_m = o->vein_depth_m;
-  if (!isnan(o->venous_pa)) p->pathology.venous_pressure_pa = o->venous_pa;
-  if (!isnan(o->wall_pa)) p->pathology.wall_shear_pa = o->wall_pa;
-  if (isnan(o->thrombus_pa)) return;
-  p->pathology.thrombus_fraction = 1;
-  p->pathology.thrombus_modulus_pa = 3 * o->thrombus_pa; // Young's, incompressible
-}
-
-static bool needs_vessels(const options *o) {
-  return o->image || !isnan(o->vein_depth_m) || !isnan(o->venous_pa) || !isnan(o->wall_pa) ||
-         !isnan(o->thrombus_pa);
-}
-
 static sonde_status prepare(press *p, const options *o, sonde_error *error) {
   sonde_preset preset = sonde_preset_default();
   sonde_status status = sonde_pathology_preset(o->pathology, &p->pathology, error);
-  if (!status) set_vein(p, o);
   if (!status && o->preset) status = sonde_preset_load(o->preset, &preset, error);
+  if (status) return status;
+
+  // The vein as asked for: where it is, its pressure, its wall and its clot.
+  p->vein_depth_m = o->vein_depth_m;
+  if (!isnan(o->venous_pa)) p->pathology.venous_pressure_pa = o->venous_pa;
+  if (!isnan(o->wall_pa)) p->pathology.wall_shear_pa = o->wall_pa;
+  if (!isnan(o->thrombus_pa)) {
+    p->pathology.thrombus_fraction = 1;
+    p->pathology.thrombus_modulus_pa = 3 * o->thrombus_pa; // Young's, incompressible
+  }
+
+  // A model without a bone can be pressed, unless vessels or a picture are asked for.
+  bool vessels = o->image || !isnan(o->vein_depth_m) || !isnan(o->venous_pa) ||
+                 !isnan(o->wall_pa) || !isnan(o->thrombus_pa);
   app_progress_begin("pressing");
-  if (!status)
-    status = settled_open(&p->scene, o->model, o->probe, &preset, needs_vessels(o), error);
+  status = settled_open(&p->scene, o->model, o->probe, &preset, vessels, error);
   return status ? status : settled_site(&p->scene, o->model, o->site, &p->start, error);
 }
 
-static sonde_status press_on(press *p, const options *o, sonde_error *error) {
-  sonde_status status = !isnan(o->force_n)
-                            ? settled_force(&p->scene, p->start, o->force_n, error)
-                            : settled_press(&p->scene, p->start, o->depth_m, INFINITY, error);
-  settled_warn(&p->scene, "press");
-  return status;
-}
-
-int cmd_press(int argc, char **argv) {
-  options o = {.site = -1,
-               .probe = "linear",
-               .pathology = "healthy",
-               .force_n = NAN,
-               .depth_m = NAN,
-               .vein_depth_m = NAN,
-               .venous_pa = NAN,
-               .thrombus_pa = NAN,
-               .wall_pa = NAN};
-  int code = read_options(argc, argv, &o);
-  if (code >= 0) return code;
+static int run(void *from, int argc, char **argv) {
+  (void)argc, (void)argv;
+  const options *o = from;
+  assert(isnan(o->force_n) != isnan(o->depth_m));
   press p = {0};
   sonde_error error = {0};
-  sonde_status status = prepare(&p, &o, &error);
-  if (!status) status = press_on(&p, &o, &error);
-  if (!status) status = look(&p, o.image, &error);
+  sonde_status status = prepare(&p, o, &error);
+  if (!status) {
+    status = !isnan(o->force_n) ? settled_force(&p.scene, p.start, o->force_n, &error)
+                                : settled_press(&p.scene, p.start, o->depth_m, INFINITY, &error);
+    settled_warn(&p.scene, "press");
+  }
+  if (!status) status = look(&p, o->image, &error);
   app_progress_end();
-  if (!status) print(&p, &o);
+  if (!status) print(&p, o);
   settled_close(&p.scene);
   return status ? app_fail("press", &error) : APP_OK;
 }
+
+const app_command cmd_press = {
+    .verb = "press",
+    .summary = "press once, settle, report force, penetration and vessels",
+    .usage = "[MODEL] --site K --probe NAME|FILE (--force-n F | --depth-mm D) [options]",
+    .text = "Presses a probe on the thigh until everything is at rest and reports the force, the "
+            "penetration and the state of the vein and the artery below it.",
+    OPT_TABLE(TABLE),
+    .size = sizeof(options),
+    .defaults = &DEFAULTS,
+    .required = "site",
+    .one_of = "force-n depth-mm",
+    .run = run};

@@ -212,7 +212,8 @@ static sonde_status copy(const arguments *a, sonde_error *error) {
   return status;
 }
 
-int cmd_reconstruct(int argc, char **argv) {
+int old_reconstruct(int argc, char **argv);
+int old_reconstruct(int argc, char **argv) {
   arguments a = {0};
   int code = read_arguments(argc, argv, &a);
   if (code >= 0) return code;

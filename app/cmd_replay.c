@@ -161,7 +161,8 @@ static sonde_status work(settings *s, sonde_player *player, sonde_replay_result 
   return status;
 }
 
-int cmd_replay(int argc, char **argv) {
+int old_replay(int argc, char **argv);
+int old_replay(int argc, char **argv) {
   settings s = {0};
   int code = parse(argc, argv, &s);
   if (code != APP_OK) return code;

@@ -512,7 +512,8 @@ static int run(const settings *s, const sonde_model *model, const char *model_pa
   return run_desk(s, model, &def, &error) ? app_fail("run", &error) : APP_OK;
 }
 
-int cmd_run(int argc, char **argv) {
+int old_run(int argc, char **argv);
+int old_run(int argc, char **argv) {
   settings s = {.port = 8642,
                 .seconds = 10.0,
                 .probe = "linear",

@@ -300,7 +300,8 @@ static void print_summary(const simulation *s) {
 }
 
 // A cancelled run ends with a snapshot only, so that tables and frames keep their rhythm.
-int cmd_simulate(int argc, char **argv) {
+int old_simulate(int argc, char **argv);
+int old_simulate(int argc, char **argv) {
   simulation s = {0};
   sonde_error error = {0};
   if (!read_arguments(argc, argv, &s.a)) return APP_BAD_INPUT;

@@ -367,7 +367,8 @@ static void print(const arguments *a, const work *w) {
   printf("written       %s\n", a->output);
 }
 
-int cmd_slice(int argc, char **argv) {
+int old_slice(int argc, char **argv);
+int old_slice(int argc, char **argv) {
   arguments a = {0};
   int code = read_arguments(argc, argv, &a);
   if (code >= 0) return code;

@@ -27,7 +27,8 @@ static const struct {
   int (*run)(int argc, char **argv);
 } PARTS[] = {{"image", validate_image}, {"haptics", validate_haptics}};
 
-int cmd_validate(int argc, char **argv) {
+int old_validate(int argc, char **argv);
+int old_validate(int argc, char **argv) {
   if (argc < 2)
     return app_usage_error("validate", "nothing to validate, expected image or haptics");
   for (int i = 1; i < argc; ++i)

@@ -1,93 +1,42 @@
-// Minimal JSON object writer on stdout (RFC 8259): one object, nested objects, escaped text,
-// numbers that are not finite as null; arrays of objects.
+// The JSON object that a command prints: written by the library into memory, then to standard
+// output as a whole.
 #include "app.h"
 
-#include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 
-static int depth;       // open objects and arrays
-static bool filled;     // the innermost one has a member already
-static uint64_t arrays; // bit `depth`: the one at that depth is an array
+static sonde_json_out out;
 
-static void write_text(const char *text) {
-  putchar('"');
-  for (const unsigned char *c = (const unsigned char *)text; *c; ++c) {
-    if (*c == '"' || *c == '\\')
-      printf("\\%c", *c);
-    else if (*c == '\n')
-      fputs("\\n", stdout);
-    else if (*c == '\t')
-      fputs("\\t", stdout);
-    else if (*c < 0x20)
-      printf("\\u%04x", *c);
-    else
-      putchar(*c);
-  }
-  putchar('"');
-}
-
-static void write_key(const char *key) {
-  printf("%s\n%*s", filled ? "," : "", 2 * depth, "");
-  filled = true;
-  if (arrays >> depth & 1) return;
-  write_text(key);
-  fputs(": ", stdout);
+static void stop_without_memory(const sonde_error *error) {
+  fprintf(stderr, "sonde: %s\n", sonde_status_text(error->status));
+  exit(APP_FAILED);
 }
 
 void app_json_begin(void) {
-  putchar('{');
-  depth = 1;
-  arrays = 0;
-  filled = false;
+  sonde_error error = {0};
+  out = (sonde_json_out){.layout = SONDE_JSON_LINES};
+  if (sonde_file_in_memory(&out.file, &error)) stop_without_memory(&error);
+  sonde_json_begin_object(&out, NULL);
 }
 
-void app_json_object(const char *key) {
-  write_key(key);
-  putchar('{');
-  depth++;
-  filled = false;
-}
-
-void app_json_array(const char *key) {
-  write_key(key);
-  putchar('[');
-  arrays |= 1ull << ++depth;
-  filled = false;
-}
-
-void app_json_close(void) {
-  bool array = arrays >> depth & 1;
-  arrays &= ~(1ull << depth--);
-  if (filled) printf("\n%*s", 2 * depth, "");
-  putchar(array ? ']' : '}');
-  filled = true;
-}
-
-void app_json_real(const char *key, double value) {
-  write_key(key);
-  if (isfinite(value))
-    printf("%.9g", value);
-  else
-    fputs("null", stdout);
-}
-
+void app_json_object(const char *key) { sonde_json_begin_object(&out, key); }
+void app_json_array(const char *key) { sonde_json_begin_list(&out, key); }
+void app_json_close(void) { sonde_json_end(&out); }
+void app_json_real(const char *key, double value) { sonde_json_put_real(&out, key, value, 9); }
+void app_json_bool(const char *key, bool value) { sonde_json_put_bool(&out, key, value); }
+void app_json_text(const char *key, const char *value) { sonde_json_put_text(&out, key, value); }
 void app_json_integer(const char *key, long long value) {
-  write_key(key);
-  printf("%lld", value);
-}
-
-void app_json_bool(const char *key, bool value) {
-  write_key(key);
-  fputs(value ? "true" : "false", stdout);
-}
-
-void app_json_text(const char *key, const char *value) {
-  write_key(key);
-  write_text(value);
+  sonde_json_put_integer(&out, key, value);
 }
 
 void app_json_end(void) {
-  while (depth > 0) app_json_close();
+  char *bytes = NULL;
+  size_t count = 0;
+  sonde_error error = {0};
+  while (out.depth > 0) sonde_json_end(&out);
+  if (sonde_file_take(out.file, &bytes, &count, &error)) stop_without_memory(&error);
+  fwrite(bytes, 1, count, stdout);
   putchar('\n');
   fflush(stdout);
+  sonde_free(bytes);
 }

@@ -1,50 +1,24 @@
 // The program sonde: picks the command of the first argument.
-//
-// find_command    table entry of a verb
-// edit_distance   letters to change between two short words
-// suggestion      the verb that an unknown word most resembles
-// print_help      list of commands
-// told            whether standard output took what was printed
-#include "app.h"
+#include "options.h"
 
+#include <assert.h>
 #include <errno.h>
 #include <signal.h>
 #include <stdio.h>
 #include <string.h>
 
-typedef struct command {
-  const char *verb;
-  int (*run)(int argc, char **argv);
-  const char *summary;
-} command;
-
-static const command COMMANDS[] = {
-    {"run", cmd_run, "simulate in real time and serve the page"},
-    {"fit", cmd_fit, "fit a thigh to measurements and write a model file"},
-    {"generate", cmd_generate, "make a thigh from parameters and a seed"},
-    {"predict", cmd_predict, "compare a model's forces with measurements"},
-    {"measure", cmd_measure, "press a model at its sites with the virtual robot"},
-    {"identify", cmd_identify, "find damping and friction from records of a moving probe"},
-    {"press", cmd_press, "press once, settle, report force, penetration and vessels"},
-    {"image", cmd_image, "write the echographic picture of a model at a pose"},
-    {"cut", cmd_cut, "cut the skin along a path and write the cut model"},
-    {"simulate", cmd_simulate, "simulate a scene of several bodies"},
-    {"reconstruct", cmd_reconstruct, "make a volume from tracked image frames"},
-    {"slice", cmd_slice, "make a picture at any pose from tracked frames or a volume"},
-    {"replay", cmd_replay, "play a recording again and compare the state hash"},
-    {"bench", cmd_bench, "time the simulation's stages"},
-    {"exam", cmd_exam, "let a scripted operator examine a case and score it"},
-    {"class", cmd_class, "run several learners on one machine"},
-    {"cases", cmd_cases, "list, check and draw the cases of the trainer"},
-    {"validate", cmd_validate, "measure a room against its targets"},
-    {"devices", cmd_devices, "list the input devices of this machine"},
-};
+// In the order of help.
+static const app_command *const COMMANDS[] = {
+    &cmd_run,         &cmd_fit,   &cmd_generate, &cmd_predict, &cmd_measure,
+    &cmd_identify,    &cmd_press, &cmd_image,    &cmd_cut,     &cmd_simulate,
+    &cmd_reconstruct, &cmd_slice, &cmd_replay,   &cmd_bench,   &cmd_exam,
+    &cmd_class,       &cmd_cases, &cmd_validate, &cmd_devices};
 
 enum { COMMAND_COUNT = sizeof COMMANDS / sizeof COMMANDS[0], WORD_MAX = 16 };
 
-static const command *find_command(const char *verb) {
+static const app_command *find_command(const char *verb) {
   for (int i = 0; i < COMMAND_COUNT; ++i)
-    if (strcmp(COMMANDS[i].verb, verb) == 0) return &COMMANDS[i];
+    if (strcmp(COMMANDS[i]->verb, verb) == 0) return COMMANDS[i];
   return NULL;
 }
 
@@ -71,10 +45,10 @@ static const char *suggestion(const char *word) {
   const char *best = NULL;
   int least_changes = 3; // more than two changes is another word
   for (int i = 0; i < COMMAND_COUNT; ++i) {
-    int changes = edit_distance(word, COMMANDS[i].verb);
+    int changes = edit_distance(word, COMMANDS[i]->verb);
     if (changes < least_changes) {
       least_changes = changes;
-      best = COMMANDS[i].verb;
+      best = COMMANDS[i]->verb;
     }
   }
   return best;
@@ -83,7 +57,7 @@ static const char *suggestion(const char *word) {
 static void print_help(FILE *stream) {
   fprintf(stream, "usage: sonde COMMAND [OPTIONS]\n\ncommands:\n");
   for (int i = 0; i < COMMAND_COUNT; ++i)
-    fprintf(stream, "  %-11s  %s\n", COMMANDS[i].verb, COMMANDS[i].summary);
+    fprintf(stream, "  %-11s  %s\n", COMMANDS[i]->verb, COMMANDS[i]->summary);
   fprintf(stream, "\nsonde COMMAND --help tells the options of a command; sonde --version the "
                   "version.\nExit codes: 0 success, 1 failure, 2 bad input.\n");
 }
@@ -97,13 +71,15 @@ static int unknown(const char *word) {
   return APP_BAD_INPUT;
 }
 
-static int help_of(const char *verb) {
-  const command *found = find_command(verb);
-  if (!found) return unknown(verb);
-  char name[WORD_MAX + 1], option[] = "--help";
-  snprintf(name, sizeof name, "%s", verb);
-  char *arguments[] = {name, option, NULL};
-  return found->run(2, arguments);
+static int run_command(const char *verb, int argc, char **argv) {
+  static _Alignas(max_align_t) char options[16384];
+  const app_command *command = find_command(verb);
+  if (!command) return unknown(verb);
+  const app_command *form = command->pick ? command->pick(argc, argv) : NULL;
+  if (form) command = form;
+  assert(command->size <= sizeof options);
+  int code = app_options_read(command, argc, argv, options);
+  return code >= 0 ? code : command->run(options, argc, argv);
 }
 
 static void print_remark(sonde_log_level level, const char *message, void *user) {
@@ -131,10 +107,10 @@ int main(int argc, char **argv) {
     return told(APP_OK);
   }
   if (strcmp(word, "--help") == 0 || strcmp(word, "-h") == 0 || strcmp(word, "help") == 0) {
-    if (argc > 2) return told(help_of(argv[2]));
+    char option[] = "--help", *help[] = {argv[2], option, NULL};
+    if (argc > 2) return told(run_command(argv[2], 2, help));
     print_help(stdout);
     return told(APP_OK);
   }
-  const command *found = find_command(word);
-  return told(found ? found->run(argc - 1, argv + 1) : unknown(word));
+  return told(run_command(word, argc - 1, argv + 1));
 }
