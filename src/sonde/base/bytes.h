@@ -67,6 +67,12 @@ static inline uint32_t bytes_take_u32(bytes_reader *reader) {
   return (uint32_t)bytes_take(reader, 4);
 }
 static inline uint64_t bytes_take_u64(bytes_reader *reader) { return bytes_take(reader, 8); }
+static inline double bytes_take_f32(bytes_reader *reader) {
+  uint32_t bits = bytes_take_u32(reader);
+  float value;
+  memcpy(&value, &bits, sizeof value);
+  return (double)value;
+}
 static inline double bytes_take_f64(bytes_reader *reader) {
   uint64_t bits = bytes_take_u64(reader);
   double value;

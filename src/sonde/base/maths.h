@@ -22,6 +22,13 @@ static inline sonde_vec3 v_neg(sonde_vec3 a) { return vec3(-a.x, -a.y, -a.z); }
 static inline sonde_vec3 v_madd(sonde_vec3 a, double s, sonde_vec3 b) {
   return vec3(a.x + s * b.x, a.y + s * b.y, a.z + s * b.z);
 }
+// Corners of the box around two points; a coordinate of b that is not a number does not count.
+static inline sonde_vec3 v_min(sonde_vec3 a, sonde_vec3 b) {
+  return vec3(b.x < a.x ? b.x : a.x, b.y < a.y ? b.y : a.y, b.z < a.z ? b.z : a.z);
+}
+static inline sonde_vec3 v_max(sonde_vec3 a, sonde_vec3 b) {
+  return vec3(b.x > a.x ? b.x : a.x, b.y > a.y ? b.y : a.y, b.z > a.z ? b.z : a.z);
+}
 static inline double v_coordinate(sonde_vec3 p, int axis) {
   return axis == 0 ? p.x : axis == 1 ? p.y : p.z;
 }

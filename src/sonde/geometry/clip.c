@@ -1,28 +1,17 @@
 // Volume between a skin triangle and the far side of a convex body, exactly.
 //
-// All is done in barycentric coordinates of the triangle, where every plane of the body is a linear
-// function given by its values at the three corners. The triangle is clipped by the body's planes
-// to a convex polygon. At a point of it the column along `direction` ends at the first plane that
-// it leaves, so its length is the minimum of linear functions t_j = (d_j - n_j.x)/(n_j.direction)
-// over the planes with n_j.direction > 0. The polygon is split until one plane is the minimum on
-// each piece: as all t_j are linear, it is enough to compare them at the corners of a piece. On a
-// piece, t times a shape function is quadratic and the rule of the three edge middles is exact.
-//
-// With the triangle's area vector N (|N| its area, along its outward normal):
+// In barycentric coordinates of the triangle every plane of the body is a linear function, given by
+// its values at the corners. The triangle is clipped by the planes to a convex polygon. There the
+// column along `direction` ends at the first plane that it leaves, so its length is the minimum of
+// linear functions t_j = (d_j - n_j.x)/(n_j.direction) over the planes with n_j.direction > 0. The
+// polygon is split until one t_j is the minimum on each piece; comparing the corners is enough.
+// With the area vector N (|N| the triangle's area, along its outward normal):
 //   volume   = (-N . direction) x mean over the triangle of t, 0 outside the polygon
 //   gradient = N x mean of phi_i (Hadamard: a surface moved by dx sweeps the volume dx . n dA)
-//
-//   clip_triangle    polygon of the part inside the body
-//   cut              one linear function against a polygon
-//   cut_thin         the same where rounding rules
-//   far_planes       the planes that can end a column of this polygon
-//   lowest_plane     the plane that undercuts the present one most at a corner of a piece
-//   split_pieces     pieces with one lowest plane each
-//   add_piece        integrals over a piece
 #include "geometry/internal.h"
 
-// Capacities. A triangle that more planes cut or end than fit here is treated as if the planes
-// beyond were absent (volume too large by what they would cut off); a triangle of the size of the
+// Capacities. A triangle that more planes clip or end than fit here is treated as if the planes
+// beyond were absent (volume too large by what they would clip); a triangle of the size of the
 // body's faces meets a handful.
 enum { MAX_CORNERS = 96, MAX_FAR = 192, ARENA_CORNERS = 1024, MAX_PIECES = 96, MAX_SPLITS = 256 };
 
@@ -38,34 +27,24 @@ typedef struct linear {
 
 // The body's planes and the skin triangle, with a ball around the triangle: one product with the
 // ball's centre tells most planes from those that may matter.
-typedef struct scene {
+typedef struct contact {
   const sonde_vec3 *n;
   const double *d;
   uint32_t planes;
   const sonde_vec3 *x; // [3]
   sonde_vec3 direction, centre;
   double radius;
-} scene;
-
-static scene make_scene(const sonde_vec3 *n, const double *d, uint32_t planes,
-                        const sonde_vec3 x[3], sonde_vec3 direction) {
-  sonde_vec3 centre = v_scale(v_add(x[0], v_add(x[1], x[2])), 1.0 / 3.0);
-  double radius2 = 0;
-  for (int k = 0; k < 3; ++k) radius2 = fmax(radius2, v_norm2(v_sub(x[k], centre)));
-  // A little larger than the ball, to be safe from rounding.
-  double radius = 1.000001 * sqrt(radius2);
-  return (scene){n, d, planes, x, direction, centre, radius};
-}
+} contact;
 
 // Depth of the ball's centre below a plane; of the corners by below_plane.
-static double centre_depth(const scene *s, uint32_t j) {
-  return s->d[j] - v_dot(s->n[j], s->centre);
+static double centre_depth(const contact *c, uint32_t j) {
+  return c->d[j] - v_dot(c->n[j], c->centre);
 }
 
 // scale times the depth below a plane as a function over the triangle.
-static linear below_plane(const scene *s, uint32_t j, double scale) {
+static linear below_plane(const contact *c, uint32_t j, double scale) {
   linear f;
-  for (int k = 0; k < 3; ++k) f.at[k] = scale * (s->d[j] - v_dot(s->n[j], s->x[k]));
+  for (int k = 0; k < 3; ++k) f.at[k] = scale * (c->d[j] - v_dot(c->n[j], c->x[k]));
   return f;
 }
 
@@ -79,10 +58,28 @@ static corner crossing(corner p, corner q, double at_p, double at_q) {
   return (corner){p.u + s * (q.u - p.u), p.v + s * (q.v - p.v)};
 }
 
-// The cut of a polygon so thin that rounding makes f change its sign more than twice around it:
-// only the run of kept corners around the lowest one stays.
-static uint32_t cut_thin(const corner *in, uint32_t count, const double *at, corner *out) {
-  uint32_t first = 0, kept = 0;
+// Keeps the part of the polygon where f <= 0: at most count + 1 corners.
+static uint32_t clip_polygon(const corner *in, uint32_t count, const linear *f, corner *out) {
+  SONDE_ASSERT(in != out && count > 0 && count < MAX_CORNERS);
+  double at[MAX_CORNERS];
+  uint32_t kept = 0, changes = 0;
+  for (uint32_t k = 0; k < count; ++k) at[k] = value(f, in[k]);
+  for (uint32_t k = 0; k < count; ++k)
+    changes += (at[k] > 0) != (at[k + 1 < count ? k + 1 : 0] > 0);
+  if (changes <= 2) {
+    for (uint32_t k = 0; k < count; ++k) {
+      uint32_t next = k + 1 < count ? k + 1 : 0;
+      if (at[k] <= 0) out[kept++] = in[k];
+      if ((at[k] < 0 && at[next] > 0) || (at[k] > 0 && at[next] < 0))
+        out[kept++] = crossing(in[k], in[next], at[k], at[next]);
+    }
+    SONDE_ASSERT(kept <= count + 1);
+    return kept;
+  }
+
+  // The polygon is so thin that rounding makes f change its sign more than twice around it: only
+  // the run of corners with f <= 0 around the lowest one stays.
+  uint32_t first = 0;
   for (uint32_t k = 1; k < count; ++k)
     if (at[k] < at[first]) first = k;
   for (uint32_t steps = 1; steps < count; ++steps) {
@@ -90,10 +87,10 @@ static uint32_t cut_thin(const corner *in, uint32_t count, const double *at, cor
     if (at[before] > 0) break;
     first = before;
   }
-  uint32_t before = first ? first - 1 : count - 1, k = first;
+  uint32_t before = first ? first - 1 : count - 1;
   if (at[before] > 0 && at[first] < 0)
     out[kept++] = crossing(in[before], in[first], at[before], at[first]);
-  while (kept <= count && at[k] <= 0) {
+  for (uint32_t k = first; kept <= count && at[k] <= 0;) {
     uint32_t next = k + 1 < count ? k + 1 : 0;
     out[kept++] = in[k];
     if (at[k] < 0 && at[next] > 0) out[kept++] = crossing(in[k], in[next], at[k], at[next]);
@@ -103,50 +100,6 @@ static uint32_t cut_thin(const corner *in, uint32_t count, const double *at, cor
   return kept;
 }
 
-// Keeps the part of the polygon where f <= 0: at most count + 1 corners.
-static uint32_t cut(const corner *in, uint32_t count, const linear *f, corner *out) {
-  SONDE_ASSERT(in != out && count > 0 && count < MAX_CORNERS);
-  double at[MAX_CORNERS];
-  uint32_t kept = 0, changes = 0;
-  for (uint32_t k = 0; k < count; ++k) at[k] = value(f, in[k]);
-  for (uint32_t k = 0; k < count; ++k)
-    changes += (at[k] > 0) != (at[k + 1 < count ? k + 1 : 0] > 0);
-  if (changes > 2) return cut_thin(in, count, at, out);
-  for (uint32_t k = 0; k < count; ++k) {
-    uint32_t next = k + 1 < count ? k + 1 : 0;
-    if (at[k] <= 0) out[kept++] = in[k];
-    if ((at[k] < 0 && at[next] > 0) || (at[k] > 0 && at[next] < 0))
-      out[kept++] = crossing(in[k], in[next], at[k], at[next]);
-  }
-  SONDE_ASSERT(kept <= count + 1);
-  return kept;
-}
-
-// Polygon of the triangle inside all planes; 0 when there is none.
-static uint32_t clip_triangle(const scene *s, corner *polygon) {
-  corner other[MAX_CORNERS];
-  corner *from = polygon, *to = other;
-  uint32_t count = 3;
-  from[0] = (corner){0, 0};
-  from[1] = (corner){1, 0};
-  from[2] = (corner){0, 1};
-  for (uint32_t j = 0; j < s->planes; ++j) {
-    if (centre_depth(s, j) >= s->radius) continue;
-    linear f = below_plane(s, j, -1);
-    if (f.at[0] <= 0 && f.at[1] <= 0 && f.at[2] <= 0) continue;
-    if (f.at[0] >= 0 && f.at[1] >= 0 && f.at[2] >= 0) return 0;
-    if (count + 1 >= MAX_CORNERS) continue;
-    count = cut(from, count, &f, to);
-    if (count < 3) return 0;
-    corner *swap = from;
-    from = to;
-    to = swap;
-  }
-  SONDE_ASSERT(count <= MAX_CORNERS);
-  for (uint32_t k = 0; k < count && from != polygon; ++k) polygon[k] = from[k];
-  return count;
-}
-
 // ---- column ends --------------------------------------------------------------------------
 
 typedef struct columns {
@@ -154,30 +107,28 @@ typedef struct columns {
   linear length[MAX_FAR]; // of the column, if this plane were the only one
 } columns;
 
-static void range(const linear *f, const corner *polygon, uint32_t count, double *low,
-                  double *high) {
-  *low = *high = value(f, polygon[0]);
-  for (uint32_t k = 1; k < count; ++k) {
-    double t = value(f, polygon[k]);
-    *low = t < *low ? t : *low;
-    *high = t > *high ? t : *high;
-  }
-}
-
 // Collects the planes whose column is somewhere shorter than the least of all longest columns:
 // the others end nowhere first. Drops what a later, lower bound has made superfluous when full.
-static void far_planes(const scene *s, const corner *polygon, uint32_t count, columns *far) {
+static void find_far_planes(const contact *c, const corner *polygon, uint32_t count, columns *far) {
+  SONDE_ASSERT(count >= 3);
   double least[MAX_FAR], bound = INFINITY;
   far->count = 0;
-  for (uint32_t j = 0; j < s->planes; ++j) {
-    double along = v_dot(s->n[j], s->direction), low, high;
-    if (along <= 1e-9) continue;
+  for (uint32_t j = 0; j < c->planes; ++j) {
     // No column in the ball ends sooner at this plane than one of the bound's length.
-    if (centre_depth(s, j) - s->radius >= bound * along) continue;
-    linear t = below_plane(s, j, 1 / along);
-    range(&t, polygon, count, &low, &high);
+    double along = v_dot(c->n[j], c->direction);
+    if (along <= 1e-9 || centre_depth(c, j) - c->radius >= bound * along) continue;
+
+    // shortest and longest column that this plane would end
+    linear t = below_plane(c, j, 1 / along);
+    double low = value(&t, polygon[0]), high = low;
+    for (uint32_t k = 1; k < count; ++k) {
+      double length = value(&t, polygon[k]);
+      low = length < low ? length : low;
+      high = length > high ? length : high;
+    }
     if (low >= bound) continue;
     bound = high < bound ? high : bound;
+
     if (far->count == MAX_FAR) {
       uint32_t kept = 0;
       for (uint32_t k = 0; k < MAX_FAR; ++k) {
@@ -230,34 +181,6 @@ static uint32_t lowest_plane(const columns *far, uint32_t plane, const corner *p
   return best;
 }
 
-// Adds the sub-triangle: weight is twice its area in barycentric coordinates, so that the whole
-// triangle weighs 1.
-static void add_triangle(const linear *t, const corner p[3], integrals *sum) {
-  double weight = (p[1].u - p[0].u) * (p[2].v - p[0].v) - (p[1].v - p[0].v) * (p[2].u - p[0].u);
-  double third = weight / 3;
-  for (int k = 0; k < 3; ++k) {
-    corner q = p[(k + 1) % 3];
-    corner middle = {0.5 * (p[k].u + q.u), 0.5 * (p[k].v + q.v)};
-    double length = third * value(t, middle), rest = 1 - middle.u - middle.v;
-    sum->phi[0] += third * rest;
-    sum->phi[1] += third * middle.u;
-    sum->phi[2] += third * middle.v;
-    sum->t_phi[0] += length * rest;
-    sum->t_phi[1] += length * middle.u;
-    sum->t_phi[2] += length * middle.v;
-  }
-  sum->area += weight;
-}
-
-static void add_piece(const linear *t, const corner *polygon, uint32_t count, integrals *sum) {
-  for (uint32_t k = 0; k < count; ++k) {
-    double length = value(t, polygon[k]);
-    sum->deepest = length > sum->deepest ? length : sum->deepest;
-  }
-  for (uint32_t k = 2; k < count; ++k)
-    add_triangle(t, (corner[3]){polygon[0], polygon[k - 1], polygon[k]}, sum);
-}
-
 // Replaces the top piece by the part where `lower` is not below its plane and, on top of it, the
 // part where it is. False when there is no room.
 static bool split_top(pieces *stack, const columns *far, uint32_t lower) {
@@ -272,9 +195,9 @@ static bool split_top(pieces *stack, const columns *far, uint32_t lower) {
   }
   corner old[MAX_CORNERS];
   for (uint32_t k = 0; k < size; ++k) old[k] = base[k];
-  uint32_t above = cut(old, size, &more, base);
+  uint32_t above = clip_polygon(old, size, &more, base);
   if (above < 3) above = 0;
-  uint32_t below = cut(old, size, &less, base + above);
+  uint32_t below = clip_polygon(old, size, &less, base + above);
   if (above) {
     stack->size[top] = above;
     stack->count++;
@@ -285,10 +208,11 @@ static bool split_top(pieces *stack, const columns *far, uint32_t lower) {
   return true;
 }
 
-static void split_pieces(const columns *far, const corner *polygon, uint32_t count,
-                         integrals *sum) {
-  pieces stack;
+// Splits the polygon into pieces with one lowest plane each and integrates over every piece.
+static void integrate_pieces(const columns *far, const corner *polygon, uint32_t count,
+                             integrals *sum) {
   SONDE_ASSERT(far->count > 0 && count >= 3);
+  pieces stack;
   double slack = 0;
   for (uint32_t k = 0; k < count; ++k) {
     stack.corners[k] = polygon[k];
@@ -297,14 +221,39 @@ static void split_pieces(const columns *far, const corner *polygon, uint32_t cou
   stack.used = stack.size[0] = count;
   stack.plane[0] = 0;
   stack.count = 1;
-  // Where two planes are equal within rounding, each may look lower than the other for ever.
   uint32_t splits = 0;
   while (stack.count) {
+    // Where two planes are equal within rounding, each may look lower than the other for ever.
     uint32_t top = stack.count - 1, size = stack.size[top], plane = stack.plane[top];
     const corner *piece = stack.corners + stack.used - size;
     uint32_t lower = lowest_plane(far, plane, piece, size, slack);
     if (lower != plane && splits++ < MAX_SPLITS && split_top(&stack, far, lower)) continue;
-    add_piece(&far->length[plane], piece, size, sum);
+
+    const linear *t = &far->length[plane];
+    for (uint32_t k = 0; k < size; ++k) {
+      double length = value(t, piece[k]);
+      sum->deepest = length > sum->deepest ? length : sum->deepest;
+    }
+    // t times a shape function is quadratic on a piece: the rule of the three edge middles is exact
+    // on each triangle of its fan. The weight is twice a triangle's area in barycentric
+    // coordinates, so that the whole skin triangle weighs 1.
+    for (uint32_t k = 2; k < size; ++k) {
+      const corner p[3] = {piece[0], piece[k - 1], piece[k]};
+      double weight = (p[1].u - p[0].u) * (p[2].v - p[0].v) - (p[1].v - p[0].v) * (p[2].u - p[0].u);
+      double third = weight / 3;
+      for (int side = 0; side < 3; ++side) {
+        corner q = p[(side + 1) % 3];
+        corner middle = {0.5 * (p[side].u + q.u), 0.5 * (p[side].v + q.v)};
+        double length = third * value(t, middle), rest = 1 - middle.u - middle.v;
+        sum->phi[0] += third * rest;
+        sum->phi[1] += third * middle.u;
+        sum->phi[2] += third * middle.v;
+        sum->t_phi[0] += length * rest;
+        sum->t_phi[1] += length * middle.u;
+        sum->t_phi[2] += length * middle.v;
+      }
+      sum->area += weight;
+    }
     stack.used -= size;
     stack.count--;
   }
@@ -313,17 +262,45 @@ static void split_pieces(const columns *far, const corner *polygon, uint32_t cou
 bool sonde_clip_triangle(const sonde_vec3 *planes_n, const double *planes_d, uint32_t plane_count,
                          const sonde_vec3 corners[3], sonde_vec3 direction,
                          sonde_clip_result *result) {
-  corner polygon[MAX_CORNERS];
-  columns far;
   *result = (sonde_clip_result){0};
-  scene s = make_scene(planes_n, planes_d, plane_count, corners, direction);
-  uint32_t count = clip_triangle(&s, polygon);
-  if (!count) return false;
-  far_planes(&s, polygon, count, &far);
+
+  // ball around the triangle, a little larger than it has to be, to be safe from rounding
+  sonde_vec3 centre = v_scale(v_add(corners[0], v_add(corners[1], corners[2])), 1.0 / 3.0);
+  double radius2 = 0;
+  for (int k = 0; k < 3; ++k) radius2 = fmax(radius2, v_norm2(v_sub(corners[k], centre)));
+  contact c = {
+      planes_n, planes_d, plane_count, corners, direction, centre, 1.000001 * sqrt(radius2)};
+
+  // polygon of the part of the triangle inside all planes
+  corner one[MAX_CORNERS], two[MAX_CORNERS];
+  one[0] = (corner){0, 0};
+  one[1] = (corner){1, 0};
+  one[2] = (corner){0, 1};
+  corner *polygon = one, *other = two;
+  uint32_t count = 3;
+  for (uint32_t j = 0; j < plane_count; ++j) {
+    if (centre_depth(&c, j) >= c.radius) continue;
+    linear f = below_plane(&c, j, -1);
+    if (f.at[0] <= 0 && f.at[1] <= 0 && f.at[2] <= 0) continue;
+    if (f.at[0] >= 0 && f.at[1] >= 0 && f.at[2] >= 0) return false;
+    if (count + 1 >= MAX_CORNERS) continue;
+    count = clip_polygon(polygon, count, &f, other);
+    if (count < 3) return false;
+    corner *swap = polygon;
+    polygon = other;
+    other = swap;
+  }
+  SONDE_ASSERT(count <= MAX_CORNERS);
+
+  // lengths of the columns from the polygon to the far side of the body
+  columns far;
+  find_far_planes(&c, polygon, count, &far);
   if (!far.count) return false;
   integrals sum = {0};
-  split_pieces(&far, polygon, count, &sum);
+  integrate_pieces(&far, polygon, count, &sum);
   if (!(sum.area > 0)) return false;
+
+  // volume, its share per corner and its gradient
   sonde_vec3 area =
       v_scale(v_cross(v_sub(corners[1], corners[0]), v_sub(corners[2], corners[0])), 0.5);
   double facing = -v_dot(area, direction);

@@ -3,15 +3,9 @@
 // The set of differences D = {a - b} is convex and holds the origin exactly when the bodies
 // overlap; its point closest to the origin is the wanted separation. Each round takes the support
 // point w of D towards the origin and finds the closest point v of the simplex with w. |v| bounds
-// the distance from above and v.w/|v| from below: the loop ends when they meet.
-//
-//   sonde_convex_climb    support by hill climbing: on a convex body a local maximum is global
-//   scan                  support by looking at every vertex, for the first call without a cache
-//   on_edge/on_triangle/on_tetrahedron
-//                         closest point of a simplex by signed lengths, areas and volumes
-//                         (Montanari, Petrinic and Barbieri 2017)
-//   on_any_part           the best over all parts of a simplex, when rounding misled the former
-//   improve               one round
+// the distance from above and v.w/|v| from below: the loop ends when they meet. The closest point
+// of a simplex follows from signed lengths, areas and volumes (Montanari, Petrinic and Barbieri
+// 2017).
 #include "geometry/internal.h"
 
 enum { MAX_ROUNDS = 128 };
@@ -21,6 +15,7 @@ enum { MAX_ROUNDS = 128 };
 
 // ---- support ------------------------------------------------------------------------------
 
+// On a convex body a local maximum is a global one.
 uint32_t sonde_convex_climb(const sonde_convex *convex, sonde_vec3 direction, uint32_t start,
                             uint32_t *work) {
   SONDE_ASSERT(start < convex->hull.vertex_count);
@@ -48,6 +43,7 @@ uint32_t sonde_convex_support(const sonde_convex *convex, sonde_vec3 direction, 
   return sonde_convex_climb(convex, direction, start, &work);
 }
 
+// Support by looking at every vertex, for the first call without a cache.
 static uint32_t scan(const sonde_convex *convex, sonde_vec3 direction, uint32_t *work) {
   uint32_t best = 0;
   double height = -INFINITY;
@@ -78,7 +74,7 @@ typedef struct nearest {
   double norm2;
 } nearest;
 
-static nearest place(const simplex *s, const double weight[4]) {
+static nearest weigh(const simplex *s, const double weight[4]) {
   SONDE_ASSERT(s->count >= 1 && s->count <= 4);
   nearest n = {.point = {0, 0, 0}};
   for (uint32_t k = 0; k < s->count; ++k) {
@@ -100,7 +96,7 @@ static nearest on_edge(const simplex *s, int i, int j) {
   double weight[4] = {0};
   weight[i] = 1 - t;
   weight[j] = t;
-  return place(s, weight);
+  return weigh(s, weight);
 }
 
 // Twice the area of (p, q, r) seen along the axis.
@@ -126,7 +122,7 @@ static nearest on_triangle(const simplex *s, int i, int j, int k) {
     weight[j] = part_b / whole;
     weight[k] = part_c / whole;
     weight[i] = 1 - weight[j] - weight[k];
-    if (weight[i] >= 0) return place(s, weight);
+    if (weight[i] >= 0) return weigh(s, weight);
   }
   if (!same_sign(whole, part_a)) keep_closer(&best, on_edge(s, j, k));
   if (!same_sign(whole, part_b)) keep_closer(&best, on_edge(s, i, k));
@@ -158,43 +154,7 @@ static nearest on_tetrahedron(const simplex *s, bool *inside) {
   }
   if (!*inside) return best;
   for (int k = 0; k < 4; ++k) weight[k] /= sum;
-  return place(s, weight);
-}
-
-static nearest on_simplex(const simplex *s, bool *inside) {
-  const double corner[4] = {1, 0, 0, 0};
-  *inside = false;
-  switch (s->count) {
-  case 1: return place(s, corner);
-  case 2: return on_edge(s, 0, 1);
-  case 3: return on_triangle(s, 0, 1, 2);
-  default: return on_tetrahedron(s, inside);
-  }
-}
-
-static nearest on_any_part(const simplex *s) {
-  nearest best = {.norm2 = INFINITY};
-  int count = (int)s->count;
-  for (int i = 0; i < count; ++i)
-    for (int j = i + 1; j < count; ++j) {
-      keep_closer(&best, on_edge(s, i, j));
-      for (int k = j + 1; k < count; ++k) keep_closer(&best, on_triangle(s, i, j, k));
-    }
-  return best;
-}
-
-// Drops the corners that the closest point does not need.
-static void reduce(simplex *s, const nearest *n) {
-  uint32_t kept = 0;
-  for (uint32_t k = 0; k < s->count; ++k) {
-    if (!(n->weight[k] > 0)) continue;
-    s->w[kept] = s->w[k];
-    s->a[kept] = s->a[k];
-    s->b[kept] = s->b[k];
-    s->weight[kept++] = n->weight[k];
-  }
-  s->count = kept;
-  SONDE_ASSERT(kept <= 4);
+  return weigh(s, weight);
 }
 
 // ---- rounds -------------------------------------------------------------------------------
@@ -233,84 +193,44 @@ static void append_support(search *g) {
   g->s.w[k] = difference(g, g->last_a, g->last_b);
 }
 
-static bool known(const simplex *s) {
-  uint32_t last = s->count - 1;
-  SONDE_ASSERT(s->count >= 1);
-  for (uint32_t k = 0; k < last; ++k)
-    if (s->a[k] == s->a[last] && s->b[k] == s->b[last]) return true;
-  return false;
-}
-
-// Takes over the closest point of the simplex; false when that is no progress.
+// Takes over the closest point of the simplex and drops the corners that it does not need; false
+// when that is no progress.
 static bool settle(search *g) {
-  bool inside;
-  nearest n = on_simplex(&g->s, &inside);
-  if (!inside && !(n.norm2 < g->norm2) && g->s.count > 1) n = on_any_part(&g->s);
+  simplex *s = &g->s;
+  SONDE_ASSERT(s->count >= 1 && s->count <= 4);
+  const double corner[4] = {1, 0, 0, 0};
+  bool inside = false;
+  nearest n;
+  switch (s->count) {
+  case 1: n = weigh(s, corner); break;
+  case 2: n = on_edge(s, 0, 1); break;
+  case 3: n = on_triangle(s, 0, 1, 2); break;
+  default: n = on_tetrahedron(s, &inside); break;
+  }
+  // When rounding misled the signs, the best over all edges and triangles counts.
+  if (!inside && !(n.norm2 < g->norm2) && s->count > 1) {
+    n.norm2 = INFINITY;
+    for (int i = 0; i < (int)s->count; ++i)
+      for (int j = i + 1; j < (int)s->count; ++j) {
+        keep_closer(&n, on_edge(s, i, j));
+        for (int k = j + 1; k < (int)s->count; ++k) keep_closer(&n, on_triangle(s, i, j, k));
+      }
+  }
   if (!inside && !(n.norm2 < g->norm2)) return false;
-  reduce(&g->s, &n);
+
+  uint32_t kept = 0;
+  for (uint32_t k = 0; k < s->count; ++k) {
+    if (!(n.weight[k] > 0)) continue;
+    s->w[kept] = s->w[k];
+    s->a[kept] = s->a[k];
+    s->b[kept] = s->b[k];
+    s->weight[kept++] = n.weight[k];
+  }
+  s->count = kept;
   g->v = n.point;
   g->norm2 = n.norm2;
   g->overlap = inside || n.norm2 <= TOUCH_M * TOUCH_M;
   return true;
-}
-
-// One round; false when the search has ended.
-static bool improve(search *g) {
-  simplex before = g->s;
-  append_support(g);
-  ++g->rounds;
-  double gap = g->norm2 - v_dot(g->v, g->s.w[g->s.count - 1]);
-  bool met = gap <= GAP_M * sqrt(g->norm2);
-  if (met || known(&g->s) || !settle(g)) {
-    g->s = before;
-    return false;
-  }
-  return !g->overlap;
-}
-
-static void begin_cold(search *g) {
-  g->cold = true;
-  g->v = v_neg(g->offset);
-  if (!(v_norm2(g->v) > 0)) g->v = vec3(1, 0, 0);
-  append_support(g);
-  ++g->rounds;
-}
-
-static bool cache_fits(const search *g, const sonde_gjk_cache *cache) {
-  if (cache->count == 0 || cache->count > 4) return false;
-  for (uint32_t k = 0; k < cache->count; ++k)
-    if (cache->a[k] >= g->a->hull.vertex_count || cache->b[k] >= g->b->hull.vertex_count)
-      return false;
-  return true;
-}
-
-static void begin(search *g, const sonde_gjk_cache *cache) {
-  if (!cache || !cache_fits(g, cache)) {
-    begin_cold(g);
-    return;
-  }
-  g->s.count = cache->count;
-  g->last_a = cache->a[0];
-  g->last_b = cache->b[0];
-  for (uint32_t k = 0; k < cache->count; ++k) {
-    g->s.a[k] = cache->a[k];
-    g->s.b[k] = cache->b[k];
-    g->s.w[k] = difference(g, cache->a[k], cache->b[k]);
-  }
-}
-
-static sonde_gjk_result finish(const search *g, sonde_pose world_from_a, sonde_pose world_from_b) {
-  sonde_vec3 on_a = vec3(0, 0, 0), on_b = vec3(0, 0, 0);
-  for (uint32_t k = 0; k < g->s.count; ++k) {
-    on_a = v_madd(on_a, g->s.weight[k], g->a->hull.vertices[g->s.a[k]]);
-    on_b = v_madd(on_b, g->s.weight[k], g->b->hull.vertices[g->s.b[k]]);
-  }
-  return (sonde_gjk_result){.distance_m = g->overlap ? 0 : sqrt(g->norm2),
-                            .point_a_m = pose_apply(world_from_a, on_a),
-                            .point_b_m = pose_apply(world_from_b, on_b),
-                            .iterations = g->rounds,
-                            .support_calls = g->work,
-                            .overlap = g->overlap};
 }
 
 sonde_gjk_result sonde_gjk_distance(const sonde_convex *a, sonde_pose world_from_a,
@@ -320,15 +240,63 @@ sonde_gjk_result sonde_gjk_distance(const sonde_convex *a, sonde_pose world_from
   sonde_pose relative = pose_mul(pose_inverse(world_from_a), world_from_b);
   search g = {.a = a, .b = b, .offset = relative.position, .norm2 = INFINITY};
   g.a_from_b = q_matrix(relative.rotation);
-  begin(&g, cache);
+  simplex *s = &g.s;
+
+  // The last call's simplex, when the cache has one of these bodies; else one support point.
+  bool warm = cache && cache->count >= 1 && cache->count <= 4;
+  for (uint32_t k = 0; warm && k < cache->count; ++k)
+    warm = cache->a[k] < a->hull.vertex_count && cache->b[k] < b->hull.vertex_count;
+  for (uint32_t k = 0; warm && k < cache->count; ++k) {
+    s->a[k] = cache->a[k];
+    s->b[k] = cache->b[k];
+    s->w[k] = difference(&g, cache->a[k], cache->b[k]);
+  }
+  if (warm) {
+    s->count = cache->count;
+    g.last_a = cache->a[0];
+    g.last_b = cache->b[0];
+  } else {
+    g.cold = true;
+    g.v = v_neg(g.offset);
+    if (!(v_norm2(g.v) > 0)) g.v = vec3(1, 0, 0);
+    append_support(&g);
+    ++g.rounds;
+  }
+
   bool going = settle(&g) && !g.overlap;
-  while (going && g.rounds < MAX_ROUNDS) going = improve(&g);
+  while (going && g.rounds < MAX_ROUNDS) {
+    simplex before = *s;
+    append_support(&g);
+    ++g.rounds;
+    // The bounds have met, or the support point is already a corner of the simplex.
+    uint32_t last = s->count - 1;
+    double gap = g.norm2 - v_dot(g.v, s->w[last]);
+    bool ended = gap <= GAP_M * sqrt(g.norm2);
+    for (uint32_t k = 0; k < last; ++k)
+      ended = ended || (s->a[k] == s->a[last] && s->b[k] == s->b[last]);
+    if (ended || !settle(&g)) {
+      *s = before;
+      break;
+    }
+    going = !g.overlap;
+  }
+
   if (cache) {
-    *cache = (sonde_gjk_cache){.count = g.s.count};
-    for (uint32_t k = 0; k < g.s.count; ++k) {
-      cache->a[k] = g.s.a[k];
-      cache->b[k] = g.s.b[k];
+    *cache = (sonde_gjk_cache){.count = s->count};
+    for (uint32_t k = 0; k < s->count; ++k) {
+      cache->a[k] = s->a[k];
+      cache->b[k] = s->b[k];
     }
   }
-  return finish(&g, world_from_a, world_from_b);
+  sonde_vec3 on_a = vec3(0, 0, 0), on_b = vec3(0, 0, 0);
+  for (uint32_t k = 0; k < s->count; ++k) {
+    on_a = v_madd(on_a, s->weight[k], a->hull.vertices[s->a[k]]);
+    on_b = v_madd(on_b, s->weight[k], b->hull.vertices[s->b[k]]);
+  }
+  return (sonde_gjk_result){.distance_m = g.overlap ? 0 : sqrt(g.norm2),
+                            .point_a_m = pose_apply(world_from_a, on_a),
+                            .point_b_m = pose_apply(world_from_b, on_b),
+                            .iterations = g.rounds,
+                            .support_calls = g.work,
+                            .overlap = g.overlap};
 }

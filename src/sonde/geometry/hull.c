@@ -4,13 +4,6 @@
 // sign of the volume of four points can be decided exactly in 128-bit integers. A face is visible
 // from a point only when the point lies strictly outside it; with exact signs the visible faces
 // always form one patch and no flat face can arise. Floating point decides the clear cases first.
-//
-//   snap             integer coordinates
-//   outside          exact side of a point; height is its distance above a face
-//   first_simplex    four points that span a volume
-//   see              the faces visible from a point, and the horizon around them
-//   cone             new faces from the horizon to the point
-//   hand_over        points of the removed faces go to the new face that they are highest above
 #include "geometry/internal.h"
 
 #include <string.h>
@@ -36,9 +29,8 @@ typedef struct hull {
   uint32_t *next; // list of the points outside each face
   face *faces;
   uint32_t face_count, face_room;
-  uint32_t *stack, *seen, *rim_face; // scratch
-  uint32_t stack_room, seen_count, seen_room, rim_count, rim_room;
-  uint32_t *rim_side, rim_side_room;
+  uint32_t *seen, *rim; // faces visible from a point; sides around them, 3 face + side
+  uint32_t seen_count, seen_room, rim_count, rim_room;
   uint32_t *from_vertex; // [point_count] new face whose rim side starts there
   double tolerance;      // in grid steps
 } hull;
@@ -46,24 +38,6 @@ typedef struct hull {
 // ---- grid ---------------------------------------------------------------------------------
 
 static sonde_vec3 as_vector(grid_point p) { return vec3((double)p.x, (double)p.y, (double)p.z); }
-
-static double snap(hull *h, const sonde_vec3 *points) {
-  SONDE_ASSERT(h->point_count > 0);
-  sonde_vec3 low = points[0], high = points[0];
-  for (uint32_t i = 1; i < h->point_count; ++i) {
-    sonde_vec3 p = points[i];
-    low = vec3(fmin(low.x, p.x), fmin(low.y, p.y), fmin(low.z, p.z));
-    high = vec3(fmax(high.x, p.x), fmax(high.y, p.y), fmax(high.z, p.z));
-  }
-  sonde_vec3 size = v_sub(high, low);
-  double extent = fmax(size.x, fmax(size.y, size.z));
-  double steps_per_m = extent > 0 ? 0x1p39 / extent : 1;
-  for (uint32_t i = 0; i < h->point_count; ++i) {
-    sonde_vec3 p = v_scale(v_sub(points[i], low), steps_per_m);
-    h->points[i] = (grid_point){llround(p.x), llround(p.y), llround(p.z)};
-  }
-  return steps_per_m;
-}
 
 // Exact normal (b - a) x (c - a): entries below 2^80.
 static void exact_normal(grid_point a, grid_point b, grid_point c, wide n[3]) {
@@ -89,6 +63,7 @@ static bool outside(const hull *h, const face *f, uint32_t point) {
 
 // ---- storage ------------------------------------------------------------------------------
 
+// Room for one more item.
 static bool reserve(void **items, uint32_t count, uint32_t *room, size_t size) {
   if (count < *room) return true;
   uint32_t wanted = *room ? 2 * *room : 64;
@@ -123,69 +98,6 @@ static uint32_t add_face(hull *h, uint32_t a, uint32_t b, uint32_t c) {
   return h->face_count++;
 }
 
-static void hull_clear(hull *h) {
-  sonde_free(h->points);
-  sonde_free(h->next);
-  sonde_free(h->faces);
-  sonde_free(h->stack);
-  sonde_free(h->seen);
-  sonde_free(h->rim_face);
-  sonde_free(h->rim_side);
-  sonde_free(h->from_vertex);
-}
-
-// ---- first simplex ------------------------------------------------------------------------
-
-typedef double (*measure_fn)(const sonde_vec3 *base, sonde_vec3 p);
-
-static double from_point(const sonde_vec3 *base, sonde_vec3 p) { return v_distance(base[0], p); }
-static double from_line(const sonde_vec3 *base, sonde_vec3 p) {
-  sonde_vec3 along = v_unit(v_sub(base[1], base[0]), vec3(0, 0, 0));
-  return v_norm(v_cross(along, v_sub(p, base[0])));
-}
-static double from_plane(const sonde_vec3 *base, sonde_vec3 p) {
-  sonde_vec3 n = v_cross(v_sub(base[1], base[0]), v_sub(base[2], base[0]));
-  return fabs(v_dot(v_unit(n, vec3(0, 0, 0)), v_sub(p, base[0])));
-}
-
-// Point with the largest measure against the points chosen so far.
-static uint32_t farthest(const hull *h, measure_fn measure, const uint32_t *chosen, int count,
-                         double *value) {
-  sonde_vec3 base[3];
-  uint32_t best = 0;
-  for (int k = 0; k < count; ++k) base[k] = as_vector(h->points[chosen[k]]);
-  *value = -1;
-  for (uint32_t i = 0; i < h->point_count; ++i) {
-    double m = measure(base, as_vector(h->points[i]));
-    if (m > *value) {
-      *value = m;
-      best = i;
-    }
-  }
-  return best;
-}
-
-// False when the points lie in one plane, within 1e-9 of their extent.
-static bool first_simplex(const hull *h, uint32_t v[4]) {
-  static const measure_fn measures[] = {from_point, from_line, from_plane};
-  double value;
-  v[0] = 0;
-  v[0] = farthest(h, from_point, v, 1, &value);
-  for (int k = 1; k < 4; ++k) {
-    v[k] = farthest(h, measures[k - 1], v, k, &value);
-    if (value < 1e-9 * 0x1p39) return false;
-  }
-  wide n[3];
-  grid_point a = h->points[v[0]], p = h->points[v[3]];
-  exact_normal(a, h->points[v[1]], h->points[v[2]], n);
-  if (n[0] * (p.x - a.x) + n[1] * (p.y - a.y) + n[2] * (p.z - a.z) > 0) {
-    uint32_t keep = v[1];
-    v[1] = v[2];
-    v[2] = keep;
-  }
-  return true;
-}
-
 // ---- growth -------------------------------------------------------------------------------
 
 // Gives the point to the face among [from, to) that it is highest above, if it is above any.
@@ -210,11 +122,36 @@ static void assign(hull *h, uint32_t point, uint32_t from, uint32_t to) {
   }
 }
 
+// Tetrahedron of points far from each other: the farthest from the first point, from that one, from
+// the line and from the plane of those chosen before. All other points go to its faces.
 static sonde_status begin(hull *h, sonde_error *error) {
-  uint32_t v[4];
-  if (!first_simplex(h, v))
-    return sonde_fail(error, SONDE_MESH,
-                      "the points lie in one plane, expected points that span a volume");
+  uint32_t v[4] = {0};
+  sonde_vec3 base[3] = {as_vector(h->points[0])}, none = vec3(0, 0, 0), line = none, plane = none;
+  for (int k = 0; k < 4; ++k) {
+    double farthest = -1;
+    for (uint32_t i = 0; i < h->point_count; ++i) {
+      sonde_vec3 from = v_sub(as_vector(h->points[i]), base[0]);
+      double distance = k < 2    ? v_norm(from)
+                        : k == 2 ? v_norm(v_cross(line, from))
+                                 : fabs(v_dot(plane, from));
+      if (distance > farthest) farthest = distance, v[k] = i;
+    }
+    if (k > 0 && farthest < 1e-9 * 0x1p39)
+      return sonde_fail(error, SONDE_MESH,
+                        "the points lie in one plane, expected points that span a volume");
+    if (k < 3) base[k] = as_vector(h->points[v[k]]);
+    if (k == 1) line = v_unit(v_sub(base[1], base[0]), none);
+    if (k == 2) plane = v_unit(v_cross(v_sub(base[1], base[0]), v_sub(base[2], base[0])), none);
+  }
+  // The fourth point lies below the face of the others.
+  wide n[3];
+  grid_point a = h->points[v[0]], p = h->points[v[3]];
+  exact_normal(a, h->points[v[1]], h->points[v[2]], n);
+  if (n[0] * (p.x - a.x) + n[1] * (p.y - a.y) + n[2] * (p.z - a.z) > 0) {
+    uint32_t swap = v[1];
+    v[1] = v[2];
+    v[2] = swap;
+  }
   static const int corners[4][3] = {{0, 1, 2}, {0, 2, 3}, {0, 3, 1}, {1, 3, 2}};
   static const uint32_t beside[4][3] = {{2, 3, 1}, {0, 3, 2}, {1, 3, 0}, {2, 1, 0}};
   for (int k = 0; k < 4; ++k) {
@@ -226,50 +163,39 @@ static sonde_status begin(hull *h, sonde_error *error) {
   return SONDE_OK;
 }
 
-// Collects the faces visible from the point and the sides that border them; false: no memory.
-static bool see(hull *h, uint32_t start, uint32_t point) {
-  h->seen_count = h->rim_count = 0;
+// Replaces the faces visible from the point by a cone from it to the horizon around them; `start`
+// is one of them. False: no memory.
+static bool add_point(hull *h, uint32_t start, uint32_t point) {
   SONDE_ASSERT(outside(h, &h->faces[start], point));
+  h->seen_count = h->rim_count = 0;
   h->faces[start].visible = true;
   if (!push(&h->seen, &h->seen_count, &h->seen_room, start)) return false;
-  for (uint32_t i = 0; i < h->seen_count; ++i)
-    for (uint32_t k = 0; k < 3; ++k) {
-      uint32_t other = h->faces[h->seen[i]].beside[k];
-      if (h->faces[other].visible) continue;
-      if (outside(h, &h->faces[other], point)) {
-        h->faces[other].visible = true;
-        if (!push(&h->seen, &h->seen_count, &h->seen_room, other)) return false;
-        continue;
-      }
-      uint32_t sides = h->rim_count;
-      if (!push(&h->rim_side, &sides, &h->rim_side_room, k)) return false;
-      if (!push(&h->rim_face, &h->rim_count, &h->rim_room, h->seen[i])) return false;
+  for (uint32_t i = 0; i < 3 * h->seen_count; ++i) {
+    uint32_t side = 3 * h->seen[i / 3] + i % 3, other = h->faces[side / 3].beside[side % 3];
+    if (h->faces[other].visible) continue;
+    if (outside(h, &h->faces[other], point)) {
+      h->faces[other].visible = true;
+      if (!push(&h->seen, &h->seen_count, &h->seen_room, other)) return false;
+    } else if (!push(&h->rim, &h->rim_count, &h->rim_room, side)) {
+      return false;
     }
-  return true;
-}
+  }
 
-// Points the face across the rim at the new face.
-static void connect(hull *h, uint32_t across, uint32_t old, uint32_t start, uint32_t fresh) {
-  uint32_t k = 0;
-  face *other = &h->faces[across];
-  while (k < 3 && (other->beside[k] != old || other->v[(k + 1) % 3] != start)) ++k;
-  SONDE_ASSERT(k < 3);
-  other->beside[k] = fresh;
-}
-
-// New faces (start, end, point) along the rim, connected around the point; false: no memory.
-static bool cone(hull *h, uint32_t point) {
+  // New faces (from, to, point) along the horizon; the face across points at the new one.
   uint32_t first = h->face_count;
   SONDE_ASSERT(h->rim_count >= 3);
   for (uint32_t i = 0; i < h->rim_count; ++i) {
-    uint32_t old = h->rim_face[i], k = h->rim_side[i];
-    uint32_t start = h->faces[old].v[k], end = h->faces[old].v[(k + 1) % 3];
-    uint32_t across = h->faces[old].beside[k];
-    uint32_t fresh = add_face(h, start, end, point);
+    uint32_t old = h->rim[i] / 3, k = h->rim[i] % 3, across = h->faces[old].beside[k];
+    uint32_t from = h->faces[old].v[k], to = h->faces[old].v[(k + 1) % 3];
+    uint32_t fresh = add_face(h, from, to, point);
     if (fresh == SONDE_NONE) return false;
     h->faces[fresh].beside[0] = across;
-    connect(h, across, old, start, fresh);
-    h->from_vertex[start] = fresh;
+    h->from_vertex[from] = fresh;
+    face *other = &h->faces[across];
+    uint32_t back = 0;
+    while (back < 3 && (other->beside[back] != old || other->v[(back + 1) % 3] != from)) ++back;
+    SONDE_ASSERT(back < 3);
+    other->beside[back] = fresh;
   }
   for (uint32_t f = first; f < h->face_count; ++f) {
     uint32_t follower = h->from_vertex[h->faces[f].v[1]];
@@ -277,34 +203,21 @@ static bool cone(hull *h, uint32_t point) {
     h->faces[f].beside[1] = follower;
     h->faces[follower].beside[2] = f;
   }
-  return true;
-}
 
-static void hand_over(hull *h, uint32_t first_new, uint32_t point) {
+  // The points of the removed faces go to the new face that they are highest above.
   for (uint32_t i = 0; i < h->seen_count; ++i) {
     face *old = &h->faces[h->seen[i]];
     old->alive = false;
     for (uint32_t p = old->first_point, next; p != SONDE_NONE; p = next) {
       next = h->next[p];
-      if (p != point) assign(h, p, first_new, h->face_count);
+      if (p != point) assign(h, p, first, h->face_count);
     }
     old->first_point = SONDE_NONE;
   }
+  return true;
 }
 
-// Adds the highest point of each face until no face has a point above the tolerance. New faces are
-// appended, so one walk over the growing list visits all.
-static sonde_status grow(hull *h, sonde_error *error) {
-  for (uint32_t f = 0; f < h->face_count; ++f) {
-    if (!h->faces[f].alive || h->faces[f].highest == SONDE_NONE) continue;
-    if (h->tolerance > 0 && h->faces[f].height <= h->tolerance) continue;
-    uint32_t point = h->faces[f].highest, first_new = h->face_count;
-    if (!see(h, f, point) || !cone(h, point)) return sonde_fail_memory(error);
-    hand_over(h, first_new, point);
-  }
-  return SONDE_OK;
-}
-
+// The mesh of the living faces, with the points that they use.
 static sonde_status collect(const hull *h, const sonde_vec3 *points, sonde_mesh *mesh,
                             sonde_error *error) {
   uint32_t faces = 0, vertices = 0;
@@ -343,13 +256,37 @@ sonde_status sonde_hull_mesh(const sonde_vec3 *points, uint32_t count, double to
   h.next = SONDE_NEW(uint32_t, count);
   h.from_vertex = SONDE_NEW(uint32_t, count);
   sonde_status status = SONDE_OK;
-  if (h.points && h.next && h.from_vertex)
-    h.tolerance = tolerance_m * snap(&h, points);
-  else
-    status = sonde_fail_memory(error);
-  if (!status) status = begin(&h, error);
-  if (!status) status = grow(&h, error);
+  if (!h.points || !h.next || !h.from_vertex) status = sonde_fail_memory(error);
+  if (!status) {
+    // coordinates in grid steps
+    sonde_vec3 low = points[0], high = points[0];
+    for (uint32_t i = 1; i < count; ++i) {
+      low = v_min(low, points[i]);
+      high = v_max(high, points[i]);
+    }
+    sonde_vec3 size = v_sub(high, low);
+    double extent = fmax(size.x, fmax(size.y, size.z));
+    double steps_per_m = extent > 0 ? 0x1p39 / extent : 1;
+    for (uint32_t i = 0; i < count; ++i) {
+      sonde_vec3 p = v_scale(v_sub(points[i], low), steps_per_m);
+      h.points[i] = (grid_point){llround(p.x), llround(p.y), llround(p.z)};
+    }
+    h.tolerance = tolerance_m * steps_per_m;
+    status = begin(&h, error);
+  }
+  // The highest point of each face, until no face has one above the tolerance. New faces are
+  // appended, so one walk over the growing list visits all.
+  for (uint32_t f = 0; f < h.face_count && !status; ++f) {
+    if (!h.faces[f].alive || h.faces[f].highest == SONDE_NONE) continue;
+    if (h.tolerance > 0 && h.faces[f].height <= h.tolerance) continue;
+    if (!add_point(&h, f, h.faces[f].highest)) status = sonde_fail_memory(error);
+  }
   if (!status) status = collect(&h, points, mesh, error);
-  hull_clear(&h);
+  sonde_free(h.points);
+  sonde_free(h.next);
+  sonde_free(h.faces);
+  sonde_free(h.seen);
+  sonde_free(h.rim);
+  sonde_free(h.from_vertex);
   return status;
 }

@@ -1,10 +1,4 @@
 // Triangle meshes in memory and what can be measured on them.
-//
-//   sonde_mesh_create/clear/copy   the arrays
-//   sonde_half_edges_sort          sides of all faces, grouped by edge (counting sort, linear time)
-//   sonde_mesh_inspect             closed, outward, edges, angles, area, volume
-//   sonde_mesh_mass                mass, centre and inertia of the enclosed solid
-//   sonde_mesh_normals/areas       per-vertex normal and area
 #include "geometry/internal.h"
 
 #include <string.h>
@@ -37,20 +31,6 @@ sonde_status sonde_mesh_copy(const sonde_mesh *mesh, sonde_mesh *copy, sonde_err
   return SONDE_OK;
 }
 
-static sonde_status check_indices(const sonde_mesh *mesh, sonde_error *error) {
-  for (uint32_t f = 0; f < mesh->face_count; ++f)
-    for (int k = 0; k < 3; ++k)
-      if (mesh->faces[f][k] >= mesh->vertex_count)
-        return sonde_fail(error, SONDE_MESH, "face %u names vertex %u, but there are only %u", f,
-                          mesh->faces[f][k], mesh->vertex_count);
-  return SONDE_OK;
-}
-
-static sonde_half_edge half_edge(const sonde_mesh *mesh, uint32_t face, int side) {
-  uint32_t a = mesh->faces[face][side], b = mesh->faces[face][(side + 1) % 3];
-  return a < b ? (sonde_half_edge){a, b, face, 1} : (sonde_half_edge){b, a, face, 0};
-}
-
 // Stable counting sort by low (or high) end; `start` has vertex_count + 1 entries.
 static void sort_by_end(const sonde_half_edge *in, sonde_half_edge *out, size_t count, bool by_low,
                         size_t *start, uint32_t vertices) {
@@ -64,70 +44,33 @@ static void sort_by_end(const sonde_half_edge *in, sonde_half_edge *out, size_t 
 sonde_status sonde_half_edges_sort(const sonde_mesh *mesh, sonde_half_edge **sorted,
                                    sonde_error *error) {
   *sorted = NULL;
-  sonde_status status = check_indices(mesh, error);
-  if (status) return status;
+  for (uint32_t f = 0; f < mesh->face_count; ++f)
+    for (int k = 0; k < 3; ++k)
+      if (mesh->faces[f][k] >= mesh->vertex_count)
+        return sonde_fail(error, SONDE_MESH, "face %u names vertex %u, but there are only %u", f,
+                          mesh->faces[f][k], mesh->vertex_count);
   size_t count = 3 * (size_t)mesh->face_count;
   sonde_half_edge *edges = SONDE_NEW(sonde_half_edge, count);
   sonde_half_edge *scratch = SONDE_NEW(sonde_half_edge, count);
   size_t *start = SONDE_NEW(size_t, mesh->vertex_count + (size_t)1);
   if (edges && scratch && start) {
-    for (size_t i = 0; i < count; ++i) edges[i] = half_edge(mesh, (uint32_t)(i / 3), (int)(i % 3));
+    for (size_t i = 0; i < count; ++i) {
+      uint32_t face = (uint32_t)(i / 3), a = mesh->faces[face][i % 3];
+      uint32_t b = mesh->faces[face][(i + 1) % 3];
+      edges[i] = a < b ? (sonde_half_edge){a, b, face, 1} : (sonde_half_edge){b, a, face, 0};
+    }
     sort_by_end(edges, scratch, count, false, start, mesh->vertex_count);
     sort_by_end(scratch, edges, count, true, start, mesh->vertex_count);
     *sorted = edges;
     edges = NULL;
-  } else {
-    status = sonde_fail_memory(error);
   }
   sonde_free(edges);
   sonde_free(scratch);
   sonde_free(start);
-  return status;
+  return *sorted ? SONDE_OK : sonde_fail_memory(error);
 }
 
 // ---- inspection ---------------------------------------------------------------------------
-
-// Reads one group of half edges that share an edge; returns whether it closes.
-static bool inspect_edge(const sonde_half_edge *group, size_t size, const sonde_mesh *mesh,
-                         sonde_mesh_report *report) {
-  if (group->low == group->high) return false;
-  double length = v_distance(mesh->vertices[group->low], mesh->vertices[group->high]);
-  if (!report->edge_count || length < report->shortest_edge_m) report->shortest_edge_m = length;
-  if (length > report->longest_edge_m) report->longest_edge_m = length;
-  report->mean_edge_m += length;
-  report->edge_count++;
-  if (size == 1) report->boundary_edges++;
-  return size == 2 && group[0].forward != group[1].forward;
-}
-
-static sonde_status inspect_edges(const sonde_mesh *mesh, sonde_mesh_report *report,
-                                  sonde_error *error) {
-  sonde_half_edge *edges = NULL;
-  sonde_status status = sonde_half_edges_sort(mesh, &edges, error);
-  if (status) return status;
-  size_t count = 3 * (size_t)mesh->face_count, next;
-  report->closed = count > 0;
-  for (size_t i = 0; i < count; i = next) {
-    for (next = i + 1; next < count; ++next)
-      if (edges[next].low != edges[i].low || edges[next].high != edges[i].high) break;
-    if (!inspect_edge(edges + i, next - i, mesh, report)) report->closed = false;
-  }
-  if (report->edge_count) report->mean_edge_m /= report->edge_count;
-  sonde_free(edges);
-  return SONDE_OK;
-}
-
-// A face with a repeated vertex or without area compared with its longest side.
-static bool degenerate(const sonde_mesh *mesh, uint32_t face, double area) {
-  const uint32_t *f = mesh->faces[face];
-  double longest2 = 0;
-  for (int k = 0; k < 3; ++k) {
-    if (f[k] == f[(k + 1) % 3]) return true;
-    sonde_vec3 side = v_sub(mesh->vertices[f[k]], mesh->vertices[f[(k + 1) % 3]]);
-    longest2 = fmax(longest2, v_norm2(side));
-  }
-  return !(area > 1e-12 * longest2);
-}
 
 static int compare_triples(const void *a, const void *b) {
   const uint32_t *x = a, *y = b;
@@ -138,14 +81,39 @@ static int compare_triples(const void *a, const void *b) {
 
 static void swap_down(uint32_t *low, uint32_t *high) {
   if (*low <= *high) return;
-  uint32_t keep = *low;
+  uint32_t swap = *low;
   *low = *high;
-  *high = keep;
+  *high = swap;
 }
 
-// Faces that have the same three vertices as another one.
-static sonde_status count_duplicates(const sonde_mesh *mesh, uint32_t *duplicates,
-                                     sonde_error *error) {
+sonde_status sonde_mesh_inspect(const sonde_mesh *mesh, sonde_mesh_report *report,
+                                sonde_error *error) {
+  SONDE_ASSERT(mesh != NULL && report != NULL);
+  *report = (sonde_mesh_report){0};
+  sonde_half_edge *sides = NULL;
+  sonde_status status = sonde_half_edges_sort(mesh, &sides, error);
+  if (status) return status;
+
+  // Length of each edge; a closed surface has two sides of opposite direction at every one.
+  size_t count = 3 * (size_t)mesh->face_count, next;
+  report->closed = count > 0;
+  for (size_t i = 0; i < count; i = next) {
+    for (next = i + 1; next < count; ++next)
+      if (sides[next].low != sides[i].low || sides[next].high != sides[i].high) break;
+    bool pair = next - i == 2 && sides[i].forward != sides[i + 1].forward;
+    if (!pair || sides[i].low == sides[i].high) report->closed = false;
+    if (sides[i].low == sides[i].high) continue;
+    double length = v_distance(mesh->vertices[sides[i].low], mesh->vertices[sides[i].high]);
+    if (!report->edge_count || length < report->shortest_edge_m) report->shortest_edge_m = length;
+    if (length > report->longest_edge_m) report->longest_edge_m = length;
+    report->mean_edge_m += length;
+    report->edge_count++;
+    if (next - i == 1) report->boundary_edges++;
+  }
+  if (report->edge_count) report->mean_edge_m /= report->edge_count;
+  sonde_free(sides);
+
+  // Faces that have the same three vertices as another one.
   uint32_t(*sorted)[3] = sonde_calloc(mesh->face_count, sizeof *sorted);
   if (!sorted) return sonde_fail_memory(error);
   for (uint32_t f = 0; f < mesh->face_count; ++f) {
@@ -156,71 +124,33 @@ static sonde_status count_duplicates(const sonde_mesh *mesh, uint32_t *duplicate
   }
   qsort(sorted, mesh->face_count, sizeof *sorted, compare_triples);
   for (uint32_t f = 1; f < mesh->face_count; ++f)
-    if (!compare_triples(sorted[f - 1], sorted[f])) ++*duplicates;
+    if (!compare_triples(sorted[f - 1], sorted[f])) report->duplicate_or_degenerate_faces++;
   sonde_free(sorted);
-  return SONDE_OK;
-}
 
-static void inspect_faces(const sonde_mesh *mesh, sonde_mesh_report *report) {
+  // Area, enclosed volume and angles; faces with a repeated vertex or without area compared with
+  // their longest side.
   report->smallest_angle_rad = mesh->face_count ? SONDE_PI : 0;
   sonde_vec3 origin = mesh->vertex_count ? mesh->vertices[0] : vec3(0, 0, 0);
   for (uint32_t f = 0; f < mesh->face_count; ++f) {
+    const uint32_t *v = mesh->faces[f];
     sonde_vec3 cross = sonde_face_cross(mesh, f);
-    double area = 0.5 * v_norm(cross);
+    double area = 0.5 * v_norm(cross), longest2 = 0;
     report->area_m2 += area;
-    report->volume_m3 += v_dot(v_sub(mesh->vertices[mesh->faces[f][0]], origin), cross) / 6.0;
-    if (degenerate(mesh, f, area)) report->duplicate_or_degenerate_faces++;
+    report->volume_m3 += v_dot(v_sub(mesh->vertices[v[0]], origin), cross) / 6.0;
     for (int k = 0; k < 3; ++k) {
-      const uint32_t *v = mesh->faces[f];
-      double angle = sonde_corner_angle(mesh->vertices[v[k]], mesh->vertices[v[(k + 1) % 3]],
-                                        mesh->vertices[v[(k + 2) % 3]]);
+      sonde_vec3 a = mesh->vertices[v[k]], b = mesh->vertices[v[(k + 1) % 3]];
+      double angle = sonde_corner_angle(a, b, mesh->vertices[v[(k + 2) % 3]]);
       report->smallest_angle_rad = fmin(report->smallest_angle_rad, angle);
+      longest2 = fmax(longest2, v_norm2(v_sub(a, b)));
     }
+    bool repeated = v[0] == v[1] || v[1] == v[2] || v[2] == v[0];
+    if (repeated || !(area > 1e-12 * longest2)) report->duplicate_or_degenerate_faces++;
   }
-}
-
-sonde_status sonde_mesh_inspect(const sonde_mesh *mesh, sonde_mesh_report *report,
-                                sonde_error *error) {
-  SONDE_ASSERT(mesh != NULL && report != NULL);
-  *report = (sonde_mesh_report){0};
-  sonde_status status = inspect_edges(mesh, report, error);
-  if (status) return status;
-  status = count_duplicates(mesh, &report->duplicate_or_degenerate_faces, error);
-  if (status) return status;
-  inspect_faces(mesh, report);
   report->outward = report->closed && report->volume_m3 > 0;
   return SONDE_OK;
 }
 
 // ---- integrals ----------------------------------------------------------------------------
-
-// Signed integrals of 1, x and x x^T over the tetrahedra (origin, face).
-typedef struct moments {
-  double volume;
-  sonde_vec3 first;
-  sonde_mat3 second;
-} moments;
-
-// With s = a + b + c and D = a . (b x c): volume D/6, first moment D s/24,
-// second moment D (a a^T + b b^T + c c^T + s s^T)/120.
-static void add_tetrahedron(moments *sum, sonde_vec3 a, sonde_vec3 b, sonde_vec3 c) {
-  double det = v_dot(a, v_cross(b, c));
-  sonde_vec3 s = v_add(a, v_add(b, c));
-  sum->volume += det / 6.0;
-  sum->first = v_madd(sum->first, det / 24.0, s);
-  sonde_vec3 terms[4] = {a, b, c, s};
-  for (int k = 0; k < 4; ++k) sum->second = m_add(sum->second, m_rank1(terms[k], det / 120.0, 0));
-}
-
-static moments integrate(const sonde_mesh *mesh, sonde_vec3 origin) {
-  moments sum = {0};
-  for (uint32_t f = 0; f < mesh->face_count; ++f) {
-    const uint32_t *v = mesh->faces[f];
-    add_tetrahedron(&sum, v_sub(mesh->vertices[v[0]], origin), v_sub(mesh->vertices[v[1]], origin),
-                    v_sub(mesh->vertices[v[2]], origin));
-  }
-  return sum;
-}
 
 sonde_status sonde_mesh_mass(const sonde_mesh *mesh, double density_kg_m3, sonde_mass *mass,
                              sonde_error *error) {
@@ -236,17 +166,32 @@ sonde_status sonde_mesh_mass(const sonde_mesh *mesh, double density_kg_m3, sonde
     return sonde_fail(error, SONDE_MESH,
                       "the mesh is not closed (%u boundary edges), expected a closed surface",
                       report.boundary_edges);
-  // About a point near the body, so that nothing large cancels.
-  sonde_vec3 origin = mesh->vertices[mesh->faces[0][0]];
-  moments sum = integrate(mesh, origin);
-  if (!(sum.volume > 0))
+
+  // Signed integrals of 1, x and x x^T over the tetrahedra (origin, face), about a point near the
+  // body, so that nothing large cancels. With s = a + b + c and D = a . (b x c): volume D/6, first
+  // moment D s/24, second moment D (a a^T + b b^T + c c^T + s s^T)/120.
+  sonde_vec3 origin = mesh->vertices[mesh->faces[0][0]], first = vec3(0, 0, 0);
+  double volume = 0;
+  sonde_mat3 second = m_zero();
+  for (uint32_t f = 0; f < mesh->face_count; ++f) {
+    const uint32_t *v = mesh->faces[f];
+    sonde_vec3 a = v_sub(mesh->vertices[v[0]], origin), b = v_sub(mesh->vertices[v[1]], origin);
+    sonde_vec3 c = v_sub(mesh->vertices[v[2]], origin), s = v_add(a, v_add(b, c));
+    double det = v_dot(a, v_cross(b, c));
+    volume += det / 6.0;
+    first = v_madd(first, det / 24.0, s);
+    const sonde_vec3 terms[4] = {a, b, c, s};
+    for (int k = 0; k < 4; ++k) second = m_add(second, m_rank1(terms[k], det / 120.0, 0));
+  }
+  if (!(volume > 0))
     return sonde_fail(error, SONDE_MESH,
                       "the mesh encloses no positive volume, expected faces "
                       "counter-clockwise seen from outside");
-  sonde_vec3 centre = v_scale(sum.first, 1.0 / sum.volume);
-  sonde_mat3 covariance = m_add(sum.second, m_rank1(centre, -sum.volume, 0));
+
+  sonde_vec3 centre = v_scale(first, 1.0 / volume);
+  sonde_mat3 covariance = m_add(second, m_rank1(centre, -volume, 0));
   double trace = covariance.m[0][0] + covariance.m[1][1] + covariance.m[2][2];
-  mass->mass_kg = density_kg_m3 * sum.volume;
+  mass->mass_kg = density_kg_m3 * volume;
   mass->centre_m = v_add(origin, centre);
   mass->inertia_kg_m2 = m_scale(m_add(m_diag(trace), m_scale(covariance, -1.0)), density_kg_m3);
   return SONDE_OK;

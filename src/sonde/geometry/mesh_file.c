@@ -1,11 +1,9 @@
-// Mesh files by extension: reading into memory, and the writers.
-//
-//   file_kind         ply, obj or stl from the path
-//   write_text        ply and obj, in the C locale whatever locale the program has set
-//   write_stl         binary, single precision
+// Mesh files by extension: reading into memory, and the writers. Texts are written in the C locale
+// whatever locale the program has set, STL in binary with single precision.
 #include "geometry/internal.h"
 
 #include "base/bounds.h"
+#include "base/bytes.h"
 
 #include <locale.h>
 #include <string.h>
@@ -32,14 +30,10 @@ static sonde_status check_arguments(const char *path, double metres_per_unit, so
   return SONDE_OK;
 }
 
-static sonde_status read_bytes(const char *path, const char *bytes, size_t count,
-                               sonde_mesh_builder *builder, sonde_error *error) {
-  switch (file_kind(path)) {
-  case PLY: return sonde_ply_read(path, bytes, count, builder, error);
-  case OBJ: return sonde_obj_read(path, bytes, count, builder, error);
-  default: return sonde_stl_read(path, bytes, count, builder, error);
-  }
-}
+typedef sonde_status (*read_fn)(const char *path, const char *bytes, size_t count,
+                                sonde_mesh_builder *builder, sonde_error *error);
+static const read_fn readers[] = {
+    [PLY] = sonde_ply_read, [OBJ] = sonde_obj_read, [STL] = sonde_stl_read};
 
 sonde_status sonde_mesh_load(const char *path, double metres_per_unit, sonde_mesh *mesh,
                              sonde_error *error) {
@@ -50,7 +44,7 @@ sonde_status sonde_mesh_load(const char *path, double metres_per_unit, sonde_mes
   sonde_mesh_builder builder = {.scale = metres_per_unit};
   sonde_status status = check_arguments(path, metres_per_unit, error);
   if (!status) status = sonde_bounded_load(path, &sonde_limits_mesh, &bytes, &count, error);
-  if (!status) status = read_bytes(path, bytes, count, &builder, error);
+  if (!status) status = readers[file_kind(path)](path, bytes, count, &builder, error);
   uint64_t most = sonde_limits_mesh.most_items;
   if (status == SONDE_MEMORY &&
       (builder.mesh.vertex_count >= most || builder.mesh.face_count >= most))
@@ -73,8 +67,28 @@ sonde_status sonde_mesh_load(const char *path, double metres_per_unit, sonde_mes
 
 // ---- writers ------------------------------------------------------------------------------
 
-static void write_text(sonde_file *file, kind format, double units, const sonde_mesh *mesh) {
-  bool ply = format == PLY;
+static void put_point(bytes_cursor *record, sonde_vec3 point) {
+  bytes_f32(record, point.x);
+  bytes_f32(record, point.y);
+  bytes_f32(record, point.z);
+}
+
+static void write_stl(sonde_file *file, double units, const sonde_mesh *mesh) {
+  SONDE_ASSERT(units > 0);
+  unsigned char head[84] = "binary STL", triangle[50] = {0};
+  bytes_u32(&(bytes_cursor){head + 80, 4, 0}, mesh->face_count);
+  sonde_file_write(file, head, sizeof head);
+  for (uint32_t f = 0; f < mesh->face_count; ++f) {
+    bytes_cursor record = {triangle, sizeof triangle, 0};
+    put_point(&record, v_unit(sonde_face_cross(mesh, f), vec3(0, 0, 0)));
+    for (int k = 0; k < 3; ++k)
+      put_point(&record, v_scale(mesh->vertices[mesh->faces[f][k]], 1.0 / units));
+    sonde_file_write(file, triangle, sizeof triangle);
+  }
+}
+
+static void write_text(sonde_file *file, bool ply, double units, const sonde_mesh *mesh) {
+  SONDE_ASSERT(units > 0);
   if (ply)
     sonde_file_printf(file,
                       "ply\nformat ascii 1.0\nelement vertex %u\nproperty double x\n"
@@ -94,32 +108,6 @@ static void write_text(sonde_file *file, kind format, double units, const sonde_
   }
 }
 
-static void put_u32(unsigned char *bytes, uint32_t value) {
-  for (int b = 0; b < 4; ++b) bytes[b] = (unsigned char)(value >> (8 * b));
-}
-
-static void put_point(unsigned char *bytes, sonde_vec3 point) {
-  float value[3] = {(float)point.x, (float)point.y, (float)point.z};
-  for (int k = 0; k < 3; ++k) {
-    uint32_t bits;
-    memcpy(&bits, &value[k], sizeof bits);
-    put_u32(bytes + 4 * k, bits);
-  }
-}
-
-static void write_stl(sonde_file *file, double units, const sonde_mesh *mesh) {
-  unsigned char head[84] = "binary STL";
-  put_u32(head + 80, mesh->face_count);
-  sonde_file_write(file, head, sizeof head);
-  for (uint32_t f = 0; f < mesh->face_count; ++f) {
-    unsigned char record[50] = {0};
-    put_point(record, v_unit(sonde_face_cross(mesh, f), vec3(0, 0, 0)));
-    for (int k = 0; k < 3; ++k)
-      put_point(record + 12 + 12 * k, v_scale(mesh->vertices[mesh->faces[f][k]], 1.0 / units));
-    sonde_file_write(file, record, sizeof record);
-  }
-}
-
 sonde_status sonde_mesh_save(const char *path, double metres_per_unit, const sonde_mesh *mesh,
                              sonde_error *error) {
   SONDE_ASSERT(path != NULL && mesh != NULL);
@@ -135,7 +123,7 @@ sonde_status sonde_mesh_save(const char *path, double metres_per_unit, const son
     if (format == STL)
       write_stl(file, metres_per_unit, mesh);
     else
-      write_text(file, format, metres_per_unit, mesh);
+      write_text(file, format == PLY, metres_per_unit, mesh);
     status = sonde_file_commit(file, error);
   }
   uselocale(previous);

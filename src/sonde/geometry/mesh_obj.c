@@ -1,9 +1,5 @@
 // Reader of Wavefront OBJ files: v and f lines; f takes v, v/vt, v//vn, v/vt/vn and negative
 // indices. Everything else (texture, normals, groups, materials, lines) is passed over.
-//
-//   count_vertices   so that faces may come before the vertices they name
-//   read_corner      one corner of a face
-//   read_face        polygon, split into a fan of triangles
 #include "geometry/internal.h"
 
 #include <string.h>
@@ -22,14 +18,6 @@ static bool keyword(sonde_text *text, char letter) {
   if (at[0] != letter || at + 1 >= text->end || (at[1] != ' ' && at[1] != '\t')) return false;
   text->at += 2;
   return true;
-}
-
-static uint32_t count_vertices(sonde_text text) {
-  uint32_t count = 0;
-  do {
-    if (keyword(&text, 'v') && count < UINT32_MAX / 4) ++count;
-  } while (sonde_text_next_line(&text));
-  return count;
 }
 
 static sonde_status read_vertex(obj *file) {
@@ -62,55 +50,49 @@ static bool at_token_end(const char *at, const char *end) {
   return at >= end || *at == ' ' || *at == '\t' || *at == '\r' || *at == '\n';
 }
 
-// Passes "/vt", "//vn" or "/vt/vn"; false when it is malformed.
-static bool skip_attributes(const char **at, const char *end) {
-  SONDE_ASSERT(*at <= end);
-  int64_t ignored;
-  if (at_token_end(*at, end)) return true;
-  if (*(*at)++ != '/') return false;
-  bool texture = read_integer(at, end, &ignored);
-  if (at_token_end(*at, end)) return texture;
-  if (*(*at)++ != '/') return false;
-  return read_integer(at, end, &ignored) && at_token_end(*at, end);
-}
-
-static sonde_status read_corner(obj *file, uint32_t *index) {
-  sonde_text *text = &file->text;
-  SONDE_ASSERT(text->at < text->end);
-  const char *at = text->at;
-  int64_t value = 0, known = file->builder->mesh.vertex_count;
-  if (!read_integer(&at, text->end, &value) || !skip_attributes(&at, text->end))
-    return sonde_text_expected(text, file->error, "a face corner such as 3, 3/1, 3//2 or 3/1/2");
-  int64_t position = value < 0 ? known + value : value - 1;
-  if (position < 0 || position >= file->vertex_count)
-    return sonde_text_expected(text, file->error, "a vertex index from 1 to %u",
-                               file->vertex_count);
-  text->at = at;
-  *index = (uint32_t)position;
-  return SONDE_OK;
-}
-
+// Corners of a polygon, split into a fan of triangles. Texture and normal of a corner are passed.
 static sonde_status read_face(obj *file) {
-  uint32_t first = 0, previous = 0, index = 0, corners = 0;
-  for (; sonde_text_more(&file->text); ++corners) {
-    sonde_status status = read_corner(file, &index);
-    if (status) return status;
+  sonde_text *text = &file->text;
+  uint32_t first = 0, previous = 0, corners = 0;
+  for (; sonde_text_more(text); ++corners) {
+    const char *at = text->at, *end = text->end;
+    int64_t value = 0, ignored, known = file->builder->mesh.vertex_count;
+    bool good = read_integer(&at, end, &value);
+    if (good && !at_token_end(at, end)) {
+      good = *at++ == '/';
+      bool texture = good && read_integer(&at, end, &ignored);
+      if (good && at_token_end(at, end))
+        good = texture;
+      else
+        good = good && *at++ == '/' && read_integer(&at, end, &ignored) && at_token_end(at, end);
+    }
+    if (!good)
+      return sonde_text_expected(text, file->error, "a face corner such as 3, 3/1, 3//2 or 3/1/2");
+    int64_t position = value < 0 ? known + value : value - 1;
+    if (position < 0 || position >= file->vertex_count)
+      return sonde_text_expected(text, file->error, "a vertex index from 1 to %u",
+                                 file->vertex_count);
+    text->at = at;
+    uint32_t index = (uint32_t)position;
     if (corners == 0) first = index;
     if (corners >= 2 && !sonde_builder_face(file->builder, first, previous, index))
       return sonde_fail_memory(file->error);
     previous = index;
   }
-  return corners >= 3
-             ? SONDE_OK
-             : sonde_text_expected(&file->text, file->error, "at least 3 corners in face %u",
-                                   file->builder->mesh.face_count + 1);
+  return corners >= 3 ? SONDE_OK
+                      : sonde_text_expected(text, file->error, "at least 3 corners in face %u",
+                                            file->builder->mesh.face_count + 1);
 }
 
 sonde_status sonde_obj_read(const char *path, const char *bytes, size_t count,
                             sonde_mesh_builder *builder, sonde_error *error) {
-  obj file = {{path, bytes, bytes, bytes + count, 1}, 0, builder, error};
-  file.vertex_count = count_vertices(file.text);
   SONDE_ASSERT(builder->mesh.vertex_count == 0);
+  obj file = {{path, bytes, bytes, bytes + count, 1}, 0, builder, error};
+  // Faces may come before the vertices that they name: count them first.
+  sonde_text all = file.text;
+  do {
+    if (keyword(&all, 'v') && file.vertex_count < UINT32_MAX / 4) ++file.vertex_count;
+  } while (sonde_text_next_line(&all));
   sonde_status status = SONDE_OK;
   do {
     if (keyword(&file.text, 'v'))

@@ -1,11 +1,7 @@
 // Reader of PLY files: ascii, binary little and big endian, any elements and properties.
-//
-//   read_header       elements and properties as declared, checked for what a mesh needs
-//   read_scalar       one value of any type from text or bytes
-//   read_vertex       x, y, z of a vertex; other properties are read and dropped
-//   read_polygon      vertex indices of a face, split into a fan of triangles
-//   read_element      all rows of an element
 #include "geometry/internal.h"
+
+#include "base/bytes.h"
 
 #include <string.h>
 
@@ -43,43 +39,6 @@ static const uint8_t scalar_bytes[] = {0, 1, 1, 2, 2, 4, 4, 4, 8};
 
 // ---- header -------------------------------------------------------------------------------
 
-static scalar parse_scalar(const char *word) {
-  for (int type = INT8; type <= REAL64; ++type)
-    if (!strcmp(word, scalar_names[type][0]) || !strcmp(word, scalar_names[type][1]))
-      return (scalar)type;
-  return NO_SCALAR;
-}
-
-static role parse_role(const element *owner, const property *item) {
-  SONDE_ASSERT(item->type != NO_SCALAR);
-  bool list = item->count_type != NO_SCALAR;
-  if (!strcmp(owner->name, "vertex") && !list && item->name[0] && !item->name[1]) {
-    if (item->name[0] == 'x') return X;
-    if (item->name[0] == 'y') return Y;
-    if (item->name[0] == 'z') return Z;
-  }
-  if (!strcmp(owner->name, "face") && list &&
-      (!strcmp(item->name, "vertex_indices") || !strcmp(item->name, "vertex_index")))
-    return INDICES;
-  return DROPPED;
-}
-
-static sonde_status parse_format(ply *file) {
-  static const char *const names[] = {"ascii", "binary_little_endian", "binary_big_endian"};
-  char word[32];
-  sonde_text_more(&file->text);
-  const char *start = file->text.at;
-  sonde_text_word(&file->text, word, sizeof word);
-  for (int k = 0; k < 3; ++k)
-    if (!strcmp(word, names[k])) {
-      file->format = (format)k;
-      return SONDE_OK;
-    }
-  file->text.at = start;
-  return sonde_text_expected(&file->text, file->error,
-                             "format ascii, binary_little_endian or binary_big_endian");
-}
-
 static sonde_status parse_element(ply *file) {
   sonde_text *text = &file->text;
   if (file->element_count == MAX_ELEMENTS)
@@ -98,8 +57,11 @@ static sonde_status parse_type(ply *file, scalar *type) {
   sonde_text_more(&file->text);
   const char *start = file->text.at;
   sonde_text_word(&file->text, word, sizeof word);
-  *type = parse_scalar(word);
-  if (*type != NO_SCALAR) return SONDE_OK;
+  for (int k = INT8; k <= REAL64; ++k)
+    if (!strcmp(word, scalar_names[k][0]) || !strcmp(word, scalar_names[k][1])) {
+      *type = (scalar)k;
+      return SONDE_OK;
+    }
   file->text.at = start;
   return sonde_text_expected(&file->text, file->error, "a type such as float or uchar");
 }
@@ -123,26 +85,17 @@ static sonde_status parse_property(ply *file) {
   if (status) return status;
   if (!sonde_text_more(text)) return sonde_text_expected(text, file->error, "a property name");
   sonde_text_word(text, item->name, sizeof item->name);
-  item->role = parse_role(owner, item);
+
+  // what a mesh needs of the property
+  const char *name = item->name;
+  bool coordinate = name[0] >= 'x' && name[0] <= 'z' && !name[1];
+  bool indices = !strcmp(name, "vertex_indices") || !strcmp(name, "vertex_index");
+  if (!strcmp(owner->name, "vertex") && !list && coordinate) item->role = (role)(X + name[0] - 'x');
+  if (!strcmp(owner->name, "face") && list && indices) item->role = INDICES;
   return SONDE_OK;
 }
 
-// One header line; sets *done at end_header.
-static sonde_status parse_line(ply *file, bool *done) {
-  char word[32];
-  const char *start = file->text.at;
-  sonde_text_word(&file->text, word, sizeof word);
-  if (!strcmp(word, "comment") || !strcmp(word, "obj_info")) return SONDE_OK;
-  if (!strcmp(word, "format")) return parse_format(file);
-  if (!strcmp(word, "element")) return parse_element(file);
-  if (!strcmp(word, "property")) return parse_property(file);
-  *done = !strcmp(word, "end_header");
-  if (*done) return SONDE_OK;
-  file->text.at = start;
-  return sonde_text_expected(&file->text, file->error,
-                             "comment, format, element, property or end_header");
-}
-
+// Properties with a role from one to the other.
 static uint32_t count_roles(const element *item, role from, role to) {
   uint32_t count = 0;
   for (uint32_t p = 0; p < item->property_count; ++p)
@@ -150,7 +103,46 @@ static uint32_t count_roles(const element *item, role from, role to) {
   return count;
 }
 
-static sonde_status check_header(ply *file) {
+static sonde_status read_header(ply *file) {
+  static const char *const formats[] = {"ascii", "binary_little_endian", "binary_big_endian"};
+  sonde_text *text = &file->text;
+  char word[32];
+  sonde_text_word(text, word, sizeof word);
+  if (strcmp(word, "ply"))
+    return sonde_fail(file->error, SONDE_FORMAT, "%s:1: expected \"ply\" in the first line",
+                      text->path);
+  for (bool done = false; !done;) {
+    if (!sonde_text_next_line(text)) return sonde_text_expected(text, file->error, "end_header");
+    if (!sonde_text_more(text)) continue;
+    const char *start = text->at;
+    sonde_text_word(text, word, sizeof word);
+    sonde_status status = SONDE_OK;
+    if (!strcmp(word, "end_header")) {
+      done = true;
+    } else if (!strcmp(word, "format")) {
+      sonde_text_more(text);
+      start = text->at;
+      sonde_text_word(text, word, sizeof word);
+      int k = 0;
+      while (k < 3 && strcmp(word, formats[k])) ++k;
+      if (k == 3) {
+        text->at = start;
+        return sonde_text_expected(text, file->error,
+                                   "format ascii, binary_little_endian or binary_big_endian");
+      }
+      file->format = (format)k;
+    } else if (!strcmp(word, "element")) {
+      status = parse_element(file);
+    } else if (!strcmp(word, "property")) {
+      status = parse_property(file);
+    } else if (strcmp(word, "comment") && strcmp(word, "obj_info")) {
+      text->at = start;
+      status = sonde_text_expected(text, file->error,
+                                   "comment, format, element, property or end_header");
+    }
+    if (status) return status;
+  }
+
   uint32_t vertices = 0, faces = 0;
   for (uint32_t e = 0; e < file->element_count; ++e) {
     const element *item = &file->elements[e];
@@ -161,30 +153,13 @@ static sonde_status check_header(ply *file) {
     if (!strcmp(item->name, "face") && item->count && count_roles(item, INDICES, INDICES) == 1)
       faces++;
   }
-  if (vertices == 1 && faces == 1) return SONDE_OK;
-  return sonde_fail(file->error, SONDE_FORMAT,
-                    "%s:%u: expected one element vertex with properties x, y, z and one element "
-                    "face with a list vertex_indices, found no such header",
-                    file->text.path, file->text.line);
-}
-
-static sonde_status read_header(ply *file) {
-  sonde_text *text = &file->text;
-  char word[8];
-  sonde_text_word(text, word, sizeof word);
-  if (strcmp(word, "ply"))
-    return sonde_fail(file->error, SONDE_FORMAT, "%s:1: expected \"ply\" in the first line",
-                      text->path);
-  bool done = false;
-  while (!done) {
-    if (!sonde_text_next_line(text)) return sonde_text_expected(text, file->error, "end_header");
-    if (!sonde_text_more(text)) continue;
-    sonde_status status = parse_line(file, &done);
-    if (status) return status;
-  }
-  sonde_status status = check_header(file);
+  if (vertices != 1 || faces != 1)
+    return sonde_fail(file->error, SONDE_FORMAT,
+                      "%s:%u: expected one element vertex with properties x, y, z and one element "
+                      "face with a list vertex_indices, found no such header",
+                      text->path, text->line);
   sonde_text_next_line(text);
-  return status;
+  return SONDE_OK;
 }
 
 // ---- rows ---------------------------------------------------------------------------------
@@ -199,36 +174,31 @@ static const char *place(const ply *file, char *buffer, size_t size) {
   return buffer;
 }
 
-static double decode(scalar type, uint64_t bits) {
+// False at the end of the file and for a number that is not finite.
+static bool read_binary(ply *file, scalar type, double *value) {
   SONDE_ASSERT(type != NO_SCALAR);
+  sonde_text *text = &file->text;
+  int size = scalar_bytes[type];
+  if (text->end - text->at < size) return false;
+  bytes_reader reader = {(const unsigned char *)text->at};
+  uint64_t bits = bytes_take(&reader, size);
+  if (file->format == BIG) bits = __builtin_bswap64(bits) >> (64 - 8 * size);
   float real32;
-  double real64;
   uint32_t low = (uint32_t)bits;
   switch (type) {
-  case INT8: return (int8_t)bits;
-  case INT16: return (int16_t)bits;
-  case INT32: return (int32_t)low;
-  case REAL32: memcpy(&real32, &low, sizeof real32); return (double)real32;
-  case REAL64: memcpy(&real64, &bits, sizeof real64); return real64;
-  default: return (double)bits;
+  case INT8: *value = (int8_t)bits; break;
+  case INT16: *value = (int16_t)bits; break;
+  case INT32: *value = (int32_t)low; break;
+  case REAL32: memcpy(&real32, &low, sizeof real32), *value = (double)real32; break;
+  case REAL64: memcpy(value, &bits, sizeof bits); break;
+  default: *value = (double)bits;
   }
-}
-
-static bool read_binary(ply *file, scalar type, double *value) {
-  sonde_text *text = &file->text;
-  size_t size = scalar_bytes[type];
-  if ((size_t)(text->end - text->at) < size) return false;
-  uint64_t bits = 0;
-  for (size_t k = 0; k < size; ++k) {
-    size_t shift = 8 * (file->format == LITTLE ? k : size - 1 - k);
-    bits |= (uint64_t)(unsigned char)text->at[k] << shift;
-  }
-  *value = decode(type, bits);
   if (!isfinite(*value)) return false;
   text->at += size;
   return true;
 }
 
+// One value of any type from text or bytes.
 static sonde_status read_scalar(ply *file, const element *owner, const property *item, scalar type,
                                 uint32_t row, double *value) {
   if (file->format == ASCII ? sonde_text_real(&file->text, value) : read_binary(file, type, value))
@@ -242,21 +212,6 @@ static sonde_status read_scalar(ply *file, const element *owner, const property 
                     "%s: expected a finite number for %s of %s %u of %u, found %s",
                     place(file, at, sizeof at), item->name, owner->name, row, owner->count,
                     short_file ? "the end of the file" : "a number that is not finite");
-}
-
-static sonde_status read_index(ply *file, const element *owner, const property *item, uint32_t row,
-                               uint32_t *index) {
-  double value = 0;
-  sonde_status status = read_scalar(file, owner, item, item->type, row, &value);
-  if (status) return status;
-  if (value >= 0 && value < file->vertex_count && value == floor(value)) {
-    *index = (uint32_t)value;
-    return SONDE_OK;
-  }
-  char at[256];
-  return sonde_fail(file->error, SONDE_FORMAT,
-                    "%s: expected a vertex index from 0 to %u in face %u, found %.17g",
-                    place(file, at, sizeof at), file->vertex_count - 1, row, value);
 }
 
 // Number of entries of a list.
@@ -275,84 +230,70 @@ static sonde_status read_length(ply *file, const element *owner, const property 
                     place(file, at, sizeof at), least, item->name, owner->name, row, value);
 }
 
-static sonde_status read_polygon(ply *file, const element *owner, const property *item,
-                                 uint32_t row) {
-  uint32_t length = 0, first = 0, previous = 0, index = 0;
-  SONDE_ASSERT(item->role == INDICES && item->count_type != NO_SCALAR);
-  sonde_status status = read_length(file, owner, item, row, 3, &length);
-  for (uint32_t k = 0; k < length && !status; ++k) {
-    status = read_index(file, owner, item, row, &index);
-    if (k == 0) first = index;
-    if (!status && k >= 2 && !sonde_builder_face(file->builder, first, previous, index))
-      status = sonde_fail_memory(file->error);
-    previous = index;
-  }
-  return status;
-}
-
-static sonde_status skip_list(ply *file, const element *owner, const property *item, uint32_t row) {
-  uint32_t length = 0;
-  double value;
-  sonde_status status = read_length(file, owner, item, row, 0, &length);
-  for (uint32_t k = 0; k < length && !status; ++k)
-    status = read_scalar(file, owner, item, item->type, row, &value);
-  return status;
-}
-
+// One row of an element: the point of a vertex, or the polygon of a face, split into a fan of
+// triangles; other properties are read and dropped.
 static sonde_status read_row(ply *file, const element *owner, uint32_t row) {
-  double point[3] = {0, 0, 0};
-  sonde_status status = SONDE_OK;
-  for (uint32_t p = 0; p < owner->property_count && !status; ++p) {
+  double point[3] = {0, 0, 0}, value = 0;
+  for (uint32_t p = 0; p < owner->property_count; ++p) {
     const property *item = &owner->properties[p];
-    double value = 0;
-    if (item->role == INDICES)
-      status = read_polygon(file, owner, item, row);
-    else if (item->count_type != NO_SCALAR)
-      status = skip_list(file, owner, item, row);
-    else
+    bool list = item->count_type != NO_SCALAR, polygon = item->role == INDICES;
+    uint32_t length = 1, first = 0, previous = 0;
+    sonde_status status =
+        list ? read_length(file, owner, item, row, polygon ? 3 : 0, &length) : SONDE_OK;
+    for (uint32_t k = 0; k < length && !status; ++k) {
       status = read_scalar(file, owner, item, item->type, row, &value);
+      if (status || !polygon) continue;
+      if (!(value >= 0 && value < file->vertex_count && value == floor(value))) {
+        char at[256];
+        return sonde_fail(file->error, SONDE_FORMAT,
+                          "%s: expected a vertex index from 0 to %u in face %u, found %.17g",
+                          place(file, at, sizeof at), file->vertex_count - 1, row, value);
+      }
+      uint32_t index = (uint32_t)value;
+      if (k == 0) first = index;
+      if (k >= 2 && !sonde_builder_face(file->builder, first, previous, index))
+        return sonde_fail_memory(file->error);
+      previous = index;
+    }
+    if (status) return status;
     if (item->role >= X && item->role <= Z) point[item->role - X] = value;
   }
-  if (status || strcmp(owner->name, "vertex")) return status;
+  if (strcmp(owner->name, "vertex")) return SONDE_OK;
   return sonde_builder_vertex(file->builder, vec3(point[0], point[1], point[2]))
              ? SONDE_OK
              : sonde_fail_memory(file->error);
-}
-
-static sonde_status read_element(ply *file, const element *owner) {
-  sonde_text *text = &file->text;
-  SONDE_ASSERT(owner->property_count <= MAX_PROPERTIES);
-  if (!owner->property_count) return SONDE_OK;
-  for (uint32_t row = 0; row < owner->count; ++row) {
-    if (file->format == ASCII && !sonde_text_skip_blank_lines(text))
-      return sonde_text_expected(text, file->error, "%s %u of %u", owner->name, row, owner->count);
-    sonde_status status = read_row(file, owner, row);
-    if (status) return status;
-    if (file->format == ASCII && sonde_text_more(text))
-      return sonde_text_expected(text, file->error, "the end of the line of %s %u", owner->name,
-                                 row);
-    if (file->format == ASCII) sonde_text_next_line(text);
-  }
-  return SONDE_OK;
 }
 
 sonde_status sonde_ply_read(const char *path, const char *bytes, size_t count,
                             sonde_mesh_builder *builder, sonde_error *error) {
   ply *file = SONDE_NEW(ply, 1);
   if (!file) return sonde_fail_memory(error);
+  SONDE_ASSERT(bytes != NULL && builder != NULL);
   file->text = (sonde_text){path, bytes, bytes, bytes + count, 1};
   file->builder = builder;
   file->error = error;
   sonde_status status = read_header(file);
   SONDE_ASSERT(file->element_count <= MAX_ELEMENTS);
-  for (uint32_t e = 0; e < file->element_count && !status; ++e)
-    status = read_element(file, &file->elements[e]);
+  sonde_text *text = &file->text;
+  bool lines = file->format == ASCII;
+  for (uint32_t e = 0; e < file->element_count; ++e) {
+    const element *item = &file->elements[e];
+    uint32_t rows = item->property_count ? item->count : 0;
+    for (uint32_t row = 0; row < rows && !status; ++row) {
+      if (lines && !sonde_text_skip_blank_lines(text))
+        status = sonde_text_expected(text, error, "%s %u of %u", item->name, row, item->count);
+      if (!status) status = read_row(file, item, row);
+      if (!status && lines && sonde_text_more(text))
+        status = sonde_text_expected(text, error, "the end of the line of %s %u", item->name, row);
+      if (!status && lines) sonde_text_next_line(text);
+    }
+  }
   char at[256];
-  if (!status && sonde_text_skip_blank_lines(&file->text))
+  if (!status && sonde_text_skip_blank_lines(text))
     status = sonde_fail(error, SONDE_FORMAT,
                         "%s: expected the end of the file after the last element, found %zu more "
                         "bytes",
-                        place(file, at, sizeof at), (size_t)(file->text.end - file->text.at));
+                        place(file, at, sizeof at), (size_t)(text->end - text->at));
   sonde_free(file);
   return status;
 }

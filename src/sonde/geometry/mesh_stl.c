@@ -1,11 +1,8 @@
 // Reader of STL files, ascii and binary. Vertices with exactly equal coordinates become one;
 // triangles that lose a corner by that are dropped.
-//
-//   weld            index of a point, by a hash table with open addressing
-//   add_triangle    welds three corners
-//   read_binary     84-byte head, then 50 bytes per triangle
-//   read_ascii      facet normal / outer loop / vertex x3 / endloop / endfacet
 #include "geometry/internal.h"
+
+#include "base/bytes.h"
 
 #include <string.h>
 
@@ -19,55 +16,35 @@ typedef struct stl {
   sonde_error *error;
 } stl;
 
-static sonde_vec3 read_point(const char *bytes) {
-  float value[3];
-  for (int k = 0; k < 3; ++k) {
-    uint32_t bits = 0;
-    for (int b = 3; b >= 0; --b) bits = bits << 8 | (unsigned char)bytes[4 * k + b];
-    memcpy(&value[k], &bits, sizeof bits);
-  }
-  return vec3((double)value[0], (double)value[1], (double)value[2]);
-}
-
-// Index of the point, new or known; SONDE_NONE when out of memory. The table never fills up: it
-// has at least twice as many places as the file can hold corners.
-static uint32_t weld(stl *file, sonde_vec3 point) {
-  sonde_mesh *mesh = &file->builder->mesh;
-  point = v_add(point, vec3(0, 0, 0)); // -0 becomes 0
-  sonde_vec3 scaled = v_scale(point, file->builder->scale);
-  uint64_t hash = sonde_hash(0, &point, sizeof point);
-  hash ^= hash >> 32; // the low bits alone hardly depend on the high bits of the coordinates
-  hash ^= hash >> 15;
-  size_t slot = (size_t)hash & (file->table_size - 1);
-  for (; file->table[slot]; slot = (slot + 1) & (file->table_size - 1)) {
-    sonde_vec3 known = mesh->vertices[file->table[slot] - 1];
-    if (known.x == scaled.x && known.y == scaled.y && known.z == scaled.z)
-      return file->table[slot] - 1;
-  }
-  SONDE_ASSERT(2 * (size_t)mesh->vertex_count < file->table_size);
-  if (!sonde_builder_vertex(file->builder, point)) return SONDE_NONE;
-  file->table[slot] = mesh->vertex_count;
-  return mesh->vertex_count - 1;
-}
-
+// Each corner gets the index of a known vertex by a hash table with open addressing, or a new one.
+// The table never fills up: it has at least twice as many places as the file can hold corners.
 static sonde_status add_triangle(stl *file, const sonde_vec3 corners[3]) {
+  sonde_mesh *mesh = &file->builder->mesh;
   uint32_t v[3];
   for (int k = 0; k < 3; ++k) {
-    v[k] = weld(file, corners[k]);
-    if (v[k] == SONDE_NONE) return sonde_fail_memory(file->error);
+    sonde_vec3 point = v_add(corners[k], vec3(0, 0, 0)); // -0 becomes 0
+    sonde_vec3 scaled = v_scale(point, file->builder->scale);
+    uint64_t hash = sonde_hash(0, &point, sizeof point);
+    hash ^= hash >> 32; // the low bits alone hardly depend on the high bits of the coordinates
+    hash ^= hash >> 15;
+    size_t slot = (size_t)hash & (file->table_size - 1);
+    for (; file->table[slot]; slot = (slot + 1) & (file->table_size - 1)) {
+      sonde_vec3 known = mesh->vertices[file->table[slot] - 1];
+      if (known.x == scaled.x && known.y == scaled.y && known.z == scaled.z) break;
+    }
+    if (!file->table[slot]) {
+      SONDE_ASSERT(2 * (size_t)mesh->vertex_count < file->table_size);
+      if (!sonde_builder_vertex(file->builder, point)) return sonde_fail_memory(file->error);
+      file->table[slot] = mesh->vertex_count;
+    }
+    v[k] = file->table[slot] - 1;
   }
   if (v[0] == v[1] || v[1] == v[2] || v[2] == v[0]) return SONDE_OK;
   return sonde_builder_face(file->builder, v[0], v[1], v[2]) ? SONDE_OK
                                                              : sonde_fail_memory(file->error);
 }
 
-static uint32_t declared_triangles(const char *bytes, size_t count) {
-  uint32_t triangles = 0;
-  if (count < HEAD_BYTES) return 0;
-  for (int b = 3; b >= 0; --b) triangles = triangles << 8 | (unsigned char)bytes[80 + b];
-  return triangles;
-}
-
+// An 84-byte head, then 50 bytes per triangle: normal, three corners, attributes.
 static sonde_status read_binary(stl *file, uint32_t triangles) {
   const sonde_text *text = &file->text;
   SONDE_ASSERT(text->at == text->begin);
@@ -80,9 +57,12 @@ static sonde_status read_binary(stl *file, uint32_t triangles) {
                       count);
   for (uint32_t t = 0; t < triangles; ++t) {
     size_t offset = HEAD_BYTES + (size_t)t * TRIANGLE_BYTES + 12;
+    bytes_reader reader = {(const unsigned char *)text->begin + offset};
     sonde_vec3 corners[3];
     for (size_t k = 0; k < 3; ++k) {
-      corners[k] = read_point(text->begin + offset + 12 * k);
+      corners[k].x = bytes_take_f32(&reader);
+      corners[k].y = bytes_take_f32(&reader);
+      corners[k].z = bytes_take_f32(&reader);
       if (!v_finite(corners[k]))
         return sonde_fail(file->error, SONDE_FORMAT,
                           "%s: byte %zu: expected finite coordinates in triangle %u", text->path,
@@ -122,16 +102,7 @@ static sonde_status read_numbers(stl *file, const char *words, sonde_vec3 *point
   return status;
 }
 
-static sonde_status read_facet(stl *file) {
-  sonde_vec3 normal, corners[3];
-  sonde_status status = read_numbers(file, "facet normal", &normal);
-  if (!status) status = expect_words(file, "outer loop");
-  for (int k = 0; k < 3 && !status; ++k) status = read_numbers(file, "vertex", &corners[k]);
-  if (!status) status = expect_words(file, "endloop");
-  if (!status) status = expect_words(file, "endfacet");
-  return status ? status : add_triangle(file, corners);
-}
-
+// facet normal / outer loop / vertex x3 / endloop / endfacet, until endsolid.
 static sonde_status read_ascii(stl *file) {
   sonde_text *text = &file->text;
   sonde_status status = expect_words(file, "solid");
@@ -140,15 +111,23 @@ static sonde_status read_ascii(stl *file) {
     if (!sonde_text_skip_blank_lines(text))
       return sonde_text_expected(text, file->error, "\"facet\" or \"endsolid\"");
     if (text->end - text->at >= 8 && !strncmp(text->at, "endsolid", 8)) break;
-    status = read_facet(file);
+    sonde_vec3 normal, corners[3];
+    status = read_numbers(file, "facet normal", &normal);
+    if (!status) status = expect_words(file, "outer loop");
+    for (int k = 0; k < 3 && !status; ++k) status = read_numbers(file, "vertex", &corners[k]);
+    if (!status) status = expect_words(file, "endloop");
+    if (!status) status = expect_words(file, "endfacet");
+    if (!status) status = add_triangle(file, corners);
   }
   return status;
 }
 
 sonde_status sonde_stl_read(const char *path, const char *bytes, size_t count,
                             sonde_mesh_builder *builder, sonde_error *error) {
+  SONDE_ASSERT(bytes != NULL && builder != NULL);
   stl file = {.text = {path, bytes, bytes, bytes + count, 1}, .builder = builder, .error = error};
-  uint32_t triangles = declared_triangles(bytes, count);
+  bytes_reader declared = {(const unsigned char *)bytes + HEAD_BYTES - 4};
+  uint32_t triangles = count < HEAD_BYTES ? 0 : bytes_take_u32(&declared);
   bool fits = count == HEAD_BYTES + (size_t)triangles * TRIANGLE_BYTES;
   bool ascii = !fits && count >= 5 && !strncmp(bytes, "solid", 5);
   // A corner takes at least 12 bytes: "vertex 0 0 0".

@@ -53,27 +53,22 @@ bool sonde_text_real(sonde_text *text, double *value) {
   return true;
 }
 
-// The token at the present place, quoted and printable, for a message.
-static void describe(sonde_text *text, char *found, size_t size) {
-  if (!sonde_text_more(text)) {
-    snprintf(found, size, "%s",
-             text->at < text->end ? "the end of the line" : "the end of the file");
-    return;
-  }
-  size_t length = token_length(text);
-  if (length > 24) length = 24;
-  snprintf(found, size, "\"%.*s\"", (int)length, text->at);
-  for (char *c = found; *c; ++c)
-    if (*c < 32 || *c > 126) *c = '?';
-}
-
 sonde_status sonde_text_expected(sonde_text *text, sonde_error *error, const char *format, ...) {
   char what[160], found[40];
+  SONDE_ASSERT(format != NULL);
   va_list arguments;
   va_start(arguments, format);
   vsnprintf(what, sizeof what, format, arguments);
   va_end(arguments);
-  describe(text, found, sizeof found);
+  // the token at the present place, quoted and printable
+  size_t length = sonde_text_more(text) ? token_length(text) : 0;
+  if (length)
+    snprintf(found, sizeof found, "\"%.*s\"", length > 24 ? 24 : (int)length, text->at);
+  else
+    snprintf(found, sizeof found, "%s",
+             text->at < text->end ? "the end of the line" : "the end of the file");
+  for (char *c = found; *c; ++c)
+    if (*c < 32 || *c > 126) *c = '?';
   return sonde_fail(error, SONDE_FORMAT, "%s:%u: expected %s, found %s", text->path, text->line,
                     what, found);
 }

@@ -2,17 +2,10 @@
 //
 // A pass marks every edge longer than 1.42 times the wanted length at its middle. While a face has
 // a marked edge but its longest edge is not marked, that one is marked too: every face can then be
-// cut without bad angles and without hanging vertices. A face with three marks is split 1:4 into
-// similar faces, with two or one it is bisected at its longest edge first. Bisecting at the longest
-// edge keeps every angle above half the smallest angle of the given mesh (Rosenberg and Stenger
-// 1975), however often it is repeated. The vertices of the given mesh keep index and place.
-//
-//   mark_long_edges   what the target asks for
-//   close_marks       longest-edge closure, by a work list of faces
-//   side_normal       normal at a vertex as its faces on one side of a crease see it
-//   smooth_middle     middle of an edge on the surface that the normals describe
-//   split_face        the new faces of one face
-//   refine_once       one pass
+// divided without bad angles and without hanging vertices. A face with three marks is split 1:4
+// into similar faces, with two or one it is bisected at its longest edge first. Bisecting at the
+// longest edge keeps every angle above half the smallest angle of the given mesh (Rosenberg and
+// Stenger 1975), however often it is repeated. The vertices of the given mesh keep index and place.
 #include "geometry/refine.h"
 #include "geometry/internal.h"
 
@@ -34,51 +27,6 @@ typedef struct pass {
   uint32_t work_count, marked;
 } pass;
 
-static void pass_clear(pass *p) {
-  sonde_topology_clear(&p->topology);
-  sonde_free(p->face_normal);
-  sonde_free(p->face_edge);
-  sonde_free(p->length);
-  sonde_free(p->middle);
-  sonde_free(p->work);
-}
-
-static void fill_face_edges(pass *p) {
-  const sonde_topology *t = &p->topology;
-  for (uint32_t e = 0; e < t->edge_count; ++e) {
-    p->length[e] = v_distance(p->mesh->vertices[t->edges[e][0]], p->mesh->vertices[t->edges[e][1]]);
-    p->middle[e] = SONDE_NONE;
-    for (int side = 0; side < 2; ++side) {
-      uint32_t f = t->edge_faces[e][side];
-      if (f == SONDE_NONE) continue;
-      for (int k = 0; k < 3; ++k) {
-        uint32_t a = p->mesh->faces[f][k], b = p->mesh->faces[f][(k + 1) % 3];
-        if ((a == t->edges[e][0] && b == t->edges[e][1]) ||
-            (b == t->edges[e][0] && a == t->edges[e][1]))
-          p->face_edge[f][k] = e;
-      }
-    }
-  }
-}
-
-static sonde_status pass_begin(pass *p, const sonde_mesh *mesh, sonde_error *error) {
-  *p = (pass){.mesh = mesh};
-  sonde_status status = sonde_topology_build(mesh, &p->topology, error);
-  if (status) return status;
-  size_t edges = p->topology.edge_count;
-  p->face_normal = SONDE_NEW(sonde_vec3, mesh->face_count);
-  p->face_edge = sonde_calloc(mesh->face_count, sizeof *p->face_edge);
-  p->length = SONDE_NEW(double, edges);
-  p->middle = SONDE_NEW(uint32_t, edges);
-  p->work = SONDE_NEW(uint32_t, 3 * edges + mesh->face_count);
-  if (!p->face_normal || !p->face_edge || !p->length || !p->middle || !p->work)
-    return sonde_fail_memory(error);
-  for (uint32_t f = 0; f < mesh->face_count; ++f)
-    p->face_normal[f] = v_unit(sonde_face_cross(mesh, f), vec3(0, 0, 0));
-  fill_face_edges(p);
-  return SONDE_OK;
-}
-
 static void push_face(pass *p, uint32_t face) {
   if (face == SONDE_NONE) return;
   SONDE_ASSERT(p->work_count < 3 * p->topology.edge_count + p->mesh->face_count);
@@ -93,20 +41,6 @@ static void mark(pass *p, uint32_t edge) {
   push_face(p, p->topology.edge_faces[edge][1]);
 }
 
-static sonde_status mark_long_edges(pass *p, target_fn target, void *user, sonde_error *error) {
-  for (uint32_t e = 0; e < p->topology.edge_count; ++e) {
-    const uint32_t *v = p->topology.edges[e];
-    sonde_vec3 middle = v_lerp(p->mesh->vertices[v[0]], p->mesh->vertices[v[1]], 0.5);
-    double wanted = target(middle, user);
-    if (!(wanted > 0))
-      return sonde_fail(error, SONDE_ARGUMENT,
-                        "the wanted edge length at (%g, %g, %g) m is %g, expected more than 0",
-                        middle.x, middle.y, middle.z, wanted);
-    if (p->length[e] > OVERSHOOT * wanted) mark(p, e);
-  }
-  return SONDE_OK;
-}
-
 // Side of the face that is longest; the edge number decides between equals, so that both faces
 // beside an edge agree.
 static int longest_side(const pass *p, uint32_t face) {
@@ -119,11 +53,55 @@ static int longest_side(const pass *p, uint32_t face) {
   return best;
 }
 
-static void close_marks(pass *p) {
+// Edges that are longer than the target asks for, then the longest-edge closure.
+static sonde_status mark_edges(pass *p, target_fn target, void *user, sonde_error *error) {
+  SONDE_ASSERT(p->marked == 0 && p->work_count == 0);
+  for (uint32_t e = 0; e < p->topology.edge_count; ++e) {
+    const uint32_t *v = p->topology.edges[e];
+    sonde_vec3 middle = v_lerp(p->mesh->vertices[v[0]], p->mesh->vertices[v[1]], 0.5);
+    double wanted = target(middle, user);
+    if (!(wanted > 0))
+      return sonde_fail(error, SONDE_ARGUMENT,
+                        "the wanted edge length at (%g, %g, %g) m is %g, expected more than 0",
+                        middle.x, middle.y, middle.z, wanted);
+    if (p->length[e] > OVERSHOOT * wanted) mark(p, e);
+  }
   while (p->work_count) {
     uint32_t face = p->work[--p->work_count];
     mark(p, p->face_edge[face][longest_side(p, face)]);
   }
+  return SONDE_OK;
+}
+
+static sonde_status begin(pass *p, const sonde_mesh *mesh, sonde_error *error) {
+  *p = (pass){.mesh = mesh};
+  sonde_status status = sonde_topology_build(mesh, &p->topology, error);
+  if (status) return status;
+  const sonde_topology *t = &p->topology;
+  size_t edges = t->edge_count;
+  p->face_normal = SONDE_NEW(sonde_vec3, mesh->face_count);
+  p->face_edge = sonde_calloc(mesh->face_count, sizeof *p->face_edge);
+  p->length = SONDE_NEW(double, edges);
+  p->middle = SONDE_NEW(uint32_t, edges);
+  p->work = SONDE_NEW(uint32_t, 3 * edges + mesh->face_count);
+  if (!p->face_normal || !p->face_edge || !p->length || !p->middle || !p->work)
+    return sonde_fail_memory(error);
+  for (uint32_t f = 0; f < mesh->face_count; ++f)
+    p->face_normal[f] = v_unit(sonde_face_cross(mesh, f), vec3(0, 0, 0));
+  for (uint32_t e = 0; e < edges; ++e) {
+    const uint32_t *ends = t->edges[e];
+    p->length[e] = v_distance(mesh->vertices[ends[0]], mesh->vertices[ends[1]]);
+    p->middle[e] = SONDE_NONE;
+    for (int side = 0; side < 2; ++side) {
+      uint32_t f = t->edge_faces[e][side];
+      for (int k = 0; f != SONDE_NONE && k < 3; ++k) {
+        uint32_t a = mesh->faces[f][k], b = mesh->faces[f][(k + 1) % 3];
+        if ((a == ends[0] && b == ends[1]) || (b == ends[0] && a == ends[1]))
+          p->face_edge[f][k] = e;
+      }
+    }
+  }
+  return SONDE_OK;
 }
 
 // ---- new vertices -------------------------------------------------------------------------
@@ -156,18 +134,6 @@ static sonde_vec3 edge_bulge(const pass *p, const uint32_t ends[2], sonde_vec3 s
   return v_madd(sum, v_dot(along, nb) / 8, nb);
 }
 
-// A crease follows the bulges of both its sides; a boundary edge stays straight across.
-static sonde_vec3 smooth_middle(const pass *p, uint32_t edge) {
-  const uint32_t *ends = p->topology.edges[edge], *beside = p->topology.edge_faces[edge];
-  sonde_vec3 middle = v_lerp(p->mesh->vertices[ends[0]], p->mesh->vertices[ends[1]], 0.5);
-  sonde_vec3 one = p->face_normal[beside[0]];
-  if (beside[1] == SONDE_NONE) return v_add(middle, edge_bulge(p, ends, one));
-  sonde_vec3 two = p->face_normal[beside[1]];
-  if (v_dot(one, two) > CREASE_COSINE)
-    return v_add(middle, edge_bulge(p, ends, v_unit(v_add(one, two), one)));
-  return v_add(middle, v_add(edge_bulge(p, ends, one), edge_bulge(p, ends, two)));
-}
-
 // ---- new faces ----------------------------------------------------------------------------
 
 static uint32_t face_marks(const pass *p, uint32_t face) {
@@ -196,31 +162,7 @@ static void put_half(sonde_mesh *out, uint32_t *at, uint32_t tip, uint32_t from,
   put(out, at, tip, middle, to);
 }
 
-static void split_face(const pass *p, uint32_t face, sonde_mesh *out, uint32_t *at) {
-  const uint32_t *v = p->mesh->faces[face];
-  uint32_t marks = face_marks(p, face);
-  SONDE_ASSERT(marks <= 3);
-  if (marks == 0) {
-    put(out, at, v[0], v[1], v[2]);
-    return;
-  }
-  int k = longest_side(p, face);
-  uint32_t a = v[k], b = v[(k + 1) % 3], c = v[(k + 2) % 3];
-  uint32_t ab = p->middle[p->face_edge[face][k]];
-  uint32_t bc = p->middle[p->face_edge[face][(k + 1) % 3]];
-  uint32_t ca = p->middle[p->face_edge[face][(k + 2) % 3]];
-  SONDE_ASSERT(ab != SONDE_NONE);
-  if (marks == 3) {
-    put(out, at, a, ab, ca);
-    put(out, at, ab, b, bc);
-    put(out, at, ca, bc, c);
-    put(out, at, ab, bc, ca);
-    return;
-  }
-  put_half(out, at, ab, b, c, bc);
-  put_half(out, at, ab, c, a, ca);
-}
-
+// Middles of the marked edges on the surface that the normals describe, then the new faces.
 static sonde_status build(pass *p, sonde_mesh *out, sonde_error *error) {
   uint32_t vertices = p->mesh->vertex_count, faces = p->mesh->face_count, at = 0;
   if (vertices + p->marked > MAX_VERTICES)
@@ -232,32 +174,44 @@ static sonde_status build(pass *p, sonde_mesh *out, sonde_error *error) {
   memcpy(out->vertices, p->mesh->vertices, vertices * sizeof *out->vertices);
   for (uint32_t e = 0; e < p->topology.edge_count; ++e) {
     if (p->middle[e] == SONDE_NONE) continue;
+    // A crease follows the bulges of both its sides; a boundary edge stays straight across.
+    const uint32_t *ends = p->topology.edges[e], *beside = p->topology.edge_faces[e];
+    sonde_vec3 middle = v_lerp(p->mesh->vertices[ends[0]], p->mesh->vertices[ends[1]], 0.5);
+    sonde_vec3 one = p->face_normal[beside[0]], bulge;
+    if (beside[1] == SONDE_NONE) {
+      bulge = edge_bulge(p, ends, one);
+    } else {
+      sonde_vec3 two = p->face_normal[beside[1]];
+      bulge = v_dot(one, two) > CREASE_COSINE
+                  ? edge_bulge(p, ends, v_unit(v_add(one, two), one))
+                  : v_add(edge_bulge(p, ends, one), edge_bulge(p, ends, two));
+    }
     p->middle[e] = vertices;
-    out->vertices[vertices++] = smooth_middle(p, e);
+    out->vertices[vertices++] = v_add(middle, bulge);
   }
-  for (uint32_t f = 0; f < p->mesh->face_count; ++f) split_face(p, f, out, &at);
-  SONDE_ASSERT(vertices == out->vertex_count && at == out->face_count);
-  return SONDE_OK;
-}
-
-// Replaces the mesh by a finer one; *done when nothing was left to split.
-static sonde_status refine_once(sonde_mesh *mesh, target_fn target, void *user, bool *done,
-                                sonde_error *error) {
-  pass p;
-  sonde_mesh finer = {0};
-  sonde_status status = pass_begin(&p, mesh, error);
-  if (!status) status = mark_long_edges(&p, target, user, error);
-  *done = !status && p.marked == 0;
-  if (!status && !*done) {
-    close_marks(&p);
-    status = build(&p, &finer, error);
-    if (!status) {
-      sonde_mesh_clear(mesh);
-      *mesh = finer;
+  for (uint32_t f = 0; f < p->mesh->face_count; ++f) {
+    const uint32_t *v = p->mesh->faces[f], *edge = p->face_edge[f];
+    uint32_t marks = face_marks(p, f);
+    if (marks == 0) {
+      put(out, &at, v[0], v[1], v[2]);
+      continue;
+    }
+    int k = longest_side(p, f);
+    uint32_t a = v[k], b = v[(k + 1) % 3], c = v[(k + 2) % 3], ab = p->middle[edge[k]];
+    uint32_t bc = p->middle[edge[(k + 1) % 3]], ca = p->middle[edge[(k + 2) % 3]];
+    SONDE_ASSERT(marks <= 3 && ab != SONDE_NONE);
+    if (marks == 3) {
+      put(out, &at, a, ab, ca);
+      put(out, &at, ab, b, bc);
+      put(out, &at, ca, bc, c);
+      put(out, &at, ab, bc, ca);
+    } else {
+      put_half(out, &at, ab, b, c, bc);
+      put_half(out, &at, ab, c, a, ca);
     }
   }
-  pass_clear(&p);
-  return status;
+  SONDE_ASSERT(vertices == out->vertex_count && at == out->face_count);
+  return SONDE_OK;
 }
 
 sonde_status sonde_mesh_refine(const sonde_mesh *mesh,
@@ -265,10 +219,26 @@ sonde_status sonde_mesh_refine(const sonde_mesh *mesh,
                                sonde_mesh *refined, sonde_error *error) {
   SONDE_ASSERT(mesh != NULL && target != NULL && refined != NULL);
   sonde_status status = sonde_mesh_copy(mesh, refined, error);
-  bool done = false;
   if (!status) status = sonde_refine_spread_fans(refined, target, user, error);
-  for (int k = 0; k < MAX_PASSES && !status && !done; ++k)
-    status = refine_once(refined, target, user, &done, error);
+  bool done = false;
+  for (int k = 0; k < MAX_PASSES && !status && !done; ++k) {
+    pass p;
+    sonde_mesh finer = {0};
+    status = begin(&p, refined, error);
+    if (!status) status = mark_edges(&p, target, user, error);
+    done = p.marked == 0;
+    if (!status && !done) status = build(&p, &finer, error);
+    if (!status && !done) {
+      sonde_mesh_clear(refined);
+      *refined = finer;
+    }
+    sonde_topology_clear(&p.topology);
+    sonde_free(p.face_normal);
+    sonde_free(p.face_edge);
+    sonde_free(p.length);
+    sonde_free(p.middle);
+    sonde_free(p.work);
+  }
   if (!status && !done)
     status = sonde_fail(error, SONDE_CONVERGENCE, "edges are still too long after %d passes",
                         MAX_PASSES);

@@ -4,12 +4,6 @@
 // refinement that keeps them. The faces around it are replaced by rings of growing edge length
 // between the fan's border and its centre. The new vertices lie on the old faces; border and centre
 // stay. Edges grow by up to half from ring to ring while the wanted length allows.
-//
-//   walk_border     border of a fan in order, false when the fan is not closed
-//   next_ring       scale and size of the ring inside the present one
-//   place_ring      its vertices
-//   zip             faces between two rings, always taking the shorter diagonal
-//   spread_fan      one fan
 #include "geometry/refine.h"
 #include "geometry/internal.h"
 
@@ -36,8 +30,11 @@ typedef struct fan {
   void *user;
 } fan;
 
-// The border runs so that the centre is on its left, seen from outside.
+// Border of the fan in order, with its length up to each vertex and its mean distance from the
+// centre. It runs so that the centre is on its left, seen from outside. False when the fan is not
+// closed. `follower` has SONDE_NONE at every vertex.
 static bool walk_border(fan *f, const sonde_topology *t, uint32_t *follower) {
+  const sonde_vec3 *x = f->mesh->vertices;
   uint32_t first = SONDE_NONE, at;
   for (uint32_t i = t->face_start[f->centre]; i < t->face_start[f->centre + 1]; ++i) {
     const uint32_t *v = f->mesh->faces[t->face_list[i]];
@@ -51,16 +48,12 @@ static bool walk_border(fan *f, const sonde_topology *t, uint32_t *follower) {
     f->border[i] = at;
   }
   f->border[f->count] = first;
-  return at == first;
-}
-
-static void measure_border(fan *f) {
-  const sonde_vec3 *x = f->mesh->vertices;
   f->radius = f->along[0] = 0;
-  for (uint32_t i = 0; i < f->count; ++i) {
+  for (uint32_t i = 0; i < f->count && at == first; ++i) {
     f->along[i + 1] = f->along[i] + v_distance(x[f->border[i]], x[f->border[i + 1]]);
     f->radius += v_distance(x[f->border[i]], x[f->centre]) / f->count;
   }
+  return at == first;
 }
 
 // Point at a length along the border, drawn towards the centre.
@@ -73,9 +66,11 @@ static sonde_vec3 ring_point(const fan *f, double length, double scale, uint32_t
   return v_lerp(x[f->centre], p, scale);
 }
 
-static ring next_ring(const fan *f, const ring *outer, uint32_t *storage) {
+// Ring inside the outer one: its edges grow by up to half while the wanted length allows. Where it
+// does not let the rings shrink, the radius does. False: no memory.
+static bool add_ring(fan *f, const ring *outer, ring *inner) {
+  SONDE_ASSERT(outer->count > CENTRE_FACES && inner->vertex != outer->vertex);
   double perimeter = f->along[f->count], edge = outer->scale * perimeter / outer->count;
-  SONDE_ASSERT(outer->count > CENTRE_FACES && storage != outer->vertex);
   double wanted = RING_GROWTH * edge;
   uint32_t piece = 0;
   for (uint32_t k = 0; k < outer->count; ++k) {
@@ -84,30 +79,22 @@ static ring next_ring(const fan *f, const ring *outer, uint32_t *storage) {
     if (asked < wanted) wanted = asked;
   }
   if (!(wanted > edge)) wanted = edge;
-  ring inner = {.vertex = storage};
   double step = RING_HEIGHT * (edge + wanted) / 2 / f->radius;
-  inner.scale = fmax(outer->scale - step, 0.45 * outer->scale);
-  double count = round(inner.scale * perimeter / wanted);
-  inner.count = (uint32_t)clamp(count, RING_LEAST, outer->count);
-  return inner;
-}
-
-static bool place_ring(fan *f, ring *inner) {
+  inner->scale = fmax(outer->scale - step, 0.45 * outer->scale);
   SONDE_ASSERT(inner->scale > 0 && inner->scale < 1);
-  double spacing = f->along[f->count] / inner->count;
-  uint32_t piece = 0;
+  double count = round(inner->scale * perimeter / wanted);
+  inner->count = (uint32_t)clamp(count, RING_LEAST, outer->count);
+
+  double spacing = perimeter / inner->count;
+  piece = 0;
   for (uint32_t k = 0; k < inner->count; ++k) {
     inner->vertex[k] = f->builder->mesh.vertex_count;
     sonde_vec3 p = ring_point(f, (k + 0.5) * spacing, inner->scale, &piece);
     if (!sonde_builder_vertex(f->builder, p)) return false;
   }
-  return true;
-}
 
-static bool zip(fan *f, const ring *outer, const ring *inner) {
-  SONDE_ASSERT(inner->count >= 3 && inner->count <= outer->count);
-  uint32_t i = 0, k = 0;
-  while (i < outer->count || k < inner->count) {
+  // faces between the two rings, always taking the shorter diagonal
+  for (uint32_t i = 0, k = 0; i < outer->count || k < inner->count;) {
     const sonde_vec3 *x = f->builder->mesh.vertices;
     uint32_t o = outer->vertex[i % outer->count], o_next = outer->vertex[(i + 1) % outer->count];
     uint32_t n = inner->vertex[k % inner->count], n_next = inner->vertex[(k + 1) % inner->count];
@@ -124,14 +111,22 @@ static bool zip(fan *f, const ring *outer, const ring *inner) {
   return true;
 }
 
-// Rings from the border inwards, then the few faces around the centre; false: no memory.
-static bool fill_fan(fan *f, uint32_t *one, uint32_t *two) {
+// Copies all but the faces around the centre; in their place come rings from the border inwards,
+// then the few faces around the centre. False: no memory.
+static bool tile_fan(fan *f, uint32_t *one, uint32_t *two) {
+  const sonde_mesh *mesh = f->mesh;
+  for (uint32_t v = 0; v < mesh->vertex_count; ++v)
+    if (!sonde_builder_vertex(f->builder, mesh->vertices[v])) return false;
+  for (uint32_t i = 0; i < mesh->face_count; ++i) {
+    const uint32_t *v = mesh->faces[i];
+    if (v[0] == f->centre || v[1] == f->centre || v[2] == f->centre) continue;
+    if (!sonde_builder_face(f->builder, v[0], v[1], v[2])) return false;
+  }
   memcpy(one, f->border, f->count * sizeof *one);
   ring outer = {f->count, one, 1};
   while (outer.count > CENTRE_FACES) {
-    ring inner = next_ring(f, &outer, outer.vertex == one ? two : one);
-    if (!place_ring(f, &inner) || !zip(f, &outer, &inner)) return false;
-    // Where the wanted length does not let the rings shrink, the radius does.
+    ring inner = {.vertex = outer.vertex == one ? two : one};
+    if (!add_ring(f, &outer, &inner)) return false;
     outer = inner;
   }
   for (uint32_t k = 0; k < outer.count; ++k)
@@ -141,43 +136,25 @@ static bool fill_fan(fan *f, uint32_t *one, uint32_t *two) {
   return true;
 }
 
-// Copies all but the faces around the centre, then fills the hole.
-static sonde_status rebuild(fan *f, uint32_t *one, uint32_t *two, sonde_error *error) {
-  const sonde_mesh *mesh = f->mesh;
-  bool ok = true;
-  for (uint32_t v = 0; v < mesh->vertex_count && ok; ++v)
-    ok = sonde_builder_vertex(f->builder, mesh->vertices[v]);
-  for (uint32_t i = 0; i < mesh->face_count && ok; ++i) {
-    const uint32_t *v = mesh->faces[i];
-    if (v[0] == f->centre || v[1] == f->centre || v[2] == f->centre) continue;
-    ok = sonde_builder_face(f->builder, v[0], v[1], v[2]);
-  }
-  return ok && fill_fan(f, one, two) ? SONDE_OK : sonde_fail_memory(error);
-}
-
 static sonde_status spread_fan(sonde_mesh *mesh, const sonde_topology *t, uint32_t centre,
                                target_fn target, void *user, sonde_error *error) {
   sonde_mesh_builder builder = {.scale = 1};
   uint32_t count = t->face_start[centre + 1] - t->face_start[centre];
+  SONDE_ASSERT(count > FAN_FACES);
   fan f = {mesh, &builder, centre, count, NULL, NULL, 0, target, user};
   f.border = SONDE_NEW(uint32_t, count + (size_t)1);
   f.along = SONDE_NEW(double, count + (size_t)1);
   uint32_t *one = SONDE_NEW(uint32_t, count), *two = SONDE_NEW(uint32_t, count);
   uint32_t *follower = SONDE_NEW(uint32_t, mesh->vertex_count);
-  sonde_status status = SONDE_OK;
-  if (f.border && f.along && one && two && follower) {
-    for (uint32_t v = 0; v < mesh->vertex_count; ++v) follower[v] = SONDE_NONE;
-    if (walk_border(&f, t, follower)) {
-      measure_border(&f);
-      status = rebuild(&f, one, two, error);
-      if (!status) {
-        sonde_mesh_clear(mesh);
-        *mesh = builder.mesh;
-        builder.mesh = (sonde_mesh){0};
-      }
+  bool ok = f.border && f.along && one && two && follower;
+  for (uint32_t v = 0; v < mesh->vertex_count && ok; ++v) follower[v] = SONDE_NONE;
+  if (ok && walk_border(&f, t, follower)) {
+    ok = tile_fan(&f, one, two);
+    if (ok) {
+      sonde_mesh_clear(mesh);
+      *mesh = builder.mesh;
+      builder.mesh = (sonde_mesh){0};
     }
-  } else {
-    status = sonde_fail_memory(error);
   }
   sonde_mesh_clear(&builder.mesh);
   sonde_free(f.border);
@@ -185,7 +162,7 @@ static sonde_status spread_fan(sonde_mesh *mesh, const sonde_topology *t, uint32
   sonde_free(one);
   sonde_free(two);
   sonde_free(follower);
-  return status;
+  return ok ? SONDE_OK : sonde_fail_memory(error);
 }
 
 sonde_status sonde_refine_spread_fans(sonde_mesh *mesh, target_fn target, void *user,

@@ -1,12 +1,8 @@
 // Queries of the surface index; they allocate nothing.
-//
-//   sonde_triangle_closest closest point by the Voronoi regions of corner, side and face
-//   sonde_surface_closest branch and bound over the tree
-//   hit_triangle          ray against triangle, both sides, watertight
-//   sonde_surface_inside  sign against the pseudo-normal of the closest feature
 #include "geometry/surface.h"
 #include "geometry/triangle.h"
 
+// By the Voronoi regions of corners, sides and face.
 void sonde_triangle_closest(sonde_vec3 p, sonde_vec3 a, sonde_vec3 b, sonde_vec3 c, double w[3]) {
   sonde_vec3 ab = v_sub(b, a), ac = v_sub(c, a), ap = v_sub(p, a);
   double d1 = v_dot(ab, ap), d2 = v_dot(ac, ap);
@@ -42,13 +38,6 @@ void sonde_triangle_closest(sonde_vec3 p, sonde_vec3 a, sonde_vec3 b, sonde_vec3
   }
 }
 
-static sonde_vec3 weighted(const sonde_mesh *mesh, uint32_t face, const double w[3]) {
-  const uint32_t *v = mesh->faces[face];
-  sonde_vec3 p = v_scale(mesh->vertices[v[0]], w[0]);
-  p = v_madd(p, w[1], mesh->vertices[v[1]]);
-  return v_madd(p, w[2], mesh->vertices[v[2]]);
-}
-
 static double box_distance2(const surface_node *node, sonde_vec3 p) {
   double x = fmax(fmax(node->low.x - p.x, p.x - node->high.x), 0);
   double y = fmax(fmax(node->low.y - p.y, p.y - node->high.y), 0);
@@ -56,25 +45,10 @@ static double box_distance2(const surface_node *node, sonde_vec3 p) {
   return x * x + y * y + z * z;
 }
 
-static void closest_in_leaf(const sonde_surface_index *index, const surface_node *node,
-                            sonde_vec3 query, sonde_surface_point *best, double *best2) {
-  SONDE_ASSERT(node->count > 0);
-  for (uint32_t i = node->first; i < node->first + node->count; ++i) {
-    sonde_surface_point trial = {.face = index->order[i]};
-    const uint32_t *v = index->mesh.faces[trial.face];
-    const sonde_vec3 *x = index->mesh.vertices;
-    sonde_triangle_closest(query, x[v[0]], x[v[1]], x[v[2]], trial.weight);
-    trial.point_m = weighted(&index->mesh, trial.face, trial.weight);
-    double d2 = v_norm2(v_sub(query, trial.point_m));
-    if (d2 < *best2) {
-      *best2 = d2;
-      *best = trial;
-    }
-  }
-}
-
+// Branch and bound over the tree, the nearer box first.
 sonde_surface_point sonde_surface_closest(const sonde_surface_index *index, sonde_vec3 query) {
   SONDE_ASSERT(index != NULL && index->node_count > 0);
+  const sonde_vec3 *x = index->mesh.vertices;
   uint32_t stack[SURFACE_STACK], depth = 0;
   double bound[SURFACE_STACK], best2 = INFINITY;
   sonde_surface_point best = {0};
@@ -84,10 +58,19 @@ sonde_surface_point sonde_surface_closest(const sonde_surface_index *index, sond
     uint32_t at = stack[--depth];
     if (bound[depth] >= best2) continue;
     const surface_node *node = &index->nodes[at];
-    if (node->count) {
-      closest_in_leaf(index, node, query, &best, &best2);
-      continue;
+    for (uint32_t i = node->first; i < node->first + node->count; ++i) {
+      sonde_surface_point trial = {.face = index->order[i]};
+      const uint32_t *v = index->mesh.faces[trial.face];
+      double *w = trial.weight;
+      sonde_triangle_closest(query, x[v[0]], x[v[1]], x[v[2]], w);
+      trial.point_m = v_madd(v_madd(v_scale(x[v[0]], w[0]), w[1], x[v[1]]), w[2], x[v[2]]);
+      double d2 = v_norm2(v_sub(query, trial.point_m));
+      if (d2 < best2) {
+        best2 = d2;
+        best = trial;
+      }
     }
+    if (node->count) continue;
     SONDE_ASSERT(depth + 2 <= SURFACE_STACK);
     uint32_t near = at + 1, far = node->first;
     double d_near = box_distance2(&index->nodes[near], query);
@@ -112,25 +95,11 @@ typedef struct ray {
   double shear_x, shear_y, scale;
 } ray;
 
-static double along(sonde_vec3 p, int axis) { return axis == 0 ? p.x : axis == 1 ? p.y : p.z; }
-
-static ray make_ray(sonde_vec3 origin, sonde_vec3 direction) {
-  ray r = {.origin = origin, .direction = direction};
-  r.inverse = vec3(1 / direction.x, 1 / direction.y, 1 / direction.z);
-  double x = fabs(direction.x), y = fabs(direction.y), z = fabs(direction.z);
-  r.z = x >= y && x >= z ? 0 : y >= z ? 1 : 2;
-  r.x = (r.z + 1) % 3;
-  r.y = (r.z + 2) % 3;
-  r.scale = 1 / along(direction, r.z);
-  r.shear_x = along(direction, r.x) * r.scale;
-  r.shear_y = along(direction, r.y) * r.scale;
-  return r;
-}
-
 static sonde_vec3 sheared(const ray *r, sonde_vec3 p) {
   sonde_vec3 from = v_sub(p, r->origin);
-  double z = along(from, r->z);
-  return vec3(along(from, r->x) - r->shear_x * z, along(from, r->y) - r->shear_y * z, z * r->scale);
+  double z = v_coordinate(from, r->z);
+  return vec3(v_coordinate(from, r->x) - r->shear_x * z, v_coordinate(from, r->y) - r->shear_y * z,
+              z * r->scale);
 }
 
 // The stretch of the ray between two planes; a ray along them is between them or it is not.
@@ -143,14 +112,6 @@ static void narrow(double origin, double inverse, double low, double high, doubl
   double a = (low - origin) * inverse, b = (high - origin) * inverse;
   *enter = fmax(*enter, fmin(a, b));
   *leave = fmin(*leave, fmax(a, b));
-}
-
-static bool enters_box(const surface_node *node, const ray *r, double reach) {
-  double enter = 0, leave = reach;
-  narrow(r->origin.x, r->inverse.x, node->low.x, node->high.x, &enter, &leave);
-  narrow(r->origin.y, r->inverse.y, node->low.y, node->high.y, &enter, &leave);
-  narrow(r->origin.z, r->inverse.z, node->low.z, node->high.z, &enter, &leave);
-  return enter <= leave * (1 + 1e-12) + 1e-12;
 }
 
 // Sheared so, the ray is the axis x = y = 0 and a side's sign is that of one cross product, which
@@ -170,66 +131,70 @@ static bool hit_triangle(const ray *r, sonde_vec3 a, sonde_vec3 b, sonde_vec3 c,
   return true;
 }
 
-static void hit_leaf(const sonde_surface_index *index, const surface_node *node, const ray *r,
-                     sonde_surface_point *hit, bool *found) {
-  for (uint32_t i = node->first; i < node->first + node->count; ++i) {
-    sonde_surface_point trial = {.face = index->order[i]};
-    const uint32_t *v = index->mesh.faces[trial.face];
-    const sonde_vec3 *x = index->mesh.vertices;
-    if (!hit_triangle(r, x[v[0]], x[v[1]], x[v[2]], &trial.distance_m, trial.weight)) continue;
-    if (trial.distance_m < 0 || trial.distance_m > hit->distance_m) continue;
-    if (*found && trial.distance_m == hit->distance_m && trial.face > hit->face) continue;
-    *hit = trial;
-    *found = true;
-  }
-}
-
 bool sonde_surface_raycast(const sonde_surface_index *index, sonde_vec3 origin,
                            sonde_vec3 direction, double max_distance_m, sonde_surface_point *hit) {
   SONDE_ASSERT(index != NULL && index->node_count > 0);
-  double length = v_norm(direction);
-  sonde_surface_point best = {.distance_m = max_distance_m};
   *hit = (sonde_surface_point){0};
+  double length = v_norm(direction);
   if (!(length > 0)) return false;
-  ray r = make_ray(origin, v_scale(direction, 1.0 / length));
+  direction = v_scale(direction, 1.0 / length);
+  double along_x = fabs(direction.x), along_y = fabs(direction.y), along_z = fabs(direction.z);
+  ray r = {.origin = origin, .direction = direction};
+  r.inverse = vec3(1 / direction.x, 1 / direction.y, 1 / direction.z);
+  r.z = along_x >= along_y && along_x >= along_z ? 0 : along_y >= along_z ? 1 : 2;
+  r.x = (r.z + 1) % 3;
+  r.y = (r.z + 2) % 3;
+  r.scale = 1 / v_coordinate(direction, r.z);
+  r.shear_x = v_coordinate(direction, r.x) * r.scale;
+  r.shear_y = v_coordinate(direction, r.y) * r.scale;
+
+  const sonde_vec3 *x = index->mesh.vertices;
+  sonde_surface_point best = {.distance_m = max_distance_m};
   uint32_t stack[SURFACE_STACK], depth = 0;
   bool found = false;
   stack[depth++] = 0;
   while (depth) {
     uint32_t at = stack[--depth];
     const surface_node *node = &index->nodes[at];
-    if (!enters_box(node, &r, best.distance_m)) continue;
-    if (node->count) {
-      hit_leaf(index, node, &r, &best, &found);
-      continue;
+    double enter = 0, leave = best.distance_m;
+    narrow(origin.x, r.inverse.x, node->low.x, node->high.x, &enter, &leave);
+    narrow(origin.y, r.inverse.y, node->low.y, node->high.y, &enter, &leave);
+    narrow(origin.z, r.inverse.z, node->low.z, node->high.z, &enter, &leave);
+    if (!(enter <= leave * (1 + 1e-12) + 1e-12)) continue;
+    for (uint32_t i = node->first; i < node->first + node->count; ++i) {
+      sonde_surface_point trial = {.face = index->order[i]};
+      const uint32_t *v = index->mesh.faces[trial.face];
+      if (!hit_triangle(&r, x[v[0]], x[v[1]], x[v[2]], &trial.distance_m, trial.weight)) continue;
+      if (trial.distance_m < 0 || trial.distance_m > best.distance_m) continue;
+      if (found && trial.distance_m == best.distance_m && trial.face > best.face) continue;
+      best = trial;
+      found = true;
     }
+    if (node->count) continue;
     SONDE_ASSERT(depth + 2 <= SURFACE_STACK);
     stack[depth++] = node->first;
     stack[depth++] = at + 1;
   }
   if (!found) return false;
-  best.point_m = v_madd(origin, best.distance_m, r.direction);
+  best.point_m = v_madd(origin, best.distance_m, direction);
   *hit = best;
   return true;
 }
 
 // ---- inside -------------------------------------------------------------------------------
 
-// Normal of the corner, side or face that the point lies on. With angle weights at corners the sign
-// of (query - closest) . normal is right for every closed surface (Baerentzen and Aanaes 2005).
-static sonde_vec3 feature_normal(const sonde_surface_index *index,
-                                 const sonde_surface_point *point) {
-  const double *w = point->weight;
-  for (int k = 0; k < 3; ++k) {
-    if (w[k] == 1) return index->vertex_normal[index->mesh.faces[point->face][k]];
-    if (w[k] == 0 && w[(k + 1) % 3] > 0 && w[(k + 2) % 3] > 0)
-      return index->side_normal[point->face][(k + 1) % 3];
-  }
-  return index->face_normal[point->face];
-}
-
 bool sonde_surface_inside(const sonde_surface_index *index, sonde_vec3 query) {
   SONDE_ASSERT(index != NULL);
   sonde_surface_point closest = sonde_surface_closest(index, query);
-  return v_dot(v_sub(query, closest.point_m), feature_normal(index, &closest)) < 0;
+  // Normal of the corner, side or face that the closest point lies on. With angle weights at
+  // corners the sign of (query - closest) . normal is right for every closed surface (Baerentzen
+  // and Aanaes 2005).
+  const double *w = closest.weight;
+  sonde_vec3 normal = index->face_normal[closest.face];
+  for (int k = 2; k >= 0; --k)
+    if (w[k] == 0 && w[(k + 1) % 3] > 0 && w[(k + 2) % 3] > 0)
+      normal = index->side_normal[closest.face][(k + 1) % 3];
+  for (int k = 2; k >= 0; --k)
+    if (w[k] == 1) normal = index->vertex_normal[index->mesh.faces[closest.face][k]];
+  return v_dot(v_sub(query, closest.point_m), normal) < 0;
 }

@@ -1,8 +1,4 @@
 // Edges, neighbours and faces around each vertex of a triangle surface.
-//
-//   collect_edges     distinct edges with the faces beside them, from the sorted half edges
-//   fill_neighbours   vertex rows of neighbours and edges; ascending because edges are sorted
-//   fill_faces        vertex rows of faces
 #include "geometry/internal.h"
 
 void sonde_topology_clear(sonde_topology *topology) {
@@ -17,60 +13,8 @@ void sonde_topology_clear(sonde_topology *topology) {
   *topology = (sonde_topology){0};
 }
 
-static sonde_status allocate(sonde_topology *topology, const sonde_mesh *mesh, uint32_t edges,
-                             sonde_error *error) {
-  size_t rows = mesh->vertex_count + (size_t)1, sides = 2 * (size_t)edges;
-  topology->vertex_count = mesh->vertex_count;
-  topology->edge_count = edges;
-  topology->edges = sonde_calloc(edges, sizeof *topology->edges);
-  topology->edge_faces = sonde_calloc(edges, sizeof *topology->edge_faces);
-  topology->start = SONDE_NEW(uint32_t, rows);
-  topology->neighbour = SONDE_NEW(uint32_t, sides);
-  topology->neighbour_edge = SONDE_NEW(uint32_t, sides);
-  topology->face_start = SONDE_NEW(uint32_t, rows);
-  topology->face_list = SONDE_NEW(uint32_t, 3 * (size_t)mesh->face_count);
-  if (topology->edges && topology->edge_faces && topology->start && topology->neighbour &&
-      topology->neighbour_edge && topology->face_start && topology->face_list)
-    return SONDE_OK;
-  return sonde_fail_memory(error);
-}
-
 static bool same_edge(const sonde_half_edge *a, const sonde_half_edge *b) {
   return a->low == b->low && a->high == b->high;
-}
-
-// Counts distinct edges; refuses what an edge table cannot hold.
-static sonde_status count_edges(const sonde_half_edge *sides, size_t count, uint32_t *edges,
-                                sonde_error *error) {
-  *edges = 0;
-  for (size_t i = 0; i < count; ++i) {
-    if (sides[i].low == sides[i].high)
-      return sonde_fail(error, SONDE_MESH, "face %u uses vertex %u twice", sides[i].face,
-                        sides[i].low);
-    if (i >= 2 && same_edge(&sides[i - 2], &sides[i]))
-      return sonde_fail(error, SONDE_MESH,
-                        "more than two faces meet at the edge of vertices %u and %u", sides[i].low,
-                        sides[i].high);
-    if (i == 0 || !same_edge(&sides[i - 1], &sides[i])) ++*edges;
-  }
-  return SONDE_OK;
-}
-
-static void collect_edges(sonde_topology *topology, const sonde_half_edge *sides, size_t count) {
-  uint32_t e = 0;
-  for (size_t i = 0; i < count; ++i) {
-    if (i > 0 && same_edge(&sides[i - 1], &sides[i])) {
-      SONDE_ASSERT(e > 0);
-      topology->edge_faces[e - 1][1] = sides[i].face;
-      continue;
-    }
-    topology->edges[e][0] = sides[i].low;
-    topology->edges[e][1] = sides[i].high;
-    topology->edge_faces[e][0] = sides[i].face;
-    topology->edge_faces[e][1] = SONDE_NONE;
-    ++e;
-  }
-  SONDE_ASSERT(e == topology->edge_count);
 }
 
 // Turns counts held in start[v + 1] into row starts.
@@ -84,47 +28,82 @@ static void rewind_rows(uint32_t *start, uint32_t rows) {
   start[0] = 0;
 }
 
-static void fill_neighbours(sonde_topology *topology) {
-  uint32_t *start = topology->start;
-  for (uint32_t e = 0; e < topology->edge_count; ++e)
-    for (int k = 0; k < 2; ++k) start[topology->edges[e][k] + 1]++;
-  accumulate(start, topology->vertex_count);
-  for (uint32_t e = 0; e < topology->edge_count; ++e)
-    for (int k = 0; k < 2; ++k) {
-      uint32_t slot = start[topology->edges[e][k]]++;
-      topology->neighbour[slot] = topology->edges[e][1 - k];
-      topology->neighbour_edge[slot] = e;
-    }
-  rewind_rows(start, topology->vertex_count);
-}
-
-static void fill_faces(sonde_topology *topology, const sonde_mesh *mesh) {
-  uint32_t *start = topology->face_start;
-  for (uint32_t f = 0; f < mesh->face_count; ++f)
-    for (int k = 0; k < 3; ++k) start[mesh->faces[f][k] + 1]++;
-  accumulate(start, topology->vertex_count);
-  for (uint32_t f = 0; f < mesh->face_count; ++f)
-    for (int k = 0; k < 3; ++k) topology->face_list[start[mesh->faces[f][k]]++] = f;
-  rewind_rows(start, topology->vertex_count);
-}
-
 sonde_status sonde_topology_build(const sonde_mesh *mesh, sonde_topology *topology,
                                   sonde_error *error) {
   SONDE_ASSERT(mesh != NULL && topology != NULL);
   *topology = (sonde_topology){0};
   sonde_half_edge *sides = NULL;
-  uint32_t edges = 0;
-  size_t count = 3 * (size_t)mesh->face_count;
+  uint32_t edges = 0, vertices = mesh->vertex_count;
+  size_t count = 3 * (size_t)mesh->face_count, rows = vertices + (size_t)1;
   sonde_status status = sonde_half_edges_sort(mesh, &sides, error);
-  if (!status) status = count_edges(sides, count, &edges, error);
-  if (!status) status = allocate(topology, mesh, edges, error);
-  if (!status) {
-    collect_edges(topology, sides, count);
-    fill_neighbours(topology);
-    fill_faces(topology, mesh);
-  } else {
-    sonde_topology_clear(topology);
+
+  // number of distinct edges; at most two faces beside each
+  for (size_t i = 0; i < count && !status; ++i) {
+    if (sides[i].low == sides[i].high)
+      status = sonde_fail(error, SONDE_MESH, "face %u uses vertex %u twice", sides[i].face,
+                          sides[i].low);
+    else if (i >= 2 && same_edge(&sides[i - 2], &sides[i]))
+      status = sonde_fail(error, SONDE_MESH,
+                          "more than two faces meet at the edge of vertices %u and %u",
+                          sides[i].low, sides[i].high);
+    else if (i == 0 || !same_edge(&sides[i - 1], &sides[i]))
+      ++edges;
   }
+  if (status) {
+    sonde_free(sides);
+    return status;
+  }
+  sonde_topology *t = topology;
+  t->vertex_count = vertices;
+  t->edge_count = edges;
+  t->edges = sonde_calloc(edges, sizeof *t->edges);
+  t->edge_faces = sonde_calloc(edges, sizeof *t->edge_faces);
+  t->start = SONDE_NEW(uint32_t, rows);
+  t->neighbour = SONDE_NEW(uint32_t, 2 * (size_t)edges);
+  t->neighbour_edge = SONDE_NEW(uint32_t, 2 * (size_t)edges);
+  t->face_start = SONDE_NEW(uint32_t, rows);
+  t->face_list = SONDE_NEW(uint32_t, count);
+  if (!t->edges || !t->edge_faces || !t->start || !t->neighbour || !t->neighbour_edge ||
+      !t->face_start || !t->face_list) {
+    sonde_topology_clear(topology);
+    sonde_free(sides);
+    return sonde_fail_memory(error);
+  }
+
+  // edges with the faces beside them
+  uint32_t last = SONDE_NONE;
+  for (size_t i = 0; i < count; ++i) {
+    if (i > 0 && same_edge(&sides[i - 1], &sides[i])) {
+      t->edge_faces[last][1] = sides[i].face;
+      continue;
+    }
+    ++last;
+    t->edges[last][0] = sides[i].low;
+    t->edges[last][1] = sides[i].high;
+    t->edge_faces[last][0] = sides[i].face;
+    t->edge_faces[last][1] = SONDE_NONE;
+  }
+  SONDE_ASSERT(last + 1 == edges);
   sonde_free(sides);
-  return status;
+
+  // neighbours and edges of each vertex; ascending because the edges are sorted
+  for (uint32_t e = 0; e < edges; ++e)
+    for (int k = 0; k < 2; ++k) t->start[t->edges[e][k] + 1]++;
+  accumulate(t->start, vertices);
+  for (uint32_t e = 0; e < edges; ++e)
+    for (int k = 0; k < 2; ++k) {
+      uint32_t slot = t->start[t->edges[e][k]]++;
+      t->neighbour[slot] = t->edges[e][1 - k];
+      t->neighbour_edge[slot] = e;
+    }
+  rewind_rows(t->start, vertices);
+
+  // faces of each vertex
+  for (uint32_t f = 0; f < mesh->face_count; ++f)
+    for (int k = 0; k < 3; ++k) t->face_start[mesh->faces[f][k] + 1]++;
+  accumulate(t->face_start, vertices);
+  for (uint32_t f = 0; f < mesh->face_count; ++f)
+    for (int k = 0; k < 3; ++k) t->face_list[t->face_start[mesh->faces[f][k]]++] = f;
+  rewind_rows(t->face_start, vertices);
+  return SONDE_OK;
 }

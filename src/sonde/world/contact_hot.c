@@ -13,12 +13,6 @@
 
 static const double STEEP_WEIGHT = 4;
 
-static sonde_vec3 v_min(sonde_vec3 a, sonde_vec3 b) {
-  return vec3(a.x < b.x ? a.x : b.x, a.y < b.y ? a.y : b.y, a.z < b.z ? a.z : b.z);
-}
-static sonde_vec3 v_max(sonde_vec3 a, sonde_vec3 b) {
-  return vec3(a.x > b.x ? a.x : b.x, a.y > b.y ? a.y : b.y, a.z > b.z ? a.z : b.z);
-}
 static bool overlap(const sonde_box *a, const sonde_box *b) {
   return a->low.x <= b->high.x && b->low.x <= a->high.x && a->low.y <= b->high.y &&
          b->low.y <= a->high.y && a->low.z <= b->high.z && b->low.z <= a->high.z;
