@@ -203,7 +203,7 @@ static void cubes_follow_the_interior(void **state) {
                                (int32_t)floor(near.z / h)};
       sonde_vec3 middle = vec3((cell[0] + 0.5) * h, (cell[1] + 0.5) * h, (cell[2] + 0.5) * h);
       sonde_vec3 guess = sonde_echo_from_world(b.echo, near);
-      sonde_cubes_add(b.echo, cell, v4_of(v_sub(middle, s->corner)), v4_of(guess));
+      sonde_cubes_add(b.echo, cell, point_of(v_sub(middle, s->corner)), point_of(guess));
       const cube c = s->cube[0];
       sonde_vec3 at = vec3((double)c.at[0], (double)c.at[1], (double)c.at[2]);
       sonde_vec3 field = v_add(middle, sonde_interior_field(b.interior, middle));

@@ -17,10 +17,10 @@ static double compare(const sonde_interior *in, sonde_vec3 corner, double *most)
   *most = 0;
   sonde_fields_begin(fields, in, corner);
   for (int row = 0; row < ROWS; ++row) {
-    v4 rest[ROW], got[ROW];
+    float_x4 rest[ROW], got[ROW];
     uint32_t count = 1 + (uint32_t)row % ROW; // any number of points
     for (uint32_t k = 0; k < count; ++k)
-      rest[k] = (v4){draw(0.06, &next), draw(0.06, &next), draw(0.06, &next), 0};
+      rest[k] = (float_x4){draw(0.06, &next), draw(0.06, &next), draw(0.06, &next), 0};
     sonde_fields_at(fields, count, rest, got);
     for (uint32_t k = 0; k < count; ++k) {
       sonde_vec3 way = vec3((double)rest[k][0], (double)rest[k][1], (double)rest[k][2]);
@@ -68,7 +68,7 @@ static void angles_are_angles(void **state) {
   for (int k = -1800; k <= 1800; ++k) {
     double angle = k * SONDE_PI / 1800, r = k % 7 ? 0.08 : 1e-4;
     float x = (float)(r * cos(angle)), y = (float)(r * sin(angle));
-    v4 got = angle4(all4(x), all4(y));
+    float_x4 got = vangle(vset_float_x4(x), vset_float_x4(y));
     double off = remainder((double)got[k & 3] - atan2((double)y, (double)x), 2 * SONDE_PI);
     worst = fmax(worst, fabs(off));
   }

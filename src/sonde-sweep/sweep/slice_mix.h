@@ -2,7 +2,7 @@
 #ifndef SONDE_SRC_SWEEP_SLICE_MIX_H
 #define SONDE_SRC_SWEEP_SLICE_MIX_H
 
-#include "echo/kernel_vector.h"
+#include "base/vector_records.h"
 #include "sweep/slice.h"
 
 #include <string.h>

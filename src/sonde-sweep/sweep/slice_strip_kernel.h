@@ -14,51 +14,51 @@ typedef struct strip_work {
 } strip_work;
 
 // Lanes of a table by their index.
-INLINE vi look_up(const void *table, vi index) {
+INLINE ints look_up(const void *table, ints index) {
 #if defined(__AVX512F__)
-  return (vi)_mm512_permutexvar_epi32((__m512i)index, _mm512_loadu_si512(table));
+  return (ints)_mm512_permutexvar_epi32((__m512i)index, _mm512_loadu_si512(table));
 #elif defined(__AVX2__)
   const __m256i *half = table;
   __m256i low = _mm256_loadu_si256(half), high = _mm256_loadu_si256(half + 1);
   low = _mm256_permutevar8x32_epi32(low, (__m256i)index);
   high = _mm256_permutevar8x32_epi32(high, (__m256i)index);
-  return pick_of(index > 7, (vi)high, (vi)low);
+  return vselect(index > 7, (ints)high, (ints)low);
 #else
   const int32_t *from = table;
-  vi to;
-  for (int x = 0; x < W; ++x) to[x] = from[index[x]];
+  ints to;
+  for (int x = 0; x < FLOATS; ++x) to[x] = from[index[x]];
   return to;
 #endif
 }
 
-INLINE vi find_index(const strip_table *table, vf x, float y) {
-  vi index = {0};
+INLINE ints find_index(const strip_table *table, floats x, float y) {
+  ints index = {0};
   for (uint32_t k = 0; k + 1 < table->count; ++k)
     index -= table->at[4][k] + y * table->row[4][k] + x * table->column[4][k] < 0;
   return index;
 }
 
-INLINE void place_pixels(const sonde_slicer *s, vf u, vf v, vi frame, int side, uint32_t first,
-                         strip_work *w) {
+INLINE void place_pixels(const sonde_slicer *s, floats u, floats v, ints frame, int side,
+                         uint32_t first, strip_work *w) {
   float wide = s->high[0] - s->low[0], high = s->high[1] - s->low[1];
-  vi i = whole(smaller(u, all(wide - 1))), j = whole(smaller(v, all(high - 1)));
-  vf left = real(i), top = real(j);
-  vi p = whole((left + 0.5f) * (1.0f / (SLICE_LINE_WIDE - 1)));
-  vi q = whole((top + 0.5f) * (1.0f / (SLICE_LINE_HIGH - 1)));
-  vi place = frame + i + p * s->layout.column_line + j * s->layout.row + q * s->layout.row_line;
+  ints i = vint(vmin(u, vset(wide - 1))), j = vint(vmin(v, vset(high - 1)));
+  floats left = vreal(i), top = vreal(j);
+  ints p = vint((left + 0.5f) * (1.0f / (SLICE_LINE_WIDE - 1)));
+  ints q = vint((top + 0.5f) * (1.0f / (SLICE_LINE_HIGH - 1)));
+  ints place = frame + i + p * s->layout.column_line + j * s->layout.row + q * s->layout.row_line;
   memcpy(w->place[side] + first, &place, sizeof place);
-  store(w->share[side][0] + first, u - left);
-  store(w->share[side][1] + first, v - top);
+  vstore(w->share[side][0] + first, u - left);
+  vstore(w->share[side][1] + first, v - top);
 }
 
 // Pixels for which the strip speaks; the others' numbers become harmless.
-INLINE vi check(const sonde_slicer *s, const strip_table *table, vf value[SLICE_FORMS]) {
-  vi hit = (value[4] >= 0) & (value[5] > 0) & (value[4] + value[5] <= (float)s->options.gap_m);
+INLINE ints check(const sonde_slicer *s, const strip_table *table, floats value[SLICE_FORMS]) {
+  ints hit = (value[4] >= 0) & (value[5] > 0) & (value[4] + value[5] <= (float)s->options.gap_m);
   for (int k = 0; k < 4; ++k)
     hit = hit & (value[k] >= table->low[k & 1]) & (value[k] <= table->high[k & 1]);
   for (int k = 0; k < 4; ++k)
-    value[k] = larger(smaller(value[k], all(s->high[k & 1] - s->low[k & 1])), all(0));
-  value[4] = only(hit, value[4]), value[5] = pick(hit, value[5], all(1));
+    value[k] = vmax(vmin(value[k], vset(s->high[k & 1] - s->low[k & 1])), vset(0));
+  value[4] = vonly(hit, value[4]), value[5] = vselect(hit, value[5], vset(1));
   return hit;
 }
 
@@ -68,18 +68,18 @@ INLINE void place_row(const sonde_slicer *s, const strip_table *table, bool chec
   static const float lanes[] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
   float starts[SLICE_FORMS][STRIPS];
   for (int f = 0; f < SLICE_FORMS; ++f)
-    for (int k = 0; k < STRIPS; k += W)
-      store(starts[f] + k, load(table->at[f] + k) + row * load(table->row[f] + k));
-  for (uint32_t k = 0; k < SLICE_TILE; k += W) {
-    vf x = load(lanes + k), value[SLICE_FORMS];
-    vi index = find_index(table, x, row);
+    for (int k = 0; k < STRIPS; k += FLOATS)
+      vstore(starts[f] + k, vload(table->at[f] + k) + row * vload(table->row[f] + k));
+  for (uint32_t k = 0; k < SLICE_TILE; k += FLOATS) {
+    floats x = vload(lanes + k), value[SLICE_FORMS];
+    ints index = find_index(table, x, row);
     for (int f = 0; f < SLICE_FORMS; ++f)
-      value[f] = (vf)look_up(starts[f], index) + x * (vf)look_up(table->column[f], index);
+      value[f] = (floats)look_up(starts[f], index) + x * (floats)vlook_up(table->column[f], index);
     if (checked) {
-      vi met = check(s, table, value);
+      ints met = check(s, table, value);
       memcpy(w->met + first + k, &met, sizeof met);
     }
-    store(w->t + first + k, value[4] / (value[4] + value[5]));
+    vstore(w->t + first + k, value[4] / (value[4] + value[5]));
     for (int side = 0; side < 2; ++side)
       place_pixels(s, value[2 * side], value[2 * side + 1], look_up(table->frame[side], index),
                    side, first + k, w);

@@ -8,7 +8,7 @@
 #ifndef SONDE_SRC_SWEEP_SLICE_STRIPS_H
 #define SONDE_SRC_SWEEP_SLICE_STRIPS_H
 
-#include "echo/kernel_vector.h"
+#include "base/vector_records.h"
 #include "sweep/slice_mix.h"
 
 enum { STRIPS = SLICE_STRIPS, TILE_PIXELS = SLICE_TILE * SLICE_TILE };

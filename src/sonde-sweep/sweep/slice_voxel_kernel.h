@@ -2,7 +2,7 @@
 #ifndef SONDE_SRC_SWEEP_SLICE_VOXEL_KERNEL_H
 #define SONDE_SRC_SWEEP_SLICE_VOXEL_KERNEL_H
 
-#include "echo/kernel_vector.h"
+#include "base/vector_records.h"
 #include "sweep/slice_mix.h"
 
 enum { LANES = SLICE_CELL_WIDE, CELL = SLICE_CELL_WIDE * SLICE_CELL_HIGH };
@@ -28,21 +28,21 @@ static bool is_within(const slice_voxels *v, const float corners[4][3]) {
 }
 
 // A row of a cell: places are bilinear between the corners.
-INLINE void find_voxels(const slice_voxels *v, const vf start[3], const vf step[3], float row,
-                        bool lines, bool checked, uint32_t first, voxel_work *w) {
-  vi place = {0}, inside = all_of(-1);
+INLINE void find_voxels(const slice_voxels *v, const floats start[3], const floats step[3],
+                        float row, bool lines, bool checked, uint32_t first, voxel_work *w) {
+  ints place = {0}, inside = vset_ints(-1);
   for (int k = 0; k < 3; ++k) {
     float high = (float)(v->size[k] - 1);
-    vf at = start[k] + row * step[k];
+    floats at = start[k] + row * step[k];
     if (checked) {
       inside = inside & (at >= -SLACK) & (at <= high + SLACK);
-      at = larger(smaller(at, all(high)), all(0));
+      at = vmax(vmin(at, vset(high)), vset(0));
     }
-    vi i = whole(smaller(at, all(high - 1)));
-    vf low = real(i);
-    store(w->t[k] + first, at - low);
+    ints i = vint(vmin(at, vset(high - 1)));
+    floats low = vreal(i);
+    vstore(w->t[k] + first, at - low);
     if (lines) {
-      vi line = whole((low + 0.5f) * (1.0f / (SLICE_BRICK - 1)));
+      ints line = vint((low + 0.5f) * (1.0f / (SLICE_BRICK - 1)));
       place += line * v->line_step[k] + (i << (2 * k)); // a brick is four voxels wide
     } else
       place += i * v->step[k];
@@ -54,11 +54,11 @@ INLINE void find_voxels(const slice_voxels *v, const vf start[3], const vf step[
 INLINE void find_cell(const slice_voxels *v, const float corners[4][3], uint32_t high, bool lines,
                       bool checked, voxel_work *w) {
   static const float lanes[] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
-  for (uint32_t x = 0; x < LANES; x += W) {
-    vf share = load(lanes + x) * (1.0f / SLICE_CELL_WIDE), start[3], step[3];
+  for (uint32_t x = 0; x < LANES; x += FLOATS) {
+    floats share = vload(lanes + x) * (1.0f / SLICE_CELL_WIDE), start[3], step[3];
     for (int k = 0; k < 3; ++k) {
       start[k] = corners[0][k] + share * (corners[1][k] - corners[0][k]);
-      vf end = corners[2][k] + share * (corners[3][k] - corners[2][k]);
+      floats end = corners[2][k] + share * (corners[3][k] - corners[2][k]);
       step[k] = (end - start[k]) * (1.0f / SLICE_CELL_HIGH);
     }
     if (checked)
@@ -92,13 +92,13 @@ INLINE void load_voxels(const slice_voxels *v, uint32_t count, voxel_work *w) {
 }
 
 // Sum of the products of both halves of each lane, numbers with a sign.
-INLINE vi sum_of_products(vi a, vi b) {
+INLINE ints sum_of_products(ints a, ints b) {
 #if defined(__AVX512BW__)
-  return (vi)_mm512_madd_epi16((__m512i)a, (__m512i)b);
+  return (ints)_mm512_madd_epi16((__m512i)a, (__m512i)b);
 #elif defined(__AVX2__)
-  return (vi)_mm256_madd_epi16((__m256i)a, (__m256i)b);
+  return (ints)_mm256_madd_epi16((__m256i)a, (__m256i)b);
 #elif defined(__SSE2__)
-  return (vi)_mm_madd_epi16((__m128i)a, (__m128i)b);
+  return (ints)_mm_madd_epi16((__m128i)a, (__m128i)b);
 #else
   return (a << 16 >> 16) * (b << 16 >> 16) + (a >> 16) * (b >> 16);
 #endif
@@ -113,16 +113,18 @@ INLINE void mix_voxels(const voxel_work *w, uint32_t first, uint8_t out[LANES]) 
     uint64_t both = (near[x] & NEAR_BYTES) | (far[x] & ~NEAR_BYTES);
     low[x] = (int32_t)(uint32_t)both, high[x] = (int32_t)(uint32_t)(both >> 32);
   }
-  for (uint32_t x = 0; x < LANES; x += W) {
-    vi a, b;
+  for (uint32_t x = 0; x < LANES; x += FLOATS) {
+    ints a, b;
     memcpy(&a, low + x, sizeof a);
     memcpy(&b, high + x, sizeof b);
-    vf t0 = load(w->t[0] + first + x), t1 = load(w->t[1] + first + x);
-    vi t = whole(load(w->t[2] + first + x) * ONE + 0.5f), share = (t << 16) - t + ONE;
-    vf p = real(sum_of_products(a & EVEN, share)), q = real(sum_of_products(a >> 8 & EVEN, share));
-    vf r = real(sum_of_products(b & EVEN, share)), s = real(sum_of_products(b >> 8 & EVEN, share));
-    vf top = p + t0 * (q - p), under = r + t0 * (s - r);
-    vi grey = whole((top + t1 * (under - top)) * (1.0f / ONE) + 0.5f);
+    floats t0 = vload(w->t[0] + first + x), t1 = vload(w->t[1] + first + x);
+    ints t = vint(vload(w->t[2] + first + x) * ONE + 0.5f), share = (t << 16) - t + ONE;
+    floats p = vreal(sum_of_products(a & EVEN, share)),
+           q = vreal(sum_of_products(a >> 8 & EVEN, share));
+    floats r = vreal(sum_of_products(b & EVEN, share)),
+           s = vreal(sum_of_products(b >> 8 & EVEN, share));
+    floats top = p + t0 * (q - p), under = r + t0 * (s - r);
+    ints grey = vint((top + t1 * (under - top)) * (1.0f / ONE) + 0.5f);
     memcpy(value + x, &grey, sizeof grey);
   }
   for (int x = 0; x < LANES; ++x) out[x] = (uint8_t)value[x];

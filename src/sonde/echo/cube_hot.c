@@ -33,8 +33,8 @@ enum { STEPS = 2 };                  // of Newton's, from a foot within a millim
 static void store_nodes(const sonde_echo *echo, sonde_cubes *s) {
   for (uint32_t k = 0; k < echo->plane_rows * SONDE_PLANE_COLUMNS; ++k) {
     const plane_node *from = &echo->node[k];
-    s->node[k].rest = v4_of(v_sub(from->rest, s->corner));
-    for (int c = 0; c < 3; ++c) s->node[k].in[c] = v4_of(m_column(&from->in, c));
+    s->node[k].rest = point_of(v_sub(from->rest, s->corner));
+    for (int c = 0; c < 3; ++c) s->node[k].in[c] = point_of(m_column(&from->in, c));
   }
 }
 
@@ -44,26 +44,26 @@ static void store_frame(const sonde_echo *echo, sonde_cubes *s) {
   const double step[3] = {echo->lines_per_column * f->pitch_m, 1, echo->depth_per_row};
   sonde_mat3 probe = q_matrix(f->probe.rotation);
   sonde_vec3 first = sonde_echo_to_world(echo, vec3(0, 0, 0));
-  s->place = v4_of(v_sub(first, s->corner));
-  s->image = v4_of(sonde_echo_from_world(echo, s->corner));
+  s->place = point_of(v_sub(first, s->corner));
+  s->image = point_of(sonde_echo_from_world(echo, s->corner));
   for (int c = 0; c < 3; ++c) {
     sonde_vec3 world = vec3(c == 0, c == 1, c == 2), local = m_mul_v(f->from_world, world);
-    s->to_place[c] = v4_of(v_scale(m_column(&probe, c), step[c]));
-    s->to_image[c] = v4_of(vec3(local.x / step[0], local.y, local.z / step[2]));
+    s->to_place[c] = point_of(v_scale(m_column(&probe, c), step[c]));
+    s->to_image[c] = point_of(vec3(local.x / step[0], local.y, local.z / step[2]));
   }
-  s->unit = v4_of(vec3(echo->lines_per_column * SONDE_FINE, 0, echo->depth_per_row / f->step_m));
-  s->pad = v4_of(vec3(0, 0, echo->pad_samples));
+  s->unit = point_of(vec3(echo->lines_per_column * SONDE_FINE, 0, echo->depth_per_row / f->step_m));
+  s->pad = point_of(vec3(0, 0, echo->pad_samples));
 }
 
 static cube_station station_of(const sonde_cubes *s, const sonde_vessel_state *v) {
-  const v4 size = {(float)v->rest_radius_m, (float)v->lead, (float)v->half_short_m,
-                   (float)v->half_long_m};
-  const v4 tissue = {(float)v->tissue_turn, (float)v->tissue_short, (float)v->tissue_shear,
-                     (float)v->tissue_long};
-  return (cube_station){v4_of(v_sub(v->rest_centre_m, s->corner)),
-                        v4_of(v_sub(v->centre_m, v->rest_centre_m)),
-                        v4_of(v->axis),
-                        v4_of(v->flat_axis),
+  const float_x4 size = {(float)v->rest_radius_m, (float)v->lead, (float)v->half_short_m,
+                         (float)v->half_long_m};
+  const float_x4 tissue = {(float)v->tissue_turn, (float)v->tissue_short, (float)v->tissue_shear,
+                           (float)v->tissue_long};
+  return (cube_station){point_of(v_sub(v->rest_centre_m, s->corner)),
+                        point_of(v_sub(v->centre_m, v->rest_centre_m)),
+                        point_of(v->axis),
+                        point_of(v->flat_axis),
                         size,
                         tissue,
                         (float)v->tissue_even};
@@ -75,16 +75,16 @@ static void bound_vessel(const sonde_echo *echo, sonde_cubes *s, uint32_t k, dou
   const sonde_interior *interior = echo->interior;
   const uint32_t which = echo->shown[k], count = interior->station_count[which];
   const sonde_station *station = interior->station[which];
-  s->low[k] = all4(INFINITY), s->high[k] = -s->low[k];
+  s->low[k] = vset_float_x4(INFINITY), s->high[k] = -s->low[k];
   for (uint32_t i = 0; i < count; ++i) {
     if (i + 1 < count && station[i + 1].s_m < first) continue;
     if (i > 0 && station[i - 1].s_m > last) break;
     const sonde_vessel_state *v = &interior->state[which][i];
     s->station[k][i] = station_of(s, v);
-    v4 reach =
-        all4((float)(fmax(close_m, reach_radii * v->rest_radius_m + echo->cell_m) + margin_m));
-    s->low[k] = smaller4(s->low[k], s->station[k][i].rest - reach);
-    s->high[k] = larger4(s->high[k], s->station[k][i].rest + reach);
+    float_x4 reach = vset_float_x4(
+        (float)(fmax(close_m, reach_radii * v->rest_radius_m + echo->cell_m) + margin_m));
+    s->low[k] = vmin(s->low[k], s->station[k][i].rest - reach);
+    s->high[k] = vmax(s->high[k], s->station[k][i].rest + reach);
   }
 }
 
@@ -109,12 +109,12 @@ void sonde_cubes_begin(sonde_echo *echo) {
 
 // A place in the coarse plane: what its nodes give for a foot.
 typedef struct foot {
-  v4 at, miss; // image coordinates in the plane; from there to the point, at rest
-  v4 in[3];    // the derivative there
+  float_x4 at, miss; // image coordinates in the plane; from there to the point, at rest
+  float_x4 in[3];    // the derivative there
 } foot;
 
 // The foot that is nearest to image coordinates `at`, and what is left to a rest point.
-static foot step_on(const sonde_echo *echo, v4 rest, v4 at) {
+static foot step_on(const sonde_echo *echo, float_x4 rest, float_x4 at) {
   const float most = (float)(echo->plane_rows - 1);
   float a = fminf(fmaxf(at[0], 0), SONDE_PLANE_COLUMNS - 1), b = fminf(fmaxf(at[2], 0), most);
   uint32_t i = (uint32_t)a, j = (uint32_t)b;
@@ -122,8 +122,9 @@ static foot step_on(const sonde_echo *echo, v4 rest, v4 at) {
   if (j > echo->plane_rows - 2) j = echo->plane_rows - 2;
   const cube_node *top = &echo->cubes->node[j * SONDE_PLANE_COLUMNS + i];
   const cube_node *low = top + SONDE_PLANE_COLUMNS;
-  const v4 u = all4(a - (float)i), v = all4(b - (float)j), u0 = 1 - u, v0 = 1 - v;
-  const v4 share[4] = {u0 * v0, u * v0, u0 * v, u * v};
+  const float_x4 u = vset_float_x4(a - (float)i), v = vset_float_x4(b - (float)j), u0 = 1 - u,
+                 v0 = 1 - v;
+  const float_x4 share[4] = {u0 * v0, u * v0, u0 * v, u * v};
 #define BLEND(field)                                                                               \
   (share[0] * top[0].field + share[1] * top[1].field + share[2] * low[0].field +                   \
    share[3] * low[1].field)
@@ -133,15 +134,15 @@ static foot step_on(const sonde_echo *echo, v4 rest, v4 at) {
 
 // Image coordinates of a rest point: Newton steps of its foot in the plane; beside the plane the
 // tissue continues along the derivative.
-static v4 place_of(const sonde_echo *echo, v4 rest, v4 at, foot *on) {
+static float_x4 place_of(const sonde_echo *echo, float_x4 rest, float_x4 at, foot *on) {
   for (int step = 0; step < STEPS; ++step) {
     *on = step_on(echo, rest, at);
-    at = on->at + times4(on->in, on->miss);
+    at = on->at + transform_point(on->in, on->miss);
   }
   return at;
 }
 
-static void locate(const sonde_echo *echo, cube *c, v4 at) {
+static void locate(const sonde_echo *echo, cube *c, float_x4 at) {
   foot on;
   c->at = place_of(echo, c->rest, at, &on);
   for (int k = 0; k < 3; ++k) c->axis[k] = on.in[k] * (float)echo->cell_m;
@@ -173,7 +174,7 @@ static void find_walls(const sonde_echo *echo, cube *c, const int32_t cell[3]) {
   const sonde_cubes *s = echo->cubes;
   const double h = echo->cell_m;
   for (uint32_t k = 0; k < echo->shown_count; ++k)
-    if (all_set4((c->rest >= s->low[k]) & (c->rest <= s->high[k])))
+    if (vall((c->rest >= s->low[k]) & (c->rest <= s->high[k])))
       find_wall(echo, c, vec3((cell[0] + 0.5) * h, (cell[1] + 0.5) * h, (cell[2] + 0.5) * h), k);
 }
 
@@ -181,13 +182,14 @@ static void find_walls(const sonde_echo *echo, cube *c, const int32_t cell[3]) {
 static void store_wall(sonde_cubes *s, const cube_wall *w, uint32_t k, uint32_t group,
                        uint32_t groups) {
   const cube_station *a = &s->station[w->vessel][w->station], *b = a + 1;
-  const v4 t = all4(w->share), u = 1 - t, size = u * a->size + t * b->size;
-  const v4 tissue = u * a->tissue + t * b->tissue;
+  const float_x4 t = vset_float_x4(w->share), u = 1 - t, size = u * a->size + t * b->size;
+  const float_x4 tissue = u * a->tissue + t * b->tissue;
   const float even = a->even + w->share * (b->even - a->even);
-  const v4 axis = unit4(u * a->axis + t * b->axis, a->axis), mean = u * a->flat + t * b->flat;
-  const v4 flat = unit4(mean - all4(dot3(mean, axis)) * axis, a->flat);
-  const v4 vector[] = {u * a->rest + t * b->rest, u * a->shift + t * b->shift, axis, flat,
-                       cross4(axis, flat)};
+  const float_x4 axis = direction_of(u * a->axis + t * b->axis, a->axis),
+                 mean = u * a->flat + t * b->flat;
+  const float_x4 flat = direction_of(mean - vset_float_x4(dot_points(mean, axis)) * axis, a->flat);
+  const float_x4 vector[] = {u * a->rest + t * b->rest, u * a->shift + t * b->shift, axis, flat,
+                             cross_points(axis, flat)};
   for (uint32_t g = group; g < group + groups; ++g) {
     for (int f = 0; f < WALL_RADIUS; ++f) s->wall[k][f][g] = vector[f / 3][f % 3];
     for (int f = 0; f < 4; ++f) s->wall[k][WALL_RADIUS + f][g] = size[f];
@@ -204,27 +206,29 @@ static void store_none(sonde_cubes *s, uint32_t k, uint32_t group, uint32_t grou
 }
 
 // Four points at offsets from the middle, in edges.
-static void add_points(const sonde_echo *echo, const cube *c, uint32_t group, const v4 offset[3]) {
+static void add_points(const sonde_echo *echo, const cube *c, uint32_t group,
+                       const float_x4 offset[3]) {
   sonde_cubes *s = echo->cubes;
   for (int k = 0; k < 3; ++k)
-    store4(s->rest[k] + 4 * group, c->rest[k] + offset[k] * (float)echo->cell_m);
+    vstore(s->rest[k] + 4 * group, c->rest[k] + offset[k] * (float)echo->cell_m);
 }
 
 // Where the field takes the four gathered points of a group.
 static void move_points(const sonde_echo *echo, const cube *c, uint32_t group) {
   sonde_cubes *s = echo->cubes;
   const float per_cell = (float)(1 / echo->cell_m);
-  v4 at[4], image[3];
+  float_x4 at[4], image[4];
   for (uint32_t i = 0; i < 4; ++i) {
     foot on;
     const uint32_t n = 4 * group + i;
-    const v4 rest = {s->gathered[0][n], s->gathered[1][n], s->gathered[2][n], 0};
-    at[i] = place_of(echo, rest, c->at + times4(c->axis, (rest - c->rest) * per_cell), &on);
+    const float_x4 rest = {s->gathered[0][n], s->gathered[1][n], s->gathered[2][n], 0};
+    at[i] =
+        place_of(echo, rest, c->at + transform_point(c->axis, (rest - c->rest) * per_cell), &on);
   }
   if (!(echo->frame.radius_m > 0)) {
-    coordinates4(at, image);
+    vtranspose_float_x4(at, image);
     for (int k = 0; k < 3; ++k)
-      store4(s->moved[k] + 4 * group, s->place[k] + image[0] * s->to_place[0][k] +
+      vstore(s->moved[k] + 4 * group, s->place[k] + image[0] * s->to_place[0][k] +
                                           image[1] * s->to_place[1][k] +
                                           image[2] * s->to_place[2][k]);
     return;
@@ -241,10 +245,11 @@ static const float quarter = 0.25f;
 // The middles of the pieces; of a whole cube the middle and those of three faces.
 static void carry_cube(const sonde_echo *echo, cube *c) {
   sonde_cubes *s = echo->cubes;
-  const v4 low = all4(-quarter), high = -low, even = {-quarter, quarter, -quarter, quarter},
-           halves = {-quarter, -quarter, quarter, quarter};
-  const v4 piece[2][3] = {{even, halves, low}, {even, halves, high}};
-  const v4 whole[3] = {{0, 0.5f, 0, 0}, {0, 0, 0.5f, 0}, {0, 0, 0, 0.5f}};
+  const float_x4 low = vset_float_x4(-quarter), high = -low,
+                 even = {-quarter, quarter, -quarter, quarter},
+                 halves = {-quarter, -quarter, quarter, quarter};
+  const float_x4 piece[2][3] = {{even, halves, low}, {even, halves, high}};
+  const float_x4 whole[3] = {{0, 0.5f, 0, 0}, {0, 0, 0.5f, 0}, {0, 0, 0, 0.5f}};
   const uint32_t groups = c->close ? 2 : 1;
   c->group = s->groups, s->groups += groups;
   for (uint32_t g = 0; g < groups; ++g)
@@ -264,7 +269,7 @@ static uint64_t cell_key(const int32_t cell[3]) {
 
 static void place_some(sonde_echo *echo);
 
-void sonde_cubes_add(sonde_echo *echo, const int32_t cell[3], v4 rest, v4 at) {
+void sonde_cubes_add(sonde_echo *echo, const int32_t cell[3], float_x4 rest, float_x4 at) {
   sonde_cubes *s = echo->cubes;
   if (s->count == CUBES_AT_ONCE || s->groups + 2 > CARRY_GROUPS) place_some(echo);
   cube *c = &s->cube[s->count++];
@@ -280,16 +285,17 @@ void sonde_cubes_add(sonde_echo *echo, const int32_t cell[3], v4 rest, v4 at) {
 // ---- maps -----------------------------------------------------------------------------------
 
 // False when it lies beside the slab.
-static bool make_map(const sonde_echo *echo, v4 origin, const v4 axis[3], uint32_t from,
+static bool make_map(const sonde_echo *echo, float_x4 origin, const float_x4 axis[3], uint32_t from,
                      uint32_t count, splat_map *one) {
   const sonde_cubes *s = echo->cubes;
-  v4 unit = s->unit;
+  float_x4 unit = s->unit;
   unit[1] = (float)(1 / sonde_echo_elevation(echo, (double)origin[2] * echo->depth_per_row));
-  const v4 first = origin * unit + s->pad, m[3] = {axis[0] * unit, axis[1] * unit, axis[2] * unit};
+  const float_x4 first = origin * unit + s->pad,
+                 m[3] = {axis[0] * unit, axis[1] * unit, axis[2] * unit};
   float reach = 0.5f * (fabsf(m[0][1]) + fabsf(m[1][1]) + fabsf(m[2][1]));
   if (fabsf(first[1]) > 1 + reach) return false;
-  store4(one->m[0], first), one->m[0][3] = 1;
-  for (int k = 0; k < 3; ++k) store4(one->m[k + 1], m[k]);
+  vstore(one->m[0], first), one->m[0][3] = 1;
+  for (int k = 0; k < 3; ++k) vstore(one->m[k + 1], m[k]);
   one->from = from, one->count = count, one->lumen = echo->tiers->lumens, one->lumens = 0;
   return true;
 }
@@ -308,36 +314,37 @@ static bool is_beyond(const float form[4]) {
 // the area, the denser the tissue's scatterers are in it: clutter keeps its power.
 static uint32_t find_lumina(const sonde_echo *echo, const cube *c, splat_lumen out[MOST_VESSELS]) {
   uint32_t found = 0;
-  const v4 along = v4_of(echo->interior->axis);
+  const float_x4 along = point_of(echo->interior->axis);
   for (uint32_t k = 0; k < c->walls; ++k) {
     const float(*w)[WALL_ROOM] = echo->cubes->wall[k];
     const uint32_t g = c->group;
-    const v4 centre = {w[WALL_REST][g], w[WALL_REST + 1][g], w[WALL_REST + 2][g], 0},
-             flat = {w[WALL_FLAT][g], w[WALL_FLAT + 1][g], w[WALL_FLAT + 2][g], 0},
-             across = {w[WALL_ACROSS][g], w[WALL_ACROSS + 1][g], w[WALL_ACROSS + 2][g], 0};
+    const float_x4 centre = {w[WALL_REST][g], w[WALL_REST + 1][g], w[WALL_REST + 2][g], 0},
+                   flat = {w[WALL_FLAT][g], w[WALL_FLAT + 1][g], w[WALL_FLAT + 2][g], 0},
+                   across = {w[WALL_ACROSS][g], w[WALL_ACROSS + 1][g], w[WALL_ACROSS + 2][g], 0};
     const float scale = 1 / w[WALL_RADIUS][g], edge = (float)echo->cell_m * scale;
-    const v4 d = (c->rest - centre) * scale;
+    const float_x4 d = (c->rest - centre) * scale;
     splat_lumen *l = &out[found];
-    *l = (splat_lumen){{dot3(d, flat), edge * flat[0], edge * flat[1], edge * flat[2]},
-                       {dot3(d, across), edge * across[0], edge * across[1], edge * across[2]},
-                       {(float)c->wall[k].along_m, (float)echo->cell_m * along[0],
-                        (float)echo->cell_m * along[1], (float)echo->cell_m * along[2]},
-                       c->wall[k].solid > 0 ? 1 - 2 * c->wall[k].solid : 1,
-                       sonde_clutter(echo) * sqrtf(w[WALL_SHORT][g] * w[WALL_LONG][g]) * scale,
-                       echo->shown[c->wall[k].vessel]};
+    *l =
+        (splat_lumen){{dot_points(d, flat), edge * flat[0], edge * flat[1], edge * flat[2]},
+                      {dot_points(d, across), edge * across[0], edge * across[1], edge * across[2]},
+                      {(float)c->wall[k].along_m, (float)echo->cell_m * along[0],
+                       (float)echo->cell_m * along[1], (float)echo->cell_m * along[2]},
+                      c->wall[k].solid > 0 ? 1 - 2 * c->wall[k].solid : 1,
+                      sonde_clutter(echo) * sqrtf(w[WALL_SHORT][g] * w[WALL_LONG][g]) * scale,
+                      echo->shown[c->wall[k].vessel]};
     if (c->wall[k].solid < 1 && !is_beyond(l->along) && !is_beyond(l->across)) ++found;
   }
   return found;
 }
 
 // The same form over a piece whose middle is at `offset`, in edges of the cube.
-static void shift_form(const float form[4], v4 offset, float out[4]) {
+static void shift_form(const float form[4], float_x4 offset, float out[4]) {
   out[0] = form[0] + form[1] * offset[0] + form[2] * offset[1] + form[3] * offset[2];
   for (int i = 1; i < 4; ++i) out[i] = 0.5f * form[i];
 }
 
 static void add_lumina(sonde_echo *echo, splat_map *one, const splat_lumen *lumen, uint32_t count,
-                       v4 offset) {
+                       float_x4 offset) {
   sonde_tiers *tiers = echo->tiers;
   for (uint32_t k = 0; k < count; ++k) {
     splat_lumen l = lumen[k];
@@ -355,21 +362,22 @@ static void add_lumina(sonde_echo *echo, splat_map *one, const splat_lumen *lume
 }
 
 // Image coordinates of four carried points.
-static void carried_points(const sonde_echo *echo, uint32_t group, v4 at[4]) {
+static void carried_points(const sonde_echo *echo, uint32_t group, float_x4 at[4]) {
   const sonde_cubes *s = echo->cubes;
-  const v4 p[3] = {load4(s->moved[0] + 4 * group), load4(s->moved[1] + 4 * group),
-                   load4(s->moved[2] + 4 * group)};
-  v4 image[3];
+  const float_x4 p[3] = {vload_float_x4(s->moved[0] + 4 * group),
+                         vload_float_x4(s->moved[1] + 4 * group),
+                         vload_float_x4(s->moved[2] + 4 * group)};
+  float_x4 image[4] = {{0}};
   if (!(echo->frame.radius_m > 0)) {
     for (int k = 0; k < 3; ++k)
       image[k] = s->image[k] + p[0] * s->to_image[0][k] + p[1] * s->to_image[1][k] +
                  p[2] * s->to_image[2][k];
-    points4(image, at);
+    vtranspose_float_x4(image, at);
     return;
   }
   for (int i = 0; i < 4; ++i) {
     sonde_vec3 world = vec3((double)p[0][i], (double)p[1][i], (double)p[2][i]);
-    at[i] = v4_of(sonde_echo_from_world(echo, v_add(s->corner, world)));
+    at[i] = point_of(sonde_echo_from_world(echo, v_add(s->corner, world)));
   }
 }
 
@@ -377,16 +385,16 @@ static void carried_points(const sonde_echo *echo, uint32_t group, v4 at[4]) {
 // gives all the maps.
 static void place_pieces(sonde_echo *echo, const cube *c) {
   const uint32_t each = echo->per_piece, shares = SONDE_LOOSE / each;
-  v4 at[8];
+  float_x4 at[8];
   splat_lumen lumen[MOST_VESSELS];
   carried_points(echo, c->group, at), carried_points(echo, c->group + 1, at + 4);
   const uint32_t lumens = find_lumina(echo, c, lumen);
   for (uint32_t part = 0; part < 8; ++part) {
     const uint32_t share = (uint32_t)(c->bits >> 32) + part;
-    const v4 axis[3] = {at[part | 1] - at[part & ~1u], at[part | 2] - at[part & ~2u],
-                        at[part | 4] - at[part & ~4u]};
-    const v4 offset = {part & 1 ? quarter : -quarter, part & 2 ? quarter : -quarter,
-                       part & 4 ? quarter : -quarter, 0};
+    const float_x4 axis[3] = {at[part | 1] - at[part & ~1u], at[part | 2] - at[part & ~2u],
+                              at[part | 4] - at[part & ~4u]};
+    const float_x4 offset = {part & 1 ? quarter : -quarter, part & 2 ? quarter : -quarter,
+                             part & 4 ? quarter : -quarter, 0};
     splat_map one;
     if (!make_map(echo, at[part], axis, SONDE_POOL + share % shares * each, each, &one)) continue;
     add_lumina(echo, &one, lumen, lumens, offset);
@@ -430,7 +438,7 @@ static void add_share(sonde_echo *echo, const splat_map *whole, float row) {
 
 static void place_cube(sonde_echo *echo, const cube *c) {
   const uint32_t patterns = SONDE_POOL / echo->per_cell;
-  v4 origin = c->at, axis[3] = {c->axis[0], c->axis[1], c->axis[2]}, at[4];
+  float_x4 origin = c->at, axis[3] = {c->axis[0], c->axis[1], c->axis[2]}, at[4];
   if (c->carried) {
     carried_points(echo, c->group, at);
     origin = at[0];

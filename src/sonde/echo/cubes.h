@@ -4,7 +4,7 @@
 #define SONDE_SRC_ECHO_CUBES_H
 
 #include "echo/echo.h"
-#include "base/four.h"
+#include "base/vector_records.h"
 
 enum {
   CUBES_AT_ONCE = 64,
@@ -12,14 +12,14 @@ enum {
 
 // A node of the coarse plane: place at rest, and the columns of plane_node.in.
 typedef struct cube_node {
-  v4 rest, in[3];
+  float_x4 rest, in[3];
 } cube_node;
 
 // A vessel's station.
 typedef struct cube_station {
-  v4 rest, shift, axis, flat;
-  v4 size;   // radius, lead, short and long semi-axis
-  v4 tissue; // turn, short, shear and long of the gradient across it
+  float_x4 rest, shift, axis, flat;
+  float_x4 size;   // radius, lead, short and long semi-axis
+  float_x4 tissue; // turn, short, shear and long of the gradient across it
   float even;
 } cube_station;
 
@@ -32,22 +32,22 @@ typedef struct cube_wall {
 } cube_wall;
 
 typedef struct cube {
-  v4 rest, at;   // middle; its image coordinates without the vessels
-  v4 axis[3];    // what its edges become: image coordinates
-  uint64_t bits; // that choose its scatterers
-  bool close;    // goes in eight pieces
-  bool carried;  // by walls: has points among those of `group`
+  float_x4 rest, at; // middle; its image coordinates without the vessels
+  float_x4 axis[3];  // what its edges become: image coordinates
+  uint64_t bits;     // that choose its scatterers
+  bool close;        // goes in eight pieces
+  bool carried;      // by walls: has points among those of `group`
   uint32_t group, walls;
   cube_wall wall[MOST_VESSELS];
 } cube;
 
 typedef struct sonde_cubes {
-  sonde_vec3 corner;                        // of the box, world
-  cube_node node[SONDE_PLANE_NODES];        // of this frame
-  v4 place, to_place[3];                    // flat face: image coordinates to lengths and back
-  v4 image, to_image[3];                    //
-  v4 unit, pad;                             // image coordinates to the grid's
-  v4 low[MOST_VESSELS], high[MOST_VESSELS]; // cubes beside that box stay whole
+  sonde_vec3 corner;                 // of the box, world
+  cube_node node[SONDE_PLANE_NODES]; // of this frame
+  float_x4 place, to_place[3];       // flat face: image coordinates to lengths and back
+  float_x4 image, to_image[3];       //
+  float_x4 unit, pad;                // image coordinates to the grid's
+  float_x4 low[MOST_VESSELS], high[MOST_VESSELS];     // cubes beside that box stay whole
   cube_station station[MOST_VESSELS][SONDE_STATIONS]; // of the vessels in view, near the slab
   uint32_t count, groups, walls;
   cube cube[CUBES_AT_ONCE];
@@ -58,7 +58,7 @@ typedef struct sonde_cubes {
 // The box is known, no cube has been added.
 void sonde_cubes_begin(sonde_echo *echo);
 // @param at image coordinates to within a millimetre
-void sonde_cubes_add(sonde_echo *echo, const int32_t cell[3], v4 rest, v4 at);
+void sonde_cubes_add(sonde_echo *echo, const int32_t cell[3], float_x4 rest, float_x4 at);
 // Maps of what is left.
 void sonde_cubes_end(sonde_echo *echo);
 

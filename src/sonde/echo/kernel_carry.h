@@ -9,104 +9,106 @@
 #define SONDE_SRC_ECHO_KERNEL_CARRY_H
 
 #include "echo/kernel.h"
-#include "echo/kernel_vector.h"
+#include "base/vector_records.h"
 #include "interior/interior.h"
 
-typedef struct vf3 {
-  vf x, y, z;
-} vf3;
+typedef struct floats3 {
+  floats x, y, z;
+} floats3;
 
-INLINE vf3 minus3(vf3 a, vf3 b) { return (vf3){a.x - b.x, a.y - b.y, a.z - b.z}; }
-INLINE vf3 madd3(vf3 a, vf s, vf3 b) { return (vf3){a.x + s * b.x, a.y + s * b.y, a.z + s * b.z}; }
-INLINE vf dot(vf3 a, vf3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-
-INLINE vf wall_at(const float (*wall)[WALL_ROOM], int field, uint32_t group) {
-  return each4(wall[field] + group);
+INLINE floats3 minus3(floats3 a, floats3 b) { return (floats3){a.x - b.x, a.y - b.y, a.z - b.z}; }
+INLINE floats3 madd3(floats3 a, floats s, floats3 b) {
+  return (floats3){a.x + s * b.x, a.y + s * b.y, a.z + s * b.z};
 }
-INLINE vf3 wall_vector(const float (*wall)[WALL_ROOM], int field, uint32_t group) {
-  return (vf3){wall_at(wall, field, group), wall_at(wall, field + 1, group),
-               wall_at(wall, field + 2, group)};
+INLINE floats dot(floats3 a, floats3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+
+INLINE floats wall_at(const float (*wall)[WALL_ROOM], int field, uint32_t group) {
+  return vrepeat4(wall[field] + group);
+}
+INLINE floats3 wall_vector(const float (*wall)[WALL_ROOM], int field, uint32_t group) {
+  return (floats3){wall_at(wall, field, group), wall_at(wall, field + 1, group),
+                   wall_at(wall, field + 2, group)};
 }
 
 // 1 to 0 with level ends.
-INLINE vf fade_out(vf t) {
-  vf left = 1 - t;
+INLINE floats fade_out(floats t) {
+  floats left = 1 - t;
   return left * left * (1 + 2 * t);
 }
 
 // A point of a cross-section.
-typedef struct vf2 {
-  vf x, y;
-} vf2;
+typedef struct floats2 {
+  floats x, y;
+} floats2;
 
 typedef struct reach {
-  vf2 at;             // from the vessel's centre
-  vf r, fade, weight; // weight: how firmly the wall leads, 0 beyond its reach
+  floats2 at;             // from the vessel's centre
+  floats r, fade, weight; // weight: how firmly the wall leads, 0 beyond its reach
 } reach;
 
-INLINE reach find_reach(const float (*wall)[WALL_ROOM], uint32_t group, vf3 rest) {
-  vf3 d = minus3(rest, wall_vector(wall, WALL_REST, group));
+INLINE reach find_reach(const float (*wall)[WALL_ROOM], uint32_t group, floats3 rest) {
+  floats3 d = minus3(rest, wall_vector(wall, WALL_REST, group));
   reach p = {.at = {dot(d, wall_vector(wall, WALL_FLAT, group)),
                     dot(d, wall_vector(wall, WALL_ACROSS, group))}};
-  p.r = root(p.at.x * p.at.x + p.at.y * p.at.y);
-  vf t = (p.r / wall_at(wall, WALL_RADIUS, group) - 1) * (1.0f / 3);
-  t = smaller(larger(t, all(0)), all(1));
+  p.r = vsqrt(p.at.x * p.at.x + p.at.y * p.at.y);
+  floats t = (p.r / wall_at(wall, WALL_RADIUS, group) - 1) * (1.0f / 3);
+  t = vmin(vmax(t, vset(0)), vset(1));
   p.fade = fade_out(t);
-  p.weight = only(t < 1, wall_at(wall, WALL_LEAD, group) * p.fade);
+  p.weight = vonly(t < 1, wall_at(wall, WALL_LEAD, group) * p.fade);
   return p;
 }
 
-INLINE vf2 turned(vf2 p, vf half) {
-  vf whole = 2 / (1 + half * half), cosine = whole - 1, sine = half * whole;
-  return (vf2){cosine * p.x - sine * p.y, sine * p.x + cosine * p.y};
+INLINE floats2 turned(floats2 p, floats half) {
+  floats whole = 2 / (1 + half * half), cosine = whole - 1, sine = half * whole;
+  return (floats2){cosine * p.x - sine * p.y, sine * p.x + cosine * p.y};
 }
 
-INLINE vf2 gathered_by(const float (*wall)[WALL_ROOM], uint32_t group, reach p) {
-  vf radius = wall_at(wall, WALL_RADIUS, group), turn = wall_at(wall, WALL_TURN, group);
-  vf tissue_long = wall_at(wall, WALL_TISSUE_LONG, group);
-  vf half_short = wall_at(wall, WALL_SHORT, group) / wall_at(wall, WALL_TISSUE_SHORT, group);
-  vf half_long = wall_at(wall, WALL_LONG, group) / tissue_long;
-  half_short = larger(half_short, (float)sonde_least_lumen * radius);
-  vf c = 0.5f * (half_long - half_short) * p.fade;
-  vf square = p.r * p.r - (radius * radius - half_short * half_long) * p.fade + c * c;
-  vf mean = root(larger(square, all(0))), per = 1 / larger(p.r, 1e-3f * radius);
-  vi inside = p.r <= radius;
-  vf2 q = turned(p.at, turn * (1 - p.fade));
-  q = (vf2){pick(inside, p.at.x * (half_short / radius), q.x * ((mean - c) * per)),
-            pick(inside, p.at.y * (half_long / radius), q.y * ((mean + c) * per))};
+INLINE floats2 gathered_by(const float (*wall)[WALL_ROOM], uint32_t group, reach p) {
+  floats radius = wall_at(wall, WALL_RADIUS, group), turn = wall_at(wall, WALL_TURN, group);
+  floats tissue_long = wall_at(wall, WALL_TISSUE_LONG, group);
+  floats half_short = wall_at(wall, WALL_SHORT, group) / wall_at(wall, WALL_TISSUE_SHORT, group);
+  floats half_long = wall_at(wall, WALL_LONG, group) / tissue_long;
+  half_short = vmax(half_short, (float)sonde_least_lumen * radius);
+  floats c = 0.5f * (half_long - half_short) * p.fade;
+  floats square = p.r * p.r - (radius * radius - half_short * half_long) * p.fade + c * c;
+  floats mean = vsqrt(vmax(square, vset(0))), per = 1 / vmax(p.r, 1e-3f * radius);
+  ints inside = p.r <= radius;
+  floats2 q = turned(p.at, turn * (1 - p.fade));
+  q = (floats2){vselect(inside, p.at.x * (half_short / radius), q.x * ((mean - c) * per)),
+                vselect(inside, p.at.y * (half_long / radius), q.y * ((mean + c) * per))};
   q.y -= p.fade * wall_at(wall, WALL_SHEAR, group) / tissue_long * q.x;
   return turned(q, -turn);
 }
 
 // 1 on the wall, 0 on another, o beyond its reach, with o the product of 1 - w of the others.
-INLINE vf share_of(const vf *weight, uint32_t walls, uint32_t k) {
-  vf others = all(1);
+INLINE floats share_of(const floats *weight, uint32_t walls, uint32_t k) {
+  floats others = vset(1);
   for (uint32_t j = 0; j < walls; ++j)
     if (j != k) others *= 1 - weight[j];
-  return others / larger(others + (1 - weight[k]) * (1 - others), all(1e-9f));
+  return others / vmax(others + (1 - weight[k]) * (1 - others), vset(1e-9f));
 }
 
-INLINE vf3 load3(const float (*from)[CARRY_POINTS], uint32_t i) {
-  return (vf3){load(from[0] + i), load(from[1] + i), load(from[2] + i)};
+INLINE floats3 load3(const float (*from)[CARRY_POINTS], uint32_t i) {
+  return (floats3){vload(from[0] + i), vload(from[1] + i), vload(from[2] + i)};
 }
-INLINE void store3(float (*to)[CARRY_POINTS], uint32_t i, vf3 a) {
-  store(to[0] + i, a.x), store(to[1] + i, a.y), store(to[2] + i, a.z);
+INLINE void store3(float (*to)[CARRY_POINTS], uint32_t i, floats3 a) {
+  vstore(to[0] + i, a.x), vstore(to[1] + i, a.y), vstore(to[2] + i, a.z);
 }
 
 static void gather_tissue(const carry_job *job) {
   SONDE_ASSERT(job->groups <= CARRY_GROUPS && job->walls <= MOST_VESSELS);
-  for (uint32_t group = 0; group < job->groups; group += W / 4) {
-    vf3 rest = load3(job->rest, 4 * group), at = rest;
-    vf weight[MOST_VESSELS];
-    vf2 way[MOST_VESSELS];
+  for (uint32_t group = 0; group < job->groups; group += FLOATS / 4) {
+    floats3 rest = load3(job->rest, 4 * group), at = rest;
+    floats weight[MOST_VESSELS];
+    floats2 way[MOST_VESSELS];
     for (uint32_t k = 0; k < job->walls; ++k) {
       reach p = find_reach(job->wall[k], group, rest);
-      vf2 to = gathered_by(job->wall[k], group, p);
-      vf lead = only(p.weight > 0, wall_at(job->wall[k], WALL_LEAD, group));
-      weight[k] = p.weight, way[k] = (vf2){lead * (to.x - p.at.x), lead * (to.y - p.at.y)};
+      floats2 to = gathered_by(job->wall[k], group, p);
+      floats lead = vonly(p.weight > 0, wall_at(job->wall[k], WALL_LEAD, group));
+      weight[k] = p.weight, way[k] = (floats2){lead * (to.x - p.at.x), lead * (to.y - p.at.y)};
     }
     for (uint32_t k = 0; k < job->walls; ++k) {
-      vf share = share_of(weight, job->walls, k);
+      floats share = share_of(weight, job->walls, k);
       at = madd3(at, share * way[k].x, wall_vector(job->wall[k], WALL_FLAT, group));
       at = madd3(at, share * way[k].y, wall_vector(job->wall[k], WALL_ACROSS, group));
     }
@@ -117,24 +119,24 @@ static void gather_tissue(const carry_job *job) {
 // The motion along a vessel stays the field's.
 static void even_tissue(const carry_job *job) {
   SONDE_ASSERT(job->groups <= CARRY_GROUPS && job->walls <= MOST_VESSELS);
-  for (uint32_t group = 0; group < job->groups; group += W / 4) {
+  for (uint32_t group = 0; group < job->groups; group += FLOATS / 4) {
     const uint32_t i = 4 * group;
-    vf3 rest = load3(job->rest, i), place = load3((const float(*)[CARRY_POINTS])job->place, i);
-    vf3 gathered = load3((const float(*)[CARRY_POINTS])job->gathered, i), at = place;
-    vf weight[MOST_VESSELS];
+    floats3 rest = load3(job->rest, i), place = load3((const float(*)[CARRY_POINTS])job->place, i);
+    floats3 gathered = load3((const float(*)[CARRY_POINTS])job->gathered, i), at = place;
+    floats weight[MOST_VESSELS];
     for (uint32_t k = 0; k < job->walls; ++k)
       weight[k] = find_reach(job->wall[k], group, rest).weight;
     for (uint32_t k = 0; k < job->walls; ++k) {
       const float(*wall)[WALL_ROOM] = job->wall[k];
-      vf3 flat = wall_vector(wall, WALL_FLAT, group),
-          across = wall_vector(wall, WALL_ACROSS, group);
-      vf3 centre = wall_vector(wall, WALL_REST, group), d = minus3(gathered, centre);
-      vf3 off = minus3(minus3(place, centre), wall_vector(wall, WALL_SHIFT, group));
-      vf2 q = turned((vf2){dot(d, flat), dot(d, across)}, wall_at(wall, WALL_TURN, group));
-      vf on_short = wall_at(wall, WALL_TISSUE_SHORT, group) * q.x - dot(off, flat);
-      vf on_long = wall_at(wall, WALL_TISSUE_LONG, group) * q.y +
-                   wall_at(wall, WALL_SHEAR, group) * q.x - dot(off, across);
-      vf firm = weight[k] * share_of(weight, job->walls, k) * wall_at(wall, WALL_EVEN, group);
+      floats3 flat = wall_vector(wall, WALL_FLAT, group),
+              across = wall_vector(wall, WALL_ACROSS, group);
+      floats3 centre = wall_vector(wall, WALL_REST, group), d = minus3(gathered, centre);
+      floats3 off = minus3(minus3(place, centre), wall_vector(wall, WALL_SHIFT, group));
+      floats2 q = turned((floats2){dot(d, flat), dot(d, across)}, wall_at(wall, WALL_TURN, group));
+      floats on_short = wall_at(wall, WALL_TISSUE_SHORT, group) * q.x - dot(off, flat);
+      floats on_long = wall_at(wall, WALL_TISSUE_LONG, group) * q.y +
+                       wall_at(wall, WALL_SHEAR, group) * q.x - dot(off, across);
+      floats firm = weight[k] * share_of(weight, job->walls, k) * wall_at(wall, WALL_EVEN, group);
       at = madd3(madd3(at, firm * on_short, flat), firm * on_long, across);
     }
     store3(job->place, i, at);

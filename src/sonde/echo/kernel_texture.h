@@ -10,13 +10,13 @@
 #ifndef SONDE_SRC_ECHO_KERNEL_TEXTURE_H
 #define SONDE_SRC_ECHO_KERNEL_TEXTURE_H
 
-#include "echo/kernel_vector.h"
+#include "base/vector_records.h"
 
 enum { TURNS_MUSCLE = 90, TURNS_FAT = 60 }; // noise cells around the leg
 
 // cos and sin of 2 pi t for t >= 0, error 3e-4.
-INLINE void turn(vf t, vf *c, vf *s) {
-  vf f = t - real(whole(t + 0.5f)), u = f * f;
+INLINE void turn(floats t, floats *c, floats *s) {
+  floats f = t - vreal(vint(t + 0.5f)), u = f * f;
   *c = 0.9999590208378121f +
        u * (-19.73094236686188f +
             u * (64.6714417761651f + u * (-82.39080631177367f + u * 45.62105110286211f)));
@@ -24,16 +24,26 @@ INLINE void turn(vf t, vf *c, vf *s) {
             u * (-41.205783568541634f + u * (78.82674122450844f + u * -58.13524213160963f)));
 }
 
-INLINE vf cell_value(vu a, vu b, vu c) {
-  vu h = a ^ b ^ c;
+// 2^a for |a| < 120, relative error 1e-7.
+INLINE floats power2(floats a) {
+  floats i = vfloor(a), t = a - i;
+  floats p = 0.0558632826591662f + t * (0.00894621466647436f + t * 0.0018951072909317184f);
+  p = 0.9999998957631335f + t * (0.693154620003299f + t * (0.24014077009185858f + t * p));
+  return (floats)((ints)p + (vint(i) << 23));
+}
+
+typedef uint32_t uints __attribute__((vector_size(VECTOR_BYTES)));
+
+INLINE floats cell_value(uints a, uints b, uints c) {
+  uints h = a ^ b ^ c;
   h = (h ^ (h >> 15)) * 0x2c1b3c6du;
   h = (h ^ (h >> 12)) * 0x297a2d39u;
   h = (h ^ (h >> 15)) >> 8;
-  return real((vi)h) * (2.0f / 16777216.0f) - 1;
+  return vreal((ints)h) * (2.0f / 16777216.0f) - 1;
 }
 
-INLINE vf smooth(vf t) { return t * t * (3 - 2 * t); }
-INLINE vi wrap(vi i, int32_t n) {
+INLINE floats smooth(floats t) { return t * t * (3 - 2 * t); }
+INLINE ints wrap(ints i, int32_t n) {
   i += (i < 0) & n, i += (i < 0) & n;
   i -= (i >= n) & n;
   return i - ((i >= n) & n);
@@ -42,16 +52,16 @@ INLINE vi wrap(vi i, int32_t n) {
 // Lattice cells of one texture in which the lines were when it was last asked for, and the values
 // at their corners: from row to row most of them stay.
 typedef struct knots {
-  vi a, b, c;
-  vf corner[8];
+  ints a, b, c;
+  floats corner[8];
 } knots;
 
-_Static_assert(sizeof(knots) == KNOT_FLOATS * sizeof(vf), "room for each line");
+_Static_assert(sizeof(knots) == KNOT_FLOATS * sizeof(floats), "room for each line");
 
 INLINE void find_corners(knots *k, int32_t turns) {
-  vu a = (vu)k->a * 0x9e3779b1u, a1 = (vu)wrap(k->a + 1, turns) * 0x9e3779b1u;
-  vu b = (vu)k->b * 0x85ebca77u, b1 = b + 0x85ebca77u;
-  vu c = (vu)k->c * 0xc2b2ae3du, c1 = c + 0xc2b2ae3du;
+  uints a = (uints)k->a * 0x9e3779b1u, a1 = (uints)wrap(k->a + 1, turns) * 0x9e3779b1u;
+  uints b = (uints)k->b * 0x85ebca77u, b1 = b + 0x85ebca77u;
+  uints c = (uints)k->c * 0xc2b2ae3du, c1 = c + 0xc2b2ae3du;
   k->corner[0] = cell_value(a, b, c), k->corner[1] = cell_value(a1, b, c);
   k->corner[2] = cell_value(a, b1, c), k->corner[3] = cell_value(a1, b1, c);
   k->corner[4] = cell_value(a, b, c1), k->corner[5] = cell_value(a1, b, c1);
@@ -60,70 +70,71 @@ INLINE void find_corners(knots *k, int32_t turns) {
 
 // Value noise in [-1, 1]; periodic around the leg with `turns` cells. A salt belongs to one
 // texture.
-INLINE vf texture(knots *memory, vf theta, vf along, vf depth, int32_t turns, int32_t salt) {
+INLINE floats texture(knots *memory, floats theta, floats along, floats depth, int32_t turns,
+                      int32_t salt) {
   knots *k = memory + salt;
-  vf u = theta * ((float)turns * 0.159154943f);
-  vf fu = below(u), fv = below(along), fw = below(depth);
-  vi a = wrap(whole(fu), turns), b = whole(fv) + 1000 * salt, c = whole(fw);
-  if (any((a != k->a) | (b != k->b) | (c != k->c))) {
+  floats u = theta * ((float)turns * 0.159154943f);
+  floats fu = vfloor(u), fv = vfloor(along), fw = vfloor(depth);
+  ints a = wrap(vint(fu), turns), b = vint(fv) + 1000 * salt, c = vint(fw);
+  if (vany((a != k->a) | (b != k->b) | (c != k->c))) {
     k->a = a, k->b = b, k->c = c;
     find_corners(k, turns);
   }
-  vf tu = smooth(u - fu), tv = smooth(along - fv), tw = smooth(depth - fw);
-  const vf *at = k->corner;
-  vf p = at[0] + tu * (at[1] - at[0]), q = at[2] + tu * (at[3] - at[2]);
-  vf r = at[4] + tu * (at[5] - at[4]), s = at[6] + tu * (at[7] - at[6]);
+  floats tu = smooth(u - fu), tv = smooth(along - fv), tw = smooth(depth - fw);
+  const floats *at = k->corner;
+  floats p = at[0] + tu * (at[1] - at[0]), q = at[2] + tu * (at[3] - at[2]);
+  floats r = at[4] + tu * (at[5] - at[4]), s = at[6] + tu * (at[7] - at[6]);
   p += tv * (q - p), r += tv * (s - r);
   return p + tw * (r - p);
 }
 
 // Bright sheets at whole values of `layer`, thin over `share` of the spacing.
-INLINE vf sheet(vf layer, float share) {
-  vf away = size_of(layer - below(layer) - 0.5f) * 2; // 1 on the sheet, 0 half-way
-  vf height = larger((away - 1 + share) / share, all(0));
+INLINE floats sheet(floats layer, float share) {
+  floats away = vabs(layer - vfloor(layer) - 0.5f) * 2; // 1 on the sheet, 0 half-way
+  floats height = vmax((away - 1 + share) / share, vset(0));
   return height * height;
 }
 
 // Septa of the fat: broken sheets roughly along the skin, bent by the lobules.
-INLINE vf septa(knots *memory, vf theta, vf s, vf depth) {
-  vf bend = texture(memory, theta, s * 70, depth * 250, TURNS_FAT, 1);
-  vf strength = texture(memory, theta, s * 110, depth * 500, 2 * TURNS_FAT, 4);
-  return larger(sheet(depth * 420 + 1.3f * bend, 0.30f) * (0.55f + strength), all(0));
+INLINE floats septa(knots *memory, floats theta, floats s, floats depth) {
+  floats bend = texture(memory, theta, s * 70, depth * 250, TURNS_FAT, 1);
+  floats strength = texture(memory, theta, s * 110, depth * 500, 2 * TURNS_FAT, 4);
+  return vmax(sheet(depth * 420 + 1.3f * bend, 0.30f) * (0.55f + strength), vset(0));
 }
 
 // Oedema: fluid in clefts around lobules of 6 by 8 mm, 0..1.
-INLINE vf clefts(knots *memory, vf theta, vf s, vf depth, float oedema) {
-  vf bend = texture(memory, theta, s * 70, depth * 250, TURNS_FAT, 1);
-  vf sway = texture(memory, theta, s * 60, depth * 160, TURNS_FAT, 8);
+INLINE floats clefts(knots *memory, floats theta, floats s, floats depth, float oedema) {
+  floats bend = texture(memory, theta, s * 70, depth * 250, TURNS_FAT, 1);
+  floats sway = texture(memory, theta, s * 60, depth * 160, TURNS_FAT, 8);
   float share = 0.12f + 0.2f * oedema;
-  vf along = sheet(depth * 170 + 0.9f * bend, share);
-  vf across = sheet(theta * (TURNS_FAT * 0.159154943f) + depth * 40 + 0.8f * sway, share);
-  vf deep = smaller(larger(along, across) * 3, all(1));
+  floats along = sheet(depth * 170 + 0.9f * bend, share);
+  floats across = sheet(theta * (TURNS_FAT * 0.159154943f) + depth * 40 + 0.8f * sway, share);
+  floats deep = vmin(vmax(along, across) * 3, vset(1));
   return deep * (oedema < 0.5f ? 2 * oedema : 1);
 }
 
 // Bright bands along the flow in a clot that has been there for long.
-INLINE vf webs(knots *memory, vf theta, vf s, vf depth, vf along) {
-  vf bend = texture(memory, theta, s * 90, depth * 400, 2 * TURNS_FAT, 9);
-  vf strength = texture(memory, theta, s * 110, depth * 500, 2 * TURNS_FAT, 10);
+INLINE floats webs(knots *memory, floats theta, floats s, floats depth, floats along) {
+  floats bend = texture(memory, theta, s * 90, depth * 400, 2 * TURNS_FAT, 9);
+  floats strength = texture(memory, theta, s * 110, depth * 500, 2 * TURNS_FAT, 10);
   return 2.6f * sheet(along * 1.2f + 0.7f * bend, 0.4f) * (0.8f + 0.6f * strength);
 }
 
 // Bundles of muscle, in decibels: dark fascicles between short bright connective streaks that run
 // at a small angle to the skin and far along the leg.
-INLINE vf bundles(knots *memory, vf theta, vf s, vf depth) {
-  vf slant = depth + 0.012f * theta;
-  vf bend = texture(memory, theta, s * 40, depth * 130, TURNS_MUSCLE / 3, 2);
-  vf fine = texture(memory, theta, s * 90, slant * 900, TURNS_MUSCLE, 3);
-  vf strength = texture(memory, theta, s * 60, slant * 700, TURNS_MUSCLE, 5);
-  vf bright = sheet(slant * 420 + 1.4f * bend, 0.5f) * (0.2f + strength);
-  return 2.5f * fine + 3.5f * bend + 19 * larger(bright, all(0)) - 5;
+INLINE floats bundles(knots *memory, floats theta, floats s, floats depth) {
+  floats slant = depth + 0.012f * theta;
+  floats bend = texture(memory, theta, s * 40, depth * 130, TURNS_MUSCLE / 3, 2);
+  floats fine = texture(memory, theta, s * 90, slant * 900, TURNS_MUSCLE, 3);
+  floats strength = texture(memory, theta, s * 60, slant * 700, TURNS_MUSCLE, 5);
+  floats bright = sheet(slant * 420 + 1.4f * bend, 0.5f) * (0.2f + strength);
+  return 2.5f * fine + 3.5f * bend + 19 * vmax(bright, vset(0)) - 5;
 }
 
 // Connective tissue within half a millimetre of the fascia.
-INLINE vf fascia(knots *memory, vf theta, vf s, vf away) {
-  vf patch = texture(memory, theta, s * 120, all(0.5f), 2 * TURNS_FAT, 7);
-  vf height = larger(1 - size_of(away) * (1 / 0.7e-3f), all(0));
+INLINE floats fascia(knots *memory, floats theta, floats s, floats away) {
+  floats patch = texture(memory, theta, s * 120, vset(0.5f), 2 * TURNS_FAT, 7);
+  floats height = vmax(1 - vabs(away) * (1 / 0.7e-3f), vset(0));
   return height * (1.6f + 0.9f * patch);
 }
 

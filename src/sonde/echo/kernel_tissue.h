@@ -26,59 +26,61 @@ static const float capsule_m = 0.3e-3f, capsule_scatter = 1.4f, hilum_scatter = 
 
 // Signed distance over the row, metres (negative inside): to first order (F - 1)/|grad F| of the
 // ellipse F = 1.
-INLINE vf wall_distance(vf a, vf b, vf half_a, vf half_b) {
-  vf square = a * a + b * b, size = root(square);
-  vf ga = a / half_a, gb = b / half_b, steep = root(ga * ga + gb * gb);
-  vf distance = pick(steep > 1e-3f, (size - 1) * size / larger(steep, all(1e-3f)), -half_a);
-  vf beyond = (size_of(b) - 1) * half_b; // bounds the estimate beside a flat ellipse's tips
-  distance = pick((beyond > 0) & (beyond > distance), beyond, distance);
-  return pick(square > 400, all(1), distance);
+INLINE floats wall_distance(floats a, floats b, floats half_a, floats half_b) {
+  floats square = a * a + b * b, size = vsqrt(square);
+  floats ga = a / half_a, gb = b / half_b, steep = vsqrt(ga * ga + gb * gb);
+  floats distance = vselect(steep > 1e-3f, (size - 1) * size / vmax(steep, vset(1e-3f)), -half_a);
+  floats beyond = (vabs(b) - 1) * half_b; // bounds the estimate beside a flat ellipse's tips
+  distance = vselect((beyond > 0) & (beyond > distance), beyond, distance);
+  return vselect(square > 400, vset(1), distance);
 }
 
 // sonde_clot_surface() for a vector of places.
-INLINE vf clot_surface(uint32_t vessel, vf along, vf across) {
-  vf sum = clot_bend * (clot_level - across * across), c, s;
+INLINE floats clot_surface(uint32_t vessel, floats along, floats across) {
+  floats sum = clot_bend * (clot_level - across * across), c, s;
   for (uint32_t k = 0; k < CLOT_WAVES; ++k) {
     const clot_wave *w = &clot_waves[k];
-    vf turns = w->across * across + w->per_m * along + sonde_clot_start(vessel, k);
-    turn(turns - below(turns), &c, &s);
+    floats turns = w->across * across + w->per_m * along + sonde_clot_start(vessel, k);
+    turn(turns - vfloor(turns), &c, &s);
     sum += w->height * c;
   }
   return sum;
 }
 
 // Unevenness of a clot, dB: lumps of 2 mm and finer grain, and the layers in which it grew.
-INLINE vf clot_grain(const tissue_vessel *it, knots *memory, vf theta, vf s, vf depth, vf inward) {
-  vf lump = texture(memory, theta, s * 400, depth * 600, 4 * TURNS_MUSCLE, 13);
-  vf layer = sheet(inward * 2.2f + 0.6f * lump, 0.6f);
+INLINE floats clot_grain(const tissue_vessel *it, knots *memory, floats theta, floats s,
+                         floats depth, floats inward) {
+  floats lump = texture(memory, theta, s * 400, depth * 600, 4 * TURNS_MUSCLE, 13);
+  floats layer = sheet(inward * 2.2f + 0.6f * lump, 0.6f);
   return it->lumps_db * lump + it->layers_db * (layer - 0.3f);
 }
 
-INLINE void mark(vi mask, vf scatter, float loss, vf out[2]) {
-  out[0] = pick(mask, scatter, out[0]), out[1] = pick(mask, all(loss), out[1]);
+INLINE void mark(ints mask, floats scatter, float loss, floats out[2]) {
+  out[0] = vselect(mask, scatter, out[0]), out[1] = vselect(mask, vset(loss), out[1]);
 }
 
-INLINE void mark_both(vi mask, vf scatter, vf loss, vf out[2]) {
-  out[0] = pick(mask, scatter, out[0]), out[1] = pick(mask, loss, out[1]);
+INLINE void mark_both(ints mask, floats scatter, floats loss, floats out[2]) {
+  out[0] = vselect(mask, scatter, out[0]), out[1] = vselect(mask, loss, out[1]);
 }
 
 // Layer by layer; levels 1 and 2 are the depths below dermis and fascia.
-INLINE void layers(const tissue_job *job, knots *memory, const vf *level, vf theta, vf s, vf depth,
-                   vf out[2]) {
-  vi in_fat = (level[1] >= 0) & (level[2] < 0), in_muscle = (level[1] >= 0) & (level[2] >= 0);
-  vf fat_scatter = all(fat_tissue[0]), muscle_scatter = all(job->plain ? 1 : muscle_tissue[0]);
-  vf fat_loss = all(fat_tissue[1]);
-  if (!job->plain && any(in_fat)) fat_scatter += 2.2f * septa(memory, theta, s, depth);
-  if (job->oedema > 0 && any(in_fat)) {
-    vf fluid = clefts(memory, theta, s, depth, job->oedema);
+INLINE void layers(const tissue_job *job, knots *memory, const floats *level, floats theta,
+                   floats s, floats depth, floats out[2]) {
+  ints in_fat = (level[1] >= 0) & (level[2] < 0), in_muscle = (level[1] >= 0) & (level[2] >= 0);
+  floats fat_scatter = vset(fat_tissue[0]),
+         muscle_scatter = vset(job->plain ? 1 : muscle_tissue[0]);
+  floats fat_loss = vset(fat_tissue[1]);
+  if (!job->plain && vany(in_fat)) fat_scatter += 2.2f * septa(memory, theta, s, depth);
+  if (job->oedema > 0 && vany(in_fat)) {
+    floats fluid = clefts(memory, theta, s, depth, job->oedema);
     fat_scatter = (fat_scatter * (1 + job->oedema)) * (1 - fluid) + fluid_tissue[0] * fluid;
     fat_loss += fluid * (fluid_tissue[1] - fat_loss);
   }
-  if (!job->plain && any(in_muscle))
+  if (!job->plain && vany(in_muscle))
     muscle_scatter = muscle_scatter * power2(bundles(memory, theta, s, depth) * 0.16609640474f);
-  vi sheath = (level[1] >= 0) & (size_of(level[2]) < 0.7e-3f);
-  if (!job->plain && any(sheath)) {
-    vf more = fascia(memory, theta, s, level[2]);
+  ints sheath = (level[1] >= 0) & (vabs(level[2]) < 0.7e-3f);
+  if (!job->plain && vany(sheath)) {
+    floats more = fascia(memory, theta, s, level[2]);
     fat_scatter += more, muscle_scatter += more;
   }
   mark_both(in_fat, fat_scatter, fat_loss, out);
@@ -86,118 +88,118 @@ INLINE void layers(const tissue_job *job, knots *memory, const vf *level, vf the
 }
 
 // Signed distance to the ellipsoid |q| = 1, m, to first order.
-INLINE vf lesion_distance(const tissue_lesion *lesion, const vf q[3]) {
-  vf square = all(0), steep = all(0);
+INLINE floats lesion_distance(const tissue_lesion *lesion, const floats q[3]) {
+  floats square = vset(0), steep = vset(0);
   for (int k = 0; k < 3; ++k) {
-    vf g = q[k] * lesion->per_half[k];
+    floats g = q[k] * lesion->per_half[k];
     square += q[k] * q[k], steep += g * g;
   }
-  vf size = root(square);
-  return (size - 1) * size / larger(root(steep), all(1));
+  floats size = vsqrt(square);
+  return (size - 1) * size / vmax(vsqrt(steep), vset(1));
 }
 
 // Rim and hilum, fluid, or clotted and liquid parts; a thin capsule.
-INLINE void lesion(const tissue_lesion *it, knots *memory, const vf q[3], vf away, vf theta, vf s,
-                   vf depth, vf out[2]) {
-  vi in = away < 0;
-  if (!any(away < capsule_m)) return;
+INLINE void lesion(const tissue_lesion *it, knots *memory, const floats q[3], floats away,
+                   floats theta, floats s, floats depth, floats out[2]) {
+  ints in = away < 0;
+  if (!vany(away < capsule_m)) return;
   if (it->kind != TISSUE_HAEMATOMA)
-    mark_both((away >= 0) & (away < capsule_m), all(capsule_scatter), out[1], out);
+    mark_both((away >= 0) & (away < capsule_m), vset(capsule_scatter), out[1], out);
   if (it->kind == TISSUE_CYST) {
-    mark(in, larger(all(it->scatter), all(fluid_tissue[0])), fluid_tissue[1], out);
+    mark(in, vmax(vset(it->scatter), vset(fluid_tissue[0])), fluid_tissue[1], out);
     return;
   }
-  vf grain = texture(memory, theta, s * 400, depth * 500, 4 * TURNS_MUSCLE, 11);
-  vf scatter = it->scatter * (1 + 0.3f * grain);
+  floats grain = texture(memory, theta, s * 400, depth * 500, 4 * TURNS_MUSCLE, 11);
+  floats scatter = it->scatter * (1 + 0.3f * grain);
   if (it->kind == TISSUE_NODE) {
-    vf hilum = q[0] * q[0] * 7 + q[1] * q[1] * 7 + q[2] * q[2] * 2 + 0.4f * grain;
-    vf share = smooth(smaller(larger((1.2f - hilum) * 2, all(0)), all(1)));
+    floats hilum = q[0] * q[0] * 7 + q[1] * q[1] * 7 + q[2] * q[2] * 2 + 0.4f * grain;
+    floats share = smooth(vmin(vmax((1.2f - hilum) * 2, vset(0)), vset(1)));
     mark(in, scatter + share * (hilum_scatter - scatter), node_loss, out);
     return;
   }
-  vf lump = texture(memory, theta, s * 150, depth * 200, 2 * TURNS_MUSCLE, 12) + 0.5f * grain;
-  vf liquid = smooth(smaller(larger(0.1f - 3 * lump, all(0)), all(1)));
+  floats lump = texture(memory, theta, s * 150, depth * 200, 2 * TURNS_MUSCLE, 12) + 0.5f * grain;
+  floats liquid = smooth(vmin(vmax(0.1f - 3 * lump, vset(0)), vset(1)));
   mark(in, scatter * power2(1.5f * lump) * (1 - liquid) + fluid_tissue[0] * liquid, haematoma_loss,
        out);
 }
 
 // Walls hide lesions, lumina walls: branches begin in the lumen of their parents. Clot last.
-INLINE void vessels(const tissue_job *job, knots *memory, const float *f, const vf *level,
-                    vf out[2]) {
+INLINE void vessels(const tissue_job *job, knots *memory, const float *f, const floats *level,
+                    floats out[2]) {
   const uint32_t n = job->lines;
   for (uint32_t v = job->vessels; v-- > 0;) {
-    mark(level[v] < job->vessel[v].wall_m, all(wall_tissue[0]), wall_tissue[1], out);
-    mark(level[v] <= 0, all(blood_tissue[0]), blood_tissue[1], out);
+    mark(level[v] < job->vessel[v].wall_m, vset(wall_tissue[0]), wall_tissue[1], out);
+    mark(level[v] <= 0, vset(blood_tissue[0]), blood_tissue[1], out);
   }
   for (uint32_t v = 2; v < job->vessels; ++v)
-    mark(level[v] <= 0, all(blood_tissue[0]), blood_tissue[1], out);
+    mark(level[v] <= 0, vset(blood_tissue[0]), blood_tissue[1], out);
   for (uint32_t v = 0; v < job->vessels; ++v) {
     const tissue_vessel *it = &job->vessel[v];
     if (!(it->clot_fraction > 0)) continue;
     const float *at = f + vessel_field_at(v, VESSEL_SHORT) * n;
-    vi clot = (level[v] <= 0) & (load(at + VESSEL_CLOT * n) >= 0.5f);
-    vf theta = load(f + PLANE_THETA * n), s = load(f + PLANE_S * n),
-       depth = load(f + PLANE_DEPTH * n);
-    if (!any(clot)) continue;
+    ints clot = (level[v] <= 0) & (vload(at + VESSEL_CLOT * n) >= 0.5f);
+    floats theta = vload(f + PLANE_THETA * n), s = vload(f + PLANE_S * n),
+           depth = vload(f + PLANE_DEPTH * n);
+    if (!vany(clot)) continue;
     if (it->clot_fraction < 1)
-      clot &= -load(at) > 1 - 2 * it->clot_fraction + clot_surface(it->number, s, load(at + n));
-    vf scatter = all(it->clot_scatter);
+      clot &= -vload(at) > 1 - 2 * it->clot_fraction + clot_surface(it->number, s, vload(at + n));
+    floats scatter = vset(it->clot_scatter);
     if (!job->plain)
       scatter =
-          scatter * power2(clot_grain(it, memory, theta, s, depth, load(at)) * 0.16609640474f);
-    if (v == 0 && job->webs > 0 && any(clot))
+          scatter * power2(clot_grain(it, memory, theta, s, depth, vload(at)) * 0.16609640474f);
+    if (v == 0 && job->webs > 0 && vany(clot))
       scatter =
-          scatter * (1 - 0.6f * job->webs) + job->webs * webs(memory, theta, s, depth, load(at));
+          scatter * (1 - 0.6f * job->webs) + job->webs * webs(memory, theta, s, depth, vload(at));
     mark(clot, scatter, it->clot_loss, out);
   }
 }
 
 // Facets of the cortex scatter towards the probe; the fewer, the more the cortex is inclined. The
 // distance to it grows along a line with the cosine of the angle between line and normal.
-INLINE vf periosteum(const tissue_job *job, vf inside, vf before) {
-  vf away = size_of(inside);
-  vi near = away < job->rough_m;
-  if (!any(near)) return all(0);
-  vf cosine = smaller(larger((inside - before) * job->rows_per_m, all(0.05f)), all(1));
-  vf square = 1 / (cosine * cosine) - 1;                              // of the tangent
-  vf fewer = square * (-1.442695f / (rough_tangent * rough_tangent)); // octaves
-  vf size = power2(larger(fewer, all(-60)));
-  return only(near, job->rough_bone * size * (1 - away / job->rough_m));
+INLINE floats periosteum(const tissue_job *job, floats inside, floats before) {
+  floats away = vabs(inside);
+  ints near = away < job->rough_m;
+  if (!vany(near)) return vset(0);
+  floats cosine = vmin(vmax((inside - before) * job->rows_per_m, vset(0.05f)), vset(1));
+  floats square = 1 / (cosine * cosine) - 1;                              // of the tangent
+  floats fewer = square * (-1.442695f / (rough_tangent * rough_tangent)); // octaves
+  floats size = power2(vmax(fewer, vset(-60)));
+  return vonly(near, job->rough_bone * size * (1 - away / job->rough_m));
 }
 
 // Returns the lanes in which a level changed sign since the row above.
-INLINE vi paint(const tissue_job *job, uint32_t l) {
+INLINE ints paint(const tissue_job *job, uint32_t l) {
   const float *f = job->row + l;
   knots *memory = (knots *)(void *)(job->memory + (size_t)l * KNOT_FLOATS * TEXTURES);
   const uint32_t n = job->lines, levels = LAYER_LEVELS + job->vessels + job->lesions;
-  vf depth = load(f + PLANE_DEPTH * n), fat = load(f + PLANE_FAT * n);
-  vf muscle = load(f + PLANE_MUSCLE * n);
-  vf across = load(f + PLANE_ACROSS * n), up = load(f + PLANE_UP * n);
-  vf theta = load(f + PLANE_THETA * n), s = load(f + PLANE_S * n), level[MOST_LEVELS];
+  floats depth = vload(f + PLANE_DEPTH * n), fat = vload(f + PLANE_FAT * n);
+  floats muscle = vload(f + PLANE_MUSCLE * n);
+  floats across = vload(f + PLANE_ACROSS * n), up = vload(f + PLANE_UP * n);
+  floats theta = vload(f + PLANE_THETA * n), s = vload(f + PLANE_S * n), level[MOST_LEVELS];
   level[0] = depth, level[1] = depth - fat, level[2] = depth - muscle;
-  level[3] = job->bone_radius_m - root(across * across + up * up);
-  vf *wall = level + LAYER_LEVELS, *edge = wall + job->vessels;
+  level[3] = job->bone_radius_m - vsqrt(across * across + up * up);
+  floats *wall = level + LAYER_LEVELS, *edge = wall + job->vessels;
   for (uint32_t v = 0; v < job->vessels; ++v) {
     const float *at = f + vessel_field_at(v, VESSEL_SHORT) * n, *half = at + VESSEL_HALF_SHORT * n;
-    wall[v] = wall_distance(load(at), load(at + n), load(half), load(half + n));
+    wall[v] = wall_distance(vload(at), vload(at + n), vload(half), vload(half + n));
   }
-  vf tissue[2] = {all(skin_tissue[0]), all(skin_tissue[1])};
+  floats tissue[2] = {vset(skin_tissue[0]), vset(skin_tissue[1])};
   layers(job, memory, level, theta, s, depth, tissue);
   for (uint32_t k = 0; k < job->lesions; ++k) {
     const float *at = f + lesion_field_at(job->vessels, k, 0) * n;
-    vf q[3] = {load(at), load(at + n), load(at + 2 * n)};
+    floats q[3] = {vload(at), vload(at + n), vload(at + 2 * n)};
     edge[k] = lesion_distance(&job->lesion[k], q);
     lesion(&job->lesion[k], memory, q, edge[k], theta, s, depth, tissue);
   }
   vessels(job, memory, f, wall, tissue);
-  mark(level[3] > 0, all(bone_tissue[0]), bone_tissue[1], tissue);
-  mark(level[0] < 0, all(0), outside_loss, tissue);
-  store(job->scatter + l, tissue[0]), store(job->loss + l, tissue[1]);
-  store(job->rough + l, periosteum(job, level[3], load(job->before + 3 * n + l)));
-  vi changed = all_of(0);
+  mark(level[3] > 0, vset(bone_tissue[0]), bone_tissue[1], tissue);
+  mark(level[0] < 0, vset(0), outside_loss, tissue);
+  vstore(job->scatter + l, tissue[0]), vstore(job->loss + l, tissue[1]);
+  vstore(job->rough + l, periosteum(job, level[3], vload(job->before + 3 * n + l)));
+  ints changed = vset_ints(0);
   for (uint32_t k = 0; k < levels; ++k) {
-    changed |= (level[k] < 0) ^ (load(job->before + k * n + l) < 0);
-    store(job->level + k * n + l, level[k]);
+    changed |= (level[k] < 0) ^ (vload(job->before + k * n + l) < 0);
+    vstore(job->level + k * n + l, level[k]);
   }
   return changed;
 }
@@ -205,7 +207,7 @@ INLINE vi paint(const tissue_job *job, uint32_t l) {
 static void tissue(const tissue_job *job) {
   for (uint32_t l = 0; l < job->lines; l += ECHO_ALIGN) {
     bool crossed = false;
-    for (uint32_t k = 0; k < ECHO_ALIGN; k += W) crossed = any(paint(job, l + k)) || crossed;
+    for (uint32_t k = 0; k < ECHO_ALIGN; k += FLOATS) crossed = vany(paint(job, l + k)) || crossed;
     job->crossed[l / ECHO_ALIGN] = crossed;
   }
 }

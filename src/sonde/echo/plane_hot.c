@@ -325,8 +325,8 @@ static bool relax(const sonde_echo *echo, seeker *s, sonde_vec3 field) {
   return !(size < tolerance_m);
 }
 
-static void fields_at(sonde_echo *echo, uint32_t count, const v4 *rest, sonde_vec3 *out) {
-  v4 field[SONDE_PLANE_COLUMNS];
+static void fields_at(sonde_echo *echo, uint32_t count, const float_x4 *rest, sonde_vec3 *out) {
+  float_x4 field[SONDE_PLANE_COLUMNS];
   SONDE_ASSERT(count <= SONDE_PLANE_COLUMNS);
   sonde_fields_at(echo->motion, count, rest, field);
   for (uint32_t k = 0; k < count; ++k)
@@ -339,13 +339,13 @@ static void find_row(sonde_echo *echo, uint32_t j, seeker row[SONDE_PLANE_COLUMN
   const int steps = j > 1 ? NEWTON_ITERATIONS : j > 0 ? ITERATIONS : FIRST_ITERATIONS;
   bool (*advance)(const sonde_echo *, seeker *, sonde_vec3) = j > 1 ? refine : relax;
   uint32_t on_way[SONDE_PLANE_COLUMNS], count = SONDE_PLANE_COLUMNS;
-  v4 rest[SONDE_PLANE_COLUMNS];
+  float_x4 rest[SONDE_PLANE_COLUMNS];
   sonde_vec3 field[SONDE_PLANE_COLUMNS];
   for (uint32_t i = 0; i < count; ++i) row[i] = seek(echo, i, j), on_way[i] = i;
   for (int step = 0; step < steps && count > 0; ++step) {
     uint32_t left = 0;
     for (uint32_t k = 0; k < count; ++k)
-      rest[k] = v4_of(v_sub(row[on_way[k]].q, echo->motion->corner));
+      rest[k] = point_of(v_sub(row[on_way[k]].q, echo->motion->corner));
     fields_at(echo, count, rest, field);
     for (uint32_t k = 0; k < count; ++k)
       if (advance(echo, &row[on_way[k]], field[k])) on_way[left++] = on_way[k];
@@ -364,10 +364,10 @@ static void place_beside(sonde_echo *echo, uint32_t j, const seeker row[SONDE_PL
   const frame *f = &echo->frame;
   plane_node *node = &echo->node[j * SONDE_PLANE_COLUMNS];
   const sonde_vec3 beside = v_scale(q_rotate(f->probe.rotation, vec3(0, 1, 0)), step_beside);
-  v4 rest[SONDE_PLANE_COLUMNS];
+  float_x4 rest[SONDE_PLANE_COLUMNS];
   sonde_vec3 there[SONDE_PLANE_COLUMNS];
   for (uint32_t i = 0; i < SONDE_PLANE_COLUMNS; ++i)
-    rest[i] = v4_of(v_sub(v_add(node[i].rest, beside), echo->motion->corner));
+    rest[i] = point_of(v_sub(v_add(node[i].rest, beside), echo->motion->corner));
   fields_at(echo, SONDE_PLANE_COLUMNS, rest, there);
   for (uint32_t i = 0; i < SONDE_PLANE_COLUMNS; ++i) {
     const seeker *s = &row[i];

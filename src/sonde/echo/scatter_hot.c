@@ -85,19 +85,19 @@ static bool find(sonde_echo *echo, uint32_t place) {
 
 // Samples of the slab in one place: `rest` in the plane, and its image coordinates.
 typedef struct probe {
-  v4 rest, at, in[3];
+  float_x4 rest, at, in[3];
 } probe;
 
 // Samples `first`, `first` + `step`, .. beside the plane, in cubes from the corner of the box; what
 // lies beyond it is taken for its border. The first guess of a cube's image coordinates is a step
 // of Newton's from the plane.
-static void visit(sonde_echo *echo, const probe *p, v4 first, v4 step, int count) {
+static void visit(sonde_echo *echo, const probe *p, float_x4 first, float_x4 step, int count) {
   const uint32_t *size = echo->box_size;
-  const v4 most = {(float)size[0] - 0.5f, (float)size[1] - 0.5f, (float)size[2] - 0.5f, 0};
+  const float_x4 most = {(float)size[0] - 0.5f, (float)size[1] - 0.5f, (float)size[2] - 0.5f, 0};
   const float h = (float)echo->cell_m;
   uint32_t last = UINT32_MAX;
   for (int k = 0; k < count; ++k) {
-    i4 at = whole4(smaller4(larger4(first + (float)k * step, all4(0)), most));
+    int_x4 at = vint(vmin(vmax(first + (float)k * step, vset_float_x4(0)), most));
     uint32_t place = ((uint32_t)at[2] * size[1] + (uint32_t)at[1]) * size[0] + (uint32_t)at[0];
     if (place == last) continue;
     last = place;
@@ -109,8 +109,8 @@ static void visit(sonde_echo *echo, const probe *p, v4 first, v4 step, int count
     ++echo->cell_count;
     const int32_t *corner = echo->box_first;
     const int32_t cell[3] = {corner[0] + at[0], corner[1] + at[1], corner[2] + at[2]};
-    v4 rest = (__builtin_convertvector(at, v4) + 0.5f) * h;
-    sonde_cubes_add(echo, cell, rest, p->at + times4(p->in, rest - p->rest));
+    float_x4 rest = (__builtin_convertvector(at, float_x4) + 0.5f) * h;
+    sonde_cubes_add(echo, cell, rest, p->at + transform_point(p->in, rest - p->rest));
   }
 }
 
@@ -127,30 +127,32 @@ static void choose_samples(const sonde_echo *echo, double wide, double high, int
   }
 }
 
-static double longer(v4 a, v4 b) { return (double)sqrtf(fmaxf(dot3(a, a), dot3(b, b))); }
+static double longer(float_x4 a, float_x4 b) {
+  return (double)sqrtf(fmaxf(dot_points(a, a), dot_points(b, b)));
+}
 
 // As many samples as the quad's sides in rest coordinates ask for.
 static void visit_quad(sonde_echo *echo, uint32_t i, uint32_t j) {
   const plane_node *n = &echo->node[j * SONDE_PLANE_COLUMNS + i];
   const cube_node *top = &echo->cubes->node[j * SONDE_PLANE_COLUMNS + i];
   const cube_node *low = top + SONDE_PLANE_COLUMNS;
-  const v4 right = top[1].rest - top[0].rest, below_right = low[1].rest - low[0].rest;
+  const float_x4 right = top[1].rest - top[0].rest, below_right = low[1].rest - low[0].rest;
   int across, down;
   choose_samples(echo, longer(right, below_right),
                  longer(low[0].rest - top[0].rest, low[1].rest - top[1].rest), &across, &down);
   double half = sonde_echo_elevation(echo, (j + 0.5) * echo->depth_per_row);
   sonde_vec3 side = v_lerp(n[0].beside, n[SONDE_PLANE_COLUMNS + 1].beside, 0.5);
   int slices = (int)clamp(ceil(2 * half * v_norm(side) / sampling_m), 2, 4 * MOST_PIECES) + 1;
-  const v4 reach = v4_of(v_scale(side, half / echo->cell_m));
-  const v4 step = reach * (2 / (float)(slices - 1));
+  const float_x4 reach = point_of(v_scale(side, half / echo->cell_m));
+  const float_x4 step = reach * (2 / (float)(slices - 1));
   const float inverse = (float)(1 / echo->cell_m);
   probe p = {.in = {top->in[0], top->in[1], top->in[2]}};
   for (int jj = 0; jj < down; ++jj)
     for (int ii = 0; ii < across; ++ii) {
       const float a = ((float)ii + 0.5f) / (float)across, b = ((float)jj + 0.5f) / (float)down;
-      const v4 above = top[0].rest + a * right, under = low[0].rest + a * below_right;
+      const float_x4 above = top[0].rest + a * right, under = low[0].rest + a * below_right;
       p.rest = above + b * (under - above);
-      p.at = (v4){(float)i + a, 0, (float)j + b, 0};
+      p.at = (float_x4){(float)i + a, 0, (float)j + b, 0};
       visit(echo, &p, p.rest * inverse - reach, step, slices);
     }
 }

@@ -3,13 +3,13 @@
 #ifndef SONDE_SRC_FIELDS_H
 #define SONDE_SRC_FIELDS_H
 
-#include "base/four.h"
+#include "base/vector_records.h"
 #include "interior/window.h"
 
 // A column of the window from the skin to the bone.
 typedef struct sonde_field_column {
-  v4 radius[SONDE_WINDOW_LEVELS / 4];
-  v4 move[SONDE_WINDOW_LEVELS]; // world
+  float_x4 radius[SONDE_WINDOW_LEVELS / 4];
+  float_x4 move[SONDE_WINDOW_LEVELS]; // world
 } sonde_field_column;
 
 typedef struct sonde_fields {
@@ -17,7 +17,7 @@ typedef struct sonde_fields {
   sonde_vec3 corner; // that places at rest are from
   // Of the leg, turned so that the window's middle is at angle 0: x, y, way along = first + columns
   // times the way from the corner.
-  v4 first, turned[3];
+  float_x4 first, turned[3];
   float theta[SONDE_WINDOW_THETA + 1], per_theta[SONDE_WINDOW_THETA];
   float s[SONDE_WINDOW_S], per_s[SONDE_WINDOW_S];
   uint32_t rows; // a bit per row of the window that is in the table
@@ -28,6 +28,6 @@ typedef struct sonde_fields {
 void sonde_fields_begin(sonde_fields *fields, const sonde_interior *interior, sonde_vec3 corner);
 // Displacements of points, m: within 0.1 um of sonde_interior_field for points within 0.1 m of the
 // corner.
-void sonde_fields_at(sonde_fields *fields, uint32_t count, const v4 *rest, v4 *field);
+void sonde_fields_at(sonde_fields *fields, uint32_t count, const float_x4 *rest, float_x4 *field);
 
 #endif
