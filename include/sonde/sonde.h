@@ -20,7 +20,7 @@
 #include "sonde/fit_sample.h"
 #include "sonde/robot.h"
 #include "sonde/identify.h"
-#include "sonde/report.h"
+#include "sonde/fit_report.h"
 #include "sonde/anatomy.h"
 #include "sonde/interior.h"
 #include "sonde/interior_findings.h"

@@ -81,7 +81,7 @@ export class Page {
     const save = h("button", { type: "button", class: "save", title: "Save this figure as an SVG file" }, "SVG");
     save.onclick = () => saveSvg(drawing, `${String(number).padStart(2, "0")}-${options.name}`);
     const caption = h("figcaption", {}, h("b", {}, `Figure ${number}. ${options.title}.`), ` ${options.caption ?? ""} `, save);
-    into.append(h("figure", { id: `figure-${options.name}`, class: options.wide ? "full" : "" }, drawing, caption));
+    into.append(h("figure", { id: `figure-${options.name}`, class: options.wide ?? Number(drawing.getAttribute("width")) > 800 ? "full" : undefined }, drawing, caption));
   }
 
   /** A table under its number; `caption` explains the columns. */

@@ -1,10 +1,10 @@
 /**
- * @file report.h
- * The report of an estimation: one self-contained HTML page (inline SVG and CSS, no script, nothing
- * loaded from elsewhere) and its figures as SVG files. What it shows and how: docs/report.md.
+ * @file fit_report.h
+ * The report of an estimation: one self-contained HTML page with figures and tables. What it shows
+ * and how: docs/report.md.
  */
-#ifndef SONDE_REPORT_H
-#define SONDE_REPORT_H
+#ifndef SONDE_FIT_REPORT_H
+#define SONDE_FIT_REPORT_H
 
 #include "sonde/fit.h"
 
@@ -118,8 +118,8 @@ typedef struct sonde_fit_report {
 } sonde_fit_report;
 
 /**
- * Writes `directory`/index.html and one .svg per figure; the directory is made when it is missing
- * (its parent must exist). Every file is complete or absent; the page comes last.
+ * Writes `directory`/index.html, complete or not at all; the directory is made when it is missing
+ * (its parent must exist).
  * @return ARGUMENT for too many stages, a stage without name or forces, forces without data, sites
  *   or probes beyond SONDE_FIT_PROBES; IO naming the file; MEMORY
  * @thread owner

@@ -1,6 +1,6 @@
 // Maximum-likelihood fits of three symmetric distributions to a sample.
-#ifndef SONDE_SRC_REPORT_DISTRIBUTION_H
-#define SONDE_SRC_REPORT_DISTRIBUTION_H
+#ifndef SONDE_SRC_FIT_DISTRIBUTION_H
+#define SONDE_SRC_FIT_DISTRIBUTION_H
 
 #include "base/base.h"
 

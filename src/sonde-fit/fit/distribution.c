@@ -3,7 +3,7 @@
 // student_step:   one step of expectation and maximisation for place and scale.
 // student_at:     place, scale and likelihood at given degrees of freedom.
 // fit_student:    golden section over the logarithm of the degrees of freedom.
-#include "report/distribution.h"
+#include "fit/distribution.h"
 
 #include "base/maths.h"
 

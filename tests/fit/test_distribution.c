@@ -2,7 +2,7 @@
 // densities, and the better description wins.
 #include "base/random.h"
 #include "fixture.h"
-#include "report/distribution.h"
+#include "fit/distribution.h"
 
 enum { COUNT = 20000 };
 static double sample[COUNT];
