@@ -155,20 +155,20 @@ typedef struct sonde_cut_map {
   uint32_t node_count;  /**< before the cut */
   uint32_t added;       /**< nodes after it: node_count + added */
   uint32_t *origin;     /**< [added] node that node_count + k was split from */
-  uint32_t *way;        /**< [way_count] nodes (before the cut) that it runs through, in order */
-  uint32_t way_count;   /**< a closed way does not repeat its first node */
+  uint32_t *path;       /**< [path_count] nodes (before the cut) that it runs through, in order */
+  uint32_t path_count;  /**< a closed path does not repeat its first node */
   uint32_t split_edges; /**< edges that became two */
   bool closed;          /**< it goes round and frees a flap */
   double length_m;      /**< at rest */
-  uint64_t work;        /**< edges that the search for the way looked at */
+  uint64_t work;        /**< edges that the search for the path looked at */
 } sonde_cut_map;
 
 /**
- * Cuts the skin along a path: nodes on the way are split, each copy keeps the faces of its side and
- * their share of area and mass; edges on the way become two with half the spring each. Rest
+ * Cuts the skin along a path: nodes on it are split, each copy keeps the faces of its side and
+ * their share of area and mass; edges on it become two with half the spring each. Rest
  * positions, normals, k0, xm and all totals stay. The ends of the path inside the skin are tips and
  * are not split; a path that ends where it began frees a flap; crossing an earlier cut is allowed.
- * The way follows the mesh's edges, within about half an edge of the path. docs/cutting.md.
+ * It follows the mesh's edges, within about half an edge of the path. docs/cutting.md.
  * @param position_m [nodes] where the nodes are now; NULL: at rest
  * @param path_m [count] 2 to 1,024 points on the skin at position_m, m
  * @param[out] cut a new model, owned by the caller; `model` stays as it is

@@ -87,7 +87,7 @@ static void totals_and_places_stay(void **state) {
     assert_int_equal(cut->surface.vertex_count, model->surface.vertex_count + map.added);
     assert_int_equal(cut->surface.face_count, model->surface.face_count);
     // Each of an open cut's two tips stays one node, a closed cut has none.
-    assert_int_equal(map.added, closed ? map.way_count : map.way_count - 2);
+    assert_int_equal(map.added, closed ? map.path_count : map.path_count - 2);
     assert_int_equal(cut->topology.edge_count, model->topology.edge_count + map.split_edges);
     assert_same_totals(model, cut);
     for (uint32_t i = 0; i < cut->surface.vertex_count; ++i) {
@@ -119,9 +119,10 @@ static void way_follows_the_path(void **state) {
     assert_int_equal(sonde_model_cut(model, NULL, path, 2, &cut, &map, NULL), SONDE_OK);
     const sonde_vec3 *x = model->surface.vertices;
     sonde_vec3 across = v_unit(v_cross(path[0], path[1]), vec3(0, 0, 1));
-    for (uint32_t w = 0; w < map.way_count; ++w) assert_near(v_dot(across, x[map.way[w]]), 0, 5e-3);
-    assert_true(v_distance(x[map.way[0]], path[0]) < 5e-3);
-    assert_true(v_distance(x[map.way[map.way_count - 1]], path[1]) < 5e-3);
+    for (uint32_t w = 0; w < map.path_count; ++w)
+      assert_near(v_dot(across, x[map.path[w]]), 0, 5e-3);
+    assert_true(v_distance(x[map.path[0]], path[0]) < 5e-3);
+    assert_true(v_distance(x[map.path[map.path_count - 1]], path[1]) < 5e-3);
     double straight = 2 * FIXTURE_RADIUS_M * atan(0.6);
     assert_true(map.length_m > 0.8 * straight && map.length_m < 1.35 * straight);
     sonde_cut_map_clear(&map);
@@ -143,8 +144,8 @@ static void dense_stroke_is_a_line(void **state) {
   const sonde_vec3 ends[2] = {path[0], path[200]};
   assert_int_equal(sonde_model_cut(model, NULL, path, 201, &dense, &map, NULL), SONDE_OK);
   assert_int_equal(sonde_model_cut(model, NULL, ends, 2, &sparse, &other, NULL), SONDE_OK);
-  assert_int_equal(map.way_count, other.way_count);
-  assert_memory_equal(map.way, other.way, map.way_count * sizeof *map.way);
+  assert_int_equal(map.path_count, other.path_count);
+  assert_memory_equal(map.path, other.path, map.path_count * sizeof *map.path);
   sonde_cut_map_clear(&map);
   sonde_cut_map_clear(&other);
   sonde_model_destroy(dense);

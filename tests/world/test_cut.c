@@ -324,7 +324,7 @@ static void refused_cut_changes_nothing(void **state) {
   assert_int_equal(sonde_state_cut(b.state, path, 2, &model, &after, &map, &error), SONDE_ARGUMENT);
   assert_null(model);
   assert_null(after);
-  assert_null(map.way);
+  assert_null(map.path);
   assert_true(sonde_state_hash(b.state) == hash);
   clear(&b);
 }

@@ -26,8 +26,27 @@ static sonde_status fail_size(const char *path, const sonde_input_limits *bounds
                     (double)bounds->most_bytes / (double)MIB);
 }
 
-static sonde_status read_all(FILE *stream, const char *path, const sonde_input_limits *bounds,
-                             char **bytes, size_t *count, sonde_error *error) {
+sonde_status sonde_bounded_load(const char *path, const sonde_input_limits *bounds, char **bytes,
+                                size_t *count, sonde_error *error) {
+  SONDE_ASSERT(path && bounds && bounds->most_bytes > 0);
+  *bytes = NULL;
+  *count = 0;
+  struct stat facts;
+  FILE *stream = fopen(path, "rb");
+  if (!stream)
+    return sonde_fail(error, sonde_disk_status(errno), "%.300s: cannot be opened: %s", path,
+                      strerror(errno));
+  bool known = fstat(fileno(stream), &facts) == 0;
+  if (known && S_ISDIR(facts.st_mode)) {
+    fclose(stream);
+    return sonde_fail(error, SONDE_IO, "%.300s: is a directory, expected a file", path);
+  }
+  if (known && S_ISREG(facts.st_mode) && (uint64_t)facts.st_size > bounds->most_bytes) {
+    fclose(stream);
+    return fail_size(path, bounds, error);
+  }
+
+  // The buffer doubles while the file goes on; a pipe does not tell its size.
   size_t used = 0, room = 1 << 16;
   char *buffer = SONDE_NEW(char, room + 1);
   while (buffer) {
@@ -39,13 +58,15 @@ static sonde_status read_all(FILE *stream, const char *path, const sonde_input_l
     buffer = grown;
     room *= 2;
   }
-  if (!buffer) return sonde_fail_memory(error);
   sonde_status status = SONDE_OK;
-  if (used > bounds->most_bytes)
+  if (!buffer)
+    status = sonde_fail_memory(error);
+  else if (used > bounds->most_bytes)
     status = fail_size(path, bounds, error);
   else if (ferror(stream))
     status = sonde_fail(error, sonde_disk_status(errno), "%.300s: cannot be read: %s", path,
                         strerror(errno));
+  fclose(stream);
   if (status) {
     sonde_free(buffer);
     return status;
@@ -54,28 +75,6 @@ static sonde_status read_all(FILE *stream, const char *path, const sonde_input_l
   *bytes = buffer;
   *count = used;
   return SONDE_OK;
-}
-
-sonde_status sonde_bounded_load(const char *path, const sonde_input_limits *bounds, char **bytes,
-                                size_t *count, sonde_error *error) {
-  SONDE_ASSERT(path && bounds && bounds->most_bytes > 0);
-  *bytes = NULL;
-  *count = 0;
-  struct stat facts;
-  FILE *stream = fopen(path, "rb");
-  if (!stream)
-    return sonde_fail(error, sonde_disk_status(errno), "%.300s: cannot be opened: %s", path,
-                      strerror(errno));
-  sonde_status status = SONDE_OK;
-  bool known = fstat(fileno(stream), &facts) == 0;
-  if (known && S_ISDIR(facts.st_mode))
-    status = sonde_fail(error, SONDE_IO, "%.300s: is a directory, expected a file", path);
-  else if (known && S_ISREG(facts.st_mode) && (uint64_t)facts.st_size > bounds->most_bytes)
-    status = fail_size(path, bounds, error);
-  else
-    status = read_all(stream, path, bounds, bytes, count, error);
-  fclose(stream);
-  return status;
 }
 
 sonde_status sonde_file_load(const char *path, char **bytes, size_t *count, sonde_error *error) {

@@ -1,7 +1,5 @@
-// take_line: cuts the next line off the text, without its line end.
-// split: cuts a line into trimmed cells.
-// next_content: the next line that is neither empty nor a comment.
-// read_header: names of the columns, all different.
+// Reader of CSV tables: lines of cells in their place in the text, blanks around them taken off,
+// empty lines and comments (#) passed over.
 #include "base/csv.h"
 
 #include "base/bounds.h"
@@ -9,6 +7,7 @@
 #include <math.h>
 #include <string.h>
 
+// The next line of the text, without its line end.
 static char *take_line(sonde_csv *csv) {
   if (csv->cursor >= csv->end) return NULL;
   char *line = csv->cursor;
@@ -22,28 +21,23 @@ static char *take_line(sonde_csv *csv) {
   return line;
 }
 
-static bool is_blank(char c) { return c == ' ' || c == '\t'; }
-
-static char *trim(char *cell) {
-  while (is_blank(*cell)) ++cell;
-  size_t length = strlen(cell);
-  while (length && is_blank(cell[length - 1])) cell[--length] = 0;
-  return cell;
-}
-
-// Returns the number of cells, of which at most CSV_COLUMNS are stored.
+// Splits a line into trimmed cells. Returns their number, of which at most CSV_COLUMNS are stored.
 static uint32_t split(char *line, const char **cells) {
   uint32_t count = 0;
   for (char *start = line; start; ++count) {
     char *comma = strchr(start, ',');
     if (comma) *comma = 0;
-    if (count < CSV_COLUMNS) cells[count] = trim(start);
+    start += strspn(start, " \t");
+    size_t length = strlen(start);
+    while (length && strchr(" \t", start[length - 1])) start[--length] = 0;
+    if (count < CSV_COLUMNS) cells[count] = start;
     start = comma ? comma + 1 : NULL;
   }
   SONDE_ASSERT(count > 0);
   return count;
 }
 
+// The next line that is neither empty nor a comment.
 static char *next_content(sonde_csv *csv) {
   char *line = take_line(csv);
   while (line) {
@@ -54,6 +48,7 @@ static char *next_content(sonde_csv *csv) {
   return NULL;
 }
 
+// Names of the columns, all different.
 static sonde_status read_header(sonde_csv *csv, sonde_error *error) {
   char *line = next_content(csv);
   if (!line)

@@ -1,8 +1,4 @@
 // System calls that change the disk, and the place where tests make them fail.
-//
-// fails              asks the test
-// sonde_disk_*       the calls
-// descriptor_of, sonde_disk_follow   where a path leads
 #include "base/disk.h"
 
 #include "base/base.h"
@@ -107,18 +103,10 @@ int sonde_disk_truncate(int descriptor, off_t bytes) {
   return ftruncate(descriptor, bytes) ? errno : 0;
 }
 
-// What /dev/stdout and /dev/fd/N lead to is a descriptor of this process, -1: another place.
-static int descriptor_of(const char *directory, const char *name) {
-  char own[64];
-  snprintf(own, sizeof own, "/proc/%ld/fd", (long)getpid());
-  char *end = NULL;
-  long number = strtol(name, &end, 10);
-  bool is_number = end != name && *end == 0 && number >= 0 && number <= INT_MAX;
-  return strcmp(directory, own) == 0 && is_number ? (int)number : -1;
-}
-
 int sonde_disk_follow(const char *path, char target[PATH_MAX], int *descriptor) {
   char next[PATH_MAX], link[PATH_MAX], directory[PATH_MAX];
+  char own[64]; // descriptors of this process: what /dev/stdout and /dev/fd/N lead to
+  snprintf(own, sizeof own, "/proc/%ld/fd", (long)getpid());
   *descriptor = -1;
   if (snprintf(next, sizeof next, "%s", path) >= PATH_MAX) return ENAMETOOLONG;
   for (int hop = 0; hop < LINKS; ++hop) {
@@ -128,8 +116,13 @@ int sonde_disk_follow(const char *path, char target[PATH_MAX], int *descriptor) 
     if (slash) *slash = 0;
     const char *parent = !slash ? "." : next[0] ? next : "/";
     if (!realpath(parent, directory)) return errno;
-    *descriptor = descriptor_of(directory, name);
-    if (*descriptor >= 0) return 0;
+    char *end = NULL;
+    long number = strtol(name, &end, 10);
+    if (strcmp(directory, own) == 0 && end != name && *end == 0 && number >= 0 &&
+        number <= INT_MAX) {
+      *descriptor = (int)number;
+      return 0;
+    }
     bool root = strcmp(directory, "/") == 0;
     if (snprintf(target, PATH_MAX, "%s/%s", root ? "" : directory, name) >= PATH_MAX)
       return ENAMETOOLONG;

@@ -1,10 +1,4 @@
 // Output files: whole or not at all beside their place, or straight into what cannot be replaced.
-//
-// open_beside          a temporary file in the directory of the target
-// is_temporary, is_abandoned  names and locks of such files
-// put                  what the buffer holds, to the system
-// sonde_file_*         the interface
-// sonde_directory_make
 #include "base/base.h"
 #include "base/disk.h"
 
@@ -81,16 +75,6 @@ static int open_beside(sonde_file *file, const struct stat *old) {
   return failure;
 }
 
-// The file exists: a directory is refused, a regular file will be replaced, all else is written
-// into: a pipe, a terminal, /dev/null.
-static int open_existing(sonde_file *file, const struct stat *info) {
-  if (S_ISDIR(info->st_mode)) return EISDIR;
-  if (!S_ISREG(info->st_mode))
-    return sonde_disk_open(file->target, O_WRONLY | O_NOCTTY, 0, &file->descriptor);
-  if (access(file->target, W_OK) != 0) return errno;
-  return open_beside(file, info);
-}
-
 static int open_output(sonde_file *file) {
   char target[PATH_MAX];
   int own = -1, failure = sonde_disk_follow(file->path, target, &own);
@@ -103,8 +87,13 @@ static int open_output(sonde_file *file) {
   file->target = copy_of(target);
   if (!file->target) return ENOMEM;
   struct stat info;
-  if (stat(target, &info) == 0) return open_existing(file, &info);
-  return errno == ENOENT ? open_beside(file, NULL) : errno;
+  if (stat(target, &info) != 0) return errno == ENOENT ? open_beside(file, NULL) : errno;
+  // A directory is refused, a regular file will be replaced; a pipe, a terminal and /dev/null are
+  // written into.
+  if (S_ISDIR(info.st_mode)) return EISDIR;
+  if (!S_ISREG(info.st_mode))
+    return sonde_disk_open(target, O_WRONLY | O_NOCTTY, 0, &file->descriptor);
+  return access(target, W_OK) == 0 ? open_beside(file, &info) : errno;
 }
 
 static sonde_file *new_file(const char *path) {
@@ -177,23 +166,22 @@ sonde_status sonde_file_extend(const char *path, uint64_t keep, sonde_file **out
 
 // ---- writing --------------------------------------------------------------------------------
 
-static int put_in_memory(sonde_file *file, const void *bytes, size_t count) {
+static void put(sonde_file *file, const void *bytes, size_t count) {
+  size_t written;
+  if (!file->failure && !file->memory)
+    file->failure = sonde_disk_write(file->descriptor, bytes, count, &written);
+  if (file->failure || !file->memory) return;
   while (file->memory_room - file->memory_used <= count) { // a 0 behind it fits too
     char *grown = sonde_realloc(file->memory, file->memory_room, 2 * file->memory_room);
-    if (!grown) return ENOMEM;
+    if (!grown) {
+      file->failure = ENOMEM;
+      return;
+    }
     file->memory = grown;
     file->memory_room *= 2;
   }
   memcpy(file->memory + file->memory_used, bytes, count);
   file->memory_used += count;
-  return 0;
-}
-
-static void put(sonde_file *file, const void *bytes, size_t count) {
-  size_t written;
-  if (file->failure) return;
-  file->failure = file->memory ? put_in_memory(file, bytes, count)
-                               : sonde_disk_write(file->descriptor, bytes, count, &written);
 }
 
 static void put_buffer(sonde_file *file) {
@@ -270,22 +258,6 @@ void sonde_file_discard(sonde_file *file) {
   destroy(file);
 }
 
-// NAME.part-xxxxxx
-static bool is_temporary(const char *entry, const char *name) {
-  size_t kept = strlen(name);
-  kept = kept < NAME_KEPT ? kept : NAME_KEPT;
-  return strncmp(entry, name, kept) == 0 && strncmp(entry + kept, ".part-", 6) == 0 &&
-         strspn(entry + kept + 6, "0123456789abcdef") == 6 && entry[kept + 12] == 0;
-}
-
-// Its writer holds the lock as long as it lives.
-static bool is_abandoned(const char *path) {
-  int descriptor = open(path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW);
-  bool free_now = descriptor >= 0 && flock(descriptor, LOCK_EX | LOCK_NB) == 0;
-  if (descriptor >= 0) (void)close(descriptor);
-  return free_now;
-}
-
 uint32_t sonde_file_remove_abandoned(const char *path) {
   SONDE_ASSERT(path);
   char target[PATH_MAX];
@@ -295,12 +267,20 @@ uint32_t sonde_file_remove_abandoned(const char *path) {
   char *name = strrchr(target, '/');
   if (!name) return 0;
   *name++ = 0;
+  size_t kept = strlen(name) < NAME_KEPT ? strlen(name) : NAME_KEPT;
   DIR *list = opendir(target[0] ? target : "/");
   for (const struct dirent *entry; list && (entry = readdir(list));) {
+    // A temporary file is called NAME.part-xxxxxx; its writer holds the lock as long as it lives.
+    const char *mark = entry->d_name + kept;
+    if (strncmp(entry->d_name, name, kept) != 0 || strncmp(mark, ".part-", 6) != 0 ||
+        strspn(mark + 6, "0123456789abcdef") != 6 || mark[12] != 0)
+      continue;
     char part[2 * PATH_MAX];
     snprintf(part, sizeof part, "%s/%s", target, entry->d_name);
-    if (is_temporary(entry->d_name, name) && is_abandoned(part))
-      removed += sonde_disk_remove(part) == 0;
+    int descriptor = open(part, O_RDONLY | O_CLOEXEC | O_NOFOLLOW);
+    bool abandoned = descriptor >= 0 && flock(descriptor, LOCK_EX | LOCK_NB) == 0;
+    if (descriptor >= 0) (void)close(descriptor);
+    if (abandoned) removed += sonde_disk_remove(part) == 0;
   }
   if (list) closedir(list);
   return removed;

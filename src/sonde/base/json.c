@@ -155,17 +155,6 @@ static sonde_status read_number(parser *p, sonde_json *value) {
   return SONDE_OK;
 }
 
-static sonde_json *new_node(tree *t) {
-  if (!t->blocks || t->blocks->used == BLOCK_NODES) {
-    block *more = SONDE_NEW(block, 1);
-    if (!more) return NULL;
-    more->before = t->blocks;
-    t->blocks = more;
-  }
-  SONDE_ASSERT(t->blocks->used < BLOCK_NODES);
-  return &t->blocks->node[t->blocks->used++];
-}
-
 static int by_key(const void *a, const void *b) {
   const sonde_json *x = *(const sonde_json *const *)a, *y = *(const sonde_json *const *)b;
   int order = strcmp(x->key, y->key);
@@ -195,6 +184,7 @@ static sonde_status read_value(parser *p, sonde_json *value);
 
 // The values of the list or object whose bracket is at p->at.
 static sonde_status read_members(parser *p, sonde_json *parent) {
+  tree *t = p->tree;
   bool object = *p->at == '{';
   const char close = object ? '}' : ']';
   sonde_json **link = &parent->first;
@@ -206,8 +196,13 @@ static sonde_status read_members(parser *p, sonde_json *parent) {
   for (bool empty = *p->at == close; !empty && (parent->count == 0 || *p->at == ',');) {
     if (parent->count > 0) p->at++;
     skip_space(p);
-    sonde_json *value = *link = new_node(p->tree);
-    if (!value) return sonde_fail_memory(p->error);
+    if (!t->blocks || t->blocks->used == BLOCK_NODES) {
+      block *more = SONDE_NEW(block, 1);
+      if (!more) return sonde_fail_memory(p->error);
+      more->before = t->blocks;
+      t->blocks = more;
+    }
+    sonde_json *value = *link = &t->blocks->node[t->blocks->used++];
     if (object) {
       if (*p->at != '"') return fail(p, "expected a key in quotes");
       sonde_status status = read_text(p, &value->key);

@@ -1,6 +1,5 @@
-// worker_main: takes the next item until none is left or the run stops.
-// wait_and_report: the caller reports progress ten times a second.
-// sonde_parallel_run: starts, waits, joins.
+// The pool of worker threads: each takes the next item until none is left or the run stops, while
+// the caller reports progress ten times a second.
 #include "base/parallel.h"
 
 #include <pthread.h>
@@ -29,16 +28,6 @@ typedef struct worker {
   pthread_t thread;
 } worker;
 
-static void note_failure(pool *p, uint32_t item, sonde_status status, const sonde_error *error) {
-  pthread_mutex_lock(&p->mutex);
-  if (!p->failure || item < p->failed_item) {
-    p->failure = status;
-    p->failed_item = item;
-    p->error = *error;
-  }
-  pthread_mutex_unlock(&p->mutex);
-}
-
 static void *worker_main(void *argument) {
   worker *me = argument;
   pool *p = me->pool;
@@ -48,7 +37,13 @@ static void *worker_main(void *argument) {
     sonde_error error = {0};
     sonde_status status = p->work(p->user, me->index, item, &p->stop, &error);
     if (status && status != SONDE_CANCELLED) {
-      note_failure(p, item, status, &error);
+      pthread_mutex_lock(&p->mutex);
+      if (!p->failure || item < p->failed_item) {
+        p->failure = status;
+        p->failed_item = item;
+        p->error = error;
+      }
+      pthread_mutex_unlock(&p->mutex);
       atomic_store(&p->stop, true);
     }
     if (!status) atomic_fetch_add(&p->done, 1);
@@ -59,36 +54,6 @@ static void *worker_main(void *argument) {
   pthread_cond_signal(&p->changed);
   pthread_mutex_unlock(&p->mutex);
   return NULL;
-}
-
-static struct timespec in_tenth_of_a_second(void) {
-  struct timespec t;
-  clock_gettime(CLOCK_REALTIME, &t);
-  t.tv_nsec += 100000000;
-  if (t.tv_nsec >= 1000000000) {
-    t.tv_nsec -= 1000000000;
-    ++t.tv_sec;
-  }
-  return t;
-}
-
-// Returns true when progress asked to stop.
-static bool wait_and_report(pool *p, const sonde_progress *progress, const char *what) {
-  bool cancelled = false;
-  pthread_mutex_lock(&p->mutex);
-  while (p->running) {
-    struct timespec until = in_tenth_of_a_second();
-    pthread_cond_timedwait(&p->changed, &p->mutex, &until);
-    pthread_mutex_unlock(&p->mutex);
-    double fraction = p->items ? (double)atomic_load(&p->done) / p->items : 1.0;
-    if (!cancelled && !sonde_progress_report(progress, fraction, what)) {
-      cancelled = true;
-      atomic_store(&p->stop, true);
-    }
-    pthread_mutex_lock(&p->mutex);
-  }
-  pthread_mutex_unlock(&p->mutex);
-  return cancelled && atomic_load(&p->done) < p->items;
 }
 
 uint32_t sonde_parallel_workers(uint32_t wanted, uint32_t items) {
@@ -104,20 +69,37 @@ sonde_status sonde_parallel_run(uint32_t items, uint32_t workers, sonde_parallel
                                 sonde_error *error) {
   SONDE_ASSERT(workers >= 1 && workers <= MAX_WORKERS);
   pool p = {.items = items, .work = work, .user = user};
-  worker crew[MAX_WORKERS];
+  worker list[MAX_WORKERS];
   pthread_mutex_init(&p.mutex, NULL);
   pthread_cond_init(&p.changed, NULL);
   uint32_t started = 0;
   p.running = workers;
   for (; started < workers; ++started) {
-    crew[started] = (worker){.pool = &p, .index = started};
-    if (pthread_create(&crew[started].thread, NULL, worker_main, &crew[started])) break;
+    list[started] = (worker){.pool = &p, .index = started};
+    if (pthread_create(&list[started].thread, NULL, worker_main, &list[started])) break;
   }
+
+  bool cancelled = false;
   pthread_mutex_lock(&p.mutex);
   p.running -= workers - started;
+  while (p.running) {
+    struct timespec until; // in a tenth of a second
+    clock_gettime(CLOCK_REALTIME, &until);
+    until.tv_nsec += 100000000;
+    until.tv_sec += until.tv_nsec / 1000000000;
+    until.tv_nsec %= 1000000000;
+    pthread_cond_timedwait(&p.changed, &p.mutex, &until);
+    pthread_mutex_unlock(&p.mutex);
+    double fraction = items ? (double)atomic_load(&p.done) / items : 1.0;
+    if (!cancelled && !sonde_progress_report(progress, fraction, what)) {
+      cancelled = true;
+      atomic_store(&p.stop, true);
+    }
+    pthread_mutex_lock(&p.mutex);
+  }
   pthread_mutex_unlock(&p.mutex);
-  bool cancelled = wait_and_report(&p, progress, what);
-  for (uint32_t k = 0; k < started; ++k) pthread_join(crew[k].thread, NULL);
+  cancelled = cancelled && atomic_load(&p.done) < items;
+  for (uint32_t k = 0; k < started; ++k) pthread_join(list[k].thread, NULL);
   pthread_cond_destroy(&p.changed);
   pthread_mutex_destroy(&p.mutex);
   if (!started) return sonde_fail(error, SONDE_MEMORY, "no thread could be started");

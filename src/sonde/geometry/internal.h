@@ -35,6 +35,13 @@ static inline double sonde_corner_angle(sonde_vec3 a, sonde_vec3 b, sonde_vec3 c
   return atan2(v_norm(v_cross(u, w)), v_dot(u, w));
 }
 
+// Edge between two vertices; SONDE_NONE when there is none.
+static inline uint32_t sonde_topology_edge(const sonde_topology *t, uint32_t a, uint32_t b) {
+  for (uint32_t k = t->start[a]; k < t->start[a + 1]; ++k)
+    if (t->neighbour[k] == b) return t->neighbour_edge[k];
+  return SONDE_NONE;
+}
+
 // ---- files --------------------------------------------------------------------------------
 
 // Growing mesh that a reader fills.

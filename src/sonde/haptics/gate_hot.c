@@ -29,10 +29,10 @@ void sonde_gate_apply(sonde_gate *gate, bool fresh, sonde_vec3 force_n, sonde_ve
   bool acted = false;
   double left = clamp(1.0 - (gate->age_s - hold_s) / watchdog_fade_s, 0.0, 1.0);
   sonde_vec3 force = v_scale(sonde_bound_norm(gate->wanted_n, limits->force_n, &acted), left);
-  sonde_vec3 turn = v_scale(sonde_bound_norm(gate->wanted_n_m, limits->torque_n_m, &acted), left);
+  sonde_vec3 torque = v_scale(sonde_bound_norm(gate->wanted_n_m, limits->torque_n_m, &acted), left);
   double rate = fmax(limits->slew_n_s, limits->force_n / watchdog_fade_s);
   double share = limits->force_n > 0.0 ? limits->torque_n_m / limits->force_n : 0.0;
   gate->force_n = sonde_bound_step(gate->force_n, force, rate * dt_s, &acted);
-  gate->torque_n_m = sonde_bound_step(gate->torque_n_m, turn, rate * share * dt_s, &acted);
+  gate->torque_n_m = sonde_bound_step(gate->torque_n_m, torque, rate * share * dt_s, &acted);
   SONDE_ASSERT(v_finite(gate->force_n) && v_finite(gate->torque_n_m));
 }

@@ -83,10 +83,10 @@ void sonde_gel_part(sonde_gel *gel, const sonde_vec3 *contact_n, sonde_vec3 prob
     if (gel->change_m3[i] < 0.0 || gel->change_m3[i] > 0.0)
       gel->film_m[i] = fmax(gel->film_m[i] + gel->change_m3[i] / gel->model->area_m2[i], 0.0);
   // Films lose gel to the air; skin that loses its film stays moist for a while.
-  double keep = exp(-dt_s / gel->def.moist_s), loss = gel->def.drying_m_s * dt_s;
+  double decay = exp(-dt_s / gel->def.moist_s), loss = gel->def.drying_m_s * dt_s;
   for (uint32_t i = 0; i < gel->model->surface.vertex_count; ++i) {
     gel->film_m[i] = fmax(gel->film_m[i] - loss, 0.0);
-    gel->moisture[i] = gel->film_m[i] > 0.0 ? 1.0 : gel->moisture[i] * keep;
+    gel->moisture[i] = gel->film_m[i] > 0.0 ? 1.0 : gel->moisture[i] * decay;
   }
 }
 

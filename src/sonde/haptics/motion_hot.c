@@ -18,8 +18,8 @@ bool sonde_pose_usable(sonde_pose pose) {
 }
 
 double sonde_quat_angle(sonde_quat a, sonde_quat b) {
-  sonde_quat turn = q_mul(q_conj(a), b);
-  return 2.0 * atan2(v_norm(vec3(turn.x, turn.y, turn.z)), fabs(turn.w));
+  sonde_quat between = q_mul(q_conj(a), b);
+  return 2.0 * atan2(v_norm(vec3(between.x, between.y, between.z)), fabs(between.w));
 }
 
 // Weights sin((1-t)h)/sin h and sin(th)/sin h, h half the angle; their limit for h -> 0 is 1-t, t.
@@ -37,13 +37,14 @@ sonde_pose sonde_pose_blend(sonde_pose a, sonde_pose b, double t) {
                       sonde_quat_slerp(a.rotation, b.rotation, t)};
 }
 
-sonde_pose sonde_pose_approach(sonde_pose a, sonde_pose b, double reach_m, double turn_rad) {
-  SONDE_ASSERT(reach_m > 0.0 && turn_rad > 0.0);
+sonde_pose sonde_pose_approach(sonde_pose a, sonde_pose b, double reach_m, double rotation_rad) {
+  SONDE_ASSERT(reach_m > 0.0 && rotation_rad > 0.0);
   double distance = v_distance(a.position, b.position);
   double angle = sonde_quat_angle(a.rotation, b.rotation);
   sonde_pose next = b;
   if (distance > reach_m)
     next.position = v_madd(a.position, reach_m / distance, v_sub(b.position, a.position));
-  if (angle > turn_rad) next.rotation = sonde_quat_slerp(a.rotation, b.rotation, turn_rad / angle);
+  if (angle > rotation_rad)
+    next.rotation = sonde_quat_slerp(a.rotation, b.rotation, rotation_rad / angle);
   return next;
 }

@@ -1,6 +1,4 @@
 // Questions to the named anatomy.
-// level_at:    the muscle level between two stored ones.
-// compartment: which of three sectors about the femur an angle lies in.
 #include "sonde/tissue_anatomy.h"
 
 #include "base/base.h"
@@ -9,6 +7,7 @@
 
 #include <string.h>
 
+// Muscle level at a height, between two stored ones.
 static sonde_muscle_level level_at(const sonde_thigh_anatomy *a, double z_m) {
   SONDE_ASSERT(a->level_count >= 2);
   uint32_t k = 1;
@@ -26,9 +25,9 @@ static sonde_muscle_level level_at(const sonde_thigh_anatomy *a, double z_m) {
 
 sonde_compartment sonde_anatomy_compartment(const sonde_thigh_anatomy *anatomy, sonde_vec3 rest_m) {
   sonde_muscle_level l = level_at(anatomy, rest_m.z);
-  double angle = atan2(rest_m.y - l.bone_y_m, rest_m.x - l.bone_x_m), turn = 2 * SONDE_PI;
-  while (angle < l.septum_rad[0]) angle += turn;
-  while (angle >= l.septum_rad[0] + turn) angle -= turn;
+  double angle = atan2(rest_m.y - l.bone_y_m, rest_m.x - l.bone_x_m), round = 2 * SONDE_PI;
+  while (angle < l.septum_rad[0]) angle += round;
+  while (angle >= l.septum_rad[0] + round) angle -= round;
   if (angle < l.septum_rad[1]) return SONDE_COMPARTMENT_ANTERIOR;
   return angle < l.septum_rad[2] ? SONDE_COMPARTMENT_POSTERIOR : SONDE_COMPARTMENT_MEDIAL;
 }

@@ -1,8 +1,4 @@
 // Building, changing and releasing the thigh model.
-// target_edge: wanted edge length near the sites' footprints.
-// order_vertices: numbering along a space-filling curve.
-// derive:      everything that follows from mesh and law.
-// build:       refine, derive, measure layers, interpolate, place vessels.
 #include "tissue/model.h"
 
 #include "base/base.h"
@@ -78,64 +74,50 @@ sonde_status sonde_model_allocate_nodes(sonde_model *model, sonde_error *error) 
   return ok && model->normal ? SONDE_OK : sonde_fail_memory(error);
 }
 
-// Half the cotangent of the angle at `apex` opposite the edge ab.
-static double half_cotangent(sonde_vec3 apex, sonde_vec3 a, sonde_vec3 b) {
-  sonde_vec3 p = v_sub(a, apex), q = v_sub(b, apex);
-  double sine = v_norm(v_cross(p, q));
-  return sine > 0 ? 0.5 * v_dot(p, q) / sine : 0;
-}
-
-static uint32_t edge_between(const sonde_topology *t, uint32_t a, uint32_t b) {
-  uint32_t k = t->start[a];
-  while (k < t->start[a + 1] && t->neighbour[k] != b) ++k;
-  SONDE_ASSERT(k < t->start[a + 1]);
-  return t->neighbour_edge[k];
-}
-
-// Area, half cotangents and edges of every face.
-static sonde_status derive_faces(sonde_model *model, sonde_error *error) {
+// Topology, normals, areas and masses of the nodes, rest lengths of the edges; area, edges and half
+// cotangents of the faces.
+sonde_status sonde_model_derive(sonde_model *model, sonde_error *error) {
   const sonde_mesh *mesh = &model->surface;
+  const sonde_vec3 *x = mesh->vertices;
+  sonde_status status = check_law(&model->law, error);
+  if (!status) status = sonde_topology_build(mesh, &model->topology, error);
+  if (status) return status;
+  uint32_t edges = model->topology.edge_count;
+  model->edge_rest_m = SONDE_NEW(double, edges);
   model->face_area_m2 = SONDE_NEW(double, mesh->face_count);
   model->face_half_cotangent = sonde_calloc(mesh->face_count, sizeof *model->face_half_cotangent);
   model->face_edge = sonde_calloc(mesh->face_count, sizeof *model->face_edge);
-  if (!model->face_area_m2 || !model->face_half_cotangent || !model->face_edge)
+  if (!model->edge_rest_m || !model->face_area_m2 || !model->face_half_cotangent ||
+      !model->face_edge)
     return sonde_fail_memory(error);
+
+  sonde_mesh_normals(mesh, model->normal);
+  sonde_mesh_areas(mesh, model->area_m2);
+  for (uint32_t i = 0; i < mesh->vertex_count; ++i)
+    model->mass_kg[i] = model->law.surface_density_kg_m2 * model->area_m2[i];
+  for (uint32_t e = 0; e < edges; ++e) {
+    const uint32_t *pair = model->topology.edges[e];
+    model->edge_rest_m[e] = v_distance(x[pair[0]], x[pair[1]]);
+    if (!(model->edge_rest_m[e] > 1e-7))
+      return sonde_fail(error, SONDE_MESH, "the skin has an edge of zero length at vertex %u",
+                        pair[0]);
+  }
   for (uint32_t f = 0; f < mesh->face_count; ++f) {
     const uint32_t *v = mesh->faces[f];
-    const sonde_vec3 *x = mesh->vertices;
     model->face_area_m2[f] =
         0.5 * v_norm(v_cross(v_sub(x[v[1]], x[v[0]]), v_sub(x[v[2]], x[v[0]])));
     if (!(model->face_area_m2[f] > 0))
       return sonde_fail(error, SONDE_MESH, "face %u of the skin has no area", f);
     for (int k = 0; k < 3; ++k) {
       uint32_t a = v[(k + 1) % 3], b = v[(k + 2) % 3];
-      model->face_half_cotangent[f][k] = half_cotangent(x[v[k]], x[a], x[b]);
-      model->face_edge[f][k] = edge_between(&model->topology, a, b);
+      sonde_vec3 to_a = v_sub(x[a], x[v[k]]), to_b = v_sub(x[b], x[v[k]]);
+      double sine = v_norm(v_cross(to_a, to_b));
+      model->face_half_cotangent[f][k] = sine > 0 ? 0.5 * v_dot(to_a, to_b) / sine : 0;
+      model->face_edge[f][k] = sonde_topology_edge(&model->topology, a, b);
+      SONDE_ASSERT(model->face_edge[f][k] != SONDE_NONE);
     }
   }
   return SONDE_OK;
-}
-
-sonde_status sonde_model_derive(sonde_model *model, sonde_error *error) {
-  sonde_status status = check_law(&model->law, error);
-  if (!status) status = sonde_topology_build(&model->surface, &model->topology, error);
-  if (status) return status;
-  uint32_t n = model->surface.vertex_count, edges = model->topology.edge_count;
-  model->edge_rest_m = SONDE_NEW(double, edges);
-  if (!model->edge_rest_m) return sonde_fail_memory(error);
-  sonde_mesh_normals(&model->surface, model->normal);
-  sonde_mesh_areas(&model->surface, model->area_m2);
-  for (uint32_t i = 0; i < n; ++i)
-    model->mass_kg[i] = model->law.surface_density_kg_m2 * model->area_m2[i];
-  for (uint32_t e = 0; e < edges; ++e) {
-    const uint32_t *pair = model->topology.edges[e];
-    model->edge_rest_m[e] =
-        v_distance(model->surface.vertices[pair[0]], model->surface.vertices[pair[1]]);
-    if (!(model->edge_rest_m[e] > 1e-7))
-      return sonde_fail(error, SONDE_MESH, "the skin has an edge of zero length at vertex %u",
-                        pair[0]);
-  }
-  return derive_faces(model, error);
 }
 
 static double outside(double value, double limit) {
@@ -158,9 +140,37 @@ static double target_edge(sonde_vec3 point, void *user) {
   return 1e9;
 }
 
-static sonde_status check_skin(const sonde_mesh *skin, sonde_error *error) {
+// Numbers the vertices along a space-filling curve, so that neighbours lie together in memory.
+static sonde_status order_vertices(sonde_mesh *mesh, sonde_error *error) {
+  uint32_t n = mesh->vertex_count;
+  sonde_keyed *list = SONDE_NEW(sonde_keyed, n);
+  uint32_t *rank = SONDE_NEW(uint32_t, n);
+  sonde_vec3 *old = SONDE_NEW(sonde_vec3, n);
+  sonde_status status = list && rank && old ? SONDE_OK : sonde_fail_memory(error);
+  if (status) goto done;
+  for (uint32_t i = 0; i < n; ++i) list[i] = (sonde_keyed){sonde_morton_key(mesh->vertices[i]), i};
+  qsort(list, n, sizeof *list, sonde_keyed_compare);
+  memcpy(old, mesh->vertices, n * sizeof *old);
+  for (uint32_t k = 0; k < n; ++k) {
+    rank[list[k].index] = k;
+    mesh->vertices[k] = old[list[k].index];
+  }
+  for (uint32_t f = 0; f < mesh->face_count; ++f)
+    for (int k = 0; k < 3; ++k) mesh->faces[f][k] = rank[mesh->faces[f][k]];
+done:
+  sonde_free(list);
+  sonde_free(rank);
+  sonde_free(old);
+  return status;
+}
+
+static sonde_status fill(sonde_model *model, const sonde_model_def *def, sonde_error *error) {
+  snprintf(model->name, sizeof model->name, "%s", def->name ? def->name : "thigh");
+  snprintf(model->provenance, sizeof model->provenance, "%s",
+           def->provenance ? def->provenance : "");
+  model->law = def->law;
   sonde_mesh_report report;
-  sonde_status status = sonde_mesh_inspect(skin, &report, error);
+  sonde_status status = sonde_mesh_inspect(def->skin, &report, error);
   if (status) return status;
   if (!report.closed)
     return sonde_fail(error, SONDE_MESH, "the skin is not closed: %u open edges",
@@ -170,10 +180,8 @@ static sonde_status check_skin(const sonde_mesh *skin, sonde_error *error) {
   if (report.duplicate_or_degenerate_faces)
     return sonde_fail(error, SONDE_MESH, "the skin has %u duplicate or degenerate faces",
                       report.duplicate_or_degenerate_faces);
-  return SONDE_OK;
-}
 
-static sonde_status copy_sites(sonde_model *model, const sonde_model_def *def, sonde_error *error) {
+  // sites, those without a fit with the default parameters, and their measurements
   model->sites = SONDE_NEW(sonde_site, def->site_count);
   model->data = SONDE_NEW(sonde_datum, def->datum_count);
   if (!model->sites || !model->data) return sonde_fail_memory(error);
@@ -186,44 +194,10 @@ static sonde_status copy_sites(sonde_model *model, const sonde_model_def *def, s
     model->sites[k].xm_m = DEFAULT_XM_M;
   }
   if (def->datum_count) memcpy(model->data, def->data, def->datum_count * sizeof *model->data);
-  return SONDE_OK;
-}
 
-// Numbers the vertices along a space-filling curve, so that neighbours lie together in memory.
-static sonde_status order_vertices(sonde_mesh *mesh, sonde_error *error) {
-  uint32_t n = mesh->vertex_count;
-  sonde_keyed *list = SONDE_NEW(sonde_keyed, n);
-  uint32_t *place = SONDE_NEW(uint32_t, n);
-  sonde_vec3 *old = SONDE_NEW(sonde_vec3, n);
-  sonde_status status = list && place && old ? SONDE_OK : sonde_fail_memory(error);
-  if (status) goto done;
-  for (uint32_t i = 0; i < n; ++i) list[i] = (sonde_keyed){sonde_morton_key(mesh->vertices[i]), i};
-  qsort(list, n, sizeof *list, sonde_keyed_compare);
-  memcpy(old, mesh->vertices, n * sizeof *old);
-  for (uint32_t k = 0; k < n; ++k) {
-    place[list[k].index] = k;
-    mesh->vertices[k] = old[list[k].index];
-  }
-  for (uint32_t f = 0; f < mesh->face_count; ++f)
-    for (int k = 0; k < 3; ++k) mesh->faces[f][k] = place[mesh->faces[f][k]];
-done:
-  sonde_free(list);
-  sonde_free(place);
-  sonde_free(old);
-  return status;
-}
-
-static sonde_status fill(sonde_model *model, const sonde_model_def *def, sonde_error *error) {
-  snprintf(model->name, sizeof model->name, "%s", def->name ? def->name : "thigh");
-  snprintf(model->provenance, sizeof model->provenance, "%s",
-           def->provenance ? def->provenance : "");
-  model->law = def->law;
-  model->vein.count = model->artery.count = 0;
-  sonde_status status = check_skin(def->skin, error);
-  if (!status) status = copy_sites(model, def, error);
-  if (!status)
-    status =
-        sonde_mesh_refine(def->skin, target_edge, (void *)(uintptr_t)def, &model->surface, error);
+  // refined skin, what follows from it, bone, layers, springs, vessels
+  status =
+      sonde_mesh_refine(def->skin, target_edge, (void *)(uintptr_t)def, &model->surface, error);
   if (!status) status = order_vertices(&model->surface, error);
   if (!status) status = sonde_model_allocate_nodes(model, error);
   if (!status) status = sonde_model_derive(model, error);
@@ -239,6 +213,7 @@ static sonde_status fill(sonde_model *model, const sonde_model_def *def, sonde_e
 }
 
 sonde_status sonde_model_build(const sonde_model_def *def, sonde_model **out, sonde_error *error) {
+  SONDE_ASSERT(def && out);
   *out = NULL;
   if (!def->skin || !def->sites || def->site_count == 0)
     return sonde_fail(error, SONDE_ARGUMENT, "a model needs a skin and at least one site");
@@ -248,17 +223,17 @@ sonde_status sonde_model_build(const sonde_model_def *def, sonde_model **out, so
   sonde_model *model = SONDE_NEW(sonde_model, 1);
   if (!model) return sonde_fail_memory(error);
   sonde_status status = fill(model, def, error);
-  if (status) {
+  if (status)
     sonde_model_destroy(model);
-    return status;
-  }
-  *out = model;
-  return SONDE_OK;
+  else
+    *out = model;
+  return status;
 }
 
 sonde_status sonde_model_set_parameters(sonde_model *model, const sonde_surface_law *law,
                                         const sonde_site *sites, uint32_t count,
                                         sonde_error *error) {
+  SONDE_ASSERT(model && law && sites);
   if (count != model->site_count)
     return sonde_fail(error, SONDE_ARGUMENT, "%u sites given, expected %u", count,
                       model->site_count);
@@ -287,6 +262,7 @@ void sonde_model_destroy(sonde_model *model) {
 }
 
 const sonde_site *sonde_model_site(const sonde_model *model, uint32_t id) {
+  SONDE_ASSERT(model != NULL);
   for (uint32_t k = 0; k < model->site_count; ++k)
     if (model->sites[k].id == id) return &model->sites[k];
   return NULL;

@@ -1,7 +1,6 @@
 // The section `anatomy` of the model file (docs/model_file.md).
-// put_names:   vessels, landmarks and segments by name in the header.
-// put_numbers: their points and the muscle levels as arrays.
-// take_*:      the same back, each checked against the room that the struct has.
+// Names stand in the header, points and muscle levels in arrays; a reader checks each number of
+// entries against the room that the struct has.
 #include "tissue/model_file.h"
 
 #include "base/base.h"
@@ -50,25 +49,6 @@ void sonde_anatomy_put_section(sonde_json_out *header, const sonde_thigh_anatomy
   sonde_json_end(header);
 }
 
-static void put_points(sonde_model_writer *w, const sonde_thigh_anatomy *a) {
-  double(*row)[POINT_COLUMNS] = sonde_calloc(ALL_POINTS, sizeof *row);
-  if (!row) {
-    w->failed = true;
-    return;
-  }
-  uint32_t rows = 0;
-  for (uint32_t b = 0; b < a->branch_count; ++b)
-    for (uint32_t k = 0; k < a->branch[b].line.count; ++k, ++rows) {
-      const sonde_vessel_point *p = &a->branch[b].line.point[k];
-      memcpy(row[rows], &p->centre_m, 24);
-      row[rows][3] = p->radius_m;
-      row[rows][4] = p->depth_m;
-    }
-  sonde_model_put(w, "anatomy_vessels", "f64", "centre m, radius m, depth m", rows, POINT_COLUMNS,
-                  row);
-  sonde_free(row);
-}
-
 void sonde_anatomy_put_arrays(sonde_model_writer *w, const sonde_thigh_anatomy *a) {
   SONDE_ASSERT(a->branch_count <= SONDE_BRANCHES && a->landmark_count <= SONDE_LANDMARKS);
   SONDE_ASSERT(a->level_count <= SONDE_LEVELS);
@@ -86,7 +66,22 @@ void sonde_anatomy_put_arrays(sonde_model_writer *w, const sonde_thigh_anatomy *
                                        l->septum_rad[0], l->septum_rad[1], l->septum_rad[2]};
     memcpy(level[k], row, sizeof row);
   }
-  put_points(w, a);
+  double(*point)[POINT_COLUMNS] = sonde_calloc(ALL_POINTS, sizeof *point);
+  if (!point) {
+    w->failed = true;
+    return;
+  }
+  uint32_t points = 0;
+  for (uint32_t b = 0; b < a->branch_count; ++b)
+    for (uint32_t k = 0; k < a->branch[b].line.count; ++k, ++points) {
+      const sonde_vessel_point *p = &a->branch[b].line.point[k];
+      memcpy(point[points], &p->centre_m, 24);
+      point[points][3] = p->radius_m;
+      point[points][4] = p->depth_m;
+    }
+  sonde_model_put(w, "anatomy_vessels", "f64", "centre m, radius m, depth m", points, POINT_COLUMNS,
+                  point);
+  sonde_free(point);
   sonde_model_put(w, "anatomy_landmarks", "f64", "skin m, normal, vein m", a->landmark_count, 9,
                   mark);
   sonde_model_put(w, "anatomy_landmark_sites", "u32", "1", a->landmark_count, 1, site);
@@ -118,18 +113,6 @@ static bool take_count(const sonde_json *list, uint32_t room, uint32_t *count) {
   return sonde_json_kind_of(list) == SONDE_JSON_LIST && *count <= room;
 }
 
-// Points [points] of a branch from consecutive rows.
-static bool take_line(const char *row, uint32_t points, sonde_vessel *line) {
-  line->count = points;
-  for (uint32_t k = 0; k < points; ++k, row += POINT_COLUMNS * 8) {
-    double x[POINT_COLUMNS];
-    memcpy(x, row, sizeof x);
-    if (!finite_row(x, POINT_COLUMNS) || !(x[3] >= 1e-6) || !(x[4] >= 0)) return false;
-    line->point[k] = (sonde_vessel_point){vec3(x[0], x[1], x[2]), x[3], x[4]};
-  }
-  return true;
-}
-
 static sonde_status take_vessels(const sonde_model_reader *r, const sonde_json *section,
                                  sonde_thigh_anatomy *a) {
   const sonde_json *list = sonde_json_member(section, "vessels"), *entry = sonde_json_first(list);
@@ -148,9 +131,14 @@ static sonde_status take_vessels(const sonde_model_reader *r, const sonde_json *
     branch->kind = artery ? SONDE_VESSEL_ARTERY : SONDE_VESSEL_VEIN;
     if (!(points >= 2 && points <= SONDE_VESSEL_POINTS && points <= rows - used))
       return wrong(r, "a vessel has a wrong number of points");
-    if (!take_line(row + (size_t)used * POINT_COLUMNS * 8, (uint32_t)points, &branch->line))
-      return wrong(r, "a vessel has a point out of range");
-    used += (uint32_t)points;
+    branch->line.count = (uint32_t)points;
+    for (uint32_t k = 0; k < branch->line.count; ++k, ++used) {
+      double x[POINT_COLUMNS];
+      memcpy(x, row + (size_t)used * sizeof x, sizeof x);
+      if (!finite_row(x, POINT_COLUMNS) || !(x[3] >= 1e-6) || !(x[4] >= 0))
+        return wrong(r, "a vessel has a point out of range");
+      branch->line.point[k] = (sonde_vessel_point){vec3(x[0], x[1], x[2]), x[3], x[4]};
+    }
   }
   return SONDE_OK;
 }
@@ -180,22 +168,30 @@ static sonde_status take_landmarks(const sonde_model_reader *r, const sonde_json
   return SONDE_OK;
 }
 
-static sonde_status take_segments(const sonde_model_reader *r, const sonde_json *section,
-                                  sonde_thigh_anatomy *a) {
+sonde_status sonde_anatomy_take(const sonde_model_reader *r, sonde_model *model) {
+  const sonde_json *section = sonde_json_member(r->header, "anatomy");
+  if (!section) return SONDE_OK;
+  SONDE_ASSERT(!model->anatomy);
+  double version = sonde_json_as_number(sonde_json_member(section, "version"));
+  if (!(version == SECTION_VERSION))
+    return sonde_fail(r->error, SONDE_VERSION, "%s: anatomy has version %g, expected %d", r->path,
+                      version, SECTION_VERSION);
+  sonde_thigh_anatomy *a = model->anatomy = SONDE_NEW(sonde_thigh_anatomy, 1);
+  if (!a) return sonde_fail_memory(r->error);
+  sonde_status status = take_vessels(r, section, a);
+  if (!status) status = take_landmarks(r, section, a);
+  if (status) return status;
+
   const sonde_json *list = sonde_json_member(section, "segments"), *entry = sonde_json_first(list);
   if (!take_count(list, SONDE_SEGMENTS, &a->segment_count)) return wrong(r, "too many segments");
-  uint32_t k = 0;
-  for (; entry; entry = sonde_json_next(entry)) {
-    sonde_segment *s = &a->segment[k++];
+  for (uint32_t k = 0; entry; ++k, entry = sonde_json_next(entry)) {
+    sonde_segment *s = &a->segment[k];
     s->from_m = sonde_json_as_number(sonde_json_member(entry, "from_m"));
     s->to_m = sonde_json_as_number(sonde_json_member(entry, "to_m"));
     if (!take_name(sonde_json_member(entry, "name"), s->name) || !finite_row(&s->from_m, 2))
       return wrong(r, "a segment lacks its name or ends");
   }
-  return SONDE_OK;
-}
 
-static sonde_status take_levels(const sonde_model_reader *r, sonde_thigh_anatomy *a) {
   uint32_t rows;
   const char *row = sonde_model_take(r, "anatomy_levels", "f64", LEVEL_COLUMNS, &rows);
   if (!row) return SONDE_FORMAT;
@@ -209,11 +205,7 @@ static sonde_status take_levels(const sonde_model_reader *r, sonde_thigh_anatomy
       return wrong(r, "a level is out of order");
     a->level[k] = (sonde_muscle_level){x[0], x[1], x[2], {x[3], x[4], x[5]}};
   }
-  return SONDE_OK;
-}
 
-static sonde_status take_scalars(const sonde_model_reader *r, const sonde_json *section,
-                                 sonde_thigh_anatomy *a) {
   const sonde_json *angle = sonde_json_first(sonde_json_member(section, "pennation_rad"));
   for (int k = 0; k < SONDE_COMPARTMENTS; ++k, angle = sonde_json_next(angle))
     a->pennation_rad[k] = sonde_json_as_number(angle);
@@ -222,21 +214,4 @@ static sonde_status take_scalars(const sonde_model_reader *r, const sonde_json *
   bool ok = finite_row(a->pennation_rad, SONDE_COMPARTMENTS) && a->fascia_medial_m >= 0 &&
             a->fascia_lateral_m >= 0 && finite_row(&a->fascia_medial_m, 2);
   return ok ? SONDE_OK : wrong(r, "pennation or fascia is missing or out of range");
-}
-
-sonde_status sonde_anatomy_take(const sonde_model_reader *r, sonde_model *model) {
-  const sonde_json *section = sonde_json_member(r->header, "anatomy");
-  if (!section) return SONDE_OK;
-  SONDE_ASSERT(!model->anatomy);
-  double version = sonde_json_as_number(sonde_json_member(section, "version"));
-  if (!(version == SECTION_VERSION))
-    return sonde_fail(r->error, SONDE_VERSION, "%s: anatomy has version %g, expected %d", r->path,
-                      version, SECTION_VERSION);
-  sonde_thigh_anatomy *a = model->anatomy = SONDE_NEW(sonde_thigh_anatomy, 1);
-  if (!a) return sonde_fail_memory(r->error);
-  sonde_status status = take_vessels(r, section, a);
-  if (!status) status = take_landmarks(r, section, a);
-  if (!status) status = take_segments(r, section, a);
-  if (!status) status = take_levels(r, a);
-  return status ? status : take_scalars(r, section, a);
 }

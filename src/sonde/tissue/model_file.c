@@ -1,7 +1,7 @@
 // The model file (docs/model_file.md): a line of magic, a JSON header that names every array, the
 // arrays in little-endian binary, and a CRC-32 of all that precedes it.
-// writer: collects arrays into one blob and their descriptions into the header.
-// reader: checks magic and CRC first, then takes the arrays by name with their expected shape.
+// The writer collects the arrays into one blob and their descriptions into the header; the reader
+// checks magic and CRC first, then takes the arrays by name with their expected shape.
 #include "tissue/live_cut.h"
 #include "tissue/model_file.h"
 #include "tissue/model.h"
@@ -24,6 +24,7 @@ typedef sonde_model_reader reader;
 
 void sonde_model_put(writer *w, const char *name, const char *type, const char *unit, uint32_t rows,
                      uint32_t columns, const void *bytes) {
+  SONDE_ASSERT(w->used <= w->room && (bytes || !rows));
   size_t count = (size_t)rows * columns * (strcmp(type, "f64") == 0 ? 8 : 4);
   if (w->used + count > w->room) {
     size_t room = 2 * (w->used + count) + 4096;
@@ -51,24 +52,6 @@ void sonde_model_put(writer *w, const char *name, const char *type, const char *
 static void put_mesh(writer *w, const char *vertices, const char *faces, const sonde_mesh *mesh) {
   sonde_model_put(w, vertices, "f64", "m", mesh->vertex_count, 3, mesh->vertices);
   sonde_model_put(w, faces, "u32", "1", mesh->face_count, 3, mesh->faces);
-}
-
-static void put_nodes(writer *w, const sonde_model *model) {
-  uint32_t n = model->surface.vertex_count;
-  sonde_model_put(w, "node_k0", "f64", "N/m^3", n, 1, model->k0_n_m3);
-  sonde_model_put(w, "node_xm", "f64", "m", n, 1, model->xm_m);
-  sonde_model_put(w, "node_shear_share", "f64", "1", n, 1, model->shear_share);
-  sonde_model_put(w, "node_limit_share", "f64", "1", n, 1, model->limit_share);
-  sonde_model_put(w, "node_fat_depth", "f64", "m", n, 1, model->fat_depth_m);
-  sonde_model_put(w, "node_muscle_depth", "f64", "m", n, 1, model->muscle_depth_m);
-  sonde_model_put(w, "node_bone_depth", "f64", "m", n, 1, model->bone_depth_m);
-}
-
-// What cannot be derived again from a skin with lips.
-static void put_cuts(writer *w, const sonde_model *model) {
-  if (!model->edge_share) return;
-  sonde_model_put(w, "node_normal", "f64", "1", model->surface.vertex_count, 3, model->normal);
-  sonde_model_put(w, "edge_share", "f64", "1", model->topology.edge_count, 1, model->edge_share);
 }
 
 static void put_sites(writer *w, const sonde_model *model) {
@@ -121,6 +104,7 @@ static void put_data(writer *w, const uint32_t *probe, const sonde_model *model)
 }
 
 static void put_vessel(writer *w, const char *name, const sonde_vessel *vessel) {
+  SONDE_ASSERT(vessel->count <= SONDE_VESSEL_POINTS);
   double row[SONDE_VESSEL_POINTS][5];
   for (uint32_t k = 0; k < vessel->count; ++k) {
     const sonde_vessel_point *p = &vessel->point[k];
@@ -162,20 +146,7 @@ static double *law_field(sonde_surface_law *law, int index, const char **name) {
   return field[index];
 }
 
-// Lists each probe of the data by name in the header; probe[datum] is its index in that list.
-static void put_probes(writer *w, uint32_t *probe, const sonde_model *model) {
-  uint32_t count = 0;
-  sonde_json_begin_list(&w->header, "probes");
-  for (uint32_t k = 0; k < model->datum_count; ++k) {
-    uint32_t first = 0;
-    while (strcmp(model->data[first].probe, model->data[k].probe) != 0) ++first;
-    SONDE_ASSERT(first <= k);
-    if (first == k) sonde_json_put_text(&w->header, NULL, model->data[k].probe);
-    probe[k] = first == k ? count++ : probe[first];
-  }
-  sonde_json_end(&w->header);
-}
-
+// `probe` is scratch, one entry per datum.
 static void put_model(writer *w, uint32_t *probe, const sonde_model *model) {
   sonde_json_out *header = &w->header;
   sonde_surface_law copy = model->law;
@@ -185,12 +156,34 @@ static void put_model(writer *w, uint32_t *probe, const sonde_model *model) {
   for (int k = 0; law_field(&copy, k, &name); ++k)
     sonde_json_put_real(header, name, *law_field(&copy, k, &name), 0);
   sonde_json_end(header);
-  put_probes(w, probe, model);
+
+  // each probe of the data by name; probe[datum] is its index in that list
+  uint32_t probes = 0;
+  sonde_json_begin_list(header, "probes");
+  for (uint32_t k = 0; k < model->datum_count; ++k) {
+    uint32_t first = 0;
+    while (strcmp(model->data[first].probe, model->data[k].probe) != 0) ++first;
+    SONDE_ASSERT(first <= k);
+    if (first == k) sonde_json_put_text(header, NULL, model->data[k].probe);
+    probe[k] = first == k ? probes++ : probe[first];
+  }
+  sonde_json_end(header);
+
   sonde_json_begin_list(header, "arrays");
   put_mesh(w, "surface_vertices", "surface_faces", &model->surface);
   put_mesh(w, "femur_vertices", "femur_faces", &model->femur);
-  put_nodes(w, model);
-  put_cuts(w, model);
+  uint32_t n = model->surface.vertex_count;
+  sonde_model_put(w, "node_k0", "f64", "N/m^3", n, 1, model->k0_n_m3);
+  sonde_model_put(w, "node_xm", "f64", "m", n, 1, model->xm_m);
+  sonde_model_put(w, "node_shear_share", "f64", "1", n, 1, model->shear_share);
+  sonde_model_put(w, "node_limit_share", "f64", "1", n, 1, model->limit_share);
+  sonde_model_put(w, "node_fat_depth", "f64", "m", n, 1, model->fat_depth_m);
+  sonde_model_put(w, "node_muscle_depth", "f64", "m", n, 1, model->muscle_depth_m);
+  sonde_model_put(w, "node_bone_depth", "f64", "m", n, 1, model->bone_depth_m);
+  if (model->edge_share) { // what cannot be derived again from a skin with lips
+    sonde_model_put(w, "node_normal", "f64", "1", n, 3, model->normal);
+    sonde_model_put(w, "edge_share", "f64", "1", model->topology.edge_count, 1, model->edge_share);
+  }
   put_sites(w, model);
   put_data(w, probe, model);
   put_vessel(w, "vein", &model->vein);
@@ -204,31 +197,11 @@ static void put_model(writer *w, uint32_t *probe, const sonde_model *model) {
   sonde_json_end(header);
 }
 
-static sonde_status write_parts(const char *path, const char *text, const writer *w,
-                                uint64_t *checksum, sonde_error *error) {
-  char magic[64];
-  int length =
-      snprintf(magic, sizeof magic, MAGIC "%d %zu %zu\n", FORMAT_VERSION, strlen(text), w->used);
-  sonde_file *file;
-  sonde_status status = sonde_file_create(path, &file, error);
-  if (status) return status;
-  uLong crc = crc32(0, (const Bytef *)magic, (uInt)length);
-  crc = crc32(crc, (const Bytef *)text, (uInt)strlen(text));
-  crc = crc32_z(crc, (const Bytef *)w->blob, w->used);
-  uint32_t tail = (uint32_t)crc;
-  sonde_file_write(file, magic, (size_t)length);
-  sonde_file_write(file, text, strlen(text));
-  sonde_file_write(file, w->blob, w->used);
-  sonde_file_write(file, &tail, sizeof tail);
-  *checksum = sonde_hash(sonde_hash(sonde_hash(0, magic, (size_t)length), text, strlen(text)),
-                         w->blob, w->used);
-  return sonde_file_commit(file, error);
-}
-
 sonde_status sonde_model_save(sonde_model *model, const char *path, sonde_error *error) {
+  SONDE_ASSERT(model && path);
   writer w = {.header = {.layout = SONDE_JSON_TABS}};
-  char *text = NULL;
-  size_t count;
+  char *text = NULL, magic[64];
+  size_t count = 0;
   uint32_t *probe = SONDE_NEW(uint32_t, model->datum_count);
   sonde_status status = probe ? SONDE_OK : sonde_fail_memory(error);
   if (!status) status = sonde_file_in_memory(&w.header.file, error);
@@ -237,7 +210,23 @@ sonde_status sonde_model_save(sonde_model *model, const char *path, sonde_error 
     status = sonde_file_take(w.header.file, &text, &count, error);
   }
   if (!status && w.failed) status = sonde_fail_memory(error);
-  if (!status) status = write_parts(path, text, &w, &model->checksum, error);
+  sonde_file *file = NULL;
+  if (!status) status = sonde_file_create(path, &file, error);
+  if (!status) {
+    // magic line, header, arrays and the CRC-32 of them all
+    size_t length =
+        (size_t)snprintf(magic, sizeof magic, MAGIC "%d %zu %zu\n", FORMAT_VERSION, count, w.used);
+    uLong crc = crc32_z(0, (const Bytef *)magic, length);
+    crc = crc32_z(crc, (const Bytef *)text, count);
+    uint32_t tail = (uint32_t)crc32_z(crc, (const Bytef *)w.blob, w.used);
+    sonde_file_write(file, magic, length);
+    sonde_file_write(file, text, count);
+    sonde_file_write(file, w.blob, w.used);
+    sonde_file_write(file, &tail, sizeof tail);
+    model->checksum =
+        sonde_hash(sonde_hash(sonde_hash(0, magic, length), text, count), w.blob, w.used);
+    status = sonde_file_commit(file, error);
+  }
   sonde_free(text);
   sonde_free(probe);
   sonde_free(w.blob);
@@ -316,29 +305,6 @@ static bool take_nodes(const reader *r, sonde_model *model) {
   return true;
 }
 
-// What files before the fields of the shear layer lack; the shares stay as they are then.
-static bool take_shares(const reader *r, sonde_model *model) {
-  uint32_t n = model->surface.vertex_count, m = model->site_count, rows[3];
-  if (!find_array(r, "node_shear_share")) return true;
-  const char *shear = sonde_model_take(r, "node_shear_share", "f64", 1, &rows[0]);
-  const char *limit = shear ? sonde_model_take(r, "node_limit_share", "f64", 1, &rows[1]) : NULL;
-  const char *site = limit ? sonde_model_take(r, "site_share", "f64", 2, &rows[2]) : NULL;
-  if (!site) return false;
-  if (rows[0] != n || rows[1] != n || rows[2] != m) {
-    sonde_fail(r->error, SONDE_FORMAT,
-               "%s: shares of %u, %u nodes and %u sites, expected %u and %u", r->path, rows[0],
-               rows[1], rows[2], n, m);
-    return false;
-  }
-  memcpy(model->shear_share, shear, (size_t)n * 8);
-  memcpy(model->limit_share, limit, (size_t)n * 8);
-  for (uint32_t k = 0; k < m; ++k, site += 16) {
-    memcpy(&model->sites[k].shear_share, site, 8);
-    memcpy(&model->sites[k].limit_share, site + 8, 8);
-  }
-  return true;
-}
-
 static bool take_sites(const reader *r, sonde_model *model) {
   uint32_t n, m;
   const char *id = sonde_model_take(r, "site_id", "u32", 1, &n);
@@ -359,6 +325,29 @@ static bool take_sites(const reader *r, sonde_model *model) {
     memcpy(&s->v, row + 72, 24);
     memcpy(&s->k0_n_m3, row + 96, 8);
     memcpy(&s->xm_m, row + 104, 8);
+  }
+  return true;
+}
+
+// What files before the fields of the shear layer lack; the shares stay as they are then.
+static bool take_shares(const reader *r, sonde_model *model) {
+  uint32_t n = model->surface.vertex_count, m = model->site_count, rows[3];
+  if (!find_array(r, "node_shear_share")) return true;
+  const char *shear = sonde_model_take(r, "node_shear_share", "f64", 1, &rows[0]);
+  const char *limit = shear ? sonde_model_take(r, "node_limit_share", "f64", 1, &rows[1]) : NULL;
+  const char *site = limit ? sonde_model_take(r, "site_share", "f64", 2, &rows[2]) : NULL;
+  if (!site) return false;
+  if (rows[0] != n || rows[1] != n || rows[2] != m) {
+    sonde_fail(r->error, SONDE_FORMAT,
+               "%s: shares of %u, %u nodes and %u sites, expected %u and %u", r->path, rows[0],
+               rows[1], rows[2], n, m);
+    return false;
+  }
+  memcpy(model->shear_share, shear, (size_t)n * 8);
+  memcpy(model->limit_share, limit, (size_t)n * 8);
+  for (uint32_t k = 0; k < m; ++k, site += 16) {
+    memcpy(&model->sites[k].shear_share, site, 8);
+    memcpy(&model->sites[k].limit_share, site + 8, 8);
   }
   return true;
 }
@@ -397,22 +386,6 @@ static bool take_vessel(const reader *r, const char *name, sonde_vessel *vessel)
     memcpy(&p->centre_m, row, 24);
     memcpy(&p->radius_m, row + 24, 8);
     memcpy(&p->depth_m, row + 32, 8);
-  }
-  return true;
-}
-
-static bool take_law(const reader *r, sonde_surface_law *law) {
-  const sonde_json *object = sonde_json_member(r->header, "law");
-  const char *name;
-  double *field;
-  for (int k = 0; (field = law_field(law, k, &name)) != NULL; ++k) {
-    const sonde_json *item = sonde_json_member(object, name);
-    if (!item && field == &law->inplane_stiffness_n_m) continue; // files before version 4 have none
-    if (sonde_json_kind_of(item) != SONDE_JSON_NUMBER) {
-      sonde_fail(r->error, SONDE_FORMAT, "%s: law.%s is missing, expected a number", r->path, name);
-      return false;
-    }
-    *field = sonde_json_as_number(item);
   }
   return true;
 }
@@ -512,17 +485,27 @@ static sonde_status read_model(const reader *r, sonde_model *model) {
   sonde_fail(r->error, SONDE_FORMAT, "%s: its arrays do not belong together", r->path);
   take_text(r, "name", model->name, sizeof model->name);
   take_text(r, "provenance", model->provenance, sizeof model->provenance);
-  if (!take_law(r, &model->law) ||
-      !take_mesh(r, "surface_vertices", "surface_faces", &model->surface) ||
+  const sonde_json *law = sonde_json_member(r->header, "law");
+  const char *name;
+  double *field;
+  for (int k = 0; (field = law_field(&model->law, k, &name)) != NULL; ++k) {
+    const sonde_json *item = sonde_json_member(law, name);
+    bool late = field == &model->law.inplane_stiffness_n_m; // files before version 4 have none
+    if (!item && late) continue;
+    if (sonde_json_kind_of(item) != SONDE_JSON_NUMBER)
+      return sonde_fail(r->error, SONDE_FORMAT, "%s: law.%s is missing, expected a number", r->path,
+                        name);
+    *field = sonde_json_as_number(item);
+  }
+  if (!take_mesh(r, "surface_vertices", "surface_faces", &model->surface) ||
       !take_mesh(r, "femur_vertices", "femur_faces", &model->femur))
     return SONDE_FORMAT;
   sonde_status status = sonde_model_allocate_nodes(model, r->error);
   if (status) return status;
   if (!take_nodes(r, model) || !take_sites(r, model) || !take_shares(r, model) ||
       !take_data(r, model) || !take_vessel(r, "vein", &model->vein) ||
-      !take_vessel(r, "artery", &model->artery))
+      !take_vessel(r, "artery", &model->artery) || !check_numbers(r, model))
     return SONDE_FORMAT;
-  if (!check_numbers(r, model)) return SONDE_FORMAT;
   if ((status = sonde_anatomy_take(r, model)) != SONDE_OK) return status;
   bool is_cut = find_array(r, "edge_share") != NULL;
   if (!is_cut) status = check_closed(r, model, false);

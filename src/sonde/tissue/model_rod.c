@@ -1,8 +1,7 @@
 // The bone of a limb whose scan shows none: a rod along the middles of its sections.
-// section_at:  middle and least radius of a section, by rays from a point inside.
-// march:       from section to section along the limb, until it ends or becomes another part.
-// fit_line:    the straight line through the middles near the sites.
-// clip:        how far the line stays inside.
+// Rays from a point inside find a section's middle; sections follow each other along the limb until
+// it ends or becomes another part; the rod lies on the straight line through the middles near the
+// sites, as far as that line stays inside.
 #include "tissue/model.h"
 
 #include "base/base.h"
@@ -27,7 +26,7 @@ typedef struct limb {
   sonde_vec3 along, e1, e2;
   section section[2 * STATIONS + 1];
   uint32_t count;
-  bool cut; // an end was reached where the sections are still wide
+  bool ends; // an end was reached where the sections are still wide
 } limb;
 
 // Area, its middle and radii of the polygon that the rays from `from` find.
@@ -67,8 +66,8 @@ static void march(limb *l, double step_m) {
     section next;
     bool inside = section_at(l, v_madd(at.middle, step_m, l->along), &next);
     bool narrow = inside && next.least_m < NARROW * first.least_m;
-    l->cut |= !inside && at.mean_m > NARROW * first.mean_m;
-    l->cut |= inside && next.mean_m > WIDE * first.mean_m;
+    l->ends |= !inside && at.mean_m > NARROW * first.mean_m;
+    l->ends |= inside && next.mean_m > WIDE * first.mean_m;
     if (!inside || narrow || next.mean_m > WIDE * first.mean_m) return;
     l->section[l->count++] = at = next;
   }
@@ -95,11 +94,11 @@ static bool find_sections(const sonde_model *model, limb *l) {
     low = fmin(low, along(l, l->section[k].middle));
     high = fmax(high, along(l, l->section[k].middle));
   }
-  return l->cut && high - low > SLENDER * 2 * l->section[0].mean_m;
+  return l->ends && high - low > SLENDER * 2 * l->section[0].mean_m;
 }
 
 // Least squares through the middles within BESIDE_SITES_M of the sites: their mean, and their
-// regression on the way along.
+// regression on the position along.
 static void fit_line(const sonde_model *model, const limb *l, sonde_vec3 *origin,
                      sonde_vec3 *direction) {
   double low = INFINITY, high = -INFINITY, count = 0, tt = 0;
@@ -114,14 +113,15 @@ static void fit_line(const sonde_model *model, const limb *l, sonde_vec3 *origin
   }
   *origin = count > 0 ? v_scale(sum, 1 / count) : l->section[0].middle;
   for (uint32_t k = 0; k < l->count; ++k) {
-    double t = along(l, l->section[k].middle), way = t - along(l, *origin);
+    double t = along(l, l->section[k].middle), from = t - along(l, *origin);
     if (t < low || t > high) continue;
-    slope = v_madd(slope, way, v_sub(l->section[k].middle, *origin));
-    tt += way * way;
+    slope = v_madd(slope, from, v_sub(l->section[k].middle, *origin));
+    tt += from * from;
   }
   *direction = tt > 0 ? v_unit(slope, l->along) : l->along;
 }
 
+// How far the line stays inside, away from the skin.
 static double clip(const limb *l, sonde_vec3 origin, sonde_vec3 step, double clear_m) {
   double length = 0, each = v_norm(step);
   for (uint32_t k = 1; k < 2 * STATIONS; ++k) {
@@ -133,11 +133,37 @@ static double clip(const limb *l, sonde_vec3 origin, sonde_vec3 step, double cle
   return length;
 }
 
-static sonde_status rod(sonde_vec3 low, sonde_vec3 high, double radius_m, sonde_mesh *mesh,
-                        sonde_error *error) {
-  sonde_status status = sonde_mesh_create(mesh, 2 * SIDES + 2, 4 * SIDES, error);
+sonde_status sonde_model_place_rod(sonde_model *model, sonde_error *error) {
+  SONDE_ASSERT(model && model->site_count > 0);
+  limb *l = SONDE_NEW(limb, 1);
+  sonde_surface_index *skin = NULL;
+  sonde_status status =
+      l ? sonde_surface_index_create(&model->surface, &skin, error) : sonde_fail_memory(error);
+  double down = 0, up = 0, radius_m = 0;
+  sonde_vec3 origin = vec3(0, 0, 0), direction = vec3(0, 0, 1);
+  if (!status) {
+    l->skin = skin;
+    if (find_sections(model, l)) {
+      fit_line(model, l, &origin, &direction);
+      radius_m = fmin(ROD_RADIUS_M, ROD_SHARE * l->section[0].least_m);
+      down = clip(l, origin, v_scale(direction, -STEP_M), CLEAR * radius_m);
+      up = clip(l, origin, v_scale(direction, STEP_M), CLEAR * radius_m);
+    }
+  }
+  sonde_surface_index_destroy(skin);
+  sonde_free(l);
   if (status) return status;
-  sonde_vec3 axis = v_unit(v_sub(high, low), vec3(0, 0, 1)), end[2] = {low, high};
+  if (down + up < SHORTEST_M) {
+    sonde_log(SONDE_LOG_WARNING, "the body is no limb along the sites' v axes: the model has no "
+                                 "bone, no vessels and no image");
+    return SONDE_OK;
+  }
+
+  sonde_mesh *mesh = &model->femur;
+  status = sonde_mesh_create(mesh, 2 * SIDES + 2, 4 * SIDES, error);
+  if (status) return status;
+  sonde_vec3 end[2] = {v_madd(origin, -down, direction), v_madd(origin, up, direction)};
+  sonde_vec3 axis = v_unit(v_sub(end[1], end[0]), vec3(0, 0, 1));
   sonde_vec3 p = v_unit(v_cross(axis, vec3(1, 0.1, 0)), vec3(0, 1, 0)), q = v_cross(axis, p);
   for (uint32_t k = 0; k < SIDES; ++k) {
     double angle = 2 * SONDE_PI * k / SIDES;
@@ -150,34 +176,7 @@ static sonde_status rod(sonde_vec3 low, sonde_vec3 high, double radius_m, sonde_
                                  {2 * SIDES + 1, 2 * k + 1, 2 * next + 1}};
     memcpy(mesh->faces[4 * k], face, sizeof face);
   }
-  mesh->vertices[2 * SIDES] = low;
-  mesh->vertices[2 * SIDES + 1] = high;
+  mesh->vertices[2 * SIDES] = end[0];
+  mesh->vertices[2 * SIDES + 1] = end[1];
   return SONDE_OK;
-}
-
-sonde_status sonde_model_place_rod(sonde_model *model, sonde_error *error) {
-  limb *l = SONDE_NEW(limb, 1);
-  sonde_surface_index *skin = NULL;
-  sonde_status status =
-      l ? sonde_surface_index_create(&model->surface, &skin, error) : sonde_fail_memory(error);
-  if (!status) {
-    l->skin = skin;
-    double down = 0, up = 0, radius_m = 0;
-    sonde_vec3 origin = vec3(0, 0, 0), direction = vec3(0, 0, 1);
-    if (find_sections(model, l)) {
-      fit_line(model, l, &origin, &direction);
-      radius_m = fmin(ROD_RADIUS_M, ROD_SHARE * l->section[0].least_m);
-      down = clip(l, origin, v_scale(direction, -STEP_M), CLEAR * radius_m);
-      up = clip(l, origin, v_scale(direction, STEP_M), CLEAR * radius_m);
-    }
-    if (down + up >= SHORTEST_M)
-      status = rod(v_madd(origin, -down, direction), v_madd(origin, up, direction), radius_m,
-                   &model->femur, error);
-    else
-      sonde_log(SONDE_LOG_WARNING, "the body is no limb along the sites' v axes: the model has no "
-                                   "bone, no vessels and no image");
-  }
-  sonde_surface_index_destroy(skin);
-  sonde_free(l);
-  return status;
 }

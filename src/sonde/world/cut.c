@@ -101,9 +101,9 @@ static void carry_counters(const carrier *c) {
 
 static void wake_lips(const carrier *c) {
   sonde_state *to = c->to;
-  for (uint32_t k = 0; k < c->map->way_count; ++k) {
-    to->awake[c->map->way[k]] = 1;
-    to->calm[c->map->way[k]] = 0;
+  for (uint32_t k = 0; k < c->map->path_count; ++k) {
+    to->awake[c->map->path[k]] = 1;
+    to->calm[c->map->path[k]] = 0;
   }
   for (uint32_t k = 0; k < c->map->added; ++k) {
     uint32_t i = c->map->origin[k], copy = c->map->node_count + k;

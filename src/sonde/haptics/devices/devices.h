@@ -33,7 +33,7 @@ typedef struct sonde_replay_device {
 typedef struct sonde_page_device {
   sonde_mailbox *goals; // sonde_pose
   sonde_pose goal, leader, middle, pose;
-  double reach_m, turn_rad, share; // per tick
+  double reach_m, rotation_rad, share; // per tick
 } sonde_page_device;
 
 // The handle holds the probe while `holds`: probe = offset + handle, turned by grip.

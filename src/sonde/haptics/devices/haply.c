@@ -88,22 +88,19 @@ static sonde_status open_device(void *self, const sonde_device_open_def *def, so
   return SONDE_OK;
 }
 
-static bool send_force(haply *h, sonde_vec3 f) {
-  char text[256];
-  int length = snprintf(text, sizeof text,
-                        "{\"inverse3\":[{\"device_id\":\"%s\",\"commands\":{\"set_cursor_force\":"
-                        "{\"values\":{\"x\":%.6f,\"y\":%.6f,\"z\":%.6f}}}}]}",
-                        h->device, f.x, f.y, f.z);
-  return length > 0 && (size_t)length < sizeof text &&
-         sonde_websocket_send(&h->socket, text, (size_t)length);
-}
-
 static int exchange(void *self, sonde_vec3 force_n, sonde_vec3 torque_n_m,
                     sonde_device_sample *sample) {
   haply *h = self;
   (void)torque_n_m;
   SONDE_ASSERT(h->opened);
-  if (!send_force(h, force_n)) return -1;
+  char text[256];
+  int length = snprintf(text, sizeof text,
+                        "{\"inverse3\":[{\"device_id\":\"%s\",\"commands\":{\"set_cursor_force\":"
+                        "{\"values\":{\"x\":%.6f,\"y\":%.6f,\"z\":%.6f}}}}]}",
+                        h->device, force_n.x, force_n.y, force_n.z);
+  if (length <= 0 || (size_t)length >= sizeof text ||
+      !sonde_websocket_send(&h->socket, text, (size_t)length))
+    return -1;
   int got, fresh = 0;
   while ((got = sonde_websocket_receive(&h->socket)) > 0)
     if (read_state(h, sample)) fresh = 1;

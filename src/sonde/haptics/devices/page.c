@@ -4,7 +4,7 @@
 #include "haptics/motion.h"
 
 // Speed of a hand that moves a probe briskly, and a lag of 2/80 s that hides the page's frames.
-static const double speed_m_s = 0.25, turn_rad_s = 3.0, filter_rad_s = 80.0;
+static const double speed_m_s = 0.25, rotation_rad_s = 3.0, filter_rad_s = 80.0;
 
 static void destroy(void *self) {
   sonde_page_device *page = self;
@@ -32,7 +32,7 @@ sonde_status sonde_device_page(sonde_pose start, double dt_s, sonde_device *devi
   page->goal = (sonde_pose){start.position, q_unit(start.rotation)};
   page->leader = page->middle = page->pose = page->goal;
   page->reach_m = speed_m_s * dt_s;
-  page->turn_rad = turn_rad_s * dt_s;
+  page->rotation_rad = rotation_rad_s * dt_s;
   page->share = -expm1(-filter_rad_s * dt_s);
   *device = (sonde_device){"page", page, sonde_page_read, sonde_device_write_nothing, destroy};
   return SONDE_OK;

@@ -15,7 +15,7 @@ void sonde_page_read(void *self, uint64_t tick, sonde_device_sample *sample) {
   SONDE_ASSERT(page->share > 0.0 && page->share <= 1.0);
   const sonde_pose *goal = sonde_mailbox_read(page->goals);
   if (goal) page->goal = *goal;
-  page->leader = sonde_pose_approach(page->leader, page->goal, page->reach_m, page->turn_rad);
+  page->leader = sonde_pose_approach(page->leader, page->goal, page->reach_m, page->rotation_rad);
   page->middle = sonde_pose_blend(page->middle, page->leader, page->share);
   page->pose = sonde_pose_blend(page->pose, page->middle, page->share);
   *sample = (sonde_device_sample){page->pose, 0, true};

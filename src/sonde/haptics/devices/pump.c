@@ -1,4 +1,5 @@
-// What all hardware drivers share: opening, the thread, the list.
+// What all hardware drivers share: opening, the thread that exchanges forces and poses at 1 kHz,
+// and the list of families.
 #include "haptics/devices/devices.h"
 #include "haptics/devices/pump.h"
 
@@ -51,8 +52,8 @@ void sonde_steer(sonde_pose *pose, const double axis[6], double dt_s) {
     a[i] = size > 0.05 ? copysign((size - 0.05) / 0.95, axis[i]) : 0.0;
   }
   pose->position = v_madd(pose->position, 0.1 * dt_s, vec3(a[0], a[1], a[2]));
-  sonde_quat turn = {1.0, 0.5 * dt_s * a[3], 0.5 * dt_s * a[4], 0.5 * dt_s * a[5]};
-  pose->rotation = q_unit(q_mul(turn, pose->rotation));
+  sonde_quat rotation = {1.0, 0.5 * dt_s * a[3], 0.5 * dt_s * a[4], 0.5 * dt_s * a[5]};
+  pose->rotation = q_unit(q_mul(rotation, pose->rotation));
 }
 
 static sonde_device_open_def clean(const sonde_device_open_def *def) {
@@ -67,19 +68,9 @@ static sonde_device_open_def clean(const sonde_device_open_def *def) {
   return c;
 }
 
-static void lose(sonde_pump *pump) {
-  pump->driver->close(pump->vendor);
-  atomic_store(&pump->connected, false);
-  atomic_fetch_add(&pump->losses, 1);
-  // whatever comes back starts from no force
-  sonde_safety_limits limits = pump->gate.limits;
-  sonde_gate_init(&pump->gate, &limits);
-  sonde_device_sample *slot = sonde_mailbox_write_slot(pump->samples);
-  *slot = (sonde_device_sample){{vec3(0, 0, 0), quat_identity()}, 0, false};
-  sonde_mailbox_publish(pump->samples);
-}
-
-static void turn(sonde_pump *pump) {
+// One exchange with the driver: newest force out, pose in. A negative answer means that the device
+// was lost.
+static void exchange(sonde_pump *pump) {
   const sonde_command *command = sonde_mailbox_read(pump->commands);
   sonde_vec3 none = vec3(0, 0, 0);
   sonde_gate_apply(&pump->gate, command != NULL, command ? command->force_n : none,
@@ -87,14 +78,20 @@ static void turn(sonde_pump *pump) {
   sonde_device_sample sample = {{none, quat_identity()}, 0, true};
   int answer =
       pump->driver->exchange(pump->vendor, pump->gate.force_n, pump->gate.torque_n_m, &sample);
+  if (answer == 0) return;
   if (answer < 0) {
-    lose(pump);
-  } else if (answer > 0) {
-    sonde_device_sample *slot = sonde_mailbox_write_slot(pump->samples);
-    *slot = sample;
-    sonde_mailbox_publish(pump->samples);
-    atomic_fetch_add(&pump->exchanges, 1);
+    pump->driver->close(pump->vendor);
+    atomic_store(&pump->connected, false);
+    atomic_fetch_add(&pump->losses, 1);
+    // whatever comes back starts from no force
+    sonde_safety_limits limits = pump->gate.limits;
+    sonde_gate_init(&pump->gate, &limits);
+    sample = (sonde_device_sample){{none, quat_identity()}, 0, false};
   }
+  sonde_device_sample *slot = sonde_mailbox_write_slot(pump->samples);
+  *slot = sample;
+  sonde_mailbox_publish(pump->samples);
+  if (answer > 0) atomic_fetch_add(&pump->exchanges, 1);
 }
 
 // After a failure everything is closed again.
@@ -114,7 +111,7 @@ static void *thread_main(void *self) {
   double due_s = sonde_clock_now(), retry_s = 0.0;
   while (!atomic_load(&pump->stop)) {
     if (atomic_load(&pump->connected)) {
-      turn(pump);
+      exchange(pump);
       retry_s = sonde_clock_now() + reopen_s;
     } else if (sonde_clock_now() >= retry_s) {
       if (bring_up(pump->driver, pump->vendor, &pump->def, NULL) == SONDE_OK)
@@ -149,20 +146,6 @@ static const sonde_driver *find_driver(const char *name) {
   return NULL;
 }
 
-static sonde_status start(sonde_pump *pump, sonde_error *error) {
-  sonde_status status = sonde_mailbox_create(sizeof(sonde_device_sample), &pump->samples, error);
-  if (!status) status = sonde_mailbox_create(sizeof(sonde_command), &pump->commands, error);
-  if (status) return status;
-  status = bring_up(pump->driver, pump->vendor, &pump->def, error);
-  if (status) return status;
-  atomic_store(&pump->connected, true);
-  if (pthread_create(&pump->thread, NULL, thread_main, pump) != 0)
-    return sonde_fail(error, SONDE_MEMORY, "%s: its thread could not be started",
-                      pump->driver->name);
-  pump->running = true;
-  return SONDE_OK;
-}
-
 sonde_status sonde_device_open(const char *name, const sonde_device_open_def *def,
                                sonde_device *device, sonde_error *error) {
   SONDE_ASSERT(name != NULL && device != NULL);
@@ -184,7 +167,16 @@ sonde_status sonde_device_open(const char *name, const sonde_device_open_def *de
   }
   pump->last.world_from_probe = pump->def.world_from_base;
   sonde_gate_init(&pump->gate, pump->def.limits.force_n > 0.0 ? &pump->def.limits : NULL);
-  sonde_status status = pump->vendor ? start(pump, error) : sonde_fail_memory(error);
+  sonde_status status = pump->vendor ? SONDE_OK : sonde_fail_memory(error);
+  if (!status) status = sonde_mailbox_create(sizeof(sonde_device_sample), &pump->samples, error);
+  if (!status) status = sonde_mailbox_create(sizeof(sonde_command), &pump->commands, error);
+  if (!status) status = bring_up(driver, pump->vendor, &pump->def, error);
+  if (!status) {
+    atomic_store(&pump->connected, true);
+    pump->running = pthread_create(&pump->thread, NULL, thread_main, pump) == 0;
+    if (!pump->running)
+      status = sonde_fail(error, SONDE_MEMORY, "%s: its thread could not be started", driver->name);
+  }
   if (status) {
     destroy(pump);
     return status;

@@ -12,7 +12,10 @@ static void destroy(void *self) {
   sonde_free(replay);
 }
 
-static sonde_status check(const sonde_device_sample *samples, uint64_t count, sonde_error *error) {
+sonde_status sonde_device_replay(const sonde_device_sample *samples, uint64_t count,
+                                 sonde_device *device, sonde_error *error) {
+  SONDE_ASSERT(device != NULL);
+  *device = (sonde_device){0};
   if (!samples || count == 0)
     return sonde_fail(error, SONDE_ARGUMENT, "replay device: no samples, expected 1 or more");
   for (uint64_t i = 0; i < count; ++i)
@@ -20,15 +23,6 @@ static sonde_status check(const sonde_device_sample *samples, uint64_t count, so
       return sonde_fail(error, SONDE_ARGUMENT,
                         "replay device: the pose of sample %llu is not finite",
                         (unsigned long long)i);
-  return SONDE_OK;
-}
-
-sonde_status sonde_device_replay(const sonde_device_sample *samples, uint64_t count,
-                                 sonde_device *device, sonde_error *error) {
-  SONDE_ASSERT(device != NULL);
-  *device = (sonde_device){0};
-  sonde_status status = check(samples, count, error);
-  if (status) return status;
   sonde_replay_device *replay = SONDE_NEW(sonde_replay_device, 1);
   if (replay) replay->samples = SONDE_NEW(sonde_device_sample, (size_t)count);
   if (!replay || !replay->samples) {

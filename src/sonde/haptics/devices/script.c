@@ -1,4 +1,5 @@
-// The device that follows keys: creation.
+// The device that follows keys: creation. Between keys a monotone cubic, over the rotations short
+// arcs.
 #include "haptics/devices/devices.h"
 
 #include "haptics/motion.h"
@@ -8,25 +9,6 @@ static void destroy(void *self) {
   if (!script) return;
   sonde_free(script->knots);
   sonde_free(script);
-}
-
-static sonde_status check(const sonde_script_key *keys, uint32_t count, double dt_s,
-                          sonde_error *error) {
-  if (!keys || count == 0)
-    return sonde_fail(error, SONDE_ARGUMENT, "script: no keys, expected 1 or more");
-  if (!(dt_s > 0.0) || !isfinite(dt_s))
-    return sonde_fail(error, SONDE_ARGUMENT, "script: a tick lasts %g s, expected more than 0",
-                      dt_s);
-  for (uint32_t i = 0; i < count; ++i) {
-    if (!isfinite(keys[i].time_s) || !sonde_pose_usable(keys[i].world_from_probe))
-      return sonde_fail(error, SONDE_ARGUMENT, "script: key %u is not finite", i);
-    if (i > 0 && !(keys[i].time_s > keys[i - 1].time_s))
-      return sonde_fail(error, SONDE_ARGUMENT,
-                        "script: key %u at %g s does not follow key %u at %g s, expected ascending "
-                        "times",
-                        i, keys[i].time_s, i - 1, keys[i - 1].time_s);
-  }
-  return SONDE_OK;
 }
 
 // Weighted harmonic mean of the secants left and right, zero where they change sign: the cubic
@@ -41,8 +23,20 @@ sonde_status sonde_device_script(const sonde_script_key *keys, uint32_t count, d
                                  sonde_device *device, sonde_error *error) {
   SONDE_ASSERT(device != NULL);
   *device = (sonde_device){0};
-  sonde_status status = check(keys, count, dt_s, error);
-  if (status) return status;
+  if (!keys || count == 0)
+    return sonde_fail(error, SONDE_ARGUMENT, "script: no keys, expected 1 or more");
+  if (!(dt_s > 0.0) || !isfinite(dt_s))
+    return sonde_fail(error, SONDE_ARGUMENT, "script: a tick lasts %g s, expected more than 0",
+                      dt_s);
+  for (uint32_t i = 0; i < count; ++i) {
+    if (!isfinite(keys[i].time_s) || !sonde_pose_usable(keys[i].world_from_probe))
+      return sonde_fail(error, SONDE_ARGUMENT, "script: key %u is not finite", i);
+    if (i > 0 && !(keys[i].time_s > keys[i - 1].time_s))
+      return sonde_fail(error, SONDE_ARGUMENT,
+                        "script: key %u at %g s does not follow key %u at %g s, expected ascending "
+                        "times",
+                        i, keys[i].time_s, i - 1, keys[i - 1].time_s);
+  }
   sonde_script_device *script = SONDE_NEW(sonde_script_device, 1);
   if (script) script->knots = SONDE_NEW(sonde_script_knot, count);
   if (!script || !script->knots) {

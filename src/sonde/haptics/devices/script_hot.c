@@ -16,7 +16,8 @@ void sonde_script_read(void *self, uint64_t tick, sonde_device_sample *sample) {
     while (span > 0 && time_s < script->knots[span].time_s) span--;
     while (span + 2 < script->count && time_s >= script->knots[span + 1].time_s) span++;
     script->span = span;
-    // The place follows a cubic with given ends and slopes (Hermite), the rotation the short arc.
+    // The position follows a cubic with given ends and slopes (Hermite), the rotation the short
+    // arc.
     const sonde_script_knot *a = script->knots + span, *b = a + 1;
     double width = b->time_s - a->time_s, u = clamp((time_s - a->time_s) / width, 0.0, 1.0);
     double r = 1.0 - u, rise = u * u * (3.0 - 2.0 * u);

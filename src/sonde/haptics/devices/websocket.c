@@ -24,6 +24,7 @@ void sonde_websocket_wait(const sonde_websocket *socket, int milliseconds) {
   if (socket->fd >= 0) ready(socket->fd, POLLIN, milliseconds);
 }
 
+// A failure leaves the socket open; sonde_websocket_open() closes it.
 static sonde_status connect_to(sonde_websocket *ws, uint16_t port, sonde_error *error) {
   ws->fd = socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   if (ws->fd < 0) return sonde_fail(error, SONDE_IO, "no socket: %s", strerror(errno));
@@ -40,11 +41,8 @@ static sonde_status connect_to(sonde_websocket *ws, uint16_t port, sonde_error *
   if (problem)
     return sonde_fail(error, SONDE_DEVICE, "no service answers on port %u: %s", (unsigned)port,
                       strerror(problem));
-  return SONDE_OK;
-}
 
-// Reads until the empty line; what follows it stays in the buffer.
-static sonde_status shake(sonde_websocket *ws, uint16_t port, sonde_error *error) {
+  // The handshake ends with an empty line; what follows it stays in the buffer.
   char request[256];
   int length = snprintf(request, sizeof request,
                         "GET / HTTP/1.1\r\nHost: localhost:%u\r\nUpgrade: websocket\r\n"
@@ -73,7 +71,6 @@ sonde_status sonde_websocket_open(sonde_websocket *ws, uint16_t port, sonde_erro
   ws->fd = -1;
   ws->fill = 0;
   sonde_status status = connect_to(ws, port, error);
-  if (!status) status = shake(ws, port, error);
   if (status) sonde_websocket_close(ws);
   return status;
 }
