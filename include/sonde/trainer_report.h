@@ -1,9 +1,7 @@
 /**
  * @file trainer_report.h
- * The report of one exam for the learner: one self-contained HTML page without script, inline style
- * and drawings, pictures as data. It shows under
- * "default-src 'none'; style-src 'unsafe-inline'; img-src data:". What it says:
- * docs/trainer_report.md.
+ * The report of one exam for the learner: one self-contained HTML page, which holds the exam as
+ * JSON and the script that draws it (sonde_report_write()). What it says: docs/trainer_report.md.
  */
 #ifndef SONDE_TRAINER_REPORT_H
 #define SONDE_TRAINER_REPORT_H

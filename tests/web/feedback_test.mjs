@@ -51,9 +51,9 @@ const quoted = (text) => [...text.matchAll(/"((?:[^"\\\n]|\\.)*)"|`((?:[^`\\]|\\
 const plain = (text) => text.split("\n").filter((l) => !/^\s*(\/\/|\*|\/\*)/.test(l)).join("\n");
 const files = (folder, end) => readdirSync(join(source, folder)).filter((f) => f.endsWith(end)).map((f) => [`${folder}/${f}`, readFileSync(join(source, folder, f), "utf8")]);
 const texts = [
-  ...files("web/src", ".ts").map(([name, text]) => [name, quoted(plain(text)).filter((s) => / /.test(s) && !/\$\{/.test(s))]),
+  ...[...files("web/src", ".ts"), ...files("web/src/report", ".ts").filter(([name]) => /exam/.test(name))].map(([name, text]) => [name, quoted(plain(text)).filter((s) => / /.test(s) && !/\$\{/.test(s))]),
   ["web/index.html", [...readFileSync(join(source, "web/index.html"), "utf8").matchAll(/>([^<>]+)<|(?:aria-label|title|placeholder)="([^"]+)"/g)].map((m) => m[1] ?? m[2])],
-  ...files("src/sonde-exam/trainer", ".c").filter(([name]) => /report|judge_guide|score_explain|vein_map/.test(name)).map(([name, text]) => [name, quoted(plain(text)).filter((s) => / /.test(s))]),
+  ...files("src/sonde-exam/trainer", ".c").filter(([name]) => /judge_guide|score_explain|vein_map/.test(name)).map(([name, text]) => [name, quoted(plain(text)).filter((s) => / /.test(s))]),
   ...files("data/cases", ".yaml").map(([name, text]) => [name, text.split("\n").filter((l) => !/^\s*#/.test(l))]),
   ...files("data/protocols", ".yaml").map(([name, text]) => [name, text.split("\n").filter((l) => !/^\s*#/.test(l))]),
 ];

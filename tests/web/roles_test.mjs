@@ -90,7 +90,8 @@ async function testComments(learner, watcher) {
     }
     return "";
   });
-  check(report.includes("Look at &lt;your&gt; second press again.") && report.includes("Here you press too fast."), "comments made while the result is shown stand in the report");
+  const said = JSON.parse(/id="report">(.*?)<\/script>/s.exec(report)[1]).comments.map((c) => c.text);
+  check(said.includes("Look at <your> second press again.") && said.includes("Here you press too fast."), "comments made while the result is shown stand in the report");
   await learner.getByRole("button", { name: "Watch the replay" }).click();
   await learner.waitForFunction(() => window.sonde.replay?.comments.length === 2);
   const kept = await learner.evaluate(() => window.sonde.replay.comments[0]);

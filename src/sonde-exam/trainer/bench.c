@@ -1,5 +1,4 @@
 // A thigh under a probe without a session.
-// look_inside: vessels at the image plane, into a snapshot.
 #include "trainer/bench.h"
 
 #include "exam/vessels.h"
@@ -32,24 +31,8 @@ void sonde_bench_step(sonde_bench *bench, sonde_pose probe) {
   bench->tick++;
 }
 
-static void look_inside(sonde_bench *bench, sonde_snapshot *s) {
-  sonde_pathology pathology = bench->pathology;
-  sonde_circulation_apply(&bench->circulation, bench->tick, BENCH_STEP_S, &pathology);
-  double since_s = (double)(bench->tick - bench->looked_tick) * BENCH_STEP_S;
-  sonde_interior_input input = {.positions_m = sonde_state_positions(bench->state),
-                                .contact_forces_n = sonde_state_contact_forces(bench->state),
-                                .world_from_probe = s->world_from_probe,
-                                .pathology = &pathology,
-                                .dt_s = bench->looked ? since_s : -1,
-                                .tick = bench->tick,
-                                .face_half_x_m = bench->probe.half_x_m,
-                                .face_half_y_m = bench->probe.half_y_m};
-  sonde_interior_update(bench->interior, &input);
-  bench->looked_tick = bench->tick;
-  sonde_snapshot_read_vessels(bench->interior, s);
-}
-
 sonde_snapshot sonde_bench_look(sonde_bench *bench, sonde_pose probe) {
+  SONDE_ASSERT(bench->looked_tick <= bench->tick);
   const double nan_m = (double)NAN;
   const sonde_contact *contact = sonde_state_contact(bench->state);
   sonde_vec3 beam = q_rotate(probe.rotation, vec3(0, 0, 1));
@@ -66,7 +49,22 @@ sonde_snapshot sonde_bench_look(sonde_bench *bench, sonde_pose probe) {
                       .vein_rest_m = {nan_m, nan_m, nan_m},
                       .vein_tilt_rad = nan_m};
   bool pressing = s.force_normal_n > TOUCH_N && s.force_normal_n < FORCE_MAX_N;
-  if (pressing) look_inside(bench, &s);
+  if (pressing) { // vessels at the image plane
+    sonde_pathology pathology = bench->pathology;
+    sonde_circulation_apply(&bench->circulation, bench->tick, BENCH_STEP_S, &pathology);
+    double since_s = (double)(bench->tick - bench->looked_tick) * BENCH_STEP_S;
+    sonde_interior_input input = {.positions_m = sonde_state_positions(bench->state),
+                                  .contact_forces_n = sonde_state_contact_forces(bench->state),
+                                  .world_from_probe = probe,
+                                  .pathology = &pathology,
+                                  .dt_s = bench->looked ? since_s : -1,
+                                  .tick = bench->tick,
+                                  .face_half_x_m = bench->probe.half_x_m,
+                                  .face_half_y_m = bench->probe.half_y_m};
+    sonde_interior_update(bench->interior, &input);
+    bench->looked_tick = bench->tick;
+    sonde_snapshot_read_vessels(bench->interior, &s);
+  }
   bench->looked = pressing;
   return s;
 }

@@ -1,10 +1,5 @@
-// A case on its thigh.
-// make_thigh:      by seed and parameters.
-// get_model:       bundled, from a file, or made.
-// place_extent:    a stretch of vein as model z.
-// place_lesions, place_branches: findings where the thigh has the places.
-// clot_in:         how much of a segment has a clot.
-// check_truth:     every segment is called what its vein is.
+// A case on its thigh: the model, the pathology where its vein has the places, and the check that
+// the truth is what was built.
 #include "trainer/case.h"
 #include "tissue/anatomy.h"
 
@@ -13,22 +8,20 @@
 // Less clot than this in a segment does not make it a segment with a clot.
 static const double CLOT_M = 0.005;
 
-static sonde_status make_thigh(const sonde_case *from, sonde_model **model, sonde_error *error) {
-  sonde_thigh thigh;
-  sonde_thigh_shape *shape = NULL;
-  sonde_thigh_def def = sonde_thigh_def_default();
-  def.name = from->id;
-  def.provenance = "Synthetic thigh of a training case";
-  sonde_status status = sonde_thigh_draw(&from->known, from->seed, &thigh, error);
-  if (!status) status = sonde_thigh_shape_create(&thigh, &shape, error);
-  if (!status) status = sonde_thigh_build(&thigh, shape, &def, model, error);
-  sonde_thigh_shape_destroy(shape);
-  return status;
-}
-
 static sonde_status get_model(const sonde_case *from, const char *bundled, const char *directory,
                               sonde_model **model, sonde_error *error) {
-  if (from->thigh == SONDE_CASE_GENERATED) return make_thigh(from, model, error);
+  if (from->thigh == SONDE_CASE_GENERATED) {
+    sonde_thigh thigh;
+    sonde_thigh_shape *shape = NULL;
+    sonde_thigh_def def = sonde_thigh_def_default();
+    def.name = from->id;
+    def.provenance = "Synthetic thigh of a training case";
+    sonde_status status = sonde_thigh_draw(&from->known, from->seed, &thigh, error);
+    if (!status) status = sonde_thigh_shape_create(&thigh, &shape, error);
+    if (!status) status = sonde_thigh_build(&thigh, shape, &def, model, error);
+    sonde_thigh_shape_destroy(shape);
+    return status;
+  }
   if (from->thigh == SONDE_CASE_BUNDLED) {
     if (bundled) return sonde_model_load(bundled, model, error);
     return sonde_fail(error, SONDE_NOT_FOUND, "case %s needs the bundled thigh", from->id);
@@ -39,6 +32,7 @@ static sonde_status get_model(const sonde_case *from, const char *bundled, const
   return sonde_model_load(path, model, error);
 }
 
+// A stretch of vein as z of the model.
 static sonde_status place_extent(const sonde_case_extent *extent, const sonde_vein_map *map,
                                  sonde_pathology *pathology, sonde_error *error) {
   pathology->thrombus_from_m = pathology->thrombus_to_m = 0; // all
@@ -57,9 +51,11 @@ static sonde_status place_extent(const sonde_case_extent *extent, const sonde_ve
   return SONDE_OK;
 }
 
-static sonde_status place_lesions(const sonde_case *from, sonde_case_setup *setup,
-                                  sonde_error *error) {
-  setup->findings.lesion_count = from->lesion_count;
+static sonde_status place_findings(const sonde_case *from, sonde_case_setup *setup,
+                                   sonde_error *error) {
+  SONDE_ASSERT(from->lesion_count <= SONDE_LESIONS && from->branch_count <= SONDE_BRANCHES);
+  sonde_findings *findings = &setup->findings;
+  findings->lesion_count = from->lesion_count;
   for (uint32_t i = 0; i < from->lesion_count; ++i) {
     const sonde_case_lesion *lesion = &from->lesion[i];
     double along;
@@ -67,26 +63,20 @@ static sonde_status place_lesions(const sonde_case *from, sonde_case_setup *setu
     if (status) return status;
     sonde_vein_point p = sonde_vein_at(&setup->map, along);
     sonde_vec3 below = v_madd(p.skin_m, -lesion->depth_m, p.normal);
-    setup->findings.lesion[i] =
-        (sonde_lesion){.kind = lesion->kind,
-                       .centre_m = v_madd(below, lesion->across_m, p.across),
-                       .axis = v_unit(v_cross(p.normal, p.across), vec3(0, 0, 1)),
-                       .half_m = lesion->half_m,
-                       .echogenicity = lesion->echogenicity};
+    findings->lesion[i] = (sonde_lesion){.kind = lesion->kind,
+                                         .centre_m = v_madd(below, lesion->across_m, p.across),
+                                         .axis = v_unit(v_cross(p.normal, p.across), vec3(0, 0, 1)),
+                                         .half_m = lesion->half_m,
+                                         .echogenicity = lesion->echogenicity};
   }
-  return SONDE_OK;
-}
-
-static sonde_status place_branches(const sonde_case *from, sonde_case_setup *setup,
-                                   sonde_error *error) {
-  setup->findings.branch_count = from->branch_count;
+  findings->branch_count = from->branch_count;
   for (uint32_t i = 0; i < from->branch_count; ++i) {
     const sonde_case_branch *branch = &from->branch[i];
     const sonde_thigh_anatomy *anatomy = setup->model->anatomy;
     const sonde_branch *there = anatomy ? sonde_anatomy_branch(anatomy, branch->branch) : NULL;
     if (!there || there->kind != SONDE_VESSEL_VEIN)
       return sonde_fail(error, SONDE_NOT_FOUND, "the thigh has no vein '%s'", branch->branch);
-    sonde_branch_finding *to = &setup->findings.branch[i];
+    sonde_branch_finding *to = &findings->branch[i];
     to->pathology = branch->pathology;
     memcpy(to->branch, branch->branch, sizeof to->branch);
     sonde_status status = place_extent(&branch->extent, &setup->map, &to->pathology, error);
@@ -97,14 +87,10 @@ static sonde_status place_branches(const sonde_case *from, sonde_case_setup *set
 
 // ---- truth
 
-static double overlap(double a_from, double a_to, double b_from, double b_to) {
-  return fmax(0, fmin(a_to, b_to) - fmax(a_from, b_from));
-}
-
 static double clot_length(const sonde_pathology *p, const sonde_segment *segment) {
   if (!(p->thrombus_fraction > 0)) return 0;
   if (p->thrombus_from_m == p->thrombus_to_m) return segment->to_m - segment->from_m;
-  return overlap(p->thrombus_from_m, p->thrombus_to_m, segment->from_m, segment->to_m);
+  return fmax(0, fmin(p->thrombus_to_m, segment->to_m) - fmax(p->thrombus_from_m, segment->from_m));
 }
 
 // A second femoral vein is a deep vein of the segment beside it; other branches are not.
@@ -123,6 +109,7 @@ static double clot_in(const sonde_case_setup *setup, const sonde_segment *segmen
   return most;
 }
 
+// Every segment is called what its vein is.
 static sonde_status check_truth(const sonde_case *from, const sonde_case_setup *setup,
                                 sonde_error *error) {
   const sonde_vein_map *map = &setup->map;
@@ -158,8 +145,7 @@ sonde_status sonde_case_build(const sonde_case *from, const char *bundled, const
   if (!status) status = get_model(from, bundled, directory, &setup->model, error);
   if (!status) status = sonde_vein_map_make(setup->model, &setup->map, error);
   if (!status) status = place_extent(&from->extent, &setup->map, &setup->pathology, error);
-  if (!status) status = place_lesions(from, setup, error);
-  if (!status) status = place_branches(from, setup, error);
+  if (!status) status = place_findings(from, setup, error);
   if (!status) status = check_truth(from, setup, error);
   sonde_circulation_apply(&from->circulation, 0, 1e-3, &setup->pathology);
   if (status) sonde_case_setup_clear(setup);
@@ -173,7 +159,7 @@ void sonde_case_setup_clear(sonde_case_setup *setup) {
 }
 
 void sonde_case_session(const sonde_case_setup *setup, sonde_session_def *def) {
-  SONDE_ASSERT(setup->model != NULL);
+  SONDE_ASSERT(setup && setup->model && def);
   def->model = setup->model;
   def->controls.pathology = setup->pathology;
   def->controls.posture = setup->circulation.posture;

@@ -1,8 +1,4 @@
 // A case drawn by its seed.
-// draw_person:    thigh, age and posture.
-// draw_clot:      stage and stretch, and the truth that follows.
-// draw_lookalike: something that is not a clot of the femoral vein.
-// tell_history:   what the patient says; it does not give the answer away.
 #include "trainer/case.h"
 
 #include "base/random.h"
@@ -26,17 +22,7 @@ static uint32_t below(draw *d, uint32_t count) {
 // Files have a tenth of a millimetre, a hundredth of a share.
 static double rounded(double value, double parts) { return round(value * parts) / parts; }
 
-static void draw_person(draw *d, sonde_case *c) {
-  c->thigh = SONDE_CASE_GENERATED;
-  c->seed = d->seed & UINT32_MAX;
-  c->known.sex = below(d, 2) ? SONDE_SEX_FEMALE : SONDE_SEX_MALE;
-  double fat_mm = rounded(c->level == SONDE_CASE_HARD ? uniform(d, 4, 6) : uniform(d, 4, 6.5), 10);
-  c->known.fat_front_m = 1e-3 * fat_mm;
-  c->known.second_vein = c->level == SONDE_CASE_HARD && below(d, 4) == 0;
-  if (c->level == SONDE_CASE_HARD && below(d, 4) == 0)
-    c->circulation.posture = SONDE_POSTURE_SITTING;
-}
-
+// Stage and stretch of a clot, and the truth that follows.
 static void draw_clot(draw *d, sonde_case *c) {
   static const char *const STAGE[] = {"acute_occlusive", "subacute_occlusive", "chronic_occlusive",
                                       "partial_mural"};
@@ -59,6 +45,7 @@ static void draw_clot(draw *d, sonde_case *c) {
            to > from ? sonde_segment_title(SEGMENTS[to]) : "");
 }
 
+// Something that is not a clot of the femoral vein.
 static void draw_lookalike(draw *d, sonde_case *c) {
   uint32_t kind = below(d, 3);
   if (kind == 2) { // a clot in the superficial vein
@@ -83,6 +70,7 @@ static void draw_lookalike(draw *d, sonde_case *c) {
            cyst ? "cyst beside the vein" : "lymph node");
 }
 
+// What the patient says; it does not give the answer away.
 static void tell_history(draw *d, sonde_case *c) {
   static const char *const COMPLAINT[] = {
       "swelling of the leg for %u days", "pain in the thigh for %u days",
@@ -116,9 +104,18 @@ void sonde_case_generate(uint64_t seed, sonde_case_level level, sonde_case *out)
     snprintf(out->truth_segment[i], sizeof out->truth_segment[i], "%s", SEGMENTS[i]);
     out->truth[i] = SONDE_DECISION_COMPRESSIBLE;
   }
-  draw_person(&d, out);
+
+  // The person: sex, fat in front of the thigh, a second vein, posture.
+  bool hard = level == SONDE_CASE_HARD;
+  out->thigh = SONDE_CASE_GENERATED;
+  out->seed = seed & UINT32_MAX;
+  out->known.sex = below(&d, 2) ? SONDE_SEX_FEMALE : SONDE_SEX_MALE;
+  out->known.fat_front_m = 1e-3 * rounded(hard ? uniform(&d, 4, 6) : uniform(&d, 4, 6.5), 10);
+  out->known.second_vein = hard && below(&d, 4) == 0;
+  if (hard && below(&d, 4) == 0) out->circulation.posture = SONDE_POSTURE_SITTING;
+
   bool clot = below(&d, 2) == 0;
   if (clot) draw_clot(&d, out);
-  if (level == SONDE_CASE_HARD && !clot) draw_lookalike(&d, out);
+  if (hard && !clot) draw_lookalike(&d, out);
   tell_history(&d, out);
 }

@@ -1,6 +1,4 @@
 // The cases of a directory.
-// load_one:  a file into an item of the list.
-// compare:   by level, then title, then id: the order in which a learner reads them.
 #include "trainer/trainer.h"
 
 #include <string.h>
@@ -9,7 +7,8 @@ static sonde_status load_one(const char *path, void *item, sonde_error *error) {
   return sonde_case_load(path, item, error);
 }
 
-static int compare(const void *a, const void *b) {
+// By level, then title, then id: the order in which a learner reads them.
+static int compare_cases(const void *a, const void *b) {
   const sonde_case *x = a, *y = b;
   if (x->level != y->level) return x->level < y->level ? -1 : 1;
   int titles = strcmp(x->title, y->title);
@@ -18,6 +17,7 @@ static int compare(const void *a, const void *b) {
 
 sonde_status sonde_case_list(const char *directory, sonde_case **cases, uint32_t *count,
                              sonde_error *error) {
+  SONDE_ASSERT(directory && cases && count);
   void *items;
   sonde_status status =
       sonde_load_directory(directory, sizeof(sonde_case), load_one, &items, count, error);
@@ -35,6 +35,6 @@ sonde_status sonde_case_list(const char *directory, sonde_case **cases, uint32_t
     *count = 0;
     return status;
   }
-  qsort(c, *count, sizeof *c, compare);
+  qsort(c, *count, sizeof *c, compare_cases);
   return SONDE_OK;
 }

@@ -1,9 +1,4 @@
 // Reading a case file.
-// read_thigh, read_circulation:    the patient.
-// read_extent, read_clot:          a stretch of vein and what fills it.
-// read_lesion, read_branch:        findings.
-// read_truth:                      the answer.
-// check_id, sonde_case_check:      what no single key can tell.
 #include "trainer/case.h"
 
 #include "base/bounds.h"
@@ -53,8 +48,25 @@ sonde_case sonde_case_default(void) {
 
 // ---- the patient
 
-static void read_generated(sonde_reader *reader, sonde_place at, sonde_case *c) {
+// The bundled thigh, a model file, or one that is generated from a seed and what is known of it.
+static void read_thigh(sonde_reader *reader, sonde_place root, sonde_case *c) {
   enum { KEYS = 40 };
+  static const char *const MODEL[] = {"model", NULL};
+  sonde_place at = sonde_read_find(reader, root, "thigh");
+  if (!at) return;
+  if (sonde_read_is_text(reader, at)) {
+    const char *text = sonde_read_text_at(reader, at, "thigh");
+    if (text && strcmp(text, "bundled") != 0)
+      sonde_reader_fail(reader, at, SONDE_FORMAT,
+                        "thigh is '%s', expected bundled, {seed: ...} or {model: FILE}", text);
+    return;
+  }
+  if (sonde_read_find(reader, at, "model")) {
+    sonde_read_keys(reader, at, "thigh", MODEL);
+    c->thigh = SONDE_CASE_MODEL;
+    sonde_read_member(reader, at, "model", true, c->model, sizeof c->model);
+    return;
+  }
   const char *keys[KEYS] = {"seed", "sex"};
   uint32_t count;
   const sonde_thigh_parameter *parameter = sonde_thigh_parameters(&count);
@@ -71,26 +83,6 @@ static void read_generated(sonde_reader *reader, sonde_place at, sonde_case *c) 
         sonde_read_real(reader, at, p->name, p->low / p->unit, p->high / p->unit, UNKNOWN);
     *sonde_thigh_member(&c->known, p) = value * p->unit;
   }
-}
-
-static void read_thigh(sonde_reader *reader, sonde_place root, sonde_case *c) {
-  sonde_place at = sonde_read_find(reader, root, "thigh");
-  if (!at) return;
-  if (sonde_read_is_text(reader, at)) {
-    const char *text = sonde_read_text_at(reader, at, "thigh");
-    if (text && strcmp(text, "bundled") != 0)
-      sonde_reader_fail(reader, at, SONDE_FORMAT,
-                        "thigh is '%s', expected bundled, {seed: ...} or {model: FILE}", text);
-    return;
-  }
-  if (!sonde_read_find(reader, at, "model")) {
-    read_generated(reader, at, c);
-    return;
-  }
-  static const char *const KEYS[] = {"model", NULL};
-  sonde_read_keys(reader, at, "thigh", KEYS);
-  c->thigh = SONDE_CASE_MODEL;
-  sonde_read_member(reader, at, "model", true, c->model, sizeof c->model);
 }
 
 static void read_circulation(sonde_reader *reader, sonde_place at, sonde_circulation *c) {
@@ -112,19 +104,7 @@ static void read_circulation(sonde_reader *reader, sonde_place at, sonde_circula
 
 // ---- pathology
 
-static void read_extent(sonde_reader *reader, sonde_place map, sonde_case_extent *extent) {
-  sonde_place from = sonde_read_find(reader, map, "from"), to = sonde_read_find(reader, map, "to");
-  *extent = (sonde_case_extent){.whole = !from && !to};
-  if (extent->whole) return;
-  if (!from || !to) {
-    sonde_reader_fail(reader, map, SONDE_FORMAT, "give both from and to, or neither");
-    return;
-  }
-  sonde_read_station(reader, from, "from", &extent->from);
-  sonde_read_station(reader, to, "to", &extent->to);
-}
-
-// Stage and what is changed of it. `keys` are those of the map, for messages.
+// The stage of a clot with what the case changes of it, and the stretch of vein that it fills.
 static void read_clot(sonde_reader *reader, sonde_place map, sonde_pathology *pathology,
                       sonde_case_extent *extent) {
   sonde_error error = {0};
@@ -140,18 +120,14 @@ static void read_clot(sonde_reader *reader, sonde_place map, sonde_pathology *pa
   p->lumen_scale = sonde_read_real(reader, map, "lumen_scale", 0.3, 2, p->lumen_scale);
   p->wall_shear_pa =
       1e3 * sonde_read_real(reader, map, "wall_kpa", 0, 300, 1e-3 * p->wall_shear_pa);
-  read_extent(reader, map, extent);
-}
 
-static void read_vein(sonde_reader *reader, sonde_place root, sonde_case *c) {
-  static const char *const KEYS[] = {
-      "stage",        "from",        "to",       "fraction", "modulus_kpa",
-      "echogenicity", "lumen_scale", "wall_kpa", "webs",     NULL};
-  sonde_place at = sonde_read_find(reader, root, "vein");
-  if (!at) return;
-  sonde_read_keys(reader, at, "vein", KEYS);
-  read_clot(reader, at, &c->pathology, &c->extent);
-  c->webs = sonde_read_real(reader, at, "webs", 0, 1, 0);
+  sonde_place from = sonde_read_find(reader, map, "from"), to = sonde_read_find(reader, map, "to");
+  *extent = (sonde_case_extent){.whole = !from && !to};
+  if (!from != !to)
+    sonde_reader_fail(reader, map, SONDE_FORMAT, "give both from and to, or neither");
+  if (!from || !to) return;
+  sonde_read_station(reader, from, "from", &extent->from);
+  sonde_read_station(reader, to, "to", &extent->to);
 }
 
 static void read_lesion(sonde_reader *reader, sonde_place at, sonde_case_lesion *lesion) {
@@ -174,15 +150,6 @@ static void read_lesion(sonde_reader *reader, sonde_place at, sonde_case_lesion 
   lesion->echogenicity = sonde_read_real(reader, at, "echogenicity", 0, 1, ECHO[lesion->kind % 3]);
 }
 
-static void read_branch(sonde_reader *reader, sonde_place at, sonde_case_branch *branch) {
-  static const char *const KEYS[] = {"branch",   "stage",       "from",         "to",
-                                     "fraction", "modulus_kpa", "echogenicity", "lumen_scale",
-                                     "wall_kpa", NULL};
-  sonde_read_keys(reader, at, "a branch", KEYS);
-  sonde_read_member(reader, at, "branch", true, branch->branch, sizeof branch->branch);
-  read_clot(reader, at, &branch->pathology, &branch->extent);
-}
-
 static uint32_t read_some(sonde_reader *reader, sonde_place list, const char *what, uint32_t most) {
   uint32_t count = sonde_read_count(reader, list);
   if (count <= most) return count;
@@ -190,7 +157,20 @@ static uint32_t read_some(sonde_reader *reader, sonde_place list, const char *wh
   return 0;
 }
 
-static void read_findings(sonde_reader *reader, sonde_place root, sonde_case *c) {
+// What fills the femoral vein, and what else the thigh has.
+static void read_pathology(sonde_reader *reader, sonde_place root, sonde_case *c) {
+  static const char *const VEIN[] = {
+      "stage",        "from",        "to",       "fraction", "modulus_kpa",
+      "echogenicity", "lumen_scale", "wall_kpa", "webs",     NULL};
+  static const char *const BRANCH[] = {"branch",   "stage",       "from",         "to",
+                                       "fraction", "modulus_kpa", "echogenicity", "lumen_scale",
+                                       "wall_kpa", NULL};
+  sonde_place vein = sonde_read_find(reader, root, "vein");
+  if (vein) {
+    sonde_read_keys(reader, vein, "vein", VEIN);
+    read_clot(reader, vein, &c->pathology, &c->extent);
+    c->webs = sonde_read_real(reader, vein, "webs", 0, 1, 0);
+  }
   static const char *const KEYS[] = {"lesions", "branches", "oedema", NULL};
   sonde_place at = sonde_read_find(reader, root, "findings");
   if (!at) return;
@@ -202,29 +182,22 @@ static void read_findings(sonde_reader *reader, sonde_place root, sonde_case *c)
     read_lesion(reader, sonde_read_item(reader, lesions, i), &c->lesion[i]);
   sonde_place branches = sonde_read_find(reader, at, "branches");
   c->branch_count = read_some(reader, branches, "branches", SONDE_BRANCHES);
-  for (uint32_t i = 0; i < c->branch_count; ++i)
-    read_branch(reader, sonde_read_item(reader, branches, i), &c->branch[i]);
+  for (uint32_t i = 0; i < c->branch_count; ++i) {
+    sonde_place item = sonde_read_item(reader, branches, i);
+    sonde_case_branch *branch = &c->branch[i];
+    sonde_read_keys(reader, item, "a branch", BRANCH);
+    sonde_read_member(reader, item, "branch", true, branch->branch, sizeof branch->branch);
+    read_clot(reader, item, &branch->pathology, &branch->extent);
+  }
 }
 
 // ---- the answer
 
-static void read_segments(sonde_reader *reader, sonde_place at, sonde_case *c) {
+static void read_truth(sonde_reader *reader, sonde_place root, sonde_case *c) {
+  static const char *const KEYS[] = {"thrombosis", "diagnosis", "segments", "look_alikes", NULL};
   static const char *const NAMES[] = {"common_femoral", "femoral_proximal", "femoral_mid",
                                       "femoral_distal", "popliteal_near",   NULL};
   static const char *const WORDS[] = {"compressible", "clot", NULL};
-  if (!at) return;
-  sonde_read_keys(reader, at, "segments", NAMES);
-  for (int i = 0; NAMES[i]; ++i) {
-    if (!sonde_read_find(reader, at, NAMES[i])) continue;
-    int word = sonde_read_choice(reader, at, NAMES[i], WORDS, 0);
-    SONDE_ASSERT(c->truth_count < SONDE_SEGMENTS);
-    snprintf(c->truth_segment[c->truth_count], sizeof c->truth_segment[0], "%s", NAMES[i]);
-    c->truth[c->truth_count++] = word ? SONDE_DECISION_CLOT : SONDE_DECISION_COMPRESSIBLE;
-  }
-}
-
-static void read_truth(sonde_reader *reader, sonde_place root, sonde_case *c) {
-  static const char *const KEYS[] = {"thrombosis", "diagnosis", "segments", "look_alikes", NULL};
   sonde_place at = sonde_read_find(reader, root, "truth");
   if (!at) {
     sonde_reader_fail(reader, root, SONDE_FORMAT, "truth is missing");
@@ -235,7 +208,15 @@ static void read_truth(sonde_reader *reader, sonde_place root, sonde_case *c) {
     sonde_reader_fail(reader, at, SONDE_FORMAT, "thrombosis (true or false) is missing");
   c->thrombosis = sonde_read_bool(reader, at, "thrombosis", false);
   sonde_read_member(reader, at, "diagnosis", true, c->diagnosis, sizeof c->diagnosis);
-  read_segments(reader, sonde_read_find(reader, at, "segments"), c);
+  sonde_place segments = sonde_read_find(reader, at, "segments");
+  if (segments) sonde_read_keys(reader, segments, "segments", NAMES);
+  for (int i = 0; segments && NAMES[i]; ++i) {
+    if (!sonde_read_find(reader, segments, NAMES[i])) continue;
+    int word = sonde_read_choice(reader, segments, NAMES[i], WORDS, 0);
+    SONDE_ASSERT(c->truth_count < SONDE_SEGMENTS);
+    snprintf(c->truth_segment[c->truth_count], sizeof c->truth_segment[0], "%s", NAMES[i]);
+    c->truth[c->truth_count++] = word ? SONDE_DECISION_CLOT : SONDE_DECISION_COMPRESSIBLE;
+  }
   sonde_place list = sonde_read_find(reader, at, "look_alikes");
   c->look_alike_count = read_some(reader, list, "look_alikes", SONDE_LOOK_ALIKES);
   for (uint32_t i = 0; i < c->look_alike_count; ++i) {
@@ -255,6 +236,7 @@ static sonde_status check_id(const char *id, sonde_error *error) {
 }
 
 sonde_status sonde_case_check(const sonde_case *of, sonde_error *error) {
+  SONDE_ASSERT(of && of->truth_count <= SONDE_SEGMENTS);
   sonde_status status = check_id(of->id, error);
   if (status) return status;
   bool clot = false;
@@ -291,8 +273,7 @@ static void read_case(sonde_reader *reader, sonde_case *c) {
   sonde_read_member(reader, root, "note", false, c->note, sizeof c->note);
   read_thigh(reader, root, c);
   read_circulation(reader, sonde_read_find(reader, root, "circulation"), &c->circulation);
-  read_vein(reader, root, c);
-  read_findings(reader, root, c);
+  read_pathology(reader, root, c);
   read_truth(reader, root, c);
   if (sonde_reader_good(reader) && sonde_case_check(c, &error))
     sonde_reader_pass(reader, sonde_read_find(reader, root, "truth"), &error);
@@ -312,6 +293,7 @@ sonde_status sonde_case_parse(const char *text, const char *name, sonde_case *ou
 }
 
 sonde_status sonde_case_load(const char *path, sonde_case *out, sonde_error *error) {
+  SONDE_ASSERT(path && out);
   char *text = NULL;
   size_t count;
   sonde_status status = sonde_bounded_load_text(path, &sonde_limits_yaml, &text, &count, error);

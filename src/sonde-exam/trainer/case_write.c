@@ -1,12 +1,14 @@
 // Writing a case file that reads to the same case.
-// put_text, put_station, put_clot: pieces.
+#include "sonde/base_json.h"
 #include "trainer/case.h"
 
 #include <string.h>
 
-static void put_text(sonde_file *file, const char *key, const char *text) {
-  sonde_file_printf(file, "%s: ", key);
-  sonde_json_text(file, text); // a YAML string in double quotes has JSON's escapes
+// A YAML string in double quotes has JSON's escapes.
+static void put_quoted(sonde_file *file, const char *before, const char *text) {
+  sonde_json_out out = {.file = file, .layout = SONDE_JSON_COMPACT};
+  sonde_file_printf(file, "%s", before);
+  sonde_json_put_text(&out, NULL, text);
   sonde_file_printf(file, "\n");
 }
 
@@ -36,25 +38,29 @@ static void put_clot(sonde_file *file, const char *before, const sonde_pathology
   put_station(file, "to", &extent->to);
 }
 
-static void put_thigh(sonde_file *file, const sonde_case *c) {
-  if (c->thigh == SONDE_CASE_BUNDLED) sonde_file_printf(file, "thigh: bundled\n");
-  if (c->thigh == SONDE_CASE_MODEL) {
-    sonde_file_printf(file, "thigh:\n  ");
-    put_text(file, "model", c->model);
-  }
-  if (c->thigh != SONDE_CASE_GENERATED) return;
-  sonde_file_printf(file, "thigh:\n  seed: %llu\n  sex: %s\n", (unsigned long long)c->seed,
-                    sonde_case_sexes[c->known.sex]);
-  uint32_t count;
-  const sonde_thigh_parameter *p = sonde_thigh_parameters(&count);
-  sonde_thigh known = c->known;
-  for (uint32_t i = 0; i < count; ++i) {
-    double value = *sonde_thigh_member(&known, &p[i]);
-    if (isfinite(value)) sonde_file_printf(file, "  %s: %.12g\n", p[i].name, value / p[i].unit);
-  }
-}
+static void put_patient(sonde_file *file, const sonde_case *from) {
+  sonde_file_printf(file, "sonde_case: %d\n", SONDE_CASE_VERSION);
+  put_quoted(file, "id: ", from->id);
+  put_quoted(file, "title: ", from->title);
+  sonde_file_printf(file, "level: %s\n", sonde_case_levels[from->level]);
+  put_quoted(file, "history: ", from->history);
+  if (from->note[0]) put_quoted(file, "note: ", from->note);
 
-static void put_circulation(sonde_file *file, const sonde_circulation *c) {
+  if (from->thigh == SONDE_CASE_BUNDLED) sonde_file_printf(file, "thigh: bundled\n");
+  if (from->thigh == SONDE_CASE_MODEL) put_quoted(file, "thigh:\n  model: ", from->model);
+  if (from->thigh == SONDE_CASE_GENERATED) {
+    sonde_file_printf(file, "thigh:\n  seed: %llu\n  sex: %s\n", (unsigned long long)from->seed,
+                      sonde_case_sexes[from->known.sex]);
+    uint32_t count;
+    const sonde_thigh_parameter *p = sonde_thigh_parameters(&count);
+    sonde_thigh known = from->known;
+    for (uint32_t i = 0; i < count; ++i) {
+      double value = *sonde_thigh_member(&known, &p[i]);
+      if (isfinite(value)) sonde_file_printf(file, "  %s: %.12g\n", p[i].name, value / p[i].unit);
+    }
+  }
+
+  const sonde_circulation *c = &from->circulation;
   sonde_file_printf(file, "circulation: {posture: %s, breath_mmhg: %.12g",
                     sonde_case_postures[c->posture], c->breath_pa / SONDE_PA_PER_MMHG);
   if (c->valsalva_to_s > c->valsalva_from_s)
@@ -63,9 +69,15 @@ static void put_circulation(sonde_file *file, const sonde_circulation *c) {
   sonde_file_printf(file, ", valsalva_mmhg: %.12g}\n", c->valsalva_pa / SONDE_PA_PER_MMHG);
 }
 
-static void put_findings(sonde_file *file, const sonde_case *c) {
-  if (c->lesion_count == 0 && c->branch_count == 0 && !(c->oedema > 0)) return;
-  sonde_file_printf(file, "findings:\n  oedema: %.12g\n", c->oedema);
+static void put_case(sonde_file *file, const sonde_case *c) {
+  put_patient(file, c);
+  sonde_file_printf(file, "vein:");
+  put_clot(file, "\n  ", &c->pathology, &c->extent);
+  sonde_file_printf(file, "\n  webs: %.12g\n", c->webs);
+
+  SONDE_ASSERT(c->lesion_count <= SONDE_LESIONS && c->branch_count <= SONDE_BRANCHES);
+  if (c->lesion_count || c->branch_count || c->oedema > 0)
+    sonde_file_printf(file, "findings:\n  oedema: %.12g\n", c->oedema);
   if (c->lesion_count) sonde_file_printf(file, "  lesions:\n");
   for (uint32_t i = 0; i < c->lesion_count; ++i) {
     const sonde_case_lesion *l = &c->lesion[i];
@@ -82,36 +94,14 @@ static void put_findings(sonde_file *file, const sonde_case *c) {
     put_clot(file, "\n    ", &c->branch[i].pathology, &c->branch[i].extent);
     sonde_file_printf(file, "\n");
   }
-}
 
-static void put_truth(sonde_file *file, const sonde_case *c) {
-  sonde_file_printf(file, "truth:\n  thrombosis: %s\n  ", c->thrombosis ? "true" : "false");
-  put_text(file, "diagnosis", c->diagnosis);
+  sonde_file_printf(file, "truth:\n  thrombosis: %s\n", c->thrombosis ? "true" : "false");
+  put_quoted(file, "  diagnosis: ", c->diagnosis);
   sonde_file_printf(file, "  segments:\n");
   for (uint32_t i = 0; i < c->truth_count; ++i)
     sonde_file_printf(file, "    %s: %s\n", c->truth_segment[i], sonde_decision_name(c->truth[i]));
   if (c->look_alike_count) sonde_file_printf(file, "  look_alikes:\n");
-  for (uint32_t i = 0; i < c->look_alike_count; ++i) {
-    sonde_file_printf(file, "  - ");
-    sonde_json_text(file, c->look_alike[i]);
-    sonde_file_printf(file, "\n");
-  }
-}
-
-static void put_case(sonde_file *file, const sonde_case *from) {
-  sonde_file_printf(file, "sonde_case: %d\n", SONDE_CASE_VERSION);
-  put_text(file, "id", from->id);
-  put_text(file, "title", from->title);
-  sonde_file_printf(file, "level: %s\n", sonde_case_levels[from->level]);
-  put_text(file, "history", from->history);
-  if (from->note[0]) put_text(file, "note", from->note);
-  put_thigh(file, from);
-  put_circulation(file, &from->circulation);
-  sonde_file_printf(file, "vein:");
-  put_clot(file, "\n  ", &from->pathology, &from->extent);
-  sonde_file_printf(file, "\n  webs: %.12g\n", from->webs);
-  put_findings(file, from);
-  put_truth(file, from);
+  for (uint32_t i = 0; i < c->look_alike_count; ++i) put_quoted(file, "  - ", c->look_alike[i]);
 }
 
 sonde_status sonde_case_save(const sonde_case *from, const char *path, sonde_error *error) {

@@ -1,10 +1,4 @@
-// The judge: from snapshots to compressions.
-// want:            the stretch of vein that the plan examines.
-// begin, look:     a press starts; one snapshot of it.
-// sonde_press_classify: complete, open, insufficient, too hard, off axis.
-// locate, cover, keep: what a finished press has examined.
-// watch:           hysteresis between pressing and letting go.
-// spend:           contact time by force.
+// The judge: from snapshots to compressions, and what they examine.
 #include "trainer/judge.h"
 
 #include <string.h>
@@ -27,39 +21,58 @@ const char *sonde_press_state_name(sonde_press_state state) {
   return STATE[state];
 }
 
-static uint32_t bin_of(double along_m) {
-  double bin = floor(along_m / JUDGE_BIN_M);
-  return (uint32_t)clamp(bin, 0, JUDGE_BINS - 1);
+// ---- stretches of vein
+
+uint32_t sonde_vein_steps(const sonde_vein_map *map) {
+  return (uint32_t)ceil(fmin(map->length_m / JUDGE_BIN_M, JUDGE_BINS));
 }
 
-static void mark(const sonde_judge *judge, bool *bins, double from_m, double to_m) {
-  double end_m = fmin(judge->map.length_m, JUDGE_BIN_M * JUDGE_BINS);
+void sonde_vein_mark(const sonde_vein_map *map, bool *bins, double from_m, double to_m) {
+  double end_m = fmin(map->length_m, JUDGE_BIN_M * JUDGE_BINS);
   if (!(to_m > 0 && from_m < end_m)) return;
-  // a bin counts when its middle lies within
-  for (uint32_t i = bin_of(from_m); i <= bin_of(fmin(to_m, end_m)); ++i) {
-    double middle = ((double)i + 0.5) * JUDGE_BIN_M;
-    if (middle >= from_m && middle <= to_m && middle <= end_m) bins[i] = true;
+  double first = clamp(floor(from_m / JUDGE_BIN_M), 0, JUDGE_BINS - 1);
+  double last = clamp(floor(fmin(to_m, end_m) / JUDGE_BIN_M), 0, JUDGE_BINS - 1);
+  for (uint32_t i = (uint32_t)first; i <= (uint32_t)last; ++i) {
+    double middle_m = ((double)i + 0.5) * JUDGE_BIN_M;
+    if (middle_m >= from_m && middle_m <= to_m && middle_m <= end_m) bins[i] = true;
   }
 }
 
-static void want(sonde_judge *judge) {
-  double reach = judge->plan.criteria.reach_m;
-  for (uint32_t i = 0; i < judge->plan.count; ++i) {
-    double at = judge->plan.point[i].at.along_m;
-    mark(judge, judge->wanted, at - reach, at + reach);
+sonde_vein_run sonde_vein_longest_gap(const bool *planned, const bool *covered, uint32_t steps) {
+  SONDE_ASSERT(steps <= JUDGE_BINS);
+  sonde_vein_run longest = {0, 0};
+  for (uint32_t i = 0, run = 0; i < steps; ++i) {
+    run = planned[i] && !covered[i] ? run + 1 : 0;
+    if (run > longest.to - longest.from) longest = (sonde_vein_run){i + 1 - run, i + 1};
   }
+  return longest;
 }
+
+bool sonde_place_is_done(const sonde_plan *plan, uint32_t place, const sonde_compression *presses,
+                         uint32_t count) {
+  SONDE_ASSERT(place < plan->count && (presses || count == 0));
+  for (uint32_t i = 0; i < count; ++i)
+    if (sonde_press_is_valid(presses[i].result) &&
+        fabs(presses[i].along_m - plan->point[place].at.along_m) <= plan->criteria.reach_m)
+      return true;
+  return false;
+}
+
+// ---- a judge
 
 sonde_status sonde_judge_create(const sonde_vein_map *map, const sonde_plan *plan,
                                 sonde_judge **out, sonde_error *error) {
-  SONDE_ASSERT(map && plan && out);
+  SONDE_ASSERT(map && plan && out && plan->count <= SONDE_PLAN_POINTS);
   sonde_judge *judge = *out = SONDE_NEW(sonde_judge, 1);
   if (!judge) return sonde_fail_memory(error);
   judge->map = *map;
   judge->plan = *plan;
   judge->hint_s = -INFINITY;
   judge->seen = SONDE_SEGMENTS;
-  want(judge);
+  for (uint32_t i = 0; i < plan->count; ++i) {
+    double at_m = plan->point[i].at.along_m, reach_m = plan->criteria.reach_m;
+    sonde_vein_mark(map, judge->wanted, at_m - reach_m, at_m + reach_m);
+  }
   return SONDE_OK;
 }
 
@@ -83,23 +96,9 @@ sonde_force_target sonde_press_target(const sonde_judge *judge) {
   return judge->plan.point[place].target;
 }
 
-static void begin(sonde_judge *judge, const sonde_snapshot *s) {
-  judge->pressing = true;
-  judge->seen_at_peak = false;
-  judge->now = (sonde_compression){.start_s = s->time_s - judge->first_s,
-                                   .segment = SONDE_SEGMENTS,
-                                   .point = SONDE_PLAN_POINTS,
-                                   .z_m = (double)NAN,
-                                   .along_m = (double)NAN,
-                                   .vein_ratio = (double)NAN,
-                                   .artery_ratio = (double)NAN,
-                                   .artery_least = (double)NAN,
-                                   .tilt_rad = (double)NAN};
-  settle_place(judge, s->world_from_probe.position.z);
-}
-
-// fmin() leaves out what is not a number.
-static void look(sonde_judge *judge, const sonde_snapshot *s) {
+// One snapshot of the press under way: its greatest force, and the least area of the vein with the
+// artery and the tilt at that moment. fmin() leaves out what is not a number.
+static void follow_press(sonde_judge *judge, const sonde_snapshot *s) {
   sonde_compression *p = &judge->now;
   bool seen = isfinite(s->vein_area_ratio) && isfinite(s->vein_rest_m.z);
   if (s->force_normal_n >= p->force_peak_n) {
@@ -150,30 +149,39 @@ bool sonde_press_is_astray(const sonde_judge *judge) {
   return now.point == SONDE_PLAN_POINTS;
 }
 
-// Every place within reach is examined, not only the nearest one: presses in any order do the same.
-static void cover(sonde_judge *judge, const sonde_compression *p) {
+static bool end_press(sonde_judge *judge) {
+  sonde_compression *p = &judge->now;
+  SONDE_ASSERT(judge->pressing);
+  p->result = sonde_press_classify(judge);
+  locate(judge, p);
+  judge->pressing = false;
+  judge->trough_n = p->force_peak_n;
+  sonde_motion_pressed(&judge->motion);
+
+  // Counts by result and by place.
   judge->result_count[p->result]++;
   if (p->place < judge->plan.count) {
     judge->at_place[p->place]++;
     judge->hard_at_place[p->place] += p->result == SONDE_PRESS_TOO_HARD;
   }
-  if (!sonde_press_is_valid(p->result) || !isfinite(p->along_m)) return;
-  double reach = judge->plan.criteria.reach_m;
-  mark(judge, judge->covered, p->along_m - reach - COVER_EXTRA_M,
-       p->along_m + reach + COVER_EXTRA_M);
-  for (uint32_t i = 0; i < judge->plan.count; ++i)
-    judge->done[i] |= fabs(judge->plan.point[i].at.along_m - p->along_m) <= reach;
-  if (p->result == SONDE_PRESS_COMPLETE) judge->closed_sum += 1 - p->vein_ratio;
-  if (p->segment == SONDE_SEGMENTS) return;
-  judge->seen = p->segment;
-  if (p->result == SONDE_PRESS_OPEN)
-    judge->open[p->segment]++;
-  else
-    judge->complete[p->segment]++;
-}
 
-static bool keep(sonde_judge *judge, const sonde_compression *p) {
-  if (judge->press_count == SONDE_COMPRESSIONS) return true; // still counted
+  // A good press covers vein. Every place within reach is examined, not only the nearest one:
+  // presses in any order do the same.
+  if (sonde_press_is_valid(p->result) && isfinite(p->along_m)) {
+    double reach_m = judge->plan.criteria.reach_m, cover_m = reach_m + COVER_EXTRA_M;
+    sonde_vein_mark(&judge->map, judge->covered, p->along_m - cover_m, p->along_m + cover_m);
+    for (uint32_t i = 0; i < judge->plan.count; ++i)
+      judge->done[i] |= fabs(judge->plan.point[i].at.along_m - p->along_m) <= reach_m;
+    if (p->result == SONDE_PRESS_COMPLETE) judge->closed_sum += 1 - p->vein_ratio;
+    if (p->segment != SONDE_SEGMENTS) {
+      judge->seen = p->segment;
+      judge->open[p->segment] += p->result == SONDE_PRESS_OPEN;
+      judge->complete[p->segment] += p->result == SONDE_PRESS_COMPLETE;
+    }
+  }
+
+  // The list of presses; what does not fit is counted all the same.
+  if (judge->press_count == SONDE_COMPRESSIONS) return true;
   if (judge->press_count == judge->capacity) {
     uint32_t capacity = judge->capacity ? 2 * judge->capacity : 64;
     sonde_compression *more =
@@ -186,63 +194,59 @@ static bool keep(sonde_judge *judge, const sonde_compression *p) {
   return true;
 }
 
-static bool end(sonde_judge *judge) {
-  judge->now.result = sonde_press_classify(judge);
-  locate(judge, &judge->now);
-  cover(judge, &judge->now);
-  judge->pressing = false;
-  judge->trough_n = judge->now.force_peak_n;
-  sonde_motion_pressed(&judge->motion);
-  return keep(judge, &judge->now);
-}
-
 // ---- snapshots
-
-static bool watch(sonde_judge *judge, const sonde_snapshot *s) {
-  double force = s->force_normal_n;
-  bool kept = true;
-  if (judge->pressing && force < fmax(END_N, END_SHARE * judge->now.force_peak_n))
-    kept = end(judge);
-  if (!judge->pressing) {
-    judge->trough_n = fmin(judge->trough_n, force);
-    if (force >= BEGIN_N && force >= judge->trough_n + RISE_N) begin(judge, s);
-  }
-  if (judge->pressing) look(judge, s);
-  return kept;
-}
-
-static void spend(sonde_judge *judge, const sonde_snapshot *s) {
-  double force = 0.5 * (s->force_normal_n + judge->last.force_normal_n);
-  double step_s = s->time_s - judge->last.time_s;
-  if (!(force >= CONTACT_N) || step_s > LONGEST_STEP_S) return;
-  double bin = fmin(force / FORCE_BIN_N, FORCE_BINS - 1);
-  judge->force_s[(uint32_t)bin] += step_s;
-  judge->contact_s += step_s;
-}
 
 bool sonde_judge_feed(sonde_judge *judge, const sonde_snapshot *snapshot) {
   SONDE_ASSERT(judge && snapshot);
-  sonde_snapshot all = *snapshot;
-  const sonde_snapshot *s = &all;
-  all.vein_area_ratio = sonde_vein_ratio(snapshot);
-  if (!isfinite(s->time_s) || !isfinite(s->force_normal_n)) return true;
-  if (judge->started && !(s->time_s > judge->last.time_s)) return true;
-  if (judge->started)
-    spend(judge, s);
-  else
-    judge->first_s = s->time_s;
-  judge->force_peak_n = fmax(judge->force_peak_n, s->force_normal_n);
-  judge->restores = s->restores;
-  sonde_motion_feed(&judge->motion, s->time_s, s->world_from_probe.position);
-  bool kept = watch(judge, s);
-  judge->last = *s;
+  const double none = (double)NAN;
+  sonde_snapshot s = *snapshot;
+  bool kept = true;
+  s.vein_area_ratio = sonde_vein_ratio(snapshot);
+  if (!isfinite(s.time_s) || !isfinite(s.force_normal_n)) return true;
+  if (judge->started && !(s.time_s > judge->last.time_s)) return true;
+  if (!judge->started) judge->first_s = s.time_s;
+
+  // Time in contact, by force.
+  double mean_n = 0.5 * (s.force_normal_n + judge->last.force_normal_n);
+  double step_s = s.time_s - judge->last.time_s;
+  if (judge->started && mean_n >= CONTACT_N && step_s <= LONGEST_STEP_S) {
+    judge->force_s[(uint32_t)fmin(mean_n / FORCE_BIN_N, FORCE_BINS - 1)] += step_s;
+    judge->contact_s += step_s;
+  }
+  judge->force_peak_n = fmax(judge->force_peak_n, s.force_normal_n);
+  judge->restores = s.restores;
+  sonde_motion_feed(&judge->motion, s.time_s, s.world_from_probe.position);
+
+  // Hysteresis between pressing and letting go.
+  if (judge->pressing && s.force_normal_n < fmax(END_N, END_SHARE * judge->now.force_peak_n))
+    kept = end_press(judge);
+  if (!judge->pressing) {
+    judge->trough_n = fmin(judge->trough_n, s.force_normal_n);
+    if (s.force_normal_n >= BEGIN_N && s.force_normal_n >= judge->trough_n + RISE_N) {
+      judge->pressing = true;
+      judge->seen_at_peak = false;
+      judge->now = (sonde_compression){.start_s = s.time_s - judge->first_s,
+                                       .segment = SONDE_SEGMENTS,
+                                       .point = SONDE_PLAN_POINTS,
+                                       .z_m = none,
+                                       .along_m = none,
+                                       .vein_ratio = none,
+                                       .artery_ratio = none,
+                                       .artery_least = none,
+                                       .tilt_rad = none};
+      settle_place(judge, s.world_from_probe.position.z);
+    }
+  }
+  if (judge->pressing) follow_press(judge, &s);
+  judge->last = s;
   judge->started = true;
   return kept;
 }
 
-bool sonde_judge_finish(sonde_judge *judge) { return judge->pressing ? end(judge) : true; }
+bool sonde_judge_finish(sonde_judge *judge) { return judge->pressing ? end_press(judge) : true; }
 
 const sonde_compression *sonde_judge_compressions(const sonde_judge *judge, uint32_t *count) {
+  SONDE_ASSERT(judge && count);
   *count = judge->press_count;
   return judge->press;
 }

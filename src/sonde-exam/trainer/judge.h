@@ -13,7 +13,7 @@ static const double COVER_EXTRA_M = 0.0025;
 // Lighter contact than this is not pressing.
 static const double CONTACT_N = 1.0;
 
-// The probe's way on a fixed grid of time, whatever the rate of the snapshots.
+// The probe's path on a fixed grid of time, whatever the rate of the snapshots.
 typedef struct sonde_motion {
   bool started;
   double last_s, next_s;
@@ -23,13 +23,13 @@ typedef struct sonde_motion {
   uint32_t filled;
   double path_m;
   double jerk_sum, speed_peak_m_s, time_s; // since the last press
-  double smooth_sum;                       // over the ways before
-  uint32_t ways;
+  double smooth_sum;                       // over the approaches to the presses before
+  uint32_t approaches;
 } sonde_motion;
 void sonde_motion_feed(sonde_motion *motion, double time_s, sonde_vec3 position_m);
-// A press has ended, and with it the way to it.
+// A press has ended, and with it the approach to it.
 void sonde_motion_pressed(sonde_motion *motion);
-// Log dimensionless jerk, mean over the ways; NaN before the probe has moved.
+// Log dimensionless jerk, mean over the approaches; NaN before the probe has moved.
 double sonde_motion_smoothness(const sonde_motion *motion);
 
 struct sonde_judge {
@@ -71,6 +71,23 @@ static const double SONDE_SCORE_TIME_S = 600;
 static inline bool sonde_press_is_valid(sonde_press_result result) {
   return result == SONDE_PRESS_COMPLETE || result == SONDE_PRESS_OPEN;
 }
+// Steps of JUDGE_BIN_M that the vein has, the last one perhaps cut short.
+uint32_t sonde_vein_steps(const sonde_vein_map *map);
+// Marks the steps whose middle lies within a stretch of vein. @param bins [JUDGE_BINS]
+void sonde_vein_mark(const sonde_vein_map *map, bool *bins, double from_m, double to_m);
+// Steps [from, to).
+typedef struct sonde_vein_run {
+  uint32_t from, to;
+} sonde_vein_run;
+// The longest run of planned steps that no good press covers; empty: there is none.
+sonde_vein_run sonde_vein_longest_gap(const bool *planned, const bool *covered, uint32_t steps);
+// Ends of a segment as distances along the vein, the one at the groin first.
+void sonde_vein_segment_ends(const sonde_vein_map *map, uint32_t segment, double *from_m,
+                             double *to_m);
+// A good press lies within reach of the place.
+bool sonde_place_is_done(const sonde_plan *plan, uint32_t place, const sonde_compression *presses,
+                         uint32_t count);
+
 // What a press is so far.
 sonde_press_result sonde_press_classify(const sonde_judge *judge);
 // The force of the place where the press under way is, NaN without a place.

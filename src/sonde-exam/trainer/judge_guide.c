@@ -1,31 +1,12 @@
 // What to do next: one sentence for the learner.
-// next_point:    first place of the plan that is not examined.
-// is_due:        a needed segment whose places are done and that has no decision.
-// undecided:     the one that was pressed last if it is due, else the first that is.
-// measure:       where the probe is against a place.
-// say_next, say_move, say_press: the sentence.
-// ask:           for the finding, before what comes next.
 #include "trainer/judge.h"
 
 #include <ctype.h>
 
-static uint32_t next_point(const sonde_judge *judge) {
-  for (uint32_t i = 0; i < judge->plan.count; ++i)
-    if (!judge->done[i]) return i;
-  return SONDE_PLAN_POINTS;
-}
-
+// A segment of the plan whose places are done and that has no decision.
 static bool is_due(const sonde_judge *judge, uint32_t segment) {
   sonde_segment_status s = sonde_judge_segment(judge, segment);
   return s.needed && s.done == s.points && s.decision == SONDE_DECISION_NONE;
-}
-
-// What was just seen is asked for first: it is still in the learner's mind, and in the picture.
-static uint32_t undecided(const sonde_judge *judge) {
-  if (judge->seen < SONDE_SEGMENTS && is_due(judge, judge->seen)) return judge->seen;
-  for (uint32_t i = 0; i < judge->map.segment_count; ++i)
-    if (is_due(judge, i)) return i;
-  return SONDE_SEGMENTS;
 }
 
 // Distance along the skin: what lies along the normal is the press itself.
@@ -35,7 +16,7 @@ static double measure(const sonde_judge *judge, const sonde_vein_point *at, doub
   sonde_vec3 away = v_sub(pose.position, at->skin_m);
   sonde_vec3 flat = v_madd(away, -v_dot(away, at->normal), at->normal);
   sonde_vec3 course = v_cross(at->normal, at->across);
-  // towards the knee: the way on which the map's points come later
+  // towards the knee: the direction in which the map's points come later
   const sonde_vein_map *map = &judge->map;
   sonde_vec3 down = v_sub(map->point[map->point_count - 1].vein_m, map->point[0].vein_m);
   if (v_dot(down, course) < 0) course = v_neg(course);
@@ -43,18 +24,6 @@ static double measure(const sonde_judge *judge, const sonde_vein_point *at, doub
   double transverse = fabs(v_dot(q_rotate(pose.rotation, vec3(0, 1, 0)), course));
   *angle_rad = acos(fmin(transverse, 1));
   return v_norm(flat);
-}
-
-static void say_move(sonde_guidance *g, bool pressing, const char *title, double along_m,
-                     double offset_m) {
-  const char *move = pressing ? "Not here: let go and move" : "Move";
-  double across_m = sqrt(fmax(0, offset_m * offset_m - along_m * along_m));
-  double along_mm = fabs(1e3 * along_m), across_mm = 1e3 * across_m;
-  if (along_mm >= across_mm)
-    snprintf(g->text, sizeof g->text, "%s the probe %.0f mm towards the %s: %s.", move, along_mm,
-             along_m < 0 ? "knee" : "groin", title);
-  else
-    snprintf(g->text, sizeof g->text, "%s the probe %.0f mm sideways: %s.", move, across_mm, title);
 }
 
 static void say_press(const sonde_judge *judge, sonde_guidance *g) {
@@ -99,30 +68,45 @@ static void say_next(const sonde_judge *judge, sonde_guidance *g) {
   g->angle_ok = g->angle_rad <= c->tilt_rad;
   // a press at a place is finished before the next one is named
   bool elsewhere = judge->pressing ? sonde_press_is_astray(judge) : g->offset_m > c->reach_m;
-  if (elsewhere)
-    say_move(g, judge->pressing, point->title, along_m, g->offset_m);
-  else
+  if (!elsewhere) {
     say_press(judge, g);
-}
-
-static void ask(const sonde_judge *judge, sonde_guidance *g) {
-  g->text[0] = (char)tolower((unsigned char)g->text[0]);
-  if (g->point < SONDE_PLAN_POINTS) snprintf(g->detail, sizeof g->detail, "Then %s", g->text);
-  snprintf(g->text, sizeof g->text, "Say what you saw: %s.",
-           sonde_segment_title(judge->map.segment[g->undecided].name));
+    return;
+  }
+  const char *move = judge->pressing ? "Not here: let go and move" : "Move";
+  double across_mm = 1e3 * sqrt(fmax(0, g->offset_m * g->offset_m - along_m * along_m));
+  double along_mm = fabs(1e3 * along_m);
+  if (along_mm >= across_mm)
+    snprintf(g->text, sizeof g->text, "%s the probe %.0f mm towards the %s: %s.", move, along_mm,
+             along_m < 0 ? "knee" : "groin", point->title);
+  else
+    snprintf(g->text, sizeof g->text, "%s the probe %.0f mm sideways: %s.", move, across_mm,
+             point->title);
 }
 
 sonde_guidance sonde_judge_guidance(const sonde_judge *judge) {
+  SONDE_ASSERT(judge && judge->plan.count <= SONDE_PLAN_POINTS);
   const double none = (double)NAN;
-  sonde_guidance g = {.point = next_point(judge),
+  sonde_guidance g = {.point = SONDE_PLAN_POINTS,
                       .offset_m = none,
                       .angle_rad = none,
                       .force = {none, none, none},
-                      .undecided = undecided(judge)};
+                      .undecided = SONDE_SEGMENTS};
+  for (uint32_t i = judge->plan.count; i-- > 0;)
+    if (!judge->done[i]) g.point = i;
   if (g.point < judge->plan.count) g.force = judge->plan.point[g.point].target;
   if (judge->pressing) g.force = sonde_press_target(judge);
   say_next(judge, &g);
-  if (g.undecided < SONDE_SEGMENTS && !judge->pressing) ask(judge, &g);
+
+  // The finding is asked for before what comes next: first of the segment that was just seen, while
+  // it is still in the learner's mind and in the picture.
+  for (uint32_t i = judge->map.segment_count; i-- > 0;)
+    if (is_due(judge, i)) g.undecided = i;
+  if (judge->seen < SONDE_SEGMENTS && is_due(judge, judge->seen)) g.undecided = judge->seen;
+  if (g.undecided == SONDE_SEGMENTS || judge->pressing) return g;
+  g.text[0] = (char)tolower((unsigned char)g.text[0]);
+  if (g.point < SONDE_PLAN_POINTS) snprintf(g.detail, sizeof g.detail, "Then %s", g.text);
+  snprintf(g.text, sizeof g.text, "Say what you saw: %s.",
+           sonde_segment_title(judge->map.segment[g.undecided].name));
   return g;
 }
 

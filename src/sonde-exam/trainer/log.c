@@ -1,20 +1,4 @@
 // The log of exams in one SQLite file.
-//
-// sql_fail        what SQLite says, as a status and a sentence
-// run             statements without a result
-// prepare         one statement
-// integer_of      first value of a statement's first row
-// kind_of, look   what file this is, at one moment
-// is_new, check_kind, check_whole  empty file; a log of this version; nothing in it is damaged
-// make_tables     schema of a new log, once, whoever comes first
-// fail_to_open    why a file cannot be opened
-// configure       waiting, distrust of the file's own code
-// sonde_exam_log_open, sonde_exam_log_close
-// put_columns     names of all columns, or as many numbered places, with commas between
-// bind_value, read_value  one member of an entry to and from a statement
-// is_date         a date of our form
-// check_entry     what the table could not say in words
-// grow            room for one more item of an array
 #include "trainer/log.h"
 
 #include "base/disk.h"
@@ -157,7 +141,8 @@ static sonde_status kind_of(sonde_exam_log *log, file_kind *kind, sonde_error *e
   return status;
 }
 
-// In one transaction: another program may be making the tables between two questions.
+// What file this is, in one transaction: another program may be making the tables between two
+// questions.
 static sonde_status look(sonde_exam_log *log, file_kind *kind, sonde_error *error) {
   sonde_status status = run(log, "BEGIN", error);
   if (status) return status;
@@ -168,41 +153,6 @@ static sonde_status look(sonde_exam_log *log, file_kind *kind, sonde_error *erro
 
 static bool is_new(const file_kind *kind) {
   return kind->application == 0 && kind->version == 0 && kind->tables == 0;
-}
-
-static sonde_status check_kind(const sonde_exam_log *log, const file_kind *kind,
-                               sonde_error *error) {
-  if (kind->application != APPLICATION)
-    return sonde_fail(error, SONDE_FORMAT,
-                      "%s: is an SQLite file of something else; expected a log of exams",
-                      log->path);
-  if (kind->version != SONDE_LOG_VERSION)
-    return sonde_fail(error, SONDE_VERSION, "%s: log of exams of version %lld; expected %d",
-                      log->path, (long long)kind->version, SONDE_LOG_VERSION);
-  return SONDE_OK;
-}
-
-static sonde_status check_whole(sonde_exam_log *log, sonde_error *error) {
-  sqlite3_stmt *statement = NULL;
-  sonde_status status = prepare(log, "PRAGMA quick_check(1)", &statement, error);
-  if (!status && sqlite3_step(statement) != SQLITE_ROW) status = sql_fail(log, error);
-  if (!status) {
-    const char *words = (const char *)sqlite3_column_text(statement, 0);
-    if (!words || strcmp(words, "ok") != 0)
-      status =
-          sonde_fail(error, SONDE_FORMAT, "%s: the log of exams is damaged: %s; it stays as it is",
-                     log->path, words ? words : "unreadable");
-  }
-  sqlite3_finalize(statement);
-  return status;
-}
-
-static const char *sql_type(column_kind kind) {
-  switch (kind) {
-  case COLUMN_TEXT: return "TEXT NOT NULL";
-  case COLUMN_REAL: return "REAL"; // NULL: not measured
-  default: return "INTEGER NOT NULL";
-  }
 }
 
 // Adds to a statement that must fit.
@@ -217,26 +167,27 @@ static void put(char *sql, size_t *used, const char *format, ...) {
   *used += (size_t)length;
 }
 
-static void put_tables(char *sql) {
-  size_t used = 0;
-  put(sql, &used, "CREATE TABLE exams (number INTEGER PRIMARY KEY");
-  for (uint32_t i = 0; i < COLUMN_TOTAL; ++i)
-    put(sql, &used, ", %s %s%s", COLUMNS[i].name, sql_type(COLUMNS[i].kind),
-        i == 0 ? " UNIQUE" : "");
-  put(sql, &used, ") STRICT; CREATE INDEX exams_of_trainee ON exams (trainee, date);");
-  put(sql, &used, "PRAGMA application_id = %d; PRAGMA user_version = %d;", APPLICATION,
-      SONDE_LOG_VERSION);
-}
-
-// Looks again once the file is ours: another program may have made the tables meanwhile.
+// The tables of a new log. Looks again once the file is ours: another program may have made them
+// meanwhile.
 static sonde_status make_tables(sonde_exam_log *log, sonde_error *error) {
+  static const char *const TYPES[] = {[COLUMN_TEXT] = "TEXT NOT NULL",
+                                      [COLUMN_REAL] = "REAL", // NULL: not measured
+                                      [COLUMN_COUNT] = "INTEGER NOT NULL",
+                                      [COLUMN_FLAG] = "INTEGER NOT NULL"};
   char sql[SQL_SIZE];
+  size_t used = 0;
   file_kind kind = {0};
   sonde_status status = run(log, "BEGIN IMMEDIATE", error);
   if (status) return status;
   status = kind_of(log, &kind, error);
   if (!status && is_new(&kind)) {
-    put_tables(sql);
+    put(sql, &used, "CREATE TABLE exams (number INTEGER PRIMARY KEY");
+    for (uint32_t i = 0; i < COLUMN_TOTAL; ++i)
+      put(sql, &used, ", %s %s%s", COLUMNS[i].name, TYPES[COLUMNS[i].kind],
+          i == 0 ? " UNIQUE" : "");
+    put(sql, &used, ") STRICT; CREATE INDEX exams_of_trainee ON exams (trainee, date);");
+    put(sql, &used, "PRAGMA application_id = %d; PRAGMA user_version = %d;", APPLICATION,
+        SONDE_LOG_VERSION);
     status = run(log, sql, error);
   }
   if (!status) status = run(log, "COMMIT", error);
@@ -244,37 +195,51 @@ static sonde_status make_tables(sonde_exam_log *log, sonde_error *error) {
   return status;
 }
 
-static void configure(sonde_exam_log *log) {
-  sqlite3_extended_result_codes(log->base, 1);
-  sqlite3_busy_timeout(log->base, WAIT_MS);
-  sqlite3_db_config(log->base, SQLITE_DBCONFIG_DEFENSIVE, 1, NULL);
-  sqlite3_db_config(log->base, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, NULL);
-}
-
-// SQLite does not say why: the same attempt does. What succeeds at the second one was the
-// machine's.
-static sonde_status fail_to_open(const char *path, sonde_error *error) {
-  int descriptor, failure = sonde_disk_open(path, O_RDWR | O_CREAT, 0666, &descriptor);
-  if (!failure) (void)sonde_disk_close(descriptor);
-  return sonde_fail(error, failure ? sonde_disk_status(failure) : SONDE_DISK,
-                    "%s: the log of exams cannot be opened: %s", path,
-                    failure ? strerror(failure) : "the disk failed once");
-}
-
 static sonde_status open_and_check(sonde_exam_log *log, const char *path, sonde_error *error) {
   file_kind kind = {0};
   int code = sqlite3_open_v2(path, &log->base, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE, NULL);
   if (!log->base) return sonde_fail_memory(error);
-  if (code == SQLITE_CANTOPEN) return fail_to_open(path, error);
+  // SQLite does not say why it cannot open: the same attempt does. What succeeds at the second one
+  // was the machine's.
+  if (code == SQLITE_CANTOPEN) {
+    int descriptor, failure = sonde_disk_open(path, O_RDWR | O_CREAT, 0666, &descriptor);
+    if (!failure) (void)sonde_disk_close(descriptor);
+    return sonde_fail(error, failure ? sonde_disk_status(failure) : SONDE_DISK,
+                      "%s: the log of exams cannot be opened: %s", path,
+                      failure ? strerror(failure) : "the disk failed once");
+  }
   if (code) return sql_fail(log, error);
-  configure(log);
+  sqlite3_extended_result_codes(log->base, 1);
+  sqlite3_busy_timeout(log->base, WAIT_MS);
+  // The file's own code is not trusted.
+  sqlite3_db_config(log->base, SQLITE_DBCONFIG_DEFENSIVE, 1, NULL);
+  sqlite3_db_config(log->base, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, NULL);
+
   sonde_status status = look(log, &kind, error);
   if (!status && is_new(&kind)) {
     status = make_tables(log, error);
     if (!status) status = look(log, &kind, error);
   }
-  if (!status) status = check_kind(log, &kind, error);
-  if (!status) status = check_whole(log, error);
+  if (status) return status;
+  if (kind.application != APPLICATION)
+    return sonde_fail(error, SONDE_FORMAT,
+                      "%s: is an SQLite file of something else; expected a log of exams",
+                      log->path);
+  if (kind.version != SONDE_LOG_VERSION)
+    return sonde_fail(error, SONDE_VERSION, "%s: log of exams of version %lld; expected %d",
+                      log->path, (long long)kind.version, SONDE_LOG_VERSION);
+
+  sqlite3_stmt *statement = NULL;
+  status = prepare(log, "PRAGMA quick_check(1)", &statement, error);
+  if (!status && sqlite3_step(statement) != SQLITE_ROW) status = sql_fail(log, error);
+  if (!status) {
+    const char *words = (const char *)sqlite3_column_text(statement, 0);
+    if (!words || strcmp(words, "ok") != 0)
+      status =
+          sonde_fail(error, SONDE_FORMAT, "%s: the log of exams is damaged: %s; it stays as it is",
+                     log->path, words ? words : "unreadable");
+  }
+  sqlite3_finalize(statement);
   return status;
 }
 
@@ -302,6 +267,7 @@ void sonde_exam_log_close(sonde_exam_log *log) {
 
 // ---- entries ------------------------------------------------------------------------------------
 
+// Names of all columns, or as many numbered parameters, with commas between.
 static void put_columns(char *sql, size_t *used, bool names) {
   for (uint32_t i = 0; i < COLUMN_TOTAL; ++i) {
     const char *comma = i ? ", " : "";
@@ -312,45 +278,19 @@ static void put_columns(char *sql, size_t *used, bool names) {
   }
 }
 
-static int bind_value(sqlite3_stmt *statement, int place, const column *c, const char *member) {
-  if (c->kind == COLUMN_TEXT) return sqlite3_bind_text(statement, place, member, -1, SQLITE_STATIC);
-  if (c->kind == COLUMN_FLAG) return sqlite3_bind_int(statement, place, *(const bool *)member);
-  if (c->kind == COLUMN_COUNT)
-    return sqlite3_bind_int64(statement, place, *(const uint32_t *)(const void *)member);
-  return sqlite3_bind_double(statement, place, *(const double *)(const void *)member); // NaN: NULL
-}
-
-static void read_value(sqlite3_stmt *statement, int place, const column *c, char *member) {
-  if (c->kind == COLUMN_TEXT) {
-    sonde_log_copy(member, c->size, (const char *)sqlite3_column_text(statement, place));
-  } else if (c->kind == COLUMN_FLAG) {
-    *(bool *)member = sqlite3_column_int(statement, place) != 0;
-  } else if (c->kind == COLUMN_COUNT) {
-    int64_t value = sqlite3_column_int64(statement, place);
-    *(uint32_t *)(void *)member = (uint32_t)(value < 0            ? 0
-                                             : value > UINT32_MAX ? UINT32_MAX
-                                                                  : value);
-  } else {
-    bool is_null = sqlite3_column_type(statement, place) == SQLITE_NULL;
-    *(double *)(void *)member = is_null ? (double)NAN : sqlite3_column_double(statement, place);
-  }
-}
-
-static bool is_date(const char *date) {
-  static const char FORM[] = "dddd-dd-ddTdd:dd:ddZ";
-  for (size_t i = 0; i < sizeof FORM; ++i) { // the end too
-    bool digit = date[i] >= '0' && date[i] <= '9';
-    if (FORM[i] == 'd' ? !digit : date[i] != FORM[i]) return false;
-  }
-  return true;
-}
-
+// What the table could not say in words.
 static sonde_status check_entry(const sonde_log_entry *entry, sonde_error *error) {
   if (!entry->id[0] || !entry->trainee[0] || !entry->case_id[0])
     return sonde_fail(error, SONDE_ARGUMENT,
                       "exam '%s' of '%s' on case '%s'; expected an id, a trainee and a case",
                       entry->id, entry->trainee, entry->case_id);
-  if (!is_date(entry->date))
+  static const char FORM[] = "dddd-dd-ddTdd:dd:ddZ";
+  bool dated = true;
+  for (size_t i = 0; dated && i < sizeof FORM; ++i) { // the end too
+    bool digit = entry->date[i] >= '0' && entry->date[i] <= '9';
+    dated = FORM[i] == 'd' ? digit : entry->date[i] == FORM[i];
+  }
+  if (!dated)
     return sonde_fail(error, SONDE_ARGUMENT,
                       "exam %s: date '%s'; expected the form 2026-11-22T04:40:00Z", entry->id,
                       entry->date);
@@ -375,8 +315,18 @@ sonde_status sonde_exam_log_add(sonde_exam_log *log, const sonde_log_entry *entr
   sqlite3_stmt *statement = NULL;
   status = prepare(log, sql, &statement, error);
   int code = SQLITE_OK;
-  for (int i = 0; !status && i < COLUMN_TOTAL && !code; ++i)
-    code = bind_value(statement, i + 1, &COLUMNS[i], (const char *)entry + COLUMNS[i].offset);
+  for (int i = 0; !status && i < COLUMN_TOTAL && !code; ++i) {
+    const column *c = &COLUMNS[i];
+    const void *member = (const char *)entry + c->offset;
+    switch (c->kind) {
+    case COLUMN_TEXT: code = sqlite3_bind_text(statement, i + 1, member, -1, SQLITE_STATIC); break;
+    case COLUMN_FLAG: code = sqlite3_bind_int(statement, i + 1, *(const bool *)member); break;
+    case COLUMN_COUNT:
+      code = sqlite3_bind_int64(statement, i + 1, *(const uint32_t *)member);
+      break;
+    case COLUMN_REAL: code = sqlite3_bind_double(statement, i + 1, *(const double *)member); break;
+    } // NaN: NULL
+  }
   if (!status && (code || sqlite3_step(statement) != SQLITE_DONE)) {
     bool twice = sqlite3_extended_errcode(log->base) == SQLITE_CONSTRAINT_UNIQUE;
     status = twice ? sonde_fail(error, SONDE_ARGUMENT, "%s: exam '%s' is in the log already",
@@ -447,27 +397,29 @@ sonde_status sonde_log_entry_parse(const char *text, sonde_log_entry *entry, son
   return check_entry(entry, error) ? SONDE_FORMAT : SONDE_OK;
 }
 
-// Makes room for item number `count`; false when out of memory.
-static bool grow(void **items, uint32_t count, uint32_t *room, size_t size) {
-  if (count < *room) return true;
-  uint32_t more = *room ? 2 * *room : 16;
-  void *grown = sonde_realloc(*items, *room * size, more * size);
-  if (!grown) return false;
-  *items = grown;
-  *room = more;
-  return true;
-}
-
-static int bind_trainee(sqlite3_stmt *statement, const char *trainee) {
-  return trainee ? sqlite3_bind_text(statement, 1, trainee, -1, SQLITE_STATIC)
-                 : sqlite3_bind_null(statement, 1);
-}
-
 typedef void (*read_row_fn)(sqlite3_stmt *statement, void *item);
 
+static double real_or_nan(sqlite3_stmt *statement, int place) {
+  if (sqlite3_column_type(statement, place) == SQLITE_NULL) return (double)NAN;
+  return sqlite3_column_double(statement, place);
+}
+
 static void read_entry(sqlite3_stmt *statement, void *item) {
-  for (int i = 0; i < COLUMN_TOTAL; ++i)
-    read_value(statement, i, &COLUMNS[i], (char *)item + COLUMNS[i].offset);
+  for (int i = 0; i < COLUMN_TOTAL; ++i) {
+    const column *c = &COLUMNS[i];
+    void *member = (char *)item + c->offset;
+    switch (c->kind) {
+    case COLUMN_TEXT:
+      sonde_log_copy(member, c->size, (const char *)sqlite3_column_text(statement, i));
+      break;
+    case COLUMN_FLAG: *(bool *)member = sqlite3_column_int(statement, i) != 0; break;
+    case COLUMN_COUNT:
+      *(uint32_t *)member =
+          (uint32_t)clamp((double)sqlite3_column_int64(statement, i), 0, UINT32_MAX);
+      break;
+    case COLUMN_REAL: *(double *)member = real_or_nan(statement, i); break;
+    }
+  }
 }
 
 // All rows of a statement whose first parameter is a trainee and whose second is a most.
@@ -477,18 +429,26 @@ static sonde_status read_rows(sonde_exam_log *log, const char *sql, const char *
   uint32_t room = 0;
   sqlite3_stmt *statement = NULL;
   sonde_status status = prepare(log, sql, &statement, error);
-  if (!status && (bind_trainee(statement, trainee) || sqlite3_bind_int64(statement, 2, most)))
-    status = sql_fail(log, error);
+  int bound = status ? SQLITE_OK : sqlite3_bind_int64(statement, 2, most);
+  if (!status && !bound && trainee) // unbound: NULL
+    bound = sqlite3_bind_text(statement, 1, trainee, -1, SQLITE_STATIC);
+  if (!status && bound) status = sql_fail(log, error);
   int code = SQLITE_DONE;
   while (!status && (code = sqlite3_step(statement)) == SQLITE_ROW) {
-    if (!grow(items, *count, &room, size)) {
-      status = sonde_fail_memory(error);
-    } else {
-      char *item = (char *)*items + *count * size;
-      memset(item, 0, size);
-      read(statement, item);
-      ++*count;
+    if (*count == room) {
+      uint32_t more = room ? 2 * room : 16;
+      void *grown = sonde_realloc(*items, room * size, more * size);
+      if (!grown) {
+        status = sonde_fail_memory(error);
+        break;
+      }
+      *items = grown;
+      room = more;
     }
+    char *item = (char *)*items + *count * size;
+    memset(item, 0, size);
+    read(statement, item);
+    ++*count;
   }
   if (!status && code != SQLITE_DONE) status = sql_fail(log, error);
   sqlite3_finalize(statement);
@@ -514,11 +474,6 @@ sonde_status sonde_exam_log_list(sonde_exam_log *log, const char *trainee, uint3
                                   sizeof(sonde_log_entry), read_entry, &items, count, error);
   *entries = items;
   return status;
-}
-
-static double real_or_nan(sqlite3_stmt *statement, int place) {
-  if (sqlite3_column_type(statement, place) == SQLITE_NULL) return (double)NAN;
-  return sqlite3_column_double(statement, place);
 }
 
 static void read_count(sqlite3_stmt *statement, void *item) {

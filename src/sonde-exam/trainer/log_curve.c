@@ -1,8 +1,4 @@
 // Entries from scores, and what a list of entries says about learning.
-//
-// sonde_log_copy, sonde_log_date, sonde_log_entry_make
-// median                 of a few scores
-// sonde_learning_curve, sonde_exam_log_curve, sonde_exam_log_series
 #include "trainer/log.h"
 
 #include <string.h>
@@ -51,17 +47,6 @@ sonde_log_entry sonde_log_entry_make(const sonde_case *patient, const sonde_scor
 
 // ---- learning -----------------------------------------------------------------------------------
 
-static double median(const double *values, uint32_t count) {
-  double sorted[SONDE_LOG_WINDOW_MAX];
-  SONDE_ASSERT(count > 0 && count <= SONDE_LOG_WINDOW_MAX);
-  for (uint32_t i = 0; i < count; ++i) {
-    uint32_t j = i;
-    for (; j > 0 && sorted[j - 1] > values[i]; --j) sorted[j] = sorted[j - 1];
-    sorted[j] = values[i];
-  }
-  return 0.5 * (sorted[(count - 1) / 2] + sorted[count / 2]);
-}
-
 uint32_t sonde_learning_curve(const sonde_log_entry *entries, uint32_t count, uint32_t window,
                               sonde_learning_point *points) {
   SONDE_ASSERT(count == 0 || (entries && points));
@@ -74,7 +59,15 @@ uint32_t sonde_learning_curve(const sonde_log_entry *entries, uint32_t count, ui
     last[used % most] = e->score;
     sonde_learning_point *p = &points[used++];
     *p = (sonde_learning_point){.number = used, .score = e->score, .passed = e->passed};
-    p->median = median(last, used < most ? used : most);
+    // The median of the window's scores, by insertion.
+    double sorted[SONDE_LOG_WINDOW_MAX];
+    uint32_t within = used < most ? used : most;
+    for (uint32_t k = 0; k < within; ++k) {
+      uint32_t j = k;
+      for (; j > 0 && sorted[j - 1] > last[k]; --j) sorted[j] = sorted[j - 1];
+      sorted[j] = last[k];
+    }
+    p->median = 0.5 * (sorted[(within - 1) / 2] + sorted[within / 2]);
     memcpy(p->date, e->date, sizeof p->date);
   }
   return used;

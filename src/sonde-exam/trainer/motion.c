@@ -1,19 +1,11 @@
-// The probe's way: length and smoothness.
-// advance:     one step of the grid: low-pass, path, speed, jerk.
-// smoothness:  of the way since the last press.
+// Length and smoothness of the probe's path.
 #include "trainer/judge.h"
 
 // Grid of 20 Hz; two low-passes of 4 Hz each: a hand's movements stay, its tremor and the sampling
-// go. The sample after a pause starts anew: nothing is known of the way between.
+// go. The sample after a pause starts anew: nothing is known of the path between.
 static const double GRID_S = 0.05, PAUSE_S = 2, SHARE = 0.7153857; // 1 - exp(-2 pi 4 Hz 0.05 s)
 
-static void restart(sonde_motion *m, double time_s, sonde_vec3 position_m) {
-  m->started = true;
-  m->filled = 0;
-  m->next_s = time_s;
-  m->stage_m[0] = m->stage_m[1] = position_m;
-}
-
+// One step of the grid: low-pass, length of the path, greatest speed, jerk.
 static void advance(sonde_motion *m, sonde_vec3 position_m) {
   m->stage_m[0] = v_lerp(m->stage_m[0], position_m, SHARE);
   m->stage_m[1] = v_lerp(m->stage_m[1], m->stage_m[0], SHARE);
@@ -36,15 +28,17 @@ static void advance(sonde_motion *m, sonde_vec3 position_m) {
 }
 
 void sonde_motion_feed(sonde_motion *m, double time_s, sonde_vec3 position_m) {
-  SONDE_ASSERT(!m->started || time_s > m->last_s);
+  SONDE_ASSERT(isfinite(time_s) && (!m->started || time_s > m->last_s));
   if (!v_finite(position_m)) return;
   if (m->started && time_s - m->last_s > PAUSE_S) {
     m->path_m += v_distance(position_m, m->last_m);
     m->started = false;
   }
   if (!m->started) {
-    restart(m, time_s, position_m);
-    m->last_s = time_s;
+    m->started = true;
+    m->filled = 0;
+    m->next_s = m->last_s = time_s;
+    m->stage_m[0] = m->stage_m[1] = position_m;
     m->last_m = position_m;
   }
   for (; m->next_s <= time_s; m->next_s += GRID_S) {
@@ -56,6 +50,7 @@ void sonde_motion_feed(sonde_motion *m, double time_s, sonde_vec3 position_m) {
   m->last_m = position_m;
 }
 
+// Log dimensionless jerk since the last press.
 static double smoothness(const sonde_motion *m) {
   if (!(m->jerk_sum > 0 && m->speed_peak_m_s > 0)) return (double)NAN;
   double scale = m->time_s * m->time_s * m->time_s / (m->speed_peak_m_s * m->speed_peak_m_s);
@@ -63,13 +58,13 @@ static double smoothness(const sonde_motion *m) {
 }
 
 // The figure falls with the number of movements that it is taken over (by 4 ln of it), so it is
-// taken over the way to each press: who examines more places is not called less smooth.
+// taken over the approach to each press: who examines more places is not called less smooth.
 void sonde_motion_pressed(sonde_motion *m) {
-  double way = smoothness(m);
-  if (isfinite(way)) m->smooth_sum += way, m->ways++;
+  double approach = smoothness(m);
+  if (isfinite(approach)) m->smooth_sum += approach, m->approaches++;
   m->jerk_sum = m->speed_peak_m_s = m->time_s = 0;
 }
 
 double sonde_motion_smoothness(const sonde_motion *m) {
-  return m->ways > 0 ? m->smooth_sum / m->ways : smoothness(m);
+  return m->approaches > 0 ? m->smooth_sum / m->approaches : smoothness(m);
 }

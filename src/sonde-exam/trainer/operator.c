@@ -1,11 +1,4 @@
-// Scripted operators.
-// choose_places:   which places of the plan are visited.
-// aim:             the errors of the hand at a place.
-// pose_at:         pose above or below a place.
-// begin_place:     the next place, or the end.
-// travel, press, release: one step of each phase, at every snapshot.
-// too_far:         whether this press ends.
-// weigh:           what a finished press showed.
+// Scripted operators: hands of different skill that examine the places of a plan.
 #include "trainer/trainer.h"
 
 #include "base/random.h"
@@ -136,10 +129,7 @@ static double spread(sonde_operator *op, double size) {
   return size * clamp(sonde_random_normal(op->seed, op->draws++), -2.5, 2.5);
 }
 
-static void choose_places(sonde_operator *op) {
-  for (uint32_t i = 0; i < op->plan.count; ++i) op->visit[i] = uniform(op, 0, 1) >= op->habit.skip;
-}
-
+// The errors of the hand at a place.
 static void aim(sonde_operator *op) {
   const habit *h = &op->habit;
   double calm = op->attempt > 0 ? 0.5 : 1; // a second try is made with more care
@@ -167,6 +157,7 @@ static sonde_pose pose_at(const sonde_operator *op) {
                       q_from_matrix(m_columns(x, v_cross(z, x), z))};
 }
 
+// The next place that is visited, or the end.
 static void begin_place(sonde_operator *op, uint32_t place) {
   while (place < op->plan.count && !op->visit[place]) ++place;
   op->place = place;
@@ -178,7 +169,7 @@ static void begin_place(sonde_operator *op, uint32_t place) {
 sonde_status sonde_operator_create(const char *name, uint64_t seed, const sonde_vein_map *map,
                                    const sonde_plan *plan, double dt_s, sonde_operator **out,
                                    sonde_device *device, sonde_error *error) {
-  SONDE_ASSERT(name && map && plan && out && device);
+  SONDE_ASSERT(name && map && plan && out && device && dt_s > 0);
   *out = NULL;
   size_t k = 0;
   while (k < SONDE_COUNT_OF(HABIT) && strcmp(HABIT[k].name, name) != 0) ++k;
@@ -188,7 +179,7 @@ sonde_status sonde_operator_create(const char *name, uint64_t seed, const sonde_
   sonde_operator *op = SONDE_NEW(sonde_operator, 1);
   if (!op) return sonde_fail_memory(error);
   *op = (sonde_operator){.habit = HABIT[k], .map = *map, .plan = *plan, .seed = seed};
-  choose_places(op);
+  for (uint32_t i = 0; i < plan->count; ++i) op->visit[i] = uniform(op, 0, 1) >= op->habit.skip;
   begin_place(op, 0);
   op->along_m = plan->count > 0 ? plan->point[0].at.along_m : 0;
   op->depth_m = -LIFT_M;
@@ -231,40 +222,35 @@ static void travel(sonde_operator *op, const sonde_snapshot *s, double dt_s) {
   if (op->wait_s <= 0) op->phase = PRESS;
 }
 
-static bool too_far(const sonde_operator *op, const sonde_snapshot *s) {
-  const habit *h = &op->habit;
-  if (s->force_normal_n >= op->stop_n || op->depth_m >= DEEPEST_M) return true;
-  // the skin slips from the probe; a light touch may bounce
-  if (op->peak_n > FIRM_N && s->force_normal_n < GIVES_WAY * op->peak_n) return true;
-  if (h->force_to_n > 0 || h->beyond_to_n > 0) return false;
-  double vein = sonde_vein_ratio(s);
-  if (vein <= h->closed_ratio) return true;
-  double firm_n = op->plan.point[op->place].target.firm_n + h->past_firm_n;
-  return s->force_normal_n >= firm_n && vein >= h->open_ratio;
-}
-
+// One look of a press, and whether it ends.
 static void press(sonde_operator *op, const sonde_snapshot *s, double dt_s) {
   const habit *h = &op->habit;
-  double speed = s->force_normal_n < TOUCH_N ? h->approach_m_s : h->press_m_s;
-  double stiffness = (s->force_normal_n - op->felt_n) / (op->depth_m - op->felt_depth_m);
+  double force_n = s->force_normal_n, speed = force_n < TOUCH_N ? h->approach_m_s : h->press_m_s;
+  double stiffness = (force_n - op->felt_n) / (op->depth_m - op->felt_depth_m);
   if (stiffness > 0) speed = fmin(speed, h->rate_n_s / stiffness);
-  op->felt_n = s->force_normal_n;
+  op->felt_n = force_n;
   op->felt_depth_m = op->depth_m;
   bool stops = h->hesitant && sin(2 * SONDE_PI * 1.1 * s->time_s) > 0.3;
   if (!stops) op->depth_m += dt_s * speed;
-  if (!too_far(op, s)) return;
+
+  bool ends = force_n >= op->stop_n || op->depth_m >= DEEPEST_M;
+  // The skin slips from the probe; a light touch may bounce.
+  ends |= op->peak_n > FIRM_N && force_n < GIVES_WAY * op->peak_n;
+  // Who goes by the image ends at a closed vein, and at one that stays open at a firm force.
+  double vein = sonde_vein_ratio(s);
+  double firm_n = op->plan.point[op->place].target.firm_n + h->past_firm_n;
+  if (!(h->force_to_n > 0 || h->beyond_to_n > 0))
+    ends |= vein <= h->closed_ratio || (force_n >= firm_n && vein >= h->open_ratio);
+  if (!ends) return;
   op->phase = HOLD;
   op->wait_s = HOLD_S;
 }
 
-static void watch(sonde_operator *op, const sonde_snapshot *s) {
-  op->ratio = fmin(op->ratio, sonde_vein_ratio(s));
-  op->peak_n = fmax(op->peak_n, s->force_normal_n);
-}
-
-// Closed once is closed: a vein that can be emptied has no clot there.
-static void weigh(sonde_operator *op) {
+// What a finished press showed. Closed once is closed: a vein that can be emptied has no clot
+// there.
+static void weigh_press(sonde_operator *op) {
   const habit *h = &op->habit;
+  SONDE_ASSERT(op->place < op->plan.count);
   uint32_t segment = op->plan.point[op->place].segment;
   bool by_image = !(h->force_to_n > 0);
   bool closed = op->ratio <= h->closed_ratio + (by_image ? 0.02 : 0);
@@ -288,17 +274,15 @@ static void weigh(sonde_operator *op) {
   begin_place(op, op->place + 1);
 }
 
-static void release(sonde_operator *op, double dt_s) {
-  op->depth_m = towards(op->depth_m, -LIFT_M, RELEASE_M_S * dt_s);
-  if (op->depth_m <= -LIFT_M) weigh(op);
-}
-
 void sonde_operator_see(sonde_operator *op, const sonde_snapshot *s) {
   SONDE_ASSERT(op && s);
   double dt_s = op->started ? clamp(s->time_s - op->last_s, 0, 0.2) : 0;
   op->started = true;
   op->last_s = s->time_s;
-  if (op->phase == PRESS || op->phase == HOLD) watch(op, s);
+  if (op->phase == PRESS || op->phase == HOLD) {
+    op->ratio = fmin(op->ratio, sonde_vein_ratio(s));
+    op->peak_n = fmax(op->peak_n, s->force_normal_n);
+  }
   switch (op->phase) {
   case TRAVEL: travel(op, s, dt_s); break;
   case PRESS: press(op, s, dt_s); break;
@@ -306,7 +290,10 @@ void sonde_operator_see(sonde_operator *op, const sonde_snapshot *s) {
     op->wait_s -= dt_s;
     if (op->wait_s <= 0) op->phase = RELEASE;
     break;
-  case RELEASE: release(op, dt_s); break;
+  case RELEASE:
+    op->depth_m = towards(op->depth_m, -LIFT_M, RELEASE_M_S * dt_s);
+    if (op->depth_m <= -LIFT_M) weigh_press(op);
+    break;
   case DONE: break;
   }
   sonde_device_page_goal(&op->hand, pose_at(op));

@@ -1,7 +1,4 @@
 // Protocols: their files, and their places on one thigh.
-// read_criteria, read_stop: parts of the file.
-// load_one, compare:        the protocols of a directory.
-// add_point, add_stop:      places on a thigh.
 #include "trainer/trainer.h"
 
 #include "base/bounds.h"
@@ -13,21 +10,6 @@ static const double DEGREE = SONDE_PI / 180, SAME_M = 1e-6;
 sonde_criteria sonde_criteria_default(void) {
   return (sonde_criteria){
       .tilt_rad = 20 * DEGREE, .closed_ratio = 0.10, .open_ratio = 0.30, .reach_m = 0.010};
-}
-
-static void read_criteria(sonde_reader *reader, sonde_place root, sonde_criteria *c) {
-  static const char *const KEYS[] = {"tilt_deg", "closed_ratio", "open_ratio", "reach_mm", NULL};
-  sonde_place at = sonde_read_find(reader, root, "criteria");
-  if (!at) return;
-  sonde_read_keys(reader, at, "criteria", KEYS);
-  c->tilt_rad = DEGREE * sonde_read_real(reader, at, "tilt_deg", 1, 80, c->tilt_rad / DEGREE);
-  c->closed_ratio = sonde_read_real(reader, at, "closed_ratio", 0, 1, c->closed_ratio);
-  c->open_ratio = sonde_read_real(reader, at, "open_ratio", 0, 1, c->open_ratio);
-  c->reach_m = 1e-3 * sonde_read_real(reader, at, "reach_mm", 1, 50, 1e3 * c->reach_m);
-  if (!(c->closed_ratio < c->open_ratio))
-    sonde_reader_fail(reader, at, SONDE_ARGUMENT,
-                      "closed_ratio is %g, expected less than open_ratio (%g)", c->closed_ratio,
-                      c->open_ratio);
 }
 
 static void read_stop(sonde_reader *reader, sonde_place at, sonde_exam_stop *stop) {
@@ -52,38 +34,51 @@ static void read_stop(sonde_reader *reader, sonde_place at, sonde_exam_stop *sto
   stop->every_m = 1e-3 * sonde_read_real(reader, at, "every_mm", 2, 200, (double)NAN);
 }
 
-static void read_protocol(sonde_reader *reader, sonde_exam_protocol *p) {
+sonde_status sonde_exam_protocol_parse(const char *text, const char *name, sonde_exam_protocol *out,
+                                       sonde_error *error) {
+  SONDE_ASSERT(text && name && out);
   static const char *const KEYS[] = {"sonde_protocol", "id",     "title", "text",
                                      "criteria",       "places", NULL};
+  static const char *const CRITERIA[] = {"tilt_deg", "closed_ratio", "open_ratio", "reach_mm",
+                                         NULL};
+  sonde_reader *reader;
+  *out = (sonde_exam_protocol){.criteria = sonde_criteria_default()};
+  sonde_status status = sonde_reader_create(text, name, &reader, error);
+  if (status) return status;
   sonde_place root = sonde_reader_root(reader);
   sonde_read_keys(reader, root, "a protocol", KEYS);
   double version = sonde_read_real(reader, root, "sonde_protocol", 0, 1e6, (double)NAN);
   if (version != SONDE_EXAM_PROTOCOL_VERSION)
     sonde_reader_fail(reader, sonde_read_find(reader, root, "sonde_protocol"), SONDE_VERSION,
                       "protocol of version %g, expected %d", version, SONDE_EXAM_PROTOCOL_VERSION);
-  sonde_read_member(reader, root, "id", true, p->id, sizeof p->id);
-  sonde_read_member(reader, root, "title", true, p->title, sizeof p->title);
-  sonde_read_member(reader, root, "text", true, p->text, sizeof p->text);
-  read_criteria(reader, root, &p->criteria);
-  sonde_place places = sonde_read_find(reader, root, "places");
-  p->stop_count = sonde_read_count(reader, places);
-  if (p->stop_count == 0 || p->stop_count > SONDE_EXAM_STOPS) {
-    sonde_reader_fail(reader, root, SONDE_FORMAT, "%u places, expected 1 to %d", p->stop_count,
-                      SONDE_EXAM_STOPS);
-    p->stop_count = 0;
-  }
-  for (uint32_t i = 0; i < p->stop_count; ++i)
-    read_stop(reader, sonde_read_item(reader, places, i), &p->stop[i]);
-}
+  sonde_read_member(reader, root, "id", true, out->id, sizeof out->id);
+  sonde_read_member(reader, root, "title", true, out->title, sizeof out->title);
+  sonde_read_member(reader, root, "text", true, out->text, sizeof out->text);
 
-sonde_status sonde_exam_protocol_parse(const char *text, const char *name, sonde_exam_protocol *out,
-                                       sonde_error *error) {
-  SONDE_ASSERT(text && name && out);
-  sonde_reader *reader;
-  *out = (sonde_exam_protocol){.criteria = sonde_criteria_default()};
-  sonde_status status = sonde_reader_create(text, name, &reader, error);
-  if (status) return status;
-  read_protocol(reader, out);
+  sonde_criteria *c = &out->criteria;
+  sonde_place at = sonde_read_find(reader, root, "criteria");
+  if (at) {
+    sonde_read_keys(reader, at, "criteria", CRITERIA);
+    c->tilt_rad = DEGREE * sonde_read_real(reader, at, "tilt_deg", 1, 80, c->tilt_rad / DEGREE);
+    c->closed_ratio = sonde_read_real(reader, at, "closed_ratio", 0, 1, c->closed_ratio);
+    c->open_ratio = sonde_read_real(reader, at, "open_ratio", 0, 1, c->open_ratio);
+    c->reach_m = 1e-3 * sonde_read_real(reader, at, "reach_mm", 1, 50, 1e3 * c->reach_m);
+    if (!(c->closed_ratio < c->open_ratio))
+      sonde_reader_fail(reader, at, SONDE_ARGUMENT,
+                        "closed_ratio is %g, expected less than open_ratio (%g)", c->closed_ratio,
+                        c->open_ratio);
+  }
+
+  sonde_place places = sonde_read_find(reader, root, "places");
+  out->stop_count = sonde_read_count(reader, places);
+  if (out->stop_count == 0 || out->stop_count > SONDE_EXAM_STOPS) {
+    sonde_reader_fail(reader, root, SONDE_FORMAT, "%u places, expected 1 to %d", out->stop_count,
+                      SONDE_EXAM_STOPS);
+    out->stop_count = 0;
+  }
+  for (uint32_t i = 0; i < out->stop_count; ++i)
+    read_stop(reader, sonde_read_item(reader, places, i), &out->stop[i]);
+
   status = sonde_reader_status(reader, error);
   sonde_reader_destroy(reader);
   return status;
@@ -91,6 +86,7 @@ sonde_status sonde_exam_protocol_parse(const char *text, const char *name, sonde
 
 sonde_status sonde_exam_protocol_load(const char *path, sonde_exam_protocol *out,
                                       sonde_error *error) {
+  SONDE_ASSERT(path && out);
   char *text = NULL;
   size_t count;
   sonde_status status = sonde_bounded_load_text(path, &sonde_limits_yaml, &text, &count, error);
@@ -99,12 +95,13 @@ sonde_status sonde_exam_protocol_load(const char *path, sonde_exam_protocol *out
   return status;
 }
 
+// As sonde_item_load.
 static sonde_status load_one(const char *path, void *item, sonde_error *error) {
   return sonde_exam_protocol_load(path, item, error);
 }
 
 // Single places before stretches, fewer before more.
-static int compare(const void *a, const void *b) {
+static int compare_protocols(const void *a, const void *b) {
   const sonde_exam_protocol *x = a, *y = b;
   double rank[2] = {0, 0};
   for (uint32_t i = 0; i < x->stop_count; ++i) rank[0] += x->stop[i].every_m > 0 ? 100 : 1;
@@ -115,11 +112,12 @@ static int compare(const void *a, const void *b) {
 
 sonde_status sonde_exam_protocol_list(const char *directory, sonde_exam_protocol **protocols,
                                       uint32_t *count, sonde_error *error) {
+  SONDE_ASSERT(directory && protocols && count);
   void *items;
   sonde_status status =
       sonde_load_directory(directory, sizeof(sonde_exam_protocol), load_one, &items, count, error);
   *protocols = items;
-  if (!status) qsort(items, *count, sizeof(sonde_exam_protocol), compare);
+  if (!status) qsort(items, *count, sizeof(sonde_exam_protocol), compare_protocols);
   return status;
 }
 
@@ -143,20 +141,6 @@ static sonde_status add_point(const sonde_exam_stop *stop, const sonde_vein_map 
   return SONDE_OK;
 }
 
-// Equal steps of at most every_m from the first place to the last.
-static sonde_status add_stop(const sonde_exam_stop *stop, const sonde_vein_map *map,
-                             sonde_plan *plan, sonde_error *error) {
-  double from, to;
-  sonde_status status = sonde_station_find(&stop->from, map, &from, error);
-  if (!status && !(stop->every_m > 0)) return add_point(stop, map, from, plan, error);
-  if (!status) status = sonde_station_find(&stop->to, map, &to, error);
-  if (status) return status;
-  double steps = fmax(1, ceil((fabs(to - from) - SAME_M) / stop->every_m));
-  for (double k = 0; k <= steps && !status; ++k)
-    status = add_point(stop, map, from + (to - from) * k / steps, plan, error);
-  return status;
-}
-
 sonde_status sonde_plan_make(const sonde_exam_protocol *protocol, const sonde_vein_map *map,
                              sonde_plan *plan, sonde_error *error) {
   SONDE_ASSERT(protocol && map && plan);
@@ -165,8 +149,20 @@ sonde_status sonde_plan_make(const sonde_exam_protocol *protocol, const sonde_ve
   for (uint32_t i = 0; i < protocol->stop_count && !status; ++i) {
     const sonde_exam_stop *stop = &protocol->stop[i];
     if (stop->needs[0] && !sonde_vein_has_branch(map, stop->needs)) continue;
-    status = add_stop(stop, map, plan, error);
+    double from_m, to_m;
+    status = sonde_station_find(&stop->from, map, &from_m, error);
+    if (!status && !(stop->every_m > 0)) {
+      status = add_point(stop, map, from_m, plan, error);
+      continue;
+    }
+    // Equal steps of at most every_m from the first place to the last.
+    if (!status) status = sonde_station_find(&stop->to, map, &to_m, error);
+    if (status) return status;
+    double steps = fmax(1, ceil((fabs(to_m - from_m) - SAME_M) / stop->every_m));
+    for (double k = 0; k <= steps && !status; ++k)
+      status = add_point(stop, map, from_m + (to_m - from_m) * k / steps, plan, error);
   }
+  SONDE_ASSERT(plan->count <= SONDE_PLAN_POINTS);
   if (!status && plan->count == 0)
     status = sonde_fail(error, SONDE_ARGUMENT, "the thigh has no place of the protocol '%s'",
                         protocol->id);

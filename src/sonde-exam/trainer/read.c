@@ -1,6 +1,4 @@
-// Shared by the readers of cases and protocols: texts, stations, directories.
-// compare_names:  order of file names.
-// list_names:     the *.yaml of a directory, sorted.
+// Texts and stations of cases and protocols, and the files of a directory.
 #include "trainer/trainer.h"
 
 #include <dirent.h>
@@ -47,40 +45,33 @@ void sonde_read_station(sonde_reader *reader, sonde_place at, const char *what,
 
 static int compare_names(const void *a, const void *b) { return strcmp(a, b); }
 
-static bool is_yaml(const char *name) {
-  size_t length = strlen(name);
-  return length > 5 && length < NAME_BYTES && name[0] != '.' &&
-         strcmp(name + length - 5, ".yaml") == 0;
-}
-
-// @param names [FILES_MAX] of NAME_BYTES each
-static sonde_status list_names(const char *directory, char (*names)[NAME_BYTES], uint32_t *count,
-                               sonde_error *error) {
-  DIR *open = opendir(directory);
-  if (!open) return sonde_fail(error, SONDE_IO, "%s: %s", directory, strerror(errno));
-  sonde_status status = SONDE_OK;
-  *count = 0;
-  for (struct dirent *entry; !status && (entry = readdir(open));) {
-    if (!is_yaml(entry->d_name)) continue;
-    if (*count == FILES_MAX)
-      status = sonde_fail(error, SONDE_ARGUMENT, "%s: more than %d files", directory, FILES_MAX);
-    else
-      snprintf(names[(*count)++], NAME_BYTES, "%s", entry->d_name);
-  }
-  closedir(open);
-  qsort(names, *count, NAME_BYTES, compare_names);
-  return status;
-}
-
 sonde_status sonde_load_directory(const char *directory, size_t item_bytes, sonde_item_load load,
                                   void **items, uint32_t *count, sonde_error *error) {
-  SONDE_ASSERT(directory && items && count);
+  SONDE_ASSERT(directory && items && count && item_bytes > 0);
   *items = NULL;
   *count = 0;
   char(*names)[NAME_BYTES] = sonde_calloc(FILES_MAX, NAME_BYTES);
   if (!names) return sonde_fail_memory(error);
+
+  // The *.yaml of the directory, in the order of their names.
   uint32_t found = 0;
-  sonde_status status = list_names(directory, names, &found, error);
+  sonde_status status = SONDE_OK;
+  DIR *open = opendir(directory);
+  if (!open) status = sonde_fail(error, SONDE_IO, "%s: %s", directory, strerror(errno));
+  for (struct dirent *entry; !status && (entry = readdir(open));) {
+    const char *name = entry->d_name;
+    size_t length = strlen(name);
+    if (length <= 5 || length >= NAME_BYTES || name[0] == '.' || strcmp(name + length - 5, ".yaml"))
+      continue;
+    if (found == FILES_MAX)
+      status = sonde_fail(error, SONDE_ARGUMENT, "%s: more than %d files", directory, FILES_MAX);
+    else
+      snprintf(names[found++], NAME_BYTES, "%s", name);
+  }
+  if (open) closedir(open);
+  SONDE_ASSERT(found <= FILES_MAX);
+  qsort(names, found, NAME_BYTES, compare_names);
+
   char *all = status ? NULL : sonde_calloc(found, item_bytes);
   if (!status && !all) status = sonde_fail_memory(error);
   for (uint32_t i = 0; i < found && !status; ++i) {
@@ -96,24 +87,4 @@ sonde_status sonde_load_directory(const char *directory, size_t item_bytes, sond
   *items = all;
   *count = found;
   return SONDE_OK;
-}
-
-void sonde_json_text(sonde_file *file, const char *text) {
-  sonde_file_printf(file, "\"");
-  for (const unsigned char *c = (const unsigned char *)text; *c; ++c) {
-    if (*c == '"' || *c == '\\')
-      sonde_file_printf(file, "\\%c", *c);
-    else if (*c < 0x20)
-      sonde_file_printf(file, "\\u%04x", *c);
-    else
-      sonde_file_write(file, c, 1);
-  }
-  sonde_file_printf(file, "\"");
-}
-
-void sonde_json_real(sonde_file *file, double value) {
-  if (isfinite(value))
-    sonde_file_printf(file, "%.9g", value);
-  else
-    sonde_file_printf(file, "null");
 }

@@ -1,11 +1,5 @@
 // The score: what was found against what is there. Formulas: docs/trainer.md, version
 // SONDE_SCORE_VERSION.
-// judge_segments:  right and supported decisions.
-// overall:         the diagnosis that the decisions amount to.
-// gentle:          places examined without pressing too hard.
-// parts:           the weighted parts, each 0..1.
-// total:           the sum, and what caps it.
-// tell:            one sentence.
 #include "trainer/judge.h"
 
 #include <string.h>
@@ -14,6 +8,7 @@
 static const double CAP = 49, PASS = 70;
 static const double TIME_NONE_S = 1200;
 
+// Right and supported decisions, segment by segment.
 static void judge_segments(const sonde_judge *judge, const sonde_case *truth, sonde_score *score) {
   score->segment_count = judge->map.segment_count;
   for (uint32_t i = 0; i < score->segment_count; ++i) {
@@ -35,8 +30,42 @@ static void judge_segments(const sonde_judge *judge, const sonde_case *truth, so
   }
 }
 
-// One segment with a clot makes a thrombosis; its absence takes all segments of the plan.
-static void overall(const sonde_case *truth, sonde_score *score) {
+// Findings: the mean over the segments of the plan. One open place shows a clot; that there is none
+// takes every place.
+static double share_of_findings(const sonde_score *score) {
+  double sum = 0;
+  uint32_t needed = 0;
+  for (uint32_t i = 0; i < score->segment_count; ++i) {
+    const sonde_segment_verdict *v = &score->segment[i];
+    if (!v->needed) continue;
+    needed++;
+    SONDE_ASSERT(v->points > 0 && v->done <= v->points);
+    if (!v->correct || !v->supported) continue;
+    sum += v->decision == SONDE_DECISION_CLOT ? 1 : (double)v->done / v->points;
+  }
+  return needed ? sum / needed : 0;
+}
+
+// Force: what restraint earns counts only for the places that were examined, so that doing nothing
+// earns nothing.
+static double share_of_restraint(const sonde_judge *judge) {
+  double sum = 0;
+  for (uint32_t i = 0; i < judge->plan.count; ++i) {
+    double presses = fmax(1, judge->at_place[i]);
+    SONDE_ASSERT(judge->hard_at_place[i] <= judge->at_place[i]);
+    if (judge->done[i]) sum += 1 - judge->hard_at_place[i] / presses;
+  }
+  return judge->plan.count ? sum / judge->plan.count : 0;
+}
+
+void sonde_judge_score(const sonde_judge *judge, const sonde_case *truth, sonde_score *score) {
+  SONDE_ASSERT(judge && truth && score);
+  *score = (sonde_score){.metrics = sonde_judge_metrics(judge)};
+  const sonde_metrics *m = &score->metrics;
+  judge_segments(judge, truth, score);
+
+  // The diagnosis: one segment with a clot makes a thrombosis, its absence takes all segments of
+  // the plan.
   bool all = true;
   for (uint32_t i = 0; i < score->segment_count; ++i) {
     const sonde_segment_verdict *v = &score->segment[i];
@@ -46,58 +75,27 @@ static void overall(const sonde_case *truth, sonde_score *score) {
   score->thrombosis = truth->thrombosis;
   score->answered = score->called_thrombosis || all;
   score->correct = score->answered && score->called_thrombosis == score->thrombosis;
-}
 
-static double decided(const sonde_score *score) {
-  double sum = 0;
-  uint32_t needed = 0;
-  for (uint32_t i = 0; i < score->segment_count; ++i) {
-    const sonde_segment_verdict *v = &score->segment[i];
-    if (!v->needed) continue;
-    needed++;
-    if (!v->correct || !v->supported) continue;
-    // one open place shows a clot; that there is none takes every place
-    sum += v->decision == SONDE_DECISION_CLOT ? 1 : (double)v->done / v->points;
-  }
-  return needed ? sum / needed : 0;
-}
-
-// What restraint earns counts only for the places that were examined: doing nothing earns nothing.
-static double gentle(const sonde_judge *judge) {
-  double sum = 0;
-  for (uint32_t i = 0; i < judge->plan.count; ++i) {
-    double presses = fmax(1, judge->at_place[i]);
-    if (judge->done[i]) sum += 1 - judge->hard_at_place[i] / presses;
-  }
-  return judge->plan.count ? sum / judge->plan.count : 0;
-}
-
-static void parts(const sonde_judge *judge, sonde_score *score) {
-  const sonde_metrics *m = &score->metrics;
-  score->decisions = decided(score);
+  // The parts, each 0 to 1, and their weighted sum, which a wrong diagnosis caps.
+  double unused_s = TIME_NONE_S - m->time_s;
+  score->decisions = share_of_findings(score);
   score->coverage = m->coverage;
   score->technique = m->press_count ? m->valid_share : 0;
-  score->force = gentle(judge);
-  double left_s = TIME_NONE_S - m->time_s;
-  score->economy = m->coverage * clamp(left_s / (TIME_NONE_S - SONDE_SCORE_TIME_S), 0, 1);
-}
-
-static void total(sonde_score *score) {
-  score->score = 0;
+  score->force = share_of_restraint(judge);
+  score->economy = m->coverage * clamp(unused_s / (TIME_NONE_S - SONDE_SCORE_TIME_S), 0, 1);
 #define SONDE_SCORE_ADD(name, weight, title, text) score->score += (weight)*score->name;
   SONDE_SCORE_LIST(SONDE_SCORE_ADD)
 #undef SONDE_SCORE_ADD
   SONDE_ASSERT(score->score >= 0 && score->score <= 100 + 1e-9);
   if (!score->correct) score->score = fmin(score->score, CAP);
   score->passed = score->correct && score->score >= PASS;
-}
 
-static void tell(const sonde_case *truth, sonde_score *score) {
+  // The result in one sentence.
   snprintf(score->truth, sizeof score->truth, "%s", truth->diagnosis);
-  const char *asked = score->called_thrombosis ? "Deep vein thrombosis"
-                      : score->answered        ? "No deep vein thrombosis where examined"
-                                               : "No diagnosis: not every segment was decided";
-  snprintf(score->asked, sizeof score->asked, "%s", asked);
+  snprintf(score->asked, sizeof score->asked, "%s",
+           score->called_thrombosis ? "Deep vein thrombosis"
+           : score->answered        ? "No deep vein thrombosis where examined"
+                                    : "No diagnosis: not every segment was decided");
   const char *verdict =
       score->passed              ? "Passed"
       : score->correct           ? "Right diagnosis, but the examination does not support it"
@@ -106,19 +104,8 @@ static void tell(const sonde_case *truth, sonde_score *score) {
                                  : "Not passed: a clot was missed";
   snprintf(score->summary, sizeof score->summary,
            "%s. %.0f of 100 points; %u of %u places examined, %u of %u compressions valid.",
-           verdict, score->score, score->metrics.points_done, score->metrics.points,
-           score->metrics.presses[SONDE_PRESS_COMPLETE] + score->metrics.presses[SONDE_PRESS_OPEN],
-           score->metrics.press_count);
-}
-
-void sonde_judge_score(const sonde_judge *judge, const sonde_case *truth, sonde_score *score) {
-  SONDE_ASSERT(judge && truth && score);
-  *score = (sonde_score){.metrics = sonde_judge_metrics(judge)};
-  judge_segments(judge, truth, score);
-  overall(truth, score);
-  parts(judge, score);
-  total(score);
-  tell(truth, score);
+           verdict, score->score, m->points_done, m->points,
+           m->presses[SONDE_PRESS_COMPLETE] + m->presses[SONDE_PRESS_OPEN], m->press_count);
 }
 
 // ---- series

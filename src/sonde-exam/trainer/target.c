@@ -1,6 +1,4 @@
 // The force of each place: what closes a healthy vein there.
-// straight_above: the probe over a point of the vein, across it, at a depth below the skin at rest.
-// press:          a healthy vein is pressed until its walls touch.
 #include "trainer/bench.h"
 
 // The probe starts above the skin and presses as a careful hand does, looked at 40 times a second.
@@ -15,6 +13,7 @@ sonde_force_target sonde_force_target_make(double closes_n) {
 }
 
 uint32_t sonde_plan_nearest(const sonde_plan *plan, double along_m) {
+  SONDE_ASSERT(plan && plan->count <= SONDE_PLAN_POINTS);
   uint32_t nearest = SONDE_PLAN_POINTS;
   double least = INFINITY;
   for (uint32_t i = 0; i < plan->count; ++i) {
@@ -24,14 +23,17 @@ uint32_t sonde_plan_nearest(const sonde_plan *plan, double along_m) {
   return nearest;
 }
 
+// The probe across the vein, straight above a point of it, at a depth below the skin at rest.
 static sonde_pose straight_above(const sonde_vein_point *p, double depth_m) {
   sonde_vec3 z = v_neg(p->normal), x = p->across;
   return (sonde_pose){v_madd(p->skin_m, -depth_m, p->normal),
                       q_from_matrix(m_columns(x, v_cross(z, x), z))};
 }
 
-// The force at which the ratio passes `closed_ratio`, between two looks; NaN: it never does.
-static double press(sonde_bench *bench, const sonde_vein_point *at, double closed_ratio) {
+// Presses a healthy vein. @return the force at which its area passes `closed_ratio` of that at
+// rest, between two looks; NaN: it never does
+static double find_closing_force(sonde_bench *bench, const sonde_vein_point *at,
+                                 double closed_ratio) {
   double depth_m = -LIFT_M, before_n = 0, before = 1;
   while (depth_m < DEEPEST_M) {
     sonde_pose pose = straight_above(at, depth_m);
@@ -68,7 +70,8 @@ sonde_status sonde_plan_find_targets(sonde_plan *plan, const sonde_case_setup *s
       return sonde_fail(error, SONDE_CANCELLED, "cancelled");
     sonde_bench bench;
     status = sonde_bench_open(&bench, &healthy, &findings, true, error);
-    double closes_n = status ? 0 : press(&bench, &point->at, plan->criteria.closed_ratio);
+    double closes_n =
+        status ? 0 : find_closing_force(&bench, &point->at, plan->criteria.closed_ratio);
     sonde_bench_close(&bench);
     if (status) return status;
     if (!isfinite(closes_n))

@@ -26,9 +26,4 @@ static inline double sonde_vein_ratio(const sonde_snapshot *s) {
   return isfinite(first) ? fmax(first, s->other_vein_ratio) : first;
 }
 
-// JSON text with escapes, quotes included.
-void sonde_json_text(sonde_file *file, const char *text);
-// A number, null when it is not finite.
-void sonde_json_real(sonde_file *file, double value);
-
 #endif

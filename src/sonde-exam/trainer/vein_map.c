@@ -1,11 +1,5 @@
 // The vein as the examination knows it: the skin above every point of its course, and its segments.
-// nearest_skin:  direction across the leg in which the skin is nearest.
-// find_skin:     skin above every point; directions are averaged along the vein.
-// set_frame:     normal and across of a point.
-// cut_segments:  the model's segments within the course.
-// name_places:   the model's branches and landmarks.
-// name_segments: segments of a model that names none.
-#include "trainer/trainer.h"
+#include "trainer/judge.h"
 
 #include <string.h>
 
@@ -27,52 +21,32 @@ const char *sonde_segment_title(const char *name) {
   return name;
 }
 
-// The leg runs along z; the ends of the model are not skin.
-static bool nearest_skin(const sonde_surface_index *skin, sonde_vec3 vein, sonde_vec3 *out) {
-  double least = REACH_M;
-  for (int k = 0; k < DIRECTIONS; ++k) {
-    double turn = 2 * SONDE_PI * k / DIRECTIONS;
-    sonde_vec3 direction = vec3(cos(turn), sin(turn), 0);
-    sonde_surface_point hit;
-    if (!sonde_surface_raycast(skin, vein, direction, least, &hit)) continue;
-    double distance = v_distance(hit.point_m, vein);
-    if (distance < least) least = distance, *out = direction;
-  }
-  return least < REACH_M;
-}
-
-static void set_frame(const sonde_model *model, sonde_vein_map *map, uint32_t k) {
-  sonde_vein_point *p = &map->point[k];
-  const sonde_vein_point *before = &map->point[k > 0 ? k - 1 : 0];
-  const sonde_vein_point *after = &map->point[k + 1 < map->point_count ? k + 1 : k];
-  sonde_vec3 course = v_sub(after->vein_m, before->vein_m);
-  course = v_madd(course, -v_dot(course, p->normal), p->normal);
-  p->across = v_cross(v_unit(course, vec3(0, 0, 1)), p->normal);
-  // as the sites have it, so that left and right of the image do not change between the two
-  double nearest = INFINITY;
-  sonde_vec3 u = p->across;
-  for (uint32_t i = 0; i < model->site_count; ++i) {
-    double distance = v_distance(model->sites[i].position_m, p->skin_m);
-    if (distance < nearest) nearest = distance, u = model->sites[i].u;
-  }
-  if (v_dot(u, p->across) < 0) p->across = v_neg(p->across);
-}
-
+// The skin above every point. The leg runs along z, and the ends of the model are not skin, so the
+// nearest skin is looked for across the leg; directions are averaged along the vein.
 static sonde_status find_skin(const sonde_model *model, sonde_vein_map *map, sonde_error *error) {
   sonde_surface_index *skin;
   sonde_status status = sonde_surface_index_create(&model->surface, &skin, error);
   if (status) return status;
   sonde_vec3 out[SONDE_VESSEL_POINTS];
-  for (uint32_t k = 0; k < map->point_count && !status; ++k)
-    if (!nearest_skin(skin, map->point[k].vein_m, &out[k]))
+  sonde_surface_point hit;
+  for (uint32_t k = 0; k < map->point_count && !status; ++k) {
+    double least_m = REACH_M;
+    for (int i = 0; i < DIRECTIONS; ++i) {
+      double angle = 2 * SONDE_PI * i / DIRECTIONS;
+      sonde_vec3 direction = vec3(cos(angle), sin(angle), 0);
+      if (!sonde_surface_raycast(skin, map->point[k].vein_m, direction, least_m, &hit)) continue;
+      double distance_m = v_distance(hit.point_m, map->point[k].vein_m);
+      if (distance_m < least_m) least_m = distance_m, out[k] = direction;
+    }
+    if (!(least_m < REACH_M))
       status = sonde_fail(error, SONDE_MESH, "point %u of the vein has no skin above it", k);
+  }
   for (uint32_t k = 0; k < map->point_count && !status; ++k) {
     sonde_vein_point *p = &map->point[k];
     sonde_vec3 sum = vec3(0, 0, 0);
     for (uint32_t i = k > SMOOTH ? k - SMOOTH : 0; i < map->point_count && i <= k + SMOOTH; ++i)
       sum = v_add(sum, out[i]);
     p->normal = v_unit(sum, out[k]);
-    sonde_surface_point hit;
     bool met = sonde_surface_raycast(skin, p->vein_m, p->normal, REACH_M, &hit);
     p->skin_m = met ? hit.point_m : v_madd(p->vein_m, p->depth_m, p->normal);
     p->depth_m = v_distance(p->skin_m, p->vein_m);
@@ -81,30 +55,26 @@ static sonde_status find_skin(const sonde_model *model, sonde_vein_map *map, son
   return status;
 }
 
-static void cut_segments(const sonde_thigh_anatomy *anatomy, sonde_vein_map *map) {
-  double a = map->point[0].z_m, b = map->point[map->point_count - 1].z_m;
-  double low = fmin(a, b), high = fmax(a, b);
-  for (uint32_t i = 0; i < anatomy->segment_count; ++i) {
+// Segments, branches and landmarks that the model names; a model without anatomy gets the segments
+// of SEGMENT by their shares of the course.
+static void name_segments(const sonde_thigh_anatomy *anatomy, sonde_vein_map *map) {
+  double first = map->point[0].z_m, last = map->point[map->point_count - 1].z_m, from = first;
+  double low = fmin(first, last), high = fmax(first, last);
+  for (uint32_t i = 0; anatomy && i < anatomy->segment_count; ++i) {
     sonde_segment segment = anatomy->segment[i];
     segment.from_m = fmax(segment.from_m, low);
     segment.to_m = fmin(segment.to_m, high);
     if (segment.to_m > segment.from_m) map->segment[map->segment_count++] = segment;
   }
-}
-
-static void name_places(const sonde_thigh_anatomy *anatomy, sonde_vein_map *map) {
-  map->branch_count = anatomy->branch_count;
+  map->branch_count = anatomy ? anatomy->branch_count : 0;
   for (uint32_t i = 0; i < map->branch_count; ++i)
     memcpy(map->branch[i], anatomy->branch[i].name, sizeof map->branch[i]);
-  map->landmark_count = anatomy->landmark_count;
+  map->landmark_count = anatomy ? anatomy->landmark_count : 0;
   for (uint32_t i = 0; i < map->landmark_count; ++i) {
     memcpy(map->landmark[i], anatomy->landmark[i].name, sizeof map->landmark[i]);
     map->landmark_z_m[i] = anatomy->landmark[i].vein_m.z;
   }
-}
-
-static void name_segments(sonde_vein_map *map) {
-  double first = map->point[0].z_m, last = map->point[map->point_count - 1].z_m, from = first;
+  if (map->segment_count > 0) return;
   for (size_t i = 0; i < SONDE_COUNT_OF(SEGMENT); ++i) {
     double to = first + SEGMENT[i].to * (last - first);
     sonde_segment *segment = &map->segment[map->segment_count++];
@@ -130,12 +100,25 @@ sonde_status sonde_vein_map_make(const sonde_model *model, sonde_vein_map *map,
     p->along_m = map->length_m;
   }
   sonde_status status = find_skin(model, map, error);
-  for (uint32_t k = 0; k < map->point_count && !status; ++k) set_frame(model, map, k);
-  if (!status && model->anatomy) {
-    cut_segments(model->anatomy, map);
-    name_places(model->anatomy, map);
+
+  // Across the vein in the plane of the skin, as the nearest site has it, so that left and right of
+  // the image do not change between the two.
+  for (uint32_t k = 0; k < map->point_count && !status; ++k) {
+    sonde_vein_point *p = &map->point[k];
+    const sonde_vein_point *before = &map->point[k > 0 ? k - 1 : 0];
+    const sonde_vein_point *after = &map->point[k + 1 < map->point_count ? k + 1 : k];
+    sonde_vec3 course = v_sub(after->vein_m, before->vein_m);
+    course = v_madd(course, -v_dot(course, p->normal), p->normal);
+    p->across = v_cross(v_unit(course, vec3(0, 0, 1)), p->normal);
+    double nearest = INFINITY;
+    sonde_vec3 u = p->across;
+    for (uint32_t i = 0; i < model->site_count; ++i) {
+      double distance = v_distance(model->sites[i].position_m, p->skin_m);
+      if (distance < nearest) nearest = distance, u = model->sites[i].u;
+    }
+    if (v_dot(u, p->across) < 0) p->across = v_neg(p->across);
   }
-  if (!status && map->segment_count == 0) name_segments(map);
+  if (!status) name_segments(model->anatomy, map);
   return status;
 }
 
@@ -188,17 +171,18 @@ uint32_t sonde_vein_segment_at(const sonde_vein_map *map, double z_m) {
   return SONDE_SEGMENTS;
 }
 
-// Ends of a segment as distances along the vein, the one at the groin first.
-static void segment_ends(const sonde_vein_map *map, uint32_t i, double *from_m, double *to_m) {
-  double a = sonde_vein_along(map, map->segment[i].from_m);
-  double b = sonde_vein_along(map, map->segment[i].to_m);
+void sonde_vein_segment_ends(const sonde_vein_map *map, uint32_t segment, double *from_m,
+                             double *to_m) {
+  SONDE_ASSERT(segment < map->segment_count && from_m && to_m);
+  double a = sonde_vein_along(map, map->segment[segment].from_m);
+  double b = sonde_vein_along(map, map->segment[segment].to_m);
   *from_m = fmin(a, b);
   *to_m = fmax(a, b);
 }
 
 sonde_status sonde_station_find(const sonde_station *station, const sonde_vein_map *map,
                                 double *along_m, sonde_error *error) {
-  SONDE_ASSERT(along_m != NULL);
+  SONDE_ASSERT(station && map && along_m);
   double base = 0;
   if (station->landmark[0]) {
     uint32_t i = 0;
@@ -213,7 +197,7 @@ sonde_status sonde_station_find(const sonde_station *station, const sonde_vein_m
       return sonde_fail(error, SONDE_NOT_FOUND, "the thigh has no segment '%s' (it begins with %s)",
                         station->segment, map->segment[0].name);
     double from, to;
-    segment_ends(map, i, &from, &to);
+    sonde_vein_segment_ends(map, i, &from, &to);
     base = from + station->share * (to - from);
   }
   *along_m = base + station->shift_m;

@@ -14,9 +14,9 @@ typedef struct sonde_axis {
 
 // About `ticks` steps over [low, high], widened to whole steps. Values that are not finite or equal
 // give an axis around them.
-SONDE_LINK sonde_axis sonde_axis_make(double low, double high, int ticks);
+sonde_axis sonde_axis_make(double low, double high, int ticks);
 // Ends exactly at low and high, with ticks inside.
-SONDE_LINK sonde_axis sonde_axis_tight(double low, double high, int ticks);
+sonde_axis sonde_axis_tight(double low, double high, int ticks);
 sonde_number sonde_axis_label(const sonde_axis *axis, double value);
 // A step of 1, 2 or 5 times a power of ten, at least `least`.
 double sonde_nice_step(double least);
@@ -27,20 +27,20 @@ typedef struct sonde_chart {
   sonde_axis x, y;
 } sonde_chart;
 
-SONDE_LINK double sonde_chart_x(const sonde_chart *chart, double value);
-SONDE_LINK double sonde_chart_y(const sonde_chart *chart, double value);
-SONDE_LINK bool sonde_chart_holds(const sonde_chart *chart, double x, double y);
+double sonde_chart_x(const sonde_chart *chart, double value);
+double sonde_chart_y(const sonde_chart *chart, double value);
+bool sonde_chart_holds(const sonde_chart *chart, double x, double y);
 
 // Grid, ticks and labels; a NULL label leaves it out, a title stands above the plot.
-SONDE_LINK void sonde_chart_frame(const sonde_chart *chart, const char *title, const char *x_label,
-                                  const char *y_label);
+void sonde_chart_frame(const sonde_chart *chart, const char *title, const char *x_label,
+                       const char *y_label);
 // Between these, what leaves the plot is cut off.
-SONDE_LINK void sonde_chart_clip(const sonde_chart *chart);
-SONDE_LINK void sonde_chart_unclip(const sonde_chart *chart);
+void sonde_chart_clip(const sonde_chart *chart);
+void sonde_chart_unclip(const sonde_chart *chart);
 
 // Gaps where a value is not finite. Draw between clip and unclip.
-SONDE_LINK void sonde_chart_line(const sonde_chart *chart, const double *x, const double *y,
-                                 uint32_t count, const char *colour, const char *more);
+void sonde_chart_line(const sonde_chart *chart, const double *x, const double *y, uint32_t count,
+                      const char *colour, const char *more);
 // Between two curves.
 void sonde_chart_band(const sonde_chart *chart, const double *x, const double *low,
                       const double *high, uint32_t count, const char *colour);
@@ -50,8 +50,8 @@ void sonde_chart_dots(const sonde_chart *chart, const double *x, const double *y
 void sonde_chart_mark(const sonde_chart *chart, double x, double y, uint32_t index,
                       const char *colour);
 // A box between two values on each axis, cut at the plot.
-SONDE_LINK void sonde_chart_box(const sonde_chart *chart, double x0, double x1, double y0,
-                                double y1, const char *look);
+void sonde_chart_box(const sonde_chart *chart, double x0, double x1, double y0, double y1,
+                     const char *look);
 void sonde_chart_across(const sonde_chart *chart, double y, const char *look);
 void sonde_chart_upright(const sonde_chart *chart, double x, const char *look);
 

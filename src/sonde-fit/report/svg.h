@@ -23,8 +23,7 @@ SONDE_LINK void sonde_svg_write(sonde_text *out, const sonde_figure *figure, boo
 
 SONDE_LINK void sonde_svg_line(sonde_text *out, double x1, double y1, double x2, double y2,
                                const char *look);
-SONDE_LINK void sonde_svg_rect(sonde_text *out, double x, double y, double w, double h,
-                               const char *look);
+void sonde_svg_rect(sonde_text *out, double x, double y, double w, double h, const char *look);
 SONDE_LINK void sonde_svg_circle(sonde_text *out, double x, double y, double radius,
                                  const char *look);
 // Foreign text at a point; classes start, middle, end say how it is anchored.
@@ -51,6 +50,6 @@ void sonde_path_box(sonde_path *path, double x, double y, double w, double h);
 SONDE_LINK void sonde_path_end(sonde_path *path);
 
 // Rough width of a text in pixels, to keep labels apart.
-SONDE_LINK double sonde_text_width(const char *utf8, double size);
+double sonde_text_width(const char *utf8, double size);
 
 #endif

@@ -13,14 +13,14 @@ typedef struct sonde_text {
   bool failed;
 } sonde_text;
 
-SONDE_LINK void sonde_text_put(sonde_text *text, const char *bytes);
+void sonde_text_put(sonde_text *text, const char *bytes);
 // Only for strings and integers: real numbers go through the functions below.
-SONDE_LINK void sonde_text_format(sonde_text *text, const char *format, ...)
+void sonde_text_format(sonde_text *text, const char *format, ...)
     __attribute__((format(printf, 2, 3)));
 // Puts foreign text: the five characters of XML are escaped, what is neither a character of XML nor
 // UTF-8 becomes U+FFFD. NULL is empty.
-SONDE_LINK void sonde_text_escape(sonde_text *text, const char *utf8);
-SONDE_LINK void sonde_text_append(sonde_text *text, const sonde_text *more);
+void sonde_text_escape(sonde_text *text, const char *utf8);
+void sonde_text_append(sonde_text *text, const sonde_text *more);
 SONDE_LINK void sonde_text_clear(sonde_text *text);
 
 // A number as text, by value, so that it can stand in an argument list: sonde_fixed(x, 2).s
@@ -35,6 +35,6 @@ sonde_number sonde_significant(double x, int digits);    // powers of ten when v
 sonde_number sonde_short(double x);                      // at most 4 digits, no zeros at the end
 sonde_number sonde_grouped(uint64_t x);                  // 1,828
 // For coordinates: one decimal, plain ASCII; asserts that x is finite.
-SONDE_LINK sonde_number sonde_coordinate(double x);
+sonde_number sonde_coordinate(double x);
 
 #endif
