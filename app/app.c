@@ -2,7 +2,6 @@
 #include "app.h"
 
 #include <errno.h>
-#include <getopt.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -80,6 +79,15 @@ bool app_parse_integer(const char *verb, const char *option, const char *text, l
   return false;
 }
 
+bool app_parse_size(const char *verb, const char *text, long *width, long *height) {
+  char end;
+  if (sscanf(text, "%ldx%ld%c", width, height, &end) == 2 && *width >= 16 && *height >= 16 &&
+      *width <= 4096 && *height <= 4096)
+    return true;
+  app_usage_error(verb, "--size expects WxH from 16x16 to 4096x4096, got '%s'", text);
+  return false;
+}
+
 // ---- bundled model
 
 #define MODEL_UNDER_PREFIX "share/sonde/thigh.sonde"
@@ -125,18 +133,6 @@ bool app_data_directory(const char *name, char *path, size_t size) {
   }
   snprintf(path, size, "%s/share/sonde/data/%s", SONDE_INSTALL_PREFIX, name);
   return is_readable(path);
-}
-
-bool app_model_argument(const char *verb, int argc, char **argv, char *model, size_t size) {
-  char searched[1024];
-  if (argc - optind > 1) {
-    app_usage_error(verb, "one model expected, '%s' is too much", argv[optind + 1]);
-    return false;
-  }
-  if (optind < argc) return (size_t)snprintf(model, size, "%s", argv[optind]) > 0;
-  bool found = app_bundled_model(model, size, searched, sizeof searched);
-  if (!found) app_usage_error(verb, "no bundled model found (looked at %s)", searched);
-  return found;
 }
 
 double app_seconds(clockid_t clock) {

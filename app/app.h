@@ -23,6 +23,8 @@ bool app_parse_real(const char *verb, const char *option, const char *text, doub
                     double *value);
 bool app_parse_integer(const char *verb, const char *option, const char *text, long low, long high,
                        long *value);
+// "WxH" from 16x16 to 4096x4096, of --size.
+bool app_parse_size(const char *verb, const char *text, long *width, long *height);
 
 // Asks before long work whether an output file (NULL: none) can be written: APP_OK, or the exit
 // code after printing why not.
@@ -46,9 +48,6 @@ bool app_interrupted(void);
 // Path of the bundled model, found beside the program, in the source tree or in the install tree.
 // false when there is none; then *searched names the places.
 bool app_bundled_model(char *path, size_t size, char *searched, size_t searched_size);
-// The model that a command line names after its options, else the bundled one; false after printing
-// that there is none or one argument too many.
-bool app_model_argument(const char *verb, int argc, char **argv, char *model, size_t size);
 
 // A clock of the system in seconds.
 double app_seconds(clockid_t clock);
@@ -69,6 +68,9 @@ void app_json_real(const char *key, double value);
 void app_json_integer(const char *key, long long value);
 void app_json_bool(const char *key, bool value);
 void app_json_text(const char *key, const char *value);
+// Several members at once: "force_n:%g steps:%u same:%hhd case:%s"; %hhd is a bool, %u %d %lu %ld
+// %llu %lld are integers, with one blank between the members.
+void app_json(const char *members, ...) __attribute__((format(printf, 1, 2)));
 void app_json_end(void);
 
 #endif

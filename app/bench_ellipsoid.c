@@ -1,9 +1,9 @@
 // The comparison scene: a geodesic ellipsoid of N = 10 f^2 + 2 nodes, total mass 5 kg (times
 // size^2), radial springs of 5e5 N/m^3 per area, surface springs of the stiffness asked for, a ball
-// of 30 mm. corners:    vertices and faces of the icosahedron. face_points: points of one
-// subdivided face; shared ones repeat. weld:       the same points once.
+// of 30 mm.
 #include "bench_ellipsoid.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,6 +11,7 @@
 static const double RADII_M[3] = {0.10, 0.04, 0.04};
 static const double RADIAL_N_M3 = 5e5, MASS_KG = 5, CONTACT_N_M3 = 2e7;
 
+// Vertices and faces of the icosahedron, a vertex on +z.
 static void corners(double v[12][3], int faces[20][3]) {
   double height = 1 / sqrt(5.0), ring = 2 / sqrt(5.0), turn = 4 * atan(1.0) / 5;
   memset(v, 0, 12 * sizeof *v);
@@ -40,81 +41,64 @@ static int by_place(const void *a, const void *b) {
 
 static uint32_t row_start(uint32_t f, uint32_t i) { return i * (f + 1) - i * (i - 1) / 2; }
 
-static void face_points(double v[12][3], const int face[3], uint32_t f, point *out) {
-  for (uint32_t i = 0; i <= f; ++i)
-    for (uint32_t j = 0; i + j <= f; ++j, ++out) {
-      double size = 0;
-      for (int c = 0; c < 3; ++c) {
-        out->at[c] = (f - i - j) * v[face[0]][c] + i * v[face[1]][c] + j * v[face[2]][c];
-        size += out->at[c] * out->at[c];
-      }
-      for (int c = 0; c < 3; ++c) out->at[c] /= sqrt(size);
-    }
-}
-
-// Numbers equal points alike; returns how many differ.
-static uint32_t weld(point *points, uint32_t count, uint32_t *number, sonde_vec3 *vertices) {
-  uint32_t used = 0;
-  qsort(points, count, sizeof *points, by_place);
-  for (uint32_t k = 0; k < count; ++k) {
-    if (k == 0 || by_place(&points[k - 1], &points[k]) != 0) {
-      vertices[used] = (sonde_vec3){points[k].at[0], points[k].at[1], points[k].at[2]};
-      used++;
-    }
-    number[points[k].place] = used - 1;
-  }
-  return used;
-}
-
-static void connect(uint32_t f, const uint32_t *number, sonde_mesh *mesh) {
-  uint32_t out = 0, per_face = (f + 1) * (f + 2) / 2;
-  for (uint32_t face = 0; face < 20; ++face)
-    for (uint32_t i = 0; i < f; ++i)
-      for (uint32_t j = 0; i + j < f; ++j) {
-        const uint32_t *n = number + face * per_face;
-        uint32_t a = n[row_start(f, i) + j], b = n[row_start(f, i + 1) + j];
-        uint32_t c = n[row_start(f, i) + j + 1];
-        memcpy(mesh->faces[out++], ((uint32_t[3]){a, b, c}), sizeof *mesh->faces);
-        if (i + j + 1 == f) continue;
-        uint32_t d = n[row_start(f, i + 1) + j + 1];
-        memcpy(mesh->faces[out++], ((uint32_t[3]){b, d, c}), sizeof *mesh->faces);
-      }
-}
-
+// The icosahedron with each edge in f parts, on the ellipsoid.
 static sonde_status geodesic(uint32_t f, double size, sonde_mesh *mesh, sonde_error *error) {
-  uint32_t per_face = (f + 1) * (f + 2) / 2, count = 20 * per_face;
+  assert(f > 0 && size > 0);
+  uint32_t per_face = (f + 1) * (f + 2) / 2, count = 20 * per_face, used = 0;
   double v[12][3];
   int faces[20][3];
   sonde_status status = sonde_mesh_create(mesh, 10 * f * f + 2, 20 * f * f, error);
-  point *points = malloc(count * sizeof *points);
+  if (status) return status;
+  point *points = malloc(count * sizeof *points), *out = points;
   uint32_t *number = malloc(count * sizeof *number);
-  sonde_vec3 *vertices = malloc(count * sizeof *vertices);
-  if (!status && points && number && vertices) {
-    corners(v, faces);
-    for (uint32_t k = 0; k < 20; ++k) face_points(v, faces[k], f, points + k * per_face);
-    for (uint32_t k = 0; k < count; ++k) points[k].place = k;
-    uint32_t used = weld(points, count, number, vertices);
-    if (used == mesh->vertex_count) {
-      for (uint32_t k = 0; k < used; ++k)
-        mesh->vertices[k] =
-            (sonde_vec3){size * RADII_M[0] * vertices[k].x, size * RADII_M[1] * vertices[k].y,
-                         size * RADII_M[2] * vertices[k].z};
-      connect(f, number, mesh);
-    }
+  if (!points || !number) {
+    free(points);
+    free(number);
+    return error->status = SONDE_MEMORY;
   }
+
+  // Points of every face on the unit sphere; those on its edges repeat.
+  corners(v, faces);
+  for (uint32_t k = 0; k < 20; ++k)
+    for (uint32_t i = 0; i <= f; ++i)
+      for (uint32_t j = 0; i + j <= f; ++j, ++out) {
+        const int *face = faces[k];
+        double radius = 0;
+        for (int c = 0; c < 3; ++c) {
+          out->at[c] = (f - i - j) * v[face[0]][c] + i * v[face[1]][c] + j * v[face[2]][c];
+          radius += out->at[c] * out->at[c];
+        }
+        for (int c = 0; c < 3; ++c) out->at[c] /= sqrt(radius);
+        out->place = (uint32_t)(out - points);
+      }
+
+  // Each place once, in the order of its coordinates.
+  qsort(points, count, sizeof *points, by_place);
+  for (uint32_t k = 0; k < count; ++k) {
+    const double *at = points[k].at;
+    if (k == 0 || by_place(&points[k - 1], &points[k]) != 0)
+      mesh->vertices[used++] = (sonde_vec3){size * RADII_M[0] * at[0], size * RADII_M[1] * at[1],
+                                            size * RADII_M[2] * at[2]};
+    number[points[k].place] = used - 1;
+  }
+  assert(used == mesh->vertex_count);
+
+  // Triangles, row by row of each face.
+  uint32_t triangle = 0;
+  for (uint32_t face = 0; face < 20; ++face)
+    for (uint32_t i = 0; i < f; ++i)
+      for (uint32_t j = 0; i + j < f; ++j) {
+        const uint32_t *row = number + face * per_face + row_start(f, i);
+        const uint32_t *next = number + face * per_face + row_start(f, i + 1);
+        memcpy(mesh->faces[triangle++], ((uint32_t[3]){row[j], next[j], row[j + 1]}),
+               sizeof *mesh->faces);
+        if (i + j + 1 == f) continue;
+        memcpy(mesh->faces[triangle++], ((uint32_t[3]){next[j], next[j + 1], row[j + 1]}),
+               sizeof *mesh->faces);
+      }
   free(points);
   free(number);
-  free(vertices);
-  return status;
-}
-
-// Springs act along the radii, as if fixed to an inner ellipsoid of 0.6 of the size.
-static void point_along_radii(sonde_model *model) {
-  for (uint32_t i = 0; i < model->surface.vertex_count; ++i) {
-    sonde_vec3 x = model->surface.vertices[i];
-    double r = sqrt(x.x * x.x + x.y * x.y + x.z * x.z);
-    model->normal[i] = (sonde_vec3){x.x / r, x.y / r, x.z / r};
-  }
+  return SONDE_OK;
 }
 
 sonde_status bench_ellipsoid_build(const bench_ellipsoid *def, sonde_model **model,
@@ -145,7 +129,12 @@ sonde_status bench_ellipsoid_build(const bench_ellipsoid *def, sonde_model **mod
     build.law.surface_density_kg_m2 = MASS_KG * def->size * def->size / report.area_m2;
     status = sonde_model_build(&build, model, error);
   }
-  if (!status) point_along_radii(*model);
+  // Springs act along the radii, as if fixed to an inner ellipsoid of 0.6 of the size.
+  for (uint32_t i = 0; !status && i < (*model)->surface.vertex_count; ++i) {
+    sonde_vec3 x = (*model)->surface.vertices[i];
+    double r = sqrt(x.x * x.x + x.y * x.y + x.z * x.z);
+    (*model)->normal[i] = (sonde_vec3){x.x / r, x.y / r, x.z / r};
+  }
   sonde_mesh_clear(&mesh);
   return status;
 }

@@ -1,15 +1,11 @@
 // sonde bench --haptics: the whole loop at 1 kHz in real time, with the simulated hand in place of
 // a hardware.
-//
-// tick        one tick, with its times
-// lateness    wake-ups against the grid that the earliest of them lie on
-// run         the loop for some seconds
-// print_*     the results
 #include "bench_haptics.h"
 
 #include "app.h"
 #include "haptics_rig.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -38,6 +34,7 @@ static void tick(void *user) {
 // In place. Where wake-ups lie within the period is a circle; they begin after its widest empty
 // arc. Whole periods are deadline misses and counted by the loop.
 static void lateness(double *woken_s, double *scratch, size_t count) {
+  assert(count > 0);
   const double period = 1e-3;
   double start = woken_s[0], widest = 0.0, earliest = 0.0;
   for (size_t k = 0; k < count; ++k) scratch[k] = woken_s[k] = fmod(woken_s[k] - start, period);
@@ -53,10 +50,9 @@ static void lateness(double *woken_s, double *scratch, size_t count) {
 
 static void print_times(const char *name, double *list, size_t count) {
   app_json_object(name);
-  app_json_real("p50", 1e6 * app_quantile(list, count, 0.5));
-  app_json_real("p99", 1e6 * app_quantile(list, count, 0.99));
-  app_json_real("p999", 1e6 * app_quantile(list, count, 0.999));
-  app_json_real("max", 1e6 * app_quantile(list, count, 1.0));
+  app_json("p50:%g p99:%g p999:%g max:%g", 1e6 * app_quantile(list, count, 0.5),
+           1e6 * app_quantile(list, count, 0.99), 1e6 * app_quantile(list, count, 0.999),
+           1e6 * app_quantile(list, count, 1.0));
   app_json_close();
 }
 
@@ -64,23 +60,18 @@ static void print_json(bench *b, const sonde_loop_stats *stats) {
   sonde_render_margins margins = sonde_render_margins_of(&b->rig.render.def, b->rig.def.mass_kg,
                                                          b->rig.def.damping_n_s_m, 0.0);
   app_json_begin();
-  app_json_text("device", b->rig.def.limits->name);
-  app_json_integer("ticks", (long long)b->count);
+  app_json("device:%s ticks:%lu", b->rig.def.limits->name, b->count);
   print_times("compute_us", b->compute_s, b->count);
   print_times("cpu_us", b->cpu_s, b->count);
   print_times("lateness_us", b->woken_s, b->count);
-  app_json_integer("deadline_misses", (long long)stats->deadline_misses);
-  app_json_real("energy_j", b->rig.render.energy_j);
-  app_json_real("energy_min_j", b->rig.render.energy_min_j);
-  app_json_real("max_force_n", b->rig.max_force_n);
-  app_json_real("max_slew_n_per_s", b->rig.max_step_n * 1e3);
-  app_json_real("force_scale", b->rig.render.def.force_scale);
-  app_json_real("coupling_n_per_m", b->rig.render.def.stiffness_n_m);
-  app_json_real("stiffness_margin", margins.stiffness);
-  app_json_real("phase_margin_deg", margins.phase_rad * 57.29577951308232);
-  app_json_real("passivity_margin", margins.passivity);
-  app_json_text("fault", sonde_fault_text(b->rig.safety.fault));
-  app_json_text("priority_note", stats->priority_note);
+  app_json("deadline_misses:%lu energy_j:%g energy_min_j:%g max_force_n:%g max_slew_n_per_s:%g "
+           "force_scale:%g coupling_n_per_m:%g stiffness_margin:%g phase_margin_deg:%g "
+           "passivity_margin:%g fault:%s priority_note:%s",
+           stats->deadline_misses, b->rig.render.energy_j, b->rig.render.energy_min_j,
+           b->rig.max_force_n, b->rig.max_step_n * 1e3, b->rig.render.def.force_scale,
+           b->rig.render.def.stiffness_n_m, margins.stiffness,
+           margins.phase_rad * 57.29577951308232, margins.passivity,
+           sonde_fault_text(b->rig.safety.fault), stats->priority_note);
   app_json_end();
 }
 
@@ -116,11 +107,14 @@ static sonde_status write_csv(const bench *b, const char *path, sonde_error *err
   return sonde_file_commit(file, error);
 }
 
-static sonde_status run(bench *b, const haptics_rig_def *def, double seconds,
-                        sonde_loop_stats *stats, sonde_error *error) {
+// Runs the loop for some seconds and prints what it took.
+static sonde_status measure(bench *b, const haptics_rig_def *def, double seconds, bool json,
+                            const char *csv, sonde_error *error) {
   sonde_world_def world = haptics_world();
+  sonde_loop_stats stats = {0};
   sonde_state *state = NULL;
   sonde_loop *loop = NULL;
+  app_catch_interrupt();
   sonde_status status = sonde_state_create(def->model, &world, &state, error);
   if (!status) status = haptics_rig_start(&b->rig, def, state, error);
   if (!status) status = sonde_loop_start(1e-3, tick, b, &loop, error);
@@ -128,34 +122,10 @@ static sonde_status run(bench *b, const haptics_rig_def *def, double seconds,
     double until = app_seconds(CLOCK_MONOTONIC) + seconds;
     while (app_seconds(CLOCK_MONOTONIC) < until && !app_interrupted())
       nanosleep(&(struct timespec){0, 20000000}, NULL);
-    sonde_loop_stop(loop, stats);
+    sonde_loop_stop(loop, &stats);
   }
   haptics_rig_stop(&b->rig);
   sonde_state_destroy(state);
-  return status;
-}
-
-static bool make_room(bench *b, double seconds) {
-  b->capacity = (size_t)(seconds * 1e3) + 1000;
-  b->woken_s = calloc(b->capacity, sizeof(double));
-  b->compute_s = calloc(b->capacity, sizeof(double));
-  b->cpu_s = calloc(b->capacity, sizeof(double));
-  b->scratch = calloc(b->capacity, sizeof(double));
-  return b->woken_s && b->compute_s && b->cpu_s && b->scratch;
-}
-
-static void clear(bench *b) {
-  free(b->woken_s);
-  free(b->compute_s);
-  free(b->cpu_s);
-  free(b->scratch);
-}
-
-static sonde_status measure(bench *b, const haptics_rig_def *def, double seconds, bool json,
-                            const char *csv, sonde_error *error) {
-  sonde_loop_stats stats = {0};
-  app_catch_interrupt();
-  sonde_status status = run(b, def, seconds, &stats, error);
   if (!status && csv) status = write_csv(b, csv, error); // before quantiles sort
   if (status || b->count == 0) return status;
   lateness(b->woken_s, b->scratch, b->count);
@@ -177,8 +147,12 @@ int bench_haptics(const char *model_path, const char *device, double seconds, bo
   sonde_probe probe = {0};
   sonde_status status = sonde_model_load(model_path, &model, &error);
   if (!status) status = sonde_probe_create("linear", &probe, &error);
-  if (!status && !make_room(&b, seconds)) status = SONDE_MEMORY;
+  b.capacity = (size_t)(seconds * 1e3) + 1000;
+  double *times = calloc(4 * b.capacity, sizeof *times);
+  if (!status && !times) status = error.status = SONDE_MEMORY;
   if (!status) {
+    b.woken_s = times, b.compute_s = times + b.capacity;
+    b.cpu_s = times + 2 * b.capacity, b.scratch = times + 3 * b.capacity;
     const sonde_site *site = sonde_model_site(model, 27);
     haptics_rig_def def = {.model = model,
                            .probe = &probe,
@@ -189,7 +163,7 @@ int bench_haptics(const char *model_path, const char *device, double seconds, bo
                            .depth_m = 0.02};
     status = measure(&b, &def, seconds, json, csv, &error);
   }
-  clear(&b);
+  free(times);
   sonde_probe_clear(&probe);
   sonde_model_destroy(model);
   return status ? app_fail("bench", &error) : APP_OK;

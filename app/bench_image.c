@@ -3,38 +3,19 @@
 // record:                 one frame at each of some settled depths, over and over.
 #include "bench_image.h"
 
-#include "app.h"
+#include "pose.h"
 #include "settled.h"
 
-#include <getopt.h>
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-static const char HELP[] =
-    "usage: sonde bench [MODEL] --scene image [options]\n"
-    "\n"
-    "Times full echographic frames on one core while a probe presses: the tissue's scatterers\n"
-    "move with it, rank-three beam, attenuation, interfaces, logarithm, scan conversion. CPU time\n"
-    "of the rendering thread; the interior's own update is not part of it.\n"
-    "\n"
-    "  --lines N        8 to 512; default 192\n"
-    "  --samples N      per line, 64 to 4096; default 1024\n"
-    "  --scatterers N   moved with the tissue per frame, about; default 1000000\n"
-    "  --size WxH       picture; default 512x512\n"
-    "  --frames N       1 to 100000; default 200\n"
-    "  --kernels NAME   avx512, avx2, sse4, base, plain; default the widest\n"
-    "                   that runs here\n"
-    "  --curved-mm R    radius of a curved face; default flat\n"
-    "  --json           print one JSON object\n"
-    "  --help           this text\n"
-    "MODEL defaults to the bundled thigh.\n";
-
 enum { STAGES = 6, DEPTHS = 6 };
 
 typedef struct options {
-  char model[1024];
+  const char *model, *scene;
   long lines, samples, scatterers, frames, width, height;
   const char *kernels;
   double radius_m;
@@ -52,57 +33,31 @@ typedef struct bench {
   double scatterers;
 } bench;
 
-static bool read_size(options *o, const char *text) {
-  char end;
-  if (sscanf(text, "%ldx%ld%c", &o->width, &o->height, &end) == 2 && o->width >= 16 &&
-      o->height >= 16 && o->width <= 4096 && o->height <= 4096)
-    return true;
-  app_usage_error("bench", "--size expects WxH from 16x16 to 4096x4096, got '%s'", text);
-  return false;
+static const options DEFAULTS = {.lines = 192,
+                                 .samples = 1024,
+                                 .scatterers = 1000000,
+                                 .frames = 200,
+                                 .width = 512,
+                                 .height = 512};
+
+static bool read_size(void *to, const char *text) {
+  options *o = to;
+  return app_parse_size("bench", text, &o->width, &o->height);
 }
 
-static bool read_value(options *o, int option) {
-  double mm;
-  switch (option) {
-  case 'l': return app_parse_integer("bench", "--lines", optarg, 8, 512, &o->lines);
-  case 's': return app_parse_integer("bench", "--samples", optarg, 64, 4096, &o->samples);
-  case 'n':
-    return app_parse_integer("bench", "--scatterers", optarg, 1000, 20000000, &o->scatterers);
-  case 'f': return app_parse_integer("bench", "--frames", optarg, 1, 100000, &o->frames);
-  case 'z': return read_size(o, optarg);
-  case 'r':
-    if (!app_parse_real("bench", "--curved-mm", optarg, 20, 1000, &mm)) return false;
-    o->radius_m = mm * 1e-3;
-    return true;
-  case 'k': o->kernels = optarg; return true;
-  case 'j': o->json = true; return true;
-  case 'S': return true; // the scene, known already
-  default: return false;
-  }
-}
-
-static int read_options(int argc, char **argv, options *o) {
-  static const struct option LONG[] = {{"scene", required_argument, NULL, 'S'},
-                                       {"lines", required_argument, NULL, 'l'},
-                                       {"samples", required_argument, NULL, 's'},
-                                       {"scatterers", required_argument, NULL, 'n'},
-                                       {"frames", required_argument, NULL, 'f'},
-                                       {"size", required_argument, NULL, 'z'},
-                                       {"curved-mm", required_argument, NULL, 'r'},
-                                       {"kernels", required_argument, NULL, 'k'},
-                                       {"json", no_argument, NULL, 'j'},
-                                       {"help", no_argument, NULL, 'h'},
-                                       {NULL, 0, NULL, 0}};
-  for (int c; (c = getopt_long(argc, argv, "", LONG, NULL)) != -1;) {
-    if (c == 'h') {
-      fputs(HELP, stdout);
-      return APP_OK;
-    }
-    if (!read_value(o, c)) return APP_BAD_INPUT;
-  }
-  if (!app_model_argument("bench", argc, argv, o->model, sizeof o->model)) return APP_BAD_INPUT;
-  return -1;
-}
+static const app_option TABLE[] = {
+    OPT_MODEL(model),
+    OPT_TEXT(scene, "scene", "image", "this form of sonde bench"),
+    OPT_INTEGER(lines, "lines", "N", 8, 512, "scan lines"),
+    OPT_INTEGER(samples, "samples", "N", 64, 4096, "per line"),
+    OPT_INTEGER(scatterers, "scatterers", "N", 1000, 20000000,
+                "moved with the tissue per frame, about"),
+    OPT_CALL(read_size, "size", "WxH", "picture; default 512x512"),
+    OPT_INTEGER(frames, "frames", "N", 1, 100000, "frames"),
+    OPT_TEXT(kernels, "kernels", "NAME",
+             "avx512, avx2, sse4, base, plain; default the widest that runs here"),
+    OPT_REAL(radius_m, "curved-mm", "R", 20, 1000, 1e-3, "radius of a curved face; default flat"),
+    OPT_JSON(json)};
 
 static void draw(bench *b, uint64_t tick) {
   settled_update(&b->scene, &b->pathology, tick);
@@ -144,7 +99,7 @@ static void record(bench *b, const options *o) {
     settled_at(&b->scene, b->start, 0.004 + 0.010 * (double)first / (double)o->frames, 1e-5);
     draw(b, tick++); // warm
     for (long k = first; k < first + o->frames / DEPTHS + 1 && k < o->frames; ++k) {
-      settled_at(&b->scene, settled_advance(b->start, 1e-5 * (double)(k % 8)),
+      settled_at(&b->scene, pose_shift(b->start, 1e-5 * (double)(k % 8), pose_axis(b->start, 2)),
                  0.004 + 0.010 * (double)first / (double)o->frames, 1e-3);
       draw(b, tick++);
       sonde_echo_times t = sonde_echo_last_times(b->echo);
@@ -192,22 +147,16 @@ static void print(bench *b, const options *o) {
   app_json_end();
 }
 
-int bench_image(int argc, char **argv) {
-  options o = {.lines = 192,
-               .samples = 1024,
-               .scatterers = 1000000,
-               .frames = 200,
-               .width = 512,
-               .height = 512};
-  int code = read_options(argc, argv, &o);
-  if (code >= 0) return code;
+static int run(void *from) {
+  const options *o = from;
+  assert(o->model && o->frames > 0);
   bench b = {0};
   sonde_error error = {0};
-  b.stage = calloc((size_t)(STAGES + 1) * (size_t)o.frames, sizeof *b.stage);
-  sonde_status status = b.stage ? prepare(&b, &o, &error) : SONDE_MEMORY;
+  b.stage = calloc((size_t)(STAGES + 1) * (size_t)o->frames, sizeof *b.stage);
+  sonde_status status = b.stage ? prepare(&b, o, &error) : SONDE_MEMORY;
   if (!status) {
-    record(&b, &o);
-    print(&b, &o);
+    record(&b, o);
+    print(&b, o);
   }
   free(b.stage);
   sonde_image_clear(&b.image);
@@ -216,11 +165,15 @@ int bench_image(int argc, char **argv) {
   return status ? app_fail("bench", &error) : APP_OK;
 }
 
-bool bench_image_asked(int argc, char **argv) {
-  for (int i = 1; i < argc; ++i) {
-    if (strcmp(argv[i], "--scene=image") == 0) return true;
-    if (i + 1 < argc && strcmp(argv[i], "--scene") == 0 && strcmp(argv[i + 1], "image") == 0)
-      return true;
-  }
-  return false;
-}
+const app_command bench_image = {
+    .verb = "bench",
+    .summary = "time full echographic frames",
+    .usage = "[MODEL] --scene image [options]",
+    .text = "With --scene image: times full echographic frames on one core while a probe presses: "
+            "the tissue's scatterers move with it, rank-three beam, attenuation, interfaces, "
+            "logarithm, scan conversion. CPU time of the rendering thread; the interior's own "
+            "update is not part of it.",
+    OPT_TABLE(TABLE),
+    .size = sizeof(options),
+    .defaults = &DEFAULTS,
+    .run = run};

@@ -2,10 +2,9 @@
 #ifndef SONDE_BENCH_IMAGE_H
 #define SONDE_BENCH_IMAGE_H
 
-#include <stdbool.h>
+#include "options.h"
 
-// True when the command line asks for this scene.
-bool bench_image_asked(int argc, char **argv);
-int bench_image(int argc, char **argv);
+// The form of sonde bench for this scene.
+extern const app_command bench_image;
 
 #endif

@@ -1,83 +1,48 @@
 // sonde cases: the trainer's cases.
-// list:      those of a directory.
-// check:     a file, and its truth against its thigh.
-// generate:  a case by its seed.
 #include "exam_common.h"
+#include "options.h"
 
-#include <getopt.h>
+#include <assert.h>
 #include <stdio.h>
 #include <string.h>
 
 static const char VERB[] = "cases";
-static const char HELP[] =
-    "usage: sonde cases [--cases DIR] [--json]\n"
-    "       sonde cases --check FILE [--json]\n"
-    "       sonde cases --generate SEED -o FILE [--level LEVEL] [--json]\n"
-    "\n"
-    "Lists the cases of the trainer, checks a case file against its thigh, or draws a case.\n"
-    "The format is in docs/trainer.md.\n"
-    "\n"
-    "  --cases DIR       cases from there; default: those that ship\n"
-    "  --check FILE      read a case, make its thigh, and compare its truth with its pathology\n"
-    "  --generate SEED   draw a case (0 to 4294967295)\n"
-    "  --level LEVEL     first, easy, hard; default easy\n"
-    "  -o, --output FILE where to write it\n"
-    "  --truth           list the diagnoses too\n"
-    "  --json            print one JSON object\n"
-    "  --help            this text\n";
-
 static const char *const THIGHS[] = {"bundled", "generated", "model"};
 
-typedef struct arguments {
+typedef struct options {
   const char *cases, *check, *output;
-  long seed, level; // seed < 0: none
-  bool truth, json, help;
-} arguments;
+  long seed; // < 0: none
+  int level;
+  bool truth, json;
+} options;
 
-static bool read_level(const char *text, long *level) {
-  for (*level = 0; *level < 3; ++*level)
-    if (strcmp(sonde_case_level_name((sonde_case_level)*level), text) == 0) return true;
-  app_usage_error(VERB, "--level expects first, easy or hard, got '%s'", text);
-  return false;
-}
+static const options DEFAULTS = {.seed = -1, .level = SONDE_CASE_EASY};
 
-static bool read_option(int option, arguments *a) {
-  switch (option) {
-  case 'C': a->cases = optarg; return true;
-  case 'c': a->check = optarg; return true;
-  case 'g': return app_parse_integer(VERB, "--generate", optarg, 0, 4294967295L, &a->seed);
-  case 'l': return read_level(optarg, &a->level);
-  case 'o': a->output = optarg; return true;
-  case 't': return a->truth = true;
-  case 'j': return a->json = true;
-  case 'h': return a->help = true;
-  default: return false;
-  }
-}
+// In the order of sonde_case_level.
+static const char *const LEVELS[] = {"first", "easy", "hard", NULL};
 
-static bool read_arguments(int argc, char **argv, arguments *a) {
-  static const struct option LONG[] = {{"cases", required_argument, NULL, 'C'},
-                                       {"check", required_argument, NULL, 'c'},
-                                       {"generate", required_argument, NULL, 'g'},
-                                       {"level", required_argument, NULL, 'l'},
-                                       {"output", required_argument, NULL, 'o'},
-                                       {"truth", no_argument, NULL, 't'},
-                                       {"json", no_argument, NULL, 'j'},
-                                       {"help", no_argument, NULL, 'h'},
-                                       {NULL, 0, NULL, 0}};
-  for (int c; (c = getopt_long(argc, argv, "o:", LONG, NULL)) != -1;)
-    if (!read_option(c, a)) return false;
-  if (a->help) return true;
+static const app_option TABLE[] = {
+    OPT_TEXT(cases, "cases", "DIR", "cases from there; default: those that ship"),
+    OPT_FLAG(truth, "truth", "list the diagnoses too"),
+    OPT_TEXT(check, "check", "FILE",
+             "read a case, make its thigh, and compare its truth with its pathology; a mistake is "
+             "named with its line"),
+    OPT_INTEGER(seed, "generate", "SEED", 0, 4294967295L,
+                "draw a case; equal seeds and levels give equal files"),
+    OPT_WORD(level, "level", "LEVEL", LEVELS, "of the drawn case"),
+    OPT_TEXT(output, "o,output", "FILE", "where to write the drawn case"),
+    OPT_JSON(json)};
+
+static int check_options(void *from) {
+  const options *a = from;
   const char *wrong = NULL;
-  if (optind < argc) wrong = "no argument";
   if (a->check && a->seed >= 0) wrong = "either --check or --generate";
   if (a->seed >= 0 && !a->output) wrong = "-o FILE with --generate";
   if (a->seed < 0 && a->output) wrong = "-o FILE only with --generate";
-  if (wrong) app_usage_error(VERB, "expected %s", wrong);
-  return !wrong;
+  return wrong ? app_usage_error(VERB, "expected %s", wrong) : APP_OK;
 }
 
-static int list(const arguments *a, const exam_library *library) {
+static int list(const options *a, const exam_library *library) {
   sonde_case *cases;
   uint32_t count;
   sonde_error error = {0};
@@ -110,7 +75,7 @@ static int list(const arguments *a, const exam_library *library) {
   return APP_OK;
 }
 
-static int tell(const arguments *a, const sonde_case *c, const sonde_vein_map *map,
+static int tell(const options *a, const sonde_case *c, const sonde_vein_map *map,
                 const char *file) {
   if (!a->json) {
     printf("%s: %s (%s), %s\n", file, c->id, sonde_case_level_name(c->level), c->diagnosis);
@@ -135,7 +100,7 @@ static int tell(const arguments *a, const sonde_case *c, const sonde_vein_map *m
 }
 
 // A case is good when it can be built: then the truth fits the pathology.
-static int check(const arguments *a, const exam_library *library, const sonde_case *c,
+static int check(const options *a, const exam_library *library, const sonde_case *c,
                  const char *file, const char *directory) {
   sonde_error error = {0};
   sonde_case_setup setup;
@@ -153,26 +118,36 @@ static int check(const arguments *a, const exam_library *library, const sonde_ca
   return code;
 }
 
-int old_cases(int argc, char **argv);
-int old_cases(int argc, char **argv) {
-  arguments a = {.seed = -1, .level = SONDE_CASE_EASY};
-  if (!read_arguments(argc, argv, &a)) return APP_BAD_INPUT;
-  if (a.help) {
-    fputs(HELP, stdout);
-    return APP_OK;
-  }
-  exam_library library = exam_library_find(a.cases, NULL);
+static int run(void *from) {
+  const options *a = from;
+  assert(!a->check || a->seed < 0);
+  exam_library library = exam_library_find(a->cases, NULL);
   sonde_error error = {0};
   sonde_case c;
-  if (a.seed >= 0) {
-    sonde_case_generate((uint64_t)a.seed, (sonde_case_level)a.level, &c);
-    return check(&a, &library, &c, a.output, NULL);
+  if (a->seed >= 0) {
+    sonde_case_generate((uint64_t)a->seed, (sonde_case_level)a->level, &c);
+    return check(a, &library, &c, a->output, NULL);
   }
-  if (!a.check) return list(&a, &library);
+  if (!a->check) return list(a, &library);
   char directory[1100];
-  const char *slash = strrchr(a.check, '/');
-  snprintf(directory, sizeof directory, "%.*s", slash ? (int)(slash - a.check) : 1,
-           slash ? a.check : ".");
-  if (sonde_case_load(a.check, &c, &error)) return app_fail(VERB, &error);
-  return check(&a, &library, &c, a.check, directory);
+  const char *slash = strrchr(a->check, '/');
+  snprintf(directory, sizeof directory, "%.*s", slash ? (int)(slash - a->check) : 1,
+           slash ? a->check : ".");
+  if (sonde_case_load(a->check, &c, &error)) return app_fail(VERB, &error);
+  return check(a, &library, &c, a->check, directory);
 }
+
+const app_command cmd_cases = {
+    .verb = "cases",
+    .summary = "list, check and draw the cases of the trainer",
+    .usage = "[--cases DIR] [--truth] [--json]\n--check FILE [--json]\n"
+             "--generate SEED -o FILE [--level LEVEL] [--json]",
+    .text =
+        "Lists the cases of the trainer, or reads a case file, makes its thigh and compares its "
+        "truth with its pathology, or draws a case and writes it. The format is in "
+        "docs/trainer.md; examples in data/cases.",
+    OPT_TABLE(TABLE),
+    .size = sizeof(options),
+    .defaults = &DEFAULTS,
+    .check = check_options,
+    .run = run};

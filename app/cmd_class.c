@@ -1,16 +1,8 @@
 // sonde class: several learners on one machine, one process each, and a table for the teacher.
-//
-// parse_names     a list with commas
-// check_names, check_arguments
-// own_program     this program's path
-// state_of        one word or two about a learner
-// cell, draw_row  fixed columns
-// say             a sentence that stays on the screen
-// draw            the table, over the last one on a terminal
-// tell_changes    a line per change, in a pipe
 #include "class_learners.h"
+#include "options.h"
 
-#include <getopt.h>
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -18,58 +10,24 @@
 #include <unistd.h>
 
 static const char VERB[] = "class";
-static const char HELP[] =
-    "usage: sonde class --learners N [--names A,B,C] [--port P] [-- RUN OPTIONS]\n"
-    "\n"
-    "Starts `sonde run` for each of N learners, each with a page of its own, and shows how they\n"
-    "are doing. A program that dies is started again, three times at most. Each learner\n"
-    "has two addresses: the learner's own, and the teacher's, to watch, comment and take control.\n"
-    "An address has a secret: who has it can take part. Ctrl-C ends them all.\n"
-    "\n"
-    "  --learners N    how many (1 to 16); default: as many as names\n"
-    "  --names A,B,C   what to call them; default: Learner 1, Learner 2, ...\n"
-    "  --port P        page of the first learner, the others follow (default 8642)\n"
-    "  --help          this text\n"
-    "\n"
-    "Everything after -- goes to every sonde run (see sonde run --help).\n";
 
-typedef struct settings {
+typedef struct options {
   long learners, port;
   const char *names, *program;
-  bool help;
-} settings;
+  char **arguments;
+} options;
 
-// ---- the command line
+static const options DEFAULTS = {.port = 8642};
 
-static bool parse_option(int option, settings *s) {
-  switch (option) {
-  case 'n': return app_parse_integer(VERB, "--learners", optarg, 1, CLASS_LEARNERS, &s->learners);
-  case 'p': return app_parse_integer(VERB, "--port", optarg, 1, 65535, &s->port);
-  case 'a': s->names = optarg; return true;
-  case 'x': s->program = optarg; return true; // for tests: what is run instead of this program
-  default: return s->help = true;
-  }
-}
+// --program is for tests: what is run instead of this program.
+static const app_option TABLE[] = {
+    OPT_INTEGER(learners, "learners", "N", 1, CLASS_LEARNERS,
+                "how many; default: as many as names"),
+    OPT_TEXT(names, "names", "A,B,C", "what to call them; default: Learner 1, Learner 2, ..."),
+    OPT_INTEGER(port, "port", "P", 1, 65535, "page of the first learner, the others follow"),
+    OPT_TEXT(program, "program", "FILE", NULL), OPT_REST(arguments)};
 
-static int parse(int argc, char **argv, settings *s) {
-  static const struct option options[] = {
-      {"learners", required_argument, NULL, 'n'}, {"port", required_argument, NULL, 'p'},
-      {"names", required_argument, NULL, 'a'},    {"program", required_argument, NULL, 'x'},
-      {"help", no_argument, NULL, 'h'},           {NULL, 0, NULL, 0}};
-  int option;
-  opterr = 0;
-  while ((option = getopt_long(argc, argv, "+:h", options, NULL)) != -1) {
-    if (option == ':') return app_usage_error(VERB, "%s needs a value", argv[optind - 1]);
-    if (option == '?') return app_usage_error(VERB, "unknown option '%s'", argv[optind - 1]);
-    if (!parse_option(option, s)) return APP_BAD_INPUT;
-  }
-  if (!s->help && optind < argc && strcmp(argv[optind - 1], "--") != 0)
-    return app_usage_error(VERB, "unexpected argument '%s'; options of sonde run come after --",
-                           argv[optind]);
-  return APP_OK;
-}
-
-static int parse_names(const settings *s, class_room *room) {
+static int parse_names(const options *s, class_room *room) {
   const char *p = s->names;
   while (p) {
     size_t length = strcspn(p, ",");
@@ -90,7 +48,7 @@ static int parse_names(const settings *s, class_room *room) {
   return APP_OK;
 }
 
-static int check_names(const settings *s, class_room *room) {
+static int check_names(const options *s, class_room *room) {
   for (uint32_t i = 0; i < room->count; ++i) {
     class_learner *learner = &room->learner[i];
     if (!learner->name[0]) snprintf(learner->name, sizeof learner->name, "Learner %u", i + 1);
@@ -272,27 +230,41 @@ static int run_class(class_room *room) {
   return alive ? APP_OK : APP_FAILED;
 }
 
-int old_class(int argc, char **argv);
-int old_class(int argc, char **argv) {
-  settings s = {.port = 8642};
+static int run(void *from) {
+  const options *s = from;
   static class_room room;
   char program[4096];
-  int code = parse(argc, argv, &s);
-  if (code != APP_OK) return code;
-  if (s.help) {
-    fputs(HELP, stdout);
-    return APP_OK;
-  }
-  room.arguments = argv + optind;
-  room.argument_count = argc - optind;
-  code = parse_names(&s, &room);
-  if (code == APP_OK) code = check_names(&s, &room);
+  char *none[] = {NULL};
+  room.arguments = s->arguments ? s->arguments : none;
+  while (room.arguments[room.argument_count]) room.argument_count++;
+  int code = parse_names(s, &room);
+  if (code == APP_OK) code = check_names(s, &room);
   if (code == APP_OK) code = check_arguments(&room);
   if (code != APP_OK) return code;
-  if (!s.program && !own_program(program, sizeof program)) {
+  assert(room.count >= 1 && room.count <= CLASS_LEARNERS);
+  if (!s->program && !own_program(program, sizeof program)) {
     fprintf(stderr, "sonde class: /proc/self/exe cannot be read\n");
     return APP_FAILED;
   }
-  room.program = s.program ? s.program : program;
+  room.program = s->program ? s->program : program;
   return run_class(&room);
 }
+
+const app_command cmd_class = {
+    .verb = "class",
+    .summary = "run several learners on one machine",
+    .usage = "--learners N [--names A,B,C] [--port P] [-- RUN OPTIONS]",
+    .text =
+        "Starts sonde-run(1) once for each of N learners, each with a page of its own on "
+        "127.0.0.1, and shows in a table how they are doing: phase of the exam, case, time, "
+        "score; in a pipe a line per change. A program that dies is started again after half a "
+        "second, three times at most; the count starts anew after a minute of running. Each "
+        "learner has two addresses, printed at the start: the learner's own, and the teacher's, "
+        "to watch, comment, take control and give it back. An address has a secret: who has it "
+        "can take part. Ctrl-C ends them all.",
+    .tail = "Everything after a double hyphen goes to every sonde-run(1), but for the options that "
+            "would make the learners meet in one place: a port, a recording, a run without page.",
+    OPT_TABLE(TABLE),
+    .size = sizeof(options),
+    .defaults = &DEFAULTS,
+    .run = run};

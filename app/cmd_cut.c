@@ -1,5 +1,6 @@
 // sonde cut: cuts the skin of a model along a path and writes the cut model.
 #include "options.h"
+#include "pose.h"
 
 #include <assert.h>
 #include <math.h>
@@ -65,14 +66,6 @@ static const char *read_triple(const char *text, const char *last, sonde_vec3 *p
   return text;
 }
 
-static sonde_status read_line(const char *text, work *w, sonde_error *error) {
-  const char *next = read_triple(text, ":", &w->path[0]);
-  if (next) next = *next == ':' ? read_triple(next + 1, "", &w->path[1]) : NULL;
-  w->count = 2;
-  if (next) return SONDE_OK;
-  return app_error(error, SONDE_ARGUMENT, "--line expects x,y,z:x,y,z in mm, got '%.80s'", text);
-}
-
 static sonde_status read_file(const char *path, work *w, sonde_error *error) {
   char *bytes = NULL;
   size_t size;
@@ -99,35 +92,6 @@ static sonde_status read_file(const char *path, work *w, sonde_error *error) {
       status = app_error(error, SONDE_FORMAT, "%.300s:%d: expected three numbers", path, number);
   }
   sonde_free(bytes);
-  return status;
-}
-
-static sonde_vec3 along(sonde_vec3 from, double a, sonde_vec3 u, double b, sonde_vec3 v) {
-  return (sonde_vec3){from.x + a * u.x + b * v.x, from.y + a * u.y + b * v.y,
-                      from.z + a * u.z + b * v.z};
-}
-
-// 33 points on the tangent plane of the site, each moved to the skin below it.
-static sonde_status site_line(const options *a, work *w, sonde_error *error) {
-  enum { POINTS = 33 };
-  const sonde_site *s = w->site;
-  sonde_surface_index *skin;
-  sonde_status status = sonde_surface_index_create(&w->model->surface, &skin, error);
-  if (status) return status;
-  double c = cos(a->turn_rad), d = sin(a->turn_rad);
-  sonde_vec3 inward = {-s->normal.x, -s->normal.y, -s->normal.z};
-  for (w->count = 0; !status && w->count < POINTS; ++w->count) {
-    double t = a->length_m * (w->count / (POINTS - 1.0) - 0.5), o = a->offset_m;
-    sonde_vec3 on_plane = along(s->position_m, t * c - o * d, s->u, t * d + o * c, s->v);
-    sonde_vec3 above = along(on_plane, 0.02, s->normal, 0, s->normal);
-    sonde_surface_point hit;
-    if (sonde_surface_raycast(skin, above, inward, 0.1, &hit))
-      w->path[w->count] = hit.point_m;
-    else
-      status = app_error(error, SONDE_ARGUMENT, "the cut leaves the skin %.1f mm beside site %ld",
-                         sqrt(t * t + o * o) * 1e3, a->site);
-  }
-  sonde_surface_index_destroy(skin);
   return status;
 }
 
@@ -162,17 +126,10 @@ static void print(const options *a, const work *w) {
   double mass = sum(w->model->mass_kg, nodes), mass_after = sum(w->cut->mass_kg, after);
   if (a->json) {
     app_json_begin();
-    app_json_integer("nodes_before", nodes);
-    app_json_integer("nodes", after);
-    app_json_integer("split_edges", w->map.split_edges);
-    app_json_real("length_mm", w->map.length_m * 1e3);
-    app_json_bool("closed", w->map.closed);
-    app_json_real("mass_kg", mass_after);
-    app_json_real("mass_change", mass_after / mass - 1);
-    app_json_real("cut_ms", w->seconds * 1e3);
-    app_json_real("force_before_n", w->before_n);
-    app_json_real("force_after_n", w->after_n);
-    app_json_text("model", a->output);
+    app_json("nodes_before:%u nodes:%u split_edges:%u length_mm:%g closed:%hhd mass_kg:%g "
+             "mass_change:%g cut_ms:%g force_before_n:%g force_after_n:%g model:%s",
+             nodes, after, w->map.split_edges, w->map.length_m * 1e3, w->map.closed, mass_after,
+             mass_after / mass - 1, w->seconds * 1e3, w->before_n, w->after_n, a->output);
     app_json_end();
     return;
   }
@@ -186,13 +143,43 @@ static void print(const options *a, const work *w) {
   printf("model         %s\n", a->output);
 }
 
+// The points of the cut: two that are given, those of a file, or 33 beside a site.
 static sonde_status find_path(const options *a, work *w, sonde_error *error) {
-  if (a->line) return read_line(a->line, w, error);
+  enum { POINTS = 33 };
   if (a->path) return read_file(a->path, w, error);
-  w->site = sonde_model_site(w->model, (uint32_t)a->site);
-  if (w->site) return site_line(a, w, error);
-  return app_error(error, SONDE_NOT_FOUND, "%.400s: no site %ld, the model has %u sites", a->model,
-                   a->site, w->model->site_count);
+  if (a->line) {
+    const char *next = read_triple(a->line, ":", &w->path[0]);
+    if (next) next = *next == ':' ? read_triple(next + 1, "", &w->path[1]) : NULL;
+    w->count = 2;
+    return next ? SONDE_OK
+                : app_error(error, SONDE_ARGUMENT, "--line expects x,y,z:x,y,z in mm, got '%.80s'",
+                            a->line);
+  }
+  const sonde_site *s = w->site = sonde_model_site(w->model, (uint32_t)a->site);
+  if (!s)
+    return app_error(error, SONDE_NOT_FOUND, "%.400s: no site %ld, the model has %u sites",
+                     a->model, a->site, w->model->site_count);
+
+  // A straight line in the tangent plane of the site, each point moved to the skin below it.
+  sonde_surface_index *skin;
+  sonde_status status = sonde_surface_index_create(&w->model->surface, &skin, error);
+  if (status) return status;
+  double c = cos(a->turn_rad), d = sin(a->turn_rad), o = a->offset_m;
+  sonde_vec3 inward = {-s->normal.x, -s->normal.y, -s->normal.z};
+  for (w->count = 0; !status && w->count < POINTS; ++w->count) {
+    double t = a->length_m * (w->count / (POINTS - 1.0) - 0.5);
+    sonde_pose above = {.position = s->position_m};
+    above = pose_shift(pose_shift(above, t * c - o * d, s->u), t * d + o * c, s->v);
+    above = pose_shift(above, 0.02, s->normal);
+    sonde_surface_point hit;
+    if (sonde_surface_raycast(skin, above.position, inward, 0.1, &hit))
+      w->path[w->count] = hit.point_m;
+    else
+      status = app_error(error, SONDE_ARGUMENT, "the cut leaves the skin %.1f mm beside site %ld",
+                         sqrt(t * t + o * o) * 1e3, a->site);
+  }
+  sonde_surface_index_destroy(skin);
+  return status;
 }
 
 static sonde_status cut(const options *a, work *w, sonde_error *error) {
@@ -212,8 +199,7 @@ static sonde_status cut(const options *a, work *w, sonde_error *error) {
   return sonde_model_save(w->cut, a->output, error);
 }
 
-static int run(void *from, int argc, char **argv) {
-  (void)argc, (void)argv;
+static int run(void *from) {
   const options *a = from;
   assert(a->output);
   static work w;

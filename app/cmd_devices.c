@@ -13,8 +13,7 @@ static const app_option TABLE[] = {
              "open each device for a moment instead of only looking for its library"),
     OPT_JSON(json)};
 
-static int run(void *from, int argc, char **argv) {
-  (void)argc, (void)argv;
+static int run(void *from) {
   const options *o = from;
   sonde_device_info info[32];
   uint32_t count = sonde_devices_find(o->probe, info, 32);
@@ -30,9 +29,7 @@ static int run(void *from, int argc, char **argv) {
       continue;
     }
     app_json_object(d->name);
-    app_json_text("description", d->description);
-    app_json_bool("available", d->available);
-    app_json_text("reason", d->reason);
+    app_json("description:%s available:%hhd reason:%s", d->description, d->available, d->reason);
     app_json_close();
   }
   if (o->json) app_json_end();

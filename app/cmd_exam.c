@@ -1,87 +1,53 @@
 // sonde exam: a scripted operator examines a case.
-// examine:    one exam.
-// print_text, print_json: its result.
 #include "exam_common.h"
+#include "options.h"
 
-#include <getopt.h>
+#include <assert.h>
 #include <stdio.h>
 #include <string.h>
 
 static const char VERB[] = "exam";
-static const char HELP[] =
-    "usage: sonde exam --case ID|FILE [options]\n"
-    "       sonde exam --compare [options]\n"
-    "       sonde exam --recover DIR [--json]\n"
-    "\n"
-    "Lets a scripted operator examine a case in lockstep and scores the exam. The operator sees\n"
-    "what a trainee sees, never the truth. Formulas: docs/trainer.md.\n"
-    "\n"
-    "  --case ID|FILE    a case that ships (sonde cases lists them) or a case file\n"
-    "  --protocol P      two_point, three_point, extended, or a file; default extended\n"
-    "  --operator NAME   expert, novice, timid, forceful; default expert\n"
-    "  --seed N          of the operator's hand (0 to 4294967295); default 1\n"
-    "  --compare         every case by every operator, and each metric's separation\n"
-    "  --seeds N         exams of each operator on each case when comparing (1 to 100); default 1\n"
-    "  --recover DIR     of a directory of exams kept by sonde run: adds to its log the exams "
-    "whose\n"
-    "                    program was killed, makes missing results and reports from the journals\n"
-    "  --solid           the inside by finite elements, as in real time; slower\n"
-    "  --cases DIR       cases from there\n"
-    "  --protocols DIR   protocols from there\n"
-    "  -o, --output DIR  write results as JSON and the presses as CSV; made when absent\n"
-    "  --json            print one JSON object\n"
-    "  --help            this text\n";
 
-typedef struct arguments {
+typedef struct options {
   const char *patient, *protocol, *operator_name, *cases, *protocols, *directory, *recover;
   long seed, seeds;
-  bool compare, solid, json, help;
-} arguments;
+  bool compare, solid, json;
+} options;
 
-static bool read_option(int option, arguments *a) {
-  switch (option) {
-  case 'c': a->patient = optarg; return true;
-  case 'p': a->protocol = optarg; return true;
-  case 'O': a->operator_name = optarg; return true;
-  case 's': return app_parse_integer(VERB, "--seed", optarg, 0, 4294967295L, &a->seed);
-  case 'n': return app_parse_integer(VERB, "--seeds", optarg, 1, 100, &a->seeds);
-  case 'C': a->cases = optarg; return true;
-  case 'P': a->protocols = optarg; return true;
-  case 'o': a->directory = optarg; return true;
-  case 'x': return a->compare = true;
-  case 'S': return a->solid = true;
-  case 'R': a->recover = optarg; return true;
-  case 'j': return a->json = true;
-  case 'h': return a->help = true;
-  default: return false;
-  }
-}
+static const options DEFAULTS = {
+    .protocol = "extended", .operator_name = "expert", .seed = 1, .seeds = 1};
 
-static bool read_arguments(int argc, char **argv, arguments *a) {
-  static const struct option LONG[] = {{"case", required_argument, NULL, 'c'},
-                                       {"protocol", required_argument, NULL, 'p'},
-                                       {"operator", required_argument, NULL, 'O'},
-                                       {"seed", required_argument, NULL, 's'},
-                                       {"seeds", required_argument, NULL, 'n'},
-                                       {"cases", required_argument, NULL, 'C'},
-                                       {"protocols", required_argument, NULL, 'P'},
-                                       {"output", required_argument, NULL, 'o'},
-                                       {"compare", no_argument, NULL, 'x'},
-                                       {"solid", no_argument, NULL, 'S'},
-                                       {"recover", required_argument, NULL, 'R'},
-                                       {"json", no_argument, NULL, 'j'},
-                                       {"help", no_argument, NULL, 'h'},
-                                       {NULL, 0, NULL, 0}};
-  for (int c; (c = getopt_long(argc, argv, "o:", LONG, NULL)) != -1;)
-    if (!read_option(c, a)) return false;
-  if (a->help) return true;
-  if (optind < argc) {
-    app_usage_error(VERB, "unexpected argument '%s'", argv[optind]);
-    return false;
-  }
-  if (a->compare || a->patient || a->recover) return true;
-  app_usage_error(VERB, "--case is missing");
-  return false;
+static const app_option TABLE[] = {
+    OPT_TEXT(patient, "case", "ID|FILE", "a case that ships, see sonde-cases(1), or a case file"),
+    OPT_TEXT(protocol, "protocol", "P", "two_point, three_point, extended, or a protocol file"),
+    OPT_TEXT(operator_name, "operator", "NAME", "expert, novice, timid or forceful"),
+    OPT_INTEGER(seed, "seed", "N", 0, 4294967295L, "of the operator's hand"),
+    OPT_FLAG(compare, "compare",
+             "every case (or the one of --case) by every operator: a table of scores, the mean of "
+             "each metric, and how well it tells the expert from each of the others (0.5: not at "
+             "all; 0 or 1: always)"),
+    OPT_INTEGER(seeds, "seeds", "N", 1, 100, "exams of each operator on each case when comparing"),
+    OPT_TEXT(
+        recover, "recover", "DIR",
+        "of a directory in which sonde-run(1) keeps exams: adds the exams that its log lacks "
+        "because their program was killed, with their score or as interrupted, and plays the "
+        "journals of finished exams whose result or report is missing to make them again. Exams "
+        "that run are left alone"),
+    OPT_FLAG(solid, "solid",
+             "the inside by finite elements, as in real time, instead of columns; slower"),
+    OPT_TEXT(cases, "cases", "DIR", "cases from there instead of those that ship"),
+    OPT_TEXT(protocols, "protocols", "DIR", "protocols from there instead of those that ship"),
+    OPT_TEXT(directory, "o,output", "DIR",
+             "write each result as JSON and its presses as CSV into DIR; made when absent"),
+    OPT_JSON(json)};
+
+static int check(void *from) {
+  const options *a = from;
+  if (!a->compare && !a->patient && !a->recover) return app_usage_error(VERB, "--case is missing");
+  for (const char *const *known = sonde_operator_names(); *known; ++known)
+    if (strcmp(*known, a->operator_name) == 0) return APP_OK;
+  return app_usage_error(VERB, "no operator '%s', expected expert, novice, timid or forceful",
+                         a->operator_name);
 }
 
 static void print_segments(const sonde_score *s) {
@@ -145,7 +111,7 @@ static void print_json(const sonde_case *patient, const char *protocol, const ch
   app_json_end();
 }
 
-static int examine(const arguments *a, const exam_library *library,
+static int examine(const options *a, const exam_library *library,
                    const sonde_exam_protocol *protocol) {
   sonde_error error = {0};
   sonde_case patient;
@@ -183,30 +149,32 @@ static int examine(const arguments *a, const exam_library *library,
   return APP_OK;
 }
 
-static bool known_operator(const char *name) {
-  for (const char *const *known = sonde_operator_names(); *known; ++known)
-    if (strcmp(*known, name) == 0) return true;
-  app_usage_error(VERB, "no operator '%s', expected expert, novice, timid or forceful", name);
-  return false;
-}
-
-int old_exam(int argc, char **argv);
-int old_exam(int argc, char **argv) {
-  arguments a = {.protocol = "extended", .operator_name = "expert", .seed = 1, .seeds = 1};
-  if (!read_arguments(argc, argv, &a)) return APP_BAD_INPUT;
-  if (a.help) {
-    fputs(HELP, stdout);
-    return APP_OK;
-  }
-  if (!known_operator(a.operator_name)) return APP_BAD_INPUT;
-  exam_library library = exam_library_find(a.cases, a.protocols);
-  if (a.recover) return exam_recover(&library, a.recover, a.json);
+static int run(void *from) {
+  const options *a = from;
+  assert(a->protocol && a->operator_name);
+  exam_library library = exam_library_find(a->cases, a->protocols);
+  if (a->recover) return exam_recover(&library, a->recover, a->json);
   sonde_exam_protocol protocol;
   sonde_error error = {0};
-  sonde_status status = exam_find_protocol(&library, a.protocol, &protocol, &error);
+  sonde_status status = exam_find_protocol(&library, a->protocol, &protocol, &error);
   if (status) return app_fail(VERB, &error);
-  if (!a.compare) return examine(&a, &library, &protocol);
-  compare_options o = {&library, &protocol, a.patient, a.directory,
-                       a.seed,   a.seeds,   a.json,    a.solid};
+  if (!a->compare) return examine(a, &library, &protocol);
+  compare_options o = {&library, &protocol, a->patient, a->directory,
+                       a->seed,  a->seeds,  a->json,    a->solid};
   return exam_compare(&o);
 }
+
+const app_command cmd_exam = {
+    .verb = "exam",
+    .summary = "let a scripted operator examine a case and score it",
+    .usage = "--case ID|FILE [options]\n--compare [options]\n--recover DIR [--json]",
+    .text =
+        "Lets a scripted operator examine a case in lockstep and scores the exam as a person's "
+        "is: the operator moves a probe over the thigh, presses, looks, and decides for every "
+        "segment of the vein. The operator sees what a trainee sees, never the truth. Formulas: "
+        "docs/trainer.md.",
+    OPT_TABLE(TABLE),
+    .size = sizeof(options),
+    .defaults = &DEFAULTS,
+    .check = check,
+    .run = run};

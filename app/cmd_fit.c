@@ -1,104 +1,144 @@
 // sonde fit: measurements, sites and surfaces in, thigh model out.
-// parse:       options into texts, then into definitions.
-// load_inputs: tables and surfaces.
-// fit_model:   build, estimate, set the parameters, save, look at the result from other sides.
 #include "fit_checks.h"
 #include "fit_common.h"
 #include "fit_doubts.h"
-#include "fit_open.h"
 #include "fit_report.h"
 #include "fit_sample.h"
-#include "fit_tables.h"
+#include "options.h"
 
+#include <assert.h>
+#include <math.h>
 #include <stdlib.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 static const char VERB[] = "fit";
-static const char HELP[] =
-    "usage: sonde fit MEASUREMENTS.csv --surface SKIN.ply --sites SITES.csv -o MODEL [options]\n"
-    "       sonde fit --sample TABLE.csv [--exponent N] [--area-mm2 A --height-mm H] [--json]\n"
-    "\n"
-    "Estimates the normal springs f(x) = x/(a x + b) of every site (stage 1: every curve by "
-    "itself;\n"
-    "stage 2: one pair per site and one uniform edge stiffness, neighbours held still; stage 3: "
-    "refit\n"
-    "with shear between neighbours on the equilibrium of the whole skin), carries them over the\n"
-    "refined skin and writes a thigh model. Files are in mm and N.\n"
-    "\n"
-    "  --surface FILE    skin, closed, outward: .ply, .obj or .stl\n"
-    "  --sites FILE      site,x_mm,y_mm,z_mm,nx..nz,ux..uz,vx..vz[,fat_mm]\n"
-    "  -o FILE           model file to write\n"
-    "  --stages 1|2|3    last stage; default 2. With 1 the model has one pair per site, no edges\n"
-    "                    in the estimation and the law's default edge stiffness. Only 3 gives a\n"
-    "                    model whose forces follow the measurements when it moves freely\n"
-    "  --femur FILE      default: femur.ply beside the skin; without one a limb gets a rod along\n"
-    "                    the middles of its sections, another body no bone\n"
-    "  --body KIND       limb (default) or other: no bone unless --femur is given, no vessels, "
-    "and\n"
-    "                    so no image\n"
-    "  --fat FILE        skin/fat interface; default: fat_skin_interface.ply beside the skin\n"
-    "  --muscle FILE     fat/muscle interface; default: muscle_surface.ply beside the skin\n"
-    "  --name TEXT       name in the model file; default thigh\n"
-    "  --provenance TEXT where the data come from, kept in the model file\n"
-    "  --weights KIND    absolute (default) or relative to each probe's mean force\n"
-    "  --loss KIND       squares (default), huber or student\n"
-    "  --pretension      estimate an edge pre-tension too\n"
-    "  --cold-start      start stage 2 from generic values instead of stage 1\n"
-    "  --exponent N      of the normal springs k0 x/(1 - (x/xm)^N) in stage 3: 1, 2 (default),\n"
-    "                    3, or auto: the one with the least error on sites left out\n"
-    "  --inplane-n-m K   in-plane stiffness of the skin in stage 3, 0 to 1e4; default 35, chosen\n"
-    "  --tangential-n-m3 G  stiffness per area against sliding along the skin, 0 to 1e8; default\n"
-    "                    1e5, chosen\n"
-    "  --uniform-shear   one shear stiffness and limit for the whole skin in stage 3; default: a\n"
-    "                    field like k0 and xm\n"
-    "  --smoothness SD   of ln k0 and ln xm per site spacing in stage 3; default: by leaving "
-    "sites\n"
-    "                    out one by one\n"
-    "  --hold-out KIND   sites (eight parts in turn), probe (each in turn) or depth (the deepest\n"
-    "                    quarter): refit without them and print the error on them\n"
-    "  --also FILE       with --hold-out sites: measurements of other probes that the refits\n"
-    "                    predict too, each at the sites that it has not seen; also by --layers\n"
-    "  --layers          the same fit with other laws between neighbours, their errors beside\n"
-    "                    ours: pre-tension (T), pre-tension and stiffening (J)\n"
-    "  --profile         likelihood of the shear stiffness: all else refitted at nine values\n"
-    "  --identifiability what each probe alone and all together would determine\n"
-    "  --starts N        refit from N random points and count how many end in the same optimum\n"
-    "  --seed S          of the random points; default 1\n"
-    "  --report DIR      write DIR/index.html with figures, tables and intervals; after stage 3\n"
-    "                    with --profile and --identifiability\n"
-    "  --estimate-zero   estimate the contact zero of every curve in stage 3\n"
-    "  --estimate-tare   estimate the force that the sensor reads in the air, of every curve\n"
-    "  --zero-sd-mm SD   its standard deviation beforehand; default 5. Implies --estimate-zero\n"
-    "  --tare-sd-n SD    likewise; default 2. Implies --estimate-tare\n"
-    "  --fine-mm L       longest skin edge near footprints; default 3\n"
-    "  --sample TABLE    force against compression of one specimen instead: the springs of n = 1,\n"
-    "                    2, 3 and a free n, the chosen one by its error on what was left out\n"
-    "  --area-mm2 A      the specimen's cross-section; default: from the table's first lines\n"
-    "  --height-mm H     its height, likewise\n"
-    "  --accept-implausible  fit measurements outside what is known of tissue, with a warning;\n"
-    "                    a table in other units is refused all the same\n"
-    "  --json            one JSON object instead of the table\n"
-    "  --help            this text\n";
+
+typedef struct options {
+  const char *measurements, *surface, *sites, *output, *femur, *fat, *muscle, *name, *provenance;
+  const char *report, *sample, *also;
+  sonde_fit_def def;
+  int body, exponent, hold_out; // of the lists of words; hold_out -1: none
+  double area_m2, height_m;     // of a specimen; 0: those of its table
+  double fine_m, inplane_n_m, tangential_n_m3, zero_sd_m, tare_sd_n;
+  long starts, seed;
+  bool zero, tare, json, profile, identify, layers, accept;
+} options;
+
+enum { BODY_LIMB, BODY_OTHER };
+enum { EXPONENT_2 = 1, EXPONENT_AUTO = 3 };
+
+static void prepare(void *to) {
+  options *o = to;
+  o->def = sonde_fit_def_default();
+  o->exponent = EXPONENT_2;
+  o->hold_out = -1;
+  o->fine_m = 1e-3 * 3;
+  o->inplane_n_m = SONDE_SKIN_INPLANE_N_M;
+  o->tangential_n_m3 = SONDE_SKIN_TANGENTIAL_N_M3;
+  o->zero_sd_m = 1e-3 * 5;
+  o->tare_sd_n = 2;
+  o->seed = 1;
+}
 
 static const char *const HOLD_OUTS[] = {"sites", "probe", "depth", NULL};
+static const char *const WEIGHTS[] = {"absolute", "relative", NULL};
+static const char *const LOSSES[] = {"squares", "huber", "student", NULL};
+static const char *const BODIES[] = {"limb", "other", NULL};
+static const char *const EXPONENTS[] = {"1", "2", "3", "auto", NULL};
 
-typedef struct fit_arguments {
-  const char *measurements, *surface, *sites, *output, *femur, *fat, *muscle, *name, *provenance;
-  const char *stages, *weights, *loss, *fine_mm, *exponent, *report, *hold_out, *smoothness;
-  const char *sample, *area, *height, *body, *starts, *seed, *also, *inplane, *tangential, *zero_sd,
-      *tare_sd;
-  bool zero, tare;
-  bool json, help, pretension, cold_start, profile, identify, layers, uniform_shear, accept;
-  char command_line[1024]; // as typed
-} fit_arguments;
-
-// Of the model that is fitted.
-typedef struct fit_skin {
-  double fine_mm, inplane_n_m, tangential_n_m3;
-  bool other; // no limb
-} fit_skin;
-
-static const char CHOOSE[] = "auto"; // of --exponent
+static const app_option TABLE[] = {
+    OPT_ARGUMENT(measurements, "MEASUREMENTS.csv",
+                 "forces against penetrations; a column phase (loading, unloading) keeps the rows "
+                 "of loading, a column repeat (a number) makes the repeats of a curve their mean"),
+    OPT_TEXT(surface, "surface", "FILE", "skin, closed, outward: .ply, .obj or .stl"),
+    OPT_TEXT(sites, "sites", "FILE",
+             "the measured places: site,x_mm,y_mm,z_mm,nx..nz,ux..uz,vx..vz[,fat_mm]"),
+    OPT_OUTPUT(output, "o,output", "FILE", "model file to write; it appears when it is complete"),
+    OPT_INTEGER(
+        def.stages, "stages", "N", 1, 3,
+        "last stage. With 1 the model has one pair per site, no edges in the estimation and "
+        "the law's default edge stiffness. Only 3 gives a model whose forces follow the "
+        "measurements when it moves freely"),
+    OPT_TEXT(femur, "femur", "FILE",
+             "femur; without one a limb gets a rod along the middles of its sections, another body "
+             "no bone; default: femur.ply beside the skin"),
+    OPT_WORD(body, "body", "KIND", BODIES,
+             "other: no vessels, and no bone unless --femur is given; such a model can be pressed "
+             "and run, but has no image"),
+    OPT_TEXT(fat, "fat", "FILE",
+             "skin/fat interface; default: fat_skin_interface.ply beside the skin"),
+    OPT_TEXT(muscle, "muscle", "FILE",
+             "fat/muscle interface; default: muscle_surface.ply beside the skin"),
+    OPT_TEXT(name, "name", "TEXT", "name in the model file; default thigh"),
+    OPT_TEXT(provenance, "provenance", "TEXT", "where the data come from, kept in the model file"),
+    OPT_WORD(def.weights, "weights", "KIND", WEIGHTS, "relative: to each probe's mean force"),
+    OPT_WORD(def.loss, "loss", "KIND", LOSSES, "loss of the residuals"),
+    OPT_FLAG(def.fit_pretension, "pretension", "estimate a pre-tension of the edges too"),
+    OPT_FLAG(def.cold_start, "cold-start", "start stage 2 from generic values instead of stage 1"),
+    OPT_WORD(
+        exponent, "exponent", "N", EXPONENTS,
+        "of the normal springs k0 x/(1 - (x/xm)^N) in stage 3; auto: all three are fitted, and "
+        "the one with the least error on sites that were left out is kept, which takes three "
+        "times as long"),
+    OPT_REAL(inplane_n_m, "inplane-n-m", "K", 0, 1e4, 1,
+             "in-plane stiffness of the skin in stage 3; chosen, not fitted"),
+    OPT_REAL(tangential_n_m3, "tangential-n-m3", "G", 0, 1e8, 1,
+             "stiffness per area against sliding along the skin in stage 3; chosen"),
+    OPT_FLAG(
+        def.uniform_shear, "uniform-shear",
+        "one shear stiffness and limit for the whole skin in stage 3; default: a field like k0 "
+        "and xm"),
+    OPT_REAL(def.smoothness_sd, "smoothness", "SD", 1e-4, 10, 1,
+             "of ln k0 and ln xm per site spacing in stage 3; default: the one that predicts sites "
+             "left out one by one best"),
+    OPT_WORD(hold_out, "hold-out", "KIND", HOLD_OUTS,
+             "sites (eight parts in turn), probe (each in turn) or depth (the deepest quarter): "
+             "refit without them and print the error on them"),
+    OPT_TEXT(also, "also", "FILE",
+             "with --hold-out sites: measurements of other probes, which were not fitted, that the "
+             "refits predict too, each at the sites that it has not seen; with --layers: every law "
+             "predicts them"),
+    OPT_FLAG(layers, "layers",
+             "fit stage 3 again with other laws between neighbours and print their errors beside "
+             "ours: pre-tension (T), pre-tension and stiffening (J). The model keeps our law: the "
+             "others are laws of the fit only"),
+    OPT_FLAG(profile, "profile",
+             "profile likelihood of the shear stiffness: all else refitted at nine values, and the "
+             "interval where the likelihood has dropped by what 95 % allow"),
+    OPT_FLAG(identify, "identifiability",
+             "how certain the parameters would be from each probe alone and from all together"),
+    OPT_INTEGER(starts, "starts", "N", 1, 10000,
+                "refit from N random points and count how many end in the same optimum"),
+    OPT_INTEGER(seed, "seed", "S", 0, 2147483647, "of the random points"),
+    OPT_TEXT(
+        report, "report", "DIR",
+        "write DIR/index.html with figures, tables and intervals; after stage 3 with --profile "
+        "and --identifiability"),
+    OPT_FLAG(zero, "estimate-zero",
+             "estimate the penetration at which every curve begins, its contact zero, in stage 3"),
+    OPT_FLAG(tare, "estimate-tare",
+             "estimate the force that the sensor reads in the air, of every curve, in stage 3"),
+    OPT_REAL(zero_sd_m, "zero-sd-mm", "SD", 0.01, 20, 1e-3,
+             "standard deviation of the contact zero beforehand; implies --estimate-zero"),
+    OPT_REAL(tare_sd_n, "tare-sd-n", "SD", 1e-3, 20, 1,
+             "standard deviation of the tare beforehand; implies --estimate-tare"),
+    OPT_REAL(fine_m, "fine-mm", "L", 0.5, 50, 1e-3, "longest skin edge near footprints"),
+    OPT_TEXT(sample, "sample", "TABLE",
+             "fit force against compression of one specimen between two plates instead, and write "
+             "no model: the springs of n = 1, 2, 3 and of a free n, the chosen one by its error on "
+             "stretches of compression that were left out. The table has a column compression, "
+             "penetration or displacement and a column load or force with their units, as in "
+             "Compression (mm)"),
+    OPT_REAL(area_m2, "area-mm2", "A", 1, 1e6, 1e-6,
+             "cross-section of the specimen; default: from a line such as Diameter: 50mm before "
+             "the table's header"),
+    OPT_REAL(height_m, "height-mm", "H", 0.1, 1e3, 1e-3,
+             "height of the specimen; default: from such a line too"),
+    OPT_FLAG(accept, "accept-implausible",
+             "fit measurements outside what is known of tissue, with a warning; a table in other "
+             "units, or one whose forces do not rise, is refused all the same"),
+    OPT_JSON(json)};
 
 // All that was found.
 typedef struct fit_outcome {
@@ -115,156 +155,30 @@ typedef struct fit_inputs {
   sonde_mesh skin, femur, fat, muscle;
 } fit_inputs;
 
-static bool parse_arguments(int argc, char **argv, fit_arguments *a) {
-  const app_option options[] = {{"--surface", &a->surface, NULL},
-                                {"--sites", &a->sites, NULL},
-                                {"-o", &a->output, NULL},
-                                {"--output", &a->output, NULL},
-                                {"--stages", &a->stages, NULL},
-                                {"--femur", &a->femur, NULL},
-                                {"--body", &a->body, NULL},
-                                {"--sample", &a->sample, NULL},
-                                {"--area-mm2", &a->area, NULL},
-                                {"--height-mm", &a->height, NULL},
-                                {"--fat", &a->fat, NULL},
-                                {"--muscle", &a->muscle, NULL},
-                                {"--name", &a->name, NULL},
-                                {"--provenance", &a->provenance, NULL},
-                                {"--weights", &a->weights, NULL},
-                                {"--loss", &a->loss, NULL},
-                                {"--fine-mm", &a->fine_mm, NULL},
-                                {"--exponent", &a->exponent, NULL},
-                                {"--smoothness", &a->smoothness, NULL},
-                                {"--uniform-shear", NULL, &a->uniform_shear},
-                                {"--inplane-n-m", &a->inplane, NULL},
-                                {"--tangential-n-m3", &a->tangential, NULL},
-                                {"--report", &a->report, NULL},
-                                {"--hold-out", &a->hold_out, NULL},
-                                {"--also", &a->also, NULL},
-                                {"--starts", &a->starts, NULL},
-                                {"--seed", &a->seed, NULL},
-                                {"--profile", NULL, &a->profile},
-                                {"--identifiability", NULL, &a->identify},
-                                {"--layers", NULL, &a->layers},
-                                {"--pretension", NULL, &a->pretension},
-                                {"--cold-start", NULL, &a->cold_start},
-                                {"--accept-implausible", NULL, &a->accept},
-                                {"--estimate-zero", NULL, &a->zero},
-                                {"--estimate-tare", NULL, &a->tare},
-                                {"--zero-sd-mm", &a->zero_sd, NULL},
-                                {"--tare-sd-n", &a->tare_sd, NULL},
-                                {"--json", NULL, &a->json},
-                                {"--help", NULL, &a->help}};
-  if (!app_take_options(VERB, argc, argv, options, sizeof options / sizeof *options,
-                        &a->measurements))
-    return false;
-  if (a->help || a->sample) return true;
-  return app_require(VERB, "MEASUREMENTS.csv", a->measurements) &&
-         app_require(VERB, "--surface", a->surface) && app_require(VERB, "--sites", a->sites) &&
-         app_require(VERB, "-o MODEL", a->output);
-}
-
-// Arguments with blanks are put in quotes.
-static void keep_command_line(int argc, char **argv, fit_arguments *a) {
-  size_t used = (size_t)snprintf(a->command_line, sizeof a->command_line, "sonde fit");
-  for (int k = 1; k < argc && used < sizeof a->command_line; ++k) {
-    const char *quote = strpbrk(argv[k], " \t'") || !argv[k][0] ? "\"" : "";
-    used += (size_t)snprintf(a->command_line + used, sizeof a->command_line - used, " %s%s%s",
-                             quote, argv[k], quote);
-  }
-}
-
-// Standard deviations of contact zero and tare; 0: not estimated.
-static bool parse_offsets(const fit_arguments *a, long stages, sonde_fit_def *def) {
-  double zero_mm = a->zero ? 5 : 0, tare_n = a->tare ? 2 : 0;
-  if (a->zero_sd && !app_parse_real(VERB, "--zero-sd-mm", a->zero_sd, 0.01, 20, &zero_mm))
-    return false;
-  if (a->tare_sd && !app_parse_real(VERB, "--tare-sd-n", a->tare_sd, 1e-3, 20, &tare_n))
-    return false;
-  def->zero_sd_m = 1e-3 * zero_mm;
-  def->tare_sd_n = tare_n;
-  if (stages == 3 || !(zero_mm > 0 || tare_n > 0)) return true;
-  app_usage_error(VERB, "--estimate-zero and --estimate-tare need --stages 3");
-  return false;
-}
-
-static bool parse_checks(const fit_arguments *a, long stages, fit_checks *checks) {
-  long starts = 0, seed = 1;
-  if (a->starts && !app_parse_integer(VERB, "--starts", a->starts, 1, 10000, &starts)) return false;
-  if (a->seed && !app_parse_integer(VERB, "--seed", a->seed, 0, 2147483647, &seed)) return false;
-  const char *late = a->hold_out   ? "--hold-out"
-                     : a->profile  ? "--profile"
-                     : a->identify ? "--identifiability"
-                     : a->layers   ? "--layers"
-                     : a->starts   ? "--starts"
-                                   : NULL;
-  if (late && stages < 3) {
-    app_usage_error(VERB, "%s needs --stages 3", late);
-    return false;
-  }
-  bool reported = a->report && stages == 3;
-  *checks = (fit_checks){.profile = a->profile || reported,
-                         .identify = a->identify || reported,
-                         .layers = a->layers,
-                         .starts = (uint32_t)starts,
-                         .seed = (uint64_t)seed};
-  return true;
-}
-
-static bool chooses_exponent(const fit_arguments *a) {
-  return a->exponent && strcmp(a->exponent, CHOOSE) == 0;
-}
-
-static bool parse_fit(const fit_arguments *a, sonde_fit_def *def, fit_skin *skin,
-                      fit_checks *checks) {
-  static const char *const WEIGHTS[] = {"absolute", "relative", NULL};
-  static const char *const LOSSES[] = {"squares", "huber", "student", NULL};
-  int weights = 0, loss = 0;
-  long stages = 2;
-  if (a->stages && !app_parse_integer(VERB, "--stages", a->stages, 1, 3, &stages)) return false;
-  if (a->weights && !app_parse_word(VERB, "--weights", a->weights, WEIGHTS, &weights)) return false;
-  if (a->loss && !app_parse_word(VERB, "--loss", a->loss, LOSSES, &loss)) return false;
-  if (a->fine_mm && !app_parse_real(VERB, "--fine-mm", a->fine_mm, 0.5, 50, &skin->fine_mm))
-    return false;
-  if (a->inplane && !app_parse_real(VERB, "--inplane-n-m", a->inplane, 0, 1e4, &skin->inplane_n_m))
-    return false;
-  if (a->tangential &&
-      !app_parse_real(VERB, "--tangential-n-m3", a->tangential, 0, 1e8, &skin->tangential_n_m3))
-    return false;
-  static const char *const BODIES[] = {"limb", "other", NULL};
-  int body = 0;
-  if (a->body && !app_parse_word(VERB, "--body", a->body, BODIES, &body)) return false;
-  skin->other = body == 1;
-  *def = sonde_fit_def_default();
-  long exponent = (long)def->normal_exponent;
-  if (chooses_exponent(a) && stages < 3) {
-    app_usage_error(VERB, "--exponent auto needs --stages 3");
-    return false;
-  }
-  if (a->exponent && !chooses_exponent(a) &&
-      !app_parse_integer(VERB, "--exponent", a->exponent, 1, 3, &exponent))
-    return false;
-  if (a->smoothness &&
-      !app_parse_real(VERB, "--smoothness", a->smoothness, 1e-4, 10, &def->smoothness_sd))
-    return false;
-  if (a->hold_out) {
-    int kind;
-    if (!app_parse_word(VERB, "--hold-out", a->hold_out, HOLD_OUTS, &kind)) return false;
-  }
-  bool by_sites = a->hold_out && strcmp(a->hold_out, HOLD_OUTS[0]) == 0;
-  if (a->also && !a->layers && !by_sites) {
-    app_usage_error(VERB, "--also needs --hold-out sites or --layers");
-    return false;
-  }
-  if (!parse_offsets(a, stages, def)) return false;
-  def->normal_exponent = (double)exponent;
-  def->uniform_shear = a->uniform_shear;
-  def->stages = (uint32_t)stages;
-  def->weights = (sonde_fit_weights)weights;
-  def->loss = (sonde_fit_loss)loss;
-  def->fit_pretension = a->pretension;
-  def->cold_start = a->cold_start;
-  return parse_checks(a, stages, checks);
+// What goes with what, and the definition of the fit that follows from it.
+static int check(void *from) {
+  options *o = from;
+  if (o->sample)
+    return o->measurements || o->surface || o->sites || o->output
+               ? app_usage_error(VERB,
+                                 "--sample goes without measurements, surface, sites and model")
+               : APP_OK;
+  const char *late = o->hold_out >= 0               ? "--hold-out"
+                     : o->profile                   ? "--profile"
+                     : o->identify                  ? "--identifiability"
+                     : o->layers                    ? "--layers"
+                     : o->starts                    ? "--starts"
+                     : o->exponent == EXPONENT_AUTO ? "--exponent auto"
+                                                    : NULL;
+  if (late && o->def.stages < 3) return app_usage_error(VERB, "%s needs --stages 3", late);
+  if (o->also && !o->layers && o->hold_out != SONDE_HOLD_OUT_SITES)
+    return app_usage_error(VERB, "--also needs --hold-out sites or --layers");
+  if (o->zero || app_option_given("zero-sd-mm")) o->def.zero_sd_m = o->zero_sd_m;
+  if (o->tare || app_option_given("tare-sd-n")) o->def.tare_sd_n = o->tare_sd_n;
+  if (o->def.stages < 3 && (o->def.zero_sd_m > 0 || o->def.tare_sd_n > 0))
+    return app_usage_error(VERB, "--estimate-zero and --estimate-tare need --stages 3");
+  if (o->exponent != EXPONENT_AUTO) o->def.normal_exponent = o->exponent + 1;
+  return APP_OK;
 }
 
 // Loads an optional surface: the named one, else the usual name beside the skin when it exists.
@@ -282,34 +196,24 @@ static sonde_status load_layer(const char *named, const char *skin, const char *
   return sonde_mesh_load(named ? named : path, 1e-3, mesh, error);
 }
 
-static sonde_status load_inputs(const fit_arguments *a, fit_inputs *in, sonde_error *error) {
+static sonde_status load_inputs(const options *a, fit_inputs *in, sonde_error *error) {
   sonde_status status = sonde_site_table_load(a->sites, &in->sites, error);
   if (!status)
     status = sonde_measurements_load(a->measurements, &in->sites, &in->measurements, error);
   if (!status && a->also) status = sonde_measurements_load(a->also, &in->sites, &in->also, error);
   if (!status) status = sonde_mesh_load(a->surface, 1e-3, &in->skin, error);
-  bool other = a->body && strcmp(a->body, "other") == 0; // of which only what is named counts
-  if (!status && (a->femur || !other))
+  // Of another body only the bone that is named counts.
+  if (!status && (a->femur || a->body == BODY_LIMB))
     status = load_layer(a->femur, a->surface, "femur.ply", &in->femur, error);
   if (!status) status = load_layer(a->fat, a->surface, "fat_skin_interface.ply", &in->fat, error);
   if (!status) status = load_layer(a->muscle, a->surface, "muscle_surface.ply", &in->muscle, error);
   return status;
 }
 
-static void clear_inputs(fit_inputs *in) {
-  sonde_site_table_clear(&in->sites);
-  sonde_measurements_clear(&in->measurements);
-  sonde_measurements_clear(&in->also);
-  sonde_mesh_clear(&in->skin);
-  sonde_mesh_clear(&in->femur);
-  sonde_mesh_clear(&in->fat);
-  sonde_mesh_clear(&in->muscle);
-}
-
 static const sonde_mesh *given(const sonde_mesh *mesh) { return mesh->vertex_count ? mesh : NULL; }
 
-static sonde_status build_model(const fit_arguments *a, const fit_inputs *in, const fit_skin *skin,
-                                sonde_model **model, sonde_error *error) {
+static sonde_status build_model(const options *a, const fit_inputs *in, sonde_model **model,
+                                sonde_error *error) {
   sonde_model_def def = sonde_model_def_default();
   char provenance[256];
   const char *slash = strrchr(a->measurements, '/');
@@ -318,36 +222,33 @@ static sonde_status build_model(const fit_arguments *a, const fit_inputs *in, co
   def.provenance = a->provenance ? a->provenance : provenance;
   if (a->name) def.name = a->name;
   def.skin = &in->skin;
-  def.femur = skin->other ? &in->femur : given(&in->femur);
+  def.femur = a->body == BODY_OTHER ? &in->femur : given(&in->femur);
   def.fat_interface = given(&in->fat);
   def.muscle_interface = given(&in->muscle);
   def.sites = in->sites.sites;
   def.site_count = in->sites.count;
   def.data = in->measurements.data;
   def.datum_count = in->measurements.count;
-  def.fine_edge_m = 1e-3 * skin->fine_mm;
-  def.law.inplane_stiffness_n_m = skin->inplane_n_m;
-  def.law.tangential_stiffness_n_m3 = skin->tangential_n_m3;
+  def.fine_edge_m = a->fine_m;
+  def.law.inplane_stiffness_n_m = a->inplane_n_m;
+  def.law.tangential_stiffness_n_m3 = a->tangential_n_m3;
   sonde_status status = sonde_model_build(&def, model, error);
-  if (!status && skin->other) (*model)->vein.count = (*model)->artery.count = 0;
+  if (!status && a->body == BODY_OTHER) (*model)->vein.count = (*model)->artery.count = 0;
   return status;
 }
 
-static sonde_status leave_out(const fit_arguments *a, const fit_inputs *in,
-                              const sonde_model *model, const sonde_fit_def *def, fit_outcome *out,
-                              sonde_error *error) {
-  int kind;
+static sonde_status leave_out(const options *a, const fit_inputs *in, const sonde_model *model,
+                              const sonde_fit_def *def, fit_outcome *out, sonde_error *error) {
   sonde_progress progress = app_progress();
   const sonde_measurements *m = &in->measurements, *also = &in->also;
-  if (!app_parse_word(VERB, "--hold-out", a->hold_out, HOLD_OUTS, &kind)) return SONDE_ARGUMENT;
   double *predicted_n = calloc(m->count + also->count, sizeof *predicted_n);
   if (!predicted_n) return SONDE_MEMORY;
-  bool with_also = a->also && kind == SONDE_HOLD_OUT_SITES;
+  bool with_also = a->also && a->hold_out == SONDE_HOLD_OUT_SITES;
   sonde_status status =
       with_also ? sonde_fit_hold_out_also(model, &in->sites, m, also, def, &out->result, &progress,
                                           predicted_n, error)
-                : sonde_fit_hold_out(model, &in->sites, m, def, &out->result, (sonde_hold_out)kind,
-                                     &progress, predicted_n, error);
+                : sonde_fit_hold_out(model, &in->sites, m, def, &out->result,
+                                     (sonde_hold_out)a->hold_out, &progress, predicted_n, error);
   if (!status)
     status = sonde_error_report_of(m->data, predicted_n, m->count, &out->hold_out, error);
   if (!status && with_also)
@@ -359,24 +260,24 @@ static sonde_status leave_out(const fit_arguments *a, const fit_inputs *in,
 }
 
 // Who says the exponent of stage 3.
-static const char *exponent_from(const fit_arguments *a) {
-  if (chooses_exponent(a)) return "chosen by the held-out error";
-  return a->exponent ? "given" : "given (default)";
+static const char *exponent_from(const options *a) {
+  if (a->exponent == EXPONENT_AUTO) return "chosen by the held-out error";
+  return app_option_given("exponent") ? "given" : "given (default)";
 }
 
-static sonde_status write_report(const fit_arguments *a, const fit_inputs *in,
-                                 const sonde_model *model, const fit_outcome *out,
-                                 sonde_error *error) {
-  char name[64];
-  snprintf(name, sizeof name, "%s, refitted", a->hold_out ? a->hold_out : "");
+static sonde_status write_report(const options *a, const fit_inputs *in, const sonde_model *model,
+                                 const fit_outcome *out, sonde_error *error) {
+  char name[64], command_line[1024];
+  app_command_line(command_line, sizeof command_line);
+  snprintf(name, sizeof name, "%s, refitted", a->hold_out >= 0 ? HOLD_OUTS[a->hold_out] : "");
   const fit_findings findings = {.model = model,
                                  .sites = &in->sites,
                                  .data = &in->measurements,
                                  .result = &out->result,
-                                 .command_line = a->command_line,
+                                 .command_line = command_line,
                                  .exponent_from = exponent_from(a),
                                  .hold_out_name = name,
-                                 .hold_out = a->hold_out ? &out->hold_out : NULL,
+                                 .hold_out = a->hold_out >= 0 ? &out->hold_out : NULL,
                                  .also = out->also.all.count ? &out->also : NULL,
                                  .checks = &out->checks,
                                  .doubts = &out->doubts,
@@ -387,52 +288,120 @@ static sonde_status write_report(const fit_arguments *a, const fit_inputs *in,
   return status;
 }
 
-// Before the fit.
-static sonde_status examine_measurements(const fit_arguments *a, const fit_inputs *in,
-                                         fit_outcome *out, sonde_error *error) {
-  sonde_status status = sonde_measurements_examine(&in->measurements, &out->doubts, error);
-  if (!status) status = fit_doubts_decide(&out->doubts, a->measurements, a->accept, error);
-  if (!status) fit_doubts_print(&out->doubts, 0, a->measurements);
+// Refuses what no tissue gives, warns of what is doubtful: from the doubt number `first` on.
+static sonde_status decide(const options *a, const fit_outcome *out, uint32_t first,
+                           sonde_error *error) {
+  sonde_status status = fit_doubts_decide(&out->doubts, a->measurements, a->accept, error);
+  if (!status) fit_doubts_print(&out->doubts, first, a->measurements);
   return status;
 }
 
-static sonde_status examine_result(const fit_arguments *a, const fit_inputs *in,
-                                   const sonde_model *model, fit_outcome *out, sonde_error *error) {
-  uint32_t before = out->doubts.count;
-  sonde_status status =
-      sonde_fit_examine(model, &in->measurements, &out->result, &out->doubts, error);
-  if (!status) status = fit_doubts_decide(&out->doubts, a->measurements, a->accept, error);
-  if (!status) fit_doubts_print(&out->doubts, before, a->measurements);
+// Settles a probe a little below the site in the middle, as the first look at the model will, and
+// reads the bone, where it has one.
+static sonde_status settle_once(const sonde_model *model, const char *name, sonde_error *error) {
+  enum { MOST_ITERATIONS = 400 };
+  static const double DEPTH_M = 2e-3, RESIDUAL = 1e-6;
+  assert(model->site_count > 0);
+  sonde_status status = SONDE_OK;
+  if (model->femur.face_count) {
+    sonde_interior *interior = NULL;
+    status = sonde_interior_create(model, &interior, error);
+    sonde_interior_destroy(interior);
+  }
+
+  // The site nearest to the middle of all.
+  sonde_vec3 middle = {0, 0, 0};
+  const sonde_site *site = model->sites;
+  double nearest = INFINITY;
+  for (uint32_t k = 0; k < model->site_count; ++k) {
+    middle.x += model->sites[k].position_m.x / model->site_count;
+    middle.y += model->sites[k].position_m.y / model->site_count;
+    middle.z += model->sites[k].position_m.z / model->site_count;
+  }
+  for (uint32_t k = 0; k < model->site_count; ++k) {
+    sonde_vec3 p = model->sites[k].position_m;
+    double away = hypot(hypot(p.x - middle.x, p.y - middle.y), p.z - middle.z);
+    if (away < nearest) nearest = away, site = &model->sites[k];
+  }
+
+  sonde_world_def world = sonde_world_def_default();
+  sonde_state *state = NULL;
+  sonde_probe probe = {0};
+  if (!status) status = sonde_probe_create(name, &probe, error);
+  if (!status) status = sonde_state_create(model, &world, &state, error);
+  if (!status) {
+    sonde_settle_result r =
+        sonde_settle(state, &probe, sonde_site_pose(site, DEPTH_M), RESIDUAL, MOST_ITERATIONS);
+    if (!r.converged || !isfinite(r.reaction_n))
+      status = app_error(error, SONDE_CONVERGENCE,
+                         "the fitted model does not come to rest under the probe %s at site %u, "
+                         "%g mm deep: residual %.2g; nothing was written",
+                         name, site->id, 1e3 * DEPTH_M, r.residual);
+  }
+  sonde_state_destroy(state);
+  sonde_probe_clear(&probe);
   return status;
 }
 
-// def's exponent becomes the chosen one, which the checks after the fit need.
-static sonde_status fit_model(const fit_arguments *a, const fit_inputs *in, sonde_fit_def *def,
-                              const fit_skin *skin, fit_outcome *out, sonde_error *error) {
+static sonde_status fit_model(const options *a, const fit_inputs *in, fit_outcome *out,
+                              sonde_error *error) {
   sonde_model *model = NULL;
   sonde_fit_result *result = &out->result;
+  sonde_fit_def def = a->def;
   sonde_progress progress = app_progress();
-  sonde_status status = build_model(a, in, skin, &model, error);
-  if (!status && chooses_exponent(a)) {
-    status = sonde_fit_exponents(model, &in->sites, &in->measurements, def, &progress, out->tried,
+  sonde_status status = build_model(a, in, &model, error);
+
+  // The estimate; the checks behind it need the exponent that it chose.
+  if (!status && a->exponent == EXPONENT_AUTO) {
+    status = sonde_fit_exponents(model, &in->sites, &in->measurements, &def, &progress, out->tried,
                                  result, error);
-    if (!status) def->normal_exponent = result->law.normal_exponent;
+    if (!status) def.normal_exponent = result->law.normal_exponent;
   } else if (!status) {
-    status = sonde_fit(model, &in->sites, &in->measurements, def, &progress, result, error);
+    status = sonde_fit(model, &in->sites, &in->measurements, &def, &progress, result, error);
   }
   app_progress_end();
-  if (!status) status = examine_result(a, in, model, out, error);
+
+  // Parameters that no tissue has are refused as measurements are.
+  uint32_t before = out->doubts.count;
+  if (!status) status = sonde_fit_examine(model, &in->measurements, result, &out->doubts, error);
+  if (!status) status = decide(a, out, before, error);
+
+  // The model: a probe is settled on it before it is written, and the file is read back.
   if (!status)
     status =
         sonde_model_set_parameters(model, &result->law, result->sites, result->site_count, error);
-  if (!status) fit_tables_correct(result, model);
-  if (!status) status = fit_open_check(model, in->measurements.data[0].probe, error);
+  for (uint32_t i = 0; !status && i < model->datum_count; ++i) {
+    sonde_datum *d = &model->data[i]; // kept without the contact zero and the tare of its curve
+    for (uint32_t c = 0; c < result->curve_count; ++c) {
+      const sonde_curve_fit *curve = &result->curves[c];
+      if (curve->site != d->site || strcmp(curve->probe, d->probe) != 0) continue;
+      d->penetration_m = fmax(d->penetration_m - curve->zero_m, 0);
+      d->force_n -= curve->tare_n;
+    }
+  }
+  if (!status) status = settle_once(model, in->measurements.data[0].probe, error);
   if (!status) status = sonde_model_save(model, a->output, error);
-  if (!status) status = fit_open_written(model, a->output, error);
-  if (!status && a->hold_out) status = leave_out(a, in, model, def, out, error);
-  out->checks.also = a->also ? &in->also : NULL;
+  struct stat facts;
+  if (!status && stat(a->output, &facts) == 0 && S_ISREG(facts.st_mode)) {
+    sonde_model *read = NULL;
+    status = sonde_model_load(a->output, &read, error);
+    if (!status && read->checksum != model->checksum)
+      status =
+          app_error(error, SONDE_IO, "%.300s: holds another model than was written", a->output);
+    sonde_model_destroy(read);
+  }
+
+  // What else can be said of the result.
+  if (!status && a->hold_out >= 0) status = leave_out(a, in, model, &def, out, error);
+  bool reported = a->report && def.stages == 3;
+  out->checks = (fit_checks){.profile = a->profile || reported,
+                             .identify = a->identify || reported,
+                             .layers = a->layers,
+                             .also = a->also ? &in->also : NULL,
+                             .starts = (uint32_t)a->starts,
+                             .seed = (uint64_t)a->seed};
   if (!status)
-    status = fit_checks_run(&out->checks, model, &in->sites, &in->measurements, def, result,
+    status = fit_checks_run(&out->checks, model, &in->sites, &in->measurements, &def, result,
                             &progress, error);
   app_progress_end();
   if (!status && a->report) status = write_report(a, in, model, out, error);
@@ -440,18 +409,28 @@ static sonde_status fit_model(const fit_arguments *a, const fit_inputs *in, sond
   return status;
 }
 
-static void print_json_confidence(const sonde_fit_confidence *c) {
-  app_json_real("smoothness_sd", c->smoothness_sd);
-  app_json_real("shear_smoothness_sd", c->shear_smoothness_sd);
-  app_json_real("ln_shear_sd", c->ln_shear_sd);
-  app_json_real("ln_limit_sd", c->ln_limit_sd);
-  app_json_real("shear_bootstrap_low_n_m", c->shear_95[0]);
-  app_json_real("shear_bootstrap_high_n_m", c->shear_95[1]);
-  app_json_real("limit_bootstrap_low", c->limit_95[0]);
-  app_json_real("limit_bootstrap_high", c->limit_95[1]);
-  app_json_object("one_site_out");
-  app_json_report("full", &c->one_out);
-  app_json_close();
+// Mean and standard deviation of an offset over the curves.
+typedef struct spread {
+  double mean, sd;
+} spread;
+
+static spread spread_of(const sonde_fit_result *r, bool tare) {
+  spread s = {0, 0};
+  for (uint32_t c = 0; c < r->curve_count; ++c)
+    s.mean += (tare ? r->curves[c].tare_n : 1e3 * r->curves[c].zero_m) / r->curve_count;
+  for (uint32_t c = 0; c < r->curve_count; ++c) {
+    double off = (tare ? r->curves[c].tare_n : 1e3 * r->curves[c].zero_m) - s.mean;
+    s.sd += off * off / r->curve_count;
+  }
+  s.sd = sqrt(s.sd);
+  return s;
+}
+
+// Root mean square over the rows of one curve's repeats about their mean.
+static double scatter_of(const sonde_measurements *m) {
+  double sum = 0;
+  for (uint32_t i = 0; i < m->count; ++i) sum += m->scatter_n[i] * m->scatter_n[i] / m->count;
+  return sqrt(sum);
 }
 
 static void print_json_stages(const sonde_fit_result *r) {
@@ -462,25 +441,30 @@ static void print_json_stages(const sonde_fit_result *r) {
   if (r->stage2.all.count > 0) {
     app_json_object("stage2");
     app_json_report("simplified", &r->stage2);
-    app_json_integer("parameters", r->stage2_parameters);
-    app_json_integer("iterations", r->stage2_iterations);
-    app_json_bool("converged", r->stage2_converged);
-    app_json_real("edge_stiffness_n_m", r->stage2_edge_n_m);
+    app_json("parameters:%u iterations:%u converged:%hhd edge_stiffness_n_m:%g",
+             r->stage2_parameters, r->stage2_iterations, r->stage2_converged, r->stage2_edge_n_m);
     app_json_close();
   }
   if (r->stage3.all.count > 0) {
     app_json_object("stage3");
     app_json_report("full", &r->stage3);
-    app_json_integer("parameters", r->parameters);
-    app_json_integer("iterations", r->iterations);
-    app_json_bool("converged", r->converged);
-    print_json_confidence(&r->confidence);
+    app_json("parameters:%u iterations:%u converged:%hhd", r->parameters, r->iterations,
+             r->converged);
+    const sonde_fit_confidence *c = &r->confidence;
+    app_json("smoothness_sd:%g shear_smoothness_sd:%g ln_shear_sd:%g ln_limit_sd:%g "
+             "shear_bootstrap_low_n_m:%g shear_bootstrap_high_n_m:%g limit_bootstrap_low:%g "
+             "limit_bootstrap_high:%g",
+             c->smoothness_sd, c->shear_smoothness_sd, c->ln_shear_sd, c->ln_limit_sd,
+             c->shear_95[0], c->shear_95[1], c->limit_95[0], c->limit_95[1]);
+    app_json_object("one_site_out");
+    app_json_report("full", &c->one_out);
+    app_json_close();
     app_json_close();
   }
 }
 
-static void print_json(const fit_arguments *a, const sonde_measurements *data,
-                       const sonde_fit_def *def, const fit_outcome *out, double seconds) {
+static void print_json(const options *a, const sonde_measurements *data, const fit_outcome *out,
+                       double seconds) {
   const sonde_fit_result *r = &out->result;
   app_json_begin();
   if (r->stage3.all.count > 0)
@@ -490,9 +474,9 @@ static void print_json(const fit_arguments *a, const sonde_measurements *data,
   else
     app_json_report("independent", &r->stage1);
   print_json_stages(r);
-  if (a->hold_out) {
+  if (a->hold_out >= 0) {
     app_json_object("hold_out");
-    app_json_text("kind", a->hold_out);
+    app_json_text("kind", HOLD_OUTS[a->hold_out]);
     app_json_report("full", &out->hold_out);
     if (out->also.all.count) {
       app_json_object("also");
@@ -506,31 +490,34 @@ static void print_json(const fit_arguments *a, const sonde_measurements *data,
     app_json_object("exponents");
     for (int k = 0; k < SONDE_FIT_EXPONENTS; ++k) {
       app_json_object(KEY[k]);
-      app_json_real("mae_percent", out->tried[k].mae_percent);
-      app_json_real("held_out_percent", out->tried[k].held_out_percent);
-      app_json_bool("converged", out->tried[k].converged);
+      app_json("mae_percent:%g held_out_percent:%g converged:%hhd", out->tried[k].mae_percent,
+               out->tried[k].held_out_percent, out->tried[k].converged);
       app_json_close();
     }
     app_json_close();
   }
   app_json_real("normal_exponent", r->law.normal_exponent);
-  if (def->stages >= 3) app_json_text("normal_exponent_from", exponent_from(a));
+  if (a->def.stages >= 3) app_json_text("normal_exponent_from", exponent_from(a));
   fit_checks_print_json(&out->checks);
-  fit_tables_print_json(data, def, r);
+  spread zero = spread_of(r, false), tare = spread_of(r, true);
+  app_json("unloading_rows:%u repeats:%u", data->unloading, data->repeats);
+  if (data->scatter_n) app_json_real("repeat_mean_sd_n", scatter_of(data));
+  if (a->def.zero_sd_m > 0) {
+    app_json("zero_mean_mm:%g zero_sd_mm:%g", zero.mean, zero.sd);
+  }
+  if (a->def.tare_sd_n > 0) {
+    app_json("tare_mean_n:%g tare_sd_n:%g", tare.mean, tare.sd);
+  }
   fit_doubts_print_json(&out->doubts, a->measurements);
-  app_json_integer("parameters", r->parameters);
-  app_json_text("model", a->output);
-  app_json_real("edge_stiffness_n_m", r->law.edge_stiffness_n_m);
-  app_json_real("edge_pretension_n", r->law.edge_pretension_n);
-  app_json_real("shear_stiffness_n_m", r->law.shear_stiffness_n_m);
-  app_json_real("shear_limit", r->law.shear_limit);
-  app_json_real("inplane_stiffness_n_m", r->law.inplane_stiffness_n_m);
-  app_json_real("seconds", seconds);
+  app_json("parameters:%u model:%s edge_stiffness_n_m:%g edge_pretension_n:%g "
+           "shear_stiffness_n_m:%g shear_limit:%g inplane_stiffness_n_m:%g seconds:%g",
+           r->parameters, a->output, r->law.edge_stiffness_n_m, r->law.edge_pretension_n,
+           r->law.shear_stiffness_n_m, r->law.shear_limit, r->law.inplane_stiffness_n_m, seconds);
   app_json_end();
 }
 
-static void print_table(const fit_arguments *a, const sonde_measurements *data,
-                        const sonde_fit_def *def, const fit_outcome *out, double seconds) {
+static void print_table(const options *a, const sonde_measurements *data, const fit_outcome *out,
+                        double seconds) {
   const sonde_fit_result *r = &out->result;
   char title[128];
   snprintf(title, sizeof title, "stage 1, every curve by itself: %u parameters",
@@ -563,68 +550,78 @@ static void print_table(const fit_arguments *a, const sonde_measurements *data,
   } else if (r->law.edge_pretension_n > 0) {
     printf("pre-tension %.3g N\n", r->law.edge_pretension_n);
   }
-  if (a->hold_out) {
-    snprintf(title, sizeof title, "left out and predicted by a refit: %s", a->hold_out);
+  if (a->hold_out >= 0) {
+    snprintf(title, sizeof title, "left out and predicted by a refit: %s", HOLD_OUTS[a->hold_out]);
     app_print_report(title, &out->hold_out);
     if (out->also.all.count)
       app_print_report("never fitted, predicted at the sites left out", &out->also);
   }
   fit_checks_print(&out->checks);
-  fit_tables_print(data, def, r);
+  if (data->unloading) printf("%u rows of unloading are left out\n", data->unloading);
+  if (data->scatter_n)
+    printf("up to %u repeats of a curve; standard deviation of their mean %.3g N\n", data->repeats,
+           scatter_of(data));
+  spread zero = spread_of(r, false), tare = spread_of(r, true);
+  if (a->def.zero_sd_m > 0)
+    printf("contact zero of the curves: %+.3f mm, standard deviation %.3f mm\n", zero.mean,
+           zero.sd);
+  if (a->def.tare_sd_n > 0)
+    printf("tare of the curves: %+.3f N, standard deviation %.3f N\n", tare.mean, tare.sd);
   printf("wrote %s in %.2f s\n", a->output, seconds);
 }
 
-static int run_sample(const fit_arguments *a) {
-  long exponent = 0;
-  double area_mm2 = 0, height_mm = 0;
-  if (a->measurements || a->surface || a->sites || a->output)
-    return app_usage_error(VERB, "--sample goes without measurements, surface, sites and model");
-  if ((a->exponent && !chooses_exponent(a) &&
-       !app_parse_integer(VERB, "--exponent", a->exponent, 1, 3, &exponent)) ||
-      (a->area && !app_parse_real(VERB, "--area-mm2", a->area, 1, 1e6, &area_mm2)) ||
-      (a->height && !app_parse_real(VERB, "--height-mm", a->height, 0.1, 1e3, &height_mm)))
-    return APP_BAD_INPUT;
-  const fit_sample_options options = {.path = a->sample,
-                                      .exponent = (double)exponent,
-                                      .area_m2 = 1e-6 * area_mm2,
-                                      .height_m = 1e-3 * height_mm,
-                                      .accept_implausible = a->accept,
-                                      .json = a->json};
-  return fit_sample_run(&options);
-}
-
-int old_fit(int argc, char **argv);
-int old_fit(int argc, char **argv) {
-  fit_arguments arguments = {0};
-  sonde_fit_def def;
-  fit_skin skin = {3, SONDE_SKIN_INPLANE_N_M, SONDE_SKIN_TANGENTIAL_N_M3, false};
+static int run(void *from) {
+  const options *a = from;
   double start = app_seconds(CLOCK_MONOTONIC);
-  if (!parse_arguments(argc, argv, &arguments)) return APP_BAD_INPUT;
-  if (arguments.help) {
-    fputs(HELP, stdout);
-    return APP_OK;
+  if (a->sample) {
+    bool chosen = !app_option_given("exponent") || a->exponent == EXPONENT_AUTO;
+    return fit_sample_run(&(fit_sample_options){.path = a->sample,
+                                                .exponent = chosen ? 0 : a->exponent + 1,
+                                                .area_m2 = a->area_m2,
+                                                .height_m = a->height_m,
+                                                .accept_implausible = a->accept,
+                                                .json = a->json});
   }
-  if (arguments.sample) return run_sample(&arguments);
+  assert(a->measurements && a->surface && a->sites && a->output);
+
   fit_outcome out = {0};
-  if (!parse_fit(&arguments, &def, &skin, &out.checks)) return APP_BAD_INPUT;
-  int unwritable = app_check_output(VERB, arguments.output);
-  if (unwritable) return unwritable;
-  keep_command_line(argc, argv, &arguments);
   fit_inputs inputs = {0};
   sonde_error error = {0};
-  sonde_status status = load_inputs(&arguments, &inputs, &error);
-  if (!status) status = examine_measurements(&arguments, &inputs, &out, &error);
-  if (!status) status = fit_model(&arguments, &inputs, &def, &skin, &out, &error);
-  int code = APP_OK;
-  if (status)
-    code = app_fail(VERB, &error);
-  else if (arguments.json)
-    print_json(&arguments, &inputs.measurements, &def, &out, app_seconds(CLOCK_MONOTONIC) - start);
-  else
-    print_table(&arguments, &inputs.measurements, &def, &out, app_seconds(CLOCK_MONOTONIC) - start);
+  sonde_status status = load_inputs(a, &inputs, &error);
+  if (!status) status = sonde_measurements_examine(&inputs.measurements, &out.doubts, &error);
+  if (!status) status = decide(a, &out, 0, &error);
+  if (!status) status = fit_model(a, &inputs, &out, &error);
+  double seconds = app_seconds(CLOCK_MONOTONIC) - start;
+  if (!status) (a->json ? print_json : print_table)(a, &inputs.measurements, &out, seconds);
+  int code = status ? app_fail(VERB, &error) : APP_OK;
   if (!status && !out.result.converged)
     fprintf(stderr, "sonde fit: the last stage reached its iteration limit before it converged\n");
   sonde_fit_result_clear(&out.result);
-  clear_inputs(&inputs);
+  sonde_site_table_clear(&inputs.sites);
+  sonde_measurements_clear(&inputs.measurements);
+  sonde_measurements_clear(&inputs.also);
+  sonde_mesh_clear(&inputs.skin);
+  sonde_mesh_clear(&inputs.femur);
+  sonde_mesh_clear(&inputs.fat);
+  sonde_mesh_clear(&inputs.muscle);
   return code;
 }
+
+const app_command cmd_fit = {
+    .verb = "fit",
+    .summary = "fit a thigh to measurements and write a model file",
+    .usage = "MEASUREMENTS.csv --surface SKIN.ply --sites SITES.csv -o MODEL [options]\n"
+             "--sample TABLE.csv [--exponent N] [--area-mm2 A --height-mm H] [--json]",
+    .text = "Estimates the normal springs f(x) = x/(a x + b) of every site, carries them over the "
+            "refined skin and writes a thigh model. Stage 1 fits every curve by itself; stage 2 "
+            "one pair of parameters per site and one uniform edge stiffness, with the neighbours "
+            "of a footprint held still; stage 3 refits with shear between neighbours on the "
+            "equilibrium of the whole skin, and says how sure its parameters are. Files are in mm "
+            "and N.",
+    OPT_TABLE(TABLE),
+    .size = sizeof(options),
+    .prepare = prepare,
+    .required = "MEASUREMENTS.csv surface sites o",
+    .form = "sample",
+    .check = check,
+    .run = run};

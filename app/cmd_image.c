@@ -1,118 +1,40 @@
 // sonde image: one echographic picture of a model, at any pose.
-// read_pose:     seven numbers.
-// place:         the probe above a site or at a pose, pressed when asked.
-// other_vessels: branches that the plane cuts.
-// draw:          interior, picture, file.
-#include "app.h"
 #include "image_findings.h"
+#include "options.h"
 #include "settled.h"
 
-#include <getopt.h>
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
-static const char HELP[] =
-    "usage: sonde image [MODEL] (--pose X,Y,Z,QW,QX,QY,QZ | --site K) -o PNG [options]\n"
-    "\n"
-    "Writes the echographic picture that a probe sees, and tells what it shows.\n"
-    "\n"
-    "  --pose LIST        world from probe: mm, each -2000 to 2000, and unit quaternion; z is\n"
-    "                     the beam\n"
-    "  --site K           above this site of the model instead\n"
-    "  --turn-deg A       about the beam, -180 to 180; 90 looks along the leg; default 0\n"
-    "  --force-n F        press along the beam until the settled force is F (0.01 to 200)\n"
-    "  --press-mm D       or press so deep below the rest skin (-10 to 60)\n"
-    "  --probe NAME       point, linear, square, sphere, or a mesh file (mm); default linear\n"
-    "  --aperture-mm W    width of the array, 5 to 200; default that of the probe; of a curved\n"
-    "                     face along the arc, at most half a circle\n"
-    "  --curved-mm R      radius of a curved face, 20 to 1000; default flat\n"
-    "  --case NAME        healthy, partial_mural, acute_occlusive, subacute_occlusive,\n"
-    "                     chronic_occlusive; default healthy\n"
-    "  --clot BRANCH:CASE the same for a branch of the model, e.g. great_saphenous\n"
-    "  --lesion KIND:X:DEPTH:WIDTH:HEIGHT  node, cyst or haematoma (mm) in the image plane\n"
-    "                     before the probe presses; up to 8\n"
-    "  --webs W           bands in an old clot of the femoral vein, 0 to 1; default 0\n"
-    "  --oedema W         fluid in the fat, 0 to 1; default 0\n"
-    "  --depth-mm D       imaged depth, 20 to 150; default 70\n"
-    "  --frequency-mhz F  1 to 12; default 7.5\n"
-    "  --focus-mm D       5 to 150; default 25\n"
-    "  --gain-db G        -30 to 30; default 0\n"
-    "  --tgc-db-cm G      on top of the default compensation, -50 to 50; default 0\n"
-    "  --range-db R       dynamic range, 30 to 90; default 60\n"
-    "  --size WxH         pixels, 16 to 4096; default 512x512\n"
-    "  --seed N           of the tissue's scatterers, default 0\n"
-    "  -o PNG             the picture\n"
-    "  --json             print one JSON object\n"
-    "  --help             this text\n"
-    "MODEL defaults to the bundled thigh. Without --force-n and --press-mm the skin stays at "
-    "rest.\n";
-
 typedef struct options {
-  char model[1024];
-  const char *probe, *pathology, *out;
+  const char *model, *probe, *pathology, *out;
   sonde_pose pose;
   bool posed, json;
   long site, width, height, seed;
-  double force_n, press_m, turn, aperture_m, radius_m; // NaN when not asked for
+  double force_n, press_m, turn_rad, aperture_m, radius_m; // NaN when not asked for
   sonde_echo_settings settings;
   image_findings findings;
 } options;
 
-enum {
-  POSE = 1,
-  SITE,
-  TURN,
-  FORCE,
-  PRESS,
-  PROBE,
-  APERTURE,
-  CURVED,
-  CASE,
-  CLOT,
-  LESION,
-  WEBS,
-  OEDEMA,
-  DEPTH,
-  FREQUENCY,
-  FOCUS,
-  GAIN,
-  TGC,
-  RANGE,
-  SIZE,
-  SEED,
-  JSON
-};
-
-static const struct option LONG[] = {{"pose", required_argument, NULL, POSE},
-                                     {"site", required_argument, NULL, SITE},
-                                     {"turn-deg", required_argument, NULL, TURN},
-                                     {"force-n", required_argument, NULL, FORCE},
-                                     {"press-mm", required_argument, NULL, PRESS},
-                                     {"probe", required_argument, NULL, PROBE},
-                                     {"aperture-mm", required_argument, NULL, APERTURE},
-                                     {"curved-mm", required_argument, NULL, CURVED},
-                                     {"case", required_argument, NULL, CASE},
-                                     {"clot", required_argument, NULL, CLOT},
-                                     {"lesion", required_argument, NULL, LESION},
-                                     {"webs", required_argument, NULL, WEBS},
-                                     {"oedema", required_argument, NULL, OEDEMA},
-                                     {"depth-mm", required_argument, NULL, DEPTH},
-                                     {"frequency-mhz", required_argument, NULL, FREQUENCY},
-                                     {"focus-mm", required_argument, NULL, FOCUS},
-                                     {"gain-db", required_argument, NULL, GAIN},
-                                     {"tgc-db-cm", required_argument, NULL, TGC},
-                                     {"range-db", required_argument, NULL, RANGE},
-                                     {"size", required_argument, NULL, SIZE},
-                                     {"seed", required_argument, NULL, SEED},
-                                     {"json", no_argument, NULL, JSON},
-                                     {"help", no_argument, NULL, 'h'},
-                                     {NULL, 0, NULL, 0}};
+static void prepare(void *to) {
+  *(options *)to = (options){.probe = "linear",
+                             .pathology = "healthy",
+                             .width = 512,
+                             .height = 512,
+                             .force_n = NAN,
+                             .press_m = NAN,
+                             .aperture_m = NAN,
+                             .radius_m = NAN,
+                             .settings = sonde_echo_settings_default()};
+}
 
 // The farthest that a probe may be from the model's origin, as for the page's goals.
 static const double FAR_MM = 2000;
 
-static bool read_pose(options *o, const char *text) {
+static bool read_pose(void *to, const char *text) {
+  options *o = to;
   double v[7];
   char end;
   int read = sscanf(text, "%lf,%lf,%lf,%lf,%lf,%lf,%lf%c", &v[0], &v[1], &v[2], &v[3], &v[4], &v[5],
@@ -136,114 +58,105 @@ static bool read_pose(options *o, const char *text) {
   return o->posed = true;
 }
 
-static bool read_size(options *o, const char *text) {
-  char end;
-  if (sscanf(text, "%ldx%ld%c", &o->width, &o->height, &end) == 2 && o->width >= 16 &&
-      o->height >= 16 && o->width <= 4096 && o->height <= 4096)
-    return true;
-  app_usage_error("image", "--size expects WxH from 16x16 to 4096x4096, got '%s'", text);
-  return false;
+static bool read_size(void *to, const char *text) {
+  options *o = to;
+  return app_parse_size("image", text, &o->width, &o->height);
 }
 
-// A number in the option's unit, times that unit.
-static bool read_real(int option, double low, double high, double unit, double *value) {
-  const char *name = "";
-  for (const struct option *l = LONG; l->name; ++l)
-    if (l->val == option) name = l->name;
-  char dashed[32];
-  snprintf(dashed, sizeof dashed, "--%s", name);
-  double number;
-  if (!app_parse_real("image", dashed, optarg, low, high, &number)) return false;
-  *value = number * unit;
-  return true;
+static bool read_clot(void *to, const char *text) {
+  return image_findings_clot(&((options *)to)->findings, text);
 }
 
-// A setting of the scanner, which the page has under the same key.
-static bool read_scanner(int option, const char *key, sonde_echo_settings *settings) {
-  const sonde_echo_range *range = sonde_echo_ranges(), *end = range + SONDE_ECHO_SETTINGS;
-  while (range < end && strcmp(range->key, key) != 0) ++range;
-  double *value = range < end ? (double *)(void *)((char *)settings + range->offset) : NULL;
-  return value && read_real(option, range->low, range->high, range->si, value);
+static bool read_lesion(void *to, const char *text) {
+  return image_findings_lesion(&((options *)to)->findings, text);
 }
 
-static bool read_setting(options *o, int option) {
-  sonde_echo_settings *s = &o->settings;
-  switch (option) {
-  case TURN: return read_real(option, -180, 180, atan(1) / 45, &o->turn);
-  case FORCE: return read_real(option, 0.01, 200, 1, &o->force_n);
-  case PRESS: return read_real(option, -10, 60, 1e-3, &o->press_m);
-  case APERTURE: return read_real(option, 5, 200, 1e-3, &o->aperture_m);
-  case WEBS: return read_real(option, 0, 1, 1, &o->findings.rest.webs);
-  case OEDEMA: return read_real(option, 0, 1, 1, &o->findings.rest.oedema);
-  case CURVED: return read_real(option, 20, 1000, 1e-3, &o->radius_m);
-  case DEPTH: return read_scanner(option, "depth_mm", s);
-  case FREQUENCY: return read_scanner(option, "frequency_mhz", s);
-  case FOCUS: return read_scanner(option, "focus_mm", s);
-  case GAIN: return read_scanner(option, "gain_db", s);
-  case TGC: return read_scanner(option, "tgc_db_per_cm", s);
-  case RANGE: return read_scanner(option, "dynamic_range_db", s);
-  default: return false;
-  }
-}
+static const app_option TABLE[] = {
+    OPT_MODEL(model),
+    OPT_CALL(read_pose, "pose", "X,Y,Z,QW,QX,QY,QZ",
+             "world from probe: mm, each -2000 to 2000, and unit quaternion; z is the beam"),
+    OPT_INTEGER(site, "site", "K", 0, 1000000, "above this site of the model instead"),
+    OPT_REAL(turn_rad, "turn-deg", "A", -180, 180, 3.14159265358979323846 / 180,
+             "about the beam; 90 looks along the leg"),
+    OPT_REAL(force_n, "force-n", "F", 0.01, 200, 1,
+             "press along the beam until the settled force is F newtons"),
+    OPT_REAL(press_m, "press-mm", "D", -10, 60, 1e-3, "or press so deep below the rest skin"),
+    OPT_TEXT(probe, "probe", "NAME|FILE", "point, linear, square, sphere, or a mesh file in mm"),
+    OPT_REAL(aperture_m, "aperture-mm", "W", 5, 200, 1e-3,
+             "width of the array, of a curved face along the arc, at most half a circle; default "
+             "that of the probe"),
+    OPT_REAL(
+        radius_m, "curved-mm", "R", 20, 1000, 1e-3,
+        "radius of a curved face, whose arc, the array's width over this radius, spans at most "
+        "100 degrees; default flat"),
+    OPT_TEXT(pathology, "case", "NAME",
+             "state of the vein: healthy, partial_mural, acute_occlusive, subacute_occlusive or "
+             "chronic_occlusive"),
+    OPT_CALL(read_clot, "clot", "BRANCH:CASE",
+             "the same for a branch of the model, such as great_saphenous"),
+    OPT_CALL(read_lesion, "lesion", "KIND:X:DEPTH:WIDTH:HEIGHT",
+             "a node, cyst or haematoma (mm) in the image plane before the probe presses; up to 8"),
+    OPT_REAL(findings.rest.webs, "webs", "W", 0, 1, 1, "bands in an old clot of the femoral vein"),
+    OPT_REAL(findings.rest.oedema, "oedema", "W", 0, 1, 1, "fluid in the fat"),
+    OPT_CALL(read_size, "size", "WxH", "pixels, 16 to 4096; default 512x512"),
+    OPT_INTEGER(seed, "seed", "N", 0, 1000000000, "of the tissue's scatterers"),
+    OPT_OUTPUT(out, "o", "PNG", "the picture"),
+    OPT_JSON(json),
+    OPT_GROUP("The scanner")};
 
-static bool read_option(options *o, int option) {
-  switch (option) {
-  case POSE: return read_pose(o, optarg);
-  case SITE: return app_parse_integer("image", "--site", optarg, 0, 1000000, &o->site);
-  case SEED: return app_parse_integer("image", "--seed", optarg, 0, 1000000000, &o->seed);
-  case SIZE: return read_size(o, optarg);
-  case PROBE: o->probe = optarg; return true;
-  case CASE: o->pathology = optarg; return true;
-  case CLOT: return image_findings_clot(&o->findings, optarg);
-  case LESION: return image_findings_lesion(&o->findings, optarg);
-  case 'o': o->out = optarg; return true;
-  case JSON: o->json = true; return true;
-  default: return read_setting(o, option);
-  }
-}
-
-static int read_options(int argc, char **argv, options *o) {
-  for (int c; (c = getopt_long(argc, argv, "o:", LONG, NULL)) != -1;) {
-    if (c == 'h') {
-      fputs(HELP, stdout);
-      return APP_OK;
+// Settings of the scanner with the ranges of the library, which the page has too.
+static uint32_t list_settings(app_option *list, uint32_t room) {
+  static const struct {
+    const char *key, *name, *value, *help;
+  } SETTINGS[] = {
+      {"depth_mm", "depth-mm", "D", "imaged depth"},
+      {"frequency_mhz", "frequency-mhz", "F", "of the beam"},
+      {"focus_mm", "focus-mm", "D", "of the beam"},
+      {"gain_db", "gain-db", "G", "gain"},
+      {"tgc_db_per_cm", "tgc-db-cm", "G", "on top of the default time-gain compensation"},
+      {"dynamic_range_db", "range-db", "R", "dynamic range"}};
+  const sonde_echo_range *ranges = sonde_echo_ranges();
+  uint32_t count = 0;
+  for (size_t k = 0; k < sizeof SETTINGS / sizeof *SETTINGS; ++k)
+    for (const sonde_echo_range *r = ranges; r < ranges + SONDE_ECHO_SETTINGS; ++r) {
+      if (strcmp(r->key, SETTINGS[k].key) != 0) continue;
+      if (count == room) break;
+      list[count++] = (app_option){.name = SETTINGS[k].name,
+                                   .value = SETTINGS[k].value,
+                                   .kind = OPTION_REAL,
+                                   .at = offsetof(options, settings) + r->offset,
+                                   .bytes = sizeof(double),
+                                   .low = r->low,
+                                   .high = r->high,
+                                   .scale = r->si,
+                                   .help = SETTINGS[k].help};
     }
-    if (!read_option(o, c)) return APP_BAD_INPUT;
-  }
-  if (o->posed == (o->site >= 0)) return app_usage_error("image", "give either --pose or --site");
-  if (!isnan(o->force_n) && !isnan(o->press_m))
-    return app_usage_error("image", "give --force-n or --press-mm, not both");
+  return count;
+}
+
+static int check(void *from) {
+  const options *o = from;
   double arc_rad = o->aperture_m / o->radius_m; // NaN unless both are given
   if (arc_rad > acos(-1))
     return app_usage_error("image",
                            "--aperture-mm %g is an arc of %.0f degrees of --curved-mm %g, expected "
                            "at most 180",
                            1e3 * o->aperture_m, 45 * arc_rad / atan(1), 1e3 * o->radius_m);
-  if (!o->out) return app_usage_error("image", "-o PNG is missing");
-  if (!app_model_argument("image", argc, argv, o->model, sizeof o->model)) return APP_BAD_INPUT;
-  return -1;
-}
-
-// About the own beam.
-static sonde_pose turned(sonde_pose p, double angle) {
-  double c = cos(0.5 * angle), s = sin(0.5 * angle);
-  sonde_quat q = p.rotation;
-  p.rotation.w = q.w * c - q.z * s, p.rotation.x = q.x * c + q.y * s;
-  p.rotation.y = q.y * c - q.x * s, p.rotation.z = q.z * c + q.w * s;
-  return p;
+  return APP_OK;
 }
 
 static sonde_status place(settled *s, const options *o, sonde_error *error) {
   sonde_pose start = o->pose;
   sonde_status status = o->posed ? SONDE_OK : settled_site(s, o->model, o->site, &start, error);
   if (status) return status;
-  start = turned(start, o->turn);
+  // The probe turns about its own beam.
+  double c = cos(0.5 * o->turn_rad), h = sin(0.5 * o->turn_rad);
+  sonde_quat q = start.rotation;
+  start.rotation.w = q.w * c - q.z * h, start.rotation.x = q.x * c + q.y * h;
+  start.rotation.y = q.y * c - q.x * h, start.rotation.z = q.z * c + q.w * h;
   bool pressed = !isnan(o->force_n) || !isnan(o->press_m);
-  if (pressed && o->posed && !settled_on_skin(s, &start)) {
-    error->status = SONDE_ARGUMENT;
-    snprintf(error->message, sizeof error->message, "the beam of this pose does not meet the skin");
-    return error->status;
-  }
+  if (pressed && o->posed && !settled_on_skin(s, &start))
+    return app_error(error, SONDE_ARGUMENT, "the beam of this pose does not meet the skin");
   s->pose = start;
   status = image_findings_apply(&o->findings, start, s->interior, error);
   if (status) return status;
@@ -308,46 +221,47 @@ static void print(const settled *s, const options *o, const sonde_image *image) 
     return;
   }
   app_json_begin();
-  app_json_text("image", o->out);
-  app_json_real("width_mm", image->width_m * 1e3);
-  app_json_real("height_mm", image->height_m * 1e3);
-  app_json_real("force_n", s->force_n);
+  app_json("image:%s width_mm:%g height_mm:%g force_n:%g", o->out, image->width_m * 1e3,
+           image->height_m * 1e3, s->force_n);
   settled_json_jumps(s);
-  app_json_text("case", o->pathology);
-  app_json_real("vein_short_mm", v ? 2e3 * vein.half_short_m : NAN);
-  app_json_real("vein_area_ratio", v ? vein.area_ratio : NAN);
-  app_json_real("artery_short_mm", a ? 2e3 * artery.half_short_m : NAN);
-  app_json_real("artery_area_ratio", a ? artery.area_ratio : NAN);
+  app_json("case:%s vein_short_mm:%g vein_area_ratio:%g artery_short_mm:%g artery_area_ratio:%g",
+           o->pathology, v ? 2e3 * vein.half_short_m : NAN, v ? vein.area_ratio : NAN,
+           a ? 2e3 * artery.half_short_m : NAN, a ? artery.area_ratio : NAN);
   other_vessels(s, true);
   app_json_end();
 }
 
-int old_image(int argc, char **argv);
-int old_image(int argc, char **argv) {
-  options o = {.probe = "linear",
-               .pathology = "healthy",
-               .site = -1,
-               .width = 512,
-               .height = 512,
-               .force_n = NAN,
-               .press_m = NAN,
-               .aperture_m = NAN,
-               .radius_m = NAN,
-               .settings = sonde_echo_settings_default()};
-  int code = read_options(argc, argv, &o);
-  if (code >= 0) return code;
+static int run(void *from) {
+  const options *o = from;
+  assert(o->out && o->width > 0 && o->height > 0);
   settled s = {0};
   sonde_image image = {0};
   sonde_pathology pathology;
   sonde_error error = {0};
   app_progress_begin("pressing and drawing");
-  sonde_status status = sonde_pathology_preset(o.pathology, &pathology, &error);
-  if (!status) status = settled_open(&s, o.model, o.probe, NULL, true, &error);
-  if (!status) status = place(&s, &o, &error);
-  if (!status) status = draw(&s, &o, &pathology, &image, &error);
+  sonde_status status = sonde_pathology_preset(o->pathology, &pathology, &error);
+  if (!status) status = settled_open(&s, o->model, o->probe, NULL, true, &error);
+  if (!status) status = place(&s, o, &error);
+  if (!status) status = draw(&s, o, &pathology, &image, &error);
   app_progress_end();
-  if (!status) print(&s, &o, &image);
+  if (!status) print(&s, o, &image);
   sonde_image_clear(&image);
   settled_close(&s);
   return status ? app_fail("image", &error) : APP_OK;
 }
+
+const app_command cmd_image = {
+    .verb = "image",
+    .summary = "write the echographic picture of a model at a pose",
+    .usage = "[MODEL] (--pose X,Y,Z,QW,QX,QY,QZ | --site K) -o PNG [options]",
+    .text = "Writes the echographic picture that a probe sees on a model at rest or pressed, and "
+            "tells what it shows. Without --force-n and --press-mm the skin stays at rest.",
+    OPT_TABLE(TABLE),
+    .extend = list_settings,
+    .size = sizeof(options),
+    .prepare = prepare,
+    .required = "o",
+    .one_of = "pose site",
+    .not_both = "force-n press-mm",
+    .check = check,
+    .run = run};

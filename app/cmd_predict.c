@@ -1,75 +1,58 @@
 // sonde predict: errors of a settled model against measurements, per probe.
-// table_of_model: the sites that the model carries, when no site file is given.
-// print_bands:    mean error in percent by depth.
 #include "fit_common.h"
+#include "options.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 
 static const char VERB[] = "predict";
-static const char HELP[] =
-    "usage: sonde predict MODEL --measurements CSV [--sites CSV] [options]\n"
-    "\n"
-    "Presses the model as the experiment did (footprint bonded, moved along the normal) and "
-    "compares\n"
-    "the force at each measured penetration.\n"
-    "\n"
-    "  --measurements CSV   site,probe,x_mm,y_mm,z_mm,nx,ny,nz,penetration_mm,force_n\n"
-    "  --sites CSV          positions and axes of the sites; default: those in the model\n"
-    "  --interaction KIND   simplified (default): nodes beside the footprint stay at rest\n"
-    "                       full: static equilibrium of the whole surface\n"
-    "  --residual R         relative residual of the equilibrium; default 1e-6\n"
-    "  --threads N          default: one per core\n"
-    "  --bands              mean error by depth as well\n"
-    "  --json               one JSON object instead of the table\n"
-    "  --help               this text\n";
 
-typedef struct predict_arguments {
-  const char *model, *measurements, *sites, *interaction, *residual, *threads;
-  bool json, help, bands;
-} predict_arguments;
+typedef struct options {
+  const char *model, *measurements, *sites;
+  sonde_predict_def def;
+  bool json, bands;
+} options;
+
+static void prepare(void *to) { ((options *)to)->def = sonde_predict_def_default(); }
 
 static const char *const INTERACTIONS[] = {"simplified", "full", NULL};
 
-static bool parse_arguments(int argc, char **argv, predict_arguments *a) {
-  const app_option options[] = {{"--measurements", &a->measurements, NULL},
-                                {"--sites", &a->sites, NULL},
-                                {"--interaction", &a->interaction, NULL},
-                                {"--residual", &a->residual, NULL},
-                                {"--threads", &a->threads, NULL},
-                                {"--bands", NULL, &a->bands},
-                                {"--json", NULL, &a->json},
-                                {"--help", NULL, &a->help}};
-  if (!app_take_options(VERB, argc, argv, options, sizeof options / sizeof *options, &a->model))
-    return false;
-  if (a->help) return true;
-  return app_require(VERB, "MODEL", a->model) &&
-         app_require(VERB, "--measurements", a->measurements);
-}
+static const app_option TABLE[] = {
+    OPT_ARGUMENT(model, "MODEL", "the model file"),
+    OPT_TEXT(measurements, "measurements", "CSV",
+             "force against penetration: "
+             "site,probe,x_mm,y_mm,z_mm,nx,ny,nz,penetration_mm,force_n"),
+    OPT_TEXT(sites, "sites", "CSV", "positions and axes of the sites; default: those in the model"),
+    OPT_WORD(def.interaction, "interaction", "KIND", INTERACTIONS,
+             "simplified: nodes beside the footprint stay at rest; full: static equilibrium of the "
+             "whole surface"),
+    OPT_REAL(def.relative_residual, "residual", "R", 1e-14, 0.1, 1,
+             "relative residual of the equilibrium"),
+    OPT_INTEGER(def.threads, "threads", "N", 1, 64,
+                "threads; the result does not depend on them; default: one per core"),
+    OPT_FLAG(bands, "bands", "mean error by depth as well"),
+    OPT_JSON(json)};
 
-static bool parse_def(const predict_arguments *a, sonde_predict_def *def) {
-  int interaction = 0;
-  long threads = 0;
-  *def = sonde_predict_def_default();
-  if (a->interaction &&
-      !app_parse_word(VERB, "--interaction", a->interaction, INTERACTIONS, &interaction))
-    return false;
-  if (a->threads && !app_parse_integer(VERB, "--threads", a->threads, 1, 64, &threads))
-    return false;
-  if (a->residual &&
-      !app_parse_real(VERB, "--residual", a->residual, 1e-14, 0.1, &def->relative_residual))
-    return false;
-  def->interaction = (sonde_interaction)interaction;
-  def->threads = (uint32_t)threads;
-  return true;
-}
+static void print_result(const options *a, const sonde_measurements *m, const double *predicted_n,
+                         const sonde_error_report *report, double seconds) {
+  const char *interaction = INTERACTIONS[a->def.interaction];
+  if (a->json) {
+    app_json_begin();
+    app_json_report(interaction, report);
+    app_json("not_converged:%u seconds:%g", report->left_out, seconds);
+    app_json_end();
+    return;
+  }
+  char title[128];
+  snprintf(title, sizeof title, "%s interaction, %.1f s", interaction, seconds);
+  app_print_report(title, report);
+  if (report->left_out) printf("%u rows left out: no equilibrium was found\n", report->left_out);
+  if (!a->bands) return;
 
-enum { BANDS = 32 };
-static const double BAND_MM = 2.0;
-
-// Mean of (model - measured)/measured mean per band of depth and probe.
-static void print_bands(const sonde_measurements *m, const double *predicted_n,
-                        const sonde_error_report *report) {
+  // Mean of (model - measured)/measured mean per band of depth and probe.
+  enum { BANDS = 32 };
+  const double BAND_MM = 2.0;
   printf("bias by depth, %% of the band's mean force\n  %-10s", "depth mm");
   for (uint32_t p = 0; p < report->probe_count; ++p) printf(" %10s", report->probe[p]);
   printf("\n");
@@ -93,69 +76,49 @@ static void print_bands(const sonde_measurements *m, const double *predicted_n,
   }
 }
 
-static void print_result(const predict_arguments *a, const sonde_predict_def *def,
-                         const sonde_measurements *m, const double *predicted_n,
-                         const sonde_error_report *report, double seconds) {
-  const char *interaction = INTERACTIONS[def->interaction];
-  if (a->json) {
-    app_json_begin();
-    app_json_report(interaction, report);
-    app_json_integer("not_converged", report->left_out);
-    app_json_real("seconds", seconds);
-    app_json_end();
-    return;
-  }
-  char title[128];
-  snprintf(title, sizeof title, "%s interaction, %.1f s", interaction, seconds);
-  app_print_report(title, report);
-  if (report->left_out) printf("%u rows left out: no equilibrium was found\n", report->left_out);
-  if (a->bands) print_bands(m, predicted_n, report);
-}
-
-static sonde_status predict(const predict_arguments *a, const sonde_predict_def *def,
-                            const sonde_model *model, const sonde_site_table *sites,
-                            sonde_error *error) {
-  double start = app_seconds(CLOCK_MONOTONIC);
-  sonde_measurements m;
-  sonde_status status = sonde_measurements_load(a->measurements, sites, &m, error);
-  if (status) return status;
-  double *predicted_n = calloc(m.count, sizeof *predicted_n);
-  sonde_error_report report;
-  sonde_progress progress = app_progress();
-  if (!predicted_n) {
-    *error = (sonde_error){.status = SONDE_MEMORY};
-    status = SONDE_MEMORY;
-  } else {
-    status = sonde_predict(model, sites, &m, def, &progress, predicted_n, error);
-  }
-  app_progress_end();
-  if (!status) status = sonde_error_report_of(m.data, predicted_n, m.count, &report, error);
-  if (!status) print_result(a, def, &m, predicted_n, &report, app_seconds(CLOCK_MONOTONIC) - start);
-  free(predicted_n);
-  sonde_measurements_clear(&m);
-  return status;
-}
-
-int old_predict(int argc, char **argv);
-int old_predict(int argc, char **argv) {
-  predict_arguments arguments = {0};
-  sonde_predict_def def;
-  if (!parse_arguments(argc, argv, &arguments)) return APP_BAD_INPUT;
-  if (arguments.help) {
-    fputs(HELP, stdout);
-    return APP_OK;
-  }
-  if (!parse_def(&arguments, &def)) return APP_BAD_INPUT;
+static int run(void *from) {
+  const options *a = from;
+  assert(a->model && a->measurements);
   sonde_model *model = NULL;
   sonde_site_table loaded = {0};
+  sonde_measurements m = {0};
   sonde_error error = {0};
-  sonde_status status = sonde_model_load(arguments.model, &model, &error);
-  if (!status && arguments.sites) status = sonde_site_table_load(arguments.sites, &loaded, &error);
-  if (!status) {
-    sonde_site_table of_model = {.count = model->site_count, .sites = model->sites};
-    status = predict(&arguments, &def, model, arguments.sites ? &loaded : &of_model, &error);
-  }
+  sonde_error_report report;
+  double start = app_seconds(CLOCK_MONOTONIC), *predicted_n = NULL;
+
+  // The sites are those of the table, else those that the model carries.
+  sonde_status status = sonde_model_load(a->model, &model, &error);
+  if (!status && a->sites) status = sonde_site_table_load(a->sites, &loaded, &error);
+  if (status) goto done;
+  sonde_site_table sites =
+      a->sites ? loaded : (sonde_site_table){.count = model->site_count, .sites = model->sites};
+  status = sonde_measurements_load(a->measurements, &sites, &m, &error);
+  if (status) goto done;
+
+  // The model's force at every measured penetration.
+  predicted_n = calloc(m.count, sizeof *predicted_n);
+  sonde_progress progress = app_progress();
+  status = predicted_n ? sonde_predict(model, &sites, &m, &a->def, &progress, predicted_n, &error)
+                       : (error.status = SONDE_MEMORY);
+  app_progress_end();
+  if (!status) status = sonde_error_report_of(m.data, predicted_n, m.count, &report, &error);
+  if (!status) print_result(a, &m, predicted_n, &report, app_seconds(CLOCK_MONOTONIC) - start);
+done:
+  free(predicted_n);
+  sonde_measurements_clear(&m);
   sonde_site_table_clear(&loaded);
   sonde_model_destroy(model);
   return status ? app_fail(VERB, &error) : APP_OK;
 }
+
+const app_command cmd_predict = {
+    .verb = "predict",
+    .summary = "compare a model's forces with measurements",
+    .usage = "MODEL --measurements CSV [--sites CSV] [options]",
+    .text = "Presses the model as the experiment did, with the footprint bonded and moved along "
+            "the normal, and compares the force at each measured penetration.",
+    OPT_TABLE(TABLE),
+    .size = sizeof(options),
+    .prepare = prepare,
+    .required = "MODEL measurements",
+    .run = run};

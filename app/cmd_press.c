@@ -109,19 +109,14 @@ static void print(const press *p, const options *o) {
   const settled *s = &p->scene;
   if (o->json) {
     app_json_begin();
-    app_json_real("force_n", s->force_n);
-    app_json_real("penetration_mm", s->depth_m * 1e3);
-    app_json_real("reaction_n", s->result.reaction_n);
-    app_json_real("contact_n", s->result.contact_n);
+    app_json("force_n:%g penetration_mm:%g reaction_n:%g contact_n:%g", s->force_n,
+             s->depth_m * 1e3, s->result.reaction_n, s->result.contact_n);
     print_vessel("vein", &p->vessel[0], p->cut[0]);
     print_vessel("artery", &p->vessel[1], p->cut[1]);
-    app_json_real("vein_short_mm", p->cut[0] ? p->vessel[0].half_short_m * 2e3 : NAN);
-    app_json_real("residual", s->result.residual);
-    app_json_integer("steps", s->iterations);
+    app_json("vein_short_mm:%g residual:%g steps:%u",
+             p->cut[0] ? p->vessel[0].half_short_m * 2e3 : NAN, s->result.residual, s->iterations);
     settled_json_jumps(s);
-    app_json_text("case", p->pathology.name);
-    app_json_text("probe", s->probe.name);
-    app_json_integer("site", o->site);
+    app_json("case:%s probe:%s site:%ld", p->pathology.name, s->probe.name, o->site);
     app_json_end();
     return;
   }
@@ -163,8 +158,7 @@ static sonde_status prepare(press *p, const options *o, sonde_error *error) {
   return status ? status : settled_site(&p->scene, o->model, o->site, &p->start, error);
 }
 
-static int run(void *from, int argc, char **argv) {
-  (void)argc, (void)argv;
+static int run(void *from) {
   const options *o = from;
   assert(isnan(o->force_n) != isnan(o->depth_m));
   press p = {0};

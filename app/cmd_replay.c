@@ -1,121 +1,72 @@
 // sonde replay: plays a recording again and compares hashes, or exports what it shows.
-#include "app.h"
+#include "options.h"
 #include "replay_export.h"
 
-#include <getopt.h>
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <unistd.h>
 
-static const char help[] =
-    "usage: sonde replay RECORDING [OPTIONS]\n"
-    "\n"
-    "Plays the recorded inputs again, tick by tick, and compares the state with the recorded one.\n"
-    "With an export it writes what the exam shows instead. Exit code 0: the same, or written;\n"
-    "1: different, or failed; 2: the file or the model cannot be used.\n"
-    "\n"
-    "  --model MODEL     model file; default: the one the recording names, or the bundled thigh\n"
-    "  --images          make every image again as well and compare their hash\n"
-    "  --recover         take a file that was cut off (by a killed program or a full disk), as\n"
-    "                    far as it is whole\n"
-    "  --csv FILE        a row per image: time, pose, force, depth, area ratios; units in the "
-    "head\n"
-    "  --json-file FILE  the same as JSON, with the comments\n"
-    "  --frames DIR      a PNG per image\n"
-    "  --video FILE.mp4  a film of 25 pictures per second; needs the program ffmpeg\n"
-    "  --from S, --to S  part of the exam to export, in seconds\n"
-    "  --json            print one JSON object: ticks, hash, recorded_hash, same; of an export "
-    "rows,\n"
-    "                    pictures, film_frames\n"
-    "  --help            this text\n";
-
-typedef struct settings {
+typedef struct options {
   const char *recording, *model;
   replay_export what;
-  bool json, images, recover, ranged, help;
-} settings;
+  bool json, images, recover;
+} options;
 
-static bool parse_option(int option, settings *s) {
-  switch (option) {
-  case 'm': s->model = optarg; return true;
-  case 'j': s->json = true; return true;
-  case 'h': s->help = true; return true;
-  case 'i': s->images = true; return true;
-  case 'r': s->recover = true; return true;
-  case 'c': s->what.csv = optarg; return true;
-  case 'J': s->what.json = optarg; return true;
-  case 'v': s->what.video = optarg; return true;
-  case 'd': s->what.frames = optarg; return true;
-  case 'f':
-    s->ranged = true;
-    return app_parse_real("replay", "--from", optarg, 0, 1e6, &s->what.from_s);
-  default: s->ranged = true; return app_parse_real("replay", "--to", optarg, 0, 1e6, &s->what.to_s);
-  }
-}
+static const options DEFAULTS = {.what.to_s = 1e6};
 
-static bool exports(const settings *s) {
+static const app_option TABLE[] = {
+    OPT_ARGUMENT(recording, "RECORDING", NULL),
+    OPT_TEXT(model, "m,model", "MODEL",
+             "model file; default: the one that the recording names, or the bundled thigh"),
+    OPT_FLAG(images, "images",
+             "make every image again as well and compare the hash of their pixels"),
+    OPT_FLAG(recover, "recover",
+             "take a file without an end, as a killed program leaves it, up to its last whole "
+             "block, and one with inputs that a full disk lost, up to the loss"),
+    OPT_TEXT(what.csv, "csv", "FILE",
+             "a row per image: time, pose, force, depth, area ratios; units in the head"),
+    OPT_TEXT(what.json, "json-file", "FILE",
+             "the same as JSON, with the comments in recording.comments.json"),
+    OPT_TEXT(what.frames, "frames", "DIR", "a PNG per image, named by its tick"),
+    OPT_TEXT(what.video, "video", "FILE.mp4",
+             "a film of 25 pictures per second; needs the program ffmpeg (Debian package ffmpeg)"),
+    OPT_REAL(what.from_s, "from", "S", 0, 1e6, 1, "begin of the part to export, in seconds"),
+    OPT_REAL(what.to_s, "to", "S", 0, 1e6, 1, "end of the part to export, in seconds"),
+    OPT_FLAG(
+        json, "json",
+        "print one JSON object: ticks, hash, recorded_hash, ended, same, checks, "
+        "different_tick, with --images also images, image_hash, same_images; of an export rows, "
+        "pictures, film_frames")};
+
+static bool exports(const options *s) {
   return s->what.csv || s->what.json || s->what.video || s->what.frames;
 }
 
-// 0 when the command line is good.
-static int parse(int argc, char **argv, settings *s) {
-  static const struct option options[] = {
-      {"model", required_argument, NULL, 'm'}, {"json", no_argument, NULL, 'j'},
-      {"images", no_argument, NULL, 'i'},      {"recover", no_argument, NULL, 'r'},
-      {"csv", required_argument, NULL, 'c'},   {"json-file", required_argument, NULL, 'J'},
-      {"video", required_argument, NULL, 'v'}, {"frames", required_argument, NULL, 'd'},
-      {"from", required_argument, NULL, 'f'},  {"to", required_argument, NULL, 't'},
-      {"help", no_argument, NULL, 'h'},        {NULL, 0, NULL, 0}};
-  int option;
-  opterr = 0;
-  s->what.to_s = 1e6;
-  while ((option = getopt_long(argc, argv, ":hm:", options, NULL)) != -1) {
-    if (option == ':') return app_usage_error("replay", "%s needs a value", argv[optind - 1]);
-    if (option == '?') return app_usage_error("replay", "unknown option '%s'", argv[optind - 1]);
-    if (!parse_option(option, s)) return APP_BAD_INPUT;
-  }
-  if (s->help) return APP_OK;
-  if (optind + 1 != argc) return app_usage_error("replay", "expected one RECORDING");
-  if (s->ranged && !exports(s))
+static int check(void *from) {
+  options *s = from;
+  if ((app_option_given("from") || app_option_given("to")) && !exports(s))
     return app_usage_error("replay",
                            "--from and --to need --csv, --json-file, --frames or --video");
   if (s->images && exports(s))
     return app_usage_error("replay", "--images compares and exports nothing");
   if (!(s->what.from_s <= s->what.to_s))
     return app_usage_error("replay", "--from %g is behind --to %g", s->what.from_s, s->what.to_s);
-  s->recording = s->what.recording = argv[optind];
+  s->what.recording = s->recording;
   return APP_OK;
 }
 
-// A recording may have moved to a machine that keeps the model elsewhere: then the bundled one is
-// tried, and the recorded checksum decides.
-static void choose_model(const settings *s, char *path, size_t size) {
-  char bundled[4096], searched[4096];
-  if (s->model)
-    snprintf(path, size, "%s", s->model);
-  else if (access(path, R_OK) != 0 &&
-           app_bundled_model(bundled, sizeof bundled, searched, sizeof searched))
-    snprintf(path, size, "%s", bundled);
-}
-
-static void print_result(const settings *s, const sonde_replay_result *r, bool ended) {
+static void print_result(const options *s, const sonde_replay_result *r, bool ended) {
   char hash[20], recorded[20], image_hash[20];
   snprintf(hash, sizeof hash, "%016llx", (unsigned long long)r->hash);
   snprintf(recorded, sizeof recorded, "%016llx", (unsigned long long)r->recorded_hash);
   snprintf(image_hash, sizeof image_hash, "%016llx", (unsigned long long)r->image_hash);
   if (s->json) {
     app_json_begin();
-    app_json_integer("ticks", (long long)r->ticks);
-    app_json_text("hash", hash);
-    app_json_text("recorded_hash", recorded);
-    app_json_bool("ended", ended);
-    app_json_bool("same", r->same);
-    app_json_integer("checks", r->checks);
-    app_json_integer("different_tick", (long long)r->different_tick);
+    app_json("ticks:%lu hash:%s recorded_hash:%s ended:%hhd same:%hhd checks:%u different_tick:%lu",
+             r->ticks, hash, recorded, ended, r->same, r->checks, r->different_tick);
     if (s->images) {
-      app_json_integer("images", (long long)r->images);
-      app_json_text("image_hash", image_hash);
-      app_json_bool("same_images", r->same_images);
+      app_json("images:%lu image_hash:%s same_images:%hhd", r->images, image_hash, r->same_images);
     }
     app_json_end();
     return;
@@ -132,13 +83,11 @@ static void print_result(const settings *s, const sonde_replay_result *r, bool e
     printf("first difference at tick %llu\n", (unsigned long long)r->different_tick);
 }
 
-static void print_export(const settings *s) {
+static void print_export(const options *s) {
   const replay_export *w = &s->what;
   if (s->json) {
     app_json_begin();
-    app_json_integer("rows", w->rows);
-    app_json_integer("pictures", w->pictures);
-    app_json_integer("film_frames", w->film_frames);
+    app_json("rows:%u pictures:%u film_frames:%u", w->rows, w->pictures, w->film_frames);
     app_json_end();
     return;
   }
@@ -147,51 +96,55 @@ static void print_export(const settings *s) {
   if (w->video) printf("%u frames of film written to %s\n", w->film_frames, w->video);
 }
 
-static sonde_status work(settings *s, sonde_player *player, sonde_replay_result *result,
-                         sonde_error *error) {
-  sonde_progress progress = app_progress();
-  double end_s = sonde_player_info(player)->duration_s;
-  sonde_status status;
-  s->what.to_s = fmin(s->what.to_s, end_s);
-  if (exports(s))
-    status = replay_export_run(player, &s->what, &progress, error);
-  else
-    status = sonde_player_check(player, s->images, &progress, result, error);
-  app_progress_end();
-  return status;
-}
-
-int old_replay(int argc, char **argv);
-int old_replay(int argc, char **argv) {
-  settings s = {0};
-  int code = parse(argc, argv, &s);
-  if (code != APP_OK) return code;
-  if (s.help) {
-    fputs(help, stdout);
-    return APP_OK;
-  }
+static int run(void *from) {
+  options *s = from;
+  assert(s->recording);
   sonde_error error = {0};
   sonde_model *model = NULL;
   sonde_player *player = NULL;
   sonde_recording_info info = {0};
   sonde_replay_result result = {0};
-  sonde_status status = sonde_recording_inspect(s.recording, s.recover, &info, &error);
-  if (!status) {
-    char path[4096];
-    snprintf(path, sizeof path, "%s", info.model_path);
-    choose_model(&s, path, sizeof path);
-    status = sonde_model_load(path, &model, &error);
-  }
-  sonde_player_def def = {.path = s.recording, .model = model, .recover = s.recover};
+  sonde_status status = sonde_recording_inspect(s->recording, s->recover, &info, &error);
+
+  // A recording may have moved to a machine that keeps the model elsewhere: then the bundled one is
+  // tried, and the recorded checksum decides.
+  char bundled[4096], searched[4096];
+  const char *path = s->model ? s->model : info.model_path;
+  if (!status && !s->model && access(path, R_OK) != 0 &&
+      app_bundled_model(bundled, sizeof bundled, searched, sizeof searched))
+    path = bundled;
+  if (!status) status = sonde_model_load(path, &model, &error);
+  sonde_player_def def = {.path = s->recording, .model = model, .recover = s->recover};
   if (!status) status = sonde_player_open(&def, &player, &error);
-  if (!status) status = work(&s, player, &result, &error);
+  if (!status) {
+    sonde_progress progress = app_progress();
+    s->what.to_s = fmin(s->what.to_s, sonde_player_info(player)->duration_s);
+    status = exports(s) ? replay_export_run(player, &s->what, &progress, &error)
+                        : sonde_player_check(player, s->images, &progress, &result, &error);
+    app_progress_end();
+  }
   sonde_player_close(player);
   sonde_model_destroy(model);
   if (status) return app_fail("replay", &error);
-  if (exports(&s)) {
-    print_export(&s);
+  if (exports(s)) {
+    print_export(s);
     return APP_OK;
   }
-  print_result(&s, &result, info.ended);
-  return result.same && (!s.images || result.same_images) ? APP_OK : APP_FAILED;
+  print_result(s, &result, info.ended);
+  return result.same && (!s->images || result.same_images) ? APP_OK : APP_FAILED;
 }
+
+const app_command cmd_replay = {
+    .verb = "replay",
+    .summary = "play a recording again and compare the state hash",
+    .usage = "RECORDING [options]",
+    .text = "Plays the recorded inputs again, tick by tick, and compares the state with the "
+            "recorded one, at the end and at the hashes on the way. With an export it writes what "
+            "the exam shows instead and compares nothing. Exit code 0: the same, or written; 1: "
+            "different, or failed; 2: the file or the model cannot be used.",
+    OPT_TABLE(TABLE),
+    .size = sizeof(options),
+    .defaults = &DEFAULTS,
+    .required = "RECORDING",
+    .check = check,
+    .run = run};

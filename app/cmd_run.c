@@ -1,70 +1,85 @@
 // sonde run: the simulator in real time, with the page or headless with a scripted exam.
-//
-// parse              the command line
-// choose_probes      built-in probes, and a probe file when one is named
-// load_tissue        presets
-// define, create_session   everything that simulates
-// run_page, run_desk until Ctrl-C
-// run_headless       for a time, in real time or in lockstep
-// print_summary      what a headless run did
-#include "app.h"
 #include "desk.h"
 #include "exam_common.h"
+#include "options.h"
 #include "run_device.h"
 
-#include <getopt.h>
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
 
-static const char help[] =
-    "usage: sonde run [MODEL] [OPTIONS]\n"
-    "\n"
-    "Simulates compression ultrasound of a thigh at 1 kHz and serves the page that shows it.\n"
-    "MODEL is a model file; default: the bundled thigh. Ctrl-C stops.\n"
-    "\n"
-    "  --port N        port of the page on 127.0.0.1; 0: any free one (default 8642)\n"
-    "  --headless      no page: a scripted exam at site 27 runs for --seconds\n"
-    "  --seconds S     duration of a headless run (default 10)\n"
-    "  --lockstep      headless without real time: as fast as it goes, the same every time\n"
-    "  --record FILE   record the inputs; `sonde replay FILE` plays them again\n"
-    "  --probe NAME    point, linear, square, sphere or a mesh file (default linear)\n"
-    "  --case NAME     healthy, partial_mural, acute_occlusive, subacute_occlusive,\n"
-    "                  chronic_occlusive (default healthy)\n"
-    "  --preset FILE   damping, stiffness and friction (sonde-identify(1))\n"
-    "  --compare FILE  a second preset, which the page can change over to\n"
-    "  --gel-ml V      gel spread over the sites at the start (default 10; 0: dry skin)\n"
-    "  --no-gel        no gel is simulated: every line of the image is coupled\n"
-    "  --circulation   pulse, breath, posture and strain move the vessels' pressures\n"
-    "  --posture NAME  supine, sitting or standing; with --circulation (default supine)\n"
-    "  --device NAME   page, touch, touch_x, premium_1.5, omega.3, omega.6, falcon, haply,\n"
-    "                  spacenav, gamepad, hand (simulated operator), script or replay\n"
-    "                  (default page; headless: script)\n"
-    "  --device-at AT  site or landmark where the probe starts (default 27)\n"
-    "  --clutch N      button that lets the handle move without the probe; 0: none (default 1)\n"
-    "  --force-scale X rendered over tissue force (default: from the device's limits)\n"
-    "  --limits NAME   render as for this device (docs/haptics.md)\n"
-    "  --from FILE     recording whose poses --device replay plays\n"
-    "  --device-library FILE, --device-port N: of the maker's driver, when not the usual ones\n"
-    "  --trainee NAME  whose exams they are (default: $SONDE_TRAINEE, else as the page says)\n"
-    "  --exams DIR     where exams are kept (default: sonde/exams in $XDG_DATA_HOME or\n"
-    "                  ~/.local/share)\n"
-    "  --cases DIR, --protocols DIR: other cases and protocols than those that ship\n"
-    "  --json          headless: print one JSON object at the end\n"
-    "  --help          this text\n";
-
 enum { MAX_PROBES = 16 };
 
-typedef struct settings {
-  const char *model, *record, *probe, *pathology, *preset, *compare, *posture;
+typedef struct options {
+  const char *model, *record, *probe, *pathology, *preset, *compare;
   const char *trainee, *exams, *cases, *protocols;
   long port;
-  double seconds, gel_ml;
-  bool headless, lockstep, json, help, timed, no_gel, circulate;
+  double seconds, gel_m3;
+  bool headless, lockstep, json, no_gel, circulate;
+  sonde_posture posture;
   run_device device;
-} settings;
+} options;
+
+static const options DEFAULTS = {.port = 8642,
+                                 .seconds = 10.0,
+                                 .probe = "linear",
+                                 .pathology = "healthy",
+                                 .gel_m3 = 1e-6 * 10.0,
+                                 .device = {.clutch = 1}};
+
+static const char *const POSTURES[SONDE_POSTURE_COUNT + 1] = {"supine", "sitting", "standing"};
+
+static const app_option TABLE[] = {
+    OPT_MODEL(model),
+    OPT_INTEGER(port, "port", "N", 0, 65535, "port of the page on 127.0.0.1; 0: any free one"),
+    OPT_FLAG(headless, "headless", "no page: a scripted exam at site 27 runs for --seconds"),
+    OPT_REAL(seconds, "seconds", "S", 0.001, 1e6, 1, "duration of a headless run"),
+    OPT_FLAG(lockstep, "lockstep",
+             "headless without real time: as fast as it goes, the same every time"),
+    OPT_TEXT(record, "record", "FILE",
+             "record the inputs for sonde-replay(1); a FILE that is there before becomes FILE.old"),
+    OPT_TEXT(probe, "probe", "NAME|FILE",
+             "point, linear, square, sphere, or a mesh file in millimetres"),
+    OPT_TEXT(pathology, "case", "NAME",
+             "healthy, partial_mural, acute_occlusive, subacute_occlusive or chronic_occlusive"),
+    OPT_TEXT(preset, "preset", "FILE", "damping, stiffness and friction, see sonde-identify(1)"),
+    OPT_TEXT(compare, "compare", "FILE",
+             "a second preset, which the controls of the page can change over to"),
+    OPT_REAL(gel_m3, "gel-ml", "V", 0, 1000, 1e-6,
+             "gel spread over the sites at the start; 0: dry skin"),
+    OPT_FLAG(no_gel, "no-gel", "no gel is simulated: every line of the image is coupled"),
+    OPT_FLAG(circulate, "circulation",
+             "pulse, breath, posture and strain move the vessels' pressures"),
+    OPT_WORD(posture, "posture", "NAME", POSTURES, "with --circulation"),
+    OPT_TEXT(
+        device.name, "device", "NAME",
+        "what moves the probe: page, touch, touch_x, premium_1.5, openhaptics, omega.3, "
+        "omega.6, falcon, forcedimension, haply, spacenav, gamepad, hand (simulated operator), "
+        "script or replay; default page, headless script"),
+    OPT_TEXT(device.at, "device-at", "AT",
+             "number of a site or name of a landmark where the probe starts; default 27"),
+    OPT_INTEGER(device.clutch, "clutch", "N", 0, 32,
+                "button that lets the handle move without the probe; 0: none"),
+    OPT_REAL(device.force_scale, "force-scale", "X", 1e-3, 10, 1,
+             "rendered over tissue force; default from the device's limits: 25 N of tissue are 0.8 "
+             "of its peak"),
+    OPT_TEXT(device.limits, "limits", "NAME", "render as for this device (docs/haptics.md)"),
+    OPT_TEXT(device.from, "from", "FILE", "recording whose poses --device replay plays"),
+    OPT_TEXT(device.library, "device-library", "FILE",
+             "of the maker's driver, when it is not the usual one"),
+    OPT_INTEGER(device.port, "device-port", "N", 1, 65535,
+                "of the maker's driver, when it is not the usual one"),
+    OPT_TEXT(trainee, "trainee", "NAME",
+             "whose exams they are; default: $SONDE_TRAINEE, else as the page says"),
+    OPT_TEXT(exams, "exams", "DIR",
+             "where exams are kept: recording, data, report and the log of all (exams.sqlite); "
+             "default: sonde/exams in $XDG_DATA_HOME or ~/.local/share"),
+    OPT_TEXT(cases, "cases", "DIR", "other cases than those that ship"),
+    OPT_TEXT(protocols, "protocols", "DIR", "other protocols than those that ship"),
+    OPT_FLAG(json, "json", "headless: print one JSON object at the end")};
 
 // What a headless run saw.
 typedef struct summary {
@@ -79,168 +94,56 @@ typedef struct summary {
   sonde_loop_stats loop;
 } summary;
 
-static bool parse_device(int option, settings *s) {
-  run_device *d = &s->device;
-  switch (option) {
-  case 'D': d->name = optarg; return true;
-  case 'A': d->at = optarg; return true;
-  case 'L': d->limits = optarg; return true;
-  case 'F': d->from = optarg; return true;
-  case 'y': d->library = optarg; return true;
-  case 'o': return app_parse_integer("run", "--device-port", optarg, 1, 65535, &d->port);
-  case 'k': return app_parse_integer("run", "--clutch", optarg, 0, 32, &d->clutch);
-  default: return app_parse_real("run", "--force-scale", optarg, 1e-3, 10, &d->force_scale);
-  }
-}
-
-static bool parse_option(int option, settings *s) {
-  switch (option) {
-  case 'p': return app_parse_integer("run", "--port", optarg, 0, 65535, &s->port);
-  case 's':
-    s->timed = true;
-    return app_parse_real("run", "--seconds", optarg, 0.001, 1e6, &s->seconds);
-  case 'H': s->headless = true; return true;
-  case 'l': s->lockstep = true; return true;
-  case 'j': s->json = true; return true;
-  case 'h': s->help = true; return true;
-  case 'r': s->record = optarg; return true;
-  case 'P': s->probe = optarg; return true;
-  case 'e': s->preset = optarg; return true;
-  case 'm': s->compare = optarg; return true;
-  case 'g': return app_parse_real("run", "--gel-ml", optarg, 0, 1000, &s->gel_ml);
-  case 'n': s->no_gel = true; return true;
-  case 'C': s->circulate = true; return true;
-  case 'u': s->posture = optarg; return true;
-  case 'c': s->pathology = optarg; return true;
-  case 't': s->trainee = optarg; return true;
-  case 'E': s->exams = optarg; return true;
-  case 'a': s->cases = optarg; return true;
-  case 'O': s->protocols = optarg; return true;
-  default: return parse_device(option, s);
-  }
-}
-
-static const struct option OPTIONS[] = {{"port", required_argument, NULL, 'p'},
-                                        {"seconds", required_argument, NULL, 's'},
-                                        {"headless", no_argument, NULL, 'H'},
-                                        {"lockstep", no_argument, NULL, 'l'},
-                                        {"json", no_argument, NULL, 'j'},
-                                        {"help", no_argument, NULL, 'h'},
-                                        {"record", required_argument, NULL, 'r'},
-                                        {"probe", required_argument, NULL, 'P'},
-                                        {"case", required_argument, NULL, 'c'},
-                                        {"preset", required_argument, NULL, 'e'},
-                                        {"compare", required_argument, NULL, 'm'},
-                                        {"gel-ml", required_argument, NULL, 'g'},
-                                        {"no-gel", no_argument, NULL, 'n'},
-                                        {"circulation", no_argument, NULL, 'C'},
-                                        {"posture", required_argument, NULL, 'u'},
-                                        {"device", required_argument, NULL, 'D'},
-                                        {"device-at", required_argument, NULL, 'A'},
-                                        {"limits", required_argument, NULL, 'L'},
-                                        {"from", required_argument, NULL, 'F'},
-                                        {"device-library", required_argument, NULL, 'y'},
-                                        {"device-port", required_argument, NULL, 'o'},
-                                        {"clutch", required_argument, NULL, 'k'},
-                                        {"trainee", required_argument, NULL, 't'},
-                                        {"exams", required_argument, NULL, 'E'},
-                                        {"cases", required_argument, NULL, 'a'},
-                                        {"protocols", required_argument, NULL, 'O'},
-                                        {"force-scale", required_argument, NULL, 'x'},
-                                        {NULL, 0, NULL, 0}};
-
-static const char *const POSTURES[SONDE_POSTURE_COUNT] = {"supine", "sitting", "standing"};
-
-// SONDE_POSTURE_COUNT for a name that is none.
-static sonde_posture posture_of(const char *name) {
-  int k = 0;
-  while (name && k < SONDE_POSTURE_COUNT && strcmp(name, POSTURES[k]) != 0) ++k;
-  return (sonde_posture)k;
-}
-
-// 0 when the options go together.
-static int check(settings *s) {
-  if ((s->timed || s->lockstep || s->json) && !s->headless)
+static int check(void *from) {
+  options *s = from;
+  if ((app_option_given("seconds") || s->lockstep || s->json) && !s->headless)
     return app_usage_error("run", "--seconds, --lockstep and --json need --headless");
   if (s->compare && !s->preset)
     return app_usage_error("run", "--compare needs a --preset to compare with");
-  if (posture_of(s->posture) == SONDE_POSTURE_COUNT)
-    return app_usage_error("run", "unknown posture '%s', expected supine, sitting or standing",
-                           s->posture);
   s->device.headless = s->headless;
   s->device.lockstep = s->lockstep;
   s->device.seconds = s->headless ? s->seconds : 3600.0;
   return run_device_check(&s->device) ? APP_OK : APP_BAD_INPUT;
 }
 
-// 0 when the command line is good.
-static int parse(int argc, char **argv, settings *s) {
-  int option;
-  opterr = 0;
-  while ((option = getopt_long(argc, argv, ":h", OPTIONS, NULL)) != -1) {
-    if (option == ':') return app_usage_error("run", "%s needs a value", argv[optind - 1]);
-    if (option == '?') return app_usage_error("run", "unknown option '%s'", argv[optind - 1]);
-    if (!parse_option(option, s)) return APP_BAD_INPUT;
-  }
-  if (s->help) return APP_OK;
-  if (optind < argc) s->model = argv[optind++];
-  if (optind < argc) return app_usage_error("run", "unexpected argument '%s'", argv[optind]);
-  return check(s);
-}
-
-// Fills a NULL-terminated list and returns the index of the wanted probe.
-static uint32_t choose_probes(const char *wanted, const char *names[MAX_PROBES]) {
-  const char *const *built_in = sonde_probe_names();
-  uint32_t count = 0, index = UINT32_MAX;
-  for (; count < MAX_PROBES - 2 && built_in[count]; ++count) {
-    names[count] = built_in[count];
-    if (strcmp(wanted, built_in[count]) == 0) index = count;
-  }
-  if (index == UINT32_MAX) {
-    index = count;
-    names[count++] = wanted; // a file, or a name that the session will reject
-  }
-  names[count] = NULL;
-  return index;
-}
-
-static sonde_status load_tissue(const settings *s, sonde_session_def *def, sonde_error *error) {
-  const char *const paths[SONDE_SESSION_PRESETS] = {s->preset, s->compare};
-  sonde_status status = SONDE_OK;
-  for (int k = 0; k < SONDE_SESSION_PRESETS && paths[k] && !status; ++k)
-    status = sonde_preset_load(paths[k], &def->presets[def->preset_count++], error);
-  return status;
-}
-
-// Everything but the probes and the model.
-static sonde_status define(const settings *s, sonde_session_def *def, sonde_error *error) {
+// Everything of the session but its model. names: filled with the probes, ended by NULL.
+static sonde_status define_session(const options *s, const char *names[MAX_PROBES],
+                                   sonde_session_def *def, sonde_error *error) {
   *def = sonde_session_def_default();
   def->record_path = s->record;
   def->controls.gel = !s->no_gel;
-  def->gel_m3 = 1e-6 * s->gel_ml;
-  def->circulate = s->circulate;
-  def->controls.posture = posture_of(s->posture);
+  def->gel_m3 = s->gel_m3;
+  def->circulate = s->circulate || !s->headless; // the page has buttons for posture and strain
+  def->controls.posture = s->posture;
   run_device_limits(&s->device, def);
+
+  // The built-in probes, and the wanted one when it is a file or a name that will be refused.
+  const char *const *built_in = sonde_probe_names();
+  uint32_t count = 0, wanted = UINT32_MAX;
+  for (; count < MAX_PROBES - 2 && built_in[count]; ++count) {
+    names[count] = built_in[count];
+    if (strcmp(s->probe, built_in[count]) == 0) wanted = count;
+  }
+  if (wanted == UINT32_MAX) {
+    wanted = count;
+    names[count++] = s->probe;
+  }
+  names[count] = NULL;
+  def->probe_names = names;
+  def->controls.probe = wanted;
+
+  // State of the vein, and the presets that the page can change over between.
+  const char *const presets[SONDE_SESSION_PRESETS] = {s->preset, s->compare};
   sonde_status status = sonde_pathology_preset(s->pathology, &def->controls.pathology, error);
-  return status ? status : load_tissue(s, def, error);
+  for (int k = 0; k < SONDE_SESSION_PRESETS && presets[k] && !status; ++k)
+    status = sonde_preset_load(presets[k], &def->presets[def->preset_count++], error);
+  return status;
 }
 
 static sonde_status make_device(const void *user, const sonde_site *start,
                                 const sonde_session_def *def, sonde_device *device,
                                 sonde_error *error) {
-  return run_device_create(&((const settings *)user)->device, start, def, device, error);
-}
-
-static sonde_status create_session(const settings *s, const sonde_model *model,
-                                   sonde_session_def *def, sonde_session **session,
-                                   sonde_error *error) {
-  sonde_site site;
-  sonde_device device = {0};
-  sonde_status status = run_device_site(&s->device, model, &site, error);
-  if (!status) status = make_device(s, &site, def, &device, error);
-  if (!status) status = sonde_session_create(def, &device, session, error);
-  if (device.destroy) device.destroy(device.self); // not moved: creation failed
-  return status;
+  return run_device_create(&((const options *)user)->device, start, def, device, error);
 }
 
 static void sleep_s(double seconds) {
@@ -256,7 +159,7 @@ static void announce(const char *learner, const char *teacher) {
 }
 
 // Free practice only, recorded.
-static sonde_status run_page(const settings *s, const sonde_session_def *session_def,
+static sonde_status run_page(const options *s, const sonde_session_def *session_def,
                              sonde_session *session, sonde_error *error) {
   sonde_page_server *server = NULL;
   sonde_page_def def = {.port = (uint16_t)s->port,
@@ -278,33 +181,26 @@ static sonde_status run_page(const settings *s, const sonde_session_def *session
   return status;
 }
 
-// Where exams are kept when the command line does not say.
-static void exams_directory(const settings *s, char *path, size_t size) {
-  const char *data = getenv("XDG_DATA_HOME"), *home = getenv("HOME");
-  if (s->exams)
-    snprintf(path, size, "%s", s->exams);
-  else if (data && data[0])
-    snprintf(path, size, "%s/sonde/exams", data);
-  else
-    snprintf(path, size, "%s/.local/share/sonde/exams", home && home[0] ? home : "/tmp");
-}
-
 // Practice, exams and replays.
-static sonde_status run_desk(const settings *s, const sonde_model *model,
+static sonde_status run_desk(const options *s, const sonde_model *model,
                              const sonde_session_def *session_def, sonde_error *error) {
   char exams[4096];
   exam_library library = exam_library_find(s->cases, s->protocols);
-  const char *named = getenv("SONDE_TRAINEE");
-  exams_directory(s, exams, sizeof exams);
+  const char *named = getenv("SONDE_TRAINEE"), *trainee = s->trainee ? s->trainee : named;
+  const char *data = getenv("XDG_DATA_HOME"), *home = getenv("HOME");
+  if (s->exams)
+    snprintf(exams, sizeof exams, "%s", s->exams);
+  else if (data && data[0])
+    snprintf(exams, sizeof exams, "%s/sonde/exams", data);
+  else
+    snprintf(exams, sizeof exams, "%s/.local/share/sonde/exams", home && home[0] ? home : "/tmp");
   desk_def def = {.model = model,
                   .model_path = session_def->model_path,
                   .bundled_path = library.has_bundled ? library.bundled : NULL,
                   .cases = library.cases,
                   .protocols = library.protocols,
                   .exams = exams,
-                  .trainee = s->trainee ? s->trainee
-                             : named    ? named
-                                        : "",
+                  .trainee = trainee ? trainee : "",
                   .practice = *session_def,
                   .port = (uint16_t)s->port,
                   .force_limit_n = session_def->limits.force_n,
@@ -353,46 +249,36 @@ static void watch(sonde_session *session, summary *seen) {
   sonde_session_control(session, &controls);
 }
 
-static void run_lockstep(const settings *s, double dt_s, sonde_session *session,
-                         const sonde_progress *progress, summary *seen) {
-  uint64_t ticks = (uint64_t)llround(s->seconds / dt_s);
-  for (uint64_t i = 0; i < ticks; ++i) {
-    sonde_session_tick(session);
-    look(session, seen);
-    watch(session, seen);
-    double fraction = (double)(i + 1) / (double)ticks;
-    if (i % 100 == 99 && !progress->report(fraction, "lockstep", progress->user)) break;
-  }
-}
-
-static sonde_status run_realtime(const settings *s, sonde_session *session,
-                                 const sonde_progress *progress, summary *seen,
+// With a script or a hand, for a time: in real time, or tick by tick as fast as it goes.
+static sonde_status run_headless(const options *s, sonde_session *session, summary *seen,
                                  sonde_error *error) {
-  sonde_status status = sonde_session_start(session, error);
-  if (status) return status;
-  double start_s = app_seconds(CLOCK_MONOTONIC), passed_s = 0.0;
-  while (passed_s < s->seconds &&
-         progress->report(passed_s / s->seconds, "real time", progress->user)) {
-    look(session, seen);
-    watch(session, seen);
-    sleep_s(fmin(0.01, s->seconds - passed_s));
-    passed_s = app_seconds(CLOCK_MONOTONIC) - start_s;
-  }
-  sonde_session_stop(session);
-  look(session, seen);
-  return SONDE_OK;
-}
-
-static sonde_status run_headless(const settings *s, sonde_session *session, summary *seen,
-                                 sonde_error *error) {
+  assert(s->seconds > 0);
   sonde_progress progress = app_progress();
-  sonde_status status = SONDE_OK;
-  *seen = (summary){.vein_ratio_min = INFINITY, .gel_volume_m3 = NAN};
   double start_s = app_seconds(CLOCK_MONOTONIC);
-  if (s->lockstep)
-    run_lockstep(s, sonde_session_def_default().world.dt_s, session, &progress, seen);
-  else
-    status = run_realtime(s, session, &progress, seen, error);
+  *seen = (summary){.vein_ratio_min = INFINITY, .gel_volume_m3 = NAN};
+  sonde_status status = s->lockstep ? SONDE_OK : sonde_session_start(session, error);
+  if (s->lockstep) {
+    double dt_s = sonde_session_def_default().world.dt_s;
+    uint64_t ticks = (uint64_t)llround(s->seconds / dt_s);
+    for (uint64_t i = 0; i < ticks; ++i) {
+      sonde_session_tick(session);
+      look(session, seen);
+      watch(session, seen);
+      double fraction = (double)(i + 1) / (double)ticks;
+      if (i % 100 == 99 && !progress.report(fraction, "lockstep", progress.user)) break;
+    }
+  } else if (!status) {
+    double begin_s = app_seconds(CLOCK_MONOTONIC), passed_s = 0.0;
+    while (passed_s < s->seconds &&
+           progress.report(passed_s / s->seconds, "real time", progress.user)) {
+      look(session, seen);
+      watch(session, seen);
+      sleep_s(fmin(0.01, s->seconds - passed_s));
+      passed_s = app_seconds(CLOCK_MONOTONIC) - begin_s;
+    }
+    sonde_session_stop(session);
+    look(session, seen);
+  }
   app_progress_end();
   seen->wall_s = app_seconds(CLOCK_MONOTONIC) - start_s;
   seen->ticks = sonde_session_ticks(session);
@@ -405,47 +291,37 @@ static sonde_status run_headless(const settings *s, sonde_session *session, summ
   return status;
 }
 
-static void print_json(const settings *s, const summary *seen) {
+static void print_json(const options *s, const summary *seen) {
   char hash[20];
   snprintf(hash, sizeof hash, "%016llx", (unsigned long long)seen->hash);
   app_json_begin();
-  app_json_integer("ticks", (long long)seen->ticks);
-  app_json_integer("deadline_misses", (long long)seen->loop.deadline_misses);
-  app_json_integer("images", (long long)seen->images);
+  app_json("ticks:%lu deadline_misses:%lu images:%lu", seen->ticks, seen->loop.deadline_misses,
+           seen->images);
   if (isfinite(seen->latency_s[0])) {
     app_json_object("pose_to_image_ms");
-    app_json_real("median", 1e3 * seen->latency_s[0]);
-    app_json_real("p99", 1e3 * seen->latency_s[1]);
+    app_json("median:%g p99:%g", 1e3 * seen->latency_s[0], 1e3 * seen->latency_s[1]);
     app_json_close();
   }
-  app_json_text("hash", hash);
-  app_json_real("wall_s", seen->wall_s);
-  app_json_real("tick_mean_ms", 1e3 * seen->loop.compute_mean_s);
-  app_json_real("tick_max_ms", 1e3 * seen->loop.compute_max_s);
-  app_json_bool("realtime_priority", seen->loop.realtime_priority);
-  app_json_bool("memory_locked", seen->loop.memory_locked);
-  app_json_text("device", s->device.name);
-  app_json_real("force_scale", seen->force_scale);
-  app_json_real("force_max_n", seen->force_max_n);
-  app_json_real("rendered_force_max_n", seen->rendered_max_n);
-  app_json_integer("faults", seen->faults);
-  app_json_text("fault", sonde_fault_text(seen->fault));
-  app_json_integer("taken_off", seen->restores);
+  app_json("hash:%s wall_s:%g tick_mean_ms:%g tick_max_ms:%g realtime_priority:%hhd "
+           "memory_locked:%hhd device:%s force_scale:%g force_max_n:%g rendered_force_max_n:%g "
+           "faults:%u fault:%s taken_off:%u",
+           hash, seen->wall_s, 1e3 * seen->loop.compute_mean_s, 1e3 * seen->loop.compute_max_s,
+           seen->loop.realtime_priority, seen->loop.memory_locked, s->device.name,
+           seen->force_scale, seen->force_max_n, seen->rendered_max_n, seen->faults,
+           sonde_fault_text(seen->fault), seen->restores);
   if (seen->link.exchanges) {
-    app_json_integer("device_exchanges", (long long)seen->link.exchanges);
-    app_json_integer("device_losses", (long long)seen->link.losses);
+    app_json("device_exchanges:%lu device_losses:%lu", seen->link.exchanges, seen->link.losses);
   }
   if (isfinite(seen->gel_volume_m3)) {
-    app_json_real("gel_ml", 1e6 * seen->gel_volume_m3);
-    app_json_real("gel_coupling", seen->gel_coupling);
+    app_json("gel_ml:%g gel_coupling:%g", 1e6 * seen->gel_volume_m3, seen->gel_coupling);
   }
-  app_json_real("penetration_max_mm", 1e3 * seen->penetration_max_m);
-  app_json_real("vein_area_ratio_min", seen->vein_ratio_min);
+  app_json("penetration_max_mm:%g vein_area_ratio_min:%g", 1e3 * seen->penetration_max_m,
+           seen->vein_ratio_min);
   if (s->record) app_json_text("recording", s->record);
   app_json_end();
 }
 
-static void print_summary(const settings *s, const summary *seen) {
+static void print_summary(const options *s, const summary *seen) {
   if (s->json) {
     print_json(s, seen);
     return;
@@ -477,11 +353,16 @@ static void print_summary(const settings *s, const summary *seen) {
 }
 
 // The session from beginning to end; errors of the recording come at the end.
-static int simulate(const settings *s, const sonde_model *model, sonde_session_def *def) {
+static int simulate(const options *s, const sonde_model *model, sonde_session_def *def) {
   sonde_error error = {0};
   sonde_session *session = NULL;
   summary seen = {0};
-  sonde_status status = create_session(s, model, def, &session, &error);
+  sonde_site site;
+  sonde_device device = {0};
+  sonde_status status = run_device_site(&s->device, model, &site, &error);
+  if (!status) status = make_device(s, &site, def, &device, &error);
+  if (!status) status = sonde_session_create(def, &device, &session, &error);
+  if (device.destroy) device.destroy(device.self); // not moved: creation failed
   if (!status && s->headless)
     status = run_headless(s, session, &seen, &error);
   else if (!status)
@@ -498,47 +379,41 @@ static int simulate(const settings *s, const sonde_model *model, sonde_session_d
   return APP_OK;
 }
 
-static int run(const settings *s, const sonde_model *model, const char *model_path) {
+static int run(void *from) {
+  const options *s = from;
+  assert(s->model && s->probe);
   const char *names[MAX_PROBES];
   sonde_error error = {0};
-  sonde_session_def def;
-  if (define(s, &def, &error)) return app_fail("run", &error);
-  def.model = model;
-  def.model_path = model_path;
-  def.probe_names = names;
-  def.controls.probe = choose_probes(s->probe, names);
-  def.circulate = s->circulate || !s->headless; // the page has buttons for posture and strain
-  if (s->headless || s->record) return simulate(s, model, &def);
-  return run_desk(s, model, &def, &error) ? app_fail("run", &error) : APP_OK;
-}
-
-int old_run(int argc, char **argv);
-int old_run(int argc, char **argv) {
-  settings s = {.port = 8642,
-                .seconds = 10.0,
-                .probe = "linear",
-                .pathology = "healthy",
-                .posture = "supine",
-                .gel_ml = 10.0,
-                .device = {.clutch = 1}};
-  int code = parse(argc, argv, &s);
-  if (code != APP_OK) return code;
-  if (s.help) {
-    fputs(help, stdout);
-    return APP_OK;
-  }
-  char bundled[4096], searched[4096];
-  if (!s.model) {
-    if (!app_bundled_model(bundled, sizeof bundled, searched, sizeof searched))
-      return app_usage_error("run", "the bundled model was not found (searched %s)", searched);
-    s.model = bundled;
-  }
-  sonde_error error = {0};
   sonde_model *model = NULL;
-  if (sonde_model_load(s.model, &model, &error)) return app_fail("run", &error);
-  char *absolute = realpath(s.model, NULL);
-  code = run(&s, model, absolute ? absolute : s.model);
+  sonde_session_def def;
+  if (sonde_model_load(s->model, &model, &error)) return app_fail("run", &error);
+  char *absolute = realpath(s->model, NULL);
+  int code = APP_OK;
+  if (define_session(s, names, &def, &error)) {
+    code = app_fail("run", &error);
+  } else {
+    def.model = model;
+    def.model_path = absolute ? absolute : s->model;
+    if (s->headless || s->record)
+      code = simulate(s, model, &def);
+    else if (run_desk(s, model, &def, &error))
+      code = app_fail("run", &error);
+  }
   free(absolute);
   sonde_model_destroy(model);
   return code;
 }
+
+const app_command cmd_run = {
+    .verb = "run",
+    .summary = "simulate in real time and serve the page",
+    .usage = "[MODEL] [options]\n"
+             "[MODEL] --headless [--seconds S] [--lockstep] [--json] [options]",
+    .text =
+        "Simulates compression ultrasound of a thigh at 1 kHz and serves the page that shows it "
+        "on 127.0.0.1. Ctrl-C stops.",
+    OPT_TABLE(TABLE),
+    .size = sizeof(options),
+    .defaults = &DEFAULTS,
+    .check = check,
+    .run = run};

@@ -1,44 +1,39 @@
 // sonde simulate: runs a scene of several bodies and writes its motion.
-// resume:       goes on from the snapshot; tables lose the rows beyond it.
-// write_frame:  surfaces of all bodies, rows of the tables, the series file, then the snapshot.
-// run:          steps until the end or Ctrl-C.
-#include "app.h"
+#include "options.h"
 #include "scene_figure.h"
 
-#include <getopt.h>
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 static const char VERB[] = "simulate";
-static const char HELP[] =
-    "usage: sonde simulate SCENE -o DIR [options]\n"
-    "\n"
-    "Simulates a scene of several bodies (docs/scene.md) and writes, into DIR, the surfaces as\n"
-    "VTK files (open scene.pvd in ParaView), bodies.csv, contacts.csv and a snapshot.\n"
-    "\n"
-    "  -o, --output DIR  directory to write to; made when absent\n"
-    "  --steps N         simulate N steps\n"
-    "  --seconds S       simulate S seconds; default: duration_s of the scene\n"
-    "  --every K         write every K-th step; default: 60 frames per second of the scene\n"
-    "  --no-frames       write no VTK files\n"
-    "  --picture FILE    draw the bodies as they stand at the end (SVG)\n"
-    "  --resume          go on from the snapshot in DIR; the result is the same, bit by bit\n"
-    "  --json            print one JSON object\n"
-    "  --help            this text\n"
-    "Ctrl-C keeps what is finished; --resume goes on from there.\n";
 
-typedef struct arguments {
+typedef struct options {
   const char *scene, *directory, *picture;
   long steps, every; // 0: not given
   double seconds;    // 0: not given
-  bool resume, json, help, no_frames;
-} arguments;
+  bool resume, json, no_frames;
+} options;
+
+static const app_option TABLE[] = {
+    OPT_ARGUMENT(scene, "SCENE", NULL),
+    OPT_TEXT(directory, "o,output", "DIR", "directory to write to; made when absent"),
+    OPT_INTEGER(steps, "steps", "N", 1, 2000000000, "simulate N steps"),
+    OPT_REAL(seconds, "seconds", "S", 1e-9, 1e6, 1,
+             "simulate S seconds; default: duration_s of the scene"),
+    OPT_INTEGER(every, "every", "K", 1, 2000000000,
+                "write every K-th step and the last; default: 60 frames per second of the scene"),
+    OPT_FLAG(no_frames, "no-frames", "write no VTK files"),
+    OPT_TEXT(picture, "picture", "FILE", "draw the bodies as they stand at the end (SVG)"),
+    OPT_FLAG(resume, "resume",
+             "go on from the snapshot in DIR; the result is the same, bit by bit, as that of a run "
+             "without a break"),
+    OPT_JSON(json)};
 
 typedef struct simulation {
-  arguments a;
+  options a;
   sonde_scene *scene;
   sonde_scene_state *state;
   uint64_t steps, every, start; // steps in all, and where this run began
@@ -48,51 +43,8 @@ typedef struct simulation {
   bool cancelled;
 } simulation;
 
-static bool read_option(int option, arguments *a) {
-  switch (option) {
-  case 'o': a->directory = optarg; return true;
-  case 's': return app_parse_integer(VERB, "--steps", optarg, 1, 2000000000, &a->steps);
-  case 'S': return app_parse_real(VERB, "--seconds", optarg, 1e-9, 1e6, &a->seconds);
-  case 'e': return app_parse_integer(VERB, "--every", optarg, 1, 2000000000, &a->every);
-  case 'p': a->picture = optarg; return true;
-  case 'n': return a->no_frames = true;
-  case 'r': return a->resume = true;
-  case 'j': return a->json = true;
-  case 'h': return a->help = true;
-  default: return false;
-  }
-}
-
-static bool read_arguments(int argc, char **argv, arguments *a) {
-  static const struct option LONG[] = {
-      {"output", required_argument, NULL, 'o'},  {"steps", required_argument, NULL, 's'},
-      {"seconds", required_argument, NULL, 'S'}, {"every", required_argument, NULL, 'e'},
-      {"no-frames", no_argument, NULL, 'n'},     {"picture", required_argument, NULL, 'p'},
-      {"resume", no_argument, NULL, 'r'},        {"json", no_argument, NULL, 'j'},
-      {"help", no_argument, NULL, 'h'},          {NULL, 0, NULL, 0}};
-  for (int c; (c = getopt_long(argc, argv, "o:", LONG, NULL)) != -1;)
-    if (!read_option(c, a)) return false;
-  if (a->help) return true;
-  if (argc - optind != 1) {
-    app_usage_error(VERB, "one scene expected, got %d", argc - optind);
-    return false;
-  }
-  a->scene = argv[optind];
-  if (!a->directory) app_usage_error(VERB, "-o DIR is missing");
-  if (a->steps && a->seconds > 0) {
-    app_usage_error(VERB, "give either --steps or --seconds");
-    return false;
-  }
-  return a->directory != NULL;
-}
-
 static void path_of(const simulation *s, const char *name, char *path, size_t size) {
   snprintf(path, size, "%s/%s", s->a.directory, name);
-}
-
-static sonde_status fail(sonde_error *error, sonde_status status, const char *path,
-                         const char *what) {
-  return app_error(error, status, "%.300s: %s", path, what);
 }
 
 // ---- tables
@@ -104,13 +56,82 @@ static const char CONTACTS_HEAD[] =
     "step,time_s,a,b,fx_n,fy_n,fz_n,tx_n_m,ty_n_m,tz_n_m,normal_n,friction_n,volume_m3,area_m2,"
     "depth_m,energy_j,regions\n";
 
-static double norm(sonde_vec3 v) { return sqrt(v.x * v.x + v.y * v.y + v.z * v.z); }
-
 static void put_vector(sonde_file *table, sonde_vec3 v) {
   sonde_file_printf(table, ",%.12g,%.12g,%.12g", v.x, v.y, v.z);
 }
 
-static void put_rows(simulation *s) {
+// A new table, or the old one without the rows of steps that will be made again.
+static sonde_status open_table(const simulation *s, const char *name, const char *head,
+                               sonde_file **table, sonde_error *error) {
+  char path[1100], *text = NULL;
+  size_t count = 0;
+  long keep = 0;
+  path_of(s, name, path, sizeof path);
+  if (s->a.resume) {
+    sonde_status status = sonde_file_load(path, &text, &count, error);
+    if (status) return status;
+    // Bytes before the rows of later steps.
+    keep = strncmp(text, head, strlen(head)) == 0 ? (long)strlen(head) : -1;
+    for (const char *end; keep >= 0 && (end = strchr(text + keep, '\n')); keep = end + 1 - text)
+      if (strtoull(text + keep, NULL, 10) > s->start) break;
+    sonde_free(text);
+    if (keep < 0)
+      return app_error(error, SONDE_FORMAT, "%.300s: not a table of sonde simulate", path);
+  }
+  sonde_status status = sonde_file_extend(path, (uint64_t)keep, table, error);
+  if (!status && !s->a.resume) sonde_file_printf(*table, "%s", head);
+  return status;
+}
+
+// ---- frames
+
+static void frame_name(const simulation *s, uint32_t body, uint64_t step, char *name, size_t size) {
+  snprintf(name, size, "frames/%s_%09llu.vtp", sonde_scene_body(s->scene, body).name,
+           (unsigned long long)step);
+}
+
+// The surfaces of all bodies at this step, and the list of every frame up to it, which ParaView
+// plays by time.
+static sonde_status save_surfaces(const simulation *s, sonde_error *error) {
+  char path[1300], name[128];
+  uint64_t last = sonde_scene_tick(s->state);
+  uint32_t bodies = sonde_scene_body_count(s->scene);
+  sonde_status status = SONDE_OK;
+  for (uint32_t b = 0; b < bodies && !status; ++b) {
+    frame_name(s, b, last, name, sizeof name);
+    path_of(s, name, path, sizeof path);
+    status = sonde_scene_save_vtp(s->state, b, path, error);
+  }
+  if (status) return status;
+  sonde_file *file = NULL;
+  path_of(s, "scene.pvd", path, sizeof path);
+  status = sonde_file_create(path, &file, error);
+  if (status) return status;
+  double dt = sonde_scene_get_step(s->scene).dt_s;
+  sonde_file_printf(file, "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\">\n"
+                          "<Collection>\n");
+  for (uint64_t k = 0; k <= last; k = k < last && k + s->every > last ? last : k + s->every)
+    for (uint32_t b = 0; b < bodies; ++b) {
+      frame_name(s, b, k, name, sizeof name);
+      sonde_file_printf(file, "<DataSet timestep=\"%.9g\" part=\"%u\" name=\"%s\" file=\"%s\"/>\n",
+                        (double)k * dt, b, sonde_scene_body(s->scene, b).name, name);
+    }
+  sonde_file_printf(file, "</Collection>\n</VTKFile>\n");
+  return sonde_file_commit(file, error);
+}
+
+static sonde_status save_snapshot(const simulation *s, sonde_error *error) {
+  char path[1100];
+  path_of(s, "state.snapshot", path, sizeof path);
+  return sonde_scene_state_save(s->state, path, error);
+}
+
+// The snapshot goes last: what it claims to be finished is on disk.
+static sonde_status write_frame(simulation *s, sonde_error *error) {
+  sonde_status status = s->a.no_frames ? SONDE_OK : save_surfaces(s, error);
+  if (status) return status;
+
+  // Rows of the tables: bodies, then pairs in contact.
   unsigned long long step = sonde_scene_tick(s->state);
   double time_s = sonde_scene_time(s->state);
   for (uint32_t b = 0; b < sonde_scene_body_count(s->scene); ++b) {
@@ -132,90 +153,11 @@ static void put_rows(simulation *s) {
     put_vector(s->contacts, m.force_n);
     put_vector(s->contacts, m.torque_n_m);
     sonde_file_printf(s->contacts, ",%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%u\n", m.normal_n,
-                      norm(m.friction_n), m.volume_m3, m.area_m2, m.depth_m, m.energy_j,
-                      m.region_count);
+                      sqrt(m.friction_n.x * m.friction_n.x + m.friction_n.y * m.friction_n.y +
+                           m.friction_n.z * m.friction_n.z),
+                      m.volume_m3, m.area_m2, m.depth_m, m.energy_j, m.region_count);
   }
-}
 
-// Bytes before the rows of later steps; -1 when the table is none of ours. `text` ends with a 0.
-static long keep_until(const char *text, const char *head, uint64_t step) {
-  size_t length = strlen(head);
-  if (strncmp(text, head, length) != 0) return -1;
-  const char *row = text + length;
-  for (const char *end; (end = strchr(row, '\n')); row = end + 1)
-    if (strtoull(row, NULL, 10) > step) break;
-  return row - text;
-}
-
-// A new table, or the old one without the rows of steps that will be made again.
-static sonde_status open_table(const simulation *s, const char *name, const char *head,
-                               sonde_file **table, sonde_error *error) {
-  char path[1100], *text = NULL;
-  size_t count = 0;
-  long keep = 0;
-  path_of(s, name, path, sizeof path);
-  if (s->a.resume) {
-    sonde_status status = sonde_file_load(path, &text, &count, error);
-    if (status) return status;
-    keep = keep_until(text, head, s->start);
-    sonde_free(text);
-    if (keep < 0) return fail(error, SONDE_FORMAT, path, "not a table of sonde simulate");
-  }
-  sonde_status status = sonde_file_extend(path, (uint64_t)keep, table, error);
-  if (!status && !s->a.resume) sonde_file_printf(*table, "%s", head);
-  return status;
-}
-
-// ---- frames
-
-static void frame_name(const simulation *s, uint32_t body, uint64_t step, char *name, size_t size) {
-  snprintf(name, size, "frames/%s_%09llu.vtp", sonde_scene_body(s->scene, body).name,
-           (unsigned long long)step);
-}
-
-// Lists every frame up to this step; ParaView plays them by time.
-static sonde_status save_series(const simulation *s, sonde_error *error) {
-  char path[1100], name[128];
-  path_of(s, "scene.pvd", path, sizeof path);
-  sonde_file *file = NULL;
-  sonde_status status = sonde_file_create(path, &file, error);
-  if (status) return status;
-  double dt = sonde_scene_get_step(s->scene).dt_s;
-  uint64_t last = sonde_scene_tick(s->state);
-  sonde_file_printf(file, "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\">\n"
-                          "<Collection>\n");
-  for (uint64_t k = 0; k <= last; k = k < last && k + s->every > last ? last : k + s->every)
-    for (uint32_t b = 0; b < sonde_scene_body_count(s->scene); ++b) {
-      frame_name(s, b, k, name, sizeof name);
-      sonde_file_printf(file, "<DataSet timestep=\"%.9g\" part=\"%u\" name=\"%s\" file=\"%s\"/>\n",
-                        (double)k * dt, b, sonde_scene_body(s->scene, b).name, name);
-    }
-  sonde_file_printf(file, "</Collection>\n</VTKFile>\n");
-  return sonde_file_commit(file, error);
-}
-
-static sonde_status save_surfaces(const simulation *s, sonde_error *error) {
-  char path[1300], name[128];
-  sonde_status status = SONDE_OK;
-  for (uint32_t b = 0; b < sonde_scene_body_count(s->scene) && !status; ++b) {
-    frame_name(s, b, sonde_scene_tick(s->state), name, sizeof name);
-    path_of(s, name, path, sizeof path);
-    status = sonde_scene_save_vtp(s->state, b, path, error);
-  }
-  return status ? status : save_series(s, error);
-}
-
-static sonde_status save_snapshot(const simulation *s, sonde_error *error) {
-  char path[1100];
-  path_of(s, "state.snapshot", path, sizeof path);
-  return sonde_scene_state_save(s->state, path, error);
-}
-
-// The snapshot goes last: what it claims to be finished is on disk.
-static sonde_status write_frame(simulation *s, sonde_error *error) {
-  sonde_status status = s->a.no_frames ? SONDE_OK : save_surfaces(s, error);
-  if (status) return status;
-  put_rows(s);
   status = sonde_file_flush(s->bodies, error);
   if (!status) status = sonde_file_flush(s->contacts, error);
   return status ? status : save_snapshot(s, error);
@@ -265,29 +207,20 @@ static sonde_status run(simulation *s, sonde_error *error) {
 
 static void print_json(const simulation *s, double steps) {
   app_json_begin();
-  app_json_text("title", sonde_scene_title(s->scene));
-  app_json_integer("bodies", sonde_scene_body_count(s->scene));
-  app_json_integer("steps", (long long)sonde_scene_tick(s->state));
-  app_json_real("time_s", sonde_scene_time(s->state));
-  app_json_real("ms_per_step", steps > 0 ? 1e3 * s->seconds / steps : NAN);
-  app_json_real("solver_iterations_per_step",
-                steps > 0 ? (double)s->solver_iterations / steps : NAN);
-  app_json_integer("most_contact_points", (long long)s->most_points);
-  app_json_integer("flagged_steps", (long long)sonde_scene_flag_count(s->state));
-  app_json_integer("flags", sonde_scene_all_flags(s->state));
+  app_json("title:%s bodies:%u steps:%lu time_s:%g ms_per_step:%g solver_iterations_per_step:%g "
+           "most_contact_points:%lu flagged_steps:%lu flags:%u",
+           sonde_scene_title(s->scene), sonde_scene_body_count(s->scene),
+           sonde_scene_tick(s->state), sonde_scene_time(s->state),
+           steps > 0 ? 1e3 * s->seconds / steps : NAN,
+           steps > 0 ? (double)s->solver_iterations / steps : NAN, s->most_points,
+           sonde_scene_flag_count(s->state), sonde_scene_all_flags(s->state));
   char hash[24];
   snprintf(hash, sizeof hash, "%016llx", (unsigned long long)sonde_scene_hash(s->state));
-  app_json_text("hash", hash);
-  app_json_bool("cancelled", s->cancelled);
+  app_json("hash:%s cancelled:%hhd", hash, s->cancelled);
   app_json_end();
 }
 
-static void print_summary(const simulation *s) {
-  double steps = (double)(sonde_scene_tick(s->state) - s->start);
-  if (s->a.json) {
-    print_json(s, steps);
-    return;
-  }
+static void print_summary(const simulation *s, double steps) {
   printf("steps         %8llu (%.6g s)\n", (unsigned long long)sonde_scene_tick(s->state),
          sonde_scene_time(s->state));
   if (steps > 0) {
@@ -300,20 +233,16 @@ static void print_summary(const simulation *s) {
 }
 
 // A cancelled run ends with a snapshot only, so that tables and frames keep their rhythm.
-int old_simulate(int argc, char **argv);
-int old_simulate(int argc, char **argv) {
-  simulation s = {0};
+static int simulate(void *from) {
+  simulation s = {.a = *(const options *)from};
   sonde_error error = {0};
-  if (!read_arguments(argc, argv, &s.a)) return APP_BAD_INPUT;
-  if (s.a.help) {
-    fputs(HELP, stdout);
-    return APP_OK;
-  }
+  assert(s.a.scene && s.a.directory);
   sonde_status status = prepare(&s, &error);
   if (!status) status = run(&s, &error);
   if (!status && s.cancelled) status = save_snapshot(&s, &error);
   if (!status && s.a.picture) status = scene_figure(s.scene, s.state, s.a.picture, &error);
-  if (!status) print_summary(&s);
+  double steps = status ? 0 : (double)(sonde_scene_tick(s.state) - s.start);
+  if (!status) (s.a.json ? print_json : print_summary)(&s, steps);
   if (!status && s.cancelled)
     fprintf(stderr, "sonde simulate: cancelled at step %llu of %llu; --resume goes on\n",
             (unsigned long long)sonde_scene_tick(s.state), (unsigned long long)s.steps);
@@ -324,3 +253,18 @@ int old_simulate(int argc, char **argv) {
   if (status) return app_fail(VERB, &error);
   return s.cancelled ? APP_FAILED : APP_OK;
 }
+
+const app_command cmd_simulate = {
+    .verb = "simulate",
+    .summary = "simulate a scene of several bodies",
+    .usage = "SCENE -o DIR [options]",
+    .text =
+        "Simulates a scene of several bodies with contact and friction (docs/scene.md; examples "
+        "in data/scenes) and writes, into DIR, the surfaces as VTK files (open scene.pvd in "
+        "ParaView), bodies.csv, contacts.csv and a snapshot.",
+    .tail = "Ctrl-C keeps what is finished; --resume goes on from there.",
+    OPT_TABLE(TABLE),
+    .size = sizeof(options),
+    .required = "SCENE o",
+    .not_both = "steps seconds",
+    .run = simulate};

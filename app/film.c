@@ -1,10 +1,8 @@
 // A film through ffmpeg, a program of its own that reads grey pictures from a pipe: Debian's
 // libraries of it carry parts under the GPL, which a library that links them would take on.
-// start:     the program, without a shell.
-// write_all: a picture into the pipe.
-// film_*:    the interface.
 #include "replay_export.h"
 
+#include <assert.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <signal.h>
@@ -99,25 +97,17 @@ sonde_status film_open(const char *path, uint32_t width, uint32_t height, int fr
   return fail(error, SONDE_IO, strerror(failure), path);
 }
 
-static bool write_all(int to, const uint8_t *bytes, size_t count) {
-  while (count > 0) {
-    ssize_t written = write(to, bytes, count);
-    if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) return false;
-    bytes += written;
-    count -= (size_t)written;
-  }
-  return true;
-}
-
 bool film_add(film *f, const uint8_t *pixels) {
-  if (f->pipe >= 0 && write_all(f->pipe, pixels, f->bytes)) {
-    f->frames++;
-    return true;
+  assert(f && pixels);
+  for (size_t left = f->bytes; f->pipe >= 0 && left > 0;) {
+    ssize_t written = write(f->pipe, pixels + f->bytes - left, left);
+    if (written > 0) left -= (size_t)written;
+    if (written > 0 || (written < 0 && errno == EINTR)) continue;
+    close(f->pipe);
+    f->pipe = -1;
   }
-  if (f->pipe >= 0) close(f->pipe);
-  f->pipe = -1;
-  return false;
+  f->frames += f->pipe >= 0;
+  return f->pipe >= 0;
 }
 
 sonde_status film_close(film *f, sonde_error *error) {

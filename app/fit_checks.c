@@ -1,5 +1,4 @@
-// fit_checks_run:   what was asked for.
-// fit_checks_print: as text. fit_checks_print_json: into the open object.
+// What else sonde fit can say of a result: profile, certainty, random starts, other layers.
 #include "fit_checks.h"
 
 #include "fit_common.h"
@@ -39,10 +38,14 @@ void fit_checks_name(const sonde_fit_part *part, char name[40]) {
     snprintf(name, 40, "all probes");
 }
 
-static void print_parts(const sonde_fit_identifiability *parts) {
-  printf("what each probe determines (ln sd; correlation G-k0, G-xm, k0-xm; condition)\n");
-  for (uint32_t p = 0; p < parts->count; ++p) {
-    const sonde_fit_part *part = &parts->part[p];
+void fit_checks_print(const fit_checks *c) {
+  if (c->shear.count)
+    printf("profile likelihood of G: %.4g N/m, 95 %% interval %.4g to %.4g\n",
+           c->shear.estimate_n_m, c->shear.interval_95[0], c->shear.interval_95[1]);
+  if (c->parts.count)
+    printf("what each probe determines (ln sd; correlation G-k0, G-xm, k0-xm; condition)\n");
+  for (uint32_t p = 0; p < c->parts.count; ++p) {
+    const sonde_fit_part *part = &c->parts.part[p];
     char name[40];
     fit_checks_name(part, name);
     printf("  %-16s", name);
@@ -50,66 +53,25 @@ static void print_parts(const sonde_fit_identifiability *parts) {
     printf("; %+.2f %+.2f %+.2f; %.3g\n", part->correlation[0][2], part->correlation[0][3],
            part->correlation[2][3], part->condition);
   }
-}
-
-// One line: errors of seen rows, of sites left out, of probes that were never fitted.
-static void print_layer(const sonde_fit_layer *l) {
-  printf("  %-30s %4u parameters, cost %8.1f;", fit_checks_layer(l->kind), l->parameters, l->cost);
-  for (uint32_t p = 0; p < l->seen.probe_count; ++p)
-    printf(" %s %.2f %% (site left out %.2f %%)", l->seen.probe[p], l->seen.probes[p].mae_percent,
-           l->one_out.probes[p].mae_percent);
-  for (uint32_t p = 0; p < l->also.probe_count; ++p)
-    printf(" %s, never fitted, %.2f %%", l->also.probe[p], l->also.probes[p].mae_percent);
-  printf("\n");
-  if (l->kind != SONDE_LAYER_LIMIT)
-    printf("  %-30s T %.3g N/m, k %.3g N/m, c %.3g%s\n", "", l->tension_n_m, l->second,
-           l->stiffening, l->converged ? "" : ", not converged");
-}
-
-void fit_checks_print(const fit_checks *c) {
-  if (c->shear.count)
-    printf("profile likelihood of G: %.4g N/m, 95 %% interval %.4g to %.4g\n",
-           c->shear.estimate_n_m, c->shear.interval_95[0], c->shear.interval_95[1]);
-  if (c->parts.count) print_parts(&c->parts);
   if (c->ends.count)
     printf("random starts: %u of %u end in the same optimum (cost %.6g to %.6g), %u fail\n",
            c->ends.same, c->ends.count, c->ends.least_cost, c->ends.most_cost, c->ends.failed);
   if (!c->layers) return;
   printf("other laws of the layer between neighbours, refitted\n");
-  for (int k = 0; k < SONDE_FIT_LAYERS; ++k) print_layer(&c->layer[k]);
-}
-
-static void print_json_part(const sonde_fit_part *part) {
-  char name[40], key[48];
-  fit_checks_name(part, name);
-  app_json_object(name);
-  app_json_real("condition", part->condition);
-  for (int k = 0; k < 4; ++k) {
-    snprintf(key, sizeof key, "ln_%s_sd", FIGURE_NAME[k]);
-    app_json_real(key, part->ln_sd[k]);
+  for (const sonde_fit_layer *l = c->layer; l < c->layer + SONDE_FIT_LAYERS; ++l) {
+    // Errors of seen rows, of sites left out, of probes that were never fitted.
+    printf("  %-30s %4u parameters, cost %8.1f;", fit_checks_layer(l->kind), l->parameters,
+           l->cost);
+    for (uint32_t p = 0; p < l->seen.probe_count; ++p)
+      printf(" %s %.2f %% (site left out %.2f %%)", l->seen.probe[p], l->seen.probes[p].mae_percent,
+             l->one_out.probes[p].mae_percent);
+    for (uint32_t p = 0; p < l->also.probe_count; ++p)
+      printf(" %s, never fitted, %.2f %%", l->also.probe[p], l->also.probes[p].mae_percent);
+    printf("\n");
+    if (l->kind != SONDE_LAYER_LIMIT)
+      printf("  %-30s T %.3g N/m, k %.3g N/m, c %.3g%s\n", "", l->tension_n_m, l->second,
+             l->stiffening, l->converged ? "" : ", not converged");
   }
-  for (int k = 0; k < 4; ++k)
-    for (int j = 0; j < k; ++j) {
-      snprintf(key, sizeof key, "correlation_%s_%s", FIGURE_NAME[j], FIGURE_NAME[k]);
-      app_json_real(key, part->correlation[j][k]);
-    }
-  app_json_close();
-}
-
-static void print_json_profile(const sonde_fit_profile *p) {
-  app_json_object("profile");
-  app_json_real("shear_n_m", p->estimate_n_m);
-  app_json_real("low_n_m", p->interval_95[0]);
-  app_json_real("high_n_m", p->interval_95[1]);
-  app_json_real("threshold", p->threshold);
-  app_json_object("rise");
-  for (uint32_t k = 0; k < p->count; ++k) {
-    char key[32];
-    snprintf(key, sizeof key, "%.6g", p->shear_n_m[k]);
-    app_json_real(key, p->rise[k]);
-  }
-  app_json_close();
-  app_json_close();
 }
 
 static void print_json_layers(const fit_checks *c) {
@@ -119,12 +81,8 @@ static void print_json_layers(const fit_checks *c) {
     const sonde_fit_layer *l = &c->layer[k];
     app_json_object(KEY[k]);
     app_json_report("full", &l->seen);
-    app_json_integer("parameters", l->parameters);
-    app_json_bool("converged", l->converged);
-    app_json_real("cost", l->cost);
-    app_json_real("tension_n_m", l->tension_n_m);
-    app_json_real("second", l->second);
-    app_json_real("stiffening_c", l->stiffening);
+    app_json("parameters:%u converged:%hhd cost:%g tension_n_m:%g second:%g stiffening_c:%g",
+             l->parameters, l->converged, l->cost, l->tension_n_m, l->second, l->stiffening);
     app_json_object("one_site_out");
     app_json_report("full", &l->one_out);
     app_json_close();
@@ -140,20 +98,46 @@ static void print_json_layers(const fit_checks *c) {
 
 void fit_checks_print_json(const fit_checks *c) {
   if (c->layers) print_json_layers(c);
-  if (c->shear.count) print_json_profile(&c->shear);
+  if (c->shear.count) {
+    const sonde_fit_profile *p = &c->shear;
+    app_json_object("profile");
+    app_json("shear_n_m:%g low_n_m:%g high_n_m:%g threshold:%g", p->estimate_n_m, p->interval_95[0],
+             p->interval_95[1], p->threshold);
+    app_json_object("rise");
+    for (uint32_t k = 0; k < p->count; ++k) {
+      char key[32];
+      snprintf(key, sizeof key, "%.6g", p->shear_n_m[k]);
+      app_json_real(key, p->rise[k]);
+    }
+    app_json_close();
+    app_json_close();
+  }
   if (c->parts.count) {
     app_json_object("identifiability");
-    for (uint32_t p = 0; p < c->parts.count; ++p) print_json_part(&c->parts.part[p]);
+    for (uint32_t p = 0; p < c->parts.count; ++p) {
+      const sonde_fit_part *part = &c->parts.part[p];
+      char name[40], key[48];
+      fit_checks_name(part, name);
+      app_json_object(name);
+      app_json_real("condition", part->condition);
+      for (int k = 0; k < 4; ++k) {
+        snprintf(key, sizeof key, "ln_%s_sd", FIGURE_NAME[k]);
+        app_json_real(key, part->ln_sd[k]);
+      }
+      for (int k = 0; k < 4; ++k)
+        for (int j = 0; j < k; ++j) {
+          snprintf(key, sizeof key, "correlation_%s_%s", FIGURE_NAME[j], FIGURE_NAME[k]);
+          app_json_real(key, part->correlation[j][k]);
+        }
+      app_json_close();
+    }
     app_json_close();
   }
   if (c->ends.count) {
     app_json_object("random_starts");
-    app_json_integer("count", c->ends.count);
-    app_json_integer("same", c->ends.same);
-    app_json_integer("failed", c->ends.failed);
-    app_json_real("least_cost", c->ends.least_cost);
-    app_json_real("most_cost", c->ends.most_cost);
-    app_json_real("farthest_sd", c->ends.farthest_sd);
+    app_json("count:%u same:%u failed:%u least_cost:%g most_cost:%g farthest_sd:%g", c->ends.count,
+             c->ends.same, c->ends.failed, c->ends.least_cost, c->ends.most_cost,
+             c->ends.farthest_sd);
     app_json_close();
   }
 }

@@ -1,5 +1,4 @@
-// fit_doubts_sentence: file, line, curve and what is said.
-// fit_doubts_decide:   whether a fit may go on.
+// What sonde fit says of measurements and results that no tissue gives.
 #include "fit_doubts.h"
 
 #include "app.h"

@@ -1,10 +1,11 @@
-// fit_all: the springs of n = 1, 2, 3 and of a free n.
-// print:   the one that predicts best what was left out, and the others beside it.
+// One specimen between two plates: the springs of n = 1, 2, 3 and of a free n; the one that
+// predicts best what was left out, and the others beside it.
 #include "fit_sample.h"
 
 #include "app.h"
 #include "fit_doubts.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 
@@ -18,27 +19,10 @@ typedef struct findings {
   sonde_doubts doubts;
 } findings;
 
-static sonde_status fit_all(const fit_sample_options *o, findings *f, sonde_error *error) {
-  sonde_status status = SONDE_OK;
-  for (int k = 0; k < LAWS && !status; ++k)
-    status = sonde_fit_sample(&f->sample, EXPONENT[k], &f->law[k], error);
-  for (int k = 0; k < LAWS - 1 && !status; ++k)
-    if (o->exponent > 0 ? EXPONENT[k] == o->exponent
-                        : f->law[k].held_out_percent < f->law[f->best].held_out_percent)
-      f->best = k;
-  return status;
-}
-
 // Of the specimen's material at small compression; NaN without its sizes.
 static double modulus_kpa(const sonde_sample *s, const sonde_sample_law *l) {
   bool known = s->area_m2 > 0 && s->height_m > 0;
   return known ? 1e-3 * l->stiffness_n_m * s->height_m / s->area_m2 : NAN;
-}
-
-static void print_law(const sonde_sample_law *l, const char *mark) {
-  printf("  %-6.3f %10.4g %9.2f %9.3f %8.2f %% %8.2f %% %8.2f %%%s\n", l->exponent,
-         1e-3 * l->stiffness_n_m, 1e3 * l->asymptote_m, l->mae_n, l->mae_percent, l->rms_percent,
-         l->held_out_percent, mark);
 }
 
 static void print(const fit_sample_options *o, const findings *f) {
@@ -48,7 +32,12 @@ static void print(const fit_sample_options *o, const findings *f) {
   printf("  %-6s %10s %9s %9s %10s %10s %10s\n", "n", "K N/mm", "x_m mm", "MAE N", "of mean",
          "RMS/peak", "left out");
   for (int k = 0; k < LAWS; ++k)
-    print_law(&f->law[k], k == f->best ? "  chosen" : k == LAWS - 1 ? "  n estimated" : "");
+    printf("  %-6.3f %10.4g %9.2f %9.3f %8.2f %% %8.2f %% %8.2f %%%s\n", f->law[k].exponent,
+           1e-3 * f->law[k].stiffness_n_m, 1e3 * f->law[k].asymptote_m, f->law[k].mae_n,
+           f->law[k].mae_percent, f->law[k].rms_percent, f->law[k].held_out_percent,
+           k == f->best    ? "  chosen"
+           : k == LAWS - 1 ? "  n estimated"
+                           : "");
   printf("n = 1: f = x/(a x + b) with a = %.5g 1/N, b = %.5g mm/N\n",
          -1 / (one->stiffness_n_m * one->asymptote_m), 1e3 / one->stiffness_n_m);
   if (isfinite(modulus_kpa(&f->sample, best)))
@@ -57,26 +46,19 @@ static void print(const fit_sample_options *o, const findings *f) {
 
 static void print_json_law(const char *key, const sonde_sample *s, const sonde_sample_law *l) {
   app_json_object(key);
-  app_json_real("exponent", l->exponent);
-  app_json_real("stiffness_n_mm", 1e-3 * l->stiffness_n_m);
-  app_json_real("asymptote_mm", 1e3 * l->asymptote_m);
-  app_json_real("a_per_n", -1 / (l->stiffness_n_m * l->asymptote_m));
-  app_json_real("b_mm_per_n", 1e3 / l->stiffness_n_m);
-  app_json_real("modulus_kpa", modulus_kpa(s, l));
-  app_json_real("mae_n", l->mae_n);
-  app_json_real("rms_n", l->rms_n);
-  app_json_real("mae_percent", l->mae_percent);
-  app_json_real("rms_percent", l->rms_percent);
-  app_json_real("held_out_percent", l->held_out_percent);
-  app_json_bool("converged", l->converged);
+  app_json("exponent:%g stiffness_n_mm:%g asymptote_mm:%g a_per_n:%g b_mm_per_n:%g "
+           "modulus_kpa:%g mae_n:%g rms_n:%g mae_percent:%g rms_percent:%g held_out_percent:%g "
+           "converged:%hhd",
+           l->exponent, 1e-3 * l->stiffness_n_m, 1e3 * l->asymptote_m,
+           -1 / (l->stiffness_n_m * l->asymptote_m), 1e3 / l->stiffness_n_m, modulus_kpa(s, l),
+           l->mae_n, l->rms_n, l->mae_percent, l->rms_percent, l->held_out_percent, l->converged);
   app_json_close();
 }
 
 static void print_json(const fit_sample_options *o, const findings *f) {
   static const char *const KEY[LAWS] = {"n1", "n2", "n3", "free"};
   app_json_begin();
-  app_json_integer("count", f->sample.count);
-  app_json_real("exponent", f->law[f->best].exponent);
+  app_json("count:%u exponent:%g", f->sample.count, f->law[f->best].exponent);
   for (int k = 0; k < LAWS; ++k) print_json_law(KEY[k], &f->sample, &f->law[k]);
   print_json_law("chosen", &f->sample, &f->law[f->best]);
   fit_doubts_print_json(&f->doubts, o->path);
@@ -84,6 +66,7 @@ static void print_json(const fit_sample_options *o, const findings *f) {
 }
 
 int fit_sample_run(const fit_sample_options *o) {
+  assert(o->path);
   findings f = {0};
   sonde_error error = {0};
   sonde_status status = sonde_sample_load(o->path, &f.sample, &error);
@@ -92,7 +75,12 @@ int fit_sample_run(const fit_sample_options *o) {
   if (!status) status = sonde_sample_examine(&f.sample, &f.doubts, &error);
   if (!status) status = fit_doubts_decide(&f.doubts, o->path, o->accept_implausible, &error);
   if (!status) fit_doubts_print(&f.doubts, 0, o->path);
-  if (!status) status = fit_all(o, &f, &error);
+  for (int k = 0; k < LAWS && !status; ++k)
+    status = sonde_fit_sample(&f.sample, EXPONENT[k], &f.law[k], &error);
+  for (int k = 0; k < LAWS - 1 && !status; ++k)
+    if (o->exponent > 0 ? EXPONENT[k] == o->exponent
+                        : f.law[k].held_out_percent < f.law[f.best].held_out_percent)
+      f.best = k;
   if (!status) (o->json ? print_json : print)(o, &f);
   sonde_sample_clear(&f.sample);
   return status ? app_fail("fit", &error) : APP_OK;

@@ -5,24 +5,40 @@
 #include "frames_common.h"
 
 typedef struct press_options {
-  const char *model, *site, *force, *probe, *pathology, *venous, *arterial, *vein_at;
+  const char *model, *probe, *pathology;
+  long site;
+  double force_n, venous_pa, arterial_pa; // NaN: not asked for, as the next one
+  double vein_mm[2];                      // where the vein is in the picture
 } press_options;
 
-#define PRESS_OPTION_LIST(o)                                                                       \
-  {"--press", &(o).model, NULL}, {"--site", &(o).site, NULL}, {"--force-n", &(o).force, NULL},     \
-      {"--probe", &(o).probe, NULL}, {"--case", &(o).pathology, NULL},                             \
-      {"--venous-mmhg", &(o).venous, NULL}, {"--arterial-mmhg", &(o).arterial, NULL}, {            \
-    "--vein-at", &(o).vein_at, NULL                                                                \
-  }
+#define PRESS_OPTIONS(m, read_vein)                                                                \
+  OPT_TEXT(                                                                                        \
+      m.model, "press", "MODEL",                                                                   \
+      "deform the picture as that thigh is deformed when its site is pressed; the top of the "     \
+      "picture lies on the skin at rest"),                                                         \
+      OPT_INTEGER(m.site, "site", "K", 0, 1000000, "with --press: number of the site"),            \
+      OPT_REAL(m.force_n, "force-n", "F", 0.01, 200, 1, "with --press: settled force"),            \
+      OPT_TEXT(m.probe, "probe", "NAME", "with --press: as of sonde-press(1)"),                    \
+      OPT_TEXT(m.pathology, "case", "NAME", "with --press: as of sonde-press(1)"),                 \
+      OPT_REAL(m.venous_pa, "venous-mmhg", "P", 0.1, 200, 133.322387415,                           \
+               "with --press: pressure in the vein; default of the case"),                         \
+      OPT_REAL(m.arterial_pa, "arterial-mmhg", "P", 1, 300, 133.322387415,                         \
+               "with --press: pressure in the artery; default of the case"),                       \
+      OPT_CALL(read_vein, "vein-at", "X,Z",                                                        \
+               "with --press: where the vein is in the picture, mm from the middle of its top; "   \
+               "default where the model has it")
 
 typedef struct press_result {
   double force_n, depth_m, vein_area_ratio, artery_area_ratio; // NaN: not under the probe
 } press_result;
 
-// True when the options fit together; prints what does not.
-bool press_check(const char *verb, const press_options *options);
+// The rules of these options, as app_command has them.
+#define PRESS_NEEDS                                                                                \
+  "press>site press>force-n site>press force-n>press probe>press case>press "                      \
+  "venous-mmhg>press arterial-mmhg>press vein-at>press"
+
 // Presses the model until the force is reached and deforms the picture as the thigh.
-sonde_status press_picture(const char *verb, const press_options *options, sonde_image *image,
-                           uint8_t *known, press_result *result, sonde_error *error);
+sonde_status press_picture(const press_options *options, sonde_image *image, uint8_t *known,
+                           press_result *result, sonde_error *error);
 
 #endif

@@ -1,10 +1,8 @@
 // What a case adds to a thigh, from the command line.
-// image_findings_lesion, image_findings_clot:  one option each.
-// direction:             of a probe's axis, in the world.
-// image_findings_apply:  from the image plane to the thigh.
 #include "image_findings.h"
 
 #include "app.h"
+#include "pose.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -51,30 +49,15 @@ bool image_findings_clot(image_findings *f, const char *text) {
   return false;
 }
 
-// Column `axis` of the pose's rotation.
-static sonde_vec3 direction(sonde_pose p, int axis) {
-  sonde_quat q = p.rotation;
-  if (axis == 0)
-    return (sonde_vec3){1 - 2 * (q.y * q.y + q.z * q.z), 2 * (q.x * q.y + q.w * q.z),
-                        2 * (q.x * q.z - q.w * q.y)};
-  if (axis == 1)
-    return (sonde_vec3){2 * (q.x * q.y - q.w * q.z), 1 - 2 * (q.x * q.x + q.z * q.z),
-                        2 * (q.y * q.z + q.w * q.x)};
-  return (sonde_vec3){2 * (q.x * q.z + q.w * q.y), 2 * (q.y * q.z - q.w * q.x),
-                      1 - 2 * (q.x * q.x + q.y * q.y)};
-}
-
 sonde_status image_findings_apply(const image_findings *f, sonde_pose at, sonde_interior *interior,
                                   sonde_error *error) {
   sonde_findings all = f->rest;
-  sonde_vec3 x = direction(at, 0), z = direction(at, 2);
+  sonde_vec3 x = pose_axis(at, 0), z = pose_axis(at, 2);
   for (uint32_t k = 0; k < f->lesion_count; ++k) {
     const image_lesion *from = &f->lesion[k];
     sonde_lesion *to = &all.lesion[all.lesion_count++];
-    *to = (sonde_lesion){.kind = from->kind, .axis = direction(at, 1)};
-    to->centre_m.x = at.position.x + from->x_m * x.x + from->depth_m * z.x;
-    to->centre_m.y = at.position.y + from->x_m * x.y + from->depth_m * z.y;
-    to->centre_m.z = at.position.z + from->x_m * x.z + from->depth_m * z.z;
+    *to = (sonde_lesion){.kind = from->kind, .axis = pose_axis(at, 1)};
+    to->centre_m = pose_shift(pose_shift(at, from->x_m, x), from->depth_m, z).position;
     to->half_m.x = 0.5 * from->height_m;
     to->half_m.y = 0.5 * from->width_m;
     to->half_m.z = 0.5 * from->width_m * LENGTH_OVER_WIDTH[from->kind];

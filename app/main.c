@@ -16,40 +16,27 @@ static const app_command *const COMMANDS[] = {
 
 enum { COMMAND_COUNT = sizeof COMMANDS / sizeof COMMANDS[0], WORD_MAX = 16 };
 
-static const app_command *find_command(const char *verb) {
-  for (int i = 0; i < COMMAND_COUNT; ++i)
-    if (strcmp(COMMANDS[i]->verb, verb) == 0) return COMMANDS[i];
-  return NULL;
-}
-
-static int least(int a, int b) { return a < b ? a : b; }
-
-// Insertions, deletions and replacements between two words; both must fit WORD_MAX.
-static int edit_distance(const char *a, const char *b) {
-  int row[WORD_MAX + 1], columns = (int)strlen(b);
-  for (int j = 0; j <= columns; ++j) row[j] = j;
-  for (int i = 1; a[i - 1]; ++i) {
-    int diagonal = row[0];
-    row[0] = i;
-    for (int j = 1; j <= columns; ++j) {
-      int replaced = diagonal + (a[i - 1] != b[j - 1]);
-      diagonal = row[j];
-      row[j] = least(replaced, 1 + least(row[j], row[j - 1]));
-    }
-  }
-  return row[columns];
-}
-
+// The verb that an unknown word most resembles: insertions, deletions and replacements of letters
+// are counted; more than two make another word. NULL: none.
 static const char *suggestion(const char *word) {
-  if (strlen(word) > WORD_MAX) return NULL;
   const char *best = NULL;
-  int least_changes = 3; // more than two changes is another word
-  for (int i = 0; i < COMMAND_COUNT; ++i) {
-    int changes = edit_distance(word, COMMANDS[i]->verb);
-    if (changes < least_changes) {
-      least_changes = changes;
-      best = COMMANDS[i]->verb;
+  int least_changes = 3;
+  for (int i = 0; i < COMMAND_COUNT && strlen(word) <= WORD_MAX; ++i) {
+    const char *verb = COMMANDS[i]->verb;
+    int row[WORD_MAX + 1], columns = (int)strlen(verb);
+    assert(columns <= WORD_MAX);
+    for (int j = 0; j <= columns; ++j) row[j] = j;
+    for (int k = 1; word[k - 1]; ++k) {
+      int diagonal = row[0];
+      row[0] = k;
+      for (int j = 1; j <= columns; ++j) {
+        int replaced = diagonal + (word[k - 1] != verb[j - 1]);
+        int moved = 1 + (row[j] < row[j - 1] ? row[j] : row[j - 1]);
+        diagonal = row[j];
+        row[j] = replaced < moved ? replaced : moved;
+      }
     }
+    if (row[columns] < least_changes) least_changes = row[columns], best = verb;
   }
   return best;
 }
@@ -62,24 +49,24 @@ static void print_help(FILE *stream) {
                   "version.\nExit codes: 0 success, 1 failure, 2 bad input.\n");
 }
 
-static int unknown(const char *word) {
-  fprintf(stderr, "sonde: unknown command '%s'", word);
-  const char *near = suggestion(word);
-  if (near) fprintf(stderr, "; did you mean '%s'?", near);
-  fprintf(stderr, "\n\n");
-  print_help(stderr);
-  return APP_BAD_INPUT;
-}
-
 static int run_command(const char *verb, int argc, char **argv) {
   static _Alignas(max_align_t) char options[16384];
-  const app_command *command = find_command(verb);
-  if (!command) return unknown(verb);
+  const app_command *command = NULL;
+  for (int i = 0; i < COMMAND_COUNT && !command; ++i)
+    if (strcmp(COMMANDS[i]->verb, verb) == 0) command = COMMANDS[i];
+  if (!command) {
+    const char *near = suggestion(verb);
+    fprintf(stderr, "sonde: unknown command '%s'", verb);
+    if (near) fprintf(stderr, "; did you mean '%s'?", near);
+    fprintf(stderr, "\n\n");
+    print_help(stderr);
+    return APP_BAD_INPUT;
+  }
   const app_command *form = command->pick ? command->pick(argc, argv) : NULL;
   if (form) command = form;
   assert(command->size <= sizeof options);
   int code = app_options_read(command, argc, argv, options);
-  return code >= 0 ? code : command->run(options, argc, argv);
+  return code >= 0 ? code : command->run(options);
 }
 
 static void print_remark(sonde_log_level level, const char *message, void *user) {

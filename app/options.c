@@ -15,22 +15,9 @@ static struct {
   app_option list[MOST_OPTIONS];
   uint32_t count;
   bool given[MOST_OPTIONS];
+  int argc;
+  char **argv;
 } now;
-
-static void open_table(const app_command *command) {
-  assert(command->count <= MOST_OPTIONS && command->size > 0);
-  memset(&now, 0, sizeof now);
-  now.command = command;
-  memcpy(now.list, command->table, command->count * sizeof *now.list);
-  now.count = command->count;
-  if (command->extend) now.count += command->extend(now.list + now.count, MOST_OPTIONS - now.count);
-}
-
-static void set_defaults(const app_command *command, void *options) {
-  memset(options, 0, command->size);
-  if (command->defaults) memcpy(options, command->defaults, command->size);
-  if (command->prepare) command->prepare(options);
-}
 
 static bool is_option(const app_option *o) {
   return o->kind != OPTION_ARGUMENT && o->kind != OPTION_MODEL && o->kind != OPTION_REST &&
@@ -54,21 +41,6 @@ static int find_name(const char *word, size_t length) {
   for (uint32_t k = 0; k < now.count; ++k)
     if (has_name(&now.list[k], word, length)) return (int)k;
   return -1;
-}
-
-// By its whole name, else by the only name that begins so; -1: none.
-static int find_long(const char *word, size_t length) {
-  int found = find_name(word, length);
-  if (found >= 0 && is_option(&now.list[found])) return found;
-  uint32_t matches = 0;
-  for (uint32_t k = 0; k < now.count; ++k) {
-    const char *comma = strchr(now.list[k].name, ',');
-    const char *name = comma ? comma + 1 : now.list[k].name;
-    if (!is_option(&now.list[k]) || !name[1] || strncmp(name, word, length) != 0) continue;
-    found = (int)k;
-    matches++;
-  }
-  return matches == 1 && length ? found : -1;
 }
 
 // "-o", "--force-n"; of "o,output" the letter.
@@ -217,25 +189,24 @@ static int check_rules(const app_command *c) {
 static int print_help(const app_command *command, const void *defaults);
 static int print_json(const app_command *command, const void *defaults);
 
-static bool is_argument(const app_option *o) {
-  return o->kind == OPTION_ARGUMENT || o->kind == OPTION_MODEL;
-}
-
-// The first argument of the table that no word has filled; NULL: none.
-static const app_option *open_argument(void) {
-  for (uint32_t k = 0; k < now.count; ++k)
-    if (is_argument(&now.list[k]) && !now.given[k]) return &now.list[k];
-  return NULL;
-}
-
 // One word that begins with '-', and its value, which may be the next word. APP_OK: taken.
 static int read_option(int argc, char **argv, int *at, void *options) {
   const char *word = argv[*at], *verb = now.command->verb, *value = NULL;
   bool is_long = word[1] == '-';
   size_t length = is_long ? strcspn(word + 2, "=") : 1;
-  int k = is_long ? find_long(word + 2, length) : find_name(word + 1, 1);
-  if (k < 0 || (!is_long && !is_option(&now.list[k])))
-    return app_usage_error(verb, "unknown option '%s'", word);
+  int k = find_name(word + 1 + is_long, length);
+
+  // A long name may be cut short where only one begins so.
+  int matches = 0, match = -1;
+  for (uint32_t j = 0; is_long && length && j < now.count; ++j) {
+    const char *comma = strchr(now.list[j].name, ',');
+    const char *name = comma ? comma + 1 : now.list[j].name;
+    if (!is_option(&now.list[j]) || !name[1] || strncmp(name, word + 2, length) != 0) continue;
+    match = (int)j;
+    matches++;
+  }
+  if (k < 0 && matches == 1) k = match;
+  if (k < 0 || !is_option(&now.list[k])) return app_usage_error(verb, "unknown option '%s'", word);
   const app_option *o = &now.list[k];
   if (is_long && word[2 + length]) value = word + 2 + length + 1;
   if (!is_long && word[2]) value = word + 2;
@@ -250,60 +221,82 @@ static int read_option(int argc, char **argv, int *at, void *options) {
 }
 
 static int read_words(int argc, char **argv, void *options) {
-  static char bundled[4096];
-  char searched[1024];
   const char *verb = now.command->verb;
-  const app_option *argument;
-  int code;
   for (int i = 1; i < argc; ++i) {
+    int rest = find_name("--", 2), code;
     if (strcmp(argv[i], "--") == 0) {
-      int rest = find_name("--", 2);
-      if (rest >= 0) {
-        *(char ***)member(&now.list[rest], options) = argv + i + 1;
-        break;
-      }
-      continue;
+      if (rest < 0) continue;
+      *(char ***)member(&now.list[rest], options) = argv + i + 1;
+      break;
     }
     if (argv[i][0] == '-' && argv[i][1]) {
       if ((code = read_option(argc, argv, &i, options)) != APP_OK) return code;
       continue;
     }
-    if (!(argument = open_argument()))
+    // The first argument of the table that no word has filled.
+    uint32_t k = 0;
+    while (k < now.count && (now.given[k] || (now.list[k].kind != OPTION_ARGUMENT &&
+                                              now.list[k].kind != OPTION_MODEL)))
+      ++k;
+    if (k == now.count)
       return app_usage_error(verb, "unexpected argument '%s'%s", argv[i],
-                             find_name("--", 2) >= 0 ? "; options of sonde run come after --" : "");
-    now.given[argument - now.list] = true;
-    *(const char **)member(argument, options) = argv[i];
+                             rest < 0 ? "" : "; options of sonde run come after --");
+    now.given[k] = true;
+    *(const char **)member(&now.list[k], options) = argv[i];
   }
-  if (now.command->form && given_name(now.command->form, strlen(now.command->form))) return APP_OK;
-  if ((code = check_rules(now.command)) != APP_OK) return code;
-  argument = open_argument();
-  if (!argument || argument->kind != OPTION_MODEL) return APP_OK;
-  if (!app_bundled_model(bundled, sizeof bundled, searched, sizeof searched))
-    return app_usage_error(verb, "no bundled model found (looked at %s)", searched);
-  *(const char **)member(argument, options) = bundled;
   return APP_OK;
 }
 
 int app_options_read(const app_command *command, int argc, char **argv, void *options) {
-  assert(argc >= 1 && options);
-  if (!command->table) return -1;
+  assert(argc >= 1 && options && command->size > 0 && command->count <= MOST_OPTIONS);
   bool help = false, json = false;
-  open_table(command);
-  set_defaults(command, options);
+
+  // The table, and the options as they are when nothing is said.
+  memset(&now, 0, sizeof now);
+  now.command = command;
+  now.argc = argc, now.argv = argv;
+  memcpy(now.list, command->table, command->count * sizeof *now.list);
+  now.count = command->count;
+  if (command->extend) now.count += command->extend(now.list + now.count, MOST_OPTIONS - now.count);
+  memset(options, 0, command->size);
+  if (command->defaults) memcpy(options, command->defaults, command->size);
+  if (command->prepare) command->prepare(options);
+
+  // Help is given whatever else was said.
   for (int i = 1; i < argc && strcmp(argv[i], "--") != 0; ++i) {
     help |= strcmp(argv[i], "--help") == 0 || strcmp(argv[i], "-h") == 0;
     json |= strcmp(argv[i], "--json") == 0;
   }
   if (help) return (json ? print_json : print_help)(command, options);
+
+  // The words, the rules of the table, the command's own; then what is missing but has a place.
   int code = read_words(argc, argv, options);
+  bool free_form = command->form && code == APP_OK && app_option_given(command->form);
+  if (code == APP_OK && !free_form) code = check_rules(command);
   if (code == APP_OK && command->check) code = command->check(options);
-  for (uint32_t k = 0; k < now.count && code == APP_OK; ++k)
-    if (now.list[k].kind == OPTION_OUTPUT)
-      code = app_check_output(command->verb, *(const char **)member(&now.list[k], options));
+  for (uint32_t k = 0; k < now.count && code == APP_OK; ++k) {
+    static char bundled[4096];
+    char searched[1024];
+    const char **text = member(&now.list[k], options);
+    if (now.list[k].kind == OPTION_OUTPUT) code = app_check_output(command->verb, *text);
+    if (now.list[k].kind != OPTION_MODEL || *text) continue;
+    *text = bundled;
+    if (!app_bundled_model(bundled, sizeof bundled, searched, sizeof searched))
+      code = app_usage_error(command->verb, "no bundled model found (looked at %s)", searched);
+  }
   return code == APP_OK ? -1 : code;
 }
 
 bool app_option_given(const char *name) { return given_name(name, strlen(name)); }
+
+void app_command_line(char *text, size_t room) {
+  assert(now.command && room > 0);
+  snprintf(text, room, "sonde %s", now.command->verb);
+  for (int k = 1; k < now.argc; ++k) {
+    const char *word = now.argv[k], *quote = strpbrk(word, " \t'") || !word[0] ? "\"" : "";
+    add(text, room, " %s%s%s", quote, word, quote);
+  }
+}
 
 // ---- help
 
@@ -313,7 +306,8 @@ static bool default_text(const app_option *o, const void *options, char text[64]
   text[0] = 0;
   if (o->kind == OPTION_TEXT && *(const char *const *)(const void *)from)
     snprintf(text, 64, "%s", *(const char *const *)(const void *)from);
-  if (o->kind == OPTION_WORD) snprintf(text, 64, "%s", o->words[integer_of(o, options)]);
+  if (o->kind == OPTION_WORD && integer_of(o, options) >= 0)
+    snprintf(text, 64, "%s", o->words[integer_of(o, options)]);
   if (o->kind == OPTION_INTEGER) {
     long long value = integer_of(o, options);
     if ((double)value >= o->low && (double)value <= o->high) snprintf(text, 64, "%lld", value);
@@ -339,12 +333,15 @@ static bool is_in(const char *list, const app_option *o) {
 static void full_help(const app_option *o, const void *options, char *text, size_t room) {
   char value[64], facts[400] = "";
   if (o->kind == OPTION_WORD) add_words(facts, sizeof facts, o->words);
-  if (o->kind == OPTION_REAL) add(facts, sizeof facts, "%.10g to %.10g", o->low, o->high);
+  if (o->kind == OPTION_REAL) {
+    bool whole = o->low == floor(o->low) && o->high == floor(o->high);
+    add(facts, sizeof facts, whole ? "%.0f to %.0f" : "%g to %g", o->low, o->high);
+  }
   if (o->kind == OPTION_INTEGER) add(facts, sizeof facts, "%.0f to %.0f", o->low, o->high);
   const app_command *c = now.command;
-  if (default_text(o, options, value) && !is_in(c->required, o) && !is_in(c->one_of, o))
-    add(facts, sizeof facts, "%sdefault %s", facts[0] ? "; " : "", value);
   const char *said = strstr(o->help, "; default");
+  if (!said && default_text(o, options, value) && !is_in(c->required, o) && !is_in(c->one_of, o))
+    add(facts, sizeof facts, "%sdefault %s", facts[0] ? "; " : "", value);
   int before = said ? (int)(said - o->help) : (int)strlen(o->help);
   snprintf(text, room, "%.*s%s%s%s%s", before, o->help, facts[0] ? " (" : "", facts,
            facts[0] ? ")" : "", o->help + before);
@@ -381,36 +378,33 @@ static void print_wrapped(const char *text, int at, int indent) {
   putchar('\n');
 }
 
-static void print_usage(const app_command *c) {
+static int print_help(const app_command *c, const void *defaults) {
+  char text[2000], head[64];
+  int column = 0;
   const char *lead = "usage:";
   for (const char *line = c->usage; *line; lead = "      ") {
     int length = (int)strcspn(line, "\n");
-    char text[600];
-    snprintf(text, sizeof text, "sonde %s%s%.*s", c->verb, length ? " " : "", length, line);
+    snprintf(text, sizeof text, "sonde %s %.*s", c->verb, length, line);
     printf("%s ", lead);
     print_wrapped(text, 7, 7);
     line += length + (line[length] != 0);
   }
-  if (!c->usage[0]) printf("usage: sonde %s\n", c->verb);
-}
-
-static int print_help(const app_command *c, const void *defaults) {
-  char text[2000], head[64];
-  int column = 0;
-  print_usage(c);
   putchar('\n');
   print_wrapped(c->text, 0, 0);
   putchar('\n');
   for (uint32_t k = 0; k < now.count; ++k) {
-    if (!is_option(&now.list[k]) || !now.list[k].help) continue;
+    if (now.list[k].kind == OPTION_GROUP || !now.list[k].help) continue;
     head_of(&now.list[k], head);
     int wide = (int)strlen(head) + 4;
     column = wide > WIDEST_HEAD || wide < column ? column : wide;
   }
   for (uint32_t k = 0; k < now.count; ++k) {
     const app_option *o = &now.list[k];
-    if (o->kind == OPTION_GROUP) printf("\n%s:\n", o->name);
-    if (!is_option(o) || !o->help) continue;
+    if (o->kind == OPTION_GROUP) {
+      snprintf(text, sizeof text, "\n%s:", o->name);
+      print_wrapped(text, 0, 0);
+    }
+    if (o->kind == OPTION_GROUP || !o->help) continue;
     head_of(o, head);
     full_help(o, defaults, text, sizeof text);
     int wide = (int)strlen(head) + 4;

@@ -47,7 +47,7 @@ typedef struct app_command {
   int (*check)(void *options); // APP_OK, or a code after saying what does not fit; NULL: none
   // The form of the command that the words ask for; NULL: this one.
   const struct app_command *(*pick)(int argc, char **argv);
-  int (*run)(void *options, int argc, char **argv);
+  int (*run)(void *options);
 } app_command;
 
 // A command's own struct is called `options`; a member of another type does not compile.
@@ -86,7 +86,9 @@ extern const app_command cmd_run, cmd_fit, cmd_generate, cmd_predict, cmd_measur
 // Reads the words behind the verb. -1: go on; else the exit code, after help or after what is
 // wrong.
 int app_options_read(const app_command *command, int argc, char **argv, void *options);
-// Whether the words that were read last had this option.
+// Whether the words that were read last had this option; and those words as they were typed, the
+// ones with blanks in quotes.
 bool app_option_given(const char *name);
+void app_command_line(char *text, size_t room);
 
 #endif

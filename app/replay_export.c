@@ -1,12 +1,7 @@
-// Exports of an exam.
-// columns, print_row: a row per image, as CSV or JSON.
-// open_tables, close_tables: both files.
-// save_picture:       the image as a PNG.
-// draw_scale:         depth in centimetres.
-// picture_of, film_until: pictures of the film at even times.
-// replay_export_run:  plays and writes.
+// Exports of an exam: a table as CSV or JSON, a PNG per image, a film.
 #include "replay_export.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -17,11 +12,11 @@ enum { FRAMES_PER_S = 25, CAPTION_SCALE = 2, STRIP = 2 * (CAPTION_HEIGHT * CAPTI
 typedef struct output {
   replay_export *what;
   sonde_player *player;
-  sonde_file *csv, *json;
+  sonde_file *csv;
+  sonde_json_out json; // its file NULL: not wanted
   film *film;
   uint8_t *picture; // [height][width] of the film
   uint32_t width, height;
-  bool any; // the picture shows an image
 } output;
 
 typedef struct column {
@@ -63,94 +58,49 @@ static void columns(const sonde_player *player, const sonde_frame *frame, column
   memcpy(out, list, sizeof list);
 }
 
-static void json_text(sonde_file *file, const char *text) {
-  sonde_file_printf(file, "\"");
-  for (const unsigned char *c = (const unsigned char *)text; *c; ++c)
-    if (*c == '"' || *c == '\\')
-      sonde_file_printf(file, "\\%c", *c);
-    else if (*c < 0x20)
-      sonde_file_printf(file, "\\u%04x", *c);
-    else
-      sonde_file_printf(file, "%c", *c);
-  sonde_file_printf(file, "\"");
-}
-
-// Quoted, with quotes doubled.
-static void csv_text(sonde_file *file, const char *text) {
-  sonde_file_printf(file, "\"");
-  for (; *text; ++text) sonde_file_printf(file, *text == '"' ? "\"\"" : "%c", *text);
-  sonde_file_printf(file, "\"");
-}
-
-static void print_row(const output *o, const sonde_frame *frame) {
+// A row per image: numbers with 9 digits, nothing (CSV) or null (JSON) where there is none.
+static void print_row(output *o, const sonde_frame *frame) {
   column list[COLUMNS];
   columns(o->player, frame, list);
-  const char *fault = sonde_fault_text(frame->snapshot.fault);
+  const char *fault = frame->snapshot.fault ? sonde_fault_text(frame->snapshot.fault) : "";
   sonde_session_controls c = sonde_player_controls(o->player);
+  const char *const texts[] = {c.pathology.name, fault};
   for (int k = 0; o->csv && k < COLUMNS; ++k)
     sonde_file_printf(o->csv, isfinite(list[k].value) ? "%.9g," : ",", list[k].value);
-  if (o->csv) {
-    csv_text(o->csv, c.pathology.name);
-    sonde_file_printf(o->csv, ",");
-    csv_text(o->csv, frame->snapshot.fault ? fault : "");
-    sonde_file_printf(o->csv, "\n");
+  for (int k = 0; o->csv && k < 2; ++k) { // quoted, with quotes doubled
+    sonde_file_printf(o->csv, "\"");
+    for (const char *t = texts[k]; *t; ++t)
+      sonde_file_printf(o->csv, *t == '"' ? "\"\"" : "%c", *t);
+    sonde_file_printf(o->csv, k ? "\"\n" : "\",");
   }
-  if (!o->json) return;
-  sonde_file_printf(o->json, "%s\n    {", o->what->rows ? "," : "");
-  for (int k = 0; k < COLUMNS; ++k)
-    sonde_file_printf(o->json, isfinite(list[k].value) ? "\"%s\": %.9g, " : "\"%s\": null, ",
-                      list[k].name, list[k].value);
-  sonde_file_printf(o->json, "\"case\": ");
-  json_text(o->json, c.pathology.name);
-  sonde_file_printf(o->json, ", \"fault\": ");
-  json_text(o->json, frame->snapshot.fault ? fault : "");
-  sonde_file_printf(o->json, "}");
+  if (!o->json.file) return;
+  sonde_json_begin_object(&o->json, NULL);
+  for (int k = 0; k < COLUMNS; ++k) sonde_json_put_real(&o->json, list[k].name, list[k].value, 9);
+  sonde_json_put_text(&o->json, "case", c.pathology.name);
+  sonde_json_put_text(&o->json, "fault", fault);
+  sonde_json_end(&o->json);
 }
 
-static void print_heads(const output *o) {
-  column list[COLUMNS];
-  sonde_frame none = {0};
-  columns(o->player, &none, list);
-  for (int k = 0; o->csv && k < COLUMNS; ++k) sonde_file_printf(o->csv, "%s,", list[k].name);
-  if (o->csv) sonde_file_printf(o->csv, "case,fault\n");
-  if (!o->json) return;
-  const sonde_recording_info *info = sonde_player_info(o->player);
-  sonde_file_printf(o->json, "{\n  \"recording\": ");
-  json_text(o->json, o->what->recording);
-  sonde_file_printf(o->json, ",\n  \"model\": ");
-  json_text(o->json, info->model_name);
-  sonde_file_printf(o->json, ",\n  \"duration_s\": %.9g,\n  \"images\": [", info->duration_s);
-}
-
-static sonde_status print_comments(const output *o, sonde_error *error) {
+static sonde_status print_comments(output *o, sonde_error *error) {
   sonde_comments comments;
   sonde_status status = sonde_comments_load(o->what->recording, &comments, error);
   if (status) return status;
-  sonde_file_printf(o->json, "\n  ],\n  \"comments\": [");
+  sonde_json_end(&o->json); // of the images
+  sonde_json_begin_list(&o->json, "comments");
   for (uint32_t k = 0; k < comments.count; ++k) {
     const sonde_comment *c = &comments.list[k];
-    sonde_file_printf(o->json, "%s\n    {\"time_s\": %.9g, \"author\": ", k ? "," : "", c->time_s);
-    json_text(o->json, c->author);
-    sonde_file_printf(o->json, ", \"text\": ");
-    json_text(o->json, c->text);
-    sonde_file_printf(o->json, "}");
+    sonde_json_begin_object(&o->json, NULL);
+    sonde_json_put_real(&o->json, "time_s", c->time_s, 9);
+    sonde_json_put_text(&o->json, "author", c->author);
+    sonde_json_put_text(&o->json, "text", c->text);
+    sonde_json_end(&o->json);
   }
-  sonde_file_printf(o->json, "\n  ]\n}\n");
+  sonde_json_end(&o->json);
+  sonde_json_end(&o->json);
+  sonde_file_printf(o->json.file, "\n");
   sonde_comments_clear(&comments);
   return SONDE_OK;
 }
-
-static sonde_status save_picture(const output *o, const sonde_frame *frame, sonde_error *error) {
-  char path[4200];
-  snprintf(path, sizeof path, "%s/image_%08llu.png", o->what->frames,
-           (unsigned long long)frame->snapshot.tick);
-  sonde_image image = {.width = frame->width,
-                       .height = frame->height,
-                       .pixels = (uint8_t *)(uintptr_t)frame->pixels};
-  return sonde_image_save_png(&image, path, error);
-}
-
-// ---- film ---------------------------------------------------------------------------------
 
 static void add_percent(char *text, size_t size, const char *name, double ratio) {
   size_t used = strlen(text);
@@ -160,30 +110,29 @@ static void add_percent(char *text, size_t size, const char *name, double ratio)
     snprintf(text + used, size - used, "  %s   - %%", name);
 }
 
-// A mark for every centimetre of depth, at the right edge.
-static void draw_scale(output *o, const sonde_frame *frame) {
+// The image as the film shows it.
+static void draw_picture(output *o, const sonde_frame *frame) {
+  assert(frame->width <= o->width && frame->height + STRIP <= o->height);
+  for (uint32_t j = 0; j < frame->height; ++j)
+    memcpy(o->picture + (size_t)j * o->width, frame->pixels + (size_t)j * frame->width,
+           frame->width);
+
+  // A mark for every centimetre of depth, at the right edge.
   enum { MARK = 7, EDGE = 26 };
-  const uint8_t grey = 170;
   uint32_t left = frame->width > EDGE ? frame->width - EDGE : 0;
   for (uint32_t cm = 1; cm * 0.01 < frame->height_m; ++cm) {
     uint32_t y = (uint32_t)(cm * 0.01 / frame->height_m * frame->height);
-    memset(o->picture + (size_t)y * o->width + left, grey, frame->width > EDGE ? MARK : 0);
     char text[12];
+    memset(o->picture + (size_t)y * o->width + left, 170, frame->width > EDGE ? MARK : 0);
     snprintf(text, sizeof text, "%u", cm);
     if (y > CAPTION_HEIGHT)
       caption_draw(o->picture, o->width, frame->height, left + MARK + 4, y - CAPTION_HEIGHT / 2 + 1,
                    1, text);
   }
-}
 
-static void picture_of(output *o, const sonde_frame *frame) {
-  for (uint32_t j = 0; j < frame->height; ++j)
-    memcpy(o->picture + (size_t)j * o->width, frame->pixels + (size_t)j * frame->width,
-           frame->width);
-  draw_scale(o, frame);
+  // Two lines of text below.
   size_t strip = (size_t)frame->height * o->width;
   memset(o->picture + strip, 24, (size_t)o->width * o->height - strip);
-  o->any = true;
   const sonde_snapshot *s = &frame->snapshot;
   char line[2][96];
   snprintf(line[0], sizeof line[0], "%7.2f s   force %5.1f N", s->time_s, s->force_normal_n);
@@ -205,90 +154,94 @@ static bool film_until(output *o, double time_s) {
   return true;
 }
 
-// Even sides, as the film's colours want them.
-static sonde_status open_film(output *o, sonde_error *error) {
-  const sonde_recording_info *info = sonde_player_info(o->player);
-  o->width = (info->image_width + 1) / 2 * 2;
-  o->height = (info->image_height + STRIP + 1) / 2 * 2;
-  o->picture = calloc(o->width, o->height);
-  if (!o->picture) {
-    *error = (sonde_error){.status = SONDE_MEMORY, .message = "out of memory"};
-    return SONDE_MEMORY;
-  }
-  return film_open(o->what->video, o->width, o->height, FRAMES_PER_S, &o->film, error);
-}
-
-// ---- all ----------------------------------------------------------------------------------
-
+// Opens what is wanted and writes the heads of the tables.
 static sonde_status open_all(output *o, sonde_error *error) {
   replay_export *what = o->what;
+  const sonde_recording_info *info = sonde_player_info(o->player);
+  column list[COLUMNS];
   sonde_status status = SONDE_OK;
+  o->json.layout = SONDE_JSON_LINES;
   if (what->frames) status = sonde_directory_make(what->frames, 0777, false, error);
   if (!status && what->csv) status = sonde_file_create(what->csv, &o->csv, error);
-  if (!status && what->json) status = sonde_file_create(what->json, &o->json, error);
-  if (!status && what->video) status = open_film(o, error);
-  if (!status) print_heads(o);
-  return status;
+  if (!status && what->json) status = sonde_file_create(what->json, &o->json.file, error);
+  if (!status && what->video) { // even sides, as the film's colours want them
+    o->width = (info->image_width + 1) / 2 * 2;
+    o->height = (info->image_height + STRIP + 1) / 2 * 2;
+    o->picture = calloc(o->width, o->height);
+    status = o->picture ? film_open(what->video, o->width, o->height, FRAMES_PER_S, &o->film, error)
+                        : app_error(error, SONDE_MEMORY, "out of memory");
+  }
+  if (status) return status;
+  columns(o->player, &(sonde_frame){0}, list);
+  for (int k = 0; o->csv && k < COLUMNS; ++k) sonde_file_printf(o->csv, "%s,", list[k].name);
+  if (o->csv) sonde_file_printf(o->csv, "case,fault\n");
+  if (!o->json.file) return SONDE_OK;
+  sonde_json_begin_object(&o->json, NULL);
+  sonde_json_put_text(&o->json, "recording", what->recording);
+  sonde_json_put_text(&o->json, "model", info->model_name);
+  sonde_json_put_real(&o->json, "duration_s", info->duration_s, 9);
+  sonde_json_begin_list(&o->json, "images");
+  return SONDE_OK;
 }
 
 static sonde_status write_image(output *o, const sonde_frame *frame, sonde_error *error) {
-  sonde_status status = SONDE_OK;
+  replay_export *what = o->what;
   bool filmed = !o->film || film_until(o, frame->snapshot.time_s);
-  if (o->film) picture_of(o, frame);
-  if (o->csv || o->json) print_row(o, frame), o->what->rows++;
-  if (o->what->frames) status = save_picture(o, frame, error);
-  if (!status && o->what->frames) o->what->pictures++;
-  if (!filmed) *error = (sonde_error){.status = SONDE_IO, .message = "ffmpeg went away"};
-  return filmed ? status : SONDE_IO;
+  if (o->film) draw_picture(o, frame);
+  if (o->csv || o->json.file) print_row(o, frame), what->rows++;
+  if (what->frames) {
+    char path[4200];
+    snprintf(path, sizeof path, "%s/image_%08llu.png", what->frames,
+             (unsigned long long)frame->snapshot.tick);
+    sonde_image image = {.width = frame->width,
+                         .height = frame->height,
+                         .pixels = (uint8_t *)(uintptr_t)frame->pixels};
+    sonde_status status = sonde_image_save_png(&image, path, error);
+    if (status) return status;
+    what->pictures++;
+  }
+  return filmed ? SONDE_OK : app_error(error, SONDE_IO, "ffmpeg went away");
 }
 
+// Every image from the begin to the end of the part; a film begins with the image that stood there.
 static sonde_status play(output *o, const sonde_progress *progress, sonde_error *error) {
   replay_export *what = o->what;
   sonde_status status = sonde_player_seek(o->player, what->from_s, progress, error);
   sonde_frame frame;
   bool any = !status && sonde_player_frame(o->player, &frame);
   if (any && frame.snapshot.time_s >= what->from_s) status = write_image(o, &frame, error);
-  if (any && o->film) picture_of(o, &frame);
+  if (any && o->film) draw_picture(o, &frame);
   while (!status && sonde_player_next_image(o->player, true)) {
     if (!sonde_player_frame(o->player, &frame) || frame.snapshot.time_s > what->to_s) break;
     status = write_image(o, &frame, error);
     double share = (frame.snapshot.time_s - what->from_s) / fmax(what->to_s - what->from_s, 1e-9);
-    if (!status && !progress->report(fmin(share, 1), "export", progress->user)) {
-      *error = (sonde_error){.status = SONDE_CANCELLED,
-                             .message = "cancelled; what was written is whole"};
-      return SONDE_CANCELLED;
-    }
+    if (!status && !progress->report(fmin(share, 1), "export", progress->user))
+      return app_error(error, SONDE_CANCELLED, "cancelled; what was written is whole");
   }
   if (!status && o->film) (void)film_until(o, what->to_s + 0.5 / FRAMES_PER_S);
   return status;
 }
 
-// What a cancelled export has is kept, what a failed one has is not.
-static sonde_status close_all(output *o, sonde_status status, sonde_error *error) {
-  bool keep = status == SONDE_OK || status == SONDE_CANCELLED;
-  sonde_error own = {0};
-  sonde_status first = SONDE_OK;
-  if (keep && o->json) first = print_comments(o, &own);
-  sonde_file *files[2] = {o->csv, o->json};
-  for (int k = 0; k < 2; ++k) {
-    if (!files[k]) continue;
-    if (!keep || first)
-      sonde_file_discard(files[k]);
-    else
-      first = sonde_file_commit(files[k], &own);
-  }
-  sonde_error filmed = {0};
-  sonde_status film_status = film_close(o->film, &filmed);
-  free(o->picture);
-  if (status) return status;
-  *error = first ? own : filmed;
-  return first ? first : film_status;
-}
-
 sonde_status replay_export_run(sonde_player *player, replay_export *what,
                                const sonde_progress *progress, sonde_error *error) {
+  assert(what->from_s <= what->to_s);
   output o = {.what = what, .player = player};
   sonde_status status = open_all(&o, error);
   if (!status) status = play(&o, progress, error);
-  return close_all(&o, status, error);
+
+  // What a cancelled export has is kept, what a failed one has is not.
+  bool keep = status == SONDE_OK || status == SONDE_CANCELLED;
+  sonde_error own = {0}, filmed = {0};
+  sonde_status first = keep && o.json.file ? print_comments(&o, &own) : SONDE_OK;
+  sonde_file *files[2] = {o.csv, o.json.file};
+  for (int k = 0; k < 2; ++k)
+    if (files[k] && keep && !first)
+      first = sonde_file_commit(files[k], &own);
+    else
+      sonde_file_discard(files[k]);
+  sonde_status film_status = film_close(o.film, &filmed);
+  free(o.picture);
+  if (status) return status;
+  *error = first ? own : filmed;
+  return first ? first : film_status;
 }

@@ -1,12 +1,8 @@
 // The device that sonde run follows.
-//
-// family_of    what a name stands for
-// limits_of    the row that the rendering follows
-// exam_keys    the scripted exam: press, hold, slide, come back, release
-// create_exam  a script, or a hand that follows it; create_driver: hardware behind a clutch
 #include "run_device.h"
 
 #include "app.h"
+#include "pose.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -81,10 +77,8 @@ static sonde_status at_landmark(const sonde_model *model, const char *name, sond
   const sonde_landmark *mark = model->anatomy ? sonde_anatomy_landmark(model->anatomy, name) : NULL;
   const sonde_site *near = mark ? sonde_model_site(model, mark->site) : NULL;
   if (!near) {
-    *error = (sonde_error){.status = SONDE_NOT_FOUND};
-    snprintf(error->message, sizeof error->message,
-             "the model %s has neither a site nor a landmark '%.60s'", model->name, name);
-    return error->status;
+    return app_error(error, SONDE_NOT_FOUND,
+                     "the model %s has neither a site nor a landmark '%.60s'", model->name, name);
   }
   *site = *near;
   site->position_m = mark->skin_m;
@@ -102,10 +96,8 @@ sonde_status run_device_site(const run_device *device, const sonde_model *model,
   if (device->at && !named) return at_landmark(model, device->at, site, error);
   if (!named && model->site_count) named = &model->sites[0];
   if (!named) {
-    *error = (sonde_error){.status = SONDE_MISMATCH};
-    snprintf(error->message, sizeof error->message,
-             "the model %s has no measured site where the probe could start", model->name);
-    return error->status;
+    return app_error(error, SONDE_MISMATCH,
+                     "the model %s has no measured site where the probe could start", model->name);
   }
   *site = *named;
   return SONDE_OK;
@@ -132,34 +124,25 @@ static const exam_step ROUND[] = {{0.0, -0.010, 0.0}, {0.6, 0.0, 0.0},     {1.8,
 enum { ROUND_STEPS = sizeof ROUND / sizeof ROUND[0] };
 static const double round_s = 6.0;
 
-// Keys for the whole run, freed by the caller; NULL without memory. An arm that yields aims deeper.
-static sonde_script_key *exam_keys(const sonde_site *site, double seconds, double yield_m,
-                                   uint32_t *count) {
-  uint32_t rounds = (uint32_t)(seconds / round_s) + 1;
-  sonde_script_key *keys = calloc((size_t)rounds * ROUND_STEPS, sizeof *keys);
-  *count = 0;
-  for (uint32_t i = 0; keys && i < rounds * ROUND_STEPS; ++i) {
-    const exam_step *step = &ROUND[i % ROUND_STEPS];
-    sonde_pose pose = sonde_site_pose(site, step->depth_m + (step->depth_m > 0 ? yield_m : 0));
-    pose.position.x += step->along_m * site->v.x;
-    pose.position.y += step->along_m * site->v.y;
-    pose.position.z += step->along_m * site->v.z;
-    keys[(*count)++] = (sonde_script_key){i / ROUND_STEPS * round_s + step->time_s, pose};
-  }
-  return keys;
-}
-
-// The simulated operator holds a handle with the limits' motors and encoders.
+// The scripted exam for the whole run, or a simulated operator who follows it and holds a handle
+// with the limits' motors and encoders; an arm that yields aims deeper.
 static sonde_status create_exam(const run_device *device, const sonde_site *site, double dt_s,
                                 bool by_hand, sonde_device *out, sonde_error *error) {
+  assert(device->seconds > 0);
   const sonde_device_limits *limits = limits_of(device);
   sonde_hand_def hand = sonde_hand_def_default();
-  double peak = limits ? limits->force_peak_n : 0;
-  hand.force_limit_n = peak;
+  hand.force_limit_n = limits ? limits->force_peak_n : 0;
   hand.resolution_m = limits ? limits->resolution_m : 0;
-  uint32_t count = 0;
-  sonde_script_key *keys =
-      exam_keys(site, device->seconds, by_hand ? 0.8 * peak / hand.stiffness_n_m : 0, &count);
+  double yield_m = by_hand ? 0.8 * hand.force_limit_n / hand.stiffness_n_m : 0;
+  uint32_t count = ((uint32_t)(device->seconds / round_s) + 1) * ROUND_STEPS;
+  sonde_script_key *keys = calloc(count, sizeof *keys);
+  if (!keys) return error->status = SONDE_MEMORY;
+  for (uint32_t i = 0; i < count; ++i) {
+    const exam_step *step = &ROUND[i % ROUND_STEPS];
+    sonde_pose pose = sonde_site_pose(site, step->depth_m + (step->depth_m > 0 ? yield_m : 0));
+    keys[i] = (sonde_script_key){i / ROUND_STEPS * round_s + step->time_s,
+                                 pose_shift(pose, step->along_m, site->v)};
+  }
   sonde_status status = by_hand ? sonde_device_hand(&hand, keys, count, dt_s, out, error)
                                 : sonde_device_script(keys, count, dt_s, out, error);
   free(keys);

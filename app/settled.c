@@ -1,9 +1,8 @@
-// A probe settled on a model.
-// beam_of:         axis of a pose, in the world.
-// settled_press, settled_force: a slow press to a depth or a force, and what it says of jumps.
+// A probe settled on a model: a slow press to a depth or a force, and what it says of jumps.
 #include "settled.h"
 
 #include "app.h"
+#include "pose.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -37,25 +36,8 @@ sonde_status settled_site(const settled *s, const char *model, long number, sond
     *above = sonde_site_pose(site, 0);
     return SONDE_OK;
   }
-  error->status = SONDE_NOT_FOUND;
-  snprintf(error->message, sizeof error->message, "%.400s: no site %ld, the model has %u sites",
-           model, number, s->model->site_count);
-  return SONDE_NOT_FOUND;
-}
-
-// Third column of the rotation.
-static sonde_vec3 beam_of(sonde_pose p) {
-  sonde_quat q = p.rotation;
-  return (sonde_vec3){2 * (q.x * q.z + q.w * q.y), 2 * (q.y * q.z - q.w * q.x),
-                      1 - 2 * (q.x * q.x + q.y * q.y)};
-}
-
-sonde_pose settled_advance(sonde_pose pose, double along_beam_m) {
-  sonde_vec3 z = beam_of(pose);
-  pose.position.x += along_beam_m * z.x;
-  pose.position.y += along_beam_m * z.y;
-  pose.position.z += along_beam_m * z.z;
-  return pose;
+  return app_error(error, SONDE_NOT_FOUND, "%.400s: no site %ld, the model has %u sites", model,
+                   number, s->model->site_count);
 }
 
 bool settled_on_skin(const settled *s, sonde_pose *pose) {
@@ -64,8 +46,8 @@ bool settled_on_skin(const settled *s, sonde_pose *pose) {
   sonde_surface_index *skin = NULL;
   sonde_surface_point hit;
   if (sonde_surface_index_create(&s->model->surface, &skin, &error)) return false;
-  sonde_pose outside = settled_advance(*pose, -back_m);
-  bool found = sonde_surface_raycast(skin, outside.position, beam_of(*pose), reach_m, &hit);
+  sonde_pose outside = pose_shift(*pose, -back_m, pose_axis(*pose, 2));
+  bool found = sonde_surface_raycast(skin, outside.position, pose_axis(*pose, 2), reach_m, &hit);
   if (found) pose->position = hit.point_m;
   sonde_surface_index_destroy(skin);
   return found;
@@ -73,11 +55,10 @@ bool settled_on_skin(const settled *s, sonde_pose *pose) {
 
 void settled_at(settled *s, sonde_pose start, double depth_m, double residual) {
   s->depth_m = depth_m;
-  s->pose = settled_advance(start, depth_m);
+  s->pose = pose_shift(start, depth_m, pose_axis(start, 2));
   s->result = sonde_settle(s->state, &s->probe, s->pose, residual, 400);
   s->iterations += s->result.iterations;
-  sonde_vec3 f = sonde_state_contact(s->state)->force_n, z = beam_of(start);
-  s->force_n = -(f.x * z.x + f.y * z.y + f.z * z.z);
+  s->force_n = -vec_dot(sonde_state_contact(s->state)->force_n, pose_axis(start, 2));
 }
 
 sonde_status settled_press(settled *s, sonde_pose start, double depth_m, double force_n,
@@ -86,8 +67,8 @@ sonde_status settled_press(settled *s, sonde_pose start, double depth_m, double 
   sonde_path_def def = sonde_path_def_default();
   def.force_n = force_n;
   sonde_status status =
-      sonde_settle_path(s->state, &s->probe, start, settled_advance(start, depth_m), &def,
-                        &progress, &s->path, error);
+      sonde_settle_path(s->state, &s->probe, start, pose_shift(start, depth_m, pose_axis(start, 2)),
+                        &def, &progress, &s->path, error);
   app_progress_end();
   s->depth_m = depth_m < 0 ? depth_m : s->path.way_m;
   s->pose = s->path.pose;
@@ -116,11 +97,9 @@ void settled_json_jumps(const settled *s) {
   app_json_array("branch_jumps");
   for (uint32_t k = 0; k < p->jump_count && k < SONDE_PATH_JUMPS; ++k) {
     app_json_object(NULL);
-    app_json_real("from_mm", p->jump[k].from_m * 1e3);
-    app_json_real("to_mm", p->jump[k].to_m * 1e3);
-    app_json_real("force_before_n", p->jump[k].before_n);
-    app_json_real("force_one_step_n", p->jump[k].whole_n);
-    app_json_real("force_two_steps_n", p->jump[k].two_n);
+    app_json("from_mm:%g to_mm:%g force_before_n:%g force_one_step_n:%g force_two_steps_n:%g",
+             p->jump[k].from_m * 1e3, p->jump[k].to_m * 1e3, p->jump[k].before_n,
+             p->jump[k].whole_n, p->jump[k].two_n);
     app_json_close();
   }
   app_json_close();

@@ -42,6 +42,5 @@ void settled_warn(const settled *s, const char *verb);
 void settled_json_jumps(const settled *s);
 // The interior at the settled state.
 void settled_update(const settled *s, const sonde_pathology *pathology, uint64_t tick);
-sonde_pose settled_advance(sonde_pose pose, double along_beam_m);
 
 #endif

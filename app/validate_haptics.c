@@ -1,20 +1,11 @@
 // sonde validate haptics: every measure of the haptics room with its target, without hardware.
-//
-// report          one measure
-// full_model      compute time of the loop with the full model
-// local_model     the local model fed at 100 Hz beside the full model
-// high_pass       vibration: what is left above 80 Hz
-// stability       operators, devices and sites; and a scene of 100 Hz with and without control
-// faults          stalls, jumps, loss and nonsense before both gates
-// friction        tangential over normal force in a slide
-// gel_film        one film, two effects
-// pressing        a recorded hand
 #include "app.h"
 #include "haptics_rig.h"
+#include "pose.h"
 #include "validate.h"
 #include "validate_list.h"
 
-#include <getopt.h>
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -22,8 +13,7 @@
 #include <time.h>
 
 typedef struct options {
-  char model[1024];
-  const char *pressing;
+  const char *model, *pressing;
   long sites;
   bool json;
 } options;
@@ -43,8 +33,7 @@ static const sonde_vec3 ZERO = {0, 0, 0};
 static sonde_vec3 minus(sonde_vec3 a, sonde_vec3 b) {
   return (sonde_vec3){a.x - b.x, a.y - b.y, a.z - b.z};
 }
-static double dot(sonde_vec3 a, sonde_vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-static double norm(sonde_vec3 a) { return sqrt(dot(a, a)); }
+static double norm(sonde_vec3 a) { return sqrt(vec_dot(a, a)); }
 
 // `most`: the target is an upper bound, else a lower one.
 static void report(work *w, const char *name, double value, double target, bool most) {
@@ -61,33 +50,27 @@ static haptics_rig_def rig_def(const work *w, const char *device) {
                            .depth_m = 0.03};
 }
 
-// One run of the loop in lockstep; spent_s: each tick's least processor time so far.
-static sonde_status time_ticks(work *w, int ticks, double *spent_s, uint64_t *stale) {
-  haptics_rig rig;
-  haptics_rig_def def = rig_def(w, "omega.3");
-  sonde_state_reset(w->state);
-  sonde_status status = haptics_rig_start(&rig, &def, w->state, w->error);
-  if (status) return status;
-  for (int i = 0; i < ticks; ++i) {
-    double start = app_seconds(CLOCK_THREAD_CPUTIME_ID);
-    haptics_rig_tick(&rig);
-    spent_s[i] = fmin(spent_s[i], app_seconds(CLOCK_THREAD_CPUTIME_ID) - start);
-    *stale += sonde_state_tick(w->state) != (uint64_t)i + 1;
-  }
-  haptics_rig_stop(&rig);
-  return SONDE_OK;
-}
-
-// The same ticks some times over: what else a machine does lengthens one of them at random, and
-// each tick's least time is its own.
+// Compute time of the loop with the full model. The same ticks are run some times over: what else a
+// machine does lengthens one of them at random, and each tick's least time is its own.
 static sonde_status full_model(work *w) {
   enum { TICKS = 3000, RUNS = 5 };
   static double spent_s[TICKS];
   uint64_t stale = 0;
-  sonde_status status = SONDE_OK;
+  haptics_rig_def def = rig_def(w, "omega.3");
   for (int i = 0; i < TICKS; ++i) spent_s[i] = INFINITY;
-  for (int run = 0; !status && run < RUNS; ++run) status = time_ticks(w, TICKS, spent_s, &stale);
-  if (status) return status;
+  for (int run = 0; run < RUNS; ++run) {
+    haptics_rig rig;
+    sonde_state_reset(w->state);
+    sonde_status status = haptics_rig_start(&rig, &def, w->state, w->error);
+    if (status) return status;
+    for (int i = 0; i < TICKS; ++i) {
+      double start = app_seconds(CLOCK_THREAD_CPUTIME_ID);
+      haptics_rig_tick(&rig);
+      spent_s[i] = fmin(spent_s[i], app_seconds(CLOCK_THREAD_CPUTIME_ID) - start);
+      stale += sonde_state_tick(w->state) != (uint64_t)i + 1;
+    }
+    haptics_rig_stop(&rig);
+  }
   report(w, "full_model_stale_ticks", (double)stale, 0, true);
   report(w, "full_model_cpu_p999_ms", 1e3 * app_quantile(spent_s, TICKS, 0.999), 0.5, true);
   return SONDE_OK;
@@ -105,42 +88,10 @@ static double high_pass(double z[2][2], double x, double hz) {
   return x;
 }
 
-typedef struct locals {
-  sonde_local local;
-  sonde_vec3 at[10], speed[10], force[10]; // of the last ten ticks
-  sonde_vec3 before, model_before, held, last_at;
-  double worst_n, largest_n, jump_n, square, model_z[2][2], held_z[2][2], model_e, held_e;
-} locals;
-
-// An answer comes every 10 ticks and is 10 ticks old: what a scene of 100 Hz delivers.
-static void compare(locals *l, int tick, sonde_vec3 at, sonde_vec3 force) {
-  int slot = tick % 10;
-  bool answered = slot == 0 && tick >= 10;
-  if (answered) {
-    l->held = l->force[slot];
-    sonde_local_feed(&l->local, l->at[slot], l->speed[slot], l->held);
-  }
-  sonde_vec3 v = minus(at, l->last_at);
-  l->at[slot] = at;
-  l->speed[slot] = tick ? (sonde_vec3){1e3 * v.x, 1e3 * v.y, 1e3 * v.z} : ZERO;
-  l->force[slot] = force;
-  sonde_vec3 model = sonde_local_force(&l->local, at);
-  double error = norm(minus(model, force));
-  l->worst_n = fmax(l->worst_n, error);
-  l->largest_n = fmax(l->largest_n, norm(force));
-  l->square += error * error;
-  if (answered)
-    l->jump_n =
-        fmax(l->jump_n, norm(minus(model, l->model_before)) - norm(minus(force, l->before)));
-  double a = high_pass(l->model_z, norm(model), 80), b = high_pass(l->held_z, norm(l->held), 80);
-  l->model_e += a * a;
-  l->held_e += b * b;
-  l->before = force;
-  l->model_before = model;
-  l->last_at = at;
-}
-
+// The local model fed at 100 Hz beside the full model: an answer comes every 10 ticks and is 10
+// ticks old, which is what a scene of 100 Hz delivers.
 static sonde_status local_model(work *w) {
+  enum { TICKS = 2400, LATE = 10 };
   static const double keys_mm[][2] = {{0, -2},    {600, 15},  {900, 15}, {1200, 22},
                                       {1500, 10}, {1800, 12}, {2400, -2}};
   sonde_script_key keys[7];
@@ -150,21 +101,54 @@ static sonde_status local_model(work *w) {
   sonde_device device;
   sonde_status status = sonde_device_script(keys, 7, 1e-3, &device, w->error);
   if (status) return status;
-  static locals l;
-  memset(&l, 0, sizeof l);
-  sonde_local_init(&l.local, NULL);
+
+  sonde_local local;
+  sonde_vec3 ats[LATE] = {0}, speeds[LATE] = {0}, forces[LATE] = {0}; // of the last ticks
+  sonde_vec3 force_before = ZERO, model_before = ZERO, held = ZERO, at_before = ZERO;
+  double worst_n = 0, largest_n = 0, jump_n = 0, square = 0, model_energy = 0, held_energy = 0;
+  double model_z[2][2] = {{0}}, held_z[2][2] = {{0}};
+  sonde_local_init(&local, NULL);
   sonde_state_reset(w->state);
-  for (int tick = 0; tick < 2400; ++tick) {
+  for (int tick = 0; tick < TICKS; ++tick) {
+    // The full model's force at the pose of the script.
     sonde_device_sample sample;
     device.read(device.self, (uint64_t)tick, &sample);
     sonde_step(w->state, &w->probe, sample.world_from_probe);
-    compare(&l, tick, sample.world_from_probe.position, sonde_state_contact(w->state)->force_n);
+    sonde_vec3 at = sample.world_from_probe.position,
+               force = sonde_state_contact(w->state)->force_n;
+
+    // The local model's, after the answer to where the probe was ten ticks ago.
+    int slot = tick % LATE;
+    bool answered = slot == 0 && tick >= LATE;
+    if (answered) {
+      held = forces[slot];
+      sonde_local_feed(&local, ats[slot], speeds[slot], held);
+    }
+    sonde_vec3 v = minus(at, at_before);
+    ats[slot] = at;
+    speeds[slot] = tick ? (sonde_vec3){1e3 * v.x, 1e3 * v.y, 1e3 * v.z} : ZERO;
+    forces[slot] = force;
+    sonde_vec3 model = sonde_local_force(&local, at);
+
+    // Errors, the jump at an answer beyond that of the full model, vibration above 80 Hz.
+    double error = norm(minus(model, force));
+    worst_n = fmax(worst_n, error);
+    largest_n = fmax(largest_n, norm(force));
+    square += error * error;
+    double jump = norm(minus(model, model_before)) - norm(minus(force, force_before));
+    if (answered) jump_n = fmax(jump_n, jump);
+    double a = high_pass(model_z, norm(model), 80), b = high_pass(held_z, norm(held), 80);
+    model_energy += a * a;
+    held_energy += b * b;
+    force_before = force;
+    model_before = model;
+    at_before = at;
   }
   device.destroy(device.self);
-  report(w, "local_worst_error_percent", 100 * l.worst_n / l.largest_n, 5, true);
-  report(w, "local_rms_error_percent", 100 * sqrt(l.square / 2400) / l.largest_n, 5, true);
-  report(w, "local_jump_n", l.jump_n, 0.1, true);
-  report(w, "local_vibration_below_hold_db", 10 * log10(l.held_e / l.model_e), 20, false);
+  report(w, "local_worst_error_percent", 100 * worst_n / largest_n, 5, true);
+  report(w, "local_rms_error_percent", 100 * sqrt(square / TICKS) / largest_n, 5, true);
+  report(w, "local_jump_n", jump_n, 0.1, true);
+  report(w, "local_vibration_below_hold_db", 10 * log10(held_energy / model_energy), 20, false);
   return SONDE_OK;
 }
 
@@ -198,27 +182,23 @@ static sonde_status press(work *w, const haptics_rig_def *def, swing *s) {
 // A limit cycle does not decay.
 static bool cycles(const swing *s) { return s->late_m > 1e-4 && s->late_m > 0.9 * s->early_m; }
 
-static haptics_rig_def combination(const work *w, uint32_t k) {
+// Operators of all masses and dampings with three devices: site by site with the 75 combinations in
+// turn (37 is coprime to 75). Every eighth also with a scene of 100 Hz: through the local model,
+// and held and rendered as it is, which has to be found unstable.
+static sonde_status stability(work *w) {
   static const char *const devices[] = {"touch", "premium_1.5", "omega.3"};
   static const double masses[] = {0.1, 0.2, 0.5, 1.0, 2.0}, dampings[] = {0.0, 0.5, 1.0, 2.0, 5.0};
-  haptics_rig_def def = rig_def(w, devices[k % 3]);
-  def.mass_kg = masses[k / 3 % 5];
-  def.damping_n_s_m = dampings[k / 15 % 5];
-  def.faultless = true;
-  return def;
-}
-
-// Site by site with the 75 combinations in turn (37 is coprime to 75). Every eighth also with a
-// scene of 100 Hz: through the local model, and held and rendered as it is, which has to be found
-// unstable.
-static sonde_status stability(work *w) {
   uint32_t sites = w->model->site_count, wanted = (uint32_t)w->o->sites;
   if (wanted > 0 && wanted < sites) sites = wanted;
   double energy = 0.0, deepest = 1.0;
   uint32_t cases = 0, unstable = 0, slow_unstable = 0;
   uint32_t direct_cases = 0, direct_unstable = 0;
   for (uint32_t i = 0; i < sites && !app_interrupted(); ++i) {
-    haptics_rig_def def = combination(w, i * 37 % 75);
+    uint32_t k = i * 37 % 75;
+    haptics_rig_def def = rig_def(w, devices[k % 3]);
+    def.mass_kg = masses[k / 3 % 5];
+    def.damping_n_s_m = dampings[k / 15 % 5];
+    def.faultless = true;
     def.site = &w->model->sites[(uint64_t)i * w->model->site_count / sites];
     swing s;
     sonde_status status = press(w, &def, &s);
@@ -330,15 +310,12 @@ static slide slide_with(work *w, const sonde_friction *friction) {
   sonde_state_reset(w->state);
   double along = 0, pressed = 0, low = INFINITY, high = -INFINITY;
   for (int tick = 0; tick < 1600; ++tick) {
-    double t = 1e-3 * tick, way = 0.01 * fmax(t - 0.5, 0);
+    double t = 1e-3 * tick, slid_m = 0.01 * fmax(t - 0.5, 0);
     sonde_pose pose = sonde_site_pose(w->site, 0.008 * fmin(t / 0.4, 1.0));
-    pose.position.x += way * w->site->u.x;
-    pose.position.y += way * w->site->u.y;
-    pose.position.z += way * w->site->u.z;
-    sonde_step(w->state, &w->probe, pose);
+    sonde_step(w->state, &w->probe, pose_shift(pose, slid_m, w->site->u));
     if (tick < 900) continue;
     sonde_vec3 force = sonde_state_contact(w->state)->force_n;
-    double f = -dot(force, w->site->u), n = dot(force, w->site->normal);
+    double f = -vec_dot(force, w->site->u), n = vec_dot(force, w->site->normal);
     along += f;
     pressed += n;
     low = fmin(low, f / n);
@@ -365,22 +342,10 @@ static void friction(work *w) {
   sonde_state_set_friction(w->state, &(sonde_friction){0}, NULL);
 }
 
-// Film under the probe, friction and image of one tick.
-static void gel_effects(const work *w, sonde_gel *gel, sonde_pose pose, double *mu, double *image) {
-  const sonde_friction dry = {
-      .mu_static = 0.5, .mu_kinetic = 0.36, .stribeck_speed_m_s = 0.01, .mu_gel = 0.05};
-  const sonde_vec3 *contact = sonde_state_contact_forces(w->state);
-  sonde_friction now = sonde_gel_friction(gel, contact, &dry);
-  sonde_error error;
-  *mu = sonde_state_set_friction(w->state, &now, &error) ? NAN
-                                                         : sonde_friction_coefficient(&now, 0.1);
-  float share;
-  sonde_gel_coupling(gel, sonde_state_positions(w->state), contact, &pose.position, 1, &share);
-  *image = (double)share;
-}
-
 // Pressed with 1 ml; wiped off while held. Both effects have to change in the tick of the wipe.
 static sonde_status gel_film(work *w) {
+  const sonde_friction dry = {
+      .mu_static = 0.5, .mu_kinetic = 0.36, .stribeck_speed_m_s = 0.01, .mu_gel = 0.05};
   sonde_gel *gel = NULL;
   sonde_gel_def def = sonde_gel_def_default();
   sonde_status status = sonde_gel_create(w->model, &def, &gel, w->error);
@@ -394,7 +359,16 @@ static sonde_status gel_film(work *w) {
     if (tick == 1000) sonde_gel_wipe(gel);
     int k = tick >= 1000 ? tick - 999 : 0;
     if (k == 0) sonde_gel_step(gel, sonde_state_contact_forces(w->state), ZERO, 1e-3);
-    gel_effects(w, gel, pose, &mu[k], &image[k]);
+    // Friction and coupling of the image under the film of this tick.
+    const sonde_vec3 *contact = sonde_state_contact_forces(w->state);
+    sonde_friction film = sonde_gel_friction(gel, contact, &dry);
+    sonde_error error;
+    float share;
+    mu[k] = sonde_state_set_friction(w->state, &film, &error)
+                ? NAN
+                : sonde_friction_coefficient(&film, 0.1);
+    sonde_gel_coupling(gel, sonde_state_positions(w->state), contact, &pose.position, 1, &share);
+    image[k] = (double)share;
   }
   sonde_gel_destroy(gel);
   report(w, "gel_friction_with", mu[0], 0.1, true);
@@ -405,38 +379,29 @@ static sonde_status gel_film(work *w) {
   return SONDE_OK;
 }
 
-static sonde_status read_pressing(const char *path, const sonde_site *site, sonde_script_key *keys,
-                                  uint32_t capacity, uint32_t *count, sonde_error *error) {
-  FILE *file = fopen(path, "r");
-  if (!file) {
-    snprintf(error->message, sizeof error->message, "%s cannot be read", path);
-    return error->status = SONDE_IO;
-  }
-  char line[1024];
-  *count = 0;
-  while (*count < capacity && fgets(line, sizeof line, file)) {
-    double t, x, y, z;
-    if (sscanf(line, "%lf %lf %lf %lf", &t, &x, &y, &z) != 4) continue;
-    if (*count && !(t > keys[*count - 1].time_s)) continue;
-    // a third of the motion: 83 mm into a spring there, 28 mm into a thigh here
-    keys[(*count)++] = (sonde_script_key){t, sonde_site_pose(site, fmax(-y / 3, -0.03))};
-  }
-  fclose(file);
-  if (*count > 1) return SONDE_OK;
-  snprintf(error->message, sizeof error->message,
-           "%s holds no motion, expected lines of time and position", path);
-  return error->status = SONDE_FORMAT;
-}
-
+// A recorded hand, lines of time and position: a third of the motion, 83 mm into a spring there, 28
+// mm into a thigh here.
 static sonde_status pressing(work *w) {
   enum { CAPACITY = 100000 };
+  const char *path = w->o->pressing;
   sonde_script_key *keys = calloc(CAPACITY, sizeof *keys);
+  FILE *file = fopen(path, "r");
+  char line[1024];
   uint32_t count = 0;
   sonde_device device = {0};
+  while (keys && file && count < CAPACITY && fgets(line, sizeof line, file)) {
+    double t, x, y, z;
+    if (sscanf(line, "%lf %lf %lf %lf", &t, &x, &y, &z) != 4) continue;
+    if (count && !(t > keys[count - 1].time_s)) continue;
+    keys[count++] = (sonde_script_key){t, sonde_site_pose(w->site, fmax(-y / 3, -0.03))};
+  }
   sonde_status status =
-      keys ? read_pressing(w->o->pressing, w->site, keys, CAPACITY, &count, w->error)
-           : SONDE_MEMORY;
-  if (!status) status = sonde_device_script(keys, count, 1e-3, &device, w->error);
+      !keys       ? (w->error->status = SONDE_MEMORY)
+      : !file     ? app_error(w->error, SONDE_IO, "%s cannot be read", path)
+      : count < 2 ? app_error(w->error, SONDE_FORMAT,
+                              "%s holds no motion, expected lines of time and position", path)
+                  : sonde_device_script(keys, count, 1e-3, &device, w->error);
+  if (file) fclose(file);
   if (!status) {
     haptics_rig rig;
     haptics_rig_def def = rig_def(w, "premium_1.5");
@@ -455,23 +420,12 @@ static sonde_status pressing(work *w) {
   return status;
 }
 
-static sonde_status measure(work *w) {
-  sonde_status status = full_model(w);
-  if (!status) status = local_model(w);
-  if (!status) status = stability(w);
-  if (status) return status;
-  faults(w);
-  friction(w);
-  status = gel_film(w);
-  if (status) return status;
-  return w->o->pressing ? pressing(w) : SONDE_OK;
-}
-
-static int run(const options *o) {
+int validate_haptics(const char *model, const char *pressing_path, long sites, bool json) {
+  const options o = {model, pressing_path, sites, json};
   sonde_error error = {0};
-  work w = {.o = o, .error = &error, .list = {.json = o->json, .working = "haptics"}};
+  work w = {.o = &o, .error = &error, .list = {.json = json, .working = "haptics"}};
   sonde_world_def world = haptics_world();
-  sonde_status status = sonde_model_load(o->model, &w.model, &error);
+  sonde_status status = sonde_model_load(model, &w.model, &error);
   if (!status) status = sonde_probe_create("linear", &w.probe, &error);
   if (!status) status = sonde_state_create(w.model, &world, &w.state, &error);
   if (!status) {
@@ -479,28 +433,16 @@ static int run(const options *o) {
     if (!w.site) w.site = &w.model->sites[w.model->site_count / 2];
     app_catch_interrupt();
     app_progress_begin(w.list.working);
-    status = measure(&w);
+    status = full_model(&w);
+    if (!status) status = local_model(&w);
+    if (!status) status = stability(&w);
+    if (!status) faults(&w), friction(&w);
+    if (!status) status = gel_film(&w);
+    if (!status && pressing_path) status = pressing(&w);
   }
   sonde_state_destroy(w.state);
   sonde_probe_clear(&w.probe);
   sonde_model_destroy(w.model);
   if (status) return app_fail("validate", &error);
   return validate_end(&w.list) ? APP_OK : APP_FAILED;
-}
-
-int validate_haptics(int argc, char **argv) {
-  static const struct option list[] = {{"pressing", required_argument, NULL, 'p'},
-                                       {"sites", required_argument, NULL, 's'},
-                                       {"json", no_argument, NULL, 'j'},
-                                       {NULL, 0, NULL, 0}};
-  options o = {0};
-  for (int c; (c = getopt_long(argc, argv, "", list, NULL)) != -1;) {
-    if (c == '?') return APP_BAD_INPUT;
-    if (c == 'p') o.pressing = optarg;
-    if (c == 'j') o.json = true;
-    if (c == 's' && !app_parse_integer("validate", "--sites", optarg, 1, 1000, &o.sites))
-      return APP_BAD_INPUT;
-  }
-  if (!app_model_argument("validate", argc, argv, o.model, sizeof o.model)) return APP_BAD_INPUT;
-  return run(&o);
 }

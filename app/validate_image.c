@@ -9,7 +9,6 @@
 #include "validate_leg.h"
 #include "validate_list.h"
 
-#include <getopt.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -407,18 +406,10 @@ static sonde_status times(report *r) {
   return status;
 }
 
-int validate_image(int argc, char **argv) {
-  static const struct option LONG[] = {
-      {"quick", no_argument, NULL, 'q'}, {"json", no_argument, NULL, 'j'}, {NULL, 0, NULL, 0}};
+int validate_image(bool quick, bool json) {
   static sonde_status (*const PARTS[])(report *) = {
       reference, speckle, attenuation, bone, enhancement, vein, deep, compensation, times};
-  report r = {0};
-  for (int c; (c = getopt_long(argc, argv, "", LONG, NULL)) != -1;) switch (c) {
-    case 'q': r.quick = true; break;
-    case 'j': r.list.json = true; break;
-    default: return APP_BAD_INPUT;
-    }
-  if (argc != optind) return app_usage_error("validate", "unexpected argument after image");
+  report r = {.quick = quick, .list.json = json};
   sonde_progress progress = app_progress();
   sonde_status status = SONDE_OK;
   const int count = sizeof PARTS / sizeof *PARTS;

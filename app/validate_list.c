@@ -31,16 +31,11 @@ static void print_json(const validate_list *l) {
   app_json_begin();
   for (const validate_measure *m = l->list; m < l->list + l->count; ++m) {
     app_json_object(m->name);
-    app_json_real("value", m->value);
-    app_json_real("least", m->least);
-    app_json_real("most", m->most);
-    app_json_text("target", m->target);
-    app_json_bool("pass", m->pass);
+    app_json("value:%g least:%g most:%g target:%s pass:%hhd", m->value, m->least, m->most,
+             m->target, m->pass);
     app_json_close();
   }
-  app_json_integer("passed", l->count - l->failed);
-  app_json_integer("failed", l->failed);
-  app_json_bool("pass", l->failed == 0);
+  app_json("passed:%u failed:%u pass:%hhd", l->count - l->failed, l->failed, l->failed == 0);
   app_json_end();
 }
 

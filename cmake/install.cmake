@@ -35,8 +35,6 @@ sonde_pc(sonde-scene OF sonde-files sonde)
 sonde_pc(sonde-fit OF sonde-files sonde OTHERS libcjson)
 sonde_pc(sonde-exam OF sonde-fit sonde-files sonde OTHERS sqlite3 zlib libcjson)
 
-install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs/man/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1
-  FILES_MATCHING PATTERN "*.1")
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/data/thigh ${PROJECT_SOURCE_DIR}/data/scenes
   ${PROJECT_SOURCE_DIR}/data/cases ${PROJECT_SOURCE_DIR}/data/protocols

@@ -1,5 +1,5 @@
 # manual.awk: a manual page in mdoc from what `sonde COMMAND --help --json` prints; several forms
-# of a command may follow each other. Variables: section (of the first form's heading; date).
+# of a command may follow each other. Variable: date.
 function unescape(t) {
   gsub(/\\n/, "\n", t); gsub(/\\t/, "\t", t); gsub(/\\"/, "\"", t); gsub(/\\\\/, "\\", t)
   return t

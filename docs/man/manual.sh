@@ -9,28 +9,38 @@ mkdir -p "$to"
 verbs=$("$sonde" --help | sed -n '/^commands:/,/^$/s/^  \([a-z]*\)  .*/\1/p')
 for verb in $verbs; do
   {
-    forms=$("$sonde" "$verb" --help --json)
-    printf '%s\n' "$forms" | awk -v date="$date" -f "$here/manual.awk"
-    notes=$here/$verb.mdoc
-    [[ -e $notes ]] && cat "$notes"
-    grep -qs '^\.Sh EXIT STATUS' "$notes" ||
-      printf '.Sh EXIT STATUS\n0 on success, 1 when the work failed or was cancelled, 2 for bad input; then nothing was written.\n'
-    grep -qs '^\.Sh SEE ALSO' "$notes" || printf '.Sh SEE ALSO\n.Xr sonde 1\n'
-  } >"$to/sonde-$verb.1"
+    "$sonde" "$verb" --help --json
+    [[ $verb != bench ]] || "$sonde" bench --scene image --help --json
+  } | awk -v date="$date" -f "$here/manual.awk" >"$to/sonde-$verb.1"
+  [[ -e $here/$verb.mdoc ]] && notes=$here/$verb.mdoc || notes=/dev/null
+  # The usual sections where a command has none of its own, in the usual order.
+  awk '
+    function status() {
+      if (!told++) print ".Sh EXIT STATUS\n0 on success, 1 when the work failed or was cancelled, 2 for bad input; then nothing was written."
+    }
+    /^\.Sh EXIT STATUS/ { told = 1 }
+    /^\.Sh (EXAMPLES|SEE ALSO)/ { status() }
+    /^\.Sh SEE ALSO/ { seen = 1 }
+    { print }
+    END { status(); if (!seen) print ".Sh SEE ALSO\n.Xr sonde 1" }' "$notes" >>"$to/sonde-$verb.1"
 done
-# The page of the program itself: the list of commands goes where sonde.mdoc says.
+# The page of the program itself: sonde.mdoc with the list of commands where it says so.
 "$sonde" --help | awk -v date="$date" -v notes="$here/sonde.mdoc" '
-  /^  [a-z]+  / { verb[++n] = $1; sub(/^ *[a-z]+ +/, ""); what[n] = $0 }
+  /^  [a-z]+  / {
+    verb[++n] = $1
+    sub(/^ *[a-z]+ +/, "")
+    item[n] = ".It Cm " verb[n] "\n" toupper(substr($0, 1, 1)) substr($0, 2) ", see\n.Xr sonde-" verb[n] " 1 ."
+  }
   END {
     print ".Dd " date
-    while ((getline line < notes) > 0) {
+    while ((getline line < notes) > 0)
       if (line == "@COMMANDS")
-        for (k = 1; k <= n; ++k)
-          printf ".It Cm %s\n%s%s, see\n.Xr sonde-%s 1 .\n", verb[k], toupper(substr(what[k], 1, 1)), substr(what[k], 2), verb[k]
+        for (k = 1; k <= n; ++k) print item[k]
       else if (line == "@PAGES") {
-        close("sort")
-        for (k = 1; k <= n; ++k) for (j = 1; j < k; ++j) if (verb[k] < verb[j]) { t = verb[k]; verb[k] = verb[j]; verb[j] = t }
-        for (k = 1; k <= n; ++k) printf ".Xr sonde-%s 1%s\n", verb[k], k < n ? " ," : ""
-      } else print line
-    }
+        for (k = 1; k <= n; ++k)
+          for (j = 1; j < k; ++j)
+            if (verb[k] < verb[j]) { t = verb[k]; verb[k] = verb[j]; verb[j] = t }
+        for (k = 1; k <= n; ++k) print ".Xr sonde-" verb[k] " 1" (k < n ? " ," : "")
+      } else
+        print line
   }' >"$to/sonde.1"

@@ -146,7 +146,7 @@ rejects 'still\.csv:3.*time_s' identify "$MODEL" --slide "$in/still.csv" -o p.js
 printf '%s,tangential_n\n0,0,0,0,0\n1,0,0,0,0\n' $columns >"$in/few.csv"
 rejects 'too short' identify "$MODEL" --ramp-hold "$in/few.csv" -o p.json
 rejects 'ramp-hold' identify "$MODEL" -o p.json
-rejects 'ramp-hold, slide' identify "$MODEL" --simulate tap --site 27 -o out.csv
+rejects 'ramp-hold or slide, got .tap' identify "$MODEL" --simulate tap --site 27 -o out.csv
 rejects 'no site 9999' identify "$MODEL" --simulate slide --site 9999 -o out.csv
 printf '{"format": "sonde-preset", "version": 1,\n"mu_static": -1}' >"$in/odd.json"
 rejects 'odd\.json:2: mu_static' press "$MODEL" --site 27 --depth-mm 2 --preset "$in/odd.json"

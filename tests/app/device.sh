@@ -33,6 +33,6 @@ rejects "belong together" run "$MODEL" --headless --device replay
 rejects "not --headless" run "$MODEL" --headless --device page
 rejects "no known limits" run "$MODEL" --limits nothing
 rejects "neither a site nor a landmark" run "$MODEL" --headless --lockstep --device-at nowhere
-rejects "unknown posture" run "$MODEL" --posture hanging
+rejects "posture expects supine, sitting or standing" run "$MODEL" --posture hanging
 rejects "needs a --preset" run "$MODEL" --compare x.json
 finish

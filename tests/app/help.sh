@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Help, unknown words, and the manual: every option of --help stands in the manual page and back.
-man=$(cd "$(dirname "${BASH_SOURCE[0]}")/../../docs/man" && pwd)
+# Help, unknown words, and the manual that the build made: every option of --help stands in the manual
+# page and back, and in the table that --help --json prints.
+man=$MANUAL
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 declare -A options=(
   [run]="--port --headless --seconds --record --json"
@@ -40,9 +41,15 @@ for verb in "${!options[@]}"; do
   done
   # In mdoc "Fl -seconds" is --seconds.
   there=$(sed 's/Fl -\([a-z]\)/ --\1/g' "$man/sonde-$verb.1" | listed)
-  here=$(listed <"$out")
+  here=$({ cat "$out"; [[ $verb != bench ]] || "$SONDE" bench --scene image --help; } | listed)
   [[ $here == "$there" ]] ||
     wrong "sonde $verb: --help and manual differ: $(diff <(echo "$here") <(echo "$there") | grep '^[<>]' | tr '\n' ' ')"
+  gives "command=$verb summary:text usage:text text:text" "$verb" --help --json
+  table=$(sed -n 's/^ *"name": "\(--[^"]*\)",*$/\1/p; s/^ *"long_name": "\([^"]*\)",*$/--\1/p' "$out" | listed)
+  for option in $table; do
+    grep -qxF -- "$option" <<<"$here" || wrong "sonde $verb: --help misses $option of its table"
+  done
+  [[ -n $table ]] || wrong "sonde $verb --help --json lists no option"
   rejects 'frobnicate' "$verb" --frobnicate
 done
 rejects "did you mean 'press'" pres
