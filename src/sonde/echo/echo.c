@@ -1,19 +1,9 @@
 // Life of a renderer, the operator's settings.
-//
-// sonde_echo_settings_default, sonde_echo_ranges, sonde_echo_settings_clamp
-// sonde_echo_create   buffers and random tables
-// sonde_echo_destroy
-// carve               one block of memory for what vectors read
-// forget_textures     what they remember
-// fill_tables         scatterers, streamlines of the blood, noise
-// sonde_echo_flow_default, sonde_echo_set_flow, sonde_echo_set_coupling
-// sonde_echo_set_radius, sonde_echo_set_kernels
 #include "base/base.h"
-#include "base/random.h"
 #include "base/vector.h"
 #include "echo/cubes.h"
 #include "echo/echo.h"
-#include "echo/tiers.h"
+#include "echo/bands.h"
 #include "interior/fields.h"
 
 #include <stddef.h>
@@ -41,10 +31,6 @@ sonde_echo_settings sonde_echo_settings_default(void) {
                                .tgc_db_per_m = 0};
 }
 
-static double bounded(double value, double low, double high, double otherwise) {
-  return isnan(value) ? otherwise : clamp(value, low, high);
-}
-
 #define RANGE(key, low, high, si, member)                                                          \
   { key, low, high, si, offsetof(sonde_echo_settings, member) }
 static const sonde_echo_range ranges[] = {
@@ -67,88 +53,9 @@ sonde_echo_settings sonde_echo_settings_clamp(sonde_echo_settings s) {
     const sonde_echo_range *r = &ranges[k];
     double *value = (double *)(void *)((char *)&s + r->offset);
     double otherwise = *(const double *)(const void *)((const char *)&d + r->offset);
-    *value = bounded(*value, r->low * r->si, r->high * r->si, otherwise);
+    *value = isnan(*value) ? otherwise : clamp(*value, r->low * r->si, r->high * r->si);
   }
   return s;
-}
-
-// Jittered grid: one scatterer per box of layers of 2^bits x 2^bits boxes. Fewer by chance in one
-// place and more in another would make the speckle's contrast depend on the density. Boxes that
-// follow each other lie apart, so that a scatterer seldom waits for what the one before it wrote.
-static void fill_share(const scatter_pool *pool, uint64_t seed, uint32_t first, uint32_t bits,
-                       uint32_t layers) {
-  const uint32_t layer = 1u << 2 * bits, side[3] = {1u << bits, 1u << bits, layers};
-  for (uint32_t i = 0; i < layer * layers; ++i) {
-    uint64_t j = 4 * (uint64_t)(first + i);
-    uint32_t box[3] = {0, 0, i / layer};
-    for (uint32_t k = 0; k < 2 * bits; ++k) box[k % 2] |= (i >> k & 1) << (bits - 1 - k / 2);
-    float at[3];
-    for (uint32_t c = 0; c < 3; ++c)
-      at[c] = (float)((box[c] + sonde_random_uniform(seed, j + 1 + c)) / side[c] - 0.5);
-    pool->x[first + i] = at[0], pool->y[first + i] = at[1], pool->z[first + i] = at[2];
-    pool->sign[first + i] = sonde_random_bits(seed, j) & (1u << 20) ? 1.0f : -1.0f;
-  }
-}
-
-static int by_value(const void *a, const void *b) {
-  float x = *(const float *)a, y = *(const float *)b;
-  return (x > y) - (x < y);
-}
-
-// The same share in parts that are evenly spread each: of the four scatterers in two by two boxes
-// of a layer one goes to the first quarter, one to the second, two to the half. Order of z is kept.
-static void fill_parts(sonde_echo *echo, uint32_t from, uint32_t to) {
-  const scatter_pool *p = &echo->pool;
-  SONDE_ASSERT(echo->per_cell % 64 == 0 && from + echo->per_cell <= SONDE_POOL);
-  const uint32_t quarter = echo->per_cell / 4;
-  uint32_t end[3] = {to, to + quarter, to + 2 * quarter};
-  for (uint32_t i = 0; i < echo->per_cell; ++i) {
-    const uint32_t layer = i / 64, square = i % 16, member = i / 16 % 4; // see fill_share()
-    const uint64_t draw =
-        sonde_random_bits(echo->seed + 7, ((uint64_t)from + 64 * layer) * 16 + square);
-    const uint32_t place = (member + (uint32_t)(draw >> 40)) % 4, at = end[place < 2 ? place : 2]++;
-    p->x[at] = p->x[from + i], p->y[at] = p->y[from + i], p->z[at] = p->z[from + i];
-    p->sign[at] = p->sign[from + i];
-  }
-}
-
-// In each cube's share the scatterers come in order of z, along the leg: the slab of a transverse
-// plane then takes or leaves whole vectors of them. Within a layer the other coordinates do not
-// depend on z, so that z alone is sorted.
-static void fill_pools(sonde_echo *echo) {
-  const uint32_t layers = echo->per_cell / 64, each = echo->per_piece;
-  for (uint32_t i = 0; i + echo->per_cell <= SONDE_POOL; i += echo->per_cell) {
-    fill_share(&echo->pool, echo->seed, i, 3, layers);
-    for (uint32_t layer = 0; layer < layers; ++layer)
-      qsort(echo->pool.z + i + 64 * layer, 64, sizeof(float), by_value);
-  }
-  for (uint32_t i = 0; i + echo->per_cell <= SONDE_POOL; i += echo->per_cell)
-    fill_parts(echo, i, SONDE_POOL + SONDE_LOOSE + i);
-  scatter_pool loose = {echo->pool.x + SONDE_POOL, echo->pool.y + SONDE_POOL,
-                        echo->pool.z + SONDE_POOL, echo->pool.sign + SONDE_POOL};
-  for (uint32_t i = 0; i + each <= SONDE_LOOSE; i += each)
-    fill_share(&loose, echo->seed + 5, i, 2, each / 16);
-}
-
-// Streamlines evenly over a round section of unit width, so that the first n fill it for any n;
-// speed over the mean is 2 (1 - (r/R)^2).
-static void fill_blood(sonde_echo *echo) {
-  const scatter_pool *blood = &echo->blood;
-  for (uint32_t i = 0; i < SONDE_BLOOD; ++i) {
-    uint64_t j = 3 * (uint64_t)i, seed = echo->seed + 6;
-    double square = sonde_random_uniform(seed, j), r = 0.5 * sqrt(square);
-    double angle = 2 * SONDE_PI * sonde_random_uniform(seed, j + 1);
-    blood->x[i] = (float)(r * cos(angle)), blood->y[i] = (float)(r * sin(angle));
-    blood->z[i] = (float)sonde_random_uniform(seed, j + 2);
-    blood->sign[i] = (float)(2 * (1 - square));
-  }
-}
-
-static void fill_tables(sonde_echo *echo) {
-  fill_pools(echo);
-  fill_blood(echo);
-  for (uint64_t i = 0; i < SONDE_NOISE; ++i)
-    echo->noise[i] = (float)(sonde_random_normal(echo->seed + 1, i) * sqrt(0.5));
 }
 
 #define CARVE(pointer, count) ((pointer) = sonde_carve(block, &used, (count), sizeof *(pointer)))
@@ -180,7 +87,7 @@ static size_t carve(sonde_echo *echo, char *block) {
   CARVE(echo->coupling, lines);
   const double finest_m = LEAST_DEPTH_M / (double)(echo->samples - 1);
   CARVE(echo->grid,
-        (2 * most_lines + 16) * (sonde_tiers_window(cell_size_m, finest_m) + (size_t)2));
+        (2 * most_lines + 16) * (sonde_bands_window(cell_size_m, finest_m) + (size_t)2));
   for (int k = 0; k < SONDE_FINE; ++k) {
     CARVE(echo->line_re[k], most_lines / SONDE_FINE);
     CARVE(echo->line_im[k], most_lines / SONDE_FINE);
@@ -191,7 +98,7 @@ static size_t carve(sonde_echo *echo, char *block) {
   CARVE(echo->grey, image);
   CARVE(echo->noise, SONDE_NOISE);
   CARVE(echo->cubes, 1);
-  CARVE(echo->tiers, 1);
+  CARVE(echo->bands, 1);
   CARVE(echo->motion, 1);
   used = carve_pool(&echo->pool, block, used, 2 * SONDE_POOL + SONDE_LOOSE);
   return carve_pool(&echo->blood, block, used, SONDE_BLOOD);
@@ -217,7 +124,12 @@ static void forget_textures(sonde_echo *echo) {
   memset(echo->knots, 0xff, sizeof *echo->knots * echo->padded * TEXTURES * KNOT_FLOATS);
 }
 
-static sonde_status check_def(const sonde_echo_def *def, sonde_error *error) {
+sonde_status sonde_echo_create(const sonde_interior *interior, const sonde_echo_def *def,
+                               sonde_echo **echo, sonde_error *error) {
+  SONDE_ASSERT(interior != NULL && echo != NULL);
+  sonde_echo_def none = {0};
+  if (def == NULL) def = &none;
+  *echo = NULL;
   bool lines =
       def->line_count == 0 || (def->line_count >= 8 && def->line_count <= SONDE_MOST_LINES);
   bool samples =
@@ -229,17 +141,6 @@ static sonde_status check_def(const sonde_echo_def *def, sonde_error *error) {
   if (!(def->scatterers_per_m3 >= 0) || def->scatterers_per_m3 > 400e9)
     return sonde_fail(error, SONDE_ARGUMENT, "%g scatterers per m^3; expected 0 to 4e11",
                       def->scatterers_per_m3);
-  return SONDE_OK;
-}
-
-sonde_status sonde_echo_create(const sonde_interior *interior, const sonde_echo_def *def,
-                               sonde_echo **echo, sonde_error *error) {
-  SONDE_ASSERT(interior != NULL && echo != NULL);
-  sonde_echo_def none = {0};
-  if (def == NULL) def = &none;
-  *echo = NULL;
-  sonde_status status = check_def(def, error);
-  if (status != SONDE_OK) return status;
   sonde_echo *made = SONDE_NEW(sonde_echo, 1);
   if (made == NULL) return sonde_fail_memory(error);
   made->interior = interior;
@@ -259,7 +160,7 @@ sonde_status sonde_echo_create(const sonde_interior *interior, const sonde_echo_
     sonde_echo_destroy(made);
     return sonde_fail_memory(error);
   }
-  fill_tables(made);
+  sonde_scatterers_draw(made);
   forget_textures(made);
   sonde_echo_set_coupling(made, NULL);
   *echo = made;

@@ -65,12 +65,6 @@ typedef struct scatter_pool {
   float *x, *y, *z, *sign;
 } scatter_pool;
 
-// p = origin + axis[0] x + axis[1] y + axis[2] z for x, y, z in +-1/2, in image coordinates
-// (columns, metres beside the plane, rows).
-typedef struct map {
-  sonde_vec3 origin, axis[3];
-} map;
-
 struct sonde_echo {
   const sonde_interior *interior;
   const echo_kernels *kernels;
@@ -78,7 +72,7 @@ struct sonde_echo {
   uint32_t padded;                                           // lines in whole vectors
   uint32_t grid_stride, gain_stride;                         // floats per row of the grid, gains
   uint32_t grid_lines, grid_samples, pad_lines, pad_samples; // lines: columns of the grid
-  uint32_t window_rows, tier_rows, tier_count;               // of the grid's rows, tiers.h
+  uint32_t window_rows, band_rows, band_count;               // of the grid's rows, bands.h
   double density_m3, cell_m;
   uint32_t per_cell, per_piece; // scatterers of a cube and of an eighth of it
   uint64_t seed;
@@ -135,13 +129,15 @@ struct sonde_echo {
   double slab_m[SONDE_SLAB_ROWS + 1]; // half height, depths in even steps
   double spare_octaves[SONDE_SLAB_ROWS + 1]; // of scatterers there, beyond what speckle needs
   struct sonde_cubes *cubes;                 // cubes.h
-  struct sonde_tiers *tiers;                 // tiers.h
+  struct sonde_bands *bands;                 // bands.h
   struct sonde_fields *motion;               // of this frame
-  uint32_t cell_count, moved, bled;          // cells and scatterers of the last frame
+  uint32_t moved, bled;                      // scatterers of the last frame, blood among them
   uint32_t lost;                             // cells, maps and lumina for which there was no room
   sonde_echo_times times;
 };
 
+// Tables of scatterers, streamlines and noise of a new renderer.
+void sonde_scatterers_draw(sonde_echo *echo);
 // Lines, samples and focus from what the operator sets; the key of the beam they need.
 void sonde_echo_geometry(sonde_echo *echo, double aperture_m, const sonde_echo_settings *settings);
 beam_key sonde_echo_key(const frame *f);
@@ -156,14 +152,11 @@ void sonde_echo_medium(sonde_echo *echo);
 void sonde_sheet_begin(sonde_echo *echo);
 void sonde_sheet_add(sonde_echo *echo, uint32_t line, float depth_m, float rise_m, float amplitude);
 void sonde_sheet_lay(sonde_echo *echo, uint32_t row, float gain);
-// Tissue and blood, which then wait for their tiers.
+// Tissue (cubes.h) and blood, which then wait for their bands of rows (bands.h).
 void sonde_echo_scatter(sonde_echo *echo);
 void sonde_echo_blood(sonde_echo *echo);
-// Those of the points that belong to a tier.
-void sonde_echo_scatter_points(sonde_echo *echo, const sonde_echo_point *points, uint32_t count,
-                               uint32_t tier);
-// The rows of a tier that has been laid.
-void sonde_echo_beam(sonde_echo *echo, uint32_t tier, bool tissue);
+// The rows of a band that has been laid.
+void sonde_echo_beam(sonde_echo *echo, uint32_t band, bool tissue);
 // Time-gain compensation at a depth, dB: the operator's slope up to the scanner's ceiling.
 double sonde_echo_compensation_db(const frame *f, double depth_m);
 // After the last one.
@@ -185,12 +178,6 @@ sonde_vec3 sonde_echo_to_world(const sonde_echo *echo, sonde_vec3 at);
 sonde_vec3 sonde_echo_from_world(const sonde_echo *echo, sonde_vec3 point_m);
 // Half height of the slab at a depth.
 double sonde_echo_elevation(const sonde_echo *echo, double depth_m);
-// Scatterers of maps of a pool into the grid.
-void sonde_echo_splat(sonde_echo *echo, const scatter_pool *pool, const splat_map *first,
-                      uint32_t maps, const splat_lumen *lumen, splat_limits rows);
-// What the jobs of all of them have in common.
-splat_job sonde_echo_splat_job(sonde_echo *echo);
-
 // Share of the amplitude in a lumen that is clutter and moves with the tissue; the blood has the
 // rest of the power. Measurements without texture are without clutter.
 static inline float sonde_clutter(const sonde_echo *echo) { return echo->plain ? 0 : 0.7f; }

@@ -11,7 +11,7 @@
 // lateral    symmetric complex kernels of rank three on one row
 // axial      real kernels down the rows, noise, compensation, modulus, logarithm
 // add_row, add_rows  its sums, as the registers allow
-// gather_tissue, even_tissue, tissue  in kernel_carry.h, kernel_tissue.h
+// gather_tissue, even_tissue, tissue  in kernel_walls.h, kernel_tissue.h
 // merge      a row of the grid, times its gain, to even and odd columns
 // widen, mix rows of the coarse plane, per line and between two
 // fade       attenuation and clutter of a row
@@ -20,7 +20,7 @@
 
 #include "base/base.h"
 #include "echo/kernel.h"
-#include "echo/kernel_carry.h"
+#include "echo/kernel_walls.h"
 #include "echo/kernel_tissue.h"
 
 #include <string.h>
@@ -183,7 +183,7 @@ static void splat(const splat_job *job) {
 static void stream(const stream_job *job) {
   const float *restrict z = job->z, *restrict speed = job->speed;
   float *restrict place = job->at, *restrict sign = job->sign;
-  const double way = job->way;
+  const double way = job->flowed;
   const uint32_t salt = job->salt * 0xc2b2ae3du, first = job->first;
   const int32_t segment = job->segment;
   SONDE_ASSERT(job->count <= 0x7fffffff);

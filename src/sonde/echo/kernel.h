@@ -78,21 +78,21 @@ typedef enum wall_field {
 } wall_field;
 
 enum {
-  CARRY_GROUPS = 64,
-  CARRY_POINTS = 4 * CARRY_GROUPS,
-  WALL_ROOM = CARRY_GROUPS + ECHO_ALIGN // whole vectors read beyond the last
+  WALL_GROUPS = 64,
+  WALL_POINTS = 4 * WALL_GROUPS,
+  WALL_ROOM = WALL_GROUPS + ECHO_ALIGN // whole vectors read beyond the last
 };
 
 // Points of the tissue, in groups of four that share the vessels beside them: where those gather
 // them before the field moves them, and where they even it out.
-typedef struct carry_job {
+typedef struct wall_job {
   uint32_t groups, walls;
   const float (*wall)[WALL_FIELDS][WALL_ROOM]; // [walls]
-  const float (*rest)[CARRY_POINTS];           // [3]
-  float (*gathered)[CARRY_POINTS];             // [3] of gather(); read by even()
-  float (*place)[CARRY_POINTS];                // [3] of even(): of the gathered point by the field
+  const float (*rest)[WALL_POINTS];            // [3]
+  float (*gathered)[WALL_POINTS];              // [3] of gather(); read by even()
+  float (*place)[WALL_POINTS];                 // [3] of even(): of the gathered point by the field
                                                // alone; replaced
-} carry_job;
+} wall_job;
 
 // A row of the grid, times a gain, to even and odd columns; leaves zeros.
 typedef struct merge_job {
@@ -108,7 +108,7 @@ typedef struct merge_job {
 typedef struct stream_job {
   const float *z, *speed; // [count] place at the start, speed over the mean
   uint32_t count, first;  // number of the first streamline
-  double way;             // of the mean flow, in segments
+  double flowed;          // by the mean flow, in segments
   int32_t segment;
   uint32_t salt;
   float *at, *sign; // [count] place about the segment's middle; +-1
@@ -206,8 +206,8 @@ typedef struct convert_job {
 typedef struct echo_kernels {
   const char *name;
   void (*splat)(const splat_job *job);
-  void (*gather)(const carry_job *job);
-  void (*even)(const carry_job *job);
+  void (*gather)(const wall_job *job);
+  void (*even)(const wall_job *job);
   void (*stream)(const stream_job *job);
   void (*lateral)(const lateral_job *job);
   void (*axial)(const axial_job *job);

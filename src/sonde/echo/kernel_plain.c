@@ -74,7 +74,7 @@ static sonde_vessel_state vessel_of(const float (*wall)[WALL_ROOM], uint32_t gro
   return v;
 }
 
-static uint32_t vessels_near(const carry_job *job, uint32_t group,
+static uint32_t vessels_near(const wall_job *job, uint32_t group,
                              sonde_vessel_state near[MOST_VESSELS]) {
   uint32_t count = 0;
   for (uint32_t k = 0; k < job->walls; ++k)
@@ -82,11 +82,11 @@ static uint32_t vessels_near(const carry_job *job, uint32_t group,
   return count;
 }
 
-static sonde_vec3 point_of(const float (*from)[CARRY_POINTS], uint32_t i) {
+static sonde_vec3 point_of(const float (*from)[WALL_POINTS], uint32_t i) {
   return vec3((double)from[0][i], (double)from[1][i], (double)from[2][i]);
 }
 
-static void gather(const carry_job *job) {
+static void gather(const wall_job *job) {
   for (uint32_t i = 0; i < 4 * job->groups; ++i) {
     sonde_vessel_state near[MOST_VESSELS];
     uint32_t count = vessels_near(job, i / 4, near);
@@ -95,12 +95,12 @@ static void gather(const carry_job *job) {
   }
 }
 
-static void even(const carry_job *job) {
+static void even(const wall_job *job) {
   for (uint32_t i = 0; i < 4 * job->groups; ++i) {
     sonde_vessel_state near[MOST_VESSELS];
     uint32_t count = vessels_near(job, i / 4, near);
-    sonde_vec3 gathered = point_of((const float(*)[CARRY_POINTS])job->gathered, i);
-    sonde_vec3 place = point_of((const float(*)[CARRY_POINTS])job->place, i);
+    sonde_vec3 gathered = point_of((const float(*)[WALL_POINTS])job->gathered, i);
+    sonde_vec3 place = point_of((const float(*)[WALL_POINTS])job->place, i);
     sonde_vec3 at = sonde_vessels_even(near, count, point_of(job->rest, i), gathered, place);
     for (int c = 0; c < 3; ++c) job->place[c][i] = (float)v_coordinate(at, c);
   }
@@ -108,7 +108,7 @@ static void even(const carry_job *job) {
 
 static void stream(const stream_job *job) {
   for (uint32_t i = 0; i < job->count; ++i) {
-    double at = (double)job->z[i] + job->way * (double)job->speed[i], whole = floor(at);
+    double at = (double)job->z[i] + job->flowed * (double)job->speed[i], whole = floor(at);
     uint32_t train = (uint32_t)(job->segment - (int32_t)whole);
     uint32_t h = train * 0x9e3779b1u ^ (job->first + i) * 0x85ebca77u ^ job->salt * 0xc2b2ae3du;
     h = (h ^ (h >> 15)) * 0x2c1b3c6du;

@@ -1,15 +1,6 @@
-// March along the scan lines through the deformed tissue: backscatter, attenuation, interfaces,
-// shadow of the bone, air. Constants and sources: docs/echo.md.
-//
-// sonde_echo_medium  all rows of the march
-// place_lines, widen, next_row    coarse plane -> one row, per line
-// roughness          of an interface along its surface
-// interface_of, salt_of, hidden  what a level stands for and where it does not count
-// cross, cross_levels  a level's zero between two rows becomes an echo
-// materials          of what is in view
-// mark_air           lines whose face does not touch the skin
-// store_gain         of a row
-// blur               an aperture looks past small obstacles
+// Second stage of a frame: a march along the scan lines through the deformed tissue gives
+// backscatter, attenuation, interfaces, the shadow of the bone, and air. Constants and sources:
+// docs/echo.md.
 #include "base/base.h"
 #include "base/random.h"
 #include "echo/echo.h"
@@ -44,39 +35,24 @@ static const interface lesion_edges[SONDE_LESION_KINDS] = {
 static const float rough_share = 0.3f, rough_m = 0.4e-3f;
 static const float wall_m[2] = {0.6e-3f, 0.9e-3f}, thin_wall = 0.25f; // of a branch's radius
 
-static void place_lines(sonde_echo *echo) {
-  float per_line = (float)(1 / echo->lines_per_column);
-  for (uint32_t l = 0; l < echo->padded; ++l) {
-    float x =
-        ((float)echo->frame.edge_lines + (float)(l < echo->lines ? l : echo->lines - 1)) * per_line;
-    uint32_t i = (uint32_t)x < SONDE_PLANE_COLUMNS - 2 ? (uint32_t)x : SONDE_PLANE_COLUMNS - 2;
-    echo->line_column[l] = (int32_t)i;
-    echo->line_share[l] = x - (float)i;
-  }
-}
-
-// A coarse row, per line.
-static void widen(sonde_echo *echo, uint32_t coarse, float *wide) {
-  SONDE_ASSERT(coarse < echo->plane_rows);
-  widen_job job = {.column = echo->line_column, .share = echo->line_share, .lines = echo->padded};
-  for (uint32_t field = 0; field < echo->fields; ++field) {
-    job.in = echo->plane + field * SONDE_PLANE_NODES + coarse * SONDE_PLANE_COLUMNS;
-    job.out = wide + field * echo->padded;
-    echo->kernels->widen(&job);
-  }
-}
-
-// Fields of a row; coarse rows are widened when the march reaches them.
-static void next_row(sonde_echo *echo, uint32_t row, uint32_t *reached) {
-  const uint32_t last = echo->plane_rows - 2;
+// Fields of a row of the march, per line: between two coarse rows, which are widened to the lines
+// when the march reaches them.
+static void interpolate_row(sonde_echo *echo, uint32_t row, uint32_t *reached) {
+  const uint32_t last = echo->plane_rows - 2, size = echo->fields * echo->padded;
   float y = (float)(row * (last + 1)) / (SONDE_MEDIUM_ROWS - 1);
   uint32_t j = (uint32_t)y < last ? (uint32_t)y : last;
-  uint32_t size = echo->fields * echo->padded;
-  for (; *reached < j + 2; ++*reached) widen(echo, *reached, echo->wide + *reached % 2 * size);
+  widen_job job = {.column = echo->line_column, .share = echo->line_share, .lines = echo->padded};
+  for (; *reached < j + 2; ++*reached)
+    for (uint32_t field = 0; field < echo->fields; ++field) {
+      job.in = echo->plane + field * SONDE_PLANE_NODES + *reached * SONDE_PLANE_COLUMNS;
+      job.out = echo->wide + *reached % 2 * size + field * echo->padded;
+      echo->kernels->widen(&job);
+    }
   echo->kernels->mix(echo->wide + j % 2 * size, echo->wide + (j + 1) % 2 * size, y - (float)j,
                      echo->row, size);
 }
 
+// Random number in [-1, 1) of a lattice point.
 static float knot(int32_t a, int32_t b, uint32_t salt) {
   uint32_t h = (uint32_t)a * 0x9e3779b1u ^ (uint32_t)b * 0x85ebca77u ^ salt * 0xc2b2ae3du;
   h = (h ^ (h >> 15)) * 0x2c1b3c6du;
@@ -97,25 +73,8 @@ static float roughness(const sonde_echo *echo, uint32_t l, uint32_t salt) {
   return top + b * (low - top);
 }
 
-static const interface *interface_of(const sonde_echo *echo, uint32_t level) {
-  if (level < LAYER_LEVELS) return &interfaces[level];
-  level -= LAYER_LEVELS;
-  if (level < echo->shown_count) return &vessel_wall;
-  SONDE_ASSERT(level - echo->shown_count < echo->lesion_count);
-  return &lesion_edges[echo->interior->findings.lesion[echo->lesion[level - echo->shown_count]]
-                           .kind];
-}
-
-// Of the roughness: stays with the thing, whatever else is in view.
-static uint32_t salt_of(const sonde_echo *echo, uint32_t level) {
-  if (level < LAYER_LEVELS) return level;
-  level -= LAYER_LEVELS;
-  if (level < echo->shown_count) return LAYER_LEVELS + echo->shown[level];
-  return MOST_LEVELS + echo->lesion[level - echo->shown_count];
-}
-
 // Layers end at vessels and lesions, lesions at vessels, and branches open into their parents.
-static bool hidden(const sonde_echo *echo, const float *now, uint32_t l, uint32_t level) {
+static bool is_hidden(const sonde_echo *echo, const float *now, uint32_t l, uint32_t level) {
   const uint32_t n = echo->padded, walls = LAYER_LEVELS, edges = walls + echo->shown_count;
   if (level == 0 || level == CORTEX) return false;
   for (uint32_t k = walls; k < edges; ++k) {
@@ -128,50 +87,52 @@ static bool hidden(const sonde_echo *echo, const float *now, uint32_t l, uint32_
   return false;
 }
 
-// A level that changes sign between the last row and this one reflects.
-static void cross(sonde_echo *echo, uint32_t row, uint32_t l, uint32_t which) {
-  const interface *kind = interface_of(echo, which);
-  const float *now = echo->level[row % 2] + which * echo->padded;
-  float before = echo->level[(row + 1) % 2][which * echo->padded + l];
-  uint32_t left = l > 0 ? l - 1 : l, right = l + 1 < echo->lines ? l + 1 : l;
-  float dz = (float)(echo->frame.depth_m / (SONDE_MEDIUM_ROWS - 1));
-  float t = before / (before - now[l]), slope = (now[l] - before) / dz;
-  float across = (now[right] - now[left]) / (float)(right - left);
-  float rise = -across / (SONDE_FINE * (fabsf(slope) > 1e-6f ? slope : 1e-6f));
-  float rough = echo->plain ? 0 : 4 * roughness(echo, l, salt_of(echo, which));
-  float amplitude = echo->coupling[l] * amplitude_of_db(kind->db + rough - echo->loss_db[l]);
-  sonde_sheet_add(echo, l, ((float)row - 1 + t) * dz, rise, amplitude);
-  echo->loss_db[l] += kind->loss_db;
-  if (which == CORTEX)
-    echo->rough[l] *= amplitude_of_db(kind->loss_db); // facets lie above the loss
-}
-
-static void cross_levels(sonde_echo *echo, uint32_t row, const uint8_t *crossed) {
-  const uint32_t n = echo->padded;
+// A level that changes sign between the last row and this one is an interface, which reflects.
+static void add_interfaces(sonde_echo *echo, uint32_t row, const uint8_t *crossed) {
+  const uint32_t n = echo->padded, edges = LAYER_LEVELS + echo->shown_count;
+  const sonde_lesion *lesion = echo->interior->findings.lesion;
   const float *now = echo->level[row % 2], *before = echo->level[(row + 1) % 2];
+  const float dz = (float)(echo->frame.depth_m / (SONDE_MEDIUM_ROWS - 1));
   for (uint32_t l = 0; l < echo->lines; ++l) {
     if (!crossed[l / ECHO_ALIGN] || echo->air[l]) continue;
     for (uint32_t which = 0; which < echo->levels; ++which) {
-      uint32_t k = which * n + l;
-      if ((before[k] < 0) == (now[k] < 0)) continue;
-      if (!hidden(echo, now, l, which)) cross(echo, row, l, which);
+      const float *level = now + which * n, last = before[which * n + l];
+      if ((last < 0) == (level[l] < 0) || is_hidden(echo, now, l, which)) continue;
+      // What reflects, and the salt of its roughness: it stays whatever else is in view.
+      const interface *kind = &interfaces[which % LAYER_LEVELS];
+      uint32_t salt = which;
+      if (which >= edges) {
+        const uint32_t number = echo->lesion[which - edges];
+        kind = &lesion_edges[lesion[number].kind], salt = MOST_LEVELS + number;
+      } else if (which >= LAYER_LEVELS) {
+        kind = &vessel_wall, salt = LAYER_LEVELS + echo->shown[which - LAYER_LEVELS];
+      }
+      // Where between the rows, and how much deeper from column to column.
+      uint32_t left = l > 0 ? l - 1 : l, right = l + 1 < echo->lines ? l + 1 : l;
+      float t = last / (last - level[l]), slope = (level[l] - last) / dz;
+      float across = (level[right] - level[left]) / (float)(right - left);
+      float rise = -across / (SONDE_FINE * (fabsf(slope) > 1e-6f ? slope : 1e-6f));
+      float rough = echo->plain ? 0 : 4 * roughness(echo, l, salt);
+      float amplitude = echo->coupling[l] * amplitude_of_db(kind->db + rough - echo->loss_db[l]);
+      sonde_sheet_add(echo, l, ((float)row - 1 + t) * dz, rise, amplitude);
+      echo->loss_db[l] += kind->loss_db;
+      if (which == CORTEX)
+        echo->rough[l] *= amplitude_of_db(kind->loss_db); // facets lie above the loss
     }
   }
 }
 
-// Bands at multiples of the face's own thickness, fading; as loud as what does not couple in.
-static void reverberate(sonde_echo *echo, uint32_t l, float loudness) {
-  for (int k = 0; k < 6; ++k)
-    sonde_sheet_add(echo, l, 0.4e-3f + 1.3e-3f * (float)k, 0,
-                    loudness * 6.0f * exp2f(-1.4f * (float)k));
-}
-
+// Lines whose face does not touch the skin. A face reverberates: bands at multiples of its own
+// thickness, fading, as loud as what does not couple in.
 static void mark_air(sonde_echo *echo) {
   echo->some_air = false;
   for (uint32_t l = 0; l < echo->padded; ++l) {
     echo->air[l] = echo->row[PLANE_DEPTH * echo->padded + l] < -air_gap_m;
-    if (l < echo->lines) reverberate(echo, l, echo->air[l] ? 1 : 1 - echo->coupling[l]);
     echo->some_air = echo->some_air || echo->air[l];
+    const float loudness = echo->air[l] ? 1 : 1 - echo->coupling[l];
+    for (int k = 0; k < 6 && l < echo->lines; ++k)
+      sonde_sheet_add(echo, l, 0.4e-3f + 1.3e-3f * (float)k, 0,
+                      loudness * 6.0f * exp2f(-1.4f * (float)k));
   }
 }
 
@@ -217,43 +178,29 @@ static void store_gain(sonde_echo *echo, uint32_t row) {
   for (uint32_t l = last + 1; l < echo->gain_stride; ++l) gain[l] = gain[last];
 }
 
-// A fresh clot (echogenicity 0.25) scatters as blood does and is as even; old ones are brighter,
-// with lumps and layers.
-static tissue_vessel vessel_of(const sonde_pathology *p, uint32_t which, float wall_m_here,
-                               bool vein) {
-  const float fresh = 0.25f, fresh_db = -24.4f, db_per_echogenicity = 24;
-  float more = (float)p->echogenicity - fresh, age = fminf(fmaxf(more / 0.7f, 0), 1);
-  return (tissue_vessel){.wall_m = wall_m_here,
-                         .clot_fraction = vein ? (float)p->thrombus_fraction : 0,
-                         .clot_scatter = amplitude_of_db(fresh_db + db_per_echogenicity * more),
-                         .clot_loss = 18 + 40 * age,
-                         .lumps_db = 1.5f + 4 * age,
-                         .layers_db = 8 * age,
-                         .number = which};
-}
-
-// Facets lie thinner than the pulse is long, which they fill only in part. The energy of a tent is
-// two thirds of its height's over its half width; that of the pulse is 0.83 wavelengths of its
-// peak's.
-static void roughen(const sonde_echo *echo, tissue_job *job) {
-  const float row_m = (float)(echo->frame.depth_m / (SONDE_MEDIUM_ROWS - 1));
-  job->rough_m = fmaxf(rough_m, row_m);
-  float filled = 0.83f * (float)echo->frame.wavelength_m / (job->rough_m * 2 / 3);
-  job->rough_bone = echo->plain ? 0 : rough_share * amplitude_of_db(interfaces[CORTEX].db);
-  job->rough_bone *= sqrtf(1 + filled);
-}
-
-static void materials(const sonde_echo *echo, tissue_job *job) {
+// Materials of what is in view.
+static void describe_tissue(const sonde_echo *echo, tissue_job *job) {
   const sonde_interior *in = echo->interior;
   job->vessels = echo->shown_count, job->lesions = echo->lesion_count;
   job->webs = (float)in->findings.webs, job->oedema = (float)in->findings.oedema;
+  // A fresh clot (echogenicity 0.25) scatters as blood does and is as even; old ones are brighter,
+  // with lumps and layers.
+  const float fresh = 0.25f, fresh_db = -24.4f, db_per_echogenicity = 24;
   for (uint32_t k = 0; k < job->vessels; ++k) {
-    uint32_t which = echo->shown[k];
+    const uint32_t which = echo->shown[k];
     const sonde_pathology *p = sonde_echo_pathology(echo, which);
-    bool vein = in->kind[which] == SONDE_VESSEL_VEIN;
     float wall = wall_m[in->kind[which]];
     if (which >= 2) wall = fminf(wall, thin_wall * (float)in->station[which][0].radius_m);
-    job->vessel[k] = vessel_of(p, which, wall, vein);
+    float more = (float)p->echogenicity - fresh, age = fminf(fmaxf(more / 0.7f, 0), 1);
+    bool vein = in->kind[which] == SONDE_VESSEL_VEIN;
+    job->vessel[k] =
+        (tissue_vessel){.wall_m = wall,
+                        .clot_fraction = vein ? (float)p->thrombus_fraction : 0,
+                        .clot_scatter = amplitude_of_db(fresh_db + db_per_echogenicity * more),
+                        .clot_loss = 18 + 40 * age,
+                        .lumps_db = 1.5f + 4 * age,
+                        .layers_db = 8 * age,
+                        .number = which};
   }
   for (uint32_t k = 0; k < job->lesions; ++k) {
     const sonde_lesion *l = &in->findings.lesion[echo->lesion[k]];
@@ -262,6 +209,14 @@ static void materials(const sonde_echo *echo, tissue_job *job) {
         {(float)(1 / l->half_m.x), (float)(1 / l->half_m.y), (float)(1 / l->half_m.z)},
         (float)l->echogenicity};
   }
+  // Facets of the cortex lie thinner than the pulse is long, which they fill only in part. The
+  // energy of a tent is two thirds of its height's over its half width; that of the pulse is 0.83
+  // wavelengths of its peak's.
+  const float row_m = (float)(echo->frame.depth_m / (SONDE_MEDIUM_ROWS - 1));
+  job->rough_m = fmaxf(rough_m, row_m);
+  float filled = 0.83f * (float)echo->frame.wavelength_m / (job->rough_m * 2 / 3);
+  job->rough_bone = echo->plain ? 0 : rough_share * amplitude_of_db(interfaces[CORTEX].db);
+  job->rough_bone *= sqrtf(1 + filled);
 }
 
 void sonde_echo_medium(sonde_echo *echo) {
@@ -279,21 +234,26 @@ void sonde_echo_medium(sonde_echo *echo) {
                     .loss = echo->loss,
                     .rough = echo->rough,
                     .crossed = crossed};
-  materials(echo, &job);
-  roughen(echo, &job);
+  describe_tissue(echo, &job);
   memset(echo->loss_db, 0, lines * sizeof *echo->loss_db);
   memset(echo->tail, 0, lines * sizeof *echo->tail);
   sonde_sheet_begin(echo);
-  place_lines(echo);
+  // Each line lies between two columns of the coarse plane.
+  for (uint32_t l = 0; l < lines; ++l) {
+    uint32_t line = l < echo->lines ? l : echo->lines - 1;
+    float x = ((float)f->edge_lines + (float)line) * (float)(1 / echo->lines_per_column);
+    uint32_t i = (uint32_t)x < SONDE_PLANE_COLUMNS - 2 ? (uint32_t)x : SONDE_PLANE_COLUMNS - 2;
+    echo->line_column[l] = (int32_t)i, echo->line_share[l] = x - (float)i;
+  }
   for (uint32_t row = 0; row < SONDE_MEDIUM_ROWS; ++row) {
-    next_row(echo, row, &reached);
+    interpolate_row(echo, row, &reached);
     job.level = echo->level[row % 2], job.before = echo->level[(row + 1) % 2];
     echo->kernels->tissue(&job);
     job.rows_per_m = (float)((SONDE_MEDIUM_ROWS - 1) / f->depth_m);
     if (row == 0) mark_air(echo);
     blur(echo, echo->loss_db);
     blur(echo, echo->tail);
-    if (row > 0) cross_levels(echo, row, crossed);
+    if (row > 0) add_interfaces(echo, row, crossed);
     for (uint32_t l = 0; l < lines && echo->some_air; ++l)
       if (echo->air[l]) echo->scatter[l] = echo->rough[l] = 0;
     for (uint32_t l = 0; l < lines; ++l)

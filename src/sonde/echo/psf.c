@@ -4,15 +4,6 @@
 // sum of delayed pulses; three real kernels span these well for all depths at once. They are the
 // leading singular vectors of all bands' rows together, found by subspace iteration from the pulse
 // and its derivatives. What is left per band are the three complex lateral kernels.
-//
-// sonde_psf_begin, sonde_psf_step  all of it, band by band, then the kernels
-// tabulate          exact responses of a band
-// sharpen           takes off what the splat widens
-// depth_of_band, add_band  response of one band
-// add_gram, mirror_gram, iterate  shared axial kernels
-// orthonormalise    Gram-Schmidt
-// measure_sheet     what a level sheet echoes
-// project           lateral kernels of a band, their reach
 #include "echo/psf.h"
 
 #include "base/base.h"
@@ -35,8 +26,8 @@ sonde_array sonde_beam_array(const beam_key *key) {
   return a;
 }
 
-double sonde_psf_band(const beam_psf *psf, double depth_m, int *band) {
-  int b = 0, high = SONDE_BANDS - 2;
+double sonde_psf_depth(const beam_psf *psf, double depth_m, int *above) {
+  int b = 0, high = SONDE_PSF_DEPTHS - 2;
   while (b < high) {
     int middle = (b + high) / 2;
     if (depth_m > psf->depth_m[middle + 1])
@@ -44,45 +35,11 @@ double sonde_psf_band(const beam_psf *psf, double depth_m, int *band) {
     else
       high = middle;
   }
-  *band = b;
+  *above = b;
   return clamp((depth_m - psf->depth_m[b]) / (psf->depth_m[b + 1] - psf->depth_m[b]), 0, 1);
 }
 
-static void tabulate(beam_psf *psf, const sonde_array *array, int b) {
-  SONDE_ASSERT(b >= 0 && b < SONDE_BANDS);
-  const beam_key *key = &psf->key;
-  double z = psf->depth_m[b], k = 2 * SONDE_PI * key->frequency_hz / sonde_sound_m_s;
-  int rows = 2 * psf->half_rows + 1;
-  for (int l = 0; l <= psf->half_lines; ++l) {
-    double x = l * key->pitch_m, depth = z;
-    if (key->radius_m > 0) {
-      double angle = x / key->radius_m;
-      x = (key->radius_m + z) * sin(angle);
-      depth = (key->radius_m + z) * cos(angle) - key->radius_m;
-    }
-    double *out = psf->table[b][l], c = cos(2 * k * z), s = sin(2 * k * z);
-    sonde_array_line(array, x, depth, z - psf->half_rows * key->step_m, key->step_m, (uint32_t)rows,
-                     out);
-    for (int n = 0; n < rows; ++n) { // the splat brings the carrier's phase
-      double re = out[2 * n], im = out[2 * n + 1];
-      out[2 * n] = re * c - im * s, out[2 * n + 1] = re * s + im * c;
-    }
-  }
-}
-
 static double weight_of(int line) { return line == 0 ? 1 : 2; } // both sides
-
-// Scales a band to unit energy.
-static void normalise(beam_psf *psf, int b) {
-  int width = 2 * (2 * psf->half_rows + 1);
-  double energy = 0;
-  for (int l = 0; l <= psf->half_lines; ++l)
-    for (int i = 0; i < width; ++i)
-      energy += weight_of(l) * psf->table[b][l][i] * psf->table[b][l][i];
-  double scale = energy > 0 ? 1 / sqrt(energy) : 0;
-  for (int l = 0; l <= psf->half_lines; ++l)
-    for (int i = 0; i < width; ++i) psf->table[b][l][i] *= scale;
-}
 
 // Inverse of what the splat widens, by least squares over all places between lines and samples,
 // to fourth order in the differences d along an axis: 1 - second d^2 + fourth d^4. Two linear taps
@@ -90,59 +47,49 @@ static void normalise(beam_psf *psf, int b) {
 static const double line_second = 1.0 / 12, line_fourth = 7.0 / 720;
 static const double sample_second = 1.0 / 8, sample_fourth = 0.01927;
 
-static void sharpen_rows(double *p, int rows) {
-  double line[2 * ROWS];
-  memcpy(line, p, sizeof(double) * 2 * (size_t)rows);
-  for (int i = 0; i < 2 * rows; ++i) {
-    double at[5];
-    for (int k = -2; k <= 2; ++k) {
-      int j = i + 2 * k;
-      at[k + 2] = j >= 0 && j < 2 * rows ? line[j] : 0;
-    }
-    p[i] -= sample_second * (at[1] - 2 * at[2] + at[3]);
-    p[i] += sample_fourth * (at[0] - 4 * at[1] + 6 * at[2] - 4 * at[3] + at[4]);
-  }
+static double sharpened(const double at[5], double second, double fourth) {
+  double p = at[2] - second * (at[1] - 2 * at[2] + at[3]);
+  return p + fourth * (at[0] - 4 * at[1] + 6 * at[2] - 4 * at[3] + at[4]);
 }
 
-static void sharpen(beam_psf *psf, int b) {
-  int rows = 2 * psf->half_rows + 1, lines = psf->half_lines;
-  double column[SONDE_MOST_TAPS + 1];
-  for (int l = 0; l <= lines; ++l) sharpen_rows(psf->table[b][l], rows);
+// Across the samples of each line, then across the lines.
+static void sharpen(double table[][2 * ROWS], int lines, int rows) {
+  double at[5], row[2 * ROWS], column[SONDE_MOST_TAPS + 1];
+  for (int l = 0; l <= lines; ++l) {
+    memcpy(row, table[l], sizeof row);
+    for (int i = 0; i < 2 * rows; ++i) {
+      for (int k = -2; k <= 2; ++k) {
+        int j = i + 2 * k;
+        at[k + 2] = j >= 0 && j < 2 * rows ? row[j] : 0;
+      }
+      table[l][i] = sharpened(at, sample_second, sample_fourth);
+    }
+  }
   for (int i = 0; i < 2 * rows; ++i) {
-    for (int l = 0; l <= lines; ++l) column[l] = psf->table[b][l][i];
+    for (int l = 0; l <= lines; ++l) column[l] = table[l][i];
     for (int l = 0; l <= lines; ++l) {
-      double at[5];
       for (int k = -2; k <= 2; ++k) at[k + 2] = abs(l + k) <= lines ? column[abs(l + k)] : 0;
-      psf->table[b][l][i] -= line_second * (at[1] - 2 * at[2] + at[3]);
-      psf->table[b][l][i] += line_fourth * (at[0] - 4 * at[1] + 6 * at[2] - 4 * at[3] + at[4]);
+      table[l][i] = sharpened(at, line_second, line_fourth);
     }
   }
 }
 
-// Adds one band to the lower triangle.
+// Adds the rows of a response to the lower triangle of the Gram matrix. Interfaces are the
+// brightest echoes: what a level sheet echoes, the sum over the lines, counts besides.
 static void add_gram(beam_psf *psf, int b) {
   int rows = 2 * psf->half_rows + 1;
+  double sum[2 * ROWS] = {0};
   for (int l = 0; l <= psf->half_lines; ++l) {
     const double *p = psf->table[b][l];
     double w = weight_of(l);
     for (int i = 0; i < rows; ++i)
       for (int j = 0; j <= i; ++j)
         psf->gram[i][j] += w * (p[2 * i] * p[2 * j] + p[2 * i + 1] * p[2 * j + 1]);
+    for (int i = 0; i < 2 * rows; ++i) sum[i] += w * p[i];
   }
-  // Interfaces are the brightest echoes: what a level sheet echoes, the sum over the lines, counts
-  // besides.
-  double sum[2 * ROWS] = {0};
-  for (int l = 0; l <= psf->half_lines; ++l)
-    for (int i = 0; i < 2 * rows; ++i) sum[i] += weight_of(l) * psf->table[b][l][i];
   for (int i = 0; i < rows; ++i)
     for (int j = 0; j <= i; ++j)
       psf->gram[i][j] += sheet_weight * (sum[2 * i] * sum[2 * j] + sum[2 * i + 1] * sum[2 * j + 1]);
-}
-
-static void mirror_gram(beam_psf *psf) {
-  int rows = 2 * psf->half_rows + 1;
-  for (int i = 0; i < rows; ++i)
-    for (int j = 0; j < i; ++j) psf->gram[j][i] = psf->gram[i][j];
 }
 
 static void orthonormalise(double v[SONDE_RANK][ROWS], int rows) {
@@ -165,9 +112,12 @@ static double pulse_rows(const beam_psf *psf) {
   return a.pulse_wavelengths * a.sound_m_s / a.frequency_hz / 2.35482 / psf->key.step_m;
 }
 
-static void iterate(beam_psf *psf) {
+// Shared axial kernels: the leading vectors of the Gram matrix by subspace iteration.
+static void find_axial(beam_psf *psf) {
   int rows = 2 * psf->half_rows + 1;
   double product[SONDE_RANK][ROWS], sigma = pulse_rows(psf);
+  for (int i = 0; i < rows; ++i)
+    for (int j = 0; j < i; ++j) psf->gram[j][i] = psf->gram[i][j];
   for (int i = 0; i < rows; ++i) {
     double x = (i - psf->half_rows) / sigma, e = exp(-0.5 * x * x);
     psf->axial[0][i] = e, psf->axial[1][i] = x * e, psf->axial[2][i] = (x * x - 1) * e;
@@ -212,7 +162,8 @@ static void measure_sheet(beam_psf *psf, int b) {
   SONDE_ASSERT(psf->sheet[b] > 0);
 }
 
-static void project(beam_psf *psf, int b) {
+// Lateral kernels that belong to the axial ones at a depth, and how far they reach.
+static void find_lateral(beam_psf *psf, int b) {
   int rows = 2 * psf->half_rows + 1;
   double energy = 0, kept[SONDE_MOST_TAPS + 1], whole = 0;
   for (int l = 0; l <= psf->half_lines; ++l) {
@@ -258,36 +209,59 @@ void sonde_psf_begin(beam_psf *psf, const beam_key *key) {
   memset(psf->gram, 0, sizeof psf->gram);
 }
 
-// Bands lie at even steps up to a knee before the focus, below which the response changes most, and
-// from there on at steps that grow with the power 3/2 of the depth.
-static double depth_of_band(const beam_key *key, int b) {
+// Depths lie at even steps up to a knee before the focus, below which the response changes most,
+// and from there on at steps that grow with the power 3/2 of the depth.
+static double depth_of(const beam_key *key, int b) {
   double knee = fmax(0.7 * key->focus_m, 0.125 * key->depth_m);
   double first = first_depth_m / knee, last = key->depth_m / knee;
   if (last > 1) last = 3 - 2 / sqrt(last);
-  double u = first + (last - first) * b / (SONDE_BANDS - 1);
+  double u = first + (last - first) * b / (SONDE_PSF_DEPTHS - 1);
   return knee * (u < 1 ? u : 4 / ((3 - u) * (3 - u)));
 }
 
-static void add_band(beam_psf *psf, int b) {
-  sonde_array array = sonde_beam_array(&psf->key);
-  psf->depth_m[b] = depth_of_band(&psf->key, b);
-  psf->elevation_m[b] = sonde_array_elevation_half(&array, psf->depth_m[b]);
-  tabulate(psf, &array, b);
-  normalise(psf, b);
-  sharpen(psf, b);
-  add_gram(psf, b);
+// The exact response at one depth: of unit energy, and sharpened.
+static void tabulate(beam_psf *psf, int b) {
+  SONDE_ASSERT(b >= 0 && b < SONDE_PSF_DEPTHS);
+  const beam_key *key = &psf->key;
+  const sonde_array array = sonde_beam_array(key);
+  const double z = depth_of(key, b), k = 2 * SONDE_PI * key->frequency_hz / sonde_sound_m_s;
+  const int rows = 2 * psf->half_rows + 1;
+  psf->depth_m[b] = z, psf->elevation_m[b] = sonde_array_elevation_half(&array, z);
+  for (int l = 0; l <= psf->half_lines; ++l) {
+    double x = l * key->pitch_m, depth = z;
+    if (key->radius_m > 0) {
+      double angle = x / key->radius_m;
+      x = (key->radius_m + z) * sin(angle);
+      depth = (key->radius_m + z) * cos(angle) - key->radius_m;
+    }
+    double *out = psf->table[b][l], c = cos(2 * k * z), s = sin(2 * k * z);
+    sonde_array_line(&array, x, depth, z - psf->half_rows * key->step_m, key->step_m,
+                     (uint32_t)rows, out);
+    for (int n = 0; n < rows; ++n) { // the splat brings the carrier's phase
+      double re = out[2 * n], im = out[2 * n + 1];
+      out[2 * n] = re * c - im * s, out[2 * n + 1] = re * s + im * c;
+    }
+  }
+  double energy = 0;
+  for (int l = 0; l <= psf->half_lines; ++l)
+    for (int i = 0; i < 2 * rows; ++i)
+      energy += weight_of(l) * psf->table[b][l][i] * psf->table[b][l][i];
+  const double scale = energy > 0 ? 1 / sqrt(energy) : 0;
+  for (int l = 0; l <= psf->half_lines; ++l)
+    for (int i = 0; i < 2 * rows; ++i) psf->table[b][l][i] *= scale;
+  sharpen(psf->table[b], psf->half_lines, rows);
 }
 
 bool sonde_psf_step(beam_psf *psf) {
   SONDE_ASSERT(psf != NULL && psf->step >= 0 && psf->step <= SONDE_PSF_STEPS);
   if (psf->step == SONDE_PSF_STEPS) return true;
-  if (psf->step < SONDE_BANDS) {
-    add_band(psf, psf->step);
-  } else if (psf->step == SONDE_BANDS) {
-    mirror_gram(psf);
-    iterate(psf);
+  if (psf->step < SONDE_PSF_DEPTHS) {
+    tabulate(psf, psf->step);
+    add_gram(psf, psf->step);
+  } else if (psf->step == SONDE_PSF_DEPTHS) {
+    find_axial(psf);
   } else {
-    for (int b = 0; b < SONDE_BANDS; ++b) project(psf, b), measure_sheet(psf, b);
+    for (int b = 0; b < SONDE_PSF_DEPTHS; ++b) find_lateral(psf, b), measure_sheet(psf, b);
   }
   return ++psf->step == SONDE_PSF_STEPS;
 }

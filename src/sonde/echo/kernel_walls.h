@@ -5,8 +5,8 @@
 // gathered_by     where one vessel gathers the points
 // share_of        of a wall beside others
 // gather_tissue, even_tissue  all of them
-#ifndef SONDE_SRC_ECHO_KERNEL_CARRY_H
-#define SONDE_SRC_ECHO_KERNEL_CARRY_H
+#ifndef SONDE_SRC_ECHO_KERNEL_WALL_H
+#define SONDE_SRC_ECHO_KERNEL_WALL_H
 
 #include "echo/kernel.h"
 #include "base/vector_records.h"
@@ -88,15 +88,15 @@ INLINE floats share_of(const floats *weight, uint32_t walls, uint32_t k) {
   return others / vmax(others + (1 - weight[k]) * (1 - others), vset(1e-9f));
 }
 
-INLINE floats3 load3(const float (*from)[CARRY_POINTS], uint32_t i) {
+INLINE floats3 load3(const float (*from)[WALL_POINTS], uint32_t i) {
   return (floats3){vload(from[0] + i), vload(from[1] + i), vload(from[2] + i)};
 }
-INLINE void store3(float (*to)[CARRY_POINTS], uint32_t i, floats3 a) {
+INLINE void store3(float (*to)[WALL_POINTS], uint32_t i, floats3 a) {
   vstore(to[0] + i, a.x), vstore(to[1] + i, a.y), vstore(to[2] + i, a.z);
 }
 
-static void gather_tissue(const carry_job *job) {
-  SONDE_ASSERT(job->groups <= CARRY_GROUPS && job->walls <= MOST_VESSELS);
+static void gather_tissue(const wall_job *job) {
+  SONDE_ASSERT(job->groups <= WALL_GROUPS && job->walls <= MOST_VESSELS);
   for (uint32_t group = 0; group < job->groups; group += FLOATS / 4) {
     floats3 rest = load3(job->rest, 4 * group), at = rest;
     floats weight[MOST_VESSELS];
@@ -117,12 +117,12 @@ static void gather_tissue(const carry_job *job) {
 }
 
 // The motion along a vessel stays the field's.
-static void even_tissue(const carry_job *job) {
-  SONDE_ASSERT(job->groups <= CARRY_GROUPS && job->walls <= MOST_VESSELS);
+static void even_tissue(const wall_job *job) {
+  SONDE_ASSERT(job->groups <= WALL_GROUPS && job->walls <= MOST_VESSELS);
   for (uint32_t group = 0; group < job->groups; group += FLOATS / 4) {
     const uint32_t i = 4 * group;
-    floats3 rest = load3(job->rest, i), place = load3((const float(*)[CARRY_POINTS])job->place, i);
-    floats3 gathered = load3((const float(*)[CARRY_POINTS])job->gathered, i), at = place;
+    floats3 rest = load3(job->rest, i), place = load3((const float(*)[WALL_POINTS])job->place, i);
+    floats3 gathered = load3((const float(*)[WALL_POINTS])job->gathered, i), at = place;
     floats weight[MOST_VESSELS];
     for (uint32_t k = 0; k < job->walls; ++k)
       weight[k] = find_reach(job->wall[k], group, rest).weight;

@@ -1,24 +1,24 @@
-// The window of the grid: whatever the tiers' height, the field is the same, and nothing is left in
+// The window of the grid: whatever the bands' height, the field is the same, and nothing is left in
 // the window.
 #include "echo/bench.h"
-#include "echo/tiers.h"
+#include "echo/bands.h"
 
 #include <string.h>
 
-// Rows per tier, 0: as measured; the last fits no cube into the window at once.
+// Rows per band, 0: as measured; the last fits no cube into the window at once.
 static float *draw(bench *b, uint32_t rows, uint32_t *moved) {
   sonde_echo *echo = b->echo;
   echo->frame.pathology = &b->pathology;
   sonde_echo_frame(echo, b->pose, 0.04, &b->settings);
-  if (rows > 0) echo->tier_rows = rows < echo->window_rows ? rows : echo->window_rows - 2;
-  sonde_tiers_begin(echo);
+  if (rows > 0) echo->band_rows = rows < echo->window_rows ? rows : echo->window_rows - 2;
+  sonde_bands_begin(echo);
   sonde_echo_plane(echo);
   sonde_echo_medium(echo);
   sonde_echo_scatter(echo);
   sonde_echo_blood(echo);
-  for (uint32_t tier = 0; tier < echo->tier_count; ++tier) {
-    sonde_tiers_lay(echo, tier);
-    sonde_echo_beam(echo, tier, true);
+  for (uint32_t band = 0; band < echo->band_count; ++band) {
+    sonde_bands_lay(echo, band);
+    sonde_echo_beam(echo, band, true);
   }
   sonde_echo_beam_end(echo);
   *moved = echo->moved;
@@ -48,13 +48,13 @@ static void check_view(bench *b) {
   uint32_t moved, again;
   float *one = draw(b, 0, &moved);
   const sonde_echo *echo = b->echo;
-  print_message("%u rows, window %u, tiers of %u\n", echo->grid_samples, echo->window_rows,
-                echo->tier_rows);
-  assert_true(echo->tier_count > 3);
+  print_message("%u rows, window %u, bands of %u\n", echo->grid_samples, echo->window_rows,
+                echo->band_rows);
+  assert_true(echo->band_count > 3);
   for (size_t k = 0; k < SONDE_COUNT_OF(heights); ++k) {
     float *other = draw(b, heights[k], &again);
     double off = apart(b, one, other);
-    print_message("  of %u: %.2g\n", echo->tier_rows, off);
+    print_message("  of %u: %.2g\n", echo->band_rows, off);
     assert_true(off < 1e-5 && again == moved);
     sonde_free(other);
   }
