@@ -1,7 +1,4 @@
 // From a shape to a model.
-// place_sites:   a grid of sites along the vein's course.
-// fill_nodes:    layers and springs of every node.
-// mark:          one landmark; segments and muscle levels follow the vein.
 #include "anatomy/shape.h"
 
 #include <string.h>

@@ -1,14 +1,4 @@
 // Where the vessels run (docs/anatomy.md).
-// vein_angle, cover, calibre: the femoral vein by its share of the thigh's length, groin 0, knee 1.
-// lay_vein:      below the skin at its angle, under fat and cover.
-// beside_vein, lay_artery: lateral of the vein at the groin, in front from the middle on.
-// lay_saphenous: in the fat above the fascia, into the common femoral vein.
-// lay_deep:      artery and vein that leave backwards along the femur.
-// around_artery, room_around, lay_second: a second femoral vein on another side of the artery.
-// side_of:       the skin without its flat ends.
-// gap_between:   least distance of two vessels' walls.
-// check_*:       walls apart, below the fascia, outside the bone; all covers shrink or grow until
-// it holds.
 #include "anatomy/shape.h"
 
 #include <string.h>

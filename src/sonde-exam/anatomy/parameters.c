@@ -1,7 +1,4 @@
 // The parameters of a thigh: their list, their ranges and their distributions (docs/anatomy.md).
-// value_of:    the member of a parameter.
-// normal_draw: a truncated normal value that depends on seed and parameter only.
-// fill_*:      groups of parameters, those that others depend on first.
 #include "anatomy/shape.h"
 #include "base/random.h"
 

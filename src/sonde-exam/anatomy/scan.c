@@ -1,11 +1,4 @@
 // From scanned surfaces of a leg to the shape of a thigh.
-// shaft_line:   straight line through the middle of the femur's middle third.
-// leg_frame:    knee by the end without the head, medial side by the condyles' width and the head.
-// align_bone:   the frame turned so that z runs along the femur.
-// centre_line:  the straight line through the middles of the skin's sections.
-// bone_line:    the femur's middle, with its bow.
-// sample_skin, sample_femur, sample_muscle: tables by rays; misses are filled from neighbours.
-// smooth:       one binomial pass over a table.
 #include "anatomy/shape.h"
 
 #include <stdlib.h>

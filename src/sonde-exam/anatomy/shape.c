@@ -1,9 +1,4 @@
 // The shape that parameters describe.
-// between:      a value given at groin, middle and knee, quadratic in between.
-// outline:      the section's radius up to a factor.
-// scale_row:    the factor that gives the girth.
-// fat_around:   fat between four sides: its logarithm by two harmonics, so that it stays positive.
-// check_muscle: room between fat and femur.
 #include "anatomy/shape.h"
 
 static const double LEAST_MUSCLE_M = 0.012;

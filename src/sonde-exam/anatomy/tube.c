@@ -1,9 +1,4 @@
 // Tubes: tables over angle and height, and their meshes.
-// entry:       the value of a table between its entries.
-// ring_plan:   how many vertices stand on each ring, from the middle of one end to the other's.
-// place_ring:  vertices at equal steps along the ring's outline, every other ring turned by half a
-//              step.
-// zip:         the band of faces between two rings: always the shorter diagonal.
 #include "anatomy/shape.h"
 
 #include <stdlib.h>

@@ -1,9 +1,4 @@
 // Comments of a teacher: notes of the recording; RECORDING.comments.json of old ones.
-// is_text:              UTF-8 without control characters but line ends and tabs.
-// read_comment, load_file: the file of an old recording.
-// take_notes:           those of a journal.
-// write_all:            the file as a whole.
-// sonde_comments_*:     the interface.
 #include "sonde/exam_journal.h"
 #include "sonde/exam_player.h"
 

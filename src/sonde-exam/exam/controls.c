@@ -1,9 +1,4 @@
 // Controls of a session: cleaning, and sharing with readers that must not wait.
-// keep_real:                  a number in a range, or the one before when it is not a number.
-// clean_pathology:            every member of a pathology usable.
-// sonde_controls_clean:       the same for all controls.
-// sonde_shared_controls_set:  one writer.
-// sonde_shared_controls_get:  readers try again while a write is under way.
 #include "exam/session.h"
 
 #include "base/base.h"

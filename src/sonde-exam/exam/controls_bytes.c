@@ -1,7 +1,4 @@
 // Controls as bytes of a recording (docs/recording.md): the one place that knows their order.
-// sonde_controls_bytes: how many follow the tick in a controls record.
-// put_rest, get_rest:   what version 3 lacks.
-// sonde_controls_put, sonde_controls_get: those.
 #include "exam/record.h"
 
 #include "base/base.h"

@@ -1,10 +1,5 @@
 // What keeps the skin from being turned inside out: a probe that is led where no press leads is
 // taken off, the skin goes back to rest, and the probe acts again when it has left the body.
-//
-// depth_beyond:  how much deeper a point lies below the resting skin than tissue there gives way.
-// is_through:    the probe is deeper than any press.
-// has_left:      the probe is clear of the body.
-// sonde_subject_guard, sonde_subject_flags: the interface.
 #include "exam/subject.h"
 
 #include "base/base.h"

@@ -1,9 +1,4 @@
 // A file that only grows, and what waits for a disk that is full.
-// open_new:        the file under its own name, an older one aside.
-// lock:            says that somebody writes, until the descriptor is closed.
-// grow:            room for bytes that wait.
-// settle:          the bytes that are on the disk need not be kept.
-// sonde_journal_*: the interface.
 #include "exam/journal.h"
 
 #include "base/base.h"

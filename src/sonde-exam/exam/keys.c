@@ -1,8 +1,4 @@
 // Keyframes in memory and in their file.
-// pack, unpack:    zlib around the parts of one keyframe.
-// head_of:         what must be equal for a file to be of use.
-// scan:            the list of a file's keyframes.
-// sonde_keys_*:    the interface.
 #include "exam/keys.h"
 
 #include "base/base.h"

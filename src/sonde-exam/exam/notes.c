@@ -1,7 +1,4 @@
 // Notes of a recording that nobody writes any more.
-// copy_notes:    out of the file's bytes.
-// append:        one note and the block that closes it off.
-// sonde_notes_*: the interface.
 #include "exam/record.h"
 
 #include "base/base.h"

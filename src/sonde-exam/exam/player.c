@@ -1,12 +1,4 @@
 // A recording played by a session that gets recorded inputs instead of a device's.
-// create_session:       with what the recording says.
-// remember_start, sonde_player_restart: the moment before the first tick.
-// sonde_player_jump:    to a keyframe.
-// make_image, tick_once: one tick and the image of its state.
-// jump_near:            to where a seek starts.
-// keep:                 a keyframe, where the recording has none yet.
-// write_cache:          what was played through, beside the recording.
-// sonde_player_*:       the interface.
 #include "exam/player.h"
 
 #include "base/base.h"

@@ -1,7 +1,4 @@
 // Playing everything and comparing with what was recorded.
-// meet:               one recorded hash.
-// check_images:       all images up to the player's tick.
-// sonde_player_check: the whole exam.
 #include "exam/player.h"
 
 #include "base/base.h"

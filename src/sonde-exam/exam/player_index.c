@@ -1,7 +1,4 @@
 // What a player needs to know of a recording before it plays.
-// count, fill:        events, images, hashes, places; sizes first.
-// make_up_images:     of files that do not tell theirs: as a lockstep session makes them.
-// sonde_player_index: all of it.
 #include "exam/player.h"
 
 #include "base/base.h"

@@ -1,11 +1,4 @@
 // Writing a recording: a text header, records, blocks that close off what came before.
-// emit:             bytes to the journal and into the CRC.
-// put_*:            one record as bytes.
-// close_block:      a block record; what came before survives the program.
-// publish:          how the writing goes.
-// end_inputs:       when one is missing, those behind it are of no use.
-// put_hex, put_world, write_header: the header line.
-// sonde_recorder_*: the interface.
 #include "exam/record.h"
 
 #include "base/base.h"

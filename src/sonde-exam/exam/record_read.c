@@ -1,11 +1,4 @@
 // Reading a recording: everything is checked before the first record is handed out.
-// text_of, real_of, hash_of:         members of the header that must be there.
-// read_model, read_probes, read_world: parts of the header.
-// read_magic, read_header, read_end: the three parts of the file.
-// sonde_record_bytes, decode_*:      one record.
-// read_blocks:                       of an old file that was cut off, as far as it is whole.
-// walk_blocks, read_journal:         of a file from version 8 on.
-// check_records:                     walks all of them.
 #include "exam/record.h"
 
 #include "base/bounds.h"

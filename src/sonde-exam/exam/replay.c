@@ -1,7 +1,4 @@
 // Playing a recording again: the recorded inputs drive the world in lockstep.
-// sonde_recording_probes, _fits: what was recorded is what is at hand.
-// compare, next_check: state hashes on the way.
-// play:                all records.
 #include "exam/record.h"
 #include "exam/subject.h"
 

@@ -1,8 +1,4 @@
 // Life of a session.
-// check:           the definition.
-// create_probes, create_boxes, create_lines, create_parts: parts of a session, in this order.
-// release:         frees whatever exists.
-// sonde_session_*: the interface; ticks are in session_hot.c, threads in session_threads.c.
 #include "exam/keys.h"
 
 #include "base/base.h"

@@ -1,14 +1,4 @@
 // One tick of a session. Nothing here or below it allocates, locks, prints or waits.
-// push:            a record into the ring; a full ring is counted.
-// take_controls:   newest controls come into force, with their stop and resume.
-// read_device:     pose of this tick, exactly as the world and the recording get it.
-// step_world:      everything that moves with the probe.
-// fill_snapshot:   what viewers are told about this tick.
-// surface_is_due, key_is_due, sonde_session_key_place: when an image, and a keyframe with it, is to
-// be made.
-// offer_key:       all that the next tick depends on into the mailbox of the recorder.
-// sonde_session_offer: the surface and its snapshot into the mailbox of the image thread.
-// sonde_session_step, sonde_session_realtime_tick, sonde_session_replay: the tick.
 #include "exam/session.h"
 
 #include "base/base.h"

@@ -1,14 +1,4 @@
 // From the newest surface to a frame: skin, inside, vessels, image, all of one tick.
-// penetration:        depth of the probe's face below the rest skin.
-// update_interior:    the inside and the vessels at this surface.
-// choose_beam, prepare_beam: the one asked for when it is due, else the last one; a share of it.
-// work_ahead:         in real time, between two images.
-// couple, volume:     what the gel does to the image, and how much there is.
-// render:             the image; a model without a bone has a black one.
-// fill_frame:         everything into one slot.
-// count_latency:      how old the frame's pose is when the frame is finished.
-// check_image:        hash of the pixels for the recording.
-// sonde_session_follow, _draw, _show: one image. sonde_session_latency: percentiles.
 #include "exam/session.h"
 #include "exam/vessels.h"
 

@@ -1,6 +1,4 @@
 // What a session carries from image to image, and going on from a keyframe; cold.
-// sonde_session_remember_image: the inside, the beam, what was shown.
-// sonde_session_recall:         world, inputs and inside of a keyframe.
 #include "exam/session.h"
 
 #include "base/base.h"

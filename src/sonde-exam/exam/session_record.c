@@ -1,8 +1,4 @@
 // What a session keeps of itself: records, keyframes and notes to their files, and the end.
-// create_keys, sonde_session_create_recording: the journal and the keyframes beside it.
-// write_records, write_check, write_key, write_notes: rings, mailboxes and notes to the files.
-// sonde_session_drain: all of that.
-// sonde_session_note, _finish, _recording: the interface.
 #include "exam/keys.h"
 
 #include "base/base.h"

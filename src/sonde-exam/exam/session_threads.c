@@ -1,7 +1,4 @@
 // The threads of a session in real time, and the lockstep tick.
-// image_main, record_main: look for a surface every 0.2 ms, for records every 5, so
-//                          that the tick never has to wake anyone.
-// sonde_session_start/stop/tick: the interface.
 #include "exam/session.h"
 
 #include "base/base.h"

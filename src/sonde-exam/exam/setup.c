@@ -1,7 +1,4 @@
 // What a session starts with, as a member of a recording's header.
-// add_friction, list_preset, list_circulation: its numbers by name; the same list writes and reads.
-// write_list, read_list: such a list in a JSON object.
-// read_presets, read_circulation: parts of it.
 #include "exam/setup.h"
 
 #include "base/base.h"

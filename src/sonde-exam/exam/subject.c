@@ -1,7 +1,4 @@
 // The thigh under the probe: creation.
-// skin_at, spread: the gel of the start, half around the sites, half along the vein.
-// scale_friction, sonde_setup_preset: what the bench makes of a preset.
-// usable, sonde_subject_recall: going on from a moment.
 #include "exam/subject.h"
 
 #include "base/base.h"

@@ -1,9 +1,4 @@
 // The thigh under the probe: controls and ticks.
-// apply_tissue:   springs and dampers of the preset in force.
-// apply_friction: its friction, with the film under the probe.
-// nearest_skin:   the node nearest to the probe's face, where it is now.
-// apply_gel:      what the counters ask for.
-// step_gel:       a part of the film's step.
 #include "exam/subject.h"
 
 #include "base/base.h"

@@ -1,6 +1,4 @@
 // What the image plane cuts of the vessels.
-// tilt:              between a vessel and the normal of the image plane.
-// read_second_vein:  of a double femoral vein.
 #include "exam/vessels.h"
 
 #include "base/base.h"

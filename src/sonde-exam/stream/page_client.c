@@ -1,11 +1,4 @@
 // One WebSocket client: what it may say, and what it is told.
-//
-// page_client_wants_frame   its room for a frame
-// take_token                the rate limit
-// acknowledge               a frame reached the screen
-// greet, send_geometry, take_frame, do_job   one message each
-// page_client_join, page_client_leave        slots
-// page_client_next, page_client_hear         what goes out, what comes in
 #include "stream/page_server.h"
 
 #include "base/clock.h"

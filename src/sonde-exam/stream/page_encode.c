@@ -1,11 +1,4 @@
 // Binary messages to the page, little-endian whatever the machine.
-//
-// put_header      magic, version, type, part or sequence, size
-// put_point_mm    a point as three float32 in mm
-// page_encode_mesh, page_encode_line   geometry that is sent once
-// put_snapshot    the scalar fields of a frame
-// quantise        a displacement as a signed 16-bit count of PAGE_QUANTUM_M
-// page_encode_frame   snapshot, skin and image of one tick
 #include "base/bytes.h"
 #include "stream/page_message.h"
 

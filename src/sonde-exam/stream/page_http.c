@@ -1,14 +1,4 @@
 // The HTTP side: loopback names only, the page for everyone, everything else for who has the token.
-//
-// is_local            "127.0.0.1" or "localhost" followed by our port
-// send_head           status line and security headers
-// send_refusal        a short text answer
-// send_file           a built-in file, or one from the development directory
-// knows_token, knows_key   who may have what
-// read_id, send_document, answer_document   report and data of an exam
-// send_status         what the program says of itself
-// offers, upgrade     the WebSocket's handshake
-// page_http_answer    a request
 #include "stream/page_data.h"
 #include "stream/page_server.h"
 

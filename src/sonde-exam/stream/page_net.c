@@ -3,14 +3,6 @@
 // WebSocket frame by its own head. Every stage has an end (page_patience), and a full table makes
 // room by closing the oldest connection that is no client, so that connections which never finish
 // their request cost nobody else anything.
-//
-// bind_problem, page_net_open   the port, on the loopback address
-// end_connection, drop          the two ways out: politely, or at once
-// send_out, feed                what goes out
-// take_head, take_frames, hear  what comes in
-// admit                         new connections
-// watch_time                    the ends of the stages
-// run                           the thread
 #include "stream/page_server.h"
 
 #include "base/clock.h"

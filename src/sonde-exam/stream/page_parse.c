@@ -1,11 +1,4 @@
 // JSON commands from the page: everything is bounded and checked before it reaches the session.
-//
-// read_real     a finite number within a range, or absent
-// read_name     a short plain name, or absent
-// read_vector   an array of finite numbers
-// read_text, read_bool, read_time   the same for requests
-// parse_*       one command each
-// page_command_take   its numbers into controls
 #include "stream/page_message.h"
 
 #include "base/maths.h"

@@ -1,8 +1,4 @@
 // Head of an HTTP request (RFC 9112), as far as browsers send it to this server.
-//
-// take           a part of a line, bounded
-// parse_line     method, target, version
-// parse_field    one header field
 #include "stream/page_request.h"
 
 #include <string.h>

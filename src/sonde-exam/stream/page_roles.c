@@ -2,12 +2,6 @@
 // first. A teacher may take control and gives it back; the learner may lend it to another. An owner
 // that is gone (a reload, a lost connection) is waited for and recognised by its id; meanwhile
 // another may stand in, and after that the next watcher is the owner.
-//
-// is_owner, may, page_client_role      what a client is and may ask for
-// make_owner, stand_in                 whose control it is, for good or until the learner is back
-// page_roles_join, page_roles_leave    clients come and go
-// page_roles_turn                      the end of the wait for the owner
-// page_roles_act                       take, give, return
 #include "stream/page_server.h"
 
 #include "base/clock.h"

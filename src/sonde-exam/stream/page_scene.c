@@ -1,8 +1,4 @@
 // Geometry of a source as messages, encoded once and shared by all clients.
-//
-// append              room for one more message
-// append_mesh, append_line   one part each
-// page_scene_create   skin, femur, vessels, probes
 #include "stream/page_server.h"
 
 static page_buffer *append(page_scene *scene, size_t size) {

@@ -1,8 +1,4 @@
 // Token, document keys and handshake: see page_secret.h.
-//
-// block, page_sha1, page_hmac_sha1   the hash and its keyed form
-// page_accept_key, page_document_key what is made of them
-// sonde_page_token_make              128 bits of the kernel
 #include "stream/page_secret.h"
 
 #include "sonde/stream.h"

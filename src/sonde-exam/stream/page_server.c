@@ -1,12 +1,4 @@
 // The page's server: start, the pump of frames, commands, stop.
-//
-// tell_gel               how much is on the skin
-// publish_frame          a frame -> encoded -> `latest`
-// pump_once, pump_run    newest frame of the source, published
-// apply_*                what a command changes
-// page_server_show       another source; sonde_page_show_model: one without a session
-// sonde_page_post, sonde_page_publish, sonde_page_tell   frames and texts of the program
-// page_server_start, sonde_page_stop
 #include "stream/page_server.h"
 
 #include "base/clock.h"

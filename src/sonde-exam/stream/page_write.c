@@ -1,10 +1,5 @@
 // JSON messages to the page. Numbers are written by integer arithmetic, so that the locale of the
 // program that uses the library cannot change the decimal point.
-//
-// reserve, put, put_escaped, put_real   growing text
-// put_vector_mm, put_direction          points and unit vectors as arrays
-// put_probe, put_cases, put_site, put_curve   parts of the hello
-// page_write_*                          one message each
 #include "stream/page_message.h"
 
 #include "base/maths.h"

@@ -1,12 +1,4 @@
 // Reading a YAML document through libyaml, whose nodes know their lines.
-// node_of:      the node of a place.
-// remember:     keeps the first error.
-// list_keys:    the keys that were expected, for messages.
-// check_key:    refuses unknown and repeated keys.
-// fail_parser:  libyaml's own complaint becomes the message.
-// check_shape:  one document, within the limits of size, nesting and number of values.
-// build:        the document.
-// sonde_read_*: typed values with ranges.
 #include "files/yaml.h"
 
 #include "base/bounds.h"

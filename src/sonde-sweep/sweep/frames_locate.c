@@ -1,6 +1,4 @@
 // From the transforms of a frame and the calibration to its pose.
-//
-// read_transform, read_clip elements of a PLUS configuration
 #include "sweep/frames.h"
 
 #include "base/bounds.h"

@@ -1,6 +1,4 @@
 // MetaImage: "Key = Value" lines, the last one ElementDataFile = LOCAL, then the pixels.
-//
-// sonde_metaimage_write_sequence  header as IGSIO writes it
 #include "sweep/frames.h"
 
 #include <string.h>

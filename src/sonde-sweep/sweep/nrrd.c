@@ -1,6 +1,4 @@
 // NRRD: a magic line, "field: value" and "key:=value" lines, an empty line, then the pixels.
-//
-// sonde_nrrd_write_sequence  three axes as IGSIO writes, or four as Slicer wants
 #include "sweep/frames.h"
 
 #include <string.h>

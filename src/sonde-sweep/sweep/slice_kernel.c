@@ -1,25 +1,11 @@
-// Pixels of a picture from the frames around them, and from a volume.
+// Pixels of a picture from the frames around them, and from a volume: kernels, compiled once for each
+// instruction set with SLICE_KERNELS defined; every operation is one IEEE operation per vector element,
+// so that all give the same bits. docs/frames_images.md derives the weights.
 //
-// A picture is cut into blocks and those into tiles. Over a tile the distance d to a plane is
-// linear, so its bounds are known from the tile's centre. A plane that covers the whole tile on one
-// side hides every plane of that side that lies behind its far bound; what is left are two or three
-// candidates. Where frames are joined across and do not cross, slice_strips.h does most of the
-// work.
-//
-// Between plane i (d_i >= 0) and plane j (d_j < 0) the pixel p lies on a line that meets both.
-// Weights in proportion to the distance of the other plane make the mean of the two points p
-// itself, whatever the line's direction: a field that is linear in space comes out exactly, however
-// the planes are tilted. The direction is n_i + n_j, half way between the normals, so that both
-// distances shrink alike. Along the sweep it is the way from where a pixel lies in frame i to where
-// the same pixel lies in frame j: what moves with the probe (gain over depth, near field,
-// persistence of the scanner) then meets itself; where that way grazes the planes or leaves a
-// frame, the normals serve again. In local coordinates (u, v, d) of a frame the direction is (e_u,
-// e_v, e_d), and the line meets the frame at u - d e_u / e_d.
-//
-// outline_of, is_outside where no frame can be
-//
-// Compiled once for each instruction set with SLICE_KERNELS defined; every operation is one IEEE
-// operation per lane, so that all give the same bits.
+// A picture is divided into blocks and those into tiles. Over a tile the distance d to a plane is linear,
+// so its bounds are known from the tile's centre. A plane that covers the whole tile on one side hides
+// every plane of that side that lies behind its far bound; two or three candidates remain. Where
+// consecutive frames do not cross, slice_strips.h does most of the work.
 #include "sweep/slice_strip_kernel.h"
 #include "sweep/slice_voxel_kernel.h"
 

@@ -2,8 +2,6 @@
 //
 // The field is read at the corners of cells of 16 x 8 pixels; between them the places in the volume
 // are bilinear. A field that is linear over a cell comes out exactly.
-//
-// voxel_at, slice_plainly  pixel by pixel: the nearest voxel, flat and very large volumes
 #include "sweep/slice.h"
 
 #include <string.h>
