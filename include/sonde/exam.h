@@ -141,14 +141,8 @@ SONDE_API void sonde_session_control(sonde_session *session,
                                      const sonde_session_controls *controls);
 /** The controls set last, after clamping. @thread any */
 SONDE_API sonde_session_controls sonde_session_controls_now(const sonde_session *session);
-/** The tissue that the controls set last ask for, e.g. for sonde_preset_save(). @thread any */
-SONDE_API sonde_preset sonde_session_preset(const sonde_session *session);
 /** For sonde_device_page_goal(). @thread any */
 SONDE_API sonde_device *sonde_session_device(sonde_session *session);
-SONDE_API uint32_t sonde_session_probe_count(const sonde_session *session); /**< @thread any */
-/** @thread any */
-SONDE_API const sonde_probe *sonde_session_probe(const sonde_session *session, uint32_t index);
-SONDE_API const sonde_model *sonde_session_model(const sonde_session *session); /**< @thread any */
 
 /** Newest finished frame: snapshot, skin and image of one and the same tick. */
 struct sonde_frame {
@@ -189,22 +183,10 @@ typedef struct sonde_replay_result {
   char model_path[512];
 } sonde_replay_result;
 
-/** Plays the recorded inputs in lockstep on `model` (checked against the recorded checksum).
- *  @return SONDE_MISMATCH for another model or probe, FORMAT/CHECKSUM/VERSION for an unusable file,
- *    CANCELLED; a different hash is SONDE_OK with result->same false
- *  @thread owner */
-SONDE_API sonde_status sonde_replay_run(const char *path, const sonde_model *model,
-                                        const sonde_progress *progress, sonde_replay_result *result,
-                                        sonde_error *error);
-/** A device that plays the poses of a recording again; absent after the
- *  last. @return as sonde_replay_run() for an unusable file @thread owner */
+/** A device that plays the poses of a recording again; absent after the last.
+ *  @return FORMAT/CHECKSUM/VERSION for an unusable file @thread owner */
 SONDE_API sonde_status sonde_device_recording(const char *path, sonde_device *device,
                                               sonde_error *error);
-/** Path and checksum of the model that a recording was made on; checks the whole file.
- *  @param model_path [size] receives the path, cut to size; either output may be NULL
- *  @thread owner */
-SONDE_API sonde_status sonde_replay_inspect(const char *path, char *model_path, size_t size,
-                                            uint64_t *model_checksum, sonde_error *error);
 
 #ifdef __cplusplus
 }

@@ -48,13 +48,6 @@ SONDE_API void sonde_notes_clear(sonde_notes *notes); /**< @thread owner */
 /** The newest note of a kind; NULL: none. @thread any */
 SONDE_API const sonde_note *sonde_notes_last(const sonde_notes *notes, sonde_note_kind kind);
 
-/** Appends a note to a recording that nobody writes any more: on disk when this returns OK; after a
- *  failure the recording is as it was. Bytes behind the last whole block are cut off.
- *  @return VERSION for recordings before version 8, DEVICE for one that is being recorded, ARGUMENT
- *    for a text that is too long, DISK, IO
- *  @thread owner */
-SONDE_API sonde_status sonde_notes_add(const char *recording, sonde_note_kind kind,
-                                       const char *text, sonde_error *error);
 /** Whether a program is recording into the file. @thread any */
 SONDE_API bool sonde_recording_is_open(const char *recording);
 

@@ -67,21 +67,8 @@ SONDE_API bool sonde_player_frame(sonde_player *player, sonde_frame *frame);
 
 /** Where the player stands. @thread owner of the player */
 SONDE_API double sonde_player_time(const sonde_player *player);
-SONDE_API uint64_t sonde_player_tick(const sonde_player *player); /**< @thread owner */
-/** sonde_state_hash() @thread owner */
-SONDE_API uint64_t sonde_player_hash(sonde_player *player);
 /** @thread owner */
 SONDE_API sonde_session_controls sonde_player_controls(const sonde_player *player);
-SONDE_API const sonde_probe *sonde_player_probe(const sonde_player *player); /**< @thread owner */
-
-/** A change of the controls during the exam; the first one is the start. */
-typedef struct sonde_player_event {
-  double time_s;
-  sonde_session_controls controls;
-} sonde_player_event;
-/** [count] in order of time, owned by the player. @thread owner of the player */
-SONDE_API const sonde_player_event *sonde_player_events(const sonde_player *player,
-                                                        uint32_t *count);
 
 /** Plays everything from the start and compares with what was recorded, also in between.
  *  @param images also makes every image and compares their hash
@@ -111,10 +98,11 @@ typedef struct sonde_comments {
  *  @return SONDE_FORMAT naming the comment of that file that is not one */
 SONDE_API sonde_status sonde_comments_load(const char *recording, sonde_comments *comments,
                                            sonde_error *error);
-/** Adds a comment to a recording that nobody writes any more (sonde_notes_add()), or to
- *  RECORDING.comments.json.
- *  @return SONDE_ARGUMENT: no text, a time that is not one, text that is not UTF-8, too many; as
- *    sonde_notes_add()
+/** Adds a comment to a recording that nobody writes any more: on the disk when this returns OK;
+ *  after a failure the recording is as it was. Bytes behind the last whole block are cut off. One
+ *  from before version 8 gets RECORDING.comments.json.
+ *  @return SONDE_ARGUMENT: no text, a time that is not one, text that is not UTF-8, too many;
+ *    DEVICE while it is being recorded, DISK, IO
  *  @thread owner */
 SONDE_API sonde_status sonde_comments_add(const char *recording, const sonde_comment *comment,
                                           sonde_error *error);

@@ -8,13 +8,14 @@ int main(void) {
   sonde_sequence sequence;
   sonde_scene *scene = NULL;
   sonde_site_table table;
+  sonde_recording_info info;
   sonde_error error;
   if (sonde_image_create(2, 2, &image, &error) != SONDE_OK) return 1;
   int good = sonde_image_save_png(&image, "/nowhere/a.png", &error) == SONDE_IO;
   good = good && sonde_sequence_load("/nowhere/a.mha", &sequence, &error) == SONDE_IO;
   good = good && sonde_scene_load("/nowhere/a.yaml", NULL, &scene, &error) == SONDE_IO;
   good = good && sonde_site_table_load("/nowhere/a.csv", &table, &error) == SONDE_IO;
-  good = good && sonde_replay_inspect("/nowhere/a.sonde", NULL, 0, NULL, &error) == SONDE_IO;
+  good = good && sonde_recording_inspect("/nowhere/a.rec", false, &info, &error) == SONDE_IO;
   sonde_image_clear(&image);
   printf("files, sweep, scene, fit, exam: %s\n", good ? "work" : "FAIL");
   return !good;

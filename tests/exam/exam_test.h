@@ -10,7 +10,7 @@
 
 #include "base/base.h"
 #include "base/maths.h"
-#include "exam/session.h"
+#include "exam/player.h"
 #include "../barrel_mesh.h"
 
 #include <string.h>
@@ -99,6 +99,20 @@ static inline sonde_session *open_session(const sonde_session_def *def, sonde_de
 static inline void close_session(sonde_session *session) {
   sonde_error error = {0};
   if (sonde_session_destroy(session, &error)) fail_msg("%s", error.message);
+}
+
+// The recorded inputs once more, compared with what was recorded; images are not made.
+static inline sonde_status play_again(const char *path, const sonde_model *model,
+                                      const sonde_progress *progress, sonde_replay_result *result,
+                                      sonde_error *error) {
+  sonde_player *player = NULL;
+  const sonde_player_def def = {.path = path, .model = model, .no_cache = true};
+  sonde_status status = sonde_player_open(&def, &player, error);
+  if (status) return status;
+  sonde_interior_set_method(player->session->interior, SONDE_INTERIOR_COLUMNS);
+  status = sonde_player_check(player, false, progress, result, error);
+  sonde_player_close(player);
+  return status;
 }
 
 #endif

@@ -252,7 +252,7 @@ static void recording_keeps_the_patient(void **state) {
   close_session(session);
   sonde_replay_result result;
   sonde_error error = {0};
-  assert_int_equal(sonde_replay_run(path, *state, NULL, &result, &error), SONDE_OK);
+  assert_int_equal(play_again(path, *state, NULL, &result, &error), SONDE_OK);
   assert_int_equal(result.ticks, 700);
   assert_true(result.same);
 }

@@ -327,9 +327,8 @@ static void the_controls_are_told(void **state) {
   static seen s;
   record(*state, 900, &s);
   sonde_player *player = open_player(*state, false, true);
-  uint32_t count;
-  const sonde_player_event *events = sonde_player_events(player, &count);
-  assert_int_equal(count, 5);
+  const sonde_player_event *events = player->events;
+  assert_int_equal(player->event_count, 5);
   assert_true(events[0].time_s == 0 && fabs(events[3].time_s - 0.61) < 1e-9);
   assert_true(events[3].controls.pathology.thrombus_fraction == 1);
   assert_int_equal(sonde_player_seek(player, 0.4, NULL, NULL), SONDE_OK);

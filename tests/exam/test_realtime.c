@@ -38,7 +38,7 @@ static uint64_t watch(sonde_session *session, uint64_t ticks) {
 static void replay_and_compare(const char *path, const sonde_model *model, uint64_t hash) {
   sonde_replay_result result;
   sonde_error error = {0};
-  if (sonde_replay_run(path, model, NULL, &result, &error)) fail_msg("%s", error.message);
+  if (play_again(path, model, NULL, &result, &error)) fail_msg("%s", error.message);
   assert_true(result.same);
   assert_true(result.hash == hash);
   char keys[64];

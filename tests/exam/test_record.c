@@ -37,7 +37,7 @@ static void replay_reaches_the_same_state(void **state) {
   uint64_t hash = record_scene(*state, 400);
   sonde_replay_result result;
   sonde_error error = {0};
-  if (sonde_replay_run(path, *state, NULL, &result, &error)) fail_msg("%s", error.message);
+  if (play_again(path, *state, NULL, &result, &error)) fail_msg("%s", error.message);
   assert_int_equal(result.ticks, 400);
   assert_true(result.same && result.hash == hash && result.recorded_hash == hash);
   assert_string_equal(result.model_path, "barrel.sonde");
@@ -45,15 +45,10 @@ static void replay_reaches_the_same_state(void **state) {
 
 static void inspection_names_the_model(void **state) {
   record_scene(*state, 3);
-  char model_path[64];
-  uint64_t checksum = 0;
-  assert_int_equal(sonde_replay_inspect(path, model_path, sizeof model_path, &checksum, NULL),
-                   SONDE_OK);
-  assert_string_equal(model_path, "barrel.sonde");
-  assert_true(checksum == 0x0123456789abcdefu);
-  char small[4];
-  assert_int_equal(sonde_replay_inspect(path, small, sizeof small, NULL, NULL), SONDE_OK);
-  assert_string_equal(small, "bar");
+  sonde_recording_info info;
+  assert_int_equal(sonde_recording_inspect(path, false, &info, NULL), SONDE_OK);
+  assert_string_equal(info.model_path, "barrel.sonde");
+  assert_true(info.model_checksum == 0x0123456789abcdefu);
 }
 
 static void another_model_is_refused(void **state) {
@@ -62,7 +57,7 @@ static void another_model_is_refused(void **state) {
   sonde_replay_result result;
   sonde_error error;
   model->checksum ^= 1;
-  assert_int_equal(sonde_replay_run(path, model, NULL, &result, &error), SONDE_MISMATCH);
+  assert_int_equal(play_again(path, model, NULL, &result, &error), SONDE_MISMATCH);
   model->checksum ^= 1;
   assert_non_null(strstr(error.message, "barrel"));
 }
@@ -73,7 +68,7 @@ static void another_thigh_gives_another_hash(void **state) {
   sonde_model *twin = barrel_model();
   for (uint32_t i = 0; i < twin->surface.vertex_count; ++i) twin->k0_n_m3[i] *= 1.0 + 1e-6;
   sonde_replay_result result;
-  assert_int_equal(sonde_replay_run(path, twin, NULL, &result, NULL), SONDE_OK);
+  assert_int_equal(play_again(path, twin, NULL, &result, NULL), SONDE_OK);
   assert_false(result.same);
   sonde_model_destroy(twin);
 }
@@ -88,7 +83,7 @@ static void replay_can_be_cancelled(void **state) {
   record_scene(*state, 700);
   sonde_replay_result result;
   sonde_progress progress = {stop_soon, NULL};
-  assert_int_equal(sonde_replay_run(path, *state, &progress, &result, NULL), SONDE_CANCELLED);
+  assert_int_equal(play_again(path, *state, &progress, &result, NULL), SONDE_CANCELLED);
   assert_true(result.ticks < 700 && result.ticks > 0);
   assert_false(result.same);
 }
@@ -101,7 +96,8 @@ static void write_file(const char *bytes, size_t count) {
 }
 
 static sonde_status inspect(sonde_error *error) {
-  return sonde_replay_inspect(path, NULL, 0, NULL, error);
+  sonde_recording_info info;
+  return sonde_recording_inspect(path, false, &info, error);
 }
 
 static void every_flipped_byte_is_noticed(void **state) {

@@ -1,9 +1,7 @@
 // Comments of a teacher: notes of the recording; RECORDING.comments.json of old ones.
-#include "sonde/exam_journal.h"
-#include "sonde/exam_player.h"
+#include "exam/record.h"
 
 #include "base/bounds.h"
-#include "sonde/base_json.h"
 
 #include <math.h>
 #include <string.h>
@@ -105,20 +103,6 @@ done:
   return status;
 }
 
-// A comment of a journal that is not one is left out: the recording is whole without it.
-static void take_notes(const sonde_notes *notes, sonde_comments *comments) {
-  for (uint32_t i = 0; i < notes->count && comments->count < SONDE_MAX_COMMENTS; ++i) {
-    const sonde_note *note = &notes->list[i];
-    sonde_comment comment;
-    sonde_json *root = NULL;
-    if (note->kind != SONDE_NOTE_COMMENT) continue;
-    if (sonde_json_parse(note->text, strlen(note->text), NULL, &root, NULL)) continue;
-    read_comment(root, &comment);
-    if (!fault_of(&comment)) insert(comments, &comment);
-    sonde_json_free(root);
-  }
-}
-
 sonde_status sonde_comments_load(const char *recording, sonde_comments *comments,
                                  sonde_error *error) {
   SONDE_ASSERT(recording != NULL && comments != NULL);
@@ -128,7 +112,18 @@ sonde_status sonde_comments_load(const char *recording, sonde_comments *comments
   sonde_status status = load_file(recording, comments, error);
   if (!status && access(recording, F_OK) == 0) {
     (void)sonde_notes_load(recording, &notes, NULL); // who plays the recording says what ails it
-    take_notes(&notes, comments);
+    // A note of a journal that is not a usable comment is left out: the recording is whole without
+    // it.
+    for (uint32_t i = 0; i < notes.count && comments->count < SONDE_MAX_COMMENTS; ++i) {
+      const sonde_note *note = &notes.list[i];
+      sonde_comment comment;
+      sonde_json *root = NULL;
+      if (note->kind != SONDE_NOTE_COMMENT) continue;
+      if (sonde_json_parse(note->text, strlen(note->text), NULL, &root, NULL)) continue;
+      read_comment(root, &comment);
+      if (!fault_of(&comment)) insert(comments, &comment);
+      sonde_json_free(root);
+    }
     sonde_notes_clear(&notes);
   }
   if (status) sonde_comments_clear(comments);

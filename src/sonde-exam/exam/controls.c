@@ -10,28 +10,24 @@ static double keep_real(double wanted, double before, double low, double high) {
   return isfinite(wanted) ? clamp(wanted, low, high) : before;
 }
 
-// Ranges are physiological with a wide margin; 1e5 Pa is 750 mmHg.
-static sonde_pathology clean_pathology(sonde_pathology p, const sonde_pathology *before) {
-  p.name[sizeof p.name - 1] = 0;
-  p.venous_pressure_pa = keep_real(p.venous_pressure_pa, before->venous_pressure_pa, 0.0, 1e5);
-  p.arterial_pressure_pa =
-      keep_real(p.arterial_pressure_pa, before->arterial_pressure_pa, 0.0, 1e5);
-  p.thrombus_fraction = keep_real(p.thrombus_fraction, before->thrombus_fraction, 0.0, 1.0);
-  p.thrombus_modulus_pa = keep_real(p.thrombus_modulus_pa, before->thrombus_modulus_pa, 0.0, 1e8);
-  p.thrombus_from_m = keep_real(p.thrombus_from_m, before->thrombus_from_m, -10.0, 10.0);
-  p.thrombus_to_m = keep_real(p.thrombus_to_m, before->thrombus_to_m, -10.0, 10.0);
-  p.lumen_scale = keep_real(p.lumen_scale, before->lumen_scale, 0.1, 3.0);
-  p.echogenicity = keep_real(p.echogenicity, before->echogenicity, 0.0, 1.0);
-  return p;
-}
-
 sonde_session_controls sonde_controls_clean(const sonde_session_controls *wanted,
                                             const sonde_session_controls *before,
                                             uint32_t probe_count) {
   SONDE_ASSERT(before->probe < probe_count);
   sonde_session_controls controls = *wanted;
   if (controls.probe >= probe_count) controls.probe = before->probe;
-  controls.pathology = clean_pathology(wanted->pathology, &before->pathology);
+  // Ranges are physiological with a wide margin; 1e5 Pa is 750 mmHg.
+  sonde_pathology *p = &controls.pathology;
+  const sonde_pathology *q = &before->pathology;
+  p->name[sizeof p->name - 1] = 0;
+  p->venous_pressure_pa = keep_real(p->venous_pressure_pa, q->venous_pressure_pa, 0.0, 1e5);
+  p->arterial_pressure_pa = keep_real(p->arterial_pressure_pa, q->arterial_pressure_pa, 0.0, 1e5);
+  p->thrombus_fraction = keep_real(p->thrombus_fraction, q->thrombus_fraction, 0.0, 1.0);
+  p->thrombus_modulus_pa = keep_real(p->thrombus_modulus_pa, q->thrombus_modulus_pa, 0.0, 1e8);
+  p->thrombus_from_m = keep_real(p->thrombus_from_m, q->thrombus_from_m, -10.0, 10.0);
+  p->thrombus_to_m = keep_real(p->thrombus_to_m, q->thrombus_to_m, -10.0, 10.0);
+  p->lumen_scale = keep_real(p->lumen_scale, q->lumen_scale, 0.1, 3.0);
+  p->echogenicity = keep_real(p->echogenicity, q->echogenicity, 0.0, 1.0);
   controls.echo = sonde_echo_settings_clamp(wanted->echo);
   if ((unsigned)controls.posture >= SONDE_POSTURE_COUNT) controls.posture = before->posture;
   if (controls.preset >= SONDE_SESSION_PRESETS) controls.preset = before->preset;

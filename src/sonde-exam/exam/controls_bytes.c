@@ -10,19 +10,6 @@ size_t sonde_controls_bytes(int version) {
   return version < 4 ? 152 : 208;
 }
 
-static void put_rest(bytes_cursor *w, const sonde_session_controls *c) {
-  bytes_f64(w, c->pathology.wall_shear_pa);
-  bytes_u32(w, (c->gel ? 1u : 0u) | (c->valsalva ? 2u : 0u));
-  bytes_u32(w, c->gel_put);
-  bytes_u32(w, c->gel_wipe);
-  bytes_u32(w, c->posture);
-  bytes_u32(w, c->preset);
-  bytes_u32(w, 0);
-  bytes_f64(w, c->stiffness_scale);
-  bytes_f64(w, c->damping_scale);
-  bytes_f64(w, c->friction_scale);
-}
-
 void sonde_controls_put(bytes_cursor *w, const sonde_session_controls *c) {
   const size_t start = w->count;
   const sonde_pathology *p = &c->pathology;
@@ -45,29 +32,21 @@ void sonde_controls_put(bytes_cursor *w, const sonde_session_controls *c) {
   bytes_u32(w, c->resume);
   for (size_t i = 0; i < SONDE_COUNT_OF(numbers); ++i) bytes_f64(w, numbers[i]);
   bytes_put(w, p->name, sizeof p->name);
-  put_rest(w, c);
+  bytes_f64(w, c->pathology.wall_shear_pa);
+  bytes_u32(w, (c->gel ? 1u : 0u) | (c->valsalva ? 2u : 0u));
+  bytes_u32(w, c->gel_put);
+  bytes_u32(w, c->gel_wipe);
+  bytes_u32(w, c->posture);
+  bytes_u32(w, c->preset);
+  bytes_u32(w, 0);
+  bytes_f64(w, c->stiffness_scale);
+  bytes_f64(w, c->damping_scale);
+  bytes_f64(w, c->friction_scale);
   SONDE_ASSERT(w->count == start + sonde_controls_bytes(SONDE_RECORD_VERSION));
 }
 
 static double within(double value, double low, double high) {
   return value >= low && value <= high ? value : 1.0;
-}
-
-// Out of range only in a file that nobody wrote so: the tick takes them as they are.
-static void get_rest(bytes_reader *r, sonde_session_controls *c) {
-  c->pathology.wall_shear_pa = bytes_take_f64(r);
-  uint32_t flags = bytes_take_u32(r);
-  c->gel = flags & 1;
-  c->valsalva = flags & 2;
-  c->gel_put = bytes_take_u32(r);
-  c->gel_wipe = bytes_take_u32(r);
-  uint32_t posture = bytes_take_u32(r), preset = bytes_take_u32(r);
-  c->posture = posture < SONDE_POSTURE_COUNT ? (sonde_posture)posture : SONDE_POSTURE_SUPINE;
-  c->preset = preset < SONDE_SESSION_PRESETS ? preset : 0;
-  (void)bytes_take_u32(r);
-  c->stiffness_scale = within(bytes_take_f64(r), 0.5, 2.0);
-  c->damping_scale = within(bytes_take_f64(r), 0.25, 4.0);
-  c->friction_scale = within(bytes_take_f64(r), 0.0, 2.0);
 }
 
 void sonde_controls_get(bytes_reader *r, int version, sonde_session_controls *c) {
@@ -83,6 +62,21 @@ void sonde_controls_get(bytes_reader *r, int version, sonde_session_controls *c)
   memcpy(c->pathology.name, r->at, sizeof c->pathology.name);
   c->pathology.name[sizeof c->pathology.name - 1] = 0;
   r->at += sizeof c->pathology.name;
-  if (version >= 4) get_rest(r, c);
+  if (version >= 4) {
+    // Numbers out of range are only in a file that no session wrote: a tick takes them as they are.
+    c->pathology.wall_shear_pa = bytes_take_f64(r);
+    uint32_t flags = bytes_take_u32(r);
+    c->gel = flags & 1;
+    c->valsalva = flags & 2;
+    c->gel_put = bytes_take_u32(r);
+    c->gel_wipe = bytes_take_u32(r);
+    uint32_t posture = bytes_take_u32(r), preset = bytes_take_u32(r);
+    c->posture = posture < SONDE_POSTURE_COUNT ? (sonde_posture)posture : SONDE_POSTURE_SUPINE;
+    c->preset = preset < SONDE_SESSION_PRESETS ? preset : 0;
+    (void)bytes_take_u32(r);
+    c->stiffness_scale = within(bytes_take_f64(r), 0.5, 2.0);
+    c->damping_scale = within(bytes_take_f64(r), 0.25, 4.0);
+    c->friction_scale = within(bytes_take_f64(r), 0.0, 2.0);
+  }
   SONDE_ASSERT(r->at == start + sonde_controls_bytes(version));
 }

@@ -141,18 +141,14 @@ bool sonde_journal_append(sonde_journal *journal, const void *bytes, size_t coun
   return true;
 }
 
-static void settle(sonde_journal *journal) {
-  journal->synced += (off_t)journal->written;
-  journal->count -= journal->written;
-  memmove(journal->bytes, journal->bytes + journal->written, journal->count);
-  journal->written = 0;
-}
-
 // Bytes that the system took and could not bring to the disk may be gone: they are written again.
 static int sync_all(sonde_journal *journal) {
   int failure = journal->regular ? sonde_disk_sync(journal->descriptor) : 0;
   if (!failure) {
-    settle(journal);
+    journal->synced += (off_t)journal->written;
+    journal->count -= journal->written;
+    memmove(journal->bytes, journal->bytes + journal->written, journal->count);
+    journal->written = 0;
     return 0;
   }
   if (lseek(journal->descriptor, journal->synced, SEEK_SET) >= 0) journal->written = 0;

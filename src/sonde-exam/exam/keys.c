@@ -177,14 +177,12 @@ bool sonde_keys_add(sonde_keys *keys, const sonde_key *key) {
   return true;
 }
 
-static bool read_entry(FILE *file, file_entry *entry) {
-  return fread(entry, sizeof *entry, 1, file) == 1 && (entry->tag == ENTRY || entry->tag == LAST);
-}
-
 // False when the list is not that of a whole file for this recording.
 static bool scan(sonde_keys *keys, uint32_t recording_crc) {
   file_entry entry;
-  while (read_entry(keys->file, &entry) && entry.tag == ENTRY) {
+  while ((fread(&entry, sizeof entry, 1, keys->file) == 1 &&
+          (entry.tag == ENTRY || entry.tag == LAST)) &&
+         entry.tag == ENTRY) {
     uint64_t last = keys->count ? keys->list[keys->count - 1].tick : 0;
     long at = ftell(keys->file);
     bool fits = at >= 0 && entry.raw_bytes >= PARTS && entry.raw_bytes <= keys->raw_room &&

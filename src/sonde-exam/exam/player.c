@@ -6,7 +6,7 @@
 
 #include <string.h>
 
-enum { SHELF = 3 };
+enum { WINDOWS = 3 }; // of the interior that are kept for seeks
 
 static uint64_t tick_of(const sonde_player *player) { return sonde_session_ticks(player->session); }
 
@@ -30,27 +30,21 @@ static sonde_status create_session(sonde_player *player, const sonde_model *mode
   if (!status) status = sonde_session_create(&def, &device, &player->session, error);
   if (device.destroy) device.destroy(device.self);
   sonde_free(names);
-  if (!status && player->session->interior)
-    status = sonde_interior_keep_windows(player->session->interior, SHELF, error);
-  return status;
-}
-
-// The recorded probes have the shape that they had.
-static sonde_status check_probes(const sonde_player *player, sonde_error *error) {
-  const sonde_recording *r = &player->recording;
+  if (status) return status;
+  // The probes must have the shape that they had when the exam was recorded.
   for (uint32_t i = 0; i < r->probe_count; ++i)
     if (sonde_probe_hash(sonde_session_probe(player->session, i)) != r->probe_hashes[i])
       return sonde_fail(error, SONDE_MISMATCH,
                         "%s: the probe \"%s\" has another shape than when it was recorded",
                         player->path, r->probe_names[i]);
-  return SONDE_OK;
-}
-
-static sonde_status remember_start(sonde_player *player, sonde_error *error) {
+  // The moment before the first tick is the player's first keyframe.
   sonde_subject *subject = player->session->subject;
+  if (player->session->interior)
+    status = sonde_interior_keep_windows(player->session->interior, WINDOWS, error);
   player->world = sonde_calloc(1, sonde_subject_size(subject));
   player->start_world = sonde_calloc(1, sonde_subject_size(subject));
-  if (!player->world || !player->start_world) return sonde_fail_memory(error);
+  if (!player->world || !player->start_world) status = sonde_fail_memory(error);
+  if (status) return status;
   player->start_bytes = sonde_subject_remember(subject, player->start_world);
   player->start_inputs = (sonde_tick_memory){player->session->controls, player->session->sample};
   sonde_session_remember_image(player->session, &player->start_inside);
@@ -108,37 +102,30 @@ bool sonde_player_jump(sonde_player *player, const sonde_packed_key *packed) {
   return true;
 }
 
-// Where the session would have taken one, unless there is one already.
-static void keep(sonde_player *player, uint64_t tick) {
-  sonde_session *s = player->session;
-  uint64_t ahead = 2 * (uint64_t)s->ticks_per_image;
-  const sonde_packed_key *last = sonde_keys_find(&player->keys, tick);
-  uint64_t from = sonde_session_key_place(s, tick);
-  if (from == 0 || (last && last->tick + ahead > from)) return;
-  sonde_tick_memory inputs;
-  memset(&inputs, 0, sizeof inputs);
-  size_t bytes = sonde_session_remember_tick(s, &inputs, player->world);
-  sonde_session_remember_image(s, &player->inside);
-  sonde_key key = {tick, &inputs, &player->inside, player->world, bytes};
-  (void)sonde_keys_add(&player->keys, &key); // a seek from farther away without it
-}
-
+// Makes the image of the state at hand, if the recording has one.
 static void make_image(sonde_player *player) {
   sonde_session *s = player->session;
+  uint32_t next = player->next_image;
+  uint64_t tick = tick_of(player);
+  if (next >= player->image_count || player->images[next].tick != tick) return;
+  // A keyframe where the session would have taken one, unless there is one already.
+  const sonde_packed_key *last = sonde_keys_find(&player->keys, tick);
+  uint64_t from = sonde_session_key_place(s, tick), ahead = 2 * (uint64_t)s->ticks_per_image;
+  if (from != 0 && !(last && last->tick + ahead > from)) {
+    sonde_tick_memory inputs;
+    memset(&inputs, 0, sizeof inputs);
+    size_t bytes = sonde_session_remember_tick(s, &inputs, player->world);
+    sonde_session_remember_image(s, &player->inside);
+    sonde_key key = {tick, &inputs, &player->inside, player->world, bytes};
+    (void)sonde_keys_add(&player->keys, &key); // without it a seek starts from farther away
+  }
+  // The limits of the force acted on the device, which the recording tells.
   const sonde_player_image *image = &player->images[player->next_image++];
-  keep(player, image->tick);
   s->safety.force_n = image->told.rendered_force_n;
   s->safety.fault = image->told.fault;
   sonde_session_offer(s);
   player->followed = sonde_session_follow(s);
   player->drawn = false;
-}
-
-// The image of the state at hand, if the recording has one.
-static void image_now(sonde_player *player) {
-  uint32_t next = player->next_image;
-  if (next < player->image_count && player->images[next].tick == tick_of(player))
-    make_image(player);
 }
 
 // False at the end.
@@ -155,36 +142,9 @@ static bool tick_once(sonde_player *player) {
        ++player->next_event)
     controls = &player->events[player->next_event].controls;
   sonde_session_replay(player->session, controls, &record.sample);
-  image_now(player);
+  make_image(player);
   if (player->covered == tick) player->covered = tick + 1;
   return true;
-}
-
-static void write_cache(sonde_player *player) {
-  sonde_keys_file *file = NULL;
-  char *path = sonde_keys_path(player->path);
-  bool whole = player->covered == player->info.ticks && player->keys.count > player->from_file;
-  if (path && whole && !player->no_cache)
-    (void)sonde_keys_create(path, player->session->subject, &file, NULL);
-  bool good = file != NULL;
-  for (uint32_t k = 0; good && k < player->keys.count; ++k) {
-    sonde_packed_key key;
-    good = sonde_keys_fetch(&player->keys, &player->keys.list[k], &key);
-    if (good) sonde_keys_append(file, &key);
-  }
-  if (good)
-    (void)sonde_keys_commit(file, player->recording.told.crc, NULL);
-  else
-    sonde_keys_discard(file);
-  sonde_free(path);
-}
-
-static void open_cache(sonde_player *player) {
-  char *path = player->no_cache ? NULL : sonde_keys_path(player->path);
-  if (path)
-    sonde_keys_open(&player->keys, path, player->session->subject, player->recording.told.crc);
-  player->from_file = player->keys.count;
-  sonde_free(path);
 }
 
 sonde_status sonde_player_open(const sonde_player_def *def, sonde_player **out,
@@ -199,17 +159,24 @@ sonde_status sonde_player_open(const sonde_player_def *def, sonde_player **out,
   sonde_status status = player->path ? SONDE_OK : sonde_fail_memory(error);
   if (!status) memcpy(player->path, def->path, bytes);
   if (!status) status = sonde_recording_load(def->path, def->recover, &player->recording, error);
-  if (!status) status = sonde_recording_fits(&player->recording, def->path, def->model, error);
+  const sonde_recording *r = &player->recording;
+  if (!status && r->model_checksum != def->model->checksum)
+    status = sonde_fail(error, SONDE_MISMATCH,
+                        "%s: recorded on the model %s (checksum %016llx), this one is %s (%016llx)",
+                        def->path, r->model_name, (unsigned long long)r->model_checksum,
+                        def->model->name, (unsigned long long)def->model->checksum);
   if (!status) status = sonde_player_index(player, error);
   if (!status) status = create_session(player, def->model, def->findings, error);
-  if (!status) status = check_probes(player, error);
-  if (!status) status = remember_start(player, error);
   if (status) {
     player->no_cache = true;
     sonde_player_close(player);
     return status;
   }
-  open_cache(player);
+  // Keyframes that an earlier player left beside the recording.
+  char *path = player->no_cache ? NULL : sonde_keys_path(player->path);
+  if (path) sonde_keys_open(&player->keys, path, player->session->subject, r->told.crc);
+  player->from_file = player->keys.count;
+  sonde_free(path);
   sonde_player_restart(player);
   *out = player;
   return SONDE_OK;
@@ -217,7 +184,24 @@ sonde_status sonde_player_open(const sonde_player_def *def, sonde_player **out,
 
 void sonde_player_close(sonde_player *player) {
   if (!player) return;
-  if (!player->no_cache) write_cache(player);
+  // The keyframes of an exam that was played through are kept beside the recording.
+  if (!player->no_cache && player->covered == player->info.ticks &&
+      player->keys.count > player->from_file) {
+    sonde_keys_file *file = NULL;
+    char *path = sonde_keys_path(player->path);
+    if (path) (void)sonde_keys_create(path, player->session->subject, &file, NULL);
+    bool good = file != NULL;
+    for (uint32_t k = 0; good && k < player->keys.count; ++k) {
+      sonde_packed_key key;
+      good = sonde_keys_fetch(&player->keys, &player->keys.list[k], &key);
+      if (good) sonde_keys_append(file, &key);
+    }
+    if (good)
+      (void)sonde_keys_commit(file, player->recording.told.crc, NULL);
+    else
+      sonde_keys_discard(file);
+    sonde_free(path);
+  }
   sonde_keys_clear(&player->keys);
   (void)sonde_session_destroy(player->session, NULL);
   sonde_recording_clear(&player->recording);
@@ -240,28 +224,24 @@ static uint64_t clamp_tick(const sonde_player *player, double time_s) {
   return tick < (double)player->info.ticks ? (uint64_t)tick : player->info.ticks;
 }
 
-// To the nearest place from which the goal's image can be made: a keyframe's own image is made
-// again.
-static void jump_near(sonde_player *player, uint64_t goal) {
-  uint32_t images = images_until(player, goal);
-  uint64_t now = tick_of(player);
-  bool here = now <= goal;
-  const sonde_packed_key *key =
-      images > 0 ? sonde_keys_find(&player->keys, player->images[images - 1].tick) : NULL;
-  while (key && (!here || key->tick > now)) {
-    if (sonde_player_jump(player, key)) return;
-    key = key > player->keys.list ? key - 1 : NULL;
-    here = false; // a damaged one leaves nothing to go on from
-  }
-  if (!here) sonde_player_restart(player);
-}
-
 sonde_status sonde_player_seek(sonde_player *player, double time_s, const sonde_progress *progress,
                                sonde_error *error) {
   SONDE_ASSERT(player != NULL);
   uint64_t goal = clamp_tick(player, time_s);
-  jump_near(player, goal);
-  image_now(player);
+  // To the nearest moment from which the goal's image can be made: a keyframe's own image is made
+  // again. A damaged keyframe leaves nothing to go on from.
+  uint32_t images = images_until(player, goal);
+  uint64_t now = tick_of(player);
+  bool here = now <= goal, jumped = false;
+  const sonde_packed_key *key =
+      images > 0 ? sonde_keys_find(&player->keys, player->images[images - 1].tick) : NULL;
+  while (key && !jumped && (!here || key->tick > now)) {
+    jumped = sonde_player_jump(player, key);
+    key = key > player->keys.list ? key - 1 : NULL;
+    here = false;
+  }
+  if (!here && !jumped) sonde_player_restart(player);
+  make_image(player);
   uint64_t start = tick_of(player);
   for (uint64_t tick = start; tick < goal && tick_once(player); ++tick) {
     double fraction = (double)(tick + 1 - start) / (double)(goal - start);
@@ -319,14 +299,4 @@ uint64_t sonde_player_hash(sonde_player *player) {
 
 sonde_session_controls sonde_player_controls(const sonde_player *player) {
   return player->session->controls;
-}
-
-const sonde_probe *sonde_player_probe(const sonde_player *player) {
-  return sonde_session_probe(player->session, player->session->controls.probe);
-}
-
-const sonde_player_event *sonde_player_events(const sonde_player *player, uint32_t *count) {
-  SONDE_ASSERT(count != NULL);
-  *count = player->event_count;
-  return player->events;
 }

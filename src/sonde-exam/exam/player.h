@@ -10,6 +10,12 @@ typedef struct sonde_player_image {
   sonde_record_image told;
 } sonde_player_image;
 
+// A change of the controls during the exam; the first one is the start.
+typedef struct sonde_player_event {
+  double time_s;
+  sonde_session_controls controls;
+} sonde_player_event;
+
 enum { SONDE_PLAYER_MARK = 256 }; // ticks between known places in the file
 
 struct sonde_player {
@@ -41,6 +47,8 @@ struct sonde_player {
 
 // Lists of events, images, hashes and places.
 sonde_status sonde_player_index(sonde_player *player, sonde_error *error);
+uint64_t sonde_player_tick(const sonde_player *player);
+uint64_t sonde_player_hash(sonde_player *player); // sonde_state_hash()
 // Stands at a tick with a keyframe, or at the start.
 void sonde_player_restart(sonde_player *player);
 bool sonde_player_jump(sonde_player *player, const sonde_packed_key *key);

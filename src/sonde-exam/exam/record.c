@@ -30,42 +30,6 @@ static bool emit(sonde_recorder *recorder, const void *bytes, size_t count, bool
   return true;
 }
 
-static void put_tick(bytes_cursor *w, const sonde_record *record) {
-  sonde_pose pose = record->sample.world_from_probe;
-  const double numbers[7] = {pose.position.x, pose.position.y, pose.position.z, pose.rotation.w,
-                             pose.rotation.x, pose.rotation.y, pose.rotation.z};
-  bytes_u32(w, SONDE_RECORD_TICK);
-  bytes_u32(w, record->sample.present ? 1 : 0);
-  bytes_u64(w, record->tick);
-  bytes_u32(w, record->sample.buttons);
-  bytes_u32(w, 0);
-  for (int i = 0; i < 7; ++i) bytes_f64(w, numbers[i]);
-}
-
-static void put_controls(bytes_cursor *w, const sonde_record *record) {
-  bytes_u32(w, SONDE_RECORD_CONTROLS);
-  bytes_u32(w, record->controls.probe);
-  bytes_u64(w, record->tick);
-  sonde_controls_put(w, &record->controls);
-}
-
-static void put_image(bytes_cursor *w, const sonde_record *record) {
-  const sonde_record_image *image = &record->image;
-  bytes_u32(w, SONDE_RECORD_IMAGE);
-  bytes_u32(w, image->fault);
-  bytes_u64(w, record->tick);
-  bytes_f64(w, image->rendered_force_n.x);
-  bytes_f64(w, image->rendered_force_n.y);
-  bytes_f64(w, image->rendered_force_n.z);
-}
-
-static void put_check(bytes_cursor *w, const sonde_record *record) {
-  bytes_u32(w, SONDE_RECORD_CHECK);
-  bytes_u32(w, record->check.kind);
-  bytes_u64(w, record->check.tick);
-  bytes_u64(w, record->check.hash);
-}
-
 void sonde_record_put_block(unsigned char *bytes, uint32_t crc, uint64_t ticks) {
   bytes_cursor w = {bytes, 16, 0};
   bytes_u32(&w, SONDE_RECORD_BLOCK);
@@ -104,27 +68,47 @@ static void close_block(sonde_recorder *recorder, bool sync) {
   publish(recorder, trouble, sync);
 }
 
-// The first one that is missing is the last one that matters.
-static void end_inputs(sonde_recorder *recorder) {
-  recorder->broken = true;
-  atomic_fetch_add(&recorder->lost, 1);
-}
-
 void sonde_recorder_write(sonde_recorder *recorder, const sonde_record *record) {
   unsigned char bytes[SONDE_RECORD_MOST_BYTES];
   bytes_cursor w = {bytes, sizeof bytes, 0};
-  bool is_tick = record->tag == SONDE_RECORD_TICK;
+  const bool is_tick = record->tag == SONDE_RECORD_TICK;
+  const sonde_pose pose = record->sample.world_from_probe;
+  const double place[7] = {pose.position.x, pose.position.y, pose.position.z, pose.rotation.w,
+                           pose.rotation.x, pose.rotation.y, pose.rotation.z};
+  const double *force_n = &record->image.rendered_force_n.x;
+  // Tag and one number of 32 bits, the tick, then what belongs to the tag.
+  bytes_u32(&w, record->tag);
   switch (record->tag) {
-  case SONDE_RECORD_TICK: put_tick(&w, record); break;
-  case SONDE_RECORD_CONTROLS: put_controls(&w, record); break;
-  case SONDE_RECORD_IMAGE: put_image(&w, record); break;
-  default: put_check(&w, record); break;
+  case SONDE_RECORD_TICK:
+    bytes_u32(&w, record->sample.present ? 1 : 0);
+    bytes_u64(&w, record->tick);
+    bytes_u32(&w, record->sample.buttons);
+    bytes_u32(&w, 0);
+    for (int i = 0; i < 7; ++i) bytes_f64(&w, place[i]);
+    break;
+  case SONDE_RECORD_CONTROLS:
+    bytes_u32(&w, record->controls.probe);
+    bytes_u64(&w, record->tick);
+    sonde_controls_put(&w, &record->controls);
+    break;
+  case SONDE_RECORD_IMAGE:
+    bytes_u32(&w, record->image.fault);
+    bytes_u64(&w, record->tick);
+    for (int i = 0; i < 3; ++i) bytes_f64(&w, force_n[i]);
+    break;
+  default:
+    bytes_u32(&w, record->check.kind);
+    bytes_u64(&w, record->check.tick);
+    bytes_u64(&w, record->check.hash);
+    break;
   }
   SONDE_ASSERT(w.count == sonde_record_bytes(SONDE_RECORD_VERSION, record->tag) && bytes_fit(&w));
   bool is_check = record->tag == SONDE_RECORD_CHECK;
   bool follows = is_check ? record->tick <= recorder->ticks : record->tick == recorder->ticks;
   if (recorder->broken || !follows || !emit(recorder, bytes, w.count, false)) {
-    end_inputs(recorder);
+    // The first one that is missing is the last one that matters.
+    recorder->broken = true;
+    atomic_fetch_add(&recorder->lost, 1);
     return;
   }
   recorder->images += record->tag == SONDE_RECORD_IMAGE;
@@ -164,22 +148,6 @@ static void put_hex(sonde_json_out *out, const char *key, uint64_t value) {
   sonde_json_put_text(out, key, text);
 }
 
-static void put_world(sonde_json_out *out, const sonde_world_def *def) {
-  sonde_json_begin_object(out, "world");
-  sonde_json_put_real(out, "dt_s", def->dt_s, 0);
-  sonde_json_put_real(out, "implicitness", def->implicitness, 0);
-  sonde_json_put_integer(out, "newton_iterations", def->newton_iterations);
-  sonde_json_put_real(out, "pcg_relative", def->pcg.relative_residual, 0);
-  sonde_json_put_real(out, "pcg_absolute", def->pcg.absolute_residual, 0);
-  sonde_json_put_integer(out, "pcg_iterations", def->pcg.max_iterations);
-  sonde_json_put_integer(out, "contact_law", def->contact_law);
-  sonde_json_put_real(out, "contact_stiffness_n_m3", def->contact_stiffness_n_m3, 0);
-  sonde_json_put_real(out, "contact_damping_n_s_m3", def->contact_damping_n_s_m3, 0);
-  sonde_json_put_integer(out, "engine", def->engine);
-  sonde_json_put_real(out, "sleep_displacement_m", def->sleep_displacement_m, 0);
-  sonde_json_end(out);
-}
-
 // The header line with its end.
 static sonde_status write_header(const sonde_record_head *head, char **text, size_t *count,
                                  sonde_error *error) {
@@ -201,7 +169,19 @@ static sonde_status write_header(const sonde_record_head *head, char **text, siz
     sonde_json_end(&out);
   }
   sonde_json_end(&out);
-  put_world(&out, &head->world);
+  sonde_json_begin_object(&out, "world");
+  sonde_json_put_real(&out, "dt_s", head->world.dt_s, 0);
+  sonde_json_put_real(&out, "implicitness", head->world.implicitness, 0);
+  sonde_json_put_integer(&out, "newton_iterations", head->world.newton_iterations);
+  sonde_json_put_real(&out, "pcg_relative", head->world.pcg.relative_residual, 0);
+  sonde_json_put_real(&out, "pcg_absolute", head->world.pcg.absolute_residual, 0);
+  sonde_json_put_integer(&out, "pcg_iterations", head->world.pcg.max_iterations);
+  sonde_json_put_integer(&out, "contact_law", head->world.contact_law);
+  sonde_json_put_real(&out, "contact_stiffness_n_m3", head->world.contact_stiffness_n_m3, 0);
+  sonde_json_put_real(&out, "contact_damping_n_s_m3", head->world.contact_damping_n_s_m3, 0);
+  sonde_json_put_integer(&out, "engine", head->world.engine);
+  sonde_json_put_real(&out, "sleep_displacement_m", head->world.sleep_displacement_m, 0);
+  sonde_json_end(&out);
   sonde_setup_write(&out, &head->setup);
   sonde_json_begin_object(&out, "image");
   sonde_json_put_integer(&out, "width", head->image_width);

@@ -165,11 +165,11 @@ size_t sonde_record_put_note(unsigned char *bytes, sonde_note_kind kind, uint64_
 void sonde_recording_describe(const sonde_recording *recording, sonde_recording_info *info);
 // Hash of a probe's body, so that a replay notices another shape behind the same name.
 uint64_t sonde_probe_hash(const sonde_probe *probe);
-// The recorded probes, checked to have the recorded shape.
-// @param[out] probes [probe_count], cleared by the caller also after a failure
-sonde_status sonde_recording_probes(const sonde_recording *recording, const char *path,
-                                    sonde_probe *probes, sonde_error *error);
-sonde_status sonde_recording_fits(const sonde_recording *recording, const char *path,
-                                  const sonde_model *model, sonde_error *error);
+// Appends a note to a recording that nobody writes: on the disk when this returns OK; after a
+// failure the recording is as it was. Bytes behind the last whole block are cut off.
+// @return VERSION for recordings before version 8, DEVICE for one that is being recorded, ARGUMENT
+//   for a text that is too long, DISK, IO @thread owner
+sonde_status sonde_notes_add(const char *recording, sonde_note_kind kind, const char *text,
+                             sonde_error *error);
 
 #endif

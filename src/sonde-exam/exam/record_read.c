@@ -7,6 +7,7 @@
 #include "haptics/motion.h"
 
 #include <stdlib.h>
+#include <string.h>
 #include <zlib.h>
 
 // What is being read, for sentences.
@@ -53,15 +54,6 @@ static sonde_status hash_of(const source *s, const sonde_json *object, const cha
   return end == text || *end ? fail_header(s, key) : SONDE_OK;
 }
 
-static sonde_status read_model(const source *s, const sonde_json *root) {
-  sonde_recording *r = s->recording;
-  const sonde_json *model = sonde_json_member(root, "model");
-  sonde_status status = text_of(s, model, "path", r->model_path, sizeof r->model_path);
-  if (!status) status = text_of(s, model, "name", r->model_name, sizeof r->model_name);
-  if (!status) status = hash_of(s, model, "checksum", &r->model_checksum);
-  return status;
-}
-
 static sonde_status read_probes(const source *s, const sonde_json *root) {
   sonde_recording *r = s->recording;
   const sonde_json *probes = sonde_json_member(root, "probes");
@@ -76,46 +68,6 @@ static sonde_status read_probes(const source *s, const sonde_json *root) {
     if (!status) status = text_of(s, probe, "name", r->probe_names[i], sizeof r->probe_names[i]);
     if (!status) status = hash_of(s, probe, "hash", &r->probe_hashes[i]);
   }
-  return status;
-}
-
-static sonde_status read_world(const source *s, const sonde_json *root) {
-  const sonde_json *world = sonde_json_member(root, "world");
-  sonde_world_def def = sonde_world_def_default();
-  uint32_t law = 0, engine = 0;
-  const struct {
-    const char *key;
-    double *value;
-  } reals[] = {{"dt_s", &def.dt_s},
-               {"implicitness", &def.implicitness},
-               {"pcg_relative", &def.pcg.relative_residual},
-               {"pcg_absolute", &def.pcg.absolute_residual},
-               {"contact_stiffness_n_m3", &def.contact_stiffness_n_m3},
-               {"contact_damping_n_s_m3", &def.contact_damping_n_s_m3},
-               {"sleep_displacement_m", &def.sleep_displacement_m}};
-  sonde_status status = SONDE_OK;
-  for (size_t i = 0; i < SONDE_COUNT_OF(reals) && !status; ++i)
-    status = real_of(s, world, reals[i].key, reals[i].value);
-  if (!status) status = count_of(s, world, "newton_iterations", &def.newton_iterations);
-  if (!status) status = count_of(s, world, "pcg_iterations", &def.pcg.max_iterations);
-  if (!status) status = count_of(s, world, "contact_law", &law);
-  if (!status) status = count_of(s, world, "engine", &engine);
-  if (!status && law > SONDE_CONTACT_NODES) status = fail_header(s, "contact_law");
-  if (!status && engine > SONDE_ENGINE_FAST) status = fail_header(s, "engine");
-  def.contact_law = (sonde_contact_law)law;
-  def.engine = (sonde_engine)engine;
-  s->recording->world = def;
-  return status;
-}
-
-// Came with version 4.
-static sonde_status read_image(const source *s, const sonde_json *root) {
-  const sonde_json *image = sonde_json_member(root, "image");
-  sonde_recording *r = s->recording;
-  sonde_status status = count_of(s, image, "width", &r->image_width);
-  if (!status) status = count_of(s, image, "height", &r->image_height);
-  if (!status) status = count_of(s, image, "ticks_per_image", &r->ticks_per_image);
-  if (!status && r->ticks_per_image == 0) status = fail_header(s, "ticks_per_image");
   return status;
 }
 
@@ -147,13 +99,50 @@ static sonde_status read_header(const source *s) {
                                   (uint32_t)sonde_limits_recording.most_items};
   sonde_json *root = NULL;
   sonde_status status = sonde_json_parse(line, (size_t)(end - line), &from, &root, s->error);
-  if (!status) status = read_model(s, root);
+  if (!status) {
+    const sonde_json *model = sonde_json_member(root, "model");
+    status = text_of(s, model, "path", r->model_path, sizeof r->model_path);
+    if (!status) status = text_of(s, model, "name", r->model_name, sizeof r->model_name);
+    if (!status) status = hash_of(s, model, "checksum", &r->model_checksum);
+  }
   if (!status) status = read_probes(s, root);
-  if (!status) status = read_world(s, root);
+  if (!status) {
+    const sonde_json *world = sonde_json_member(root, "world");
+    sonde_world_def def = sonde_world_def_default();
+    uint32_t law = 0, engine = 0;
+    const struct {
+      const char *key;
+      double *value;
+    } reals[] = {{"dt_s", &def.dt_s},
+                 {"implicitness", &def.implicitness},
+                 {"pcg_relative", &def.pcg.relative_residual},
+                 {"pcg_absolute", &def.pcg.absolute_residual},
+                 {"contact_stiffness_n_m3", &def.contact_stiffness_n_m3},
+                 {"contact_damping_n_s_m3", &def.contact_damping_n_s_m3},
+                 {"sleep_displacement_m", &def.sleep_displacement_m}};
+    for (size_t i = 0; i < SONDE_COUNT_OF(reals) && !status; ++i)
+      status = real_of(s, world, reals[i].key, reals[i].value);
+    if (!status) status = count_of(s, world, "newton_iterations", &def.newton_iterations);
+    if (!status) status = count_of(s, world, "pcg_iterations", &def.pcg.max_iterations);
+    if (!status) status = count_of(s, world, "contact_law", &law);
+    if (!status) status = count_of(s, world, "engine", &engine);
+    if (!status && law > SONDE_CONTACT_NODES) status = fail_header(s, "contact_law");
+    if (!status && engine > SONDE_ENGINE_FAST) status = fail_header(s, "engine");
+    def.contact_law = (sonde_contact_law)law;
+    def.engine = (sonde_engine)engine;
+    s->recording->world = def;
+  }
   r->image_width = r->image_height = 512, r->ticks_per_image = 20;
   if (!status && !sonde_setup_read(root, &r->setup)) status = fail_header(s, "setup");
   r->world.friction = r->setup.friction;
-  if (!status && r->version >= 4) status = read_image(s, root);
+  if (!status && r->version >= 4) {
+    // Came with version 4.
+    const sonde_json *image = sonde_json_member(root, "image");
+    status = count_of(s, image, "width", &r->image_width);
+    if (!status) status = count_of(s, image, "height", &r->image_height);
+    if (!status) status = count_of(s, image, "ticks_per_image", &r->ticks_per_image);
+    if (!status && r->ticks_per_image == 0) status = fail_header(s, "ticks_per_image");
+  }
   sonde_json_free(root);
   r->at = r->start = (size_t)(end + 1 - r->bytes);
   return status;
@@ -172,7 +161,16 @@ size_t sonde_record_bytes(int version, uint32_t tag) {
   }
 }
 
-// The last bytes; afterwards recording->end is the end of the records.
+static void take_end(sonde_recording *r, bytes_reader *reader) {
+  sonde_record_end *told = &r->told;
+  told->ticks = bytes_take_u64(reader);
+  told->hash = bytes_take_u64(reader);
+  told->lost = bytes_take_u64(reader);
+  if (r->version >= 4)
+    told->images = bytes_take_u64(reader), told->image_hash = bytes_take_u64(reader);
+}
+
+// The last bytes of a file before version 8; afterwards recording->end is the end of the records.
 static sonde_status read_end(const source *s) {
   sonde_recording *r = s->recording;
   size_t bytes = sonde_record_bytes(r->version, SONDE_RECORD_END);
@@ -181,54 +179,16 @@ static sonde_status read_end(const source *s) {
   if (start < r->at || bytes_take_u32(&reader) != SONDE_RECORD_END || bytes_take_u32(&reader) != 0)
     return sonde_fail(s->error, SONDE_FORMAT,
                       "%s: the recording has no end: it was cut off or not finished", s->path);
-  sonde_record_end *told = &r->told;
-  told->ticks = bytes_take_u64(&reader);
-  told->hash = bytes_take_u64(&reader);
-  told->lost = bytes_take_u64(&reader);
-  if (r->version >= 4)
-    told->images = bytes_take_u64(&reader), told->image_hash = bytes_take_u64(&reader);
-  told->crc = bytes_take_u32(&reader);
+  take_end(r, &reader);
+  r->told.crc = bytes_take_u32(&reader);
   uint32_t crc = (uint32_t)crc32_z(0, (const unsigned char *)r->bytes, r->end - 8);
-  if (!sonde_checksum_fits(told->crc, crc))
+  if (!sonde_checksum_fits(r->told.crc, crc))
     return sonde_fail(s->error, SONDE_CHECKSUM,
                       "%s: the recording is damaged: its CRC-32 is %08x, expected %08x", s->path,
-                      crc, told->crc);
+                      crc, r->told.crc);
   r->end = start;
   r->ended = true;
   return SONDE_OK;
-}
-
-static void decode_tick(bytes_reader *reader, sonde_record *record) {
-  record->sample.present = bytes_take_u32(reader) & 1;
-  record->tick = bytes_take_u64(reader);
-  record->sample.buttons = bytes_take_u32(reader);
-  (void)bytes_take_u32(reader);
-  double n[7];
-  for (int i = 0; i < 7; ++i) n[i] = bytes_take_f64(reader);
-  record->sample.world_from_probe = (sonde_pose){{n[0], n[1], n[2]}, {n[3], n[4], n[5], n[6]}};
-}
-
-static void decode_controls(bytes_reader *reader, int version, sonde_record *record) {
-  uint32_t probe = bytes_take_u32(reader);
-  record->tick = bytes_take_u64(reader);
-  sonde_controls_get(reader, version, &record->controls);
-  record->controls.probe = probe;
-}
-
-static void decode_image(bytes_reader *reader, sonde_record *record) {
-  uint32_t fault = bytes_take_u32(reader);
-  record->tick = bytes_take_u64(reader);
-  record->image.fault = fault < SONDE_FAULT_COUNT ? (sonde_fault)fault : SONDE_FAULT_COUNT;
-  sonde_vec3 *force_n = &record->image.rendered_force_n;
-  force_n->x = bytes_take_f64(reader), force_n->y = bytes_take_f64(reader),
-  force_n->z = bytes_take_f64(reader);
-}
-
-static void decode_check(bytes_reader *reader, sonde_record *record) {
-  uint32_t kind = bytes_take_u32(reader);
-  record->check.kind = kind == SONDE_CHECK_STATE ? SONDE_CHECK_STATE : SONDE_CHECK_IMAGES;
-  record->check.tick = record->tick = bytes_take_u64(reader);
-  record->check.hash = bytes_take_u64(reader);
 }
 
 // The tag at a place before `end` and the record's bytes; 0 when no whole record is there.
@@ -246,24 +206,44 @@ static size_t record_at(const sonde_recording *r, size_t at, size_t end, uint32_
   return bytes > end - at ? 0 : bytes;
 }
 
-static bool is_input(uint32_t tag) {
-  return tag != SONDE_RECORD_BLOCK && tag != SONDE_RECORD_NOTE && tag != SONDE_RECORD_END;
-}
-
 bool sonde_recording_next(sonde_recording *r, sonde_record *record) {
   SONDE_ASSERT(r->at <= r->end);
   memset(record, 0, sizeof *record);
   uint32_t tag;
   size_t bytes;
-  while ((bytes = record_at(r, r->at, r->end, &tag)) > 0 && !is_input(tag)) r->at += bytes;
+  while ((bytes = record_at(r, r->at, r->end, &tag)) > 0 && !(tag != SONDE_RECORD_BLOCK && tag != SONDE_RECORD_NOTE && tag != SONDE_RECORD_END)) r->at += bytes;
   if (bytes == 0) return false;
   record->tag = tag;
   bytes_reader reader = {(const unsigned char *)r->bytes + r->at + 4};
   switch (tag) {
-  case SONDE_RECORD_TICK: decode_tick(&reader, record); break;
-  case SONDE_RECORD_CONTROLS: decode_controls(&reader, r->version, record); break;
-  case SONDE_RECORD_IMAGE: decode_image(&reader, record); break;
-  default: decode_check(&reader, record); break;
+  case SONDE_RECORD_TICK: {
+    record->sample.present = bytes_take_u32(&reader) & 1;
+    record->tick = bytes_take_u64(&reader);
+    record->sample.buttons = bytes_take_u32(&reader);
+    (void)bytes_take_u32(&reader);
+    double n[7];
+    for (int i = 0; i < 7; ++i) n[i] = bytes_take_f64(&reader);
+    record->sample.world_from_probe = (sonde_pose){{n[0], n[1], n[2]}, {n[3], n[4], n[5], n[6]}};
+  } break;
+  case SONDE_RECORD_CONTROLS: {
+    uint32_t probe = bytes_take_u32(&reader);
+    record->tick = bytes_take_u64(&reader);
+    sonde_controls_get(&reader, r->version, &record->controls);
+    record->controls.probe = probe;
+  } break;
+  case SONDE_RECORD_IMAGE: {
+    uint32_t fault = bytes_take_u32(&reader);
+    record->tick = bytes_take_u64(&reader);
+    record->image.fault = fault < SONDE_FAULT_COUNT ? (sonde_fault)fault : SONDE_FAULT_COUNT;
+    double *force_n = &record->image.rendered_force_n.x;
+    for (int i = 0; i < 3; ++i) force_n[i] = bytes_take_f64(&reader);
+  } break;
+  default: {
+    uint32_t kind = bytes_take_u32(&reader);
+    record->check.kind = kind == SONDE_CHECK_STATE ? SONDE_CHECK_STATE : SONDE_CHECK_IMAGES;
+    record->check.tick = record->tick = bytes_take_u64(&reader);
+    record->check.hash = bytes_take_u64(&reader);
+  } break;
   }
   r->at += bytes;
   return true;
@@ -361,21 +341,6 @@ static journal_walk walk_blocks(const sonde_recording *r) {
   return w;
 }
 
-static sonde_status read_journal_end(const source *s, const journal_walk *w) {
-  sonde_recording *r = s->recording;
-  bytes_reader reader = {(const unsigned char *)r->bytes + w->end_at + 8};
-  sonde_record_end *told = &r->told;
-  told->ticks = bytes_take_u64(&reader);
-  told->hash = bytes_take_u64(&reader);
-  told->lost = bytes_take_u64(&reader);
-  told->images = bytes_take_u64(&reader);
-  told->image_hash = bytes_take_u64(&reader);
-  told->crc = w->end_crc;
-  r->ended = true;
-  r->end = w->end_at;
-  return SONDE_OK;
-}
-
 // A journal is whole up to its last whole block; what follows was torn off while it was written.
 static sonde_status read_journal(const source *s, bool recover) {
   sonde_recording *r = s->recording;
@@ -394,9 +359,13 @@ static sonde_status read_journal(const source *s, bool recover) {
   r->notes_end = w.whole;
   r->block_ticks = w.whole_ticks;
   r->crc = (uint32_t)crc32_z(0, (const unsigned char *)r->bytes, w.whole);
-  if (w.ended) return read_journal_end(s, &w);
-  r->end = w.whole;
-  r->told.crc = r->crc;
+  r->end = w.ended ? w.end_at : w.whole;
+  if (w.ended) {
+    bytes_reader reader = {(const unsigned char *)r->bytes + w.end_at + 8};
+    take_end(r, &reader);
+  }
+  r->told.crc = w.ended ? w.end_crc : r->crc;
+  r->ended = w.ended;
   return SONDE_OK;
 }
 
@@ -453,4 +422,31 @@ void sonde_recording_clear(sonde_recording *recording) {
   sonde_free(recording->probe_names);
   sonde_free(recording->probe_hashes);
   *recording = (sonde_recording){0};
+}
+
+sonde_status sonde_recording_inspect(const char *path, bool recover, sonde_recording_info *info,
+                                     sonde_error *error) {
+  SONDE_ASSERT(path != NULL && info != NULL);
+  sonde_recording recording;
+  *info = (sonde_recording_info){0};
+  sonde_status status = sonde_recording_load(path, recover, &recording, error);
+  if (status) return status;
+  sonde_recording_describe(&recording, info);
+  sonde_recording_clear(&recording);
+  return SONDE_OK;
+}
+
+void sonde_recording_describe(const sonde_recording *r, sonde_recording_info *info) {
+  uint64_t made = r->told.ticks / r->ticks_per_image;
+  *info = (sonde_recording_info){.version = r->version,
+                                 .model_checksum = r->model_checksum,
+                                 .dt_s = r->world.dt_s,
+                                 .duration_s = (double)r->told.ticks * r->world.dt_s,
+                                 .ticks = r->told.ticks,
+                                 .images = r->version < 4 ? made : r->told.images,
+                                 .image_width = r->image_width,
+                                 .image_height = r->image_height,
+                                 .ended = r->ended};
+  snprintf(info->model_path, sizeof info->model_path, "%s", r->model_path);
+  snprintf(info->model_name, sizeof info->model_name, "%s", r->model_name);
 }

@@ -30,26 +30,6 @@ static const char *const *probe_names(const sonde_session_def *def) {
   return def->probe_names ? def->probe_names : sonde_probe_names();
 }
 
-static sonde_status check_patient(const sonde_session_def *def, sonde_error *error) {
-  const sonde_circulation *c = &def->circulation;
-  const double numbers[] = {c->heart_rate_hz,  c->systolic_pa,     c->diastolic_pa,
-                            c->breath_rate_hz, c->valsalva_from_s, c->valsalva_to_s,
-                            c->breath_pa,      c->valsalva_pa};
-  for (size_t i = 0; i < SONDE_COUNT_OF(numbers); ++i)
-    if (!isfinite(numbers[i]))
-      return sonde_fail(error, SONDE_ARGUMENT, "session: a circulation with a number that is none");
-  if (!(def->gel_m3 >= 0 && def->gel_m3 <= 1e-3))
-    return sonde_fail(error, SONDE_ARGUMENT, "session: %g m^3 of gel, expected 0 to 0.001",
-                      def->gel_m3);
-  if (def->preset_count > SONDE_SESSION_PRESETS)
-    return sonde_fail(error, SONDE_ARGUMENT, "session: %u presets, expected at most %d",
-                      def->preset_count, SONDE_SESSION_PRESETS);
-  sonde_status status = SONDE_OK;
-  for (uint32_t i = 0; i < def->preset_count && !status; ++i)
-    status = sonde_preset_apply(&def->presets[i], NULL, NULL, error);
-  return status;
-}
-
 static sonde_status check(const sonde_session_def *def, const sonde_device *device,
                           sonde_error *error) {
   uint32_t probes = 0;
@@ -67,20 +47,23 @@ static sonde_status check(const sonde_session_def *def, const sonde_device *devi
   if (def->ticks_per_image == 0)
     return sonde_fail(error, SONDE_ARGUMENT, "session: 0 ticks per image, expected 1 or more");
   sonde_status status = sonde_hand_check(&def->limits, &def->rendering, error);
-  return status ? status : check_patient(def, error);
-}
-
-static sonde_status create_probes(sonde_session *session, const char *const *names,
-                                  sonde_error *error) {
-  uint32_t count = 0;
-  while (names[count]) count++;
-  session->probes = SONDE_NEW(sonde_probe, count);
-  if (!session->probes) return sonde_fail_memory(error);
-  sonde_status status = SONDE_OK;
-  for (uint32_t i = 0; i < count && !status; ++i) {
-    status = sonde_probe_create(names[i], &session->probes[i], error);
-    if (!status) session->probe_count = i + 1;
-  }
+  if (status) return status;
+  // The patient: pulse and breath, gel, tissue.
+  const sonde_circulation *c = &def->circulation;
+  const double numbers[] = {c->heart_rate_hz,  c->systolic_pa,     c->diastolic_pa,
+                            c->breath_rate_hz, c->valsalva_from_s, c->valsalva_to_s,
+                            c->breath_pa,      c->valsalva_pa};
+  for (size_t i = 0; i < SONDE_COUNT_OF(numbers); ++i)
+    if (!isfinite(numbers[i]))
+      return sonde_fail(error, SONDE_ARGUMENT, "session: a circulation with a number that is none");
+  if (!(def->gel_m3 >= 0 && def->gel_m3 <= 1e-3))
+    return sonde_fail(error, SONDE_ARGUMENT, "session: %g m^3 of gel, expected 0 to 0.001",
+                      def->gel_m3);
+  if (def->preset_count > SONDE_SESSION_PRESETS)
+    return sonde_fail(error, SONDE_ARGUMENT, "session: %u presets, expected at most %d",
+                      def->preset_count, SONDE_SESSION_PRESETS);
+  for (uint32_t i = 0; i < def->preset_count && !status; ++i)
+    status = sonde_preset_apply(&def->presets[i], NULL, NULL, error);
   return status;
 }
 
@@ -91,35 +74,16 @@ static size_t place(size_t *end, size_t bytes) {
   return at;
 }
 
-static sonde_status create_boxes(sonde_session *session, sonde_error *error) {
-  size_t vectors = session->nodes * sizeof(sonde_vec3);
-  size_t surface_end = sizeof(sonde_surface_slot), frame_end = sizeof(sonde_frame);
-  session->positions_at = place(&surface_end, vectors);
-  session->forces_at = place(&surface_end, vectors);
-  session->film_at = place(&surface_end, session->nodes * sizeof(double));
-  session->skin_at = place(&frame_end, 3 * session->nodes * sizeof(float));
-  session->pixels_at = place(&frame_end, (size_t)session->image_width * session->image_height);
-  sonde_status status =
-      sonde_mailbox_create(sizeof(sonde_session_controls), &session->control_box, error);
-  if (!status) status = sonde_mailbox_create(surface_end, &session->surface_box, error);
-  if (!status) status = sonde_mailbox_create(frame_end, &session->frame_box, error);
-  return status;
-}
-
-// One coupling per line of the image.
-static sonde_status create_lines(sonde_session *session, sonde_error *error) {
-  uint32_t samples;
-  if (session->echo) sonde_echo_envelope(session->echo, &session->lines, &samples);
-  session->line_m = SONDE_NEW(sonde_vec3, session->lines);
-  session->line_coupling = SONDE_NEW(float, session->lines);
-  session->touched = SONDE_NEW(uint32_t, session->nodes);
-  if (session->line_m && session->line_coupling && session->touched) return SONDE_OK;
-  return sonde_fail_memory(error);
-}
-
 static sonde_status create_parts(sonde_session *session, const sonde_session_def *def,
                                  sonde_error *error) {
-  sonde_status status = create_probes(session, probe_names(def), error);
+  const char *const *names = probe_names(def);
+  uint32_t count = 0, samples;
+  while (names[count]) count++;
+  session->probes = SONDE_NEW(sonde_probe, count);
+  sonde_status status = session->probes ? SONDE_OK : sonde_fail_memory(error);
+  for (; session->probe_count < count && !status; session->probe_count += !status)
+    status = sonde_probe_create(names[session->probe_count], &session->probes[session->probe_count],
+                                error);
   bool inside = def->model->femur.face_count > 0; // else forces only
   if (!status && !inside && def->findings)
     return sonde_fail(error, SONDE_MESH, "the model has no bone and no vessels for findings");
@@ -128,8 +92,25 @@ static sonde_status create_parts(sonde_session *session, const sonde_session_def
     status = sonde_interior_set_findings(session->interior, def->findings, error);
   if (!status && inside)
     status = sonde_echo_create(session->interior, &(sonde_echo_def){0}, &session->echo, error);
-  if (!status) status = create_boxes(session, error);
-  if (!status) status = create_lines(session, error);
+  if (!status) {
+    size_t vectors = session->nodes * sizeof(sonde_vec3);
+    size_t surface_end = sizeof(sonde_surface_slot), frame_end = sizeof(sonde_frame);
+    session->positions_at = place(&surface_end, vectors);
+    session->forces_at = place(&surface_end, vectors);
+    session->film_at = place(&surface_end, session->nodes * sizeof(double));
+    session->skin_at = place(&frame_end, 3 * session->nodes * sizeof(float));
+    session->pixels_at = place(&frame_end, (size_t)session->image_width * session->image_height);
+    status = sonde_mailbox_create(sizeof(sonde_session_controls), &session->control_box, error);
+    if (!status) status = sonde_mailbox_create(surface_end, &session->surface_box, error);
+    if (!status) status = sonde_mailbox_create(frame_end, &session->frame_box, error);
+  }
+  // One coupling of the gel per line of the image.
+  if (session->echo) sonde_echo_envelope(session->echo, &session->lines, &samples);
+  session->line_m = SONDE_NEW(sonde_vec3, session->lines);
+  session->line_coupling = SONDE_NEW(float, session->lines);
+  session->touched = SONDE_NEW(uint32_t, session->nodes);
+  if (!status && !(session->line_m && session->line_coupling && session->touched))
+    status = sonde_fail_memory(error);
   if (status) return status;
   session->controls =
       sonde_controls_clean(&def->controls, &session->controls, session->probe_count);
@@ -140,7 +121,7 @@ static sonde_status create_parts(sonde_session *session, const sonde_session_def
   session->state = session->subject->state;
   sonde_shared_controls_set(&session->requested, &session->controls);
   if (session->controls.stop) sonde_safety_trip(&session->safety, SONDE_FAULT_STOPPED);
-  return sonde_session_create_recording(session, def, probe_names(def), error);
+  return sonde_session_create_recording(session, def, names, error);
 }
 
 static void release(sonde_session *session) {
@@ -229,14 +210,10 @@ sonde_preset sonde_session_preset(const sonde_session *session) {
 
 sonde_device *sonde_session_device(sonde_session *session) { return &session->device; }
 
-uint32_t sonde_session_probe_count(const sonde_session *session) { return session->probe_count; }
-
 const sonde_probe *sonde_session_probe(const sonde_session *session, uint32_t index) {
   SONDE_ASSERT(index < session->probe_count);
   return &session->probes[index];
 }
-
-const sonde_model *sonde_session_model(const sonde_session *session) { return session->model; }
 
 sonde_fault sonde_session_fault(const sonde_session *session) {
   return (sonde_fault)atomic_load_explicit(&session->fault, memory_order_relaxed);

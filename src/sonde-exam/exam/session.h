@@ -196,6 +196,9 @@ void sonde_session_draw(sonde_session *session);
 sonde_status sonde_session_create_recording(sonde_session *session, const sonde_session_def *def,
                                             const char *const *probe_names, sonde_error *error);
 void sonde_session_release_recording(sonde_session *session);
+// The tissue that the controls set last ask for. @thread any
+sonde_preset sonde_session_preset(const sonde_session *session);
+const sonde_probe *sonde_session_probe(const sonde_session *session, uint32_t index);
 // Moves everything in the rings and keyframes to their files. Recorder thread or lockstep.
 void sonde_session_drain(sonde_session *session);
 

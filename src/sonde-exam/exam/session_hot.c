@@ -15,52 +15,38 @@ static void push(sonde_session *session, const sonde_record *record) {
   atomic_store_explicit(&session->lost_records, lost + 1, memory_order_relaxed);
 }
 
-// A stop that newer controls have taken back before any tick saw it still trips.
-static void take_controls(sonde_session *session, uint64_t tick) {
-  if (atomic_exchange_explicit(&session->stop_pressed, false, memory_order_acquire))
-    sonde_safety_trip(&session->safety, SONDE_FAULT_STOPPED);
-  const sonde_session_controls *newest = sonde_mailbox_read(session->control_box);
-  if (!newest) return;
-  bool resume = newest->resume != session->controls.resume;
-  session->controls = *newest;
-  SONDE_ASSERT(session->controls.probe < session->probe_count);
-  if (resume && !newest->stop) sonde_safety_resume(&session->safety);
-  sonde_subject_control(session->subject, newest);
-  sonde_record record = {.tag = SONDE_RECORD_CONTROLS, .tick = tick};
-  record.controls = session->controls;
-  push(session, &record);
-}
-
-// A pose that is not one counts as an absent device; the device then stays where it was. What is
-// recorded is the probe's pose behind the coupling: a replay needs no device.
-static void read_device(sonde_session *session, uint64_t tick) {
-  sonde_device_sample sample = session->sample;
-  session->device.read(session->device.self, tick, &sample);
-  if (sonde_pose_usable(sample.world_from_probe)) {
-    sample.world_from_probe.rotation = q_unit(sample.world_from_probe.rotation);
-  } else {
-    sample.world_from_probe = session->sample.world_from_probe;
-    if (session->render.started) sample.world_from_probe.position = session->render.device_m;
-    sample.present = false;
-  }
-  if (!sample.present) sonde_safety_trip(&session->safety, SONDE_FAULT_DEVICE_LOST);
-  sonde_safety_motion(&session->safety, sample.world_from_probe.position, session->dt_s);
-  sample.world_from_probe =
-      sonde_render_probe(&session->render, sample.world_from_probe,
-                         sonde_state_contact(session->state)->force_n, session->safety.force_n);
-  session->sample = sample;
-  sonde_record record = {.tag = SONDE_RECORD_TICK, .tick = tick};
-  record.sample = sample;
-  push(session, &record);
-}
-
 // Shared by live and replayed ticks: what the world depends on belongs here.
 static void step_world(sonde_session *session) {
   const sonde_probe *probe = &session->probes[session->controls.probe];
   sonde_subject_step(session->subject, probe, session->sample.world_from_probe);
 }
 
-static void fill_snapshot(const sonde_session *session, sonde_snapshot *snapshot) {
+// In lockstep every so many ticks; in real time when the last image is finished, but no sooner:
+// every surface that is offered becomes an image, so that a replay can make the same ones.
+static bool surface_is_due(sonde_session *session, uint64_t tick) {
+  if (!session->realtime) return tick % session->ticks_per_image == 0;
+  return tick - session->offered_tick >= session->ticks_per_image &&
+         !atomic_load_explicit(&session->surface_pending, memory_order_acquire);
+}
+
+// Tissue that nothing touches is soon at rest, and quick to go through.
+uint64_t sonde_session_key_place(const sonde_session *session, uint64_t tick) {
+  uint64_t near = tick + 2 * (uint64_t)session->ticks_per_image - 1, period = session->key_period;
+  bool touching = sonde_state_contact(session->state)->area_m2 > 0;
+  return touching || near / period % 2 == 0 ? near / period * period : 0;
+}
+
+size_t sonde_session_remember_tick(const sonde_session *session, sonde_tick_memory *memory,
+                                   void *world) {
+  memory->controls = session->controls;
+  memory->sample = session->sample;
+  return sonde_subject_remember(session->subject, world);
+}
+
+void sonde_session_offer(sonde_session *session) {
+  unsigned char *slot = sonde_mailbox_write_slot(session->surface_box);
+  sonde_surface_slot *head = (sonde_surface_slot *)(void *)slot;
+  sonde_snapshot *snapshot = &head->snapshot;
   const sonde_contact *contact = sonde_state_contact(session->state);
   sonde_pose pose = session->sample.world_from_probe;
   sonde_vec3 axis = q_rotate(pose.rotation, vec3(0, 0, 1));
@@ -89,54 +75,20 @@ static void fill_snapshot(const sonde_session *session, sonde_snapshot *snapshot
       .restores = session->subject->now.restores,
       .fault = session->safety.fault,
   };
-}
-
-// In lockstep every so many ticks; in real time when the last image is finished, but no sooner:
-// every surface that is offered becomes an image, so that a replay can make the same ones.
-static bool surface_is_due(sonde_session *session, uint64_t tick) {
-  if (!session->realtime) return tick % session->ticks_per_image == 0;
-  return tick - session->offered_tick >= session->ticks_per_image &&
-         !atomic_load_explicit(&session->surface_pending, memory_order_acquire);
-}
-
-// Tissue that nothing touches is soon at rest, and quick to go through.
-uint64_t sonde_session_key_place(const sonde_session *session, uint64_t tick) {
-  uint64_t near = tick + 2 * (uint64_t)session->ticks_per_image - 1, period = session->key_period;
-  bool touching = sonde_state_contact(session->state)->area_m2 > 0;
-  return touching || near / period % 2 == 0 ? near / period * period : 0;
-}
-
-static bool key_is_due(sonde_session *session, uint64_t tick) {
-  uint64_t place = session->world_box ? sonde_session_key_place(session, tick) : 0;
-  if (place < session->key_tick) return false;
-  session->key_tick = place + session->key_period;
-  return true;
-}
-
-size_t sonde_session_remember_tick(const sonde_session *session, sonde_tick_memory *memory,
-                                   void *world) {
-  memory->controls = session->controls;
-  memory->sample = session->sample;
-  return sonde_subject_remember(session->subject, world);
-}
-
-static void offer_key(sonde_session *session) {
-  sonde_world_slot *slot = (void *)sonde_mailbox_write_slot(session->world_box);
-  slot->tick = sonde_state_tick(session->state);
-  slot->bytes = sonde_session_remember_tick(session, &slot->memory, slot + 1);
-  sonde_mailbox_publish(session->world_box);
-}
-
-void sonde_session_offer(sonde_session *session) {
-  unsigned char *slot = sonde_mailbox_write_slot(session->surface_box);
-  sonde_surface_slot *head = (sonde_surface_slot *)(void *)slot;
-  fill_snapshot(session, &head->snapshot);
   head->controls = session->controls;
   head->pathology = sonde_subject_pathology(session->subject);
   head->circulation = session->subject->now.circulation;
   head->pose_s = session->last_tick_s;
-  head->key = key_is_due(session, head->snapshot.tick);
-  if (head->key) offer_key(session);
+  // All that the next tick depends on goes to the recorder when a keyframe is due.
+  uint64_t place = session->world_box ? sonde_session_key_place(session, head->snapshot.tick) : 0;
+  head->key = place >= session->key_tick;
+  if (head->key) {
+    session->key_tick = place + session->key_period;
+    sonde_world_slot *part = (void *)sonde_mailbox_write_slot(session->world_box);
+    part->tick = sonde_state_tick(session->state);
+    part->bytes = sonde_session_remember_tick(session, &part->memory, part + 1);
+    sonde_mailbox_publish(session->world_box);
+  }
   size_t bytes = session->nodes * sizeof(sonde_vec3);
   memcpy(slot + session->positions_at, sonde_state_positions(session->state), bytes);
   memcpy(slot + session->forces_at, sonde_state_contact_forces(session->state), bytes);
@@ -148,16 +100,42 @@ void sonde_session_offer(sonde_session *session) {
   sonde_mailbox_publish(session->surface_box);
 }
 
-static void record_image(sonde_session *session, uint64_t tick) {
-  sonde_record record = {.tag = SONDE_RECORD_IMAGE, .tick = tick};
-  record.image = (sonde_record_image){session->safety.force_n, session->safety.fault};
-  push(session, &record);
-}
-
 void sonde_session_step(sonde_session *session) {
   uint64_t tick = atomic_load_explicit(&session->ticks, memory_order_relaxed);
-  take_controls(session, tick);
-  read_device(session, tick);
+  // A stop that newer controls have taken back before any tick saw it still trips.
+  if (atomic_exchange_explicit(&session->stop_pressed, false, memory_order_acquire))
+    sonde_safety_trip(&session->safety, SONDE_FAULT_STOPPED);
+  const sonde_session_controls *newest = sonde_mailbox_read(session->control_box);
+  if (newest) {
+    bool resume = newest->resume != session->controls.resume;
+    session->controls = *newest;
+    SONDE_ASSERT(session->controls.probe < session->probe_count);
+    if (resume && !newest->stop) sonde_safety_resume(&session->safety);
+    sonde_subject_control(session->subject, newest);
+    sonde_record change = {.tag = SONDE_RECORD_CONTROLS, .tick = tick};
+    change.controls = session->controls;
+    push(session, &change);
+  }
+  // A pose that is not one counts as an absent device; the device then stays where it was. What is
+  // recorded is the probe's pose behind the coupling: a replay needs no device.
+  sonde_device_sample sample = session->sample;
+  session->device.read(session->device.self, tick, &sample);
+  if (sonde_pose_usable(sample.world_from_probe)) {
+    sample.world_from_probe.rotation = q_unit(sample.world_from_probe.rotation);
+  } else {
+    sample.world_from_probe = session->sample.world_from_probe;
+    if (session->render.started) sample.world_from_probe.position = session->render.device_m;
+    sample.present = false;
+  }
+  if (!sample.present) sonde_safety_trip(&session->safety, SONDE_FAULT_DEVICE_LOST);
+  sonde_safety_motion(&session->safety, sample.world_from_probe.position, session->dt_s);
+  sample.world_from_probe =
+      sonde_render_probe(&session->render, sample.world_from_probe,
+                         sonde_state_contact(session->state)->force_n, session->safety.force_n);
+  session->sample = sample;
+  sonde_record record = {.tag = SONDE_RECORD_TICK, .tick = tick};
+  record.sample = sample;
+  push(session, &record);
   step_world(session);
   if (sonde_state_flags(session->state) & SONDE_FLAG_NON_FINITE)
     sonde_safety_trip(&session->safety, SONDE_FAULT_NON_FINITE);
@@ -168,7 +146,9 @@ void sonde_session_step(sonde_session *session) {
   session->device.write(session->device.self, session->safety.force_n, session->safety.torque_n_m);
   atomic_store_explicit(&session->fault, (int)session->safety.fault, memory_order_relaxed);
   if (surface_is_due(session, tick + 1)) {
-    record_image(session, tick + 1);
+    sonde_record made = {.tag = SONDE_RECORD_IMAGE, .tick = tick + 1};
+    made.image = (sonde_record_image){session->safety.force_n, session->safety.fault};
+    push(session, &made);
     sonde_session_offer(session);
   }
   SONDE_ASSERT(sonde_state_tick(session->state) == tick + 1);

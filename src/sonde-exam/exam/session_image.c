@@ -25,30 +25,6 @@ static double penetration(const sonde_session *session, sonde_pose pose) {
   return sonde_surface_inside(session->subject->rest_skin, pose.position) ? distance : -distance;
 }
 
-static void update_interior(sonde_session *session, const unsigned char *slot) {
-  const sonde_surface_slot *head = (const void *)slot;
-  if (!session->interior) return;
-  const sonde_pathology *pathology = &head->controls.pathology;
-  // another vein, not the same one in motion or under another pressure: it starts in equilibrium
-  bool same =
-      session->shown && memcmp(&session->shown_pathology, pathology, sizeof *pathology) == 0;
-  double since_s = (double)(head->snapshot.tick - session->shown_tick) * session->dt_s;
-  sonde_interior_input input = {
-      .positions_m = (const void *)(slot + session->positions_at),
-      .contact_forces_n = (const void *)(slot + session->forces_at),
-      .world_from_probe = head->snapshot.world_from_probe,
-      .pathology = &head->pathology,
-      .dt_s = same ? since_s : -1.0,
-      .tick = head->snapshot.tick,
-      .face_half_x_m = session->probes[head->snapshot.probe].half_x_m,
-      .face_half_y_m = session->probes[head->snapshot.probe].half_y_m,
-  };
-  sonde_interior_update(session->interior, &input);
-  session->shown = true;
-  session->shown_tick = head->snapshot.tick;
-  session->shown_pathology = *pathology;
-}
-
 static sonde_echo_settings with_beam(const sonde_session_beam *beam, sonde_echo_settings rest) {
   rest.frequency_hz = beam->frequency_hz;
   rest.depth_m = beam->depth_m;
@@ -102,26 +78,6 @@ static double couple(sonde_session *session, const unsigned char *slot) {
   return sum / session->lines;
 }
 
-static double volume(const sonde_session *session, const unsigned char *slot) {
-  const sonde_surface_slot *head = (const void *)slot;
-  const double *film_m = (const void *)(slot + session->film_at);
-  double sum = 0;
-  if (!head->controls.gel) return (double)NAN;
-  for (size_t i = 0; i < session->nodes; ++i) sum += film_m[i] * session->model->area_m2[i];
-  return sum;
-}
-
-static void render(sonde_session *session, const sonde_surface_slot *head, sonde_image *image) {
-  sonde_echo_settings settings = with_beam(&session->beam, head->controls.echo);
-  sonde_echo_flow flow = sonde_echo_flow_default();
-  flow.t_s = (double)head->snapshot.tick * session->dt_s;
-  if (session->subject->setup.circulate) flow.circulation = head->circulation;
-  sonde_echo_set_flow(session->echo, &flow);
-  sonde_echo_render(session->echo, head->snapshot.world_from_probe, session->beam.aperture_m,
-                    &head->pathology, &settings, image);
-  SONDE_ASSERT(sonde_interior_tick(session->interior) == head->snapshot.tick);
-}
-
 static void fill_frame(sonde_session *session, const unsigned char *slot, unsigned char *out) {
   const sonde_surface_slot *head = (const void *)slot;
   const sonde_vec3 *positions_m = (const void *)(slot + session->positions_at);
@@ -136,12 +92,20 @@ static void fill_frame(sonde_session *session, const unsigned char *slot, unsign
                        .pixels = out + session->pixels_at};
   double coupling = couple(session, slot);
   bool off = head->snapshot.flags & SONDE_FLAG_INSIDE_OUT; // the probe sees no body
-  if (session->echo && !off)
-    render(session, head, &image);
-  else
+  if (session->echo && !off) {
+    sonde_echo_settings settings = with_beam(&session->beam, head->controls.echo);
+    sonde_echo_flow flow = sonde_echo_flow_default();
+    flow.t_s = (double)head->snapshot.tick * session->dt_s;
+    if (session->subject->setup.circulate) flow.circulation = head->circulation;
+    sonde_echo_set_flow(session->echo, &flow);
+    sonde_echo_render(session->echo, head->snapshot.world_from_probe, session->beam.aperture_m,
+                      &head->pathology, &settings, &image);
+    SONDE_ASSERT(sonde_interior_tick(session->interior) == head->snapshot.tick);
+  } else {
     memset(image.pixels, 0, (size_t)image.width * image.height);
-  if (session->echo && off)
-    image.width_m = session->beam.aperture_m, image.height_m = session->beam.depth_m;
+    if (session->echo)
+      image.width_m = session->beam.aperture_m, image.height_m = session->beam.depth_m;
+  }
   sonde_frame *frame = (sonde_frame *)(void *)out;
   *frame = (sonde_frame){.snapshot = head->snapshot,
                          .skin_m = skin_m,
@@ -151,34 +115,15 @@ static void fill_frame(sonde_session *session, const unsigned char *slot, unsign
                          .width_m = image.width_m,
                          .height_m = image.height_m};
   frame->snapshot.gel_coupling = coupling;
-  frame->snapshot.gel_volume_m3 = volume(session, slot);
+  const double *film_m = (const void *)(slot + session->film_at);
+  double gel_m3 = head->controls.gel ? 0 : (double)NAN;
+  for (size_t i = 0; head->controls.gel && i < session->nodes; ++i)
+    gel_m3 += film_m[i] * session->model->area_m2[i];
+  frame->snapshot.gel_volume_m3 = gel_m3;
   frame->snapshot.venous_pressure_pa = head->pathology.venous_pressure_pa;
   frame->snapshot.arterial_pressure_pa = head->pathology.arterial_pressure_pa;
   frame->snapshot.penetration_m = penetration(session, head->snapshot.world_from_probe);
   if (session->interior && !off) sonde_snapshot_read_vessels(session->interior, &frame->snapshot);
-}
-
-static void count_latency(sonde_session *session, double pose_s) {
-  if (!(pose_s > 0)) return;
-  double bin = (sonde_clock_now() - pose_s) / LATENCY_BIN_S;
-  uint32_t at = bin < LATENCY_BINS - 1 ? (uint32_t)fmax(bin, 0) : LATENCY_BINS - 1;
-  atomic_fetch_add_explicit(&session->latency[at], 1, memory_order_relaxed);
-}
-
-// All pixels so far, so that one number tells whether a replay shows the same.
-static void check_image(sonde_session *session, const sonde_frame *frame) {
-  if (!session->image_checks) return;
-  size_t count = (size_t)frame->width * frame->height;
-  session->images_hash = sonde_hash(session->images_hash, frame->pixels, count);
-  sonde_record_check check = {SONDE_CHECK_IMAGES, frame->snapshot.tick, session->images_hash};
-  (void)sonde_ring_push(session->image_checks, &check); // the end has the last one at any rate
-}
-
-static void offer_inside(sonde_session *session, uint64_t tick) {
-  sonde_inside_slot *slot = (void *)sonde_mailbox_write_slot(session->inside_box);
-  slot->tick = tick;
-  sonde_session_remember_image(session, &slot->memory);
-  sonde_mailbox_publish(session->inside_box);
 }
 
 bool sonde_session_follow(sonde_session *session) {
@@ -186,8 +131,34 @@ bool sonde_session_follow(sonde_session *session) {
   if (!slot) return false;
   session->surface = slot;
   const sonde_surface_slot *head = (const void *)slot;
-  if (head->key) offer_inside(session, head->snapshot.tick);
-  update_interior(session, slot);
+  if (head->key) {
+    sonde_inside_slot *part = (void *)sonde_mailbox_write_slot(session->inside_box);
+    part->tick = head->snapshot.tick;
+    sonde_session_remember_image(session, &part->memory);
+    sonde_mailbox_publish(session->inside_box);
+  }
+  if (session->interior) {
+    // Another vein than the last image's starts in equilibrium; the same one in motion or under
+    // another pressure goes on from its last state.
+    const sonde_pathology *pathology = &head->controls.pathology;
+    bool same =
+        session->shown && memcmp(&session->shown_pathology, pathology, sizeof *pathology) == 0;
+    double since_s = (double)(head->snapshot.tick - session->shown_tick) * session->dt_s;
+    sonde_interior_input input = {
+        .positions_m = (const void *)(slot + session->positions_at),
+        .contact_forces_n = (const void *)(slot + session->forces_at),
+        .world_from_probe = head->snapshot.world_from_probe,
+        .pathology = &head->pathology,
+        .dt_s = same ? since_s : -1.0,
+        .tick = head->snapshot.tick,
+        .face_half_x_m = session->probes[head->snapshot.probe].half_x_m,
+        .face_half_y_m = session->probes[head->snapshot.probe].half_y_m,
+    };
+    sonde_interior_update(session->interior, &input);
+    session->shown = true;
+    session->shown_tick = head->snapshot.tick;
+    session->shown_pathology = *pathology;
+  }
   choose_beam(session, &head->controls.echo, 2.0 * session->probes[head->snapshot.probe].half_x_m);
   return true;
 }
@@ -196,24 +167,33 @@ void sonde_session_draw(sonde_session *session) {
   SONDE_ASSERT(session->surface != NULL);
   sonde_frame *frame = (void *)sonde_mailbox_write_slot(session->frame_box);
   fill_frame(session, session->surface, (unsigned char *)frame);
-  check_image(session, frame);
+  // All pixels so far, so that one number tells whether a replay shows the same.
+  if (session->image_checks) {
+    size_t count = (size_t)frame->width * frame->height;
+    session->images_hash = sonde_hash(session->images_hash, frame->pixels, count);
+    sonde_record_check check = {SONDE_CHECK_IMAGES, frame->snapshot.tick, session->images_hash};
+    (void)sonde_ring_push(session->image_checks, &check); // the end has the last one at any rate
+  }
   if (session->watch) session->watch(session->watch_user, frame);
   sonde_mailbox_publish(session->frame_box);
-}
-
-// What later images need, when this one is out and the pose of the next is not yet taken; a little
-// more than an image's share, so that nothing is left when it is due.
-static void work_ahead(sonde_session *session) {
-  const sonde_surface_slot *head = (const void *)session->surface;
-  if (session->interior) sonde_interior_build_ahead(session->interior);
-  prepare_beam(session, &head->controls.echo, BEAM_STEPS + 1);
 }
 
 bool sonde_session_show(sonde_session *session) {
   if (!sonde_session_follow(session)) return false;
   sonde_session_draw(session);
-  count_latency(session, ((const sonde_surface_slot *)session->surface)->pose_s);
-  if (session->realtime) work_ahead(session);
+  double pose_s = ((const sonde_surface_slot *)session->surface)->pose_s;
+  if (pose_s > 0) {
+    double bin = (sonde_clock_now() - pose_s) / LATENCY_BIN_S;
+    uint32_t at = bin < LATENCY_BINS - 1 ? (uint32_t)fmax(bin, 0) : LATENCY_BINS - 1;
+    atomic_fetch_add_explicit(&session->latency[at], 1, memory_order_relaxed);
+  }
+  if (session->realtime) {
+    // What later images need, when this one is out and the pose of the next is not yet taken; a
+    // little more than an image's share, so that nothing is left when it is due.
+    const sonde_surface_slot *head = (const void *)session->surface;
+    if (session->interior) sonde_interior_build_ahead(session->interior);
+    prepare_beam(session, &head->controls.echo, BEAM_STEPS + 1);
+  }
   uint64_t images = atomic_load_explicit(&session->images, memory_order_relaxed);
   atomic_store_explicit(&session->images, images + 1, memory_order_release);
   atomic_store_explicit(&session->surface_pending, false, memory_order_release);

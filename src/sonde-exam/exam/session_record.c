@@ -15,14 +15,10 @@ struct sonde_queued_note {
   char text[];
 };
 
-static void create_keys(sonde_session *session, const char *record_path) {
-  if (!sonde_recorder_is_file(session->recorder)) return;
-  char *path = sonde_keys_path(record_path);
-  if (path) (void)sonde_keys_create(path, session->subject, &session->keys, NULL);
-  sonde_free(path);
-}
-
-static sonde_status create_boxes(sonde_session *session, sonde_error *error) {
+// The first controls and the setup are on the disk before the first tick.
+sonde_status sonde_session_create_recording(sonde_session *session, const sonde_session_def *def,
+                                            const char *const *probe_names, sonde_error *error) {
+  if (!def->record_path) return SONDE_OK;
   size_t world_bytes = sizeof(sonde_world_slot) + sonde_subject_size(session->subject);
   sonde_status status =
       sonde_ring_create(sizeof(sonde_record), RING_RECORDS, &session->records, error);
@@ -32,14 +28,6 @@ static sonde_status create_boxes(sonde_session *session, sonde_error *error) {
   if (!status) status = sonde_mailbox_create(world_bytes, &session->world_box, error);
   if (!status)
     status = sonde_mailbox_create(sizeof(sonde_inside_slot), &session->inside_box, error);
-  return status;
-}
-
-// The first controls and the setup are on the disk before the first tick.
-sonde_status sonde_session_create_recording(sonde_session *session, const sonde_session_def *def,
-                                            const char *const *probe_names, sonde_error *error) {
-  if (!def->record_path) return SONDE_OK;
-  sonde_status status = create_boxes(session, error);
   if (status) return status;
   sonde_record_head head = {.model_path = def->model_path,
                             .model_name = def->model->name,
@@ -62,7 +50,13 @@ sonde_status sonde_session_create_recording(sonde_session *session, const sonde_
     status = sonde_recorder_sync(session->recorder, error);
     session->keep_recording = !status;
   }
-  if (!status) create_keys(session, def->record_path);
+  if (!status) {
+    if (!(!sonde_recorder_is_file(session->recorder))) {
+      char *path = sonde_keys_path(def->record_path);
+      if (path) (void)sonde_keys_create(path, session->subject, &session->keys, NULL);
+      sonde_free(path);
+    }
+  }
   return status;
 }
 
@@ -80,23 +74,6 @@ static void write_check(sonde_session *session, const sonde_record_check *check)
   sonde_recorder_write(session->recorder, &record);
 }
 
-// When the world and the inside of the same image are there; a newer one may overtake either.
-static void write_key(sonde_session *session) {
-  const sonde_world_slot *world = session->world_part;
-  const sonde_inside_slot *inside = session->inside_part;
-  if (!world || !inside || world->tick != inside->tick) return;
-  sonde_key key = {.tick = world->tick,
-                   .inputs = &world->memory,
-                   .inside = &inside->memory,
-                   .world = world + 1,
-                   .world_bytes = world->bytes};
-  if (session->keys) sonde_keys_write(session->keys, &key);
-  write_check(session,
-              &(sonde_record_check){SONDE_CHECK_STATE, world->tick,
-                                    sonde_subject_saved_hash(session->subject, world + 1)});
-  session->world_part = NULL, session->inside_part = NULL;
-}
-
 static sonde_queued_note *take_notes(sonde_session *session) {
   pthread_mutex_lock(&session->note_lock);
   sonde_queued_note *first = session->notes;
@@ -105,42 +82,48 @@ static sonde_queued_note *take_notes(sonde_session *session) {
   return first;
 }
 
-static void write_notes(sonde_session *session, sonde_queued_note *note) {
-  while (note) {
-    sonde_queued_note *next = note->next;
-    sonde_recorder_note(session->recorder, note->kind, note->tick, note->text);
-    sonde_free(note);
-    note = next;
-  }
-}
-
-// A disk that is full has no room for keyframes, which a player can make again.
-static void write_again(sonde_session *session) {
-  sonde_recorder_retry(session->recorder);
-  if (!session->keys || !sonde_recorder_look(session->recorder).trouble) return;
-  sonde_keys_discard(session->keys);
-  session->keys = NULL;
-}
-
 // Hashes and notes come behind the records of their ticks: what is seen before the ring is emptied
 // has its records in it.
 void sonde_session_drain(sonde_session *session) {
   if (!session->recorder) return;
   sonde_queued_note *notes = take_notes(session);
-  const void *world = sonde_mailbox_read(session->world_box);
-  const void *inside = sonde_mailbox_read(session->inside_box);
+  const void *world_part = sonde_mailbox_read(session->world_box);
+  const void *inside_part = sonde_mailbox_read(session->inside_box);
   sonde_record_check check;
   bool checked = sonde_ring_pop(session->image_checks, &check);
   write_records(session);
-  if (world) session->world_part = world;
-  if (inside) session->inside_part = inside;
-  write_key(session);
+  if (world_part) session->world_part = world_part;
+  if (inside_part) session->inside_part = inside_part;
+  // A keyframe is written when the world and the inside of the same image are there; a newer one
+  // may overtake either.
+  const sonde_world_slot *world = session->world_part;
+  const sonde_inside_slot *inside = session->inside_part;
+  if (world && inside && world->tick == inside->tick) {
+    sonde_key key = {.tick = world->tick,
+                     .inputs = &world->memory,
+                     .inside = &inside->memory,
+                     .world = world + 1,
+                     .world_bytes = world->bytes};
+    if (session->keys) sonde_keys_write(session->keys, &key);
+    write_check(session,
+                &(sonde_record_check){SONDE_CHECK_STATE, world->tick,
+                                      sonde_subject_saved_hash(session->subject, world + 1)});
+    session->world_part = NULL, session->inside_part = NULL;
+  }
   for (; checked; checked = sonde_ring_pop(session->image_checks, &check)) {
     write_records(session);
     write_check(session, &check);
   }
-  write_notes(session, notes);
-  write_again(session);
+  for (sonde_queued_note *note = notes, *next; note; note = next) {
+    next = note->next;
+    sonde_recorder_note(session->recorder, note->kind, note->tick, note->text);
+    sonde_free(note);
+  }
+  // A disk that is full has no room for keyframes, which a player can make again.
+  sonde_recorder_retry(session->recorder);
+  if (!session->keys || !sonde_recorder_look(session->recorder).trouble) return;
+  sonde_keys_discard(session->keys);
+  session->keys = NULL;
 }
 
 // ---- the interface ----------------------------------------------------------------------------
@@ -165,18 +148,16 @@ sonde_status sonde_session_note(sonde_session *session, sonde_note_kind kind, ui
   return SONDE_OK;
 }
 
-static void end_inputs(sonde_session *session) {
-  session->end = (sonde_record_end){.hash = sonde_state_hash(session->state),
-                                    .lost = atomic_load(&session->lost_records),
-                                    .image_hash = session->images_hash};
-  sonde_recorder_end(session->recorder, &session->end);
-  session->ended = true;
-}
-
 sonde_status sonde_session_finish(sonde_session *session, sonde_error *error) {
   sonde_session_stop(session);
   if (!session->recorder) return SONDE_OK;
-  if (!session->ended) end_inputs(session);
+  if (!session->ended) {
+    session->end = (sonde_record_end){.hash = sonde_state_hash(session->state),
+                                      .lost = atomic_load(&session->lost_records),
+                                      .image_hash = session->images_hash};
+    sonde_recorder_end(session->recorder, &session->end);
+    session->ended = true;
+  }
   sonde_session_drain(session); // notes that came after a first attempt
   sonde_status status = sonde_recorder_sync(session->recorder, error);
   if (status) return status;

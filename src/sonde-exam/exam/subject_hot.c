@@ -28,27 +28,6 @@ static void apply_friction(sonde_subject *subject) {
   sonde_state_rub(subject->state, &friction);
 }
 
-static uint32_t nearest_skin(const sonde_subject *subject) {
-  return v_nearest(sonde_state_positions(subject->state), subject->model->surface.vertex_count,
-                   subject->now.pose.position);
-}
-
-// A counter that ran far ahead asks for no more than a few portions.
-static void apply_gel(sonde_subject *subject, const sonde_session_controls *before) {
-  const sonde_session_controls *now = &subject->now.controls;
-  uint32_t portions = now->gel_put - before->gel_put;
-  if (!subject->now.placed) return; // the counters count from the start
-  if (now->gel_wipe != before->gel_wipe) sonde_gel_wipe(subject->gel);
-  if (portions == 0) return;
-  sonde_vec3 centre_m = subject->model->surface.vertices[nearest_skin(subject)];
-  sonde_gel_put(subject->gel, centre_m, portion_radius_m, portion_m3 * fmin(portions, 5));
-}
-
-static bool same_tissue(const sonde_session_controls *a, const sonde_session_controls *b) {
-  return a->preset == b->preset && a->stiffness_scale == b->stiffness_scale &&
-         a->damping_scale == b->damping_scale;
-}
-
 void sonde_subject_control(sonde_subject *subject, const sonde_session_controls *controls) {
   SONDE_ASSERT(controls->stiffness_scale > 0 && controls->friction_scale >= 0);
   sonde_session_controls before = subject->now.controls;
@@ -57,18 +36,23 @@ void sonde_subject_control(sonde_subject *subject, const sonde_session_controls 
   subject->now.circulation.posture = controls->posture;
   if (controls->valsalva != before.valsalva)
     sonde_circulation_strain(&subject->now.circulation, time_s, controls->valsalva);
-  if (!subject->now.placed || !same_tissue(&before, controls)) apply_tissue(subject);
-  apply_gel(subject, &before);
+  if (!subject->now.placed ||
+      !(before.preset == controls->preset && before.stiffness_scale == controls->stiffness_scale &&
+        before.damping_scale == controls->damping_scale))
+    apply_tissue(subject);
+  // A counter that ran far ahead asks for no more than a few portions.
+  const sonde_session_controls *now = &subject->now.controls;
+  uint32_t portions = now->gel_put - before.gel_put;
+  if (subject->now.placed) {
+    if (now->gel_wipe != before.gel_wipe) sonde_gel_wipe(subject->gel);
+    if (portions != 0) {
+      sonde_vec3 centre_m = subject->model->surface.vertices[(
+          v_nearest(sonde_state_positions(subject->state), subject->model->surface.vertex_count,
+                    subject->now.pose.position))];
+      sonde_gel_put(subject->gel, centre_m, portion_radius_m, portion_m3 * fmin(portions, 5));
+    }
+  }
   apply_friction(subject);
-}
-
-static void step_gel(sonde_subject *subject) {
-  uint32_t part = (uint32_t)((sonde_state_tick(subject->state) - 1) % SONDE_GEL_TICKS);
-  sonde_gel_part(subject->gel, sonde_state_contact_forces(subject->state), subject->now.drift_m_s,
-                 SONDE_GEL_TICKS * subject->dt_s, part, SONDE_GEL_TICKS);
-  bool touching = sonde_state_contact(subject->state)->area_m2 > 0;
-  if (part + 1 == SONDE_GEL_TICKS || touching != subject->now.touching) apply_friction(subject);
-  subject->now.touching = touching;
 }
 
 void sonde_subject_step(sonde_subject *subject, const sonde_probe *probe, sonde_pose pose) {
@@ -82,7 +66,14 @@ void sonde_subject_step(sonde_subject *subject, const sonde_probe *probe, sonde_
   now->placed = true;
   sonde_step(subject->state, off ? NULL : probe, pose);
   now->carried = sonde_state_flags(subject->state) & SONDE_FLAG_INSIDE_OUT;
-  if (now->controls.gel) step_gel(subject);
+  if (now->controls.gel) {
+    uint32_t part = (uint32_t)((sonde_state_tick(subject->state) - 1) % SONDE_GEL_TICKS);
+    sonde_gel_part(subject->gel, sonde_state_contact_forces(subject->state), subject->now.drift_m_s,
+                   SONDE_GEL_TICKS * subject->dt_s, part, SONDE_GEL_TICKS);
+    bool touching = sonde_state_contact(subject->state)->area_m2 > 0;
+    if (part + 1 == SONDE_GEL_TICKS || touching != subject->now.touching) apply_friction(subject);
+    subject->now.touching = touching;
+  }
 }
 
 sonde_pathology sonde_subject_pathology(const sonde_subject *subject) {

@@ -1,6 +1,8 @@
 // The page of a session: adapts sonde_session to the server's source.
 #include "stream/page_server.h"
 
+#include "exam/session.h"
+
 #include <string.h>
 
 typedef struct session_source {
@@ -31,50 +33,46 @@ static void release(void *self) {
   sonde_free(self);
 }
 
-static session_source *adapt(sonde_session *session) {
-  uint32_t count = sonde_session_probe_count(session);
-  session_source *self = SONDE_NEW(session_source, 1);
-  if (!self) return NULL;
-  self->session = session;
+static sonde_status make_source(sonde_session *session, double force_limit_n, page_source *source,
+                                sonde_error *error) {
+  SONDE_ASSERT(session->probe_count > 0);
   sonde_device *device = sonde_session_device(session);
-  if (device && strcmp(device->name, "page") == 0) self->page_device = device;
-  self->probes = SONDE_NEW(const sonde_probe *, count);
-  if (!self->probes) {
-    release(self);
-    return NULL;
+  session_source *self = SONDE_NEW(session_source, 1);
+  const sonde_probe **probes = SONDE_NEW(const sonde_probe *, session->probe_count);
+  if (!self || !probes) {
+    sonde_free(self);
+    sonde_free(probes);
+    return sonde_fail_memory(error);
   }
-  for (uint32_t i = 0; i < count; ++i) self->probes[i] = sonde_session_probe(session, i);
-  return self;
-}
-
-static page_source make_source(session_source *self, double force_limit_n) {
-  return (page_source){self,          sonde_session_model(self->session),
-                       self->probes,  sonde_session_probe_count(self->session),
-                       force_limit_n, take_frame,
-                       set_goal,      set_controls,
-                       get_controls,  release};
+  bool by_page = device && strcmp(device->name, "page") == 0;
+  *self = (session_source){session, by_page ? device : NULL, probes};
+  for (uint32_t i = 0; i < session->probe_count; ++i) probes[i] = sonde_session_probe(session, i);
+  *source =
+      (page_source){self,       session->model, probes,       session->probe_count, force_limit_n,
+                    take_frame, set_goal,       set_controls, get_controls,         release};
+  return SONDE_OK;
 }
 
 sonde_status sonde_page_start(const sonde_page_def *def, sonde_session *session,
                               sonde_page_server **server, sonde_error *error) {
   SONDE_ASSERT(def && session && server);
-  session_source *self = adapt(session);
-  if (!self) return sonde_fail_memory(error);
   double limit_n =
       def->force_limit_n > 0 ? def->force_limit_n : sonde_safety_limits_default().force_n;
-  page_source source = make_source(self, limit_n);
-  sonde_status status = page_server_start(def, &source, server, error);
-  if (status) release(self);
+  page_source source;
+  sonde_status status = make_source(session, limit_n, &source, error);
+  if (status) return status;
+  status = page_server_start(def, &source, server, error);
+  if (status) release(source.self);
   return status;
 }
 
 sonde_status sonde_page_show(sonde_page_server *server, sonde_session *session,
                              sonde_error *error) {
   SONDE_ASSERT(server && session);
-  session_source *self = adapt(session);
-  if (!self) return sonde_fail_memory(error);
-  page_source source = make_source(self, server->source.force_limit_n);
-  sonde_status status = page_server_show(server, &source, error);
-  if (status) release(self);
+  page_source source;
+  sonde_status status = make_source(session, server->source.force_limit_n, &source, error);
+  if (status) return status;
+  status = page_server_show(server, &source, error);
+  if (status) release(source.self);
   return status;
 }
