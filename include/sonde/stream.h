@@ -109,8 +109,6 @@ SONDE_API void sonde_page_address(const sonde_page_server *server, bool teacher,
  *  and nothing else, relative to the page's. @param path less than 160 characters @thread any */
 SONDE_API void sonde_page_link(const sonde_page_server *server, const char *path,
                                char link[SONDE_PAGE_LINK]);
-SONDE_API uint16_t sonde_page_port(const sonde_page_server *server); /**< @thread any */
-SONDE_API uint32_t sonde_page_clients(sonde_page_server *server);    /**< @thread any */
 /** Closes all connections and joins the threads. @thread owner */
 SONDE_API void sonde_page_stop(sonde_page_server *server);
 

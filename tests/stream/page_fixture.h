@@ -93,7 +93,7 @@ static inline int start_server(void **state) {
   sonde_page_def def = {
       .token = WS_TOKEN, .exams_directory = f->directory, .user = f, .request = note_request};
   if (page_server_start(&def, &source, &f->server, NULL)) return -1;
-  f->port = sonde_page_port(f->server);
+  f->port = f->server->port;
   *state = f;
   return 0;
 }
@@ -113,8 +113,8 @@ static inline int stop_server(void **state) {
 
 static inline void wait_for_clients(fixture *f, uint32_t count) {
   double end_s = sonde_clock_now() + PATIENCE_S;
-  while (sonde_page_clients(f->server) != count && sonde_clock_now() < end_s) usleep(2000);
-  assert_int_equal(sonde_page_clients(f->server), count);
+  while (page_server_clients(f->server) != count && sonde_clock_now() < end_s) usleep(2000);
+  assert_int_equal(page_server_clients(f->server), count);
 }
 
 static inline int set_up(void **state) {

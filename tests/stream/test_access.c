@@ -117,7 +117,7 @@ static void without_the_token_there_is_no_socket(void **state) {
     snprintf(lines, sizeof lines, "Sec-WebSocket-Protocol: %s\r\n", WRONG[i]);
     assert_int_equal(ws_open_with(f->port, host, lines, 0), -401);
   }
-  assert_int_equal(sonde_page_clients(f->server), 0);
+  assert_int_equal(page_server_clients(f->server), 0);
   int s = ws_open(f->port);
   assert_true(s >= 0);
   close(s);

@@ -46,7 +46,7 @@ static void only_this_page_may_open_the_socket(void **state) {
   for (size_t i = 0; i < SONDE_COUNT_OF(FOREIGN); ++i)
     assert_int_equal(ws_open_as(f->port, host, FOREIGN[i], 0), -403);
   assert_int_equal(ws_open_as(f->port, host, origin, 0), -403); // https is another origin
-  assert_int_equal(sonde_page_clients(f->server), 0);
+  assert_int_equal(page_server_clients(f->server), 0);
   snprintf(origin, sizeof origin, "http://localhost:%u", (unsigned)f->port);
   int s = ws_open_as(f->port, host, origin, 0);
   assert_true(s >= 0);

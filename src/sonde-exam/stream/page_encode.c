@@ -61,54 +61,11 @@ static void put_force(bytes_cursor *out, sonde_vec3 force_n) {
   bytes_f32(out, force_n.z);
 }
 
-static void put_pose(bytes_cursor *out, sonde_pose pose) {
-  put_point_mm(out, pose.position);
-  bytes_f32(out, pose.rotation.w);
-  bytes_f32(out, pose.rotation.x);
-  bytes_f32(out, pose.rotation.y);
-  bytes_f32(out, pose.rotation.z);
-}
-
-static void put_snapshot(bytes_cursor *out, const sonde_frame *frame, uint32_t nodes) {
-  const sonde_snapshot *s = &frame->snapshot;
-  bytes_u64(out, s->tick);
-  bytes_f64(out, s->time_s);
-  bytes_u32(out, nodes);
-  bytes_u16(out, (uint16_t)frame->width);
-  bytes_u16(out, (uint16_t)frame->height);
-  bytes_u16(out, (uint16_t)s->probe);
-  bytes_u16(out, (uint16_t)s->fault);
-  bytes_u16(out, (uint16_t)(s->flags & 0xffff));
-  bytes_u16(out, (uint16_t)(s->solver_iterations > 0xffff ? 0xffff : s->solver_iterations));
-  bytes_u32(out, s->awake_nodes);
-  put_pose(out, s->world_from_probe);
-  put_force(out, s->force_n);
-  put_force(out, s->rendered_force_n);
-  bytes_f32(out, s->force_normal_n);
-  bytes_f32(out, s->penetration_m * MM);
-  bytes_f32(out, s->contact_area_m2 * MM * MM);
-  bytes_f32(out, s->vein_area_ratio);
-  bytes_f32(out, s->artery_area_ratio);
-  bytes_f32(out, s->vein_short_m * MM);
-  bytes_f32(out, frame->width_m * MM);
-  bytes_f32(out, frame->height_m * MM);
-  bytes_f32(out, PAGE_QUANTUM_M * MM);
-}
-
 // Nearest count of quanta; beyond the range the end of the range, not a number as 0.
 static uint16_t quantise(double displacement_m) {
   double steps = displacement_m / PAGE_QUANTUM_M;
   if (!isfinite(steps)) steps = 0;
   return (uint16_t)(int16_t)lrint(clamp(steps, -32767, 32767));
-}
-
-static void put_displacements(bytes_cursor *out, const float *skin_m, const sonde_mesh *rest) {
-  for (uint32_t i = 0; i < rest->vertex_count; ++i) {
-    sonde_vec3 p = rest->vertices[i];
-    bytes_u16(out, quantise((double)skin_m[3 * i] - p.x));
-    bytes_u16(out, quantise((double)skin_m[3 * i + 1] - p.y));
-    bytes_u16(out, quantise((double)skin_m[3 * i + 2] - p.z));
-  }
 }
 
 size_t page_encode_frame(const sonde_frame *frame, const sonde_mesh *rest, uint32_t sequence,
@@ -120,9 +77,40 @@ size_t page_encode_frame(const sonde_frame *frame, const sonde_mesh *rest, uint3
   if (size > capacity) return size;
   bytes_cursor out = {bytes, capacity, 0};
   put_header(&out, PAGE_FRAME, sequence, size);
-  put_snapshot(&out, frame, rest->vertex_count);
+  const sonde_snapshot *s = &frame->snapshot;
+  bytes_u64(&out, s->tick);
+  bytes_f64(&out, s->time_s);
+  bytes_u32(&out, rest->vertex_count);
+  bytes_u16(&out, (uint16_t)frame->width);
+  bytes_u16(&out, (uint16_t)frame->height);
+  bytes_u16(&out, (uint16_t)s->probe);
+  bytes_u16(&out, (uint16_t)s->fault);
+  bytes_u16(&out, (uint16_t)(s->flags & 0xffff));
+  bytes_u16(&out, (uint16_t)(s->solver_iterations > 0xffff ? 0xffff : s->solver_iterations));
+  bytes_u32(&out, s->awake_nodes);
+  put_point_mm(&out, s->world_from_probe.position);
+  bytes_f32(&out, s->world_from_probe.rotation.w);
+  bytes_f32(&out, s->world_from_probe.rotation.x);
+  bytes_f32(&out, s->world_from_probe.rotation.y);
+  bytes_f32(&out, s->world_from_probe.rotation.z);
+  put_force(&out, s->force_n);
+  put_force(&out, s->rendered_force_n);
+  bytes_f32(&out, s->force_normal_n);
+  bytes_f32(&out, s->penetration_m * MM);
+  bytes_f32(&out, s->contact_area_m2 * MM * MM);
+  bytes_f32(&out, s->vein_area_ratio);
+  bytes_f32(&out, s->artery_area_ratio);
+  bytes_f32(&out, s->vein_short_m * MM);
+  bytes_f32(&out, frame->width_m * MM);
+  bytes_f32(&out, frame->height_m * MM);
+  bytes_f32(&out, PAGE_QUANTUM_M * MM);
   SONDE_ASSERT(out.count == PAGE_FRAME_FIXED_BYTES);
-  put_displacements(&out, frame->skin_m, rest);
+  for (uint32_t i = 0; i < rest->vertex_count; ++i) {
+    sonde_vec3 p = rest->vertices[i];
+    bytes_u16(&out, quantise((double)frame->skin_m[3 * i] - p.x));
+    bytes_u16(&out, quantise((double)frame->skin_m[3 * i + 1] - p.y));
+    bytes_u16(&out, quantise((double)frame->skin_m[3 * i + 2] - p.z));
+  }
   bytes_put(&out, frame->pixels, pixels);
   SONDE_ASSERT(out.count == size);
   return size;

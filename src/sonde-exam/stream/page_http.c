@@ -110,15 +110,6 @@ static bool knows_token(const sonde_page_server *server, const page_request *req
   return page_secret_equal(server->teacher_token, given) || learner;
 }
 
-// The address of a document says its own key, so that it opens in another tab and opens nothing
-// else.
-static bool knows_key(const sonde_page_server *server, const page_request *request) {
-  char given[64], key[PAGE_SECRET_TEXT];
-  if (!page_request_parameter(request, "key", given, sizeof given)) return false;
-  page_document_key(server->token, request->path, key);
-  return page_secret_equal(key, given);
-}
-
 static void send_stranger(page_out *out) {
   send_refusal(out, 401, "Unauthorized",
                "open the address that the program printed: it has the token that this asks for\n");
@@ -143,43 +134,38 @@ static const exam_document DOCUMENTS[] = {
     {"/exam/", ".csv", "exam.csv", "text/csv; charset=utf-8", NULL},
 };
 
-// An id is lower-case letters, digits and '-', so that it names one directory and nothing else.
-static bool read_id(const char *uri, const exam_document *document, char *id, size_t size) {
-  size_t prefix = strlen(document->prefix), suffix = strlen(document->suffix), all = strlen(uri);
-  if (all <= prefix + suffix || all - prefix - suffix >= size) return false;
-  if (strncmp(uri, document->prefix, prefix) != 0) return false;
-  if (strcmp(uri + all - suffix, document->suffix) != 0) return false;
-  snprintf(id, size, "%.*s", (int)(all - prefix - suffix), uri + prefix);
-  return strspn(id, "abcdefghijklmnopqrstuvwxyz0123456789-") == strlen(id);
-}
-
-static void send_document(const sonde_page_server *server, const exam_document *document,
-                          const char *id, page_out *out) {
-  char path[640], *bytes = NULL;
-  size_t size = 0;
-  snprintf(path, sizeof path, "%s/%s/%s", server->exams_directory, id, document->name);
-  if (sonde_file_load(path, &bytes, &size, NULL)) {
-    send_refusal(out, 404, "Not Found", "there is no such exam\n");
-    return;
-  }
-  send_head(out, 200, "OK",
-            &(page_body){.type = document->type,
-                         .policy = document->policy,
-                         .bytes = bytes,
-                         .size = size,
-                         .owned = bytes});
-}
-
 // False when the address is not one of an exam.
 static bool answer_document(const sonde_page_server *server, const page_request *request,
                             page_out *out) {
-  char id[64];
+  const char *uri = request->path;
+  const size_t all = strlen(uri);
   for (size_t i = 0; server->exams_directory[0] && i < SONDE_COUNT_OF(DOCUMENTS); ++i) {
-    if (!read_id(request->path, &DOCUMENTS[i], id, sizeof id)) continue;
-    if (knows_token(server, request) || knows_key(server, request))
-      send_document(server, &DOCUMENTS[i], id, out);
-    else
+    // An id is lower-case letters, digits and '-', so that it names one directory and nothing else.
+    const exam_document *d = &DOCUMENTS[i];
+    char id[64], given[64], key[PAGE_SECRET_TEXT];
+    size_t prefix = strlen(d->prefix), suffix = strlen(d->suffix);
+    if (all <= prefix + suffix || all - prefix - suffix >= sizeof id) continue;
+    if (strncmp(uri, d->prefix, prefix) || strcmp(uri + all - suffix, d->suffix)) continue;
+    snprintf(id, sizeof id, "%.*s", (int)(all - prefix - suffix), uri + prefix);
+    if (id[strspn(id, "abcdefghijklmnopqrstuvwxyz0123456789-")]) continue;
+    // The address of a document says its own key, so that it opens in another tab and opens nothing
+    // else.
+    bool known = knows_token(server, request);
+    if (!known && page_request_parameter(request, "key", given, sizeof given)) {
+      page_document_key(server->token, uri, key);
+      known = page_secret_equal(key, given);
+    }
+    char path[640], *bytes = NULL;
+    page_body body = {.type = d->type, .policy = d->policy};
+    snprintf(path, sizeof path, "%s/%s/%s", server->exams_directory, id, d->name);
+    if (!known) {
       send_stranger(out);
+    } else if (sonde_file_load(path, &bytes, &body.size, NULL)) {
+      send_refusal(out, 404, "Not Found", "there is no such exam\n");
+    } else {
+      body.bytes = body.owned = bytes;
+      send_head(out, 200, "OK", &body);
+    }
     return true;
   }
   return false;
@@ -199,38 +185,24 @@ static void send_status(sonde_page_server *server, page_out *out) {
               &(page_body){.type = "application/json", .bytes = text, .size = size, .owned = text});
 }
 
-static const page_file *find_file(const char *uri) {
-  uint32_t count;
-  const page_file *files = page_files(&count);
-  const char *name = strcmp(uri, "/") == 0 ? "/index.html" : uri;
-  SONDE_ASSERT(files && count > 0);
-  for (uint32_t i = 0; i < count; ++i)
-    if (name[0] == '/' && strcmp(name + 1, files[i].name) == 0) return &files[i];
-  return NULL;
-}
-
 // ---- the WebSocket
-
-// The token is one of the subprotocols that the client offers: a browser cannot send it in another
-// field, and an address would be written down. Every offer is compared, whatever came before.
-static page_who offers(const sonde_page_server *server, const char *list) {
-  page_who known = PAGE_NOBODY;
-  for (const char *p = list; *p;) {
-    size_t count = strcspn(p, ", ");
-    char word[PAGE_FIELD_TEXT];
-    snprintf(word, sizeof word, "%.*s", (int)count, p);
-    if (page_secret_equal(server->token, word)) known = PAGE_LEARNER;
-    if (page_secret_equal(server->teacher_token, word)) known = PAGE_TEACHER;
-    p += count + strspn(p + count, ", ");
-  }
-  return known;
-}
 
 static void upgrade(sonde_page_server *server, const page_request *request, page_out *out,
                     page_client **client) {
   const char *origin = request->given[PAGE_ORIGIN] ? request->field[PAGE_ORIGIN] : NULL;
   const char *key = request->field[PAGE_WS_KEY];
-  page_who who = offers(server, request->field[PAGE_WS_PROTOCOL]);
+  // The token is one of the subprotocols that the client offers: a browser cannot send it in
+  // another field, and an address would be written down. Every offer is compared, whatever came
+  // before.
+  page_who who = PAGE_NOBODY;
+  for (const char *p = request->field[PAGE_WS_PROTOCOL]; *p;) {
+    size_t count = strcspn(p, ", ");
+    char word[PAGE_FIELD_TEXT];
+    snprintf(word, sizeof word, "%.*s", (int)count, p);
+    if (page_secret_equal(server->token, word)) who = PAGE_LEARNER;
+    if (page_secret_equal(server->teacher_token, word)) who = PAGE_TEACHER;
+    p += count + strspn(p + count, ", ");
+  }
   char id[PAGE_SECRET_TEXT];
   if (!page_request_parameter(request, "client", id, sizeof id) || !sonde_page_token_valid(id))
     id[0] = 0;
@@ -276,7 +248,11 @@ static void answer(sonde_page_server *server, const page_request *request, page_
     else
       send_stranger(out);
   } else if (!answer_document(server, request, out)) {
-    const page_file *file = find_file(request->path);
+    uint32_t count, i = 0;
+    const page_file *files = page_files(&count), *file = NULL;
+    const char *name = strcmp(request->path, "/") == 0 ? "index.html" : request->path + 1;
+    for (; i < count && !file; ++i)
+      if (strcmp(name, files[i].name) == 0) file = &files[i];
     if (file)
       send_file(server, file, out);
     else

@@ -5,6 +5,7 @@
 #define SONDE_SRC_STREAM_PAGE_MESSAGE_H
 
 #include "base/base.h"
+#include "sonde/base_json.h"
 #include "sonde/stream.h"
 
 enum {
@@ -39,15 +40,6 @@ size_t page_encode_line(const sonde_vessel *vessel, uint32_t part, unsigned char
 size_t page_encode_frame(const sonde_frame *frame, const sonde_mesh *rest, uint32_t sequence,
                          unsigned char *bytes, size_t capacity);
 
-// Growing text; a failed allocation is remembered in `failed`.
-typedef struct page_text {
-  char *text;
-  size_t count, capacity;
-  bool failed;
-} page_text;
-
-void page_text_clear(page_text *text);
-
 // What the hello message says; all borrowed.
 typedef struct page_hello {
   const sonde_model *model;
@@ -68,15 +60,12 @@ typedef struct page_role {
   bool controls;
 } page_role;
 
-void page_write_hello(page_text *text, const page_hello *hello);
+// Each writer puts one message onto a text in memory.
+void page_write_hello(sonde_json_out *out, const page_hello *hello);
 // @param hide_case a learner may not be told its name @param gel_m3 on the skin
-void page_write_controls(page_text *text, const sonde_session_controls *controls,
+void page_write_controls(sonde_json_out *out, const sonde_session_controls *controls,
                          const char *probe_name, bool hide_case, double gel_m3, page_role role);
 bool page_posture_parse(const char *name, sonde_posture *posture);
-// `kind` is "error" or another message type with one text.
-void page_write_note(page_text *text, const char *kind, const char *sentence);
-void page_write_pong(page_text *text, uint32_t id);
-void page_write_raw(page_text *text, const char *json);
 
 typedef enum page_command_type {
   PAGE_COMMAND_GOAL,

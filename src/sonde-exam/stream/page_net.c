@@ -122,27 +122,6 @@ static bool send_out(page_connection *c) {
   return true;
 }
 
-static void frame_close(page_connection *c) {
-  unsigned char *status = (unsigned char *)c->pong; // a closing connection answers no ping
-  status[0] = (unsigned char)(c->close_due >> 8 & 0xff);
-  status[1] = (unsigned char)(c->close_due & 0xff);
-  page_out_frame(&c->out, PAGE_WS_CLOSE, status, 2, NULL);
-}
-
-// The next message of a client, if there is one. A frame that closes is the last.
-static bool choose(page_connection *c) {
-  clear_out(c);
-  if (c->close_due) {
-    frame_close(c);
-  } else if (c->pong_due) {
-    page_out_frame(&c->out, PAGE_WS_PONG, c->pong, c->pong_size, NULL);
-    c->pong_due = false;
-  } else {
-    return page_client_next(c->client, &c->out);
-  }
-  return true;
-}
-
 // Sends what there is and what the socket takes.
 static void feed(page_connection *c) {
   if (!send_out(c)) {
@@ -157,9 +136,21 @@ static void feed(page_connection *c) {
     enter(c, PAGE_TALKS);
     c->heard_s = c->pinged_s = c->stage_s;
   }
+  // The next message of a client, if there is one. A frame that closes is the last.
   while (c->stage == PAGE_TALKS && idle(c)) {
     bool last = c->close_due != 0;
-    if (!choose(c)) break;
+    clear_out(c);
+    if (last) {
+      unsigned char *status = (unsigned char *)c->pong; // a closing connection answers no ping
+      status[0] = (unsigned char)(c->close_due >> 8 & 0xff);
+      status[1] = (unsigned char)(c->close_due & 0xff);
+      page_out_frame(&c->out, PAGE_WS_CLOSE, status, 2, NULL);
+    } else if (c->pong_due) {
+      page_out_frame(&c->out, PAGE_WS_PONG, c->pong, c->pong_size, NULL);
+      c->pong_due = false;
+    } else if (!page_client_next(c->client, &c->out)) {
+      break;
+    }
     if (!send_out(c)) {
       drop(c);
       return;
@@ -174,18 +165,6 @@ static void feed(page_connection *c) {
 
 // ---- what comes in
 
-static void take_head(sonde_page_server *server, page_connection *c) {
-  size_t size = page_request_size((const char *)c->in, c->in_count);
-  if (size == 0 && c->in_count < PAGE_HEAD_BYTES) return;
-  if (size == 0)
-    page_http_refuse(&c->out, 431);
-  else
-    page_http_answer(server, (const char *)c->in, size, &c->out, &c->client);
-  c->in_count -= size;
-  memmove(c->in, c->in + size, c->in_count);
-  enter(c, PAGE_ANSWERED);
-}
-
 // One frame of a client; the status to close with, 0 to go on.
 static int take_frame(page_connection *c, const page_ws_head *head, unsigned char *payload) {
   page_ws_unmask(payload, head->payload, head->mask);
@@ -197,20 +176,6 @@ static int take_frame(page_connection *c, const page_ws_head *head, unsigned cha
   }
   if (head->opcode != PAGE_WS_TEXT) return 0;
   return page_client_hear(c->client, (const char *)payload, head->payload) ? 0 : PAGE_CLOSE_POLICY;
-}
-
-static void take_frames(page_connection *c) {
-  size_t used = 0;
-  while (!c->close_due) {
-    page_ws_head head;
-    size_t left = c->in_count - used;
-    c->close_due = page_ws_read(c->in + used, left, PAGE_COMMAND_BYTES, &head);
-    if (c->close_due || !head.head || left < head.head + head.payload) break;
-    c->close_due = take_frame(c, &head, c->in + used + head.head);
-    used += head.head + head.payload;
-  }
-  c->in_count -= used;
-  memmove(c->in, c->in + used, c->in_count);
 }
 
 // Room for a whole frame is always left: a frame that is not whole is shorter than the buffer.
@@ -225,32 +190,36 @@ static void hear(sonde_page_server *server, page_connection *c) {
   }
   c->in_count += (size_t)got;
   c->heard_s = sonde_clock_now();
-  if (c->stage == PAGE_ASKS) take_head(server, c);
+  if (c->stage == PAGE_ASKS) {
+    size_t size = page_request_size((const char *)c->in, c->in_count);
+    if (size != 0 || c->in_count >= PAGE_HEAD_BYTES) {
+      if (size == 0)
+        page_http_refuse(&c->out, 431);
+      else
+        page_http_answer(server, (const char *)c->in, size, &c->out, &c->client);
+      c->in_count -= size;
+      memmove(c->in, c->in + size, c->in_count);
+      enter(c, PAGE_ANSWERED);
+    }
+  }
   if (c->stage == PAGE_ANSWERED) feed(c);
   if (c->stage == PAGE_TALKS) {
-    take_frames(c);
+    size_t used = 0;
+    while (!c->close_due) {
+      page_ws_head head;
+      size_t left = c->in_count - used;
+      c->close_due = page_ws_read(c->in + used, left, PAGE_COMMAND_BYTES, &head);
+      if (c->close_due || !head.head || left < head.head + head.payload) break;
+      c->close_due = take_frame(c, &head, c->in + used + head.head);
+      used += head.head + head.payload;
+    }
+    c->in_count -= used;
+    memmove(c->in, c->in + used, c->in_count);
     feed(c);
   }
 }
 
-static void throw_away(page_connection *c) {
-  ssize_t got = 1;
-  for (size_t all = 0; all < THROWN && got > 0; all += (size_t)got)
-    got = recv(c->socket, c->in, PAGE_HEAD_BYTES, 0);
-  if (got == 0 || (got < 0 && errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR)) drop(c);
-}
-
 // ---- new connections
-
-// Closes the oldest connection that is no client.
-static void close_oldest(sonde_page_server *server) {
-  page_connection *oldest = NULL;
-  for (int i = 0; i < PAGE_CONNECTIONS; ++i) {
-    page_connection *c = &server->connection[i];
-    if (c->socket >= 0 && !c->client && (!oldest || c->accepted < oldest->accepted)) oldest = c;
-  }
-  if (oldest) drop(oldest);
-}
 
 static page_connection *find_place(sonde_page_server *server) {
   for (int i = 0; i < PAGE_CONNECTIONS; ++i)
@@ -263,7 +232,13 @@ static void admit(sonde_page_server *server) {
   for (int i = 0; i < ADMITTED; ++i) {
     int socket = accept4(server->listener, NULL, NULL, SOCK_CLOEXEC | SOCK_NONBLOCK), one = 1;
     bool full = socket < 0 ? errno == EMFILE || errno == ENFILE : !find_place(server);
-    if (full) close_oldest(server);
+    if (full) {
+      // The oldest connection that is no client makes room.
+      page_connection *oldest = NULL;
+      for (page_connection *o = server->connection; o < server->connection + PAGE_CONNECTIONS; ++o)
+        if (o->socket >= 0 && !o->client && (!oldest || o->accepted < oldest->accepted)) oldest = o;
+      if (oldest) drop(oldest);
+    }
     if (socket < 0) return;
     page_connection *c = find_place(server);
     unsigned char *in = c ? SONDE_NEW(unsigned char, PAGE_HEAD_BYTES) : NULL;
@@ -280,62 +255,43 @@ static void admit(sonde_page_server *server) {
 
 // ---- the thread
 
+// Ends a connection that stays too long in its stage, and pings a client that is silent.
 static void watch_time(const page_patience *patience, page_connection *c, double now_s) {
-  double age_s = now_s - c->stage_s;
-  if (c->stage == PAGE_TALKS) {
-    if (now_s - c->heard_s > patience->silent_s) {
-      drop(c);
-    } else if (now_s - c->heard_s > patience->ping_s && now_s - c->pinged_s > patience->ping_s &&
-               idle(c)) {
-      c->pinged_s = now_s;
-      clear_out(c);
-      page_out_frame(&c->out, PAGE_WS_PING, NULL, 0, NULL);
-      feed(c);
-    }
-    return;
-  }
   const double most_s[] = {[PAGE_ASKS] = patience->ask_s,
                            [PAGE_ANSWERED] = patience->answer_s,
                            [PAGE_ENDS] = patience->end_s};
-  if (age_s > most_s[c->stage]) drop(c);
-}
-
-static void serve(sonde_page_server *server, page_connection *c, int events) {
-  if (c->stage == PAGE_ENDS) {
-    if (events) throw_away(c);
-    return;
-  }
-  if (c->stage == PAGE_ANSWERED || c->stage == PAGE_TALKS) feed(c); // news, or room in the socket
-  if (c->socket >= 0 && listens(c) && (events & (POLLIN | POLLHUP | POLLERR))) hear(server, c);
-}
-
-// 1001 to every client whose last message is whole.
-static void say_goodbye(sonde_page_server *server) {
-  for (int i = 0; i < PAGE_CONNECTIONS; ++i) {
-    page_connection *c = &server->connection[i];
-    if (c->socket >= 0 && c->stage == PAGE_TALKS && idle(c)) {
-      c->close_due = PAGE_CLOSE_AWAY;
-      feed(c);
-    }
-    if (c->socket >= 0) drop(c);
+  if (c->stage != PAGE_TALKS) {
+    if (now_s - c->stage_s > most_s[c->stage]) drop(c);
+  } else if (now_s - c->heard_s > patience->silent_s) {
+    drop(c);
+  } else if (now_s - c->heard_s > patience->ping_s && now_s - c->pinged_s > patience->ping_s &&
+             idle(c)) {
+    c->pinged_s = now_s;
+    clear_out(c);
+    page_out_frame(&c->out, PAGE_WS_PING, NULL, 0, NULL);
+    feed(c);
   }
 }
 
-// False when the server stops.
-static bool goes_on(sonde_page_server *server, page_patience *patience) {
-  pthread_mutex_lock(&server->lock);
-  bool stopping = server->stopping;
-  page_roles_turn(server);
-  *patience = server->patience;
-  pthread_mutex_unlock(&server->lock);
-  return !stopping;
+// Reads on for a moment from a connection that ends.
+static void throw_away(page_connection *c) {
+  ssize_t got = 1;
+  for (size_t all = 0; all < THROWN && got > 0; all += (size_t)got)
+    got = recv(c->socket, c->in, PAGE_HEAD_BYTES, 0);
+  if (got == 0 || (got < 0 && errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR)) drop(c);
 }
 
 static void *run(void *argument) {
   sonde_page_server *server = argument;
   struct pollfd poll_list[PAGE_CONNECTIONS + 2];
-  page_patience patience;
-  while (goes_on(server, &patience)) {
+  for (;;) {
+    pthread_mutex_lock(&server->lock);
+    bool stopping = server->stopping;
+    page_roles_turn(server);
+    const page_patience patience = server->patience;
+    pthread_mutex_unlock(&server->lock);
+    if (stopping) break;
+    // Wait for sockets, for news of the program, at most for a round.
     poll_list[PAGE_CONNECTIONS] = (struct pollfd){.fd = server->listener, .events = POLLIN};
     poll_list[PAGE_CONNECTIONS + 1] = (struct pollfd){.fd = server->wake, .events = POLLIN};
     for (int i = 0; i < PAGE_CONNECTIONS; ++i) {
@@ -350,12 +306,23 @@ static void *run(void *argument) {
     double now_s = sonde_clock_now();
     for (int i = 0; i < PAGE_CONNECTIONS; ++i) {
       page_connection *c = &server->connection[i];
-      if (c->socket >= 0) serve(server, c, poll_list[i].revents);
+      const int events = poll_list[i].revents;
+      if (c->socket < 0) continue;
+      if (c->stage == PAGE_ENDS && events) throw_away(c);
+      if (c->stage == PAGE_ANSWERED || c->stage == PAGE_TALKS) feed(c); // news, or room to send
+      if (c->socket >= 0 && listens(c) && (events & (POLLIN | POLLHUP | POLLERR))) hear(server, c);
       if (c->socket >= 0) watch_time(&patience, c, now_s);
     }
     if (poll_list[PAGE_CONNECTIONS].revents) admit(server);
   }
-  say_goodbye(server);
+  // 1001 to every client whose last message is whole.
+  for (page_connection *c = server->connection; c < server->connection + PAGE_CONNECTIONS; ++c) {
+    if (c->socket >= 0 && c->stage == PAGE_TALKS && idle(c)) {
+      c->close_due = PAGE_CLOSE_AWAY;
+      feed(c);
+    }
+    if (c->socket >= 0) drop(c);
+  }
   return NULL;
 }
 

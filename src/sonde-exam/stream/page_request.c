@@ -17,16 +17,6 @@ static bool take(const char *from, size_t count, char *to, size_t size) {
   return true;
 }
 
-static int parse_target(const char *target, size_t count, page_request *request) {
-  const char *query = memchr(target, '?', count);
-  size_t path = query ? (size_t)(query - target) : count;
-  if (path == 0 || target[0] != '/') return 400;
-  if (!take(target, path, request->path, sizeof request->path)) return 414;
-  if (query && !take(query + 1, count - path - 1, request->query, sizeof request->query))
-    return 414;
-  return 0;
-}
-
 // "GET /path?query HTTP/1.1" without the line's end.
 static int parse_line(const char *line, size_t count, page_request *request) {
   const char *first = memchr(line, ' ', count);
@@ -39,7 +29,14 @@ static int parse_line(const char *line, size_t count, page_request *request) {
   if (version != 8 ||
       (memcmp(second + 1, "HTTP/1.1", 8) != 0 && memcmp(second + 1, "HTTP/1.0", 8) != 0))
     return 505;
-  return parse_target(target, (size_t)(second - target), request);
+  const char *query = memchr(target, '?', (size_t)(second - target));
+  size_t path = (size_t)((query ? query : second) - target);
+  if (path == 0 || target[0] != '/') return 400;
+  if (!take(target, path, request->path, sizeof request->path)) return 414;
+  if (query &&
+      !take(query + 1, (size_t)(second - query - 1), request->query, sizeof request->query))
+    return 414;
+  return 0;
 }
 
 // A field that comes twice is refused: two readers might choose differently.

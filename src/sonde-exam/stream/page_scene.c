@@ -20,7 +20,12 @@ static bool append_line(page_scene *scene, const sonde_vessel *vessel, uint32_t 
   return buffer != NULL;
 }
 
-static bool encode(page_scene *scene, const page_source *source) {
+page_scene *page_scene_create(const page_source *source) {
+  SONDE_ASSERT(source->model && (source->probes || source->probe_count == 0));
+  page_scene *scene = SONDE_NEW(page_scene, 1);
+  if (!scene) return NULL;
+  scene->references = 1;
+  scene->messages = SONDE_NEW(page_buffer, 4 + source->probe_count);
   const sonde_model *model = source->model;
   bool good = append_mesh(scene, &model->surface, PAGE_SKIN) &&
               append_mesh(scene, &model->femur, PAGE_FEMUR) &&
@@ -28,16 +33,7 @@ static bool encode(page_scene *scene, const page_source *source) {
               append_line(scene, &model->artery, PAGE_ARTERY);
   for (uint32_t i = 0; good && i < source->probe_count; ++i)
     good = append_mesh(scene, &source->probes[i]->body.hull, PAGE_PROBE + i);
-  return good;
-}
-
-page_scene *page_scene_create(const page_source *source) {
-  SONDE_ASSERT(source->model && (source->probes || source->probe_count == 0));
-  page_scene *scene = SONDE_NEW(page_scene, 1);
-  if (!scene) return NULL;
-  scene->references = 1;
-  scene->messages = SONDE_NEW(page_buffer, 4 + source->probe_count);
-  if (scene->messages && encode(scene, source)) return scene;
+  if (scene->messages && good) return scene;
   page_scene_unref(scene);
   return NULL;
 }

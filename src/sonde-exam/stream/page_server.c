@@ -6,40 +6,27 @@
 #include <math.h>
 #include <string.h>
 
-static bool anyone_waits(sonde_page_server *server) {
-  bool waits = false;
-  pthread_mutex_lock(&server->lock);
-  for (int i = 0; i < PAGE_CLIENTS; ++i)
-    if (page_client_wants_frame(&server->client[i])) waits = true;
-  pthread_mutex_unlock(&server->lock);
-  return waits;
-}
-
-// Under the lock. It dries slowly: clients are told of a change that they could see.
-static void tell_gel(sonde_page_server *server, double volume_m3) {
-  const double visible_m3 = 0.25e-6;
-  bool same =
-      fabs(volume_m3 - server->gel_m3) < visible_m3 || (isnan(volume_m3) && isnan(server->gel_m3));
-  if (same) return;
-  server->gel_m3 = volume_m3;
-  ++server->controls_serial;
-}
-
 // Encodes into `spare` and makes it the newest.
 static bool publish_frame(sonde_page_server *server, const sonde_frame *whole) {
   sonde_frame told = *whole;
-  const sonde_frame *frame = &told;
   if (server->hide_areas) {
     told.snapshot.vein_area_ratio = told.snapshot.artery_area_ratio = (double)NAN;
     told.snapshot.vein_short_m = (double)NAN;
   }
   const sonde_mesh *rest = &server->source.model->surface;
   page_buffer *spare = &server->spare;
-  size_t size = page_encode_frame(frame, rest, server->sequence + 1, NULL, 0);
+  size_t size = page_encode_frame(&told, rest, server->sequence + 1, NULL, 0);
   if (!page_buffer_reserve(spare, size)) return false;
-  spare->size = page_encode_frame(frame, rest, server->sequence + 1, spare->bytes, spare->capacity);
+  spare->size = page_encode_frame(&told, rest, server->sequence + 1, spare->bytes, spare->capacity);
   pthread_mutex_lock(&server->lock);
-  tell_gel(server, told.snapshot.gel_volume_m3);
+  // Under the lock. It dries slowly: clients are told of a change that they could see.
+  const double visible_m3 = 0.25e-6;
+  bool same = fabs(told.snapshot.gel_volume_m3 - server->gel_m3) < visible_m3 ||
+              (isnan(told.snapshot.gel_volume_m3) && isnan(server->gel_m3));
+  if (!same) {
+    server->gel_m3 = told.snapshot.gel_volume_m3;
+    ++server->controls_serial;
+  }
   page_buffer newest = *spare;
   *spare = server->latest;
   server->latest = newest;
@@ -47,13 +34,6 @@ static bool publish_frame(sonde_page_server *server, const sonde_frame *whole) {
   page_wake(server);
   pthread_mutex_unlock(&server->lock);
   return true;
-}
-
-// Under the source's lock. Only frames that are waited for are taken.
-static bool pump_once(sonde_page_server *server) {
-  sonde_frame frame;
-  if (!server->source.frame || !anyone_waits(server)) return false;
-  return server->source.frame(server->source.self, &frame) && publish_frame(server, &frame);
 }
 
 static void *pump_run(void *argument) {
@@ -64,27 +44,34 @@ static void *pump_run(void *argument) {
     pthread_mutex_unlock(&server->lock);
     if (stopping) return NULL;
     pthread_mutex_lock(&server->source_lock);
-    double pause_s = pump_once(server) ? 0.002 : 0.005;
+    // Only frames that are waited for are taken.
+    const page_source *source = &server->source;
+    bool waits = false;
+    pthread_mutex_lock(&server->lock);
+    for (int i = 0; i < PAGE_CLIENTS; ++i)
+      if (page_client_wants_frame(&server->client[i])) waits = true;
+    pthread_mutex_unlock(&server->lock);
+    sonde_frame frame;
+    bool sent = source->frame && waits && source->frame(source->self, &frame) &&
+                publish_frame(server, &frame);
+    double pause_s = sent ? 0.002 : 0.005;
     pthread_mutex_unlock(&server->source_lock);
     sonde_clock_sleep_until(sonde_clock_now() + pause_s);
   }
 }
 
-static bool find_probe(const sonde_page_server *server, const char *name, uint32_t *probe) {
-  for (uint32_t i = 0; i < server->source.probe_count; ++i) {
-    if (strcmp(server->source.probes[i]->name, name) != 0) continue;
-    *probe = i;
-    return true;
-  }
-  return false;
-}
-
 static void apply_controls(sonde_page_server *server, page_client *client,
                            const page_command *command) {
   sonde_session_controls next = server->controls;
-  if (command->probe[0] && !find_probe(server, command->probe, &next.probe)) {
-    page_client_note(client, "there is no probe of that name");
-    return;
+  const page_source *source = &server->source;
+  if (command->probe[0]) {
+    uint32_t i = 0;
+    while (i < source->probe_count && strcmp(source->probes[i]->name, command->probe) != 0) ++i;
+    if (i == source->probe_count) {
+      page_client_note(client, "there is no probe of that name");
+      return;
+    }
+    next.probe = i;
   }
   if (command->pathology[0] && server->hide_case) {
     page_client_note(client, "the case is the exam's");
@@ -102,18 +89,16 @@ static void apply_controls(sonde_page_server *server, page_client *client,
   server->controls = next;
 }
 
-// What everyone may do who was let in; the rest is for the client that controls.
-static bool is_free(const page_command *command) {
-  if (command->type == PAGE_COMMAND_REQUEST)
-    return command->request.ask == SONDE_PAGE_COMMENT ||
-           command->request.ask == SONDE_PAGE_LIST_EXAMS;
-  return command->type == PAGE_COMMAND_STOP || command->type == PAGE_COMMAND_ROLE;
-}
-
 void page_command_apply(sonde_page_server *server, page_client *client,
                         const page_command *command) {
   const page_source *source = &server->source;
-  if (!is_free(command) && !page_client_controls(client)) {
+  // Everyone who was let in may stop, ask for control, comment and list; the rest is for the client
+  // that controls.
+  const sonde_page_ask ask = command->request.ask;
+  bool is_free = command->type == PAGE_COMMAND_REQUEST
+                     ? ask == SONDE_PAGE_COMMENT || ask == SONDE_PAGE_LIST_EXAMS
+                     : command->type == PAGE_COMMAND_STOP || command->type == PAGE_COMMAND_ROLE;
+  if (!is_free && !page_client_controls(client)) {
     page_client_note(client, "another page controls the probe; this one only watches");
     return;
   }
@@ -149,16 +134,6 @@ void page_command_apply(sonde_page_server *server, page_client *client,
   source->control(source->self, &server->controls);
 }
 
-// A source without a session.
-typedef struct page_model {
-  const sonde_probe **probes;
-} page_model;
-
-static void release_model(void *self) {
-  sonde_free(((page_model *)self)->probes);
-  sonde_free(self);
-}
-
 // The scene is encoded before the locks are taken; a frame of the scene before is never shown with
 // this one.
 sonde_status page_server_show(sonde_page_server *server, const page_source *source,
@@ -186,19 +161,17 @@ sonde_status sonde_page_show_model(sonde_page_server *server, const sonde_model 
                                    const sonde_probe *probes, uint32_t probe_count,
                                    sonde_error *error) {
   SONDE_ASSERT(server && model && (probes || probe_count == 0));
-  page_model *self = SONDE_NEW(page_model, 1);
-  if (!self) return sonde_fail_memory(error);
-  self->probes = SONDE_NEW(const sonde_probe *, probe_count + 1);
-  page_source source = {.self = self,
+  const sonde_probe **list = SONDE_NEW(const sonde_probe *, probe_count + 1);
+  if (!list) return sonde_fail_memory(error);
+  for (uint32_t i = 0; i < probe_count; ++i) list[i] = &probes[i];
+  page_source source = {.self = list,
                         .model = model,
-                        .probes = self->probes,
+                        .probes = list,
                         .probe_count = probe_count,
                         .force_limit_n = server->source.force_limit_n,
-                        .release = release_model};
-  for (uint32_t i = 0; self->probes && i < probe_count; ++i) self->probes[i] = &probes[i];
-  sonde_status status =
-      self->probes ? page_server_show(server, &source, error) : sonde_fail_memory(error);
-  if (status) release_model(self);
+                        .release = sonde_free};
+  sonde_status status = page_server_show(server, &source, error);
+  if (status) sonde_free(list);
   return status;
 }
 
@@ -257,18 +230,6 @@ void sonde_page_tell(sonde_page_server *server, const char *sentence) {
   pthread_mutex_unlock(&server->lock);
 }
 
-static void keep_def(sonde_page_server *server, const sonde_page_def *def) {
-  server->def = *def;
-  if (def->data_directory)
-    snprintf(server->data_directory, sizeof server->data_directory, "%s", def->data_directory);
-  if (def->exams_directory)
-    snprintf(server->exams_directory, sizeof server->exams_directory, "%s", def->exams_directory);
-  server->def.data_directory = server->def.exams_directory = server->def.model_path = NULL;
-  server->def.token = server->def.teacher_token = NULL;
-  server->patience = (page_patience){
-      .ask_s = 10, .answer_s = 30, .end_s = 2, .ping_s = 2, .silent_s = 6, .return_s = 60};
-}
-
 static sonde_status keep_token(char kept[PAGE_SECRET_TEXT], const char *token, sonde_error *error) {
   if (!token) return sonde_page_token_make(kept, error);
   if (!sonde_page_token_valid(token))
@@ -284,7 +245,15 @@ sonde_status page_server_start(const sonde_page_def *def, const page_source *sou
   *server_out = NULL;
   sonde_page_server *server = SONDE_NEW(sonde_page_server, 1);
   if (!server) return sonde_fail_memory(error);
-  keep_def(server, def);
+  server->def = *def;
+  if (def->data_directory)
+    snprintf(server->data_directory, sizeof server->data_directory, "%s", def->data_directory);
+  if (def->exams_directory)
+    snprintf(server->exams_directory, sizeof server->exams_directory, "%s", def->exams_directory);
+  server->def.data_directory = server->def.exams_directory = server->def.model_path = NULL;
+  server->def.token = server->def.teacher_token = NULL;
+  server->patience = (page_patience){
+      .ask_s = 10, .answer_s = 30, .end_s = 2, .ping_s = 2, .silent_s = 6, .return_s = 60};
   pthread_mutex_init(&server->lock, NULL);
   pthread_mutex_init(&server->source_lock, NULL);
   server->listener = server->wake = -1;
@@ -322,12 +291,7 @@ void sonde_page_link(const sonde_page_server *server, const char *path,
   snprintf(link, SONDE_PAGE_LINK, "%s?key=%s", path, key);
 }
 
-uint16_t sonde_page_port(const sonde_page_server *server) {
-  SONDE_ASSERT(server);
-  return server->port;
-}
-
-uint32_t sonde_page_clients(sonde_page_server *server) {
+uint32_t page_server_clients(sonde_page_server *server) {
   SONDE_ASSERT(server);
   uint32_t count = 0;
   pthread_mutex_lock(&server->lock);

@@ -166,6 +166,7 @@ sonde_status page_server_start(const sonde_page_def *def, const page_source *sou
                                sonde_page_server **server, sonde_error *error);
 
 // Wakes the sockets' thread: there is something to send. @thread any
+uint32_t page_server_clients(sonde_page_server *server);
 void page_wake(sonde_page_server *server);
 
 // page_net.c: opens the port, then starts and ends the thread of the sockets.
