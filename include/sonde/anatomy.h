@@ -79,8 +79,6 @@ SONDE_API sonde_thigh sonde_thigh_unknown(void);
  */
 SONDE_API sonde_status sonde_thigh_draw(const sonde_thigh *known, uint64_t seed, sonde_thigh *thigh,
                                         sonde_error *error);
-/** Checks every range. @return ARGUMENT naming parameter and range @thread any */
-SONDE_API sonde_status sonde_thigh_check(const sonde_thigh *thigh, sonde_error *error);
 
 /** Skin, femur and fat of a thigh as tables over angle and height. */
 typedef struct sonde_thigh_shape sonde_thigh_shape;
@@ -146,11 +144,6 @@ enum { SONDE_THIGH_COLUMNS = 5, SONDE_THIGH_ROWS = 12 };
 SONDE_API sonde_status sonde_thigh_build(const sonde_thigh *thigh, const sonde_thigh_shape *shape,
                                          const sonde_thigh_def *def, sonde_model **model,
                                          sonde_error *error);
-
-/** The rule: stiffness (N/m^3) and asymptote (m) of the springs above layers of that thickness.
- *  @thread any */
-SONDE_API void sonde_thigh_springs(double fat_m, double muscle_m, double stiffness, double *k0_n_m3,
-                                   double *xm_m);
 
 /** Writes cross-sections of a model with anatomy at three landmarks as SVG. @thread owner */
 SONDE_API sonde_status sonde_thigh_sections(const sonde_model *model, const char *path,

@@ -1,6 +1,7 @@
 // Laws of generated thighs.
 #include "anatomy_test.h"
 #include "../sanitized.h"
+#include "anatomy/shape.h"
 #include "tissue/anatomy.h"
 
 #include <inttypes.h>

@@ -26,56 +26,6 @@ sonde_thigh_def sonde_thigh_def_default(void) {
   return (sonde_thigh_def){"thigh", "Generated, not measured", 0.006, 0.003};
 }
 
-static sonde_surface_law law_of(const sonde_thigh *thigh) {
-  sonde_surface_law law = sonde_surface_law_default();
-  law.edge_stiffness_n_m = 0;
-  law.inplane_stiffness_n_m = SONDE_SKIN_INPLANE_N_M * thigh->stiffness;
-  law.tangential_stiffness_n_m3 = SONDE_SKIN_TANGENTIAL_N_M3 * thigh->stiffness;
-  law.shear_stiffness_n_m = SHEAR_N_M * thigh->stiffness;
-  law.shear_limit = SHEAR_LIMIT;
-  law.normal_exponent = 2;
-  law.normal_damping_s = thigh->damping_s;
-  return law;
-}
-
-static double site_share(uint32_t row) { return 0.06 + 0.88 * row / (SONDE_THIGH_ROWS - 1); }
-
-// Columns at equal steps around the leg, the middle one above the vein.
-static void place_sites(const sonde_thigh *thigh, const sonde_thigh_shape *shape,
-                        sonde_site *sites) {
-  const sonde_tube *skin = &shape->skin;
-  for (uint32_t k = 0; k < SITES; ++k) {
-    double t = site_share(k / SONDE_THIGH_COLUMNS), z = t * skin->length_m;
-    double step = (double)(k % SONDE_THIGH_COLUMNS) - (SONDE_THIGH_COLUMNS - 1) / 2;
-    double angle = sonde_course_angle(thigh, t);
-    angle += step * SITE_STEP_M / sonde_tube_radius(skin, angle, z);
-    sonde_vec3 n = sonde_tube_normal(skin, angle, z), axis = vec3(0, 0, 1);
-    sonde_vec3 u = v_unit(v_cross(axis, n), vec3(1, 0, 0));
-    sonde_site *s = &sites[k];
-    *s = (sonde_site){.id = k,
-                      .position_m = v_whole_nm(sonde_tube_point(skin, angle, z)),
-                      .normal = n,
-                      .u = u,
-                      .v = v_cross(n, u)};
-    double fat = sonde_shape_fat(shape, s->position_m);
-    double bone = sonde_tube_outside(&shape->femur, s->position_m);
-    sonde_thigh_springs(fat, bone - fat - thigh->skin_m, thigh->stiffness, &s->k0_n_m3, &s->xm_m);
-  }
-}
-
-static void fill_nodes(const sonde_thigh *thigh, const sonde_thigh_shape *shape,
-                       sonde_model *model) {
-  for (uint32_t i = 0; i < model->surface.vertex_count; ++i) {
-    double bone = model->bone_depth_m[i], fat = sonde_shape_fat(shape, model->surface.vertices[i]);
-    model->fat_depth_m[i] = fmin(whole_nm(thigh->skin_m), 0.4 * bone);
-    model->muscle_depth_m[i] =
-        clamp(whole_nm(thigh->skin_m + fat), model->fat_depth_m[i], 0.9 * bone);
-    sonde_thigh_springs(model->muscle_depth_m[i] - model->fat_depth_m[i],
-                        bone - model->muscle_depth_m[i], thigh->stiffness, &model->k0_n_m3[i],
-                        &model->xm_m[i]);
-  }
-}
-
 /* ---- names -------------------------------------------------------------------------------- */
 
 static void mark(sonde_model *model, const sonde_thigh *thigh, const sonde_thigh_shape *shape,
@@ -100,9 +50,16 @@ static void mark(sonde_model *model, const sonde_thigh *thigh, const sonde_thigh
   }
 }
 
-static void name_places(sonde_model *model, const sonde_thigh *thigh,
-                        const sonde_thigh_shape *shape) {
-  sonde_thigh_anatomy *a = model->anatomy;
+// Vessels, landmarks, segments of the vein and compartments of the muscles.
+static sonde_status name_parts(const sonde_thigh *thigh, const sonde_thigh_shape *shape,
+                               const sonde_course *course, sonde_model *model, sonde_error *error) {
+  sonde_thigh_anatomy *a = model->anatomy = SONDE_NEW(sonde_thigh_anatomy, 1);
+  if (!a) return sonde_fail_memory(error);
+  model->vein = course->vein;
+  model->artery = course->artery;
+  a->branch_count = course->branch_count;
+  memcpy(a->branch, course->branch, sizeof a->branch);
+  // Landmarks, and segments of the vein from one to the next.
   double length = shape->skin.length_m, meet = sonde_course_confluence(thigh);
   mark(model, thigh, shape, "common_femoral", 0.06);
   mark(model, thigh, shape, "saphenofemoral_junction", sonde_course_junction());
@@ -125,12 +82,8 @@ static void name_places(sonde_model *model, const sonde_thigh *thigh,
     a->segment[k].from_m = k > 0 ? a->segment[k - 1].to_m : 0;
     a->segment[k].to_m = whole_nm(segment[k].to * length);
   }
-}
-
-// The medial sheet passes through the femoral vessels; the lateral one stands behind the femur's
-// outer side; adductors give way to the hamstrings towards the knee.
-static void name_muscles(sonde_model *model, const sonde_thigh_shape *shape) {
-  sonde_thigh_anatomy *a = model->anatomy;
+  // The medial sheet passes through the femoral vessels; the lateral one stands behind the femur's
+  // outer side; adductors give way to the hamstrings towards the knee.
   const sonde_vessel *vein = &model->vein;
   double turn = 2 * SONDE_PI, degree = SONDE_PI / 180;
   a->level_count = LEVELS;
@@ -150,30 +103,38 @@ static void name_muscles(sonde_model *model, const sonde_thigh_shape *shape) {
   memcpy(a->pennation_rad, pennation, sizeof pennation);
   a->fascia_medial_m = 0.0006;
   a->fascia_lateral_m = 0.0016;
-}
-
-static sonde_status name_all(const sonde_thigh *thigh, const sonde_thigh_shape *shape,
-                             const sonde_course *course, sonde_model *model, sonde_error *error) {
-  sonde_thigh_anatomy *a = model->anatomy = SONDE_NEW(sonde_thigh_anatomy, 1);
-  if (!a) return sonde_fail_memory(error);
-  model->vein = course->vein;
-  model->artery = course->artery;
-  a->branch_count = course->branch_count;
-  memcpy(a->branch, course->branch, sizeof a->branch);
-  name_places(model, thigh, shape);
-  name_muscles(model, shape);
   return SONDE_OK;
 }
 
 static sonde_status make(const sonde_thigh *thigh, const sonde_thigh_shape *shape,
                          const sonde_thigh_def *def, sonde_mesh *skin, sonde_mesh *femur,
                          sonde_course *course, sonde_model **model, sonde_error *error) {
+  SONDE_ASSERT(thigh->stiffness > 0 && shape->skin.length_m > 0);
+  const sonde_tube *outer = &shape->skin;
   sonde_site sites[SITES];
   sonde_status status = sonde_tube_mesh(&shape->skin, def->edge_m, skin, error);
   if (!status) status = sonde_tube_mesh(&shape->femur, 0.004, femur, error);
   if (!status) status = sonde_course_place(thigh, shape, skin, course, error);
   if (status) return status;
-  place_sites(thigh, shape, sites);
+  // Columns at equal steps around the leg, the middle one above the vein.
+  for (uint32_t k = 0; k < SITES; ++k) {
+    uint32_t row = k / SONDE_THIGH_COLUMNS;
+    double t = 0.06 + 0.88 * row / (SONDE_THIGH_ROWS - 1), z = t * outer->length_m;
+    double step = (double)(k % SONDE_THIGH_COLUMNS) - (SONDE_THIGH_COLUMNS - 1) / 2;
+    double angle = sonde_course_angle(thigh, t);
+    angle += step * SITE_STEP_M / sonde_tube_radius(outer, angle, z);
+    sonde_vec3 n = sonde_tube_normal(outer, angle, z), axis = vec3(0, 0, 1);
+    sonde_vec3 u = v_unit(v_cross(axis, n), vec3(1, 0, 0));
+    sonde_site *s = &sites[k];
+    *s = (sonde_site){.id = k,
+                      .position_m = v_whole_nm(sonde_tube_point(outer, angle, z)),
+                      .normal = n,
+                      .u = u,
+                      .v = v_cross(n, u)};
+    double fat = sonde_shape_fat(shape, s->position_m);
+    double bone = sonde_tube_outside(&shape->femur, s->position_m);
+    sonde_thigh_springs(fat, bone - fat - thigh->skin_m, thigh->stiffness, &s->k0_n_m3, &s->xm_m);
+  }
   sonde_model_def built = sonde_model_def_default();
   built.name = def->name;
   built.provenance = def->provenance;
@@ -183,16 +144,32 @@ static sonde_status make(const sonde_thigh *thigh, const sonde_thigh_shape *shap
   built.site_count = SITES;
   built.fine_edge_m = def->fine_edge_m;
   built.fine_reach_m = FINE_REACH_M;
-  built.law = law_of(thigh);
+  built.law = sonde_surface_law_default();
+  built.law.edge_stiffness_n_m = 0;
+  built.law.inplane_stiffness_n_m = SONDE_SKIN_INPLANE_N_M * thigh->stiffness;
+  built.law.tangential_stiffness_n_m3 = SONDE_SKIN_TANGENTIAL_N_M3 * thigh->stiffness;
+  built.law.shear_stiffness_n_m = SHEAR_N_M * thigh->stiffness;
+  built.law.shear_limit = SHEAR_LIMIT;
+  built.law.normal_exponent = 2;
+  built.law.normal_damping_s = thigh->damping_s;
   status = sonde_model_build(&built, model, error);
   if (status) return status;
-  fill_nodes(thigh, shape, *model);
-  return name_all(thigh, shape, course, *model, error);
+  // Layers and springs of every node.
+  sonde_model *m = *model;
+  for (uint32_t i = 0; i < m->surface.vertex_count; ++i) {
+    double bone = m->bone_depth_m[i], fat = sonde_shape_fat(shape, m->surface.vertices[i]);
+    m->fat_depth_m[i] = fmin(whole_nm(thigh->skin_m), 0.4 * bone);
+    m->muscle_depth_m[i] = clamp(whole_nm(thigh->skin_m + fat), m->fat_depth_m[i], 0.9 * bone);
+    sonde_thigh_springs(m->muscle_depth_m[i] - m->fat_depth_m[i], bone - m->muscle_depth_m[i],
+                        thigh->stiffness, &m->k0_n_m3[i], &m->xm_m[i]);
+  }
+  return name_parts(thigh, shape, course, m, error);
 }
 
 sonde_status sonde_thigh_build(const sonde_thigh *thigh, const sonde_thigh_shape *shape,
                                const sonde_thigh_def *def, sonde_model **model,
                                sonde_error *error) {
+  SONDE_ASSERT(thigh && shape && def && model);
   *model = NULL;
   sonde_status status = sonde_thigh_check(thigh, error);
   if (status) return status;

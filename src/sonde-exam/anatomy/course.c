@@ -28,24 +28,15 @@ double sonde_course_angle(const sonde_thigh *thigh, double share) {
   return thigh->vein_angle_rad - (10 * share + 100 * share * share) * SONDE_PI / 180;
 }
 
-static double cover(const layout *l, double t) {
-  double a = l->thigh->vein_cover_m, b = l->thigh->canal_cover_m, c = b + 0.01;
-  double all = a * (1 - t) * (1 - 2 * t) + 4 * b * t * (1 - t) + c * t * (2 * t - 1);
-  return l->cover_scale * fmax(all, 0.001);
-}
-
 static double calibre(double t) {
   return 1 - 0.12 * smooth_step(2 * t) - 0.08 * smooth_step(2 * t - 1);
-}
-
-static double depth_of(const layout *l, sonde_vec3 p) {
-  return whole_nm(sonde_surface_closest(l->skin, p).distance_m);
 }
 
 static void add(const layout *l, sonde_vessel *line, sonde_vec3 centre, double radius) {
   SONDE_ASSERT(line->count < SONDE_VESSEL_POINTS);
   centre = v_whole_nm(centre);
-  line->point[line->count++] = (sonde_vessel_point){centre, whole_nm(radius), depth_of(l, centre)};
+  line->point[line->count++] = (sonde_vessel_point){
+      centre, whole_nm(radius), whole_nm(sonde_surface_closest(l->skin, centre).distance_m)};
 }
 
 static double share_of(uint32_t k) {
@@ -65,23 +56,22 @@ static double fat_at(const layout *l, double angle, double z_m) {
 }
 
 static void lay_vein(const layout *l) {
+  SONDE_ASSERT(l->thigh->length_m > 0 && l->cover_scale > 0);
   l->course->vein.count = 0;
   for (uint32_t k = 0; k < SONDE_VESSEL_POINTS; ++k) {
     double t = share_of(k), z = t * l->thigh->length_m, angle = sonde_course_angle(l->thigh, t);
     double radius = 0.5 * l->thigh->vein_m * calibre(t);
-    double depth = l->thigh->skin_m + fat_at(l, angle, z) + cover(l, t) + radius;
+    double a = l->thigh->vein_cover_m, b = l->thigh->canal_cover_m, c = b + 0.01;
+    double all = a * (1 - t) * (1 - 2 * t) + 4 * b * t * (1 - t) + c * t * (2 * t - 1);
+    double depth =
+        l->thigh->skin_m + fat_at(l, angle, z) + (l->cover_scale * fmax(all, 0.001)) + radius;
     l->course->angle_rad[k] = angle;
     l->course->skin_z_m[k] = z;
     add(l, &l->course->vein, below_skin(l, angle, z, depth), radius);
   }
 }
 
-static sonde_vec3 tangent(const sonde_vessel *line, uint32_t k) {
-  uint32_t a = k > 0 ? k - 1 : 0, b = k + 1 < line->count ? k + 1 : k;
-  return v_unit(v_sub(line->point[b].centre_m, line->point[a].centre_m), vec3(0, 0, 1));
-}
-
-static sonde_vec3 turned(sonde_vec3 v, double angle) {
+static sonde_vec3 rotated(sonde_vec3 v, double angle) {
   return vec3(v.x * cos(angle) - v.y * sin(angle), v.x * sin(angle) + v.y * cos(angle), v.z);
 }
 
@@ -91,34 +81,35 @@ static double below_fascia(const layout *l, sonde_vec3 centre, double radius) {
   return above.distance_m - radius - l->thigh->skin_m - sonde_shape_fat(l->shape, above.point_m);
 }
 
-// Beside the vein in the direction `to`, which turns away from the skin where the fascia is near.
-static sonde_vec3 beside_vein(const layout *l, uint32_t k, sonde_vec3 to, double radius) {
-  const sonde_vessel_point *vein = &l->course->vein.point[k];
-  sonde_vec3 along = tangent(&l->course->vein, k), centre = vein->centre_m;
-  sonde_vec3 up = v_sub(sonde_surface_closest(l->skin, centre).point_m, centre);
-  double way = v_dot(turned(to, 0.01), up) < v_dot(to, up) ? 1 : -1;
-  for (int degree = 0; degree <= 60; ++degree) {
-    sonde_vec3 side = turned(to, way * degree * SONDE_PI / 180);
-    side = v_unit(v_madd(side, -v_dot(side, along), along), side);
-    centre = v_madd(vein->centre_m, vein->radius_m + radius + WALL_GAP_M, side);
-    if (below_fascia(l, centre, radius) > 2 * LEAST_COVER_M) break;
-  }
-  return centre;
-}
-
-// From lateral (10 degrees) by the front (80 at mid-thigh) to the medial front (125 at the knee).
+// Beside the vein: from lateral (10 degrees) by the front (80 at mid-thigh) to the medial front
+// (125 at the knee).
 static void lay_artery(const layout *l) {
   sonde_course *c = l->course;
   c->artery.count = 0;
   for (uint32_t k = 0; k < SONDE_VESSEL_POINTS; ++k) {
     double t = share_of(k), radius = 0.5 * l->thigh->artery_m * calibre(t);
-    double side = (10 + 165 * t - 50 * t * t) * SONDE_PI / 180;
-    add(l, &c->artery, beside_vein(l, k, vec3(-cos(side), sin(side), 0), radius), radius);
+    double lateral = (10 + 165 * t - 50 * t * t) * SONDE_PI / 180;
+    const sonde_vessel_point *vein = &c->vein.point[k];
+    sonde_vec3 to = vec3(-cos(lateral), sin(lateral), 0), centre = vein->centre_m;
+    uint32_t a = k > 0 ? k - 1 : 0, b = k + 1 < c->vein.count ? k + 1 : k;
+    sonde_vec3 along =
+        v_unit(v_sub(c->vein.point[b].centre_m, c->vein.point[a].centre_m), vec3(0, 0, 1));
+    // The direction rotates away from the skin where the fascia is near.
+    sonde_vec3 up = v_sub(sonde_surface_closest(l->skin, centre).point_m, centre);
+    double sense = v_dot(rotated(to, 0.01), up) < v_dot(to, up) ? 1 : -1;
+    for (int degree = 0; degree <= 60; ++degree) {
+      sonde_vec3 side = rotated(to, sense * degree * SONDE_PI / 180);
+      side = v_unit(v_madd(side, -v_dot(side, along), along), side);
+      centre = v_madd(vein->centre_m, vein->radius_m + radius + WALL_GAP_M, side);
+      if (below_fascia(l, centre, radius) > 2 * LEAST_COVER_M) break;
+    }
+    add(l, &c->artery, centre, radius);
   }
 }
 
 // A vessel's point at a share of the length, between its stored ones.
 static sonde_vessel_point at_share(const sonde_vessel *line, double t) {
+  SONDE_ASSERT(line->count > 1);
   double at = clamp((t - FIRST) / (LAST - FIRST), 0, 1) * (line->count - 1);
   uint32_t k = (uint32_t)fmin(floor(at), line->count - 2);
   const sonde_vessel_point *a = &line->point[k], *b = a + 1;
@@ -155,14 +146,6 @@ static void lay_saphenous(const layout *l) {
   }
 }
 
-// Point beside the femur, `gap` outside it, towards a medial and then back side.
-static sonde_vec3 beside_bone(const layout *l, double t, double gap) {
-  const sonde_tube *bone = &l->shape->femur;
-  double z = t * l->thigh->length_m, angle = -(10 + 60 * t) * SONDE_PI / 180;
-  sonde_vec3 out = vec3(cos(angle), sin(angle), 0);
-  return v_madd(sonde_tube_point(bone, angle, z), gap, out);
-}
-
 static void lay_deep(const layout *l) {
   enum { POINTS = 40 };
   const double from[2] = {l->thigh->deep_branch_m / l->thigh->length_m,
@@ -178,7 +161,12 @@ static void lay_deep(const layout *l) {
       double t = from[which] + (to - from[which]) * k / (POINTS - 1);
       double thin = 1 - 0.35 * (t - from[which]) / (to - from[which]);
       double gap = which == 0 ? bone_gap + ra : bone_gap + 2 * ra + rv + WALL_GAP_M;
-      sonde_vec3 leaves = at_share(parent, t).centre_m, goal = beside_bone(l, t, gap);
+      // Point beside the femur, `gap` outside it, towards a medial and then back side.
+      const sonde_tube *bone = &l->shape->femur;
+      double z = t * l->thigh->length_m, angle = -(10 + 60 * t) * SONDE_PI / 180;
+      sonde_vec3 out = vec3(cos(angle), sin(angle), 0);
+      sonde_vec3 leaves = at_share(parent, t).centre_m,
+                 goal = v_madd(sonde_tube_point(bone, angle, z), gap, out);
       double w = smooth_step((t - from[which]) / bend);
       add(l, line, v_lerp(leaves, goal, w), thin * (which == 0 ? ra : rv));
     }
@@ -191,27 +179,24 @@ static sonde_vec3 around_artery(const layout *l, double s, double angle, double 
   double t = from + (to - from) * s, w = smooth_step(4 * s) * smooth_step(4 * (1 - s));
   sonde_vessel_point v = at_share(&l->course->vein, t), a = at_share(&l->course->artery, t);
   *radius = 0.7 * v.radius_m;
-  return v_add(a.centre_m, turned(v_sub(v.centre_m, a.centre_m), angle * w));
-}
-
-// Least room to bone and fascia along the way.
-static double room_around(const layout *l, double angle) {
-  double least = INFINITY, radius;
-  for (int k = 0; k <= 8; ++k) {
-    sonde_vec3 p = around_artery(l, k / 8.0, angle, &radius);
-    least = fmin(least, below_fascia(l, p, radius));
-    least = fmin(least, sonde_tube_outside(&l->shape->femur, p) - radius - LEAST_BONE_GAP_M);
-  }
-  return least;
+  return v_add(a.centre_m, rotated(v_sub(v.centre_m, a.centre_m), angle * w));
 }
 
 static void lay_second(const layout *l) {
   enum { POINTS = 40 };
   const double angle[] = {2, -2, 1.7, -1.7, 1.4, -1.4, 1.1, -1.1};
   sonde_vessel *line = begin(l, "second_femoral_vein", SONDE_VESSEL_VEIN);
+  // The side with most room to bone and fascia; 3 mm are enough, so that the wider rotation comes
+  // first.
   double best = -INFINITY, chosen = angle[0], radius;
   for (size_t k = 0; k < SONDE_COUNT_OF(angle); ++k) {
-    double room = fmin(room_around(l, angle[k]), 0.003); // enough is enough: the wider turn first
+    double room = INFINITY;
+    for (int i = 0; i <= 8; ++i) {
+      sonde_vec3 p = around_artery(l, i / 8.0, angle[k], &radius);
+      room = fmin(room, below_fascia(l, p, radius));
+      room = fmin(room, sonde_tube_outside(&l->shape->femur, p) - radius - LEAST_BONE_GAP_M);
+    }
+    room = fmin(room, 0.003);
     if (room > best) best = room, chosen = angle[k];
   }
   for (uint32_t k = 0; k < POINTS; ++k) {
@@ -222,20 +207,17 @@ static void lay_second(const layout *l) {
 
 /* ---- checks ------------------------------------------------------------------------------- */
 
-static double piece_distance(sonde_vec3 p, sonde_vec3 a, sonde_vec3 b) {
-  sonde_vec3 d = v_sub(b, a);
-  double t = clamp(v_dot(v_sub(p, a), d) / fmax(v_norm2(d), 1e-18), 0, 1);
-  return v_distance(p, v_madd(a, t, d));
-}
-
+// Least distance of two vessels' walls.
 static double gap_between(const sonde_vessel *p, const sonde_vessel *q) {
+  SONDE_ASSERT(p->count > 1 && q->count > 1);
   double least = INFINITY;
   for (uint32_t i = 0; i < p->count; ++i)
     for (uint32_t j = 0; j + 1 < q->count; ++j) {
-      double d =
-          piece_distance(p->point[i].centre_m, q->point[j].centre_m, q->point[j + 1].centre_m);
-      least = fmin(least,
-                   d - p->point[i].radius_m - fmax(q->point[j].radius_m, q->point[j + 1].radius_m));
+      const sonde_vessel_point *a = &q->point[j], *b = a + 1;
+      sonde_vec3 at = p->point[i].centre_m, d = v_sub(b->centre_m, a->centre_m);
+      double t = clamp(v_dot(v_sub(at, a->centre_m), d) / fmax(v_norm2(d), 1e-18), 0, 1);
+      double apart = v_distance(at, v_madd(a->centre_m, t, d));
+      least = fmin(least, apart - p->point[i].radius_m - fmax(a->radius_m, b->radius_m));
     }
   return least;
 }
@@ -266,8 +248,20 @@ static sonde_status check_line(const layout *l, const char *name, const sonde_ve
   return SONDE_OK;
 }
 
-static sonde_status check_apart(const layout *l, sonde_error *error) {
-  const sonde_course *c = l->course;
+static sonde_status lay_all(const layout *l, sonde_error *error) {
+  sonde_course *c = l->course;
+  c->branch_count = 0;
+  lay_vein(l);
+  lay_artery(l);
+  lay_saphenous(l);
+  lay_deep(l);
+  if (l->thigh->second_vein > 0) lay_second(l);
+  sonde_status status = check_line(l, "femoral vein", &c->vein, error);
+  if (!status) status = check_line(l, "femoral artery", &c->artery, error);
+  for (uint32_t b = 0; b < c->branch_count && !status; ++b)
+    status = check_line(l, c->branch[b].name, &c->branch[b].line, error);
+  if (status) return status;
+  // Walls of different vessels must be apart.
   if (gap_between(&c->vein, &c->artery) < LEAST_GAP_M)
     return blame("femoral artery", "meets the vein", 0, error);
   for (uint32_t b = 0; b < c->branch_count; ++b) {
@@ -284,46 +278,21 @@ static sonde_status check_apart(const layout *l, sonde_error *error) {
   return SONDE_OK;
 }
 
-static sonde_status lay_all(const layout *l, sonde_error *error) {
-  sonde_course *c = l->course;
-  c->branch_count = 0;
-  lay_vein(l);
-  lay_artery(l);
-  lay_saphenous(l);
-  lay_deep(l);
-  if (l->thigh->second_vein > 0) lay_second(l);
-  sonde_status status = check_line(l, "femoral vein", &c->vein, error);
-  if (!status) status = check_line(l, "femoral artery", &c->artery, error);
-  for (uint32_t b = 0; b < c->branch_count && !status; ++b)
-    status = check_line(l, c->branch[b].name, &c->branch[b].line, error);
-  return status ? status : check_apart(l, error);
-}
-
-// The skin without the flat ends, from which depth is not counted.
-static sonde_status side_of(const sonde_mesh *skin, double length, sonde_mesh *side,
-                            sonde_error *error) {
-  sonde_status status = sonde_mesh_copy(skin, side, error);
-  if (status) return status;
-  side->face_count = 0;
-  for (uint32_t f = 0; f < skin->face_count; ++f) {
-    double low = INFINITY, high = -INFINITY;
-    for (int k = 0; k < 3; ++k) {
-      low = fmin(low, skin->vertices[skin->faces[f][k]].z);
-      high = fmax(high, skin->vertices[skin->faces[f][k]].z);
-    }
-    if (high > 1e-9 && low < length - 1e-9)
-      memcpy(side->faces[side->face_count++], skin->faces[f], sizeof side->faces[0]);
-  }
-  SONDE_ASSERT(side->face_count > 0);
-  return SONDE_OK;
-}
-
 sonde_status sonde_course_place(const sonde_thigh *thigh, const sonde_thigh_shape *shape,
                                 const sonde_mesh *skin, sonde_course *course, sonde_error *error) {
   layout l = {thigh, shape, NULL, course, 1};
   sonde_surface_index *index = NULL;
   sonde_mesh side = {0};
-  sonde_status status = side_of(skin, shape->skin.length_m, &side, error);
+  // Depth counts from the skin without its flat ends.
+  sonde_status status = sonde_mesh_copy(skin, &side, error);
+  side.face_count = 0;
+  for (uint32_t t = 0; !status && t < skin->face_count; ++t) {
+    const uint32_t *v = skin->faces[t];
+    double za = skin->vertices[v[0]].z, zb = skin->vertices[v[1]].z, zc = skin->vertices[v[2]].z;
+    if (fmax(za, fmax(zb, zc)) > 1e-9 && fmin(za, fmin(zb, zc)) < shape->skin.length_m - 1e-9)
+      memcpy(side.faces[side.face_count++], v, sizeof side.faces[0]);
+  }
+  SONDE_ASSERT(status || side.face_count > 0);
   if (!status) status = sonde_surface_index_create(&side, &index, error);
   sonde_mesh_clear(&side);
   if (status) return status;

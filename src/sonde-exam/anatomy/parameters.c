@@ -60,6 +60,7 @@ typedef struct draw {
 // Mean and deviation, truncated to mean +- 2.5 deviations and to [low, high]; kept when known.
 static void normal_draw(const draw *d, double *member, double mean, double deviation, double low,
                         double high) {
+  SONDE_ASSERT(low < high && deviation >= 0);
   if (!isnan(*member)) return;
   uint64_t place = (uint64_t)((char *)member - (char *)d->thigh);
   double value = mean;
@@ -70,15 +71,6 @@ static void normal_draw(const draw *d, double *member, double mean, double devia
     if (value >= low && value <= high) break;
   }
   *member = whole_nm(clamp(value, low, high));
-}
-
-static void fill_fat(const draw *d) {
-  sonde_thigh *t = d->thigh;
-  double share = t->sex == SONDE_SEX_FEMALE ? 1.15 : 0.85;
-  normal_draw(d, &t->fat_front_m, 0.0104 * share, 0.0041 * share, 0.003, 0.04);
-  normal_draw(d, &t->fat_inner_m, 1.5 * t->fat_front_m, 0.15 * t->fat_front_m, 0.003, 0.06);
-  normal_draw(d, &t->fat_outer_m, 0.7 * t->fat_front_m, 0.05 * t->fat_front_m, 0.002, 0.06);
-  normal_draw(d, &t->fat_back_m, 1.1 * t->fat_front_m, 0.1 * t->fat_front_m, 0.002, 0.06);
 }
 
 static void fill_shape(const draw *d) {
@@ -97,26 +89,6 @@ static void fill_shape(const draw *d) {
   normal_draw(d, &t->femur_anterior_m, 0.012, 0.0015, 0, 0.025);
 }
 
-static void fill_vessels(const draw *d) {
-  sonde_thigh *t = d->thigh;
-  bool female = t->sex == SONDE_SEX_FEMALE;
-  normal_draw(d, &t->vein_m, female ? 0.0098 : 0.0106, 0.0012, 0.004, 0.018);
-  normal_draw(d, &t->artery_m, female ? 0.0075 : 0.0085, 0.0007, 0.003, 0.014);
-  normal_draw(d, &t->vein_angle_rad, 70 * SONDE_PI / 180, 4 * SONDE_PI / 180, 0.78, 1.57);
-  normal_draw(d, &t->vein_cover_m, 0.003, 0.0008, 0.001, 0.03);
-  normal_draw(d, &t->canal_cover_m, 0.009, 0.0015, 0.003, 0.04);
-  normal_draw(d, &t->saphenous_m, 0.004, 0.0007, 0.001, 0.01);
-  normal_draw(d, &t->deep_branch_m, 0.04, 0.006, 0.015, 0.08);
-  if (isnan(t->second_vein))
-    t->second_vein = sonde_random_uniform(d->seed, SEX_COUNTER + 1) < 0.2 ? 1 : 0;
-}
-
-static void fill_mechanics(const draw *d) {
-  sonde_thigh *t = d->thigh;
-  normal_draw(d, &t->stiffness, 1, 0.17, 0.2, 5);
-  normal_draw(d, &t->damping_s, 0.02, 0, 0.001, 0.2);
-}
-
 sonde_status sonde_thigh_draw(const sonde_thigh *known, uint64_t seed, sonde_thigh *thigh,
                               sonde_error *error) {
   *thigh = *known;
@@ -128,9 +100,24 @@ sonde_status sonde_thigh_draw(const sonde_thigh *known, uint64_t seed, sonde_thi
   if (thigh->sex == SONDE_SEX_DRAWN)
     thigh->sex = sonde_random_bits(seed, SEX_COUNTER) & 1 ? SONDE_SEX_FEMALE : SONDE_SEX_MALE;
   draw d = {thigh, seed};
-  fill_fat(&d);
+  sonde_thigh *t = d.thigh;
+  double share = t->sex == SONDE_SEX_FEMALE ? 1.15 : 0.85;
+  normal_draw(&d, &t->fat_front_m, 0.0104 * share, 0.0041 * share, 0.003, 0.04);
+  normal_draw(&d, &t->fat_inner_m, 1.5 * t->fat_front_m, 0.15 * t->fat_front_m, 0.003, 0.06);
+  normal_draw(&d, &t->fat_outer_m, 0.7 * t->fat_front_m, 0.05 * t->fat_front_m, 0.002, 0.06);
+  normal_draw(&d, &t->fat_back_m, 1.1 * t->fat_front_m, 0.1 * t->fat_front_m, 0.002, 0.06);
   fill_shape(&d);
-  fill_vessels(&d);
-  fill_mechanics(&d);
+  bool female = t->sex == SONDE_SEX_FEMALE;
+  normal_draw(&d, &t->vein_m, female ? 0.0098 : 0.0106, 0.0012, 0.004, 0.018);
+  normal_draw(&d, &t->artery_m, female ? 0.0075 : 0.0085, 0.0007, 0.003, 0.014);
+  normal_draw(&d, &t->vein_angle_rad, 70 * SONDE_PI / 180, 4 * SONDE_PI / 180, 0.78, 1.57);
+  normal_draw(&d, &t->vein_cover_m, 0.003, 0.0008, 0.001, 0.03);
+  normal_draw(&d, &t->canal_cover_m, 0.009, 0.0015, 0.003, 0.04);
+  normal_draw(&d, &t->saphenous_m, 0.004, 0.0007, 0.001, 0.01);
+  normal_draw(&d, &t->deep_branch_m, 0.04, 0.006, 0.015, 0.08);
+  if (isnan(t->second_vein))
+    t->second_vein = sonde_random_uniform(d.seed, SEX_COUNTER + 1) < 0.2 ? 1 : 0;
+  normal_draw(&d, &t->stiffness, 1, 0.17, 0.2, 5);
+  normal_draw(&d, &t->damping_s, 0.02, 0, 0.001, 0.2);
   return sonde_thigh_check(thigh, error);
 }

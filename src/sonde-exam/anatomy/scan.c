@@ -17,11 +17,6 @@ typedef struct frame {
 static sonde_vec3 to_scan(const frame *f, sonde_vec3 p) {
   return v_madd(v_madd(v_madd(f->origin, p.x, f->x), p.y, f->y), p.z, f->z);
 }
-static sonde_vec3 to_frame(const frame *f, sonde_vec3 p) {
-  sonde_vec3 d = v_sub(p, f->origin);
-  return vec3(v_dot(d, f->x), v_dot(d, f->y), v_dot(d, f->z));
-}
-
 static sonde_vec3 across(sonde_vec3 d, sonde_vec3 axis) { return v_madd(d, -v_dot(d, axis), axis); }
 
 // Largest principal direction of the vertices within [low, high] along the axis, by power
@@ -48,6 +43,7 @@ static sonde_vec3 wide_direction(const sonde_mesh *mesh, const frame *f, double 
 }
 
 static void measure_extent(const sonde_mesh *femur, frame *f) {
+  SONDE_ASSERT(femur->vertex_count > 0 && v_norm2(f->z) > 0.5);
   f->low = INFINITY, f->high = -INFINITY;
   for (uint32_t i = 0; i < femur->vertex_count; ++i) {
     double s = v_dot(v_sub(femur->vertices[i], f->origin), f->z);
@@ -58,6 +54,7 @@ static void measure_extent(const sonde_mesh *femur, frame *f) {
 // Mean of the femur's surface between two heights, by area.
 static bool slab_centre(const sonde_mesh *femur, const frame *f, double low, double high,
                         sonde_vec3 *centre) {
+  SONDE_ASSERT(low <= high);
   double area = 0;
   sonde_vec3 sum = vec3(0, 0, 0);
   for (uint32_t k = 0; k < femur->face_count; ++k) {
@@ -139,6 +136,7 @@ static double cast(const sonde_surface_index *index, const frame *f, sonde_vec3 
 
 static sonde_vec3 section_middle(const sonde_surface_index *skin, const frame *f, double z) {
   enum { RAYS = 72 };
+  SONDE_ASSERT(z >= 0 && isfinite(z));
   sonde_vec3 middle = vec3(0, 0, z);
   for (int pass = 0; pass < 4; ++pass) {
     double area = 0, x = 0, y = 0, last = NAN, last_angle = 0;
@@ -160,6 +158,7 @@ static sonde_vec3 section_middle(const sonde_surface_index *skin, const frame *f
 
 // Least squares through points at equal steps: value at the middle and change over the whole.
 static void fit_line(const sonde_vec3 *point, int count, sonde_vec3 *mean, sonde_vec3 *slope) {
+  SONDE_ASSERT(count > 1);
   double weight = 0;
   *mean = *slope = vec3(0, 0, 0);
   for (int k = 0; k < count; ++k) {
@@ -194,7 +193,8 @@ static void bone_line(const sonde_mesh *femur, const frame *f, double length,
     double z = (0.15 + 0.2 * k) * length;
     if (!slab_centre(femur, f, z - 0.008, z + 0.008, &knot[k]))
       knot[k] = k > 0 ? to_scan(f, knot[k - 1]) : f->origin;
-    knot[k] = to_frame(f, knot[k]);
+    sonde_vec3 d = v_sub(knot[k], f->origin);
+    knot[k] = vec3(v_dot(d, f->x), v_dot(d, f->y), v_dot(d, f->z));
     knot[k].z = z;
   }
 }
@@ -272,30 +272,9 @@ static double row_height(double length, uint32_t row) {
   return clamp(length * row / (SONDE_TUBE_ROWS - 1), inset, length - inset);
 }
 
-static void sample_skin(const sonde_surface_index *skin, const frame *f, sonde_tube *tube,
-                        sonde_leg_report *report) {
-  for (uint32_t j = 0; j < SONDE_TUBE_ROWS; ++j)
-    for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i) {
-      double angle = tube_angle(i), z = row_height(tube->length_m, j);
-      sonde_vec3 middle = vec3(tube->x_m[j], tube->y_m[j], z);
-      double r = cast(skin, f, middle, vec3(cos(angle), sin(angle), 0), REACH_M);
-      tube->radius_m[j][i] = r;
-      report->rays++;
-      if (!isfinite(r)) report->missed++;
-    }
-}
-
 static int by_size(const void *a, const void *b) {
   double p = *(const double *)a, q = *(const double *)b;
   return (p > q) - (p < q);
-}
-
-static double median_radius(const sonde_tube *tube) {
-  double list[SONDE_TUBE_COLUMNS];
-  for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i)
-    list[i] = tube->radius_m[SONDE_TUBE_ROWS / 2][i];
-  qsort(list, SONDE_TUBE_COLUMNS, sizeof *list, by_size);
-  return list[SONDE_TUBE_COLUMNS / 2];
 }
 
 // Rays come from outside; head, neck and trochanter are held within 1.6 times the shaft's radius.
@@ -317,47 +296,18 @@ static void sample_femur(const sonde_leg_scan *scan, const sonde_surface_index *
     }
   }
   fill_table(tube->radius_m);
-  double shaft = median_radius(tube);
+  double list[SONDE_TUBE_COLUMNS];
+  for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i)
+    list[i] = tube->radius_m[SONDE_TUBE_ROWS / 2][i];
+  qsort(list, SONDE_TUBE_COLUMNS, sizeof *list, by_size);
+  double shaft = list[SONDE_TUBE_COLUMNS / 2];
   for (uint32_t j = 0; j < SONDE_TUBE_ROWS; ++j)
     for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i)
       tube->radius_m[j][i] = clamp(tube->radius_m[j][i], 0.6 * shaft, WIDEST_BONE * shaft);
   smooth(tube->radius_m, 3);
 }
 
-static void sample_muscle(const sonde_surface_index *muscle, const frame *f,
-                          const sonde_thigh *thigh, sonde_thigh_shape *shape) {
-  const sonde_tube *skin = &shape->skin;
-  for (uint32_t j = 0; j < SONDE_TUBE_ROWS; ++j)
-    for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i) {
-      double angle = tube_angle(i), z = row_height(skin->length_m, j);
-      sonde_vec3 in = v_neg(sonde_tube_normal(skin, angle, z));
-      double depth = cast(muscle, f, sonde_tube_point(skin, angle, z), in, 0.06);
-      shape->fat_m[j][i] = isfinite(depth) ? fmax(depth - thigh->skin_m, 0.002) : NAN;
-    }
-  fill_table(shape->fat_m);
-  smooth(shape->fat_m, 12);
-}
-
 /* ---- the whole ---------------------------------------------------------------------------- */
-
-static void describe(sonde_thigh_shape *shape, sonde_thigh *thigh, bool fat) {
-  const sonde_tube *skin = &shape->skin;
-  double length = skin->length_m, half = 0.5 * length;
-  thigh->length_m = length;
-  thigh->girth_m = sonde_tube_girth(skin, half);
-  thigh->girth_proximal_m = fmax(sonde_tube_girth(skin, 0), thigh->girth_m);
-  thigh->girth_distal_m = fmin(sonde_tube_girth(skin, length), thigh->girth_m);
-  thigh->femur_m = whole_nm(sonde_tube_girth(&shape->femur, half) / SONDE_PI);
-  const uint32_t middle = SONDE_TUBE_ROWS / 2;
-  thigh->femur_lateral_m = clamp(skin->x_m[0] - shape->femur.x_m[0], 0, 0.045);
-  thigh->femur_anterior_m = clamp(shape->femur.y_m[middle] - skin->y_m[middle], 0, 0.025);
-  if (!fat) return;
-  double *side[] = {&thigh->fat_inner_m, &thigh->fat_front_m, &thigh->fat_outer_m,
-                    &thigh->fat_back_m};
-  for (int k = 0; k < 4; ++k)
-    *side[k] = whole_nm(
-        clamp(sonde_tube_lookup(skin, shape->fat_m, 0.5 * SONDE_PI * k, half), 0.002, 0.06));
-}
 
 typedef struct indices {
   sonde_surface_index *skin, *femur, *muscle;
@@ -370,10 +320,19 @@ static sonde_status sample(const sonde_leg_scan *scan, const indices *in, sonde_
   if (status) return status;
   report->femur_length_m = f.high - f.low;
   double length = whole_nm((CUT_BOTTOM - CUT_TOP) * report->femur_length_m);
+  SONDE_ASSERT(length > 0);
   shape->skin.length_m = shape->femur.length_m = length;
   align_bone(scan->femur, &f, length);
   centre_line(in->skin, &f, &shape->skin);
-  sample_skin(in->skin, &f, &shape->skin, report);
+  for (uint32_t j = 0; j < SONDE_TUBE_ROWS; ++j)
+    for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i) {
+      double angle = tube_angle(i), z = row_height(shape->skin.length_m, j);
+      sonde_vec3 middle = vec3(shape->skin.x_m[j], shape->skin.y_m[j], z);
+      double r = cast(in->skin, &f, middle, vec3(cos(angle), sin(angle), 0), REACH_M);
+      shape->skin.radius_m[j][i] = r;
+      report->rays++;
+      if (!isfinite(r)) report->missed++;
+    }
   if (report->missed > MOST_MISSED * report->rays)
     return sonde_fail(error, SONDE_MESH,
                       "%u of %u rays from the middle of the thigh miss the skin, expected at most "
@@ -383,8 +342,35 @@ static sonde_status sample(const sonde_leg_scan *scan, const indices *in, sonde_
   smooth(shape->skin.radius_m, 2);
   sample_femur(scan, in->femur, &f, &shape->femur);
   sonde_shape_fill_fat(thigh, shape);
-  if (in->muscle) sample_muscle(in->muscle, &f, thigh, shape);
-  describe(shape, thigh, in->muscle != NULL);
+  const sonde_tube *skin = &shape->skin;
+  if (in->muscle) {
+    for (uint32_t j = 0; j < SONDE_TUBE_ROWS; ++j)
+      for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i) {
+        double angle = tube_angle(i), z = row_height(skin->length_m, j);
+        sonde_vec3 inward = v_neg(sonde_tube_normal(skin, angle, z));
+        double depth = cast(in->muscle, &f, sonde_tube_point(skin, angle, z), inward, 0.06);
+        shape->fat_m[j][i] = isfinite(depth) ? fmax(depth - thigh->skin_m, 0.002) : NAN;
+      }
+    fill_table(shape->fat_m);
+    smooth(shape->fat_m, 12);
+  }
+  // The scan's own measures replace the parameters.
+  double half = 0.5 * length;
+  thigh->length_m = length;
+  thigh->girth_m = sonde_tube_girth(skin, half);
+  thigh->girth_proximal_m = fmax(sonde_tube_girth(skin, 0), thigh->girth_m);
+  thigh->girth_distal_m = fmin(sonde_tube_girth(skin, length), thigh->girth_m);
+  thigh->femur_m = whole_nm(sonde_tube_girth(&shape->femur, half) / SONDE_PI);
+  const uint32_t middle = SONDE_TUBE_ROWS / 2;
+  thigh->femur_lateral_m = clamp(skin->x_m[0] - shape->femur.x_m[0], 0, 0.045);
+  thigh->femur_anterior_m = clamp(shape->femur.y_m[middle] - skin->y_m[middle], 0, 0.025);
+  if (in->muscle != NULL) {
+    double *side[] = {&thigh->fat_inner_m, &thigh->fat_front_m, &thigh->fat_outer_m,
+                      &thigh->fat_back_m};
+    for (int k = 0; k < 4; ++k)
+      *side[k] = whole_nm(
+          clamp(sonde_tube_lookup(skin, shape->fat_m, 0.5 * SONDE_PI * k, half), 0.002, 0.06));
+  }
   return sonde_thigh_check(thigh, error);
 }
 

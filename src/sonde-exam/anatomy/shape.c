@@ -4,56 +4,26 @@
 static const double LEAST_MUSCLE_M = 0.012;
 static const double FAT_TAPER = 0.15; // more at the groin, less at the knee
 
-static double between(double groin, double middle, double knee, double t) {
-  return groin * (1 - t) * (1 - 2 * t) + 4 * middle * t * (1 - t) + knee * t * (2 * t - 1);
-}
-
 static double outline(const sonde_thigh *thigh, double angle, double t) {
   double second = thigh->oval * (1 - 0.45 * t), third = 0.02 * (1 - 0.4 * t);
   return 1 + second * cos(2 * (angle - 1.745)) + third * cos(3 * (angle - 0.349));
 }
 
-static void scale_row(const sonde_thigh *thigh, sonde_tube *skin, uint32_t row) {
-  double t = (double)row / (SONDE_TUBE_ROWS - 1), z = t * skin->length_m;
-  for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i)
-    skin->radius_m[row][i] = outline(thigh, tube_angle(i), t);
-  double wanted = between(thigh->girth_proximal_m, thigh->girth_m, thigh->girth_distal_m, t);
-  double factor = wanted / sonde_tube_girth(skin, z);
-  for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i)
-    skin->radius_m[row][i] = whole_nm(factor * skin->radius_m[row][i]);
-}
-
-static double fat_around(const sonde_thigh *thigh, double angle) {
+void sonde_shape_fill_fat(const sonde_thigh *thigh, sonde_thigh_shape *shape) {
+  SONDE_ASSERT(thigh->fat_inner_m > 0 && thigh->fat_outer_m > 0);
+  SONDE_ASSERT(thigh->fat_front_m > 0 && thigh->fat_back_m > 0);
   double inner = log(thigh->fat_inner_m), outer = log(thigh->fat_outer_m);
   double front = log(thigh->fat_front_m), back = log(thigh->fat_back_m);
-  return exp(0.25 * (inner + outer + front + back) + 0.5 * (inner - outer) * cos(angle) +
-             0.5 * (front - back) * sin(angle) +
-             0.25 * (inner + outer - front - back) * cos(2 * angle));
-}
-
-void sonde_shape_fill_fat(const sonde_thigh *thigh, sonde_thigh_shape *shape) {
   for (uint32_t j = 0; j < SONDE_TUBE_ROWS; ++j) {
     double taper = 1 + FAT_TAPER * (1 - 2.0 * j / (SONDE_TUBE_ROWS - 1));
-    for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i)
-      shape->fat_m[j][i] = whole_nm(taper * fat_around(thigh, tube_angle(i)));
-  }
-}
-
-// The shaft widens towards the trochanter and the condyles. z runs along it, so that it is the
-// middle of the sections that comes from the medial side to the femur on the way to the knee.
-static void fill_femur(const sonde_thigh *thigh, sonde_thigh_shape *shape) {
-  sonde_tube *femur = &shape->femur;
-  const double at_knee_m = fmin(0.003, thigh->femur_lateral_m);
-  for (uint32_t j = 0; j < SONDE_TUBE_ROWS; ++j) {
-    double t = (double)j / (SONDE_TUBE_ROWS - 1);
-    double up = fmax(0, (0.15 - t) / 0.15), down = fmax(0, (t - 0.7) / 0.3);
-    double radius = 0.5 * thigh->femur_m * (1 + 0.35 * (up * up + down * down));
-    double swing = thigh->femur_lateral_m - at_knee_m;
-    double lateral = at_knee_m + swing * (1 - t) * (1 - t); // of the section's middle
-    shape->skin.x_m[j] = whole_nm(swing * (0.5 - t)); // straight line through the bone's middles
-    femur->x_m[j] = whole_nm(shape->skin.x_m[j] - lateral);
-    femur->y_m[j] = thigh->femur_anterior_m;
-    for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i) femur->radius_m[j][i] = whole_nm(radius);
+    for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i) {
+      // The logarithm of the fat by two harmonics, so that it stays positive between the sides.
+      double angle = tube_angle(i);
+      double fat = exp(0.25 * (inner + outer + front + back) + 0.5 * (inner - outer) * cos(angle) +
+                       0.5 * (front - back) * sin(angle) +
+                       0.25 * (inner + outer - front - back) * cos(2 * angle));
+      shape->fat_m[j][i] = whole_nm(taper * fat);
+    }
   }
 }
 
@@ -79,19 +49,6 @@ double sonde_shape_least_muscle(const sonde_thigh_shape *shape, const sonde_thig
   return least;
 }
 
-static sonde_status check_muscle(const sonde_thigh *thigh, const sonde_thigh_shape *shape,
-                                 sonde_error *error) {
-  double z_m = 0, least = sonde_shape_least_muscle(shape, thigh, &z_m);
-  if (least >= LEAST_MUSCLE_M) return SONDE_OK;
-  double here = sonde_tube_girth(&shape->skin, z_m);
-  const double share = 0.65; // of a wider radius: the femur moves aside with the girth
-  double more = 2 * SONDE_PI * (LEAST_MUSCLE_M - least) * thigh->girth_m / here / share;
-  return sonde_fail(error, SONDE_ARGUMENT,
-                    "girth-mm is %g: fat and femur leave %.1f mm of muscle at %.0f mm from the "
-                    "groin, expected 12; girth-mm from about %.0f to 900 would do, or less fat",
-                    thigh->girth_m * 1e3, least * 1e3, z_m * 1e3, (thigh->girth_m + more) * 1e3);
-}
-
 sonde_status sonde_thigh_shape_create(const sonde_thigh *thigh, sonde_thigh_shape **out,
                                       sonde_error *error) {
   *out = NULL;
@@ -100,16 +57,46 @@ sonde_status sonde_thigh_shape_create(const sonde_thigh *thigh, sonde_thigh_shap
   sonde_thigh_shape *shape = SONDE_NEW(sonde_thigh_shape, 1);
   if (!shape) return sonde_fail_memory(error);
   shape->skin.length_m = shape->femur.length_m = thigh->length_m;
-  for (uint32_t j = 0; j < SONDE_TUBE_ROWS; ++j) scale_row(thigh, &shape->skin, j);
-  sonde_shape_fill_fat(thigh, shape);
-  fill_femur(thigh, shape);
-  status = check_muscle(thigh, shape, error);
-  if (status) {
-    sonde_thigh_shape_destroy(shape);
-    return status;
+  for (uint32_t j = 0; j < SONDE_TUBE_ROWS; ++j) {
+    double t = (double)j / (SONDE_TUBE_ROWS - 1), z = t * shape->skin.length_m;
+    for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i)
+      shape->skin.radius_m[j][i] = outline(thigh, tube_angle(i), t);
+    double wanted = thigh->girth_proximal_m * (1 - t) * (1 - 2 * t) +
+                    4 * thigh->girth_m * t * (1 - t) + thigh->girth_distal_m * t * (2 * t - 1);
+    double factor = wanted / sonde_tube_girth(&shape->skin, z);
+    for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i)
+      shape->skin.radius_m[j][i] = whole_nm(factor * shape->skin.radius_m[j][i]);
   }
-  *out = shape;
-  return SONDE_OK;
+  sonde_shape_fill_fat(thigh, shape);
+  // The shaft widens towards the trochanter and the condyles. z runs along it, so that it is the
+  // middle of the sections that comes from the medial side to the femur on the way to the knee.
+  sonde_tube *femur = &shape->femur;
+  const double at_knee_m = fmin(0.003, thigh->femur_lateral_m);
+  for (uint32_t j = 0; j < SONDE_TUBE_ROWS; ++j) {
+    double t = (double)j / (SONDE_TUBE_ROWS - 1);
+    double up = fmax(0, (0.15 - t) / 0.15), down = fmax(0, (t - 0.7) / 0.3);
+    double radius = 0.5 * thigh->femur_m * (1 + 0.35 * (up * up + down * down));
+    double swing = thigh->femur_lateral_m - at_knee_m;
+    double lateral = at_knee_m + swing * (1 - t) * (1 - t); // of the section's middle
+    shape->skin.x_m[j] = whole_nm(swing * (0.5 - t)); // straight line through the bone's middles
+    femur->x_m[j] = whole_nm(shape->skin.x_m[j] - lateral);
+    femur->y_m[j] = thigh->femur_anterior_m;
+    for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i) femur->radius_m[j][i] = whole_nm(radius);
+  }
+  double z_m = 0, least = sonde_shape_least_muscle(shape, thigh, &z_m);
+  if (least >= LEAST_MUSCLE_M) {
+    *out = shape;
+    return SONDE_OK;
+  }
+  // A girth that would do: the femur moves aside with the girth and takes a part of a wider radius.
+  const double share = 0.65;
+  double here = sonde_tube_girth(&shape->skin, z_m);
+  double more = 2 * SONDE_PI * (LEAST_MUSCLE_M - least) * thigh->girth_m / here / share;
+  sonde_thigh_shape_destroy(shape);
+  return sonde_fail(error, SONDE_ARGUMENT,
+                    "girth-mm is %g: fat and femur leave %.1f mm of muscle at %.0f mm from the "
+                    "groin, expected 12; girth-mm from about %.0f to 900 would do, or less fat",
+                    thigh->girth_m * 1e3, least * 1e3, z_m * 1e3, (thigh->girth_m + more) * 1e3);
 }
 
 void sonde_thigh_shape_destroy(sonde_thigh_shape *shape) { sonde_free(shape); }

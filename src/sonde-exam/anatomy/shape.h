@@ -58,6 +58,12 @@ double sonde_shape_fat(const sonde_thigh_shape *shape, sonde_vec3 point_m);
 double sonde_shape_least_muscle(const sonde_thigh_shape *shape, const sonde_thigh *thigh,
                                 double *z_m);
 
+// Checks every range of the parameters. @return ARGUMENT naming parameter and range
+sonde_status sonde_thigh_check(const sonde_thigh *thigh, sonde_error *error);
+// Stiffness (N/m^3) and asymptote (m) of the springs above layers of that thickness.
+void sonde_thigh_springs(double fat_m, double muscle_m, double stiffness, double *k0_n_m3,
+                         double *xm_m);
+
 // The vessels of a thigh as they are placed.
 typedef struct sonde_course {
   sonde_vessel vein, artery;

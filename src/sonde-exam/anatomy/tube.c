@@ -99,6 +99,7 @@ static void add_ring(plan *p, uint32_t count, double z_m, double scale) {
 
 // An end of `inner` rings, 1/inner of the radius apart; ring `inner` is the outline itself.
 static uint32_t inner_count(uint32_t around, uint32_t k, uint32_t inner) {
+  SONDE_ASSERT(inner > 0 && k < inner);
   uint32_t count = (uint32_t)lround((double)around * k / inner);
   return k == 0 ? 1 : count < LEAST_RING ? (uint32_t)LEAST_RING : count;
 }
@@ -124,24 +125,6 @@ static sonde_status ring_plan(const sonde_tube *tube, double edge_m, plan *p, so
   return SONDE_OK;
 }
 
-static void place_ring(const sonde_tube *tube, const ring *r, sonde_vec3 *vertices) {
-  SONDE_ASSERT(r->count >= 1 && r->scale >= 0);
-  sonde_vec3 centre = middle(tube, r->z_m), outline[SONDE_TUBE_COLUMNS + 1];
-  double arc[SONDE_TUBE_COLUMNS + 1] = {0};
-  for (uint32_t i = 0; i <= SONDE_TUBE_COLUMNS; ++i) {
-    outline[i] = sonde_tube_point(tube, tube_angle(i), r->z_m);
-    if (i > 0) arc[i] = arc[i - 1] + v_distance(outline[i - 1], outline[i]);
-  }
-  uint32_t at = 0;
-  for (uint32_t k = 0; k < r->count; ++k) {
-    double wanted = arc[SONDE_TUBE_COLUMNS] * (k + r->offset) / r->count;
-    while (at + 1 < SONDE_TUBE_COLUMNS && arc[at + 1] < wanted) ++at;
-    double t = (wanted - arc[at]) / (arc[at + 1] - arc[at]);
-    sonde_vec3 p = v_lerp(outline[at], outline[at + 1], t);
-    vertices[r->first + k] = v_whole_nm(v_lerp(centre, p, r->scale));
-  }
-}
-
 static double share(const ring *r, uint32_t k) { return (k + r->offset) / r->count; }
 
 static void zip(const ring *a, const ring *b, uint32_t (*faces)[3], uint32_t *used) {
@@ -165,7 +148,21 @@ sonde_status sonde_tube_mesh(const sonde_tube *tube, double edge_m, sonde_mesh *
   if (!status) status = sonde_mesh_create(mesh, p.vertices, p.faces, error);
   uint32_t used = 0;
   for (uint32_t k = 0; !status && k < p.rings; ++k) {
-    place_ring(tube, &p.ring[k], mesh->vertices);
+    SONDE_ASSERT(p.ring[k].count >= 1 && p.ring[k].scale >= 0);
+    sonde_vec3 centre = middle(tube, p.ring[k].z_m), outline[SONDE_TUBE_COLUMNS + 1];
+    double arc[SONDE_TUBE_COLUMNS + 1] = {0};
+    for (uint32_t i = 0; i <= SONDE_TUBE_COLUMNS; ++i) {
+      outline[i] = sonde_tube_point(tube, tube_angle(i), p.ring[k].z_m);
+      if (i > 0) arc[i] = arc[i - 1] + v_distance(outline[i - 1], outline[i]);
+    }
+    uint32_t at = 0;
+    for (uint32_t n = 0; n < p.ring[k].count; ++n) {
+      double wanted = arc[SONDE_TUBE_COLUMNS] * (n + p.ring[k].offset) / p.ring[k].count;
+      while (at + 1 < SONDE_TUBE_COLUMNS && arc[at + 1] < wanted) ++at;
+      double t = (wanted - arc[at]) / (arc[at + 1] - arc[at]);
+      sonde_vec3 corner = v_lerp(outline[at], outline[at + 1], t);
+      mesh->vertices[p.ring[k].first + n] = v_whole_nm(v_lerp(centre, corner, p.ring[k].scale));
+    }
     if (k > 0) zip(&p.ring[k - 1], &p.ring[k], mesh->faces, &used);
   }
   SONDE_ASSERT(status || used == mesh->face_count);

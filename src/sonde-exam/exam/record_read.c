@@ -211,7 +211,9 @@ bool sonde_recording_next(sonde_recording *r, sonde_record *record) {
   memset(record, 0, sizeof *record);
   uint32_t tag;
   size_t bytes;
-  while ((bytes = record_at(r, r->at, r->end, &tag)) > 0 && !(tag != SONDE_RECORD_BLOCK && tag != SONDE_RECORD_NOTE && tag != SONDE_RECORD_END)) r->at += bytes;
+  while ((bytes = record_at(r, r->at, r->end, &tag)) > 0 &&
+         !(tag != SONDE_RECORD_BLOCK && tag != SONDE_RECORD_NOTE && tag != SONDE_RECORD_END))
+    r->at += bytes;
   if (bytes == 0) return false;
   record->tag = tag;
   bytes_reader reader = {(const unsigned char *)r->bytes + r->at + 4};

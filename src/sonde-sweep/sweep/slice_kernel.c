@@ -1,11 +1,11 @@
-// Pixels of a picture from the frames around them, and from a volume: kernels, compiled once for each
-// instruction set with SLICE_KERNELS defined; every operation is one IEEE operation per vector element,
-// so that all give the same bits. docs/frames_images.md derives the weights.
+// Pixels of a picture from the frames around them, and from a volume: kernels, compiled once for
+// each instruction set with SLICE_KERNELS defined; every operation is one IEEE operation per vector
+// element, so that all give the same bits. docs/frames_images.md derives the weights.
 //
-// A picture is divided into blocks and those into tiles. Over a tile the distance d to a plane is linear,
-// so its bounds are known from the tile's centre. A plane that covers the whole tile on one side hides
-// every plane of that side that lies behind its far bound; two or three candidates remain. Where
-// consecutive frames do not cross, slice_strips.h does most of the work.
+// A picture is divided into blocks and those into tiles. Over a tile the distance d to a plane is
+// linear, so its bounds are known from the tile's centre. A plane that covers the whole tile on one
+// side hides every plane of that side that lies behind its far bound; two or three candidates
+// remain. Where consecutive frames do not cross, slice_strips.h does most of the work.
 #include "sweep/slice_strip_kernel.h"
 #include "sweep/slice_voxel_kernel.h"
 
