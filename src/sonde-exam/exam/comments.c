@@ -2,6 +2,7 @@
 #include "exam/record.h"
 
 #include "base/bounds.h"
+#include "base/utf8.h"
 
 #include <math.h>
 #include <string.h>
@@ -16,26 +17,15 @@ static char *path_of(const char *recording) {
   return path;
 }
 
-// Bytes of the character that starts here, 0 when none does.
-static size_t character(const unsigned char *at) {
-  size_t more = *at < 0x80 ? 0 : *at >= 0xc2 && *at < 0xe0 ? 1 : (*at & 0xf0) == 0xe0 ? 2 : 3;
-  if (more == 0) return *at >= 0x20 || *at == '\n' || *at == '\t' ? *at != 0x7f : 0;
-  if (more == 3 && (*at < 0xf0 || *at > 0xf4)) return 0;
-  for (size_t k = 1; k <= more; ++k)
-    if ((at[k] & 0xc0) != 0x80) return 0;
-  bool overlong = (*at == 0xe0 && at[1] < 0xa0) || (*at == 0xf0 && at[1] < 0x90);
-  bool beyond = (*at == 0xed && at[1] > 0x9f) || (*at == 0xf4 && at[1] > 0x8f);
-  return overlong || beyond ? 0 : more + 1;
-}
-
-// Ends within `size` bytes, terminator included.
+// UTF-8 without control characters but line ends and tabs, terminated within `size` bytes.
 static bool is_text(const char *text, size_t size) {
   const char *end = memchr(text, 0, size);
   if (!end) return false;
-  for (const char *at = text; at < end;) {
-    size_t bytes = character((const unsigned char *)at);
-    if (bytes == 0) return false;
-    at += bytes;
+  for (const unsigned char *c = (const unsigned char *)text; *c;) {
+    size_t bytes = utf8_character(c);
+    bool control = *c == 0x7f || (*c < 0x20 && *c != '\n' && *c != '\t');
+    if (bytes == 0 || control) return false;
+    c += bytes;
   }
   return true;
 }
@@ -172,19 +162,6 @@ static sonde_status write_all(const char *recording, const sonde_comments *comme
   return status;
 }
 
-// Into the journal; into a file of its own beside a recording from before version 8.
-static sonde_status add_one(const char *recording, sonde_comments *comments,
-                            const sonde_comment *comment, const char *text, sonde_error *error) {
-  sonde_error own = {0};
-  sonde_status status = sonde_notes_add(recording, SONDE_NOTE_COMMENT, text, &own);
-  if (status == SONDE_VERSION) {
-    insert(comments, comment);
-    return write_all(recording, comments, error);
-  }
-  if (status && error) *error = own;
-  return status;
-}
-
 sonde_status sonde_comments_add(const char *recording, const sonde_comment *comment,
                                 sonde_error *error) {
   SONDE_ASSERT(recording != NULL && comment != NULL);
@@ -195,7 +172,14 @@ sonde_status sonde_comments_add(const char *recording, const sonde_comment *comm
   if (!status && comments.count >= SONDE_MAX_COMMENTS)
     status = sonde_fail(&own, SONDE_ARGUMENT, "%s has %d comments already", recording,
                         SONDE_MAX_COMMENTS);
-  if (!status) status = add_one(recording, &comments, comment, text, &own);
+  // A journal takes the comment as a note; an older recording gets a file of comments beside it.
+  if (!status) {
+    status = sonde_notes_add(recording, SONDE_NOTE_COMMENT, text, &own);
+    if (status == SONDE_VERSION) {
+      insert(&comments, comment);
+      status = write_all(recording, &comments, &own);
+    }
+  }
   if (status && error) *error = own;
   sonde_comments_clear(&comments);
   sonde_free(text);

@@ -119,40 +119,21 @@ int sonde_journal_keep(sonde_journal *journal, uint64_t bytes) {
 
 bool sonde_journal_is_file(const sonde_journal *journal) { return journal->regular; }
 
-// Twice the room, as far as the bound allows.
-static bool grow(sonde_journal *journal, size_t count, size_t bound) {
-  if (journal->count + count > bound) return false;
-  size_t room = journal->room;
-  while (room < journal->count + count) room *= 2;
-  if (room == journal->room) return true;
-  unsigned char *bytes = sonde_realloc(journal->bytes, journal->room, room);
-  if (!bytes) return false;
-  journal->bytes = bytes;
-  journal->room = room;
-  return true;
-}
-
 bool sonde_journal_append(sonde_journal *journal, const void *bytes, size_t count, bool important) {
   SONDE_ASSERT(bytes != NULL);
   size_t bound = (size_t)SONDE_JOURNAL_PENDING + (important ? SONDE_JOURNAL_RESERVE : 0);
-  if (!grow(journal, count, bound)) return false;
+  if (journal->count + count > bound) return false;
+  size_t room = journal->room;
+  while (room < journal->count + count) room *= 2;
+  if (room > journal->room) {
+    unsigned char *grown = sonde_realloc(journal->bytes, journal->room, room);
+    if (!grown) return false;
+    journal->bytes = grown;
+    journal->room = room;
+  }
   memcpy(journal->bytes + journal->count, bytes, count);
   journal->count += count;
   return true;
-}
-
-// Bytes that the system took and could not bring to the disk may be gone: they are written again.
-static int sync_all(sonde_journal *journal) {
-  int failure = journal->regular ? sonde_disk_sync(journal->descriptor) : 0;
-  if (!failure) {
-    journal->synced += (off_t)journal->written;
-    journal->count -= journal->written;
-    memmove(journal->bytes, journal->bytes + journal->written, journal->count);
-    journal->written = 0;
-    return 0;
-  }
-  if (lseek(journal->descriptor, journal->synced, SEEK_SET) >= 0) journal->written = 0;
-  return failure;
 }
 
 int sonde_journal_flush(sonde_journal *journal, bool sync, bool now) {
@@ -164,7 +145,17 @@ int sonde_journal_flush(sonde_journal *journal, bool sync, bool now) {
     failure = sonde_disk_write(journal->descriptor, journal->bytes + journal->written,
                                journal->count - journal->written, &written);
   journal->written += written;
-  if (!failure && (sync || journal->written >= SYNC_BYTES)) failure = sync_all(journal);
+  if (!failure && (sync || journal->written >= SYNC_BYTES)) {
+    failure = journal->regular ? sonde_disk_sync(journal->descriptor) : 0;
+    if (!failure) {
+      journal->synced += (off_t)journal->written;
+      journal->count -= journal->written;
+      memmove(journal->bytes, journal->bytes + journal->written, journal->count);
+      journal->written = 0;
+    } else if (lseek(journal->descriptor, journal->synced, SEEK_SET) >= 0) {
+      journal->written = 0; // what could not be brought to the disk may be gone: written again
+    }
+  }
   journal->trouble = failure;
   if (failure) journal->again_s = sonde_clock_now() + AGAIN_S;
   return failure;

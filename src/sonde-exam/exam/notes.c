@@ -8,31 +8,28 @@
 #include <string.h>
 #include <zlib.h>
 
-static sonde_status copy_notes(const sonde_recording *r, sonde_notes *notes, sonde_error *error) {
-  sonde_record_note note;
-  uint32_t count = 0;
-  size_t bytes = 1;
-  for (size_t at = r->start; sonde_recording_next_note(r, &at, &note); bytes += note.bytes + 1)
-    ++count;
-  notes->list = SONDE_NEW(sonde_note, count);
-  notes->texts = SONDE_NEW(char, bytes);
-  if (!notes->list || !notes->texts) return sonde_fail_memory(error);
-  char *text = notes->texts;
-  for (size_t at = r->start; sonde_recording_next_note(r, &at, &note); text += note.bytes + 1) {
-    memcpy(text, note.text, note.bytes);
-    notes->list[notes->count++] = (sonde_note){note.kind, note.tick, text};
-  }
-  SONDE_ASSERT(notes->count == count);
-  return SONDE_OK;
-}
-
 sonde_status sonde_notes_load(const char *path, sonde_notes *notes, sonde_error *error) {
   SONDE_ASSERT(path && notes);
   sonde_recording recording;
   *notes = (sonde_notes){0};
   sonde_status status = sonde_recording_load(path, true, &recording, error);
   if (status) return status;
-  status = copy_notes(&recording, notes, error);
+  // Sizes first, then the texts behind one another.
+  const sonde_recording *r = &recording;
+  sonde_record_note note;
+  uint32_t count = 0;
+  size_t bytes = 1;
+  for (size_t at = r->start; sonde_recording_next_note(r, &at, &note); bytes += note.bytes + 1)
+    ++count;
+  notes->list = SONDE_NEW(sonde_note, count);
+  char *text = notes->texts = SONDE_NEW(char, bytes);
+  if (!notes->list || !notes->texts) status = sonde_fail_memory(error);
+  for (size_t at = r->start; !status && sonde_recording_next_note(r, &at, &note);) {
+    memcpy(text, note.text, note.bytes);
+    notes->list[notes->count++] = (sonde_note){note.kind, note.tick, text};
+    text += note.bytes + 1;
+  }
+  SONDE_ASSERT(status || notes->count == count);
   sonde_recording_clear(&recording);
   if (status) sonde_notes_clear(notes);
   return status;

@@ -10,68 +10,51 @@
 #include <string.h>
 #include <zlib.h>
 
-// What is being read, for sentences.
+// What is being read. The first mistake stays: after it every read does nothing.
 typedef struct source {
   const char *path;
   sonde_recording *recording;
+  sonde_status status;
   sonde_error *error;
 } source;
 
-static sonde_status fail_header(const source *s, const char *what) {
-  return sonde_fail(s->error, SONDE_FORMAT, "%s:2: the header has no usable \"%s\"", s->path, what);
+static void fail_header(source *s, const char *what) {
+  if (s->status) return;
+  s->status =
+      sonde_fail(s->error, SONDE_FORMAT, "%s:2: the header has no usable \"%s\"", s->path, what);
 }
 
-static sonde_status text_of(const source *s, const sonde_json *object, const char *key, char *text,
-                            size_t size) {
+static void read_text(source *s, const sonde_json *object, const char *key, char *text,
+                      size_t size) {
   const char *found = sonde_json_as_text(sonde_json_member(object, key));
-  if (!found || strlen(found) >= size) return fail_header(s, key);
-  snprintf(text, size, "%s", found);
-  return SONDE_OK;
+  if (found && strlen(found) < size)
+    snprintf(text, size, "%s", found);
+  else
+    fail_header(s, key);
 }
 
-static sonde_status real_of(const source *s, const sonde_json *object, const char *key,
-                            double *value) {
-  *value = sonde_json_as_number(sonde_json_member(object, key));
-  return isnan(*value) ? fail_header(s, key) : SONDE_OK;
+static double read_real(source *s, const sonde_json *object, const char *key) {
+  double value = sonde_json_as_number(sonde_json_member(object, key));
+  if (isnan(value)) fail_header(s, key);
+  return value;
 }
 
-static sonde_status count_of(const source *s, const sonde_json *object, const char *key,
-                             uint32_t *value) {
-  double real = 0.0;
-  sonde_status status = real_of(s, object, key, &real);
-  if (status) return status;
-  if (!(real >= 0.0 && real <= 4294967295.0)) return fail_header(s, key);
-  *value = (uint32_t)real;
-  return SONDE_OK;
+static uint32_t read_count(source *s, const sonde_json *object, const char *key, uint32_t most) {
+  double real = read_real(s, object, key);
+  if (real >= 0.0 && real < most + 1.0) return (uint32_t)real;
+  fail_header(s, key);
+  return 0;
 }
 
-static sonde_status hash_of(const source *s, const sonde_json *object, const char *key,
-                            uint64_t *value) {
-  char text[17], *end = NULL;
-  sonde_status status = text_of(s, object, key, text, sizeof text);
-  if (status) return status;
-  *value = strtoull(text, &end, 16);
-  return end == text || *end ? fail_header(s, key) : SONDE_OK;
+static uint64_t read_hash(source *s, const sonde_json *object, const char *key) {
+  char text[17] = "", *end = NULL;
+  read_text(s, object, key, text, sizeof text);
+  uint64_t value = strtoull(text, &end, 16);
+  if (end == text || *end) fail_header(s, key);
+  return value;
 }
 
-static sonde_status read_probes(const source *s, const sonde_json *root) {
-  sonde_recording *r = s->recording;
-  const sonde_json *probes = sonde_json_member(root, "probes");
-  uint32_t count = sonde_json_count(probes);
-  if (sonde_json_kind_of(probes) != SONDE_JSON_LIST || count == 0) return fail_header(s, "probes");
-  r->probe_names = sonde_calloc(count, sizeof *r->probe_names);
-  r->probe_hashes = SONDE_NEW(uint64_t, count);
-  if (!r->probe_names || !r->probe_hashes) return sonde_fail_memory(s->error);
-  sonde_status status = SONDE_OK;
-  for (const sonde_json *probe = sonde_json_first(probes); probe; probe = sonde_json_next(probe)) {
-    uint32_t i = r->probe_count++;
-    if (!status) status = text_of(s, probe, "name", r->probe_names[i], sizeof r->probe_names[i]);
-    if (!status) status = hash_of(s, probe, "hash", &r->probe_hashes[i]);
-  }
-  return status;
-}
-
-// Leaves recording->at at the second line.
+// The first line. Leaves recording->at at the second one.
 static sonde_status read_magic(const source *s) {
   sonde_recording *r = s->recording;
   size_t length = strlen(SONDE_RECORD_MAGIC);
@@ -90,7 +73,7 @@ static sonde_status read_magic(const source *s) {
   return SONDE_OK;
 }
 
-static sonde_status read_header(const source *s) {
+static sonde_status read_header(source *s) {
   sonde_recording *r = s->recording;
   const char *line = r->bytes + r->at;
   const char *end = memchr(line, '\n', r->end - r->at);
@@ -98,54 +81,53 @@ static sonde_status read_header(const source *s) {
   const sonde_json_source from = {s->path, 2, sonde_limits_recording.most_depth,
                                   (uint32_t)sonde_limits_recording.most_items};
   sonde_json *root = NULL;
-  sonde_status status = sonde_json_parse(line, (size_t)(end - line), &from, &root, s->error);
-  if (!status) {
-    const sonde_json *model = sonde_json_member(root, "model");
-    status = text_of(s, model, "path", r->model_path, sizeof r->model_path);
-    if (!status) status = text_of(s, model, "name", r->model_name, sizeof r->model_name);
-    if (!status) status = hash_of(s, model, "checksum", &r->model_checksum);
+  s->status = sonde_json_parse(line, (size_t)(end - line), &from, &root, s->error);
+  r->at = r->start = (size_t)(end + 1 - r->bytes);
+  if (s->status) return s->status;
+  const sonde_json *model = sonde_json_member(root, "model");
+  read_text(s, model, "path", r->model_path, sizeof r->model_path);
+  read_text(s, model, "name", r->model_name, sizeof r->model_name);
+  r->model_checksum = read_hash(s, model, "checksum");
+  // The probes, by name and shape.
+  const sonde_json *probes = sonde_json_member(root, "probes"), *probe = sonde_json_first(probes);
+  uint32_t count = sonde_json_count(probes);
+  if (sonde_json_kind_of(probes) != SONDE_JSON_LIST || count == 0) fail_header(s, "probes");
+  r->probe_names = sonde_calloc(count, sizeof *r->probe_names);
+  r->probe_hashes = SONDE_NEW(uint64_t, count);
+  if (!s->status && (!r->probe_names || !r->probe_hashes)) s->status = sonde_fail_memory(s->error);
+  for (; probe && !s->status; probe = sonde_json_next(probe)) {
+    uint32_t i = r->probe_count++;
+    read_text(s, probe, "name", r->probe_names[i], sizeof r->probe_names[i]);
+    r->probe_hashes[i] = read_hash(s, probe, "hash");
   }
-  if (!status) status = read_probes(s, root);
-  if (!status) {
-    const sonde_json *world = sonde_json_member(root, "world");
-    sonde_world_def def = sonde_world_def_default();
-    uint32_t law = 0, engine = 0;
-    const struct {
-      const char *key;
-      double *value;
-    } reals[] = {{"dt_s", &def.dt_s},
-                 {"implicitness", &def.implicitness},
-                 {"pcg_relative", &def.pcg.relative_residual},
-                 {"pcg_absolute", &def.pcg.absolute_residual},
-                 {"contact_stiffness_n_m3", &def.contact_stiffness_n_m3},
-                 {"contact_damping_n_s_m3", &def.contact_damping_n_s_m3},
-                 {"sleep_displacement_m", &def.sleep_displacement_m}};
-    for (size_t i = 0; i < SONDE_COUNT_OF(reals) && !status; ++i)
-      status = real_of(s, world, reals[i].key, reals[i].value);
-    if (!status) status = count_of(s, world, "newton_iterations", &def.newton_iterations);
-    if (!status) status = count_of(s, world, "pcg_iterations", &def.pcg.max_iterations);
-    if (!status) status = count_of(s, world, "contact_law", &law);
-    if (!status) status = count_of(s, world, "engine", &engine);
-    if (!status && law > SONDE_CONTACT_NODES) status = fail_header(s, "contact_law");
-    if (!status && engine > SONDE_ENGINE_FAST) status = fail_header(s, "engine");
-    def.contact_law = (sonde_contact_law)law;
-    def.engine = (sonde_engine)engine;
-    s->recording->world = def;
-  }
+  // The world.
+  const sonde_json *world = sonde_json_member(root, "world");
+  sonde_world_def *def = &r->world;
+  *def = sonde_world_def_default();
+  def->dt_s = read_real(s, world, "dt_s");
+  def->implicitness = read_real(s, world, "implicitness");
+  def->pcg.relative_residual = read_real(s, world, "pcg_relative");
+  def->pcg.absolute_residual = read_real(s, world, "pcg_absolute");
+  def->contact_stiffness_n_m3 = read_real(s, world, "contact_stiffness_n_m3");
+  def->contact_damping_n_s_m3 = read_real(s, world, "contact_damping_n_s_m3");
+  def->sleep_displacement_m = read_real(s, world, "sleep_displacement_m");
+  def->newton_iterations = read_count(s, world, "newton_iterations", UINT32_MAX);
+  def->pcg.max_iterations = read_count(s, world, "pcg_iterations", UINT32_MAX);
+  def->contact_law = (sonde_contact_law)read_count(s, world, "contact_law", SONDE_CONTACT_NODES);
+  def->engine = (sonde_engine)read_count(s, world, "engine", SONDE_ENGINE_FAST);
+  if (!sonde_setup_read(root, &r->setup)) fail_header(s, "setup");
+  def->friction = r->setup.friction;
+  // The image; files before version 4 do not tell it.
   r->image_width = r->image_height = 512, r->ticks_per_image = 20;
-  if (!status && !sonde_setup_read(root, &r->setup)) status = fail_header(s, "setup");
-  r->world.friction = r->setup.friction;
-  if (!status && r->version >= 4) {
-    // Came with version 4.
+  if (r->version >= 4) {
     const sonde_json *image = sonde_json_member(root, "image");
-    status = count_of(s, image, "width", &r->image_width);
-    if (!status) status = count_of(s, image, "height", &r->image_height);
-    if (!status) status = count_of(s, image, "ticks_per_image", &r->ticks_per_image);
-    if (!status && r->ticks_per_image == 0) status = fail_header(s, "ticks_per_image");
+    r->image_width = read_count(s, image, "width", UINT32_MAX);
+    r->image_height = read_count(s, image, "height", UINT32_MAX);
+    r->ticks_per_image = read_count(s, image, "ticks_per_image", UINT32_MAX);
+    if (r->ticks_per_image == 0) fail_header(s, "ticks_per_image");
   }
   sonde_json_free(root);
-  r->at = r->start = (size_t)(end + 1 - r->bytes);
-  return status;
+  return s->status;
 }
 
 size_t sonde_record_bytes(int version, uint32_t tag) {
@@ -403,7 +385,7 @@ sonde_status sonde_recording_load(const char *path, bool recover, sonde_recordin
                                   sonde_error *error) {
   SONDE_ASSERT(path != NULL && recording != NULL);
   *recording = (sonde_recording){0};
-  source s = {path, recording, error};
+  source s = {.path = path, .recording = recording, .error = error};
   sonde_status status =
       sonde_bounded_load(path, &sonde_limits_recording, &recording->bytes, &recording->end, error);
   if (!status) status = read_magic(&s);

@@ -11,20 +11,6 @@
 
 enum { BEAM_STEPS = 3 }; // of a new beam per image
 
-// Along the axis from well outside: the first crossing is the skin above the probe's face, whether
-// the face is above or below it. Beside the thigh the signed closest distance takes over.
-static double penetration(const sonde_session *session, sonde_pose pose) {
-  const double back_m = 0.15, reach_m = 0.3;
-  sonde_vec3 axis = q_rotate(pose.rotation, vec3(0, 0, 1));
-  sonde_vec3 outside = v_madd(pose.position, -back_m, axis);
-  sonde_surface_point hit;
-  bool clear = !sonde_surface_inside(session->subject->rest_skin, outside);
-  if (clear && sonde_surface_raycast(session->subject->rest_skin, outside, axis, reach_m, &hit))
-    return back_m - v_dot(v_sub(hit.point_m, outside), axis);
-  double distance = sonde_surface_closest(session->subject->rest_skin, pose.position).distance_m;
-  return sonde_surface_inside(session->subject->rest_skin, pose.position) ? distance : -distance;
-}
-
 static sonde_echo_settings with_beam(const sonde_session_beam *beam, sonde_echo_settings rest) {
   rest.frequency_hz = beam->frequency_hz;
   rest.depth_m = beam->depth_m;
@@ -80,6 +66,24 @@ static double couple(sonde_session *session, const unsigned char *slot) {
 
 static void fill_frame(sonde_session *session, const unsigned char *slot, unsigned char *out) {
   const sonde_surface_slot *head = (const void *)slot;
+  // Depth of the face below the resting skin: along the axis from well outside, the first crossing
+  // is the skin above the face, whether the face is above or below it. Beside the thigh the signed
+  // closest distance takes over.
+  const sonde_surface_index *rest = session->subject->rest_skin;
+  const double back_m = 0.15, reach_m = 0.3;
+  sonde_pose pose = head->snapshot.world_from_probe;
+  sonde_vec3 axis = q_rotate(pose.rotation, vec3(0, 0, 1));
+  sonde_vec3 outside = v_madd(pose.position, -back_m, axis);
+  sonde_surface_point hit;
+  double depth_m = 0;
+  if (!sonde_surface_inside(rest, outside) &&
+      sonde_surface_raycast(rest, outside, axis, reach_m, &hit)) {
+    depth_m = back_m - v_dot(v_sub(hit.point_m, outside), axis);
+  } else {
+    depth_m = sonde_surface_closest(rest, pose.position).distance_m;
+    if (!sonde_surface_inside(rest, pose.position)) depth_m = -depth_m;
+  }
+  // The skin in single precision.
   const sonde_vec3 *positions_m = (const void *)(slot + session->positions_at);
   float *skin_m = (float *)(void *)(out + session->skin_at);
   for (size_t i = 0; i < session->nodes; ++i) {
@@ -122,7 +126,7 @@ static void fill_frame(sonde_session *session, const unsigned char *slot, unsign
   frame->snapshot.gel_volume_m3 = gel_m3;
   frame->snapshot.venous_pressure_pa = head->pathology.venous_pressure_pa;
   frame->snapshot.arterial_pressure_pa = head->pathology.arterial_pressure_pa;
-  frame->snapshot.penetration_m = penetration(session, head->snapshot.world_from_probe);
+  frame->snapshot.penetration_m = depth_m;
   if (session->interior && !off) sonde_snapshot_read_vessels(session->interior, &frame->snapshot);
 }
 

@@ -104,35 +104,6 @@ void sonde_setup_write(sonde_json_out *header, const sonde_setup *setup) {
   sonde_json_end(header);
 }
 
-static bool read_presets(const sonde_json *object, sonde_setup *setup) {
-  const sonde_json *presets = sonde_json_member(object, "presets");
-  if (sonde_json_count(presets) > SONDE_SESSION_PRESETS) return false;
-  number list[MOST_NUMBERS];
-  for (const sonde_json *item = sonde_json_first(presets); item; item = sonde_json_next(item)) {
-    sonde_preset *preset = &setup->presets[setup->preset_count++];
-    const char *name = sonde_json_as_text(sonde_json_member(item, "name"));
-    snprintf(preset->name, sizeof preset->name, "%.60s", name ? name : "");
-    read_list(item, list, list_preset(list, preset));
-    if (sonde_preset_apply(preset, NULL, NULL, NULL)) return false;
-  }
-  return true;
-}
-
-static bool read_circulation(const sonde_json *object, sonde_setup *setup) {
-  const sonde_json *circulation = sonde_json_member(object, "circulation");
-  if (!circulation) return true;
-  double posture = sonde_json_as_number(sonde_json_member(circulation, "posture"));
-  if (!(posture >= 0 && posture < SONDE_POSTURE_COUNT)) return false;
-  number list[MOST_NUMBERS];
-  setup->circulate = true;
-  setup->circulation.posture = (sonde_posture)(int)posture;
-  uint32_t count = list_circulation(list, &setup->circulation);
-  read_list(circulation, list, count);
-  for (uint32_t i = 0; i < count; ++i)
-    if (!isfinite(*list[i].value)) return false;
-  return true;
-}
-
 bool sonde_setup_read(const sonde_json *header, sonde_setup *setup) {
   *setup = sonde_setup_default();
   const sonde_json *object = sonde_json_member(header, "setup");
@@ -143,6 +114,25 @@ bool sonde_setup_read(const sonde_json *header, sonde_setup *setup) {
   setup->gel_m3 = sonde_json_as_number(sonde_json_member(object, "gel_m3"));
   if (!(setup->gel_m3 >= 0 && setup->gel_m3 <= 1e-3)) return false;
   setup->friction = friction.friction;
-  return sonde_preset_apply(&friction, NULL, NULL, NULL) == SONDE_OK &&
-         read_presets(object, setup) && read_circulation(object, setup);
+  if (sonde_preset_apply(&friction, NULL, NULL, NULL)) return false;
+  const sonde_json *presets = sonde_json_member(object, "presets");
+  if (sonde_json_count(presets) > SONDE_SESSION_PRESETS) return false;
+  for (const sonde_json *item = sonde_json_first(presets); item; item = sonde_json_next(item)) {
+    sonde_preset *preset = &setup->presets[setup->preset_count++];
+    const char *name = sonde_json_as_text(sonde_json_member(item, "name"));
+    snprintf(preset->name, sizeof preset->name, "%.60s", name ? name : "");
+    read_list(item, list, list_preset(list, preset));
+    if (sonde_preset_apply(preset, NULL, NULL, NULL)) return false;
+  }
+  const sonde_json *circulation = sonde_json_member(object, "circulation");
+  if (!circulation) return true;
+  double posture = sonde_json_as_number(sonde_json_member(circulation, "posture"));
+  if (!(posture >= 0 && posture < SONDE_POSTURE_COUNT)) return false;
+  setup->circulate = true;
+  setup->circulation.posture = (sonde_posture)(int)posture;
+  uint32_t count = list_circulation(list, &setup->circulation);
+  read_list(circulation, list, count);
+  for (uint32_t i = 0; i < count; ++i)
+    if (!isfinite(*list[i].value)) return false;
+  return true;
 }

@@ -2,6 +2,7 @@
 // the copy (no escape grows), and values are taken from blocks of nodes that are freed together.
 #include "base/base.h"
 #include "base/maths.h"
+#include "base/utf8.h"
 #include "sonde/base_json.h"
 
 #include <stdarg.h>
@@ -52,18 +53,6 @@ __attribute__((format(printf, 2, 3))) static sonde_status fail(const parser *p, 
 
 static void skip_space(parser *p) {
   for (; p->at < p->end && strchr(" \t\r\n", *p->at) && *p->at; ++p->at) p->line += *p->at == '\n';
-}
-
-// Bytes of the UTF-8 character that starts here (RFC 3629), 0 when none does: not overlong, no
-// surrogate, not beyond U+10FFFF. The 0 behind the text ends a character that is torn there.
-static size_t character(const unsigned char *c) {
-  size_t more = c[0] < 0x80 ? 0 : c[0] < 0xc2 ? 4 : c[0] < 0xe0 ? 1 : c[0] < 0xf0 ? 2 : 3;
-  if (more == 4 || c[0] > 0xf4) return 0;
-  for (size_t k = 1; k <= more; ++k)
-    if ((c[k] & 0xc0) != 0x80) return 0;
-  bool overlong = (c[0] == 0xe0 && c[1] < 0xa0) || (c[0] == 0xf0 && c[1] < 0x90);
-  bool beyond = (c[0] == 0xed && c[1] > 0x9f) || (c[0] == 0xf4 && c[1] > 0x8f);
-  return overlong || beyond ? 0 : more + 1;
 }
 
 // Code unit of four hexadecimal digits, -1 when they are none.
@@ -120,7 +109,7 @@ static sonde_status read_text(parser *p, const char **text) {
       if (status) return status;
       continue;
     }
-    size_t bytes = character((const unsigned char *)p->at);
+    size_t bytes = utf8_character((const unsigned char *)p->at);
     if (bytes == 0) return fail(p, "expected UTF-8, found byte %u", c);
     memmove(to, p->at, bytes);
     to += bytes, p->at += bytes;
@@ -332,7 +321,7 @@ static void put_string(sonde_json_out *out, const char *text) {
   static const char NAMES[] = "\"\\bfnrt", BYTES[] = "\"\\\b\f\n\r\t";
   put(out, "\"");
   for (const unsigned char *c = (const unsigned char *)text; *c;) {
-    size_t bytes = character(c);
+    size_t bytes = utf8_character(c);
     const char *escape = strchr(BYTES, *c);
     if (escape)
       sonde_file_printf(out->file, "\\%c", NAMES[escape - BYTES]);
