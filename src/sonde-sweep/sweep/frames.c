@@ -114,43 +114,17 @@ sonde_status sonde_sequence_set_transform(sonde_sequence *s, uint32_t frame, con
   return status ? status : sonde_sequence_set(s, frame, key, "OK", error);
 }
 
-// False when the key is not one of a frame; *number may then hold anything.
-static bool split_frame_key(const char *key, uint64_t *number, const char **name) {
-  static const char prefix[] = "Seq_Frame";
-  if (strncmp(key, prefix, sizeof prefix - 1) != 0) return false;
-  const char *digits = key + sizeof prefix - 1;
-  size_t length = strspn(digits, "0123456789");
-  if (length < 1 || length > 9 || digits[length] != '_' || !digits[length + 1]) return false;
-  *number = 0;
-  for (size_t i = 0; i < length; ++i) *number = 10 * *number + (uint64_t)(digits[i] - '0');
-  *name = digits + length + 1;
-  return true;
-}
-
-// Numbers of a transform; those of an INVALID one may be anything.
-static sonde_status check_transform(const sonde_header *h, const sonde_header_entry *e,
-                                    sonde_error *error) {
-  sonde_affine affine;
-  if (!sonde_text_ends(e->key, "Transform") || sonde_text_affine(e->value, &affine))
-    return SONDE_OK;
-  for (uint32_t i = 0; i < h->entry_count; ++i) {
-    const sonde_header_entry *other = &h->entries[i];
-    size_t length = strlen(e->key);
-    if (strncmp(other->key, e->key, length) == 0 && strcmp(other->key + length, "Status") == 0 &&
-        strcmp(other->value, "OK") != 0)
-      return SONDE_OK;
-  }
-  return sonde_fail(error, SONDE_FORMAT,
-                    "%.200s:%u: %.60s: expected 16 finite numbers, the last four 0 0 0 1, found "
-                    "'%.80s'",
-                    h->path, e->line, e->key, e->value);
-}
-
 static sonde_status read_field(const sonde_header *h, const sonde_header_entry *e,
                                sonde_sequence *s, sonde_error *error) {
+  // Seq_Frame0012_Name belongs to frame 12, any other key to the file.
+  static const char prefix[] = "Seq_Frame";
+  const char *key = e->key, *digits = key + sizeof prefix - 1;
+  bool framed = strncmp(key, prefix, sizeof prefix - 1) == 0;
+  size_t length = framed ? strspn(digits, "0123456789") : 0;
+  framed = length >= 1 && length <= 9 && digits[length] == '_' && digits[length + 1];
   uint64_t number = 0;
-  const char *key = e->key;
-  bool framed = split_frame_key(e->key, &number, &key);
+  for (size_t i = 0; framed && i < length; ++i) number = 10 * number + (uint64_t)(digits[i] - '0');
+  if (framed) key = digits + length + 1;
   if (framed && number >= s->count)
     return sonde_fail(error, SONDE_FORMAT, "%.200s:%u: %.60s: expected frames 0 to %u", h->path,
                       e->line, e->key, s->count - 1);
@@ -166,7 +140,21 @@ static sonde_status read_field(const sonde_header *h, const sonde_header_entry *
     status = sonde_fail(error, SONDE_FORMAT, "%.200s:%u: %.200s", h->path, e->line, cause.message);
   else if (status)
     status = sonde_fail_memory(error);
-  return status ? status : check_transform(h, e, error);
+  // A transform has its numbers, unless its status is INVALID.
+  sonde_affine affine;
+  bool sound =
+      status || !sonde_text_ends(e->key, "Transform") || sonde_text_affine(e->value, &affine);
+  const size_t end = strlen(e->key);
+  for (uint32_t i = 0; i < h->entry_count && !sound; ++i) {
+    const sonde_header_entry *other = &h->entries[i];
+    sound = strncmp(other->key, e->key, end) == 0 && strcmp(other->key + end, "Status") == 0 &&
+            strcmp(other->value, "OK") != 0;
+  }
+  if (sound) return status;
+  return sonde_fail(error, SONDE_FORMAT,
+                    "%.200s:%u: %.60s: expected 16 finite numbers, the last four 0 0 0 1, found "
+                    "'%.80s'",
+                    h->path, e->line, e->key, e->value);
 }
 
 // Its own inverse: U mirrors columns, N mirrors rows.

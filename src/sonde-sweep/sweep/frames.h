@@ -62,7 +62,8 @@ typedef struct sonde_header_rule {
 } sonde_header_rule;
 sonde_status sonde_header_rules(const sonde_header *header, const sonde_header_rule *rules,
                                 size_t count, sonde_error *error);
-bool sonde_header_among(const char *key, const char *const *names, size_t count);
+// @param names "|one|another|"
+bool sonde_header_among(const char *key, const char *names);
 sonde_status sonde_header_whole(const sonde_header *header, const sonde_header_entry *entry,
                                 uint32_t count, uint32_t low, uint32_t high, uint32_t *values,
                                 sonde_error *error);

@@ -42,66 +42,6 @@ static bool attribute(const char *element, const char *end, const char *name, ch
   return false;
 }
 
-static sonde_status read_transform(const char *path, const char *bytes, const char *element,
-                                   const char *end, sonde_calibration *c, sonde_error *error) {
-  char matrix[1024];
-  uint32_t line = sonde_line_of(bytes, element);
-  if (c->count == SONDE_COUNT_OF(c->transforms))
-    return sonde_fail(error, SONDE_FORMAT, "%.200s:%u: expected at most %zu transforms", path, line,
-                      SONDE_COUNT_OF(c->transforms));
-  bool good = attribute(element, end, "From", c->transforms[c->count].from, NAME_MAX_BYTES) &&
-              attribute(element, end, "To", c->transforms[c->count].to, NAME_MAX_BYTES) &&
-              attribute(element, end, "Matrix", matrix, sizeof matrix) &&
-              sonde_text_affine(matrix, &c->transforms[c->count].to_from_from);
-  if (!good)
-    return sonde_fail(
-        error, SONDE_FORMAT,
-        "%.200s:%u: Transform: expected From, To and Matrix of 16 finite numbers that "
-        "end in 0 0 0 1",
-        path, line);
-  ++c->count;
-  return SONDE_OK;
-}
-
-static sonde_status read_clip(const char *path, const char *bytes, const char *element,
-                              const char *end, sonde_calibration *c, sonde_error *error) {
-  char origin[64], size[64];
-  double v[4];
-  if (!attribute(element, end, "ClipRectangleOrigin", origin, sizeof origin) ||
-      !attribute(element, end, "ClipRectangleSize", size, sizeof size))
-    return SONDE_OK;
-  bool good = sonde_text_reals(origin, 2, v) && sonde_text_reals(size, 2, v + 2);
-  for (int k = 0; k < 4 && good; ++k) {
-    good = v[k] >= (k > 1) && v[k] <= SONDE_SIDE_MAX && floor(v[k]) == v[k];
-    if (good) c->clip[k] = (uint32_t)v[k];
-  }
-  c->has_clip = good;
-  if (good) return SONDE_OK;
-  return sonde_fail(error, SONDE_FORMAT,
-                    "%.200s:%u: ClipRectangleOrigin and ClipRectangleSize: expected two whole "
-                    "numbers of pixels each",
-                    path, sonde_line_of(bytes, element));
-}
-
-// Only elements that begin with these names matter; comments are skipped.
-static sonde_status read_elements(const char *path, const char *bytes, const char *stop,
-                                  sonde_calibration *c, sonde_error *error) {
-  sonde_status status = SONDE_OK;
-  for (const char *at = bytes; !status && (at = memchr(at, '<', (size_t)(stop - at))) != NULL;) {
-    bool comment = strncmp(at, "<!--", 4) == 0;
-    const char *end = comment ? strstr(at, "-->") : memchr(at, '>', (size_t)(stop - at));
-    if (!end)
-      return sonde_fail(error, SONDE_FORMAT, "%.200s:%u: the file ends inside an element", path,
-                        sonde_line_of(bytes, at));
-    if (strncmp(at, "<Transform", 10) == 0 && is_blank(at[10]))
-      status = read_transform(path, bytes, at, end, c, error);
-    if (strncmp(at, "<VolumeReconstruction", 21) == 0 && is_blank(at[21]))
-      status = read_clip(path, bytes, at, end, c, error);
-    at = end;
-  }
-  return status;
-}
-
 sonde_status sonde_calibration_load(const char *path, sonde_calibration *c, sonde_error *error) {
   SONDE_ASSERT(path != NULL && c != NULL);
   *c = (sonde_calibration){0};
@@ -109,7 +49,49 @@ sonde_status sonde_calibration_load(const char *path, sonde_calibration *c, sond
   size_t count;
   sonde_status status = sonde_bounded_load_text(path, &sonde_limits_xml, &bytes, &count, error);
   if (status) return status;
-  status = read_elements(path, bytes, bytes + count, c, error);
+  // Only elements that begin with these names matter; comments are skipped.
+  const char *stop = bytes + count, *end;
+  for (const char *at = bytes; !status && (at = memchr(at, '<', (size_t)(stop - at))); at = end) {
+    bool comment = strncmp(at, "<!--", 4) == 0;
+    end = comment ? strstr(at, "-->") : memchr(at, '>', (size_t)(stop - at));
+    if (!end) {
+      status = sonde_fail(error, SONDE_FORMAT, "%.200s:%u: the file ends inside an element", path,
+                          sonde_line_of(bytes, at));
+    } else if (strncmp(at, "<Transform", 10) == 0 && is_blank(at[10])) {
+      char matrix[1024];
+      bool full = c->count == SONDE_COUNT_OF(c->transforms);
+      if (full)
+        status = sonde_fail(error, SONDE_FORMAT, "%.200s:%u: expected at most %zu transforms", path,
+                            sonde_line_of(bytes, at), SONDE_COUNT_OF(c->transforms));
+      else if (!attribute(at, end, "From", c->transforms[c->count].from, NAME_MAX_BYTES) ||
+               !attribute(at, end, "To", c->transforms[c->count].to, NAME_MAX_BYTES) ||
+               !attribute(at, end, "Matrix", matrix, sizeof matrix) ||
+               !sonde_text_affine(matrix, &c->transforms[c->count].to_from_from))
+        status = sonde_fail(
+            error, SONDE_FORMAT,
+            "%.200s:%u: Transform: expected From, To and Matrix of 16 finite numbers that "
+            "end in 0 0 0 1",
+            path, sonde_line_of(bytes, at));
+      c->count += !status;
+    } else if (strncmp(at, "<VolumeReconstruction", 21) == 0 && is_blank(at[21])) {
+      char origin[64], size[64];
+      double v[4];
+      if (!attribute(at, end, "ClipRectangleOrigin", origin, sizeof origin) ||
+          !attribute(at, end, "ClipRectangleSize", size, sizeof size))
+        continue;
+      bool good = sonde_text_reals(origin, 2, v) && sonde_text_reals(size, 2, v + 2);
+      for (int k = 0; k < 4 && good; ++k) {
+        good = v[k] >= (k > 1) && v[k] <= SONDE_SIDE_MAX && floor(v[k]) == v[k];
+        if (good) c->clip[k] = (uint32_t)v[k];
+      }
+      c->has_clip = good;
+      if (!good)
+        status = sonde_fail(error, SONDE_FORMAT,
+                            "%.200s:%u: ClipRectangleOrigin and ClipRectangleSize: expected two "
+                            "whole numbers of pixels each",
+                            path, sonde_line_of(bytes, at));
+    }
+  }
   if (!status && c->count == 0)
     status = sonde_fail(error, SONDE_FORMAT,
                         "%.200s: expected at least one <Transform From To Matrix>", path);
@@ -235,26 +217,6 @@ static sonde_status choose_world(const sonde_sequence *s, const sonde_calibratio
   return status;
 }
 
-static sonde_status locate_frame(sonde_sequence *s, const sonde_calibration *c, uint32_t frame,
-                                 graph *g, sonde_located *located, sonde_error *error) {
-  sonde_status status = frame_graph(s, c, frame, false, g, error);
-  if (status) return status;
-  sonde_tracked_frame *f = &s->frames[frame];
-  uint32_t world = reached_name(g, located->world);
-  const char *word = sonde_sequence_get(s, frame, "ImageStatus");
-  if (!word) word = sonde_sequence_get(s, frame, "Status");
-  f->used = world != NAMES_MAX && (!word || strcmp(word, "OK") == 0);
-  if (f->used) {
-    f->world_from_pixel = affine_scale(g->from_image[world], 1e-3);
-    ++located->used;
-    return SONDE_OK;
-  }
-  status = world == NAMES_MAX ? frame_graph(s, c, frame, true, g, error) : SONDE_OK;
-  bool way = world != NAMES_MAX || reached_name(g, located->world) != NAMES_MAX;
-  ++*(way ? &located->invalid : &located->missing);
-  return status;
-}
-
 sonde_status sonde_sequence_locate(sonde_sequence *s, const sonde_calibration *c, const char *world,
                                    sonde_located *out, sonde_error *error) {
   SONDE_ASSERT(s != NULL && s->frames != NULL);
@@ -280,7 +242,19 @@ sonde_status sonde_sequence_locate(sonde_sequence *s, const sonde_calibration *c
   if (!g) return sonde_fail_memory(error);
   sonde_error cause = {0};
   for (uint32_t i = 0; i < s->count && !status; ++i) {
-    status = locate_frame(s, c, i, g, &located, &cause);
+    status = frame_graph(s, c, i, false, g, &cause);
+    if (!status) {
+      sonde_tracked_frame *f = &s->frames[i];
+      uint32_t name = reached_name(g, located.world);
+      const char *word = sonde_sequence_get(s, i, "ImageStatus");
+      if (!word) word = sonde_sequence_get(s, i, "Status");
+      f->used = name != NAMES_MAX && (!word || strcmp(word, "OK") == 0);
+      if (f->used) f->world_from_pixel = affine_scale(g->from_image[name], 1e-3);
+      // A frame without a path of transforms is counted apart from one whose path is INVALID.
+      if (name == NAMES_MAX) status = frame_graph(s, c, i, true, g, &cause);
+      bool path = name != NAMES_MAX || reached_name(g, located.world) != NAMES_MAX;
+      ++*(f->used ? &located.used : path ? &located.invalid : &located.missing);
+    }
     if (status) sonde_fail(error, status, "frame %u: %.300s", i, cause.message);
   }
   sonde_free(g);

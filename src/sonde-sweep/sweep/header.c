@@ -121,9 +121,11 @@ sonde_status sonde_header_rules(const sonde_header *h, const sonde_header_rule *
   return status;
 }
 
-bool sonde_header_among(const char *key, const char *const *names, size_t count) {
-  for (size_t i = 0; i < count; ++i)
-    if (strcmp(names[i], key) == 0) return true;
+bool sonde_header_among(const char *key, const char *names) {
+  SONDE_ASSERT(names[0] == '|');
+  size_t length = strlen(key);
+  for (const char *at = names; at[1]; at += 1 + strcspn(at + 1, "|"))
+    if (strncmp(at + 1, key, length) == 0 && at[1 + length] == '|') return true;
   return false;
 }
 
@@ -175,28 +177,6 @@ void sonde_header_clear(sonde_header *h) {
   *h = (sonde_header){0};
 }
 
-// zlib counts in 32 bits: both ends are fed in pieces. Returns the bytes written.
-static size_t inflate_all(const sonde_header *h, uint8_t *out, size_t expected, int *code) {
-  z_stream z = {0};
-  *code = inflateInit2(&z, h->packing == SONDE_PACKING_GZIP ? GZIP_BITS : ZLIB_BITS);
-  if (*code != Z_OK) return 0;
-  const uint8_t *in = (const uint8_t *)h->bytes + h->data;
-  size_t in_left = h->packed, written = 0;
-  do {
-    size_t give = in_left < UINT_MAX / 2 ? in_left : UINT_MAX / 2;
-    size_t room = expected - written < UINT_MAX / 2 ? expected - written : UINT_MAX / 2;
-    uint8_t beyond; // one byte tells that there are more than expected
-    z.next_in = (Bytef *)(uintptr_t)in, z.avail_in = (uInt)give;
-    z.next_out = room ? out + written : &beyond, z.avail_out = room ? (uInt)room : 1;
-    *code = inflate(&z, Z_NO_FLUSH);
-    size_t made = (room ? room : 1) - z.avail_out;
-    in += give - z.avail_in, in_left -= give - z.avail_in, written += made;
-    if (*code == Z_OK && made == 0 && give == z.avail_in) *code = Z_BUF_ERROR;
-  } while (*code == Z_OK && written <= expected);
-  inflateEnd(&z);
-  return written;
-}
-
 sonde_status sonde_pixels_read(const sonde_header *h, size_t expected, uint8_t **pixels,
                                sonde_error *error) {
   SONDE_ASSERT(h->packed <= h->count - h->data);
@@ -216,7 +196,24 @@ sonde_status sonde_pixels_read(const sonde_header *h, size_t expected, uint8_t *
   sonde_status status = SONDE_OK;
   if (raw && expected) memcpy(out, h->bytes + h->data, expected);
   int code = Z_STREAM_END;
-  size_t written = raw ? expected : inflate_all(h, out, expected, &code);
+  size_t written = raw ? expected : 0, in_left = raw ? 0 : h->packed;
+  // zlib counts in 32 bits: both ends are fed in pieces. One byte more than expected tells that
+  // there are more.
+  z_stream z = {0};
+  const uint8_t *in = (const uint8_t *)h->bytes + h->data;
+  if (!raw) code = inflateInit2(&z, h->packing == SONDE_PACKING_GZIP ? GZIP_BITS : ZLIB_BITS);
+  while (!raw && code == Z_OK && written <= expected) {
+    size_t give = in_left < UINT_MAX / 2 ? in_left : UINT_MAX / 2;
+    size_t room = expected - written < UINT_MAX / 2 ? expected - written : UINT_MAX / 2;
+    uint8_t beyond;
+    z.next_in = (Bytef *)(uintptr_t)in, z.avail_in = (uInt)give;
+    z.next_out = room ? out + written : &beyond, z.avail_out = room ? (uInt)room : 1;
+    code = inflate(&z, Z_NO_FLUSH);
+    size_t made = (room ? room : 1) - z.avail_out;
+    in += give - z.avail_in, in_left -= give - z.avail_in, written += made;
+    if (code == Z_OK && made == 0 && give == z.avail_in) code = Z_BUF_ERROR;
+  }
+  if (!raw) inflateEnd(&z);
   if (code == Z_MEM_ERROR)
     status = sonde_fail_memory(error);
   else if (code == Z_DATA_ERROR || code == Z_NEED_DICT)

@@ -103,31 +103,6 @@ static sonde_status leave_each_out(work *w, sonde_left_out *result, const sonde_
   return SONDE_OK;
 }
 
-static sonde_status make_work(work *w, sonde_error *error) {
-  const sonde_sequence *s = w->sequence;
-  sonde_status status = SONDE_OK;
-  for (int k = 0; k < WAYS && !status; ++k)
-    status = sonde_image_create(s->width, s->height, &w->images[k], error);
-  w->lit = SONDE_NEW(uint8_t, w->pixels);
-  w->known = SONDE_NEW(uint8_t, w->pixels);
-  w->other_known = SONDE_NEW(uint8_t, w->pixels);
-  w->mean = SONDE_NEW(uint8_t, w->pixels);
-  w->used = SONDE_NEW(uint32_t, s->count);
-  if (!status && !(w->lit && w->known && w->other_known && w->mean && w->used))
-    status = sonde_fail_memory(error);
-  for (uint32_t i = 0; i < s->count && !status; ++i)
-    if (s->frames[i].used) w->used[w->count++] = i;
-  if (!status) {
-    // A pixel counts where some frame shows it brighter than black.
-    for (uint32_t i = 0; i < w->sequence->count; ++i) {
-      if (!w->sequence->frames[i].used) continue;
-      const uint8_t *frame = frame_of(w, i);
-      for (size_t p = 0; p < w->pixels; ++p) w->lit[p] |= frame[p] > 0;
-    }
-  }
-  return status ? status : sonde_slice_bank_create(s, &w->bank, error);
-}
-
 sonde_status sonde_sequence_leave_one_out(const sonde_sequence *s,
                                           const sonde_slicer_options *options,
                                           sonde_left_out *result, const sonde_progress *progress,
@@ -137,7 +112,22 @@ sonde_status sonde_sequence_leave_one_out(const sonde_sequence *s,
   work w = {.sequence = s, .pixels = (size_t)s->width * s->height};
   w.options = options ? *options : sonde_slicer_options_default();
   sonde_status status = sonde_slicer_check(s, &w.options, error);
-  if (!status) status = make_work(&w, error);
+  for (int k = 0; k < WAYS && !status; ++k)
+    status = sonde_image_create(s->width, s->height, &w.images[k], error);
+  w.lit = SONDE_NEW(uint8_t, w.pixels);
+  w.known = SONDE_NEW(uint8_t, w.pixels);
+  w.other_known = SONDE_NEW(uint8_t, w.pixels);
+  w.mean = SONDE_NEW(uint8_t, w.pixels);
+  w.used = SONDE_NEW(uint32_t, s->count);
+  if (!status && !(w.lit && w.known && w.other_known && w.mean && w.used))
+    status = sonde_fail_memory(error);
+  // A pixel counts where some frame shows it brighter than black.
+  for (uint32_t i = 0; i < s->count && !status; ++i) {
+    if (!s->frames[i].used) continue;
+    w.used[w.count++] = i;
+    for (size_t p = 0; p < w.pixels; ++p) w.lit[p] |= frame_of(&w, i)[p] > 0;
+  }
+  if (!status) status = sonde_slice_bank_create(s, &w.bank, error);
   if (!status) status = leave_each_out(&w, result, progress, error);
   for (int k = 0; k < WAYS; ++k) sonde_image_clear(&w.images[k]);
   sonde_slice_bank_destroy(w.bank);

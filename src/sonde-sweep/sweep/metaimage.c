@@ -3,35 +3,15 @@
 
 #include <string.h>
 
-static const char *const OWNED[] = {"ObjectType",
-                                    "NDims",
-                                    "AnatomicalOrientation",
-                                    "BinaryData",
-                                    "BinaryDataByteOrderMSB",
-                                    "CenterOfRotation",
-                                    "CompressedData",
-                                    "CompressedDataSize",
-                                    "DimSize",
-                                    "ElementNumberOfChannels",
-                                    "ElementSpacing",
-                                    "ElementSize",
-                                    "ElementType",
-                                    "Kinds",
-                                    "Offset",
-                                    "Origin",
-                                    "Position",
-                                    "Rotation",
-                                    "Orientation",
-                                    "TransformMatrix",
-                                    "ElementByteOrderMSB",
-                                    "UltrasoundImageOrientation",
-                                    "ElementDataFile",
-                                    "CustomFieldNames",
-                                    "CustomFrameFieldNames"};
+// Names that describe the pixels, each between two bars.
+static const char OWNED[] =
+    "|ObjectType|NDims|AnatomicalOrientation|BinaryData|BinaryDataByteOrderMSB"
+    "|CenterOfRotation|CompressedData|CompressedDataSize|DimSize|ElementNumberOfChannels"
+    "|ElementSpacing|ElementSize|ElementType|Kinds|Offset|Origin|Position|Rotation"
+    "|Orientation|TransformMatrix|ElementByteOrderMSB|UltrasoundImageOrientation"
+    "|ElementDataFile|CustomFieldNames|CustomFrameFieldNames|";
 
-bool sonde_metaimage_owns(const char *key) {
-  return sonde_header_among(key, OWNED, SONDE_COUNT_OF(OWNED));
-}
+bool sonde_metaimage_owns(const char *key) { return sonde_header_among(key, OWNED); }
 
 static sonde_status read_lines(sonde_header *h, sonde_error *error) {
   for (;;) {
@@ -58,30 +38,27 @@ static sonde_status read_lines(sonde_header *h, sonde_error *error) {
   }
 }
 
-static sonde_status check_words(const sonde_header *h, sonde_error *error) {
-  static const sonde_header_rule rules[] = {{"ObjectType", false, {"Image"}},
-                                            {"NDims", true, {"3"}},
-                                            {"BinaryData", false, {"True"}},
-                                            {"ElementNumberOfChannels", false, {"1"}},
-                                            {"ElementType", true, {"MET_UCHAR"}},
-                                            {"CompressedData", false, {"True", "False"}},
-                                            {"DimSize", true, {NULL}},
-                                            {"ElementDataFile", true, {"LOCAL"}}};
-  sonde_status status = sonde_header_rules(h, rules, SONDE_COUNT_OF(rules), error);
-  for (size_t i = 0; i < SONDE_COUNT_OF(rules) && !status; ++i) {
-    const sonde_header_entry *e = sonde_header_find(h, rules[i].key);
-    for (const sonde_header_entry *f = e; f && !status && ++f < h->entries + h->entry_count;)
-      if (strcmp(e->key, f->key) == 0)
-        status = sonde_fail(error, SONDE_FORMAT, "%.200s:%u: %s repeats line %u", h->path, f->line,
-                            f->key, e->line);
-  }
-  return status;
-}
-
 sonde_status sonde_metaimage_parse(sonde_header *h, sonde_error *error) {
   double spacing[3] = {1, 1, 1}, offset[3] = {0}, axes[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
   sonde_status status = read_lines(h, error);
-  if (!status) status = check_words(h, error);
+  if (!status) {
+    static const sonde_header_rule rules[] = {{"ObjectType", false, {"Image"}},
+                                              {"NDims", true, {"3"}},
+                                              {"BinaryData", false, {"True"}},
+                                              {"ElementNumberOfChannels", false, {"1"}},
+                                              {"ElementType", true, {"MET_UCHAR"}},
+                                              {"CompressedData", false, {"True", "False"}},
+                                              {"DimSize", true, {NULL}},
+                                              {"ElementDataFile", true, {"LOCAL"}}};
+    status = sonde_header_rules(h, rules, SONDE_COUNT_OF(rules), error);
+    for (size_t i = 0; i < SONDE_COUNT_OF(rules) && !status; ++i) {
+      const sonde_header_entry *e = sonde_header_find(h, rules[i].key);
+      for (const sonde_header_entry *f = e; f && !status && ++f < h->entries + h->entry_count;)
+        if (strcmp(e->key, f->key) == 0)
+          status = sonde_fail(error, SONDE_FORMAT, "%.200s:%u: %s repeats line %u", h->path,
+                              f->line, f->key, e->line);
+    }
+  }
   if (status) return status;
   h->dimension = 3;
   h->list_axis = 2;

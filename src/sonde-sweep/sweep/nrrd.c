@@ -3,51 +3,15 @@
 
 #include <string.h>
 
-static const char *const OWNED[] = {"dimension",
-                                    "type",
-                                    "encoding",
-                                    "endian",
-                                    "kinds",
-                                    "sizes",
-                                    "space",
-                                    "space dimension",
-                                    "space directions",
-                                    "space origin",
-                                    "space units",
-                                    "spacings",
-                                    "labels",
-                                    "centers",
-                                    "centerings",
-                                    "units",
-                                    "thicknesses",
-                                    "axis mins",
-                                    "axis maxs",
-                                    "content",
-                                    "number",
-                                    "measurement frame",
-                                    "data file",
-                                    "datafile",
-                                    "line skip",
-                                    "lineskip",
-                                    "byte skip",
-                                    "byteskip",
-                                    "ultrasound image orientation",
-                                    "DataNodeClassName",
-                                    "axis 0 index type",
-                                    "axis 0 index values",
-                                    "axis 3 index type",
-                                    "axis 3 index values"};
+// Names that describe the pixels, each between two bars.
+static const char OWNED[] =
+    "|dimension|type|encoding|endian|kinds|sizes|space|space dimension|space directions"
+    "|space origin|space units|spacings|labels|centers|centerings|units|thicknesses|axis mins"
+    "|axis maxs|content|number|measurement frame|data file|datafile|line skip|lineskip"
+    "|byte skip|byteskip|ultrasound image orientation|DataNodeClassName|axis 0 index type"
+    "|axis 0 index values|axis 3 index type|axis 3 index values|";
 
-bool sonde_nrrd_owns(const char *key) {
-  return sonde_header_among(key, OWNED, SONDE_COUNT_OF(OWNED));
-}
-
-// The first of ": " and ":=" divides a line.
-static char *divide(char *line, size_t *length) {
-  char *field = strstr(line, ":"), *key = strstr(line, ":=");
-  *length = field && field == key ? 2 : 1;
-  return field;
-}
+bool sonde_nrrd_owns(const char *key) { return sonde_header_among(key, OWNED); }
 
 static sonde_status read_lines(sonde_header *h, sonde_error *error) {
   char *line;
@@ -65,8 +29,9 @@ static sonde_status read_lines(sonde_header *h, sonde_error *error) {
                         h->path, h->lines);
     if (!*line) return SONDE_OK;
     if (*line == '#') continue;
-    size_t length;
-    char *middle = divide(line, &length);
+    // The first of ": " and ":=" divides a line.
+    char *middle = strstr(line, ":"), *key = strstr(line, ":=");
+    size_t length = middle && middle == key ? 2 : 1;
     if (!middle)
       return sonde_fail(error, SONDE_FORMAT,
                         "%.200s:%u: expected 'field: value' or 'key:=value', found '%.60s'",
@@ -75,24 +40,6 @@ static sonde_status read_lines(sonde_header *h, sonde_error *error) {
     status = sonde_header_add(h, line, middle + length, error);
     if (status) return status;
   }
-}
-
-static sonde_status check_words(sonde_header *h, sonde_error *error) {
-  static const sonde_header_rule rules[] = {
-      {"type", true, {"unsigned char", "uchar", "uint8", "uint8_t"}},
-      {"dimension", true, {"3", "4"}},
-      {"encoding", true, {"raw", "gzip", "gz"}},
-      {"sizes", true, {NULL}},
-      {"line skip", false, {"0"}},
-      {"byte skip", false, {"0"}}};
-  sonde_status status = sonde_header_rules(h, rules, SONDE_COUNT_OF(rules), error);
-  const sonde_header_entry *apart = sonde_header_find(h, "data file");
-  if (!apart) apart = sonde_header_find(h, "datafile");
-  if (!status && apart)
-    status = sonde_fail(error, SONDE_FORMAT,
-                        "%.200s:%u: data file: the pixels are expected in the same file", h->path,
-                        apart->line);
-  return status;
 }
 
 // "(a,b,c)"; moves on; false when it is something else.
@@ -134,7 +81,21 @@ static sonde_status read_grid(sonde_header *h, sonde_error *error) {
 
 sonde_status sonde_nrrd_parse(sonde_header *h, sonde_error *error) {
   sonde_status status = read_lines(h, error);
-  if (!status) status = check_words(h, error);
+  if (status) return status;
+  static const sonde_header_rule rules[] = {
+      {"type", true, {"unsigned char", "uchar", "uint8", "uint8_t"}},
+      {"dimension", true, {"3", "4"}},
+      {"encoding", true, {"raw", "gzip", "gz"}},
+      {"sizes", true, {NULL}},
+      {"line skip", false, {"0"}},
+      {"byte skip", false, {"0"}}};
+  status = sonde_header_rules(h, rules, SONDE_COUNT_OF(rules), error);
+  const sonde_header_entry *apart = sonde_header_find(h, "data file");
+  if (!apart) apart = sonde_header_find(h, "datafile");
+  if (!status && apart)
+    status = sonde_fail(error, SONDE_FORMAT,
+                        "%.200s:%u: data file: the pixels are expected in the same file", h->path,
+                        apart->line);
   if (status) return status;
   h->dimension = (uint32_t)(sonde_header_find(h, "dimension")->value[0] - '0');
   h->packed = h->count - h->data;

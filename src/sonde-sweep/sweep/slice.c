@@ -63,64 +63,39 @@ sonde_status sonde_slicer_check(const sonde_sequence *s, const sonde_slicer_opti
   return SONDE_OK;
 }
 
-static bool make_strips(slice_strips *strips, size_t count) {
-  size_t lanes = count + SLICE_STRIPS;
-  double *wide = SONDE_NEW(double, (3 * SLICE_FORMS + 2) * lanes);
-  float *narrow = SONDE_NEW(float, 2 * SLICE_FORMS * lanes);
-  int32_t *places = SONDE_NEW(int32_t, 2 * lanes);
-  strips->forms[0][0] = wide, strips->steps[0][0] = narrow, strips->place[0] = places;
-  if (!wide || !narrow || !places) return false;
-  for (size_t f = 0; f < SLICE_FORMS; ++f) {
-    for (size_t k = 0; k < 3; ++k) strips->forms[f][k] = wide + (3 * f + k) * lanes;
-    for (size_t k = 0; k < 2; ++k) strips->steps[f][k] = narrow + (2 * f + k) * lanes;
-  }
-  for (size_t k = 0; k < 2; ++k) {
-    strips->place[k] = places + k * lanes;
-    strips->lean[k] = wide + (3 * SLICE_FORMS + k) * lanes;
-  }
-  return true;
-}
-
-static bool make_room(slice_room *room, uint32_t count) {
-  room->candidates = SONDE_NEW(slice_candidate, count);
-  room->block = SONDE_NEW(const slice_plane *, count);
-  room->tile = SONDE_NEW(const slice_plane *, count);
-  double *numbers = SONDE_NEW(double, 5 * (size_t)count);
-  for (uint32_t k = 0; k < 3; ++k) room->spans.form[k] = numbers ? numbers + k * count : NULL;
-  room->spans.low = numbers ? numbers + 3 * (size_t)count : NULL;
-  room->spans.high = numbers ? numbers + 4 * (size_t)count : NULL;
-  bool strips = make_strips(&room->strips, count);
-  return room->candidates && room->block && room->tile && strips && numbers;
-}
-
-static bool make_rooms(sonde_slicer *slicer, uint32_t count) {
+// Scratch of the workers; false without memory.
+static bool make_scratch(sonde_slicer *slicer, uint32_t count) {
+  const size_t padded = count + (size_t)SLICE_STRIPS;
   slicer->every = SONDE_NEW(const slice_plane *, count);
   slicer->forms = SONDE_NEW(double, 3 * (size_t)count);
   slicer->rooms = SONDE_NEW(slice_room, slicer->workers);
   if (!slicer->every || !slicer->forms || !slicer->rooms) return false;
   for (uint32_t i = 0; i < count; ++i) slicer->every[i] = &slicer->planes[i];
-  bool enough = true;
-  for (uint32_t k = 0; k < slicer->workers && enough; ++k)
-    enough = make_room(&slicer->rooms[k], count);
-  return enough;
-}
-
-// Used part of a frame, line by line down its columns.
-static void fill_lines(const sonde_slicer *slicer, const slice_plane *plane) {
-  uint32_t wide = (uint32_t)(slicer->high[0] - slicer->low[0]) + 1;
-  uint32_t high = (uint32_t)(slicer->high[1] - slicer->low[1]) + 1;
-  const uint8_t *from =
-      plane->pixels + (size_t)slicer->low[1] * slicer->width + (size_t)slicer->low[0];
-  uint8_t *line = slicer->layout.lines + plane->place;
-  for (uint32_t u = 0; u < wide - 1; u += SLICE_LINE_WIDE - 1)
-    for (uint32_t v = 0; v < high - 1; v += SLICE_LINE_HIGH - 1, line += SLICE_LINE)
-      for (uint32_t j = 0; j < SLICE_LINE_HIGH && v + j < high; ++j) {
-        const uint8_t *row = from + (size_t)(v + j) * slicer->width + u;
-        if (wide - u >= SLICE_LINE_WIDE)
-          memcpy(line + j * SLICE_LINE_WIDE, row, SLICE_LINE_WIDE);
-        else
-          memcpy(line + j * SLICE_LINE_WIDE, row, wide - u);
-      }
+  for (slice_room *room = slicer->rooms; room < slicer->rooms + slicer->workers; ++room) {
+    room->candidates = SONDE_NEW(slice_candidate, count);
+    room->block = SONDE_NEW(const slice_plane *, count);
+    room->tile = SONDE_NEW(const slice_plane *, count);
+    double *numbers = room->spans.form[0] = SONDE_NEW(double, 5 * (size_t)count);
+    // The strips' numbers, one array for each type of them.
+    slice_strips *strips = &room->strips;
+    double *wide = strips->forms[0][0] = SONDE_NEW(double, (3 * SLICE_FORMS + 2) * padded);
+    float *narrow = strips->steps[0][0] = SONDE_NEW(float, 2 * SLICE_FORMS * padded);
+    int32_t *places = strips->place[0] = SONDE_NEW(int32_t, 2 * padded);
+    if (!room->candidates || !room->block || !room->tile || !numbers || !wide || !narrow || !places)
+      return false;
+    for (uint32_t k = 0; k < 3; ++k) room->spans.form[k] = numbers + k * count;
+    room->spans.low = numbers + 3 * (size_t)count;
+    room->spans.high = numbers + 4 * (size_t)count;
+    for (size_t f = 0; f < SLICE_FORMS; ++f) {
+      for (size_t k = 0; k < 3; ++k) strips->forms[f][k] = wide + (3 * f + k) * padded;
+      for (size_t k = 0; k < 2; ++k) strips->steps[f][k] = narrow + (2 * f + k) * padded;
+    }
+    for (size_t k = 0; k < 2; ++k) {
+      strips->place[k] = places + k * padded;
+      strips->lean[k] = wide + (3 * SLICE_FORMS + k) * padded;
+    }
+  }
+  return true;
 }
 
 // Where the strips read the frames: in lines for many pictures, else where they are. None when the
@@ -146,7 +121,16 @@ static sonde_status lay_out(const sonde_sequence *s, sonde_slicer *slicer, sonde
   layout->row = SLICE_LINE_WIDE;
   layout->column_line = (int32_t)(rows * SLICE_LINE) - (SLICE_LINE_WIDE - 1);
   layout->row_line = SLICE_LINE - (SLICE_LINE_HIGH - 1) * SLICE_LINE_WIDE;
-  for (uint32_t i = 0; i < slicer->count; ++i) fill_lines(slicer, &slicer->planes[i]);
+  // The used part of each frame, line by line down its columns.
+  const uint32_t wide = s->clip[2], high = s->clip[3];
+  for (const slice_plane *p = slicer->planes; p < slicer->planes + slicer->count; ++p) {
+    uint8_t *line = layout->lines + p->place;
+    for (uint32_t u = 0; u < wide - 1; u += SLICE_LINE_WIDE - 1)
+      for (uint32_t v = 0; v < high - 1; v += SLICE_LINE_HIGH - 1, line += SLICE_LINE)
+        for (uint32_t j = 0; j < SLICE_LINE_HIGH && v + j < high; ++j)
+          memcpy(line + j * SLICE_LINE_WIDE, p->pixels + first + (size_t)(v + j) * s->width + u,
+                 wide - u < SLICE_LINE_WIDE ? wide - u : SLICE_LINE_WIDE);
+  }
   return SONDE_OK;
 }
 
@@ -174,7 +158,7 @@ sonde_status sonde_slicer_create_with(const sonde_sequence *s, const sonde_slice
   }
   slicer->planes = SONDE_NEW(slice_plane, s->count);
   slicer->reached = SONDE_NEW(uint64_t, slicer->workers);
-  bool enough = slicer->planes && slicer->reached && make_rooms(slicer, s->count);
+  bool enough = slicer->planes && slicer->reached && make_scratch(slicer, s->count);
   if (!enough) status = sonde_fail_memory(error);
   slicer->bank = bank;
   slicer->owns_bank = !bank && o.method == SONDE_SLICE_KRIGE;

@@ -34,6 +34,19 @@ typedef struct slice_bank {
   slice_likeness *pairs;  // [used][SLICE_LAGS + 1]
 } slice_bank;
 
+// A frame at place (u, v) of a level, bilinear.
+static inline float slice_level_at(const slice_bank *bank, const slice_pyramid *p, int k, float u,
+                                   float v) {
+  uint32_t i = (uint32_t)u, j = (uint32_t)v;
+  uint32_t right = i + 1 < bank->wide[k];
+  const uint8_t *q = p->level[k] + j * bank->stride[k] + i;
+  const uint8_t *r = q + (j + 1 < bank->high[k] ? bank->stride[k] : 0);
+  float a = u - (float)i, b = v - (float)j;
+  float top = (float)q[0] + a * (float)(q[right] - q[0]);
+  float low = (float)r[0] + a * (float)(r[right] - r[0]);
+  return top + b * (low - top);
+}
+
 // r(d) = exp(-(d/length)^power)
 typedef struct slice_decay {
   double variance, length_m, power;

@@ -37,33 +37,6 @@ static bool plane_covers(const sonde_slicer *s, const rectangle *r, const slice_
   return u.low >= s->low[0] && u.high <= s->high[0] && v.low >= s->low[1] && v.high <= s->high[1];
 }
 
-// Far bounds of the nearest planes that cover a rectangle: all d >= 0, and all d < 0. The nearest
-// planes usually do.
-static bounds find_hiding(const sonde_slicer *s, const rectangle *r, const slice_plane *const *from,
-                          uint32_t count, const slice_spans *spans) {
-  const double *low = spans->low, *high = spans->high, none = (double)INFINITY;
-  bounds best = {-none, none};
-  int64_t front = -1, back = -1;
-  for (uint32_t i = 0; i < count; ++i) {
-    if (low[i] >= 0 && high[i] < best.high) best.high = high[i], back = i;
-    if (high[i] < 0 && low[i] > best.low) best.low = low[i], front = i;
-  }
-  bool hidden = back < 0 || plane_covers(s, r, from[back]);
-  bool covered = front < 0 || plane_covers(s, r, from[front]);
-  if (!hidden) best.high = none;
-  if (!covered) best.low = -none;
-  for (uint32_t i = 0; i < count && !(hidden && covered); ++i) {
-    bool behind = !hidden && low[i] >= 0 && high[i] < best.high;
-    bool before = !covered && high[i] < 0 && low[i] > best.low;
-    if ((!behind && !before) || !plane_covers(s, r, from[i])) continue;
-    if (behind)
-      best.high = high[i];
-    else
-      best.low = low[i];
-  }
-  return best;
-}
-
 // Planes further away are joined with none and seen from nowhere.
 static inline double reach_of(const sonde_slicer *s) {
   return s->options.gap_m > s->options.reach_m ? s->options.gap_m : s->options.reach_m;
@@ -74,13 +47,34 @@ static inline double reach_of(const sonde_slicer *s) {
 static uint32_t gather_planes(const sonde_slicer *s, const rectangle *r,
                               const slice_plane *const *from, uint32_t count,
                               const slice_spans *spans, const slice_plane **out) {
-  bounds hiding = find_hiding(s, r, from, count, spans);
+  // Far bounds of the nearest planes that cover a rectangle: all d >= 0, and all d < 0. The nearest
+  // planes usually do.
+  const double *low = spans->low, *high = spans->high, none = (double)INFINITY;
+  bounds hiding = {-none, none};
+  int64_t front = -1, back = -1;
+  for (uint32_t i = 0; i < count; ++i) {
+    if (low[i] >= 0 && high[i] < hiding.high) hiding.high = high[i], back = i;
+    if (high[i] < 0 && low[i] > hiding.low) hiding.low = low[i], front = i;
+  }
+  bool hidden = back < 0 || plane_covers(s, r, from[back]);
+  bool covered = front < 0 || plane_covers(s, r, from[front]);
+  if (!hidden) hiding.high = none;
+  if (!covered) hiding.low = -none;
+  for (uint32_t i = 0; i < count && !(hidden && covered); ++i) {
+    bool behind = !hidden && low[i] >= 0 && high[i] < hiding.high;
+    bool before = !covered && high[i] < 0 && low[i] > hiding.low;
+    if ((!behind && !before) || !plane_covers(s, r, from[i])) continue;
+    if (behind)
+      hiding.high = high[i];
+    else
+      hiding.low = low[i];
+  }
   double reach = reach_of(s);
   uint32_t found = 0;
   for (uint32_t i = 0; i < count; ++i) {
-    double low = spans->low[i], high = spans->high[i];
-    if (!((high >= 0 && low <= hiding.high) || (low < 0 && high >= hiding.low))) continue;
-    if (low > reach || high < -reach) continue;
+    if (!((high[i] >= 0 && low[i] <= hiding.high) || (low[i] < 0 && high[i] >= hiding.low)))
+      continue;
+    if (low[i] > reach || high[i] < -reach) continue;
     const slice_forms *f = &from[i]->forms;
     bounds u = span(f->u, r), v = span(f->v, r);
     if (u.high >= s->low[0] - SLACK && u.low <= s->high[0] + SLACK && v.high >= s->low[1] - SLACK &&
@@ -121,21 +115,6 @@ typedef struct outline {
   float most[2][3], least[2][3];
 } outline;
 
-static void outline_of(const slice_candidate *room, uint32_t count, outline *o) {
-  for (int i = 0; i < 3; ++i) {
-    o->most[0][i] = o->least[0][i] = room[0].u[i];
-    o->most[1][i] = o->least[1][i] = room[0].v[i];
-  }
-  for (uint32_t k = 1; k < count; ++k)
-    for (int i = 0; i < 3; ++i) {
-      float u = room[k].u[i], v = room[k].v[i];
-      o->most[0][i] = u > o->most[0][i] ? u : o->most[0][i];
-      o->least[0][i] = u < o->least[0][i] ? u : o->least[0][i];
-      o->most[1][i] = v > o->most[1][i] ? v : o->most[1][i];
-      o->least[1][i] = v < o->least[1][i] ? v : o->least[1][i];
-    }
-}
-
 // No candidate reaches any of `wide` x `high` pixels from (x, y).
 static inline bool is_outside(const sonde_slicer *s, const outline *o, float x, float y, float wide,
                               float high) {
@@ -149,10 +128,21 @@ static inline bool is_outside(const sonde_slicer *s, const outline *o, float x, 
   return false;
 }
 
-static inline bool has_foot(const sonde_slicer *s, const slice_candidate *c, float x, float y) {
-  float at[2] = {c->u[0] + y * c->u[2] + x * c->u[1], c->v[0] + y * c->v[2] + x * c->v[1]};
+static inline bool is_inside(const sonde_slicer *s, const float at[2]) {
   return at[0] >= s->low[0] - SLACK && at[0] <= s->high[0] + SLACK && at[1] >= s->low[1] - SLACK &&
          at[1] <= s->high[1] + SLACK;
+}
+
+// Pixel of a frame at (x, y) of the tile.
+static inline void foot(const slice_candidate *c, float x, float y, float at[2]) {
+  at[0] = c->u[0] + y * c->u[2] + x * c->u[1];
+  at[1] = c->v[0] + y * c->v[2] + x * c->v[1];
+}
+
+static inline bool has_foot(const sonde_slicer *s, const slice_candidate *c, float x, float y) {
+  float at[2];
+  foot(c, x, y, at);
+  return is_inside(s, at);
 }
 
 static inline float distance_at(const slice_candidate *c, float x, float y) {
@@ -214,23 +204,19 @@ static void blend(const sonde_slicer *s, const slice_candidate *room, int32_t up
   }
 }
 
-// Pixel (i, j) of the frame; with lines, where the strips have read already.
-static inline const uint8_t *pixel_of(const sonde_slicer *s, const slice_plane *plane, uint32_t i,
-                                      uint32_t j) {
-  const slice_layout *l = &s->layout;
-  if (!l->lines) return plane->pixels + (size_t)j * s->width + i;
-  int32_t x = (int32_t)i - (int32_t)s->low[0], y = (int32_t)j - (int32_t)s->low[1];
-  return l->lines + plane->place + x + y * l->row + x / (SLICE_LINE_WIDE - 1) * l->column_line +
-         y / (SLICE_LINE_HIGH - 1) * l->row_line;
-}
-
 static inline float sample(const sonde_slicer *s, const slice_plane *plane, float u, float v) {
   u = bound(u, s->low[0], s->high[0]);
   v = bound(v, s->low[1], s->high[1]);
   uint32_t iu = (uint32_t)bound(u, s->low[0], s->high[0] - 1);
   uint32_t iv = (uint32_t)bound(v, s->low[1], s->high[1] - 1);
   float a = u - (float)iu, b = v - (float)iv;
-  const uint8_t *p = pixel_of(s, plane, iu, iv);
+  const slice_layout *l = &s->layout;
+  const uint8_t *p = plane->pixels + (size_t)iv * s->width + iu;
+  if (l->lines) { // where the strips have read already
+    int32_t x = (int32_t)iu - (int32_t)s->low[0], y = (int32_t)iv - (int32_t)s->low[1];
+    p = l->lines + plane->place + x + y * l->row + x / (SLICE_LINE_WIDE - 1) * l->column_line +
+        y / (SLICE_LINE_HIGH - 1) * l->row_line;
+  }
   const uint8_t *q = p + s->layout.row;
   float top = (float)p[0] + a * (float)(p[1] - p[0]), low = (float)q[0] + a * (float)(q[1] - q[0]);
   return top + b * (low - top);
@@ -238,19 +224,9 @@ static inline float sample(const sonde_slicer *s, const slice_plane *plane, floa
 
 // A frame at pixel (x, y) of the tile, straight below it.
 static inline float sample_foot(const sonde_slicer *s, const slice_candidate *c, float x, float y) {
-  return sample(s, c->plane, c->u[0] + y * c->u[2] + x * c->u[1],
-                c->v[0] + y * c->v[2] + x * c->v[1]);
-}
-
-static inline bool is_inside(const sonde_slicer *s, const float at[2]) {
-  return at[0] >= s->low[0] - SLACK && at[0] <= s->high[0] + SLACK && at[1] >= s->low[1] - SLACK &&
-         at[1] <= s->high[1] + SLACK;
-}
-
-// Pixel of a frame at (x, y) of the tile.
-static inline void foot(const slice_candidate *c, float x, float y, float at[2]) {
-  at[0] = c->u[0] + y * c->u[2] + x * c->u[1];
-  at[1] = c->v[0] + y * c->v[2] + x * c->v[1];
+  float at[2];
+  foot(c, x, y, at);
+  return sample(s, c->plane, at[0], at[1]);
 }
 
 // Moves a foot to where the way of pixel (u, v) meets the frame.
@@ -260,35 +236,6 @@ static inline void follow(float way[3][3], float u, float v, float d, float at[2
   at[1] -= t * (way[1][0] + u * way[1][1] + v * way[1][2]);
 }
 
-// Where a line through the pixel meets both frames; false when it passes one by.
-static inline bool meet(const sonde_slicer *s, const slice_candidate *room, pair *p, float x,
-                        float y, float a, float b, float m[2], float n[2]) {
-  const slice_candidate *up = &room[p->up], *down = &room[p->down];
-  foot(up, x, y, m);
-  foot(down, x, y, n);
-  if (p->along_sweep) {
-    float u = m[0], v = m[1], start[2] = {n[0], n[1]}; // one line for both
-    follow(p->up_way, u, v, a, m);
-    follow(p->down_way, u, v, -b, n);
-    if (is_inside(s, m) && is_inside(s, n)) return true;
-    m[0] = u, m[1] = v, n[0] = start[0], n[1] = start[1];
-  }
-  for (int k = 0; k < 2; ++k) m[k] -= a * p->up_shift[k], n[k] += b * p->down_shift[k];
-  return is_inside(s, m) && is_inside(s, n);
-}
-
-static inline float sample_level(const slice_bank *bank, const uint8_t *level, int k, float u,
-                                 float v) {
-  uint32_t i = (uint32_t)u, j = (uint32_t)v;
-  uint32_t right = i + 1 < bank->wide[k];
-  const uint8_t *p = level + j * bank->stride[k] + i;
-  const uint8_t *q = p + (j + 1 < bank->high[k] ? bank->stride[k] : 0);
-  float a = u - (float)i, b = v - (float)j;
-  float top = (float)p[0] + a * (float)(p[right] - p[0]);
-  float low = (float)q[0] + a * (float)(q[right] - q[0]);
-  return top + b * (low - top);
-}
-
 // All levels of a frame, weighted.
 static inline float sample_levels(const sonde_slicer *s, const slice_plane *plane,
                                   const float at[2], const float *w0, const float *w1, float t) {
@@ -296,7 +243,7 @@ static inline float sample_levels(const sonde_slicer *s, const slice_plane *plan
   float v = bound(at[1], s->low[1], s->high[1]) - s->low[1], sum = 0, scale = 1;
   for (int k = 0; k < SLICE_LEVELS; ++k, scale *= 0.5f) {
     float w = w0[k] + t * (w1[k] - w0[k]);
-    sum += w * sample_level(s->bank, plane->pyramid->level[k], k, u * scale, v * scale);
+    sum += w * slice_level_at(s->bank, plane->pyramid, k, u * scale, v * scale);
   }
   return sum;
 }
@@ -324,13 +271,27 @@ static float krige(const sonde_slicer *s, const slice_plane *lower, const float 
   return bound(value, 0, 255);
 }
 
-// Mean of both frames, each weighted by the distance a or b of the other, or their kriging;
-// negative when the line passes a frame by.
+// Mean of both frames where a line through the pixel meets them, each weighted by the distance a or
+// b of the other, or their kriging; negative when the line passes a frame by.
 static inline float between(const sonde_slicer *s, const slice_candidate *room, pair *p, float x,
                             float y, float a, float b) {
   const slice_plane *up = room[p->up].plane, *down = room[p->down].plane;
-  float m[2], n[2];
-  if (!meet(s, room, p, x, y, a, b, m, n)) return -1;
+  float foot_up[2], foot_down[2], m[2], n[2];
+  foot(&room[p->up], x, y, foot_up);
+  foot(&room[p->down], x, y, foot_down);
+  memcpy(m, foot_up, sizeof m);
+  memcpy(n, foot_down, sizeof n);
+  if (p->along_sweep) { // one line for both
+    follow(p->up_way, foot_up[0], foot_up[1], a, m);
+    follow(p->down_way, foot_up[0], foot_up[1], -b, n);
+  }
+  if (!p->along_sweep || !is_inside(s, m) || !is_inside(s, n)) {
+    for (int k = 0; k < 2; ++k) {
+      m[k] = foot_up[k] - a * p->up_shift[k];
+      n[k] = foot_down[k] + b * p->down_shift[k];
+    }
+    if (!is_inside(s, m) || !is_inside(s, n)) return -1;
+  }
   float t = a / (a + b);
   if (s->options.method == SONDE_SLICE_KRIGE)
     return up < down ? krige(s, up, m, down, n, t, a + b) : krige(s, down, n, up, m, 1 - t, a + b);
@@ -480,47 +441,6 @@ static uint64_t fill_tile(const sonde_slicer *s, const rectangle *r, const slice
   return reached;
 }
 
-// One pixel that no strip speaks for; the candidates are sorted.
-static float search_pixel(const sonde_slicer *s, const slice_candidate *room, uint32_t count,
-                          uint32_t x, float y, const outline *o, pair pairs[PAIRS]) {
-  row_pick pick;
-  if (is_outside(s, o, (float)x, y, 0, 0)) return -1;
-  nearest_of_sorted(s, room, count, x, y, &pick);
-  bool both = pick.up[x] >= 0 && pick.down[x] >= 0;
-  pair *p = both ? find_pair(s, room, pick.up[x], pick.down[x], pairs) : pairs;
-  return value_at(s, room, &pick, (int)x, y, p);
-}
-
-// A tile in which strips speak for some pixels.
-static uint64_t fill_edge(const sonde_slicer *s, const rectangle *r, const slice_candidate *room,
-                          uint32_t count, const outline *o, const strip_work *strips) {
-  uint64_t reached = 0;
-  pair pairs[PAIRS];
-  for (int k = 0; k < PAIRS; ++k) pairs[k].up = -1;
-  for (uint32_t y = 0; y < r->high; ++y) {
-    uint8_t grey[SLICE_TILE];
-    const int32_t *met = strips->met + y * SLICE_TILE;
-    int32_t every = -1;
-    mix_row_of(strips, y * SLICE_TILE, grey);
-    for (int x = 0; x < SLICE_TILE; ++x) every &= met[x];
-    size_t at = (size_t)(r->row + y) * s->image->width + r->column;
-    if (every) reached += put_row(s, at, r->wide, grey, true);
-    for (uint32_t x = 0; x < r->wide && !every; ++x) {
-      float value = met[x] ? (float)grey[x] : search_pixel(s, room, count, x, (float)y, o, pairs);
-      put_pixel(s, at + x, value);
-      reached += value >= 0;
-    }
-  }
-  return reached;
-}
-
-// A pixel that is the same in all frames.
-static inline bool is_still(const sonde_slicer *s, const float at[2]) {
-  uint32_t x = (uint32_t)(bound(at[0], s->low[0], s->high[0]) - s->low[0] + 0.5f);
-  uint32_t y = (uint32_t)(bound(at[1], s->low[1], s->high[1]) - s->low[1] + 0.5f);
-  return s->model.along_sweep && !s->bank->shares[0][(size_t)y * s->bank->wide[0] + x];
-}
-
 static uint64_t slice_sum_all(const slice_sum *sum) {
   const sonde_slicer *s = sum->slicer;
   uint64_t reached = 0;
@@ -534,7 +454,10 @@ static uint64_t slice_sum_all(const slice_sum *sum) {
           at[i] =
               sum->maps[k][i][0] * (float)x + sum->maps[k][i][1] * (float)y + sum->maps[k][i][2];
         met += is_inside(s, at);
-        if (met && is_still(s, at)) { // the first frame that is there speaks for all
+        // Of a pixel that is the same in all frames the first frame that is there speaks for all.
+        uint32_t i = (uint32_t)(bound(at[0], s->low[0], s->high[0]) - s->low[0] + 0.5f);
+        uint32_t j = (uint32_t)(bound(at[1], s->low[1], s->high[1]) - s->low[1] + 0.5f);
+        if (met && s->model.along_sweep && !s->bank->shares[0][(size_t)j * s->bank->wide[0] + i]) {
           value = sample(s, sum->planes[k], at[0], at[1]);
           met = sum->n;
           break;
@@ -557,15 +480,6 @@ static void start_candidate(const slice_plane *plane, const rectangle *tile, sli
   start_at(plane->forms.d, tile, c->d);
 }
 
-// Without strips.
-static uint64_t search_tile(const sonde_slicer *s, const rectangle *tile, uint32_t all,
-                            slice_room *room) {
-  uint32_t count = gather_planes(s, tile, room->block, all, &room->spans, room->tile);
-  if (!count) return fill_evenly(s, tile, NULL);
-  for (uint32_t i = 0; i < count; ++i) start_candidate(room->tile[i], tile, &room->candidates[i]);
-  return fill_tile(s, tile, room->candidates, count);
-}
-
 // Where strips do not speak for every pixel: all planes of the block within reach.
 static uint64_t search_edge(const sonde_slicer *s, const rectangle *tile, uint32_t all,
                             slice_room *room, const strip_table *table) {
@@ -577,11 +491,47 @@ static uint64_t search_edge(const sonde_slicer *s, const rectangle *tile, uint32
   SONDE_ASSERT(count > 0);
   outline o;
   strip_work work;
-  outline_of(room->candidates, count, &o);
+  for (int i = 0; i < 3; ++i) {
+    o.most[0][i] = o.least[0][i] = room->candidates[0].u[i];
+    o.most[1][i] = o.least[1][i] = room->candidates[0].v[i];
+  }
+  for (uint32_t k = 1; k < count; ++k)
+    for (int i = 0; i < 3; ++i) {
+      float u = room->candidates[k].u[i], v = room->candidates[k].v[i];
+      o.most[0][i] = u > o.most[0][i] ? u : o.most[0][i];
+      o.least[0][i] = u < o.least[0][i] ? u : o.least[0][i];
+      o.most[1][i] = v > o.most[1][i] ? v : o.most[1][i];
+      o.least[1][i] = v < o.least[1][i] ? v : o.least[1][i];
+    }
   if (is_outside(s, &o, 0, 0, (float)tile->wide, (float)tile->high))
     return fill_evenly(s, tile, NULL);
   place_tile(s, table, tile->high, &work);
-  return fill_edge(s, tile, room->candidates, count, &o, &work);
+  uint64_t reached = 0;
+  pair pairs[PAIRS];
+  for (int k = 0; k < PAIRS; ++k) pairs[k].up = -1;
+  for (uint32_t y = 0; y < tile->high; ++y) {
+    uint8_t grey[SLICE_TILE];
+    const int32_t *met = work.met + y * SLICE_TILE;
+    int32_t every = -1;
+    mix_row_of(&work, y * SLICE_TILE, grey);
+    for (int x = 0; x < SLICE_TILE; ++x) every &= met[x];
+    size_t at = (size_t)(tile->row + y) * s->image->width + tile->column;
+    if (every) reached += put_row(s, at, tile->wide, grey, true);
+    for (uint32_t x = 0; x < tile->wide && !every; ++x) {
+      float value = met[x] ? (float)grey[x] : -1;
+      if (!met[x] && !is_outside(s, &o, (float)x, (float)y, 0, 0)) {
+        // No strip speaks for this pixel: search among the candidates, which are sorted.
+        row_pick pick;
+        nearest_of_sorted(s, room->candidates, count, x, (float)y, &pick);
+        bool both = pick.up[x] >= 0 && pick.down[x] >= 0;
+        pair *p = both ? find_pair(s, room->candidates, pick.up[x], pick.down[x], pairs) : pairs;
+        value = value_at(s, room->candidates, &pick, (int)x, (float)y, p);
+      }
+      put_pixel(s, at + x, value);
+      reached += value >= 0;
+    }
+  }
+  return reached;
 }
 
 // Planes of the block first, then of each tile in it.
@@ -605,11 +555,15 @@ static uint64_t slice_block(const sonde_slicer *s, uint32_t column, uint32_t row
       rectangle tile = {column + x, row + y, at_most(SLICE_TILE, block.wide - x),
                         at_most(SLICE_TILE, block.high - y)};
       span_all(&room->spans, all, &tile);
-      if (!fill_table(s, room, &tile, &table))
-        reached += search_tile(s, &tile, all, room);
-      else if (!table.whole)
+      if (!fill_table(s, room, &tile, &table)) {
+        uint32_t count = gather_planes(s, &tile, room->block, all, &room->spans, room->tile);
+        for (uint32_t i = 0; i < count; ++i)
+          start_candidate(room->tile[i], &tile, &room->candidates[i]);
+        reached +=
+            count ? fill_tile(s, &tile, room->candidates, count) : fill_evenly(s, &tile, NULL);
+      } else if (!table.whole) {
         reached += search_edge(s, &tile, all, room, &table);
-      else {
+      } else {
         strip_work work;
         place_tile(s, &table, tile.high, &work);
         reached += fill_evenly(s, &tile, &work);

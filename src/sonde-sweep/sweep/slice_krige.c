@@ -50,42 +50,14 @@ static void halve(const slice_bank *bank, int k, const uint8_t *from, uint8_t *t
     }
 }
 
-// 255 for a pixel that changes; of the levels above, the mean below.
-static void halve_shares(const slice_bank *bank, int k, uint8_t *to) {
-  const uint8_t *from = bank->shares[k];
-  uint32_t wide = bank->wide[k], high = bank->high[k], w2 = bank->wide[k + 1];
-  for (uint32_t y = 0; y < bank->high[k + 1]; ++y)
-    for (uint32_t x = 0; x < w2; ++x) {
-      uint32_t sum = 0;
-      for (int j = 0; j < 5; ++j)
-        for (int i = 0; i < 5; ++i)
-          sum += BINOMIAL[i] * BINOMIAL[j] *
-                 from[(size_t)bounded((int)(2 * y) + j - 2, high) * wide +
-                      bounded((int)(2 * x) + i - 2, wide)];
-      to[(size_t)y * w2 + x] = (uint8_t)((sum + 255) >> 8); // what has any keeps some
-    }
-}
-
-static inline float level_at(const slice_bank *bank, const slice_pyramid *p, int k, float u,
-                             float v) {
-  float scale = 1.0f / (float)(1 << k), x = u * scale, y = v * scale;
-  uint32_t i = (uint32_t)x, j = (uint32_t)y;
-  uint32_t right = i + 1 < bank->wide[k], below = j + 1 < bank->high[k];
-  const uint8_t *q = p->level[k] + j * bank->stride[k] + i;
-  const uint8_t *r = q + below * bank->stride[k];
-  float a = x - (float)i, b = y - (float)j;
-  float top = (float)q[0] + a * (float)(q[right] - q[0]);
-  float low = (float)r[0] + a * (float)(r[right] - r[0]);
-  return top + b * (low - top);
-}
-
 // (u, v) counts from the corner of the used part.
 static void scales_at(const slice_bank *bank, uint32_t frame, float u, float v,
                       float scales[SLICE_LEVELS]) {
   const slice_pyramid *p = &bank->pyramids[frame];
-  float finer = level_at(bank, p, 0, u, v);
+  float finer = slice_level_at(bank, p, 0, u, v);
   for (int k = 1; k < SLICE_LEVELS; ++k) {
-    float level = level_at(bank, p, k, u, v);
+    float scale = 1.0f / (float)(1 << k);
+    float level = slice_level_at(bank, p, k, u * scale, v * scale);
     scales[k - 1] = finer - level;
     finer = level;
   }
@@ -121,13 +93,6 @@ static bool foot_map(const sonde_sequence *s, uint32_t a, uint32_t b, float map[
   return true;
 }
 
-// Inside of the frames and not a pixel that stands still.
-static inline bool changes(const slice_bank *bank, float u, float v) {
-  if (!(u >= 0 && v >= 0 && u <= (float)(bank->wide[0] - 1) && v <= (float)(bank->high[0] - 1)))
-    return false;
-  return bank->shares[0][(size_t)(v + 0.5f) * bank->wide[0] + (size_t)(u + 0.5f)] != 0;
-}
-
 // Mean products of frames a and b; of b at the same pixel or at the foot.
 static void compare(const slice_bank *bank, slice_likeness *pair) {
   const sonde_sequence *s = bank->sequence;
@@ -142,7 +107,8 @@ static void compare(const slice_bank *bank, slice_likeness *pair) {
     float u = (float)(i % columns * step + step / 2);
     float v = (float)(i / columns * step + step / 2);
     float x = u + (float)s->clip[0], y = v + (float)s->clip[1];
-    if (!changes(bank, u, v)) continue;
+    // A pixel that never changes does not count.
+    if (!bank->shares[0][(size_t)(v + 0.5f) * bank->wide[0] + (size_t)(u + 0.5f)]) continue;
     scales_at(bank, pair->a, u, v, own);
     for (int way = 0; way < 2; ++way) {
       float p = u, q = v;
@@ -161,25 +127,6 @@ static void compare(const slice_bank *bank, slice_likeness *pair) {
   for (int way = 0; way < 2; ++way)
     for (int k = 0; k < SLICE_LEVELS; ++k)
       pair->mean[way][k] = count[way] > 0 ? (float)(sum[way][k] / count[way]) : 0;
-}
-
-// Every frame with itself and the next LAGS.
-static sonde_status measure_pairs(slice_bank *bank, sonde_error *error) {
-  const sonde_sequence *s = bank->sequence;
-  uint32_t n = 0;
-  bank->frames = SONDE_NEW(uint32_t, bank->used);
-  bank->pairs = SONDE_NEW(slice_likeness, (size_t)bank->used * (LAGS + 1));
-  if (!bank->frames || !bank->pairs) return sonde_fail_memory(error);
-  for (uint32_t i = 0; i < s->count; ++i)
-    if (s->frames[i].used) bank->frames[n++] = i;
-  for (uint32_t i = 0; i < n; ++i)
-    for (uint32_t lag = 0; lag <= LAGS && i + lag < n; ++lag) {
-      slice_likeness *pair = &bank->pairs[i * (LAGS + 1) + lag];
-      *pair = (slice_likeness){.a = bank->frames[i], .b = bank->frames[i + lag]};
-      pair->distance_m = (float)apart(s, pair->a, pair->b);
-      compare(bank, pair);
-    }
-  return SONDE_OK;
 }
 
 static sonde_status build_pyramids(slice_bank *bank, sonde_error *error) {
@@ -210,7 +157,17 @@ static sonde_status build_pyramids(slice_bank *bank, sonde_error *error) {
     }
   for (int k = 1; k < SLICE_LEVELS; ++k) {
     bank->shares[k] = bank->shares[k - 1] + (size_t)bank->wide[k - 1] * bank->high[k - 1];
-    halve_shares(bank, k - 1, bank->shares[k]);
+    // The share of what changes: 255 for a pixel that does, of the levels above the mean below.
+    const uint8_t *from = bank->shares[k - 1];
+    uint32_t wide = bank->wide[k - 1], high = bank->high[k - 1];
+    for (size_t p = 0; p < (size_t)bank->wide[k] * bank->high[k]; ++p) {
+      int column = (int)(p % bank->wide[k]) * 2 - 2, row = (int)(p / bank->wide[k]) * 2 - 2;
+      uint32_t sum = 0;
+      for (int n = 0; n < 25; ++n)
+        sum += BINOMIAL[n % 5] * BINOMIAL[n / 5] *
+               from[(size_t)bounded(row + n / 5, high) * wide + bounded(column + n % 5, wide)];
+      bank->shares[k][p] = (uint8_t)((sum + 255) >> 8); // what has any keeps some
+    }
   }
   uint8_t *levels = bank->levels;
   for (uint32_t i = 0; i < s->count; ++i) {
@@ -235,7 +192,20 @@ sonde_status sonde_slice_bank_create(const sonde_sequence *s, slice_bank **out,
   bank->sequence = s;
   for (uint32_t i = 0; i < s->count; ++i) bank->used += s->frames[i].used;
   sonde_status status = build_pyramids(bank, error);
-  if (!status) status = measure_pairs(bank, error);
+  bank->frames = SONDE_NEW(uint32_t, bank->used);
+  bank->pairs = SONDE_NEW(slice_likeness, (size_t)bank->used * (LAGS + 1));
+  if (!status && (!bank->frames || !bank->pairs)) status = sonde_fail_memory(error);
+  // Every frame is compared with itself and the next LAGS.
+  uint32_t n = 0;
+  for (uint32_t i = 0; i < s->count && !status; ++i)
+    if (s->frames[i].used) bank->frames[n++] = i;
+  for (uint32_t i = 0; i < n; ++i)
+    for (uint32_t lag = 0; lag <= LAGS && i + lag < n; ++lag) {
+      slice_likeness *pair = &bank->pairs[i * (LAGS + 1) + lag];
+      *pair = (slice_likeness){.a = bank->frames[i], .b = bank->frames[i + lag]};
+      pair->distance_m = (float)apart(s, pair->a, pair->b);
+      compare(bank, pair);
+    }
   if (status) sonde_slice_bank_destroy(bank);
   *out = status ? NULL : bank;
   return status;
@@ -262,31 +232,6 @@ static double product(const slice_bank *bank, uint32_t a, uint32_t b, int way, i
   return (double)bank->pairs[low * (LAGS + 1) + high - low].mean[way][level];
 }
 
-// Likeness of the frames in use, 1 - variogram / variance, in bins of the logarithm of the
-// distance.
-static void collect(const sonde_slicer *s, const slice_model *m, int level, bin bins[BINS]) {
-  const slice_bank *bank = s->bank;
-  double variance = m->decays[level].variance;
-  memset(bins, 0, BINS * sizeof *bins);
-  for (uint32_t i = 0; i < bank->used && variance > 0; ++i) {
-    if (is_out(s, bank->frames[i])) continue;
-    for (uint32_t lag = 1; lag <= LAGS && i + lag < bank->used; ++lag) {
-      if (is_out(s, bank->frames[i + lag])) continue;
-      const slice_likeness *p = &bank->pairs[i * (LAGS + 1) + lag];
-      double d = m->by_order ? lag * ORDER_M : fmax((double)p->distance_m, SHORTEST_M);
-      double own = product(bank, i, i, m->along_sweep, level) +
-                   product(bank, i + lag, i + lag, m->along_sweep, level);
-      // Four bins per doubling, the first one ends at 0.05 mm.
-      int at = (int)clamp(1 + 4 * log2(d / 5e-5), 0, BINS - 1);
-      bins[at].log_m += log(d);
-      bins[at].likeness += 1 - (0.5 * own - (double)p->mean[m->along_sweep][level]) / variance;
-      bins[at].weight += 1;
-    }
-  }
-  for (int i = 0; i < BINS; ++i)
-    if (bins[i].weight > 0) bins[i].log_m /= bins[i].weight, bins[i].likeness /= bins[i].weight;
-}
-
 static double likeness_at(const decay *d, double distance_m) {
   return distance_m > 0 ? exp(-pow(distance_m / d->length_m, d->power)) : 1;
 }
@@ -302,7 +247,28 @@ static void fit(const sonde_slicer *slicer, slice_model *m, int level) {
   decay best = {count > 0 ? sum / count : 0, LONGEST_M, 1};
   m->decays[level] = best;
   if (!(best.variance > 0)) return;
-  collect(slicer, m, level, bins);
+  // Likeness of the frames in use, 1 - variogram / variance, in bins of the logarithm of the
+  // distance.
+  const slice_bank *bank = slicer->bank;
+  double variance = m->decays[level].variance;
+  memset(bins, 0, BINS * sizeof *bins);
+  for (uint32_t i = 0; i < bank->used && variance > 0; ++i) {
+    if (is_out(slicer, bank->frames[i])) continue;
+    for (uint32_t lag = 1; lag <= LAGS && i + lag < bank->used; ++lag) {
+      if (is_out(slicer, bank->frames[i + lag])) continue;
+      const slice_likeness *p = &bank->pairs[i * (LAGS + 1) + lag];
+      double d = m->by_order ? lag * ORDER_M : fmax((double)p->distance_m, SHORTEST_M);
+      double own = product(bank, i, i, m->along_sweep, level) +
+                   product(bank, i + lag, i + lag, m->along_sweep, level);
+      // Four bins per doubling, the first one ends at 0.05 mm.
+      int at = (int)clamp(1 + 4 * log2(d / 5e-5), 0, BINS - 1);
+      bins[at].log_m += log(d);
+      bins[at].likeness += 1 - (0.5 * own - (double)p->mean[m->along_sweep][level]) / variance;
+      bins[at].weight += 1;
+    }
+  }
+  for (int i = 0; i < BINS; ++i)
+    if (bins[i].weight > 0) bins[i].log_m /= bins[i].weight, bins[i].likeness /= bins[i].weight;
   double least = (double)INFINITY;
   for (int i = 0; i < LENGTHS; ++i)
     for (int j = 0; j < POWERS; ++j) {
@@ -427,25 +393,6 @@ static void make_map(const sonde_slicer *s, int32_t from, int32_t to, float map[
     (void)foot_map(s->bank->sequence, frame_of(s, from), frame_of(s, to), map);
 }
 
-static void make_join(sonde_slicer *s, int32_t lower, const decay decays[SLICE_LEVELS]) {
-  slice_join *join = &s->joins[lower];
-  int32_t upper = lower + 1;
-  double gap = apart(s->bank->sequence, frame_of(s, lower), frame_of(s, upper)), beyond[2];
-  bool before = goes_on(s, lower - 1, lower, upper, &beyond[0]);
-  bool behind = goes_on(s, upper + 1, upper, lower, &beyond[1]);
-  join->before = before ? lower - 1 : -1, join->behind = behind ? upper + 1 : -1;
-  make_map(s, lower, join->before, join->to_before);
-  make_map(s, upper, join->behind, join->to_behind);
-  double at[SLICE_JOINED] = {0};
-  int slots[SLICE_JOINED], n = 0;
-  if (before) at[n] = -beyond[0], slots[n++] = 0;
-  at[n] = 0, slots[n++] = 1;
-  at[n] = gap, slots[n++] = 2;
-  if (behind) at[n] = gap + beyond[1], slots[n++] = 3;
-  for (int t = 0; t <= SLICE_STEPS; ++t)
-    weights_at(decays, n, at, slots, gap * t / SLICE_STEPS, &join->steps[t]);
-}
-
 sonde_status sonde_slicer_krige(sonde_slicer *s, sonde_error *error) {
   SONDE_ASSERT(s->bank != NULL && s->count > 0);
   s->joins = SONDE_NEW(slice_join, s->count);
@@ -461,7 +408,27 @@ sonde_status sonde_slicer_krige(sonde_slicer *s, sonde_error *error) {
     if (k == 0 || (k == 1 && m.error < s->pose_model.error)) s->pose_model = m;
   }
   s->options.along_sweep = s->pose_model.along_sweep;
-  for (uint32_t i = 0; i + 1 < s->count; ++i) make_join(s, (int32_t)i, s->pose_model.decays);
+  for (uint32_t i = 0; i + 1 < s->count; ++i) {
+    // Weights between a plane and the next one, with the planes beyond both where they go on alike.
+    int32_t lower = (int32_t)i;
+    slice_join *join = &s->joins[lower];
+    int32_t upper = lower + 1;
+    double gap = apart(s->bank->sequence, frame_of(s, lower), frame_of(s, upper)), beyond[2];
+    bool before = goes_on(s, lower - 1, lower, upper, &beyond[0]);
+    bool behind = goes_on(s, upper + 1, upper, lower, &beyond[1]);
+    join->before = before ? lower - 1 : -1, join->behind = behind ? upper + 1 : -1;
+    make_map(s, lower, join->before, join->to_before);
+    make_map(s, upper, join->behind, join->to_behind);
+    double place[SLICE_JOINED] = {0};
+    int slots[SLICE_JOINED], joined = 0;
+    if (before) place[joined] = -beyond[0], slots[joined++] = 0;
+    place[joined] = 0, slots[joined++] = 1;
+    place[joined] = gap, slots[joined++] = 2;
+    if (behind) place[joined] = gap + beyond[1], slots[joined++] = 3;
+    for (int t = 0; t <= SLICE_STEPS; ++t)
+      weights_at(s->pose_model.decays, joined, place, slots, gap * t / SLICE_STEPS,
+                 &join->steps[t]);
+  }
   for (int k = 0; k < SLICE_FAR; ++k) {
     double gap = s->options.gap_m * (k + 0.5) / SLICE_FAR, at[2] = {0, gap};
     for (int t = 0; t <= SLICE_STEPS; ++t)

@@ -32,23 +32,10 @@ static void node_places(const job *j, uint32_t column, uint32_t row, uint32_t co
   }
 }
 
-static bool grey_at(const sonde_image *image, double u, double v, uint8_t *grey) {
-  *grey = 0;
-  if (!(u >= -0.5 && v >= -0.5 && u <= image->width - 0.5 && v <= image->height - 0.5))
-    return false;
-  u = clamp(u, 0, image->width - 1.0), v = clamp(v, 0, image->height - 1.0);
-  size_t i = (size_t)u, j = (size_t)v;
-  size_t right = i + 1 < image->width, below = j + 1 < image->height ? image->width : 0;
-  const uint8_t *p = image->pixels + j * image->width + i, *q = p + below;
-  double a = u - (double)i, b = v - (double)j;
-  double top = p[0] + a * (p[right] - p[0]), low = q[0] + a * (q[right] - q[0]);
-  *grey = (uint8_t)(top + b * (low - top) + 0.5);
-  return true;
-}
-
-// Rows of pixels between two rows of nodes.
-static uint64_t press_row(const job *j, uint32_t column, uint32_t row, uint32_t wide,
+// Rows of pixels between two rows of nodes; returns the pixels that lie in the rest picture.
+static uint64_t fill_rows(const job *j, uint32_t column, uint32_t row, uint32_t wide,
                           double (*above)[2], double (*below)[2]) {
+  const sonde_image *rest = j->rest;
   uint64_t reached = 0;
   for (uint32_t y = 0; y < NODE && row + y < j->out->height; ++y)
     for (uint32_t x = 0; x < wide; ++x) {
@@ -58,8 +45,21 @@ static uint64_t press_row(const job *j, uint32_t column, uint32_t row, uint32_t 
         double low = below[x / NODE][k] + s * (below[x / NODE + 1][k] - below[x / NODE][k]);
         at[k] = top + t * (low - top);
       }
+      bool known = at[0] >= -0.5 && at[1] >= -0.5 && at[0] <= rest->width - 0.5 &&
+                   at[1] <= rest->height - 0.5;
+      uint8_t grey = 0;
+      if (known) {
+        double u = clamp(at[0], 0, rest->width - 1.0), v = clamp(at[1], 0, rest->height - 1.0);
+        size_t column_at = (size_t)u, row_at = (size_t)v;
+        size_t right = column_at + 1 < rest->width;
+        const uint8_t *p = rest->pixels + row_at * rest->width + column_at;
+        const uint8_t *q = p + (row_at + 1 < rest->height ? rest->width : 0);
+        double a = u - (double)column_at, b = v - (double)row_at;
+        double top = p[0] + a * (p[right] - p[0]), low = q[0] + a * (q[right] - q[0]);
+        grey = (uint8_t)(top + b * (low - top) + 0.5);
+      }
       size_t i = (size_t)(row + y) * j->out->width + column + x;
-      bool known = grey_at(j->rest, at[0], at[1], &j->out->pixels[i]);
+      j->out->pixels[i] = grey;
       if (j->known) j->known[i] = known;
       reached += known;
     }
@@ -80,7 +80,7 @@ uint64_t sonde_image_pressed(const sonde_image *rest, const sonde_image_press *p
     node_places(&j, left, 0, count, places[0]);
     for (uint32_t row = 0; row < out->height; row += NODE, k ^= 1) {
       node_places(&j, left, row + NODE, count, places[k ^ 1]);
-      reached += press_row(&j, left, row, wide, places[k], places[k ^ 1]);
+      reached += fill_rows(&j, left, row, wide, places[k], places[k ^ 1]);
     }
   }
   return reached;
