@@ -34,7 +34,7 @@ typedef enum sonde_touch_law {
   SONDE_TOUCH_ENERGY,     /**< energy kappa' V^2/2: nodal forces kappa' V grad V; kappa' in N/m^5 */
 } sonde_touch_law;
 
-/** Options of the step; every value is checked by sonde_scene_set_step(). */
+/** Options of the step. */
 typedef struct sonde_scene_step {
   double dt_s;                /**< default 1e-3 */
   double lambda;              /**< implicitness of eq. (4) in [0,1]; 0 is eq. (3); default 1 */
@@ -50,9 +50,8 @@ typedef struct sonde_scene_step {
   double substep_tolerance_m; /**< wanted error of a step, by step doubling; 0: no substeps */
   uint32_t substep_halvings;  /**< smallest substep is dt/2^this; default 8, at most 16 */
 } sonde_scene_step;
-SONDE_API sonde_scene_step sonde_scene_step_default(void); /**< @thread any */
 
-/** A compiled scene: constant but for the step's options. */
+/** A compiled scene. */
 typedef struct sonde_scene sonde_scene;
 
 /**
@@ -63,10 +62,6 @@ typedef struct sonde_scene sonde_scene;
  */
 SONDE_API sonde_status sonde_scene_load(const char *path, const char *thigh, sonde_scene **scene,
                                         sonde_error *error);
-/** The same from text. @param name of the text in messages; its directory is that of other files
- * @thread owner */
-SONDE_API sonde_status sonde_scene_parse(const char *text, const char *name, const char *thigh,
-                                         sonde_scene **scene, sonde_error *error);
 SONDE_API void sonde_scene_destroy(sonde_scene *scene); /**< @thread owner */
 
 /** What a body is. */
@@ -82,15 +77,11 @@ typedef struct sonde_body_info {
 SONDE_API uint32_t sonde_scene_body_count(const sonde_scene *scene); /**< @thread any */
 /** @thread any */
 SONDE_API sonde_body_info sonde_scene_body(const sonde_scene *scene, uint32_t body);
-/** Index of a body, UINT32_MAX when absent. @thread any */
-SONDE_API uint32_t sonde_scene_find(const sonde_scene *scene, const char *name);
 SONDE_API const char *sonde_scene_title(const sonde_scene *scene); /**< @thread any */
 /** `duration_s` of the file: how long a run is meant to be; 1 s when absent. @thread any */
 SONDE_API double sonde_scene_duration(const sonde_scene *scene);
 /** Acceleration of gravity (m/s^2); zero when the file gives none. @thread any */
 SONDE_API sonde_vec3 sonde_scene_gravity(const sonde_scene *scene);
-/** Hash of the text and of the meshes that the scene was compiled from. @thread any */
-SONDE_API uint64_t sonde_scene_checksum(const sonde_scene *scene);
 
 /** Two bodies that may touch; indices of bodies. */
 typedef struct sonde_scene_pair {
@@ -104,9 +95,6 @@ SONDE_API uint32_t sonde_scene_pair_count(const sonde_scene *scene); /**< @threa
 SONDE_API sonde_scene_pair sonde_scene_pair_at(const sonde_scene *scene, uint32_t pair);
 
 SONDE_API sonde_scene_step sonde_scene_get_step(const sonde_scene *scene); /**< @thread owner */
-/** @return ARGUMENT naming the value out of range @thread owner, while no state steps */
-SONDE_API sonde_status sonde_scene_set_step(sonde_scene *scene, const sonde_scene_step *step,
-                                            sonde_error *error);
 
 /** Everything that moves. */
 typedef struct sonde_scene_state sonde_scene_state;
@@ -115,7 +103,6 @@ typedef struct sonde_scene_state sonde_scene_state;
 SONDE_API sonde_status sonde_scene_state_create(const sonde_scene *scene, sonde_scene_state **state,
                                                 sonde_error *error);
 SONDE_API void sonde_scene_state_destroy(sonde_scene_state *state); /**< @thread owner */
-SONDE_API void sonde_scene_state_reset(sonde_scene_state *state);   /**< @thread owner */
 
 /** Bits of sonde_scene_report.flags; trouble is flagged and counted, never fatal. */
 enum {
@@ -150,13 +137,6 @@ SONDE_API double sonde_scene_time(const sonde_scene_state *state);   /**< @threa
 /** Hash of everything that moves: equal runs have equal hashes. @thread owner */
 SONDE_API uint64_t sonde_scene_hash(const sonde_scene_state *state);
 
-/** Nodes of a deformable body, world (m, m/s); NULL for a rigid body. @thread tick */
-SONDE_API const sonde_vec3 *sonde_scene_nodes(const sonde_scene_state *state, uint32_t body);
-SONDE_API const sonde_vec3 *sonde_scene_node_velocities(const sonde_scene_state *state,
-                                                        uint32_t body); /**< @thread tick */
-/** Overwrites the nodes of a deformable body; either may be NULL. @thread owner */
-SONDE_API void sonde_scene_set_nodes(sonde_scene_state *state, uint32_t body,
-                                     const sonde_vec3 *positions, const sonde_vec3 *velocities);
 /** Writes the vertices of a body's surface as they are now, [surface vertices] m. @thread owner */
 SONDE_API void sonde_scene_surface(const sonde_scene_state *state, uint32_t body,
                                    sonde_vec3 *vertices);

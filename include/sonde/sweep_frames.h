@@ -49,18 +49,6 @@ typedef struct sonde_sequence {
 SONDE_API sonde_status sonde_sequence_create(uint32_t width, uint32_t height, uint32_t count,
                                              sonde_sequence *sequence, sonde_error *error);
 SONDE_API void sonde_sequence_clear(sonde_sequence *sequence); /**< @thread owner */
-/** Sets or replaces a field; key and value are copied. @param frame or SONDE_WHOLE_FILE
- *  @thread owner */
-SONDE_API sonde_status sonde_sequence_set(sonde_sequence *sequence, uint32_t frame, const char *key,
-                                          const char *value, sonde_error *error);
-/** Sets "<name>Transform" to 16 numbers in mm and its status to OK. @param a_from_b in mm
- *  @thread owner */
-SONDE_API sonde_status sonde_sequence_set_transform(sonde_sequence *sequence, uint32_t frame,
-                                                    const char *name, const sonde_affine *a_from_b,
-                                                    sonde_error *error);
-/** Value of a field or NULL; borrowed. @thread any */
-SONDE_API const char *sonde_sequence_get(const sonde_sequence *sequence, uint32_t frame,
-                                         const char *key);
 
 /**
  * Reads a MetaImage (.igs.mha) or NRRD (.igs.nrrd, .seq.nrrd) sequence of 8-bit grey frames, raw or
@@ -146,8 +134,6 @@ SONDE_API sonde_status sonde_slicer_create(const sonde_sequence *sequence,
                                            const sonde_slicer_options *options,
                                            sonde_slicer **slicer, sonde_error *error);
 SONDE_API void sonde_slicer_destroy(sonde_slicer *slicer); /**< @thread owner */
-/** Whether frames are joined pixel to pixel: as asked for, or as KRIGE chose. @thread any */
-SONDE_API bool sonde_slicer_is_along_sweep(const sonde_slicer *slicer);
 /**
  * Fills an image straight from the frames: each pixel lies between the planes of two frames and
  * takes their values where a line through it meets them, weighted by the distance to the other.

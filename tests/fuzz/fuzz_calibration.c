@@ -1,6 +1,7 @@
 // PLUS configurations (XML): any bytes are either transforms that locate a sequence's frames, or an
 // error.
 #include "fuzz.h"
+#include "sweep/frames.h"
 
 #include <math.h>
 

@@ -1,6 +1,7 @@
 // Scenes (first byte even) and tetrahedra of TetGen (odd: NAME.node, a line "--", NAME.ele). A
 // small scene that is read is advanced by a few ticks, saved and loaded again.
 #include "fuzz.h"
+#include "scene/scene.h"
 
 #include <math.h>
 

@@ -1,6 +1,7 @@
 // Snapshots of a scene: the checksum is made right so that the reader goes on; what is loaded is
 // advanced by a few ticks.
 #include "fuzz.h"
+#include "scene/scene.h"
 
 #include "fuzz_scene_text.h"
 

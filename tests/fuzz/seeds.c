@@ -4,6 +4,8 @@
 // put_file      one seed from a file
 // seed_*        the seeds of one target
 #include "fuzz.h"
+#include "sweep/frames.h"
+#include "scene/scene.h"
 
 #include "base/maths.h"
 #include "fuzz_scene_text.h"

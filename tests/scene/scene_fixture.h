@@ -3,7 +3,7 @@
 #define SONDE_TESTS_SCENE_FIXTURE_H
 
 #include "fixture.h"
-#include "sonde/scene.h"
+#include "scene/scene.h"
 
 #include <stdio.h>
 

@@ -1,7 +1,7 @@
 // Files of tracked sequences and volumes: round trips, orientation, foreign dialects, damage with
 // file and line, INVALID frames, joined transforms, real recordings.
 #include "fixture.h"
-#include "sonde/sweep_volume.h"
+#include "sweep/frames.h"
 
 #include <stdio.h>
 #include <sys/stat.h>

@@ -68,70 +68,33 @@ static void fail_event(sonde_reader *reader, const yaml_event_t *event, const ch
                 (int)event->start_mark.line + 1, text);
 }
 
-// What has been counted of a stream of events.
-typedef struct shape {
-  uint32_t documents, depth;
-  uint64_t items;
-} shape;
-
-static void count_event(sonde_reader *reader, const yaml_event_t *event, shape *seen) {
+// One document within the limits; the whole text is gone over without being kept, so that building
+// the document is bounded.
+static void check_shape(sonde_reader *reader, yaml_parser_t *parser) {
   const sonde_input_limits *bounds = &sonde_limits_yaml;
-  bool opens = event->type == YAML_MAPPING_START_EVENT || event->type == YAML_SEQUENCE_START_EVENT;
-  bool closes = event->type == YAML_MAPPING_END_EVENT || event->type == YAML_SEQUENCE_END_EVENT;
-  seen->documents += event->type == YAML_DOCUMENT_START_EVENT;
-  seen->items += opens || event->type == YAML_SCALAR_EVENT || event->type == YAML_ALIAS_EVENT;
-  seen->depth += opens;
-  seen->depth -= closes && seen->depth > 0;
-  if (seen->documents > 1)
-    fail_event(reader, event, "a second document begins, expected %llu", 1);
-  else if (seen->depth > bounds->most_depth)
-    fail_event(reader, event, "expected at most %llu levels of nesting", bounds->most_depth);
-  else if (seen->items > bounds->most_items)
-    fail_event(reader, event, "expected at most %llu values", bounds->most_items);
-}
-
-// Goes over the whole text once without keeping it, so that building the document is bounded.
-static void check_shape(sonde_reader *reader, const char *text, size_t count) {
-  yaml_parser_t parser;
+  uint32_t documents = 0, depth = 0;
+  uint64_t items = 0;
   yaml_event_t event;
-  shape seen = {0};
-  if (count > sonde_limits_yaml.most_bytes) {
-    sonde_fail_at(&reader->error, SONDE_FORMAT, "sonde_reader",
-                  "%s:1: %zu bytes of YAML, expected at most %llu", reader->name, count,
-                  (unsigned long long)sonde_limits_yaml.most_bytes);
-    return;
-  }
-  if (!yaml_parser_initialize(&parser)) {
-    sonde_fail_memory(&reader->error);
-    return;
-  }
-  yaml_parser_set_input_string(&parser, (const unsigned char *)text, count);
   for (bool more = true; more && sonde_reader_good(reader);) {
-    if (!yaml_parser_parse(&parser, &event)) {
-      fail_parser(reader, &parser);
+    if (!yaml_parser_parse(parser, &event)) {
+      fail_parser(reader, parser);
       break;
     }
-    count_event(reader, &event, &seen);
+    bool opens = event.type == YAML_MAPPING_START_EVENT || event.type == YAML_SEQUENCE_START_EVENT;
+    bool closes = event.type == YAML_MAPPING_END_EVENT || event.type == YAML_SEQUENCE_END_EVENT;
+    documents += event.type == YAML_DOCUMENT_START_EVENT;
+    items += opens || event.type == YAML_SCALAR_EVENT || event.type == YAML_ALIAS_EVENT;
+    depth += opens;
+    depth -= closes && depth > 0;
+    if (documents > 1)
+      fail_event(reader, &event, "a second document begins, expected %llu", 1);
+    else if (depth > bounds->most_depth)
+      fail_event(reader, &event, "expected at most %llu levels of nesting", bounds->most_depth);
+    else if (items > bounds->most_items)
+      fail_event(reader, &event, "expected at most %llu values", bounds->most_items);
     more = event.type != YAML_STREAM_END_EVENT;
     yaml_event_delete(&event);
   }
-  yaml_parser_delete(&parser);
-}
-
-static void build(sonde_reader *reader, const char *text, size_t count) {
-  yaml_parser_t parser;
-  if (!yaml_parser_initialize(&parser)) {
-    sonde_fail_memory(&reader->error);
-    return;
-  }
-  yaml_parser_set_input_string(&parser, (const unsigned char *)text, count);
-  reader->has_document = yaml_parser_load(&parser, &reader->document) == 1;
-  if (!reader->has_document)
-    fail_parser(reader, &parser);
-  else if (!yaml_document_get_root_node(&reader->document))
-    sonde_fail_at(&reader->error, SONDE_FORMAT, "sonde_reader",
-                  "%s:1: the file is empty, expected a map", reader->name);
-  yaml_parser_delete(&parser);
 }
 
 sonde_status sonde_reader_create(const char *text, const char *name, sonde_reader **out,
@@ -140,8 +103,30 @@ sonde_status sonde_reader_create(const char *text, const char *name, sonde_reade
   sonde_reader *reader = *out = SONDE_NEW(sonde_reader, 1);
   if (!reader) return sonde_fail_memory(error);
   reader->name = name;
-  check_shape(reader, text, strlen(text));
-  if (sonde_reader_good(reader)) build(reader, text, strlen(text));
+  const size_t count = strlen(text);
+  if (count > sonde_limits_yaml.most_bytes)
+    sonde_fail_at(&reader->error, SONDE_FORMAT, "sonde_reader",
+                  "%s:1: %zu bytes of YAML, expected at most %llu", name, count,
+                  (unsigned long long)sonde_limits_yaml.most_bytes);
+  for (int pass = 0; pass < 2 && sonde_reader_good(reader); ++pass) {
+    yaml_parser_t parser;
+    if (!yaml_parser_initialize(&parser)) {
+      sonde_fail_memory(&reader->error);
+      break;
+    }
+    yaml_parser_set_input_string(&parser, (const unsigned char *)text, count);
+    if (pass == 0) {
+      check_shape(reader, &parser);
+    } else {
+      reader->has_document = yaml_parser_load(&parser, &reader->document) == 1;
+      if (!reader->has_document)
+        fail_parser(reader, &parser);
+      else if (!yaml_document_get_root_node(&reader->document))
+        sonde_fail_at(&reader->error, SONDE_FORMAT, "sonde_reader",
+                      "%s:1: the file is empty, expected a map", name);
+    }
+    yaml_parser_delete(&parser);
+  }
   sonde_status status = sonde_reader_status(reader, error);
   if (status) {
     sonde_reader_destroy(reader);
@@ -184,43 +169,33 @@ static void list_keys(const char *const *keys, char *text, size_t size) {
   }
 }
 
-static void check_key(sonde_reader *reader, const yaml_node_t *map, const yaml_node_pair_t *pair,
-                      const char *what, const char *const *keys) {
-  const char *key = scalar(reader, pair->key);
-  bool known = false;
-  for (int i = 0; key && keys[i]; ++i) known |= strcmp(keys[i], key) == 0;
-  if (!known) {
-    char expected[300];
-    list_keys(keys, expected, sizeof expected);
-    sonde_reader_fail(reader, pair->key, SONDE_FORMAT, "unknown key '%s' in %s, expected one of %s",
-                      key ? key : "(not a word)", what, expected);
-    return;
-  }
-  for (const yaml_node_pair_t *other = map->data.mapping.pairs.start;
-       other < pair && sonde_reader_good(reader); ++other) {
-    const char *before = scalar(reader, other->key);
-    if (before && strcmp(before, key) == 0)
-      sonde_reader_fail(reader, pair->key, SONDE_FORMAT, "key '%s' is given twice in %s", key,
-                        what);
-  }
-}
-
 void sonde_read_keys(sonde_reader *reader, sonde_place at, const char *what,
                      const char *const *keys) {
   SONDE_ASSERT(what && keys);
   if (!sonde_reader_good(reader)) return;
+  char expected[300];
+  list_keys(keys, expected, sizeof expected);
   const yaml_node_t *map = node_of(reader, at);
   if (!map || map->type != YAML_MAPPING_NODE) {
-    char expected[300];
-    list_keys(keys, expected, sizeof expected);
     sonde_reader_fail(reader, at, SONDE_FORMAT, "%s must be a map with the keys %s", what,
                       expected);
     return;
   }
-  const yaml_node_pair_t *end = map->data.mapping.pairs.top;
-  for (const yaml_node_pair_t *p = map->data.mapping.pairs.start;
-       p < end && sonde_reader_good(reader); ++p)
-    check_key(reader, map, p, what, keys);
+  const yaml_node_pair_t *start = map->data.mapping.pairs.start, *end = map->data.mapping.pairs.top;
+  for (const yaml_node_pair_t *p = start; p < end && sonde_reader_good(reader); ++p) {
+    const char *key = scalar(reader, p->key);
+    bool known = false, twice = false;
+    for (int i = 0; key && keys[i]; ++i) known |= strcmp(keys[i], key) == 0;
+    for (const yaml_node_pair_t *other = start; known && other < p; ++other) {
+      const char *before = scalar(reader, other->key);
+      twice |= before && strcmp(before, key) == 0;
+    }
+    if (!known)
+      sonde_reader_fail(reader, p->key, SONDE_FORMAT, "unknown key '%s' in %s, expected one of %s",
+                        key ? key : "(not a word)", what, expected);
+    else if (twice)
+      sonde_reader_fail(reader, p->key, SONDE_FORMAT, "key '%s' is given twice in %s", key, what);
+  }
 }
 
 sonde_place sonde_read_find(sonde_reader *reader, sonde_place at, const char *key) {

@@ -40,27 +40,6 @@ static bool edges_cross(const sonde_mesh *mesh, const uint32_t a[3], const uint3
   return false;
 }
 
-// Pairs of triangles with less than two corners in common must not cross.
-static sonde_status find_intersection(const sonde_mesh *mesh, const sonde_face_tree *tree,
-                                      sonde_error *error) {
-  uint32_t count = sonde_face_tree_pairs(tree, tree, 0, NULL, 0, NULL);
-  uint32_t(*pairs)[2] = sonde_calloc(count, sizeof *pairs);
-  if (!pairs) return sonde_fail_memory(error);
-  sonde_face_tree_pairs(tree, tree, 0, pairs, count, NULL);
-  sonde_status status = SONDE_OK;
-  for (uint32_t k = 0; k < count && !status; ++k) {
-    if (pairs[k][0] >= pairs[k][1]) continue;
-    const uint32_t *a = mesh->faces[pairs[k][0]], *b = mesh->faces[pairs[k][1]];
-    int common = 0;
-    for (int i = 0; i < 9; ++i) common += a[i / 3] == b[i % 3];
-    if (common < 2 && (edges_cross(mesh, a, b) || edges_cross(mesh, b, a)))
-      status = sonde_fail(error, SONDE_MESH, "the surface cuts itself: triangles %u and %u",
-                          pairs[k][0], pairs[k][1]);
-  }
-  sonde_free(pairs);
-  return status;
-}
-
 sonde_status sonde_mesh_check_solid(const sonde_mesh *mesh, sonde_error *error) {
   sonde_mesh_report report;
   sonde_status status = sonde_mesh_inspect(mesh, &report, error);
@@ -74,9 +53,28 @@ sonde_status sonde_mesh_check_solid(const sonde_mesh *mesh, sonde_error *error) 
                       report.volume_m3 * 1e9);
   status = sonde_mesh_check_areas(mesh, error);
   if (status) return status;
+  // Pairs of triangles with less than two corners in common must not cross.
   sonde_face_tree *tree = NULL;
+  uint32_t count = 0, (*pairs)[2] = NULL;
   status = sonde_face_tree_create(mesh, &tree, error);
-  if (!status) status = find_intersection(mesh, tree, error);
+  if (!status) {
+    count = sonde_face_tree_pairs(tree, tree, 0, NULL, 0, NULL);
+    pairs = sonde_calloc(count, sizeof *pairs);
+    if (pairs)
+      sonde_face_tree_pairs(tree, tree, 0, pairs, count, NULL);
+    else
+      status = sonde_fail_memory(error);
+  }
+  for (uint32_t k = 0; k < count && !status; ++k) {
+    if (pairs[k][0] >= pairs[k][1]) continue;
+    const uint32_t *a = mesh->faces[pairs[k][0]], *b = mesh->faces[pairs[k][1]];
+    int common = 0;
+    for (int i = 0; i < 9; ++i) common += a[i / 3] == b[i % 3];
+    if (common < 2 && (edges_cross(mesh, a, b) || edges_cross(mesh, b, a)))
+      status = sonde_fail(error, SONDE_MESH, "the surface cuts itself: triangles %u and %u",
+                          pairs[k][0], pairs[k][1]);
+  }
+  sonde_free(pairs);
   sonde_face_tree_destroy(tree);
   SONDE_ASSERT(status == SONDE_OK || !error || error->message[0]);
   return status;

@@ -121,34 +121,6 @@ static uint32_t cells_around(const cubes *c, const uint32_t at[3], const int d[3
   return cells;
 }
 
-// Cells along each side; the box has to be made of whole cubes.
-static bool read_grid(sonde_reader *reader, sonde_place at, sonde_place lattice, cubes *c) {
-  sonde_place shape = sonde_read_find(reader, at, "shape");
-  sonde_place box = sonde_read_find(reader, shape, "box_mm");
-  if (!box) {
-    sonde_reader_fail(reader, shape ? shape : at, SONDE_FORMAT,
-                      "a lattice needs shape: {box_mm: [x, y, z]} or lattice: {tetrahedra: FILE}");
-    return false;
-  }
-  sonde_vec3 size = sonde_read_vector_at(reader, box, "box_mm", SONDE_SCENE_FAR_MM);
-  double side = sonde_read_real(reader, lattice, "cell_mm", 1e-3, 1e4, NAN);
-  const double length[3] = {size.x, size.y, size.z};
-  double points = 1;
-  for (int k = 0; k < 3 && sonde_reader_good(reader); ++k) {
-    double whole = round(length[k] / side);
-    if (!(whole >= 1) || fabs(whole * side - length[k]) > 1e-6 * side)
-      sonde_reader_fail(reader, box, SONDE_ARGUMENT,
-                        "a side of %g mm is not a whole number of cells of %g mm", length[k], side);
-    c->n[k] = (uint32_t)whole;
-    points *= whole + 1;
-  }
-  if (sonde_reader_good(reader) && points > 2e5)
-    sonde_reader_fail(reader, lattice, SONDE_ARGUMENT, "%.0f nodes, expected 200000 or fewer",
-                      points);
-  c->side_m = side * 1e-3;
-  return sonde_reader_good(reader);
-}
-
 // The springs that start at one grid point; with a body, they are added to it.
 static uint32_t point_springs(const cubes *c, const uint32_t at[3], sonde_body *body,
                               uint32_t used) {
@@ -170,7 +142,32 @@ static uint32_t point_springs(const cubes *c, const uint32_t at[3], sonde_body *
 static void read_cells(const sonde_scene_source *source, sonde_place at, sonde_place lattice,
                        cubes *c, sonde_body *body) {
   static const int HERE[3] = {0, 0, 0};
-  if (!read_grid(source->reader, at, lattice, c)) return;
+  sonde_reader *reader = source->reader;
+  sonde_place shape = sonde_read_find(reader, at, "shape");
+  sonde_place box = sonde_read_find(reader, shape, "box_mm");
+  if (!box) {
+    sonde_reader_fail(reader, shape ? shape : at, SONDE_FORMAT,
+                      "a lattice needs shape: {box_mm: [x, y, z]} or lattice: {tetrahedra: FILE}");
+    return;
+  }
+  // Cells along each side: the box has to be made of whole cubes.
+  sonde_vec3 size = sonde_read_vector_at(reader, box, "box_mm", SONDE_SCENE_FAR_MM);
+  double edge_mm = sonde_read_real(reader, lattice, "cell_mm", 1e-3, 1e4, NAN), nodes = 1;
+  const double length[3] = {size.x, size.y, size.z};
+  for (int k = 0; k < 3 && sonde_reader_good(reader); ++k) {
+    double whole = round(length[k] / edge_mm);
+    if (!(whole >= 1) || fabs(whole * edge_mm - length[k]) > 1e-6 * edge_mm)
+      sonde_reader_fail(reader, box, SONDE_ARGUMENT,
+                        "a side of %g mm is not a whole number of cells of %g mm", length[k],
+                        edge_mm);
+    c->n[k] = (uint32_t)whole;
+    nodes *= whole + 1;
+  }
+  if (sonde_reader_good(reader) && nodes > 2e5)
+    sonde_reader_fail(reader, lattice, SONDE_ARGUMENT, "%.0f nodes, expected 200000 or fewer",
+                      nodes);
+  c->side_m = edge_mm * 1e-3;
+  if (!sonde_reader_good(reader)) return;
   SONDE_ASSERT(c->n[0] && c->n[1] && c->n[2]);
   sonde_error error = {0};
   uint32_t rows = c->n[0] + 1, layers = rows * (c->n[1] + 1), points = layers * (c->n[2] + 1);
@@ -181,7 +178,7 @@ static void read_cells(const sonde_scene_source *source, sonde_place at, sonde_p
   sonde_status status = sonde_grid_skin(c->n, &body->surface, &body->surface_node, &error);
   if (!status) status = sonde_body_allocate(body, points, count, &error);
   if (status) {
-    sonde_reader_pass(source->reader, at, &error);
+    sonde_reader_pass(reader, at, &error);
     return;
   }
   double side = c->side_m, cube_kg = c->density_kg_m3 * side * side * side;

@@ -10,17 +10,15 @@ static const sonde_material PLAIN = {
     .name = "", .stiffness_n_m3 = 1e8, .damping_s = 1e-3, .mu_static = 0, .mu_kinetic = 0};
 static const double STRIBECK_M_S = 0.01, BOND_M = 1e-4, BOND_DAMPING_S = 1e-2;
 
-sonde_scene_step sonde_scene_step_default(void) {
-  return (sonde_scene_step){.dt_s = 1e-3,
-                            .lambda = 1,
-                            .newton_iterations = 1,
-                            .newton_residual = 1e-9,
-                            .line_search = true,
-                            .cast = true,
-                            .sleep_m = 5e-6,
-                            .solver = {1e-8, 1e-14, 1000},
-                            .substep_halvings = 8};
-}
+static const sonde_scene_step STEP = {.dt_s = 1e-3,
+                                      .lambda = 1,
+                                      .newton_iterations = 1,
+                                      .newton_residual = 1e-9,
+                                      .line_search = true,
+                                      .cast = true,
+                                      .sleep_m = 5e-6,
+                                      .solver = {1e-8, 1e-14, 1000},
+                                      .substep_halvings = 8};
 
 static void read_step(sonde_reader *reader, sonde_place at, sonde_scene *scene) {
   static const char *const KEYS[] = {"dt_s",
@@ -274,31 +272,6 @@ static void read_materials(sonde_reader *reader, sonde_place root, sonde_scene *
   scene->material_count = count;
 }
 
-// A rigid body has two slots, its velocity and its spin; a deformable one has a slot per node.
-static sonde_status number_slots(sonde_scene *scene, sonde_error *error) {
-  for (uint32_t i = 0; i < scene->body_count; ++i) {
-    sonde_body *body = &scene->bodies[i];
-    body->first_slot = scene->slot_count;
-    body->slot_count = sonde_body_is_rigid(body) ? 2 : body->node_count;
-    body->first_pair = scene->pair_count;
-    scene->slot_count += body->slot_count;
-    scene->pair_count += body->model ? body->model->topology.edge_count : body->spring_count;
-  }
-  scene->pairs = sonde_calloc(scene->pair_count, sizeof *scene->pairs);
-  if (!scene->pairs) return sonde_fail_memory(error);
-  for (uint32_t i = 0; i < scene->body_count; ++i) {
-    const sonde_body *body = &scene->bodies[i];
-    uint32_t count = body->model ? body->model->topology.edge_count : body->spring_count;
-    for (uint32_t e = 0; e < count; ++e) {
-      const uint32_t *pair = body->model ? body->model->topology.edges[e] : body->pairs[e];
-      SONDE_ASSERT(pair[0] < pair[1] && pair[1] < body->node_count);
-      for (int k = 0; k < 2; ++k)
-        scene->pairs[body->first_pair + e][k] = body->first_slot + pair[k];
-    }
-  }
-  return SONDE_OK;
-}
-
 static void read_scene(const sonde_scene_source *source, sonde_scene *scene) {
   static const char *const KEYS[] = {"sonde_scene", "title",  "gravity_m_s2", "duration_s", "step",
                                      "materials",   "bodies", "contacts",     NULL};
@@ -344,10 +317,28 @@ sonde_status sonde_scene_parse(const char *text, const char *name, const char *t
   if (status) return status;
   sonde_scene *scene = SONDE_NEW(sonde_scene, 1);
   if (scene) {
-    scene->step = sonde_scene_step_default();
+    scene->step = STEP;
     read_scene(&source, scene);
     status = sonde_reader_status(source.reader, error);
-    if (!status) status = number_slots(scene, error);
+    // A rigid body has two slots, its velocity and its spin; a deformable one has a slot per node.
+    for (sonde_body *b = scene->bodies; b < scene->bodies + scene->body_count && !status; ++b) {
+      b->first_slot = scene->slot_count;
+      b->slot_count = sonde_body_is_rigid(b) ? 2 : b->node_count;
+      b->first_pair = scene->pair_count;
+      scene->slot_count += b->slot_count;
+      scene->pair_count += b->model ? b->model->topology.edge_count : b->spring_count;
+    }
+    scene->pairs = sonde_calloc(scene->pair_count, sizeof *scene->pairs);
+    if (!status && !scene->pairs) status = sonde_fail_memory(error);
+    for (uint32_t i = 0; i < scene->body_count && !status; ++i) {
+      const sonde_body *b = &scene->bodies[i];
+      uint32_t count = b->model ? b->model->topology.edge_count : b->spring_count;
+      for (uint32_t e = 0; e < 2 * count; ++e) {
+        const uint32_t *pair = b->model ? b->model->topology.edges[e / 2] : b->pairs[e / 2];
+        SONDE_ASSERT(pair[0] < pair[1] && pair[1] < b->node_count);
+        scene->pairs[b->first_pair + e / 2][e % 2] = b->first_slot + pair[e % 2];
+      }
+    }
     // The checksum covers the text and all geometry that other files hold.
     uint64_t hash = sonde_hash(0, text, strlen(text));
     for (uint32_t i = 0; i < scene->body_count && !status; ++i) {

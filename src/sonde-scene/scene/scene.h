@@ -125,4 +125,21 @@ sonde_status sonde_shape_ellipsoid(sonde_vec3 radii_m, double edge_m, sonde_mesh
 sonde_status sonde_shape_cylinder(double radius_m, double length_m, double edge_m, sonde_mesh *mesh,
                                   sonde_error *error);
 
+// A scene from text. @param name of the text in messages; its directory is that of other files
+// @thread owner
+sonde_status sonde_scene_parse(const char *text, const char *name, const char *thigh,
+                               sonde_scene **scene, sonde_error *error);
+// Index of a body, UINT32_MAX when absent. @thread any
+uint32_t sonde_scene_find(const sonde_scene *scene, const char *name);
+// @return ARGUMENT naming the value out of range @thread owner, while no state steps
+sonde_status sonde_scene_set_step(sonde_scene *scene, const sonde_scene_step *step,
+                                  sonde_error *error);
+void sonde_scene_state_reset(sonde_scene_state *state); // @thread owner
+// Nodes of a deformable body, world (m, m/s); NULL for a rigid body. @thread tick
+const sonde_vec3 *sonde_scene_nodes(const sonde_scene_state *state, uint32_t body);
+const sonde_vec3 *sonde_scene_node_velocities(const sonde_scene_state *state, uint32_t body);
+// Overwrites the nodes of a deformable body; either may be NULL. @thread owner
+void sonde_scene_set_nodes(sonde_scene_state *state, uint32_t body, const sonde_vec3 *positions,
+                           const sonde_vec3 *velocities);
+
 #endif

@@ -25,34 +25,6 @@ static bool moves(const sonde_scene_state *state, const sonde_body *body, uint32
   return (sonde_body_is_rigid(body) || !body->held[k]) && is_awake(state, body->first_slot + k);
 }
 
-static void list_part(sonde_scene_state *state, uint32_t b, uint32_t first_face) {
-  const sonde_body *body = &state->scene->bodies[b];
-  const sonde_model *model = body->model;
-  const uint8_t *calm = state->now.calm + body->first_slot;
-  uint32_t *rows = state->part_rows + body->first_slot, *rim = state->part_rim + body->first_slot;
-  uint32_t *edges = state->part_edges + body->first_pair, *faces = state->part_faces + first_face;
-  sonde_tissue_part part = {.rows = rows, .rim = rim, .edges = edges, .faces = faces};
-  uint8_t *in_rim = state->in_rim + body->first_slot;
-  memset(in_rim, 0, body->node_count);
-  for (uint32_t i = 0; i < body->node_count; ++i)
-    if (calm[i] < CALM) rows[part.row_count++] = i;
-  for (uint32_t e = 0; e < model->topology.edge_count; ++e) {
-    const uint32_t *end = model->topology.edges[e];
-    bool first = calm[end[0]] < CALM, second = calm[end[1]] < CALM;
-    if (!first && !second) continue;
-    edges[part.edge_count++] = e;
-    uint32_t other = first ? end[1] : end[0];
-    if ((first && second) || in_rim[other]) continue;
-    in_rim[other] = 1;
-    rim[part.rim_count++] = other;
-  }
-  for (uint32_t f = 0; f < model->surface.face_count; ++f) {
-    const uint32_t *v = model->surface.faces[f];
-    if (calm[v[0]] < CALM || calm[v[1]] < CALM || calm[v[2]] < CALM) faces[part.face_count++] = f;
-  }
-  state->part[b] = part;
-}
-
 void sonde_sleep_list(sonde_scene_state *state) {
   const sonde_scene *scene = state->scene;
   uint32_t face = 0;
@@ -62,13 +34,37 @@ void sonde_sleep_list(sonde_scene_state *state) {
     for (uint32_t k = 0; k < body->slot_count; ++k)
       if (moves(state, body, k))
         state->active_rows[state->active_row_count++] = body->first_slot + k;
-    uint32_t end = b + 1 < scene->body_count ? body[1].first_pair : scene->pair_count;
-    for (uint32_t e = body->first_pair; e < end; ++e)
+    uint32_t last = b + 1 < scene->body_count ? body[1].first_pair : scene->pair_count;
+    for (uint32_t e = body->first_pair; e < last; ++e)
       if (moves(state, body, scene->pairs[e][0] - body->first_slot) &&
           moves(state, body, scene->pairs[e][1] - body->first_slot))
         state->active_pairs[state->active_pair_count++] = e;
     if (!body->model) continue;
-    list_part(state, b, face);
+    // The waking part of a tissue: its nodes, the sleepers beside them, their springs and faces.
+    const sonde_model *model = body->model;
+    const uint8_t *calm = state->now.calm + body->first_slot;
+    uint32_t *rows = state->part_rows + body->first_slot, *rim = state->part_rim + body->first_slot;
+    uint32_t *edges = state->part_edges + body->first_pair, *faces = state->part_faces + face;
+    sonde_tissue_part part = {.rows = rows, .rim = rim, .edges = edges, .faces = faces};
+    uint8_t *in_rim = state->in_rim + body->first_slot;
+    memset(in_rim, 0, body->node_count);
+    for (uint32_t i = 0; i < body->node_count; ++i)
+      if (calm[i] < CALM) rows[part.row_count++] = i;
+    for (uint32_t e = 0; e < model->topology.edge_count; ++e) {
+      const uint32_t *end = model->topology.edges[e];
+      bool first = calm[end[0]] < CALM, second = calm[end[1]] < CALM;
+      if (!first && !second) continue;
+      edges[part.edge_count++] = e;
+      uint32_t other = first ? end[1] : end[0];
+      if ((first && second) || in_rim[other]) continue;
+      in_rim[other] = 1;
+      rim[part.rim_count++] = other;
+    }
+    for (uint32_t f = 0; f < model->surface.face_count; ++f) {
+      const uint32_t *v = model->surface.faces[f];
+      if (calm[v[0]] < CALM || calm[v[1]] < CALM || calm[v[2]] < CALM) faces[part.face_count++] = f;
+    }
+    state->part[b] = part;
     face += body->surface.face_count;
   }
   SONDE_ASSERT(state->active_row_count <= scene->slot_count);

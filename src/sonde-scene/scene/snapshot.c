@@ -38,30 +38,6 @@ static bool within(const sonde_vec3 *list, uint32_t count, double most) {
   return true;
 }
 
-// Numbers that no scene reaches would break what the steps rely on.
-static sonde_status check_numbers(const sonde_scene_state *state, const sonde_kept *kept,
-                                  const char *path, sonde_error *error) {
-  const sonde_scene *scene = state->scene;
-  bool good = within(kept->position, scene->slot_count, SONDE_SCENE_REACH_M) &&
-              within(kept->velocity, scene->slot_count, SONDE_SCENE_FASTEST) &&
-              within(kept->increment, scene->slot_count, SONDE_SCENE_FASTEST) &&
-              within(kept->hint, scene->touch_count, 1 + 1e-6) &&
-              within(kept->bond, state->bond_count, SONDE_SCENE_REACH_M);
-  good = good && kept->head->level <= SONDE_SCENE_MOST_HALVINGS && kept->head->time_s >= 0 &&
-         kept->head->time_s <= SONDE_SCENE_LATEST_S;
-  for (uint32_t k = 0; k < scene->body_count && good; ++k) {
-    sonde_quat q = kept->rotation[k];
-    good = fabs(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z - 1) <= 1e-6;
-  }
-  for (uint32_t k = 0; k < state->bond_count && good; ++k)
-    good = kept->slip[k] >= 0 && kept->slip[k] <= SONDE_SCENE_FASTEST;
-  if (good) return SONDE_OK;
-  return sonde_fail(error, SONDE_FORMAT,
-                    "%s: expected positions within %g m, velocities within %g m/s and unit "
-                    "quaternions",
-                    path, SONDE_SCENE_REACH_M, SONDE_SCENE_FASTEST);
-}
-
 sonde_status sonde_scene_state_load(sonde_scene_state *state, const char *path,
                                     sonde_error *error) {
   char *bytes = NULL;
@@ -81,8 +57,28 @@ sonde_status sonde_scene_state_load(sonde_scene_state *state, const char *path,
   else if (count != sizeof h + h.bytes || sonde_hash(0, block, h.bytes) != h.hash)
     status = sonde_fail(error, SONDE_CHECKSUM, "%s: the snapshot is damaged", path);
   else {
+    // Numbers that no scene reaches would break what the steps rely on.
+    const sonde_scene *scene = state->scene;
+    const sonde_kept *kept = &state->undo;
     memcpy(state->undo.block, block, state->undo.bytes);
-    status = check_numbers(state, &state->undo, path, error);
+    bool good = within(kept->position, scene->slot_count, SONDE_SCENE_REACH_M) &&
+                within(kept->velocity, scene->slot_count, SONDE_SCENE_FASTEST) &&
+                within(kept->increment, scene->slot_count, SONDE_SCENE_FASTEST) &&
+                within(kept->hint, scene->touch_count, 1 + 1e-6) &&
+                within(kept->bond, state->bond_count, SONDE_SCENE_REACH_M) &&
+                kept->head->level <= SONDE_SCENE_MOST_HALVINGS && kept->head->time_s >= 0 &&
+                kept->head->time_s <= SONDE_SCENE_LATEST_S;
+    for (uint32_t k = 0; k < scene->body_count && good; ++k) {
+      sonde_quat q = kept->rotation[k];
+      good = fabs(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z - 1) <= 1e-6;
+    }
+    for (uint32_t k = 0; k < state->bond_count && good; ++k)
+      good = kept->slip[k] >= 0 && kept->slip[k] <= SONDE_SCENE_FASTEST;
+    if (!good)
+      status = sonde_fail(error, SONDE_FORMAT,
+                          "%s: expected positions within %g m, velocities within %g m/s and unit "
+                          "quaternions",
+                          path, SONDE_SCENE_REACH_M, SONDE_SCENE_FASTEST);
   }
   if (!status) sonde_kept_copy(&state->now, &state->undo);
   sonde_free(bytes);

@@ -97,33 +97,6 @@ static sonde_status make_tree(sonde_scene_state *state, uint32_t b, sonde_error 
   return sonde_face_tree_create(&mesh, &state->tree[b], error);
 }
 
-static sonde_status make_contact(sonde_scene_state *state, sonde_error *error) {
-  const sonde_scene *scene = state->scene;
-  uint32_t n = scene->body_count;
-  sonde_status status = sonde_sweep_create(n, &state->sweep, error);
-  for (uint32_t b = 0; b < n; ++b) // beyond everything, so that it meets nothing
-    state->bounds[b] = (sonde_bounds){{1e9 + 10 * b, 1e9, 1e9}, {1e9 + 10 * b + 1, 1e9, 1e9}};
-  for (uint32_t t = 0; t < scene->touch_count && !status; ++t) {
-    const sonde_touch *touch = &scene->touches[t];
-    uint32_t faces =
-        scene->bodies[touch->a].surface.face_count + scene->bodies[touch->b].surface.face_count;
-    bool large_faces = sonde_body_is_rigid(&scene->bodies[touch->a]) &&
-                       sonde_body_is_rigid(&scene->bodies[touch->b]);
-    sonde_overlap_config config = {.points_per_piece = 1};
-    if (touch->law == SONDE_TOUCH_FOUNDATION && large_faces) config.points_per_piece = 3;
-    config.max_pieces = 16 * faces < 4096 ? 4096 : 16 * faces;
-    if (config.max_pieces > PIECES_MOST) config.max_pieces = PIECES_MOST;
-    config.max_points = 2 * config.max_pieces;
-    status = make_tree(state, touch->a, error);
-    if (!status) status = make_tree(state, touch->b, error);
-    if (!status)
-      status = sonde_overlap_create(state->tree[touch->a], state->tree[touch->b], &config,
-                                    &state->overlap[t], error);
-    state->touch_of[touch->a * n + touch->b] = state->touch_of[touch->b * n + touch->a] = t + 1;
-  }
-  return status;
-}
-
 static sonde_status allocate(sonde_scene_state *state, sonde_error *error) {
   // Room for contact: columns with a push and two tangents each, regions over all vertices twice.
   const sonde_scene *scene = state->scene;
@@ -202,7 +175,29 @@ sonde_status sonde_scene_state_create(const sonde_scene *scene, sonde_scene_stat
   sonde_status status = allocate(state, error);
   if (!status) {
     sonde_scene_state_reset(state);
-    status = make_contact(state, error);
+    // Trees of the faces that may touch, and the common volume of each pair of bodies.
+    uint32_t n = scene->body_count;
+    status = sonde_sweep_create(n, &state->sweep, error);
+    for (uint32_t b = 0; b < n; ++b) // beyond everything, so that it meets nothing
+      state->bounds[b] = (sonde_bounds){{1e9 + 10 * b, 1e9, 1e9}, {1e9 + 10 * b + 1, 1e9, 1e9}};
+    for (uint32_t t = 0; t < scene->touch_count && !status; ++t) {
+      const sonde_touch *touch = &scene->touches[t];
+      uint32_t faces =
+          scene->bodies[touch->a].surface.face_count + scene->bodies[touch->b].surface.face_count;
+      bool large_faces = sonde_body_is_rigid(&scene->bodies[touch->a]) &&
+                         sonde_body_is_rigid(&scene->bodies[touch->b]);
+      sonde_overlap_config config = {.points_per_piece = 1};
+      if (touch->law == SONDE_TOUCH_FOUNDATION && large_faces) config.points_per_piece = 3;
+      config.max_pieces = 16 * faces < 4096 ? 4096 : 16 * faces;
+      if (config.max_pieces > PIECES_MOST) config.max_pieces = PIECES_MOST;
+      config.max_points = 2 * config.max_pieces;
+      status = make_tree(state, touch->a, error);
+      if (!status) status = make_tree(state, touch->b, error);
+      if (!status)
+        status = sonde_overlap_create(state->tree[touch->a], state->tree[touch->b], &config,
+                                      &state->overlap[t], error);
+      state->touch_of[touch->a * n + touch->b] = state->touch_of[touch->b * n + touch->a] = t + 1;
+    }
   }
   if (!status)
     status = sonde_block_matrix_create(scene->slot_count, scene->pair_count,
@@ -353,7 +348,6 @@ uint32_t sonde_scene_body_count(const sonde_scene *scene) { return scene->body_c
 const char *sonde_scene_title(const sonde_scene *scene) { return scene->title; }
 double sonde_scene_duration(const sonde_scene *scene) { return scene->duration_s; }
 sonde_vec3 sonde_scene_gravity(const sonde_scene *scene) { return scene->gravity_m_s2; }
-uint64_t sonde_scene_checksum(const sonde_scene *scene) { return scene->checksum; }
 uint32_t sonde_scene_pair_count(const sonde_scene *scene) { return scene->touch_count; }
 sonde_scene_step sonde_scene_get_step(const sonde_scene *scene) { return scene->step; }
 

@@ -235,21 +235,6 @@ static void balance(sonde_scene_state *state, sonde_vec3 *dv, double h) {
   }
 }
 
-static void undo(sonde_scene_state *state, double h) {
-  sonde_kept_head head = *state->now.head;
-  sonde_kept_copy(&state->now, &state->undo);
-  head.time_s += h;
-  *state->now.head = head;
-  size_t bytes = state->scene->slot_count * sizeof(sonde_vec3);
-  memset(state->now.velocity, 0, bytes);
-  memset(state->now.increment, 0, bytes);
-  memset(state->now.calm, 0, state->scene->slot_count);
-  memset(state->now.bond, 0, state->bond_count * sizeof(sonde_vec3));
-  memset(state->now.slip, 0, state->bond_count * sizeof(double));
-  for (uint32_t t = 0; t < state->scene->touch_count; ++t) state->pair[t] = (sonde_pair_measure){0};
-  state->report.flags |= SONDE_SCENE_NON_FINITE;
-}
-
 void sonde_step_once(sonde_scene_state *state, double h) {
   SONDE_ASSERT(h > 0);
   sonde_kept_copy(&state->undo, &state->now);
@@ -290,7 +275,20 @@ void sonde_step_once(sonde_scene_state *state, double h) {
   finite = sonde_stage_finish(state, state->now.increment, h) && finite;
   state->report.awake = state->active_row_count;
   if (!finite) {
-    undo(state, h);
+    // The bodies stand still where the step began, with their contacts forgotten.
+    sonde_kept_head head = *state->now.head;
+    sonde_kept_copy(&state->now, &state->undo);
+    head.time_s += h;
+    *state->now.head = head;
+    size_t bytes = state->scene->slot_count * sizeof(sonde_vec3);
+    memset(state->now.velocity, 0, bytes);
+    memset(state->now.increment, 0, bytes);
+    memset(state->now.calm, 0, state->scene->slot_count);
+    memset(state->now.bond, 0, state->bond_count * sizeof(sonde_vec3));
+    memset(state->now.slip, 0, state->bond_count * sizeof(double));
+    for (uint32_t t = 0; t < state->scene->touch_count; ++t)
+      state->pair[t] = (sonde_pair_measure){0};
+    state->report.flags |= SONDE_SCENE_NON_FINITE;
     return;
   }
   state->now.head->time_s += h;

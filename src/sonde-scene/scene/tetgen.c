@@ -132,32 +132,6 @@ static bool same(const record *a, const record *b) {
   return memcmp(a->key, b->key, sizeof a->key) == 0;
 }
 
-// Springs and masses from the sorted records of edges.
-static sonde_status add_springs(const tetrahedra *tets, sonde_solid solid, record *edges,
-                                uint32_t count, sonde_body *body, sonde_error *error) {
-  uint32_t used = 0;
-  for (uint32_t i = 0; i < count; ++i) {
-    if (used && same(&edges[used - 1], &edges[i]))
-      edges[used - 1].stiffness += edges[i].stiffness;
-    else
-      edges[used++] = edges[i];
-  }
-  sonde_status status = sonde_body_allocate(body, tets->node_count, used, error);
-  if (status) return status;
-  memcpy(body->node, tets->node, tets->node_count * sizeof *tets->node);
-  for (uint32_t e = 0; e < used; ++e) {
-    uint32_t a = body->pairs[e][0] = edges[e].key[0], b = body->pairs[e][1] = edges[e].key[1];
-    double k = edges[e].stiffness;
-    body->spring[e] =
-        (sonde_spring){v_distance(tets->node[a], tets->node[b]), k, k * solid.damping_s};
-  }
-  for (uint32_t t = 0; t < tets->count; ++t)
-    for (int k = 0; k < 4; ++k)
-      body->node_mass_kg[tets->corner[t][k]] +=
-          solid.density_kg_m3 * six_volumes(tets, tets->corner[t]) / 24;
-  return SONDE_OK;
-}
-
 // Faces that stand alone, over the nodes that they use.
 static sonde_status add_skin(record *faces, uint32_t count, sonde_body *body, sonde_error *error) {
   SONDE_ASSERT(!body->surface_node);
@@ -217,8 +191,27 @@ static sonde_status build(const tetrahedra *tets, sonde_solid solid, sonde_body 
   if (!status) {
     qsort(edges, 6 * (size_t)tets->count, sizeof *edges, compare);
     qsort(faces, 4 * (size_t)tets->count, sizeof *faces, compare);
-    status = add_springs(tets, solid, edges, 6 * tets->count, body, error);
+    // Springs from the sorted records of edges, masses from the tetrahedra.
+    uint32_t used = 0;
+    for (uint32_t i = 0; i < 6 * tets->count; ++i) {
+      if (used && same(&edges[used - 1], &edges[i]))
+        edges[used - 1].stiffness += edges[i].stiffness;
+      else
+        edges[used++] = edges[i];
+    }
+    status = sonde_body_allocate(body, tets->node_count, used, error);
   }
+  for (uint32_t e = 0; e < body->spring_count && !status; ++e) {
+    uint32_t a = body->pairs[e][0] = edges[e].key[0], b = body->pairs[e][1] = edges[e].key[1];
+    double k = edges[e].stiffness;
+    body->spring[e] =
+        (sonde_spring){v_distance(tets->node[a], tets->node[b]), k, k * solid.damping_s};
+  }
+  if (!status) memcpy(body->node, tets->node, tets->node_count * sizeof *tets->node);
+  for (uint32_t t = 0; t < tets->count && !status; ++t)
+    for (int k = 0; k < 4; ++k)
+      body->node_mass_kg[tets->corner[t][k]] +=
+          solid.density_kg_m3 * six_volumes(tets, tets->corner[t]) / 24;
   if (!status) status = add_skin(faces, 4 * tets->count, body, error);
   for (uint32_t i = 0; i < body->node_count && !status; ++i)
     if (!(body->node_mass_kg[i] > 0))

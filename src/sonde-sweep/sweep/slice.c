@@ -195,11 +195,6 @@ void sonde_slicer_destroy(sonde_slicer *slicer) {
   sonde_free(slicer);
 }
 
-bool sonde_slicer_is_along_sweep(const sonde_slicer *slicer) {
-  SONDE_ASSERT(slicer != NULL);
-  return slicer->options.along_sweep;
-}
-
 static sonde_status block_row(void *user, uint32_t worker, uint32_t item, const atomic_bool *stop,
                               sonde_error *error) {
   sonde_slicer *slicer = user;
