@@ -136,7 +136,7 @@ static void any_moment_is_that_of_playing_through(void **state) {
   struct stat info;
   assert_int_equal(stat(keys_path, &info), 0);
   sonde_player *player = open_player(*state, false, false);
-  assert_int_equal(player->keys.count, 3);
+  assert_int_equal(player->keyframes.count, 3);
   seek_everywhere(player, &s, 1200);
   uint64_t hash = player->recording.told.hash;
   assert_int_equal(sonde_player_seek(player, 9, NULL, NULL), SONDE_OK);
@@ -153,9 +153,9 @@ static void keyframes_are_a_cache(void **state) {
   assert_int_equal(sonde_file_load(keys_path, &bytes, &count, NULL), SONDE_OK);
   unlink(keys_path);
   sonde_player *player = open_player(*state, false, false);
-  assert_int_equal(player->keys.count, 0);
+  assert_int_equal(player->keyframes.count, 0);
   seek_everywhere(player, &s, 1200);
-  assert_int_equal(player->keys.count, 3);
+  assert_int_equal(player->keyframes.count, 3);
   sonde_player_close(player);
   assert_int_equal(sonde_file_load(keys_path, &again, &other, NULL), SONDE_OK);
   assert_in_range(other, count - 64, count + 64); // bytes between members pack differently

@@ -45,7 +45,7 @@ static void test_incline(void **unused) {
   sonde_vec3 before = measure(&w, "box").centre_m;
   steps(&w, 3000);
   sonde_vec3 after = measure(&w, "box").centre_m;
-  assert_true(before.x < 5e-4); // about the way of the bonds
+  assert_true(before.x < 5e-4); // about the displacement of the bonds
   assert_near(v_distance(after, before), 0, 1e-9);
   sonde_pair_measure pair = sonde_scene_pair_measure(w.state, 0);
   assert_near(pair.friction_n.x, 9.81 * sin(0.95 * limit), 1e-4);
@@ -94,10 +94,10 @@ static void test_on_a_soft_slab(void **unused) {
   double drag = a == 0 ? pair.friction_n.x : -pair.friction_n.x;
   assert_near(drag / pair.normal_n, 0.3, 0.01);
   steps(&w, 400);
-  double way = measure(&w, "box").centre_m.x - x0;
-  print_message("soft slab: slid %.1f mm, v^2/(2 mu g) = %.1f mm\n", way * 1e3,
+  double displacement = measure(&w, "box").centre_m.x - x0;
+  print_message("soft slab: slid %.1f mm, v^2/(2 mu g) = %.1f mm\n", displacement * 1e3,
                 0.64 / (0.6 * 9.81) * 1e3);
-  assert_near(way / (0.64 / (0.6 * 9.81)), 1, 0.03);
+  assert_near(displacement / (0.64 / (0.6 * 9.81)), 1, 0.03);
   world_end(&w);
 }
 

@@ -263,13 +263,13 @@ static void test_gradients_against_elimination(void **unused) {
   uint64_t seed = 7;
   for (uint32_t r = 0; r < active.row_count; ++r) {
     sonde_vec3 right = fixture_vector(&seed, 1);
-    state->right[active.rows[r]] = right;
+    state->residual[active.rows[r]] = right;
     memcpy(b + 3 * r, &right, sizeof right);
   }
   sonde_pcg_options options = {1e-12, 0, 5000};
   sonde_block_invert_diagonal(state->matrix, &active);
   sonde_pcg_result result = sonde_pcg_solve(state->matrix, &active, state->terms, state->term_count,
-                                            state->right, x, &state->scratch, &options);
+                                            state->residual, x, &state->scratch, &options);
   assert_true(result.converged);
   eliminate(a, b, n);
   for (uint32_t r = 0; r < active.row_count; ++r) {

@@ -12,7 +12,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-static const double AGAIN_S = 0.5;
+static const double RETRY_S = 0.5;
 enum { ROOM = 1 << 16, SYNC_BYTES = 1 << 20 };
 
 struct sonde_journal {
@@ -24,7 +24,7 @@ struct sonde_journal {
   unsigned char *bytes;
   size_t count, written, room;
   int trouble; // of the last attempt
-  double again_s;
+  double retry_s;
 };
 
 static sonde_status fail(const char *path, int failure, sonde_error *error) {
@@ -109,7 +109,7 @@ sonde_status sonde_journal_extend(const char *path, sonde_journal **out, sonde_e
   return sonde_fail(error, SONDE_DEVICE, "%s: is being recorded", path);
 }
 
-int sonde_journal_keep(sonde_journal *journal, uint64_t bytes) {
+int sonde_journal_truncate(sonde_journal *journal, uint64_t bytes) {
   SONDE_ASSERT(journal->count == 0);
   int failure = sonde_disk_truncate(journal->descriptor, (off_t)bytes);
   if (!failure && lseek(journal->descriptor, (off_t)bytes, SEEK_SET) < 0) failure = errno;
@@ -138,7 +138,7 @@ bool sonde_journal_append(sonde_journal *journal, const void *bytes, size_t coun
 
 int sonde_journal_flush(sonde_journal *journal, bool sync, bool now) {
   SONDE_ASSERT(journal->written <= journal->count);
-  if (journal->trouble && !now && sonde_clock_now() < journal->again_s) return journal->trouble;
+  if (journal->trouble && !now && sonde_clock_now() < journal->retry_s) return journal->trouble;
   size_t written = 0;
   int failure = 0;
   if (journal->count > journal->written)
@@ -157,7 +157,7 @@ int sonde_journal_flush(sonde_journal *journal, bool sync, bool now) {
     }
   }
   journal->trouble = failure;
-  if (failure) journal->again_s = sonde_clock_now() + AGAIN_S;
+  if (failure) journal->retry_s = sonde_clock_now() + RETRY_S;
   return failure;
 }
 

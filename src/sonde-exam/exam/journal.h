@@ -17,11 +17,11 @@ typedef struct sonde_journal sonde_journal;
 // Makes a file under its own name. A file that is there already and not empty gets the name
 // PATH.old; links are followed; what is not a regular file is written into.
 sonde_status sonde_journal_create(const char *path, sonde_journal **journal, sonde_error *error);
-// Opens a file to go on with it: sonde_journal_keep() says where before the first bytes.
+// Opens a file to go on with it: sonde_journal_truncate() says where before the first bytes.
 // @return SONDE_DEVICE while another program or another part of this one writes the file
 sonde_status sonde_journal_extend(const char *path, sonde_journal **journal, sonde_error *error);
 // Cuts off what comes after the first `bytes`, which no reader can use. @return 0 or an errno
-int sonde_journal_keep(sonde_journal *journal, uint64_t bytes);
+int sonde_journal_truncate(sonde_journal *journal, uint64_t bytes);
 // True for a file that can be read back.
 bool sonde_journal_is_file(const sonde_journal *journal);
 // @param important may use the reserve @return false when there is no room: the bytes are not taken

@@ -58,7 +58,7 @@ static int append(sonde_journal *journal, const sonde_recording *r, sonde_note_k
   crc = crc32_z(crc, (const unsigned char *)text, length);
   crc = crc32_z(crc, (const unsigned char *)zeros, pad);
   sonde_record_put_block(block, (uint32_t)crc, r->block_ticks);
-  int failure = sonde_journal_keep(journal, r->notes_end);
+  int failure = sonde_journal_truncate(journal, r->notes_end);
   if (failure) return failure;
   bool taken = sonde_journal_append(journal, head, sizeof head, true) &&
                sonde_journal_append(journal, text, length, true) &&

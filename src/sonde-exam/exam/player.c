@@ -48,7 +48,7 @@ static sonde_status create_session(sonde_player *player, const sonde_model *mode
   player->start_bytes = sonde_subject_remember(subject, player->start_world);
   player->start_inputs = (sonde_tick_memory){player->session->controls, player->session->sample};
   sonde_session_remember_image(player->session, &player->start_inside);
-  return sonde_keys_init(&player->keys, subject, error);
+  return sonde_keyframes_init(&player->keyframes, subject, error);
 }
 
 static uint32_t images_until(const sonde_player *player, uint64_t tick) {
@@ -86,9 +86,9 @@ void sonde_player_restart(sonde_player *player) {
   player->followed = player->drawn = false;
 }
 
-bool sonde_player_jump(sonde_player *player, const sonde_packed_key *packed) {
-  sonde_key key;
-  if (!sonde_keys_unpack(&player->keys, packed, &key)) return false;
+bool sonde_player_jump(sonde_player *player, const sonde_packed_keyframe *packed) {
+  sonde_keyframe key;
+  if (!sonde_keyframes_unpack(&player->keyframes, packed, &key)) return false;
   sonde_tick_memory inputs;
   memcpy(&inputs, key.inputs, sizeof inputs);
   memcpy(&player->inside, key.inside, sizeof player->inside);
@@ -109,15 +109,16 @@ static void make_image(sonde_player *player) {
   uint64_t tick = tick_of(player);
   if (next >= player->image_count || player->images[next].tick != tick) return;
   // A keyframe where the session would have taken one, unless there is one already.
-  const sonde_packed_key *last = sonde_keys_find(&player->keys, tick);
-  uint64_t from = sonde_session_key_place(s, tick), ahead = 2 * (uint64_t)s->ticks_per_image;
+  const sonde_packed_keyframe *last = sonde_keyframes_find(&player->keyframes, tick);
+  uint64_t from = sonde_session_keyframe_tick(s, tick), ahead = 2 * (uint64_t)s->ticks_per_image;
   if (from != 0 && !(last && last->tick + ahead > from)) {
     sonde_tick_memory inputs;
     memset(&inputs, 0, sizeof inputs);
     size_t bytes = sonde_session_remember_tick(s, &inputs, player->world);
     sonde_session_remember_image(s, &player->inside);
-    sonde_key key = {tick, &inputs, &player->inside, player->world, bytes};
-    (void)sonde_keys_add(&player->keys, &key); // without it a seek starts from farther away
+    sonde_keyframe key = {tick, &inputs, &player->inside, player->world, bytes};
+    (void)sonde_keyframes_add(&player->keyframes,
+                              &key); // without it a seek starts from farther away
   }
   // The limits of the force acted on the device, which the recording tells.
   const sonde_player_image *image = &player->images[player->next_image++];
@@ -173,9 +174,9 @@ sonde_status sonde_player_open(const sonde_player_def *def, sonde_player **out,
     return status;
   }
   // Keyframes that an earlier player left beside the recording.
-  char *path = player->no_cache ? NULL : sonde_keys_path(player->path);
-  if (path) sonde_keys_open(&player->keys, path, player->session->subject, r->told.crc);
-  player->from_file = player->keys.count;
+  char *path = player->no_cache ? NULL : sonde_keyframes_path(player->path);
+  if (path) sonde_keyframes_open(&player->keyframes, path, player->session->subject, r->told.crc);
+  player->from_file = player->keyframes.count;
   sonde_free(path);
   sonde_player_restart(player);
   *out = player;
@@ -186,23 +187,23 @@ void sonde_player_close(sonde_player *player) {
   if (!player) return;
   // The keyframes of an exam that was played through are kept beside the recording.
   if (!player->no_cache && player->covered == player->info.ticks &&
-      player->keys.count > player->from_file) {
-    sonde_keys_file *file = NULL;
-    char *path = sonde_keys_path(player->path);
-    if (path) (void)sonde_keys_create(path, player->session->subject, &file, NULL);
+      player->keyframes.count > player->from_file) {
+    sonde_keyframe_writer *file = NULL;
+    char *path = sonde_keyframes_path(player->path);
+    if (path) (void)sonde_keyframe_writer_create(path, player->session->subject, &file, NULL);
     bool good = file != NULL;
-    for (uint32_t k = 0; good && k < player->keys.count; ++k) {
-      sonde_packed_key key;
-      good = sonde_keys_fetch(&player->keys, &player->keys.list[k], &key);
-      if (good) sonde_keys_append(file, &key);
+    for (uint32_t k = 0; good && k < player->keyframes.count; ++k) {
+      sonde_packed_keyframe key;
+      good = sonde_keyframes_fetch(&player->keyframes, &player->keyframes.list[k], &key);
+      if (good) sonde_keyframe_writer_copy(file, &key);
     }
     if (good)
-      (void)sonde_keys_commit(file, player->recording.told.crc, NULL);
+      (void)sonde_keyframe_writer_commit(file, player->recording.told.crc, NULL);
     else
-      sonde_keys_discard(file);
+      sonde_keyframe_writer_discard(file);
     sonde_free(path);
   }
-  sonde_keys_clear(&player->keys);
+  sonde_keyframes_clear(&player->keyframes);
   (void)sonde_session_destroy(player->session, NULL);
   sonde_recording_clear(&player->recording);
   sonde_free(player->events);
@@ -233,11 +234,11 @@ sonde_status sonde_player_seek(sonde_player *player, double time_s, const sonde_
   uint32_t images = images_until(player, goal);
   uint64_t now = tick_of(player);
   bool here = now <= goal, jumped = false;
-  const sonde_packed_key *key =
-      images > 0 ? sonde_keys_find(&player->keys, player->images[images - 1].tick) : NULL;
+  const sonde_packed_keyframe *key =
+      images > 0 ? sonde_keyframes_find(&player->keyframes, player->images[images - 1].tick) : NULL;
   while (key && !jumped && (!here || key->tick > now)) {
     jumped = sonde_player_jump(player, key);
-    key = key > player->keys.list ? key - 1 : NULL;
+    key = key > player->keyframes.list ? key - 1 : NULL;
     here = false;
   }
   if (!here && !jumped) sonde_player_restart(player);

@@ -2,7 +2,7 @@
 #ifndef SONDE_SRC_PLAYER_H
 #define SONDE_SRC_PLAYER_H
 
-#include "exam/keys.h"
+#include "exam/keyframes.h"
 
 // An image of the recording.
 typedef struct sonde_player_image {
@@ -31,7 +31,7 @@ struct sonde_player {
   size_t *marks;              // [mark_count] places of the first record of every 256th tick
   uint32_t event_count, image_count, check_count, mark_count;
 
-  sonde_keys keys;
+  sonde_keyframes keyframes;
   uint32_t from_file; // keyframes that were there
   sonde_tick_memory start_inputs;
   sonde_image_memory start_inside, inside;
@@ -51,6 +51,6 @@ uint64_t sonde_player_tick(const sonde_player *player);
 uint64_t sonde_player_hash(sonde_player *player); // sonde_state_hash()
 // Stands at a tick with a keyframe, or at the start.
 void sonde_player_restart(sonde_player *player);
-bool sonde_player_jump(sonde_player *player, const sonde_packed_key *key);
+bool sonde_player_jump(sonde_player *player, const sonde_packed_keyframe *key);
 
 #endif

@@ -9,7 +9,7 @@ sonde_status sonde_player_check(sonde_player *player, bool images, const sonde_p
                                 sonde_replay_result *result, sonde_error *error) {
   SONDE_ASSERT(player != NULL && result != NULL);
   const sonde_record_end *told = &player->recording.told;
-  const uint64_t slack = 8 * player->session->key_period;
+  const uint64_t slack = 8 * player->session->keyframe_period;
   *result =
       (sonde_replay_result){.recorded_hash = told->hash, .recorded_image_hash = told->image_hash};
   bool images_differ = false, cancelled = false;

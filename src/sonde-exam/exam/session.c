@@ -1,5 +1,5 @@
 // Life of a session.
-#include "exam/keys.h"
+#include "exam/keyframes.h"
 
 #include "base/base.h"
 #include "base/maths.h"
@@ -155,8 +155,8 @@ sonde_status sonde_session_create(const sonde_session_def *def, sonde_device *de
   session->nodes = def->model->surface.vertex_count;
   session->dt_s = def->world.dt_s;
   session->ticks_per_image = def->ticks_per_image;
-  session->key_period = (uint64_t)ceil(SONDE_KEY_PERIOD_S / session->dt_s);
-  session->key_tick = session->key_period;
+  session->keyframe_period = (uint64_t)ceil(SONDE_KEYFRAME_PERIOD_S / session->dt_s);
+  session->keyframe_tick = session->keyframe_period;
   session->image_width = def->image_width;
   session->image_height = def->image_height;
   session->sample.world_from_probe.rotation = quat_identity();

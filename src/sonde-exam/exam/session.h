@@ -39,7 +39,7 @@ typedef struct sonde_surface_slot {
   sonde_pathology pathology; // of the controls, with the pressures of this tick
   sonde_circulation circulation;
   double pose_s; // clock when the tick read its pose; 0 in lockstep
-  bool key;      // a keyframe was taken with it
+  bool keyframe; // one was taken with it
 } sonde_surface_slot;
 
 // Bins of 0.25 ms; the last one holds all that is older.
@@ -82,7 +82,7 @@ typedef struct sonde_inside_slot {
 
 // Keyframes are taken at the last images before every multiple of this, every other one while the
 // probe touches nothing.
-#define SONDE_KEY_PERIOD_S 0.25
+#define SONDE_KEYFRAME_PERIOD_S 0.25
 
 typedef struct sonde_queued_note sonde_queued_note;
 
@@ -106,9 +106,9 @@ struct sonde_session {
   sonde_session_controls controls; // in force
   sonde_device_sample sample;      // last used
   bool realtime;
-  uint64_t offered_tick;         // of the newest surface
-  uint64_t key_period, key_tick; // ticks; the next multiple that may want a keyframe
-  double last_tick_s;            // clock of the previous real-time tick, 0 before the first
+  uint64_t offered_tick;                   // of the newest surface
+  uint64_t keyframe_period, keyframe_tick; // ticks; the next multiple that may want a keyframe
+  double last_tick_s; // clock of the previous real-time tick, 0 before the first
   _Atomic uint64_t ticks;
   _Atomic int fault; // the safety's, for other threads
   _Atomic uint64_t lost_records;
@@ -143,7 +143,7 @@ struct sonde_session {
   sonde_record_end end;
   pthread_mutex_t note_lock; // of notes; the tick never takes it
   sonde_queued_note *notes;
-  struct sonde_keys_file *keys;
+  struct sonde_keyframe_writer *keyframes;
   const sonde_world_slot *world_part; // of the next keyframe, until both parts are there
   const sonde_inside_slot *inside_part;
 
@@ -174,7 +174,7 @@ void sonde_session_realtime_tick(void *session);
 void sonde_session_replay(sonde_session *session, const sonde_session_controls *controls,
                           const sonde_device_sample *sample);
 // The multiple whose keyframe an image of this tick would be, 0: none is wanted (hot).
-uint64_t sonde_session_key_place(const sonde_session *session, uint64_t tick);
+uint64_t sonde_session_keyframe_tick(const sonde_session *session, uint64_t tick);
 // The surface and its snapshot into the mailbox of the image thread (hot).
 void sonde_session_offer(sonde_session *session);
 // What the next tick depends on, also sonde_subject_remember() into world[] (hot). Returns its

@@ -30,8 +30,9 @@ static bool surface_is_due(sonde_session *session, uint64_t tick) {
 }
 
 // Tissue that nothing touches is soon at rest, and quick to go through.
-uint64_t sonde_session_key_place(const sonde_session *session, uint64_t tick) {
-  uint64_t near = tick + 2 * (uint64_t)session->ticks_per_image - 1, period = session->key_period;
+uint64_t sonde_session_keyframe_tick(const sonde_session *session, uint64_t tick) {
+  uint64_t near = tick + 2 * (uint64_t)session->ticks_per_image - 1,
+           period = session->keyframe_period;
   bool touching = sonde_state_contact(session->state)->area_m2 > 0;
   return touching || near / period % 2 == 0 ? near / period * period : 0;
 }
@@ -80,10 +81,11 @@ void sonde_session_offer(sonde_session *session) {
   head->circulation = session->subject->now.circulation;
   head->pose_s = session->last_tick_s;
   // All that the next tick depends on goes to the recorder when a keyframe is due.
-  uint64_t place = session->world_box ? sonde_session_key_place(session, head->snapshot.tick) : 0;
-  head->key = place >= session->key_tick;
-  if (head->key) {
-    session->key_tick = place + session->key_period;
+  uint64_t place =
+      session->world_box ? sonde_session_keyframe_tick(session, head->snapshot.tick) : 0;
+  head->keyframe = place >= session->keyframe_tick;
+  if (head->keyframe) {
+    session->keyframe_tick = place + session->keyframe_period;
     sonde_world_slot *part = (void *)sonde_mailbox_write_slot(session->world_box);
     part->tick = sonde_state_tick(session->state);
     part->bytes = sonde_session_remember_tick(session, &part->memory, part + 1);

@@ -135,7 +135,7 @@ bool sonde_session_follow(sonde_session *session) {
   if (!slot) return false;
   session->surface = slot;
   const sonde_surface_slot *head = (const void *)slot;
-  if (head->key) {
+  if (head->keyframe) {
     sonde_inside_slot *part = (void *)sonde_mailbox_write_slot(session->inside_box);
     part->tick = head->snapshot.tick;
     sonde_session_remember_image(session, &part->memory);

@@ -1,5 +1,5 @@
 // What a session keeps of itself: records, keyframes and notes to their files, and the end.
-#include "exam/keys.h"
+#include "exam/keyframes.h"
 
 #include "base/base.h"
 
@@ -52,8 +52,9 @@ sonde_status sonde_session_create_recording(sonde_session *session, const sonde_
   }
   if (!status) {
     if (!(!sonde_recorder_is_file(session->recorder))) {
-      char *path = sonde_keys_path(def->record_path);
-      if (path) (void)sonde_keys_create(path, session->subject, &session->keys, NULL);
+      char *path = sonde_keyframes_path(def->record_path);
+      if (path)
+        (void)sonde_keyframe_writer_create(path, session->subject, &session->keyframes, NULL);
       sonde_free(path);
     }
   }
@@ -99,12 +100,12 @@ void sonde_session_drain(sonde_session *session) {
   const sonde_world_slot *world = session->world_part;
   const sonde_inside_slot *inside = session->inside_part;
   if (world && inside && world->tick == inside->tick) {
-    sonde_key key = {.tick = world->tick,
-                     .inputs = &world->memory,
-                     .inside = &inside->memory,
-                     .world = world + 1,
-                     .world_bytes = world->bytes};
-    if (session->keys) sonde_keys_write(session->keys, &key);
+    sonde_keyframe key = {.tick = world->tick,
+                          .inputs = &world->memory,
+                          .inside = &inside->memory,
+                          .world = world + 1,
+                          .world_bytes = world->bytes};
+    if (session->keyframes) sonde_keyframe_writer_add(session->keyframes, &key);
     write_check(session,
                 &(sonde_record_check){SONDE_CHECK_STATE, world->tick,
                                       sonde_subject_saved_hash(session->subject, world + 1)});
@@ -121,9 +122,9 @@ void sonde_session_drain(sonde_session *session) {
   }
   // A disk that is full has no room for keyframes, which a player can make again.
   sonde_recorder_retry(session->recorder);
-  if (!session->keys || !sonde_recorder_look(session->recorder).trouble) return;
-  sonde_keys_discard(session->keys);
-  session->keys = NULL;
+  if (!session->keyframes || !sonde_recorder_look(session->recorder).trouble) return;
+  sonde_keyframe_writer_discard(session->keyframes);
+  session->keyframes = NULL;
 }
 
 // ---- the interface ----------------------------------------------------------------------------
@@ -161,11 +162,11 @@ sonde_status sonde_session_finish(sonde_session *session, sonde_error *error) {
   sonde_session_drain(session); // notes that came after a first attempt
   sonde_status status = sonde_recorder_sync(session->recorder, error);
   if (status) return status;
-  if (session->keys && !session->end.lost)
-    (void)sonde_keys_commit(session->keys, session->end.crc, NULL);
+  if (session->keyframes && !session->end.lost)
+    (void)sonde_keyframe_writer_commit(session->keyframes, session->end.crc, NULL);
   else
-    sonde_keys_discard(session->keys);
-  session->keys = NULL;
+    sonde_keyframe_writer_discard(session->keyframes);
+  session->keyframes = NULL;
   sonde_recorder_close(session->recorder);
   session->recorder = NULL;
   if (!session->end.lost) return SONDE_OK;
@@ -198,7 +199,7 @@ void sonde_session_release_recording(sonde_session *session) {
     sonde_recorder_discard(session->recorder);
   else
     sonde_recorder_close(session->recorder);
-  sonde_keys_discard(session->keys);
+  sonde_keyframe_writer_discard(session->keyframes);
   for (sonde_queued_note *note = take_notes(session), *next; note; note = next) {
     next = note->next;
     sonde_free(note);

@@ -73,9 +73,10 @@ sonde_cast_result sonde_convex_cast_faces(const sonde_convex *a, const sonde_mot
     box = (sonde_bounds){v_sub(motion_a->start.position, reach),
                          v_add(motion_a->start.position, reach)};
   } else {
-    sonde_mat3 turn = q_matrix(motion_a->start.rotation);
+    sonde_mat3 rotation = q_matrix(motion_a->start.rotation);
     for (uint32_t v = 0; v < a->hull.vertex_count; ++v)
-      box = bounds_add(box, v_add(m_mul_v(turn, a->hull.vertices[v]), motion_a->start.position));
+      box =
+          bounds_add(box, v_add(m_mul_v(rotation, a->hull.vertices[v]), motion_a->start.position));
   }
   box = bounds_join(box, (sonde_bounds){v_add(box.low, shift), v_add(box.high, shift)});
   box = (sonde_bounds){v_sub(box.low, margin), v_add(box.high, margin)};

@@ -24,9 +24,9 @@ static inline difference difference_make(const sonde_convex *a, sonde_pose world
 }
 
 // Farthest point of the set along a direction of A's frame; *on_a is the point of A in it.
-static inline sonde_vec3 difference_support(difference *d, sonde_vec3 way, sonde_vec3 *on_a) {
-  d->last_a = sonde_convex_climb(d->a, way, d->last_a, &d->work);
-  d->last_b = sonde_convex_climb(d->b, v_neg(m_mul_v(d->b_from_a, way)), d->last_b, &d->work);
+static inline sonde_vec3 difference_support(difference *d, sonde_vec3 direction, sonde_vec3 *on_a) {
+  d->last_a = sonde_convex_climb(d->a, direction, d->last_a, &d->work);
+  d->last_b = sonde_convex_climb(d->b, v_neg(m_mul_v(d->b_from_a, direction)), d->last_b, &d->work);
   *on_a = d->a->hull.vertices[d->last_a];
   return v_sub(*on_a, v_add(m_mul_v(d->a_from_b, d->b->hull.vertices[d->last_b]), d->offset));
 }

@@ -37,8 +37,8 @@ static bool nudge(difference *d, trial *best) {
   trial lowest = *best;
   for (int k = 0; k < 8; ++k) {
     double angle = SONDE_PI * k / 4;
-    sonde_vec3 way = v_madd(v_madd(n, 0.05 * cos(angle), u), 0.05 * sin(angle), v);
-    trial t = try_direction(d, v_unit(way, n));
+    sonde_vec3 direction = v_madd(v_madd(n, 0.05 * cos(angle), u), 0.05 * sin(angle), v);
+    trial t = try_direction(d, v_unit(direction, n));
     if (t.depth < lowest.depth) lowest = t;
   }
   bool better = lowest.depth < best->depth * (1 - 1e-9);
@@ -59,8 +59,8 @@ static bool follow(difference *d, sonde_pose b_at, trial *best, uint32_t *rounds
     sonde_gjk_result gap = sonde_gjk_distance(d->a, a_at, d->b, moved, &cache);
     d->work += gap.support_calls;
     if (gap.overlap || !(gap.distance_m > 0)) return false;
-    sonde_vec3 way = v_sub(gap.point_b_m, gap.point_a_m);
-    trial next = try_direction(d, v_unit(way, best->direction));
+    sonde_vec3 direction = v_sub(gap.point_b_m, gap.point_a_m);
+    trial next = try_direction(d, v_unit(direction, best->direction));
     bool stands = !(next.depth < best->depth * (1 - 1e-9));
     if (next.depth < best->depth) *best = next;
     if (stands && !nudge(d, best)) return true;
@@ -88,9 +88,9 @@ sonde_depth_result sonde_convex_displace(const sonde_convex *a, sonde_pose world
   trial starts[STARTS];
   for (int k = 0; k < STARTS; ++k) starts[k] = (trial){.depth = INFINITY};
   for (int k = 0; k < 27; ++k) {
-    sonde_vec3 way = vec3(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1);
-    if (!(v_norm2(way) > 0)) continue;
-    trial t = try_direction(&d, v_unit(way, way));
+    sonde_vec3 corner = vec3(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1);
+    if (!(v_norm2(corner) > 0)) continue;
+    trial t = try_direction(&d, v_unit(corner, corner));
     for (int i = 0; i < STARTS; ++i) {
       if (!(t.depth < starts[i].depth)) continue;
       trial swap = starts[i];

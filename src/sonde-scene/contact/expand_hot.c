@@ -40,16 +40,17 @@ static bool add_face(polytope *p, uint32_t a, uint32_t b, uint32_t c) {
   return true;
 }
 
-static point support(polytope *p, sonde_vec3 way) {
+static point support(polytope *p, sonde_vec3 direction) {
   point q;
-  q.w = difference_support(&p->d, way, &q.on_a);
+  q.w = difference_support(&p->d, direction, &q.on_a);
   return q;
 }
 
-// The farther of the supports along way and back, measured from the point x.
-static point farther(polytope *p, sonde_vec3 way, sonde_vec3 x) {
-  point there = support(p, way), back = support(p, v_neg(way));
-  double a = fabs(v_dot(way, v_sub(there.w, x))), b = fabs(v_dot(way, v_sub(back.w, x)));
+// The farther of the supports along direction and back, measured from the point x.
+static point farther(polytope *p, sonde_vec3 direction, sonde_vec3 x) {
+  point there = support(p, direction), back = support(p, v_neg(direction));
+  double a = fabs(v_dot(direction, v_sub(there.w, x))),
+         b = fabs(v_dot(direction, v_sub(back.w, x)));
   return a >= b ? there : back;
 }
 

@@ -73,13 +73,13 @@ bool sonde_overlap_compute(sonde_overlap *overlap, const sonde_face_tree *a,
     if (!(v_norm2(hint) > 0)) {
       // The hint defaults to the axis along which the boxes overlap least, towards B's middle.
       sonde_vec3 size = v_sub(common.high, common.low);
-      sonde_vec3 way = v_sub(v_add(box_b.low, box_b.high), v_add(box_a.low, box_a.high));
+      sonde_vec3 offset = v_sub(v_add(box_b.low, box_b.high), v_add(box_a.low, box_a.high));
       if (size.x <= size.y && size.x <= size.z)
-        hint = vec3(way.x < 0 ? -1 : 1, 0, 0);
+        hint = vec3(offset.x < 0 ? -1 : 1, 0, 0);
       else if (size.y <= size.z)
-        hint = vec3(0, way.y < 0 ? -1 : 1, 0);
+        hint = vec3(0, offset.y < 0 ? -1 : 1, 0);
       else
-        hint = vec3(0, 0, way.z < 0 ? -1 : 1);
+        hint = vec3(0, 0, offset.z < 0 ? -1 : 1);
     }
     hint = v_unit(hint, vec3(0, 0, 1));
     view around = sonde_view_make(hint, (sonde_bounds){{0, 0, 0}, {0, 0, 0}});

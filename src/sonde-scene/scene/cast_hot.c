@@ -28,12 +28,12 @@ double sonde_scene_thickness(const sonde_mesh *surface) {
   return area > 0 && volume > 0 ? volume / area : 0;
 }
 
-static sonde_bounds widen(sonde_vec3 way, double by) {
+static sonde_bounds widen(sonde_vec3 displacement, double by) {
   sonde_vec3 more = vec3(by, by, by);
-  return (sonde_bounds){v_sub(way, more), v_add(way, more)};
+  return (sonde_bounds){v_sub(displacement, more), v_add(displacement, more)};
 }
 
-// A turn moves a vertex by no more than reach times angle, and no more than twice the reach.
+// A rotation moves a vertex by no more than reach times angle, and no more than twice the reach.
 static sonde_bounds guess(const sonde_scene_state *state, uint32_t b, double h) {
   const sonde_body *body = &state->scene->bodies[b];
   const sonde_vec3 *v = state->now.velocity + body->first_slot;
@@ -42,33 +42,34 @@ static sonde_bounds guess(const sonde_scene_state *state, uint32_t b, double h) 
   if (body->motion == SONDE_BODY_DRIVEN) fall = vec3(0, 0, 0);
   if (sonde_body_is_rigid(body))
     return widen(v_madd(fall, h, v[0]), state->reach_m[b] * fmin(2, h * v_norm(v[1])));
-  sonde_bounds ways = {v_scale(v[0], h), v_scale(v[0], h)};
+  sonde_bounds displacements = {v_scale(v[0], h), v_scale(v[0], h)};
   for (uint32_t i = 1; i < body->node_count; ++i) {
-    sonde_vec3 way = v_scale(v[i], h);
-    ways = bounds_add(ways, way);
+    sonde_vec3 displacement = v_scale(v[i], h);
+    displacements = bounds_add(displacements, displacement);
   }
-  return (sonde_bounds){v_low(ways.low, v_add(ways.low, fall)),
-                        v_high(ways.high, v_add(ways.high, fall))};
+  return (sonde_bounds){v_low(displacements.low, v_add(displacements.low, fall)),
+                        v_high(displacements.high, v_add(displacements.high, fall))};
 }
 
 static sonde_bounds made(const sonde_scene_state *state, uint32_t b) {
   const sonde_body *body = &state->scene->bodies[b];
   const sonde_vec3 *to = state->now.position + body->first_slot;
   const sonde_vec3 *from = state->undo.position + body->first_slot;
-  sonde_vec3 way = v_sub(to[0], from[0]);
+  sonde_vec3 displacement = v_sub(to[0], from[0]);
   if (sonde_body_is_rigid(body)) {
-    sonde_quat turn = q_mul(state->now.rotation[b], q_conj(state->undo.rotation[b]));
-    return widen(way, 2 * state->reach_m[b] * v_norm(vec3(turn.x, turn.y, turn.z)));
+    sonde_quat change = q_mul(state->now.rotation[b], q_conj(state->undo.rotation[b]));
+    return widen(displacement, 2 * state->reach_m[b] * v_norm(vec3(change.x, change.y, change.z)));
   }
-  sonde_bounds ways = {way, way};
+  sonde_bounds displacements = {displacement, displacement};
   for (uint32_t i = 1; i < body->node_count; ++i) {
-    way = v_sub(to[i], from[i]);
-    ways = bounds_add(ways, way);
+    displacement = v_sub(to[i], from[i]);
+    displacements = bounds_add(displacements, displacement);
   }
-  return ways;
+  return displacements;
 }
 
-static sonde_bounds bounds_of(const sonde_scene_state *state, const sonde_kept *at, uint32_t b) {
+static sonde_bounds bounds_of(const sonde_scene_state *state, const sonde_scene_motion *at,
+                              uint32_t b) {
   const sonde_mesh *mesh = &state->scene->bodies[b].surface;
   sonde_vec3 *surface = state->surface + state->surface_first[b];
   SONDE_ASSERT(mesh->vertex_count > 0);
@@ -79,27 +80,31 @@ static sonde_bounds bounds_of(const sonde_scene_state *state, const sonde_kept *
   return box;
 }
 
-// Share of the ways that all pairs may go: to where their boxes meet and a thickness further.
-static double safe_share(const sonde_scene_state *state, const sonde_kept *from, double allowed) {
+// Share of the displacements that all pairs may make: to where their boxes meet and a thickness
+// further.
+static double safe_share(const sonde_scene_state *state, const sonde_scene_motion *from,
+                         double allowed) {
   const sonde_scene *scene = state->scene;
   double share = 1;
   for (uint32_t t = 0; t < scene->touch_count; ++t) {
     uint32_t a = scene->touches[t].a, b = scene->touches[t].b;
-    // The longest way is that of a point of a as a point of b sees it.
-    const sonde_bounds *way_a = &state->way[a], *way_b = &state->way[b];
-    sonde_vec3 p = v_sub(way_a->high, way_b->low), q = v_sub(way_b->high, way_a->low);
-    double way = v_norm(vec3(fmax(p.x, q.x), fmax(p.y, q.y), fmax(p.z, q.z)));
+    // The longest displacement is that of a point of a as a point of b sees it.
+    const sonde_bounds *displacement_a = &state->displacement[a],
+                       *displacement_b = &state->displacement[b];
+    sonde_vec3 p = v_sub(displacement_a->high, displacement_b->low),
+               q = v_sub(displacement_b->high, displacement_a->low);
+    double displacement = v_norm(vec3(fmax(p.x, q.x), fmax(p.y, q.y), fmax(p.z, q.z)));
     double most = allowed * fmin(state->thickness_m[a], state->thickness_m[b]);
-    if (!(way > share * most)) continue;
+    if (!(displacement > share * most)) continue;
     sonde_bounds box_a = bounds_of(state, from, a), box_b = bounds_of(state, from, b);
-    // The ways close the gap along each axis, from either side, by p and q.
+    // The displacements close the gap along each axis, from either side, by p and q.
     sonde_vec3 ab = v_sub(box_b.low, box_a.high), ba = v_sub(box_a.low, box_b.high);
     const double gap[6] = {ab.x, ab.y, ab.z, ba.x, ba.y, ba.z};
     const double closing[6] = {p.x, p.y, p.z, q.x, q.y, q.z};
     double apart = 0;
     for (int k = 0; k < 6; ++k)
       if (gap[k] > 0) apart = fmax(apart, closing[k] > gap[k] ? gap[k] / closing[k] : 1);
-    share = fmin(share, apart + most / way);
+    share = fmin(share, apart + most / displacement);
   }
   return share;
 }
@@ -115,15 +120,15 @@ void sonde_step_guarded(sonde_scene_state *state, double h) {
   while (done < h) {
     double left = h - done;
     sonde_rigid_begin(state, left); // velocities of driven bodies
-    for (uint32_t b = 0; b < bodies; ++b) state->way[b] = guess(state, b, left);
+    for (uint32_t b = 0; b < bodies; ++b) state->displacement[b] = guess(state, b, left);
     // The parts are equal: a short one after a deep one would throw the bodies apart.
     double parts = ceil(1 / fmax(safe_share(state, &state->now, PLANNED), least / left));
     double part = parts > 1 ? left / parts : left;
     for (;;) {
       sonde_step_once(state, part);
-      for (uint32_t b = 0; b < bodies; ++b) state->way[b] = made(state, b);
+      for (uint32_t b = 0; b < bodies; ++b) state->displacement[b] = made(state, b);
       if (!(safe_share(state, &state->undo, MADE) < 1 && part > least)) break;
-      sonde_kept_copy(&state->now, &state->undo);
+      sonde_scene_motion_copy(&state->now, &state->undo);
       part *= 0.5;
     }
     if (part < h) state->report.cuts++;

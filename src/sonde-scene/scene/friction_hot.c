@@ -1,9 +1,10 @@
 // Coulomb friction with bonds, on every column of a contact (docs/scene.md).
 //
-// A bond's way z is how far the two surfaces have moved past each other since they met, less what
-// slipped. Its force is -P mu_s z/d for |z| up to d mu/mu_s, P the column's push and d the way
-// before slip, so that z is not upset when P changes. Vertices carry z; columns come and go. The
-// vertices receive increments, never means, so that bonds at rest stay as they are, bit by bit.
+// A bond's displacement z is how far the two surfaces have moved past each other since they met,
+// less what slipped. Its force is -P mu_s z/d for |z| up to d mu/mu_s, P the column's push and d
+// the displacement before slip, so that z is not upset when P changes. Vertices carry z; columns
+// come and go. The vertices receive increments, never means, so that bonds at rest stay as they
+// are, bit by bit.
 #include "scene/state.h"
 
 #include "base/base.h"
@@ -16,14 +17,14 @@ static sonde_vec3 across(sonde_vec3 a, sonde_vec3 n) { return v_madd(a, -v_dot(a
 void sonde_grip_begin(sonde_scene_state *state, sonde_grip *grip) {
   const sonde_touch *touch = &state->scene->touches[grip->touch];
   if (!(touch->mu_static > 0)) return;
-  sonde_vec3 way = vec3(0, 0, 0);
+  sonde_vec3 displacement = vec3(0, 0, 0);
   double slip = 0;
   for (int k = 0; k < 3; ++k) {
     SONDE_ASSERT(grip->bond[k] < state->bond_count);
-    way = v_madd(way, grip->bond_weight[k], state->now.bond[grip->bond[k]]);
+    displacement = v_madd(displacement, grip->bond_weight[k], state->now.bond[grip->bond[k]]);
     slip += grip->bond_weight[k] * state->now.slip[grip->bond[k]];
   }
-  grip->way = across(way, grip->normal);
+  grip->displacement = across(displacement, grip->normal);
   // The coefficient falls from static to kinetic along Stribeck's curve.
   SONDE_ASSERT(touch->stribeck_m_s > 0);
   double x = slip / touch->stribeck_m_s;
@@ -39,8 +40,8 @@ void sonde_grip_evaluate(sonde_scene_state *state, sonde_grip *grip, double move
   double stiffness = push * touch->mu_static / touch->bond_m;
   double damper = stiffness * touch->bond_damping_s;
   sonde_vec3 slip = across(sonde_grip_slip(state, grip, state->stage_velocity), grip->normal);
-  sonde_vec3 way = v_madd(grip->way, moved_s, slip);
-  sonde_vec3 resisted = v_madd(v_scale(way, stiffness), damper, slip);
+  sonde_vec3 displacement = v_madd(grip->displacement, moved_s, slip);
+  sonde_vec3 resisted = v_madd(v_scale(displacement, stiffness), damper, slip);
   double most = push * grip->mu;
   if (v_norm2(resisted) <= most * most) {
     // Two directions across the normal resist as long as the bond holds.
@@ -53,7 +54,7 @@ void sonde_grip_evaluate(sonde_scene_state *state, sonde_grip *grip, double move
     grip->damper = damper;
     grip->force = v_neg(resisted);
   } else {
-    // The force keeps its size; across the slip its direction turns with the way.
+    // The force keeps its size; across the slip its direction turns with the displacement.
     SONDE_ASSERT(most >= 0);
     double size = v_norm(resisted), share = most / size;
     sonde_vec3 along = v_scale(resisted, 1 / size);
@@ -68,11 +69,11 @@ void sonde_grip_evaluate(sonde_scene_state *state, sonde_grip *grip, double move
 void sonde_grip_predict(sonde_scene_state *state, sonde_grip *grip) {
   grip->end_force = grip->force;
   if (!grip->term_count) return;
-  sonde_vec3 way = sonde_grip_slip(state, grip, state->move);
+  sonde_vec3 displacement = sonde_grip_slip(state, grip, state->move);
   sonde_vec3 rate = sonde_grip_slip(state, grip, state->gain);
   for (uint32_t k = 0; k < grip->term_count; ++k) {
     sonde_vec3 t = grip->tangent[k];
-    double more = grip->stiffness * v_dot(way, t) + grip->damper * v_dot(rate, t);
+    double more = grip->stiffness * v_dot(displacement, t) + grip->damper * v_dot(rate, t);
     grip->end_force = v_madd(grip->end_force, -more, t);
   }
 }
@@ -87,13 +88,14 @@ void sonde_bonds_advance(sonde_scene_state *state, double h) {
     double push = state->pushes[grip->push].end_force * grip->share;
     const sonde_touch *touch = &state->scene->touches[grip->touch];
     if (!(touch->mu_static > 0 && push > 0)) continue;
-    // The way at the end of the step is returned to where the bond holds; the rest has slipped.
+    // The displacement at the end of the step is returned to where the bond holds; the rest has
+    // slipped.
     sonde_vec3 slip = across(sonde_grip_slip(state, grip, state->mean_velocity), grip->normal);
-    sonde_vec3 way = v_madd(grip->way, h, slip);
-    double limit = touch->bond_m * grip->mu / touch->mu_static, length = v_norm(way);
+    sonde_vec3 displacement = v_madd(grip->displacement, h, slip);
+    double limit = touch->bond_m * grip->mu / touch->mu_static, length = v_norm(displacement);
     double slipped = length > limit ? length - limit : 0;
-    if (length > limit) way = v_scale(way, limit / length);
-    sonde_vec3 gained = v_sub(way, grip->way);
+    if (length > limit) displacement = v_scale(displacement, limit / length);
+    sonde_vec3 gained = v_sub(displacement, grip->displacement);
     for (int c = 0; c < 3; ++c) {
       double load = push * fmax(grip->bond_weight[c], 0);
       uint32_t i = grip->bond[c];

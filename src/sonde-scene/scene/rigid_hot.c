@@ -8,11 +8,11 @@
 #include "base/base.h"
 #include "base/maths.h"
 
-sonde_quat sonde_quat_turn(sonde_quat rotation, sonde_vec3 spin, double time_s) {
+sonde_quat sonde_quat_advance(sonde_quat rotation, sonde_vec3 spin, double time_s) {
   double speed = v_norm(spin), half = 0.5 * time_s * speed;
   double scale = half > 1e-8 ? sin(half) / speed : 0.5 * time_s;
-  sonde_quat turn = {cos(half), scale * spin.x, scale * spin.y, scale * spin.z};
-  return q_unit(q_mul(turn, rotation));
+  sonde_quat change = {cos(half), scale * spin.x, scale * spin.y, scale * spin.z};
+  return q_unit(q_mul(change, rotation));
 }
 
 sonde_mat3 sonde_inertia_world(sonde_mat3 inertia, sonde_quat rotation) {
@@ -22,10 +22,10 @@ sonde_mat3 sonde_inertia_world(sonde_mat3 inertia, sonde_quat rotation) {
 
 // Spin that turns one orientation into another in a time, the shorter way.
 static sonde_vec3 spin_between(sonde_quat from, sonde_quat to, double time_s) {
-  sonde_quat turn = q_mul(to, q_conj(from));
-  double sign = turn.w < 0 ? -1 : 1;
-  sonde_vec3 axis = vec3(sign * turn.x, sign * turn.y, sign * turn.z);
-  double angle = 2 * atan2(v_norm(axis), sign * turn.w);
+  sonde_quat change = q_mul(to, q_conj(from));
+  double sign = change.w < 0 ? -1 : 1;
+  sonde_vec3 axis = vec3(sign * change.x, sign * change.y, sign * change.z);
+  double angle = 2 * atan2(v_norm(axis), sign * change.w);
   return v_scale(v_unit(axis, vec3(0, 0, 1)), angle / time_s);
 }
 
@@ -40,7 +40,7 @@ sonde_pose sonde_path_pose(const sonde_path *path, double time_s) {
   sonde_quat q = path->pose[i].rotation;
   sonde_vec3 spin = spin_between(q, path->pose[i + 1].rotation, 1);
   return (sonde_pose){v_lerp(path->pose[i].position, path->pose[i + 1].position, t),
-                      sonde_quat_turn(q, spin, t)};
+                      sonde_quat_advance(q, spin, t)};
 }
 
 // Pose of a driven or resting body's centre at a time.
@@ -75,14 +75,14 @@ static sonde_vec3 spin_at(const sonde_scene_state *state, uint32_t body, sonde_q
   return q_rotate(rotation, m_mul_v(state->body_inverse[body], local));
 }
 
-sonde_quat sonde_rigid_turn(const sonde_scene_state *state, uint32_t body, sonde_quat from,
-                            sonde_vec3 angular, double time_s, sonde_vec3 *spin) {
+sonde_quat sonde_rigid_advance(const sonde_scene_state *state, uint32_t body, sonde_quat from,
+                               sonde_vec3 angular, double time_s, sonde_vec3 *spin) {
   SONDE_ASSERT(time_s >= 0);
   enum { MOST = 30 };
   sonde_quat rotation = from;
   *spin = spin_at(state, body, from, angular);
   for (int k = 0; k < MOST && time_s > 0; ++k) {
-    rotation = sonde_quat_turn(from, *spin, time_s);
+    rotation = sonde_quat_advance(from, *spin, time_s);
     sonde_vec3 next = spin_at(state, body, rotation, angular);
     double change = v_distance(next, *spin);
     *spin = next;
@@ -122,10 +122,10 @@ void sonde_stage_at(sonde_scene_state *state, const sonde_vec3 *dv, double h) {
     state->stage_position[spin] = vec3(0, 0, 0);
     if (body->motion == SONDE_BODY_FREE)
       state->stage_rotation[b] =
-          sonde_rigid_turn(state, b, from, angular_at(state, b, dv[spin], lambda), lambda * h,
-                           &state->stage_velocity[spin]);
+          sonde_rigid_advance(state, b, from, angular_at(state, b, dv[spin], lambda), lambda * h,
+                              &state->stage_velocity[spin]);
     else
-      state->stage_rotation[b] = sonde_quat_turn(from, state->now.velocity[spin], lambda * h);
+      state->stage_rotation[b] = sonde_quat_advance(from, state->now.velocity[spin], lambda * h);
   }
 }
 
@@ -148,8 +148,8 @@ bool sonde_stage_finish(sonde_scene_state *state, const sonde_vec3 *dv, double h
       // step at the end), and the spin follows from the momentum.
       sonde_quat from = state->now.rotation[b];
       sonde_vec3 w, end = angular_at(state, b, dv[spin], 1);
-      sonde_rigid_turn(state, b, from, angular_at(state, b, dv[spin], lambda), lambda * h, &w);
-      state->now.rotation[b] = sonde_quat_turn(from, w, h);
+      sonde_rigid_advance(state, b, from, angular_at(state, b, dv[spin], lambda), lambda * h, &w);
+      state->now.rotation[b] = sonde_quat_advance(from, w, h);
       state->now.velocity[spin] = spin_at(state, b, state->now.rotation[b], end);
     } else {
       sonde_pose to = centre_pose(body, state->now.head->time_s + h);

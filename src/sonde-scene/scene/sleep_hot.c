@@ -95,7 +95,7 @@ bool sonde_sleep_wake_touched(sonde_scene_state *state) {
 }
 
 void sonde_sleep_rest(sonde_scene_state *state) {
-  double way = state->scene->step.sleep_m, still = way / STILL_S;
+  double displacement = state->scene->step.sleep_m, still = displacement / STILL_S;
   for (uint32_t b = 0; b < state->scene->body_count; ++b) {
     const sonde_body *body = &state->scene->bodies[b];
     const sonde_model *model = body->model;
@@ -115,7 +115,7 @@ void sonde_sleep_rest(sonde_scene_state *state) {
       SONDE_ASSERT(area > 0);
       double normal = along / (model->k0_n_m3[i] * area);
       double tangent = across > 0 ? across / (model->law.tangential_stiffness_n_m3 * area) : 0;
-      bool at_rest = speed <= still && sqrt(normal * normal + tangent * tangent) <= way;
+      bool at_rest = speed <= still && sqrt(normal * normal + tangent * tangent) <= displacement;
       if (!body->held[i] && !at_rest)
         calm[i] = 0;
       else if (++calm[i] >= CALM)
@@ -125,8 +125,8 @@ void sonde_sleep_rest(sonde_scene_state *state) {
     // where the sleepers found balance.
     for (uint32_t r = 0; r < part->rim_count; ++r) {
       uint32_t i = part->rim[r];
-      bool turn = (i + state->now.head->tick) % TRIAL_PERIOD == 0;
-      if (turn && calm[i] >= CALM) calm[i] = CALM - 1;
+      bool tried = (i + state->now.head->tick) % TRIAL_PERIOD == 0;
+      if (tried && calm[i] >= CALM) calm[i] = CALM - 1;
     }
   }
 }

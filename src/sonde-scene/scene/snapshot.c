@@ -59,28 +59,28 @@ sonde_status sonde_scene_state_load(sonde_scene_state *state, const char *path,
   else {
     // Numbers that no scene reaches would break what the steps rely on.
     const sonde_scene *scene = state->scene;
-    const sonde_kept *kept = &state->undo;
+    const sonde_scene_motion *motion = &state->undo;
     memcpy(state->undo.block, block, state->undo.bytes);
-    bool good = within(kept->position, scene->slot_count, SONDE_SCENE_REACH_M) &&
-                within(kept->velocity, scene->slot_count, SONDE_SCENE_FASTEST) &&
-                within(kept->increment, scene->slot_count, SONDE_SCENE_FASTEST) &&
-                within(kept->hint, scene->touch_count, 1 + 1e-6) &&
-                within(kept->bond, state->bond_count, SONDE_SCENE_REACH_M) &&
-                kept->head->level <= SONDE_SCENE_MOST_HALVINGS && kept->head->time_s >= 0 &&
-                kept->head->time_s <= SONDE_SCENE_LATEST_S;
+    bool good = within(motion->position, scene->slot_count, SONDE_SCENE_REACH_M) &&
+                within(motion->velocity, scene->slot_count, SONDE_SCENE_FASTEST) &&
+                within(motion->increment, scene->slot_count, SONDE_SCENE_FASTEST) &&
+                within(motion->hint, scene->touch_count, 1 + 1e-6) &&
+                within(motion->bond, state->bond_count, SONDE_SCENE_REACH_M) &&
+                motion->head->level <= SONDE_SCENE_MOST_HALVINGS && motion->head->time_s >= 0 &&
+                motion->head->time_s <= SONDE_SCENE_LATEST_S;
     for (uint32_t k = 0; k < scene->body_count && good; ++k) {
-      sonde_quat q = kept->rotation[k];
+      sonde_quat q = motion->rotation[k];
       good = fabs(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z - 1) <= 1e-6;
     }
     for (uint32_t k = 0; k < state->bond_count && good; ++k)
-      good = kept->slip[k] >= 0 && kept->slip[k] <= SONDE_SCENE_FASTEST;
+      good = motion->slip[k] >= 0 && motion->slip[k] <= SONDE_SCENE_FASTEST;
     if (!good)
       status = sonde_fail(error, SONDE_FORMAT,
                           "%s: expected positions within %g m, velocities within %g m/s and unit "
                           "quaternions",
                           path, SONDE_SCENE_REACH_M, SONDE_SCENE_FASTEST);
   }
-  if (!status) sonde_kept_copy(&state->now, &state->undo);
+  if (!status) sonde_scene_motion_copy(&state->now, &state->undo);
   sonde_free(bytes);
   return status;
 }

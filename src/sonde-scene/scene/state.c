@@ -22,17 +22,17 @@ static void *carve(carver *c, size_t count, size_t size) {
 
 #define CARVE(at, count) ((at) = carve(c, (count), sizeof *(at)))
 
-static void lay_kept(const sonde_scene_state *state, carver *c, sonde_kept *kept) {
+static void lay_motion(const sonde_scene_state *state, carver *c, sonde_scene_motion *motion) {
   const sonde_scene *scene = state->scene;
-  CARVE(kept->head, 1);
-  CARVE(kept->position, scene->slot_count);
-  CARVE(kept->velocity, scene->slot_count);
-  CARVE(kept->increment, scene->slot_count);
-  CARVE(kept->rotation, scene->body_count);
-  CARVE(kept->hint, scene->touch_count);
-  CARVE(kept->bond, state->bond_count);
-  CARVE(kept->slip, state->bond_count);
-  CARVE(kept->calm, scene->slot_count);
+  CARVE(motion->head, 1);
+  CARVE(motion->position, scene->slot_count);
+  CARVE(motion->velocity, scene->slot_count);
+  CARVE(motion->increment, scene->slot_count);
+  CARVE(motion->rotation, scene->body_count);
+  CARVE(motion->hint, scene->touch_count);
+  CARVE(motion->bond, state->bond_count);
+  CARVE(motion->slip, state->bond_count);
+  CARVE(motion->calm, scene->slot_count);
 }
 
 static void lay_arrays(sonde_scene_state *s, carver *c) {
@@ -41,7 +41,7 @@ static void lay_arrays(sonde_scene_state *s, carver *c) {
   size_t slots = scene->slot_count;
   sonde_vec3 **const all[] = {
       &s->stage_position,  &s->stage_velocity, &s->force,     &s->product,   &s->contact_force,
-      &s->contact_product, &s->right,          &s->change,    &s->move,      &s->gain,
+      &s->contact_product, &s->residual,       &s->change,    &s->move,      &s->gain,
       &s->mean_velocity,   &s->scratch.r,      &s->scratch.z, &s->scratch.p, &s->scratch.q};
   for (size_t k = 0; k < SONDE_COUNT_OF(all); ++k) *all[k] = carve(c, slots, sizeof(sonde_vec3));
   CARVE(s->plain_diagonal, slots);
@@ -66,7 +66,7 @@ static void lay_arrays(sonde_scene_state *s, carver *c) {
   CARVE(s->inertia, bodies);
   CARVE(s->reach_m, bodies);
   CARVE(s->thickness_m, bodies);
-  CARVE(s->way, bodies);
+  CARVE(s->displacement, bodies);
   CARVE(s->body_inverse, bodies);
   CARVE(s->part, bodies);
   CARVE(s->island, bodies);
@@ -119,16 +119,16 @@ static sonde_status allocate(sonde_scene_state *state, sonde_error *error) {
   state->term_capacity = state->push_capacity + 2 * points + scene->body_count;
   state->row_capacity = bulk + 3 * 8 * points + 2 * state->surface_count + 4 * state->push_capacity;
   state->near_capacity = scene->body_count * (scene->body_count - 1) / 2;
-  sonde_kept *const kept[] = {&state->now, &state->undo, &state->saved, &state->whole};
-  for (size_t k = 0; k < SONDE_COUNT_OF(kept); ++k) {
+  sonde_scene_motion *const motion[] = {&state->now, &state->undo, &state->saved, &state->whole};
+  for (size_t k = 0; k < SONDE_COUNT_OF(motion); ++k) {
     carver c = {0};
-    lay_kept(state, &c, kept[k]);
-    kept[k]->bytes = c.used;
-    kept[k]->block = c.block = sonde_calloc(1, c.used);
-    if (!kept[k]->block) return sonde_fail_memory(error);
+    lay_motion(state, &c, motion[k]);
+    motion[k]->bytes = c.used;
+    motion[k]->block = c.block = sonde_calloc(1, c.used);
+    if (!motion[k]->block) return sonde_fail_memory(error);
     c.used = 0;
-    lay_kept(state, &c, kept[k]);
-    SONDE_ASSERT(c.used == kept[k]->bytes);
+    lay_motion(state, &c, motion[k]);
+    SONDE_ASSERT(c.used == motion[k]->bytes);
   }
   carver arrays = {0};
   lay_arrays(state, &arrays);

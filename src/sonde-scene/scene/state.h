@@ -8,26 +8,26 @@
 #include "tissue/two_layer.h"
 
 // What a step hands to the next, in one block: copied for substeps, written by snapshots.
-typedef struct sonde_kept_head {
+typedef struct sonde_scene_motion_head {
   uint64_t tick, flag_count;
   double time_s;
   uint32_t all_flags;
   uint32_t level; // substeps of dt/2^level
-} sonde_kept_head;
+} sonde_scene_motion_head;
 
-typedef struct sonde_kept {
+typedef struct sonde_scene_motion {
   void *block;
   size_t bytes;
-  sonde_kept_head *head;
+  sonde_scene_motion_head *head;
   sonde_vec3 *position;  // [slots] m; 0 for spins
   sonde_vec3 *velocity;  // [slots] m/s, rad/s
   sonde_vec3 *increment; // [slots] of the last step: the solver's start
   sonde_quat *rotation;  // [bodies] world from the body's axes
   sonde_vec3 *hint;      // [touches] last direction out of a into b
-  sonde_vec3 *bond;      // [bonds] way since the bond began, per vertex of a touch's bond side
-  double *slip;          // [bonds] m/s by which it slipped in the last step
-  uint8_t *calm;         // [slots] steps at rest of a tissue's node; many: it sleeps
-} sonde_kept;
+  sonde_vec3 *bond; // [bonds] displacement since the bond began, per vertex of a touch's bond side
+  double *slip;     // [bonds] m/s by which it slipped in the last step
+  uint8_t *calm;    // [slots] steps at rest of a tissue's node; many: it sleeps
+} sonde_scene_motion;
 
 // A push of one body on another along generalised coordinates: a quantity u (depth of a column or
 // volume of a region) grows at the rate sum g.v, and the force on the slots is -f g.
@@ -52,7 +52,7 @@ typedef struct sonde_grip {
   double bond_weight[3];
   sonde_vec3 point[2];          // on a and on b, world
   sonde_vec3 normal;            // out of a into b
-  sonde_vec3 way;               // b of the point at the start of the step, across
+  sonde_vec3 displacement;      // b of the point at the start of the step, across
   double mu, stiffness, damper; // coefficient now; of the bond at the evaluation
   sonde_vec3 force, end_force;  // of friction on a
   uint32_t term_count;          // tangents that resist: 2 sticking, 1 slipping
@@ -66,9 +66,9 @@ typedef struct sonde_inertia {
 
 struct sonde_scene_state {
   const sonde_scene *scene;
-  sonde_kept now, undo;    // undo: the start of a step, kept for one that fails
-  sonde_kept saved, whole; // of step doubling: the start, and the single step's end
-  void *block;             // all arrays below
+  sonde_scene_motion now, undo;    // undo: the start of a step, for one that fails
+  sonde_scene_motion saved, whole; // of step doubling: the start, and the single step's end
+  void *block;                     // all arrays below
   uint32_t bond_count, surface_count;
 
   // the point at which forces are evaluated
@@ -80,8 +80,8 @@ struct sonde_scene_state {
   sonde_inertia *inertia;                      // [bodies]
   double *reach_m;                             // [bodies] of a rigid body's vertices
   double *thickness_m;                         // [bodies] volume over area at rest
-  sonde_bounds *way;                           // [bodies] scratch: box of the vertices' ways
-  sonde_mat3 *body_inverse;                    // [bodies] inverse inertia in the body's frame
+  sonde_bounds *displacement; // [bodies] scratch: box of the vertices' displacements
+  sonde_mat3 *body_inverse;   // [bodies] inverse inertia in the body's frame
 
   // contact
   sonde_face_tree **tree;  // [bodies], NULL for what never touches
@@ -108,7 +108,7 @@ struct sonde_scene_state {
   sonde_mat3 *plain_diagonal;                  // [slots]
   sonde_vec3 *force, *product;                 // [slots] of the bodies themselves
   sonde_vec3 *contact_force, *contact_product; // [slots]
-  sonde_vec3 *right, *change, *move, *gain;    // [slots]
+  sonde_vec3 *residual, *change, *move, *gain; // [slots]
   sonde_vec3 *mean_velocity;                   // [slots] scratch
   uint32_t *active_rows, *active_pairs;
   uint32_t active_row_count, active_pair_count;
@@ -123,13 +123,13 @@ struct sonde_scene_state {
 };
 
 // Turns by spin * time (exponential map).
-sonde_quat sonde_quat_turn(sonde_quat rotation, sonde_vec3 spin, double time_s);
+sonde_quat sonde_quat_advance(sonde_quat rotation, sonde_vec3 spin, double time_s);
 // R I R^T.
 sonde_mat3 sonde_inertia_world(sonde_mat3 inertia, sonde_quat rotation);
 // Orientation after turning for time_s at the spin that the angular momentum has there; *spin
 // receives it.
-sonde_quat sonde_rigid_turn(const sonde_scene_state *state, uint32_t body, sonde_quat from,
-                            sonde_vec3 angular, double time_s, sonde_vec3 *spin);
+sonde_quat sonde_rigid_advance(const sonde_scene_state *state, uint32_t body, sonde_quat from,
+                               sonde_vec3 angular, double time_s, sonde_vec3 *spin);
 // Velocities of driven bodies over a step, inertias and angular momenta at its start. @thread tick
 void sonde_rigid_begin(sonde_scene_state *state, double h);
 // Stage at the start of the step. @thread tick
@@ -191,6 +191,6 @@ void sonde_step_once(sonde_scene_state *state, double h);
 void sonde_step_guarded(sonde_scene_state *state, double h);
 // Volume over area of a closed surface; 0 for one that encloses nothing.
 double sonde_scene_thickness(const sonde_mesh *surface);
-void sonde_kept_copy(sonde_kept *to, const sonde_kept *from);
+void sonde_scene_motion_copy(sonde_scene_motion *to, const sonde_scene_motion *from);
 
 #endif

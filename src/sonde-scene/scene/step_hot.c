@@ -88,7 +88,7 @@ static void solve(sonde_scene_state *state, sonde_vec3 *x) {
   if (step->lambda > 0) {
     memset(state->scratch.q, 0, state->scene->slot_count * sizeof(sonde_vec3));
     sonde_pcg_result result = sonde_pcg_solve(matrix, &active, state->terms, state->term_count,
-                                              state->right, x, &state->scratch, &step->solver);
+                                              state->residual, x, &state->scratch, &step->solver);
     state->report.solver_iterations += result.iterations;
     if (!result.converged) state->report.flags |= SONDE_SCENE_NOT_CONVERGED;
   } else {
@@ -96,7 +96,7 @@ static void solve(sonde_scene_state *state, sonde_vec3 *x) {
     for (uint32_t r = 0; r < state->active_row_count; ++r) {
       uint32_t i = state->active_rows[r];
       const double *d = matrix->inverse[i];
-      sonde_vec3 b = state->right[i];
+      sonde_vec3 b = state->residual[i];
       x[i] = vec3(d[0] * b.x + d[1] * b.y + d[2] * b.z, d[1] * b.x + d[3] * b.y + d[4] * b.z,
                   d[2] * b.x + d[4] * b.y + d[5] * b.z);
     }
@@ -118,7 +118,7 @@ static double dot_active(const sonde_scene_state *state, const sonde_vec3 *x, co
 }
 
 // Mass times a vector: a number per node and per centre, the inertia at the start per spin.
-static void residual(sonde_scene_state *state, const sonde_vec3 *dv, double h) {
+static void form_residual(sonde_scene_state *state, const sonde_vec3 *dv, double h) {
   for (uint32_t b = 0; b < state->scene->body_count; ++b) {
     const sonde_body *body = &state->scene->bodies[b];
     bool rigid = sonde_body_is_rigid(body);
@@ -126,9 +126,10 @@ static void residual(sonde_scene_state *state, const sonde_vec3 *dv, double h) {
       uint32_t i = body->first_slot + k;
       sonde_vec3 f = v_scale(v_add(state->force[i], state->contact_force[i]), h);
       if (rigid && k == 1)
-        state->right[i] = v_sub(f, m_mul_v(state->inertia[b].start, dv[i]));
+        state->residual[i] = v_sub(f, m_mul_v(state->inertia[b].start, dv[i]));
       else
-        state->right[i] = v_madd(f, -(rigid ? body->mass.mass_kg : body->node_mass_kg[k]), dv[i]);
+        state->residual[i] =
+            v_madd(f, -(rigid ? body->mass.mass_kg : body->node_mass_kg[k]), dv[i]);
     }
   }
 }
@@ -151,7 +152,7 @@ static void evaluate_at(sonde_scene_state *state, const sonde_vec3 *dv, double h
   sonde_stage_at(state, dv, h);
   evaluate(state, h, state->scene->step.lambda * h);
   sonde_touch_gather(state, &scales);
-  residual(state, dv, h);
+  form_residual(state, dv, h);
 }
 
 static void move_active(const sonde_scene_state *state, sonde_vec3 *dv, double length) {
@@ -167,22 +168,22 @@ static void newton(sonde_scene_state *state, double h) {
   SONDE_ASSERT(h > 0);
   const sonde_scene_step *step = &state->scene->step;
   sonde_vec3 *dv = state->now.increment;
-  double reference = norm_active(state, state->right);
+  double reference = norm_active(state, state->residual);
   evaluate_at(state, dv, h);
   for (uint32_t k = 1; k < step->newton_iterations; ++k) {
-    double size = norm_active(state, state->right);
+    double size = norm_active(state, state->residual);
     state->report.newton_residual = reference > 0 ? size / reference : 0;
     if (!(size > step->newton_residual * reference)) break;
     memset(state->change, 0, state->scene->slot_count * sizeof *state->change);
     solve(state, state->change);
-    double slope = dot_active(state, state->right, state->change), length = 1;
+    double slope = dot_active(state, state->residual, state->change), length = 1;
     move_active(state, dv, 1);
     // The slope of the incremental potential along p is -g.p. It starts at -slope < 0 and vanishes
     // at the minimum; a step past it by more than half is halved. Friction and dampers have no
     // potential, but their forces have this slope all the same.
     for (int halvings = 0;; ++halvings) {
       evaluate_at(state, dv, h);
-      double now = dot_active(state, state->right, state->change);
+      double now = dot_active(state, state->residual, state->change);
       bool overshot = now < -0.5 * slope || !isfinite(now);
       if (!step->line_search || !overshot || halvings == MOST_HALVINGS) break;
       length *= 0.5;
@@ -212,7 +213,7 @@ static void balance(sonde_scene_state *state, sonde_vec3 *dv, double h) {
     uint32_t b = island_of(state->island, scene->touches[t].b);
     state->island[a > b ? a : b] = a > b ? b : a;
   }
-  residual(state, dv, h);
+  form_residual(state, dv, h);
   for (uint32_t root = 0; root < scene->body_count; ++root) {
     sonde_vec3 sum = vec3(0, 0, 0);
     double mass = 0;
@@ -223,7 +224,7 @@ static void balance(sonde_scene_state *state, sonde_vec3 *dv, double h) {
       loose = state->loose[b];
       mass += body->mass.mass_kg;
       uint32_t count = sonde_body_is_rigid(body) ? 1 : body->slot_count;
-      for (uint32_t k = 0; k < count; ++k) sum = v_add(sum, state->right[body->first_slot + k]);
+      for (uint32_t k = 0; k < count; ++k) sum = v_add(sum, state->residual[body->first_slot + k]);
     }
     for (uint32_t b = root; b < scene->body_count && loose; ++b) {
       const sonde_body *body = &scene->bodies[b];
@@ -237,7 +238,7 @@ static void balance(sonde_scene_state *state, sonde_vec3 *dv, double h) {
 
 void sonde_step_once(sonde_scene_state *state, double h) {
   SONDE_ASSERT(h > 0);
-  sonde_kept_copy(&state->undo, &state->now);
+  sonde_scene_motion_copy(&state->undo, &state->now);
   sonde_sleep_begin(state);
   sonde_rigid_begin(state, h);
   sonde_stage_start(state);
@@ -254,7 +255,7 @@ void sonde_step_once(sonde_scene_state *state, double h) {
     for (uint32_t i = 0; i < state->scene->slot_count; ++i) {
       sonde_vec3 f = v_add(state->force[i], state->contact_force[i]);
       sonde_vec3 kv = v_add(state->product[i], state->contact_product[i]);
-      state->right[i] = v_madd(v_scale(f, h), scale, kv);
+      state->residual[i] = v_madd(v_scale(f, h), scale, kv);
     }
     solve(state, dv);
     moves_since(state, NULL, dv, h);
@@ -276,8 +277,8 @@ void sonde_step_once(sonde_scene_state *state, double h) {
   state->report.awake = state->active_row_count;
   if (!finite) {
     // The bodies stand still where the step began, with their contacts forgotten.
-    sonde_kept_head head = *state->now.head;
-    sonde_kept_copy(&state->now, &state->undo);
+    sonde_scene_motion_head head = *state->now.head;
+    sonde_scene_motion_copy(&state->now, &state->undo);
     head.time_s += h;
     *state->now.head = head;
     size_t bytes = state->scene->slot_count * sizeof(sonde_vec3);

@@ -6,7 +6,7 @@
 
 #include <string.h>
 
-void sonde_kept_copy(sonde_kept *to, const sonde_kept *from) {
+void sonde_scene_motion_copy(sonde_scene_motion *to, const sonde_scene_motion *from) {
   SONDE_ASSERT(to->bytes == from->bytes);
   memcpy(to->block, from->block, to->bytes);
 }
@@ -23,26 +23,26 @@ static void adaptive(sonde_scene_state *state) {
     // The error of two steps of h/2 is their distance from one of h, over 2^p - 1.
     double h = step->dt_s * size / finest, order_factor = step->lambda == 0.5 ? 3 : 1;
     SONDE_ASSERT(h > 0);
-    sonde_kept_copy(&state->saved, &state->now);
+    sonde_scene_motion_copy(&state->saved, &state->now);
     sonde_step_guarded(state, h);
-    sonde_kept_copy(&state->whole, &state->now);
-    sonde_kept_copy(&state->now, &state->saved);
+    sonde_scene_motion_copy(&state->whole, &state->now);
+    sonde_scene_motion_copy(&state->now, &state->saved);
     sonde_step_guarded(state, 0.5 * h);
     sonde_step_guarded(state, 0.5 * h);
-    // Vertices of rigid bodies move with centre and rotation: their reach times the turn.
-    const sonde_kept *a = &state->now, *b = &state->whole;
+    // Vertices of rigid bodies move with centre and rotation: their reach times the angle.
+    const sonde_scene_motion *a = &state->now, *b = &state->whole;
     double most = 0;
     for (uint32_t i = 0; i < state->scene->slot_count; ++i)
       most = fmax(most, v_distance(a->position[i], b->position[i]));
     for (uint32_t k = 0; k < state->scene->body_count; ++k) {
       const sonde_body *body = &state->scene->bodies[k];
       if (!sonde_body_is_rigid(body)) continue;
-      sonde_quat turn = q_mul(a->rotation[k], q_conj(b->rotation[k]));
-      most = fmax(most, 2 * v_norm(vec3(turn.x, turn.y, turn.z)) * state->reach_m[k]);
+      sonde_quat change = q_mul(a->rotation[k], q_conj(b->rotation[k]));
+      most = fmax(most, 2 * v_norm(vec3(change.x, change.y, change.z)) * state->reach_m[k]);
     }
     double error = most / order_factor;
     if (error > tolerance && level < step->substep_halvings) {
-      sonde_kept_copy(&state->now, &state->saved);
+      sonde_scene_motion_copy(&state->now, &state->saved);
       state->report.rejected++;
       ++level;
       continue;
@@ -66,7 +66,7 @@ void sonde_scene_advance(sonde_scene_state *state) {
     adaptive(state);
   else
     sonde_step_guarded(state, step->dt_s);
-  sonde_kept_head *head = state->now.head;
+  sonde_scene_motion_head *head = state->now.head;
   head->time_s = start + step->dt_s;
   head->tick++;
   head->all_flags |= state->report.flags;

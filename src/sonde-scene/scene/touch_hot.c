@@ -375,11 +375,11 @@ uint32_t sonde_touch_predict(sonde_scene_state *state) {
   uint32_t dropped = 0;
   for (uint32_t k = 0; k < state->push_count; ++k) {
     sonde_push *push = &state->pushes[k];
-    double way = along_rows(state, push, state->move);
-    push->end_value = push->value + way;
+    double displacement = along_rows(state, push, state->move);
+    push->end_value = push->value + displacement;
     if (push->dropped) continue;
-    push->end_force =
-        push->force + push->stiffness * way + push->damper * along_rows(state, push, state->gain);
+    push->end_force = push->force + push->stiffness * displacement +
+                      push->damper * along_rows(state, push, state->gain);
     if (push->end_force >= 0) continue;
     push->dropped = true;
     push->end_force = 0;

@@ -17,13 +17,13 @@ static const uint8_t *frame_of(const work *w, uint32_t frame) {
   return w->sequence->pixels + frame * w->pixels;
 }
 
-enum { AT_PLACE, KRIGED, BRACKETED, NEAREST, WAYS };
+enum { AT_PLACE, KRIGED, BRACKETED, NEAREST, MAKERS };
 
 static void keep_common(work *w) {
   for (size_t p = 0; p < w->pixels; ++p) w->known[p] = w->known[p] && w->other_known[p];
 }
 
-static sonde_status render(work *w, uint32_t frame, sonde_slice_method method, int way,
+static sonde_status render(work *w, uint32_t frame, sonde_slice_method method, int maker,
                            bool *along_sweep, sonde_error *error) {
   sonde_slicer *slicer;
   sonde_slicer_options options = w->options;
@@ -39,7 +39,7 @@ static sonde_status render(work *w, uint32_t frame, sonde_slice_method method, i
                               w->other_known);
     keep_common(w);
   }
-  sonde_slicer_render(slicer, pose, &w->images[way], w->other_known);
+  sonde_slicer_render(slicer, pose, &w->images[maker], w->other_known);
   keep_common(w);
   sonde_slicer_destroy(slicer);
   return SONDE_OK;
@@ -49,7 +49,7 @@ static sonde_status leave_out(work *w, uint32_t k, sonde_left_out *result, sonde
   uint32_t frame = w->used[k], step = 1 + w->options.left_out_beside;
   uint64_t left = 0;
   bool along_sweep = false;
-  // The pixels that count are those that all ways of making the frame reach.
+  // The pixels that count are those that every maker of the frame reaches.
   memcpy(w->known, w->lit, w->pixels);
   sonde_status status = render(w, frame, SONDE_SLICE_KRIGE, KRIGED, &along_sweep, error);
   if (!status) status = render(w, frame, SONDE_SLICE_BRACKET, BRACKETED, NULL, error);
@@ -59,11 +59,11 @@ static sonde_status leave_out(work *w, uint32_t k, sonde_left_out *result, sonde
   // The mean of the frames before and after is taken pixel by pixel.
   const uint8_t *a = frame_of(w, w->used[k - step]), *b = frame_of(w, w->used[k + step]);
   for (size_t p = 0; p < w->pixels; ++p) w->mean[p] = (uint8_t)((a[p] + b[p] + 1) / 2);
-  sonde_likeness *sums[WAYS + 1] = {&result->place, &result->krige, &result->bracket,
-                                    &result->nearest, &result->neighbours};
-  for (int i = 0; i <= WAYS && !status; ++i) {
+  sonde_likeness *sums[MAKERS + 1] = {&result->place, &result->krige, &result->bracket,
+                                      &result->nearest, &result->neighbours};
+  for (int i = 0; i <= MAKERS && !status; ++i) {
     sonde_likeness l, *sum = sums[i];
-    status = sonde_image_likeness(frame_of(w, frame), i < WAYS ? w->images[i].pixels : w->mean,
+    status = sonde_image_likeness(frame_of(w, frame), i < MAKERS ? w->images[i].pixels : w->mean,
                                   w->known, w->sequence->width, w->sequence->height, &l, error);
     if (status) break;
     sum->count += l.count;
@@ -112,7 +112,7 @@ sonde_status sonde_sequence_leave_one_out(const sonde_sequence *s,
   work w = {.sequence = s, .pixels = (size_t)s->width * s->height};
   w.options = options ? *options : sonde_slicer_options_default();
   sonde_status status = sonde_slicer_check(s, &w.options, error);
-  for (int k = 0; k < WAYS && !status; ++k)
+  for (int k = 0; k < MAKERS && !status; ++k)
     status = sonde_image_create(s->width, s->height, &w.images[k], error);
   w.lit = SONDE_NEW(uint8_t, w.pixels);
   w.known = SONDE_NEW(uint8_t, w.pixels);
@@ -129,7 +129,7 @@ sonde_status sonde_sequence_leave_one_out(const sonde_sequence *s,
   }
   if (!status) status = sonde_slice_bank_create(s, &w.bank, error);
   if (!status) status = leave_each_out(&w, result, progress, error);
-  for (int k = 0; k < WAYS; ++k) sonde_image_clear(&w.images[k]);
+  for (int k = 0; k < MAKERS; ++k) sonde_image_clear(&w.images[k]);
   sonde_slice_bank_destroy(w.bank);
   sonde_free(w.lit);
   sonde_free(w.known);

@@ -80,8 +80,9 @@ static bool make_scratch(sonde_slicer *slicer, uint32_t count) {
     slice_strips *strips = &room->strips;
     double *wide = strips->forms[0][0] = SONDE_NEW(double, (3 * SLICE_FORMS + 2) * padded);
     float *narrow = strips->steps[0][0] = SONDE_NEW(float, 2 * SLICE_FORMS * padded);
-    int32_t *places = strips->place[0] = SONDE_NEW(int32_t, 2 * padded);
-    if (!room->candidates || !room->block || !room->tile || !numbers || !wide || !narrow || !places)
+    int32_t *offsets = strips->offset[0] = SONDE_NEW(int32_t, 2 * padded);
+    if (!room->candidates || !room->block || !room->tile || !numbers || !wide || !narrow ||
+        !offsets)
       return false;
     for (uint32_t k = 0; k < 3; ++k) room->spans.form[k] = numbers + k * count;
     room->spans.low = numbers + 3 * (size_t)count;
@@ -91,7 +92,7 @@ static bool make_scratch(sonde_slicer *slicer, uint32_t count) {
       for (size_t k = 0; k < 2; ++k) strips->steps[f][k] = narrow + (2 * f + k) * padded;
     }
     for (size_t k = 0; k < 2; ++k) {
-      strips->place[k] = places + k * padded;
+      strips->offset[k] = offsets + k * padded;
       strips->lean[k] = wide + (3 * SLICE_FORMS + k) * padded;
     }
   }
@@ -113,7 +114,7 @@ static sonde_status lay_out(const sonde_sequence *s, sonde_slicer *slicer, sonde
   if (!slicer->has_strips) return SONDE_OK;
   size_t first = (size_t)s->clip[1] * s->width + s->clip[0];
   for (uint32_t i = 0; i < slicer->count; ++i)
-    slicer->planes[i].place =
+    slicer->planes[i].offset =
         lines ? (int32_t)(i * frame) : (int32_t)(slicer->planes[i].pixels + first - s->pixels);
   if (!lines) return SONDE_OK;
   layout->pixels = layout->lines = SONDE_NEW(uint8_t, all);
@@ -124,7 +125,7 @@ static sonde_status lay_out(const sonde_sequence *s, sonde_slicer *slicer, sonde
   // The used part of each frame, line by line down its columns.
   const uint32_t wide = s->clip[2], high = s->clip[3];
   for (const slice_plane *p = slicer->planes; p < slicer->planes + slicer->count; ++p) {
-    uint8_t *line = layout->lines + p->place;
+    uint8_t *line = layout->lines + p->offset;
     for (uint32_t u = 0; u < wide - 1; u += SLICE_LINE_WIDE - 1)
       for (uint32_t v = 0; v < high - 1; v += SLICE_LINE_HIGH - 1, line += SLICE_LINE)
         for (uint32_t j = 0; j < SLICE_LINE_HIGH && v + j < high; ++j)
@@ -182,7 +183,7 @@ void sonde_slicer_destroy(sonde_slicer *slicer) {
     sonde_free(room->spans.form[0]);
     sonde_free(room->strips.forms[0][0]);
     sonde_free(room->strips.steps[0][0]);
-    sonde_free(room->strips.place[0]);
+    sonde_free(room->strips.offset[0]);
   }
   sonde_free(slicer->rooms);
   sonde_free(slicer->every);

@@ -83,7 +83,7 @@ typedef struct slice_plane {
   sonde_vec3 normal;
   float last_shift[2], next_shift[2]; // slice_shift() to the planes before and behind
   const uint8_t *pixels;
-  int32_t place;                // of its first used pixel in the layout
+  int32_t offset;               // bytes to its first used pixel in the layout
   const slice_pyramid *pyramid; // NULL without kriging
   uint32_t frame;               // of the sequence
   slice_forms forms;            // of the picture being rendered
@@ -113,7 +113,7 @@ enum { SLICE_FORMS = 6, SLICE_STRIPS = 16 };
 typedef struct slice_strips {
   double *forms[SLICE_FORMS][3]; // [count + SLICE_STRIPS]
   float *steps[SLICE_FORMS][2];  // per column and row, rounded
-  int32_t *place[2];             // of the frames: behind and in front
+  int32_t *offset[2];            // bytes to the frames: behind and in front
   double *lean[2]; // most columns and rows from a pixel's foot to where its line meets, per metre
   uint32_t count;
 } slice_strips;

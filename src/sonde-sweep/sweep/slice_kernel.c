@@ -18,12 +18,12 @@ typedef struct row_pick {
 } row_pick;
 
 // Directions of the line that joins two planes, in the local coordinates of each: columns and rows
-// per metre of distance, or the way linear in the pixel (1, u, v) of the upper frame.
+// per metre of distance, or the path linear in the pixel (1, u, v) of the upper frame.
 typedef struct pair {
   int32_t up, down;
   bool along_sweep;
-  float up_shift[2], down_shift[2];   // half way between the normals: constant
-  float up_way[3][3], down_way[3][3]; // along the sweep
+  float up_shift[2], down_shift[2];     // half way between the normals: constant
+  float up_path[3][3], down_path[3][3]; // along the sweep
 } pair;
 
 static void start_at(const double form[3], const rectangle *r, float out[3]) {
@@ -171,19 +171,19 @@ static void nearest_of_sorted(const sonde_slicer *s, const slice_candidate *room
 }
 
 // Way from a pixel of plane a to the same pixel of plane b, in local coordinates of a.
-static void sweep_way(const slice_plane *a, const slice_plane *b, float way[3][3]) {
+static void sweep_path(const slice_plane *a, const slice_plane *b, float path[3][3]) {
   sonde_affine to = affine_mul(&a->local_from_world, &b->world_from_pixel);
   for (int k = 0; k < 3; ++k) {
-    way[k][0] = (float)to.m[k][3];
-    way[k][1] = (float)(to.m[k][0] - (k == 0));
-    way[k][2] = (float)(to.m[k][1] - (k == 1));
+    path[k][0] = (float)to.m[k][3];
+    path[k][1] = (float)(to.m[k][0] - (k == 0));
+    path[k][2] = (float)(to.m[k][1] - (k == 1));
   }
 }
 
-// The way leaves to that side of the plane, at most 60 degrees off its normal.
-static bool is_steep(const slice_plane *plane, float way[3][3], float u, float v, float side) {
+// The path leaves to that side of the plane, at most 60 degrees off its normal.
+static bool is_steep(const slice_plane *plane, float path[3][3], float u, float v, float side) {
   float e[3];
-  for (int k = 0; k < 3; ++k) e[k] = way[k][0] + u * way[k][1] + v * way[k][2];
+  for (int k = 0; k < 3; ++k) e[k] = path[k][0] + u * path[k][1] + v * path[k][2];
   double across = hypot(e[0] * plane->pixel_m[0], e[1] * plane->pixel_m[1]);
   return across < 1.7 * (double)(side * e[2]);
 }
@@ -196,11 +196,11 @@ static void blend(const sonde_slicer *s, const slice_candidate *room, int32_t up
   slice_shift(a, b, p->up_shift);
   slice_shift(b, a, p->down_shift);
   if (!p->along_sweep) return;
-  sweep_way(a, b, p->up_way);
-  sweep_way(b, a, p->down_way);
+  sweep_path(a, b, p->up_path);
+  sweep_path(b, a, p->down_path);
   for (int corner = 0; corner < 4 && p->along_sweep; ++corner) {
     float u = corner & 1 ? s->high[0] : s->low[0], v = corner & 2 ? s->high[1] : s->low[1];
-    p->along_sweep = is_steep(a, p->up_way, u, v, 1) && is_steep(b, p->down_way, u, v, -1);
+    p->along_sweep = is_steep(a, p->up_path, u, v, 1) && is_steep(b, p->down_path, u, v, -1);
   }
 }
 
@@ -214,7 +214,7 @@ static inline float sample(const sonde_slicer *s, const slice_plane *plane, floa
   const uint8_t *p = plane->pixels + (size_t)iv * s->width + iu;
   if (l->lines) { // where the strips have read already
     int32_t x = (int32_t)iu - (int32_t)s->low[0], y = (int32_t)iv - (int32_t)s->low[1];
-    p = l->lines + plane->place + x + y * l->row + x / (SLICE_LINE_WIDE - 1) * l->column_line +
+    p = l->lines + plane->offset + x + y * l->row + x / (SLICE_LINE_WIDE - 1) * l->column_line +
         y / (SLICE_LINE_HIGH - 1) * l->row_line;
   }
   const uint8_t *q = p + s->layout.row;
@@ -229,11 +229,11 @@ static inline float sample_foot(const sonde_slicer *s, const slice_candidate *c,
   return sample(s, c->plane, at[0], at[1]);
 }
 
-// Moves a foot to where the way of pixel (u, v) meets the frame.
-static inline void follow(float way[3][3], float u, float v, float d, float at[2]) {
-  float t = d / (way[2][0] + u * way[2][1] + v * way[2][2]);
-  at[0] -= t * (way[0][0] + u * way[0][1] + v * way[0][2]);
-  at[1] -= t * (way[1][0] + u * way[1][1] + v * way[1][2]);
+// Moves a foot to where the path of pixel (u, v) meets the frame.
+static inline void follow(float path[3][3], float u, float v, float d, float at[2]) {
+  float t = d / (path[2][0] + u * path[2][1] + v * path[2][2]);
+  at[0] -= t * (path[0][0] + u * path[0][1] + v * path[0][2]);
+  at[1] -= t * (path[1][0] + u * path[1][1] + v * path[1][2]);
 }
 
 // All levels of a frame, weighted.
@@ -248,7 +248,7 @@ static inline float sample_levels(const sonde_slicer *s, const slice_plane *plan
   return sum;
 }
 
-// Kriging between lower and upper plane, a share of the way t from the lower one.
+// Kriging between lower and upper plane, a share of the path t from the lower one.
 static float krige(const sonde_slicer *s, const slice_plane *lower, const float l[2],
                    const slice_plane *upper, const float u[2], float t, float gap) {
   int32_t i = (int32_t)(lower - s->planes);
@@ -282,8 +282,8 @@ static inline float between(const sonde_slicer *s, const slice_candidate *room, 
   memcpy(m, foot_up, sizeof m);
   memcpy(n, foot_down, sizeof n);
   if (p->along_sweep) { // one line for both
-    follow(p->up_way, foot_up[0], foot_up[1], a, m);
-    follow(p->down_way, foot_up[0], foot_up[1], -b, n);
+    follow(p->up_path, foot_up[0], foot_up[1], a, m);
+    follow(p->down_path, foot_up[0], foot_up[1], -b, n);
   }
   if (!p->along_sweep || !is_inside(s, m) || !is_inside(s, n)) {
     for (int k = 0; k < 2; ++k) {
@@ -362,14 +362,14 @@ INLINE void meet_row(const sonde_slicer *s, const slice_candidate *room, const r
 
 // Where in the frame, and how far between its pixels.
 INLINE void find_pixels(const sonde_slicer *s, float at[2][SLICE_TILE], float share[2][SLICE_TILE],
-                        int32_t place[SLICE_TILE]) {
+                        int32_t offset[SLICE_TILE]) {
   int32_t width = (int32_t)s->width, iu_high = (int32_t)s->high[0], iv_high = (int32_t)s->high[1];
   for (int x = 0; x < SLICE_TILE; ++x) {
     float u = bound(at[0][x], s->low[0], s->high[0]), v = bound(at[1][x], s->low[1], s->high[1]);
     int32_t i = (int32_t)u, j = (int32_t)v;
     i = i < iu_high ? i : iu_high - 1, j = j < iv_high ? j : iv_high - 1;
     share[0][x] = u - (float)i, share[1][x] = v - (float)j;
-    place[x] = j * width + i;
+    offset[x] = j * width + i;
   }
 }
 
@@ -505,7 +505,7 @@ static uint64_t search_edge(const sonde_slicer *s, const rectangle *tile, uint32
     }
   if (is_outside(s, &o, 0, 0, (float)tile->wide, (float)tile->high))
     return fill_evenly(s, tile, NULL);
-  place_tile(s, table, tile->high, &work);
+  locate_tile(s, table, tile->high, &work);
   uint64_t reached = 0;
   pair pairs[PAIRS];
   for (int k = 0; k < PAIRS; ++k) pairs[k].up = -1;
@@ -565,7 +565,7 @@ static uint64_t slice_block(const sonde_slicer *s, uint32_t column, uint32_t row
         reached += search_edge(s, &tile, all, room, &table);
       } else {
         strip_work work;
-        place_tile(s, &table, tile.high, &work);
+        locate_tile(s, &table, tile.high, &work);
         reached += fill_evenly(s, &tile, &work);
       }
     }

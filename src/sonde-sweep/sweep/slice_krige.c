@@ -76,8 +76,8 @@ static sonde_vec3 normal_of(const sonde_sequence *s, uint32_t frame) {
 
 // From the middle of either frame to the plane of the other, mean of both.
 static double apart(const sonde_sequence *s, uint32_t a, uint32_t b) {
-  sonde_vec3 way = v_sub(middle(s, a), middle(s, b));
-  return 0.5 * (fabs(v_dot(way, normal_of(s, a))) + fabs(v_dot(way, normal_of(s, b))));
+  sonde_vec3 step = v_sub(middle(s, a), middle(s, b));
+  return 0.5 * (fabs(v_dot(step, normal_of(s, a))) + fabs(v_dot(step, normal_of(s, b))));
 }
 
 // Pixel (u, v, 1) of frame a -> its foot on frame b; false for a frame without a plane.
@@ -110,9 +110,9 @@ static void compare(const slice_bank *bank, slice_likeness *pair) {
     // A pixel that never changes does not count.
     if (!bank->shares[0][(size_t)(v + 0.5f) * bank->wide[0] + (size_t)(u + 0.5f)]) continue;
     scales_at(bank, pair->a, u, v, own);
-    for (int way = 0; way < 2; ++way) {
+    for (int joining = 0; joining < 2; ++joining) {
       float p = u, q = v;
-      if (way == 0 && pair->a != pair->b) {
+      if (joining == 0 && pair->a != pair->b) {
         p = map[0][0] * x + map[0][1] * y + map[0][2] - (float)s->clip[0];
         q = map[1][0] * x + map[1][1] * y + map[1][2] - (float)s->clip[1];
       }
@@ -120,13 +120,13 @@ static void compare(const slice_bank *bank, slice_likeness *pair) {
           !(p >= 0 && q >= 0 && p <= (float)(bank->wide[0] - 1) && q <= (float)(bank->high[0] - 1)))
         continue;
       scales_at(bank, pair->b, p, q, other);
-      for (int k = 0; k < SLICE_LEVELS; ++k) sum[way][k] += (double)(own[k] * other[k]);
-      count[way] += 1;
+      for (int k = 0; k < SLICE_LEVELS; ++k) sum[joining][k] += (double)(own[k] * other[k]);
+      count[joining] += 1;
     }
   }
-  for (int way = 0; way < 2; ++way)
+  for (int joining = 0; joining < 2; ++joining)
     for (int k = 0; k < SLICE_LEVELS; ++k)
-      pair->mean[way][k] = count[way] > 0 ? (float)(sum[way][k] / count[way]) : 0;
+      pair->mean[joining][k] = count[joining] > 0 ? (float)(sum[joining][k] / count[joining]) : 0;
 }
 
 static sonde_status build_pyramids(slice_bank *bank, sonde_error *error) {
@@ -226,10 +226,10 @@ static bool is_out(const sonde_slicer *s, uint32_t frame) {
 }
 
 // Mean product of two used frames at most LAGS apart; their places among the used ones.
-static double product(const slice_bank *bank, uint32_t a, uint32_t b, int way, int level) {
+static double product(const slice_bank *bank, uint32_t a, uint32_t b, int joining, int level) {
   uint32_t low = a < b ? a : b, high = a < b ? b : a;
   SONDE_ASSERT(high < bank->used && high - low <= LAGS);
-  return (double)bank->pairs[low * (LAGS + 1) + high - low].mean[way][level];
+  return (double)bank->pairs[low * (LAGS + 1) + high - low].mean[joining][level];
 }
 
 static double likeness_at(const decay *d, double distance_m) {
@@ -375,15 +375,17 @@ static uint32_t frame_of(const sonde_slicer *slicer, int32_t plane) {
   return slicer->planes[plane].frame;
 }
 
-// A plane beyond an end of the gap that goes on the same way and is not too far.
-static bool goes_on(const sonde_slicer *s, int32_t plane, int32_t end, int32_t other, double *way) {
-  *way = 0;
+// A plane beyond an end of the gap that goes on alike and is not too far.
+static bool goes_on(const sonde_slicer *s, int32_t plane, int32_t end, int32_t other,
+                    double *beyond) {
+  *beyond = 0;
   if (plane < 0 || plane >= (int32_t)s->count) return false;
   const sonde_sequence *q = s->bank->sequence;
   double gap = apart(q, frame_of(s, end), frame_of(s, other));
   double all = apart(q, frame_of(s, plane), frame_of(s, other));
-  *way = apart(q, frame_of(s, plane), frame_of(s, end));
-  return *way > 0.05 * gap && *way <= s->options.gap_m && fabs(all - gap - *way) < 0.25 * all;
+  *beyond = apart(q, frame_of(s, plane), frame_of(s, end));
+  return *beyond > 0.05 * gap && *beyond <= s->options.gap_m &&
+         fabs(all - gap - *beyond) < 0.25 * all;
 }
 
 static void make_map(const sonde_slicer *s, int32_t from, int32_t to, float map[2][3]) {

@@ -16,8 +16,8 @@ typedef struct job {
 } job;
 
 // Middle of pixel 0 to middle of the last one spans the size less one pixel.
-static void node_places(const job *j, uint32_t column, uint32_t row, uint32_t count,
-                        double places[][2]) {
+static void locate_nodes(const job *j, uint32_t column, uint32_t row, uint32_t count,
+                         double positions[][2]) {
   const sonde_image *out = j->out, *rest = j->rest;
   double dx = out->width_m / out->width, dz = out->height_m / out->height;
   for (uint32_t k = 0; k < count; ++k) {
@@ -26,9 +26,10 @@ static void node_places(const job *j, uint32_t column, uint32_t row, uint32_t co
     sonde_vec3 p =
         sonde_interior_rest_point(j->press->interior, pose_apply(j->press->pose, vec3(x, 0, z)));
     sonde_vec3 q = pose_apply_inverse(j->press->rest_pose, p);
-    places[k][0] = (q.x + j->press->shift_m[0] + 0.5 * rest->width_m) / rest->width_m * rest->width;
-    places[k][1] = (q.z + j->press->shift_m[1]) / rest->height_m * rest->height;
-    places[k][0] -= 0.5, places[k][1] -= 0.5;
+    positions[k][0] =
+        (q.x + j->press->shift_m[0] + 0.5 * rest->width_m) / rest->width_m * rest->width;
+    positions[k][1] = (q.z + j->press->shift_m[1]) / rest->height_m * rest->height;
+    positions[k][0] -= 0.5, positions[k][1] -= 0.5;
   }
 }
 
@@ -73,14 +74,14 @@ uint64_t sonde_image_pressed(const sonde_image *rest, const sonde_image_press *p
   job j = {rest, press, out, known};
   uint64_t reached = 0;
   for (uint32_t left = 0; left < out->width; left += NODE * (NODES - 1)) {
-    double places[2][NODES][2];
+    double positions[2][NODES][2];
     uint32_t wide = out->width - left, k = 0;
     if (wide > NODE * (NODES - 1)) wide = NODE * (NODES - 1);
     uint32_t count = (wide + NODE - 1) / NODE + 1;
-    node_places(&j, left, 0, count, places[0]);
+    locate_nodes(&j, left, 0, count, positions[0]);
     for (uint32_t row = 0; row < out->height; row += NODE, k ^= 1) {
-      node_places(&j, left, row + NODE, count, places[k ^ 1]);
-      reached += fill_rows(&j, left, row, wide, places[k], places[k ^ 1]);
+      locate_nodes(&j, left, row + NODE, count, positions[k ^ 1]);
+      reached += fill_rows(&j, left, row, wide, positions[k], positions[k ^ 1]);
     }
   }
   return reached;

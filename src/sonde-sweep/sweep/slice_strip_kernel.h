@@ -8,7 +8,7 @@
 
 typedef struct strip_work {
   int32_t met[TILE_PIXELS]; // -1 where the strip speaks
-  int32_t place[2][TILE_PIXELS];
+  int32_t offset[2][TILE_PIXELS];
   float share[2][2][TILE_PIXELS], t[TILE_PIXELS];
   uint64_t greys[2][TILE_PIXELS]; // bytes 0, 1 and below them 6, 7
 } strip_work;
@@ -38,15 +38,15 @@ INLINE ints find_index(const strip_table *table, floats x, float y) {
   return index;
 }
 
-INLINE void place_pixels(const sonde_slicer *s, floats u, floats v, ints frame, int side,
+INLINE void locate_pixels(const sonde_slicer *s, floats u, floats v, ints frame, int side,
                          uint32_t first, strip_work *w) {
   float wide = s->high[0] - s->low[0], high = s->high[1] - s->low[1];
   ints i = vint(vmin(u, vset(wide - 1))), j = vint(vmin(v, vset(high - 1)));
   floats left = vreal(i), top = vreal(j);
   ints p = vint((left + 0.5f) * (1.0f / (SLICE_LINE_WIDE - 1)));
   ints q = vint((top + 0.5f) * (1.0f / (SLICE_LINE_HIGH - 1)));
-  ints place = frame + i + p * s->layout.column_line + j * s->layout.row + q * s->layout.row_line;
-  memcpy(w->place[side] + first, &place, sizeof place);
+  ints offset = frame + i + p * s->layout.column_line + j * s->layout.row + q * s->layout.row_line;
+  memcpy(w->offset[side] + first, &offset, sizeof offset);
   vstore(w->share[side][0] + first, u - left);
   vstore(w->share[side][1] + first, v - top);
 }
@@ -63,8 +63,8 @@ INLINE ints check(const sonde_slicer *s, const strip_table *table, floats value[
 }
 
 // A row of a tile.
-INLINE void place_row(const sonde_slicer *s, const strip_table *table, bool checked, float row,
-                      uint32_t first, strip_work *w) {
+INLINE void locate_row(const sonde_slicer *s, const strip_table *table, bool checked, float row,
+                       uint32_t first, strip_work *w) {
   static const float lanes[] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
   float starts[SLICE_FORMS][STRIPS];
   for (int f = 0; f < SLICE_FORMS; ++f)
@@ -81,8 +81,8 @@ INLINE void place_row(const sonde_slicer *s, const strip_table *table, bool chec
     }
     vstore(w->t + first + k, value[4] / (value[4] + value[5]));
     for (int side = 0; side < 2; ++side)
-      place_pixels(s, value[2 * side], value[2 * side + 1], look_up(table->frame[side], index),
-                   side, first + k, w);
+      locate_pixels(s, value[2 * side], value[2 * side + 1], look_up(table->frame[side], index),
+                    side, first + k, w);
   }
 }
 
@@ -91,12 +91,12 @@ static void load_greys(const slice_layout *layout, uint32_t count, strip_work *w
   const uint8_t *pixels = layout->pixels;
   size_t row = (size_t)layout->row;
   for (int side = 0; side < 2; ++side) {
-    const int32_t *place = w->place[side];
+    const int32_t *offset = w->offset[side];
     uint64_t *greys = w->greys[side];
     for (uint32_t i = 0; layout->lines && i < count; i += 8)
-      for (uint32_t k = 0; k < 8; ++k) memcpy(&greys[i + k], pixels + place[i + k], sizeof *greys);
+      for (uint32_t k = 0; k < 8; ++k) memcpy(&greys[i + k], pixels + offset[i + k], sizeof *greys);
     for (uint32_t i = 0; !layout->lines && i < count; ++i) {
-      const uint8_t *p = pixels + place[i];
+      const uint8_t *p = pixels + offset[i];
       greys[i] = two_greys(p) | two_greys(p + row) << 48;
     }
   }
@@ -106,16 +106,16 @@ static void load_greys(const slice_layout *layout, uint32_t count, strip_work *w
 INLINE void ask_for(const slice_layout *layout, const strip_work *w, uint32_t first) {
   for (uint32_t x = 0; x < SLICE_TILE; x += 4)
     for (int side = 0; side < 2; ++side)
-      __builtin_prefetch(layout->pixels + w->place[side][first + x]);
+      __builtin_prefetch(layout->pixels + w->offset[side][first + x]);
 }
 
-static void place_tile(const sonde_slicer *s, const strip_table *table, uint32_t high,
-                       strip_work *w) {
+static void locate_tile(const sonde_slicer *s, const strip_table *table, uint32_t high,
+                        strip_work *w) {
   for (uint32_t y = 0; y < high; ++y) {
     if (table->whole)
-      place_row(s, table, false, (float)y, y * SLICE_TILE, w);
+      locate_row(s, table, false, (float)y, y * SLICE_TILE, w);
     else
-      place_row(s, table, true, (float)y, y * SLICE_TILE, w);
+      locate_row(s, table, true, (float)y, y * SLICE_TILE, w);
     ask_for(&s->layout, w, y * SLICE_TILE);
   }
   load_greys(&s->layout, high * SLICE_TILE, w);

@@ -68,7 +68,7 @@ static void make_strip(const slice_plane *front, const slice_plane *behind, uint
   float behind_shift[2], front_shift[2];
   shift_between(behind, front, behind_shift);
   shift_between(front, behind, front_shift);
-  strips->place[0][i] = behind->place, strips->place[1][i] = front->place;
+  strips->offset[0][i] = behind->offset, strips->offset[1][i] = front->offset;
   for (int k = 0; k < 3; ++k) {
     double a = behind->forms.d[k], b = -front->forms.d[k];
     strips->forms[0][k][i] = behind->forms.u[k] - a * (double)behind_shift[0];
@@ -145,7 +145,7 @@ static void fill_lanes(const sonde_slicer *s, const rectangle *tile, const slice
     memcpy(table->row[f], strips->steps[f][1] + first, sizeof table->row[f]);
   }
   for (int side = 0; side < 2; ++side)
-    memcpy(table->frame[side], strips->place[side] + first, sizeof table->frame[side]);
+    memcpy(table->frame[side], strips->offset[side] + first, sizeof table->frame[side]);
 }
 
 // Where a line that meets both frames starts from a foot on both.

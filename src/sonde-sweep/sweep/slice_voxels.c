@@ -101,8 +101,8 @@ static inline four offset_at(const sonde_warp *warp, const double at[3]) {
   return a + t[2] * (c - a);
 }
 
-static void places_of_row(const maps *m, uint32_t column, uint32_t row, uint32_t count,
-                          float (*places)[3]) {
+static void locate_row(const maps *m, uint32_t column, uint32_t row, uint32_t count,
+                       float (*positions)[3]) {
   const double(*voxel)[4] = m->voxel_from_pixel.m, (*node)[4] = m->node_from_pixel.m;
   const double(*turn)[4] = m->voxel_from_world.m;
   for (uint32_t c = 0; c < count; ++c) {
@@ -114,22 +114,23 @@ static void places_of_row(const maps *m, uint32_t column, uint32_t row, uint32_t
       for (int k = 0; k < 3; ++k)
         p[k] += turn[k][0] * (double)o[0] + turn[k][1] * (double)o[1] + turn[k][2] * (double)o[2];
     }
-    for (int k = 0; k < 3; ++k) places[c][k] = (float)p[k];
+    for (int k = 0; k < 3; ++k) positions[c][k] = (float)p[k];
   }
 }
 
 static uint64_t slice_cells(const slice_kernels *kernels, const slice_voxels *v, const maps *m) {
   uint64_t reached = 0;
   for (uint32_t left = 0; left < v->image->width; left += CELLS * SLICE_CELL_WIDE) {
-    float places[2][CELLS + 1][3], corners[4][3];
+    float positions[2][CELLS + 1][3], corners[4][3];
     uint32_t cells = (v->image->width - left + SLICE_CELL_WIDE - 1) / SLICE_CELL_WIDE;
     if (cells > CELLS) cells = CELLS;
-    places_of_row(m, left, 0, cells + 1, places[0]);
+    locate_row(m, left, 0, cells + 1, positions[0]);
     for (uint32_t row = 0, k = 0; row < v->image->height; row += SLICE_CELL_HIGH, k ^= 1) {
-      places_of_row(m, left, row + SLICE_CELL_HIGH, cells + 1, places[k ^ 1]);
+      locate_row(m, left, row + SLICE_CELL_HIGH, cells + 1, positions[k ^ 1]);
       for (uint32_t c = 0; c < cells; ++c) {
-        memcpy(corners[0], places[k][c], 2 * sizeof corners[0]); // upper corners, then lower ones
-        memcpy(corners[2], places[k ^ 1][c], 2 * sizeof corners[0]);
+        memcpy(corners[0], positions[k][c],
+               2 * sizeof corners[0]); // upper corners, then lower ones
+        memcpy(corners[2], positions[k ^ 1][c], 2 * sizeof corners[0]);
         reached += kernels->cell(v, (const float(*)[3])corners, left + c * SLICE_CELL_WIDE, row);
       }
     }

@@ -1,5 +1,5 @@
 // Keyframes in memory and in their file.
-#include "exam/keys.h"
+#include "exam/keyframes.h"
 
 #include "base/base.h"
 
@@ -22,13 +22,13 @@ typedef struct file_entry {
   uint64_t tick;
 } file_entry;
 
-struct sonde_keys_file {
+struct sonde_keyframe_writer {
   sonde_file *file;
   unsigned char *raw, *packed;
   size_t raw_room;
 };
 
-char *sonde_keys_path(const char *recording) {
+char *sonde_keyframes_path(const char *recording) {
   SONDE_ASSERT(recording != NULL);
   size_t bytes = strlen(recording) + sizeof ".keys";
   char *path = SONDE_NEW(char, bytes);
@@ -50,8 +50,8 @@ static file_head head_of(const sonde_subject *subject) {
 }
 
 // Into packed[compressBound(raw_room)]; false when the parts do not fit, which a program's own do.
-static bool pack(const sonde_key *key, unsigned char *raw, size_t room, unsigned char *packed,
-                 sonde_packed_key *out) {
+static bool pack(const sonde_keyframe *key, unsigned char *raw, size_t room, unsigned char *packed,
+                 sonde_packed_keyframe *out) {
   size_t bytes = PARTS + key->world_bytes;
   uLongf length = compressBound(room);
   SONDE_ASSERT(bytes <= room && bytes <= UINT32_MAX);
@@ -59,27 +59,27 @@ static bool pack(const sonde_key *key, unsigned char *raw, size_t room, unsigned
   memcpy(raw + sizeof *key->inputs, key->inside, sizeof *key->inside);
   memcpy(raw + PARTS, key->world, key->world_bytes);
   if (compress2(packed, &length, raw, bytes, LEVEL) != Z_OK) return false;
-  *out = (sonde_packed_key){.tick = key->tick,
-                            .raw_bytes = (uint32_t)bytes,
-                            .packed_bytes = (uint32_t)length,
-                            .crc = (uint32_t)crc32_z(0, packed, length),
-                            .packed = packed};
+  *out = (sonde_packed_keyframe){.tick = key->tick,
+                                 .raw_bytes = (uint32_t)bytes,
+                                 .packed_bytes = (uint32_t)length,
+                                 .crc = (uint32_t)crc32_z(0, packed, length),
+                                 .packed = packed};
   return true;
 }
 
 // ---- writing ------------------------------------------------------------------------------
 
-static void free_writer(sonde_keys_file *keys) {
+static void free_writer(sonde_keyframe_writer *keys) {
   if (!keys) return;
   sonde_free(keys->raw);
   sonde_free(keys->packed);
   sonde_free(keys);
 }
 
-sonde_status sonde_keys_create(const char *path, const sonde_subject *subject,
-                               sonde_keys_file **out, sonde_error *error) {
+sonde_status sonde_keyframe_writer_create(const char *path, const sonde_subject *subject,
+                                          sonde_keyframe_writer **out, sonde_error *error) {
   *out = NULL;
-  sonde_keys_file *keys = SONDE_NEW(sonde_keys_file, 1);
+  sonde_keyframe_writer *keys = SONDE_NEW(sonde_keyframe_writer, 1);
   if (!keys) return sonde_fail_memory(error);
   keys->raw_room = raw_room(subject);
   keys->raw = sonde_calloc(1, keys->raw_room);
@@ -97,19 +97,21 @@ sonde_status sonde_keys_create(const char *path, const sonde_subject *subject,
   return SONDE_OK;
 }
 
-void sonde_keys_append(sonde_keys_file *keys, const sonde_packed_key *key) {
+void sonde_keyframe_writer_copy(sonde_keyframe_writer *keys, const sonde_packed_keyframe *key) {
   SONDE_ASSERT(key->packed != NULL);
   file_entry entry = {ENTRY, key->raw_bytes, key->packed_bytes, key->crc, key->tick};
   sonde_file_write(keys->file, &entry, sizeof entry);
   sonde_file_write(keys->file, key->packed, key->packed_bytes);
 }
 
-void sonde_keys_write(sonde_keys_file *keys, const sonde_key *key) {
-  sonde_packed_key packed;
-  if (pack(key, keys->raw, keys->raw_room, keys->packed, &packed)) sonde_keys_append(keys, &packed);
+void sonde_keyframe_writer_add(sonde_keyframe_writer *keys, const sonde_keyframe *key) {
+  sonde_packed_keyframe packed;
+  if (pack(key, keys->raw, keys->raw_room, keys->packed, &packed))
+    sonde_keyframe_writer_copy(keys, &packed);
 }
 
-sonde_status sonde_keys_commit(sonde_keys_file *keys, uint32_t recording_crc, sonde_error *error) {
+sonde_status sonde_keyframe_writer_commit(sonde_keyframe_writer *keys, uint32_t recording_crc,
+                                          sonde_error *error) {
   file_entry last = {LAST, 0, 0, recording_crc, 0};
   sonde_file_write(keys->file, &last, sizeof last);
   sonde_status status = sonde_file_commit(keys->file, error);
@@ -117,7 +119,7 @@ sonde_status sonde_keys_commit(sonde_keys_file *keys, uint32_t recording_crc, so
   return status;
 }
 
-void sonde_keys_discard(sonde_keys_file *keys) {
+void sonde_keyframe_writer_discard(sonde_keyframe_writer *keys) {
   if (!keys) return;
   sonde_file_discard(keys->file);
   free_writer(keys);
@@ -125,27 +127,28 @@ void sonde_keys_discard(sonde_keys_file *keys) {
 
 // ---- list ---------------------------------------------------------------------------------
 
-sonde_status sonde_keys_init(sonde_keys *keys, const sonde_subject *subject, sonde_error *error) {
-  *keys = (sonde_keys){.raw_room = raw_room(subject)};
+sonde_status sonde_keyframes_init(sonde_keyframes *keys, const sonde_subject *subject,
+                                  sonde_error *error) {
+  *keys = (sonde_keyframes){.raw_room = raw_room(subject)};
   keys->raw = sonde_calloc(1, keys->raw_room);
   keys->packed = sonde_calloc(1, compressBound(keys->raw_room));
   return keys->raw && keys->packed ? SONDE_OK : sonde_fail_memory(error);
 }
 
-void sonde_keys_clear(sonde_keys *keys) {
+void sonde_keyframes_clear(sonde_keyframes *keys) {
   for (uint32_t k = 0; k < keys->count; ++k) sonde_free(keys->list[k].packed);
   sonde_free(keys->list);
   sonde_free(keys->raw);
   sonde_free(keys->packed);
   if (keys->file) fclose(keys->file);
-  *keys = (sonde_keys){0};
+  *keys = (sonde_keyframes){0};
 }
 
 // Room for one more; false without memory.
-static bool grow(sonde_keys *keys) {
+static bool grow(sonde_keyframes *keys) {
   if (keys->count < keys->room) return true;
   uint32_t room = keys->room ? 2 * keys->room : 64;
-  sonde_packed_key *list =
+  sonde_packed_keyframe *list =
       sonde_realloc(keys->list, keys->room * sizeof *list, room * sizeof *list);
   if (!list) return false;
   keys->list = list;
@@ -154,19 +157,19 @@ static bool grow(sonde_keys *keys) {
 }
 
 // Place of the first keyframe behind a tick.
-static uint32_t place_after(const sonde_keys *keys, uint64_t tick) {
+static uint32_t place_after(const sonde_keyframes *keys, uint64_t tick) {
   return sonde_count_until(keys->list, sizeof *keys->list, keys->count, tick);
 }
 
-sonde_packed_key *sonde_keys_find(const sonde_keys *keys, uint64_t tick) {
+sonde_packed_keyframe *sonde_keyframes_find(const sonde_keyframes *keys, uint64_t tick) {
   uint32_t after = place_after(keys, tick);
   return after > 0 ? &keys->list[after - 1] : NULL;
 }
 
-bool sonde_keys_add(sonde_keys *keys, const sonde_key *key) {
+bool sonde_keyframes_add(sonde_keyframes *keys, const sonde_keyframe *key) {
   uint32_t at = place_after(keys, key->tick);
   if (at > 0 && keys->list[at - 1].tick == key->tick) return true;
-  sonde_packed_key packed;
+  sonde_packed_keyframe packed;
   if (!grow(keys) || !pack(key, keys->raw, keys->raw_room, keys->packed, &packed)) return false;
   packed.packed = sonde_calloc(1, packed.packed_bytes);
   if (!packed.packed) return false;
@@ -178,7 +181,7 @@ bool sonde_keys_add(sonde_keys *keys, const sonde_key *key) {
 }
 
 // False when the list is not that of a whole file for this recording.
-static bool scan(sonde_keys *keys, uint32_t recording_crc) {
+static bool scan(sonde_keyframes *keys, uint32_t recording_crc) {
   file_entry entry;
   while ((fread(&entry, sizeof entry, 1, keys->file) == 1 &&
           (entry.tag == ENTRY || entry.tag == LAST)) &&
@@ -188,17 +191,17 @@ static bool scan(sonde_keys *keys, uint32_t recording_crc) {
     bool fits = at >= 0 && entry.raw_bytes >= PARTS && entry.raw_bytes <= keys->raw_room &&
                 entry.packed_bytes <= compressBound(keys->raw_room) && entry.tick > last;
     if (!fits || !grow(keys) || fseek(keys->file, (long)entry.packed_bytes, SEEK_CUR)) return false;
-    keys->list[keys->count++] = (sonde_packed_key){.tick = entry.tick,
-                                                   .raw_bytes = entry.raw_bytes,
-                                                   .packed_bytes = entry.packed_bytes,
-                                                   .crc = entry.crc,
-                                                   .at = (uint64_t)at};
+    keys->list[keys->count++] = (sonde_packed_keyframe){.tick = entry.tick,
+                                                        .raw_bytes = entry.raw_bytes,
+                                                        .packed_bytes = entry.packed_bytes,
+                                                        .crc = entry.crc,
+                                                        .at = (uint64_t)at};
   }
   return entry.tag == LAST && entry.crc == recording_crc;
 }
 
-void sonde_keys_open(sonde_keys *keys, const char *path, const sonde_subject *subject,
-                     uint32_t recording_crc) {
+void sonde_keyframes_open(sonde_keyframes *keys, const char *path, const sonde_subject *subject,
+                          uint32_t recording_crc) {
   SONDE_ASSERT(keys->file == NULL && keys->count == 0);
   file_head head, mine = head_of(subject);
   keys->file = fopen(path, "rb");
@@ -211,7 +214,8 @@ void sonde_keys_open(sonde_keys *keys, const char *path, const sonde_subject *su
   keys->file = NULL;
 }
 
-bool sonde_keys_fetch(sonde_keys *keys, const sonde_packed_key *packed, sonde_packed_key *whole) {
+bool sonde_keyframes_fetch(sonde_keyframes *keys, const sonde_packed_keyframe *packed,
+                           sonde_packed_keyframe *whole) {
   *whole = *packed;
   if (packed->packed) return true;
   whole->packed = keys->packed;
@@ -220,17 +224,18 @@ bool sonde_keys_fetch(sonde_keys *keys, const sonde_packed_key *packed, sonde_pa
          crc32_z(0, keys->packed, packed->packed_bytes) == packed->crc;
 }
 
-bool sonde_keys_unpack(sonde_keys *keys, const sonde_packed_key *packed, sonde_key *key) {
-  sonde_packed_key whole;
+bool sonde_keyframes_unpack(sonde_keyframes *keys, const sonde_packed_keyframe *packed,
+                            sonde_keyframe *key) {
+  sonde_packed_keyframe whole;
   uLongf bytes = keys->raw_room;
-  if (!sonde_keys_fetch(keys, packed, &whole)) return false;
+  if (!sonde_keyframes_fetch(keys, packed, &whole)) return false;
   if (uncompress(keys->raw, &bytes, whole.packed, whole.packed_bytes) != Z_OK ||
       bytes != packed->raw_bytes)
     return false;
-  *key = (sonde_key){.tick = packed->tick,
-                     .inputs = (const void *)keys->raw,
-                     .inside = (const void *)(keys->raw + sizeof(sonde_tick_memory)),
-                     .world = keys->raw + PARTS,
-                     .world_bytes = bytes - PARTS};
+  *key = (sonde_keyframe){.tick = packed->tick,
+                          .inputs = (const void *)keys->raw,
+                          .inside = (const void *)(keys->raw + sizeof(sonde_tick_memory)),
+                          .world = keys->raw + PARTS,
+                          .world_bytes = bytes - PARTS};
   return true;
 }
