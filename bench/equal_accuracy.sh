@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # equal_accuracy.sh SONDE DIR [MODULI]: what the explicit and the implicit step cost for the same error
-# (docs/scene.md). A cantilever of springs bends under its weight for 0.2 s; the way of its centre,
+# (docs/scene_theory.md). A cantilever of springs bends under its weight for 0.2 s; the way of its centre,
 # every 5 ms, is compared with a fine run of its own (rms of the difference over rms of the way).
 # Per stiffness and method the step is halved until the error is 1 % or less; prints one CSV row
 # each, best of three runs.

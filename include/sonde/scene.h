@@ -27,7 +27,7 @@ typedef enum sonde_body_motion {
   SONDE_BODY_DRIVEN
 } sonde_body_motion;
 
-/** How two bodies push each other apart (docs/scene.md). */
+/** How two bodies push each other apart (docs/scene_theory.md). */
 typedef enum sonde_touch_law {
   SONDE_TOUCH_FOUNDATION, /**< pressure kappa*depth + mu*rate at points of the contact */
   SONDE_TOUCH_VOLUME,     /**< eq. (2): kappa V + mu dV/dt per region along its direction */

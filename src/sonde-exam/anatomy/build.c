@@ -7,7 +7,7 @@ enum { SITES = SONDE_THIGH_COLUMNS * SONDE_THIGH_ROWS, LEVELS = 32 };
 static const double SITE_STEP_M = 0.015, FINE_REACH_M = 0.005; // between columns; round footprints
 
 // Springs of the layers in series and an asymptote that is a share of the tissue's thickness:
-// least squares over the 64 sites of the bundled thigh (docs/anatomy.md).
+// least squares over the 64 sites of the bundled thigh (docs/anatomy_theory.md).
 static const double FAT_COMPLIANCE = 1.688e-4, MUSCLE_COMPLIANCE = 4.963e-5; // m^2/N
 static const double ASYMPTOTE_SHARE = 0.6726;
 static const double LEAST_FAT_M = 0.002, LEAST_TISSUE_M = 0.02;

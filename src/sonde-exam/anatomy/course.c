@@ -1,4 +1,4 @@
-// Where the vessels run (docs/anatomy.md).
+// Where the vessels run (docs/anatomy_theory.md).
 #include "anatomy/shape.h"
 
 #include <string.h>

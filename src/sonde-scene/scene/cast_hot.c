@@ -1,5 +1,5 @@
 // Conservative advancement inside a step: no pair moves past its first touch by more than a share
-// of the thinner body's thickness at once, so that nothing passes through (docs/scene.md).
+// of the thinner body's thickness at once, so that nothing passes through (docs/scene_theory.md).
 //
 // Thickness V/A is a third of a ball's radius, a sixth of a cube's edge and half of a sheet's
 // thickness. A column that grows by less than that per step never reaches the far side of either

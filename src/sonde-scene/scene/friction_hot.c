@@ -1,4 +1,4 @@
-// Coulomb friction with bonds, on every column of a contact (docs/scene.md).
+// Coulomb friction with bonds, on every column of a contact (docs/scene_theory.md).
 //
 // A bond's displacement z is how far the two surfaces have moved past each other since they met,
 // less what slipped. Its force is -P mu_s z/d for |z| up to d mu/mu_s, P the column's push and d

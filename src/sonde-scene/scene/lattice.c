@@ -3,7 +3,7 @@
 //
 // A cube of edge s with springs k/4 along its 12 edges and k/2 along its 12 face diagonals has the
 // energy of an isotropic solid with E = 2.5 k/s and Poisson's ratio 1/4, the only one that central
-// forces allow (Cauchy): C11 = 3 k/s, C12 = C44 = k/s. docs/scene.md.
+// forces allow (Cauchy): C11 = 3 k/s, C12 = C44 = k/s. docs/scene_theory.md.
 #include "scene/lattice.h"
 
 #include "base/base.h"

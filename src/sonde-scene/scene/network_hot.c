@@ -1,4 +1,4 @@
-// Springs of surfaces and lattices, and the bulk of a closed surface (docs/scene.md).
+// Springs of surfaces and lattices, and the bulk of a closed surface (docs/scene_theory.md).
 #include "scene/state.h"
 
 #include "base/base.h"

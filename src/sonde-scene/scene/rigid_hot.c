@@ -1,4 +1,4 @@
-// Motion of rigid bodies and the points at which a step evaluates forces (docs/scene.md).
+// Motion of rigid bodies and the points at which a step evaluates forces (docs/scene_theory.md).
 //
 // The unknown of a free rigid body's second slot is the change of angular momentum, as I dw with
 // the inertia I at the start of the step. Gyroscopic terms never appear: the momentum is carried

@@ -1,4 +1,4 @@
-// Nodes at rest of anchored tissues sleep (docs/scene.md).
+// Nodes at rest of anchored tissues sleep (docs/scene_theory.md).
 //
 // A tissue's node falls asleep when for CALM steps it was slow and the forces on it, contact
 // then stays where it is, and its neighbours feel its springs. What touches others never sleeps.

@@ -1,4 +1,4 @@
-// One implicit step for all bodies of a scene (docs/scene.md).
+// One implicit step for all bodies of a scene (docs/scene_theory.md).
 #include "scene/state.h"
 
 #include "base/base.h"

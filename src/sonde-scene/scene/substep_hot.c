@@ -1,4 +1,4 @@
-// A step of the scene, whole or in substeps chosen by step doubling (docs/scene.md).
+// A step of the scene, whole or in substeps chosen by step doubling (docs/scene_theory.md).
 #include "scene/state.h"
 
 #include "base/base.h"

@@ -1,6 +1,6 @@
 // Pixels of a picture from the frames around them, and from a volume: kernels, compiled once for
 // each instruction set with SLICE_KERNELS defined; every operation is one IEEE operation per vector
-// element, so that all give the same bits. docs/frames_images.md derives the weights.
+// element, so that all give the same bits. docs/frames_images_theory.md derives the weights.
 //
 // A picture is divided into blocks and those into tiles. Over a tile the distance d to a plane is
 // linear, so its bounds are known from the tile's centre. A plane that covers the whole tile on one
