@@ -73,22 +73,6 @@ static void normal_draw(const draw *d, double *member, double mean, double devia
   *member = whole_nm(clamp(value, low, high));
 }
 
-static void fill_shape(const draw *d) {
-  sonde_thigh *t = d->thigh;
-  bool female = t->sex == SONDE_SEX_FEMALE;
-  normal_draw(d, &t->length_m, female ? 0.300 : 0.323, female ? 0.012 : 0.013, 0.2, 0.4);
-  normal_draw(d, &t->skin_m, 0.0018, 0.0002, 0.001, 0.004);
-  double fat = 0.25 * (t->fat_front_m + t->fat_back_m + t->fat_inner_m + t->fat_outer_m);
-  double around = 2 * SONDE_PI * (fat + t->skin_m); // what skin and fat add to the muscles' girth
-  normal_draw(d, &t->girth_m, around + (female ? 0.425 : 0.46), 0.022, 0.3, 0.9);
-  normal_draw(d, &t->girth_proximal_m, 1.22 * t->girth_m, 0.03 * t->girth_m, t->girth_m, 1.1);
-  normal_draw(d, &t->girth_distal_m, 0.81 * t->girth_m, 0.02 * t->girth_m, 0.25, t->girth_m);
-  normal_draw(d, &t->oval, 0.055, 0.012, 0, 0.12);
-  normal_draw(d, &t->femur_m, female ? 0.026 : 0.028, 0.0015, 0.016, 0.04);
-  normal_draw(d, &t->femur_lateral_m, 0.30 * t->girth_proximal_m / (2 * SONDE_PI), 0.003, 0, 0.045);
-  normal_draw(d, &t->femur_anterior_m, 0.012, 0.0015, 0, 0.025);
-}
-
 sonde_status sonde_thigh_draw(const sonde_thigh *known, uint64_t seed, sonde_thigh *thigh,
                               sonde_error *error) {
   *thigh = *known;
@@ -101,13 +85,25 @@ sonde_status sonde_thigh_draw(const sonde_thigh *known, uint64_t seed, sonde_thi
     thigh->sex = sonde_random_bits(seed, SEX_COUNTER) & 1 ? SONDE_SEX_FEMALE : SONDE_SEX_MALE;
   draw d = {thigh, seed};
   sonde_thigh *t = d.thigh;
-  double share = t->sex == SONDE_SEX_FEMALE ? 1.15 : 0.85;
+  const bool female = t->sex == SONDE_SEX_FEMALE;
+  const double share = female ? 1.15 : 0.85;
+  // Fat of the four sides, then the sections, which depend on it, then vessels and springs.
   normal_draw(&d, &t->fat_front_m, 0.0104 * share, 0.0041 * share, 0.003, 0.04);
   normal_draw(&d, &t->fat_inner_m, 1.5 * t->fat_front_m, 0.15 * t->fat_front_m, 0.003, 0.06);
   normal_draw(&d, &t->fat_outer_m, 0.7 * t->fat_front_m, 0.05 * t->fat_front_m, 0.002, 0.06);
   normal_draw(&d, &t->fat_back_m, 1.1 * t->fat_front_m, 0.1 * t->fat_front_m, 0.002, 0.06);
-  fill_shape(&d);
-  bool female = t->sex == SONDE_SEX_FEMALE;
+  normal_draw(&d, &t->length_m, female ? 0.300 : 0.323, female ? 0.012 : 0.013, 0.2, 0.4);
+  normal_draw(&d, &t->skin_m, 0.0018, 0.0002, 0.001, 0.004);
+  double fat = 0.25 * (t->fat_front_m + t->fat_back_m + t->fat_inner_m + t->fat_outer_m);
+  double around = 2 * SONDE_PI * (fat + t->skin_m); // what skin and fat add to the muscles' girth
+  normal_draw(&d, &t->girth_m, around + (female ? 0.425 : 0.46), 0.022, 0.3, 0.9);
+  normal_draw(&d, &t->girth_proximal_m, 1.22 * t->girth_m, 0.03 * t->girth_m, t->girth_m, 1.1);
+  normal_draw(&d, &t->girth_distal_m, 0.81 * t->girth_m, 0.02 * t->girth_m, 0.25, t->girth_m);
+  normal_draw(&d, &t->oval, 0.055, 0.012, 0, 0.12);
+  normal_draw(&d, &t->femur_m, female ? 0.026 : 0.028, 0.0015, 0.016, 0.04);
+  normal_draw(&d, &t->femur_lateral_m, 0.30 * t->girth_proximal_m / (2 * SONDE_PI), 0.003, 0,
+              0.045);
+  normal_draw(&d, &t->femur_anterior_m, 0.012, 0.0015, 0, 0.025);
   normal_draw(&d, &t->vein_m, female ? 0.0098 : 0.0106, 0.0012, 0.004, 0.018);
   normal_draw(&d, &t->artery_m, female ? 0.0075 : 0.0085, 0.0007, 0.003, 0.014);
   normal_draw(&d, &t->vein_angle_rad, 70 * SONDE_PI / 180, 4 * SONDE_PI / 180, 0.78, 1.57);

@@ -71,27 +71,6 @@ static bool slab_centre(const sonde_mesh *femur, const frame *f, double low, dou
   return area > 0;
 }
 
-static sonde_status shaft_line(const sonde_mesh *femur, frame *f, sonde_error *error) {
-  if (femur->vertex_count < 50 || femur->face_count < 50)
-    return sonde_fail(error, SONDE_MESH, "the femur has %u vertices, expected a surface",
-                      femur->vertex_count);
-  f->origin = femur->vertices[0];
-  f->z = vec3(0, 0, 1);
-  f->z = wide_direction(femur, f, -INFINITY, INFINITY, false);
-  for (int pass = 0; pass < 3; ++pass) {
-    measure_extent(femur, f);
-    double length = f->high - f->low;
-    sonde_vec3 a, b;
-    if (!slab_centre(femur, f, f->low + 0.3 * length, f->low + 0.4 * length, &a) ||
-        !slab_centre(femur, f, f->low + 0.6 * length, f->low + 0.7 * length, &b))
-      return sonde_fail(error, SONDE_MESH, "the femur has no shaft");
-    f->origin = a;
-    f->z = v_unit(v_sub(b, a), f->z);
-  }
-  measure_extent(femur, f);
-  return SONDE_OK;
-}
-
 // How far the middle of an end stands beside the shaft's line.
 static sonde_vec3 end_offset(const sonde_mesh *femur, const frame *f, bool far) {
   double length = f->high - f->low;
@@ -102,8 +81,26 @@ static sonde_vec3 end_offset(const sonde_mesh *femur, const frame *f, bool far) 
 }
 
 static sonde_status leg_frame(const sonde_leg_scan *scan, frame *f, sonde_error *error) {
-  sonde_status status = shaft_line(scan->femur, f, error);
-  if (status) return status;
+  // z runs along the straight line through the middles of the shaft's middle third.
+  const sonde_mesh *femur = scan->femur;
+  if (femur->vertex_count < 50 || femur->face_count < 50)
+    return sonde_fail(error, SONDE_MESH, "the femur has %u vertices, expected a surface",
+                      femur->vertex_count);
+  f->origin = femur->vertices[0];
+  f->z = vec3(0, 0, 1);
+  f->z = wide_direction(femur, f, -INFINITY, INFINITY, false);
+  for (int pass = 0; pass < 3; ++pass) {
+    measure_extent(femur, f);
+    double long_m = f->high - f->low;
+    sonde_vec3 a, b;
+    if (!slab_centre(femur, f, f->low + 0.3 * long_m, f->low + 0.4 * long_m, &a) ||
+        !slab_centre(femur, f, f->low + 0.6 * long_m, f->low + 0.7 * long_m, &b))
+      return sonde_fail(error, SONDE_MESH, "the femur has no shaft");
+    f->origin = a;
+    f->z = v_unit(v_sub(b, a), f->z);
+  }
+  measure_extent(femur, f);
+  // The head stands beside the shaft, farther than the condyles do.
   sonde_vec3 head = end_offset(scan->femur, f, false), other = end_offset(scan->femur, f, true);
   if (v_norm(other) > v_norm(head)) {
     head = other;

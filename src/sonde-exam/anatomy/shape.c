@@ -4,11 +4,6 @@
 static const double LEAST_MUSCLE_M = 0.012;
 static const double FAT_TAPER = 0.15; // more at the groin, less at the knee
 
-static double outline(const sonde_thigh *thigh, double angle, double t) {
-  double second = thigh->oval * (1 - 0.45 * t), third = 0.02 * (1 - 0.4 * t);
-  return 1 + second * cos(2 * (angle - 1.745)) + third * cos(3 * (angle - 0.349));
-}
-
 void sonde_shape_fill_fat(const sonde_thigh *thigh, sonde_thigh_shape *shape) {
   SONDE_ASSERT(thigh->fat_inner_m > 0 && thigh->fat_outer_m > 0);
   SONDE_ASSERT(thigh->fat_front_m > 0 && thigh->fat_back_m > 0);
@@ -58,9 +53,12 @@ sonde_status sonde_thigh_shape_create(const sonde_thigh *thigh, sonde_thigh_shap
   if (!shape) return sonde_fail_memory(error);
   shape->skin.length_m = shape->femur.length_m = thigh->length_m;
   for (uint32_t j = 0; j < SONDE_TUBE_ROWS; ++j) {
+    // The section's radius up to a factor, which gives it the wanted girth.
     double t = (double)j / (SONDE_TUBE_ROWS - 1), z = t * shape->skin.length_m;
+    double second = thigh->oval * (1 - 0.45 * t), third = 0.02 * (1 - 0.4 * t);
     for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i)
-      shape->skin.radius_m[j][i] = outline(thigh, tube_angle(i), t);
+      shape->skin.radius_m[j][i] =
+          1 + second * cos(2 * (tube_angle(i) - 1.745)) + third * cos(3 * (tube_angle(i) - 0.349));
     double wanted = thigh->girth_proximal_m * (1 - t) * (1 - 2 * t) +
                     4 * thigh->girth_m * t * (1 - t) + thigh->girth_distal_m * t * (2 * t - 1);
     double factor = wanted / sonde_tube_girth(&shape->skin, z);

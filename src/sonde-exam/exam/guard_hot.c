@@ -39,29 +39,21 @@ static bool is_through(const sonde_subject *subject, const sonde_probe *probe, s
   return depth_beyond(subject, pose_apply(pose, vec3(0, 0, -length_of(probe)))) > 0;
 }
 
-// Ends, corners and middle of the probe's box. What lies between them may reach into the skin a
-// little: the skin is at rest then and gives way as to any probe that is put on it.
-static bool has_left(const sonde_subject *subject, const sonde_probe *probe, sonde_pose pose) {
-  double length_m = length_of(probe);
-  sonde_vec3 point[11];
-  for (int k = 0; k < 8; ++k)
-    point[k] = vec3(k & 1 ? probe->half_x_m : -probe->half_x_m,
-                    k & 2 ? probe->half_y_m : -probe->half_y_m, k & 4 ? 0 : -length_m);
-  for (int k = 0; k < 3; ++k) point[8 + k] = vec3(0, 0, -0.5 * k * length_m);
-  for (size_t k = 0; k < SONDE_COUNT_OF(point); ++k) {
-    sonde_vec3 at = pose_apply(pose, point[k]);
-    if (sonde_surface_closest(subject->rest_skin, at).distance_m < clear_m ||
-        sonde_surface_inside(subject->rest_skin, at))
-      return false;
-  }
-  return true;
-}
-
 bool sonde_subject_guard(sonde_subject *subject, const sonde_probe *probe, sonde_pose pose) {
   sonde_subject_moment *now = &subject->now;
   SONDE_ASSERT(probe != NULL && v_finite(pose.position));
   if (now->off) {
-    now->off = !has_left(subject, probe, pose);
+    // The probe acts again when the ends, corners and middle of its box are clear of the body. What
+    // lies between them may reach into the skin a little: the skin is at rest then and gives way as
+    // to any probe that is put on it.
+    double length_m = length_of(probe), x = probe->half_x_m, y = probe->half_y_m;
+    now->off = false;
+    for (int k = 0; k < 11 && !now->off; ++k) {
+      sonde_vec3 corner = vec3(k & 1 ? x : -x, k & 2 ? y : -y, k & 4 ? 0 : -length_m);
+      sonde_vec3 at = pose_apply(pose, k < 8 ? corner : vec3(0, 0, -0.5 * (k - 8) * length_m));
+      now->off = sonde_surface_closest(subject->rest_skin, at).distance_m < clear_m ||
+                 sonde_surface_inside(subject->rest_skin, at);
+    }
   } else if (now->carried || is_through(subject, probe, pose)) {
     now->off = true;
     now->restores++;

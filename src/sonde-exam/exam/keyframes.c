@@ -180,34 +180,30 @@ bool sonde_keyframes_add(sonde_keyframes *keys, const sonde_keyframe *key) {
   return true;
 }
 
-// False when the list is not that of a whole file for this recording.
-static bool scan(sonde_keyframes *keys, uint32_t recording_crc) {
-  file_entry entry;
-  while ((fread(&entry, sizeof entry, 1, keys->file) == 1 &&
-          (entry.tag == ENTRY || entry.tag == LAST)) &&
-         entry.tag == ENTRY) {
-    uint64_t last = keys->count ? keys->list[keys->count - 1].tick : 0;
-    long at = ftell(keys->file);
-    bool fits = at >= 0 && entry.raw_bytes >= PARTS && entry.raw_bytes <= keys->raw_room &&
-                entry.packed_bytes <= compressBound(keys->raw_room) && entry.tick > last;
-    if (!fits || !grow(keys) || fseek(keys->file, (long)entry.packed_bytes, SEEK_CUR)) return false;
-    keys->list[keys->count++] = (sonde_packed_keyframe){.tick = entry.tick,
-                                                        .raw_bytes = entry.raw_bytes,
-                                                        .packed_bytes = entry.packed_bytes,
-                                                        .crc = entry.crc,
-                                                        .at = (uint64_t)at};
-  }
-  return entry.tag == LAST && entry.crc == recording_crc;
-}
-
 void sonde_keyframes_open(sonde_keyframes *keys, const char *path, const sonde_subject *subject,
                           uint32_t recording_crc) {
   SONDE_ASSERT(keys->file == NULL && keys->count == 0);
   file_head head, mine = head_of(subject);
   keys->file = fopen(path, "rb");
   if (!keys->file) return;
-  bool good = fread(&head, sizeof head, 1, keys->file) == 1 &&
-              memcmp(&head, &mine, sizeof head) == 0 && scan(keys, recording_crc);
+  bool good =
+      fread(&head, sizeof head, 1, keys->file) == 1 && memcmp(&head, &mine, sizeof head) == 0;
+  // The list of a whole file for this recording: entries in the order of ticks, then its CRC.
+  file_entry entry = {0};
+  while (good && fread(&entry, sizeof entry, 1, keys->file) == 1 && entry.tag == ENTRY) {
+    uint64_t last = keys->count ? keys->list[keys->count - 1].tick : 0;
+    long at = ftell(keys->file);
+    good = at >= 0 && entry.raw_bytes >= PARTS && entry.raw_bytes <= keys->raw_room &&
+           entry.packed_bytes <= compressBound(keys->raw_room) && entry.tick > last && grow(keys) &&
+           fseek(keys->file, (long)entry.packed_bytes, SEEK_CUR) == 0;
+    if (!good) break;
+    keys->list[keys->count++] = (sonde_packed_keyframe){.tick = entry.tick,
+                                                        .raw_bytes = entry.raw_bytes,
+                                                        .packed_bytes = entry.packed_bytes,
+                                                        .crc = entry.crc,
+                                                        .at = (uint64_t)at};
+  }
+  good = good && entry.tag == LAST && entry.crc == recording_crc;
   if (good) return;
   keys->count = 0;
   fclose(keys->file);

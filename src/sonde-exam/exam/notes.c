@@ -47,28 +47,6 @@ const sonde_note *sonde_notes_last(const sonde_notes *notes, sonde_note_kind kin
   return NULL;
 }
 
-// The recording is read when its file is locked: another program may have added to it meanwhile.
-static int append(sonde_journal *journal, const sonde_recording *r, sonde_note_kind kind,
-                  const char *text) {
-  static const char zeros[8];
-  unsigned char head[SONDE_RECORD_NOTE_BYTES], block[16];
-  size_t length = strlen(text), pad = -length & 7;
-  (void)sonde_record_put_note(head, kind, r->told.ticks, length);
-  uLong crc = crc32_z(r->crc, head, sizeof head);
-  crc = crc32_z(crc, (const unsigned char *)text, length);
-  crc = crc32_z(crc, (const unsigned char *)zeros, pad);
-  sonde_record_put_block(block, (uint32_t)crc, r->block_ticks);
-  int failure = sonde_journal_truncate(journal, r->notes_end);
-  if (failure) return failure;
-  bool taken = sonde_journal_append(journal, head, sizeof head, true) &&
-               sonde_journal_append(journal, text, length, true) &&
-               sonde_journal_append(journal, zeros, pad, true) &&
-               sonde_journal_append(journal, block, sizeof block, true);
-  failure = taken ? sonde_journal_flush(journal, true, true) : ENOMEM;
-  if (failure) sonde_journal_forget(journal);
-  return failure;
-}
-
 sonde_status sonde_notes_add(const char *path, sonde_note_kind kind, const char *text,
                              sonde_error *error) {
   SONDE_ASSERT(path && text && kind >= SONDE_NOTE_SETUP && kind <= SONDE_NOTE_COMMENT);
@@ -79,19 +57,35 @@ sonde_status sonde_notes_add(const char *path, sonde_note_kind kind, const char 
                       strlen(text), SONDE_NOTE_MOST_BYTES);
   sonde_status status = sonde_journal_extend(path, &journal, error);
   if (status) return status;
+  // The recording is read when its file is locked: another program may have added to it meanwhile.
   status = sonde_recording_load(path, true, &recording, error);
+  if (!status && recording.version < SONDE_RECORD_JOURNAL)
+    status = sonde_fail(error, SONDE_VERSION, "%s: version %d of a recording takes no notes", path,
+                        recording.version);
   if (!status) {
-    int failure = 0;
-    if (recording.version < SONDE_RECORD_JOURNAL)
-      status = sonde_fail(error, SONDE_VERSION, "%s: version %d of a recording takes no notes",
-                          path, recording.version);
-    else
-      failure = append(journal, &recording, kind, text);
+    // One note and the block that closes it off, behind the last whole block.
+    static const char zeros[8];
+    unsigned char head[SONDE_RECORD_NOTE_BYTES], block[16];
+    size_t length = strlen(text), pad = -length & 7;
+    (void)sonde_record_put_note(head, kind, recording.told.ticks, length);
+    uLong crc = crc32_z(recording.crc, head, sizeof head);
+    crc = crc32_z(crc, (const unsigned char *)text, length);
+    crc = crc32_z(crc, (const unsigned char *)zeros, pad);
+    sonde_record_put_block(block, (uint32_t)crc, recording.block_ticks);
+    int failure = sonde_journal_truncate(journal, recording.notes_end);
+    if (!failure) {
+      bool taken = sonde_journal_append(journal, head, sizeof head, true) &&
+                   sonde_journal_append(journal, text, length, true) &&
+                   sonde_journal_append(journal, zeros, pad, true) &&
+                   sonde_journal_append(journal, block, sizeof block, true);
+      failure = taken ? sonde_journal_flush(journal, true, true) : ENOMEM;
+      if (failure) sonde_journal_forget(journal);
+    }
     if (failure)
       status = sonde_fail(error, sonde_disk_status(failure), "%s: cannot be written: %s", path,
                           strerror(failure));
-    sonde_recording_clear(&recording);
   }
+  sonde_recording_clear(&recording);
   sonde_journal_close(journal);
   return status;
 }

@@ -5,32 +5,26 @@
 
 enum { FIN = 0x80, RESERVED = 0x70, MASKED = 0x80, SHORT_MAX = 125 };
 
-// What the first two bytes already forbid.
-static int judge(unsigned first, unsigned second) {
-  int opcode = first & 0x0f;
-  bool control = opcode >= PAGE_WS_CLOSE;
-  if (first & RESERVED) return PAGE_CLOSE_PROTOCOL;
-  if (!(second & MASKED)) return PAGE_CLOSE_PROTOCOL; // RFC 6455, 5.1
-  if (opcode > PAGE_WS_PONG || (opcode > PAGE_WS_BINARY && !control)) return PAGE_CLOSE_PROTOCOL;
-  if (control && (!(first & FIN) || (second & 0x7f) > SHORT_MAX)) return PAGE_CLOSE_PROTOCOL;
-  if (!control && (!(first & FIN) || opcode != PAGE_WS_TEXT)) return PAGE_CLOSE_DATA;
-  return 0;
-}
-
 int page_ws_read(const unsigned char *bytes, size_t count, size_t limit, page_ws_head *head) {
   SONDE_ASSERT(bytes && head);
   *head = (page_ws_head){0};
   if (count < 2) return 0;
-  int refused = judge(bytes[0], bytes[1]);
-  if (refused) return refused;
-  size_t length = bytes[1] & 0x7f, extra = length == 126 ? 2 : length == 127 ? 8 : 0;
+  // The first two bytes already forbid much: what is not masked (RFC 6455, 5.1), fragments of
+  // control frames, and all messages but whole texts.
+  const int opcode = bytes[0] & 0x0f, length7 = bytes[1] & 0x7f;
+  const bool control = opcode >= PAGE_WS_CLOSE, whole = bytes[0] & FIN;
+  if ((bytes[0] & RESERVED) || !(bytes[1] & MASKED) || opcode > PAGE_WS_PONG ||
+      (opcode > PAGE_WS_BINARY && !control) || (control && (!whole || length7 > SHORT_MAX)))
+    return PAGE_CLOSE_PROTOCOL;
+  if (!control && (!whole || opcode != PAGE_WS_TEXT)) return PAGE_CLOSE_DATA;
+  size_t length = (size_t)length7, extra = length == 126 ? 2 : length == 127 ? 8 : 0;
   if (count < 2 + extra) return 0;
   uint64_t payload = extra ? 0 : length;
   for (size_t i = 0; i < extra; ++i) payload = payload << 8 | bytes[2 + i];
   if (payload > limit) return PAGE_CLOSE_TOO_BIG;
   if (count < 2 + extra + 4) return 0;
   memcpy(head->mask, bytes + 2 + extra, 4);
-  head->opcode = bytes[0] & 0x0f;
+  head->opcode = opcode;
   head->head = 2 + extra + 4;
   head->payload = (size_t)payload;
   return 0;

@@ -171,20 +171,6 @@ static bool answer_document(const sonde_page_server *server, const page_request 
   return false;
 }
 
-static void send_status(sonde_page_server *server, page_out *out) {
-  pthread_mutex_lock(&server->lock);
-  const char *newest = server->topic[SONDE_PAGE_STATUS].text;
-  size_t size = newest ? strlen(newest) : 2;
-  char *text = SONDE_NEW(char, size);
-  if (text) memcpy(text, newest ? newest : "{}", size);
-  pthread_mutex_unlock(&server->lock);
-  if (!text)
-    send_refusal(out, 503, "Service Unavailable", "out of memory\n");
-  else
-    send_head(out, 200, "OK",
-              &(page_body){.type = "application/json", .bytes = text, .size = size, .owned = text});
-}
-
 // ---- the WebSocket
 
 static void upgrade(sonde_page_server *server, const page_request *request, page_out *out,
@@ -243,9 +229,20 @@ static void answer(sonde_page_server *server, const page_request *request, page_
   } else if (strcmp(request->path, "/favicon.ico") == 0) {
     send_head(out, 204, "No Content", &(page_body){.type = "image/x-icon"});
   } else if (strcmp(request->path, "/status.json") == 0) {
-    if (knows_token(server, request))
-      send_status(server, out);
-    else
+    if (knows_token(server, request)) {
+      pthread_mutex_lock(&server->lock);
+      const char *newest = server->topic[SONDE_PAGE_STATUS].text;
+      size_t size = newest ? strlen(newest) : 2;
+      char *text = SONDE_NEW(char, size);
+      if (text) memcpy(text, newest ? newest : "{}", size);
+      pthread_mutex_unlock(&server->lock);
+      if (!text)
+        send_refusal(out, 503, "Service Unavailable", "out of memory\n");
+      else
+        send_head(
+            out, 200, "OK",
+            &(page_body){.type = "application/json", .bytes = text, .size = size, .owned = text});
+    } else
       send_stranger(out);
   } else if (!answer_document(server, request, out)) {
     uint32_t count, i = 0;

@@ -1,5 +1,5 @@
-// Inside of a scene's motion: arrays over slots (docs/scene_theory.md). A node of a deformable body is one
-// slot; a rigid body has two: its centre with its velocity, and its spin.
+// Inside of a scene's motion: arrays over slots (docs/scene_theory.md). A node of a deformable body
+// is one slot; a rigid body has two: its centre with its velocity, and its spin.
 #ifndef SONDE_SRC_SCENE_STATE_H
 #define SONDE_SRC_SCENE_STATE_H
 

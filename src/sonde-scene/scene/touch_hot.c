@@ -219,7 +219,8 @@ static bool add_rows(sonde_scene_state *state, uint32_t b, const sonde_overlap_e
 }
 
 // Energy law: u = V and g = dV/dx. Eq. (2): F = kappa V along the direction, shared by projected
-// area; with u = V/area and stiffness kappa * area its slope is the rank-one one of docs/scene_theory.md.
+// area; with u = V/area and stiffness kappa * area its slope is the rank-one one of
+// docs/scene_theory.md.
 static uint32_t add_region(sonde_scene_state *state, uint32_t t, const sonde_overlap_result *found,
                            const sonde_overlap_region *region) {
   const sonde_touch *touch = &state->scene->touches[t];

@@ -197,26 +197,6 @@ static uint32_t reached_name(const graph *g, const char *name) {
   return NAMES_MAX;
 }
 
-static sonde_status choose_world(const sonde_sequence *s, const sonde_calibration *c,
-                                 sonde_located *located, sonde_error *error) {
-  static const char *const usual[] = {"Reference", "Tracker", "World", "Probe"};
-  graph *g = SONDE_NEW(graph, 1);
-  sonde_status status = g ? SONDE_OK : sonde_fail_memory(error);
-  for (size_t k = 0; k < SONDE_COUNT_OF(usual) && !status && !located->world[0]; ++k)
-    for (uint32_t i = 0; i < s->count && !status && !located->world[0]; ++i) {
-      status = frame_graph(s, c, i, true, g, error);
-      if (!status && reached_name(g, usual[k]) != NAMES_MAX)
-        snprintf(located->world, sizeof located->world, "%s", usual[k]);
-    }
-  sonde_free(g);
-  if (!status && !located->world[0])
-    status = sonde_fail(error, SONDE_MISMATCH,
-                        "no transforms lead from Image to Reference, Tracker, World or Probe; the "
-                        "file has no ImageToProbe: give the PLUS configuration that holds it "
-                        "(--config)");
-  return status;
-}
-
 sonde_status sonde_sequence_locate(sonde_sequence *s, const sonde_calibration *c, const char *world,
                                    sonde_located *out, sonde_error *error) {
   SONDE_ASSERT(s != NULL && s->frames != NULL);
@@ -233,13 +213,26 @@ sonde_status sonde_sequence_locate(sonde_sequence *s, const sonde_calibration *c
                         clip[2], clip[3], clip[0], clip[1], s->width, s->height);
     memcpy(s->clip, clip, sizeof s->clip);
   }
-  if (world)
-    snprintf(located.world, sizeof located.world, "%.31s", world);
-  else
-    status = choose_world(s, c, &located, error);
-  if (status) return status;
   graph *g = SONDE_NEW(graph, 1);
   if (!g) return sonde_fail_memory(error);
+  snprintf(located.world, sizeof located.world, "%.31s", world ? world : "");
+  // Without a wish the world is the first of the usual names that some frame leads to.
+  static const char *const usual[] = {"Reference", "Tracker", "World", "Probe"};
+  for (size_t k = 0; k < SONDE_COUNT_OF(usual) && !world && !status && !located.world[0]; ++k)
+    for (uint32_t i = 0; i < s->count && !status && !located.world[0]; ++i) {
+      status = frame_graph(s, c, i, true, g, error);
+      if (!status && reached_name(g, usual[k]) != NAMES_MAX)
+        snprintf(located.world, sizeof located.world, "%s", usual[k]);
+    }
+  if (!status && !world && !located.world[0])
+    status = sonde_fail(error, SONDE_MISMATCH,
+                        "no transforms lead from Image to Reference, Tracker, World or Probe; the "
+                        "file has no ImageToProbe: give the PLUS configuration that holds it "
+                        "(--config)");
+  if (status) {
+    sonde_free(g);
+    return status;
+  }
   sonde_error cause = {0};
   for (uint32_t i = 0; i < s->count && !status; ++i) {
     status = frame_graph(s, c, i, false, g, &cause);

@@ -231,34 +231,6 @@ sonde_status sonde_pixels_read(const sonde_header *h, size_t expected, uint8_t *
   return status;
 }
 
-static sonde_status pack_pixels(const uint8_t *pixels, size_t count, sonde_packing packing,
-                                uint8_t **packed, size_t *packed_count, sonde_error *error) {
-  SONDE_ASSERT(packing != SONDE_PACKING_RAW && (pixels != NULL || count == 0));
-  z_stream z = {0};
-  size_t room = count + count / 1000 + 1024, used = 0, taken = 0;
-  uint8_t *out = SONDE_NEW(uint8_t, room);
-  int bits = packing == SONDE_PACKING_GZIP ? GZIP_BITS : ZLIB_BITS;
-  *packed = NULL;
-  if (!out || deflateInit2(&z, 6, Z_DEFLATED, bits, 8, Z_DEFAULT_STRATEGY) != Z_OK) {
-    sonde_free(out);
-    return sonde_fail_memory(error);
-  }
-  int code = Z_OK;
-  while (code == Z_OK) {
-    size_t give = count - taken < UINT_MAX / 2 ? count - taken : UINT_MAX / 2;
-    size_t space = room - used < UINT_MAX / 2 ? room - used : UINT_MAX / 2;
-    z.next_in = (Bytef *)(uintptr_t)(pixels + taken), z.avail_in = (uInt)give;
-    z.next_out = out + used, z.avail_out = (uInt)space;
-    code = deflate(&z, taken + give == count ? Z_FINISH : Z_NO_FLUSH);
-    taken += give - z.avail_in, used += space - z.avail_out;
-  }
-  deflateEnd(&z);
-  SONDE_ASSERT(code == Z_STREAM_END && taken == count); // the room is deflate's worst case
-  *packed = out;
-  *packed_count = used;
-  return SONDE_OK;
-}
-
 sonde_status sonde_pixels_save(const char *path, const sonde_sequence *s, const sonde_volume *v,
                                const uint8_t *pixels, size_t count, bool compressed,
                                sonde_error *error) {
@@ -270,9 +242,25 @@ sonde_status sonde_pixels_save(const char *path, const sonde_sequence *s, const 
   uint8_t *packed = NULL;
   sonde_file *file = NULL;
   sonde_status status = SONDE_OK;
-  if (compressed)
-    status = pack_pixels(pixels, count, mha ? SONDE_PACKING_ZLIB : SONDE_PACKING_GZIP, &packed,
-                         &count, error);
+  if (compressed) {
+    // zlib counts in 32 bits: both ends are fed in pieces.
+    z_stream z = {0};
+    size_t room = count + count / 1000 + 1024, used = 0, taken = 0; // deflate's worst case
+    packed = SONDE_NEW(uint8_t, room);
+    int code = deflateInit2(&z, 6, Z_DEFLATED, mha ? ZLIB_BITS : GZIP_BITS, 8, Z_DEFAULT_STRATEGY);
+    if (!packed || code != Z_OK) status = sonde_fail_memory(error);
+    while (!status && code == Z_OK) {
+      size_t give = count - taken < UINT_MAX / 2 ? count - taken : UINT_MAX / 2;
+      size_t space = room - used < UINT_MAX / 2 ? room - used : UINT_MAX / 2;
+      z.next_in = (Bytef *)(uintptr_t)(pixels + taken), z.avail_in = (uInt)give;
+      z.next_out = packed + used, z.avail_out = (uInt)space;
+      code = deflate(&z, taken + give == count ? Z_FINISH : Z_NO_FLUSH);
+      taken += give - z.avail_in, used += space - z.avail_out;
+    }
+    SONDE_ASSERT(status || (code == Z_STREAM_END && taken == count));
+    deflateEnd(&z);
+    count = used;
+  }
   if (!status) status = sonde_file_create(path, &file, error);
   if (!status) {
     if (s && mha) sonde_metaimage_write_sequence(file, s, compressed ? count : 0);
