@@ -39,7 +39,7 @@ INLINE ints find_index(const strip_table *table, floats x, float y) {
 }
 
 INLINE void locate_pixels(const sonde_slicer *s, floats u, floats v, ints frame, int side,
-                         uint32_t first, strip_work *w) {
+                          uint32_t first, strip_work *w) {
   float wide = s->high[0] - s->low[0], high = s->high[1] - s->low[1];
   ints i = vint(vmin(u, vset(wide - 1))), j = vint(vmin(v, vset(high - 1)));
   floats left = vreal(i), top = vreal(j);
