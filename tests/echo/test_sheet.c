@@ -88,7 +88,7 @@ static void look_at_pose(rig *r, const probe_kind *p) {
   sonde_echo_frame(b->echo, b->pose, p->aperture_m, &b->settings);
   sonde_echo_plane(b->echo);
   sonde_echo_medium(b->echo);
-  for (uint32_t tier = 0; tier < b->echo->tier_count; ++tier) sonde_echo_beam(b->echo, tier, true);
+  for (uint32_t band = 0; band < b->echo->band_count; ++band) sonde_echo_beam(b->echo, band, true);
 }
 
 // The middle line meets the sheet `deep_m` below the face, `slope` off its normal.
