@@ -28,7 +28,7 @@ typedef enum sonde_contact_law {
 /** How a step is computed (docs/world.md). */
 typedef enum sonde_engine {
   SONDE_ENGINE_DOUBLE, /**< double precision, every option */
-  SONDE_ENGINE_FAST,   /**< single precision in vectors of 16; implicitness 1, not VOLUME */
+  SONDE_ENGINE_FAST,   /**< the same code in single precision; implicitness 1, not VOLUME */
 } sonde_engine;
 
 /**
@@ -51,10 +51,10 @@ SONDE_API double sonde_friction_coefficient(const sonde_friction *friction, doub
 typedef struct sonde_world_def {
   double dt_s;                /**< step; default 1e-3 */
   double implicitness;        /**< lambda in [0,1]; default 1 (backward Euler) */
-  uint32_t newton_iterations; /**< from the last step's change of velocity; default 2. FAST: at
-                                   most, fewer where the next would change less than the solver
-                                   leaves. 0: eq. (4) as in the paper, linearised at the start of
-                                   the step (DOUBLE) */
+  uint32_t newton_iterations; /**< from the last step's change of velocity; default 2. At most:
+                                   fewer where the next would change less than the solver leaves.
+                                   0: eq. (4) as in the paper, linearised at the start of the step
+                                   (DOUBLE) */
   sonde_engine engine;        /**< default DOUBLE */
   sonde_pcg_options pcg;      /**< default relative 5e-3, at most 200 iterations */
   sonde_contact_law contact_law;
@@ -218,7 +218,7 @@ SONDE_API uint32_t sonde_state_awake(const sonde_state *state);          /**< @t
 SONDE_API uint32_t sonde_state_flags(const sonde_state *state);          /**< @thread tick */
 SONDE_API uint64_t sonde_state_flag_count(const sonde_state *state);     /**< @thread tick */
 SONDE_API sonde_stage_times sonde_state_times(const sonde_state *state); /**< @thread tick */
-/** Bytes that the fast engine's kernels moved in the last step, at least; else 0. @thread tick */
+/** Bytes that the engine's kernels moved in the last step, at least. @thread tick */
 SONDE_API uint64_t sonde_state_bytes_moved(const sonde_state *state);
 /** Most bytes that sonde_state_save() writes for this state. @thread any */
 SONDE_API size_t sonde_state_size(const sonde_state *state);

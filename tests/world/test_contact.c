@@ -37,6 +37,7 @@ static void action_equals_reaction(void **state) {
   for (int law = 0; law < 2; ++law) {
     sonde_world_def def = sonde_world_def_default();
     def.contact_law = law ? SONDE_CONTACT_VOLUME : SONDE_CONTACT_FOUNDATION;
+    def.newton_iterations = 1; // the force is found where the skin is before it moves
     bench b = make("linear", def);
     sonde_pose pose = fixture_pose(0.001);
     pose.position.y += 0.004; // off centre: a moment
@@ -45,7 +46,6 @@ static void action_equals_reaction(void **state) {
     sonde_vec3 force = c->force_n, torque = c->torque_n_m;
     double size = v_norm(force);
     assert_true(size > 1e-3);
-    // positions moved after the force was taken: moments about the origin use the old ones
     for (uint32_t i = 0; i < b.model->surface.vertex_count; ++i) {
       sonde_vec3 f = sonde_state_contact_forces(b.state)[i];
       force = v_add(force, f);

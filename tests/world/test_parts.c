@@ -2,9 +2,8 @@
 // double engine's motion across the parts' border, and a second thread that can sleep.
 #include "../fixture.h"
 #include "../sanitized.h"
+#include "world/batches.h"
 #include "world/crew.h"
-#include "world/lanes.h"
-#include "world/state.h"
 
 #include "base/clock.h"
 #include "base/random.h"
@@ -49,9 +48,9 @@ static void press(sonde_state *state, int steps) {
 
 static uint64_t hash_of(const sonde_model *model, const sonde_world_def *def, int steps) {
   sonde_state *state = make_moving(model, def);
-  assert_int_equal(state->lanes->part_count, 2);
-  assert_true(state->lanes->seen_count > 100);
-  assert_int_equal(state->lanes->crew != NULL, def->threads > 1);
+  assert_int_equal(sonde_batches_of(state)->part_count, 2);
+  assert_true(sonde_batches_of(state)->seen_count > 100);
+  assert_int_equal(sonde_batches_of(state)->thread != NULL, def->threads > 1);
   press(state, steps);
   uint64_t hash = sonde_state_hash(state);
   sonde_state_destroy(state);
@@ -142,8 +141,8 @@ static void two_threads_belong_to_the_fast_engine(void **state) {
   assert_int_equal(sonde_state_create(model, &def, &none, &error), SONDE_ARGUMENT);
   def.threads = 2;
   assert_int_equal(sonde_state_create(model, &def, &none, &error), SONDE_OK);
-  assert_int_equal(none->lanes->part_count, 1);
-  assert_null(none->lanes->crew);
+  assert_int_equal(sonde_batches_of(none)->part_count, 1);
+  assert_null(sonde_batches_of(none)->thread);
   sonde_state_destroy(none);
   sonde_model_destroy(model);
 }

@@ -1,38 +1,29 @@
-// Hot evaluation of the two-layer tissue (docs/tissue.md): passes over edges, faces and nodes.
-// begin_node: clears a node's sums, its indentation and rate.
-// add_edge:   surface spring-damper: force, projected stiffness, damping block.
-// face_slope: gradient of the indentation over a face.
-// sonde_tissue_face_law: G and gm of a face. add_shear, add_inplane: the layers of one face.
-// add_anchor: normal spring of eq. (1), tangential spring and their dampers at one node.
-// linearise:  assembles force, K v and the matrix of the implicit step.
+// Evaluation of the two-layer tissue into a block matrix (docs/tissue.md): passes over edges, faces
+// and nodes by the laws of tissue/laws.h. For scenes of several bodies, and for tests of the
+// engines.
+#define SONDE_REAL_SCALAR
+#include "tissue/laws.h"
 #include "tissue/two_layer.h"
 
 #include "base/base.h"
 #include "base/maths.h"
-
-// Elastic tension and tangent of a surface spring at length l.
-typedef struct tension {
-  double force; // along the spring, > 0 pulls the ends together
-  double slope; // d force / d length
-} tension;
-
-static inline tension edge_tension(const sonde_surface_law *law, double share, double length,
-                                   double rest) {
-  double stretch = length - rest;
-  double stiffness = share * law->edge_stiffness_n_m;
-  if (stretch < 0) stiffness *= law->edge_compression;
-  return (tension){share * law->edge_pretension_n + stiffness * stretch, stiffness};
-}
 
 // What a cut left of the edge's spring.
 static inline double share_of(const sonde_model *model, uint32_t e) {
   return model->edge_share ? model->edge_share[e] : 1;
 }
 
+static edge_law edge_law_of(const sonde_surface_law *law) {
+  return (edge_law){law->edge_stiffness_n_m, law->edge_damping_s * law->edge_stiffness_n_m,
+                    law->edge_compression, law->edge_pretension_n};
+}
+
 typedef struct evaluation {
   const sonde_model *model;
   const sonde_vec3 *x, *v;
   sonde_tissue_scales scale;
+  edge_law edge;
+  anchor_law anchor;
   sonde_vec3 *force, *stiffness_velocity;
   sonde_block_matrix *matrix;
   sonde_tissue_node *node;
@@ -55,46 +46,22 @@ static inline void add_block(sonde_mat3 *m, const sonde_mat3 *block) {
     for (int c = 0; c < 3; ++c) m->m[r][c] += block->m[r][c];
 }
 
-// Force T n plus damper; H = k nn^T + max(0, T/l) (I - nn^T), K = [H, -H; -H, H]. The geometric
-// part is dropped in compression, which keeps H positive semidefinite while the force stays exact;
-// the unsymmetric part of the damping is dropped.
+// Force of the spring-damper; K = [H, -H; -H, H].
 static void add_edge(const evaluation *at, uint32_t e, uint32_t i, uint32_t j) {
-  const sonde_surface_law *law = &at->model->law;
-  double rest = at->model->edge_rest_m[e];
   sonde_vec3 d = v_sub(at->x[j], at->x[i]), w = v_sub(at->v[j], at->v[i]);
-  double length = v_norm(d), shortest = 0.05 * rest;
-  if (length < shortest) length = shortest;
-  double inverse = 1.0 / length;
-  sonde_vec3 n = v_scale(d, inverse);
-  double share = share_of(at->model, e);
-  tension t = edge_tension(law, share, length, rest);
-  double damper = share * law->edge_damping_s * law->edge_stiffness_n_m;
-  double lateral = t.force > 0 ? t.force * inverse : 0, along = t.slope - lateral;
-  double closing = v_dot(n, w), pull = t.force + damper * closing;
-  at->force[i] = v_madd(at->force[i], pull, n);
-  at->force[j] = v_madd(at->force[j], -pull, n);
-  sonde_vec3 kv = v_madd(v_scale(w, lateral), along * closing, n);
+  edge_pull edge = pull_edge(&at->edge, share_of(at->model, e), at->model->edge_rest_m[e],
+                             (const double[3]){d.x, d.y, d.z}, (const double[3]){w.x, w.y, w.z});
+  sonde_vec3 n = vec3(edge.n[0], edge.n[1], edge.n[2]);
+  at->force[i] = v_madd(at->force[i], edge.pull, n);
+  at->force[j] = v_madd(at->force[j], -edge.pull, n);
+  sonde_vec3 kv = v_madd(v_scale(w, edge.lateral), edge.along * edge.closing, n);
   at->stiffness_velocity[i] = v_sub(at->stiffness_velocity[i], kv);
   at->stiffness_velocity[j] = v_add(at->stiffness_velocity[j], kv);
-  sonde_mat3 block = m_rank1(n, at->scale.stiffness * along + at->scale.damping * damper,
-                             at->scale.stiffness * lateral);
+  sonde_mat3 block = m_rank1(n, at->scale.stiffness * edge.along + at->scale.damping * edge.damper,
+                             at->scale.stiffness * edge.lateral);
   add_block(&at->matrix->diagonal[i], &block);
   add_block(&at->matrix->diagonal[j], &block);
   at->matrix->upper[e] = m_scale(block, -1.0);
-}
-
-// |grad s| over a face; flux[k] is half the cotangent Laplacian of s at corner k, so that
-// A |grad s|^2 = sum s flux.
-static inline double face_slope(const double half_cotangent[3], double area_m2, const double s[3],
-                                double flux[3]) {
-  double sum = 0, across[3];
-  for (int k = 0; k < 3; ++k) {
-    double d = s[(k + 1) % 3] - s[(k + 2) % 3];
-    across[k] = half_cotangent[k] * d;
-    sum += across[k] * d;
-  }
-  for (int k = 0; k < 3; ++k) flux[k] = across[(k + 2) % 3] - across[(k + 1) % 3];
-  return sqrt(sum > 0 ? sum / area_m2 : 0);
 }
 
 void sonde_tissue_face_law(const sonde_model *model, uint32_t f, double *shear_n_m, double *limit) {
@@ -111,15 +78,14 @@ static void add_shear(const evaluation *at, uint32_t f) {
   const sonde_model *model = at->model;
   const uint32_t *v = model->surface.faces[f];
   const double *half = model->face_half_cotangent[f];
-  double area = model->face_area_m2[f], slope, flux[3], s[3], rate[3], along = 0;
+  double shear_n_m, limit, across[3], flux[3], s[3], rate[3], along = 0, modulus, beyond;
   for (int k = 0; k < 3; ++k)
     s[k] = at->node[v[k]].indentation_m, rate[k] = at->node[v[k]].rate_m_s;
-  double g = face_slope(half, area, s, flux);
-  double shear_n_m, limit;
   sonde_tissue_face_law(model, f, &shear_n_m, &limit);
-  double q = sonde_shear_force(shear_n_m, limit, g, &slope);
-  double modulus = g > 1e-9 ? q / g : slope;
-  double beyond = g > 1e-9 ? (slope - modulus) / (g * g * area) : 0;
+  double square = square_slope(half, s, across);
+  double bend = 1 / (limit * limit * model->face_area_m2[f]);
+  shear_modulus(shear_n_m, bend, square * bend, &modulus, &beyond);
+  for (int k = 0; k < 3; ++k) flux[k] = across[(k + 2) % 3] - across[(k + 1) % 3];
   for (int k = 0; k < 3; ++k) along += flux[k] * rate[k];
   for (int k = 0; k < 3; ++k) {
     int a = (k + 1) % 3, b = (k + 2) % 3;
@@ -180,27 +146,23 @@ static void add_inplane(const evaluation *at, uint32_t f) {
 // Normal spring p(s) A along N plus tangential spring g_t A (I - NN^T), each with its damper.
 static void add_anchor(const evaluation *at, uint32_t i) {
   const sonde_model *model = at->model;
-  const sonde_surface_law *law = &model->law;
   const sonde_tissue_node *node = &at->node[i];
   sonde_vec3 n = model->normal[i];
-  double s = node->indentation_m, rate = -node->rate_m_s;
-  double area = model->area_m2[i], slope;
-  double pressure = sonde_normal_pressure(law->normal_exponent, model->k0_n_m3[i], model->xm_m[i],
-                                          law->guard, s, &slope);
-  double normal_damper = law->normal_damping_s * model->k0_n_m3[i] * area;
-  double tangent = law->tangential_stiffness_n_m3 * area;
-  double tangent_damper = law->normal_damping_s * tangent;
-  double push = pressure * area - normal_damper * rate - v_dot(n, node->pull_n);
+  double rate = -node->rate_m_s, xm = model->xm_m[i], area = model->area_m2[i];
+  anchor_push anchor = push_anchor(&at->anchor, model->k0_n_m3[i], xm, model->law.guard * xm, area,
+                                   node->indentation_m, rate);
+  double push = anchor.push - v_dot(n, node->pull_n);
   sonde_vec3 f = v_madd(v_add(at->force[i], node->pull_n), push, n);
-  at->force[i] = v_madd(v_madd(f, -tangent, node->slide_m), -tangent_damper, node->slide_m_s);
-  double normal_stiffness = slope * area;
+  at->force[i] =
+      v_madd(v_madd(f, -anchor.tangent, node->slide_m), -anchor.tangent_damper, node->slide_m_s);
+  double normal_stiffness = anchor.slope * area;
   double hold = normal_stiffness * rate - v_dot(n, node->drag_n_s);
   sonde_vec3 kv = v_madd(v_add(at->stiffness_velocity[i], node->drag_n_s), hold, n);
-  at->stiffness_velocity[i] = v_madd(kv, tangent, node->slide_m_s);
-  double flat =
-      at->scale.stiffness * tangent + at->scale.damping * tangent_damper + node->inplane_n_m;
+  at->stiffness_velocity[i] = v_madd(kv, anchor.tangent, node->slide_m_s);
+  double flat = at->scale.stiffness * anchor.tangent + at->scale.damping * anchor.tangent_damper +
+                node->inplane_n_m;
   double steep =
-      at->scale.stiffness * normal_stiffness + at->scale.damping * normal_damper + node->shear_n_m;
+      at->scale.stiffness * normal_stiffness + at->scale.damping * anchor.damper + node->shear_n_m;
   sonde_mat3 block = m_rank1(n, steep - flat, flat + at->scale.mass * model->mass_kg[i]);
   add_block(&at->matrix->diagonal[i], &block);
 }
@@ -212,7 +174,18 @@ void sonde_tissue_linearise(const sonde_model *model, const sonde_tissue_part *p
                             sonde_tissue_node *scratch) {
   SONDE_ASSERT(matrix->row_count == model->surface.vertex_count);
   SONDE_ASSERT(matrix->pair_count == model->topology.edge_count);
-  evaluation at = {model, position, velocity, *scales, force, stiffness_velocity, matrix, scratch};
+  const sonde_surface_law *law = &model->law;
+  evaluation at = {
+      .model = model,
+      .x = position,
+      .v = velocity,
+      .scale = *scales,
+      .edge = edge_law_of(law),
+      .anchor = {(int)law->normal_exponent, law->tangential_stiffness_n_m3, law->normal_damping_s},
+      .force = force,
+      .stiffness_velocity = stiffness_velocity,
+      .matrix = matrix,
+      .node = scratch};
   const uint32_t *rows = part ? part->rows : NULL, *edges = part ? part->edges : NULL;
   uint32_t row_count = part ? part->row_count : matrix->row_count;
   uint32_t edge_count = part ? part->edge_count : matrix->pair_count;
@@ -230,20 +203,15 @@ void sonde_tissue_linearise(const sonde_model *model, const sonde_tissue_part *p
   for (uint32_t r = 0; r < row_count; ++r) add_anchor(&at, rows ? rows[r] : r);
 }
 
-static double edge_energy(const sonde_surface_law *law, double share, double length, double rest) {
-  tension t = edge_tension(law, share, length, rest);
-  double stretch = length - rest;
-  return share * law->edge_pretension_n * stretch + 0.5 * t.slope * stretch * stretch;
-}
-
 static double shear_energy(const sonde_model *model, const sonde_vec3 *position, uint32_t f) {
-  double s[3], flux[3];
+  double s[3], across[3];
   for (int k = 0; k < 3; ++k) {
     uint32_t i = model->surface.faces[f][k];
     s[k] = v_dot(model->normal[i], v_sub(model->surface.vertices[i], position[i]));
   }
   double area = model->face_area_m2[f];
-  double g = face_slope(model->face_half_cotangent[f], area, s, flux);
+  double square = square_slope(model->face_half_cotangent[f], s, across);
+  double g = sqrt(fmax(square, 0) / area);
   double shear_n_m, limit;
   sonde_tissue_face_law(model, f, &shear_n_m, &limit);
   return area * sonde_shear_energy(shear_n_m, limit, g);
@@ -265,6 +233,7 @@ static double inplane_energy(const sonde_model *model, const sonde_vec3 *positio
 
 double sonde_tissue_energy(const sonde_model *model, const sonde_vec3 *position) {
   const sonde_surface_law *law = &model->law;
+  const edge_law edge = edge_law_of(law);
   double energy = 0;
   for (uint32_t i = 0; i < model->surface.vertex_count; ++i) {
     sonde_vec3 u = v_sub(position[i], model->surface.vertices[i]);
@@ -276,8 +245,9 @@ double sonde_tissue_energy(const sonde_model *model, const sonde_vec3 *position)
   }
   for (uint32_t e = 0; e < model->topology.edge_count; ++e) {
     const uint32_t *pair = model->topology.edges[e];
-    energy += edge_energy(law, share_of(model, e), v_distance(position[pair[0]], position[pair[1]]),
-                          model->edge_rest_m[e]);
+    double stretch = v_distance(position[pair[0]], position[pair[1]]) - model->edge_rest_m[e];
+    double share = share_of(model, e), stiffness = edge_stiffness(&edge, share, stretch);
+    energy += (share * edge.pretension + 0.5 * stiffness * stretch) * stretch;
   }
   for (uint32_t f = 0; f < model->surface.face_count && law->shear_stiffness_n_m > 0; ++f)
     energy += shear_energy(model, position, f);

@@ -1,4 +1,4 @@
-// The probe's planes, shared by the contact laws.
+// The contact of every engine: the probe's planes, regions of touched skin, force on the probe.
 #ifndef SONDE_SRC_CONTACT_H
 #define SONDE_SRC_CONTACT_H
 
@@ -11,31 +11,42 @@ static inline bool pushes_forward(const sonde_state *state, sonde_vec3 slope) {
   return v_dot(slope, state->inward) <= 1e-9;
 }
 
-// t = weight (d - n.x) for one plane.
-static inline double plane_depth(const sonde_state *state, uint32_t k, sonde_vec3 x) {
-  return state->plane_weight[k] * (state->plane_offset[k] - v_dot(state->plane_normal[k], x));
-}
-
+// Gradient of the depth t = weight (d - n.x) under one plane.
 static inline sonde_vec3 plane_slope(const sonde_state *state, uint32_t k) {
   return v_scale(state->plane_normal[k], -state->plane_weight[k]);
 }
 
-// Joins the regions of two touched nodes. @thread tick
-void sonde_contact_join(sonde_state *state, uint32_t a, uint32_t b);
-// Joins the regions of touched nodes beside one another. @thread tick
-void sonde_nodes_join(sonde_state *state);
-// Parts of sonde_contact_detect() and sonde_contact_apply() for the fast engine: no node is
-// touched; the probe's planes in the world frame; touched nodes are awake; regions. @thread tick
+// No node is touched. @thread tick
 void sonde_contact_forget(sonde_state *state);
+// The probe's planes in the world frame. @thread tick
 void sonde_contact_place(sonde_state *state, const sonde_probe *probe, sonde_pose pose);
-void sonde_contact_wake(sonde_state *state);
+// Joins the regions of two touched nodes; of touched nodes beside one another. @thread tick
+void sonde_contact_join(sonde_state *state, uint32_t a, uint32_t b);
+void sonde_nodes_join(sonde_state *state);
+// Volume, its rate, area and direction of the regions, and which one a touched node belongs to.
+// @thread tick
 void sonde_contact_regions(sonde_state *state, const sonde_motion *probe);
-// The contact of the fast engine. Finds touched nodes and adds pushes and their part of the matrix
-// to press[], with ties; near_probe is found. @thread tick
-void sonde_press_detect(sonde_state *state, const sonde_probe *probe, sonde_pose pose,
-                        const sonde_motion *motion);
-// contact_force[] at the end of the step by the linear system; with `surprise` the square of the
-// difference between these pushes and the ones that nodes meet where they go. @thread tick
-double sonde_press_meet(sonde_state *state, bool surprise);
+uint32_t sonde_contact_region_of(const sonde_state *state, uint32_t i);
+// Force and torque on the probe, forces and centres of the regions from the pushes. @thread tick
+void sonde_contact_wrench(sonde_state *state, sonde_vec3 origin);
+// Box of the probe in the world. @thread tick
+sonde_box sonde_contact_box(const sonde_probe *probe, sonde_pose pose);
+// After a step: whether the probe holds skin that rests elsewhere (SONDE_FLAG_INSIDE_OUT).
+// @thread tick
+bool sonde_contact_carries(const sonde_state *state, const sonde_probe *probe, sonde_pose pose);
+
+// How a bond enters the linear system of a step: scales of its damping and stiffness.
+typedef struct sonde_contact_scales {
+  double damping, stiffness;
+} sonde_contact_scales;
+// Force of the bond of a touched node where it is evaluated and its part of the matrix; false where
+// there is none. @thread tick
+bool sonde_friction_at(const sonde_state *state, uint32_t i, const sonde_motion *probe,
+                       const sonde_contact_scales *scales, sonde_vec3 *force, sonde_mat3 *block);
+// Bonds, normal pushes and the coefficient at the end of the step; adds friction to
+// contact_force[]. @thread tick
+void sonde_friction_advance(sonde_state *state, const sonde_motion *probe);
+// Forgets all bonds. @thread tick
+void sonde_friction_release(sonde_state *state);
 
 #endif

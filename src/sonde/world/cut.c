@@ -1,11 +1,7 @@
 // A cut between two steps: the skin's new model and a state that goes on from the old one.
-// copy_*:       per-node arrays; copies take the value of the node they were split from.
-// share_*:      what a node holds for its area (pushes, volumes) is split with the area.
-// carry:        contact memory, sleeping and counters.
-// wake_lips:    the nodes along the cut, which the missing springs no longer hold.
 #include "base/base.h"
 #include "base/maths.h"
-#include "world/state.h"
+#include "world/engine.h"
 
 #include <string.h>
 
@@ -46,11 +42,6 @@ static void share_numbers(const carrier *c, const double *from, double *to) {
   }
 }
 
-static void copy_bytes(const sonde_cut_map *map, const uint8_t *from, uint8_t *to) {
-  memcpy(to, from, map->node_count);
-  for (uint32_t k = 0; k < map->added; ++k) to[map->node_count + k] = from[map->origin[k]];
-}
-
 static void copy_ticks(const sonde_cut_map *map, const uint64_t *from, uint64_t *to) {
   memcpy(to, from, map->node_count * sizeof *to);
   for (uint32_t k = 0; k < map->added; ++k) to[map->node_count + k] = from[map->origin[k]];
@@ -68,9 +59,6 @@ static void carry_touched(const carrier *c) {
       to->touched[to->touched_count++] = copy;
   }
   SONDE_ASSERT(to->touched_count <= to->model->surface.vertex_count);
-  to->touched_face_count = c->from->touched_face_count;
-  memcpy(to->touched_faces, c->from->touched_faces,
-         to->touched_face_count * sizeof *to->touched_faces);
 }
 
 static void carry_contact(const carrier *c) {
@@ -99,19 +87,6 @@ static void carry_counters(const carrier *c) {
   to->times = from->times;
 }
 
-static void wake_lips(const carrier *c) {
-  sonde_state *to = c->to;
-  for (uint32_t k = 0; k < c->map->path_count; ++k) {
-    to->awake[c->map->path[k]] = 1;
-    to->calm[c->map->path[k]] = 0;
-  }
-  for (uint32_t k = 0; k < c->map->added; ++k) {
-    uint32_t i = c->map->origin[k], copy = c->map->node_count + k;
-    to->awake[i] = to->awake[copy] = 1;
-    to->calm[i] = to->calm[copy] = 0;
-  }
-}
-
 // `moved` is room for positions and velocities of the new nodes.
 static void carry(const carrier *c, sonde_vec3 *moved) {
   uint32_t nodes = c->map->node_count + c->map->added;
@@ -120,14 +95,9 @@ static void carry(const carrier *c, sonde_vec3 *moved) {
   copy_vectors(c->map, sonde_state_positions(c->from), moved);
   copy_vectors(c->map, sonde_state_velocities(c->from), moved + nodes);
   sonde_state_set(c->to, moved, moved + nodes);
-  copy_vectors(c->map, c->from->increment, c->to->increment);
-  copy_bytes(c->map, c->from->awake, c->to->awake);
-  copy_bytes(c->map, c->from->calm, c->to->calm);
-  sonde_contact_clear(c->to); // boxes of the faces where they are now
+  sonde_contact_clear(c->to);
   carry_contact(c);
   carry_counters(c);
-  wake_lips(c);
-  sonde_state_list_awake(c->to);
 }
 
 sonde_status sonde_state_cut(sonde_state *before, const sonde_vec3 *path_m, uint32_t count,

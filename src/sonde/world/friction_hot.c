@@ -1,15 +1,10 @@
 // Friction of the probe on the skin, every step (docs/world.md).
-// sonde_friction_coefficient: Stribeck curve and gel film.
-// bond_of:      a node's bond at the start of a step: stiffness, direction, limit.
-// apply:        forces and matrix terms: a spring while the bond sticks, a constant force when not.
-// advance_node: return mapping at the end of the step: the bond is cut back to its limit.
-// advance:      bonds of all touched nodes and the coefficient that their slip leaves.
 //
 // Every touched node has a bond with the probe: the tangential way b that the node has gone
 // relative to the probe, less what slipped. Its force is -P mu_s b/d for |b| up to d mu/mu_s and
 // never more than mu P, with P the normal push and d the way before slip. The law is linear in P,
 // so that b is not upset when the push changes. P and mu are those of the end of the step before.
-#include "world/state.h"
+#include "world/contact.h"
 
 #include "base/base.h"
 #include "base/maths.h"
@@ -22,8 +17,6 @@ double sonde_friction_coefficient(const sonde_friction *friction, double slip_m_
   double dry = friction->mu_kinetic + (friction->mu_static - friction->mu_kinetic) * exp(-x * x);
   return friction->mu_gel + (dry - friction->mu_gel) * exp(-friction->gel_film);
 }
-
-static bool is_on(const sonde_state *state) { return state->def.friction.mu_static > 0; }
 
 void sonde_friction_release(sonde_state *state) {
   state->mu = sonde_friction_coefficient(&state->def.friction, 0);
@@ -61,42 +54,27 @@ static bool bond_of(const sonde_state *state, uint32_t i, const sonde_motion *pr
 }
 
 // Sticking: -k b. Slipping: -k limit b/|b|, whose slope is k limit/|b| across b and 0 along it.
-static void apply_bond(sonde_state *state, uint32_t i, const bond *at,
-                       const sonde_contact_scales *scales) {
-  double length = v_norm(at->way_m);
-  bool slips = length > at->limit_m;
-  double stiffness = slips ? at->stiffness_n_m * at->limit_m / length : at->stiffness_n_m;
-  sonde_vec3 v = across(state->velocity[i], at->normal);
+bool sonde_friction_at(const sonde_state *state, uint32_t i, const sonde_motion *probe,
+                       const sonde_contact_scales *scales, sonde_vec3 *force, sonde_mat3 *block) {
+  bond at;
+  double reach = state->def.implicitness * state->def.dt_s;
+  SONDE_ASSERT(i < state->model->surface.vertex_count && reach >= 0);
+  if (!bond_of(state, i, probe, v_scale(state->velocity[i], reach), &at)) return false;
+  double length = v_norm(at.way_m);
+  bool slips = length > at.limit_m;
+  double stiffness = slips ? at.stiffness_n_m * at.limit_m / length : at.stiffness_n_m;
   double scaled = scales->stiffness * stiffness;
-  sonde_mat3 block = m_rank1(at->normal, -scaled, scaled);
-  if (slips) {
-    sonde_vec3 along = v_scale(at->way_m, 1 / length);
-    block = m_add(block, m_rank1(along, -scaled, 0));
-    v = across(v, along);
-  }
-  state->force[i] = v_madd(state->force[i], -stiffness, at->way_m);
-  state->product[i] = v_madd(state->product[i], stiffness, v);
-  state->matrix->diagonal[i] = m_add(state->matrix->diagonal[i], block);
-}
-
-void sonde_friction_apply(sonde_state *state, const sonde_motion *probe,
-                          const sonde_contact_scales *scales, double moved_s) {
-  if (!is_on(state)) return;
-  SONDE_ASSERT(moved_s >= 0);
-  for (uint32_t k = 0; k < state->touched_count; ++k) {
-    uint32_t i = state->touched[k];
-    bond at;
-    if (bond_of(state, i, probe, v_scale(state->velocity[i], moved_s), &at))
-      apply_bond(state, i, &at, scales);
-  }
+  *block = m_rank1(at.normal, -scaled, scaled);
+  if (slips) *block = m_add(*block, m_rank1(v_scale(at.way_m, 1 / length), -scaled, 0));
+  *force = v_scale(at.way_m, -stiffness);
+  return true;
 }
 
 // Returns the way that slipped.
 static double advance_node(sonde_state *state, uint32_t i, const sonde_motion *probe) {
   double h = state->def.dt_s, slip = 0;
-  sonde_vec3 v = v_madd(state->velocity[i], state->def.implicitness, state->increment[i]);
   bond at;
-  bool held = bond_of(state, i, probe, v_scale(v, h), &at);
+  bool held = bond_of(state, i, probe, v_scale(state->velocity[i], h), &at);
   state->grip_n[i] = state->contact_force[i];
   state->grip_tick[i] = state->tick + 1;
   state->bond_m[i] = vec3(0, 0, 0);
@@ -114,7 +92,7 @@ static double advance_node(sonde_state *state, uint32_t i, const sonde_motion *p
 
 // One coefficient for the whole patch, from its mean slip speed weighted by the push.
 void sonde_friction_advance(sonde_state *state, const sonde_motion *probe) {
-  if (!is_on(state)) return;
+  if (!(state->def.friction.mu_static > 0)) return;
   double sum = 0, push = 0;
   for (uint32_t k = 0; k < state->touched_count; ++k) {
     uint32_t i = state->touched[k];

@@ -1,11 +1,4 @@
 // The static equilibrium that a slow press ends in: the probe follows a straight way in steps.
-//
-// pose_at             pose of the probe after a share of the way
-// move_touched_skin   moves the skin that the probe touches along with it
-// settle_from         finds the equilibrium one step on from another
-// take_step           compares one step with two half steps and halves the step until they agree
-// meet_force          finds the place within the last step where the force is the one asked for
-// sonde_settle_path   goes from step to step until the goal is reached or the force is met
 #include "base/base.h"
 #include "base/maths.h"
 #include "world/state.h"

@@ -1,109 +1,93 @@
-// Static equilibrium by pseudo-transient continuation: (M/dt^2 + K) dx = F with growing dt, so that
-// far from the solution the mass damps the move and near it the iteration is Newton's.
-// evaluate: forces, contact and residual at the current positions.
-// line_search: shortens the step until the energy no longer rises at its end.
-// adapt:    shorter steps when nothing improves.
-// iterate:  the loop shared by the free and the bonded problem.
-#include "world/state.h"
+// Static equilibrium by pseudo-transient continuation: (M/tau^2 + K) d = F with growing tau, so
+// that far from the solution the mass damps the move and near it the iteration is Newton's. Always
+// in double precision, on the kernels of the engine.
+#define SONDE_REAL_DOUBLE
+#include "world/batches.h"
+#include "world/contact.h"
 
 #include "base/base.h"
 #include "base/maths.h"
-#include "tissue/two_layer.h"
 
 #include <string.h>
 
 typedef struct problem {
   sonde_state *state;
+  sonde_batches *body;
   const sonde_probe *probe; // NULL for a bonded footprint
   sonde_pose pose;
-  double dt_s;
-  const uint32_t *held; // bonded nodes
-  uint32_t held_count;
+  double tau_s;
 } problem;
 
-static sonde_vec3 holder_force(const problem *p) {
-  sonde_vec3 sum = vec3(0, 0, 0);
-  for (uint32_t k = 0; k < p->held_count; ++k) sum = v_add(sum, p->state->force[p->held[k]]);
-  return sum;
-}
+// What an evaluation finds: |F| over the free nodes, the size of the force that causes the
+// deformation, and sums for the solver.
+typedef struct balance {
+  double residual, load;
+  sonde_batch_sums sums;
+} balance;
 
-// Residual |F| over the free nodes; *load is the size of the force that causes the deformation.
-static double evaluate(const problem *p, double *load) {
+// Forces, contact and matrix at the displacements u.
+static balance evaluate(const problem *p) {
   sonde_state *state = p->state;
-  const sonde_tissue_scales scales = {1 / (p->dt_s * p->dt_s), 0, 1};
-  sonde_tissue_linearise(state->tissue, NULL, state->position, state->velocity, &scales,
-                         state->force, state->product, state->matrix, state->scratch_nodes);
-  memcpy(state->probed, state->position,
-         state->model->surface.vertex_count * sizeof *state->probed);
-  sonde_contact_clear(state); // nodes may have moved far since the last evaluation: refit every box
-  sonde_contact_detect(state, p->probe, p->pose);
-  if (p->probe) {
-    const sonde_motion still = {.origin = p->pose.position};
-    const sonde_contact_scales contact = {0, 1};
-    sonde_contact_apply(state, &still, &contact);
-    sonde_contact_wrench(state, p->pose.position);
-  }
-  double sum = 0;
-  for (uint32_t r = 0; r < state->row_count; ++r) {
-    uint32_t i = state->rows[r];
-    state->right[i] = v_add(state->force[i], state->contact_force[i]);
-    sum += v_norm2(state->right[i]);
-  }
-  sonde_vec3 reaction = vec3(0, 0, 0);
-  for (uint32_t i = 0; i < state->model->surface.vertex_count; ++i)
-    reaction = v_add(reaction, state->force[i]);
-  state->contact.reaction_n = reaction;
-  *load = p->probe ? v_norm(state->contact.force_n) : v_norm(holder_force(p));
-  return sqrt(sum);
+  sonde_batches *body = p->body;
+  const sonde_motion still = {.origin = p->pose.position};
+  body->law.mass_scale = 1 / (p->tau_s * p->tau_s);
+  body->corners_coupled = state->def.contact_law != SONDE_CONTACT_NODES;
+  for (uint32_t s = 0; s < body->common.batch_count; ++s)
+    for (uint32_t l = 0; l < SONDE_BATCH; ++l) sonde_batches_record(body, s * SONDE_BATCH + l);
+  sonde_batches_detect(state, body, p->probe, p->pose, &still);
+  balance at = {.sums = sonde_parts_linearise(body, false)};
+  sonde_batches_advance_contact(state, body, false); // of no move: the pushes themselves
+  sonde_contact_wrench(state, p->pose.position);
+  state->contact.reaction_n = body->reaction_n;
+  at.residual = sqrt(at.sums.residual2);
+  at.load = v_norm(p->probe ? state->contact.force_n : body->holder_n);
+  return at;
 }
 
-// From the kept positions along the solution, each node at most 95 % of the gap to its asymptote
-// and 5 mm.
-static void move(sonde_state *state, double share) {
-  for (uint32_t r = 0; r < state->row_count; ++r) {
-    uint32_t i = state->rows[r];
-    sonde_vec3 d = v_scale(state->increment[i], share);
-    double size = v_norm(d);
-    if (size > 5e-3) d = v_scale(d, 5e-3 / size);
-    d = sonde_bounded_move(state->model, i, state->trial[i], d);
-    state->position[i] = v_add(state->trial[i], d);
+// From the base along the solution, each node at most 95 % of the gap to its asymptote and 5 mm.
+static void move(const problem *p, double share) {
+  const double longest = 5e-3;
+  SONDE_ASSERT(share > 0);
+  for (uint32_t s = 0; s < p->body->common.batch_count; ++s) {
+    const sonde_batch_model *fixed = &p->body->model[s];
+    const sonde_batch *base = &p->body->base[s];
+    sonde_batch *at = &p->body->batch[s];
+    double moved2 = 0;
+    for (uint32_t l = 0; l < fixed->used; ++l) {
+      sonde_vec3 d = v_scale(sonde_batch_vector(base->x, l), share);
+      sonde_vec3 u = sonde_batch_vector(base->u, l), n = sonde_batch_vector(fixed->normal, l);
+      double size = v_norm(d);
+      if (size > longest) d = v_scale(d, longest / size);
+      double gap = fmax(0.95 * (fixed->xm[l] + v_dot(n, u)), 0), over = -v_dot(n, d) - gap;
+      if (over > 0) d = v_madd(d, over, n);
+      u = v_add(u, d);
+      at->u[0][l] = u.x, at->u[1][l] = u.y, at->u[2][l] = u.z;
+      moved2 = fmax(moved2, v_norm2(u));
+    }
+    p->body->moved2[s] = moved2;
   }
 }
 
-static void solve(sonde_state *state) {
-  const sonde_pcg_options options = {1e-4, 1e-14, 600};
-  sonde_active_set active = {state->rows, state->row_count, state->pairs, state->pair_count};
-  for (uint32_t r = 0; r < state->row_count; ++r) state->increment[state->rows[r]] = vec3(0, 0, 0);
-  sonde_block_invert_diagonal(state->matrix, &active);
-  state->solver = sonde_pcg_solve(state->matrix, &active, state->term, state->term_count,
-                                  state->right, state->increment, &state->scratch, &options);
-}
-
-static void keep_positions(sonde_state *state, sonde_vec3 *from, sonde_vec3 *to) {
-  memcpy(to, from, state->model->surface.vertex_count * sizeof *to);
-}
-
-// F.d over the free nodes: minus the slope of the energy along the step.
-static double slope(const sonde_state *state) {
-  double sum = 0;
-  for (uint32_t r = 0; r < state->row_count; ++r) {
-    uint32_t i = state->rows[r];
-    sum += v_dot(state->right[i], v_sub(state->position[i], state->trial[i]));
+// r.d over the free nodes, d the way from the base: with F there minus the slope of the energy.
+static double work(const problem *p) {
+  wide_sum sum = {0};
+  for (uint32_t s = 0; s < p->body->common.batch_count; ++s) {
+    const sonde_batch *base = &p->body->base[s], *at = &p->body->batch[s];
+    for (int c = 0; c < 3; ++c) sum += at->r[c] * (at->u[c] - base->u[c]);
   }
-  return sum;
+  return total(sum);
 }
 
 // Shortens the step until the energy does not rise at its end by more than it fell at its start:
 // F.d there may be negative, but not larger than half of what it was. Secant on F.d.
-static bool line_search(const problem *p, double share, double first_slope, double *residual,
-                        double *load) {
+static bool line_search(const problem *p, double share, double first_slope, balance *now) {
   for (int tries = 0; tries < 8; ++tries) {
-    double next_load;
-    move(p->state, share);
-    double next = evaluate(p, &next_load), end = slope(p->state) / share;
-    if (isfinite(next) && (end >= -0.5 * first_slope || next < 0.5 * *residual)) {
-      *residual = next;
-      *load = next_load;
+    move(p, share);
+    balance next = evaluate(p);
+    double end = work(p) / share;
+    if (isfinite(next.residual) &&
+        (end >= -0.5 * first_slope || next.residual < 0.5 * now->residual)) {
+      *now = next;
       return true;
     }
     share *= isfinite(end) ? clamp(first_slope / (first_slope - end), 0.1, 0.7) : 0.1;
@@ -111,76 +95,107 @@ static bool line_search(const problem *p, double share, double first_slope, doub
   return false;
 }
 
-// Contact that opens and closes in turn makes a cycle, which shorter steps break: the share falls
-// when eight iterations bring no progress and recovers with progress.
-typedef struct pace {
-  double share, best;
-  uint32_t stalled;
-} pace;
-
-static void adapt(pace *at, double residual) {
-  if (residual < 0.8 * at->best) {
-    at->best = residual;
-    at->stalled = 0;
-    at->share = fmin(1, 1.2 * at->share);
-  } else if (++at->stalled >= 8) {
-    at->stalled = 0;
-    at->best = residual;
-    at->share = fmax(0.1, 0.5 * at->share);
+// The solution goes to the base with the displacements it starts from; returns F.d of the whole
+// step.
+static double solve(const problem *p, const balance *now) {
+  sonde_batches *body = p->body;
+  sonde_pcg_result *solver = &p->state->solver;
+  const sonde_pcg_options options = {1e-4, 1e-14, 600};
+  wide_sum descent = {0};
+  uint32_t count = body->common.batch_count;
+  double target = fmax(options.relative_residual * now->residual, options.absolute_residual);
+  for (uint32_t s = 0; s < count; ++s) {
+    memcpy(body->base[s].u, body->batch[s].u, sizeof body->base[s].u);
+    memcpy(body->base[s].r, body->batch[s].r, sizeof body->base[s].r);
   }
-}
-
-// F.d of the whole step before it is taken.
-static double descent(const sonde_state *state) {
-  double sum = 0;
-  for (uint32_t r = 0; r < state->row_count; ++r)
-    sum += v_dot(state->right[state->rows[r]], state->increment[state->rows[r]]);
-  return sum;
+  *solver = (sonde_pcg_result){.reference = now->residual};
+  solver->residual =
+      sonde_batches_conjugate(body, target, options.max_iterations, now->sums, &solver->iterations);
+  solver->converged = solver->residual <= target;
+  for (uint32_t s = 0; s < count; ++s) {
+    memcpy(body->base[s].x, body->batch[s].x, sizeof body->base[s].x);
+    descent += dot(body->base[s].r, body->base[s].x);
+  }
+  return total(descent);
 }
 
 static sonde_settle_result iterate(problem *p, double relative, uint32_t limit) {
-  sonde_state *state = p->state;
   sonde_settle_result result = {0};
-  double load, residual = evaluate(p, &load);
-  for (uint32_t r = 0; p->probe && r < state->contact.region_count; ++r)
-    result.start_depth_m = fmax(result.start_depth_m, state->contact.region[r].depth_max_m);
-  pace at = {1, residual, 0};
+  const sonde_contact *contact = &p->state->contact;
+  balance now = evaluate(p);
+  for (uint32_t r = 0; p->probe && r < contact->region_count; ++r)
+    result.start_depth_m = fmax(result.start_depth_m, contact->region[r].depth_max_m);
+  // Contact that opens and closes in turn makes a cycle, which shorter steps break: the share falls
+  // when eight iterations bring no progress and recovers with progress.
+  double share = 1, best = now.residual;
+  uint32_t stalled = 0;
   while (result.iterations < limit) {
-    result.converged = residual <= relative * load || residual <= 1e-12;
+    result.converged = now.residual <= relative * now.load || now.residual <= 1e-12;
     if (result.converged) break;
-    solve(state);
-    keep_positions(state, state->position, state->trial);
+    double descent = solve(p, &now);
     result.iterations++;
-    if (line_search(p, at.share, descent(state), &residual, &load)) {
-      p->dt_s = fmin(4 * p->dt_s, 1e3);
-      adapt(&at, residual);
+    if (!line_search(p, share, descent, &now)) {
+      p->tau_s *= 0.05;
+      for (uint32_t s = 0; s < p->body->common.batch_count; ++s)
+        memcpy(p->body->batch[s].u, p->body->base[s].u, sizeof p->body->base[s].u);
+      now = evaluate(p);
       continue;
     }
-    p->dt_s *= 0.05;
-    keep_positions(state, state->trial, state->position);
-    residual = evaluate(p, &load);
+    p->tau_s = fmin(4 * p->tau_s, 1e3);
+    if (now.residual < 0.8 * best) {
+      best = now.residual, stalled = 0;
+      share = fmin(1, 1.2 * share);
+    } else if (++stalled >= 8) {
+      best = now.residual, stalled = 0;
+      share = fmax(0.1, 0.5 * share);
+    }
   }
-  result.residual = load > 0 ? residual / load : 0;
-  result.contact_n = load;
-  result.reaction_n = v_norm(state->contact.reaction_n);
+  result.residual = now.load > 0 ? now.residual / now.load : 0;
+  result.contact_n = now.load;
+  result.reaction_n = v_norm(contact->reaction_n);
   return result;
 }
 
-static void quieten(sonde_state *state) {
-  size_t bytes = state->model->surface.vertex_count * sizeof *state->velocity;
-  memset(state->velocity, 0, bytes);
-  memset(state->increment, 0, bytes);
+// The problem at the state's positions, at rest and without a probe; false when memory is out. A
+// state of floats gets its doubles when they are asked for first.
+static bool begin(sonde_state *state, problem *p) {
+  sonde_state_publish(state);
+  if (!state->precise && sonde_engine_double.create(state->tissue, &state->def, state->face_order,
+                                                    &state->precise, NULL))
+    return false;
+  sonde_batches *body = (sonde_batches *)(void *)state->precise;
+  memset(state->velocity, 0, state->model->surface.vertex_count * sizeof *state->velocity);
+  sonde_contact_clear(state);
+  body->common.calls->import(&body->common, state->model->surface.vertices, state->position,
+                             state->velocity, true);
+  memset(body->is_near, 0, body->common.batch_count);
+  sonde_batches_list(body, body->common.is_awake);
+  body->law.reach = body->law.force_scale = body->law.stiffness_scale = 1;
+  body->law.damping_scale = 0;
+  *p =
+      (problem){.state = state, .body = body, .pose = {.rotation = quat_identity()}, .tau_s = 0.02};
+  return true;
+}
+
+// The state takes over the displacements, at rest.
+static void end(problem *p) {
+  sonde_state *state = p->state;
+  sonde_batches *body = p->body;
+  sonde_batches_set_law(body, &state->tissue->law, &state->def);
+  memset(body->common.published, 0, body->common.batch_count);
+  body->common.calls->publish(&body->common, state->model->surface.vertices, state->position,
+                              state->velocity);
+  sonde_state_wake_all(state);
 }
 
 sonde_settle_result sonde_settle(sonde_state *state, const sonde_probe *probe, sonde_pose pose,
                                  double relative_residual, uint32_t max_iterations) {
+  problem p;
   SONDE_ASSERT(probe && v_finite(pose.position));
-  sonde_state_publish(state);
-  quieten(state);
-  sonde_state_wake_all(state);
-  problem p = {state, probe, pose, 0.02, NULL, 0};
+  if (!begin(state, &p)) return (sonde_settle_result){0};
+  p.probe = probe, p.pose = pose;
   sonde_settle_result result = iterate(&p, relative_residual, max_iterations);
-  quieten(state);
+  end(&p);
   state->probe_pose = pose;
   state->has_probe_pose = true;
   return result;
@@ -190,19 +205,22 @@ sonde_settle_result sonde_settle_bonded(sonde_state *state, const uint32_t *node
                                         const sonde_vec3 *positions_m, uint32_t count,
                                         double relative_residual, uint32_t max_iterations,
                                         sonde_vec3 *force_n) {
+  problem p;
   sonde_state_publish(state);
-  quieten(state);
-  sonde_state_wake_all(state);
   for (uint32_t k = 0; k < count; ++k) {
     SONDE_ASSERT(nodes[k] < state->model->surface.vertex_count);
     state->position[nodes[k]] = positions_m[k];
-    state->awake[nodes[k]] = 0;
   }
-  sonde_state_list_awake(state);
-  problem p = {state, NULL, {.rotation = quat_identity()}, 0.02, nodes, count};
+  state->engine->stale = true; // the positions are newer
+  if (!begin(state, &p)) return (sonde_settle_result){0};
+  for (uint32_t s = 0; s < p.body->common.batch_count; ++s) p.body->free[s] = all(1);
+  for (uint32_t k = 0; k < count; ++k)
+    p.body->free[nodes[k] / SONDE_BATCH][nodes[k] % SONDE_BATCH] = 0;
+  p.body->holds = true;
   sonde_settle_result result = iterate(&p, relative_residual, max_iterations);
-  if (force_n) *force_n = holder_force(&p);
-  quieten(state);
-  sonde_state_wake_all(state);
+  if (force_n) *force_n = p.body->holder_n;
+  p.body->holds = false;
+  end(&p);
+  for (uint32_t k = 0; k < count; ++k) state->position[nodes[k]] = positions_m[k];
   return result;
 }

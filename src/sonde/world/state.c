@@ -1,13 +1,9 @@
 // Creation and release of the moving state; cold.
-// carve:       lays all arrays out in one block; measured and placed by the same code.
-// order_faces: sorts faces along a Morton curve for the contact boxes.
-#include "world/lanes.h"
-#include "world/state.h"
+#include "world/engine.h"
 
 #include "base/base.h"
 #include "base/maths.h"
 #include "base/morton.h"
-#include "tissue/two_layer.h"
 
 #include <string.h>
 
@@ -100,23 +96,17 @@ sonde_status sonde_state_tune(sonde_state *state, const sonde_tuning *t, sonde_e
 
 #define CARVE(field, count) (s->field = sonde_carve(base, &offset, (count), sizeof *s->field))
 
+// All arrays in one block: measured and placed by the same code.
 static size_t carve(sonde_state *s, char *base) {
   size_t offset = 0;
-  uint32_t n = s->model->surface.vertex_count, edges = s->model->topology.edge_count;
-  uint32_t faces = s->model->surface.face_count;
-  CARVE(tuned_k0, n);
-  CARVE(position, n), CARVE(velocity, n), CARVE(increment, n), CARVE(probed, n);
-  CARVE(calm, n), CARVE(awake, n), CARVE(rows, n);
-  CARVE(edges, edges), CARVE(pairs, edges), CARVE(faces, faces), CARVE(rim, n), CARVE(in_rim, n);
-  CARVE(face_order, faces), CARVE(boxes, s->block_count);
+  uint32_t n = s->model->surface.vertex_count;
+  CARVE(tuned_k0, n), CARVE(face_order, s->model->surface.face_count);
+  CARVE(position, n), CARVE(velocity, n), CARVE(probed, n);
   CARVE(touched, n), CARVE(parent, n), CARVE(share_m3, n), CARVE(gradient, n);
-  CARVE(touched_faces, faces), CARVE(point_planes, faces);
-  CARVE(contact_force, n), CARVE(lumped, n), CARVE(lumped_rows, n);
+  CARVE(contact_force, n), CARVE(surprise, n);
   CARVE(bond_m, n), CARVE(grip_n, n), CARVE(grip_tick, n);
   CARVE(plane_weight, SONDE_MAX_PROBE_PLANES);
   CARVE(plane_normal, SONDE_MAX_PROBE_PLANES), CARVE(plane_offset, SONDE_MAX_PROBE_PLANES);
-  CARVE(force, n), CARVE(product, n), CARVE(right, n), CARVE(trial, n), CARVE(scratch_nodes, n);
-  CARVE(scratch.r, n), CARVE(scratch.z, n), CARVE(scratch.p, n), CARVE(scratch.q, n);
   return offset;
 }
 
@@ -135,6 +125,10 @@ static sonde_status order_faces(sonde_state *state, sonde_error *error) {
   return SONDE_OK;
 }
 
+static const sonde_engine_calls *engine_of(sonde_engine engine) {
+  return engine == SONDE_ENGINE_FAST ? &sonde_engine_float : &sonde_engine_double;
+}
+
 sonde_status sonde_state_create_ordered(const sonde_model *model, const sonde_world_def *def,
                                         const uint32_t *face_order, sonde_state **out,
                                         sonde_error *error) {
@@ -148,8 +142,6 @@ sonde_status sonde_state_create_ordered(const sonde_model *model, const sonde_wo
   state->model = state->tissue = model;
   state->tuning = sonde_tuning_default();
   state->def = *def;
-  state->block_count =
-      (model->surface.face_count + SONDE_FACES_PER_BLOCK - 1) / SONDE_FACES_PER_BLOCK;
   state->block = sonde_calloc(1, carve(state, NULL));
   if (state->block) carve(state, state->block);
   status = state->block ? SONDE_OK : sonde_fail_memory(error);
@@ -158,11 +150,8 @@ sonde_status sonde_state_create_ordered(const sonde_model *model, const sonde_wo
   else if (!status)
     status = order_faces(state, error);
   if (!status)
-    status = sonde_block_matrix_create(model->surface.vertex_count, model->topology.edge_count,
-                                       (const uint32_t(*)[2])model->topology.edges, &state->matrix,
-                                       error);
-  if (!status && def->engine == SONDE_ENGINE_FAST)
-    status = sonde_lanes_create(model, def, state->face_order, &state->lanes, error);
+    status = engine_of(def->engine)->create(model, def, state->face_order, &state->engine, error);
+  if (!status && def->engine == SONDE_ENGINE_DOUBLE) state->precise = state->engine;
   if (status) {
     sonde_state_destroy(state);
     return status;
@@ -179,8 +168,9 @@ sonde_status sonde_state_create(const sonde_model *model, const sonde_world_def 
 
 void sonde_state_destroy(sonde_state *state) {
   if (!state) return;
-  sonde_lanes_destroy(state->lanes);
-  sonde_block_matrix_destroy(state->matrix);
+  if (state->engine) state->engine->calls->destroy(state->engine);
+  if (state->precise && state->precise != state->engine)
+    state->precise->calls->destroy(state->precise);
   sonde_free(state->block);
   sonde_free(state);
 }

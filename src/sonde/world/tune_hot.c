@@ -1,8 +1,6 @@
 // Other springs and another friction for a state that is under way.
-// scale_springs: the tuned model from the model.
 #include "tissue/model.h"
-#include "world/lanes.h"
-#include "world/state.h"
+#include "world/engine.h"
 
 #include "base/base.h"
 #include "base/maths.h"
@@ -29,7 +27,9 @@ void sonde_state_retune(sonde_state *state, const sonde_tuning *tuning) {
   state->tuning = *tuning;
   scale_springs(state);
   state->tissue = plain ? state->model : &state->tuned;
-  if (state->lanes) sonde_lanes_tune(state->lanes, state->tissue, &state->def);
+  state->engine->calls->tune(state->engine, state->tissue, &state->def);
+  if (state->precise && state->precise != state->engine)
+    state->precise->calls->tune(state->precise, state->tissue, &state->def);
   sonde_state_publish(state);
   sonde_state_wake_all(state);
 }

@@ -2,7 +2,7 @@
 // ahead, behind: corners of a face after and before a node, counter-clockwise.
 // is_taken, find: faces that no chain has yet.
 // emit, chain:    one run of faces, each beginning where the one before ends.
-#include "world/lanes.h"
+#include "world/fan.h"
 
 #include "base/base.h"
 
@@ -67,7 +67,7 @@ static void chain(const sonde_model *model, uint32_t i, sonde_fan *fan, uint32_t
     emit(fan, behind(model, face, i), face);
 }
 
-void sonde_lanes_fan(const sonde_model *model, uint32_t i, sonde_fan *fan) {
+void sonde_fan_find(const sonde_model *model, uint32_t i, sonde_fan *fan) {
   bool closed;
   SONDE_ASSERT(i < model->surface.vertex_count);
   fan->count = fan->turn = 0;

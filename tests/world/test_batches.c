@@ -2,8 +2,7 @@
 // within single precision, equilibrium, sleeping, and what it refuses.
 #include "../fixture.h"
 #include "../sanitized.h"
-#include "world/lane_parts.h"
-#include "world/state.h"
+#include "world/batches.h"
 
 #include "base/random.h"
 
@@ -62,9 +61,9 @@ static void play(scene *s, int steps) {
 
 static uint64_t hash_with(const char *kernels, couplings by, const sonde_world_def *def) {
   scene s = make_coupled(by, 4, "point", def);
-  s.state->lanes->kernels = sonde_lane_kernels_find(kernels);
+  sonde_batches_of(s.state)->kernels = sonde_kernels_find(kernels);
   uint64_t hash = 0;
-  if (s.state->lanes->kernels) {
+  if (sonde_batches_of(s.state)->kernels) {
     play(&s, 250);
     assert_true(v_norm(sonde_state_contact(s.state)->force_n) > 0.1);
     hash = sonde_state_hash(s.state);
@@ -155,7 +154,7 @@ static void rests_in_equilibrium(void **state) {
 
 // A body at rest whose nodes move at random, all of it taking part.
 static void stir(scene *s) {
-  sonde_lanes *lanes = s->state->lanes;
+  sonde_batches *body = sonde_batches_of(s->state);
   const sonde_vec3 *rest = s->model->surface.vertices;
   sonde_vec3 *velocity = calloc(s->n, sizeof *velocity);
   assert_non_null(velocity);
@@ -163,10 +162,10 @@ static void stir(scene *s) {
     velocity[i] = v_scale(
         vec3(sonde_random_normal(3, i), sonde_random_normal(4, i), sonde_random_normal(5, i)),
         1e-3);
-  sonde_lanes_import(lanes, rest, rest, velocity, true);
+  body->common.calls->import(&body->common, rest, rest, velocity, true);
   free(velocity);
-  lanes->awake_count = lanes->part_awake[1] = lanes->part_awake[2] = lanes->slice_count;
-  for (uint32_t k = 0; k < lanes->slice_count; ++k) lanes->awake[k] = k, lanes->is_near[k] = 0;
+  body->awake_count = body->part_awake[1] = body->part_awake[2] = body->common.batch_count;
+  for (uint32_t k = 0; k < body->common.batch_count; ++k) body->awake[k] = k, body->is_near[k] = 0;
 }
 
 // What sweeps leave, as conjugate gradients take it over, is the residual of their solution.
@@ -177,21 +176,21 @@ static void sweeps_leave_the_residual_of_their_solution(void **state) {
   for (size_t kind = 0; kind < SONDE_COUNT_OF(strong); ++kind) {
     sonde_world_def def = fast_def();
     scene s = make_coupled(strong[kind], 4, "point", &def);
-    sonde_lanes *lanes = s.state->lanes;
+    sonde_batches *body = sonde_batches_of(s.state);
     double off2 = 0, left2 = 0;
-    lanes->law.edge_compression = 1; // linear about the place at rest
+    body->law.edge.compression = 1; // linear about the place at rest
     stir(&s);
-    sonde_parts_linearise(lanes, true);
-    for (int k = 0; k < 2; ++k) sonde_parts_sweep(lanes);
-    double found2 = sonde_parts_restart(lanes).left2;
+    sonde_parts_linearise(body, true);
+    for (int k = 0; k < 2; ++k) sonde_parts_sweep(body);
+    double found2 = sonde_parts_restart(body).residual2;
     sonde_vec3 *left = calloc(s.n, sizeof *left);
     assert_non_null(left);
     for (uint32_t i = 0; i < s.n; ++i)
-      left[i] = sonde_lane_vector(lanes->slice[i / SONDE_LANES].r, i % SONDE_LANES);
-    sonde_parts_accept(lanes);
-    sonde_parts_linearise(lanes, false);
+      left[i] = sonde_batch_vector(body->batch[i / SONDE_BATCH].r, i % SONDE_BATCH);
+    sonde_parts_accept(body);
+    sonde_parts_linearise(body, false);
     for (uint32_t i = 0; i < s.n; ++i) {
-      sonde_vec3 r = sonde_lane_vector(lanes->slice[i / SONDE_LANES].r, i % SONDE_LANES);
+      sonde_vec3 r = sonde_batch_vector(body->batch[i / SONDE_BATCH].r, i % SONDE_BATCH);
       off2 += v_norm2(v_sub(r, left[i])), left2 += v_norm2(left[i]);
     }
     assert_true(left2 > 0);

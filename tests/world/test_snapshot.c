@@ -1,7 +1,7 @@
 // Saved states: going on from one gives the bits of the run that was never stopped, whatever the
 // state did in between; blobs that are none are refused before anything changes.
 #include "../fixture.h"
-#include "world/keep.h"
+#include "world/snapshot.h"
 
 typedef struct scene {
   sonde_model *model;
@@ -79,8 +79,9 @@ static void goes_on(const sonde_world_def *def, int at) {
     size_t count;
     void *end = save(used[k], &count);
     assert_int_equal(count, again);
-    assert_memory_equal((char *)end + sizeof(sonde_keep_head),
-                        (char *)last + sizeof(sonde_keep_head), count - sizeof(sonde_keep_head));
+    assert_memory_equal((char *)end + sizeof(sonde_snapshot_head),
+                        (char *)last + sizeof(sonde_snapshot_head),
+                        count - sizeof(sonde_snapshot_head));
     sonde_free(end);
   }
   sonde_free(blob);
@@ -148,9 +149,10 @@ static void blobs_that_do_not_fit_are_refused(void **state) {
   for (size_t cut = 0; cut < bytes; cut += 1 + cut / 3)
     assert_int_equal(sonde_state_restore(s.state, blob, cut, &error), SONDE_FORMAT);
   // every byte of the head and of the list of nodes: refused, or a number that may be any
-  sonde_keep_parts parts = sonde_keep_layout(s.state, false, s.state->touched_count);
+  sonde_snapshot_parts parts = sonde_snapshot_layout(s.state, false, s.state->touched_count);
   scene other = make(&def);
-  for (size_t i = 0; i < bytes; i += i < sizeof(sonde_keep_head) || i >= parts.touched ? 1 : 997) {
+  for (size_t i = 0; i < bytes;
+       i += i < sizeof(sonde_snapshot_head) || i >= parts.touched ? 1 : 997) {
     blob[i] ^= 0x81;
     sonde_status status = sonde_state_restore(other.state, blob, bytes, &error);
     if (!status) play(other.state, &s.probe, 120, 122);

@@ -1,0 +1,7 @@
+// An engine in one precision: its step.
+#define SONDE_REAL_DOUBLE
+#include "world/parts.c"
+
+#include "world/contact_batches.c"
+
+#include "world/newton.c"

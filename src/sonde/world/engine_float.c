@@ -1,0 +1,2 @@
+// An engine in one precision: layout of a model; cold.
+#include "world/batches.c"

@@ -1,0 +1,6 @@
+// An engine in one precision: its step.
+#include "world/parts.c"
+
+#include "world/contact_batches.c"
+
+#include "world/newton.c"
