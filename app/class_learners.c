@@ -1,11 +1,4 @@
-// Processes of a class: start, watch, stop.
-//
-// child_arguments   PROGRAM run --port N and what the user added
-// child_environment the parent's, with the learner's name and the tokens
-// attributes        signals as if started from a shell
-// files             no input, no output, errors to a pipe
-// hear              keeps the last line that a program said
-// ended             why a program ended, in words
+// Processes of a class: started, watched, started again, ended.
 #include "class_learners.h"
 
 #include <errno.h>
@@ -32,82 +25,59 @@ double class_now_s(void) {
 
 // ---- starting
 
-static bool child_arguments(const class_room *room, const char *port, const char *list[ARGUMENTS]) {
-  const char *const first[] = {room->program, "run", "--port", port};
-  int count = 0;
-  for (; count < 4; ++count) list[count] = first[count];
-  if (room->argument_count > ARGUMENTS - 5) return false;
-  for (int i = 0; i < room->argument_count; ++i) list[count++] = room->arguments[i];
-  list[count] = NULL;
-  return true;
-}
+// PROGRAM run --port N and what the user added; signals as if started from a shell; no input, no
+// output, errors to a pipe. The name and the tokens go by the environment, which no other user can
+// read, not by the command line.
+static int spawn(const class_room *room, class_learner *learner, int errors) {
+  static const char *const OURS[] = {"SONDE_TRAINEE=", "SONDE_PAGE_TOKEN=", "SONDE_TEACHER_TOKEN="};
+  char port[8], own[3][CLASS_NAME + SONDE_PAGE_TOKEN + 24];
+  char *words[ARGUMENTS] = {(char *)room->program, "run", "--port", port};
+  char *variables[VARIABLES] = {own[0], own[1], own[2]};
+  int count = 4, variable = 3;
+  snprintf(port, sizeof port, "%u", (unsigned)learner->port);
+  snprintf(own[0], sizeof own[0], "%s%s", OURS[0], learner->name);
+  snprintf(own[1], sizeof own[1], "%s%s", OURS[1], learner->token);
+  snprintf(own[2], sizeof own[2], "%s%s", OURS[2], learner->teacher_token);
+  if (room->argument_count > ARGUMENTS - 5) return E2BIG;
+  for (int i = 0; i < room->argument_count; ++i) words[count++] = room->arguments[i];
+  for (char **p = environ; *p && variable < VARIABLES - 1; ++p) {
+    bool ours = false;
+    for (int i = 0; i < 3; ++i) ours |= strncmp(*p, OURS[i], strlen(OURS[i])) == 0;
+    if (!ours) variables[variable++] = *p;
+  }
 
-// The tokens go by the environment, which no other user can read, not by the command line.
-static void child_environment(char *name, char *token, char *teacher, char *list[VARIABLES]) {
-  int count = 0;
-  list[count++] = name;
-  list[count++] = token;
-  list[count++] = teacher;
-  for (char **p = environ; *p && count < VARIABLES - 1; ++p)
-    if (strncmp(*p, "SONDE_TRAINEE=", 14) != 0 && strncmp(*p, "SONDE_PAGE_TOKEN=", 17) != 0 &&
-        strncmp(*p, "SONDE_TEACHER_TOKEN=", 20) != 0)
-      list[count++] = *p;
-  list[count] = NULL;
-}
-
-static int attributes(posix_spawnattr_t *attribute) {
+  posix_spawnattr_t attribute;
+  posix_spawn_file_actions_t actions;
   sigset_t defaults, none;
-  int code = posix_spawnattr_init(attribute);
-  if (code) return code;
   sigemptyset(&none);
   sigemptyset(&defaults);
   sigaddset(&defaults, SIGINT);
   sigaddset(&defaults, SIGTERM);
   sigaddset(&defaults, SIGPIPE);
-  posix_spawnattr_setsigdefault(attribute, &defaults);
-  posix_spawnattr_setsigmask(attribute, &none);
-  return posix_spawnattr_setflags(attribute, POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETSIGMASK);
-}
-
-static int files(posix_spawn_file_actions_t *actions, int errors) {
-  int code = posix_spawn_file_actions_init(actions);
-  if (!code) code = posix_spawn_file_actions_addopen(actions, 0, "/dev/null", O_RDONLY, 0);
-  if (!code) code = posix_spawn_file_actions_addopen(actions, 1, "/dev/null", O_WRONLY, 0);
-  if (!code) code = posix_spawn_file_actions_adddup2(actions, errors, 2);
-  return code;
-}
-
-static int spawn(const class_room *room, class_learner *learner, int errors) {
-  char port[8], name[CLASS_NAME + 16], token[SONDE_PAGE_TOKEN + 20], teacher[SONDE_PAGE_TOKEN + 24];
-  const char *argument[ARGUMENTS];
-  char *variable[VARIABLES];
-  posix_spawnattr_t attribute;
-  posix_spawn_file_actions_t actions;
-  snprintf(port, sizeof port, "%u", (unsigned)learner->port);
-  snprintf(name, sizeof name, "SONDE_TRAINEE=%s", learner->name);
-  if (!child_arguments(room, port, argument)) return E2BIG;
-  snprintf(token, sizeof token, "SONDE_PAGE_TOKEN=%s", learner->token);
-  snprintf(teacher, sizeof teacher, "SONDE_TEACHER_TOKEN=%s", learner->teacher_token);
-  child_environment(name, token, teacher, variable);
-  int code = attributes(&attribute);
+  int code = posix_spawnattr_init(&attribute);
   if (code) return code;
-  code = files(&actions, errors);
-  // posix_spawn() takes words that it does not change as if it might
-  char *words[ARGUMENTS];
-  memcpy(words, argument, sizeof words);
+  posix_spawnattr_setsigdefault(&attribute, &defaults);
+  posix_spawnattr_setsigmask(&attribute, &none);
+  posix_spawnattr_setflags(&attribute, POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETSIGMASK);
+  code = posix_spawn_file_actions_init(&actions);
+  if (!code) code = posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
+  if (!code) code = posix_spawn_file_actions_addopen(&actions, 1, "/dev/null", O_WRONLY, 0);
+  if (!code) code = posix_spawn_file_actions_adddup2(&actions, errors, 2);
   if (!code)
-    code = posix_spawn(&learner->process, room->program, &actions, &attribute, words, variable);
+    code = posix_spawn(&learner->process, room->program, &actions, &attribute, words, variables);
   posix_spawn_file_actions_destroy(&actions);
   posix_spawnattr_destroy(&attribute);
   if (code) learner->process = 0;
   return code;
 }
 
+static const class_status UNKNOWN = {.elapsed_s = (double)NAN, .score = (double)NAN};
+
 bool class_start(const class_room *room, class_learner *learner, class_say say) {
   int ends[2], code = pipe2(ends, O_CLOEXEC | O_NONBLOCK) ? errno : 0;
   learner->started_s = class_now_s();
   learner->last_line[0] = 0;
-  learner->status = (class_status){.elapsed_s = (double)NAN, .score = (double)NAN};
+  learner->status = UNKNOWN;
   if (!code) {
     fcntl(ends[1], F_SETFL, 0); // the program's end waits as usual
     code = spawn(room, learner, ends[1]);
@@ -128,6 +98,7 @@ bool class_start(const class_room *room, class_learner *learner, class_say say) 
 
 // ---- watching
 
+// Keeps the last line that a program said.
 static void hear(class_learner *learner) {
   char bytes[1024];
   ssize_t got;
@@ -141,25 +112,25 @@ static void hear(class_learner *learner) {
     if ((unsigned char)*p < 0x20 || *p == 0x7f) *p = ' ';
 }
 
-static void ended(const class_learner *learner, int status, char *words, size_t size) {
-  char how[64];
+static void forget_process(class_learner *learner) {
+  close(learner->errors_fd);
+  learner->process = 0;
+}
+
+// Says why a program ended, and whether it is started again.
+static void bury(class_learner *learner, int status, class_say say) {
+  char how[64], words[400], sentence[512];
+  hear(learner);
   if (WIFSIGNALED(status))
     snprintf(how, sizeof how, "was ended by signal %d", WTERMSIG(status));
   else
     snprintf(how, sizeof how, "ended with exit code %d", WEXITSTATUS(status));
-  const char *said = learner->last_line[0] ? ": " : "";
-  snprintf(words, size, "%s after %.0f s%s%s", how, class_now_s() - learner->started_s, said,
-           learner->last_line);
-}
-
-static void bury(class_learner *learner, int status, class_say say) {
-  char words[400], sentence[512];
-  hear(learner);
-  ended(learner, status, words, sizeof words);
-  if (class_now_s() - learner->started_s >= LONG_S) learner->restarts = 0;
-  close(learner->errors_fd);
-  learner->process = 0;
-  learner->status = (class_status){.elapsed_s = (double)NAN, .score = (double)NAN};
+  double lived_s = class_now_s() - learner->started_s;
+  snprintf(words, sizeof words, "%s after %.0f s%s%s", how, lived_s,
+           learner->last_line[0] ? ": " : "", learner->last_line);
+  if (lived_s >= LONG_S) learner->restarts = 0;
+  forget_process(learner);
+  learner->status = UNKNOWN;
   learner->gave_up = learner->restarts >= CLASS_RESTARTS;
   if (learner->gave_up) {
     snprintf(sentence, sizeof sentence, "%s; given up after %d restarts", words, CLASS_RESTARTS);
@@ -178,12 +149,10 @@ bool class_watch(class_room *room, class_say say) {
     class_learner *learner = &room->learner[i];
     int status = 0;
     if (learner->process && waitpid(learner->process, &status, WNOHANG) == learner->process) {
-      if (app_interrupted()) { // Ctrl-C reached it first
-        close(learner->errors_fd);
-        learner->process = 0;
-      } else {
+      if (app_interrupted()) // Ctrl-C reached it first
+        forget_process(learner);
+      else
         bury(learner, status, say);
-      }
     } else if (learner->process) {
       hear(learner);
     } else if (!learner->gave_up && class_now_s() >= learner->start_again_s && !app_interrupted()) {
@@ -196,18 +165,17 @@ bool class_watch(class_room *room, class_say say) {
 
 // ---- stopping
 
+// How many programs have not ended.
 static uint32_t running(class_room *room) {
   uint32_t count = 0;
   for (uint32_t i = 0; i < room->count; ++i) {
     class_learner *learner = &room->learner[i];
     if (!learner->process) continue;
     hear(learner); // a full pipe would keep it from ending
-    if (waitpid(learner->process, NULL, WNOHANG) == 0) {
+    if (waitpid(learner->process, NULL, WNOHANG) == 0)
       ++count;
-    } else {
-      close(learner->errors_fd);
-      learner->process = 0;
-    }
+    else
+      forget_process(learner);
   }
   return count;
 }

@@ -1,5 +1,5 @@
 // sonde run: the simulator in real time, with the page or headless with a scripted exam.
-#include "desk.h"
+#include "exam_app.h"
 #include "exam_common.h"
 #include "options.h"
 #include "run_device.h"
@@ -182,8 +182,8 @@ static sonde_status run_page(const options *s, const sonde_session_def *session_
 }
 
 // Practice, exams and replays.
-static sonde_status run_desk(const options *s, const sonde_model *model,
-                             const sonde_session_def *session_def, sonde_error *error) {
+static sonde_status run_exams(const options *s, const sonde_model *model,
+                              const sonde_session_def *session_def, sonde_error *error) {
   char exams[4096];
   exam_library library = exam_library_find(s->cases, s->protocols);
   const char *named = getenv("SONDE_TRAINEE"), *trainee = s->trainee ? s->trainee : named;
@@ -194,33 +194,33 @@ static sonde_status run_desk(const options *s, const sonde_model *model,
     snprintf(exams, sizeof exams, "%s/sonde/exams", data);
   else
     snprintf(exams, sizeof exams, "%s/.local/share/sonde/exams", home && home[0] ? home : "/tmp");
-  desk_def def = {.model = model,
-                  .model_path = session_def->model_path,
-                  .bundled_path = library.has_bundled ? library.bundled : NULL,
-                  .cases = library.cases,
-                  .protocols = library.protocols,
-                  .exams = exams,
-                  .trainee = trainee ? trainee : "",
-                  .practice = *session_def,
-                  .port = (uint16_t)s->port,
-                  .force_limit_n = session_def->limits.force_n,
-                  .make_device = make_device,
-                  .user = s,
-                  .device_name = s->device.name};
-  desk *d = NULL;
+  exam_app_def def = {.model = model,
+                      .model_path = session_def->model_path,
+                      .bundled_path = library.has_bundled ? library.bundled : NULL,
+                      .cases = library.cases,
+                      .protocols = library.protocols,
+                      .exams = exams,
+                      .trainee = trainee ? trainee : "",
+                      .practice = *session_def,
+                      .port = (uint16_t)s->port,
+                      .force_limit_n = session_def->limits.force_n,
+                      .make_device = make_device,
+                      .user = s,
+                      .device_name = s->device.name};
+  exam_app *app = NULL;
   app_catch_interrupt();
   sonde_status status = run_device_site(&s->device, model, &def.start, error);
-  if (!status) status = desk_create(&def, &d, error);
+  if (!status) status = exam_app_create(&def, &app, error);
   if (status) return status;
   char learner[SONDE_PAGE_ADDRESS], teacher[SONDE_PAGE_ADDRESS];
-  desk_address(d, false, learner);
-  desk_address(d, true, teacher);
+  exam_app_address(app, false, learner);
+  exam_app_address(app, true, teacher);
   announce(learner, teacher);
   while (!app_interrupted()) {
-    desk_turn(d);
+    exam_app_turn(app);
     sleep_s(0.01);
   }
-  return desk_destroy(d, error);
+  return exam_app_destroy(app, error);
 }
 
 static void look(sonde_session *session, summary *seen) {
@@ -396,7 +396,7 @@ static int run(void *from) {
     def.model_path = absolute ? absolute : s->model;
     if (s->headless || s->record)
       code = simulate(s, model, &def);
-    else if (run_desk(s, model, &def, &error))
+    else if (run_exams(s, model, &def, &error))
       code = app_fail("run", &error);
   }
   free(absolute);

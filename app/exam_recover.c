@@ -1,6 +1,6 @@
 // sonde exam --recover: what the journals of a directory say goes into its log, and results and
 // reports that are missing are made from them.
-#include "desk_parts.h"
+#include "exam_app_parts.h"
 #include "exam_common.h"
 
 #include <dirent.h>
@@ -10,9 +10,9 @@
 
 typedef struct recovery {
   const char *directory;
-  desk_library library;
+  exam_places places;
   sonde_exam_log *log;
-  desk_recovered found;
+  exam_recovered found;
   uint32_t derived, failed;
 } recovery;
 
@@ -32,7 +32,7 @@ static bool derive_all(recovery *r) {
     sonde_error error = {0};
     sonde_status status = SONDE_OK;
     if (!cancelled)
-      status = desk_derive(&r->library, r->directory, names[i]->d_name, r->log, &derived, &error);
+      status = exam_derive(&r->places, r->directory, names[i]->d_name, r->log, &derived, &error);
     if (status && status != SONDE_CANCELLED) {
       fprintf(stderr, "sonde exam: %s: %s\n", names[i]->d_name, error.message);
       r->failed++;
@@ -46,7 +46,7 @@ static bool derive_all(recovery *r) {
 }
 
 static void print(const recovery *r, bool json) {
-  const desk_recovered *f = &r->found;
+  const exam_recovered *f = &r->found;
   if (json) {
     app_json_begin();
     app_json_integer("exams", f->exams);
@@ -70,14 +70,14 @@ static void print(const recovery *r, bool json) {
 }
 
 int exam_recover(const exam_library *library, const char *directory, bool json) {
-  char path[DESK_PATH];
+  char path[EXAM_PATH];
   sonde_error error = {0};
   recovery r = {.directory = directory,
-                .library = {library->has_bundled ? library->bundled : NULL, library->cases,
-                            library->protocols}};
-  desk_path(path, directory, "exams.sqlite");
+                .places = {library->has_bundled ? library->bundled : NULL, library->cases,
+                           library->protocols}};
+  exam_app_path(path, directory, "exams.sqlite");
   if (sonde_exam_log_open(path, &r.log, &error)) return app_fail("exam", &error);
-  desk_recover(directory, r.log, &r.found);
+  exam_recover_log(directory, r.log, &r.found);
   if (r.found.unreadable) fprintf(stderr, "sonde exam: %s\n", r.found.worst);
   bool whole = derive_all(&r);
   sonde_exam_log_close(r.log);

@@ -1,9 +1,9 @@
-// exam_once run [...]: one exam at the desk as the page would drive it, with what the program was
+// exam_once run [...]: one exam as the page would drive it, with what the program was
 // told to be on the disk on standard output, one word a line: begun, decided (twice), kept.
 // exam_once notes FILE: how many decisions a journal has.
 // Environment: EXAM_ONCE_DIR, _MODEL, _CASES, _PROTOCOLS, _SECONDS, _ROOM_AFTER (the program goes
 // on so long with a result that is not on the disk).
-#include "desk_parts.h"
+#include "exam_app_parts.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -32,89 +32,89 @@ static void say(const char *word) {
   fflush(stdout);
 }
 
-static void turn_for(desk *d, double seconds) {
+static void turn_for(exam_app *app, double seconds) {
   double until_s = app_seconds(CLOCK_MONOTONIC) + seconds;
   do {
-    desk_turn(d);
+    exam_app_turn(app);
     nanosleep(&(struct timespec){.tv_nsec = 5000000}, NULL);
   } while (app_seconds(CLOCK_MONOTONIC) < until_s);
 }
 
-static void ask(desk *d, const sonde_page_request *request) {
-  pthread_mutex_lock(&d->lock);
-  d->request[(d->request_first + d->request_count++) % DESK_REQUESTS] = *request;
-  pthread_mutex_unlock(&d->lock);
+static void ask(exam_app *app, const sonde_page_request *request) {
+  pthread_mutex_lock(&app->lock);
+  app->request[(app->request_first + app->request_count++) % EXAM_REQUESTS] = *request;
+  pthread_mutex_unlock(&app->lock);
 }
 
 // Waits until the journal has so many notes on the disk, or the disk is in trouble.
-static bool wait_for_notes(desk *d, uint32_t count) {
-  sonde_recording_state state = sonde_session_recording(d->session);
+static bool wait_for_notes(exam_app *app, uint32_t count) {
+  sonde_recording_state state = sonde_session_recording(app->session);
   for (int i = 0; i < 1000 && state.notes < count && !state.in_trouble; ++i) {
-    turn_for(d, 0);
-    state = sonde_session_recording(d->session);
+    turn_for(app, 0);
+    state = sonde_session_recording(app->session);
   }
   return state.notes >= count;
 }
 
 // The setup is the first note.
-static void decide(desk *d, const char *word, uint32_t notes) {
+static void decide(exam_app *app, const char *word, uint32_t notes) {
   sonde_page_request request = {.ask = SONDE_PAGE_DECIDE};
-  snprintf(request.id, sizeof request.id, "%s", d->exam->setup.map.segment[0].name);
+  snprintf(request.id, sizeof request.id, "%s", app->exam->setup.map.segment[0].name);
   snprintf(request.text, sizeof request.text, "%s", word);
-  ask(d, &request);
-  if (wait_for_notes(d, notes)) say("decided");
+  ask(app, &request);
+  if (wait_for_notes(app, notes)) say("decided");
 }
 
-static bool is_kept(const desk *d) {
-  return d->exam && d->exam->in_journal && d->exam->filed && d->exam->logged;
+static bool is_kept(const exam_app *app) {
+  return app->exam && app->exam->in_journal && app->exam->filed && app->exam->logged;
 }
 
-static int examine(desk *d) {
+static int examine(exam_app *app) {
   double seconds = atof(setting("EXAM_ONCE_SECONDS")),
          room_s = atof(setting("EXAM_ONCE_ROOM_AFTER"));
   sonde_error error = {0};
   sonde_page_request request = {
       .ask = SONDE_PAGE_START_EXAM, .id = "patient-1", .guidance = "hints", .name = "Tester"};
-  snprintf(request.protocol, sizeof request.protocol, "%s", d->protocol_list[0].id);
-  if (desk_exam_start(d, &request, &error)) {
+  snprintf(request.protocol, sizeof request.protocol, "%s", app->protocol_list[0].id);
+  if (exam_start(app, &request, &error)) {
     fprintf(stderr, "exam_once: %s\n", error.message);
     return APP_FAILED;
   }
   say("begun");
-  turn_for(d, seconds / 2);
-  decide(d, "clot", 2);
-  ask(d, &(sonde_page_request){.ask = SONDE_PAGE_HINT});
-  turn_for(d, seconds / 2);
-  decide(d, "compressible", 4);
-  desk_exam_finish(d, &error);
-  if (is_kept(d)) say("kept");
-  turn_for(d, is_kept(d) ? 0.05 : room_s);
-  if (!is_kept(d)) fprintf(stderr, "exam_once: the page is told: %s\n", d->message);
-  return is_kept(d) ? APP_OK : APP_FAILED;
+  turn_for(app, seconds / 2);
+  decide(app, "clot", 2);
+  ask(app, &(sonde_page_request){.ask = SONDE_PAGE_HINT});
+  turn_for(app, seconds / 2);
+  decide(app, "compressible", 4);
+  exam_finish(app, &error);
+  if (is_kept(app)) say("kept");
+  turn_for(app, is_kept(app) ? 0.05 : room_s);
+  if (!is_kept(app)) fprintf(stderr, "exam_once: the page is told: %s\n", app->message);
+  return is_kept(app) ? APP_OK : APP_FAILED;
 }
 
 static int run(void) {
   sonde_error error = {0};
   sonde_model *model = NULL;
-  desk *d = NULL;
+  exam_app *app = NULL;
   sonde_session_def practice = sonde_session_def_default();
   practice.image_width = practice.image_height = 128;
   if (sonde_model_load(setting("EXAM_ONCE_MODEL"), &model, &error)) return app_fail("run", &error);
-  desk_def def = {.model = model,
-                  .model_path = setting("EXAM_ONCE_MODEL"),
-                  .cases = setting("EXAM_ONCE_CASES"),
-                  .protocols = setting("EXAM_ONCE_PROTOCOLS"),
-                  .exams = setting("EXAM_ONCE_DIR"),
-                  .start = model->sites[0],
-                  .trainee = "Tester",
-                  .practice = practice,
-                  .make_device = make_device,
-                  .device_name = "script"};
+  exam_app_def def = {.model = model,
+                      .model_path = setting("EXAM_ONCE_MODEL"),
+                      .cases = setting("EXAM_ONCE_CASES"),
+                      .protocols = setting("EXAM_ONCE_PROTOCOLS"),
+                      .exams = setting("EXAM_ONCE_DIR"),
+                      .start = model->sites[0],
+                      .trainee = "Tester",
+                      .practice = practice,
+                      .make_device = make_device,
+                      .device_name = "script"};
   int code = APP_FAILED;
-  if (!desk_create(&def, &d, &error)) code = examine(d);
+  if (!exam_app_create(&def, &app, &error)) code = examine(app);
   sonde_error late = {0};
-  if (desk_destroy(d, &late)) code = app_fail("run", &late);
-  if (!d) code = app_fail("run", &error);
+  if (exam_app_destroy(app, &late)) code = app_fail("run", &late);
+  if (!app) code = app_fail("run", &error);
   sonde_model_destroy(model);
   return code;
 }

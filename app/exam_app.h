@@ -1,13 +1,13 @@
-// The examiner's desk of `sonde run`: free practice, exams of cases, replays; what the page shows
+// The exam application of `sonde run`: free practice, exams of cases, replays; what the page shows
 // of them and asks for. One thread owns it; the page's threads only leave requests and frames.
-#ifndef SONDE_APP_DESK_H
-#define SONDE_APP_DESK_H
+#ifndef SONDE_APP_EXAM_APP_H
+#define SONDE_APP_EXAM_APP_H
 
 #include "app.h"
 
-typedef struct desk desk;
+typedef struct exam_app exam_app;
 
-typedef struct desk_def {
+typedef struct exam_app_def {
   const sonde_model *model; // of free practice; borrowed
   const char *model_path;   // absolute; also of the cases that use the bundled thigh
   const char *bundled_path; // NULL: model_path
@@ -25,15 +25,15 @@ typedef struct desk_def {
                               sonde_error *error);
   const void *user;
   const char *device_name;
-} desk_def;
+} exam_app_def;
 
 // Starts practice and serves the page.
-sonde_status desk_create(const desk_def *def, desk **out, sonde_error *error);
+sonde_status exam_app_create(const exam_app_def *def, exam_app **out, sonde_error *error);
 // Ends what runs; an exam under way is kept without a score.
-sonde_status desk_destroy(desk *d, sonde_error *error);
+sonde_status exam_app_destroy(exam_app *app, sonde_error *error);
 // The page's address with the learner's or the teacher's token.
-void desk_address(const desk *d, bool teacher, char address[SONDE_PAGE_ADDRESS]);
+void exam_app_address(const exam_app *app, bool teacher, char address[SONDE_PAGE_ADDRESS]);
 // Does what was asked for since the last turn; call it every 10 ms or so.
-void desk_turn(desk *d);
+void exam_app_turn(exam_app *app);
 
 #endif

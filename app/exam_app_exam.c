@@ -1,0 +1,200 @@
+// An exam: begun on a case's thigh, watched frame by frame, judged.
+#include "exam_app_parts.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+static bool show_progress(double fraction, const char *what, void *user) {
+  exam_app *app = user;
+  (void)what;
+  app->progress = fraction;
+  exam_app_tell_exam(app);
+  return true;
+}
+
+sonde_status exam_prepare(exam *of, const char *bundled, const char *cases,
+                          const sonde_progress *progress, sonde_error *error) {
+  sonde_status status = sonde_case_build(&of->patient, bundled, cases, &of->setup, error);
+  if (!status) status = sonde_plan_make(of->protocol, &of->setup.map, &of->plan, error);
+  if (!status) status = sonde_plan_find_targets(&of->plan, &of->setup, progress, error);
+  if (!status) status = sonde_judge_create(&of->setup.map, &of->plan, &of->judge, error);
+  if (!status && !(of->sample = calloc(EXAM_SAMPLES, sizeof *of->sample)))
+    status = app_error(error, SONDE_MEMORY, "out of memory");
+  return status;
+}
+
+// On the session's image thread.
+static void watch(void *user, const sonde_frame *frame) {
+  exam *of = user;
+  pthread_mutex_lock(of->lock);
+  exam_observe(of, frame);
+  pthread_mutex_unlock(of->lock);
+}
+
+// The learner is told nothing before the session is shown.
+static sonde_status begin(exam_app *app, exam *of, sonde_error *error) {
+  char recording[EXAM_PATH], stamp[32], *setup = NULL;
+  sonde_progress progress = {show_progress, app};
+  sonde_status status = exam_prepare(of, exam_app_bundled(app), app->cases, &progress, error);
+  app->progress = 0;
+  if (status) return status;
+
+  // Date, id and directory; the mark tells exams of the same second apart.
+  struct timespec now;
+  struct tm day;
+  clock_gettime(CLOCK_REALTIME, &now);
+  localtime_r(&now.tv_sec, &day);
+  strftime(stamp, sizeof stamp, "%Y-%m-%d-%H%M%S", &day);
+  sonde_log_date((int64_t)now.tv_sec, of->date);
+  unsigned mark = (unsigned)(now.tv_nsec / 1000 ^ (long)getpid()) & 0xffff;
+  snprintf(of->id, sizeof of->id, "%s-%04x", stamp, mark);
+  exam_app_path(of->directory, app->exams, of->id);
+  status = sonde_directory_make(of->directory, 0700, false, error);
+  if (!status) status = exam_setup_text(of, &setup, error);
+  if (status) return status;
+
+  // The session, with the probe above the vein's end at the groin.
+  exam_app_path(recording, of->directory, "exam.rec");
+  sonde_session_def def = app->def.practice;
+  sonde_case_session(&of->setup, &def);
+  def.model_path = of->patient.thigh == SONDE_CASE_BUNDLED ? app->def.model_path : NULL;
+  def.record_path = recording;
+  def.record_setup = setup;
+  def.watch = watch;
+  def.watch_user = of;
+  sonde_vein_point first = sonde_vein_at(&of->setup.map, 0.0);
+  sonde_site site = {.position_m = first.skin_m, .normal = first.normal, .u = first.across};
+  sonde_page_conceal(app->server, true, strcmp(of->guidance, "full") != 0);
+  status = exam_app_run_session(app, &def, &site, error);
+  sonde_free(setup);
+  if (status) sonde_page_conceal(app->server, false, false);
+  return status;
+}
+
+sonde_status exam_start(exam_app *app, const sonde_page_request *request, sonde_error *error) {
+  const sonde_case *patient = NULL;
+  const sonde_exam_protocol *protocol = NULL;
+  for (uint32_t i = 0; i < app->case_count; ++i) {
+    char alias[EXAM_ALIAS];
+    exam_app_case_alias(app, app->case_list[i].id, alias);
+    if (strcmp(alias, request->id) == 0) patient = &app->case_list[i];
+  }
+  for (uint32_t i = 0; i < app->protocol_count; ++i)
+    if (strcmp(app->protocol_list[i].id, request->protocol) == 0) protocol = &app->protocol_list[i];
+  if (!patient || !protocol)
+    return app_error(error, SONDE_NOT_FOUND, "there is no %s of that name",
+                     patient ? "protocol" : "case");
+  exam *of = calloc(1, sizeof *of);
+  if (!of) return app_error(error, SONDE_MEMORY, "out of memory");
+  of->lock = &app->lock;
+  of->patient = *patient;
+  of->protocol = protocol;
+  snprintf(of->guidance, sizeof of->guidance, "%.*s", (int)sizeof of->guidance - 1,
+           request->guidance);
+  snprintf(of->trainee, sizeof of->trainee, "%.*s", (int)sizeof of->trainee - 1, request->name);
+  snprintf(app->trainee, sizeof app->trainee, "%s", of->trainee);
+  exam_phase before = app->phase;
+  exam_app_set_phase(app, EXAM_PREPARING,
+                     "The patient is being prepared: this takes some seconds.");
+  const sonde_session *session = app->session;
+  sonde_status status = begin(app, of, error);
+  if (status) {
+    bool bare = app->session != session || !session; // what ran before is gone
+    if (bare) exam_app_end_session(app);
+    exam_destroy(of);
+    if (!bare || exam_app_practice(app, NULL)) exam_app_set_phase(app, before, error->message);
+    return status;
+  }
+  exam_app_change(app, of, NULL);
+  exam_app_tell_greeting(app);
+  exam_app_set_phase(app, EXAM_RUNNING, "");
+  return SONDE_OK;
+}
+
+// ---- watching
+
+// Means of 2 x 2 pixels.
+static void keep_picture(const sonde_frame *frame, exam_picture *picture) {
+  sonde_image *image = &picture->image;
+  if (!image->pixels &&
+      sonde_image_create(frame->width / 2, frame->height / 2, image, NULL) != SONDE_OK)
+    return;
+  for (uint32_t y = 0; y < image->height; ++y)
+    for (uint32_t x = 0; x < image->width; ++x) {
+      const uint8_t *p = frame->pixels + 2 * (size_t)y * frame->width + 2 * (size_t)x;
+      image->pixels[y * image->width + x] =
+          (uint8_t)((p[0] + p[1] + p[frame->width] + p[frame->width + 1] + 2) / 4);
+    }
+  image->width_m = frame->width_m;
+  image->height_m = frame->height_m;
+  image->tick = frame->snapshot.tick;
+  picture->vein_ratio = frame->snapshot.vein_area_ratio;
+}
+
+void exam_observe(exam *of, const sonde_frame *frame) {
+  const sonde_snapshot *s = &frame->snapshot;
+  uint32_t presses, n = of->sample_count;
+  sonde_judge_feed(of->judge, s);
+  of->seen_tick = s->tick;
+
+  // The press that just ended takes both images.
+  sonde_judge_compressions(of->judge, &presses);
+  if (presses > of->presses_seen) {
+    of->presses_seen = presses;
+    if (of->open.image.pixels && of->closed.image.pixels && of->picture_count < EXAM_PICTURES) {
+      of->picture[of->picture_count++] =
+          (sonde_exam_picture){presses - 1, of->open.image, of->closed.image};
+      of->open.image = of->closed.image = (sonde_image){0};
+    }
+    of->closed.vein_ratio = INFINITY;
+  }
+
+  // The open vein is pictured as long as nothing presses, the closed one whenever it gets smaller.
+  bool pressing = sonde_judge_state(of->judge).state != SONDE_PRESS_STATE_NONE;
+  if (isfinite(s->vein_area_ratio) && !pressing) {
+    keep_picture(frame, &of->open);
+    of->closed.vein_ratio = INFINITY;
+  } else if (isfinite(s->vein_area_ratio) && s->vein_area_ratio < of->closed.vein_ratio) {
+    keep_picture(frame, &of->closed);
+  }
+
+  // Force and area of the vein, ten times a second.
+  if (n == EXAM_SAMPLES || (n && s->time_s - of->sample[n - 1].time_s < 0.1)) return;
+  of->sample[of->sample_count++] =
+      (sonde_exam_sample){s->time_s, s->force_normal_n, s->vein_area_ratio};
+}
+
+// ---- the end
+
+// What the disk does not take is told and tried again by exam_app_keep().
+sonde_status exam_finish(exam_app *app, sonde_error *error) {
+  exam *of = app->exam;
+  if (app->phase != EXAM_RUNNING)
+    return app_error(error, SONDE_ARGUMENT, "there is no exam to finish");
+  exam_app_set_phase(app, EXAM_DONE, "");
+  sonde_session_stop(app->session); // from here on nothing is watched
+  sonde_judge_finish(of->judge);
+  sonde_judge_score(of->judge, &of->patient, &of->score);
+  of->scored = true;
+  exam_app_keep(app);
+  exam_app_tell_exam(app);
+  return SONDE_OK;
+}
+
+void exam_destroy(exam *of) {
+  if (!of) return;
+  for (uint32_t i = 0; i < of->picture_count; ++i) {
+    sonde_image_clear(&of->picture[i].before);
+    sonde_image_clear(&of->picture[i].peak);
+  }
+  sonde_image_clear(&of->open.image);
+  sonde_image_clear(&of->closed.image);
+  free(of->sample);
+  free(of->comments.list);
+  sonde_judge_destroy(of->judge);
+  sonde_case_setup_clear(&of->setup);
+  free(of);
+}
