@@ -51,7 +51,7 @@ SONDE_API const char *const *sonde_pathology_names(void);
 SONDE_API sonde_status sonde_pathology_preset(const char *name, sonde_pathology *pathology,
                                               sonde_error *error);
 
-/** Cross-section of a vessel at one station of its centre line. */
+/** A section of a vessel: across its centre line at one point of it. */
 typedef struct sonde_vessel_state {
   sonde_vec3 rest_centre_m;
   sonde_vec3 centre_m;  /**< deformed */
@@ -61,18 +61,19 @@ typedef struct sonde_vessel_state {
   double outside_pa;                /**< effective pressure on the wall */
   double area_ratio;                /**< current / rest, dynamic */
   double half_short_m, half_long_m; /**< semi-axes of the ellipse */
-  double lead;                      /**< how firmly the wall leads the tissue beside it, 0..1 */
-  /** Gradient of the tissue's motion across the vessel, as it would be without the vessel: a turn
-   *  from the flat axis towards the other by an angle of which tissue_turn is the tangent of the
-   *  half, then (short, long) -> (tissue_short short, tissue_shear short + tissue_long long).
-   *  0, 1, 0, 1 at rest. */
-  double tissue_turn, tissue_short, tissue_shear, tissue_long;
-  double tissue_even; /**< share of the motion beyond that gradient which ends at the wall, 0..1 */
+  double coupling;                  /**< of the tissue beside it to the wall, 0..1 */
+  /** Gradient of the tissue's motion across the vessel, as it would be without the vessel: a
+   * rotation from the flat axis towards the other by an angle of which tissue_rotation is the
+   * tangent of the half, then (short, long) -> (tissue_short short, tissue_shear short +
+   * tissue_long long). 0, 1, 0, 1 at rest. */
+  double tissue_rotation, tissue_short, tissue_shear, tissue_long;
+  double tissue_smoothing; /**< share of the motion beyond that gradient which ends at the wall,
+                              0..1 */
 } sonde_vessel_state;
 
 typedef struct sonde_interior sonde_interior;
 
-/** Builds the column map, the factored surface Laplacian and the vessels' stations.
+/** Builds the column map, the factored surface Laplacian and the vessels' sections.
  *  @param model borrowed @thread owner */
 SONDE_API sonde_status sonde_interior_create(const sonde_model *model, sonde_interior **interior,
                                              sonde_error *error);
@@ -126,7 +127,7 @@ SONDE_API sonde_label sonde_interior_label(const sonde_interior *interior, sonde
 SONDE_API uint32_t sonde_interior_vessel_count(const sonde_interior *interior);
 /** femoral_vein, femoral_artery or the branch's name. @thread any */
 SONDE_API const char *sonde_interior_vessel_name(const sonde_interior *interior, int which);
-/** State of the vein (0), the artery (1) or a branch where the probe's image plane cuts it; false
+/** State of the vein (0), the artery (1) or a branch in the probe's image plane; false
  *  when it does not pass within 40 mm of the beam axis. @thread any, not during an update */
 SONDE_API bool sonde_interior_vessel_at_plane(const sonde_interior *interior, int which,
                                               sonde_pose world_from_probe,

@@ -392,8 +392,8 @@ static void work_ahead_changes_no_update(void **state) {
   assert_true(in[1]->building && in[1]->next->ready);
   hover(in[1], &t, 0.155, 0.03);
   assert_false(in[1]->building);
-  assert_memory_equal(&in[0]->live->grid.place, &in[1]->live->grid.place,
-                      sizeof in[0]->live->grid.place);
+  assert_memory_equal(&in[0]->live->grid.footprint, &in[1]->live->grid.footprint,
+                      sizeof in[0]->live->grid.footprint);
   const size_t near = 3 * (size_t)SONDE_WINDOW_NEAR;
   assert_memory_equal(in[0]->live->compliance, in[1]->live->compliance,
                       near * near * sizeof(double));

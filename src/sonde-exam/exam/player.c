@@ -40,7 +40,7 @@ static sonde_status create_session(sonde_player *player, const sonde_model *mode
   // The moment before the first tick is the player's first keyframe.
   sonde_subject *subject = player->session->subject;
   if (player->session->interior)
-    status = sonde_interior_keep_windows(player->session->interior, WINDOWS, error);
+    status = sonde_interior_cache_windows(player->session->interior, WINDOWS, error);
   player->world = sonde_calloc(1, sonde_subject_size(subject));
   player->start_world = sonde_calloc(1, sonde_subject_size(subject));
   if (!player->world || !player->start_world) status = sonde_fail_memory(error);

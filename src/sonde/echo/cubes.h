@@ -56,7 +56,7 @@ typedef struct sonde_cubes {
   float_x4 place, to_place[3];                        // flat face: image coordinates to lengths
   float_x4 image, to_image[3];                        // and back
   float_x4 low[MOST_VESSELS], high[MOST_VESSELS];     // cubes beside that box stay whole
-  cube_station station[MOST_VESSELS][SONDE_STATIONS]; // of the vessels in view, near the slab
+  cube_station station[MOST_VESSELS][SONDE_SECTIONS]; // of the vessels in view, near the slab
   uint32_t count, groups, walls;
   moved_cube moved[CUBES_AT_ONCE];
   float wall[MOST_VESSELS][WALL_FIELDS][WALL_ROOM];

@@ -62,14 +62,14 @@ static sonde_vessel_state vessel_of(const float (*wall)[WALL_ROOM], uint32_t gro
                           .axis = vector_of(wall, WALL_AXIS, group),
                           .flat_axis = vector_of(wall, WALL_FLAT, group),
                           .rest_radius_m = (double)wall[WALL_RADIUS][group],
-                          .lead = (double)wall[WALL_LEAD][group],
+                          .coupling = (double)wall[WALL_LEAD][group],
                           .half_short_m = (double)wall[WALL_SHORT][group],
                           .half_long_m = (double)wall[WALL_LONG][group],
-                          .tissue_turn = (double)wall[WALL_TURN][group],
+                          .tissue_rotation = (double)wall[WALL_TURN][group],
                           .tissue_short = (double)wall[WALL_TISSUE_SHORT][group],
                           .tissue_shear = (double)wall[WALL_SHEAR][group],
                           .tissue_long = (double)wall[WALL_TISSUE_LONG][group],
-                          .tissue_even = (double)wall[WALL_EVEN][group]};
+                          .tissue_smoothing = (double)wall[WALL_EVEN][group]};
   v.centre_m = v_add(v.rest_centre_m, vector_of(wall, WALL_SHIFT, group));
   return v;
 }
@@ -90,7 +90,7 @@ static void gather(const wall_job *job) {
   for (uint32_t i = 0; i < 4 * job->groups; ++i) {
     sonde_vessel_state near[MOST_VESSELS];
     uint32_t count = vessels_near(job, i / 4, near);
-    sonde_vec3 at = sonde_vessels_gather(near, count, point_of(job->rest, i));
+    sonde_vec3 at = sonde_vessels_warp(near, count, point_of(job->rest, i));
     for (int c = 0; c < 3; ++c) job->gathered[c][i] = (float)v_coordinate(at, c);
   }
 }
@@ -101,7 +101,7 @@ static void even(const wall_job *job) {
     uint32_t count = vessels_near(job, i / 4, near);
     sonde_vec3 gathered = point_of((const float(*)[WALL_POINTS])job->gathered, i);
     sonde_vec3 place = point_of((const float(*)[WALL_POINTS])job->place, i);
-    sonde_vec3 at = sonde_vessels_even(near, count, point_of(job->rest, i), gathered, place);
+    sonde_vec3 at = sonde_vessels_smooth(near, count, point_of(job->rest, i), gathered, place);
     for (int c = 0; c < 3; ++c) job->place[c][i] = (float)v_coordinate(at, c);
   }
 }

@@ -1,5 +1,5 @@
-// Where the vessels' walls take the tissue around them: sonde_vessels_gather and
-// sonde_vessels_even for many points in single precision. Included by kernel.c only.
+// Where the vessels' walls take the tissue around them: sonde_vessels_warp and
+// sonde_vessels_smooth for many points in single precision. Included by kernel.c only.
 //
 // find_reach      offset from a vessel, and how firmly it leads
 // gathered_by     where one vessel gathers the points

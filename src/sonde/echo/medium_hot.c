@@ -190,7 +190,7 @@ static void describe_tissue(const sonde_echo *echo, tissue_job *job) {
     const uint32_t which = echo->shown[k];
     const sonde_pathology *p = sonde_echo_pathology(echo, which);
     float wall = wall_m[in->kind[which]];
-    if (which >= 2) wall = fminf(wall, thin_wall * (float)in->station[which][0].radius_m);
+    if (which >= 2) wall = fminf(wall, thin_wall * (float)in->section[which][0].radius_m);
     float more = (float)p->echogenicity - fresh, age = fminf(fmaxf(more / 0.7f, 0), 1);
     bool vein = in->kind[which] == SONDE_VESSEL_VEIN;
     job->vessel[k] =

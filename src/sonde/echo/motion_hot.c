@@ -40,22 +40,22 @@ void sonde_motion_begin(sonde_echo *echo) {
   }
   // Stations of the vessels in view that lie there, and the box of what they reach.
   for (uint32_t k = 0; k < echo->shown_count; ++k) {
-    const uint32_t which = echo->shown[k], count = in->station_count[which];
-    const sonde_station *station = in->station[which];
+    const uint32_t which = echo->shown[k], count = in->section_count[which];
+    const sonde_vessel_section *station = in->section[which];
     s->low[k] = vset_float_x4(INFINITY), s->high[k] = -s->low[k];
     for (uint32_t i = 0; i < count; ++i) {
       if (i + 1 < count && station[i + 1].s_m < first) continue;
       if (i > 0 && station[i - 1].s_m > last) break;
       const sonde_vessel_state *v = &in->state[which][i];
-      s->station[k][i] = (cube_station){
-          point_of(v_sub(v->rest_centre_m, s->corner)),
-          point_of(v_sub(v->centre_m, v->rest_centre_m)),
-          point_of(v->axis),
-          point_of(v->flat_axis),
-          {(float)v->rest_radius_m, (float)v->lead, (float)v->half_short_m, (float)v->half_long_m},
-          {(float)v->tissue_turn, (float)v->tissue_short, (float)v->tissue_shear,
-           (float)v->tissue_long},
-          (float)v->tissue_even};
+      s->station[k][i] = (cube_station){point_of(v_sub(v->rest_centre_m, s->corner)),
+                                        point_of(v_sub(v->centre_m, v->rest_centre_m)),
+                                        point_of(v->axis),
+                                        point_of(v->flat_axis),
+                                        {(float)v->rest_radius_m, (float)v->coupling,
+                                         (float)v->half_short_m, (float)v->half_long_m},
+                                        {(float)v->tissue_rotation, (float)v->tissue_short,
+                                         (float)v->tissue_shear, (float)v->tissue_long},
+                                        (float)v->tissue_smoothing};
       float_x4 reach =
           vset_float_x4((float)(fmax(close_m, reach_radii * v->rest_radius_m + h) + margin_m));
       s->low[k] = vmin(s->low[k], s->station[k][i].rest - reach);
@@ -102,7 +102,7 @@ static void find_walls(const sonde_echo *echo, const slab_cube *from, moved_cube
     const uint32_t which = echo->shown[k];
     uint32_t i;
     double t;
-    if (!sonde_vessel_stations(in, which, along_m, &i, &t)) continue;
+    if (!sonde_vessel_sections(in, which, along_m, &i, &t)) continue;
     const sonde_vessel_state *a = &in->state[which][i], *b = a + 1;
     sonde_vec3 middle = v_lerp(a->rest_centre_m, b->rest_centre_m, t);
     double radius = a->rest_radius_m + t * (b->rest_radius_m - a->rest_radius_m);
@@ -111,9 +111,9 @@ static void find_walls(const sonde_echo *echo, const slab_cube *from, moved_cube
     if (!(distance < reach_radii * radius + h)) continue;
     double solid = sonde_echo_solid(echo, which, middle.z);
     bool closed = fmin(a->area_ratio, b->area_ratio) < sonde_least_lumen;
-    if (closed && fmin(a->lead, b->lead) < 1) solid = 1; // its walls touch and lead no gap
+    if (closed && fmin(a->coupling, b->coupling) < 1) solid = 1; // its walls touch and lead no gap
     c->wall[c->walls++] = (cube_wall){k, i, (float)t, (float)solid, along_m};
-    c->by_walls = c->by_walls || a->lead > 0 || b->lead > 0;
+    c->by_walls = c->by_walls || a->coupling > 0 || b->coupling > 0;
   }
   c->by_walls = c->by_walls || c->close; // pieces take one path whether a wall moves or not
 }

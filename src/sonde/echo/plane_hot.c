@@ -34,11 +34,11 @@ static bool in_view(const sonde_echo *echo, sonde_vec3 point, double reach_m) {
 static void choose_view(sonde_echo *echo) {
   const sonde_interior *in = echo->interior;
   echo->shown[0] = 0, echo->shown[1] = 1, echo->shown_count = 2;
-  echo->vessels = in->station_count[0] > 0 || in->station_count[1] > 0;
+  echo->vessels = in->section_count[0] > 0 || in->section_count[1] > 0;
   for (uint32_t which = 2; which < in->vessel_count; ++which) {
     const sonde_vessel_state *v = in->state[which];
     bool seen = false;
-    for (uint32_t i = 0; i < in->station_count[which] && !seen; ++i)
+    for (uint32_t i = 0; i < in->section_count[which] && !seen; ++i)
       seen = in_view(echo, v[i].centre_m, 4 * v[i].rest_radius_m);
     if (seen) echo->shown[echo->shown_count++] = which, echo->vessels = true;
   }
@@ -59,11 +59,11 @@ static void choose_view(sonde_echo *echo) {
 static void store_vessel(const sonde_echo *echo, uint32_t k, double s, sonde_vec3 point,
                          float *at) {
   const sonde_interior *in = echo->interior;
-  const uint32_t which = echo->shown[k], count = in->station_count[which];
+  const uint32_t which = echo->shown[k], count = in->section_count[which];
   sonde_vessel_state v;
   double across = far_away, along = far_away, half_short = 1e-3, half_long = 1e-3, clot = 0;
   bool there = sonde_vessel_at(in, which, s, &v);
-  if (!there && which >= 2) v = in->state[which][s < in->station[which][0].s_m ? 0 : count - 1];
+  if (!there && which >= 2) v = in->state[which][s < in->section[which][0].s_m ? 0 : count - 1];
   if (there || which >= 2) {
     sonde_vec3 d = v_sub(point, v.centre_m);
     along = v_dot(d, v.flat_axis) / v.half_short_m;

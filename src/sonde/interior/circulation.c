@@ -1,7 +1,4 @@
 // Pressures of the femoral vessels in time: closed functions of t, so that a tick says all.
-//
-// sonde_venous_pressure    posture + breath + Valsalva
-// sonde_arterial_pressure  a pulse of two waves between diastolic and systolic
 #include "base/base.h"
 #include "interior/interior.h"
 

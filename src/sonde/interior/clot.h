@@ -27,7 +27,7 @@ static inline float sonde_clot_start(uint32_t vessel, uint32_t wave) {
 }
 
 // Height of the surface over the chord that bounds the clot's share, in radii towards its bottom;
-// `across` the lumen in radii, `along_m` as the stations count. It depends on the tissue alone, so
+// `across` the lumen in radii, `along_m` as the sections count. It depends on the tissue alone, so
 // that it stays where it is.
 static inline double sonde_clot_surface(uint32_t vessel, double along_m, double across) {
   double sum = (double)clot_bend * ((double)clot_level - across * across);

@@ -1,11 +1,5 @@
-// The column table: built once from the rest skin and the femur.
-//
-// find_axis       femur axis and radius from the moments of its surface
-// find_extent     rows of the table between the leg's ends, where the axis is inside
-// cast_columns    skin point of every column, derivatives of R, outward flux vectors
-// store_layers    layer depths in the evaluation's table
-// factor_surface  five-point Laplacian of the skin in (theta, s), zero at both ends
-// factor_surface        five-point Laplacian of the skin in (theta, s), zero at both ends
+// The column table, built once from the rest skin and the femur: axis and radius of the bone, a
+// skin point per column, the layers below it, and the factored Laplacian of the skin.
 #include "base/base.h"
 #include "interior/interior.h"
 #include "interior/window.h"
@@ -247,6 +241,6 @@ void sonde_columns_refresh(sonde_interior *in) {
   SONDE_ASSERT(in != NULL && in->field != NULL);
   store_layers(in);
   in->live->ready = in->next->ready = in->building = in->solid = false;
-  for (uint32_t k = 0; k < in->shelf_count; ++k)
-    if (in->shelf[k]) in->shelf[k]->ready = false;
+  for (uint32_t k = 0; k < in->cache_count; ++k)
+    if (in->cache[k]) in->cache[k]->ready = false;
 }

@@ -1,10 +1,10 @@
-// The displacement field: one solve per update, closed evaluation anywhere (docs/interior.md).
+// The displacement field: one solve per update, closed evaluation anywhere
+// (docs/interior_theory.md).
 //
 // With p(theta, s, zeta) the column map, J = H r its volume density and U a field without
 // divergence in (theta, s, zeta), u = (1/J) (U^zeta dp/dzeta + U^theta dp/dtheta + U^s dp/ds) has
 // none in space, whatever the shape of the leg. Two such fields are added; at the bone both vanish:
 // - inflow, the flux through the skin: U^zeta = g W, U^i = g' V^i with d_i V^i = -W.
-//   g = 1 - 3 z^2 + 2 z^3.
 // - slide, the skin's motion along itself: U^i = g S^i + g'/2 V'^i with S^i = H R t^i,
 //   U^zeta = -(z - 3/2 z^2 + z^4/2) D, D = d_i S^i = d_i V'^i: what follows the skin below it comes
 //   back at mid-depth.
@@ -12,7 +12,7 @@
 #include "base/base.h"
 #include "interior/clot.h"
 #include "interior/interior.h"
-#include "interior/unfold.h"
+#include "interior/fold_repair.h"
 #include "interior/window.h"
 
 #include <string.h>
@@ -136,7 +136,7 @@ sonde_vec3 sonde_interior_field(const sonde_interior *in, sonde_vec3 rest) {
   polar q = to_polar(in, rest);
   if (!in->solid) {
     sonde_vec3 kept, plain = column_field(in, q);
-    double share = sonde_bend_at(in->bend, q.theta, q.s, q.r, &kept);
+    double share = sonde_column_grid_at(in->column_grid, q.theta, q.s, q.r, &kept);
     return share > 0 ? v_lerp(plain, kept, share) : plain;
   }
   double u[3];

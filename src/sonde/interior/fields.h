@@ -14,9 +14,9 @@ typedef struct sonde_field_column {
 
 typedef struct sonde_fields {
   const sonde_interior *interior;
-  sonde_vec3 corner; // that places at rest are from
-  // Of the leg, turned so that the window's middle is at angle 0: x, y, way along = first + columns
-  // times the way from the corner.
+  sonde_vec3 corner; // origin of the rest positions
+  // Of the leg, rotated so that the window's middle is at angle 0: x, y and position along it =
+  // first + columns times the offset from the corner.
   float_x4 first, turned[3];
   float theta[SONDE_WINDOW_THETA + 1], per_theta[SONDE_WINDOW_THETA];
   float s[SONDE_WINDOW_S], per_s[SONDE_WINDOW_S];

@@ -1,10 +1,5 @@
 // The displacement field for many points: window coordinates of four points at once, then for each
 // the nodes of its cell, four numbers at a time.
-//
-// sonde_fields_begin  what the window's coordinates need
-// store_row           nodes of one row of the window, when it is first asked for
-// field_of            displacement of one point from its window coordinates
-// sonde_fields_at     of all points
 #include "base/base.h"
 #include "interior/fields.h"
 
@@ -17,18 +12,18 @@ void sonde_fields_begin(sonde_fields *f, const sonde_interior *in, sonde_vec3 co
   f->interior = in, f->corner = corner, f->rows = 0;
   if (!in->solid) return;
   const sonde_window *w = in->live;
-  double cosine = cos(w->grid.place.theta), sine = sin(w->grid.place.theta);
+  double cosine = cos(w->grid.footprint.theta), sine = sin(w->grid.footprint.theta);
   sonde_vec3 x = v_madd(v_scale(in->e1, cosine), sine, in->e2);
   sonde_vec3 y = v_madd(v_scale(in->e2, cosine), -sine, in->e1), from = v_sub(corner, in->origin);
   f->first =
-      point_of(vec3(v_dot(from, x), v_dot(from, y), v_dot(from, in->axis) - w->grid.place.s));
+      point_of(vec3(v_dot(from, x), v_dot(from, y), v_dot(from, in->axis) - w->grid.footprint.s));
   for (int c = 0; c < 3; ++c)
     f->turned[c] =
         point_of(vec3(v_coordinate(x, c), v_coordinate(y, c), v_coordinate(in->axis, c)));
   for (int i = 0; i <= NT; ++i) f->theta[i] = (float)w->grid.theta[i];
   for (int i = 0; i < NT; ++i)
     f->per_theta[i] = (float)(1 / (w->grid.theta[i + 1] - w->grid.theta[i]));
-  for (int j = 0; j < NS; ++j) f->s[j] = (float)(w->grid.s[j] - w->grid.place.s);
+  for (int j = 0; j < NS; ++j) f->s[j] = (float)(w->grid.s[j] - w->grid.footprint.s);
   for (int j = 0; j + 1 < NS; ++j) f->per_s[j] = (float)(1 / (w->grid.s[j + 1] - w->grid.s[j]));
 }
 
@@ -94,8 +89,8 @@ void sonde_fields_at(sonde_fields *f, uint32_t count, const float_x4 *rest, floa
   SONDE_ASSERT(f->interior != NULL && (count == 0 || (rest != NULL && field != NULL)));
   uint32_t cell[2] = {0, 0};
   for (uint32_t k = 0; k < count && !f->interior->solid; ++k) {
-    sonde_vec3 way = vec3((double)rest[k][0], (double)rest[k][1], (double)rest[k][2]);
-    field[k] = point_of(sonde_interior_field(f->interior, v_add(f->corner, way)));
+    sonde_vec3 offset = vec3((double)rest[k][0], (double)rest[k][1], (double)rest[k][2]);
+    field[k] = point_of(sonde_interior_field(f->interior, v_add(f->corner, offset)));
   }
   for (uint32_t k = 0; k < count && f->interior->solid; k += 4) {
     const uint32_t some = count - k < 4 ? count - k : 4;

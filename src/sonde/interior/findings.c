@@ -1,8 +1,4 @@
-// What a case adds to a leg: checked once, applied at every update.
-//
-// sonde_interior_set_findings  lesions, clots in branches, webs, oedema
-// sonde_findings_apply         what each vessel holds during an update
-// sonde_lesion_point, sonde_lesion_label  a rest point in the lesions
+// What a case adds to a leg, lesions and clots in branches: checked once, applied at every update.
 #include "base/base.h"
 #include "interior/interior.h"
 
@@ -62,8 +58,8 @@ static sonde_status check_lesion(const sonde_interior *in, uint32_t k, const son
   for (int end = 0; end < 6 && fits; ++end) {
     const lesion_frame f = frame_of(in, l);
     const sonde_vec3 axis = end < 2 ? f.x : end < 4 ? f.y : f.z;
-    double way = (end % 2 ? 1 : -1) / v_norm2(axis);
-    fits = in_tissue(in, v_madd(l->centre_m, way, axis));
+    double offset = (end % 2 ? 1 : -1) / v_norm2(axis);
+    fits = in_tissue(in, v_madd(l->centre_m, offset, axis));
   }
   if (fits) return SONDE_OK;
   return sonde_fail(error, SONDE_ARGUMENT,

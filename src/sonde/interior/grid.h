@@ -1,6 +1,6 @@
 // The grid of a leg around the probe: columns from the skin to the femur, fine under the probe and
 // growing away from it. It carries the elements of the solid (window.h) and the map that keeps
-// tissue from folding (unfold.h).
+// tissue from folding (repair.h).
 #ifndef SONDE_SRC_GRID_H
 #define SONDE_SRC_GRID_H
 
@@ -19,16 +19,16 @@ enum {
   SONDE_GRID_HEXES = SONDE_WINDOW_THETA * (SONDE_WINDOW_S - 1) * (SONDE_WINDOW_LEVELS - 1),
 };
 
-// Where a grid is: middle and half extents of the probe's face on the leg.
-typedef struct sonde_window_place {
+// Where a grid is: middle and half extents of the probe's face on the leg (angle, axial position).
+typedef struct sonde_footprint {
   double theta, s;
   double half_theta_m, half_s_m;
-} sonde_window_place;
+} sonde_footprint;
 
 typedef struct sonde_grid {
-  sonde_window_place place;
-  double
-      theta[SONDE_WINDOW_THETA + 1]; // offsets from place.theta, ascending; the last is the first
+  sonde_footprint footprint;
+  double theta[SONDE_WINDOW_THETA +
+               1]; // offsets from footprint.theta, ascending; the last is the first
   double s[SONDE_WINDOW_S];
   float radius[SONDE_WINDOW_S * SONDE_WINDOW_THETA][SONDE_WINDOW_LEVELS];
   sonde_vec3 node[SONDE_WINDOW_NODES]; // at rest, leg frame: e1, e2, along the axis
@@ -55,13 +55,13 @@ typedef struct sonde_grid_edges {
   sonde_vec3 x[2][2], y[2][2], z[2][2]; // by the ends along the other two axes, in the axes' order
 } sonde_grid_edges;
 
-static inline void sonde_grid_read_edges(const sonde_vec3 *place, const uint32_t node[8],
+static inline void sonde_grid_read_edges(const sonde_vec3 *position, const uint32_t node[8],
                                          sonde_grid_edges *e) {
   for (uint32_t i = 0; i < 2; ++i)
     for (uint32_t j = 0; j < 2; ++j) {
-      e->x[i][j] = v_sub(place[node[1 + 2 * i + 4 * j]], place[node[2 * i + 4 * j]]);
-      e->y[i][j] = v_sub(place[node[2 + i + 4 * j]], place[node[i + 4 * j]]);
-      e->z[i][j] = v_sub(place[node[4 + i + 2 * j]], place[node[i + 2 * j]]);
+      e->x[i][j] = v_sub(position[node[1 + 2 * i + 4 * j]], position[node[2 * i + 4 * j]]);
+      e->y[i][j] = v_sub(position[node[2 + i + 4 * j]], position[node[i + 4 * j]]);
+      e->z[i][j] = v_sub(position[node[4 + i + 2 * j]], position[node[i + 2 * j]]);
     }
 }
 
@@ -73,11 +73,11 @@ typedef struct sonde_grid_cell {
   double weight[4]; // of the columns
 } sonde_grid_cell;
 
-// Columns and rows for a place on the leg.
-void sonde_grid_begin(sonde_grid *grid, const sonde_interior *in, sonde_window_place place);
-// Place for a probe; false when it is far above the skin. *within: not beyond the leg's ends.
-bool sonde_grid_place(const sonde_interior *in, const sonde_interior_input *input,
-                      sonde_window_place *place, bool *within);
+// Columns and rows for a footprint.
+void sonde_grid_begin(sonde_grid *grid, const sonde_interior *in, sonde_footprint footprint);
+// Footprint of a probe; false when it is far above the skin. *within: not beyond the leg's ends.
+bool sonde_grid_footprint(const sonde_interior *in, const sonde_interior_input *input,
+                          sonde_footprint *footprint, bool *within);
 // The columns around an angle and a row; false beyond the ends.
 bool sonde_grid_columns(const sonde_grid *grid, double theta, double s, sonde_grid_cell *cell);
 // Faces of elements cut the skin's corners: the outermost element goes on by this share of a layer.

@@ -1,9 +1,5 @@
 // Placing a grid on a leg and finding points in it. Rows and columns are even under the probe's
 // face; beyond it the distances grow towards the ends of the leg and the far side.
-//
-// sonde_grid_place                        where a grid for this probe would be
-// sonde_grid_begin                        rows, columns and nodes of a place
-// sonde_grid_columns, sonde_grid_find     cell of a point and its share in it
 #include "base/base.h"
 #include "interior/grid.h"
 
@@ -17,25 +13,25 @@ static const double muscle_level[NL] = {0, 0, 0, 0.12, 0.27, 0.46, 0.70, 1};
 static const double grow_s[5] = {1.4, 2, 3, 4.5, 6.5};
 static const double grow_t[12] = {1.5, 2.3, 3.6, 5.5, 7.5, 9, 9, 7.5, 5.5, 3.6, 2.3, 1.5};
 
-bool sonde_grid_place(const sonde_interior *in, const sonde_interior_input *input,
-                      sonde_window_place *place, bool *within) {
-  SONDE_ASSERT(in != NULL && input != NULL && place != NULL && within != NULL);
+bool sonde_grid_footprint(const sonde_interior *in, const sonde_interior_input *input,
+                          sonde_footprint *footprint, bool *within) {
+  SONDE_ASSERT(in != NULL && input != NULL && footprint != NULL && within != NULL);
   sonde_mat3 r = q_matrix(input->world_from_probe.rotation);
   sonde_vec3 x = m_column(&r, 0), y = m_column(&r, 1);
   double hx = isfinite(input->face_half_x_m) ? input->face_half_x_m : default_half_x_m;
   double hy = isfinite(input->face_half_y_m) ? input->face_half_y_m : default_half_y_m;
   sonde_column_point at;
   bool on_leg = sonde_interior_locate(in, input->world_from_probe.position, &at);
-  *place = (sonde_window_place){.theta = at.theta, .s = at.s};
-  place->half_s_m = fabs(v_dot(x, in->axis)) * hx + fabs(v_dot(y, in->axis)) * hy;
+  *footprint = (sonde_footprint){.theta = at.theta, .s = at.s};
+  footprint->half_s_m = fabs(v_dot(x, in->axis)) * hx + fabs(v_dot(y, in->axis)) * hy;
   double across_x = sqrt(fmax(0, 1 - v_dot(x, in->axis) * v_dot(x, in->axis)));
   double across_y = sqrt(fmax(0, 1 - v_dot(y, in->axis) * v_dot(y, in->axis)));
-  place->half_theta_m = across_x * hx + across_y * hy;
+  footprint->half_theta_m = across_x * hx + across_y * hy;
   *within = on_leg;
   return at.depth_m > -far_m;
 }
 
-// ---- a place ------------------------------------------------------------------------------
+// ---- a footprint --------------------------------------------------------------------------
 
 static double sum_of(const double *d, uint32_t count) {
   double sum = 0;
@@ -43,17 +39,17 @@ static double sum_of(const double *d, uint32_t count) {
   return sum;
 }
 
-void sonde_grid_begin(sonde_grid *g, const sonde_interior *in, sonde_window_place place) {
-  SONDE_ASSERT(g != NULL && in != NULL && isfinite(place.theta) && isfinite(place.s));
+void sonde_grid_begin(sonde_grid *g, const sonde_interior *in, sonde_footprint footprint) {
+  SONDE_ASSERT(g != NULL && in != NULL && isfinite(footprint.theta) && isfinite(footprint.s));
   sonde_column_point at;
-  g->place = place;
-  sonde_interior_column(in, place.theta, place.s, &at);
+  g->footprint = footprint;
+  sonde_interior_column(in, footprint.theta, footprint.s, &at);
 
   // Rows along the leg: even under the face, then growing to the reach or the leg's ends. A grid
   // that ends with the leg still has rows of some height.
   const double low = in->s_low_m, high = in->s_high_m;
-  const double half_s = fmin(place.half_s_m + margin_s_m, 0.4 * (high - low));
-  const double middle = clamp(place.s, low + half_s, high - half_s);
+  const double half_s = fmin(footprint.half_s_m + margin_s_m, 0.4 * (high - low));
+  const double middle = clamp(footprint.s, low + half_s, high - half_s);
   const double down = fmax(fmin(reach_m, middle - half_s - low), 5e-3);
   const double up = fmax(fmin(reach_m, high - middle - half_s), 5e-3);
   const double step_s = 2 * half_s / (SONDE_WINDOW_NEAR_S - 1), all_s = sum_of(grow_s, 5);
@@ -66,7 +62,7 @@ void sonde_grid_begin(sonde_grid *g, const sonde_interior *in, sonde_window_plac
 
   // Angles of the columns: even under the face; the rest of the circle has thirteen gaps, the
   // middle one counted twice.
-  const double half = fmin((place.half_theta_m + margin_t_m) / at.radius_m, 1.2);
+  const double half = fmin((footprint.half_theta_m + margin_t_m) / at.radius_m, 1.2);
   const double step = 2 * half / (SONDE_WINDOW_NEAR_T - 1), rest = 2 * SONDE_PI - 2 * half;
   const double all = sum_of(grow_t, 12) + grow_t[5];
   for (uint32_t k = 0; k < SONDE_WINDOW_NEAR_T; ++k) g->theta[k] = -half + step * k;
@@ -75,9 +71,10 @@ void sonde_grid_begin(sonde_grid *g, const sonde_interior *in, sonde_window_plac
     g->theta[k] = g->theta[k - 1] + rest * grow_t[n < 6 ? n : n - 1] / all;
   }
 
-  // Radii and places of the nodes: the levels of fat and of muscle share the depth of their layer.
+  // Radii and positions of the nodes: the levels of fat and of muscle share the depth of their
+  // layer.
   for (uint32_t c = 0; c < NS * NT; ++c) {
-    const double theta = place.theta + g->theta[c % NT], s = g->s[c / NT];
+    const double theta = footprint.theta + g->theta[c % NT], s = g->s[c / NT];
     sonde_interior_column(in, theta, s, &at);
     const double height = at.radius_m - in->bone_radius_m;
     const double fat = clamp(at.muscle_m / at.cosine, 2.5e-3, 0.6 * height);
@@ -108,7 +105,7 @@ void sonde_grid_begin(sonde_grid *g, const sonde_interior *in, sonde_window_plac
 bool sonde_grid_columns(const sonde_grid *g, double theta, double s, sonde_grid_cell *c) {
   SONDE_ASSERT(g != NULL && c != NULL);
   if (s < g->s[0] || s > g->s[NS - 1]) return false;
-  double turn = fmod(theta - g->place.theta - g->theta[0], 2 * SONDE_PI);
+  double turn = fmod(theta - g->footprint.theta - g->theta[0], 2 * SONDE_PI);
   if (turn < 0) turn += 2 * SONDE_PI;
   turn += g->theta[0];
   c->i = 0, c->j = 0;

@@ -1,7 +1,4 @@
-// Life of an interior.
-//
-// sonde_interior_create   column table, stations, rest state
-// sonde_interior_destroy
+// Creation and release of an interior.
 #include "base/base.h"
 #include "interior/interior.h"
 #include "interior/window.h"
@@ -23,9 +20,9 @@ sonde_status sonde_interior_create(const sonde_model *model, sonde_interior **in
   sonde_status status = sonde_pathology_preset("healthy", &made->pathology[0], error);
   for (uint32_t k = 1; k < SONDE_VESSELS; ++k) made->pathology[k] = made->pathology[0];
   if (status == SONDE_OK) status = sonde_columns_create(made, error);
-  if (status == SONDE_OK) status = sonde_stations_create(made, error);
-  made->bend = SONDE_NEW(struct sonde_bend, 1);
-  if (status == SONDE_OK && made->bend == NULL) status = sonde_fail_memory(error);
+  if (status == SONDE_OK) status = sonde_sections_create(made, error);
+  made->column_grid = SONDE_NEW(struct sonde_column_grid, 1);
+  if (status == SONDE_OK && made->column_grid == NULL) status = sonde_fail_memory(error);
   if (status == SONDE_OK) status = sonde_window_create(&made->live, error);
   if (status == SONDE_OK) status = sonde_window_create(&made->next, error);
   if (status == SONDE_OK) made->whole = sonde_window_steps(made->live, SONDE_WINDOW_BUDGET);
@@ -40,13 +37,13 @@ void sonde_interior_destroy(sonde_interior *interior) {
   if (interior == NULL) return;
   sonde_window_destroy(interior->live);
   sonde_window_destroy(interior->next);
-  for (uint32_t k = 0; k < interior->shelf_count; ++k) sonde_window_destroy(interior->shelf[k]);
-  sonde_free(interior->shelf);
+  for (uint32_t k = 0; k < interior->cache_count; ++k) sonde_window_destroy(interior->cache[k]);
+  sonde_free(interior->cache);
   sonde_surface_index_destroy(interior->skin);
   sonde_ldl_destroy(interior->ldl);
   sonde_free(interior->column);
   sonde_free(interior->field);
-  sonde_free(interior->bend);
+  sonde_free(interior->column_grid);
   sonde_free(interior->potential);
   sonde_free(interior->scratch);
   sonde_free(interior);

@@ -1,4 +1,4 @@
-// Inside of the interior room: the column table, the vessels' stations, what an update leaves.
+// Inside of the interior room: the column table, the vessels' sections, what an update leaves.
 //
 // Columns run from the femur's axis straight out to the skin. A point has coordinates
 // (theta, s, zeta): angle about the axis, position along it, depth fraction 0 (skin) .. 1 (bone).
@@ -11,7 +11,7 @@
 #include "sparse/ldl.h"
 #include "sonde/interior_findings.h"
 
-enum { SONDE_STATIONS = 160, SONDE_VESSELS = 2 + SONDE_BRANCHES };
+enum { SONDE_SECTIONS = 160, SONDE_VESSELS = 2 + SONDE_BRANCHES };
 
 // Constant facts of one column of the table.
 typedef struct sonde_column {
@@ -43,10 +43,10 @@ typedef struct sonde_column_point {
   double cosine; // between column and skin normal: depth over distance along the column
 } sonde_column_point;
 
-// Shear moduli of the layers around the vessels (docs/interior.md).
+// Shear moduli of the layers around the vessels (docs/interior_theory.md).
 static const double sonde_fat_pa = 1.5e3, sonde_muscle_pa = 3.6e3;
 
-// Share of a vessel's area from whose loss on its wall leads the tissue beside it fully.
+// Share of a vessel's area from whose loss on the tissue beside it is fully coupled to the wall.
 static const double sonde_engaged_loss = 0.05;
 // Rest radii over which a wall's motion fades.
 static const double sonde_wall_reach = 3.0;
@@ -54,23 +54,23 @@ static const double sonde_wall_reach = 3.0;
 static const double sonde_least_lumen = 0.03;
 
 struct sonde_window;
-struct sonde_bend;
+struct sonde_column_grid;
 
-// Axes of a lesion at rest over its semi-axes: dot products with the way from its centre are
+// Axes of a lesion at rest over its semi-axes: dot products with the offset from its centre are
 // coordinates in which it is the unit ball.
 typedef struct lesion_frame {
   sonde_vec3 x, y, z;
 } lesion_frame;
 
-// A vessel's constant station.
-typedef struct sonde_station {
+// A vessel's constant section.
+typedef struct sonde_vessel_section {
   sonde_vec3 rest_m, axis;
   double s_m; // along the femur's axis, ascending
   double radius_m, depth_m;
   double hold;     // shear modulus around it over that of muscle
   double tissue_m; // from the skin to the bone
-  double lead;     // of the tissue by its wall: 0 where it opens into another vessel, 1 beyond
-} sonde_station;
+  double coupling; // of the tissue by its wall: 0 where it opens into another vessel, 1 beyond
+} sonde_vessel_section;
 
 struct sonde_interior {
   const sonde_model *model;
@@ -84,22 +84,22 @@ struct sonde_interior {
   sonde_column_field *field; // same shape
   sonde_ldl *ldl;
   double *potential, *scratch;
-  struct sonde_bend *bend;          // keeps the columns' field from folding
-  struct sonde_window *live, *next; // the solid in use and the one that is being factored
-  bool building;                    // next has a place and is not in use yet
-  bool ahead;                       // the coming update's share of it is done
-  uint32_t built, whole;            // updates that it has been building, that a build takes
-  struct sonde_window **shelf; // [shelf_count] factored windows of other places, latest first; NULL
-                               // before it is needed
-  uint32_t shelf_count;        // 0 in a running session
+  struct sonde_column_grid *column_grid; // keeps the columns' field from folding
+  struct sonde_window *live, *next;      // the solid in use and the one that is being factored
+  bool building;                         // next has a footprint and is not in use yet
+  bool ahead;                            // the coming update's share of it is done
+  uint32_t built, whole;                 // updates that it has been building, that a build takes
+  struct sonde_window **cache; // [cache_count] factored windows of other footprints, latest first;
+                               // NULL before it is needed
+  uint32_t cache_count;        // 0 in a running session
   bool solid;                  // the last update was solved by the solid
   sonde_interior_method method;
   uint32_t vessel_count; // femoral vein, femoral artery, branches
   sonde_vessel_kind kind[SONDE_VESSELS];
-  uint32_t station_count[SONDE_VESSELS]; // 0: a leg without this vessel
-  sonde_station station[SONDE_VESSELS][SONDE_STATIONS];
-  sonde_vessel_state state[SONDE_VESSELS][SONDE_STATIONS];
-  bool strained[SONDE_VESSELS][SONDE_STATIONS]; // of the update: tissue beside it may fold
+  uint32_t section_count[SONDE_VESSELS]; // 0: a leg without this vessel
+  sonde_vessel_section section[SONDE_VESSELS][SONDE_SECTIONS];
+  sonde_vessel_state state[SONDE_VESSELS][SONDE_SECTIONS];
+  bool strained[SONDE_VESSELS][SONDE_SECTIONS]; // of the update: tissue beside it may fold
   sonde_pathology pathology[SONDE_VESSELS];     // of the last update
   sonde_findings findings;
   lesion_frame lesion[SONDE_LESIONS];
@@ -121,35 +121,35 @@ sonde_vec3 sonde_interior_invert(const sonde_interior *interior, sonde_vec3 poin
 bool sonde_interior_locate(const sonde_interior *interior, sonde_vec3 rest_m,
                            sonde_column_point *at);
 
-// Stations i and i + 1 of a vessel around axial position s and the way between them, 0..1; false
+// Sections i and i + 1 of a vessel around axial position s and the share between them, 0..1; false
 // beyond the vessel's ends. @thread any
-bool sonde_vessel_stations(const sonde_interior *interior, uint32_t which, double s_m, uint32_t *i,
+bool sonde_vessel_sections(const sonde_interior *interior, uint32_t which, double s_m, uint32_t *i,
                            double *share);
 // State of a vessel interpolated at axial position s. @thread any
 bool sonde_vessel_at(const sonde_interior *interior, uint32_t which, double s_m,
                      sonde_vessel_state *state);
-// Where the wall gathers a point given relative to the centre of the undisturbed cross-section,
+// Where the wall warps a point given relative to the centre of the undisturbed cross-section,
 // at rest: the tissue's gradient takes a point of the lumen from there to the lumen as it is.
 // Keeps orientation, fades out with distance. @thread any
-void sonde_vessel_gather(const sonde_vessel_state *state, double *short_m, double *long_m);
+void sonde_vessel_warp(const sonde_vessel_state *state, double *short_m, double *long_m);
 // Where the tissue's gradient carries it. @thread any
 void sonde_vessel_tissue(const sonde_vessel_state *state, double *short_m, double *long_m);
-// A point goes first to where the walls near it gather the tissue, at rest still, then with the
-// field, and last to where the walls even out the field's bends: the place of a rest point that was
-// gathered to `gathered_m` and that the field took to `place_m`. @thread any
-sonde_vec3 sonde_vessels_gather(const sonde_vessel_state *near, uint32_t count, sonde_vec3 rest_m);
-sonde_vec3 sonde_vessels_even(const sonde_vessel_state *near, uint32_t count, sonde_vec3 rest_m,
-                              sonde_vec3 gathered_m, sonde_vec3 place_m);
+// A point goes first to where the walls near it warp the tissue, at rest still, then with the
+// field, and last to where the walls smooth the field's bends: the position of a rest point that
+// was warped to `warped_m` and that the field took to `moved_m`. @thread any
+sonde_vec3 sonde_vessels_warp(const sonde_vessel_state *near, uint32_t count, sonde_vec3 rest_m);
+sonde_vec3 sonde_vessels_smooth(const sonde_vessel_state *near, uint32_t count, sonde_vec3 rest_m,
+                                sonde_vec3 warped_m, sonde_vec3 moved_m);
 // Vessels whose walls can move a rest point at axial position s; their number. @thread any
 uint32_t sonde_vessels_near(const sonde_interior *interior, sonde_vec3 rest_m, double s_m,
                             sonde_vessel_state near[SONDE_VESSELS]);
-// The steps of a rest point beside these vessels: gathered, moved by the field, evened out.
-typedef struct sonde_carried {
-  sonde_vec3 gathered_m, place_m, even_m;
-} sonde_carried;
+// The steps of a rest point beside these vessels: warped, moved by the field, smoothed.
+typedef struct sonde_wall_steps {
+  sonde_vec3 warped_m, moved_m, smoothed_m;
+} sonde_wall_steps;
 // @thread any
-sonde_carried sonde_vessels_carry(const sonde_interior *interior, const sonde_vessel_state *near,
-                                  uint32_t count, sonde_vec3 rest_m);
+sonde_wall_steps sonde_vessels_trace(const sonde_interior *interior, const sonde_vessel_state *near,
+                                     uint32_t count, sonde_vec3 rest_m);
 // Displacement of a rest point at axial position s, vessels included; it goes on beyond the skin.
 // @thread any
 sonde_vec3 sonde_vessels_displace(const sonde_interior *interior, sonde_vec3 rest_m, double s_m);
@@ -173,9 +173,9 @@ bool sonde_interior_follow(sonde_interior *interior, const sonde_interior_input 
 typedef struct sonde_interior_memory {
   uint64_t tick;
   uint32_t ready, live_ready, building, built;
-  double live[4], next[4]; // places: angle, position, half extents
-  double area_ratio[2][SONDE_STATIONS];
-  sonde_vec3 flat_axis[2][SONDE_STATIONS];
+  double live[4], next[4]; // footprints: angle, position, half extents
+  double area_ratio[2][SONDE_SECTIONS];
+  sonde_vec3 flat_axis[2][SONDE_SECTIONS];
 } sonde_interior_memory;
 
 // The next update's share of a window that is being built, so that the update is quicker; nothing
@@ -185,21 +185,21 @@ SONDE_LINK void sonde_interior_build_ahead(sonde_interior *in);
 // No allocation. @thread of the updates
 SONDE_LINK void sonde_interior_remember(const sonde_interior *interior,
                                         sonde_interior_memory *memory);
-// Goes on from there. Factors the window in use unless it or one like it on the shelf is at hand;
+// Goes on from there. Factors the window in use unless it or one like it in the cache is at hand;
 // one that was being built is made when it is due. @return FORMAT @thread owner
 SONDE_LINK sonde_status sonde_interior_recall(sonde_interior *interior,
                                               const sonde_interior_memory *memory,
                                               sonde_error *error);
 // Room for factored windows that are not in use. @thread owner
-SONDE_LINK sonde_status sonde_interior_keep_windows(sonde_interior *interior, uint32_t count,
-                                                    sonde_error *error);
-// Makes in->next a window for a place: from the shelf when it is there. Without a shelf no
+SONDE_LINK sonde_status sonde_interior_cache_windows(sonde_interior *interior, uint32_t count,
+                                                     sonde_error *error);
+// Makes in->next a window for a footprint: from the cache when it is there. Without a cache no
 // allocation.
-void sonde_interior_next_window(sonde_interior *interior, const double place[4]);
+void sonde_interior_next_window(sonde_interior *interior, const double footprint[4]);
 
 // Stages of a creation.
 sonde_status sonde_columns_create(sonde_interior *interior, sonde_error *error);
-sonde_status sonde_stations_create(sonde_interior *interior, sonde_error *error);
+sonde_status sonde_sections_create(sonde_interior *interior, sonde_error *error);
 
 // Layer depths of the table again as the model gives them; windows have to be made again.
 void sonde_columns_refresh(sonde_interior *interior);
@@ -217,15 +217,16 @@ double sonde_artery_rest_scale(const sonde_pathology *pathology);
 bool sonde_pathology_clot(const sonde_pathology *pathology, double z_m);
 
 // Area of the vein relative to its rest area at an effective outside pressure (Pa), for a lumen
-// pressure and thrombus (tube law, docs/interior.md). Monotone, > 0. @thread any
+// pressure and thrombus (tube law, docs/interior_theory.md). Monotone, > 0. @thread any
 double sonde_vein_area_ratio(const sonde_pathology *pathology, double outside_pa);
 // Area of the artery relative to its rest area at an effective outside pressure (Pa). @thread any
 double sonde_artery_area_ratio(const sonde_pathology *pathology, double outside_pa);
 // Pressure inside an empty vein's wall (Pa) that holds it at `area_ratio` of its stress-free area
-// inside muscle, for a wall of that shear modulus (docs/interior.md). Monotone. @thread any
+// inside muscle, for a wall of that shear modulus (docs/interior_theory.md). Monotone. @thread any
 double sonde_vein_tube_pressure(double area_ratio, double wall_shear_pa);
 // Normal stresses (Pa, compression positive) below a uniformly loaded rectangle on an
-// incompressible half space: lateral x, axial y, normal z (docs/interior.md, superposed corners).
+// incompressible half space: lateral x, axial y, normal z (docs/interior_theory.md, superposed
+// corners).
 // @param half_x_m,half_y_m rectangle @param x_m,y_m,z_m point, z_m > 0 depth @thread any
 sonde_vec3 sonde_rectangle_stress(double pressure_pa, double half_x_m, double half_y_m, double x_m,
                                   double y_m, double z_m);
@@ -237,12 +238,12 @@ void sonde_interior_displacements(const sonde_interior *interior, uint32_t count
 // reaction is the contact force; without vessels. @return false (zero stress) where the solid does
 // not reach: no contact, outside the leg or its window, in bone. @thread any
 bool sonde_interior_stress(const sonde_interior *interior, sonde_vec3 rest_m, sonde_mat3 *stress);
-// Stations of the vein (0), the artery (1) or a branch; 0 when the leg lacks it.
+// Sections of the vein (0), the artery (1) or a branch; 0 when the leg lacks it.
 // @thread any, not during an update
 const sonde_vessel_state *sonde_interior_vessel(const sonde_interior *interior, int which,
                                                 uint32_t *count);
 // Pressure in the common femoral vein (Pa) at time t: posture, breath, Valsalva
-// (docs/interior.md). A function of t only. @thread any
+// (docs/interior_theory.md). A function of t only. @thread any
 double sonde_venous_pressure(const sonde_circulation *circulation, double t_s);
 // Pressure in the femoral artery (Pa) at time t: between diastolic and systolic, periodic.
 // @thread any

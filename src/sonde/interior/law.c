@@ -1,12 +1,6 @@
-// Area and shape of the vessels at an effective outside pressure. Laws and constants:
-// docs/interior.md; calibrated on shared/data/vein_compression.
-//
-// sonde_rectangle_stress   stress below a loaded rectangle (superposed corners)
-// sonde_vein_area_ratio, sonde_vein_area_in  tube law of the open part, compression law of the
-//                          solid part
-// sonde_artery_area_ratio  exponential law
-// sonde_vessel_shape       semi-axes of the ellipse
-// sonde_artery_rest_scale  how the artery's pressure widens it
+// Area and shape of the vessels at an effective outside pressure: tube law of a vein, compression
+// law of a clot, exponential law of an artery, ellipse of a section. Laws and constants:
+// docs/interior_theory.md; calibrated on shared/data/vein_compression.
 #include "base/base.h"
 #include "interior/interior.h"
 

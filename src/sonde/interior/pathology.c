@@ -1,7 +1,4 @@
-// Presets of the vein's state and their names.
-//
-// sonde_pathology_names   list of names
-// sonde_pathology_preset  by name, lenient in separators and abbreviation
+// Presets of the vein's state, found by name, lenient in separators and abbreviation.
 #include "base/base.h"
 #include "interior/interior.h"
 

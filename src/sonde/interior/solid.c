@@ -3,10 +3,6 @@
 // The shape change is integrated at 2x2x2 points, the volume change once per element (Nagtegaal,
 // Parks and Rice 1974): with both at all points eight incompressibility conditions per element
 // would leave no motion.
-//
-// sonde_solid_connect   numbers of the unknowns, order, analysis
-// sonde_solid_matrix    stiffness: shape change, mean dilatation, in-plane stiffness of the skin
-// sonde_solid_stress    mean over the element
 #include "interior/solid.h"
 
 #include "base/base.h"
@@ -53,14 +49,15 @@ sonde_status sonde_solid_connect(sonde_solid *s, const unsigned char *last,
   s->unknown_count = count, s->last_count = count - free_count;
   for (uint32_t h = 0; h < s->hex_count; ++h)
     for (int c = 0; c < 8; ++c) s->corner[h][c] = s->unknown[s->hex[h].node[c]];
-  sonde_vec3 *place = SONDE_NEW(sonde_vec3, count + 1);
-  if (!place) return sonde_fail_memory(error);
+  sonde_vec3 *footprint = SONDE_NEW(sonde_vec3, count + 1);
+  if (!footprint) return sonde_fail_memory(error);
   for (uint32_t i = 0; i < s->node_count; ++i)
-    if (s->unknown[i] != SONDE_FRONT_NONE) place[s->unknown[i]] = (points ? points : s->node)[i];
-  sonde_fronts_def def = {count, s->last_count, place, s->hex_count,
+    if (s->unknown[i] != SONDE_FRONT_NONE)
+      footprint[s->unknown[i]] = (points ? points : s->node)[i];
+  sonde_fronts_def def = {count, s->last_count, footprint, s->hex_count,
                           (const uint32_t(*)[8])s->corner};
   sonde_status status = sonde_fronts_create(&def, &s->fronts, error);
-  sonde_free(place);
+  sonde_free(footprint);
   return status;
 }
 

@@ -18,7 +18,7 @@ typedef struct sonde_solid {
   uint32_t node_count, hex_count, unknown_count, last_count;
   sonde_vec3 *node;
   sonde_solid_hex *hex;
-  uint32_t *unknown;     // [node_count] place among the free nodes, SONDE_FRONT_NONE: at rest
+  uint32_t *unknown;     // [node_count] number among the free nodes, SONDE_FRONT_NONE: at rest
   unsigned char *held;   // [node_count] bits 1 2 4: x y z stay zero
   uint32_t (*corner)[8]; // [hex_count] unknowns of the corners
   bool plain;            // full integration of the volume change: locks, for comparison

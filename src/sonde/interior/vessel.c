@@ -1,41 +1,32 @@
 // Vessels under the probe: load on the skin -> stress at the vessel -> area -> ellipse -> tissue
-// around it (docs/interior.md).
-//
-// sonde_interior_update           field, then vessels
-// measure_load                    equivalent uniform rectangle of the contact forces
-// pressure_on                     effective pressure on a wall
-// update_vessel                   area, shape and course
-// find_tissue, keep_clear         gradient of the field around a wall; room between two of them
-// yield_at                        a wall that would fold the tissue gives way
-// sonde_vessel_stations, sonde_vessel_at  state between stations
-// sonde_vessel_gather, sonde_vessel_tissue  the tissue around a moving wall
+// around it (docs/interior_theory.md). Where a wall would fold the tissue it gives way.
 #include "base/base.h"
 #include "interior/interior.h"
 #include "interior/window.h"
 
-static const double relaxation_s = 0.1;     // emptying of a vein segment (docs/interior.md)
+static const double relaxation_s = 0.1;     // emptying of a vein segment (docs/interior_theory.md)
 static const double least_ratio = 1e-12;    // a vein that is pressed flat is still an ellipse
 static const double skin_spread_m = 1.8e-3; // the skin widens the loaded patch by its thickness
 static const double reach_share = 0.65;     // of the way from the moment's side to the reach's
 static const double least_half_m = 1.5e-3;  // a point probe still has a face
 static const double least_share = 0.03;     // of the largest nodal force: belongs to the contact
 static const double least_depth_m = 3e-3;
-static const double bone_start = 0.30, bone_rise = 1.75; // rigid base, docs/interior.md
+static const double bone_start = 0.30, bone_rise = 1.75; // rigid base, docs/interior_theory.md
 static const double plane_reach_m = 40e-3;
 static const double gradient_reach = 1.5, bend_reach = 2.5; // rest radii: where the field is read
 static const double most_squeeze = 1.6; // a lumen's semi-axis over the tissue's stretch, rest radii
-static const double least_tissue = 0.1, most_turn = 0.5; // of the gradient beside a wall
-static const double most_shear = 1;                      // over the stretch along the other axis
+static const double least_tissue = 0.1, most_rotation = 0.5; // of the gradient beside a wall
+static const double most_shear = 1; // over the stretch along the other axis
 static const double gap_share = 0.2;
 static const double gentle_squeeze = 0.45, gentle_bend = 0.02, probing_m = 0.1e-3;
-static const double least_gathered = 0.2; // volume of the gathered tissue over that at rest
-static const double most_lean = 0.4; // tangent of the angle between a vessel and itself at rest
+static const double least_warped = 0.2; // volume of the warped tissue over that at rest
+static const double most_lean = 0.4;    // tangent of the angle between a vessel and itself at rest
 static const double safe_share = 0.2;
-// From one station to the next a share changes by so much at most: what a wall does ends gently
+// From one section to the next a share changes by so much at most: what a wall does ends gently
 // along its vessel as well.
-static const double even_step = 0.15, lead_step = 0.25;
+static const double smoothing_step = 0.15, coupling_step = 0.25;
 enum { PASSES = 10 };
-// Tissue around a station is probed on rings within the reach of its wall, and between two walls at
+// Tissue around a section is probed on rings within the reach of its wall, and between two walls at
 // thirds of the gap: on the line between their middles and to both sides of it, where the gap is
 // still narrow. A gap wider than twice the radii together is probed by the rings of both walls.
 enum { RING_SIDES = 10, RINGS = 3, GAP_WAYS = 3, GAP_SIDES = 5 };
@@ -53,8 +44,8 @@ typedef struct load {
 
 // Half side of the uniform strip that stands for the load: between the one with the same second
 // moment and the reach of the contact. The moment alone takes the peak under the middle of a flat
-// face on a round leg at its full sharpness; the stiff skin evens it out (docs/interior.md). Nodes
-// just outside the face carry a share too: the strip is never wider than the face.
+// face on a round leg at its full sharpness; the stiff skin smooths it (docs/interior_theory.md).
+// Nodes just outside the face carry a share too: the strip is never wider than the face.
 static double half_side(double moment, double low, double high, double face) {
   double half = sqrt(3 * fmax(0, moment)), reach = 0.5 * fmax(0, high - low);
   half = fmax(half + reach_share * fmax(reach - half, 0), least_half_m);
@@ -98,26 +89,27 @@ static double effective(double trace, double axial) {
 
 // Effective pressure on a vessel's wall: from the solid's stress, and until the solid is factored
 // from the half space under the equivalent rectangle.
-static double pressure_on(const sonde_interior *in, const sonde_station *station, const load *l) {
+static double pressure_on(const sonde_interior *in, const sonde_vessel_section *section,
+                          const load *l) {
   if (in->solid && in->live->stress_scale > 0) {
     sonde_mat3 s;
-    if (!sonde_interior_stress(in, station->rest_m, &s)) return 0;
-    double axial = -v_dot(station->axis, m_mul_v(s, station->axis));
+    if (!sonde_interior_stress(in, section->rest_m, &s)) return 0;
+    double axial = -v_dot(section->axis, m_mul_v(s, section->axis));
     return effective(-(s.m[0][0] + s.m[1][1] + s.m[2][2]), axial);
   }
-  sonde_vec3 d = v_sub(station->rest_m, l->centre_m);
+  sonde_vec3 d = v_sub(section->rest_m, l->centre_m);
   if (!(l->force_n > 0) || v_norm2(d) > 0.12 * 0.12) return 0;
   sonde_surface_point hit; // of the rest skin, against the beam
-  double z = station->depth_m;
-  if (sonde_surface_raycast(in->skin, station->rest_m, v_neg(l->beam), 0.1, &hit))
-    z = v_distance(hit.point_m, station->rest_m);
+  double z = section->depth_m;
+  if (sonde_surface_raycast(in->skin, section->rest_m, v_neg(l->beam), 0.1, &hit))
+    z = v_distance(hit.point_m, section->rest_m);
   z = fmax(z, least_depth_m);
   sonde_vec3 s = sonde_rectangle_stress(l->pressure_pa, l->half_x_m, l->half_y_m, v_dot(d, l->x),
                                         v_dot(d, l->y), z);
   sonde_vec3 a =
-      vec3(v_dot(station->axis, l->x), v_dot(station->axis, l->y), v_dot(station->axis, l->beam));
+      vec3(v_dot(section->axis, l->x), v_dot(section->axis, l->y), v_dot(section->axis, l->beam));
   double axial = a.x * a.x * s.x + a.y * a.y * s.y + a.z * a.z * s.z;
-  double base = 1 + bone_rise * fmax(0, fmin(z / station->tissue_m, 1) - bone_start);
+  double base = 1 + bone_rise * fmax(0, fmin(z / section->tissue_m, 1) - bone_start);
   return base * effective(s.x + s.y + s.z, axial);
 }
 
@@ -126,7 +118,7 @@ static void update_vessel(sonde_interior *in, uint32_t which, const load *l,
                           const sonde_interior_input *input) {
   const bool artery = in->kind[which] == SONDE_VESSEL_ARTERY;
   const sonde_pathology *all = &in->pathology[which];
-  const uint32_t count = in->station_count[which];
+  const uint32_t count = in->section_count[which];
   sonde_vessel_state *state = in->state[which];
   // What it holds without and with clot, and its radius at rest over the model's.
   sonde_pathology held[2] = {*all, *all};
@@ -136,28 +128,28 @@ static void update_vessel(sonde_interior *in, uint32_t which, const load *l,
   scale[1] = artery || !(all->thrombus_fraction > 0) ? scale[0] : sonde_vein_rest_scale(all, true);
   if (!(input->dt_s < 0) && in->ready) blend = 1 - exp(-input->dt_s / relaxation_s);
   for (uint32_t i = 0; i < count; ++i) {
-    const sonde_station *station = &in->station[which][i];
+    const sonde_vessel_section *section = &in->section[which][i];
     sonde_vessel_state *v = &state[i];
-    const bool clot = !artery && sonde_pathology_clot(all, station->rest_m.z);
-    double half_short, half_long, goal = 1; // most stations, most of the time
-    v->outside_pa = pressure_on(in, station, l);
+    const bool clot = !artery && sonde_pathology_clot(all, section->rest_m.z);
+    double half_short, half_long, goal = 1; // most sections, most of the time
+    v->outside_pa = pressure_on(in, section, l);
     if (artery)
       goal = sonde_artery_area_ratio(&held[clot], v->outside_pa);
     else if (v->outside_pa > 0 || clot)
-      goal = sonde_vein_area_in(&held[clot], v->outside_pa, station->hold);
+      goal = sonde_vein_area_in(&held[clot], v->outside_pa, section->hold);
     v->area_ratio = fmax(v->area_ratio + (goal - v->area_ratio) * blend, least_ratio);
-    v->lead = station->lead * clamp(fabs(1 - v->area_ratio) / sonde_engaged_loss, 0, 1);
-    v->rest_radius_m = station->radius_m * scale[clot];
+    v->coupling = section->coupling * clamp(fabs(1 - v->area_ratio) / sonde_engaged_loss, 0, 1);
+    v->rest_radius_m = section->radius_m * scale[clot];
     sonde_vessel_shape(in->kind[which], &held[clot], clot, v->area_ratio, &half_short, &half_long);
     v->half_short_m = half_short * v->rest_radius_m;
     v->half_long_m = half_long * v->rest_radius_m;
-    v->rest_centre_m = station->rest_m;
-    v->centre_m = v_add(station->rest_m, sonde_interior_field(in, station->rest_m));
+    v->rest_centre_m = section->rest_m;
+    v->centre_m = v_add(section->rest_m, sonde_interior_field(in, section->rest_m));
   }
   // A vessel leans away from its course at rest by so much at most: its cross-sections stay apart.
   for (uint32_t i = 0; i < count; ++i) {
     const uint32_t a = i > 0 ? i - 1 : 0, b = i + 1 < count ? i + 1 : i;
-    const sonde_vec3 rest = in->station[which][i].axis;
+    const sonde_vec3 rest = in->section[which][i].axis;
     sonde_vec3 axis = v_unit(v_sub(state[b].centre_m, state[a].centre_m), rest);
     double along = v_dot(axis, rest);
     sonde_vec3 aside = v_madd(axis, -along, rest);
@@ -173,10 +165,11 @@ static void update_vessel(sonde_interior *in, uint32_t which, const load *l,
 // Gradient of the field across a vessel, over points on both sides of it, as a turn and a lower
 // triangle; and how much of the bend by which the field differs from it ends at the wall. Returns
 // whether the tissue may be close to folding.
-static bool find_tissue(const sonde_interior *in, sonde_vessel_state *v) {
+static bool read_gradient(const sonde_interior *in, sonde_vessel_state *v) {
   enum { SIDES = 8 };
-  v->tissue_short = v->tissue_long = v->tissue_even = 1, v->tissue_shear = v->tissue_turn = 0;
-  if (!(v->lead > 0)) return false;
+  v->tissue_short = v->tissue_long = v->tissue_smoothing = 1,
+  v->tissue_shear = v->tissue_rotation = 0;
+  if (!(v->coupling > 0)) return false;
   SONDE_ASSERT(v->rest_radius_m > 0);
   double f[2][2], most = 0, thin = INFINITY;
   sonde_vec3 side[2] = {v->flat_axis, v_cross(v->axis, v->flat_axis)};
@@ -192,9 +185,9 @@ static bool find_tissue(const sonde_interior *in, sonde_vessel_state *v) {
   double least_short = v->half_short_m / (most_squeeze * v->rest_radius_m);
   double least_long = v->half_long_m / (most_squeeze * v->rest_radius_m);
   double size = hypot(f[0][0], f[0][1]);
-  double half = clamp(-f[0][1] / fmax(size + f[0][0], 1e-3), -most_turn, most_turn);
+  double half = clamp(-f[0][1] / fmax(size + f[0][0], 1e-3), -most_rotation, most_rotation);
   double whole = 2 / (1 + half * half), cosine = whole - 1, sine = half * whole;
-  v->tissue_turn = half;
+  v->tissue_rotation = half;
   v->tissue_short = fmax(size, fmax(least_short, least_tissue));
   v->tissue_long = fmax(f[1][0] * sine + f[1][1] * cosine, fmax(least_long, least_tissue));
   double most_sheared = most_shear * v->tissue_long;
@@ -216,17 +209,17 @@ static bool find_tissue(const sonde_interior *in, sonde_vessel_state *v) {
     most = fmax(most, hypot(v_dot(u, side[0]) - a + x, v_dot(u, side[1]) - b + y));
   }
   double bound = bend_share * fmin(thin, fmin(v->tissue_short, v->tissue_long)) * far;
-  if (most > bound) v->tissue_even = bound / most;
+  if (most > bound) v->tissue_smoothing = bound / most;
   return fmin(v->tissue_short, v->tissue_long) < gentle_squeeze || most > gentle_bend * far;
 }
 
 // Two vessels side by side leave tissue between them: towards the other a lumen takes a share of
 // the gap at rest, as the tissue's gradient stretches it, and is as much larger across; its area
 // stays.
-static void keep_clear(sonde_interior *in, uint32_t which, uint32_t i) {
+static void bound_towards_neighbours(sonde_interior *in, uint32_t which, uint32_t i) {
   sonde_vessel_state *v = &in->state[which][i], beside;
-  for (uint32_t other = 0; other < in->vessel_count && v->lead > 0; ++other) {
-    if (other == which || !sonde_vessel_at(in, other, in->station[which][i].s_m, &beside)) continue;
+  for (uint32_t other = 0; other < in->vessel_count && v->coupling > 0; ++other) {
+    if (other == which || !sonde_vessel_at(in, other, in->section[which][i].s_m, &beside)) continue;
     sonde_vec3 d = v_sub(beside.rest_centre_m, v->rest_centre_m);
     d = v_madd(d, -v_dot(d, v->axis), v->axis);
     double apart = v_norm(d), gap = apart - v->rest_radius_m - beside.rest_radius_m;
@@ -243,10 +236,10 @@ static void keep_clear(sonde_interior *in, uint32_t which, uint32_t i) {
   }
 }
 
-// What walls do to the tissue beside a station.
+// What walls do to the tissue beside a section.
 typedef struct strain {
-  double gathered; // least volume after gathering
-  double even;     // largest share of the present evening out that surely folds nothing
+  double warped; // least volume after warping
+  double smooth; // largest share of the present smoothing that surely folds nothing
 } strain;
 
 static sonde_mat3 per_step(const sonde_vec3 at[4], double step) {
@@ -254,50 +247,51 @@ static sonde_mat3 per_step(const sonde_vec3 at[4], double step) {
                  1 / step);
 }
 
-// At a place of rest beside a station, by differences over a step, to both sides of the station in
-// turn. The tissue's gradient without evening out is M, evening out adds B: no fold where e times
+// At a rest position beside a section, by differences over a step, to both sides of the section in
+// turn. The tissue's gradient without smoothing is M, smoothing adds B: no fold where e times
 // the size of B stays below the least stretch under M, which is at least M's volume over the size
 // of its cofactors.
-static void strain_at(const sonde_interior *in, const sonde_vessel_state *v, double station_s,
-                      sonde_vec3 way, int number, strain *least) {
+static void probe_strain(const sonde_interior *in, const sonde_vessel_state *v, double section_s,
+                         sonde_vec3 offset, int number, strain *least) {
   const double step = number % 2 ? probing_m : -probing_m;
-  const double s = station_s + v_dot(way, in->axis);
-  const sonde_vec3 at = v_add(v->rest_centre_m, way);
-  sonde_vec3 gathered[4], place[4], even[4];
+  const double s = section_s + v_dot(offset, in->axis);
+  const sonde_vec3 at = v_add(v->rest_centre_m, offset);
+  sonde_vec3 warped[4], moved[4], smooth[4];
   sonde_vessel_state near[SONDE_VESSELS];
   uint32_t count = sonde_vessels_near(in, at, s, near);
   for (int c = 0; c < 4; ++c) {
     sonde_vec3 side = c == 1 ? in->e1 : c == 2 ? in->e2 : in->axis;
     sonde_vec3 from = c > 0 ? v_madd(at, step, side) : at;
     if (c == 3) count = sonde_vessels_near(in, from, s + step, near);
-    sonde_carried to = sonde_vessels_carry(in, near, count, from);
-    gathered[c] = to.gathered_m, place[c] = to.place_m, even[c] = v_sub(to.even_m, to.place_m);
+    sonde_wall_steps to = sonde_vessels_trace(in, near, count, from);
+    warped[c] = to.warped_m, moved[c] = to.moved_m, smooth[c] = v_sub(to.smoothed_m, to.moved_m);
   }
-  const sonde_mat3 turn = m_transpose(m_columns(in->e1, in->e2, in->axis));
-  sonde_mat3 g = m_mul(per_step(gathered, step), turn), m = m_mul(per_step(place, step), turn);
-  sonde_mat3 bend = per_step(even, step);
+  const sonde_mat3 to_world = m_transpose(m_columns(in->e1, in->e2, in->axis));
+  sonde_mat3 g = m_mul(per_step(warped, step), to_world),
+             m = m_mul(per_step(moved, step), to_world);
+  sonde_mat3 bend = per_step(smooth, step);
   sonde_vec3 a = m_column(&g, 0), b = m_column(&g, 1), c = m_column(&g, 2);
-  least->gathered = fmin(least->gathered, v_dot(a, v_cross(b, c)));
+  least->warped = fmin(least->warped, v_dot(a, v_cross(b, c)));
   a = m_column(&m, 0), b = m_column(&m, 1), c = m_column(&m, 2);
   sonde_vec3 bc = v_cross(b, c), ca = v_cross(c, a), ab = v_cross(a, b);
   double stretch = v_dot(a, bc) / sqrt(v_norm2(bc) + v_norm2(ca) + v_norm2(ab));
   a = m_column(&bend, 0), b = m_column(&bend, 1), c = m_column(&bend, 2);
   double size = sqrt(v_norm2(a) + v_norm2(b) + v_norm2(c));
-  least->even = fmin(least->even, safe_share * fmax(0, stretch) / fmax(size, 1e-9));
+  least->smooth = fmin(least->smooth, safe_share * fmax(0, stretch) / fmax(size, 1e-9));
 }
 
-// Where walls would fold a layer that is squeezed very thin around a station, or the tissue between
+// Where walls would fold a layer that is squeezed very thin around a section, or the tissue between
 // two of them, they give way to it, and less of the bends ends at them. True when walls gave way.
-static bool yield_at(sonde_interior *in, uint32_t which, uint32_t i) {
+static bool yield_to_folding(sonde_interior *in, uint32_t which, uint32_t i) {
   const sonde_vessel_state *v = &in->state[which][i];
   const sonde_vec3 side[2] = {v->flat_axis, v_cross(v->axis, v->flat_axis)};
-  const double s = in->station[which][i].s_m;
+  const double s = in->section[which][i].s_m;
   strain least = {INFINITY, INFINITY};
   for (int k = 0; k < RING_SIDES * RINGS; ++k) {
     double a = 2 * SONDE_PI * (k % RING_SIDES) / RING_SIDES;
     double r = ring_radii[k / RING_SIDES] * v->rest_radius_m;
-    sonde_vec3 way = v_madd(v_scale(side[0], r * cos(a)), r * sin(a), side[1]);
-    strain_at(in, v, s, way, k, &least);
+    sonde_vec3 offset = v_madd(v_scale(side[0], r * cos(a)), r * sin(a), side[1]);
+    probe_strain(in, v, s, offset, k, &least);
   }
   for (uint32_t other = 0; other < in->vessel_count; ++other) {
     sonde_vessel_state beside;
@@ -309,25 +303,25 @@ static bool yield_at(sonde_interior *in, uint32_t which, uint32_t i) {
     for (int k = 0; k < GAP_WAYS * GAP_SIDES; ++k) {
       double r = (v->rest_radius_m + gap * (k % GAP_WAYS + 1) / (GAP_WAYS + 1)) / apart;
       double aside = (k / GAP_WAYS - GAP_SIDES / 2) * gap_side_radii * v->rest_radius_m;
-      strain_at(in, v, s, v_madd(v_scale(d, r), aside, across), k, &least);
+      probe_strain(in, v, s, v_madd(v_scale(d, r), aside, across), k, &least);
     }
   }
-  const bool folding = least.gathered < least_gathered;
+  const bool folding = least.warped < least_warped;
   in->strained[which][i] = folding; // to be looked at again
-  if (!folding && least.even >= 1) return false;
+  if (!folding && least.smooth >= 1) return false;
   for (uint32_t other = 0; other < in->vessel_count; ++other) {
     uint32_t at;
     double share;
-    if (!sonde_vessel_stations(in, other, s, &at, &share)) continue;
+    if (!sonde_vessel_sections(in, other, s, &at, &share)) continue;
     sonde_vessel_state *w = &in->state[other][at + (share > 0.5)];
     SONDE_ASSERT(w->rest_radius_m > 0 && w->tissue_short > 0 && w->tissue_long > 0);
-    w->tissue_even *= fmin(least.even, 1);
+    w->tissue_smoothing *= fmin(least.smooth, 1);
     if (!folding) continue;
     // The wall leads less, and a lumen that stands up against the squeeze goes half the way to
     // where the tissue's gradient takes it.
     double with_short = w->tissue_short * w->rest_radius_m;
     double with_long = w->tissue_long * w->rest_radius_m;
-    w->lead *= 0.5;
+    w->coupling *= 0.5;
     if (w->half_short_m <= with_short) continue;
     w->half_short_m += 0.5 * (with_short - w->half_short_m);
     w->half_long_m += 0.5 * (with_long - w->half_long_m);
@@ -335,33 +329,34 @@ static bool yield_at(sonde_interior *in, uint32_t which, uint32_t i) {
   return folding;
 }
 
-// Bounds a station's shares by those of its neighbour.
-static void bound_by(sonde_interior *in, uint32_t which, uint32_t i, uint32_t from) {
+// Bounds a section's shares by those of its neighbour.
+static void bound_by_neighbour(sonde_interior *in, uint32_t which, uint32_t i, uint32_t from) {
   sonde_vessel_state *v = &in->state[which][i];
   const sonde_vessel_state *w = &in->state[which][from];
-  const double most = in->station[which][i].lead, beside = in->station[which][from].lead;
-  v->tissue_even = fmin(v->tissue_even, w->tissue_even + even_step);
-  if (beside > 0) v->lead = fmin(v->lead, most * fmin(1, w->lead / beside + lead_step));
+  const double most = in->section[which][i].coupling, beside = in->section[which][from].coupling;
+  v->tissue_smoothing = fmin(v->tissue_smoothing, w->tissue_smoothing + smoothing_step);
+  if (beside > 0)
+    v->coupling = fmin(v->coupling, most * fmin(1, w->coupling / beside + coupling_step));
 }
 
 void sonde_interior_vessels(sonde_interior *in, const sonde_interior_input *input) {
   load l = measure_load(in->model, input);
-  const uint32_t *count = in->station_count;
+  const uint32_t *count = in->section_count;
   for (uint32_t which = 0; which < in->vessel_count; ++which) update_vessel(in, which, &l, input);
   for (uint32_t which = 0; which < in->vessel_count; ++which)
     for (uint32_t i = 0; i < count[which]; ++i)
-      in->strained[which][i] = find_tissue(in, &in->state[which][i]);
+      in->strained[which][i] = read_gradient(in, &in->state[which][i]);
   for (uint32_t which = 0; which < in->vessel_count; ++which)
-    for (uint32_t i = 0; i < count[which]; ++i) keep_clear(in, which, i);
+    for (uint32_t i = 0; i < count[which]; ++i) bound_towards_neighbours(in, which, i);
   bool changed = true;
   for (int pass = 0; pass < PASSES && changed; ++pass) {
     changed = false;
     for (uint32_t which = 0; which < in->vessel_count; ++which)
       for (uint32_t i = 0; i < count[which]; ++i)
-        if (in->strained[which][i] && yield_at(in, which, i)) changed = true;
+        if (in->strained[which][i] && yield_to_folding(in, which, i)) changed = true;
     for (uint32_t which = 0; which < in->vessel_count; ++which) {
-      for (uint32_t i = 1; i < count[which]; ++i) bound_by(in, which, i, i - 1);
-      for (uint32_t i = count[which]; i-- > 1;) bound_by(in, which, i - 1, i);
+      for (uint32_t i = 1; i < count[which]; ++i) bound_by_neighbour(in, which, i, i - 1);
+      for (uint32_t i = count[which]; i-- > 1;) bound_by_neighbour(in, which, i - 1, i);
     }
   }
   for (uint32_t which = 0; which < in->vessel_count; ++which)
@@ -380,7 +375,7 @@ void sonde_interior_update(sonde_interior *in, const sonde_interior_input *input
   in->solid = sonde_interior_follow(in, input);
   if (!in->solid) {
     sonde_interior_solve(in, input->positions_m);
-    sonde_bend_update(in->bend, in, input);
+    sonde_column_grid_update(in->column_grid, in, input);
   }
   sonde_interior_vessels(in, input);
   in->tick = input->tick;
@@ -392,7 +387,7 @@ void sonde_interior_update(sonde_interior *in, const sonde_interior_input *input
 const sonde_vessel_state *sonde_interior_vessel(const sonde_interior *in, int which,
                                                 uint32_t *count) {
   SONDE_ASSERT(in != NULL && which >= 0 && (uint32_t)which < in->vessel_count && count != NULL);
-  *count = in->station_count[which];
+  *count = in->section_count[which];
   return in->state[which];
 }
 
@@ -412,23 +407,23 @@ static sonde_vessel_state blend_states(const sonde_vessel_state *a, const sonde_
   v.tissue_short += t * (b->tissue_short - a->tissue_short);
   v.tissue_long += t * (b->tissue_long - a->tissue_long);
   v.tissue_shear += t * (b->tissue_shear - a->tissue_shear);
-  v.tissue_turn += t * (b->tissue_turn - a->tissue_turn);
-  v.tissue_even += t * (b->tissue_even - a->tissue_even);
-  v.lead += t * (b->lead - a->lead);
+  v.tissue_rotation += t * (b->tissue_rotation - a->tissue_rotation);
+  v.tissue_smoothing += t * (b->tissue_smoothing - a->tissue_smoothing);
+  v.coupling += t * (b->coupling - a->coupling);
   return v;
 }
 
-bool sonde_vessel_stations(const sonde_interior *in, uint32_t which, double s, uint32_t *at,
+bool sonde_vessel_sections(const sonde_interior *in, uint32_t which, double s, uint32_t *at,
                            double *share) {
   SONDE_ASSERT(which < in->vessel_count && at != NULL && share != NULL);
-  uint32_t count = in->station_count[which];
-  const sonde_station *station = in->station[which];
-  if (count < 2 || s < station[0].s_m || s > station[count - 1].s_m) return false;
-  double guess = (s - station[0].s_m) / (station[count - 1].s_m - station[0].s_m) * (count - 1);
+  uint32_t count = in->section_count[which];
+  const sonde_vessel_section *section = in->section[which];
+  if (count < 2 || s < section[0].s_m || s > section[count - 1].s_m) return false;
+  double guess = (s - section[0].s_m) / (section[count - 1].s_m - section[0].s_m) * (count - 1);
   uint32_t i = (uint32_t)fmin(floor(guess), count - 2);
-  while (i > 0 && station[i].s_m > s) --i;
-  while (i + 2 < count && station[i + 1].s_m < s) ++i;
-  double t = (s - station[i].s_m) / (station[i + 1].s_m - station[i].s_m);
+  while (i > 0 && section[i].s_m > s) --i;
+  while (i + 2 < count && section[i + 1].s_m < s) ++i;
+  double t = (s - section[i].s_m) / (section[i + 1].s_m - section[i].s_m);
   *at = i, *share = clamp(t, 0, 1);
   return true;
 }
@@ -438,7 +433,7 @@ bool sonde_vessel_at(const sonde_interior *in, uint32_t which, double s,
   SONDE_ASSERT(which < in->vessel_count);
   uint32_t i;
   double t;
-  if (!sonde_vessel_stations(in, which, s, &i, &t)) return false;
+  if (!sonde_vessel_sections(in, which, s, &i, &t)) return false;
   *state = blend_states(&in->state[which][i], &in->state[which][i + 1], t);
   return true;
 }
@@ -448,7 +443,7 @@ bool sonde_vessel_reaches(const sonde_interior *in, uint32_t which, double s, so
   SONDE_ASSERT(which < in->vessel_count && beyond_m >= 0);
   uint32_t i;
   double t;
-  if (!sonde_vessel_stations(in, which, s, &i, &t)) return false;
+  if (!sonde_vessel_sections(in, which, s, &i, &t)) return false;
   const sonde_vessel_state *a = &in->state[which][i], *b = a + 1;
   sonde_vec3 d = v_sub(rest, v_lerp(a->rest_centre_m, b->rest_centre_m, t));
   double slant = fabs(v_dot(d, a->axis)); // lies along the vessel, not beside it
@@ -457,7 +452,7 @@ bool sonde_vessel_reaches(const sonde_interior *in, uint32_t which, double s, so
 }
 
 // Turns a point by an angle of which `half` is the tangent of the half.
-static void turn_point(double half, double *x, double *y) {
+static void rotate_point(double half, double *x, double *y) {
   double whole = 2 / (1 + half * half), cosine = whole - 1, sine = half * whole, x0 = *x;
   *x = cosine * x0 - sine * *y;
   *y = sine * x0 + cosine * *y;
@@ -468,7 +463,7 @@ static void turn_point(double half, double *x, double *y) {
 // the lumen lost; loss, c, turn and shear fade out. Both half axes grow with the circle, and a turn
 // or shear that depends on it alone keeps areas: no two points meet. A lumen that is pressed flat
 // keeps a line of that thickness.
-void sonde_vessel_gather(const sonde_vessel_state *v, double *short_m, double *long_m) {
+void sonde_vessel_warp(const sonde_vessel_state *v, double *short_m, double *long_m) {
   SONDE_ASSERT(v->rest_radius_m > 0 && v->half_short_m > 0);
   double rest = v->rest_radius_m, x = *short_m, y = *long_m, r = sqrt(x * x + y * y);
   double t = clamp((r / rest - 1) / sonde_wall_reach, 0, 1), fade = (1 - t) * (1 - t) * (1 + 2 * t);
@@ -479,18 +474,18 @@ void sonde_vessel_gather(const sonde_vessel_state *v, double *short_m, double *l
   } else {
     double c = 0.5 * (half_long - half_short) * fade;
     double mean = sqrt(r * r - (rest * rest - half_short * half_long) * fade + c * c);
-    turn_point(v->tissue_turn * (1 - fade), &x, &y);
+    rotate_point(v->tissue_rotation * (1 - fade), &x, &y);
     x *= (mean - c) / r, y *= (mean + c) / r;
   }
   y -= fade * v->tissue_shear / v->tissue_long * x;
-  turn_point(-v->tissue_turn, &x, &y);
+  rotate_point(-v->tissue_rotation, &x, &y);
   *short_m = x, *long_m = y;
 }
 
 void sonde_vessel_tissue(const sonde_vessel_state *v, double *short_m, double *long_m) {
   SONDE_ASSERT(v != NULL && short_m != NULL && long_m != NULL);
   double a = *short_m, b = *long_m;
-  turn_point(v->tissue_turn, &a, &b);
+  rotate_point(v->tissue_rotation, &a, &b);
   *short_m = v->tissue_short * a;
   *long_m = v->tissue_long * b + v->tissue_shear * a;
 }
@@ -502,7 +497,7 @@ bool sonde_interior_vessel_at_plane(const sonde_interior *in, int which, sonde_p
   const sonde_vessel_state *v = in->state[which];
   double nearest = plane_reach_m;
   bool found = false;
-  for (uint32_t i = 0; i + 1 < in->station_count[which]; ++i) {
+  for (uint32_t i = 0; i + 1 < in->section_count[which]; ++i) {
     sonde_vec3 a = pose_apply_inverse(probe, v[i].centre_m);
     sonde_vec3 b = pose_apply_inverse(probe, v[i + 1].centre_m);
     if ((a.y > 0) == (b.y > 0)) continue;

@@ -1,9 +1,5 @@
-// Placing the solid of a leg.
-//
-// sonde_window_create  memory, topology, order
-// sonde_window_begin   corners and materials of a place
-// sonde_window_steps   how many of them
-// sonde_window_step    a share of the factorisation, then the skin's compliance
+// Placing the solid of a leg: elements and their order once, corners, materials and a share of the
+// factorisation per call for each footprint.
 #include "interior/window.h"
 
 #include "base/base.h"
@@ -12,8 +8,9 @@
 
 enum { NT = SONDE_WINDOW_THETA, NS = SONDE_WINDOW_S, NL = SONDE_WINDOW_LEVELS };
 
-// Shear moduli of the layers (docs/interior.md); only their ratio moves the inside. Muscle and skin
-// as at rest, fat (1.1 kPa at rest, Ogden exponent 8) as at 16 % compression: it is squeezed most.
+// Shear moduli of the layers (docs/interior_theory.md); only their ratio moves the inside. Muscle
+// and skin as at rest, fat (1.1 kPa at rest, Ogden exponent 8) as at 16 % compression: it is
+// squeezed most.
 static const double skin_pa = 40e3;
 static const double bulk_over_shear = 100;
 
@@ -85,17 +82,17 @@ void sonde_window_destroy(sonde_window *w) {
   sonde_free(w);
 }
 
-// ---- a place ------------------------------------------------------------------------------
+// ---- a footprint --------------------------------------------------------------------------
 
-void sonde_window_begin(sonde_window *w, const sonde_interior *in, sonde_window_place place) {
-  SONDE_ASSERT(w != NULL && in != NULL && isfinite(place.theta) && isfinite(place.s));
+void sonde_window_begin(sonde_window *w, const sonde_interior *in, sonde_footprint footprint) {
+  SONDE_ASSERT(w != NULL && in != NULL && isfinite(footprint.theta) && isfinite(footprint.s));
   sonde_column_point at;
   w->ready = w->loaded = false;
   w->moved.count = w->pressed.count = 0;
   memset(w->felt, 0, w->solid.hex_count * sizeof *w->felt);
-  sonde_grid_begin(&w->grid, in, place);
+  sonde_grid_begin(&w->grid, in, footprint);
   memcpy(w->solid.node, w->grid.node, sizeof w->grid.node);
-  sonde_interior_column(in, place.theta, place.s, &at);
+  sonde_interior_column(in, footprint.theta, footprint.s, &at);
   for (uint32_t h = 0; h < w->solid.hex_count; ++h) {
     uint32_t l = h % (NL - 1);
     double shear = l < SONDE_WINDOW_FAT ? sonde_fat_pa : sonde_muscle_pa;

@@ -15,7 +15,7 @@
 
 #include "interior/grid.h"
 #include "interior/solid.h"
-#include "interior/unfold.h"
+#include "interior/fold_repair.h"
 
 enum {
   SONDE_WINDOW_NEAR = SONDE_WINDOW_NEAR_T * SONDE_WINDOW_NEAR_S,
@@ -26,7 +26,7 @@ enum { SONDE_WINDOW_BUDGET = 4000000 }; // multiplications per update of a runni
 
 // One touched point of the skin.
 typedef struct sonde_touched {
-  uint32_t near[4]; // places among the near skin nodes
+  uint32_t near[4]; // numbers among the near skin nodes
   double weight[4];
   double move[3]; // leg frame
 } sonde_touched;
@@ -52,7 +52,7 @@ typedef struct sonde_window {
   double stress_scale;    // contact force over the reaction to the unit motion
   sonde_mat3 *stress;     // [hexes] under a unit motion, where felt
   bool *felt;             // [hexes] those around the vessels
-  sonde_unfold unfold;
+  sonde_fold_repair repair;
   bool loaded;
   uint32_t iterations;
 } sonde_window;
@@ -61,8 +61,8 @@ typedef struct sonde_window {
 sonde_status sonde_window_create(sonde_window **window, sonde_error *error);
 void sonde_window_destroy(sonde_window *window);
 
-// Corners and materials for a place; the numbers follow by steps. No allocation.
-void sonde_window_begin(sonde_window *window, const sonde_interior *in, sonde_window_place place);
+// Corners and materials for a footprint; the numbers follow by steps. No allocation.
+void sonde_window_begin(sonde_window *window, const sonde_interior *in, sonde_footprint footprint);
 // True when done (window->ready) or failed.
 bool sonde_window_step(sonde_window *window, uint64_t budget);
 

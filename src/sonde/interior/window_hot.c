@@ -1,11 +1,6 @@
-// The solid of a leg at every update.
-//
-// touch, read_contact   points of the skin that carry contact force
-// solve_forces          conjugate gradients on the forces
-// respond               the response to the touched points' motion
-// sonde_window_field    trilinear in angle, row and level
-// sonde_window_stress, list_elements  nodal means within a tissue, interpolated
-// sonde_window_update   touched points, forces, recovery
+// The solid of a leg at every update: touched points of the skin, the forces under which they move
+// as prescribed (conjugate gradients on the skin's compliance), all other nodes by one backward
+// pass, stress as nodal means within a tissue.
 #include "base/base.h"
 #include "interior/window.h"
 
@@ -24,7 +19,8 @@ static const double tolerance = 2e-3; // of the prescribed motion
 
 // ---- contact ------------------------------------------------------------------------------
 
-static void touch(sonde_window *w, const sonde_interior *in, sonde_vec3 rest, sonde_vec3 move) {
+static void add_touched(sonde_window *w, const sonde_interior *in, sonde_vec3 rest,
+                        sonde_vec3 move) {
   sonde_vec3 d = v_sub(rest, in->origin);
   const uint32_t first = SONDE_WINDOW_NEAR_FIRST;
   sonde_grid_cell c;
@@ -44,18 +40,18 @@ static void touch(sonde_window *w, const sonde_interior *in, sonde_vec3 rest, so
 
 typedef struct contact {
   uint32_t count, active; // touched points; near nodes they use
-  uint32_t *node, *place; // [active] those, [NEAR] where in that list
+  uint32_t *node, *slot;  // [active] those, [NEAR] where in that list
   double *force;          // [3*active]
   double *moved;          // [3*active]
   double *compliance;     // [3*active][3*active] of those nodes; row k: what a force on k moves
   double give;
 } contact;
 
-static void gather(const sonde_window *w, const double *f, const contact *c) {
+static void sum_forces(const sonde_window *w, const double *f, const contact *c) {
   memset(c->force, 0, 3 * c->active * sizeof *c->force);
   for (uint32_t p = 0; p < c->count; ++p)
     for (int k = 0; k < 4; ++k) {
-      double *at = c->force + 3 * c->place[w->touched[p].near[k]];
+      double *at = c->force + 3 * c->slot[w->touched[p].near[k]];
       for (int axis = 0; axis < 3; ++axis)
         at[axis] += w->touched[p].weight[k] * f[3 * p + (uint32_t)axis];
     }
@@ -91,7 +87,7 @@ static void solve_forces(sonde_window *w, const contact *c, double *f, double *r
   for (w->iterations = 0; w->iterations < MOST_ITERATIONS; ++w->iterations) {
     if (old <= tolerance * tolerance * reference) break;
     // Displacements q under forces p: moved = compliance * force, two nodes at a time.
-    gather(w, p, c);
+    sum_forces(w, p, c);
     memset(c->moved, 0, active * sizeof *c->moved);
     uint32_t k = 0;
     for (; k + 6 <= active; k += 6)
@@ -101,7 +97,7 @@ static void solve_forces(sonde_window *w, const contact *c, double *f, double *r
     for (uint32_t i = 0; i < n; ++i) {
       const sonde_touched *t = &w->touched[i / 3];
       double sum = c->give * p[i];
-      for (int m = 0; m < 4; ++m) sum += t->weight[m] * c->moved[3 * c->place[t->near[m]] + i % 3];
+      for (int m = 0; m < 4; ++m) sum += t->weight[m] * c->moved[3 * c->slot[t->near[m]] + i % 3];
       q[i] = sum;
     }
     double step = old / dot(p, q, n);
@@ -140,7 +136,7 @@ static double read_contact(sonde_window *w, const sonde_interior *in,
     r->low_y = fmin(r->low_y, q.y), r->high_y = fmax(r->high_y, q.y);
     if (!under_face(input, input->positions_m[v])) continue;
     sonde_vec3 move = v_sub(input->positions_m[v], skin->vertices[v]);
-    touch(w, in, skin->vertices[v], v_scale(beam, v_dot(move, beam)));
+    add_touched(w, in, skin->vertices[v], v_scale(beam, v_dot(move, beam)));
   }
   // A mesh coarser than the elements would leave the skin free between its vertices: the columns of
   // the table whose whole triangle is touched count as points of contact too.
@@ -157,7 +153,7 @@ static double read_contact(sonde_window *w, const sonde_interior *in,
       now = v_madd(now, c->weight[n], input->positions_m[c->node[n]]);
     }
     if (!all || !under_face(input, now)) continue;
-    touch(w, in, c->rest_m, v_scale(beam, v_dot(v_sub(now, c->rest_m), beam)));
+    add_touched(w, in, c->rest_m, v_scale(beam, v_dot(v_sub(now, c->rest_m), beam)));
   }
   double x = input->face_half_x_m, y = input->face_half_y_m;
   r->low_x = fmax(r->low_x, -x), r->high_x = fmin(r->high_x, x);
@@ -166,7 +162,8 @@ static double read_contact(sonde_window *w, const sonde_interior *in,
 }
 
 // Displacements of the near nodes for the touched points' `move`; false when they stay as they are.
-static bool respond(sonde_window *w, contact *c, const double along[3], sonde_answer *answer) {
+static bool solve_response(sonde_window *w, contact *c, const double along[3],
+                           sonde_answer *answer) {
   c->count = w->touched_count;
   if (answer->count == c->count && memcmp(answer->along, along, sizeof answer->along) == 0 &&
       memcmp(answer->touched, w->touched, c->count * sizeof *w->touched) == 0)
@@ -183,7 +180,7 @@ static bool respond(sonde_window *w, contact *c, const double along[3], sonde_an
     for (int k = 0; k < 4; ++k) seen[w->touched[p].near[k]] = true;
   for (uint32_t n = 0; n < SONDE_WINDOW_NEAR; ++n) {
     if (!seen[n]) continue;
-    c->place[n] = c->active;
+    c->slot[n] = c->active;
     c->node[c->active++] = n;
     for (size_t k = 3 * (size_t)n; k < 3 * (size_t)n + 3; ++k) sum += w->compliance[k * SIDE + k];
   }
@@ -196,7 +193,7 @@ static bool respond(sonde_window *w, contact *c, const double along[3], sonde_an
   }
   double *f = w->scratch + 2 * SIDE, moved[SIDE] = {0};
   solve_forces(w, c, f, f + 3 * c->count);
-  gather(w, f, c);
+  sum_forces(w, f, c);
   // Displacements of all near nodes under the forces.
   for (uint32_t k = 0; k < 3 * c->active; ++k) {
     const double *restrict row = w->compliance + (size_t)(3 * c->node[k / 3] + k % 3) * SIDE;
@@ -265,22 +262,22 @@ bool sonde_window_stress(const sonde_window *w, double theta, double s, double r
 // ---- update -------------------------------------------------------------------------------
 
 // The linear solid's displacements, kept from folding.
-static void keep_apart(sonde_window *w) {
+static void repair_folds(sonde_window *w) {
   sonde_solid *s = &w->solid;
   for (uint32_t n = 0; n < SONDE_WINDOW_NODES; ++n)
-    w->unfold.now[n] = v_add(w->grid.node[n], sonde_solid_moved(s, n));
-  memset(w->unfold.held, 0, sizeof w->unfold.held);
+    w->repair.now[n] = v_add(w->grid.node[n], sonde_solid_moved(s, n));
+  memset(w->repair.held, 0, sizeof w->repair.held);
   for (uint32_t p = 0; p < w->moved.count; ++p)
     for (int k = 0; k < 4; ++k) {
       const sonde_touched *t = &w->moved.touched[p];
       uint32_t row = t->near[k] / SONDE_WINDOW_NEAR_T + SONDE_WINDOW_NEAR_FIRST;
       if (t->weight[k] > held_share)
-        w->unfold.held[row * NT + t->near[k] % SONDE_WINDOW_NEAR_T] = true;
+        w->repair.held[row * NT + t->near[k] % SONDE_WINDOW_NEAR_T] = true;
     }
-  if (!sonde_unfold_nodes(&w->unfold, &w->grid)) return;
+  if (!sonde_fold_repair_nodes(&w->repair, &w->grid)) return;
   for (uint32_t n = 0; n < SONDE_WINDOW_NODES; ++n) {
     if (s->unknown[n] == SONDE_FRONT_NONE) continue;
-    sonde_vec3 u = v_sub(w->unfold.now[n], w->grid.node[n]);
+    sonde_vec3 u = v_sub(w->repair.now[n], w->grid.node[n]);
     float *x = s->x + 3 * (size_t)s->unknown[n];
     x[0] = (float)u.x, x[1] = (float)u.y, x[2] = (float)u.z;
   }
@@ -289,10 +286,10 @@ static void keep_apart(sonde_window *w) {
 bool sonde_window_update(sonde_window *w, const sonde_interior *in,
                          const sonde_interior_input *input) {
   SONDE_ASSERT(w != NULL && w->ready && input != NULL);
-  uint32_t nodes[SONDE_WINDOW_NEAR], places[SONDE_WINDOW_NEAR], count = 0;
+  uint32_t nodes[SONDE_WINDOW_NEAR], slots[SONDE_WINDOW_NEAR], count = 0;
   sonde_vec3 beam = q_rotate(input->world_from_probe.rotation, vec3(0, 0, 1));
   double along[3] = {v_dot(beam, in->e1), v_dot(beam, in->e2), v_dot(beam, in->axis)};
-  contact c = {.node = nodes, .place = places, .force = w->scratch};
+  contact c = {.node = nodes, .slot = slots, .force = w->scratch};
   c.moved = w->scratch + SIDE;
   c.compliance = w->compliance + (size_t)SIDE * SIDE; // free once it is inverted
   patch r;
@@ -300,7 +297,7 @@ bool sonde_window_update(sonde_window *w, const sonde_interior *in,
   w->loaded = w->touched_count > 0;
   if (!w->loaded) return false;
   float *fresh[2];
-  const bool moved = respond(w, &c, along, &w->moved);
+  const bool moved = solve_response(w, &c, along, &w->moved);
   if (moved) fresh[count++] = w->moved.x;
   // Stress per newton: even samples of the patch on the rest skin all move by one length.
   w->touched_count = 0;
@@ -310,20 +307,20 @@ bool sonde_window_update(sonde_window *w, const sonde_interior *in,
     sonde_surface_point hit;
     sonde_vec3 from = pose_apply(input->world_from_probe, vec3(x, y, -sample_start_m));
     if (sonde_surface_raycast(in->skin, from, beam, 2 * sample_start_m, &hit))
-      touch(w, in, hit.point_m, beam);
+      add_touched(w, in, hit.point_m, beam);
   }
-  const bool pressed = respond(w, &c, along, &w->pressed);
+  const bool pressed = solve_response(w, &c, along, &w->pressed);
   if (pressed && w->pressed.count > 0) fresh[count++] = w->pressed.x;
   sonde_fronts_recover(w->solid.fronts, fresh, count); // all other nodes
-  if (moved) keep_apart(w);
-  // Stations of a vessel are closer than elements: each of these is evaluated once per update.
+  if (moved) repair_folds(w);
+  // Sections of a vessel are closer than elements: each of these is evaluated once per update.
   if (pressed) memset(w->felt, 0, w->solid.hex_count * sizeof *w->felt);
   for (uint32_t which = 0; which < in->vessel_count && pressed; ++which)
-    for (uint32_t n = 0; n < in->station_count[which]; ++n) {
+    for (uint32_t n = 0; n < in->section_count[which]; ++n) {
       uint32_t element[27];
       double share[27];
       sonde_column_point at;
-      (void)sonde_interior_locate(in, in->station[which][n].rest_m, &at);
+      (void)sonde_interior_locate(in, in->section[which][n].rest_m, &at);
       if (!list_elements(w, at.theta, at.s, at.r, element, share)) continue;
       for (uint32_t k = 0; k < 27; ++k) {
         if (w->felt[element[k]]) continue;

@@ -92,7 +92,7 @@ uint32_t sonde_model_central_site(const sonde_model *model) {
 }
 
 // Depth of the vein's centre below the skin: 18 mm at the central site, shallower towards the groin
-// (3 mm per 100 mm), deeper towards the knee (8 mm per 100 mm): docs/interior.md.
+// (3 mm per 100 mm), deeper towards the knee (8 mm per 100 mm).
 static double vein_depth(double along) {
   return along < 0 ? fmax(VEIN_DEPTH_M + 0.03 * along, 0.012)
                    : fmin(VEIN_DEPTH_M + 0.08 * along, 0.035);

@@ -1,9 +1,6 @@
-// Tissue around the vessels: what the solid knows nothing of.
-//
-// sonde_vessels_gather, sonde_vessels_even  before and behind the field
-// sonde_vessels_displace       both with the field between them
-// sonde_interior_displacement  field and vessels; zero outside and in bone
-// sonde_interior_rest_point    inverse: exact in a lumen, iterated elsewhere
+// Displacement of the tissue around the vessels: a rest point is warped to where the walls near it
+// leave room, moved by the field, and the field's bends are smoothed at the walls
+// (docs/interior_theory.md). The inverse is exact in a lumen and iterated elsewhere.
 #include "base/base.h"
 #include "interior/interior.h"
 
@@ -13,10 +10,10 @@ static const double least_volume = 1e-3;                // of the derivative
 static const double good_enough_m = 1e-6;               // of an inverse
 
 // What one wall asks of a point.
-typedef struct pulled {
+typedef struct wall_pull {
   double weight; // 1 on the wall, 0 beyond its reach
-  sonde_vec3 way;
-} pulled;
+  sonde_vec3 displacement;
+} wall_pull;
 
 // Offset from a vessel's centre at rest, in its cross-section; false beyond the reach of its wall.
 static bool within_reach(const sonde_vessel_state *v, sonde_vec3 rest, sonde_vec3 across, double *a,
@@ -24,22 +21,22 @@ static bool within_reach(const sonde_vessel_state *v, sonde_vec3 rest, sonde_vec
   sonde_vec3 d = v_sub(rest, v->rest_centre_m);
   *a = v_dot(d, v->flat_axis), *b = v_dot(d, across);
   double t = fmax((sqrt(*a * *a + *b * *b) / v->rest_radius_m - 1) / sonde_wall_reach, 0);
-  *weight = v->lead * (1 - t) * (1 - t) * (1 + 2 * t);
-  return t < 1 && v->lead > 0;
+  *weight = v->coupling * (1 - t) * (1 - t) * (1 + 2 * t);
+  return t < 1 && v->coupling > 0;
 }
 
 // Share of a wall: 1 on it, 0 on another, o beyond its reach, with o the product of 1 - w of the
 // others.
-static double share_of(const pulled *p, uint32_t count, uint32_t k) {
+static double share_of(const wall_pull *p, uint32_t count, uint32_t k) {
   double others = 1;
   for (uint32_t j = 0; j < count; ++j)
     if (j != k) others *= 1 - p[j].weight;
   return others / fmax(others + (1 - p[k].weight) * (1 - others), least_share);
 }
 
-sonde_vec3 sonde_vessels_gather(const sonde_vessel_state *near, uint32_t count, sonde_vec3 rest) {
+sonde_vec3 sonde_vessels_warp(const sonde_vessel_state *near, uint32_t count, sonde_vec3 rest) {
   SONDE_ASSERT(count <= SONDE_VESSELS && (count == 0 || near != NULL));
-  pulled p[SONDE_VESSELS];
+  wall_pull p[SONDE_VESSELS];
   uint32_t kept = 0;
   for (uint32_t k = 0; k < count; ++k) {
     const sonde_vessel_state *v = &near[k];
@@ -47,34 +44,36 @@ sonde_vec3 sonde_vessels_gather(const sonde_vessel_state *near, uint32_t count, 
     double a, b;
     if (!within_reach(v, rest, across, &a, &b, &p[kept].weight)) continue;
     double x = a, y = b;
-    sonde_vessel_gather(v, &x, &y);
-    p[kept++].way = v_madd(v_scale(v->flat_axis, v->lead * (x - a)), v->lead * (y - b), across);
+    sonde_vessel_warp(v, &x, &y);
+    p[kept++].displacement =
+        v_madd(v_scale(v->flat_axis, v->coupling * (x - a)), v->coupling * (y - b), across);
   }
   sonde_vec3 at = rest;
-  for (uint32_t k = 0; k < kept; ++k) at = v_madd(at, share_of(p, kept, k), p[k].way);
+  for (uint32_t k = 0; k < kept; ++k) at = v_madd(at, share_of(p, kept, k), p[k].displacement);
   return at;
 }
 
 // The motion along a vessel stays the field's.
-sonde_vec3 sonde_vessels_even(const sonde_vessel_state *near, uint32_t count, sonde_vec3 rest,
-                              sonde_vec3 gathered, sonde_vec3 place) {
+sonde_vec3 sonde_vessels_smooth(const sonde_vessel_state *near, uint32_t count, sonde_vec3 rest,
+                                sonde_vec3 warped, sonde_vec3 moved) {
   SONDE_ASSERT(count <= SONDE_VESSELS && (count == 0 || near != NULL));
-  pulled p[SONDE_VESSELS];
+  wall_pull p[SONDE_VESSELS];
   uint32_t kept = 0;
   for (uint32_t k = 0; k < count; ++k) {
     const sonde_vessel_state *v = &near[k];
     sonde_vec3 across = v_cross(v->axis, v->flat_axis);
     double a, b;
     if (!within_reach(v, rest, across, &a, &b, &p[kept].weight)) continue;
-    sonde_vec3 d = v_sub(gathered, v->rest_centre_m), bend = v_sub(v->centre_m, place);
+    sonde_vec3 d = v_sub(warped, v->rest_centre_m), bend = v_sub(v->centre_m, moved);
     a = v_dot(d, v->flat_axis), b = v_dot(d, across);
     sonde_vessel_tissue(v, &a, &b);
     bend = v_madd(v_madd(bend, a, v->flat_axis), b, across);
     bend = v_madd(bend, -v_dot(bend, v->axis), v->axis);
-    p[kept++].way = v_scale(bend, v->tissue_even);
+    p[kept++].displacement = v_scale(bend, v->tissue_smoothing);
   }
-  sonde_vec3 at = place;
-  for (uint32_t k = 0; k < kept; ++k) at = v_madd(at, p[k].weight * share_of(p, kept, k), p[k].way);
+  sonde_vec3 at = moved;
+  for (uint32_t k = 0; k < kept; ++k)
+    at = v_madd(at, p[k].weight * share_of(p, kept, k), p[k].displacement);
   return at;
 }
 
@@ -87,18 +86,18 @@ uint32_t sonde_vessels_near(const sonde_interior *in, sonde_vec3 rest, double s,
   return count;
 }
 
-sonde_carried sonde_vessels_carry(const sonde_interior *in, const sonde_vessel_state *near,
-                                  uint32_t count, sonde_vec3 rest) {
-  sonde_carried c = {.gathered_m = sonde_vessels_gather(near, count, rest)};
-  c.place_m = v_add(c.gathered_m, sonde_interior_field(in, c.gathered_m));
-  c.even_m = sonde_vessels_even(near, count, rest, c.gathered_m, c.place_m);
+sonde_wall_steps sonde_vessels_trace(const sonde_interior *in, const sonde_vessel_state *near,
+                                     uint32_t count, sonde_vec3 rest) {
+  sonde_wall_steps c = {.warped_m = sonde_vessels_warp(near, count, rest)};
+  c.moved_m = v_add(c.warped_m, sonde_interior_field(in, c.warped_m));
+  c.smoothed_m = sonde_vessels_smooth(near, count, rest, c.warped_m, c.moved_m);
   return c;
 }
 
 sonde_vec3 sonde_vessels_displace(const sonde_interior *in, sonde_vec3 rest, double s) {
   sonde_vessel_state near[SONDE_VESSELS];
   uint32_t count = sonde_vessels_near(in, rest, s, near);
-  return v_sub(sonde_vessels_carry(in, near, count, rest).even_m, rest);
+  return v_sub(sonde_vessels_trace(in, near, count, rest).smoothed_m, rest);
 }
 
 sonde_vec3 sonde_interior_displacement(const sonde_interior *in, sonde_vec3 rest) {
@@ -161,7 +160,7 @@ sonde_vec3 sonde_interior_rest_point(const sonde_interior *in, sonde_vec3 point)
   // In a lumen the map across is known both ways; along the vessel the field moves the point.
   for (uint32_t which = 0; which < in->vessel_count; ++which) {
     sonde_vessel_state v;
-    if (!sonde_vessel_at(in, which, at.s, &v) || v.lead < 1 || v.tissue_even < 1) continue;
+    if (!sonde_vessel_at(in, which, at.s, &v) || v.coupling < 1 || v.tissue_smoothing < 1) continue;
     sonde_vec3 d = v_sub(point, v.centre_m), across = v_cross(v.axis, v.flat_axis);
     double a = v_dot(d, v.flat_axis) / v.half_short_m, b = v_dot(d, across) / v.half_long_m;
     if (a * a + b * b > 1) continue;
@@ -174,7 +173,7 @@ sonde_vec3 sonde_interior_rest_point(const sonde_interior *in, sonde_vec3 point)
   }
   double left = invert(in, point, &rest);
   // The map has one inverse, but Newton's way to it may be barred by a layer that is squeezed thin:
-  // other starts are places along the column that the tissue may have come from.
+  // other starts are positions along the column that the tissue may have come from.
   enum { STARTS = 12 };
   (void)sonde_interior_locate(in, point, &at);
   sonde_vec3 out = v_add(v_scale(in->e1, cos(at.theta)), v_scale(in->e2, sin(at.theta)));

@@ -1,9 +1,5 @@
-// Stations of the vessels: the model's centre lines cut into equal pieces.
-//
-// sonde_stations_create  femoral vessels and branches
-// sonde_interior_set_vein_depth  moves the femoral ones
-// resample               points at equal arc length, ascending along the femur's axis
-// lay_out                the femoral vessels, with the fascia above them
+// Sections of the vessels: the model's centre lines in equal pieces, ascending along the femur's
+// axis.
 #include "base/base.h"
 #include "interior/interior.h"
 
@@ -18,30 +14,30 @@ static double piece_of(const sonde_vessel *line, uint32_t i) {
   return v_distance(line->point[i].centre_m, line->point[i - 1].centre_m);
 }
 
-// A branch may leave its parent across the leg: stations that do not advance along it are left out.
+// A branch may leave its parent across the leg: sections that do not advance along it are left out.
 static sonde_status resample(sonde_interior *in, uint32_t which, const sonde_vessel *line,
                              sonde_error *error) {
-  in->station_count[which] = 0;
+  in->section_count[which] = 0;
   if (line->count < 2) return SONDE_OK; // a leg without this vessel
   SONDE_ASSERT(line->count <= SONDE_VESSEL_POINTS);
   double length = 0;
   for (uint32_t i = 1; i < line->count; ++i) length += piece_of(line, i);
   uint32_t count = (uint32_t)fmax(2, ceil(length / spacing_m) + 1), kept = 0;
-  if (count > SONDE_STATIONS) count = SONDE_STATIONS;
+  if (count > SONDE_SECTIONS) count = SONDE_SECTIONS;
   sonde_vec3 along = v_sub(line->point[line->count - 1].centre_m, line->point[0].centre_m);
   const bool backward = v_dot(along, in->axis) < 0;
-  sonde_station *station = in->station[which];
+  sonde_vessel_section *section = in->section[which];
   for (uint32_t i = 0; i < count; ++i) {
     double arc = length * (backward ? count - 1 - i : i) / (count - 1);
     uint32_t end = 1;
     for (; arc > piece_of(line, end) && end + 1 < line->count; ++end) arc -= piece_of(line, end);
     const sonde_vessel_point *a = &line->point[end - 1], *b = &line->point[end];
     double piece = piece_of(line, end), t = piece > 0 ? clamp(arc / piece, 0, 1) : 0;
-    sonde_station one = {.rest_m = v_lerp(a->centre_m, b->centre_m, t),
-                         .radius_m = a->radius_m + t * (b->radius_m - a->radius_m),
-                         .depth_m = a->depth_m + t * (b->depth_m - a->depth_m),
-                         .hold = 1,
-                         .lead = 1};
+    sonde_vessel_section one = {.rest_m = v_lerp(a->centre_m, b->centre_m, t),
+                                .radius_m = a->radius_m + t * (b->radius_m - a->radius_m),
+                                .depth_m = a->depth_m + t * (b->depth_m - a->depth_m),
+                                .hold = 1,
+                                .coupling = 1};
     if (!(one.radius_m > 0) || !v_finite(one.rest_m))
       return sonde_fail(error, SONDE_ARGUMENT, "vessel %u has a point without radius", which);
     sonde_column_point at;
@@ -49,31 +45,31 @@ static sonde_status resample(sonde_interior *in, uint32_t which, const sonde_ves
     one.s_m = at.s;
     one.tissue_m = at.radius_m - in->bone_radius_m;
     if (!(one.depth_m > 0)) one.depth_m = at.depth_m;
-    double advance = kept > 0 ? one.s_m - station[kept - 1].s_m : INFINITY;
+    double advance = kept > 0 ? one.s_m - section[kept - 1].s_m : INFINITY;
     if (which < 2 && !(advance > 0))
       return sonde_fail(error, SONDE_ARGUMENT, "vessel %u turns back along the leg", which);
-    station[kept] = one;
+    section[kept] = one;
     if (which < 2 || advance > least_advance_m) ++kept;
   }
   for (uint32_t i = 0; i < kept; ++i) {
     uint32_t a = i > 0 ? i - 1 : 0, b = i + 1 < kept ? i + 1 : i;
-    station[i].axis = v_unit(v_sub(station[b].rest_m, station[a].rest_m), in->axis);
+    section[i].axis = v_unit(v_sub(section[b].rest_m, section[a].rest_m), in->axis);
   }
-  in->station_count[which] = kept < 2 ? 0 : kept;
+  in->section_count[which] = kept < 2 ? 0 : kept;
   return SONDE_OK;
 }
 
 static void rest_state(sonde_interior *in, uint32_t which) {
-  for (uint32_t i = 0; i < in->station_count[which]; ++i) {
-    const sonde_station *station = &in->station[which][i];
-    double r = station->radius_m;
+  for (uint32_t i = 0; i < in->section_count[which]; ++i) {
+    const sonde_vessel_section *section = &in->section[which][i];
+    double r = section->radius_m;
     sonde_column_point at;
-    (void)sonde_interior_locate(in, station->rest_m, &at);
+    (void)sonde_interior_locate(in, section->rest_m, &at);
     sonde_vec3 out = v_add(v_scale(in->e1, cos(at.theta)), v_scale(in->e2, sin(at.theta)));
-    out = v_madd(out, -v_dot(out, station->axis), station->axis);
-    in->state[which][i] = (sonde_vessel_state){.rest_centre_m = station->rest_m,
-                                               .centre_m = station->rest_m,
-                                               .axis = station->axis,
+    out = v_madd(out, -v_dot(out, section->axis), section->axis);
+    in->state[which][i] = (sonde_vessel_state){.rest_centre_m = section->rest_m,
+                                               .centre_m = section->rest_m,
+                                               .axis = section->axis,
                                                .flat_axis = v_unit(out, in->e1),
                                                .rest_radius_m = r,
                                                .area_ratio = 1,
@@ -81,7 +77,7 @@ static void rest_state(sonde_interior *in, uint32_t which) {
                                                .half_long_m = r,
                                                .tissue_short = 1,
                                                .tissue_long = 1,
-                                               .tissue_even = 1};
+                                               .tissue_smoothing = 1};
   }
 }
 
@@ -112,7 +108,7 @@ static sonde_status lay_out(sonde_interior *in, const sonde_vessel *vein,
   return SONDE_OK;
 }
 
-sonde_status sonde_stations_create(sonde_interior *in, sonde_error *error) {
+sonde_status sonde_sections_create(sonde_interior *in, sonde_error *error) {
   const sonde_thigh_anatomy *anatomy = in->model->anatomy;
   sonde_status status = lay_out(in, &in->model->vein, &in->model->artery, error);
   for (uint32_t b = 0; anatomy != NULL && b < anatomy->branch_count && !status; ++b) {
@@ -121,21 +117,22 @@ sonde_status sonde_stations_create(sonde_interior *in, sonde_error *error) {
     in->kind[which] = anatomy->branch[b].kind;
     status = resample(in, which, &anatomy->branch[b].line, error);
     rest_state(in, which);
-    for (uint32_t i = 0; i < in->station_count[which]; ++i) {
-      sonde_station *station = &in->station[which][i];
+    for (uint32_t i = 0; i < in->section_count[which]; ++i) {
+      sonde_vessel_section *section = &in->section[which][i];
       sonde_column_point at;
-      (void)sonde_interior_locate(in, station->rest_m, &at);
+      (void)sonde_interior_locate(in, section->rest_m, &at);
       // A vein in the fat gives way sooner than one in muscle.
-      if (at.depth_m < at.muscle_m) station->hold = sonde_fat_pa / sonde_muscle_pa;
-      // Where a branch opens into another vessel two walls would lead the same tissue: there that
+      if (at.depth_m < at.muscle_m) section->hold = sonde_fat_pa / sonde_muscle_pa;
+      // Where a branch opens into another vessel two walls would move the same tissue: there that
       // of the branch does not, and beyond it leads the more the farther the two walls are apart.
       for (uint32_t other = 0; other < which; ++other) {
         sonde_vessel_state v;
-        if (!sonde_vessel_at(in, other, station->s_m, &v)) continue;
-        sonde_vec3 d = v_sub(station->rest_m, v.rest_centre_m);
+        if (!sonde_vessel_at(in, other, section->s_m, &v)) continue;
+        sonde_vec3 d = v_sub(section->rest_m, v.rest_centre_m);
         d = v_madd(d, -v_dot(d, v.axis), v.axis);
-        double gap = v_norm(d) - v.rest_radius_m - station->radius_m;
-        station->lead = fmin(station->lead, clamp(gap / (full_gap * station->radius_m), 0, 1));
+        double gap = v_norm(d) - v.rest_radius_m - section->radius_m;
+        section->coupling =
+            fmin(section->coupling, clamp(gap / (full_gap * section->radius_m), 0, 1));
       }
     }
   }

@@ -9,7 +9,7 @@
 // Elements: where a Bernstein coefficient of an element's volume is a small share of the volume at
 // rest, the element's nodes move along its derivative until it is not (projected Gauss-Seidel);
 // bone and the skin under the face are held.
-#include "interior/unfold.h"
+#include "interior/fold_repair.h"
 
 #include "base/base.h"
 
@@ -24,8 +24,8 @@ static const double least_volume = 0.06, aim = 0.10; // of a volume at rest
 static const double fast = 1.3;                      // relaxation of the first sweeps
 static const double most_change = 0.2;               // of an edge at rest
 // Least Bernstein coefficient of the columns' field below which the grid takes part, and from which
-// it leads alone.
-static const double calm_from = 0.35, calm_to = 0.15;
+// it is the field alone.
+static const double grid_from = 0.35, grid_alone = 0.15;
 static const double quiet_m = 1e-3; // displacement that folds nothing
 
 // ---- columns ------------------------------------------------------------------------------
@@ -42,7 +42,7 @@ static double stretch_of(double strain, double *slope) {
 
 // Heights of a column's layers after stiffening. Under the linear field times `more` the layers
 // that are shortened give the column the height it has under the field itself, or the least one.
-static bool stretch_column(sonde_vec3 *now, const sonde_vec3 *rest) {
+static bool stiffen_column(sonde_vec3 *now, const sonde_vec3 *rest) {
   double height[NL], strain[NL], most = 0, goal = 0, tall = 0, at = 0, slope;
   double r = hypot(rest[0].x, rest[0].y), cosine = rest[0].x / r, sine = rest[0].y / r;
   for (int l = 0; l + 1 < NL; ++l) {
@@ -105,13 +105,14 @@ static double share_in(const sonde_grid_edges *e, coefficient q, double scale) {
   return sum * scale;
 }
 
-static bool is_free(const sonde_unfold *u, uint32_t node) {
+static bool is_free(const sonde_fold_repair *u, uint32_t node) {
   uint32_t level = node % NL;
   return level + 1 < NL && (level > 0 || !u->held[node / NL]);
 }
 
 // Moves an element's nodes along the derivative of this coefficient until it is `aim`.
-static void widen(sonde_unfold *u, const element *of, uint32_t which, double relaxation) {
+static void raise_coefficient(sonde_fold_repair *u, const element *of, uint32_t which,
+                              double relaxation) {
   const coefficient q = coefficient_of(which);
   const double scale = of->scale[which];
   sonde_grid_edges e;
@@ -137,7 +138,7 @@ static void widen(sonde_unfold *u, const element *of, uint32_t which, double rel
 
 // Reads an element and counts its coefficients below `bound`; *least receives the least so far. An
 // element whose edges are nearly what they are at rest can't be small: it is not read.
-static uint32_t count_below(const sonde_unfold *u, const sonde_grid *grid, uint32_t hex,
+static uint32_t count_below(const sonde_fold_repair *u, const sonde_grid *grid, uint32_t hex,
                             double bound, element *of, double *least) {
   sonde_grid_edges e, rest;
   sonde_grid_nodes(hex, of->node);
@@ -161,16 +162,16 @@ static uint32_t count_below(const sonde_unfold *u, const sonde_grid *grid, uint3
 }
 
 // An element and those around it are looked at in the next sweeps.
-static void wake(sonde_unfold *u, uint32_t hex) {
+static void mark_pending(sonde_fold_repair *u, uint32_t hex) {
   SONDE_ASSERT(hex < SONDE_GRID_HEXES);
   int l = (int)(hex % (NL - 1)), i = (int)(hex / (NL - 1) % NT), j = (int)(hex / (NL - 1) / NT);
   for (int b = j > 0 ? j - 1 : 0; b <= j + 1 && b < NS - 1; ++b)
     for (int a = i + NT - 1; a <= i + NT + 1; ++a)
       for (int c = l > 0 ? l - 1 : 0; c <= l + 1 && c < NL - 1; ++c)
-        u->awake[(b * NT + a % NT) * (NL - 1) + c] = 3;
+        u->pending[(b * NT + a % NT) * (NL - 1) + c] = 3;
 }
 
-bool sonde_unfold_nodes(sonde_unfold *u, const sonde_grid *grid) {
+bool sonde_fold_repair_nodes(sonde_fold_repair *u, const sonde_grid *grid) {
   SONDE_ASSERT(u != NULL && grid != NULL);
   bool moved = false, quiet = true, folded = false;
   element of;
@@ -179,19 +180,19 @@ bool sonde_unfold_nodes(sonde_unfold *u, const sonde_grid *grid) {
     quiet = v_distance(u->now[n], grid->node[n]) < quiet_m;
   if (quiet) return false;
   for (uint32_t c = 0; c < NS * NT; ++c)
-    if (stretch_column(u->now + c * NL, grid->node + c * NL)) moved = true;
-  memset(u->awake, 0, sizeof u->awake);
+    if (stiffen_column(u->now + c * NL, grid->node + c * NL)) moved = true;
+  memset(u->pending, 0, sizeof u->pending);
   for (uint32_t h = 0; h < SONDE_GRID_HEXES; ++h)
-    if (count_below(u, grid, h, least_volume, &of, &least) > 0) wake(u, h), folded = true;
+    if (count_below(u, grid, h, least_volume, &of, &least) > 0) mark_pending(u, h), folded = true;
   if (!folded) return moved;
   for (uint32_t sweep = 0, small = 1; sweep < SWEEPS && small > 0; ++sweep) {
     small = 0;
     for (uint32_t h = 0; h < SONDE_GRID_HEXES; ++h) {
-      if (u->awake[h] == 0) continue;
-      --u->awake[h], least = INFINITY;
+      if (u->pending[h] == 0) continue;
+      --u->pending[h], least = INFINITY;
       if (count_below(u, grid, h, aim, &of, &least) == 0) continue;
-      for (uint32_t k = 0; k < 27; ++k) widen(u, &of, k, sweep < FAST ? fast : 1);
-      wake(u, h), small += least < 0.5 * (least_volume + aim);
+      for (uint32_t k = 0; k < 27; ++k) raise_coefficient(u, &of, k, sweep < FAST ? fast : 1);
+      mark_pending(u, h), small += least < 0.5 * (least_volume + aim);
     }
   }
   return true;
@@ -199,33 +200,35 @@ bool sonde_unfold_nodes(sonde_unfold *u, const sonde_grid *grid) {
 
 // ---- the columns' field -------------------------------------------------------------------
 
-void sonde_bend_update(sonde_bend *b, const sonde_interior *in, const sonde_interior_input *input) {
+void sonde_column_grid_update(sonde_column_grid *b, const sonde_interior *in,
+                              const sonde_interior_input *input) {
   SONDE_ASSERT(b != NULL && in != NULL && input != NULL);
   const sonde_mat3 world_from_leg = m_columns(in->e1, in->e2, in->axis);
   const sonde_mat3 leg_from_world = m_transpose(world_from_leg);
-  sonde_window_place place;
+  sonde_footprint footprint;
   bool within;
   b->strength = 0;
-  if (!sonde_grid_place(in, input, &place, &within)) return;
-  sonde_grid_begin(&b->grid, in, place);
+  if (!sonde_grid_footprint(in, input, &footprint, &within)) return;
+  sonde_grid_begin(&b->grid, in, footprint);
   for (uint32_t n = 0; n < SONDE_WINDOW_NODES; ++n) {
     sonde_vec3 rest = v_add(in->origin, m_mul_v(world_from_leg, b->grid.node[n]));
     sonde_vec3 u = m_mul_v(leg_from_world, sonde_interior_column_field(in, rest));
-    b->unfold.now[n] = v_add(b->grid.node[n], u);
+    b->repair.now[n] = v_add(b->grid.node[n], u);
   }
-  memset(b->unfold.held, 1, sizeof b->unfold.held);
+  memset(b->repair.held, 1, sizeof b->repair.held);
   element of;
   double least = INFINITY; // where the field is far from folding it stays as it is
   for (uint32_t h = 0; h < SONDE_GRID_HEXES; ++h)
-    (void)count_below(&b->unfold, &b->grid, h, 0, &of, &least);
-  b->strength = clamp((calm_from - least) / (calm_from - calm_to), 0, 1);
+    (void)count_below(&b->repair, &b->grid, h, 0, &of, &least);
+  b->strength = clamp((grid_from - least) / (grid_from - grid_alone), 0, 1);
   if (!(b->strength > 0)) return;
-  (void)sonde_unfold_nodes(&b->unfold, &b->grid);
+  (void)sonde_fold_repair_nodes(&b->repair, &b->grid);
   for (uint32_t n = 0; n < SONDE_WINDOW_NODES; ++n)
-    b->move[n] = m_mul_v(world_from_leg, v_sub(b->unfold.now[n], b->grid.node[n]));
+    b->move[n] = m_mul_v(world_from_leg, v_sub(b->repair.now[n], b->grid.node[n]));
 }
 
-double sonde_bend_at(const sonde_bend *b, double theta, double s, double r, sonde_vec3 *move) {
+double sonde_column_grid_at(const sonde_column_grid *b, double theta, double s, double r,
+                            sonde_vec3 *move) {
   SONDE_ASSERT(b != NULL && move != NULL);
   sonde_grid_cell c;
   *move = vec3(0, 0, 0);
