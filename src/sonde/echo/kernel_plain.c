@@ -1,7 +1,5 @@
 // The inner loops without vectors and with the library's functions: what the others are tested
 // against. The tissue's row comes from the base set.
-//
-// splat, gather, even, stream, lateral, axial (sample by sample), merge, widen, mix, fade, convert
 #include "base/base.h"
 #include "echo/kernel.h"
 #include "interior/clot.h"
@@ -13,42 +11,39 @@ static double form_at(const float form[4], double x, double y, double z) {
   return (double)form[0] + (double)form[1] * x + (double)form[2] * y + (double)form[3] * z;
 }
 
-static bool in_lumen(const splat_lumen *l, double x, double y, double z) {
-  double a = form_at(l->along, x, y, z), b = form_at(l->across, x, y, z), chord = (double)l->chord;
-  if (chord < 1) chord += sonde_clot_surface(l->vessel, form_at(l->way, x, y, z), b);
-  return a * a + b * b < 1 && a >= -chord;
-}
-
-static void lay_point(const splat_job *job, const double at[3], double sign) {
-  double height = 1 - at[1] * at[1];
-  double nearest = floor(at[2] + 0.5);
-  if (!(height > 0 && at[0] >= 0 && at[0] < (double)job->right &&
-        nearest >= (double)job->rows.first && nearest < (double)job->rows.last))
-    return;
-  double weight = sign * height, l = floor(at[0]);
-  double turn = 6.283185307179586 * at[2] * (double)job->turns, b = at[2] - nearest;
-  const double deep[3] = {0.5 * (0.5 - b) * (0.5 - b), 0.75 - b * b, 0.5 * (0.5 + b) * (0.5 + b)};
-  for (size_t corner = 0; corner < 6; ++corner) {
-    double a = corner & 1 ? at[0] - l : 1 - (at[0] - l), size = a * deep[corner / 2] * weight;
-    size_t row = ((size_t)nearest & job->mask) + corner / 2;
-    float *g = job->grid + row * job->stride + 2 * ((size_t)l + (corner & 1));
-    g[0] += (float)(size * cos(turn)), g[1] -= (float)(size * sin(turn));
-  }
-}
-
 static void splat(const splat_job *job) {
   for (const splat_map *map = job->map; map < job->map + job->maps; ++map)
     for (uint32_t i = map->from; i < map->from + map->count; ++i) {
       double x = (double)job->x[i], y = (double)job->y[i], z = (double)job->z[i], at[3];
-      double size = (double)job->sign[i] * (double)map->m[0][3], shown = 1;
-      for (uint32_t k = 0; k < map->lumens; ++k) {
-        const splat_lumen *l = &job->lumen[map->lumen + k];
-        if (in_lumen(l, x, y, z)) shown = (double)l->amplitude;
-      }
       for (int c = 0; c < 3; ++c)
         at[c] = (double)map->m[0][c] + (double)map->m[1][c] * x + (double)map->m[2][c] * y +
                 (double)map->m[3][c] * z;
-      lay_point(job, at, size * shown);
+      // Within the slab and the grid.
+      const double height = 1 - at[1] * at[1], nearest = floor(at[2] + 0.5), line = floor(at[0]);
+      if (!(height > 0 && at[0] >= 0 && at[0] < (double)job->right &&
+            nearest >= (double)job->rows.first && nearest < (double)job->rows.last))
+        continue;
+      // Lumina show less of the tissue's scatterers.
+      double shown = 1;
+      for (uint32_t k = map->lumen; k < map->lumen + map->lumens; ++k) {
+        const splat_lumen *l = &job->lumen[k];
+        double a = form_at(l->along, x, y, z), b = form_at(l->across, x, y, z);
+        double chord = (double)l->chord;
+        if (chord < 1) chord += sonde_clot_surface(l->vessel, form_at(l->way, x, y, z), b);
+        if (a * a + b * b < 1 && a >= -chord) shown = (double)l->amplitude;
+      }
+      const double weight = (double)job->sign[i] * (double)map->m[0][3] * shown * height;
+      // Two columns, three rows.
+      const double turn = 6.283185307179586 * at[2] * (double)job->turns, b = at[2] - nearest;
+      const double deep[3] = {0.5 * (0.5 - b) * (0.5 - b), 0.75 - b * b,
+                              0.5 * (0.5 + b) * (0.5 + b)};
+      for (size_t corner = 0; corner < 6; ++corner) {
+        double a = corner & 1 ? at[0] - line : 1 - (at[0] - line);
+        double size = a * deep[corner / 2] * weight;
+        size_t row = ((size_t)nearest & job->mask) + corner / 2;
+        float *g = job->grid + row * job->stride + 2 * ((size_t)line + (corner & 1));
+        g[0] += (float)(size * cos(turn)), g[1] -= (float)(size * sin(turn));
+      }
     }
 }
 
@@ -57,28 +52,27 @@ static sonde_vec3 vector_of(const float (*wall)[WALL_ROOM], int field, uint32_t 
               (double)wall[field + 2][group]);
 }
 
-static sonde_vessel_state vessel_of(const float (*wall)[WALL_ROOM], uint32_t group) {
-  sonde_vessel_state v = {.rest_centre_m = vector_of(wall, WALL_REST, group),
-                          .axis = vector_of(wall, WALL_AXIS, group),
-                          .flat_axis = vector_of(wall, WALL_FLAT, group),
-                          .rest_radius_m = (double)wall[WALL_RADIUS][group],
-                          .coupling = (double)wall[WALL_LEAD][group],
-                          .half_short_m = (double)wall[WALL_SHORT][group],
-                          .half_long_m = (double)wall[WALL_LONG][group],
-                          .tissue_rotation = (double)wall[WALL_TURN][group],
-                          .tissue_short = (double)wall[WALL_TISSUE_SHORT][group],
-                          .tissue_shear = (double)wall[WALL_SHEAR][group],
-                          .tissue_long = (double)wall[WALL_TISSUE_LONG][group],
-                          .tissue_smoothing = (double)wall[WALL_EVEN][group]};
-  v.centre_m = v_add(v.rest_centre_m, vector_of(wall, WALL_SHIFT, group));
-  return v;
-}
-
 static uint32_t vessels_near(const wall_job *job, uint32_t group,
                              sonde_vessel_state near[MOST_VESSELS]) {
   uint32_t count = 0;
-  for (uint32_t k = 0; k < job->walls; ++k)
-    if (job->wall[k][WALL_LEAD][group] > 0) near[count++] = vessel_of(job->wall[k], group);
+  for (uint32_t k = 0; k < job->walls; ++k) {
+    const float(*wall)[WALL_ROOM] = job->wall[k];
+    if (!(wall[WALL_LEAD][group] > 0)) continue;
+    sonde_vessel_state *v = &near[count++];
+    *v = (sonde_vessel_state){.rest_centre_m = vector_of(wall, WALL_REST, group),
+                              .axis = vector_of(wall, WALL_AXIS, group),
+                              .flat_axis = vector_of(wall, WALL_FLAT, group),
+                              .rest_radius_m = (double)wall[WALL_RADIUS][group],
+                              .coupling = (double)wall[WALL_LEAD][group],
+                              .half_short_m = (double)wall[WALL_SHORT][group],
+                              .half_long_m = (double)wall[WALL_LONG][group],
+                              .tissue_rotation = (double)wall[WALL_TURN][group],
+                              .tissue_short = (double)wall[WALL_TISSUE_SHORT][group],
+                              .tissue_shear = (double)wall[WALL_SHEAR][group],
+                              .tissue_long = (double)wall[WALL_TISSUE_LONG][group],
+                              .tissue_smoothing = (double)wall[WALL_EVEN][group]};
+    v->centre_m = v_add(v->rest_centre_m, vector_of(wall, WALL_SHIFT, group));
+  }
   return count;
 }
 
@@ -138,28 +132,25 @@ static void lateral(const lateral_job *job) {
     }
 }
 
-static void axial_sample(const axial_job *job, int sample) {
-  for (uint32_t l = 0; l < job->lines; ++l) {
-    const float *noise = job->noise[sample] + l;
-    double re = (double)(job->noise_size * noise[0]);
-    double im = (double)(job->noise_size * noise[job->lines]);
-    for (int t = 0; t < job->count; ++t)
-      for (uint32_t k = 0; k < SONDE_RANK; ++k) {
-        const float *row = job->rows[t + sample] + 2 * k * job->lines + l;
-        re += (double)job->tap[t][k] * (double)row[0];
-        im += (double)job->tap[t][k] * (double)row[job->lines];
-      }
-    double size = (double)job->compensation[sample] * sqrt(re * re + im * im);
-    double db = 20 * log10(fmax(size, 1e-20));
-    double grey = (db + (double)job->offset_db) * (double)job->grey_per_db;
-    job->envelope[sample][l] = (float)size;
-    job->grey[sample][l] = (float)fmin(fmax(grey, 0), 255);
-  }
-}
-
 static void axial(const axial_job *job) {
   SONDE_ASSERT(job->samples > 0 && job->samples <= AXIAL_MOST);
-  for (int sample = 0; sample < job->samples; ++sample) axial_sample(job, sample);
+  for (int sample = 0; sample < job->samples; ++sample)
+    for (uint32_t l = 0; l < job->lines; ++l) {
+      const float *noise = job->noise[sample] + l;
+      double re = (double)(job->noise_size * noise[0]);
+      double im = (double)(job->noise_size * noise[job->lines]);
+      for (int t = 0; t < job->count; ++t)
+        for (uint32_t k = 0; k < SONDE_RANK; ++k) {
+          const float *row = job->rows[t + sample] + 2 * k * job->lines + l;
+          re += (double)job->tap[t][k] * (double)row[0];
+          im += (double)job->tap[t][k] * (double)row[job->lines];
+        }
+      double size = (double)job->compensation[sample] * sqrt(re * re + im * im);
+      double db = 20 * log10(fmax(size, 1e-20));
+      double grey = (db + (double)job->offset_db) * (double)job->grey_per_db;
+      job->envelope[sample][l] = (float)size;
+      job->grey[sample][l] = (float)fmin(fmax(grey, 0), 255);
+    }
 }
 
 static void tissue(const tissue_job *job) { sonde_echo_kernels_base.tissue(job); }
@@ -200,17 +191,6 @@ static void fade(const fade_job *job) {
   }
 }
 
-// Grey value between four samples.
-static double between(const convert_job *job, double line, double sample) {
-  if (!(line >= 0 && line < job->lines - 1.0 && sample >= 0 && sample < job->samples - 1.0))
-    return 0;
-  size_t l = (size_t)line, n = (size_t)sample;
-  const float *p = job->grey + n * job->stride + l, *q = p + job->stride;
-  double a = line - (double)l, b = sample - (double)n;
-  return (1 - b) * ((1 - a) * (double)p[0] + a * (double)p[1]) +
-         b * ((1 - a) * (double)q[0] + a * (double)q[1]) + 0.5;
-}
-
 static void convert(const convert_job *job) {
   SONDE_ASSERT(job->lines_per_m > 0);
   for (uint32_t c = 0; c < job->width; ++c) {
@@ -219,8 +199,17 @@ static void convert(const convert_job *job) {
       double x = v, from = z + (double)job->radius_m;
       v = (double)job->radius_m * atan2(x, from), z = hypot(x, from) - (double)job->radius_m;
     }
-    double line = v * (double)job->lines_per_m + (double)job->first_line;
-    job->out[c] = (uint8_t)between(job, line, z * (double)job->samples_per_m);
+    const double line = v * (double)job->lines_per_m + (double)job->first_line;
+    const double sample = z * (double)job->samples_per_m;
+    job->out[c] = 0;
+    if (!(line >= 0 && line < job->lines - 1.0 && sample >= 0 && sample < job->samples - 1.0))
+      continue;
+    // Grey value between four samples.
+    const size_t l = (size_t)line, n = (size_t)sample;
+    const float *p = job->grey + n * job->stride + l, *q = p + job->stride;
+    const double a = line - (double)l, b = sample - (double)n;
+    job->out[c] = (uint8_t)((1 - b) * ((1 - a) * (double)p[0] + a * (double)p[1]) +
+                            b * ((1 - a) * (double)q[0] + a * (double)q[1]) + 0.5);
   }
 }
 

@@ -1,12 +1,5 @@
-// Textures in tissue coordinates: angle around the leg, way along it, depth below the skin.
+// Textures in tissue coordinates: angle around the leg, length along it, depth below the skin.
 // Included by kernel_tissue.h only.
-//
-// turn                    cosine and sine of shares of a turn
-// cell_value, find_corners, texture  value noise
-// sheet                   bright layers at whole values
-// septa, bundles, fascia  fat and muscle
-// clefts                  fluid between the lobules of the fat
-// webs                    bands in an old clot
 #ifndef SONDE_SRC_ECHO_KERNEL_TEXTURE_H
 #define SONDE_SRC_ECHO_KERNEL_TEXTURE_H
 

@@ -1,16 +1,9 @@
 // Tissue along one row of the march: labels, backscatter, attenuation, signed distances to the
-// interfaces, textures in tissue coordinates. Included by kernel.c only.
-//
-// wall_distance        signed distance to a vessel's inner wall
-// lesion_distance, lesion  node, cyst, haematoma
-// clot_surface, clot_grain  a clot's free surface and unevenness
-// vessels            walls, lumina, clots
-// layers             skin, fat, muscle
-// periosteum         the cortex's roughness
-// paint              one vector of lines
+// interfaces, textures. Included by kernel.c only.
 #ifndef SONDE_SRC_ECHO_KERNEL_TISSUE_H
 #define SONDE_SRC_ECHO_KERNEL_TISSUE_H
 
+#include "base/base.h"
 #include "echo/kernel.h"
 #include "echo/kernel_texture.h"
 #include "interior/clot.h"

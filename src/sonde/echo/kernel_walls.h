@@ -1,15 +1,11 @@
-// Where the vessels' walls take the tissue around them: sonde_vessels_warp and
-// sonde_vessels_smooth for many points in single precision. Included by kernel.c only.
-//
-// find_reach      offset from a vessel, and how firmly it leads
-// gathered_by     where one vessel gathers the points
-// share_of        of a wall beside others
-// gather_tissue, even_tissue  all of them
-#ifndef SONDE_SRC_ECHO_KERNEL_WALL_H
-#define SONDE_SRC_ECHO_KERNEL_WALL_H
+// Where the vessels' walls take the tissue around them: sonde_vessels_warp and sonde_vessels_smooth
+// for many points in single precision. Included by kernel.c only.
+#ifndef SONDE_SRC_ECHO_KERNEL_WALLS_H
+#define SONDE_SRC_ECHO_KERNEL_WALLS_H
 
-#include "echo/kernel.h"
+#include "base/base.h"
 #include "base/vector_records.h"
+#include "echo/kernel.h"
 #include "interior/interior.h"
 
 typedef struct floats3 {

@@ -2,8 +2,8 @@
 //
 // The exact response at one depth is a matrix, lines by samples. Along depth every row of it is a
 // sum of delayed pulses; three real kernels span these well for all depths at once. They are the
-// leading singular vectors of all bands' rows together, found by subspace iteration from the pulse
-// and its derivatives. What is left per band are the three complex lateral kernels.
+// leading singular vectors of all depths' rows together, found by subspace iteration from the pulse
+// and its derivatives. Three complex lateral kernels per depth belong to them.
 #include "echo/psf.h"
 
 #include "base/base.h"
@@ -209,22 +209,20 @@ void sonde_psf_begin(beam_psf *psf, const beam_key *key) {
   memset(psf->gram, 0, sizeof psf->gram);
 }
 
-// Depths lie at even steps up to a knee before the focus, below which the response changes most,
-// and from there on at steps that grow with the power 3/2 of the depth.
-static double depth_of(const beam_key *key, int b) {
-  double knee = fmax(0.7 * key->focus_m, 0.125 * key->depth_m);
-  double first = first_depth_m / knee, last = key->depth_m / knee;
-  if (last > 1) last = 3 - 2 / sqrt(last);
-  double u = first + (last - first) * b / (SONDE_PSF_DEPTHS - 1);
-  return knee * (u < 1 ? u : 4 / ((3 - u) * (3 - u)));
-}
-
 // The exact response at one depth: of unit energy, and sharpened.
 static void tabulate(beam_psf *psf, int b) {
   SONDE_ASSERT(b >= 0 && b < SONDE_PSF_DEPTHS);
   const beam_key *key = &psf->key;
   const sonde_array array = sonde_beam_array(key);
-  const double z = depth_of(key, b), k = 2 * SONDE_PI * key->frequency_hz / sonde_sound_m_s;
+  // Depths lie at even steps up to a knee before the focus, below which the response changes most,
+  // and from there on at steps that grow with the power 3/2 of the depth.
+  double knee = fmax(0.7 * key->focus_m, 0.125 * key->depth_m);
+  double first = first_depth_m / knee, last = key->depth_m / knee;
+  if (last > 1) last = 3 - 2 / sqrt(last);
+  double u = first + (last - first) * b / (SONDE_PSF_DEPTHS - 1);
+  const double z = knee * (u < 1 ? u : 4 / ((3 - u) * (3 - u)));
+  // What the lines see there, without the carrier's phase, which the splat brings.
+  const double k = 2 * SONDE_PI * key->frequency_hz / sonde_sound_m_s;
   const int rows = 2 * psf->half_rows + 1;
   psf->depth_m[b] = z, psf->elevation_m[b] = sonde_array_elevation_half(&array, z);
   for (int l = 0; l <= psf->half_lines; ++l) {
@@ -237,7 +235,7 @@ static void tabulate(beam_psf *psf, int b) {
     double *out = psf->table[b][l], c = cos(2 * k * z), s = sin(2 * k * z);
     sonde_array_line(&array, x, depth, z - psf->half_rows * key->step_m, key->step_m,
                      (uint32_t)rows, out);
-    for (int n = 0; n < rows; ++n) { // the splat brings the carrier's phase
+    for (int n = 0; n < rows; ++n) {
       double re = out[2 * n], im = out[2 * n + 1];
       out[2 * n] = re * c - im * s, out[2 * n + 1] = re * s + im * c;
     }

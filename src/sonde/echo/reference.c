@@ -1,12 +1,4 @@
 // The exact echo of a point: all paths from transmitting to receiving elements.
-//
-// element         place and direction of an element, share of an aperture's edge
-// aim             amplitude and path of the way between an element and a point
-// sonde_array_echo   the double sum
-// turn               cos and sin
-// wave_at, add_pulse transmitted wave at the scatterer, tabulated
-// receive            sum over the receiving elements
-// fresnel            elevation amplitude of the lens-focused aperture
 #include "base/base.h"
 #include "base/maths.h"
 #include "echo/echo.h"

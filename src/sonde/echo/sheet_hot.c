@@ -6,10 +6,6 @@
 // without gaps, and where an interface ends it fades within a line. By Kirchhoff's approximation a
 // column holds as much at every slope: the sheet's area grows as its inclination to the beam takes
 // away. So the lateral kernels alone decide what returns.
-//
-// sonde_sheet_begin, sonde_sheet_add  the interfaces of a frame
-// sonde_sheet_lay    one row of them
-// slope_share, add_point  what the columns can hold of a slope; one column
 #include "base/base.h"
 #include "echo/echo.h"
 

@@ -1,13 +1,4 @@
 // The fast image measured against the exact one.
-//
-// fill_block           random scatterers
-// window_of            lines and samples that count
-// correlate            Pearson's coefficient over a window
-// sonde_echo_likeness
-// profile, half_width  envelope of a point against its place
-// sonde_echo_point_widths
-// moved_back           intensity between samples
-// sonde_echo_flicker
 #include "base/base.h"
 #include "base/random.h"
 #include "echo/echo.h"
