@@ -14,11 +14,6 @@ enum { MOST_PIECES = 12 };
 // cube's inscribed ball reaches: half the diagonal of its cells.
 static const double sampling_m = 1.1e-3;
 
-static int32_t floor_of(double x) {
-  int32_t i = (int32_t)x;
-  return i - (x < i);
-}
-
 void sonde_cubes_begin(sonde_echo *echo) {
   sonde_cubes *s = echo->cubes;
   const uint32_t nodes = echo->plane_rows * SONDE_PLANE_COLUMNS;
@@ -36,7 +31,7 @@ void sonde_cubes_begin(sonde_echo *echo) {
   // Box of whole cubes around it, none of them visited.
   double cubes = 1;
   for (int c = 0; c < 3; ++c) {
-    echo->box_first[c] = floor_of(low[c] / h);
+    echo->box_first[c] = (int32_t)floor(low[c] / h);
     double size = floor(high[c] / h) - echo->box_first[c] + 1, room = SONDE_BOX_CUBES;
     echo->box_size[c] = (uint32_t)clamp(size, 1, floor(room / cubes));
     if (size > echo->box_size[c]) ++echo->lost;

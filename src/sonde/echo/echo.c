@@ -104,21 +104,6 @@ static size_t carve(sonde_echo *echo, char *block) {
   return carve_pool(&echo->blood, block, used, SONDE_BLOOD);
 }
 
-static bool allocate(sonde_echo *echo) {
-  echo->block = SONDE_NEW(char, carve(echo, NULL) + 63);
-  if (echo->block) carve(echo, sonde_whole_lines(echo->block));
-  echo->psf = SONDE_NEW(beam_psf, 1);
-  echo->spare = SONDE_NEW(beam_psf, 1);
-  echo->node = SONDE_NEW(plane_node, SONDE_PLANE_NODES);
-  echo->plane = SONDE_NEW(float, SONDE_PLANE_NODES *MOST_FIELDS + 2 * ECHO_ALIGN);
-  echo->air = SONDE_NEW(uint8_t, echo->padded);
-  echo->sheet = SONDE_NEW(sheet_point, SONDE_SHEET_POINTS);
-  echo->first_sheet = SONDE_NEW(int32_t, echo->samples + 2 * SONDE_MOST_TAPS);
-  echo->seen = SONDE_NEW(uint64_t, SONDE_BOX_CUBES / 64);
-  return echo->block && echo->psf && echo->spare && echo->node && echo->plane && echo->air &&
-         echo->sheet && echo->first_sheet && echo->seen;
-}
-
 // Each set of kernels has its own order.
 static void forget_textures(sonde_echo *echo) {
   memset(echo->knots, 0xff, sizeof *echo->knots * echo->padded * TEXTURES * KNOT_FLOATS);
@@ -156,7 +141,18 @@ sonde_status sonde_echo_create(const sonde_interior *interior, const sonde_echo_
   double per_cell = made->density_m3 * cell_size_m * cell_size_m * cell_size_m;
   made->per_cell = (uint32_t)clamp(STEP * floor(per_cell / STEP + 0.5), 2 * STEP, MOST_PER_CELL);
   made->per_piece = (made->per_cell / 8 + ECHO_ALIGN - 1) / ECHO_ALIGN * ECHO_ALIGN;
-  if (!allocate(made)) {
+  made->block = SONDE_NEW(char, carve(made, NULL) + 63);
+  if (made->block) carve(made, sonde_whole_lines(made->block));
+  made->psf = SONDE_NEW(beam_psf, 1);
+  made->spare = SONDE_NEW(beam_psf, 1);
+  made->node = SONDE_NEW(plane_node, SONDE_PLANE_NODES);
+  made->plane = SONDE_NEW(float, SONDE_PLANE_NODES *MOST_FIELDS + 2 * ECHO_ALIGN);
+  made->air = SONDE_NEW(uint8_t, made->padded);
+  made->sheet = SONDE_NEW(sheet_point, SONDE_SHEET_POINTS);
+  made->first_sheet = SONDE_NEW(int32_t, made->samples + 2 * SONDE_MOST_TAPS);
+  made->seen = SONDE_NEW(uint64_t, SONDE_BOX_CUBES / 64);
+  if (!made->block || !made->psf || !made->spare || !made->node || !made->plane || !made->air ||
+      !made->sheet || !made->first_sheet || !made->seen) {
     sonde_echo_destroy(made);
     return sonde_fail_memory(error);
   }

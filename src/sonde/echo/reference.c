@@ -100,19 +100,8 @@ static void turn(double angle, double *c, double *s) {
   *c = sign * p, *s = sign * x * q;
 }
 
-static void add_pulse(wave *w, double sigma, double at, double re, double im) {
-  int low = (int)ceil((at - 5 * sigma - w->first) / w->step);
-  int high = (int)floor((at + 5 * sigma - w->first) / w->step);
-  low = low < 0 ? 0 : low, high = high < w->count ? high : w->count - 1;
-  // Gaussian on equal steps by two multiplications per value.
-  double q = w->step / sigma, x = (w->first + low * w->step - at) / sigma;
-  double g = exp(-0.5 * x * x), ratio = exp(-x * q - 0.5 * q * q), shrink = exp(-q * q);
-  for (int n = low; n <= high; ++n) {
-    w->value[n][0] += g * re, w->value[n][1] += g * im;
-    g *= ratio, ratio *= shrink;
-  }
-}
-
+// The transmitted wave's table: Gaussian pulses of all transmitting elements, each on equal steps
+// by two multiplications per value.
 static void wave_at(const sonde_array *a, double x, double z, wave *w) {
   double sigma = pulse_sigma(a), k = 2 * SONDE_PI / wavelength(a);
   double send = reach(a, a->focus_m / a->transmit_f), path[MOST], size[MOST];
@@ -129,29 +118,19 @@ static void wave_at(const sonde_array *a, double x, double z, wave *w) {
   w->step = fmax(sigma / PER_SIGMA, (high - low + 10 * sigma) / (TABLE - 2));
   w->count = (int)((high - low + 10 * sigma) / w->step) + 2;
   for (int n = 0; n < w->count; ++n) w->value[n][0] = w->value[n][1] = 0;
-  for (int i = 0; i <= 2 * half; ++i)
-    add_pulse(w, sigma, path[i], size[i] * cos(2 * k * path[i]), -size[i] * sin(2 * k * path[i]));
-}
-
-static void receive(const sonde_array *a, const wave *w, double depth, const double *length,
-                    const double *back, int most, double echo[2]) {
-  double take = reach(a, depth / a->receive_f), k = 2 * SONDE_PI / wavelength(a), total = 0;
-  int half = (int)(take + 0.5);
-  SONDE_ASSERT(half <= most);
-  echo[0] = echo[1] = 0;
-  for (int j = -half; j <= half; ++j) {
-    double part = share(take, j), home = length[j + most] - delay(a, j, depth);
-    total += part;
-    double at = (depth - 0.5 * home - w->first) / w->step;
-    if (!(at >= 0 && at < w->count - 1)) continue;
-    int n = (int)at;
-    double b = at - n, re = w->value[n][0] + b * (w->value[n + 1][0] - w->value[n][0]);
-    double im = w->value[n][1] + b * (w->value[n + 1][1] - w->value[n][1]);
-    double c, s, size = part * back[j + most];
-    turn(k * home, &c, &s);
-    echo[0] += size * (re * c + im * s), echo[1] += size * (im * c - re * s);
+  const double q = w->step / sigma, shrink = exp(-q * q);
+  for (int i = 0; i <= 2 * half; ++i) {
+    const double at = path[i], re = size[i] * cos(2 * k * at), im = -size[i] * sin(2 * k * at);
+    int first = (int)ceil((at - 5 * sigma - w->first) / w->step);
+    int last = (int)floor((at + 5 * sigma - w->first) / w->step);
+    first = first < 0 ? 0 : first, last = last < w->count ? last : w->count - 1;
+    double start = (w->first + first * w->step - at) / sigma;
+    double g = exp(-0.5 * start * start), ratio = exp(-start * q - 0.5 * q * q);
+    for (int n = first; n <= last; ++n) {
+      w->value[n][0] += g * re, w->value[n][1] += g * im;
+      g *= ratio, ratio *= shrink;
+    }
   }
-  echo[0] /= total, echo[1] /= total;
 }
 
 void sonde_array_line(const sonde_array *a, double x_m, double z_m, double first_m, double step_m,
@@ -159,13 +138,32 @@ void sonde_array_line(const sonde_array *a, double x_m, double z_m, double first
   SONDE_ASSERT(a != NULL && echo != NULL && step_m > 0);
   wave w;
   double length[MOST], back[MOST];
-  double last = first_m + step_m * count;
-  int most = (int)(reach(a, fmax(last, z_m) / a->receive_f) + 0.5);
+  const double k = 2 * SONDE_PI / wavelength(a), last = first_m + step_m * count;
+  const int most = (int)(reach(a, fmax(last, z_m) / a->receive_f) + 0.5);
   SONDE_ASSERT(2 * most + 1 <= MOST);
   for (int j = -most; j <= most; ++j) length[j + most] = aim(a, j, x_m, z_m, &back[j + most]);
   wave_at(a, x_m, z_m, &w);
-  for (uint32_t n = 0; n < count; ++n)
-    receive(a, &w, first_m + n * step_m, length, back, most, echo + 2 * n);
+  for (uint32_t sample = 0; sample < count; ++sample, echo += 2) {
+    // Sum over the receiving elements of the aperture that belongs to the depth.
+    const double depth = first_m + sample * step_m, take = reach(a, depth / a->receive_f);
+    const int half = (int)(take + 0.5);
+    double total = 0;
+    SONDE_ASSERT(half <= most);
+    echo[0] = echo[1] = 0;
+    for (int j = -half; j <= half; ++j) {
+      double part = share(take, j), home = length[j + most] - delay(a, j, depth);
+      total += part;
+      double at = (depth - 0.5 * home - w.first) / w.step;
+      if (!(at >= 0 && at < w.count - 1)) continue;
+      int n = (int)at;
+      double b = at - n, re = w.value[n][0] + b * (w.value[n + 1][0] - w.value[n][0]);
+      double im = w.value[n][1] + b * (w.value[n + 1][1] - w.value[n][1]);
+      double c, s, size = part * back[j + most];
+      turn(k * home, &c, &s);
+      echo[0] += size * (re * c + im * s), echo[1] += size * (im * c - re * s);
+    }
+    echo[0] /= total, echo[1] /= total;
+  }
 }
 
 // One-way amplitude at (y, z) of an aperture whose lens focuses at lens_m, Fresnel approximation.

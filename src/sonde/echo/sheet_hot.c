@@ -31,20 +31,6 @@ static float slope_share(float half_turns) {
   return sinc * sinc * (1 - t * t * (3 - 2 * t));
 }
 
-static void add_point(sonde_echo *echo, uint32_t column, float depth_m, float re, float im) {
-  const frame *f = &echo->frame;
-  float row = depth_m / (float)f->step_m + (float)echo->pad_samples, nearest = floorf(row + 0.5f);
-  SONDE_ASSERT(column < echo->grid_lines);
-  if (!(nearest >= 0 && nearest < (float)echo->grid_samples)) return;
-  if (echo->sheet_count == SONDE_SHEET_POINTS) {
-    ++echo->lost;
-    return;
-  }
-  int32_t *first = echo->first_sheet + (uint32_t)nearest;
-  echo->sheet[echo->sheet_count] = (sheet_point){re, im, row - nearest, column, *first};
-  *first = (int32_t)echo->sheet_count++;
-}
-
 // Beyond the outer lines the sheet goes on along its tangent as far as the kernels reach.
 void sonde_sheet_add(sonde_echo *echo, uint32_t line, float depth_m, float rise_m,
                      float amplitude) {
@@ -59,7 +45,19 @@ void sonde_sheet_add(sonde_echo *echo, uint32_t line, float depth_m, float rise_
     const bool shared = (k == -1 && line > 0) || (k == 1 && line + 1 < echo->lines);
     const float part = shared ? 0.5f * size : size, depth = depth_m + (float)k * rise_m;
     const float angle = (float)fmod(turn * (double)depth, 2 * SONDE_PI);
-    add_point(echo, (uint32_t)(column + k), depth, part * cosf(angle), -part * sinf(angle));
+    // Into the list of the row nearest to it.
+    const float row = depth / (float)f->step_m + (float)echo->pad_samples;
+    const float nearest = floorf(row + 0.5f);
+    SONDE_ASSERT(column + k >= 0 && column + k < (int)echo->grid_lines);
+    if (!(nearest >= 0 && nearest < (float)echo->grid_samples)) continue;
+    if (echo->sheet_count == SONDE_SHEET_POINTS) {
+      ++echo->lost;
+      continue;
+    }
+    int32_t *first = echo->first_sheet + (uint32_t)nearest;
+    echo->sheet[echo->sheet_count] = (sheet_point){part * cosf(angle), -part * sinf(angle),
+                                                   row - nearest, (uint32_t)(column + k), *first};
+    *first = (int32_t)echo->sheet_count++;
   }
 }
 
