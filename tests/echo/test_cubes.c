@@ -16,7 +16,7 @@ static float between(double low, double high, uint64_t *draw) {
 }
 
 typedef struct wall_points {
-  float wall[3][WALL_FIELDS][WALL_ROOM], rest[3][WALL_POINTS], gathered[3][WALL_POINTS],
+  float wall[3][WALL_FIELDS][WALL_ROOM], rest[3][WALL_POINTS], warped[3][WALL_POINTS],
       place[3][WALL_POINTS];
 } wall_points;
 
@@ -37,11 +37,11 @@ static void draw_wall(wall_points *c, uint32_t k, uint32_t g, uint64_t *draw) {
     c->wall[k][WALL_ACROSS + i][g] = (float)v_coordinate(across, i);
   }
   c->wall[k][WALL_RADIUS][g] = radius;
-  for (int i = 0; i < 5; ++i) c->wall[k][WALL_TURN + i][g] = tissue[i];
+  for (int i = 0; i < 5; ++i) c->wall[k][WALL_ROTATION + i][g] = tissue[i];
   c->wall[k][WALL_LONG][g] = half_long;
   c->wall[k][WALL_SHORT][g] = radius * radius * (1 - lost) / half_long;
   float engaged = fminf(fabsf(lost) / (float)sonde_engaged_loss, 1);
-  c->wall[k][WALL_LEAD][g] = (g + k) % 5 ? engaged : 0;
+  c->wall[k][WALL_COUPLING][g] = (g + k) % 5 ? engaged : 0;
 }
 
 static void draw_points(wall_points *c) {
@@ -62,10 +62,10 @@ static void move_with(const char *set, uint32_t walls, wall_points *c) {
                         walls,
                         (const float(*)[WALL_FIELDS][WALL_ROOM])c->wall,
                         (const float(*)[WALL_POINTS])c->rest,
-                        c->gathered,
+                        c->warped,
                         c->place};
-  sonde_echo_kernels_find(set)->gather(&job);
-  sonde_echo_kernels_find(set)->even(&job);
+  sonde_echo_kernels_find(set)->warp(&job);
+  sonde_echo_kernels_find(set)->smooth(&job);
 }
 
 // All sets move points to the same bits, and within 50 nm of where the vessels take them; away
@@ -81,7 +81,7 @@ static void walls_move_alike(void **state) {
       if (sonde_echo_kernels_find(sets[k]) == NULL) continue;
       move_with(sets[k], walls, &c[k]);
       if (k < PLAIN) assert_memory_equal(c[k].place, c[0].place, sizeof c[k].place);
-      if (k < PLAIN) assert_memory_equal(c[k].gathered, c[0].gathered, sizeof c[k].gathered);
+      if (k < PLAIN) assert_memory_equal(c[k].warped, c[0].warped, sizeof c[k].warped);
     }
     for (int k = 0; k < 3; ++k)
       for (uint32_t i = 0; i < WALL_POINTS; ++i) {

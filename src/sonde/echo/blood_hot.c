@@ -72,11 +72,11 @@ void sonde_echo_blood(sonde_echo *echo) {
   SONDE_ASSERT(echo->frame.pathology != NULL);
   echo->bled = 0;
   for (uint32_t shown = 0; shown < echo->shown_count; ++shown) {
-    const uint32_t which = echo->shown[shown], stations = in->section_count[which];
-    if (stations < 2) continue;
+    const uint32_t which = echo->shown[shown], sections = in->section_count[which];
+    if (sections < 2) continue;
     const double flowed = flowed_m(echo, which) / sonde_segment_m;
     const int32_t first = (int32_t)ceil(in->section[which][0].s_m / sonde_segment_m);
-    const int32_t last = (int32_t)floor(in->section[which][stations - 1].s_m / sonde_segment_m);
+    const int32_t last = (int32_t)floor(in->section[which][sections - 1].s_m / sonde_segment_m);
     sonde_vessel_state low, high;
     bool known = sonde_vessel_at(in, which, first * sonde_segment_m, &low);
     for (int32_t k = first; k < last && known; ++k, low = high) {

@@ -19,20 +19,20 @@ typedef struct slab_cube {
   int32_t number[3]; // along the world's axes
 } slab_cube;
 
-// A vessel's station.
-typedef struct cube_station {
+// A vessel's section: rest centre, path of the centre, along the vessel, short axis.
+typedef struct cube_section {
   float_x4 rest, shift, axis, flat;
-  float_x4 size;   // radius, lead, short and long semi-axis
-  float_x4 tissue; // turn, short, shear and long of the gradient across it
-  float even;
-} cube_station;
+  float_x4 size;   // radius, coupling, short and long semi-axis
+  float_x4 tissue; // rotation, short, shear and long of the gradient across it
+  float smoothing;
+} cube_section;
 
 // A vessel beside a cube.
 typedef struct cube_wall {
-  uint32_t vessel, station; // in view; before it
-  float share;              // of the path to the next station
+  uint32_t vessel, section; // in view; before it
+  float share;              // of the path to the next section
   float solid;              // share of the short axis that clot fills, from the far side
-  double along_m;           // of the cube's middle, as the stations count
+  double along_m;           // of the cube's middle, as the sections are counted
 } cube_wall;
 
 // A cube where the tissue's motion takes it.
@@ -56,11 +56,11 @@ typedef struct sonde_cubes {
   float_x4 place, to_place[3];                        // flat face: image coordinates to lengths
   float_x4 image, to_image[3];                        // and back
   float_x4 low[MOST_VESSELS], high[MOST_VESSELS];     // cubes beside that box stay whole
-  cube_station station[MOST_VESSELS][SONDE_SECTIONS]; // of the vessels in view, near the slab
+  cube_section section[MOST_VESSELS][SONDE_SECTIONS]; // of the vessels in view, near the slab
   uint32_t count, groups, walls;
   moved_cube moved[CUBES_AT_ONCE];
   float wall[MOST_VESSELS][WALL_FIELDS][WALL_ROOM];
-  float rest[3][WALL_POINTS], gathered[3][WALL_POINTS], place_m[3][WALL_POINTS];
+  float rest[3][WALL_POINTS], warped[3][WALL_POINTS], place_m[3][WALL_POINTS];
 } sonde_cubes;
 
 // The box around the slab, and the plane's nodes from its corner.

@@ -9,8 +9,8 @@
 
 const echo_kernels SONDE_KERNELS = {SONDE_KERNELS_NAME,
                                     splat,
-                                    gather_tissue,
-                                    even_tissue,
+                                    warp_tissue,
+                                    smooth_tissue,
                                     stream,
                                     lateral,
                                     axial,

@@ -66,14 +66,14 @@ typedef enum wall_field {
   WALL_FLAT = WALL_AXIS + 3,   // short axis
   WALL_ACROSS = WALL_FLAT + 3, // long axis
   WALL_RADIUS = WALL_ACROSS + 3,
-  WALL_LEAD,  // 0..1: how firmly the wall leads; 0: no vessel
-  WALL_SHORT, // semi-axes, m
+  WALL_COUPLING, // 0..1: how firmly the wall leads; 0: no vessel
+  WALL_SHORT,    // semi-axes, m
   WALL_LONG,
-  WALL_TURN, // the tissue's gradient across the vessel, as sonde_vessel_state has it
+  WALL_ROTATION, // the tissue's gradient across the vessel, as sonde_vessel_state has it
   WALL_TISSUE_SHORT,
   WALL_SHEAR,
   WALL_TISSUE_LONG,
-  WALL_EVEN,
+  WALL_SMOOTHING,
   WALL_FIELDS
 } wall_field;
 
@@ -83,14 +83,14 @@ enum {
   WALL_ROOM = WALL_GROUPS + ECHO_ALIGN // whole vectors read beyond the last
 };
 
-// Points of the tissue, in groups of four that share the vessels beside them: where those gather
-// them before the field moves them, and where they even it out.
+// Points of the tissue, in groups of four that share the vessels beside them: where those warp
+// them before the field moves them, and where they smooth the displacement.
 typedef struct wall_job {
   uint32_t groups, walls;
   const float (*wall)[WALL_FIELDS][WALL_ROOM]; // [walls]
   const float (*rest)[WALL_POINTS];            // [3]
-  float (*gathered)[WALL_POINTS];              // [3] of gather(); read by even()
-  float (*place)[WALL_POINTS];                 // [3] of even(): of the gathered point by the field
+  float (*warped)[WALL_POINTS];                // [3] of warp(); read by smooth()
+  float (*place)[WALL_POINTS];                 // [3] of smooth(): of the warped point by the field
                                                // alone; replaced
 } wall_job;
 
@@ -206,8 +206,8 @@ typedef struct convert_job {
 typedef struct echo_kernels {
   const char *name;
   void (*splat)(const splat_job *job);
-  void (*gather)(const wall_job *job);
-  void (*even)(const wall_job *job);
+  void (*warp)(const wall_job *job);
+  void (*smooth)(const wall_job *job);
   void (*stream)(const stream_job *job);
   void (*lateral)(const lateral_job *job);
   void (*axial)(const axial_job *job);

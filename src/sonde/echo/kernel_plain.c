@@ -57,20 +57,20 @@ static uint32_t vessels_near(const wall_job *job, uint32_t group,
   uint32_t count = 0;
   for (uint32_t k = 0; k < job->walls; ++k) {
     const float(*wall)[WALL_ROOM] = job->wall[k];
-    if (!(wall[WALL_LEAD][group] > 0)) continue;
+    if (!(wall[WALL_COUPLING][group] > 0)) continue;
     sonde_vessel_state *v = &near[count++];
     *v = (sonde_vessel_state){.rest_centre_m = vector_of(wall, WALL_REST, group),
                               .axis = vector_of(wall, WALL_AXIS, group),
                               .flat_axis = vector_of(wall, WALL_FLAT, group),
                               .rest_radius_m = (double)wall[WALL_RADIUS][group],
-                              .coupling = (double)wall[WALL_LEAD][group],
+                              .coupling = (double)wall[WALL_COUPLING][group],
                               .half_short_m = (double)wall[WALL_SHORT][group],
                               .half_long_m = (double)wall[WALL_LONG][group],
-                              .tissue_rotation = (double)wall[WALL_TURN][group],
+                              .tissue_rotation = (double)wall[WALL_ROTATION][group],
                               .tissue_short = (double)wall[WALL_TISSUE_SHORT][group],
                               .tissue_shear = (double)wall[WALL_SHEAR][group],
                               .tissue_long = (double)wall[WALL_TISSUE_LONG][group],
-                              .tissue_smoothing = (double)wall[WALL_EVEN][group]};
+                              .tissue_smoothing = (double)wall[WALL_SMOOTHING][group]};
     v->centre_m = v_add(v->rest_centre_m, vector_of(wall, WALL_SHIFT, group));
   }
   return count;
@@ -80,22 +80,22 @@ static sonde_vec3 point_of(const float (*from)[WALL_POINTS], uint32_t i) {
   return vec3((double)from[0][i], (double)from[1][i], (double)from[2][i]);
 }
 
-static void gather(const wall_job *job) {
+static void warp(const wall_job *job) {
   for (uint32_t i = 0; i < 4 * job->groups; ++i) {
     sonde_vessel_state near[MOST_VESSELS];
     uint32_t count = vessels_near(job, i / 4, near);
     sonde_vec3 at = sonde_vessels_warp(near, count, point_of(job->rest, i));
-    for (int c = 0; c < 3; ++c) job->gathered[c][i] = (float)v_coordinate(at, c);
+    for (int c = 0; c < 3; ++c) job->warped[c][i] = (float)v_coordinate(at, c);
   }
 }
 
-static void even(const wall_job *job) {
+static void smooth(const wall_job *job) {
   for (uint32_t i = 0; i < 4 * job->groups; ++i) {
     sonde_vessel_state near[MOST_VESSELS];
     uint32_t count = vessels_near(job, i / 4, near);
-    sonde_vec3 gathered = point_of((const float(*)[WALL_POINTS])job->gathered, i);
+    sonde_vec3 warped = point_of((const float(*)[WALL_POINTS])job->warped, i);
     sonde_vec3 place = point_of((const float(*)[WALL_POINTS])job->place, i);
-    sonde_vec3 at = sonde_vessels_smooth(near, count, point_of(job->rest, i), gathered, place);
+    sonde_vec3 at = sonde_vessels_smooth(near, count, point_of(job->rest, i), warped, place);
     for (int c = 0; c < 3; ++c) job->place[c][i] = (float)v_coordinate(at, c);
   }
 }
@@ -213,5 +213,5 @@ static void convert(const convert_job *job) {
   }
 }
 
-const echo_kernels sonde_echo_kernels_plain = {"plain", splat, gather, even, stream, lateral, axial,
-                                               tissue,  merge, widen,  mix,  fade,   convert};
+const echo_kernels sonde_echo_kernels_plain = {
+    "plain", splat, warp, smooth, stream, lateral, axial, tissue, merge, widen, mix, fade, convert};

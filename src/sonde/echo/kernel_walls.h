@@ -50,7 +50,7 @@ INLINE reach find_reach(const float (*wall)[WALL_ROOM], uint32_t group, floats3 
   floats t = (p.r / wall_at(wall, WALL_RADIUS, group) - 1) * (1.0f / 3);
   t = vmin(vmax(t, vset(0)), vset(1));
   p.fade = fade_out(t);
-  p.weight = vonly(t < 1, wall_at(wall, WALL_LEAD, group) * p.fade);
+  p.weight = vonly(t < 1, wall_at(wall, WALL_COUPLING, group) * p.fade);
   return p;
 }
 
@@ -59,8 +59,8 @@ INLINE floats2 turned(floats2 p, floats half) {
   return (floats2){cosine * p.x - sine * p.y, sine * p.x + cosine * p.y};
 }
 
-INLINE floats2 gathered_by(const float (*wall)[WALL_ROOM], uint32_t group, reach p) {
-  floats radius = wall_at(wall, WALL_RADIUS, group), turn = wall_at(wall, WALL_TURN, group);
+INLINE floats2 warped_by(const float (*wall)[WALL_ROOM], uint32_t group, reach p) {
+  floats radius = wall_at(wall, WALL_RADIUS, group), turn = wall_at(wall, WALL_ROTATION, group);
   floats tissue_long = wall_at(wall, WALL_TISSUE_LONG, group);
   floats half_short = wall_at(wall, WALL_SHORT, group) / wall_at(wall, WALL_TISSUE_SHORT, group);
   floats half_long = wall_at(wall, WALL_LONG, group) / tissue_long;
@@ -91,7 +91,7 @@ INLINE void store3(float (*to)[WALL_POINTS], uint32_t i, floats3 a) {
   vstore(to[0] + i, a.x), vstore(to[1] + i, a.y), vstore(to[2] + i, a.z);
 }
 
-static void gather_tissue(const wall_job *job) {
+static void warp_tissue(const wall_job *job) {
   SONDE_ASSERT(job->groups <= WALL_GROUPS && job->walls <= MOST_VESSELS);
   for (uint32_t group = 0; group < job->groups; group += FLOATS / 4) {
     floats3 rest = load3(job->rest, 4 * group), at = rest;
@@ -99,8 +99,8 @@ static void gather_tissue(const wall_job *job) {
     floats2 way[MOST_VESSELS];
     for (uint32_t k = 0; k < job->walls; ++k) {
       reach p = find_reach(job->wall[k], group, rest);
-      floats2 to = gathered_by(job->wall[k], group, p);
-      floats lead = vonly(p.weight > 0, wall_at(job->wall[k], WALL_LEAD, group));
+      floats2 to = warped_by(job->wall[k], group, p);
+      floats lead = vonly(p.weight > 0, wall_at(job->wall[k], WALL_COUPLING, group));
       weight[k] = p.weight, way[k] = (floats2){lead * (to.x - p.at.x), lead * (to.y - p.at.y)};
     }
     for (uint32_t k = 0; k < job->walls; ++k) {
@@ -108,17 +108,17 @@ static void gather_tissue(const wall_job *job) {
       at = madd3(at, share * way[k].x, wall_vector(job->wall[k], WALL_FLAT, group));
       at = madd3(at, share * way[k].y, wall_vector(job->wall[k], WALL_ACROSS, group));
     }
-    store3(job->gathered, 4 * group, at);
+    store3(job->warped, 4 * group, at);
   }
 }
 
 // The motion along a vessel stays the field's.
-static void even_tissue(const wall_job *job) {
+static void smooth_tissue(const wall_job *job) {
   SONDE_ASSERT(job->groups <= WALL_GROUPS && job->walls <= MOST_VESSELS);
   for (uint32_t group = 0; group < job->groups; group += FLOATS / 4) {
     const uint32_t i = 4 * group;
     floats3 rest = load3(job->rest, i), place = load3((const float(*)[WALL_POINTS])job->place, i);
-    floats3 gathered = load3((const float(*)[WALL_POINTS])job->gathered, i), at = place;
+    floats3 warped = load3((const float(*)[WALL_POINTS])job->warped, i), at = place;
     floats weight[MOST_VESSELS];
     for (uint32_t k = 0; k < job->walls; ++k)
       weight[k] = find_reach(job->wall[k], group, rest).weight;
@@ -126,13 +126,15 @@ static void even_tissue(const wall_job *job) {
       const float(*wall)[WALL_ROOM] = job->wall[k];
       floats3 flat = wall_vector(wall, WALL_FLAT, group),
               across = wall_vector(wall, WALL_ACROSS, group);
-      floats3 centre = wall_vector(wall, WALL_REST, group), d = minus3(gathered, centre);
+      floats3 centre = wall_vector(wall, WALL_REST, group), d = minus3(warped, centre);
       floats3 off = minus3(minus3(place, centre), wall_vector(wall, WALL_SHIFT, group));
-      floats2 q = turned((floats2){dot(d, flat), dot(d, across)}, wall_at(wall, WALL_TURN, group));
+      floats2 q =
+          turned((floats2){dot(d, flat), dot(d, across)}, wall_at(wall, WALL_ROTATION, group));
       floats on_short = wall_at(wall, WALL_TISSUE_SHORT, group) * q.x - dot(off, flat);
       floats on_long = wall_at(wall, WALL_TISSUE_LONG, group) * q.y +
                        wall_at(wall, WALL_SHEAR, group) * q.x - dot(off, across);
-      floats firm = weight[k] * share_of(weight, job->walls, k) * wall_at(wall, WALL_EVEN, group);
+      floats firm =
+          weight[k] * share_of(weight, job->walls, k) * wall_at(wall, WALL_SMOOTHING, group);
       at = madd3(madd3(at, firm * on_short, flat), firm * on_long, across);
     }
     store3(job->place, i, at);

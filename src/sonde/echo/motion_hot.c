@@ -2,7 +2,7 @@
 //
 // Every point goes where sonde_interior_displacement takes it, walls of vessels included. The field
 // takes a cube's middle to the image by Newton steps in the coarse plane. Beside a vessel the walls
-// gather some points of the cube, the field takes these, and the walls even them out: the middles
+// warp some points of the cube, the field takes these, and the walls smooth them: the middles
 // of the eight pieces of a cube that is close, else the middle and those of three faces.
 #include "base/base.h"
 #include "base/random.h"
@@ -41,13 +41,13 @@ void sonde_motion_begin(sonde_echo *echo) {
   // Stations of the vessels in view that lie there, and the box of what they reach.
   for (uint32_t k = 0; k < echo->shown_count; ++k) {
     const uint32_t which = echo->shown[k], count = in->section_count[which];
-    const sonde_vessel_section *station = in->section[which];
+    const sonde_vessel_section *section = in->section[which];
     s->low[k] = vset_float_x4(INFINITY), s->high[k] = -s->low[k];
     for (uint32_t i = 0; i < count; ++i) {
-      if (i + 1 < count && station[i + 1].s_m < first) continue;
-      if (i > 0 && station[i - 1].s_m > last) break;
+      if (i + 1 < count && section[i + 1].s_m < first) continue;
+      if (i > 0 && section[i - 1].s_m > last) break;
       const sonde_vessel_state *v = &in->state[which][i];
-      s->station[k][i] = (cube_station){point_of(v_sub(v->rest_centre_m, s->corner)),
+      s->section[k][i] = (cube_section){point_of(v_sub(v->rest_centre_m, s->corner)),
                                         point_of(v_sub(v->centre_m, v->rest_centre_m)),
                                         point_of(v->axis),
                                         point_of(v->flat_axis),
@@ -58,8 +58,8 @@ void sonde_motion_begin(sonde_echo *echo) {
                                         (float)v->tissue_smoothing};
       float_x4 reach =
           vset_float_x4((float)(fmax(close_m, reach_radii * v->rest_radius_m + h) + margin_m));
-      s->low[k] = vmin(s->low[k], s->station[k][i].rest - reach);
-      s->high[k] = vmax(s->high[k], s->station[k][i].rest + reach);
+      s->low[k] = vmin(s->low[k], s->section[k][i].rest - reach);
+      s->high[k] = vmax(s->high[k], s->section[k][i].rest + reach);
     }
   }
 }
@@ -132,9 +132,9 @@ static void add_points(const sonde_echo *echo, moved_cube *c) {
     for (int k = 0; k < 3; ++k)
       vstore(s->rest[k] + 4 * g, c->rest[k] + (c->close ? piece[g - first][k] : whole[k]) * h);
   for (uint32_t k = 0; k < c->walls; ++k) {
-    // State of the vessel between its two stations.
+    // State of the vessel between its two sections.
     const cube_wall *w = &c->wall[k];
-    const cube_station *a = &s->station[w->vessel][w->station], *b = a + 1;
+    const cube_section *a = &s->section[w->vessel][w->section], *b = a + 1;
     const float_x4 t = vset_float_x4(w->share), u = 1 - t, size = u * a->size + t * b->size;
     const float_x4 tissue = u * a->tissue + t * b->tissue, mean = u * a->flat + t * b->flat;
     const float_x4 axis = direction_of(u * a->axis + t * b->axis, a->axis);
@@ -145,26 +145,26 @@ static void add_points(const sonde_echo *echo, moved_cube *c) {
     for (uint32_t g = first; g < end; ++g) {
       for (int f = 0; f < WALL_RADIUS; ++f) s->wall[k][f][g] = vector[f / 3][f % 3];
       for (int f = 0; f < 4; ++f) s->wall[k][WALL_RADIUS + f][g] = size[f];
-      for (int f = 0; f < 4; ++f) s->wall[k][WALL_TURN + f][g] = tissue[f];
-      s->wall[k][WALL_EVEN][g] = a->even + w->share * (b->even - a->even);
+      for (int f = 0; f < 4; ++f) s->wall[k][WALL_ROTATION + f][g] = tissue[f];
+      s->wall[k][WALL_SMOOTHING][g] = a->smoothing + w->share * (b->smoothing - a->smoothing);
     }
   }
   for (uint32_t k = c->walls; k < echo->shown_count; ++k) // no vessel
     for (uint32_t g = first; g < end; ++g) {
       for (int f = WALL_RADIUS; f < WALL_FIELDS; ++f) s->wall[k][f][g] = 1;
-      s->wall[k][WALL_LEAD][g] = 0;
+      s->wall[k][WALL_COUPLING][g] = 0;
     }
   if (c->walls > s->walls) s->walls = c->walls;
 }
 
-// Where the field takes the four gathered points of a group, m from the corner.
+// Where the field takes the four warped points of a group, m from the corner.
 static void move_points(const sonde_echo *echo, const moved_cube *c, uint32_t group) {
   sonde_cubes *s = echo->cubes;
   const float per_cube = (float)(1 / echo->cell_m);
   float_x4 at[4], image[4], in[3];
   for (uint32_t i = 0; i < 4; ++i) {
     const uint32_t n = 4 * group + i;
-    const float_x4 rest = {s->gathered[0][n], s->gathered[1][n], s->gathered[2][n], 0};
+    const float_x4 rest = {s->warped[0][n], s->warped[1][n], s->warped[2][n], 0};
     const float_x4 guess = c->at + transform_point(c->axis, (rest - c->rest) * per_cube);
     at[i] = locate_point(echo, rest, guess, in);
   }
@@ -201,17 +201,17 @@ uint32_t sonde_motion_displace(sonde_echo *echo, uint32_t first) {
     if (echo->vessels) find_walls(echo, from, c);
     if (c->by_walls) add_points(echo, c);
   }
-  // Walls gather the points beside them, the field takes these, and the walls even them out.
+  // Walls warp the points beside them, the field takes these, and the walls smooth them.
   const wall_job job = {s->groups,
                         s->walls,
                         (const float(*)[WALL_FIELDS][WALL_ROOM])s->wall,
                         (const float(*)[WALL_POINTS])s->rest,
-                        s->gathered,
+                        s->warped,
                         s->place_m};
-  echo->kernels->gather(&job);
+  echo->kernels->warp(&job);
   for (const moved_cube *c = s->moved; c < s->moved + s->count; ++c)
     for (uint32_t g = 0; c->by_walls && g < (c->close ? 2 : 1); ++g)
       move_points(echo, c, c->group + g);
-  echo->kernels->even(&job);
+  echo->kernels->smooth(&job);
   return next;
 }

@@ -10,7 +10,7 @@ enum { FIRST_ITERATIONS = 24, ITERATIONS = 8, NEWTON_ITERATIONS = 4 };
 static const double far_away = 50; // in semi-axes
 static const double step_beside = 1e-3;
 static const double tolerance_m = 1e-7;
-static const double view_margin_m = 8e-3; // slab, a cube and the step between two stations
+static const double view_margin_m = 8e-3; // slab, a cube and the step between two sections
 
 const sonde_pathology *sonde_echo_pathology(const sonde_echo *echo, uint32_t which) {
   return which == 0 ? echo->frame.pathology : &echo->interior->pathology[which];
