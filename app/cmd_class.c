@@ -78,12 +78,6 @@ static int check_arguments(const class_room *room) {
   return APP_OK;
 }
 
-static bool own_program(char *path, size_t size) {
-  ssize_t length = readlink("/proc/self/exe", path, size - 1);
-  if (length > 0) path[length] = 0;
-  return length > 0;
-}
-
 // ---- the screen
 
 static struct {
@@ -171,22 +165,24 @@ static void tell_changes(const class_room *room, char told[CLASS_LEARNERS][128])
 
 // ---- a class
 
-// A learner keeps the token when the program is started again, and so the page finds it.
-static int make_tokens(class_room *room) {
+static void print_address(const char *whose, uint16_t port, const char *token) {
+  printf("%s: http://127.0.0.1:%u/#%s\n", whose, (unsigned)port, token);
+}
+
+static int run_class(class_room *room) {
+  static char told[CLASS_LEARNERS][128];
+  double ask_s = 0;
+  bool alive = true;
+  app_catch_interrupt();
+  screen.terminal = isatty(STDOUT_FILENO) == 1;
+  // A learner keeps the token when the program is started again, and so the page finds it.
   for (uint32_t i = 0; i < room->count; ++i) {
     sonde_error error = {0};
     if (sonde_page_token_make(room->learner[i].token, &error) ||
         sonde_page_token_make(room->learner[i].teacher_token, &error))
       return app_fail(VERB, &error);
   }
-  return APP_OK;
-}
-
-static void print_address(const char *whose, uint16_t port, const char *token) {
-  printf("%s: http://127.0.0.1:%u/#%s\n", whose, (unsigned)port, token);
-}
-
-static void print_addresses(const class_room *room) {
+  for (uint32_t i = 0; i < room->count; ++i) class_start(room, &room->learner[i], say);
   printf("%u learners. A teacher's address is to watch, comment and take control. Ctrl-C ends "
          "them all.\n",
          room->count);
@@ -197,18 +193,6 @@ static void print_addresses(const class_room *room) {
     snprintf(whose, sizeof whose, "Teacher of %s", room->learner[i].name);
     print_address(whose, room->learner[i].port, room->learner[i].teacher_token);
   }
-}
-
-static int run_class(class_room *room) {
-  static char told[CLASS_LEARNERS][128];
-  double ask_s = 0;
-  bool alive = true;
-  app_catch_interrupt();
-  screen.terminal = isatty(STDOUT_FILENO) == 1;
-  int code = make_tokens(room);
-  if (code != APP_OK) return code;
-  for (uint32_t i = 0; i < room->count; ++i) class_start(room, &room->learner[i], say);
-  print_addresses(room);
   draw(room);
   while (!app_interrupted() && alive) {
     alive = class_watch(room, say);
@@ -242,10 +226,12 @@ static int run(void *from) {
   if (code == APP_OK) code = check_arguments(&room);
   if (code != APP_OK) return code;
   assert(room.count >= 1 && room.count <= CLASS_LEARNERS);
-  if (!s->program && !own_program(program, sizeof program)) {
+  ssize_t length = s->program ? 1 : readlink("/proc/self/exe", program, sizeof program - 1);
+  if (length <= 0) {
     fprintf(stderr, "sonde class: /proc/self/exe cannot be read\n");
     return APP_FAILED;
   }
+  program[length] = 0;
   room.program = s->program ? s->program : program;
   return run_class(&room);
 }

@@ -50,7 +50,10 @@ static int check(void *from) {
                          a->operator_name);
 }
 
-static void print_segments(const sonde_score *s) {
+static void print_text(const sonde_case *patient, const sonde_score *s) {
+  const sonde_metrics *m = &s->metrics;
+  printf("%s: %s\n%s\nfound: %s\ntruth: %s\n\n", patient->id, patient->title, s->summary, s->asked,
+         s->truth);
   printf("%-18s %6s %6s  %-13s %-13s\n", "segment", "places", "done", "decision", "truth");
   for (uint32_t i = 0; i < s->segment_count; ++i) {
     const sonde_segment_verdict *v = &s->segment[i];
@@ -59,13 +62,6 @@ static void print_segments(const sonde_score *s) {
            decision[0] ? decision : "-", sonde_decision_name(v->truth),
            v->correct || !v->needed ? "" : " wrong");
   }
-}
-
-static void print_text(const sonde_case *patient, const sonde_score *s) {
-  const sonde_metrics *m = &s->metrics;
-  printf("%s: %s\n%s\nfound: %s\ntruth: %s\n\n", patient->id, patient->title, s->summary, s->asked,
-         s->truth);
-  print_segments(s);
   printf("\nparts (0..1):");
 #define PRINT_PART(name, weight, title, text) printf(" %s %.2f", #name, s->name);
   SONDE_SCORE_LIST(PRINT_PART)

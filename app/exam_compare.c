@@ -1,7 +1,4 @@
 // sonde exam --compare: every case by every operator, and what tells the operators apart.
-// run_case:     one case: its thigh once, then every operator and seed.
-// separation:   chance that an expert's exam has more of a metric than a novice's.
-// print_table, print_metrics: the outcome.
 #include "exam_common.h"
 
 #include <math.h>
@@ -64,13 +61,7 @@ static sonde_score *cell(const table *t, uint32_t of, uint32_t op, long seed) {
   return &t->score[(of * OPERATORS + op) * (uint32_t)t->o->seeds + (uint32_t)seed];
 }
 
-// The bar runs over all exams; the shares that one exam reports fill its part.
-static void show_part(const table *t, uint32_t of, uint32_t op, long seed) {
-  double seeds = (double)t->o->seeds, all = (double)t->case_count * OPERATORS * seeds;
-  double before = (double)(of * OPERATORS + op) * seeds + (double)seed;
-  app_progress_part(before / all, (before + 1) / all);
-}
-
+// One case: its thigh once, then every operator and seed.
 static sonde_status run_case(table *t, uint32_t of, const sonde_progress *progress,
                              sonde_error *error) {
   const compare_options *o = t->o;
@@ -84,7 +75,10 @@ static sonde_status run_case(table *t, uint32_t of, const sonde_progress *progre
   for (uint32_t op = 0; op < OPERATORS && !status; ++op)
     for (long seed = 0; seed < o->seeds && !status; ++seed) {
       char json[PATH_SIZE], csv[PATH_SIZE];
-      show_part(t, of, op, seed);
+      // The bar runs over all exams; the shares that one exam reports fill its part.
+      double before = (double)(of * OPERATORS + op) * (double)o->seeds + (double)seed;
+      double all = (double)t->case_count * OPERATORS * (double)o->seeds;
+      app_progress_part(before / all, (before + 1) / all);
       sonde_exam_def def = sonde_exam_def_default();
       def.patient = &t->cases[of];
       def.protocol = o->protocol;
@@ -117,7 +111,8 @@ static double mean(const table *t, uint32_t op, const metric *m) {
   return count ? sum / count : (double)NAN;
 }
 
-// 0.5: no difference; ties count half (the area under the ROC curve).
+// Chance that an exam of operator a has more of a metric than one of b. 0.5: no difference; ties
+// count half (the area under the ROC curve).
 static double separation(const table *t, const metric *m, uint32_t a, uint32_t b) {
   double more = 0;
   uint32_t pairs = 0;
@@ -200,20 +195,17 @@ static void print_json(const table *t) {
   app_json_end();
 }
 
-static sonde_status load(table *t, sonde_error *error) {
-  sonde_status status = sonde_case_list(t->o->library->cases, &t->cases, &t->case_count, error);
-  if (status || !t->o->only) return status;
-  char directory[1100];
-  t->case_count = 1;
-  return exam_find_case(t->o->library, t->o->only, &t->cases[0], directory, sizeof directory,
-                        error);
-}
-
 int exam_compare(const compare_options *options) {
   sonde_error error = {0};
   table t = {.o = options};
   sonde_progress progress = app_progress();
-  sonde_status status = load(&t, &error);
+  char directory[1100];
+  sonde_status status = sonde_case_list(options->library->cases, &t.cases, &t.case_count, &error);
+  if (!status && options->only) {
+    t.case_count = 1;
+    status = exam_find_case(options->library, options->only, &t.cases[0], directory,
+                            sizeof directory, &error);
+  }
   if (!status && t.case_count == 0)
     status = app_error(&error, SONDE_NOT_FOUND, "no cases in '%.300s'", options->library->cases);
   if (!status && options->directory)

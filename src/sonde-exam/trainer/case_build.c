@@ -93,22 +93,6 @@ static double clot_length(const sonde_pathology *p, const sonde_segment *segment
   return fmax(0, fmin(p->thrombus_to_m, segment->to_m) - fmax(p->thrombus_from_m, segment->from_m));
 }
 
-// A second femoral vein is a deep vein of the segment beside it; other branches are not.
-static double clot_in(const sonde_case_setup *setup, const sonde_segment *segment) {
-  double most = clot_length(&setup->pathology, segment);
-  for (uint32_t i = 0; i < setup->findings.branch_count; ++i) {
-    const sonde_branch_finding *finding = &setup->findings.branch[i];
-    if (strcmp(finding->branch, "second_femoral_vein") != 0) continue;
-    const sonde_vessel *line = &sonde_anatomy_branch(setup->model->anatomy, finding->branch)->line;
-    double a = line->point[0].centre_m.z, b = line->point[line->count - 1].centre_m.z;
-    sonde_segment beside = *segment;
-    beside.from_m = fmax(segment->from_m, fmin(a, b));
-    beside.to_m = fmin(segment->to_m, fmax(a, b));
-    if (beside.to_m > beside.from_m) most = fmax(most, clot_length(&finding->pathology, &beside));
-  }
-  return most;
-}
-
 // Every segment is called what its vein is.
 static sonde_status check_truth(const sonde_case *from, const sonde_case_setup *setup,
                                 sonde_error *error) {
@@ -125,7 +109,21 @@ static sonde_status check_truth(const sonde_case *from, const sonde_case_setup *
     if (called == SONDE_DECISION_NONE)
       return sonde_fail(error, SONDE_MISMATCH, "%s: the truth misses the segment '%s'", from->id,
                         segment->name);
-    double clot_m = clot_in(setup, segment);
+
+    // A second femoral vein is a deep vein of the segment beside it; other branches are not.
+    double clot_m = clot_length(&setup->pathology, segment);
+    for (uint32_t b = 0; b < setup->findings.branch_count; ++b) {
+      const sonde_branch_finding *finding = &setup->findings.branch[b];
+      if (strcmp(finding->branch, "second_femoral_vein") != 0) continue;
+      const sonde_vessel *line =
+          &sonde_anatomy_branch(setup->model->anatomy, finding->branch)->line;
+      double z0 = line->point[0].centre_m.z, z1 = line->point[line->count - 1].centre_m.z;
+      sonde_segment beside = *segment;
+      beside.from_m = fmax(segment->from_m, fmin(z0, z1));
+      beside.to_m = fmin(segment->to_m, fmax(z0, z1));
+      if (beside.to_m > beside.from_m)
+        clot_m = fmax(clot_m, clot_length(&finding->pathology, &beside));
+    }
     if ((called == SONDE_DECISION_CLOT) == (clot_m >= CLOT_M)) continue;
     return sonde_fail(error, SONDE_MISMATCH,
                       "%s: the truth calls %s %s, but %.0f of its %.0f mm have a clot", from->id,

@@ -85,23 +85,6 @@ static void read_thigh(sonde_reader *reader, sonde_place root, sonde_case *c) {
   }
 }
 
-static void read_circulation(sonde_reader *reader, sonde_place at, sonde_circulation *c) {
-  static const char *const KEYS[] = {"posture",       "breath_mmhg",   "valsalva_from_s",
-                                     "valsalva_to_s", "valsalva_mmhg", NULL};
-  if (!at) return;
-  sonde_read_keys(reader, at, "circulation", KEYS);
-  c->posture = (sonde_posture)sonde_read_choice(reader, at, "posture", sonde_case_postures, 0);
-  const double pa = SONDE_PA_PER_MMHG;
-  c->breath_pa = pa * sonde_read_real(reader, at, "breath_mmhg", 0, 10, c->breath_pa / pa);
-  c->valsalva_pa = pa * sonde_read_real(reader, at, "valsalva_mmhg", 0, 60, c->valsalva_pa / pa);
-  c->valsalva_from_s = sonde_read_real(reader, at, "valsalva_from_s", 0, 3600, 0);
-  c->valsalva_to_s = sonde_read_real(reader, at, "valsalva_to_s", 0, 3600, 0);
-  if (c->valsalva_to_s < c->valsalva_from_s)
-    sonde_reader_fail(reader, at, SONDE_ARGUMENT,
-                      "valsalva_to_s is %g, expected valsalva_from_s (%g) or more",
-                      c->valsalva_to_s, c->valsalva_from_s);
-}
-
 // ---- pathology
 
 // The stage of a clot with what the case changes of it, and the stretch of vein that it fills.
@@ -251,6 +234,8 @@ sonde_status sonde_case_check(const sonde_case *of, sonde_error *error) {
 }
 
 static void read_case(sonde_reader *reader, sonde_case *c) {
+  static const char *const CIRCULATION[] = {"posture",       "breath_mmhg",   "valsalva_from_s",
+                                            "valsalva_to_s", "valsalva_mmhg", NULL};
   const char *keys[] = {"sonde_case",  "id",   "title",    "level", "history", "note", "thigh",
                         "circulation", "vein", "findings", "truth", NULL,      NULL};
   sonde_place root = sonde_reader_root(reader);
@@ -272,7 +257,22 @@ static void read_case(sonde_reader *reader, sonde_case *c) {
   sonde_read_member(reader, root, "history", true, c->history, sizeof c->history);
   sonde_read_member(reader, root, "note", false, c->note, sizeof c->note);
   read_thigh(reader, root, c);
-  read_circulation(reader, sonde_read_find(reader, root, "circulation"), &c->circulation);
+  sonde_place at = sonde_read_find(reader, root, "circulation");
+  if (at) {
+    sonde_circulation *flow = &c->circulation;
+    sonde_read_keys(reader, at, "circulation", CIRCULATION);
+    flow->posture = (sonde_posture)sonde_read_choice(reader, at, "posture", sonde_case_postures, 0);
+    const double pa = SONDE_PA_PER_MMHG;
+    flow->breath_pa = pa * sonde_read_real(reader, at, "breath_mmhg", 0, 10, flow->breath_pa / pa);
+    flow->valsalva_pa =
+        pa * sonde_read_real(reader, at, "valsalva_mmhg", 0, 60, flow->valsalva_pa / pa);
+    flow->valsalva_from_s = sonde_read_real(reader, at, "valsalva_from_s", 0, 3600, 0);
+    flow->valsalva_to_s = sonde_read_real(reader, at, "valsalva_to_s", 0, 3600, 0);
+    if (flow->valsalva_to_s < flow->valsalva_from_s)
+      sonde_reader_fail(reader, at, SONDE_ARGUMENT,
+                        "valsalva_to_s is %g, expected valsalva_from_s (%g) or more",
+                        flow->valsalva_to_s, flow->valsalva_from_s);
+  }
   read_pathology(reader, root, c);
   read_truth(reader, root, c);
   if (sonde_reader_good(reader) && sonde_case_check(c, &error))

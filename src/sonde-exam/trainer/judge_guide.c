@@ -9,23 +9,6 @@ static bool is_due(const sonde_judge *judge, uint32_t segment) {
   return s.needed && s.done == s.points && s.decision == SONDE_DECISION_NONE;
 }
 
-// Distance along the skin: what lies along the normal is the press itself.
-static double measure(const sonde_judge *judge, const sonde_vein_point *at, double *along_m,
-                      double *angle_rad) {
-  sonde_pose pose = judge->last.world_from_probe;
-  sonde_vec3 away = v_sub(pose.position, at->skin_m);
-  sonde_vec3 flat = v_madd(away, -v_dot(away, at->normal), at->normal);
-  sonde_vec3 course = v_cross(at->normal, at->across);
-  // towards the knee: the direction in which the map's points come later
-  const sonde_vein_map *map = &judge->map;
-  sonde_vec3 down = v_sub(map->point[map->point_count - 1].vein_m, map->point[0].vein_m);
-  if (v_dot(down, course) < 0) course = v_neg(course);
-  *along_m = v_dot(flat, course);
-  double transverse = fabs(v_dot(q_rotate(pose.rotation, vec3(0, 1, 0)), course));
-  *angle_rad = acos(fmin(transverse, 1));
-  return v_norm(flat);
-}
-
 static void say_press(const sonde_judge *judge, sonde_guidance *g) {
   if (!g->angle_ok) {
     snprintf(g->text, sizeof g->text,
@@ -63,8 +46,20 @@ static void say_next(const sonde_judge *judge, sonde_guidance *g) {
     snprintf(g->text, sizeof g->text, "Put the probe across the leg: %s.", point->title);
     return;
   }
-  double along_m;
-  g->offset_m = measure(judge, &point->at, &along_m, &g->angle_rad);
+
+  // Where the probe is from the place, along the skin: what lies along the normal is the press
+  // itself. The course points towards the knee, where the map's points come later.
+  const sonde_vein_map *map = &judge->map;
+  sonde_pose pose = judge->last.world_from_probe;
+  sonde_vec3 normal = point->at.normal, away = v_sub(pose.position, point->at.skin_m);
+  sonde_vec3 flat = v_madd(away, -v_dot(away, normal), normal);
+  sonde_vec3 course = v_cross(normal, point->at.across);
+  sonde_vec3 down = v_sub(map->point[map->point_count - 1].vein_m, map->point[0].vein_m);
+  if (v_dot(down, course) < 0) course = v_neg(course);
+  double along_m = v_dot(flat, course);
+  double transverse = fabs(v_dot(q_rotate(pose.rotation, vec3(0, 1, 0)), course));
+  g->angle_rad = acos(fmin(transverse, 1));
+  g->offset_m = v_norm(flat);
   g->angle_ok = g->angle_rad <= c->tilt_rad;
   // a press at a place is finished before the next one is named
   bool elsewhere = judge->pressing ? sonde_press_is_astray(judge) : g->offset_m > c->reach_m;

@@ -5,28 +5,6 @@
 // go. The sample after a pause starts anew: nothing is known of the path between.
 static const double GRID_S = 0.05, PAUSE_S = 2, SHARE = 0.7153857; // 1 - exp(-2 pi 4 Hz 0.05 s)
 
-// One step of the grid: low-pass, length of the path, greatest speed, jerk.
-static void advance(sonde_motion *m, sonde_vec3 position_m) {
-  m->stage_m[0] = v_lerp(m->stage_m[0], position_m, SHARE);
-  m->stage_m[1] = v_lerp(m->stage_m[1], m->stage_m[0], SHARE);
-  sonde_vec3 now = m->stage_m[1];
-  if (m->filled >= 1) {
-    double step = v_distance(now, m->before_m[0]);
-    m->path_m += step;
-    m->speed_peak_m_s = fmax(m->speed_peak_m_s, step / GRID_S);
-    m->time_s += GRID_S;
-  }
-  if (m->filled >= 3) {
-    sonde_vec3 inner = v_sub(m->before_m[0], m->before_m[1]);
-    sonde_vec3 third = v_sub(v_sub(now, m->before_m[2]), v_scale(inner, 3));
-    m->jerk_sum += v_norm2(third) / pow(GRID_S, 5); // |jerk|^2 dt
-  }
-  m->before_m[2] = m->before_m[1];
-  m->before_m[1] = m->before_m[0];
-  m->before_m[0] = now;
-  if (m->filled < 3) m->filled++;
-}
-
 void sonde_motion_feed(sonde_motion *m, double time_s, sonde_vec3 position_m) {
   SONDE_ASSERT(isfinite(time_s) && (!m->started || time_s > m->last_s));
   if (!v_finite(position_m)) return;
@@ -44,7 +22,27 @@ void sonde_motion_feed(sonde_motion *m, double time_s, sonde_vec3 position_m) {
   for (; m->next_s <= time_s; m->next_s += GRID_S) {
     double span_s = time_s - m->last_s;
     double share = span_s > 0 ? clamp((m->next_s - m->last_s) / span_s, 0, 1) : 1;
-    advance(m, v_lerp(m->last_m, position_m, share));
+    sonde_vec3 at_m = v_lerp(m->last_m, position_m, share);
+
+    // One step of the grid: low-pass, length of the path, greatest speed, jerk.
+    m->stage_m[0] = v_lerp(m->stage_m[0], at_m, SHARE);
+    m->stage_m[1] = v_lerp(m->stage_m[1], m->stage_m[0], SHARE);
+    sonde_vec3 now = m->stage_m[1];
+    if (m->filled >= 1) {
+      double step = v_distance(now, m->before_m[0]);
+      m->path_m += step;
+      m->speed_peak_m_s = fmax(m->speed_peak_m_s, step / GRID_S);
+      m->time_s += GRID_S;
+    }
+    if (m->filled >= 3) {
+      sonde_vec3 inner = v_sub(m->before_m[0], m->before_m[1]);
+      sonde_vec3 third = v_sub(v_sub(now, m->before_m[2]), v_scale(inner, 3));
+      m->jerk_sum += v_norm2(third) / pow(GRID_S, 5); // |jerk|^2 dt
+    }
+    m->before_m[2] = m->before_m[1];
+    m->before_m[1] = m->before_m[0];
+    m->before_m[0] = now;
+    if (m->filled < 3) m->filled++;
   }
   m->last_s = time_s;
   m->last_m = position_m;

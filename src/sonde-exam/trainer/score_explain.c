@@ -25,16 +25,6 @@ static const char *title_of(const sonde_plan *plan, uint32_t place) {
   return place < plan->count ? plan->point[place].title : "vein not in view";
 }
 
-// The places without a good press.
-static void name_missed(const sonde_plan *plan, const sonde_compression *presses, uint32_t count,
-                        char *text) {
-  uint32_t missed = 0;
-  for (uint32_t i = 0; i < plan->count; ++i)
-    if (!sonde_place_is_done(plan, i, presses, count) && ++missed <= NAMED)
-      say(text, "%s: not examined", title_of(plan, i));
-  if (missed > NAMED) say(text, "and %u more places not examined", missed - NAMED);
-}
-
 static void explain_findings(const sonde_score *score, char *text) {
   for (uint32_t i = 0; i < score->segment_count; ++i) {
     const sonde_segment_verdict *v = &score->segment[i];
@@ -102,7 +92,12 @@ void sonde_score_explain(const sonde_score *score, const sonde_plan *plan,
     }
     if (k == FORCE && hard > said) say(text, "and %u more presses above the limit", hard - said);
 
-    if (k == COVERAGE || k == FORCE) name_missed(plan, presses, count, text);
+    // The places without a good press.
+    uint32_t missed = 0;
+    for (uint32_t i = 0; (k == COVERAGE || k == FORCE) && i < plan->count; ++i)
+      if (!sonde_place_is_done(plan, i, presses, count) && ++missed <= NAMED)
+        say(text, "%s: not examined", title_of(plan, i));
+    if (missed > NAMED) say(text, "and %u more places not examined", missed - NAMED);
     if (k == COVERAGE) say(text, "longest stretch without a good press: %.0f mm", 1e3 * m->gap_m);
     if (k == TIME && m->time_s > SONDE_SCORE_TIME_S)
       say(text, "%.0f s, full points up to %.0f s", m->time_s, SONDE_SCORE_TIME_S);

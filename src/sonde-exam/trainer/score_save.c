@@ -145,26 +145,6 @@ void sonde_put_result(sonde_json_out *out, const sonde_exam_report *exam) {
   sonde_json_end(out);
 }
 
-static sonde_status save_csv(const sonde_judge *judge, const char *path, sonde_error *error) {
-  sonde_file *file;
-  sonde_status status = sonde_file_create(path, &file, error);
-  if (status) return status;
-  sonde_file_printf(file, "press,result,segment,start_s,peak_s,end_s,z_mm,force_peak_n,vein_ratio,"
-                          "artery_ratio,artery_least,tilt_deg\n");
-  for (uint32_t i = 0; i < judge->press_count; ++i) {
-    const sonde_compression *p = &judge->press[i];
-    const double value[] = {p->start_s,      p->peak_s,       p->end_s,
-                            1e3 * p->z_m,    p->force_peak_n, p->vein_ratio,
-                            p->artery_ratio, p->artery_least, DEGREES * p->tilt_rad};
-    sonde_file_printf(file, "%u,%s,%s", i + 1, sonde_press_result_name(p->result),
-                      segment_of(&judge->map, p));
-    for (size_t k = 0; k < SONDE_COUNT_OF(value); ++k)
-      sonde_file_printf(file, isfinite(value[k]) ? ",%.9g" : ",", value[k]);
-    sonde_file_printf(file, "\n");
-  }
-  return sonde_file_commit(file, error);
-}
-
 sonde_status sonde_score_save(const sonde_judge *judge, const sonde_case *truth,
                               const sonde_score *score, const sonde_score_note *note,
                               const char *json_path, const char *csv_path, sonde_error *error) {
@@ -188,6 +168,22 @@ sonde_status sonde_score_save(const sonde_judge *judge, const sonde_case *truth,
     sonde_file_printf(out.file, "\n");
     status = sonde_file_commit(out.file, error);
   }
-  if (!status && csv_path) status = save_csv(judge, csv_path, error);
-  return status;
+  if (status || !csv_path) return status;
+  sonde_file *file;
+  status = sonde_file_create(csv_path, &file, error);
+  if (status) return status;
+  sonde_file_printf(file, "press,result,segment,start_s,peak_s,end_s,z_mm,force_peak_n,vein_ratio,"
+                          "artery_ratio,artery_least,tilt_deg\n");
+  for (uint32_t i = 0; i < judge->press_count; ++i) {
+    const sonde_compression *p = &judge->press[i];
+    const double value[] = {p->start_s,      p->peak_s,       p->end_s,
+                            1e3 * p->z_m,    p->force_peak_n, p->vein_ratio,
+                            p->artery_ratio, p->artery_least, DEGREES * p->tilt_rad};
+    sonde_file_printf(file, "%u,%s,%s", i + 1, sonde_press_result_name(p->result),
+                      segment_of(&judge->map, p));
+    for (size_t k = 0; k < SONDE_COUNT_OF(value); ++k)
+      sonde_file_printf(file, isfinite(value[k]) ? ",%.9g" : ",", value[k]);
+    sonde_file_printf(file, "\n");
+  }
+  return sonde_file_commit(file, error);
 }
