@@ -26,7 +26,10 @@ static const app_option TABLE[] = {
     OPT_INTEGER(every, "every", "K", 1, 2000000000,
                 "write every K-th step and the last; default: 60 frames per second of the scene"),
     OPT_FLAG(no_frames, "no-frames", "write no VTK files"),
-    OPT_TEXT(picture, "picture", "FILE", "draw the bodies as they stand at the end (SVG)"),
+    OPT_TEXT(picture, "picture", "FILE",
+             "draw the bodies as they stand at the end: as a report that can be turned when FILE "
+             "ends in "
+             ".html, as SVG otherwise"),
     OPT_FLAG(resume, "resume",
              "go on from the snapshot in DIR; the result is the same, bit by bit, as that of a run "
              "without a break"),

@@ -1,18 +1,17 @@
-// settle_stage2:  what the simplified interaction's parameters give when neighbours may move.
-// linear_springs: the best linear law for every curve, the claim that the paper rejects.
-// add_*:          the report's tables.
-// fit_report_write: all of it.
+// The report of an estimation: collects its results, and the forces that only the report needs.
 #include "fit_report.h"
 
 #include "fit_doubts.h"
 
+#include <assert.h>
 #include <math.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
 
-enum { STAGES = 5, HOLDOUTS = 3 * SONDE_FIT_PROBES, NOTES = 5 + SONDE_DOUBTS };
+enum { STAGES = 5, HOLDOUTS = 3 * SONDE_FIT_PROBES, NOTES = 5 + SONDE_DOUBTS, NOTE = 900 };
 
 typedef struct builder {
   const fit_findings *in;
@@ -28,17 +27,13 @@ typedef struct builder {
   double correlation[16];
   double *stage2_full_n, *linear_n;
   const char *note[NOTES];
-  char date[32], text[NOTES][900];
+  char date[32], text[NOTES][NOTE];
 } builder;
 
-static void add_stage(builder *b, const char *name, uint32_t parameters, const double *model_n,
-                      bool is_main) {
-  if (!model_n) return;
-  b->stage[b->report.stage_count++] = (sonde_report_stage){name, parameters, model_n, is_main};
-}
+// ---- forces that only the report needs ----------------------------------------------------------
 
 // The least squares line F = k x through the origin for every (site, probe).
-static void linear_springs(const sonde_measurements *m, double *linear_n) {
+static void fit_linear_springs(const sonde_measurements *m, double *linear_n) {
   for (uint32_t i = 0; i < m->count; ++i) {
     double xf = 0, xx = 0;
     for (uint32_t k = 0; k < m->count; ++k) {
@@ -51,190 +46,12 @@ static void linear_springs(const sonde_measurements *m, double *linear_n) {
   }
 }
 
-static sonde_report_interval around(double value, double ln_sd) {
-  sonde_report_interval i = sonde_report_value(value);
-  i.lower = value * exp(-1.96 * ln_sd);
-  i.upper = value * exp(1.96 * ln_sd);
-  return i;
-}
-
-static void add_parameters(builder *b) {
-  const sonde_fit_result *r = b->in->result;
-  const sonde_fit_confidence *c = &r->confidence;
-  uint32_t count = 0;
-  b->parameter[count++] = (sonde_report_parameter){"edge stiffness of stage 2", "N/m",
-                                                   around(r->stage2_edge_n_m, r->edge_sd_log),
-                                                   "simplified interaction"};
-  if (c->band_n) {
-    sonde_report_interval g = around(r->law.shear_stiffness_n_m, c->ln_shear_sd);
-    sonde_report_interval gm = around(r->law.shear_limit, c->ln_limit_sd);
-    g.bootstrap_lower = c->shear_95[0], g.bootstrap_upper = c->shear_95[1];
-    gm.bootstrap_lower = c->limit_95[0], gm.bootstrap_upper = c->limit_95[1];
-    b->parameter[count++] =
-        (sonde_report_parameter){"shear stiffness G", "N/m", g, "bootstrap over sites, linearised"};
-    b->parameter[count++] = (sonde_report_parameter){"shear limit gm", "slope", gm, NULL};
-    b->parameter[count++] =
-        (sonde_report_parameter){"exponent of the normal springs", "",
-                                 sonde_report_value(r->law.normal_exponent), b->in->exponent_from};
-    b->parameter[count++] = (sonde_report_parameter){
-        "tangential stiffness", "N/m3", sonde_report_value(r->law.tangential_stiffness_n_m3),
-        "given: these data do not determine it"};
-    b->parameter[count++] = (sonde_report_parameter){
-        "in-plane stiffness of the skin", "N/m", sonde_report_value(r->law.inplane_stiffness_n_m),
-        "given: these data do not determine it"};
-    b->parameter[count++] =
-        (sonde_report_parameter){"smoothness of ln k0 and ln xm per site spacing", "",
-                                 sonde_report_value(c->smoothness_sd), "by leaving sites out"};
-    b->parameter[count++] = (sonde_report_parameter){
-        "smoothness of ln G and ln gm per site spacing", "",
-        sonde_report_value(c->shear_smoothness_sd), "by leaving sites out"};
-  }
-  b->report.parameters = b->parameter;
-  b->report.parameter_count = count;
-}
-
-static void add_sites(builder *b) {
-  const sonde_fit_result *r = b->in->result;
-  const sonde_fit_confidence *c = &r->confidence;
-  if (!c->band_n) return;
-  for (uint32_t s = 0; s < r->site_count; ++s)
-    b->site[s] = (sonde_report_site){
-        r->sites[s].id, around(r->sites[s].k0_n_m3, c->ln_k0_sd[s]),
-        around(r->sites[s].xm_m, c->ln_xm_sd[s]),
-        around(r->law.shear_stiffness_n_m * r->sites[s].shear_share, c->ln_site_shear_sd[s]),
-        around(r->law.shear_limit * r->sites[s].limit_share, c->ln_site_limit_sd[s])};
-  b->report.site_parameters = b->site;
-  b->report.site_parameter_count = r->site_count;
-  static const char *const NAMES[] = {"ln G", "ln gm", "mean ln k0", "mean ln xm"};
-  for (int k = 0; k < 16; ++k) b->correlation[k] = c->correlation[k / 4][k % 4];
-  b->report.correlation_names = NAMES;
-  b->report.correlation = b->correlation;
-  b->report.correlation_count = 4;
-  b->report.band_n = c->band_n;
-}
-
-static void add_profile(builder *b) {
-  const sonde_fit_profile *p = &b->in->checks->shear;
-  if (!p->count) return;
-  b->profile = (sonde_report_profile){.name = "shear stiffness G",
-                                      .unit = "N/m",
-                                      .count = p->count,
-                                      .x = p->shear_n_m,
-                                      .rise = p->rise,
-                                      .quadratic = p->quadratic,
-                                      .estimate = p->estimate_n_m,
-                                      .threshold = p->threshold};
-  b->report.profiles = &b->profile;
-  b->report.profile_count = 1;
-}
-
-// Rows of one parameter stand together.
-static void add_identifiability(builder *b) {
-  static const char *const NAMES[] = {"shear stiffness G", "shear limit gm",
-                                      "k0, mean of the sites", "xm, mean of the sites"};
-  const sonde_fit_identifiability *parts = &b->in->checks->parts;
-  uint32_t count = 0;
-  for (uint32_t p = 0; p < parts->count; ++p) fit_checks_name(&parts->part[p], b->part_name[p]);
-  for (int k = 0; k < 4; ++k)
-    for (uint32_t p = 0; p < parts->count; ++p)
-      b->determined[count++] =
-          (sonde_report_identifiability){NAMES[k], b->part_name[p], parts->part[p].ln_sd[k]};
-  b->report.identifiability = b->determined;
-  b->report.identifiability_count = count;
-}
-
-static void add_holdout(builder *b, const char *what, const sonde_error_report *out) {
-  const sonde_error_report *seen = &b->in->result->stage3;
-  for (uint32_t p = 0; p < out->probe_count && b->report.holdout_count < HOLDOUTS; ++p) {
-    if (!out->probes[p].count) continue;
-    double training = NAN;
-    for (uint32_t q = 0; q < seen->probe_count; ++q)
-      if (!strcmp(seen->probe[q], out->probe[p])) training = seen->probes[q].mae_percent;
-    b->holdout[b->report.holdout_count++] = (sonde_report_holdout){what,
-                                                                   out->probe[p],
-                                                                   out->probes[p].mae_n,
-                                                                   out->probes[p].sd_n,
-                                                                   out->probes[p].mae_percent,
-                                                                   training};
-  }
-  b->report.holdouts = b->holdout;
-}
-
-static void add_timings(builder *b) {
-  static const char *const NAMES[] = {"stage 1", "stage 2", "stage 3"};
-  for (uint32_t k = 0; k < 3; ++k)
-    if (b->in->result->stage_n[k])
-      b->timing[b->report.timing_count++] =
-          (sonde_report_timing){NAMES[k], b->in->result->seconds[k]};
-  b->report.timings = b->timing;
-}
-
-static void describe_layers(const fit_checks *checks, char *text, size_t room) {
-  int used = snprintf(text, room,
-                      "Laws of the layer between neighbours, each refitted; MAE, seen "
-                      "(sites left out, linearised):");
-  for (int k = 0; k < SONDE_FIT_LAYERS; ++k) {
-    const sonde_fit_layer *l = &checks->layer[k];
-    for (uint32_t p = 0; p < l->seen.probe_count && used > 0 && (size_t)used < room; ++p)
-      used += snprintf(text + used, room - (size_t)used, "%s%s %s %.2f %% (%.2f %%)",
-                       p   ? ", "
-                       : k ? "; "
-                           : " ",
-                       p ? "" : fit_checks_layer(l->kind), l->seen.probe[p],
-                       l->seen.probes[p].mae_percent, l->one_out.probes[p].mae_percent);
-  }
-}
-
-static void add_notes(builder *b) {
-  const sonde_fit_confidence *c = &b->in->result->confidence;
-  uint32_t count = 0;
-  if (c->tried_count) {
-    int used = snprintf(b->text[count], sizeof b->text[0],
-                        "Error of sites left out one by one (linearised), by smoothness:");
-    for (uint32_t k = 0; k < c->tried_count && used > 0 && (size_t)used < sizeof b->text[0]; ++k)
-      used += snprintf(b->text[count] + used, sizeof b->text[0] - (size_t)used, " %g: %.2f %%%s",
-                       c->tried_sd[k], c->tried_percent[k], k + 1 < c->tried_count ? "," : ".");
-    b->note[count] = b->text[count];
-    ++count;
-  }
-  const sonde_fit_identifiability *parts = &b->in->checks->parts;
-  if (parts->count > 1) {
-    int used = snprintf(b->text[count], sizeof b->text[0],
-                        "Correlation of ln G with mean ln k0, and condition of the correlations of "
-                        "G, gm, k0 and xm:");
-    for (uint32_t k = 0; k < parts->count && used > 0 && (size_t)used < sizeof b->text[0]; ++k) {
-      char name[40];
-      fit_checks_name(&parts->part[k], name);
-      used += snprintf(b->text[count] + used, sizeof b->text[0] - (size_t)used, " %s %+.2f, %.3g%s",
-                       name, parts->part[k].correlation[0][2], parts->part[k].condition,
-                       k + 1 < parts->count ? ";" : ".");
-    }
-    b->note[count] = b->text[count];
-    ++count;
-  }
-  if (b->in->checks->layers) {
-    describe_layers(b->in->checks, b->text[count], sizeof b->text[0]);
-    b->note[count] = b->text[count];
-    ++count;
-  }
-  for (uint32_t k = 0; k < b->in->doubts->count; ++k) {
-    int used = snprintf(b->text[count], sizeof b->text[0], "Warning: ");
-    fit_doubts_sentence(&b->in->doubts->doubt[k], b->in->path, b->text[count] + used,
-                        sizeof b->text[0] - (size_t)used);
-    b->note[count] = b->text[count];
-    ++count;
-  }
-  if (b->in->data->remark[0]) b->note[count++] = b->in->data->remark;
-  b->report.notes = b->note;
-  b->report.note_count = count;
-}
-
-// Settling the whole set takes minutes: a sample of the sites tells enough.
-enum { SAMPLE = 8, SAMPLE_FIRST = 3 };
-
+// Forces of a model on the equilibrium of the whole skin at every eighth site, NaN elsewhere:
+// settling all of them takes minutes.
 static sonde_status predict_sample(const sonde_model *model, const fit_findings *in,
                                    const sonde_progress *progress, double *full_n,
                                    sonde_error *error) {
+  enum { EVERY = 8, FIRST = 3 };
   const sonde_measurements *m = in->data;
   sonde_measurements some = *m;
   some.data = calloc(m->count, sizeof *some.data);
@@ -246,7 +63,7 @@ static sonde_status predict_sample(const sonde_model *model, const fit_findings 
     uint32_t s = 0;
     while (s < in->sites->count && in->sites->sites[s].id != m->data[i].site) ++s;
     full_n[i] = NAN;
-    if (s % SAMPLE != SAMPLE_FIRST % in->sites->count) continue;
+    if (s % EVERY != FIRST % in->sites->count) continue;
     row[some.count] = i;
     some.data[some.count++] = m->data[i];
   }
@@ -262,7 +79,7 @@ static sonde_status predict_sample(const sonde_model *model, const fit_findings 
   return status;
 }
 
-// Forces of the stage 2 parameters on the equilibrium of the whole skin.
+// What the simplified interaction's parameters give when neighbours may move.
 static sonde_status settle_stage2(const fit_findings *in, const sonde_progress *progress,
                                   double *full_n, sonde_error *error) {
   const sonde_fit_result *r = in->result;
@@ -272,8 +89,8 @@ static sonde_status settle_stage2(const fit_findings *in, const sonde_progress *
   md.sites = in->sites->sites;
   md.site_count = in->sites->count;
   md.fine_edge_m = 1; // the skin is refined already
-  sonde_status status = sonde_model_build(&md, &model, error);
   bool three = r->stage2_sites != NULL;
+  sonde_status status = sonde_model_build(&md, &model, error);
   if (!status)
     status = sonde_model_set_parameters(model, three ? &r->stage2_law : &r->law,
                                         three ? r->stage2_sites : r->sites, r->site_count, error);
@@ -282,59 +99,218 @@ static sonde_status settle_stage2(const fit_findings *in, const sonde_progress *
   return status;
 }
 
-static void add_stages(builder *b) {
+// ---- parts of the report ------------------------------------------------------------------------
+
+static void add_stage(builder *b, const char *name, uint32_t parameters, const double *model_n,
+                      bool is_main) {
+  if (!model_n) return;
+  assert(b->report.stage_count < STAGES);
+  b->stage[b->report.stage_count++] = (sonde_report_stage){name, parameters, model_n, is_main};
+}
+
+// The 95 % interval of a positive parameter whose logarithm has this standard deviation.
+static sonde_report_interval spread(double value, double ln_sd) {
+  sonde_report_interval i = sonde_report_value(value);
+  i.lower = value * exp(-1.96 * ln_sd);
+  i.upper = value * exp(1.96 * ln_sd);
+  return i;
+}
+
+static void add_parameters(builder *b) {
+  static const char *const GIVEN = "given: these data do not determine it";
+  static const char *const LEFT_OUT = "by leaving sites out";
+  static const char *const NAMES[] = {"ln G", "ln gm", "mean ln k0", "mean ln xm"};
   const sonde_fit_result *r = b->in->result;
-  bool three = r->stage_n[2] != NULL;
-  b->report.stages = b->stage;
-  add_stage(b, "linear springs, curve by curve", r->stage1_parameters / 2, b->linear_n, false);
-  add_stage(b, "stage 1, eq. (1) curve by curve", r->stage1_parameters, r->stage_n[0],
-            !r->stage_n[1]);
-  add_stage(b, "stage 2 in its simplified interaction (the paper)", r->stage2_parameters,
-            r->stage_n[1], !three);
-  add_stage(b, "stage 2's parameters in the full model (every eighth site)", r->stage2_parameters,
-            b->stage2_full_n, false);
-  add_stage(b, "stage 3, full model", r->parameters, r->stage_n[2], three);
+  const sonde_fit_confidence *c = &r->confidence;
+  b->report.parameters = b->parameter;
+  b->parameter[b->report.parameter_count++] = (sonde_report_parameter){
+      "edge stiffness of stage 2", "N/m", spread(r->stage2_edge_n_m, r->edge_sd_log),
+      "simplified interaction"};
+  if (!c->band_n) return; // what follows is known after stage 3
+
+  sonde_report_interval g = spread(r->law.shear_stiffness_n_m, c->ln_shear_sd);
+  sonde_report_interval gm = spread(r->law.shear_limit, c->ln_limit_sd);
+  g.bootstrap_lower = c->shear_95[0], g.bootstrap_upper = c->shear_95[1];
+  gm.bootstrap_lower = c->limit_95[0], gm.bootstrap_upper = c->limit_95[1];
+  const sonde_report_parameter whole[] = {
+      {"shear stiffness G", "N/m", g, "bootstrap over sites, linearised"},
+      {"shear limit gm", "slope", gm, NULL},
+      {"exponent of the normal springs", "", sonde_report_value(r->law.normal_exponent),
+       b->in->exponent_from},
+      {"tangential stiffness", "N/m\u00b3", sonde_report_value(r->law.tangential_stiffness_n_m3),
+       GIVEN},
+      {"in-plane stiffness of the skin", "N/m", sonde_report_value(r->law.inplane_stiffness_n_m),
+       GIVEN},
+      {"smoothness of ln k0 and ln xm per site spacing", "", sonde_report_value(c->smoothness_sd),
+       LEFT_OUT},
+      {"smoothness of ln G and ln gm per site spacing", "",
+       sonde_report_value(c->shear_smoothness_sd), LEFT_OUT}};
+  memcpy(&b->parameter[b->report.parameter_count], whole, sizeof whole);
+  b->report.parameter_count += sizeof whole / sizeof *whole;
+
+  for (uint32_t s = 0; s < r->site_count; ++s)
+    b->site[s] = (sonde_report_site){
+        r->sites[s].id, spread(r->sites[s].k0_n_m3, c->ln_k0_sd[s]),
+        spread(r->sites[s].xm_m, c->ln_xm_sd[s]),
+        spread(r->law.shear_stiffness_n_m * r->sites[s].shear_share, c->ln_site_shear_sd[s]),
+        spread(r->law.shear_limit * r->sites[s].limit_share, c->ln_site_limit_sd[s])};
+  b->report.site_parameters = b->site;
+  b->report.site_parameter_count = r->site_count;
+  for (int k = 0; k < 16; ++k) b->correlation[k] = c->correlation[k / 4][k % 4];
+  b->report.correlation_names = NAMES;
+  b->report.correlation = b->correlation;
+  b->report.correlation_count = 4;
+  b->report.band_n = c->band_n;
+}
+
+// The profile of G, and how well parts of the data determine each parameter: rows of one parameter
+// stand together.
+static void add_checks(builder *b) {
+  static const char *const NAMES[] = {"shear stiffness G", "shear limit gm",
+                                      "k0, mean of the sites", "xm, mean of the sites"};
+  const sonde_fit_profile *p = &b->in->checks->shear;
+  const sonde_fit_identifiability *parts = &b->in->checks->parts;
+  b->profile = (sonde_report_profile){"shear stiffness G", "N/m",       p->count,
+                                      p->shear_n_m,        p->rise,     p->quadratic,
+                                      p->estimate_n_m,     p->threshold};
+  b->report.profiles = &b->profile;
+  b->report.profile_count = p->count > 0;
+  for (uint32_t k = 0; k < parts->count; ++k) fit_checks_name(&parts->part[k], b->part_name[k]);
+  b->report.identifiability = b->determined;
+  for (int k = 0; k < 4; ++k)
+    for (uint32_t i = 0; i < parts->count; ++i)
+      b->determined[b->report.identifiability_count++] =
+          (sonde_report_identifiability){NAMES[k], b->part_name[i], parts->part[i].ln_sd[k]};
+}
+
+static void add_holdout(builder *b, const char *what, const sonde_error_report *out) {
+  const sonde_error_report *seen = &b->in->result->stage3;
+  b->report.holdouts = b->holdout;
+  for (uint32_t p = 0; p < out->probe_count && b->report.holdout_count < HOLDOUTS; ++p) {
+    if (!out->probes[p].count) continue;
+    double training = NAN;
+    for (uint32_t q = 0; q < seen->probe_count; ++q)
+      if (!strcmp(seen->probe[q], out->probe[p])) training = seen->probes[q].mae_percent;
+    b->holdout[b->report.holdout_count++] = (sonde_report_holdout){what,
+                                                                   out->probe[p],
+                                                                   out->probes[p].mae_n,
+                                                                   out->probes[p].sd_n,
+                                                                   out->probes[p].mae_percent,
+                                                                   training};
+  }
+}
+
+// ---- notes --------------------------------------------------------------------------------------
+
+// Appends to the note that is being written; what has no room is cut off.
+__attribute__((format(printf, 2, 3))) static void say(builder *b, const char *format, ...) {
+  assert(b->report.note_count < NOTES);
+  char *text = b->text[b->report.note_count];
+  size_t used = strlen(text);
+  va_list values;
+  va_start(values, format);
+  vsnprintf(text + used, NOTE - used, format, values);
+  va_end(values);
+}
+
+static void end_note(builder *b) {
+  b->note[b->report.note_count] = b->text[b->report.note_count];
+  ++b->report.note_count;
+}
+
+static void add_notes(builder *b) {
+  const sonde_fit_confidence *c = &b->in->result->confidence;
+  const fit_checks *checks = b->in->checks;
+  if (c->tried_count) {
+    say(b, "Error of sites left out one by one (linearised), by smoothness:");
+    for (uint32_t k = 0; k < c->tried_count; ++k)
+      say(b, " %g: %.2f %%%s", c->tried_sd[k], c->tried_percent[k],
+          k + 1 < c->tried_count ? "," : ".");
+    end_note(b);
+  }
+  if (checks->parts.count > 1) {
+    say(b, "Correlation of ln G with mean ln k0, and condition of the correlations of G, gm, k0 "
+           "and xm:");
+    for (uint32_t k = 0; k < checks->parts.count; ++k)
+      say(b, " %s %+.2f, %.3g%s", b->part_name[k], checks->parts.part[k].correlation[0][2],
+          checks->parts.part[k].condition, k + 1 < checks->parts.count ? ";" : ".");
+    end_note(b);
+  }
+  if (checks->layers) {
+    say(b, "Laws of the layer between neighbours, each refitted; MAE, seen (sites left out, "
+           "linearised):");
+    for (int k = 0; k < SONDE_FIT_LAYERS; ++k) {
+      const sonde_fit_layer *l = &checks->layer[k];
+      for (uint32_t p = 0; p < l->seen.probe_count; ++p)
+        say(b, "%s%s %s %.2f %% (%.2f %%)",
+            p   ? ", "
+            : k ? "; "
+                : " ",
+            p ? "" : fit_checks_layer(l->kind), l->seen.probe[p], l->seen.probes[p].mae_percent,
+            l->one_out.probes[p].mae_percent);
+    }
+    end_note(b);
+  }
+  for (uint32_t k = 0; k < b->in->doubts->count; ++k) {
+    char sentence[NOTE];
+    fit_doubts_sentence(&b->in->doubts->doubt[k], b->in->path, sentence, sizeof sentence);
+    say(b, "Warning: %s", sentence);
+    end_note(b);
+  }
+  if (b->in->data->remark[0]) {
+    say(b, "%s", b->in->data->remark);
+    end_note(b);
+  }
+  b->report.notes = b->note;
 }
 
 sonde_status fit_report_write(const fit_findings *in, const char *directory,
                               const sonde_progress *progress, sonde_error *error) {
+  const sonde_fit_result *r = in->result;
   builder *b = calloc(1, sizeof *b);
   double *full_n = calloc(in->data->count, sizeof *full_n);
   double *linear_n = calloc(in->data->count, sizeof *linear_n);
-  sonde_report_site *site = calloc(in->result->site_count, sizeof *site);
-  sonde_status status = SONDE_MEMORY;
-  if (!b || !full_n || !linear_n || !site) goto done;
-  *b = (builder){.in = in, .linear_n = linear_n, .site = site};
-  b->report = (sonde_fit_report){.title = "Estimation report",
-                                 .provenance = in->model->provenance,
-                                 .command_line = in->command_line,
-                                 .version = sonde_version(),
-                                 .model = in->model,
-                                 .sites = in->sites,
-                                 .data = in->data};
-  time_t now = time(NULL);
-  struct tm parts;
-  if (gmtime_r(&now, &parts) && strftime(b->date, sizeof b->date, "%Y-%m-%d %H:%M UTC", &parts))
-    b->report.date = b->date;
-  linear_springs(in->data, linear_n);
-  status = SONDE_OK;
-  if (in->result->stage_n[1]) {
-    b->stage2_full_n = full_n;
-    status = settle_stage2(in, progress, full_n, error);
+  sonde_report_site *site = calloc(r->site_count, sizeof *site);
+  sonde_status status = b && full_n && linear_n && site ? SONDE_OK : SONDE_MEMORY;
+  if (!status && r->stage_n[1]) status = settle_stage2(in, progress, full_n, error);
+  if (!status) {
+    bool three = r->stage_n[2] != NULL;
+    *b = (builder){.in = in, .site = site};
+    b->report = (sonde_fit_report){.title = "Estimation report",
+                                   .provenance = in->model->provenance,
+                                   .command_line = in->command_line,
+                                   .version = sonde_version(),
+                                   .model = in->model,
+                                   .sites = in->sites,
+                                   .data = in->data,
+                                   .stages = b->stage,
+                                   .timings = b->timing};
+    time_t now = time(NULL);
+    struct tm parts;
+    if (gmtime_r(&now, &parts) && strftime(b->date, sizeof b->date, "%Y-%m-%d %H:%M UTC", &parts))
+      b->report.date = b->date;
+    fit_linear_springs(in->data, linear_n);
+    add_stage(b, "linear springs, curve by curve", r->stage1_parameters / 2, linear_n, false);
+    add_stage(b, "stage 1, eq. (1) curve by curve", r->stage1_parameters, r->stage_n[0],
+              !r->stage_n[1]);
+    add_stage(b, "stage 2 in its simplified interaction (the paper)", r->stage2_parameters,
+              r->stage_n[1], !three);
+    add_stage(b, "stage 2's parameters in the full model (every eighth site)", r->stage2_parameters,
+              r->stage_n[1] ? full_n : NULL, false);
+    add_stage(b, "stage 3, full model", r->parameters, r->stage_n[2], three);
+    add_parameters(b);
+    add_checks(b);
+    if (r->confidence.one_out_n)
+      add_holdout(b, "one site at a time (linearised)", &r->confidence.one_out);
+    if (in->hold_out) add_holdout(b, in->hold_out_name, in->hold_out);
+    if (in->also) add_holdout(b, "sites, refitted; probe never fitted", in->also);
+    static const char *const NAMES[] = {"stage 1", "stage 2", "stage 3"};
+    for (int k = 0; k < 3; ++k)
+      if (r->stage_n[k])
+        b->timing[b->report.timing_count++] = (sonde_report_timing){NAMES[k], r->seconds[k]};
+    add_notes(b);
+    status = sonde_fit_report_write(&b->report, directory, error);
   }
-  add_stages(b);
-  add_parameters(b);
-  add_sites(b);
-  if (in->result->confidence.one_out_n)
-    add_holdout(b, "one site at a time (linearised)", &in->result->confidence.one_out);
-  if (in->hold_out) add_holdout(b, in->hold_out_name, in->hold_out);
-  if (in->also) add_holdout(b, "sites, refitted; probe never fitted", in->also);
-  add_profile(b);
-  add_identifiability(b);
-  add_timings(b);
-  add_notes(b);
-  if (!status) status = sonde_fit_report_write(&b->report, directory, error);
-done:
   free(b);
   free(full_n);
   free(linear_n);

@@ -1,44 +1,47 @@
-// Draws the surfaces of a scene's bodies as SVG.
+// The bodies of a scene as they stand: an SVG drawing, or a report as HTML with measures and
+// surfaces that turn.
 //
-// Faces turned to the viewer are cut into small pieces and painted from back to front in thin
-// layers of depth; pieces of one body, shade and layer are one path.
-//
-// look         the camera: a parallel projection
-// fit          its scale and place, so that all bodies are seen
-// cut_face     pieces of a face, by halving its longest edge
-// collect      the pieces of all bodies
-// paint        paths in order of depth
-// write_names  names in the colours of the bodies, and the time
-// scene_figure
+// In the drawing faces turned to the viewer are cut into small pieces and painted from back to
+// front in thin layers of depth; pieces of one body, shade and layer are one path.
 #include "scene_figure.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
-enum { WIDTH = 520, TALLEST = 460, MARGIN = 12, LEGEND = 26, LAYERS = 240, SHADES = 48 };
-enum { PIECES_MOST = 400000, DEEPEST = 12 };
+enum {
+  WIDTH = 520,
+  TALLEST = 460,
+  MARGIN = 12,
+  LEGEND = 26,
+  LAYERS = 240,
+  SHADES = 48,
+  DEEPEST = 12
+};
+enum { PIECES_MOST = 400000, DIGITS = 9, PLACES = 6 };
 static const double PIECE_PX = 22; // longest edge of a piece
 
+// A parallel projection: axes of the view, pixels per metre, pixels of the origin, range of depth.
 typedef struct camera {
   sonde_vec3 right, up, toward;
-  double scale, left, top, least, most; // pixels per metre, origin, range of depth
+  double scale, left, top, least_m, most_m;
 } camera;
 
 typedef struct piece {
-  double at[3][2];
+  double xy[3][2];
   uint32_t layer, body, shade;
 } piece;
 
 typedef struct figure {
   const sonde_scene *scene;
   camera camera;
-  double height;
-  sonde_vec3 **place; // [bodies] vertices
+  sonde_vec3 **vertex; // [bodies] of the surface, m
   piece *pieces;
-  uint32_t count, room;
+  uint32_t count;
 } figure;
 
-static sonde_vec3 along(sonde_vec3 a, double s, sonde_vec3 b) {
+static sonde_vec3 madd(sonde_vec3 a, double s, sonde_vec3 b) {
   return (sonde_vec3){a.x + s * b.x, a.y + s * b.y, a.z + s * b.z};
 }
 static double dot(sonde_vec3 a, sonde_vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
@@ -47,181 +50,243 @@ static sonde_vec3 cross(sonde_vec3 a, sonde_vec3 b) {
 }
 static sonde_vec3 unit(sonde_vec3 a) {
   double size = sqrt(dot(a, a));
-  return along((sonde_vec3){0, 0, 0}, size > 0 ? 1 / size : 0, a);
+  return madd((sonde_vec3){0, 0, 0}, size > 0 ? 1 / size : 0, a);
 }
 
-static camera look(sonde_vec3 up) {
+// Seen from above and the side; up is against gravity, or z without any.
+static camera look(const figure *f) {
   const double AROUND = 0.55, ABOVE = 0.42; // rad
+  const sonde_vec3 none = {0, 0, 0};
+  sonde_vec3 up = madd(none, -1, sonde_scene_gravity(f->scene));
   if (!(dot(up, up) > 0)) up = (sonde_vec3){0, 0, 1};
   up = unit(up);
   sonde_vec3 side = fabs(up.x) < 0.9 ? (sonde_vec3){1, 0, 0} : (sonde_vec3){0, 0, 1};
-  side = unit(along(side, -dot(side, up), up));
-  sonde_vec3 front = cross(side, up), none = {0, 0, 0};
-  sonde_vec3 level = along(along(none, cos(AROUND), front), sin(AROUND), side);
-  camera c = {.toward = along(along(none, cos(ABOVE), level), sin(ABOVE), up), .scale = 1};
+  side = unit(madd(side, -dot(side, up), up));
+  sonde_vec3 level = madd(madd(none, cos(AROUND), cross(side, up)), sin(AROUND), side);
+  camera c = {.toward = madd(madd(none, cos(ABOVE), level), sin(ABOVE), up)};
   c.right = unit(cross(up, c.toward));
   c.up = cross(c.toward, c.right);
+
+  // Scale and origin such that all bodies are seen.
+  double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+  for (uint32_t b = 0; b < sonde_scene_body_count(f->scene); ++b)
+    for (uint32_t i = 0; i < sonde_scene_body(f->scene, b).surface->vertex_count; ++i) {
+      sonde_vec3 p = f->vertex[b][i];
+      const double at[3] = {dot(p, c.right), dot(p, c.up), dot(p, c.toward)};
+      for (int k = 0; k < 3; ++k) low[k] = fmin(low[k], at[k]), high[k] = fmax(high[k], at[k]);
+    }
+  double across = fmax(high[0] - low[0], 1e-9), tall = fmax(high[1] - low[1], 1e-9);
+  c.scale = fmin((WIDTH - 2 * MARGIN) / across, TALLEST / tall);
+  c.left = 0.5 * (WIDTH - c.scale * (low[0] + high[0]));
+  c.top = MARGIN + c.scale * high[1];
+  c.least_m = low[2], c.most_m = fmax(high[2], low[2] + 1e-9);
   return c;
 }
 
-static void fit(figure *f) {
-  camera *c = &f->camera;
-  double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-  for (uint32_t b = 0; b < sonde_scene_body_count(f->scene); ++b) {
-    uint32_t count = sonde_scene_body(f->scene, b).surface->vertex_count;
-    for (uint32_t i = 0; i < count; ++i) {
-      sonde_vec3 p = f->place[b][i];
-      const double at[3] = {dot(p, c->right), dot(p, c->up), dot(p, c->toward)};
-      for (int k = 0; k < 3; ++k) low[k] = fmin(low[k], at[k]), high[k] = fmax(high[k], at[k]);
-    }
-  }
-  double across = fmax(high[0] - low[0], 1e-9), tall = fmax(high[1] - low[1], 1e-9);
-  c->scale = fmin((WIDTH - 2 * MARGIN) / across, TALLEST / tall);
-  c->left = 0.5 * (WIDTH - c->scale * (low[0] + high[0]));
-  c->top = MARGIN + c->scale * high[1];
-  c->least = low[2];
-  c->most = fmax(high[2], low[2] + 1e-9);
-  f->height = 2 * MARGIN + LEGEND + c->scale * tall;
-}
-
-static void add_piece(figure *f, const sonde_vec3 p[3], uint32_t body, uint32_t shade) {
-  const camera *c = &f->camera;
-  if (f->count == f->room) return;
-  piece *out = &f->pieces[f->count++];
-  double depth = 0;
-  for (int k = 0; k < 3; ++k) {
-    out->at[k][0] = c->left + c->scale * dot(p[k], c->right);
-    out->at[k][1] = c->top - c->scale * dot(p[k], c->up);
-    depth += dot(p[k], c->toward) / 3;
-  }
-  out->layer = (uint32_t)fmin((depth - c->least) / (c->most - c->least) * LAYERS, LAYERS - 1);
-  out->body = body;
-  out->shade = shade;
-}
-
+// Pieces of a face, by halving its longest edge.
 static void cut_face(figure *f, const sonde_vec3 p[3], uint32_t body, uint32_t shade, int depth) {
+  const camera *c = &f->camera;
   int longest = 0;
   double most = 0;
   for (int k = 0; k < 3; ++k) {
-    sonde_vec3 edge = along(p[(k + 1) % 3], -1, p[k]);
+    sonde_vec3 edge = madd(p[(k + 1) % 3], -1, p[k]);
     if (dot(edge, edge) > most) most = dot(edge, edge), longest = k;
   }
-  if (sqrt(most) * f->camera.scale < PIECE_PX || depth == DEEPEST) {
-    add_piece(f, p, body, shade);
+  if (sqrt(most) * c->scale >= PIECE_PX && depth < DEEPEST) {
+    sonde_vec3 a = p[longest], b = p[(longest + 1) % 3], other = p[(longest + 2) % 3];
+    sonde_vec3 middle = madd(a, 0.5, madd(b, -1, a));
+    cut_face(f, (const sonde_vec3[3]){a, middle, other}, body, shade, depth + 1);
+    cut_face(f, (const sonde_vec3[3]){middle, b, other}, body, shade, depth + 1);
     return;
   }
-  sonde_vec3 a = p[longest], b = p[(longest + 1) % 3], c = p[(longest + 2) % 3];
-  sonde_vec3 middle = along(a, 0.5, along(b, -1, a));
-  cut_face(f, (const sonde_vec3[3]){a, middle, c}, body, shade, depth + 1);
-  cut_face(f, (const sonde_vec3[3]){middle, b, c}, body, shade, depth + 1);
-}
-
-// Light from above the viewer's left shoulder.
-static void collect(figure *f) {
-  const camera *c = &f->camera;
-  sonde_vec3 light = unit(along(along(c->toward, 1.1, c->up), -0.5, c->right));
-  for (uint32_t b = 0; b < sonde_scene_body_count(f->scene); ++b) {
-    const sonde_mesh *mesh = sonde_scene_body(f->scene, b).surface;
-    for (uint32_t i = 0; i < mesh->face_count; ++i) {
-      const uint32_t *v = mesh->faces[i];
-      const sonde_vec3 p[3] = {f->place[b][v[0]], f->place[b][v[1]], f->place[b][v[2]]};
-      sonde_vec3 normal = unit(cross(along(p[1], -1, p[0]), along(p[2], -1, p[0])));
-      if (!(dot(normal, c->toward) > 0)) continue;
-      double lit = fmax(dot(normal, light), 0);
-      cut_face(f, p, b, (uint32_t)fmin(lit * SHADES, SHADES - 1), 0);
-    }
+  if (f->count == PIECES_MOST) return;
+  piece *out = &f->pieces[f->count++];
+  double depth_m = 0;
+  for (int k = 0; k < 3; ++k) {
+    out->xy[k][0] = c->left + c->scale * dot(p[k], c->right);
+    out->xy[k][1] = c->top - c->scale * dot(p[k], c->up);
+    depth_m += dot(p[k], c->toward) / 3;
   }
+  double share = (depth_m - c->least_m) / (c->most_m - c->least_m);
+  out->layer = (uint32_t)fmin(share * LAYERS, LAYERS - 1);
+  out->body = body, out->shade = shade;
 }
 
-static int back_to_front(const void *a, const void *b) {
+static int compare_pieces(const void *a, const void *b) {
   const piece *x = a, *y = b;
   if (x->layer != y->layer) return x->layer < y->layer ? -1 : 1;
   if (x->body != y->body) return x->body < y->body ? -1 : 1;
   return (x->shade > y->shade) - (x->shade < y->shade);
 }
 
-static uint32_t colour(uint32_t body, uint32_t shade) {
+static void format_look(char look[64], const char *format, uint32_t body, uint32_t shade) {
   static const uint8_t BASE[][3] = {{214, 196, 168}, {214, 106, 84},  {92, 138, 190},
                                     {128, 128, 134}, {112, 168, 110}, {186, 140, 190}};
   const uint8_t *base = BASE[body % (sizeof BASE / sizeof *BASE)];
   double light = 0.5 + 0.58 * shade / (SHADES - 1);
-  uint32_t out = 0;
-  for (int k = 0; k < 3; ++k) out = out << 8 | (uint32_t)fmin(base[k] * light, 255);
-  return out;
+  unsigned rgb = 0;
+  for (int k = 0; k < 3; ++k) rgb = rgb << 8 | (unsigned)fmin(base[k] * light, 255);
+  snprintf(look, 64, format, rgb, rgb);
 }
 
-static void paint(figure *f, sonde_file *file) {
-  qsort(f->pieces, f->count, sizeof *f->pieces, back_to_front);
-  for (uint32_t i = 0; i < f->count;) {
-    const piece *first = &f->pieces[i];
-    unsigned fill = colour(first->body, first->shade);
-    sonde_file_printf(file, "<path fill='#%06x' stroke='#%06x' d='", fill, fill);
-    for (; i < f->count && back_to_front(first, &f->pieces[i]) == 0; ++i) {
-      const piece *p = &f->pieces[i];
-      sonde_file_printf(file, "M%.1f %.1fL%.1f %.1f %.1f %.1fz", p->at[0][0], p->at[0][1],
-                        p->at[1][0], p->at[1][1], p->at[2][0], p->at[2][1]);
+// Light from above the viewer's left shoulder; then names in the colours of the bodies, and the
+// time.
+static sonde_status draw_bodies(figure *f, double time_s, const char *path, sonde_error *error) {
+  const camera *c = &f->camera;
+  sonde_vec3 light = unit(madd(madd(c->toward, 1.1, c->up), -0.5, c->right));
+  double lowest = 0;
+  for (uint32_t b = 0; b < sonde_scene_body_count(f->scene); ++b) {
+    const sonde_mesh *mesh = sonde_scene_body(f->scene, b).surface;
+    for (uint32_t i = 0; i < mesh->vertex_count; ++i)
+      lowest = fmax(lowest, c->top - c->scale * dot(f->vertex[b][i], c->up));
+    for (uint32_t i = 0; i < mesh->face_count; ++i) {
+      const uint32_t *v = mesh->faces[i];
+      const sonde_vec3 p[3] = {f->vertex[b][v[0]], f->vertex[b][v[1]], f->vertex[b][v[2]]};
+      sonde_vec3 normal = unit(cross(madd(p[1], -1, p[0]), madd(p[2], -1, p[0])));
+      if (!(dot(normal, c->toward) > 0)) continue;
+      double lit = fmax(dot(normal, light), 0);
+      cut_face(f, p, b, (uint32_t)fmin(lit * SHADES, SHADES - 1), 0);
     }
-    sonde_file_printf(file, "'/>\n");
   }
-}
+  qsort(f->pieces, f->count, sizeof *f->pieces, compare_pieces);
 
-// Names of bodies are letters, digits, '-' and '_': nothing to escape.
-static void write_names(const figure *f, const sonde_scene_state *state, sonde_file *file) {
-  double x = MARGIN, y = f->height - MARGIN;
-  for (uint32_t b = 0; b < sonde_scene_body_count(f->scene) && x < WIDTH - 170; ++b) {
-    const char *name = sonde_scene_body(f->scene, b).name;
-    int written = 0;
-    sonde_file_printf(file, "<rect x='%.0f' y='%.0f' width='11' height='11' fill='#%06x'/>\n", x,
-                      y - 10, (unsigned)colour(b, SHADES - 2));
-    sonde_file_printf(file, "<text x='%.0f' y='%.0f'>%s</text>\n", x + 16, y, name);
-    while (name[written]) ++written;
-    x += 34 + 7.5 * written;
-  }
-  sonde_file_printf(file, "<text x='%d' y='%.0f' text-anchor='end'>t = %.3f s</text>\n",
-                    WIDTH - MARGIN, y, sonde_scene_time(state));
-}
-
-static sonde_status write_figure(figure *f, const sonde_scene_state *state, const char *path,
-                                 sonde_error *error) {
   sonde_file *file = NULL;
-  sonde_status status = sonde_file_create(path, &file, error);
+  double(*xy)[2] = malloc(3 * ((size_t)f->count + 1) * sizeof *xy);
+  sonde_status status = xy ? sonde_file_create(path, &file, error) : SONDE_MEMORY;
+  if (!status) {
+    char words[64];
+    double x = MARGIN, y = lowest + MARGIN + LEGEND - 12;
+    sonde_svg_begin(file, sonde_scene_title(f->scene), WIDTH, y + MARGIN);
+    for (uint32_t i = 0; i < f->count;) {
+      const piece *first = &f->pieces[i];
+      uint32_t corners = 0;
+      for (; i < f->count && compare_pieces(first, &f->pieces[i]) == 0; ++i, corners += 3)
+        memcpy(xy[corners], f->pieces[i].xy, sizeof f->pieces[i].xy);
+      format_look(words, "fill='#%06x' stroke='#%06x' stroke-width='.6'", first->body,
+                  first->shade);
+      sonde_svg_put_outlines(file, (const double(*)[2])xy, corners, 3, words);
+    }
+    for (uint32_t b = 0; b < sonde_scene_body_count(f->scene) && x < WIDTH - 170; ++b) {
+      const char *name = sonde_scene_body(f->scene, b).name;
+      const double box[4][2] = {{x, y - 10}, {x + 11, y - 10}, {x + 11, y + 1}, {x, y + 1}};
+      format_look(words, "fill='#%06x'", b, SHADES - 2);
+      sonde_svg_put_outlines(file, box, 4, 4, words);
+      sonde_svg_put_text(file, x + 16, y, "", name);
+      x += 34 + 7.5 * (double)strlen(name);
+    }
+    snprintf(words, sizeof words, "t = %.3f s", time_s);
+    sonde_svg_put_text(file, WIDTH - MARGIN, y, "class='end'", words);
+    status = sonde_svg_end(file, error);
+  }
+  free(xy);
+  return status;
+}
+
+// ---- report -------------------------------------------------------------------------------------
+
+static void put(sonde_json_out *out, const char *key, double value) {
+  sonde_json_put_real(out, key, value, DIGITS);
+}
+
+static double norm(sonde_vec3 v) { return sqrt(dot(v, v)); }
+
+static void put_bodies(sonde_json_out *out, const figure *f, const sonde_scene_state *state) {
+  static const char *const KIND[] = {"rigid", "surface", "lattice", "thigh"};
+  sonde_json_begin_list(out, "bodies");
+  for (uint32_t b = 0; b < sonde_scene_body_count(f->scene); ++b) {
+    sonde_body_info body = sonde_scene_body(f->scene, b);
+    sonde_body_measure m = sonde_scene_measure(state, b);
+    sonde_json_begin_object(out, NULL);
+    sonde_json_put_text(out, "name", body.name);
+    sonde_json_put_text(out, "kind", KIND[body.kind]);
+    sonde_json_put_integer(out, "nodes", body.node_count);
+    put(out, "mass_kg", body.mass.mass_kg);
+    sonde_json_begin_list(out, "centre_mm");
+    put(out, NULL, 1e3 * m.centre_m.x), put(out, NULL, 1e3 * m.centre_m.y);
+    put(out, NULL, 1e3 * m.centre_m.z);
+    sonde_json_end(out);
+    put(out, "speed_mm_s", 1e3 * norm(m.velocity_m_s));
+    put(out, "kinetic_mj", 1e3 * m.kinetic_j);
+    put(out, "elastic_mj", 1e3 * m.elastic_j);
+    sonde_json_begin_list(out, "position_mm");
+    for (uint32_t i = 0; i < body.surface->vertex_count; ++i) {
+      const sonde_vec3 p = f->vertex[b][i];
+      sonde_json_put_real(out, NULL, 1e3 * p.x, PLACES);
+      sonde_json_put_real(out, NULL, 1e3 * p.y, PLACES);
+      sonde_json_put_real(out, NULL, 1e3 * p.z, PLACES);
+    }
+    sonde_json_end(out);
+    sonde_json_begin_list(out, "face");
+    for (uint32_t i = 0; i < body.surface->face_count; ++i)
+      for (int k = 0; k < 3; ++k) sonde_json_put_integer(out, NULL, body.surface->faces[i][k]);
+    sonde_json_end(out);
+    sonde_json_end(out);
+  }
+  sonde_json_end(out);
+}
+
+static sonde_status write_report(const figure *f, const sonde_scene_state *state, const char *path,
+                                 sonde_error *error) {
+  sonde_json_out out = {0};
+  sonde_status status = sonde_file_in_memory(&out.file, error);
   if (status) return status;
-  sonde_file_printf(file,
-                    "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 %d %.0f' width='%d' "
-                    "height='%.0f' font-family='sans-serif' font-size='13'>\n"
-                    "<rect width='100%%' height='100%%' fill='#fff'/>\n"
-                    "<g stroke-width='.6' stroke-linejoin='round'>\n",
-                    WIDTH, f->height, WIDTH, f->height);
-  paint(f, file);
-  sonde_file_printf(file, "</g>\n<g fill='#333'>\n");
-  write_names(f, state, file);
-  sonde_file_printf(file, "</g>\n</svg>\n");
-  return sonde_file_commit(file, error);
+  sonde_json_begin_object(&out, NULL);
+  sonde_json_put_text(&out, "kind", "scene");
+  sonde_json_put_text(&out, "title", sonde_scene_title(f->scene));
+  sonde_json_put_text(&out, "version", sonde_version());
+  put(&out, "time_s", sonde_scene_time(state));
+  sonde_json_put_integer(&out, "steps", (int64_t)sonde_scene_tick(state));
+  sonde_json_put_integer(&out, "flagged_steps", (int64_t)sonde_scene_flag_count(state));
+  sonde_vec3 gravity = sonde_scene_gravity(f->scene);
+  sonde_json_begin_list(&out, "gravity_m_s2");
+  put(&out, NULL, gravity.x), put(&out, NULL, gravity.y), put(&out, NULL, gravity.z);
+  sonde_json_end(&out);
+  put_bodies(&out, f, state);
+  sonde_json_begin_list(&out, "contacts");
+  for (uint32_t k = 0; k < sonde_scene_pair_count(f->scene); ++k) {
+    sonde_scene_pair pair = sonde_scene_pair_at(f->scene, k);
+    sonde_pair_measure m = sonde_scene_pair_measure(state, k);
+    sonde_json_begin_object(&out, NULL);
+    sonde_json_put_text(&out, "a", sonde_scene_body(f->scene, pair.a).name);
+    sonde_json_put_text(&out, "b", sonde_scene_body(f->scene, pair.b).name);
+    put(&out, "normal_n", m.normal_n);
+    put(&out, "friction_n", norm(m.friction_n));
+    put(&out, "depth_mm", 1e3 * m.depth_m);
+    put(&out, "area_mm2", 1e6 * m.area_m2);
+    put(&out, "volume_mm3", 1e9 * m.volume_m3);
+    put(&out, "energy_mj", 1e3 * m.energy_j);
+    sonde_json_end(&out);
+  }
+  sonde_json_end(&out);
+  sonde_json_end(&out);
+  char *json = NULL;
+  size_t length = 0;
+  status = sonde_file_take(out.file, &json, &length, error);
+  if (!status) status = sonde_report_write(path, sonde_scene_title(f->scene), json, length, error);
+  sonde_free(json);
+  return status;
 }
 
 sonde_status scene_figure(const sonde_scene *scene, const sonde_scene_state *state,
                           const char *path, sonde_error *error) {
   uint32_t bodies = sonde_scene_body_count(scene);
-  figure f = {.scene = scene,
-              .camera = look(along((sonde_vec3){0, 0, 0}, -1, sonde_scene_gravity(scene))),
-              .room = PIECES_MOST};
-  f.place = calloc(bodies, sizeof *f.place);
-  f.pieces = malloc(PIECES_MOST * sizeof *f.pieces);
-  bool good = f.place && f.pieces;
+  const char *ending = strrchr(path, '.');
+  figure f = {.scene = scene, .vertex = calloc(bodies, sizeof *f.vertex)};
+  bool good = f.vertex != NULL;
   for (uint32_t b = 0; b < bodies && good; ++b) {
-    uint32_t count = sonde_scene_body(scene, b).surface->vertex_count;
-    f.place[b] = calloc(count, sizeof **f.place);
-    good = f.place[b] != NULL;
-    if (good) sonde_scene_surface(state, b, f.place[b]);
+    f.vertex[b] = calloc(sonde_scene_body(scene, b).surface->vertex_count, sizeof **f.vertex);
+    good = f.vertex[b] != NULL;
+    if (good) sonde_scene_surface(state, b, f.vertex[b]);
   }
   sonde_status status = SONDE_MEMORY;
-  if (good) {
-    fit(&f);
-    collect(&f);
-    status = write_figure(&f, state, path, error);
+  if (good && ending && strcmp(ending, ".html") == 0) {
+    status = write_report(&f, state, path, error);
+  } else if (good && (f.pieces = malloc(PIECES_MOST * sizeof *f.pieces))) {
+    f.camera = look(&f);
+    status = draw_bodies(&f, sonde_scene_time(state), path, error);
   }
-  for (uint32_t b = 0; f.place && b < bodies; ++b) free(f.place[b]);
-  free(f.place);
+  for (uint32_t b = 0; f.vertex && b < bodies; ++b) free(f.vertex[b]);
+  free(f.vertex);
   free(f.pieces);
   return status;
 }

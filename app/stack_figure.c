@@ -2,15 +2,9 @@
 //
 // Positions are those of the frames, the way along the sweep stretched so that sheets show; the
 // view keeps the first frame's columns and rows upright and shifts depth along a diagonal.
-//
-// used_plane      plane of the used part of a frame
-// in_axes         where a pixel of a plane lies, in the axes of the first frame
-// project         from there to the figure's pixels
-// set_axes, fit   the view
-// draw_sheet      one plane: its pixels, dimmed, or framed in white
-// stack_figure
 #include "stack_figure.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stddef.h>
 
@@ -48,20 +42,6 @@ static void project(const view *v, const sonde_affine *plane, double u, double w
   at[1] = v->top + v->scale * (p[1] + 0.22 * p[0] - 0.30 * depth);
 }
 
-static void set_axes(view *v, const sonde_affine *last, double u, double w) {
-  double *x = v->axes[0], *y = v->axes[1], *n = v->axes[2], sx = 0, sy = 0, p[3];
-  for (int i = 0; i < 3; ++i) {
-    x[i] = v->first.m[i][0], y[i] = v->first.m[i][1];
-    sx += x[i] * x[i], sy += y[i] * y[i];
-  }
-  for (int i = 0; i < 3; ++i) x[i] /= sqrt(sx), y[i] /= sqrt(sy);
-  for (int i = 0; i < 3; ++i)
-    n[i] = x[(i + 1) % 3] * y[(i + 2) % 3] - x[(i + 2) % 3] * y[(i + 1) % 3];
-  in_axes(v, last, u, w, p);
-  if (p[2] < 0)
-    for (int i = 0; i < 3; ++i) n[i] = -n[i];
-}
-
 // Parallelogram of a plane: figure pixel -> plane pixel by the inverse of the projected axes.
 // @param stride of the rows of pixels
 static void draw_sheet(const view *v, const sonde_affine *plane, const uint8_t *pixels,
@@ -88,63 +68,64 @@ static void draw_sheet(const view *v, const sonde_affine *plane, const uint8_t *
     }
 }
 
-// Scale and place such that all corners fit.
-static void fit(view *v, const sonde_sequence *s, uint32_t last) {
-  double low[2] = {1e9, 1e9}, high[2] = {-1e9, -1e9}, way[3];
+// The view of the used frames; false for a single one, which has no way along the sweep.
+static bool fit_view(view *v, const sonde_sequence *s) {
+  uint32_t first = 0, last = s->count - 1;
+  while (first < last && !s->frames[first].used) ++first;
+  while (last > first && !s->frames[last].used) --last;
+  if (first == last) return false;
+
+  // Axes: columns, rows and normal of the first frame, the normal towards the last one.
+  v->first = used_plane(s, first);
+  sonde_affine end = used_plane(s, last);
+  double *x = v->axes[0], *y = v->axes[1], *n = v->axes[2], width = 0, height = 0, along[3];
+  for (int i = 0; i < 3; ++i) width = hypot(width, v->first.m[i][0]);
+  for (int i = 0; i < 3; ++i) height = hypot(height, v->first.m[i][1]);
+  for (int i = 0; i < 3; ++i) x[i] = v->first.m[i][0] / width, y[i] = v->first.m[i][1] / height;
+  for (int i = 0; i < 3; ++i)
+    n[i] = x[(i + 1) % 3] * y[(i + 2) % 3] - x[(i + 2) % 3] * y[(i + 1) % 3];
+  in_axes(v, &end, s->clip[2] / 2.0, s->clip[3] / 2.0, along);
+  for (int i = 0; i < 3 && along[2] < 0; ++i) n[i] = -n[i];
+  in_axes(v, &end, 0, 0, along);
+  v->stretch = along[2] > 1e-6 ? 3 * width * s->clip[2] / along[2] : 1;
+
+  // Scale and origin such that all corners fit.
+  double low[2] = {1e9, 1e9}, high[2] = {-1e9, -1e9};
   v->scale = 1, v->left = v->top = 0;
-  sonde_affine plane = used_plane(s, last);
-  in_axes(v, &plane, 0, 0, way);
-  double width = 0;
-  for (int i = 0; i < 3; ++i) width = hypot(width, v->first.m[i][0] * s->clip[2]);
-  v->stretch = way[2] > 1e-6 ? 3 * width / way[2] : 1;
   for (uint32_t i = 0; i < s->count; ++i) {
-    plane = used_plane(s, i);
+    sonde_affine plane = used_plane(s, i);
     for (int corner = 0; corner < 4 && s->frames[i].used; ++corner) {
       double at[2];
       project(v, &plane, corner & 1 ? s->clip[2] - 1.0 : 0, corner & 2 ? s->clip[3] - 1.0 : 0, at);
       for (int k = 0; k < 2; ++k) low[k] = fmin(low[k], at[k]), high[k] = fmax(high[k], at[k]);
     }
   }
-  double x = (FIGURE_WIDTH - 2 * MARGIN) / (high[0] - low[0]);
-  double y = (FIGURE_HEIGHT - 2 * MARGIN) / (high[1] - low[1]);
-  v->scale = fmin(x, y);
+  v->scale = fmin((FIGURE_WIDTH - 2 * MARGIN) / (high[0] - low[0]),
+                  (FIGURE_HEIGHT - 2 * MARGIN) / (high[1] - low[1]));
   v->left = MARGIN - v->scale * low[0];
   v->top = MARGIN - v->scale * low[1];
-}
-
-static bool prepare(view *v, const sonde_sequence *s) {
-  uint32_t first = 0, last = s->count - 1;
-  while (first < last && !s->frames[first].used) ++first;
-  while (last > first && !s->frames[last].used) --last;
-  if (first == last) return false;
-  v->first = used_plane(s, first);
-  sonde_affine end = used_plane(s, last);
-  set_axes(v, &end, s->clip[2] / 2.0, s->clip[3] / 2.0);
-  fit(v, s, last);
   return true;
 }
 
 sonde_status stack_figure(const sonde_sequence *s, uint32_t step, double place,
                           const sonde_affine *plane, const sonde_image *picture, const char *path,
                           sonde_error *error) {
+  assert(s->count > 0 && step > 0);
   sonde_image figure;
   view v = {.figure = &figure};
   sonde_status status = sonde_image_create(FIGURE_WIDTH, FIGURE_HEIGHT, &figure, error);
   if (status) return status;
-  bool drawn = !prepare(&v, s);           // a single frame has no way along the sweep
-  for (uint32_t k = s->count; k-- > 0;) { // far sheets first
-    if (!drawn && place > k) {
+  bool drawn = !fit_view(&v, s);
+  for (uint32_t k = s->count;
+       k-- > 0;) { // far sheets first, the made picture in front of those behind it
+    if (!drawn && place >= k) {
       draw_sheet(&v, plane, picture->pixels, picture->width, picture->width, picture->height, true);
       drawn = true;
     }
-    bool here = s->frames[k].used && k % step == 0 && fabs(k - place) > 1e-9;
+    if (!s->frames[k].used || k % step != 0 || fabs(k - place) <= 1e-9) continue;
     sonde_affine sheet = used_plane(s, k);
-    const uint8_t *from = s->pixels + ((size_t)k * s->height + s->clip[1]) * s->width + s->clip[0];
-    if (here) draw_sheet(&v, &sheet, from, s->width, s->clip[2], s->clip[3], false);
-    if (!drawn && place >= k && !here) {
-      draw_sheet(&v, plane, picture->pixels, picture->width, picture->width, picture->height, true);
-      drawn = true;
-    }
+    size_t corner = ((size_t)k * s->height + s->clip[1]) * s->width + s->clip[0];
+    draw_sheet(&v, &sheet, s->pixels + corner, s->width, s->clip[2], s->clip[3], false);
   }
   status = sonde_image_save_png(&figure, path, error);
   sonde_image_clear(&figure);

@@ -21,12 +21,32 @@ SONDE_API sonde_status sonde_image_save_png(const sonde_image *image, const char
  * (web/src/report), opens from disk and loads nothing.
  * @param title of the window, UTF-8
  * @param json [length] one JSON object in UTF-8; its member "kind" names the view: fit, scene,
- * section, exam or class
+ * exam or class
  * @return IO naming the file, DISK, MEMORY
  * @thread owner
  */
 SONDE_API sonde_status sonde_report_write(const char *path, const char *title, const char *json,
                                           size_t length, sonde_error *error);
+
+/** Begins a drawing as SVG on an output file: lengths in pixels, y downwards, on white; words in
+ * the classes tick, head, middle, end, light. @param title UTF-8 @thread owner */
+SONDE_API void sonde_svg_begin(sonde_file *file, const char *title, double width, double height);
+/** An open line. @param xy [count][2] @param look attributes, e.g. "stroke='#333'" @thread owner */
+SONDE_API void sonde_svg_put_line(sonde_file *file, const double (*xy)[2], uint32_t count,
+                                  const char *look);
+/** Closed outlines of the same look, drawn as one.
+ * @param xy [count][2] @param corners of each outline; count is a multiple of it @thread owner */
+SONDE_API void sonde_svg_put_outlines(sonde_file *file, const double (*xy)[2], uint32_t count,
+                                      uint32_t corners, const char *look);
+/** @thread owner */
+SONDE_API void sonde_svg_put_circle(sonde_file *file, double x, double y, double radius,
+                                    const char *look);
+/** Words with their base line at y. @param utf8 escaped here; what XML cannot hold becomes U+FFFD
+ * @thread owner */
+SONDE_API void sonde_svg_put_text(sonde_file *file, double x, double y, const char *look,
+                                  const char *utf8);
+/** Ends the drawing and commits the file. @return as sonde_file_commit() @thread owner */
+SONDE_API sonde_status sonde_svg_end(sonde_file *file, sonde_error *error);
 
 #ifdef __cplusplus
 }

@@ -76,5 +76,27 @@ run("fit", join(thigh, "indentation.csv"), "--surface", join(thigh, "skin.ply"),
   await page.pdf({ path: join(out, "fit.pdf"), format: "A4" });
 }
 
+// ---- the report of a scene
+
+run("simulate", join(data, "scenes/four_kinds.yaml"), "-o", "scene", "--steps", "60", "--no-frames", "--picture", "scene.html");
+{
+  const { page, data: r, drawings, text } = await openReport(context, join(out, "scene.html"), check);
+  check(r.kind === "scene" && drawings === 1 && text.includes(`t = ${r.time_s.toFixed(3)} s`), "the scene is drawn at its time");
+  const rows = (await page.locator("section#bodies tbody tr").allInnerTexts()).map((row) => row.split("\t"));
+  check(rows.length === r.bodies.length && rows.every((row, i) => row[0] === r.bodies[i].name && row[3] === r.bodies[i].mass_kg.toPrecision(4)), `bodies: ${rows.map((row) => row[0])}`);
+  const contacts = await page.locator("section#contacts tbody tr").count();
+  check(contacts === r.contacts.length && contacts > 0, `${contacts} contacts`);
+  const drawn = () => page.locator(".surface").evaluate((g) => g.innerHTML);
+  const before = await drawn();
+  const visible = r.bodies.reduce((n, b) => n + b.face.length / 3, 0) / 3;
+  check((before.match(/M/g) ?? []).length > visible, "the faces towards the viewer are painted");
+  const box = await page.locator("figure svg").boundingBox();
+  await page.mouse.move(box.x + 300, box.y + 200);
+  await page.mouse.down();
+  await page.mouse.move(box.x + 400, box.y + 230, { steps: 4 });
+  await page.mouse.up();
+  check((await drawn()) !== before && (await page.locator(".surface").count()) === 1, "dragging turns the bodies");
+}
+
 await close();
 judge(failures, checks);

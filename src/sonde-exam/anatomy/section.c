@@ -1,12 +1,6 @@
 // Cross-sections of a model as a drawing, seen from the feet: front up, medial side right.
-// cut_mesh:     points where a plane z meets a mesh's edges, in order around its middle.
-// draw_loop:    a closed outline.
-// fitting_scale: pixels per metre.
-// draw_septa:   the sheets between the compartments, from femur to fascia.
-// draw_line_at: a vessel's circle where it passes the plane.
-// draw_panel:   one section with its captions.
 #include "anatomy/shape.h"
-#include "report/svg.h"
+#include "sonde/files.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -14,26 +8,31 @@
 static const double PANEL = 460, MARGIN = 14, CAPTION = 84; // pixels
 
 typedef struct section_point {
-  double angle, x, y;      // m
-  double inner_x, inner_y; // on the fascia
+  double angle, outer[2], inner[2]; // around the middle; m: on the skin, on the fascia
 } section_point;
 
+// Points where a plane meets a mesh, in order around their middle.
 typedef struct loop {
   uint32_t count, room;
   section_point *point;
-  double x, y; // middle
+  double x, y; // middle, m
 } loop;
 
-static int by_angle(const void *a, const void *b) {
+typedef struct panel {
+  sonde_file *file;
+  double x, y, scale; // pixels of the model's middle line, pixels per m
+} panel;
+
+static int compare_angles(const void *a, const void *b) {
   double p = ((const section_point *)a)->angle, q = ((const section_point *)b)->angle;
   return (p > q) - (p < q);
 }
 
-// `model` NULL: no fascia.
-static sonde_status cut_mesh(const sonde_mesh *mesh, const sonde_model *model, double z_m,
-                             loop *out, sonde_error *error) {
-  *out = (loop){.room = mesh->face_count};
-  out->point = SONDE_NEW(section_point, out->room);
+// Intersects the plane z with the mesh; the fascia lies below the skin by the depth of the muscle
+// (`model` NULL: none).
+static sonde_status intersect_plane(const sonde_mesh *mesh, const sonde_model *model, double z_m,
+                                    loop *out, sonde_error *error) {
+  *out = (loop){.room = mesh->face_count, .point = SONDE_NEW(section_point, mesh->face_count)};
   if (!out->point) return sonde_fail_memory(error);
   for (uint32_t f = 0; f < mesh->face_count; ++f)
     for (int k = 0; k < 3; ++k) { // every edge once: where it rises
@@ -43,68 +42,57 @@ static sonde_status cut_mesh(const sonde_mesh *mesh, const sonde_model *model, d
       double t = (z_m - a.z) / (b.z - a.z);
       sonde_vec3 p = v_lerp(a, b, t), inner = p;
       if (model) {
-        double depth = (1 - t) * model->muscle_depth_m[i] + t * model->muscle_depth_m[j];
-        inner = v_madd(p, -depth, v_lerp(model->normal[i], model->normal[j], t));
+        double depth_m = (1 - t) * model->muscle_depth_m[i] + t * model->muscle_depth_m[j];
+        inner = v_madd(p, -depth_m, v_lerp(model->normal[i], model->normal[j], t));
       }
-      out->point[out->count++] = (section_point){0, p.x, p.y, inner.x, inner.y};
-      out->x += p.x;
-      out->y += p.y;
+      out->point[out->count++] = (section_point){0, {p.x, p.y}, {inner.x, inner.y}};
+      out->x += p.x, out->y += p.y;
     }
   if (out->count < 3) return sonde_fail(error, SONDE_MESH, "nothing to cut at z = %g m", z_m);
-  out->x /= out->count;
-  out->y /= out->count;
+  out->x /= out->count, out->y /= out->count;
   for (uint32_t k = 0; k < out->count; ++k)
-    out->point[k].angle = atan2(out->point[k].y - out->y, out->point[k].x - out->x);
-  qsort(out->point, out->count, sizeof *out->point, by_angle);
+    out->point[k].angle = atan2(out->point[k].outer[1] - out->y, out->point[k].outer[0] - out->x);
+  qsort(out->point, out->count, sizeof *out->point, compare_angles);
   return SONDE_OK;
 }
-
-typedef struct panel {
-  sonde_text *out;
-  double x, y;  // pixels of the model's middle line
-  double scale; // pixels per m
-} panel;
 
 static double px(const panel *p, double x_m) { return p->x + x_m * p->scale; }
 static double py(const panel *p, double y_m) { return p->y - y_m * p->scale; }
 
-static void draw_loop(const panel *p, const loop *l, bool inner, const char *look) {
-  sonde_path path = sonde_path_begin(p->out, look);
+static sonde_status draw_loop(const panel *p, const loop *l, bool inner, const char *look,
+                              sonde_error *error) {
+  double(*xy)[2] = sonde_calloc(l->count, sizeof *xy);
+  if (!xy) return sonde_fail_memory(error);
   for (uint32_t k = 0; k < l->count; ++k) {
-    double x = inner ? l->point[k].inner_x : l->point[k].x;
-    double y = inner ? l->point[k].inner_y : l->point[k].y;
-    if (k == 0)
-      sonde_path_move(&path, px(p, x), py(p, y));
-    else
-      sonde_path_draw(&path, px(p, x), py(p, y));
+    const double *at = inner ? l->point[k].inner : l->point[k].outer;
+    xy[k][0] = px(p, at[0]), xy[k][1] = py(p, at[1]);
   }
-  sonde_path_close(&path);
-  sonde_path_end(&path);
+  sonde_svg_put_outlines(p->file, (const double(*)[2])xy, l->count, l->count, look);
+  sonde_free(xy);
+  return SONDE_OK;
 }
 
-static const sonde_muscle_level *nearest_level(const sonde_thigh_anatomy *a, double z_m) {
-  SONDE_ASSERT(a->level_count > 0);
-  const sonde_muscle_level *best = &a->level[0];
-  for (uint32_t k = 1; k < a->level_count; ++k)
-    if (fabs(a->level[k].z_m - z_m) < fabs(best->z_m - z_m)) best = &a->level[k];
-  return best;
-}
-
+// The sheets between the compartments of the nearest level, from femur to fascia.
 static void draw_septa(const panel *p, const sonde_thigh_anatomy *a, const loop *skin, double z_m) {
-  const sonde_muscle_level *l = nearest_level(a, z_m);
+  SONDE_ASSERT(a->level_count > 0);
+  const sonde_muscle_level *l = &a->level[0];
+  for (uint32_t k = 1; k < a->level_count; ++k)
+    if (fabs(a->level[k].z_m - z_m) < fabs(l->z_m - z_m)) l = &a->level[k];
   for (int s = 0; s < SONDE_COMPARTMENTS; ++s) {
     double c = cos(l->septum_rad[s]), d = sin(l->septum_rad[s]), reach = 0, side = INFINITY;
     for (uint32_t k = 0; k < skin->count; ++k) { // where the fascia lies in that direction
-      double x = skin->point[k].inner_x - l->bone_x_m, y = skin->point[k].inner_y - l->bone_y_m;
+      double x = skin->point[k].inner[0] - l->bone_x_m, y = skin->point[k].inner[1] - l->bone_y_m;
       double along = x * c + y * d, beside = fabs(y * c - x * d);
       if (along > 0 && beside < side) side = beside, reach = along;
     }
-    sonde_svg_line(p->out, px(p, l->bone_x_m), py(p, l->bone_y_m), px(p, l->bone_x_m + reach * c),
-                   py(p, l->bone_y_m + reach * d), "stroke='#f2dcd6' stroke-width='2.5'");
+    const double ends[2][2] = {{px(p, l->bone_x_m), py(p, l->bone_y_m)},
+                               {px(p, l->bone_x_m + reach * c), py(p, l->bone_y_m + reach * d)}};
+    sonde_svg_put_line(p->file, ends, 2, "stroke='#f2dcd6' stroke-width='2.5'");
   }
 }
 
-static bool line_at(const sonde_vessel *line, double z_m, sonde_vessel_point *at) {
+// The vessel where it passes the plane.
+static bool find_vessel(const sonde_vessel *line, double z_m, sonde_vessel_point *at) {
   for (uint32_t k = 0; k + 1 < line->count; ++k) {
     const sonde_vessel_point *a = &line->point[k], *b = a + 1;
     if ((a->centre_m.z > z_m) == (b->centre_m.z > z_m)) continue;
@@ -117,116 +105,104 @@ static bool line_at(const sonde_vessel *line, double z_m, sonde_vessel_point *at
   return false;
 }
 
-static void draw_line_at(const panel *p, const sonde_vessel *line, sonde_vessel_kind kind,
-                         const char *letters, double z_m) {
+static void draw_vessel(const panel *p, const sonde_vessel *line, sonde_vessel_kind kind,
+                        const char *letter, double z_m) {
   sonde_vessel_point v;
-  if (!line_at(line, z_m, &v)) return;
-  const char *look = kind == SONDE_VESSEL_VEIN ? "fill='#3f6fb5' stroke='#d9e4f5'"
-                                               : "fill='#c8383a' stroke='#f7dada'";
+  if (!find_vessel(line, z_m, &v)) return;
   double x = px(p, v.centre_m.x), y = py(p, v.centre_m.y);
-  sonde_svg_circle(p->out, x, y, v.radius_m * p->scale, look);
-  sonde_svg_words(p->out, x, y + 3, "class='small light middle'", letters);
+  sonde_svg_put_circle(p->file, x, y, v.radius_m * p->scale,
+                       kind == SONDE_VESSEL_VEIN ? "fill='#3f6fb5' stroke='#d9e4f5'"
+                                                 : "fill='#c8383a' stroke='#f7dada'");
+  sonde_svg_put_text(p->file, x, y + 3, "class='light middle'", letter);
 }
 
-static void caption(const panel *p, const sonde_model *model, const sonde_landmark *mark,
-                    double left) {
+static void draw_caption(const panel *p, const sonde_model *model, const sonde_landmark *mark,
+                         double left) {
   sonde_vessel_point v, a;
-  bool both = line_at(&model->vein, mark->vein_m.z, &v);
-  both = line_at(&model->artery, mark->vein_m.z, &a) && both;
-  double top = PANEL + 12;
-  sonde_svg_text(p->out, left + 16, top, "class='head'", mark->name);
-  if (!both) return;
-  char text[240];
-  snprintf(text, sizeof text, "z %s mm; vein %s mm wide, centre %s mm deep",
-           sonde_fixed(mark->vein_m.z * 1e3, 0).s, sonde_fixed(2e3 * v.radius_m, 1).s,
-           sonde_fixed(v.depth_m * 1e3, 1).s);
-  sonde_svg_words(p->out, left + 16, top + 17, "class='tick'", text);
-  snprintf(text, sizeof text, "artery %s mm wide, centre %s mm deep",
-           sonde_fixed(2e3 * a.radius_m, 1).s, sonde_fixed(a.depth_m * 1e3, 1).s);
-  sonde_svg_words(p->out, left + 16, top + 33, "class='tick'", text);
+  double z_m = mark->vein_m.z, top = PANEL + 12;
+  sonde_svg_put_text(p->file, left, top, "class='head'", mark->name);
+  if (!find_vessel(&model->vein, z_m, &v) || !find_vessel(&model->artery, z_m, &a)) return;
+  char text[160];
+  snprintf(text, sizeof text, "z %.0f mm; vein %.1f mm wide, centre %.1f mm deep", z_m * 1e3,
+           2e3 * v.radius_m, v.depth_m * 1e3);
+  sonde_svg_put_text(p->file, left, top + 17, "class='tick'", text);
+  snprintf(text, sizeof text, "artery %.1f mm wide, centre %.1f mm deep", 2e3 * a.radius_m,
+           a.depth_m * 1e3);
+  sonde_svg_put_text(p->file, left, top + 33, "class='tick'", text);
 }
 
-static void centre_panel(panel *p, const loop *skin) {
-  double low_x = INFINITY, high_x = -INFINITY, low_y = INFINITY, high_y = -INFINITY;
-  for (uint32_t k = 0; k < skin->count; ++k) {
-    low_x = fmin(low_x, skin->point[k].x), high_x = fmax(high_x, skin->point[k].x);
-    low_y = fmin(low_y, skin->point[k].y), high_y = fmax(high_y, skin->point[k].y);
-  }
-  p->x -= 0.5 * (low_x + high_x) * p->scale;
-  p->y += 0.5 * (low_y + high_y) * p->scale;
-}
-
+// One section, drawn about the middle of its own skin.
 static sonde_status draw_panel(panel *p, const sonde_model *model, const sonde_landmark *mark,
-                               double left, sonde_error *error) {
+                               sonde_error *error) {
   const sonde_thigh_anatomy *a = model->anatomy;
-  double z = mark->vein_m.z;
+  double z_m = mark->vein_m.z, left = p->x - 0.5 * PANEL + 16;
+  double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
   loop skin = {0}, bone = {0};
-  sonde_status status = cut_mesh(&model->surface, model, z, &skin, error);
-  if (!status) status = cut_mesh(&model->femur, NULL, z, &bone, error);
+  sonde_status status = intersect_plane(&model->surface, model, z_m, &skin, error);
+  if (!status) status = intersect_plane(&model->femur, NULL, z_m, &bone, error);
+  for (uint32_t k = 0; k < skin.count && !status; ++k)
+    for (int i = 0; i < 2; ++i) {
+      low[i] = fmin(low[i], skin.point[k].outer[i]);
+      high[i] = fmax(high[i], skin.point[k].outer[i]);
+    }
   if (!status) {
-    centre_panel(p, &skin);
-    draw_loop(p, &skin, false, "fill='#f3dfa2' stroke='#a9744f' stroke-width='3'");
-    draw_loop(p, &skin, true, "fill='#a8443c' stroke='#f5efe6' stroke-width='1.5'");
-    draw_septa(p, a, &skin, z);
-    draw_loop(p, &bone, false, "fill='#efe9da' stroke='#b9ad8f' stroke-width='1.5'");
+    p->x -= 0.5 * (low[0] + high[0]) * p->scale;
+    p->y += 0.5 * (low[1] + high[1]) * p->scale;
+    status = draw_loop(p, &skin, false, "fill='#f3dfa2' stroke='#a9744f' stroke-width='3'", error);
+  }
+  if (!status)
+    status = draw_loop(p, &skin, true, "fill='#a8443c' stroke='#f5efe6' stroke-width='1.5'", error);
+  if (!status) draw_septa(p, a, &skin, z_m);
+  if (!status)
+    status =
+        draw_loop(p, &bone, false, "fill='#efe9da' stroke='#b9ad8f' stroke-width='1.5'", error);
+  if (!status) {
     for (uint32_t k = 0; k < a->branch_count; ++k)
-      draw_line_at(p, &a->branch[k].line, a->branch[k].kind, "", z);
-    draw_line_at(p, &model->artery, SONDE_VESSEL_ARTERY, "A", z);
-    draw_line_at(p, &model->vein, SONDE_VESSEL_VEIN, "V", z);
-    caption(p, model, mark, left);
+      draw_vessel(p, &a->branch[k].line, a->branch[k].kind, "", z_m);
+    draw_vessel(p, &model->artery, SONDE_VESSEL_ARTERY, "A", z_m);
+    draw_vessel(p, &model->vein, SONDE_VESSEL_VEIN, "V", z_m);
+    draw_caption(p, model, mark, left);
   }
   sonde_free(skin.point);
   sonde_free(bone.point);
   return status;
 }
 
-// One scale for all panels, so that the widest section fits; each is drawn about its middle.
-static double fitting_scale(const sonde_mesh *surface) {
+sonde_status sonde_thigh_sections(const sonde_model *model, const char *path, sonde_error *error) {
+  static const char *const MARK[] = {"common_femoral", "femoral_mid", "popliteal_near"};
+  enum { PANELS = SONDE_COUNT_OF(MARK) };
+  SONDE_ASSERT(model && path);
+  if (!model->anatomy) return sonde_fail(error, SONDE_ARGUMENT, "the model has no named anatomy");
+
+  // One scale for all panels, so that the widest section fits.
   sonde_vec3 low = vec3(INFINITY, INFINITY, 0), high = vec3(-INFINITY, -INFINITY, 0);
-  for (uint32_t k = 0; k < surface->vertex_count; ++k) {
-    sonde_vec3 p = surface->vertices[k];
+  for (uint32_t k = 0; k < model->surface.vertex_count; ++k) {
+    sonde_vec3 p = model->surface.vertices[k];
     low = vec3(fmin(low.x, p.x), fmin(low.y, p.y), 0);
     high = vec3(fmax(high.x, p.x), fmax(high.y, p.y), 0);
   }
-  double widest = fmax(fmax(high.x - low.x, high.y - low.y), 0.02);
-  return (PANEL - 2 * MARGIN) / widest;
-}
+  double scale = (PANEL - 2 * MARGIN) / fmax(fmax(high.x - low.x, high.y - low.y), 0.02);
+  SONDE_ASSERT(scale > 0);
 
-static void draw_frame(sonde_text *out, uint32_t panels, double scale) {
-  double y = PANEL + CAPTION - 14, x = 16;
-  sonde_svg_line(out, x, y, x + 0.05 * scale, y, "stroke='#222' stroke-width='3'");
-  sonde_svg_words(out, x + 0.05 * scale + 8, y + 4, "class='tick'", "50 mm");
-  sonde_svg_words(out, panels * PANEL - 16, y + 4, "class='tick end'",
-                  "seen from the feet: front up, lateral left, medial right");
-}
-
-sonde_status sonde_thigh_sections(const sonde_model *model, const char *path, sonde_error *error) {
-  static const char *const MARK[] = {"common_femoral", "femoral_mid", "popliteal_near"};
-  enum { PANELS = sizeof MARK / sizeof MARK[0] };
-  if (!model->anatomy) return sonde_fail(error, SONDE_ARGUMENT, "the model has no named anatomy");
-  sonde_figure figure = {.name = "sections", .width = PANELS * PANEL, .height = PANEL + CAPTION};
-  snprintf(figure.title, sizeof figure.title, "Cross-sections of %s", model->name);
-  sonde_status status = SONDE_OK;
-  double scale = fitting_scale(&model->surface);
+  sonde_file *file = NULL;
+  sonde_status status = sonde_file_create(path, &file, error);
+  if (status) return status;
+  char title[160];
+  snprintf(title, sizeof title, "Cross-sections of %s", model->name);
+  sonde_svg_begin(file, title, PANELS * PANEL, PANEL + CAPTION);
   for (int k = 0; k < PANELS && !status; ++k) {
     const sonde_landmark *mark = sonde_anatomy_landmark(model->anatomy, MARK[k]);
-    panel p = {&figure.body, (k + 0.5) * PANEL, PANEL / 2, scale};
-    if (!mark)
-      status = sonde_fail(error, SONDE_NOT_FOUND, "the model has no landmark '%s'", MARK[k]);
-    else
-      status = draw_panel(&p, model, mark, k * PANEL, error);
+    panel p = {file, (k + 0.5) * PANEL, PANEL / 2, scale};
+    status = mark ? draw_panel(&p, model, mark, error)
+                  : sonde_fail(error, SONDE_NOT_FOUND, "the model has no landmark '%s'", MARK[k]);
   }
-  draw_frame(&figure.body, PANELS, scale);
-  sonde_text text = {0};
-  sonde_file *file = NULL;
-  if (!status) sonde_svg_write(&text, &figure, true);
-  if (!status && (text.failed || figure.body.failed)) status = sonde_fail_memory(error);
-  if (!status) status = sonde_file_create(path, &file, error);
-  if (!status) {
-    sonde_file_write(file, text.bytes, text.used);
-    status = sonde_file_commit(file, error);
-  }
-  sonde_text_clear(&text);
-  sonde_text_clear(&figure.body);
+  double y = PANEL + CAPTION - 14, x = 16;
+  const double bar[2][2] = {{x, y}, {x + 0.05 * scale, y}};
+  sonde_svg_put_line(file, bar, 2, "stroke='#222' stroke-width='3'");
+  sonde_svg_put_text(file, bar[1][0] + 8, y + 4, "class='tick'", "50 mm");
+  sonde_svg_put_text(file, PANELS * PANEL - 16, y + 4, "class='tick end'",
+                     "seen from the feet: front up, lateral left, medial right");
+  if (!status) return sonde_svg_end(file, error);
+  sonde_file_discard(file);
   return status;
 }

@@ -1,12 +1,12 @@
 // Maps of the parameters on the skin, seen along the mean normal of the sites, and of the error by site.
 
-import { type Axis, axis, range, tickLabel, tightAxis, niceStep } from "./axis";
+import { type Axis, axis, range, tickLabel, tightAxis } from "./axis";
 import { drawing, text } from "./chart";
 import { sequential } from "./colour";
 import { h, type Page, paragraph, s } from "./dom";
 import type { FitReport, Site } from "./fit_data";
-import { type Camera, cross, dot, look, madd, paint, project, type Surface, unit, type Vector, vertex } from "./mesh";
-import { isKnown, type Real, real, short, signed } from "./number";
+import { type Camera, cross, dot, look, madd, paint, project, scaleBar, type Surface, unit, type Vector, vertex } from "./mesh";
+import { isKnown, type Real, real, signed } from "./number";
 
 const LEFT = 10;
 const TOP = 16;
@@ -77,13 +77,6 @@ function drawSites(into: SVGElement, sites: Site[], c: Camera, values: Map<numbe
   }
 }
 
-function drawScale(into: SVGElement, c: Camera, y: number): void {
-  const length_mm = niceStep(40 / c.scale);
-  const end = LEFT + length_mm * c.scale;
-  const line = (x1: number, y1: number, x2: number, y2: number): SVGElement => s("line", { x1, y1, x2, y2, class: "axis" });
-  into.append(line(LEFT, y, end, y), line(LEFT, y - 4, LEFT, y + 4), line(end, y - 4, end, y + 4), text(end + 8, y + 4, "tick", `${short(length_mm)} mm`));
-}
-
 function drawMap(skin: Surface, sites: Site[], c: Camera, m: MapOptions): SVGElement {
   const height = TOP + Math.max(c.height, 320) + 34;
   const svg = drawing(440, height);
@@ -99,7 +92,7 @@ function drawMap(skin: Surface, sites: Site[], c: Camera, m: MapOptions): SVGEle
   };
   svg.append(paint(c, [skin], colourOf, 12, Infinity));
   drawSites(svg, sites, c, "sites" in m.values ? m.values.sites : null, m.range);
-  drawScale(svg, c, height - 12);
+  svg.append(scaleBar(c, LEFT, height - 12));
   drawKey(svg, LEFT + INSIDE + 44, TOP + 30, 240, m.range);
   return svg;
 }

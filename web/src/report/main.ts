@@ -6,9 +6,8 @@ import { fit } from "./fit";
 import { h } from "./dom";
 import { plain } from "./plain";
 import { scene } from "./scene";
-import { section } from "./section";
 
-const VIEWS: Record<string, (data: unknown) => void> = { fit, scene, section, exam, class: classReport };
+const VIEWS: Record<string, (data: unknown) => void> = { fit, scene, exam, class: classReport };
 
 try {
   const data = JSON.parse(document.getElementById("report")?.textContent ?? "") as { kind?: string };

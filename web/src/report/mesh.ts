@@ -1,7 +1,10 @@
 // Surfaces in a parallel projection: faces turned to the viewer, painted from back to front in thin layers of depth,
 // one path per layer and colour.
 
+import { niceStep } from "./axis";
+import { text } from "./chart";
 import { s } from "./dom";
+import { short } from "./number";
 
 export type Vector = [number, number, number];
 
@@ -54,6 +57,14 @@ export function look(toward: Vector, up: Vector, surfaces: Surface[], box: { lef
 
 export const project = (c: Camera, p: Vector): [number, number] => [c.x + c.scale * dot(p, c.right), c.y - c.scale * dot(p, c.up)];
 
+/** A bar of a round length in mm, where the surfaces are in mm. */
+export function scaleBar(c: Camera, x: number, y: number): SVGElement {
+  const length_mm = niceStep(40 / c.scale);
+  const end = x + length_mm * c.scale;
+  const line = (x1: number, y1: number, x2: number, y2: number): SVGElement => s("line", { x1, y1, x2, y2, class: "axis" });
+  return s("g", {}, line(x, y, end, y), line(x, y - 4, x, y + 4), line(end, y - 4, end, y + 4), text(end + 8, y + 4, "tick", `${short(length_mm)} mm`));
+}
+
 interface Piece {
   depth: number;
   colour: string;
@@ -80,7 +91,7 @@ function cut(c: Camera, corners: [Vector, Vector, Vector], colour: string, most_
  * @param colourOf of a face with this unit normal; null: the face is left out
  * @param most_px longest edge of what is painted at once
  */
-export function paint(c: Camera, surfaces: Surface[], colourOf: (surface: number, face: number, normal: Vector) => string | null, layers = 240, most_px = 22): SVGElement {
+export function paint(c: Camera, surfaces: Surface[], colourOf: (surface: number, face: number, normal: Vector) => string | null, layers = 600, most_px = 14): SVGElement {
   const pieces: Piece[] = [];
   surfaces.forEach((surface, which) => {
     for (let f = 0; 3 * f < surface.face.length; ++f) {
