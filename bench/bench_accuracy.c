@@ -155,52 +155,50 @@ static axes axes_of(cost (*costs)[METHODS]) {
   return a;
 }
 
+static void draw_line(sonde_file *f, double x0, double y0, double x1, double y1, const char *look) {
+  const double ends[2][2] = {{x0, y0}, {x1, y1}};
+  sonde_svg_put_line(f, ends, 2, look);
+}
+
 static void draw_frame(sonde_file *f, const axes *a) {
-  sonde_file_printf(f,
-                    "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 720 400' "
-                    "font-family='sans-serif' font-size='13'>\n"
-                    "<rect width='720' height='400' fill='white'/>\n"
-                    "<text x='%d' y='24' font-size='15'>Cost of 50 ms at an error of at most 1 "
-                    "%%</text>\n",
-                    LEFT);
-  for (int p = (int)a->low; p <= (int)a->high; ++p)
-    sonde_file_printf(f,
-                      "<path d='M%d %.1fh%d' stroke='#ddd'/>"
-                      "<text x='%d' y='%.1f' text-anchor='end'>%g</text>\n",
-                      LEFT, y_of(a, pow(10, p)), WIDTH, LEFT - 8, y_of(a, pow(10, p)) + 4,
-                      pow(10, p));
-  for (int k = 0; k < STIFFNESSES; ++k)
-    sonde_file_printf(f,
-                      "<path d='M%.1f %dv5' stroke='#333'/>"
-                      "<text x='%.1f' y='%d' text-anchor='middle'>%g</text>\n",
-                      x_of(STIFFNESS[k]), TOP + HEIGHT, x_of(STIFFNESS[k]), TOP + HEIGHT + 20,
-                      STIFFNESS[k]);
-  sonde_file_printf(f,
-                    "<path d='M%d %dv%dh%d' stroke='#333' fill='none'/>\n"
-                    "<text x='%d' y='%d' text-anchor='middle'>stiffness of a surface spring "
-                    "(N/m)</text>\n"
-                    "<text transform='translate(20 %d) rotate(-90)' text-anchor='middle'>time on "
-                    "one core (s)</text>\n",
-                    LEFT, TOP, HEIGHT, WIDTH, LEFT + WIDTH / 2, TOP + HEIGHT + 42,
-                    TOP + HEIGHT / 2);
+  const double corner[3][2] = {{LEFT, TOP}, {LEFT, TOP + HEIGHT}, {LEFT + WIDTH, TOP + HEIGHT}};
+  char words[100];
+  sonde_svg_put_text(f, LEFT, 24, "class='head'", "Cost of 50 ms at an error of at most 1 %");
+  for (int p = (int)a->low; p <= (int)a->high; ++p) {
+    double y = y_of(a, pow(10, p));
+    draw_line(f, LEFT, y, LEFT + WIDTH, y, "stroke='#ddd'");
+    snprintf(words, sizeof words, "%g", pow(10, p));
+    sonde_svg_put_text(f, LEFT - 8, y + 4, "class='tick end'", words);
+  }
+  for (int k = 0; k < STIFFNESSES; ++k) {
+    double x = x_of(STIFFNESS[k]);
+    draw_line(f, x, TOP + HEIGHT, x, TOP + HEIGHT + 5, "stroke='#333'");
+    snprintf(words, sizeof words, "%g", STIFFNESS[k]);
+    sonde_svg_put_text(f, x, TOP + HEIGHT + 20, "class='tick middle'", words);
+  }
+  sonde_svg_put_line(f, corner, 3, "stroke='#333' fill='none'");
+  sonde_svg_put_text(f, LEFT + WIDTH / 2.0, TOP + HEIGHT + 42, "class='middle'",
+                     "stiffness of a surface spring, N/m");
+  snprintf(words, sizeof words, "transform='translate(20 %d) rotate(-90)' class='middle'",
+           TOP + HEIGHT / 2);
+  sonde_svg_put_text(f, 0, 0, words, "time on one core, s");
 }
 
 static void draw_method(sonde_file *f, const axes *a, cost (*costs)[METHODS], int m) {
-  char pen = 'M';
-  sonde_file_printf(f, "<path fill='none' stroke-width='2' stroke='%s' d='", METHOD[m].colour);
-  for (int k = 0; k < STIFFNESSES; ++k) {
-    if (!(costs[k][m].seconds > 0)) continue;
-    sonde_file_printf(f, "%c%.1f %.1f", pen, x_of(STIFFNESS[k]), y_of(a, costs[k][m].seconds));
-    pen = 'L';
-  }
-  sonde_file_printf(f, "'/>\n");
+  double xy[STIFFNESSES][2];
+  char look[80], dot[40];
+  uint32_t count = 0;
   for (int k = 0; k < STIFFNESSES; ++k)
-    if (costs[k][m].seconds > 0)
-      sonde_file_printf(f, "<circle cx='%.1f' cy='%.1f' r='4' fill='%s'/>\n", x_of(STIFFNESS[k]),
-                        y_of(a, costs[k][m].seconds), METHOD[m].colour);
-  sonde_file_printf(f, "<circle cx='%d' cy='%d' r='4' fill='%s'/><text x='%d' y='%d'>%s</text>\n",
-                    LEFT + WIDTH + 20, TOP + 20 + 24 * m, METHOD[m].colour, LEFT + WIDTH + 32,
-                    TOP + 24 + 24 * m, METHOD[m].name);
+    if (costs[k][m].seconds > 0) {
+      xy[count][0] = x_of(STIFFNESS[k]);
+      xy[count++][1] = y_of(a, costs[k][m].seconds);
+    }
+  snprintf(look, sizeof look, "fill='none' stroke-width='2' stroke='%s'", METHOD[m].colour);
+  snprintf(dot, sizeof dot, "fill='%s'", METHOD[m].colour);
+  sonde_svg_put_line(f, (const double(*)[2])xy, count, look);
+  for (uint32_t k = 0; k < count; ++k) sonde_svg_put_circle(f, xy[k][0], xy[k][1], 4, dot);
+  sonde_svg_put_circle(f, LEFT + WIDTH + 20, TOP + 20 + 24 * m, 4, dot);
+  sonde_svg_put_text(f, LEFT + WIDTH + 32, TOP + 24 + 24 * m, "", METHOD[m].name);
 }
 
 static sonde_status draw(const char *path, cost (*costs)[METHODS], sonde_error *error) {
@@ -208,10 +206,10 @@ static sonde_status draw(const char *path, cost (*costs)[METHODS], sonde_error *
   sonde_status status = sonde_file_create(path, &f, error);
   if (status) return status;
   axes a = axes_of(costs);
+  sonde_svg_begin(f, "Cost over stiffness", 720, 400);
   draw_frame(f, &a);
   for (int m = 0; m < METHODS; ++m) draw_method(f, &a, costs, m);
-  sonde_file_printf(f, "</svg>\n");
-  return sonde_file_commit(f, error);
+  return sonde_svg_end(f, error);
 }
 
 int main(int argc, char **argv) {

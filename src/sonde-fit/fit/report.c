@@ -272,9 +272,25 @@ static void put_histogram(report *r) {
   sonde_json_end(&r->out);
 }
 
-// Every stage against the same measurements, then the main one by probe, depth and site.
-static void put_all_errors(report *r) {
+// The measurements as columns with the main stage's force and its band; every stage against them;
+// the main one by probe, depth and site.
+static void put_measurements(report *r) {
   static const choice ALL = {EVERY, EVERY, EVERY};
+  const sonde_datum *data = r->in->data->data;
+  sonde_json_begin_object(&r->out, "rows");
+  sonde_json_begin_list(&r->out, "site");
+  for (uint32_t i = 0; i < r->rows; ++i) sonde_json_put_integer(&r->out, NULL, data[i].site);
+  sonde_json_end(&r->out);
+  sonde_json_begin_list(&r->out, "probe");
+  for (uint32_t i = 0; i < r->rows; ++i) sonde_json_put_integer(&r->out, NULL, r->probe_of[i]);
+  sonde_json_end(&r->out);
+  for (uint32_t i = 0; i < r->rows; ++i) r->scratch[i] = data[i].penetration_m;
+  put_list(r, "depth_mm", r->scratch, r->rows, 1e3, PLACES);
+  for (uint32_t i = 0; i < r->rows; ++i) r->scratch[i] = data[i].force_n;
+  put_list(r, "force_n", r->scratch, r->rows, 1, PLACES);
+  if (r->main) put_list(r, "model_n", r->main->model_n, r->rows, 1, PLACES);
+  if (r->in->band_n) put_list(r, "band_n", r->in->band_n, r->rows, 1, PLACES);
+  sonde_json_end(&r->out);
   sonde_json_begin_list(&r->out, "stages");
   for (uint32_t k = 0; k < r->in->stage_count; ++k) {
     const sonde_report_stage *s = &r->in->stages[k];
@@ -311,26 +327,8 @@ static void put_all_errors(report *r) {
   sonde_json_end(&r->out);
 }
 
-// ---- measurements and skin ----------------------------------------------------------------------
-
-// The measurements as columns, with the main stage's force and its band.
-static void put_rows(report *r) {
-  const sonde_datum *data = r->in->data->data;
-  sonde_json_begin_object(&r->out, "rows");
-  sonde_json_begin_list(&r->out, "site");
-  for (uint32_t i = 0; i < r->rows; ++i) sonde_json_put_integer(&r->out, NULL, data[i].site);
-  sonde_json_end(&r->out);
-  sonde_json_begin_list(&r->out, "probe");
-  for (uint32_t i = 0; i < r->rows; ++i) sonde_json_put_integer(&r->out, NULL, r->probe_of[i]);
-  sonde_json_end(&r->out);
-  for (uint32_t i = 0; i < r->rows; ++i) r->scratch[i] = data[i].penetration_m;
-  put_list(r, "depth_mm", r->scratch, r->rows, 1e3, PLACES);
-  for (uint32_t i = 0; i < r->rows; ++i) r->scratch[i] = data[i].force_n;
-  put_list(r, "force_n", r->scratch, r->rows, 1, PLACES);
-  if (r->main) put_list(r, "model_n", r->main->model_n, r->rows, 1, PLACES);
-  if (r->in->band_n) put_list(r, "band_n", r->in->band_n, r->rows, 1, PLACES);
-  sonde_json_end(&r->out);
-}
+// ---- skin
+// ----------------------------------------------------------------------------------------
 
 // Pearson's correlation of the thickness of the fat with k0 or xm over the sites where both are
 // known; NaN for fewer than 8 sites.
@@ -464,10 +462,6 @@ static void put_inference(report *r) {
     sonde_json_end(&r->out);
   }
   sonde_json_end(&r->out);
-}
-
-static void put_checks(report *r) {
-  const sonde_fit_report *in = r->in;
   sonde_json_begin_list(&r->out, "holdouts");
   for (uint32_t i = 0; i < in->holdout_count; ++i) {
     const sonde_report_holdout *h = &in->holdouts[i];
@@ -524,14 +518,10 @@ static void put_report(report *r) {
     sonde_json_end(&r->out);
   }
   sonde_json_end(&r->out);
-  if (r->rows) {
-    put_rows(r);
-    put_all_errors(r);
-  }
+  if (r->rows) put_measurements(r);
   put_skin(r);
   put_parameters(r);
   put_inference(r);
-  put_checks(r);
   sonde_json_end(&r->out);
 }
 

@@ -7,7 +7,7 @@ import { type Child, s } from "./dom";
 
 /** Okabe and Ito. */
 export const PALETTE = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#777777"] as const;
-export const DASHES = ["", "7 3", "2 3", "9 3 2 3", "12 4", "4 2", "1 3", "6 2 1 2"] as const;
+const DASHES = ["", "7 3", "2 3", "9 3 2 3", "12 4", "4 2", "1 3", "6 2 1 2"] as const;
 const MARKS = [
   "m-2.6 0a2.6 2.6 0 1 0 5.2 0a2.6 2.6 0 1 0-5.2 0z", // circle
   "m-2.4-2.4h4.8v4.8h-4.8z", // square
