@@ -1,5 +1,6 @@
 // Drawings as SVG, for files that no browser has a part in. Coordinates have one decimal.
 #include "base/base.h"
+#include "base/utf8.h"
 #include "sonde/files.h"
 
 #include <math.h>
@@ -14,7 +15,7 @@ static void put_tenths(sonde_file *file, char before, double x) {
 
 static void put_text(sonde_file *file, const char *utf8) {
   for (const unsigned char *c = (const unsigned char *)utf8; *c;) {
-    size_t bytes = sonde_utf8_bytes(c);
+    size_t bytes = utf8_character(c);
     if (*c == '<' || *c == '>' || *c == '&')
       sonde_file_printf(file, "&#%u;", *c);
     else if (bytes == 0 || (*c < 0x20 && *c != '\t' && *c != '\n'))

@@ -48,10 +48,6 @@ SONDE_LINK sonde_status sonde_fail_at(sonde_error *error, sonde_status status, c
 #define sonde_fail_memory(error)                                                                   \
   sonde_fail_at((error), SONDE_MEMORY, __func__, "out of memory in %s", __func__)
 
-// Bytes of the UTF-8 character that starts here, 0 when none does: not overlong, no surrogate, not
-// beyond U+10FFFF. The text ends with a 0.
-SONDE_LINK size_t sonde_utf8_bytes(const unsigned char *c);
-
 SONDE_LINK void sonde_log(sonde_log_level level, const char *format, ...)
     __attribute__((format(printf, 2, 3)));
 

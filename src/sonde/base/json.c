@@ -109,7 +109,7 @@ static sonde_status read_text(parser *p, const char **text) {
       if (status) return status;
       continue;
     }
-    size_t bytes = sonde_utf8_bytes((const unsigned char *)p->at);
+    size_t bytes = utf8_character((const unsigned char *)p->at);
     if (bytes == 0) return fail(p, "expected UTF-8, found byte %u", c);
     memmove(to, p->at, bytes);
     to += bytes, p->at += bytes;
@@ -321,7 +321,7 @@ static void put_string(sonde_json_out *out, const char *text) {
   static const char NAMES[] = "\"\\bfnrt", BYTES[] = "\"\\\b\f\n\r\t";
   put(out, "\"");
   for (const unsigned char *c = (const unsigned char *)text; *c;) {
-    size_t bytes = sonde_utf8_bytes(c);
+    size_t bytes = utf8_character(c);
     const char *escape = strchr(BYTES, *c);
     if (escape)
       sonde_file_printf(out->file, "\\%c", NAMES[escape - BYTES]);
