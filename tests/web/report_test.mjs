@@ -86,7 +86,7 @@ run("simulate", join(data, "scenes/four_kinds.yaml"), "-o", "scene", "--steps", 
   check(rows.length === r.bodies.length && rows.every((row, i) => row[0] === r.bodies[i].name && row[3] === r.bodies[i].mass_kg.toPrecision(4)), `bodies: ${rows.map((row) => row[0])}`);
   const contacts = await page.locator("section#contacts tbody tr").count();
   check(contacts === r.contacts.length && contacts > 0, `${contacts} contacts`);
-  const drawn = () => page.locator(".surface").evaluate((g) => g.innerHTML);
+  const drawn = () => page.locator(".surface").first().evaluate((g) => g.innerHTML);
   const before = await drawn();
   const visible = r.bodies.reduce((n, b) => n + b.face.length / 3, 0) / 3;
   check((before.match(/M/g) ?? []).length > visible, "the faces towards the viewer are painted");
