@@ -1,7 +1,6 @@
 /**
  * @file sparse.h
- * Symmetric sparse matrices of 3x3 blocks, preconditioned conjugate gradients, and a scalar
- * factor-once solver.
+ * Symmetric sparse matrices of 3x3 blocks and preconditioned conjugate gradients.
  */
 #ifndef SONDE_SPARSE_H
 #define SONDE_SPARSE_H

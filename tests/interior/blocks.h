@@ -60,14 +60,14 @@ static inline void block_solve(block *b) {
   if (sonde_solid_connect(s, b->last, NULL, &error) != SONDE_OK) fail_msg("%s", error.message);
   assert_true(sonde_solid_factor(s));
   uint32_t side = 3 * s->last_count, first = s->unknown_count - s->last_count;
-  const double *condensed = sonde_fronts_condensed(s->fronts);
+  const double *condensed = sonde_numeric_condensed(&s->numeric);
   double *a = SONDE_NEW(double, (size_t)side *side), *x = SONDE_NEW(double, side), stiff = 0;
   for (uint32_t j = 0; j < side; ++j)
     for (uint32_t i = j; i < side; ++i) a[(size_t)i * side + j] = condensed[(size_t)j * side + i];
   for (uint32_t i = 0; i < side; ++i) stiff = fmax(stiff, 1e8 * a[(size_t)i * side + i]);
   for (uint32_t node = 0; node < s->node_count; ++node)
     for (uint32_t axis = 0; axis < 3; ++axis) {
-      if (!b->last[node] || s->unknown[node] == SONDE_FRONT_NONE) continue;
+      if (!b->last[node] || s->unknown[node] == SONDE_HELD_CORNER) continue;
       uint32_t row = 3 * (s->unknown[node] - first) + axis;
       bool given = b->given[3 * node + axis];
       x[row] = b->load[3 * node + axis] * (given ? stiff : 1);
@@ -78,11 +78,11 @@ static inline void block_solve(block *b) {
   for (uint32_t i = 0; i < side; ++i) s->x[3 * first + i] = (float)x[i];
   for (uint32_t node = 0; node < s->node_count; ++node)
     for (uint32_t axis = 0; axis < 3; ++axis) {
-      if (!b->given[3 * node + axis] || s->unknown[node] == SONDE_FRONT_NONE) continue;
+      if (!b->given[3 * node + axis] || s->unknown[node] == SONDE_HELD_CORNER) continue;
       double u = x[3 * (s->unknown[node] - first) + axis];
       b->reaction[3 * node + axis] = stiff * (b->load[3 * node + axis] - u);
     }
-  sonde_fronts_recover(s->fronts, &s->x, 1);
+  sonde_numeric_recover(&s->numeric, &s->x, 1);
   sonde_free(a);
   sonde_free(x);
 }

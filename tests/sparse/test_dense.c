@@ -115,11 +115,31 @@ static void outer_products_add_up(void **state) {
   sonde_free(a);
 }
 
+static void the_inverse_undoes_the_matrix(void **state) {
+  (void)state;
+  enum { N = 70 };
+  double *a = definite_matrix(N), *f = definite_matrix(N), *x = SONDE_NEW(double, N *N);
+  assert_true(sonde_cholesky(f, N));
+  sonde_cholesky_invert(f, N, x);
+  for (size_t i = 0; i < N; ++i)
+    for (size_t j = 0; j < N; ++j) {
+      double sum = 0;
+      for (size_t k = 0; k < N; ++k) sum += a[i * N + k] * x[k * N + j];
+      assert_true(fabs(sum - (i == j)) < 1e-9);
+    }
+  a[0] = -1;
+  assert_false(sonde_cholesky(a, N));
+  sonde_free(a);
+  sonde_free(f);
+  sonde_free(x);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(products_are_those_of_plain_loops),
       cmocka_unit_test(factors_solve),
       cmocka_unit_test(outer_products_add_up),
+      cmocka_unit_test(the_inverse_undoes_the_matrix),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

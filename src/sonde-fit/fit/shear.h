@@ -7,7 +7,7 @@
 
 #include "fit/cut.h"
 #include "fit/fit_inside.h"
-#include "sparse/frontal.h"
+#include "sparse/direct.h"
 
 typedef struct sonde_patch_face {
   uint32_t place[3];
@@ -32,7 +32,7 @@ typedef struct sonde_patch {
   uint32_t side_count, *side;   // [side_count] faces with free and held corners
   uint32_t *row_start, *column; // matrix of the free places, full pattern
   uint32_t *diagonal;           // [free_count] entry
-  sonde_frontal *frontal;       // its analysis
+  sonde_symbolic *symbolic;     // its analysis
   bool coarse;                  // the mesh is too coarse for the footprint
 } sonde_patch;
 
@@ -78,8 +78,8 @@ typedef struct sonde_patch_solver {
   // s), A g^2, secant modulus q/g and factor of the rank-one part of the stiffness.
   double *normal_n, *normal_slope, *residual, *value;
   double (*flux)[3], *square, *secant, *beyond;
-  float *factor, *scratch;
-  double *work, *step, *trial, *multiplier;
+  sonde_numeric factor;
+  double *step, *trial, *multiplier;
   double *right, *preconditioned, *direction, *product;
 } sonde_patch_solver;
 

@@ -145,8 +145,12 @@ static sonde_status analyse(const sonde_model *model, const sonde_cut *cut, sond
   uint32_t free = 0;
   for (uint32_t v = 0; v < cut->vertex_count; ++v)
     if (!cut->held[v]) point_m[free++] = sonde_cut_point(model, cut, v);
-  const sonde_pattern pattern = {p->free_count, p->row_start, p->column, point_m};
-  sonde_status status = sonde_frontal_create(&pattern, &p->frontal, error);
+  const sonde_symbolic_def def = {.node_count = p->free_count,
+                                  .block = 1,
+                                  .points = point_m,
+                                  .row_start = p->row_start,
+                                  .column = p->column};
+  sonde_status status = sonde_symbolic_create(&def, &p->symbolic, error);
   sonde_free(point_m);
   return status;
 }
@@ -203,6 +207,6 @@ void sonde_patch_clear(sonde_patch *p) {
   sonde_free(p->row_start);
   sonde_free(p->column);
   sonde_free(p->diagonal);
-  sonde_frontal_destroy(p->frontal);
+  sonde_symbolic_destroy(p->symbolic);
   *p = (sonde_patch){0};
 }

@@ -55,36 +55,31 @@ static void drag_places(slide *s, sonde_vec3 site_normal) {
     s->t[k] = v_scale(across(s->normal[k], site_normal), -1);
 }
 
-// z = r over the diagonal; returns r.z over the free places.
-static double precondition(slide *s) {
+static void multiply_free(const void *user, const double *x, double *y) {
+  multiply(user, (const sonde_vec3 *)x, (sonde_vec3 *)y);
+}
+
+static double precondition(const void *user, const double *r, double *z) {
+  const slide *s = user;
   double sum = 0;
-  for (uint32_t k = 0; k < s->patch->free_count; ++k) {
-    s->z[k] = s->diagonal[k] > 0 ? v_scale(s->r[k], 1 / s->diagonal[k]) : vec3(0, 0, 0);
-    sum += v_dot(s->r[k], s->z[k]);
+  for (uint32_t k = 0; k < s->patch->free_count; ++k, r += 3, z += 3) {
+    double compliance = s->diagonal[k] > 0 ? 1 / s->diagonal[k] : 0;
+    for (int axis = 0; axis < 3; ++axis) z[axis] = r[axis] * compliance;
+    sum += r[0] * z[0] + r[1] * z[1] + r[2] * z[2];
   }
   return sum;
 }
 
+// The free places come to rest while the others stay as they are.
 static void follow(slide *s) {
-  uint32_t n = s->patch->free_count;
-  multiply(s, s->t, s->product);
-  for (uint32_t k = 0; k < n; ++k) s->r[k] = v_scale(s->product[k], -1);
-  double before = precondition(s), least = before * ACCURACY * ACCURACY, beta = 0;
-  for (int i = 0; i < MOST_ITERATIONS && before > least && before > 0; ++i) {
-    double curvature = 0;
-    for (uint32_t k = 0; k < n; ++k) s->direction[k] = v_madd(s->z[k], beta, s->direction[k]);
-    multiply(s, s->direction, s->product);
-    for (uint32_t k = 0; k < n; ++k) curvature += v_dot(s->direction[k], s->product[k]);
-    SONDE_ASSERT(curvature > 0);
-    double alpha = before / curvature;
-    for (uint32_t k = 0; k < n; ++k) {
-      s->t[k] = v_madd(s->t[k], alpha, s->direction[k]);
-      s->r[k] = v_madd(s->r[k], -alpha, s->product[k]);
-    }
-    double now = precondition(s);
-    beta = now / before;
-    before = now;
-  }
+  const sonde_operator matrix = {.count = s->patch->free_count,
+                                 .width = 3,
+                                 .multiply = multiply_free,
+                                 .precondition = precondition,
+                                 .user = s};
+  const sonde_pcg_vectors vectors = {&s->r->x, &s->z->x, &s->direction->x, &s->product->x};
+  const sonde_pcg_goal goal = {.relative = ACCURACY, .max_iterations = MOST_ITERATIONS};
+  (void)sonde_pcg(&matrix, NULL, &s->t->x, &vectors, &goal);
 }
 
 sonde_status sonde_patch_drag(sonde_patch *patch, const sonde_surface_law *law,

@@ -14,60 +14,40 @@ static const double NEGLIGIBLE_N = 1e-13;
 
 static sonde_status factor(sonde_patch_solver *solver, sonde_error *error) {
   const sonde_patch *p = solver->patch;
-  solver->factored = sonde_frontal_factor(p->frontal, solver->value, solver->factor, solver->work);
+  const sonde_matrix_source source = {.value = solver->value};
+  solver->factored = sonde_numeric_factor(&solver->factor, p->symbolic, &source);
   if (solver->factored) return SONDE_OK;
   return sonde_fail(error, SONDE_CONVERGENCE, "the stiffness of the skin is not positive definite");
 }
 
-static void multiply(const sonde_patch_solver *solver, const double *x, double *y) {
+static void multiply(const void *user, const double *x, double *y) {
+  const sonde_patch_solver *solver = user;
   const sonde_patch *p = solver->patch;
-  for (uint32_t i = 0; i < p->free_count; ++i) {
-    double sum = 0;
-    for (uint32_t k = p->row_start[i]; k < p->row_start[i + 1]; ++k)
-      sum += solver->value[k] * x[p->column[k]];
-    y[i] = sum;
-  }
+  sonde_rows_multiply(p->free_count, p->row_start, p->column, solver->value, x, y);
 }
 
-static double dot(const double *a, const double *b, uint32_t n) {
-  double sum = 0;
-  for (uint32_t i = 0; i < n; ++i) sum += a[i] * b[i];
-  return sum;
-}
-
-static void precondition(const sonde_patch_solver *solver, double *x) {
-  sonde_frontal_solve(solver->patch->frontal, solver->factor, x, solver->scratch);
+static double precondition(const void *user, const double *r, double *z) {
+  const sonde_patch_solver *solver = user;
+  memcpy(z, r, solver->patch->free_count * sizeof *z);
+  sonde_numeric_solve(&solver->factor, z);
+  return sonde_dot(r, z, solver->patch->free_count);
 }
 
 // x arrives as right-hand side and leaves as solution; false, with x unchanged, when the kept
 // factor is too far from the matrix: the residual would not fall far enough at its pace.
-static bool solve_by_gradients(sonde_patch_solver *solver, double *x, double accuracy, int most) {
-  uint32_t n = solver->patch->free_count;
-  double *r = solver->right, *z = solver->preconditioned, *d = solver->direction;
-  double *sum = solver->trial, rest = dot(x, x, n), goal = accuracy * accuracy * rest, before = 1;
-  memcpy(r, x, n * sizeof *r);
-  memset(sum, 0, n * sizeof *sum);
-  memset(d, 0, n * sizeof *d);
-  for (int k = 0; k < most; ++k) {
-    memcpy(z, r, n * sizeof *z);
-    precondition(solver, z);
-    double rz = dot(r, z, n), keep = k ? rz / before : 0;
-    for (uint32_t i = 0; i < n; ++i) d[i] = z[i] + keep * d[i];
-    multiply(solver, d, solver->product);
-    double curvature = dot(d, solver->product, n);
-    if (!(curvature > 0)) return rest <= goal;
-    double length = rz / curvature, last = rest;
-    for (uint32_t i = 0; i < n; ++i) sum[i] += length * d[i];
-    for (uint32_t i = 0; i < n; ++i) r[i] -= length * solver->product[i];
-    before = rz;
-    rest = dot(r, r, n);
-    if (rest <= goal) {
-      memcpy(x, sum, n * sizeof *x);
-      return true;
-    }
-    if (rest * pow(rest / last, most - 1 - k) > goal) return false;
-  }
-  return false;
+static bool solve_by_gradients(sonde_patch_solver *solver, double *x, double accuracy,
+                               uint32_t most) {
+  const uint32_t n = solver->patch->free_count;
+  const sonde_operator matrix = {
+      .count = n, .width = 1, .multiply = multiply, .precondition = precondition, .user = solver};
+  const sonde_pcg_vectors vectors = {solver->right, solver->preconditioned, solver->direction,
+                                     solver->product};
+  const sonde_pcg_goal goal = {
+      .relative = accuracy, .max_iterations = most, .from_zero = true, .foresee = true};
+  memset(solver->trial, 0, n * sizeof *x);
+  bool solved = sonde_pcg(&matrix, x, solver->trial, &vectors, &goal).converged;
+  if (solved) memcpy(x, solver->trial, n * sizeof *x);
+  return solved;
 }
 
 static sonde_status solve(sonde_patch_solver *solver, double *x, double accuracy,
@@ -75,14 +55,15 @@ static sonde_status solve(sonde_patch_solver *solver, double *x, double accuracy
   if (solver->factored && solve_by_gradients(solver, x, accuracy, GRADIENT_STEPS)) return SONDE_OK;
   sonde_status status = factor(solver, error);
   // Single precision needs a few steps for the finest accuracy; what they do not reach is rounding.
-  if (!status && !solve_by_gradients(solver, x, accuracy, POLISHING_STEPS)) precondition(solver, x);
+  if (!status && !solve_by_gradients(solver, x, accuracy, POLISHING_STEPS))
+    sonde_numeric_solve(&solver->factor, x);
   return status;
 }
 
 // The factor of another depth would cost more in conjugate gradients than a new one.
 static sonde_status first_step(sonde_patch_solver *solver, double *x, sonde_error *error) {
   sonde_status status = factor(solver, error);
-  if (!status) precondition(solver, x);
+  if (!status) sonde_numeric_solve(&solver->factor, x);
   return status;
 }
 
@@ -169,13 +150,13 @@ sonde_status sonde_patch_force(sonde_patch_solver *solver, double depth_m, const
   sonde_status status = adjoint(solver, solver->multiplier, error);
   if (status) return status;
   // The last Newton step would change the force by c K_hf ds = -mu K ds = mu R.
-  *force_n += dot(solver->multiplier, solver->residual, solver->patch->free_count);
+  *force_n += sonde_dot(solver->multiplier, solver->residual, solver->patch->free_count);
   sonde_patch_differentiate(solver, s_m, solver->multiplier, gradient);
   return SONDE_OK;
 }
 
 typedef struct sizes {
-  size_t places, faces, entries, factor, work, scratch;
+  size_t places, faces, entries;
 } sizes;
 
 static size_t larger(size_t a, size_t b) { return a > b ? a : b; }
@@ -187,9 +168,6 @@ static sizes sizes_of(const sonde_patch *patches, uint32_t count) {
     most.places = larger(most.places, p->place_count);
     most.faces = larger(most.faces, p->face_count);
     most.entries = larger(most.entries, p->row_start[p->free_count]);
-    most.factor = larger(most.factor, sonde_frontal_factor_size(p->frontal));
-    most.work = larger(most.work, sonde_frontal_work_size(p->frontal));
-    most.scratch = larger(most.scratch, sonde_frontal_scratch_size(p->frontal));
   }
   return most;
 }
@@ -216,19 +194,17 @@ sonde_status sonde_patch_solver_create(const sonde_patch *patches, uint32_t coun
                                  .square = SONDE_NEW(double, most.faces),
                                  .secant = SONDE_NEW(double, most.faces),
                                  .beyond = SONDE_NEW(double, most.faces),
-                                 .value = SONDE_NEW(double, most.entries),
-                                 .factor = SONDE_NEW(float, most.factor),
-                                 .work = SONDE_NEW(double, most.work),
-                                 .scratch = SONDE_NEW(float, most.scratch)};
+                                 .value = SONDE_NEW(double, most.entries)};
   bool ok = solver->face_law && solver->steepness && solver->flux && solver->square &&
-            solver->secant && solver->beyond && solver->value && solver->factor && solver->work &&
-            solver->scratch;
+            solver->secant && solver->beyond && solver->value;
   place_arrays(solver, array);
   for (int k = 0; k < PLACE_ARRAYS; ++k)
     ok = (*array[k] = SONDE_NEW(double, most.places)) != NULL && ok;
-  if (ok) return SONDE_OK;
-  sonde_patch_solver_clear(solver);
-  return sonde_fail_memory(error);
+  sonde_status status = ok ? SONDE_OK : sonde_fail_memory(error);
+  for (uint32_t k = 0; k < count && !status; ++k)
+    status = sonde_numeric_reserve(&solver->factor, patches[k].symbolic, error);
+  if (status) sonde_patch_solver_clear(solver);
+  return status;
 }
 
 void sonde_patch_solver_clear(sonde_patch_solver *solver) {
@@ -242,8 +218,6 @@ void sonde_patch_solver_clear(sonde_patch_solver *solver) {
   sonde_free(solver->secant);
   sonde_free(solver->beyond);
   sonde_free(solver->value);
-  sonde_free(solver->factor);
-  sonde_free(solver->work);
-  sonde_free(solver->scratch);
+  sonde_numeric_clear(&solver->factor);
   *solver = (sonde_patch_solver){0};
 }

@@ -181,7 +181,7 @@ static double along(const sonde_interior *in, uint32_t i, uint32_t j) {
 
 // Rows of the matrix have ascending columns; beyond the ends the potential is zero.
 static sonde_status factor_surface(sonde_interior *in, sonde_error *error) {
-  SONDE_ASSERT(in->ldl == NULL && in->s_count >= 4);
+  SONDE_ASSERT(in->surface == NULL && in->s_count >= 4);
   sonde_status status = SONDE_OK;
   const uint32_t n = in->theta_count, count = n * in->s_count;
   uint32_t filled = 0;
@@ -208,10 +208,7 @@ static sonde_status factor_surface(sonde_interior *in, sonde_error *error) {
     start[k + 1] = filled;
     points[k] = in->column[k].rest_m;
   }
-  status = sonde_ldl_create(count, start, column, value, points, &in->ldl, error);
-  if (status != SONDE_OK) goto done;
-  in->scratch = SONDE_NEW(double, sonde_ldl_scratch(in->ldl, 1));
-  if (in->scratch == NULL) status = sonde_fail_memory(error);
+  status = sonde_direct_create(count, start, column, value, points, &in->surface, error);
 done:
   sonde_free(start);
   sonde_free(column);

@@ -25,7 +25,7 @@ static const double most_slide_strain = 0.05;
 // ---- update -------------------------------------------------------------------------------
 
 void sonde_interior_solve(sonde_interior *in, const sonde_vec3 *positions) {
-  SONDE_ASSERT(positions != NULL && in->ldl != NULL);
+  SONDE_ASSERT(positions != NULL && in->surface != NULL);
   const uint32_t n = in->theta_count, count = n * in->s_count;
   // Motion of the skin at each column, through it and along it.
   for (uint32_t k = 0; k < count; ++k) {
@@ -53,7 +53,7 @@ void sonde_interior_solve(sonde_interior *in, const sonde_vec3 *positions) {
     in->field[k].spread = (float)spread;
     in->potential[k] = (0.5 * spread - row[i].inflow) * cell;
   }
-  sonde_ldl_solve(in->ldl, 1, in->potential, in->scratch);
+  sonde_direct_solve(in->surface, in->potential);
   // V at i+1/2 and j+1/2; the potential is zero beyond both ends.
   for (uint32_t k = 0; k < count; ++k) {
     const uint32_t right = k / n * n + (k + 1) % n, up = k + n;

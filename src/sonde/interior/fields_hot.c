@@ -40,8 +40,8 @@ static void store_row(sonde_fields *f, uint32_t j) {
     for (uint32_t l = 0; l < NL; ++l) {
       uint32_t at = w->solid.unknown[k * NL + l];
       const float *u = w->solid.x + 3 * (size_t)at;
-      c->move[l] = at == SONDE_FRONT_NONE ? vset_float_x4(0)
-                                          : transform_point(leg, (float_x4){u[0], u[1], u[2], 0});
+      c->move[l] = at == SONDE_HELD_CORNER ? vset_float_x4(0)
+                                           : transform_point(leg, (float_x4){u[0], u[1], u[2], 0});
     }
   }
 }

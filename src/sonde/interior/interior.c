@@ -40,12 +40,11 @@ void sonde_interior_destroy(sonde_interior *interior) {
   for (uint32_t k = 0; k < interior->cache_count; ++k) sonde_window_destroy(interior->cache[k]);
   sonde_free(interior->cache);
   sonde_surface_index_destroy(interior->skin);
-  sonde_ldl_destroy(interior->ldl);
+  sonde_direct_destroy(interior->surface);
   sonde_free(interior->column);
   sonde_free(interior->field);
   sonde_free(interior->column_grid);
   sonde_free(interior->potential);
-  sonde_free(interior->scratch);
   sonde_free(interior);
 }
 

@@ -8,7 +8,7 @@
 #include "base/link.h"
 #include "base/maths.h"
 #include "sonde/interior.h"
-#include "sparse/ldl.h"
+#include "sparse/direct.h"
 #include "sonde/interior_findings.h"
 
 enum { SONDE_SECTIONS = 160, SONDE_VESSELS = 2 + SONDE_BRANCHES };
@@ -82,8 +82,8 @@ struct sonde_interior {
   uint32_t theta_count, s_count;
   sonde_column *column;      // [s_count*theta_count] theta fastest
   sonde_column_field *field; // same shape
-  sonde_ldl *ldl;
-  double *potential, *scratch;
+  sonde_direct *surface; // Laplacian of the skin's columns
+  double *potential;
   struct sonde_column_grid *column_grid; // keeps the columns' field from folding
   struct sonde_window *live, *next;      // the solid in use and the one that is being factored
   bool building;                         // next has a footprint and is not in use yet

@@ -30,18 +30,19 @@ sonde_status sonde_solid_allocate(sonde_solid *s, uint32_t nodes, uint32_t hexes
 void sonde_solid_clear(sonde_solid *s) {
   void *parts[] = {s->node, s->hex, s->unknown, s->held, s->corner, s->x};
   for (size_t i = 0; i < SONDE_COUNT_OF(parts); ++i) sonde_free(parts[i]);
-  sonde_fronts_destroy(s->fronts);
+  sonde_numeric_clear(&s->numeric);
+  sonde_symbolic_destroy(s->symbolic);
   *s = (sonde_solid){0};
 }
 
 sonde_status sonde_solid_connect(sonde_solid *s, const unsigned char *last,
                                  const sonde_vec3 *points, sonde_error *error) {
-  SONDE_ASSERT(s->fronts == NULL && last != NULL);
+  SONDE_ASSERT(s->symbolic == NULL && last != NULL);
   uint32_t count = 0, free_count = 0;
   for (int pass = 0; pass < 2; ++pass) {
     for (uint32_t i = 0; i < s->node_count; ++i)
       if (s->held[i] == 7)
-        s->unknown[i] = SONDE_FRONT_NONE;
+        s->unknown[i] = SONDE_HELD_CORNER;
       else if ((last[i] != 0) == (pass == 1))
         s->unknown[i] = count++;
     if (pass == 0) free_count = count;
@@ -52,11 +53,16 @@ sonde_status sonde_solid_connect(sonde_solid *s, const unsigned char *last,
   sonde_vec3 *footprint = SONDE_NEW(sonde_vec3, count + 1);
   if (!footprint) return sonde_fail_memory(error);
   for (uint32_t i = 0; i < s->node_count; ++i)
-    if (s->unknown[i] != SONDE_FRONT_NONE)
+    if (s->unknown[i] != SONDE_HELD_CORNER)
       footprint[s->unknown[i]] = (points ? points : s->node)[i];
-  sonde_fronts_def def = {count, s->last_count, footprint, s->hex_count,
-                          (const uint32_t(*)[8])s->corner};
-  sonde_status status = sonde_fronts_create(&def, &s->fronts, error);
+  const sonde_symbolic_def def = {.node_count = count,
+                                  .last_count = s->last_count,
+                                  .block = 3,
+                                  .points = footprint,
+                                  .element_count = s->hex_count,
+                                  .elements = (const uint32_t(*)[8])s->corner};
+  sonde_status status = sonde_symbolic_create(&def, &s->symbolic, error);
+  if (!status) status = sonde_numeric_reserve(&s->numeric, s->symbolic, error);
   sonde_free(footprint);
   return status;
 }
@@ -157,19 +163,24 @@ void sonde_solid_matrix(const void *user, uint32_t hex, double (*k)[24]) {
       if (i != row) k[row][i] = k[i][row] = 0;
 }
 
+void sonde_solid_begin(sonde_solid *s) {
+  SONDE_ASSERT(s->symbolic != NULL);
+  const sonde_matrix_source source = {.element = sonde_solid_matrix, .user = s};
+  sonde_numeric_begin(&s->numeric, s->symbolic, &source);
+}
+
 bool sonde_solid_factor(sonde_solid *s) {
-  SONDE_ASSERT(s->fronts != NULL);
-  sonde_fronts_begin(s->fronts);
-  while (!sonde_fronts_step(s->fronts, sonde_solid_matrix, s, UINT64_MAX)) {
+  sonde_solid_begin(s);
+  while (!sonde_numeric_step(&s->numeric, UINT64_MAX)) {
   }
-  return !sonde_fronts_failed(s->fronts);
+  return !s->numeric.failed;
 }
 
 // ---- reading ------------------------------------------------------------------------------
 
 static sonde_vec3 moved_in(const sonde_solid *s, const float *x, uint32_t node) {
   uint32_t at = s->unknown[node];
-  if (at == SONDE_FRONT_NONE) return vec3(0, 0, 0);
+  if (at == SONDE_HELD_CORNER) return vec3(0, 0, 0);
   x += 3 * (size_t)at;
   return vec3((double)x[0], (double)x[1], (double)x[2]);
 }

@@ -4,7 +4,7 @@
 #define SONDE_SRC_SOLID_H
 
 #include "base/maths.h"
-#include "sparse/fronts.h"
+#include "sparse/multifrontal.h"
 
 // Corners 0-3 run round the outer face, 4-7 lie below them. A left-handed element counts its
 // volume positive.
@@ -18,11 +18,12 @@ typedef struct sonde_solid {
   uint32_t node_count, hex_count, unknown_count, last_count;
   sonde_vec3 *node;
   sonde_solid_hex *hex;
-  uint32_t *unknown;     // [node_count] number among the free nodes, SONDE_FRONT_NONE: at rest
+  uint32_t *unknown;     // [node_count] number among the free nodes, SONDE_HELD_CORNER: at rest
   unsigned char *held;   // [node_count] bits 1 2 4: x y z stay zero
   uint32_t (*corner)[8]; // [hex_count] unknowns of the corners
   bool plain;            // full integration of the volume change: locks, for comparison
-  sonde_fronts *fronts;
+  sonde_symbolic *symbolic;
+  sonde_numeric numeric;
   float *x; // [3*unknown_count] displacements
 } sonde_solid;
 
@@ -34,8 +35,10 @@ sonde_status sonde_solid_allocate(sonde_solid *solid, uint32_t nodes, uint32_t h
 sonde_status sonde_solid_connect(sonde_solid *solid, const unsigned char *last,
                                  const sonde_vec3 *points, sonde_error *error);
 void sonde_solid_clear(sonde_solid *solid);
-// Stiffness of one element; a sonde_front_matrix over a sonde_solid.
+// Stiffness of one element, for a sonde_matrix_source over a sonde_solid.
 void sonde_solid_matrix(const void *solid, uint32_t hex, double (*k)[24]);
+// Starts new numbers of the factor.
+void sonde_solid_begin(sonde_solid *solid);
 // Factors everything now; false at a pivot that is not positive.
 bool sonde_solid_factor(sonde_solid *solid);
 

@@ -100,21 +100,27 @@ void sonde_window_begin(sonde_window *w, const sonde_interior *in, sonde_footpri
     w->solid.hex[h].bulk_pa = bulk_over_shear * shear;
     w->solid.hex[h].skin_n_m = l == 0 ? (skin_pa - sonde_fat_pa) * at.fat_m : 0;
   }
-  sonde_fronts_begin(w->solid.fronts);
+  sonde_solid_begin(&w->solid);
 }
 
 uint32_t sonde_window_steps(const sonde_window *w, uint64_t budget) {
   SONDE_ASSERT(w != NULL && budget > 0);
-  return sonde_fronts_steps(w->solid.fronts, budget);
+  return sonde_symbolic_steps(w->solid.symbolic, budget);
 }
 
 bool sonde_window_step(sonde_window *w, uint64_t budget) {
   SONDE_ASSERT(w != NULL && !w->ready);
   const size_t side = 3 * (size_t)SONDE_WINDOW_NEAR;
   double *c = w->compliance;
-  if (!sonde_fronts_step(w->solid.fronts, sonde_solid_matrix, &w->solid, budget)) return false;
-  w->ready = !sonde_fronts_failed(w->solid.fronts) &&
-             sonde_fronts_compliance(w->solid.fronts, c, c + side * side);
+  if (!sonde_numeric_step(&w->solid.numeric, budget)) return false;
+  w->ready = !w->solid.numeric.failed;
+  if (w->ready) {
+    double *factor = c + side * side;
+    sonde_transpose(sonde_numeric_condensed(&w->solid.numeric), (uint32_t)side, (uint32_t)side,
+                    factor);
+    w->ready = sonde_cholesky(factor, (uint32_t)side);
+    if (w->ready) sonde_cholesky_invert(factor, (uint32_t)side, c);
+  }
   // Row k of the compliance is the answer to a force on unknown k.
   for (size_t i = 0; i < side && w->ready; ++i)
     for (size_t j = 0; j < i; ++j) {

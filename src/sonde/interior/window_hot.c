@@ -214,7 +214,7 @@ bool sonde_window_field(const sonde_window *w, double theta, double s, double r,
   for (int k = 0; k < 4; ++k)
     for (uint32_t l = 0; l < 2; ++l) {
       uint32_t at = w->solid.unknown[c.column[k] * NL + c.level + l];
-      if (at == SONDE_FRONT_NONE) continue;
+      if (at == SONDE_HELD_CORNER) continue;
       const float *x = w->solid.x + 3 * (size_t)at;
       double share = c.weight[k] * (l ? c.t : 1 - c.t);
       for (int axis = 0; axis < 3; ++axis) u[axis] += share * (double)x[axis];
@@ -276,7 +276,7 @@ static void repair_folds(sonde_window *w) {
     }
   if (!sonde_fold_repair_nodes(&w->repair, &w->grid)) return;
   for (uint32_t n = 0; n < SONDE_WINDOW_NODES; ++n) {
-    if (s->unknown[n] == SONDE_FRONT_NONE) continue;
+    if (s->unknown[n] == SONDE_HELD_CORNER) continue;
     sonde_vec3 u = v_sub(w->repair.now[n], w->grid.node[n]);
     float *x = s->x + 3 * (size_t)s->unknown[n];
     x[0] = (float)u.x, x[1] = (float)u.y, x[2] = (float)u.z;
@@ -311,7 +311,7 @@ bool sonde_window_update(sonde_window *w, const sonde_interior *in,
   }
   const bool pressed = solve_response(w, &c, along, &w->pressed);
   if (pressed && w->pressed.count > 0) fresh[count++] = w->pressed.x;
-  sonde_fronts_recover(w->solid.fronts, fresh, count); // all other nodes
+  sonde_numeric_recover(&w->solid.numeric, fresh, count); // all other nodes
   if (moved) repair_folds(w);
   // Sections of a vessel are closer than elements: each of these is evaluated once per update.
   if (pressed) memset(w->felt, 0, w->solid.hex_count * sizeof *w->felt);

@@ -1,59 +1,44 @@
-// Hot kernels of the block matrix.
-// multiply: y = A x over the active rows and pairs, plus rank-one terms.
-// invert:   inverse of each symmetric diagonal block for the preconditioner.
+// Products with the block matrix over its active rows and pairs, the inverses of its diagonal
+// blocks, and its solution by conjugate gradients that these precondition.
 #include "sparse/block.h"
 
 #include "base/base.h"
 #include "base/maths.h"
-
-static void multiply_diagonal(const sonde_block_matrix *matrix, const sonde_active_set *active,
-                              const sonde_vec3 *x, sonde_vec3 *y) {
-  const uint32_t *rows = active ? active->rows : NULL;
-  uint32_t count = rows ? active->row_count : matrix->row_count;
-  for (uint32_t r = 0; r < count; ++r) {
-    uint32_t i = rows ? rows[r] : r;
-    y[i] = m_mul_v(matrix->diagonal[i], x[i]);
-  }
-}
-
-// y_i += B x_j and y_j += B^T x_i for one stored block.
-static inline void multiply_pair(const sonde_mat3 *block, const sonde_vec3 *x, sonde_vec3 *y,
-                                 uint32_t i, uint32_t j) {
-  const double(*b)[3] = block->m;
-  sonde_vec3 xi = x[i], xj = x[j];
-  y[i].x += b[0][0] * xj.x + b[0][1] * xj.y + b[0][2] * xj.z;
-  y[i].y += b[1][0] * xj.x + b[1][1] * xj.y + b[1][2] * xj.z;
-  y[i].z += b[2][0] * xj.x + b[2][1] * xj.y + b[2][2] * xj.z;
-  y[j].x += b[0][0] * xi.x + b[1][0] * xi.y + b[2][0] * xi.z;
-  y[j].y += b[0][1] * xi.x + b[1][1] * xi.y + b[2][1] * xi.z;
-  y[j].z += b[0][2] * xi.x + b[1][2] * xi.y + b[2][2] * xi.z;
-}
-
-static void multiply_pairs(const sonde_block_matrix *matrix, const sonde_active_set *active,
-                           const sonde_vec3 *x, sonde_vec3 *y) {
-  const uint32_t *list = active ? active->pairs : NULL;
-  uint32_t count = list ? active->pair_count : matrix->pair_count;
-  for (uint32_t k = 0; k < count; ++k) {
-    uint32_t e = list ? list[k] : k;
-    multiply_pair(&matrix->upper[e], x, y, matrix->pairs[e][0], matrix->pairs[e][1]);
-  }
-}
-
-static void multiply_rank_one(const sonde_rank_one *term, const sonde_vec3 *x, sonde_vec3 *y) {
-  double projection = 0;
-  for (uint32_t k = 0; k < term->count; ++k) projection += v_dot(term->g[k], x[term->rows[k]]);
-  projection *= term->scale;
-  for (uint32_t k = 0; k < term->count; ++k)
-    y[term->rows[k]] = v_madd(y[term->rows[k]], projection, term->g[k]);
-}
+#include "sparse/pcg.h"
 
 void sonde_block_multiply(const sonde_block_matrix *matrix, const sonde_active_set *active,
                           const sonde_rank_one *terms, uint32_t term_count, const sonde_vec3 *x,
                           sonde_vec3 *y) {
   SONDE_ASSERT(x != y);
-  multiply_diagonal(matrix, active, x, y);
-  multiply_pairs(matrix, active, x, y);
-  for (uint32_t t = 0; t < term_count; ++t) multiply_rank_one(&terms[t], x, y);
+  // Blocks on the diagonal.
+  const uint32_t *list = active ? active->rows : NULL;
+  uint32_t count = list ? active->row_count : matrix->row_count;
+  for (uint32_t r = 0; r < count; ++r) {
+    uint32_t i = list ? list[r] : r;
+    y[i] = m_mul_v(matrix->diagonal[i], x[i]);
+  }
+  // y_i += B x_j and y_j += B^T x_i of each block above it.
+  list = active ? active->pairs : NULL;
+  count = list ? active->pair_count : matrix->pair_count;
+  for (uint32_t k = 0; k < count; ++k) {
+    uint32_t e = list ? list[k] : k, i = matrix->pairs[e][0], j = matrix->pairs[e][1];
+    const double(*b)[3] = (const double(*)[3])matrix->upper[e].m;
+    sonde_vec3 xi = x[i], xj = x[j];
+    y[i].x += b[0][0] * xj.x + b[0][1] * xj.y + b[0][2] * xj.z;
+    y[i].y += b[1][0] * xj.x + b[1][1] * xj.y + b[1][2] * xj.z;
+    y[i].z += b[2][0] * xj.x + b[2][1] * xj.y + b[2][2] * xj.z;
+    y[j].x += b[0][0] * xi.x + b[1][0] * xi.y + b[2][0] * xi.z;
+    y[j].y += b[0][1] * xi.x + b[1][1] * xi.y + b[2][1] * xi.z;
+    y[j].z += b[0][2] * xi.x + b[1][2] * xi.y + b[2][2] * xi.z;
+  }
+  // Rank-one terms.
+  for (const sonde_rank_one *term = terms; term < terms + term_count; ++term) {
+    double projection = 0;
+    for (uint32_t k = 0; k < term->count; ++k) projection += v_dot(term->g[k], x[term->rows[k]]);
+    projection *= term->scale;
+    for (uint32_t k = 0; k < term->count; ++k)
+      y[term->rows[k]] = v_madd(y[term->rows[k]], projection, term->g[k]);
+  }
 }
 
 // Adjugate over determinant of a symmetric 3x3 block. A block whose determinant rounds to no
@@ -86,4 +71,57 @@ void sonde_block_invert_diagonal(sonde_block_matrix *matrix, const sonde_active_
     uint32_t i = rows ? rows[r] : r;
     invert_symmetric((const double(*)[3])matrix->diagonal[i].m, matrix->inverse[i]);
   }
+}
+
+// ---- solution -----------------------------------------------------------------------------
+
+typedef struct block_operator {
+  const sonde_block_matrix *matrix;
+  const sonde_active_set *active;
+  const sonde_rank_one *terms;
+  uint32_t term_count;
+} block_operator;
+
+static void multiply(const void *user, const double *x, double *y) {
+  const block_operator *a = user;
+  sonde_block_multiply(a->matrix, a->active, a->terms, a->term_count, (const sonde_vec3 *)x,
+                       (sonde_vec3 *)y);
+}
+
+static double precondition(const void *user, const double *r, double *z) {
+  const block_operator *a = user;
+  const uint32_t *rows = a->active ? a->active->rows : NULL;
+  uint32_t count = rows ? a->active->row_count : a->matrix->row_count;
+  double sum = 0;
+  for (uint32_t k = 0; k < count; ++k) {
+    uint32_t i = rows ? rows[k] : k;
+    const double *d = a->matrix->inverse[i], *v = r + 3 * (size_t)i;
+    double *to = z + 3 * (size_t)i;
+    to[0] = d[0] * v[0] + d[1] * v[1] + d[2] * v[2];
+    to[1] = d[1] * v[0] + d[3] * v[1] + d[4] * v[2];
+    to[2] = d[2] * v[0] + d[4] * v[1] + d[5] * v[2];
+    sum += v[0] * to[0] + v[1] * to[1] + v[2] * to[2];
+  }
+  return sum;
+}
+
+sonde_pcg_result sonde_pcg_solve(const sonde_block_matrix *matrix, const sonde_active_set *active,
+                                 const sonde_rank_one *terms, uint32_t term_count,
+                                 const sonde_vec3 *b, sonde_vec3 *x,
+                                 const sonde_pcg_scratch *scratch,
+                                 const sonde_pcg_options *options) {
+  const block_operator user = {matrix, active, terms, term_count};
+  sonde_operator a = {.count = matrix->row_count,
+                      .width = 3,
+                      .multiply = multiply,
+                      .precondition = precondition,
+                      .user = &user};
+  if (active && active->rows) a.rows = active->rows, a.count = active->row_count;
+  SONDE_ASSERT(a.count <= matrix->row_count);
+  const sonde_pcg_vectors vectors = {&scratch->r->x, &scratch->z->x, &scratch->p->x,
+                                     &scratch->q->x};
+  const sonde_pcg_goal goal = {.relative = options->relative_residual,
+                               .absolute = options->absolute_residual,
+                               .max_iterations = options->max_iterations};
+  return sonde_pcg(&a, &b->x, &x->x, &vectors, &goal);
 }

@@ -1,23 +1,18 @@
-// sonde_dense_kernels_find: of this processor.
-// sonde_multiply: by the widest of them.
-// mirror:         one triangle onto the other.
-// factor_rows:    rows of the transposed factor against each other and what follows them.
-// sonde_cholesky: blocks of rows of the transposed factor in the upper triangle, then mirrored.
-// sonde_cholesky_forward, _solve: forward, then backward; _many: by blocks of rows.
-// sonde_add_outers: by strips of the lower triangle.
+// Dense symmetric systems by blocks of rows, whose products the vector kernels make.
 #include "sparse/dense.h"
 
 #include "base/base.h"
 #include "base/vector.h"
 
 #include <math.h>
+#include <string.h>
 
 enum { BLOCK = 16, STRIP = 32 };
 
 const sonde_dense_kernels *sonde_dense_kernels_find(const char *name) {
   const sonde_dense_kernels *known[] = {
 #ifdef __x86_64__
-      &sonde_dense_kernels_avx2,
+      &sonde_dense_kernels_avx512, &sonde_dense_kernels_avx2,
 #endif
       &sonde_dense_kernels_base};
   for (size_t k = 0; k < SONDE_COUNT_OF(known); ++k)
@@ -134,6 +129,32 @@ void sonde_cholesky_solve_many(const double *factor, uint32_t n, double *x, uint
   for (uint32_t k = n; k-- > 0;) {
     subtract_rows(factor, n, x, columns, k, k + 1, k + 1, n, true);
     divide_row(x + (size_t)k * columns, columns, factor[(size_t)k * n + k]);
+  }
+}
+
+void sonde_cholesky_invert(const double *factor, uint32_t n, double *inverse) {
+  SONDE_ASSERT(n > 0 && factor != inverse);
+  memset(inverse, 0, (size_t)n * n * sizeof *inverse);
+  // Row i of L^-1 ends at column i.
+  for (uint32_t i = 0; i < n; ++i) {
+    const sonde_product product = {.c = inverse + (size_t)i * n,
+                                   .c_row = n,
+                                   .a = factor + (size_t)i * n,
+                                   .a_row = n,
+                                   .a_step = 1,
+                                   .b = inverse,
+                                   .b_row = n,
+                                   .rows = 1,
+                                   .columns = i,
+                                   .depth = i,
+                                   .subtract = true};
+    inverse[(size_t)i * n + i] = 1;
+    sonde_multiply(&product);
+    divide_row(inverse + (size_t)i * n, i + 1, factor[(size_t)i * n + i]);
+  }
+  for (uint32_t i = n; i-- > 0;) {
+    subtract_rows(factor, n, inverse, n, i, i + 1, i + 1, n, true);
+    divide_row(inverse + (size_t)i * n, n, factor[(size_t)i * n + i]);
   }
 }
 

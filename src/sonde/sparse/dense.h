@@ -1,4 +1,4 @@
-// Dense symmetric systems, lower triangles in row order, products of matrices, and what the pieces
+// Dense symmetric systems, lower triangles in row order, products of matrices, and what the fronts
 // of a multifrontal factor need. Every number is the same whatever the instruction set; products
 // sum in the order of plain loops.
 #ifndef SONDE_SRC_DENSE_H
@@ -24,25 +24,36 @@ typedef struct sonde_product {
 } sonde_product;
 SONDE_LINK void sonde_multiply(const sonde_product *product);
 
-// For one instruction set. Columns of a piece: `own` of them with `rows` numbers each, the triangle
-// at the top; rows are a multiple of 8, those behind the last used one zero.
+// Numbers in a row of a factor of `own` columns: a multiple of 8.
+static inline uint32_t sonde_front_width(uint32_t own) { return (own + 7) / 8 * 8; }
+
+// Numbers from column to column of a front of order n: zero ones let vectors end behind the last
+// row.
+static inline size_t sonde_front_stride(uint32_t n) { return (size_t)n + 7; }
+
+// For one instruction set. A front is a lower triangle by columns; what lies above it is nobody's.
+// Its factor of `own`
+// columns has rows of sonde_front_width(own), zero behind the used ones: L21 (`behind` rows), then
+// L11 with its transpose above the diagonal and zero on it, then the inverse of the diagonal.
 typedef struct sonde_dense_kernels {
   const char *name;
   void (*multiply)(const sonde_product *product);
-  // Factors the columns and subtracts their product from the update [size x size], lower triangle
-  // by columns, size a multiple of 4; the diagonal receives its inverse, what is above it zero.
-  // False: a pivot is not positive.
-  bool (*eliminate)(double *columns, uint32_t own, uint32_t rows, double *update, uint32_t size);
-  // Triangular solves with such columns, x [rows].
-  void (*forward)(const float *columns, uint32_t own, uint32_t rows, float *x);
-  void (*backward)(const float *columns, uint32_t own, uint32_t rows, float *x);
+  // Cholesky of the columns [from, to); what lies behind receives the Schur complement. False at a
+  // pivot that is not positive.
+  bool (*eliminate)(double *front, uint32_t n, uint32_t from, uint32_t to);
+  // x = L11^-1 right, then rest[behind] -= L21 x; right is scratch. Vectors of the width.
+  void (*forward)(const float *factor, uint32_t own, uint32_t behind, float *right, float *x,
+                  float *rest);
+  // x = L11^-T (right - L21^T rest); right is scratch.
+  void (*backward)(const float *factor, uint32_t own, uint32_t behind, float *right, float *x,
+                   const float *rest);
 } sonde_dense_kernels;
 
 // The widest that this processor runs, or those called `name`; NULL: none of that name.
 const sonde_dense_kernels *sonde_dense_kernels_find(const char *name);
 extern const sonde_dense_kernels sonde_dense_kernels_base;
 #ifdef __x86_64__
-extern const sonde_dense_kernels sonde_dense_kernels_avx2;
+extern const sonde_dense_kernels sonde_dense_kernels_avx2, sonde_dense_kernels_avx512;
 #endif
 
 // Cholesky factor in the lower triangle of a [n * n], in place; the upper one is scratch. @return
@@ -57,6 +68,8 @@ SONDE_LINK void sonde_cholesky_forward_many(const double *factor, uint32_t n, do
                                             uint32_t columns);
 SONDE_LINK void sonde_cholesky_solve_many(const double *factor, uint32_t n, double *x,
                                           uint32_t columns);
+// inverse [n * n] of L L^T, symmetric but for rounding.
+void sonde_cholesky_invert(const double *factor, uint32_t n, double *inverse);
 // Adds weight[k] row row^T of rows [count][n] to the lower triangle of a.
 SONDE_LINK void sonde_add_outers(double *a, uint32_t n, const double *rows, uint32_t count,
                                  const double *weight);

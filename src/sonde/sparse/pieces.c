@@ -101,17 +101,3 @@ void sonde_pieces_clear(sonde_pieces *s) {
   for (size_t i = 0; i < SONDE_COUNT_OF(parts); ++i) sonde_free(parts[i]);
   *s = (sonde_pieces){0};
 }
-
-size_t sonde_pieces_stack(const sonde_pieces *s, uint32_t (*side)(const sonde_piece *)) {
-  size_t top = 0, most = 0;
-  for (uint32_t t = 0; t < s->count; ++t) {
-    size_t own = side(&s->list[t]);
-    for (uint32_t c = 0, at = t - 1; c < s->list[t].child_count; ++c, at = s->list[at].before) {
-      size_t taken = side(&s->list[at]);
-      top -= taken * taken;
-    }
-    top += own * own;
-    if (top > most) most = top;
-  }
-  return most;
-}

@@ -31,7 +31,4 @@ sonde_status sonde_pieces_find(const sonde_pattern *pattern, uint32_t rows, uint
                                sonde_pieces *pieces, sonde_error *error);
 void sonde_pieces_clear(sonde_pieces *pieces);
 
-// Most numbers that wait at once when the update of a piece is a matrix of order side(piece).
-size_t sonde_pieces_stack(const sonde_pieces *pieces, uint32_t (*side)(const sonde_piece *));
-
 #endif

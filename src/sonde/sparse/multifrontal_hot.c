@@ -1,0 +1,262 @@
+// Numbers of the multifrontal factor, front by front: assembly, elimination, storage; solutions.
+#include "sparse/multifrontal.h"
+
+#include "base/base.h"
+#include "base/vector.h"
+
+#include <string.h>
+
+enum { PANEL = 32 }; // columns that are eliminated at a time
+
+static size_t order_of(const sonde_symbolic *s, const sonde_piece *p) {
+  return s->block * ((size_t)p->count + p->boundary_count);
+}
+
+// Of the working front; the condensed matrix is left without gaps.
+static size_t stride_of(const sonde_numeric *f, size_t n) {
+  return f->now < f->symbolic->pieces.count ? sonde_front_stride((uint32_t)n) : n;
+}
+
+// Multiplications, about, of assembling a front of order n and of eliminating columns of it.
+static uint64_t assembly_cost(const sonde_piece *p, size_t n) {
+  return n * n + 20000 * (uint64_t)p->entry_count;
+}
+
+static uint64_t panel_cost(size_t n, uint32_t from, uint32_t to) {
+  return (to - from) * (n - from) * (n - from) / 2;
+}
+
+// The same walk as sonde_numeric_step() without the numbers.
+uint32_t sonde_symbolic_steps(const sonde_symbolic *s, uint64_t budget) {
+  SONDE_ASSERT(s != NULL && budget > 0);
+  uint32_t steps = 1;
+  uint64_t spent = 0;
+  for (uint32_t t = 0; t <= s->pieces.count; ++t) {
+    const sonde_piece *p = &s->pieces.list[t];
+    size_t n = order_of(s, p), own = (size_t)s->block * p->count;
+    if (spent >= budget) spent = 0, ++steps;
+    spent += assembly_cost(p, n);
+    for (uint32_t from = 0; from < own && t < s->pieces.count; from += PANEL) {
+      if (spent >= budget) spent = 0, ++steps;
+      spent += panel_cost(n, from, from + PANEL < own ? from + PANEL : (uint32_t)own);
+    }
+  }
+  return steps;
+}
+
+// ---- assembly -----------------------------------------------------------------------------
+
+// Adds the update of a child to the lower triangle of the front. Nodes ascend in both.
+INLINE void add_update(double *front, size_t stride, const uint32_t *related, uint32_t count,
+                       const double *update, size_t block) {
+  for (size_t j = 0; j < block * count; ++j, update += block * count) {
+    const size_t node = j / block, axis = j % block;
+    double *column = front + (block * related[node] + axis) * stride;
+    for (size_t b = axis; b < block; ++b)
+      column[block * related[node] + b] += update[block * node + b];
+    for (size_t i = node + 1; i < count; ++i)
+      for (size_t b = 0; b < block; ++b) column[block * related[i] + b] += update[block * i + b];
+  }
+}
+
+// Adds the entries of the pattern in the piece's own rows, whose blocks lie transposed in columns.
+INLINE void add_entries(double *front, size_t stride, const sonde_front_entry *entries,
+                        uint32_t count, const double *value, size_t block) {
+  for (uint32_t k = 0; k < count; ++k) {
+    const sonde_front_entry *e = &entries[k];
+    const double *from = value + e->source * block * block;
+    for (size_t j = 0; j < block; ++j)
+      for (size_t i = e->row == e->column ? j : 0; i < block; ++i)
+        front[(block * e->column + j) * stride + block * e->row + i] += from[block * j + i];
+  }
+}
+
+// Adds the matrix of one element to the lower triangle.
+static void add_element(sonde_numeric *f, size_t stride, uint32_t element) {
+  const uint32_t *nodes = f->symbolic->elements[element], *rank = f->symbolic->pieces.rank;
+  double k[24][24];
+  f->source.element(f->source.user, element, k);
+  for (int a = 0; a < 8; ++a) {
+    if (nodes[a] == SONDE_HELD_CORNER) continue;
+    size_t column = 3 * (size_t)f->local[rank[nodes[a]]];
+    for (int b = 0; b < 8; ++b) {
+      if (nodes[b] == SONDE_HELD_CORNER) continue;
+      size_t row = 3 * (size_t)f->local[rank[nodes[b]]];
+      if (row < column) continue;
+      for (size_t i = 0; i < 3; ++i)
+        for (size_t j = 0; j < 3; ++j)
+          f->front[(column + j) * stride + row + i] += k[3 * a + (int)j][3 * b + (int)i];
+    }
+  }
+}
+
+static void assemble(sonde_numeric *f, const sonde_piece *p) {
+  const sonde_symbolic *s = f->symbolic;
+  const sonde_piece *list = s->pieces.list;
+  size_t n = order_of(s, p), stride = stride_of(f, n);
+  memset(f->front, 0, n * stride * sizeof *f->front);
+  // The matrix.
+  if (s->elements) {
+    for (uint32_t i = 0; i < p->count; ++i) f->local[p->first + i] = i;
+    for (uint32_t i = 0; i < p->boundary_count; ++i)
+      f->local[s->pieces.boundary[p->boundary + i]] = p->count + i;
+    for (uint32_t e = 0; e < p->entry_count; ++e)
+      add_element(f, stride, s->element_of[p->entry + e]);
+  } else if (s->block == 1)
+    add_entries(f->front, stride, s->entries + p->entry, p->entry_count, f->source.value, 1);
+  else
+    add_entries(f->front, stride, s->entries + p->entry, p->entry_count, f->source.value, 3);
+  // What the children left, latest first.
+  for (uint32_t c = 0, at = f->now - 1; c < p->child_count; ++c, at = list[at].before) {
+    size_t order = (size_t)s->block * list[at].boundary_count;
+    const uint32_t *related = s->related + list[at].boundary;
+    f->top -= order * order;
+    if (s->block == 1)
+      add_update(f->front, stride, related, list[at].boundary_count, f->stack + f->top, 1);
+    else
+      add_update(f->front, stride, related, list[at].boundary_count, f->stack + f->top, 3);
+  }
+}
+
+// ---- factorisation ------------------------------------------------------------------------
+
+// The factor of the front to single precision, what lies behind onto the stack.
+static void store(sonde_numeric *f, const sonde_piece *p) {
+  const size_t own = (size_t)f->symbolic->block * p->count, n = order_of(f->symbolic, p);
+  const size_t behind = n - own, width = sonde_front_width((uint32_t)own), stride = stride_of(f, n);
+  float *to = f->factor + p->factor, *l11 = to + behind * width, *inverse = l11 + own * width;
+  memset(l11, 0, (own + 1) * width * sizeof *to);
+  for (size_t j = 0; j < own; ++j) {
+    const double *column = f->front + j * stride;
+    inverse[j] = (float)(1 / column[j]);
+    for (size_t i = j + 1; i < own; ++i) l11[i * width + j] = l11[j * width + i] = (float)column[i];
+  }
+  for (size_t j = 0; j < width; j += 8) // by strips of eight columns
+    for (size_t i = 0; i < behind; ++i) {
+      const double *row = f->front + j * stride + own + i;
+      for (size_t c = 0; c < 8; ++c)
+        to[i * width + j + c] = j + c < own ? (float)row[c * stride] : 0;
+    }
+  double *update = f->stack + f->top;
+  for (size_t j = 0; j < behind; ++j)
+    memcpy(update + j * behind + j, f->front + (own + j) * stride + own + j,
+           (behind - j) * sizeof *update);
+  f->top += behind * behind;
+  SONDE_ASSERT(f->top <= f->stack_room);
+}
+
+void sonde_numeric_begin(sonde_numeric *f, const sonde_symbolic *symbolic,
+                         const sonde_matrix_source *source) {
+  SONDE_ASSERT(f->factor_room >= symbolic->factor_size);
+  SONDE_ASSERT(symbolic->elements ? source->element != NULL : source->value != NULL);
+  f->symbolic = symbolic;
+  f->source = *source;
+  f->now = f->column = 0;
+  f->top = 0;
+  f->assembled = f->failed = false;
+}
+
+bool sonde_numeric_step(sonde_numeric *f, uint64_t budget) {
+  SONDE_ASSERT(f != NULL && f->symbolic != NULL);
+  const sonde_pieces *pieces = &f->symbolic->pieces;
+  for (uint64_t spent = 0; spent < budget && !f->failed;) {
+    const sonde_piece *p = &pieces->list[f->now];
+    size_t n = order_of(f->symbolic, p), own = (size_t)f->symbolic->block * p->count;
+    if (!f->assembled) {
+      assemble(f, p);
+      f->assembled = true, f->column = 0;
+      spent += assembly_cost(p, n);
+      continue;
+    }
+    if (f->now == pieces->count) return true; // the condensed matrix stays in the working front
+    uint32_t to = f->column + PANEL < own ? f->column + PANEL : (uint32_t)own;
+    f->failed = !f->kernels->eliminate(f->front, (uint32_t)n, f->column, to);
+    spent += panel_cost(n, f->column, to);
+    f->column = to;
+    if (to < own) continue;
+    store(f, p);
+    ++f->now, f->assembled = false;
+  }
+  return f->failed || (f->now == pieces->count && f->assembled);
+}
+
+bool sonde_numeric_factor(sonde_numeric *f, const sonde_symbolic *symbolic,
+                          const sonde_matrix_source *source) {
+  sonde_numeric_begin(f, symbolic, source);
+  while (!sonde_numeric_step(f, UINT64_MAX)) {
+  }
+  return !f->failed;
+}
+
+const double *sonde_numeric_condensed(const sonde_numeric *f) {
+  SONDE_ASSERT(f->now == f->symbolic->pieces.count && f->assembled);
+  return f->front;
+}
+
+// ---- solution -----------------------------------------------------------------------------
+
+// `part` holds the right-hand side and the solution of a piece, then the unknowns of its boundary.
+INLINE void recover_piece(const sonde_numeric *f, const sonde_piece *p, float *x, uint32_t block) {
+  const uint32_t *order = f->symbolic->pieces.order + p->first;
+  const uint32_t *boundary = f->symbolic->pieces.boundary + p->boundary;
+  uint32_t own = block * p->count, width = sonde_front_width(own);
+  float *right = f->part, *solved = right + width, *rest = solved + width;
+  for (uint32_t j = 0; j < width; ++j) right[j] = 0;
+  for (uint32_t i = 0; i < p->boundary_count; ++i)
+    for (uint32_t a = 0; a < block; ++a)
+      rest[block * i + a] = x[block * (size_t)f->symbolic->pieces.order[boundary[i]] + a];
+  f->kernels->backward(f->factor + p->factor, own, block * p->boundary_count, right, solved, rest);
+  for (uint32_t i = 0; i < p->count; ++i)
+    for (uint32_t a = 0; a < block; ++a) x[block * (size_t)order[i] + a] = solved[block * i + a];
+}
+
+// All solutions piece by piece: a piece of the factor comes from memory once.
+void sonde_numeric_recover(const sonde_numeric *f, float *const *x, uint32_t count) {
+  SONDE_ASSERT(f != NULL && x != NULL);
+  for (uint32_t t = f->symbolic->pieces.count; t-- > 0;)
+    for (uint32_t k = 0; k < count; ++k)
+      if (f->symbolic->block == 1)
+        recover_piece(f, &f->symbolic->pieces.list[t], x[k], 1);
+      else
+        recover_piece(f, &f->symbolic->pieces.list[t], x[k], 3);
+}
+
+// All unknowns in their order lie in `gathered`.
+INLINE void solve(const sonde_numeric *f, double *x, uint32_t block) {
+  const sonde_pieces *pieces = &f->symbolic->pieces;
+  float *y = f->gathered;
+  for (uint32_t k = 0; k < f->symbolic->node_count; ++k)
+    for (uint32_t a = 0; a < block; ++a)
+      y[block * k + a] = (float)x[block * (size_t)pieces->order[k] + a];
+  for (uint32_t pass = 0; pass < 2; ++pass)
+    for (uint32_t n = 0; n < pieces->count; ++n) {
+      const sonde_piece *p = &pieces->list[pass ? pieces->count - 1 - n : n];
+      const uint32_t *boundary = pieces->boundary + p->boundary;
+      uint32_t own = block * p->count, behind = block * p->boundary_count;
+      uint32_t width = sonde_front_width(own);
+      float *right = f->part, *solved = right + width, *rest = solved + width;
+      memcpy(right, y + (size_t)block * p->first, own * sizeof *right);
+      memset(right + own, 0, (width - own) * sizeof *right);
+      for (uint32_t i = 0; i < behind; ++i)
+        rest[i] = y[block * (size_t)boundary[i / block] + i % block];
+      if (pass) {
+        f->kernels->backward(f->factor + p->factor, own, behind, right, solved, rest);
+      } else {
+        f->kernels->forward(f->factor + p->factor, own, behind, right, solved, rest);
+        for (uint32_t i = 0; i < behind; ++i)
+          y[block * (size_t)boundary[i / block] + i % block] = rest[i];
+      }
+      memcpy(y + (size_t)block * p->first, solved, own * sizeof *y);
+    }
+  for (uint32_t k = 0; k < f->symbolic->node_count; ++k)
+    for (uint32_t a = 0; a < block; ++a)
+      x[block * (size_t)pieces->order[k] + a] = (double)y[block * k + a];
+}
+
+void sonde_numeric_solve(const sonde_numeric *f, double *x) {
+  SONDE_ASSERT(f->symbolic->last_count == 0 && !f->failed);
+  if (f->symbolic->block == 1)
+    solve(f, x, 1);
+  else
+    solve(f, x, 3);
+}
