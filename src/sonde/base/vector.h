@@ -205,7 +205,6 @@ INLINE float vsum_pairs(float_x8 a) {
 // Vectors as wide as the set.
 typedef floats floats_near __attribute__((aligned(4), may_alias));
 typedef doubles doubles_near __attribute__((aligned(8), may_alias));
-typedef doubles_near lot;
 INLINE floats vload(const float *p) { return *(const floats_near *)p; }
 INLINE floats vset(float a) { return a - (floats){0}; }
 INLINE ints vset_ints(int32_t a) { return a - (ints){0}; }
