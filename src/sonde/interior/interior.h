@@ -82,7 +82,7 @@ struct sonde_interior {
   uint32_t theta_count, s_count;
   sonde_column *column;      // [s_count*theta_count] theta fastest
   sonde_column_field *field; // same shape
-  sonde_direct *surface; // Laplacian of the skin's columns
+  sonde_direct *surface;     // Laplacian of the skin's columns
   double *potential;
   struct sonde_column_grid *column_grid; // keeps the columns' field from folding
   struct sonde_window *live, *next;      // the solid in use and the one that is being factored
