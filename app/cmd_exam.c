@@ -168,7 +168,7 @@ const app_command cmd_exam = {
         "Lets a scripted operator examine a case in lockstep and scores the exam as a person's "
         "is: the operator moves a probe over the thigh, presses, looks, and decides for every "
         "segment of the vein. The operator sees what a trainee sees, never the truth. Formulas: "
-        "docs/trainer.md.",
+        "docs/trainer_theory.md.",
     OPT_TABLE(TABLE),
     .size = sizeof(options),
     .defaults = &DEFAULTS,

@@ -45,30 +45,6 @@ static bool derive_all(recovery *r) {
   return !cancelled;
 }
 
-static void print(const recovery *r, bool json) {
-  const exam_recovered *f = &r->found;
-  if (json) {
-    app_json_begin();
-    app_json_integer("exams", f->exams);
-    app_json_integer("running", f->running);
-    app_json_integer("added", f->added);
-    app_json_integer("added_finished", f->finished);
-    app_json_integer("added_interrupted", f->interrupted);
-    app_json_integer("derived", r->derived);
-    app_json_integer("never_began", f->never_began);
-    app_json_integer("unreadable", f->unreadable + r->failed);
-    app_json_end();
-    return;
-  }
-  printf("%u exams in %s, %u of them running\n", f->exams, r->directory, f->running);
-  printf("added to the log: %u (%u finished, %u interrupted)\n", f->added, f->finished,
-         f->interrupted);
-  printf("result and report made again: %u\n", r->derived);
-  if (f->never_began)
-    printf("exams that did not begin, since the disk was full or the program ended: %u\n",
-           f->never_began);
-}
-
 int exam_recover(const exam_library *library, const char *directory, bool json) {
   char path[EXAM_PATH];
   sonde_error error = {0};
@@ -81,7 +57,27 @@ int exam_recover(const exam_library *library, const char *directory, bool json) 
   if (r.found.unreadable) fprintf(stderr, "sonde exam: %s\n", r.found.worst);
   bool whole = derive_all(&r);
   sonde_exam_log_close(r.log);
-  print(&r, json);
+  const exam_recovered *f = &r.found;
+  if (json) {
+    app_json_begin();
+    app_json_integer("exams", f->exams);
+    app_json_integer("running", f->running);
+    app_json_integer("added", f->added);
+    app_json_integer("added_finished", f->finished);
+    app_json_integer("added_interrupted", f->interrupted);
+    app_json_integer("derived", r.derived);
+    app_json_integer("never_began", f->never_began);
+    app_json_integer("unreadable", f->unreadable + r.failed);
+    app_json_end();
+  } else {
+    printf("%u exams in %s, %u of them running\n", f->exams, r.directory, f->running);
+    printf("added to the log: %u (%u finished, %u interrupted)\n", f->added, f->finished,
+           f->interrupted);
+    printf("result and report made again: %u\n", r.derived);
+    if (f->never_began)
+      printf("exams that did not begin, since the disk was full or the program ended: %u\n",
+             f->never_began);
+  }
   if (!whole) fprintf(stderr, "sonde exam: cancelled; what was made is kept\n");
   return whole && r.found.unreadable == 0 && r.failed == 0 ? APP_OK : APP_FAILED;
 }

@@ -20,8 +20,8 @@ SONDE_API sonde_status sonde_image_save_png(const sonde_image *image, const char
  * Writes a report atomically: one HTML file that holds its data and the script that draws them
  * (web/src/report), opens from disk and loads nothing.
  * @param title of the window, UTF-8
- * @param json [length] one JSON object in UTF-8; its member "kind" names the view: fit, scene,
- * exam or class
+ * @param json [length] one JSON object in UTF-8; its member "kind" names the view: fit, scene
+ * or exam
  * @return IO naming the file, DISK, MEMORY
  * @thread owner
  */

@@ -1,7 +1,7 @@
 /**
  * @file trainer_judge.h
  * What a trainee did, from what the session showed: compressions, coverage, guidance, decisions,
- * and the score against the truth. Every formula: docs/trainer.md.
+ * and the score against the truth. Every formula: docs/trainer_theory.md.
  */
 #ifndef SONDE_TRAINER_JUDGE_H
 #define SONDE_TRAINER_JUDGE_H

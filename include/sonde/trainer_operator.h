@@ -1,7 +1,7 @@
 /**
  * @file trainer_operator.h
  * Scripted operators: they see what a trainee sees (snapshots, never the truth), move a device
- * along a protocol, press, and decide. docs/trainer.md.
+ * along a protocol, press, and decide. docs/trainer_theory.md.
  */
 #ifndef SONDE_TRAINER_OPERATOR_H
 #define SONDE_TRAINER_OPERATOR_H

@@ -13,7 +13,7 @@ extern "C" {
 
 enum { SONDE_EXAM_PROTOCOL_VERSION = 1, SONDE_EXAM_STOPS = 16, SONDE_PLAN_POINTS = 64 };
 
-/** What a valid compression is (docs/trainer.md). The forces are those of a place:
+/** What a valid compression is (docs/trainer_theory.md). The forces are those of a place:
  *  sonde_force_target. */
 typedef struct sonde_criteria {
   double tilt_rad;     /**< most between image plane and transverse; 20 degrees */

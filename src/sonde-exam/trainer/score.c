@@ -1,4 +1,4 @@
-// The score: what was found against what is there. Formulas: docs/trainer.md, version
+// The score: what was found against what is there. Formulas: docs/trainer_theory.md, version
 // SONDE_SCORE_VERSION.
 #include "trainer/judge.h"
 

@@ -183,7 +183,7 @@ function earlier(data: Exam): HTMLElement {
   const result = (e: Entry): Cell => (e.interrupted ? "interrupted" : verdict(e.passed, e.passed ? "passed" : e.correct ? "not passed" : "wrong diagnosis"));
   const rows = data.exams.slice(0, LISTED).map((e, i) => ({
     strong: i === 0,
-    cells: [strong(`${e.title}${i === 0 ? " (this exam)" : ""}`), h("span", { class: "day" }, e.date.slice(0, 16).replace("T", " ")), fixed(e.score, 0), result(e), percent(e.coverage), percent(e.valid_share),
+    cells: [strong(`${e.title}${i === 0 ? " (this exam)" : ""}`), h("span", { class: "line" }, e.date.slice(0, 16).replace("T", " ")), fixed(e.score, 0), result(e), percent(e.coverage), percent(e.valid_share),
       withUnit(isKnown(e.time_s) ? e.time_s / 60 : e.time_s, 1, "min")],
   }));
   return section("earlier", "Compared with your earlier exams",
@@ -221,7 +221,7 @@ function presses(data: Exam): HTMLElement | null {
   if (!count) return null;
   const rows = data.presses.map((p, i) => {
     const mark = s("svg", { viewBox: "0 0 14 14", width: 14, height: 14, "aria-hidden": "true" }, pressMark(7, 7, p.result));
-    const cells: Cell[] = [String(i + 1), fixed(p.start_s, 1), placeOf(data, p), h("span", {}, mark, ` ${WORDS[p.result]}`), fixed(p.force_peak_n, 1),
+    const cells: Cell[] = [String(i + 1), fixed(p.start_s, 1), placeOf(data, p), h("span", { class: "line" }, mark, ` ${WORDS[p.result]}`), fixed(p.force_peak_n, 1),
       inPercent(p.vein), inPercent(p.artery_least), fixed(p.tilt_deg, 0)];
     return { cells };
   });
@@ -241,7 +241,7 @@ function comments(data: Exam): HTMLElement | null {
 function foot(data: Exam): HTMLElement {
   const line = (words: string, code: string | null): Child => code && h("p", {}, words, h("code", {}, code));
   return h("footer", {},
-    h("p", {}, `The patient, the images and the forces are synthetic: computed by Sonde ${data.program}. Scores and measures: formulas of version ${data.score.version}, docs/trainer.md.`),
+    h("p", {}, `The patient, the images and the forces are synthetic: computed by Sonde ${data.program}. Scores and measures: formulas of version ${data.score.version}, docs/trainer_theory.md.`),
     line("Exam ", data.exam.exam),
     line("Its recording plays again with ", data.recording && `sonde replay ${data.recording}`));
 }

@@ -1,13 +1,12 @@
 // A report: the document holds its data as JSON, whose member "kind" names the view that draws them.
 
-import { classReport } from "./class";
 import { exam } from "./exam";
 import { fit } from "./fit";
 import { h } from "./dom";
 import { plain } from "./plain";
 import { scene } from "./scene";
 
-const VIEWS: Record<string, (data: unknown) => void> = { fit, scene, exam, class: classReport };
+const VIEWS: Record<string, (data: unknown) => void> = { fit, scene, exam };
 
 try {
   const data = JSON.parse(document.getElementById("report")?.textContent ?? "") as { kind?: string };
