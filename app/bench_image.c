@@ -1,6 +1,5 @@
-// The image's benchmark: full frames of a thigh that deforms from frame to frame.
-// read_options, prepare:  the renderer, its density chosen for the number of scatterers.
-// record:                 one frame at each of some settled depths, over and over.
+// The image's benchmark: full frames of a thigh that deforms from frame to frame, at some settled
+// depths of the probe.
 #include "bench_image.h"
 
 #include "pose.h"
@@ -65,6 +64,7 @@ static void draw(bench *b, uint64_t tick) {
                     &b->settings, &b->image);
 }
 
+// A renderer of so many scatterers per volume.
 static sonde_status make_echo(bench *b, const options *o, double density, sonde_error *error) {
   sonde_echo_destroy(b->echo);
   b->echo = NULL;
@@ -93,6 +93,7 @@ static sonde_status prepare(bench *b, const options *o, sonde_error *error) {
   return make_echo(b, o, known_m3 * (double)o->scatterers / fmax(moved, 1), error);
 }
 
+// Times of some frames at each depth, after one that fills the caches.
 static void record(bench *b, const options *o) {
   uint64_t tick = 2;
   for (long first = 0; first < o->frames; first += o->frames / DEPTHS + 1) {

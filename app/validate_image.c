@@ -1,9 +1,5 @@
-// sonde validate image: the echographic image measured against its targets.
-// note:        one measure with its target.
-// stage_*:     a synthetic leg, an interior and a renderer.
-// reference:   likeness, widths, flicker against the exact reference.
-// deep, compensation: tissue to the set depth, brightness to the receiver's noise.
-// speckle, attenuation, interfaces, enhancement, shadow, closure: on round synthetic legs.
+// sonde validate image: the echographic image measured against its targets, on round synthetic
+// legs. Each measure is a function that opens a stage (leg, interior, renderer), looks, and notes.
 #include "app.h"
 #include "validate.h"
 #include "validate_leg.h"
@@ -19,7 +15,7 @@ typedef struct report {
   sonde_error error;
 } report;
 
-// Nothing after a failure.
+// One measure with its target; nothing after a failure.
 static void note(report *r, const char *name, double value, double least, double most,
                  const char *target) {
   if (!r->error.status) validate_note(&r->list, name, value, least, most, target);
@@ -57,6 +53,7 @@ static void stage_close(stage *s) {
   free(s->forces);
 }
 
+// The interior follows the skin, a frame is drawn; its envelope.
 static const float *look(stage *s, uint64_t tick) {
   uint32_t lines, samples;
   sonde_interior_update(s->interior,
@@ -67,11 +64,12 @@ static const float *look(stage *s, uint64_t tick) {
   return sonde_echo_envelope(s->view.echo, &lines, &samples);
 }
 
-// Without compensation.
+// Takes the default compensation off.
 static void plain_gain(stage *s) {
   s->view.settings.tgc_db_per_m = -sonde_echo_default_tgc_db_per_m(s->view.settings.frequency_hz);
 }
 
+// Lateral extent about the middle line and depth, m.
 typedef struct region {
   double x0, x1, z0, z1;
 } region;
@@ -94,6 +92,7 @@ static double intensity(const stage *s, const float *e, region r, double *contra
 
 static double db(double power) { return 10 * log10(fmax(power, 1e-30)); }
 
+// Likeness, widths of a point and flicker against the exact reference.
 static sonde_status reference(report *r) {
   static const double DEPTHS[] = {0.012, 0.018, 0.025, 0.032, 0.045};
   stage s;
@@ -121,6 +120,7 @@ static sonde_status reference(report *r) {
   return status;
 }
 
+// Mean over deviation of fully developed speckle in homogeneous muscle.
 static sonde_status speckle(report *r) {
   stage s;
   sonde_status status = stage_open(&s, 0.2, 0.014, 2.5e-3, 0, false, &r->error);
@@ -257,6 +257,7 @@ static double image_diameter(const stage *s, const float *e, double centre_m) {
   return (place[1] - place[0]) * step;
 }
 
+// A force on a patch of the skin over the vessels, evenly on its nodes.
 static void press_skin(stage *s, double newton) {
   uint32_t count = 0, n = s->leg.surface.vertex_count;
   for (int pass = 0; pass < 2; ++pass)
@@ -278,6 +279,7 @@ static double closure(const double *diameter, const double *pressure, int count)
   return NAN;
 }
 
+// Diameter and closure of a pressed vein: the picture against the mechanics.
 static sonde_status vein(report *r) {
   enum { LOADS = 40 };
   stage s;
@@ -388,6 +390,7 @@ static sonde_status compensation(report *r) {
   return status;
 }
 
+// Time of a new beam and of a frame.
 static sonde_status times(report *r) {
   enum { FRAMES = 30 };
   stage s;

@@ -80,7 +80,7 @@ struct sonde_echo {
   frame frame;
   double theta_centre;
   int32_t line_column[SONDE_MOST_LINES];  // coarse column left of each line
-  float line_share[SONDE_MOST_LINES];     // way to the next
+  float line_share[SONDE_MOST_LINES];     // distance to the next, columns
   uint32_t plane_rows;                    // of the coarse plane
   double lines_per_column, depth_per_row; // of it; depth in m
   bool vessels;                           // any

@@ -20,10 +20,10 @@ enum {
   AXIAL_MOST = 4, // samples summed at once
 };
 
-// A lumen over one map: forms of its scatterers' coordinates, 1 on the wall at rest, and of the way
-// along the vessel, m. A mural clot fills what lies beyond its free surface on the far side.
+// A lumen over one map: forms of its scatterers' coordinates, 1 on the wall at rest, and of the
+// length along the vessel, m. A mural clot fills what lies beyond its free surface on the far side.
 typedef struct splat_lumen {
-  float along[4], across[4], way[4];
+  float along[4], across[4], axial[4];
   float chord;     // of the clot's share, in radii; 1: no clot
   float amplitude; // of the scatterers in the lumen: what clutter shows of them
   uint32_t vessel; // whose clot it is
@@ -61,7 +61,7 @@ typedef struct splat_job {
 // State of a vessel beside some points. Vectors of the cross-section are of unit length.
 typedef enum wall_field {
   WALL_REST,                   // centre at rest, m
-  WALL_SHIFT = WALL_REST + 3,  // way of the centre, m
+  WALL_SHIFT = WALL_REST + 3,  // displacement of the centre, m
   WALL_AXIS = WALL_SHIFT + 3,  // along the vessel
   WALL_FLAT = WALL_AXIS + 3,   // short axis
   WALL_ACROSS = WALL_FLAT + 3, // long axis
@@ -99,7 +99,7 @@ typedef struct merge_job {
   float *grid;
   const float *top, *low; // [count + 1] gains of even columns in the rows above and below; odd ones
                           // take the mean of their neighbours; NULL: 1
-  float share;            // of the way from top to low
+  float share;            // of the distance from top to low
   float *re[SONDE_FINE], *im[SONDE_FINE]; // [count]
   uint32_t count;                         // pairs of columns, multiple of ECHO_ALIGN
 } merge_job;
@@ -157,7 +157,7 @@ typedef struct tissue_lesion {
 typedef struct widen_job {
   const float *in;       // [columns], readable for a whole vector more
   const int32_t *column; // [lines] to the left of each line, ascending
-  const float *share;    // [lines] of the way to the next
+  const float *share;    // [lines] of the distance to the next
   float *out;            // [lines]
   uint32_t lines;        // multiple of ECHO_ALIGN
 } widen_job;
@@ -188,7 +188,7 @@ typedef struct fade_job {
   float *tail;       // [lines] power that reverberates above this row; moves on to the next
   float *gain;       // [lines] amplitude
   float clutter;     // share of the power that comes late
-  float fresh, kept; // of the tail per row: what joins it, what the way leaves of it
+  float fresh, kept; // of the tail per row: what joins it, what losses leave of it
   uint32_t lines;    // multiple of ECHO_ALIGN
 } fade_job;
 

@@ -29,7 +29,7 @@ static void splat(const splat_job *job) {
         const splat_lumen *l = &job->lumen[k];
         double a = form_at(l->along, x, y, z), b = form_at(l->across, x, y, z);
         double chord = (double)l->chord;
-        if (chord < 1) chord += sonde_clot_surface(l->vessel, form_at(l->way, x, y, z), b);
+        if (chord < 1) chord += sonde_clot_surface(l->vessel, form_at(l->axial, x, y, z), b);
         if (a * a + b * b < 1 && a >= -chord) shown = (double)l->amplitude;
       }
       const double weight = (double)job->sign[i] * (double)map->m[0][3] * shown * height;

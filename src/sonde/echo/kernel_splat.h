@@ -102,7 +102,7 @@ INLINE floats in_lumina(const splat_job *job, const splat_map *map, floats x, fl
     floats b = l->across[0] + l->across[1] * x + l->across[2] * y + l->across[3] * z;
     ints in = a * a + b * b < 1;
     if (l->chord < 1) {
-      floats along_m = l->way[0] + l->way[1] * x + l->way[2] * y + l->way[3] * z;
+      floats along_m = l->axial[0] + l->axial[1] * x + l->axial[2] * y + l->axial[3] * z;
       in = in & (a >= -l->chord - clot_surface(l->vessel, along_m, b));
     }
     size = vselect(in, vset(l->amplitude), size);

@@ -96,17 +96,17 @@ static void warp_tissue(const wall_job *job) {
   for (uint32_t group = 0; group < job->groups; group += FLOATS / 4) {
     floats3 rest = load3(job->rest, 4 * group), at = rest;
     floats weight[MOST_VESSELS];
-    floats2 way[MOST_VESSELS];
+    floats2 move[MOST_VESSELS];
     for (uint32_t k = 0; k < job->walls; ++k) {
       reach p = find_reach(job->wall[k], group, rest);
       floats2 to = warped_by(job->wall[k], group, p);
       floats lead = vonly(p.weight > 0, wall_at(job->wall[k], WALL_COUPLING, group));
-      weight[k] = p.weight, way[k] = (floats2){lead * (to.x - p.at.x), lead * (to.y - p.at.y)};
+      weight[k] = p.weight, move[k] = (floats2){lead * (to.x - p.at.x), lead * (to.y - p.at.y)};
     }
     for (uint32_t k = 0; k < job->walls; ++k) {
       floats share = share_of(weight, job->walls, k);
-      at = madd3(at, share * way[k].x, wall_vector(job->wall[k], WALL_FLAT, group));
-      at = madd3(at, share * way[k].y, wall_vector(job->wall[k], WALL_ACROSS, group));
+      at = madd3(at, share * move[k].x, wall_vector(job->wall[k], WALL_FLAT, group));
+      at = madd3(at, share * move[k].y, wall_vector(job->wall[k], WALL_ACROSS, group));
     }
     store3(job->warped, 4 * group, at);
   }

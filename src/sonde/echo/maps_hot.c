@@ -93,7 +93,7 @@ static void map_pieces(sonde_echo *echo, const moved_cube *c) {
                              piece & 4 ? 0.25f : -0.25f};
     for (uint32_t k = 0; k < lumens; ++k) {
       splat_lumen l = lumen[k];
-      float *form[] = {l.along, l.across, l.way};
+      float *form[] = {l.along, l.across, l.axial};
       for (size_t f = 0; f < SONDE_COUNT_OF(form); ++f) {
         form[f][0] =
             form[f][0] + form[f][1] * offset[0] + form[f][2] * offset[1] + form[f][3] * offset[2];

@@ -8,7 +8,7 @@
 #include <string.h>
 
 static const float air_gap_m = 2e-3f;
-// Clutter: echoes that come late after several ways between the layers above, and side lobes. Its
+// Clutter: late echoes, which went back and forth between the layers above, and side lobes. Its
 // power over that of the tissue above, and the depth over which it fades.
 static const float clutter_power = 0.02f, clutter_m = 5e-3f;
 

@@ -54,41 +54,14 @@ static void choose_view(sonde_echo *echo) {
   SONDE_ASSERT(echo->fields <= MOST_FIELDS && echo->levels <= MOST_LEVELS);
 }
 
-// Beyond its end a branch fades away from the last section: neighbours inside and beyond then meet
-// without passing its axis.
-static void store_vessel(const sonde_echo *echo, uint32_t k, double s, sonde_vec3 point,
-                         float *at) {
-  const sonde_interior *in = echo->interior;
-  const uint32_t which = echo->shown[k], count = in->section_count[which];
-  sonde_vessel_state v;
-  double across = far_away, along = far_away, half_short = 1e-3, half_long = 1e-3, clot = 0;
-  bool there = sonde_vessel_at(in, which, s, &v);
-  if (!there && which >= 2) v = in->state[which][s < in->section[which][0].s_m ? 0 : count - 1];
-  if (there || which >= 2) {
-    sonde_vec3 d = v_sub(point, v.centre_m);
-    along = v_dot(d, v.flat_axis) / v.half_short_m;
-    across = v_dot(d, v_cross(v.axis, v.flat_axis)) / v.half_long_m;
-    half_short = v.half_short_m, half_long = v.half_long_m;
-    clot = sonde_echo_solid(echo, which, v.rest_centre_m.z) > 0;
-  }
-  if (!there && which >= 2) {
-    double size = fmax(hypot(along, across), 1e-3);
-    along *= far_away / size, across *= far_away / size;
-  }
-  float *field = at + vessel_field_at(k, VESSEL_SHORT) * SONDE_PLANE_NODES;
-  field[VESSEL_SHORT * SONDE_PLANE_NODES] = (float)along;
-  field[VESSEL_LONG * SONDE_PLANE_NODES] = (float)across;
-  field[VESSEL_HALF_SHORT * SONDE_PLANE_NODES] = (float)half_short;
-  field[VESSEL_HALF_LONG * SONDE_PLANE_NODES] = (float)half_long;
-  field[VESSEL_CLOT * SONDE_PLANE_NODES] = (float)clot;
-}
-
 // Fields of a node whose rest point is known.
 static void store_node(sonde_echo *echo, uint32_t node, sonde_vec3 point) {
   const uint32_t count = SONDE_PLANE_NODES;
+  const sonde_interior *in = echo->interior;
   const sonde_vec3 rest = echo->node[node].rest;
+  // Layers.
   sonde_column_point at;
-  bool within = sonde_interior_locate(echo->interior, rest, &at);
+  bool within = sonde_interior_locate(in, rest, &at);
   double turn = at.theta - echo->theta_centre;
   at.theta -= 2 * SONDE_PI * floor(turn / (2 * SONDE_PI) + 0.5);
   float *p = echo->plane + node;
@@ -99,9 +72,36 @@ static void store_node(sonde_echo *echo, uint32_t node, sonde_vec3 point) {
   p[PLANE_MUSCLE * count] = (float)at.muscle_m;
   p[PLANE_ACROSS * count] = (float)(at.r * cos(at.theta));
   p[PLANE_UP * count] = (float)(at.r * sin(at.theta));
-  for (uint32_t k = 0; k < echo->shown_count; ++k) store_vessel(echo, k, at.s, point, p);
+  // Coordinates in the deformed sections of the vessels. Beyond its end a branch fades away from
+  // the last section: neighbours inside and beyond then meet without passing its axis.
+  for (uint32_t k = 0; k < echo->shown_count; ++k) {
+    const uint32_t which = echo->shown[k], sections = in->section_count[which];
+    sonde_vessel_state v;
+    double across = far_away, along = far_away, half_short = 1e-3, half_long = 1e-3, clot = 0;
+    bool there = sonde_vessel_at(in, which, at.s, &v);
+    if (!there && which >= 2)
+      v = in->state[which][at.s < in->section[which][0].s_m ? 0 : sections - 1];
+    if (there || which >= 2) {
+      sonde_vec3 d = v_sub(point, v.centre_m);
+      along = v_dot(d, v.flat_axis) / v.half_short_m;
+      across = v_dot(d, v_cross(v.axis, v.flat_axis)) / v.half_long_m;
+      half_short = v.half_short_m, half_long = v.half_long_m;
+      clot = sonde_echo_solid(echo, which, v.rest_centre_m.z) > 0;
+    }
+    if (!there && which >= 2) {
+      double size = fmax(hypot(along, across), 1e-3);
+      along *= far_away / size, across *= far_away / size;
+    }
+    float *field = p + vessel_field_at(k, VESSEL_SHORT) * count;
+    field[VESSEL_SHORT * count] = (float)along;
+    field[VESSEL_LONG * count] = (float)across;
+    field[VESSEL_HALF_SHORT * count] = (float)half_short;
+    field[VESSEL_HALF_LONG * count] = (float)half_long;
+    field[VESSEL_CLOT * count] = (float)clot;
+  }
+  // Coordinates in the lesions.
   for (uint32_t k = 0; k < echo->lesion_count; ++k) {
-    sonde_vec3 q = sonde_lesion_point(echo->interior, echo->lesion[k], rest);
+    sonde_vec3 q = sonde_lesion_point(in, echo->lesion[k], rest);
     float *field = p + lesion_field_at(echo->shown_count, k, 0) * count;
     for (int c = 0; c < 3; ++c) field[c * (int)count] = (float)v_coordinate(q, c);
   }
@@ -129,7 +129,7 @@ static sonde_mat3 steps_at(const sonde_echo *echo, uint32_t i, uint32_t j, uint3
   return m_columns(a, c, b);
 }
 
-// A node of a row on the way to its rest point.
+// A node of a row whose rest point is sought.
 typedef struct seeker {
   sonde_vec3 local, point, from; // probe frame, world, line and depth
   sonde_mat3 steps;              // that turn a miss in the image into a correction

@@ -56,7 +56,7 @@ static double aim(const sonde_array *a, int i, double x, double z, double *ampli
   return length;
 }
 
-// What focusing at depth z subtracts from the way of element i.
+// What focusing at depth z subtracts from the path of element i.
 static double delay(const sonde_array *a, int i, double z) {
   double place[2], normal[2];
   element(a, i, place, normal);
@@ -201,31 +201,6 @@ double sonde_array_elevation_half(const sonde_array *a, double z_m) {
 
 // ---- images of points ------------------------------------------------------------------------
 
-// One scatterer, one line: adds to the complex samples of the window.
-static void add_point(const sonde_echo *echo, const sonde_array *a, const sonde_echo_point *p,
-                      uint32_t line, const uint32_t samples[2], double *column, double *scratch) {
-  const frame *f = &echo->frame;
-  double x = p->x_m, z = p->z_m, v = (line - f->first_line) * f->pitch_m;
-  if (f->radius_m > 0) { // the line's own frame: turned about the centre of the face
-    double angle = v / f->radius_m, c = cos(angle), s = sin(angle), from = p->z_m + f->radius_m;
-    x = p->x_m * c - from * s, z = p->x_m * s + from * c - f->radius_m;
-  } else {
-    x -= v;
-  }
-  double near = 8 * a->pulse_wavelengths * f->wavelength_m, wide = 20 * f->wavelength_m;
-  if (fabs(x) > wide || !(z > 0)) return;
-  int64_t low = (int64_t)floor((z - near) / f->step_m),
-          high = (int64_t)ceil((z + near) / f->step_m);
-  if (low < samples[0]) low = samples[0];
-  if (high > samples[1]) high = samples[1];
-  if (low > high) return;
-  uint32_t count = (uint32_t)(high - low + 1);
-  double size = p->amplitude * sonde_array_elevation(a, p->y_m, z);
-  sonde_array_line(a, x, z, (double)low * f->step_m, f->step_m, count, scratch);
-  double *out = column + 2 * (low - samples[0]);
-  for (uint32_t n = 0; n < 2 * count; ++n) out[n] += size * scratch[n];
-}
-
 sonde_status sonde_echo_reference_points(const sonde_echo *echo, double aperture_m,
                                          const sonde_echo_settings *settings,
                                          const sonde_echo_point *points, uint32_t count,
@@ -239,15 +214,38 @@ sonde_status sonde_echo_reference_points(const sonde_echo *echo, double aperture
   sonde_echo view = {.lines = echo->lines, .samples = echo->samples};
   view.frame.radius_m = echo->frame.radius_m;
   sonde_echo_geometry(&view, aperture_m, settings);
-  uint32_t height = samples[1] - samples[0] + 1;
+  const frame *f = &view.frame;
+  const uint32_t height = samples[1] - samples[0] + 1;
   double *column = SONDE_NEW(double, 4 * (size_t)echo->samples);
   if (column == NULL) return sonde_fail_memory(error);
-  beam_key key = sonde_echo_key(&view.frame);
-  sonde_array array = sonde_beam_array(&key);
+  double *one = column + 2 * (size_t)echo->samples;
+  const beam_key key = sonde_echo_key(f);
+  const sonde_array array = sonde_beam_array(&key);
+  const double near = 8 * array.pulse_wavelengths * f->wavelength_m, wide = 20 * f->wavelength_m;
   for (uint32_t l = lines[0]; l <= lines[1]; ++l) {
     for (uint32_t n = 0; n < 2 * height; ++n) column[n] = 0;
-    for (uint32_t i = 0; i < count; ++i)
-      add_point(&view, &array, &points[i], l, samples, column, column + 2 * (size_t)echo->samples);
+    for (const sonde_echo_point *p = points; p < points + count; ++p) {
+      // The point in the line's own frame, which turns about the centre of a curved face.
+      double x = p->x_m, z = p->z_m, v = (l - f->first_line) * f->pitch_m;
+      if (f->radius_m > 0) {
+        double angle = v / f->radius_m, c = cos(angle), s = sin(angle), from = p->z_m + f->radius_m;
+        x = p->x_m * c - from * s, z = p->x_m * s + from * c - f->radius_m;
+      } else {
+        x -= v;
+      }
+      if (fabs(x) > wide || !(z > 0)) continue;
+      // Its echo at the samples about it.
+      int64_t low = (int64_t)floor((z - near) / f->step_m);
+      int64_t high = (int64_t)ceil((z + near) / f->step_m);
+      if (low < samples[0]) low = samples[0];
+      if (high > samples[1]) high = samples[1];
+      if (low > high) continue;
+      const uint32_t some = (uint32_t)(high - low + 1);
+      const double size = p->amplitude * sonde_array_elevation(&array, p->y_m, z);
+      sonde_array_line(&array, x, z, (double)low * f->step_m, f->step_m, some, one);
+      double *out = column + 2 * (low - samples[0]);
+      for (uint32_t n = 0; n < 2 * some; ++n) out[n] += size * one[n];
+    }
     for (uint32_t n = 0; n < height; ++n)
       envelope[(size_t)(samples[0] + n) * echo->lines + l] =
           (float)hypot(column[2 * n], column[2 * n + 1]);

@@ -9,6 +9,7 @@ enum { PLACES = 161, FRACTIONS = 8, SINC = 8 };
 static const double block_x_m = 7e-3, block_z_m = 3e-3;
 static const double rim_x_m = 1.5e-3, rim_z_m = 0.5e-3;
 
+// Random scatterers in a block about the middle line.
 static void fill_block(sonde_echo_point *p, uint32_t count, double depth_m, uint64_t seed) {
   for (uint32_t i = 0; i < count; ++i)
     p[i] = (sonde_echo_point){.x_m = block_x_m * (sonde_random_uniform(seed, 3 * i) - 0.5),
@@ -17,10 +18,12 @@ static void fill_block(sonde_echo_point *p, uint32_t count, double depth_m, uint
                               .amplitude = sonde_random_bits(seed, 3 * i + 2) & 1024 ? 1 : -1};
 }
 
+// First and last that count.
 typedef struct window {
   uint32_t lines[2], samples[2];
 } window;
 
+// Lines and samples that lie near a depth on the middle line.
 static window window_of(const sonde_echo_view *view, double depth_m, double half_x, double half_z) {
   double pitch = view->aperture_m / (view->echo->lines - 1), middle = 0.5 * (view->echo->lines - 1);
   double step = view->settings.depth_m / (view->echo->samples - 1);
@@ -33,6 +36,7 @@ static window window_of(const sonde_echo_view *view, double depth_m, double half
   return w;
 }
 
+// Pearson's coefficient over a window.
 static double correlate(const float *a, const float *b, uint32_t stride, const window *w) {
   double n = 0, sa = 0, sb = 0, aa = 0, bb = 0, ab = 0;
   for (uint32_t s = w->samples[0]; s <= w->samples[1]; ++s)
@@ -43,6 +47,7 @@ static double correlate(const float *a, const float *b, uint32_t stride, const w
   return (ab - sa * sb / n) / sqrt((aa - sa * sa / n) * (bb - sb * sb / n));
 }
 
+// Envelope of the fast image.
 static const float *draw(const sonde_echo_view *v, const sonde_echo_point *p, uint32_t count) {
   uint32_t lines, samples;
   sonde_echo_render_points(v->echo, v->aperture_m, &v->settings, p, count);
@@ -101,9 +106,9 @@ static sonde_status profile(const sonde_echo_view *v, double depth_m, bool besid
   if (!beside) w.samples[1] = w.samples[0];
   double x0 = (w.lines[0] - 0.5 * (v->echo->lines - 1)) * pitch, z0 = w.samples[0] * sample_m;
   for (int i = 0; i < PLACES; ++i) {
-    double way = (i - PLACES / 2) * step;
+    double offset = (i - PLACES / 2) * step;
     sonde_echo_point p = {
-        .x_m = beside ? x0 + way : x0, .z_m = beside ? depth_m : z0 + way, .amplitude = 1};
+        .x_m = beside ? x0 + offset : x0, .z_m = beside ? depth_m : z0 + offset, .amplitude = 1};
     fast[i] = peak(draw(v, &p, 1), v->echo->lines, &w);
     sonde_status status = sonde_echo_reference_points(v->echo, v->aperture_m, &v->settings, &p, 1,
                                                       w.lines, w.samples, scratch, error);
@@ -129,11 +134,12 @@ sonde_status sonde_echo_point_widths(const sonde_echo_view *view, double depth_m
   return status;
 }
 
-// Envelope `way` samples further, 0 < way < 1, from a windowed sinc of the intensity.
-static double moved_back(const float *image, uint32_t stride, uint32_t s, uint32_t l, double way) {
+// Envelope a fraction of a sample further, 0 < fraction < 1, from a windowed sinc of the intensity.
+static double moved_back(const float *image, uint32_t stride, uint32_t s, uint32_t l,
+                         double fraction) {
   double sum = 0;
   for (int k = 1 - SINC; k <= SINC; ++k) {
-    double x = way - k, v = (double)image[(size_t)((int64_t)s + k) * stride + l];
+    double x = fraction - k, v = (double)image[(size_t)((int64_t)s + k) * stride + l];
     double taper = cos(0.5 * SONDE_PI * x / SINC);
     sum += v * v * sin(SONDE_PI * x) / (SONDE_PI * x) * taper * taper;
   }
@@ -152,6 +158,7 @@ sonde_status sonde_echo_flicker(const sonde_echo_view *view, double depth_m, uin
     window w = window_of(view, depth_m, 0.5 * block_x_m - rim_x_m, 0.5 * block_z_m - rim_z_m);
     double step = view->settings.depth_m / (view->echo->samples - 1), change = 0, size = 0;
     fill_block(points, count, depth_m, seed);
+    // The image of still scatterers against those that moved down, moved back.
     const float *image = draw(view, points, count);
     for (size_t i = 0; i < pixels; ++i) still[i] = image[i];
     for (int k = 1; k < FRACTIONS; ++k) {
