@@ -1,8 +1,5 @@
-// cast:          the skin at an angle and height: a ray from the axis outwards, moved a little when
-//                it slips between two faces.
-// fill_points:   the grid of skin points.
-// measure_rows:  s of every point, from the middle column to both sides.
-// measure_along: t of every row, along the middle column.
+// Coordinates on a region of the skin: a grid of points, cast from the axis of the leg, with the
+// distance around the leg from the middle column and along it from the first row.
 #include "robot/sites_inside.h"
 
 static const double CELL_RAD = SONDE_PI / 180, CELL_M = 2e-3; // at most
@@ -17,17 +14,6 @@ sonde_status sonde_chart_origin(const sonde_model *model, sonde_vec3 *origin_m,
   return status;
 }
 
-static bool cast(const sonde_chart *chart, double angle_rad, double z_m, sonde_surface_point *hit) {
-  static const double ASIDE[][2] = {{0, 0}, {1, 1.7}, {-1.3, 1}, {0.9, -1.1}, {-1, -1.9}};
-  for (size_t k = 0; k < SONDE_COUNT_OF(ASIDE); ++k) {
-    double angle = angle_rad + ASIDE_RAD * ASIDE[k][0];
-    sonde_vec3 from = vec3(chart->origin_m.x, chart->origin_m.y, z_m + ASIDE_M * ASIDE[k][1]);
-    sonde_vec3 out = vec3(cos(angle), sin(angle), 0);
-    if (sonde_surface_raycast(chart->index, from, out, REACH_M, hit)) return true;
-  }
-  return false;
-}
-
 static double angle_at(const sonde_chart *chart, double column) {
   const sonde_chart_bounds *b = &chart->bounds;
   return b->angle_low_rad + (b->angle_high_rad - b->angle_low_rad) * column / (chart->columns - 1);
@@ -38,41 +24,18 @@ static double height_at(const sonde_chart *chart, double row) {
   return b->z_low_m + (b->z_high_m - b->z_low_m) * row / (chart->rows - 1);
 }
 
+// The skin on a ray from the axis outwards, moved a little when it slips between two faces.
 bool sonde_chart_hit(const sonde_chart *chart, double row, double column,
                      sonde_surface_point *hit) {
-  return cast(chart, angle_at(chart, column), height_at(chart, row), hit);
-}
-
-static sonde_status fill_points(sonde_chart *chart, sonde_error *error) {
-  for (uint32_t j = 0; j < chart->rows; ++j)
-    for (uint32_t i = 0; i < chart->columns; ++i) {
-      sonde_surface_point hit;
-      if (!sonde_chart_hit(chart, j, i, &hit))
-        return sonde_fail(error, SONDE_MISMATCH,
-                          "no skin at %.1f degrees around the axis and z = %.1f mm, expected a "
-                          "region on the skin, which the axis does not leave",
-                          angle_at(chart, i) * 180 / SONDE_PI, height_at(chart, j) * 1e3);
-      chart->point_m[(size_t)j * chart->columns + i] = hit.point_m;
-    }
-  return SONDE_OK;
-}
-
-static void measure_rows(sonde_chart *chart) {
-  uint32_t middle = chart->columns / 2;
-  for (uint32_t j = 0; j < chart->rows; ++j) {
-    const sonde_vec3 *p = &chart->point_m[(size_t)j * chart->columns];
-    double *s = &chart->around_m[(size_t)j * chart->columns];
-    for (uint32_t i = middle + 1; i < chart->columns; ++i)
-      s[i] = s[i - 1] + v_distance(p[i], p[i - 1]);
-    for (uint32_t i = middle; i-- > 0;) s[i] = s[i + 1] - v_distance(p[i], p[i + 1]);
+  static const double ASIDE[][2] = {{0, 0}, {1, 1.7}, {-1.3, 1}, {0.9, -1.1}, {-1, -1.9}};
+  double angle_rad = angle_at(chart, column), z_m = height_at(chart, row);
+  for (size_t k = 0; k < SONDE_COUNT_OF(ASIDE); ++k) {
+    double angle = angle_rad + ASIDE_RAD * ASIDE[k][0];
+    sonde_vec3 from = vec3(chart->origin_m.x, chart->origin_m.y, z_m + ASIDE_M * ASIDE[k][1]);
+    sonde_vec3 out = vec3(cos(angle), sin(angle), 0);
+    if (sonde_surface_raycast(chart->index, from, out, REACH_M, hit)) return true;
   }
-}
-
-static void measure_along(sonde_chart *chart) {
-  const sonde_vec3 *p = &chart->point_m[chart->columns / 2];
-  for (uint32_t j = 1; j < chart->rows; ++j)
-    chart->along_m[j] = chart->along_m[j - 1] + v_distance(p[(size_t)j * chart->columns],
-                                                           p[(size_t)(j - 1) * chart->columns]);
+  return false;
 }
 
 // An odd number of grid lines, so that the middle one halves the width.
@@ -94,6 +57,33 @@ static sonde_status check_bounds(const sonde_chart_bounds *b, sonde_error *error
   return SONDE_OK;
 }
 
+// The points of the grid, then their distances.
+static sonde_status measure_grid(sonde_chart *chart, sonde_error *error) {
+  uint32_t middle = chart->columns / 2;
+  for (uint32_t j = 0; j < chart->rows; ++j) {
+    sonde_vec3 *p = &chart->point_m[(size_t)j * chart->columns];
+    double *around_m = &chart->around_m[(size_t)j * chart->columns];
+    for (uint32_t i = 0; i < chart->columns; ++i) {
+      sonde_surface_point hit;
+      if (!sonde_chart_hit(chart, j, i, &hit))
+        return sonde_fail(error, SONDE_MISMATCH,
+                          "no skin at %.1f degrees around the axis and z = %.1f mm, expected a "
+                          "region on the skin, which the axis does not leave",
+                          angle_at(chart, i) * 180 / SONDE_PI, height_at(chart, j) * 1e3);
+      p[i] = hit.point_m;
+    }
+    // Around the leg: from the middle column to both sides.
+    for (uint32_t i = middle + 1; i < chart->columns; ++i)
+      around_m[i] = around_m[i - 1] + v_distance(p[i], p[i - 1]);
+    for (uint32_t i = middle; i-- > 0;) around_m[i] = around_m[i + 1] - v_distance(p[i], p[i + 1]);
+    // Along the leg: down the middle column.
+    if (j > 0)
+      chart->along_m[j] =
+          chart->along_m[j - 1] + v_distance(p[middle], (p - chart->columns)[middle]);
+  }
+  return SONDE_OK;
+}
+
 sonde_status sonde_chart_create(const sonde_model *model, const sonde_chart_bounds *bounds,
                                 sonde_chart *chart, sonde_error *error) {
   *chart = (sonde_chart){.bounds = *bounds};
@@ -108,14 +98,9 @@ sonde_status sonde_chart_create(const sonde_model *model, const sonde_chart_boun
   chart->around_m = SONDE_NEW(double, points);
   chart->along_m = SONDE_NEW(double, chart->rows);
   if (!chart->point_m || !chart->around_m || !chart->along_m) status = sonde_fail_memory(error);
-  if (!status) status = fill_points(chart, error);
-  if (status) {
-    sonde_chart_clear(chart);
-    return status;
-  }
-  measure_rows(chart);
-  measure_along(chart);
-  return SONDE_OK;
+  if (!status) status = measure_grid(chart, error);
+  if (status) sonde_chart_clear(chart);
+  return status;
 }
 
 void sonde_chart_clear(sonde_chart *chart) {
