@@ -123,9 +123,10 @@ static void add_parameters(builder *b) {
   const sonde_fit_result *r = b->in->result;
   const sonde_fit_confidence *c = &r->confidence;
   b->report.parameters = b->parameter;
-  b->parameter[b->report.parameter_count++] = (sonde_report_parameter){
-      "edge stiffness of stage 2", "N/m", spread(r->stage2_edge_n_m, r->edge_sd_log),
-      "simplified interaction"};
+  if (r->stage_n[1])
+    b->parameter[b->report.parameter_count++] = (sonde_report_parameter){
+        "edge stiffness of stage 2", "N/m", spread(r->stage2_edge_n_m, r->edge_sd_log),
+        "simplified interaction"};
   if (!c->band_n) return; // what follows is known after stage 3
 
   sonde_report_interval g = spread(r->law.shear_stiffness_n_m, c->ln_shear_sd);

@@ -5,6 +5,7 @@
 // front in thin layers of depth; pieces of one body, shade and layer are one path.
 #include "scene_figure.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -55,6 +56,7 @@ static sonde_vec3 unit(sonde_vec3 a) {
 
 // Seen from above and the side; up is against gravity, or z without any.
 static camera look(const figure *f) {
+  assert(f->vertex && sonde_scene_body_count(f->scene) > 0);
   const double AROUND = 0.55, ABOVE = 0.42; // rad
   const sonde_vec3 none = {0, 0, 0};
   sonde_vec3 up = madd(none, -1, sonde_scene_gravity(f->scene));
@@ -85,6 +87,7 @@ static camera look(const figure *f) {
 
 // Pieces of a face, by halving its longest edge.
 static void cut_face(figure *f, const sonde_vec3 p[3], uint32_t body, uint32_t shade, int depth) {
+  assert(f->pieces && shade < SHADES && depth <= DEEPEST);
   const camera *c = &f->camera;
   int longest = 0;
   double most = 0;
@@ -122,6 +125,7 @@ static int compare_pieces(const void *a, const void *b) {
 static void format_look(char look[64], const char *format, uint32_t body, uint32_t shade) {
   static const uint8_t BASE[][3] = {{214, 196, 168}, {214, 106, 84},  {92, 138, 190},
                                     {128, 128, 134}, {112, 168, 110}, {186, 140, 190}};
+  assert(shade < SHADES);
   const uint8_t *base = BASE[body % (sizeof BASE / sizeof *BASE)];
   double light = 0.5 + 0.58 * shade / (SHADES - 1);
   unsigned rgb = 0;

@@ -76,6 +76,16 @@ run("fit", join(thigh, "indentation.csv"), "--surface", join(thigh, "skin.ply"),
   await page.pdf({ path: join(out, "fit.pdf"), format: "A4" });
 }
 
+// A report of the first stage alone: sections without data leave no trace.
+run("fit", join(thigh, "indentation.csv"), "--surface", join(thigh, "skin.ply"), "--sites", join(thigh, "sites.csv"), "--stages", "1",
+  "--fine-mm", "8", "-o", "first.sonde", "--report", "first");
+{
+  const { page, data: r } = await openReport(context, join(out, "first/index.html"), check);
+  const ids = await page.locator("section").evaluateAll((list) => list.map((s) => s.id));
+  check(ids.join() === "summary,stages,curves,errors,tables,maps,timing", `sections of the first stage: ${ids}`);
+  check((await page.locator("nav a").count()) === ids.length && r.stages.length === 2, "a link to each section");
+}
+
 // ---- the report of a scene
 
 run("simulate", join(data, "scenes/four_kinds.yaml"), "-o", "scene", "--steps", "60", "--no-frames", "--picture", "scene.html");

@@ -161,6 +161,7 @@ static void put_interval(report *r, const char *key, const sonde_report_interval
 // Forces of the chosen rows for which the model has one: into model[] and force[], which are
 // scratch.
 static uint32_t choose(report *r, const double *model_n, choice c, double **model, double **force) {
+  SONDE_ASSERT(model_n && (c.probe == EVERY || c.probe < r->probe_count));
   uint32_t count = 0;
   *model = r->scratch;
   *force = r->scratch + r->rows;
@@ -333,6 +334,7 @@ static void put_measurements(report *r) {
 // Pearson's correlation of the thickness of the fat with k0 or xm over the sites where both are
 // known; NaN for fewer than 8 sites.
 static double correlate_fat(const report *r, bool xm) {
+  SONDE_ASSERT(r->in->model);
   double n = 0, x = 0, y = 0, xx = 0, yy = 0, xy = 0;
   for (uint32_t i = 0; i < r->site_count; ++i) {
     const sonde_site *site = sonde_model_site(r->in->model, r->sites[i].id);
@@ -409,6 +411,7 @@ static void put_parameters(report *r) {
 // First crossing of the threshold from the estimate towards smaller (side < 0) or larger values;
 // NaN without one.
 static double cross_threshold(const sonde_report_profile *p, double threshold, int side) {
+  SONDE_ASSERT(p->count >= 2 && threshold > 0 && (side == 1 || side == -1));
   for (uint32_t k = 1; k < p->count; ++k) {
     uint32_t a = side > 0 ? k - 1 : p->count - k, b = side > 0 ? k : p->count - 1 - k;
     if ((p->x[b] - p->estimate) * side <= 0) continue;
