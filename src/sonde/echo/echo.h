@@ -65,75 +65,87 @@ typedef struct scatter_pool {
   float *x, *y, *z, *sign;
 } scatter_pool;
 
+// Grouped by the stage that writes them, in their order.
 struct sonde_echo {
+  // Creation and settings (echo.c).
   const sonde_interior *interior;
   const echo_kernels *kernels;
   uint32_t lines, samples;
-  uint32_t padded;                                           // lines in whole vectors
-  uint32_t grid_stride, gain_stride;                         // floats per row of the grid, gains
-  uint32_t grid_lines, grid_samples, pad_lines, pad_samples; // lines: columns of the grid
-  uint32_t window_rows, band_rows, band_count;               // of the grid's rows, bands.h
+  uint32_t padded; // lines in whole vectors
   double density_m3, cell_m;
   uint32_t per_cell, per_piece; // scatterers of a cube and of an eighth of it
   uint64_t seed;
-  bool plain; // no texture
-  frame frame;
-  double theta_centre;
-  int32_t line_column[SONDE_MOST_LINES];  // coarse column left of each line
-  float line_share[SONDE_MOST_LINES];     // distance to the next, columns
-  uint32_t plane_rows;                    // of the coarse plane
-  double lines_per_column, depth_per_row; // of it; depth in m
-  bool vessels;                           // any
-  uint32_t shown[MOST_VESSELS];           // vessels in view: the femoral ones, then branches
-  uint32_t shown_count;
-  uint32_t lesion[MOST_LESIONS]; // lesions in view
-  uint32_t lesion_count;
-  uint32_t fields, levels; // of the plane and of the medium
-  char *block;             // of all float buffers but the coarse plane
-  beam_psf *psf, *spare;   // in use; being built or the one before
-  plane_node *node;        // [PLANE_NODES]
-  float *plane;            // [MOST_FIELDS][PLANE_NODES] and a vector
-  float *wide;             // [2][fields][padded] two coarse rows, per line
-  float *row;              // [fields][padded], one row of the march
-  float *level[2];         // [levels][padded] of this row and the last
-  float *knots;            // [padded][TEXTURES][KNOT_FLOATS] of the textures, kernel.h
-  float *scatter;          // [padded] of this row
-  float *loss;             // [padded] of this row
-  float *rough;            // [padded] of this row
-  float *gain;     // [MEDIUM_ROWS][gain_stride] of the grid's even columns: beside the outer lines
-                   // those go on
-  float *loss_db;  // [padded] accumulated
-  float *tail;     // [padded] power that reverberates, kernel.h
-  uint8_t *air;    // [padded]
+  bool plain;      // no texture
   float *coupling; // [padded] share of the amplitude that passes the face, 0..1
-  bool some_air;
-  sheet_point *sheet; // [SHEET_POINTS]
-  uint32_t sheet_count;
-  int32_t *first_sheet; // [samples + 2 MOST_TAPS] list of those nearest to each row of the grid
-  float *grid; // [window_rows + 2][grid_stride] scattered field, kernel.h; zero between frames
-  float *line_re[SONDE_FINE]; // one row of it with its gain: [grid_lines / FINE]
-  float *line_im[SONDE_FINE];
-  float *ring;          // [2*MOST_TAPS+AXIAL_MOST][RING_PLANES][padded]
-  float *envelope;      // [samples][padded]
-  float *flat_envelope; // [samples][lines], what readers see
-  float *grey;          // [samples][padded]
+  sonde_echo_flow flow;
+  char *block; // of all float buffers but the coarse plane
+
+  // Random tables (scatterers.c).
   // [POOL + LOOSE + POOL] sorted by z within each cube's share; then unsorted ones for pieces; then
   // the shares again, each in the order of its parts: a quarter, a quarter, a half.
   scatter_pool pool;
   scatter_pool blood; // [BLOOD] streamlines: place in a lumen of unit width, speed over the mean
-  sonde_echo_flow flow;
-  float *noise;         // [NOISE]
+  float *noise;       // [NOISE]
+
+  // Constants of a frame (frame_hot.c).
+  frame frame;
+  beam_psf *psf, *spare;                       // in use; being built or the one before
+  uint32_t grid_stride, gain_stride;           // floats per row of the grid, gains
+  uint32_t grid_lines, grid_samples;           // columns and rows of the grid
+  uint32_t pad_lines, pad_samples;             // of them beside the image
+  uint32_t window_rows, band_rows, band_count; // of the grid's rows, bands.h
+  uint32_t plane_rows;                         // of the coarse plane
+  double lines_per_column, depth_per_row;      // of it; depth in m
+  double slab_m[SONDE_SLAB_ROWS + 1];          // half height, depths in even steps
+  double spare_octaves[SONDE_SLAB_ROWS + 1];   // of scatterers there, beyond what speckle needs
+  uint32_t lost;                               // cubes, maps and lumina for which there was no room
+  sonde_echo_times times;
+
+  // The coarse plane at rest (plane_hot.c).
+  double theta_centre;
+  bool vessels;                 // any
+  uint32_t shown[MOST_VESSELS]; // vessels in view: the femoral ones, then branches
+  uint32_t shown_count;
+  uint32_t lesion[MOST_LESIONS]; // lesions in view
+  uint32_t lesion_count;
+  uint32_t fields, levels;     // of the plane and of the medium
+  plane_node *node;            // [PLANE_NODES]
+  float *plane;                // [MOST_FIELDS][PLANE_NODES] and a vector
+  struct sonde_fields *motion; // of this frame
+
+  // The march along the lines (medium_hot.c).
+  int32_t line_column[SONDE_MOST_LINES]; // coarse column left of each line
+  float line_share[SONDE_MOST_LINES];    // distance to the next, columns
+  float *wide;                           // [2][fields][padded] two coarse rows, per line
+  float *row;                            // [fields][padded], one row of the march
+  float *level[2];                       // [levels][padded] of this row and the last
+  float *knots;                  // [padded][TEXTURES][KNOT_FLOATS] of the textures, kernel.h
+  float *scatter, *loss, *rough; // [padded] of this row
+  float *loss_db;                // [padded] accumulated
+  float *tail;                   // [padded] power that reverberates, kernel.h
+  uint8_t *air;                  // [padded]
+  bool some_air;
+  float *gain; // [MEDIUM_ROWS][gain_stride] of the grid's even columns: beside the outer lines
+               // those go on
+  sheet_point *sheet; // [SHEET_POINTS]
+  uint32_t sheet_count;
+  int32_t *first_sheet; // [samples + 2 MOST_TAPS] list of those nearest to each row of the grid
+
+  // Scatterers on their path (cubes_hot.c to bands_hot.c).
   int32_t box_first[3]; // cubes of the box around the slab at rest
   uint32_t box_size[3];
-  uint64_t *seen;                     // [BOX_CUBES / 64] a bit per cube of the box, x fastest
-  double slab_m[SONDE_SLAB_ROWS + 1]; // half height, depths in even steps
-  double spare_octaves[SONDE_SLAB_ROWS + 1]; // of scatterers there, beyond what speckle needs
-  struct sonde_cubes *cubes;                 // cubes.h
-  struct sonde_bands *bands;                 // bands.h
-  struct sonde_fields *motion;               // of this frame
-  uint32_t moved, bled;                      // scatterers of the last frame, blood among them
-  uint32_t lost;                             // cells, maps and lumina for which there was no room
-  sonde_echo_times times;
+  uint64_t *seen;            // [BOX_CUBES / 64] a bit per cube of the box, x fastest
+  struct sonde_cubes *cubes; // cubes.h
+  struct sonde_bands *bands; // bands.h
+  uint32_t moved, bled;      // scatterers of the last frame, blood among them
+  float *grid; // [window_rows + 2][grid_stride] scattered field, kernel.h; zero between frames
+
+  // The beam (beam_hot.c).
+  float *line_re[SONDE_FINE], *line_im[SONDE_FINE]; // a row with its gain: [grid_lines / FINE]
+  float *ring;                                      // [2*MOST_TAPS+AXIAL_MOST][RING_PLANES][padded]
+  float *envelope;                                  // [samples][padded]
+  float *flat_envelope;                             // [samples][lines], what readers see
+  float *grey;                                      // [samples][padded]
 };
 
 // Tables of scatterers, streamlines and noise of a new renderer.

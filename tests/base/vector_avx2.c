@@ -1,0 +1,2 @@
+#define VECTOR_TEST vectors_of_avx2
+#include "vector_kernel.h"
