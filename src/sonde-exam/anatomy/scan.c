@@ -131,28 +131,6 @@ static double cast(const sonde_surface_index *index, const frame *f, sonde_vec3 
   return v_distance(hit.point_m, origin);
 }
 
-static sonde_vec3 section_middle(const sonde_surface_index *skin, const frame *f, double z) {
-  enum { RAYS = 72 };
-  SONDE_ASSERT(z >= 0 && isfinite(z));
-  sonde_vec3 middle = vec3(0, 0, z);
-  for (int pass = 0; pass < 4; ++pass) {
-    double area = 0, x = 0, y = 0, last = NAN, last_angle = 0;
-    for (int k = 0; k <= RAYS; ++k) {
-      double angle = 2 * SONDE_PI * k / RAYS;
-      double r = cast(skin, f, middle, vec3(cos(angle), sin(angle), 0), REACH_M);
-      if (isfinite(last) && isfinite(r)) { // triangle of the middle and two skin points
-        double part = 0.5 * last * r * sin(angle - last_angle);
-        area += part;
-        x += part * (last * cos(last_angle) + r * cos(angle)) / 3;
-        y += part * (last * sin(last_angle) + r * sin(angle)) / 3;
-      }
-      last = r, last_angle = angle;
-    }
-    if (area > 0) middle = v_add(middle, vec3(x / area, y / area, 0));
-  }
-  return middle;
-}
-
 // Least squares through points at equal steps: value at the middle and change over the whole.
 static void fit_line(const sonde_vec3 *point, int count, sonde_vec3 *mean, sonde_vec3 *slope) {
   SONDE_ASSERT(count > 1);
@@ -169,10 +147,27 @@ static void fit_line(const sonde_vec3 *point, int count, sonde_vec3 *mean, sonde
 
 // The straight line through the middles of the skin's sections.
 static void centre_line(const sonde_surface_index *skin, const frame *f, sonde_tube *tube) {
-  enum { ROWS = 21 };
+  enum { ROWS = 21, RAYS = 72, PASSES = 4 };
   sonde_vec3 middle[ROWS], mean, slope;
-  for (int k = 0; k < ROWS; ++k)
-    middle[k] = section_middle(skin, f, (0.02 + 0.96 * k / (ROWS - 1)) * tube->length_m);
+  SONDE_ASSERT(tube->length_m > 0);
+  for (int n = 0; n < ROWS * PASSES; ++n) {
+    sonde_vec3 *m = &middle[n / PASSES];
+    if (n % PASSES == 0)
+      *m = vec3(0, 0, (0.02 + 0.96 * (n / PASSES) / (ROWS - 1)) * tube->length_m);
+    double area = 0, x = 0, y = 0, last = NAN, last_angle = 0;
+    for (int k = 0; k <= RAYS; ++k) {
+      double angle = 2 * SONDE_PI * k / RAYS;
+      double r = cast(skin, f, *m, vec3(cos(angle), sin(angle), 0), REACH_M);
+      if (isfinite(last) && isfinite(r)) { // triangle of the middle and two skin points
+        double part = 0.5 * last * r * sin(angle - last_angle);
+        area += part;
+        x += part * (last * cos(last_angle) + r * cos(angle)) / 3;
+        y += part * (last * sin(last_angle) + r * sin(angle)) / 3;
+      }
+      last = r, last_angle = angle;
+    }
+    if (area > 0) *m = v_add(*m, vec3(x / area, y / area, 0));
+  }
   fit_line(middle, ROWS, &mean, &slope);
   for (uint32_t j = 0; j < SONDE_TUBE_ROWS; ++j) {
     double t = (double)j / (SONDE_TUBE_ROWS - 1) - 0.5;

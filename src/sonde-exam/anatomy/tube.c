@@ -127,20 +127,6 @@ static sonde_status ring_plan(const sonde_tube *tube, double edge_m, plan *p, so
 
 static double share(const ring *r, uint32_t k) { return (k + r->offset) / r->count; }
 
-static void zip(const ring *a, const ring *b, uint32_t (*faces)[3], uint32_t *used) {
-  uint32_t i = 0, j = 0, ends_a = a->count > 1 ? a->count : 0, ends_b = b->count > 1 ? b->count : 0;
-  while (i < ends_a || j < ends_b) {
-    double on_a = fabs(share(a, i + 1) - share(b, j)), on_b = fabs(share(a, i) - share(b, j + 1));
-    uint32_t *f = faces[(*used)++];
-    f[0] = a->first + i % a->count;
-    f[2] = b->first + j % b->count;
-    if (j == ends_b || (i < ends_a && on_a <= on_b))
-      f[1] = a->first + ++i % a->count;
-    else
-      f[1] = b->first + ++j % b->count;
-  }
-}
-
 sonde_status sonde_tube_mesh(const sonde_tube *tube, double edge_m, sonde_mesh *mesh,
                              sonde_error *error) {
   plan p;
@@ -163,7 +149,22 @@ sonde_status sonde_tube_mesh(const sonde_tube *tube, double edge_m, sonde_mesh *
       sonde_vec3 corner = v_lerp(outline[at], outline[at + 1], t);
       mesh->vertices[p.ring[k].first + n] = v_whole_nm(v_lerp(centre, corner, p.ring[k].scale));
     }
-    if (k > 0) zip(&p.ring[k - 1], &p.ring[k], mesh->faces, &used);
+    if (k > 0) {
+      // The band of faces between two rings: always the shorter diagonal.
+      const ring *a = &p.ring[k - 1], *b = &p.ring[k];
+      const uint32_t ends_a = a->count > 1 ? a->count : 0, ends_b = b->count > 1 ? b->count : 0;
+      for (uint32_t i = 0, j = 0; i < ends_a || j < ends_b;) {
+        double on_a = fabs(share(a, i + 1) - share(b, j));
+        double on_b = fabs(share(a, i) - share(b, j + 1));
+        uint32_t *f = mesh->faces[used++];
+        f[0] = a->first + i % a->count;
+        f[2] = b->first + j % b->count;
+        if (j == ends_b || (i < ends_a && on_a <= on_b))
+          f[1] = a->first + ++i % a->count;
+        else
+          f[1] = b->first + ++j % b->count;
+      }
+    }
   }
   SONDE_ASSERT(status || used == mesh->face_count);
   sonde_free(p.ring);

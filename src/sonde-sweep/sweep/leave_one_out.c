@@ -45,54 +45,47 @@ static sonde_status render(work *w, uint32_t frame, sonde_slice_method method, i
   return SONDE_OK;
 }
 
-static sonde_status leave_out(work *w, uint32_t k, sonde_left_out *result, sonde_error *error) {
-  uint32_t frame = w->used[k], step = 1 + w->options.left_out_beside;
-  uint64_t left = 0;
-  bool along_sweep = false;
-  // The pixels that count are those that every maker of the frame reaches.
-  memcpy(w->known, w->lit, w->pixels);
-  sonde_status status = render(w, frame, SONDE_SLICE_KRIGE, KRIGED, &along_sweep, error);
-  if (!status) status = render(w, frame, SONDE_SLICE_BRACKET, BRACKETED, NULL, error);
-  if (!status) status = render(w, frame, SONDE_SLICE_NEAREST, NEAREST, NULL, error);
-  for (size_t p = 0; p < w->pixels; ++p) left += w->known[p];
-  if (status || !left) return status; // the others do not reach this frame: not counted
-  // The mean of the frames before and after is taken pixel by pixel.
-  const uint8_t *a = frame_of(w, w->used[k - step]), *b = frame_of(w, w->used[k + step]);
-  for (size_t p = 0; p < w->pixels; ++p) w->mean[p] = (uint8_t)((a[p] + b[p] + 1) / 2);
-  sonde_likeness *sums[MAKERS + 1] = {&result->place, &result->krige, &result->bracket,
-                                      &result->nearest, &result->neighbours};
-  for (int i = 0; i <= MAKERS && !status; ++i) {
-    sonde_likeness l, *sum = sums[i];
-    status = sonde_image_likeness(frame_of(w, frame), i < MAKERS ? w->images[i].pixels : w->mean,
-                                  w->known, w->sequence->width, w->sequence->height, &l, error);
-    if (status) break;
-    sum->count += l.count;
-    sum->rms_grey += l.rms_grey * l.rms_grey * (double)l.count;
-    sum->mae_grey += l.mae_grey * (double)l.count;
-    sum->psnr_db += l.psnr_db, sum->ncc += l.ncc, sum->ssim += l.ssim;
-  }
-  result->along_sweep += along_sweep;
-  ++result->frames;
-  return status;
-}
-
 static sonde_status leave_each_out(work *w, sonde_left_out *result, const sonde_progress *progress,
                                    sonde_error *error) {
+  sonde_likeness *sums[MAKERS + 1] = {&result->place, &result->krige, &result->bracket,
+                                      &result->nearest, &result->neighbours};
+  const sonde_sequence *s = w->sequence;
   uint32_t step = 1 + w->options.left_out_beside;
   for (uint32_t k = step; k + step < w->count; ++k) {
+    uint32_t frame = w->used[k];
     if (!sonde_progress_report(progress, (double)k / w->count, "leave one out"))
-      return sonde_fail(error, SONDE_CANCELLED, "cancelled after frame %u of %u", w->used[k],
-                        w->sequence->count);
-    sonde_status status = leave_out(w, k, result, error);
+      return sonde_fail(error, SONDE_CANCELLED, "cancelled after frame %u of %u", frame, s->count);
+    // The pixels that count are those that every maker of the frame reaches.
+    uint64_t left = 0;
+    bool along_sweep = false;
+    memcpy(w->known, w->lit, w->pixels);
+    sonde_status status = render(w, frame, SONDE_SLICE_KRIGE, KRIGED, &along_sweep, error);
+    if (!status) status = render(w, frame, SONDE_SLICE_BRACKET, BRACKETED, NULL, error);
+    if (!status) status = render(w, frame, SONDE_SLICE_NEAREST, NEAREST, NULL, error);
     if (status) return status;
+    for (size_t p = 0; p < w->pixels; ++p) left += w->known[p];
+    if (!left) continue; // the others do not reach this frame: not counted
+    // The mean of the frames before and after is taken pixel by pixel.
+    const uint8_t *a = frame_of(w, w->used[k - step]), *b = frame_of(w, w->used[k + step]);
+    for (size_t p = 0; p < w->pixels; ++p) w->mean[p] = (uint8_t)((a[p] + b[p] + 1) / 2);
+    for (int i = 0; i <= MAKERS; ++i) {
+      sonde_likeness l, *sum = sums[i];
+      status = sonde_image_likeness(frame_of(w, frame), i < MAKERS ? w->images[i].pixels : w->mean,
+                                    w->known, s->width, s->height, &l, error);
+      if (status) return status;
+      sum->count += l.count;
+      sum->rms_grey += l.rms_grey * l.rms_grey * (double)l.count;
+      sum->mae_grey += l.mae_grey * (double)l.count;
+      sum->psnr_db += l.psnr_db, sum->ncc += l.ncc, sum->ssim += l.ssim;
+    }
+    result->along_sweep += along_sweep;
+    ++result->frames;
   }
   if (!result->frames)
     return sonde_fail(error, SONDE_MISMATCH,
                       "%u frames with a pose, none of which lies between others; expected at least "
                       "%u in a sweep",
                       w->count, 2 * step + 1);
-  sonde_likeness *sums[] = {&result->place, &result->krige, &result->bracket, &result->nearest,
-                            &result->neighbours};
   for (size_t i = 0; i < SONDE_COUNT_OF(sums); ++i) {
     sonde_likeness *sum = sums[i];
     SONDE_ASSERT(sum->count > 0);

@@ -56,29 +56,6 @@ static bool read_vector(const char **text, double v[3]) {
   return *at == ')';
 }
 
-static sonde_status read_grid(sonde_header *h, sonde_error *error) {
-  const sonde_header_entry *axes = sonde_header_find(h, "space directions");
-  const sonde_header_entry *origin = sonde_header_find(h, "space origin");
-  if (h->dimension != 3 || h->list_axis >= 0) return SONDE_OK;
-  double v[3], spacing[3] = {1, 1, 1};
-  sonde_status status = axes ? SONDE_OK : sonde_header_reals(h, "spacings", 3, spacing, error);
-  const char *text = axes ? axes->value : "";
-  for (int k = 0; k < 3 && !status; ++k) {
-    if (axes && !read_vector(&text, v))
-      return sonde_fail(error, SONDE_FORMAT,
-                        "%.200s:%u: space directions: expected three (x,y,z), found '%.60s'",
-                        h->path, axes->line, axes->value);
-    for (int i = 0; i < 3; ++i) h->mm_from_voxel.m[i][k] = axes ? v[i] : spacing[k] * (i == k);
-  }
-  text = origin ? origin->value : "";
-  if (!status && origin && !read_vector(&text, v))
-    return sonde_fail(error, SONDE_FORMAT,
-                      "%.200s:%u: space origin: expected (x,y,z), found '%.60s'", h->path,
-                      origin->line, origin->value);
-  for (int i = 0; i < 3 && origin; ++i) h->mm_from_voxel.m[i][3] = v[i];
-  return status;
-}
-
 sonde_status sonde_nrrd_parse(sonde_header *h, sonde_error *error) {
   sonde_status status = read_lines(h, error);
   if (status) return status;
@@ -116,7 +93,27 @@ sonde_status sonde_nrrd_parse(sonde_header *h, sonde_error *error) {
                       h->path, kinds->line, h->dimension);
   status = sonde_header_whole(h, sonde_header_find(h, "sizes"), h->dimension, 1, SONDE_FRAMES_MAX,
                               h->size, error);
-  return status ? status : read_grid(h, error);
+  if (status || h->dimension != 3 || h->list_axis >= 0) return status;
+  // The grid of a volume: its axes or their spacings, and its origin.
+  const sonde_header_entry *axes = sonde_header_find(h, "space directions");
+  const sonde_header_entry *origin = sonde_header_find(h, "space origin");
+  double v[3], spacing[3] = {1, 1, 1};
+  if (!axes) status = sonde_header_reals(h, "spacings", 3, spacing, error);
+  text = axes ? axes->value : "";
+  for (int k = 0; k < 3 && !status; ++k) {
+    if (axes && !read_vector(&text, v))
+      return sonde_fail(error, SONDE_FORMAT,
+                        "%.200s:%u: space directions: expected three (x,y,z), found '%.60s'",
+                        h->path, axes->line, axes->value);
+    for (int i = 0; i < 3; ++i) h->mm_from_voxel.m[i][k] = axes ? v[i] : spacing[k] * (i == k);
+  }
+  text = origin ? origin->value : "";
+  if (!status && origin && !read_vector(&text, v))
+    return sonde_fail(error, SONDE_FORMAT,
+                      "%.200s:%u: space origin: expected (x,y,z), found '%.60s'", h->path,
+                      origin->line, origin->value);
+  for (int i = 0; i < 3 && origin && !status; ++i) h->mm_from_voxel.m[i][3] = v[i];
+  return status;
 }
 
 static void write_start(sonde_file *file, int dimension, bool packed) {
