@@ -3,7 +3,16 @@
 
 #include "base/base.h"
 
+#include <stddef.h>
 #include <string.h>
+
+// Members that follow each other in memory as in the file.
+enum { ECHO = 6, PATHOLOGY = 8 };
+_Static_assert(offsetof(sonde_echo_settings, tgc_db_per_m) == (ECHO - 1) * sizeof(double),
+               "the settings' numbers from frequency_hz on");
+_Static_assert(offsetof(sonde_pathology, echogenicity) ==
+                   offsetof(sonde_pathology, venous_pressure_pa) + (PATHOLOGY - 1) * sizeof(double),
+               "the pathology's numbers from venous_pressure_pa on");
 
 size_t sonde_controls_bytes(int version) {
   SONDE_ASSERT(version >= SONDE_RECORD_OLDEST && version <= SONDE_RECORD_VERSION);
@@ -12,26 +21,12 @@ size_t sonde_controls_bytes(int version) {
 
 void sonde_controls_put(bytes_cursor *w, const sonde_session_controls *c) {
   const size_t start = w->count;
-  const sonde_pathology *p = &c->pathology;
-  const sonde_echo_settings *e = &c->echo;
-  const double numbers[] = {e->frequency_hz,
-                            e->depth_m,
-                            e->gain_db,
-                            e->dynamic_range_db,
-                            e->focus_m,
-                            e->tgc_db_per_m,
-                            p->venous_pressure_pa,
-                            p->arterial_pressure_pa,
-                            p->thrombus_fraction,
-                            p->thrombus_modulus_pa,
-                            p->thrombus_from_m,
-                            p->thrombus_to_m,
-                            p->lumen_scale,
-                            p->echogenicity};
+  const double *echo = &c->echo.frequency_hz, *vessels = &c->pathology.venous_pressure_pa;
   bytes_u32(w, c->stop ? 1 : 0);
   bytes_u32(w, c->resume);
-  for (size_t i = 0; i < SONDE_COUNT_OF(numbers); ++i) bytes_f64(w, numbers[i]);
-  bytes_put(w, p->name, sizeof p->name);
+  for (int i = 0; i < ECHO; ++i) bytes_f64(w, echo[i]);
+  for (int i = 0; i < PATHOLOGY; ++i) bytes_f64(w, vessels[i]);
+  bytes_put(w, c->pathology.name, sizeof c->pathology.name);
   bytes_f64(w, c->pathology.wall_shear_pa);
   bytes_u32(w, (c->gel ? 1u : 0u) | (c->valsalva ? 2u : 0u));
   bytes_u32(w, c->gel_put);
@@ -51,14 +46,13 @@ static double within(double value, double low, double high) {
 
 void sonde_controls_get(bytes_reader *r, int version, sonde_session_controls *c) {
   const unsigned char *start = r->at;
-  double n[14];
   *c = (sonde_session_controls){
       .probe = c->probe, .stiffness_scale = 1, .damping_scale = 1, .friction_scale = 1};
+  double *echo = &c->echo.frequency_hz, *vessels = &c->pathology.venous_pressure_pa;
   c->stop = bytes_take_u32(r) & 1;
   c->resume = bytes_take_u32(r);
-  for (int i = 0; i < 14; ++i) n[i] = bytes_take_f64(r);
-  c->echo = (sonde_echo_settings){n[0], n[1], n[2], n[3], n[4], n[5]};
-  c->pathology = (sonde_pathology){"", n[6], n[7], n[8], n[9], n[10], n[11], n[12], n[13], 0};
+  for (int i = 0; i < ECHO; ++i) echo[i] = bytes_take_f64(r);
+  for (int i = 0; i < PATHOLOGY; ++i) vessels[i] = bytes_take_f64(r);
   memcpy(c->pathology.name, r->at, sizeof c->pathology.name);
   c->pathology.name[sizeof c->pathology.name - 1] = 0;
   r->at += sizeof c->pathology.name;
