@@ -174,7 +174,8 @@ static void bench_is_a_preset(void **state) {
   scaled.controls.friction_scale = 0.5;
   sonde_session *session = open_session(&scaled, slide_device());
   preset.preset_count = 1;
-  preset.presets[0] = sonde_session_preset(session);
+  sonde_session_controls asked = sonde_session_controls_now(session);
+  preset.presets[0] = sonde_setup_preset(&session->subject->setup, &asked);
   close_session(session);
   assert_true(preset.presets[0].friction.mu_static == 0.25);
   uint64_t hash = hash_of(&scaled, NULL);

@@ -6,7 +6,7 @@
 
 #include <string.h>
 
-static double keep_real(double wanted, double before, double low, double high) {
+static double usable_real(double wanted, double before, double low, double high) {
   return isfinite(wanted) ? clamp(wanted, low, high) : before;
 }
 
@@ -20,20 +20,21 @@ sonde_session_controls sonde_controls_clean(const sonde_session_controls *wanted
   sonde_pathology *p = &controls.pathology;
   const sonde_pathology *q = &before->pathology;
   p->name[sizeof p->name - 1] = 0;
-  p->venous_pressure_pa = keep_real(p->venous_pressure_pa, q->venous_pressure_pa, 0.0, 1e5);
-  p->arterial_pressure_pa = keep_real(p->arterial_pressure_pa, q->arterial_pressure_pa, 0.0, 1e5);
-  p->thrombus_fraction = keep_real(p->thrombus_fraction, q->thrombus_fraction, 0.0, 1.0);
-  p->thrombus_modulus_pa = keep_real(p->thrombus_modulus_pa, q->thrombus_modulus_pa, 0.0, 1e8);
-  p->thrombus_from_m = keep_real(p->thrombus_from_m, q->thrombus_from_m, -10.0, 10.0);
-  p->thrombus_to_m = keep_real(p->thrombus_to_m, q->thrombus_to_m, -10.0, 10.0);
-  p->lumen_scale = keep_real(p->lumen_scale, q->lumen_scale, 0.1, 3.0);
-  p->echogenicity = keep_real(p->echogenicity, q->echogenicity, 0.0, 1.0);
+  p->venous_pressure_pa = usable_real(p->venous_pressure_pa, q->venous_pressure_pa, 0.0, 1e5);
+  p->arterial_pressure_pa = usable_real(p->arterial_pressure_pa, q->arterial_pressure_pa, 0.0, 1e5);
+  p->thrombus_fraction = usable_real(p->thrombus_fraction, q->thrombus_fraction, 0.0, 1.0);
+  p->thrombus_modulus_pa = usable_real(p->thrombus_modulus_pa, q->thrombus_modulus_pa, 0.0, 1e8);
+  p->thrombus_from_m = usable_real(p->thrombus_from_m, q->thrombus_from_m, -10.0, 10.0);
+  p->thrombus_to_m = usable_real(p->thrombus_to_m, q->thrombus_to_m, -10.0, 10.0);
+  p->lumen_scale = usable_real(p->lumen_scale, q->lumen_scale, 0.1, 3.0);
+  p->echogenicity = usable_real(p->echogenicity, q->echogenicity, 0.0, 1.0);
   controls.echo = sonde_echo_settings_clamp(wanted->echo);
   if ((unsigned)controls.posture >= SONDE_POSTURE_COUNT) controls.posture = before->posture;
   if (controls.preset >= SONDE_SESSION_PRESETS) controls.preset = before->preset;
-  controls.stiffness_scale = keep_real(wanted->stiffness_scale, before->stiffness_scale, 0.5, 2.0);
-  controls.damping_scale = keep_real(wanted->damping_scale, before->damping_scale, 0.25, 4.0);
-  controls.friction_scale = keep_real(wanted->friction_scale, before->friction_scale, 0.0, 2.0);
+  controls.stiffness_scale =
+      usable_real(wanted->stiffness_scale, before->stiffness_scale, 0.5, 2.0);
+  controls.damping_scale = usable_real(wanted->damping_scale, before->damping_scale, 0.25, 4.0);
+  controls.friction_scale = usable_real(wanted->friction_scale, before->friction_scale, 0.0, 2.0);
   return controls;
 }
 

@@ -161,10 +161,6 @@ int sonde_journal_flush(sonde_journal *journal, bool sync, bool now) {
   return failure;
 }
 
-size_t sonde_journal_pending(const sonde_journal *journal) {
-  return journal->count - journal->written;
-}
-
 void sonde_journal_forget(sonde_journal *journal) {
   (void)sonde_disk_truncate(journal->descriptor, journal->synced);
   (void)lseek(journal->descriptor, journal->synced, SEEK_SET);

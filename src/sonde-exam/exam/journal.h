@@ -29,8 +29,6 @@ bool sonde_journal_append(sonde_journal *journal, const void *bytes, size_t coun
 // Hands all bytes over to the system, and with `sync` to the disk. After a failure it does nothing
 // for half a second unless `now`. @return 0 when all was taken, the errno of the trouble otherwise
 int sonde_journal_flush(sonde_journal *journal, bool sync, bool now);
-// Bytes that the system has not taken.
-size_t sonde_journal_pending(const sonde_journal *journal);
 // Takes back what was appended since the last sync, from the file too as far as the disk allows.
 void sonde_journal_forget(sonde_journal *journal);
 // Closes and frees; bytes that wait are lost. NULL is ignored.

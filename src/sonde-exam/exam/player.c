@@ -59,7 +59,7 @@ static uint32_t images_until(const sonde_player *player, uint64_t tick) {
 // come.
 static void place(sonde_player *player, uint64_t tick) {
   sonde_recording *r = &player->recording;
-  const uint64_t *events = player->event_ticks;
+  const sonde_player_event *events = player->events;
   uint32_t e = 0, i = 0;
   if (tick > 0) e = sonde_count_until(events, sizeof *events, player->event_count, tick - 1);
   if (tick > 0) i = images_until(player, tick - 1);
@@ -139,7 +139,7 @@ static bool tick_once(sonde_player *player) {
   } while (record.tag != SONDE_RECORD_TICK);
   SONDE_ASSERT(record.tick == tick);
   for (;
-       player->next_event < player->event_count && player->event_ticks[player->next_event] <= tick;
+       player->next_event < player->event_count && player->events[player->next_event].tick <= tick;
        ++player->next_event)
     controls = &player->events[player->next_event].controls;
   sonde_session_replay(player->session, controls, &record.sample);
@@ -207,7 +207,6 @@ void sonde_player_close(sonde_player *player) {
   (void)sonde_session_destroy(player->session, NULL);
   sonde_recording_clear(&player->recording);
   sonde_free(player->events);
-  sonde_free(player->event_ticks);
   sonde_free(player->images);
   sonde_free(player->checks);
   sonde_free(player->marks);

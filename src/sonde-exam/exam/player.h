@@ -12,6 +12,7 @@ typedef struct sonde_player_image {
 
 // A change of the controls during the exam; the first one is the start.
 typedef struct sonde_player_event {
+  uint64_t tick;
   double time_s;
   sonde_session_controls controls;
 } sonde_player_event;
@@ -25,7 +26,6 @@ struct sonde_player {
   sonde_recording_info info;
   sonde_session *session;
   sonde_player_event *events; // [event_count]
-  uint64_t *event_ticks;
   sonde_player_image *images; // [image_count]
   sonde_record_check *checks; // [check_count]
   size_t *marks;              // [mark_count] places of the first record of every 256th tick

@@ -18,12 +18,10 @@ sonde_status sonde_player_index(sonde_player *player, sonde_error *error) {
   if (images >= UINT32_MAX || marks >= UINT32_MAX)
     return sonde_fail(error, SONDE_FORMAT, "%s: too long for a player", player->path);
   player->events = SONDE_NEW(sonde_player_event, events);
-  player->event_ticks = SONDE_NEW(uint64_t, events);
   player->images = SONDE_NEW(sonde_player_image, (size_t)images);
   player->checks = SONDE_NEW(sonde_record_check, checks);
   player->marks = SONDE_NEW(size_t, (size_t)marks);
-  if (!player->events || !player->event_ticks || !player->images || !player->checks ||
-      !player->marks)
+  if (!player->events || !player->images || !player->checks || !player->marks)
     return sonde_fail_memory(error);
   sonde_recording walk = *r;
   for (size_t at = walk.at; sonde_recording_next(&walk, &record); at = walk.at) {
@@ -31,9 +29,8 @@ sonde_status sonde_player_index(sonde_player *player, sonde_error *error) {
       // Controls as a session would have taken them: a file may hold any numbers.
       sonde_session_controls before = sonde_session_def_default().controls;
       if (player->event_count > 0) before = player->events[player->event_count - 1].controls;
-      player->event_ticks[player->event_count] = record.tick;
       player->events[player->event_count++] =
-          (sonde_player_event){(double)record.tick * r->world.dt_s,
+          (sonde_player_event){record.tick, (double)record.tick * r->world.dt_s,
                                sonde_controls_clean(&record.controls, &before, r->probe_count)};
     }
     if (record.tag == SONDE_RECORD_CHECK) player->checks[player->check_count++] = record.check;

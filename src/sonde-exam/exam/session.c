@@ -182,7 +182,7 @@ sonde_status sonde_session_destroy(sonde_session *session, sonde_error *error) {
   if (!session) return SONDE_OK;
   sonde_session_stop(session);
   sonde_status status = SONDE_OK;
-  if (sonde_session_ticks(session) > 0 || session->keep_recording)
+  if (sonde_session_ticks(session) > 0 || session->setup_stored)
     status = sonde_session_finish(session, error);
   if (session->device.destroy) session->device.destroy(session->device.self);
   release(session);
@@ -201,11 +201,6 @@ void sonde_session_control(sonde_session *session, const sonde_session_controls 
 
 sonde_session_controls sonde_session_controls_now(const sonde_session *session) {
   return sonde_shared_controls_get(&session->requested);
-}
-
-sonde_preset sonde_session_preset(const sonde_session *session) {
-  sonde_session_controls controls = sonde_shared_controls_get(&session->requested);
-  return sonde_setup_preset(&session->subject->setup, &controls);
 }
 
 sonde_device *sonde_session_device(sonde_session *session) { return &session->device; }

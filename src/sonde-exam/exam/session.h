@@ -139,7 +139,7 @@ struct sonde_session {
 
   // recorder; NULL without a recording and after its end
   sonde_recorder *recorder;
-  bool keep_recording, ended; // also one without ticks; its end was written
+  bool setup_stored, ended; // kept also without ticks; its end was written
   sonde_record_end end;
   pthread_mutex_t note_lock; // of notes; the tick never takes it
   sonde_queued_note *notes;
@@ -196,8 +196,6 @@ void sonde_session_draw(sonde_session *session);
 sonde_status sonde_session_create_recording(sonde_session *session, const sonde_session_def *def,
                                             const char *const *probe_names, sonde_error *error);
 void sonde_session_release_recording(sonde_session *session);
-// The tissue that the controls set last ask for. @thread any
-sonde_preset sonde_session_preset(const sonde_session *session);
 const sonde_probe *sonde_session_probe(const sonde_session *session, uint32_t index);
 // Moves everything in the rings and keyframes to their files. Recorder thread or lockstep.
 void sonde_session_drain(sonde_session *session);

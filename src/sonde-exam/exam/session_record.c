@@ -48,7 +48,7 @@ sonde_status sonde_session_create_recording(sonde_session *session, const sonde_
   if (def->record_setup) {
     sonde_recorder_note(session->recorder, SONDE_NOTE_SETUP, 0, def->record_setup);
     status = sonde_recorder_sync(session->recorder, error);
-    session->keep_recording = !status;
+    session->setup_stored = !status;
   }
   if (!status) {
     if (!(!sonde_recorder_is_file(session->recorder))) {
@@ -195,7 +195,7 @@ sonde_recording_state sonde_session_recording(const sonde_session *session) {
 }
 
 void sonde_session_release_recording(sonde_session *session) {
-  if (sonde_session_ticks(session) == 0 && !session->keep_recording)
+  if (sonde_session_ticks(session) == 0 && !session->setup_stored)
     sonde_recorder_discard(session->recorder);
   else
     sonde_recorder_close(session->recorder);

@@ -230,7 +230,7 @@ void sonde_page_tell(sonde_page_server *server, const char *sentence) {
   pthread_mutex_unlock(&server->lock);
 }
 
-static sonde_status keep_token(char kept[PAGE_SECRET_TEXT], const char *token, sonde_error *error) {
+static sonde_status copy_token(char kept[PAGE_SECRET_TEXT], const char *token, sonde_error *error) {
   if (!token) return sonde_page_token_make(kept, error);
   if (!sonde_page_token_valid(token))
     return sonde_fail(error, SONDE_ARGUMENT, "a page's token must have %d digits from 0-9a-f",
@@ -258,8 +258,8 @@ sonde_status page_server_start(const sonde_page_def *def, const page_source *sou
   pthread_mutex_init(&server->source_lock, NULL);
   server->listener = server->wake = -1;
   for (int i = 0; i < PAGE_CONNECTIONS; ++i) server->connection[i].socket = -1;
-  sonde_status status = keep_token(server->token, def->token, error);
-  if (!status) status = keep_token(server->teacher_token, def->teacher_token, error);
+  sonde_status status = copy_token(server->token, def->token, error);
+  if (!status) status = copy_token(server->teacher_token, def->teacher_token, error);
   if (!status) status = page_net_open(server, def->port, error);
   if (!status) status = page_server_show(server, source, error);
   if (!status) status = page_net_start(server, error);

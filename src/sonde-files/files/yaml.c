@@ -226,20 +226,6 @@ sonde_place sonde_read_item(const sonde_reader *reader, sonde_place list, uint32
   return node->data.sequence.items.start[index];
 }
 
-const char *sonde_read_only_key(sonde_reader *reader, sonde_place at, const char *what,
-                                sonde_place *value) {
-  SONDE_ASSERT(value);
-  const yaml_node_t *map = node_of(reader, at);
-  if (!sonde_reader_good(reader)) return NULL;
-  if (map && map->type == YAML_MAPPING_NODE &&
-      map->data.mapping.pairs.top - map->data.mapping.pairs.start == 1) {
-    *value = map->data.mapping.pairs.start->value;
-    return scalar(reader, map->data.mapping.pairs.start->key);
-  }
-  sonde_reader_fail(reader, at, SONDE_FORMAT, "%s must be a map with one key", what);
-  return NULL;
-}
-
 double sonde_read_real_at(sonde_reader *reader, sonde_place at, const char *what, double low,
                           double high) {
   SONDE_ASSERT(low <= high);

@@ -34,9 +34,6 @@ SONDE_LINK bool sonde_read_is_text(const sonde_reader *reader, sonde_place at);
 SONDE_LINK uint32_t sonde_read_count(sonde_reader *reader, sonde_place list);
 SONDE_LINK sonde_place sonde_read_item(const sonde_reader *reader, sonde_place list,
                                        uint32_t index);
-// The only key of a map such as {sphere: ...}; *value receives its place.
-const char *sonde_read_only_key(sonde_reader *reader, sonde_place map, const char *what,
-                                sonde_place *value);
 
 // Numbers within [low, high]; a NaN fallback makes the key necessary.
 SONDE_LINK double sonde_read_real(sonde_reader *reader, sonde_place map, const char *key,

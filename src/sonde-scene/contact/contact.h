@@ -150,13 +150,6 @@ bool sonde_overlap_compute(sonde_overlap *overlap, const sonde_face_tree *a,
                            const sonde_face_tree *b, sonde_vec3 hint);
 /** Result of the last compute. @thread tick */
 const sonde_overlap_result *sonde_overlap_get(const sonde_overlap *overlap);
-/**
- * Rate of a region's volume (m^3/s): sum of gradient . velocity over both bodies.
- * @param velocity_a,velocity_b per vertex (m/s); NULL for a body at rest
- * @thread tick
- */
-double sonde_overlap_rate(const sonde_overlap_result *result, uint32_t region,
-                          const sonde_vec3 *velocity_a, const sonde_vec3 *velocity_b);
 
 /* ---- convex bodies ------------------------------------------------------------------------ */
 

@@ -115,18 +115,3 @@ const sonde_overlap_result *sonde_overlap_get(const sonde_overlap *overlap) {
   SONDE_ASSERT(overlap != NULL);
   return &overlap->result;
 }
-
-double sonde_overlap_rate(const sonde_overlap_result *result, uint32_t region,
-                          const sonde_vec3 *velocity_a, const sonde_vec3 *velocity_b) {
-  SONDE_ASSERT(region < result->region_count);
-  const sonde_overlap_region *r = &result->regions[region];
-  const sonde_vec3 *velocity[2] = {velocity_a, velocity_b};
-  double rate = 0;
-  for (int side = 0; side < 2; ++side) {
-    const sonde_overlap_entry *entry = result->entries[side] + r->first_entry[side];
-    if (!velocity[side]) continue;
-    for (uint32_t k = 0; k < r->entry_count[side]; ++k)
-      rate += v_dot(entry[k].gradient_m2, velocity[side][entry[k].vertex]);
-  }
-  return rate;
-}

@@ -19,7 +19,7 @@ static const uint8_t *frame_of(const work *w, uint32_t frame) {
 
 enum { AT_PLACE, KRIGED, BRACKETED, NEAREST, MAKERS };
 
-static void keep_common(work *w) {
+static void intersect_known(work *w) {
   for (size_t p = 0; p < w->pixels; ++p) w->known[p] = w->known[p] && w->other_known[p];
 }
 
@@ -37,10 +37,10 @@ static sonde_status render(work *w, uint32_t frame, sonde_slice_method method, i
     *along_sweep = slicer->model.along_sweep;
     sonde_slicer_render_place(slicer, frame, pose, (const uint32_t[2]){0, 0}, &w->images[AT_PLACE],
                               w->other_known);
-    keep_common(w);
+    intersect_known(w);
   }
   sonde_slicer_render(slicer, pose, &w->images[maker], w->other_known);
-  keep_common(w);
+  intersect_known(w);
   sonde_slicer_destroy(slicer);
   return SONDE_OK;
 }

@@ -128,9 +128,13 @@ static sonde_status lay_out(const sonde_sequence *s, sonde_slicer *slicer, sonde
     uint8_t *line = layout->lines + p->offset;
     for (uint32_t u = 0; u < wide - 1; u += SLICE_LINE_WIDE - 1)
       for (uint32_t v = 0; v < high - 1; v += SLICE_LINE_HIGH - 1, line += SLICE_LINE)
-        for (uint32_t j = 0; j < SLICE_LINE_HIGH && v + j < high; ++j)
-          memcpy(line + j * SLICE_LINE_WIDE, p->pixels + first + (size_t)(v + j) * s->width + u,
-                 wide - u < SLICE_LINE_WIDE ? wide - u : SLICE_LINE_WIDE);
+        for (uint32_t j = 0; j < SLICE_LINE_HIGH && v + j < high; ++j) {
+          const uint8_t *row = p->pixels + first + (size_t)(v + j) * s->width + u;
+          if (wide - u >= SLICE_LINE_WIDE) // a size that the compiler knows
+            memcpy(line + j * SLICE_LINE_WIDE, row, SLICE_LINE_WIDE);
+          else
+            memcpy(line + j * SLICE_LINE_WIDE, row, wide - u);
+        }
   }
   return SONDE_OK;
 }

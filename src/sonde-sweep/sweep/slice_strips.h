@@ -3,8 +3,8 @@
 // Where the planes of a block do not cross, those sorted by distance cut the picture into strips.
 // Within a strip the same two frames lie on either side, and everything that a pixel needs is
 // linear: the distances and the points on both frames. A tile's strips stand in a table, a strip
-// in a lane. The number of planes in front of a pixel is its strip, and one permutation fetches a
-// number for 16 pixels. Pixels whose frames might end nearby are left to the full search.
+// in a vector element. The number of planes in front of a pixel is its strip, and one permutation
+// fetches a number for 16 pixels. Pixels whose frames might end nearby are left to the full search.
 #ifndef SONDE_SRC_SWEEP_SLICE_STRIPS_H
 #define SONDE_SRC_SWEEP_SLICE_STRIPS_H
 
@@ -133,8 +133,8 @@ static void count_planes(const slice_room *room, uint32_t count[2]) {
   }
 }
 
-static void fill_lanes(const sonde_slicer *s, const rectangle *tile, const slice_strips *strips,
-                       uint32_t first, strip_table *table) {
+static void fill_numbers(const sonde_slicer *s, const rectangle *tile, const slice_strips *strips,
+                         uint32_t first, strip_table *table) {
   double x = tile->column, y = tile->row;
   for (int f = 0; f < SLICE_FORMS; ++f) {
     const double *at = strips->forms[f][0] + first, *column = strips->forms[f][1] + first;
@@ -175,7 +175,7 @@ static bool fill_table(const sonde_slicer *s, const slice_room *room, const rect
   if (last <= first || last - first > STRIPS) return false;
   table->count = last - first;
   table->whole = !ends && (room->covered || strips_cover(s, tile, strips, first, last));
-  fill_lanes(s, tile, strips, first, table);
+  fill_numbers(s, tile, strips, first, table);
   if (!table->whole) find_limits(s, tile, strips, first, table);
   return true;
 }
