@@ -99,20 +99,6 @@ sonde_status sonde_calibration_load(const char *path, sonde_calibration *c, sond
   return status;
 }
 
-// The first "To" behind the first letter and before a capital divides: "ToolToProbe".
-static bool split_name(const char *key, size_t length, char *from, char *to) {
-  for (size_t i = 1; i + 2 < length; ++i) {
-    if (key[i] != 'T' || key[i + 1] != 'o' || key[i + 2] < 'A' || key[i + 2] > 'Z') continue;
-    size_t rest = length - i - 2;
-    if (i >= NAME_MAX_BYTES || rest >= NAME_MAX_BYTES) return false;
-    memcpy(from, key, i);
-    memcpy(to, key + i + 2, rest);
-    from[i] = to[rest] = 0;
-    return true;
-  }
-  return false;
-}
-
 // NAMES_MAX when there is no room for another.
 static uint32_t name_index(graph *g, const char *name) {
   for (uint32_t i = 0; i < g->name_count; ++i)
@@ -143,7 +129,15 @@ static sonde_status frame_edges(const sonde_sequence *s, uint32_t frame, bool al
     const char *key = f->fields[i].key;
     char from[NAME_MAX_BYTES], to[NAME_MAX_BYTES], status_key[128];
     sonde_affine there;
-    if (!sonde_text_ends(key, "Transform") || !split_name(key, strlen(key) - 9, from, to)) continue;
+    if (!sonde_text_ends(key, "Transform")) continue;
+    // The first "To" behind the first letter and before a capital divides: "ToolToProbe".
+    size_t length = strlen(key) - 9, at = 1;
+    while (at + 2 < length &&
+           (key[at] != 'T' || key[at + 1] != 'o' || key[at + 2] < 'A' || key[at + 2] > 'Z'))
+      ++at;
+    if (at + 2 >= length || at >= NAME_MAX_BYTES || length - at - 2 >= NAME_MAX_BYTES) continue;
+    snprintf(from, sizeof from, "%.*s", (int)at, key);
+    snprintf(to, sizeof to, "%.*s", (int)(length - at - 2), key + at + 2);
     snprintf(status_key, sizeof status_key, "%.100sStatus", key);
     const char *word = sonde_sequence_get(s, frame, status_key);
     if (!all && word && strcmp(word, "OK") != 0) continue;

@@ -22,35 +22,6 @@ bool sonde_slice_is_left_out(const sonde_sequence *s, const sonde_slicer_options
   return count <= o->left_out_beside;
 }
 
-static sonde_status fill_planes(const sonde_sequence *s, sonde_slicer *slicer, sonde_error *error) {
-  sonde_vec3 previous = vec3(0, 0, 0);
-  for (uint32_t i = 0; i < s->count; ++i) {
-    if (!s->frames[i].used || sonde_slice_is_left_out(s, &slicer->options, i)) continue;
-    slice_plane *plane = &slicer->planes[slicer->count];
-    const sonde_affine *a = &s->frames[i].world_from_pixel;
-    sonde_vec3 u = affine_column(a, 0), v = affine_column(a, 1);
-    sonde_vec3 n = v_unit(v_cross(u, v), vec3(0, 0, 0));
-    if (v_dot(n, previous) < 0) n = v_neg(n); // one side for the whole sweep
-    sonde_affine world_from_local = affine_columns(u, v, n, affine_column(a, 3));
-    if (!affine_inverse(&world_from_local, &plane->local_from_world))
-      return sonde_fail(error, SONDE_ARGUMENT,
-                        "frame %u: its columns and rows run the same way, expected a plane", i);
-    previous = plane->normal = n;
-    plane->world_from_pixel = *a;
-    plane->pixel_m[0] = v_norm(u), plane->pixel_m[1] = v_norm(v);
-    plane->pixels = s->pixels + (size_t)i * s->width * s->height;
-    plane->frame = i;
-    plane->pyramid = slicer->bank ? &slicer->bank->pyramids[i] : NULL;
-    ++slicer->count;
-  }
-  for (slice_plane *p = slicer->planes; p + 1 < slicer->planes + slicer->count; ++p) {
-    slice_shift(p, p + 1, p->next_shift);
-    slice_shift(p + 1, p, p[1].last_shift);
-  }
-  if (slicer->count) return SONDE_OK;
-  return sonde_fail(error, SONDE_MISMATCH, "no frame with a pose is left to slice");
-}
-
 sonde_status sonde_slicer_check(const sonde_sequence *s, const sonde_slicer_options *o,
                                 sonde_error *error) {
   if (s->clip[2] < 2 || s->clip[3] < 2)
@@ -168,7 +139,34 @@ sonde_status sonde_slicer_create_with(const sonde_sequence *s, const sonde_slice
   slicer->bank = bank;
   slicer->owns_bank = !bank && o.method == SONDE_SLICE_KRIGE;
   if (!status && slicer->owns_bank) status = sonde_slice_bank_create(s, &slicer->bank, error);
-  if (!status) status = fill_planes(s, slicer, error);
+  // Planes of the frames in use, their normals to one side for the whole sweep.
+  sonde_vec3 previous = vec3(0, 0, 0);
+  for (uint32_t i = 0; i < s->count && !status; ++i) {
+    if (!s->frames[i].used || sonde_slice_is_left_out(s, &slicer->options, i)) continue;
+    slice_plane *plane = &slicer->planes[slicer->count];
+    const sonde_affine *a = &s->frames[i].world_from_pixel;
+    sonde_vec3 u = affine_column(a, 0), v = affine_column(a, 1);
+    sonde_vec3 n = v_unit(v_cross(u, v), vec3(0, 0, 0));
+    if (v_dot(n, previous) < 0) n = v_neg(n);
+    sonde_affine world_from_local = affine_columns(u, v, n, affine_column(a, 3));
+    if (!affine_inverse(&world_from_local, &plane->local_from_world))
+      status = sonde_fail(error, SONDE_ARGUMENT,
+                          "frame %u: its columns and rows run the same way, expected a plane", i);
+    previous = plane->normal = n;
+    plane->world_from_pixel = *a;
+    plane->pixel_m[0] = v_norm(u), plane->pixel_m[1] = v_norm(v);
+    plane->pixels = s->pixels + (size_t)i * s->width * s->height;
+    plane->frame = i;
+    plane->pyramid = slicer->bank ? &slicer->bank->pyramids[i] : NULL;
+    ++slicer->count;
+  }
+  if (!status && !slicer->count)
+    status = sonde_fail(error, SONDE_MISMATCH, "no frame with a pose is left to slice");
+  for (uint32_t i = 0; i + 1 < slicer->count; ++i) {
+    slice_plane *p = &slicer->planes[i];
+    slice_shift(p, p + 1, p->next_shift);
+    slice_shift(p + 1, p, p[1].last_shift);
+  }
   if (!status) status = lay_out(s, slicer, error);
   if (!status && o.method == SONDE_SLICE_KRIGE) status = sonde_slicer_krige(slicer, error);
   if (status) sonde_slicer_destroy(slicer);
