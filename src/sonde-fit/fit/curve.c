@@ -2,7 +2,7 @@
 // linear_start: closed-form estimate of (k0, xm) from x = b f + a (x f).
 // curve_row: residual of one point.
 // sonde_fit_curve: Levenberg-Marquardt on one curve.
-#include "fit/arrow.h"
+#include "fit/bordered.h"
 #include "fit/law.h"
 
 #include "base/maths.h"
@@ -79,7 +79,7 @@ static sonde_status check_curve(const double *depth_m, const double *force_n, ui
 }
 
 static void curve_result(const curve_data *c, uint32_t count, const double theta[2],
-                         const sonde_arrow_result *result, sonde_curve_fit *fit) {
+                         const sonde_bordered_result *result, sonde_curve_fit *fit) {
   sonde_law law = sonde_law_of(theta, c->floor_m);
   fit->count = count;
   fit->k0_n_m3 = law.k0_n_m3;
@@ -106,17 +106,17 @@ sonde_status sonde_fit_curve(const double *penetration_m, const double *force_n,
   linear_start(&data, count, deepest_m, &k0, &xm_m);
   sonde_law_log(start ? start[0] : k0, start ? start[1] : xm_m, data.floor_m, theta[0]);
   const uint32_t rows[2] = {0, count};
-  sonde_arrow_problem problem = {.block_count = 1,
-                                 .row_start = rows,
-                                 .row = curve_row,
-                                 .user = &data,
-                                 .low = {LAW_LOW[0], LAW_LOW[1]},
-                                 .high = {LAW_HIGH[0], LAW_HIGH[1]},
-                                 .loss = def->loss,
-                                 .loss_scale = def->loss_scale > 0 ? def->loss_scale : 0.5,
-                                 .max_iterations = def->max_iterations};
-  sonde_arrow_result result;
-  status = sonde_arrow_minimise(&problem, theta, NULL, &result, error);
+  sonde_bordered_problem problem = {.block_count = 1,
+                                    .row_start = rows,
+                                    .row = curve_row,
+                                    .user = &data,
+                                    .low = {LAW_LOW[0], LAW_LOW[1]},
+                                    .high = {LAW_HIGH[0], LAW_HIGH[1]},
+                                    .loss = def->loss,
+                                    .loss_scale = def->loss_scale > 0 ? def->loss_scale : 0.5,
+                                    .max_iterations = def->max_iterations};
+  sonde_bordered_result result;
+  status = sonde_bordered_minimise(&problem, theta, NULL, &result, error);
   if (!status) curve_result(&data, count, theta[0], &result, fit);
   return status;
 }

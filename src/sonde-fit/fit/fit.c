@@ -1,10 +1,10 @@
 // fit_curves:     stage 1, eq. (1) for every curve by itself.
 // start_sites:    geometric means of a site's curves.
-// fit_sites:      arrow Levenberg-Marquardt over all sites, without edges, then with them.
+// fit_sites:      bordered Levenberg-Marquardt over all sites, without edges, then with them.
 // finish:         site parameters, forces and error report of stage 1 or 2.
 // refit_sites:    stage 3, on the full equilibrium.
 #include "base/clock.h"
-#include "fit/arrow.h"
+#include "fit/bordered.h"
 #include "fit/fit_inside.h"
 #include "fit/law.h"
 #include "fit/refit.h"
@@ -121,37 +121,38 @@ static void start_sites(const sonde_fit_plan *plan, const sonde_fit_result *resu
   }
 }
 
-static sonde_arrow_problem arrow_problem(const sonde_site_problem *p, const sonde_fit_def *def,
-                                         const sonde_progress *progress) {
-  return (sonde_arrow_problem){.block_count = p->plan->site_count,
-                               .border_count = p->edges ? (p->tension ? 2u : 1u) : 0u,
-                               .row_start = p->plan->site_start,
-                               .row = sonde_site_row,
-                               .user = p,
-                               .low = {LAW_LOW[0], LAW_LOW[1]},
-                               .high = {LAW_HIGH[0], LAW_HIGH[1]},
-                               .border_low = {LN_EDGE_LOW, LN_TENSION_LOW},
-                               .border_high = {LN_EDGE_HIGH, LN_TENSION_HIGH},
-                               .loss = def->loss,
-                               .loss_scale = def->loss_scale,
-                               .max_iterations = def->max_iterations,
-                               .progress = progress};
+static sonde_bordered_problem bordered_problem(const sonde_site_problem *p,
+                                               const sonde_fit_def *def,
+                                               const sonde_progress *progress) {
+  return (sonde_bordered_problem){.block_count = p->plan->site_count,
+                                  .border_count = p->edges ? (p->tension ? 2u : 1u) : 0u,
+                                  .row_start = p->plan->site_start,
+                                  .row = sonde_site_row,
+                                  .user = p,
+                                  .low = {LAW_LOW[0], LAW_LOW[1]},
+                                  .high = {LAW_HIGH[0], LAW_HIGH[1]},
+                                  .border_low = {LN_EDGE_LOW, LN_TENSION_LOW},
+                                  .border_high = {LN_EDGE_HIGH, LN_TENSION_HIGH},
+                                  .loss = def->loss,
+                                  .loss_scale = def->loss_scale,
+                                  .max_iterations = def->max_iterations,
+                                  .progress = progress};
 }
 
 // Sites without edges first: its solution is the model of stage 1 and the start of stage 2.
 static sonde_status fit_sites(sonde_site_problem *p, const sonde_fit_def *def,
                               const sonde_progress *progress, double (*theta)[2], double *border,
-                              sonde_arrow_result *found, sonde_error *error) {
+                              sonde_bordered_result *found, sonde_error *error) {
   sonde_status status = SONDE_OK;
   if (!def->cold_start || def->stages == 1) {
-    sonde_arrow_problem problem = arrow_problem(p, def, NULL);
-    status = sonde_arrow_minimise(&problem, theta, border, found, error);
+    sonde_bordered_problem problem = bordered_problem(p, def, NULL);
+    status = sonde_bordered_minimise(&problem, theta, border, found, error);
   }
   if (status || def->stages == 1) return status;
   p->edges = true;
   p->tension = def->fit_pretension;
-  sonde_arrow_problem problem = arrow_problem(p, def, progress);
-  status = sonde_arrow_minimise(&problem, theta, border, found, error);
+  sonde_bordered_problem problem = bordered_problem(p, def, progress);
+  status = sonde_bordered_minimise(&problem, theta, border, found, error);
   if (!status && found->cancelled)
     status = sonde_fail(error, SONDE_CANCELLED, "the fit was cancelled; nothing is kept");
   return status;
@@ -184,7 +185,7 @@ static void set_sites(const sonde_fit_plan *plan, const double *floor_m, const d
 }
 
 static sonde_status finish(const sonde_site_problem *p, const double (*theta)[2],
-                           const double *border, const sonde_arrow_result *found,
+                           const double *border, const sonde_bordered_result *found,
                            sonde_fit_result *result, sonde_error *error) {
   const sonde_fit_plan *plan = p->plan;
   set_sites(plan, p->floor_m, theta, result->sites, result->site_count);
@@ -214,8 +215,8 @@ static sonde_status fit_model(const sonde_model *model, const sonde_site_table *
                               sonde_site_problem *p, const sonde_fit_def *def,
                               const sonde_progress *progress, sonde_fit_result *result,
                               sonde_error *error) {
-  double border[ARROW_BORDER] = {log(EDGE_START_N_M), log(TENSION_START_N)};
-  sonde_arrow_result found = {0};
+  double border[BORDER_MOST] = {log(EDGE_START_N_M), log(TENSION_START_N)};
+  sonde_bordered_result found = {0};
   double(*theta)[2] = sonde_calloc(p->plan->site_count, sizeof *theta);
   sonde_status status = theta ? SONDE_OK : sonde_fail_memory(error);
   if (!status) status = sonde_site_problem_create(model, sites, def, p, error);

@@ -1,10 +1,5 @@
-// cost_of:   of measurements and smoothness.
-// fix:       takes fixed parameters out of the normal equations.
-// promised:  fall of the cost that a step promises.
-// try_point: forces, derivatives and cost at a set of parameters.
-// linearise: normal equations at the accepted point. accept: moves there.
-// iterate:   Levenberg-Marquardt with Marquardt's scaling. descend: the same from its first point.
-// sonde_refit_minimise: on few depths, then on all.
+// Stage 3's Levenberg-Marquardt: on few depths first, then on all, where the smoothness is chosen.
+#include "fit/marquardt.h"
 #include "fit/refit_inside.h"
 #include "fit/refit_offset.h"
 
@@ -16,8 +11,7 @@ static const double SMOOTHNESS_START = 0.03;
 static const double LONGEST_STEP = 0.7;   // of a logarithm
 static const double NOTHING = 1e-5;       // fall of an exact fit
 static const double SMALL_DAMPING = 1e-3; // a nearly full Gauss-Newton step
-static const double DAMPING_FALL = 0.1, DAMPING_LEAST = 1e-9, DAMPING_MOST = 1e9;
-static const double FLAT = 2e-2; // rise of the cost that rough equilibria may cause
+static const double FLAT = 2e-2;          // rise of the cost that rough equilibria may cause
 enum { MOST_ITERATIONS = 40 };
 
 // stride: every so many depths; enough: relative fall of the cost that is not worth a step; choose:
@@ -33,33 +27,6 @@ static const stage COARSE = {4, 1, 1e-2, false}, WHOLE = {1, 1e-3, 1e-4, false};
 static double cost_of(const sonde_refit *r, sonde_refit_workspace *w, const double *theta) {
   return sonde_refit_add_rows(r, 0, w->rows, w->force_n, NULL, NULL) +
          sonde_refit_add_prior(r, theta, r->smoothness, w->line, NULL) + sonde_offsets_cost(r);
-}
-
-// A fixed parameter gets an equation of its own, whose solution is no step.
-static void fix(const sonde_refit *r, sonde_normal *normal) {
-  uint32_t n = normal->n;
-  for (uint32_t k = 0; r->fixed && k < n; ++k) {
-    if (!r->fixed[k]) continue;
-    for (uint32_t j = 0; j < n; ++j)
-      normal->matrix[(size_t)(j < k ? k : j) * n + (j < k ? j : k)] = j == k;
-    normal->gradient[k] = 0;
-  }
-}
-
-// How far the cost of the quadratic falls along the step of its damped equations.
-static double promised(const sonde_refit *r, const sonde_refit_workspace *w, double damping) {
-  double fall = r->offsets ? r->offsets->fall : 0;
-  for (uint32_t i = 0; i < w->n; ++i) {
-    double diagonal = w->normal.matrix[(size_t)i * w->n + i];
-    fall += 0.5 * w->step[i] * (damping * diagonal * w->step[i] - w->normal.gradient[i]);
-  }
-  return fall;
-}
-
-static double longest(const double *x, uint32_t n) {
-  double most = 0;
-  for (uint32_t i = 0; i < n; ++i) most = fmax(most, fabs(x[i]));
-  return most;
 }
 
 static bool allocate(sonde_refit_workspace *w) {
@@ -86,125 +53,155 @@ static void release(sonde_refit_workspace *w) {
   sonde_free(w->line);
 }
 
-// Tells the caller about the iteration too.
-typedef struct stepwise {
-  const sonde_progress *outer;
+// A minimisation on some of the depths.
+typedef struct search {
+  sonde_refit *r;
+  sonde_refit_workspace *w;
+  double *theta, *force_n; // at the accepted point
+  double cost, enough;     // there; relative fall that is not worth a step
+  const sonde_progress *progress;
   uint32_t evaluation;
-  double cost;
-} stepwise;
+} search;
 
+// Tells the caller about the iteration too.
 static bool report_step(double fraction, const char *what, void *user) {
-  const stepwise *at = user;
+  const search *s = user;
   char text[96];
-  snprintf(text, sizeof text, "%s, evaluation %u, cost %.0f", what, at->evaluation, at->cost);
-  return sonde_progress_report(at->outer, fraction, text);
+  snprintf(text, sizeof text, "%s, evaluation %u, cost %.0f", what, s->evaluation, s->cost);
+  return sonde_progress_report(s->progress, fraction, text);
 }
 
-// Cost at the trial; infinite where an equilibrium is not found.
-static sonde_status try_point(sonde_refit *r, sonde_refit_workspace *w, stepwise *at, double *cost,
-                              sonde_error *error) {
-  const sonde_progress inner = {report_step, at};
-  at->evaluation++;
-  sonde_status status = sonde_refit_forces(r, w->trial, w->force_n, w->jacobian, &inner, error);
-  *cost = status ? INFINITY : cost_of(r, w, w->trial);
+// Forces, derivatives and cost at the trial; infinite where an equilibrium is not found.
+static sonde_status evaluate(void *user, double *cost, sonde_error *error) {
+  search *s = user;
+  sonde_refit_workspace *w = s->w;
+  const sonde_progress inner = {report_step, s};
+  s->evaluation++;
+  sonde_status status = sonde_refit_forces(s->r, w->trial, w->force_n, w->jacobian, &inner, error);
+  *cost = status ? INFINITY : cost_of(s->r, w, w->trial);
   return status == SONDE_CONVERGENCE ? SONDE_OK : status;
 }
 
-// The normal equations at the accepted point.
-static void linearise(sonde_refit *r, sonde_refit_workspace *w, const double *theta,
-                      const double *force_n) {
-  sonde_normal_clear(&w->normal);
-  sonde_refit_add_rows(r, 0, w->rows, force_n, w->kept_jacobian, &w->normal);
-  sonde_refit_add_prior(r, theta, r->smoothness, w->line, &w->normal);
-  sonde_offsets_eliminate(r, force_n, w->kept_jacobian, &w->normal);
-  fix(r, &w->normal);
-}
-
-static void accept(sonde_refit *r, sonde_refit_workspace *w, double *theta, double *force_n) {
-  memcpy(theta, w->trial, w->n * sizeof *theta);
-  memcpy(force_n, w->force_n, w->rows * sizeof *force_n);
+static void accept(void *user, double cost, double fall, bool *done) {
+  (void)fall, (void)done;
+  search *s = user;
+  sonde_refit_workspace *w = s->w;
+  memcpy(s->theta, w->trial, w->n * sizeof *s->theta);
+  memcpy(s->force_n, w->force_n, w->rows * sizeof *s->force_n);
   double *swap = w->kept_jacobian;
   w->kept_jacobian = w->jacobian;
   w->jacobian = swap;
-  sonde_offsets_accept(r);
-  linearise(r, w, theta, force_n);
+  sonde_offsets_accept(s->r);
+  s->cost = cost;
+}
+
+// The accepted point is evaluated, or evaluated again.
+static sonde_status start(search *s, sonde_error *error) {
+  double cost;
+  bool done;
+  memcpy(s->w->trial, s->theta, s->w->n * sizeof *s->theta);
+  sonde_status status = evaluate(s, &cost, error);
+  if (!status && !isfinite(cost)) status = SONDE_CONVERGENCE; // error says where
+  if (!status) accept(s, cost, 0, &done);
+  return status;
+}
+
+static sonde_status linearise(void *user, double *cost, bool *done, sonde_error *error) {
+  (void)done, (void)error;
+  search *s = user;
+  const sonde_refit *r = s->r;
+  sonde_refit_workspace *w = s->w;
+  sonde_normal *normal = &w->normal;
+  sonde_normal_clear(normal);
+  sonde_refit_add_rows(r, 0, w->rows, s->force_n, w->kept_jacobian, normal);
+  sonde_refit_add_prior(r, s->theta, r->smoothness, w->line, normal);
+  sonde_offsets_eliminate(s->r, s->force_n, w->kept_jacobian, normal);
+  // A fixed parameter gets an equation of its own, whose solution is no step.
+  for (uint32_t k = 0; r->fixed && k < w->n; ++k) {
+    if (!r->fixed[k]) continue;
+    for (uint32_t j = 0; j < w->n; ++j)
+      normal->matrix[(size_t)(j < k ? k : j) * w->n + (j < k ? j : k)] = j == k;
+    normal->gradient[k] = 0;
+  }
+  *cost = s->cost;
+  return SONDE_OK;
+}
+
+static double fall_worth(const search *s, double cost) { return s->enough * cost + NOTHING; }
+
+static bool propose(void *user, double damping, double cost, bool *done) {
+  search *s = user;
+  sonde_refit_workspace *w = s->w;
+  if (!sonde_normal_solve(&w->normal, damping, w->factor, w->step)) return false;
+  // How far the cost of the quadratic falls along the step of its damped equations.
+  double promised = s->r->offsets ? s->r->offsets->fall : 0, longest = 0;
+  for (uint32_t i = 0; i < w->n; ++i) {
+    double diagonal = w->normal.matrix[(size_t)i * w->n + i];
+    promised += 0.5 * w->step[i] * (damping * diagonal * w->step[i] - w->normal.gradient[i]);
+    longest = fmax(longest, fabs(w->step[i]));
+  }
+  *done = damping <= SMALL_DAMPING && promised <= fall_worth(s, cost);
+  if (*done) return true;
+  double share = longest > LONGEST_STEP ? LONGEST_STEP / longest : 1;
+  for (uint32_t i = 0; i < w->n; ++i) w->trial[i] = s->theta[i] + share * w->step[i];
+  sonde_offsets_try(s->r, w->step, share);
+  return true;
 }
 
 // Where the cost is flat, equilibria that are settled roughly make it rise along steps that would
 // lower it: from there on they are exact, and the accepted point is evaluated again.
-static sonde_status sharpen(sonde_refit *r, sonde_refit_workspace *w, double *theta,
-                            double *force_n, stepwise *at, double *cost, sonde_error *error) {
-  SONDE_ASSERT(r->rough && cost);
-  r->rough = false;
-  memcpy(w->trial, theta, w->n * sizeof *theta);
-  sonde_status status = try_point(r, w, at, cost, error);
-  if (!status && !isfinite(*cost)) status = SONDE_CONVERGENCE; // error says where
-  if (!status) accept(r, w, theta, force_n);
-  return status;
+static sonde_status refuse(void *user, double damping, double cost, double rise, bool *done,
+                           bool *renew, sonde_error *error) {
+  search *s = user;
+  sonde_offsets_return(s->r);
+  *done = damping <= SMALL_DAMPING && rise <= fall_worth(s, cost);
+  *renew = !*done && s->r->rough && rise <= FLAT * cost;
+  if (!*renew) return SONDE_OK;
+  s->r->rough = false;
+  return start(s, error);
 }
 
-static sonde_status iterate(sonde_refit *r, sonde_refit_workspace *w, stage goal, double *theta,
-                            double *force_n, stepwise *at, sonde_refit_result *result,
-                            sonde_error *error) {
-  double damping = goal.damping;
-  SONDE_ASSERT(isfinite(result->cost) && r->def->max_iterations > 0);
-  uint32_t limit =
-      r->def->max_iterations < MOST_ITERATIONS ? r->def->max_iterations : (uint32_t)MOST_ITERATIONS;
-  result->converged = false;
-  while (result->iterations < limit && damping < DAMPING_MOST) {
-    if (!sonde_normal_solve(&w->normal, damping, w->factor, w->step)) {
-      damping *= 10;
-      continue;
-    }
-    double size = longest(w->step, w->n), share = size > LONGEST_STEP ? LONGEST_STEP / size : 1;
-    double enough = goal.enough * result->cost + NOTHING;
-    result->converged = damping <= SMALL_DAMPING && promised(r, w, damping) <= enough;
-    if (result->converged) break;
-    for (uint32_t i = 0; i < w->n; ++i) w->trial[i] = theta[i] + share * w->step[i];
-    sonde_offsets_try(r, w->step, share);
-    double cost;
-    sonde_status status = try_point(r, w, at, &cost, error);
-    if (status) return status;
-    result->iterations++;
-    if (!(cost < result->cost)) {
-      sonde_offsets_return(r);
-      result->converged = damping <= SMALL_DAMPING && cost - result->cost <= enough;
-      if (result->converged) break;
-      if (r->rough && cost - result->cost <= FLAT * result->cost) {
-        status = sharpen(r, w, theta, force_n, at, &result->cost, error);
-        if (status) return status;
-        continue;
-      }
-      damping = fmax(10 * damping, 1e-6);
-      continue;
-    }
-    result->cost = at->cost = cost;
-    accept(r, w, theta, force_n);
-    damping = fmax(DAMPING_FALL * damping, DAMPING_LEAST);
+static bool stall(void *user, double cost) {
+  (void)user, (void)cost;
+  return false;
+}
+
+// From and to theta, on the depths of a stage.
+static sonde_status descend(search *s, stage goal, sonde_refit_result *result, sonde_error *error) {
+  bool first = s->evaluation == 0;
+  s->r->stride = goal.stride;
+  s->enough = goal.enough;
+  sonde_status status = start(s, error);
+  if (!status && goal.choose) {
+    status = sonde_refit_choose_smoothness(s->r, s->w, s->theta, s->force_n, error);
+    if (!status) s->cost = cost_of(s->r, s->w, s->theta);
   }
-  return SONDE_OK;
-}
-
-// Levenberg-Marquardt on some depths, from and to theta.
-static sonde_status descend(sonde_refit *r, sonde_refit_workspace *w, stage goal, double *theta,
-                            double *force_n, stepwise *at, sonde_refit_result *result,
-                            sonde_error *error) {
-  bool first = at->evaluation == 0;
-  r->stride = goal.stride;
-  memcpy(w->trial, theta, w->n * sizeof *theta);
-  sonde_status status = try_point(r, w, at, &result->cost, error);
-  if (!status && !isfinite(result->cost)) status = SONDE_CONVERGENCE; // error says where
   if (status) return status;
-  accept(r, w, theta, force_n);
-  if (goal.choose) {
-    status = sonde_refit_choose_smoothness(r, w, theta, force_n, error);
-    if (status) return status;
-    linearise(r, w, theta, force_n);
-    result->cost = cost_of(r, w, theta);
-  }
-  at->cost = result->cost;
-  if (first) result->start_cost = result->cost;
-  return iterate(r, w, goal, theta, force_n, at, result, error);
+  SONDE_ASSERT(s->r->def->max_iterations > 0 && result->iterations <= MOST_ITERATIONS);
+  uint32_t limit = s->r->def->max_iterations < MOST_ITERATIONS ? s->r->def->max_iterations
+                                                               : (uint32_t)MOST_ITERATIONS;
+  const sonde_marquardt marquardt = {.user = s,
+                                     .linearise = linearise,
+                                     .propose = propose,
+                                     .evaluate = evaluate,
+                                     .accept = accept,
+                                     .refuse = refuse,
+                                     .stall = stall,
+                                     .damping = goal.damping,
+                                     .fall = 0.1,
+                                     .least = 1e-9,
+                                     .rise = 10,
+                                     .rise_least = 1e-6,
+                                     .most = 1e9,
+                                     .max_steps = UINT32_MAX,
+                                     .max_trials = limit - result->iterations};
+  sonde_marquardt_result found;
+  status = sonde_marquardt_minimise(&marquardt, &found, error);
+  if (first) result->start_cost = found.start_cost;
+  result->cost = found.cost;
+  result->iterations += found.trials;
+  result->converged = found.converged;
+  return status;
 }
 
 // The way from a far start to the neighbourhood of the optimum needs few depths. The smoothness is
@@ -215,7 +212,7 @@ sonde_status sonde_refit_minimise(sonde_refit *r, double *theta, double *force_n
   *result = (sonde_refit_result){0};
   SONDE_ASSERT(r->plan->row_count > 0);
   sonde_refit_workspace w = {.n = sonde_refit_parameters(r), .rows = r->plan->row_count};
-  stepwise at = {.outer = progress};
+  search s = {.r = r, .w = &w, .theta = theta, .force_n = force_n, .progress = progress};
   bool given = r->def->smoothness_sd > 0;
   double start_sd = given ? r->def->smoothness_sd : SMOOTHNESS_START;
   double shear_sd =
@@ -223,11 +220,11 @@ sonde_status sonde_refit_minimise(sonde_refit *r, double *theta, double *force_n
   r->smoothness = (sonde_smoothness){start_sd, shear_sd};
   sonde_status status = allocate(&w) ? SONDE_OK : sonde_fail_memory(error);
   r->rough = true;
-  if (!status && !r->near) status = descend(r, &w, COARSE, theta, force_n, &at, result, error);
+  if (!status && !r->near) status = descend(&s, COARSE, result, error);
   stage whole = WHOLE;
   whole.choose = !given;
   if (r->enough > 0) whole.enough = r->enough;
-  if (!status) status = descend(r, &w, whole, theta, force_n, &at, result, error);
+  if (!status) status = descend(&s, whole, result, error);
   r->rough = false;
   if (!status && r->curvature) sonde_normal_copy(&w.normal, r->curvature);
   if (!status && r->confidence) status = sonde_refit_confidence(r, &w, theta, force_n, error);

@@ -2,7 +2,7 @@
 // loss_scale:            of a robust loss.
 // sonde_refit_weigh:     what one measurement counts.
 // sonde_refit_add_rows / sonde_refit_prior_row, _add_prior: measurements and what is known before.
-#include "fit/arrow.h"
+#include "fit/bordered.h"
 #include "sparse/dense.h"
 #include "fit/refit_inside.h"
 #include "fit/refit_offset.h"

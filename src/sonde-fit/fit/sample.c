@@ -6,7 +6,7 @@
 #include "sonde/fit_sample.h"
 
 #include "base/maths.h"
-#include "fit/arrow.h"
+#include "fit/bordered.h"
 #include "base/csv.h"
 
 #include <ctype.h>
@@ -190,7 +190,7 @@ static void sample_row(const void *user, uint32_t block, uint32_t row, const dou
                        const double *border, double *residual, double *jacobian) {
   (void)block;
   const fitting *f = user;
-  memset(jacobian, 0, (2 + ARROW_BORDER) * sizeof *jacobian);
+  memset(jacobian, 0, (2 + BORDER_MOST) * sizeof *jacobian);
   *residual = 0;
   if (stretch_of(f->sample, row) == f->left_out) return;
   spring l = spring_of(f, theta, border);
@@ -204,7 +204,7 @@ static void sample_row(const void *user, uint32_t block, uint32_t row, const dou
 
 static sonde_status minimise(fitting *f, spring *found, bool *converged, sonde_error *error) {
   const sonde_sample *s = f->sample;
-  double deepest_m = 0, xf = 0, xx = 0, theta[1][2], border[ARROW_BORDER] = {0};
+  double deepest_m = 0, xf = 0, xx = 0, theta[1][2], border[BORDER_MOST] = {0};
   for (uint32_t i = 0; i < s->count; ++i) {
     double x = s->compression_m[i];
     if (stretch_of(s, i) == f->left_out) continue;
@@ -218,19 +218,19 @@ static sonde_status minimise(fitting *f, spring *found, bool *converged, sonde_e
   theta[0][0] = log(xf / xx);
   theta[0][1] = log(0.5 * deepest_m);
   const uint32_t rows[2] = {0, s->count};
-  sonde_arrow_problem problem = {.block_count = 1,
-                                 .border_count = f->exponent > 0 ? 0 : 1,
-                                 .row_start = rows,
-                                 .row = sample_row,
-                                 .user = f,
-                                 .low = {-30, -14},
-                                 .high = {30, 4},
-                                 .border_low = {log(EXPONENT_LOW)},
-                                 .border_high = {log(EXPONENT_HIGH)},
-                                 .loss_scale = 1,
-                                 .max_iterations = 400};
-  sonde_arrow_result result;
-  sonde_status status = sonde_arrow_minimise(&problem, theta, border, &result, error);
+  sonde_bordered_problem problem = {.block_count = 1,
+                                    .border_count = f->exponent > 0 ? 0 : 1,
+                                    .row_start = rows,
+                                    .row = sample_row,
+                                    .user = f,
+                                    .low = {-30, -14},
+                                    .high = {30, 4},
+                                    .border_low = {log(EXPONENT_LOW)},
+                                    .border_high = {log(EXPONENT_HIGH)},
+                                    .loss_scale = 1,
+                                    .max_iterations = 400};
+  sonde_bordered_result result;
+  sonde_status status = sonde_bordered_minimise(&problem, theta, border, &result, error);
   *found = spring_of(f, theta[0], border);
   *converged = !status && result.converged;
   return status;

@@ -27,7 +27,7 @@ void sonde_site_problem_clear(sonde_site_problem *p);
 // T0); jacobian: derivatives by theta and border.
 double sonde_site_force(const sonde_site_problem *p, uint32_t block, uint32_t row,
                         const double theta[2], const double *border, double jacobian[4]);
-// Weighted residual; the row function of the arrow problem, user is a sonde_site_problem.
+// Weighted residual; the row function of the bordered problem, user is a sonde_site_problem.
 void sonde_site_row(const void *user, uint32_t block, uint32_t row, const double theta[2],
                     const double *border, double *residual, double jacobian[4]);
 

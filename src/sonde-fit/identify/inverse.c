@@ -1,11 +1,4 @@
-// Levenberg-Marquardt over forward simulations.
-// simulate:     one parameter vector on one record, an item of the parallel loop.
-// simulate_all: several vectors on all records.
-// note_share, report_shares: how far the simulations of a batch are, for progress.
-// weigh:        Huber weights about the scale of the residuals.
-// normal_equations, solve_small: at most four unknowns.
-// descend:      a damped step, tried and accepted or refused.
-// judge:        covariance and sensitivities at the end.
+// Levenberg-Marquardt over forward simulations, Huber weights about the scale of the residuals.
 //
 // A weak prior of one standard deviation PRIOR about the start keeps a parameter that the records
 // do not hold where it was; its interval then says so.
@@ -14,6 +7,8 @@
 #include "base/maths.h"
 #include "base/order.h"
 #include "base/parallel.h"
+#include "fit/marquardt.h"
+#include "sparse/dense.h"
 
 #include <string.h>
 
@@ -33,6 +28,9 @@ typedef struct workspace {
   uint32_t residuals;
   atomic_uint *share; // [VECTORS * records] of each simulation, in thousandths
   double noise;       // robust scale of the residuals
+  // At vector 0: normal equations, right-hand side.
+  double normal[P * P], right[P];
+  bool stale; // vector 1 is a trial: the derivatives are gone
 } workspace;
 
 // A simulation takes up to minutes: its own share is told, not only its end.
@@ -141,54 +139,25 @@ static double loss(const workspace *w, uint32_t vector) {
   return sum;
 }
 
-typedef struct normal_equations {
-  double a[P][P], b[P];
-} normal_equations;
-
 static double slope_of(const workspace *w, uint32_t p, uint32_t k) {
   return (w->residual[1 + p][k] - w->residual[0][k]) / (w->theta[1 + p][p] - w->theta[0][p]);
 }
 
-static void build(const workspace *w, normal_equations *e) {
+static void build(workspace *w) {
   uint32_t n = w->in->parameter_count;
-  *e = (normal_equations){0};
+  memset(w->normal, 0, sizeof w->normal);
+  memset(w->right, 0, sizeof w->right);
   for (uint32_t k = 0; k < w->residuals; ++k) {
     double j[P], weight = w->weight[k] / (w->noise * w->noise);
     for (uint32_t p = 0; p < n; ++p) j[p] = slope_of(w, p, k);
     for (uint32_t p = 0; p < n; ++p) {
-      e->b[p] -= weight * j[p] * w->residual[0][k];
-      for (uint32_t q = 0; q < n; ++q) e->a[p][q] += weight * j[p] * j[q];
+      w->right[p] -= weight * j[p] * w->residual[0][k];
+      for (uint32_t q = 0; q < n; ++q) w->normal[p * n + q] += weight * j[p] * j[q];
     }
   }
   for (uint32_t p = 0; p < n; ++p) {
-    e->a[p][p] += 1 / (PRIOR * PRIOR);
-    e->b[p] -= (w->theta[0][p] - w->start[p]) / (PRIOR * PRIOR);
-  }
-}
-
-// Gauss-Jordan of the positive definite a + damping diag(a): x = inverse b, and the inverse.
-static void solve_small(const normal_equations *e, uint32_t n, double damping, double *x,
-                        double inverse[P][P]) {
-  double m[P][2 * P] = {{0}};
-  for (uint32_t p = 0; p < n; ++p) {
-    for (uint32_t q = 0; q < n; ++q) m[p][q] = e->a[p][q] * (p == q ? 1 + damping : 1);
-    m[p][n + p] = 1;
-  }
-  for (uint32_t p = 0; p < n; ++p) {
-    double pivot = m[p][p];
-    SONDE_ASSERT(pivot > 0);
-    for (uint32_t q = 0; q < 2 * n; ++q) m[p][q] /= pivot;
-    for (uint32_t r = 0; r < n; ++r) {
-      double factor = m[r][p];
-      for (uint32_t q = 0; r != p && q < 2 * n; ++q) m[r][q] -= factor * m[p][q];
-    }
-  }
-  for (uint32_t p = 0; p < n; ++p) {
-    x[p] = 0;
-    for (uint32_t q = 0; q < n; ++q) {
-      x[p] += m[p][n + q] * e->b[q];
-      if (inverse) inverse[p][q] = m[p][n + q];
-    }
+    w->normal[p * n + p] += 1 / (PRIOR * PRIOR);
+    w->right[p] -= (w->theta[0][p] - w->start[p]) / (PRIOR * PRIOR);
   }
 }
 
@@ -202,58 +171,80 @@ static sonde_status differentiate(workspace *w, sonde_error *error) {
   return simulate_all(w, 1, 1 + w->in->parameter_count, "sensitivities", error);
 }
 
-static void swap_vectors(workspace *w, uint32_t a, uint32_t b) {
-  double theta[P], *residual = w->residual[a];
-  memcpy(theta, w->theta[a], sizeof theta);
-  memcpy(w->theta[a], w->theta[b], sizeof theta);
-  memcpy(w->theta[b], theta, sizeof theta);
-  w->residual[a] = w->residual[b];
-  w->residual[b] = residual;
+static sonde_status linearise(void *user, double *cost, bool *done, sonde_error *error) {
+  (void)done;
+  workspace *w = user;
+  sonde_status status = w->stale ? differentiate(w, error) : SONDE_OK;
+  w->stale = false;
+  if (status) return status;
+  weigh(w);
+  build(w);
+  *cost = loss(w, 0);
+  return SONDE_OK;
 }
 
 // The trial takes the place of the first derivative vector, which is made anew afterwards.
-static sonde_status descend(workspace *w, double *damping, bool *done, bool *stale,
-                            sonde_error *error) {
-  normal_equations e;
-  build(w, &e);
-  double before = loss(w, 0);
-  for (int tries = 0; tries < 4; ++tries) {
-    double step[P], trial[P], way = 0, gain = 0;
-    solve_small(&e, w->in->parameter_count, *damping, step, NULL);
-    memcpy(trial, w->theta[0], sizeof trial);
-    for (uint32_t p = 0; p < w->in->parameter_count; ++p) {
-      double to = w->theta[0][p] + clamp(step[p], -LONGEST, LONGEST);
-      trial[p] = clamp(to, w->in->low[p], w->in->high[p]);
-      way = fmax(way, fabs(trial[p] - w->theta[0][p]) / w->in->step[p]);
-      gain += 0.5 * e.b[p] * (trial[p] - w->theta[0][p]);
-    }
-    // Nothing to gain but what noise gives: the derivatives stay those of theta[0].
-    *done = way < 0.05 || gain < 0.05;
-    if (*done) return SONDE_OK;
-    memcpy(w->theta[1], trial, sizeof trial);
-    *stale = true;
-    sonde_status status = simulate_all(w, 1, 2, "trial", error);
-    if (status) return status;
-    if (loss(w, 1) < before) {
-      *done = before - loss(w, 1) < 0.05;
-      *damping *= 0.1;
-      swap_vectors(w, 0, 1);
-      return SONDE_OK;
-    }
-    *damping = fmax(10 * *damping, 0.1);
+static bool propose(void *user, double damping, double cost, bool *done) {
+  (void)cost;
+  workspace *w = user;
+  uint32_t n = w->in->parameter_count;
+  double factor[P * P], step[P], trial[P], moved = 0, gain = 0;
+  memcpy(factor, w->normal, sizeof factor);
+  memcpy(step, w->right, sizeof step);
+  memcpy(trial, w->theta[0], sizeof trial); // parameters that are not sought stay
+  for (uint32_t p = 0; p < n; ++p) factor[p * n + p] *= 1 + damping;
+  if (!sonde_cholesky(factor, n)) return false;
+  sonde_cholesky_solve(factor, n, step);
+  for (uint32_t p = 0; p < n; ++p) {
+    double to = w->theta[0][p] + clamp(step[p], -LONGEST, LONGEST);
+    trial[p] = clamp(to, w->in->low[p], w->in->high[p]);
+    moved = fmax(moved, fabs(trial[p] - w->theta[0][p]) / w->in->step[p]);
+    gain += 0.5 * w->right[p] * (trial[p] - w->theta[0][p]);
   }
-  *done = true; // no better point within the noise of the forward model
-  return SONDE_OK;
+  // Nothing to gain but what noise gives: the derivatives stay those of theta[0].
+  *done = moved < 0.05 || gain < 0.05;
+  if (*done) return true;
+  memcpy(w->theta[1], trial, sizeof trial);
+  w->stale = true;
+  return true;
+}
+
+static sonde_status evaluate(void *user, double *cost, sonde_error *error) {
+  workspace *w = user;
+  sonde_status status = simulate_all(w, 1, 2, "trial", error);
+  if (!status) *cost = loss(w, 1);
+  return status;
+}
+
+static void accept(void *user, double cost, double fall, bool *done) {
+  (void)cost;
+  workspace *w = user;
+  double *swap = w->residual[0];
+  w->residual[0] = w->residual[1];
+  w->residual[1] = swap;
+  memcpy(w->theta[0], w->theta[1], sizeof w->theta[0]);
+  *done = fall < 0.05;
+  w->in->iterations++;
+}
+
+// No better point within the noise of the forward model.
+static bool stall(void *user, double cost) {
+  (void)user, (void)cost;
+  return true;
 }
 
 static void judge(workspace *w) {
   sonde_inverse *in = w->in;
-  normal_equations e;
-  double unused[P], sum = 0;
+  uint32_t n = in->parameter_count;
+  double inverse[P * P], sum = 0;
   weigh(w);
-  build(w, &e);
-  solve_small(&e, in->parameter_count, 0, unused, in->covariance);
-  for (uint32_t p = 0; p < in->parameter_count; ++p) {
+  build(w);
+  bool definite = sonde_cholesky(w->normal, n);
+  SONDE_ASSERT(definite); // by its prior
+  (void)definite;
+  sonde_cholesky_invert(w->normal, n, inverse);
+  for (uint32_t p = 0; p < n; ++p) {
+    memcpy(in->covariance[p], inverse + p * n, n * sizeof *inverse);
     double squares = 0;
     for (uint32_t k = 0; k < w->residuals; ++k) squares += slope_of(w, p, k) * slope_of(w, p, k);
     in->sensitivity[p] = sqrt(squares / w->residuals);
@@ -302,17 +293,27 @@ static void clear(workspace *w) {
 sonde_status sonde_inverse_solve(sonde_inverse *in, sonde_error *error) {
   SONDE_ASSERT(in->parameter_count >= 1 && in->parameter_count <= P && in->record_count > 0);
   workspace w = {.in = in};
-  double damping = 1e-3;
   sonde_status status = prepare(&w, error);
   if (!status) status = simulate_all(&w, 0, 1, "first simulation", error);
-  bool stale = true;
-  for (in->converged = false; !status; in->iterations++) {
-    if (stale) status = differentiate(&w, error);
-    if (status || in->converged || in->iterations >= in->options->max_iterations) break;
-    weigh(&w);
-    stale = false;
-    status = descend(&w, &damping, &in->converged, &stale, error);
-  }
+  const sonde_marquardt marquardt = {.user = &w,
+                                     .linearise = linearise,
+                                     .propose = propose,
+                                     .evaluate = evaluate,
+                                     .accept = accept,
+                                     .stall = stall,
+                                     .damping = 1e-3,
+                                     .fall = 0.1,
+                                     .rise = 10,
+                                     .rise_least = 0.1,
+                                     .most = INFINITY,
+                                     .trials_per_step = 4,
+                                     .max_steps = in->options->max_iterations,
+                                     .max_trials = UINT32_MAX};
+  sonde_marquardt_result found = {0};
+  w.stale = true;
+  if (!status) status = sonde_marquardt_minimise(&marquardt, &found, error);
+  in->iterations = found.steps, in->converged = found.converged;
+  if (!status && w.stale) status = differentiate(&w, error);
   if (!status) {
     judge(&w);
     memcpy(in->theta, w.theta[0], sizeof in->theta);

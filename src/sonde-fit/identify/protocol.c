@@ -1,7 +1,4 @@
-// check:        ranges of a protocol.
-// find_depth:   where a slow press meets a force.
-// plan_ramps:   knots of ramp-and-hold. plan_slides: knots of the slide.
-// sample:       the plan driven over the model, sensors with noise.
+// A protocol driven over the model: knots of ramp and hold or of slides, sensors with noise.
 #include "base/maths.h"
 #include "base/random.h"
 #include "sonde/world_path.h"
@@ -96,8 +93,9 @@ static void put_knot(plan *p) {
 }
 
 static void move_to(plan *p, double penetration_m, double slide_m, double speed_m_s) {
-  double way = fabs(penetration_m - p->penetration_m) + fabs(slide_m - p->slide_m);
-  p->time_s += way / speed_m_s;
+  SONDE_ASSERT(speed_m_s > 0);
+  double distance_m = fabs(penetration_m - p->penetration_m) + fabs(slide_m - p->slide_m);
+  p->time_s += distance_m / speed_m_s;
   p->penetration_m = penetration_m;
   p->slide_m = slide_m;
   put_knot(p);
@@ -106,38 +104,6 @@ static void move_to(plan *p, double penetration_m, double slide_m, double speed_
 static void wait(plan *p, double seconds) {
   p->time_s += seconds;
   put_knot(p);
-}
-
-static void plan_ramps(const sonde_protocol *protocol, double depth_m, plan *p) {
-  for (uint32_t k = 0; k < protocol->speed_count; ++k) {
-    wait(p, 0.1);
-    move_to(p, depth_m, 0, protocol->speed_m_s[k]);
-    wait(p, protocol->hold_s);
-    move_to(p, -LEAD_M, 0, protocol->speed_m_s[k]);
-    wait(p, 0.2);
-  }
-}
-
-// As many moves to and fro as take the time of the slowest speed's: the noise weighs the same.
-static uint32_t rounds_of(const sonde_protocol *protocol, double speed_m_s) {
-  double slowest = speed_m_s;
-  for (uint32_t k = 0; k < protocol->speed_count; ++k)
-    slowest = fmin(slowest, protocol->speed_m_s[k]);
-  return (uint32_t)clamp(speed_m_s / slowest + 0.5, 1, MOST_ROUNDS);
-}
-
-static void plan_slides(const sonde_protocol *protocol, double depth_m, plan *p) {
-  wait(p, 0.1);
-  move_to(p, depth_m, 0, APPROACH_M_S);
-  wait(p, protocol->hold_s);
-  for (uint32_t k = 0; k < protocol->speed_count; ++k)
-    for (uint32_t round = rounds_of(protocol, protocol->speed_m_s[k]); round > 0; --round) {
-      move_to(p, depth_m, protocol->slide_m, protocol->speed_m_s[k]);
-      wait(p, protocol->hold_s);
-      move_to(p, depth_m, 0, protocol->speed_m_s[k]);
-      wait(p, protocol->hold_s);
-    }
-  move_to(p, -LEAD_M, 0, APPROACH_M_S);
 }
 
 static sonde_status make_plan(const sonde_model *model, const sonde_protocol *protocol,
@@ -150,10 +116,34 @@ static sonde_status make_plan(const sonde_model *model, const sonde_protocol *pr
   if (status) return status;
   plan p = {0, -LEAD_M, 0, &drive->penetration, &drive->slide};
   put_knot(&p);
-  if (protocol->kind == SONDE_PROTOCOL_SLIDE)
-    plan_slides(protocol, depth_m, &p);
-  else
-    plan_ramps(protocol, depth_m, &p);
+  SONDE_ASSERT(depth_m > 0);
+  bool slides = protocol->kind == SONDE_PROTOCOL_SLIDE;
+  double slowest = INFINITY;
+  for (uint32_t k = 0; k < protocol->speed_count; ++k)
+    slowest = fmin(slowest, protocol->speed_m_s[k]);
+  if (slides) {
+    wait(&p, 0.1);
+    move_to(&p, depth_m, 0, APPROACH_M_S);
+    wait(&p, protocol->hold_s);
+  }
+  for (uint32_t k = 0; k < protocol->speed_count; ++k) {
+    double speed = protocol->speed_m_s[k];
+    // As many slides to and fro as take the time of the slowest speed's: the noise weighs the same.
+    uint32_t rounds = slides ? (uint32_t)clamp(speed / slowest + 0.5, 1, MOST_ROUNDS) : 0;
+    for (uint32_t round = 0; round < rounds; ++round) {
+      move_to(&p, depth_m, protocol->slide_m, speed);
+      wait(&p, protocol->hold_s);
+      move_to(&p, depth_m, 0, speed);
+      wait(&p, protocol->hold_s);
+    }
+    if (slides) continue;
+    wait(&p, 0.1);
+    move_to(&p, depth_m, 0, speed);
+    wait(&p, protocol->hold_s);
+    move_to(&p, -LEAD_M, 0, speed);
+    wait(&p, 0.2);
+  }
+  if (slides) move_to(&p, -LEAD_M, 0, APPROACH_M_S);
   SONDE_ASSERT(drive->slide.count <= MOST_KNOTS);
   double samples = floor(p.time_s * protocol->rate_hz) + 1;
   if (samples > MOST_SAMPLES)
@@ -167,14 +157,6 @@ static sonde_status make_plan(const sonde_model *model, const sonde_protocol *pr
   return SONDE_OK;
 }
 
-static void add_noise(const sonde_protocol *p, uint32_t k, sonde_motion_sample *sample) {
-  uint64_t counter = 4 * (uint64_t)k;
-  sample->penetration_m += p->noise_position_m * sonde_random_normal(p->seed, counter);
-  sample->slide_m += p->noise_position_m * sonde_random_normal(p->seed, counter + 1);
-  sample->normal_n += p->noise_force_n * sonde_random_normal(p->seed, counter + 2);
-  sample->tangential_n += p->noise_force_n * sonde_random_normal(p->seed, counter + 3);
-}
-
 static sonde_status sample(const sonde_model *model, const sonde_world_def *def,
                            const sonde_protocol *protocol, const sonde_drive *drive,
                            const sonde_progress *progress, sonde_motion_record *record,
@@ -186,10 +168,15 @@ static sonde_status sample(const sonde_model *model, const sonde_world_def *def,
     status = sonde_drive_run(drive, model, def, NULL, progress, force, force + drive->count, error);
   for (uint32_t k = 0; !status && k < drive->count; ++k) {
     double t = drive->time_s[k];
+    uint64_t counter = 4 * (uint64_t)k;
+    double noise[4];
+    for (uint32_t n = 0; n < 4; ++n)
+      noise[n] = (n < 2 ? protocol->noise_position_m : protocol->noise_force_n) *
+                 sonde_random_normal(protocol->seed, counter + n);
     record->samples[k] =
-        (sonde_motion_sample){t, sonde_track_at(&drive->penetration, t),
-                              sonde_track_at(&drive->slide, t), force[k], force[drive->count + k]};
-    add_noise(protocol, k, &record->samples[k]);
+        (sonde_motion_sample){t, sonde_track_at(&drive->penetration, t) + noise[0],
+                              sonde_track_at(&drive->slide, t) + noise[1], force[k] + noise[2],
+                              force[drive->count + k] + noise[3]};
   }
   record->count = drive->count;
   sonde_free(force);

@@ -1,6 +1,5 @@
-// solve_three:  static force and two amplitudes for given times, by least squares.
-// fit_times:    the times by search over a grid in their logarithms that is refined.
-// read_hold:    one hold. sonde_relaxation_read: all holds that follow a ramp in.
+// Relaxation of held skin: static force and up to two falling exponentials behind each hold that
+// follows a ramp in, their times by search over a grid in the logarithms that is refined.
 #include "identify/summary.h"
 
 #include "base/maths.h"
@@ -77,7 +76,7 @@ static double grid_point(double low, double high, int k) {
 
 // Each round narrows both ranges about the best pair.
 static exponentials fit_times(const decay *d, double shortest_s, double longest_s, int terms) {
-  SONDE_ASSERT(shortest_s > 0 && longest_s > shortest_s && terms >= 2);
+  SONDE_ASSERT(d->count >= FEWEST && shortest_s > 0 && longest_s > shortest_s && terms >= 2);
   exponentials best = {.squares = INFINITY};
   double low[2] = {shortest_s, shortest_s}, high[2] = {longest_s, longest_s};
   for (int round = 0; round < ROUNDS; ++round) {
@@ -141,19 +140,6 @@ static double relaxation_time(const exponentials *e) {
   return high;
 }
 
-// Slope of ln F over ln t, by least squares over the samples with F > 0 and t > 0.
-static double power_of(const decay *d) {
-  double n = 0, x = 0, y = 0, xx = 0, xy = 0;
-  for (uint32_t k = 0; k < d->count; ++k) {
-    double t = d->sample[k].time_s - d->start_s, f = d->sample[k].normal_n;
-    if (!(t > 0) || !(f > 0)) continue;
-    double lx = log(t), ly = log(f);
-    n += 1, x += lx, y += ly, xx += lx * lx, xy += lx * ly;
-  }
-  double spread = n * xx - x * x;
-  return spread > 0 ? (n * xy - x * y) / spread : 0;
-}
-
 static bool read_hold(const sonde_motion_record *record, double start_s, double end_s,
                       sonde_relaxation *hold) {
   sonde_span span = sonde_span_between(record, start_s, end_s);
@@ -170,7 +156,16 @@ static bool read_hold(const sonde_motion_record *record, double start_s, double 
     hold->tau_s[k] = e.tau_s[k];
     hold->amplitude_n[k] = e.amplitude[k];
   }
-  hold->power = power_of(&d);
+  // Slope of ln F over ln t, by least squares over the samples with F > 0 and t > 0.
+  double n = 0, x = 0, y = 0, xx = 0, xy = 0;
+  for (uint32_t k = 0; k < d.count; ++k) {
+    double t = d.sample[k].time_s - start_s, f = d.sample[k].normal_n;
+    if (!(t > 0) || !(f > 0)) continue;
+    double lx = log(t), ly = log(f);
+    n += 1, x += lx, y += ly, xx += lx * lx, xy += lx * ly;
+  }
+  double spread = n * xx - x * x;
+  hold->power = spread > 0 ? (n * xy - x * y) / spread : 0;
   hold->rms_n = sqrt(e.squares / d.count);
   return true;
 }

@@ -1,6 +1,5 @@
-// read_move:  one straight move: plateau and breakaway of tangential over normal force.
-// collect:    moves of one speed, both directions.
-// sonde_slide_read: speeds in ascending order.
+// Friction of sliding: plateau and breakaway of tangential over normal force in straight moves, put
+// together by speed.
 #include "identify/summary.h"
 
 #include "base/maths.h"
@@ -21,17 +20,6 @@ static double ratio_at(const sonde_motion_record *record, uint32_t k) {
   return s->normal_n > LEAST_PUSH_N ? s->tangential_n / s->normal_n : 0;
 }
 
-// Largest mean of SMOOTH neighbouring ratios along the direction of the move.
-static double peak_of(const sonde_motion_record *record, sonde_span span, double direction) {
-  double best = -INFINITY;
-  for (uint32_t k = span.from; k + SMOOTH <= span.to; ++k) {
-    double sum = 0;
-    for (uint32_t j = 0; j < SMOOTH; ++j) sum += ratio_at(record, k + j);
-    best = fmax(best, direction * sum / SMOOTH);
-  }
-  return best;
-}
-
 static sonde_status read_move(const sonde_motion_record *record, double start_s, double end_s,
                               double speed, move *found, sonde_error *error) {
   sonde_span span = sonde_span_between(record, start_s, end_s);
@@ -42,7 +30,13 @@ static sonde_status read_move(const sonde_motion_record *record, double start_s,
   double *ratio = SONDE_NEW(double, count);
   if (!ratio) return sonde_fail_memory(error);
   for (uint32_t k = 0; k < count; ++k) ratio[k] = ratio_at(record, half.from + k);
-  *found = (move){speed, sonde_median(ratio, count), peak_of(record, span, speed < 0 ? -1 : 1)};
+  *found = (move){speed, sonde_median(ratio, count), -INFINITY};
+  // Largest mean of neighbouring ratios along the direction of the move.
+  for (uint32_t k = span.from; k + SMOOTH <= span.to; ++k) {
+    double sum = 0;
+    for (uint32_t j = 0; j < SMOOTH; ++j) sum += ratio_at(record, k + j);
+    found->peak = fmax(found->peak, (speed < 0 ? -1 : 1) * sum / SMOOTH);
+  }
   sonde_free(ratio);
   return SONDE_OK;
 }
@@ -50,6 +44,7 @@ static sonde_status read_move(const sonde_motion_record *record, double start_s,
 // Half the sum of the directions is what leans against the probe on sloping skin; half their
 // difference is friction.
 static sonde_slide collect(const move *moves, uint32_t count, double speed) {
+  SONDE_ASSERT(speed > 0 && count <= MOST_MOVES);
   double sum[2] = {0}, peak = 0;
   uint32_t n[2] = {0};
   for (uint32_t k = 0; k < count; ++k) {
@@ -69,35 +64,6 @@ static sonde_slide collect(const move *moves, uint32_t count, double speed) {
                        .moves = n[0] + n[1]};
 }
 
-static void sort_in(sonde_slide *slides, uint32_t *count, sonde_slide added) {
-  SONDE_ASSERT(*count < SONDE_HOLDS);
-  uint32_t at = (*count)++;
-  for (; at > 0 && slides[at - 1].speed_m_s > added.speed_m_s; --at) slides[at] = slides[at - 1];
-  slides[at] = added;
-}
-
-static bool is_known(const sonde_slide *slides, uint32_t count, double speed) {
-  for (uint32_t k = 0; k < count; ++k)
-    if (speed <= slides[k].speed_m_s * SAME_SPEED && speed * SAME_SPEED >= slides[k].speed_m_s)
-      return true;
-  return false;
-}
-
-static sonde_status read_moves(const sonde_motion_record *record, const sonde_track *track,
-                               move *moves, uint32_t *count, sonde_error *error) {
-  for (uint32_t k = 0; k + 1 < track->count && *count < MOST_MOVES; ++k) {
-    double speed = sonde_track_slope(track, k);
-    bool moved = fabs(track->value[k + 1] - track->value[k]) >= SHORTEST_M;
-    if (!moved || fabs(speed) < SONDE_STANDS_M_S) continue;
-    move *found = &moves[*count];
-    sonde_status status =
-        read_move(record, track->time_s[k], track->time_s[k + 1], speed, found, error);
-    if (status) return status;
-    *count += fabs(found->speed_m_s) > 0;
-  }
-  return SONDE_OK;
-}
-
 sonde_status sonde_slide_read(const sonde_motion_record *record, sonde_slide *slides,
                               uint32_t *count, sonde_error *error) {
   const sonde_motion_sample *s = record->samples;
@@ -107,10 +73,25 @@ sonde_status sonde_slide_read(const sonde_motion_record *record, sonde_slide *sl
   *count = 0;
   sonde_status status = sonde_track_fit(&s->time_s, &s->slide_m, sizeof *s / sizeof(double),
                                         record->count, &track, error);
-  if (!status) status = read_moves(record, &track, moves, &found, error);
+  // Straight moves.
+  for (uint32_t k = 0; !status && k + 1 < track.count && found < MOST_MOVES; ++k) {
+    double speed = sonde_track_slope(&track, k);
+    bool moved = fabs(track.value[k + 1] - track.value[k]) >= SHORTEST_M;
+    if (!moved || fabs(speed) < SONDE_STANDS_M_S) continue;
+    status = read_move(record, track.time_s[k], track.time_s[k + 1], speed, &moves[found], error);
+    found += !status && fabs(moves[found].speed_m_s) > 0;
+  }
+  // Their speeds, ascending.
   for (uint32_t k = 0; !status && k < found && *count < SONDE_HOLDS; ++k) {
     double speed = fabs(moves[k].speed_m_s);
-    if (!is_known(slides, *count, speed)) sort_in(slides, count, collect(moves, found, speed));
+    bool known = false;
+    for (uint32_t n = 0; n < *count && !known; ++n)
+      known =
+          speed <= slides[n].speed_m_s * SAME_SPEED && speed * SAME_SPEED >= slides[n].speed_m_s;
+    if (known) continue;
+    uint32_t at = (*count)++;
+    for (; at > 0 && slides[at - 1].speed_m_s > speed; --at) slides[at] = slides[at - 1];
+    slides[at] = collect(moves, found, speed);
   }
   sonde_track_clear(&track);
   if (status || *count) return status;

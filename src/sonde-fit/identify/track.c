@@ -1,9 +1,5 @@
-// Straight moves behind noisy samples.
-// noise_of:     standard deviation from second differences.
-// misfit:       sum of squares about the line of a run of samples, from running sums.
-// merge:        joins neighbouring pieces as long as noise explains the loss.
-// shift:        moves each boundary to where both lines fit best.
-// place_knots:  where neighbouring lines cross.
+// Straight moves behind noisy samples: short pieces are joined as long as noise explains the loss,
+// and each boundary moves to where both lines fit best.
 #include "identify/track.h"
 
 #include "base/maths.h"
@@ -12,6 +8,7 @@
 #include <string.h>
 
 sonde_status sonde_track_create(uint32_t room, sonde_track *track, sonde_error *error) {
+  SONDE_ASSERT(room > 0);
   *track = (sonde_track){0};
   track->time_s = SONDE_NEW(double, 2 * (size_t)room);
   if (!track->time_s) return sonde_fail_memory(error);
@@ -24,28 +21,23 @@ void sonde_track_clear(sonde_track *track) {
   *track = (sonde_track){0};
 }
 
-// Last knot that is not after the time; 0 before the first.
-static uint32_t knot_before(const sonde_track *track, double time_s) {
-  uint32_t low = 0, high = track->count;
-  while (high - low > 1) {
-    uint32_t middle = low + (high - low) / 2;
-    if (track->time_s[middle] <= time_s)
-      low = middle;
-    else
-      high = middle;
-  }
-  return low;
-}
-
 double sonde_track_slope(const sonde_track *track, uint32_t k) {
   if (k + 1 >= track->count) return 0;
   return (track->value[k + 1] - track->value[k]) / (track->time_s[k + 1] - track->time_s[k]);
 }
 
 double sonde_track_at(const sonde_track *track, double time_s) {
-  SONDE_ASSERT(track->count >= 1);
+  SONDE_ASSERT(track->count >= 1 && isfinite(time_s));
   if (time_s <= track->time_s[0]) return track->value[0];
-  uint32_t k = knot_before(track, time_s);
+  // The last knot that is not after the time.
+  uint32_t k = 0, high = track->count;
+  while (high - k > 1) {
+    uint32_t middle = k + (high - k) / 2;
+    if (track->time_s[middle] <= time_s)
+      k = middle;
+    else
+      high = middle;
+  }
   return track->value[k] + sonde_track_slope(track, k) * (time_s - track->time_s[k]);
 }
 
@@ -87,19 +79,15 @@ static sonde_status noise_of(const double *value, size_t stride, uint32_t count,
   return SONDE_OK;
 }
 
-static double merge_loss(const pieces *p, uint32_t k) {
-  const uint32_t *at = p->start;
-  return misfit(p, at[k], at[k + 2], NULL) - misfit(p, at[k], at[k + 1], NULL) -
-         misfit(p, at[k + 1], at[k + 2], NULL);
-}
-
 // Two lines where one would do fit better by about 2 variances; a real corner by far more than 40.
 static void merge(pieces *p) {
   while (p->count > 1) {
     uint32_t best = 0;
     double least = INFINITY;
     for (uint32_t k = 0; k + 1 < p->count; ++k) {
-      double loss = merge_loss(p, k);
+      const uint32_t *at = p->start + k;
+      double loss = misfit(p, at[0], at[2], NULL) - misfit(p, at[0], at[1], NULL) -
+                    misfit(p, at[1], at[2], NULL);
       if (loss < least) least = loss, best = k;
     }
     if (least > 40 * p->noise * p->noise) return;
@@ -108,28 +96,7 @@ static void merge(pieces *p) {
   }
 }
 
-static void shift(pieces *p) {
-  for (uint32_t k = 0; k + 1 < p->count; ++k) {
-    uint32_t from = p->start[k], to = p->start[k + 2], best = p->start[k + 1];
-    double least = INFINITY;
-    for (uint32_t at = from + 2; at + 2 <= to; ++at) {
-      double sum = misfit(p, from, at, NULL) + misfit(p, at, to, NULL);
-      if (sum < least) least = sum, best = at;
-    }
-    p->start[k + 1] = best;
-  }
-}
-
 static double line_at(const line *l, double t) { return l->mean_v + l->slope * (t - l->mean_t); }
-
-// Between the middles of both pieces; lines that do not cross there meet at the boundary.
-static void place_knot(const line *a, const line *b, double boundary, sonde_track *track) {
-  double slope = a->slope - b->slope, time = boundary;
-  double cross = (line_at(b, boundary) - line_at(a, boundary)) / slope + boundary;
-  if (fabs(slope) > 0 && cross > a->mean_t && cross < b->mean_t) time = cross;
-  track->time_s[track->count] = time;
-  track->value[track->count++] = 0.5 * (line_at(a, time) + line_at(b, time));
-}
 
 // Times in the sums, and so those of the lines, count from the first sample.
 static void place_knots(const pieces *p, const double *time_s, size_t stride, sonde_track *track) {
@@ -137,24 +104,22 @@ static void place_knots(const pieces *p, const double *time_s, size_t stride, so
   line now, before = {0};
   for (uint32_t k = 0; k < p->count; ++k) {
     misfit(p, p->start[k], p->start[k + 1], &now);
-    if (k > 0)
-      place_knot(&before, &now, time_s[p->start[k] * stride] - origin, track);
-    else
+    if (k > 0) {
+      // Between the middles of both pieces; lines that do not cross there meet at the boundary.
+      double boundary = time_s[p->start[k] * stride] - origin, slope = before.slope - now.slope;
+      double cross = (line_at(&now, boundary) - line_at(&before, boundary)) / slope + boundary;
+      bool meet = fabs(slope) > 0 && cross > before.mean_t && cross < now.mean_t;
+      double time = meet ? cross : boundary;
+      track->time_s[track->count] = time;
+      track->value[track->count++] = 0.5 * (line_at(&before, time) + line_at(&now, time));
+    } else {
       track->value[track->count++] = line_at(&now, 0); // at time 0
+    }
     before = now;
   }
   track->time_s[track->count] = end;
   track->value[track->count++] = line_at(&before, end);
   for (uint32_t k = 0; k < track->count; ++k) track->time_s[k] += origin;
-}
-
-static void sum_up(const double *time_s, const double *value, size_t stride, pieces *p) {
-  double origin = time_s[0];
-  for (uint32_t k = 0; k < p->samples; ++k) {
-    double t = time_s[k * stride] - origin, v = value[k * stride];
-    const double term[5] = {t, v, t * t, t * v, v * v};
-    for (int m = 0; m < 5; ++m) p->sum[k + 1][m] = p->sum[k][m] + term[m];
-  }
 }
 
 // First pieces of ten samples; the merging keeps those with a corner inside, shifting the boundary
@@ -170,12 +135,24 @@ sonde_status sonde_track_fit(const double *time_s, const double *value, size_t s
   sonde_status status = p.sum && p.start ? SONDE_OK : sonde_fail_memory(error);
   if (!status) status = noise_of(value, stride, count, &p.noise, error);
   if (!status) {
-    sum_up(time_s, value, stride, &p);
+    for (uint32_t k = 0; k < count; ++k) {
+      double t = time_s[k * stride] - time_s[0], v = value[k * stride];
+      const double term[5] = {t, v, t * t, t * v, v * v};
+      for (int m = 0; m < 5; ++m) p.sum[k + 1][m] = p.sum[k][m] + term[m];
+    }
     for (uint32_t k = 0; k < p.count; ++k) p.start[k] = k * FIRST;
     p.start[p.count] = count;
     for (int round = 0; round < 4; ++round) {
       merge(&p);
-      shift(&p);
+      for (uint32_t k = 0; k + 1 < p.count; ++k) {
+        uint32_t from = p.start[k], to = p.start[k + 2], best = p.start[k + 1];
+        double least = INFINITY;
+        for (uint32_t at = from + 2; at + 2 <= to; ++at) {
+          double sum = misfit(&p, from, at, NULL) + misfit(&p, at, to, NULL);
+          if (sum < least) least = sum, best = at;
+        }
+        p.start[k + 1] = best;
+      }
     }
     merge(&p);
     status = sonde_track_create(p.count + 1, track, error);

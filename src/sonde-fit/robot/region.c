@@ -1,7 +1,4 @@
-// load_outline: corners of an outline from a CSV file.
-// load_patch:   a mesh cut out of the skin.
-// angle_of:     a point's angle around the axis, within a turn that starts at some angle.
-// sonde_region_holds: distance from the patch, or crossings of the outline in (angle, z).
+// A painted region of the skin: an outline from a CSV file, or a mesh cut out of the skin.
 #include "base/csv.h"
 #include "robot/sites_inside.h"
 
@@ -37,26 +34,21 @@ static sonde_status load_outline(const char *path, sonde_region *region, sonde_e
   return status;
 }
 
-static sonde_status load_patch(const char *path, sonde_region *region, sonde_error *error) {
+sonde_status sonde_region_load(const char *path, sonde_region *region, sonde_error *error) {
+  *region = (sonde_region){0};
+  const char *dot = strrchr(path, '.');
+  bool outline = dot && !strcasecmp(dot, ".csv");
   sonde_mesh mesh = {0};
-  sonde_status status = sonde_mesh_load(path, 1e-3, &mesh, error);
-  if (!status) status = sonde_surface_index_create(&mesh, &region->patch, error);
-  if (!status) {
+  sonde_status status =
+      outline ? load_outline(path, region, error) : sonde_mesh_load(path, 1e-3, &mesh, error);
+  if (!status && !outline) status = sonde_surface_index_create(&mesh, &region->patch, error);
+  if (!status && !outline) {
     region->count = mesh.vertex_count;
     region->point_m = mesh.vertices;
     mesh.vertices = NULL;
     mesh.vertex_count = 0;
   }
   sonde_mesh_clear(&mesh);
-  return status;
-}
-
-sonde_status sonde_region_load(const char *path, sonde_region *region, sonde_error *error) {
-  *region = (sonde_region){0};
-  const char *dot = strrchr(path, '.');
-  bool outline = dot && !strcasecmp(dot, ".csv");
-  sonde_status status =
-      outline ? load_outline(path, region, error) : load_patch(path, region, error);
   if (status) sonde_region_clear(region);
   return status;
 }
@@ -95,9 +87,11 @@ sonde_chart_bounds sonde_region_bounds(const sonde_region *region, sonde_vec3 or
   return b;
 }
 
-// Crossings of the outline with the ray of growing angle from the point: odd inside.
-static bool outline_holds(const sonde_region *region, const sonde_chart *chart,
-                          sonde_vec3 point_m) {
+bool sonde_region_holds(const sonde_region *region, const sonde_chart *chart, sonde_vec3 point_m) {
+  SONDE_ASSERT(region->count > 0);
+  if (region->patch)
+    return sonde_surface_closest(region->patch, point_m).distance_m <= PATCH_TOLERANCE_M;
+  // Crossings of the outline with the ray of growing angle from the point: odd inside.
   double start = chart->bounds.angle_low_rad, angle = angle_of(point_m, chart->origin_m, start);
   bool inside = false;
   for (uint32_t k = 0; k < region->count; ++k) {
@@ -107,10 +101,4 @@ static bool outline_holds(const sonde_region *region, const sonde_chart *chart,
     inside ^= angle < from + (to - from) * (point_m.z - a.z) / (b.z - a.z);
   }
   return inside;
-}
-
-bool sonde_region_holds(const sonde_region *region, const sonde_chart *chart, sonde_vec3 point_m) {
-  SONDE_ASSERT(region->count > 0);
-  if (!region->patch) return outline_holds(region, chart, point_m);
-  return sonde_surface_closest(region->patch, point_m).distance_m <= PATCH_TOLERANCE_M;
 }

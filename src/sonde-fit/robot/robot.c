@@ -1,8 +1,5 @@
-// measure_site: step by step at one site until a stop rule holds.
-// read_sensors: noise, then quantisation; depends only on (seed, site, step).
-// repeats:      whether a reading's penetration was recorded before.
-// gather:       what is kept, in table order.
-// sonde_robot_run: sites in parallel.
+// The virtual robot: presses at every site step by step until a limit holds, reads sensors with
+// noise and quantisation, and writes what they read as a table.
 #include "base/maths.h"
 #include "base/random.h"
 #include "fit/fit_inside.h"
@@ -29,9 +26,10 @@ typedef struct robot {
   const sonde_site_table *sites;
   const sonde_robot_def *def;
   sonde_probe probe;
+  char label[24]; // its column of the table
   bool bonded;
   uint32_t step_limit;
-  sonde_press *crew;         // [workers] of a body; NULL for a bonded footprint
+  sonde_press *press;        // [workers] of a body; NULL for a bonded footprint
   sonde_datum *row;          // [sites * step_limit]
   sonde_robot_visit *visits; // [sites]
 } robot;
@@ -62,41 +60,6 @@ static double quantised(double value, double quantum) {
   return quantum > 0 ? quantum * round(value / quantum) : value;
 }
 
-static void read_sensors(const sonde_robot_def *def, uint32_t step, sonde_datum *datum) {
-  SONDE_ASSERT(step < MAX_STEPS);
-  uint64_t counter = 2u * ((uint64_t)datum->site * MAX_STEPS + step);
-  double depth =
-      datum->penetration_m + def->noise_penetration_m * sonde_random_normal(def->seed, counter);
-  double force = datum->force_n + def->noise_force_n * sonde_random_normal(def->seed, counter + 1);
-  datum->penetration_m = fmax(0.0, quantised(depth, def->quantum_penetration_m));
-  datum->force_n = quantised(force, def->quantum_force_n);
-}
-
-static bool repeats(const sonde_datum *rows, uint32_t count) {
-  for (uint32_t k = 0; k < count; ++k)
-    if (fabs(rows[k].penetration_m - rows[count].penetration_m) < SAME_DEPTH_M) return true;
-  return false;
-}
-
-// The probe's column: its name without folders, fit for a table.
-static void probe_label(const char *name, char label[24]) {
-  const char *slash = strrchr(name, '/');
-  snprintf(label, 24, "%.23s", slash ? slash + 1 : name);
-  for (char *c = label; *c; ++c)
-    if (*c == ',' || *c == '#' || *c == ' ') *c = '_';
-}
-
-static double press_once(robot *r, sonde_press *press, uint32_t index, sonde_bonded *bonded,
-                         double depth_m) {
-  const sonde_site *site = &r->sites->sites[index];
-  sonde_robot_visit *visit = &r->visits[index];
-  if (r->bonded) return sonde_bonded_force(bonded, depth_m);
-  double force_n = sonde_press_probe(press, site, &r->probe, depth_m - r->def->step_m, depth_m);
-  if (!isnan(force_n))
-    visit->area_m2 = fmax(visit->area_m2, sonde_state_contact(press->state)->area_m2);
-  return force_n;
-}
-
 static sonde_status press_steps(robot *r, sonde_press *press, uint32_t index, sonde_bonded *bonded,
                                 const atomic_bool *stop, sonde_error *error) {
   sonde_robot_visit *visit = &r->visits[index];
@@ -106,18 +69,34 @@ static sonde_status press_steps(robot *r, sonde_press *press, uint32_t index, so
   for (uint32_t step = 0; step < r->step_limit; ++step) {
     if (atomic_load(stop)) return sonde_fail(error, SONDE_CANCELLED, "cancelled");
     double depth_m = (step + 1) * r->def->step_m;
-    double force_n = press_once(r, press, index, bonded, depth_m);
+    double force_n = r->bonded ? sonde_bonded_force(bonded, depth_m)
+                               : sonde_press_probe(press, &r->sites->sites[index], &r->probe,
+                                                   depth_m - r->def->step_m, depth_m);
     if (isnan(force_n)) {
       visit->end = SONDE_ROBOT_NO_EQUILIBRIUM;
       return SONDE_OK;
     }
+    if (!r->bonded)
+      visit->area_m2 = fmax(visit->area_m2, sonde_state_contact(press->state)->area_m2);
+    // The sensors: noise that depends on seed, site and step only, then quantisation.
+    const sonde_robot_def *def = r->def;
+    uint64_t counter = 2u * ((uint64_t)visit->site * MAX_STEPS + step);
+    double read_m = depth_m + def->noise_penetration_m * sonde_random_normal(def->seed, counter);
+    double read_n = force_n + def->noise_force_n * sonde_random_normal(def->seed, counter + 1);
     sonde_datum *datum = &rows[visit->rows];
-    *datum = (sonde_datum){.site = visit->site, .penetration_m = depth_m, .force_n = force_n};
-    probe_label(r->probe.name, datum->probe);
-    read_sensors(r->def, step, datum);
+    *datum = (sonde_datum){
+        .site = visit->site,
+        .penetration_m = fmax(0.0, quantised(read_m, def->quantum_penetration_m)),
+        .force_n = quantised(read_n, def->quantum_force_n),
+    };
+    memcpy(datum->probe, r->label, sizeof datum->probe);
     visit->depth_m = depth_m;
     visit->force_n = force_n;
-    if (!repeats(rows, visit->rows)) ++visit->rows;
+    // A penetration that was recorded before is not recorded again.
+    bool repeated = false;
+    for (uint32_t k = 0; k < visit->rows && !repeated; ++k)
+      repeated = fabs(rows[k].penetration_m - datum->penetration_m) < SAME_DEPTH_M;
+    if (!repeated) ++visit->rows;
     if (fmax(force_n, datum->force_n) > r->def->limit_n) {
       visit->end = SONDE_ROBOT_FORCE_LIMIT;
       return SONDE_OK;
@@ -139,14 +118,14 @@ static sonde_status measure_site(void *user, uint32_t worker, uint32_t index,
   if (r->bonded && !status)
     status = sonde_bonded_create(r->model, site, r->probe.half_x_m, r->probe.half_y_m,
                                  r->def->relative_residual, r->def->max_iterations, &bonded, error);
-  sonde_press *press = r->bonded ? NULL : &r->crew[worker];
+  sonde_press *press = r->bonded ? NULL : &r->press[worker];
   if (!status) status = press_steps(r, press, index, &bonded, stop, error);
   sonde_bonded_clear(&bonded);
   return status;
 }
 
-// Drops the rows of sites under way that are too few; returns the number of rows that are kept.
-static uint32_t keep(robot *r, bool cancelled, sonde_measurements *m) {
+// The rows in the order of the sites; those of sites under way that are too few are dropped.
+static sonde_status gather(robot *r, bool cancelled, sonde_measurements *m, sonde_error *error) {
   uint32_t rows = 0, whole = 0, parts = 0;
   for (uint32_t i = 0; i < r->sites->count; ++i) {
     sonde_robot_visit *visit = &r->visits[i];
@@ -157,19 +136,12 @@ static uint32_t keep(robot *r, bool cancelled, sonde_measurements *m) {
     whole += !under_way;
     parts += under_way && visit->rows;
   }
+  sonde_status status = sonde_measurements_create(m, rows, error);
+  if (status) return status;
   if (cancelled)
     snprintf(m->remark, sizeof m->remark,
              "partial: cancelled after %u of %u sites; the last steps of %u sites are missing",
              whole, r->sites->count, parts);
-  return rows;
-}
-
-static sonde_status gather(robot *r, bool cancelled, sonde_measurements *m, sonde_error *error) {
-  sonde_measurements kept = {0};
-  uint32_t rows = keep(r, cancelled, &kept);
-  sonde_status status = sonde_measurements_create(m, rows, error);
-  if (status) return status;
-  memcpy(m->remark, kept.remark, sizeof m->remark);
   for (uint32_t i = 0; i < r->sites->count; ++i) {
     for (uint32_t k = 0; k < r->visits[i].rows; ++k, ++m->count) {
       m->data[m->count] = r->row[(size_t)i * r->step_limit + k];
@@ -193,25 +165,12 @@ static sonde_status choose_probe(robot *r, sonde_error *error) {
     return sonde_fail(error, SONDE_ARGUMENT, "probe '%s': expected a name of at most 23 characters",
                       r->def->probe);
   r->bonded = r->probe.rectangular && contact != SONDE_ROBOT_PROBE;
+  // The name without folders, fit for a table.
+  const char *slash = strrchr(r->probe.name, '/');
+  snprintf(r->label, sizeof r->label, "%.23s", slash ? slash + 1 : r->probe.name);
+  for (char *c = r->label; *c; ++c)
+    if (*c == ',' || *c == '#' || *c == ' ') *c = '_';
   return SONDE_OK;
-}
-
-static sonde_status allocate_rows(robot *r, sonde_error *error) {
-  uint32_t sites = r->sites->count;
-  r->step_limit = (uint32_t)floor(r->def->depth_limit_m / r->def->step_m * (1 + 1e-12));
-  SONDE_ASSERT(r->step_limit >= 1);
-  r->row = SONDE_NEW(sonde_datum, (size_t)sites * r->step_limit);
-  r->visits = SONDE_NEW(sonde_robot_visit, sites);
-  if (!r->row || !r->visits) return sonde_fail_memory(error);
-  for (uint32_t i = 0; i < sites; ++i) r->visits[i].site = r->sites->sites[i].id;
-  return SONDE_OK;
-}
-
-static void clear_robot(robot *r, uint32_t workers) {
-  sonde_press_crew_destroy(r->crew, workers);
-  sonde_probe_clear(&r->probe);
-  sonde_free(r->row);
-  sonde_free(r->visits);
 }
 
 void sonde_robot_log_clear(sonde_robot_log *log) {
@@ -232,10 +191,17 @@ sonde_status sonde_robot_run(const sonde_model *model, const sonde_site_table *s
   robot r = {.model = model, .sites = sites, .def = def};
   uint32_t workers = sonde_parallel_workers(def->threads, sites->count);
   status = choose_probe(&r, error);
-  if (!status) status = allocate_rows(&r, error);
+  if (!status) {
+    r.step_limit = (uint32_t)floor(def->depth_limit_m / def->step_m * (1 + 1e-12));
+    SONDE_ASSERT(r.step_limit >= 1);
+    r.row = SONDE_NEW(sonde_datum, (size_t)sites->count * r.step_limit);
+    r.visits = SONDE_NEW(sonde_robot_visit, sites->count);
+    if (!r.row || !r.visits) status = sonde_fail_memory(error);
+  }
+  for (uint32_t i = 0; i < sites->count && !status; ++i) r.visits[i].site = sites->sites[i].id;
   if (!status && !r.bonded)
     status = sonde_press_crew_create(model, def->relative_residual, def->max_iterations, workers,
-                                     &r.crew, error);
+                                     &r.press, error);
   if (!status)
     status =
         sonde_parallel_run(sites->count, workers, measure_site, &r, progress, "measuring", error);
@@ -248,6 +214,9 @@ sonde_status sonde_robot_run(const sonde_model *model, const sonde_site_table *s
       r.visits = NULL;
     }
   }
-  clear_robot(&r, workers);
+  sonde_press_crew_destroy(r.press, workers);
+  sonde_probe_clear(&r.probe);
+  sonde_free(r.row);
+  sonde_free(r.visits);
   return status;
 }

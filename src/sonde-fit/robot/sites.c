@@ -1,9 +1,5 @@
-// smooth_normal:  mean outward normal of the skin around a point.
-// fat_below:      fat thickness of the model below a point.
-// put_site:       one site where the chart's grid coordinates say.
-// place_in_bounds: rows and columns over the whole chart.
-// count_inside / find_lattice: the square lattice with the wanted number of points in the region.
-// place_painted:  its points as sites.
+// Sites on the skin: rows and columns over a chart, or a square lattice with the wanted number of
+// points in a painted region.
 #include "robot/sites_inside.h"
 
 enum { MOST_SITES = 10000, OFFSETS = 6, PITCHES = 150 };
@@ -35,24 +31,6 @@ static sonde_vec3 smooth_normal(const sonde_model *model, const sonde_surface_po
   return v_unit(sum, own);
 }
 
-static double fat_below(const sonde_model *model, const sonde_surface_point *at) {
-  const uint32_t *v = model->surface.faces[at->face];
-  double fat_m = 0;
-  for (int k = 0; k < 3; ++k)
-    fat_m += at->weight[k] * (model->muscle_depth_m[v[k]] - model->fat_depth_m[v[k]]);
-  return fat_m;
-}
-
-// A model without measured layers has one thickness everywhere (except close to the bone).
-static void forget_uniform_fat(sonde_site_table *table) {
-  double low = INFINITY, high = -INFINITY;
-  for (uint32_t i = 0; i < table->count; ++i) {
-    low = fmin(low, table->fat_depth_m[i]);
-    high = fmax(high, table->fat_depth_m[i]);
-  }
-  for (uint32_t i = 0; i < table->count && !(high - low > 1e-9); ++i) table->fat_depth_m[i] = NAN;
-}
-
 typedef struct sampler {
   const sonde_model *model;
   const sonde_sites_def *def;
@@ -71,7 +49,12 @@ static sonde_status put_site(sampler *s, double row, double column, sonde_error 
   sonde_vec3 u = v_unit(v_cross(axis, n), vec3(1, 0, 0));
   table->sites[table->count] = (sonde_site){
       .id = table->count, .position_m = at.point_m, .normal = n, .u = u, .v = v_cross(n, u)};
-  table->fat_depth_m[table->count++] = fat_below(s->model, &at);
+  // Fat of the model below it.
+  const uint32_t *v = s->model->surface.faces[at.face];
+  double fat_m = 0;
+  for (int k = 0; k < 3; ++k)
+    fat_m += at.weight[k] * (s->model->muscle_depth_m[v[k]] - s->model->fat_depth_m[v[k]]);
+  table->fat_depth_m[table->count++] = fat_m;
   return SONDE_OK;
 }
 
@@ -107,27 +90,6 @@ typedef struct extent {
   double area_m2, s_m, t_m; // of the region; its centre
   double low_m, high_m;     // range of s
 } extent;
-
-static extent mark_inside(sampler *s) {
-  const sonde_chart *c = &s->chart;
-  extent e = {.low_m = INFINITY, .high_m = -INFINITY};
-  for (uint32_t j = 0; j < c->rows; ++j)
-    for (uint32_t i = 0; i < c->columns; ++i) {
-      size_t at = (size_t)j * c->columns + i;
-      double around_m = c->around_m[at];
-      s->inside[at] = sonde_region_holds(&s->region, c, c->point_m[at]);
-      e.low_m = fmin(e.low_m, around_m);
-      e.high_m = fmax(e.high_m, around_m);
-      if (!s->inside[at] || i + 1 == c->columns || j + 1 == c->rows) continue;
-      double cell = (c->around_m[at + 1] - around_m) * (c->along_m[j + 1] - c->along_m[j]);
-      e.area_m2 += cell;
-      e.s_m += cell * around_m;
-      e.t_m += cell * c->along_m[j];
-    }
-  e.s_m /= fmax(e.area_m2, 1e-30);
-  e.t_m /= fmax(e.area_m2, 1e-30);
-  return e;
-}
 
 // Calls put_site for the lattice points inside the region, or only counts them and sums how far
 // their middle is from the region's.
@@ -192,71 +154,81 @@ static sonde_status find_lattice(sampler *s, const extent *e, uint32_t wanted, l
                     wanted, s->def->painted, nearest_count);
 }
 
-static sonde_status check_region(const sampler *s, double area_m2, sonde_error *error) {
+static sonde_status place_painted(sampler *s, sonde_error *error) {
+  s->inside = SONDE_NEW(bool, (size_t)s->chart.rows * s->chart.columns);
+  if (!s->inside) return sonde_fail_memory(error);
+  // The region's grid points, area and centre in the chart.
+  const sonde_chart *c = &s->chart;
+  extent e = {.low_m = INFINITY, .high_m = -INFINITY};
+  for (uint32_t j = 0; j < c->rows; ++j)
+    for (uint32_t i = 0; i < c->columns; ++i) {
+      size_t at = (size_t)j * c->columns + i;
+      double around_m = c->around_m[at];
+      s->inside[at] = sonde_region_holds(&s->region, c, c->point_m[at]);
+      e.low_m = fmin(e.low_m, around_m);
+      e.high_m = fmax(e.high_m, around_m);
+      if (!s->inside[at] || i + 1 == c->columns || j + 1 == c->rows) continue;
+      double cell = (c->around_m[at + 1] - around_m) * (c->along_m[j + 1] - c->along_m[j]);
+      e.area_m2 += cell;
+      e.s_m += cell * around_m;
+      e.t_m += cell * c->along_m[j];
+    }
+  e.s_m /= fmax(e.area_m2, 1e-30);
+  e.t_m /= fmax(e.area_m2, 1e-30);
   for (uint32_t k = 0; k < s->region.count; ++k) {
-    double away_m = sonde_surface_closest(s->chart.index, s->region.point_m[k]).distance_m;
+    double away_m = sonde_surface_closest(c->index, s->region.point_m[k]).distance_m;
     if (!(away_m <= SKIN_TOLERANCE_M))
       return sonde_fail(error, SONDE_MISMATCH,
                         "%s: point %u lies %.1f mm from the skin, expected at most %.1f mm",
                         s->def->painted, k, away_m * 1e3, SKIN_TOLERANCE_M * 1e3);
   }
-  if (area_m2 > 0) return SONDE_OK;
-  return sonde_fail(error, SONDE_MISMATCH, "%s holds no skin, expected a region of it",
-                    s->def->painted);
-}
-
-static sonde_status place_painted(sampler *s, sonde_error *error) {
-  s->inside = SONDE_NEW(bool, (size_t)s->chart.rows * s->chart.columns);
-  if (!s->inside) return sonde_fail_memory(error);
-  extent e = mark_inside(s);
+  if (!(e.area_m2 > 0))
+    return sonde_fail(error, SONDE_MISMATCH, "%s holds no skin, expected a region of it",
+                      s->def->painted);
+  // Its lattice.
   uint32_t wanted = s->def->columns * s->def->rows, count;
   lattice found = {0};
   double eccentricity_m;
-  sonde_status status = check_region(s, e.area_m2, error);
-  if (!status) status = find_lattice(s, &e, wanted, &found, error);
+  sonde_status status = find_lattice(s, &e, wanted, &found, error);
   if (!status) status = walk_lattice(s, &e, found, true, &count, &eccentricity_m, error);
   return status;
 }
 
 // ---- table --------------------------------------------------------------------------------
 
-static sonde_status check_def(const sonde_sites_def *def, sonde_error *error) {
+sonde_status sonde_sites_place(const sonde_model *model, const sonde_sites_def *def,
+                               sonde_site_table *table, sonde_error *error) {
+  *table = (sonde_site_table){0};
   if (def->columns < 1 || def->rows < 1 || (uint64_t)def->columns * def->rows > MOST_SITES)
     return sonde_fail(error, SONDE_ARGUMENT, "%u x %u sites, expected 1 to %d", def->columns,
                       def->rows, MOST_SITES);
   if (!(def->smoothing_m >= 0 && def->smoothing_m <= 0.1))
     return sonde_fail(error, SONDE_ARGUMENT, "smoothing_m is %g, expected 0 to 0.1",
                       def->smoothing_m);
-  return SONDE_OK;
-}
-
-static sonde_status choose_bounds(sampler *s, sonde_chart_bounds *bounds, sonde_error *error) {
-  const sonde_sites_def *def = s->def;
-  *bounds =
-      (sonde_chart_bounds){def->angle_low_rad, def->angle_high_rad, def->z_low_m, def->z_high_m};
-  if (!def->painted) return SONDE_OK;
-  sonde_vec3 origin_m;
-  sonde_status status = sonde_region_load(def->painted, &s->region, error);
-  if (!status) status = sonde_chart_origin(s->model, &origin_m, error);
-  if (!status) *bounds = sonde_region_bounds(&s->region, origin_m);
-  return status;
-}
-
-sonde_status sonde_sites_place(const sonde_model *model, const sonde_sites_def *def,
-                               sonde_site_table *table, sonde_error *error) {
-  *table = (sonde_site_table){0};
-  sonde_chart_bounds bounds;
+  sonde_chart_bounds bounds = {def->angle_low_rad, def->angle_high_rad, def->z_low_m,
+                               def->z_high_m};
   sampler s = {.model = model, .def = def, .table = table};
-  sonde_status status = check_def(def, error);
-  if (status) return status;
+  sonde_status status = SONDE_OK;
   table->sites = SONDE_NEW(sonde_site, (size_t)def->columns * def->rows);
   table->fat_depth_m = SONDE_NEW(double, (size_t)def->columns * def->rows);
   if (!table->sites || !table->fat_depth_m) status = sonde_fail_memory(error);
-  if (!status) status = choose_bounds(&s, &bounds, error);
+  if (!status && def->painted) {
+    sonde_vec3 origin_m;
+    status = sonde_region_load(def->painted, &s.region, error);
+    if (!status) status = sonde_chart_origin(model, &origin_m, error);
+    if (!status) bounds = sonde_region_bounds(&s.region, origin_m);
+  }
   if (!status) status = sonde_chart_create(model, &bounds, &s.chart, error);
   if (!status) status = def->painted ? place_painted(&s, error) : place_in_bounds(&s, error);
   SONDE_ASSERT(status || table->count == def->columns * def->rows);
-  forget_uniform_fat(table);
+  // A model without measured layers has one thickness everywhere (except close to the bone).
+  double least_m = INFINITY, most_m = -INFINITY;
+  for (uint32_t i = 0; i < table->count; ++i) {
+    least_m = fmin(least_m, table->fat_depth_m[i]);
+    most_m = fmax(most_m, table->fat_depth_m[i]);
+  }
+  for (uint32_t i = 0; i < table->count && !(most_m - least_m > 1e-9); ++i)
+    table->fat_depth_m[i] = NAN;
   sonde_region_clear(&s.region);
   sonde_chart_clear(&s.chart);
   sonde_free(s.inside);

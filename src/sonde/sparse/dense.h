@@ -69,7 +69,7 @@ SONDE_LINK void sonde_cholesky_forward_many(const double *factor, uint32_t n, do
 SONDE_LINK void sonde_cholesky_solve_many(const double *factor, uint32_t n, double *x,
                                           uint32_t columns);
 // inverse [n * n] of L L^T, symmetric but for rounding.
-void sonde_cholesky_invert(const double *factor, uint32_t n, double *inverse);
+SONDE_LINK void sonde_cholesky_invert(const double *factor, uint32_t n, double *inverse);
 // Adds weight[k] row row^T of rows [count][n] to the lower triangle of a.
 SONDE_LINK void sonde_add_outers(double *a, uint32_t n, const double *rows, uint32_t count,
                                  const double *weight);

@@ -1,8 +1,8 @@
-// The arrow-structured Levenberg-Marquardt against a dense oracle, and its losses.
+// The bordered Levenberg-Marquardt against a dense oracle, and its losses.
 #include "fit_test.h"
 
 #include "base/random.h"
-#include "fit/arrow.h"
+#include "fit/bordered.h"
 
 enum { BLOCKS = 5, ROWS = 8, SIZE = 2 * BLOCKS + 2 };
 
@@ -49,18 +49,18 @@ static void family_row(const void *user, uint32_t block, uint32_t row, const dou
 
 static const uint32_t STARTS[BLOCKS + 1] = {0, 8, 16, 24, 32, 40};
 
-static sonde_arrow_problem family_problem(const family *f) {
-  return (sonde_arrow_problem){.block_count = BLOCKS,
-                               .border_count = 2,
-                               .row_start = STARTS,
-                               .row = family_row,
-                               .user = f,
-                               .low = {-20, -20},
-                               .high = {20, 20},
-                               .border_low = {-20, -20},
-                               .border_high = {20, 20},
-                               .loss_scale = 1,
-                               .max_iterations = 500};
+static sonde_bordered_problem family_problem(const family *f) {
+  return (sonde_bordered_problem){.block_count = BLOCKS,
+                                  .border_count = 2,
+                                  .row_start = STARTS,
+                                  .row = family_row,
+                                  .user = f,
+                                  .low = {-20, -20},
+                                  .high = {20, 20},
+                                  .border_low = {-20, -20},
+                                  .border_high = {20, 20},
+                                  .loss_scale = 1,
+                                  .max_iterations = 500};
 }
 
 static void fill_family(family *f, double (*theta)[2], double *border, double noise) {
@@ -108,13 +108,13 @@ static void step_equals_dense_step(void **state) {
   family f;
   double theta[BLOCKS][2], border[2], dense[SIZE], step[BLOCKS][2], border_step[2];
   fill_family(&f, theta, border, 0.1);
-  sonde_arrow_problem problem = family_problem(&f);
-  sonde_arrow_block blocks[BLOCKS];
-  sonde_arrow_border normal;
+  sonde_bordered_problem problem = family_problem(&f);
+  sonde_bordered_block blocks[BLOCKS];
+  sonde_bordered_border normal;
   for (double damping = 1; damping > 1e-5; damping *= 0.1) {
     theta[1][0] += 0.1;
-    sonde_arrow_assemble(&problem, (const double(*)[2])theta, border, blocks, &normal);
-    assert_true(sonde_arrow_solve(blocks, BLOCKS, &normal, 2, damping, step, border_step));
+    sonde_bordered_assemble(&problem, (const double(*)[2])theta, border, blocks, &normal);
+    assert_true(sonde_bordered_solve(blocks, BLOCKS, &normal, 2, damping, step, border_step));
     dense_step(&f, (const double(*)[2])theta, border, damping, dense);
     double scale = 0;
     for (int i = 0; i < SIZE; ++i) scale = fmax(scale, fabs(dense[i]));
@@ -130,14 +130,14 @@ static void optimum_equals_dense_optimum(void **state) {
   family f;
   double truth[BLOCKS][2], true_border[2], theta[BLOCKS][2] = {{0}}, border[2] = {0}, step[SIZE];
   fill_family(&f, truth, true_border, 0.05);
-  sonde_arrow_problem problem = family_problem(&f);
-  sonde_arrow_result result;
-  assert_ok(sonde_arrow_minimise(&problem, theta, border, &result, NULL), NULL);
+  sonde_bordered_problem problem = family_problem(&f);
+  sonde_bordered_result result;
+  assert_ok(sonde_bordered_minimise(&problem, theta, border, &result, NULL), NULL);
   assert_true(result.converged);
   dense_step(&f, (const double(*)[2])theta, border, 0, step);
   for (int i = 0; i < SIZE; ++i) assert_near(step[i], 0, 1e-6);
   fill_family(&f, truth, true_border, 0);
-  assert_ok(sonde_arrow_minimise(&problem, theta, border, &result, NULL), NULL);
+  assert_ok(sonde_bordered_minimise(&problem, theta, border, &result, NULL), NULL);
   for (int b = 0; b < BLOCKS; ++b)
     for (int i = 0; i < 2; ++i) assert_near(theta[b][i], truth[b][i], 1e-6);
   assert_near(border[0], true_border[0], 1e-6);
@@ -149,9 +149,9 @@ static void border_variance_equals_dense_inverse(void **state) {
   family f;
   double theta[BLOCKS][2], border[2];
   fill_family(&f, theta, border, 0.05);
-  sonde_arrow_problem problem = family_problem(&f);
-  sonde_arrow_result result;
-  assert_ok(sonde_arrow_minimise(&problem, theta, border, &result, NULL), NULL);
+  sonde_bordered_problem problem = family_problem(&f);
+  sonde_bordered_result result;
+  assert_ok(sonde_bordered_minimise(&problem, theta, border, &result, NULL), NULL);
   for (int column = 0; column < 2; ++column) {
     // inverse(c,c) = d x_c / d rhs_c: perturb the right-hand side through the dense solver.
     double a[SIZE][SIZE] = {{0}}, x[SIZE] = {0};
@@ -174,11 +174,11 @@ static void bounds_hold(void **state) {
   family f;
   double theta[BLOCKS][2], border[2];
   fill_family(&f, theta, border, 0);
-  sonde_arrow_problem problem = family_problem(&f);
+  sonde_bordered_problem problem = family_problem(&f);
   problem.high[0] = 0.15; // the truth of blocks 2..4 lies above
   for (int b = 0; b < BLOCKS; ++b) theta[b][0] = theta[b][1] = 0;
-  sonde_arrow_result result;
-  assert_ok(sonde_arrow_minimise(&problem, theta, border, &result, NULL), NULL);
+  sonde_bordered_result result;
+  assert_ok(sonde_bordered_minimise(&problem, theta, border, &result, NULL), NULL);
   assert_true(result.converged);
   assert_near(theta[4][0], 0.15, 0);
   assert_true(theta[0][0] < 0.15);
@@ -213,11 +213,11 @@ static void progress_cancels(void **state) {
   double theta[BLOCKS][2] = {{0}}, border[2] = {0}, truth[BLOCKS][2];
   fill_family(&f, truth, border, 0);
   border[0] = 2;
-  sonde_arrow_problem problem = family_problem(&f);
+  sonde_bordered_problem problem = family_problem(&f);
   const sonde_progress progress = {stop_at_once, NULL};
   problem.progress = &progress;
-  sonde_arrow_result result;
-  assert_ok(sonde_arrow_minimise(&problem, theta, border, &result, NULL), NULL);
+  sonde_bordered_result result;
+  assert_ok(sonde_bordered_minimise(&problem, theta, border, &result, NULL), NULL);
   assert_true(result.cancelled);
   assert_int_equal(result.iterations, 0);
 }
