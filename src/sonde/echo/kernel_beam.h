@@ -36,6 +36,7 @@ INLINE void fields(const float *p, floats out[4]) {
 #endif
 }
 
+// Gain of even columns between two rows of the march.
 INLINE floats gain_at(const merge_job *job, uint32_t l) {
   floats top = vload(job->top + l);
   return top + job->share * (vload(job->low + l) - top);
@@ -69,6 +70,7 @@ INLINE void spread_taps(const float *from, int count, taps *out) {
 }
 INLINE floats tap_of(const taps *t, int i) { return SPREAD ? t->spread[i] : vset(t->from[i]); }
 
+// Adds one tap of all kernels, times the sum of the two columns to its left and right.
 INLINE void add_taps(const taps *tap, int first, floats x, floats y, floats sum[LATERAL_SUMS]) {
   const floats part[LATERAL_PARTS] = {x + y, x, y};
   for (int k = 0; k < LATERAL_SUMS; ++k) sum[k] += tap_of(tap, first + k) * part[k % LATERAL_PARTS];
@@ -77,6 +79,7 @@ INLINE void add_taps(const taps *tap, int first, floats x, floats y, floats sum[
 // As many vectors of lines at once as there are registers for their sums.
 enum { ABREAST = FLOATS == 16 ? 2 : 1 };
 
+// Sums of all kernels for some vectors of lines.
 INLINE void lateral_some(const lateral_job *job, const taps *tap, uint32_t l, uint32_t vectors) {
   floats sum[ABREAST][LATERAL_SUMS];
   for (uint32_t v = 0; v < vectors; ++v) {
@@ -119,6 +122,7 @@ INLINE floats decibels(floats a) {
   return 6.0205999f * (exponent + log2m);
 }
 
+// Noise, compensation, modulus and logarithm of a vector of lines.
 INLINE void finish_axial(const axial_job *job, int sample, uint32_t l, const floats *sum) {
   const float *noise = job->noise[sample] + l;
   floats re = job->noise_size * vload(noise) + sum[0] + sum[2] + sum[4];

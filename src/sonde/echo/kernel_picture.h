@@ -14,6 +14,7 @@ INLINE floats angle_of(floats x, floats z) {
   return 2 * t * (0.9999999631898905f + u * (-0.33332396678715026f + u * p));
 }
 
+// Grey of pixels below a curved face.
 INLINE floats pixel_of(const convert_job *job, floats x) {
   floats from = vset(job->z + job->radius_m), v = angle_of(x, from) * job->radius_m;
   floats depth = vsqrt(x * x + from * from) - job->radius_m;
@@ -48,6 +49,7 @@ INLINE floats pixel_between(const convert_job *job, const float *mixed, bool clo
   return vonly(in, p + a * (q - p) + 0.5f);
 }
 
+// Grey of all lines at the depth of a row of pixels.
 INLINE void mix_samples(const convert_job *job, float *mixed) {
   float sample = job->z * job->samples_per_m;
   uint32_t n = (uint32_t)sample < job->samples - 2 ? (uint32_t)sample : job->samples - 2;

@@ -17,6 +17,7 @@ typedef struct splat_vector {
   float up[FLOATS], down[FLOATS];
 } splat_vector;
 
+// One scatterer to its two columns of three rows.
 INLINE void add_scatterer(float *grid, uint32_t stride, const splat_vector *p, int lane) {
   const int place = lane % 4 * (FLOATS / 4) + lane / 4; // see vtranspose()
   const uint32_t cell = p->cell[lane];                  // of the row above
@@ -110,6 +111,7 @@ INLINE floats in_lumina(const splat_job *job, const splat_map *map, floats x, fl
   return size;
 }
 
+// Scatterers of one map within the slab and, unless all of them are inside, within the grid.
 INLINE void splat_some(const splat_job *job, const splat_map *map, bool inside, slab_batch *f) {
   const float *px = job->x + map->from, *py = job->y + map->from, *pz = job->z + map->from;
   const float *sign = job->sign + map->from, right = job->right;
@@ -164,7 +166,7 @@ static void splat(const splat_job *job) {
   lay_rest(job, &f);
 }
 
-// Streamlines are apart from each other: the compiler makes vectors of this.
+// Blood on its streamlines, which are apart from each other: the compiler makes vectors of this.
 static void stream(const stream_job *job) {
   const float *restrict z = job->z, *restrict speed = job->speed;
   float *restrict place = job->at, *restrict sign = job->sign;

@@ -28,8 +28,8 @@ INLINE floats3 wall_vector(const float (*wall)[WALL_ROOM], int field, uint32_t g
 
 // 1 to 0 with level ends.
 INLINE floats fade_out(floats t) {
-  floats left = 1 - t;
-  return left * left * (1 + 2 * t);
+  floats rest = 1 - t;
+  return rest * rest * (1 + 2 * t);
 }
 
 // A point of a cross-section.
@@ -37,9 +37,11 @@ typedef struct floats2 {
   floats x, y;
 } floats2;
 
+// Where a point lies beside a vessel at rest, and the vessel's hold on it: 1 at the wall, 0 beyond
+// four radii, times the coupling.
 typedef struct reach {
-  floats2 at;             // from the vessel's centre
-  floats r, fade, weight; // weight: how firmly the wall leads, 0 beyond its reach
+  floats2 at; // from the vessel's centre: short and long axis, m
+  floats r, fade, weight;
 } reach;
 
 INLINE reach find_reach(const float (*wall)[WALL_ROOM], uint32_t group, floats3 rest) {
@@ -54,13 +56,16 @@ INLINE reach find_reach(const float (*wall)[WALL_ROOM], uint32_t group, floats3 
   return p;
 }
 
-INLINE floats2 turned(floats2 p, floats half) {
+// Rotates a point by an angle whose half has the tangent `half`.
+INLINE floats2 rotated(floats2 p, floats half) {
   floats whole = 2 / (1 + half * half), cosine = whole - 1, sine = half * whole;
   return (floats2){cosine * p.x - sine * p.y, sine * p.x + cosine * p.y};
 }
 
+// A point of the section where one vessel warps it: the wall goes to its ellipse, inside it the
+// point is scaled with the lumen, and outside the area between is kept, fading with the distance.
 INLINE floats2 warped_by(const float (*wall)[WALL_ROOM], uint32_t group, reach p) {
-  floats radius = wall_at(wall, WALL_RADIUS, group), turn = wall_at(wall, WALL_ROTATION, group);
+  floats radius = wall_at(wall, WALL_RADIUS, group), angle = wall_at(wall, WALL_ROTATION, group);
   floats tissue_long = wall_at(wall, WALL_TISSUE_LONG, group);
   floats half_short = wall_at(wall, WALL_SHORT, group) / wall_at(wall, WALL_TISSUE_SHORT, group);
   floats half_long = wall_at(wall, WALL_LONG, group) / tissue_long;
@@ -69,14 +74,15 @@ INLINE floats2 warped_by(const float (*wall)[WALL_ROOM], uint32_t group, reach p
   floats square = p.r * p.r - (radius * radius - half_short * half_long) * p.fade + c * c;
   floats mean = vsqrt(vmax(square, vset(0))), per = 1 / vmax(p.r, 1e-3f * radius);
   ints inside = p.r <= radius;
-  floats2 q = turned(p.at, turn * (1 - p.fade));
+  floats2 q = rotated(p.at, angle * (1 - p.fade));
   q = (floats2){vselect(inside, p.at.x * (half_short / radius), q.x * ((mean - c) * per)),
                 vselect(inside, p.at.y * (half_long / radius), q.y * ((mean + c) * per))};
   q.y -= p.fade * wall_at(wall, WALL_SHEAR, group) / tissue_long * q.x;
-  return turned(q, -turn);
+  return rotated(q, -angle);
 }
 
-// 1 on the wall, 0 on another, o beyond its reach, with o the product of 1 - w of the others.
+// Share of one wall beside others: 1 on the wall, 0 on another, o beyond its reach, with o the
+// product of 1 - w of the others.
 INLINE floats share_of(const floats *weight, uint32_t walls, uint32_t k) {
   floats others = vset(1);
   for (uint32_t j = 0; j < walls; ++j)
@@ -91,6 +97,7 @@ INLINE void store3(float (*to)[WALL_POINTS], uint32_t i, floats3 a) {
   vstore(to[0] + i, a.x), vstore(to[1] + i, a.y), vstore(to[2] + i, a.z);
 }
 
+// Rest points where the vessels beside them warp them.
 static void warp_tissue(const wall_job *job) {
   SONDE_ASSERT(job->groups <= WALL_GROUPS && job->walls <= MOST_VESSELS);
   for (uint32_t group = 0; group < job->groups; group += FLOATS / 4) {
@@ -112,7 +119,8 @@ static void warp_tissue(const wall_job *job) {
   }
 }
 
-// The motion along a vessel stays the field's.
+// Points of the image where the walls smooth them: what the field adds to the wall's ellipse beyond
+// its gradient ends there. The motion along a vessel stays the field's.
 static void smooth_tissue(const wall_job *job) {
   SONDE_ASSERT(job->groups <= WALL_GROUPS && job->walls <= MOST_VESSELS);
   for (uint32_t group = 0; group < job->groups; group += FLOATS / 4) {
@@ -129,7 +137,7 @@ static void smooth_tissue(const wall_job *job) {
       floats3 centre = wall_vector(wall, WALL_REST, group), d = minus3(warped, centre);
       floats3 off = minus3(minus3(place, centre), wall_vector(wall, WALL_SHIFT, group));
       floats2 q =
-          turned((floats2){dot(d, flat), dot(d, across)}, wall_at(wall, WALL_ROTATION, group));
+          rotated((floats2){dot(d, flat), dot(d, across)}, wall_at(wall, WALL_ROTATION, group));
       floats on_short = wall_at(wall, WALL_TISSUE_SHORT, group) * q.x - dot(off, flat);
       floats on_long = wall_at(wall, WALL_TISSUE_LONG, group) * q.y +
                        wall_at(wall, WALL_SHEAR, group) * q.x - dot(off, across);
