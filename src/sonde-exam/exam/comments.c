@@ -143,25 +143,6 @@ char *sonde_comment_json(const sonde_comment *comment, sonde_error *error) {
   return text;
 }
 
-static sonde_status write_all(const char *recording, const sonde_comments *comments,
-                              sonde_error *error) {
-  char *path = path_of(recording);
-  sonde_json_out out = {.layout = SONDE_JSON_TABS};
-  sonde_status status = path ? SONDE_OK : sonde_fail_memory(error);
-  if (!status) status = sonde_file_create(path, &out.file, error);
-  if (!status) {
-    sonde_json_begin_object(&out, NULL);
-    sonde_json_begin_list(&out, "comments");
-    for (uint32_t k = 0; k < comments->count; ++k) put_comment(&out, &comments->list[k]);
-    sonde_json_end(&out);
-    sonde_json_end(&out);
-    sonde_file_printf(out.file, "\n");
-    status = sonde_file_commit(out.file, error);
-  }
-  sonde_free(path);
-  return status;
-}
-
 sonde_status sonde_comments_add(const char *recording, const sonde_comment *comment,
                                 sonde_error *error) {
   SONDE_ASSERT(recording != NULL && comment != NULL);
@@ -177,7 +158,19 @@ sonde_status sonde_comments_add(const char *recording, const sonde_comment *comm
     status = sonde_notes_add(recording, SONDE_NOTE_COMMENT, text, &own);
     if (status == SONDE_VERSION) {
       insert(&comments, comment);
-      status = write_all(recording, &comments, &own);
+      char *path = path_of(recording);
+      sonde_json_out out = {.layout = SONDE_JSON_TABS};
+      status = path ? sonde_file_create(path, &out.file, &own) : sonde_fail_memory(&own);
+      if (!status) {
+        sonde_json_begin_object(&out, NULL);
+        sonde_json_begin_list(&out, "comments");
+        for (uint32_t k = 0; k < comments.count; ++k) put_comment(&out, &comments.list[k]);
+        sonde_json_end(&out);
+        sonde_json_end(&out);
+        sonde_file_printf(out.file, "\n");
+        status = sonde_file_commit(out.file, &own);
+      }
+      sonde_free(path);
     }
   }
   if (status && error) *error = own;

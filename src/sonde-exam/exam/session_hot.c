@@ -21,14 +21,6 @@ static void step_world(sonde_session *session) {
   sonde_subject_step(session->subject, probe, session->sample.world_from_probe);
 }
 
-// In lockstep every so many ticks; in real time when the last image is finished, but no sooner:
-// every surface that is offered becomes an image, so that a replay can make the same ones.
-static bool surface_is_due(sonde_session *session, uint64_t tick) {
-  if (!session->realtime) return tick % session->ticks_per_image == 0;
-  return tick - session->offered_tick >= session->ticks_per_image &&
-         !atomic_load_explicit(&session->surface_pending, memory_order_acquire);
-}
-
 // Tissue that nothing touches is soon at rest, and quick to go through.
 uint64_t sonde_session_keyframe_tick(const sonde_session *session, uint64_t tick) {
   uint64_t near = tick + 2 * (uint64_t)session->ticks_per_image - 1,
@@ -147,7 +139,15 @@ void sonde_session_step(sonde_session *session) {
   sonde_safety_apply(&session->safety, session->render.force_n, torque, session->dt_s);
   session->device.write(session->device.self, session->safety.force_n, session->safety.torque_n_m);
   atomic_store_explicit(&session->fault, (int)session->safety.fault, memory_order_relaxed);
-  if (surface_is_due(session, tick + 1)) {
+  // In lockstep an image every so many ticks; in real time when the last one is finished, but no
+  // sooner: every surface that is offered becomes an image, so that a replay can make the same
+  // ones.
+  const uint32_t period = session->ticks_per_image;
+  bool due = session->realtime
+                 ? tick + 1 - session->offered_tick >= period &&
+                       !atomic_load_explicit(&session->surface_pending, memory_order_acquire)
+                 : (tick + 1) % period == 0;
+  if (due) {
     sonde_record made = {.tag = SONDE_RECORD_IMAGE, .tick = tick + 1};
     made.image = (sonde_record_image){session->safety.force_n, session->safety.fault};
     push(session, &made);
