@@ -22,7 +22,6 @@ build_packages() {
   need_command cmake cmake
   need_command ninja ninja-build
   need_command pkg-config pkg-config
-  need_library libcjson libcjson-dev
   need_library libpng libpng-dev
   need_library sqlite3 libsqlite3-dev
   need_library yaml-0.1 libyaml-dev
@@ -32,6 +31,7 @@ build_packages() {
 }
 
 test_packages() {
+  need_library libcjson libcjson-dev # a second reader of JSON
   need_library cmocka libcmocka-dev
   need_library ccd libccd-dev
   need_command clang clang
