@@ -11,17 +11,15 @@
 
 // ---- messages
 
-// Whether the caller can mend it by giving other input.
-static bool is_bad_input(sonde_status status) {
-  return status != SONDE_MEMORY && status != SONDE_CONVERGENCE && status != SONDE_DEVICE &&
-         status != SONDE_CANCELLED && status != SONDE_DISK;
-}
-
 int app_fail(const char *verb, const sonde_error *error) {
   app_progress_end();
   const char *text = error->message[0] ? error->message : sonde_status_text(error->status);
   fprintf(stderr, "sonde %s: %s\n", verb, text);
-  return is_bad_input(error->status) ? APP_BAD_INPUT : APP_FAILED;
+  // Other input mends all but these.
+  bool failed = error->status == SONDE_MEMORY || error->status == SONDE_CONVERGENCE ||
+                error->status == SONDE_DEVICE || error->status == SONDE_CANCELLED ||
+                error->status == SONDE_DISK;
+  return failed ? APP_FAILED : APP_BAD_INPUT;
 }
 
 sonde_status app_error(sonde_error *error, sonde_status status, const char *format, ...) {
@@ -76,15 +74,6 @@ bool app_parse_integer(const char *verb, const char *option, const char *text, l
   }
   app_usage_error(verb, "%s expects a whole number from %ld to %ld, got '%s'", option, low, high,
                   text ? text : "nothing");
-  return false;
-}
-
-bool app_parse_size(const char *verb, const char *text, long *width, long *height) {
-  char end;
-  if (sscanf(text, "%ldx%ld%c", width, height, &end) == 2 && *width >= 16 && *height >= 16 &&
-      *width <= 4096 && *height <= 4096)
-    return true;
-  app_usage_error(verb, "--size expects WxH from 16x16 to 4096x4096, got '%s'", text);
   return false;
 }
 

@@ -23,8 +23,6 @@ bool app_parse_real(const char *verb, const char *option, const char *text, doub
                     double *value);
 bool app_parse_integer(const char *verb, const char *option, const char *text, long low, long high,
                        long *value);
-// "WxH" from 16x16 to 4096x4096, of --size.
-bool app_parse_size(const char *verb, const char *text, long *width, long *height);
 
 // Asks before long work whether an output file (NULL: none) can be written: APP_OK, or the exit
 // code after printing why not.

@@ -15,7 +15,8 @@ enum { STAGES = 6, DEPTHS = 6 };
 
 typedef struct options {
   const char *model, *scene;
-  long lines, samples, scatterers, frames, width, height;
+  long lines, samples, scatterers, frames;
+  double size[2];
   const char *kernels;
   double radius_m;
   bool json;
@@ -32,17 +33,8 @@ typedef struct bench {
   double scatterers;
 } bench;
 
-static const options DEFAULTS = {.lines = 192,
-                                 .samples = 1024,
-                                 .scatterers = 1000000,
-                                 .frames = 200,
-                                 .width = 512,
-                                 .height = 512};
-
-static bool read_size(void *to, const char *text) {
-  options *o = to;
-  return app_parse_size("bench", text, &o->width, &o->height);
-}
+static const options DEFAULTS = {
+    .lines = 192, .samples = 1024, .scatterers = 1000000, .frames = 200, .size = {512, 512}};
 
 static const app_option TABLE[] = {
     OPT_MODEL(model),
@@ -51,7 +43,7 @@ static const app_option TABLE[] = {
     OPT_INTEGER(samples, "samples", "N", 64, 4096, "per line"),
     OPT_INTEGER(scatterers, "scatterers", "N", 1000, 20000000,
                 "moved with the tissue per frame, about"),
-    OPT_CALL(read_size, "size", "WxH", "picture; default 512x512"),
+    OPT_WHOLES(size, "size", "WxH", 16, 4096, "picture"),
     OPT_INTEGER(frames, "frames", "N", 1, 100000, "frames"),
     OPT_TEXT(kernels, "kernels", "NAME",
              "avx512, avx2, sse4, base, plain; default the widest that runs here"),
@@ -84,7 +76,7 @@ static sonde_status prepare(bench *b, const options *o, sonde_error *error) {
   if (!status && settled_site(&b->scene, o->model, 27, &b->start, error))
     b->start = sonde_site_pose(&b->scene.model->sites[b->scene.model->site_count / 2], 0);
   if (!status)
-    status = sonde_image_create((uint32_t)o->width, (uint32_t)o->height, &b->image, error);
+    status = sonde_image_create((uint32_t)o->size[0], (uint32_t)o->size[1], &b->image, error);
   if (!status) status = make_echo(b, o, known_m3, error);
   if (status) return status;
   settled_at(&b->scene, b->start, 0.008, 1e-5);
@@ -122,8 +114,8 @@ static void print(bench *b, const options *o) {
   size_t n = (size_t)o->frames;
   double median = app_quantile(b->stage, n, 0.5), p99 = app_quantile(b->stage, n, 0.99);
   if (!o->json) {
-    printf("%ld lines of %ld samples, %.0f scatterers, %ldx%ld pixels, %s, one core\n", o->lines,
-           o->samples, b->scatterers, o->width, o->height, sonde_echo_kernels(b->echo));
+    printf("%ld lines of %ld samples, %.0f scatterers, %.0fx%.0f pixels, %s, one core\n", o->lines,
+           o->samples, b->scatterers, o->size[0], o->size[1], sonde_echo_kernels(b->echo));
     printf("  frame     median %8.3f ms   p99 %8.3f ms\n", median, p99);
     for (long i = 0; i < STAGES; ++i)
       printf("  %-9s median %8.3f ms\n", NAMES[i],

@@ -1,6 +1,4 @@
 // Small text on grey pictures: letters of 5 x 9 dots.
-// glyph_of:     rows of a character, 5 bits each.
-// caption_draw: a line of text.
 #include "replay_export.h"
 
 typedef struct glyph {
@@ -25,26 +23,16 @@ static const glyph GLYPHS[] = {
     {'s', {0, 0, 14, 16, 14, 1, 30, 0, 0}},    {'t', {8, 8, 28, 8, 8, 9, 6, 0, 0}},
     {'v', {0, 0, 17, 17, 17, 10, 4, 0, 0}},    {'y', {0, 0, 17, 17, 17, 17, 15, 1, 14}}};
 
-static const glyph *glyph_of(char character) {
-  for (size_t k = 0; k < sizeof GLYPHS / sizeof GLYPHS[0]; ++k)
-    if (GLYPHS[k].character == character) return &GLYPHS[k];
-  return NULL; // a space
-}
-
-static void dot(uint8_t *pixels, uint32_t width, uint32_t height, uint32_t x, uint32_t y,
-                uint32_t scale) {
-  const uint8_t bright = 220;
-  for (uint32_t j = y; j < y + scale && j < height; ++j)
-    for (uint32_t i = x; i < x + scale && i < width; ++i) pixels[(size_t)j * width + i] = bright;
-}
-
 void caption_draw(uint8_t *pixels, uint32_t width, uint32_t height, uint32_t x, uint32_t y,
                   uint32_t scale, const char *text) {
+  const uint8_t bright = 220;
   for (; *text; ++text, x += CAPTION_WIDTH * scale) {
-    const glyph *g = glyph_of(*text);
-    for (uint32_t j = 0; g && j < CAPTION_HEIGHT; ++j)
-      for (uint32_t i = 0; i < 5; ++i)
-        if (g->row[j] >> (4 - i) & 1)
-          dot(pixels, width, height, x + i * scale, y + j * scale, scale);
+    const glyph *g = GLYPHS, *end = GLYPHS + sizeof GLYPHS / sizeof GLYPHS[0];
+    while (g < end && g->character != *text) ++g; // none: a space
+    // Every dot is a square of `scale` pixels, as far as it lies in the picture.
+    for (uint32_t j = 0; g < end && j < CAPTION_HEIGHT * scale && y + j < height; ++j)
+      for (uint32_t i = 0; i < 5 * scale && x + i < width; ++i)
+        if (g->row[j / scale] >> (4 - i / scale) & 1)
+          pixels[(size_t)(y + j) * width + x + i] = bright;
   }
 }

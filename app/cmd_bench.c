@@ -273,21 +273,6 @@ static sonde_status measure(bench *b, double *error_ratio, sonde_error *error) {
   return status;
 }
 
-static sonde_status write_csv(const bench *b, sonde_error *error) {
-  sonde_file *file;
-  sonde_status status = sonde_file_create(b->o->csv, &file, error);
-  if (status) return status;
-  sonde_file_printf(file, "step,time_s,step_ms,contact_ms,assembly_ms,solve_ms,update_ms,"
-                          "iterations,awake_nodes\n");
-  for (uint32_t k = 0; k < b->steps; ++k) {
-    const sample *s = &b->samples[k];
-    sonde_file_printf(file, "%u,%.6f,%.6f,%.6f,%.6f,%.6f,%.6f,%u,%u\n", k, (k + 1) * b->o->dt_s,
-                      s->total_s * 1e3, s->contact_s * 1e3, s->assembly_s * 1e3, s->solve_s * 1e3,
-                      s->update_s * 1e3, s->iterations, s->awake);
-  }
-  return sonde_file_commit(file, error);
-}
-
 // Bytes per second when a block of that size is read over and over: what memory could give at best.
 static double bandwidth(double bytes) {
   size_t count = (size_t)(bytes / sizeof(uint64_t)) + 1;
@@ -383,7 +368,18 @@ static int run_bench(void *from) {
     if (!b.site) b.site = &model->sites[model->site_count / 2];
     status = measure(&b, &error_ratio, &error);
   }
-  if (!status && o->csv) status = write_csv(&b, &error);
+  sonde_file *file = NULL;
+  if (!status && o->csv) status = sonde_file_create(o->csv, &file, &error);
+  if (file) {
+    sonde_file_printf(file, "step,time_s,step_ms,contact_ms,assembly_ms,solve_ms,update_ms,"
+                            "iterations,awake_nodes\n");
+    for (const sample *r = b.samples; r < b.samples + b.steps; ++r)
+      sonde_file_printf(file, "%td,%.6f,%.6f,%.6f,%.6f,%.6f,%.6f,%u,%u\n", r - b.samples,
+                        (double)(r - b.samples + 1) * o->dt_s, r->total_s * 1e3, r->contact_s * 1e3,
+                        r->assembly_s * 1e3, r->solve_s * 1e3, r->update_s * 1e3, r->iterations,
+                        r->awake);
+    status = sonde_file_commit(file, &error);
+  }
   if (!status) (o->json ? print_json : print_table)(&b, error_ratio);
   free(b.samples);
   sonde_probe_clear(&b.probe);

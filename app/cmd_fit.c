@@ -196,20 +196,6 @@ static sonde_status load_layer(const char *named, const char *skin, const char *
   return sonde_mesh_load(named ? named : path, 1e-3, mesh, error);
 }
 
-static sonde_status load_inputs(const options *a, fit_inputs *in, sonde_error *error) {
-  sonde_status status = sonde_site_table_load(a->sites, &in->sites, error);
-  if (!status)
-    status = sonde_measurements_load(a->measurements, &in->sites, &in->measurements, error);
-  if (!status && a->also) status = sonde_measurements_load(a->also, &in->sites, &in->also, error);
-  if (!status) status = sonde_mesh_load(a->surface, 1e-3, &in->skin, error);
-  // Of another body only the bone that is named counts.
-  if (!status && (a->femur || a->body == BODY_LIMB))
-    status = load_layer(a->femur, a->surface, "femur.ply", &in->femur, error);
-  if (!status) status = load_layer(a->fat, a->surface, "fat_skin_interface.ply", &in->fat, error);
-  if (!status) status = load_layer(a->muscle, a->surface, "muscle_surface.ply", &in->muscle, error);
-  return status;
-}
-
 static const sonde_mesh *given(const sonde_mesh *mesh) { return mesh->vertex_count ? mesh : NULL; }
 
 static sonde_status build_model(const options *a, const fit_inputs *in, sonde_model **model,
@@ -587,7 +573,19 @@ static int run(void *from) {
   fit_outcome out = {0};
   fit_inputs inputs = {0};
   sonde_error error = {0};
-  sonde_status status = load_inputs(a, &inputs, &error);
+  sonde_status status = sonde_site_table_load(a->sites, &inputs.sites, &error);
+  if (!status)
+    status = sonde_measurements_load(a->measurements, &inputs.sites, &inputs.measurements, &error);
+  if (!status && a->also)
+    status = sonde_measurements_load(a->also, &inputs.sites, &inputs.also, &error);
+  if (!status) status = sonde_mesh_load(a->surface, 1e-3, &inputs.skin, &error);
+  // Of another body only the bone that is named counts.
+  if (!status && (a->femur || a->body == BODY_LIMB))
+    status = load_layer(a->femur, a->surface, "femur.ply", &inputs.femur, &error);
+  if (!status)
+    status = load_layer(a->fat, a->surface, "fat_skin_interface.ply", &inputs.fat, &error);
+  if (!status)
+    status = load_layer(a->muscle, a->surface, "muscle_surface.ply", &inputs.muscle, &error);
   if (!status) status = sonde_measurements_examine(&inputs.measurements, &out.doubts, &error);
   if (!status) status = decide(a, &out, 0, &error);
   if (!status) status = fit_model(a, &inputs, &out, &error);

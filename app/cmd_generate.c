@@ -97,37 +97,6 @@ static int check(void *from) {
   return APP_OK;
 }
 
-static sonde_status make(const options *a, work *w, sonde_error *error) {
-  // The shape: from what is drawn, or from a scanned leg.
-  sonde_status status = sonde_thigh_draw(&a->known, (uint64_t)a->seed, &w->thigh, error);
-  if (!status && !a->skin) {
-    status = sonde_thigh_shape_create(&w->thigh, &w->shape, error);
-  } else if (!status) {
-    status = sonde_mesh_load(a->skin, 1e-3, &w->skin, error);
-    if (!status) status = sonde_mesh_load(a->femur, 1e-3, &w->femur, error);
-    if (!status && a->muscle) status = sonde_mesh_load(a->muscle, 1e-3, &w->muscle, error);
-    sonde_leg_scan scan = {&w->skin, &w->femur, a->muscle ? &w->muscle : NULL, a->left == 1};
-    if (!status) status = sonde_thigh_shape_scan(&scan, &w->thigh, &w->shape, &w->leg, error);
-  }
-  if (status) return status;
-
-  // The model on it.
-  char provenance[200];
-  snprintf(provenance, sizeof provenance, "Synthetic: %s, seed %ld",
-           a->skin ? "scanned surfaces with generated vessels and mechanics"
-                   : "generated thigh, not measured on a person",
-           a->seed);
-  sonde_thigh_def def = sonde_thigh_def_default();
-  def.name = a->skin ? "scanned thigh" : "generated thigh";
-  def.provenance = provenance;
-  def.edge_m = a->edge_m;
-  def.fine_edge_m = a->fine_edge_m;
-  status = sonde_thigh_build(&w->thigh, w->shape, &def, &w->model, error);
-  if (!status) status = sonde_model_save(w->model, a->output, error);
-  if (!status && a->section) status = sonde_thigh_sections(w->model, a->section, error);
-  return status;
-}
-
 static void print(const options *a, work *w) {
   sonde_mesh_report mesh = {0};
   (void)sonde_mesh_inspect(&w->model->surface, &mesh, NULL);
@@ -176,7 +145,33 @@ static int run(void *from) {
   work w = {0};
   sonde_error error = {0};
   app_progress_begin("making the thigh");
-  sonde_status status = make(a, &w, &error);
+  // The shape: from what is drawn, or from a scanned leg.
+  sonde_status status = sonde_thigh_draw(&a->known, (uint64_t)a->seed, &w.thigh, &error);
+  if (!status && !a->skin) {
+    status = sonde_thigh_shape_create(&w.thigh, &w.shape, &error);
+  } else if (!status) {
+    status = sonde_mesh_load(a->skin, 1e-3, &w.skin, &error);
+    if (!status) status = sonde_mesh_load(a->femur, 1e-3, &w.femur, &error);
+    if (!status && a->muscle) status = sonde_mesh_load(a->muscle, 1e-3, &w.muscle, &error);
+    sonde_leg_scan scan = {&w.skin, &w.femur, a->muscle ? &w.muscle : NULL, a->left == 1};
+    if (!status) status = sonde_thigh_shape_scan(&scan, &w.thigh, &w.shape, &w.leg, &error);
+  }
+
+  // The model on it.
+  char provenance[200];
+  snprintf(provenance, sizeof provenance, "Synthetic: %s, seed %ld",
+           a->skin ? "scanned surfaces with generated vessels and mechanics"
+                   : "generated thigh, not measured on a person",
+           a->seed);
+  sonde_thigh_def def = sonde_thigh_def_default();
+  def.name = a->skin ? "scanned thigh" : "generated thigh";
+  def.provenance = provenance;
+  def.edge_m = a->edge_m;
+  def.fine_edge_m = a->fine_edge_m;
+  if (!status) status = sonde_thigh_build(&w.thigh, w.shape, &def, &w.model, &error);
+  if (!status) status = sonde_model_save(w.model, a->output, &error);
+  if (!status && a->section) status = sonde_thigh_sections(w.model, a->section, &error);
+
   app_progress_end();
   if (!status) print(a, &w);
   sonde_model_destroy(w.model);

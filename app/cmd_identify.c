@@ -79,7 +79,7 @@ static void replace(double *value, double asked) {
   if (!isnan(asked)) *value = asked;
 }
 
-static sonde_protocol make_protocol(const options *a) {
+static int simulate(const options *a, const sonde_model *model, const sonde_world_def *world) {
   assert(a->simulate >= 0 && a->site >= 0);
   sonde_protocol p = sonde_protocol_default((sonde_protocol_kind)a->simulate);
   p.site = (uint32_t)a->site;
@@ -95,16 +95,12 @@ static sonde_protocol make_protocol(const options *a) {
   p.seed = (uint64_t)a->seed;
   replace(&p.speed_m_s[0], a->speed_m_s);
   if (!isnan(a->speed_m_s)) p.speed_count = 1;
-  return p;
-}
 
-static int simulate(const options *a, const sonde_model *model, const sonde_world_def *world) {
-  sonde_protocol protocol = make_protocol(a);
   sonde_motion_record record;
   sonde_error error = {0};
   double start = app_seconds(CLOCK_MONOTONIC), most_n = 0, across_n = 0;
   sonde_progress progress = app_progress();
-  if (sonde_protocol_run(model, world, &protocol, &progress, &record, &error))
+  if (sonde_protocol_run(model, world, &p, &progress, &record, &error))
     return app_fail(VERB, &error);
   app_progress_end();
   for (uint32_t k = 0; k < record.count; ++k) {

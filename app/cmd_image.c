@@ -10,9 +10,10 @@
 
 typedef struct options {
   const char *model, *probe, *pathology, *out;
+  double numbers[7], size[2]; // of the pose as typed; pixels
   sonde_pose pose;
   bool posed, json;
-  long site, width, height, seed;
+  long site, seed;
   double force_n, press_m, turn_rad, aperture_m, radius_m; // NaN when not asked for
   sonde_echo_settings settings;
   image_findings findings;
@@ -21,8 +22,8 @@ typedef struct options {
 static void prepare(void *to) {
   *(options *)to = (options){.probe = "linear",
                              .pathology = "healthy",
-                             .width = 512,
-                             .height = 512,
+                             .size = {512, 512},
+                             .numbers = {NAN},
                              .force_n = NAN,
                              .press_m = NAN,
                              .aperture_m = NAN,
@@ -32,36 +33,6 @@ static void prepare(void *to) {
 
 // The farthest that a probe may be from the model's origin, as for the page's goals.
 static const double FAR_MM = 2000;
-
-static bool read_pose(void *to, const char *text) {
-  options *o = to;
-  double v[7];
-  char end;
-  int read = sscanf(text, "%lf,%lf,%lf,%lf,%lf,%lf,%lf%c", &v[0], &v[1], &v[2], &v[3], &v[4], &v[5],
-                    &v[6], &end);
-  double norm = 0;
-  for (int k = 3; k < 7; ++k) norm += read == 7 ? v[k] * v[k] : 0;
-  if (read != 7 || !(fabs(norm - 1) < 1e-2) || !isfinite(v[0] + v[1] + v[2])) {
-    app_usage_error("image",
-                    "--pose expects X,Y,Z in mm and a unit quaternion QW,QX,QY,QZ, got '%s'", text);
-    return false;
-  }
-  if (!(fabs(v[0]) <= FAR_MM && fabs(v[1]) <= FAR_MM && fabs(v[2]) <= FAR_MM)) {
-    app_usage_error("image", "--pose expects X, Y and Z from %g to %g mm, got '%s'", -FAR_MM,
-                    FAR_MM, text);
-    return false;
-  }
-  norm = sqrt(norm);
-  o->pose.position = (sonde_vec3){v[0] * 1e-3, v[1] * 1e-3, v[2] * 1e-3};
-  o->pose.rotation.w = v[3] / norm, o->pose.rotation.x = v[4] / norm;
-  o->pose.rotation.y = v[5] / norm, o->pose.rotation.z = v[6] / norm;
-  return o->posed = true;
-}
-
-static bool read_size(void *to, const char *text) {
-  options *o = to;
-  return app_parse_size("image", text, &o->width, &o->height);
-}
 
 static bool read_clot(void *to, const char *text) {
   return image_findings_clot(&((options *)to)->findings, text);
@@ -73,8 +44,8 @@ static bool read_lesion(void *to, const char *text) {
 
 static const app_option TABLE[] = {
     OPT_MODEL(model),
-    OPT_CALL(read_pose, "pose", "X,Y,Z,QW,QX,QY,QZ",
-             "world from probe: mm, each -2000 to 2000, and unit quaternion; z is the beam"),
+    OPT_NUMBERS(numbers, "pose", "X,Y,Z,QW,QX,QY,QZ", -INFINITY, INFINITY,
+                "world from probe: mm, each -2000 to 2000, and unit quaternion; z is the beam"),
     OPT_INTEGER(site, "site", "K", 0, 1000000, "above this site of the model instead"),
     OPT_REAL(turn_rad, "turn-deg", "A", -180, 180, 3.14159265358979323846 / 180,
              "about the beam; 90 looks along the leg"),
@@ -98,7 +69,7 @@ static const app_option TABLE[] = {
              "a node, cyst or haematoma (mm) in the image plane before the probe presses; up to 8"),
     OPT_REAL(findings.rest.webs, "webs", "W", 0, 1, 1, "bands in an old clot of the femoral vein"),
     OPT_REAL(findings.rest.oedema, "oedema", "W", 0, 1, 1, "fluid in the fat"),
-    OPT_CALL(read_size, "size", "WxH", "pixels, 16 to 4096; default 512x512"),
+    OPT_WHOLES(size, "size", "WxH", 16, 4096, "pixels"),
     OPT_INTEGER(seed, "seed", "N", 0, 1000000000, "of the tissue's scatterers"),
     OPT_OUTPUT(out, "o", "PNG", "the picture"),
     OPT_JSON(json),
@@ -135,7 +106,18 @@ static uint32_t list_settings(app_option *list, uint32_t room) {
 }
 
 static int check(void *from) {
-  const options *o = from;
+  options *o = from;
+  double *v = o->numbers;
+  double norm = sqrt(v[3] * v[3] + v[4] * v[4] + v[5] * v[5] + v[6] * v[6]);
+  o->posed = app_option_given("pose");
+  if (o->posed && !(fabs(norm * norm - 1) < 1e-2))
+    return app_usage_error("image", "--pose expects a unit quaternion QW,QX,QY,QZ, got one of %g",
+                           norm);
+  if (o->posed && !(fabs(v[0]) <= FAR_MM && fabs(v[1]) <= FAR_MM && fabs(v[2]) <= FAR_MM))
+    return app_usage_error("image", "--pose expects X, Y and Z from %g to %g mm, got %g,%g,%g",
+                           -FAR_MM, FAR_MM, v[0], v[1], v[2]);
+  o->pose.position = (sonde_vec3){v[0] * 1e-3, v[1] * 1e-3, v[2] * 1e-3};
+  o->pose.rotation = (sonde_quat){v[3] / norm, v[4] / norm, v[5] / norm, v[6] / norm};
   double arc_rad = o->aperture_m / o->radius_m; // NaN unless both are given
   if (arc_rad > acos(-1))
     return app_usage_error("image",
@@ -177,7 +159,8 @@ static sonde_status draw(const settled *s, const options *o, const sonde_patholo
       sonde_echo_check_view(aperture, isnan(o->radius_m) ? 0 : o->radius_m, error);
   if (!status) status = sonde_echo_create(s->interior, &def, &echo, error);
   if (!status) status = sonde_echo_set_radius(echo, isnan(o->radius_m) ? 0 : o->radius_m, error);
-  if (!status) status = sonde_image_create((uint32_t)o->width, (uint32_t)o->height, image, error);
+  if (!status)
+    status = sonde_image_create((uint32_t)o->size[0], (uint32_t)o->size[1], image, error);
   if (!status) {
     sonde_echo_render(echo, s->pose, aperture, pathology, &o->settings, image);
     uint32_t lost = sonde_echo_last_times(echo).lost;
@@ -209,7 +192,7 @@ static void print(const settled *s, const options *o, const sonde_image *image) 
   bool v = sonde_interior_vessel_at_plane(s->interior, 0, s->pose, &vein);
   bool a = sonde_interior_vessel_at_plane(s->interior, 1, s->pose, &artery);
   if (!o->json) {
-    printf("%s: %ld x %ld pixels, %.1f x %.1f mm, %.2f N\n", o->out, o->width, o->height,
+    printf("%s: %.0f x %.0f pixels, %.1f x %.1f mm, %.2f N\n", o->out, o->size[0], o->size[1],
            image->width_m * 1e3, image->height_m * 1e3, s->force_n);
     if (v)
       printf("vein   %.1f mm front to back, %.0f %% of its rest area\n", 2e3 * vein.half_short_m,
@@ -233,7 +216,7 @@ static void print(const settled *s, const options *o, const sonde_image *image) 
 
 static int run(void *from) {
   const options *o = from;
-  assert(o->out && o->width > 0 && o->height > 0);
+  assert(o->out && o->size[0] > 0 && o->size[1] > 0);
   settled s = {0};
   sonde_image image = {0};
   sonde_pathology pathology;

@@ -13,6 +13,7 @@ typedef struct options {
   const char *model, *sites, *save_sites, *probe, *output, *log;
   sonde_robot_def def;
   sonde_sites_def places;
+  double grid[2], bounds[4]; // degrees and mm
   bool json;
 } options;
 
@@ -21,46 +22,8 @@ static void prepare(void *to) {
   o->def = sonde_robot_def_default();
   o->def.seed = 1;
   o->places = sonde_sites_def_default();
-  o->places.columns = o->places.rows = 8;
-}
-
-// Reads numbers with one separator after each but the last; false when the text is anything else.
-static bool parse_list(const char *text, const char *separators, double *values) {
-  for (;; ++separators, ++values) {
-    const char *end;
-    *values = sonde_parse_real(text, &end);
-    if (end == text || !isfinite(*values)) return false;
-    if (!*separators) return !*end;
-    if (*end != *separators) return false;
-    text = end + 1;
-  }
-}
-
-static bool read_grid(void *to, const char *text) {
-  sonde_sites_def *places = &((options *)to)->places;
-  double grid[2];
-  if (!(parse_list(text, "x", grid) && grid[0] >= 1 && grid[0] <= 1000 && grid[1] >= 1 &&
-        grid[1] <= 1000 && floor(grid[0]) >= grid[0] && floor(grid[1]) >= grid[1])) {
-    app_usage_error(VERB, "--grid expects two whole numbers such as 8x8, got '%s'", text);
-    return false;
-  }
-  places->columns = (uint32_t)grid[0];
-  places->rows = (uint32_t)grid[1];
-  return true;
-}
-
-static bool read_bounds(void *to, const char *text) {
-  sonde_sites_def *places = &((options *)to)->places;
-  double bounds[4];
-  if (!parse_list(text, ":,:", bounds)) {
-    app_usage_error(VERB, "--bounds expects degrees and mm such as 0:100,83:217, got '%s'", text);
-    return false;
-  }
-  places->angle_low_rad = RAD_PER_DEGREE * bounds[0];
-  places->angle_high_rad = RAD_PER_DEGREE * bounds[1];
-  places->z_low_m = 1e-3 * bounds[2];
-  places->z_high_m = 1e-3 * bounds[3];
-  return true;
+  o->grid[0] = o->grid[1] = 8;
+  o->bounds[0] = NAN;
 }
 
 static const char *const CONTACTS[] = {"auto", "bonded", "probe", NULL};
@@ -68,15 +31,15 @@ static const char *const CONTACTS[] = {"auto", "bonded", "probe", NULL};
 static const app_option TABLE[] = {
     OPT_ARGUMENT(model, "MODEL", "the model file"),
     OPT_TEXT(sites, "sites", "CSV", "positions, normals and axes of the sites"),
-    OPT_CALL(read_bounds, "bounds", "A:B,C:D",
-             "regular sites from A to B degrees around the leg (its axis is parallel to z through "
-             "the skin's centroid; 0 is +x, 90 is +y) and from z = C to D mm"),
+    OPT_NUMBERS(
+        bounds, "bounds", "A:B,C:D", -INFINITY, INFINITY,
+        "regular sites from A to B degrees around the leg (its axis is parallel to z through "
+        "the skin's centroid; 0 is +x, 90 is +y) and from z = C to D mm"),
     OPT_TEXT(places.painted, "painted", "FILE",
              "regular sites, on a square lattice, in a region: a mesh of that patch of skin (.ply, "
              ".obj, .stl), or a .csv file x_mm,y_mm,z_mm with the corners of its outline in order"),
-    OPT_CALL(read_grid, "grid", "NxM",
-             "with --bounds: N sites around the leg, M along it; with --painted: N*M sites; "
-             "default 8x8"),
+    OPT_WHOLES(grid, "grid", "NxM", 1, 1000,
+               "with --bounds: N sites around the leg, M along it; with --painted: N*M sites"),
     OPT_OUTPUT(save_sites, "save-sites", "CSV",
                "write the sites; without --probe and -o nothing else is done"),
     OPT_TEXT(
@@ -111,7 +74,16 @@ static const app_option TABLE[] = {
 
 static int check(void *from) {
   options *o = from;
+  sonde_sites_def *places = &o->places;
   o->def.probe = o->probe;
+  places->columns = (uint32_t)o->grid[0];
+  places->rows = (uint32_t)o->grid[1];
+  if (app_option_given("bounds")) {
+    places->angle_low_rad = RAD_PER_DEGREE * o->bounds[0];
+    places->angle_high_rad = RAD_PER_DEGREE * o->bounds[1];
+    places->z_low_m = 1e-3 * o->bounds[2];
+    places->z_high_m = 1e-3 * o->bounds[3];
+  }
   if (app_option_given("grid") && o->sites)
     return app_usage_error(VERB, "--grid places sites and does not go with --sites");
   if (o->save_sites && !o->probe && !o->output) return APP_OK;

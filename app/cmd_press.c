@@ -135,35 +135,31 @@ static void print(const press *p, const options *o) {
   if (o->image) printf("image         %s\n", o->image);
 }
 
-static sonde_status prepare(press *p, const options *o, sonde_error *error) {
+static int run(void *from) {
+  const options *o = from;
+  assert(isnan(o->force_n) != isnan(o->depth_m));
+  press p = {.vein_depth_m = o->vein_depth_m};
+  sonde_pathology *vein = &p.pathology;
+  sonde_error error = {0};
   sonde_preset preset = sonde_preset_default();
-  sonde_status status = sonde_pathology_preset(o->pathology, &p->pathology, error);
-  if (!status && o->preset) status = sonde_preset_load(o->preset, &preset, error);
-  if (status) return status;
+  sonde_status status = sonde_pathology_preset(o->pathology, vein, &error);
+  if (!status && o->preset) status = sonde_preset_load(o->preset, &preset, &error);
 
-  // The vein as asked for: where it is, its pressure, its wall and its clot.
-  p->vein_depth_m = o->vein_depth_m;
-  if (!isnan(o->venous_pa)) p->pathology.venous_pressure_pa = o->venous_pa;
-  if (!isnan(o->wall_pa)) p->pathology.wall_shear_pa = o->wall_pa;
+  // The vein as asked for: its pressure, its wall and its clot, whose modulus is Young's and whose
+  // material is incompressible.
+  if (!isnan(o->venous_pa)) vein->venous_pressure_pa = o->venous_pa;
+  if (!isnan(o->wall_pa)) vein->wall_shear_pa = o->wall_pa;
   if (!isnan(o->thrombus_pa)) {
-    p->pathology.thrombus_fraction = 1;
-    p->pathology.thrombus_modulus_pa = 3 * o->thrombus_pa; // Young's, incompressible
+    vein->thrombus_fraction = 1;
+    vein->thrombus_modulus_pa = 3 * o->thrombus_pa;
   }
 
   // A model without a bone can be pressed, unless vessels or a picture are asked for.
   bool vessels = o->image || !isnan(o->vein_depth_m) || !isnan(o->venous_pa) ||
                  !isnan(o->wall_pa) || !isnan(o->thrombus_pa);
   app_progress_begin("pressing");
-  status = settled_open(&p->scene, o->model, o->probe, &preset, vessels, error);
-  return status ? status : settled_site(&p->scene, o->model, o->site, &p->start, error);
-}
-
-static int run(void *from) {
-  const options *o = from;
-  assert(isnan(o->force_n) != isnan(o->depth_m));
-  press p = {0};
-  sonde_error error = {0};
-  sonde_status status = prepare(&p, o, &error);
+  if (!status) status = settled_open(&p.scene, o->model, o->probe, &preset, vessels, &error);
+  if (!status) status = settled_site(&p.scene, o->model, o->site, &p.start, &error);
   if (!status) {
     status = !isnan(o->force_n) ? settled_force(&p.scene, p.start, o->force_n, &error)
                                 : settled_press(&p.scene, p.start, o->depth_m, INFINITY, &error);

@@ -83,19 +83,6 @@ static void print_result(const options *s, const sonde_replay_result *r, bool en
     printf("first difference at tick %llu\n", (unsigned long long)r->different_tick);
 }
 
-static void print_export(const options *s) {
-  const replay_export *w = &s->what;
-  if (s->json) {
-    app_json_begin();
-    app_json("rows:%u pictures:%u film_frames:%u", w->rows, w->pictures, w->film_frames);
-    app_json_end();
-    return;
-  }
-  if (w->csv || w->json) printf("%u rows written\n", w->rows);
-  if (w->frames) printf("%u pictures written to %s\n", w->pictures, w->frames);
-  if (w->video) printf("%u frames of film written to %s\n", w->film_frames, w->video);
-}
-
 static int run(void *from) {
   options *s = from;
   assert(s->recording);
@@ -126,10 +113,17 @@ static int run(void *from) {
   sonde_player_close(player);
   sonde_model_destroy(model);
   if (status) return app_fail("replay", &error);
-  if (exports(s)) {
-    print_export(s);
+  const replay_export *w = &s->what;
+  if (exports(s) && s->json) {
+    app_json_begin();
+    app_json("rows:%u pictures:%u film_frames:%u", w->rows, w->pictures, w->film_frames);
+    app_json_end();
     return APP_OK;
   }
+  if (w->csv || w->json) printf("%u rows written\n", w->rows);
+  if (w->frames) printf("%u pictures written to %s\n", w->pictures, w->frames);
+  if (w->video) printf("%u frames of film written to %s\n", w->film_frames, w->video);
+  if (exports(s)) return APP_OK;
   print_result(s, &result, info.ended);
   return result.same && (!s->images || result.same_images) ? APP_OK : APP_FAILED;
 }

@@ -15,8 +15,8 @@ typedef struct options {
   frames_options frames;
   press_options press;
   bool compare, json, volume;
-  double position_mm[3], quaternion[4], size_mm[2], frame; // frame NaN: a pose
-  long hold_out, stack;                                    // -1, 0: not asked for
+  double pose[7], size_mm[2], frame; // frame NaN: a pose
+  long hold_out, stack;              // -1, 0: not asked for
   double pixels[2];
   bool nearest; // of a volume
   sonde_slicer_options slicer;
@@ -27,7 +27,7 @@ static void prepare(void *to) {
   o->slicer = sonde_slicer_options_default();
   o->size_mm[0] = o->size_mm[1] = 40;
   o->pixels[0] = o->pixels[1] = 512;
-  o->frame = NAN;
+  o->frame = o->pose[0] = NAN;
   o->hold_out = -1;
   o->press = (press_options){.probe = "linear",
                              .pathology = "healthy",
@@ -53,53 +53,13 @@ typedef struct work {
   press_result pressed;
 } work;
 
-static bool read_pose(void *to, const char *text) {
-  options *o = to;
-  double v[7];
-  if (!frames_numbers(text, 7, ',', v)) {
-    app_usage_error(VERB, "--pose expects X,Y,Z,QW,QX,QY,QZ, got '%s'", text);
-    return false;
-  }
-  double norm = sqrt(v[3] * v[3] + v[4] * v[4] + v[5] * v[5] + v[6] * v[6]);
-  if (!(fabs(norm - 1) < 1e-2)) {
-    app_usage_error(VERB, "--pose: the quaternion has length %g, expected 1", norm);
-    return false;
-  }
-  for (int k = 0; k < 3; ++k) o->position_mm[k] = v[k];
-  for (int k = 0; k < 4; ++k) o->quaternion[k] = v[3 + k] / norm;
-  return true;
-}
-
-static bool read_pair(const char *option, const char *text, double low, double high,
-                      double value[2]) {
-  if (frames_numbers(text, 2, ',', value) && value[0] >= low && value[0] <= high &&
-      value[1] >= low && value[1] <= high)
-    return true;
-  app_usage_error(VERB, "%s expects W,H from %g to %g, got '%s'", option, low, high, text);
-  return false;
-}
-
-static bool read_size(void *to, const char *text) {
-  return read_pair("--size-mm", text, 0.1, 1000, ((options *)to)->size_mm);
-}
-
-static bool read_pixels(void *to, const char *text) {
-  return read_pair("--pixels", text, 2, 8192, ((options *)to)->pixels);
-}
-
-static bool read_vein(void *to, const char *text) {
-  if (frames_numbers(text, 2, ',', ((options *)to)->press.vein_mm)) return true;
-  app_usage_error(VERB, "--vein-at expects X,Z in mm, got '%s'", text);
-  return false;
-}
-
 static const app_option TABLE[] = {
     OPT_ARGUMENT(input, "SEQUENCE|VOLUME",
                  "names that end in .igs.mha, .igs.nrrd, .seq.mha and .seq.nrrd are sequences of "
                  "tracked frames, others volumes"),
-    OPT_CALL(read_pose, "pose", "P",
-             "X,Y,Z,QW,QX,QY,QZ: the probe's origin in mm and its rotation; the picture is its x-z "
-             "plane, see docs/frames.md"),
+    OPT_NUMBERS(pose, "pose", "X,Y,Z,QW,QX,QY,QZ", -INFINITY, INFINITY,
+                "the probe's origin in mm and its rotation; the picture is its x-z "
+                "plane, see docs/frames.md"),
     OPT_REAL(frame, "frame", "F", 0, 1e6, 1, "where frame F lies; 7.5 lies between frames 7 and 8"),
     OPT_INTEGER(hold_out, "hold-out", "N", 0, 1000000,
                 "where frame N lies, made without it, and how like the two are"),
@@ -115,15 +75,14 @@ static const app_option TABLE[] = {
              "of a sequence both, nearest or krige: frames on both sides of a pixel, the nearest "
              "one, or two on either side weighted by how alike the frames are; of a volume linear "
              "or nearest; default both, or linear"),
-    OPT_CALL(read_size, "size-mm", "W,H", "of the picture with --pose, 0.1 to 1000; default 40,40"),
-    OPT_CALL(read_pixels, "pixels", "W,H",
-             "of the picture with --pose, 2 to 8192; default 512,512"),
+    OPT_NUMBERS(size_mm, "size-mm", "W,H", 0.1, 1000, "of the picture with --pose"),
+    OPT_NUMBERS(pixels, "pixels", "W,H", 2, 8192, "of the picture with --pose"),
     OPT_FLAG(slicer.along_sweep, "along-sweep", "join frames pixel to pixel instead of across"),
     OPT_REAL(slicer.gap_m, "gap-mm", "D", 0.001, 1000, 1e-3, "frames further apart are not joined"),
     OPT_REAL(slicer.reach_m, "reach-mm", "D", 0, 1000, 1e-3,
              "how far a frame speaks alone at the end of a sweep, where there is none beyond"),
     FRAMES_OPTIONS(frames),
-    PRESS_OPTIONS(press, read_vein),
+    PRESS_OPTIONS(press),
     OPT_JSON(json)};
 
 static int check(void *from) {
@@ -131,6 +90,10 @@ static int check(void *from) {
   static const char *const METHODS[2][3] = {{"both", "nearest", "krige"}, {"linear", "nearest"}};
   options *o = from;
   bool posed = app_option_given("pose");
+  double *q = o->pose + 3, norm = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+  if (posed && !(fabs(norm - 1) < 1e-2))
+    return app_usage_error(VERB, "--pose: the quaternion has length %g, expected 1", norm);
+  for (int k = 0; posed && k < 4; ++k) q[k] /= norm;
 
   // A name with one of these ends is a sequence, any other a volume.
   size_t length = strlen(o->input);
@@ -145,6 +108,9 @@ static int check(void *from) {
                            o->input);
   if (o->stack && (posed || o->compare))
     return app_usage_error(VERB, "--stack belongs to --frame or --hold-out, without --compare");
+  bool sited = o->press.site >= 0, forced = !isnan(o->press.force_n);
+  if ((o->press.model || sited || forced) && !(o->press.model && sited && forced))
+    return app_usage_error(VERB, "--press MODEL, --site K and --force-n F belong together");
   if (o->press.model && (o->compare || o->stack))
     return app_usage_error(VERB, "--press does not go with --compare or --stack");
 
@@ -171,7 +137,7 @@ static sonde_status make_image(work *w, uint32_t width, uint32_t height, sonde_e
 
 // A picture of the size asked for, in the x-z plane of the pose.
 static sonde_status pose_image(const options *a, work *w, sonde_error *error) {
-  const double *p = a->position_mm, *q = a->quaternion;
+  const double *p = a->pose, *q = p + 3;
   sonde_pose pose = {{p[0] * 1e-3, p[1] * 1e-3, p[2] * 1e-3}, {q[0], q[1], q[2], q[3]}};
   sonde_status status = make_image(w, (uint32_t)a->pixels[0], (uint32_t)a->pixels[1], error);
   if (status) return status;
@@ -338,8 +304,9 @@ static int run(void *from) {
 const app_command cmd_slice = {
     .verb = "slice",
     .summary = "make a picture at any pose from tracked frames or a volume",
-    .usage = "SEQUENCE (--pose P | --frame F | --hold-out N) -o IMAGE.png [options]\n"
-             "VOLUME --pose P -o IMAGE.png [options]",
+    .usage =
+        "SEQUENCE (--pose X,Y,Z,QW,QX,QY,QZ | --frame F | --hold-out N) -o IMAGE.png [options]\n"
+        "VOLUME --pose X,Y,Z,QW,QX,QY,QZ -o IMAGE.png [options]",
     .text = "Writes the picture of a plane: of a sequence each pixel is interpolated between the "
             "nearest tracked frames on both sides of it, weighted by distance, without a volume in "
             "between; or of a volume.",
@@ -348,6 +315,7 @@ const app_command cmd_slice = {
     .prepare = prepare,
     .required = "SEQUENCE|VOLUME o",
     .one_of = "pose frame hold-out",
-    .needs = "compare>hold-out " PRESS_NEEDS,
+    .needs = "compare>hold-out probe>press case>press venous-mmhg>press arterial-mmhg>press "
+             "vein-at>press",
     .check = check,
     .run = run};

@@ -29,37 +29,6 @@ static sonde_status fail(sonde_error *error, sonde_status status, const char *wh
   return app_error(error, status, "%.200s: %.200s", path, what);
 }
 
-// Its own process group: Ctrl-C ends the pictures, and ffmpeg then finishes the film.
-static int start(film *f, uint32_t width, uint32_t height, int frames_per_s, int from) {
-  char size[32], rate[16];
-  snprintf(size, sizeof size, "%ux%u", width, height);
-  snprintf(rate, sizeof rate, "%d", frames_per_s);
-  const char *arguments[] = {
-      "ffmpeg",     "-hide_banner", "-loglevel",   "error",
-      "-nostdin",   "-y",           "-f",          "rawvideo",
-      "-pix_fmt",   "gray",         "-video_size", size,
-      "-framerate", rate,           "-i",          "pipe:0",
-      "-an",        "-pix_fmt",     "yuv420p",     "-movflags",
-      "+faststart", "-f",           "mp4",         sonde_file_temporary(f->file),
-      NULL};
-  posix_spawn_file_actions_t actions;
-  posix_spawnattr_t attributes;
-  sigset_t pipe_signal;
-  sigemptyset(&pipe_signal);
-  sigaddset(&pipe_signal, SIGPIPE);
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_adddup2(&actions, from, 0);
-  posix_spawnattr_init(&attributes);
-  posix_spawnattr_setsigdefault(&attributes, &pipe_signal);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP | POSIX_SPAWN_SETSIGDEF);
-  char *argv[sizeof arguments / sizeof arguments[0]];
-  memcpy(argv, arguments, sizeof argv);
-  int failure = posix_spawnp(&f->child, "ffmpeg", &actions, &attributes, argv, environ);
-  posix_spawn_file_actions_destroy(&actions);
-  posix_spawnattr_destroy(&attributes);
-  return failure;
-}
-
 sonde_status film_open(const char *path, uint32_t width, uint32_t height, int frames_per_s,
                        film **out, sonde_error *error) {
   int ends[2];
@@ -79,7 +48,35 @@ sonde_status film_open(const char *path, uint32_t width, uint32_t height, int fr
   }
   signal(SIGPIPE, SIG_IGN); // an ffmpeg that gives up is told by write()
   f->bytes = (size_t)width * height;
-  int failure = start(f, width, height, frames_per_s, ends[0]);
+
+  // ffmpeg, without a shell, in its own process group: Ctrl-C ends the pictures, and ffmpeg then
+  // finishes the film.
+  char size[32], rate[16];
+  snprintf(size, sizeof size, "%ux%u", width, height);
+  snprintf(rate, sizeof rate, "%d", frames_per_s);
+  const char *arguments[] = {
+      "ffmpeg",     "-hide_banner", "-loglevel",   "error",
+      "-nostdin",   "-y",           "-f",          "rawvideo",
+      "-pix_fmt",   "gray",         "-video_size", size,
+      "-framerate", rate,           "-i",          "pipe:0",
+      "-an",        "-pix_fmt",     "yuv420p",     "-movflags",
+      "+faststart", "-f",           "mp4",         sonde_file_temporary(f->file),
+      NULL};
+  posix_spawn_file_actions_t actions;
+  posix_spawnattr_t attributes;
+  sigset_t pipe_signal;
+  sigemptyset(&pipe_signal);
+  sigaddset(&pipe_signal, SIGPIPE);
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_adddup2(&actions, ends[0], 0);
+  posix_spawnattr_init(&attributes);
+  posix_spawnattr_setsigdefault(&attributes, &pipe_signal);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP | POSIX_SPAWN_SETSIGDEF);
+  char *argv[sizeof arguments / sizeof arguments[0]];
+  memcpy(argv, arguments, sizeof argv);
+  int failure = posix_spawnp(&f->child, "ffmpeg", &actions, &attributes, argv, environ);
+  posix_spawn_file_actions_destroy(&actions);
+  posix_spawnattr_destroy(&attributes);
   close(ends[0]);
   f->pipe = ends[1];
   if (!failure) {

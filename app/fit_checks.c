@@ -74,30 +74,28 @@ void fit_checks_print(const fit_checks *c) {
   }
 }
 
-static void print_json_layers(const fit_checks *c) {
-  static const char *const KEY[] = {"limit", "tension", "stiffening"};
-  app_json_object("layers");
-  for (int k = 0; k < SONDE_FIT_LAYERS; ++k) {
-    const sonde_fit_layer *l = &c->layer[k];
-    app_json_object(KEY[k]);
-    app_json_report("full", &l->seen);
-    app_json("parameters:%u converged:%hhd cost:%g tension_n_m:%g second:%g stiffening_c:%g",
-             l->parameters, l->converged, l->cost, l->tension_n_m, l->second, l->stiffening);
-    app_json_object("one_site_out");
-    app_json_report("full", &l->one_out);
-    app_json_close();
-    if (c->also) {
-      app_json_object("also");
-      app_json_report("full", &l->also);
+void fit_checks_print_json(const fit_checks *c) {
+  if (c->layers) {
+    static const char *const KEY[] = {"limit", "tension", "stiffening"};
+    app_json_object("layers");
+    for (int k = 0; k < SONDE_FIT_LAYERS; ++k) {
+      const sonde_fit_layer *l = &c->layer[k];
+      app_json_object(KEY[k]);
+      app_json_report("full", &l->seen);
+      app_json("parameters:%u converged:%hhd cost:%g tension_n_m:%g second:%g stiffening_c:%g",
+               l->parameters, l->converged, l->cost, l->tension_n_m, l->second, l->stiffening);
+      app_json_object("one_site_out");
+      app_json_report("full", &l->one_out);
+      app_json_close();
+      if (c->also) {
+        app_json_object("also");
+        app_json_report("full", &l->also);
+        app_json_close();
+      }
       app_json_close();
     }
     app_json_close();
   }
-  app_json_close();
-}
-
-void fit_checks_print_json(const fit_checks *c) {
-  if (c->layers) print_json_layers(c);
   if (c->shear.count) {
     const sonde_fit_profile *p = &c->shear;
     app_json_object("profile");

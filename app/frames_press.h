@@ -11,7 +11,7 @@ typedef struct press_options {
   double vein_mm[2];                      // where the vein is in the picture
 } press_options;
 
-#define PRESS_OPTIONS(m, read_vein)                                                                \
+#define PRESS_OPTIONS(m)                                                                           \
   OPT_TEXT(                                                                                        \
       m.model, "press", "MODEL",                                                                   \
       "deform the picture as that thigh is deformed when its site is pressed; the top of the "     \
@@ -24,18 +24,14 @@ typedef struct press_options {
                "with --press: pressure in the vein; default of the case"),                         \
       OPT_REAL(m.arterial_pa, "arterial-mmhg", "P", 1, 300, 133.322387415,                         \
                "with --press: pressure in the artery; default of the case"),                       \
-      OPT_CALL(read_vein, "vein-at", "X,Z",                                                        \
-               "with --press: where the vein is in the picture, mm from the middle of its top; "   \
-               "default where the model has it")
+      OPT_NUMBERS(                                                                                 \
+          m.vein_mm, "vein-at", "X,Z", -INFINITY, INFINITY,                                        \
+          "with --press: where the vein is in the picture, mm from the middle of its top; "        \
+          "default where the model has it")
 
 typedef struct press_result {
   double force_n, depth_m, vein_area_ratio, artery_area_ratio; // NaN: not under the probe
 } press_result;
-
-// The rules of these options, as app_command has them.
-#define PRESS_NEEDS                                                                                \
-  "press>site press>force-n site>press force-n>press probe>press case>press "                      \
-  "venous-mmhg>press arterial-mmhg>press vein-at>press"
 
 // Presses the model until the force is reached and deforms the picture as the thigh.
 sonde_status press_picture(const press_options *options, sonde_image *image, uint8_t *known,

@@ -2,6 +2,7 @@
 #include "options.h"
 
 #include <assert.h>
+#include <ctype.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -89,6 +90,35 @@ static void add_words(char *text, size_t room, const char *const *words) {
     add(text, room, "%s%s", k == 0 ? "" : words[k + 1] ? ", " : " or ", words[k]);
 }
 
+// Signs between numbers, as the value's name has them: all that are no capitals.
+static const char *separator(const char *p) {
+  while (isupper((unsigned char)*p)) ++p;
+  return p;
+}
+
+// Numbers within [low, high] with the separators of the option's value between them.
+static bool read_numbers(const app_option *o, const char *text, double *values) {
+  char name[48];
+  const char *p = text, *sign = separator(o->value);
+  for (size_t k = 0; k < o->bytes / sizeof *values; ++k, sign = separator(sign + (*sign != 0))) {
+    const char *end;
+    values[k] = sonde_parse_real(p, &end);
+    bool good = end != p && isfinite(values[k]) && values[k] >= o->low && values[k] <= o->high &&
+                (o->kind == OPTION_NUMBERS || values[k] == floor(values[k]));
+    p = end + (*sign != 0);
+    if (good && *end == *sign) continue;
+    if (isfinite(o->low))
+      app_usage_error(now.command->verb, "%s expects %s%s from %g to %g, got '%s'", dashed(o, name),
+                      o->value, o->kind == OPTION_WHOLES ? ", whole numbers" : "", o->low, o->high,
+                      text);
+    else
+      app_usage_error(now.command->verb, "%s expects %s, got '%s'", dashed(o, name), o->value,
+                      text);
+    return false;
+  }
+  return true;
+}
+
 static bool read_value(const app_option *o, const char *text, void *options) {
   const char *verb = now.command->verb;
   char name[48], known[300] = "";
@@ -114,6 +144,8 @@ static bool read_value(const app_option *o, const char *text, void *options) {
     add_words(known, sizeof known, o->words);
     app_usage_error(verb, "%s expects %s, got '%s'", dashed(o, name), known, text);
     return false;
+  case OPTION_NUMBERS:
+  case OPTION_WHOLES: return read_numbers(o, text, member(o, options));
   case OPTION_CALL: return o->take(options, text);
   default: *(const char **)member(o, options) = text; return true;
   }
@@ -319,6 +351,13 @@ static bool default_text(const app_option *o, const void *options, char text[64]
     double slack = 1e-9 * fabs(value);
     if (value >= o->low - slack && value <= o->high + slack) snprintf(text, 64, "%g", value);
   }
+  const double *list = (const double *)(const void *)from;
+  const char *sign = o->kind == OPTION_NUMBERS || o->kind == OPTION_WHOLES ? o->value : "";
+  for (size_t k = 0; *sign && isfinite(list[k]); ++k) {
+    sign = separator(sign);
+    add(text, 64, "%g%.*s", list[k], *sign != 0, sign);
+    sign += *sign != 0;
+  }
   return text[0] != 0;
 }
 
@@ -333,7 +372,8 @@ static bool is_in(const char *list, const app_option *o) {
 static void full_help(const app_option *o, const void *options, char *text, size_t room) {
   char value[64], facts[400] = "";
   if (o->kind == OPTION_WORD) add_words(facts, sizeof facts, o->words);
-  if (o->kind == OPTION_REAL) {
+  if ((o->kind == OPTION_REAL || o->kind == OPTION_NUMBERS || o->kind == OPTION_WHOLES) &&
+      isfinite(o->low)) {
     bool whole = o->low == floor(o->low) && o->high == floor(o->high);
     add(facts, sizeof facts, whole ? "%.0f to %.0f" : "%g to %g", o->low, o->high);
   }
@@ -422,8 +462,9 @@ static int print_help(const app_command *c, const void *defaults) {
 }
 
 static int print_json(const app_command *c, const void *defaults) {
-  static const char *const KINDS[] = {"flag", "text",     "output",   "integer", "real", "word",
-                                      "text", "argument", "argument", "rest",    "group"};
+  static const char *const KINDS[] = {"flag",     "text",    "output", "integer", "real",
+                                      "word",     "numbers", "wholes", "text",    "argument",
+                                      "argument", "rest",    "group"};
   app_json_begin();
   app_json_text("command", c->verb);
   app_json_text("summary", c->summary);
@@ -440,7 +481,7 @@ static int print_json(const app_command *c, const void *defaults) {
     if (strchr(o->name, ',')) app_json_text("long_name", strchr(o->name, ',') + 1);
     if (o->value) app_json_text("value", o->value);
     app_json_text("kind", KINDS[o->kind]);
-    if (o->kind == OPTION_REAL || o->kind == OPTION_INTEGER) {
+    if (o->low < o->high && isfinite(o->low)) {
       app_json_real("low", o->low);
       app_json_real("high", o->high);
     }

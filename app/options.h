@@ -11,6 +11,8 @@ typedef enum app_option_kind {
   OPTION_INTEGER,  // of 4 or 8 bytes, within [low, high]
   OPTION_REAL,     // double, within [low, high] before it is multiplied by `scale`
   OPTION_WORD,     // int or enum: index into `words`
+  OPTION_NUMBERS,  // double[]: as many as `value` has, between the same signs: "WxH", "A:B,C:D"
+  OPTION_WHOLES,   // likewise, whole numbers
   OPTION_CALL,     // what `take` reads; may be given more than once
   OPTION_ARGUMENT, // const char *: a word that is no option, in the order of the table
   OPTION_MODEL,    // likewise; the bundled model when there is none
@@ -65,6 +67,10 @@ typedef struct app_command {
   { name, value, OPTION_REAL, OPT_AT(m, double), low, high, scale, NULL, NULL, help }
 #define OPT_WORD(m, name, value, words, help)                                                      \
   { name, value, OPTION_WORD, OPT_SIZE(m), 0, 0, 0, words, NULL, help }
+#define OPT_NUMBERS(m, name, value, low, high, help)                                               \
+  { name, value, OPTION_NUMBERS, OPT_SIZE(m), low, high, 1, NULL, NULL, help }
+#define OPT_WHOLES(m, name, value, low, high, help)                                                \
+  { name, value, OPTION_WHOLES, OPT_SIZE(m), low, high, 1, NULL, NULL, help }
 #define OPT_CALL(take, name, value, help)                                                          \
   { name, value, OPTION_CALL, 0, 0, 0, 0, 0, NULL, take, help }
 #define OPT_ARGUMENT(m, name, help)                                                                \

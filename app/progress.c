@@ -1,10 +1,4 @@
-// Progress of long work on a terminal, and Ctrl-C.
-//
-// on_interrupt          the first Ctrl-C sets a flag
-// draw                  the line on stderr: bar, per cent, what, time
-// report                what the library says of its work
-// beat, start_beat      a thread that draws the time each second, also while nothing is reported
-// app_progress_*        the interface
+// Progress of long work on a terminal, drawn once a second by a thread of its own, and Ctrl-C.
 #include "app.h"
 
 #include <math.h>
@@ -78,15 +72,6 @@ static void *beat(void *unused) {
   return NULL;
 }
 
-// Without a thread the line still follows the reports.
-static void start_beat(void) {
-  sigset_t all, before;
-  sigfillset(&all); // signals are the business of the thread that works
-  pthread_sigmask(SIG_SETMASK, &all, &before);
-  line.beating = pthread_create(&line.thread, NULL, beat, NULL) == 0;
-  pthread_sigmask(SIG_SETMASK, &before, NULL);
-}
-
 static bool report(double fraction, const char *what, void *user) {
   (void)user;
   if (!line.terminal) return !interrupted;
@@ -107,7 +92,12 @@ static void open_line(void) {
                          .percent = -1,
                          .to = 1,
                          .start_s = app_seconds(CLOCK_MONOTONIC)};
-  if (line.terminal) start_beat();
+  if (!line.terminal) return;
+  sigset_t all, before;
+  sigfillset(&all); // signals are the business of the thread that works
+  pthread_sigmask(SIG_SETMASK, &all, &before);
+  line.beating = pthread_create(&line.thread, NULL, beat, NULL) == 0; // else reports alone draw
+  pthread_sigmask(SIG_SETMASK, &before, NULL);
 }
 
 sonde_progress app_progress(void) {

@@ -149,34 +149,32 @@ static sonde_status create_exam(const run_device *device, const sonde_site *site
   return status;
 }
 
-static sonde_status create_driver(const run_device *device, const sonde_site *site,
-                                  const sonde_session_def *session, sonde_device *out,
-                                  sonde_error *error) {
-  const char *driver = family_of(device->name)->driver;
-  sonde_pose start = sonde_site_pose(site, -0.01);
-  sonde_device_open_def def = {.library = device->library,
-                               .port = (uint16_t)device->port,
-                               .world_from_base = sonde_device_base(driver, start),
-                               .limits = session->limits};
-  sonde_clutch_def clutch = {.world_from_probe = start,
-                             .buttons = device->clutch ? 1u << (device->clutch - 1) : 0,
-                             .dt_s = session->world.dt_s};
-  sonde_device inner = {0};
-  sonde_status status = sonde_device_open(driver, &def, &inner, error);
-  if (!status) status = sonde_device_clutch(&clutch, &inner, out, error);
-  if (inner.destroy) inner.destroy(inner.self);
-  return status;
-}
-
 sonde_status run_device_create(const run_device *device, const sonde_site *site,
                                const sonde_session_def *def, sonde_device *out,
                                sonde_error *error) {
+  const family *f = family_of(device->name);
+  assert(f && site && def->world.dt_s > 0);
+  sonde_pose start = sonde_site_pose(site, -0.01);
   double dt_s = def->world.dt_s;
-  switch (family_of(device->name)->kind) {
-  case PAGE: return sonde_device_page(sonde_site_pose(site, -0.01), dt_s, out, error);
+  switch (f->kind) {
+  case PAGE: return sonde_device_page(start, dt_s, out, error);
   case SCRIPT: return create_exam(device, site, dt_s, false, out, error);
   case HAND: return create_exam(device, site, dt_s, true, out, error);
   case REPLAY: return sonde_device_recording(device->from, out, error);
-  default: return create_driver(device, site, def, out, error);
+  default: break;
   }
+
+  // Hardware behind a clutch: a button lets the handle move without the probe.
+  sonde_device_open_def open = {.library = device->library,
+                                .port = (uint16_t)device->port,
+                                .world_from_base = sonde_device_base(f->driver, start),
+                                .limits = def->limits};
+  sonde_clutch_def clutch = {.world_from_probe = start,
+                             .buttons = device->clutch ? 1u << (device->clutch - 1) : 0,
+                             .dt_s = dt_s};
+  sonde_device inner = {0};
+  sonde_status status = sonde_device_open(f->driver, &open, &inner, error);
+  if (!status) status = sonde_device_clutch(&clutch, &inner, out, error);
+  if (inner.destroy) inner.destroy(inner.self);
+  return status;
 }

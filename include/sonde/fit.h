@@ -206,8 +206,7 @@ typedef struct sonde_fit_result {
 /**
  * Stage 1 per curve; then one (k0, xm) per site for all its probes, without edges (stages == 1) or
  * with the simplified interaction and a uniform edge stiffness (2); then the refit on the full
- * equilibrium with a uniform shear layer and smooth site parameters (3). Formulas:
- * docs/estimation.md.
+ * equilibrium with a uniform shear layer and smooth site parameters (3); see docs/estimation.md.
  * @param model gives the refined skin, its normals and the law (guard, compression); unchanged
  * @return CANCELLED by progress; ARGUMENT for a probe without rectangular footprint or a curve of
  *   fewer than 3 points
