@@ -1,6 +1,7 @@
 // Shared by the subcommands: messages and exit codes, numbers of options, the bundled model.
 #include "app.h"
 
+#include <assert.h>
 #include <errno.h>
 #include <math.h>
 #include <stdarg.h>
@@ -23,6 +24,7 @@ int app_fail(const char *verb, const sonde_error *error) {
 }
 
 sonde_status app_error(sonde_error *error, sonde_status status, const char *format, ...) {
+  assert(error && status != SONDE_OK);
   va_list arguments;
   va_start(arguments, format);
   error->status = status;
@@ -50,6 +52,7 @@ int app_check_output(const char *verb, const char *path) {
 
 bool app_parse_real(const char *verb, const char *option, const char *text, double low, double high,
                     double *value) {
+  assert(low <= high);
   const char *end = text;
   double number = text ? sonde_parse_real(text, &end) : 0.0;
   bool good = text && end != text && *end == 0 && isfinite(number);
@@ -64,6 +67,7 @@ bool app_parse_real(const char *verb, const char *option, const char *text, doub
 
 bool app_parse_integer(const char *verb, const char *option, const char *text, long low, long high,
                        long *value) {
+  assert(low <= high);
   char *end = NULL;
   errno = 0;
   long number = text ? strtol(text, &end, 10) : 0;
@@ -136,6 +140,7 @@ static int by_value(const void *a, const void *b) {
 }
 
 double app_quantile(double *list, size_t count, double share) {
+  assert(share >= 0 && share <= 1);
   if (count == 0) return (double)NAN;
   qsort(list, count, sizeof *list, by_value);
   return list[(size_t)(share * (double)(count - 1) + 0.5)];

@@ -103,6 +103,7 @@ static sonde_status geodesic(uint32_t f, double size, sonde_mesh *mesh, sonde_er
 
 sonde_status bench_ellipsoid_build(const bench_ellipsoid *def, sonde_model **model,
                                    sonde_error *error) {
+  assert(def->nodes >= 42 && def->stiffness > 0);
   uint32_t f = (uint32_t)(sqrt((double)(def->nodes - 2) / 10) + 0.5);
   sonde_mesh mesh = {0};
   sonde_mesh_report report;

@@ -1,6 +1,8 @@
 // Small text on grey pictures: letters of 5 x 9 dots.
 #include "replay_export.h"
 
+#include <assert.h>
+
 typedef struct glyph {
   char character;
   uint8_t row[CAPTION_HEIGHT]; // highest of 5 bits: left
@@ -25,6 +27,7 @@ static const glyph GLYPHS[] = {
 
 void caption_draw(uint8_t *pixels, uint32_t width, uint32_t height, uint32_t x, uint32_t y,
                   uint32_t scale, const char *text) {
+  assert(scale > 0);
   const uint8_t bright = 220;
   for (; *text; ++text, x += CAPTION_WIDTH * scale) {
     const glyph *g = GLYPHS, *end = GLYPHS + sizeof GLYPHS / sizeof GLYPHS[0];

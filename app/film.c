@@ -31,6 +31,7 @@ static sonde_status fail(sonde_error *error, sonde_status status, const char *wh
 
 sonde_status film_open(const char *path, uint32_t width, uint32_t height, int frames_per_s,
                        film **out, sonde_error *error) {
+  assert(width % 2 == 0 && height % 2 == 0 && frames_per_s > 0);
   int ends[2];
   *out = NULL;
   film *f = calloc(1, sizeof *f);

@@ -3,6 +3,7 @@
 
 #include "fit_common.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 
@@ -26,6 +27,7 @@ sonde_status fit_checks_run(fit_checks *c, const sonde_model *model, const sonde
 }
 
 const char *fit_checks_layer(sonde_layer kind) {
+  assert(kind < SONDE_FIT_LAYERS);
   static const char *const NAME[] = {"A, shear with a limit", "T, pre-tension",
                                      "J, pre-tension and stiffening"};
   return NAME[kind];

@@ -3,6 +3,7 @@
 
 #include "app.h"
 
+#include <assert.h>
 #include <stdio.h>
 
 void fit_doubts_sentence(const sonde_doubt *d, const char *path, char *text, size_t room) {
@@ -28,6 +29,7 @@ sonde_status fit_doubts_decide(const sonde_doubts *doubts, const char *path, boo
 }
 
 void fit_doubts_print(const sonde_doubts *doubts, uint32_t first, const char *path) {
+  assert(first <= doubts->count);
   for (uint32_t k = first; k < doubts->count; ++k) {
     char text[900];
     fit_doubts_sentence(&doubts->doubt[k], path, text, sizeof text);

@@ -1,6 +1,7 @@
 // A hand that presses the thigh through a device's limits.
 #include "haptics_rig.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,6 +12,7 @@ sonde_world_def haptics_world(void) { return sonde_session_def_default().world; 
 
 void haptics_rig_follow(haptics_rig *rig, const haptics_rig_def *def, sonde_state *state,
                         sonde_device device) {
+  assert(def->limits && device.read);
   *rig = (haptics_rig){.def = *def, .state = state, .device = device};
   sonde_render_def rendering = sonde_render_def_for(def->limits, DT_S, 0.0);
   if (def->direct) {
@@ -47,6 +49,7 @@ static sonde_vec3 slow_force(haptics_rig *rig, sonde_vec3 at, sonde_vec3 force) 
 
 sonde_status haptics_rig_start(haptics_rig *rig, const haptics_rig_def *def, sonde_state *state,
                                sonde_error *error) {
+  assert(def->site && def->limits && def->mass_kg > 0);
   sonde_hand_def hand = sonde_hand_def_default();
   hand.mass_kg = def->mass_kg;
   hand.damping_n_s_m = def->damping_n_s_m;
@@ -65,6 +68,7 @@ sonde_status haptics_rig_start(haptics_rig *rig, const haptics_rig_def *def, son
 static double norm(sonde_vec3 v) { return sqrt(v.x * v.x + v.y * v.y + v.z * v.z); }
 
 void haptics_rig_tick(haptics_rig *rig) {
+  assert(rig->device.read && rig->device.write);
   sonde_device_sample sample;
   sonde_vec3 before = rig->safety.force_n;
   rig->device.read(rig->device.self, rig->tick++, &sample);

@@ -4,6 +4,7 @@
 #include "app.h"
 #include "pose.h"
 
+#include <assert.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -51,6 +52,7 @@ bool image_findings_clot(image_findings *f, const char *text) {
 
 sonde_status image_findings_apply(const image_findings *f, sonde_pose at, sonde_interior *interior,
                                   sonde_error *error) {
+  assert(f->lesion_count <= SONDE_LESIONS);
   sonde_findings all = f->rest;
   sonde_vec3 x = pose_axis(at, 0), z = pose_axis(at, 2);
   for (uint32_t k = 0; k < f->lesion_count; ++k) {

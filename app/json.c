@@ -18,6 +18,7 @@ static void stop_without_memory(const sonde_error *error) {
 }
 
 void app_json_begin(void) {
+  assert(out.depth == 0);
   sonde_error error = {0};
   out = (sonde_json_out){.layout = SONDE_JSON_LINES};
   if (sonde_file_in_memory(&out.file, &error)) stop_without_memory(&error);
@@ -61,6 +62,7 @@ void app_json(const char *members, ...) {
 }
 
 void app_json_end(void) {
+  assert(out.file && out.depth > 0);
   char *bytes = NULL;
   size_t count = 0;
   sonde_error error = {0};

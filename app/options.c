@@ -322,6 +322,7 @@ int app_options_read(const app_command *command, int argc, char **argv, void *op
 bool app_option_given(const char *name) { return given_name(name, strlen(name)); }
 
 void app_command_line(char *text, size_t room) {
+  assert(now.command);
   assert(now.command && room > 0);
   snprintf(text, room, "sonde %s", now.command->verb);
   for (int k = 1; k < now.argc; ++k) {

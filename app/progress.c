@@ -1,6 +1,7 @@
 // Progress of long work on a terminal, drawn once a second by a thread of its own, and Ctrl-C.
 #include "app.h"
 
+#include <assert.h>
 #include <math.h>
 #include <pthread.h>
 #include <signal.h>
@@ -116,6 +117,7 @@ void app_progress_begin(const char *what) {
 }
 
 void app_progress_part(double from, double to) {
+  assert(0 <= from && from <= to && to <= 1);
   pthread_mutex_lock(&mutex);
   line.from = from, line.to = to;
   pthread_mutex_unlock(&mutex);

@@ -4,6 +4,7 @@
 #include "app.h"
 #include "pose.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -54,6 +55,7 @@ bool settled_on_skin(const settled *s, sonde_pose *pose) {
 }
 
 void settled_at(settled *s, sonde_pose start, double depth_m, double residual) {
+  assert(residual > 0);
   s->depth_m = depth_m;
   s->pose = pose_shift(start, depth_m, pose_axis(start, 2));
   s->result = sonde_settle(s->state, &s->probe, s->pose, residual, 400);
@@ -63,6 +65,7 @@ void settled_at(settled *s, sonde_pose start, double depth_m, double residual) {
 
 sonde_status settled_press(settled *s, sonde_pose start, double depth_m, double force_n,
                            sonde_error *error) {
+  assert(s->state && depth_m >= -0.01);
   sonde_progress progress = app_progress();
   sonde_path_def def = sonde_path_def_default();
   def.force_n = force_n;

@@ -3,6 +3,7 @@
 // vessel:  straight, parallel to z.
 #include "validate_leg.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 
@@ -58,6 +59,7 @@ static void vessel(sonde_vessel *v, double skin, double depth, double turn, doub
 sonde_status validate_leg_build(double radius_m, double bone_m, double muscle_m,
                                 double vein_depth_m, bool vessels, sonde_model *m,
                                 sonde_error *error) {
+  assert(bone_m > 0 && bone_m < radius_m && vein_depth_m < radius_m);
   *m = (sonde_model){0};
   sonde_status status = tube(radius_m, AROUND, ROWS, &m->surface, error);
   if (!status) status = tube(bone_m, AROUND, 12, &m->femur, error);

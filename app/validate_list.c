@@ -3,11 +3,13 @@
 
 #include "app.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 
 void validate_note(validate_list *l, const char *name, double value, double least, double most,
                    const char *target) {
+  assert(least <= most);
   if (l->count == VALIDATE_MOST) return;
   validate_measure *m = &l->list[l->count++];
   *m = (validate_measure){.value = value, .least = least, .most = most};
