@@ -60,7 +60,11 @@ static void draw(bench *b, uint64_t tick) {
 static sonde_status make_echo(bench *b, const options *o, double density, sonde_error *error) {
   sonde_echo_destroy(b->echo);
   b->echo = NULL;
-  sonde_echo_def def = {(uint32_t)o->lines, (uint32_t)o->samples, density, 1, false};
+  sonde_echo_def def = sonde_echo_def_default();
+  def.line_count = (uint32_t)o->lines;
+  def.sample_count = (uint32_t)o->samples;
+  def.scatterers_per_m3 = density;
+  def.seed = 1;
   sonde_status status = sonde_echo_create(b->scene.interior, &def, &b->echo, error);
   if (!status && o->kernels) status = sonde_echo_set_kernels(b->echo, o->kernels, error);
   if (!status) status = sonde_echo_check_view(2 * b->scene.probe.half_x_m, o->radius_m, error);

@@ -152,7 +152,8 @@ static sonde_status place(settled *s, const options *o, sonde_error *error) {
 static sonde_status draw(const settled *s, const options *o, const sonde_pathology *pathology,
                          sonde_image *image, sonde_error *error) {
   sonde_echo *echo = NULL;
-  sonde_echo_def def = {.seed = (uint64_t)o->seed};
+  sonde_echo_def def = sonde_echo_def_default();
+  def.seed = (uint64_t)o->seed;
   double aperture = isnan(o->aperture_m) ? 2 * s->probe.half_x_m : o->aperture_m;
   settled_update(s, pathology, sonde_state_tick(s->state));
   sonde_status status =

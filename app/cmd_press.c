@@ -74,7 +74,7 @@ static sonde_status look(press *p, const char *image_path, sonde_error *error) {
     p->cut[which] = sonde_interior_vessel_at_plane(interior, which, scene->pose, &p->vessel[which]);
   if (!image_path) goto done;
   sonde_echo_settings settings = sonde_echo_settings_default();
-  status = sonde_echo_create(interior, &(sonde_echo_def){0}, &echo, error);
+  status = sonde_echo_create(interior, NULL, &echo, error);
   if (!status) status = sonde_image_create(512, 512, &image, error);
   if (status) goto done;
   sonde_echo_render(echo, scene->pose, 2 * scene->probe.half_x_m, &p->pathology, &settings, &image);

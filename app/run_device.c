@@ -165,13 +165,15 @@ sonde_status run_device_create(const run_device *device, const sonde_site *site,
   }
 
   // Hardware behind a clutch: a button lets the handle move without the probe.
-  sonde_device_open_def open = {.library = device->library,
-                                .port = (uint16_t)device->port,
-                                .world_from_base = sonde_device_base(f->driver, start),
-                                .limits = def->limits};
-  sonde_clutch_def clutch = {.world_from_probe = start,
-                             .buttons = device->clutch ? 1u << (device->clutch - 1) : 0,
-                             .dt_s = dt_s};
+  sonde_device_open_def open = sonde_device_open_def_default();
+  open.library = device->library;
+  open.port = (uint16_t)device->port;
+  open.world_from_base = sonde_device_base(f->driver, start);
+  open.limits = def->limits;
+  sonde_clutch_def clutch = sonde_clutch_def_default();
+  clutch.world_from_probe = start;
+  clutch.buttons = device->clutch ? 1u << (device->clutch - 1) : 0;
+  clutch.dt_s = dt_s;
   sonde_device inner = {0};
   sonde_status status = sonde_device_open(f->driver, &open, &inner, error);
   if (!status) status = sonde_device_clutch(&clutch, &inner, out, error);

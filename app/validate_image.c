@@ -34,7 +34,9 @@ typedef struct stage {
 static sonde_status stage_open(stage *s, double radius, double bone, double muscle, double depth,
                                bool vessels, sonde_error *error) {
   *s = (stage){.view = {.aperture_m = 0.04, .settings = sonde_echo_settings_default()}};
-  sonde_echo_def def = {.plain = true, .seed = 11};
+  sonde_echo_def def = sonde_echo_def_default();
+  def.plain = true;
+  def.seed = 11;
   sonde_status status = validate_leg_build(radius, bone, muscle, depth, vessels, &s->leg, error);
   if (!status) status = sonde_interior_create(&s->leg, &s->interior, error);
   if (!status) status = sonde_echo_create(s->interior, &def, &s->view.echo, error);

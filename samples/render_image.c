@@ -14,12 +14,13 @@ typedef struct scene {
 
 static sonde_status build(scene *s, const char *path, sonde_error *error) {
   sonde_world_def def = sonde_world_def_default();
+  sonde_echo_def image = sonde_echo_def_default();
+  image.seed = 1;
   sonde_status status = sonde_model_load(path, &s->model, error);
   if (!status) status = sonde_probe_create("linear", &s->probe, error);
   if (!status) status = sonde_state_create(s->model, &def, &s->state, error);
   if (!status) status = sonde_interior_create(s->model, &s->interior, error);
-  if (!status)
-    status = sonde_echo_create(s->interior, &(sonde_echo_def){.seed = 1}, &s->echo, error);
+  if (!status) status = sonde_echo_create(s->interior, &image, &s->echo, error);
   if (!status) status = sonde_image_create(512, 512, &s->image, error);
   return status;
 }

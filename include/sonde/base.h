@@ -21,6 +21,11 @@ extern "C" {
 #define SONDE_VERSION_PATCH 0
 #define SONDE_VERSION_STRING "0.1.0"
 
+/** Version of the option structs (..._def). Their ..._def_default() functions write it into
+ * `version`, and what takes such a struct refuses another one: a program that was built with other
+ * headers, or that did not begin with the default, is told so. */
+#define SONDE_DEF_VERSION 1
+
 /** Marks a symbol of the public interface; everything else stays hidden in the shared library. */
 #if defined(__GNUC__)
 #define SONDE_API __attribute__((visibility("default")))

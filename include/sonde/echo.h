@@ -57,6 +57,7 @@ typedef struct sonde_echo sonde_echo;
 
 /** Options fixed at creation; zero selects the default. */
 typedef struct sonde_echo_def {
+  uint32_t version;         /**< SONDE_DEF_VERSION, from sonde_echo_def_default() */
   uint32_t line_count;      /**< default 192 */
   uint32_t sample_count;    /**< per line, default 1024 */
   double scatterers_per_m3; /**< default: enough for developed speckle */
@@ -64,7 +65,11 @@ typedef struct sonde_echo_def {
   bool plain; /**< tissue without septa and bundles, for measurements */
 } sonde_echo_def;
 
-/** @param interior borrowed, its updates feed the images @thread owner */
+/** All zero but the version. @thread any */
+SONDE_API sonde_echo_def sonde_echo_def_default(void);
+
+/** @param interior borrowed, its updates feed the images @param def NULL: the default @thread owner
+ */
 SONDE_API sonde_status sonde_echo_create(const sonde_interior *interior, const sonde_echo_def *def,
                                          sonde_echo **echo, sonde_error *error);
 SONDE_API void sonde_echo_destroy(sonde_echo *echo); /**< @thread owner */

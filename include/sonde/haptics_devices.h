@@ -13,6 +13,7 @@ extern "C" {
 
 /** How to open a driver; zero means default. */
 typedef struct sonde_device_open_def {
+  uint32_t version;           /**< SONDE_DEF_VERSION, from sonde_device_open_def_default() */
   const char *library;        /**< path of the vendor's library; NULL: its usual names */
   uint16_t port;              /**< haply: of its service on this machine; default 10001 */
   sonde_pose world_from_base; /**< the device's frame; a zero rotation is none */
@@ -21,11 +22,15 @@ typedef struct sonde_device_open_def {
   double silence_s;           /**< without a pose for so long: not present; default 0.05 */
 } sonde_device_open_def;
 
+/** All zero but the version. @thread any */
+SONDE_API sonde_device_open_def sonde_device_open_def_default(void);
+
 /**
  * Opens openhaptics, forcedimension, haply, spacenav or gamepad and starts its thread: it exchanges
  * force and pose with the vendor at 1 kHz and meets the tick through mailboxes only. A device that
  * is lost (present: false) is opened again every quarter of a second.
  * spacenav and gamepad steer: their deflection is the speed of the pose, from the base on.
+ * @param def NULL: the default
  * @return SONDE_DEVICE with the reason in one sentence, SONDE_ARGUMENT for another name
  * @thread owner
  */
@@ -39,11 +44,15 @@ SONDE_API sonde_pose sonde_device_base(const char *name, sonde_pose world_from_p
 
 /** How a handle takes hold of the probe; zero means default. */
 typedef struct sonde_clutch_def {
+  uint32_t version;            /**< SONDE_DEF_VERSION, from sonde_clutch_def_default() */
   sonde_pose world_from_probe; /**< where the probe is at the start; a zero rotation is none */
   uint32_t buttons; /**< while one of them is pressed the probe stays where it is; 0: never */
   double ramp_s;    /**< the force comes back within so long; default 0.1 */
   double dt_s;      /**< a tick; default 1e-3 */
 } sonde_clutch_def;
+
+/** All zero but the version. @thread any */
+SONDE_API sonde_clutch_def sonde_clutch_def_default(void);
 
 /**
  * A device with a clutch around another one, `inner`, which is moved into it: the handle takes hold

@@ -12,6 +12,7 @@ extern "C" {
 #endif
 
 typedef struct sonde_gel_def {
+  uint32_t version;        /**< SONDE_DEF_VERSION, from sonde_gel_def_default() */
   double viscosity_pa_s;   /**< at the shear of a scan; default 10 */
   double lubricating_m;    /**< film that lubricates by 1/e, and couples the same; default 20e-6 */
   double drying_m_s;       /**< loss to the air; default 5e-8 */

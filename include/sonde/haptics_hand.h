@@ -18,6 +18,7 @@ extern "C" {
  * solved exactly for a force f and a goal held over a tick. The rotation follows the delayed goal.
  */
 typedef struct sonde_hand_def {
+  uint32_t version;       /**< SONDE_DEF_VERSION, from sonde_hand_def_default() */
   double mass_kg;         /**< hand and handle; default 0.5 */
   double damping_n_s_m;   /**< of arm and device; default 2 */
   double stiffness_n_m;   /**< of the arm towards its goal, 0: a free mass; default 400 */

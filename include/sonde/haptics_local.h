@@ -12,6 +12,7 @@ extern "C" {
 #endif
 
 typedef struct sonde_local_def {
+  uint32_t version;     /**< SONDE_DEF_VERSION, from sonde_local_def_default() */
   double dt_s;          /**< a tick; default 1e-3 */
   double period_s;      /**< between two answers of the scene; default 1e-2 */
   double stiffness_n_m; /**< taken before anything was measured; default 300 */
@@ -43,7 +44,8 @@ typedef struct sonde_local {
   bool placed;
 } sonde_local;
 
-/** @param def NULL: the default; members out of range are replaced by it @thread owner */
+/** @param def NULL or of another version: the default; members out of range are replaced by it
+ *  @thread owner */
 SONDE_API void sonde_local_init(sonde_local *local, const sonde_local_def *def);
 /** A new answer: the force on a probe that was at `at_m` with `velocity_m_s` when the scene read
  * it. Numbers that are not finite are ignored. @thread tick */

@@ -34,6 +34,7 @@ SONDE_API sonde_safety_limits sonde_safety_limits_of(const sonde_device_limits *
 /** How a tissue force becomes a device force. Stiffness and damping are those felt at the device.
  */
 typedef struct sonde_render_def {
+  uint32_t version;            /**< SONDE_DEF_VERSION, from sonde_render_def_default() */
   double dt_s;                 /**< default 1e-3 */
   double force_scale;          /**< rendered over tissue force; default 1 */
   double stiffness_n_m;        /**< of the coupling; 0: none, the probe is the device */
@@ -81,7 +82,8 @@ typedef struct sonde_render {
   uint64_t controlled_ticks;
 } sonde_render;
 
-/** @param def members out of range are replaced by the default @thread owner */
+/** @param def NULL or of another version: the default; members out of range are replaced by it
+ *  @thread owner */
 SONDE_API void sonde_render_init(sonde_render *render, const sonde_render_def *def);
 /**
  * One tick before the world's step: the device's pose in, the probe's pose out. The force for the

@@ -112,6 +112,7 @@ typedef struct sonde_model {
 
 /** What a model is built from; zero means default where a default is named. */
 typedef struct sonde_model_def {
+  uint32_t version; /**< SONDE_DEF_VERSION, from sonde_model_def_default() */
   const char *name;
   const char *provenance;
   const sonde_mesh *skin;             /**< closed, outward, m */

@@ -49,12 +49,12 @@ SONDE_API double sonde_friction_coefficient(const sonde_friction *friction, doub
 
 /** Options of a world; all validated at creation. */
 typedef struct sonde_world_def {
+  uint32_t version;           /**< SONDE_DEF_VERSION, from sonde_world_def_default() */
   double dt_s;                /**< step; default 1e-3 */
   double implicitness;        /**< lambda in [0,1]; default 1 (backward Euler) */
   uint32_t newton_iterations; /**< from the last step's change of velocity; default 2. At most:
                                    fewer where the next would change less than the solver leaves.
-                                   0: eq. (4) as in the paper, linearised at the start of the step
-                                   (DOUBLE) */
+                                   0: eq. (4) as in the paper, linearised once (DOUBLE) */
   sonde_engine engine;        /**< default DOUBLE */
   sonde_pcg_options pcg;      /**< default relative 5e-3, at most 200 iterations */
   sonde_contact_law contact_law;

@@ -13,6 +13,7 @@ extern "C" {
 
 /** How sonde_settle_path() goes; sonde_path_def_default(), then changes. */
 typedef struct sonde_path_def {
+  uint32_t version;         /**< SONDE_DEF_VERSION, from sonde_path_def_default() */
   double step_m;            /**< longest step of the probe's face; default 1 mm */
   double least_step_m;      /**< no step is halved below it; default 0.125 mm */
   double tolerance;         /**< relative difference of force at which one step and two half steps

@@ -32,7 +32,7 @@ static inline void bench_create(bench *b, double radius, double bone, double fat
                                 bool vessels) {
   *b = (bench){.leg = tube_create(radius, bone, 0.3, fat_m, 160, 60)};
   if (!vessels) b->leg.model.vein.count = b->leg.model.artery.count = 0;
-  sonde_echo_def def = {.plain = plain, .seed = 5};
+  sonde_echo_def def = {.version = SONDE_DEF_VERSION, .plain = plain, .seed = 5};
   assert_int_equal(sonde_interior_create(&b->leg.model, &b->interior, NULL), SONDE_OK);
   assert_int_equal(sonde_echo_create(b->interior, &def, &b->echo, NULL), SONDE_OK);
   assert_int_equal(sonde_image_create(512, 512, &b->image, NULL), SONDE_OK);

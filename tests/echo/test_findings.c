@@ -27,7 +27,9 @@ static void renew(scene *s) {
   s->b.echo = NULL, s->b.interior = NULL;
   s->b.leg.model.anatomy = &s->anatomy;
   assert_int_equal(sonde_interior_create(&s->b.leg.model, &s->b.interior, NULL), SONDE_OK);
-  assert_int_equal(sonde_echo_create(s->b.interior, &(sonde_echo_def){.seed = 5}, &s->b.echo, NULL),
+  assert_int_equal(sonde_echo_create(s->b.interior,
+                                     &(sonde_echo_def){.version = SONDE_DEF_VERSION, .seed = 5},
+                                     &s->b.echo, NULL),
                    SONDE_OK);
 }
 

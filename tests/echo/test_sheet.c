@@ -65,7 +65,9 @@ static void rig_renew(rig *r) {
   sonde_echo_destroy(b->echo);
   sonde_interior_destroy(b->interior);
   assert_int_equal(sonde_interior_create(&b->leg.model, &b->interior, NULL), SONDE_OK);
-  assert_int_equal(sonde_echo_create(b->interior, &(sonde_echo_def){.plain = true}, &b->echo, NULL),
+  assert_int_equal(sonde_echo_create(b->interior,
+                                     &(sonde_echo_def){.version = SONDE_DEF_VERSION, .plain = true},
+                                     &b->echo, NULL),
                    SONDE_OK);
   spy(r);
 }

@@ -151,7 +151,10 @@ typedef struct sight {
 } sight;
 
 static sonde_status open_sight(const sonde_model *model, sight *s, sonde_error *error) {
-  sonde_echo_def def = {.line_count = 32, .sample_count = 128, .scatterers_per_m3 = 1e8};
+  sonde_echo_def def = {.version = SONDE_DEF_VERSION,
+                        .line_count = 32,
+                        .sample_count = 128,
+                        .scatterers_per_m3 = 1e8};
   sonde_status status = sonde_interior_create(model, &s->interior, error);
   if (!status) status = sonde_echo_create(s->interior, &def, &s->echo, error);
   return status ? status : sonde_image_create(32, 32, &s->image, error);

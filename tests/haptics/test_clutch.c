@@ -28,7 +28,7 @@ typedef struct rig {
 static void set_up(rig *r, sonde_pose start) {
   *r = (rig){.handle.sample = {pose_at(0.01, -0.02, 0.03), 0, true}};
   sonde_device inner = {"handle", &r->handle, read_handle, write_handle, NULL};
-  sonde_clutch_def def = {.world_from_probe = start, .buttons = 2};
+  sonde_clutch_def def = {.version = SONDE_DEF_VERSION, .world_from_probe = start, .buttons = 2};
   assert_int_equal(sonde_device_clutch(&def, &inner, &r->device, NULL), SONDE_OK);
   assert_null(inner.self);
 }
@@ -154,7 +154,7 @@ static void bad_definitions_are_named(void **state) {
   handle h = {0};
   sonde_device inner = {0}, device;
   sonde_error error;
-  sonde_clutch_def def = {.buttons = 1};
+  sonde_clutch_def def = {.version = SONDE_DEF_VERSION, .buttons = 1};
   assert_int_equal(sonde_device_clutch(&def, &inner, &device, &error), SONDE_ARGUMENT);
   inner = (sonde_device){"handle", &h, read_handle, write_handle, NULL};
   def.world_from_probe = pose_at((double)NAN, 0, 0);

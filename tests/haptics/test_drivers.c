@@ -97,7 +97,8 @@ static void live(const char *name, fake_control *control, sonde_device_open_def 
 static void library(const char *name, const char *path, bool feels_force, bool steers) {
   void *handle;
   fake_control *control = hold(path, &handle);
-  live(name, control, (sonde_device_open_def){.library = path}, feels_force, steers);
+  live(name, control, (sonde_device_open_def){.version = SONDE_DEF_VERSION, .library = path},
+       feels_force, steers);
   assert_int_equal(control->opened, control->closed);
   dlclose(handle);
 }
@@ -123,7 +124,7 @@ static void haply_lives(void **state) {
   (void)state;
   static mock_haply mock;
   assert_true(mock_haply_start(&mock));
-  sonde_device_open_def def = {.port = mock.port};
+  sonde_device_open_def def = {.version = SONDE_DEF_VERSION, .port = mock.port};
   rig r = {.push_n = vec3(0, 0, 2)};
   sonde_error error;
   assert_int_equal(sonde_device_open("haply", &def, &r.device, &error), SONDE_DEVICE);
@@ -163,7 +164,7 @@ static void absence_has_reasons(void **state) {
   sonde_device device;
   sonde_error error;
   assert_int_equal(sonde_device_open("teapot", NULL, &device, &error), SONDE_ARGUMENT);
-  sonde_device_open_def def = {.library = "/nonexistent/libHD.so"};
+  sonde_device_open_def def = {.version = SONDE_DEF_VERSION, .library = "/nonexistent/libHD.so"};
   assert_int_equal(sonde_device_open("openhaptics", &def, &device, &error), SONDE_DEVICE);
   assert_non_null(strstr(error.message, "/nonexistent/libHD.so"));
   def.library = FAKE_DHD; // another vendor's

@@ -212,6 +212,10 @@ static void bad_definitions_are_named(void **state) {
   assert_int_equal(sonde_gel_create(s.model, &def, &gel, &error), SONDE_ARGUMENT);
   assert_non_null(strstr(error.message, "lubricating_m"));
   assert_null(gel);
+  def = sonde_gel_def_default();
+  def.version++;
+  assert_int_equal(sonde_gel_create(s.model, &def, &gel, &error), SONDE_ARGUMENT);
+  assert_non_null(strstr(error.message, "version"));
   tear_down(&s);
 }
 

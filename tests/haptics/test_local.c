@@ -126,7 +126,8 @@ static void silence_fades(void **state) {
 static void nonsense_is_ignored(void **state) {
   (void)state;
   sonde_local local;
-  sonde_local_init(&local, &(sonde_local_def){.dt_s = -1, .period_s = (double)NAN});
+  sonde_local_init(&local, &(sonde_local_def){
+                               .version = SONDE_DEF_VERSION, .dt_s = -1, .period_s = (double)NAN});
   assert_true(fabs(local.def.dt_s - 1e-3) < 1e-15 && fabs(local.def.period_s - 1e-2) < 1e-15);
   sonde_vec3 at = vec3(0, 0, -0.01), none = vec3(0, 0, 0);
   assert_true(v_norm(sonde_local_force(&local, at)) <= 0.0); // nothing known yet

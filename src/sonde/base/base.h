@@ -48,6 +48,10 @@ SONDE_LINK sonde_status sonde_fail_at(sonde_error *error, sonde_status status, c
 #define sonde_fail_memory(error)                                                                   \
   sonde_fail_at((error), SONDE_MEMORY, __func__, "out of memory in %s", __func__)
 
+// Whether an option struct has the version of this library.
+// @return SONDE_ARGUMENT naming what was to be made
+sonde_status sonde_def_check(const char *what, uint32_t version, sonde_error *error);
+
 SONDE_LINK void sonde_log(sonde_log_level level, const char *format, ...)
     __attribute__((format(printf, 2, 3)));
 

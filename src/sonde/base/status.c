@@ -35,6 +35,14 @@ sonde_status sonde_fail_at(sonde_error *error, sonde_status status, const char *
   return status;
 }
 
+sonde_status sonde_def_check(const char *what, uint32_t version, sonde_error *error) {
+  SONDE_ASSERT(what);
+  if (version == SONDE_DEF_VERSION) return SONDE_OK;
+  return sonde_fail(error, SONDE_ARGUMENT,
+                    "%s: options of version %u, expected %d: begin with the default function", what,
+                    version, SONDE_DEF_VERSION);
+}
+
 void sonde_set_log(sonde_log_fn log, void *user) {
   log_callback = log;
   log_user = user;

@@ -109,12 +109,18 @@ static void forget_textures(sonde_echo *echo) {
   memset(echo->knots, 0xff, sizeof *echo->knots * echo->padded * TEXTURES * KNOT_FLOATS);
 }
 
+sonde_echo_def sonde_echo_def_default(void) {
+  return (sonde_echo_def){.version = SONDE_DEF_VERSION};
+}
+
 sonde_status sonde_echo_create(const sonde_interior *interior, const sonde_echo_def *def,
                                sonde_echo **echo, sonde_error *error) {
   SONDE_ASSERT(interior != NULL && echo != NULL);
-  sonde_echo_def none = {0};
-  if (def == NULL) def = &none;
+  const sonde_echo_def otherwise = sonde_echo_def_default();
+  if (def == NULL) def = &otherwise;
   *echo = NULL;
+  sonde_status status = sonde_def_check("echo", def->version, error);
+  if (status) return status;
   bool lines =
       def->line_count == 0 || (def->line_count >= 8 && def->line_count <= SONDE_MOST_LINES);
   bool samples =

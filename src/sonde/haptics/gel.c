@@ -8,7 +8,8 @@
 #include <stddef.h>
 
 sonde_gel_def sonde_gel_def_default(void) {
-  return (sonde_gel_def){.viscosity_pa_s = 10.0,
+  return (sonde_gel_def){.version = SONDE_DEF_VERSION,
+                         .viscosity_pa_s = 10.0,
                          .lubricating_m = 20e-6,
                          .drying_m_s = 5e-8,
                          .moist_s = 60.0,
@@ -38,7 +39,8 @@ sonde_status sonde_gel_create(const sonde_model *model, const sonde_gel_def *def
   SONDE_ASSERT(model != NULL && out != NULL);
   *out = NULL;
   sonde_gel_def wanted = def ? *def : sonde_gel_def_default();
-  sonde_status status = sonde_ranges_check("gel", &wanted, RANGES, SONDE_COUNT_OF(RANGES), error);
+  sonde_status status = sonde_def_check("gel", wanted.version, error);
+  if (!status) status = sonde_ranges_check("gel", &wanted, RANGES, SONDE_COUNT_OF(RANGES), error);
   if (status) return status;
   const sonde_topology *topology = &model->topology;
   size_t nodes = model->surface.vertex_count;

@@ -15,7 +15,9 @@
 static const double forget = 0.6, noise_n2 = 1e-4;
 static const double stiffness_max = 2e4, damping_max = 200.0;
 
-sonde_local_def sonde_local_def_default(void) { return (sonde_local_def){1e-3, 1e-2, 300.0, 0.02}; }
+sonde_local_def sonde_local_def_default(void) {
+  return (sonde_local_def){SONDE_DEF_VERSION, 1e-3, 1e-2, 300.0, 0.02};
+}
 
 static double within(double value, double low, double high, double fallback) {
   return value >= low && value <= high ? value : fallback;
@@ -34,7 +36,7 @@ static void start_contact(sonde_local *local) {
 
 void sonde_local_init(sonde_local *local, const sonde_local_def *def) {
   SONDE_ASSERT(local != NULL);
-  sonde_local_def d = sonde_local_def_default(), c = def ? *def : d;
+  sonde_local_def d = sonde_local_def_default(), c = def && def->version == d.version ? *def : d;
   c.dt_s = within(c.dt_s, 1e-5, 0.1, d.dt_s);
   c.period_s = within(c.period_s, 1e-3, 0.2, d.period_s);
   c.stiffness_n_m = within(c.stiffness_n_m, 1.0, 1e4, d.stiffness_n_m);

@@ -6,7 +6,8 @@
 #include "haptics/ranges.h"
 
 sonde_render_def sonde_render_def_default(void) {
-  return (sonde_render_def){.dt_s = 1e-3,
+  return (sonde_render_def){.version = SONDE_DEF_VERSION,
+                            .dt_s = 1e-3,
                             .force_scale = 1.0,
                             .probe_mass_kg = 0.1,
                             .filter_rad_s = 800.0,
@@ -17,7 +18,8 @@ sonde_render_def sonde_render_def_default(void) {
 
 void sonde_render_init(sonde_render *render, const sonde_render_def *def) {
   SONDE_ASSERT(render != NULL);
-  *render = (sonde_render){.def = def ? *def : sonde_render_def_default()};
+  bool usable = def && def->version == SONDE_DEF_VERSION;
+  *render = (sonde_render){.def = usable ? *def : sonde_render_def_default()};
   sonde_render_def_clean(&render->def);
   SONDE_ASSERT(!render->started);
 }

@@ -143,15 +143,13 @@ sonde_vec3 sonde_vessels_smooth(const sonde_vessel_state *near, uint32_t count, 
 // Vessels whose walls can move a rest point at axial position s; their number. @thread any
 uint32_t sonde_vessels_near(const sonde_interior *interior, sonde_vec3 rest_m, double s_m,
                             sonde_vessel_state near[SONDE_VESSELS]);
-// The steps of a rest point beside these vessels: warped, moved by the field, smoothed.
 typedef struct sonde_wall_steps {
   sonde_vec3 warped_m, moved_m, smoothed_m;
 } sonde_wall_steps;
-// @thread any
+// The steps of a rest point beside these vessels: warp, field, smoothing. @thread any
 sonde_wall_steps sonde_vessels_trace(const sonde_interior *interior, const sonde_vessel_state *near,
                                      uint32_t count, sonde_vec3 rest_m);
-// Displacement of a rest point at axial position s, vessels included; it goes on beyond the skin.
-// @thread any
+// Displacement of a rest point at s, vessels included, also beyond the skin. @thread any
 sonde_vec3 sonde_vessels_displace(const sonde_interior *interior, sonde_vec3 rest_m, double s_m);
 // Whether the wall of a branch can move a point; cheaper than its state. @thread any
 bool sonde_vessel_reaches(const sonde_interior *interior, uint32_t which, double s_m,

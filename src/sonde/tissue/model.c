@@ -28,7 +28,8 @@ sonde_surface_law sonde_surface_law_default(void) {
 }
 
 sonde_model_def sonde_model_def_default(void) {
-  return (sonde_model_def){.name = "thigh",
+  return (sonde_model_def){.version = SONDE_DEF_VERSION,
+                           .name = "thigh",
                            .provenance = "",
                            .fine_edge_m = 0.003,
                            .fine_reach_m = 0.015,
@@ -215,6 +216,8 @@ static sonde_status fill(sonde_model *model, const sonde_model_def *def, sonde_e
 sonde_status sonde_model_build(const sonde_model_def *def, sonde_model **out, sonde_error *error) {
   SONDE_ASSERT(def && out);
   *out = NULL;
+  sonde_status status = sonde_def_check("model", def->version, error);
+  if (status) return status;
   if (!def->skin || !def->sites || def->site_count == 0)
     return sonde_fail(error, SONDE_ARGUMENT, "a model needs a skin and at least one site");
   if (!(def->fine_edge_m > 1e-4) || !(def->fine_reach_m >= 0))
@@ -222,7 +225,7 @@ sonde_status sonde_model_build(const sonde_model_def *def, sonde_model **out, so
                       def->fine_edge_m);
   sonde_model *model = SONDE_NEW(sonde_model, 1);
   if (!model) return sonde_fail_memory(error);
-  sonde_status status = fill(model, def, error);
+  status = fill(model, def, error);
   if (status)
     sonde_model_destroy(model);
   else

@@ -169,6 +169,8 @@ static bool follow(path *p, const sonde_progress *progress) {
 }
 
 static sonde_status check_def(const sonde_path_def *d, sonde_error *error) {
+  sonde_status status = sonde_def_check("path", d->version, error);
+  if (status) return status;
   const struct {
     const char *name;
     double value, low, high;
@@ -186,7 +188,8 @@ static sonde_status check_def(const sonde_path_def *d, sonde_error *error) {
 }
 
 sonde_path_def sonde_path_def_default(void) {
-  return (sonde_path_def){.step_m = 1e-3,
+  return (sonde_path_def){.version = SONDE_DEF_VERSION,
+                          .step_m = 1e-3,
                           .least_step_m = 0.125e-3,
                           .tolerance = 0.01,
                           .force_n = INFINITY,

@@ -8,7 +8,8 @@
 #include <string.h>
 
 sonde_world_def sonde_world_def_default(void) {
-  return (sonde_world_def){.dt_s = 1e-3,
+  return (sonde_world_def){.version = SONDE_DEF_VERSION,
+                           .dt_s = 1e-3,
                            .implicitness = 1,
                            .newton_iterations = 2,
                            .pcg = {5e-3, 1e-12, 200},
@@ -37,6 +38,8 @@ static sonde_status check_friction(const sonde_friction *f, sonde_error *error) 
 }
 
 static sonde_status check(const sonde_world_def *def, sonde_error *error) {
+  sonde_status status = sonde_def_check("world", def->version, error);
+  if (status) return status;
   bool fast = def->engine == SONDE_ENGINE_FAST;
   const struct {
     const char *name;

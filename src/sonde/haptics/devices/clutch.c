@@ -6,6 +6,10 @@
 
 #include <string.h>
 
+sonde_clutch_def sonde_clutch_def_default(void) {
+  return (sonde_clutch_def){.version = SONDE_DEF_VERSION};
+}
+
 static void destroy(void *self) {
   sonde_clutch_device *clutch = self;
   if (!clutch) return;
@@ -17,6 +21,8 @@ sonde_status sonde_device_clutch(const sonde_clutch_def *def, sonde_device *inne
                                  sonde_device *device, sonde_error *error) {
   SONDE_ASSERT(def != NULL && inner != NULL && device != NULL);
   *device = (sonde_device){0};
+  sonde_status status = sonde_def_check("clutch", def->version, error);
+  if (status) return status;
   if (!inner->read || !inner->write)
     return sonde_fail(error, SONDE_ARGUMENT, "clutch: no device to put it around");
   sonde_pose start = def->world_from_probe;

@@ -21,7 +21,8 @@ const sonde_hand_preset *sonde_hand_presets(uint32_t *count) {
 }
 
 sonde_hand_def sonde_hand_def_default(void) {
-  return (sonde_hand_def){.mass_kg = 0.5,
+  return (sonde_hand_def){.version = SONDE_DEF_VERSION,
+                          .mass_kg = 0.5,
                           .damping_n_s_m = 2.0,
                           .stiffness_n_m = 400.0,
                           .delay_s = 0.15,
@@ -79,7 +80,8 @@ sonde_status sonde_device_hand(const sonde_hand_def *def, const sonde_script_key
                                sonde_error *error) {
   SONDE_ASSERT(def != NULL && device != NULL);
   *device = (sonde_device){0};
-  sonde_status status = sonde_ranges_check("hand", def, RANGES, SONDE_COUNT_OF(RANGES), error);
+  sonde_status status = sonde_def_check("hand", def->version, error);
+  if (!status) status = sonde_ranges_check("hand", def, RANGES, SONDE_COUNT_OF(RANGES), error);
   if (status) return status;
   if (def->latency_ticks > SONDE_HAND_LATENCY)
     return sonde_fail(error, SONDE_ARGUMENT, "hand: latency_ticks is %u, expected 0 to %d",

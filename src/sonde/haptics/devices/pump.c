@@ -56,8 +56,12 @@ void sonde_steer(sonde_pose *pose, const double axis[6], double dt_s) {
   pose->rotation = q_unit(q_mul(rotation, pose->rotation));
 }
 
+sonde_device_open_def sonde_device_open_def_default(void) {
+  return (sonde_device_open_def){.version = SONDE_DEF_VERSION};
+}
+
 static sonde_device_open_def clean(const sonde_device_open_def *def) {
-  sonde_device_open_def c = def ? *def : (sonde_device_open_def){0};
+  sonde_device_open_def c = def ? *def : sonde_device_open_def_default();
   sonde_quat q = c.world_from_base.rotation;
   if (!(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z > 1e-12))
     c.world_from_base.rotation = quat_identity();
@@ -156,6 +160,10 @@ sonde_status sonde_device_open(const char *name, const sonde_device_open_def *de
                       "no driver '%s', expected openhaptics, forcedimension, haply, spacenav or "
                       "gamepad",
                       name);
+  if (def) {
+    sonde_status status = sonde_def_check(name, def->version, error);
+    if (status) return status;
+  }
   sonde_pump *pump = SONDE_NEW(sonde_pump, 1);
   if (!pump) return sonde_fail_memory(error);
   pump->vendor = sonde_calloc(1, driver->bytes);
