@@ -147,7 +147,8 @@ sonde_world_def bench_ellipsoid_world(double dt_s) {
   def.contact_stiffness_n_m3 = CONTACT_N_M3;
   def.contact_damping_n_s_m3 = 0;
   def.newton_iterations = 4;
-  def.pcg.relative_residual = 0.1;
+  def.pcg = (sonde_pcg_options){0.1, 1e-12, 200};
+  def.sleep_displacement_m = 5e-6;
   return def;
 }
 

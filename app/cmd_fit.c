@@ -311,6 +311,7 @@ static sonde_status settle_once(const sonde_model *model, const char *name, sond
   }
 
   sonde_world_def world = sonde_world_def_default();
+  world.engine = SONDE_ENGINE_DOUBLE; // nothing but equilibria
   sonde_state *state = NULL;
   sonde_probe probe = {0};
   if (!status) status = sonde_probe_create(name, &probe, error);

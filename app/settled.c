@@ -15,6 +15,7 @@ static const double DEEPEST_M = 0.06; // how far a press to a force goes
 sonde_status settled_open(settled *s, const char *model, const char *probe,
                           const sonde_preset *preset, bool needs_interior, sonde_error *error) {
   sonde_world_def world = sonde_world_def_default();
+  world.engine = SONDE_ENGINE_DOUBLE; // nothing but equilibria
   sonde_status status = sonde_probe_create(probe, &s->probe, error);
   if (!status) status = sonde_model_load(model, &s->model, error);
   if (!status && preset) status = sonde_preset_apply(preset, s->model, &world, error);

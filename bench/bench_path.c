@@ -21,9 +21,7 @@ static sonde_status press_in_time(const sonde_model *model, const sonde_probe *p
                                   const sonde_site *site, double depth_m, double *force_n,
                                   sonde_error *error) {
   sonde_world_def def = sonde_world_def_default();
-  def.engine = SONDE_ENGINE_FAST;
-  def.newton_iterations = 3;
-  def.sleep_displacement_m = 20e-6;
+  def.pcg = (sonde_pcg_options){5e-3, 1e-12, 200};
   sonde_state *state;
   sonde_status status = sonde_state_create(model, &def, &state, error);
   if (status) return status;

@@ -33,6 +33,16 @@ static inline sonde_model *bundled_thigh(void) {
   return model;
 }
 
+// A world in double precision, solved closer than the default.
+static inline sonde_world_def fixture_world_def(void) {
+  sonde_world_def def = sonde_world_def_default();
+  def.engine = SONDE_ENGINE_DOUBLE;
+  def.newton_iterations = 2;
+  def.pcg = (sonde_pcg_options){5e-3, 1e-12, 200};
+  def.sleep_displacement_m = 5e-6;
+  return def;
+}
+
 static inline uint32_t fixture_middle(sonde_mesh *mesh, uint32_t *count, uint32_t a, uint32_t b) {
   sonde_vec3 m = v_unit(v_add(mesh->vertices[a], mesh->vertices[b]), vec3(1, 0, 0));
   for (uint32_t i = 0; i < *count; ++i)

@@ -52,16 +52,16 @@ typedef struct sonde_world_def {
   uint32_t version;           /**< SONDE_DEF_VERSION, from sonde_world_def_default() */
   double dt_s;                /**< step; default 1e-3 */
   double implicitness;        /**< lambda in [0,1]; default 1 (backward Euler) */
-  uint32_t newton_iterations; /**< from the last step's change of velocity; default 2. At most:
+  uint32_t newton_iterations; /**< from the last step's change of velocity; default 3. At most:
                                    fewer where the next would change less than the solver leaves.
                                    0: eq. (4) as in the paper, linearised once (DOUBLE) */
-  sonde_engine engine;        /**< default DOUBLE */
-  sonde_pcg_options pcg;      /**< default relative 5e-3, at most 200 iterations */
+  sonde_engine engine;        /**< default FAST, what a trainee feels */
+  sonde_pcg_options pcg;      /**< default relative 1e-2, 1 mN over a step, at most 200 */
   sonde_contact_law contact_law;
   double contact_stiffness_n_m3; /**< kappa; default 5e8 */
   double contact_damping_n_s_m3; /**< mu; default 1e5 */
   double sleep_displacement_m;   /**< a node slower than this per 10 ms for 20 steps sleeps until a
-                                      neighbour moves; 0 keeps all awake; default 5e-6 */
+                                      neighbour moves; 0 keeps all awake; default 20e-6 */
   sonde_friction friction;       /**< default none */
   uint32_t threads; /**< FAST: 1 or 2, default 1 (0 is 1). With 2 another thread steps half of a
                        body of 16,384 nodes and more: the same bits, and it waits in a loop while

@@ -28,7 +28,7 @@ static uint64_t run(const scene *s) {
   law.shear_stiffness_n_m = s->shear_n_m;
   law.inplane_stiffness_n_m = s->inplane_n_m;
   if (s->inplane_n_m > 0) law.edge_stiffness_n_m = 0;
-  sonde_world_def def = sonde_world_def_default();
+  sonde_world_def def = fixture_world_def();
   def.implicitness = s->lambda;
   def.contact_law = s->law;
   def.engine = s->engine;

@@ -14,7 +14,7 @@ typedef struct scene {
 } scene;
 
 static sonde_world_def fast_def(void) {
-  sonde_world_def def = sonde_world_def_default();
+  sonde_world_def def = fixture_world_def();
   def.engine = SONDE_ENGINE_FAST;
   return def;
 }
@@ -107,7 +107,7 @@ static void follows_the_double_engine(void **state) {
   const char *probes[] = {"point", "linear", "ball:20"};
   for (size_t k = 0; k < ROUNDS(10, 3); ++k) {
     couplings by = k < 2 ? usual : kinds[k % SONDE_COUNT_OF(kinds)];
-    sonde_world_def def = sonde_world_def_default();
+    sonde_world_def def = fixture_world_def();
     def.newton_iterations = 8;
     def.pcg = (sonde_pcg_options){1e-6, 1e-12, 500};
     def.sleep_displacement_m = 0;

@@ -22,7 +22,7 @@ static void clear(bench *b) {
 
 static void separated_means_no_force(void **state) {
   (void)state;
-  bench b = make("linear", sonde_world_def_default());
+  bench b = make("linear", fixture_world_def());
   sonde_step(b.state, &b.probe, fixture_pose(-1e-5));
   const sonde_contact *c = sonde_state_contact(b.state);
   assert_int_equal(c->region_count, 0);
@@ -35,7 +35,7 @@ static void separated_means_no_force(void **state) {
 static void action_equals_reaction(void **state) {
   (void)state;
   for (int law = 0; law < 2; ++law) {
-    sonde_world_def def = sonde_world_def_default();
+    sonde_world_def def = fixture_world_def();
     def.contact_law = law ? SONDE_CONTACT_VOLUME : SONDE_CONTACT_FOUNDATION;
     def.newton_iterations = 1; // the force is found where the skin is before it moves
     bench b = make("linear", def);
@@ -63,7 +63,7 @@ static void force_is_kappa_times_volume(void **state) {
   (void)state;
   const double tolerance[2] = {0.03, 0.005};
   for (int law = 0; law < 2; ++law) {
-    sonde_world_def def = sonde_world_def_default();
+    sonde_world_def def = fixture_world_def();
     def.contact_law = law ? SONDE_CONTACT_VOLUME : SONDE_CONTACT_FOUNDATION;
     def.implicitness = 0;
     def.dt_s = 1e-6;
@@ -81,7 +81,7 @@ static void force_is_kappa_times_volume(void **state) {
 static void never_pulls(void **state) {
   (void)state;
   for (int law = 0; law < 2; ++law) {
-    sonde_world_def def = sonde_world_def_default();
+    sonde_world_def def = fixture_world_def();
     def.contact_law = law ? SONDE_CONTACT_VOLUME : SONDE_CONTACT_FOUNDATION;
     def.contact_damping_n_s_m3 = 1e9;
     bench b = make("square", def);
@@ -96,7 +96,7 @@ static void never_pulls(void **state) {
 
 static void two_bumps_are_two_regions(void **state) {
   (void)state;
-  bench b = make("linear", sonde_world_def_default());
+  bench b = make("linear", fixture_world_def());
   uint32_t n = b.model->surface.vertex_count;
   sonde_vec3 *x = SONDE_NEW(sonde_vec3, n);
   for (uint32_t i = 0; i < n; ++i) {
@@ -120,7 +120,7 @@ static void two_bumps_are_two_regions(void **state) {
 // grows with depth and the skin stays within the asymptote.
 static void settled_reaction_equals_contact(void **state) {
   (void)state;
-  bench b = make("square", sonde_world_def_default());
+  bench b = make("square", fixture_world_def());
   double last = 0;
   for (double depth = 0.002; depth < 0.0121; depth += 0.002) {
     sonde_settle_result r = sonde_settle(b.state, &b.probe, fixture_pose(depth), 1e-8, 400);
@@ -141,7 +141,7 @@ static void volume_law_holds_the_probe(void **state) {
   (void)state;
   double force[2] = {0}, reaction[2] = {0};
   for (int law = 0; law < 2; ++law) {
-    sonde_world_def def = sonde_world_def_default();
+    sonde_world_def def = fixture_world_def();
     def.contact_law = law ? SONDE_CONTACT_VOLUME : SONDE_CONTACT_FOUNDATION;
     bench b = make("square", def);
     for (int k = 0; k < 1500; ++k) {
@@ -159,7 +159,7 @@ static void volume_law_holds_the_probe(void **state) {
 // Time stepping with the probe held ends where the static solver ends.
 static void dynamics_end_in_the_static_solution(void **state) {
   (void)state;
-  sonde_world_def def = sonde_world_def_default();
+  sonde_world_def def = fixture_world_def();
   def.sleep_displacement_m = 1e-9;
   bench b = make("square", def);
   for (int k = 0; k < 800; ++k) sonde_step(b.state, &b.probe, fixture_pose(fmin(0.006, 2e-5 * k)));
@@ -173,7 +173,7 @@ static void dynamics_end_in_the_static_solution(void **state) {
 // 100 N on the square probe: no node reaches its asymptote.
 static void indentation_stays_below_the_asymptote(void **state) {
   (void)state;
-  bench b = make("square", sonde_world_def_default());
+  bench b = make("square", fixture_world_def());
   double worst = 0, force = 0;
   for (double depth = 0; depth < 0.2 && force < 100; depth += 0.0005) {
     sonde_step(b.state, &b.probe, fixture_pose(depth));
@@ -191,7 +191,7 @@ static void indentation_stays_below_the_asymptote(void **state) {
 // A bonded footprint: held nodes are where they were put, the holder carries the whole force.
 static void bonded_footprint_carries_the_force(void **state) {
   (void)state;
-  bench b = make("point", sonde_world_def_default());
+  bench b = make("point", fixture_world_def());
   uint32_t nodes[8], count = 0;
   sonde_vec3 place[8], force;
   for (uint32_t i = 0; i < b.model->surface.vertex_count && count < 8; ++i)

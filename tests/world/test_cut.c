@@ -20,7 +20,8 @@ typedef struct bench {
 
 static bench make(const sonde_surface_law *law, const sonde_world_def *def) {
   bench b = {.model = fixture_model(LEVELS, law)};
-  assert_int_equal(sonde_state_create(b.model, def, &b.state, NULL), SONDE_OK);
+  const sonde_world_def usual = fixture_world_def();
+  assert_int_equal(sonde_state_create(b.model, def ? def : &usual, &b.state, NULL), SONDE_OK);
   return b;
 }
 
@@ -84,7 +85,7 @@ static void motion_goes_on(void **state) {
   (void)state;
   sonde_surface_law law = coupled_law();
   law.edge_pretension_n = 0.2;
-  sonde_world_def def = sonde_world_def_default();
+  sonde_world_def def = fixture_world_def();
   def.friction.mu_static = def.friction.mu_kinetic = 0.4;
   bench b = make(&law, &def);
   sonde_probe probe;
@@ -130,7 +131,7 @@ static void rest_stays_rest(void **state) {
 static void far_cut_is_not_felt(void **state) {
   (void)state;
   sonde_surface_law law = coupled_law();
-  sonde_world_def def = sonde_world_def_default();
+  sonde_world_def def = fixture_world_def();
   def.friction.mu_static = def.friction.mu_kinetic = 0.4;
   def.pcg = (sonde_pcg_options){1e-13, 1e-300, 5000};
   def.newton_iterations = 8;

@@ -3,7 +3,7 @@
 #include "../fixture.h"
 #include "../sanitized.h"
 #include "world/batches.h"
-#include "world/crew.h"
+#include "world/second_thread.h"
 
 #include "base/clock.h"
 #include "base/random.h"
@@ -62,7 +62,7 @@ static void one_thread_and_two_give_the_same_bits(void **state) {
   const couplings kinds[] = {{50, 15, 70}, {50, 0, 0}, {0, 15, 70}};
   for (size_t k = 0; k < ROUNDS(SONDE_COUNT_OF(kinds), 1); ++k) {
     sonde_model *model = make_model(kinds[k]);
-    sonde_world_def def = sonde_world_def_default();
+    sonde_world_def def = fixture_world_def();
     def.engine = SONDE_ENGINE_FAST;
     def.contact_law = k == 1 ? SONDE_CONTACT_NODES : SONDE_CONTACT_FOUNDATION;
     uint64_t hash = hash_of(model, &def, ROUNDS(60, 5));
@@ -87,7 +87,7 @@ static void parts_move_as_one_body(void **state) {
   const couplings kinds[] = {{200, 0, 0}, {50, 15, 70}};
   for (size_t k = 0; k < ROUNDS(SONDE_COUNT_OF(kinds), 1); ++k) {
     sonde_model *model = make_model(kinds[k]);
-    sonde_world_def def = sonde_world_def_default();
+    sonde_world_def def = fixture_world_def();
     def.newton_iterations = 6;
     def.pcg.relative_residual = 1e-6;
     def.sleep_displacement_m = 0;
@@ -112,25 +112,25 @@ static void count(void *with, uint32_t part) { ++((uint32_t *)with)[part]; }
 // Work that comes at once, and work that comes when the thread has gone to sleep.
 static void a_second_thread_sleeps_and_wakes(void **state) {
   (void)state;
-  sonde_crew *crew = NULL;
+  sonde_second_thread *second = NULL;
   uint32_t done[2] = {0, 0}, pieces = 0;
-  assert_int_equal(sonde_crew_create(&crew, NULL), SONDE_OK);
+  assert_int_equal(sonde_second_thread_create(&second, NULL), SONDE_OK);
   for (int round = 0; round < 5; ++round) {
-    for (int k = 0; k < 1000; ++k, ++pieces) sonde_crew_run(crew, count, done);
+    for (int k = 0; k < 1000; ++k, ++pieces) sonde_second_thread_run(second, count, done);
     sonde_clock_sleep_until(sonde_clock_now() + 0.02);
   }
-  sonde_crew_destroy(crew);
+  sonde_second_thread_destroy(second);
   assert_int_equal(done[0], pieces);
   assert_int_equal(done[1], pieces);
-  sonde_crew_run(NULL, count, done);
+  sonde_second_thread_run(NULL, count, done);
   assert_int_equal(done[1], pieces + 1);
-  sonde_crew_destroy(NULL);
+  sonde_second_thread_destroy(NULL);
 }
 
 static void two_threads_belong_to_the_fast_engine(void **state) {
   (void)state;
   sonde_model *model = fixture_model(2, NULL);
-  sonde_world_def def = sonde_world_def_default();
+  sonde_world_def def = fixture_world_def();
   sonde_state *none = NULL;
   sonde_error error = {0};
   def.threads = 2;

@@ -40,7 +40,7 @@ static void the_force_does_not_depend_on_the_division(void **state) {
   (void)state;
   const double call_m[] = {DEEP_M, 5e-3, 1e-3};
   double force_n[3];
-  bench b = make("linear", sonde_world_def_default());
+  bench b = make("linear", fixture_world_def());
   for (int k = 0; k < 3; ++k) {
     sonde_state_reset(b.state);
     for (double at = 0; at < DEEP_M - 1e-9; at += call_m[k]) {
@@ -59,7 +59,7 @@ static void the_force_does_not_depend_on_the_division(void **state) {
 // Pressed by time steps in 0.4 s and held 0.6 s: what the hand feels.
 static void a_press_by_time_steps_ends_there_too(void **state) {
   (void)state;
-  sonde_world_def def = sonde_world_def_default();
+  sonde_world_def def = fixture_world_def();
   bench slow = make("linear", def);
   def.engine = SONDE_ENGINE_FAST;
   def.sleep_displacement_m = 0;
@@ -75,7 +75,7 @@ static void a_press_by_time_steps_ends_there_too(void **state) {
 // The depth at which a force is met has that force when pressed to it.
 static void force_and_depth_are_one_curve(void **state) {
   (void)state;
-  bench b = make("linear", sonde_world_def_default());
+  bench b = make("linear", fixture_world_def());
   sonde_path_def def = sonde_path_def_default();
   sonde_path_result met;
   double wanted = press(&b, 0, 0.012).force_n;
@@ -92,7 +92,7 @@ static void force_and_depth_are_one_curve(void **state) {
 // One call that carries the probe far into the skin says so.
 static void a_far_settling_is_told(void **state) {
   (void)state;
-  bench b = make("linear", sonde_world_def_default());
+  bench b = make("linear", fixture_world_def());
   sonde_settle_result far = sonde_settle(b.state, &b.probe, fixture_pose(DEEP_M), 1e-9, 400);
   assert_true(far.start_depth_m > 5 * SONDE_SETTLE_NEAR_M);
   sonde_state_reset(b.state);
@@ -105,7 +105,7 @@ static void a_far_settling_is_told(void **state) {
 // With a tolerance that no two equilibria meet, every step is a jump: each is told, with its place.
 static void jumps_are_told(void **state) {
   (void)state;
-  bench b = make("linear", sonde_world_def_default());
+  bench b = make("linear", fixture_world_def());
   sonde_path_def def = sonde_path_def_default();
   def.tolerance = 1e-6;
   def.step_m = def.least_step_m = 4e-3;
@@ -124,7 +124,7 @@ static void jumps_are_told(void **state) {
 
 static void bad_options_are_refused(void **state) {
   (void)state;
-  bench b = make("linear", sonde_world_def_default());
+  bench b = make("linear", fixture_world_def());
   sonde_path_result r;
   sonde_error error;
   for (int k = 0; k < 5; ++k) {

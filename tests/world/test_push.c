@@ -19,7 +19,7 @@ typedef struct bench {
 
 // A dented and rumpled skin.
 static bench make(const sonde_model *model, sonde_contact_law law) {
-  sonde_world_def def = sonde_world_def_default();
+  sonde_world_def def = fixture_world_def();
   def.contact_law = law;
   def.engine = sizeof(real) == sizeof(float) ? SONDE_ENGINE_FAST : SONDE_ENGINE_DOUBLE;
   bench b = {.model = model, .n = model->surface.vertex_count};

@@ -27,7 +27,7 @@ static void clear(scene *s) {
 }
 
 static sonde_world_def def_of(int k) {
-  sonde_world_def def = sonde_world_def_default();
+  sonde_world_def def = fixture_world_def();
   def.engine = k & 1 ? SONDE_ENGINE_DOUBLE : SONDE_ENGINE_FAST;
   def.contact_law = k & 2 ? SONDE_CONTACT_NODES : SONDE_CONTACT_FOUNDATION;
   if (k & 4) def.friction.mu_static = 0.5, def.friction.mu_kinetic = 0.3;
@@ -105,7 +105,7 @@ static void back_of_a_ball_does_not_push(void **state) {
     }
     clear(&s);
   }
-  sonde_world_def def = sonde_world_def_default();
+  sonde_world_def def = fixture_world_def();
   scene s = make("sphere", &def);
   sonde_settle(s.state, &s.probe, fixture_pose(0.027), 1e-6, 200);
   assert_true(sonde_state_contact(s.state)->force_n.x >= 0);
@@ -117,7 +117,7 @@ static void back_of_a_ball_does_not_push(void **state) {
 static void contact_lasts(void **state) {
   (void)state;
   for (int engine = 0; engine < 2; ++engine) {
-    sonde_world_def def = sonde_world_def_default();
+    sonde_world_def def = fixture_world_def();
     def.engine = engine ? SONDE_ENGINE_FAST : SONDE_ENGINE_DOUBLE;
     def.contact_stiffness_n_m3 = 1e7;
     def.contact_damping_n_s_m3 = 0;

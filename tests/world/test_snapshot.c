@@ -10,7 +10,7 @@ typedef struct scene {
 } scene;
 
 static sonde_world_def def_of(sonde_engine engine, sonde_contact_law law) {
-  sonde_world_def def = sonde_world_def_default();
+  sonde_world_def def = fixture_world_def();
   def.engine = engine, def.contact_law = law;
   def.friction.mu_static = 0.6, def.friction.mu_kinetic = 0.4;
   def.sleep_displacement_m = 20e-6;

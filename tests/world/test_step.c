@@ -4,7 +4,7 @@
 #include "tissue/two_layer.h"
 
 static sonde_world_def exact_def(double dt, double lambda) {
-  sonde_world_def def = sonde_world_def_default();
+  sonde_world_def def = fixture_world_def();
   def.dt_s = dt;
   def.implicitness = lambda;
   def.newton_iterations = 0;
@@ -22,7 +22,8 @@ typedef struct bench {
 static bench make(int levels, const sonde_surface_law *law, const sonde_world_def *def) {
   bench b = {.model = fixture_model(levels, law)};
   b.n = b.model->surface.vertex_count;
-  assert_int_equal(sonde_state_create(b.model, def, &b.state, NULL), SONDE_OK);
+  const sonde_world_def usual = fixture_world_def();
+  assert_int_equal(sonde_state_create(b.model, def ? def : &usual, &b.state, NULL), SONDE_OK);
   return b;
 }
 
@@ -212,7 +213,7 @@ static void explicit_stability_boundary(void **state) {
 }
 
 static uint64_t press_hash(double sleep, uint32_t *awake, sonde_vec3 *position) {
-  sonde_world_def def = sonde_world_def_default();
+  sonde_world_def def = fixture_world_def();
   def.sleep_displacement_m = sleep;
   if (sleep == 0) def.pcg.relative_residual = 1e-10;
   bench b = make(4, NULL, &def);
@@ -251,7 +252,7 @@ static void sleeping_is_harmless(void **state) {
 
 static void everything_sleeps_in_the_end(void **state) {
   (void)state;
-  sonde_world_def def = sonde_world_def_default();
+  sonde_world_def def = fixture_world_def();
   bench b = make(3, NULL, &def);
   sonde_vec3 x[258], v[258];
   shake(&b, x, v, 5e-4, 0.01);
@@ -313,7 +314,7 @@ static void steps_do_not_allocate(void **state) {
 static void bad_options_are_named(void **state) {
   (void)state;
   sonde_model *model = fixture_model(0, NULL);
-  sonde_world_def def = sonde_world_def_default();
+  sonde_world_def def = fixture_world_def();
   def.implicitness = 1.5;
   sonde_state *s;
   sonde_error error;

@@ -10,7 +10,7 @@ typedef struct bench {
 } bench;
 
 static sonde_world_def def_of(sonde_engine engine) {
-  sonde_world_def def = sonde_world_def_default();
+  sonde_world_def def = fixture_world_def();
   def.engine = engine;
   def.sleep_displacement_m = 0;
   def.pcg.relative_residual = 1e-6;

@@ -14,11 +14,6 @@ sonde_session_def sonde_session_def_default(void) {
                            .image_width = 512,
                            .image_height = 512,
                            .ticks_per_image = 20};
-  def.world.engine = SONDE_ENGINE_FAST;
-  def.world.newton_iterations = 3;
-  def.world.pcg.relative_residual = 1e-2;
-  def.world.pcg.absolute_residual = 1e-3 * def.world.dt_s; // 1 mN
-  def.world.sleep_displacement_m = 20e-6;
   def.controls.echo = sonde_echo_settings_default();
   def.controls.stiffness_scale = def.controls.damping_scale = def.controls.friction_scale = 1;
   sonde_status status = sonde_pathology_preset("healthy", &def.controls.pathology, NULL);

@@ -10,7 +10,7 @@ sonde_status sonde_press_create(const sonde_model *model, double relative_residu
   *press = (sonde_press){
       .model = model, .relative_residual = relative_residual, .max_iterations = max_iterations};
   sonde_world_def def = sonde_world_def_default();
-  def.sleep_displacement_m = 0;
+  def.engine = SONDE_ENGINE_DOUBLE; // nothing but equilibria
   press->position_m = SONDE_NEW(sonde_vec3, model->surface.vertex_count);
   sonde_status status = press->position_m ? SONDE_OK : sonde_fail_memory(error);
   if (!status) status = sonde_state_create(model, &def, &press->state, error);

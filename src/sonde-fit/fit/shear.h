@@ -71,7 +71,6 @@ typedef struct sonde_patch_solver {
   bool factored;           // factor is of a matrix of patch
   // Of the places and faces with the law's parameters.
   double *k0_n_m3, *xm_m, *shear_share, *limit_share;
-  double *stiff, *inverse_xm; // A k0, 1/xm
   sonde_patch_face_law *face_law;
   double *steepness; // 1/(A gm^2)
   // At the last assembly: A p and A p' of places; of faces flux (half the cotangent Laplacian of

@@ -1,18 +1,16 @@
-// spread_law: parameters of places and faces. press: normal springs of all places.
-// slopes:     gradients of s over some faces. resist: secant moduli of the layer there.
-// resist_steep: the same where the limit is near, and of a membrane.
-// add_faces:  into residual and matrix.
-// sonde_patch_assemble: all of it. sonde_patch_differentiate: the same numbers by parameters.
+// Residual and matrix of a footprint's equilibrium from the laws of tissue/laws.h, and their
+// derivatives by every parameter.
+#define SONDE_REAL_SCALAR
+#include "tissue/laws.h"
+
 #include "fit/shear.h"
 
 #include "base/maths.h"
-#include "tissue/two_layer.h"
 
 #include <string.h>
 
 enum { BLOCK = 64 };
-static const double STEEP = 0.85; // (g/gm)^2 from which the law's straight part may begin
-static const double FLAT = 1e-9;  // slope whose secant modulus is the tangent
+static const double FLAT = 1e-9; // slope whose secant modulus is the tangent
 
 static double sum_of(const double *field, const uint32_t place[3]) {
   return field[place[0]] + field[place[1]] + field[place[2]];
@@ -22,9 +20,6 @@ static double sum_of(const double *field, const uint32_t place[3]) {
 static void spread_law(sonde_patch_solver *solver) {
   const sonde_patch *p = solver->patch;
   const sonde_patch_law *law = &solver->law;
-  for (uint32_t i = 0; i < p->place_count; ++i)
-    solver->inverse_xm[i] = 1 / solver->xm_m[i],
-    solver->stiff[i] = p->area_m2[i] * solver->k0_n_m3[i];
   for (uint32_t f = 0; f < p->face_count; ++f) {
     const uint32_t *place = p->face[f].place;
     double shear = sum_of(solver->shear_share, place), limit = sum_of(solver->limit_share, place);
@@ -57,26 +52,18 @@ void sonde_patch_solver_use(sonde_patch_solver *solver, const sonde_patch *patch
   spread_law(solver);
 }
 
-// x/(1 - x^n) of sonde_normal_pressure(), straight below zero when n > 1; the few places beyond the
-// guard are done again by that function.
+// Normal springs of all places.
 static void press(sonde_patch_solver *solver, const double *s) {
   const sonde_patch *p = solver->patch;
-  const sonde_patch_law *law = &solver->law;
-  double n = law->exponent, *normal = solver->normal_n, *slope = solver->normal_slope;
-  const double *stiff = solver->stiff, *inverse_xm = solver->inverse_xm;
+  const double *k0 = solver->k0_n_m3, *xm = solver->xm_m, *area = p->area_m2;
+  const double guard = solver->law.guard;
+  const int exponent = (int)solver->law.exponent;
+  double *restrict normal = solver->normal_n, *restrict slope = solver->normal_slope;
   for (uint32_t i = 0; i < p->place_count; ++i) {
-    double x = s[i] * inverse_xm[i], straight = n > 1 && x < 0 ? 0 : x;
-    double power = n > 2 ? straight * straight * straight : n > 1 ? straight * straight : straight;
-    double inverse = 1 / (1 - power);
-    normal[i] = stiff[i] * s[i] * inverse;
-    slope[i] = stiff[i] * (1 + (n - 1) * power) * (inverse * inverse);
+    double steep;
+    normal[i] = area[i] * normal_pressure(exponent, k0[i], xm[i], guard * xm[i], s[i], &steep);
+    slope[i] = area[i] * steep;
   }
-  for (uint32_t i = 0; i < p->place_count; ++i)
-    if (s[i] > law->guard * solver->xm_m[i]) {
-      normal[i] = p->area_m2[i] * sonde_normal_pressure(n, solver->k0_n_m3[i], solver->xm_m[i],
-                                                        law->guard, s[i], &slope[i]);
-      slope[i] *= p->area_m2[i];
-    }
 }
 
 // flux[k] = half the cotangent Laplacian of s at corner k, so that square = A |grad s|^2 = sum s
@@ -85,10 +72,8 @@ static void slopes(const sonde_patch_solver *solver, uint32_t from, uint32_t cou
                    const double *s) {
   for (uint32_t f = from; f < from + count; ++f) {
     const sonde_patch_face *face = &solver->patch->face[f];
-    const double *half = face->half_cotangent;
-    double a = s[face->place[0]], b = s[face->place[1]], c = s[face->place[2]];
-    double across[3] = {half[0] * (b - c), half[1] * (c - a), half[2] * (a - b)};
-    double square = across[0] * (b - c) + across[1] * (c - a) + across[2] * (a - b);
+    const double at[3] = {s[face->place[0]], s[face->place[1]], s[face->place[2]]};
+    double across[3], square = square_slope(face->half_cotangent, at, across);
     double *flux = solver->flux[f];
     flux[0] = across[2] - across[1];
     flux[1] = across[0] - across[2];
@@ -97,35 +82,34 @@ static void slopes(const sonde_patch_solver *solver, uint32_t from, uint32_t cou
   }
 }
 
-// Force q of the layer at a slope and dq/dg.
-static double layer_force(const sonde_patch_law *layer, const sonde_patch_face_law *law, double g,
-                          double *slope) {
-  if (!layer->membrane) return sonde_shear_force(law->shear_n_m, law->limit, g, slope);
-  double root = sqrt(1 + g * g), e = root - 1, c = layer->stiffening, steep = g / root;
+// A membrane's tension: force q at slope g over g, and (q' - q/g)/square.
+static void stretch_membrane(const sonde_patch_solver *solver, uint32_t f) {
+  const sonde_patch_face_law *law = &solver->face_law[f];
+  double g = sqrt(solver->square[f] / solver->patch->face[f].area_m2), c = solver->law.stiffening;
+  double length = sqrt(1 + g * g), e = length - 1, steep = g / length;
   double tension = law->shear_n_m + law->limit * e * (1 + c * e * e);
-  *slope = tension / (root * root * root) + law->limit * (1 + 3 * c * e * e) * steep * steep;
-  return tension * steep;
+  double slope =
+      tension / (length * length * length) + law->limit * (1 + 3 * c * e * e) * steep * steep;
+  solver->secant[f] = g > FLAT ? tension * steep / g : slope;
+  solver->beyond[f] = g > FLAT ? (slope - solver->secant[f]) / solver->square[f] : 0;
 }
 
-static void resist_steep(const sonde_patch_solver *solver, uint32_t f) {
-  double area = solver->patch->face[f].area_m2, g = sqrt(solver->square[f] / area), slope;
-  double q = layer_force(&solver->law, &solver->face_law[f], g, &slope);
-  solver->secant[f] = g > FLAT ? q / g : slope;
-  solver->beyond[f] = g > FLAT ? (slope - q / g) / solver->square[f] : 0;
-}
-
-// Secant modulus m = q/g and the factor (q' - m)/(g^2 A) of the rank-one part of a face's
-// stiffness. With r = (g/gm)^2: m = G/(1 - r), and the factor is 2 m/((1 - r) gm^2 A).
+// Secant moduli of some faces and the factors of the rank-one parts of their stiffness; those in
+// the law's straight part are done again.
 static void resist(const sonde_patch_solver *solver, uint32_t from, uint32_t count) {
-  double *secant = solver->secant, *beyond = solver->beyond;
-  const double *square = solver->square, *steepness = solver->steepness;
-  for (uint32_t f = from; f < from + count; ++f) {
-    double inverse = 1 / (1 - square[f] * steepness[f]);
-    secant[f] = solver->face_law[f].shear_n_m * inverse;
-    beyond[f] = 2 * secant[f] * inverse * steepness[f];
-  }
+  const double past = SONDE_SHEAR_GUARD * SONDE_SHEAR_GUARD;
+  const double *square = solver->square, *bend = solver->steepness;
+  const sonde_patch_face_law *law = solver->face_law;
   for (uint32_t f = from; f < from + count; ++f)
-    if (solver->law.membrane || !(square[f] * steepness[f] < STEEP)) resist_steep(solver, f);
+    shear_modulus_below(law[f].shear_n_m, bend[f], square[f] * bend[f], &solver->secant[f],
+                        &solver->beyond[f]);
+  for (uint32_t f = from; f < from + count; ++f) {
+    if (solver->law.membrane)
+      stretch_membrane(solver, f);
+    else if (!(square[f] * bend[f] <= past))
+      shear_modulus(law[f].shear_n_m, bend[f], square[f] * bend[f], &solver->secant[f],
+                    &solver->beyond[f]);
+  }
 }
 
 static void add_faces(const sonde_patch_solver *solver, uint32_t from, uint32_t count) {

@@ -173,12 +173,12 @@ static sizes sizes_of(const sonde_patch *patches, uint32_t count) {
 }
 
 // Every array [places] of a solver.
-enum { PLACE_ARRAYS = 16 };
+enum { PLACE_ARRAYS = 14 };
 static void place_arrays(sonde_patch_solver *s, double **array[PLACE_ARRAYS]) {
   double **const all[PLACE_ARRAYS] = {
-      &s->k0_n_m3,  &s->xm_m,    &s->shear_share, &s->limit_share,   &s->stiff,    &s->inverse_xm,
-      &s->residual, &s->step,    &s->trial,       &s->multiplier,    &s->normal_n, &s->normal_slope,
-      &s->right,    &s->product, &s->direction,   &s->preconditioned};
+      &s->k0_n_m3, &s->xm_m,    &s->shear_share, &s->limit_share,   &s->residual,
+      &s->step,    &s->trial,   &s->multiplier,  &s->normal_n,      &s->normal_slope,
+      &s->right,   &s->product, &s->direction,   &s->preconditioned};
   memcpy(array, all, sizeof all);
 }
 

@@ -32,6 +32,8 @@ sonde_world_def sonde_identify_world(void) {
   sonde_world_def def = sonde_world_def_default();
   def.newton_iterations = 5;
   def.pcg.relative_residual = 1e-3;
+  def.pcg.absolute_residual = 1e-12;
+  def.sleep_displacement_m = 5e-6;
   return def;
 }
 

@@ -24,7 +24,6 @@ INLINE uint32_t bits(wholes mask) { return mask; }
 INLINE reals dot(const reals a[3], const reals b[3]) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
-#define root(a) __builtin_sqrt(a)
 #else
 // Nodes in a batch, numbers in a record of a node; sums run in double precision.
 #ifdef SONDE_REAL_DOUBLE
@@ -38,7 +37,6 @@ typedef double_x4 quad;
 typedef double_x8 wide_sum;
 INLINE wide_sum widen(reals a) { return a; }
 INLINE reals all(real a) { return vset_double_x8(a); }
-#define root(a) vsqrt(a)
 #else
 typedef float real;
 typedef int32_t whole;
@@ -125,8 +123,12 @@ INLINE void write_records(real *base, int stride, const reals in[4]) {
 
 // sqrt(a) and 1/sqrt(a) for a > 0: of floats both within 5e-7.
 INLINE reals root_and_inverse(reals a, reals *inverse) {
-#ifdef root
-  reals length = root(a);
+#if defined(SONDE_REAL_SCALAR) || defined(SONDE_REAL_DOUBLE)
+#ifdef SONDE_REAL_SCALAR
+  reals length = __builtin_sqrt(a);
+#else
+  reals length = vsqrt(a);
+#endif
   *inverse = 1 / length;
   return length;
 #else

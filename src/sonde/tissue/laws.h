@@ -94,12 +94,19 @@ INLINE reals square_slope(const reals half_cotangent[3], const reals s[3], reals
   return across[0] * d[0] + across[1] * d[1] + across[2] * d[2];
 }
 
-// Shear layer of a face: the secant modulus m = q/g and (q' - m)/(g^2 A), without the cancellation
-// of q' - m; from x2 = (g/gm)^2, in which there is no root below the guard. bend: 1/(gm^2 A).
+// Shear layer of a face below its straight part, from x2 = (g/gm)^2: the secant modulus m = q/g and
+// (q' - m)/(g^2 A), without a root and without the cancellation of q' - m. bend: 1/(gm^2 A).
+INLINE void shear_modulus_below(reals shear, reals bend, reals x2, reals *modulus, reals *beyond) {
+  reals inverse = 1 / (1 - x2);
+  *modulus = shear * inverse;
+  *beyond = 2 * *modulus * inverse * bend;
+}
+
+// The same with the straight part.
 INLINE void shear_modulus(reals shear, reals bend, reals x2, reals *modulus, reals *beyond) {
   const real most = (real)SONDE_SHEAR_GUARD, most2 = most * most;
-  reals held = smaller(x2, all(most2)), inverse = 1 / (1 - held);
-  reals secant = shear * inverse, steep = 2 * secant * inverse;
+  reals steep, secant;
+  shear_modulus_below(shear, all(1), smaller(x2, all(most2)), &secant, &steep);
   *modulus = secant;
   *beyond = steep * bend;
   wholes past = x2 > most2;

@@ -2,7 +2,7 @@
 #include "world/batches.h"
 
 #include "tissue/two_layer.h"
-#include "world/crew.h"
+#include "world/second_thread.h"
 #include "world/fan.h"
 
 #include "base/base.h"
@@ -14,7 +14,6 @@
 // Of face_marked.
 static size_t mark_words(const sonde_batches *l) { return l->face_batch_count / 64 + 1; }
 
-static real lower(real a, real b) { return a < b ? a : b; }
 static real upper(real a, real b) { return b > a ? b : a; }
 
 // Vectors for so many numbers.
@@ -72,23 +71,6 @@ static void order_slots(const sonde_model *model, bool layered, uint32_t i, sond
     fan->node[fan->count++] = t->neighbour[k];
 }
 
-static uint32_t count_slots(const sonde_model *model, bool layered, uint32_t batch,
-                            sonde_fan *fan) {
-  uint32_t most = 0;
-  for (uint32_t l = 0; l < SONDE_BATCH; ++l) {
-    order_slots(model, layered, batch * SONDE_BATCH + l, fan);
-    if (fan->count > most) most = fan->count;
-  }
-  return most;
-}
-
-static uint32_t edge_between(const sonde_topology *t, uint32_t i, uint32_t j) {
-  uint32_t k = t->start[i];
-  while (k < t->start[i + 1] && t->neighbour[k] != j) ++k;
-  SONDE_ASSERT(k < t->start[i + 1]);
-  return t->neighbour_edge[k];
-}
-
 // Which part a row belongs to.
 static uint32_t part_of(const sonde_batches *body, uint32_t row) {
   return body->part_count > 1 && row / SONDE_BATCH >= body->part_batch[1];
@@ -98,20 +80,6 @@ static bool is_seen(const sonde_batches *body, const sonde_topology *t, uint32_t
   for (uint32_t k = t->start[i]; k < t->start[i + 1]; ++k)
     if (part_of(body, t->neighbour[k]) != part_of(body, i)) return true;
   return false;
-}
-
-// Rows that the other part sees; those of the last part, which the first one sees, come last.
-static void list_seen(sonde_batches *body, const sonde_topology *t) {
-  uint32_t count = 0, half = 0;
-  if (body->seen_count == 0) return;
-  for (uint32_t i = 0; i < t->vertex_count; ++i) {
-    if (!is_seen(body, t, i)) continue;
-    half += part_of(body, i) == 0;
-    body->seen[count] = i;
-    body->seen_at[i] = body->common.batch_count * SONDE_BATCH + count++;
-  }
-  SONDE_ASSERT(count == body->seen_count);
-  body->part_seen[1] = half, body->part_seen[2] = count;
 }
 
 // Where row i reads what row j has published.
@@ -130,7 +98,11 @@ static void fill_spring(sonde_batches *body, const sonde_model *model, uint32_t 
   sonde_vec3 d = vec3(1, 0, 0);
   double length = 1, share = used;
   if (used) {
-    uint32_t e = edge_between(&model->topology, i, j);
+    const sonde_topology *t = &model->topology;
+    uint32_t at = t->start[i];
+    while (at < t->start[i + 1] && t->neighbour[at] != j) ++at;
+    SONDE_ASSERT(at < t->start[i + 1]);
+    uint32_t e = t->neighbour_edge[at];
     if (model->edge_share) share = model->edge_share[e];
     d = v_sub(model->surface.vertices[j], model->surface.vertices[i]);
     length = model->edge_rest_m[e];
@@ -192,13 +164,6 @@ static void fill_springs(sonde_batch_model *fixed, const sonde_model *model, uin
   fixed->yield[l] = (real)(1 / (model->area_m2[i] * (tangent > 0 ? fmin(tangent, k0) : k0)));
 }
 
-static void empty_boxes(sonde_batches *body) {
-  for (uint32_t k = 0; k < vectors_of(body->common.batch_count); ++k)
-    for (int c = 0; c < 3; ++c)
-      for (int l = 0; l < SONDE_BATCH; ++l)
-        body->box[k].low[c][l] = (real)1e30, body->box[k].high[c][l] = -(real)1e30;
-}
-
 static void fill_batch(sonde_batches *body, const sonde_model *model, uint32_t s) {
   uint32_t n = model->surface.vertex_count;
   sonde_batch_model *fixed = &body->model[s];
@@ -225,7 +190,7 @@ static void fill_batch(sonde_batches *body, const sonde_model *model, uint32_t s
       real p, low;
       sonde_split(at[c], &p, &low);
       fixed->place[c][l] = p, fixed->place_low[c][l] = low;
-      box->low[c][own] = lower(box->low[c][own], p);
+      if (p < box->low[c][own]) box->low[c][own] = p;
       box->high[c][own] = upper(box->high[c][own], p);
     }
     const sonde_topology *t = &model->topology;
@@ -235,15 +200,6 @@ static void fill_batch(sonde_batches *body, const sonde_model *model, uint32_t s
       fixed->bend = upper(fixed->bend, 1 / rest);
     }
     fixed->used = l + 1;
-  }
-}
-
-static void fill_faces(sonde_batches *body, const sonde_model *model) {
-  for (uint32_t at = 0; at < model->surface.face_count; ++at) {
-    uint32_t f = body->face_order[at], s = at / SONDE_BATCH, l = at % SONDE_BATCH;
-    SONDE_ASSERT(s < body->face_batch_count);
-    body->point_area[s][l] = (real)(model->face_area_m2[f] / SONDE_FACE_POINTS);
-    for (int k = 0; k < 3; ++k) body->face[s][k][l] = (whole)model->surface.faces[f][k];
   }
 }
 
@@ -334,7 +290,8 @@ static uint32_t most_around(const sonde_topology *t) {
   return most;
 }
 
-// Sizes that need a pass over the mesh: slots and lists per slice. lists: room for two of 16 nodes.
+// Sizes that need a pass over the mesh: slots and lists per batch. lists: room for two of one
+// batch.
 static void measure(sonde_batches *body, const sonde_model *model, const uint32_t *place,
                     sonde_batch_model *sizes, uint32_t *lists, sonde_fan *fan) {
   const sonde_topology *t = &model->topology;
@@ -346,7 +303,10 @@ static void measure(sonde_batches *body, const sonde_model *model, const uint32_
     uint32_t left = t->vertex_count - s * SONDE_BATCH;
     sizes[s].used = left < SONDE_BATCH ? left : SONDE_BATCH;
     sizes[s].first_slot = body->slot_count;
-    sizes[s].slot_count = count_slots(model, body->law.layered, s, fan);
+    for (uint32_t l = 0; l < SONDE_BATCH; ++l) {
+      order_slots(model, body->law.layered, s * SONDE_BATCH + l, fan);
+      if (fan->count > sizes[s].slot_count) sizes[s].slot_count = fan->count;
+    }
     list_near(body, model, place, s, lists, lists + most);
     sizes[s].first_near = body->near_total;
     sizes[s].first_face = body->face_total;
@@ -359,8 +319,19 @@ static void measure(sonde_batches *body, const sonde_model *model, const uint32_
 static void fill(sonde_batches *body, const sonde_model *model, const uint32_t *place,
                  const sonde_batch_model *sizes, sonde_fan *fan) {
   memcpy(body->model, sizes, body->common.batch_count * sizeof *sizes);
-  empty_boxes(body);
-  list_seen(body, &model->topology);
+  for (uint32_t k = 0; k < vectors_of(body->common.batch_count); ++k)
+    for (int c = 0; c < 3; ++c)
+      body->box[k].low[c] = all((real)1e30), body->box[k].high[c] = all(-(real)1e30);
+  // Rows that the other part sees; those of the last part, which the first one sees, come last.
+  uint32_t count = 0, half = 0;
+  for (uint32_t i = 0; body->seen_count > 0 && i < model->surface.vertex_count; ++i) {
+    if (!is_seen(body, &model->topology, i)) continue;
+    half += part_of(body, i) == 0;
+    body->seen[count] = i;
+    body->seen_at[i] = body->common.batch_count * SONDE_BATCH + count++;
+  }
+  SONDE_ASSERT(count == body->seen_count);
+  body->part_seen[1] = half, body->part_seen[2] = count;
   for (uint32_t s = 0; s < body->common.batch_count; ++s) {
     const sonde_batch_model *fixed = &body->model[s];
     fill_batch(body, model, s);
@@ -368,17 +339,12 @@ static void fill(sonde_batches *body, const sonde_model *model, const uint32_t *
               body->face_near + fixed->first_face);
     for (uint32_t l = 0; l < SONDE_BATCH; ++l) fill_row(body, model, s * SONDE_BATCH + l, fan);
   }
-  fill_faces(body, model);
-}
-
-// The block starts at a multiple of 64, as vectors need.
-static sonde_status allocate(sonde_batches *body, uint32_t faces, sonde_error *error) {
-  size_t bytes = carve(body, faces, NULL);
-  body->block = sonde_calloc(1, bytes + 63);
-  if (!body->block) return sonde_fail_memory(error);
-  carve(body, faces, sonde_whole_lines(body->block));
-  SONDE_ASSERT(((uintptr_t)body->batch & 63) == 0);
-  return SONDE_OK;
+  // Faces in batches, for the contact.
+  for (uint32_t at = 0; at < model->surface.face_count; ++at) {
+    uint32_t f = body->face_order[at], s = at / SONDE_BATCH, l = at % SONDE_BATCH;
+    body->point_area[s][l] = (real)(model->face_area_m2[f] / SONDE_FACE_POINTS);
+    for (int k = 0; k < 3; ++k) body->face[s][k][l] = (whole)model->surface.faces[f][k];
+  }
 }
 
 // What laying out needs for itself.
@@ -406,18 +372,10 @@ static sonde_status open_workshop(workshop *shop, const sonde_model *model, uint
   return SONDE_OK;
 }
 
-static void close_workshop(workshop *shop) {
-  sonde_free(shop->room);
-  sonde_free(shop->place);
-  sonde_free(shop->lists);
-  sonde_free(shop->fan.node);
-  sonde_free(shop->fan.face);
-}
-
 static void destroy(sonde_engine_data *data) {
   sonde_batches *body = (sonde_batches *)(void *)data;
   if (!body) return;
-  sonde_crew_destroy(body->thread);
+  sonde_second_thread_destroy(body->thread);
   sonde_free(body->block);
   sonde_free(body);
 }
@@ -442,13 +400,18 @@ static sonde_status create(const sonde_model *model, const sonde_world_def *def,
   set_step(body, model, def);
   body->kernels = sonde_kernels_find(NULL);
   sonde_status status = SONDE_OK;
-  if (def->threads > 1 && body->part_count > 1) status = sonde_crew_create(&body->thread, error);
+  if (def->threads > 1 && body->part_count > 1)
+    status = sonde_second_thread_create(&body->thread, error);
   if (!status) status = open_workshop(&shop, model, body->common.batch_count, face_order, error);
   if (!status) {
     measure(body, model, shop.place, shop.sizes, shop.lists, &shop.fan);
-    status = allocate(body, faces, error);
+    // The block starts at a multiple of 64, as vectors need.
+    body->block = sonde_calloc(1, carve(body, faces, NULL) + 63);
+    if (!body->block) status = sonde_fail_memory(error);
   }
   if (!status) {
+    carve(body, faces, sonde_whole_lines(body->block));
+    SONDE_ASSERT(((uintptr_t)body->batch & 63) == 0);
     fill(body, model, shop.place, shop.sizes, &shop.fan);
     body->common.batch_nodes = SONDE_BATCH;
     body->common.batches = (char *)body->batch;
@@ -460,7 +423,11 @@ static sonde_status create(const sonde_model *model, const sonde_world_def *def,
   } else {
     destroy(&body->common);
   }
-  close_workshop(&shop);
+  sonde_free(shop.room);
+  sonde_free(shop.place);
+  sonde_free(shop.lists);
+  sonde_free(shop.fan.node);
+  sonde_free(shop.fan.face);
   return status;
 }
 

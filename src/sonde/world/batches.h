@@ -132,7 +132,7 @@ struct sonde_batches {
   uint32_t *awake;   // batches that take part, ascending
   uint32_t awake_count;
   uint32_t part_awake[SONDE_PARTS + 1]; // of awake[]
-  struct sonde_crew *thread;            // NULL: one thread
+  struct sonde_second_thread *thread;   // NULL: one thread
   uint8_t *is_near;                     // touched batches and waking ones around them
   uint32_t *near_list;                  // these
   uint32_t near_count;

@@ -106,23 +106,17 @@ uint32_t sonde_contact_region_of(const sonde_state *state, uint32_t i) {
   return state->parent[i] - state->model->surface.vertex_count;
 }
 
-// Velocity of a node relative to the probe's point at the same place.
-static sonde_vec3 relative_velocity(const sonde_state *state, uint32_t i,
-                                    const sonde_motion *probe) {
-  sonde_vec3 arm = v_sub(state->probed[i], probe->origin);
-  sonde_vec3 carried = v_add(probe->velocity, v_cross(probe->spin, arm));
-  return v_sub(state->velocity[i], carried);
-}
-
 // Volume, its rate and the direction k = sum g_i / |sum g_i|: the mean normal of the wetted face.
-static void sum_regions(sonde_state *state, const sonde_motion *probe) {
+void sonde_contact_regions(sonde_state *state, const sonde_motion *probe) {
   sonde_contact *contact = &state->contact;
+  number_regions(state);
   for (uint32_t k = 0; k < state->touched_count; ++k) {
     uint32_t i = state->touched[k];
     sonde_contact_region *region = &contact->region[sonde_contact_region_of(state, i)];
-    sonde_vec3 g = state->gradient[i];
+    sonde_vec3 g = state->gradient[i], arm = v_sub(state->probed[i], probe->origin);
+    sonde_vec3 carried = v_add(probe->velocity, v_cross(probe->spin, arm));
     region->volume_m3 += state->share_m3[i];
-    region->volume_rate_m3_s += v_dot(g, relative_velocity(state, i, probe));
+    region->volume_rate_m3_s += v_dot(g, v_sub(state->velocity[i], carried));
     region->direction = v_add(region->direction, g);
     region->node_count++;
   }
@@ -131,11 +125,6 @@ static void sum_regions(sonde_state *state, const sonde_motion *probe) {
     region->area_m2 = v_norm(region->direction);
     region->direction = v_unit(region->direction, vec3(0, 0, 0));
   }
-}
-
-void sonde_contact_regions(sonde_state *state, const sonde_motion *probe) {
-  number_regions(state);
-  sum_regions(state, probe);
 }
 
 void sonde_contact_wrench(sonde_state *state, sonde_vec3 origin) {
@@ -161,10 +150,6 @@ void sonde_contact_wrench(sonde_state *state, sonde_vec3 origin) {
           v_scale(contact->region[r].centre_m, 1.0 / contact->region[r].force_n);
 }
 
-static double distance_to_box(const sonde_box *box, sonde_vec3 p) {
-  return v_norm(v_sub(p, v_max(box->low, v_min(box->high, p))));
-}
-
 // Greatest and least distance from the box around the probe to where the skin that it pushes rests.
 bool sonde_contact_carries(const sonde_state *state, const sonde_probe *probe, sonde_pose pose) {
   double most = 0, least = INFINITY;
@@ -172,7 +157,8 @@ bool sonde_contact_carries(const sonde_state *state, const sonde_probe *probe, s
   for (uint32_t k = 0; k < state->touched_count; ++k) {
     uint32_t i = state->touched[k];
     if (!(v_norm2(state->contact_force[i]) > 0)) continue;
-    double distance = distance_to_box(&box, state->model->surface.vertices[i]);
+    sonde_vec3 rest = state->model->surface.vertices[i];
+    double distance = v_distance(rest, v_max(box.low, v_min(box.high, rest)));
     most = fmax(most, distance);
     least = fmin(least, distance);
   }

@@ -26,18 +26,10 @@ void sonde_friction_release(sonde_state *state) {
 
 typedef struct bond {
   sonde_vec3 normal;    // along which the probe pushes
-  sonde_vec3 way_m;     // b, across the normal
+  sonde_vec3 b_m;       // deflection, across the normal
   double stiffness_n_m; // P mu_s/d
   double limit_m;       // d mu/mu_s
 } bond;
-
-static sonde_vec3 across(sonde_vec3 a, sonde_vec3 n) { return v_madd(a, -v_dot(a, n), n); }
-
-// Way of the probe's point at a node during the step.
-static sonde_vec3 carried_way(const sonde_state *state, uint32_t i, const sonde_motion *probe) {
-  sonde_vec3 arm = v_sub(state->position[i], probe->origin);
-  return v_scale(v_add(probe->velocity, v_cross(probe->spin, arm)), state->def.dt_s);
-}
 
 // False for a node that the probe did not push in the step before.
 static bool bond_of(const sonde_state *state, uint32_t i, const sonde_motion *probe,
@@ -46,8 +38,11 @@ static bool bond_of(const sonde_state *state, uint32_t i, const sonde_motion *pr
   if (state->grip_tick[i] != state->tick || !(push > 0)) return false;
   double most = sonde_friction_coefficient(&state->def.friction, 0);
   at->normal = v_scale(state->grip_n[i], 1 / push);
-  sonde_vec3 way = v_sub(v_add(state->bond_m[i], moved), carried_way(state, i, probe));
-  at->way_m = across(way, at->normal);
+  // The node's displacement against the probe's point there, less what slipped, across the push.
+  sonde_vec3 arm = v_sub(state->position[i], probe->origin);
+  sonde_vec3 carried = v_scale(v_add(probe->velocity, v_cross(probe->spin, arm)), state->def.dt_s);
+  sonde_vec3 b = v_sub(v_add(state->bond_m[i], moved), carried);
+  at->b_m = v_madd(b, -v_dot(b, at->normal), at->normal);
   at->stiffness_n_m = push * most / BOND_M;
   at->limit_m = BOND_M * state->mu / most;
   return most > 0;
@@ -60,13 +55,13 @@ bool sonde_friction_at(const sonde_state *state, uint32_t i, const sonde_motion 
   double reach = state->def.implicitness * state->def.dt_s;
   SONDE_ASSERT(i < state->model->surface.vertex_count && reach >= 0);
   if (!bond_of(state, i, probe, v_scale(state->velocity[i], reach), &at)) return false;
-  double length = v_norm(at.way_m);
+  double length = v_norm(at.b_m);
   bool slips = length > at.limit_m;
   double stiffness = slips ? at.stiffness_n_m * at.limit_m / length : at.stiffness_n_m;
   double scaled = scales->stiffness * stiffness;
   *block = m_rank1(at.normal, -scaled, scaled);
-  if (slips) *block = m_add(*block, m_rank1(v_scale(at.way_m, 1 / length), -scaled, 0));
-  *force = v_scale(at.way_m, -stiffness);
+  if (slips) *block = m_add(*block, m_rank1(v_scale(at.b_m, 1 / length), -scaled, 0));
+  *force = v_scale(at.b_m, -stiffness);
   return true;
 }
 
@@ -79,14 +74,14 @@ static double advance_node(sonde_state *state, uint32_t i, const sonde_motion *p
   state->grip_tick[i] = state->tick + 1;
   state->bond_m[i] = vec3(0, 0, 0);
   if (!held) return 0;
-  double length = v_norm(at.way_m);
+  double length = v_norm(at.b_m);
   if (length > at.limit_m) {
     slip = length - at.limit_m;
-    at.way_m = v_scale(at.way_m, at.limit_m / length);
+    at.b_m = v_scale(at.b_m, at.limit_m / length);
   }
-  SONDE_ASSERT(v_norm(at.way_m) <= BOND_M * (1 + 1e-9));
-  state->bond_m[i] = at.way_m;
-  state->contact_force[i] = v_madd(state->contact_force[i], -at.stiffness_n_m, at.way_m);
+  SONDE_ASSERT(v_norm(at.b_m) <= BOND_M * (1 + 1e-9));
+  state->bond_m[i] = at.b_m;
+  state->contact_force[i] = v_madd(state->contact_force[i], -at.stiffness_n_m, at.b_m);
   return slip;
 }
 

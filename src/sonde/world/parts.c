@@ -1,13 +1,14 @@
 // The kernels over a whole body: one part, or two beside each other, and their sums.
 #include "world/batches.h"
 
-#include "world/crew.h"
+#include "world/second_thread.h"
 
 #include "base/base.h"
 #include "base/maths.h"
 
 #include <string.h>
 
+// The first four read neighbours.
 typedef enum phase { LINEARISE, SWEEP, RESTART, MULTIPLY, ADVANCE, BEND, ACCEPT, UPDATE } phase;
 
 typedef struct job {
@@ -56,18 +57,14 @@ static void run_part(void *with, uint32_t part) {
   }
 }
 
-static bool reads_neighbours(phase p) {
-  return p == LINEARISE || p == SWEEP || p == RESTART || p == MULTIPLY;
-}
-
 // The sums of all parts end up in those of the first.
 static void run(job *j) {
   if (j->body->part_count == 1) {
     run_part(j, 0);
     return;
   }
-  if (reads_neighbours(j->phase)) sonde_crew_run(j->body->thread, look, j);
-  sonde_crew_run(j->body->thread, run_part, j);
+  if (j->phase <= MULTIPLY) sonde_second_thread_run(j->body->thread, look, j);
+  sonde_second_thread_run(j->body->thread, run_part, j);
   sonde_batch_sums *sum = &j->sums[0];
   const sonde_batch_sums *more = &j->sums[1];
   j->value[0] += j->value[1];

@@ -33,11 +33,6 @@ typedef struct path {
 
 static uint32_t nodes(const path *p) { return p->state->model->surface.vertex_count; }
 
-// Angle between two orientations.
-static double turn(sonde_quat a, sonde_quat b) {
-  return 2 * acos(fmin(1, fabs(a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z)));
-}
-
 static sonde_pose pose_at(const path *p, double share) {
   sonde_quat a = p->from.rotation, b = p->to.rotation;
   double sign = a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z < 0 ? -share : share,
@@ -47,33 +42,25 @@ static sonde_pose pose_at(const path *p, double share) {
   return (sonde_pose){v_lerp(p->from.position, p->to.position, share), q_unit(q)};
 }
 
-static double push_along_beam(const path *p, sonde_pose pose) {
-  return -v_dot(p->state->contact.force_n, q_rotate(pose.rotation, vec3(0, 0, 1)));
-}
-
-// The touched skin goes along with the probe, as it does under a slow press. Left behind it would
-// lie deep inside the probe, where some of it is nearer to a side than to the face.
-static void move_touched_skin(path *p, const equilibrium *from, double share) {
+// The equilibrium one step on from another. The touched skin goes along with the probe first, as it
+// does under a slow press: left behind it would lie deep inside the probe, where some of it is
+// nearer to a side than to the face.
+static void settle_from(path *p, const equilibrium *from, double share, double residual,
+                        equilibrium *to) {
+  sonde_state *state = p->state;
   sonde_pose was = pose_at(p, from->share), is = pose_at(p, share);
-  memcpy(p->state->position, from->position, nodes(p) * sizeof *from->position);
+  SONDE_ASSERT(share >= 0 && share <= 1);
+  sonde_state_publish(state);
+  memcpy(state->position, from->position, nodes(p) * sizeof *from->position);
   for (uint32_t i = 0; i < nodes(p); ++i) {
     if (!from->touched[i]) continue;
     const sonde_vec3 at = from->position[i];
     sonde_vec3 move = v_sub(pose_apply(is, pose_apply_inverse(was, at)), at);
-    p->state->position[i] = v_add(at, sonde_bounded_move(p->state->model, i, at, move));
+    state->position[i] = v_add(at, sonde_bounded_move(state->model, i, at, move));
   }
-}
-
-static void settle_from(path *p, const equilibrium *from, double share, double residual,
-                        equilibrium *to) {
-  sonde_state *state = p->state;
-  sonde_pose pose = pose_at(p, share);
-  SONDE_ASSERT(share >= 0 && share <= 1);
-  sonde_state_publish(state);
-  move_touched_skin(p, from, share);
-  to->settled = sonde_settle(state, p->probe, pose, residual, p->def->max_iterations);
+  to->settled = sonde_settle(state, p->probe, is, residual, p->def->max_iterations);
   to->share = share;
-  to->force_n = push_along_beam(p, pose);
+  to->force_n = -v_dot(state->contact.force_n, q_rotate(is.rotation, vec3(0, 0, 1)));
   memcpy(to->position, state->position, nodes(p) * sizeof *to->position);
   for (uint32_t i = 0; i < nodes(p); ++i) to->touched[i] = v_norm2(state->contact_force[i]) > 0;
   p->result->iterations += to->settled.iterations;
@@ -85,30 +72,11 @@ static void swap_equilibria(equilibrium *a, equilibrium *b) {
   *a = *b, *b = c;
 }
 
-static void copy_equilibrium(const path *p, const equilibrium *from, equilibrium *to) {
-  to->share = from->share, to->force_n = from->force_n, to->settled = from->settled;
-  memcpy(to->position, from->position, nodes(p) * sizeof *to->position);
-  memcpy(to->touched, from->touched, nodes(p));
-}
-
-static bool forces_agree(const path *p) {
-  double least = fmax(p->def->tolerance * fabs(p->end.force_n), forgiven_n);
-  return p->whole.settled.converged && p->half.settled.converged && p->end.settled.converged &&
-         fabs(p->whole.force_n - p->end.force_n) <= least;
-}
-
-static void note_jump(path *p) {
-  sonde_path_result *r = p->result;
-  double way_m = v_distance(p->from.position, p->to.position);
-  if (r->jump_count < SONDE_PATH_JUMPS)
-    r->jump[r->jump_count] = (sonde_path_jump){p->here.share * way_m, p->end.share * way_m,
-                                               p->here.force_n, p->whole.force_n, p->end.force_n};
-  ++r->jump_count;
-}
-
 // From `here`, at most *step_m on; `end` is the new equilibrium. The first half of a step that was
-// too long is the next, shorter one taken at once.
+// too long is the next, shorter one taken at once. A shortest step whose halves end elsewhere is
+// told as a jump.
 static void take_step(path *p, double *step_m) {
+  sonde_path_result *r = p->result;
   double step = *step_m, left = (1 - p->here.share) * p->length_m;
   SONDE_ASSERT(step > 0 && left > 0);
   for (bool known = false;; known = true) {
@@ -118,11 +86,18 @@ static void take_step(path *p, double *step_m) {
     settle_from(p, &p->here, middle, on_the_way, &p->half);
     settle_from(p, &p->half, share, on_the_way, &p->end);
     step = fmin(step, left);
-    bool same = forces_agree(p);
+    double least = fmax(p->def->tolerance * fabs(p->end.force_n), forgiven_n);
+    bool same = p->whole.settled.converged && p->half.settled.converged &&
+                p->end.settled.converged && fabs(p->whole.force_n - p->end.force_n) <= least;
     if (same || 0.5 * step < p->def->least_step_m) {
-      if (!same) note_jump(p);
+      double length_m = v_distance(p->from.position, p->to.position);
+      if (!same && r->jump_count < SONDE_PATH_JUMPS)
+        r->jump[r->jump_count] =
+            (sonde_path_jump){p->here.share * length_m, p->end.share * length_m, p->here.force_n,
+                              p->whole.force_n, p->end.force_n};
+      r->jump_count += !same;
       *step_m = same ? fmin(2 * step, p->def->step_m) : step;
-      ++p->result->steps;
+      ++r->steps;
       return;
     }
     swap_equilibria(&p->whole, &p->half);
@@ -142,17 +117,15 @@ static void meet_force(path *p) {
     settle_from(p, &p->here, low - low_f * (high - low) / (high_f - low_f), on_the_way, &p->end);
     double weight = k % 3 == 2 ? 0.5 : 1;
     if (p->end.force_n < wanted) {
-      copy_equilibrium(p, &p->end, &p->here);
+      p->here.share = p->end.share, p->here.force_n = p->end.force_n;
+      p->here.settled = p->end.settled;
+      memcpy(p->here.position, p->end.position, nodes(p) * sizeof *p->here.position);
+      memcpy(p->here.touched, p->end.touched, nodes(p));
       low_f = p->here.force_n - wanted, high_f *= weight;
     } else {
       high = p->end.share, high_f = p->end.force_n - wanted, low_f *= weight;
     }
   }
-}
-
-static double share_done(const path *p) {
-  double force = isfinite(p->def->force_n) ? p->here.force_n / p->def->force_n : 0;
-  return clamp(fmax(p->here.share, force), 0, 1);
 }
 
 // False when cancelled.
@@ -162,7 +135,9 @@ static bool follow(path *p, const sonde_progress *progress) {
   while (p->end.settled.converged && p->end.share < 1 && p->end.force_n < p->def->force_n &&
          p->length_m > 0) {
     swap_equilibria(&p->here, &p->end);
-    if (!sonde_progress_report(progress, share_done(p), "pressing")) return false;
+    double met_share = isfinite(p->def->force_n) ? p->here.force_n / p->def->force_n : 0;
+    double done = clamp(fmax(p->here.share, met_share), 0, 1);
+    if (!sonde_progress_report(progress, done, "pressing")) return false;
     take_step(p, &step_m);
   }
   return true;
@@ -244,8 +219,10 @@ sonde_status sonde_settle_path(sonde_state *state, const sonde_probe *probe, son
   *result = (sonde_path_result){.pose = from};
   path p = {.state = state, .probe = probe, .def = def ? def : &usual};
   p.from = from, p.to = to, p.result = result;
-  p.length_m = v_distance(from.position, to.position) +
-               turn(from.rotation, to.rotation) * hypot(probe->half_x_m, probe->half_y_m);
+  sonde_quat a = from.rotation, b = to.rotation;
+  double angle = 2 * acos(fmin(1, fabs(a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z)));
+  p.length_m =
+      v_distance(from.position, to.position) + angle * hypot(probe->half_x_m, probe->half_y_m);
   sonde_status status = check_def(p.def, error);
   if (!status) status = create_equilibria(&p, error);
   if (!status) {

@@ -94,15 +94,6 @@ static void restore_touched(sonde_state *state, const sonde_snapshot_head *head,
   state->touched_count = head->touched;
 }
 
-static void restore_head(sonde_state *state, const sonde_snapshot_head *head) {
-  state->tick = head->tick, state->flag_count = head->flag_count;
-  state->flags = head->flags, state->mu = head->mu;
-  state->probe_pose = head->probe_pose;
-  state->has_probe_pose = head->has_probe_pose;
-  state->contact = head->contact, state->solver = head->solver;
-  state->times = (sonde_stage_times){0};
-}
-
 sonde_status sonde_state_restore(sonde_state *state, const void *blob, size_t bytes,
                                  sonde_error *error) {
   SONDE_ASSERT(state != NULL && blob != NULL);
@@ -120,7 +111,12 @@ sonde_status sonde_state_restore(sonde_state *state, const void *blob, size_t by
   if (!status) status = sonde_state_set_friction(state, &head.friction, error);
   if (status) return status;
   restore_touched(state, &head, (const char *)blob + parts.touched);
-  restore_head(state, &head);
+  state->tick = head.tick, state->flag_count = head.flag_count;
+  state->flags = head.flags, state->mu = head.mu;
+  state->probe_pose = head.probe_pose;
+  state->has_probe_pose = head.has_probe_pose;
+  state->contact = head.contact, state->solver = head.solver;
+  state->times = (sonde_stage_times){0};
   restore_motion(state, &parts, blob, head.doubles);
   sonde_state_publish(state);
   state->awake_nodes = head.awake_nodes;

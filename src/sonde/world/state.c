@@ -11,12 +11,13 @@ sonde_world_def sonde_world_def_default(void) {
   return (sonde_world_def){.version = SONDE_DEF_VERSION,
                            .dt_s = 1e-3,
                            .implicitness = 1,
-                           .newton_iterations = 2,
-                           .pcg = {5e-3, 1e-12, 200},
+                           .newton_iterations = 3,
+                           .engine = SONDE_ENGINE_FAST,
+                           .pcg = {1e-2, 1e-6, 200}, // 1 mN over a step
                            .contact_law = SONDE_CONTACT_FOUNDATION,
                            .contact_stiffness_n_m3 = 5e8,
                            .contact_damping_n_s_m3 = 1e5,
-                           .sleep_displacement_m = 5e-6,
+                           .sleep_displacement_m = 20e-6,
                            .friction = {.stribeck_speed_m_s = 0.01, .mu_gel = 0.05},
                            .threads = 1};
 }
@@ -128,10 +129,6 @@ static sonde_status order_faces(sonde_state *state, sonde_error *error) {
   return SONDE_OK;
 }
 
-static const sonde_engine_calls *engine_of(sonde_engine engine) {
-  return engine == SONDE_ENGINE_FAST ? &sonde_engine_float : &sonde_engine_double;
-}
-
 sonde_status sonde_state_create_ordered(const sonde_model *model, const sonde_world_def *def,
                                         const uint32_t *face_order, sonde_state **out,
                                         sonde_error *error) {
@@ -145,6 +142,8 @@ sonde_status sonde_state_create_ordered(const sonde_model *model, const sonde_wo
   state->model = state->tissue = model;
   state->tuning = sonde_tuning_default();
   state->def = *def;
+  const sonde_engine_calls *calls =
+      def->engine == SONDE_ENGINE_FAST ? &sonde_engine_float : &sonde_engine_double;
   state->block = sonde_calloc(1, carve(state, NULL));
   if (state->block) carve(state, state->block);
   status = state->block ? SONDE_OK : sonde_fail_memory(error);
@@ -152,8 +151,7 @@ sonde_status sonde_state_create_ordered(const sonde_model *model, const sonde_wo
     memcpy(state->face_order, face_order, model->surface.face_count * sizeof *face_order);
   else if (!status)
     status = order_faces(state, error);
-  if (!status)
-    status = engine_of(def->engine)->create(model, def, state->face_order, &state->engine, error);
+  if (!status) status = calls->create(model, def, state->face_order, &state->engine, error);
   if (!status && def->engine == SONDE_ENGINE_DOUBLE) state->precise = state->engine;
   if (status) {
     sonde_state_destroy(state);

@@ -1,13 +1,13 @@
-#ifndef SONDE_SRC_CREW_INSIDE_H
-#define SONDE_SRC_CREW_INSIDE_H
+#ifndef SONDE_SRC_SECOND_THREAD_INSIDE_H
+#define SONDE_SRC_SECOND_THREAD_INSIDE_H
 
-#include "world/crew.h"
+#include "world/second_thread.h"
 
 #include <pthread.h>
 #include <semaphore.h>
 #include <stdatomic.h>
 
-struct sonde_crew {
+struct sonde_second_thread {
   pthread_t thread;
   sem_t wake;
   void (*work)(void *with, uint32_t part);
@@ -22,13 +22,13 @@ struct sonde_crew {
 };
 
 // The second part of a piece of work goes to whoever comes first.
-static inline bool sonde_crew_take(sonde_crew *crew, unsigned piece) {
+static inline bool sonde_second_thread_take(sonde_second_thread *second, unsigned piece) {
   unsigned before = piece - 1;
-  return atomic_compare_exchange_strong(&crew->taken, &before, piece);
+  return atomic_compare_exchange_strong(&second->taken, &before, piece);
 }
 
 // Tells the processor that this is a loop that waits.
-static inline void sonde_crew_pause(void) {
+static inline void sonde_second_thread_pause(void) {
 #if defined(__x86_64__)
   __builtin_ia32_pause();
 #elif defined(__aarch64__)
