@@ -41,35 +41,33 @@ void sonde_block_multiply(const sonde_block_matrix *matrix, const sonde_active_s
   }
 }
 
-// Adjugate over determinant of a symmetric 3x3 block. A block whose determinant rounds to no
-// positive number (one stiffness is 1e16 times another) counts as its mean stiffness in all
-// directions.
-static void invert_symmetric(const double (*d)[3], double *inverse) {
-  double a = d[0][0], b = d[0][1], c = d[0][2], e = d[1][1], f = d[1][2], g = d[2][2];
-  double xx = e * g - f * f, xy = c * f - b * g, xz = b * f - c * e;
-  double determinant = a * xx + b * xy + c * xz;
-  if (determinant <= 0) {
-    double mean = (a + e + g) / 3;
-    for (int k = 0; k < 6; ++k) inverse[k] = 0;
-    inverse[0] = inverse[3] = inverse[5] = mean > 0 ? 1 / mean : 1;
-    return;
-  }
-  double s = 1.0 / determinant;
-  inverse[0] = xx * s;
-  inverse[1] = xy * s;
-  inverse[2] = xz * s;
-  inverse[3] = (a * g - c * c) * s;
-  inverse[4] = (b * c - a * f) * s;
-  inverse[5] = (a * e - b * b) * s;
-}
-
 void sonde_block_invert_diagonal(sonde_block_matrix *matrix, const sonde_active_set *active) {
   const uint32_t *rows = active ? active->rows : NULL;
   uint32_t count = rows ? active->row_count : matrix->row_count;
   SONDE_ASSERT(count <= matrix->row_count);
   for (uint32_t r = 0; r < count; ++r) {
     uint32_t i = rows ? rows[r] : r;
-    invert_symmetric((const double(*)[3])matrix->diagonal[i].m, matrix->inverse[i]);
+    // Adjugate over determinant of a symmetric block. A block whose determinant rounds to no
+    // positive number (one stiffness is 1e16 times another) counts as its mean stiffness in all
+    // directions.
+    const double(*d)[3] = (const double(*)[3])matrix->diagonal[i].m;
+    double *inverse = matrix->inverse[i];
+    double a = d[0][0], b = d[0][1], c = d[0][2], e = d[1][1], f = d[1][2], g = d[2][2];
+    double xx = e * g - f * f, xy = c * f - b * g, xz = b * f - c * e;
+    double determinant = a * xx + b * xy + c * xz;
+    if (determinant <= 0) {
+      double mean = (a + e + g) / 3;
+      for (int k = 0; k < 6; ++k) inverse[k] = 0;
+      inverse[0] = inverse[3] = inverse[5] = mean > 0 ? 1 / mean : 1;
+      continue;
+    }
+    double s = 1.0 / determinant;
+    inverse[0] = xx * s;
+    inverse[1] = xy * s;
+    inverse[2] = xz * s;
+    inverse[3] = (a * g - c * c) * s;
+    inverse[4] = (b * c - a * f) * s;
+    inverse[5] = (a * e - b * b) * s;
   }
 }
 

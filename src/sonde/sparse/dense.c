@@ -33,22 +33,6 @@ static void mirror(double *a, uint32_t n, bool to_upper) {
         a[(size_t)i * n + j] = a[(size_t)j * n + i];
 }
 
-// Rows [from, to) of the upper triangle, from which all earlier ones have been taken.
-static bool factor_rows(double *a, uint32_t n, uint32_t from, uint32_t to) {
-  for (uint32_t i = from; i < to; ++i) {
-    double *row = a + (size_t)i * n;
-    for (uint32_t k = from; k < i; ++k) {
-      const double *above = a + (size_t)k * n;
-      double l = above[i];
-      for (uint32_t j = i; j < n; ++j) row[j] -= l * above[j];
-    }
-    if (!(row[i] > 0)) return false;
-    double root = row[i] = sqrt(row[i]);
-    for (uint32_t j = i + 1; j < n; ++j) row[j] /= root;
-  }
-  return true;
-}
-
 bool sonde_cholesky(double *a, uint32_t n) {
   SONDE_ASSERT(n > 0);
   mirror(a, n, true);
@@ -66,7 +50,18 @@ bool sonde_cholesky(double *a, uint32_t n) {
                                    .depth = i,
                                    .subtract = true};
     sonde_multiply(&product);
-    if (!factor_rows(a, n, i, end)) return false;
+    // Rows of the block against each other; all earlier ones have been taken from them.
+    for (uint32_t r = i; r < end; ++r) {
+      double *row = a + (size_t)r * n;
+      for (uint32_t k = i; k < r; ++k) {
+        const double *above = a + (size_t)k * n;
+        double l = above[r];
+        for (uint32_t j = r; j < n; ++j) row[j] -= l * above[j];
+      }
+      if (!(row[r] > 0)) return false;
+      double root = row[r] = sqrt(row[r]);
+      for (uint32_t j = r + 1; j < n; ++j) row[j] /= root;
+    }
   }
   mirror(a, n, false);
   return true;

@@ -1,8 +1,5 @@
-// sort_piece:       along its widest side.
-// split_separator:  rows of the upper half that touch the lower one go behind the others.
-// part:             one piece into lower half, upper half, separator.
-// dissect:          all pieces, with an explicit stack.
-// sonde_pattern_check: columns within the rows and ascending.
+// Nested dissection: every piece is split along its widest side into halves and what separates
+// them, with an explicit stack.
 #include "sparse/dissect.h"
 
 #include "base/base.h"
@@ -36,39 +33,12 @@ static void sort_piece(const dissection *d, uint32_t *piece, uint32_t count) {
   sonde_sort_along(points, widest, piece, count, d->keys);
 }
 
-// side[row] is the mark for the lower half of the current piece. Returns how many rows of the upper
-// half stay.
-static uint32_t split_separator(const dissection *d, uint32_t *upper, uint32_t count) {
-  const sonde_pattern *a = d->pattern;
-  uint32_t keep = 0, parted = 0;
-  for (uint32_t i = 0; i < count; ++i) {
-    uint32_t row = upper[i];
-    bool touches = false;
-    for (uint32_t p = a->start[row]; p < a->start[row + 1] && !touches; ++p)
-      touches = d->side[a->column[p]] == d->mark;
-    if (touches)
-      d->scratch[parted++] = row;
-    else
-      upper[keep++] = row;
-  }
-  memcpy(upper + keep, d->scratch, parted * sizeof *d->scratch);
-  return keep;
-}
-
-// Returns how many rows of the upper half stay.
-static uint32_t part(dissection *d, uint32_t *piece, uint32_t count) {
-  uint32_t half = count / 2;
-  sort_piece(d, piece, count);
-  ++d->mark;
-  for (uint32_t i = 0; i < half; ++i) d->side[piece[i]] = d->mark;
-  return split_separator(d, piece + half, count - half);
-}
-
 static void dissect(dissection *d, uint32_t rows, uint32_t leaf, uint32_t *order, uint32_t *above) {
   struct {
     uint32_t first, count, above;
   } stack[STACK];
-  uint32_t depth = 0, n = d->pattern->n;
+  const sonde_pattern *a = d->pattern;
+  uint32_t depth = 0, n = a->n;
   for (uint32_t i = 0; i < n; ++i) order[i] = i;
   for (uint32_t i = 0; i < n && above; ++i) above[i] = UINT32_MAX;
   stack[depth].first = 0, stack[depth].count = rows, stack[depth++].above = rows;
@@ -79,7 +49,24 @@ static void dissect(dissection *d, uint32_t rows, uint32_t leaf, uint32_t *order
       if (above) above[first] = up;
       continue;
     }
-    uint32_t half = count / 2, keep = part(d, order + first, count), last = first + half + keep;
+    // The lower half gets the current mark; rows of the upper half that touch it are the separator.
+    uint32_t half = count / 2, keep = 0, parted = 0, *upper = order + first + half;
+    sort_piece(d, order + first, count);
+    ++d->mark;
+    for (uint32_t i = 0; i < half; ++i) d->side[order[first + i]] = d->mark;
+    for (uint32_t i = 0; i < count - half; ++i) {
+      uint32_t row = upper[i];
+      bool touches = false;
+      for (uint32_t p = a->start[row]; p < a->start[row + 1] && !touches; ++p)
+        touches = d->side[a->column[p]] == d->mark;
+      if (touches)
+        d->scratch[parted++] = row;
+      else
+        upper[keep++] = row;
+    }
+    memcpy(upper + keep, d->scratch, parted * sizeof *d->scratch);
+    // The separator goes behind both halves and above them.
+    uint32_t last = first + half + keep;
     if (half + keep < count) {
       if (above) above[last] = up;
       up = last;

@@ -60,23 +60,6 @@ static sonde_piece *piece_of_element(const sonde_symbolic *s, uint32_t element) 
   return least < s->node_count ? &s->pieces.list[s->pieces.piece_of[least]] : NULL;
 }
 
-static void assign_elements(sonde_symbolic *s, uint32_t element_count) {
-  for (uint32_t e = 0; e < element_count; ++e) {
-    sonde_piece *p = piece_of_element(s, e);
-    if (p) ++p->entry_count;
-  }
-  for (uint32_t t = 0, at = 0; t <= s->pieces.count; ++t) {
-    sonde_piece *p = &s->pieces.list[t];
-    p->entry = at;
-    at += p->entry_count;
-    p->entry_count = 0;
-  }
-  for (uint32_t e = 0; e < element_count; ++e) {
-    sonde_piece *p = piece_of_element(s, e);
-    if (p) s->element_of[p->entry + p->entry_count++] = e;
-  }
-}
-
 // Indices of nodes in the front of each piece: of what its children leave, and of the pattern's
 // entries in its own rows. index [node_count] is scratch.
 static void relate_fronts(sonde_symbolic *s, const sonde_symbolic_def *def, uint32_t *index) {
@@ -153,7 +136,21 @@ sonde_status sonde_symbolic_create(const sonde_symbolic_def *def, sonde_symbolic
     status = sonde_fail_memory(error);
     goto done;
   }
-  if (s->elements) assign_elements(s, def->element_count);
+  // Elements go to their pieces: counted, placed, listed.
+  for (uint32_t e = 0; e < def->element_count && s->elements; ++e) {
+    sonde_piece *p = piece_of_element(s, e);
+    if (p) ++p->entry_count;
+  }
+  for (uint32_t t = 0, at = 0; t <= s->pieces.count && s->elements; ++t) {
+    sonde_piece *p = &s->pieces.list[t];
+    p->entry = at;
+    at += p->entry_count;
+    p->entry_count = 0;
+  }
+  for (uint32_t e = 0; e < def->element_count && s->elements; ++e) {
+    sonde_piece *p = piece_of_element(s, e);
+    if (p) s->element_of[p->entry + p->entry_count++] = e;
+  }
   relate_fronts(s, def, index);
   measure(s);
 done:

@@ -1,7 +1,5 @@
-// list_pieces       from the marks of the dissection
-// add_place         to a boundary, once
-// find_boundaries   later rows that a piece touches or its children leave
-// sonde_pieces_stack  the walk of a factor, sizes only
+// Pieces of a nested dissection from its marks, and their boundaries: later rows that a piece
+// touches or its children leave.
 #include "sparse/pieces.h"
 
 #include "base/base.h"
@@ -34,16 +32,6 @@ static sonde_status list_pieces(sonde_pieces *s, uint32_t n, uint32_t rows, cons
   return SONDE_OK;
 }
 
-static sonde_status reserve(sonde_pieces *s, size_t more, size_t *room, sonde_error *error) {
-  if (s->boundary_total + more <= *room) return SONDE_OK;
-  size_t wanted = 2 * (s->boundary_total + more);
-  uint32_t *grown = sonde_realloc(s->boundary, *room * sizeof *grown, wanted * sizeof *grown);
-  if (!grown) return sonde_fail_memory(error);
-  s->boundary = grown;
-  *room = wanted;
-  return SONDE_OK;
-}
-
 // seen[place] is the number of the last piece, from 1, that has it in its boundary.
 static void add_place(sonde_pieces *s, uint32_t t, uint32_t place, uint32_t *seen) {
   sonde_piece *p = &s->list[t];
@@ -57,8 +45,13 @@ static sonde_status find_boundaries(sonde_pieces *s, const sonde_pattern *a, uin
   size_t room = 0;
   for (uint32_t t = 0; t < s->count; ++t) {
     sonde_piece *p = &s->list[t];
-    sonde_status status = reserve(s, a->n, &room, error);
-    if (status) return status;
+    if (s->boundary_total + a->n > room) {
+      size_t wanted = 2 * (s->boundary_total + a->n);
+      uint32_t *grown = sonde_realloc(s->boundary, room * sizeof *grown, wanted * sizeof *grown);
+      if (!grown) return sonde_fail_memory(error);
+      s->boundary = grown;
+      room = wanted;
+    }
     p->boundary = (uint32_t)s->boundary_total;
     for (uint32_t k = p->first; k < p->first + p->count; ++k)
       for (uint32_t q = a->start[s->order[k]]; q < a->start[s->order[k] + 1]; ++q)
