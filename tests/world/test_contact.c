@@ -94,6 +94,23 @@ static void never_pulls(void **state) {
   }
 }
 
+// Eq. (4) as the paper has it, linearised once, follows a press as Newton's method does.
+static void equation_4_presses_like_newtons_method(void **state) {
+  (void)state;
+  double force[2];
+  for (int k = 0; k < 2; ++k) {
+    sonde_world_def def = fixture_world_def();
+    def.newton_iterations = k ? 8 : 0;
+    def.pcg.relative_residual = 1e-6;
+    bench b = make("square", def);
+    for (int t = 0; t < 60; ++t) sonde_step(b.state, &b.probe, fixture_pose(1e-4 * t));
+    force[k] = v_norm(sonde_state_contact(b.state)->force_n);
+    clear(&b);
+  }
+  assert_true(force[1] > 0.5);
+  assert_near(force[0], force[1], 0.02 * force[1]);
+}
+
 static void two_bumps_are_two_regions(void **state) {
   (void)state;
   bench b = make("linear", fixture_world_def());
@@ -216,6 +233,7 @@ int main(void) {
                                      cmocka_unit_test(action_equals_reaction),
                                      cmocka_unit_test(force_is_kappa_times_volume),
                                      cmocka_unit_test(never_pulls),
+                                     cmocka_unit_test(equation_4_presses_like_newtons_method),
                                      cmocka_unit_test(two_bumps_are_two_regions),
                                      cmocka_unit_test(settled_reaction_equals_contact),
                                      cmocka_unit_test(volume_law_holds_the_probe),

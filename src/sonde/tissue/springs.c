@@ -32,15 +32,6 @@ double sonde_normal_energy(double exponent, double k0_n_m3, double xm_m, double 
          over * (pressure + 0.5 * slope * over);
 }
 
-// q = m g with the secant modulus m, dq/dg = m + (q' - m).
-double sonde_shear_force(double shear_n_m, double limit, double g, double *slope) {
-  SONDE_ASSERT(g >= 0);
-  double bend = 1 / (limit * limit), modulus, beyond;
-  shear_modulus(shear_n_m, bend, g * g * bend, &modulus, &beyond);
-  if (slope) *slope = modulus + beyond * g * g;
-  return modulus * g;
-}
-
 double sonde_shear_energy(double shear_n_m, double limit, double g) {
   return sonde_normal_energy(2, shear_n_m, limit, SONDE_SHEAR_GUARD, g);
 }

@@ -60,8 +60,4 @@ SONDE_LINK double sonde_tissue_energy(const sonde_model *model, const sonde_vec3
 double sonde_normal_energy(double exponent, double k0_n_m3, double xm_m, double guard, double s_m);
 // Energy per area of the shear layer. @thread any
 double sonde_shear_energy(double shear_n_m, double limit, double g);
-// Force per length of the shear layer at slope g = |grad s| >= 0; *slope = dq/dg.
-// @thread any (tick)
-SONDE_LINK double sonde_shear_force(double shear_n_m, double limit, double g, double *slope);
-
 #endif

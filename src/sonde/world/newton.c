@@ -222,6 +222,52 @@ static bool is_bent(sonde_state *state, sonde_batches *body, double surprise2, i
   return !body->corners_coupled && uncoupled2(body) > fmax(share * now->force2, rest2);
 }
 
+static bool is_equation_4(const sonde_state *state) {
+  return state->def.newton_iterations == 0 && state->def.implicitness > 0;
+}
+
+// Eq. (4) of the paper is linear from the start of the step. The tissue's dampers are linear: its
+// forces are evaluated at the positions of the start with velocities of zero. The contact is found
+// where the velocities v of the start lead; at zero its pushes are less by its matrix times v.
+static void evaluate_at_rest(sonde_batches *body) {
+  const real force_scale = body->law.force_scale;
+  for (uint32_t k = 0; k < body->contact_count; ++k) {
+    uint32_t s = body->contact_batch[k];
+    const reals *v = body->batch[s].ve;
+    const reals row[4] = {v[0], v[1], v[2], all(0)};
+    for (uint32_t l = 0; l < SONDE_BATCH; ++l)
+      for (uint32_t c = 0; c < 4; ++c)
+        body->probe_move[(s * SONDE_BATCH + l) * SONDE_QUAD + c] = row[c][l];
+  }
+  sonde_batches_couple(body, body->probe_move);
+  for (uint32_t k = 0; k < body->contact_count; ++k) {
+    sonde_batch_contact *at = &body->contact[k];
+    const reals *v = body->batch[body->contact_batch[k]].ve;
+    reals own[6], out[3], taken[3];
+    for (int c = 0; c < 6; ++c)
+      own[c] = body->corners_coupled ? at->block[c] - at->neighbours[c] : at->block[c];
+    for (int c = 0; c < 3; ++c)
+      for (int l = 0; l < SONDE_BATCH; ++l) taken[c][l] = at->product[l][c];
+    out[0] = own[0] * v[0] + own[1] * v[1] + own[2] * v[2] - taken[0];
+    out[1] = own[1] * v[0] + own[3] * v[1] + own[4] * v[2] - taken[1];
+    out[2] = own[2] * v[0] + own[4] * v[1] + own[5] * v[2] - taken[2];
+    for (int c = 0; c < 3; ++c) at->force[c] += out[c] / force_scale;
+  }
+  for (uint32_t a = 0; a < body->awake_count; ++a) {
+    uint32_t s = body->awake[a];
+    for (int c = 0; c < 3; ++c) body->batch[s].ve[c] = (reals){0};
+    for (uint32_t l = 0; l < SONDE_BATCH; ++l) sonde_batches_record(body, s * SONDE_BATCH + l);
+  }
+}
+
+// The solution of that as a change of the velocities of the start.
+static void count_from_start(sonde_batches *body) {
+  for (uint32_t a = 0; a < body->awake_count; ++a) {
+    sonde_batch *at = &body->batch[body->awake[a]];
+    for (int c = 0; c < 3; ++c) at->x[c] -= at->v[c], at->ve[c] = at->v[c];
+  }
+}
+
 // One Newton iteration: contact, forces and matrix where the nodes are expected, solution, pushes
 // after it. True when another one is needed; `last`: there will be none. Sweeps need a first
 // iteration without corner couplings.
@@ -245,6 +291,7 @@ static bool iterate(sonde_state *state, sonde_batches *body, const sonde_probe *
       if (body->common.is_awake[s] && !body->is_near[s]) sonde_batches_still(body, s, 1);
     sonde_batches_list(body, body->is_near);
   }
+  if (is_equation_4(state)) evaluate_at_rest(body);
   double detected = sonde_clock_now();
 
   now->last = last;
@@ -257,6 +304,7 @@ static bool iterate(sonde_state *state, sonde_batches *body, const sonde_probe *
     now->force2 = sums.force2;
   double assembled = sonde_clock_now();
   bool solved = solve(state, body, now, sweep, sums, sqrt(now->force2));
+  if (is_equation_4(state)) count_from_start(body);
   double end = sonde_clock_now();
 
   bool open = solved && !last;
@@ -323,8 +371,7 @@ static void rest(sonde_state *state, sonde_batches *body) {
 }
 
 // Where forces are evaluated first: what the probe touched may have bounced, its change of velocity
-// says nothing about the next. Eq. (4) of the paper is linear from the start of the step at rest,
-// since the dampers are linear.
+// says nothing about the next.
 static void expect(sonde_state *state, sonde_batches *body) {
   for (uint32_t k = 0; k < state->touched_count; ++k) {
     uint32_t i = state->touched[k], l = i % SONDE_BATCH;
@@ -332,11 +379,10 @@ static void expect(sonde_state *state, sonde_batches *body) {
     for (int c = 0; c < 3; ++c) at->ve[c][l] = at->v[c][l];
     sonde_batches_record(body, i);
   }
-  if (state->def.newton_iterations > 0 || !(state->def.implicitness > 0)) return;
+  if (!is_equation_4(state)) return;
   for (uint32_t a = 0; a < body->awake_count; ++a) {
-    uint32_t s = body->awake[a];
-    for (int c = 0; c < 3; ++c) body->batch[s].ve[c] = (reals){0};
-    for (uint32_t l = 0; l < SONDE_BATCH; ++l) sonde_batches_record(body, s * SONDE_BATCH + l);
+    sonde_batch *at = &body->batch[body->awake[a]];
+    for (int c = 0; c < 3; ++c) at->ve[c] = at->v[c];
   }
 }
 
