@@ -1,6 +1,4 @@
-// allocate / optimum_of: arrays, the result's parameters.
-// sonde_again_create: both and the refit. sonde_again_run: the refit from theta.
-// sonde_again_factor / sonde_again_spread: variances from the curvature at its end.
+// A refit that runs again from another point, and the variances at its end.
 #include "fit/again.h"
 #include "fit/refit_offset.h"
 #include "sparse/dense.h"

@@ -1,12 +1,5 @@
-// linear:           normal equations by site, of all, with a prior.
-// without_site:     errors of a site's rows at the linearised optimum without them.
-// leave_out:        the same site by site.
-// sonde_refit_choose_smoothness: the prior whose left-out sites are predicted best.
-// solve_rows:       H^-1 of many rows at once.
-// sandwich:         covariance from the residuals themselves.
-// add_prior_spread: what the smoothness adds to it.
-// bootstrap:        linearised refits with sites drawn again.
-// sonde_refit_confidence: all of it at the optimum.
+// What the data say about the parameters of stage 3: smoothness by left-out sites, sandwich
+// covariance, bootstrap over sites, all linearised at the optimum.
 #include "sparse/dense.h"
 #include "fit/refit_inside.h"
 

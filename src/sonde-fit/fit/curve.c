@@ -1,7 +1,4 @@
-// sonde_law_pressure: eq. (1) and its derivatives by log parameters.
-// linear_start: closed-form estimate of (k0, xm) from x = b f + a (x f).
-// curve_row: residual of one point.
-// sonde_fit_curve: Levenberg-Marquardt on one curve.
+// Stage 1: eq. (1) on one curve by bordered Levenberg-Marquardt from a closed-form start.
 #include "fit/bordered.h"
 #include "fit/law.h"
 

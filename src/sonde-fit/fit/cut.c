@@ -1,10 +1,4 @@
-// wrapped:       coordinates of a node in the footprint's axes, measured along the skin.
-// mark_inside:   nodes under the footprint, or the nearest one on a coarse mesh.
-// keep_nodes:    nodes within reach of them, with whole faces.
-// too_long:      middles of edges near the sides. crossing: points on edges that a side crosses.
-// cut_sides:     both, until the sides run along edges.
-// is_coarse:     whether the mesh can carry the footprint.
-// add_rim:       lengths of the border beyond which the skin is left out.
+// The skin around a footprint, cut along its sides and its rim.
 #include "fit/cut_split.h"
 
 #include "base/maths.h"

@@ -1,10 +1,4 @@
-// collect:       points on edges, sorted, each once.
-// find:          the vertex of an edge's point.
-// mix:           parents of a point between two vertices.
-// grow:          room for the new vertices and faces.
-// put_corner:    a face with two points: the corner between them and the rest.
-// split_face:    the parts of one face.
-// sonde_cut_split: all of it.
+// Faces that a cut crosses are split at the points where it meets their edges.
 #include "fit/cut_split.h"
 
 #include "base/maths.h"

@@ -1,6 +1,4 @@
-// share_progress:      the part of one exponent in the whole.
-// held_out_percent:    mean over the probes, so that a probe of small forces counts as much.
-// sonde_fit_exponents: stage 3 for every exponent; keeps the result that predicts best.
+// The exponent of the normal springs that predicts left-out measurements best.
 #include "sonde/fit_confidence.h"
 
 #include "base/base.h"

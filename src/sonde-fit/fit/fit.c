@@ -1,8 +1,4 @@
-// fit_curves:     stage 1, eq. (1) for every curve by itself.
-// start_sites:    geometric means of a site's curves.
-// fit_sites:      bordered Levenberg-Marquardt over all sites, without edges, then with them.
-// finish:         site parameters, forces and error report of stage 1 or 2.
-// refit_sites:    stage 3, on the full equilibrium.
+// The three stages of an estimation and their errors.
 #include "base/clock.h"
 #include "fit/bordered.h"
 #include "fit/fit_inside.h"

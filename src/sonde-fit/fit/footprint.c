@@ -1,7 +1,4 @@
-// mark_held:  nodes whose cell is covered by more than half; at least the most covered one.
-// add_nodes:  nodes that carry the normal law, with area and cosine.
-// add_edges:  edges from held nodes to the others.
-// sonde_footprint_edges: what those edges add at a depth.
+// Nodes under a footprint and the edges between them.
 #include "base/maths.h"
 #include "fit/fit_inside.h"
 #include "geometry/internal.h"

@@ -1,8 +1,4 @@
-// fold_of:       which part of the measurements a row belongs to.
-// start:         parameters at which a refit begins.
-// run_fold:      refit without that part, then its forces.
-// run_folds:     all parts in turn.
-// sonde_measurements_join: measurements of both tables, checked to be of different probes.
+// Left-out parts of the measurements, predicted by a refit of the rest.
 #include "fit/again.h"
 #include "sonde/fit_confidence.h"
 

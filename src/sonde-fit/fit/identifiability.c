@@ -1,7 +1,4 @@
-// condition_of:  by Jacobi rotations.
-// describe:      deviations and correlations of the four figures.
-// look_at:       the curvature of one probe's rows.
-// sonde_fit_identify: every probe, then all.
+// Which figures one probe and all probes determine, from the curvature at the common optimum.
 #include "fit/again.h"
 #include "sonde/fit_confidence.h"
 

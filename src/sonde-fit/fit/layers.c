@@ -1,9 +1,4 @@
-// describe:    errors of the fitted rows, of sites left out, of rows that were never fitted.
-// settle:      a refit with one law of the layer and what it gives.
-// cost_at:     J's least cost with its stiffening held.
-// search:      that stiffening by golden section.
-// start_membrane: T from the result's own law.
-// sonde_fit_layers: that law, T, J.
+// Two laws of the shear layer fitted and compared.
 #include "fit/again.h"
 #include "sonde/fit_confidence.h"
 

@@ -1,8 +1,4 @@
-// add_probes: the distinct probes, their footprints and mean forces.
-// sort_rows: row order (site index, probe, penetration).
-// cut: marks where curves and sites begin.
-// arrange: all of this, for the rows that are not left out.
-// mark_unfit: curves that no fit can use; excluded and warned about.
+// The rows of an estimation by site, probe and depth, and those that take no part.
 #include "fit/fit_inside.h"
 
 #include <math.h>

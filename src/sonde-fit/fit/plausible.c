@@ -1,9 +1,4 @@
-// sonde_plausible:  the table of ranges and the grade of a value.
-// curve_list:       rows by site, probe and depth, cut into curves.
-// measure_curve:    slopes, falls and order of one curve.
-// judge_units:      penetration and force of the whole table.
-// judge_curve:      the course of one curve.
-// judge_zero:       forces extrapolated to zero depth, by probe.
+// Measurements judged against known ranges before a fit.
 #include "fit/plausible.h"
 #include "fit/fit_inside.h"
 #include "sonde/fit_sample.h"

@@ -1,6 +1,4 @@
-// bias_of:        mean residual of a quarter of the depths, by probe.
-// judge_bias:     residuals that run with depth.
-// judge_geometry: penetration and asymptote against body and tissue below every site.
+// The result of a fit judged against known ranges.
 #include "fit/plausible.h"
 #include "fit/fit_inside.h"
 

@@ -1,6 +1,4 @@
-// predict_simplified: closed formula per row.
-// predict_full_curve: equilibrium per depth, each from the one before.
-// sonde_predict: curves in parallel.
+// Forces of a fitted model on the rows of a table.
 #include "base/maths.h"
 #include "fit/fit_inside.h"
 #include "base/parallel.h"

@@ -1,7 +1,4 @@
-// run_at:    the least cost with ln G held at a value.
-// walk:      from the optimum to one side, each value from the one before.
-// end_of:    where the rise crosses the threshold.
-// sonde_fit_profile_shear: optimum, both sides, interval.
+// Profile of the cost over the stiffness of the shear layer.
 #include "fit/again.h"
 #include "sonde/fit_confidence.h"
 

@@ -1,9 +1,5 @@
-// sonde_refit_sd_n: how much a row counts.
-// spread:          node fields from site parameters.
-// settle_datum:    equilibrium of one row, from its last one or from the depth before.
-// work_on_curve:   all depths of a curve, with adjoint gradients carried to the sites.
-// sonde_refit_forces: all curves in parallel.
-// sonde_refit_start: nominal area enlarged by a rim of surrounding skin.
+// Stage 3's model: fields of the nodes from parameters of the sites, forces and derivatives of all
+// rows.
 #include "fit/refit.h"
 #include "sparse/dense.h"
 #include "base/parallel.h"

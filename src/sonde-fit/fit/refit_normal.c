@@ -1,7 +1,4 @@
-// sonde_normal_*:        lower triangle and gradient of a quadratic.
-// loss_scale:            of a robust loss.
-// sonde_refit_weigh:     what one measurement counts.
-// sonde_refit_add_rows / sonde_refit_prior_row, _add_prior: measurements and what is known before.
+// Stage 3's normal equations: weights of rows, what is known beforehand.
 #include "fit/bordered.h"
 #include "sparse/dense.h"
 #include "fit/refit_inside.h"

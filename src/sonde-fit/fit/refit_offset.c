@@ -1,5 +1,4 @@
-// slopes_of:  how the error of a row changes with its curve's zero and tare.
-// reduce:     takes one curve's offsets out of the normal equations.
+// Contact zero and tare of each curve, eliminated from the normal equations.
 #include "fit/refit_offset.h"
 
 #include "base/maths.h"

@@ -1,6 +1,4 @@
-// sonde_phase_of:            loading or unloading.
-// mean_curve:                one site and probe, all its repeats at the depths of the first.
-// sonde_measurements_average: every curve in turn.
+// Repeated presses and unloading, reduced to one curve per site and probe.
 #include "fit/repeats.h"
 
 #include "base/maths.h"

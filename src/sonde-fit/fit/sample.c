@@ -1,8 +1,4 @@
-// column_of / take_size: names, units and sizes in the lines before the rows.
-// sonde_sample_load:     all rows, by compression.
-// sample_row:            residual of one row and its derivatives.
-// minimise:              Levenberg-Marquardt over the rows that a stretch does not leave out.
-// sonde_fit_sample:      the fit, and each of four stretches predicted by the others.
+// A law of compression fitted to one specimen, and stretches of it predicted by the others.
 #include "sonde/fit_sample.h"
 
 #include "base/maths.h"

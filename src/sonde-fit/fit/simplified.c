@@ -1,6 +1,4 @@
-// normal_force: eq. (1) of one site over a footprint.
-// sonde_site_force / sonde_site_row: force and residual of one measurement with derivatives.
-// sonde_site_problem_create: footprints, edge terms and weights, once per fit.
+// Stage 2: eq. (1) over a footprint with surface springs at its sides.
 #include "fit/simplified.h"
 
 #include "base/maths.h"

@@ -1,7 +1,4 @@
-// sonde_site_basis:     interpolates unit fields, two sites per call (k0 and xm).
-// spacing:              median distance to the nearest other site.
-// predict_from_plane:   weighted least squares plane through the neighbours, at the site.
-// sonde_site_roughness: value minus prediction.
+// Fields of the nodes interpolated between sites, and their roughness.
 #include "fit/site_field.h"
 
 #include "base/maths.h"

@@ -1,6 +1,4 @@
-// draw_start:  one random point in the logarithms.
-// distance_sd: how far its end lies from the optimum, in standard deviations.
-// sonde_fit_random_starts: all of them, one after another.
+// Refits from random starts: how far their ends lie apart.
 #include "fit/again.h"
 #include "sonde/fit_confidence.h"
 

@@ -1,5 +1,4 @@
-// moments: bias, MAE, RMSE, deviations of the finite rows.
-// sonde_error_report_of: the same per probe, by picking that probe's rows.
+// Bias and mean errors of rows, whole and per probe.
 #include "base/maths.h"
 #include "base/order.h"
 #include "fit/fit_inside.h"

@@ -1,9 +1,4 @@
-// load_site / load_sites: rows of the site file, checked and made orthonormal.
-// load_row / load_rows: rows of the measurement file, checked one by one.
-// check_site: a row's site exists and lies where the site file says.
-// check_repeats: no (site, probe, penetration) occurs twice.
-// check_sign: on the whole the forces press.
-// place_on_surface / fail_off: how far a site is from the skin and its normal, and the sentence.
+// Tables of sites and measurements: read, checked, written.
 #include "base/maths.h"
 #include "base/csv.h"
 #include "fit/fit_inside.h"

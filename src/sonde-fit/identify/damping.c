@@ -1,5 +1,4 @@
-// apply:  normal damping, stiffness scale and edge damping of a trial.
-// sonde_identify_damping: all three parameters; the third one only when the records hold it.
+// Damping and stiffness from ramps and holds; the dampers of edges only when the records tell.
 #include "identify/inverse.h"
 
 #include "base/maths.h"

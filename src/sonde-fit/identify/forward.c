@@ -1,7 +1,4 @@
-// sonde_drive_pose:   site, penetration along the normal, slide along the axis.
-// start:              settled in steps of 2 mm when the motion begins inside the skin.
-// sonde_drive_run:    steps of the world between which the sensors are read.
-// sonde_model_borrow: stiffer or softer copies of a model.
+// A motion driven over the model, the skin settled before it begins.
 #include "identify/forward.h"
 
 #include "base/maths.h"

@@ -1,8 +1,4 @@
-// less_pile_up, guess: coefficients read off the records, less what needs no friction.
-// apply:   Stribeck's curve of a trial.
-// windows_of: the second halves of the slides, in windows.
-// look_at: ratio of the forces in a window, ripple of a half.
-// compare: the same looks at the simulated and at the recorded forces.
+// Friction from slides: coefficients read off the records, then by simulation.
 //
 // Where friction falls with speed the probe may stick and slip, and the phase of that sawtooth is
 // as unpredictable as it is uninteresting. Means over windows and the ripple about them do not have

@@ -1,6 +1,4 @@
-// FIELDS:   keys of the file, their units and ranges.
-// check:    the ranges, for files and for presets made by hand.
-// load, save, apply.
+// Presets of what was identified: their file, ranges, and use on a model.
 #include "base/bounds.h"
 #include "base/maths.h"
 #include "identify/forward.h"

@@ -1,6 +1,4 @@
-// read_comment:  `# key: value` before the header line.
-// read_rows:     samples in time order.
-// load and save: the file of a record (docs/identify.md).
+// Motion records as tables.
 #include "base/maths.h"
 #include "base/csv.h"
 #include "sonde/identify.h"
