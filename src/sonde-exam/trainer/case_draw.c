@@ -22,29 +22,6 @@ static uint32_t below(draw *d, uint32_t count) {
 // Files have a tenth of a millimetre, a hundredth of a share.
 static double rounded(double value, double parts) { return round(value * parts) / parts; }
 
-// Stage and stretch of a clot, and the truth that follows.
-static void draw_clot(draw *d, sonde_case *c) {
-  static const char *const STAGE[] = {"acute_occlusive", "subacute_occlusive", "chronic_occlusive",
-                                      "partial_mural"};
-  uint32_t stage = below(d, c->level == SONDE_CASE_FIRST ? 1 : c->level == SONDE_CASE_EASY ? 3 : 4);
-  uint32_t length = c->level == SONDE_CASE_HARD ? 1 : 1 + below(d, 3);
-  uint32_t from = below(d, SEGMENT_COUNT + 1 - length), to = from + length - 1;
-  sonde_status status = sonde_pathology_preset(STAGE[stage], &c->pathology, NULL);
-  SONDE_ASSERT(status == SONDE_OK && to < SEGMENT_COUNT);
-  c->webs = stage == 2 ? rounded(uniform(d, 0.3, 0.9), 100) : 0;
-  c->extent.whole = false;
-  snprintf(c->extent.from.segment, sizeof c->extent.from.segment, "%s", SEGMENTS[from]);
-  snprintf(c->extent.to.segment, sizeof c->extent.to.segment, "%s", SEGMENTS[to]);
-  c->extent.from.share = rounded(uniform(d, 0, 0.15), 100);
-  c->extent.to.share = rounded(uniform(d, 0.85, 1), 100);
-  for (uint32_t i = from; i <= to; ++i) c->truth[i] = SONDE_DECISION_CLOT;
-  c->thrombosis = true;
-  static const char *const WORD[] = {"Acute", "Subacute", "Chronic", "Partial (mural)"};
-  snprintf(c->diagnosis, sizeof c->diagnosis, "%s deep vein thrombosis: %s%s%s", WORD[stage],
-           sonde_segment_title(SEGMENTS[from]), to > from ? " to " : "",
-           to > from ? sonde_segment_title(SEGMENTS[to]) : "");
-}
-
 // Something that is not a clot of the femoral vein.
 static void draw_lookalike(draw *d, sonde_case *c) {
   uint32_t kind = below(d, 3);
@@ -68,25 +45,6 @@ static void draw_lookalike(draw *d, sonde_case *c) {
   lesion->station.share = 0.5;
   snprintf(c->look_alike[c->look_alike_count++], sizeof c->look_alike[0], "%s",
            cyst ? "cyst beside the vein" : "lymph node");
-}
-
-// What the patient says; it does not give the answer away.
-static void tell_history(draw *d, sonde_case *c) {
-  static const char *const COMPLAINT[] = {
-      "swelling of the leg for %u days", "pain in the thigh for %u days",
-      "a heavy leg since a journey %u days ago", "a tender calf and thigh %u days after surgery"};
-  static const char *const MORE[] = {
-      "Walks without help.", "Takes no tablets.", "Has had a thrombosis of the other leg.",
-      "The leg is a little warmer than the other.", "Otherwise well."};
-  char what[80];
-  uint32_t age = 24 + below(d, 60), days = 2 + below(d, 9);
-  const char *format = COMPLAINT[below(d, SONDE_COUNT_OF(COMPLAINT))];
-  const char *at = strstr(format, "%u");
-  SONDE_ASSERT(at != NULL);
-  snprintf(what, sizeof what, "%.*s%u%s", (int)(at - format), format, days, at + 2);
-  snprintf(c->history, sizeof c->history, "%s, %u years, with %s. %s",
-           c->known.sex == SONDE_SEX_FEMALE ? "Woman" : "Man", age, what,
-           MORE[below(d, SONDE_COUNT_OF(MORE))]);
 }
 
 void sonde_case_generate(uint64_t seed, sonde_case_level level, sonde_case *out) {
@@ -115,7 +73,45 @@ void sonde_case_generate(uint64_t seed, sonde_case_level level, sonde_case *out)
   if (hard && below(&d, 4) == 0) out->circulation.posture = SONDE_POSTURE_SITTING;
 
   bool clot = below(&d, 2) == 0;
-  if (clot) draw_clot(&d, out);
+  if (clot) { // its stage and stretch, and the truth that follows
+    static const char *const STAGE[] = {"acute_occlusive", "subacute_occlusive",
+                                        "chronic_occlusive", "partial_mural"};
+    uint32_t stage = below(&d, out->level == SONDE_CASE_FIRST  ? 1
+                               : out->level == SONDE_CASE_EASY ? 3
+                                                               : 4);
+    uint32_t length = out->level == SONDE_CASE_HARD ? 1 : 1 + below(&d, 3);
+    uint32_t from = below(&d, SEGMENT_COUNT + 1 - length), to = from + length - 1;
+    sonde_status status = sonde_pathology_preset(STAGE[stage], &out->pathology, NULL);
+    SONDE_ASSERT(status == SONDE_OK && to < SEGMENT_COUNT);
+    out->webs = stage == 2 ? rounded(uniform(&d, 0.3, 0.9), 100) : 0;
+    out->extent.whole = false;
+    snprintf(out->extent.from.segment, sizeof out->extent.from.segment, "%s", SEGMENTS[from]);
+    snprintf(out->extent.to.segment, sizeof out->extent.to.segment, "%s", SEGMENTS[to]);
+    out->extent.from.share = rounded(uniform(&d, 0, 0.15), 100);
+    out->extent.to.share = rounded(uniform(&d, 0.85, 1), 100);
+    for (uint32_t i = from; i <= to; ++i) out->truth[i] = SONDE_DECISION_CLOT;
+    out->thrombosis = true;
+    static const char *const WORD[] = {"Acute", "Subacute", "Chronic", "Partial (mural)"};
+    snprintf(out->diagnosis, sizeof out->diagnosis, "%s deep vein thrombosis: %s%s%s", WORD[stage],
+             sonde_segment_title(SEGMENTS[from]), to > from ? " to " : "",
+             to > from ? sonde_segment_title(SEGMENTS[to]) : "");
+  }
   if (hard && !clot) draw_lookalike(&d, out);
-  tell_history(&d, out);
+
+  // What the patient says; it does not give the answer away.
+  static const char *const COMPLAINT[] = {
+      "swelling of the leg for %u days", "pain in the thigh for %u days",
+      "a heavy leg since a journey %u days ago", "a tender calf and thigh %u days after surgery"};
+  static const char *const MORE[] = {
+      "Walks without help.", "Takes no tablets.", "Has had a thrombosis of the other leg.",
+      "The leg is a little warmer than the other.", "Otherwise well."};
+  char what[80];
+  uint32_t age = 24 + below(&d, 60), days = 2 + below(&d, 9);
+  const char *format = COMPLAINT[below(&d, SONDE_COUNT_OF(COMPLAINT))];
+  const char *at = strstr(format, "%u");
+  SONDE_ASSERT(at != NULL);
+  snprintf(what, sizeof what, "%.*s%u%s", (int)(at - format), format, days, at + 2);
+  snprintf(out->history, sizeof out->history, "%s, %u years, with %s. %s",
+           out->known.sex == SONDE_SEX_FEMALE ? "Woman" : "Man", age, what,
+           MORE[below(&d, SONDE_COUNT_OF(MORE))]);
 }

@@ -113,26 +113,6 @@ static void read_clot(sonde_reader *reader, sonde_place map, sonde_pathology *pa
   sonde_read_station(reader, to, "to", &extent->to);
 }
 
-static void read_lesion(sonde_reader *reader, sonde_place at, sonde_case_lesion *lesion) {
-  static const char *const KEYS[] = {"kind",    "at",           "across_mm", "depth_mm",
-                                     "size_mm", "echogenicity", NULL};
-  static const double ECHO[] = {0.25, 0.0, 0.4}; // of node, cyst, haematoma
-  sonde_read_keys(reader, at, "a lesion", KEYS);
-  lesion->kind = (sonde_lesion_kind)sonde_read_choice(reader, at, "kind", sonde_case_lesions, 0);
-  sonde_place where = sonde_read_find(reader, at, "at");
-  if (!where)
-    sonde_reader_fail(reader, at, SONDE_FORMAT, "at is missing");
-  else
-    sonde_read_station(reader, where, "at", &lesion->station);
-  lesion->across_m = 1e-3 * sonde_read_real(reader, at, "across_mm", -100, 100, 0);
-  lesion->depth_m = 1e-3 * sonde_read_real(reader, at, "depth_mm", 1, 120, UNKNOWN);
-  sonde_vec3 size = sonde_read_vector(reader, at, "size_mm", 100, vec3(10, 10, 16));
-  if (!(size.x > 0 && size.y > 0 && size.z > 0))
-    sonde_reader_fail(reader, at, SONDE_ARGUMENT, "size_mm must be three lengths more than 0");
-  lesion->half_m = v_scale(size, 0.5e-3);
-  lesion->echogenicity = sonde_read_real(reader, at, "echogenicity", 0, 1, ECHO[lesion->kind % 3]);
-}
-
 static uint32_t read_some(sonde_reader *reader, sonde_place list, const char *what, uint32_t most) {
   uint32_t count = sonde_read_count(reader, list);
   if (count <= most) return count;
@@ -145,6 +125,9 @@ static void read_pathology(sonde_reader *reader, sonde_place root, sonde_case *c
   static const char *const VEIN[] = {
       "stage",        "from",        "to",       "fraction", "modulus_kpa",
       "echogenicity", "lumen_scale", "wall_kpa", "webs",     NULL};
+  static const char *const LESION[] = {"kind",    "at",           "across_mm", "depth_mm",
+                                       "size_mm", "echogenicity", NULL};
+  static const double ECHO[] = {0.25, 0.0, 0.4}; // of node, cyst, haematoma
   static const char *const BRANCH[] = {"branch",   "stage",       "from",         "to",
                                        "fraction", "modulus_kpa", "echogenicity", "lumen_scale",
                                        "wall_kpa", NULL};
@@ -161,8 +144,26 @@ static void read_pathology(sonde_reader *reader, sonde_place root, sonde_case *c
   c->oedema = sonde_read_real(reader, at, "oedema", 0, 1, 0);
   sonde_place lesions = sonde_read_find(reader, at, "lesions");
   c->lesion_count = read_some(reader, lesions, "lesions", SONDE_LESIONS);
-  for (uint32_t i = 0; i < c->lesion_count; ++i)
-    read_lesion(reader, sonde_read_item(reader, lesions, i), &c->lesion[i]);
+  for (uint32_t i = 0; i < c->lesion_count; ++i) {
+    sonde_place item = sonde_read_item(reader, lesions, i);
+    sonde_case_lesion *lesion = &c->lesion[i];
+    sonde_read_keys(reader, item, "a lesion", LESION);
+    lesion->kind =
+        (sonde_lesion_kind)sonde_read_choice(reader, item, "kind", sonde_case_lesions, 0);
+    sonde_place where = sonde_read_find(reader, item, "at");
+    if (!where)
+      sonde_reader_fail(reader, item, SONDE_FORMAT, "at is missing");
+    else
+      sonde_read_station(reader, where, "at", &lesion->station);
+    lesion->across_m = 1e-3 * sonde_read_real(reader, item, "across_mm", -100, 100, 0);
+    lesion->depth_m = 1e-3 * sonde_read_real(reader, item, "depth_mm", 1, 120, UNKNOWN);
+    sonde_vec3 size = sonde_read_vector(reader, item, "size_mm", 100, vec3(10, 10, 16));
+    if (!(size.x > 0 && size.y > 0 && size.z > 0))
+      sonde_reader_fail(reader, item, SONDE_ARGUMENT, "size_mm must be three lengths more than 0");
+    lesion->half_m = v_scale(size, 0.5e-3);
+    lesion->echogenicity =
+        sonde_read_real(reader, item, "echogenicity", 0, 1, ECHO[lesion->kind % 3]);
+  }
   sonde_place branches = sonde_read_find(reader, at, "branches");
   c->branch_count = read_some(reader, branches, "branches", SONDE_BRANCHES);
   for (uint32_t i = 0; i < c->branch_count; ++i) {
@@ -233,11 +234,17 @@ sonde_status sonde_case_check(const sonde_case *of, sonde_error *error) {
   return SONDE_OK;
 }
 
-static void read_case(sonde_reader *reader, sonde_case *c) {
+sonde_status sonde_case_parse(const char *text, const char *name, sonde_case *out,
+                              sonde_error *error) {
+  SONDE_ASSERT(text && name && out);
   static const char *const CIRCULATION[] = {"posture",       "breath_mmhg",   "valsalva_from_s",
                                             "valsalva_to_s", "valsalva_mmhg", NULL};
   const char *keys[] = {"sonde_case",  "id",   "title",    "level", "history", "note", "thigh",
                         "circulation", "vein", "findings", "truth", NULL,      NULL};
+  sonde_reader *reader;
+  *out = sonde_case_default();
+  sonde_status status = sonde_reader_create(text, name, &reader, error);
+  if (status) return status;
   sonde_place root = sonde_reader_root(reader);
   double version = sonde_read_real(reader, root, "sonde_case", 0, 1e6, 0);
   // Files of version 1 may set forces; the forces of a place come from its thigh.
@@ -248,18 +255,18 @@ static void read_case(sonde_reader *reader, sonde_case *c) {
   if (version != 1 && version != SONDE_CASE_VERSION)
     sonde_reader_fail(reader, sonde_read_find(reader, root, "sonde_case"), SONDE_VERSION,
                       "case of version %g, expected 1 or %d", version, SONDE_CASE_VERSION);
-  sonde_read_member(reader, root, "id", true, c->id, sizeof c->id);
-  sonde_error error = {0};
-  if (sonde_reader_good(reader) && check_id(c->id, &error))
-    sonde_reader_pass(reader, sonde_read_find(reader, root, "id"), &error);
-  sonde_read_member(reader, root, "title", true, c->title, sizeof c->title);
-  c->level = (sonde_case_level)sonde_read_choice(reader, root, "level", sonde_case_levels, 0);
-  sonde_read_member(reader, root, "history", true, c->history, sizeof c->history);
-  sonde_read_member(reader, root, "note", false, c->note, sizeof c->note);
-  read_thigh(reader, root, c);
+  sonde_read_member(reader, root, "id", true, out->id, sizeof out->id);
+  sonde_error problem = {0};
+  if (sonde_reader_good(reader) && check_id(out->id, &problem))
+    sonde_reader_pass(reader, sonde_read_find(reader, root, "id"), &problem);
+  sonde_read_member(reader, root, "title", true, out->title, sizeof out->title);
+  out->level = (sonde_case_level)sonde_read_choice(reader, root, "level", sonde_case_levels, 0);
+  sonde_read_member(reader, root, "history", true, out->history, sizeof out->history);
+  sonde_read_member(reader, root, "note", false, out->note, sizeof out->note);
+  read_thigh(reader, root, out);
   sonde_place at = sonde_read_find(reader, root, "circulation");
   if (at) {
-    sonde_circulation *flow = &c->circulation;
+    sonde_circulation *flow = &out->circulation;
     sonde_read_keys(reader, at, "circulation", CIRCULATION);
     flow->posture = (sonde_posture)sonde_read_choice(reader, at, "posture", sonde_case_postures, 0);
     const double pa = SONDE_PA_PER_MMHG;
@@ -273,20 +280,10 @@ static void read_case(sonde_reader *reader, sonde_case *c) {
                         "valsalva_to_s is %g, expected valsalva_from_s (%g) or more",
                         flow->valsalva_to_s, flow->valsalva_from_s);
   }
-  read_pathology(reader, root, c);
-  read_truth(reader, root, c);
-  if (sonde_reader_good(reader) && sonde_case_check(c, &error))
-    sonde_reader_pass(reader, sonde_read_find(reader, root, "truth"), &error);
-}
-
-sonde_status sonde_case_parse(const char *text, const char *name, sonde_case *out,
-                              sonde_error *error) {
-  SONDE_ASSERT(text && name && out);
-  sonde_reader *reader;
-  *out = sonde_case_default();
-  sonde_status status = sonde_reader_create(text, name, &reader, error);
-  if (status) return status;
-  read_case(reader, out);
+  read_pathology(reader, root, out);
+  read_truth(reader, root, out);
+  if (sonde_reader_good(reader) && sonde_case_check(out, &problem))
+    sonde_reader_pass(reader, sonde_read_find(reader, root, "truth"), &problem);
   status = sonde_reader_status(reader, error);
   sonde_reader_destroy(reader);
   return status;

@@ -38,39 +38,36 @@ static void put_clot(sonde_file *file, const char *before, const sonde_pathology
   put_station(file, "to", &extent->to);
 }
 
-static void put_patient(sonde_file *file, const sonde_case *from) {
+static void put_case(sonde_file *file, const sonde_case *c) {
   sonde_file_printf(file, "sonde_case: %d\n", SONDE_CASE_VERSION);
-  put_quoted(file, "id: ", from->id);
-  put_quoted(file, "title: ", from->title);
-  sonde_file_printf(file, "level: %s\n", sonde_case_levels[from->level]);
-  put_quoted(file, "history: ", from->history);
-  if (from->note[0]) put_quoted(file, "note: ", from->note);
+  put_quoted(file, "id: ", c->id);
+  put_quoted(file, "title: ", c->title);
+  sonde_file_printf(file, "level: %s\n", sonde_case_levels[c->level]);
+  put_quoted(file, "history: ", c->history);
+  if (c->note[0]) put_quoted(file, "note: ", c->note);
 
-  if (from->thigh == SONDE_CASE_BUNDLED) sonde_file_printf(file, "thigh: bundled\n");
-  if (from->thigh == SONDE_CASE_MODEL) put_quoted(file, "thigh:\n  model: ", from->model);
-  if (from->thigh == SONDE_CASE_GENERATED) {
-    sonde_file_printf(file, "thigh:\n  seed: %llu\n  sex: %s\n", (unsigned long long)from->seed,
-                      sonde_case_sexes[from->known.sex]);
+  if (c->thigh == SONDE_CASE_BUNDLED) sonde_file_printf(file, "thigh: bundled\n");
+  if (c->thigh == SONDE_CASE_MODEL) put_quoted(file, "thigh:\n  model: ", c->model);
+  if (c->thigh == SONDE_CASE_GENERATED) {
+    sonde_file_printf(file, "thigh:\n  seed: %llu\n  sex: %s\n", (unsigned long long)c->seed,
+                      sonde_case_sexes[c->known.sex]);
     uint32_t count;
     const sonde_thigh_parameter *p = sonde_thigh_parameters(&count);
-    sonde_thigh known = from->known;
+    sonde_thigh known = c->known;
     for (uint32_t i = 0; i < count; ++i) {
       double value = *sonde_thigh_member(&known, &p[i]);
       if (isfinite(value)) sonde_file_printf(file, "  %s: %.12g\n", p[i].name, value / p[i].unit);
     }
   }
 
-  const sonde_circulation *c = &from->circulation;
+  const sonde_circulation *flow = &c->circulation;
   sonde_file_printf(file, "circulation: {posture: %s, breath_mmhg: %.12g",
-                    sonde_case_postures[c->posture], c->breath_pa / SONDE_PA_PER_MMHG);
-  if (c->valsalva_to_s > c->valsalva_from_s)
-    sonde_file_printf(file, ", valsalva_from_s: %.12g, valsalva_to_s: %.12g", c->valsalva_from_s,
-                      c->valsalva_to_s);
-  sonde_file_printf(file, ", valsalva_mmhg: %.12g}\n", c->valsalva_pa / SONDE_PA_PER_MMHG);
-}
+                    sonde_case_postures[flow->posture], flow->breath_pa / SONDE_PA_PER_MMHG);
+  if (flow->valsalva_to_s > flow->valsalva_from_s)
+    sonde_file_printf(file, ", valsalva_from_s: %.12g, valsalva_to_s: %.12g", flow->valsalva_from_s,
+                      flow->valsalva_to_s);
+  sonde_file_printf(file, ", valsalva_mmhg: %.12g}\n", flow->valsalva_pa / SONDE_PA_PER_MMHG);
 
-static void put_case(sonde_file *file, const sonde_case *c) {
-  put_patient(file, c);
   sonde_file_printf(file, "vein:");
   put_clot(file, "\n  ", &c->pathology, &c->extent);
   sonde_file_printf(file, "\n  webs: %.12g\n", c->webs);

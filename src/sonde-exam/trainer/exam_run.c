@@ -9,30 +9,6 @@ sonde_exam_def sonde_exam_def_default(void) {
   return (sonde_exam_def){.operator_name = "expert", .seed = 1, .limit_s = 1200};
 }
 
-// Ticks until the operator is done.
-static sonde_status examine(const sonde_exam_def *def, sonde_bench *bench, sonde_device *hand,
-                            sonde_operator *op, sonde_judge *judge, const sonde_progress *progress,
-                            sonde_error *error) {
-  sonde_device_sample sample = {0};
-  for (uint64_t looks = 0; !sonde_operator_done(op);) {
-    hand->read(hand->self, bench->tick, &sample);
-    sonde_bench_step(bench, sample.world_from_probe);
-    if (bench->tick % TICKS_PER_LOOK != 0) continue;
-    sonde_snapshot s = sonde_bench_look(bench, sample.world_from_probe);
-    if (!sonde_judge_feed(judge, &s)) return sonde_fail_memory(error);
-    sonde_operator_see(op, &s);
-    if (s.time_s > def->limit_s)
-      return sonde_fail(error, SONDE_CONVERGENCE, "the %s found no end in %.0f s",
-                        def->operator_name, def->limit_s);
-    if (++looks % LOOKS_PER_REPORT != 0) continue;
-    sonde_metrics m = sonde_judge_metrics(judge);
-    double share = m.points ? (double)m.points_done / m.points : 0;
-    if (!sonde_progress_report(progress, share, def->patient->id))
-      return sonde_fail(error, SONDE_CANCELLED, "cancelled at %.0f s", s.time_s);
-  }
-  return sonde_judge_finish(judge) ? SONDE_OK : sonde_fail_memory(error);
-}
-
 sonde_status sonde_exam_run(const sonde_exam_def *def, const sonde_case_setup *setup,
                             const sonde_progress *progress, sonde_score *score,
                             sonde_error *error) {
@@ -57,7 +33,30 @@ sonde_status sonde_exam_run(const sonde_exam_def *def, const sonde_case_setup *s
                                    &op, &hand, error);
   if (!status) status = sonde_bench_open(&bench, setup, &setup->findings, def->solid, error);
 
-  if (!status) status = examine(def, &bench, &hand, op, judge, progress, error);
+  // Ticks until the operator is done.
+  sonde_device_sample sample = {0};
+  for (uint64_t looks = 0; !status && !sonde_operator_done(op);) {
+    hand.read(hand.self, bench.tick, &sample);
+    sonde_bench_step(&bench, sample.world_from_probe);
+    if (bench.tick % TICKS_PER_LOOK != 0) continue;
+    sonde_snapshot s = sonde_bench_look(&bench, sample.world_from_probe);
+    if (!sonde_judge_feed(judge, &s)) {
+      status = sonde_fail_memory(error);
+      break;
+    }
+    sonde_operator_see(op, &s);
+    if (s.time_s > def->limit_s) {
+      status = sonde_fail(error, SONDE_CONVERGENCE, "the %s found no end in %.0f s",
+                          def->operator_name, def->limit_s);
+      break;
+    }
+    if (++looks % LOOKS_PER_REPORT != 0) continue;
+    sonde_metrics m = sonde_judge_metrics(judge);
+    double share = m.points ? (double)m.points_done / m.points : 0;
+    if (!sonde_progress_report(progress, share, def->patient->id))
+      status = sonde_fail(error, SONDE_CANCELLED, "cancelled at %.0f s", s.time_s);
+  }
+  if (!status && !sonde_judge_finish(judge)) status = sonde_fail_memory(error);
 
   // Findings, score and files.
   for (uint32_t i = 0; !status && i < setup->map.segment_count; ++i)

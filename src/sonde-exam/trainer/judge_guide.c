@@ -9,30 +9,6 @@ static bool is_due(const sonde_judge *judge, uint32_t segment) {
   return s.needed && s.done == s.points && s.decision == SONDE_DECISION_NONE;
 }
 
-static void say_press(const sonde_judge *judge, sonde_guidance *g) {
-  if (!g->angle_ok) {
-    snprintf(g->text, sizeof g->text,
-             "Turn the probe by %.0f degrees, so that it lies straight across the vein.",
-             g->angle_rad * 180 / SONDE_PI);
-    return;
-  }
-  static const char *const OTHER[] = {
-      [SONDE_PRESS_STATE_COMPLETE] = "The vein is closed: let go.",
-      [SONDE_PRESS_STATE_OPEN] = "Pressed firmly, and the vein stays open: let go.",
-      [SONDE_PRESS_STATE_TOO_HARD] = "Too hard: let go and press again with less force.",
-      [SONDE_PRESS_STATE_OFF_AXIS] = "The vein is not cut straight across: let go and tilt back."};
-  sonde_press_state state = sonde_judge_state(judge).state;
-  if (state > SONDE_PRESS_STATE_PRESSING)
-    snprintf(g->text, sizeof g->text, "%s", OTHER[state]);
-  else if (state == SONDE_PRESS_STATE_PRESSING)
-    snprintf(g->text, sizeof g->text,
-             "Press on slowly until the walls of the vein touch, at most %.0f N. If it is still "
-             "open at %.0f N, it stays open.",
-             g->force.limit_n, g->force.firm_n);
-  else
-    snprintf(g->text, sizeof g->text, "Here: press until the walls of the vein touch.");
-}
-
 // Where to go and what to do there.
 static void say_next(const sonde_judge *judge, sonde_guidance *g) {
   const sonde_criteria *c = &judge->plan.criteria;
@@ -64,7 +40,28 @@ static void say_next(const sonde_judge *judge, sonde_guidance *g) {
   // a press at a place is finished before the next one is named
   bool elsewhere = judge->pressing ? sonde_press_is_astray(judge) : g->offset_m > c->reach_m;
   if (!elsewhere) {
-    say_press(judge, g);
+    if (!g->angle_ok) {
+      snprintf(g->text, sizeof g->text,
+               "Turn the probe by %.0f degrees, so that it lies straight across the vein.",
+               g->angle_rad * 180 / SONDE_PI);
+      return;
+    }
+    static const char *const OTHER[] = {
+        [SONDE_PRESS_STATE_COMPLETE] = "The vein is closed: let go.",
+        [SONDE_PRESS_STATE_OPEN] = "Pressed firmly, and the vein stays open: let go.",
+        [SONDE_PRESS_STATE_TOO_HARD] = "Too hard: let go and press again with less force.",
+        [SONDE_PRESS_STATE_OFF_AXIS] =
+            "The vein is not cut straight across: let go and tilt back."};
+    sonde_press_state state = sonde_judge_state(judge).state;
+    if (state > SONDE_PRESS_STATE_PRESSING)
+      snprintf(g->text, sizeof g->text, "%s", OTHER[state]);
+    else if (state == SONDE_PRESS_STATE_PRESSING)
+      snprintf(g->text, sizeof g->text,
+               "Press on slowly until the walls of the vein touch, at most %.0f N. If it is still "
+               "open at %.0f N, it stays open.",
+               g->force.limit_n, g->force.firm_n);
+    else
+      snprintf(g->text, sizeof g->text, "Here: press until the walls of the vein touch.");
     return;
   }
   const char *move = judge->pressing ? "Not here: let go and move" : "Move";

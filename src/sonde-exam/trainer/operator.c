@@ -201,51 +201,6 @@ static double towards(double from, double to, double step) {
   return fabs(to - from) <= step ? to : from + (to > from ? step : -step);
 }
 
-// Along the course of the vein at a small height, so that the skin's curve is followed.
-static void travel(sonde_operator *op, const sonde_snapshot *s, double dt_s) {
-  const habit *h = &op->habit;
-  double step = h->travel_m_s * dt_s, goal_m = op->aim_m + op->beyond_m;
-  op->along_m = towards(op->along_m, goal_m, step);
-  op->across_m = towards(op->across_m, op->aim_across_m, step);
-  op->twist_rad = towards(op->twist_rad, op->aim_twist_rad, dt_s);
-  if (op->along_m != goal_m || op->across_m != op->aim_across_m ||
-      op->twist_rad != op->aim_twist_rad)
-    return;
-  if (op->beyond_m != 0) { // back, and again a little too far
-    op->beyond_m = fabs(op->beyond_m) > SETTLED_M ? -0.5 * op->beyond_m : 0;
-    return;
-  }
-  op->wait_s -= dt_s;
-  double reach_m = h->wander_m * clamp(op->wait_s, 0, 1); // comes to rest in the end
-  op->sway_m = reach_m * sin(2 * SONDE_PI * 0.45 * s->time_s);
-  op->sway_across_m = reach_m * sin(2 * SONDE_PI * 0.7 * s->time_s);
-  if (op->wait_s <= 0) op->phase = PRESS;
-}
-
-// One look of a press, and whether it ends.
-static void press(sonde_operator *op, const sonde_snapshot *s, double dt_s) {
-  const habit *h = &op->habit;
-  double force_n = s->force_normal_n, speed = force_n < TOUCH_N ? h->approach_m_s : h->press_m_s;
-  double stiffness = (force_n - op->felt_n) / (op->depth_m - op->felt_depth_m);
-  if (stiffness > 0) speed = fmin(speed, h->rate_n_s / stiffness);
-  op->felt_n = force_n;
-  op->felt_depth_m = op->depth_m;
-  bool stops = h->hesitant && sin(2 * SONDE_PI * 1.1 * s->time_s) > 0.3;
-  if (!stops) op->depth_m += dt_s * speed;
-
-  bool ends = force_n >= op->stop_n || op->depth_m >= DEEPEST_M;
-  // The skin slips from the probe; a light touch may bounce.
-  ends |= op->peak_n > FIRM_N && force_n < GIVES_WAY * op->peak_n;
-  // Who goes by the image ends at a closed vein, and at one that stays open at a firm force.
-  double vein = sonde_vein_ratio(s);
-  double firm_n = op->plan.point[op->place].target.firm_n + h->past_firm_n;
-  if (!(h->force_to_n > 0 || h->beyond_to_n > 0))
-    ends |= vein <= h->closed_ratio || (force_n >= firm_n && vein >= h->open_ratio);
-  if (!ends) return;
-  op->phase = HOLD;
-  op->wait_s = HOLD_S;
-}
-
 // What a finished press showed. Closed once is closed: a vein that can be emptied has no clot
 // there.
 static void weigh_press(sonde_operator *op) {
@@ -276,6 +231,7 @@ static void weigh_press(sonde_operator *op) {
 
 void sonde_operator_see(sonde_operator *op, const sonde_snapshot *s) {
   SONDE_ASSERT(op && s);
+  const habit *h = &op->habit;
   double dt_s = op->started ? clamp(s->time_s - op->last_s, 0, 0.2) : 0;
   op->started = true;
   op->last_s = s->time_s;
@@ -284,8 +240,49 @@ void sonde_operator_see(sonde_operator *op, const sonde_snapshot *s) {
     op->peak_n = fmax(op->peak_n, s->force_normal_n);
   }
   switch (op->phase) {
-  case TRAVEL: travel(op, s, dt_s); break;
-  case PRESS: press(op, s, dt_s); break;
+  case TRAVEL: {
+    // Along the course of the vein at a small height, so that the skin's curve is followed.
+    double step = h->travel_m_s * dt_s, goal_m = op->aim_m + op->beyond_m;
+    op->along_m = towards(op->along_m, goal_m, step);
+    op->across_m = towards(op->across_m, op->aim_across_m, step);
+    op->twist_rad = towards(op->twist_rad, op->aim_twist_rad, dt_s);
+    if (op->along_m != goal_m || op->across_m != op->aim_across_m ||
+        op->twist_rad != op->aim_twist_rad)
+      break;
+    if (op->beyond_m != 0) { // back, and again a little too far
+      op->beyond_m = fabs(op->beyond_m) > SETTLED_M ? -0.5 * op->beyond_m : 0;
+      break;
+    }
+    op->wait_s -= dt_s;
+    double reach_m = h->wander_m * clamp(op->wait_s, 0, 1); // comes to rest in the end
+    op->sway_m = reach_m * sin(2 * SONDE_PI * 0.45 * s->time_s);
+    op->sway_across_m = reach_m * sin(2 * SONDE_PI * 0.7 * s->time_s);
+    if (op->wait_s <= 0) op->phase = PRESS;
+    break;
+  }
+  case PRESS: {
+    // One look of a press, and whether it ends.
+    double force_n = s->force_normal_n, speed = force_n < TOUCH_N ? h->approach_m_s : h->press_m_s;
+    double stiffness = (force_n - op->felt_n) / (op->depth_m - op->felt_depth_m);
+    if (stiffness > 0) speed = fmin(speed, h->rate_n_s / stiffness);
+    op->felt_n = force_n;
+    op->felt_depth_m = op->depth_m;
+    bool stops = h->hesitant && sin(2 * SONDE_PI * 1.1 * s->time_s) > 0.3;
+    if (!stops) op->depth_m += dt_s * speed;
+
+    bool ends = force_n >= op->stop_n || op->depth_m >= DEEPEST_M;
+    // The skin slips from the probe; a light touch may bounce.
+    ends |= op->peak_n > FIRM_N && force_n < GIVES_WAY * op->peak_n;
+    // Who goes by the image ends at a closed vein, and at one that stays open at a firm force.
+    double vein = sonde_vein_ratio(s);
+    double firm_n = op->plan.point[op->place].target.firm_n + h->past_firm_n;
+    if (!(h->force_to_n > 0 || h->beyond_to_n > 0))
+      ends |= vein <= h->closed_ratio || (force_n >= firm_n && vein >= h->open_ratio);
+    if (!ends) break;
+    op->phase = HOLD;
+    op->wait_s = HOLD_S;
+    break;
+  }
   case HOLD:
     op->wait_s -= dt_s;
     if (op->wait_s <= 0) op->phase = RELEASE;

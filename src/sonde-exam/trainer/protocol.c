@@ -12,33 +12,13 @@ sonde_criteria sonde_criteria_default(void) {
       .tilt_rad = 20 * DEGREE, .closed_ratio = 0.10, .open_ratio = 0.30, .reach_m = 0.010};
 }
 
-static void read_stop(sonde_reader *reader, sonde_place at, sonde_exam_stop *stop) {
-  static const char *const KEYS[] = {"title", "text", "needs",    "at",
-                                     "from",  "to",   "every_mm", NULL};
-  sonde_read_keys(reader, at, "a place", KEYS);
-  sonde_read_member(reader, at, "needs", false, stop->needs, sizeof stop->needs);
-  sonde_read_member(reader, at, "title", true, stop->title, sizeof stop->title);
-  sonde_read_member(reader, at, "text", true, stop->text, sizeof stop->text);
-  sonde_place one = sonde_read_find(reader, at, "at"), from = sonde_read_find(reader, at, "from");
-  sonde_place to = sonde_read_find(reader, at, "to");
-  if ((one != 0) == (from != 0) || (from != 0) != (to != 0)) {
-    sonde_reader_fail(reader, at, SONDE_FORMAT, "give either at, or from, to and every_mm");
-    return;
-  }
-  if (one) {
-    sonde_read_station(reader, one, "at", &stop->from);
-    return;
-  }
-  sonde_read_station(reader, from, "from", &stop->from);
-  sonde_read_station(reader, to, "to", &stop->to);
-  stop->every_m = 1e-3 * sonde_read_real(reader, at, "every_mm", 2, 200, (double)NAN);
-}
-
 sonde_status sonde_exam_protocol_parse(const char *text, const char *name, sonde_exam_protocol *out,
                                        sonde_error *error) {
   SONDE_ASSERT(text && name && out);
   static const char *const KEYS[] = {"sonde_protocol", "id",     "title", "text",
                                      "criteria",       "places", NULL};
+  static const char *const PLACE[] = {"title", "text", "needs",    "at",
+                                      "from",  "to",   "every_mm", NULL};
   static const char *const CRITERIA[] = {"tilt_deg", "closed_ratio", "open_ratio", "reach_mm",
                                          NULL};
   sonde_reader *reader;
@@ -76,8 +56,27 @@ sonde_status sonde_exam_protocol_parse(const char *text, const char *name, sonde
                       SONDE_EXAM_STOPS);
     out->stop_count = 0;
   }
-  for (uint32_t i = 0; i < out->stop_count; ++i)
-    read_stop(reader, sonde_read_item(reader, places, i), &out->stop[i]);
+  for (uint32_t i = 0; i < out->stop_count; ++i) {
+    sonde_exam_stop *stop = &out->stop[i];
+    at = sonde_read_item(reader, places, i);
+    sonde_read_keys(reader, at, "a place", PLACE);
+    sonde_read_member(reader, at, "needs", false, stop->needs, sizeof stop->needs);
+    sonde_read_member(reader, at, "title", true, stop->title, sizeof stop->title);
+    sonde_read_member(reader, at, "text", true, stop->text, sizeof stop->text);
+    sonde_place one = sonde_read_find(reader, at, "at"), from = sonde_read_find(reader, at, "from");
+    sonde_place to = sonde_read_find(reader, at, "to");
+    if ((one != 0) == (from != 0) || (from != 0) != (to != 0)) {
+      sonde_reader_fail(reader, at, SONDE_FORMAT, "give either at, or from, to and every_mm");
+      continue;
+    }
+    if (one) {
+      sonde_read_station(reader, one, "at", &stop->from);
+      continue;
+    }
+    sonde_read_station(reader, from, "from", &stop->from);
+    sonde_read_station(reader, to, "to", &stop->to);
+    stop->every_m = 1e-3 * sonde_read_real(reader, at, "every_mm", 2, 200, (double)NAN);
+  }
 
   status = sonde_reader_status(reader, error);
   sonde_reader_destroy(reader);

@@ -55,35 +55,6 @@ static sonde_status find_skin(const sonde_model *model, sonde_vein_map *map, son
   return status;
 }
 
-// Segments, branches and landmarks that the model names; a model without anatomy gets the segments
-// of SEGMENT by their shares of the course.
-static void name_segments(const sonde_thigh_anatomy *anatomy, sonde_vein_map *map) {
-  double first = map->point[0].z_m, last = map->point[map->point_count - 1].z_m, from = first;
-  double low = fmin(first, last), high = fmax(first, last);
-  for (uint32_t i = 0; anatomy && i < anatomy->segment_count; ++i) {
-    sonde_segment segment = anatomy->segment[i];
-    segment.from_m = fmax(segment.from_m, low);
-    segment.to_m = fmin(segment.to_m, high);
-    if (segment.to_m > segment.from_m) map->segment[map->segment_count++] = segment;
-  }
-  map->branch_count = anatomy ? anatomy->branch_count : 0;
-  for (uint32_t i = 0; i < map->branch_count; ++i)
-    memcpy(map->branch[i], anatomy->branch[i].name, sizeof map->branch[i]);
-  map->landmark_count = anatomy ? anatomy->landmark_count : 0;
-  for (uint32_t i = 0; i < map->landmark_count; ++i) {
-    memcpy(map->landmark[i], anatomy->landmark[i].name, sizeof map->landmark[i]);
-    map->landmark_z_m[i] = anatomy->landmark[i].vein_m.z;
-  }
-  if (map->segment_count > 0) return;
-  for (size_t i = 0; i < SONDE_COUNT_OF(SEGMENT); ++i) {
-    double to = first + SEGMENT[i].to * (last - first);
-    sonde_segment *segment = &map->segment[map->segment_count++];
-    *segment = (sonde_segment){.from_m = fmin(from, to), .to_m = fmax(from, to)};
-    snprintf(segment->name, sizeof segment->name, "%s", SEGMENT[i].name);
-    from = to;
-  }
-}
-
 sonde_status sonde_vein_map_make(const sonde_model *model, sonde_vein_map *map,
                                  sonde_error *error) {
   SONDE_ASSERT(model && map);
@@ -118,8 +89,36 @@ sonde_status sonde_vein_map_make(const sonde_model *model, sonde_vein_map *map,
     }
     if (v_dot(u, p->across) < 0) p->across = v_neg(p->across);
   }
-  if (!status) name_segments(model->anatomy, map);
-  return status;
+  if (status) return status;
+
+  // Segments, branches and landmarks that the model names; a model without anatomy gets the
+  // segments of SEGMENT by their shares of the course.
+  const sonde_thigh_anatomy *anatomy = model->anatomy;
+  double first = map->point[0].z_m, last = map->point[map->point_count - 1].z_m, from = first;
+  double low = fmin(first, last), high = fmax(first, last);
+  for (uint32_t i = 0; anatomy && i < anatomy->segment_count; ++i) {
+    sonde_segment segment = anatomy->segment[i];
+    segment.from_m = fmax(segment.from_m, low);
+    segment.to_m = fmin(segment.to_m, high);
+    if (segment.to_m > segment.from_m) map->segment[map->segment_count++] = segment;
+  }
+  map->branch_count = anatomy ? anatomy->branch_count : 0;
+  for (uint32_t i = 0; i < map->branch_count; ++i)
+    memcpy(map->branch[i], anatomy->branch[i].name, sizeof map->branch[i]);
+  map->landmark_count = anatomy ? anatomy->landmark_count : 0;
+  for (uint32_t i = 0; i < map->landmark_count; ++i) {
+    memcpy(map->landmark[i], anatomy->landmark[i].name, sizeof map->landmark[i]);
+    map->landmark_z_m[i] = anatomy->landmark[i].vein_m.z;
+  }
+  if (map->segment_count > 0) return SONDE_OK;
+  for (size_t i = 0; i < SONDE_COUNT_OF(SEGMENT); ++i) {
+    double to = first + SEGMENT[i].to * (last - first);
+    sonde_segment *segment = &map->segment[map->segment_count++];
+    *segment = (sonde_segment){.from_m = fmin(from, to), .to_m = fmax(from, to)};
+    snprintf(segment->name, sizeof segment->name, "%s", SEGMENT[i].name);
+    from = to;
+  }
+  return SONDE_OK;
 }
 
 sonde_vein_point sonde_vein_at(const sonde_vein_map *map, double along_m) {

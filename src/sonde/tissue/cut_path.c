@@ -125,19 +125,6 @@ static void reach(search *s, uint32_t node, double cost, uint32_t from) {
   s->heap[at] = entry;
 }
 
-static heap_entry pop(search *s) {
-  SONDE_ASSERT(s->heap_count > 0);
-  heap_entry top = s->heap[0], last = s->heap[--s->heap_count];
-  uint32_t at = 0;
-  for (uint32_t child; (child = 2 * at + 1) < s->heap_count; at = child) {
-    if (child + 1 < s->heap_count && before(&s->heap[child + 1], &s->heap[child])) ++child;
-    if (!before(&s->heap[child], &last)) break;
-    s->heap[at] = s->heap[child];
-  }
-  s->heap[at] = last;
-  return top;
-}
-
 // Dijkstra's search from the end of a leg back to its start: afterwards from[] leads from `start`
 // to `end`. False when they do not hang together.
 static bool find_leg(search *s, uint32_t start, uint32_t end) {
@@ -147,7 +134,14 @@ static bool find_leg(search *s, uint32_t start, uint32_t end) {
   s->reached_count = s->heap_count = 0;
   reach(s, end, 0, NONE);
   while (s->heap_count > 0) {
-    heap_entry at = pop(s);
+    heap_entry at = s->heap[0], last = s->heap[--s->heap_count];
+    uint32_t hole = 0;
+    for (uint32_t child; (child = 2 * hole + 1) < s->heap_count; hole = child) {
+      if (child + 1 < s->heap_count && before(&s->heap[child + 1], &s->heap[child])) ++child;
+      if (!before(&s->heap[child], &last)) break;
+      s->heap[hole] = s->heap[child];
+    }
+    s->heap[hole] = last;
     if (at.cost > s->cost[at.node]) continue;
     if (at.node == start) return true;
     // Neighbours are those of all copies: a cut may cross an earlier one. An edge costs its length

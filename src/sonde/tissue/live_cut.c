@@ -128,8 +128,21 @@ static uint32_t faces_beside(const sonde_topology *t, uint32_t e) {
   return t->edge_faces[e][1] == SONDE_NONE ? 1 : 2;
 }
 
-// What a cut leaves as it is: names, law, sites, data, vessels, anatomy, bone.
-static sonde_status copy_rest(const sonde_model *model, sonde_model *cut, sonde_error *error) {
+// Vertices, fields and springs of the new model; takes over the faces.
+static sonde_status fill(const sonde_model *model, const sonde_cut_map *map, uint32_t (*faces)[3],
+                         sonde_model *cut, sonde_error *error) {
+  SONDE_ASSERT(map->added > 0);
+  sonde_mesh *skin = &cut->surface;
+  skin->faces = faces;
+  skin->face_count = model->surface.face_count;
+  skin->vertices = SONDE_NEW(sonde_vec3, map->node_count + (size_t)map->added);
+  if (!skin->vertices) return sonde_fail_memory(error);
+  skin->vertex_count = map->node_count + map->added;
+  copy_vectors(map, model->surface.vertices, skin->vertices);
+  sonde_status status = sonde_model_allocate_nodes(cut, error);
+  if (status) return status;
+
+  // What a cut leaves as it is: names, law, sites, data, vessels, anatomy, bone.
   memcpy(cut->name, model->name, sizeof cut->name);
   memcpy(cut->provenance, model->provenance, sizeof cut->provenance);
   cut->law = model->law;
@@ -147,22 +160,7 @@ static sonde_status copy_rest(const sonde_model *model, sonde_model *cut, sonde_
   cut->datum_count = model->datum_count;
   if (model->site_count) memcpy(cut->sites, model->sites, model->site_count * sizeof *cut->sites);
   if (model->datum_count) memcpy(cut->data, model->data, model->datum_count * sizeof *cut->data);
-  return sonde_mesh_copy(&model->femur, &cut->femur, error);
-}
-
-// Vertices, fields and springs of the new model; takes over the faces.
-static sonde_status fill(const sonde_model *model, const sonde_cut_map *map, uint32_t (*faces)[3],
-                         sonde_model *cut, sonde_error *error) {
-  SONDE_ASSERT(map->added > 0);
-  sonde_mesh *skin = &cut->surface;
-  skin->faces = faces;
-  skin->face_count = model->surface.face_count;
-  skin->vertices = SONDE_NEW(sonde_vec3, map->node_count + (size_t)map->added);
-  if (!skin->vertices) return sonde_fail_memory(error);
-  skin->vertex_count = map->node_count + map->added;
-  copy_vectors(map, model->surface.vertices, skin->vertices);
-  sonde_status status = sonde_model_allocate_nodes(cut, error);
-  if (!status) status = copy_rest(model, cut, error);
+  status = sonde_mesh_copy(&model->femur, &cut->femur, error);
   if (!status) status = sonde_model_derive(cut, error);
   if (status) return status;
 

@@ -143,8 +143,19 @@ static sonde_status take_vessels(const sonde_model_reader *r, const sonde_json *
   return SONDE_OK;
 }
 
-static sonde_status take_landmarks(const sonde_model_reader *r, const sonde_json *section,
-                                   sonde_thigh_anatomy *a) {
+sonde_status sonde_anatomy_take(const sonde_model_reader *r, sonde_model *model) {
+  const sonde_json *section = sonde_json_member(r->header, "anatomy");
+  if (!section) return SONDE_OK;
+  SONDE_ASSERT(!model->anatomy);
+  double version = sonde_json_as_number(sonde_json_member(section, "version"));
+  if (!(version == SECTION_VERSION))
+    return sonde_fail(r->error, SONDE_VERSION, "%s: anatomy has version %g, expected %d", r->path,
+                      version, SECTION_VERSION);
+  sonde_thigh_anatomy *a = model->anatomy = SONDE_NEW(sonde_thigh_anatomy, 1);
+  if (!a) return sonde_fail_memory(r->error);
+  sonde_status status = take_vessels(r, section, a);
+  if (status) return status;
+
   const sonde_json *list = sonde_json_member(section, "landmarks"), *entry = sonde_json_first(list);
   uint32_t rows, sites, k = 0;
   const char *row = sonde_model_take(r, "anatomy_landmarks", "f64", 9, &rows);
@@ -165,26 +176,11 @@ static sonde_status take_landmarks(const sonde_model_reader *r, const sonde_json
     memcpy(&mark->vein_m, x + 6, 24);
     ++k;
   }
-  return SONDE_OK;
-}
 
-sonde_status sonde_anatomy_take(const sonde_model_reader *r, sonde_model *model) {
-  const sonde_json *section = sonde_json_member(r->header, "anatomy");
-  if (!section) return SONDE_OK;
-  SONDE_ASSERT(!model->anatomy);
-  double version = sonde_json_as_number(sonde_json_member(section, "version"));
-  if (!(version == SECTION_VERSION))
-    return sonde_fail(r->error, SONDE_VERSION, "%s: anatomy has version %g, expected %d", r->path,
-                      version, SECTION_VERSION);
-  sonde_thigh_anatomy *a = model->anatomy = SONDE_NEW(sonde_thigh_anatomy, 1);
-  if (!a) return sonde_fail_memory(r->error);
-  sonde_status status = take_vessels(r, section, a);
-  if (!status) status = take_landmarks(r, section, a);
-  if (status) return status;
-
-  const sonde_json *list = sonde_json_member(section, "segments"), *entry = sonde_json_first(list);
+  list = sonde_json_member(section, "segments");
+  entry = sonde_json_first(list);
   if (!take_count(list, SONDE_SEGMENTS, &a->segment_count)) return wrong(r, "too many segments");
-  for (uint32_t k = 0; entry; ++k, entry = sonde_json_next(entry)) {
+  for (k = 0; entry; ++k, entry = sonde_json_next(entry)) {
     sonde_segment *s = &a->segment[k];
     s->from_m = sonde_json_as_number(sonde_json_member(entry, "from_m"));
     s->to_m = sonde_json_as_number(sonde_json_member(entry, "to_m"));
@@ -192,12 +188,11 @@ sonde_status sonde_anatomy_take(const sonde_model_reader *r, sonde_model *model)
       return wrong(r, "a segment lacks its name or ends");
   }
 
-  uint32_t rows;
-  const char *row = sonde_model_take(r, "anatomy_levels", "f64", LEVEL_COLUMNS, &rows);
+  row = sonde_model_take(r, "anatomy_levels", "f64", LEVEL_COLUMNS, &rows);
   if (!row) return SONDE_FORMAT;
   if (rows < 2 || rows > SONDE_LEVELS) return wrong(r, "a wrong number of levels");
   a->level_count = rows;
-  for (uint32_t k = 0; k < rows; ++k) {
+  for (k = 0; k < rows; ++k) {
     double x[LEVEL_COLUMNS];
     memcpy(x, row + (size_t)k * sizeof x, sizeof x);
     if (!finite_row(x, LEVEL_COLUMNS) || (k > 0 && !(x[0] > a->level[k - 1].z_m)) ||
@@ -207,7 +202,7 @@ sonde_status sonde_anatomy_take(const sonde_model_reader *r, sonde_model *model)
   }
 
   const sonde_json *angle = sonde_json_first(sonde_json_member(section, "pennation_rad"));
-  for (int k = 0; k < SONDE_COMPARTMENTS; ++k, angle = sonde_json_next(angle))
+  for (k = 0; k < SONDE_COMPARTMENTS; ++k, angle = sonde_json_next(angle))
     a->pennation_rad[k] = sonde_json_as_number(angle);
   a->fascia_medial_m = sonde_json_as_number(sonde_json_member(section, "fascia_medial_m"));
   a->fascia_lateral_m = sonde_json_as_number(sonde_json_member(section, "fascia_lateral_m"));

@@ -283,28 +283,6 @@ static bool take_mesh(const reader *r, const char *vertices, const char *faces, 
   return true;
 }
 
-static bool take_nodes(const reader *r, sonde_model *model) {
-  const struct {
-    const char *name;
-    double *to;
-  } array[] = {{"node_k0", model->k0_n_m3},
-               {"node_xm", model->xm_m},
-               {"node_fat_depth", model->fat_depth_m},
-               {"node_muscle_depth", model->muscle_depth_m},
-               {"node_bone_depth", model->bone_depth_m}};
-  uint32_t n = model->surface.vertex_count;
-  for (size_t k = 0; k < SONDE_COUNT_OF(array); ++k) {
-    uint32_t rows;
-    const void *from = sonde_model_take(r, array[k].name, "f64", 1, &rows);
-    if (from && rows != n)
-      sonde_fail(r->error, SONDE_FORMAT, "%s: array '%s' has %u rows, expected %u", r->path,
-                 array[k].name, rows, n);
-    if (!from || rows != n) return false;
-    memcpy(array[k].to, from, (size_t)n * 8);
-  }
-  return true;
-}
-
 static bool take_sites(const reader *r, sonde_model *model) {
   uint32_t n, m;
   const char *id = sonde_model_take(r, "site_id", "u32", 1, &n);
@@ -326,26 +304,23 @@ static bool take_sites(const reader *r, sonde_model *model) {
     memcpy(&s->k0_n_m3, row + 96, 8);
     memcpy(&s->xm_m, row + 104, 8);
   }
-  return true;
-}
 
-// What files before the fields of the shear layer lack; the shares stay as they are then.
-static bool take_shares(const reader *r, sonde_model *model) {
-  uint32_t n = model->surface.vertex_count, m = model->site_count, rows[3];
+  // What files before the fields of the shear layer lack; the shares stay as they are then.
+  uint32_t nodes = model->surface.vertex_count, rows[3];
   if (!find_array(r, "node_shear_share")) return true;
   const char *shear = sonde_model_take(r, "node_shear_share", "f64", 1, &rows[0]);
   const char *limit = shear ? sonde_model_take(r, "node_limit_share", "f64", 1, &rows[1]) : NULL;
   const char *site = limit ? sonde_model_take(r, "site_share", "f64", 2, &rows[2]) : NULL;
   if (!site) return false;
-  if (rows[0] != n || rows[1] != n || rows[2] != m) {
+  if (rows[0] != nodes || rows[1] != nodes || rows[2] != n) {
     sonde_fail(r->error, SONDE_FORMAT,
                "%s: shares of %u, %u nodes and %u sites, expected %u and %u", r->path, rows[0],
-               rows[1], rows[2], n, m);
+               rows[1], rows[2], nodes, n);
     return false;
   }
-  memcpy(model->shear_share, shear, (size_t)n * 8);
-  memcpy(model->limit_share, limit, (size_t)n * 8);
-  for (uint32_t k = 0; k < m; ++k, site += 16) {
+  memcpy(model->shear_share, shear, (size_t)nodes * 8);
+  memcpy(model->limit_share, limit, (size_t)nodes * 8);
+  for (uint32_t k = 0; k < n; ++k, site += 16) {
     memcpy(&model->sites[k].shear_share, site, 8);
     memcpy(&model->sites[k].limit_share, site + 8, 8);
   }
@@ -502,8 +477,28 @@ static sonde_status read_model(const reader *r, sonde_model *model) {
     return SONDE_FORMAT;
   sonde_status status = sonde_model_allocate_nodes(model, r->error);
   if (status) return status;
-  if (!take_nodes(r, model) || !take_sites(r, model) || !take_shares(r, model) ||
-      !take_data(r, model) || !take_vessel(r, "vein", &model->vein) ||
+
+  // What every node has.
+  const struct {
+    const char *name;
+    double *to;
+  } array[] = {{"node_k0", model->k0_n_m3},
+               {"node_xm", model->xm_m},
+               {"node_fat_depth", model->fat_depth_m},
+               {"node_muscle_depth", model->muscle_depth_m},
+               {"node_bone_depth", model->bone_depth_m}};
+  uint32_t n = model->surface.vertex_count;
+  for (size_t k = 0; k < SONDE_COUNT_OF(array); ++k) {
+    uint32_t rows;
+    const void *from = sonde_model_take(r, array[k].name, "f64", 1, &rows);
+    if (from && rows != n)
+      sonde_fail(r->error, SONDE_FORMAT, "%s: array '%s' has %u rows, expected %u", r->path,
+                 array[k].name, rows, n);
+    if (!from || rows != n) return SONDE_FORMAT;
+    memcpy(array[k].to, from, (size_t)n * 8);
+  }
+
+  if (!take_sites(r, model) || !take_data(r, model) || !take_vessel(r, "vein", &model->vein) ||
       !take_vessel(r, "artery", &model->artery) || !check_numbers(r, model))
     return SONDE_FORMAT;
   if ((status = sonde_anatomy_take(r, model)) != SONDE_OK) return status;

@@ -28,13 +28,19 @@ static sonde_status measure_interface(sonde_model *model, const sonde_mesh *mesh
   return SONDE_OK;
 }
 
-// Distance of each node from the bone; without a bone half the path to the other side of the body.
-static sonde_status measure_bone(sonde_model *model, sonde_error *error) {
+sonde_status sonde_model_measure_layers(sonde_model *model, const sonde_mesh *fat,
+                                        const sonde_mesh *muscle, sonde_error *error) {
+  SONDE_ASSERT(model && model->surface.vertex_count > 0);
+  sonde_status status = measure_interface(model, fat, SKIN_THICKNESS_M, model->fat_depth_m, error);
+  if (!status) status = measure_interface(model, muscle, FAT_DEPTH_M, model->muscle_depth_m, error);
+  if (status) return status;
+
+  // Distance of each node from the bone; without a bone half the path to the other side of the
+  // body.
   const double skip_m = 1e-4, far_m = 1;
   bool bone = model->femur.vertex_count > 0;
   sonde_surface_index *index;
-  sonde_status status =
-      sonde_surface_index_create(bone ? &model->femur : &model->surface, &index, error);
+  status = sonde_surface_index_create(bone ? &model->femur : &model->surface, &index, error);
   if (status) return status;
   for (uint32_t i = 0; i < model->surface.vertex_count; ++i) {
     sonde_vec3 in = v_neg(model->normal[i]), p = model->surface.vertices[i];
@@ -47,16 +53,7 @@ static sonde_status measure_bone(sonde_model *model, sonde_error *error) {
       model->bone_depth_m[i] = skip_m;
   }
   sonde_surface_index_destroy(index);
-  return SONDE_OK;
-}
 
-sonde_status sonde_model_measure_layers(sonde_model *model, const sonde_mesh *fat,
-                                        const sonde_mesh *muscle, sonde_error *error) {
-  SONDE_ASSERT(model && model->surface.vertex_count > 0);
-  sonde_status status = measure_interface(model, fat, SKIN_THICKNESS_M, model->fat_depth_m, error);
-  if (!status) status = measure_interface(model, muscle, FAT_DEPTH_M, model->muscle_depth_m, error);
-  if (!status) status = measure_bone(model, error);
-  if (status) return status;
   // Order of the layers holds everywhere, also at the end faces.
   for (uint32_t i = 0; i < model->surface.vertex_count; ++i) {
     model->fat_depth_m[i] = fmin(model->fat_depth_m[i], 0.4 * model->bone_depth_m[i]);
@@ -89,13 +86,6 @@ uint32_t sonde_model_central_site(const sonde_model *model) {
   for (uint32_t k = 0; k < model->site_count; ++k)
     if (v_distance(model->sites[k].position_m, middle) <= 1.25 * nearest) return k;
   return 0;
-}
-
-// Depth of the vein's centre below the skin: 18 mm at the central site, shallower towards the groin
-// (3 mm per 100 mm), deeper towards the knee (8 mm per 100 mm).
-static double vein_depth(double along) {
-  return along < 0 ? fmax(VEIN_DEPTH_M + 0.03 * along, 0.012)
-                   : fmin(VEIN_DEPTH_M + 0.08 * along, 0.035);
 }
 
 static void add_point(sonde_vessel *vessel, sonde_vec3 centre, double radius, double depth) {
@@ -145,7 +135,10 @@ sonde_status sonde_model_place_vessels(sonde_model *model, bool beside_bone, son
     for (int k = 0; k < 3; ++k) normal = v_madd(normal, hit.weight[k], model->normal[v[k]]);
     normal = v_unit(normal, vec3(0, 0, 1));
 
-    double depth = vein_depth(along);
+    // The vein's centre is 18 mm below the skin at the central site, shallower towards the groin
+    // (3 mm per 100 mm), deeper towards the knee (8 mm per 100 mm).
+    double depth = along < 0 ? fmax(VEIN_DEPTH_M + 0.03 * along, 0.012)
+                             : fmin(VEIN_DEPTH_M + 0.08 * along, 0.035);
     sonde_vec3 vein = v_madd(hit.point_m, -depth, normal);
     sonde_vec3 side = v_unit(v_cross(axis.direction, normal), vec3(1, 0, 0));
     sonde_vec3 artery = v_madd(vein, VESSEL_OFFSET_M, side);

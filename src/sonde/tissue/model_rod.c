@@ -97,30 +97,6 @@ static bool find_sections(const sonde_model *model, limb *l) {
   return l->ends && high - low > SLENDER * 2 * l->section[0].mean_m;
 }
 
-// Least squares through the middles within BESIDE_SITES_M of the sites: their mean, and their
-// regression on the position along.
-static void fit_line(const sonde_model *model, const limb *l, sonde_vec3 *origin,
-                     sonde_vec3 *direction) {
-  double low = INFINITY, high = -INFINITY, count = 0, tt = 0;
-  sonde_vec3 sum = vec3(0, 0, 0), slope = vec3(0, 0, 0);
-  for (uint32_t k = 0; k < model->site_count; ++k) {
-    low = fmin(low, along(l, model->sites[k].position_m) - BESIDE_SITES_M);
-    high = fmax(high, along(l, model->sites[k].position_m) + BESIDE_SITES_M);
-  }
-  for (uint32_t k = 0; k < l->count; ++k) {
-    double t = along(l, l->section[k].middle);
-    if (t >= low && t <= high) sum = v_add(sum, l->section[k].middle), count += 1;
-  }
-  *origin = count > 0 ? v_scale(sum, 1 / count) : l->section[0].middle;
-  for (uint32_t k = 0; k < l->count; ++k) {
-    double t = along(l, l->section[k].middle), from = t - along(l, *origin);
-    if (t < low || t > high) continue;
-    slope = v_madd(slope, from, v_sub(l->section[k].middle, *origin));
-    tt += from * from;
-  }
-  *direction = tt > 0 ? v_unit(slope, l->along) : l->along;
-}
-
 // How far the line stays inside, away from the skin.
 static double clip(const limb *l, sonde_vec3 origin, sonde_vec3 step, double clear_m) {
   double length = 0, each = v_norm(step);
@@ -144,7 +120,26 @@ sonde_status sonde_model_place_rod(sonde_model *model, sonde_error *error) {
   if (!status) {
     l->skin = skin;
     if (find_sections(model, l)) {
-      fit_line(model, l, &origin, &direction);
+      // Least squares through the middles within BESIDE_SITES_M of the sites: their mean, and
+      // their regression on the position along.
+      double low = INFINITY, high = -INFINITY, count = 0, tt = 0;
+      sonde_vec3 sum = vec3(0, 0, 0), slope = vec3(0, 0, 0);
+      for (uint32_t k = 0; k < model->site_count; ++k) {
+        low = fmin(low, along(l, model->sites[k].position_m) - BESIDE_SITES_M);
+        high = fmax(high, along(l, model->sites[k].position_m) + BESIDE_SITES_M);
+      }
+      for (uint32_t k = 0; k < l->count; ++k) {
+        double t = along(l, l->section[k].middle);
+        if (t >= low && t <= high) sum = v_add(sum, l->section[k].middle), count += 1;
+      }
+      origin = count > 0 ? v_scale(sum, 1 / count) : l->section[0].middle;
+      for (uint32_t k = 0; k < l->count; ++k) {
+        double t = along(l, l->section[k].middle), from = t - along(l, origin);
+        if (t < low || t > high) continue;
+        slope = v_madd(slope, from, v_sub(l->section[k].middle, origin));
+        tt += from * from;
+      }
+      direction = tt > 0 ? v_unit(slope, l->along) : l->along;
       radius_m = fmin(ROD_RADIUS_M, ROD_SHARE * l->section[0].least_m);
       down = clip(l, origin, v_scale(direction, -STEP_M), CLEAR * radius_m);
       up = clip(l, origin, v_scale(direction, STEP_M), CLEAR * radius_m);
