@@ -55,22 +55,6 @@ static double fat_at(const layout *l, double angle, double z_m) {
   return sonde_shape_fat(l->shape, sonde_tube_point(&l->shape->skin, angle, z_m));
 }
 
-static void lay_vein(const layout *l) {
-  SONDE_ASSERT(l->thigh->length_m > 0 && l->cover_scale > 0);
-  l->course->vein.count = 0;
-  for (uint32_t k = 0; k < SONDE_VESSEL_POINTS; ++k) {
-    double t = share_of(k), z = t * l->thigh->length_m, angle = sonde_course_angle(l->thigh, t);
-    double radius = 0.5 * l->thigh->vein_m * calibre(t);
-    double a = l->thigh->vein_cover_m, b = l->thigh->canal_cover_m, c = b + 0.01;
-    double all = a * (1 - t) * (1 - 2 * t) + 4 * b * t * (1 - t) + c * t * (2 * t - 1);
-    double depth =
-        l->thigh->skin_m + fat_at(l, angle, z) + (l->cover_scale * fmax(all, 0.001)) + radius;
-    l->course->angle_rad[k] = angle;
-    l->course->skin_z_m[k] = z;
-    add(l, &l->course->vein, below_skin(l, angle, z, depth), radius);
-  }
-}
-
 static sonde_vec3 rotated(sonde_vec3 v, double angle) {
   return vec3(v.x * cos(angle) - v.y * sin(angle), v.x * sin(angle) + v.y * cos(angle), v.z);
 }
@@ -79,32 +63,6 @@ static sonde_vec3 rotated(sonde_vec3 v, double angle) {
 static double below_fascia(const layout *l, sonde_vec3 centre, double radius) {
   sonde_surface_point above = sonde_surface_closest(l->skin, centre);
   return above.distance_m - radius - l->thigh->skin_m - sonde_shape_fat(l->shape, above.point_m);
-}
-
-// Beside the vein: from lateral (10 degrees) by the front (80 at mid-thigh) to the medial front
-// (125 at the knee).
-static void lay_artery(const layout *l) {
-  sonde_course *c = l->course;
-  c->artery.count = 0;
-  for (uint32_t k = 0; k < SONDE_VESSEL_POINTS; ++k) {
-    double t = share_of(k), radius = 0.5 * l->thigh->artery_m * calibre(t);
-    double lateral = (10 + 165 * t - 50 * t * t) * SONDE_PI / 180;
-    const sonde_vessel_point *vein = &c->vein.point[k];
-    sonde_vec3 to = vec3(-cos(lateral), sin(lateral), 0), centre = vein->centre_m;
-    uint32_t a = k > 0 ? k - 1 : 0, b = k + 1 < c->vein.count ? k + 1 : k;
-    sonde_vec3 along =
-        v_unit(v_sub(c->vein.point[b].centre_m, c->vein.point[a].centre_m), vec3(0, 0, 1));
-    // The direction rotates away from the skin where the fascia is near.
-    sonde_vec3 up = v_sub(sonde_surface_closest(l->skin, centre).point_m, centre);
-    double sense = v_dot(rotated(to, 0.01), up) < v_dot(to, up) ? 1 : -1;
-    for (int degree = 0; degree <= 60; ++degree) {
-      sonde_vec3 side = rotated(to, sense * degree * SONDE_PI / 180);
-      side = v_unit(v_madd(side, -v_dot(side, along), along), side);
-      centre = v_madd(vein->centre_m, vein->radius_m + radius + WALL_GAP_M, side);
-      if (below_fascia(l, centre, radius) > 2 * LEAST_COVER_M) break;
-    }
-    add(l, &c->artery, centre, radius);
-  }
 }
 
 // A vessel's point at a share of the length, between its stored ones.
@@ -250,9 +208,44 @@ static sonde_status check_line(const layout *l, const char *name, const sonde_ve
 
 static sonde_status lay_all(const layout *l, sonde_error *error) {
   sonde_course *c = l->course;
+  SONDE_ASSERT(l->thigh->length_m > 0 && l->cover_scale > 0);
   c->branch_count = 0;
-  lay_vein(l);
-  lay_artery(l);
+  c->vein.count = 0;
+  for (uint32_t k = 0; k < SONDE_VESSEL_POINTS; ++k) {
+    double t = share_of(k), z = t * l->thigh->length_m, angle = sonde_course_angle(l->thigh, t);
+    double radius = 0.5 * l->thigh->vein_m * calibre(t);
+    double a = l->thigh->vein_cover_m, b = l->thigh->canal_cover_m, e = b + 0.01;
+    double all = a * (1 - t) * (1 - 2 * t) + 4 * b * t * (1 - t) + e * t * (2 * t - 1);
+    double depth =
+        l->thigh->skin_m + fat_at(l, angle, z) + (l->cover_scale * fmax(all, 0.001)) + radius;
+    c->angle_rad[k] = angle;
+    c->skin_z_m[k] = z;
+    add(l, &c->vein, below_skin(l, angle, z, depth), radius);
+  }
+
+  // The artery beside the vein: from lateral (10 degrees) by the front (80 at mid-thigh) to the
+  // medial front (125 at the knee).
+  c->artery.count = 0;
+  for (uint32_t k = 0; k < SONDE_VESSEL_POINTS; ++k) {
+    double t = share_of(k), radius = 0.5 * l->thigh->artery_m * calibre(t);
+    double lateral = (10 + 165 * t - 50 * t * t) * SONDE_PI / 180;
+    const sonde_vessel_point *vein = &c->vein.point[k];
+    sonde_vec3 to = vec3(-cos(lateral), sin(lateral), 0), centre = vein->centre_m;
+    uint32_t a = k > 0 ? k - 1 : 0, b = k + 1 < c->vein.count ? k + 1 : k;
+    sonde_vec3 along =
+        v_unit(v_sub(c->vein.point[b].centre_m, c->vein.point[a].centre_m), vec3(0, 0, 1));
+    // The direction rotates away from the skin where the fascia is near.
+    sonde_vec3 up = v_sub(sonde_surface_closest(l->skin, centre).point_m, centre);
+    double sense = v_dot(rotated(to, 0.01), up) < v_dot(to, up) ? 1 : -1;
+    for (int degree = 0; degree <= 60; ++degree) {
+      sonde_vec3 side = rotated(to, sense * degree * SONDE_PI / 180);
+      side = v_unit(v_madd(side, -v_dot(side, along), along), side);
+      centre = v_madd(vein->centre_m, vein->radius_m + radius + WALL_GAP_M, side);
+      if (below_fascia(l, centre, radius) > 2 * LEAST_COVER_M) break;
+    }
+    add(l, &c->artery, centre, radius);
+  }
+
   lay_saphenous(l);
   lay_deep(l);
   if (l->thigh->second_vein > 0) lay_second(l);

@@ -72,25 +72,6 @@ static sonde_status draw_loop(const panel *p, const loop *l, bool inner, const c
   return SONDE_OK;
 }
 
-// The sheets between the compartments of the nearest level, from femur to fascia.
-static void draw_septa(const panel *p, const sonde_thigh_anatomy *a, const loop *skin, double z_m) {
-  SONDE_ASSERT(a->level_count > 0);
-  const sonde_muscle_level *l = &a->level[0];
-  for (uint32_t k = 1; k < a->level_count; ++k)
-    if (fabs(a->level[k].z_m - z_m) < fabs(l->z_m - z_m)) l = &a->level[k];
-  for (int s = 0; s < SONDE_COMPARTMENTS; ++s) {
-    double c = cos(l->septum_rad[s]), d = sin(l->septum_rad[s]), reach = 0, side = INFINITY;
-    for (uint32_t k = 0; k < skin->count; ++k) { // where the fascia lies in that direction
-      double x = skin->point[k].inner[0] - l->bone_x_m, y = skin->point[k].inner[1] - l->bone_y_m;
-      double along = x * c + y * d, beside = fabs(y * c - x * d);
-      if (along > 0 && beside < side) side = beside, reach = along;
-    }
-    const double ends[2][2] = {{px(p, l->bone_x_m), py(p, l->bone_y_m)},
-                               {px(p, l->bone_x_m + reach * c), py(p, l->bone_y_m + reach * d)}};
-    sonde_svg_put_line(p->file, ends, 2, "stroke='#f2dcd6' stroke-width='2.5'");
-  }
-}
-
 // The vessel where it passes the plane.
 static bool find_vessel(const sonde_vessel *line, double z_m, sonde_vessel_point *at) {
   for (uint32_t k = 0; k + 1 < line->count; ++k) {
@@ -152,7 +133,23 @@ static sonde_status draw_panel(panel *p, const sonde_model *model, const sonde_l
   }
   if (!status)
     status = draw_loop(p, &skin, true, "fill='#a8443c' stroke='#f5efe6' stroke-width='1.5'", error);
-  if (!status) draw_septa(p, a, &skin, z_m);
+  if (!status) { // the sheets between the compartments of the nearest level, from femur to fascia
+    SONDE_ASSERT(a->level_count > 0);
+    const sonde_muscle_level *l = &a->level[0];
+    for (uint32_t k = 1; k < a->level_count; ++k)
+      if (fabs(a->level[k].z_m - z_m) < fabs(l->z_m - z_m)) l = &a->level[k];
+    for (int s = 0; s < SONDE_COMPARTMENTS; ++s) {
+      double c = cos(l->septum_rad[s]), d = sin(l->septum_rad[s]), reach = 0, side = INFINITY;
+      for (uint32_t k = 0; k < skin.count; ++k) { // where the fascia lies in that direction
+        double x = skin.point[k].inner[0] - l->bone_x_m, y = skin.point[k].inner[1] - l->bone_y_m;
+        double along = x * c + y * d, beside = fabs(y * c - x * d);
+        if (along > 0 && beside < side) side = beside, reach = along;
+      }
+      const double ends[2][2] = {{px(p, l->bone_x_m), py(p, l->bone_y_m)},
+                                 {px(p, l->bone_x_m + reach * c), py(p, l->bone_y_m + reach * d)}};
+      sonde_svg_put_line(p->file, ends, 2, "stroke='#f2dcd6' stroke-width='2.5'");
+    }
+  }
   if (!status)
     status =
         draw_loop(p, &bone, false, "fill='#efe9da' stroke='#b9ad8f' stroke-width='1.5'", error);

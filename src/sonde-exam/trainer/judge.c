@@ -96,29 +96,6 @@ sonde_force_target sonde_press_target(const sonde_judge *judge) {
   return judge->plan.point[place].target;
 }
 
-// One snapshot of the press under way: its greatest force, and the least area of the vein with the
-// artery and the tilt at that moment. fmin() leaves out what is not a number.
-static void follow_press(sonde_judge *judge, const sonde_snapshot *s) {
-  sonde_compression *p = &judge->now;
-  bool seen = isfinite(s->vein_area_ratio) && isfinite(s->vein_rest_m.z);
-  if (s->force_normal_n >= p->force_peak_n) {
-    p->force_peak_n = s->force_normal_n;
-    p->peak_s = s->time_s - judge->first_s;
-    judge->seen_at_peak = seen;
-  }
-  p->end_s = s->time_s - judge->first_s;
-  p->artery_least = fmin(p->artery_least, s->artery_area_ratio);
-  // where the probe was put: under the press tissue moves along the leg
-  if (seen && isnan(p->z_m)) {
-    p->z_m = s->vein_rest_m.z;
-    settle_place(judge, p->z_m);
-  }
-  if (!seen || s->vein_area_ratio >= (isnan(p->vein_ratio) ? INFINITY : p->vein_ratio)) return;
-  p->vein_ratio = s->vein_area_ratio;
-  p->artery_ratio = s->artery_area_ratio;
-  p->tilt_rad = s->vein_tilt_rad;
-}
-
 // Comparisons with NaN are false: without a force target nothing is too hard, and nothing firm.
 sonde_press_result sonde_press_classify(const sonde_judge *judge) {
   const sonde_compression *p = &judge->now;
@@ -237,7 +214,30 @@ bool sonde_judge_feed(sonde_judge *judge, const sonde_snapshot *snapshot) {
       settle_place(judge, s.world_from_probe.position.z);
     }
   }
-  if (judge->pressing) follow_press(judge, &s);
+
+  // The press under way: its greatest force, and the least area of the vein with the artery and the
+  // tilt at that moment. fmin() leaves out what is not a number.
+  if (judge->pressing) {
+    sonde_compression *p = &judge->now;
+    bool seen = isfinite(s.vein_area_ratio) && isfinite(s.vein_rest_m.z);
+    if (s.force_normal_n >= p->force_peak_n) {
+      p->force_peak_n = s.force_normal_n;
+      p->peak_s = s.time_s - judge->first_s;
+      judge->seen_at_peak = seen;
+    }
+    p->end_s = s.time_s - judge->first_s;
+    p->artery_least = fmin(p->artery_least, s.artery_area_ratio);
+    // where the probe was put: under the press tissue moves along the leg
+    if (seen && isnan(p->z_m)) {
+      p->z_m = s.vein_rest_m.z;
+      settle_place(judge, p->z_m);
+    }
+    if (seen && s.vein_area_ratio < (isnan(p->vein_ratio) ? INFINITY : p->vein_ratio)) {
+      p->vein_ratio = s.vein_area_ratio;
+      p->artery_ratio = s.artery_area_ratio;
+      p->tilt_rad = s.vein_tilt_rad;
+    }
+  }
   judge->last = s;
   judge->started = true;
   return kept;

@@ -8,28 +8,6 @@
 static const double CAP = 49, PASS = 70;
 static const double TIME_NONE_S = 1200;
 
-// Right and supported decisions, segment by segment.
-static void judge_segments(const sonde_judge *judge, const sonde_case *truth, sonde_score *score) {
-  score->segment_count = judge->map.segment_count;
-  for (uint32_t i = 0; i < score->segment_count; ++i) {
-    sonde_segment_status status = sonde_judge_segment(judge, i);
-    sonde_segment_verdict *v = &score->segment[i];
-    const sonde_segment *segment = &judge->map.segment[i];
-    *v = (sonde_segment_verdict){.needed = status.needed,
-                                 .decision = status.decision,
-                                 .from_m = segment->from_m,
-                                 .to_m = segment->to_m,
-                                 .points = status.points,
-                                 .done = status.done};
-    memcpy(v->name, segment->name, sizeof v->name);
-    for (uint32_t k = 0; k < truth->truth_count; ++k)
-      if (strcmp(truth->truth_segment[k], v->name) == 0) v->truth = truth->truth[k];
-    v->correct = v->decision != SONDE_DECISION_NONE && v->decision == v->truth;
-    bool clot = v->decision == SONDE_DECISION_CLOT;
-    v->supported = clot ? judge->open[i] > 0 : judge->complete[i] > 0;
-  }
-}
-
 // Findings: the mean over the segments of the plan. One open place shows a clot; that there is none
 // takes every place.
 static double share_of_findings(const sonde_score *score) {
@@ -62,7 +40,26 @@ void sonde_judge_score(const sonde_judge *judge, const sonde_case *truth, sonde_
   SONDE_ASSERT(judge && truth && score);
   *score = (sonde_score){.metrics = sonde_judge_metrics(judge)};
   const sonde_metrics *m = &score->metrics;
-  judge_segments(judge, truth, score);
+
+  // Right and supported decisions, segment by segment.
+  score->segment_count = judge->map.segment_count;
+  for (uint32_t i = 0; i < score->segment_count; ++i) {
+    sonde_segment_status status = sonde_judge_segment(judge, i);
+    sonde_segment_verdict *v = &score->segment[i];
+    const sonde_segment *segment = &judge->map.segment[i];
+    *v = (sonde_segment_verdict){.needed = status.needed,
+                                 .decision = status.decision,
+                                 .from_m = segment->from_m,
+                                 .to_m = segment->to_m,
+                                 .points = status.points,
+                                 .done = status.done};
+    memcpy(v->name, segment->name, sizeof v->name);
+    for (uint32_t k = 0; k < truth->truth_count; ++k)
+      if (strcmp(truth->truth_segment[k], v->name) == 0) v->truth = truth->truth[k];
+    v->correct = v->decision != SONDE_DECISION_NONE && v->decision == v->truth;
+    bool clot = v->decision == SONDE_DECISION_CLOT;
+    v->supported = clot ? judge->open[i] > 0 : judge->complete[i] > 0;
+  }
 
   // The diagnosis: one segment with a clot makes a thrombosis, its absence takes all segments of
   // the plan.

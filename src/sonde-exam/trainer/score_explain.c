@@ -25,22 +25,6 @@ static const char *title_of(const sonde_plan *plan, uint32_t place) {
   return place < plan->count ? plan->point[place].title : "vein not in view";
 }
 
-static void explain_findings(const sonde_score *score, char *text) {
-  for (uint32_t i = 0; i < score->segment_count; ++i) {
-    const sonde_segment_verdict *v = &score->segment[i];
-    const char *title = sonde_segment_title(v->name);
-    if (!v->needed) continue;
-    if (v->decision == SONDE_DECISION_NONE)
-      say(text, "%s: no finding", title);
-    else if (!v->correct)
-      say(text, "%s: wrong finding", title);
-    else if (!v->supported)
-      say(text, "%s: no press shows the finding", title);
-    else if (v->decision == SONDE_DECISION_COMPRESSIBLE && v->done < v->points)
-      say(text, "%s: %u of %u places pressed well", title, v->done, v->points);
-  }
-}
-
 static void explain_technique(const sonde_metrics *m, const sonde_plan *plan,
                               const sonde_compression *presses, uint32_t count, char *text) {
   static const char *const WHY[] = {[SONDE_PRESS_INSUFFICIENT] = "not far enough",
@@ -77,7 +61,19 @@ void sonde_score_explain(const sonde_score *score, const sonde_plan *plan,
   for (k = 0; k < SONDE_SCORE_PARTS; ++k) {
     char *text = part[k].lost;
     if (part[k].points >= part[k].of - NOTHING) continue;
-    if (k == FINDINGS) explain_findings(score, text);
+    for (uint32_t i = 0; k == FINDINGS && i < score->segment_count; ++i) {
+      const sonde_segment_verdict *v = &score->segment[i];
+      const char *title = sonde_segment_title(v->name);
+      if (!v->needed) continue;
+      if (v->decision == SONDE_DECISION_NONE)
+        say(text, "%s: no finding", title);
+      else if (!v->correct)
+        say(text, "%s: wrong finding", title);
+      else if (!v->supported)
+        say(text, "%s: no press shows the finding", title);
+      else if (v->decision == SONDE_DECISION_COMPRESSIBLE && v->done < v->points)
+        say(text, "%s: %u of %u places pressed well", title, v->done, v->points);
+    }
     if (k == TECHNIQUE) explain_technique(m, plan, presses, count, text);
 
     // Presses above the limit that lie in a part of the list which was not kept are counted by the

@@ -162,25 +162,6 @@ typedef struct integrals {
   double phi[3], t_phi[3], area, deepest;
 } integrals;
 
-// The plane that lies lowest below `plane` at a corner; `plane` itself when none does.
-static uint32_t lowest_plane(const columns *far, uint32_t plane, const corner *polygon,
-                             uint32_t count, double slack) {
-  SONDE_ASSERT(plane < far->count && count <= MAX_CORNERS);
-  uint32_t best = plane;
-  double deepest = slack;
-  double present[MAX_CORNERS];
-  for (uint32_t k = 0; k < count; ++k) present[k] = value(&far->length[plane], polygon[k]);
-  for (uint32_t j = 0; j < far->count; ++j)
-    for (uint32_t k = 0; k < count; ++k) {
-      double below = present[k] - value(&far->length[j], polygon[k]);
-      if (below > deepest) {
-        deepest = below;
-        best = j;
-      }
-    }
-  return best;
-}
-
 // Replaces the top piece by the part where `lower` is not below its plane and, on top of it, the
 // part where it is. False when there is no room.
 static bool split_top(pieces *stack, const columns *far, uint32_t lower) {
@@ -226,7 +207,19 @@ static void integrate_pieces(const columns *far, const corner *polygon, uint32_t
     // Where two planes are equal within rounding, each may look lower than the other for ever.
     uint32_t top = stack.count - 1, size = stack.size[top], plane = stack.plane[top];
     const corner *piece = stack.corners + stack.used - size;
-    uint32_t lower = lowest_plane(far, plane, piece, size, slack);
+    SONDE_ASSERT(plane < far->count && size <= MAX_CORNERS);
+    uint32_t lower = plane; // lies lowest below `plane` at a corner
+    double deepest = slack;
+    double present[MAX_CORNERS];
+    for (uint32_t k = 0; k < size; ++k) present[k] = value(&far->length[plane], piece[k]);
+    for (uint32_t j = 0; j < far->count; ++j)
+      for (uint32_t k = 0; k < size; ++k) {
+        double below = present[k] - value(&far->length[j], piece[k]);
+        if (below > deepest) {
+          deepest = below;
+          lower = j;
+        }
+      }
     if (lower != plane && splits++ < MAX_SPLITS && split_top(&stack, far, lower)) continue;
 
     const linear *t = &far->length[plane];

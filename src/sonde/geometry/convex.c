@@ -17,21 +17,6 @@ static int compare_sizes(const void *a, const void *b) {
   return x->face < y->face ? -1 : x->face > y->face;
 }
 
-// Plane of a patch of faces: its mean normal, the offset of its outermost vertex.
-static void add_plane(sonde_convex *convex, const uint32_t *patch, uint32_t count) {
-  const sonde_mesh *hull = &convex->hull;
-  SONDE_ASSERT(count > 0 && convex->plane_count < hull->face_count);
-  sonde_vec3 sum = vec3(0, 0, 0);
-  for (uint32_t i = 0; i < count; ++i) sum = v_add(sum, sonde_face_cross(hull, patch[i]));
-  sonde_vec3 normal = v_unit(sum, vec3(0, 0, 1));
-  double offset = -INFINITY;
-  for (uint32_t i = 0; i < count; ++i)
-    for (int k = 0; k < 3; ++k)
-      offset = fmax(offset, v_dot(normal, hull->vertices[hull->faces[patch[i]][k]]));
-  convex->plane_normal[convex->plane_count] = normal;
-  convex->plane_offset_m[convex->plane_count++] = offset;
-}
-
 // Faces from large to small, so that a plane is taken from its best face; a plane has the faces of
 // the coplanar patch around its first one.
 static void find_planes(sonde_convex *convex, double tolerance_m, sized_face *order, bool *done,
@@ -64,7 +49,18 @@ static void find_planes(sonde_convex *convex, double tolerance_m, sized_face *or
         patch[count++] = other;
       }
     }
-    add_plane(convex, patch, count);
+
+    // Plane of the patch: its mean normal, the offset of its outermost vertex.
+    SONDE_ASSERT(count > 0 && convex->plane_count < hull->face_count);
+    sonde_vec3 sum = vec3(0, 0, 0);
+    for (uint32_t p = 0; p < count; ++p) sum = v_add(sum, sonde_face_cross(hull, patch[p]));
+    normal = v_unit(sum, vec3(0, 0, 1));
+    offset = -INFINITY;
+    for (uint32_t p = 0; p < count; ++p)
+      for (int k = 0; k < 3; ++k)
+        offset = fmax(offset, v_dot(normal, hull->vertices[hull->faces[patch[p]][k]]));
+    convex->plane_normal[convex->plane_count] = normal;
+    convex->plane_offset_m[convex->plane_count++] = offset;
   }
 }
 

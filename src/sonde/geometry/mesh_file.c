@@ -73,41 +73,6 @@ static void put_point(bytes_cursor *record, sonde_vec3 point) {
   bytes_f32(record, point.z);
 }
 
-static void write_stl(sonde_file *file, double units, const sonde_mesh *mesh) {
-  SONDE_ASSERT(units > 0);
-  unsigned char head[84] = "binary STL", triangle[50] = {0};
-  bytes_u32(&(bytes_cursor){head + 80, 4, 0}, mesh->face_count);
-  sonde_file_write(file, head, sizeof head);
-  for (uint32_t f = 0; f < mesh->face_count; ++f) {
-    bytes_cursor record = {triangle, sizeof triangle, 0};
-    put_point(&record, v_unit(sonde_face_cross(mesh, f), vec3(0, 0, 0)));
-    for (int k = 0; k < 3; ++k)
-      put_point(&record, v_scale(mesh->vertices[mesh->faces[f][k]], 1.0 / units));
-    sonde_file_write(file, triangle, sizeof triangle);
-  }
-}
-
-static void write_text(sonde_file *file, bool ply, double units, const sonde_mesh *mesh) {
-  SONDE_ASSERT(units > 0);
-  if (ply)
-    sonde_file_printf(file,
-                      "ply\nformat ascii 1.0\nelement vertex %u\nproperty double x\n"
-                      "property double y\nproperty double z\nelement face %u\n"
-                      "property list uchar uint vertex_indices\nend_header\n",
-                      mesh->vertex_count, mesh->face_count);
-  for (uint32_t v = 0; v < mesh->vertex_count; ++v) {
-    sonde_vec3 p = mesh->vertices[v];
-    sonde_file_printf(file, "%s%.17g %.17g %.17g\n", ply ? "" : "v ", p.x / units, p.y / units,
-                      p.z / units);
-  }
-  uint32_t base = ply ? 0 : 1;
-  for (uint32_t f = 0; f < mesh->face_count; ++f) {
-    const uint32_t *v = mesh->faces[f];
-    sonde_file_printf(file, "%s %u %u %u\n", ply ? "3" : "f", v[0] + base, v[1] + base,
-                      v[2] + base);
-  }
-}
-
 sonde_status sonde_mesh_save(const char *path, double metres_per_unit, const sonde_mesh *mesh,
                              sonde_error *error) {
   SONDE_ASSERT(path != NULL && mesh != NULL);
@@ -120,10 +85,37 @@ sonde_status sonde_mesh_save(const char *path, double metres_per_unit, const son
   status = sonde_file_create(path, &file, error);
   if (!status) {
     kind format = file_kind(path);
-    if (format == STL)
-      write_stl(file, metres_per_unit, mesh);
-    else
-      write_text(file, format == PLY, metres_per_unit, mesh);
+    if (format == STL) {
+      unsigned char head[84] = "binary STL", triangle[50] = {0};
+      bytes_u32(&(bytes_cursor){head + 80, 4, 0}, mesh->face_count);
+      sonde_file_write(file, head, sizeof head);
+      for (uint32_t f = 0; f < mesh->face_count; ++f) {
+        bytes_cursor record = {triangle, sizeof triangle, 0};
+        put_point(&record, v_unit(sonde_face_cross(mesh, f), vec3(0, 0, 0)));
+        for (int k = 0; k < 3; ++k)
+          put_point(&record, v_scale(mesh->vertices[mesh->faces[f][k]], 1.0 / metres_per_unit));
+        sonde_file_write(file, triangle, sizeof triangle);
+      }
+    } else {
+      bool ply = format == PLY;
+      if (ply)
+        sonde_file_printf(file,
+                          "ply\nformat ascii 1.0\nelement vertex %u\nproperty double x\n"
+                          "property double y\nproperty double z\nelement face %u\n"
+                          "property list uchar uint vertex_indices\nend_header\n",
+                          mesh->vertex_count, mesh->face_count);
+      for (uint32_t v = 0; v < mesh->vertex_count; ++v) {
+        sonde_vec3 p = mesh->vertices[v];
+        sonde_file_printf(file, "%s%.17g %.17g %.17g\n", ply ? "" : "v ", p.x / metres_per_unit,
+                          p.y / metres_per_unit, p.z / metres_per_unit);
+      }
+      uint32_t base = ply ? 0 : 1;
+      for (uint32_t f = 0; f < mesh->face_count; ++f) {
+        const uint32_t *v = mesh->faces[f];
+        sonde_file_printf(file, "%s %u %u %u\n", ply ? "3" : "f", v[0] + base, v[1] + base,
+                          v[2] + base);
+      }
+    }
     status = sonde_file_commit(file, error);
   }
   uselocale(previous);
