@@ -31,23 +31,6 @@ static void tick(void *user) {
   atomic_store(&b->count, k + 1);
 }
 
-// In place. Where wake-ups lie within the period is a circle; they begin after its widest empty
-// arc. Whole periods are deadline misses and counted by the loop.
-static void lateness(double *woken_s, double *scratch, size_t count) {
-  assert(count > 0);
-  const double period = 1e-3;
-  double start = woken_s[0], widest = 0.0, earliest = 0.0;
-  for (size_t k = 0; k < count; ++k) scratch[k] = woken_s[k] = fmod(woken_s[k] - start, period);
-  app_quantile(scratch, count, 0.5); // sorts
-  for (size_t k = 0; k < count; ++k) {
-    double before = k ? scratch[k - 1] : scratch[count - 1] - period;
-    if (scratch[k] - before <= widest) continue;
-    widest = scratch[k] - before;
-    earliest = scratch[k];
-  }
-  for (size_t k = 0; k < count; ++k) woken_s[k] = fmod(woken_s[k] - earliest + period, period);
-}
-
 static void print_times(const char *name, double *list, size_t count) {
   app_json_object(name);
   app_json("p50:%g p99:%g p999:%g max:%g", 1e6 * app_quantile(list, count, 0.5),
@@ -97,16 +80,6 @@ static void print_table(bench *b, const sonde_loop_stats *stats) {
   if (stats->priority_note[0]) printf("  %s\n", stats->priority_note);
 }
 
-static sonde_status write_csv(const bench *b, const char *path, sonde_error *error) {
-  sonde_file *file;
-  sonde_status status = sonde_file_create(path, &file, error);
-  if (status) return status;
-  sonde_file_printf(file, "tick,compute_us,cpu_us\n");
-  for (size_t k = 0; k < b->count; ++k)
-    sonde_file_printf(file, "%zu,%.3f,%.3f\n", k, 1e6 * b->compute_s[k], 1e6 * b->cpu_s[k]);
-  return sonde_file_commit(file, error);
-}
-
 // Runs the loop for some seconds and prints what it took.
 static sonde_status measure(bench *b, const haptics_rig_def *def, double seconds, bool json,
                             const char *csv, sonde_error *error) {
@@ -126,9 +99,34 @@ static sonde_status measure(bench *b, const haptics_rig_def *def, double seconds
   }
   haptics_rig_stop(&b->rig);
   sonde_state_destroy(state);
-  if (!status && csv) status = write_csv(b, csv, error); // before quantiles sort
+  // The table keeps the order of the ticks, which the quantiles sort away.
+  if (!status && csv) {
+    sonde_file *file;
+    status = sonde_file_create(csv, &file, error);
+    if (!status) {
+      sonde_file_printf(file, "tick,compute_us,cpu_us\n");
+      for (size_t k = 0; k < b->count; ++k)
+        sonde_file_printf(file, "%zu,%.3f,%.3f\n", k, 1e6 * b->compute_s[k], 1e6 * b->cpu_s[k]);
+      status = sonde_file_commit(file, error);
+    }
+  }
   if (status || b->count == 0) return status;
-  lateness(b->woken_s, b->scratch, b->count);
+  // In place. Where wake-ups lie within the period is a circle; they begin after its widest empty
+  // arc. Whole periods are deadline misses and counted by the loop.
+  assert(b->count > 0);
+  const double period = 1e-3;
+  double start = b->woken_s[0], widest = 0.0, earliest = 0.0;
+  for (size_t k = 0; k < b->count; ++k)
+    b->scratch[k] = b->woken_s[k] = fmod(b->woken_s[k] - start, period);
+  app_quantile(b->scratch, b->count, 0.5); // sorts
+  for (size_t k = 0; k < b->count; ++k) {
+    double before = k ? b->scratch[k - 1] : b->scratch[b->count - 1] - period;
+    if (b->scratch[k] - before <= widest) continue;
+    widest = b->scratch[k] - before;
+    earliest = b->scratch[k];
+  }
+  for (size_t k = 0; k < b->count; ++k)
+    b->woken_s[k] = fmod(b->woken_s[k] - earliest + period, period);
   (json ? print_json : print_table)(b, &stats);
   return SONDE_OK;
 }

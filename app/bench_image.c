@@ -89,29 +89,6 @@ static sonde_status prepare(bench *b, const options *o, sonde_error *error) {
   return make_echo(b, o, known_m3 * (double)o->scatterers / fmax(moved, 1), error);
 }
 
-// Times of some frames at each depth, after one that fills the caches.
-static void record(bench *b, const options *o) {
-  uint64_t tick = 2;
-  for (long first = 0; first < o->frames; first += o->frames / DEPTHS + 1) {
-    settled_at(&b->scene, b->start, 0.004 + 0.010 * (double)first / (double)o->frames, 1e-5);
-    draw(b, tick++); // warm
-    for (long k = first; k < first + o->frames / DEPTHS + 1 && k < o->frames; ++k) {
-      settled_at(&b->scene, pose_shift(b->start, 1e-5 * (double)(k % 8), pose_axis(b->start, 2)),
-                 0.004 + 0.010 * (double)first / (double)o->frames, 1e-3);
-      draw(b, tick++);
-      sonde_echo_times t = sonde_echo_last_times(b->echo);
-      const double s[STAGES] = {t.settings_s, t.plane_s, t.medium_s,
-                                t.scatter_s,  t.beam_s,  t.picture_s};
-      b->stage[k] = 0;
-      for (long i = 0; i < STAGES; ++i) {
-        b->stage[(i + 1) * o->frames + k] = s[i] * 1e3;
-        b->stage[k] += s[i] * 1e3;
-      }
-      b->scatterers += t.scatterers / (double)o->frames;
-    }
-  }
-}
-
 static void print(bench *b, const options *o) {
   static const char *const NAMES[STAGES] = {"settings", "plane", "medium",
                                             "scatter",  "beam",  "picture"};
@@ -152,7 +129,26 @@ static int run(void *from) {
   b.stage = calloc((size_t)(STAGES + 1) * (size_t)o->frames, sizeof *b.stage);
   sonde_status status = b.stage ? prepare(&b, o, &error) : SONDE_MEMORY;
   if (!status) {
-    record(&b, o);
+    // Times of some frames at each depth, after one that fills the caches.
+    uint64_t tick = 2;
+    for (long first = 0; first < o->frames; first += o->frames / DEPTHS + 1) {
+      settled_at(&b.scene, b.start, 0.004 + 0.010 * (double)first / (double)o->frames, 1e-5);
+      draw(&b, tick++); // warm
+      for (long k = first; k < first + o->frames / DEPTHS + 1 && k < o->frames; ++k) {
+        settled_at(&b.scene, pose_shift(b.start, 1e-5 * (double)(k % 8), pose_axis(b.start, 2)),
+                   0.004 + 0.010 * (double)first / (double)o->frames, 1e-3);
+        draw(&b, tick++);
+        sonde_echo_times t = sonde_echo_last_times(b.echo);
+        const double s[STAGES] = {t.settings_s, t.plane_s, t.medium_s,
+                                  t.scatter_s,  t.beam_s,  t.picture_s};
+        b.stage[k] = 0;
+        for (long i = 0; i < STAGES; ++i) {
+          b.stage[(i + 1) * o->frames + k] = s[i] * 1e3;
+          b.stage[k] += s[i] * 1e3;
+        }
+        b.scatterers += t.scatterers / (double)o->frames;
+      }
+    }
     print(&b, o);
   }
   free(b.stage);

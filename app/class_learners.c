@@ -117,32 +117,6 @@ static void forget_process(class_learner *learner) {
   learner->process = 0;
 }
 
-// Says why a program ended, and whether it is started again.
-static void bury(class_learner *learner, int status, class_say say) {
-  char how[64], words[400], sentence[512];
-  hear(learner);
-  if (WIFSIGNALED(status))
-    snprintf(how, sizeof how, "was ended by signal %d", WTERMSIG(status));
-  else
-    snprintf(how, sizeof how, "ended with exit code %d", WEXITSTATUS(status));
-  double lived_s = class_now_s() - learner->started_s;
-  snprintf(words, sizeof words, "%s after %.0f s%s%s", how, lived_s,
-           learner->last_line[0] ? ": " : "", learner->last_line);
-  if (lived_s >= LONG_S) learner->restarts = 0;
-  forget_process(learner);
-  learner->status = UNKNOWN;
-  learner->gave_up = learner->restarts >= CLASS_RESTARTS;
-  if (learner->gave_up) {
-    snprintf(sentence, sizeof sentence, "%s; given up after %d restarts", words, CLASS_RESTARTS);
-  } else {
-    learner->restarts++;
-    learner->start_again_s = class_now_s() + AGAIN_S;
-    snprintf(sentence, sizeof sentence, "%s; starting again (%u of %d)", words, learner->restarts,
-             CLASS_RESTARTS);
-  }
-  say(learner, sentence);
-}
-
 bool class_watch(class_room *room, class_say say) {
   uint32_t lost = 0;
   for (uint32_t i = 0; i < room->count; ++i) {
@@ -151,8 +125,32 @@ bool class_watch(class_room *room, class_say say) {
     if (learner->process && waitpid(learner->process, &status, WNOHANG) == learner->process) {
       if (app_interrupted()) // Ctrl-C reached it first
         forget_process(learner);
-      else
-        bury(learner, status, say);
+      else {
+        // Says why a program ended, and whether it is started again.
+        char how[64], words[400], sentence[512];
+        hear(learner);
+        if (WIFSIGNALED(status))
+          snprintf(how, sizeof how, "was ended by signal %d", WTERMSIG(status));
+        else
+          snprintf(how, sizeof how, "ended with exit code %d", WEXITSTATUS(status));
+        double lived_s = class_now_s() - learner->started_s;
+        snprintf(words, sizeof words, "%s after %.0f s%s%s", how, lived_s,
+                 learner->last_line[0] ? ": " : "", learner->last_line);
+        if (lived_s >= LONG_S) learner->restarts = 0;
+        forget_process(learner);
+        learner->status = UNKNOWN;
+        learner->gave_up = learner->restarts >= CLASS_RESTARTS;
+        if (learner->gave_up) {
+          snprintf(sentence, sizeof sentence, "%s; given up after %d restarts", words,
+                   CLASS_RESTARTS);
+        } else {
+          learner->restarts++;
+          learner->start_again_s = class_now_s() + AGAIN_S;
+          snprintf(sentence, sizeof sentence, "%s; starting again (%u of %d)", words,
+                   learner->restarts, CLASS_RESTARTS);
+        }
+        say(learner, sentence);
+      }
     } else if (learner->process) {
       hear(learner);
     } else if (!learner->gave_up && class_now_s() >= learner->start_again_s && !app_interrupted()) {

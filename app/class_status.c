@@ -25,18 +25,6 @@ static void finish(question *q) {
   q->poll.fd = -1;
 }
 
-// A connection that does not wait.
-static void connect_to(const class_learner *learner, question *q) {
-  struct sockaddr_in address = {.sin_family = AF_INET,
-                                .sin_port = htons(learner->port),
-                                .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
-  *q = (question){.poll = {.fd = -1, .events = POLLOUT}};
-  if (learner->process) q->poll.fd = socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-  if (q->poll.fd < 0) return;
-  if (connect(q->poll.fd, (struct sockaddr *)&address, sizeof address) && errno != EINPROGRESS)
-    finish(q);
-}
-
 // Sends the request, then takes what comes.
 static void advance(question *q, const class_learner *learner) {
   if (!q->sent) {
@@ -69,24 +57,24 @@ static double take_number(const sonde_json *object, const char *key) {
   return fabs(value) < 1e6 ? value : (double)NAN;
 }
 
-static void read_answer(const question *q, class_status *status) {
-  *status = (class_status){.answers = q->used > 0, .elapsed_s = (double)NAN, .score = (double)NAN};
-  const char *body = strstr(q->answer, "\r\n\r\n");
-  if (strncmp(q->answer, "HTTP/1.", 7) != 0 || !strstr(q->answer, " 200 ") || !body) return;
-  sonde_json *object = NULL;
-  (void)sonde_json_parse(body + 4, strlen(body + 4), NULL, &object, NULL);
-  take_text(object, "phase", status->phase, sizeof status->phase);
-  take_text(object, "case", status->patient, sizeof status->patient);
-  status->elapsed_s = take_number(object, "elapsed_s");
-  status->score = take_number(object, "score");
-  sonde_json_free(object);
-}
-
 void class_ask(class_room *room) {
   static question all[CLASS_LEARNERS];
   struct pollfd polls[CLASS_LEARNERS];
   double until_s = class_now_s() + WAIT_S;
-  for (uint32_t i = 0; i < room->count; ++i) connect_to(&room->learner[i], &all[i]);
+  for (uint32_t i = 0; i < room->count; ++i) {
+    // A connection that does not wait.
+    struct sockaddr_in address = {.sin_family = AF_INET,
+                                  .sin_port = htons(room->learner[i].port),
+                                  .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
+    all[i] = (question){.poll = {.fd = -1, .events = POLLOUT}};
+    if (room->learner[i].process)
+      all[i].poll.fd = socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+    if (all[i].poll.fd >= 0) {
+      if (connect(all[i].poll.fd, (struct sockaddr *)&address, sizeof address) &&
+          errno != EINPROGRESS)
+        finish(&all[i]);
+    }
+  }
   for (double rest_s = WAIT_S; rest_s > 0; rest_s = until_s - class_now_s()) {
     bool open = false;
     for (uint32_t i = 0; i < room->count; ++i) {
@@ -99,6 +87,19 @@ void class_ask(class_room *room) {
   }
   for (uint32_t i = 0; i < room->count; ++i) {
     if (all[i].poll.fd >= 0) finish(&all[i]);
-    read_answer(&all[i], &room->learner[i].status);
+    room->learner[i].status =
+        (class_status){.answers = all[i].used > 0, .elapsed_s = (double)NAN, .score = (double)NAN};
+    const char *body = strstr(all[i].answer, "\r\n\r\n");
+    if (strncmp(all[i].answer, "HTTP/1.", 7) == 0 && strstr(all[i].answer, " 200 ") && body) {
+      sonde_json *object = NULL;
+      (void)sonde_json_parse(body + 4, strlen(body + 4), NULL, &object, NULL);
+      take_text(object, "phase", room->learner[i].status.phase,
+                sizeof room->learner[i].status.phase);
+      take_text(object, "case", room->learner[i].status.patient,
+                sizeof room->learner[i].status.patient);
+      room->learner[i].status.elapsed_s = take_number(object, "elapsed_s");
+      room->learner[i].status.score = take_number(object, "score");
+      sonde_json_free(object);
+    }
   }
 }

@@ -133,15 +133,6 @@ static double smooth(double x) {
   return x * x * (3 - 2 * x);
 }
 
-// Pose of the scene at a time: 2 mm above the skin, down to depth in 0.4 s, then the slide.
-static sonde_pose pose_at(const bench *b, double time_s) {
-  const scene *s = &SCENES[b->o->scene];
-  if (is_ellipsoid(b->o)) return bench_ellipsoid_pose(&b->o->ellipsoid, time_s);
-  double depth = -0.002 + (s->depth_m + 0.002) * smooth(time_s / 0.4);
-  double slide = s->slide_m * smooth((time_s - 0.4) / 0.5);
-  return pose_shift(sonde_site_pose(b->site, depth), slide, b->site->v);
-}
-
 // Processor time of this thread: other work on the machine does not count.
 static double now(void) { return app_seconds(CLOCK_THREAD_CPUTIME_ID); }
 
@@ -169,7 +160,19 @@ static void run(const bench *b, sonde_state *state, double way_m, sample *sample
       }
       sonde_state_set(state, kept, NULL);
     }
-    sonde_pose pose = pose_at(b, (k + 1) * b->o->dt_s);
+    sonde_pose pose;
+    {
+      // Pose of the scene at a time: 2 mm above the skin, down to depth in 0.4 s, then the slide.
+      double time_s = (k + 1) * b->o->dt_s;
+      const scene *s = &SCENES[b->o->scene];
+      if (is_ellipsoid(b->o)) {
+        pose = bench_ellipsoid_pose(&b->o->ellipsoid, time_s);
+      } else {
+        double depth = -0.002 + (s->depth_m + 0.002) * smooth(time_s / 0.4);
+        double slide = s->slide_m * smooth((time_s - 0.4) / 0.5);
+        pose = pose_shift(sonde_site_pose(b->site, depth), slide, b->site->v);
+      }
+    }
     double start = now();
     sonde_step(state, &b->probe, pose);
     double total = now() - start;
@@ -235,42 +238,6 @@ static sonde_world_def world_of(const options *o, bool reference) {
   if (def.engine == SONDE_ENGINE_FAST) def.threads = (uint32_t)o->threads;
   def.sleep_displacement_m = reference ? 0 : o->sleep_m;
   return def;
-}
-
-// Times some runs, of which the one with the least median stays, and compares with a run of the
-// same scene that is solved to the end.
-static sonde_status measure(bench *b, double *error_ratio, sonde_error *error) {
-  assert(b->steps > 0 && b->o->repeat > 0);
-  sonde_world_def def = world_of(b->o, false), exact = world_of(b->o, true);
-  sonde_state *state = NULL, *reference = NULL;
-  sonde_status status = sonde_state_create(b->model, &def, &state, error);
-  if (!status) status = sonde_state_create(b->model, &exact, &reference, error);
-  size_t nodes = b->model->surface.vertex_count;
-  sonde_vec3 *kept = calloc(2 * nodes, sizeof *kept);
-  sample *other = calloc(b->steps, sizeof *other);
-  if (!status && (!kept || !other)) status = error->status = SONDE_MEMORY;
-  double best = INFINITY;
-  for (long r = 0; !status && r < b->o->repeat; ++r) {
-    sample *best_samples = b->samples;
-    run(b, state, b->o->disturb_m, other, kept);
-    b->samples = other;
-    double median = quantile(b, offsetof(sample, total_s), 0.5);
-    other = median < best ? best_samples : other;
-    if (median < best)
-      best = median;
-    else
-      b->samples = best_samples;
-  }
-  *error_ratio = NAN;
-  if (!status && !b->o->no_reference) {
-    run(b, reference, 0, NULL, kept + nodes);
-    *error_ratio = relative_error(b->model, kept, kept + nodes);
-  }
-  free(kept);
-  free(other);
-  sonde_state_destroy(state);
-  sonde_state_destroy(reference);
-  return status;
 }
 
 // Bytes per second when a block of that size is read over and over: what memory could give at best.
@@ -366,7 +333,38 @@ static int run_bench(void *from) {
     b.model = model;
     b.site = sonde_model_site(model, 27);
     if (!b.site) b.site = &model->sites[model->site_count / 2];
-    status = measure(&b, &error_ratio, &error);
+    // Times some runs, of which the one with the least median stays, and compares with a run of the
+    // same scene that is solved to the end.
+    assert(b.steps > 0 && b.o->repeat > 0);
+    sonde_world_def def = world_of(b.o, false), exact = world_of(b.o, true);
+    sonde_state *state = NULL, *reference = NULL;
+    status = sonde_state_create(b.model, &def, &state, &error);
+    if (!status) status = sonde_state_create(b.model, &exact, &reference, &error);
+    size_t nodes = b.model->surface.vertex_count;
+    sonde_vec3 *kept = calloc(2 * nodes, sizeof *kept);
+    sample *other = calloc(b.steps, sizeof *other);
+    if (!status && (!kept || !other)) status = error.status = SONDE_MEMORY;
+    double best = INFINITY;
+    for (long r = 0; !status && r < b.o->repeat; ++r) {
+      sample *best_samples = b.samples;
+      run(&b, state, b.o->disturb_m, other, kept);
+      b.samples = other;
+      double median = quantile(&b, offsetof(sample, total_s), 0.5);
+      other = median < best ? best_samples : other;
+      if (median < best)
+        best = median;
+      else
+        b.samples = best_samples;
+    }
+    error_ratio = NAN;
+    if (!status && !b.o->no_reference) {
+      run(&b, reference, 0, NULL, kept + nodes);
+      error_ratio = relative_error(b.model, kept, kept + nodes);
+    }
+    free(kept);
+    free(other);
+    sonde_state_destroy(state);
+    sonde_state_destroy(reference);
   }
   sonde_file *file = NULL;
   if (!status && o->csv) status = sonde_file_create(o->csv, &file, &error);

@@ -74,39 +74,6 @@ static void print_text(const sonde_case *patient, const sonde_score *s) {
          m->force_peak_n, m->force_p95_n, m->time_s, 1e3 * m->path_m, m->smoothness);
 }
 
-static void print_json(const sonde_case *patient, const char *protocol, const char *name,
-                       const sonde_score *s) {
-  const sonde_metrics *m = &s->metrics;
-  app_json_begin();
-  app_json_text("case", patient->id);
-  app_json_text("protocol", protocol);
-  app_json_text("operator", name);
-  app_json_real("score", s->score);
-  app_json_bool("passed", s->passed);
-  app_json_bool("correct", s->correct);
-  app_json_text("diagnosis", s->asked);
-  app_json_text("truth", s->truth);
-#define JSON_PART(part, weight, title, text) app_json_real(#part, s->part);
-  SONDE_SCORE_LIST(JSON_PART)
-#undef JSON_PART
-  app_json_real("gap_mm", 1e3 * m->gap_m);
-  app_json_integer("places", m->points);
-  app_json_integer("places_done", m->points_done);
-  for (int k = 0; k < SONDE_PRESS_RESULTS; ++k)
-    app_json_integer(sonde_press_result_name((sonde_press_result)k), m->presses[k]);
-  app_json_real("force_peak_n", m->force_peak_n);
-  app_json_real("force_p95_n", m->force_p95_n);
-  app_json_real("time_s", m->time_s);
-  app_json_real("path_mm", 1e3 * m->path_m);
-  app_json_real("smoothness", m->smoothness);
-  app_json_integer("taken_off", m->restores);
-  app_json_object("segments");
-  for (uint32_t i = 0; i < s->segment_count; ++i)
-    app_json_text(s->segment[i].name, sonde_decision_name(s->segment[i].decision));
-  app_json_close();
-  app_json_end();
-}
-
 static int examine(const options *a, const exam_library *library,
                    const sonde_exam_protocol *protocol) {
   sonde_error error = {0};
@@ -138,9 +105,37 @@ static int examine(const options *a, const exam_library *library,
   sonde_status status = sonde_exam_run(&def, NULL, &progress, &score, &error);
   app_progress_end();
   if (status) return app_fail(VERB, &error);
-  if (a->json)
-    print_json(&patient, protocol->id, a->operator_name, &score);
-  else
+  if (a->json) {
+    const sonde_metrics *m = &score.metrics;
+    app_json_begin();
+    app_json_text("case", patient.id);
+    app_json_text("protocol", protocol->id);
+    app_json_text("operator", a->operator_name);
+    app_json_real("score", score.score);
+    app_json_bool("passed", score.passed);
+    app_json_bool("correct", score.correct);
+    app_json_text("diagnosis", score.asked);
+    app_json_text("truth", score.truth);
+#define JSON_PART(part, weight, title, text) app_json_real(#part, score.part);
+    SONDE_SCORE_LIST(JSON_PART)
+#undef JSON_PART
+    app_json_real("gap_mm", 1e3 * m->gap_m);
+    app_json_integer("places", m->points);
+    app_json_integer("places_done", m->points_done);
+    for (int k = 0; k < SONDE_PRESS_RESULTS; ++k)
+      app_json_integer(sonde_press_result_name((sonde_press_result)k), m->presses[k]);
+    app_json_real("force_peak_n", m->force_peak_n);
+    app_json_real("force_p95_n", m->force_p95_n);
+    app_json_real("time_s", m->time_s);
+    app_json_real("path_mm", 1e3 * m->path_m);
+    app_json_real("smoothness", m->smoothness);
+    app_json_integer("taken_off", m->restores);
+    app_json_object("segments");
+    for (uint32_t i = 0; i < score.segment_count; ++i)
+      app_json_text(score.segment[i].name, sonde_decision_name(score.segment[i].decision));
+    app_json_close();
+    app_json_end();
+  } else
     print_text(&patient, &score);
   return APP_OK;
 }

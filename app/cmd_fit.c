@@ -420,7 +420,16 @@ static double scatter_of(const sonde_measurements *m) {
   return sqrt(sum);
 }
 
-static void print_json_stages(const sonde_fit_result *r) {
+static void print_json(const options *a, const sonde_measurements *data, const fit_outcome *out,
+                       double seconds) {
+  const sonde_fit_result *r = &out->result;
+  app_json_begin();
+  if (r->stage3.all.count > 0)
+    app_json_report("full", &r->stage3);
+  else if (r->stage2.all.count > 0)
+    app_json_report("simplified", &r->stage2);
+  else
+    app_json_report("independent", &r->stage1);
   app_json_object("stage1");
   app_json_report("independent", &r->stage1);
   app_json_integer("parameters", r->stage1_parameters);
@@ -448,19 +457,6 @@ static void print_json_stages(const sonde_fit_result *r) {
     app_json_close();
     app_json_close();
   }
-}
-
-static void print_json(const options *a, const sonde_measurements *data, const fit_outcome *out,
-                       double seconds) {
-  const sonde_fit_result *r = &out->result;
-  app_json_begin();
-  if (r->stage3.all.count > 0)
-    app_json_report("full", &r->stage3);
-  else if (r->stage2.all.count > 0)
-    app_json_report("simplified", &r->stage2);
-  else
-    app_json_report("independent", &r->stage1);
-  print_json_stages(r);
   if (a->hold_out >= 0) {
     app_json_object("hold_out");
     app_json_text("kind", HOLD_OUTS[a->hold_out]);

@@ -204,63 +204,11 @@ static void print_estimate(const char *name, const char *unit, double scale,
          scale * e->high, e->identified ? "" : "  (not determined)");
 }
 
-static void print_text(const findings *f, const char *output) {
-  for (uint32_t k = 0; k < f->holds; ++k)
-    printf("hold at %.2f mm after %.1f mm/s: %.3f N to %.3f N (ratio %.3f), relaxation %.3g s\n",
-           1e3 * f->hold[k].depth_m, 1e3 * f->hold[k].speed_m_s, f->hold[k].peak_n,
-           f->hold[k].static_n, f->hold[k].ratio, f->hold[k].relaxation_s);
-  if (f->has_damping) {
-    printf("damping: %u samples, residual %.4f N\n", f->damping.samples, f->damping.residual_n);
-    print_estimate("normal damping", "ms", 1e3, &f->damping.normal_damping_s);
-    print_estimate("stiffness scale", "", 1, &f->damping.stiffness_scale);
-    print_estimate("edge damping", "ms", 1e3, &f->damping.edge_damping_s);
-  }
-  for (uint32_t k = 0; k < f->slides; ++k)
-    printf("slide at %.1f mm/s: ratio %.4f, breakaway %.4f (%u moves)\n",
-           1e3 * f->slide[k].speed_m_s, f->slide[k].ratio, f->slide[k].breakaway,
-           f->slide[k].moves);
-  if (f->has_friction) {
-    printf("friction: %u samples, residual %.4f N\n", f->friction.samples, f->friction.residual_n);
-    print_estimate("static", "", 1, &f->friction.mu_static);
-    print_estimate("kinetic", "", 1, &f->friction.mu_kinetic);
-    print_estimate("Stribeck speed", "mm/s", 1e3, &f->friction.stribeck_speed_m_s);
-  }
-  if (output) printf("wrote %s\n", output);
-}
-
 static void json_estimate(const char *key, double scale, const sonde_estimate *e) {
   app_json_object(key);
   app_json("value:%g low:%g high:%g identified:%hhd", scale * e->value, scale * e->low,
            scale * e->high, e->identified);
   app_json_close();
-}
-
-static void print_json(const findings *f, const char *output) {
-  app_json_begin();
-  if (f->has_damping) {
-    app_json_object("damping");
-    json_estimate("normal_damping_ms", 1e3, &f->damping.normal_damping_s);
-    json_estimate("stiffness_scale", 1, &f->damping.stiffness_scale);
-    json_estimate("edge_damping_ms", 1e3, &f->damping.edge_damping_s);
-    app_json("edge_sensitivity_n:%g residual_n:%g peak_n:%g static_n:%g relaxation_s:%g samples:%u "
-             "simulations:%u",
-             f->damping.edge_sensitivity_n, f->damping.residual_n, f->hold[0].peak_n,
-             f->hold[0].static_n, f->hold[0].relaxation_s, f->damping.samples,
-             f->damping.simulations);
-    app_json_close();
-  }
-  if (f->has_friction) {
-    app_json_object("friction");
-    json_estimate("mu_static", 1, &f->friction.mu_static);
-    json_estimate("mu_kinetic", 1, &f->friction.mu_kinetic);
-    json_estimate("stribeck_speed_mm_s", 1e3, &f->friction.stribeck_speed_m_s);
-    app_json("gel_film:%g residual_n:%g samples:%u simulations:%u", f->friction.gel_film,
-             f->friction.residual_n, f->friction.samples, f->friction.simulations);
-    app_json_close();
-  }
-  if (output) app_json_text("preset", output);
-  app_json_real("seconds", f->seconds);
-  app_json_end();
 }
 
 static int identify(const options *a, const sonde_model *model, const sonde_preset *preset) {
@@ -276,10 +224,58 @@ static int identify(const options *a, const sonde_model *model, const sonde_pres
   if (!status && a->output) status = sonde_preset_save(a->output, &found.preset, &error);
   if (status) return app_fail(VERB, &error);
   found.seconds = app_seconds(CLOCK_MONOTONIC) - start;
-  if (a->json)
-    print_json(&found, a->output);
-  else
-    print_text(&found, a->output);
+  if (a->json) {
+    app_json_begin();
+    if (found.has_damping) {
+      app_json_object("damping");
+      json_estimate("normal_damping_ms", 1e3, &found.damping.normal_damping_s);
+      json_estimate("stiffness_scale", 1, &found.damping.stiffness_scale);
+      json_estimate("edge_damping_ms", 1e3, &found.damping.edge_damping_s);
+      app_json(
+          "edge_sensitivity_n:%g residual_n:%g peak_n:%g static_n:%g relaxation_s:%g samples:%u "
+          "simulations:%u",
+          found.damping.edge_sensitivity_n, found.damping.residual_n, found.hold[0].peak_n,
+          found.hold[0].static_n, found.hold[0].relaxation_s, found.damping.samples,
+          found.damping.simulations);
+      app_json_close();
+    }
+    if (found.has_friction) {
+      app_json_object("friction");
+      json_estimate("mu_static", 1, &found.friction.mu_static);
+      json_estimate("mu_kinetic", 1, &found.friction.mu_kinetic);
+      json_estimate("stribeck_speed_mm_s", 1e3, &found.friction.stribeck_speed_m_s);
+      app_json("gel_film:%g residual_n:%g samples:%u simulations:%u", found.friction.gel_film,
+               found.friction.residual_n, found.friction.samples, found.friction.simulations);
+      app_json_close();
+    }
+    if (a->output) app_json_text("preset", a->output);
+    app_json_real("seconds", found.seconds);
+    app_json_end();
+  } else {
+    for (uint32_t k = 0; k < found.holds; ++k)
+      printf("hold at %.2f mm after %.1f mm/s: %.3f N to %.3f N (ratio %.3f), relaxation %.3g s\n",
+             1e3 * found.hold[k].depth_m, 1e3 * found.hold[k].speed_m_s, found.hold[k].peak_n,
+             found.hold[k].static_n, found.hold[k].ratio, found.hold[k].relaxation_s);
+    if (found.has_damping) {
+      printf("damping: %u samples, residual %.4f N\n", found.damping.samples,
+             found.damping.residual_n);
+      print_estimate("normal damping", "ms", 1e3, &found.damping.normal_damping_s);
+      print_estimate("stiffness scale", "", 1, &found.damping.stiffness_scale);
+      print_estimate("edge damping", "ms", 1e3, &found.damping.edge_damping_s);
+    }
+    for (uint32_t k = 0; k < found.slides; ++k)
+      printf("slide at %.1f mm/s: ratio %.4f, breakaway %.4f (%u moves)\n",
+             1e3 * found.slide[k].speed_m_s, found.slide[k].ratio, found.slide[k].breakaway,
+             found.slide[k].moves);
+    if (found.has_friction) {
+      printf("friction: %u samples, residual %.4f N\n", found.friction.samples,
+             found.friction.residual_n);
+      print_estimate("static", "", 1, &found.friction.mu_static);
+      print_estimate("kinetic", "", 1, &found.friction.mu_kinetic);
+      print_estimate("Stribeck speed", "mm/s", 1e3, &found.friction.stribeck_speed_m_s);
+    }
+    if (a->output) printf("wrote %s\n", a->output);
+  }
   return APP_OK;
 }
 

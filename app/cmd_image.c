@@ -149,30 +149,6 @@ static sonde_status place(settled *s, const options *o, sonde_error *error) {
   return status;
 }
 
-static sonde_status draw(const settled *s, const options *o, const sonde_pathology *pathology,
-                         sonde_image *image, sonde_error *error) {
-  sonde_echo *echo = NULL;
-  sonde_echo_def def = sonde_echo_def_default();
-  def.seed = (uint64_t)o->seed;
-  double aperture = isnan(o->aperture_m) ? 2 * s->probe.half_x_m : o->aperture_m;
-  settled_update(s, pathology, sonde_state_tick(s->state));
-  sonde_status status =
-      sonde_echo_check_view(aperture, isnan(o->radius_m) ? 0 : o->radius_m, error);
-  if (!status) status = sonde_echo_create(s->interior, &def, &echo, error);
-  if (!status) status = sonde_echo_set_radius(echo, isnan(o->radius_m) ? 0 : o->radius_m, error);
-  if (!status)
-    status = sonde_image_create((uint32_t)o->size[0], (uint32_t)o->size[1], image, error);
-  if (!status) {
-    sonde_echo_render(echo, s->pose, aperture, pathology, &o->settings, image);
-    uint32_t lost = sonde_echo_last_times(echo).lost;
-    if (lost)
-      fprintf(stderr, "sonde image: %u pieces of tissue are missing in the picture\n", lost);
-    status = sonde_image_save_png(image, o->out, error);
-  }
-  sonde_echo_destroy(echo);
-  return status;
-}
-
 static void other_vessels(const settled *s, bool json) {
   if (json) app_json_object("branches");
   for (int k = 2; k < (int)sonde_interior_vessel_count(s->interior); ++k) {
@@ -226,7 +202,26 @@ static int run(void *from) {
   sonde_status status = sonde_pathology_preset(o->pathology, &pathology, &error);
   if (!status) status = settled_open(&s, o->model, o->probe, NULL, true, &error);
   if (!status) status = place(&s, o, &error);
-  if (!status) status = draw(&s, o, &pathology, &image, &error);
+  if (!status) {
+    sonde_echo *echo = NULL;
+    sonde_echo_def def = sonde_echo_def_default();
+    def.seed = (uint64_t)o->seed;
+    double aperture = isnan(o->aperture_m) ? 2 * s.probe.half_x_m : o->aperture_m;
+    settled_update(&s, &pathology, sonde_state_tick(s.state));
+    status = sonde_echo_check_view(aperture, isnan(o->radius_m) ? 0 : o->radius_m, &error);
+    if (!status) status = sonde_echo_create(s.interior, &def, &echo, &error);
+    if (!status) status = sonde_echo_set_radius(echo, isnan(o->radius_m) ? 0 : o->radius_m, &error);
+    if (!status)
+      status = sonde_image_create((uint32_t)o->size[0], (uint32_t)o->size[1], &image, &error);
+    if (!status) {
+      sonde_echo_render(echo, s.pose, aperture, &pathology, &o->settings, &image);
+      uint32_t lost = sonde_echo_last_times(echo).lost;
+      if (lost)
+        fprintf(stderr, "sonde image: %u pieces of tissue are missing in the picture\n", lost);
+      status = sonde_image_save_png(&image, o->out, &error);
+    }
+    sonde_echo_destroy(echo);
+  }
   app_progress_end();
   if (!status) print(&s, o, &image);
   sonde_image_clear(&image);

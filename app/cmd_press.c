@@ -57,34 +57,6 @@ typedef struct press {
   bool cut[2];                  // the image plane meets it
 } press;
 
-static sonde_status look(press *p, const char *image_path, sonde_error *error) {
-  settled *scene = &p->scene;
-  sonde_interior *interior = scene->interior;
-  sonde_echo *echo = NULL;
-  sonde_image image = {0};
-  sonde_status status = SONDE_OK;
-  if (!interior) return SONDE_OK; // a model without a bone
-  if (!isnan(p->vein_depth_m)) {
-    const sonde_vec3 at = p->start.position;
-    status = sonde_interior_set_vein_depth(interior, at, p->vein_depth_m, error);
-  }
-  if (status) goto done;
-  settled_update(scene, &p->pathology, sonde_state_tick(scene->state));
-  for (int which = 0; which < 2; ++which)
-    p->cut[which] = sonde_interior_vessel_at_plane(interior, which, scene->pose, &p->vessel[which]);
-  if (!image_path) goto done;
-  sonde_echo_settings settings = sonde_echo_settings_default();
-  status = sonde_echo_create(interior, NULL, &echo, error);
-  if (!status) status = sonde_image_create(512, 512, &image, error);
-  if (status) goto done;
-  sonde_echo_render(echo, scene->pose, 2 * scene->probe.half_x_m, &p->pathology, &settings, &image);
-  status = sonde_image_save_png(&image, image_path, error);
-done:
-  sonde_image_clear(&image);
-  sonde_echo_destroy(echo);
-  return status;
-}
-
 // Of one vessel; null when the plane misses it. Diameters before are those of the rest circle.
 static void print_vessel(const char *name, const sonde_vessel_state *v, bool cut) {
   char key[64];
@@ -165,7 +137,31 @@ static int run(void *from) {
                                 : settled_press(&p.scene, p.start, o->depth_m, INFINITY, &error);
     settled_warn(&p.scene, "press");
   }
-  if (!status) status = look(&p, o->image, &error);
+  if (!status && p.scene.interior) { // a model with a bone
+    sonde_echo *echo = NULL;
+    sonde_image image = {0};
+    if (!isnan(p.vein_depth_m))
+      status =
+          sonde_interior_set_vein_depth(p.scene.interior, p.start.position, p.vein_depth_m, &error);
+    if (!status) {
+      settled_update(&p.scene, &p.pathology, sonde_state_tick(p.scene.state));
+      for (int which = 0; which < 2; ++which)
+        p.cut[which] =
+            sonde_interior_vessel_at_plane(p.scene.interior, which, p.scene.pose, &p.vessel[which]);
+    }
+    if (!status && o->image) {
+      sonde_echo_settings settings = sonde_echo_settings_default();
+      status = sonde_echo_create(p.scene.interior, NULL, &echo, &error);
+      if (!status) status = sonde_image_create(512, 512, &image, &error);
+      if (!status) {
+        sonde_echo_render(echo, p.scene.pose, 2 * p.scene.probe.half_x_m, &p.pathology, &settings,
+                          &image);
+        status = sonde_image_save_png(&image, o->image, &error);
+      }
+    }
+    sonde_image_clear(&image);
+    sonde_echo_destroy(echo);
+  }
   app_progress_end();
   if (!status) print(&p, o);
   settled_close(&p.scene);

@@ -249,48 +249,6 @@ static void watch(sonde_session *session, summary *seen) {
   sonde_session_control(session, &controls);
 }
 
-// With a script or a hand, for a time: in real time, or tick by tick as fast as it goes.
-static sonde_status run_headless(const options *s, sonde_session *session, summary *seen,
-                                 sonde_error *error) {
-  assert(s->seconds > 0);
-  sonde_progress progress = app_progress();
-  double start_s = app_seconds(CLOCK_MONOTONIC);
-  *seen = (summary){.vein_ratio_min = INFINITY, .gel_volume_m3 = NAN};
-  sonde_status status = s->lockstep ? SONDE_OK : sonde_session_start(session, error);
-  if (s->lockstep) {
-    double dt_s = sonde_session_def_default().world.dt_s;
-    uint64_t ticks = (uint64_t)llround(s->seconds / dt_s);
-    for (uint64_t i = 0; i < ticks; ++i) {
-      sonde_session_tick(session);
-      look(session, seen);
-      watch(session, seen);
-      double fraction = (double)(i + 1) / (double)ticks;
-      if (i % 100 == 99 && !progress.report(fraction, "lockstep", progress.user)) break;
-    }
-  } else if (!status) {
-    double begin_s = app_seconds(CLOCK_MONOTONIC), passed_s = 0.0;
-    while (passed_s < s->seconds &&
-           progress.report(passed_s / s->seconds, "real time", progress.user)) {
-      look(session, seen);
-      watch(session, seen);
-      sleep_s(fmin(0.01, s->seconds - passed_s));
-      passed_s = app_seconds(CLOCK_MONOTONIC) - begin_s;
-    }
-    sonde_session_stop(session);
-    look(session, seen);
-  }
-  app_progress_end();
-  seen->wall_s = app_seconds(CLOCK_MONOTONIC) - start_s;
-  seen->ticks = sonde_session_ticks(session);
-  seen->images = sonde_session_images(session);
-  seen->latency_s[0] = sonde_session_latency(session, 0.5);
-  seen->latency_s[1] = sonde_session_latency(session, 0.99);
-  seen->link = sonde_device_link_of(sonde_session_device(session));
-  seen->hash = sonde_session_hash(session);
-  seen->loop = sonde_session_loop(session);
-  return status;
-}
-
 static void print_json(const options *s, const summary *seen) {
   char hash[20];
   snprintf(hash, sizeof hash, "%016llx", (unsigned long long)seen->hash);
@@ -363,9 +321,45 @@ static int simulate(const options *s, const sonde_model *model, sonde_session_de
   if (!status) status = make_device(s, &site, def, &device, &error);
   if (!status) status = sonde_session_create(def, &device, &session, &error);
   if (device.destroy) device.destroy(device.self); // not moved: creation failed
-  if (!status && s->headless)
-    status = run_headless(s, session, &seen, &error);
-  else if (!status)
+  if (!status && s->headless) {
+    // With a script or a hand, for a time: in real time, or tick by tick as fast as it goes.
+    assert(s->seconds > 0);
+    sonde_progress progress = app_progress();
+    double start_s = app_seconds(CLOCK_MONOTONIC);
+    seen = (summary){.vein_ratio_min = INFINITY, .gel_volume_m3 = NAN};
+    status = s->lockstep ? SONDE_OK : sonde_session_start(session, &error);
+    if (s->lockstep) {
+      double dt_s = sonde_session_def_default().world.dt_s;
+      uint64_t ticks = (uint64_t)llround(s->seconds / dt_s);
+      for (uint64_t i = 0; i < ticks; ++i) {
+        sonde_session_tick(session);
+        look(session, &seen);
+        watch(session, &seen);
+        double fraction = (double)(i + 1) / (double)ticks;
+        if (i % 100 == 99 && !progress.report(fraction, "lockstep", progress.user)) break;
+      }
+    } else if (!status) {
+      double begin_s = app_seconds(CLOCK_MONOTONIC), passed_s = 0.0;
+      while (passed_s < s->seconds &&
+             progress.report(passed_s / s->seconds, "real time", progress.user)) {
+        look(session, &seen);
+        watch(session, &seen);
+        sleep_s(fmin(0.01, s->seconds - passed_s));
+        passed_s = app_seconds(CLOCK_MONOTONIC) - begin_s;
+      }
+      sonde_session_stop(session);
+      look(session, &seen);
+    }
+    app_progress_end();
+    seen.wall_s = app_seconds(CLOCK_MONOTONIC) - start_s;
+    seen.ticks = sonde_session_ticks(session);
+    seen.images = sonde_session_images(session);
+    seen.latency_s[0] = sonde_session_latency(session, 0.5);
+    seen.latency_s[1] = sonde_session_latency(session, 0.99);
+    seen.link = sonde_device_link_of(sonde_session_device(session));
+    seen.hash = sonde_session_hash(session);
+    seen.loop = sonde_session_loop(session);
+  } else if (!status)
     status = run_page(s, def, session, &error);
   sonde_error late = {0};
   sonde_status closed = sonde_session_destroy(session, &late);

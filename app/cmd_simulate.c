@@ -168,27 +168,6 @@ static sonde_status write_frame(simulation *s, sonde_error *error) {
 
 // ---- run
 
-static sonde_status prepare(simulation *s, sonde_error *error) {
-  char thigh[1024], searched[1024], path[1100];
-  bool bundled = app_bundled_model(thigh, sizeof thigh, searched, sizeof searched);
-  sonde_status status = sonde_scene_load(s->a.scene, bundled ? thigh : NULL, &s->scene, error);
-  if (!status) status = sonde_scene_state_create(s->scene, &s->state, error);
-  if (status) return status;
-  double dt = sonde_scene_get_step(s->scene).dt_s;
-  double seconds = s->a.seconds > 0 ? s->a.seconds : sonde_scene_duration(s->scene);
-  s->steps = s->a.steps ? (uint64_t)s->a.steps : (uint64_t)ceil(seconds / dt - 1e-9);
-  s->every = s->a.every ? (uint64_t)s->a.every : (uint64_t)fmax(1, round(1 / (60 * dt)));
-  path_of(s, "state.snapshot", path, sizeof path);
-  if (s->a.resume) status = sonde_scene_state_load(s->state, path, error);
-  s->start = sonde_scene_tick(s->state);
-  if (!status) status = sonde_directory_make(s->a.directory, 0777, false, error);
-  path_of(s, "frames", path, sizeof path);
-  if (!status && !s->a.no_frames) status = sonde_directory_make(path, 0777, false, error);
-  if (!status) status = open_table(s, "bodies.csv", BODIES_HEAD, &s->bodies, error);
-  if (!status) status = open_table(s, "contacts.csv", CONTACTS_HEAD, &s->contacts, error);
-  return status;
-}
-
 static sonde_status run(simulation *s, sonde_error *error) {
   sonde_progress progress = app_progress();
   sonde_status status = s->a.resume ? SONDE_OK : write_frame(s, error);
@@ -208,44 +187,57 @@ static sonde_status run(simulation *s, sonde_error *error) {
   return status;
 }
 
-static void print_json(const simulation *s, double steps) {
-  app_json_begin();
-  app_json("title:%s bodies:%u steps:%lu time_s:%g ms_per_step:%g solver_iterations_per_step:%g "
-           "most_contact_points:%lu flagged_steps:%lu flags:%u",
-           sonde_scene_title(s->scene), sonde_scene_body_count(s->scene),
-           sonde_scene_tick(s->state), sonde_scene_time(s->state),
-           steps > 0 ? 1e3 * s->seconds / steps : NAN,
-           steps > 0 ? (double)s->solver_iterations / steps : NAN, s->most_points,
-           sonde_scene_flag_count(s->state), sonde_scene_all_flags(s->state));
-  char hash[24];
-  snprintf(hash, sizeof hash, "%016llx", (unsigned long long)sonde_scene_hash(s->state));
-  app_json("hash:%s cancelled:%hhd", hash, s->cancelled);
-  app_json_end();
-}
-
-static void print_summary(const simulation *s, double steps) {
-  printf("steps         %8llu (%.6g s)\n", (unsigned long long)sonde_scene_tick(s->state),
-         sonde_scene_time(s->state));
-  if (steps > 0) {
-    printf("step          %8.3f ms\n", 1e3 * s->seconds / steps);
-    printf("iterations    %8.1f per step\n", (double)s->solver_iterations / steps);
-  }
-  printf("flagged steps %8llu\n", (unsigned long long)sonde_scene_flag_count(s->state));
-  printf("hash          %016llx\n", (unsigned long long)sonde_scene_hash(s->state));
-  printf("written to    %s\n", s->a.directory);
-}
-
 // A cancelled run ends with a snapshot only, so that tables and frames keep their rhythm.
 static int simulate(void *from) {
   simulation s = {.a = *(const options *)from};
   sonde_error error = {0};
   assert(s.a.scene && s.a.directory);
-  sonde_status status = prepare(&s, &error);
+  char thigh[1024], searched[1024], path[1100];
+  bool bundled = app_bundled_model(thigh, sizeof thigh, searched, sizeof searched);
+  sonde_status status = sonde_scene_load(s.a.scene, bundled ? thigh : NULL, &s.scene, &error);
+  if (!status) status = sonde_scene_state_create(s.scene, &s.state, &error);
+  if (!status) {
+    double dt = sonde_scene_get_step(s.scene).dt_s;
+    double seconds = s.a.seconds > 0 ? s.a.seconds : sonde_scene_duration(s.scene);
+    s.steps = s.a.steps ? (uint64_t)s.a.steps : (uint64_t)ceil(seconds / dt - 1e-9);
+    s.every = s.a.every ? (uint64_t)s.a.every : (uint64_t)fmax(1, round(1 / (60 * dt)));
+    path_of(&s, "state.snapshot", path, sizeof path);
+    if (s.a.resume) status = sonde_scene_state_load(s.state, path, &error);
+    s.start = sonde_scene_tick(s.state);
+    if (!status) status = sonde_directory_make(s.a.directory, 0777, false, &error);
+    path_of(&s, "frames", path, sizeof path);
+    if (!status && !s.a.no_frames) status = sonde_directory_make(path, 0777, false, &error);
+    if (!status) status = open_table(&s, "bodies.csv", BODIES_HEAD, &s.bodies, &error);
+    if (!status) status = open_table(&s, "contacts.csv", CONTACTS_HEAD, &s.contacts, &error);
+  }
   if (!status) status = run(&s, &error);
   if (!status && s.cancelled) status = save_snapshot(&s, &error);
   if (!status && s.a.picture) status = scene_figure(s.scene, s.state, s.a.picture, &error);
   double steps = status ? 0 : (double)(sonde_scene_tick(s.state) - s.start);
-  if (!status) (s.a.json ? print_json : print_summary)(&s, steps);
+  if (!status && s.a.json) {
+    app_json_begin();
+    app_json("title:%s bodies:%u steps:%lu time_s:%g ms_per_step:%g solver_iterations_per_step:%g "
+             "most_contact_points:%lu flagged_steps:%lu flags:%u",
+             sonde_scene_title(s.scene), sonde_scene_body_count(s.scene), sonde_scene_tick(s.state),
+             sonde_scene_time(s.state), steps > 0 ? 1e3 * s.seconds / steps : NAN,
+             steps > 0 ? (double)s.solver_iterations / steps : NAN, s.most_points,
+             sonde_scene_flag_count(s.state), sonde_scene_all_flags(s.state));
+    char hash[24];
+    snprintf(hash, sizeof hash, "%016llx", (unsigned long long)sonde_scene_hash(s.state));
+    app_json("hash:%s cancelled:%hhd", hash, s.cancelled);
+    app_json_end();
+  }
+  if (!status && !s.a.json) {
+    printf("steps         %8llu (%.6g s)\n", (unsigned long long)sonde_scene_tick(s.state),
+           sonde_scene_time(s.state));
+    if (steps > 0) {
+      printf("step          %8.3f ms\n", 1e3 * s.seconds / steps);
+      printf("iterations    %8.1f per step\n", (double)s.solver_iterations / steps);
+    }
+    printf("flagged steps %8llu\n", (unsigned long long)sonde_scene_flag_count(s.state));
+    printf("hash          %016llx\n", (unsigned long long)sonde_scene_hash(s.state));
+    printf("written to    %s\n", s.a.directory);
+  }
   if (!status && s.cancelled)
     fprintf(stderr, "sonde simulate: cancelled at step %llu of %llu; --resume goes on\n",
             (unsigned long long)sonde_scene_tick(s.state), (unsigned long long)s.steps);

@@ -246,44 +246,6 @@ static sonde_status slice_volume(const options *a, work *w, sonde_error *error) 
   return write_picture(a, w, error);
 }
 
-static void print_json(const options *a, const work *w) {
-  double share = (double)w->reached / ((double)w->image.width * w->image.height);
-  app_json_begin();
-  app_json("width:%u height:%u width_mm:%g height_mm:%g reached:%g slice_ms:%g", w->image.width,
-           w->image.height, w->image.width_m * 1e3, w->image.height_m * 1e3, share,
-           w->seconds * 1e3);
-  if (!a->volume) {
-    app_json("frames_used:%u world:%s", w->located.used, w->located.world);
-  }
-  if (w->compared) {
-    app_json("rms_grey:%g mae_grey:%g psnr_db:%g ncc:%g ssim:%g", w->likeness.rms_grey,
-             w->likeness.mae_grey, w->likeness.psnr_db, w->likeness.ncc, w->likeness.ssim);
-  }
-  if (a->press.model) {
-    app_json("force_n:%g penetration_mm:%g vein_area_ratio:%g artery_area_ratio:%g",
-             w->pressed.force_n, w->pressed.depth_m * 1e3, w->pressed.vein_area_ratio,
-             w->pressed.artery_area_ratio);
-  }
-  app_json_text("image", a->output);
-  app_json_end();
-}
-
-static void print_text(const options *a, const work *w) {
-  double share = (double)w->reached / ((double)w->image.width * w->image.height);
-  printf("picture       %u x %u pixels, %.1f x %.1f mm, %.1f %% reached, %.2f ms\n", w->image.width,
-         w->image.height, w->image.width_m * 1e3, w->image.height_m * 1e3, 100 * share,
-         w->seconds * 1e3);
-  if (w->compared)
-    printf("against real  RMS %.2f, MAE %.2f grey levels, PSNR %.2f dB, NCC %.4f, SSIM %.4f\n",
-           w->likeness.rms_grey, w->likeness.mae_grey, w->likeness.psnr_db, w->likeness.ncc,
-           w->likeness.ssim);
-  if (a->press.model)
-    printf("pressed       %.2f N at %.2f mm, vein %.1f %% and artery %.1f %% of their rest area\n",
-           w->pressed.force_n, w->pressed.depth_m * 1e3, 100 * w->pressed.vein_area_ratio,
-           100 * w->pressed.artery_area_ratio);
-  printf("written       %s\n", a->output);
-}
-
 static int run(void *from) {
   const options *a = from;
   assert(a->input && a->output);
@@ -292,7 +254,42 @@ static int run(void *from) {
   app_progress_begin("slicing");
   sonde_status status = a->volume ? slice_volume(a, &w, &error) : slice_sequence(a, &w, &error);
   app_progress_end();
-  if (!status) (a->json ? print_json : print_text)(a, &w);
+  if (!status && a->json) {
+    double share = (double)w.reached / ((double)w.image.width * w.image.height);
+    app_json_begin();
+    app_json("width:%u height:%u width_mm:%g height_mm:%g reached:%g slice_ms:%g", w.image.width,
+             w.image.height, w.image.width_m * 1e3, w.image.height_m * 1e3, share, w.seconds * 1e3);
+    if (!a->volume) {
+      app_json("frames_used:%u world:%s", w.located.used, w.located.world);
+    }
+    if (w.compared) {
+      app_json("rms_grey:%g mae_grey:%g psnr_db:%g ncc:%g ssim:%g", w.likeness.rms_grey,
+               w.likeness.mae_grey, w.likeness.psnr_db, w.likeness.ncc, w.likeness.ssim);
+    }
+    if (a->press.model) {
+      app_json("force_n:%g penetration_mm:%g vein_area_ratio:%g artery_area_ratio:%g",
+               w.pressed.force_n, w.pressed.depth_m * 1e3, w.pressed.vein_area_ratio,
+               w.pressed.artery_area_ratio);
+    }
+    app_json_text("image", a->output);
+    app_json_end();
+  }
+  if (!status && !a->json) {
+    double share = (double)w.reached / ((double)w.image.width * w.image.height);
+    printf("picture       %u x %u pixels, %.1f x %.1f mm, %.1f %% reached, %.2f ms\n",
+           w.image.width, w.image.height, w.image.width_m * 1e3, w.image.height_m * 1e3,
+           100 * share, w.seconds * 1e3);
+    if (w.compared)
+      printf("against real  RMS %.2f, MAE %.2f grey levels, PSNR %.2f dB, NCC %.4f, SSIM %.4f\n",
+             w.likeness.rms_grey, w.likeness.mae_grey, w.likeness.psnr_db, w.likeness.ncc,
+             w.likeness.ssim);
+    if (a->press.model)
+      printf(
+          "pressed       %.2f N at %.2f mm, vein %.1f %% and artery %.1f %% of their rest area\n",
+          w.pressed.force_n, w.pressed.depth_m * 1e3, 100 * w.pressed.vein_area_ratio,
+          100 * w.pressed.artery_area_ratio);
+    printf("written       %s\n", a->output);
+  }
   sonde_slicer_destroy(w.slicer);
   sonde_image_clear(&w.image);
   sonde_sequence_clear(&w.sequence);

@@ -25,45 +25,6 @@ static sonde_log_entry entry_of(const exam *of) {
 
 // ---- files and log
 
-static sonde_status write_report(sonde_exam_log *log, const exam *of, sonde_error *error) {
-  enum { MOST = 50 };
-  char path[EXAM_PATH];
-  uint32_t chosen[SONDE_EXAM_PICTURES], count, kept = 0;
-  sonde_exam_picture pictures[SONDE_EXAM_PICTURES];
-  sonde_log_entry *earlier = NULL;
-  sonde_exam_report report = {.patient = &of->patient,
-                              .protocol = of->protocol,
-                              .map = &of->setup.map,
-                              .plan = &of->plan,
-                              .score = &of->score,
-                              .note = note_of(of),
-                              .pictures = pictures,
-                              .samples = of->sample,
-                              .sample_count = of->sample_count,
-                              .comments = of->comments.list,
-                              .comment_count = of->comments.count,
-                              .recording = "exam.rec"};
-
-  // The trainee's exams before this one: a report does not depend on when it is made.
-  sonde_status status = sonde_exam_log_list(log, name_of(of), 0, &earlier, &count, error);
-  if (status) return status;
-  for (uint32_t i = 0; i < count && kept < MOST; ++i)
-    if (strcmp(earlier[i].date, of->date) <= 0 && strcmp(earlier[i].id, of->id) != 0)
-      earlier[kept++] = earlier[i];
-  report.earlier = earlier;
-  report.earlier_count = kept;
-
-  report.presses = sonde_judge_compressions(of->judge, &report.press_count);
-  count = sonde_exam_report_choose(report.presses, report.press_count, SONDE_EXAM_PICTURES, chosen);
-  for (uint32_t i = 0; i < count; ++i)
-    for (uint32_t k = 0; k < of->picture_count; ++k)
-      if (of->picture[k].press == chosen[i]) pictures[report.picture_count++] = of->picture[k];
-  status =
-      sonde_exam_report_write(&report, exam_app_path(path, of->directory, "report.html"), error);
-  sonde_free(earlier);
-  return status;
-}
-
 // The row is worth an attempt also without the files.
 sonde_status exam_save(sonde_exam_log *log, exam *of, sonde_error *error) {
   sonde_status status = SONDE_OK, logged = SONDE_OK;
@@ -73,7 +34,46 @@ sonde_status exam_save(sonde_exam_log *log, exam *of, sonde_error *error) {
     status = sonde_score_save(of->judge, &of->patient, &of->score, &note,
                               exam_app_path(json, of->directory, "exam.json"),
                               exam_app_path(csv, of->directory, "exam.csv"), error);
-    if (!status) status = write_report(log, of, error);
+    if (!status) {
+      enum { MOST = 50 };
+      char path[EXAM_PATH];
+      uint32_t chosen[SONDE_EXAM_PICTURES], count, kept = 0;
+      sonde_exam_picture pictures[SONDE_EXAM_PICTURES];
+      sonde_log_entry *earlier = NULL;
+      sonde_exam_report report = {.patient = &of->patient,
+                                  .protocol = of->protocol,
+                                  .map = &of->setup.map,
+                                  .plan = &of->plan,
+                                  .score = &of->score,
+                                  .note = note_of(of),
+                                  .pictures = pictures,
+                                  .samples = of->sample,
+                                  .sample_count = of->sample_count,
+                                  .comments = of->comments.list,
+                                  .comment_count = of->comments.count,
+                                  .recording = "exam.rec"};
+
+      // The trainee's exams before this one: a report does not depend on when it is made.
+      status = sonde_exam_log_list(log, name_of(of), 0, &earlier, &count, error);
+      if (!status) {
+        for (uint32_t i = 0; i < count && kept < MOST; ++i)
+          if (strcmp(earlier[i].date, of->date) <= 0 && strcmp(earlier[i].id, of->id) != 0)
+            earlier[kept++] = earlier[i];
+        report.earlier = earlier;
+        report.earlier_count = kept;
+
+        report.presses = sonde_judge_compressions(of->judge, &report.press_count);
+        count = sonde_exam_report_choose(report.presses, report.press_count, SONDE_EXAM_PICTURES,
+                                         chosen);
+        for (uint32_t i = 0; i < count; ++i)
+          for (uint32_t k = 0; k < of->picture_count; ++k)
+            if (of->picture[k].press == chosen[i])
+              pictures[report.picture_count++] = of->picture[k];
+        status = sonde_exam_report_write(&report, exam_app_path(path, of->directory, "report.html"),
+                                         error);
+        sonde_free(earlier);
+      }
+    }
     of->filed = !status;
   }
   sonde_error own = {0};

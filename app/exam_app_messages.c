@@ -111,39 +111,6 @@ void exam_app_tell_greeting(exam_app *app) {
 
 // ---- exam
 
-// The step to take. Target, force and offsets under full guidance, or while a hint shows them.
-static void put_step(sonde_json_out *out, const exam *of, bool full, bool hinted) {
-  sonde_guidance g = {.offset_m = (double)NAN};
-  if (of) g = sonde_judge_guidance(of->judge);
-  bool shown = of && (full || hinted), silent = !of || strcmp(of->guidance, "exam") == 0;
-  bool asked = !silent && g.undecided < of->setup.map.segment_count;
-  sonde_json_begin_object(out, "step");
-  sonde_json_put_text(out, "text", silent ? "" : g.text);
-  sonde_json_put_text(out, "detail", shown || asked ? g.detail : "");
-  sonde_json_put_text(out, "segment", asked ? of->setup.map.segment[g.undecided].name : "");
-  if (shown && g.point < of->plan.count) {
-    const sonde_plan_point *point = &of->plan.point[g.point];
-    sonde_json_begin_object(out, "target");
-    sonde_json_put_text(out, "name", point->title);
-    put_vector(out, "position_mm", point->at.skin_m, 1e3);
-    put_vector(out, "normal", point->at.normal, 1);
-    put_vector(out, "across", point->at.across, 1);
-    sonde_json_put_real(out, "radius_mm", of->plan.criteria.reach_m * 1e3, 0);
-    sonde_json_end(out);
-  } else {
-    put_null(out, "target");
-  }
-  if (shown && isfinite(g.force.limit_n))
-    put_reals(out, "force_n", (double[]){g.force.firm_n, g.force.limit_n}, 2);
-  else
-    put_null(out, "force_n");
-  put_rounded(out, "offset_mm", shown ? g.offset_m * 1e3 : (double)NAN, 1);
-  put_rounded(out, "angle_deg", shown ? g.angle_rad * DEGREES : (double)NAN, 1);
-  sonde_json_put_bool(out, "angle_ok", shown && g.angle_ok);
-  sonde_json_end(out);
-  sonde_json_put_text(out, "hint", hinted ? g.text : "");
-}
-
 // The press under way, the segments, and the newest presses.
 static void put_findings(sonde_json_out *out, const exam *of, bool shown) {
   enum { MOST = 200 };
@@ -249,7 +216,36 @@ void exam_app_tell_exam(exam_app *app) {
   put_rounded(&out, "elapsed_s", elapsed_s, 1);
   sonde_json_put_bool(&out, "recording", of != NULL);
   sonde_json_put_integer(&out, "hints_used", hints);
-  put_step(&out, of, full, hinted);
+  // The step to take. Target, force and offsets under full guidance, or while a hint shows them.
+  sonde_guidance g = {.offset_m = (double)NAN};
+  if (of) g = sonde_judge_guidance(of->judge);
+  bool shown = of && (full || hinted), silent = !of || strcmp(of->guidance, "exam") == 0;
+  bool asked = !silent && g.undecided < of->setup.map.segment_count;
+  sonde_json_begin_object(&out, "step");
+  sonde_json_put_text(&out, "text", silent ? "" : g.text);
+  sonde_json_put_text(&out, "detail", shown || asked ? g.detail : "");
+  sonde_json_put_text(&out, "segment", asked ? of->setup.map.segment[g.undecided].name : "");
+  if (shown && g.point < of->plan.count) {
+    const sonde_plan_point *point = &of->plan.point[g.point];
+    sonde_json_begin_object(&out, "target");
+    sonde_json_put_text(&out, "name", point->title);
+    put_vector(&out, "position_mm", point->at.skin_m, 1e3);
+    put_vector(&out, "normal", point->at.normal, 1);
+    put_vector(&out, "across", point->at.across, 1);
+    sonde_json_put_real(&out, "radius_mm", of->plan.criteria.reach_m * 1e3, 0);
+    sonde_json_end(&out);
+  } else {
+    put_null(&out, "target");
+  }
+  if (shown && isfinite(g.force.limit_n))
+    put_reals(&out, "force_n", (double[]){g.force.firm_n, g.force.limit_n}, 2);
+  else
+    put_null(&out, "force_n");
+  put_rounded(&out, "offset_mm", shown ? g.offset_m * 1e3 : (double)NAN, 1);
+  put_rounded(&out, "angle_deg", shown ? g.angle_rad * DEGREES : (double)NAN, 1);
+  sonde_json_put_bool(&out, "angle_ok", shown && g.angle_ok);
+  sonde_json_end(&out);
+  sonde_json_put_text(&out, "hint", hinted ? g.text : "");
   if (of) {
     put_findings(&out, of, full || hinted);
     put_result(&out, app, of);

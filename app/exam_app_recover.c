@@ -26,19 +26,6 @@ static sonde_json *parse(const char *text) {
   return root;
 }
 
-static bool read_entry_of_setup(const sonde_json *root, sonde_log_entry *entry) {
-  *entry = (sonde_log_entry){.interrupted = true};
-  copy_member(root, "exam", entry->id, sizeof entry->id);
-  copy_member(root, "trainee", entry->trainee, sizeof entry->trainee);
-  copy_member(root, "case", entry->case_id, sizeof entry->case_id);
-  copy_member(root, "title", entry->case_title, sizeof entry->case_title);
-  copy_member(root, "protocol", entry->protocol, sizeof entry->protocol);
-  copy_member(root, "guidance", entry->guidance, sizeof entry->guidance);
-  copy_member(root, "date", entry->date, sizeof entry->date);
-  if (!entry->trainee[0]) snprintf(entry->trainee, sizeof entry->trainee, "Guest");
-  return entry->id[0] && entry->case_id[0];
-}
-
 sonde_json *exam_read_setup(const char *recording) {
   sonde_notes notes;
   if (sonde_notes_load(recording, &notes, NULL)) return NULL;
@@ -49,27 +36,6 @@ sonde_json *exam_read_setup(const char *recording) {
 }
 
 // ---- the log ------------------------------------------------------------------------------------
-
-// An exam from before the journal: its recording then grew under another name, which a kill left,
-// until its program ended.
-static void take_old_part(const char *directory) {
-  DIR *list = opendir(directory);
-  for (const struct dirent *entry; list && (entry = readdir(list));) {
-    char from[EXAM_PATH], to[EXAM_PATH], *bytes = NULL;
-    size_t count = 0;
-    sonde_file *file = NULL;
-    if (strncmp(entry->d_name, "exam.rec.part-", 14) != 0 || exists(directory, "exam.rec"))
-      continue;
-    if (sonde_file_load(exam_app_path(from, directory, entry->d_name), &bytes, &count, NULL))
-      continue;
-    if (!sonde_file_create(exam_app_path(to, directory, "exam.rec"), &file, NULL)) {
-      sonde_file_write(file, bytes, count);
-      (void)sonde_file_commit(file, NULL);
-    }
-    sonde_free(bytes);
-  }
-  if (list) closedir(list);
-}
 
 // The journal of an exam that began has a whole block from its start on, and grows. What is short
 // and has none is what a full disk or a kill left of an exam that did not begin.
@@ -93,7 +59,26 @@ static bool read_entry(const char *directory, const char *id, sonde_log_entry *e
   sonde_error error = {0};
   sonde_status status = SONDE_OK;
   bool old = exists(directory, "start.json"); // from before the journal
-  if (old) take_old_part(directory);
+  if (old) {
+    // An exam from before the journal: its recording then grew under another name, which a kill
+    // left, until its program ended.
+    DIR *list = opendir(directory);
+    for (const struct dirent *file_of; list && (file_of = readdir(list));) {
+      char from[EXAM_PATH], to[EXAM_PATH], *bytes = NULL;
+      size_t count = 0;
+      sonde_file *file = NULL;
+      if (strncmp(file_of->d_name, "exam.rec.part-", 14) != 0 || exists(directory, "exam.rec"))
+        continue;
+      if (sonde_file_load(exam_app_path(from, directory, file_of->d_name), &bytes, &count, NULL))
+        continue;
+      if (!sonde_file_create(exam_app_path(to, directory, "exam.rec"), &file, NULL)) {
+        sonde_file_write(file, bytes, count);
+        (void)sonde_file_commit(file, NULL);
+      }
+      sonde_free(bytes);
+    }
+    if (list) closedir(list);
+  }
   bool recorded = exists(directory, "exam.rec");
   if (recorded)
     status = sonde_notes_load(exam_app_path(path, directory, "exam.rec"), &notes, &error);
@@ -106,7 +91,16 @@ static bool read_entry(const char *directory, const char *id, sonde_log_entry *e
   sonde_json *root = setup ? parse(setup->text) : NULL;
   if (!root && !sonde_file_load(exam_app_path(path, directory, "start.json"), &text, &size, NULL))
     root = parse(text);
-  bool known = read_entry_of_setup(root, entry);
+  *entry = (sonde_log_entry){.interrupted = true};
+  copy_member(root, "exam", entry->id, sizeof entry->id);
+  copy_member(root, "trainee", entry->trainee, sizeof entry->trainee);
+  copy_member(root, "case", entry->case_id, sizeof entry->case_id);
+  copy_member(root, "title", entry->case_title, sizeof entry->case_title);
+  copy_member(root, "protocol", entry->protocol, sizeof entry->protocol);
+  copy_member(root, "guidance", entry->guidance, sizeof entry->guidance);
+  copy_member(root, "date", entry->date, sizeof entry->date);
+  if (!entry->trainee[0]) snprintf(entry->trainee, sizeof entry->trainee, "Guest");
+  bool known = entry->id[0] && entry->case_id[0];
   sonde_log_entry judged;
   if (score && !sonde_log_entry_parse(score->text, &judged, &error)) *entry = judged, known = true;
   if (!known) complain(found, id, status ? error.message : "says nothing about the exam");
@@ -203,34 +197,6 @@ static void apply_note(exam *of, const sonde_note *note) {
                              NULL);
 }
 
-// Image by image as the exam was judged, each note after the last image before it.
-static sonde_status play(exam *of, const char *path, const sonde_notes *notes, sonde_error *error) {
-  sonde_player *player = NULL;
-  sonde_player_def def = {.path = path,
-                          .model = of->setup.model,
-                          .findings = &of->setup.findings,
-                          .recover = true,
-                          .no_cache = true};
-  sonde_progress progress = app_progress();
-  sonde_status status = sonde_player_open(&def, &player, error);
-  uint32_t next = 0;
-  sonde_frame frame;
-  bool cancelled = false;
-  while (!status && !cancelled && sonde_player_next_image(player, true)) {
-    if (!sonde_player_frame(player, &frame)) continue;
-    while (next < notes->count && notes->list[next].tick < frame.snapshot.tick)
-      apply_note(of, &notes->list[next++]);
-    exam_observe(of, &frame);
-    double length_s = sonde_player_info(player)->duration_s;
-    cancelled =
-        !progress.report(sonde_player_time(player) / fmax(length_s, 1e-3), of->id, progress.user);
-  }
-  while (next < notes->count) apply_note(of, &notes->list[next++]);
-  app_progress_end();
-  sonde_player_close(player);
-  return cancelled ? app_error(error, SONDE_CANCELLED, "cancelled in exam %s", of->id) : status;
-}
-
 static sonde_status derive(exam *of, const exam_places *places, sonde_exam_log *log, bool *derived,
                            sonde_error *error) {
   char path[EXAM_PATH];
@@ -245,7 +211,34 @@ static sonde_status derive(exam *of, const exam_places *places, sonde_exam_log *
   sonde_json *root = setup && score ? parse(setup->text) : NULL;
   if (root) { // an interrupted exam has no result
     status = fill(of, root, places, &protocol, path, error);
-    if (!status) status = play(of, path, &notes, error);
+    if (!status) {
+      // Image by image as the exam was judged, each note after the last image before it.
+      sonde_player *player = NULL;
+      sonde_player_def def = {.path = path,
+                              .model = of->setup.model,
+                              .findings = &of->setup.findings,
+                              .recover = true,
+                              .no_cache = true};
+      sonde_progress progress = app_progress();
+      status = sonde_player_open(&def, &player, error);
+      uint32_t next = 0;
+      sonde_frame frame;
+      bool cancelled = false;
+      while (!status && !cancelled && sonde_player_next_image(player, true)) {
+        if (!sonde_player_frame(player, &frame)) continue;
+        while (next < notes.count && notes.list[next].tick < frame.snapshot.tick)
+          apply_note(of, &notes.list[next++]);
+        exam_observe(of, &frame);
+        double length_s = sonde_player_info(player)->duration_s;
+        cancelled = !progress.report(sonde_player_time(player) / fmax(length_s, 1e-3), of->id,
+                                     progress.user);
+      }
+      while (next < notes.count) apply_note(of, &notes.list[next++]);
+      app_progress_end();
+      sonde_player_close(player);
+      status =
+          cancelled ? app_error(error, SONDE_CANCELLED, "cancelled in exam %s", of->id) : status;
+    }
     if (!status) {
       sonde_judge_finish(of->judge);
       sonde_judge_score(of->judge, &of->patient, &of->score);

@@ -15,39 +15,6 @@ static void show(exam_app *app) {
   if (sonde_page_post(app->server, &frame, &controls)) replay->shown_tick = frame.snapshot.tick;
 }
 
-// What the judge saw, the thigh, the recording and its comments.
-static sonde_status load(exam_app *app, exam_replay *replay, const char *id, sonde_error *error) {
-  char directory[EXAM_PATH], path[EXAM_PATH], *data = NULL;
-  size_t size = 0;
-  sonde_case patient;
-  sonde_status status;
-  exam_app_path(directory, app->exams, id);
-  exam_app_path(replay->recording, directory, "exam.rec");
-  snprintf(replay->id, sizeof replay->id, "%s", id);
-  // An exam without an end has no data.
-  if (!sonde_file_load(exam_app_path(path, directory, "exam.json"), &data, &size, NULL))
-    (void)sonde_json_parse(data, size, NULL, &replay->result, NULL);
-  sonde_free(data);
-
-  sonde_json *setup = exam_read_setup(replay->recording);
-  const char *text = sonde_json_as_text(sonde_json_member(setup, "patient"));
-  if (text)
-    status = sonde_case_parse(text, replay->recording, &patient, error);
-  else // an exam from before the journal
-    status = sonde_case_load(exam_app_path(path, directory, "case.yaml"), &patient, error);
-  sonde_json_free(setup);
-  if (status) return status;
-  snprintf(replay->title, sizeof replay->title, "%s", patient.title);
-  status = sonde_case_build(&patient, exam_app_bundled(app), app->cases, &replay->setup, error);
-  sonde_player_def def = {.path = replay->recording,
-                          .model = replay->setup.model,
-                          .findings = &replay->setup.findings,
-                          .recover = true};
-  if (!status) status = sonde_player_open(&def, &replay->player, error);
-  if (!status) status = sonde_comments_load(replay->recording, &replay->comments, error);
-  return status;
-}
-
 sonde_status exam_replay_open(exam_app *app, const char *id, sonde_error *error) {
   // An id names one directory.
   if (!id[0] || strspn(id, "abcdefghijklmnopqrstuvwxyz0123456789-") != strlen(id))
@@ -66,7 +33,37 @@ sonde_status exam_replay_open(exam_app *app, const char *id, sonde_error *error)
                                    app->probe_count, error);
     if (!status) exam_app_end_session(app);
   }
-  if (!status) status = load(app, replay, id, error);
+  if (!status) {
+    // What the judge saw, the thigh, the recording and its comments.
+    char directory[EXAM_PATH], path[EXAM_PATH], *data = NULL;
+    size_t size = 0;
+    sonde_case patient;
+    exam_app_path(directory, app->exams, id);
+    exam_app_path(replay->recording, directory, "exam.rec");
+    snprintf(replay->id, sizeof replay->id, "%s", id);
+    // An exam without an end has no data.
+    if (!sonde_file_load(exam_app_path(path, directory, "exam.json"), &data, &size, NULL))
+      (void)sonde_json_parse(data, size, NULL, &replay->result, NULL);
+    sonde_free(data);
+
+    sonde_json *setup = exam_read_setup(replay->recording);
+    const char *text = sonde_json_as_text(sonde_json_member(setup, "patient"));
+    if (text)
+      status = sonde_case_parse(text, replay->recording, &patient, error);
+    else // an exam from before the journal
+      status = sonde_case_load(exam_app_path(path, directory, "case.yaml"), &patient, error);
+    sonde_json_free(setup);
+    if (!status) {
+      snprintf(replay->title, sizeof replay->title, "%s", patient.title);
+      status = sonde_case_build(&patient, exam_app_bundled(app), app->cases, &replay->setup, error);
+      sonde_player_def def = {.path = replay->recording,
+                              .model = replay->setup.model,
+                              .findings = &replay->setup.findings,
+                              .recover = true};
+      if (!status) status = sonde_player_open(&def, &replay->player, error);
+      if (!status) status = sonde_comments_load(replay->recording, &replay->comments, error);
+    }
+  }
   if (!status)
     status = sonde_page_show_model(app->server, replay->setup.model, app->probes, app->probe_count,
                                    error);

@@ -61,45 +61,6 @@ static sonde_score *cell(const table *t, uint32_t of, uint32_t op, long seed) {
   return &t->score[(of * OPERATORS + op) * (uint32_t)t->o->seeds + (uint32_t)seed];
 }
 
-// One case: its thigh once, then every operator and seed.
-static sonde_status run_case(table *t, uint32_t of, const sonde_progress *progress,
-                             sonde_error *error) {
-  const compare_options *o = t->o;
-  sonde_case_setup setup;
-  sonde_plan plan;
-  const char *bundled = o->library->has_bundled ? o->library->bundled : NULL;
-  sonde_status status = sonde_case_build(&t->cases[of], bundled, o->library->cases, &setup, error);
-  if (status) return status;
-  status = sonde_plan_make(o->protocol, &setup.map, &plan, error);
-  if (!status) status = sonde_plan_find_targets(&plan, &setup, progress, error);
-  for (uint32_t op = 0; op < OPERATORS && !status; ++op)
-    for (long seed = 0; seed < o->seeds && !status; ++seed) {
-      char json[PATH_SIZE], csv[PATH_SIZE];
-      // The bar runs over all exams; the shares that one exam reports fill its part.
-      double before = (double)(of * OPERATORS + op) * (double)o->seeds + (double)seed;
-      double all = (double)t->case_count * OPERATORS * (double)o->seeds;
-      app_progress_part(before / all, (before + 1) / all);
-      sonde_exam_def def = sonde_exam_def_default();
-      def.patient = &t->cases[of];
-      def.protocol = o->protocol;
-      def.plan = &plan;
-      def.operator_name = sonde_operator_names()[op];
-      def.seed = (uint64_t)(o->seed + seed);
-      def.solid = o->solid;
-      if (o->directory) {
-        snprintf(json, sizeof json, "%.900s/%s-%s-%ld.json", o->directory, t->cases[of].id,
-                 def.operator_name, o->seed + seed);
-        snprintf(csv, sizeof csv, "%.900s/%s-%s-%ld.csv", o->directory, t->cases[of].id,
-                 def.operator_name, o->seed + seed);
-        def.json_path = json;
-        def.csv_path = csv;
-      }
-      status = sonde_exam_run(&def, &setup, progress, cell(t, of, op, seed), error);
-    }
-  sonde_case_setup_clear(&setup);
-  return status;
-}
-
 static double mean(const table *t, uint32_t op, const metric *m) {
   double sum = 0;
   uint32_t count = 0;
@@ -128,6 +89,14 @@ static double separation(const table *t, const metric *m, uint32_t a, uint32_t b
   return pairs ? more / pairs : (double)NAN;
 }
 
+static sonde_series series_of(const table *t, uint32_t op) {
+  sonde_series series = {0};
+  for (uint32_t of = 0; of < t->case_count; ++of)
+    for (long seed = 0; seed < t->o->seeds; ++seed)
+      sonde_series_add(&series, cell(t, of, op, seed));
+  return series;
+}
+
 static void print_table(const table *t) {
   printf("%-22s", "score (* passed)");
   for (uint32_t op = 0; op < OPERATORS; ++op) printf("%10s", sonde_operator_names()[op]);
@@ -142,17 +111,7 @@ static void print_table(const table *t) {
       putchar('\n');
     }
   puts("!: wrong or no diagnosis\n");
-}
 
-static sonde_series series_of(const table *t, uint32_t op) {
-  sonde_series series = {0};
-  for (uint32_t of = 0; of < t->case_count; ++of)
-    for (long seed = 0; seed < t->o->seeds; ++seed)
-      sonde_series_add(&series, cell(t, of, op, seed));
-  return series;
-}
-
-static void print_metrics(const table *t) {
   printf("%-14s%10s%10s%10s%10s  separation expert/novice, /timid, /forceful\n", "mean", "expert",
          "novice", "timid", "forceful");
   for (size_t k = 0; k < METRIC_COUNT; ++k) {
@@ -212,11 +171,46 @@ int exam_compare(const compare_options *options) {
     status = sonde_directory_make(options->directory, 0777, false, &error);
   size_t exams = (size_t)t.case_count * OPERATORS * (size_t)options->seeds;
   if (!status && !(t.score = calloc(exams, sizeof *t.score))) status = error.status = SONDE_MEMORY;
-  for (uint32_t of = 0; of < t.case_count && !status; ++of)
-    status = run_case(&t, of, &progress, &error);
+  for (uint32_t of = 0; of < t.case_count && !status; ++of) {
+    // One case: its thigh once, then every operator and seed.
+    const compare_options *o = t.o;
+    sonde_case_setup setup;
+    sonde_plan plan;
+    const char *bundled = o->library->has_bundled ? o->library->bundled : NULL;
+    status = sonde_case_build(&t.cases[of], bundled, o->library->cases, &setup, &error);
+    if (!status) {
+      status = sonde_plan_make(o->protocol, &setup.map, &plan, &error);
+      if (!status) status = sonde_plan_find_targets(&plan, &setup, &progress, &error);
+      for (uint32_t op = 0; op < OPERATORS && !status; ++op)
+        for (long seed = 0; seed < o->seeds && !status; ++seed) {
+          char json[PATH_SIZE], csv[PATH_SIZE];
+          // The bar runs over all exams; the shares that one exam reports fill its part.
+          double before = (double)(of * OPERATORS + op) * (double)o->seeds + (double)seed;
+          double all = (double)t.case_count * OPERATORS * (double)o->seeds;
+          app_progress_part(before / all, (before + 1) / all);
+          sonde_exam_def def = sonde_exam_def_default();
+          def.patient = &t.cases[of];
+          def.protocol = o->protocol;
+          def.plan = &plan;
+          def.operator_name = sonde_operator_names()[op];
+          def.seed = (uint64_t)(o->seed + seed);
+          def.solid = o->solid;
+          if (o->directory) {
+            snprintf(json, sizeof json, "%.900s/%s-%s-%ld.json", o->directory, t.cases[of].id,
+                     def.operator_name, o->seed + seed);
+            snprintf(csv, sizeof csv, "%.900s/%s-%s-%ld.csv", o->directory, t.cases[of].id,
+                     def.operator_name, o->seed + seed);
+            def.json_path = json;
+            def.csv_path = csv;
+          }
+          status = sonde_exam_run(&def, &setup, &progress, cell(&t, of, op, seed), &error);
+        }
+      sonde_case_setup_clear(&setup);
+    }
+  }
   app_progress_end();
   if (!status && options->json) print_json(&t);
-  if (!status && !options->json) print_table(&t), print_metrics(&t);
+  if (!status && !options->json) print_table(&t);
   free(t.score);
   sonde_free(t.cases);
   return status ? app_fail("exam", &error) : APP_OK;

@@ -25,25 +25,6 @@ static double modulus_kpa(const sonde_sample *s, const sonde_sample_law *l) {
   return known ? 1e-3 * l->stiffness_n_m * s->height_m / s->area_m2 : NAN;
 }
 
-static void print(const fit_sample_options *o, const findings *f) {
-  const sonde_sample_law *best = &f->law[f->best], *one = &f->law[0];
-  printf("%s: %u rows to %.4g mm\n", o->path, f->sample.count,
-         1e3 * f->sample.compression_m[f->sample.count - 1]);
-  printf("  %-6s %10s %9s %9s %10s %10s %10s\n", "n", "K N/mm", "x_m mm", "MAE N", "of mean",
-         "RMS/peak", "left out");
-  for (int k = 0; k < LAWS; ++k)
-    printf("  %-6.3f %10.4g %9.2f %9.3f %8.2f %% %8.2f %% %8.2f %%%s\n", f->law[k].exponent,
-           1e-3 * f->law[k].stiffness_n_m, 1e3 * f->law[k].asymptote_m, f->law[k].mae_n,
-           f->law[k].mae_percent, f->law[k].rms_percent, f->law[k].held_out_percent,
-           k == f->best    ? "  chosen"
-           : k == LAWS - 1 ? "  n estimated"
-                           : "");
-  printf("n = 1: f = x/(a x + b) with a = %.5g 1/N, b = %.5g mm/N\n",
-         -1 / (one->stiffness_n_m * one->asymptote_m), 1e3 / one->stiffness_n_m);
-  if (isfinite(modulus_kpa(&f->sample, best)))
-    printf("modulus at small compression %.4g kPa\n", modulus_kpa(&f->sample, best));
-}
-
 static void print_json_law(const char *key, const sonde_sample *s, const sonde_sample_law *l) {
   app_json_object(key);
   app_json("exponent:%g stiffness_n_mm:%g asymptote_mm:%g a_per_n:%g b_mm_per_n:%g "
@@ -53,16 +34,6 @@ static void print_json_law(const char *key, const sonde_sample *s, const sonde_s
            -1 / (l->stiffness_n_m * l->asymptote_m), 1e3 / l->stiffness_n_m, modulus_kpa(s, l),
            l->mae_n, l->rms_n, l->mae_percent, l->rms_percent, l->held_out_percent, l->converged);
   app_json_close();
-}
-
-static void print_json(const fit_sample_options *o, const findings *f) {
-  static const char *const KEY[LAWS] = {"n1", "n2", "n3", "free"};
-  app_json_begin();
-  app_json("count:%u exponent:%g", f->sample.count, f->law[f->best].exponent);
-  for (int k = 0; k < LAWS; ++k) print_json_law(KEY[k], &f->sample, &f->law[k]);
-  print_json_law("chosen", &f->sample, &f->law[f->best]);
-  fit_doubts_print_json(&f->doubts, o->path);
-  app_json_end();
 }
 
 int fit_sample_run(const fit_sample_options *o) {
@@ -81,7 +52,33 @@ int fit_sample_run(const fit_sample_options *o) {
     if (o->exponent > 0 ? EXPONENT[k] == o->exponent
                         : f.law[k].held_out_percent < f.law[f.best].held_out_percent)
       f.best = k;
-  if (!status) (o->json ? print_json : print)(o, &f);
+  if (!status && o->json) {
+    static const char *const KEY[LAWS] = {"n1", "n2", "n3", "free"};
+    app_json_begin();
+    app_json("count:%u exponent:%g", f.sample.count, f.law[f.best].exponent);
+    for (int k = 0; k < LAWS; ++k) print_json_law(KEY[k], &f.sample, &f.law[k]);
+    print_json_law("chosen", &f.sample, &f.law[f.best]);
+    fit_doubts_print_json(&f.doubts, o->path);
+    app_json_end();
+  }
+  if (!status && !o->json) {
+    const sonde_sample_law *best = &f.law[f.best], *one = &f.law[0];
+    printf("%s: %u rows to %.4g mm\n", o->path, f.sample.count,
+           1e3 * f.sample.compression_m[f.sample.count - 1]);
+    printf("  %-6s %10s %9s %9s %10s %10s %10s\n", "n", "K N/mm", "x_m mm", "MAE N", "of mean",
+           "RMS/peak", "left out");
+    for (int k = 0; k < LAWS; ++k)
+      printf("  %-6.3f %10.4g %9.2f %9.3f %8.2f %% %8.2f %% %8.2f %%%s\n", f.law[k].exponent,
+             1e-3 * f.law[k].stiffness_n_m, 1e3 * f.law[k].asymptote_m, f.law[k].mae_n,
+             f.law[k].mae_percent, f.law[k].rms_percent, f.law[k].held_out_percent,
+             k == f.best     ? "  chosen"
+             : k == LAWS - 1 ? "  n estimated"
+                             : "");
+    printf("n = 1: f = x/(a x + b) with a = %.5g 1/N, b = %.5g mm/N\n",
+           -1 / (one->stiffness_n_m * one->asymptote_m), 1e3 / one->stiffness_n_m);
+    if (isfinite(modulus_kpa(&f.sample, best)))
+      printf("modulus at small compression %.4g kPa\n", modulus_kpa(&f.sample, best));
+  }
   sonde_sample_clear(&f.sample);
   return status ? app_fail("fit", &error) : APP_OK;
 }

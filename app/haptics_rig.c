@@ -29,24 +29,6 @@ void haptics_rig_follow(haptics_rig *rig, const haptics_rig_def *def, sonde_stat
   sonde_state_reset(state);
 }
 
-// What a scene that answers every so many ticks, and a period late, makes of the true force.
-static sonde_vec3 slow_force(haptics_rig *rig, sonde_vec3 at, sonde_vec3 force) {
-  sonde_vec3 v = {(at.x - rig->last_m.x) / DT_S, (at.y - rig->last_m.y) / DT_S,
-                  (at.z - rig->last_m.z) / DT_S};
-  if (rig->tick == 1) v = (sonde_vec3){0, 0, 0};
-  rig->last_m = at;
-  if (rig->tick % (uint64_t)rig->def.slow_ticks == 0) {
-    rig->held_n = rig->asked_n;
-    if (rig->tick > (uint64_t)rig->def.slow_ticks)
-      sonde_local_feed(&rig->local, rig->asked_m, rig->asked_m_s, rig->asked_n);
-    rig->asked_m = at;
-    rig->asked_m_s = v;
-    rig->asked_n = force;
-  }
-  sonde_vec3 model = sonde_local_force(&rig->local, at);
-  return rig->def.direct ? rig->held_n : model;
-}
-
 sonde_status haptics_rig_start(haptics_rig *rig, const haptics_rig_def *def, sonde_state *state,
                                sonde_error *error) {
   assert(def->site && def->limits && def->mass_kg > 0);
@@ -76,7 +58,24 @@ void haptics_rig_tick(haptics_rig *rig) {
   sonde_pose pose = sonde_render_probe(&rig->render, sample.world_from_probe, rig->felt_n, before);
   sonde_step(rig->state, rig->def.probe, pose);
   rig->felt_n = sonde_state_contact(rig->state)->force_n;
-  if (rig->def.slow_ticks) rig->felt_n = slow_force(rig, pose.position, rig->felt_n);
+  if (rig->def.slow_ticks) {
+    // What a scene that answers every so many ticks, and a period late, makes of the true force.
+    sonde_vec3 v = {(pose.position.x - rig->last_m.x) / DT_S,
+                    (pose.position.y - rig->last_m.y) / DT_S,
+                    (pose.position.z - rig->last_m.z) / DT_S};
+    if (rig->tick == 1) v = (sonde_vec3){0, 0, 0};
+    rig->last_m = pose.position;
+    if (rig->tick % (uint64_t)rig->def.slow_ticks == 0) {
+      rig->held_n = rig->asked_n;
+      if (rig->tick > (uint64_t)rig->def.slow_ticks)
+        sonde_local_feed(&rig->local, rig->asked_m, rig->asked_m_s, rig->asked_n);
+      rig->asked_m = pose.position;
+      rig->asked_m_s = v;
+      rig->asked_n = rig->felt_n;
+    }
+    sonde_vec3 model = sonde_local_force(&rig->local, pose.position);
+    rig->felt_n = rig->def.direct ? rig->held_n : model;
+  }
   sonde_render_force(&rig->render, rig->felt_n);
   sonde_safety_apply(&rig->safety, rig->render.force_n, (sonde_vec3){0, 0, 0}, DT_S);
   rig->device.write(rig->device.self, rig->safety.force_n, (sonde_vec3){0, 0, 0});

@@ -133,59 +133,6 @@ static void format_look(char look[64], const char *format, uint32_t body, uint32
   snprintf(look, 64, format, rgb, rgb);
 }
 
-// Light from above the viewer's left shoulder; then names in the colours of the bodies, and the
-// time.
-static sonde_status draw_bodies(figure *f, double time_s, const char *path, sonde_error *error) {
-  const camera *c = &f->camera;
-  sonde_vec3 light = unit(madd(madd(c->toward, 1.1, c->up), -0.5, c->right));
-  double lowest = 0;
-  for (uint32_t b = 0; b < sonde_scene_body_count(f->scene); ++b) {
-    const sonde_mesh *mesh = sonde_scene_body(f->scene, b).surface;
-    for (uint32_t i = 0; i < mesh->vertex_count; ++i)
-      lowest = fmax(lowest, c->top - c->scale * dot(f->vertex[b][i], c->up));
-    for (uint32_t i = 0; i < mesh->face_count; ++i) {
-      const uint32_t *v = mesh->faces[i];
-      const sonde_vec3 p[3] = {f->vertex[b][v[0]], f->vertex[b][v[1]], f->vertex[b][v[2]]};
-      sonde_vec3 normal = unit(cross(madd(p[1], -1, p[0]), madd(p[2], -1, p[0])));
-      if (!(dot(normal, c->toward) > 0)) continue;
-      double lit = fmax(dot(normal, light), 0);
-      cut_face(f, p, b, (uint32_t)fmin(lit * SHADES, SHADES - 1), 0);
-    }
-  }
-  qsort(f->pieces, f->count, sizeof *f->pieces, compare_pieces);
-
-  sonde_file *file = NULL;
-  double(*xy)[2] = malloc(3 * ((size_t)f->count + 1) * sizeof *xy);
-  sonde_status status = xy ? sonde_file_create(path, &file, error) : SONDE_MEMORY;
-  if (!status) {
-    char words[64];
-    double x = MARGIN, y = lowest + MARGIN + LEGEND - 12;
-    sonde_svg_begin(file, sonde_scene_title(f->scene), WIDTH, y + MARGIN);
-    for (uint32_t i = 0; i < f->count;) {
-      const piece *first = &f->pieces[i];
-      uint32_t corners = 0;
-      for (; i < f->count && compare_pieces(first, &f->pieces[i]) == 0; ++i, corners += 3)
-        memcpy(xy[corners], f->pieces[i].xy, sizeof f->pieces[i].xy);
-      format_look(words, "fill='#%06x' stroke='#%06x' stroke-width='.6'", first->body,
-                  first->shade);
-      sonde_svg_put_outlines(file, (const double(*)[2])xy, corners, 3, words);
-    }
-    for (uint32_t b = 0; b < sonde_scene_body_count(f->scene) && x < WIDTH - 170; ++b) {
-      const char *name = sonde_scene_body(f->scene, b).name;
-      const double box[4][2] = {{x, y - 10}, {x + 11, y - 10}, {x + 11, y + 1}, {x, y + 1}};
-      format_look(words, "fill='#%06x'", b, SHADES - 2);
-      sonde_svg_put_outlines(file, box, 4, 4, words);
-      sonde_svg_put_text(file, x + 16, y, "", name);
-      x += 34 + 7.5 * (double)strlen(name);
-    }
-    snprintf(words, sizeof words, "t = %.3f s", time_s);
-    sonde_svg_put_text(file, WIDTH - MARGIN, y, "class='end'", words);
-    status = sonde_svg_end(file, error);
-  }
-  free(xy);
-  return status;
-}
-
 // ---- report -------------------------------------------------------------------------------------
 
 static void put(sonde_json_out *out, const char *key, double value) {
@@ -193,41 +140,6 @@ static void put(sonde_json_out *out, const char *key, double value) {
 }
 
 static double norm(sonde_vec3 v) { return sqrt(dot(v, v)); }
-
-static void put_bodies(sonde_json_out *out, const figure *f, const sonde_scene_state *state) {
-  static const char *const KIND[] = {"rigid", "surface", "lattice", "thigh"};
-  sonde_json_begin_list(out, "bodies");
-  for (uint32_t b = 0; b < sonde_scene_body_count(f->scene); ++b) {
-    sonde_body_info body = sonde_scene_body(f->scene, b);
-    sonde_body_measure m = sonde_scene_measure(state, b);
-    sonde_json_begin_object(out, NULL);
-    sonde_json_put_text(out, "name", body.name);
-    sonde_json_put_text(out, "kind", KIND[body.kind]);
-    sonde_json_put_integer(out, "nodes", body.node_count);
-    put(out, "mass_kg", body.mass.mass_kg);
-    sonde_json_begin_list(out, "centre_mm");
-    put(out, NULL, 1e3 * m.centre_m.x), put(out, NULL, 1e3 * m.centre_m.y);
-    put(out, NULL, 1e3 * m.centre_m.z);
-    sonde_json_end(out);
-    put(out, "speed_mm_s", 1e3 * norm(m.velocity_m_s));
-    put(out, "kinetic_mj", 1e3 * m.kinetic_j);
-    put(out, "elastic_mj", 1e3 * m.elastic_j);
-    sonde_json_begin_list(out, "position_mm");
-    for (uint32_t i = 0; i < body.surface->vertex_count; ++i) {
-      const sonde_vec3 p = f->vertex[b][i];
-      sonde_json_put_real(out, NULL, 1e3 * p.x, PLACES);
-      sonde_json_put_real(out, NULL, 1e3 * p.y, PLACES);
-      sonde_json_put_real(out, NULL, 1e3 * p.z, PLACES);
-    }
-    sonde_json_end(out);
-    sonde_json_begin_list(out, "face");
-    for (uint32_t i = 0; i < body.surface->face_count; ++i)
-      for (int k = 0; k < 3; ++k) sonde_json_put_integer(out, NULL, body.surface->faces[i][k]);
-    sonde_json_end(out);
-    sonde_json_end(out);
-  }
-  sonde_json_end(out);
-}
 
 static sonde_status write_report(const figure *f, const sonde_scene_state *state, const char *path,
                                  sonde_error *error) {
@@ -245,7 +157,38 @@ static sonde_status write_report(const figure *f, const sonde_scene_state *state
   sonde_json_begin_list(&out, "gravity_m_s2");
   put(&out, NULL, gravity.x), put(&out, NULL, gravity.y), put(&out, NULL, gravity.z);
   sonde_json_end(&out);
-  put_bodies(&out, f, state);
+  static const char *const KIND[] = {"rigid", "surface", "lattice", "thigh"};
+  sonde_json_begin_list(&out, "bodies");
+  for (uint32_t b = 0; b < sonde_scene_body_count(f->scene); ++b) {
+    sonde_body_info body = sonde_scene_body(f->scene, b);
+    sonde_body_measure m = sonde_scene_measure(state, b);
+    sonde_json_begin_object(&out, NULL);
+    sonde_json_put_text(&out, "name", body.name);
+    sonde_json_put_text(&out, "kind", KIND[body.kind]);
+    sonde_json_put_integer(&out, "nodes", body.node_count);
+    put(&out, "mass_kg", body.mass.mass_kg);
+    sonde_json_begin_list(&out, "centre_mm");
+    put(&out, NULL, 1e3 * m.centre_m.x), put(&out, NULL, 1e3 * m.centre_m.y);
+    put(&out, NULL, 1e3 * m.centre_m.z);
+    sonde_json_end(&out);
+    put(&out, "speed_mm_s", 1e3 * norm(m.velocity_m_s));
+    put(&out, "kinetic_mj", 1e3 * m.kinetic_j);
+    put(&out, "elastic_mj", 1e3 * m.elastic_j);
+    sonde_json_begin_list(&out, "position_mm");
+    for (uint32_t i = 0; i < body.surface->vertex_count; ++i) {
+      const sonde_vec3 p = f->vertex[b][i];
+      sonde_json_put_real(&out, NULL, 1e3 * p.x, PLACES);
+      sonde_json_put_real(&out, NULL, 1e3 * p.y, PLACES);
+      sonde_json_put_real(&out, NULL, 1e3 * p.z, PLACES);
+    }
+    sonde_json_end(&out);
+    sonde_json_begin_list(&out, "face");
+    for (uint32_t i = 0; i < body.surface->face_count; ++i)
+      for (int k = 0; k < 3; ++k) sonde_json_put_integer(&out, NULL, body.surface->faces[i][k]);
+    sonde_json_end(&out);
+    sonde_json_end(&out);
+  }
+  sonde_json_end(&out);
   sonde_json_begin_list(&out, "contacts");
   for (uint32_t k = 0; k < sonde_scene_pair_count(f->scene); ++k) {
     sonde_scene_pair pair = sonde_scene_pair_at(f->scene, k);
@@ -287,7 +230,55 @@ sonde_status scene_figure(const sonde_scene *scene, const sonde_scene_state *sta
     status = write_report(&f, state, path, error);
   } else if (good && (f.pieces = malloc(PIECES_MOST * sizeof *f.pieces))) {
     f.camera = look(&f);
-    status = draw_bodies(&f, sonde_scene_time(state), path, error);
+    // Light from above the viewer's left shoulder; then names in the colours of the bodies, and the
+    // time.
+    const camera *c = &f.camera;
+    sonde_vec3 light = unit(madd(madd(c->toward, 1.1, c->up), -0.5, c->right));
+    double lowest = 0;
+    for (uint32_t b = 0; b < sonde_scene_body_count(f.scene); ++b) {
+      const sonde_mesh *mesh = sonde_scene_body(f.scene, b).surface;
+      for (uint32_t i = 0; i < mesh->vertex_count; ++i)
+        lowest = fmax(lowest, c->top - c->scale * dot(f.vertex[b][i], c->up));
+      for (uint32_t i = 0; i < mesh->face_count; ++i) {
+        const uint32_t *v = mesh->faces[i];
+        const sonde_vec3 p[3] = {f.vertex[b][v[0]], f.vertex[b][v[1]], f.vertex[b][v[2]]};
+        sonde_vec3 normal = unit(cross(madd(p[1], -1, p[0]), madd(p[2], -1, p[0])));
+        if (!(dot(normal, c->toward) > 0)) continue;
+        double lit = fmax(dot(normal, light), 0);
+        cut_face(&f, p, b, (uint32_t)fmin(lit * SHADES, SHADES - 1), 0);
+      }
+    }
+    qsort(f.pieces, f.count, sizeof *f.pieces, compare_pieces);
+
+    sonde_file *file = NULL;
+    double(*xy)[2] = malloc(3 * ((size_t)f.count + 1) * sizeof *xy);
+    status = xy ? sonde_file_create(path, &file, error) : SONDE_MEMORY;
+    if (!status) {
+      char words[64];
+      double x = MARGIN, y = lowest + MARGIN + LEGEND - 12;
+      sonde_svg_begin(file, sonde_scene_title(f.scene), WIDTH, y + MARGIN);
+      for (uint32_t i = 0; i < f.count;) {
+        const piece *first = &f.pieces[i];
+        uint32_t corners = 0;
+        for (; i < f.count && compare_pieces(first, &f.pieces[i]) == 0; ++i, corners += 3)
+          memcpy(xy[corners], f.pieces[i].xy, sizeof f.pieces[i].xy);
+        format_look(words, "fill='#%06x' stroke='#%06x' stroke-width='.6'", first->body,
+                    first->shade);
+        sonde_svg_put_outlines(file, (const double(*)[2])xy, corners, 3, words);
+      }
+      for (uint32_t b = 0; b < sonde_scene_body_count(f.scene) && x < WIDTH - 170; ++b) {
+        const char *name = sonde_scene_body(f.scene, b).name;
+        const double box[4][2] = {{x, y - 10}, {x + 11, y - 10}, {x + 11, y + 1}, {x, y + 1}};
+        format_look(words, "fill='#%06x'", b, SHADES - 2);
+        sonde_svg_put_outlines(file, box, 4, 4, words);
+        sonde_svg_put_text(file, x + 16, y, "", name);
+        x += 34 + 7.5 * (double)strlen(name);
+      }
+      snprintf(words, sizeof words, "t = %.3f s", sonde_scene_time(state));
+      sonde_svg_put_text(file, WIDTH - MARGIN, y, "class='end'", words);
+      status = sonde_svg_end(file, error);
+    }
+    free(xy);
   }
   for (uint32_t b = 0; f.vertex && b < bodies; ++b) free(f.vertex[b]);
   free(f.vertex);

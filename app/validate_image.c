@@ -237,40 +237,6 @@ static sonde_status enhancement(report *r) {
   return status;
 }
 
-// Front-to-back diameter that the picture shows: between the two walls' echoes on the middle lines.
-static double image_diameter(const stage *s, const float *e, double centre_m) {
-  uint32_t lines, samples;
-  (void)sonde_echo_envelope(s->view.echo, &lines, &samples);
-  double step = s->view.settings.depth_m / (samples - 1), sum[4096] = {0};
-  uint32_t middle = (uint32_t)(centre_m / step), reach = (uint32_t)(7e-3 / step);
-  for (uint32_t n = middle - reach; n <= middle + reach; ++n)
-    for (uint32_t l = lines / 2 - 3; l < lines / 2 + 3; ++l)
-      sum[n] += (double)e[(size_t)n * lines + l];
-  double place[2] = {0};
-  for (int side = 0; side < 2; ++side) {
-    uint32_t best = middle;
-    for (uint32_t k = 0; k <= reach; ++k) {
-      uint32_t n = side ? middle + k : middle - k;
-      if (sum[n] > sum[best]) best = n;
-    }
-    double a = log(sum[best - 1]), b = log(sum[best]), c = log(sum[best + 1]); // peak by a parabola
-    place[side] = best + (a - 2 * b + c < 0 ? 0.5 * (a - c) / (a - 2 * b + c) : 0);
-  }
-  return (place[1] - place[0]) * step;
-}
-
-// A force on a patch of the skin over the vessels, evenly on its nodes.
-static void press_skin(stage *s, double newton) {
-  uint32_t count = 0, n = s->leg.surface.vertex_count;
-  for (int pass = 0; pass < 2; ++pass)
-    for (uint32_t i = 0; i < n; ++i) {
-      sonde_vec3 p = s->leg.surface.vertices[i];
-      bool under = p.y > 0 && fabs(p.x) < 0.02 && fabs(p.z - 0.15) < 0.006;
-      if (pass == 0) s->forces[i] = (sonde_vec3){0, 0, 0}, count += under;
-      if (pass == 1 && under) s->forces[i].y = -newton / count;
-    }
-}
-
 // Pressure at which a falling diameter passes a fifth of its rest value.
 static double closure(const double *diameter, const double *pressure, int count) {
   for (int k = 1; k < count; ++k)
@@ -289,13 +255,41 @@ static sonde_status vein(report *r) {
   double seen[LOADS], true_m[LOADS], pressure[LOADS], worst = 0;
   int used = 0;
   for (int k = 0; k < LOADS && !status; ++k) {
-    press_skin(&s, 1.0 * k);
+    // A force on a patch of the skin over the vessels, evenly on its nodes.
+    uint32_t count = 0;
+    for (int pass = 0; pass < 2; ++pass)
+      for (uint32_t i = 0; i < s.leg.surface.vertex_count; ++i) {
+        sonde_vec3 p = s.leg.surface.vertices[i];
+        bool under = p.y > 0 && fabs(p.x) < 0.02 && fabs(p.z - 0.15) < 0.006;
+        if (pass == 0) s.forces[i] = (sonde_vec3){0, 0, 0}, count += under;
+        if (pass == 1 && under) s.forces[i].y = -(1.0 * k) / count;
+      }
     sonde_vessel_state v;
     const float *e = look(&s, (uint64_t)k + 1);
     if (!sonde_interior_vessel_at_plane(s.interior, 0, s.pose, &v)) break;
     double centre = s.pose.position.y - v.centre_m.y;
     true_m[used] = 2 * v.half_short_m, pressure[used] = v.outside_pa / 133.322387415;
-    seen[used] = image_diameter(&s, e, centre);
+    // Front-to-back diameter that the picture shows: between the two walls' echoes on the middle
+    // lines.
+    uint32_t lines, samples;
+    (void)sonde_echo_envelope(s.view.echo, &lines, &samples);
+    double step = s.view.settings.depth_m / (samples - 1), sum[4096] = {0};
+    uint32_t middle = (uint32_t)(centre / step), reach = (uint32_t)(7e-3 / step);
+    for (uint32_t n = middle - reach; n <= middle + reach; ++n)
+      for (uint32_t l = lines / 2 - 3; l < lines / 2 + 3; ++l)
+        sum[n] += (double)e[(size_t)n * lines + l];
+    double place[2] = {0};
+    for (int side = 0; side < 2; ++side) {
+      uint32_t best = middle;
+      for (uint32_t away = 0; away <= reach; ++away) {
+        uint32_t n = side ? middle + away : middle - away;
+        if (sum[n] > sum[best]) best = n;
+      }
+      double a = log(sum[best - 1]), b = log(sum[best]),
+             c = log(sum[best + 1]); // peak by a parabola
+      place[side] = best + (a - 2 * b + c < 0 ? 0.5 * (a - c) / (a - 2 * b + c) : 0);
+    }
+    seen[used] = (place[1] - place[0]) * step;
     if (true_m[used] > 0.6e-3) worst = fmax(worst, fabs(seen[used] - true_m[used]));
     if (true_m[used++] < 0.5e-3) break;
   }

@@ -29,23 +29,19 @@ void validate_note(validate_list *l, const char *name, double value, double leas
   if (l->working) app_progress_begin(l->working);
 }
 
-static void print_json(const validate_list *l) {
-  app_json_begin();
-  for (const validate_measure *m = l->list; m < l->list + l->count; ++m) {
-    app_json_object(m->name);
-    app_json("value:%g least:%g most:%g target:%s pass:%hhd", m->value, m->least, m->most,
-             m->target, m->pass);
-    app_json_close();
-  }
-  app_json("passed:%u failed:%u pass:%hhd", l->count - l->failed, l->failed, l->failed == 0);
-  app_json_end();
-}
-
 bool validate_end(const validate_list *l) {
   app_progress_end();
-  if (l->json)
-    print_json(l);
-  else
+  if (l->json) {
+    app_json_begin();
+    for (const validate_measure *m = l->list; m < l->list + l->count; ++m) {
+      app_json_object(m->name);
+      app_json("value:%g least:%g most:%g target:%s pass:%hhd", m->value, m->least, m->most,
+               m->target, m->pass);
+      app_json_close();
+    }
+    app_json("passed:%u failed:%u pass:%hhd", l->count - l->failed, l->failed, l->failed == 0);
+    app_json_end();
+  } else
     printf("%d passed, %d failed\n", l->count - l->failed, l->failed);
   return l->failed == 0;
 }
