@@ -71,24 +71,6 @@ static sonde_status make_echo(bench *b, const options *o, double density, sonde_
   return status ? status : sonde_echo_set_radius(b->echo, o->radius_m, error);
 }
 
-// A first frame at a known density tells the density that is asked for.
-static sonde_status prepare(bench *b, const options *o, sonde_error *error) {
-  const double known_m3 = 16e9;
-  b->settings = sonde_echo_settings_default();
-  sonde_status status = sonde_pathology_preset("healthy", &b->pathology, error);
-  if (!status) status = settled_open(&b->scene, o->model, "linear", NULL, true, error);
-  if (!status && settled_site(&b->scene, o->model, 27, &b->start, error))
-    b->start = sonde_site_pose(&b->scene.model->sites[b->scene.model->site_count / 2], 0);
-  if (!status)
-    status = sonde_image_create((uint32_t)o->size[0], (uint32_t)o->size[1], &b->image, error);
-  if (!status) status = make_echo(b, o, known_m3, error);
-  if (status) return status;
-  settled_at(&b->scene, b->start, 0.008, 1e-5);
-  draw(b, 1);
-  double moved = sonde_echo_last_times(b->echo).scatterers;
-  return make_echo(b, o, known_m3 * (double)o->scatterers / fmax(moved, 1), error);
-}
-
 static void print(bench *b, const options *o) {
   static const char *const NAMES[STAGES] = {"settings", "plane", "medium",
                                             "scatter",  "beam",  "picture"};
@@ -127,7 +109,25 @@ static int run(void *from) {
   bench b = {0};
   sonde_error error = {0};
   b.stage = calloc((size_t)(STAGES + 1) * (size_t)o->frames, sizeof *b.stage);
-  sonde_status status = b.stage ? prepare(&b, o, &error) : SONDE_MEMORY;
+  sonde_status status = b.stage ? SONDE_OK : SONDE_MEMORY;
+  if (!status) {
+    // A first frame at a known density tells the density that is asked for.
+    const double known_m3 = 16e9;
+    b.settings = sonde_echo_settings_default();
+    status = sonde_pathology_preset("healthy", &b.pathology, &error);
+    if (!status) status = settled_open(&b.scene, o->model, "linear", NULL, true, &error);
+    if (!status && settled_site(&b.scene, o->model, 27, &b.start, &error))
+      b.start = sonde_site_pose(&b.scene.model->sites[b.scene.model->site_count / 2], 0);
+    if (!status)
+      status = sonde_image_create((uint32_t)o->size[0], (uint32_t)o->size[1], &b.image, &error);
+    if (!status) status = make_echo(&b, o, known_m3, &error);
+    if (!status) {
+      settled_at(&b.scene, b.start, 0.008, 1e-5);
+      draw(&b, 1);
+      double moved = sonde_echo_last_times(b.echo).scatterers;
+      status = make_echo(&b, o, known_m3 * (double)o->scatterers / fmax(moved, 1), &error);
+    }
+  }
   if (!status) {
     // Times of some frames at each depth, after one that fills the caches.
     uint64_t tick = 2;

@@ -25,25 +25,6 @@ static void finish(question *q) {
   q->poll.fd = -1;
 }
 
-// Sends the request, then takes what comes.
-static void advance(question *q, const class_learner *learner) {
-  if (!q->sent) {
-    char request[256];
-    int size = snprintf(request, sizeof request,
-                        "GET /status.json HTTP/1.1\r\nHost: 127.0.0.1:%u\r\nConnection: close\r\n"
-                        "Accept: application/json\r\nAuthorization: Bearer %s\r\n\r\n",
-                        (unsigned)learner->port, learner->token);
-    q->sent = send(q->poll.fd, request, (size_t)size, MSG_NOSIGNAL) == size;
-    q->poll.events = POLLIN;
-    if (!q->sent) finish(q);
-    return;
-  }
-  ssize_t got = recv(q->poll.fd, q->answer + q->used, CLASS_ANSWER - q->used, 0);
-  if (got > 0) q->used += (size_t)got;
-  bool again = got < 0 && (errno == EAGAIN || errno == EINTR);
-  if ((got <= 0 && !again) || q->used == CLASS_ANSWER) finish(q);
-}
-
 // A member as text that a terminal can show.
 static void take_text(const sonde_json *object, const char *key, char *to, size_t size) {
   const char *text = sonde_json_as_text(sonde_json_member(object, key));
@@ -83,7 +64,26 @@ void class_ask(class_room *room) {
     }
     if (!open || poll(polls, room->count, (int)(1e3 * rest_s) + 1) < 0) break;
     for (uint32_t i = 0; i < room->count; ++i)
-      if (polls[i].fd >= 0 && polls[i].revents) advance(&all[i], &room->learner[i]);
+      if (polls[i].fd >= 0 && polls[i].revents) {
+        // Sends the request, then takes what comes.
+        if (!all[i].sent) {
+          char request[256];
+          int size =
+              snprintf(request, sizeof request,
+                       "GET /status.json HTTP/1.1\r\nHost: 127.0.0.1:%u\r\nConnection: close\r\n"
+                       "Accept: application/json\r\nAuthorization: Bearer %s\r\n\r\n",
+                       (unsigned)room->learner[i].port, room->learner[i].token);
+          all[i].sent = send(all[i].poll.fd, request, (size_t)size, MSG_NOSIGNAL) == size;
+          all[i].poll.events = POLLIN;
+          if (!all[i].sent) finish(&all[i]);
+        } else {
+          ssize_t got =
+              recv(all[i].poll.fd, all[i].answer + all[i].used, CLASS_ANSWER - all[i].used, 0);
+          if (got > 0) all[i].used += (size_t)got;
+          bool again = got < 0 && (errno == EAGAIN || errno == EINTR);
+          if ((got <= 0 && !again) || all[i].used == CLASS_ANSWER) finish(&all[i]);
+        }
+      }
   }
   for (uint32_t i = 0; i < room->count; ++i) {
     if (all[i].poll.fd >= 0) finish(&all[i]);

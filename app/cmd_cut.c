@@ -121,28 +121,6 @@ static double sum(const double *values, uint32_t count) {
   return total;
 }
 
-static void print(const options *a, const work *w) {
-  uint32_t nodes = w->model->surface.vertex_count, after = w->cut->surface.vertex_count;
-  double mass = sum(w->model->mass_kg, nodes), mass_after = sum(w->cut->mass_kg, after);
-  if (a->json) {
-    app_json_begin();
-    app_json("nodes_before:%u nodes:%u split_edges:%u length_mm:%g closed:%hhd mass_kg:%g "
-             "mass_change:%g cut_ms:%g force_before_n:%g force_after_n:%g model:%s",
-             nodes, after, w->map.split_edges, w->map.length_m * 1e3, w->map.closed, mass_after,
-             mass_after / mass - 1, w->seconds * 1e3, w->before_n, w->after_n, a->output);
-    app_json_end();
-    return;
-  }
-  printf("cut           %8.1f mm along %u edges%s, in %.1f ms\n", w->map.length_m * 1e3,
-         w->map.split_edges, w->map.closed ? ", closed" : "", w->seconds * 1e3);
-  printf("nodes         %8u, were %u\n", after, nodes);
-  printf("mass          %8.4f kg, changed by %.1g of it\n", mass_after, mass_after / mass - 1);
-  if (!isnan(a->depth_m))
-    printf("force         %8.3f N at %g mm, was %.3f N\n", w->after_n, a->depth_m * 1e3,
-           w->before_n);
-  printf("model         %s\n", a->output);
-}
-
 // The points of the cut: two that are given, those of a file, or 33 beside a site.
 static sonde_status find_path(const options *a, work *w, sonde_error *error) {
   enum { POINTS = 33 };
@@ -206,7 +184,27 @@ static int run(void *from) {
   w = (work){0};
   sonde_error error = {0};
   sonde_status status = cut(a, &w, &error);
-  if (!status) print(a, &w);
+  if (!status) {
+    uint32_t nodes = w.model->surface.vertex_count, after = w.cut->surface.vertex_count;
+    double mass = sum(w.model->mass_kg, nodes), mass_after = sum(w.cut->mass_kg, after);
+    if (a->json) {
+      app_json_begin();
+      app_json("nodes_before:%u nodes:%u split_edges:%u length_mm:%g closed:%hhd mass_kg:%g "
+               "mass_change:%g cut_ms:%g force_before_n:%g force_after_n:%g model:%s",
+               nodes, after, w.map.split_edges, w.map.length_m * 1e3, w.map.closed, mass_after,
+               mass_after / mass - 1, w.seconds * 1e3, w.before_n, w.after_n, a->output);
+      app_json_end();
+    } else {
+      printf("cut           %8.1f mm along %u edges%s, in %.1f ms\n", w.map.length_m * 1e3,
+             w.map.split_edges, w.map.closed ? ", closed" : "", w.seconds * 1e3);
+      printf("nodes         %8u, were %u\n", after, nodes);
+      printf("mass          %8.4f kg, changed by %.1g of it\n", mass_after, mass_after / mass - 1);
+      if (!isnan(a->depth_m))
+        printf("force         %8.3f N at %g mm, was %.3f N\n", w.after_n, a->depth_m * 1e3,
+               w.before_n);
+      printf("model         %s\n", a->output);
+    }
+  }
   sonde_cut_map_clear(&w.map);
   sonde_model_destroy(w.cut);
   sonde_model_destroy(w.model);

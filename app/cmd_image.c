@@ -164,33 +164,6 @@ static void other_vessels(const settled *s, bool json) {
   if (json) app_json_close();
 }
 
-static void print(const settled *s, const options *o, const sonde_image *image) {
-  sonde_vessel_state vein, artery;
-  bool v = sonde_interior_vessel_at_plane(s->interior, 0, s->pose, &vein);
-  bool a = sonde_interior_vessel_at_plane(s->interior, 1, s->pose, &artery);
-  if (!o->json) {
-    printf("%s: %.0f x %.0f pixels, %.1f x %.1f mm, %.2f N\n", o->out, o->size[0], o->size[1],
-           image->width_m * 1e3, image->height_m * 1e3, s->force_n);
-    if (v)
-      printf("vein   %.1f mm front to back, %.0f %% of its rest area\n", 2e3 * vein.half_short_m,
-             100 * vein.area_ratio);
-    if (a)
-      printf("artery %.1f mm front to back, %.0f %% of its rest area\n", 2e3 * artery.half_short_m,
-             100 * artery.area_ratio);
-    other_vessels(s, false);
-    return;
-  }
-  app_json_begin();
-  app_json("image:%s width_mm:%g height_mm:%g force_n:%g", o->out, image->width_m * 1e3,
-           image->height_m * 1e3, s->force_n);
-  settled_json_jumps(s);
-  app_json("case:%s vein_short_mm:%g vein_area_ratio:%g artery_short_mm:%g artery_area_ratio:%g",
-           o->pathology, v ? 2e3 * vein.half_short_m : NAN, v ? vein.area_ratio : NAN,
-           a ? 2e3 * artery.half_short_m : NAN, a ? artery.area_ratio : NAN);
-  other_vessels(s, true);
-  app_json_end();
-}
-
 static int run(void *from) {
   const options *o = from;
   assert(o->out && o->size[0] > 0 && o->size[1] > 0);
@@ -223,7 +196,33 @@ static int run(void *from) {
     sonde_echo_destroy(echo);
   }
   app_progress_end();
-  if (!status) print(&s, o, &image);
+  if (!status) {
+    sonde_vessel_state vein, artery;
+    bool v = sonde_interior_vessel_at_plane(s.interior, 0, s.pose, &vein);
+    bool a = sonde_interior_vessel_at_plane(s.interior, 1, s.pose, &artery);
+    if (!o->json) {
+      printf("%s: %.0f x %.0f pixels, %.1f x %.1f mm, %.2f N\n", o->out, o->size[0], o->size[1],
+             image.width_m * 1e3, image.height_m * 1e3, s.force_n);
+      if (v)
+        printf("vein   %.1f mm front to back, %.0f %% of its rest area\n", 2e3 * vein.half_short_m,
+               100 * vein.area_ratio);
+      if (a)
+        printf("artery %.1f mm front to back, %.0f %% of its rest area\n",
+               2e3 * artery.half_short_m, 100 * artery.area_ratio);
+      other_vessels(&s, false);
+    } else {
+      app_json_begin();
+      app_json("image:%s width_mm:%g height_mm:%g force_n:%g", o->out, image.width_m * 1e3,
+               image.height_m * 1e3, s.force_n);
+      settled_json_jumps(&s);
+      app_json(
+          "case:%s vein_short_mm:%g vein_area_ratio:%g artery_short_mm:%g artery_area_ratio:%g",
+          o->pathology, v ? 2e3 * vein.half_short_m : NAN, v ? vein.area_ratio : NAN,
+          a ? 2e3 * artery.half_short_m : NAN, a ? artery.area_ratio : NAN);
+      other_vessels(&s, true);
+      app_json_end();
+    }
+  }
   sonde_image_clear(&image);
   settled_close(&s);
   return status ? app_fail("image", &error) : APP_OK;

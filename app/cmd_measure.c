@@ -112,25 +112,6 @@ typedef struct summary {
   double force_max_n, area_mean_m2, area_low_m2, area_high_m2;
 } summary;
 
-static void print_result(const options *a, const sonde_measurements *m, const summary *s,
-                         bool cancelled, uint32_t wanted, double seconds) {
-  if (a->json) {
-    app_json("file:%s probe:%s sites:%u rows:%u force_limit:%u depth_limit:%u not_converged:%u "
-             "force_max_n:%g contact_area_mean_mm2:%g contact_area_low_mm2:%g "
-             "contact_area_high_mm2:%g cancelled:%hhd seconds:%g",
-             a->output, a->probe, s->sites, m->count, s->ends[SONDE_ROBOT_FORCE_LIMIT],
-             s->ends[SONDE_ROBOT_DEPTH_LIMIT], s->ends[SONDE_ROBOT_NO_EQUILIBRIUM], s->force_max_n,
-             1e6 * s->area_mean_m2, 1e6 * s->area_low_m2, 1e6 * s->area_high_m2, cancelled,
-             seconds);
-    return;
-  }
-  printf("wrote %s: %u of %u sites, %u rows, at most %.2f N, %.1f s\n", a->output, s->sites, wanted,
-         m->count, s->force_max_n, seconds);
-  printf("probe %s: contact area %.1f mm2 (%.1f to %.1f); ended by force %u, by depth %u\n",
-         a->probe, 1e6 * s->area_mean_m2, 1e6 * s->area_low_m2, 1e6 * s->area_high_m2,
-         s->ends[SONDE_ROBOT_FORCE_LIMIT], s->ends[SONDE_ROBOT_DEPTH_LIMIT]);
-}
-
 // A cancelled robot without rows leaves no file.
 static int conclude(const options *a, const sonde_site_table *sites, const sonde_measurements *m,
                     const sonde_robot_log *log, bool cancelled, double seconds) {
@@ -171,7 +152,20 @@ static int conclude(const options *a, const sonde_site_table *sites, const sonde
 
   if (a->json) app_json_begin();
   print_spacing(a, sites);
-  print_result(a, m, &s, cancelled, log->count, seconds);
+  if (a->json) {
+    app_json("file:%s probe:%s sites:%u rows:%u force_limit:%u depth_limit:%u not_converged:%u "
+             "force_max_n:%g contact_area_mean_mm2:%g contact_area_low_mm2:%g "
+             "contact_area_high_mm2:%g cancelled:%hhd seconds:%g",
+             a->output, a->probe, s.sites, m->count, s.ends[SONDE_ROBOT_FORCE_LIMIT],
+             s.ends[SONDE_ROBOT_DEPTH_LIMIT], s.ends[SONDE_ROBOT_NO_EQUILIBRIUM], s.force_max_n,
+             1e6 * s.area_mean_m2, 1e6 * s.area_low_m2, 1e6 * s.area_high_m2, cancelled, seconds);
+  } else {
+    printf("wrote %s: %u of %u sites, %u rows, at most %.2f N, %.1f s\n", a->output, s.sites,
+           log->count, m->count, s.force_max_n, seconds);
+    printf("probe %s: contact area %.1f mm2 (%.1f to %.1f); ended by force %u, by depth %u\n",
+           a->probe, 1e6 * s.area_mean_m2, 1e6 * s.area_low_m2, 1e6 * s.area_high_m2,
+           s.ends[SONDE_ROBOT_FORCE_LIMIT], s.ends[SONDE_ROBOT_DEPTH_LIMIT]);
+  }
   if (a->json) app_json_end();
   if (s.ends[SONDE_ROBOT_NO_EQUILIBRIUM])
     fprintf(stderr, "sonde measure: %u sites ended before the limit: no equilibrium was found\n",

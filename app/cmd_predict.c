@@ -34,48 +34,6 @@ static const app_option TABLE[] = {
     OPT_FLAG(bands, "bands", "mean error by depth as well"),
     OPT_JSON(json)};
 
-static void print_result(const options *a, const sonde_measurements *m, const double *predicted_n,
-                         const sonde_error_report *report, double seconds) {
-  const char *interaction = INTERACTIONS[a->def.interaction];
-  if (a->json) {
-    app_json_begin();
-    app_json_report(interaction, report);
-    app_json("not_converged:%u seconds:%g", report->left_out, seconds);
-    app_json_end();
-    return;
-  }
-  char title[128];
-  snprintf(title, sizeof title, "%s interaction, %.1f s", interaction, seconds);
-  app_print_report(title, report);
-  if (report->left_out) printf("%u rows left out: no equilibrium was found\n", report->left_out);
-  if (!a->bands) return;
-
-  // Mean of (model - measured)/measured mean per band of depth and probe.
-  enum { BANDS = 32 };
-  const double BAND_MM = 2.0;
-  printf("bias by depth, %% of the band's mean force\n  %-10s", "depth mm");
-  for (uint32_t p = 0; p < report->probe_count; ++p) printf(" %10s", report->probe[p]);
-  printf("\n");
-  for (int band = 0; band < BANDS; ++band) {
-    double error_n[SONDE_FIT_PROBES] = {0}, force_n[SONDE_FIT_PROBES] = {0};
-    bool any = false;
-    for (uint32_t i = 0; i < m->count; ++i) {
-      long at = lround(m->data[i].penetration_m * 1e3 / BAND_MM);
-      if (at != band || !isfinite(predicted_n[i])) continue;
-      uint32_t p = 0;
-      while (strcmp(report->probe[p], m->data[i].probe) != 0) ++p;
-      error_n[p] += predicted_n[i] - m->data[i].force_n;
-      force_n[p] += m->data[i].force_n;
-      any = true;
-    }
-    if (!any) continue;
-    printf("  %-10g", band * BAND_MM);
-    for (uint32_t p = 0; p < report->probe_count; ++p)
-      force_n[p] > 0 ? printf(" %+10.1f", 100 * error_n[p] / force_n[p]) : printf(" %10s", "-");
-    printf("\n");
-  }
-}
-
 static int run(void *from) {
   const options *a = from;
   assert(a->model && a->measurements);
@@ -102,7 +60,49 @@ static int run(void *from) {
                        : (error.status = SONDE_MEMORY);
   app_progress_end();
   if (!status) status = sonde_error_report_of(m.data, predicted_n, m.count, &report, &error);
-  if (!status) print_result(a, &m, predicted_n, &report, app_seconds(CLOCK_MONOTONIC) - start);
+  if (!status) {
+    double seconds = app_seconds(CLOCK_MONOTONIC) - start;
+    const char *interaction = INTERACTIONS[a->def.interaction];
+    if (a->json) {
+      app_json_begin();
+      app_json_report(interaction, &report);
+      app_json("not_converged:%u seconds:%g", report.left_out, seconds);
+      app_json_end();
+    } else {
+      char title[128];
+      snprintf(title, sizeof title, "%s interaction, %.1f s", interaction, seconds);
+      app_print_report(title, &report);
+      if (report.left_out) printf("%u rows left out: no equilibrium was found\n", report.left_out);
+      if (a->bands) {
+
+        // Mean of (model - measured)/measured mean per band of depth and probe.
+        enum { BANDS = 32 };
+        const double BAND_MM = 2.0;
+        printf("bias by depth, %% of the band's mean force\n  %-10s", "depth mm");
+        for (uint32_t p = 0; p < report.probe_count; ++p) printf(" %10s", report.probe[p]);
+        printf("\n");
+        for (int band = 0; band < BANDS; ++band) {
+          double error_n[SONDE_FIT_PROBES] = {0}, force_n[SONDE_FIT_PROBES] = {0};
+          bool any = false;
+          for (uint32_t i = 0; i < m.count; ++i) {
+            long at = lround(m.data[i].penetration_m * 1e3 / BAND_MM);
+            if (at != band || !isfinite(predicted_n[i])) continue;
+            uint32_t p = 0;
+            while (strcmp(report.probe[p], m.data[i].probe) != 0) ++p;
+            error_n[p] += predicted_n[i] - m.data[i].force_n;
+            force_n[p] += m.data[i].force_n;
+            any = true;
+          }
+          if (!any) continue;
+          printf("  %-10g", band * BAND_MM);
+          for (uint32_t p = 0; p < report.probe_count; ++p)
+            force_n[p] > 0 ? printf(" %+10.1f", 100 * error_n[p] / force_n[p])
+                           : printf(" %10s", "-");
+          printf("\n");
+        }
+      }
+    }
+  }
 done:
   free(predicted_n);
   sonde_measurements_clear(&m);

@@ -56,33 +56,6 @@ static int check(void *from) {
   return APP_OK;
 }
 
-static void print_result(const options *s, const sonde_replay_result *r, bool ended) {
-  char hash[20], recorded[20], image_hash[20];
-  snprintf(hash, sizeof hash, "%016llx", (unsigned long long)r->hash);
-  snprintf(recorded, sizeof recorded, "%016llx", (unsigned long long)r->recorded_hash);
-  snprintf(image_hash, sizeof image_hash, "%016llx", (unsigned long long)r->image_hash);
-  if (s->json) {
-    app_json_begin();
-    app_json("ticks:%lu hash:%s recorded_hash:%s ended:%hhd same:%hhd checks:%u different_tick:%lu",
-             r->ticks, hash, recorded, ended, r->same, r->checks, r->different_tick);
-    if (s->images) {
-      app_json("images:%lu image_hash:%s same_images:%hhd", r->images, image_hash, r->same_images);
-    }
-    app_json_end();
-    return;
-  }
-  printf("%llu ticks replayed: state hash %s, recorded %s: %s\n", (unsigned long long)r->ticks,
-         hash, ended ? recorded : "none (the file was cut off)",
-         r->same ? "the same" : "DIFFERENT");
-  if (s->images)
-    printf("%llu images made: hash %s: %s\n", (unsigned long long)r->images, image_hash,
-           r->same_images ? "the same" : "DIFFERENT");
-  if (r->checks || r->different_tick)
-    printf("%u states on the way compared%s", r->checks, r->different_tick ? "; " : "\n");
-  if (r->different_tick)
-    printf("first difference at tick %llu\n", (unsigned long long)r->different_tick);
-}
-
 static int run(void *from) {
   options *s = from;
   assert(s->recording);
@@ -124,7 +97,37 @@ static int run(void *from) {
   if (w->frames) printf("%u pictures written to %s\n", w->pictures, w->frames);
   if (w->video) printf("%u frames of film written to %s\n", w->film_frames, w->video);
   if (exports(s)) return APP_OK;
-  print_result(s, &result, info.ended);
+  {
+    char hash[20], recorded[20], image_hash[20];
+    snprintf(hash, sizeof hash, "%016llx", (unsigned long long)result.hash);
+    snprintf(recorded, sizeof recorded, "%016llx", (unsigned long long)result.recorded_hash);
+    snprintf(image_hash, sizeof image_hash, "%016llx", (unsigned long long)result.image_hash);
+    if (s->json) {
+      app_json_begin();
+      app_json(
+          "ticks:%lu hash:%s recorded_hash:%s ended:%hhd same:%hhd checks:%u different_tick:%lu",
+          result.ticks, hash, recorded, info.ended, result.same, result.checks,
+          result.different_tick);
+      if (s->images) {
+        app_json("images:%lu image_hash:%s same_images:%hhd", result.images, image_hash,
+                 result.same_images);
+      }
+      app_json_end();
+    } else {
+      printf("%llu ticks replayed: state hash %s, recorded %s: %s\n",
+             (unsigned long long)result.ticks, hash,
+             info.ended ? recorded : "none (the file was cut off)",
+             result.same ? "the same" : "DIFFERENT");
+      if (s->images)
+        printf("%llu images made: hash %s: %s\n", (unsigned long long)result.images, image_hash,
+               result.same_images ? "the same" : "DIFFERENT");
+      if (result.checks || result.different_tick)
+        printf("%u states on the way compared%s", result.checks,
+               result.different_tick ? "; " : "\n");
+      if (result.different_tick)
+        printf("first difference at tick %llu\n", (unsigned long long)result.different_tick);
+    }
+  }
   return result.same && (!s->images || result.same_images) ? APP_OK : APP_FAILED;
 }
 

@@ -249,39 +249,35 @@ static void watch(sonde_session *session, summary *seen) {
   sonde_session_control(session, &controls);
 }
 
-static void print_json(const options *s, const summary *seen) {
-  char hash[20];
-  snprintf(hash, sizeof hash, "%016llx", (unsigned long long)seen->hash);
-  app_json_begin();
-  app_json("ticks:%lu deadline_misses:%lu images:%lu", seen->ticks, seen->loop.deadline_misses,
-           seen->images);
-  if (isfinite(seen->latency_s[0])) {
-    app_json_object("pose_to_image_ms");
-    app_json("median:%g p99:%g", 1e3 * seen->latency_s[0], 1e3 * seen->latency_s[1]);
-    app_json_close();
-  }
-  app_json("hash:%s wall_s:%g tick_mean_ms:%g tick_max_ms:%g realtime_priority:%hhd "
-           "memory_locked:%hhd device:%s force_scale:%g force_max_n:%g rendered_force_max_n:%g "
-           "faults:%u fault:%s taken_off:%u",
-           hash, seen->wall_s, 1e3 * seen->loop.compute_mean_s, 1e3 * seen->loop.compute_max_s,
-           seen->loop.realtime_priority, seen->loop.memory_locked, s->device.name,
-           seen->force_scale, seen->force_max_n, seen->rendered_max_n, seen->faults,
-           sonde_fault_text(seen->fault), seen->restores);
-  if (seen->link.exchanges) {
-    app_json("device_exchanges:%lu device_losses:%lu", seen->link.exchanges, seen->link.losses);
-  }
-  if (isfinite(seen->gel_volume_m3)) {
-    app_json("gel_ml:%g gel_coupling:%g", 1e6 * seen->gel_volume_m3, seen->gel_coupling);
-  }
-  app_json("penetration_max_mm:%g vein_area_ratio_min:%g", 1e3 * seen->penetration_max_m,
-           seen->vein_ratio_min);
-  if (s->record) app_json_text("recording", s->record);
-  app_json_end();
-}
-
 static void print_summary(const options *s, const summary *seen) {
   if (s->json) {
-    print_json(s, seen);
+    char hash[20];
+    snprintf(hash, sizeof hash, "%016llx", (unsigned long long)seen->hash);
+    app_json_begin();
+    app_json("ticks:%lu deadline_misses:%lu images:%lu", seen->ticks, seen->loop.deadline_misses,
+             seen->images);
+    if (isfinite(seen->latency_s[0])) {
+      app_json_object("pose_to_image_ms");
+      app_json("median:%g p99:%g", 1e3 * seen->latency_s[0], 1e3 * seen->latency_s[1]);
+      app_json_close();
+    }
+    app_json("hash:%s wall_s:%g tick_mean_ms:%g tick_max_ms:%g realtime_priority:%hhd "
+             "memory_locked:%hhd device:%s force_scale:%g force_max_n:%g rendered_force_max_n:%g "
+             "faults:%u fault:%s taken_off:%u",
+             hash, seen->wall_s, 1e3 * seen->loop.compute_mean_s, 1e3 * seen->loop.compute_max_s,
+             seen->loop.realtime_priority, seen->loop.memory_locked, s->device.name,
+             seen->force_scale, seen->force_max_n, seen->rendered_max_n, seen->faults,
+             sonde_fault_text(seen->fault), seen->restores);
+    if (seen->link.exchanges) {
+      app_json("device_exchanges:%lu device_losses:%lu", seen->link.exchanges, seen->link.losses);
+    }
+    if (isfinite(seen->gel_volume_m3)) {
+      app_json("gel_ml:%g gel_coupling:%g", 1e6 * seen->gel_volume_m3, seen->gel_coupling);
+    }
+    app_json("penetration_max_mm:%g vein_area_ratio_min:%g", 1e3 * seen->penetration_max_m,
+             seen->vein_ratio_min);
+    if (s->record) app_json_text("recording", s->record);
+    app_json_end();
     return;
   }
   printf("%llu ticks and %llu images in %.2f s, %llu deadline misses\n",

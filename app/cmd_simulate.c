@@ -93,36 +93,6 @@ static void frame_name(const simulation *s, uint32_t body, uint64_t step, char *
            (unsigned long long)step);
 }
 
-// The surfaces of all bodies at this step, and the list of every frame up to it, which ParaView
-// plays by time.
-static sonde_status save_surfaces(const simulation *s, sonde_error *error) {
-  char path[1300], name[128];
-  uint64_t last = sonde_scene_tick(s->state);
-  uint32_t bodies = sonde_scene_body_count(s->scene);
-  sonde_status status = SONDE_OK;
-  for (uint32_t b = 0; b < bodies && !status; ++b) {
-    frame_name(s, b, last, name, sizeof name);
-    path_of(s, name, path, sizeof path);
-    status = sonde_scene_save_vtp(s->state, b, path, error);
-  }
-  if (status) return status;
-  sonde_file *file = NULL;
-  path_of(s, "scene.pvd", path, sizeof path);
-  status = sonde_file_create(path, &file, error);
-  if (status) return status;
-  double dt = sonde_scene_get_step(s->scene).dt_s;
-  sonde_file_printf(file, "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\">\n"
-                          "<Collection>\n");
-  for (uint64_t k = 0; k <= last; k = k < last && k + s->every > last ? last : k + s->every)
-    for (uint32_t b = 0; b < bodies; ++b) {
-      frame_name(s, b, k, name, sizeof name);
-      sonde_file_printf(file, "<DataSet timestep=\"%.9g\" part=\"%u\" name=\"%s\" file=\"%s\"/>\n",
-                        (double)k * dt, b, sonde_scene_body(s->scene, b).name, name);
-    }
-  sonde_file_printf(file, "</Collection>\n</VTKFile>\n");
-  return sonde_file_commit(file, error);
-}
-
 static sonde_status save_snapshot(const simulation *s, sonde_error *error) {
   char path[1100];
   path_of(s, "state.snapshot", path, sizeof path);
@@ -131,7 +101,39 @@ static sonde_status save_snapshot(const simulation *s, sonde_error *error) {
 
 // The snapshot goes last: what it claims to be finished is on disk.
 static sonde_status write_frame(simulation *s, sonde_error *error) {
-  sonde_status status = s->a.no_frames ? SONDE_OK : save_surfaces(s, error);
+  sonde_status status = SONDE_OK;
+  if (!s->a.no_frames) {
+    // The surfaces of all bodies at this step, and the list of every frame up to it, which ParaView
+    // plays by time.
+    char path[1300], name[128];
+    uint64_t last = sonde_scene_tick(s->state);
+    uint32_t bodies = sonde_scene_body_count(s->scene);
+    for (uint32_t b = 0; b < bodies && !status; ++b) {
+      frame_name(s, b, last, name, sizeof name);
+      path_of(s, name, path, sizeof path);
+      status = sonde_scene_save_vtp(s->state, b, path, error);
+    }
+    if (!status) {
+      sonde_file *file = NULL;
+      path_of(s, "scene.pvd", path, sizeof path);
+      status = sonde_file_create(path, &file, error);
+      if (!status) {
+        double dt = sonde_scene_get_step(s->scene).dt_s;
+        sonde_file_printf(file,
+                          "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\">\n"
+                          "<Collection>\n");
+        for (uint64_t k = 0; k <= last; k = k < last && k + s->every > last ? last : k + s->every)
+          for (uint32_t b = 0; b < bodies; ++b) {
+            frame_name(s, b, k, name, sizeof name);
+            sonde_file_printf(file,
+                              "<DataSet timestep=\"%.9g\" part=\"%u\" name=\"%s\" file=\"%s\"/>\n",
+                              (double)k * dt, b, sonde_scene_body(s->scene, b).name, name);
+          }
+        sonde_file_printf(file, "</Collection>\n</VTKFile>\n");
+        status = sonde_file_commit(file, error);
+      }
+    }
+  }
   if (status) return status;
 
   // Rows of the tables: bodies, then pairs in contact.

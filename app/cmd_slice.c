@@ -167,43 +167,44 @@ static sonde_status between_frames(const options *a, work *w, sonde_error *error
   return SONDE_OK;
 }
 
-// How like the left-out frame and the picture are; with --compare also the picture of both: real,
-// made and 128 + real - made, two black columns between them; pixels out of reach are black.
-static sonde_status compare_frame(const options *a, work *w, sonde_error *error) {
-  const sonde_sequence *s = &w->sequence;
-  uint32_t width = w->image.width, height = w->image.height, wide = 3 * width + 4;
-  assert(a->hold_out >= 0 && width == s->clip[2] && height == s->clip[3]);
-  uint8_t *real = malloc((size_t)width * height);
-  sonde_image out = {0};
-  if (!real) return app_error(error, SONDE_MEMORY, "out of memory for the frame");
-
-  // The used part of the frame.
-  const uint8_t *from =
-      s->pixels + ((size_t)a->hold_out * s->height + s->clip[1]) * s->width + s->clip[0];
-  for (uint32_t row = 0; row < height; ++row)
-    memcpy(real + (size_t)row * width, from + (size_t)row * s->width, width);
-  sonde_status status =
-      sonde_image_likeness(real, w->image.pixels, w->known, width, height, &w->likeness, error);
-  w->compared = !status;
-
-  if (!status && a->compare) status = sonde_image_create(wide, height, &out, error);
-  for (uint32_t row = 0; !status && a->compare && row < height; ++row)
-    for (uint32_t x = 0; x < width; ++x) {
-      size_t k = (size_t)row * width + x, to = (size_t)row * wide + x;
-      int difference = 128 + real[k] - w->image.pixels[k];
-      difference = difference < 0 ? 0 : difference > 255 ? 255 : difference;
-      out.pixels[to] = real[k];
-      out.pixels[to + width + 2] = w->image.pixels[k];
-      out.pixels[to + 2 * width + 4] = w->known[k] ? (uint8_t)difference : 0;
-    }
-  if (!status && a->compare) status = sonde_image_save_png(&out, a->output, error);
-  sonde_image_clear(&out);
-  free(real);
-  return status;
-}
-
 static sonde_status write_picture(const options *a, work *w, sonde_error *error) {
-  sonde_status status = a->hold_out >= 0 ? compare_frame(a, w, error) : SONDE_OK;
+  sonde_status status = SONDE_OK;
+  if (a->hold_out >= 0) {
+    // How like the left-out frame and the picture are; with --compare also the picture of both:
+    // real, made and 128 + real - made, two black columns between them; pixels out of reach are
+    // black.
+    const sonde_sequence *s = &w->sequence;
+    uint32_t width = w->image.width, height = w->image.height, wide = 3 * width + 4;
+    assert(a->hold_out >= 0 && width == s->clip[2] && height == s->clip[3]);
+    uint8_t *real = malloc((size_t)width * height);
+    sonde_image out = {0};
+    if (!real) {
+      status = app_error(error, SONDE_MEMORY, "out of memory for the frame");
+    } else {
+      // The used part of the frame.
+      const uint8_t *from =
+          s->pixels + ((size_t)a->hold_out * s->height + s->clip[1]) * s->width + s->clip[0];
+      for (uint32_t row = 0; row < height; ++row)
+        memcpy(real + (size_t)row * width, from + (size_t)row * s->width, width);
+      status =
+          sonde_image_likeness(real, w->image.pixels, w->known, width, height, &w->likeness, error);
+      w->compared = !status;
+
+      if (!status && a->compare) status = sonde_image_create(wide, height, &out, error);
+      for (uint32_t row = 0; !status && a->compare && row < height; ++row)
+        for (uint32_t x = 0; x < width; ++x) {
+          size_t k = (size_t)row * width + x, to = (size_t)row * wide + x;
+          int difference = 128 + real[k] - w->image.pixels[k];
+          difference = difference < 0 ? 0 : difference > 255 ? 255 : difference;
+          out.pixels[to] = real[k];
+          out.pixels[to + width + 2] = w->image.pixels[k];
+          out.pixels[to + 2 * width + 4] = w->known[k] ? (uint8_t)difference : 0;
+        }
+      if (!status && a->compare) status = sonde_image_save_png(&out, a->output, error);
+      sonde_image_clear(&out);
+      free(real);
+    }
+  }
   if (status || a->compare) return status;
   if (a->press.model) status = press_picture(&a->press, &w->image, w->known, &w->pressed, error);
   if (status) return status;
@@ -236,23 +237,24 @@ static sonde_status slice_sequence(const options *a, work *w, sonde_error *error
   return write_picture(a, w, error);
 }
 
-static sonde_status slice_volume(const options *a, work *w, sonde_error *error) {
-  sonde_status status = sonde_volume_load(a->input, &w->volume, error);
-  if (!status) status = pose_image(a, w, error);
-  if (status) return status;
-  double start = app_seconds(CLOCK_MONOTONIC);
-  w->reached = sonde_volume_slice(&w->volume, a->nearest, &w->plane, &w->image, w->known);
-  w->seconds = app_seconds(CLOCK_MONOTONIC) - start;
-  return write_picture(a, w, error);
-}
-
 static int run(void *from) {
   const options *a = from;
   assert(a->input && a->output);
   work w = {0};
   sonde_error error = {0};
   app_progress_begin("slicing");
-  sonde_status status = a->volume ? slice_volume(a, &w, &error) : slice_sequence(a, &w, &error);
+  sonde_status status = SONDE_OK;
+  if (a->volume) {
+    status = sonde_volume_load(a->input, &w.volume, &error);
+    if (!status) status = pose_image(a, &w, &error);
+    if (!status) {
+      double start = app_seconds(CLOCK_MONOTONIC);
+      w.reached = sonde_volume_slice(&w.volume, a->nearest, &w.plane, &w.image, w.known);
+      w.seconds = app_seconds(CLOCK_MONOTONIC) - start;
+      status = write_picture(a, &w, &error);
+    }
+  }
+  if (!a->volume) status = slice_sequence(a, &w, &error);
   app_progress_end();
   if (!status && a->json) {
     double share = (double)w.reached / ((double)w.image.width * w.image.height);

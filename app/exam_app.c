@@ -198,61 +198,6 @@ void exam_app_turn(exam_app *app) {
 
 // ---- the application
 
-// Cases, protocols, the log, and the probes that a replay shows.
-static sonde_status load_library(exam_app *app, sonde_error *error) {
-  char path[EXAM_PATH];
-  sonde_status status = sonde_case_list(app->cases, &app->case_list, &app->case_count, error);
-  if (!status)
-    status =
-        sonde_exam_protocol_list(app->protocols, &app->protocol_list, &app->protocol_count, error);
-  if (!status) status = sonde_directory_make(app->exams, 0700, true, error);
-  if (!status)
-    status = sonde_exam_log_open(exam_app_path(path, app->exams, "exams.sqlite"), &app->log, error);
-  if (status) return status;
-  const char *const *names = app->def.practice.probe_names;
-  if (!names) names = sonde_probe_names();
-  uint32_t count = 0;
-  while (names[count]) ++count;
-  app->probes = calloc(count, sizeof *app->probes);
-  if (!app->probes) return app_error(error, SONDE_MEMORY, "out of memory");
-  for (uint32_t i = 0; i < count && !status; ++i) {
-    status = sonde_probe_create(names[i], &app->probes[i], error);
-    app->probe_count += !status;
-  }
-  return status;
-}
-
-static sonde_status serve_page(exam_app *app, sonde_error *error) {
-  char token[SONDE_PAGE_TOKEN], teacher[SONDE_PAGE_TOKEN];
-  sonde_status status = page_token_find(app->exams, "page.token", "SONDE_PAGE_TOKEN", token, error);
-  if (!status)
-    status = page_token_find(app->exams, "teacher.token", "SONDE_TEACHER_TOKEN", teacher, error);
-  if (status) return status;
-  sonde_page_def page = {.port = app->def.port,
-                         .token = token,
-                         .teacher_token = teacher,
-                         .model_path = app->def.model_path,
-                         .force_limit_n = app->def.force_limit_n,
-                         .exams_directory = app->exams,
-                         .user = app,
-                         .request = take_request};
-  status = sonde_page_start(&page, app->session, &app->server, error);
-  if (status) return status;
-  exam_recovered found;
-  exam_recover_log(app->exams, app->log, &found);
-  if (found.unreadable)
-    fprintf(stderr, "sonde run: %u of %u exams in %s cannot be read: %s\n", found.unreadable,
-            found.exams, app->exams, found.worst);
-  if (found.finished)
-    fprintf(stderr,
-            "sonde run: %u finished exams were not in the log; "
-            "sonde exam --recover %s makes their reports\n",
-            found.finished, app->exams);
-  exam_app_tell_greeting(app);
-  exam_app_tell_exam(app);
-  return sonde_session_start(app->session, error);
-}
-
 sonde_status exam_app_create(const exam_app_def *def, exam_app **out, sonde_error *error) {
   exam_app *app = calloc(1, sizeof *app);
   *out = NULL;
@@ -263,9 +208,63 @@ sonde_status exam_app_create(const exam_app_def *def, exam_app **out, sonde_erro
   snprintf(app->protocols, sizeof app->protocols, "%s", def->protocols);
   snprintf(app->exams, sizeof app->exams, "%s", def->exams);
   snprintf(app->trainee, sizeof app->trainee, "%s", def->trainee);
-  sonde_status status = load_library(app, error);
+  // Cases, protocols, the log, and the probes that a replay shows.
+  char path[EXAM_PATH];
+  sonde_status status = sonde_case_list(app->cases, &app->case_list, &app->case_count, error);
+  if (!status)
+    status =
+        sonde_exam_protocol_list(app->protocols, &app->protocol_list, &app->protocol_count, error);
+  if (!status) status = sonde_directory_make(app->exams, 0700, true, error);
+  if (!status)
+    status = sonde_exam_log_open(exam_app_path(path, app->exams, "exams.sqlite"), &app->log, error);
+  if (!status) {
+    const char *const *names = app->def.practice.probe_names;
+    if (!names) names = sonde_probe_names();
+    uint32_t count = 0;
+    while (names[count]) ++count;
+    app->probes = calloc(count, sizeof *app->probes);
+    if (!app->probes) {
+      status = app_error(error, SONDE_MEMORY, "out of memory");
+    } else {
+      for (uint32_t i = 0; i < count && !status; ++i) {
+        status = sonde_probe_create(names[i], &app->probes[i], error);
+        app->probe_count += !status;
+      }
+    }
+  }
   if (!status) status = start_practice(app, error);
-  if (!status) status = serve_page(app, error);
+  if (!status) {
+    char token[SONDE_PAGE_TOKEN], teacher[SONDE_PAGE_TOKEN];
+    status = page_token_find(app->exams, "page.token", "SONDE_PAGE_TOKEN", token, error);
+    if (!status)
+      status = page_token_find(app->exams, "teacher.token", "SONDE_TEACHER_TOKEN", teacher, error);
+    if (!status) {
+      sonde_page_def page = {.port = app->def.port,
+                             .token = token,
+                             .teacher_token = teacher,
+                             .model_path = app->def.model_path,
+                             .force_limit_n = app->def.force_limit_n,
+                             .exams_directory = app->exams,
+                             .user = app,
+                             .request = take_request};
+      status = sonde_page_start(&page, app->session, &app->server, error);
+      if (!status) {
+        exam_recovered found;
+        exam_recover_log(app->exams, app->log, &found);
+        if (found.unreadable)
+          fprintf(stderr, "sonde run: %u of %u exams in %s cannot be read: %s\n", found.unreadable,
+                  found.exams, app->exams, found.worst);
+        if (found.finished)
+          fprintf(stderr,
+                  "sonde run: %u finished exams were not in the log; "
+                  "sonde exam --recover %s makes their reports\n",
+                  found.finished, app->exams);
+        exam_app_tell_greeting(app);
+        exam_app_tell_exam(app);
+        status = sonde_session_start(app->session, error);
+      }
+    }
+  }
   if (status)
     exam_app_destroy(app, NULL);
   else

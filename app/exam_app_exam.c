@@ -34,46 +34,6 @@ static void watch(void *user, const sonde_frame *frame) {
   pthread_mutex_unlock(of->lock);
 }
 
-// The learner is told nothing before the session is shown.
-static sonde_status begin(exam_app *app, exam *of, sonde_error *error) {
-  char recording[EXAM_PATH], stamp[32], *setup = NULL;
-  sonde_progress progress = {show_progress, app};
-  sonde_status status = exam_prepare(of, exam_app_bundled(app), app->cases, &progress, error);
-  app->progress = 0;
-  if (status) return status;
-
-  // Date, id and directory; the mark tells exams of the same second apart.
-  struct timespec now;
-  struct tm day;
-  clock_gettime(CLOCK_REALTIME, &now);
-  localtime_r(&now.tv_sec, &day);
-  strftime(stamp, sizeof stamp, "%Y-%m-%d-%H%M%S", &day);
-  sonde_log_date((int64_t)now.tv_sec, of->date);
-  unsigned mark = (unsigned)(now.tv_nsec / 1000 ^ (long)getpid()) & 0xffff;
-  snprintf(of->id, sizeof of->id, "%s-%04x", stamp, mark);
-  exam_app_path(of->directory, app->exams, of->id);
-  status = sonde_directory_make(of->directory, 0700, false, error);
-  if (!status) status = exam_setup_text(of, &setup, error);
-  if (status) return status;
-
-  // The session, with the probe above the vein's end at the groin.
-  exam_app_path(recording, of->directory, "exam.rec");
-  sonde_session_def def = app->def.practice;
-  sonde_case_session(&of->setup, &def);
-  def.model_path = of->patient.thigh == SONDE_CASE_BUNDLED ? app->def.model_path : NULL;
-  def.record_path = recording;
-  def.record_setup = setup;
-  def.watch = watch;
-  def.watch_user = of;
-  sonde_vein_point first = sonde_vein_at(&of->setup.map, 0.0);
-  sonde_site site = {.position_m = first.skin_m, .normal = first.normal, .u = first.across};
-  sonde_page_conceal(app->server, true, strcmp(of->guidance, "full") != 0);
-  status = exam_app_run_session(app, &def, &site, error);
-  sonde_free(setup);
-  if (status) sonde_page_conceal(app->server, false, false);
-  return status;
-}
-
 sonde_status exam_start(exam_app *app, const sonde_page_request *request, sonde_error *error) {
   const sonde_case *patient = NULL;
   const sonde_exam_protocol *protocol = NULL;
@@ -100,7 +60,42 @@ sonde_status exam_start(exam_app *app, const sonde_page_request *request, sonde_
   exam_app_set_phase(app, EXAM_PREPARING,
                      "The patient is being prepared: this takes some seconds.");
   const sonde_session *session = app->session;
-  sonde_status status = begin(app, of, error);
+  // The learner is told nothing before the session is shown.
+  char recording[EXAM_PATH], stamp[32], *setup = NULL;
+  sonde_progress progress = {show_progress, app};
+  sonde_status status = exam_prepare(of, exam_app_bundled(app), app->cases, &progress, error);
+  app->progress = 0;
+  if (!status) {
+    // Date, id and directory; the mark tells exams of the same second apart.
+    struct timespec now;
+    struct tm day;
+    clock_gettime(CLOCK_REALTIME, &now);
+    localtime_r(&now.tv_sec, &day);
+    strftime(stamp, sizeof stamp, "%Y-%m-%d-%H%M%S", &day);
+    sonde_log_date((int64_t)now.tv_sec, of->date);
+    unsigned mark = (unsigned)(now.tv_nsec / 1000 ^ (long)getpid()) & 0xffff;
+    snprintf(of->id, sizeof of->id, "%s-%04x", stamp, mark);
+    exam_app_path(of->directory, app->exams, of->id);
+    status = sonde_directory_make(of->directory, 0700, false, error);
+    if (!status) status = exam_setup_text(of, &setup, error);
+    if (!status) {
+      // The session, with the probe above the vein's end at the groin.
+      exam_app_path(recording, of->directory, "exam.rec");
+      sonde_session_def def = app->def.practice;
+      sonde_case_session(&of->setup, &def);
+      def.model_path = of->patient.thigh == SONDE_CASE_BUNDLED ? app->def.model_path : NULL;
+      def.record_path = recording;
+      def.record_setup = setup;
+      def.watch = watch;
+      def.watch_user = of;
+      sonde_vein_point first = sonde_vein_at(&of->setup.map, 0.0);
+      sonde_site site = {.position_m = first.skin_m, .normal = first.normal, .u = first.across};
+      sonde_page_conceal(app->server, true, strcmp(of->guidance, "full") != 0);
+      status = exam_app_run_session(app, &def, &site, error);
+      sonde_free(setup);
+      if (status) sonde_page_conceal(app->server, false, false);
+    }
+  }
   if (status) {
     bool bare = app->session != session || !session; // what ran before is gone
     if (bare) exam_app_end_session(app);

@@ -154,36 +154,6 @@ static bool film_until(output *o, double time_s) {
   return true;
 }
 
-// Opens what is wanted and writes the heads of the tables.
-static sonde_status open_all(output *o, sonde_error *error) {
-  replay_export *what = o->what;
-  const sonde_recording_info *info = sonde_player_info(o->player);
-  column list[COLUMNS];
-  sonde_status status = SONDE_OK;
-  o->json.layout = SONDE_JSON_LINES;
-  if (what->frames) status = sonde_directory_make(what->frames, 0777, false, error);
-  if (!status && what->csv) status = sonde_file_create(what->csv, &o->csv, error);
-  if (!status && what->json) status = sonde_file_create(what->json, &o->json.file, error);
-  if (!status && what->video) { // even sides, as the film's colours want them
-    o->width = (info->image_width + 1) / 2 * 2;
-    o->height = (info->image_height + STRIP + 1) / 2 * 2;
-    o->picture = calloc(o->width, o->height);
-    status = o->picture ? film_open(what->video, o->width, o->height, FRAMES_PER_S, &o->film, error)
-                        : app_error(error, SONDE_MEMORY, "out of memory");
-  }
-  if (status) return status;
-  columns(o->player, &(sonde_frame){0}, list);
-  for (int k = 0; o->csv && k < COLUMNS; ++k) sonde_file_printf(o->csv, "%s,", list[k].name);
-  if (o->csv) sonde_file_printf(o->csv, "case,fault\n");
-  if (!o->json.file) return SONDE_OK;
-  sonde_json_begin_object(&o->json, NULL);
-  sonde_json_put_text(&o->json, "recording", what->recording);
-  sonde_json_put_text(&o->json, "model", info->model_name);
-  sonde_json_put_real(&o->json, "duration_s", info->duration_s, 9);
-  sonde_json_begin_list(&o->json, "images");
-  return SONDE_OK;
-}
-
 static sonde_status write_image(output *o, const sonde_frame *frame, sonde_error *error) {
   replay_export *what = o->what;
   bool filmed = !o->film || film_until(o, frame->snapshot.time_s);
@@ -226,7 +196,33 @@ sonde_status replay_export_run(sonde_player *player, replay_export *what,
                                const sonde_progress *progress, sonde_error *error) {
   assert(what->from_s <= what->to_s);
   output o = {.what = what, .player = player};
-  sonde_status status = open_all(&o, error);
+  sonde_status status = SONDE_OK;
+  const sonde_recording_info *info = sonde_player_info(o.player);
+  o.json.layout = SONDE_JSON_LINES;
+  if (what->frames) status = sonde_directory_make(what->frames, 0777, false, error);
+  if (!status && what->csv) status = sonde_file_create(what->csv, &o.csv, error);
+  if (!status && what->json) status = sonde_file_create(what->json, &o.json.file, error);
+  if (!status && what->video) { // even sides, as the film's colours want them
+    o.width = (info->image_width + 1) / 2 * 2;
+    o.height = (info->image_height + STRIP + 1) / 2 * 2;
+    o.picture = calloc(o.width, o.height);
+    status = o.picture ? film_open(what->video, o.width, o.height, FRAMES_PER_S, &o.film, error)
+                       : app_error(error, SONDE_MEMORY, "out of memory");
+  }
+
+  // The heads of the tables.
+  column list[COLUMNS] = {0};
+  if (!status) columns(o.player, &(sonde_frame){0}, list);
+  for (int k = 0; !status && o.csv && k < COLUMNS; ++k)
+    sonde_file_printf(o.csv, "%s,", list[k].name);
+  if (!status && o.csv) sonde_file_printf(o.csv, "case,fault\n");
+  if (!status && o.json.file) {
+    sonde_json_begin_object(&o.json, NULL);
+    sonde_json_put_text(&o.json, "recording", what->recording);
+    sonde_json_put_text(&o.json, "model", info->model_name);
+    sonde_json_put_real(&o.json, "duration_s", info->duration_s, 9);
+    sonde_json_begin_list(&o.json, "images");
+  }
   if (!status) status = play(&o, progress, error);
 
   // What a cancelled export has is kept, what a failed one has is not.

@@ -272,33 +272,6 @@ static void faulty_tick(chain *c, int kind, int tick) {
   exchange(c, true, kind == 6);
 }
 
-static void faults(work *w) {
-  int injected = 0, tick = 0, resumed = 0;
-  chain c = {.random = 12345};
-  const sonde_device_limits *limits = sonde_device_limits_find("touch");
-  c.bounds = sonde_safety_limits_of(limits);
-  sonde_render_def def = sonde_render_def_for(limits, 1e-3, 0.0);
-  sonde_safety_init(&c.safety, &c.bounds);
-  sonde_gate_init(&c.gate, &c.bounds);
-  sonde_render_init(&c.render, &def);
-  for (; injected < 5000; ++tick) {
-    int kind = draw(&c) < 0.02 ? 1 + (int)(6 * draw(&c)) : 0;
-    injected += kind != 0;
-    faulty_tick(&c, kind, tick);
-    if (c.safety.fault == SONDE_FAULT_NONE || draw(&c) > 0.05) continue;
-    sonde_safety_resume(&c.safety);
-    resumed++;
-  }
-  report(w, "faults_injected", injected, 1000, false);
-  report(w, "faults_force_share_of_limit", c.over_n, 1 + 1e-12, true);
-  report(w, "faults_slew_share_of_limit", c.over_slew_n, 1 + 1e-9, true);
-  report(w, "faults_force_after_50_ms_n", c.late_n, 0, true);
-  sonde_safety_resume(&c.safety);
-  for (int i = 0; i < 300; ++i) faulty_tick(&c, 0, 0);
-  report(w, "faults_resumes", resumed, 100, false);
-  report(w, "faults_force_after_resume_n", norm(c.gate.force_n), 0.2, false);
-}
-
 typedef struct slide {
   double mean, swing; // tangential over normal force
 } slide;
@@ -436,7 +409,33 @@ int validate_haptics(const char *model, const char *pressing_path, long sites, b
     status = full_model(&w);
     if (!status) status = local_model(&w);
     if (!status) status = stability(&w);
-    if (!status) faults(&w), friction(&w);
+    if (!status) {
+      int injected = 0, tick = 0, resumed = 0;
+      chain c = {.random = 12345};
+      const sonde_device_limits *limits = sonde_device_limits_find("touch");
+      c.bounds = sonde_safety_limits_of(limits);
+      sonde_render_def def = sonde_render_def_for(limits, 1e-3, 0.0);
+      sonde_safety_init(&c.safety, &c.bounds);
+      sonde_gate_init(&c.gate, &c.bounds);
+      sonde_render_init(&c.render, &def);
+      for (; injected < 5000; ++tick) {
+        int kind = draw(&c) < 0.02 ? 1 + (int)(6 * draw(&c)) : 0;
+        injected += kind != 0;
+        faulty_tick(&c, kind, tick);
+        if (c.safety.fault == SONDE_FAULT_NONE || draw(&c) > 0.05) continue;
+        sonde_safety_resume(&c.safety);
+        resumed++;
+      }
+      report(&w, "faults_injected", injected, 1000, false);
+      report(&w, "faults_force_share_of_limit", c.over_n, 1 + 1e-12, true);
+      report(&w, "faults_slew_share_of_limit", c.over_slew_n, 1 + 1e-9, true);
+      report(&w, "faults_force_after_50_ms_n", c.late_n, 0, true);
+      sonde_safety_resume(&c.safety);
+      for (int i = 0; i < 300; ++i) faulty_tick(&c, 0, 0);
+      report(&w, "faults_resumes", resumed, 100, false);
+      report(&w, "faults_force_after_resume_n", norm(c.gate.force_n), 0.2, false);
+    }
+    if (!status) friction(&w);
     if (!status) status = gel_film(&w);
     if (!status && pressing_path) status = pressing(&w);
   }
