@@ -191,22 +191,6 @@ static void bone_line(const sonde_mesh *femur, const frame *f, double length,
   }
 }
 
-// Turns the frame until z runs along the bone's middles in the thigh, and x = y = 0 is their mean.
-static void align_bone(const sonde_mesh *femur, frame *f, double length) {
-  for (int pass = 0; pass < 4; ++pass) {
-    sonde_vec3 knot[KNOTS], mean, slope;
-    bone_line(femur, f, length, knot);
-    fit_line(knot, KNOTS, &mean, &slope);
-    sonde_vec3 z = v_unit(slope, vec3(0, 0, 1));
-    sonde_vec3 x = v_unit(across(vec3(1, 0, 0), z), vec3(1, 0, 0)), y = v_cross(z, x);
-    frame old = *f;
-    f->origin = to_scan(&old, v_madd(mean, -mean.z / z.z, z));
-    f->x = v_sub(to_scan(&old, x), old.origin);
-    f->y = v_sub(to_scan(&old, y), old.origin);
-    f->z = v_sub(to_scan(&old, z), old.origin);
-  }
-}
-
 /* ---- tables ------------------------------------------------------------------------------- */
 
 // Fills NaN entries from the nearest ones of the row on both sides; a row without any from the row
@@ -314,7 +298,21 @@ static sonde_status sample(const sonde_leg_scan *scan, const indices *in, sonde_
   double length = whole_nm((CUT_BOTTOM - CUT_TOP) * report->femur_length_m);
   SONDE_ASSERT(length > 0);
   shape->skin.length_m = shape->femur.length_m = length;
-  align_bone(scan->femur, &f, length);
+
+  // The frame rotates until z runs along the bone's middles in the thigh, x = y = 0 at their mean.
+  for (int pass = 0; pass < 4; ++pass) {
+    sonde_vec3 knot[KNOTS], mean, slope;
+    bone_line(scan->femur, &f, length, knot);
+    fit_line(knot, KNOTS, &mean, &slope);
+    sonde_vec3 z = v_unit(slope, vec3(0, 0, 1));
+    sonde_vec3 x = v_unit(across(vec3(1, 0, 0), z), vec3(1, 0, 0)), y = v_cross(z, x);
+    frame old = f;
+    f.origin = to_scan(&old, v_madd(mean, -mean.z / z.z, z));
+    f.x = v_sub(to_scan(&old, x), old.origin);
+    f.y = v_sub(to_scan(&old, y), old.origin);
+    f.z = v_sub(to_scan(&old, z), old.origin);
+  }
+
   centre_line(in->skin, &f, &shape->skin);
   for (uint32_t j = 0; j < SONDE_TUBE_ROWS; ++j)
     for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i) {

@@ -97,21 +97,6 @@ static void draw_vessel(const panel *p, const sonde_vessel *line, sonde_vessel_k
   sonde_svg_put_text(p->file, x, y + 3, "class='light middle'", letter);
 }
 
-static void draw_caption(const panel *p, const sonde_model *model, const sonde_landmark *mark,
-                         double left) {
-  sonde_vessel_point v, a;
-  double z_m = mark->vein_m.z, top = PANEL + 12;
-  sonde_svg_put_text(p->file, left, top, "class='head'", mark->name);
-  if (!find_vessel(&model->vein, z_m, &v) || !find_vessel(&model->artery, z_m, &a)) return;
-  char text[160];
-  snprintf(text, sizeof text, "z %.0f mm; vein %.1f mm wide, centre %.1f mm deep", z_m * 1e3,
-           2e3 * v.radius_m, v.depth_m * 1e3);
-  sonde_svg_put_text(p->file, left, top + 17, "class='tick'", text);
-  snprintf(text, sizeof text, "artery %.1f mm wide, centre %.1f mm deep", 2e3 * a.radius_m,
-           a.depth_m * 1e3);
-  sonde_svg_put_text(p->file, left, top + 33, "class='tick'", text);
-}
-
 // One section, drawn about the middle of its own skin.
 static sonde_status draw_panel(panel *p, const sonde_model *model, const sonde_landmark *mark,
                                sonde_error *error) {
@@ -158,7 +143,20 @@ static sonde_status draw_panel(panel *p, const sonde_model *model, const sonde_l
       draw_vessel(p, &a->branch[k].line, a->branch[k].kind, "", z_m);
     draw_vessel(p, &model->artery, SONDE_VESSEL_ARTERY, "A", z_m);
     draw_vessel(p, &model->vein, SONDE_VESSEL_VEIN, "V", z_m);
-    draw_caption(p, model, mark, left);
+
+    // The caption: place, widths and depths.
+    sonde_vessel_point vein, artery;
+    double top = PANEL + 12;
+    sonde_svg_put_text(p->file, left, top, "class='head'", mark->name);
+    if (find_vessel(&model->vein, z_m, &vein) && find_vessel(&model->artery, z_m, &artery)) {
+      char text[160];
+      snprintf(text, sizeof text, "z %.0f mm; vein %.1f mm wide, centre %.1f mm deep", z_m * 1e3,
+               2e3 * vein.radius_m, vein.depth_m * 1e3);
+      sonde_svg_put_text(p->file, left, top + 17, "class='tick'", text);
+      snprintf(text, sizeof text, "artery %.1f mm wide, centre %.1f mm deep", 2e3 * artery.radius_m,
+               artery.depth_m * 1e3);
+      sonde_svg_put_text(p->file, left, top + 33, "class='tick'", text);
+    }
   }
   sonde_free(skin.point);
   sonde_free(bone.point);

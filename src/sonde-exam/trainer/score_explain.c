@@ -25,26 +25,6 @@ static const char *title_of(const sonde_plan *plan, uint32_t place) {
   return place < plan->count ? plan->point[place].title : "vein not in view";
 }
 
-static void explain_technique(const sonde_metrics *m, const sonde_plan *plan,
-                              const sonde_compression *presses, uint32_t count, char *text) {
-  static const char *const WHY[] = {[SONDE_PRESS_INSUFFICIENT] = "not far enough",
-                                    [SONDE_PRESS_TOO_HARD] = "too hard",
-                                    [SONDE_PRESS_OFF_AXIS] = "not straight across the vein"};
-  if (m->press_count == 0) say(text, "no press");
-  for (int k = SONDE_PRESS_INSUFFICIENT; k < SONDE_PRESS_RESULTS; ++k) {
-    if (m->presses[k] == 0) continue;
-    say(text, "%u of %u presses %s", m->presses[k], m->press_count, WHY[k]);
-    uint32_t before = SONDE_PLAN_POINTS + 1, said = 0;
-    for (uint32_t i = 0; i < count && said < NAMED; ++i) {
-      if (presses[i].result != (sonde_press_result)k || presses[i].place == before) continue;
-      before = presses[i].place;
-      size_t used = strlen(text);
-      snprintf(text + used, SONDE_SCORE_WORDS - used, "%s%s", said++ ? ", " : ": ",
-               title_of(plan, before));
-    }
-  }
-}
-
 void sonde_score_explain(const sonde_score *score, const sonde_plan *plan,
                          const sonde_compression *presses, uint32_t count,
                          sonde_score_part part[SONDE_SCORE_PARTS]) {
@@ -52,6 +32,9 @@ void sonde_score_explain(const sonde_score *score, const sonde_plan *plan,
   enum { FINDINGS, COVERAGE, TECHNIQUE, FORCE, TIME };
   _Static_assert(TIME + 1 == SONDE_SCORE_PARTS, "a paragraph per part");
   const sonde_metrics *m = &score->metrics;
+  static const char *const WHY[] = {[SONDE_PRESS_INSUFFICIENT] = "not far enough",
+                                    [SONDE_PRESS_TOO_HARD] = "too hard",
+                                    [SONDE_PRESS_OFF_AXIS] = "not straight across the vein"};
   uint32_t k = 0;
 #define SONDE_SCORE_PART(name, weight, title, text)                                                \
   part[k++] = (sonde_score_part){#name, title, text, (weight)*score->name, weight, ""};
@@ -74,7 +57,19 @@ void sonde_score_explain(const sonde_score *score, const sonde_plan *plan,
       else if (v->decision == SONDE_DECISION_COMPRESSIBLE && v->done < v->points)
         say(text, "%s: %u of %u places pressed well", title, v->done, v->points);
     }
-    if (k == TECHNIQUE) explain_technique(m, plan, presses, count, text);
+    if (k == TECHNIQUE && m->press_count == 0) say(text, "no press");
+    for (int r = SONDE_PRESS_INSUFFICIENT; k == TECHNIQUE && r < SONDE_PRESS_RESULTS; ++r) {
+      if (m->presses[r] == 0) continue;
+      say(text, "%u of %u presses %s", m->presses[r], m->press_count, WHY[r]);
+      uint32_t before = SONDE_PLAN_POINTS + 1, named = 0;
+      for (uint32_t i = 0; i < count && named < NAMED; ++i) {
+        if (presses[i].result != (sonde_press_result)r || presses[i].place == before) continue;
+        before = presses[i].place;
+        size_t used = strlen(text);
+        snprintf(text + used, SONDE_SCORE_WORDS - used, "%s%s", named++ ? ", " : ": ",
+                 title_of(plan, before));
+      }
+    }
 
     // Presses above the limit that lie in a part of the list which was not kept are counted by the
     // metrics all the same.

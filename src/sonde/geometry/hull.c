@@ -217,32 +217,6 @@ static bool add_point(hull *h, uint32_t start, uint32_t point) {
   return true;
 }
 
-// The mesh of the living faces, with the points that they use.
-static sonde_status collect(const hull *h, const sonde_vec3 *points, sonde_mesh *mesh,
-                            sonde_error *error) {
-  uint32_t faces = 0, vertices = 0;
-  uint32_t *index = h->from_vertex;
-  memset(index, 0, h->point_count * sizeof *index);
-  for (uint32_t f = 0; f < h->face_count; ++f) {
-    if (!h->faces[f].alive) continue;
-    ++faces;
-    for (int k = 0; k < 3; ++k) index[h->faces[f].v[k]] = 1;
-  }
-  for (uint32_t i = 0; i < h->point_count; ++i)
-    if (index[i]) index[i] = ++vertices;
-  sonde_status status = sonde_mesh_create(mesh, vertices, faces, error);
-  if (status) return status;
-  for (uint32_t i = 0; i < h->point_count; ++i)
-    if (index[i]) mesh->vertices[index[i] - 1] = points[i];
-  uint32_t at = 0;
-  for (uint32_t f = 0; f < h->face_count; ++f) {
-    if (!h->faces[f].alive) continue;
-    for (int k = 0; k < 3; ++k) mesh->faces[at][k] = index[h->faces[f].v[k]] - 1;
-    ++at;
-  }
-  return SONDE_OK;
-}
-
 sonde_status sonde_hull_mesh(const sonde_vec3 *points, uint32_t count, double tolerance_m,
                              sonde_mesh *mesh, sonde_error *error) {
   *mesh = (sonde_mesh){0};
@@ -281,7 +255,28 @@ sonde_status sonde_hull_mesh(const sonde_vec3 *points, uint32_t count, double to
     if (h.tolerance > 0 && h.faces[f].height <= h.tolerance) continue;
     if (!add_point(&h, f, h.faces[f].highest)) status = sonde_fail_memory(error);
   }
-  if (!status) status = collect(&h, points, mesh, error);
+  // The mesh of the living faces, with the points that they use.
+  if (!status) {
+    uint32_t faces = 0, vertices = 0;
+    uint32_t *index = h.from_vertex;
+    memset(index, 0, h.point_count * sizeof *index);
+    for (uint32_t f = 0; f < h.face_count; ++f) {
+      if (!h.faces[f].alive) continue;
+      ++faces;
+      for (int k = 0; k < 3; ++k) index[h.faces[f].v[k]] = 1;
+    }
+    for (uint32_t i = 0; i < h.point_count; ++i)
+      if (index[i]) index[i] = ++vertices;
+    status = sonde_mesh_create(mesh, vertices, faces, error);
+    for (uint32_t i = 0; i < h.point_count && !status; ++i)
+      if (index[i]) mesh->vertices[index[i] - 1] = points[i];
+    uint32_t at = 0;
+    for (uint32_t f = 0; f < h.face_count && !status; ++f) {
+      if (!h.faces[f].alive) continue;
+      for (int k = 0; k < 3; ++k) mesh->faces[at][k] = index[h.faces[f].v[k]] - 1;
+      ++at;
+    }
+  }
   sonde_free(h.points);
   sonde_free(h.next);
   sonde_free(h.faces);

@@ -237,27 +237,6 @@ static bool is_straight(const sonde_vec3 *path, uint32_t from, uint32_t to) {
   return true;
 }
 
-// Takes the repeated first node off a closed path; no node may come twice. `seen` has an entry per
-// node and is zero.
-static sonde_status check_path(const sonde_model *model, sonde_cut_path *path, uint8_t *seen,
-                               sonde_error *error) {
-  path->closed = path->count > 3 && path->node[0] == path->node[path->count - 1];
-  path->count -= path->closed;
-  if (path->count < 3)
-    return sonde_fail(error, SONDE_ARGUMENT,
-                      "the cut follows %u edges of the skin, expected a path along 2 or more",
-                      path->count ? path->count - 1 : 0);
-  for (uint32_t k = 0; k < path->count; ++k) {
-    sonde_vec3 x = model->surface.vertices[path->node[k]];
-    if (seen[path->node[k]]++)
-      return sonde_fail(error, SONDE_ARGUMENT,
-                        "the cut crosses or touches itself at (%.1f, %.1f, %.1f) mm, expected a "
-                        "simple path",
-                        x.x * 1e3, x.y * 1e3, x.z * 1e3);
-  }
-  return SONDE_OK;
-}
-
 sonde_status sonde_cut_path_find(const sonde_model *model, const sonde_copies *copies,
                                  const sonde_vec3 *position, const sonde_vec3 *point,
                                  uint32_t count, sonde_cut_path *path, sonde_error *error) {
@@ -284,7 +263,25 @@ sonde_status sonde_cut_path_find(const sonde_model *model, const sonde_copies *c
     for (uint32_t from = 0, to; from + 1 < count; from = kept[used++] = to)
       for (to = from + 1; to + 1 < count && is_straight(point, from, to + 1);) ++to;
     status = follow(&s, point, kept, used, error);
-    if (!status) status = check_path(model, path, seen, error);
+
+    // The repeated first node goes off a closed path; no node may come twice.
+    if (!status) {
+      path->closed = path->count > 3 && path->node[0] == path->node[path->count - 1];
+      path->count -= path->closed;
+      if (path->count < 3)
+        status = sonde_fail(error, SONDE_ARGUMENT,
+                            "the cut follows %u edges of the skin, expected a path along 2 or more",
+                            path->count ? path->count - 1 : 0);
+    }
+    for (uint32_t k = 0; !status && k < path->count; ++k) {
+      sonde_vec3 x = model->surface.vertices[path->node[k]];
+      if (seen[path->node[k]]++)
+        status =
+            sonde_fail(error, SONDE_ARGUMENT,
+                       "the cut crosses or touches itself at (%.1f, %.1f, %.1f) mm, expected a "
+                       "simple path",
+                       x.x * 1e3, x.y * 1e3, x.z * 1e3);
+    }
   } else {
     status = sonde_fail_memory(error);
   }

@@ -54,7 +54,7 @@ static void put_mesh(writer *w, const char *vertices, const char *faces, const s
   sonde_model_put(w, faces, "u32", "1", mesh->face_count, 3, mesh->faces);
 }
 
-static void put_sites(writer *w, const sonde_model *model) {
+static void put_sites(writer *w, const uint32_t *probe, const sonde_model *model) {
   uint32_t n = model->site_count;
   uint32_t *id = SONDE_NEW(uint32_t, n);
   double(*row)[14] = sonde_calloc(n, sizeof *row);
@@ -81,21 +81,20 @@ static void put_sites(writer *w, const sonde_model *model) {
   sonde_free(id);
   sonde_free(row);
   sonde_free(share);
-}
 
-static void put_data(writer *w, const uint32_t *probe, const sonde_model *model) {
-  uint32_t n = model->datum_count;
-  uint32_t(*key)[2] = sonde_calloc(n, sizeof *key);
-  double(*value)[2] = sonde_calloc(n, sizeof *value);
+  // The measurements at the sites.
+  uint32_t count = model->datum_count;
+  uint32_t(*key)[2] = sonde_calloc(count, sizeof *key);
+  double(*value)[2] = sonde_calloc(count, sizeof *value);
   if (key && value) {
-    for (uint32_t k = 0; k < n; ++k) {
+    for (uint32_t k = 0; k < count; ++k) {
       key[k][0] = model->data[k].site;
       key[k][1] = probe[k];
       value[k][0] = model->data[k].penetration_m;
       value[k][1] = model->data[k].force_n;
     }
-    sonde_model_put(w, "datum_key", "u32", "site, probe", n, 2, key);
-    sonde_model_put(w, "datum", "f64", "penetration m, force N", n, 2, value);
+    sonde_model_put(w, "datum_key", "u32", "site, probe", count, 2, key);
+    sonde_model_put(w, "datum", "f64", "penetration m, force N", count, 2, value);
   } else {
     w->failed = true;
   }
@@ -184,8 +183,7 @@ static void put_model(writer *w, uint32_t *probe, const sonde_model *model) {
     sonde_model_put(w, "node_normal", "f64", "1", n, 3, model->normal);
     sonde_model_put(w, "edge_share", "f64", "1", model->topology.edge_count, 1, model->edge_share);
   }
-  put_sites(w, model);
-  put_data(w, probe, model);
+  put_sites(w, probe, model);
   put_vessel(w, "vein", &model->vein);
   put_vessel(w, "artery", &model->artery);
   if (model->anatomy) sonde_anatomy_put_arrays(w, model->anatomy);
