@@ -104,34 +104,29 @@ static uint32_t inner_count(uint32_t around, uint32_t k, uint32_t inner) {
   return k == 0 ? 1 : count < LEAST_RING ? (uint32_t)LEAST_RING : count;
 }
 
-static sonde_status ring_plan(const sonde_tube *tube, double edge_m, plan *p, sonde_error *error) {
+static double share(const ring *r, uint32_t k) { return (k + r->offset) / r->count; }
+
+sonde_status sonde_tube_mesh(const sonde_tube *tube, double edge_m, sonde_mesh *mesh,
+                             sonde_error *error) {
   double girth = 0;
   for (int k = 0; k <= 4; ++k) girth += sonde_tube_girth(tube, tube->length_m * k / 4) / 5;
   uint32_t around = (uint32_t)lround(fmax(girth / edge_m, 12));
   uint32_t rows = (uint32_t)lround(fmax(tube->length_m / (edge_m * HEIGHT), 2));
   uint32_t inner = (uint32_t)lround(fmax(around / (2 * SONDE_PI * HEIGHT), 2));
-  *p = (plan){.ring = SONDE_NEW(ring, rows + 1 + 2 * inner)};
-  if (!p->ring) return sonde_fail_memory(error);
+  plan p = (plan){.ring = SONDE_NEW(ring, rows + 1 + 2 * inner)};
+  if (!p.ring) return sonde_fail_memory(error);
   for (uint32_t k = 0; k < inner; ++k)
-    add_ring(p, inner_count(around, k, inner), 0, (double)k / inner);
+    add_ring(&p, inner_count(around, k, inner), 0, (double)k / inner);
   for (uint32_t j = 0; j <= rows; ++j)
-    add_ring(p, around, j == rows ? tube->length_m : tube->length_m * j / rows, 1);
+    add_ring(&p, around, j == rows ? tube->length_m : tube->length_m * j / rows, 1);
   for (uint32_t k = inner; k-- > 0;)
-    add_ring(p, inner_count(around, k, inner), tube->length_m, (double)k / inner);
-  for (uint32_t k = 0; k + 1 < p->rings; ++k) {
-    uint32_t a = p->ring[k].count, b = p->ring[k + 1].count;
-    p->faces += (a > 1 ? a : 0) + (b > 1 ? b : 0);
+    add_ring(&p, inner_count(around, k, inner), tube->length_m, (double)k / inner);
+  for (uint32_t k = 0; k + 1 < p.rings; ++k) {
+    uint32_t a = p.ring[k].count, b = p.ring[k + 1].count;
+    p.faces += (a > 1 ? a : 0) + (b > 1 ? b : 0);
   }
-  return SONDE_OK;
-}
 
-static double share(const ring *r, uint32_t k) { return (k + r->offset) / r->count; }
-
-sonde_status sonde_tube_mesh(const sonde_tube *tube, double edge_m, sonde_mesh *mesh,
-                             sonde_error *error) {
-  plan p;
-  sonde_status status = ring_plan(tube, edge_m, &p, error);
-  if (!status) status = sonde_mesh_create(mesh, p.vertices, p.faces, error);
+  sonde_status status = sonde_mesh_create(mesh, p.vertices, p.faces, error);
   uint32_t used = 0;
   for (uint32_t k = 0; !status && k < p.rings; ++k) {
     SONDE_ASSERT(p.ring[k].count >= 1 && p.ring[k].scale >= 0);

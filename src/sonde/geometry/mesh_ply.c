@@ -214,22 +214,6 @@ static sonde_status read_scalar(ply *file, const element *owner, const property 
                     short_file ? "the end of the file" : "a number that is not finite");
 }
 
-// Number of entries of a list.
-static sonde_status read_length(ply *file, const element *owner, const property *item, uint32_t row,
-                                double least, uint32_t *length) {
-  double value = 0;
-  sonde_status status = read_scalar(file, owner, item, item->count_type, row, &value);
-  if (status) return status;
-  if (value >= least && value < 4e9 && value == floor(value)) {
-    *length = (uint32_t)value;
-    return SONDE_OK;
-  }
-  char at[256];
-  return sonde_fail(file->error, SONDE_FORMAT,
-                    "%s: expected at least %g entries in list %s of %s %u, found %.17g",
-                    place(file, at, sizeof at), least, item->name, owner->name, row, value);
-}
-
 // One row of an element: the point of a vertex, or the polygon of a face, split into a fan of
 // triangles; other properties are read and dropped.
 static sonde_status read_row(ply *file, const element *owner, uint32_t row) {
@@ -238,8 +222,19 @@ static sonde_status read_row(ply *file, const element *owner, uint32_t row) {
     const property *item = &owner->properties[p];
     bool list = item->count_type != NO_SCALAR, polygon = item->role == INDICES;
     uint32_t length = 1, first = 0, previous = 0;
-    sonde_status status =
-        list ? read_length(file, owner, item, row, polygon ? 3 : 0, &length) : SONDE_OK;
+    sonde_status status = SONDE_OK;
+    if (list) { // number of its entries
+      double entries = 0, least = polygon ? 3 : 0;
+      status = read_scalar(file, owner, item, item->count_type, row, &entries);
+      if (status) return status;
+      if (!(entries >= least && entries < 4e9 && entries == floor(entries))) {
+        char at[256];
+        return sonde_fail(file->error, SONDE_FORMAT,
+                          "%s: expected at least %g entries in list %s of %s %u, found %.17g",
+                          place(file, at, sizeof at), least, item->name, owner->name, row, entries);
+      }
+      length = (uint32_t)entries;
+    }
     for (uint32_t k = 0; k < length && !status; ++k) {
       status = read_scalar(file, owner, item, item->type, row, &value);
       if (status || !polygon) continue;

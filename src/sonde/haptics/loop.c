@@ -12,22 +12,6 @@
 // mlockall acts on the process; loops of several sessions share it.
 static atomic_int memory_locks;
 
-// Locking faults in every mapped page (untouched stacks too): it is harmless only below a quarter
-// of the machine's memory. MCL_FUTURE is left out: beyond RLIMIT_MEMLOCK it would make later
-// allocations fail.
-static bool lock_memory(void) {
-  unsigned long pages = 0;
-  FILE *file = fopen("/proc/self/statm", "r");
-  if (!file) return false;
-  bool known = fscanf(file, "%lu", &pages) == 1;
-  fclose(file);
-  long total = sysconf(_SC_PHYS_PAGES);
-  bool small = known && total > 0 && pages < (unsigned long)total / 4;
-  if (!small || mlockall(MCL_CURRENT) != 0) return false;
-  atomic_fetch_add(&memory_locks, 1);
-  return true;
-}
-
 typedef struct launch {
   sonde_loop *loop;
   pthread_mutex_t mutex;
@@ -42,7 +26,19 @@ static void *thread_main(void *argument) {
   pthread_mutex_lock(&start->mutex);
   struct sched_param param = {.sched_priority = 40};
   loop->realtime_priority = pthread_setschedparam(pthread_self(), SCHED_FIFO, &param) == 0;
-  loop->memory_locked = lock_memory();
+
+  // Locking faults in every mapped page (untouched stacks too): it is harmless only below a quarter
+  // of the machine's memory. MCL_FUTURE is left out: beyond RLIMIT_MEMLOCK it would make later
+  // allocations fail.
+  unsigned long pages = 0;
+  FILE *file = fopen("/proc/self/statm", "r");
+  bool known = file && fscanf(file, "%lu", &pages) == 1;
+  if (file) fclose(file);
+  long total = known ? sysconf(_SC_PHYS_PAGES) : 0;
+  bool small = total > 0 && pages < (unsigned long)total / 4;
+  loop->memory_locked = small && mlockall(MCL_CURRENT) == 0;
+  if (loop->memory_locked) atomic_fetch_add(&memory_locks, 1);
+
   static const char *const refused[2][2] = {
       {"real-time priority and memory locking were", "real-time priority was"},
       {"memory locking was", NULL}};

@@ -508,31 +508,6 @@ static sonde_status read_model(const reader *r, sonde_model *model) {
   return status;
 }
 
-// Splits magic, header and arrays; checks sizes, version and CRC before anything is believed.
-static sonde_status split(const char *path, const char *bytes, size_t count, size_t *text,
-                          size_t *blob, size_t *start, sonde_error *error) {
-  int version = 0, used = 0;
-  if (count < 32 || strncmp(bytes, MAGIC, strlen(MAGIC)) != 0)
-    return sonde_fail(error, SONDE_FORMAT, "%s: is not a Sonde model, expected '%s' at its start",
-                      path, MAGIC);
-  uint32_t stored, crc = (uint32_t)crc32_z(0, (const Bytef *)bytes, count - 4);
-  memcpy(&stored, bytes + count - 4, 4);
-  if (crc != stored)
-    return sonde_fail(error, SONDE_CHECKSUM,
-                      "%s: is damaged or truncated: CRC-32 is %08x, expected %08x", path, crc,
-                      stored);
-  if (sscanf(bytes + strlen(MAGIC), "%d %zu %zu%n", &version, text, blob, &used) != 3)
-    return sonde_fail(error, SONDE_FORMAT, "%s:1: expected a version and two sizes", path);
-  if (version < OLDEST_VERSION || version > FORMAT_VERSION)
-    return sonde_fail(error, SONDE_VERSION, "%s: has format version %d, expected %d to %d", path,
-                      version, OLDEST_VERSION, FORMAT_VERSION);
-  *start = strlen(MAGIC) + (size_t)used + 1;
-  if (*text > count || *blob > count || *start + *text + *blob + 4 != count)
-    return sonde_fail(error, SONDE_FORMAT, "%s:1: the sizes do not add up to the file's %zu bytes",
-                      path, count);
-  return SONDE_OK;
-}
-
 sonde_status sonde_model_load(const char *path, sonde_model **out, sonde_error *error) {
   *out = NULL;
   char *bytes = NULL;
@@ -542,7 +517,30 @@ sonde_status sonde_model_load(const char *path, sonde_model **out, sonde_error *
   sonde_model *model = SONDE_NEW(sonde_model, 1);
   sonde_status status = model ? sonde_bounded_load(path, &sonde_limits_model, &bytes, &count, error)
                               : sonde_fail_memory(error);
-  if (!status) status = split(path, bytes, count, &text, &blob, &start, error);
+
+  // Magic, header and arrays: sizes, version and CRC are checked before anything is believed.
+  if (!status) {
+    int version = 0, used = 0;
+    bool known = count >= 32 && strncmp(bytes, MAGIC, strlen(MAGIC)) == 0;
+    uint32_t stored = 0, crc = known ? (uint32_t)crc32_z(0, (const Bytef *)bytes, count - 4) : 0;
+    if (known) memcpy(&stored, bytes + count - 4, 4);
+    if (!known)
+      status = sonde_fail(error, SONDE_FORMAT,
+                          "%s: is not a Sonde model, expected '%s' at its start", path, MAGIC);
+    else if (crc != stored)
+      status = sonde_fail(error, SONDE_CHECKSUM,
+                          "%s: is damaged or truncated: CRC-32 is %08x, expected %08x", path, crc,
+                          stored);
+    else if (sscanf(bytes + strlen(MAGIC), "%d %zu %zu%n", &version, &text, &blob, &used) != 3)
+      status = sonde_fail(error, SONDE_FORMAT, "%s:1: expected a version and two sizes", path);
+    else if (version < OLDEST_VERSION || version > FORMAT_VERSION)
+      status = sonde_fail(error, SONDE_VERSION, "%s: has format version %d, expected %d to %d",
+                          path, version, OLDEST_VERSION, FORMAT_VERSION);
+    start = strlen(MAGIC) + (size_t)used + 1;
+    if (!status && (text > count || blob > count || start + text + blob + 4 != count))
+      status = sonde_fail(error, SONDE_FORMAT,
+                          "%s:1: the sizes do not add up to the file's %zu bytes", path, count);
+  }
   const sonde_json_source source = {path, 2, sonde_limits_model.most_depth,
                                     (uint32_t)sonde_limits_model.most_items};
   if (!status) status = sonde_json_parse(bytes + start, text, &source, &header, error);
