@@ -116,31 +116,6 @@ static void splat(sonde_echo *echo, const scatter_pool *pool, const splat_map *f
   echo->kernels->splat(&job);
 }
 
-// Blood of one segment: scatterers on their streamlines outside clot.
-static void lay_segment(sonde_echo *echo, const blood_segment *s, splat_limits rows) {
-  enum { AT_ONCE = STREAMLINES_AT_ONCE };
-  float x[AT_ONCE], y[AT_ONCE], z[AT_ONCE], sign[AT_ONCE];
-  const scatter_pool *blood = &echo->blood, some = {x, y, z, sign};
-  SONDE_ASSERT(s->count <= SONDE_BLOOD && s->solid < 1);
-  splat_map one = s->map;
-  for (uint32_t i = 0; i < s->count; i += AT_ONCE) {
-    const uint32_t count = s->count - i < AT_ONCE ? s->count - i : AT_ONCE;
-    const stream_job job = {blood->z + i, blood->sign + i, count, i,   s->flowed,
-                            s->segment,   s->salt,         z,     sign};
-    echo->kernels->stream(&job);
-    memcpy(x, blood->x + i, count * sizeof *x);
-    memcpy(y, blood->y + i, count * sizeof *y);
-    uint32_t kept = s->solid > 0 ? 0 : count;
-    for (uint32_t k = 0; k < count && s->solid > 0; ++k) {
-      if (sonde_blood_in_clot(s, x[k], y[k], z[k])) continue;
-      x[kept] = x[k], y[kept] = y[k], z[kept] = z[k], sign[kept++] = sign[k];
-    }
-    for (; kept % ECHO_ALIGN; ++kept) x[kept] = y[kept] = z[kept] = sign[kept] = 0;
-    one.count = kept;
-    if (kept > 0) splat(echo, &some, &one, 1, rows);
-  }
-}
-
 // Rows that scatterers of a band are nearest to: a scatterer reaches the row above its nearest one,
 // whose band lays it.
 static splat_limits rows_of(const sonde_echo *echo, uint32_t band) {
@@ -172,10 +147,31 @@ void sonde_bands_lay(sonde_echo *echo, uint32_t band) {
   }
   if (count > 0) splat(echo, &echo->pool, b->batch, count, all);
   for (int32_t k = b->blood.first[band], next; k >= 0; k = next) {
-    const blood_segment *one = &b->segment[k];
-    const bool fits = one->map.m[0][2] + half_rows(&one->map) < bottom;
+    const blood_segment *from = &b->segment[k];
+    const bool fits = from->map.m[0][2] + half_rows(&from->map) < bottom;
     next = b->next_segment[k];
-    lay_segment(echo, one, fits ? all : some);
+    // Blood of one segment: scatterers on their streamlines outside clot.
+    enum { AT_ONCE = STREAMLINES_AT_ONCE };
+    float x[AT_ONCE], y[AT_ONCE], z[AT_ONCE], sign[AT_ONCE];
+    const scatter_pool *blood = &echo->blood, streams = {x, y, z, sign};
+    SONDE_ASSERT(from->count <= SONDE_BLOOD && from->solid < 1);
+    splat_map one = from->map;
+    for (uint32_t i = 0; i < from->count; i += AT_ONCE) {
+      const uint32_t length = from->count - i < AT_ONCE ? from->count - i : AT_ONCE;
+      const stream_job job = {blood->z + i,  blood->sign + i, length, i,   from->flowed,
+                              from->segment, from->salt,      z,      sign};
+      echo->kernels->stream(&job);
+      memcpy(x, blood->x + i, length * sizeof *x);
+      memcpy(y, blood->y + i, length * sizeof *y);
+      uint32_t kept = from->solid > 0 ? 0 : length;
+      for (uint32_t n = 0; n < length && from->solid > 0; ++n) {
+        if (sonde_blood_in_clot(from, x[n], y[n], z[n])) continue;
+        x[kept] = x[n], y[kept] = y[n], z[kept] = z[n], sign[kept++] = sign[n];
+      }
+      for (; kept % ECHO_ALIGN; ++kept) x[kept] = y[kept] = z[kept] = sign[kept] = 0;
+      one.count = kept;
+      if (kept > 0) splat(echo, &streams, &one, 1, fits ? all : some);
+    }
     if (!fits && !is_last) append(&b->blood, b->next_segment, band + 1, k);
   }
 }

@@ -26,27 +26,6 @@ static float *ring_row(const sonde_echo *echo, uint32_t row) {
   return echo->ring + (size_t)(row % rows) * RING_PLANES * echo->padded;
 }
 
-// One row of the field, times what tissue and losses leave of it, into the row of columns.
-static void merge_row(sonde_echo *echo, uint32_t sample, bool tissue) {
-  // The window's first and last rows have parts beside it.
-  const uint32_t last = echo->window_rows, row = 1 + sample % last, stride = echo->grid_stride;
-  float *here = echo->grid + (size_t)row * stride;
-  if (row == 1 || row == last) {
-    float *other = row == 1 ? here + (size_t)last * stride : echo->grid;
-    for (uint32_t i = 0; i < stride; ++i) here[i] += other[i], other[i] = 0;
-  }
-  // Gain between two rows of the march.
-  double at = ((double)sample - echo->pad_samples) / (echo->samples - 1) * (SONDE_MEDIUM_ROWS - 1);
-  at = clamp(at, 0, SONDE_MEDIUM_ROWS - 1.001);
-  const float *top = echo->gain + (size_t)(uint32_t)at * echo->gain_stride;
-  merge_job job = {.grid = here, .count = echo->grid_lines / SONDE_FINE};
-  if (tissue)
-    job.top = top, job.low = top + echo->gain_stride, job.share = (float)(at - (uint32_t)at);
-  for (int k = 0; k < SONDE_FINE; ++k) job.re[k] = echo->line_re[k], job.im[k] = echo->line_im[k];
-  SONDE_ASSERT(job.count < echo->gain_stride);
-  echo->kernels->merge(&job);
-}
-
 // Lateral kernels at the row's depth, normalised to unit speckle; interfaces join before them.
 static void filter_row(sonde_echo *echo, uint32_t sample, bool tissue) {
   const frame *f = &echo->frame;
@@ -77,7 +56,26 @@ static void filter_row(sonde_echo *echo, uint32_t sample, bool tissue) {
     job.re[k] = echo->line_re[k] + echo->pad_lines / SONDE_FINE;
     job.im[k] = echo->line_im[k] + echo->pad_lines / SONDE_FINE;
   }
-  merge_row(echo, sample, tissue);
+  // One row of the field, times what tissue and losses leave of it, into the row of columns.
+  // The window's first and last rows have parts beside it.
+  const uint32_t last = echo->window_rows, row = 1 + sample % last, stride = echo->grid_stride;
+  float *here = echo->grid + (size_t)row * stride;
+  if (row == 1 || row == last) {
+    float *other = row == 1 ? here + (size_t)last * stride : echo->grid;
+    for (uint32_t i = 0; i < stride; ++i) here[i] += other[i], other[i] = 0;
+  }
+  // Gain between two rows of the march.
+  double at = ((double)sample - echo->pad_samples) / (echo->samples - 1) * (SONDE_MEDIUM_ROWS - 1);
+  at = clamp(at, 0, SONDE_MEDIUM_ROWS - 1.001);
+  const float *gain = echo->gain + (size_t)(uint32_t)at * echo->gain_stride;
+  merge_job merge = {.grid = here, .count = echo->grid_lines / SONDE_FINE};
+  if (tissue)
+    merge.top = gain, merge.low = gain + echo->gain_stride,
+    merge.share = (float)(at - (uint32_t)at);
+  for (int k = 0; k < SONDE_FINE; ++k)
+    merge.re[k] = echo->line_re[k], merge.im[k] = echo->line_im[k];
+  SONDE_ASSERT(merge.count < echo->gain_stride);
+  echo->kernels->merge(&merge);
   const double *sheet = psf->sheet + above;
   if (tissue)
     sonde_sheet_lay(echo, sample, (float)(1 / (scale * (sheet[0] + t * (sheet[1] - sheet[0])))));

@@ -23,18 +23,6 @@ static double beats_of(const sonde_circulation *c, double t) {
   return whole + (sum > 0 ? part / sum : beats - whole);
 }
 
-// Path of the mean flow in a vessel since t = 0, m.
-static double flowed_m(const sonde_echo *echo, uint32_t which) {
-  const sonde_echo_flow *flow = &echo->flow;
-  if (echo->interior->kind[which] == SONDE_VESSEL_VEIN) {
-    bool plug = sonde_echo_pathology(echo, which)->thrombus_fraction >= 1;
-    return plug ? 0 : flow->vein_m_s * flow->t_s;
-  }
-  double rate = flow->circulation.heart_rate_hz;
-  if (!(rate > 0)) return -flow->artery_m_s * flow->t_s;
-  return -flow->artery_m_s / rate * beats_of(&flow->circulation, flow->t_s);
-}
-
 // Map of the lumen between two sections, unit lumen to the grid; returns its volume, 0 when it is
 // out of the picture or beside the slab.
 static double map_segment(const sonde_echo *echo, const sonde_vessel_state *low,
@@ -74,14 +62,22 @@ void sonde_echo_blood(sonde_echo *echo) {
   for (uint32_t shown = 0; shown < echo->shown_count; ++shown) {
     const uint32_t which = echo->shown[shown], sections = in->section_count[which];
     if (sections < 2) continue;
-    const double flowed = flowed_m(echo, which) / sonde_segment_m;
+    // Path of the mean flow in a vessel since t = 0, m.
+    const sonde_echo_flow *flow = &echo->flow;
+    const double rate = flow->circulation.heart_rate_hz;
+    double flowed_m = 0;
+    if (in->kind[which] != SONDE_VESSEL_VEIN)
+      flowed_m = rate > 0 ? -flow->artery_m_s / rate * beats_of(&flow->circulation, flow->t_s)
+                          : -flow->artery_m_s * flow->t_s;
+    else if (!(sonde_echo_pathology(echo, which)->thrombus_fraction >= 1))
+      flowed_m = flow->vein_m_s * flow->t_s;
     const int32_t first = (int32_t)ceil(in->section[which][0].s_m / sonde_segment_m);
     const int32_t last = (int32_t)floor(in->section[which][sections - 1].s_m / sonde_segment_m);
     sonde_vessel_state low, high;
     bool known = sonde_vessel_at(in, which, first * sonde_segment_m, &low);
     for (int32_t k = first; k < last && known; ++k, low = high) {
       known = sonde_vessel_at(in, which, (k + 1) * sonde_segment_m, &high);
-      blood_segment one = {.flowed = flowed,
+      blood_segment one = {.flowed = flowed_m / sonde_segment_m,
                            .solid = sonde_echo_solid(echo, which, low.rest_centre_m.z),
                            .salt = (uint32_t)echo->seed + which,
                            .segment = k,

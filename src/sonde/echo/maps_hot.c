@@ -46,11 +46,16 @@ static bool is_beyond(const float form[4]) {
   return fabsf(form[0]) > 1 + 0.5f * (fabsf(form[1]) + fabsf(form[2]) + fabsf(form[3]));
 }
 
-// The lumina that a cube touches, over its coordinates; solid clot belongs to the tissue. The fewer
-// the area, the denser the tissue's scatterers are in it: clutter keeps its power.
-static uint32_t find_lumina(const sonde_echo *echo, const moved_cube *c,
-                            splat_lumen out[MOST_VESSELS]) {
-  uint32_t found = 0;
+// Maps of the eight pieces of a cube. The middles of two neighbours are as far apart as a piece is
+// long: one point per piece, moved by the walls, gives them all.
+static void map_pieces(sonde_echo *echo, const moved_cube *c) {
+  const uint32_t each = echo->per_piece, shares = SONDE_LOOSE / each;
+  float_x4 at[8];
+  splat_lumen lumen[MOST_VESSELS];
+  image_points(echo, c->group, at), image_points(echo, c->group + 1, at + 4);
+  // The lumina that a cube touches, over its coordinates; solid clot belongs to the tissue. The
+  // fewer the area, the denser the tissue's scatterers are in it: clutter keeps its power.
+  uint32_t lumens = 0;
   const float_x4 along = point_of(echo->interior->axis);
   for (uint32_t k = 0; k < c->walls; ++k) {
     const float(*w)[WALL_ROOM] = echo->cubes->wall[k];
@@ -60,7 +65,7 @@ static uint32_t find_lumina(const sonde_echo *echo, const moved_cube *c,
                    across = {w[WALL_ACROSS][g], w[WALL_ACROSS + 1][g], w[WALL_ACROSS + 2][g], 0};
     const float scale = 1 / w[WALL_RADIUS][g], edge = (float)echo->cell_m * scale;
     const float_x4 d = (c->rest - centre) * scale;
-    splat_lumen *l = &out[found];
+    splat_lumen *l = &lumen[lumens];
     *l =
         (splat_lumen){{dot_points(d, flat), edge * flat[0], edge * flat[1], edge * flat[2]},
                       {dot_points(d, across), edge * across[0], edge * across[1], edge * across[2]},
@@ -69,19 +74,8 @@ static uint32_t find_lumina(const sonde_echo *echo, const moved_cube *c,
                       c->wall[k].solid > 0 ? 1 - 2 * c->wall[k].solid : 1,
                       sonde_clutter(echo) * sqrtf(w[WALL_SHORT][g] * w[WALL_LONG][g]) * scale,
                       echo->shown[c->wall[k].vessel]};
-    if (c->wall[k].solid < 1 && !is_beyond(l->along) && !is_beyond(l->across)) ++found;
+    if (c->wall[k].solid < 1 && !is_beyond(l->along) && !is_beyond(l->across)) ++lumens;
   }
-  return found;
-}
-
-// Maps of the eight pieces of a cube. The middles of two neighbours are as far apart as a piece is
-// long: one point per piece, moved by the walls, gives them all.
-static void map_pieces(sonde_echo *echo, const moved_cube *c) {
-  const uint32_t each = echo->per_piece, shares = SONDE_LOOSE / each;
-  float_x4 at[8];
-  splat_lumen lumen[MOST_VESSELS];
-  image_points(echo, c->group, at), image_points(echo, c->group + 1, at + 4);
-  const uint32_t lumens = find_lumina(echo, c, lumen);
   for (uint32_t piece = 0; piece < 8; ++piece) {
     const uint32_t share = (uint32_t)(c->bits >> 32) + piece;
     const float_x4 axis[3] = {at[piece | 1] - at[piece & ~1u], at[piece | 2] - at[piece & ~2u],
@@ -111,57 +105,56 @@ static void map_pieces(sonde_echo *echo, const moved_cube *c) {
   }
 }
 
-// Maps of a whole cube. Where resolution cells hold more scatterers than speckle needs, half of a
-// share, or three fourths of it, fade out with depth, while the others take over their energy:
-// tissue that moves through these depths does not change its speckle at once.
-static void map_cube(sonde_echo *echo, const moved_cube *c) {
-  const uint32_t all = echo->per_cell, half = all / 2, fourth = all / 4,
-                 patterns = SONDE_POOL / all;
-  float_x4 origin = c->at, axis[3] = {c->axis[0], c->axis[1], c->axis[2]}, at[4];
-  SONDE_ASSERT(fourth % ECHO_ALIGN == 0 && half == 2 * fourth);
-  if (c->by_walls) {
-    image_points(echo, c->group, at);
-    origin = at[0];
-    for (int k = 0; k < 3; ++k) axis[k] = 2 * (at[k + 1] - at[0]);
-  }
-  for (int k = 0; k < 3; ++k) // mirrored patterns look new
-    if (c->bits >> (61 + k) & 1) axis[k] = -axis[k];
-  splat_map one;
-  const uint32_t from = (uint32_t)(c->bits % patterns) * all;
-  if (!make_map(echo, origin, axis, from, all, &one)) return;
-  double row = clamp((double)origin[2] / (echo->plane_rows - 1), 0, 1) * SONDE_SLAB_ROWS;
-  double spare = echo->spare_octaves[(uint32_t)row];
-  double fading = clamp(2 * (1 - (spare - floor(spare))), 0, 1), other = sqrt(2 - fading * fading);
-  if (!(spare > 0) || (spare < 1 && fading >= 1)) {
-    sonde_bands_add_map(echo, &one);
-    return;
-  }
-  // Parts of the share: which, and the amplitude of their scatterers.
-  struct {
-    uint32_t first, count;
-    double amplitude;
-  } part[2] = {{0, half, other}, {half, half, fading}};
-  if (spare >= 2)
-    part[0].count = fourth, part[0].amplitude = 2, part[1].count = 0;
-  else if (spare >= 1 && fading >= 1)
-    part[0].amplitude = sqrt(2), part[1].count = 0;
-  else if (spare >= 1) {
-    part[0].count = part[1].first = part[1].count = fourth;
-    part[0].amplitude = sqrt(2) * other, part[1].amplitude = sqrt(2) * fading;
-  }
-  for (int k = 0; k < 2 && part[k].count > 0; ++k) {
-    one.from = SONDE_POOL + SONDE_LOOSE + from + part[k].first;
-    one.count = part[k].count, one.m[0][3] = (float)part[k].amplitude;
-    sonde_bands_add_map(echo, &one);
-  }
-}
-
 void sonde_maps_make(sonde_echo *echo) {
   const sonde_cubes *s = echo->cubes;
   SONDE_ASSERT(s->count <= CUBES_AT_ONCE && s->groups <= WALL_GROUPS);
-  for (const moved_cube *c = s->moved; c < s->moved + s->count; ++c)
-    if (c->close)
+  for (const moved_cube *c = s->moved; c < s->moved + s->count; ++c) {
+    if (c->close) {
       map_pieces(echo, c);
-    else
-      map_cube(echo, c);
+      continue;
+    }
+    // Maps of a whole cube. Where resolution cells hold more scatterers than speckle needs, half of
+    // a share, or three fourths of it, fade out with depth, while the others take over their
+    // energy: tissue that moves through these depths does not change its speckle at once.
+    const uint32_t all = echo->per_cell, half = all / 2, fourth = all / 4,
+                   patterns = SONDE_POOL / all;
+    float_x4 origin = c->at, axis[3] = {c->axis[0], c->axis[1], c->axis[2]}, at[4];
+    SONDE_ASSERT(fourth % ECHO_ALIGN == 0 && half == 2 * fourth);
+    if (c->by_walls) {
+      image_points(echo, c->group, at);
+      origin = at[0];
+      for (int k = 0; k < 3; ++k) axis[k] = 2 * (at[k + 1] - at[0]);
+    }
+    for (int k = 0; k < 3; ++k) // mirrored patterns look new
+      if (c->bits >> (61 + k) & 1) axis[k] = -axis[k];
+    splat_map one;
+    const uint32_t from = (uint32_t)(c->bits % patterns) * all;
+    if (!make_map(echo, origin, axis, from, all, &one)) continue;
+    double row = clamp((double)origin[2] / (echo->plane_rows - 1), 0, 1) * SONDE_SLAB_ROWS;
+    double spare = echo->spare_octaves[(uint32_t)row];
+    double fading = clamp(2 * (1 - (spare - floor(spare))), 0, 1),
+           other = sqrt(2 - fading * fading);
+    if (!(spare > 0) || (spare < 1 && fading >= 1)) {
+      sonde_bands_add_map(echo, &one);
+      continue;
+    }
+    // Parts of the share: which, and the amplitude of their scatterers.
+    struct {
+      uint32_t first, count;
+      double amplitude;
+    } part[2] = {{0, half, other}, {half, half, fading}};
+    if (spare >= 2)
+      part[0].count = fourth, part[0].amplitude = 2, part[1].count = 0;
+    else if (spare >= 1 && fading >= 1)
+      part[0].amplitude = sqrt(2), part[1].count = 0;
+    else if (spare >= 1) {
+      part[0].count = part[1].first = part[1].count = fourth;
+      part[0].amplitude = sqrt(2) * other, part[1].amplitude = sqrt(2) * fading;
+    }
+    for (int k = 0; k < 2 && part[k].count > 0; ++k) {
+      one.from = SONDE_POOL + SONDE_LOOSE + from + part[k].first;
+      one.count = part[k].count, one.m[0][3] = (float)part[k].amplitude;
+      sonde_bands_add_map(echo, &one);
+    }
+  }
 }

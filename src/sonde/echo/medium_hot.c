@@ -35,23 +35,6 @@ static const interface lesion_edges[SONDE_LESION_KINDS] = {
 static const float rough_share = 0.3f, rough_m = 0.4e-3f;
 static const float wall_m[2] = {0.6e-3f, 0.9e-3f}, thin_wall = 0.25f; // of a branch's radius
 
-// Fields of a row of the march, per line: between two coarse rows, which are widened to the lines
-// when the march reaches them.
-static void interpolate_row(sonde_echo *echo, uint32_t row, uint32_t *reached) {
-  const uint32_t last = echo->plane_rows - 2, size = echo->fields * echo->padded;
-  float y = (float)(row * (last + 1)) / (SONDE_MEDIUM_ROWS - 1);
-  uint32_t j = (uint32_t)y < last ? (uint32_t)y : last;
-  widen_job job = {.column = echo->line_column, .share = echo->line_share, .lines = echo->padded};
-  for (; *reached < j + 2; ++*reached)
-    for (uint32_t field = 0; field < echo->fields; ++field) {
-      job.in = echo->plane + field * SONDE_PLANE_NODES + *reached * SONDE_PLANE_COLUMNS;
-      job.out = echo->wide + *reached % 2 * size + field * echo->padded;
-      echo->kernels->widen(&job);
-    }
-  echo->kernels->mix(echo->wide + j % 2 * size, echo->wide + (j + 1) % 2 * size, y - (float)j,
-                     echo->row, size);
-}
-
 // Random number in [-1, 1) of a lattice point.
 static float knot(int32_t a, int32_t b, uint32_t salt) {
   uint32_t h = (uint32_t)a * 0x9e3779b1u ^ (uint32_t)b * 0x85ebca77u ^ salt * 0xc2b2ae3du;
@@ -119,20 +102,6 @@ static void add_interfaces(sonde_echo *echo, uint32_t row, const uint8_t *crosse
       if (which == CORTEX)
         echo->rough[l] *= amplitude_of_db(kind->loss_db); // facets lie above the loss
     }
-  }
-}
-
-// Lines whose face does not touch the skin. A face reverberates: bands at multiples of its own
-// thickness, fading, as loud as what does not couple in.
-static void mark_air(sonde_echo *echo) {
-  echo->some_air = false;
-  for (uint32_t l = 0; l < echo->padded; ++l) {
-    echo->air[l] = echo->row[PLANE_DEPTH * echo->padded + l] < -air_gap_m;
-    echo->some_air = echo->some_air || echo->air[l];
-    const float loudness = echo->air[l] ? 1 : 1 - echo->coupling[l];
-    for (int k = 0; k < 6 && l < echo->lines; ++k)
-      sonde_sheet_add(echo, l, 0.4e-3f + 1.3e-3f * (float)k, 0,
-                      loudness * 6.0f * exp2f(-1.4f * (float)k));
   }
 }
 
@@ -238,6 +207,7 @@ void sonde_echo_medium(sonde_echo *echo) {
   memset(echo->loss_db, 0, lines * sizeof *echo->loss_db);
   memset(echo->tail, 0, lines * sizeof *echo->tail);
   sonde_sheet_begin(echo);
+  echo->some_air = false;
   // Each line lies between two columns of the coarse plane.
   for (uint32_t l = 0; l < lines; ++l) {
     uint32_t line = l < echo->lines ? l : echo->lines - 1;
@@ -246,11 +216,34 @@ void sonde_echo_medium(sonde_echo *echo) {
     echo->line_column[l] = (int32_t)i, echo->line_share[l] = x - (float)i;
   }
   for (uint32_t row = 0; row < SONDE_MEDIUM_ROWS; ++row) {
-    interpolate_row(echo, row, &reached);
+    // Fields of a row of the march, per line: between two coarse rows, which are widened to the
+    // lines when the march reaches them.
+    const uint32_t last = echo->plane_rows - 2, size = echo->fields * echo->padded;
+    float y = (float)(row * (last + 1)) / (SONDE_MEDIUM_ROWS - 1);
+    uint32_t j = (uint32_t)y < last ? (uint32_t)y : last;
+    widen_job widen = {
+        .column = echo->line_column, .share = echo->line_share, .lines = echo->padded};
+    for (; reached < j + 2; ++reached)
+      for (uint32_t field = 0; field < echo->fields; ++field) {
+        widen.in = echo->plane + field * SONDE_PLANE_NODES + reached * SONDE_PLANE_COLUMNS;
+        widen.out = echo->wide + reached % 2 * size + field * echo->padded;
+        echo->kernels->widen(&widen);
+      }
+    echo->kernels->mix(echo->wide + j % 2 * size, echo->wide + (j + 1) % 2 * size, y - (float)j,
+                       echo->row, size);
     job.level = echo->level[row % 2], job.before = echo->level[(row + 1) % 2];
     echo->kernels->tissue(&job);
     job.rows_per_m = (float)((SONDE_MEDIUM_ROWS - 1) / f->depth_m);
-    if (row == 0) mark_air(echo);
+    // Lines whose face does not touch the skin. A face reverberates: bands at multiples of its own
+    // thickness, fading, as loud as what does not couple in.
+    for (uint32_t l = 0; row == 0 && l < lines; ++l) {
+      echo->air[l] = echo->row[PLANE_DEPTH * echo->padded + l] < -air_gap_m;
+      echo->some_air = echo->some_air || echo->air[l];
+      const float loudness = echo->air[l] ? 1 : 1 - echo->coupling[l];
+      for (int k = 0; k < 6 && l < echo->lines; ++k)
+        sonde_sheet_add(echo, l, 0.4e-3f + 1.3e-3f * (float)k, 0,
+                        loudness * 6.0f * exp2f(-1.4f * (float)k));
+    }
     blur(echo, echo->loss_db);
     blur(echo, echo->tail);
     if (row > 0) add_interfaces(echo, row, crossed);

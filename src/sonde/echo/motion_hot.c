@@ -91,7 +91,7 @@ static float_x4 locate_point(const sonde_echo *echo, float_x4 rest, float_x4 at,
 // Vessels beside a cube. Whether it goes in pieces depends on the tissue at rest alone: its
 // scatterers stay the same while the walls move.
 static void find_walls(const sonde_echo *echo, const slab_cube *from, moved_cube *c) {
-  const sonde_cubes *s = echo->cubes;
+  sonde_cubes *s = echo->cubes;
   const sonde_interior *in = echo->interior;
   const double h = echo->cell_m;
   const sonde_vec3 centre =
@@ -116,12 +116,9 @@ static void find_walls(const sonde_echo *echo, const slab_cube *from, moved_cube
     c->by_walls = c->by_walls || a->coupling > 0 || b->coupling > 0;
   }
   c->by_walls = c->by_walls || c->close; // pieces take one path whether a wall moves or not
-}
-
-// Points of a cube that walls move, four to a group, and the vessels beside them.
-static void add_points(const sonde_echo *echo, moved_cube *c) {
-  sonde_cubes *s = echo->cubes;
-  const float h = (float)echo->cell_m, quarter = 0.25f;
+  if (!c->by_walls) return;
+  // Points of a cube that walls move, four to a group, and the vessels beside them.
+  const float edge = (float)echo->cell_m, quarter = 0.25f;
   const float_x4 low = vset_float_x4(-quarter), even = {-quarter, quarter, -quarter, quarter},
                  halves = {-quarter, -quarter, quarter, quarter};
   const float_x4 piece[2][3] = {{even, halves, low}, {even, halves, -low}};
@@ -130,7 +127,7 @@ static void add_points(const sonde_echo *echo, moved_cube *c) {
   c->group = first, s->groups = end;
   for (uint32_t g = first; g < end; ++g)
     for (int k = 0; k < 3; ++k)
-      vstore(s->rest[k] + 4 * g, c->rest[k] + (c->close ? piece[g - first][k] : whole[k]) * h);
+      vstore(s->rest[k] + 4 * g, c->rest[k] + (c->close ? piece[g - first][k] : whole[k]) * edge);
   for (uint32_t k = 0; k < c->walls; ++k) {
     // State of the vessel between its two sections.
     const cube_wall *w = &c->wall[k];
@@ -157,32 +154,6 @@ static void add_points(const sonde_echo *echo, moved_cube *c) {
   if (c->walls > s->walls) s->walls = c->walls;
 }
 
-// Where the field takes the four warped points of a group, m from the corner.
-static void move_points(const sonde_echo *echo, const moved_cube *c, uint32_t group) {
-  sonde_cubes *s = echo->cubes;
-  const float per_cube = (float)(1 / echo->cell_m);
-  float_x4 at[4], image[4], in[3];
-  for (uint32_t i = 0; i < 4; ++i) {
-    const uint32_t n = 4 * group + i;
-    const float_x4 rest = {s->warped[0][n], s->warped[1][n], s->warped[2][n], 0};
-    const float_x4 guess = c->at + transform_point(c->axis, (rest - c->rest) * per_cube);
-    at[i] = locate_point(echo, rest, guess, in);
-  }
-  if (!(echo->frame.radius_m > 0)) {
-    vtranspose_float_x4(at, image);
-    for (int k = 0; k < 3; ++k)
-      vstore(s->place_m[k] + 4 * group, s->place[k] + image[0] * s->to_place[0][k] +
-                                            image[1] * s->to_place[1][k] +
-                                            image[2] * s->to_place[2][k]);
-    return;
-  }
-  for (uint32_t i = 0; i < 4; ++i) {
-    sonde_vec3 p = vec3((double)at[i][0], (double)at[i][1], (double)at[i][2]);
-    p = v_sub(sonde_echo_to_world(echo, p), s->corner);
-    for (int k = 0; k < 3; ++k) s->place_m[k][4 * group + i] = (float)v_coordinate(p, k);
-  }
-}
-
 uint32_t sonde_motion_displace(sonde_echo *echo, uint32_t first) {
   sonde_cubes *s = echo->cubes;
   uint32_t next = first;
@@ -199,7 +170,6 @@ uint32_t sonde_motion_displace(sonde_echo *echo, uint32_t first) {
     c->at = locate_point(echo, c->rest, from->at, c->axis);
     for (int k = 0; k < 3; ++k) c->axis[k] *= (float)echo->cell_m;
     if (echo->vessels) find_walls(echo, from, c);
-    if (c->by_walls) add_points(echo, c);
   }
   // Walls warp the points beside them, the field takes these, and the walls smooth them.
   const wall_job job = {s->groups,
@@ -209,9 +179,32 @@ uint32_t sonde_motion_displace(sonde_echo *echo, uint32_t first) {
                         s->warped,
                         s->place_m};
   echo->kernels->warp(&job);
+  const float per_cube = (float)(1 / echo->cell_m);
   for (const moved_cube *c = s->moved; c < s->moved + s->count; ++c)
-    for (uint32_t g = 0; c->by_walls && g < (c->close ? 2 : 1); ++g)
-      move_points(echo, c, c->group + g);
+    for (uint32_t g = 0; c->by_walls && g < (c->close ? 2 : 1); ++g) {
+      // Where the field takes the four warped points of a group, m from the corner.
+      const uint32_t group = c->group + g;
+      float_x4 at[4], image[4], in[3];
+      for (uint32_t i = 0; i < 4; ++i) {
+        const uint32_t n = 4 * group + i;
+        const float_x4 rest = {s->warped[0][n], s->warped[1][n], s->warped[2][n], 0};
+        const float_x4 guess = c->at + transform_point(c->axis, (rest - c->rest) * per_cube);
+        at[i] = locate_point(echo, rest, guess, in);
+      }
+      if (!(echo->frame.radius_m > 0)) {
+        vtranspose_float_x4(at, image);
+        for (int k = 0; k < 3; ++k)
+          vstore(s->place_m[k] + 4 * group, s->place[k] + image[0] * s->to_place[0][k] +
+                                                image[1] * s->to_place[1][k] +
+                                                image[2] * s->to_place[2][k]);
+        continue;
+      }
+      for (uint32_t i = 0; i < 4; ++i) {
+        sonde_vec3 p = vec3((double)at[i][0], (double)at[i][1], (double)at[i][2]);
+        p = v_sub(sonde_echo_to_world(echo, p), s->corner);
+        for (int k = 0; k < 3; ++k) s->place_m[k][4 * group + i] = (float)v_coordinate(p, k);
+      }
+    }
   echo->kernels->smooth(&job);
   return next;
 }

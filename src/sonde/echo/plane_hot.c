@@ -30,30 +30,6 @@ static bool in_view(const sonde_echo *echo, sonde_vec3 point, double reach_m) {
   return fabs(at.y) < reach && beside < reach && above < reach;
 }
 
-// The femoral vessels always, so that a leg without branches takes the same way through the stages.
-static void choose_view(sonde_echo *echo) {
-  const sonde_interior *in = echo->interior;
-  echo->shown[0] = 0, echo->shown[1] = 1, echo->shown_count = 2;
-  echo->vessels = in->section_count[0] > 0 || in->section_count[1] > 0;
-  for (uint32_t which = 2; which < in->vessel_count; ++which) {
-    const sonde_vessel_state *v = in->state[which];
-    bool seen = false;
-    for (uint32_t i = 0; i < in->section_count[which] && !seen; ++i)
-      seen = in_view(echo, v[i].centre_m, 4 * v[i].rest_radius_m);
-    if (seen) echo->shown[echo->shown_count++] = which, echo->vessels = true;
-  }
-  echo->lesion_count = 0;
-  for (uint32_t k = 0; k < in->findings.lesion_count; ++k) {
-    const sonde_lesion *l = &in->findings.lesion[k];
-    sonde_vec3 now = v_add(l->centre_m, sonde_interior_field(in, l->centre_m));
-    double reach = fmax(fmax(l->half_m.x, l->half_m.y), l->half_m.z);
-    if (in_view(echo, now, 1.5 * reach)) echo->lesion[echo->lesion_count++] = k;
-  }
-  echo->fields = lesion_field_at(echo->shown_count, echo->lesion_count, 0);
-  echo->levels = LAYER_LEVELS + echo->shown_count + echo->lesion_count;
-  SONDE_ASSERT(echo->fields <= MOST_FIELDS && echo->levels <= MOST_LEVELS);
-}
-
 // Fields of a node whose rest point is known.
 static void store_node(sonde_echo *echo, uint32_t node, sonde_vec3 point) {
   const uint32_t count = SONDE_PLANE_NODES;
@@ -218,7 +194,28 @@ void sonde_echo_plane(sonde_echo *echo) {
   sonde_column_point centre;
   (void)sonde_interior_locate(echo->interior, f->probe.position, &centre);
   echo->theta_centre = centre.theta;
-  choose_view(echo);
+  // The femoral vessels always, so that a leg without branches takes the same way through the
+  // stages.
+  const sonde_interior *in = echo->interior;
+  echo->shown[0] = 0, echo->shown[1] = 1, echo->shown_count = 2;
+  echo->vessels = in->section_count[0] > 0 || in->section_count[1] > 0;
+  for (uint32_t which = 2; which < in->vessel_count; ++which) {
+    const sonde_vessel_state *v = in->state[which];
+    bool seen = false;
+    for (uint32_t i = 0; i < in->section_count[which] && !seen; ++i)
+      seen = in_view(echo, v[i].centre_m, 4 * v[i].rest_radius_m);
+    if (seen) echo->shown[echo->shown_count++] = which, echo->vessels = true;
+  }
+  echo->lesion_count = 0;
+  for (uint32_t k = 0; k < in->findings.lesion_count; ++k) {
+    const sonde_lesion *l = &in->findings.lesion[k];
+    sonde_vec3 now = v_add(l->centre_m, sonde_interior_field(in, l->centre_m));
+    double reach = fmax(fmax(l->half_m.x, l->half_m.y), l->half_m.z);
+    if (in_view(echo, now, 1.5 * reach)) echo->lesion[echo->lesion_count++] = k;
+  }
+  echo->fields = lesion_field_at(echo->shown_count, echo->lesion_count, 0);
+  echo->levels = LAYER_LEVELS + echo->shown_count + echo->lesion_count;
+  SONDE_ASSERT(echo->fields <= MOST_FIELDS && echo->levels <= MOST_LEVELS);
   sonde_fields_begin(echo->motion, echo->interior, f->probe.position);
   for (uint32_t j = 0; j < echo->plane_rows; ++j) {
     seeker row[SONDE_PLANE_COLUMNS];

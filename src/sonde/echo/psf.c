@@ -52,46 +52,6 @@ static double sharpened(const double at[5], double second, double fourth) {
   return p + fourth * (at[0] - 4 * at[1] + 6 * at[2] - 4 * at[3] + at[4]);
 }
 
-// Across the samples of each line, then across the lines.
-static void sharpen(double table[][2 * ROWS], int lines, int rows) {
-  double at[5], row[2 * ROWS], column[SONDE_MOST_TAPS + 1];
-  for (int l = 0; l <= lines; ++l) {
-    memcpy(row, table[l], sizeof row);
-    for (int i = 0; i < 2 * rows; ++i) {
-      for (int k = -2; k <= 2; ++k) {
-        int j = i + 2 * k;
-        at[k + 2] = j >= 0 && j < 2 * rows ? row[j] : 0;
-      }
-      table[l][i] = sharpened(at, sample_second, sample_fourth);
-    }
-  }
-  for (int i = 0; i < 2 * rows; ++i) {
-    for (int l = 0; l <= lines; ++l) column[l] = table[l][i];
-    for (int l = 0; l <= lines; ++l) {
-      for (int k = -2; k <= 2; ++k) at[k + 2] = abs(l + k) <= lines ? column[abs(l + k)] : 0;
-      table[l][i] = sharpened(at, line_second, line_fourth);
-    }
-  }
-}
-
-// Adds the rows of a response to the lower triangle of the Gram matrix. Interfaces are the
-// brightest echoes: what a level sheet echoes, the sum over the lines, counts besides.
-static void add_gram(beam_psf *psf, int b) {
-  int rows = 2 * psf->half_rows + 1;
-  double sum[2 * ROWS] = {0};
-  for (int l = 0; l <= psf->half_lines; ++l) {
-    const double *p = psf->table[b][l];
-    double w = weight_of(l);
-    for (int i = 0; i < rows; ++i)
-      for (int j = 0; j <= i; ++j)
-        psf->gram[i][j] += w * (p[2 * i] * p[2 * j] + p[2 * i + 1] * p[2 * j + 1]);
-    for (int i = 0; i < 2 * rows; ++i) sum[i] += w * p[i];
-  }
-  for (int i = 0; i < rows; ++i)
-    for (int j = 0; j <= i; ++j)
-      psf->gram[i][j] += sheet_weight * (sum[2 * i] * sum[2 * j] + sum[2 * i + 1] * sum[2 * j + 1]);
-}
-
 static void orthonormalise(double v[SONDE_RANK][ROWS], int rows) {
   for (int k = 0; k < SONDE_RANK; ++k) {
     for (int m = 0; m < k; ++m) {
@@ -110,56 +70,6 @@ static void orthonormalise(double v[SONDE_RANK][ROWS], int rows) {
 static double pulse_rows(const beam_psf *psf) {
   sonde_array a = sonde_beam_array(&psf->key);
   return a.pulse_wavelengths * a.sound_m_s / a.frequency_hz / 2.35482 / psf->key.step_m;
-}
-
-// Shared axial kernels: the leading vectors of the Gram matrix by subspace iteration.
-static void find_axial(beam_psf *psf) {
-  int rows = 2 * psf->half_rows + 1;
-  double product[SONDE_RANK][ROWS], sigma = pulse_rows(psf);
-  for (int i = 0; i < rows; ++i)
-    for (int j = 0; j < i; ++j) psf->gram[j][i] = psf->gram[i][j];
-  for (int i = 0; i < rows; ++i) {
-    double x = (i - psf->half_rows) / sigma, e = exp(-0.5 * x * x);
-    psf->axial[0][i] = e, psf->axial[1][i] = x * e, psf->axial[2][i] = (x * x - 1) * e;
-  }
-  orthonormalise(psf->axial, rows);
-  for (int step = 0; step < ITERATIONS; ++step) {
-    for (int k = 0; k < SONDE_RANK; ++k)
-      for (int i = 0; i < rows; ++i) {
-        double sum = 0;
-        for (int j = 0; j < rows; ++j) sum += psf->gram[i][j] * psf->axial[k][j];
-        product[k][i] = sum;
-      }
-    memcpy(psf->axial, product, sizeof product);
-    orthonormalise(psf->axial, rows);
-  }
-}
-
-// Every column of a level sheet holds 1 on a row: the lateral kernels add up, and the echo's energy
-// along the rows is that of a plain pulse whose peak is the sheet's echo. Of the three rows that a
-// point is shared between, the middle one holds 3/4.
-static void measure_sheet(beam_psf *psf, int b) {
-  const double beside = 0.125, middle = 0.75;
-  double sum[SONDE_RANK][2], energy = 0, before[2] = {0}, here[2] = {0};
-  for (int k = 0; k < SONDE_RANK; ++k) {
-    sum[k][0] = sum[k][1] = 0;
-    for (int l = 0; l <= psf->half[b]; ++l) {
-      const float *tap = psf->lateral[b][l][k];
-      sum[k][0] += weight_of(l) * (double)tap[0];
-      sum[k][1] += weight_of(l) * ((double)tap[2] - (double)tap[0]);
-    }
-  }
-  for (int i = 0; i <= 2 * psf->half_rows + 2; ++i) {
-    double next[2] = {0};
-    for (int k = 0; k < SONDE_RANK && i <= 2 * psf->half_rows; ++k)
-      next[0] += sum[k][0] * psf->axial[k][i], next[1] += sum[k][1] * psf->axial[k][i];
-    for (int part = 0; part < 2; ++part) {
-      double echo = beside * before[part] + middle * here[part] + beside * next[part];
-      energy += echo * echo, before[part] = here[part], here[part] = next[part];
-    }
-  }
-  psf->sheet[b] = sqrt(energy / (pulse_rows(psf) * sqrt(SONDE_PI)));
-  SONDE_ASSERT(psf->sheet[b] > 0);
 }
 
 // Lateral kernels that belong to the axial ones at a depth, and how far they reach.
@@ -188,6 +98,30 @@ static void find_lateral(beam_psf *psf, int b) {
   int half = psf->half_lines;
   while (half > 1 && beyond + kept[half] < lost * energy) beyond += kept[half--];
   psf->half[b] = half;
+  // Every column of a level sheet holds 1 on a row: the lateral kernels add up, and the echo's
+  // energy along the rows is that of a plain pulse whose peak is the sheet's echo. Of the three
+  // rows that a point is shared between, the middle one holds 3/4.
+  const double beside = 0.125, middle = 0.75;
+  double sum[SONDE_RANK][2], sheet_energy = 0, before[2] = {0}, here[2] = {0};
+  for (int k = 0; k < SONDE_RANK; ++k) {
+    sum[k][0] = sum[k][1] = 0;
+    for (int l = 0; l <= psf->half[b]; ++l) {
+      const float *tap = psf->lateral[b][l][k];
+      sum[k][0] += weight_of(l) * (double)tap[0];
+      sum[k][1] += weight_of(l) * ((double)tap[2] - (double)tap[0]);
+    }
+  }
+  for (int i = 0; i <= 2 * psf->half_rows + 2; ++i) {
+    double next[2] = {0};
+    for (int k = 0; k < SONDE_RANK && i <= 2 * psf->half_rows; ++k)
+      next[0] += sum[k][0] * psf->axial[k][i], next[1] += sum[k][1] * psf->axial[k][i];
+    for (int part = 0; part < 2; ++part) {
+      double echo = beside * before[part] + middle * here[part] + beside * next[part];
+      sheet_energy += echo * echo, before[part] = here[part], here[part] = next[part];
+    }
+  }
+  psf->sheet[b] = sqrt(sheet_energy / (pulse_rows(psf) * sqrt(SONDE_PI)));
+  SONDE_ASSERT(psf->sheet[b] > 0);
 }
 
 static int taps(double reach_m, double step_m) {
@@ -247,19 +181,71 @@ static void tabulate(beam_psf *psf, int b) {
   const double scale = energy > 0 ? 1 / sqrt(energy) : 0;
   for (int l = 0; l <= psf->half_lines; ++l)
     for (int i = 0; i < 2 * rows; ++i) psf->table[b][l][i] *= scale;
-  sharpen(psf->table[b], psf->half_lines, rows);
+  // It is sharpened across the samples of each line, then across the lines.
+  double at[5], row[2 * ROWS], column[SONDE_MOST_TAPS + 1];
+  for (int l = 0; l <= psf->half_lines; ++l) {
+    memcpy(row, psf->table[b][l], sizeof row);
+    for (int i = 0; i < 2 * rows; ++i) {
+      for (int n = -2; n <= 2; ++n) {
+        int j = i + 2 * n;
+        at[n + 2] = j >= 0 && j < 2 * rows ? row[j] : 0;
+      }
+      psf->table[b][l][i] = sharpened(at, sample_second, sample_fourth);
+    }
+  }
+  for (int i = 0; i < 2 * rows; ++i) {
+    for (int l = 0; l <= psf->half_lines; ++l) column[l] = psf->table[b][l][i];
+    for (int l = 0; l <= psf->half_lines; ++l) {
+      for (int n = -2; n <= 2; ++n)
+        at[n + 2] = abs(l + n) <= psf->half_lines ? column[abs(l + n)] : 0;
+      psf->table[b][l][i] = sharpened(at, line_second, line_fourth);
+    }
+  }
 }
 
 bool sonde_psf_step(beam_psf *psf) {
   SONDE_ASSERT(psf != NULL && psf->step >= 0 && psf->step <= SONDE_PSF_STEPS);
   if (psf->step == SONDE_PSF_STEPS) return true;
+  const int rows = 2 * psf->half_rows + 1;
   if (psf->step < SONDE_PSF_DEPTHS) {
     tabulate(psf, psf->step);
-    add_gram(psf, psf->step);
+    // Adds the rows of a response to the lower triangle of the Gram matrix. Interfaces are the
+    // brightest echoes: what a level sheet echoes, the sum over the lines, counts besides.
+    double sum[2 * ROWS] = {0};
+    for (int l = 0; l <= psf->half_lines; ++l) {
+      const double *p = psf->table[psf->step][l];
+      double w = weight_of(l);
+      for (int i = 0; i < rows; ++i)
+        for (int j = 0; j <= i; ++j)
+          psf->gram[i][j] += w * (p[2 * i] * p[2 * j] + p[2 * i + 1] * p[2 * j + 1]);
+      for (int i = 0; i < 2 * rows; ++i) sum[i] += w * p[i];
+    }
+    for (int i = 0; i < rows; ++i)
+      for (int j = 0; j <= i; ++j)
+        psf->gram[i][j] +=
+            sheet_weight * (sum[2 * i] * sum[2 * j] + sum[2 * i + 1] * sum[2 * j + 1]);
   } else if (psf->step == SONDE_PSF_DEPTHS) {
-    find_axial(psf);
+    // Shared axial kernels: the leading vectors of the Gram matrix by subspace iteration.
+    double product[SONDE_RANK][ROWS], sigma = pulse_rows(psf);
+    for (int i = 0; i < rows; ++i)
+      for (int j = 0; j < i; ++j) psf->gram[j][i] = psf->gram[i][j];
+    for (int i = 0; i < rows; ++i) {
+      double x = (i - psf->half_rows) / sigma, e = exp(-0.5 * x * x);
+      psf->axial[0][i] = e, psf->axial[1][i] = x * e, psf->axial[2][i] = (x * x - 1) * e;
+    }
+    orthonormalise(psf->axial, rows);
+    for (int step = 0; step < ITERATIONS; ++step) {
+      for (int k = 0; k < SONDE_RANK; ++k)
+        for (int i = 0; i < rows; ++i) {
+          double sum = 0;
+          for (int j = 0; j < rows; ++j) sum += psf->gram[i][j] * psf->axial[k][j];
+          product[k][i] = sum;
+        }
+      memcpy(psf->axial, product, sizeof product);
+      orthonormalise(psf->axial, rows);
+    }
   } else {
-    for (int b = 0; b < SONDE_PSF_DEPTHS; ++b) find_lateral(psf, b), measure_sheet(psf, b);
+    for (int b = 0; b < SONDE_PSF_DEPTHS; ++b) find_lateral(psf, b);
   }
   return ++psf->step == SONDE_PSF_STEPS;
 }

@@ -100,39 +100,6 @@ static void turn(double angle, double *c, double *s) {
   *c = sign * p, *s = sign * x * q;
 }
 
-// The transmitted wave's table: Gaussian pulses of all transmitting elements, each on equal steps
-// by two multiplications per value.
-static void wave_at(const sonde_array *a, double x, double z, wave *w) {
-  double sigma = pulse_sigma(a), k = 2 * SONDE_PI / wavelength(a);
-  double send = reach(a, a->focus_m / a->transmit_f), path[MOST], size[MOST];
-  int half = (int)(send + 0.5);
-  SONDE_ASSERT(2 * half + 1 <= MOST);
-  double low = 1e9, high = -1e9;
-  for (int i = -half; i <= half; ++i) {
-    double p = 0.5 * (aim(a, i, x, z, &size[i + half]) - delay(a, i, a->focus_m));
-    path[i + half] = p;
-    size[i + half] *= share(send, i);
-    low = fmin(low, p), high = fmax(high, p);
-  }
-  w->first = low - 5 * sigma;
-  w->step = fmax(sigma / PER_SIGMA, (high - low + 10 * sigma) / (TABLE - 2));
-  w->count = (int)((high - low + 10 * sigma) / w->step) + 2;
-  for (int n = 0; n < w->count; ++n) w->value[n][0] = w->value[n][1] = 0;
-  const double q = w->step / sigma, shrink = exp(-q * q);
-  for (int i = 0; i <= 2 * half; ++i) {
-    const double at = path[i], re = size[i] * cos(2 * k * at), im = -size[i] * sin(2 * k * at);
-    int first = (int)ceil((at - 5 * sigma - w->first) / w->step);
-    int last = (int)floor((at + 5 * sigma - w->first) / w->step);
-    first = first < 0 ? 0 : first, last = last < w->count ? last : w->count - 1;
-    double start = (w->first + first * w->step - at) / sigma;
-    double g = exp(-0.5 * start * start), ratio = exp(-start * q - 0.5 * q * q);
-    for (int n = first; n <= last; ++n) {
-      w->value[n][0] += g * re, w->value[n][1] += g * im;
-      g *= ratio, ratio *= shrink;
-    }
-  }
-}
-
 void sonde_array_line(const sonde_array *a, double x_m, double z_m, double first_m, double step_m,
                       uint32_t count, double *echo) {
   SONDE_ASSERT(a != NULL && echo != NULL && step_m > 0);
@@ -142,7 +109,36 @@ void sonde_array_line(const sonde_array *a, double x_m, double z_m, double first
   const int most = (int)(reach(a, fmax(last, z_m) / a->receive_f) + 0.5);
   SONDE_ASSERT(2 * most + 1 <= MOST);
   for (int j = -most; j <= most; ++j) length[j + most] = aim(a, j, x_m, z_m, &back[j + most]);
-  wave_at(a, x_m, z_m, &w);
+  // The transmitted wave's table: Gaussian pulses of all transmitting elements, each on equal steps
+  // by two multiplications per value.
+  double sigma = pulse_sigma(a);
+  double send = reach(a, a->focus_m / a->transmit_f), path[MOST], weight[MOST];
+  int sending = (int)(send + 0.5);
+  SONDE_ASSERT(2 * sending + 1 <= MOST);
+  double low = 1e9, high = -1e9;
+  for (int i = -sending; i <= sending; ++i) {
+    double p = 0.5 * (aim(a, i, x_m, z_m, &weight[i + sending]) - delay(a, i, a->focus_m));
+    path[i + sending] = p;
+    weight[i + sending] *= share(send, i);
+    low = fmin(low, p), high = fmax(high, p);
+  }
+  w.first = low - 5 * sigma;
+  w.step = fmax(sigma / PER_SIGMA, (high - low + 10 * sigma) / (TABLE - 2));
+  w.count = (int)((high - low + 10 * sigma) / w.step) + 2;
+  for (int n = 0; n < w.count; ++n) w.value[n][0] = w.value[n][1] = 0;
+  const double q = w.step / sigma, shrink = exp(-q * q);
+  for (int i = 0; i <= 2 * sending; ++i) {
+    const double at = path[i], re = weight[i] * cos(2 * k * at), im = -weight[i] * sin(2 * k * at);
+    int from = (int)ceil((at - 5 * sigma - w.first) / w.step);
+    int to = (int)floor((at + 5 * sigma - w.first) / w.step);
+    from = from < 0 ? 0 : from, to = to < w.count ? to : w.count - 1;
+    double start = (w.first + from * w.step - at) / sigma;
+    double g = exp(-0.5 * start * start), ratio = exp(-start * q - 0.5 * q * q);
+    for (int n = from; n <= to; ++n) {
+      w.value[n][0] += g * re, w.value[n][1] += g * im;
+      g *= ratio, ratio *= shrink;
+    }
+  }
   for (uint32_t sample = 0; sample < count; ++sample, echo += 2) {
     // Sum over the receiving elements of the aperture that belongs to the depth.
     const double depth = first_m + sample * step_m, take = reach(a, depth / a->receive_f);

@@ -36,17 +36,6 @@ static window window_of(const sonde_echo_view *view, double depth_m, double half
   return w;
 }
 
-// Pearson's coefficient over a window.
-static double correlate(const float *a, const float *b, uint32_t stride, const window *w) {
-  double n = 0, sa = 0, sb = 0, aa = 0, bb = 0, ab = 0;
-  for (uint32_t s = w->samples[0]; s <= w->samples[1]; ++s)
-    for (uint32_t l = w->lines[0]; l <= w->lines[1]; ++l) {
-      double x = (double)a[(size_t)s * stride + l], y = (double)b[(size_t)s * stride + l];
-      n += 1, sa += x, sb += y, aa += x * x, bb += y * y, ab += x * y;
-    }
-  return (ab - sa * sb / n) / sqrt((aa - sa * sa / n) * (bb - sb * sb / n));
-}
-
 // Envelope of the fast image.
 static const float *draw(const sonde_echo_view *v, const sonde_echo_point *p, uint32_t count) {
   uint32_t lines, samples;
@@ -66,7 +55,18 @@ sonde_status sonde_echo_likeness(const sonde_echo_view *view, double depth_m, ui
     fill_block(points, count, depth_m, seed);
     status = sonde_echo_reference_points(view->echo, view->aperture_m, &view->settings, points,
                                          count, w.lines, w.samples, exact, error);
-    if (!status) *likeness = correlate(draw(view, points, count), exact, view->echo->lines, &w);
+    if (!status) {
+      // Pearson's coefficient over the window.
+      const float *fast = draw(view, points, count);
+      double n = 0, sa = 0, sb = 0, aa = 0, bb = 0, ab = 0;
+      for (uint32_t s = w.samples[0]; s <= w.samples[1]; ++s)
+        for (uint32_t l = w.lines[0]; l <= w.lines[1]; ++l) {
+          double x = (double)fast[(size_t)s * view->echo->lines + l],
+                 y = (double)exact[(size_t)s * view->echo->lines + l];
+          n += 1, sa += x, sb += y, aa += x * x, bb += y * y, ab += x * y;
+        }
+      *likeness = (ab - sa * sb / n) / sqrt((aa - sa * sa / n) * (bb - sb * sb / n));
+    }
   }
   sonde_free(points);
   sonde_free(exact);
