@@ -73,6 +73,32 @@ static void put_vein(sonde_json_out *out, const sonde_exam_report *exam) {
   sonde_json_end(out);
 }
 
+// ---- traces -------------------------------------------------------------------------------------
+
+// Force and area of the vein over time: at most 900 points, each with the greatest force and the
+// least area of its samples, so that every peak stays. fmax() and fmin() leave NaN out.
+static void put_traces(sonde_json_out *out, const sonde_exam_report *exam) {
+  enum { POINTS = 900, TIME = 0, FORCE = 1, VEIN = 2 };
+  static const char *const KEYS[] = {"time_s", "force_n", "vein"};
+  uint32_t count = exam->sample_count, per = (count + POINTS - 1) / POINTS;
+  SONDE_ASSERT(count == 0 || exam->samples);
+  sonde_json_begin_object(out, "traces");
+  for (int k = TIME; k <= VEIN; ++k) {
+    sonde_json_begin_list(out, KEYS[k]);
+    for (uint32_t from = 0; from < count; from += per) {
+      uint32_t end = from + per < count ? from + per : count;
+      double value = (double)NAN;
+      if (k == TIME) value = 0.5 * (exam->samples[from].time_s + exam->samples[end - 1].time_s);
+      for (uint32_t i = from; i < end && k != TIME; ++i)
+        value = k == FORCE ? fmax(value, exam->samples[i].force_n)
+                           : fmin(value, exam->samples[i].vein_ratio);
+      sonde_json_put_real(out, NULL, value, k == TIME ? 7 : 5);
+    }
+    sonde_json_end(out);
+  }
+  sonde_json_end(out);
+}
+
 // ---- earlier exams ------------------------------------------------------------------------------
 
 // This exam and the trainee's earlier ones, newest first, and the learning curve through them.
@@ -206,29 +232,7 @@ sonde_status sonde_exam_report_json(const sonde_exam_report *exam, char **text, 
   sonde_json_end(&out);
 
   put_vein(&out, exam);
-
-  // Force and area of the vein over time: at most 900 points, each with the greatest force and the
-  // least area of its samples, so that every peak stays. fmax() and fmin() leave NaN out.
-  enum { POINTS = 900, TIME = 0, FORCE = 1, VEIN = 2 };
-  static const char *const KEYS[] = {"time_s", "force_n", "vein"};
-  uint32_t count = exam->sample_count, per = (count + POINTS - 1) / POINTS;
-  SONDE_ASSERT(count == 0 || exam->samples);
-  sonde_json_begin_object(&out, "traces");
-  for (int k = TIME; k <= VEIN; ++k) {
-    sonde_json_begin_list(&out, KEYS[k]);
-    for (uint32_t from = 0; from < count; from += per) {
-      uint32_t end = from + per < count ? from + per : count;
-      double value = (double)NAN;
-      if (k == TIME) value = 0.5 * (exam->samples[from].time_s + exam->samples[end - 1].time_s);
-      for (uint32_t i = from; i < end && k != TIME; ++i)
-        value = k == FORCE ? fmax(value, exam->samples[i].force_n)
-                           : fmin(value, exam->samples[i].vein_ratio);
-      sonde_json_put_real(&out, NULL, value, k == TIME ? 7 : 5);
-    }
-    sonde_json_end(&out);
-  }
-  sonde_json_end(&out);
-
+  put_traces(&out, exam);
   status = sonde_put_pictures(&out, exam, error);
   if (!status) status = put_history(&out, exam, error);
   if (status) {

@@ -50,25 +50,23 @@ void sonde_safety_motion(sonde_safety *safety, sonde_vec3 position_m, double dt_
     sonde_safety_trip(safety, SONDE_FAULT_IMPULSE);
 }
 
-static double cap_n(sonde_safety *safety, double dt_s) {
-  const sonde_safety_limits *limits = &safety->limits;
-  if (!(limits->continuous_n > 0.0)) return limits->force_n;
-  double load = v_norm2(safety->force_n) / (limits->continuous_n * limits->continuous_n);
-  double share = fmin(dt_s / limits->thermal_s, 1.0);
-  safety->heat += share * (load - safety->heat);
-  double cool = clamp(5.0 * (1.0 - safety->heat), 0.0, 1.0);
-  return fmin(limits->force_n,
-              limits->continuous_n + cool * fmax(limits->force_n - limits->continuous_n, 0.0));
-}
-
 void sonde_safety_apply(sonde_safety *safety, sonde_vec3 force_n, sonde_vec3 torque_n_m,
                         double dt_s) {
   SONDE_ASSERT(dt_s > 0.0);
   if (!v_finite(force_n) || !v_finite(torque_n_m))
     sonde_safety_trip(safety, SONDE_FAULT_NON_FINITE);
-  double cap = cap_n(safety, dt_s);
+  // A hot motor is held to what it can give for long.
+  const sonde_safety_limits *limits = &safety->limits;
+  double cap = limits->force_n;
+  if (limits->continuous_n > 0.0) {
+    double load = v_norm2(safety->force_n) / (limits->continuous_n * limits->continuous_n);
+    double share = fmin(dt_s / limits->thermal_s, 1.0);
+    safety->heat += share * (load - safety->heat);
+    double cool = clamp(5.0 * (1.0 - safety->heat), 0.0, 1.0);
+    cap = fmin(limits->force_n,
+               limits->continuous_n + cool * fmax(limits->force_n - limits->continuous_n, 0.0));
+  }
   if (safety->fault == SONDE_FAULT_NONE) {
-    const sonde_safety_limits *limits = &safety->limits;
     bool acted = false;
     double step = limits->soft_start_s > 0.0 ? dt_s / limits->soft_start_s : 1.0;
     safety->gain = fmin(1.0, safety->gain + step);
