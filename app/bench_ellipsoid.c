@@ -11,22 +11,6 @@
 static const double RADII_M[3] = {0.10, 0.04, 0.04};
 static const double RADIAL_N_M3 = 5e5, MASS_KG = 5, CONTACT_N_M3 = 2e7;
 
-// Vertices and faces of the icosahedron, a vertex on +z.
-static void corners(double v[12][3], int faces[20][3]) {
-  double height = 1 / sqrt(5.0), ring = 2 / sqrt(5.0), turn = 4 * atan(1.0) / 5;
-  memset(v, 0, 12 * sizeof *v);
-  v[0][2] = 1, v[11][2] = -1;
-  for (int k = 0; k < 5; ++k) {
-    for (int low = 0; low < 2; ++low) {
-      double *p = v[1 + k + 5 * low], angle = turn * (2 * k + low);
-      p[0] = ring * cos(angle), p[1] = ring * sin(angle), p[2] = low ? -height : height;
-    }
-    int a = 1 + k, b = 1 + (k + 1) % 5, c = 6 + k, d = 6 + (k + 1) % 5;
-    const int four[4][3] = {{0, a, b}, {a, c, b}, {b, c, d}, {11, d, c}};
-    memcpy(faces[4 * k], four, sizeof four);
-  }
-}
-
 typedef struct point {
   double at[3];
   uint32_t place; // in the list with repetitions
@@ -45,7 +29,7 @@ static uint32_t row_start(uint32_t f, uint32_t i) { return i * (f + 1) - i * (i 
 static sonde_status geodesic(uint32_t f, double size, sonde_mesh *mesh, sonde_error *error) {
   assert(f > 0 && size > 0);
   uint32_t per_face = (f + 1) * (f + 2) / 2, count = 20 * per_face, used = 0;
-  double v[12][3];
+  double v[12][3] = {0};
   int faces[20][3];
   sonde_status status = sonde_mesh_create(mesh, 10 * f * f + 2, 20 * f * f, error);
   if (status) return status;
@@ -57,8 +41,20 @@ static sonde_status geodesic(uint32_t f, double size, sonde_mesh *mesh, sonde_er
     return error->status = SONDE_MEMORY;
   }
 
+  // Vertices and faces of the icosahedron, a vertex on +z.
+  double height = 1 / sqrt(5.0), ring = 2 / sqrt(5.0), turn = 4 * atan(1.0) / 5;
+  v[0][2] = 1, v[11][2] = -1;
+  for (int k = 0; k < 5; ++k) {
+    for (int low = 0; low < 2; ++low) {
+      double *p = v[1 + k + 5 * low], angle = turn * (2 * k + low);
+      p[0] = ring * cos(angle), p[1] = ring * sin(angle), p[2] = low ? -height : height;
+    }
+    int a = 1 + k, b = 1 + (k + 1) % 5, c = 6 + k, d = 6 + (k + 1) % 5;
+    const int four[4][3] = {{0, a, b}, {a, c, b}, {b, c, d}, {11, d, c}};
+    memcpy(faces[4 * k], four, sizeof four);
+  }
+
   // Points of every face on the unit sphere; those on its edges repeat.
-  corners(v, faces);
   for (uint32_t k = 0; k < 20; ++k)
     for (uint32_t i = 0; i <= f; ++i)
       for (uint32_t j = 0; i + j <= f; ++j, ++out) {

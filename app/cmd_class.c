@@ -150,19 +150,6 @@ static void draw(const class_room *room) {
   fflush(stdout);
 }
 
-static void tell_changes(const class_room *room, char told[CLASS_LEARNERS][128]) {
-  for (uint32_t i = 0; i < room->count; ++i) {
-    const class_learner *learner = &room->learner[i];
-    char line[128], elapsed[16], score[16];
-    numbers_of(&learner->status, elapsed, score);
-    snprintf(line, sizeof line, "%s, case %.60s, score %s", state_of(learner),
-             learner->status.patient[0] ? learner->status.patient : "-", score);
-    if (strcmp(line, told[i]) == 0) continue;
-    memcpy(told[i], line, sizeof line);
-    say(learner, line);
-  }
-}
-
 // ---- a class
 
 static void print_address(const char *whose, uint16_t port, const char *token) {
@@ -201,10 +188,17 @@ static int run_class(class_room *room) {
     if (class_now_s() >= ask_s) {
       class_ask(room);
       ask_s = class_now_s() + 1;
-      if (screen.terminal)
-        draw(room);
-      else
-        tell_changes(room, told);
+      if (screen.terminal) draw(room);
+      for (uint32_t i = 0; !screen.terminal && i < room->count; ++i) {
+        const class_learner *learner = &room->learner[i];
+        char line[128], elapsed[16], score[16];
+        numbers_of(&learner->status, elapsed, score);
+        snprintf(line, sizeof line, "%s, case %.60s, score %s", state_of(learner),
+                 learner->status.patient[0] ? learner->status.patient : "-", score);
+        if (strcmp(line, told[i]) == 0) continue;
+        memcpy(told[i], line, sizeof line);
+        say(learner, line);
+      }
     }
     if (screen.terminal && !screen.lines) draw(room); // something was said
     nanosleep(&(struct timespec){.tv_nsec = 200000000}, NULL);

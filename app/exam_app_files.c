@@ -122,26 +122,6 @@ sonde_status exam_setup_text(const exam *of, char **text, sonde_error *error) {
   return status;
 }
 
-// The note that says that the exam was finished, and the journal's end. Inputs that are missing for
-// good are told once; the rest of the exam is kept all the same.
-static sonde_status finish_journal(exam_app *app, exam *of, sonde_error *error) {
-  if (!of->noted) {
-    char *text = NULL;
-    sonde_log_entry entry = entry_of(of);
-    sonde_status status = sonde_log_entry_text(&entry, &text, error);
-    if (!status)
-      status = sonde_session_note(app->session, SONDE_NOTE_SCORE, of->seen_tick, text, error);
-    sonde_free(text);
-    if (status) return status;
-    of->noted = true;
-  }
-  sonde_status status = sonde_session_finish(app->session, error);
-  of->in_journal = sonde_session_recording(app->session).finished;
-  if (!status || !of->in_journal) return status;
-  sonde_page_tell(app->server, error->message);
-  return SONDE_OK;
-}
-
 // ---- the disk
 
 static void tell_disk(exam_app *app, double now_s, const char *sentence) {
@@ -157,7 +137,26 @@ void exam_app_keep(exam_app *app) {
   bool kept = !of || !of->scored || (of->in_journal && of->filed && of->logged);
   if (kept || !app->session || now_s < of->retry_s) return;
   sonde_error error = {0}, own = {0};
-  sonde_status status = of->in_journal ? SONDE_OK : finish_journal(app, of, &error);
+  sonde_status status = SONDE_OK;
+  // The note that says that the exam was finished, and the journal's end. Inputs that are missing
+  // for good are told once; the rest of the exam is kept all the same.
+  if (!of->in_journal && !of->noted) {
+    char *text = NULL;
+    sonde_log_entry entry = entry_of(of);
+    status = sonde_log_entry_text(&entry, &text, &error);
+    if (!status)
+      status = sonde_session_note(app->session, SONDE_NOTE_SCORE, of->seen_tick, text, &error);
+    sonde_free(text);
+    of->noted = !status;
+  }
+  if (!of->in_journal && !status) {
+    status = sonde_session_finish(app->session, &error);
+    of->in_journal = sonde_session_recording(app->session).finished;
+    if (status && of->in_journal) {
+      sonde_page_tell(app->server, error.message);
+      status = SONDE_OK;
+    }
+  }
   sonde_status saved = exam_save(app->log, of, &own);
   if (!status && saved) error = own;
   if (!status && !saved) {

@@ -108,37 +108,6 @@ sonde_status exam_replay_seek(exam_app *app, double time_s, sonde_error *error) 
   return status;
 }
 
-// While the exam runs and while its result is shown, into the recording that is being made or that
-// was ended with the exam; the report is then written again.
-static sonde_status comment_exam(exam_app *app, sonde_comment *comment, sonde_error *error) {
-  exam *of = app->exam;
-  sonde_comments *all = &of->comments;
-  pthread_mutex_lock(&app->lock);
-  comment->time_s = sonde_judge_state(of->judge).time_s;
-  uint64_t tick = of->seen_tick;
-  pthread_mutex_unlock(&app->lock);
-  if (all->count == SONDE_MAX_COMMENTS)
-    return app_error(error, SONDE_ARGUMENT, "an exam takes at most %d comments",
-                     SONDE_MAX_COMMENTS);
-  sonde_comment *list = realloc(all->list, (all->count + 1) * sizeof *list);
-  if (!list) return app_error(error, SONDE_MEMORY, "out of memory");
-  all->list = list;
-  sonde_status status;
-  if (of->in_journal) {
-    char path[EXAM_PATH];
-    status = sonde_comments_add(exam_app_path(path, of->directory, "exam.rec"), comment, error);
-  } else {
-    char *text = sonde_comment_json(comment, error);
-    if (!text) return error->status;
-    status = sonde_session_note(app->session, SONDE_NOTE_COMMENT, tick, text, error);
-    sonde_free(text);
-  }
-  if (status) return status;
-  list[all->count++] = *comment;
-  of->filed = false;
-  return SONDE_OK;
-}
-
 sonde_status exam_app_comment(exam_app *app, const sonde_page_request *request,
                               sonde_error *error) {
   exam_replay *replay = app->replay;
@@ -153,8 +122,37 @@ sonde_status exam_app_comment(exam_app *app, const sonde_page_request *request,
     return sonde_comments_load(replay->recording, &replay->comments, error);
   }
   bool shown = app->phase == EXAM_RUNNING || app->phase == EXAM_DONE;
-  if (shown && app->exam && app->session) return comment_exam(app, &comment, error);
-  return app_error(error, SONDE_ARGUMENT, "there is no exam to comment on");
+  if (!shown || !app->exam || !app->session)
+    return app_error(error, SONDE_ARGUMENT, "there is no exam to comment on");
+
+  // While the exam runs and while its result is shown, into the recording that is being made or
+  // that was ended with the exam; the report is then written again.
+  exam *of = app->exam;
+  sonde_comments *all = &of->comments;
+  pthread_mutex_lock(&app->lock);
+  comment.time_s = sonde_judge_state(of->judge).time_s;
+  uint64_t tick = of->seen_tick;
+  pthread_mutex_unlock(&app->lock);
+  if (all->count == SONDE_MAX_COMMENTS)
+    return app_error(error, SONDE_ARGUMENT, "an exam takes at most %d comments",
+                     SONDE_MAX_COMMENTS);
+  sonde_comment *list = realloc(all->list, (all->count + 1) * sizeof *list);
+  if (!list) return app_error(error, SONDE_MEMORY, "out of memory");
+  all->list = list;
+  sonde_status status;
+  if (of->in_journal) {
+    char path[EXAM_PATH];
+    status = sonde_comments_add(exam_app_path(path, of->directory, "exam.rec"), &comment, error);
+  } else {
+    char *text = sonde_comment_json(&comment, error);
+    if (!text) return error->status;
+    status = sonde_session_note(app->session, SONDE_NOTE_COMMENT, tick, text, error);
+    sonde_free(text);
+  }
+  if (status) return status;
+  list[all->count++] = comment;
+  of->filed = false;
+  return SONDE_OK;
 }
 
 void exam_replay_destroy(exam_replay *replay) {

@@ -22,29 +22,6 @@ static int by_name(const struct dirent **a, const struct dirent **b) {
 
 static int is_visible(const struct dirent *entry) { return entry->d_name[0] != '.'; }
 
-// In the order of the exams, so that each report knows the ones before.
-static bool derive_all(recovery *r) {
-  struct dirent **names = NULL;
-  int count = scandir(r->directory, &names, is_visible, by_name);
-  bool cancelled = false;
-  for (int i = 0; i < count; ++i) {
-    bool derived = false;
-    sonde_error error = {0};
-    sonde_status status = SONDE_OK;
-    if (!cancelled)
-      status = exam_derive(&r->places, r->directory, names[i]->d_name, r->log, &derived, &error);
-    if (status && status != SONDE_CANCELLED) {
-      fprintf(stderr, "sonde exam: %s: %s\n", names[i]->d_name, error.message);
-      r->failed++;
-    }
-    cancelled |= status == SONDE_CANCELLED;
-    r->derived += derived;
-    free(names[i]);
-  }
-  free(names);
-  return !cancelled;
-}
-
 int exam_recover(const exam_library *library, const char *directory, bool json) {
   char path[EXAM_PATH];
   sonde_error error = {0};
@@ -55,7 +32,26 @@ int exam_recover(const exam_library *library, const char *directory, bool json) 
   if (sonde_exam_log_open(path, &r.log, &error)) return app_fail("exam", &error);
   exam_recover_log(directory, r.log, &r.found);
   if (r.found.unreadable) fprintf(stderr, "sonde exam: %s\n", r.found.worst);
-  bool whole = derive_all(&r);
+
+  // In the order of the exams, so that each report knows the ones before.
+  struct dirent **names = NULL;
+  int count = scandir(r.directory, &names, is_visible, by_name);
+  bool cancelled = false;
+  for (int i = 0; i < count; ++i) {
+    bool derived = false;
+    error = (sonde_error){0};
+    sonde_status status = SONDE_OK;
+    if (!cancelled)
+      status = exam_derive(&r.places, r.directory, names[i]->d_name, r.log, &derived, &error);
+    if (status && status != SONDE_CANCELLED) {
+      fprintf(stderr, "sonde exam: %s: %s\n", names[i]->d_name, error.message);
+      r.failed++;
+    }
+    cancelled |= status == SONDE_CANCELLED;
+    r.derived += derived;
+    free(names[i]);
+  }
+  free(names);
   sonde_exam_log_close(r.log);
   const exam_recovered *f = &r.found;
   if (json) {
@@ -78,6 +74,6 @@ int exam_recover(const exam_library *library, const char *directory, bool json) 
       printf("exams that did not begin, since the disk was full or the program ended: %u\n",
              f->never_began);
   }
-  if (!whole) fprintf(stderr, "sonde exam: cancelled; what was made is kept\n");
-  return whole && r.found.unreadable == 0 && r.failed == 0 ? APP_OK : APP_FAILED;
+  if (cancelled) fprintf(stderr, "sonde exam: cancelled; what was made is kept\n");
+  return !cancelled && r.found.unreadable == 0 && r.failed == 0 ? APP_OK : APP_FAILED;
 }

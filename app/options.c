@@ -221,48 +221,45 @@ static int check_rules(const app_command *c) {
 static int print_help(const app_command *command, const void *defaults);
 static int print_json(const app_command *command, const void *defaults);
 
-// One word that begins with '-', and its value, which may be the next word. APP_OK: taken.
-static int read_option(int argc, char **argv, int *at, void *options) {
-  const char *word = argv[*at], *verb = now.command->verb, *value = NULL;
-  bool is_long = word[1] == '-';
-  size_t length = is_long ? strcspn(word + 2, "=") : 1;
-  int k = find_name(word + 1 + is_long, length);
-
-  // A long name may be cut short where only one begins so.
-  int matches = 0, match = -1;
-  for (uint32_t j = 0; is_long && length && j < now.count; ++j) {
-    const char *comma = strchr(now.list[j].name, ',');
-    const char *name = comma ? comma + 1 : now.list[j].name;
-    if (!is_option(&now.list[j]) || !name[1] || strncmp(name, word + 2, length) != 0) continue;
-    match = (int)j;
-    matches++;
-  }
-  if (k < 0 && matches == 1) k = match;
-  if (k < 0 || !is_option(&now.list[k])) return app_usage_error(verb, "unknown option '%s'", word);
-  const app_option *o = &now.list[k];
-  if (is_long && word[2 + length]) value = word + 2 + length + 1;
-  if (!is_long && word[2]) value = word + 2;
-  if (o->kind == OPTION_FLAG && value)
-    return app_usage_error(verb, "%.*s takes no value", (int)(length + 1 + is_long), word);
-  if (o->kind != OPTION_FLAG && !value) {
-    if (*at + 1 >= argc) return app_usage_error(verb, "%s needs a value", word);
-    value = argv[++*at];
-  }
-  now.given[k] = true;
-  return read_value(o, value, options) ? APP_OK : APP_BAD_INPUT;
-}
-
 static int read_words(int argc, char **argv, void *options) {
   const char *verb = now.command->verb;
   for (int i = 1; i < argc; ++i) {
-    int rest = find_name("--", 2), code;
+    int rest = find_name("--", 2);
     if (strcmp(argv[i], "--") == 0) {
       if (rest < 0) continue;
       *(char ***)member(&now.list[rest], options) = argv + i + 1;
       break;
     }
     if (argv[i][0] == '-' && argv[i][1]) {
-      if ((code = read_option(argc, argv, &i, options)) != APP_OK) return code;
+      // A word that begins with '-', and its value, which may be the next word.
+      const char *word = argv[i], *value = NULL;
+      bool is_long = word[1] == '-';
+      size_t length = is_long ? strcspn(word + 2, "=") : 1;
+      int found = find_name(word + 1 + is_long, length);
+
+      // A long name may be cut short where only one begins so.
+      int matches = 0, match = -1;
+      for (uint32_t j = 0; is_long && length && j < now.count; ++j) {
+        const char *comma = strchr(now.list[j].name, ',');
+        const char *name = comma ? comma + 1 : now.list[j].name;
+        if (!is_option(&now.list[j]) || !name[1] || strncmp(name, word + 2, length) != 0) continue;
+        match = (int)j;
+        matches++;
+      }
+      if (found < 0 && matches == 1) found = match;
+      if (found < 0 || !is_option(&now.list[found]))
+        return app_usage_error(verb, "unknown option '%s'", word);
+      const app_option *o = &now.list[found];
+      if (is_long && word[2 + length]) value = word + 2 + length + 1;
+      if (!is_long && word[2]) value = word + 2;
+      if (o->kind == OPTION_FLAG && value)
+        return app_usage_error(verb, "%.*s takes no value", (int)(length + 1 + is_long), word);
+      if (o->kind != OPTION_FLAG && !value) {
+        if (i + 1 >= argc) return app_usage_error(verb, "%s needs a value", word);
+        value = argv[++i];
+      }
+      now.given[found] = true;
+      if (!read_value(o, value, options)) return APP_BAD_INPUT;
       continue;
     }
     // The first argument of the table that no word has filled.

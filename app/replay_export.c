@@ -58,29 +58,6 @@ static void columns(const sonde_player *player, const sonde_frame *frame, column
   memcpy(out, list, sizeof list);
 }
 
-// A row per image: numbers with 9 digits, nothing (CSV) or null (JSON) where there is none.
-static void print_row(output *o, const sonde_frame *frame) {
-  column list[COLUMNS];
-  columns(o->player, frame, list);
-  const char *fault = frame->snapshot.fault ? sonde_fault_text(frame->snapshot.fault) : "";
-  sonde_session_controls c = sonde_player_controls(o->player);
-  const char *const texts[] = {c.pathology.name, fault};
-  for (int k = 0; o->csv && k < COLUMNS; ++k)
-    sonde_file_printf(o->csv, isfinite(list[k].value) ? "%.9g," : ",", list[k].value);
-  for (int k = 0; o->csv && k < 2; ++k) { // quoted, with quotes doubled
-    sonde_file_printf(o->csv, "\"");
-    for (const char *t = texts[k]; *t; ++t)
-      sonde_file_printf(o->csv, *t == '"' ? "\"\"" : "%c", *t);
-    sonde_file_printf(o->csv, k ? "\"\n" : "\",");
-  }
-  if (!o->json.file) return;
-  sonde_json_begin_object(&o->json, NULL);
-  for (int k = 0; k < COLUMNS; ++k) sonde_json_put_real(&o->json, list[k].name, list[k].value, 9);
-  sonde_json_put_text(&o->json, "case", c.pathology.name);
-  sonde_json_put_text(&o->json, "fault", fault);
-  sonde_json_end(&o->json);
-}
-
 static sonde_status print_comments(output *o, sonde_error *error) {
   sonde_comments comments;
   sonde_status status = sonde_comments_load(o->what->recording, &comments, error);
@@ -158,7 +135,31 @@ static sonde_status write_image(output *o, const sonde_frame *frame, sonde_error
   replay_export *what = o->what;
   bool filmed = !o->film || film_until(o, frame->snapshot.time_s);
   if (o->film) draw_picture(o, frame);
-  if (o->csv || o->json.file) print_row(o, frame), what->rows++;
+  if (o->csv || o->json.file) {
+    // A row per image: numbers with 9 digits, nothing (CSV) or null (JSON) where there is none.
+    column list[COLUMNS];
+    columns(o->player, frame, list);
+    const char *fault = frame->snapshot.fault ? sonde_fault_text(frame->snapshot.fault) : "";
+    sonde_session_controls c = sonde_player_controls(o->player);
+    const char *const texts[] = {c.pathology.name, fault};
+    for (int k = 0; o->csv && k < COLUMNS; ++k)
+      sonde_file_printf(o->csv, isfinite(list[k].value) ? "%.9g," : ",", list[k].value);
+    for (int k = 0; o->csv && k < 2; ++k) { // quoted, with quotes doubled
+      sonde_file_printf(o->csv, "\"");
+      for (const char *t = texts[k]; *t; ++t)
+        sonde_file_printf(o->csv, *t == '"' ? "\"\"" : "%c", *t);
+      sonde_file_printf(o->csv, k ? "\"\n" : "\",");
+    }
+    if (o->json.file) {
+      sonde_json_begin_object(&o->json, NULL);
+      for (int k = 0; k < COLUMNS; ++k)
+        sonde_json_put_real(&o->json, list[k].name, list[k].value, 9);
+      sonde_json_put_text(&o->json, "case", c.pathology.name);
+      sonde_json_put_text(&o->json, "fault", fault);
+      sonde_json_end(&o->json);
+    }
+    what->rows++;
+  }
   if (what->frames) {
     char path[4200];
     snprintf(path, sizeof path, "%s/image_%08llu.png", what->frames,
