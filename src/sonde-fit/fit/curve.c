@@ -75,21 +75,6 @@ static sonde_status check_curve(const double *depth_m, const double *force_n, ui
   return SONDE_OK;
 }
 
-static void curve_result(const curve_data *c, uint32_t count, const double theta[2],
-                         const sonde_bordered_result *result, sonde_curve_fit *fit) {
-  sonde_law law = sonde_law_of(theta, c->floor_m);
-  fit->count = count;
-  fit->k0_n_m3 = law.k0_n_m3;
-  fit->xm_m = law.xm_m;
-  fit->iterations = result->iterations;
-  fit->converged = result->converged;
-  for (uint32_t i = 0; i < count; ++i) {
-    double residual, jacobian[4];
-    curve_row(c, 0, i, theta, NULL, &residual, jacobian);
-    fit->mae_n += fabs(residual) / count;
-  }
-}
-
 sonde_status sonde_fit_curve(const double *penetration_m, const double *force_n, uint32_t count,
                              double area_m2, double guard, const sonde_fit_def *def,
                              const double start[2], sonde_curve_fit *fit, sonde_error *error) {
@@ -114,6 +99,17 @@ sonde_status sonde_fit_curve(const double *penetration_m, const double *force_n,
                                     .max_iterations = def->max_iterations};
   sonde_bordered_result result;
   status = sonde_bordered_minimise(&problem, theta, NULL, &result, error);
-  if (!status) curve_result(&data, count, theta[0], &result, fit);
-  return status;
+  if (status) return status;
+  sonde_law law = sonde_law_of(theta[0], data.floor_m);
+  fit->count = count;
+  fit->k0_n_m3 = law.k0_n_m3;
+  fit->xm_m = law.xm_m;
+  fit->iterations = result.iterations;
+  fit->converged = result.converged;
+  for (uint32_t i = 0; i < count; ++i) {
+    double residual, jacobian[4];
+    curve_row(&data, 0, i, theta[0], NULL, &residual, jacobian);
+    fit->mae_n += fabs(residual) / count;
+  }
+  return SONDE_OK;
 }

@@ -41,39 +41,10 @@ static bool wrapped(const cutter *c, uint32_t node, sonde_pad_place *p) {
   return true;
 }
 
-static void mark_inside(cutter *c) {
-  uint32_t nearest = NOWHERE;
-  double least = INFINITY;
-  for (uint32_t i = 0; i < c->model->surface.vertex_count; ++i) {
-    sonde_pad_place p;
-    if (!wrapped(c, i, &p)) continue;
-    double beyond = fmax(fabs(p.u_m) - c->half_u_m, fabs(p.v_m) - c->half_v_m);
-    c->inside[i] = beyond <= SNAP_M;
-    c->inside_count += c->inside[i];
-    double distance = hypot(p.u_m, p.v_m);
-    if (distance < least) {
-      least = distance;
-      nearest = i;
-    }
-  }
-  if (c->inside_count > 0 || nearest == NOWHERE) return;
-  c->inside[nearest] = true;
-  c->inside_count = 1;
-}
-
 static bool is_kept(const cutter *c, uint32_t face) {
   const uint32_t *v = c->model->surface.faces[face];
   return c->vertex_of[v[0]] != NOWHERE && c->vertex_of[v[1]] != NOWHERE &&
          c->vertex_of[v[2]] != NOWHERE;
-}
-
-// Nodes of faces that are kept whole, in order; others would hang free.
-static void number_nodes(cutter *c) {
-  const sonde_mesh *skin = &c->model->surface;
-  for (uint32_t f = 0; f < skin->face_count; ++f)
-    for (int k = 0; k < 3 && is_kept(c, f); ++k) c->vertex_of[skin->faces[f][k]] = KEPT;
-  for (uint32_t i = 0; i < skin->vertex_count; ++i)
-    c->vertex_of[i] = c->vertex_of[i] == KEPT ? c->cut->node_count++ : NOWHERE;
 }
 
 static sonde_status keep_nodes(cutter *c, sonde_error *error) {
@@ -94,7 +65,12 @@ static sonde_status keep_nodes(cutter *c, sonde_error *error) {
     c->vertex_of[i] = near ? LONE : NOWHERE;
   }
   sonde_free(pad);
-  number_nodes(c);
+  // Nodes of faces that are kept whole, in order; others would hang free.
+  const sonde_mesh *skin = &c->model->surface;
+  for (uint32_t f = 0; f < skin->face_count; ++f)
+    for (int k = 0; k < 3 && is_kept(c, f); ++k) c->vertex_of[skin->faces[f][k]] = KEPT;
+  for (uint32_t i = 0; i < nodes; ++i)
+    c->vertex_of[i] = c->vertex_of[i] == KEPT ? c->cut->node_count++ : NOWHERE;
   return SONDE_OK;
 }
 
@@ -130,83 +106,57 @@ static double crossing(const sonde_cutter *c, int which, uint32_t a, uint32_t b)
   return fabs(along) <= (which < 2 ? c->half_v_m : c->half_u_m) + LONGEST_M ? share : 0;
 }
 
-static sonde_status cut_sides(sonde_cutter *c, sonde_error *error) {
-  uint32_t added = 1;
-  sonde_status status = SONDE_OK;
-  for (int k = 0; k < HALVINGS && added && !status; ++k)
-    status = sonde_cut_split(c, too_long, k, &added, error);
-  for (int side = 0; side < 4 && !status; ++side)
-    status = sonde_cut_split(c, crossing, side, &added, error);
-  if (status) return status;
+static sonde_status fill(cutter *c, sonde_error *error) {
   sonde_cut *cut = c->cut;
-  cut->held = SONDE_NEW(bool, cut->vertex_count);
-  if (!cut->held) return sonde_fail_memory(error);
-  for (uint32_t v = 0; v < cut->vertex_count; ++v) {
-    cut->held[v] = beyond(c, v) <= 1.001 * SNAP_M;
-    cut->held_count += cut->held[v];
-  }
-  return SONDE_OK;
-}
-
-static bool is_coarse(const cutter *c) {
+  const sonde_mesh *skin = &c->model->surface;
   const sonde_topology *t = &c->model->topology;
-  double sum = 0, count = 0;
-  for (uint32_t e = 0; e < t->edge_count; ++e) {
-    if (!c->inside[t->edges[e][0]] && !c->inside[t->edges[e][1]]) continue;
-    sum += c->model->edge_rest_m[e];
-    ++count;
-  }
-  return sum > 0.75 * 2 * fmin(c->half_u_m, c->half_v_m) * count;
-}
-
-static void add_rim(cutter *c) {
-  const sonde_topology *t = &c->model->topology;
-  for (uint32_t e = 0; e < t->edge_count; ++e) {
-    uint32_t left = t->edge_faces[e][0], right = t->edge_faces[e][1];
-    if (left == UINT32_MAX || right == UINT32_MAX || is_kept(c, left) == is_kept(c, right))
-      continue;
-    for (int k = 0; k < 2; ++k)
-      c->cut->rim_m[c->vertex_of[t->edges[e][k]]] += 0.5 * c->model->edge_rest_m[e];
-  }
-}
-
-static bool allocate(const cutter *c, sonde_cutter *at) {
-  sonde_cut *cut = c->cut;
+  sonde_cutter at = {c->model, c->half_u_m, c->half_v_m, NULL, cut};
   cut->parent = sonde_calloc(cut->node_count, sizeof *cut->parent);
   cut->share = sonde_calloc(cut->node_count, sizeof *cut->share);
   cut->rim_m = SONDE_NEW(double, cut->node_count);
-  cut->face = sonde_calloc(c->model->surface.face_count, sizeof *cut->face);
-  at->place = SONDE_NEW(sonde_pad_place, cut->node_count);
-  return cut->parent && cut->share && cut->rim_m && cut->face && at->place;
-}
-
-// The kept skin as it is.
-static void copy_skin(const cutter *c, sonde_cutter *at) {
-  sonde_cut *cut = c->cut;
-  const sonde_mesh *skin = &c->model->surface;
+  cut->face = sonde_calloc(skin->face_count, sizeof *cut->face);
+  at.place = SONDE_NEW(sonde_pad_place, cut->node_count);
+  if (!cut->parent || !cut->share || !cut->rim_m || !cut->face || !at.place) {
+    sonde_free(at.place);
+    return sonde_fail_memory(error);
+  }
+  // The kept skin as it is.
   cut->vertex_count = cut->node_count;
   for (uint32_t i = 0; i < skin->vertex_count; ++i) {
     uint32_t v = c->vertex_of[i];
     if (v == NOWHERE) continue;
     for (int k = 0; k < 3; ++k) cut->parent[v][k] = i;
     cut->share[v][0] = 1;
-    if (!wrapped(c, i, &at->place[v])) at->place[v] = (sonde_pad_place){NAN, NAN};
+    if (!wrapped(c, i, &at.place[v])) at.place[v] = (sonde_pad_place){NAN, NAN};
   }
   for (uint32_t f = 0; f < skin->face_count; ++f) {
     if (!is_kept(c, f)) continue;
     for (int k = 0; k < 3; ++k) cut->face[cut->face_count][k] = c->vertex_of[skin->faces[f][k]];
     ++cut->face_count;
   }
-}
-
-static sonde_status fill(cutter *c, sonde_error *error) {
-  sonde_cutter at = {c->model, c->half_u_m, c->half_v_m, NULL, c->cut};
-  sonde_status status = allocate(c, &at) ? SONDE_OK : sonde_fail_memory(error);
-  if (!status) {
-    copy_skin(c, &at);
-    add_rim(c);
-    c->cut->coarse = is_coarse(c);
-    status = cut_sides(&at, error);
+  // The length of rim at each vertex, and the mean length of the edges under the footprint.
+  double sum = 0, count = 0;
+  for (uint32_t e = 0; e < t->edge_count; ++e) {
+    const uint32_t *end = t->edges[e], *of = t->edge_faces[e];
+    double rest_m = c->model->edge_rest_m[e];
+    if (c->inside[end[0]] || c->inside[end[1]]) sum += rest_m, ++count;
+    if (of[0] == UINT32_MAX || of[1] == UINT32_MAX || is_kept(c, of[0]) == is_kept(c, of[1]))
+      continue;
+    for (int k = 0; k < 2; ++k) cut->rim_m[c->vertex_of[end[k]]] += 0.5 * rest_m;
+  }
+  cut->coarse = sum > 0.75 * 2 * fmin(c->half_u_m, c->half_v_m) * count;
+  // Long edges near the sides are halved first, then the four sides are cut.
+  uint32_t added = 1;
+  sonde_status status = SONDE_OK;
+  for (int k = 0; k < HALVINGS && added && !status; ++k)
+    status = sonde_cut_split(&at, too_long, k, &added, error);
+  for (int side = 0; side < 4 && !status; ++side)
+    status = sonde_cut_split(&at, crossing, side, &added, error);
+  if (!status && !(cut->held = SONDE_NEW(bool, cut->vertex_count)))
+    status = sonde_fail_memory(error);
+  for (uint32_t v = 0; v < cut->vertex_count && !status; ++v) {
+    cut->held[v] = beyond(&at, v) <= 1.001 * SNAP_M;
+    cut->held_count += cut->held[v];
   }
   sonde_free(at.place);
   return status;
@@ -226,7 +176,24 @@ sonde_status sonde_cut_create(const sonde_model *model, const sonde_site *site, 
               .inside = SONDE_NEW(bool, nodes),
               .cut = cut};
   sonde_status status = c.vertex_of && c.inside ? SONDE_OK : sonde_fail_memory(error);
-  if (!status) mark_inside(&c);
+  // Nodes under the footprint; the nearest one when there is none.
+  uint32_t nearest = NOWHERE;
+  double least = INFINITY;
+  for (uint32_t i = 0; i < nodes && !status; ++i) {
+    sonde_pad_place p;
+    if (!wrapped(&c, i, &p)) continue;
+    c.inside[i] = fmax(fabs(p.u_m) - half_u_m, fabs(p.v_m) - half_v_m) <= SNAP_M;
+    c.inside_count += c.inside[i];
+    double distance = hypot(p.u_m, p.v_m);
+    if (distance < least) {
+      least = distance;
+      nearest = i;
+    }
+  }
+  if (!c.inside_count && nearest != NOWHERE) {
+    c.inside[nearest] = true;
+    c.inside_count = 1;
+  }
   if (!status && !c.inside_count)
     status = sonde_fail(error, SONDE_MISMATCH,
                         "site %u: no skin within %.0f mm under its footprint: sites and surface do "

@@ -9,28 +9,6 @@ static double between(const double *field, const uint32_t parent[3], const doubl
   return exp(sum);
 }
 
-static uint32_t nearest_parent(const sonde_cut *cut, uint32_t vertex) {
-  int best = 0;
-  for (int k = 1; k < 3; ++k)
-    if (cut->share[vertex][k] > cut->share[vertex][best]) best = k;
-  return cut->parent[vertex][best];
-}
-
-static void fill(const sonde_model *model, const sonde_cut *cut, sonde_model *to) {
-  for (uint32_t v = 0; v < cut->vertex_count; ++v) {
-    const uint32_t *parent = cut->parent[v];
-    uint32_t near = nearest_parent(cut, v);
-    to->normal[v] = sonde_cut_normal(model, cut, v);
-    to->k0_n_m3[v] = between(model->k0_n_m3, parent, cut->share[v]);
-    to->xm_m[v] = between(model->xm_m, parent, cut->share[v]);
-    to->shear_share[v] = between(model->shear_share, parent, cut->share[v]);
-    to->limit_share[v] = between(model->limit_share, parent, cut->share[v]);
-    to->fat_depth_m[v] = model->fat_depth_m[near];
-    to->muscle_depth_m[v] = model->muscle_depth_m[near];
-    to->bone_depth_m[v] = model->bone_depth_m[near];
-  }
-}
-
 // The model's edge that the edge between two vertices is a part of; UINT32_MAX when it crosses a
 // face.
 static uint32_t edge_below(const sonde_model *model, const sonde_cut *cut, const uint32_t end[2]) {
@@ -51,21 +29,6 @@ static uint32_t edge_below(const sonde_model *model, const sonde_cut *cut, const
   return t->neighbour_edge[k];
 }
 
-// Springs stay where they are: parts of one hang in series, so that each is as stiff as it is
-// short, and what the cut adds across faces carries none.
-static sonde_status divide_springs(const sonde_model *model, const sonde_cut *cut, sonde_model *to,
-                                   sonde_error *error) {
-  to->edge_share = SONDE_NEW(double, to->topology.edge_count);
-  if (!to->edge_share) return sonde_fail_memory(error);
-  for (uint32_t e = 0; e < to->topology.edge_count; ++e) {
-    uint32_t of = edge_below(model, cut, to->topology.edges[e]);
-    if (of == UINT32_MAX) continue;
-    double whole = model->edge_share ? model->edge_share[of] : 1;
-    to->edge_share[e] = whole * model->edge_rest_m[of] / to->edge_rest_m[e];
-  }
-  return SONDE_OK;
-}
-
 sonde_status sonde_cut_model(const sonde_model *model, const sonde_cut *cut,
                              sonde_model **cut_model, sonde_error *error) {
   sonde_model *to = *cut_model = SONDE_NEW(sonde_model, 1);
@@ -78,12 +41,37 @@ sonde_status sonde_cut_model(const sonde_model *model, const sonde_cut *cut,
     for (int k = 0; k < 3; ++k) to->surface.faces[f][k] = cut->face[f][k];
   if (!status) status = sonde_model_allocate_nodes(to, error);
   if (!status) status = sonde_model_derive(to, error);
-  if (!status) status = divide_springs(model, cut, to, error);
-  if (!status) {
-    fill(model, cut, to);
-    return SONDE_OK;
+  if (!status && !(to->edge_share = SONDE_NEW(double, to->topology.edge_count)))
+    status = sonde_fail_memory(error);
+  if (status) {
+    sonde_model_destroy(to);
+    *cut_model = NULL;
+    return status;
   }
-  sonde_model_destroy(to);
-  *cut_model = NULL;
-  return status;
+  // Springs stay where they are: parts of one hang in series, so that each is as stiff as it is
+  // short, and what the cut adds across faces carries none.
+  for (uint32_t e = 0; e < to->topology.edge_count; ++e) {
+    uint32_t of = edge_below(model, cut, to->topology.edges[e]);
+    if (of == UINT32_MAX) continue;
+    double whole = model->edge_share ? model->edge_share[of] : 1;
+    to->edge_share[e] = whole * model->edge_rest_m[of] / to->edge_rest_m[e];
+  }
+  // Laws lie between the parents'; depths are the nearest parent's.
+  for (uint32_t v = 0; v < cut->vertex_count; ++v) {
+    const uint32_t *parent = cut->parent[v];
+    const double *share = cut->share[v];
+    uint32_t near = parent[0];
+    double most = share[0];
+    for (int k = 1; k < 3; ++k)
+      if (share[k] > most) most = share[k], near = parent[k];
+    to->normal[v] = sonde_cut_normal(model, cut, v);
+    to->k0_n_m3[v] = between(model->k0_n_m3, parent, share);
+    to->xm_m[v] = between(model->xm_m, parent, share);
+    to->shear_share[v] = between(model->shear_share, parent, share);
+    to->limit_share[v] = between(model->limit_share, parent, share);
+    to->fat_depth_m[v] = model->fat_depth_m[near];
+    to->muscle_depth_m[v] = model->muscle_depth_m[near];
+    to->bone_depth_m[v] = model->bone_depth_m[near];
+  }
+  return SONDE_OK;
 }

@@ -22,22 +22,6 @@ static uint64_t edge_of(uint32_t a, uint32_t b) {
   return a < b ? (uint64_t)a << 32 | b : (uint64_t)b << 32 | a;
 }
 
-static uint32_t collect(const sonde_cutter *c, sonde_split_where *where, int which,
-                        split_point *point) {
-  uint32_t count = 0, kept = 0;
-  for (uint32_t f = 0; f < c->cut->face_count; ++f)
-    for (int k = 0; k < 3; ++k) {
-      uint64_t edge = edge_of(c->cut->face[f][k], c->cut->face[f][(k + 1) % 3]);
-      double share = where(c, which, (uint32_t)(edge >> 32), (uint32_t)edge);
-      SONDE_ASSERT(share >= 0 && share < 1);
-      if (share > 0) point[count++] = (split_point){edge, share};
-    }
-  qsort(point, count, sizeof *point, compare);
-  for (uint32_t k = 0; k < count; ++k)
-    if (!k || point[k].edge != point[k - 1].edge) point[kept++] = point[k];
-  return kept;
-}
-
 static uint32_t find(const split_point *point, uint32_t count, uint32_t first, uint32_t a,
                      uint32_t b) {
   const split_point key = {edge_of(a, b), 0};
@@ -52,18 +36,6 @@ static void add_parent(uint32_t parent, double share, uint32_t *parents, double 
   SONDE_ASSERT(k < 3); // both ends lie in one face of the model
   parents[k] = parent;
   shares[k] += share;
-}
-
-static void mix(sonde_cutter *c, uint32_t a, uint32_t b, double t, uint32_t to) {
-  sonde_cut *cut = c->cut;
-  for (int k = 0; k < 3; ++k)
-    add_parent(cut->parent[a][k], (1 - t) * cut->share[a][k], cut->parent[to], cut->share[to]);
-  for (int k = 0; k < 3; ++k)
-    add_parent(cut->parent[b][k], t * cut->share[b][k], cut->parent[to], cut->share[to]);
-  for (int k = 1; k < 3; ++k)
-    if (!(cut->share[to][k] > 0)) cut->parent[to][k] = cut->parent[to][0];
-  const sonde_pad_place *p = &c->place[a], *q = &c->place[b];
-  c->place[to] = (sonde_pad_place){p->u_m + t * (q->u_m - p->u_m), p->v_m + t * (q->v_m - p->v_m)};
 }
 
 static bool grow(sonde_cutter *c, uint32_t vertices, uint32_t faces) {
@@ -95,22 +67,6 @@ static void put_face(sonde_cut *cut, uint32_t a, uint32_t b, uint32_t d) {
   set_face(cut, cut->face_count++, a, b, d);
 }
 
-// Points p on ab and q on da: the corner at a replaces the face; the quadrilateral (p, b, d, q) is
-// halved along its shorter diagonal.
-static void put_corner(const sonde_cutter *c, uint32_t face, uint32_t a, uint32_t p, uint32_t b,
-                       uint32_t d, uint32_t q) {
-  const sonde_model *m = c->model;
-  sonde_vec3 x[4] = {sonde_cut_point(m, c->cut, p), sonde_cut_point(m, c->cut, b),
-                     sonde_cut_point(m, c->cut, d), sonde_cut_point(m, c->cut, q)};
-  bool by_pd = v_distance(x[0], x[2]) <= v_distance(x[1], x[3]);
-  set_face(c->cut, face, a, p, q);
-  put_face(c->cut, p, b, by_pd ? d : q);
-  if (by_pd)
-    put_face(c->cut, p, d, q);
-  else
-    put_face(c->cut, b, d, q);
-}
-
 // on: the point on the edge from each corner to the next, or NOWHERE.
 static void split_face(const sonde_cutter *c, uint32_t face, const uint32_t on[3]) {
   uint32_t v[3], points = 0, k = 0;
@@ -125,12 +81,24 @@ static void split_face(const sonde_cutter *c, uint32_t face, const uint32_t on[3
   // k: the corner between both points, or the one where the edge with the point begins.
   while (on[k] == NOWHERE || (points == 2 && on[(k + 2) % 3] == NOWHERE)) ++k;
   uint32_t a = v[k], b = v[(k + 1) % 3], d = v[(k + 2) % 3], p = on[k];
-  if (points == 2) {
-    put_corner(c, face, a, p, b, d, on[(k + 2) % 3]);
+  if (points == 1) {
+    set_face(c->cut, face, a, p, d);
+    put_face(c->cut, p, b, d);
     return;
   }
-  set_face(c->cut, face, a, p, d);
-  put_face(c->cut, p, b, d);
+  // Points p on ab and q on da: the corner at a replaces the face; the quadrilateral (p, b, d, q)
+  // is halved along its shorter diagonal.
+  const sonde_model *m = c->model;
+  uint32_t q = on[(k + 2) % 3];
+  sonde_vec3 x[4] = {sonde_cut_point(m, c->cut, p), sonde_cut_point(m, c->cut, b),
+                     sonde_cut_point(m, c->cut, d), sonde_cut_point(m, c->cut, q)};
+  bool by_pd = v_distance(x[0], x[2]) <= v_distance(x[1], x[3]);
+  set_face(c->cut, face, a, p, q);
+  put_face(c->cut, p, b, by_pd ? d : q);
+  if (by_pd)
+    put_face(c->cut, p, d, q);
+  else
+    put_face(c->cut, b, d, q);
 }
 
 sonde_status sonde_cut_split(sonde_cutter *c, sonde_split_where *where, int which, uint32_t *added,
@@ -138,12 +106,35 @@ sonde_status sonde_cut_split(sonde_cutter *c, sonde_split_where *where, int whic
   sonde_cut *cut = c->cut;
   uint32_t first = cut->vertex_count, faces = cut->face_count;
   split_point *point = SONDE_NEW(split_point, 3 * (size_t)faces);
-  uint32_t count = point ? collect(c, where, which, point) : 0;
+  uint32_t found = 0, count = 0;
   sonde_status status = point ? SONDE_OK : sonde_fail_memory(error);
+  // The points on the edges of all faces, each once.
+  for (uint32_t f = 0; f < faces && !status; ++f)
+    for (int k = 0; k < 3; ++k) {
+      uint64_t edge = edge_of(cut->face[f][k], cut->face[f][(k + 1) % 3]);
+      double share = where(c, which, (uint32_t)(edge >> 32), (uint32_t)edge);
+      SONDE_ASSERT(share >= 0 && share < 1);
+      if (share > 0) point[found++] = (split_point){edge, share};
+    }
+  if (!status) qsort(point, found, sizeof *point, compare);
+  for (uint32_t k = 0; k < found; ++k)
+    if (!k || point[k].edge != point[k - 1].edge) point[count++] = point[k];
   // A point adds a face on each of its two sides.
   if (!status && count && !grow(c, count, 2 * count)) status = sonde_fail_memory(error);
-  for (uint32_t k = 0; k < count && !status; ++k)
-    mix(c, (uint32_t)(point[k].edge >> 32), (uint32_t)point[k].edge, point[k].share, first + k);
+  // A point mixes the parents of its edge's ends and lies between their places.
+  for (uint32_t n = 0; n < count && !status; ++n) {
+    uint32_t a = (uint32_t)(point[n].edge >> 32), b = (uint32_t)point[n].edge, to = first + n;
+    double t = point[n].share;
+    for (int k = 0; k < 3; ++k)
+      add_parent(cut->parent[a][k], (1 - t) * cut->share[a][k], cut->parent[to], cut->share[to]);
+    for (int k = 0; k < 3; ++k)
+      add_parent(cut->parent[b][k], t * cut->share[b][k], cut->parent[to], cut->share[to]);
+    for (int k = 1; k < 3; ++k)
+      if (!(cut->share[to][k] > 0)) cut->parent[to][k] = cut->parent[to][0];
+    const sonde_pad_place *p = &c->place[a], *q = &c->place[b];
+    c->place[to] =
+        (sonde_pad_place){p->u_m + t * (q->u_m - p->u_m), p->v_m + t * (q->v_m - p->v_m)};
+  }
   if (!status) cut->vertex_count += count;
   for (uint32_t f = 0; f < faces && !status && count; ++f) {
     const uint32_t *v = cut->face[f];

@@ -103,20 +103,6 @@ static sonde_status fit_curves(const sonde_model *model, const sonde_site_table 
 
 // ---- stage 2 ------------------------------------------------------------------------------
 
-static void start_sites(const sonde_fit_plan *plan, const sonde_fit_result *result,
-                        const double *floor_m, bool cold, double (*theta)[2]) {
-  for (uint32_t s = 0, c = 0; s < plan->site_count; ++s) {
-    double ln_k0 = 0.0, ln_xm = 0.0, curves = 0.0;
-    for (; c < plan->curve_count && plan->curve_site[c] == plan->site_index[s]; ++c, ++curves) {
-      ln_k0 += log(result->curves[c].k0_n_m3);
-      ln_xm += log(result->curves[c].xm_m);
-    }
-    SONDE_ASSERT(curves > 0);
-    double xm_m = cold ? floor_m[s] + COLD_ABOVE_M : exp(ln_xm / curves);
-    sonde_law_log(cold ? COLD_K0 : exp(ln_k0 / curves), xm_m, floor_m[s], theta[s]);
-  }
-}
-
 static sonde_bordered_problem bordered_problem(const sonde_site_problem *p,
                                                const sonde_fit_def *def,
                                                const sonde_progress *progress) {
@@ -135,41 +121,26 @@ static sonde_bordered_problem bordered_problem(const sonde_site_problem *p,
                                   .progress = progress};
 }
 
-// Sites without edges first: its solution is the model of stage 1 and the start of stage 2.
-static sonde_status fit_sites(sonde_site_problem *p, const sonde_fit_def *def,
-                              const sonde_progress *progress, double (*theta)[2], double *border,
-                              sonde_bordered_result *found, sonde_error *error) {
-  sonde_status status = SONDE_OK;
-  if (!def->cold_start || def->stages == 1) {
-    sonde_bordered_problem problem = bordered_problem(p, def, NULL);
-    status = sonde_bordered_minimise(&problem, theta, border, found, error);
-  }
-  if (status || def->stages == 1) return status;
-  p->edges = true;
-  p->tension = def->fit_pretension;
-  sonde_bordered_problem problem = bordered_problem(p, def, progress);
-  status = sonde_bordered_minimise(&problem, theta, border, found, error);
-  if (!status && found->cancelled)
-    status = sonde_fail(error, SONDE_CANCELLED, "the fit was cancelled; nothing is kept");
-  return status;
-}
-
 // ---- results ------------------------------------------------------------------------------
 
-// Sites without measurements get the geometric mean of the others.
-static void set_sites(const sonde_fit_plan *plan, const double *floor_m, const double (*theta)[2],
-                      sonde_site *sites, uint32_t count) {
+static sonde_status finish(const sonde_site_problem *p, const double (*theta)[2],
+                           const double *border, const sonde_bordered_result *found,
+                           sonde_fit_result *result, sonde_error *error) {
+  const sonde_fit_plan *plan = p->plan;
+  sonde_site *sites = result->sites;
   double ln_k0 = 0.0, ln_xm = 0.0;
-  for (uint32_t i = 0; i < count; ++i) sites[i].k0_n_m3 = sites[i].xm_m = 0.0;
+  SONDE_ASSERT(result->site_count >= plan->site_count);
+  for (uint32_t i = 0; i < result->site_count; ++i) sites[i].k0_n_m3 = sites[i].xm_m = 0.0;
   for (uint32_t s = 0; s < plan->site_count; ++s) {
-    sonde_law law = sonde_law_of(theta[s], floor_m[s]);
+    sonde_law law = sonde_law_of(theta[s], p->floor_m[s]);
     sites[plan->site_index[s]].k0_n_m3 = law.k0_n_m3;
     sites[plan->site_index[s]].xm_m = law.xm_m;
     ln_k0 += theta[s][0] / plan->site_count;
     ln_xm += log(law.xm_m) / plan->site_count;
   }
+  // Sites without measurements get the geometric mean of the others.
   uint32_t filled = 0;
-  for (uint32_t i = 0; i < count; ++i) {
+  for (uint32_t i = 0; i < result->site_count; ++i) {
     if (sites[i].k0_n_m3 > 0) continue;
     sites[i].k0_n_m3 = exp(ln_k0);
     sites[i].xm_m = exp(ln_xm);
@@ -178,14 +149,6 @@ static void set_sites(const sonde_fit_plan *plan, const double *floor_m, const d
   if (filled)
     sonde_log(SONDE_LOG_WARNING, "%u sites have no measurement and get the mean parameters",
               filled);
-}
-
-static sonde_status finish(const sonde_site_problem *p, const double (*theta)[2],
-                           const double *border, const sonde_bordered_result *found,
-                           sonde_fit_result *result, sonde_error *error) {
-  const sonde_fit_plan *plan = p->plan;
-  set_sites(plan, p->floor_m, theta, result->sites, result->site_count);
-  SONDE_ASSERT(result->site_count >= plan->site_count);
   result->parameters = result->stage1_parameters;
   if (!p->edges) return SONDE_OK;
   result->parameters = result->stage2_parameters = 2 * plan->site_count + (p->tension ? 2 : 1);
@@ -216,8 +179,32 @@ static sonde_status fit_model(const sonde_model *model, const sonde_site_table *
   double(*theta)[2] = sonde_calloc(p->plan->site_count, sizeof *theta);
   sonde_status status = theta ? SONDE_OK : sonde_fail_memory(error);
   if (!status) status = sonde_site_problem_create(model, sites, def, p, error);
-  if (!status) start_sites(p->plan, result, p->floor_m, def->cold_start, theta);
-  if (!status) status = fit_sites(p, def, progress, theta, border, &found, error);
+  // Every site starts at the geometric mean of its curves, or cold.
+  const sonde_fit_plan *plan = p->plan;
+  for (uint32_t s = 0, c = 0; s < plan->site_count && !status; ++s) {
+    double ln_k0 = 0.0, ln_xm = 0.0, curves = 0.0;
+    for (; c < plan->curve_count && plan->curve_site[c] == plan->site_index[s]; ++c, ++curves) {
+      ln_k0 += log(result->curves[c].k0_n_m3);
+      ln_xm += log(result->curves[c].xm_m);
+    }
+    SONDE_ASSERT(curves > 0);
+    double xm_m = def->cold_start ? p->floor_m[s] + COLD_ABOVE_M : exp(ln_xm / curves);
+    double k0_n_m3 = def->cold_start ? COLD_K0 : exp(ln_k0 / curves);
+    sonde_law_log(k0_n_m3, xm_m, p->floor_m[s], theta[s]);
+  }
+  // Sites without edges first: the solution is the model of stage 1 and the start of stage 2.
+  if (!status && (!def->cold_start || def->stages == 1)) {
+    sonde_bordered_problem problem = bordered_problem(p, def, NULL);
+    status = sonde_bordered_minimise(&problem, theta, border, &found, error);
+  }
+  if (!status && def->stages > 1) {
+    p->edges = true;
+    p->tension = def->fit_pretension;
+    sonde_bordered_problem problem = bordered_problem(p, def, progress);
+    status = sonde_bordered_minimise(&problem, theta, border, &found, error);
+    if (!status && found.cancelled)
+      status = sonde_fail(error, SONDE_CANCELLED, "the fit was cancelled; nothing is kept");
+  }
   if (!status) status = finish(p, (const double(*)[2])theta, border, &found, result, error);
   sonde_free(theta);
   return status;
@@ -225,35 +212,17 @@ static sonde_status fit_model(const sonde_model *model, const sonde_site_table *
 
 // ---- stage 3 ------------------------------------------------------------------------------
 
-static void set_refitted(const sonde_fit_def *def, const double *theta,
-                         const sonde_refit_result *found, sonde_fit_result *result) {
-  uint32_t count = result->site_count, fields = def->uniform_shear ? 2 : 4, n = fields * count + 2;
-  for (uint32_t s = 0; s < count; ++s) {
-    sonde_site *site = &result->sites[s];
-    site->k0_n_m3 = exp(theta[s]);
-    site->xm_m = exp(theta[count + s]);
-    site->shear_share = fields > 2 ? exp(theta[2 * count + s]) : 1;
-    site->limit_share = fields > 2 ? exp(theta[3 * count + s]) : 1;
-  }
-  result->law.shear_stiffness_n_m = exp(theta[n - 2]);
-  result->law.shear_limit = exp(theta[n - 1]);
-  result->law.normal_exponent = def->normal_exponent;
-  result->law.edge_stiffness_n_m = def->kept_edge_n_m;
-  result->law.edge_pretension_n = 0;
-  result->parameters = n;
-  result->iterations = found->iterations;
-  result->converged = found->converged;
-  result->cost = found->cost;
-  result->start_cost = found->start_cost;
-}
-
 // The paper's skin has surface springs and no in-plane layer.
 static void use_springs_only(sonde_surface_law *law) {
   law->inplane_stiffness_n_m = 0;
   law->tangential_stiffness_n_m3 = sonde_surface_law_default().tangential_stiffness_n_m3;
 }
 
-static sonde_status keep_stage2(sonde_fit_result *result, sonde_error *error) {
+static sonde_status refit_sites(const sonde_model *model, const sonde_site_table *sites,
+                                const sonde_measurements *m, const sonde_fit_plan *plan,
+                                const sonde_fit_def *def, const sonde_progress *progress,
+                                sonde_fit_result *result, sonde_error *error) {
+  // Stage 2's sites and law stay in the result beside stage 3's.
   SONDE_ASSERT(result->stage2_parameters > 0 && !result->stage2_sites);
   result->stage2_law = result->law;
   result->stage2_law.normal_exponent = 1;
@@ -262,13 +231,6 @@ static sonde_status keep_stage2(sonde_fit_result *result, sonde_error *error) {
   result->stage2_sites = SONDE_NEW(sonde_site, result->site_count);
   if (!result->stage2_sites) return sonde_fail_memory(error);
   memcpy(result->stage2_sites, result->sites, result->site_count * sizeof *result->sites);
-  return SONDE_OK;
-}
-
-static sonde_status refit_sites(const sonde_model *model, const sonde_site_table *sites,
-                                const sonde_measurements *m, const sonde_fit_plan *plan,
-                                const sonde_fit_def *def, const sonde_progress *progress,
-                                sonde_fit_result *result, sonde_error *error) {
   sonde_refit *refit = NULL;
   sonde_refit_result found = {0};
   double *theta = SONDE_NEW(double, 4 * (size_t)sites->count + 2);
@@ -280,7 +242,25 @@ static sonde_status refit_sites(const sonde_model *model, const sonde_site_table
   if (!status) sonde_refit_want_confidence(refit, &result->confidence);
   if (!status) status = sonde_refit_minimise(refit, theta, force_n, progress, &found, error);
   if (!status) {
-    set_refitted(def, theta, &found, result);
+    uint32_t count = result->site_count, fields = def->uniform_shear ? 2 : 4,
+             n = fields * count + 2;
+    for (uint32_t s = 0; s < count; ++s) {
+      sonde_site *site = &result->sites[s];
+      site->k0_n_m3 = exp(theta[s]);
+      site->xm_m = exp(theta[count + s]);
+      site->shear_share = fields > 2 ? exp(theta[2 * count + s]) : 1;
+      site->limit_share = fields > 2 ? exp(theta[3 * count + s]) : 1;
+    }
+    result->law.shear_stiffness_n_m = exp(theta[n - 2]);
+    result->law.shear_limit = exp(theta[n - 1]);
+    result->law.normal_exponent = def->normal_exponent;
+    result->law.edge_stiffness_n_m = def->kept_edge_n_m;
+    result->law.edge_pretension_n = 0;
+    result->parameters = n;
+    result->iterations = found.iterations;
+    result->converged = found.converged;
+    result->cost = found.cost;
+    result->start_cost = found.start_cost;
     sonde_refit_offsets(refit, result->curves);
     for (uint32_t r = 0; r < plan->row_count; ++r)
       result->model_n[plan->row[r]] = force_n[r] + result->curves[plan->row_curve[r]].tare_n;
@@ -290,18 +270,6 @@ static sonde_status refit_sites(const sonde_model *model, const sonde_site_table
   sonde_free(theta);
   sonde_free(force_n);
   return status;
-}
-
-static sonde_status allocate_result(const sonde_model *model, const sonde_site_table *sites,
-                                    const sonde_measurements *m, sonde_fit_result *result,
-                                    sonde_error *error) {
-  *result = (sonde_fit_result){.law = model->law, .site_count = sites->count, .converged = true};
-  result->sites = SONDE_NEW(sonde_site, sites->count);
-  result->model_n = SONDE_NEW(double, m->count);
-  if (!result->sites || !result->model_n) return sonde_fail_memory(error);
-  for (uint32_t i = 0; i < m->count; ++i) result->model_n[i] = NAN;
-  memcpy(result->sites, sites->sites, sites->count * sizeof *result->sites);
-  return SONDE_OK;
 }
 
 // Keeps a stage's forces and time.
@@ -331,14 +299,20 @@ sonde_status sonde_fit(const sonde_model *model, const sonde_site_table *sites,
   status = sonde_fit_plan_create(sites, measurements, &plan, error);
   if (status) return status;
   sonde_site_problem problem = {.plan = &plan, .m = measurements};
-  status = allocate_result(model, sites, measurements, result, error);
+  *result = (sonde_fit_result){.law = model->law,
+                               .site_count = sites->count,
+                               .sites = SONDE_NEW(sonde_site, sites->count),
+                               .model_n = SONDE_NEW(double, measurements->count),
+                               .converged = true};
+  if (!result->sites || !result->model_n) status = sonde_fail_memory(error);
+  for (uint32_t i = 0; i < measurements->count && !status; ++i) result->model_n[i] = NAN;
+  if (!status) memcpy(result->sites, sites->sites, sites->count * sizeof *result->sites);
   if (full.stages < 3) use_springs_only(&result->law);
   double start = sonde_clock_now();
   if (!status) status = fit_curves(model, sites, measurements, &plan, &full, result, error);
   if (!status) status = end_stage(result, 0, measurements->count, &start, error);
   if (!status) status = fit_model(model, sites, &problem, &full, progress, result, error);
   if (!status && full.stages > 1) status = end_stage(result, 1, measurements->count, &start, error);
-  if (!status && full.stages == 3) status = keep_stage2(result, error);
   if (!status && full.stages == 3)
     status = refit_sites(model, sites, measurements, &plan, &full, progress, result, error);
   if (!status && full.stages == 3)

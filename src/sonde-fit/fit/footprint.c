@@ -24,52 +24,6 @@ static uint32_t mark_held(const sonde_model *model, const double *covered_m2, ui
   return count;
 }
 
-static bool allocate(const sonde_model *model, sonde_footprint *f) {
-  uint32_t nodes = model->surface.vertex_count, edges = model->topology.edge_count;
-  f->node = SONDE_NEW(uint32_t, nodes);
-  f->weight_m2 = SONDE_NEW(double, nodes);
-  f->cosine = SONDE_NEW(double, nodes);
-  f->held = SONDE_NEW(uint32_t, nodes);
-  f->edge = SONDE_NEW(uint32_t, edges);
-  f->rest_m = SONDE_NEW(double, edges);
-  f->rise_m = SONDE_NEW(double, edges);
-  return f->node && f->weight_m2 && f->cosine && f->held && f->edge && f->rest_m && f->rise_m;
-}
-
-// weight_m2 arrives with the covered area of every node and is packed in place.
-static void add_nodes(const sonde_model *model, sonde_vec3 normal, sonde_coverage coverage,
-                      sonde_footprint *f) {
-  uint32_t next_held = 0;
-  for (uint32_t i = 0; i < model->surface.vertex_count; ++i) {
-    bool is_held = next_held < f->held_count && f->held[next_held] == i;
-    if (is_held) ++next_held;
-    double weight = f->weight_m2[i];
-    if (coverage == SONDE_COVERAGE_CELLS) weight = is_held ? model->area_m2[i] : 0.0;
-    if (!(weight > 0)) continue;
-    f->node[f->node_count] = i;
-    f->weight_m2[f->node_count] = weight;
-    f->cosine[f->node_count++] = v_dot(model->normal[i], normal);
-  }
-  SONDE_ASSERT(next_held == f->held_count);
-}
-
-static void add_edges(const sonde_model *model, sonde_vec3 normal, const bool *is_held,
-                      sonde_footprint *f) {
-  const sonde_topology *t = &model->topology;
-  for (uint32_t h = 0; h < f->held_count; ++h) {
-    uint32_t i = f->held[h];
-    for (uint32_t k = t->start[i]; k < t->start[i + 1]; ++k) {
-      uint32_t j = t->neighbour[k], e = t->neighbour_edge[k];
-      if (is_held[j]) continue;
-      sonde_vec3 out = v_sub(model->surface.vertices[j], model->surface.vertices[i]);
-      f->edge[f->edge_count] = e;
-      f->rest_m[f->edge_count] = model->edge_rest_m[e];
-      f->rise_m[f->edge_count++] = v_dot(out, normal);
-    }
-  }
-  SONDE_ASSERT(f->edge_count <= t->edge_count);
-}
-
 // Gives back the memory beyond `count` items; keeps the larger block when there is no memory.
 static void *shrink(void *array, uint32_t room, uint32_t count, size_t size) {
   SONDE_ASSERT(count <= room);
@@ -80,25 +34,27 @@ static void *shrink(void *array, uint32_t room, uint32_t count, size_t size) {
   return small;
 }
 
-static void shrink_all(const sonde_model *model, sonde_footprint *f) {
-  uint32_t nodes = model->surface.vertex_count, edges = model->topology.edge_count;
-  f->node = shrink(f->node, nodes, f->node_count, sizeof *f->node);
-  f->weight_m2 = shrink(f->weight_m2, nodes, f->node_count, sizeof *f->weight_m2);
-  f->cosine = shrink(f->cosine, nodes, f->node_count, sizeof *f->cosine);
-  f->held = shrink(f->held, nodes, f->held_count, sizeof *f->held);
-  f->edge = shrink(f->edge, edges, f->edge_count, sizeof *f->edge);
-  f->rest_m = shrink(f->rest_m, edges, f->edge_count, sizeof *f->rest_m);
-  f->rise_m = shrink(f->rise_m, edges, f->edge_count, sizeof *f->rise_m);
-}
-
 sonde_status sonde_footprint_create(const sonde_model *model, const sonde_site *site,
                                     double half_u_m, double half_v_m, sonde_coverage coverage,
                                     sonde_footprint *f, sonde_error *error) {
   SONDE_ASSERT(half_u_m > 0 && half_v_m > 0);
   *f = (sonde_footprint){0};
-  bool *is_held = SONDE_NEW(bool, model->surface.vertex_count);
-  sonde_status status = is_held && allocate(model, f) ? SONDE_OK : sonde_fail_memory(error);
-  if (status) goto done;
+  const sonde_topology *t = &model->topology;
+  uint32_t nodes = model->surface.vertex_count, edges = t->edge_count, next_held = 0;
+  bool *is_held = SONDE_NEW(bool, nodes);
+  f->node = SONDE_NEW(uint32_t, nodes);
+  f->weight_m2 = SONDE_NEW(double, nodes);
+  f->cosine = SONDE_NEW(double, nodes);
+  f->held = SONDE_NEW(uint32_t, nodes);
+  f->edge = SONDE_NEW(uint32_t, edges);
+  f->rest_m = SONDE_NEW(double, edges);
+  f->rise_m = SONDE_NEW(double, edges);
+  sonde_status status = SONDE_OK;
+  if (!is_held || !f->node || !f->weight_m2 || !f->cosine || !f->held || !f->edge || !f->rest_m ||
+      !f->rise_m) {
+    status = sonde_fail_memory(error);
+    goto done;
+  }
   sonde_mesh_footprint(&model->surface, site->position_m, site->normal, site->u, site->v, half_u_m,
                        half_v_m, REACH_M, f->weight_m2);
   f->held_count = mark_held(model, f->weight_m2, f->held);
@@ -110,9 +66,37 @@ sonde_status sonde_footprint_create(const sonde_model *model, const sonde_site *
     goto done;
   }
   for (uint32_t h = 0; h < f->held_count; ++h) is_held[f->held[h]] = true;
-  add_nodes(model, site->normal, coverage, f);
-  add_edges(model, site->normal, is_held, f);
-  shrink_all(model, f);
+  // weight_m2 has the covered area of every node so far and is packed in place.
+  for (uint32_t i = 0; i < nodes; ++i) {
+    next_held += is_held[i];
+    double weight = f->weight_m2[i];
+    if (coverage == SONDE_COVERAGE_CELLS) weight = is_held[i] ? model->area_m2[i] : 0.0;
+    if (!(weight > 0)) continue;
+    f->node[f->node_count] = i;
+    f->weight_m2[f->node_count] = weight;
+    f->cosine[f->node_count++] = v_dot(model->normal[i], site->normal);
+  }
+  SONDE_ASSERT(next_held == f->held_count);
+  // Edges lead from a held node to a free one.
+  for (uint32_t h = 0; h < f->held_count; ++h) {
+    uint32_t i = f->held[h];
+    for (uint32_t k = t->start[i]; k < t->start[i + 1]; ++k) {
+      uint32_t j = t->neighbour[k], e = t->neighbour_edge[k];
+      if (is_held[j]) continue;
+      sonde_vec3 out = v_sub(model->surface.vertices[j], model->surface.vertices[i]);
+      f->edge[f->edge_count] = e;
+      f->rest_m[f->edge_count] = model->edge_rest_m[e];
+      f->rise_m[f->edge_count++] = v_dot(out, site->normal);
+    }
+  }
+  SONDE_ASSERT(f->edge_count <= edges);
+  f->node = shrink(f->node, nodes, f->node_count, sizeof *f->node);
+  f->weight_m2 = shrink(f->weight_m2, nodes, f->node_count, sizeof *f->weight_m2);
+  f->cosine = shrink(f->cosine, nodes, f->node_count, sizeof *f->cosine);
+  f->held = shrink(f->held, nodes, f->held_count, sizeof *f->held);
+  f->edge = shrink(f->edge, edges, f->edge_count, sizeof *f->edge);
+  f->rest_m = shrink(f->rest_m, edges, f->edge_count, sizeof *f->rest_m);
+  f->rise_m = shrink(f->rise_m, edges, f->edge_count, sizeof *f->rise_m);
 done:
   sonde_free(is_held);
   if (status) sonde_footprint_clear(f);

@@ -17,23 +17,6 @@ static int compare_keys(const void *a, const void *b) {
   return depth ? depth : (p->row > q->row) - (p->row < q->row);
 }
 
-static sonde_status add_probe_sizes(sonde_fit_plan *plan, sonde_error *error) {
-  for (uint32_t p = 0; p < plan->probe_count; ++p) {
-    sonde_probe probe;
-    sonde_status status = sonde_probe_create(plan->probe[p], &probe, error);
-    if (status) return status;
-    plan->half_u_m[p] = probe.half_x_m;
-    plan->half_v_m[p] = probe.half_y_m;
-    bool rectangular = probe.rectangular;
-    sonde_probe_clear(&probe);
-    if (!rectangular)
-      return sonde_fail(error, SONDE_ARGUMENT,
-                        "probe '%s' has no rectangular footprint, expected one that has",
-                        plan->probe[p]);
-  }
-  return SONDE_OK;
-}
-
 // Fills keys and the probes' mean forces; left_out may be NULL.
 static sonde_status make_keys(const sonde_site_table *sites, const sonde_measurements *m,
                               const bool *left_out, sonde_fit_plan *plan, sort_key *keys,
@@ -65,32 +48,6 @@ static sonde_status make_keys(const sonde_site_table *sites, const sonde_measure
   return SONDE_OK;
 }
 
-static void cut(sonde_fit_plan *plan, const sort_key *keys) {
-  uint32_t curve = UINT32_MAX, site = UINT32_MAX; // wrap to 0 at the first row
-  for (uint32_t r = 0; r < plan->row_count; ++r) {
-    bool new_site = r == 0 || keys[r].site != keys[r - 1].site;
-    if (new_site) {
-      plan->site_start[++site] = r;
-      plan->site_index[site] = keys[r].site;
-    }
-    if (new_site || keys[r].probe != keys[r - 1].probe) {
-      plan->curve_start[++curve] = r;
-      plan->curve_site[curve] = keys[r].site;
-      plan->curve_probe[curve] = keys[r].probe;
-    } else {
-      plan->unsorted_rows += keys[r].row < keys[r - 1].row;
-    }
-    plan->row[r] = keys[r].row;
-    plan->row_probe[r] = keys[r].probe;
-    plan->row_curve[r] = curve;
-    plan->site_deepest_m[site] = fmax(plan->site_deepest_m[site], keys[r].depth_m);
-  }
-  plan->curve_count = curve + 1;
-  SONDE_ASSERT(plan->curve_count <= plan->row_count && curve >= site);
-  plan->site_count = site + 1;
-  plan->curve_start[plan->curve_count] = plan->site_start[plan->site_count] = plan->row_count;
-}
-
 static bool allocate(sonde_fit_plan *plan, uint32_t rows) {
   plan->row = SONDE_NEW(uint32_t, rows);
   plan->row_probe = SONDE_NEW(uint32_t, rows);
@@ -112,10 +69,44 @@ static sonde_status arrange(const sonde_site_table *sites, const sonde_measureme
   sort_key *keys = SONDE_NEW(sort_key, m->count);
   sonde_status status = keys && allocate(plan, m->count) ? SONDE_OK : sonde_fail_memory(error);
   if (!status) status = make_keys(sites, m, left_out, plan, keys, error);
-  if (!status) status = add_probe_sizes(plan, error);
+  for (uint32_t p = 0; p < plan->probe_count && !status; ++p) {
+    sonde_probe probe;
+    status = sonde_probe_create(plan->probe[p], &probe, error);
+    if (status) break;
+    plan->half_u_m[p] = probe.half_x_m;
+    plan->half_v_m[p] = probe.half_y_m;
+    if (!probe.rectangular)
+      status = sonde_fail(error, SONDE_ARGUMENT,
+                          "probe '%s' has no rectangular footprint, expected one that has",
+                          plan->probe[p]);
+    sonde_probe_clear(&probe);
+  }
+  if (!status) qsort(keys, plan->row_count, sizeof *keys, compare_keys);
+  // Sites and curves begin where the sorted keys change.
+  uint32_t curve = UINT32_MAX, site = UINT32_MAX; // wrap to 0 at the first row
+  for (uint32_t r = 0; r < plan->row_count && !status; ++r) {
+    bool new_site = r == 0 || keys[r].site != keys[r - 1].site;
+    if (new_site) {
+      plan->site_start[++site] = r;
+      plan->site_index[site] = keys[r].site;
+    }
+    if (new_site || keys[r].probe != keys[r - 1].probe) {
+      plan->curve_start[++curve] = r;
+      plan->curve_site[curve] = keys[r].site;
+      plan->curve_probe[curve] = keys[r].probe;
+    } else {
+      plan->unsorted_rows += keys[r].row < keys[r - 1].row;
+    }
+    plan->row[r] = keys[r].row;
+    plan->row_probe[r] = keys[r].probe;
+    plan->row_curve[r] = curve;
+    plan->site_deepest_m[site] = fmax(plan->site_deepest_m[site], keys[r].depth_m);
+  }
   if (!status) {
-    qsort(keys, plan->row_count, sizeof *keys, compare_keys);
-    cut(plan, keys);
+    plan->curve_count = curve + 1;
+    SONDE_ASSERT(plan->curve_count <= plan->row_count && curve >= site);
+    plan->site_count = site + 1;
+    plan->curve_start[plan->curve_count] = plan->site_start[plan->site_count] = plan->row_count;
   }
   sonde_free(keys);
   if (status) sonde_fit_plan_clear(plan);
@@ -135,62 +126,34 @@ sonde_status sonde_fit_plan_create_all(const sonde_site_table *sites, const sond
 
 typedef enum reason { FIT, TOO_SHORT, NO_FORCE, REASONS } reason;
 
-static reason judge(const sonde_measurements *m, const sonde_fit_plan *plan, uint32_t curve) {
-  uint32_t steps = 0;
-  double force_n = 0;
-  SONDE_ASSERT(curve < plan->curve_count);
-  for (uint32_t r = plan->curve_start[curve]; r < plan->curve_start[curve + 1]; ++r) {
-    const sonde_datum *d = &m->data[plan->row[r]];
-    steps += d->penetration_m > 0;
-    force_n += d->force_n;
-  }
-  if (steps < SONDE_FIT_LEAST_STEPS) return TOO_SHORT;
-  return force_n > 0 ? FIT : NO_FORCE;
-}
-
-static void warn(reason why, uint32_t curves, uint32_t rows, const sonde_datum *first) {
-  if (!curves) return;
-  char text[64] = "their mean force is not positive";
-  if (why == TOO_SHORT) snprintf(text, sizeof text, "fewer than %d steps", SONDE_FIT_LEAST_STEPS);
-  sonde_log(SONDE_LOG_WARNING,
-            "%u curves (%u rows) are left out: %s; the first is site %u, probe %s", curves, rows,
-            text, first->site, first->probe);
-}
-
 // Marks the rows of unfit curves; the counts go to `excluded`.
 static void mark_unfit(const sonde_measurements *m, const sonde_fit_plan *plan, bool *left_out,
                        sonde_fit_plan *excluded) {
   uint32_t curves[REASONS] = {0}, rows[REASONS] = {0};
   const sonde_datum *first[REASONS] = {NULL};
   for (uint32_t c = 0; c < plan->curve_count; ++c) {
-    reason why = judge(m, plan, c);
-    uint32_t start = plan->curve_start[c], end = plan->curve_start[c + 1];
+    uint32_t start = plan->curve_start[c], end = plan->curve_start[c + 1], steps = 0;
+    double force_n = 0;
+    for (uint32_t r = start; r < end; ++r) {
+      const sonde_datum *d = &m->data[plan->row[r]];
+      steps += d->penetration_m > 0;
+      force_n += d->force_n;
+    }
+    reason why = steps < SONDE_FIT_LEAST_STEPS ? TOO_SHORT : force_n > 0 ? FIT : NO_FORCE;
     if (!curves[why]++) first[why] = &m->data[plan->row[start]];
     rows[why] += end - start;
     for (uint32_t r = start; r < end && why != FIT; ++r) left_out[plan->row[r]] = true;
   }
   for (int why = TOO_SHORT; why < REASONS; ++why) {
-    warn((reason)why, curves[why], rows[why], first[why]);
+    if (!curves[why]) continue;
+    char text[64] = "their mean force is not positive";
+    if (why == TOO_SHORT) snprintf(text, sizeof text, "fewer than %d steps", SONDE_FIT_LEAST_STEPS);
+    sonde_log(SONDE_LOG_WARNING,
+              "%u curves (%u rows) are left out: %s; the first is site %u, probe %s", curves[why],
+              rows[why], text, first[why]->site, first[why]->probe);
     excluded->excluded_curves += curves[why];
     excluded->excluded_rows += rows[why];
   }
-}
-
-// Arranges again without the marked rows.
-static sonde_status exclude(const sonde_site_table *sites, const sonde_measurements *m,
-                            const bool *left_out, const sonde_fit_plan *excluded,
-                            sonde_fit_plan *plan, sonde_error *error) {
-  SONDE_ASSERT(excluded->excluded_rows <= m->count);
-  sonde_fit_plan_clear(plan);
-  if (excluded->excluded_rows == m->count)
-    return sonde_fail(error, SONDE_ARGUMENT,
-                      "none of the %u curves can be fitted, expected at least one of %d steps with "
-                      "a positive mean force",
-                      excluded->excluded_curves, SONDE_FIT_LEAST_STEPS);
-  sonde_status status = arrange(sites, m, left_out, plan, error);
-  plan->excluded_curves = excluded->excluded_curves;
-  plan->excluded_rows = excluded->excluded_rows;
-  return status;
 }
 
 sonde_status sonde_fit_plan_create(const sonde_site_table *sites, const sonde_measurements *m,
@@ -201,7 +164,18 @@ sonde_status sonde_fit_plan_create(const sonde_site_table *sites, const sonde_me
   bool *left_out = SONDE_NEW(bool, m->count);
   if (left_out) {
     mark_unfit(m, plan, left_out, &excluded);
-    if (excluded.excluded_rows) status = exclude(sites, m, left_out, &excluded, plan, error);
+    SONDE_ASSERT(excluded.excluded_rows <= m->count);
+    if (excluded.excluded_rows == m->count) {
+      status = sonde_fail(error, SONDE_ARGUMENT,
+                          "none of the %u curves can be fitted, expected at least one of %d steps "
+                          "with a positive mean force",
+                          excluded.excluded_curves, SONDE_FIT_LEAST_STEPS);
+    } else if (excluded.excluded_rows) {
+      sonde_fit_plan_clear(plan);
+      status = arrange(sites, m, left_out, plan, error);
+      plan->excluded_curves = excluded.excluded_curves;
+      plan->excluded_rows = excluded.excluded_rows;
+    }
   } else {
     status = sonde_fail_memory(error);
   }

@@ -36,35 +36,12 @@ double sonde_refit_sd_n(const sonde_refit *r, uint32_t row) {
   return r->m->scatter_n ? hypot(sd_n, r->m->scatter_n[r->plan->row[row]]) : sd_n;
 }
 
-static void spread(sonde_refit *r, const double *theta) {
-  uint32_t count = r->sites->count;
-  SONDE_ASSERT(count > 0);
-  for (uint32_t i = 0; i < r->model->surface.vertex_count; ++i) {
-    const double *basis = &r->basis[(size_t)i * count];
-    for (uint32_t f = 0; f < r->fields; ++f) {
-      double ln = 0;
-      for (uint32_t k = 0; k < count; ++k) ln += basis[k] * theta[f * count + k];
-      r->field[f][i] = ln;
-    }
-  }
-}
-
 // The depth before on the same curve.
 typedef struct depth_before {
   const double *s_m; // NULL at the first
   double depth_m;
   bool has_motion; // the solver knows how free places move with depth
 } depth_before;
-
-static void start_from(const depth_before *before, const sonde_patch_solver *solver, double depth_m,
-                       double *s_m) {
-  double growth = before->depth_m > 0 ? depth_m / before->depth_m : 0;
-  for (uint32_t i = 0; i < solver->patch->place_count; ++i)
-    if (before->s_m && before->has_motion)
-      s_m[i] = before->s_m[i] + (depth_m - before->depth_m) * solver->multiplier[i];
-    else
-      s_m[i] = before->s_m ? growth * before->s_m[i] : 0;
-}
 
 // Starts from the row's own last equilibrium; else, and again when that fails, from the depth
 // before. s_m keeps the outcome.
@@ -75,18 +52,15 @@ static sonde_status settle_datum(const sonde_refit *r, sonde_patch_solver *solve
   SONDE_ASSERT(row < r->plan->row_count && depth_m >= before->depth_m);
   if (r->settled[row] && !sonde_patch_settle(solver, depth_m, accuracy, NEWTON_LIMIT, s_m, error))
     return SONDE_OK;
-  start_from(before, solver, depth_m, s_m);
+  double growth = before->depth_m > 0 ? depth_m / before->depth_m : 0;
+  for (uint32_t i = 0; i < solver->patch->place_count; ++i)
+    if (before->s_m && before->has_motion)
+      s_m[i] = before->s_m[i] + (depth_m - before->depth_m) * solver->multiplier[i];
+    else
+      s_m[i] = before->s_m ? growth * before->s_m[i] : 0;
   sonde_status status = sonde_patch_settle(solver, depth_m, accuracy, NEWTON_LIMIT, s_m, error);
   r->settled[row] = !status;
   return status;
-}
-
-// The patch's part of the basis, in the order of its nodes.
-static void gather_basis(const sonde_refit *r, const sonde_patch *patch, double *basis) {
-  uint32_t count = r->sites->count;
-  for (uint32_t i = 0; i < patch->node_count; ++i)
-    memcpy(basis + (size_t)i * count, &r->basis[(size_t)patch->node[i] * count],
-           count * sizeof *basis);
 }
 
 // First to the model's nodes, then by the basis to all sites at once.
@@ -136,7 +110,11 @@ static sonde_status work_on_curve(void *user, uint32_t worker, uint32_t curve,
   sonde_status status = SONDE_OK;
   solver->adjoint_accuracy = rough ? ROUGH_ADJOINT : FINE_ADJOINT;
   sonde_patch_solver_use(solver, patch, &at->law);
-  if (at->jacobian) gather_basis(r, patch, me->basis);
+  // The patch's part of the basis, in the order of its nodes.
+  uint32_t count = r->sites->count;
+  for (uint32_t i = 0; at->jacobian && i < patch->node_count; ++i)
+    memcpy(me->basis + (size_t)i * count, &r->basis[(size_t)patch->node[i] * count],
+           count * sizeof *me->basis);
   for (uint32_t k = r->plan->curve_start[curve]; k < r->plan->curve_start[curve + 1]; ++k) {
     if (!sonde_refit_uses(r, k)) continue;
     if (atomic_load(stop)) return sonde_fail(error, SONDE_CANCELLED, "cancelled");
@@ -162,8 +140,18 @@ static sonde_status work_on_curve(void *user, uint32_t worker, uint32_t curve,
 sonde_status sonde_refit_forces(sonde_refit *r, const double *theta, double *force_n,
                                 double *jacobian, const sonde_progress *progress,
                                 sonde_error *error) {
-  const double *shear = theta + r->fields * r->sites->count;
-  spread(r, theta);
+  uint32_t count = r->sites->count;
+  const double *shear = theta + r->fields * count;
+  SONDE_ASSERT(count > 0);
+  // The fields of the nodes from the parameters of the sites.
+  for (uint32_t i = 0; i < r->model->surface.vertex_count; ++i) {
+    const double *basis = &r->basis[(size_t)i * count];
+    for (uint32_t f = 0; f < r->fields; ++f) {
+      double ln = 0;
+      for (uint32_t k = 0; k < count; ++k) ln += basis[k] * theta[f * count + k];
+      r->field[f][i] = ln;
+    }
+  }
   const sonde_surface_law *law = &r->model->law;
   evaluation at = {r,
                    {.ln_k0 = r->field[0],
@@ -216,36 +204,6 @@ void sonde_refit_start(const sonde_refit *r, const sonde_curve_fit *curves, doub
 
 // ---- creation -----------------------------------------------------------------------------
 
-static sonde_status create_patches(sonde_refit *r, double reach_m, sonde_error *error) {
-  const sonde_fit_plan *plan = r->plan;
-  sonde_status status = SONDE_OK;
-  for (uint32_t c = 0; c < plan->curve_count && !status; ++c) {
-    const sonde_site *site = &r->sites->sites[plan->curve_site[c]];
-    uint32_t probe = plan->curve_probe[c];
-    status = sonde_patch_create(r->model, site, plan->half_u_m[probe], plan->half_v_m[probe],
-                                reach_m, &r->patch[c], error);
-  }
-  uint32_t coarse = 0;
-  for (uint32_t c = 0; c < plan->curve_count && !status; ++c) coarse += r->patch[c].coarse;
-  if (coarse)
-    sonde_log(SONDE_LOG_WARNING,
-              "the mesh is too coarse for %u of %u footprints, expected edges of at most three "
-              "quarters of their narrow side",
-              coarse, plan->curve_count);
-  return status;
-}
-
-static sonde_status create_starts(sonde_refit *r, sonde_error *error) {
-  const sonde_fit_plan *plan = r->plan;
-  size_t places = 0;
-  for (uint32_t k = 0; k < plan->row_count; ++k) {
-    r->first_place[k] = places;
-    places += r->patch[plan->row_curve[k]].place_count;
-  }
-  r->indentation_m = SONDE_NEW(double, places);
-  return r->indentation_m ? SONDE_OK : sonde_fail_memory(error);
-}
-
 static sonde_status create_crew(sonde_refit *r, uint32_t threads, sonde_error *error) {
   uint32_t curves = r->plan->curve_count, places = 0, nodes = 0;
   r->workers = sonde_parallel_workers(threads, curves);
@@ -268,18 +226,6 @@ static sonde_status create_crew(sonde_refit *r, uint32_t threads, sonde_error *e
   return SONDE_OK;
 }
 
-static bool allocate(sonde_refit *r) {
-  size_t nodes = r->model->surface.vertex_count, count = r->sites->count;
-  r->patch = SONDE_NEW(sonde_patch, r->plan->curve_count);
-  r->basis = SONDE_NEW(double, nodes *count);
-  r->roughness = SONDE_NEW(double, count *count);
-  bool ok = true;
-  for (uint32_t f = 0; f < r->fields; ++f) ok &= (r->field[f] = SONDE_NEW(double, nodes)) != NULL;
-  r->first_place = SONDE_NEW(size_t, r->plan->row_count);
-  r->settled = SONDE_NEW(uint8_t, r->plan->row_count);
-  return ok && r->patch && r->basis && r->roughness && r->first_place && r->settled;
-}
-
 sonde_status sonde_refit_create(const sonde_model *model, const sonde_site_table *sites,
                                 const sonde_measurements *m, const sonde_fit_plan *plan,
                                 const sonde_fit_def *def, double reach_m, sonde_refit **refit,
@@ -294,7 +240,16 @@ sonde_status sonde_refit_create(const sonde_model *model, const sonde_site_table
                      .stride = 1,
                      .fields = def->uniform_shear ? 2 : 4,
                      .smoothness = {1, 1}};
-  sonde_status status = allocate(r) ? SONDE_OK : sonde_fail_memory(error);
+  size_t nodes = model->surface.vertex_count, count = sites->count, places = 0;
+  r->patch = SONDE_NEW(sonde_patch, plan->curve_count);
+  r->basis = SONDE_NEW(double, nodes *count);
+  r->roughness = SONDE_NEW(double, count *count);
+  bool ok = true;
+  for (uint32_t f = 0; f < r->fields; ++f) ok &= (r->field[f] = SONDE_NEW(double, nodes)) != NULL;
+  r->first_place = SONDE_NEW(size_t, plan->row_count);
+  r->settled = SONDE_NEW(uint8_t, plan->row_count);
+  ok = ok && r->patch && r->basis && r->roughness && r->first_place && r->settled;
+  sonde_status status = ok ? SONDE_OK : sonde_fail_memory(error);
   for (uint32_t k = 0; k < plan->probe_count && !status; ++k)
     if (!(plan->mean_force_n[k] > 0))
       status = sonde_fail(error, SONDE_ARGUMENT,
@@ -302,9 +257,26 @@ sonde_status sonde_refit_create(const sonde_model *model, const sonde_site_table
                           plan->probe[k], plan->mean_force_n[k]);
   if (!status) status = sonde_site_basis(model, sites, r->basis, error);
   if (!status) status = sonde_site_roughness(sites, r->roughness, error);
-  if (!status) status = create_patches(r, reach_m, error);
+  // One patch of skin per curve.
+  uint32_t coarse = 0;
+  for (uint32_t c = 0; c < plan->curve_count && !status; ++c) {
+    uint32_t probe = plan->curve_probe[c];
+    status = sonde_patch_create(model, &sites->sites[plan->curve_site[c]], plan->half_u_m[probe],
+                                plan->half_v_m[probe], reach_m, &r->patch[c], error);
+    coarse += !status && r->patch[c].coarse;
+  }
+  if (coarse && !status)
+    sonde_log(SONDE_LOG_WARNING,
+              "the mesh is too coarse for %u of %u footprints, expected edges of at most three "
+              "quarters of their narrow side",
+              coarse, plan->curve_count);
   if (!status) status = sonde_offsets_create(r, &r->offsets, error);
-  if (!status) status = create_starts(r, error);
+  // The indentations of a row's places stay from one evaluation to the next.
+  for (uint32_t k = 0; k < plan->row_count && !status; ++k) {
+    r->first_place[k] = places;
+    places += r->patch[plan->row_curve[k]].place_count;
+  }
+  if (!status && !(r->indentation_m = SONDE_NEW(double, places))) status = sonde_fail_memory(error);
   if (!status) status = create_crew(r, def->threads, error);
   if (!status) return SONDE_OK;
   sonde_refit_destroy(r);

@@ -1,8 +1,4 @@
-// order_places:  free nodes first, then the held vertices.
-// find_parents:  nodes whose parameters the places take.
-// add_faces:     areas and cotangents of the cut faces.
-// build_rows:    pattern of the free places' matrix, ascending columns.
-// find_entries:  where each face adds to it. analyse: its order of elimination.
+// The patch of a footprint: places, areas and cotangents of its faces, pattern of its matrix.
 #include "fit/shear.h"
 
 #include "base/maths.h"
@@ -36,49 +32,24 @@ static bool allocate_places(sonde_patch *p, const sonde_cut *cut) {
          p->side && p->row_start && p->diagonal;
 }
 
-// Vertices that are nodes come first and ascend.
-static void find_parents(const sonde_cut *cut, const uint32_t *place, sonde_patch *p) {
-  p->node_count = cut->node_count;
-  for (uint32_t v = 0; v < cut->node_count; ++v) p->node[v] = cut->parent[v][0];
-  for (uint32_t v = 0; v < cut->vertex_count; ++v)
+// Areas and cotangents of the cut faces.
+static void measure_faces(const sonde_model *model, const sonde_cut *cut, const uint32_t *place,
+                          sonde_patch *p) {
+  for (uint32_t f = 0; f < cut->face_count; ++f) {
+    sonde_patch_face *face = &p->face[p->face_count++];
+    sonde_vec3 x[3];
     for (int k = 0; k < 3; ++k) {
-      const uint32_t *at =
-          bsearch(&cut->parent[v][k], p->node, p->node_count, sizeof *p->node, compare_nodes);
-      SONDE_ASSERT(at != NULL);
-      p->among[place[v]][k] = (uint32_t)(at - p->node);
+      x[k] = sonde_cut_point(model, cut, cut->face[f][k]);
+      face->place[k] = place[cut->face[f][k]];
     }
-}
-
-// Free places ascend with nodes.
-static void order_places(const sonde_model *model, const sonde_cut *cut, sonde_vec3 normal,
-                         uint32_t *place, sonde_vec3 *normals, sonde_patch *p) {
-  uint32_t free = 0, held = p->free_count;
-  for (uint32_t v = 0; v < cut->vertex_count; ++v) {
-    uint32_t at = place[v] = cut->held[v] ? held++ : free++;
-    memcpy(p->parent[at], cut->parent[v], sizeof p->parent[at]);
-    memcpy(p->share[at], cut->share[v], sizeof p->share[at]);
-    p->area_m2[at] = v < cut->node_count ? RIM_WIDTH_M * cut->rim_m[v] : 0;
-    normals[at] = sonde_cut_normal(model, cut, v);
-    if (cut->held[v]) p->cosine[at] = v_dot(normals[at], normal);
-  }
-  SONDE_ASSERT(free == p->free_count && held == p->place_count);
-}
-
-static void add_face(const sonde_model *model, const sonde_cut *cut, uint32_t f,
-                     const uint32_t *place, sonde_patch *p) {
-  sonde_patch_face *face = &p->face[p->face_count++];
-  sonde_vec3 x[3];
-  for (int k = 0; k < 3; ++k) {
-    x[k] = sonde_cut_point(model, cut, cut->face[f][k]);
-    face->place[k] = place[cut->face[f][k]];
-  }
-  double twice = v_norm(v_cross(v_sub(x[1], x[0]), v_sub(x[2], x[0])));
-  SONDE_ASSERT(twice > 0);
-  face->area_m2 = 0.5 * twice;
-  for (int k = 0; k < 3; ++k) {
-    sonde_vec3 a = v_sub(x[(k + 1) % 3], x[k]), b = v_sub(x[(k + 2) % 3], x[k]);
-    face->half_cotangent[k] = 0.5 * v_dot(a, b) / twice;
-    p->area_m2[face->place[k]] += face->area_m2 / 3;
+    double twice = v_norm(v_cross(v_sub(x[1], x[0]), v_sub(x[2], x[0])));
+    SONDE_ASSERT(twice > 0);
+    face->area_m2 = 0.5 * twice;
+    for (int k = 0; k < 3; ++k) {
+      sonde_vec3 a = v_sub(x[(k + 1) % 3], x[k]), b = v_sub(x[(k + 2) % 3], x[k]);
+      face->half_cotangent[k] = 0.5 * v_dot(a, b) / twice;
+      p->area_m2[face->place[k]] += face->area_m2 / 3;
+    }
   }
 }
 
@@ -116,26 +87,13 @@ static sonde_status build_rows(sonde_patch *p, sonde_error *error) {
   return SONDE_OK;
 }
 
+// The entry of the matrix at a row and a column; NOWHERE outside the free places.
 static uint32_t entry_of(const sonde_patch *p, uint32_t row, uint32_t column) {
   if (row >= p->free_count || column >= p->free_count) return NOWHERE;
   uint32_t k = p->row_start[row];
   while (k < p->row_start[row + 1] && p->column[k] != column) ++k;
   SONDE_ASSERT(k < p->row_start[row + 1]);
   return k;
-}
-
-static void find_entries(sonde_patch *p) {
-  for (uint32_t f = 0; f < p->face_count; ++f) {
-    uint32_t held = 0;
-    for (int k = 0; k < 3; ++k) held += p->face[f].place[k] >= p->free_count;
-    if (held == 1 || held == 2) p->side[p->side_count++] = f;
-  }
-  for (uint32_t f = 0; f < p->face_count; ++f)
-    for (int k = 0; k < 3; ++k) {
-      uint32_t a = p->face[f].place[(k + 1) % 3], b = p->face[f].place[(k + 2) % 3];
-      p->face[f].entry[k][0] = entry_of(p, a, b);
-      p->face[f].entry[k][1] = entry_of(p, b, a);
-    }
 }
 
 static sonde_status analyse(const sonde_model *model, const sonde_cut *cut, sonde_patch *p,
@@ -162,15 +120,45 @@ static sonde_status fill(const sonde_model *model, const sonde_cut *cut, const s
   bool ok = place && normal && allocate_places(p, cut);
   sonde_status status = ok ? SONDE_OK : sonde_fail_memory(error);
   if (!status) {
-    order_places(model, cut, site->normal, place, normal, p);
-    find_parents(cut, place, p);
-    for (uint32_t f = 0; f < cut->face_count; ++f) add_face(model, cut, f, place, p);
+    // Free places come first; they ascend with the nodes.
+    uint32_t free = 0, held = p->free_count;
+    for (uint32_t v = 0; v < cut->vertex_count; ++v) {
+      uint32_t at = place[v] = cut->held[v] ? held++ : free++;
+      memcpy(p->parent[at], cut->parent[v], sizeof p->parent[at]);
+      memcpy(p->share[at], cut->share[v], sizeof p->share[at]);
+      p->area_m2[at] = v < cut->node_count ? RIM_WIDTH_M * cut->rim_m[v] : 0;
+      normal[at] = sonde_cut_normal(model, cut, v);
+      if (cut->held[v]) p->cosine[at] = v_dot(normal[at], site->normal);
+    }
+    SONDE_ASSERT(free == p->free_count && held == p->place_count);
+    // Vertices that are nodes come first and ascend: places find their nodes by bisection.
+    p->node_count = cut->node_count;
+    for (uint32_t v = 0; v < cut->node_count; ++v) p->node[v] = cut->parent[v][0];
+    for (uint32_t v = 0; v < cut->vertex_count; ++v)
+      for (int k = 0; k < 3; ++k) {
+        const uint32_t *at =
+            bsearch(&cut->parent[v][k], p->node, p->node_count, sizeof *p->node, compare_nodes);
+        SONDE_ASSERT(at != NULL);
+        p->among[place[v]][k] = (uint32_t)(at - p->node);
+      }
+    measure_faces(model, cut, place, p);
     status = sonde_patch_drag(p, &model->law, normal, site->normal, error);
   }
   sonde_free(place);
   sonde_free(normal);
   if (!status) status = build_rows(p, error);
-  if (!status) find_entries(p);
+  // Each face adds to its entries of the matrix; faces with a held and a free corner are the sides.
+  for (uint32_t f = 0; f < p->face_count && !status; ++f) {
+    sonde_patch_face *face = &p->face[f];
+    uint32_t held = 0;
+    for (int k = 0; k < 3; ++k) held += face->place[k] >= p->free_count;
+    if (held == 1 || held == 2) p->side[p->side_count++] = f;
+    for (int k = 0; k < 3; ++k) {
+      uint32_t a = face->place[(k + 1) % 3], b = face->place[(k + 2) % 3];
+      face->entry[k][0] = entry_of(p, a, b);
+      face->entry[k][1] = entry_of(p, b, a);
+    }
+  }
   if (!status) status = analyse(model, cut, p, error);
   return status;
 }

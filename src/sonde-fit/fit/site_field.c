@@ -48,27 +48,6 @@ sonde_status sonde_site_basis(const sonde_model *model, const sonde_site_table *
   return status;
 }
 
-static double spacing(const sonde_site_table *sites, double *nearest) {
-  for (uint32_t s = 0; s < sites->count; ++s) {
-    nearest[s] = INFINITY;
-    for (uint32_t t = 0; t < sites->count; ++t)
-      if (t != s)
-        nearest[s] =
-            fmin(nearest[s], v_distance(sites->sites[s].position_m, sites->sites[t].position_m));
-  }
-  qsort(nearest, sites->count, sizeof *nearest, sonde_compare_reals);
-  return nearest[sites->count / 2];
-}
-
-// Solves the symmetric 3x3 system m x = (1, 0, 0): Cramer's rule by cross products of its rows.
-static sonde_vec3 first_column_of_inverse(const double m[6]) {
-  sonde_vec3 a = vec3(m[0], m[1], m[2]), b = vec3(m[1], m[3], m[4]), c = vec3(m[2], m[4], m[5]);
-  sonde_vec3 cross = v_cross(b, c);
-  double determinant = v_dot(a, cross);
-  SONDE_ASSERT(determinant > 0);
-  return v_scale(cross, 1.0 / determinant);
-}
-
 typedef struct neighbour {
   double weight, u, v; // place in the site's axes, in spacings
 } neighbour;
@@ -100,7 +79,12 @@ static void roughness_row(const sonde_site_table *sites, uint32_t s, double spac
   if (!(m[0] > 0)) return;
   m[3] += SLOPE_RIDGE * m[0];
   m[5] += SLOPE_RIDGE * m[0];
-  sonde_vec3 x = first_column_of_inverse(m);
+  // The symmetric 3x3 system m x = (1, 0, 0) by Cramer's rule: cross products of its rows.
+  sonde_vec3 a = vec3(m[0], m[1], m[2]), b = vec3(m[1], m[3], m[4]), c = vec3(m[2], m[4], m[5]);
+  sonde_vec3 cross = v_cross(b, c);
+  double determinant = v_dot(a, cross);
+  SONDE_ASSERT(determinant > 0);
+  sonde_vec3 x = v_scale(cross, 1.0 / determinant);
   for (uint32_t t = 0; t < sites->count; ++t) {
     if (t == s) continue;
     neighbour n = neighbour_of(site, &sites->sites[t], spacing_m);
@@ -115,7 +99,16 @@ sonde_status sonde_site_roughness(const sonde_site_table *sites, double *rows, s
   SONDE_ASSERT(sites->count > 0);
   double *nearest = SONDE_NEW(double, sites->count);
   if (!nearest) return sonde_fail_memory(error);
-  double spacing_m = spacing(sites, nearest);
+  // The spacing is the median distance between a site and its nearest neighbour.
+  for (uint32_t s = 0; s < sites->count; ++s) {
+    nearest[s] = INFINITY;
+    for (uint32_t t = 0; t < sites->count; ++t)
+      if (t != s)
+        nearest[s] =
+            fmin(nearest[s], v_distance(sites->sites[s].position_m, sites->sites[t].position_m));
+  }
+  qsort(nearest, sites->count, sizeof *nearest, sonde_compare_reals);
+  double spacing_m = nearest[sites->count / 2];
   for (uint32_t s = 0; s < sites->count; ++s) {
     if (sites->count > 1 && spacing_m > 0)
       roughness_row(sites, s, spacing_m, &rows[(size_t)s * sites->count]);
