@@ -1,8 +1,4 @@
-// log_density:    of one value.
-// likelihood:     sum of log densities; AIC.
-// student_step:   one step of expectation and maximisation for place and scale.
-// student_at:     place, scale and likelihood at given degrees of freedom.
-// fit_student:    golden section over the logarithm of the degrees of freedom.
+// Normal, Laplace and Student's t distributions of greatest likelihood.
 #include "fit/distribution.h"
 
 #include "base/maths.h"
@@ -54,50 +50,27 @@ static void likelihood(sonde_distribution *d, const double *x, uint32_t count) {
   d->aic = 2 * (d->kind == SONDE_STUDENT ? 3 : 2) - 2 * d->log_likelihood;
 }
 
-static double median_of(const double *sorted, uint32_t count) {
-  SONDE_ASSERT(count > 0 && sorted[0] <= sorted[count - 1]);
-  return 0.5 * (sorted[(count - 1) / 2] + sorted[count / 2]);
-}
-
-static void fit_normal(const double *x, uint32_t count, sonde_distribution *d) {
-  double sum = 0, squares = 0;
-  for (uint32_t i = 0; i < count; ++i) sum += x[i];
-  d->place = sum / count;
-  for (uint32_t i = 0; i < count; ++i) squares += (x[i] - d->place) * (x[i] - d->place);
-  d->scale = sqrt(squares / count);
-}
-
-static void fit_laplace(const double *sorted, uint32_t count, sonde_distribution *d) {
-  double sum = 0;
-  d->place = median_of(sorted, count);
-  for (uint32_t i = 0; i < count; ++i) sum += fabs(sorted[i] - d->place);
-  d->scale = sum / count;
-}
-
+// Place, scale and likelihood at given degrees of freedom, by expectation and maximisation.
 // t is a normal with gamma distributed precision: w is the expected precision of each value.
 // Dividing by sum w instead of the count has the same fixed point and gets there much sooner.
-static double student_step(const double *x, uint32_t count, sonde_distribution *d) {
-  double weights = 0, first = 0, squares = 0;
-  double nu = d->freedom, old_place = d->place, old_scale = d->scale;
-  for (uint32_t i = 0; i < count; ++i) {
-    double z = (x[i] - old_place) / old_scale, w = (nu + 1) / (nu + z * z);
-    weights += w;
-    first += w * x[i];
-    squares += w * (x[i] - old_place) * (x[i] - old_place);
-  }
-  double shift = first / weights - old_place;
-  double variance = squares / weights - shift * shift;
-  d->place += shift;
-  d->scale = sqrt(variance > 0 ? variance : 0);
-  SONDE_ASSERT(weights > 0);
-  return fabs(shift) + fabs(d->scale - old_scale);
-}
-
 static double student_at(const double *sorted, uint32_t count, double log_freedom,
                          sonde_distribution *d) {
   d->freedom = exp(log_freedom);
   for (int i = 0; i < STUDENT_STEPS; ++i) {
-    double moved = student_step(sorted, count, d);
+    double weights = 0, first = 0, squares = 0;
+    double nu = d->freedom, old_place = d->place, old_scale = d->scale;
+    for (uint32_t k = 0; k < count; ++k) {
+      double x = sorted[k], z = (x - old_place) / old_scale, w = (nu + 1) / (nu + z * z);
+      weights += w;
+      first += w * x;
+      squares += w * (x - old_place) * (x - old_place);
+    }
+    SONDE_ASSERT(weights > 0);
+    double shift = first / weights - old_place;
+    double variance = squares / weights - shift * shift;
+    d->place += shift;
+    d->scale = sqrt(variance > 0 ? variance : 0);
+    double moved = fabs(shift) + fabs(d->scale - old_scale);
     if (!(d->scale > 0) || moved < 1e-10 * d->scale) break;
   }
   if (!(d->scale > 0)) return -INFINITY;
@@ -131,10 +104,18 @@ bool sonde_distribution_fit(sonde_distribution_kind kind, const double *sorted, 
   *d = (sonde_distribution){.kind = kind};
   if (count < LEAST_COUNT || !(sorted[count - 1] > sorted[0])) return false;
   SONDE_ASSERT(isfinite(sorted[0]) && isfinite(sorted[count - 1]));
-  if (kind == SONDE_LAPLACE)
-    fit_laplace(sorted, count, d);
-  else
-    fit_normal(sorted, count, d);
+  double sum = 0;
+  if (kind == SONDE_LAPLACE) { // the median and the mean deviation from it
+    d->place = 0.5 * (sorted[(count - 1) / 2] + sorted[count / 2]);
+    for (uint32_t i = 0; i < count; ++i) sum += fabs(sorted[i] - d->place);
+    d->scale = sum / count;
+  } else { // the mean and the standard deviation
+    double squares = 0;
+    for (uint32_t i = 0; i < count; ++i) sum += sorted[i];
+    d->place = sum / count;
+    for (uint32_t i = 0; i < count; ++i) squares += (sorted[i] - d->place) * (sorted[i] - d->place);
+    d->scale = sqrt(squares / count);
+  }
   if (kind == SONDE_STUDENT) fit_student(sorted, count, d);
   if (!(d->scale > 0)) return false;
   likelihood(d, sorted, count);

@@ -29,36 +29,7 @@ static uint32_t fold_of(const sonde_refit *r, sonde_hold_out kind, uint32_t row)
   return deep ? 0 : UINT32_MAX;
 }
 
-// A refit without a probe starts far from the result, and so needs the way on few depths.
-static void start(sonde_again *a, const sonde_fit_result *result, sonde_hold_out kind) {
-  a->refit->near = kind != SONDE_HOLD_OUT_PROBE;
-  if (a->refit->near)
-    memcpy(a->theta, a->optimum, a->parameters * sizeof *a->theta);
-  else
-    sonde_refit_start(a->refit, result->curves, a->theta);
-}
-
 // fitted: measurements from this one on are predicted with their part, but never fitted.
-static sonde_status run_fold(sonde_again *a, const sonde_fit_result *result, sonde_hold_out kind,
-                             uint32_t fold, uint32_t fitted, const sonde_progress *progress,
-                             double *predicted_n, sonde_error *error) {
-  sonde_refit *r = a->refit;
-  uint32_t rows = a->plan.row_count;
-  SONDE_ASSERT(fold < fold_count(&a->plan, kind));
-  for (uint32_t k = 0; k < rows; ++k)
-    a->left_out[k] = fold_of(r, kind, k) == fold || a->plan.row[k] >= fitted;
-  start(a, result, kind);
-  sonde_refit_result found;
-  r->left_out = a->left_out;
-  sonde_status status = sonde_again_run(a, progress, &found, error);
-  for (uint32_t k = 0; k < rows; ++k) a->left_out[k] = fold_of(r, kind, k) != fold;
-  r->stride = 1;
-  if (!status) status = sonde_refit_forces(r, a->theta, a->force_n, NULL, progress, error);
-  for (uint32_t k = 0; k < rows && !status; ++k)
-    if (!a->left_out[k]) predicted_n[a->plan.row[k]] = a->force_n[k];
-  return status;
-}
-
 static sonde_status run_folds(const sonde_model *model, const sonde_site_table *sites,
                               const sonde_measurements *m, uint32_t fitted,
                               const sonde_fit_def *def, const sonde_fit_result *result,
@@ -70,9 +41,27 @@ static sonde_status run_folds(const sonde_model *model, const sonde_site_table *
   if (status) return status;
   if (kind == SONDE_HOLD_OUT_PROBE && again.plan.probe_count < 2)
     status = sonde_fail(error, SONDE_ARGUMENT, "one probe only: none can be left out");
-  uint32_t folds = fold_count(&again.plan, kind);
-  for (uint32_t fold = 0; !status && fold < folds; ++fold)
-    status = run_fold(&again, result, kind, fold, fitted, progress, predicted_n, error);
+  sonde_refit *r = again.refit;
+  uint32_t folds = fold_count(&again.plan, kind), rows = again.plan.row_count;
+  for (uint32_t fold = 0; !status && fold < folds; ++fold) {
+    for (uint32_t k = 0; k < rows; ++k)
+      again.left_out[k] = fold_of(r, kind, k) == fold || again.plan.row[k] >= fitted;
+    // A refit without a probe starts far from the result, and so needs the path on few depths.
+    r->near = kind != SONDE_HOLD_OUT_PROBE;
+    if (r->near)
+      memcpy(again.theta, again.optimum, again.parameters * sizeof *again.theta);
+    else
+      sonde_refit_start(r, result->curves, again.theta);
+    sonde_refit_result found;
+    r->left_out = again.left_out;
+    status = sonde_again_run(&again, progress, &found, error);
+    // The refitted parameters predict the rows of the fold.
+    for (uint32_t k = 0; k < rows; ++k) again.left_out[k] = fold_of(r, kind, k) != fold;
+    r->stride = 1;
+    if (!status) status = sonde_refit_forces(r, again.theta, again.force_n, NULL, progress, error);
+    for (uint32_t k = 0; k < rows && !status; ++k)
+      if (!again.left_out[k]) predicted_n[again.plan.row[k]] = again.force_n[k];
+  }
   sonde_again_clear(&again);
   return status;
 }

@@ -8,29 +8,26 @@
 
 enum { FIGURES = 4, SWEEPS = 30 };
 
-// One rotation that clears entry (p, q) of a symmetric matrix.
-static void rotate(double m[FIGURES][FIGURES], int p, int q) {
-  double angle = 0.5 * atan2(2 * m[p][q], m[q][q] - m[p][p]), c = cos(angle), s = sin(angle);
-  SONDE_ASSERT(p < q && q < FIGURES);
-  for (int k = 0; k < FIGURES; ++k) {
-    double a = m[k][p], b = m[k][q];
-    m[k][p] = c * a - s * b;
-    m[k][q] = s * a + c * b;
-  }
-  for (int k = 0; k < FIGURES; ++k) {
-    double a = m[p][k], b = m[q][k];
-    m[p][k] = c * a - s * b;
-    m[q][k] = s * a + c * b;
-  }
-}
-
 // Largest over smallest eigenvalue.
 static double condition_of(const double matrix[FIGURES][FIGURES]) {
   double m[FIGURES][FIGURES], least = INFINITY, most = 0;
   memcpy(m, matrix, sizeof m);
   for (int sweep = 0; sweep < SWEEPS; ++sweep)
     for (int p = 0; p < FIGURES; ++p)
-      for (int q = p + 1; q < FIGURES; ++q) rotate(m, p, q);
+      for (int q = p + 1; q < FIGURES; ++q) {
+        // One rotation clears entry (p, q) of the symmetric matrix.
+        double angle = 0.5 * atan2(2 * m[p][q], m[q][q] - m[p][p]), c = cos(angle), s = sin(angle);
+        for (int k = 0; k < FIGURES; ++k) {
+          double a = m[k][p], b = m[k][q];
+          m[k][p] = c * a - s * b;
+          m[k][q] = s * a + c * b;
+        }
+        for (int k = 0; k < FIGURES; ++k) {
+          double a = m[p][k], b = m[q][k];
+          m[p][k] = c * a - s * b;
+          m[q][k] = s * a + c * b;
+        }
+      }
   for (int k = 0; k < FIGURES; ++k) {
     least = fmin(least, m[k][k]);
     most = fmax(most, m[k][k]);
@@ -69,24 +66,6 @@ static void describe(sonde_again *a, double *row, sonde_fit_part *part) {
   part->condition = known ? condition_of((const double(*)[FIGURES])part->correlation) : INFINITY;
 }
 
-// probe == probe_count: all. The curvature is taken at the common optimum, before any step: there
-// the information of the probes adds up.
-static sonde_status look_at(sonde_again *a, uint32_t probe, const sonde_progress *progress,
-                            double *row, sonde_fit_part *part, sonde_error *error) {
-  bool all = probe == a->plan.probe_count;
-  SONDE_ASSERT(probe <= a->plan.probe_count);
-  for (uint32_t k = 0; k < a->plan.row_count; ++k)
-    a->left_out[k] = !all && a->plan.row_probe[k] != probe;
-  if (!all) snprintf(part->probe, sizeof part->probe, "%s", a->plan.probe[probe]);
-  a->refit->left_out = a->left_out;
-  a->refit->near = true;
-  a->refit->enough = INFINITY; // any promise ends the refit where it begins
-  sonde_refit_result found;
-  sonde_status status = sonde_again_run(a, progress, &found, error);
-  if (!status) describe(a, row, part);
-  return status;
-}
-
 sonde_status sonde_fit_identify(const sonde_model *model, const sonde_site_table *sites,
                                 const sonde_measurements *measurements, const sonde_fit_def *def,
                                 const sonde_fit_result *result, const sonde_progress *progress,
@@ -98,9 +77,21 @@ sonde_status sonde_fit_identify(const sonde_model *model, const sonde_site_table
   double *row = SONDE_NEW(double, again.parameters);
   if (!row) status = sonde_fail_memory(error);
   uint32_t first = again.plan.probe_count > 1 ? 0 : again.plan.probe_count;
-  for (uint32_t p = first; p <= again.plan.probe_count && !status; ++p)
-    status =
-        look_at(&again, p, progress, row, &identifiability->part[identifiability->count++], error);
+  // The curvature is taken at the common optimum, before any step: there the information of the
+  // probes adds up. The last part has the rows of all probes.
+  for (uint32_t p = first; p <= again.plan.probe_count && !status; ++p) {
+    sonde_fit_part *part = &identifiability->part[identifiability->count++];
+    bool all = p == again.plan.probe_count;
+    for (uint32_t k = 0; k < again.plan.row_count; ++k)
+      again.left_out[k] = !all && again.plan.row_probe[k] != p;
+    if (!all) snprintf(part->probe, sizeof part->probe, "%s", again.plan.probe[p]);
+    again.refit->left_out = again.left_out;
+    again.refit->near = true;
+    again.refit->enough = INFINITY; // any promise ends the refit where it begins
+    sonde_refit_result found;
+    status = sonde_again_run(&again, progress, &found, error);
+    if (!status) describe(&again, row, part);
+  }
   sonde_free(row);
   sonde_again_clear(&again);
   return status;

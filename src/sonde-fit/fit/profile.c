@@ -20,44 +20,24 @@ typedef struct profiler {
   double cost, sd;
 } profiler;
 
-static sonde_status run_at(profiler *p, double ln_shear, double *cost, sonde_error *error) {
-  uint32_t n = p->again->parameters;
-  double move = ln_shear - p->again->theta[n - 2];
-  for (uint32_t k = 0; k < n; ++k) p->again->theta[k] += move * p->along[k];
-  p->again->theta[n - 2] = ln_shear;
-  sonde_refit_result found;
-  sonde_status status = sonde_again_run(p->again, p->progress, &found, error);
-  *cost = found.cost;
-  return status;
-}
-
 static sonde_status walk(profiler *p, int side, sonde_fit_profile *profile, sonde_error *error) {
   uint32_t n = p->again->parameters;
   sonde_status status = SONDE_OK;
   memcpy(p->again->theta, p->optimum, n * sizeof *p->optimum);
   for (int k = 0; k < MIDDLE && !status; ++k) {
-    double ln_shear = p->optimum[n - 2] + side * DISTANCE[k] * p->sd, cost;
-    status = run_at(p, ln_shear, &cost, error);
+    double ln_shear = p->optimum[n - 2] + side * DISTANCE[k] * p->sd;
+    double move = ln_shear - p->again->theta[n - 2];
+    for (uint32_t i = 0; i < n; ++i) p->again->theta[i] += move * p->along[i];
+    p->again->theta[n - 2] = ln_shear;
+    sonde_refit_result found;
+    status = sonde_again_run(p->again, p->progress, &found, error);
     int at = MIDDLE + side * (k + 1);
     SONDE_ASSERT(at >= 0 && at < SONDE_FIT_PROFILE);
     profile->shear_n_m[at] = exp(ln_shear);
-    profile->rise[at] = 2 * (cost - p->cost);
+    profile->rise[at] = 2 * (found.cost - p->cost);
     profile->quadratic[at] = profile->variance * DISTANCE[k] * DISTANCE[k];
   }
   return status;
-}
-
-// The root of the rise is nearly straight in ln G.
-static double end_of(const sonde_fit_profile *p, int side) {
-  double goal = sqrt(p->threshold);
-  for (int k = 0; k < MIDDLE; ++k) {
-    int in = MIDDLE + side * k, out = in + side;
-    double inner = sqrt(fmax(p->rise[in], 0)), outer = sqrt(fmax(p->rise[out], 0));
-    if (!(outer >= goal)) continue;
-    double share = (goal - inner) / (outer - inner);
-    return p->shear_n_m[in] * pow(p->shear_n_m[out] / p->shear_n_m[in], share);
-  }
-  return NAN;
 }
 
 // The optimum again, to the accuracy that differences of costs need, and the curvature there.
@@ -106,8 +86,20 @@ sonde_status sonde_fit_profile_shear(const sonde_model *model, const sonde_site_
     status = walk(&p, 1, profile, error);
   }
   if (!status) status = walk(&p, -1, profile, error);
-  if (!status)
-    for (int k = 0; k < 2; ++k) profile->interval_95[k] = end_of(profile, k ? 1 : -1);
+  // The interval ends where the root of the rise, nearly straight in ln G, reaches the threshold.
+  double goal = sqrt(profile->threshold);
+  for (int side = -1; side < 2 && !status; side += 2) {
+    double *end = &profile->interval_95[side > 0];
+    *end = NAN;
+    for (int k = 0; k < MIDDLE; ++k) {
+      int in = MIDDLE + side * k, out = in + side;
+      double inner = sqrt(fmax(profile->rise[in], 0)), outer = sqrt(fmax(profile->rise[out], 0));
+      if (!(outer >= goal)) continue;
+      double share = (goal - inner) / (outer - inner);
+      *end = profile->shear_n_m[in] * pow(profile->shear_n_m[out] / profile->shear_n_m[in], share);
+      break;
+    }
+  }
   sonde_free(p.fixed);
   sonde_free(p.optimum);
   sonde_free(p.along);

@@ -35,10 +35,6 @@ static int compare_rows(const void *a, const void *b) {
   return x != y ? (x > y) - (x < y) : (p->line > q->line) - (p->line < q->line);
 }
 
-static bool same_curve(const sonde_repeat_row *a, const sonde_repeat_row *b) {
-  return a->datum.site == b->datum.site && strcmp(a->datum.probe, b->datum.probe) == 0;
-}
-
 // Rows [count] of one site and probe; appends their mean to the measurements.
 static void mean_curve(const sonde_repeat_row *row, uint32_t count, sonde_measurements *m) {
   uint32_t first = 1, from = m->count;
@@ -79,7 +75,10 @@ sonde_status sonde_measurements_average(sonde_repeat_row *row, uint32_t count,
   qsort(row, count, sizeof *row, compare_rows);
   m->count = 0;
   for (uint32_t i = 0, end; i < count; i = end) {
-    for (end = i + 1; end < count && same_curve(&row[i], &row[end]);) ++end;
+    const sonde_datum *one = &row[i].datum;
+    for (end = i + 1; end < count && row[end].datum.site == one->site &&
+                      strcmp(row[end].datum.probe, one->probe) == 0;)
+      ++end;
     mean_curve(row + i, end - i, m);
   }
   return SONDE_OK;

@@ -3,25 +3,19 @@
 
 #include "base/maths.h"
 
-// Normal law of a site over a footprint at depth x and its derivative by xm.
-static double normal_force(const sonde_footprint *f, sonde_law law, double x, double *by_xm) {
-  double force = 0.0;
-  *by_xm = 0.0;
-  for (uint32_t k = 0; k < f->node_count; ++k) {
-    double c = f->cosine[k], slope;
-    double p = sonde_law_pressure(law.k0_n_m3, law.xm_m, x * c, &slope);
-    force += f->weight_m2[k] * c * p;
-    *by_xm += f->weight_m2[k] * c * slope;
-  }
-  return force;
-}
-
 double sonde_site_force(const sonde_site_problem *p, uint32_t block, uint32_t row,
                         const double theta[2], const double *border, double jacobian[4]) {
   SONDE_ASSERT(block < p->plan->site_count && row < p->plan->row_count);
   sonde_law law = sonde_law_of(theta, p->floor_m[block]);
-  double x = p->m->data[p->plan->row[row]].penetration_m, by_xm;
-  double normal = normal_force(&p->footprint[p->plan->row_curve[row]], law, x, &by_xm);
+  const sonde_footprint *f = &p->footprint[p->plan->row_curve[row]];
+  double x = p->m->data[p->plan->row[row]].penetration_m, normal = 0.0, by_xm = 0.0;
+  // The normal law of the site over the footprint, and its derivative by xm.
+  for (uint32_t k = 0; k < f->node_count; ++k) {
+    double c = f->cosine[k], slope;
+    double pressure = sonde_law_pressure(law.k0_n_m3, law.xm_m, x * c, &slope);
+    normal += f->weight_m2[k] * c * pressure;
+    by_xm += f->weight_m2[k] * c * slope;
+  }
   jacobian[0] = normal;
   jacobian[1] = by_xm * law.above_m;
   jacobian[2] = p->edges ? exp(border[0]) * p->per_stiffness_m[row] : 0.0;
@@ -38,22 +32,18 @@ void sonde_site_row(const void *user, uint32_t block, uint32_t row, const double
   for (int k = 0; k < 4; ++k) jacobian[k] *= weight;
 }
 
-static bool allocate(sonde_site_problem *p) {
-  const sonde_fit_plan *plan = p->plan;
-  p->footprint = SONDE_NEW(sonde_footprint, plan->curve_count);
-  p->per_stiffness_m = SONDE_NEW(double, plan->row_count);
-  p->per_tension = SONDE_NEW(double, plan->row_count);
-  p->weight = SONDE_NEW(double, plan->row_count);
-  p->floor_m = SONDE_NEW(double, plan->site_count);
-  return p->footprint && p->per_stiffness_m && p->per_tension && p->weight && p->floor_m;
-}
-
 sonde_status sonde_site_problem_create(const sonde_model *model, const sonde_site_table *sites,
                                        const sonde_fit_def *def, sonde_site_problem *p,
                                        sonde_error *error) {
   const sonde_fit_plan *plan = p->plan;
   bool relative = def->weights == SONDE_WEIGHTS_RELATIVE;
-  if (!allocate(p)) return sonde_fail_memory(error);
+  p->footprint = SONDE_NEW(sonde_footprint, plan->curve_count);
+  p->per_stiffness_m = SONDE_NEW(double, plan->row_count);
+  p->per_tension = SONDE_NEW(double, plan->row_count);
+  p->weight = SONDE_NEW(double, plan->row_count);
+  p->floor_m = SONDE_NEW(double, plan->site_count);
+  if (!p->footprint || !p->per_stiffness_m || !p->per_tension || !p->weight || !p->floor_m)
+    return sonde_fail_memory(error);
   for (uint32_t k = 0; k < plan->probe_count && relative; ++k)
     if (!(plan->mean_force_n[k] > 0))
       return sonde_fail(error, SONDE_ARGUMENT,

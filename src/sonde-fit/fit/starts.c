@@ -17,18 +17,15 @@ static double draw(range r, uint64_t seed, uint64_t counter) {
   return r.low + (r.high - r.low) * sonde_random_uniform(seed, counter);
 }
 
-static double deepest_of(const sonde_fit_plan *plan) {
-  double deepest = 0;
-  for (uint32_t s = 0; s < plan->site_count; ++s) deepest = fmax(deepest, plan->site_deepest_m[s]);
-  SONDE_ASSERT(deepest > 0);
-  return deepest;
-}
-
 // theta holds the generic start.
 static void draw_start(const sonde_again *a, uint64_t seed, uint32_t number, double *theta) {
   uint32_t n = a->parameters, sites = a->refit->sites->count;
   uint64_t counter = (uint64_t)number * (n + 2);
-  double least = log(1.1 * deepest_of(&a->plan));
+  double deepest = 0;
+  for (uint32_t s = 0; s < a->plan.site_count; ++s)
+    deepest = fmax(deepest, a->plan.site_deepest_m[s]);
+  SONDE_ASSERT(deepest > 0);
+  double least = log(1.1 * deepest);
   const range xm = {least, log(4 / 1.1) + least}, limit = {log(0.4), log(4.0)};
   const range k0 = {-log(3.0), log(3.0)}, shear = {-log(5.0), log(5.0)};
   const range by_site[2] = {{-0.25, 0.25}, {-0.1, 0.1}};
@@ -39,13 +36,6 @@ static void draw_start(const sonde_again *a, uint64_t seed, uint32_t number, dou
   }
   theta[n - 2] += draw(shear, seed, counter++);
   theta[n - 1] = draw(limit, seed, counter);
-}
-
-static double distance_sd(const sonde_again *a, const double *sd) {
-  double most = 0;
-  for (uint32_t k = 0; k < a->parameters; ++k)
-    most = fmax(most, fabs(a->theta[k] - a->optimum[k]) / sd[k]);
-  return most;
 }
 
 // Standard deviations of the parameters by themselves, from the curvature at the optimum.
@@ -67,29 +57,6 @@ static sonde_status find_sd(sonde_again *a, const sonde_progress *progress, doub
   return SONDE_OK;
 }
 
-static sonde_status run_start(sonde_again *a, const sonde_fit_result *result, uint64_t seed,
-                              uint32_t number, const double *sd, const sonde_progress *progress,
-                              sonde_fit_starts *starts, sonde_error *error) {
-  sonde_refit_start(a->refit, result->curves, a->theta);
-  draw_start(a, seed, number, a->theta);
-  sonde_refit_forget(a->refit);
-  sonde_refit_result found;
-  sonde_status status = sonde_again_run(a, progress, &found, error);
-  if (status && status != SONDE_CONVERGENCE) return status;
-  starts->count++;
-  if (status || !found.converged) {
-    starts->failed++;
-    return SONDE_OK;
-  }
-  starts->least_cost = fmin(starts->least_cost, found.cost);
-  starts->most_cost = fmax(starts->most_cost, found.cost);
-  double far = distance_sd(a, sd);
-  if (far > SAME_SD) return SONDE_OK;
-  starts->same++;
-  starts->farthest_sd = fmax(starts->farthest_sd, far);
-  return SONDE_OK;
-}
-
 sonde_status sonde_fit_random_starts(const sonde_model *model, const sonde_site_table *sites,
                                      const sonde_measurements *measurements,
                                      const sonde_fit_def *def, const sonde_fit_result *result,
@@ -102,8 +69,28 @@ sonde_status sonde_fit_random_starts(const sonde_model *model, const sonde_site_
   double *sd = SONDE_NEW(double, again.parameters), *row = SONDE_NEW(double, again.parameters);
   if (!sd || !row) status = sonde_fail_memory(error);
   if (!status) status = find_sd(&again, progress, row, sd, error);
-  for (uint32_t k = 0; k < count && !status; ++k)
-    status = run_start(&again, result, seed, k, sd, progress, starts, error);
+  for (uint32_t k = 0; k < count && !status; ++k) {
+    sonde_refit_start(again.refit, result->curves, again.theta);
+    draw_start(&again, seed, k, again.theta);
+    sonde_refit_forget(again.refit);
+    sonde_refit_result found;
+    status = sonde_again_run(&again, progress, &found, error);
+    if (status && status != SONDE_CONVERGENCE) break;
+    starts->count++;
+    bool failed = status || !found.converged;
+    status = SONDE_OK;
+    starts->failed += failed;
+    if (failed) continue;
+    starts->least_cost = fmin(starts->least_cost, found.cost);
+    starts->most_cost = fmax(starts->most_cost, found.cost);
+    // The distance of the end from the optimum, in standard deviations of the parameters.
+    double far = 0;
+    for (uint32_t p = 0; p < again.parameters; ++p)
+      far = fmax(far, fabs(again.theta[p] - again.optimum[p]) / sd[p]);
+    if (far > SAME_SD) continue;
+    starts->same++;
+    starts->farthest_sd = fmax(starts->farthest_sd, far);
+  }
   sonde_free(sd);
   sonde_free(row);
   sonde_again_clear(&again);
