@@ -82,14 +82,6 @@ static void with_prior(const sonde_refit *r, sonde_refit_workspace *w, const dou
   (void)sonde_refit_add_prior(r, theta, smoothness, w->line, &l->whole);
 }
 
-// Rows of a site that take part.
-static uint32_t used_rows(const sonde_refit *r, uint32_t site) {
-  uint32_t count = 0;
-  for (uint32_t k = r->plan->site_start[site]; k < r->plan->site_start[site + 1]; ++k)
-    count += sonde_refit_uses(r, k);
-  return count;
-}
-
 // Rows of a site that take part: slopes to l->forward, errors after the full step to l->error_n,
 // 1/weight to the diagonal of l->within.
 static void gather_rows(const sonde_refit *r, const sonde_refit_workspace *w, const double *force_n,
@@ -115,8 +107,9 @@ static void gather_rows(const sonde_refit *r, const sonde_refit_workspace *w, co
 // Woodbury's formula. l->error_n receives them in the order of the rows that take part.
 static bool without_site(const sonde_refit *r, const sonde_refit_workspace *w,
                          const double *force_n, uint32_t site, linear *l) {
-  uint32_t rows = used_rows(r, site), at = 0;
+  uint32_t rows = 0, at = 0;
   const uint32_t *start = r->plan->site_start + site;
+  for (uint32_t k = start[0]; k < start[1]; ++k) rows += sonde_refit_uses(r, k);
   if (rows == 0) return true;
   gather_rows(r, w, force_n, site, rows, l);
   sonde_transpose(l->forward, rows, l->n, l->turned);
@@ -161,12 +154,6 @@ static double leave_out(const sonde_refit *r, const sonde_refit_workspace *w, co
 // Which of the two standard deviations is varied.
 enum { BOTH, SHEAR_ONLY, NORMAL_ONLY, PASSES };
 
-static sonde_smoothness varied(sonde_smoothness s, int pass, double sd) {
-  if (pass != SHEAR_ONLY) s.normal_sd = sd;
-  if (pass != NORMAL_ONLY) s.shear_sd = sd;
-  return s;
-}
-
 sonde_status sonde_refit_choose_smoothness(sonde_refit *r, sonde_refit_workspace *w,
                                            const double *theta, const double *force_n,
                                            sonde_error *error) {
@@ -179,7 +166,9 @@ sonde_status sonde_refit_choose_smoothness(sonde_refit *r, sonde_refit_workspace
   add_sites(r, w, force_n, &l);
   for (int pass = 0; pass < (r->fields > 2 ? PASSES : SHEAR_ONLY); ++pass)
     for (int k = 0; k < SONDE_FIT_TRIED; ++k) {
-      sonde_smoothness trial = varied(r->smoothness, pass, TRIED_SD[k]);
+      sonde_smoothness trial = r->smoothness;
+      if (pass != SHEAR_ONLY) trial.normal_sd = TRIED_SD[k];
+      if (pass != NORMAL_ONLY) trial.shear_sd = TRIED_SD[k];
       with_prior(r, w, theta, trial, &l);
       double percent = leave_out(r, w, force_n, &l, one_out_n);
       if (pass == BOTH && r->confidence) {
@@ -275,30 +264,21 @@ static void correlate(const sonde_refit *r, const double *covariance, double cor
     for (int b = 0; b < 4; ++b) correlation[a][b] = c[a][b] / sqrt(c[a][a] * c[b][b]);
 }
 
-// Sites with replacement, one step of the linearised problem; ln G and ln gm.
-static bool draw_sites(const sonde_refit *r, sonde_refit_workspace *w, const double *theta,
-                       uint32_t draw, linear *l, double *out) {
-  uint32_t sites = l->site_count, n = l->n;
-  sonde_normal_clear(&l->part);
-  for (uint32_t s = 0; s < sites; ++s) {
-    uint64_t number = sonde_random_bits(BOOTSTRAP_SEED, (uint64_t)draw * sites + s);
-    sonde_normal_add(&l->site[number % sites], 1, &l->part);
-  }
-  (void)sonde_refit_add_prior(r, theta, r->smoothness, w->line, &l->part);
-  if (!sonde_normal_solve(&l->part, 0, l->factor, l->step)) return false;
-  out[0] = theta[n - 2] + l->step[n - 2];
-  out[1] = theta[n - 1] + l->step[n - 1];
-  return true;
-}
-
+// Sites with replacement, one step of the linearised problem each: intervals of ln G and ln gm.
 static void bootstrap(const sonde_refit *r, sonde_refit_workspace *w, const double *theta,
                       linear *l, sonde_fit_confidence *c) {
-  double drawn[2][DRAWS], one[2];
-  uint32_t count = 0;
+  double drawn[2][DRAWS];
+  uint32_t count = 0, sites = l->site_count, n = l->n;
   for (uint32_t d = 0; d < DRAWS; ++d) {
-    if (!draw_sites(r, w, theta, d, l, one)) continue;
-    drawn[0][count] = one[0];
-    drawn[1][count++] = one[1];
+    sonde_normal_clear(&l->part);
+    for (uint32_t s = 0; s < sites; ++s) {
+      uint64_t number = sonde_random_bits(BOOTSTRAP_SEED, (uint64_t)d * sites + s);
+      sonde_normal_add(&l->site[number % sites], 1, &l->part);
+    }
+    (void)sonde_refit_add_prior(r, theta, r->smoothness, w->line, &l->part);
+    if (!sonde_normal_solve(&l->part, 0, l->factor, l->step)) continue;
+    drawn[0][count] = theta[n - 2] + l->step[n - 2];
+    drawn[1][count++] = theta[n - 1] + l->step[n - 1];
   }
   for (int k = 0; k < 2 && count > 0; ++k) {
     qsort(drawn[k], count, sizeof drawn[k][0], sonde_compare_reals);
@@ -330,19 +310,6 @@ static void fill(const sonde_refit *r, sonde_refit_workspace *w, const double *c
         NORMAL_95 * sqrt(variance_of(covariance, n, &w->kept_jacobian[(size_t)k * n]));
 }
 
-static bool allocate(const sonde_refit *r, sonde_fit_confidence *c) {
-  c->ln_k0_sd = SONDE_NEW(double, r->sites->count);
-  c->ln_xm_sd = SONDE_NEW(double, r->sites->count);
-  c->ln_site_shear_sd = SONDE_NEW(double, r->sites->count);
-  c->ln_site_limit_sd = SONDE_NEW(double, r->sites->count);
-  c->band_n = SONDE_NEW(double, r->m->count);
-  c->one_out_n = SONDE_NEW(double, r->m->count);
-  for (uint32_t k = 0; c->one_out_n && c->band_n && k < r->m->count; ++k)
-    c->one_out_n[k] = c->band_n[k] = NAN;
-  return c->ln_k0_sd && c->ln_xm_sd && c->ln_site_shear_sd && c->ln_site_limit_sd && c->band_n &&
-         c->one_out_n;
-}
-
 sonde_status sonde_refit_confidence(sonde_refit *r, sonde_refit_workspace *w, const double *theta,
                                     const double *force_n, sonde_error *error) {
   sonde_fit_confidence *c = r->confidence;
@@ -351,9 +318,17 @@ sonde_status sonde_refit_confidence(sonde_refit *r, sonde_refit_workspace *w, co
   c->shear_smoothness_sd = r->smoothness.shear_sd;
   double *covariance = SONDE_NEW(double, (size_t)w->n * w->n);
   double *one_out_n = SONDE_NEW(double, w->rows);
-  bool ok = linear_create(&l, w->n, r->plan) && covariance && one_out_n && allocate(r, c);
+  c->ln_k0_sd = SONDE_NEW(double, r->sites->count);
+  c->ln_xm_sd = SONDE_NEW(double, r->sites->count);
+  c->ln_site_shear_sd = SONDE_NEW(double, r->sites->count);
+  c->ln_site_limit_sd = SONDE_NEW(double, r->sites->count);
+  c->band_n = SONDE_NEW(double, r->m->count);
+  c->one_out_n = SONDE_NEW(double, r->m->count);
+  bool ok = linear_create(&l, w->n, r->plan) && covariance && one_out_n && c->ln_k0_sd &&
+            c->ln_xm_sd && c->ln_site_shear_sd && c->ln_site_limit_sd && c->band_n && c->one_out_n;
   sonde_status status = ok ? SONDE_OK : sonde_fail_memory(error);
   if (status) goto done;
+  for (uint32_t k = 0; k < r->m->count; ++k) c->one_out_n[k] = c->band_n[k] = NAN;
   for (uint32_t k = 0; k < w->rows; ++k) one_out_n[k] = NAN;
   add_sites(r, w, force_n, &l);
   with_prior(r, w, theta, r->smoothness, &l);

@@ -104,10 +104,6 @@ static int compare_rows(const void *a, const void *b) {
   return (p > q) - (p < q);
 }
 
-static bool same_curve(const sonde_datum *a, const sonde_datum *b) {
-  return a->site == b->site && strcmp(a->probe, b->probe) == 0;
-}
-
 // Slope of the least squares line through rows; 0 when all have one depth.
 static double slope_of(const sonde_datum *const *row, uint32_t count) {
   double x = 0, f = 0, xx = 0, xf = 0;
@@ -143,19 +139,6 @@ static int compare_order(const void *a, const void *b) {
   return (p > q) - (p < q);
 }
 
-// The turning point of a curve whose rows go down and come up again in the order of the table.
-static const sonde_datum *turn_of(const sonde_datum *const *row, uint32_t count,
-                                  const sonde_datum **order) {
-  memcpy(order, row, count * sizeof *order);
-  qsort(order, count, sizeof *order, compare_order);
-  uint32_t k = 1;
-  while (k < count && order[k]->penetration_m > order[k - 1]->penetration_m) ++k;
-  uint32_t down = k;
-  while (k < count && order[k]->penetration_m < order[k - 1]->penetration_m) ++k;
-  bool turns = k == count && down >= TURN_ROWS && count - down >= TURN_ROWS;
-  return turns ? order[down - 1] : NULL;
-}
-
 static course measure_curve(const sonde_datum **row, uint32_t count, const sonde_datum **order) {
   SONDE_ASSERT(count > 0 && row && order);
   uint32_t third = count / 3 > 3 ? count / 3 : count < 3 ? count : 3;
@@ -175,15 +158,17 @@ static course measure_curve(const sonde_datum **row, uint32_t count, const sonde
     if (fall > most) most = fall, c.fall = row[k];
   }
   c.range_n = c.peak_n - low;
-  c.turn = turn_of(row, count, order);
-  return c;
-}
 
-// A fit leaves out curves that are too short or do not press.
-static bool counts(const course *c) {
-  uint32_t steps = 0;
-  for (uint32_t k = 0; k < c->count; ++k) steps += c->row[k]->penetration_m > 0;
-  return steps >= SONDE_FIT_LEAST_STEPS && mean_of(c->row, c->count) > 0;
+  // The turning point of a curve whose rows go down and come up again in the order of the table.
+  memcpy(order, row, count * sizeof *order);
+  qsort(order, count, sizeof *order, compare_order);
+  uint32_t k = 1;
+  while (k < count && order[k]->penetration_m > order[k - 1]->penetration_m) ++k;
+  uint32_t down = k;
+  while (k < count && order[k]->penetration_m < order[k - 1]->penetration_m) ++k;
+  bool turns = k == count && down >= TURN_ROWS && count - down >= TURN_ROWS;
+  if (turns) c.turn = order[down - 1];
+  return c;
 }
 
 typedef struct courses {
@@ -200,9 +185,16 @@ static sonde_status curve_list(const sonde_measurements *m, courses *list, sonde
   for (uint32_t i = 0; i < m->count; ++i) list->row[i] = &m->data[i];
   qsort(list->row, m->count, sizeof *list->row, compare_rows);
   for (uint32_t i = 0, end; i < m->count; i = end) {
-    for (end = i + 1; end < m->count && same_curve(list->row[i], list->row[end]);) ++end;
+    const sonde_datum *one = list->row[i];
+    for (end = i + 1; end < m->count && list->row[end]->site == one->site &&
+                      strcmp(list->row[end]->probe, one->probe) == 0;)
+      ++end;
     course c = measure_curve(list->row + i, end - i, list->order);
-    if (counts(&c)) list->curve[list->count++] = c;
+    // A fit leaves out curves that are too short or do not press.
+    uint32_t steps = 0;
+    for (uint32_t k = 0; k < c.count; ++k) steps += c.row[k]->penetration_m > 0;
+    if (steps >= SONDE_FIT_LEAST_STEPS && mean_of(c.row, c.count) > 0)
+      list->curve[list->count++] = c;
   }
   return SONDE_OK;
 }
@@ -350,18 +342,6 @@ static void judge_stiffening(const sonde_measurements *m, const course *c, sonde
   }
 }
 
-static void judge_modulus(const sonde_measurements *m, const course *c, double median_pa,
-                          sonde_doubts *doubts) {
-  double times = c->modulus_pa / median_pa;
-  if (!(c->modulus_pa > 0) || (times < MOST_APART && times > 1 / MOST_APART)) return;
-  sonde_doubt *d = sonde_doubt_add(doubts, "apart", SONDE_DOUBT_IMPLAUSIBLE, m, c->row[0]);
-  if (d)
-    snprintf(d->sentence, sizeof d->sentence,
-             "apparent modulus %.3g kPa where the table's median is %.3g kPa, expected one within "
-             "a factor %g: another unit in this curve?",
-             1e-3 * c->modulus_pa, 1e-3 * median_pa, MOST_APART);
-}
-
 // ---- contact zero and tare ----------------------------------------------------------------
 
 // Force at zero depth and slope there: least squares of A + B x + C x^3 through the first rows,
@@ -432,7 +412,15 @@ sonde_status sonde_measurements_examine(const sonde_measurements *m, sonde_doubt
     double median = median_modulus(&list);
     for (uint32_t k = 0; k < list.count; ++k) {
       judge_stiffening(m, &list.curve[k], doubts);
-      judge_modulus(m, &list.curve[k], median, doubts);
+      const course *c = &list.curve[k];
+      double times = c->modulus_pa / median;
+      if (!(c->modulus_pa > 0) || (times < MOST_APART && times > 1 / MOST_APART)) continue;
+      sonde_doubt *d = sonde_doubt_add(doubts, "apart", SONDE_DOUBT_IMPLAUSIBLE, m, c->row[0]);
+      if (d)
+        snprintf(d->sentence, sizeof d->sentence,
+                 "apparent modulus %.3g kPa where the table's median is %.3g kPa, expected one "
+                 "within a factor %g: another unit in this curve?",
+                 1e-3 * c->modulus_pa, 1e-3 * median, MOST_APART);
     }
     judge_zero(&list, doubts);
   }

@@ -14,24 +14,6 @@ typedef struct quarter {
   uint32_t count;
 } quarter;
 
-// Quarters of the probe's deepest penetration.
-static void bias_of(const sonde_measurements *m, const double *model_n, const char *probe,
-                    quarter part[QUARTERS]) {
-  double deepest_m = 0;
-  memset(part, 0, QUARTERS * sizeof *part);
-  for (uint32_t i = 0; i < m->count; ++i)
-    if (strcmp(m->data[i].probe, probe) == 0) deepest_m = fmax(deepest_m, m->data[i].penetration_m);
-  for (uint32_t i = 0; i < m->count && deepest_m > 0; ++i) {
-    const sonde_datum *d = &m->data[i];
-    if (strcmp(d->probe, probe) != 0 || !isfinite(model_n[i])) continue;
-    int q = (int)(QUARTERS * d->penetration_m / deepest_m);
-    quarter *to = &part[q < QUARTERS ? q : QUARTERS - 1];
-    to->error_n += model_n[i] - d->force_n;
-    to->force_n += d->force_n;
-    to->count++;
-  }
-}
-
 static void judge_bias(const sonde_measurements *m, const sonde_fit_result *result,
                        sonde_doubts *doubts) {
   const sonde_error_report *report = &result->stage3; // the only stage that follows the forces
@@ -39,7 +21,21 @@ static void judge_bias(const sonde_measurements *m, const sonde_fit_result *resu
     quarter part[QUARTERS];
     double worst = 0;
     int at = 0;
-    bias_of(m, result->model_n, report->probe[p], part);
+    memset(part, 0, sizeof part);
+    // Errors and forces by quarters of the probe's deepest penetration.
+    double deepest_m = 0;
+    for (uint32_t i = 0; i < m->count; ++i)
+      if (strcmp(m->data[i].probe, report->probe[p]) == 0)
+        deepest_m = fmax(deepest_m, m->data[i].penetration_m);
+    for (uint32_t i = 0; i < m->count && deepest_m > 0; ++i) {
+      const sonde_datum *row = &m->data[i];
+      if (strcmp(row->probe, report->probe[p]) != 0 || !isfinite(result->model_n[i])) continue;
+      int q = (int)(QUARTERS * row->penetration_m / deepest_m);
+      quarter *to = &part[q < QUARTERS ? q : QUARTERS - 1];
+      to->error_n += result->model_n[i] - row->force_n;
+      to->force_n += row->force_n;
+      to->count++;
+    }
     for (int q = 0; q < QUARTERS; ++q) {
       double bias = part[q].force_n > 0 ? part[q].error_n / part[q].force_n : 0;
       if (fabs(bias) > fabs(worst)) worst = bias, at = q;
@@ -54,29 +50,6 @@ static void judge_bias(const sonde_measurements *m, const sonde_fit_result *resu
              "depths, expected within %.0f %%: contact zero, tare, or a law that does not fit",
              report->probe[p], 100 * worst, at + 1, 100 * r->high);
   }
-}
-
-static double deepest_at(const sonde_measurements *m, uint32_t site, const sonde_datum **row) {
-  double deepest_m = 0;
-  for (uint32_t i = 0; i < m->count; ++i)
-    if (m->data[i].site == site && m->data[i].penetration_m > deepest_m)
-      deepest_m = m->data[i].penetration_m, *row = &m->data[i];
-  return deepest_m;
-}
-
-static void judge_penetration(const sonde_measurements *m, const sonde_datum *row, double through_m,
-                              sonde_doubts *doubts) {
-  SONDE_ASSERT(through_m > 0);
-  double share = row->penetration_m / through_m;
-  sonde_doubt_grade grade;
-  if (sonde_plausible(QUANTITY_SHARE, share, &grade)) return;
-  sonde_doubt *d = sonde_doubt_add(doubts, "deeper_than_the_body", grade, m, row);
-  if (!d) return;
-  snprintf(
-      d->sentence, sizeof d->sentence,
-      "a penetration of %.3g mm where the body is %.3g mm thick, expected at most %.0f %% of it",
-      1e3 * row->penetration_m, 1e3 * through_m,
-      100 * sonde_plausible_range_of(QUANTITY_SHARE)->high);
 }
 
 static void judge_asymptote(const sonde_measurements *m, const sonde_site *site,
@@ -101,13 +74,27 @@ static void judge_geometry(const sonde_model *model, const sonde_surface_index *
                            sonde_doubts *doubts) {
   const sonde_datum *row = NULL;
   sonde_surface_point far;
-  if (!(deepest_at(m, site->id, &row) > 0)) return;
+  double deepest_m = 0;
+  for (uint32_t i = 0; i < m->count; ++i)
+    if (m->data[i].site == site->id && m->data[i].penetration_m > deepest_m)
+      deepest_m = m->data[i].penetration_m, row = &m->data[i];
+  if (!row) return;
   sonde_vec3 in = v_neg(site->normal), from = v_madd(site->position_m, 6e-3, in);
   if (!sonde_surface_raycast(skin, from, in, MOST_THROUGH_M, &far)) return;
   double through_m = v_distance(site->position_m, far.point_m), bone_m = through_m;
   uint32_t near = v_nearest(model->surface.vertices, model->surface.vertex_count, site->position_m);
   if (model->femur.vertex_count) bone_m = model->bone_depth_m[near];
-  judge_penetration(m, row, through_m, doubts);
+  SONDE_ASSERT(through_m > 0);
+  sonde_doubt_grade grade;
+  sonde_doubt *d = NULL;
+  if (!sonde_plausible(QUANTITY_SHARE, row->penetration_m / through_m, &grade))
+    d = sonde_doubt_add(doubts, "deeper_than_the_body", grade, m, row);
+  if (d)
+    snprintf(d->sentence, sizeof d->sentence,
+             "a penetration of %.3g mm where the body is %.3g mm thick, expected at most %.0f %% "
+             "of it",
+             1e3 * row->penetration_m, 1e3 * through_m,
+             100 * sonde_plausible_range_of(QUANTITY_SHARE)->high);
   judge_asymptote(m, site, row, bone_m, doubts);
 }
 

@@ -17,15 +17,6 @@ typedef struct prediction {
   double *predicted_n;
 } prediction;
 
-static void predict_simplified(const prediction *p, uint32_t curve,
-                               const sonde_footprint *footprint) {
-  const sonde_fit_plan *plan = p->plan;
-  for (uint32_t r = plan->curve_start[curve]; r < plan->curve_start[curve + 1]; ++r) {
-    uint32_t row = plan->row[r];
-    p->predicted_n[row] = sonde_footprint_force(footprint, p->model, p->m->data[row].penetration_m);
-  }
-}
-
 // A depth without equilibrium leaves the rest of the curve NaN.
 static sonde_status predict_full(const prediction *p, uint32_t curve, const atomic_bool *stop,
                                  sonde_error *error) {
@@ -63,7 +54,11 @@ static sonde_status predict_curve(void *user, uint32_t worker, uint32_t curve,
                                                plan->half_u_m[probe], plan->half_v_m[probe],
                                                SONDE_COVERAGE_CLIPPED, &footprint, error);
   if (status) return status;
-  predict_simplified(p, curve, &footprint);
+  for (uint32_t r = plan->curve_start[curve]; r < plan->curve_start[curve + 1]; ++r) {
+    uint32_t row = plan->row[r];
+    p->predicted_n[row] =
+        sonde_footprint_force(&footprint, p->model, p->m->data[row].penetration_m);
+  }
   sonde_footprint_clear(&footprint);
   return SONDE_OK;
 }

@@ -380,34 +380,6 @@ static void put_skin(report *r) {
 
 // ---- estimates ----------------------------------------------------------------------------------
 
-static void put_parameters(report *r) {
-  const sonde_fit_report *in = r->in;
-  sonde_json_begin_list(&r->out, "parameters");
-  for (uint32_t i = 0; i < in->parameter_count; ++i) {
-    sonde_json_begin_object(&r->out, NULL);
-    put_words(r, "name", in->parameters[i].name);
-    put_words(r, "unit", in->parameters[i].unit);
-    put_words(r, "note", in->parameters[i].note);
-    put_interval(r, "estimate", &in->parameters[i].estimate, 1);
-    sonde_json_end(&r->out);
-  }
-  sonde_json_end(&r->out);
-  sonde_json_begin_list(&r->out, "site_parameters");
-  for (uint32_t i = 0; i < in->site_parameter_count; ++i) {
-    const sonde_report_site *s = &in->site_parameters[i];
-    sonde_json_begin_object(&r->out, NULL);
-    sonde_json_put_integer(&r->out, "site", s->site);
-    put_interval(r, "k0_kpa_mm", &s->k0_n_m3, 1e-6);
-    put_interval(r, "xm_mm", &s->xm_m, 1e3);
-    if (s->shear_n_m.value > 0) {
-      put_interval(r, "shear_n_m", &s->shear_n_m, 1);
-      put_interval(r, "shear_limit", &s->shear_limit, 1);
-    }
-    sonde_json_end(&r->out);
-  }
-  sonde_json_end(&r->out);
-}
-
 // First crossing of the threshold from the estimate towards smaller (side < 0) or larger values;
 // NaN without one.
 static double cross_threshold(const sonde_report_profile *p, double threshold, int side) {
@@ -523,7 +495,30 @@ static void put_report(report *r) {
   sonde_json_end(&r->out);
   if (r->rows) put_measurements(r);
   put_skin(r);
-  put_parameters(r);
+  sonde_json_begin_list(&r->out, "parameters");
+  for (uint32_t i = 0; i < in->parameter_count; ++i) {
+    sonde_json_begin_object(&r->out, NULL);
+    put_words(r, "name", in->parameters[i].name);
+    put_words(r, "unit", in->parameters[i].unit);
+    put_words(r, "note", in->parameters[i].note);
+    put_interval(r, "estimate", &in->parameters[i].estimate, 1);
+    sonde_json_end(&r->out);
+  }
+  sonde_json_end(&r->out);
+  sonde_json_begin_list(&r->out, "site_parameters");
+  for (uint32_t i = 0; i < in->site_parameter_count; ++i) {
+    const sonde_report_site *s = &in->site_parameters[i];
+    sonde_json_begin_object(&r->out, NULL);
+    sonde_json_put_integer(&r->out, "site", s->site);
+    put_interval(r, "k0_kpa_mm", &s->k0_n_m3, 1e-6);
+    put_interval(r, "xm_mm", &s->xm_m, 1e3);
+    if (s->shear_n_m.value > 0) {
+      put_interval(r, "shear_n_m", &s->shear_n_m, 1);
+      put_interval(r, "shear_limit", &s->shear_limit, 1);
+    }
+    sonde_json_end(&r->out);
+  }
+  sonde_json_end(&r->out);
   put_inference(r);
   sonde_json_end(&r->out);
 }

@@ -91,27 +91,6 @@ static int compare_rows(const void *a, const void *b) {
   return (p[0] > q[0]) - (p[0] < q[0]);
 }
 
-static sonde_status load_rows(sonde_csv *csv, const table *t, double (*row)[2],
-                              sonde_error *error) {
-  sonde_sample *s = t->sample;
-  for (;;) {
-    bool found;
-    sonde_status status = sonde_csv_next(csv, &found, error);
-    if (status || !found) return status;
-    for (int k = 0; k < 2 && !status; ++k) {
-      status = sonde_csv_real(csv, t->column[k], &row[s->count][k], error);
-      row[s->count][k] *= t->factor[k];
-    }
-    if (status) return status;
-    if (row[s->count][0] > 1 || fabs(row[s->count][1]) > 1e6)
-      return sonde_fail(
-          error, SONDE_FORMAT,
-          "%s:%u: %g m and %g N, expected at most 1 m and 1e6 N: are the units right?", csv->path,
-          csv->line, row[s->count][0], row[s->count][1]);
-    s->count += row[s->count][0] >= 0;
-  }
-}
-
 sonde_status sonde_sample_load(const char *path, sonde_sample *sample, sonde_error *error) {
   *sample = (sonde_sample){0};
   table t = {.sample = sample};
@@ -129,7 +108,22 @@ sonde_status sonde_sample_load(const char *path, sonde_sample *sample, sonde_err
     sample->compression_m = SONDE_NEW(double, room);
     sample->force_n = SONDE_NEW(double, room);
     bool ok = row && sample->compression_m && sample->force_n;
-    status = ok ? load_rows(&csv, &t, row, error) : sonde_fail_memory(error);
+    if (!ok) status = sonde_fail_memory(error);
+    for (bool found = true; !status;) {
+      status = sonde_csv_next(&csv, &found, error);
+      if (status || !found) break;
+      double *at = row[sample->count];
+      for (int k = 0; k < 2 && !status; ++k) {
+        status = sonde_csv_real(&csv, t.column[k], &at[k], error);
+        at[k] *= t.factor[k];
+      }
+      if (!status && (at[0] > 1 || fabs(at[1]) > 1e6))
+        status =
+            sonde_fail(error, SONDE_FORMAT,
+                       "%s:%u: %g m and %g N, expected at most 1 m and 1e6 N: are the units right?",
+                       csv.path, csv.line, at[0], at[1]);
+      if (!status) sample->count += at[0] >= 0;
+    }
   }
   if (!status && sample->count < LEAST_ROWS)
     status = sonde_fail(error, SONDE_FORMAT, "%s: %u rows of compression, expected at least %d",

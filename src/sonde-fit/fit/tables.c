@@ -44,26 +44,6 @@ static sonde_status read_direction(const sonde_csv *csv, const uint32_t *columns
   return SONDE_OK;
 }
 
-static sonde_status load_site(const sonde_csv *csv, const uint32_t *columns, uint32_t fat_column,
-                              sonde_site *site, double *fat_m, sonde_error *error) {
-  sonde_status status = sonde_csv_index(csv, columns[SITE_ID], &site->id, error);
-  if (status) return status;
-  status = read_vector(csv, columns + SITE_X, &site->position_m, error);
-  if (status) return status;
-  site->position_m = v_scale(site->position_m, METRES_PER_MM);
-  status = read_direction(csv, columns + SITE_N, NULL, &site->normal, error);
-  if (status) return status;
-  status = read_direction(csv, columns + SITE_U, &site->normal, &site->u, error);
-  if (status) return status;
-  status = read_direction(csv, columns + SITE_V, &site->normal, &site->v, error);
-  if (status) return status;
-  *fat_m = NAN;
-  if (fat_column == UINT32_MAX) return SONDE_OK;
-  status = sonde_csv_real(csv, fat_column, fat_m, error);
-  *fat_m *= METRES_PER_MM;
-  return status;
-}
-
 static sonde_status load_sites(sonde_csv *csv, sonde_site_table *table, sonde_error *error) {
   uint32_t columns[SITE_COLUMNS], fat_column = sonde_csv_column(csv, "fat_mm");
   sonde_status status = sonde_csv_require(csv, SITE_NAMES, SITE_COLUMNS, columns, error);
@@ -73,8 +53,17 @@ static sonde_status load_sites(sonde_csv *csv, sonde_site_table *table, sonde_er
     status = sonde_csv_next(csv, &found, error);
     if (status || !found) break;
     sonde_site *site = &table->sites[table->count];
-    status = load_site(csv, columns, fat_column, site, &table->fat_depth_m[table->count], error);
+    double *fat_m = &table->fat_depth_m[table->count];
+    status = sonde_csv_index(csv, columns[SITE_ID], &site->id, error);
+    if (!status) status = read_vector(csv, columns + SITE_X, &site->position_m, error);
+    if (!status) status = read_direction(csv, columns + SITE_N, NULL, &site->normal, error);
+    if (!status) status = read_direction(csv, columns + SITE_U, &site->normal, &site->u, error);
+    if (!status) status = read_direction(csv, columns + SITE_V, &site->normal, &site->v, error);
+    *fat_m = NAN;
+    if (!status && fat_column != UINT32_MAX) status = sonde_csv_real(csv, fat_column, fat_m, error);
     if (status) break;
+    site->position_m = v_scale(site->position_m, METRES_PER_MM);
+    *fat_m *= METRES_PER_MM;
     if (sonde_site_find(table, site->id) != UINT32_MAX)
       return sonde_fail(error, SONDE_FORMAT, "%s:%u: column site: site %u appears twice", csv->path,
                         csv->line, site->id);
@@ -151,26 +140,6 @@ static void place_on_surface(const sonde_model *model, const sonde_surface_index
   SONDE_ASSERT(*angle_rad >= 0 && *angle_rad <= SONDE_PI);
 }
 
-static bool is_off(double distance_m, double angle_rad, double tolerance_m) {
-  return !(distance_m <= tolerance_m && angle_rad <= NORMAL_TOLERANCE_RAD);
-}
-
-static sonde_status fail_off(const sonde_site *site, double distance_m, double angle_rad,
-                             double tolerance_m, uint32_t off, uint32_t count, sonde_error *error) {
-  if (!(distance_m <= tolerance_m))
-    return sonde_fail(
-        error, SONDE_MISMATCH,
-        "site %u lies %.1f mm from the skin, expected at most %.1f mm; %u of %u sites "
-        "do not fit: do sites and surface belong together, both in mm?",
-        site->id, distance_m * 1e3, tolerance_m * 1e3, off, count);
-  return sonde_fail(error, SONDE_MISMATCH,
-                    "site %u: its normal is %.0f degrees off the skin's%s, expected at most %.0f; "
-                    "%u of %u sites do not fit",
-                    site->id, angle_rad * 180 / SONDE_PI,
-                    angle_rad > SONDE_PI / 2 ? " and points inward" : "",
-                    NORMAL_TOLERANCE_RAD * 180 / SONDE_PI, off, count);
-}
-
 sonde_status sonde_sites_check_on_surface(const sonde_model *model, const sonde_site_table *sites,
                                           double tolerance_m, sonde_error *error) {
   sonde_surface_index *index = NULL;
@@ -180,12 +149,24 @@ sonde_status sonde_sites_check_on_surface(const sonde_model *model, const sonde_
   double distance_m = 0, angle_rad = 0;
   for (uint32_t i = 0; i < sites->count; ++i) {
     place_on_surface(model, index, &sites->sites[i], &distance_m, &angle_rad);
-    if (is_off(distance_m, angle_rad, tolerance_m) && !off++) first = i;
+    bool fits = distance_m <= tolerance_m && angle_rad <= NORMAL_TOLERANCE_RAD;
+    if (!fits && !off++) first = i;
   }
   if (off) {
     const sonde_site *site = &sites->sites[first];
     place_on_surface(model, index, site, &distance_m, &angle_rad);
-    status = fail_off(site, distance_m, angle_rad, tolerance_m, off, sites->count, error);
+    status = distance_m <= tolerance_m
+                 ? sonde_fail(error, SONDE_MISMATCH,
+                              "site %u: its normal is %.0f degrees off the skin's%s, expected at "
+                              "most %.0f; %u of %u sites do not fit",
+                              site->id, angle_rad * 180 / SONDE_PI,
+                              angle_rad > SONDE_PI / 2 ? " and points inward" : "",
+                              NORMAL_TOLERANCE_RAD * 180 / SONDE_PI, off, sites->count)
+                 : sonde_fail(error, SONDE_MISMATCH,
+                              "site %u lies %.1f mm from the skin, expected at most %.1f mm; %u of "
+                              "%u sites do not fit: do sites and surface belong together, both in "
+                              "mm?",
+                              site->id, distance_m * 1e3, tolerance_m * 1e3, off, sites->count);
   }
   sonde_surface_index_destroy(index);
   return status;
@@ -218,24 +199,6 @@ static sonde_status read_probe(const sonde_csv *csv, uint32_t column, char name[
   return SONDE_OK;
 }
 
-static sonde_status check_site(const sonde_csv *csv, const sonde_site_table *sites, uint32_t id,
-                               sonde_vec3 position_m, sonde_error *error) {
-  if (!sites) return SONDE_OK;
-  uint32_t index = sonde_site_find(sites, id);
-  if (index == UINT32_MAX)
-    return sonde_fail(error, SONDE_FORMAT,
-                      "%s:%u: column site: site %u is not in the sites file, expected one of its "
-                      "%u sites",
-                      csv->path, csv->line, id, sites->count);
-  double away_m = v_distance(position_m, sites->sites[index].position_m);
-  if (!(away_m <= SONDE_SITE_TOLERANCE_M))
-    return sonde_fail(error, SONDE_MISMATCH,
-                      "%s:%u: columns x_mm..z_mm: site %u lies %.1f mm from where the sites file "
-                      "has it, expected at most %.0f mm",
-                      csv->path, csv->line, id, away_m * 1e3, SONDE_SITE_TOLERANCE_M * 1e3);
-  return SONDE_OK;
-}
-
 static sonde_status load_row(const sonde_csv *csv, const uint32_t *columns,
                              const sonde_site_table *sites, uint32_t row, sonde_measurements *m,
                              sonde_error *error) {
@@ -260,7 +223,21 @@ static sonde_status load_row(const sonde_csv *csv, const uint32_t *columns,
     return sonde_fail(error, SONDE_FORMAT,
                       "%s:%u: column force_n: expected a force of at most 1e6 N, found '%.40s'",
                       csv->path, csv->line, csv->cell[columns[ROW_FORCE]]);
-  return check_site(csv, sites, datum->site, m->position_m[row], error);
+  if (!sites) return SONDE_OK;
+  uint32_t index = sonde_site_find(sites, datum->site);
+  if (index == UINT32_MAX)
+    return sonde_fail(error, SONDE_FORMAT,
+                      "%s:%u: column site: site %u is not in the sites file, expected one of its "
+                      "%u sites",
+                      csv->path, csv->line, datum->site, sites->count);
+  double away_m = v_distance(m->position_m[row], sites->sites[index].position_m);
+  if (!(away_m <= SONDE_SITE_TOLERANCE_M))
+    return sonde_fail(error, SONDE_MISMATCH,
+                      "%s:%u: columns x_mm..z_mm: site %u lies %.1f mm from where the sites file "
+                      "has it, expected at most %.0f mm",
+                      csv->path, csv->line, datum->site, away_m * 1e3,
+                      SONDE_SITE_TOLERANCE_M * 1e3);
+  return SONDE_OK;
 }
 
 // What identifies a row, with the line it stands on.
@@ -283,49 +260,6 @@ static int compare_keys(const void *a, const void *b) {
   return order ? order : (p->line > q->line) - (p->line < q->line);
 }
 
-static sonde_status check_repeats(const char *path, row_key *keys, uint32_t count,
-                                  sonde_error *error) {
-  qsort(keys, count, sizeof *keys, compare_keys);
-  for (uint32_t i = 1; i < count; ++i) {
-    const sonde_datum *d = keys[i].datum;
-    if (compare_data(keys[i - 1].datum, d) == 0 && keys[i - 1].repeat == keys[i].repeat)
-      return sonde_fail(error, SONDE_FORMAT,
-                        "%s:%u: repeats line %u: site %u, probe %s, penetration_mm %.4f, expected "
-                        "each once, or a column repeat or phase that tells them apart",
-                        path, keys[i].line, keys[i - 1].line, d->site, d->probe,
-                        d->penetration_m * 1e3);
-  }
-  return SONDE_OK;
-}
-
-// Single negative forces are noise; a negative mean is the other sign convention.
-static sonde_status check_sign(const char *path, const sonde_measurements *m, sonde_error *error) {
-  double sum_n = 0;
-  SONDE_ASSERT(m->count > 0);
-  for (uint32_t i = 0; i < m->count; ++i) sum_n += m->data[i].force_n;
-  if (sum_n >= 0) return SONDE_OK;
-  return sonde_fail(error, SONDE_FORMAT,
-                    "%s: column force_n: the mean is %.3g N, expected forces that push the probe "
-                    "out, > 0; is the sign reversed?",
-                    path, sum_n / m->count);
-}
-
-// Columns that tell rows of one curve apart; UINT32_MAX: absent.
-typedef struct row_kinds {
-  uint32_t phase, repeat;
-} row_kinds;
-
-static sonde_status read_kind(const sonde_csv *csv, const row_kinds *kinds, bool *loading,
-                              uint32_t *repeat, sonde_error *error) {
-  *loading = true, *repeat = 0;
-  if (kinds->phase != UINT32_MAX && !sonde_phase_of(csv->cell[kinds->phase], loading))
-    return sonde_fail(error, SONDE_FORMAT,
-                      "%s:%u: column phase: expected loading or unloading, found '%.40s'",
-                      csv->path, csv->line, csv->cell[kinds->phase]);
-  return kinds->repeat == UINT32_MAX ? SONDE_OK
-                                     : sonde_csv_index(csv, kinds->repeat, repeat, error);
-}
-
 static sonde_status average(const row_key *keys, sonde_measurements *m, sonde_error *error) {
   uint32_t count = m->count;
   sonde_repeat_row *row = SONDE_NEW(sonde_repeat_row, count);
@@ -343,16 +277,23 @@ static sonde_status average(const row_key *keys, sonde_measurements *m, sonde_er
 static sonde_status load_rows(sonde_csv *csv, const sonde_site_table *sites, row_key *keys,
                               sonde_measurements *m, sonde_error *error) {
   uint32_t columns[ROW_COLUMNS];
-  const row_kinds kinds = {sonde_csv_column(csv, "phase"), sonde_csv_column(csv, "repeat")};
+  // Columns that tell rows of one curve apart; UINT32_MAX: absent.
+  uint32_t phase = sonde_csv_column(csv, "phase"), repeat = sonde_csv_column(csv, "repeat");
   sonde_status status = sonde_csv_require(csv, ROW_NAMES, ROW_COLUMNS, columns, error);
-  bool found = !status, loading;
+  bool found = !status;
   while (!status) {
     row_key *key = &keys[m->count];
     status = sonde_csv_next(csv, &found, error);
     if (status || !found) break;
     *key = (row_key){&m->data[m->count], csv->line, 0};
     status = load_row(csv, columns, sites, m->count, m, error);
-    if (!status) status = read_kind(csv, &kinds, &loading, &key->repeat, error);
+    if (status) break;
+    bool loading = true;
+    if (phase != UINT32_MAX && !sonde_phase_of(csv->cell[phase], &loading))
+      return sonde_fail(error, SONDE_FORMAT,
+                        "%s:%u: column phase: expected loading or unloading, found '%.40s'",
+                        csv->path, csv->line, csv->cell[phase]);
+    if (repeat != UINT32_MAX) status = sonde_csv_index(csv, repeat, &key->repeat, error);
     if (status) break;
     m->count += loading;
     m->unloading += !loading;
@@ -361,9 +302,26 @@ static sonde_status load_rows(sonde_csv *csv, const sonde_site_table *sites, row
   if (!m->count)
     return sonde_fail(error, SONDE_FORMAT, "%s: has no rows, expected at least one measurement",
                       csv->path);
-  status = check_repeats(csv->path, keys, m->count, error);
-  if (!status) status = check_sign(csv->path, m, error);
-  return status || kinds.repeat == UINT32_MAX ? status : average(keys, m, error);
+  // Each depth of a curve stands once.
+  qsort(keys, m->count, sizeof *keys, compare_keys);
+  for (uint32_t i = 1; i < m->count; ++i) {
+    const sonde_datum *d = keys[i].datum;
+    if (compare_data(keys[i - 1].datum, d) == 0 && keys[i - 1].repeat == keys[i].repeat)
+      return sonde_fail(error, SONDE_FORMAT,
+                        "%s:%u: repeats line %u: site %u, probe %s, penetration_mm %.4f, expected "
+                        "each once, or a column repeat or phase that tells them apart",
+                        csv->path, keys[i].line, keys[i - 1].line, d->site, d->probe,
+                        d->penetration_m * 1e3);
+  }
+  // Single negative forces are noise; a negative mean is the other sign convention.
+  double sum_n = 0;
+  for (uint32_t i = 0; i < m->count; ++i) sum_n += m->data[i].force_n;
+  if (!(sum_n >= 0))
+    return sonde_fail(error, SONDE_FORMAT,
+                      "%s: column force_n: the mean is %.3g N, expected forces that push the probe "
+                      "out, > 0; is the sign reversed?",
+                      csv->path, sum_n / m->count);
+  return repeat == UINT32_MAX ? SONDE_OK : average(keys, m, error);
 }
 
 sonde_status sonde_measurements_create(sonde_measurements *m, uint32_t room, sonde_error *error) {
