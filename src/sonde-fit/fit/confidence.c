@@ -215,19 +215,6 @@ static void sandwich(const sonde_refit *r, const sonde_refit_workspace *w, const
   }
 }
 
-// The prior holds the fields only as far as it is true: its own spread counts too.
-static void add_prior_spread(const sonde_refit *r, linear *l, double *covariance) {
-  uint32_t n = l->n, most = most_rows(r->plan), rows = sonde_refit_prior_rows(r);
-  for (uint32_t from = 0; from < rows; from += most) {
-    uint32_t count = rows - from < most ? rows - from : most;
-    for (uint32_t k = 0; k < count; ++k)
-      l->error_n[k] = sonde_refit_prior_row(r, r->smoothness, from + k, &l->forward[(size_t)k * n],
-                                            &(double){0});
-    solve_rows(l, count);
-    sonde_add_outers(covariance, n, l->forward, count, l->error_n);
-  }
-}
-
 static double lower(const double *a, uint32_t n, uint32_t i, uint32_t j) {
   return i >= j ? a[(size_t)i * n + j] : a[(size_t)j * n + i];
 }
@@ -248,20 +235,6 @@ static int figure_of(const sonde_refit *r, uint32_t k) {
   uint32_t sites = r->sites->count, n = sonde_refit_parameters(r);
   if (k >= n - 2) return (int)(k - (n - 2));
   return k < sites ? 2 : k < 2 * sites ? 3 : -1;
-}
-
-static void correlate(const sonde_refit *r, const double *covariance, double correlation[4][4]) {
-  double c[4][4] = {{0}};
-  uint32_t n = sonde_refit_parameters(r), sites = r->sites->count;
-  for (uint32_t i = 0; i < n; ++i)
-    for (uint32_t j = 0; j < n; ++j) {
-      int a = figure_of(r, i), b = figure_of(r, j);
-      if (a < 0 || b < 0) continue;
-      double share = (a > 1 ? 1.0 / sites : 1) * (b > 1 ? 1.0 / sites : 1);
-      c[a][b] += share * lower(covariance, n, i, j);
-    }
-  for (int a = 0; a < 4; ++a)
-    for (int b = 0; b < 4; ++b) correlation[a][b] = c[a][b] / sqrt(c[a][a] * c[b][b]);
 }
 
 // Sites with replacement, one step of the linearised problem each: intervals of ln G and ln gm.
@@ -304,7 +277,18 @@ static void fill(const sonde_refit *r, sonde_refit_workspace *w, const double *c
   }
   c->ln_shear_sd = sqrt(lower(covariance, n, n - 2, n - 2));
   c->ln_limit_sd = sqrt(lower(covariance, n, n - 1, n - 1));
-  correlate(r, covariance, c->correlation);
+  // Correlation of ln G, ln gm and the means of ln k0 and ln xm.
+  double spread[4][4] = {{0}};
+  for (uint32_t i = 0; i < n; ++i)
+    for (uint32_t j = 0; j < n; ++j) {
+      int a = figure_of(r, i), b = figure_of(r, j);
+      if (a < 0 || b < 0) continue;
+      double share = (a > 1 ? 1.0 / sites : 1) * (b > 1 ? 1.0 / sites : 1);
+      spread[a][b] += share * lower(covariance, n, i, j);
+    }
+  for (int a = 0; a < 4; ++a)
+    for (int b = 0; b < 4; ++b)
+      c->correlation[a][b] = spread[a][b] / sqrt(spread[a][a] * spread[b][b]);
   for (uint32_t k = 0; k < w->rows; ++k)
     c->band_n[r->plan->row[k]] =
         NORMAL_95 * sqrt(variance_of(covariance, n, &w->kept_jacobian[(size_t)k * n]));
@@ -340,7 +324,16 @@ sonde_status sonde_refit_confidence(sonde_refit *r, sonde_refit_workspace *w, co
     goto done;
   }
   sandwich(r, w, force_n, &l, covariance);
-  add_prior_spread(r, &l, covariance);
+  // The prior holds the fields only as far as it is true: its own spread counts too.
+  uint32_t most = most_rows(r->plan), rows = sonde_refit_prior_rows(r);
+  for (uint32_t from = 0; from < rows; from += most) {
+    uint32_t count = rows - from < most ? rows - from : most;
+    for (uint32_t k = 0; k < count; ++k)
+      l.error_n[k] = sonde_refit_prior_row(r, r->smoothness, from + k, &l.forward[(size_t)k * w->n],
+                                           &(double){0});
+    solve_rows(&l, count);
+    sonde_add_outers(covariance, w->n, l.forward, count, l.error_n);
+  }
   fill(r, w, covariance, c);
   status = sonde_error_report_of(r->m->data, c->one_out_n, r->m->count, &c->one_out, error);
 done:

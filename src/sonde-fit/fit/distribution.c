@@ -78,27 +78,6 @@ static double student_at(const double *sorted, uint32_t count, double log_freedo
   return d->log_likelihood;
 }
 
-static void fit_student(const double *sorted, uint32_t count, sonde_distribution *d) {
-  static const double GOLDEN = 0.61803398874989485;
-  double low = log(LEAST_FREEDOM), high = log(MOST_FREEDOM);
-  sonde_distribution left = *d, right = *d;
-  double a = high - GOLDEN * (high - low), b = low + GOLDEN * (high - low);
-  double at_a = student_at(sorted, count, a, &left), at_b = student_at(sorted, count, b, &right);
-  for (int i = 0; i < GOLDEN_STEPS; ++i) {
-    if (at_a >= at_b) {
-      high = b, b = a, at_b = at_a, right = left;
-      a = high - GOLDEN * (high - low);
-      at_a = student_at(sorted, count, a, &left);
-    } else {
-      low = a, a = b, at_a = at_b, left = right;
-      b = low + GOLDEN * (high - low);
-      at_b = student_at(sorted, count, b, &right);
-    }
-  }
-  SONDE_ASSERT(high >= low);
-  *d = at_a >= at_b ? left : right;
-}
-
 bool sonde_distribution_fit(sonde_distribution_kind kind, const double *sorted, uint32_t count,
                             sonde_distribution *d) {
   *d = (sonde_distribution){.kind = kind};
@@ -116,7 +95,27 @@ bool sonde_distribution_fit(sonde_distribution_kind kind, const double *sorted, 
     for (uint32_t i = 0; i < count; ++i) squares += (sorted[i] - d->place) * (sorted[i] - d->place);
     d->scale = sqrt(squares / count);
   }
-  if (kind == SONDE_STUDENT) fit_student(sorted, count, d);
+  if (kind == SONDE_STUDENT) {
+    // Golden section over the logarithm of the degrees of freedom.
+    static const double GOLDEN = 0.61803398874989485;
+    double low = log(LEAST_FREEDOM), high = log(MOST_FREEDOM);
+    sonde_distribution left = *d, right = *d;
+    double a = high - GOLDEN * (high - low), b = low + GOLDEN * (high - low);
+    double at_a = student_at(sorted, count, a, &left), at_b = student_at(sorted, count, b, &right);
+    for (int i = 0; i < GOLDEN_STEPS; ++i) {
+      if (at_a >= at_b) {
+        high = b, b = a, at_b = at_a, right = left;
+        a = high - GOLDEN * (high - low);
+        at_a = student_at(sorted, count, a, &left);
+      } else {
+        low = a, a = b, at_a = at_b, left = right;
+        b = low + GOLDEN * (high - low);
+        at_b = student_at(sorted, count, b, &right);
+      }
+    }
+    SONDE_ASSERT(high >= low);
+    *d = at_a >= at_b ? left : right;
+  }
   if (!(d->scale > 0)) return false;
   likelihood(d, sorted, count);
   return isfinite(d->log_likelihood);

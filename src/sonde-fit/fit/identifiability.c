@@ -45,27 +45,6 @@ static void row_of(const sonde_again *a, int k, double *row) {
     for (uint32_t s = 0; s < sites; ++s) row[(k == 3 ? sites : 0) + s] = 1.0 / sites;
 }
 
-// Deviations and correlations from the curvature.
-static void describe(sonde_again *a, double *row, sonde_fit_part *part) {
-  uint32_t n = a->parameters;
-  double spread[FIGURES][FIGURES];
-  bool known = sonde_again_factor(a);
-  for (int k = 0; k < FIGURES; ++k) {
-    row_of(a, k, row);
-    part->ln_sd[k] = known ? sqrt(sonde_again_spread(a, row)) : INFINITY;
-    for (int j = 0; j < FIGURES && known; ++j) {
-      double with = 0;
-      row_of(a, j, row);
-      for (uint32_t i = 0; i < n; ++i) with += row[i] * a->step[i];
-      spread[k][j] = with;
-    }
-  }
-  for (int k = 0; k < FIGURES; ++k)
-    for (int j = 0; j < FIGURES; ++j)
-      part->correlation[k][j] = known ? spread[k][j] / (part->ln_sd[k] * part->ln_sd[j]) : NAN;
-  part->condition = known ? condition_of((const double(*)[FIGURES])part->correlation) : INFINITY;
-}
-
 sonde_status sonde_fit_identify(const sonde_model *model, const sonde_site_table *sites,
                                 const sonde_measurements *measurements, const sonde_fit_def *def,
                                 const sonde_fit_result *result, const sonde_progress *progress,
@@ -90,7 +69,24 @@ sonde_status sonde_fit_identify(const sonde_model *model, const sonde_site_table
     again.refit->enough = INFINITY; // any promise ends the refit where it begins
     sonde_refit_result found;
     status = sonde_again_run(&again, progress, &found, error);
-    if (!status) describe(&again, row, part);
+    if (status) break;
+
+    // Deviations and correlations from the curvature.
+    double spread[FIGURES][FIGURES];
+    bool known = sonde_again_factor(&again);
+    for (int k = 0; k < FIGURES; ++k) {
+      row_of(&again, k, row);
+      part->ln_sd[k] = known ? sqrt(sonde_again_spread(&again, row)) : INFINITY;
+      for (int j = 0; j < FIGURES && known; ++j) {
+        row_of(&again, j, row);
+        spread[k][j] = 0;
+        for (uint32_t i = 0; i < again.parameters; ++i) spread[k][j] += row[i] * again.step[i];
+      }
+    }
+    for (int k = 0; k < FIGURES; ++k)
+      for (int j = 0; j < FIGURES; ++j)
+        part->correlation[k][j] = known ? spread[k][j] / (part->ln_sd[k] * part->ln_sd[j]) : NAN;
+    part->condition = known ? condition_of((const double(*)[FIGURES])part->correlation) : INFINITY;
   }
   sonde_free(row);
   sonde_again_clear(&again);

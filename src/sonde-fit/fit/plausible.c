@@ -123,17 +123,6 @@ static double mean_of(const sonde_datum *const *row, uint32_t count) {
   return sum;
 }
 
-// A flat punch of radius a on a half space of Young's modulus E, Poisson's ratio 1/2:
-// F = 2 a E x/(1 - 1/4).
-static double modulus_of(const char *name, double slope_n_m) {
-  sonde_probe probe;
-  if (sonde_probe_create(name, &probe, NULL)) return NAN;
-  double radius_m = sqrt(4 * probe.half_x_m * probe.half_y_m / SONDE_PI);
-  bool known = probe.rectangular && radius_m > 0;
-  sonde_probe_clear(&probe);
-  return known ? 0.75 * slope_n_m / (2 * radius_m) : NAN;
-}
-
 static int compare_order(const void *a, const void *b) {
   const sonde_datum *p = *(const sonde_datum *const *)a, *q = *(const sonde_datum *const *)b;
   return (p > q) - (p < q);
@@ -148,7 +137,15 @@ static course measure_curve(const sonde_datum **row, uint32_t count, const sonde
   c.first_n_m = slope_of(row, third);
   c.last_n_m = slope_of(end, third);
   c.rise_n = mean_of(end, third) - mean_of(row, third);
-  c.modulus_pa = modulus_of(row[0]->probe, c.first_n_m);
+  // A flat punch of radius a on a half space of Young's modulus E, Poisson's ratio 1/2:
+  // F = 2 a E x/(1 - 1/4).
+  sonde_probe probe;
+  c.modulus_pa = NAN;
+  if (!sonde_probe_create(row[0]->probe, &probe, NULL)) {
+    double radius_m = sqrt(4 * probe.half_x_m * probe.half_y_m / SONDE_PI);
+    if (probe.rectangular && radius_m > 0) c.modulus_pa = 0.75 * c.first_n_m / (2 * radius_m);
+    sonde_probe_clear(&probe);
+  }
   c.peak_n = -INFINITY;
   for (uint32_t k = 0; k < count; ++k) {
     c.peak_n = fmax(c.peak_n, row[k]->force_n);
@@ -253,24 +250,6 @@ static void object(const sonde_measurements *m, sonde_doubts *doubts, sonde_quan
   snprintf(d->sentence, sizeof d->sentence, "column %s%s%s: %s %.3g %s, expected %g to %g %s",
            column, unit ? " looks like " : " is implausible", unit ? unit : "", r->quantity, value,
            r->unit, r->low, r->high, r->unit);
-}
-
-static bool judge_units(const sonde_measurements *m, const courses *list, sonde_doubts *doubts) {
-  const sonde_datum *deepest = &m->data[0], *peak = &m->data[0];
-  for (uint32_t i = 0; i < m->count; ++i) {
-    if (m->data[i].penetration_m > deepest->penetration_m) deepest = &m->data[i];
-    if (m->data[i].force_n > peak->force_n) peak = &m->data[i];
-  }
-  uint32_t before = doubts->count;
-  double mm = 1e3 * deepest->penetration_m, kpa = 1e-3 * median_modulus(list), n = peak->force_n;
-  const char *unit = likely_unit(QUANTITY_DEEPEST, mm, LENGTH, SONDE_COUNT_OF(LENGTH));
-  object(m, doubts, QUANTITY_DEEPEST, "penetration_mm", mm, unit, deepest);
-  if (doubts->count > before) return false;
-  unit = likely_unit(QUANTITY_MODULUS, kpa, FORCE, SONDE_COUNT_OF(FORCE));
-  object(m, doubts, QUANTITY_PEAK, "force_n", n, unit, peak);
-  if (doubts->count == before && isfinite(kpa) && kpa > 0)
-    object(m, doubts, QUANTITY_MODULUS, "force_n", kpa, unit, peak);
-  return doubts->count == before;
 }
 
 // ---- one curve ----------------------------------------------------------------------------
@@ -408,8 +387,24 @@ sonde_status sonde_measurements_examine(const sonde_measurements *m, sonde_doubt
   for (uint32_t k = 0; k < list.count && !status; ++k) judge_course(m, &list.curve[k], doubts);
   const sonde_doubt *gravest = sonde_doubts_gravest(doubts);
   flat = gravest && gravest->grade == SONDE_DOUBT_ABSURD;
-  if (!status && !flat && list.count && judge_units(m, &list, doubts)) {
-    double median = median_modulus(&list);
+  if (status || flat || !list.count) goto done;
+
+  // Lengths and forces in another unit than the table's.
+  const sonde_datum *deepest = &m->data[0], *peak = &m->data[0];
+  for (uint32_t i = 0; i < m->count; ++i) {
+    if (m->data[i].penetration_m > deepest->penetration_m) deepest = &m->data[i];
+    if (m->data[i].force_n > peak->force_n) peak = &m->data[i];
+  }
+  uint32_t before = doubts->count;
+  double median = median_modulus(&list), kpa = 1e-3 * median, mm = 1e3 * deepest->penetration_m;
+  const char *unit = likely_unit(QUANTITY_DEEPEST, mm, LENGTH, SONDE_COUNT_OF(LENGTH));
+  object(m, doubts, QUANTITY_DEEPEST, "penetration_mm", mm, unit, deepest);
+  if (doubts->count > before) goto done;
+  unit = likely_unit(QUANTITY_MODULUS, kpa, FORCE, SONDE_COUNT_OF(FORCE));
+  object(m, doubts, QUANTITY_PEAK, "force_n", peak->force_n, unit, peak);
+  if (doubts->count == before && isfinite(kpa) && kpa > 0)
+    object(m, doubts, QUANTITY_MODULUS, "force_n", kpa, unit, peak);
+  if (doubts->count == before) {
     for (uint32_t k = 0; k < list.count; ++k) {
       judge_stiffening(m, &list.curve[k], doubts);
       const course *c = &list.curve[k];
@@ -424,6 +419,7 @@ sonde_status sonde_measurements_examine(const sonde_measurements *m, sonde_doubt
     }
     judge_zero(&list, doubts);
   }
+done:
   clear_list(&list);
   return status;
 }

@@ -52,22 +52,6 @@ static void judge_bias(const sonde_measurements *m, const sonde_fit_result *resu
   }
 }
 
-static void judge_asymptote(const sonde_measurements *m, const sonde_site *site,
-                            const sonde_datum *row, double tissue_m, sonde_doubts *doubts) {
-  SONDE_ASSERT(tissue_m > 0);
-  double share = site->xm_m / tissue_m;
-  sonde_doubt_grade grade;
-  const sonde_plausible_range *r = sonde_plausible_range_of(QUANTITY_ASYMPTOTE);
-  if (sonde_plausible(QUANTITY_ASYMPTOTE, share, &grade)) return;
-  sonde_doubt *d = sonde_doubt_add(doubts, "asymptote", SONDE_DOUBT_WARNING, m, row);
-  if (!d) return;
-  d->line = 0; // of the whole curve
-  snprintf(d->sentence, sizeof d->sentence,
-           "the asymptote x_m is %.3g mm in %.3g mm of tissue, expected %g to %g times as much: %s",
-           1e3 * site->xm_m, 1e3 * tissue_m, r->low, r->high,
-           share > r->high ? "the curve hardly stiffens" : "the depths may be in another unit");
-}
-
 // Thickness of the body below a site, and of the tissue: to the bone when there is one.
 static void judge_geometry(const sonde_model *model, const sonde_surface_index *skin,
                            const sonde_measurements *m, const sonde_site *site,
@@ -95,7 +79,17 @@ static void judge_geometry(const sonde_model *model, const sonde_surface_index *
              "of it",
              1e3 * row->penetration_m, 1e3 * through_m,
              100 * sonde_plausible_range_of(QUANTITY_SHARE)->high);
-  judge_asymptote(m, site, row, bone_m, doubts);
+  SONDE_ASSERT(bone_m > 0);
+  double share = site->xm_m / bone_m;
+  const sonde_plausible_range *r = sonde_plausible_range_of(QUANTITY_ASYMPTOTE);
+  if (sonde_plausible(QUANTITY_ASYMPTOTE, share, &grade)) return;
+  d = sonde_doubt_add(doubts, "asymptote", SONDE_DOUBT_WARNING, m, row);
+  if (!d) return;
+  d->line = 0; // of the whole curve
+  snprintf(d->sentence, sizeof d->sentence,
+           "the asymptote x_m is %.3g mm in %.3g mm of tissue, expected %g to %g times as much: %s",
+           1e3 * site->xm_m, 1e3 * bone_m, r->low, r->high,
+           share > r->high ? "the curve hardly stiffens" : "the depths may be in another unit");
 }
 
 sonde_status sonde_fit_examine(const sonde_model *model, const sonde_measurements *m,

@@ -17,44 +17,43 @@ typedef struct prediction {
   double *predicted_n;
 } prediction;
 
-// A depth without equilibrium leaves the rest of the curve NaN.
-static sonde_status predict_full(const prediction *p, uint32_t curve, const atomic_bool *stop,
-                                 sonde_error *error) {
-  const sonde_fit_plan *plan = p->plan;
-  uint32_t probe = plan->curve_probe[curve];
-  sonde_bonded bonded;
-  sonde_status status = sonde_bonded_create(
-      p->model, &p->sites->sites[plan->curve_site[curve]], plan->half_u_m[probe],
-      plan->half_v_m[probe], p->def->relative_residual, p->def->max_iterations, &bonded, error);
-  if (status) return status;
-  double force_n = 0.0;
-  for (uint32_t r = plan->curve_start[curve]; r < plan->curve_start[curve + 1]; ++r) {
-    if (atomic_load(stop)) {
-      status = sonde_fail(error, SONDE_CANCELLED, "cancelled");
-      break;
-    }
-    uint32_t row = plan->row[r];
-    if (!isnan(force_n)) force_n = sonde_bonded_force(&bonded, p->m->data[row].penetration_m);
-    p->predicted_n[row] = force_n;
-  }
-  sonde_bonded_clear(&bonded);
-  return status;
-}
-
 static sonde_status predict_curve(void *user, uint32_t worker, uint32_t curve,
                                   const atomic_bool *stop, sonde_error *error) {
   (void)worker;
   const prediction *p = user;
   const sonde_fit_plan *plan = p->plan;
   SONDE_ASSERT(curve < plan->curve_count);
-  if (p->def->interaction == SONDE_INTERACTION_FULL) return predict_full(p, curve, stop, error);
-  uint32_t probe = plan->curve_probe[curve];
+  uint32_t probe = plan->curve_probe[curve], first = plan->curve_start[curve];
+  const sonde_site *site = &p->sites->sites[plan->curve_site[curve]];
+  uint32_t end = plan->curve_start[curve + 1];
+
+  // A depth without equilibrium leaves the rest of the curve NaN.
+  if (p->def->interaction == SONDE_INTERACTION_FULL) {
+    sonde_bonded bonded;
+    sonde_status status =
+        sonde_bonded_create(p->model, site, plan->half_u_m[probe], plan->half_v_m[probe],
+                            p->def->relative_residual, p->def->max_iterations, &bonded, error);
+    if (status) return status;
+    double force_n = 0.0;
+    for (uint32_t r = first; r < end && !status; ++r) {
+      uint32_t row = plan->row[r];
+      if (atomic_load(stop)) {
+        status = sonde_fail(error, SONDE_CANCELLED, "cancelled");
+        break;
+      }
+      if (!isnan(force_n)) force_n = sonde_bonded_force(&bonded, p->m->data[row].penetration_m);
+      p->predicted_n[row] = force_n;
+    }
+    sonde_bonded_clear(&bonded);
+    return status;
+  }
+
   sonde_footprint footprint;
-  sonde_status status = sonde_footprint_create(p->model, &p->sites->sites[plan->curve_site[curve]],
-                                               plan->half_u_m[probe], plan->half_v_m[probe],
-                                               SONDE_COVERAGE_CLIPPED, &footprint, error);
+  sonde_status status =
+      sonde_footprint_create(p->model, site, plan->half_u_m[probe], plan->half_v_m[probe],
+                             SONDE_COVERAGE_CLIPPED, &footprint, error);
   if (status) return status;
-  for (uint32_t r = plan->curve_start[curve]; r < plan->curve_start[curve + 1]; ++r) {
+  for (uint32_t r = first; r < end; ++r) {
     uint32_t row = plan->row[r];
     p->predicted_n[row] =
         sonde_footprint_force(&footprint, p->model, p->m->data[row].penetration_m);

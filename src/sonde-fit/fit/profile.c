@@ -40,30 +40,6 @@ static sonde_status walk(profiler *p, int side, sonde_fit_profile *profile, sond
   return status;
 }
 
-// The optimum again, to the accuracy that differences of costs need, and the curvature there.
-static sonde_status begin(profiler *p, sonde_fit_profile *profile, sonde_error *error) {
-  sonde_again *a = p->again;
-  uint32_t n = a->parameters, rows = a->plan.row_count;
-  sonde_refit_result found;
-  a->refit->near = true;
-  a->refit->enough = ENOUGH;
-  sonde_status status = sonde_again_run(a, p->progress, &found, error);
-  if (status) return status;
-  if (!sonde_again_factor(a))
-    return sonde_fail(error, SONDE_CONVERGENCE, "the parameters are not determined by the data");
-  memcpy(p->optimum, a->theta, n * sizeof *p->optimum);
-  p->along[n - 2] = 1;
-  double variance = sonde_again_spread(a, p->along);
-  for (uint32_t k = 0; k < n; ++k) p->along[k] = a->step[k] / variance;
-  p->cost = found.cost;
-  profile->count = SONDE_FIT_PROFILE;
-  profile->variance = 2 * found.cost / (rows > n ? rows - n : 1);
-  profile->threshold = CHI2_95 * profile->variance;
-  p->sd = sqrt(variance * profile->variance);
-  profile->estimate_n_m = profile->shear_n_m[MIDDLE] = exp(a->theta[n - 2]);
-  return SONDE_OK;
-}
-
 sonde_status sonde_fit_profile_shear(const sonde_model *model, const sonde_site_table *sites,
                                      const sonde_measurements *measurements,
                                      const sonde_fit_def *def, const sonde_fit_result *result,
@@ -79,9 +55,27 @@ sonde_status sonde_fit_profile_shear(const sonde_model *model, const sonde_site_
                 .optimum = SONDE_NEW(double, again.parameters),
                 .along = SONDE_NEW(double, again.parameters)};
   if (!p.fixed || !p.optimum || !p.along) status = sonde_fail_memory(error);
-  if (!status) status = begin(&p, profile, error);
+
+  // The optimum to the accuracy that differences of costs need, and the curvature there.
+  uint32_t n = again.parameters, rows = again.plan.row_count;
+  sonde_refit_result found;
+  again.refit->near = true;
+  again.refit->enough = ENOUGH;
+  if (!status) status = sonde_again_run(&again, progress, &found, error);
+  if (!status && !sonde_again_factor(&again))
+    status = sonde_fail(error, SONDE_CONVERGENCE, "the parameters are not determined by the data");
   if (!status) {
-    p.fixed[again.parameters - 2] = true;
+    memcpy(p.optimum, again.theta, n * sizeof *p.optimum);
+    p.along[n - 2] = 1;
+    double variance = sonde_again_spread(&again, p.along);
+    for (uint32_t k = 0; k < n; ++k) p.along[k] = again.step[k] / variance;
+    p.cost = found.cost;
+    profile->count = SONDE_FIT_PROFILE;
+    profile->variance = 2 * found.cost / (rows > n ? rows - n : 1);
+    profile->threshold = CHI2_95 * profile->variance;
+    p.sd = sqrt(variance * profile->variance);
+    profile->estimate_n_m = profile->shear_n_m[MIDDLE] = exp(again.theta[n - 2]);
+    p.fixed[n - 2] = true;
     again.refit->fixed = p.fixed;
     status = walk(&p, 1, profile, error);
   }

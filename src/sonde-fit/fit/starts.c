@@ -38,25 +38,6 @@ static void draw_start(const sonde_again *a, uint64_t seed, uint32_t number, dou
   theta[n - 1] = draw(limit, seed, counter);
 }
 
-// Standard deviations of the parameters by themselves, from the curvature at the optimum.
-static sonde_status find_sd(sonde_again *a, const sonde_progress *progress, double *row, double *sd,
-                            sonde_error *error) {
-  sonde_refit_result found;
-  a->refit->near = true;
-  sonde_status status = sonde_again_run(a, progress, &found, error);
-  if (status) return status;
-  if (!sonde_again_factor(a))
-    return sonde_fail(error, SONDE_CONVERGENCE, "the parameters are not determined by the data");
-  for (uint32_t k = 0; k < a->parameters; ++k) {
-    memset(row, 0, a->parameters * sizeof *row);
-    row[k] = 1;
-    sd[k] = sqrt(sonde_again_spread(a, row));
-  }
-  memcpy(a->optimum, a->theta, a->parameters * sizeof *a->theta);
-  a->refit->near = false;
-  return SONDE_OK;
-}
-
 sonde_status sonde_fit_random_starts(const sonde_model *model, const sonde_site_table *sites,
                                      const sonde_measurements *measurements,
                                      const sonde_fit_def *def, const sonde_fit_result *result,
@@ -68,12 +49,24 @@ sonde_status sonde_fit_random_starts(const sonde_model *model, const sonde_site_
   if (status) return status;
   double *sd = SONDE_NEW(double, again.parameters), *row = SONDE_NEW(double, again.parameters);
   if (!sd || !row) status = sonde_fail_memory(error);
-  if (!status) status = find_sd(&again, progress, row, sd, error);
+
+  // Standard deviations of the parameters by themselves, from the curvature at the optimum.
+  sonde_refit_result found;
+  again.refit->near = true;
+  if (!status) status = sonde_again_run(&again, progress, &found, error);
+  if (!status && !sonde_again_factor(&again))
+    status = sonde_fail(error, SONDE_CONVERGENCE, "the parameters are not determined by the data");
+  for (uint32_t k = 0; k < again.parameters && !status; ++k) {
+    memset(row, 0, again.parameters * sizeof *row);
+    row[k] = 1;
+    sd[k] = sqrt(sonde_again_spread(&again, row));
+  }
+  memcpy(again.optimum, again.theta, again.parameters * sizeof *again.theta);
+  again.refit->near = false;
   for (uint32_t k = 0; k < count && !status; ++k) {
     sonde_refit_start(again.refit, result->curves, again.theta);
     draw_start(&again, seed, k, again.theta);
     sonde_refit_forget(again.refit);
-    sonde_refit_result found;
     status = sonde_again_run(&again, progress, &found, error);
     if (status && status != SONDE_CONVERGENCE) break;
     starts->count++;

@@ -260,20 +260,6 @@ static int compare_keys(const void *a, const void *b) {
   return order ? order : (p->line > q->line) - (p->line < q->line);
 }
 
-static sonde_status average(const row_key *keys, sonde_measurements *m, sonde_error *error) {
-  uint32_t count = m->count;
-  sonde_repeat_row *row = SONDE_NEW(sonde_repeat_row, count);
-  if (!row) return sonde_fail_memory(error);
-  for (uint32_t i = 0; i < count; ++i) {
-    size_t at = (size_t)(keys[i].datum - m->data);
-    row[i] = (sonde_repeat_row){m->data[at], m->position_m[at], m->normal[at], keys[i].line,
-                                keys[i].repeat};
-  }
-  sonde_status status = sonde_measurements_average(row, count, m, error);
-  sonde_free(row);
-  return status;
-}
-
 static sonde_status load_rows(sonde_csv *csv, const sonde_site_table *sites, row_key *keys,
                               sonde_measurements *m, sonde_error *error) {
   uint32_t columns[ROW_COLUMNS];
@@ -321,7 +307,19 @@ static sonde_status load_rows(sonde_csv *csv, const sonde_site_table *sites, row
                       "%s: column force_n: the mean is %.3g N, expected forces that push the probe "
                       "out, > 0; is the sign reversed?",
                       csv->path, sum_n / m->count);
-  return repeat == UINT32_MAX ? SONDE_OK : average(keys, m, error);
+  if (repeat == UINT32_MAX) return SONDE_OK;
+  // Repeats become their mean curve.
+  uint32_t count = m->count;
+  sonde_repeat_row *row = SONDE_NEW(sonde_repeat_row, count);
+  if (!row) return sonde_fail_memory(error);
+  for (uint32_t i = 0; i < count; ++i) {
+    size_t at = (size_t)(keys[i].datum - m->data);
+    row[i] = (sonde_repeat_row){m->data[at], m->position_m[at], m->normal[at], keys[i].line,
+                                keys[i].repeat};
+  }
+  status = sonde_measurements_average(row, count, m, error);
+  sonde_free(row);
+  return status;
 }
 
 sonde_status sonde_measurements_create(sonde_measurements *m, uint32_t room, sonde_error *error) {
