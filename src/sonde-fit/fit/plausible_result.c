@@ -14,44 +14,6 @@ typedef struct quarter {
   uint32_t count;
 } quarter;
 
-static void judge_bias(const sonde_measurements *m, const sonde_fit_result *result,
-                       sonde_doubts *doubts) {
-  const sonde_error_report *report = &result->stage3; // the only stage that follows the forces
-  for (uint32_t p = 0; p < report->probe_count; ++p) {
-    quarter part[QUARTERS];
-    double worst = 0;
-    int at = 0;
-    memset(part, 0, sizeof part);
-    // Errors and forces by quarters of the probe's deepest penetration.
-    double deepest_m = 0;
-    for (uint32_t i = 0; i < m->count; ++i)
-      if (strcmp(m->data[i].probe, report->probe[p]) == 0)
-        deepest_m = fmax(deepest_m, m->data[i].penetration_m);
-    for (uint32_t i = 0; i < m->count && deepest_m > 0; ++i) {
-      const sonde_datum *row = &m->data[i];
-      if (strcmp(row->probe, report->probe[p]) != 0 || !isfinite(result->model_n[i])) continue;
-      int q = (int)(QUARTERS * row->penetration_m / deepest_m);
-      quarter *to = &part[q < QUARTERS ? q : QUARTERS - 1];
-      to->error_n += result->model_n[i] - row->force_n;
-      to->force_n += row->force_n;
-      to->count++;
-    }
-    for (int q = 0; q < QUARTERS; ++q) {
-      double bias = part[q].force_n > 0 ? part[q].error_n / part[q].force_n : 0;
-      if (fabs(bias) > fabs(worst)) worst = bias, at = q;
-    }
-    sonde_doubt_grade grade;
-    if (sonde_plausible(QUANTITY_BIAS, worst, &grade)) continue;
-    sonde_doubt *d = sonde_doubt_add(doubts, "residuals_with_depth", SONDE_DOUBT_WARNING, m, NULL);
-    if (!d) continue;
-    const sonde_plausible_range *r = sonde_plausible_range_of(QUANTITY_BIAS);
-    snprintf(d->sentence, sizeof d->sentence,
-             "residuals of probe %s run with depth: the model is %+.0f %% off in quarter %d of the "
-             "depths, expected within %.0f %%: contact zero, tare, or a law that does not fit",
-             report->probe[p], 100 * worst, at + 1, 100 * r->high);
-  }
-}
-
 // Thickness of the body below a site, and of the tissue: to the bone when there is one.
 static void judge_geometry(const sonde_model *model, const sonde_surface_index *skin,
                            const sonde_measurements *m, const sonde_site *site,
@@ -98,7 +60,40 @@ sonde_status sonde_fit_examine(const sonde_model *model, const sonde_measurement
   sonde_surface_index *skin;
   sonde_status status = sonde_surface_index_create(&model->surface, &skin, error);
   if (status) return status;
-  judge_bias(m, result, doubts);
+  const sonde_error_report *report = &result->stage3; // the only stage that follows the forces
+  for (uint32_t p = 0; p < report->probe_count; ++p) {
+    quarter part[QUARTERS];
+    double worst = 0;
+    int at = 0;
+    memset(part, 0, sizeof part);
+    // Errors and forces by quarters of the probe's deepest penetration.
+    double deepest_m = 0;
+    for (uint32_t i = 0; i < m->count; ++i)
+      if (strcmp(m->data[i].probe, report->probe[p]) == 0)
+        deepest_m = fmax(deepest_m, m->data[i].penetration_m);
+    for (uint32_t i = 0; i < m->count && deepest_m > 0; ++i) {
+      const sonde_datum *row = &m->data[i];
+      if (strcmp(row->probe, report->probe[p]) != 0 || !isfinite(result->model_n[i])) continue;
+      int q = (int)(QUARTERS * row->penetration_m / deepest_m);
+      quarter *to = &part[q < QUARTERS ? q : QUARTERS - 1];
+      to->error_n += result->model_n[i] - row->force_n;
+      to->force_n += row->force_n;
+      to->count++;
+    }
+    for (int q = 0; q < QUARTERS; ++q) {
+      double bias = part[q].force_n > 0 ? part[q].error_n / part[q].force_n : 0;
+      if (fabs(bias) > fabs(worst)) worst = bias, at = q;
+    }
+    sonde_doubt_grade grade;
+    if (sonde_plausible(QUANTITY_BIAS, worst, &grade)) continue;
+    sonde_doubt *d = sonde_doubt_add(doubts, "residuals_with_depth", SONDE_DOUBT_WARNING, m, NULL);
+    if (!d) continue;
+    const sonde_plausible_range *r = sonde_plausible_range_of(QUANTITY_BIAS);
+    snprintf(d->sentence, sizeof d->sentence,
+             "residuals of probe %s run with depth: the model is %+.0f %% off in quarter %d of the "
+             "depths, expected within %.0f %%: contact zero, tare, or a law that does not fit",
+             report->probe[p], 100 * worst, at + 1, 100 * r->high);
+  }
   for (uint32_t s = 0; s < result->site_count; ++s)
     judge_geometry(model, skin, m, &result->sites[s], doubts);
   sonde_surface_index_destroy(skin);

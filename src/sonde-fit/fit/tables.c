@@ -178,11 +178,16 @@ enum { ROW_SITE, ROW_PROBE, ROW_X, ROW_N = 5, ROW_DEPTH = 8, ROW_FORCE, ROW_COLU
 static const char *const ROW_NAMES[ROW_COLUMNS] = {
     "site", "probe", "x_mm", "y_mm", "z_mm", "nx", "ny", "nz", "penetration_mm", "force_n"};
 
-// Built-in names and rectangles; a table cannot name a mesh file.
-static sonde_status read_probe(const sonde_csv *csv, uint32_t column, char name[24],
-                               sonde_error *error) {
+static sonde_status load_row(const sonde_csv *csv, const uint32_t *columns,
+                             const sonde_site_table *sites, uint32_t row, sonde_measurements *m,
+                             sonde_error *error) {
+  sonde_datum *datum = &m->data[row];
+  SONDE_ASSERT(row == m->count);
+  sonde_status status = sonde_csv_index(csv, columns[ROW_SITE], &datum->site, error);
+  if (status) return status;
+  // Built-in names and rectangles; a table cannot name a mesh file.
   char known[160] = "";
-  const char *found = csv->cell[column];
+  const char *found = csv->cell[columns[ROW_PROBE]];
   double half_x_m, half_y_m;
   bool good = sonde_probe_rectangle(found, &half_x_m, &half_y_m) && strlen(found) < 24;
   for (const char *const *p = sonde_probe_names(); *p; ++p) {
@@ -195,18 +200,8 @@ static sonde_status read_probe(const sonde_csv *csv, uint32_t column, char name[
                       "%s:%u: column probe: unknown probe '%.40s', expected %sor rect:AxB (sides "
                       "in mm, at most 23 characters)",
                       csv->path, csv->line, found, known);
-  snprintf(name, 24, "%s", found);
-  return SONDE_OK;
-}
-
-static sonde_status load_row(const sonde_csv *csv, const uint32_t *columns,
-                             const sonde_site_table *sites, uint32_t row, sonde_measurements *m,
-                             sonde_error *error) {
-  sonde_datum *datum = &m->data[row];
-  SONDE_ASSERT(row == m->count);
-  sonde_status status = sonde_csv_index(csv, columns[ROW_SITE], &datum->site, error);
-  if (!status) status = read_probe(csv, columns[ROW_PROBE], datum->probe, error);
-  if (!status) status = read_vector(csv, columns + ROW_X, &m->position_m[row], error);
+  snprintf(datum->probe, sizeof datum->probe, "%s", found);
+  status = read_vector(csv, columns + ROW_X, &m->position_m[row], error);
   if (!status) status = read_direction(csv, columns + ROW_N, NULL, &m->normal[row], error);
   if (!status) status = sonde_csv_real(csv, columns[ROW_DEPTH], &datum->penetration_m, error);
   if (!status) status = sonde_csv_real(csv, columns[ROW_FORCE], &datum->force_n, error);
