@@ -82,12 +82,17 @@ static void with_prior(const sonde_refit *r, sonde_refit_workspace *w, const dou
   (void)sonde_refit_add_prior(r, theta, smoothness, w->line, &l->whole);
 }
 
-// Rows of a site that take part: slopes to l->forward, errors after the full step to l->error_n,
-// 1/weight to the diagonal of l->within.
-static void gather_rows(const sonde_refit *r, const sonde_refit_workspace *w, const double *force_n,
-                        uint32_t site, uint32_t rows, linear *l) {
-  uint32_t n = l->n, at = 0;
+// Let e = r + J d be the errors after the full step d, S = J H^-1 J^T and W the weights of a site's
+// rows: the step without them leaves the errors (1 - S W)^-1 e = W^-1 (W^-1 - S)^-1 e there, by
+// Woodbury's formula. l->error_n receives them in the order of the rows that take part.
+static bool without_site(const sonde_refit *r, const sonde_refit_workspace *w,
+                         const double *force_n, uint32_t site, linear *l) {
+  uint32_t rows = 0, n = l->n, at = 0;
   const uint32_t *start = r->plan->site_start + site;
+  for (uint32_t k = start[0]; k < start[1]; ++k) rows += sonde_refit_uses(r, k);
+  if (rows == 0) return true;
+
+  // Slopes to l->forward, errors after the full step to l->error_n, 1/weight to the diagonal.
   memset(l->within, 0, (size_t)rows * rows * sizeof *l->within);
   for (uint32_t k = start[0]; k < start[1]; ++k) {
     if (!sonde_refit_uses(r, k)) continue;
@@ -100,18 +105,7 @@ static void gather_rows(const sonde_refit *r, const sonde_refit_workspace *w, co
     memcpy(&l->forward[(size_t)at++ * n], slope, n * sizeof *slope);
   }
   SONDE_ASSERT(at == rows);
-}
 
-// Let e = r + J d be the errors after the full step d, S = J H^-1 J^T and W the weights of a site's
-// rows: the step without them leaves the errors (1 - S W)^-1 e = W^-1 (W^-1 - S)^-1 e there, by
-// Woodbury's formula. l->error_n receives them in the order of the rows that take part.
-static bool without_site(const sonde_refit *r, const sonde_refit_workspace *w,
-                         const double *force_n, uint32_t site, linear *l) {
-  uint32_t rows = 0, at = 0;
-  const uint32_t *start = r->plan->site_start + site;
-  for (uint32_t k = start[0]; k < start[1]; ++k) rows += sonde_refit_uses(r, k);
-  if (rows == 0) return true;
-  gather_rows(r, w, force_n, site, rows, l);
   sonde_transpose(l->forward, rows, l->n, l->turned);
   sonde_cholesky_forward_many(l->factor, l->n, l->turned, rows);
   const sonde_product spread = {.c = l->within,
@@ -128,6 +122,7 @@ static bool without_site(const sonde_refit *r, const sonde_refit_workspace *w,
   sonde_multiply(&spread);
   if (!sonde_cholesky(l->within, rows)) return false;
   sonde_cholesky_solve(l->within, rows, l->error_n);
+  at = 0;
   for (uint32_t k = start[0]; k < start[1]; ++k)
     if (sonde_refit_uses(r, k)) l->error_n[at++] /= sonde_refit_weigh(r, k, force_n[k]).weight;
   return true;

@@ -42,28 +42,6 @@ sonde_report_interval sonde_report_value(double value) {
   return (sonde_report_interval){value, NAN, NAN, NAN, NAN};
 }
 
-static sonde_status check_report(const sonde_fit_report *r, sonde_error *error) {
-  if (r->stage_count > SONDE_REPORT_STAGES)
-    return sonde_fail(error, SONDE_ARGUMENT, "report: %u stages, expected at most %d",
-                      r->stage_count, SONDE_REPORT_STAGES);
-  if ((r->stage_count || r->band_n) && !r->data)
-    return sonde_fail(error, SONDE_ARGUMENT, "report: forces of a model without measurements");
-  if (r->band_n && !r->stage_count)
-    return sonde_fail(error, SONDE_ARGUMENT, "report: a prediction band without a stage");
-  for (uint32_t i = 0; i < r->stage_count; ++i)
-    if (!r->stages || !r->stages[i].name || !r->stages[i].model_n)
-      return sonde_fail(error, SONDE_ARGUMENT, "report: stage %u needs a name and forces", i);
-  for (uint32_t i = 0; r->data && i < r->data->count; ++i) {
-    const sonde_datum *d = &r->data->data[i];
-    if (!isfinite(d->force_n) || !isfinite(d->penetration_m) || !memchr(d->probe, 0, 24))
-      return sonde_fail(error, SONDE_ARGUMENT,
-                        "report: measurement %u: expected a finite force and depth and a "
-                        "terminated name",
-                        i);
-  }
-  return SONDE_OK;
-}
-
 // The smallest of 1, 2, 5 times a power of ten that is not below `least`.
 static double round_up(double least) {
   SONDE_ASSERT(least > 0 && isfinite(least));
@@ -526,11 +504,29 @@ static void put_report(report *r) {
 sonde_status sonde_fit_report_write(const sonde_fit_report *in, const char *directory,
                                     sonde_error *error) {
   SONDE_ASSERT(in && directory);
+  if (in->stage_count > SONDE_REPORT_STAGES)
+    return sonde_fail(error, SONDE_ARGUMENT, "report: %u stages, expected at most %d",
+                      in->stage_count, SONDE_REPORT_STAGES);
+  if ((in->stage_count || in->band_n) && !in->data)
+    return sonde_fail(error, SONDE_ARGUMENT, "report: forces of a model without measurements");
+  if (in->band_n && !in->stage_count)
+    return sonde_fail(error, SONDE_ARGUMENT, "report: a prediction band without a stage");
+  for (uint32_t i = 0; i < in->stage_count; ++i)
+    if (!in->stages || !in->stages[i].name || !in->stages[i].model_n)
+      return sonde_fail(error, SONDE_ARGUMENT, "report: stage %u needs a name and forces", i);
+  for (uint32_t i = 0; in->data && i < in->data->count; ++i) {
+    const sonde_datum *d = &in->data->data[i];
+    if (!isfinite(d->force_n) || !isfinite(d->penetration_m) || !memchr(d->probe, 0, 24))
+      return sonde_fail(error, SONDE_ARGUMENT,
+                        "report: measurement %u: expected a finite force and depth and a "
+                        "terminated name",
+                        i);
+  }
+
   report r = {.in = in, .rows = in->data ? in->data->count : 0};
   char *json = NULL, *path = NULL;
   size_t length = 0, room = strlen(directory) + sizeof "/index.html";
-  sonde_status status = check_report(in, error);
-  if (!status) status = sort_rows(&r, error);
+  sonde_status status = sort_rows(&r, error);
   for (uint32_t i = 0; i < in->stage_count && !status; ++i)
     if (!r.main || !r.main->is_main) r.main = &in->stages[i];
   if (!status) status = sonde_file_in_memory(&r.out.file, error);
