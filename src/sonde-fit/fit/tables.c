@@ -44,37 +44,6 @@ static sonde_status read_direction(const sonde_csv *csv, const uint32_t *columns
   return SONDE_OK;
 }
 
-static sonde_status load_sites(sonde_csv *csv, sonde_site_table *table, sonde_error *error) {
-  uint32_t columns[SITE_COLUMNS], fat_column = sonde_csv_column(csv, "fat_mm");
-  sonde_status status = sonde_csv_require(csv, SITE_NAMES, SITE_COLUMNS, columns, error);
-  if (status) return status;
-  for (;;) {
-    bool found;
-    status = sonde_csv_next(csv, &found, error);
-    if (status || !found) break;
-    sonde_site *site = &table->sites[table->count];
-    double *fat_m = &table->fat_depth_m[table->count];
-    status = sonde_csv_index(csv, columns[SITE_ID], &site->id, error);
-    if (!status) status = read_vector(csv, columns + SITE_X, &site->position_m, error);
-    if (!status) status = read_direction(csv, columns + SITE_N, NULL, &site->normal, error);
-    if (!status) status = read_direction(csv, columns + SITE_U, &site->normal, &site->u, error);
-    if (!status) status = read_direction(csv, columns + SITE_V, &site->normal, &site->v, error);
-    *fat_m = NAN;
-    if (!status && fat_column != UINT32_MAX) status = sonde_csv_real(csv, fat_column, fat_m, error);
-    if (status) break;
-    site->position_m = v_scale(site->position_m, METRES_PER_MM);
-    *fat_m *= METRES_PER_MM;
-    if (sonde_site_find(table, site->id) != UINT32_MAX)
-      return sonde_fail(error, SONDE_FORMAT, "%s:%u: column site: site %u appears twice", csv->path,
-                        csv->line, site->id);
-    ++table->count;
-  }
-  if (!status && !table->count)
-    return sonde_fail(error, SONDE_FORMAT, "%s: has no rows, expected at least one site",
-                      csv->path);
-  return status;
-}
-
 uint32_t sonde_site_find(const sonde_site_table *table, uint32_t id) {
   if (id < table->count && table->sites[id].id == id) return id;
   for (uint32_t i = 0; i < table->count; ++i)
@@ -90,8 +59,35 @@ sonde_status sonde_site_table_load(const char *path, sonde_site_table *table, so
   uint32_t room = sonde_csv_lines_left(&csv);
   table->sites = SONDE_NEW(sonde_site, room);
   table->fat_depth_m = SONDE_NEW(double, room);
-  status = table->sites && table->fat_depth_m ? load_sites(&csv, table, error)
-                                              : sonde_fail_memory(error);
+  uint32_t columns[SITE_COLUMNS], fat_column = sonde_csv_column(&csv, "fat_mm");
+  status = table->sites && table->fat_depth_m
+               ? sonde_csv_require(&csv, SITE_NAMES, SITE_COLUMNS, columns, error)
+               : sonde_fail_memory(error);
+  while (!status) {
+    bool found;
+    status = sonde_csv_next(&csv, &found, error);
+    if (status || !found) break;
+    sonde_site *site = &table->sites[table->count];
+    double *fat_m = &table->fat_depth_m[table->count];
+    status = sonde_csv_index(&csv, columns[SITE_ID], &site->id, error);
+    if (!status) status = read_vector(&csv, columns + SITE_X, &site->position_m, error);
+    if (!status) status = read_direction(&csv, columns + SITE_N, NULL, &site->normal, error);
+    if (!status) status = read_direction(&csv, columns + SITE_U, &site->normal, &site->u, error);
+    if (!status) status = read_direction(&csv, columns + SITE_V, &site->normal, &site->v, error);
+    *fat_m = NAN;
+    if (!status && fat_column != UINT32_MAX)
+      status = sonde_csv_real(&csv, fat_column, fat_m, error);
+    if (status) break;
+    site->position_m = v_scale(site->position_m, METRES_PER_MM);
+    *fat_m *= METRES_PER_MM;
+    if (sonde_site_find(table, site->id) != UINT32_MAX)
+      status = sonde_fail(error, SONDE_FORMAT, "%s:%u: column site: site %u appears twice",
+                          csv.path, csv.line, site->id);
+    table->count += !status;
+  }
+  if (!status && !table->count)
+    status =
+        sonde_fail(error, SONDE_FORMAT, "%s: has no rows, expected at least one site", csv.path);
 done:
   sonde_csv_close(&csv);
   if (status) sonde_site_table_clear(table);
