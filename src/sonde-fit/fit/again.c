@@ -7,31 +7,6 @@
 
 #include <string.h>
 
-static bool allocate(sonde_again *a) {
-  a->parameters = sonde_refit_parameters(a->refit);
-  a->optimum = SONDE_NEW(double, a->parameters);
-  a->theta = SONDE_NEW(double, a->parameters);
-  a->step = SONDE_NEW(double, a->parameters);
-  a->force_n = SONDE_NEW(double, a->plan.row_count);
-  a->left_out = SONDE_NEW(bool, a->plan.row_count);
-  a->factor = SONDE_NEW(double, (size_t)a->parameters * a->parameters);
-  return sonde_normal_create(&a->curvature, a->parameters) && a->optimum && a->theta && a->step &&
-         a->force_n && a->left_out && a->factor;
-}
-
-static void optimum_of(const sonde_again *a, const sonde_fit_result *result, double *theta) {
-  uint32_t count = result->site_count, n = a->parameters;
-  for (uint32_t s = 0; s < count; ++s) {
-    theta[s] = log(result->sites[s].k0_n_m3);
-    theta[count + s] = log(result->sites[s].xm_m);
-    if (a->refit->fields == 2) continue;
-    theta[2 * count + s] = log(result->sites[s].shear_share);
-    theta[3 * count + s] = log(result->sites[s].limit_share);
-  }
-  theta[n - 2] = log(result->law.shear_stiffness_n_m);
-  theta[n - 1] = log(result->law.shear_limit);
-}
-
 sonde_status sonde_again_create(const sonde_model *model, const sonde_site_table *sites,
                                 const sonde_measurements *m, const sonde_fit_def *def,
                                 const sonde_fit_result *result, sonde_again *a,
@@ -45,15 +20,36 @@ sonde_status sonde_again_create(const sonde_model *model, const sonde_site_table
   sonde_status status = sonde_fit_plan_create(sites, m, &a->plan, error);
   if (status) return status;
   status = sonde_refit_create(model, sites, m, &a->plan, &a->def, REFIT_REACH_M, &a->refit, error);
-  if (!status && !allocate(a)) status = sonde_fail_memory(error);
   if (!status) {
-    sonde_offsets_set(a->refit, result->curves);
-    optimum_of(a, result, a->optimum);
-    memcpy(a->theta, a->optimum, a->parameters * sizeof *a->theta);
-    return SONDE_OK;
+    a->parameters = sonde_refit_parameters(a->refit);
+    a->optimum = SONDE_NEW(double, a->parameters);
+    a->theta = SONDE_NEW(double, a->parameters);
+    a->step = SONDE_NEW(double, a->parameters);
+    a->force_n = SONDE_NEW(double, a->plan.row_count);
+    a->left_out = SONDE_NEW(bool, a->plan.row_count);
+    a->factor = SONDE_NEW(double, (size_t)a->parameters * a->parameters);
+    if (!sonde_normal_create(&a->curvature, a->parameters) || !a->optimum || !a->theta ||
+        !a->step || !a->force_n || !a->left_out || !a->factor)
+      status = sonde_fail_memory(error);
   }
-  sonde_again_clear(a);
-  return status;
+  if (status) {
+    sonde_again_clear(a);
+    return status;
+  }
+  // The result is the optimum, in logarithms, and the start.
+  sonde_offsets_set(a->refit, result->curves);
+  uint32_t count = result->site_count, n = a->parameters;
+  for (uint32_t s = 0; s < count; ++s) {
+    a->optimum[s] = log(result->sites[s].k0_n_m3);
+    a->optimum[count + s] = log(result->sites[s].xm_m);
+    if (a->refit->fields == 2) continue;
+    a->optimum[2 * count + s] = log(result->sites[s].shear_share);
+    a->optimum[3 * count + s] = log(result->sites[s].limit_share);
+  }
+  a->optimum[n - 2] = log(result->law.shear_stiffness_n_m);
+  a->optimum[n - 1] = log(result->law.shear_limit);
+  memcpy(a->theta, a->optimum, n * sizeof *a->theta);
+  return SONDE_OK;
 }
 
 void sonde_again_clear(sonde_again *a) {

@@ -16,26 +16,6 @@ typedef struct comparison {
   const sonde_progress *progress;
 } comparison;
 
-static sonde_status describe(const comparison *c, sonde_fit_layer *layer, sonde_error *error) {
-  const sonde_fit_plan *plan = &c->again.plan;
-  const sonde_datum *data = c->m->data;
-  uint32_t count = c->m->count, n = c->again.parameters;
-  double *model_n = SONDE_NEW(double, count);
-  if (!model_n) return sonde_fail_memory(error);
-  for (uint32_t k = 0; k < plan->row_count; ++k) model_n[plan->row[k]] = c->again.force_n[k];
-  sonde_status status = sonde_error_report_of(data, model_n, c->fitted, &layer->seen, error);
-  if (!status && count > c->fitted)
-    status = sonde_error_report_of(data + c->fitted, model_n + c->fitted, count - c->fitted,
-                                   &layer->also, error);
-  sonde_free(model_n);
-  SONDE_ASSERT(n > 2);
-  layer->parameters = n + (layer->kind == SONDE_LAYER_STIFFENING);
-  layer->tension_n_m = exp(c->again.theta[n - 2]);
-  layer->second = exp(c->again.theta[n - 1]);
-  layer->stiffening = c->again.refit->stiffening;
-  return status;
-}
-
 // The smoothness is chosen anew for every law.
 static sonde_status settle(comparison *c, sonde_fit_layer *layer, sonde_error *error) {
   sonde_refit *r = c->again.refit;
@@ -55,7 +35,25 @@ static sonde_status settle(comparison *c, sonde_fit_layer *layer, sonde_error *e
   r->left_out = NULL;
   status = sonde_refit_forces(r, c->again.theta, c->again.force_n, NULL, c->progress, error);
   r->left_out = c->again.left_out;
-  return status ? status : describe(c, layer, error);
+  if (status) return status;
+  // Errors of the fitted measurements and of those beside them.
+  const sonde_fit_plan *plan = &c->again.plan;
+  const sonde_datum *data = c->m->data;
+  uint32_t count = c->m->count, n = c->again.parameters;
+  double *model_n = SONDE_NEW(double, count);
+  if (!model_n) return sonde_fail_memory(error);
+  for (uint32_t k = 0; k < plan->row_count; ++k) model_n[plan->row[k]] = c->again.force_n[k];
+  status = sonde_error_report_of(data, model_n, c->fitted, &layer->seen, error);
+  if (!status && count > c->fitted)
+    status = sonde_error_report_of(data + c->fitted, model_n + c->fitted, count - c->fitted,
+                                   &layer->also, error);
+  sonde_free(model_n);
+  SONDE_ASSERT(n > 2);
+  layer->parameters = n + (layer->kind == SONDE_LAYER_STIFFENING);
+  layer->tension_n_m = exp(c->again.theta[n - 2]);
+  layer->second = exp(c->again.theta[n - 1]);
+  layer->stiffening = r->stiffening;
+  return status;
 }
 
 static sonde_status cost_at(comparison *c, double ln_stiffening, double *cost, sonde_error *error) {
@@ -102,24 +100,6 @@ static void start_membrane(sonde_again *a) {
   }
 }
 
-static sonde_status compare(comparison *c, sonde_fit_layer *layer, sonde_error *error) {
-  sonde_again *a = &c->again;
-  sonde_refit *r = a->refit;
-  for (uint32_t k = 0; k < a->plan.row_count; ++k) a->left_out[k] = a->plan.row[k] >= c->fitted;
-  r->left_out = a->left_out;
-  for (int k = 0; k < SONDE_FIT_LAYERS; ++k) layer[k] = (sonde_fit_layer){.kind = (sonde_layer)k};
-  r->near = true;
-  sonde_status status = settle(c, &layer[SONDE_LAYER_LIMIT], error);
-  if (status) return status;
-  r->membrane = true;
-  sonde_refit_forget(r);
-  start_membrane(a);
-  status = settle(c, &layer[SONDE_LAYER_TENSION], error);
-  start_membrane(a); // T alone may have run to where J would not come back from
-  if (!status) status = search(c, &layer[SONDE_LAYER_LIMIT], error);
-  return status ? status : settle(c, &layer[SONDE_LAYER_STIFFENING], error);
-}
-
 sonde_status sonde_fit_layers(const sonde_model *model, const sonde_site_table *sites,
                               const sonde_measurements *m, const sonde_measurements *also,
                               const sonde_fit_def *def, const sonde_fit_result *result,
@@ -131,8 +111,24 @@ sonde_status sonde_fit_layers(const sonde_model *model, const sonde_site_table *
   comparison c = {.m = &both, .fitted = m->count, .progress = progress};
   status = sonde_again_create(model, sites, &both, def, result, &c.again, error);
   if (!status) {
-    status = compare(&c, layers, error);
-    sonde_again_clear(&c.again);
+    sonde_again *a = &c.again;
+    sonde_refit *r = a->refit;
+    for (uint32_t k = 0; k < a->plan.row_count; ++k) a->left_out[k] = a->plan.row[k] >= c.fitted;
+    r->left_out = a->left_out;
+    for (int k = 0; k < SONDE_FIT_LAYERS; ++k)
+      layers[k] = (sonde_fit_layer){.kind = (sonde_layer)k};
+    r->near = true;
+    status = settle(&c, &layers[SONDE_LAYER_LIMIT], error);
+    if (!status) {
+      r->membrane = true;
+      sonde_refit_forget(r);
+      start_membrane(a);
+      status = settle(&c, &layers[SONDE_LAYER_TENSION], error);
+      start_membrane(a); // T alone may have run to where J would not come back from
+    }
+    if (!status) status = search(&c, &layers[SONDE_LAYER_LIMIT], error);
+    if (!status) status = settle(&c, &layers[SONDE_LAYER_STIFFENING], error);
+    sonde_again_clear(a);
   }
   if (also) sonde_free(both.data);
   return status;

@@ -46,42 +46,35 @@ void sonde_press_crew_destroy(sonde_press *crew, uint32_t workers) {
   sonde_free(crew);
 }
 
-static sonde_status hold_cut(const sonde_model *model, const sonde_site *site, double half_u_m,
-                             double half_v_m, sonde_bonded *b, sonde_error *error) {
-  sonde_cut cut;
-  sonde_status status = sonde_cut_create(model, site, half_u_m, half_v_m, INFINITY, &cut, error);
-  if (!status) status = sonde_cut_model(model, &cut, &b->cut_model, error);
-  if (!status) b->held = SONDE_NEW(uint32_t, cut.held_count);
-  if (!status && !b->held) status = sonde_fail_memory(error);
-  for (uint32_t v = 0; v < cut.vertex_count && !status; ++v)
-    if (cut.held[v]) b->held[b->held_count++] = v;
-  sonde_cut_clear(&cut);
-  return status;
-}
-
-static sonde_status hold_nodes(const sonde_model *model, const sonde_site *site, double half_u_m,
-                               double half_v_m, sonde_bonded *b, sonde_error *error) {
-  sonde_footprint footprint;
-  sonde_status status = sonde_footprint_create(model, site, half_u_m, half_v_m,
-                                               SONDE_COVERAGE_CLIPPED, &footprint, error);
-  if (status) return status;
-  b->held = footprint.held;
-  b->held_count = footprint.held_count;
-  footprint.held = NULL;
-  sonde_footprint_clear(&footprint);
-  return SONDE_OK;
-}
-
 sonde_status sonde_bonded_create(const sonde_model *model, const sonde_site *site, double half_u_m,
                                  double half_v_m, double relative_residual, uint32_t max_iterations,
                                  sonde_bonded *b, sonde_error *error) {
   *b = (sonde_bonded){.normal = site->normal};
-  bool cut = model->law.shear_stiffness_n_m > 0;
-  sonde_status status = cut ? hold_cut(model, site, half_u_m, half_v_m, b, error)
-                            : hold_nodes(model, site, half_u_m, half_v_m, b, error);
+  sonde_status status;
+  if (model->law.shear_stiffness_n_m > 0) {
+    // The skin is cut along the footprint; what lies within is held.
+    sonde_cut cut;
+    status = sonde_cut_create(model, site, half_u_m, half_v_m, INFINITY, &cut, error);
+    if (!status) status = sonde_cut_model(model, &cut, &b->cut_model, error);
+    if (!status) b->held = SONDE_NEW(uint32_t, cut.held_count);
+    if (!status && !b->held) status = sonde_fail_memory(error);
+    for (uint32_t v = 0; v < cut.vertex_count && !status; ++v)
+      if (cut.held[v]) b->held[b->held_count++] = v;
+    sonde_cut_clear(&cut);
+  } else {
+    sonde_footprint footprint;
+    status = sonde_footprint_create(model, site, half_u_m, half_v_m, SONDE_COVERAGE_CLIPPED,
+                                    &footprint, error);
+    if (!status) {
+      b->held = footprint.held;
+      b->held_count = footprint.held_count;
+      footprint.held = NULL;
+      sonde_footprint_clear(&footprint);
+    }
+  }
   if (!status)
-    status = sonde_press_create(cut ? b->cut_model : model, relative_residual, max_iterations,
-                                &b->press, error);
+    status = sonde_press_create(b->cut_model ? b->cut_model : model, relative_residual,
+                                max_iterations, &b->press, error);
   if (status) sonde_bonded_clear(b);
   return status;
 }

@@ -29,30 +29,6 @@ static double cost_of(const sonde_refit *r, sonde_refit_workspace *w, const doub
          sonde_refit_add_prior(r, theta, r->smoothness, w->line, NULL) + sonde_offsets_cost(r);
 }
 
-static bool allocate(sonde_refit_workspace *w) {
-  size_t n = w->n;
-  w->force_n = SONDE_NEW(double, w->rows);
-  w->jacobian = SONDE_NEW(double, w->rows *n);
-  w->kept_jacobian = SONDE_NEW(double, w->rows *n);
-  w->factor = SONDE_NEW(double, n *n);
-  w->step = SONDE_NEW(double, n);
-  w->trial = SONDE_NEW(double, n);
-  w->line = SONDE_NEW(double, n);
-  return sonde_normal_create(&w->normal, w->n) && w->force_n && w->jacobian && w->kept_jacobian &&
-         w->factor && w->step && w->trial && w->line;
-}
-
-static void release(sonde_refit_workspace *w) {
-  sonde_free(w->force_n);
-  sonde_free(w->jacobian);
-  sonde_free(w->kept_jacobian);
-  sonde_normal_free(&w->normal);
-  sonde_free(w->factor);
-  sonde_free(w->step);
-  sonde_free(w->trial);
-  sonde_free(w->line);
-}
-
 // A minimisation on some of the depths.
 typedef struct search {
   sonde_refit *r;
@@ -218,7 +194,17 @@ sonde_status sonde_refit_minimise(sonde_refit *r, double *theta, double *force_n
   double shear_sd =
       given && r->def->shear_smoothness_sd > 0 ? r->def->shear_smoothness_sd : start_sd;
   r->smoothness = (sonde_smoothness){start_sd, shear_sd};
-  sonde_status status = allocate(&w) ? SONDE_OK : sonde_fail_memory(error);
+  size_t n = w.n;
+  w.force_n = SONDE_NEW(double, w.rows);
+  w.jacobian = SONDE_NEW(double, w.rows *n);
+  w.kept_jacobian = SONDE_NEW(double, w.rows *n);
+  w.factor = SONDE_NEW(double, n *n);
+  w.step = SONDE_NEW(double, n);
+  w.trial = SONDE_NEW(double, n);
+  w.line = SONDE_NEW(double, n);
+  bool ok = sonde_normal_create(&w.normal, w.n) && w.force_n && w.jacobian && w.kept_jacobian &&
+            w.factor && w.step && w.trial && w.line;
+  sonde_status status = ok ? SONDE_OK : sonde_fail_memory(error);
   r->rough = true;
   if (!status && !r->near) status = descend(&s, COARSE, result, error);
   stage whole = WHOLE;
@@ -228,6 +214,13 @@ sonde_status sonde_refit_minimise(sonde_refit *r, double *theta, double *force_n
   r->rough = false;
   if (!status && r->curvature) sonde_normal_copy(&w.normal, r->curvature);
   if (!status && r->confidence) status = sonde_refit_confidence(r, &w, theta, force_n, error);
-  release(&w);
+  sonde_free(w.force_n);
+  sonde_free(w.jacobian);
+  sonde_free(w.kept_jacobian);
+  sonde_normal_free(&w.normal);
+  sonde_free(w.factor);
+  sonde_free(w.step);
+  sonde_free(w.trial);
+  sonde_free(w.line);
   return status;
 }

@@ -103,25 +103,13 @@ double sonde_refit_add_rows(const sonde_refit *r, uint32_t first, uint32_t end,
   return loss;
 }
 
-static uint32_t layer_rows(const sonde_refit *r) {
-  return r->plan->probe_count == 1 && !r->membrane ? 2 : 0;
-}
-
 static uint32_t field_rows(const sonde_refit *r) {
   uint32_t shares = r->fields - 2;
   return r->fields * r->sites->count + shares * (r->sites->count + 1);
 }
 
-uint32_t sonde_refit_prior_rows(const sonde_refit *r) { return field_rows(r) + layer_rows(r); }
-
-// ln G - mean ln k0, then ln gm.
-static double layer_row(const sonde_refit *r, bool limit, double *row, double *target) {
-  uint32_t count = r->sites->count, n = sonde_refit_parameters(r);
-  row[limit ? n - 1 : n - 2] = 1;
-  for (uint32_t t = 0; t < count && !limit; ++t) row[t] = -1.0 / count;
-  *target = limit ? log(LIMIT_MIDDLE) : 2 * log(DENT_LENGTH_M);
-  double sd = limit ? LIMIT_SD : DENT_SD;
-  return 1 / (sd * sd);
+uint32_t sonde_refit_prior_rows(const sonde_refit *r) {
+  return field_rows(r) + (r->plan->probe_count == 1 && !r->membrane ? 2 : 0);
 }
 
 double sonde_refit_prior_row(const sonde_refit *r, sonde_smoothness s, uint32_t k, double *row,
@@ -130,7 +118,14 @@ double sonde_refit_prior_row(const sonde_refit *r, sonde_smoothness s, uint32_t 
   SONDE_ASSERT(k < sonde_refit_prior_rows(r));
   memset(row, 0, sonde_refit_parameters(r) * sizeof *row);
   *target = 0;
-  if (k >= field_rows(r)) return layer_row(r, k > field_rows(r), row, target);
+  if (k >= field_rows(r)) { // ln G - mean ln k0, then ln gm
+    bool limit = k > field_rows(r);
+    row[sonde_refit_parameters(r) - (limit ? 1 : 2)] = 1;
+    for (uint32_t t = 0; t < count && !limit; ++t) row[t] = -1.0 / count;
+    *target = limit ? log(LIMIT_MIDDLE) : 2 * log(DENT_LENGTH_M);
+    double sd = limit ? LIMIT_SD : DENT_SD;
+    return 1 / (sd * sd);
+  }
   uint32_t last = field_rows(r) - k; // the means of the shares come last
   if (r->fields > 2 && last <= r->fields - 2) {
     for (uint32_t t = 0; t < count; ++t) row[(r->fields - last) * count + t] = 1.0 / count;
@@ -145,27 +140,21 @@ double sonde_refit_prior_row(const sonde_refit *r, sonde_smoothness s, uint32_t 
   return 1 / (sd * sd);
 }
 
-// Where row k of the prior has entries: in one field, or anywhere.
-static void prior_span(const sonde_refit *r, uint32_t k, uint32_t *begin, uint32_t *end) {
-  uint32_t count = r->sites->count, field = k / count, last = field_rows(r) - k;
-  *begin = 0, *end = sonde_refit_parameters(r);
-  if (k >= field_rows(r)) return;
-  if (r->fields > 2 && last <= r->fields - 2)
-    *begin = (r->fields - last) * count;
-  else
-    *begin = (field < r->fields ? field : field - r->fields + 2) * count;
-  *end = *begin + count;
-}
-
 double sonde_refit_add_prior(const sonde_refit *r, const double *theta, sonde_smoothness s,
                              double *row, sonde_normal *normal) {
-  uint32_t n = sonde_refit_parameters(r);
+  uint32_t n = sonde_refit_parameters(r), count = r->sites->count;
   double cost = 0;
   SONDE_ASSERT(!normal || normal->n == n);
   for (uint32_t k = 0; k < sonde_refit_prior_rows(r); ++k) {
     double target, weight = sonde_refit_prior_row(r, s, k, row, &target), residual = -target;
-    uint32_t begin, end;
-    prior_span(r, k, &begin, &end);
+    // A row has entries in one field, or anywhere.
+    uint32_t begin = 0, end = n, field = k / count, last = field_rows(r) - k;
+    if (k < field_rows(r)) {
+      bool mean = r->fields > 2 && last <= r->fields - 2;
+      if (mean) field = r->fields - last;
+      begin = (mean || field < r->fields ? field : field - r->fields + 2) * count;
+      end = begin + count;
+    }
     for (uint32_t t = begin; t < end; ++t) residual += row[t] * theta[t];
     cost += 0.5 * weight * residual * residual;
     for (uint32_t i = begin; normal && i < end; ++i) {

@@ -65,40 +65,6 @@ double sonde_offsets_cost(const sonde_refit *r) {
   return cost;
 }
 
-// A probe above the skin feels nothing, wherever the zero is.
-static void slopes_of(const sonde_refit *r, uint32_t row, double slope[OFFSETS]) {
-  const sonde_offsets *o = r->offsets;
-  bool touches = sonde_offsets_depth(r, row) > 0;
-  slope[OFFSET_ZERO] = touches && isfinite(o->precision[OFFSET_ZERO]) ? -o->kept_slope_n_m[row] : 0;
-  slope[OFFSET_TARE] = isfinite(o->precision[OFFSET_TARE]);
-}
-
-// With A the curve's own equations, B their coupling and g their gradient: matrix - B^T A^-1 B,
-// gradient - B^T A^-1 g.
-static void reduce(sonde_refit *r, uint32_t c, sonde_normal *normal) {
-  sonde_offsets *o = r->offsets;
-  uint32_t n = normal->n;
-  SONDE_ASSERT(o && c < r->plan->curve_count);
-  const double *b = o->coupling + (size_t)c * OFFSETS * n, *g = o->gradient[c], *a = o->inverse[c];
-  double ag[OFFSETS] = {a[0] * g[0] + a[1] * g[1], a[1] * g[0] + a[2] * g[1]};
-  o->fall += 0.5 * (g[0] * ag[0] + g[1] * ag[1]);
-  for (uint32_t i = 0; i < n; ++i) {
-    double x = b[i], y = b[n + i], ax = a[0] * x + a[1] * y, ay = a[1] * x + a[2] * y;
-    normal->gradient[i] -= x * ag[0] + y * ag[1];
-    double *row = normal->matrix + (size_t)i * n;
-    for (uint32_t j = 0; j <= i; ++j) row[j] -= ax * b[j] + ay * b[n + j];
-  }
-}
-
-static void invert(const double precision[OFFSETS], double own[3], double inverse[3]) {
-  for (int k = 0; k < OFFSETS; ++k) own[2 * k] += isfinite(precision[k]) ? precision[k] : 1;
-  double determinant = own[0] * own[2] - own[1] * own[1];
-  SONDE_ASSERT(determinant > 0);
-  inverse[0] = own[2] / determinant;
-  inverse[1] = -own[1] / determinant;
-  inverse[2] = own[0] / determinant;
-}
-
 void sonde_offsets_eliminate(sonde_refit *r, const double *force_n, const double *jacobian,
                              sonde_normal *normal) {
   sonde_offsets *o = r->offsets;
@@ -114,8 +80,10 @@ void sonde_offsets_eliminate(sonde_refit *r, const double *force_n, const double
     for (uint32_t k = r->plan->curve_start[c]; k < r->plan->curve_start[c + 1]; ++k) {
       if (!sonde_refit_uses(r, k)) continue;
       sonde_refit_row row = sonde_refit_weigh(r, k, force_n[k]);
-      double slope[OFFSETS];
-      slopes_of(r, k, slope);
+      // A probe above the skin feels nothing, wherever the zero is.
+      bool slides = sonde_offsets_depth(r, k) > 0 && isfinite(o->precision[OFFSET_ZERO]);
+      const double slope[OFFSETS] = {[OFFSET_ZERO] = slides ? -o->kept_slope_n_m[k] : 0,
+                                     [OFFSET_TARE] = isfinite(o->precision[OFFSET_TARE])};
       own[0] += row.weight * slope[0] * slope[0];
       own[1] += row.weight * slope[0] * slope[1];
       own[2] += row.weight * slope[1] * slope[1];
@@ -125,8 +93,22 @@ void sonde_offsets_eliminate(sonde_refit *r, const double *force_n, const double
         for (uint32_t i = 0; i < n && w != 0; ++i) b[s * n + i] += w * jacobian[(size_t)k * n + i];
       }
     }
-    invert(o->precision, own, o->inverse[c]);
-    reduce(r, c, normal);
+    for (int k = 0; k < OFFSETS; ++k) own[2 * k] += isfinite(o->precision[k]) ? o->precision[k] : 1;
+    double determinant = own[0] * own[2] - own[1] * own[1], *a = o->inverse[c];
+    SONDE_ASSERT(determinant > 0);
+    a[0] = own[2] / determinant;
+    a[1] = -own[1] / determinant;
+    a[2] = own[0] / determinant;
+    // With A the curve's own equations, B their coupling and g their gradient: matrix - B^T A^-1 B,
+    // gradient - B^T A^-1 g.
+    double ag[OFFSETS] = {a[0] * g[0] + a[1] * g[1], a[1] * g[0] + a[2] * g[1]};
+    o->fall += 0.5 * (g[0] * ag[0] + g[1] * ag[1]);
+    for (uint32_t i = 0; i < n; ++i) {
+      double x = b[i], y = b[n + i], ax = a[0] * x + a[1] * y, ay = a[1] * x + a[2] * y;
+      normal->gradient[i] -= x * ag[0] + y * ag[1];
+      double *row = normal->matrix + (size_t)i * n;
+      for (uint32_t j = 0; j <= i; ++j) row[j] -= ax * b[j] + ay * b[n + j];
+    }
   }
 }
 

@@ -16,22 +16,6 @@ static double sum_of(const double *field, const uint32_t place[3]) {
   return field[place[0]] + field[place[1]] + field[place[2]];
 }
 
-// A face takes the mean of its corners, as the model's two layers have it.
-static void spread_law(sonde_patch_solver *solver) {
-  const sonde_patch *p = solver->patch;
-  const sonde_patch_law *law = &solver->law;
-  for (uint32_t f = 0; f < p->face_count; ++f) {
-    const uint32_t *place = p->face[f].place;
-    double shear = sum_of(solver->shear_share, place), limit = sum_of(solver->limit_share, place);
-    sonde_patch_face_law *to = &solver->face_law[f];
-    to->shear_n_m = law->shear_n_m * shear / 3;
-    to->limit = law->limit * limit / 3;
-    to->by_shear = 1 / shear;
-    to->by_limit = 1 / limit;
-    solver->steepness[f] = 1 / (p->face[f].area_m2 * to->limit * to->limit);
-  }
-}
-
 void sonde_patch_solver_use(sonde_patch_solver *solver, const sonde_patch *patch,
                             const sonde_patch_law *law) {
   solver->factored = false;
@@ -49,7 +33,17 @@ void sonde_patch_solver_use(sonde_patch_solver *solver, const sonde_patch *patch
       to[f][i] = from[f] ? exp(ln) : 1;
     }
   }
-  spread_law(solver);
+  // A face takes the mean of its corners, as the model's two layers have it.
+  for (uint32_t f = 0; f < patch->face_count; ++f) {
+    const uint32_t *place = patch->face[f].place;
+    double shear = sum_of(solver->shear_share, place), limit = sum_of(solver->limit_share, place);
+    sonde_patch_face_law *own = &solver->face_law[f];
+    own->shear_n_m = law->shear_n_m * shear / 3;
+    own->limit = law->limit * limit / 3;
+    own->by_shear = 1 / shear;
+    own->by_limit = 1 / limit;
+    solver->steepness[f] = 1 / (patch->face[f].area_m2 * own->limit * own->limit);
+  }
 }
 
 // Normal springs of all places.

@@ -1,9 +1,6 @@
 // The force with which a footprint drags the skin along itself. Tangential displacements t are
 // linear in the depth and do not see the indentations (docs/tissue.md): they cost
 // g_t A t^2/2 + K A |grad t|^2/2, the footprint's own are given, and the free ones follow.
-// multiply:      product with that energy's matrix.
-// drag_places:   what the footprint's places move at a depth of one.
-// follow:        the free places by conjugate gradients.
 #include "fit/shear.h"
 
 #include "base/maths.h"
@@ -41,20 +38,6 @@ static void multiply(const slide *s, const sonde_vec3 *x, sonde_vec3 *y) {
   for (uint32_t k = 0; k < p->place_count; ++k) y[k] = across(s->normal[k], y[k]);
 }
 
-static void drag_places(slide *s, sonde_vec3 site_normal) {
-  const sonde_patch *p = s->patch;
-  for (uint32_t k = 0; k < p->place_count; ++k)
-    s->diagonal[k] = s->law->tangential_stiffness_n_m3 * p->area_m2[k];
-  for (uint32_t f = 0; f < p->face_count; ++f)
-    for (int k = 0; k < 3; ++k) {
-      double stiffness = s->law->inplane_stiffness_n_m * p->face[f].half_cotangent[k];
-      s->diagonal[p->face[f].place[(k + 1) % 3]] += stiffness;
-      s->diagonal[p->face[f].place[(k + 2) % 3]] += stiffness;
-    }
-  for (uint32_t k = p->free_count; k < p->place_count; ++k)
-    s->t[k] = v_scale(across(s->normal[k], site_normal), -1);
-}
-
 static void multiply_free(const void *user, const double *x, double *y) {
   multiply(user, (const sonde_vec3 *)x, (sonde_vec3 *)y);
 }
@@ -70,18 +53,6 @@ static double precondition(const void *user, const double *r, double *z) {
   return sum;
 }
 
-// The free places come to rest while the others stay as they are.
-static void follow(slide *s) {
-  const sonde_operator matrix = {.count = s->patch->free_count,
-                                 .width = 3,
-                                 .multiply = multiply_free,
-                                 .precondition = precondition,
-                                 .user = s};
-  const sonde_pcg_vectors vectors = {&s->r->x, &s->z->x, &s->direction->x, &s->product->x};
-  const sonde_pcg_goal goal = {.relative = ACCURACY, .max_iterations = MOST_ITERATIONS};
-  (void)sonde_pcg(&matrix, NULL, &s->t->x, &vectors, &goal);
-}
-
 sonde_status sonde_patch_drag(sonde_patch *patch, const sonde_surface_law *law,
                               const sonde_vec3 *normal, sonde_vec3 site_normal,
                               sonde_error *error) {
@@ -92,8 +63,26 @@ sonde_status sonde_patch_drag(sonde_patch *patch, const sonde_surface_law *law,
   for (size_t k = 0; k < SONDE_COUNT_OF(array); ++k)
     ok = (*array[k] = SONDE_NEW(sonde_vec3, places)) != NULL && ok;
   if (ok) {
-    drag_places(&s, site_normal);
-    follow(&s);
+    for (uint32_t k = 0; k < places; ++k)
+      s.diagonal[k] = law->tangential_stiffness_n_m3 * patch->area_m2[k];
+    for (uint32_t f = 0; f < patch->face_count; ++f)
+      for (int k = 0; k < 3; ++k) {
+        double stiffness = law->inplane_stiffness_n_m * patch->face[f].half_cotangent[k];
+        s.diagonal[patch->face[f].place[(k + 1) % 3]] += stiffness;
+        s.diagonal[patch->face[f].place[(k + 2) % 3]] += stiffness;
+      }
+    // The footprint's places move with it, here by a depth of one.
+    for (uint32_t k = patch->free_count; k < places; ++k)
+      s.t[k] = v_scale(across(normal[k], site_normal), -1);
+    // The free places come to rest while the others stay as they are.
+    const sonde_operator matrix = {.count = patch->free_count,
+                                   .width = 3,
+                                   .multiply = multiply_free,
+                                   .precondition = precondition,
+                                   .user = &s};
+    const sonde_pcg_vectors vectors = {&s.r->x, &s.z->x, &s.direction->x, &s.product->x};
+    const sonde_pcg_goal goal = {.relative = ACCURACY, .max_iterations = MOST_ITERATIONS};
+    (void)sonde_pcg(&matrix, NULL, &s.t->x, &vectors, &goal);
     multiply(&s, s.t, s.product);
     patch->drag_n_m = 0;
     for (uint32_t k = 0; k < places; ++k) patch->drag_n_m += v_dot(s.t[k], s.product[k]);

@@ -1,7 +1,4 @@
-// factor:    numbers of the patch's matrix.
-// solve:     conjugate gradients preconditioned by the kept factor; a new factor when it is slow.
-// search:    shortens a Newton step until the energy falls at its end.
-// sonde_patch_settle: Newton. sonde_patch_force: force and its adjoint derivatives.
+// Equilibria of a footprint by Newton, its force and the adjoint derivatives.
 #include "fit/shear.h"
 
 #include "base/maths.h"
@@ -60,13 +57,6 @@ static sonde_status solve(sonde_patch_solver *solver, double *x, double accuracy
   return status;
 }
 
-// The factor of another depth would cost more in conjugate gradients than a new one.
-static sonde_status first_step(sonde_patch_solver *solver, double *x, sonde_error *error) {
-  sonde_status status = factor(solver, error);
-  if (!status) sonde_numeric_solve(&solver->factor, x);
-  return status;
-}
-
 static double along_step(const sonde_patch_solver *solver) {
   double sum = 0;
   for (uint32_t i = 0; i < solver->patch->free_count; ++i)
@@ -108,9 +98,11 @@ sonde_status sonde_patch_settle(sonde_patch_solver *solver, double depth_m, doub
   for (uint32_t k = 0; k < max_iterations; ++k) {
     if (is_small(solver, residual, relative)) return SONDE_OK;
     for (uint32_t i = 0; i < p->free_count; ++i) solver->step[i] = -solver->residual[i];
-    sonde_status status = k ? solve(solver, solver->step, NEWTON_ACCURACY, error)
-                            : first_step(solver, solver->step, error);
+    // The factor of another depth would cost more in conjugate gradients than a new one.
+    sonde_status status =
+        k ? solve(solver, solver->step, NEWTON_ACCURACY, error) : factor(solver, error);
     if (status) return status;
+    if (!k) sonde_numeric_solve(&solver->factor, solver->step);
     if (!search(solver, s_m, &residual, &solver->load_n)) break;
   }
   residual = sonde_patch_assemble(solver, s_m, &solver->load_n);
@@ -120,10 +112,16 @@ sonde_status sonde_patch_settle(sonde_patch_solver *solver, double depth_m, doub
                     depth_m * 1e3, residual, solver->load_n);
 }
 
-// mu: cosines on the held places; on the free ones minus the solution of K lambda = K_fh c, so that
-// dF/dtheta = sum mu_i dR_i/dtheta. A footprint that moves by c moves the free places by mu.
-static sonde_status adjoint(sonde_patch_solver *solver, double *mu, sonde_error *error) {
+sonde_status sonde_patch_force(sonde_patch_solver *solver, double depth_m, const double *s_m,
+                               double *force_n, sonde_patch_gradient *gradient,
+                               sonde_error *error) {
+  SONDE_ASSERT(solver->settled_m == s_m);
+  *force_n = solver->load_n + solver->patch->drag_n_m * depth_m;
+  if (!gradient) return SONDE_OK;
+  // mu: cosines on the held places; on the free ones minus the solution of K lambda = K_fh c, so
+  // that dF/dtheta = sum mu_i dR_i/dtheta. A footprint that moves by c moves the free places by mu.
   const sonde_patch *p = solver->patch;
+  double *mu = solver->multiplier;
   memcpy(mu, p->cosine, p->place_count * sizeof *mu);
   for (uint32_t h = 0; h < p->side_count; ++h) {
     const sonde_patch_face *face = &p->face[p->side[h]];
@@ -138,39 +136,15 @@ static sonde_status adjoint(sonde_patch_solver *solver, double *mu, sonde_error 
       mu[in] -= pair * p->cosine[out];
     }
   }
-  return solve(solver, mu, solver->adjoint_accuracy, error);
-}
-
-sonde_status sonde_patch_force(sonde_patch_solver *solver, double depth_m, const double *s_m,
-                               double *force_n, sonde_patch_gradient *gradient,
-                               sonde_error *error) {
-  SONDE_ASSERT(solver->settled_m == s_m);
-  *force_n = solver->load_n + solver->patch->drag_n_m * depth_m;
-  if (!gradient) return SONDE_OK;
-  sonde_status status = adjoint(solver, solver->multiplier, error);
+  sonde_status status = solve(solver, mu, solver->adjoint_accuracy, error);
   if (status) return status;
   // The last Newton step would change the force by c K_hf ds = -mu K ds = mu R.
-  *force_n += sonde_dot(solver->multiplier, solver->residual, solver->patch->free_count);
-  sonde_patch_differentiate(solver, s_m, solver->multiplier, gradient);
+  *force_n += sonde_dot(mu, solver->residual, p->free_count);
+  sonde_patch_differentiate(solver, s_m, mu, gradient);
   return SONDE_OK;
 }
 
-typedef struct sizes {
-  size_t places, faces, entries;
-} sizes;
-
 static size_t larger(size_t a, size_t b) { return a > b ? a : b; }
-
-static sizes sizes_of(const sonde_patch *patches, uint32_t count) {
-  sizes most = {0};
-  for (uint32_t k = 0; k < count; ++k) {
-    const sonde_patch *p = &patches[k];
-    most.places = larger(most.places, p->place_count);
-    most.faces = larger(most.faces, p->face_count);
-    most.entries = larger(most.entries, p->row_start[p->free_count]);
-  }
-  return most;
-}
 
 // Every array [places] of a solver.
 enum { PLACE_ARRAYS = 14 };
@@ -184,22 +158,27 @@ static void place_arrays(sonde_patch_solver *s, double **array[PLACE_ARRAYS]) {
 
 sonde_status sonde_patch_solver_create(const sonde_patch *patches, uint32_t count,
                                        sonde_patch_solver *solver, sonde_error *error) {
-  const sizes most = sizes_of(patches, count);
+  size_t places = 0, faces = 0, entries = 0;
+  for (uint32_t k = 0; k < count; ++k) {
+    const sonde_patch *p = &patches[k];
+    places = larger(places, p->place_count);
+    faces = larger(faces, p->face_count);
+    entries = larger(entries, p->row_start[p->free_count]);
+  }
   double **array[PLACE_ARRAYS];
-  SONDE_ASSERT(most.places > 0 && most.entries > 0);
+  SONDE_ASSERT(places > 0 && entries > 0);
   *solver = (sonde_patch_solver){.adjoint_accuracy = 1e-6,
-                                 .face_law = SONDE_NEW(sonde_patch_face_law, most.faces),
-                                 .steepness = SONDE_NEW(double, most.faces),
-                                 .flux = sonde_calloc(most.faces, sizeof *solver->flux),
-                                 .square = SONDE_NEW(double, most.faces),
-                                 .secant = SONDE_NEW(double, most.faces),
-                                 .beyond = SONDE_NEW(double, most.faces),
-                                 .value = SONDE_NEW(double, most.entries)};
+                                 .face_law = SONDE_NEW(sonde_patch_face_law, faces),
+                                 .steepness = SONDE_NEW(double, faces),
+                                 .flux = sonde_calloc(faces, sizeof *solver->flux),
+                                 .square = SONDE_NEW(double, faces),
+                                 .secant = SONDE_NEW(double, faces),
+                                 .beyond = SONDE_NEW(double, faces),
+                                 .value = SONDE_NEW(double, entries)};
   bool ok = solver->face_law && solver->steepness && solver->flux && solver->square &&
             solver->secant && solver->beyond && solver->value;
   place_arrays(solver, array);
-  for (int k = 0; k < PLACE_ARRAYS; ++k)
-    ok = (*array[k] = SONDE_NEW(double, most.places)) != NULL && ok;
+  for (int k = 0; k < PLACE_ARRAYS; ++k) ok = (*array[k] = SONDE_NEW(double, places)) != NULL && ok;
   sonde_status status = ok ? SONDE_OK : sonde_fail_memory(error);
   for (uint32_t k = 0; k < count && !status; ++k)
     status = sonde_numeric_reserve(&solver->factor, patches[k].symbolic, error);
