@@ -33,7 +33,8 @@ void sonde_contact_wrench(sonde_state *state, sonde_vec3 origin);
 sonde_box sonde_contact_box(const sonde_probe *probe, sonde_pose pose);
 // After a step: whether the probe holds skin that rests elsewhere (SONDE_FLAG_INSIDE_OUT).
 // @thread tick
-bool sonde_contact_carries(const sonde_state *state, const sonde_probe *probe, sonde_pose pose);
+bool sonde_contact_is_inside_out(const sonde_state *state, const sonde_probe *probe,
+                                 sonde_pose pose);
 
 // How a bond enters the linear system of a step: scales of its damping and stiffness.
 typedef struct sonde_contact_scales {

@@ -151,7 +151,8 @@ void sonde_contact_wrench(sonde_state *state, sonde_vec3 origin) {
 }
 
 // Greatest and least distance from the box around the probe to where the skin that it pushes rests.
-bool sonde_contact_carries(const sonde_state *state, const sonde_probe *probe, sonde_pose pose) {
+bool sonde_contact_is_inside_out(const sonde_state *state, const sonde_probe *probe,
+                                 sonde_pose pose) {
   double most = 0, least = INFINITY;
   sonde_box box = sonde_contact_box(probe, pose);
   for (uint32_t k = 0; k < state->touched_count; ++k) {

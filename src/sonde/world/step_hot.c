@@ -38,7 +38,7 @@ void sonde_step(sonde_state *state, const sonde_probe *probe, sonde_pose pose) {
   if (!finite) {
     sonde_state_relax(state);
     state->flags = SONDE_FLAG_NON_FINITE;
-  } else if (probe && sonde_contact_carries(state, probe, pose)) {
+  } else if (probe && sonde_contact_is_inside_out(state, probe, pose)) {
     state->flags |= SONDE_FLAG_INSIDE_OUT;
   }
   state->tick++;
