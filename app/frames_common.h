@@ -10,6 +10,7 @@ typedef struct frames_options {
 } frames_options;
 
 // Their rows in a command's table; m: the member.
+// NOLINTBEGIN(bugprone-macro-parentheses): offsetof() takes no parentheses around a member
 #define FRAMES_OPTIONS(m)                                                                          \
   OPT_TEXT(m.config, "config", "FILE",                                                             \
            "PLUS configuration (XML) with the ImageToProbe transform and the clip rectangle"),     \
@@ -20,6 +21,7 @@ typedef struct frames_options {
       OPT_TEXT(m.clip, "clip", "X,Y,W,H",                                                          \
                "use only this part of every frame, in pixels; it replaces that of the "            \
                "configuration")
+// NOLINTEND(bugprone-macro-parentheses)
 
 // Loads, clips, locates and keeps the range; SONDE_ARGUMENT for options that do not fit.
 sonde_status frames_load(const char *path, const frames_options *options, sonde_sequence *sequence,

@@ -11,6 +11,7 @@ typedef struct press_options {
   double vein_mm[2];                      // where the vein is in the picture
 } press_options;
 
+// NOLINTBEGIN(bugprone-macro-parentheses): offsetof() takes no parentheses around a member
 #define PRESS_OPTIONS(m)                                                                           \
   OPT_TEXT(                                                                                        \
       m.model, "press", "MODEL",                                                                   \
@@ -28,6 +29,7 @@ typedef struct press_options {
           m.vein_mm, "vein-at", "X,Z", -INFINITY, INFINITY,                                        \
           "with --press: where the vein is in the picture, mm from the middle of its top; "        \
           "default where the model has it")
+// NOLINTEND(bugprone-macro-parentheses)
 
 typedef struct press_result {
   double force_n, depth_m, vein_area_ratio, artery_area_ratio; // NaN: not under the probe

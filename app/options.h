@@ -53,6 +53,7 @@ typedef struct app_command {
 } app_command;
 
 // A command's own struct is called `options`; a member of another type does not compile.
+// NOLINTNEXTLINE(bugprone-macro-parentheses): a type in _Generic() stands without parentheses
 #define OPT_AT(m, type) offsetof(options, m), _Generic(((options *)0)->m, type : sizeof(type))
 #define OPT_SIZE(m) offsetof(options, m), sizeof(((options *)0)->m)
 #define OPT_FLAG(m, name, help)                                                                    \

@@ -41,8 +41,7 @@ typedef struct sonde_marquardt_result {
 } sonde_marquardt_result;
 
 // Failures are those of the functions.
-SONDE_LINK sonde_status sonde_marquardt_minimise(const sonde_marquardt *m,
-                                                 sonde_marquardt_result *result,
-                                                 sonde_error *error);
+sonde_status sonde_marquardt_minimise(const sonde_marquardt *m, sonde_marquardt_result *result,
+                                      sonde_error *error);
 
 #endif

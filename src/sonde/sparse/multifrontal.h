@@ -78,10 +78,10 @@ SONDE_LINK sonde_status sonde_numeric_reserve(sonde_numeric *numeric,
 SONDE_LINK void sonde_numeric_clear(sonde_numeric *numeric);
 
 // Starts new numbers. @thread one at a time; no allocation, here and below
-SONDE_LINK void sonde_numeric_begin(sonde_numeric *numeric, const sonde_symbolic *symbolic,
-                                    const sonde_matrix_source *source);
+void sonde_numeric_begin(sonde_numeric *numeric, const sonde_symbolic *symbolic,
+                         const sonde_matrix_source *source);
 // Works for about `budget` multiplications. Returns true when all is factored or a pivot failed.
-SONDE_LINK bool sonde_numeric_step(sonde_numeric *numeric, uint64_t budget);
+bool sonde_numeric_step(sonde_numeric *numeric, uint64_t budget);
 // All of it now. False: a pivot is not positive.
 SONDE_LINK bool sonde_numeric_factor(sonde_numeric *numeric, const sonde_symbolic *symbolic,
                                      const sonde_matrix_source *source);
