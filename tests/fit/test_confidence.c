@@ -2,7 +2,7 @@
 // what each probe determines, other starts, robust losses.
 #include "fit_test.h"
 
-#include "fit/again.h"
+#include "fit/nearby_refit.h"
 #include "fit_plate.h"
 #include "sonde/fit_confidence.h"
 
@@ -50,22 +50,23 @@ static void profile_rises_from_the_optimum(void **state) {
   for (uint32_t k = 0; k < p.count; ++k)
     if (k != middle) assert_near(p.rise[k] / p.quadratic[k], 1, 0.3);
   for (int side = 0; side < 2; ++side) {
-    sonde_again again;
-    assert_ok(sonde_again_create(t.b.model, &t.b.sites, &t.b.m, &t.def, &t.result, &again, &error),
-              &error);
+    sonde_nearby_refit again;
+    assert_ok(
+        sonde_nearby_refit_create(t.b.model, &t.b.sites, &t.b.m, &t.def, &t.result, &again, &error),
+        &error);
     bool *fixed = SONDE_NEW(bool, again.parameters);
     sonde_refit_result best, held;
     again.refit->near = true;
     again.refit->enough = 1e-6;
-    assert_ok(sonde_again_run(&again, NULL, &best, &error), &error);
+    assert_ok(sonde_nearby_refit_run(&again, NULL, &best, &error), &error);
     fixed[again.parameters - 2] = true;
     again.refit->fixed = fixed;
     again.theta[again.parameters - 2] = log(p.interval_95[side]);
-    assert_ok(sonde_again_run(&again, NULL, &held, &error), &error);
+    assert_ok(sonde_nearby_refit_run(&again, NULL, &held, &error), &error);
     assert_near(again.theta[again.parameters - 2], log(p.interval_95[side]), 0); // was held
     assert_near(2 * (held.cost - best.cost) / p.threshold, 1, 0.05);
     sonde_free(fixed);
-    sonde_again_clear(&again);
+    sonde_nearby_refit_clear(&again);
   }
   nine_clear(&t);
 }

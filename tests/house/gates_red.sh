@@ -127,6 +127,12 @@ expect green "doxygen, clean tree" "$house/doxygen.sh" "$tree"
 sed -i 's/@thread any/@param b number @thread any/' "$tree/include/sonde/base.h"
 expect red "a docstring of a parameter that is not there" "$house/doxygen.sh" "$tree"
 
+words=("$house/words.sh" "$tree")
+fresh; mkdir -p "$tree/tests/house"; cp "$house/words.txt" "$tree/tests/house"
+expect green "names without words of another meaning" "${words[@]}"
+printf 'int sonde_run_crew(int a) {\n  return a;\n}\n' >"$tree/src/sonde/world/crew_a.c"
+expect red "a name with a word of another meaning" "${words[@]}"
+
 fresh
 { echo 'int long_one(int a) {'; for i in {1..79}; do echo "  a += $i;"; done; echo '}'; } \
   >>"$tree/app/main.c"
@@ -143,8 +149,10 @@ fresh; printf "$once$twice" >"$tree/src/sonde/world/once.c"
 expect green "a helper with two uses" "${sizes[@]}"
 fresh; printf "$once" >"$tree/src/sonde/world/once.c"
 expect red "a helper with a single use" "${sizes[@]}"
-fresh; { for i in {1..46}; do echo "// $i"; done; echo 'int sonde_a(int a);'; } >"$tree/app/head.c"
-expect red "a head of 46 lines" "${sizes[@]}"
+fresh; { for i in {1..13}; do echo "// $i"; done; echo 'int sonde_a(int a);'; } >"$tree/app/head.c"
+expect red "a head of 13 lines" "${sizes[@]}"
+fresh; printf "$once"'int (*const table[])(int) = {sonde_a};\n' | sed '/sonde_b/d' >"$tree/src/sonde/world/once.c"
+expect green "a helper whose address stands in a table" "${sizes[@]}"
 fresh; for i in {1..50}; do echo 'SONDE_ASSERT(1);'; done >"$tree/src/sonde/base/many.c"
 for i in {1..400}; do echo "int sonde_$i;"; done >"$tree/src/sonde/world/few.c"
 expect red "a room with few asserts" "${sizes[@]}"

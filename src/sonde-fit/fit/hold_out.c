@@ -1,5 +1,5 @@
 // Left-out parts of the measurements, predicted by a refit of the rest.
-#include "fit/again.h"
+#include "fit/nearby_refit.h"
 #include "sonde/fit_confidence.h"
 
 #include "base/maths.h"
@@ -36,8 +36,8 @@ static sonde_status run_folds(const sonde_model *model, const sonde_site_table *
                               sonde_hold_out kind, const sonde_progress *progress,
                               double *predicted_n, sonde_error *error) {
   for (uint32_t i = 0; i < m->count; ++i) predicted_n[i] = NAN;
-  sonde_again again;
-  sonde_status status = sonde_again_create(model, sites, m, def, result, &again, error);
+  sonde_nearby_refit again;
+  sonde_status status = sonde_nearby_refit_create(model, sites, m, def, result, &again, error);
   if (status) return status;
   if (kind == SONDE_HOLD_OUT_PROBE && again.plan.probe_count < 2)
     status = sonde_fail(error, SONDE_ARGUMENT, "one probe only: none can be left out");
@@ -54,7 +54,7 @@ static sonde_status run_folds(const sonde_model *model, const sonde_site_table *
       sonde_refit_start(r, result->curves, again.theta);
     sonde_refit_result found;
     r->left_out = again.left_out;
-    status = sonde_again_run(&again, progress, &found, error);
+    status = sonde_nearby_refit_run(&again, progress, &found, error);
     // The refitted parameters predict the rows of the fold.
     for (uint32_t k = 0; k < rows; ++k) again.left_out[k] = fold_of(r, kind, k) != fold;
     r->stride = 1;
@@ -62,7 +62,7 @@ static sonde_status run_folds(const sonde_model *model, const sonde_site_table *
     for (uint32_t k = 0; k < rows && !status; ++k)
       if (!again.left_out[k]) predicted_n[again.plan.row[k]] = again.force_n[k];
   }
-  sonde_again_clear(&again);
+  sonde_nearby_refit_clear(&again);
   return status;
 }
 

@@ -1,5 +1,5 @@
 // Which figures one probe and all probes determine, from the curvature at the common optimum.
-#include "fit/again.h"
+#include "fit/nearby_refit.h"
 #include "sonde/fit_confidence.h"
 
 #include "base/maths.h"
@@ -36,7 +36,7 @@ static double condition_of(const double matrix[FIGURES][FIGURES]) {
 }
 
 // The combination of parameters that is figure k: ln G, ln gm, mean ln k0, mean ln xm.
-static void row_of(const sonde_again *a, int k, double *row) {
+static void row_of(const sonde_nearby_refit *a, int k, double *row) {
   uint32_t n = a->parameters, sites = a->refit->sites->count;
   memset(row, 0, n * sizeof *row);
   if (k < 2)
@@ -49,9 +49,10 @@ sonde_status sonde_fit_identify(const sonde_model *model, const sonde_site_table
                                 const sonde_measurements *measurements, const sonde_fit_def *def,
                                 const sonde_fit_result *result, const sonde_progress *progress,
                                 sonde_fit_identifiability *identifiability, sonde_error *error) {
-  sonde_again again;
+  sonde_nearby_refit again;
   *identifiability = (sonde_fit_identifiability){0};
-  sonde_status status = sonde_again_create(model, sites, measurements, def, result, &again, error);
+  sonde_status status =
+      sonde_nearby_refit_create(model, sites, measurements, def, result, &again, error);
   if (status) return status;
   double *row = SONDE_NEW(double, again.parameters);
   if (!row) status = sonde_fail_memory(error);
@@ -68,15 +69,15 @@ sonde_status sonde_fit_identify(const sonde_model *model, const sonde_site_table
     again.refit->near = true;
     again.refit->enough = INFINITY; // any promise ends the refit where it begins
     sonde_refit_result found;
-    status = sonde_again_run(&again, progress, &found, error);
+    status = sonde_nearby_refit_run(&again, progress, &found, error);
     if (status) break;
 
     // Deviations and correlations from the curvature.
     double spread[FIGURES][FIGURES];
-    bool known = sonde_again_factor(&again);
+    bool known = sonde_nearby_refit_factor(&again);
     for (int k = 0; k < FIGURES; ++k) {
       row_of(&again, k, row);
-      part->ln_sd[k] = known ? sqrt(sonde_again_spread(&again, row)) : INFINITY;
+      part->ln_sd[k] = known ? sqrt(sonde_nearby_refit_spread(&again, row)) : INFINITY;
       for (int j = 0; j < FIGURES && known; ++j) {
         row_of(&again, j, row);
         spread[k][j] = 0;
@@ -89,6 +90,6 @@ sonde_status sonde_fit_identify(const sonde_model *model, const sonde_site_table
     part->condition = known ? condition_of((const double(*)[FIGURES])part->correlation) : INFINITY;
   }
   sonde_free(row);
-  sonde_again_clear(&again);
+  sonde_nearby_refit_clear(&again);
   return status;
 }

@@ -1,5 +1,5 @@
 // Two laws of the shear layer fitted and compared.
-#include "fit/again.h"
+#include "fit/nearby_refit.h"
 #include "sonde/fit_confidence.h"
 
 #include "base/maths.h"
@@ -10,7 +10,7 @@ static const double LEAST_LN = 0, MOST_LN = 6, CLOSE_LN = 0.3; // of J's stiffen
 static const double GOLDEN = 0.6180339887498949;
 
 typedef struct comparison {
-  sonde_again again;
+  sonde_nearby_refit again;
   const sonde_measurements *m; // fitted ones first
   uint32_t fitted;
   const sonde_progress *progress;
@@ -23,7 +23,7 @@ static sonde_status settle(comparison *c, sonde_fit_layer *layer, sonde_error *e
   sonde_refit_result found;
   c->again.def.smoothness_sd = c->again.def.shear_smoothness_sd = 0;
   r->confidence = &confidence;
-  sonde_status status = sonde_again_run(&c->again, c->progress, &found, error);
+  sonde_status status = sonde_nearby_refit_run(&c->again, c->progress, &found, error);
   r->confidence = NULL;
   layer->one_out = confidence.one_out;
   layer->smoothness_sd = confidence.smoothness_sd;
@@ -59,7 +59,7 @@ static sonde_status settle(comparison *c, sonde_fit_layer *layer, sonde_error *e
 static sonde_status cost_at(comparison *c, double ln_stiffening, double *cost, sonde_error *error) {
   sonde_refit_result found;
   c->again.refit->stiffening = exp(ln_stiffening);
-  sonde_status status = sonde_again_run(&c->again, c->progress, &found, error);
+  sonde_status status = sonde_nearby_refit_run(&c->again, c->progress, &found, error);
   *cost = found.cost;
   return status;
 }
@@ -89,7 +89,7 @@ static sonde_status search(comparison *c, const sonde_fit_layer *before, sonde_e
 
 // From G g (1 + (g/gm)^2), the first terms of the result's law: T g + (k - T) g^3/2 has the same
 // ones with T = G and k = T (1 + 2/gm^2).
-static void start_membrane(sonde_again *a) {
+static void start_membrane(sonde_nearby_refit *a) {
   uint32_t n = a->parameters, sites = a->refit->sites->count;
   double *theta = memcpy(a->theta, a->optimum, n * sizeof *a->theta), limit = theta[n - 1],
          mean = log1p(2 * exp(-2 * limit));
@@ -109,9 +109,9 @@ sonde_status sonde_fit_layers(const sonde_model *model, const sonde_site_table *
   sonde_status status = also ? sonde_measurements_join(m, also, &both, error) : SONDE_OK;
   if (status) return status;
   comparison c = {.m = &both, .fitted = m->count, .progress = progress};
-  status = sonde_again_create(model, sites, &both, def, result, &c.again, error);
+  status = sonde_nearby_refit_create(model, sites, &both, def, result, &c.again, error);
   if (!status) {
-    sonde_again *a = &c.again;
+    sonde_nearby_refit *a = &c.again;
     sonde_refit *r = a->refit;
     for (uint32_t k = 0; k < a->plan.row_count; ++k) a->left_out[k] = a->plan.row[k] >= c.fitted;
     r->left_out = a->left_out;
@@ -128,7 +128,7 @@ sonde_status sonde_fit_layers(const sonde_model *model, const sonde_site_table *
     }
     if (!status) status = search(&c, &layers[SONDE_LAYER_LIMIT], error);
     if (!status) status = settle(&c, &layers[SONDE_LAYER_STIFFENING], error);
-    sonde_again_clear(a);
+    sonde_nearby_refit_clear(a);
   }
   if (also) sonde_free(both.data);
   return status;

@@ -24,26 +24,26 @@ void sonde_press_clear(sonde_press *press) {
   *press = (sonde_press){0};
 }
 
-sonde_status sonde_press_crew_create(const sonde_model *model, double relative_residual,
-                                     uint32_t max_iterations, uint32_t workers, sonde_press **crew,
+sonde_status sonde_press_pool_create(const sonde_model *model, double relative_residual,
+                                     uint32_t max_iterations, uint32_t workers, sonde_press **pool,
                                      sonde_error *error) {
-  *crew = SONDE_NEW(sonde_press, workers);
-  if (!*crew) return sonde_fail_memory(error);
+  *pool = SONDE_NEW(sonde_press, workers);
+  if (!*pool) return sonde_fail_memory(error);
   for (uint32_t w = 0; w < workers; ++w) {
     sonde_status status =
-        sonde_press_create(model, relative_residual, max_iterations, &(*crew)[w], error);
+        sonde_press_create(model, relative_residual, max_iterations, &(*pool)[w], error);
     if (status) {
-      sonde_press_crew_destroy(*crew, workers);
-      *crew = NULL;
+      sonde_press_pool_destroy(*pool, workers);
+      *pool = NULL;
       return status;
     }
   }
   return SONDE_OK;
 }
 
-void sonde_press_crew_destroy(sonde_press *crew, uint32_t workers) {
-  for (uint32_t w = 0; crew && w < workers; ++w) sonde_press_clear(&crew[w]);
-  sonde_free(crew);
+void sonde_press_pool_destroy(sonde_press *pool, uint32_t workers) {
+  for (uint32_t w = 0; pool && w < workers; ++w) sonde_press_clear(&pool[w]);
+  sonde_free(pool);
 }
 
 sonde_status sonde_bonded_create(const sonde_model *model, const sonde_site *site, double half_u_m,

@@ -20,10 +20,10 @@ sonde_status sonde_press_create(const sonde_model *model, double relative_residu
 void sonde_press_clear(sonde_press *press);
 
 // Creates and destroys one press per worker.
-sonde_status sonde_press_crew_create(const sonde_model *model, double relative_residual,
-                                     uint32_t max_iterations, uint32_t workers, sonde_press **crew,
+sonde_status sonde_press_pool_create(const sonde_model *model, double relative_residual,
+                                     uint32_t max_iterations, uint32_t workers, sonde_press **pool,
                                      sonde_error *error);
-void sonde_press_crew_destroy(sonde_press *crew, uint32_t workers);
+void sonde_press_pool_destroy(sonde_press *pool, uint32_t workers);
 
 // A footprint bonded to the skin at a site. With a shear layer the skin is cut along the
 // footprint's sides, so that the forces do not depend on where the sides fall between the nodes;

@@ -1,5 +1,5 @@
 // Profile of the cost over the stiffness of the shear layer.
-#include "fit/again.h"
+#include "fit/nearby_refit.h"
 #include "sonde/fit_confidence.h"
 
 #include "base/maths.h"
@@ -13,7 +13,7 @@ static const double DISTANCE[MIDDLE] = {0.75, 1.5, 2.25, 3};
 static const double ENOUGH = 2e-5; // rises of a few in a cost of many hundreds are asked for
 
 typedef struct profiler {
-  sonde_again *again;
+  sonde_nearby_refit *again;
   const sonde_progress *progress;
   bool *fixed;
   double *optimum, *along; // [parameters] and their change per ln G with all else refitted
@@ -30,7 +30,7 @@ static sonde_status walk(profiler *p, int side, sonde_fit_profile *profile, sond
     for (uint32_t i = 0; i < n; ++i) p->again->theta[i] += move * p->along[i];
     p->again->theta[n - 2] = ln_shear;
     sonde_refit_result found;
-    status = sonde_again_run(p->again, p->progress, &found, error);
+    status = sonde_nearby_refit_run(p->again, p->progress, &found, error);
     int at = MIDDLE + side * (k + 1);
     SONDE_ASSERT(at >= 0 && at < SONDE_FIT_PROFILE);
     profile->shear_n_m[at] = exp(ln_shear);
@@ -45,9 +45,10 @@ sonde_status sonde_fit_profile_shear(const sonde_model *model, const sonde_site_
                                      const sonde_fit_def *def, const sonde_fit_result *result,
                                      const sonde_progress *progress, sonde_fit_profile *profile,
                                      sonde_error *error) {
-  sonde_again again;
+  sonde_nearby_refit again;
   *profile = (sonde_fit_profile){0};
-  sonde_status status = sonde_again_create(model, sites, measurements, def, result, &again, error);
+  sonde_status status =
+      sonde_nearby_refit_create(model, sites, measurements, def, result, &again, error);
   if (status) return status;
   profiler p = {.again = &again,
                 .progress = progress,
@@ -61,13 +62,13 @@ sonde_status sonde_fit_profile_shear(const sonde_model *model, const sonde_site_
   sonde_refit_result found;
   again.refit->near = true;
   again.refit->enough = ENOUGH;
-  if (!status) status = sonde_again_run(&again, progress, &found, error);
-  if (!status && !sonde_again_factor(&again))
+  if (!status) status = sonde_nearby_refit_run(&again, progress, &found, error);
+  if (!status && !sonde_nearby_refit_factor(&again))
     status = sonde_fail(error, SONDE_CONVERGENCE, "the parameters are not determined by the data");
   if (!status) {
     memcpy(p.optimum, again.theta, n * sizeof *p.optimum);
     p.along[n - 2] = 1;
-    double variance = sonde_again_spread(&again, p.along);
+    double variance = sonde_nearby_refit_spread(&again, p.along);
     for (uint32_t k = 0; k < n; ++k) p.along[k] = again.step[k] / variance;
     p.cost = found.cost;
     profile->count = SONDE_FIT_PROFILE;
@@ -97,6 +98,6 @@ sonde_status sonde_fit_profile_shear(const sonde_model *model, const sonde_site_
   sonde_free(p.fixed);
   sonde_free(p.optimum);
   sonde_free(p.along);
-  sonde_again_clear(&again);
+  sonde_nearby_refit_clear(&again);
   return status;
 }

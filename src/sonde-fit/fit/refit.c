@@ -63,8 +63,9 @@ static sonde_status settle_datum(const sonde_refit *r, sonde_patch_solver *solve
   return status;
 }
 
-// First to the model's nodes, then by the basis to all sites at once.
-static void carry_to_sites(const sonde_refit *r, const sonde_patch *patch,
+// Derivatives by the parameters of places become those of nodes, then by the kriging basis those of
+// all sites.
+static void sum_over_sites(const sonde_refit *r, const sonde_patch *patch,
                            sonde_refit_worker *worker, double *row) {
   uint32_t count = r->sites->count, fields = r->fields;
   const sonde_patch_gradient *gradient = &worker->gradient;
@@ -102,8 +103,8 @@ static sonde_status work_on_curve(void *user, uint32_t worker, uint32_t curve,
   sonde_refit *r = at->refit;
   SONDE_ASSERT(curve < r->plan->curve_count && worker < r->workers);
   const sonde_patch *patch = &r->patch[curve];
-  sonde_patch_solver *solver = &r->crew[worker].solver;
-  sonde_refit_worker *me = &r->crew[worker];
+  sonde_patch_solver *solver = &r->pool[worker].solver;
+  sonde_refit_worker *me = &r->pool[worker];
   uint32_t parameters = sonde_refit_parameters(r);
   depth_before before = {0};
   bool rough = r->rough && at->jacobian;
@@ -131,7 +132,7 @@ static sonde_status work_on_curve(void *user, uint32_t worker, uint32_t curve,
                         r->plan->probe[r->plan->curve_probe[curve]], inner.message);
     if (at->jacobian && r->offsets)
       r->offsets->slope_n_m[k] = sonde_patch_stiffness(solver, solver->multiplier);
-    if (at->jacobian) carry_to_sites(r, patch, me, at->jacobian + (size_t)k * parameters);
+    if (at->jacobian) sum_over_sites(r, patch, me, at->jacobian + (size_t)k * parameters);
     before = (depth_before){s, depth, at->jacobian != NULL};
   }
   return SONDE_OK;
@@ -204,23 +205,23 @@ void sonde_refit_start(const sonde_refit *r, const sonde_curve_fit *curves, doub
 
 // ---- creation -----------------------------------------------------------------------------
 
-static sonde_status create_crew(sonde_refit *r, uint32_t threads, sonde_error *error) {
+static sonde_status create_pool(sonde_refit *r, uint32_t threads, sonde_error *error) {
   uint32_t curves = r->plan->curve_count, places = 0, nodes = 0;
   r->workers = sonde_parallel_workers(threads, curves);
-  r->crew = SONDE_NEW(sonde_refit_worker, r->workers);
-  if (!r->crew) return sonde_fail_memory(error);
+  r->pool = SONDE_NEW(sonde_refit_worker, r->workers);
+  if (!r->pool) return sonde_fail_memory(error);
   for (uint32_t c = 0; c < curves; ++c) {
     if (r->patch[c].place_count > places) places = r->patch[c].place_count;
     if (r->patch[c].node_count > nodes) nodes = r->patch[c].node_count;
   }
   for (uint32_t w = 0; w < r->workers; ++w) {
-    sonde_status status = sonde_patch_solver_create(r->patch, curves, &r->crew[w].solver, error);
+    sonde_status status = sonde_patch_solver_create(r->patch, curves, &r->pool[w].solver, error);
     if (status) return status;
-    r->crew[w].by_node = SONDE_NEW(double, (size_t)nodes * r->fields);
-    r->crew[w].basis = SONDE_NEW(double, (size_t)nodes * r->sites->count);
-    if (!r->crew[w].by_node || !r->crew[w].basis) return sonde_fail_memory(error);
+    r->pool[w].by_node = SONDE_NEW(double, (size_t)nodes * r->fields);
+    r->pool[w].basis = SONDE_NEW(double, (size_t)nodes * r->sites->count);
+    if (!r->pool[w].by_node || !r->pool[w].basis) return sonde_fail_memory(error);
     for (int f = 0; f < 4; ++f)
-      if (!(r->crew[w].gradient.by_place[f] = SONDE_NEW(double, places)))
+      if (!(r->pool[w].gradient.by_place[f] = SONDE_NEW(double, places)))
         return sonde_fail_memory(error);
   }
   return SONDE_OK;
@@ -277,7 +278,7 @@ sonde_status sonde_refit_create(const sonde_model *model, const sonde_site_table
     places += r->patch[plan->row_curve[k]].place_count;
   }
   if (!status && !(r->indentation_m = SONDE_NEW(double, places))) status = sonde_fail_memory(error);
-  if (!status) status = create_crew(r, def->threads, error);
+  if (!status) status = create_pool(r, def->threads, error);
   if (!status) return SONDE_OK;
   sonde_refit_destroy(r);
   *refit = NULL;
@@ -287,13 +288,13 @@ sonde_status sonde_refit_create(const sonde_model *model, const sonde_site_table
 void sonde_refit_destroy(sonde_refit *r) {
   if (!r) return;
   for (uint32_t c = 0; r->patch && c < r->plan->curve_count; ++c) sonde_patch_clear(&r->patch[c]);
-  for (uint32_t w = 0; r->crew && w < r->workers; ++w) {
-    sonde_patch_solver_clear(&r->crew[w].solver);
-    sonde_free(r->crew[w].by_node);
-    sonde_free(r->crew[w].basis);
-    for (int f = 0; f < 4; ++f) sonde_free(r->crew[w].gradient.by_place[f]);
+  for (uint32_t w = 0; r->pool && w < r->workers; ++w) {
+    sonde_patch_solver_clear(&r->pool[w].solver);
+    sonde_free(r->pool[w].by_node);
+    sonde_free(r->pool[w].basis);
+    for (int f = 0; f < 4; ++f) sonde_free(r->pool[w].gradient.by_place[f]);
   }
-  sonde_free(r->crew);
+  sonde_free(r->pool);
   sonde_offsets_destroy(r->offsets);
   sonde_free(r->patch);
   sonde_free(r->basis);

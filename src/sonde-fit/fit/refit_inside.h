@@ -33,7 +33,7 @@ struct sonde_refit {
   uint8_t *settled;      // [row_count] its equilibrium is a start for the next call
   double *indentation_m; // equilibria of all rows
   uint32_t workers;
-  sonde_refit_worker *crew;
+  sonde_refit_worker *pool;
   sonde_smoothness smoothness;
   sonde_fit_confidence *confidence; // NULL: not wanted
   sonde_offsets *offsets;           // contact zero and tare of the curves; NULL: none

@@ -1,5 +1,5 @@
 // Refits from random starts: how far their ends lie apart.
-#include "fit/again.h"
+#include "fit/nearby_refit.h"
 #include "sonde/fit_confidence.h"
 
 #include "base/maths.h"
@@ -18,7 +18,7 @@ static double draw(range r, uint64_t seed, uint64_t counter) {
 }
 
 // theta holds the generic start.
-static void draw_start(const sonde_again *a, uint64_t seed, uint32_t number, double *theta) {
+static void draw_start(const sonde_nearby_refit *a, uint64_t seed, uint32_t number, double *theta) {
   uint32_t n = a->parameters, sites = a->refit->sites->count;
   uint64_t counter = (uint64_t)number * (n + 2);
   double deepest = 0;
@@ -43,9 +43,10 @@ sonde_status sonde_fit_random_starts(const sonde_model *model, const sonde_site_
                                      const sonde_fit_def *def, const sonde_fit_result *result,
                                      uint32_t count, uint64_t seed, const sonde_progress *progress,
                                      sonde_fit_starts *starts, sonde_error *error) {
-  sonde_again again;
+  sonde_nearby_refit again;
   *starts = (sonde_fit_starts){.least_cost = INFINITY, .most_cost = -INFINITY};
-  sonde_status status = sonde_again_create(model, sites, measurements, def, result, &again, error);
+  sonde_status status =
+      sonde_nearby_refit_create(model, sites, measurements, def, result, &again, error);
   if (status) return status;
   double *sd = SONDE_NEW(double, again.parameters), *row = SONDE_NEW(double, again.parameters);
   if (!sd || !row) status = sonde_fail_memory(error);
@@ -53,13 +54,13 @@ sonde_status sonde_fit_random_starts(const sonde_model *model, const sonde_site_
   // Standard deviations of the parameters by themselves, from the curvature at the optimum.
   sonde_refit_result found;
   again.refit->near = true;
-  if (!status) status = sonde_again_run(&again, progress, &found, error);
-  if (!status && !sonde_again_factor(&again))
+  if (!status) status = sonde_nearby_refit_run(&again, progress, &found, error);
+  if (!status && !sonde_nearby_refit_factor(&again))
     status = sonde_fail(error, SONDE_CONVERGENCE, "the parameters are not determined by the data");
   for (uint32_t k = 0; k < again.parameters && !status; ++k) {
     memset(row, 0, again.parameters * sizeof *row);
     row[k] = 1;
-    sd[k] = sqrt(sonde_again_spread(&again, row));
+    sd[k] = sqrt(sonde_nearby_refit_spread(&again, row));
   }
   memcpy(again.optimum, again.theta, again.parameters * sizeof *again.theta);
   again.refit->near = false;
@@ -67,7 +68,7 @@ sonde_status sonde_fit_random_starts(const sonde_model *model, const sonde_site_
     sonde_refit_start(again.refit, result->curves, again.theta);
     draw_start(&again, seed, k, again.theta);
     sonde_refit_forget(again.refit);
-    status = sonde_again_run(&again, progress, &found, error);
+    status = sonde_nearby_refit_run(&again, progress, &found, error);
     if (status && status != SONDE_CONVERGENCE) break;
     starts->count++;
     bool failed = status || !found.converged;
@@ -86,6 +87,6 @@ sonde_status sonde_fit_random_starts(const sonde_model *model, const sonde_site_
   }
   sonde_free(sd);
   sonde_free(row);
-  sonde_again_clear(&again);
+  sonde_nearby_refit_clear(&again);
   return status;
 }

@@ -200,7 +200,7 @@ sonde_status sonde_robot_run(const sonde_model *model, const sonde_site_table *s
   }
   for (uint32_t i = 0; i < sites->count && !status; ++i) r.visits[i].site = sites->sites[i].id;
   if (!status && !r.bonded)
-    status = sonde_press_crew_create(model, def->relative_residual, def->max_iterations, workers,
+    status = sonde_press_pool_create(model, def->relative_residual, def->max_iterations, workers,
                                      &r.press, error);
   if (!status)
     status =
@@ -214,7 +214,7 @@ sonde_status sonde_robot_run(const sonde_model *model, const sonde_site_table *s
       r.visits = NULL;
     }
   }
-  sonde_press_crew_destroy(r.press, workers);
+  sonde_press_pool_destroy(r.press, workers);
   sonde_probe_clear(&r.probe);
   sonde_free(r.row);
   sonde_free(r.visits);

@@ -1,5 +1,5 @@
 // A refit that runs again from another point, and the variances at its end.
-#include "fit/again.h"
+#include "fit/nearby_refit.h"
 #include "fit/refit_offset.h"
 #include "sparse/dense.h"
 
@@ -7,11 +7,11 @@
 
 #include <string.h>
 
-sonde_status sonde_again_create(const sonde_model *model, const sonde_site_table *sites,
-                                const sonde_measurements *m, const sonde_fit_def *def,
-                                const sonde_fit_result *result, sonde_again *a,
-                                sonde_error *error) {
-  *a = (sonde_again){.def = sonde_fit_def_complete(def)};
+sonde_status sonde_nearby_refit_create(const sonde_model *model, const sonde_site_table *sites,
+                                       const sonde_measurements *m, const sonde_fit_def *def,
+                                       const sonde_fit_result *result, sonde_nearby_refit *a,
+                                       sonde_error *error) {
+  *a = (sonde_nearby_refit){.def = sonde_fit_def_complete(def)};
   if (!(result->law.shear_stiffness_n_m > 0) || !(result->confidence.smoothness_sd > 0))
     return sonde_fail(error, SONDE_ARGUMENT, "expected the result of stage 3");
   SONDE_ASSERT(result->site_count == sites->count);
@@ -33,7 +33,7 @@ sonde_status sonde_again_create(const sonde_model *model, const sonde_site_table
       status = sonde_fail_memory(error);
   }
   if (status) {
-    sonde_again_clear(a);
+    sonde_nearby_refit_clear(a);
     return status;
   }
   // The result is the optimum, in logarithms, and the start.
@@ -52,7 +52,7 @@ sonde_status sonde_again_create(const sonde_model *model, const sonde_site_table
   return SONDE_OK;
 }
 
-void sonde_again_clear(sonde_again *a) {
+void sonde_nearby_refit_clear(sonde_nearby_refit *a) {
   sonde_refit_destroy(a->refit);
   sonde_fit_plan_clear(&a->plan);
   sonde_normal_free(&a->curvature);
@@ -62,21 +62,21 @@ void sonde_again_clear(sonde_again *a) {
   sonde_free(a->force_n);
   sonde_free(a->left_out);
   sonde_free(a->factor);
-  *a = (sonde_again){0};
+  *a = (sonde_nearby_refit){0};
 }
 
-sonde_status sonde_again_run(sonde_again *a, const sonde_progress *progress,
-                             sonde_refit_result *found, sonde_error *error) {
+sonde_status sonde_nearby_refit_run(sonde_nearby_refit *a, const sonde_progress *progress,
+                                    sonde_refit_result *found, sonde_error *error) {
   a->refit->curvature = &a->curvature;
   return sonde_refit_minimise(a->refit, a->theta, a->force_n, progress, found, error);
 }
 
-bool sonde_again_factor(sonde_again *a) {
+bool sonde_nearby_refit_factor(sonde_nearby_refit *a) {
   memcpy(a->factor, a->curvature.matrix, (size_t)a->parameters * a->parameters * sizeof *a->factor);
   return sonde_cholesky(a->factor, a->parameters);
 }
 
-double sonde_again_spread(sonde_again *a, const double *row) {
+double sonde_nearby_refit_spread(sonde_nearby_refit *a, const double *row) {
   double variance = 0;
   memcpy(a->step, row, a->parameters * sizeof *row);
   sonde_cholesky_solve(a->factor, a->parameters, a->step);
