@@ -154,9 +154,11 @@ static bool read_value(const app_option *o, const char *text, void *options) {
 // ---- rules
 
 // Calls for each name of a list with blanks; "device>haptics" is handed on as it is.
+// NOLINTBEGIN(bugprone-macro-parentheses): names of variables that the macro defines
 #define EACH_NAME(p, length, list)                                                                 \
   for (const char *p = (list) ? (list) : ""; *p; p += strspn(p, " "))                              \
     for (size_t length = strcspn(p, " "); length; p += length, length = 0)
+// NOLINTEND(bugprone-macro-parentheses)
 
 static bool given_name(const char *name, size_t length) {
   int k = find_name(name, length);
