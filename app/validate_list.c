@@ -39,7 +39,8 @@ bool validate_end(const validate_list *l) {
                m->target, m->pass);
       app_json_close();
     }
-    app_json("passed:%u failed:%u pass:%hhd", l->count - l->failed, l->failed, l->failed == 0);
+    const bool pass = l->failed == 0;
+    app_json("passed:%u failed:%u pass:%hhd", l->count - l->failed, l->failed, pass);
     app_json_end();
   } else
     printf("%d passed, %d failed\n", l->count - l->failed, l->failed);

@@ -172,7 +172,7 @@ static void write_both(uint64_t *r, sonde_json_out *out, const char *key, cJSON 
     sonde_json_put_text(out, key, random_text(r, text)), item = cJSON_CreateString(text);
     break;
   case 3:
-    number = (double)(int32_t)number;
+    number = (double)(int32_t)fmax(INT32_MIN, fmin(INT32_MAX, number));
     sonde_json_put_integer(out, key, (int64_t)number), item = cJSON_CreateNumber(number);
     break;
   case 4: sonde_json_put_real(out, key, number, 0), item = cJSON_CreateNumber(number); break;

@@ -321,7 +321,8 @@ sonde_status sonde_scene_parse(const char *text, const char *name, const char *t
     read_scene(&source, scene);
     status = sonde_reader_status(source.reader, error);
     // A rigid body has two slots, its velocity and its spin; a deformable one has a slot per node.
-    for (sonde_body *b = scene->bodies; b < scene->bodies + scene->body_count && !status; ++b) {
+    for (uint32_t k = 0; k < scene->body_count && !status; ++k) {
+      sonde_body *b = &scene->bodies[k];
       b->first_slot = scene->slot_count;
       b->slot_count = sonde_body_is_rigid(b) ? 2 : b->node_count;
       b->first_pair = scene->pair_count;

@@ -32,7 +32,8 @@ void sonde_block_multiply(const sonde_block_matrix *matrix, const sonde_active_s
     y[j].z += b[0][2] * xi.x + b[1][2] * xi.y + b[2][2] * xi.z;
   }
   // Rank-one terms.
-  for (const sonde_rank_one *term = terms; term < terms + term_count; ++term) {
+  for (uint32_t t = 0; t < term_count; ++t) {
+    const sonde_rank_one *term = &terms[t];
     double projection = 0;
     for (uint32_t k = 0; k < term->count; ++k) projection += v_dot(term->g[k], x[term->rows[k]]);
     projection *= term->scale;
