@@ -26,6 +26,15 @@ const FIGURE = /<!--([a-z]\w*(?:\.\w+)+) (\d)-->(.*?)<!---->/gs
 
 const run = (bin, program, ...options) =>
   execFileSync(join(bin, program), options, { encoding: 'utf8', cwd: HOME, maxBuffer: 1 << 26 })
+// Output of a program that ends with 1 when it found what it looks for.
+const found = (bin, program, ...options) => {
+  try {
+    return run(bin, program, ...options)
+  } catch (failed) {
+    if (failed.status !== 1) throw failed
+    return failed.stdout
+  }
+}
 const spread = (runs, of) => {
   const all = runs.map(of).sort((a, b) => a - b)
   return { least: all[0], median: all[all.length >> 1], most: all[all.length - 1] }
@@ -76,7 +85,14 @@ const GROUPS = {
   },
   // Programs that print tables; the documents show what they print.
   solver: { sources: [...engine, 'bench/bench_solver.c'], measure: bin => ({ output: run(bin, 'bench_solver') }) },
-  sweep: { sources: [...engine, 'bench/bench_sweep.c'], measure: bin => ({ output: summary(run(bin, 'bench_sweep')), once: summary(run(bin, 'bench_sweep', '3', '1')) }) },
+  sweep: {
+    sources: [...engine, 'bench/bench_sweep.c'],
+    measure(bin) {
+      const counts = text => text.match(/(\d+) runs, (\d+) blew up/).slice(1).map(Number)
+      const [runs, twice] = counts(found(bin, 'bench_sweep', '3', '2')), [, once] = counts(found(bin, 'bench_sweep', '3', '1'))
+      return { runs, blew_up: { newton_2: twice, newton_1: once } }
+    },
+  },
   accuracy: { sources: [...engine, 'bench/bench_accuracy.c'], measure: bin => ({ output: run(bin, 'bench_accuracy', '1962') }) },
   step: {
     sources: [...engine, 'src/sonde/haptics'],
@@ -138,13 +154,7 @@ const GROUPS = {
     measure(bin) {
       const sum = { pictures: 0, folded: 0, points: 0, folded_points: 0, inverses: 0, lost: 0, misfits: 0, most_n: 0 }
       for (const seed of ['1', '2', '3']) {
-        let text
-        try {
-          text = run(bin, 'bench_hostile', 'data/cases', '1', seed)
-        } catch (failed) {
-          if (failed.status !== 1) throw failed // 1: it ran and found folds
-          text = failed.stdout
-        }
+        const text = found(bin, 'bench_hostile', 'data/cases', '1', seed)
         const [, pictures, force, folded] = /(\d+) pictures, force to ([\d.]+) N: (\d+) folded/.exec(text).map(Number)
         const [, foldedPoints, points] = /(\d+) of (\d+) points folded/.exec(text).map(Number)
         const [, lost, inverses] = /(\d+) of (\d+) inverses off/.exec(text).map(Number)
@@ -155,11 +165,6 @@ const GROUPS = {
       return sum
     },
   },
-}
-
-// The last line of a program that prints a table.
-function summary(text) {
-  return text.trim().split('\n').at(-1)
 }
 
 const table = (head, rows) =>
