@@ -81,7 +81,12 @@ const GROUPS = {
   },
   operators: {
     sources: ['src/sonde-exam', 'src/sonde/interior', ...engine, 'data/cases', 'data/protocols'],
-    measure: bin => json(bin, 'exam', '--compare', '--protocol', 'three_point', '-o', mkdtempSync(join(tmpdir(), 'sonde-figures-'))),
+    measure(bin) {
+      const values = json(bin, 'exam', '--compare', '--protocol', 'three_point', '-o', mkdtempSync(join(tmpdir(), 'sonde-figures-')))
+      const operators = ['expert', 'novice', 'timid', 'forceful'] // `passed` of one is a share
+      values.passed = Object.fromEntries(operators.map(name => [name, Math.round(values[name].passed * values.cases)]))
+      return values
+    },
   },
   // Programs that print tables; the documents show what they print.
   solver: { sources: [...engine, 'bench/bench_solver.c'], measure: bin => ({ output: run(bin, 'bench_solver') }) },
