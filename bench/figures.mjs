@@ -83,21 +83,13 @@ const GROUPS = {
     sources: ['src/sonde-exam', 'src/sonde/interior', ...engine, 'data/cases', 'data/protocols'],
     measure(bin) {
       const values = json(bin, 'exam', '--compare', '--protocol', 'three_point', '-o', mkdtempSync(join(tmpdir(), 'sonde-figures-')))
-      const operators = ['expert', 'novice', 'timid', 'forceful'] // `passed` of one is a share
-      values.passed = Object.fromEntries(operators.map(name => [name, Math.round(values[name].passed * values.cases)]))
+      const operators = ['expert', 'novice', 'timid', 'forceful']
+      values.passed = Object.fromEntries(operators.map(name => [name, values[name].passed]))
       return values
     },
   },
   // Programs that print tables; the documents show what they print.
   solver: { sources: [...engine, 'bench/bench_solver.c'], measure: bin => ({ output: run(bin, 'bench_solver') }) },
-  sweep: {
-    sources: [...engine, 'bench/bench_sweep.c'],
-    measure(bin) {
-      const counts = text => text.match(/(\d+) runs, (\d+) blew up/).slice(1).map(Number)
-      const [runs, twice] = counts(found(bin, 'bench_sweep', '3', '2')), [, once] = counts(found(bin, 'bench_sweep', '3', '1'))
-      return { runs, blew_up: { newton_2: twice, newton_1: once } }
-    },
-  },
   accuracy: { sources: [...engine, 'bench/bench_accuracy.c'], measure: bin => ({ output: run(bin, 'bench_accuracy', '1962') }) },
   step: {
     sources: [...engine, 'src/sonde/haptics'],
