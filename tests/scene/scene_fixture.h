@@ -45,6 +45,18 @@ static inline sonde_body_measure measure(const world *w, const char *name) {
   return sonde_scene_measure(w->state, body);
 }
 
+// Of all bodies and of all contacts (J).
+static inline double total_energy(const world *w) {
+  double sum = 0;
+  for (uint32_t b = 0; b < sonde_scene_body_count(w->scene); ++b) {
+    sonde_body_measure m = sonde_scene_measure(w->state, b);
+    sum += m.kinetic_j + m.elastic_j + m.gravity_j;
+  }
+  for (uint32_t p = 0; p < sonde_scene_pair_count(w->scene); ++p)
+    sum += sonde_scene_pair_measure(w->state, p).energy_j;
+  return sum;
+}
+
 static inline void assert_unflagged(const world *w) {
   assert_int_equal(sonde_scene_all_flags(w->state), 0);
 }

@@ -74,6 +74,8 @@ typedef struct sonde_overlap_config {
    * UINT32_MAX makes none. Default 3.
    */
   uint32_t points_per_piece;
+  /** The largest bodies that will be compared; default those of the trees at creation. */
+  uint32_t max_faces, max_vertices;
 } sonde_overlap_config;
 
 /** Something did not fit: what is beyond the room is left out of the result. */
@@ -127,15 +129,19 @@ typedef struct sonde_overlap_result {
 } sonde_overlap_result;
 
 typedef struct sonde_overlap sonde_overlap;
-/** @param a,b trees of the two bodies, for their sizes only @thread owner */
+/**
+ * One overlap serves any number of pairs, one after the other.
+ * @param a,b trees of two bodies, for their sizes only
+ * @thread owner
+ */
 sonde_status sonde_overlap_create(const sonde_face_tree *a, const sonde_face_tree *b,
                                   const sonde_overlap_config *config, sonde_overlap **overlap,
                                   sonde_error *error);
 void sonde_overlap_destroy(sonde_overlap *overlap); /**< @thread owner */
 /**
- * Common volume of the bodies at the positions of their trees. Exact for closed outward meshes,
- * concave or not. With face i of A and j of B that cover each other along k, s = +1 for a face that
- * looks along k and -1 for one that looks back,
+ * Common volume of two bodies within its room at the positions of their trees. Exact for closed
+ * outward meshes, concave or not. With face i of A and j of B that cover each other along k, s = +1
+ * for a face that looks along k and -1 for one that looks back,
  *
  *     V = - sum over i, j of s_i s_j * integral over the overlap of max(0, z_i - z_j)
  *

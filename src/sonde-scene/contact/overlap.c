@@ -9,7 +9,7 @@ static size_t lay_out(sonde_overlap *overlap, char *base) {
   size_t offset = 0, nodes = 0;
   for (int side = 0; side < 2; ++side) {
     overlap_body *b = &overlap->body[side];
-    size_t faces = b->face_count, vertices = b->vertex_count;
+    size_t faces = b->face_room, vertices = b->vertex_room;
     nodes += vertices;
     CARVE(b->face_stamp, faces);
     CARVE(b->net, faces);
@@ -60,9 +60,11 @@ sonde_status sonde_overlap_create(const sonde_face_tree *a, const sonde_face_tre
   overlap->config = full;
   for (int side = 0; side < 2; ++side) {
     const sonde_face_tree *tree = side ? b : a;
-    overlap->body[side].vertex_count = tree->vertex_count;
-    overlap->body[side].face_count = tree->face_count;
-    overlap->body[side].entry_room = 2 * tree->vertex_count + 16 * full.max_regions;
+    overlap_body *body = &overlap->body[side];
+    bool more = full.max_vertices > tree->vertex_count;
+    body->vertex_room = more ? full.max_vertices : tree->vertex_count;
+    body->face_room = full.max_faces > tree->face_count ? full.max_faces : tree->face_count;
+    body->entry_room = 2 * body->vertex_room + 16 * full.max_regions;
   }
   overlap->block = sonde_calloc(1, lay_out(overlap, NULL));
   if (!overlap->block) {

@@ -45,22 +45,22 @@ typedef struct piece {
 
 // What one body keeps per face and per vertex; rows are valid where the stamp is the present one.
 typedef struct overlap_body {
-  uint32_t vertex_count, face_count;
+  uint32_t vertex_room, face_room;
   const sonde_face_tree *tree;
-  uint64_t *face_stamp;  // [face_count]
-  double *net, *scale;   // [face_count] covered area inside the other body; size^2 of the face
-  uint32_t (*corner)[3]; // [face_count]
-  sonde_vec3 *area_per_shadow; // [face_count] n dA per area seen along k
-  uint32_t *region;            // [face_count] SONDE_NO_REGION when not touched
+  uint64_t *face_stamp;        // [faces]
+  double *net, *scale;         // [faces] covered area inside the other body; size^2 of the face
+  uint32_t (*corner)[3];       // [faces]
+  sonde_vec3 *area_per_shadow; // [faces] n dA per area seen along k
+  uint32_t *region;            // [faces] SONDE_NO_REGION when not touched
   uint32_t *seen, seen_count;  // faces with a valid row
-  uint64_t *vertex_stamp;      // [vertex_count]
-  sonde_vec3 *gradient;        // [vertex_count] of the region at work
-  uint32_t *touched;           // [vertex_count] vertices of the region at work
+  uint64_t *vertex_stamp;      // [vertices]
+  sonde_vec3 *gradient;        // [vertices] of the region at work
+  uint32_t *touched;           // [vertices] vertices of the region at work
   uint32_t *order;             // [max_pieces] pieces by the region of this side
   uint32_t *first;             // [max_regions + 2] rows of order
   sonde_overlap_entry *entries;
   uint32_t entry_room, entry_count;
-  uint32_t *counted; // [face_count] last region that counted the face
+  uint32_t *counted; // [faces] last region that counted the face
 } overlap_body;
 
 #define SONDE_NO_REGION UINT32_MAX

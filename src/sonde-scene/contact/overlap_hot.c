@@ -9,7 +9,7 @@ static const double tilts[][2] = {
 static void see_row(sonde_overlap *overlap, int side, const view *w, const seen_face *face) {
   overlap_body *b = &overlap->body[side];
   uint32_t f = face->face;
-  SONDE_ASSERT(f < b->face_count);
+  SONDE_ASSERT(f < b->face_room);
   if (b->face_stamp[f] == overlap->stamp) return;
   b->face_stamp[f] = overlap->stamp;
   b->net[f] = 0;
@@ -59,8 +59,10 @@ static void forget(sonde_overlap *overlap) {
 
 bool sonde_overlap_compute(sonde_overlap *overlap, const sonde_face_tree *a,
                            const sonde_face_tree *b, sonde_vec3 hint) {
-  SONDE_ASSERT(overlap != NULL && a->face_count == overlap->body[0].face_count);
-  SONDE_ASSERT(b->face_count == overlap->body[1].face_count);
+  SONDE_ASSERT(overlap != NULL && a->face_count <= overlap->body[0].face_room);
+  SONDE_ASSERT(a->vertex_count <= overlap->body[0].vertex_room);
+  SONDE_ASSERT(b->face_count <= overlap->body[1].face_room);
+  SONDE_ASSERT(b->vertex_count <= overlap->body[1].vertex_room);
   overlap->result.box_tests = overlap->result.face_pairs = 0;
   overlap->body[0].tree = a;
   overlap->body[1].tree = b;

@@ -36,7 +36,7 @@ static void sort(uint32_t *list, uint32_t count) {
 }
 
 static uint32_t node_of(const sonde_overlap *overlap, int side, uint32_t vertex) {
-  return side ? overlap->body[0].vertex_count + vertex : vertex;
+  return side ? overlap->body[0].vertex_room + vertex : vertex;
 }
 
 static bool touched(const sonde_overlap *overlap, int side, uint32_t face) {

@@ -11,6 +11,8 @@
 #include "base/maths.h"
 #include "contact/tree.h"
 
+#include <string.h>
+
 // The most that a pair may move as announced, and as made, in thicknesses.
 static const double PLANNED = 0.5, MADE = 1;
 enum { CUTS = 12 }; // no step is cut below h/2^CUTS
@@ -68,24 +70,26 @@ static sonde_bounds made(const sonde_scene_state *state, uint32_t b) {
   return displacements;
 }
 
-static sonde_bounds bounds_of(const sonde_scene_state *state, const sonde_scene_motion *at,
-                              uint32_t b) {
+// Made at the first question after cast_known was cleared.
+static sonde_bounds bounds_of(sonde_scene_state *state, const sonde_scene_motion *at, uint32_t b) {
   const sonde_mesh *mesh = &state->scene->bodies[b].surface;
+  if (state->cast_known[b]) return state->cast_box[b];
   sonde_vec3 *surface = state->surface + state->surface_first[b];
   SONDE_ASSERT(mesh->vertex_count > 0);
   if (state->scene->bodies[b].motion != SONDE_BODY_FIXED)
     sonde_surface_at(state, b, at->position, at->rotation, surface);
   sonde_bounds box = {surface[0], surface[0]};
   for (uint32_t i = 1; i < mesh->vertex_count; ++i) box = bounds_add(box, surface[i]);
-  return box;
+  state->cast_known[b] = true;
+  return state->cast_box[b] = box;
 }
 
 // Share of the displacements that all pairs may make: to where their boxes meet and a thickness
 // further.
-static double safe_share(const sonde_scene_state *state, const sonde_scene_motion *from,
-                         double allowed) {
+static double safe_share(sonde_scene_state *state, const sonde_scene_motion *from, double allowed) {
   const sonde_scene *scene = state->scene;
   double share = 1;
+  memset(state->cast_known, 0, scene->body_count * sizeof *state->cast_known);
   for (uint32_t t = 0; t < scene->touch_count; ++t) {
     uint32_t a = scene->touches[t].a, b = scene->touches[t].b;
     // The longest displacement is that of a point of a as a point of b sees it.

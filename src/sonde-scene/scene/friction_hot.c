@@ -16,13 +16,14 @@ static sonde_vec3 across(sonde_vec3 a, sonde_vec3 n) { return v_madd(a, -v_dot(a
 
 void sonde_grip_begin(sonde_scene_state *state, sonde_grip *grip) {
   const sonde_touch *touch = &state->scene->touches[grip->touch];
-  if (!(touch->mu_static > 0)) return;
+  if (!grip->bonded) return;
   sonde_vec3 displacement = vec3(0, 0, 0);
   double slip = 0;
   for (int k = 0; k < 3; ++k) {
-    SONDE_ASSERT(grip->bond[k] < state->bond_count);
-    displacement = v_madd(displacement, grip->bond_weight[k], state->now.bond[grip->bond[k]]);
-    slip += grip->bond_weight[k] * state->now.slip[grip->bond[k]];
+    SONDE_ASSERT(grip->bond[k] < state->now.head->bond_count);
+    const sonde_bond *bond = &state->now.bond[grip->bond[k]];
+    displacement = v_madd(displacement, grip->bond_weight[k], bond->displacement);
+    slip += grip->bond_weight[k] * bond->slip_m_s;
   }
   grip->displacement = across(displacement, grip->normal);
   // The coefficient falls from static to kinetic along Stribeck's curve.
@@ -36,7 +37,7 @@ void sonde_grip_evaluate(sonde_scene_state *state, sonde_grip *grip, double move
   grip->term_count = 0;
   grip->force = vec3(0, 0, 0);
   double push = state->pushes[grip->push].force * grip->share;
-  if (!(touch->mu_static > 0) || !(push > 0)) return;
+  if (!grip->bonded || !(push > 0)) return;
   double stiffness = push * touch->mu_static / touch->bond_m;
   double damper = stiffness * touch->bond_damping_s;
   sonde_vec3 slip = across(sonde_grip_slip(state, grip, state->stage_velocity), grip->normal);
@@ -78,16 +79,56 @@ void sonde_grip_predict(sonde_scene_state *state, sonde_grip *grip) {
   }
 }
 
+static uint32_t bonds_per_touch(const sonde_scene *scene, uint32_t t) {
+  const sonde_touch *touch = &scene->touches[t];
+  return scene->bodies[touch->bond_side ? touch->b : touch->a].surface.vertex_count;
+}
+
+uint32_t sonde_bonds_of(sonde_scene_state *state, uint32_t t) {
+  sonde_scene_motion *now = &state->now;
+  SONDE_ASSERT(t < state->scene->touch_count);
+  if (now->bond_first[t]) return now->bond_first[t] - 1;
+  uint32_t count = bonds_per_touch(state->scene, t);
+  if (now->head->bond_count + count > state->bond_capacity) {
+    state->report.flags |= SONDE_SCENE_CONTACT_FULL;
+    return UINT32_MAX;
+  }
+  now->bond_first[t] = now->head->bond_count + 1;
+  now->head->bond_count += count;
+  return now->bond_first[t] - 1;
+}
+
+// Touches without a load lose their bonds; those of the others move together, in the order of the
+// touches.
+static void pack_bonds(sonde_scene_state *state) {
+  sonde_scene_motion *now = &state->now;
+  uint32_t used = 0, before = now->head->bond_count;
+  memcpy(state->bond_sum, now->bond, before * sizeof *now->bond);
+  for (uint32_t t = 0; t < state->scene->touch_count; ++t) {
+    if (!now->bond_first[t]) continue;
+    uint32_t first = now->bond_first[t] - 1, count = bonds_per_touch(state->scene, t);
+    bool held = false;
+    for (uint32_t i = first; i < first + count; ++i) held |= state->bond_load[i] > 0;
+    now->bond_first[t] = held ? used + 1 : 0;
+    if (!held) continue;
+    memcpy(now->bond + used, state->bond_sum + first, count * sizeof *now->bond);
+    used += count;
+  }
+  SONDE_ASSERT(used <= before);
+  memset(now->bond + used, 0, (before - used) * sizeof *now->bond);
+  now->head->bond_count = used;
+}
+
 void sonde_bonds_advance(sonde_scene_state *state, double h) {
   SONDE_ASSERT(h > 0);
-  memset(state->bond_load, 0, state->bond_count * sizeof *state->bond_load);
-  memset(state->slip_sum, 0, state->bond_count * sizeof *state->slip_sum);
-  memset(state->bond_sum, 0, state->bond_count * sizeof *state->bond_sum);
+  uint32_t count = state->now.head->bond_count;
+  memset(state->bond_load, 0, count * sizeof *state->bond_load);
+  memset(state->bond_sum, 0, count * sizeof *state->bond_sum);
   for (uint32_t k = 0; k < state->grip_count; ++k) {
     const sonde_grip *grip = &state->grips[k];
     double push = state->pushes[grip->push].end_force * grip->share;
     const sonde_touch *touch = &state->scene->touches[grip->touch];
-    if (!(touch->mu_static > 0 && push > 0)) continue;
+    if (!grip->bonded || !(push > 0)) continue;
     // The displacement at the end of the step is returned to where the bond holds; the rest has
     // slipped.
     sonde_vec3 slip = across(sonde_grip_slip(state, grip, state->mean_velocity), grip->normal);
@@ -100,15 +141,19 @@ void sonde_bonds_advance(sonde_scene_state *state, double h) {
       double load = push * fmax(grip->bond_weight[c], 0);
       uint32_t i = grip->bond[c];
       state->bond_load[i] += load;
-      state->slip_sum[i] += load * slipped / h;
-      state->bond_sum[i] = v_madd(state->bond_sum[i], load, gained);
+      sonde_bond *sum = &state->bond_sum[i];
+      sum->slip_m_s += load * slipped / h;
+      sum->displacement = v_madd(sum->displacement, load, gained);
     }
   }
-  for (uint32_t i = 0; i < state->bond_count; ++i) {
+  for (uint32_t i = 0; i < count; ++i) {
     double load = state->bond_load[i];
-    bool held = load > 0;
-    state->now.slip[i] = held ? state->slip_sum[i] / load : 0;
-    state->now.bond[i] =
-        held ? v_madd(state->now.bond[i], 1 / load, state->bond_sum[i]) : vec3(0, 0, 0);
+    sonde_bond *bond = &state->now.bond[i], *sum = &state->bond_sum[i];
+    if (load > 0)
+      *bond = (sonde_bond){v_madd(bond->displacement, 1 / load, sum->displacement),
+                           sum->slip_m_s / load};
+    else
+      *bond = (sonde_bond){{0, 0, 0}, 0};
   }
+  pack_bonds(state);
 }

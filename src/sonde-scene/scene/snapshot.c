@@ -8,7 +8,7 @@
 #include <string.h>
 
 static const char MAGIC[8] = "SONDESNP";
-enum { SNAPSHOT_VERSION = 2 };
+enum { SNAPSHOT_VERSION = 3 };
 
 typedef struct header {
   char magic[8];
@@ -24,11 +24,11 @@ sonde_status sonde_scene_state_save(const sonde_scene_state *state, const char *
   if (status) return status;
   header h = {.version = SNAPSHOT_VERSION,
               .scene = state->scene->checksum,
-              .bytes = state->now.bytes,
+              .bytes = sonde_scene_motion_bytes(&state->now),
               .hash = sonde_scene_hash(state)};
   memcpy(h.magic, MAGIC, sizeof h.magic);
   sonde_file_write(file, &h, sizeof h);
-  sonde_file_write(file, state->now.block, state->now.bytes);
+  sonde_file_write(file, state->now.block, sonde_scene_motion_bytes(&state->now));
   return sonde_file_commit(file, error);
 }
 
@@ -52,7 +52,7 @@ sonde_status sonde_scene_state_load(sonde_scene_state *state, const char *path,
   else if (h.version != SNAPSHOT_VERSION)
     status = sonde_fail(error, SONDE_VERSION, "%s: version %llu, expected %d", path,
                         (unsigned long long)h.version, SNAPSHOT_VERSION);
-  else if (h.scene != state->scene->checksum || h.bytes != state->now.bytes)
+  else if (h.scene != state->scene->checksum || h.bytes < state->now.fixed)
     status = sonde_fail(error, SONDE_MISMATCH, "%s: a snapshot of another scene", path);
   else if (count != sizeof h + h.bytes || sonde_hash(0, block, h.bytes) != h.hash)
     status = sonde_fail(error, SONDE_CHECKSUM, "%s: the snapshot is damaged", path);
@@ -60,20 +60,33 @@ sonde_status sonde_scene_state_load(sonde_scene_state *state, const char *path,
     // Numbers that no scene reaches would break what the steps rely on.
     const sonde_scene *scene = state->scene;
     const sonde_scene_motion *motion = &state->undo;
-    memcpy(state->undo.block, block, state->undo.bytes);
-    bool good = within(motion->position, scene->slot_count, SONDE_SCENE_REACH_M) &&
+    sonde_scene_motion_unbond(&state->undo);
+    memcpy(state->undo.block, block, state->undo.fixed);
+    bool room = motion->head->bond_count <= state->bond_capacity &&
+                h.bytes == sonde_scene_motion_bytes(motion);
+    if (room)
+      memcpy(state->undo.bond, block + motion->fixed, h.bytes - motion->fixed);
+    else
+      state->undo.head->bond_count = 0;
+    bool good = room && within(motion->position, scene->slot_count, SONDE_SCENE_REACH_M) &&
                 within(motion->velocity, scene->slot_count, SONDE_SCENE_FASTEST) &&
                 within(motion->increment, scene->slot_count, SONDE_SCENE_FASTEST) &&
                 within(motion->hint, scene->touch_count, 1 + 1e-6) &&
-                within(motion->bond, state->bond_count, SONDE_SCENE_REACH_M) &&
                 motion->head->level <= SONDE_SCENE_MOST_HALVINGS && motion->head->time_s >= 0 &&
                 motion->head->time_s <= SONDE_SCENE_LATEST_S;
     for (uint32_t k = 0; k < scene->body_count && good; ++k) {
       sonde_quat q = motion->rotation[k];
       good = fabs(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z - 1) <= 1e-6;
     }
-    for (uint32_t k = 0; k < state->bond_count && good; ++k)
-      good = motion->slip[k] >= 0 && motion->slip[k] <= SONDE_SCENE_FASTEST;
+    for (uint32_t k = 0; k < motion->head->bond_count && good; ++k)
+      good = v_norm(motion->bond[k].displacement) <= SONDE_SCENE_REACH_M &&
+             motion->bond[k].slip_m_s >= 0 && motion->bond[k].slip_m_s <= SONDE_SCENE_FASTEST;
+    for (uint32_t k = 0; k < scene->touch_count && good; ++k) {
+      const sonde_touch *touch = &scene->touches[k];
+      uint32_t bonds = scene->bodies[touch->bond_side ? touch->b : touch->a].surface.vertex_count;
+      uint64_t first = motion->bond_first[k];
+      good = !first || first - 1 + bonds <= motion->head->bond_count;
+    }
     if (!good)
       status = sonde_fail(error, SONDE_FORMAT,
                           "%s: expected positions within %g m, velocities within %g m/s and unit "

@@ -6,7 +6,18 @@
 
 #include <string.h>
 
-enum { POINTS_MOST = 32768, PIECES_MOST = 65536 };
+// Room for contact. All pairs of a few bodies may touch at once; among many bodies those that do
+// are shared a pool: a body meets about a dozen neighbours at most.
+enum {
+  POINTS_LEAST = 2048,
+  POINTS_MOST = 32768,
+  POINTS_PER_BODY = 512,
+  POINTS_LIMIT = 262144,
+  PIECES_LEAST = 4096,
+  PIECES_MOST = 65536,
+  REGIONS = 64,
+  NEIGHBOURS = 12
+};
 
 // Counts bytes while block is NULL, else hands out aligned parts of it.
 typedef struct carver {
@@ -30,9 +41,11 @@ static void lay_motion(const sonde_scene_state *state, carver *c, sonde_scene_mo
   CARVE(motion->increment, scene->slot_count);
   CARVE(motion->rotation, scene->body_count);
   CARVE(motion->hint, scene->touch_count);
-  CARVE(motion->bond, state->bond_count);
-  CARVE(motion->slip, state->bond_count);
+  CARVE(motion->bond_first, scene->touch_count);
   CARVE(motion->calm, scene->slot_count);
+  CARVE(motion->bond, 0);
+  motion->fixed = c->used;
+  CARVE(motion->bond, state->bond_capacity);
 }
 
 static void lay_arrays(sonde_scene_state *s, carver *c) {
@@ -62,28 +75,29 @@ static void lay_arrays(sonde_scene_state *s, carver *c) {
   CARVE(s->stage_rotation, bodies);
   CARVE(s->surface, s->surface_count);
   CARVE(s->surface_first, bodies);
-  CARVE(s->bond_first, touches);
   CARVE(s->inertia, bodies);
   CARVE(s->reach_m, bodies);
   CARVE(s->thickness_m, bodies);
   CARVE(s->displacement, bodies);
+  CARVE(s->cast_box, bodies);
+  CARVE(s->cast_known, bodies);
   CARVE(s->body_inverse, bodies);
   CARVE(s->part, bodies);
   CARVE(s->island, bodies);
   CARVE(s->loose, bodies);
   CARVE(s->tree, bodies);
-  CARVE(s->overlap, touches);
   CARVE(s->touch_of, bodies * bodies);
   CARVE(s->near, s->near_capacity);
+  CARVE(s->near_touch, touches);
+  CARVE(s->found_hint, touches);
   CARVE(s->bounds, bodies);
   CARVE(s->pushes, s->push_capacity);
   CARVE(s->grips, s->grip_capacity);
   CARVE(s->terms, s->term_capacity);
   CARVE(s->rows, s->row_capacity);
   CARVE(s->g, s->row_capacity);
-  CARVE(s->bond_load, s->bond_count);
-  CARVE(s->slip_sum, s->bond_count);
-  CARVE(s->bond_sum, s->bond_count);
+  CARVE(s->bond_load, s->bond_capacity);
+  CARVE(s->bond_sum, s->bond_capacity);
   CARVE(s->pair, touches);
 }
 
@@ -100,7 +114,8 @@ static sonde_status make_tree(sonde_scene_state *state, uint32_t b, sonde_error 
 static sonde_status allocate(sonde_scene_state *state, sonde_error *error) {
   // Room for contact: columns with a push and two tangents each, regions over all vertices twice.
   const sonde_scene *scene = state->scene;
-  uint32_t points = 0, bulk = 0;
+  uint64_t points = 0, bonds = 0;
+  uint32_t bulk = 0, bodies = scene->body_count;
   for (uint32_t b = 0; b < scene->body_count; ++b) {
     state->surface_count += scene->bodies[b].surface.vertex_count;
     bulk += scene->bodies[b].node_count;
@@ -108,27 +123,30 @@ static sonde_status allocate(sonde_scene_state *state, sonde_error *error) {
   for (uint32_t t = 0; t < scene->touch_count; ++t) {
     const sonde_body *a = &scene->bodies[scene->touches[t].a];
     const sonde_body *b = &scene->bodies[scene->touches[t].b];
-    uint32_t here = 16 * (a->surface.face_count + b->surface.face_count);
-    if (here > POINTS_MOST) here = POINTS_MOST;
-    points = points + here < POINTS_MOST ? points + here : POINTS_MOST;
-    state->bond_count += (scene->touches[t].bond_side ? b : a)->surface.vertex_count;
+    points += 16 * ((uint64_t)a->surface.face_count + b->surface.face_count);
+    if (scene->touches[t].mu_static > 0)
+      bonds += (scene->touches[t].bond_side ? b : a)->surface.vertex_count;
   }
-  if (scene->touch_count && points < 2048) points = 2048;
-  state->grip_capacity = points;
-  state->push_capacity = points + 64 * scene->touch_count;
-  state->term_capacity = state->push_capacity + 2 * points + scene->body_count;
-  state->row_capacity = bulk + 3 * 8 * points + 2 * state->surface_count + 4 * state->push_capacity;
+  uint32_t most = POINTS_PER_BODY * bodies < POINTS_LIMIT ? POINTS_PER_BODY * bodies : POINTS_LIMIT;
+  if (most < POINTS_MOST) most = POINTS_MOST;
+  if (scene->touch_count && points < POINTS_LEAST) points = POINTS_LEAST;
+  uint32_t pairs = scene->touch_count, room = points < most ? (uint32_t)points : most;
+  if (pairs > NEIGHBOURS * bodies) pairs = NEIGHBOURS * bodies;
+  state->grip_capacity = room;
+  state->push_capacity = room + REGIONS * pairs;
+  state->term_capacity = state->push_capacity + 2 * room + bodies;
+  state->row_capacity = bulk + 3 * 8 * room + 2 * state->surface_count + 4 * state->push_capacity;
+  uint64_t shared = NEIGHBOURS * (uint64_t)state->surface_count;
+  state->bond_capacity = (uint32_t)(bonds < shared ? bonds : shared);
   state->near_capacity = scene->body_count * (scene->body_count - 1) / 2;
   sonde_scene_motion *const motion[] = {&state->now, &state->undo, &state->saved, &state->whole};
   for (size_t k = 0; k < SONDE_COUNT_OF(motion); ++k) {
     carver c = {0};
     lay_motion(state, &c, motion[k]);
-    motion[k]->bytes = c.used;
     motion[k]->block = c.block = sonde_calloc(1, c.used);
     if (!motion[k]->block) return sonde_fail_memory(error);
     c.used = 0;
     lay_motion(state, &c, motion[k]);
-    SONDE_ASSERT(c.used == motion[k]->bytes);
   }
   carver arrays = {0};
   lay_arrays(state, &arrays);
@@ -136,7 +154,7 @@ static sonde_status allocate(sonde_scene_state *state, sonde_error *error) {
   if (!state->block) return sonde_fail_memory(error);
   arrays.used = 0;
   lay_arrays(state, &arrays);
-  uint32_t surface = 0, bond = 0;
+  uint32_t surface = 0;
   for (uint32_t b = 0; b < scene->body_count; ++b) {
     const sonde_body *body = &scene->bodies[b];
     state->surface_first[b] = surface;
@@ -156,13 +174,46 @@ static sonde_status allocate(sonde_scene_state *state, sonde_error *error) {
     for (uint32_t i = 0; i < body->surface.vertex_count; ++i)
       state->reach_m[b] = fmax(state->reach_m[b], v_norm(body->surface.vertices[i]));
   }
-  for (uint32_t t = 0; t < scene->touch_count; ++t) {
-    const sonde_touch *touch = &scene->touches[t];
-    state->bond_first[t] = bond;
-    bond += scene->bodies[touch->bond_side ? touch->b : touch->a].surface.vertex_count;
-  }
-  SONDE_ASSERT(surface == state->surface_count && bond == state->bond_count);
+  SONDE_ASSERT(surface == state->surface_count);
   return SONDE_OK;
+}
+
+static bool makes_three_columns(const sonde_scene *scene, const sonde_touch *touch) {
+  return touch->law == SONDE_TOUCH_FOUNDATION && sonde_body_is_rigid(&scene->bodies[touch->a]) &&
+         sonde_body_is_rigid(&scene->bodies[touch->b]);
+}
+
+// The common volumes of all pairs are found one after the other in the same memory, which has room
+// for the largest pair: large faces of rigid bodies carry three columns per piece, others one.
+static sonde_status make_overlaps(sonde_scene_state *state, sonde_error *error) {
+  const sonde_scene *scene = state->scene;
+  sonde_overlap_config config[2] = {{.points_per_piece = 1}, {.points_per_piece = 3}};
+  const sonde_face_tree *tree[2] = {NULL, NULL};
+  sonde_status status = SONDE_OK;
+  for (uint32_t t = 0; t < scene->touch_count && !status; ++t) {
+    const sonde_touch *touch = &scene->touches[t];
+    int k = makes_three_columns(scene, touch);
+    const uint32_t ends[2] = {touch->a, touch->b};
+    uint32_t pieces = 0;
+    for (int s = 0; s < 2 && !status; ++s) {
+      const sonde_mesh *mesh = &scene->bodies[ends[s]].surface;
+      pieces += 16 * mesh->face_count;
+      if (mesh->face_count > config[k].max_faces) config[k].max_faces = mesh->face_count;
+      if (mesh->vertex_count > config[k].max_vertices) config[k].max_vertices = mesh->vertex_count;
+      status = make_tree(state, ends[s], error);
+    }
+    if (pieces > config[k].max_pieces) config[k].max_pieces = pieces;
+    tree[k] = state->tree[touch->a];
+  }
+  for (int k = 0; k < 2 && !status; ++k) {
+    if (!tree[k]) continue;
+    if (config[k].max_pieces < PIECES_LEAST) config[k].max_pieces = PIECES_LEAST;
+    if (config[k].max_pieces > PIECES_MOST) config[k].max_pieces = PIECES_MOST;
+    config[k].max_points = 2 * config[k].max_pieces;
+    config[k].max_regions = REGIONS;
+    status = sonde_overlap_create(tree[k], tree[k], &config[k], &state->overlap[k], error);
+  }
+  return status;
 }
 
 sonde_status sonde_scene_state_create(const sonde_scene *scene, sonde_scene_state **out,
@@ -175,29 +226,15 @@ sonde_status sonde_scene_state_create(const sonde_scene *scene, sonde_scene_stat
   sonde_status status = allocate(state, error);
   if (!status) {
     sonde_scene_state_reset(state);
-    // Trees of the faces that may touch, and the common volume of each pair of bodies.
     uint32_t n = scene->body_count;
     status = sonde_sweep_create(n, &state->sweep, error);
     for (uint32_t b = 0; b < n; ++b) // beyond everything, so that it meets nothing
       state->bounds[b] = (sonde_bounds){{1e9 + 10 * b, 1e9, 1e9}, {1e9 + 10 * b + 1, 1e9, 1e9}};
-    for (uint32_t t = 0; t < scene->touch_count && !status; ++t) {
+    for (uint32_t t = 0; t < scene->touch_count; ++t) {
       const sonde_touch *touch = &scene->touches[t];
-      uint32_t faces =
-          scene->bodies[touch->a].surface.face_count + scene->bodies[touch->b].surface.face_count;
-      bool large_faces = sonde_body_is_rigid(&scene->bodies[touch->a]) &&
-                         sonde_body_is_rigid(&scene->bodies[touch->b]);
-      sonde_overlap_config config = {.points_per_piece = 1};
-      if (touch->law == SONDE_TOUCH_FOUNDATION && large_faces) config.points_per_piece = 3;
-      config.max_pieces = 16 * faces < 4096 ? 4096 : 16 * faces;
-      if (config.max_pieces > PIECES_MOST) config.max_pieces = PIECES_MOST;
-      config.max_points = 2 * config.max_pieces;
-      status = make_tree(state, touch->a, error);
-      if (!status) status = make_tree(state, touch->b, error);
-      if (!status)
-        status = sonde_overlap_create(state->tree[touch->a], state->tree[touch->b], &config,
-                                      &state->overlap[t], error);
       state->touch_of[touch->a * n + touch->b] = state->touch_of[touch->b * n + touch->a] = t + 1;
     }
+    if (!status) status = make_overlaps(state, error);
   }
   if (!status)
     status = sonde_block_matrix_create(scene->slot_count, scene->pair_count,
@@ -220,8 +257,8 @@ void sonde_scene_state_destroy(sonde_scene_state *state) {
   if (!state) return;
   for (uint32_t b = 0; state->block && b < state->scene->body_count; ++b)
     sonde_face_tree_destroy(state->tree[b]);
-  for (uint32_t t = 0; state->block && t < state->scene->touch_count; ++t)
-    sonde_overlap_destroy(state->overlap[t]);
+  sonde_overlap_destroy(state->overlap[0]);
+  sonde_overlap_destroy(state->overlap[1]);
   sonde_sweep_destroy(state->sweep);
   sonde_block_matrix_destroy(state->matrix);
   sonde_free(state->now.block);
@@ -233,7 +270,8 @@ void sonde_scene_state_destroy(sonde_scene_state *state) {
 }
 
 void sonde_scene_state_reset(sonde_scene_state *state) {
-  memset(state->now.block, 0, state->now.bytes);
+  sonde_scene_motion_unbond(&state->now);
+  memset(state->now.block, 0, state->now.fixed);
   state->report = (sonde_scene_report){0};
   for (uint32_t t = 0; t < state->scene->touch_count; ++t) state->pair[t] = (sonde_pair_measure){0};
   for (uint32_t b = 0; b < state->scene->body_count; ++b) {
@@ -272,7 +310,7 @@ uint64_t sonde_scene_tick(const sonde_scene_state *state) { return state->now.he
 double sonde_scene_time(const sonde_scene_state *state) { return state->now.head->time_s; }
 
 uint64_t sonde_scene_hash(const sonde_scene_state *state) {
-  return sonde_hash(0, state->now.block, state->now.bytes);
+  return sonde_hash(0, state->now.block, sonde_scene_motion_bytes(&state->now));
 }
 
 const sonde_vec3 *sonde_scene_nodes(const sonde_scene_state *state, uint32_t b) {

@@ -12,21 +12,29 @@ typedef struct sonde_scene_motion_head {
   uint64_t tick, flag_count;
   double time_s;
   uint32_t all_flags;
-  uint32_t level; // substeps of dt/2^level
+  uint32_t level;      // substeps of dt/2^level
+  uint32_t bond_count; // bonds in use
+  uint32_t unused;
 } sonde_scene_motion_head;
+
+// Friction at a vertex of a touch's bond side (docs/scene_theory.md).
+typedef struct sonde_bond {
+  sonde_vec3 displacement; // m, since the bond began
+  double slip_m_s;         // by which it slipped in the last step
+} sonde_bond;
 
 typedef struct sonde_scene_motion {
   void *block;
-  size_t bytes;
+  size_t fixed; // bytes before the bonds
   sonde_scene_motion_head *head;
   sonde_vec3 *position;  // [slots] m; 0 for spins
   sonde_vec3 *velocity;  // [slots] m/s, rad/s
   sonde_vec3 *increment; // [slots] of the last step: the solver's start
   sonde_quat *rotation;  // [bodies] world from the body's axes
   sonde_vec3 *hint;      // [touches] last direction out of a into b
-  sonde_vec3 *bond; // [bonds] displacement since the bond began, per vertex of a touch's bond side
-  double *slip;     // [bonds] m/s by which it slipped in the last step
-  uint8_t *calm;    // [slots] steps at rest of a tissue's node; many: it sleeps
+  uint32_t *bond_first;  // [touches] 1 + its first bond; 0: it has none
+  uint8_t *calm;         // [slots] steps at rest of a tissue's node; many: it sleeps
+  sonde_bond *bond;      // [bond_capacity] of the touches in contact, one after the other
 } sonde_scene_motion;
 
 // A push of one body on another along generalised coordinates: a quantity u (depth of a column or
@@ -48,6 +56,7 @@ typedef struct sonde_grip {
   double weight[6];             // + on a, - on b; of a rigid body on its centre
   sonde_vec3 tilt[6];           // across the normal: what tilting the face moves the point
   sonde_vec3 arm[2];            // from the centre to the point, rigid sides
+  bool bonded;                  // friction acts
   uint32_t bond[3];             // the bonds of the face on the bond side
   double bond_weight[3];
   sonde_vec3 point[2];          // on a and on b, world
@@ -69,38 +78,40 @@ struct sonde_scene_state {
   sonde_scene_motion now, undo;    // undo: the start of a step, for one that fails
   sonde_scene_motion saved, whole; // of step doubling: the start, and the single step's end
   void *block;                     // all arrays below
-  uint32_t bond_count, surface_count;
+  uint32_t bond_capacity, surface_count;
 
   // the point at which forces are evaluated
   sonde_vec3 *stage_position, *stage_velocity; // [slots]
   sonde_quat *stage_rotation;                  // [bodies]
   sonde_vec3 *surface;                         // [surface vertices]
   uint32_t *surface_first;                     // [bodies]
-  uint32_t *bond_first;                        // [touches]
   sonde_inertia *inertia;                      // [bodies]
   double *reach_m;                             // [bodies] of a rigid body's vertices
   double *thickness_m;                         // [bodies] volume over area at rest
   sonde_bounds *displacement; // [bodies] scratch: box of the vertices' displacements
+  sonde_bounds *cast_box;     // [bodies] scratch: box of the vertices
+  bool *cast_known;           // [bodies] scratch: cast_box has been made
   sonde_mat3 *body_inverse;   // [bodies] inverse inertia in the body's frame
 
   // contact
-  sonde_face_tree **tree;  // [bodies], NULL for what never touches
-  sonde_overlap **overlap; // [touches]
+  sonde_face_tree **tree;    // [bodies], NULL for what never touches
+  sonde_overlap *overlap[2]; // one for all touches with a column per piece, one for three columns
   sonde_sweep *sweep;
   uint32_t *touch_of; // [bodies^2] touch + 1
   uint32_t (*near)[2];
   uint32_t near_capacity;
-  sonde_bounds *bounds;  // [bodies]
-  sonde_push *pushes;    // [push_capacity]
-  sonde_grip *grips;     // [grip_capacity]
-  sonde_rank_one *terms; // [term_capacity]
-  uint32_t *rows;        // [row_capacity] pool
-  sonde_vec3 *g;         // [row_capacity] pool
+  uint32_t *near_touch, near_touch_count; // touches whose bodies' boxes meet
+  sonde_vec3 *found_hint;                 // [touches] direction of the largest region
+  sonde_bounds *bounds;                   // [bodies]
+  sonde_push *pushes;                     // [push_capacity]
+  sonde_grip *grips;                      // [grip_capacity]
+  sonde_rank_one *terms;                  // [term_capacity]
+  uint32_t *rows;                         // [row_capacity] pool
+  sonde_vec3 *g;                          // [row_capacity] pool
   uint32_t push_count, grip_count, term_count, row_count, bulk_terms;
   uint32_t push_capacity, grip_capacity, term_capacity, row_capacity;
-  double *bond_load;        // [bonds] scratch
-  double *slip_sum;         // [bonds] scratch
-  sonde_vec3 *bond_sum;     // [bonds] scratch
+  double *bond_load;        // [bond_capacity] scratch
+  sonde_bond *bond_sum;     // [bond_capacity] scratch
   sonde_pair_measure *pair; // [touches]
 
   // assembly and solve
@@ -165,6 +176,8 @@ void sonde_grip_begin(sonde_scene_state *state, sonde_grip *grip);
 void sonde_grip_evaluate(sonde_scene_state *state, sonde_grip *grip, double moved_s);
 void sonde_grip_predict(sonde_scene_state *state, sonde_grip *grip);
 void sonde_bonds_advance(sonde_scene_state *state, double h);
+// First bond of a touch, made when it has none; UINT32_MAX when there is no room. @thread tick
+uint32_t sonde_bonds_of(sonde_scene_state *state, uint32_t touch);
 // Relative velocity of a grip's points, a less b, for a field over the slots.
 sonde_vec3 sonde_grip_slip(const sonde_scene_state *state, const sonde_grip *grip,
                            const sonde_vec3 *field);
@@ -192,5 +205,9 @@ void sonde_step_guarded(sonde_scene_state *state, double h);
 // Volume over area of a closed surface; 0 for one that encloses nothing.
 double sonde_scene_thickness(const sonde_mesh *surface);
 void sonde_scene_motion_copy(sonde_scene_motion *to, const sonde_scene_motion *from);
+// Bytes of a motion with the bonds in use.
+size_t sonde_scene_motion_bytes(const sonde_scene_motion *motion);
+// Ends all bonds.
+void sonde_scene_motion_unbond(sonde_scene_motion *motion);
 
 #endif

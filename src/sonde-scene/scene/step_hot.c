@@ -207,7 +207,8 @@ static void balance(sonde_scene_state *state, sonde_vec3 *dv, double h) {
   const sonde_scene *scene = state->scene;
   // Bodies joined by contacts share an island.
   for (uint32_t b = 0; b < scene->body_count; ++b) state->island[b] = b;
-  for (uint32_t t = 0; t < scene->touch_count; ++t) {
+  for (uint32_t k = 0; k < state->near_touch_count; ++k) {
+    uint32_t t = state->near_touch[k];
     if (!state->pair[t].point_count) continue;
     uint32_t a = island_of(state->island, scene->touches[t].a);
     uint32_t b = island_of(state->island, scene->touches[t].b);
@@ -271,22 +272,25 @@ void sonde_step_once(sonde_scene_state *state, double h) {
     state->mean_velocity[i] = v_madd(state->now.velocity[i], lambda, state->now.increment[i]);
   sonde_touch_finish(state, h);
   bool finite = true;
-  for (uint32_t t = 0; t < state->scene->touch_count; ++t)
-    finite &= v_finite(state->pair[t].force_n) && v_finite(state->pair[t].torque_n_m);
+  for (uint32_t k = 0; k < state->near_touch_count; ++k) {
+    const sonde_pair_measure *pair = &state->pair[state->near_touch[k]];
+    finite &= v_finite(pair->force_n) && v_finite(pair->torque_n_m);
+  }
   finite = sonde_stage_finish(state, state->now.increment, h) && finite;
   state->report.awake = state->active_row_count;
   if (!finite) {
     // The bodies stand still where the step began, with their contacts forgotten.
     sonde_scene_motion_head head = *state->now.head;
     sonde_scene_motion_copy(&state->now, &state->undo);
-    head.time_s += h;
-    *state->now.head = head;
+    state->now.head->time_s = head.time_s + h;
+    state->now.head->flag_count = head.flag_count;
+    state->now.head->all_flags = head.all_flags;
     size_t bytes = state->scene->slot_count * sizeof(sonde_vec3);
     memset(state->now.velocity, 0, bytes);
     memset(state->now.increment, 0, bytes);
     memset(state->now.calm, 0, state->scene->slot_count);
-    memset(state->now.bond, 0, state->bond_count * sizeof(sonde_vec3));
-    memset(state->now.slip, 0, state->bond_count * sizeof(double));
+    sonde_scene_motion_unbond(&state->now);
+    memset(state->now.bond_first, 0, state->scene->touch_count * sizeof *state->now.bond_first);
     for (uint32_t t = 0; t < state->scene->touch_count; ++t)
       state->pair[t] = (sonde_pair_measure){0};
     state->report.flags |= SONDE_SCENE_NON_FINITE;

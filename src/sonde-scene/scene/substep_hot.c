@@ -6,9 +6,21 @@
 
 #include <string.h>
 
+size_t sonde_scene_motion_bytes(const sonde_scene_motion *motion) {
+  return motion->fixed + motion->head->bond_count * sizeof *motion->bond;
+}
+
+// Bonds that are not in use are zero.
 void sonde_scene_motion_copy(sonde_scene_motion *to, const sonde_scene_motion *from) {
-  SONDE_ASSERT(to->bytes == from->bytes);
-  memcpy(to->block, from->block, to->bytes);
+  SONDE_ASSERT(to->fixed == from->fixed);
+  uint32_t count = from->head->bond_count, before = to->head->bond_count;
+  memcpy(to->block, from->block, sonde_scene_motion_bytes(from));
+  if (before > count) memset(to->bond + count, 0, (before - count) * sizeof *to->bond);
+}
+
+void sonde_scene_motion_unbond(sonde_scene_motion *motion) {
+  memset(motion->bond, 0, motion->head->bond_count * sizeof *motion->bond);
+  motion->head->bond_count = 0;
 }
 
 // Steps of dt/2^level, finer where the error asks for it, coarser where it allows it.

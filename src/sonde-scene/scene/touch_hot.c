@@ -164,8 +164,10 @@ static void add_column(sonde_scene_state *state, uint32_t t, const sonde_overlap
   }
   int side = touch->bond_side;
   const uint32_t *vertex = body_of(state, body[side])->surface.faces[face[side]];
-  for (int k = 0; k < 3; ++k) {
-    grip->bond[k] = state->bond_first[t] + vertex[k];
+  uint32_t bond = touch->mu_static > 0 ? sonde_bonds_of(state, t) : UINT32_MAX;
+  grip->bonded = bond != UINT32_MAX;
+  for (int k = 0; k < 3 && grip->bonded; ++k) {
+    grip->bond[k] = bond + vertex[k];
     grip->bond_weight[k] = weight[side][k];
   }
   grip->push = region_push;
@@ -247,14 +249,25 @@ static uint32_t add_region(sonde_scene_state *state, uint32_t t, const sonde_ove
 static void find_touch(sonde_scene_state *state, uint32_t t) {
   const sonde_touch *touch = &state->scene->touches[t];
   sonde_pair_measure *pair = &state->pair[t];
-  if (!sonde_overlap_compute(state->overlap[t], state->tree[touch->a], state->tree[touch->b],
+  // Large faces of rigid bodies are pushed at three columns per piece, others at one.
+  bool rigid = sonde_body_is_rigid(body_of(state, touch->a)) &&
+               sonde_body_is_rigid(body_of(state, touch->b));
+  sonde_overlap *overlap = state->overlap[rigid && touch->law == SONDE_TOUCH_FOUNDATION];
+  if (!sonde_overlap_compute(overlap, state->tree[touch->a], state->tree[touch->b],
                              state->now.hint[t]))
     return;
-  const sonde_overlap_result *found = sonde_overlap_get(state->overlap[t]);
+  const sonde_overlap_result *found = sonde_overlap_get(overlap);
   if (found->flags) state->report.flags |= SONDE_SCENE_CONTACT_FULL;
   pair->volume_m3 = found->volume_m3;
   pair->region_count = found->region_count;
   pair->point_count = found->point_count;
+  // The direction of the largest region is where the next search starts.
+  double most = 0;
+  for (uint32_t r = 0; r < found->region_count; ++r)
+    if (found->regions[r].volume_m3 > most) {
+      most = found->regions[r].volume_m3;
+      state->found_hint[t] = found->regions[r].direction;
+    }
   for (uint32_t r = 0; r < found->region_count; ++r) {
     const sonde_overlap_region *region = &found->regions[r];
     uint32_t push = UINT32_MAX, before = state->grip_count;
@@ -279,7 +292,9 @@ void sonde_touch_find(sonde_scene_state *state) {
   const sonde_scene *scene = state->scene;
   state->push_count = state->grip_count = 0;
   if (!scene->touch_count) return;
-  memset(state->pair, 0, scene->touch_count * sizeof *state->pair);
+  for (uint32_t k = 0; k < state->near_touch_count; ++k)
+    state->pair[state->near_touch[k]] = (sonde_pair_measure){0};
+  state->near_touch_count = 0;
   // The trees of what moves are fitted; a resting body's tree was fitted when the state was made.
   for (uint32_t b = 0; b < scene->body_count; ++b) {
     sonde_vec3 *surface = state->surface + state->surface_first[b];
@@ -295,7 +310,10 @@ void sonde_touch_find(sonde_scene_state *state) {
   SONDE_ASSERT(count <= state->near_capacity);
   for (uint32_t k = 0; k < count; ++k) {
     uint32_t t = state->touch_of[state->near[k][0] * scene->body_count + state->near[k][1]];
-    if (t) find_touch(state, t - 1);
+    if (!t) continue;
+    state->near_touch[state->near_touch_count++] = t - 1;
+    state->found_hint[t - 1] = vec3(0, 0, 0);
+    find_touch(state, t - 1);
   }
   state->report.touch_points = state->grip_count;
   for (uint32_t k = 0; k < state->grip_count; ++k) sonde_grip_begin(state, &state->grips[k]);
@@ -424,18 +442,11 @@ void sonde_touch_finish(sonde_scene_state *state, double h) {
     pair->torque_n_m = v_add(pair->torque_n_m, v_cross(grip->point[0], f));
     pair->torque_b_n_m = v_sub(pair->torque_b_n_m, v_cross(grip->point[1], f));
   }
-  for (uint32_t t = 0; t < state->scene->touch_count; ++t) {
-    sonde_pair_measure *pair = &state->pair[t];
-    pair->force_n = v_add(pair->force_n, pair->friction_n);
-    // The direction of the largest region is where the next search starts.
-    const sonde_overlap_result *found = sonde_overlap_get(state->overlap[t]);
-    double most = 0;
-    state->now.hint[t] = vec3(0, 0, 0);
-    for (uint32_t r = 0; r < found->region_count && pair->region_count; ++r)
-      if (found->regions[r].volume_m3 > most) {
-        most = found->regions[r].volume_m3;
-        state->now.hint[t] = found->regions[r].direction;
-      }
+  memset(state->now.hint, 0, state->scene->touch_count * sizeof *state->now.hint);
+  for (uint32_t k = 0; k < state->near_touch_count; ++k) {
+    uint32_t t = state->near_touch[k];
+    state->pair[t].force_n = v_add(state->pair[t].force_n, state->pair[t].friction_n);
+    state->now.hint[t] = state->found_hint[t];
   }
   sonde_bonds_advance(state, h);
 }
