@@ -16,12 +16,15 @@ enum {
   TALLEST = 460,
   MARGIN = 12,
   LEGEND = 26,
+  ROW = 18,
   LAYERS = 240,
   SHADES = 48,
   DEEPEST = 12
 };
 enum { PIECES_MOST = 400000, DIGITS = 9, PLACES = 6 };
 static const double PIECE_PX = 22; // longest edge of a piece
+static const double LETTER_PX = 7.5;
+static const double FAR = 2; // widths of a group beyond which a body is out of its view
 
 // A parallel projection: axes of the view, pixels per metre, pixels of the origin, range of depth.
 typedef struct camera {
@@ -38,6 +41,7 @@ typedef struct figure {
   const sonde_scene *scene;
   camera camera;
   sonde_vec3 **vertex; // [bodies] of the surface, m
+  bool *seen;          // [bodies] in the view
   piece *pieces;
   uint32_t count;
 } figure;
@@ -52,6 +56,77 @@ static sonde_vec3 cross(sonde_vec3 a, sonde_vec3 b) {
 static sonde_vec3 unit(sonde_vec3 a) {
   double size = sqrt(dot(a, a));
   return madd((sonde_vec3){0, 0, 0}, size > 0 ? 1 / size : 0, a);
+}
+
+typedef struct group {
+  double low[3], high[3]; // box, m
+  uint32_t bodies;
+  bool fixed; // holds a body that does not move
+} group;
+
+static double width_of(const group *g) {
+  double sum = 0;
+  for (int k = 0; k < 3; ++k) sum += (g->high[k] - g->low[k]) * (g->high[k] - g->low[k]);
+  return sqrt(sum);
+}
+
+static bool are_near(const group *a, const group *b) {
+  double sum = 0;
+  for (int k = 0; k < 3; ++k) {
+    double gap = fmax(0, fmax(a->low[k] - b->high[k], b->low[k] - a->high[k]));
+    sum += gap * gap;
+  }
+  return sqrt(sum) <= FAR * fmax(width_of(a), width_of(b));
+}
+
+static group join(const group *a, const group *b) {
+  group g = {.bodies = a->bodies + b->bodies, .fixed = a->fixed || b->fixed};
+  for (int k = 0; k < 3; ++k)
+    g.low[k] = fmin(a->low[k], b->low[k]), g.high[k] = fmax(a->high[k], b->high[k]);
+  return g;
+}
+
+// Bodies near each other make a group, and the group of most bodies is what the view shows: one
+// body that fell off does not shrink the others to a dot. Of equal groups the one with a body that
+// does not move is shown, else the wider one. Each group is found at its first body.
+static bool choose_seen(figure *f) {
+  uint32_t count = sonde_scene_body_count(f->scene);
+  group *groups = calloc(count, sizeof *groups);
+  uint32_t *of = calloc(count, sizeof *of); // [bodies] first body of its group
+  bool good = groups && of;
+  for (uint32_t b = 0; b < count && good; ++b) {
+    sonde_body_info body = sonde_scene_body(f->scene, b);
+    group *g = &groups[b];
+    *g = (group){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}, 1, false};
+    g->fixed = body.motion == SONDE_BODY_FIXED;
+    for (uint32_t i = 0; i < body.surface->vertex_count; ++i) {
+      const double at[3] = {f->vertex[b][i].x, f->vertex[b][i].y, f->vertex[b][i].z};
+      for (int k = 0; k < 3; ++k)
+        g->low[k] = fmin(g->low[k], at[k]), g->high[k] = fmax(g->high[k], at[k]);
+    }
+    of[b] = b;
+  }
+  for (bool joined = good; joined;) {
+    joined = false;
+    for (uint32_t a = 0; a < count; ++a)
+      for (uint32_t b = a + 1; b < count; ++b) {
+        if (of[a] != a || of[b] != b || !are_near(&groups[a], &groups[b])) continue;
+        groups[a] = join(&groups[a], &groups[b]);
+        for (uint32_t k = 0; k < count; ++k) of[k] = of[k] == b ? a : of[k];
+        joined = true;
+      }
+  }
+  uint32_t best = 0;
+  for (uint32_t b = 1; b < count && good; ++b) {
+    const group *g = &groups[b], *top = &groups[best];
+    if (of[b] != b || g->bodies < top->bodies) continue;
+    bool wider = g->fixed == top->fixed ? width_of(g) > width_of(top) : g->fixed;
+    if (g->bodies > top->bodies || wider) best = b;
+  }
+  for (uint32_t b = 0; b < count && good; ++b) f->seen[b] = of[b] == best;
+  free(groups);
+  free(of);
+  return good;
 }
 
 // Seen from above and the side; up is against gravity, or z without any.
@@ -69,10 +144,11 @@ static camera look(const figure *f) {
   c.right = unit(cross(up, c.toward));
   c.up = cross(c.toward, c.right);
 
-  // Scale and origin such that all bodies are seen.
+  // Scale and origin such that the chosen bodies are seen.
   double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
   for (uint32_t b = 0; b < sonde_scene_body_count(f->scene); ++b)
-    for (uint32_t i = 0; i < sonde_scene_body(f->scene, b).surface->vertex_count; ++i) {
+    for (uint32_t i = 0; f->seen[b] && i < sonde_scene_body(f->scene, b).surface->vertex_count;
+         ++i) {
       sonde_vec3 p = f->vertex[b][i];
       const double at[3] = {dot(p, c.right), dot(p, c.up), dot(p, c.toward)};
       for (int k = 0; k < 3; ++k) low[k] = fmin(low[k], at[k]), high[k] = fmax(high[k], at[k]);
@@ -166,6 +242,7 @@ static sonde_status write_report(const figure *f, const sonde_scene_state *state
     sonde_json_put_text(&out, "name", body.name);
     sonde_json_put_text(&out, "kind", KIND[body.kind]);
     sonde_json_put_integer(&out, "nodes", body.node_count);
+    sonde_json_put_bool(&out, "seen", f->seen[b]);
     put(&out, "mass_kg", body.mass.mass_kg);
     sonde_json_begin_list(&out, "centre_mm");
     put(&out, NULL, 1e3 * m.centre_m.x), put(&out, NULL, 1e3 * m.centre_m.y);
@@ -214,29 +291,56 @@ static sonde_status write_report(const figure *f, const sonde_scene_state *state
   return status;
 }
 
+// Names in the colours of the bodies, in as many rows as they need below the top, and the time at
+// the end of the first row; returns where the rows end. Without a file it only measures.
+static double write_legend(const figure *f, double time_s, double top, sonde_file *file) {
+  char words[96];
+  double x = MARGIN, y = top, most = WIDTH - MARGIN - 80;
+  for (uint32_t b = 0; b < sonde_scene_body_count(f->scene); ++b) {
+    snprintf(words, sizeof words, "%s%s", sonde_scene_body(f->scene, b).name,
+             f->seen[b] ? "" : " (out of view)");
+    double width = 34 + LETTER_PX * (double)strlen(words);
+    if (x > MARGIN && x + width > most) x = MARGIN, y += ROW, most = WIDTH - MARGIN;
+    if (file) {
+      char fill[64];
+      const double box[4][2] = {{x, y - 10}, {x + 11, y - 10}, {x + 11, y + 1}, {x, y + 1}};
+      format_look(fill, "fill='#%06x'", b, SHADES - 2);
+      sonde_svg_put_outlines(file, box, 4, 4, fill);
+      sonde_svg_put_text(file, x + 16, y, "", words);
+    }
+    x += width;
+  }
+  snprintf(words, sizeof words, "t = %.3f s", time_s);
+  if (file) sonde_svg_put_text(file, WIDTH - MARGIN, top, "class='end'", words);
+  return y;
+}
+
 sonde_status scene_figure(const sonde_scene *scene, const sonde_scene_state *state,
                           const char *path, sonde_error *error) {
   uint32_t bodies = sonde_scene_body_count(scene);
   const char *ending = strrchr(path, '.');
-  figure f = {.scene = scene, .vertex = calloc(bodies, sizeof *f.vertex)};
-  bool good = f.vertex != NULL;
+  figure f = {.scene = scene,
+              .vertex = calloc(bodies, sizeof *f.vertex),
+              .seen = calloc(bodies, sizeof *f.seen)};
+  bool good = f.vertex != NULL && f.seen != NULL;
   for (uint32_t b = 0; b < bodies && good; ++b) {
     f.vertex[b] = calloc(sonde_scene_body(scene, b).surface->vertex_count, sizeof **f.vertex);
     good = f.vertex[b] != NULL;
     if (good) sonde_scene_surface(state, b, f.vertex[b]);
   }
+  good = good && choose_seen(&f);
   sonde_status status = SONDE_MEMORY;
   if (good && ending && strcmp(ending, ".html") == 0) {
     status = write_report(&f, state, path, error);
   } else if (good && (f.pieces = malloc(PIECES_MOST * sizeof *f.pieces))) {
     f.camera = look(&f);
-    // Light from above the viewer's left shoulder; then names in the colours of the bodies, and the
-    // time.
+    // Light from above the viewer's left shoulder.
     const camera *c = &f.camera;
     sonde_vec3 light = unit(madd(madd(c->toward, 1.1, c->up), -0.5, c->right));
     double lowest = 0;
     for (uint32_t b = 0; b < sonde_scene_body_count(f.scene); ++b) {
       const sonde_mesh *mesh = sonde_scene_body(f.scene, b).surface;
+      if (!f.seen[b]) continue;
       for (uint32_t i = 0; i < mesh->vertex_count; ++i)
         lowest = fmax(lowest, c->top - c->scale * dot(f.vertex[b][i], c->up));
       for (uint32_t i = 0; i < mesh->face_count; ++i) {
@@ -255,8 +359,9 @@ sonde_status scene_figure(const sonde_scene *scene, const sonde_scene_state *sta
     status = xy ? sonde_file_create(path, &file, error) : SONDE_MEMORY;
     if (!status) {
       char words[64];
-      double x = MARGIN, y = lowest + MARGIN + LEGEND - 12;
-      sonde_svg_begin(file, sonde_scene_title(f.scene), WIDTH, y + MARGIN);
+      double time_s = sonde_scene_time(state), top = lowest + MARGIN + LEGEND - 12;
+      double end = write_legend(&f, time_s, top, NULL);
+      sonde_svg_begin(file, sonde_scene_title(f.scene), WIDTH, end + MARGIN);
       for (uint32_t i = 0; i < f.count;) {
         const piece *first = &f.pieces[i];
         uint32_t corners = 0;
@@ -266,22 +371,14 @@ sonde_status scene_figure(const sonde_scene *scene, const sonde_scene_state *sta
                     first->shade);
         sonde_svg_put_outlines(file, (const double(*)[2])xy, corners, 3, words);
       }
-      for (uint32_t b = 0; b < sonde_scene_body_count(f.scene) && x < WIDTH - 170; ++b) {
-        const char *name = sonde_scene_body(f.scene, b).name;
-        const double box[4][2] = {{x, y - 10}, {x + 11, y - 10}, {x + 11, y + 1}, {x, y + 1}};
-        format_look(words, "fill='#%06x'", b, SHADES - 2);
-        sonde_svg_put_outlines(file, box, 4, 4, words);
-        sonde_svg_put_text(file, x + 16, y, "", name);
-        x += 34 + 7.5 * (double)strlen(name);
-      }
-      snprintf(words, sizeof words, "t = %.3f s", sonde_scene_time(state));
-      sonde_svg_put_text(file, WIDTH - MARGIN, y, "class='end'", words);
+      write_legend(&f, time_s, top, file);
       status = sonde_svg_end(file, error);
     }
     free(xy);
   }
   for (uint32_t b = 0; f.vertex && b < bodies; ++b) free(f.vertex[b]);
   free(f.vertex);
+  free(f.seen);
   free(f.pieces);
   return status;
 }

@@ -10,6 +10,7 @@ interface Body {
   name: string;
   kind: string;
   nodes: number;
+  seen: boolean; // in the view; others are too far from the rest
   mass_kg: Real;
   centre_mm: Real[];
   speed_mm_s: Real;
@@ -55,27 +56,32 @@ function cameraAt(report: SceneReport, surfaces: Surface[], around: number, abov
   const side = unit(madd(axis, -dot(axis, up), up));
   const front = cross(side, up);
   const level = madd(madd([0, 0, 0], Math.cos(around), front), Math.sin(around), side);
-  return look(madd(madd([0, 0, 0], Math.cos(above), level), Math.sin(above), up), up, surfaces, BOX);
+  return look(madd(madd([0, 0, 0], Math.cos(above), level), Math.sin(above), up), up, surfaces.filter((_surface, b) => report.bodies[b]!.seen), BOX);
 }
 
 /** Draws the bodies into a group; the names and the time stay as they are when the view turns. */
 function drawBodies(report: SceneReport, surfaces: Surface[], around: number, above: number): SVGElement {
   const camera = cameraAt(report, surfaces, around, above);
+  const seen = surfaces.map((surface, b): Surface => (report.bodies[b]!.seen ? surface : { position: surface.position, face: [] }));
   const light = unit(madd(madd(camera.toward, 1.1, camera.up), -0.5, camera.right)); // from above the viewer's left shoulder
-  return s("g", {}, paint(camera, surfaces, (body, _face, normal) => colour(body, Math.max(0, dot(normal, light)))), scaleBar(camera, BOX.left, BOX.top + BOX.height - 4));
+  return s("g", {}, paint(camera, seen, (body, _face, normal) => colour(body, Math.max(0, dot(normal, light)))), scaleBar(camera, BOX.left, BOX.top + BOX.height - 4));
 }
 
 function figureOf(report: SceneReport, surfaces: Surface[]): SVGElement {
   let [around, above] = [0.55, 0.42];
   const foot = BOX.top + BOX.height + 24;
-  const svg = drawing(WIDTH, foot + 12);
-  let bodies = drawBodies(report, surfaces, around, above);
-  svg.append(bodies);
-  let x = 12;
+  const names: SVGElement[] = [];
+  let [x, y] = [12, foot];
   report.bodies.forEach((body, b) => {
-    svg.append(s("rect", { x, y: foot - 10, width: 11, height: 11, fill: colour(b, 0.98) }), text(x + 16, foot, "", body.name));
-    x += 34 + textWidth(body.name, 12);
+    const name = body.seen ? body.name : `${body.name} (out of view)`;
+    const width = 34 + textWidth(name, 12);
+    if (x > 12 && x + width > WIDTH - (y === foot ? 100 : 12)) [x, y] = [12, y + 18];
+    names.push(s("rect", { x, y: y - 10, width: 11, height: 11, fill: colour(b, 0.98) }), text(x + 16, y, "", name));
+    x += width;
   });
+  const svg = drawing(WIDTH, y + 12);
+  let bodies = drawBodies(report, surfaces, around, above);
+  svg.append(bodies, ...names);
   svg.append(text(WIDTH - 12, foot, "end", `t = ${fixed(report.time_s, 3)} s`));
   svg.style.cursor = "grab";
   svg.style.touchAction = "none";
