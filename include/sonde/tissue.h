@@ -16,6 +16,9 @@
 extern "C" {
 #endif
 
+/** Deformable models (docs/tissue.md). */
+typedef enum sonde_model_kind { SONDE_TWO_LAYER } sonde_model_kind;
+
 /** Uniform parameters of the surface layer and of the material's damping. */
 typedef struct sonde_surface_law {
   double edge_stiffness_n_m;        /**< k_s of a surface spring */
@@ -80,7 +83,8 @@ typedef struct sonde_vessel {
 typedef struct sonde_model {
   char name[64];
   char provenance[256]; /**< e.g. that the data are synthetic */
-  sonde_mesh surface;   /**< skin at rest, refined */
+  sonde_model_kind kind;
+  sonde_mesh surface; /**< skin at rest, refined */
   sonde_topology topology;
   sonde_mesh femur; /**< closed */
   sonde_surface_law law;

@@ -7,7 +7,7 @@
 #include "fit/refit.h"
 #include "fit/site_field.h"
 #include "fit_plate.h"
-#include "tissue/two_layer.h"
+#include "tissue/two_layer/linearise.h"
 
 static const double HALF_U[2] = {0.003, 0.030}, HALF_V[2] = {0.003, 0.006};
 

@@ -1,6 +1,6 @@
 // Laws of a cut through the skin: what stays (totals, places, rest), what is refused, files.
 #include "../fixture.h"
-#include "tissue/two_layer.h"
+#include "tissue/two_layer/linearise.h"
 
 #include <stdio.h>
 

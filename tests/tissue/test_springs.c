@@ -3,7 +3,7 @@
 #include "tissue/laws.h"
 
 #include "../fixture.h"
-#include "tissue/two_layer.h"
+#include "tissue/two_layer/linearise.h"
 
 // Force q = m g of the shear layer at slope g, on an area of 1, and its slope.
 static double shear_force(double shear_n_m, double limit, double g, double *slope) {

@@ -1,7 +1,7 @@
 // The tissue's forces against its energy, its matrix against its forces.
 #include "../fixture.h"
 #include "sparse/block.h"
-#include "tissue/two_layer.h"
+#include "tissue/two_layer/linearise.h"
 
 typedef struct bench {
   sonde_model *model;

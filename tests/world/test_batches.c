@@ -2,6 +2,7 @@
 // within single precision, equilibrium, sleeping, and what it refuses.
 #include "../fixture.h"
 #include "../sanitized.h"
+#include "tissue/two_layer/batches.h"
 #include "world/batches.h"
 
 #include "base/random.h"
@@ -61,7 +62,7 @@ static void play(scene *s, int steps) {
 
 static uint64_t hash_with(const char *kernels, couplings by, const sonde_world_def *def) {
   scene s = make_coupled(by, 4, "point", def);
-  sonde_batches_of(s.state)->kernels = sonde_kernels_find(kernels);
+  sonde_batches_of(s.state)->kernels = sonde_kernels_find(s.model, kernels);
   uint64_t hash = 0;
   if (sonde_batches_of(s.state)->kernels) {
     play(&s, 250);
@@ -178,7 +179,7 @@ static void sweeps_leave_the_residual_of_their_solution(void **state) {
     scene s = make_coupled(strong[kind], 4, "point", &def);
     sonde_batches *body = sonde_batches_of(s.state);
     double off2 = 0, left2 = 0;
-    body->law.edge.compression = 1; // linear about the place at rest
+    ((two_layer *)(void *)body->tissue)->edge.compression = 1; // linear about the place at rest
     stir(&s);
     sonde_parts_linearise(body, true);
     for (int k = 0; k < 2; ++k) sonde_parts_sweep(body);

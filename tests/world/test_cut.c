@@ -1,6 +1,6 @@
 // Laws of a cut between two steps: what goes on unchanged, what opens, what gets softer.
 #include "../fixture.h"
-#include "tissue/two_layer.h"
+#include "tissue/two_layer/linearise.h"
 
 #include <stdio.h>
 

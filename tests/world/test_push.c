@@ -5,7 +5,7 @@
 #include "tissue/model.h"
 #include "world/batches.h"
 #include "world/contact.h"
-#include "world/fan.h"
+#include "tissue/two_layer/fan.h"
 #include "geometry/internal.h"
 
 typedef struct bench {

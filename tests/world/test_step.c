@@ -1,7 +1,7 @@
 // Laws of the implicit step: the paper's (3) and (4), orders, stability, oscillation, sleeping.
 #include "../fixture.h"
 #include "sparse/block.h"
-#include "tissue/two_layer.h"
+#include "tissue/two_layer/linearise.h"
 
 static sonde_world_def exact_def(double dt, double lambda) {
   sonde_world_def def = fixture_world_def();

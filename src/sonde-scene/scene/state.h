@@ -5,7 +5,7 @@
 
 #include "scene/scene.h"
 #include "contact/contact.h"
-#include "tissue/two_layer.h"
+#include "tissue/two_layer/linearise.h"
 
 // What a step hands to the next, in one block: copied for substeps, written by snapshots.
 typedef struct sonde_scene_motion_head {

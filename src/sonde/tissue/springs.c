@@ -5,7 +5,7 @@
 
 #include "base/base.h"
 #include "base/maths.h"
-#include "tissue/two_layer.h"
+#include "tissue/two_layer/linearise.h"
 
 // Integral of x/(1 - x^n) from 0; n = 3 by partial fractions.
 static double barrier_energy(double n, double x) {

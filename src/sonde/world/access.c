@@ -8,23 +8,22 @@
 
 void sonde_state_publish(sonde_state *state) {
   if (!state->engine->stale)
-    state->engine->calls->publish(state->engine, state->model->surface.vertices, state->position,
+    state->engine->calls->publish(state->engine, state->nodes.rest, state->position,
                                   state->velocity);
 }
 
 void sonde_state_wake_all(sonde_state *state) {
   state->engine->stale = true;
-  state->awake_nodes = state->model->surface.vertex_count;
+  state->awake_nodes = state->nodes.count;
 }
 
 void sonde_state_reset(sonde_state *state) {
-  uint32_t n = state->model->surface.vertex_count;
+  uint32_t n = state->nodes.count;
   SONDE_ASSERT(n > 0);
   // As rest + displacement gives them: a coordinate of -0 would hash differently once it is
   // restored.
-  for (uint32_t i = 0; i < n; ++i)
-    state->position[i] = v_add(state->model->surface.vertices[i], vec3(0, 0, 0));
-  memcpy(state->probed, state->model->surface.vertices, n * sizeof *state->probed);
+  for (uint32_t i = 0; i < n; ++i) state->position[i] = v_add(state->nodes.rest[i], vec3(0, 0, 0));
+  memcpy(state->probed, state->nodes.rest, n * sizeof *state->probed);
   memset(state->velocity, 0, n * sizeof *state->velocity);
   memset(state->contact_force, 0, n * sizeof *state->contact_force);
   memset(state->share_m3, 0, n * sizeof *state->share_m3);
@@ -73,7 +72,7 @@ sonde_stage_times sonde_state_times(const sonde_state *state) { return state->ti
 
 void sonde_state_set(sonde_state *state, const sonde_vec3 *positions,
                      const sonde_vec3 *velocities) {
-  size_t bytes = state->model->surface.vertex_count * sizeof *state->position;
+  size_t bytes = state->nodes.count * sizeof *state->position;
   sonde_state_publish(state);
   if (positions) memcpy(state->position, positions, bytes);
   if (velocities) memcpy(state->velocity, velocities, bytes);
@@ -83,7 +82,7 @@ void sonde_state_set(sonde_state *state, const sonde_vec3 *positions,
 uint64_t sonde_state_bytes_moved(const sonde_state *state) { return state->engine->bytes_moved; }
 
 uint64_t sonde_state_hash(sonde_state *state) {
-  size_t bytes = state->model->surface.vertex_count * sizeof *state->position;
+  size_t bytes = state->nodes.count * sizeof *state->position;
   sonde_state_publish(state);
   uint64_t hash = sonde_hash(0, &state->tick, sizeof state->tick);
   hash = sonde_hash(hash, state->position, bytes);

@@ -1,50 +1,10 @@
-// What an engine knows of one batch of nodes or faces: springs, layers, motion, contact, and the
-// numbers of the law and of the step, in the precision of base/batch.h.
+// What an engine knows of one batch of nodes or faces: motion and contact, in the precision of
+// base/batch.h.
 #ifndef SONDE_SRC_BATCH_PARTS_H
 #define SONDE_SRC_BATCH_PARTS_H
 
+#include "tissue/deformable.h"
 #include "tissue/laws.h"
-
-// One neighbour of each row of a batch; rows with fewer neighbours have share 0 there.
-typedef struct sonde_slot {
-  reals rest[3]; // X_j - X_i
-  reals length;  // at rest
-} sonde_slot;
-
-// The face between a row, the neighbour of the slot before and this one, which follow one another
-// around the row; zero where there is none. Before the first slot is the row's `last`.
-typedef struct sonde_slot_face {
-  reals cot[3]; // half the cotangents at the row, the neighbour before, this one
-  reals bend;   // 1/(gm^2 area) and G of the shear layer
-  reals shear;
-} sonde_slot_face;
-
-// Both layers between a row and its neighbour: all that a product reads of a slot.
-typedef struct sonde_slot_layer {
-  wholes node;
-  reals coupling; // s of the block s N_i N_j^T of the shear layer
-  reals weight;   // half the cotangents of both faces: of the in-plane layer
-} sonde_slot_layer;
-
-// The neighbour and the edge's block of the matrix, -(along n n^T + lateral I): all that a product
-// reads of a slot, in one stream.
-typedef struct sonde_slot_tangent {
-  wholes node;
-  reals n[3], along, lateral;
-} sonde_slot_tangent;
-
-typedef struct sonde_batch_model {
-  reals normal[3], place[3], area, k0, xm, limit, mass, yield;
-  reals weight;      // sum of its slots' weights
-  wholes last, turn; // the neighbour before the first slot, and the slots up to it
-  uint32_t first_slot, slot_count;
-  uint32_t whole_count;            // slots from the front whose shares are all 1
-  uint32_t first_near, near_count; // batches that share an edge with this one
-  uint32_t first_face, face_count; // batches of faces with a corner in this one, for the contact
-  uint32_t used;                   // rows that are nodes, from the front
-  real bend;                       // 1 over the shortest edge at a node, at rest
-  reals place_low[3];              // what the precision leaves of `place`
-} sonde_batch_model;
 
 // Of a batch of batches at rest: boxes of their nodes, longest edges at one of them. Beyond the
 // last batch boxes are inside out.
@@ -58,18 +18,6 @@ typedef struct sonde_batch {
   reals factor[6]; // of the diagonal blocks D = L E L^T: l21 l31 l32, 1/e1 1/e2 1/e3
   reals x[3], r[3], z[3], w[3], p[3], q[3]; // of the conjugate gradients; D z = r
 } sonde_batch;
-
-// Numbers of the law and of the step. With y the change of ve, the linear system is
-// (mass_scale M + damping_scale C + stiffness_scale K) y = force_scale F - mass_scale M (ve - v).
-typedef struct sonde_batch_law {
-  edge_law edge;
-  anchor_law anchor;
-  real inplane, shear;   // 0: no such layer
-  bool springs, layered; // whether edges carry springs, and faces layers
-  real dt, lambda;
-  real reach; // how far ve takes a node: lambda dt
-  real force_scale, mass_scale, damping_scale, stiffness_scale;
-} sonde_batch_law;
 
 // What the contact adds to a batch: forces, xx xy xz yy yz zz of the diagonal blocks, which hold
 // whole rows, what of these belongs to neighbours, and, row by row, what the corner couplings make

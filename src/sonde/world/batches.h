@@ -41,6 +41,7 @@ typedef struct sonde_kernels {
                   sonde_batch_sums *sums);
   // Square of what x leaves unbalanced, see kernel.c
   double (*bend)(sonde_batches *body, uint32_t part);
+  void (*record)(sonde_batches *body, uint32_t s);    // what neighbours read of batch s at ve
   void (*accept)(sonde_batches *body, uint32_t part); // ve += x, records
   // u, v at the end with ve + x, ve and records for the next step; not finite: NaN
   double (*update)(sonde_batches *body, uint32_t part);
@@ -73,21 +74,17 @@ typedef struct sonde_region_push {
 struct sonde_batches {
   sonde_engine_data common;
   void *block;
-  uint32_t face_batch_count, slot_count, near_total, face_total;
+  uint32_t face_batch_count, near_total, face_total;
   const uint32_t *face_order; // [faces] of the state: batches of faces follow it
-  sonde_batch_law law;
+  sonde_step_scales step;
   const sonde_kernels *kernels;
-  sonde_batch_model *model;
+  sonde_nodes nodes;
+  sonde_tissue *tissue;   // the deformable model's data
+  sonde_rows *rows;       // [batches]
   sonde_batch_boxes *box; // [batches / SONDE_BATCH]
   sonde_batch *batch;
-  sonde_slot *slot;
-  sonde_slot_tangent *tangent;
-  sonde_slot_face *slot_face;   // of layered models
-  sonde_slot_layer *slot_layer; // as well
-  wholes *slot_from;            // the same: which face, -1 for none
-  reals *share;                 // [slots] of a spring: 1, 0 for padding
-  reals *free;                  // [batches] of double engines: 1, 0 for held rows
-  bool holds;                   // some row is held
+  reals *free; // [batches] of double engines: 1, 0 for held rows
+  bool holds;  // some row is held
   // contact
   sonde_batch_contact *contact; // of touched batches, which contact_of counts from 1
   uint32_t *contact_of;         // [batches] 0: not touched
@@ -116,13 +113,9 @@ struct sonde_batches {
   uint32_t *near_probe;  // batches that the contact looks at
   uint32_t *near_code;   // of these: planes of the probe that all of the batch's nodes are beyond
   uint32_t near_probe_count;
-  // For the neighbours, of every row where it is evaluated
-  real *record; // [rows][8] of springs: u + reach ve, ve
-  // [rows][8] of layers: tangential displacement, indentation, N.x of what it moved since they
-  // looked
-  real *slide;
-  // and of the directions: z, for springs and corners; its tangential part and N.z for layers.
-  real *direction, *layer_direction; // [rows][4]
+  // What neighbours read of every row is in the tissue's published[], of which the first is here:
+  // displacement and velocity where forces are evaluated, and the direction.
+  real *place, *direction;
   uint32_t part_count;
   uint32_t part_batch[SONDE_PARTS + 1]; // first batches
   uint32_t part_seen[SONDE_PARTS + 1];  // of seen[]: those that a part sees of the other
@@ -167,16 +160,12 @@ static inline void sonde_split(double a, real *high, real *low) {
 #define sonde_batches_step BY_REAL(sonde_batches_step)
 bool sonde_batches_step(sonde_state *state, const sonde_probe *probe, sonde_pose pose,
                         const sonde_motion *motion);
-// The law of a step of `def`.
-#define sonde_batches_set_law BY_REAL(sonde_batches_set_law)
-void sonde_batches_set_law(sonde_batches *body, const sonde_surface_law *law,
-                           const sonde_world_def *def);
+// The numbers of a step of `def`.
+#define sonde_batches_set_step BY_REAL(sonde_batches_set_step)
+void sonde_batches_set_step(sonde_batches *body, const sonde_world_def *def);
 // Directions of zero in `count` batches. @thread tick
 #define sonde_batches_still BY_REAL(sonde_batches_still)
 void sonde_batches_still(sonde_batches *body, uint32_t first, uint32_t count);
-// The record of one row where it is evaluated. @thread tick
-#define sonde_batches_record BY_REAL(sonde_batches_record)
-void sonde_batches_record(sonde_batches *body, uint32_t i);
 // Lists the batches that `take` marks. @thread tick
 #define sonde_batches_list BY_REAL(sonde_batches_list)
 void sonde_batches_list(sonde_batches *body, const uint8_t *take);
@@ -218,16 +207,9 @@ void sonde_batches_couple(sonde_batches *body, const real *vectors);
 double sonde_batches_conjugate(sonde_batches *body, double target, uint32_t most_iterations,
                                sonde_batch_sums sums, uint32_t *iterations);
 
-// The widest kernels that this processor runs, or those called `name` (NULL: widest).
+// The widest kernels of a deformable model that this processor runs, or those called `name` (NULL:
+// widest).
 #define sonde_kernels_find BY_REAL(sonde_kernels_find)
-const sonde_kernels *sonde_kernels_find(const char *name);
-#define sonde_kernels_base BY_REAL(sonde_kernels_base)
-extern const sonde_kernels sonde_kernels_base;
-#ifdef __x86_64__
-#define sonde_kernels_avx2 BY_REAL(sonde_kernels_avx2)
-#define sonde_kernels_avx512 BY_REAL(sonde_kernels_avx512)
-extern const sonde_kernels sonde_kernels_avx2;
-extern const sonde_kernels sonde_kernels_avx512;
-#endif
+const sonde_kernels *sonde_kernels_find(const sonde_model *model, const char *name);
 
 #endif

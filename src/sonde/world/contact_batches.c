@@ -45,7 +45,7 @@ static void set_probe(const sonde_state *state, sonde_batches *body, const sonde
   set_vector(to->spin, spin);
   to->stiffness = (real)state->def.contact_stiffness_n_m3;
   to->damping = (real)state->def.contact_damping_n_s_m3;
-  to->gain = body->law.lambda > 0 ? body->law.reach * to->stiffness + to->damping : 0;
+  to->gain = body->step.lambda > 0 ? body->step.reach * to->stiffness + to->damping : 0;
 }
 
 // Batches of faces with a corner near the probe. Where all these corners are beyond one of the
@@ -54,9 +54,9 @@ static void mark_faces(sonde_batches *body) {
   SONDE_ASSERT(body->near_probe_count <= body->common.batch_count);
   memset(body->face_marked, 0, (body->face_batch_count / 64 + 1) * sizeof *body->face_marked);
   for (uint32_t k = 0; k < body->near_probe_count; ++k) {
-    const sonde_batch_model *fixed = &body->model[body->near_probe[k]];
-    const uint32_t *faces = body->face_near + fixed->first_face;
-    for (uint32_t f = 0; f < fixed->face_count; ++f) {
+    const sonde_rows *rows = &body->rows[body->near_probe[k]];
+    const uint32_t *faces = body->face_near + rows->first_face;
+    for (uint32_t f = 0; f < rows->face_count; ++f) {
       uint64_t *word = &body->face_marked[faces[f] / 64], bit = (uint64_t)1 << faces[f] % 64;
       uint32_t before = *word & bit ? body->face_code[faces[f]] : UINT32_MAX;
       body->face_code[faces[f]] = before & body->near_code[k];
@@ -131,8 +131,8 @@ static void add_couplings(sonde_batches *body, const sonde_pushed_batch *at,
     add_coupling(body, v, slope, between);
     return;
   }
-  real steep = body->law.stiffness_scale * body->probe.stiffness +
-               body->law.damping_scale * body->probe.damping;
+  real steep = body->step.stiffness_scale * body->probe.stiffness +
+               body->step.damping_scale * body->probe.damping;
   for (int q = 0; q < SONDE_FACE_POINTS; ++q) {
     if (!(at->push[q][l] > 0)) continue;
     const real slope[3] = {at->slope[q][0][l], at->slope[q][1][l], at->slope[q][2][l]};
@@ -175,8 +175,8 @@ static void push_batch(sonde_state *state, sonde_batches *body, uint32_t index) 
 static sonde_vec3 place_of(const sonde_state *state, const sonde_batches *body, uint32_t i) {
   uint32_t l = i % SONDE_BATCH;
   const sonde_batch *at = &body->batch[i / SONDE_BATCH];
-  sonde_vec3 x = v_add(state->model->surface.vertices[i], sonde_batch_vector(at->u, l));
-  return v_madd(x, (double)body->law.reach, sonde_batch_vector(at->ve, l));
+  sonde_vec3 x = v_add(state->nodes.rest[i], sonde_batch_vector(at->u, l));
+  return v_madd(x, (double)body->step.reach, sonde_batch_vector(at->ve, l));
 }
 
 // The law VOLUME: faces of a batch clipped by the probe, exactly.
@@ -216,8 +216,8 @@ static void push_regions(sonde_state *state, sonde_batches *body) {
     if (!(push > 0) || !(region->area_m2 > 0)) continue;
     sonde_region_push *to = &body->region_push[body->region_push_count++];
     to->region = r, to->first = used, to->push_n = push;
-    to->scale = region->area_m2 *
-                ((double)body->law.stiffness_scale * kappa + (double)body->law.damping_scale * mu);
+    to->scale = region->area_m2 * ((double)body->step.stiffness_scale * kappa +
+                                   (double)body->step.damping_scale * mu);
     to->gain = region->area_m2 * (double)body->probe.gain;
     for (uint32_t k = 0; k < state->touched_count; ++k) {
       uint32_t i = state->touched[k], row = i % SONDE_BATCH;
@@ -290,7 +290,7 @@ void sonde_batches_detect(sonde_state *state, sonde_batches *body, const sonde_p
       uint32_t l = (uint32_t)__builtin_ctz(rest), i = s * SONDE_BATCH + l;
       state->touched[state->touched_count++] = i;
       state->velocity[i] = sonde_batch_vector(at->ve, l);
-      state->position[i] = v_add(state->model->surface.vertices[i], sonde_batch_vector(at->u, l));
+      state->position[i] = v_add(state->nodes.rest[i], sonde_batch_vector(at->u, l));
       state->probed[i] = v_madd(state->position[i], reach, state->velocity[i]);
     }
   }

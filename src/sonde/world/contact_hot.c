@@ -80,7 +80,7 @@ void sonde_contact_clear(sonde_state *state) {
 // region(i) is parent[i] - nodes.
 static void number_regions(sonde_state *state) {
   sonde_contact *contact = &state->contact;
-  uint32_t n = state->model->surface.vertex_count;
+  uint32_t n = state->nodes.count;
   for (uint32_t k = 0; k < state->touched_count; ++k) {
     uint32_t i = state->touched[k], r = state->parent[i];
     // Ascending order: every smaller node already carries its region's number.
@@ -102,8 +102,8 @@ static void number_regions(sonde_state *state) {
 }
 
 uint32_t sonde_contact_region_of(const sonde_state *state, uint32_t i) {
-  SONDE_ASSERT(state->parent[i] >= state->model->surface.vertex_count);
-  return state->parent[i] - state->model->surface.vertex_count;
+  SONDE_ASSERT(state->parent[i] >= state->nodes.count);
+  return state->parent[i] - state->nodes.count;
 }
 
 // Volume, its rate and the direction k = sum g_i / |sum g_i|: the mean normal of the wetted face.
@@ -158,7 +158,7 @@ bool sonde_contact_is_inside_out(const sonde_state *state, const sonde_probe *pr
   for (uint32_t k = 0; k < state->touched_count; ++k) {
     uint32_t i = state->touched[k];
     if (!(v_norm2(state->contact_force[i]) > 0)) continue;
-    sonde_vec3 rest = state->model->surface.vertices[i];
+    sonde_vec3 rest = state->nodes.rest[i];
     double distance = v_distance(rest, v_max(box.low, v_min(box.high, rest)));
     most = fmax(most, distance);
     least = fmin(least, distance);

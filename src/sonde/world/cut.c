@@ -55,7 +55,7 @@ static void copy_contact(const carrier *c) {
         v_norm2(to->contact_force[copy]) > 0)
       to->touched[to->touched_count++] = copy;
   }
-  SONDE_ASSERT(to->touched_count <= to->model->surface.vertex_count);
+  SONDE_ASSERT(to->touched_count <= to->nodes.count);
   to->contact = from->contact;
   to->mu = from->mu;
 }
@@ -78,7 +78,7 @@ sonde_status sonde_state_cut(sonde_state *before, const sonde_vec3 *path_m, uint
   if (!status) {
     sonde_state *to = *after;
     uint32_t nodes = own.node_count + own.added;
-    SONDE_ASSERT(nodes == to->model->surface.vertex_count);
+    SONDE_ASSERT(nodes == to->nodes.count);
     SONDE_ASSERT(to->model->surface.face_count == before->model->surface.face_count);
     sonde_state_retune(to, &before->tuning);
     copy_vectors(&own, sonde_state_positions(before), moved);

@@ -20,7 +20,7 @@ double sonde_friction_coefficient(const sonde_friction *friction, double slip_m_
 
 void sonde_friction_release(sonde_state *state) {
   state->mu = sonde_friction_coefficient(&state->def.friction, 0);
-  for (uint32_t i = 0; i < state->model->surface.vertex_count; ++i)
+  for (uint32_t i = 0; i < state->nodes.count; ++i)
     state->bond_m[i] = state->grip_n[i] = vec3(0, 0, 0);
 }
 
@@ -53,7 +53,7 @@ bool sonde_friction_at(const sonde_state *state, uint32_t i, const sonde_motion 
                        const sonde_contact_scales *scales, sonde_vec3 *force, sonde_mat3 *block) {
   bond at;
   double reach = state->def.implicitness * state->def.dt_s;
-  SONDE_ASSERT(i < state->model->surface.vertex_count && reach >= 0);
+  SONDE_ASSERT(i < state->nodes.count && reach >= 0);
   if (!bond_of(state, i, probe, v_scale(state->velocity[i], reach), &at)) return false;
   double length = v_norm(at.b_m);
   bool slips = length > at.limit_m;

@@ -1,16 +1,18 @@
-// Kernels of an engine (docs/world.md), compiled once per instruction set and precision. Every sum
-// has a fixed order: all sets give the same bits. The tissue is in kernel_tissue.c, the contact in
-// kernel_contact.c; here are the sweeps and conjugate gradients over batches of nodes.
+// Kernels of an engine (docs/world.md), compiled once per instruction set and precision
+// with each deformable model. Every sum has a fixed order: all sets give the same bits. The tissue
+// is in the model's kernel.h, the contact in kernel_contact.c; here are the sweeps and conjugate
+// gradients over batches of nodes.
 #include "world/batches.h"
 
 #include "base/base.h"
 
-#include "world/kernel_tissue.c"
+#include SONDE_MODEL_KERNEL
 
 #include "world/kernel_contact.c"
 
 // coupled: corner couplings do their part; else a row's own block stands for all of them.
-INLINE void add_contact(const sonde_batch_contact *contact, bool coupled_corners, node_sum *sum) {
+INLINE void add_contact(const sonde_batch_contact *contact, bool coupled_corners,
+                        sonde_row_sum *sum) {
   for (int c = 0; c < 3; ++c) sum->force[c] += contact->force[c];
   for (int c = 0; c < 6; ++c)
     sum->block[c] +=
@@ -44,60 +46,84 @@ typedef struct sums_of_rows {
   wide_sum rr[2], ff, rz, reaction[3], holder[3]; // rr: far from and near the probe
 } sums_of_rows;
 
-INLINE void linearise_batch(sonde_batches *body, uint32_t s, coupled by, bool moves,
-                            sums_of_rows *sums) {
-  const sonde_batch_law *law = &body->law;
-  const sonde_batch_model *fixed = &body->model[s];
-  sonde_batch *at = &body->batch[s];
-  node_sum sum = {{{0}}, {{0}}, {0}, {0}, {{0}}, {0}};
-  place here;
+// Displacement and velocity where a batch is evaluated.
+INLINE sonde_motion_at motion_at(const sonde_batches *body, uint32_t s) {
+  const sonde_batch *at = &body->batch[s];
+  sonde_motion_at here;
   for (int c = 0; c < 3; ++c)
-    here.ve[c] = at->ve[c], here.ue[c] = at->u[c] + law->reach * at->ve[c];
-  here.indentation = -dot(fixed->normal, here.ue);
-  add_springs(body, fixed, by, &here, &sum);
+    here.ve[c] = at->ve[c], here.ue[c] = at->u[c] + body->step.reach * at->ve[c];
+  return here;
+}
+
+INLINE void write_place(sonde_batches *body, uint32_t s, const sonde_motion_at *at) {
+  const reals low[4] = {at->ue[0], at->ue[1], at->ue[2], at->ve[0]};
+  const reals high[4] = {at->ve[1], at->ve[2], {0}, {0}};
+  real *record = body->tissue->published[0].place + (size_t)s * SONDE_BATCH * SONDE_RECORD;
+  if (!body->tissue->reads_rows) return;
+  write_records(record, SONDE_RECORD, low);
+  write_records(record + 4, SONDE_RECORD, high);
+}
+
+INLINE void publish_record(sonde_batches *body, uint32_t s) {
+  sonde_motion_at here = motion_at(body, s);
+  write_place(body, s, &here);
+  tissue_publish(body->tissue, s, &here);
+}
+
+INLINE void publish_direction(sonde_batches *body, uint32_t s, const reals z[3]) {
+  real *direction = body->tissue->published[0].direction + (size_t)s * SONDE_BATCH * SONDE_QUAD;
+  const reals whole_z[4] = {z[0], z[1], z[2], {0}};
+  if (body->tissue->reads_rows || (body->corners_coupled && body->contact_of[s]))
+    write_records(direction, SONDE_QUAD, whole_z);
+  tissue_publish_direction(body->tissue, s, z);
+}
+
+INLINE void linearise_batch(sonde_batches *body, uint32_t s, bool moves, sums_of_rows *sums) {
+  const sonde_step_scales *step = &body->step;
+  const sonde_rows *rows = &body->rows[s];
+  sonde_batch *at = &body->batch[s];
+  sonde_row_sum sum = {{{0}}, {{0}}, {{0}}};
+  const sonde_motion_at here = motion_at(body, s);
+  tissue_evaluate(body->tissue, step, rows, s, &here, &sum);
   for (int c = 0; c < 3; ++c) sums->reaction[c] += widen(sum.force[c]);
   if (body->holds)
     for (int c = 0; c < 3; ++c) sums->holder[c] += widen(sum.force[c] * (1 - body->free[s]));
   if (body->contact_of[s])
     add_contact(&body->contact[body->contact_of[s] - 1], body->corners_coupled, &sum);
-  reals force[3], r[3], x[3], mass = law->mass_scale * fixed->mass;
+  reals force[3], r[3], x[3], mass = step->mass_scale * rows->mass;
   for (int c = 0; c < 3; ++c) {
-    force[c] = law->force_scale * sum.force[c];
-    r[c] = force[c] - mass * (here.ve[c] - at->v[c]);
-    if (by.layers) r[c] -= sum.pending * fixed->normal[c];
+    force[c] = step->force_scale * sum.force[c];
+    r[c] = force[c] - mass * (here.ve[c] - at->v[c]) - sum.pending[c];
     if (body->holds) r[c] *= body->free[s];
   }
-  reals yield = fixed->yield / law->force_scale, force2 = dot(force, force);
+  reals yield = rows->yield / step->force_scale, force2 = dot(force, force);
   body->unrest2[s] = most(force2 * (yield * yield));
   factorise(sum.block, at->factor);
   divide(at->factor, r, x);
+  sonde_motion_at moved = here;
   for (int c = 0; c < 3; ++c) {
-    at->x[c] = moves ? x[c] : (reals){0}, here.ve[c] += x[c];
-    here.ue[c] = at->u[c] + law->reach * here.ve[c];
+    at->x[c] = moves ? x[c] : (reals){0}, moved.ve[c] += x[c];
+    moved.ue[c] = at->u[c] + step->reach * moved.ve[c];
     if (!moves) at->r[c] = r[c], at->z[c] = x[c];
   }
   wide_sum *rr = &sums->rr[body->is_near[s]];
   *rr += widen(dot(r, r));
   sums->rz += widen(dot(r, x));
   sums->ff += widen(force2);
-  if (moves && by.springs) publish_place(body, s, here.ve, here.ue);
-  if (moves && by.layers) publish_slide(body, s, here.ue, here.indentation, dot(fixed->normal, x));
+  if (moves) {
+    write_place(body, s, &moved);
+    tissue_publish_move(body->tissue, s, &here, &moved, x);
+  }
   publish_direction(body, s, x);
 }
 
 static void linearise(sonde_batches *body, uint32_t part, bool moves, sonde_batch_sums *sums) {
-  const sonde_batch_law *law = &body->law;
   sums_of_rows rows = {{{0}}, {0}, {0}, {{0}}, {{0}}};
-  SONDE_ASSERT(law->force_scale > 0 && law->mass_scale > 0);
+  SONDE_ASSERT(body->step.force_scale > 0 && body->step.mass_scale > 0);
   sums->slots = 0;
   for (uint32_t a = body->part_awake[part]; a < body->part_awake[part + 1]; ++a) {
-    sums->slots += body->model[body->awake[a]].slot_count;
-    if (law->springs && law->layered)
-      linearise_batch(body, body->awake[a], (coupled){true, true}, moves, &rows);
-    else if (law->layered)
-      linearise_batch(body, body->awake[a], (coupled){false, true}, moves, &rows);
-    else
-      linearise_batch(body, body->awake[a], (coupled){true, false}, moves, &rows);
+    sums->slots += tissue_slots(body->tissue, body->awake[a]);
+    linearise_batch(body, body->awake[a], moves, &rows);
   }
   sums->far2 = total(rows.rr[0]);
   sums->residual2 = sums->far2 + total(rows.rr[1]);
@@ -110,12 +136,7 @@ static void linearise(sonde_batches *body, uint32_t part, bool moves, sonde_batc
 
 // q += A p without the diagonal blocks for a batch, p the directions.
 INLINE void couple(sonde_batches *body, uint32_t s, reals q[3]) {
-  if (body->law.springs && body->law.layered)
-    multiply_batch(body, &body->model[s], (coupled){true, true}, q);
-  else if (body->law.layered)
-    multiply_batch(body, &body->model[s], (coupled){false, true}, q);
-  else
-    multiply_batch(body, &body->model[s], (coupled){true, false}, q);
+  tissue_multiply(body->tissue, &body->step, s, q);
   if (body->contact_of[s]) {
     const sonde_batch_contact *contact = &body->contact[body->contact_of[s] - 1];
     wholes rows;
@@ -215,11 +236,15 @@ static void advance(sonde_batches *body, uint32_t part, bool first, real alpha, 
   sums->residual2 = total(rr);
 }
 
+// What the linear system does not see of the move that x makes, as an impulse, like the residual.
 static double bend(sonde_batches *body, uint32_t part) {
   wide_sum sum = {0};
   for (uint32_t a = body->part_awake[part]; a < body->part_awake[part + 1]; ++a) {
     uint32_t s = body->awake[a];
-    reals unseen = unseen_by_tangent(&body->law, &body->model[s], &body->batch[s]);
+    const sonde_batch *at = &body->batch[s];
+    reals moved2 = body->step.reach * body->step.reach * dot(at->x, at->x);
+    reals unseen =
+        body->step.force_scale * moved2 * tissue_unseen(body->tissue, &body->rows[s], s, at->u);
     sum += widen(unseen * unseen);
   }
   return total(sum);
@@ -229,26 +254,13 @@ static void accept(sonde_batches *body, uint32_t part) {
   for (uint32_t a = body->part_awake[part]; a < body->part_awake[part + 1]; ++a) {
     sonde_batch *at = &body->batch[body->awake[a]];
     for (int c = 0; c < 3; ++c) at->ve[c] += at->x[c], at->x[c] = (reals){0};
-    publish_record(body, body->awake[a], at->ve);
-  }
-}
-
-// Keeps the indentation below x_m: at most 95 % of the remaining gap per step.
-INLINE void bound(const sonde_batch_model *fixed, real h, const sonde_batch *at, reals move[3],
-                  reals v[3]) {
-  reals gap = (real)0.95 * (fixed->xm + dot(fixed->normal, at->u));
-  reals over = -dot(fixed->normal, move) - larger(gap, all(0));
-  over = larger(over, all(0));
-  for (int c = 0; c < 3; ++c) {
-    move[c] += over * fixed->normal[c];
-    v[c] += over * fixed->normal[c] / h;
+    publish_record(body, body->awake[a]);
   }
 }
 
 // u += h (v + lambda dv), v += dv: ve with x is v + lambda dv, or, explicit, x is dv.
 static double update(sonde_batches *body, uint32_t part) {
-  const sonde_batch_law *law = &body->law;
-  real h = law->dt, lambda = law->lambda;
+  real h = body->step.dt, lambda = body->step.lambda;
   SONDE_ASSERT(h > 0 && lambda >= 0 && lambda <= 1);
   wide_sum sum = {0};
   for (uint32_t a = body->part_awake[part]; a < body->part_awake[part + 1]; ++a) {
@@ -262,7 +274,7 @@ static double update(sonde_batches *body, uint32_t part) {
       else if (lambda < 1)
         v[c] = at->v[c] + (v[c] - at->v[c]) / lambda;
     }
-    bound(&body->model[s], h, at, move, v);
+    tissue_bound(body->tissue, s, h, at->u, move, v);
     for (int c = 0; c < 3; ++c) {
       at->u[c] += move[c];
       at->ve[c] = v[c] + lambda * (v[c] - at->v[c]);
@@ -272,18 +284,18 @@ static double update(sonde_batches *body, uint32_t part) {
     body->speed2[s] = most(speed2);
     body->moved2[s] = most(moved2);
     body->common.published[s] = 0;
-    publish_record(body, s, at->ve);
+    publish_record(body, s);
     sum += widen(speed2 + moved2);
   }
   return total(sum);
 }
 
 // Whether a node of the batch is inside the box where it is evaluated.
-INLINE bool reaches(const sonde_batch_model *fixed, const sonde_batch *at, real reach,
-                    const real low[3], const real high[3], real margin) {
+INLINE bool reaches(const sonde_rows *rows, const sonde_batch *at, real reach, const real low[3],
+                    const real high[3], real margin) {
   wholes inside = (wholes){0} == (wholes){0};
   for (int c = 0; c < 3; ++c) {
-    reals x = fixed->place[c] + (at->u[c] + reach * at->ve[c]);
+    reals x = rows->place[c] + (at->u[c] + reach * at->ve[c]);
     inside &= (x >= low[c] - margin) & (x <= high[c] + margin);
   }
   return bits(inside) != 0;
@@ -299,7 +311,7 @@ INLINE uint32_t nearby(const sonde_batches *body, uint32_t group, const real low
   reals speed2 = larger(*(const reals *)(body->speed2 + group * SONDE_BATCH), least);
   reals unused, moved = root_and_inverse(moved2, &unused),
                 speed = root_and_inverse(speed2, &unused);
-  reals margin = edges * box->reach + (real)1e-4 + moved + 3 * body->law.dt * speed;
+  reals margin = edges * box->reach + (real)1e-4 + moved + 3 * body->step.dt * speed;
   wholes apart = {0};
   for (int c = 0; c < 3; ++c)
     apart |= (box->low[c] - margin > high[c]) | (box->high[c] + margin < low[c]);
@@ -312,14 +324,17 @@ static void near(sonde_batches *body, const real low[3], const real high[3], rea
     for (uint32_t rest = nearby(body, group, low, high, edges); rest; rest &= rest - 1) {
       uint32_t l = (uint32_t)__builtin_ctz(rest), s = group * SONDE_BATCH + l;
       real margin = edges * body->box[group].reach[l];
-      if (reaches(&body->model[s], &body->batch[s], body->law.reach, low, high, margin))
+      if (reaches(&body->rows[s], &body->batch[s], body->step.reach, low, high, margin))
         body->near_probe[count++] = s;
     }
   SONDE_ASSERT(count <= body->common.batch_count);
   body->near_probe_count = count;
 }
 
+static void record(sonde_batches *body, uint32_t s) { publish_record(body, s); }
+
 const sonde_kernels SONDE_KERNELS = {.name = SONDE_KERNELS_NAME,
+                                     .record = record,
                                      .linearise = linearise,
                                      .sweep = sweep,
                                      .restart = restart,

@@ -20,14 +20,14 @@ INLINE void add_carried(const sonde_batch_probe *probe, const reals x[3], reals 
 // `moved`: with the solution.
 INLINE seen_point seen(const sonde_batches *body, uint32_t s, bool moved) {
   const sonde_batch_probe *probe = &body->probe;
-  const sonde_batch_model *fixed = &body->model[s];
+  const sonde_rows *rows = &body->rows[s];
   const sonde_batch *at = &body->batch[s];
-  real reach = body->law.reach;
+  real reach = body->step.reach;
   seen_point p;
   for (int c = 0; c < 3; ++c) {
     reals v = moved ? at->ve[c] + at->x[c] : at->ve[c];
-    reals small = (fixed->place_low[c] - probe->origin_low[c]) + (at->u[c] + reach * v);
-    p.x[c] = (fixed->place[c] - probe->origin[c]) + small;
+    reals small = (rows->place_low[c] - probe->origin_low[c]) + (at->u[c] + reach * v);
+    p.x[c] = (rows->place[c] - probe->origin[c]) + small;
     p.v[c] = v - probe->velocity[c];
   }
   add_carried(probe, p.x, p.v);
@@ -179,9 +179,9 @@ INLINE reals push_at(const sonde_batch_probe *probe, reals area, const depths *b
 
 // A point's part of the matrix along its slope.
 INLINE reals steepness(const sonde_batches *body, reals area, reals push) {
-  const sonde_batch_law *law = &body->law;
+  const sonde_step_scales *step = &body->step;
   const sonde_batch_probe *probe = &body->probe;
-  real scale = law->stiffness_scale * probe->stiffness + law->damping_scale * probe->damping;
+  real scale = step->stiffness_scale * probe->stiffness + step->damping_scale * probe->damping;
   return pick(push > 0, scale * area, all(0));
 }
 
@@ -274,7 +274,7 @@ static bool push_nodes(const sonde_batches *body, uint32_t index, sonde_pushed_b
   SONDE_ASSERT(index < body->common.batch_count);
   at->index = index;
   at->inside = bits(by.inside[0]);
-  at->area = body->model[index].area;
+  at->area = body->rows[index].area;
   at->push[0] = push_at(&body->probe, at->area, &by, 0, &point);
   to->share[0] = at->area * by.depth[0];
   to->area = pick(by.inside[0], at->area, all(0));
@@ -298,7 +298,7 @@ INLINE reals push_after(const sonde_batches *body, const sonde_pushed_batch *at,
 INLINE void go_on(const sonde_batches *body, const reals move[3], seen_point *point) {
   reals step[3];
   for (int c = 0; c < 3; ++c) {
-    step[c] = body->law.reach * move[c];
+    step[c] = body->step.reach * move[c];
     point->x[c] += step[c];
     point->v[c] += move[c];
   }

@@ -38,9 +38,9 @@ static void mark_near(sonde_batches *body) {
   for (int ring = 0; ring < NEAR_RINGS; ++ring) {
     uint32_t before = count;
     for (uint32_t k = 0; k < before; ++k) {
-      const sonde_batch_model *fixed = &body->model[body->near_list[k]];
-      const uint32_t *near = body->near + fixed->first_near;
-      for (uint32_t n = 0; n < fixed->near_count; ++n) {
+      const sonde_rows *rows = &body->rows[body->near_list[k]];
+      const uint32_t *near = body->near + rows->first_near;
+      for (uint32_t n = 0; n < rows->near_count; ++n) {
         if (body->is_near[near[n]] || !body->common.is_awake[near[n]]) continue;
         body->is_near[near[n]] = 1;
         body->near_list[count++] = near[n];
@@ -79,21 +79,15 @@ static void add_friction(sonde_state *state, sonde_batches *body, const sonde_mo
 // (multiply, advance). Records of neighbours count once per slot; the contact does not count.
 enum {
   EVALUATED_PER_BATCH = 39,
-  EVALUATED_PER_SPRING = 16,
-  EVALUATED_PER_LAYERED = 12,
   SWEPT_PER_BATCH = 19,
   ITERATED_PER_BATCH = 44,
-  MULTIPLIED_PER_SPRING = 10,
-  MULTIPLIED_PER_LAYERED = 7,
   UPDATED_PER_BATCH = 29
 };
 
 static void count_bytes(sonde_batches *body, uint64_t sweeps, uint64_t iterations) {
   uint64_t batches = body->awake_count, slots = body->slot_total;
-  uint64_t springs = body->law.springs ? slots : 0, layered = body->law.layered ? slots : 0;
-  uint64_t evaluated = EVALUATED_PER_BATCH * batches + EVALUATED_PER_SPRING * springs +
-                       EVALUATED_PER_LAYERED * layered;
-  uint64_t multiplied = MULTIPLIED_PER_SPRING * springs + MULTIPLIED_PER_LAYERED * layered;
+  uint64_t evaluated = EVALUATED_PER_BATCH * batches + body->tissue->evaluated_per_slot * slots;
+  uint64_t multiplied = body->tissue->multiplied_per_slot * slots;
   body->common.bytes_moved +=
       sizeof(reals) * (evaluated + sweeps * (SWEPT_PER_BATCH * batches + multiplied) +
                        iterations * (ITERATED_PER_BATCH * batches + multiplied));
@@ -230,7 +224,7 @@ static bool is_equation_4(const sonde_state *state) {
 // forces are evaluated at the positions of the start with velocities of zero. The contact is found
 // where the velocities v of the start lead; at zero its pushes are less by its matrix times v.
 static void evaluate_at_rest(sonde_batches *body) {
-  const real force_scale = body->law.force_scale;
+  const real force_scale = body->step.force_scale;
   for (uint32_t k = 0; k < body->contact_count; ++k) {
     uint32_t s = body->contact_batch[k];
     const reals *v = body->batch[s].ve;
@@ -256,7 +250,7 @@ static void evaluate_at_rest(sonde_batches *body) {
   for (uint32_t a = 0; a < body->awake_count; ++a) {
     uint32_t s = body->awake[a];
     for (int c = 0; c < 3; ++c) body->batch[s].ve[c] = (reals){0};
-    for (uint32_t l = 0; l < SONDE_BATCH; ++l) sonde_batches_record(body, s * SONDE_BATCH + l);
+    body->kernels->record(body, s);
   }
 }
 
@@ -330,12 +324,12 @@ static void fall_asleep(sonde_state *state, sonde_batches *body, uint32_t s) {
   body->common.published[s] = 1;
   for (int c = 0; c < 3; ++c) at->v[c] = at->ve[c] = at->x[c] = (reals){0};
   sonde_batches_still(body, s, 1);
-  for (uint32_t l = 0; l < body->model[s].used; ++l) {
+  body->kernels->record(body, s);
+  for (uint32_t l = 0; l < body->rows[s].used; ++l) {
     uint32_t i = s * SONDE_BATCH + l;
-    sonde_batches_record(body, i);
     state->velocity[i] = vec3(0, 0, 0);
     state->position[i] = state->probed[i] =
-        v_add(state->model->surface.vertices[i], sonde_batch_vector(at->u, l));
+        v_add(state->nodes.rest[i], sonde_batch_vector(at->u, l));
   }
 }
 
@@ -351,8 +345,8 @@ static void rest(sonde_state *state, sonde_batches *body) {
     common->calm[state->touched[k] / SONDE_BATCH] = 0;
   for (uint32_t a = 0; a < body->awake_count; ++a) {
     uint32_t s = body->awake[a];
-    const uint32_t *near = body->near + body->model[s].first_near;
-    for (uint32_t k = 0; body->speed2[s] > 4 * still * still && k < body->model[s].near_count; ++k)
+    const uint32_t *near = body->near + body->rows[s].first_near;
+    for (uint32_t k = 0; body->speed2[s] > 4 * still * still && k < body->rows[s].near_count; ++k)
       if (!common->is_awake[near[k]]) wake(body, near[k]);
     if (body->speed2[s] > still * still || body->unrest2[s] > creep * creep)
       common->calm[s] = 0;
@@ -361,9 +355,9 @@ static void rest(sonde_state *state, sonde_batches *body) {
   }
   uint32_t turn = (uint32_t)(state->tick % SONDE_TRIAL_PERIOD);
   for (uint32_t s = turn; s < common->batch_count; s += SONDE_TRIAL_PERIOD) {
-    const uint32_t *near = body->near + body->model[s].first_near;
+    const uint32_t *near = body->near + body->rows[s].first_near;
     bool beside = false;
-    for (uint32_t k = 0; k < body->model[s].near_count; ++k) beside |= common->is_awake[near[k]];
+    for (uint32_t k = 0; k < body->rows[s].near_count; ++k) beside |= common->is_awake[near[k]];
     if (common->is_awake[s] || !beside) continue;
     common->is_awake[s] = 1;
     common->calm[s] = SONDE_CALM_TICKS - 1;
@@ -377,7 +371,9 @@ static void expect(sonde_state *state, sonde_batches *body) {
     uint32_t i = state->touched[k], l = i % SONDE_BATCH;
     sonde_batch *at = &body->batch[i / SONDE_BATCH];
     for (int c = 0; c < 3; ++c) at->ve[c][l] = at->v[c][l];
-    sonde_batches_record(body, i);
+    bool is_last =
+        k + 1 == state->touched_count || state->touched[k + 1] / SONDE_BATCH != i / SONDE_BATCH;
+    if (is_last) body->kernels->record(body, i / SONDE_BATCH);
   }
   if (!is_equation_4(state)) return;
   for (uint32_t a = 0; a < body->awake_count; ++a) {
@@ -389,10 +385,10 @@ static void expect(sonde_state *state, sonde_batches *body) {
 bool sonde_batches_step(sonde_state *state, const sonde_probe *probe, sonde_pose pose,
                         const sonde_motion *motion) {
   sonde_batches *body = sonde_batches_of(state);
-  SONDE_ASSERT(body->common.node_count == state->model->surface.vertex_count);
+  SONDE_ASSERT(body->common.node_count == state->nodes.count);
   if (body->common.stale)
-    body->common.calls->import(&body->common, state->model->surface.vertices, state->position,
-                               state->velocity, true);
+    body->common.calls->import(&body->common, state->nodes.rest, state->position, state->velocity,
+                               true);
   state->times = (sonde_stage_times){0};
   state->solver = (sonde_pcg_result){0};
   body->common.bytes_moved = 0;
@@ -415,7 +411,7 @@ bool sonde_batches_step(sonde_state *state, const sonde_probe *probe, sonde_pose
   if (finite) rest(state, body);
   state->awake_nodes = 0;
   for (uint32_t a = 0; a < body->awake_count; ++a)
-    state->awake_nodes += body->model[body->awake[a]].used;
+    state->awake_nodes += body->rows[body->awake[a]].used;
   state->times.update_s = sonde_clock_now() - solved;
   return finite;
 }

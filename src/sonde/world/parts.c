@@ -33,11 +33,14 @@ static void look(void *with, uint32_t part) {
   uint32_t count = body->part_seen[other + 1] - first;
   uint32_t to = body->common.batch_count * SONDE_BATCH + first;
   const uint32_t *from = body->seen + first;
-  bool places = j->phase == LINEARISE;
-  if (places && body->law.springs) copy_rows(body->record, to, from, count, SONDE_RECORD);
-  if (places && body->law.layered) copy_rows(body->slide, to, from, count, SONDE_RECORD);
-  if (!places && body->law.springs) copy_rows(body->direction, to, from, count, SONDE_QUAD);
-  if (!places && body->law.layered) copy_rows(body->layer_direction, to, from, count, SONDE_QUAD);
+  for (int k = 0; k < SONDE_PUBLISHED; ++k) {
+    const sonde_published *rows = &body->tissue->published[k];
+    if (!rows->place || (k == 0 && !body->tissue->reads_rows)) continue;
+    if (j->phase == LINEARISE)
+      copy_rows(rows->place, to, from, count, SONDE_RECORD);
+    else
+      copy_rows(rows->direction, to, from, count, SONDE_QUAD);
+  }
 }
 
 static void run_part(void *with, uint32_t part) {

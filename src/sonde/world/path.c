@@ -31,7 +31,7 @@ typedef struct path {
   equilibrium here, half, whole, end; // the step's start; after half, in one, and after two halves
 } path;
 
-static uint32_t nodes(const path *p) { return p->state->model->surface.vertex_count; }
+static uint32_t nodes(const path *p) { return p->state->nodes.count; }
 
 static sonde_pose pose_at(const path *p, double share) {
   sonde_quat a = p->from.rotation, b = p->to.rotation;
@@ -56,7 +56,8 @@ static void settle_from(path *p, const equilibrium *from, double share, double r
     if (!from->touched[i]) continue;
     const sonde_vec3 at = from->position[i];
     sonde_vec3 move = v_sub(pose_apply(is, pose_apply_inverse(was, at)), at);
-    state->position[i] = v_add(at, sonde_bounded_move(state->model, i, at, move));
+    state->position[i] =
+        v_add(at, sonde_model_bounded_move(state->model, i, v_sub(at, state->nodes.rest[i]), move));
   }
   to->settled = sonde_settle(state, p->probe, is, residual, p->def->max_iterations);
   to->share = share;

@@ -30,10 +30,9 @@ static balance evaluate(const problem *p) {
   sonde_state *state = p->state;
   sonde_batches *body = p->body;
   const sonde_motion still = {.origin = p->pose.position};
-  body->law.mass_scale = 1 / (p->tau_s * p->tau_s);
+  body->step.mass_scale = 1 / (p->tau_s * p->tau_s);
   body->corners_coupled = state->def.contact_law != SONDE_CONTACT_NODES;
-  for (uint32_t s = 0; s < body->common.batch_count; ++s)
-    for (uint32_t l = 0; l < SONDE_BATCH; ++l) sonde_batches_record(body, s * SONDE_BATCH + l);
+  for (uint32_t s = 0; s < body->common.batch_count; ++s) body->kernels->record(body, s);
   sonde_batches_detect(state, body, p->probe, p->pose, &still);
   balance at = {.sums = sonde_parts_linearise(body, false)};
   sonde_batches_advance_contact(state, body, false); // of no move: the pushes themselves
@@ -44,23 +43,20 @@ static balance evaluate(const problem *p) {
   return at;
 }
 
-// From the base along the solution, each node at most 95 % of the gap to its asymptote and 5 mm.
+// From the base along the solution, each node at most as far as its model lets it, and 5 mm.
 static void move(const problem *p, double share) {
   const double longest = 5e-3;
   SONDE_ASSERT(share > 0);
   for (uint32_t s = 0; s < p->body->common.batch_count; ++s) {
-    const sonde_batch_model *fixed = &p->body->model[s];
     const sonde_batch *base = &p->body->base[s];
     sonde_batch *at = &p->body->batch[s];
     double moved2 = 0;
-    for (uint32_t l = 0; l < fixed->used; ++l) {
+    for (uint32_t l = 0; l < p->body->rows[s].used; ++l) {
       sonde_vec3 d = v_scale(sonde_batch_vector(base->x, l), share);
-      sonde_vec3 u = sonde_batch_vector(base->u, l), n = sonde_batch_vector(fixed->normal, l);
+      sonde_vec3 u = sonde_batch_vector(base->u, l);
       double size = v_norm(d);
       if (size > longest) d = v_scale(d, longest / size);
-      double gap = fmax(0.95 * (fixed->xm[l] + v_dot(n, u)), 0), over = -v_dot(n, d) - gap;
-      if (over > 0) d = v_madd(d, over, n);
-      u = v_add(u, d);
+      u = v_add(u, sonde_model_bounded_move(p->state->tissue, s * SONDE_BATCH + l, u, d));
       at->u[0][l] = u.x, at->u[1][l] = u.y, at->u[2][l] = u.z;
       moved2 = fmax(moved2, v_norm2(u));
     }
@@ -164,14 +160,14 @@ static bool begin(sonde_state *state, problem *p) {
                                                     &state->precise, NULL))
     return false;
   sonde_batches *body = (sonde_batches *)(void *)state->precise;
-  memset(state->velocity, 0, state->model->surface.vertex_count * sizeof *state->velocity);
+  memset(state->velocity, 0, state->nodes.count * sizeof *state->velocity);
   sonde_contact_clear(state);
-  body->common.calls->import(&body->common, state->model->surface.vertices, state->position,
-                             state->velocity, true);
+  body->common.calls->import(&body->common, state->nodes.rest, state->position, state->velocity,
+                             true);
   memset(body->is_near, 0, body->common.batch_count);
   sonde_batches_list(body, body->common.is_awake);
-  body->law.reach = body->law.force_scale = body->law.stiffness_scale = 1;
-  body->law.damping_scale = 0;
+  body->step.reach = body->step.force_scale = body->step.stiffness_scale = 1;
+  body->step.damping_scale = 0;
   *p =
       (problem){.state = state, .body = body, .pose = {.rotation = quat_identity()}, .tau_s = 0.02};
   return true;
@@ -181,10 +177,9 @@ static bool begin(sonde_state *state, problem *p) {
 static void end(problem *p) {
   sonde_state *state = p->state;
   sonde_batches *body = p->body;
-  sonde_batches_set_law(body, &state->tissue->law, &state->def);
+  sonde_batches_set_step(body, &state->def);
   memset(body->common.published, 0, body->common.batch_count);
-  body->common.calls->publish(&body->common, state->model->surface.vertices, state->position,
-                              state->velocity);
+  body->common.calls->publish(&body->common, state->nodes.rest, state->position, state->velocity);
   sonde_state_wake_all(state);
 }
 
@@ -208,7 +203,7 @@ sonde_settle_result sonde_settle_bonded(sonde_state *state, const uint32_t *node
   problem p;
   sonde_state_publish(state);
   for (uint32_t k = 0; k < count; ++k) {
-    SONDE_ASSERT(nodes[k] < state->model->surface.vertex_count);
+    SONDE_ASSERT(nodes[k] < state->nodes.count);
     state->position[nodes[k]] = positions_m[k];
   }
   state->engine->stale = true; // the positions are newer

@@ -14,15 +14,14 @@ static sonde_status check_head(const sonde_state *state, const sonde_snapshot_he
   if (!mine || head->doubles > 1 || head->has_probe_pose > 1 || !pose ||
       head->contact.region_count > SONDE_MAX_REGIONS || head->awake_nodes > head->nodes)
     return sonde_fail(error, SONDE_FORMAT, "not a saved state of this version");
-  if (head->nodes != state->model->surface.vertex_count ||
-      head->batches != state->engine->batch_count ||
+  if (head->nodes != state->nodes.count || head->batches != state->engine->batch_count ||
       head->model_checksum != state->model->checksum || head->engine != state->def.engine ||
       head->contact_law != state->def.contact_law ||
       memcmp(&head->dt_s, &state->def.dt_s, sizeof head->dt_s) != 0)
     return sonde_fail(error, SONDE_MISMATCH,
                       "a saved state of %u nodes, engine %u, step %g s does not fit this one (%u, "
                       "%u, %g s) or its model",
-                      head->nodes, head->engine, head->dt_s, state->model->surface.vertex_count,
+                      head->nodes, head->engine, head->dt_s, state->nodes.count,
                       (unsigned)state->def.engine, state->def.dt_s);
   if (head->touched > head->nodes)
     return sonde_fail(error, SONDE_FORMAT, "the saved state lacks its nodes");
@@ -75,7 +74,7 @@ static void restore_motion(sonde_state *state, const sonde_snapshot_parts *parts
 
 // Forgets the contact at hand; nodes that the saved contact does not touch have none.
 static void restore_touched(sonde_state *state, const sonde_snapshot_head *head, const char *from) {
-  size_t n = state->model->surface.vertex_count;
+  size_t n = state->nodes.count;
   memset(state->share_m3, 0, n * sizeof *state->share_m3);
   memset(state->gradient, 0, n * sizeof *state->gradient);
   memset(state->contact_force, 0, n * sizeof *state->contact_force);
@@ -126,7 +125,8 @@ sonde_status sonde_state_restore(sonde_state *state, const void *blob, size_t by
 // The numbers that an engine publishes, from batches of `nodes` floats or doubles.
 static uint64_t hash_batches(const sonde_model *model, const char *batches, bool fast,
                              uint64_t hash) {
-  uint32_t n = model->surface.vertex_count, nodes = fast ? 16 : 8;
+  const sonde_nodes all = sonde_model_nodes(model);
+  uint32_t n = all.count, nodes = fast ? 16 : 8;
   size_t real_bytes = fast ? sizeof(float) : sizeof(double);
   for (int part = 0; part < 2; ++part)
     for (uint32_t i = 0; i < n; ++i) {
@@ -139,7 +139,7 @@ static uint64_t hash_batches(const sonde_model *model, const char *batches, bool
         if (fast) at[c] = (double)narrow;
       }
       sonde_vec3 v = vec3(at[0], at[1], at[2]);
-      if (part == 0) v = v_add(model->surface.vertices[i], v);
+      if (part == 0) v = v_add(all.rest[i], v);
       hash = sonde_hash(hash, &v, sizeof v);
     }
   return hash;
@@ -149,7 +149,7 @@ uint64_t sonde_state_saved_hash(const sonde_model *model, const void *blob) {
   sonde_snapshot_head head;
   memcpy(&head, blob, sizeof head);
   SONDE_ASSERT(memcmp(head.magic, "SNDSTATE", sizeof head.magic) == 0);
-  SONDE_ASSERT(head.nodes == model->surface.vertex_count);
+  SONDE_ASSERT(head.nodes == sonde_model_nodes(model).count);
   bool fast = head.engine == SONDE_ENGINE_FAST;
   uint64_t hash = sonde_hash(0, &head.tick, sizeof head.tick);
   const char *from = (const char *)blob;

@@ -21,7 +21,7 @@ static void save_touched(const sonde_state *state, char *to) {
 
 size_t sonde_state_size(const sonde_state *state) {
   SONDE_ASSERT(state != NULL);
-  return sonde_snapshot_layout(state, true, state->model->surface.vertex_count).end;
+  return sonde_snapshot_layout(state, true, state->nodes.count).end;
 }
 
 size_t sonde_state_save(const sonde_state *state, void *blob) {
@@ -36,7 +36,7 @@ size_t sonde_state_save(const sonde_state *state, void *blob) {
   memcpy(head.magic, "SNDSTATE", sizeof head.magic);
   head.version = SONDE_SNAPSHOT_VERSION, head.head_bytes = sizeof head;
   head.model_checksum = state->model->checksum;
-  head.nodes = state->model->surface.vertex_count, head.batches = engine->batch_count;
+  head.nodes = state->nodes.count, head.batches = engine->batch_count;
   head.engine = state->def.engine, head.contact_law = state->def.contact_law;
   head.tick = state->tick, head.flag_count = state->flag_count;
   head.doubles = doubles, head.touched = state->touched_count;

@@ -103,7 +103,7 @@ sonde_status sonde_state_tune(sonde_state *state, const sonde_tuning *t, sonde_e
 // All arrays in one block: measured and placed by the same code.
 static size_t carve(sonde_state *s, char *base) {
   size_t offset = 0;
-  uint32_t n = s->model->surface.vertex_count;
+  uint32_t n = s->nodes.count;
   CARVE(tuned_k0, n), CARVE(face_order, s->model->surface.face_count);
   CARVE(position, n), CARVE(velocity, n), CARVE(probed, n);
   CARVE(touched, n), CARVE(parent, n), CARVE(share_m3, n), CARVE(gradient, n);
@@ -140,6 +140,7 @@ sonde_status sonde_state_create_ordered(const sonde_model *model, const sonde_wo
   sonde_state *state = SONDE_NEW(sonde_state, 1);
   if (!state) return sonde_fail_memory(error);
   state->model = state->tissue = model;
+  state->nodes = sonde_model_nodes(model);
   state->tuning = sonde_tuning_default();
   state->def = *def;
   const sonde_engine_calls *calls =

@@ -6,6 +6,7 @@
 
 #include "base/link.h"
 #include "sonde/world.h"
+#include "tissue/nodes.h"
 
 typedef struct sonde_box {
   sonde_vec3 low, high;
@@ -19,6 +20,7 @@ typedef struct sonde_motion {
 struct sonde_state {
   const sonde_model *model;
   const sonde_model *tissue; // whose springs act: the model, or `tuned`
+  sonde_nodes nodes;         // of the model
   sonde_model tuned;         // shares the model's arrays but for k0_n_m3
   sonde_tuning tuning;
   sonde_world_def def;
@@ -88,9 +90,5 @@ void sonde_state_wake_all(sonde_state *state);
 SONDE_LINK void sonde_state_relax(sonde_state *state);
 // No probe: no contact. @thread tick
 void sonde_contact_clear(sonde_state *state);
-
-// A node's move from a place, kept to 95 % of the gap between its indentation and x_m. @thread tick
-sonde_vec3 sonde_bounded_move(const sonde_model *model, uint32_t i, sonde_vec3 from,
-                              sonde_vec3 move);
 
 #endif

@@ -5,19 +5,6 @@
 
 #include "base/base.h"
 
-// Keeps the indentation below x_m: at most 95 % of the remaining gap per step.
-sonde_vec3 sonde_bounded_move(const sonde_model *model, uint32_t i, sonde_vec3 from,
-                              sonde_vec3 move) {
-  sonde_vec3 n = model->normal[i];
-  double advance = -v_dot(n, move);
-  if (!(advance > 0)) return move;
-  double s = v_dot(n, v_sub(model->surface.vertices[i], from));
-  double gap = 0.95 * (model->xm_m[i] - s);
-  if (advance <= gap) return move;
-  if (gap < 0) gap = 0;
-  return v_madd(move, advance - gap, n);
-}
-
 static sonde_motion probe_motion(const sonde_state *state, sonde_pose pose) {
   sonde_motion motion = {.origin = pose.position};
   if (!state->has_probe_pose) return motion;

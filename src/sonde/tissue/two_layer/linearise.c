@@ -3,7 +3,7 @@
 // engines.
 #define SONDE_REAL_SCALAR
 #include "tissue/laws.h"
-#include "tissue/two_layer.h"
+#include "tissue/two_layer/linearise.h"
 
 #include "base/base.h"
 #include "base/maths.h"

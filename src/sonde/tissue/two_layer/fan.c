@@ -2,7 +2,7 @@
 // ahead, behind: corners of a face after and before a node, counter-clockwise.
 // is_taken, find: faces that no chain has yet.
 // emit, chain:    one run of faces, each beginning where the one before ends.
-#include "world/fan.h"
+#include "tissue/two_layer/fan.h"
 
 #include "base/base.h"
 
