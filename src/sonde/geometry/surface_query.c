@@ -183,7 +183,7 @@ bool sonde_surface_raycast(const sonde_surface_index *index, sonde_vec3 origin,
 
 // ---- inside -------------------------------------------------------------------------------
 
-bool sonde_surface_inside(const sonde_surface_index *index, sonde_vec3 query) {
+double sonde_surface_signed_distance(const sonde_surface_index *index, sonde_vec3 query) {
   SONDE_ASSERT(index != NULL);
   sonde_surface_point closest = sonde_surface_closest(index, query);
   // Normal of the corner, side or face that the closest point lies on. With angle weights at
@@ -196,5 +196,10 @@ bool sonde_surface_inside(const sonde_surface_index *index, sonde_vec3 query) {
       normal = index->side_normal[closest.face][(k + 1) % 3];
   for (int k = 2; k >= 0; --k)
     if (w[k] == 1) normal = index->vertex_normal[index->mesh.faces[closest.face][k]];
-  return v_dot(v_sub(query, closest.point_m), normal) < 0;
+  bool inside = v_dot(v_sub(query, closest.point_m), normal) < 0;
+  return inside ? -closest.distance_m : closest.distance_m;
+}
+
+bool sonde_surface_inside(const sonde_surface_index *index, sonde_vec3 query) {
+  return sonde_surface_signed_distance(index, query) < 0;
 }
