@@ -189,6 +189,42 @@ static sonde_status run(simulation *s, sonde_error *error) {
   return status;
 }
 
+// What makes a result one that cannot be trusted, in the order of telling. A body that begins
+// inside another is let out of it, which is told but is no fault.
+typedef struct fault {
+  uint32_t flag;
+  const char *what, *other; // between the bodies' names and behind the second
+} fault;
+static const fault FAULTS[] = {
+    {SONDE_SCENE_INVERTED, "turned inside out", ""},
+    {SONDE_SCENE_PASSED, "went through", ""},
+    {SONDE_SCENE_INSIDE, "was wholly inside", " and was let out"},
+    {SONDE_SCENE_NON_FINITE, "a step was not finite and was undone", ""},
+    {SONDE_SCENE_CONTACT_FULL, "there was more contact than room for it, and forces are missing",
+     ""},
+};
+
+// Tells every fault in a sentence with its bodies and its time; true when the result is spoilt.
+static bool tell_faults(const simulation *s, char *first, size_t size) {
+  bool spoilt = false;
+  for (size_t k = 0; k < sizeof FAULTS / sizeof *FAULTS; ++k) {
+    sonde_scene_event event = sonde_scene_first(s->state, FAULTS[k].flag);
+    if (!event.count) continue;
+    uint32_t bodies = sonde_scene_body_count(s->scene);
+    const char *body = event.body < bodies ? sonde_scene_body(s->scene, event.body).name : "";
+    const char *other = event.other < bodies ? sonde_scene_body(s->scene, event.other).name : "";
+    char sentence[320];
+    snprintf(sentence, sizeof sentence, "%s%s%s%s%s%s at %.6g s", body, *body ? " " : "",
+             FAULTS[k].what, *other ? " " : "", other, FAULTS[k].other, event.time_s);
+    bool worse = FAULTS[k].flag != SONDE_SCENE_INSIDE || event.time_s > 0;
+    if (worse && !spoilt) snprintf(first, size, "%s", sentence);
+    spoilt |= worse;
+    fprintf(stderr, "sonde simulate: %s%s\n", worse ? "the result cannot be trusted: " : "",
+            sentence);
+  }
+  return spoilt;
+}
+
 // A cancelled run ends with a snapshot only, so that tables and frames keep their rhythm.
 static int simulate(void *from) {
   simulation s = {.a = *(const options *)from};
@@ -216,6 +252,8 @@ static int simulate(void *from) {
   if (!status && s.cancelled) status = save_snapshot(&s, &error);
   if (!status && s.a.picture) status = scene_figure(s.scene, s.state, s.a.picture, &error);
   double steps = status ? 0 : (double)(sonde_scene_tick(s.state) - s.start);
+  char trouble[320] = "";
+  bool spoilt = !status && tell_faults(&s, trouble, sizeof trouble);
   if (!status && s.a.json) {
     app_json_begin();
     app_json("title:%s bodies:%u steps:%lu time_s:%g ms_per_step:%g solver_iterations_per_step:%g "
@@ -226,7 +264,7 @@ static int simulate(void *from) {
              sonde_scene_flag_count(s.state), sonde_scene_all_flags(s.state));
     char hash[24];
     snprintf(hash, sizeof hash, "%016llx", (unsigned long long)sonde_scene_hash(s.state));
-    app_json("hash:%s cancelled:%hhd", hash, s.cancelled);
+    app_json("hash:%s cancelled:%hhd trusted:%hhd trouble:%s", hash, s.cancelled, !spoilt, trouble);
     app_json_end();
   }
   if (!status && !s.a.json) {
@@ -248,7 +286,7 @@ static int simulate(void *from) {
   sonde_scene_state_destroy(s.state);
   sonde_scene_destroy(s.scene);
   if (status) return app_fail(VERB, &error);
-  return s.cancelled ? APP_FAILED : APP_OK;
+  return s.cancelled || spoilt ? APP_FAILED : APP_OK;
 }
 
 const app_command cmd_simulate = {

@@ -110,7 +110,19 @@ enum {
   SONDE_SCENE_NOT_CONVERGED = 1u << 1, /**< the solver hit its iteration limit */
   SONDE_SCENE_CONTACT_FULL = 1u << 2,  /**< more contact than there was room for */
   SONDE_SCENE_SUBSTEP_LIMIT = 1u << 3, /**< the smallest substep missed the tolerance */
+  SONDE_SCENE_INVERTED = 1u << 4,      /**< a deformable body is inside out, or a part of it */
+  SONDE_SCENE_PASSED = 1u << 5,        /**< a body went through another */
+  SONDE_SCENE_INSIDE = 1u << 6,        /**< a body was found wholly inside another */
+  SONDE_SCENE_FLAGS = 7                /**< how many there are */
 };
+
+/** The first step that raised a flag. */
+typedef struct sonde_scene_event {
+  double time_s;        /**< at its start */
+  uint32_t count;       /**< 0: it was never raised; else 1 */
+  uint32_t body, other; /**< whose it is, and of INSIDE and PASSED the other; UINT32_MAX: none */
+  uint32_t unused;
+} sonde_scene_event;
 
 /** What the last step did. */
 typedef struct sonde_scene_report {
@@ -132,6 +144,8 @@ SONDE_API sonde_scene_report sonde_scene_last(const sonde_scene_state *state); /
 SONDE_API uint64_t sonde_scene_flag_count(const sonde_scene_state *state);
 /** All flags since the start. @thread tick */
 SONDE_API uint32_t sonde_scene_all_flags(const sonde_scene_state *state);
+/** @param flag one of the bits @thread tick */
+SONDE_API sonde_scene_event sonde_scene_first(const sonde_scene_state *state, uint32_t flag);
 SONDE_API uint64_t sonde_scene_tick(const sonde_scene_state *state); /**< @thread tick */
 SONDE_API double sonde_scene_time(const sonde_scene_state *state);   /**< @thread tick */
 /** Hash of everything that moves: equal runs have equal hashes. @thread owner */

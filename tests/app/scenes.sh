@@ -12,4 +12,15 @@ done
 # The floor, 200 mm, is as wide as the picture.
 span=$(grep '^<path' fallen.svg | grep -o '[ML][0-9.]*' | tr -d ML | sort -n | awk 'NR == 1 { low = $1 } END { print int($1 - low) }')
 ((span > 400)) || wrong "the bodies are $span pixels wide, expected most of the picture's 520"
+
+# A spoilt run ends with 1 and says which body and when; its files and its JSON are there all the same.
+run simulate "$hostile/sheet.yaml" -o sheet --no-frames --json
+checks=$((checks + 1))
+((status == 1)) || wrong "the sheet: exit $status, expected 1"
+grep -q 'cannot be trusted: sheet turned inside out at 0.06[0-9]* s' "$err" || wrong "the sheet is not named"
+"$CHECK_JSON" flagged_steps\>=1 trusted:bool trouble:text <"$out" || wrong "the sheet: JSON"
+[[ $(wc -l <sheet/bodies.csv) -ge 100 ]] || wrong "the sheet left no table"
+# What begins inside another is told and is no fault.
+gives "trusted:bool" simulate "$hostile/inside.yaml" -o inside --no-frames --json
+grep -q 'ball was wholly inside block and was let out at 0 s' "$err" || wrong "the ball is not named"
 finish

@@ -1,5 +1,6 @@
 // Depth and first touch of convex bodies: closed forms, enumeration of all axes, libccd.
 #include "contact/bodies.h"
+#include "contact/expand.h"
 #include "geometry/internal.h"
 
 #ifdef SONDE_TEST_CCD
@@ -96,7 +97,7 @@ static void test_random_depth(void **state) {
     bool shallow = k % 4 != 0;
     sonde_vec3 last = press(&a, pa, &b, &pb, shape_uniform(&seed, 1e-4, shallow ? 0.003 : 0.03));
     double exact = exact_depth(&a, pa, &b, pb);
-    sonde_depth_result r = sonde_convex_expand(&a, pa, &b, pb, 1e-9);
+    sonde_depth_result r = convex_expand(&a, pa, &b, pb, 1e-9);
     // Two corners pushed past each other may miss.
     assert_int_equal(r.overlap, exact > 0);
     if (!r.overlap) {
@@ -147,18 +148,18 @@ static void test_analytic_depth(void **state) {
     sonde_vec3 way = shape_direction(&seed);
     double depth = shape_uniform(&seed, 2e-4, 0.01);
     sonde_pose pb = {v_madd(pa.position, 0.04 - depth, way), shape_rotation(&seed)};
-    sonde_depth_result e = sonde_convex_expand(&round, pa, &round, pb, 1e-7);
+    sonde_depth_result e = convex_expand(&round, pa, &round, pb, 1e-7);
     sonde_depth_result j = sonde_convex_displace(&round, pa, &round, pb, nowhere);
     // The meshes lie up to 2 x 1.1e-5 m inside the balls.
     assert_near(e.depth_m, depth, 4e-5);
     assert_near(j.depth_m, depth, 4e-5);
     assert_true(v_dot(e.direction, way) > 0.98 && v_dot(j.direction, way) > 0.98);
     pb.position = v_madd(pa.position, 0.0401, way);
-    assert_false(sonde_convex_expand(&round, pa, &round, pb, 1e-7).overlap);
+    assert_false(convex_expand(&round, pa, &round, pb, 1e-7).overlap);
     assert_false(sonde_convex_displace(&round, pa, &round, pb, nowhere).overlap);
     sonde_vec3 shift = q_rotate(pa.rotation, vec3(0.01, 0.005, 0.02 - 0.1 * depth));
     pb = (sonde_pose){v_add(pa.position, shift), pa.rotation};
-    e = sonde_convex_expand(&box, pa, &box, pb, 1e-9);
+    e = convex_expand(&box, pa, &box, pb, 1e-9);
     assert_near(e.depth_m, 0.1 * depth, 1e-9);
     assert_near(v_distance(e.direction, q_rotate(pa.rotation, vec3(0, 0, 1))), 0, 1e-6);
     assert_near(pose_apply_inverse(pa, e.point_a_m).z, 0.01, 1e-9);
@@ -217,7 +218,7 @@ static void test_libccd(void **state) {
     ccd_real_t depth;
     ccd_vec3_t way, at;
     int failed = ccdGJKPenetration(&first, &second, &ccd, &depth, &way, &at);
-    sonde_depth_result r = sonde_convex_expand(&a, pa, &b, pb, 1e-8);
+    sonde_depth_result r = convex_expand(&a, pa, &b, pb, 1e-8);
     if (failed) {
       ++other_gave_up;
     } else {
@@ -255,7 +256,7 @@ static void test_depth_cost(void **state) {
       cold[s] += r.support_calls / (double)POSES;
       r = sonde_convex_displace(&body, pa, &body, pb, r.direction);
       warm[s] += r.support_calls / (double)POSES;
-      expand[s] += sonde_convex_expand(&body, pa, &body, pb, 1e-7).support_calls / (double)POSES;
+      expand[s] += convex_expand(&body, pa, &body, pb, 1e-7).support_calls / (double)POSES;
     }
     print_message(
         "%6.0f vertices: displaced %7.0f dot products, from a direction %7.0f; expanded %6.0f\n",

@@ -62,6 +62,16 @@ sonde_bounds sonde_face_tree_bounds(const sonde_face_tree *tree);
 uint32_t sonde_face_tree_pairs(const sonde_face_tree *a, const sonde_face_tree *b, double margin_m,
                                uint32_t (*pairs)[2], uint32_t capacity, uint64_t *work);
 
+/** A point of a mesh and the way to it from a point beside it. */
+typedef struct sonde_face_point {
+  uint32_t face;
+  double weight[3];   /**< barycentric */
+  double depth_m;     /**< distance; negative when the point beside lies outside */
+  sonde_vec3 outward; /**< unit, along the line through both points, from the inside outwards */
+} sonde_face_point;
+/** Point of the mesh nearest to another. @thread tick */
+sonde_face_point sonde_face_tree_nearest(const sonde_face_tree *tree, sonde_vec3 from);
+
 /* ---- common volume of two closed meshes --------------------------------------------------- */
 
 /** Room of an overlap; 0 selects the default. */
@@ -181,15 +191,6 @@ typedef struct sonde_depth_result {
 sonde_depth_result sonde_convex_displace(const sonde_convex *a, sonde_pose world_from_a,
                                          const sonde_convex *b, sonde_pose world_from_b,
                                          sonde_vec3 direction);
-/**
- * Depth by an expanding polytope of fixed room (van den Bergen 2001): within `tolerance_m` of the
- * least distance that parts the bodies, unless `converged` says otherwise.
- * @thread tick
- */
-sonde_depth_result sonde_convex_expand(const sonde_convex *a, sonde_pose world_from_a,
-                                       const sonde_convex *b, sonde_pose world_from_b,
-                                       double tolerance_m);
-
 /** Motion of a rigid body from a pose, with constant velocity of its origin and constant spin. */
 typedef struct sonde_motion {
   sonde_pose start;

@@ -1,6 +1,8 @@
 // The tree of boxes every step: fitting it to moved vertices and the pairs of two trees.
 #include "contact/tree.h"
 
+#include "geometry/triangle.h"
+
 void sonde_face_tree_refit(sonde_face_tree *tree, const sonde_vec3 *vertices) {
   SONDE_ASSERT(tree != NULL && vertices != NULL);
   tree->vertices = vertices;
@@ -57,4 +59,56 @@ uint32_t sonde_face_tree_pairs(const sonde_face_tree *a, const sonde_face_tree *
   }
   if (work) *work += tests;
   return count;
+}
+
+static double box_distance2(const sonde_bounds *box, sonde_vec3 p) {
+  double x = fmax(fmax(box->low.x - p.x, p.x - box->high.x), 0);
+  double y = fmax(fmax(box->low.y - p.y, p.y - box->high.y), 0);
+  double z = fmax(fmax(box->low.z - p.z, p.z - box->high.z), 0);
+  return x * x + y * y + z * z;
+}
+
+// Branch and bound over the tree. Of faces equally near, as at an edge, the one that looks most
+// along the line tells inside from outside.
+sonde_face_point sonde_face_tree_nearest(const sonde_face_tree *tree, sonde_vec3 from) {
+  SONDE_ASSERT(tree != NULL && tree->node_count > 0);
+  sonde_face_point best = {.depth_m = INFINITY};
+  double least2 = INFINITY, steepest = 0;
+  uint32_t stack[TREE_STACK], depth = 0;
+  stack[depth++] = 0;
+  while (depth) {
+    uint32_t at = stack[--depth];
+    const tree_node *node = &tree->nodes[at];
+    if (box_distance2(&node->box, from) > least2 * (1 + 1e-9)) continue;
+    if (!node->count) {
+      // The nearer child is looked at first.
+      bool second = box_distance2(&tree->nodes[node->first].box, from) <
+                    box_distance2(&tree->nodes[at + 1].box, from);
+      SONDE_ASSERT(depth + 2 <= TREE_STACK);
+      stack[depth++] = second ? at + 1 : node->first;
+      stack[depth++] = second ? node->first : at + 1;
+      continue;
+    }
+    for (uint32_t i = node->first; i < node->first + node->count; ++i) {
+      const sonde_vec3 *x = tree->vertices;
+      const uint32_t *v = tree->corners[i];
+      double w[3];
+      sonde_triangle_closest(from, x[v[0]], x[v[1]], x[v[2]], w);
+      sonde_vec3 point = vec3(0, 0, 0);
+      for (int k = 0; k < 3; ++k) point = v_madd(point, w[k], x[v[k]]);
+      sonde_vec3 way = v_sub(point, from);
+      sonde_vec3 normal = v_cross(v_sub(x[v[1]], x[v[0]]), v_sub(x[v[2]], x[v[0]]));
+      normal = v_unit(normal, vec3(0, 0, 1));
+      double distance = v_norm(way), along = v_dot(way, normal);
+      double steep = distance > 0 ? fabs(along) / distance : 1;
+      bool nearer = v_norm2(way) < least2 * (1 - 1e-9);
+      if (!nearer && !(v_norm2(way) <= least2 * (1 + 1e-9) && steep > steepest)) continue;
+      least2 = v_norm2(way);
+      steepest = steep;
+      best = (sonde_face_point){tree->face[i], {w[0], w[1], w[2]}, distance, normal};
+      if (along < 0) best.depth_m = -distance;
+      if (distance > 0) best.outward = v_scale(way, (along < 0 ? -1 : 1) / distance);
+    }
+  }
+  return best;
 }

@@ -15,20 +15,8 @@
 
 // The most that a pair may move as announced, and as made, in thicknesses.
 static const double PLANNED = 0.5, MADE = 1;
-enum { CUTS = 12 }; // no step is cut below h/2^CUTS
-
-double sonde_scene_thickness(const sonde_mesh *surface) {
-  double volume = 0, area = 0;
-  SONDE_ASSERT(surface->vertex_count > 0);
-  sonde_vec3 origin = surface->vertices[0];
-  for (uint32_t f = 0; f < surface->face_count; ++f) {
-    sonde_vec3 p[3];
-    for (int k = 0; k < 3; ++k) p[k] = v_sub(surface->vertices[surface->faces[f][k]], origin);
-    volume += v_dot(p[0], v_cross(p[1], p[2])) / 6;
-    area += 0.5 * v_norm(v_cross(v_sub(p[1], p[0]), v_sub(p[2], p[0])));
-  }
-  return area > 0 && volume > 0 ? volume / area : 0;
-}
+static const double MARGIN = 1e-3; // of a thickness: closer bodies have met
+enum { CUTS = 12 };                // no step is cut below h/2^CUTS
 
 static sonde_bounds widen(sonde_vec3 displacement, double by) {
   sonde_vec3 more = vec3(by, by, by);
@@ -84,54 +72,108 @@ static sonde_bounds bounds_of(sonde_scene_state *state, const sonde_scene_motion
   return state->cast_box[b] = box;
 }
 
-// Share of the displacements that all pairs may make: to where their boxes meet and a thickness
-// further.
-static double safe_share(sonde_scene_state *state, const sonde_scene_motion *from, double allowed) {
-  const sonde_scene *scene = state->scene;
-  double share = 1;
-  memset(state->cast_known, 0, scene->body_count * sizeof *state->cast_known);
-  for (uint32_t t = 0; t < scene->touch_count; ++t) {
-    uint32_t a = scene->touches[t].a, b = scene->touches[t].b;
-    // The longest displacement is that of a point of a as a point of b sees it.
-    const sonde_bounds *displacement_a = &state->displacement[a],
-                       *displacement_b = &state->displacement[b];
-    sonde_vec3 p = v_sub(displacement_a->high, displacement_b->low),
-               q = v_sub(displacement_b->high, displacement_a->low);
-    double displacement = v_norm(vec3(fmax(p.x, q.x), fmax(p.y, q.y), fmax(p.z, q.z)));
-    double most = allowed * fmin(state->thickness_m[a], state->thickness_m[b]);
-    if (!(displacement > share * most)) continue;
-    sonde_bounds box_a = bounds_of(state, from, a), box_b = bounds_of(state, from, b);
-    // The displacements close the gap along each axis, from either side, by p and q.
-    sonde_vec3 ab = v_sub(box_b.low, box_a.high), ba = v_sub(box_a.low, box_b.high);
-    const double gap[6] = {ab.x, ab.y, ab.z, ba.x, ba.y, ba.z};
-    const double closing[6] = {p.x, p.y, p.z, q.x, q.y, q.z};
-    double apart = 0;
-    for (int k = 0; k < 6; ++k)
-      if (gap[k] > 0) apart = fmax(apart, closing[k] > gap[k] ? gap[k] / closing[k] : 1);
-    share = fmin(share, apart + most / displacement);
+sonde_motion sonde_cast_way(const sonde_scene_state *state, uint32_t b, double h) {
+  uint32_t s = state->scene->bodies[b].first_slot;
+  sonde_quat from = state->undo.rotation[b];
+  sonde_vec3 moved = v_sub(state->now.position[s], state->undo.position[s]);
+  return (sonde_motion){{state->undo.position[s], from},
+                        v_scale(moved, 1 / h),
+                        sonde_spin_between(from, state->now.rotation[b], h)};
+}
+
+// As the velocities at the start of the step announce it.
+static sonde_motion planned_way(const sonde_scene_state *state, uint32_t b, double h) {
+  const sonde_body *body = &state->scene->bodies[b];
+  uint32_t s = body->first_slot;
+  bool falls = body->motion == SONDE_BODY_FREE;
+  return (sonde_motion){{state->now.position[s], state->now.rotation[b]},
+                        v_madd(state->now.velocity[s], falls ? h : 0, state->scene->gravity_m_s2),
+                        state->now.velocity[s + 1]};
+}
+
+// Share of a step after which the boxes of a pair meet.
+static double boxes_meet(sonde_scene_state *state, const sonde_scene_motion *from, uint32_t t,
+                         sonde_vec3 p, sonde_vec3 q) {
+  const sonde_touch *touch = &state->scene->touches[t];
+  sonde_bounds box_a = bounds_of(state, from, touch->a), box_b = bounds_of(state, from, touch->b);
+  // The displacements close the gap along each axis, from either side, by p and q.
+  sonde_vec3 ab = v_sub(box_b.low, box_a.high), ba = v_sub(box_a.low, box_b.high);
+  const double gap[6] = {ab.x, ab.y, ab.z, ba.x, ba.y, ba.z};
+  const double closing[6] = {p.x, p.y, p.z, q.x, q.y, q.z};
+  double apart = 0;
+  for (int k = 0; k < 6; ++k)
+    if (gap[k] > 0) apart = fmax(apart, closing[k] > gap[k] ? gap[k] / closing[k] : 1);
+  return apart;
+}
+
+// Share of the displacements that a pair may make: to where the bodies meet and a thickness
+// further. Where convex bodies meet is known; of others it is where their boxes do.
+static double share_of(sonde_scene_state *state, uint32_t t, const sonde_scene_motion *from,
+                       double h) {
+  const sonde_touch *touch = &state->scene->touches[t];
+  const sonde_body *a = &state->scene->bodies[touch->a], *b = &state->scene->bodies[touch->b];
+  bool planned = from == &state->now;
+  // The longest displacement is that of a point of a as a point of b sees it.
+  const sonde_bounds *displacement_a = &state->displacement[touch->a],
+                     *displacement_b = &state->displacement[touch->b];
+  sonde_vec3 p = v_sub(displacement_a->high, displacement_b->low),
+             q = v_sub(displacement_b->high, displacement_a->low);
+  double displacement = v_norm(vec3(fmax(p.x, q.x), fmax(p.y, q.y), fmax(p.z, q.z)));
+  double thickness = fmin(state->thickness_m[touch->a], state->thickness_m[touch->b]);
+  double most = (planned ? PLANNED : MADE) * thickness;
+  if (!(displacement > most)) return 1;
+  double apart = boxes_meet(state, from, t, p, q);
+  if (apart < 1 && sonde_body_is_convex(a) && sonde_body_is_convex(b)) {
+    sonde_motion way[2];
+    const uint32_t both[2] = {touch->a, touch->b};
+    for (int s = 0; s < 2; ++s)
+      way[s] = planned ? planned_way(state, both[s], h) : sonde_cast_way(state, both[s], h);
+    sonde_cast_result met =
+        sonde_convex_cast(&a->convex, &way[0], &b->convex, &way[1], h, MARGIN * thickness);
+    apart = met.hit ? met.time_s / h : 1;
   }
+  return apart + most / displacement;
+}
+
+static double safe_share(sonde_scene_state *state, const sonde_scene_motion *from, double h) {
+  double share = 1;
+  SONDE_ASSERT(h > 0);
+  memset(state->cast_known, 0, state->scene->body_count * sizeof *state->cast_known);
+  for (uint32_t t = 0; t < state->scene->touch_count; ++t)
+    share = fmin(share, share_of(state, t, from, h));
   return share;
+}
+
+// After a step that went further than it should: which bodies may have passed through others.
+static void watch(sonde_scene_state *state, double h) {
+  for (uint32_t t = 0; t < state->scene->touch_count; ++t)
+    if (share_of(state, t, &state->undo, h) < 1) sonde_trouble_way(state, t, h);
 }
 
 void sonde_step_guarded(sonde_scene_state *state, double h) {
   SONDE_ASSERT(h > 0);
-  if (!state->scene->step.cast || !state->scene->touch_count) {
+  if (!state->scene->touch_count) {
     sonde_step_once(state, h);
     return;
   }
   uint32_t bodies = state->scene->body_count;
-  double start = state->now.head->time_s, done = 0, least = ldexp(h, -CUTS);
+  bool cast = state->scene->step.cast;
+  double start = state->now.head->time_s, done = 0, least = cast ? ldexp(h, -CUTS) : h;
   while (done < h) {
-    double left = h - done;
-    sonde_rigid_begin(state, left); // velocities of driven bodies
-    for (uint32_t b = 0; b < bodies; ++b) state->displacement[b] = guess(state, b, left);
-    // The parts are equal: a short one after a deep one would throw the bodies apart.
-    double parts = ceil(1 / fmax(safe_share(state, &state->now, PLANNED), least / left));
-    double part = parts > 1 ? left / parts : left;
+    double left = h - done, part = left;
+    if (cast) {
+      sonde_rigid_begin(state, left); // velocities of driven bodies
+      for (uint32_t b = 0; b < bodies; ++b) state->displacement[b] = guess(state, b, left);
+      // The parts are equal: a short one after a deep one would throw the bodies apart.
+      double parts = ceil(1 / fmax(safe_share(state, &state->now, left), least / left));
+      part = parts > 1 ? left / parts : left;
+    }
     for (;;) {
       sonde_step_once(state, part);
       for (uint32_t b = 0; b < bodies; ++b) state->displacement[b] = made(state, b);
-      if (!(safe_share(state, &state->undo, MADE) < 1 && part > least)) break;
+      bool far = safe_share(state, &state->undo, part) < 1;
+      if (far && !(part > least)) watch(state, part);
+      if (!(far && part > least)) break;
       sonde_scene_motion_copy(&state->now, &state->undo);
       part *= 0.5;
     }

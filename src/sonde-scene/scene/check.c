@@ -5,6 +5,20 @@
 #include "base/maths.h"
 #include "contact/contact.h"
 
+double sonde_mesh_thickness(const sonde_mesh *surface, double *area_m2) {
+  double volume = 0, area = 0;
+  SONDE_ASSERT(surface->vertex_count > 0);
+  sonde_vec3 origin = surface->vertices[0];
+  for (uint32_t f = 0; f < surface->face_count; ++f) {
+    sonde_vec3 p[3];
+    for (int k = 0; k < 3; ++k) p[k] = v_sub(surface->vertices[surface->faces[f][k]], origin);
+    volume += v_dot(p[0], v_cross(p[1], p[2])) / 6;
+    area += 0.5 * v_norm(v_cross(v_sub(p[1], p[0]), v_sub(p[2], p[0])));
+  }
+  *area_m2 = area;
+  return area > 0 && volume > 0 ? volume / area : 0;
+}
+
 sonde_status sonde_mesh_check_areas(const sonde_mesh *mesh, sonde_error *error) {
   for (uint32_t f = 0; f < mesh->face_count; ++f) {
     const uint32_t *v = mesh->faces[f];

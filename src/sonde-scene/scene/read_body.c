@@ -3,6 +3,7 @@
 
 #include "base/base.h"
 #include "base/maths.h"
+#include "geometry/internal.h"
 
 #include <string.h>
 
@@ -156,6 +157,18 @@ static void read_rigid(const sonde_scene_source *source, sonde_place at, sonde_b
   }
   for (uint32_t i = 0; i < body->surface.vertex_count; ++i)
     body->surface.vertices[i] = v_sub(body->surface.vertices[i], body->mass.centre_m);
+  // A body that fills its hull but for a hundredth counts as convex: so does a ball of flat faces.
+  static const double HULL = 1e-2; // what the hull may leave out, in thicknesses
+  sonde_mesh_report own = {0}, hull = {0};
+  double area_m2, tolerance_m = HULL * sonde_mesh_thickness(&body->surface, &area_m2);
+  status = sonde_convex_hull_within(body->surface.vertices, body->surface.vertex_count, tolerance_m,
+                                    &body->convex, &error);
+  if (!status) status = sonde_mesh_inspect(&body->convex.hull, &hull, &error);
+  if (!status) status = sonde_mesh_inspect(&body->surface, &own, &error);
+  if (status)
+    sonde_reader_pass(reader, at, &error);
+  else if (own.volume_m3 < 0.99 * hull.volume_m3)
+    sonde_convex_clear(&body->convex);
 }
 
 static void read_two_layer(const sonde_scene_source *source, sonde_place at, sonde_body *body) {
@@ -332,6 +345,7 @@ void sonde_read_body(const sonde_scene_source *source, sonde_place at, const son
 
 void sonde_body_clear(sonde_body *body) {
   sonde_mesh_clear(&body->surface);
+  sonde_convex_clear(&body->convex);
   sonde_free(body->surface_node);
   sonde_free(body->path.time_s);
   sonde_free(body->path.pose);

@@ -20,8 +20,7 @@ sonde_mat3 sonde_inertia_world(sonde_mat3 inertia, sonde_quat rotation) {
   return m_mul(m_mul(r, inertia), m_transpose(r));
 }
 
-// Spin that turns one orientation into another in a time, the shorter way.
-static sonde_vec3 spin_between(sonde_quat from, sonde_quat to, double time_s) {
+sonde_vec3 sonde_spin_between(sonde_quat from, sonde_quat to, double time_s) {
   sonde_quat change = q_mul(to, q_conj(from));
   double sign = change.w < 0 ? -1 : 1;
   sonde_vec3 axis = vec3(sign * change.x, sign * change.y, sign * change.z);
@@ -38,7 +37,7 @@ sonde_pose sonde_path_pose(const sonde_path *path, double time_s) {
   while (path->time_s[i + 1] <= time_s) ++i;
   double span = path->time_s[i + 1] - path->time_s[i], t = (time_s - path->time_s[i]) / span;
   sonde_quat q = path->pose[i].rotation;
-  sonde_vec3 spin = spin_between(q, path->pose[i + 1].rotation, 1);
+  sonde_vec3 spin = sonde_spin_between(q, path->pose[i + 1].rotation, 1);
   return (sonde_pose){v_lerp(path->pose[i].position, path->pose[i + 1].position, t),
                       sonde_quat_advance(q, spin, t)};
 }
@@ -61,7 +60,7 @@ void sonde_rigid_begin(sonde_scene_state *state, double h) {
       sonde_vec3 *velocity = &state->now.velocity[body->first_slot];
       sonde_pose to = centre_pose(body, state->now.head->time_s + h);
       velocity[0] = v_scale(v_sub(to.position, state->now.position[body->first_slot]), 1 / h);
-      velocity[1] = spin_between(state->now.rotation[b], to.rotation, h);
+      velocity[1] = sonde_spin_between(state->now.rotation[b], to.rotation, h);
     }
     sonde_mat3 inertia = sonde_inertia_world(body->mass.inertia_kg_m2, state->now.rotation[b]);
     state->inertia[b].start = inertia;

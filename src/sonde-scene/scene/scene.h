@@ -44,6 +44,7 @@ typedef struct sonde_body {
   bool closed;            // and without flaws: it may touch others
   uint32_t *surface_node; // [surface vertices] the node of each; NULL: they are the nodes
   sonde_mass mass;        // rigid: in the body's frame; else mass and centre only
+  sonde_convex convex;    // rigid: the same when it is convex, else without vertices
   sonde_pose start;       // of the body's frame
   sonde_vec3 velocity_m_s, spin_rad_s;
   sonde_path path;
@@ -51,14 +52,14 @@ typedef struct sonde_body {
 
   // deformable
   uint32_t node_count, spring_count;
-  sonde_vec3 *node;     // [nodes] where they start
-  double *node_mass_kg; // [nodes]
-  uint8_t *held;        // [nodes]
-  sonde_vec3 *load_n;   // [nodes] constant force
-  uint32_t (*pairs)[2]; // [springs] first < second
-  sonde_spring *spring; // [springs]
-  double bulk_n_m5;     // pressure per change of volume; 0: none
-  double rest_volume_m3;
+  sonde_vec3 *node;      // [nodes] where they start
+  double *node_mass_kg;  // [nodes]
+  uint8_t *held;         // [nodes]
+  sonde_vec3 *load_n;    // [nodes] constant force
+  uint32_t (*pairs)[2];  // [springs] first < second
+  sonde_spring *spring;  // [springs]
+  double bulk_n_m5;      // pressure per change of volume; 0: none
+  double rest_volume_m3; // closed
   uint32_t first_pair;
   sonde_model *model; // two-layer
 } sonde_body;
@@ -88,6 +89,9 @@ struct sonde_scene {
 static inline bool sonde_body_is_rigid(const sonde_body *body) {
   return body->kind == SONDE_BODY_RIGID;
 }
+static inline bool sonde_body_is_convex(const sonde_body *body) {
+  return body->convex.hull.vertex_count > 0;
+}
 // Pose of the body's frame at a time; the path's ends hold.
 sonde_pose sonde_path_pose(const sonde_path *path, double time_s);
 
@@ -112,6 +116,8 @@ void sonde_read_lattice(const sonde_scene_source *source, sonde_place at, sonde_
 // Springs of a surface from its edges (entry `springs`).
 void sonde_read_springs(const sonde_scene_source *source, sonde_place at, sonde_body *body);
 
+// Volume over area of a closed surface, 0 for one that encloses nothing, and its area.
+double sonde_mesh_thickness(const sonde_mesh *surface, double *area_m2);
 // First flaw of a mesh that has to bound a solid; SONDE_MESH with the reason.
 sonde_status sonde_mesh_check_solid(const sonde_mesh *mesh, sonde_error *error);
 // First triangle without area; SONDE_MESH with its number.

@@ -85,7 +85,8 @@ sonde_status sonde_scene_state_load(sonde_scene_state *state, const char *path,
       const sonde_touch *touch = &scene->touches[k];
       uint32_t bonds = scene->bodies[touch->bond_side ? touch->b : touch->a].surface.vertex_count;
       uint64_t first = motion->bond_first[k];
-      good = !first || first - 1 + bonds <= motion->head->bond_count;
+      good = (!first || first - 1 + bonds <= motion->head->bond_count) && motion->release[k] <= 2 &&
+             v_norm(motion->entry[k]) <= 1 + 1e-6;
     }
     if (!good)
       status = sonde_fail(error, SONDE_FORMAT,

@@ -42,6 +42,9 @@ static void lay_motion(const sonde_scene_state *state, carver *c, sonde_scene_mo
   CARVE(motion->rotation, scene->body_count);
   CARVE(motion->hint, scene->touch_count);
   CARVE(motion->bond_first, scene->touch_count);
+  CARVE(motion->entry, scene->touch_count);
+  CARVE(motion->deep, scene->touch_count);
+  CARVE(motion->release, scene->touch_count);
   CARVE(motion->calm, scene->slot_count);
   CARVE(motion->bond, 0);
   motion->fixed = c->used;
@@ -78,6 +81,7 @@ static void lay_arrays(sonde_scene_state *s, carver *c) {
   CARVE(s->inertia, bodies);
   CARVE(s->reach_m, bodies);
   CARVE(s->thickness_m, bodies);
+  CARVE(s->section_m2, bodies);
   CARVE(s->displacement, bodies);
   CARVE(s->cast_box, bodies);
   CARVE(s->cast_known, bodies);
@@ -159,7 +163,9 @@ static sonde_status allocate(sonde_scene_state *state, sonde_error *error) {
     const sonde_body *body = &scene->bodies[b];
     state->surface_first[b] = surface;
     surface += body->surface.vertex_count;
-    state->thickness_m[b] = sonde_scene_thickness(&body->surface);
+    double area = 0;
+    state->thickness_m[b] = sonde_mesh_thickness(&body->surface, &area);
+    state->section_m2[b] = area / 4;
     if (!sonde_body_is_rigid(body)) continue;
     // The inertia is symmetric: the columns of its inverse are the cross products of its rows.
     sonde_vec3 r[3];
@@ -305,6 +311,12 @@ uint64_t sonde_scene_flag_count(const sonde_scene_state *state) {
 }
 uint32_t sonde_scene_all_flags(const sonde_scene_state *state) {
   return state->now.head->all_flags;
+}
+sonde_scene_event sonde_scene_first(const sonde_scene_state *state, uint32_t flag) {
+  uint32_t k = 0;
+  while (k < SONDE_SCENE_FLAGS && flag != 1u << k) ++k;
+  SONDE_ASSERT(k < SONDE_SCENE_FLAGS);
+  return state->now.head->event[k];
 }
 uint64_t sonde_scene_tick(const sonde_scene_state *state) { return state->now.head->tick; }
 double sonde_scene_time(const sonde_scene_state *state) { return state->now.head->time_s; }

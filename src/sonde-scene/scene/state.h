@@ -9,6 +9,7 @@
 
 // What a step hands to the next, in one block: copied for substeps, written by snapshots.
 typedef struct sonde_scene_motion_head {
+  sonde_scene_event event[SONDE_SCENE_FLAGS]; // the first of each flag
   uint64_t tick, flag_count;
   double time_s;
   uint32_t all_flags;
@@ -33,6 +34,9 @@ typedef struct sonde_scene_motion {
   sonde_quat *rotation;  // [bodies] world from the body's axes
   sonde_vec3 *hint;      // [touches] last direction out of a into b
   uint32_t *bond_first;  // [touches] 1 + its first bond; 0: it has none
+  sonde_vec3 *entry;     // [touches] direction of the contact when it was last shallow; 0: apart
+  uint8_t *deep;         // [touches] the contact has been deep since
+  uint8_t *release;      // [touches] 1: a was wholly inside b and is not out yet; 2: b inside a
   uint8_t *calm;         // [slots] steps at rest of a tissue's node; many: it sleeps
   sonde_bond *bond;      // [bond_capacity] of the touches in contact, one after the other
 } sonde_scene_motion;
@@ -88,6 +92,7 @@ struct sonde_scene_state {
   sonde_inertia *inertia;                      // [bodies]
   double *reach_m;                             // [bodies] of a rigid body's vertices
   double *thickness_m;                         // [bodies] volume over area at rest
+  double *section_m2;         // [bodies] mean section at rest: a quarter of the area
   sonde_bounds *displacement; // [bodies] scratch: box of the vertices' displacements
   sonde_bounds *cast_box;     // [bodies] scratch: box of the vertices
   bool *cast_known;           // [bodies] scratch: cast_box has been made
@@ -131,10 +136,13 @@ struct sonde_scene_state {
   sonde_pcg_scratch scratch;
   sonde_tissue_node *tissue_nodes;
   sonde_scene_report report;
+  sonde_scene_event noted[SONDE_SCENE_FLAGS]; // in this step
 };
 
 // Turns by spin * time (exponential map).
 sonde_quat sonde_quat_advance(sonde_quat rotation, sonde_vec3 spin, double time_s);
+// Spin that turns one orientation into another in a time, the shorter way.
+sonde_vec3 sonde_spin_between(sonde_quat from, sonde_quat to, double time_s);
 // R I R^T.
 sonde_mat3 sonde_inertia_world(sonde_mat3 inertia, sonde_quat rotation);
 // Orientation after turning for time_s at the spin that the angular momentum has there; *spin
@@ -159,8 +167,33 @@ void sonde_network_linearise(sonde_scene_state *state, uint32_t body,
 double sonde_network_energy(const sonde_body *body, const sonde_vec3 *position);
 double sonde_network_volume(const sonde_body *body, const sonde_vec3 *position);
 
-// Contacts at the stage: pushes and grips. @thread tick
-void sonde_touch_find(sonde_scene_state *state);
+// Contacts at the stage: pushes and grips.
+// @param start the stage is the start of a step, where bodies are found wholly inside others
+// @thread tick
+void sonde_touch_find(sonde_scene_state *state, bool start);
+// A push whose rows come next; NULL when there is no room. @thread tick
+sonde_push *sonde_push_new(sonde_scene_state *state, uint32_t touch);
+// Notices a body wholly inside the other of a touch. @thread tick
+void sonde_release_notice(sonde_scene_state *state, uint32_t touch,
+                          const sonde_overlap_result *found);
+// The push that lets it out; false when it is out, which may only end at the start of a step.
+bool sonde_release_push(sonde_scene_state *state, uint32_t touch, bool may_end);
+// Raises a flag of one body, or of one and another (UINT32_MAX: none). @thread tick
+void sonde_scene_note(sonde_scene_state *state, uint32_t flag, uint32_t body, uint32_t other);
+// Flags a deformable body of a touch when a common volume is negative; false when it is.
+// @thread tick
+bool sonde_trouble_overlap(sonde_scene_state *state, uint32_t touch,
+                           const sonde_overlap_result *found);
+// Flags a touch whose direction turned round while it was deep; at the end of a step. @thread tick
+void sonde_trouble_direction(sonde_scene_state *state, uint32_t touch);
+// Straight motion of a rigid body from the start of a step of h, in `undo`, to its end. @thread
+// tick
+sonde_motion sonde_cast_way(const sonde_scene_state *state, uint32_t body, double h);
+// Flags a touch whose bodies met on the way of a step from `undo` and are apart again; h its
+// length. @thread tick
+void sonde_trouble_way(sonde_scene_state *state, uint32_t touch, double h);
+// Flags deformable bodies that are inside out. @thread tick
+void sonde_trouble_inspect(sonde_scene_state *state);
 // Forces at the stage, which the bodies reached after moving for moved_s. @thread tick
 void sonde_touch_evaluate(sonde_scene_state *state, double moved_s);
 // Sums forces and K v over the slots and lists the terms of the matrix. @thread tick
@@ -202,8 +235,6 @@ void sonde_sleep_rest(sonde_scene_state *state);
 void sonde_step_once(sonde_scene_state *state, double h);
 // The same in as many parts as it takes for no body to pass through another. @thread tick
 void sonde_step_guarded(sonde_scene_state *state, double h);
-// Volume over area of a closed surface; 0 for one that encloses nothing.
-double sonde_scene_thickness(const sonde_mesh *surface);
 void sonde_scene_motion_copy(sonde_scene_motion *to, const sonde_scene_motion *from);
 // Bytes of a motion with the bonds in use.
 size_t sonde_scene_motion_bytes(const sonde_scene_motion *motion);

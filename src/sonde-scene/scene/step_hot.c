@@ -60,7 +60,7 @@ static void evaluate(sonde_scene_state *state, double h, double moved_s) {
   do {
     linearise(state, &scales);
     linearised = sonde_clock_now();
-    sonde_touch_find(state);
+    sonde_touch_find(state, !(moved_s > 0));
   } while (sonde_sleep_wake_touched(state));
   sonde_touch_evaluate(state, moved_s);
   state->report.assembly_s += linearised - start;

@@ -34,6 +34,7 @@ static void adaptive(sonde_scene_state *state) {
     uint32_t size = finest >> level;
     // The error of two steps of h/2 is their distance from one of h, over 2^p - 1.
     double h = step->dt_s * size / finest, order_factor = step->lambda == 0.5 ? 3 : 1;
+    uint32_t flags = state->report.flags;
     SONDE_ASSERT(h > 0);
     sonde_scene_motion_copy(&state->saved, &state->now);
     sonde_step_guarded(state, h);
@@ -55,6 +56,7 @@ static void adaptive(sonde_scene_state *state) {
     double error = most / order_factor;
     if (error > tolerance && level < step->substep_halvings) {
       sonde_scene_motion_copy(&state->now, &state->saved);
+      state->report.flags = flags;
       state->report.rejected++;
       ++level;
       continue;
@@ -73,12 +75,20 @@ static void adaptive(sonde_scene_state *state) {
 void sonde_scene_advance(sonde_scene_state *state) {
   const sonde_scene_step *step = &state->scene->step;
   state->report = (sonde_scene_report){0};
+  memset(state->noted, 0, sizeof state->noted);
   double start = state->now.head->time_s;
   if (step->substep_tolerance_m > 0)
     adaptive(state);
   else
     sonde_step_guarded(state, step->dt_s);
+  sonde_trouble_inspect(state);
   sonde_scene_motion_head *head = state->now.head;
+  for (uint32_t k = 0; k < SONDE_SCENE_FLAGS; ++k) {
+    sonde_scene_event *first = &head->event[k], *now = &state->noted[k];
+    if (first->count || !(state->report.flags & 1u << k)) continue;
+    *first = now->count ? *now : (sonde_scene_event){0, 1, UINT32_MAX, UINT32_MAX, 0};
+    first->time_s = start;
+  }
   head->time_s = start + step->dt_s;
   head->tick++;
   head->all_flags |= state->report.flags;

@@ -97,7 +97,7 @@ void sonde_grip_spread(const sonde_scene_state *state, const sonde_grip *grip, s
   }
 }
 
-static sonde_push *new_push(sonde_scene_state *state, uint32_t t) {
+sonde_push *sonde_push_new(sonde_scene_state *state, uint32_t t) {
   if (state->push_count == state->push_capacity) {
     state->report.flags |= SONDE_SCENE_CONTACT_FULL;
     return NULL;
@@ -173,7 +173,7 @@ static void add_column(sonde_scene_state *state, uint32_t t, const sonde_overlap
   grip->push = region_push;
   grip->share = region_push == UINT32_MAX ? 1 : point->area_m2;
   if (region_push == UINT32_MAX) {
-    sonde_push *push = new_push(state, t);
+    sonde_push *push = sonde_push_new(state, t);
     if (!push || !sonde_grip_rows(state, grip, grip->normal, &push->first_row, &push->row_count))
       return;
     push->value = point->depth_m;
@@ -228,7 +228,7 @@ static uint32_t add_region(sonde_scene_state *state, uint32_t t, const sonde_ove
   const sonde_touch *touch = &state->scene->touches[t];
   bool energy = touch->law == SONDE_TOUCH_ENERGY;
   double area = region->area_m2;
-  sonde_push *push = area > 0 ? new_push(state, t) : NULL;
+  sonde_push *push = area > 0 ? sonde_push_new(state, t) : NULL;
   if (!push) return UINT32_MAX;
   if (energy) push->newtons = area;
   push->value = energy ? region->volume_m3 : region->volume_m3 / area;
@@ -246,7 +246,7 @@ static uint32_t add_region(sonde_scene_state *state, uint32_t t, const sonde_ove
   return state->push_count - 1;
 }
 
-static void find_touch(sonde_scene_state *state, uint32_t t) {
+static void find_touch(sonde_scene_state *state, uint32_t t, bool start) {
   const sonde_touch *touch = &state->scene->touches[t];
   sonde_pair_measure *pair = &state->pair[t];
   // Large faces of rigid bodies are pushed at three columns per piece, others at one.
@@ -261,6 +261,9 @@ static void find_touch(sonde_scene_state *state, uint32_t t) {
   pair->volume_m3 = found->volume_m3;
   pair->region_count = found->region_count;
   pair->point_count = found->point_count;
+  bool sound = !start || sonde_trouble_overlap(state, t, found);
+  if (start && sound) sonde_release_notice(state, t, found);
+  if (state->now.release[t] && sonde_release_push(state, t, start)) return;
   // The direction of the largest region is where the next search starts.
   double most = 0;
   for (uint32_t r = 0; r < found->region_count; ++r)
@@ -288,7 +291,7 @@ static void find_touch(sonde_scene_state *state, uint32_t t) {
   }
 }
 
-void sonde_touch_find(sonde_scene_state *state) {
+void sonde_touch_find(sonde_scene_state *state, bool start) {
   const sonde_scene *scene = state->scene;
   state->push_count = state->grip_count = 0;
   if (!scene->touch_count) return;
@@ -313,8 +316,11 @@ void sonde_touch_find(sonde_scene_state *state) {
     if (!t) continue;
     state->near_touch[state->near_touch_count++] = t - 1;
     state->found_hint[t - 1] = vec3(0, 0, 0);
-    find_touch(state, t - 1);
+    find_touch(state, t - 1, start);
   }
+  // What is no longer near another is out of it.
+  for (uint32_t t = 0; t < scene->touch_count && start; ++t)
+    if (state->now.release[t] && !state->pair[t].region_count) state->now.release[t] = 0;
   state->report.touch_points = state->grip_count;
   for (uint32_t k = 0; k < state->grip_count; ++k) sonde_grip_begin(state, &state->grips[k]);
 }
@@ -442,11 +448,16 @@ void sonde_touch_finish(sonde_scene_state *state, double h) {
     pair->torque_n_m = v_add(pair->torque_n_m, v_cross(grip->point[0], f));
     pair->torque_b_n_m = v_sub(pair->torque_b_n_m, v_cross(grip->point[1], f));
   }
-  memset(state->now.hint, 0, state->scene->touch_count * sizeof *state->now.hint);
+  for (uint32_t t = 0; t < state->scene->touch_count; ++t) {
+    if (state->pair[t].region_count) continue;
+    state->now.hint[t] = state->now.entry[t] = vec3(0, 0, 0);
+    state->now.deep[t] = 0;
+  }
   for (uint32_t k = 0; k < state->near_touch_count; ++k) {
     uint32_t t = state->near_touch[k];
     state->pair[t].force_n = v_add(state->pair[t].force_n, state->pair[t].friction_n);
     state->now.hint[t] = state->found_hint[t];
+    if (state->pair[t].region_count) sonde_trouble_direction(state, t);
   }
   sonde_bonds_advance(state, h);
 }

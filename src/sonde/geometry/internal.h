@@ -85,8 +85,9 @@ sonde_status sonde_stl_read(const char *path, const char *bytes, size_t count,
 // ---- convex bodies ------------------------------------------------------------------------
 
 // Hull that may leave points up to about tolerance_m outside; 0 is the exact hull.
-sonde_status sonde_convex_hull_within(const sonde_vec3 *points, uint32_t count, double tolerance_m,
-                                      sonde_convex *convex, sonde_error *error);
+SONDE_LINK sonde_status sonde_convex_hull_within(const sonde_vec3 *points, uint32_t count,
+                                                 double tolerance_m, sonde_convex *convex,
+                                                 sonde_error *error);
 // Triangulated hull of the points; the mesh is owned by the caller.
 sonde_status sonde_hull_mesh(const sonde_vec3 *points, uint32_t count, double tolerance_m,
                              sonde_mesh *hull, sonde_error *error);
@@ -118,7 +119,7 @@ sonde_status sonde_convex_hull(const sonde_vec3 *points, uint32_t count, sonde_c
                                sonde_error *error);
 // From a closed convex mesh. @return SONDE_MESH when open or not convex (1e-8). @thread owner
 sonde_status sonde_convex_create(const sonde_mesh *mesh, sonde_convex *convex, sonde_error *error);
-void sonde_convex_clear(sonde_convex *convex); // @thread owner
+SONDE_LINK void sonde_convex_clear(sonde_convex *convex); // @thread owner
 // GJK distance with warm start (`cache` may be NULL). Within 1e-9 m of the exact distance; closer
 // than 1e-10 m counts as touching. Without cache linear time. Gilbert, Johnson and Keerthi 1988.
 // @thread tick (no allocation)

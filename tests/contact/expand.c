@@ -2,6 +2,8 @@
 // 2001). The face whose plane is nearest to 0 bounds the depth from below, the support along its
 // normal from above; as long as they differ the support point is added to the polytope. While 0 is
 // still outside, that face has a negative offset and is the one to expand as well.
+#include "expand.h"
+
 #include "contact/difference.h"
 
 enum { MAX_POINTS = 256, MAX_FACES = 2 * MAX_POINTS, MAX_EDGES = 3 * MAX_FACES };
@@ -129,9 +131,9 @@ static sonde_vec3 point_of_a(const polytope *p, const facet *f) {
   return sum;
 }
 
-sonde_depth_result sonde_convex_expand(const sonde_convex *a, sonde_pose world_from_a,
-                                       const sonde_convex *b, sonde_pose world_from_b,
-                                       double tolerance_m) {
+sonde_depth_result convex_expand(const sonde_convex *a, sonde_pose world_from_a,
+                                 const sonde_convex *b, sonde_pose world_from_b,
+                                 double tolerance_m) {
   SONDE_ASSERT(a->hull.vertex_count > 0 && b->hull.vertex_count > 0);
   polytope p = {.d = difference_make(a, world_from_a, b, world_from_b)};
   p.size = a->radius_m + b->radius_m;
