@@ -28,8 +28,10 @@ static const double smoothing_step = 0.15, coupling_step = 0.25;
 enum { PASSES = 10 };
 // Tissue around a section is probed on rings within the reach of its wall, and between two walls at
 // thirds of the gap: on the line between their middles and to both sides of it, where the gap is
-// still narrow. A gap wider than twice the radii together is probed by the rings of both walls.
-enum { RING_SIDES = 10, RINGS = 3, GAP_WAYS = 3, GAP_SIDES = 5 };
+// still narrow. A gap wider than twice the radii together is probed by the rings of both walls. Close
+// to a wall that is pressed flat the volume changes within half a radius along the ring.
+enum { RINGS = 3, GAP_WAYS = 3, GAP_SIDES = 5 };
+static const int ring_sides[RINGS] = {20, 10, 10};
 static const double ring_radii[RINGS] = {1.1, 1.9, 3.1}, gap_side_radii = 0.4, most_gap_radii = 2;
 static const double bend_share = 0.2;   // of the tissue's least stretch that a bend may take
 static const double beyond_share = 0.5; // of the way to where the field is read: the next ring
@@ -213,29 +215,6 @@ static bool read_gradient(const sonde_interior *in, sonde_vessel_state *v) {
   return fmin(v->tissue_short, v->tissue_long) < gentle_squeeze || most > gentle_bend * far;
 }
 
-// Two vessels side by side leave tissue between them: towards the other a lumen takes a share of
-// the gap at rest, as the tissue's gradient stretches it, and is as much larger across; its area
-// stays.
-static void bound_towards_neighbours(sonde_interior *in, uint32_t which, uint32_t i) {
-  sonde_vessel_state *v = &in->state[which][i], beside;
-  for (uint32_t other = 0; other < in->vessel_count && v->coupling > 0; ++other) {
-    if (other == which || !sonde_vessel_at(in, other, in->section[which][i].s_m, &beside)) continue;
-    sonde_vec3 d = v_sub(beside.rest_centre_m, v->rest_centre_m);
-    d = v_madd(d, -v_dot(d, v->axis), v->axis);
-    double apart = v_norm(d), gap = apart - v->rest_radius_m - beside.rest_radius_m;
-    if (!(gap > 0)) continue;
-    double cosine = v_dot(d, v->flat_axis) / apart, sine2 = fmax(0, 1 - cosine * cosine);
-    double a = v->half_short_m / v->tissue_short, b = v->half_long_m / v->tissue_long;
-    double toward = a * a * cosine * cosine + b * b * sine2;
-    double bound = v->rest_radius_m + gap_share * gap;
-    if (toward <= bound * bound) continue;
-    double share = bound / sqrt(toward);
-    bool by_long = b * b * sine2 > a * a * cosine * cosine;
-    v->half_long_m *= by_long ? share : 1 / share;
-    v->half_short_m *= by_long ? 1 / share : share;
-  }
-}
-
 // What walls do to the tissue beside a section.
 typedef struct strain {
   double warped; // least volume after warping
@@ -287,12 +266,12 @@ static bool yield_to_folding(sonde_interior *in, uint32_t which, uint32_t i) {
   const sonde_vec3 side[2] = {v->flat_axis, v_cross(v->axis, v->flat_axis)};
   const double s = in->section[which][i].s_m;
   strain least = {INFINITY, INFINITY};
-  for (int k = 0; k < RING_SIDES * RINGS; ++k) {
-    double a = 2 * SONDE_PI * (k % RING_SIDES) / RING_SIDES;
-    double r = ring_radii[k / RING_SIDES] * v->rest_radius_m;
-    sonde_vec3 offset = v_madd(v_scale(side[0], r * cos(a)), r * sin(a), side[1]);
-    probe_strain(in, v, s, offset, k, &least);
-  }
+  for (int ring = 0; ring < RINGS; ++ring)
+    for (int k = 0; k < ring_sides[ring]; ++k) {
+      double a = 2 * SONDE_PI * k / ring_sides[ring], r = ring_radii[ring] * v->rest_radius_m;
+      sonde_vec3 offset = v_madd(v_scale(side[0], r * cos(a)), r * sin(a), side[1]);
+      probe_strain(in, v, s, offset, k, &least);
+    }
   for (uint32_t other = 0; other < in->vessel_count; ++other) {
     sonde_vessel_state beside;
     if (other == which || !sonde_vessel_at(in, other, s, &beside)) continue;
@@ -347,7 +326,29 @@ void sonde_interior_vessels(sonde_interior *in, const sonde_interior_input *inpu
     for (uint32_t i = 0; i < count[which]; ++i)
       in->strained[which][i] = read_gradient(in, &in->state[which][i]);
   for (uint32_t which = 0; which < in->vessel_count; ++which)
-    for (uint32_t i = 0; i < count[which]; ++i) bound_towards_neighbours(in, which, i);
+    for (uint32_t i = 0; i < count[which]; ++i) {
+      // Two vessels side by side leave tissue between them: towards the other a lumen takes a share
+      // of the gap at rest, as the tissue's gradient stretches it, and is as much larger across;
+      // its area stays.
+      sonde_vessel_state *v = &in->state[which][i], beside;
+      for (uint32_t other = 0; other < in->vessel_count && v->coupling > 0; ++other) {
+        if (other == which || !sonde_vessel_at(in, other, in->section[which][i].s_m, &beside))
+          continue;
+        sonde_vec3 d = v_sub(beside.rest_centre_m, v->rest_centre_m);
+        d = v_madd(d, -v_dot(d, v->axis), v->axis);
+        double apart = v_norm(d), gap = apart - v->rest_radius_m - beside.rest_radius_m;
+        if (!(gap > 0)) continue;
+        double cosine = v_dot(d, v->flat_axis) / apart, sine2 = fmax(0, 1 - cosine * cosine);
+        double a = v->half_short_m / v->tissue_short, b = v->half_long_m / v->tissue_long;
+        double toward = a * a * cosine * cosine + b * b * sine2;
+        double bound = v->rest_radius_m + gap_share * gap;
+        if (toward <= bound * bound) continue;
+        double share = bound / sqrt(toward);
+        bool by_long = b * b * sine2 > a * a * cosine * cosine;
+        v->half_long_m *= by_long ? share : 1 / share;
+        v->half_short_m *= by_long ? 1 / share : share;
+      }
+    }
   bool changed = true;
   for (int pass = 0; pass < PASSES && changed; ++pass) {
     changed = false;
