@@ -9,71 +9,70 @@ static const double probing_m = 1e-6, longest_m = 4e-3; // of a step of Newton's
 static const double least_volume = 1e-3;                // of the derivative
 static const double good_enough_m = 1e-6;               // of an inverse
 
-// What one wall asks of a point.
-typedef struct wall_pull {
-  double weight; // 1 on the wall, 0 beyond its reach
-  sonde_vec3 displacement;
-} wall_pull;
+// A wall in whose reach a point lies.
+typedef struct near_wall {
+  const sonde_vessel_state *vessel;
+  sonde_vec3 across; // axis of the cross-section beside the flat one
+  double a, b;       // of the point at rest along both axes from the vessel's centre, m
+  double weight;     // 1 on the wall, 0 beyond its reach
+  double share; // 1 on the wall, 0 on another; o beyond its reach, o the product of 1 - w of the
+                // others
+} near_wall;
 
-// Offset from a vessel's centre at rest, in its cross-section; false beyond the reach of its wall.
-static bool within_reach(const sonde_vessel_state *v, sonde_vec3 rest, sonde_vec3 across, double *a,
-                         double *b, double *weight) {
-  sonde_vec3 d = v_sub(rest, v->rest_centre_m);
-  *a = v_dot(d, v->flat_axis), *b = v_dot(d, across);
-  double t = fmax((sqrt(*a * *a + *b * *b) / v->rest_radius_m - 1) / sonde_wall_reach, 0);
-  *weight = v->coupling * (1 - t) * (1 - t) * (1 + 2 * t);
-  return t < 1 && v->coupling > 0;
-}
-
-// Share of a wall: 1 on it, 0 on another, o beyond its reach, with o the product of 1 - w of the
-// others.
-static double share_of(const wall_pull *p, uint32_t count, uint32_t k) {
-  double others = 1;
-  for (uint32_t j = 0; j < count; ++j)
-    if (j != k) others *= 1 - p[j].weight;
-  return others / fmax(others + (1 - p[k].weight) * (1 - others), least_share);
-}
-
-sonde_vec3 sonde_vessels_warp(const sonde_vessel_state *near, uint32_t count, sonde_vec3 rest) {
+// The walls that reach a rest point, and what each counts there.
+static uint32_t find_walls(const sonde_vessel_state *near, uint32_t count, sonde_vec3 rest,
+                           near_wall wall[SONDE_VESSELS]) {
   SONDE_ASSERT(count <= SONDE_VESSELS && (count == 0 || near != NULL));
-  wall_pull p[SONDE_VESSELS];
   uint32_t kept = 0;
   for (uint32_t k = 0; k < count; ++k) {
     const sonde_vessel_state *v = &near[k];
-    sonde_vec3 across = v_cross(v->axis, v->flat_axis);
-    double a, b;
-    if (!within_reach(v, rest, across, &a, &b, &p[kept].weight)) continue;
-    double x = a, y = b;
-    sonde_vessel_warp(v, &x, &y);
-    p[kept++].displacement =
-        v_madd(v_scale(v->flat_axis, v->coupling * (x - a)), v->coupling * (y - b), across);
+    near_wall *w = &wall[kept];
+    *w = (near_wall){.vessel = v, .across = v_cross(v->axis, v->flat_axis)};
+    sonde_vec3 d = v_sub(rest, v->rest_centre_m);
+    w->a = v_dot(d, v->flat_axis), w->b = v_dot(d, w->across);
+    double t = fmax((sqrt(w->a * w->a + w->b * w->b) / v->rest_radius_m - 1) / sonde_wall_reach, 0);
+    w->weight = v->coupling * (1 - t) * (1 - t) * (1 + 2 * t);
+    kept += t < 1 && v->coupling > 0;
   }
+  for (uint32_t k = 0; k < kept; ++k) {
+    double others = 1;
+    for (uint32_t j = 0; j < kept; ++j)
+      if (j != k) others *= 1 - wall[j].weight;
+    wall[k].share = others / fmax(others + (1 - wall[k].weight) * (1 - others), least_share);
+  }
+  return kept;
+}
+
+sonde_vec3 sonde_vessels_warp(const sonde_vessel_state *near, uint32_t count, sonde_vec3 rest) {
+  near_wall wall[SONDE_VESSELS];
+  uint32_t kept = find_walls(near, count, rest, wall);
   sonde_vec3 at = rest;
-  for (uint32_t k = 0; k < kept; ++k) at = v_madd(at, share_of(p, kept, k), p[k].displacement);
+  for (const near_wall *w = wall; w < wall + kept; ++w) {
+    const sonde_vessel_state *v = w->vessel;
+    double x = w->a, y = w->b;
+    sonde_vessel_warp(v, &x, &y);
+    at = v_madd(at, w->share,
+                v_madd(v_scale(v->flat_axis, v->coupling * (x - w->a)), v->coupling * (y - w->b),
+                       w->across));
+  }
   return at;
 }
 
 // The motion along a vessel stays the field's.
 sonde_vec3 sonde_vessels_smooth(const sonde_vessel_state *near, uint32_t count, sonde_vec3 rest,
                                 sonde_vec3 warped, sonde_vec3 moved) {
-  SONDE_ASSERT(count <= SONDE_VESSELS && (count == 0 || near != NULL));
-  wall_pull p[SONDE_VESSELS];
-  uint32_t kept = 0;
-  for (uint32_t k = 0; k < count; ++k) {
-    const sonde_vessel_state *v = &near[k];
-    sonde_vec3 across = v_cross(v->axis, v->flat_axis);
-    double a, b;
-    if (!within_reach(v, rest, across, &a, &b, &p[kept].weight)) continue;
-    sonde_vec3 d = v_sub(warped, v->rest_centre_m), bend = v_sub(v->centre_m, moved);
-    a = v_dot(d, v->flat_axis), b = v_dot(d, across);
-    sonde_vessel_tissue(v, &a, &b);
-    bend = v_madd(v_madd(bend, a, v->flat_axis), b, across);
-    bend = v_madd(bend, -v_dot(bend, v->axis), v->axis);
-    p[kept++].displacement = v_scale(bend, v->tissue_smoothing);
-  }
+  near_wall wall[SONDE_VESSELS];
+  uint32_t kept = find_walls(near, count, rest, wall);
   sonde_vec3 at = moved;
-  for (uint32_t k = 0; k < kept; ++k)
-    at = v_madd(at, p[k].weight * share_of(p, kept, k), p[k].displacement);
+  for (const near_wall *w = wall; w < wall + kept; ++w) {
+    const sonde_vessel_state *v = w->vessel;
+    sonde_vec3 d = v_sub(warped, v->rest_centre_m), bend = v_sub(v->centre_m, moved);
+    double a = v_dot(d, v->flat_axis), b = v_dot(d, w->across);
+    sonde_vessel_tissue(v, &a, &b);
+    bend = v_madd(v_madd(bend, a, v->flat_axis), b, w->across);
+    bend = v_madd(bend, -v_dot(bend, v->axis), v->axis);
+    at = v_madd(at, w->weight * w->share, v_scale(bend, v->tissue_smoothing));
+  }
   return at;
 }
 
