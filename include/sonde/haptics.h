@@ -108,7 +108,8 @@ typedef enum sonde_fault {
 /** Sentence of a fault; never NULL. @thread any */
 SONDE_API const char *sonde_fault_text(sonde_fault fault);
 
-/** State of the limiter; set up by sonde_safety_init(). */
+/** State of the limiter; set up by sonde_safety_init(). Held by value in its owner's state: a tick
+ *  needs neither an allocation nor an indirection. Its members are there to be read. */
 typedef struct sonde_safety {
   sonde_safety_limits limits;
   sonde_fault fault;

@@ -80,7 +80,8 @@ SONDE_API sonde_device_link sonde_device_link_of(const sonde_device *device);
  *  @param[out] info [capacity] @return their number, at most capacity @thread owner */
 SONDE_API uint32_t sonde_devices_find(bool probe, sonde_device_info *info, uint32_t capacity);
 
-/** The last gate, on the driver's side of the mailbox: it goes on when the simulation does not. */
+/** The last gate, on the driver's side of the mailbox: it goes on when the simulation does not.
+ * Held by value in the driver's state, as sonde_safety is; its members are there to be read. */
 typedef struct sonde_gate {
   sonde_safety_limits limits;
   double age_s; /**< since the newest command */

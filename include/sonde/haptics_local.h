@@ -25,7 +25,8 @@ SONDE_API sonde_local_def sonde_local_def_default(void);
 /**
  * Force near the newest answer of the scene (docs/haptics.md): along the force
  * dF = d / (1/K - d/(K room)) + B dv, the increment of eq. (1) with the room that is left; across
- * it a spring. K and B are measured from the answers themselves.
+ * it a spring. K and B are measured from the answers themselves. Held by value in the loop's state,
+ * as sonde_safety is; its members are there to be read.
  */
 typedef struct sonde_local {
   sonde_local_def def;

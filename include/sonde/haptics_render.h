@@ -66,7 +66,8 @@ typedef struct sonde_render_margins {
 SONDE_API sonde_render_margins sonde_render_margins_of(const sonde_render_def *def, double mass_kg,
                                                        double damping_n_s_m, double latency_s);
 
-/** State of the rendering of one device; energies at the device, J. */
+/** State of the rendering of one device; energies at the device, J. Held by value in its owner's
+ *  state, as sonde_safety is: the loop and the tests of passivity read its members. */
 typedef struct sonde_render {
   sonde_render_def def;
   bool started;
