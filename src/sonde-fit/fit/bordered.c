@@ -155,8 +155,24 @@ static bool pushes(double value, double low, double high, double gradient) {
   return (value <= low && gradient > 0) || (value >= high && gradient < 0);
 }
 
-// Takes parameters that push against a bound, or have no influence, out of the normal equations.
-static void hold_bounds(search *s) {
+// Largest cosine between the residuals and a free column of the Jacobian.
+static double optimality(const search *s, double cost) {
+  double largest = 0.0, length = sqrt(2.0 * cost);
+  if (!(length > 0)) return 0.0;
+  for (uint32_t b = 0; b < s->problem->block_count; ++b)
+    for (int i = 0; i < 2; ++i)
+      largest = fmax(largest, fabs(s->blocks[b].g[i]) / (sqrt(s->blocks[b].h[2 * i]) * length));
+  for (uint32_t k = 0; k < s->problem->border_count; ++k)
+    largest = fmax(largest, fabs(s->normal.g[k]) / (sqrt(s->normal.d[k][k]) * length));
+  return largest;
+}
+
+static sonde_status linearise(void *user, double *cost, bool *done, sonde_error *error) {
+  (void)error;
+  search *s = user;
+  *cost = sonde_bordered_assemble(s->problem, (const double(*)[2])s->theta, s->border, s->blocks,
+                                  &s->normal);
+  // Takes parameters that push against a bound, or have no influence, out of the normal equations.
   const sonde_bordered_problem *problem = s->problem;
   for (uint32_t b = 0; b < problem->block_count; ++b)
     for (int i = 0; i < 2; ++i) {
@@ -179,26 +195,6 @@ static void hold_bounds(search *s) {
     for (uint32_t b = 0; b < problem->block_count; ++b)
       s->blocks[b].c[0][k] = s->blocks[b].c[1][k] = 0.0;
   }
-}
-
-// Largest cosine between the residuals and a free column of the Jacobian.
-static double optimality(const search *s, double cost) {
-  double largest = 0.0, length = sqrt(2.0 * cost);
-  if (!(length > 0)) return 0.0;
-  for (uint32_t b = 0; b < s->problem->block_count; ++b)
-    for (int i = 0; i < 2; ++i)
-      largest = fmax(largest, fabs(s->blocks[b].g[i]) / (sqrt(s->blocks[b].h[2 * i]) * length));
-  for (uint32_t k = 0; k < s->problem->border_count; ++k)
-    largest = fmax(largest, fabs(s->normal.g[k]) / (sqrt(s->normal.d[k][k]) * length));
-  return largest;
-}
-
-static sonde_status linearise(void *user, double *cost, bool *done, sonde_error *error) {
-  (void)error;
-  search *s = user;
-  *cost = sonde_bordered_assemble(s->problem, (const double(*)[2])s->theta, s->border, s->blocks,
-                                  &s->normal);
-  hold_bounds(s);
   *done = optimality(s, *cost) < OPTIMALITY;
   return SONDE_OK;
 }

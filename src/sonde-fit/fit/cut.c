@@ -47,33 +47,6 @@ static bool is_kept(const cutter *c, uint32_t face) {
          c->vertex_of[v[2]] != NOWHERE;
 }
 
-static sonde_status keep_nodes(cutter *c, sonde_error *error) {
-  uint32_t nodes = c->model->surface.vertex_count, count = 0;
-  const sonde_vec3 *x = c->model->surface.vertices;
-  sonde_vec3 *pad = SONDE_NEW(sonde_vec3, c->inside_count);
-  if (!pad) return sonde_fail_memory(error);
-  for (uint32_t i = 0; i < nodes; ++i)
-    if (c->inside[i]) pad[count++] = x[i];
-  SONDE_ASSERT(count == c->inside_count);
-  double reach2 = c->reach_m * c->reach_m;
-  double far = c->reach_m + 2 * (c->half_u_m + c->half_v_m);
-  for (uint32_t i = 0; i < nodes; ++i) {
-    bool near = c->inside[i] || !isfinite(c->reach_m);
-    bool worth = !near && v_norm2(v_sub(x[i], c->site->position_m)) <= far * far;
-    for (uint32_t k = 0; k < count && worth && !near; ++k)
-      near = v_norm2(v_sub(x[i], pad[k])) <= reach2;
-    c->vertex_of[i] = near ? LONE : NOWHERE;
-  }
-  sonde_free(pad);
-  // Nodes of faces that are kept whole, in order; others would hang free.
-  const sonde_mesh *skin = &c->model->surface;
-  for (uint32_t f = 0; f < skin->face_count; ++f)
-    for (int k = 0; k < 3 && is_kept(c, f); ++k) c->vertex_of[skin->faces[f][k]] = KEPT;
-  for (uint32_t i = 0; i < nodes; ++i)
-    c->vertex_of[i] = c->vertex_of[i] == KEPT ? c->cut->node_count++ : NOWHERE;
-  return SONDE_OK;
-}
-
 // Distance to the footprint's sides, negative under it.
 static double beyond(const sonde_cutter *c, uint32_t vertex) {
   const sonde_pad_place *p = &c->place[vertex];
@@ -199,7 +172,34 @@ sonde_status sonde_cut_create(const sonde_model *model, const sonde_site *site, 
                         "site %u: no skin within %.0f mm under its footprint: sites and surface do "
                         "not belong together",
                         site->id, BEHIND_M * 1e3);
-  if (!status) status = keep_nodes(&c, error);
+  if (!status) {
+    uint32_t total = c.model->surface.vertex_count, count = 0;
+    const sonde_vec3 *x = c.model->surface.vertices;
+    sonde_vec3 *pad = SONDE_NEW(sonde_vec3, c.inside_count);
+    if (!pad)
+      status = sonde_fail_memory(error);
+    else {
+      for (uint32_t i = 0; i < total; ++i)
+        if (c.inside[i]) pad[count++] = x[i];
+      SONDE_ASSERT(count == c.inside_count);
+      double reach2 = c.reach_m * c.reach_m;
+      double far = c.reach_m + 2 * (c.half_u_m + c.half_v_m);
+      for (uint32_t i = 0; i < total; ++i) {
+        bool near = c.inside[i] || !isfinite(c.reach_m);
+        bool worth = !near && v_norm2(v_sub(x[i], c.site->position_m)) <= far * far;
+        for (uint32_t k = 0; k < count && worth && !near; ++k)
+          near = v_norm2(v_sub(x[i], pad[k])) <= reach2;
+        c.vertex_of[i] = near ? LONE : NOWHERE;
+      }
+      sonde_free(pad);
+      // Nodes of faces that are kept whole, in order; others would hang free.
+      const sonde_mesh *skin = &c.model->surface;
+      for (uint32_t f = 0; f < skin->face_count; ++f)
+        for (int k = 0; k < 3 && is_kept(&c, f); ++k) c.vertex_of[skin->faces[f][k]] = KEPT;
+      for (uint32_t i = 0; i < total; ++i)
+        c.vertex_of[i] = c.vertex_of[i] == KEPT ? c.cut->node_count++ : NOWHERE;
+    }
+  }
   if (!status) status = fill(&c, error);
   sonde_free(c.vertex_of);
   sonde_free(c.inside);

@@ -25,26 +25,6 @@ sonde_fit_def sonde_fit_def_complete(const sonde_fit_def *def) {
   return full;
 }
 
-static sonde_status check_def(const sonde_fit_def *def, sonde_error *error) {
-  if (def->stages < 1 || def->stages > 3)
-    return sonde_fail(error, SONDE_ARGUMENT, "stages is %u, expected 1, 2 or 3", def->stages);
-  if (!(def->kept_edge_n_m >= 0))
-    return sonde_fail(error, SONDE_ARGUMENT, "kept_edge_n_m is %g, expected >= 0",
-                      def->kept_edge_n_m);
-  if ((unsigned)def->weights > SONDE_WEIGHTS_RELATIVE || (unsigned)def->loss > SONDE_LOSS_STUDENT)
-    return sonde_fail(error, SONDE_ARGUMENT, "unknown weights or loss");
-  if (!(def->zero_sd_m >= 0 && def->zero_sd_m <= 0.1 && def->tare_sd_n >= 0 &&
-        def->tare_sd_n <= 100))
-    return sonde_fail(error, SONDE_ARGUMENT,
-                      "zero_sd_m is %g and tare_sd_n %g, expected 0 to 0.1 m and 0 to 100 N",
-                      def->zero_sd_m, def->tare_sd_n);
-  if (!(def->loss_scale >= 0) || def->max_iterations < 1)
-    return sonde_fail(error, SONDE_ARGUMENT,
-                      "loss_scale is %g and max_iterations %u, expected >= 0 and >= 1",
-                      def->loss_scale, def->max_iterations);
-  return SONDE_OK;
-}
-
 // ---- stage 1 ------------------------------------------------------------------------------
 
 typedef struct curve_buffer {
@@ -80,25 +60,6 @@ static sonde_status fit_one_curve(const sonde_model *model, const sonde_site_tab
     result->model_n[plan->row[first + k]] = area_m2 * p;
   }
   return SONDE_OK;
-}
-
-static sonde_status fit_curves(const sonde_model *model, const sonde_site_table *sites,
-                               const sonde_measurements *m, const sonde_fit_plan *plan,
-                               const sonde_fit_def *def, sonde_fit_result *result,
-                               sonde_error *error) {
-  curve_buffer buffer = {SONDE_NEW(double, m->count), SONDE_NEW(double, m->count)};
-  result->curves = SONDE_NEW(sonde_curve_fit, plan->curve_count);
-  sonde_status status = SONDE_OK;
-  if (!buffer.depth_m || !buffer.force_n || !result->curves) status = sonde_fail_memory(error);
-  for (uint32_t c = 0; c < plan->curve_count && !status; ++c)
-    status = fit_one_curve(model, sites, m, plan, def, c, buffer, result, error);
-  result->curve_count = plan->curve_count;
-  result->stage1_parameters = 2 * plan->curve_count;
-  if (!status)
-    status = sonde_error_report_of(m->data, result->model_n, m->count, &result->stage1, error);
-  sonde_free(buffer.depth_m);
-  sonde_free(buffer.force_n);
-  return status;
 }
 
 // ---- stage 2 ------------------------------------------------------------------------------
@@ -290,10 +251,24 @@ sonde_status sonde_fit(const sonde_model *model, const sonde_site_table *sites,
                        const sonde_progress *progress, sonde_fit_result *result,
                        sonde_error *error) {
   *result = (sonde_fit_result){0};
-  sonde_status status = check_def(def, error);
-  if (status) return status;
+  if (def->stages < 1 || def->stages > 3)
+    return sonde_fail(error, SONDE_ARGUMENT, "stages is %u, expected 1, 2 or 3", def->stages);
+  if (!(def->kept_edge_n_m >= 0))
+    return sonde_fail(error, SONDE_ARGUMENT, "kept_edge_n_m is %g, expected >= 0",
+                      def->kept_edge_n_m);
+  if ((unsigned)def->weights > SONDE_WEIGHTS_RELATIVE || (unsigned)def->loss > SONDE_LOSS_STUDENT)
+    return sonde_fail(error, SONDE_ARGUMENT, "unknown weights or loss");
+  if (!(def->zero_sd_m >= 0 && def->zero_sd_m <= 0.1 && def->tare_sd_n >= 0 &&
+        def->tare_sd_n <= 100))
+    return sonde_fail(error, SONDE_ARGUMENT,
+                      "zero_sd_m is %g and tare_sd_n %g, expected 0 to 0.1 m and 0 to 100 N",
+                      def->zero_sd_m, def->tare_sd_n);
+  if (!(def->loss_scale >= 0) || def->max_iterations < 1)
+    return sonde_fail(error, SONDE_ARGUMENT,
+                      "loss_scale is %g and max_iterations %u, expected >= 0 and >= 1",
+                      def->loss_scale, def->max_iterations);
   const sonde_fit_def full = sonde_fit_def_complete(def);
-  status = sonde_sites_check_on_surface(model, sites, SONDE_SITE_TOLERANCE_M, error);
+  sonde_status status = sonde_sites_check_on_surface(model, sites, SONDE_SITE_TOLERANCE_M, error);
   if (status) return status;
   sonde_fit_plan plan;
   status = sonde_fit_plan_create(sites, measurements, &plan, error);
@@ -309,7 +284,21 @@ sonde_status sonde_fit(const sonde_model *model, const sonde_site_table *sites,
   if (!status) memcpy(result->sites, sites->sites, sites->count * sizeof *result->sites);
   if (full.stages < 3) use_springs_only(&result->law);
   double start = sonde_clock_now();
-  if (!status) status = fit_curves(model, sites, measurements, &plan, &full, result, error);
+  if (!status) {
+    curve_buffer buffer = {SONDE_NEW(double, measurements->count),
+                           SONDE_NEW(double, measurements->count)};
+    result->curves = SONDE_NEW(sonde_curve_fit, plan.curve_count);
+    if (!buffer.depth_m || !buffer.force_n || !result->curves) status = sonde_fail_memory(error);
+    for (uint32_t c = 0; c < plan.curve_count && !status; ++c)
+      status = fit_one_curve(model, sites, measurements, &plan, &full, c, buffer, result, error);
+    result->curve_count = plan.curve_count;
+    result->stage1_parameters = 2 * plan.curve_count;
+    if (!status)
+      status = sonde_error_report_of(measurements->data, result->model_n, measurements->count,
+                                     &result->stage1, error);
+    sonde_free(buffer.depth_m);
+    sonde_free(buffer.force_n);
+  }
   if (!status) status = end_stage(result, 0, measurements->count, &start, error);
   if (!status) status = fit_model(model, sites, &problem, &full, progress, result, error);
   if (!status && full.stages > 1) status = end_stage(result, 1, measurements->count, &start, error);

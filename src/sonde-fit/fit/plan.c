@@ -48,26 +48,25 @@ static sonde_status make_keys(const sonde_site_table *sites, const sonde_measure
   return SONDE_OK;
 }
 
-static bool allocate(sonde_fit_plan *plan, uint32_t rows) {
-  plan->row = SONDE_NEW(uint32_t, rows);
-  plan->row_probe = SONDE_NEW(uint32_t, rows);
-  plan->row_curve = SONDE_NEW(uint32_t, rows);
-  plan->curve_start = SONDE_NEW(uint32_t, rows + 1);
-  plan->curve_site = SONDE_NEW(uint32_t, rows);
-  plan->curve_probe = SONDE_NEW(uint32_t, rows);
-  plan->site_start = SONDE_NEW(uint32_t, rows + 1);
-  plan->site_index = SONDE_NEW(uint32_t, rows);
-  plan->site_deepest_m = SONDE_NEW(double, rows);
-  return plan->row && plan->row_probe && plan->row_curve && plan->curve_start && plan->curve_site &&
-         plan->curve_probe && plan->site_start && plan->site_index && plan->site_deepest_m;
-}
-
 static sonde_status arrange(const sonde_site_table *sites, const sonde_measurements *m,
                             const bool *left_out, sonde_fit_plan *plan, sonde_error *error) {
   *plan = (sonde_fit_plan){0};
   if (!m->count) return sonde_fail(error, SONDE_ARGUMENT, "no measurements, expected at least one");
   sort_key *keys = SONDE_NEW(sort_key, m->count);
-  sonde_status status = keys && allocate(plan, m->count) ? SONDE_OK : sonde_fail_memory(error);
+  plan->row = SONDE_NEW(uint32_t, m->count);
+  plan->row_probe = SONDE_NEW(uint32_t, m->count);
+  plan->row_curve = SONDE_NEW(uint32_t, m->count);
+  plan->curve_start = SONDE_NEW(uint32_t, m->count + 1);
+  plan->curve_site = SONDE_NEW(uint32_t, m->count);
+  plan->curve_probe = SONDE_NEW(uint32_t, m->count);
+  plan->site_start = SONDE_NEW(uint32_t, m->count + 1);
+  plan->site_index = SONDE_NEW(uint32_t, m->count);
+  plan->site_deepest_m = SONDE_NEW(double, m->count);
+  sonde_status status = keys && (plan->row && plan->row_probe && plan->row_curve &&
+                                 plan->curve_start && plan->curve_site && plan->curve_probe &&
+                                 plan->site_start && plan->site_index && plan->site_deepest_m)
+                            ? SONDE_OK
+                            : sonde_fail_memory(error);
   if (!status) status = make_keys(sites, m, left_out, plan, keys, error);
   for (uint32_t p = 0; p < plan->probe_count && !status; ++p) {
     sonde_probe probe;
@@ -126,36 +125,6 @@ sonde_status sonde_fit_plan_create_all(const sonde_site_table *sites, const sond
 
 typedef enum reason { FIT, TOO_SHORT, NO_FORCE, REASONS } reason;
 
-// Marks the rows of unfit curves; the counts go to `excluded`.
-static void mark_unfit(const sonde_measurements *m, const sonde_fit_plan *plan, bool *left_out,
-                       sonde_fit_plan *excluded) {
-  uint32_t curves[REASONS] = {0}, rows[REASONS] = {0};
-  const sonde_datum *first[REASONS] = {NULL};
-  for (uint32_t c = 0; c < plan->curve_count; ++c) {
-    uint32_t start = plan->curve_start[c], end = plan->curve_start[c + 1], steps = 0;
-    double force_n = 0;
-    for (uint32_t r = start; r < end; ++r) {
-      const sonde_datum *d = &m->data[plan->row[r]];
-      steps += d->penetration_m > 0;
-      force_n += d->force_n;
-    }
-    reason why = steps < SONDE_FIT_LEAST_STEPS ? TOO_SHORT : force_n > 0 ? FIT : NO_FORCE;
-    if (!curves[why]++) first[why] = &m->data[plan->row[start]];
-    rows[why] += end - start;
-    for (uint32_t r = start; r < end && why != FIT; ++r) left_out[plan->row[r]] = true;
-  }
-  for (int why = TOO_SHORT; why < REASONS; ++why) {
-    if (!curves[why]) continue;
-    char text[64] = "their mean force is not positive";
-    if (why == TOO_SHORT) snprintf(text, sizeof text, "fewer than %d steps", SONDE_FIT_LEAST_STEPS);
-    sonde_log(SONDE_LOG_WARNING,
-              "%u curves (%u rows) are left out: %s; the first is site %u, probe %s", curves[why],
-              rows[why], text, first[why]->site, first[why]->probe);
-    excluded->excluded_curves += curves[why];
-    excluded->excluded_rows += rows[why];
-  }
-}
-
 sonde_status sonde_fit_plan_create(const sonde_site_table *sites, const sonde_measurements *m,
                                    sonde_fit_plan *plan, sonde_error *error) {
   sonde_status status = sonde_fit_plan_create_all(sites, m, plan, error);
@@ -163,7 +132,33 @@ sonde_status sonde_fit_plan_create(const sonde_site_table *sites, const sonde_me
   sonde_fit_plan excluded = {0};
   bool *left_out = SONDE_NEW(bool, m->count);
   if (left_out) {
-    mark_unfit(m, plan, left_out, &excluded);
+    // Marks the rows of unfit curves; the counts go to `excluded`.
+    uint32_t curves[REASONS] = {0}, rows[REASONS] = {0};
+    const sonde_datum *first[REASONS] = {NULL};
+    for (uint32_t c = 0; c < plan->curve_count; ++c) {
+      uint32_t start = plan->curve_start[c], end = plan->curve_start[c + 1], steps = 0;
+      double force_n = 0;
+      for (uint32_t r = start; r < end; ++r) {
+        const sonde_datum *d = &m->data[plan->row[r]];
+        steps += d->penetration_m > 0;
+        force_n += d->force_n;
+      }
+      reason why = steps < SONDE_FIT_LEAST_STEPS ? TOO_SHORT : force_n > 0 ? FIT : NO_FORCE;
+      if (!curves[why]++) first[why] = &m->data[plan->row[start]];
+      rows[why] += end - start;
+      for (uint32_t r = start; r < end && why != FIT; ++r) left_out[plan->row[r]] = true;
+    }
+    for (int why = TOO_SHORT; why < REASONS; ++why) {
+      if (!curves[why]) continue;
+      char text[64] = "their mean force is not positive";
+      if (why == TOO_SHORT)
+        snprintf(text, sizeof text, "fewer than %d steps", SONDE_FIT_LEAST_STEPS);
+      sonde_log(SONDE_LOG_WARNING,
+                "%u curves (%u rows) are left out: %s; the first is site %u, probe %s", curves[why],
+                rows[why], text, first[why]->site, first[why]->probe);
+      excluded.excluded_curves += curves[why];
+      excluded.excluded_rows += rows[why];
+    }
     SONDE_ASSERT(excluded.excluded_rows <= m->count);
     if (excluded.excluded_rows == m->count) {
       status = sonde_fail(error, SONDE_ARGUMENT,

@@ -128,46 +128,6 @@ static int compare_order(const void *a, const void *b) {
   return (p > q) - (p < q);
 }
 
-static course measure_curve(const sonde_datum **row, uint32_t count, const sonde_datum **order) {
-  SONDE_ASSERT(count > 0 && row && order);
-  uint32_t third = count / 3 > 3 ? count / 3 : count < 3 ? count : 3;
-  course c = {.row = row, .count = count};
-  const sonde_datum *const *end = row + count - third;
-  double low = INFINITY, most = 0;
-  c.first_n_m = slope_of(row, third);
-  c.last_n_m = slope_of(end, third);
-  c.rise_n = mean_of(end, third) - mean_of(row, third);
-  // A flat punch of radius a on a half space of Young's modulus E, Poisson's ratio 1/2:
-  // F = 2 a E x/(1 - 1/4).
-  sonde_probe probe;
-  c.modulus_pa = NAN;
-  if (!sonde_probe_create(row[0]->probe, &probe, NULL)) {
-    double radius_m = sqrt(4 * probe.half_x_m * probe.half_y_m / SONDE_PI);
-    if (probe.rectangular && radius_m > 0) c.modulus_pa = 0.75 * c.first_n_m / (2 * radius_m);
-    sonde_probe_clear(&probe);
-  }
-  c.peak_n = -INFINITY;
-  for (uint32_t k = 0; k < count; ++k) {
-    c.peak_n = fmax(c.peak_n, row[k]->force_n);
-    low = fmin(low, row[k]->force_n);
-    double fall = k ? row[k - 1]->force_n - row[k]->force_n : 0;
-    c.falls_n += fmax(fall, 0);
-    if (fall > most) most = fall, c.fall = row[k];
-  }
-  c.range_n = c.peak_n - low;
-
-  // The turning point of a curve whose rows go down and come up again in the order of the table.
-  memcpy(order, row, count * sizeof *order);
-  qsort(order, count, sizeof *order, compare_order);
-  uint32_t k = 1;
-  while (k < count && order[k]->penetration_m > order[k - 1]->penetration_m) ++k;
-  uint32_t down = k;
-  while (k < count && order[k]->penetration_m < order[k - 1]->penetration_m) ++k;
-  bool turns = k == count && down >= TURN_ROWS && count - down >= TURN_ROWS;
-  if (turns) c.turn = order[down - 1];
-  return c;
-}
-
 typedef struct courses {
   uint32_t count;
   course *curve;
@@ -186,7 +146,44 @@ static sonde_status curve_list(const sonde_measurements *m, courses *list, sonde
     for (end = i + 1; end < m->count && list->row[end]->site == one->site &&
                       strcmp(list->row[end]->probe, one->probe) == 0;)
       ++end;
-    course c = measure_curve(list->row + i, end - i, list->order);
+    const sonde_datum **row = list->row + i;
+    const uint32_t count = end - i;
+    SONDE_ASSERT(count > 0 && row && list->order);
+    uint32_t third = count / 3 > 3 ? count / 3 : count < 3 ? count : 3;
+    course c = {.row = row, .count = count};
+    const sonde_datum *const *tail = row + count - third;
+    double low = INFINITY, most = 0;
+    c.first_n_m = slope_of(row, third);
+    c.last_n_m = slope_of(tail, third);
+    c.rise_n = mean_of(tail, third) - mean_of(row, third);
+    // A flat punch of radius a on a half space of Young's modulus E, Poisson's ratio 1/2:
+    // F = 2 a E x/(1 - 1/4).
+    sonde_probe probe;
+    c.modulus_pa = NAN;
+    if (!sonde_probe_create(row[0]->probe, &probe, NULL)) {
+      double radius_m = sqrt(4 * probe.half_x_m * probe.half_y_m / SONDE_PI);
+      if (probe.rectangular && radius_m > 0) c.modulus_pa = 0.75 * c.first_n_m / (2 * radius_m);
+      sonde_probe_clear(&probe);
+    }
+    c.peak_n = -INFINITY;
+    for (uint32_t j = 0; j < count; ++j) {
+      c.peak_n = fmax(c.peak_n, row[j]->force_n);
+      low = fmin(low, row[j]->force_n);
+      double fall = j ? row[j - 1]->force_n - row[j]->force_n : 0;
+      c.falls_n += fmax(fall, 0);
+      if (fall > most) most = fall, c.fall = row[j];
+    }
+    c.range_n = c.peak_n - low;
+
+    // The turning point of a curve whose rows go down and come up again in the order of the table.
+    memcpy(list->order, row, count * sizeof *list->order);
+    qsort(list->order, count, sizeof *list->order, compare_order);
+    uint32_t j = 1;
+    while (j < count && list->order[j]->penetration_m > list->order[j - 1]->penetration_m) ++j;
+    uint32_t down = j;
+    while (j < count && list->order[j]->penetration_m < list->order[j - 1]->penetration_m) ++j;
+    bool turns = j == count && down >= TURN_ROWS && count - down >= TURN_ROWS;
+    if (turns) c.turn = list->order[down - 1];
     // A fit leaves out curves that are too short or do not press.
     uint32_t steps = 0;
     for (uint32_t k = 0; k < c.count; ++k) steps += c.row[k]->penetration_m > 0;
@@ -349,35 +346,6 @@ static bool extrapolate(const course *c, double *force_n, double *slope_n_m) {
   return *slope_n_m > 0;
 }
 
-static void judge_zero(const courses *list, sonde_doubts *doubts) {
-  char names[SONDE_FIT_PROBES][24];
-  uint32_t probes = 0, count[SONDE_FIT_PROBES] = {0};
-  double force[SONDE_FIT_PROBES] = {0}, square[SONDE_FIT_PROBES] = {0};
-  double slope[SONDE_FIT_PROBES] = {0};
-  for (uint32_t k = 0; k < list->count; ++k) {
-    double f, b;
-    uint32_t p = sonde_probe_index(names, &probes, list->curve[k].row[0]->probe);
-    if (p == UINT32_MAX || !extrapolate(&list->curve[k], &f, &b)) continue;
-    ++count[p], force[p] += f, square[p] += f * f, slope[p] += b;
-  }
-  for (uint32_t p = 0; p < probes; ++p) {
-    if (!count[p]) continue;
-    double mean = force[p] / count[p], b = slope[p] / count[p];
-    double sure = sqrt(fmax(square[p] / count[p] - mean * mean, 0) / count[p]);
-    double zero_mm = -1e3 * mean / b;
-    sonde_doubt_grade grade;
-    if (sonde_plausible(QUANTITY_ZERO, zero_mm, &grade) || fabs(mean) < 3 * sure) continue;
-    sonde_doubt *d = sonde_doubt_add(doubts, "contact_zero", SONDE_DOUBT_WARNING, NULL, NULL);
-    if (!d) continue;
-    d->curves = count[p];
-    snprintf(d->sentence, sizeof d->sentence,
-             "column %s: the forces of probe %s extrapolate to %+.2g N at zero depth (no force at "
-             "%+.2g mm), expected none: contact zero or tare may be wrong; see --estimate-zero and "
-             "--estimate-tare",
-             mean < 0 ? "penetration_mm" : "force_n", names[p], mean, zero_mm);
-  }
-}
-
 sonde_status sonde_measurements_examine(const sonde_measurements *m, sonde_doubts *doubts,
                                         sonde_error *error) {
   courses list;
@@ -417,7 +385,33 @@ sonde_status sonde_measurements_examine(const sonde_measurements *m, sonde_doubt
                  "within a factor %g: another unit in this curve?",
                  1e-3 * c->modulus_pa, 1e-3 * median, MOST_APART);
     }
-    judge_zero(&list, doubts);
+    char names[SONDE_FIT_PROBES][24];
+    uint32_t probes = 0, count[SONDE_FIT_PROBES] = {0};
+    double force[SONDE_FIT_PROBES] = {0}, square[SONDE_FIT_PROBES] = {0};
+    double slope[SONDE_FIT_PROBES] = {0};
+    for (uint32_t k = 0; k < list.count; ++k) {
+      double f, b;
+      uint32_t p = sonde_probe_index(names, &probes, list.curve[k].row[0]->probe);
+      if (p == UINT32_MAX || !extrapolate(&list.curve[k], &f, &b)) continue;
+      ++count[p], force[p] += f, square[p] += f * f, slope[p] += b;
+    }
+    for (uint32_t p = 0; p < probes; ++p) {
+      if (!count[p]) continue;
+      double mean = force[p] / count[p], b = slope[p] / count[p];
+      double sure = sqrt(fmax(square[p] / count[p] - mean * mean, 0) / count[p]);
+      double zero_mm = -1e3 * mean / b;
+      sonde_doubt_grade grade;
+      if (sonde_plausible(QUANTITY_ZERO, zero_mm, &grade) || fabs(mean) < 3 * sure) continue;
+      sonde_doubt *d = sonde_doubt_add(doubts, "contact_zero", SONDE_DOUBT_WARNING, NULL, NULL);
+      if (!d) continue;
+      d->curves = count[p];
+      snprintf(
+          d->sentence, sizeof d->sentence,
+          "column %s: the forces of probe %s extrapolate to %+.2g N at zero depth (no force at "
+          "%+.2g mm), expected none: contact zero or tare may be wrong; see --estimate-zero and "
+          "--estimate-tare",
+          mean < 0 ? "penetration_mm" : "force_n", names[p], mean, zero_mm);
+    }
   }
 done:
   clear_list(&list);

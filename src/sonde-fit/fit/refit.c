@@ -63,34 +63,6 @@ static sonde_status settle_datum(const sonde_refit *r, sonde_patch_solver *solve
   return status;
 }
 
-// Derivatives by the parameters of places become those of nodes, then by the kriging basis those of
-// all sites.
-static void sum_over_sites(const sonde_refit *r, const sonde_patch *patch,
-                           sonde_refit_worker *worker, double *row) {
-  uint32_t count = r->sites->count, fields = r->fields;
-  const sonde_patch_gradient *gradient = &worker->gradient;
-  memset(worker->by_node, 0, (size_t)patch->node_count * fields * sizeof *worker->by_node);
-  for (uint32_t i = 0; i < patch->place_count; ++i)
-    for (int k = 0; k < 3 && patch->share[i][k] > 0; ++k) {
-      double *to = &worker->by_node[(size_t)patch->among[i][k] * fields];
-      for (uint32_t f = 0; f < fields; ++f) to[f] += patch->share[i][k] * gradient->by_place[f][i];
-    }
-  memset(row, 0, sonde_refit_parameters(r) * sizeof *row);
-  const sonde_product product = {.c = row,
-                                 .c_row = count,
-                                 .a = worker->by_node,
-                                 .a_row = 1,
-                                 .a_step = fields,
-                                 .b = worker->basis,
-                                 .b_row = count,
-                                 .rows = fields,
-                                 .columns = count,
-                                 .depth = patch->node_count};
-  sonde_multiply(&product);
-  row[fields * count] = gradient->by_ln_shear;
-  row[fields * count + 1] = gradient->by_ln_limit;
-}
-
 typedef struct evaluation {
   sonde_refit *refit;
   sonde_patch_law law;
@@ -132,7 +104,34 @@ static sonde_status work_on_curve(void *user, uint32_t worker, uint32_t curve,
                         r->plan->probe[r->plan->curve_probe[curve]], inner.message);
     if (at->jacobian && r->offsets)
       r->offsets->slope_n_m[k] = sonde_patch_stiffness(solver, solver->multiplier);
-    if (at->jacobian) sum_over_sites(r, patch, me, at->jacobian + (size_t)k * parameters);
+    if (at->jacobian) {
+      // Derivatives by the parameters of places become those of nodes, then by the kriging basis
+      // those of all sites.
+      double *row = at->jacobian + (size_t)k * parameters;
+      uint32_t places = r->sites->count, fields = r->fields;
+      const sonde_patch_gradient *gradient = &me->gradient;
+      memset(me->by_node, 0, (size_t)patch->node_count * fields * sizeof *me->by_node);
+      for (uint32_t i = 0; i < patch->place_count; ++i)
+        for (int j = 0; j < 3 && patch->share[i][j] > 0; ++j) {
+          double *to = &me->by_node[(size_t)patch->among[i][j] * fields];
+          for (uint32_t f = 0; f < fields; ++f)
+            to[f] += patch->share[i][j] * gradient->by_place[f][i];
+        }
+      memset(row, 0, sonde_refit_parameters(r) * sizeof *row);
+      const sonde_product product = {.c = row,
+                                     .c_row = places,
+                                     .a = me->by_node,
+                                     .a_row = 1,
+                                     .a_step = fields,
+                                     .b = me->basis,
+                                     .b_row = places,
+                                     .rows = fields,
+                                     .columns = places,
+                                     .depth = patch->node_count};
+      sonde_multiply(&product);
+      row[fields * places] = gradient->by_ln_shear;
+      row[fields * places + 1] = gradient->by_ln_limit;
+    }
     before = (depth_before){s, depth, at->jacobian != NULL};
   }
   return SONDE_OK;

@@ -35,38 +35,6 @@ static int compare_rows(const void *a, const void *b) {
   return x != y ? (x > y) - (x < y) : (p->line > q->line) - (p->line < q->line);
 }
 
-// Rows [count] of one site and probe; appends their mean to the measurements.
-static void mean_curve(const sonde_repeat_row *row, uint32_t count, sonde_measurements *m) {
-  uint32_t first = 1, from = m->count;
-  SONDE_ASSERT(count > 0 && row && m->scatter_n);
-  double squares = 0, freedom = 0;
-  while (first < count && row[first].repeat == row[0].repeat) ++first;
-  uint32_t most = 1;
-  for (uint32_t k = 0; k < first; ++k) {
-    double sum = 0, square = 0;
-    uint32_t n = 0;
-    for (uint32_t a = 0, b; a < count; a = b) {
-      double force_n;
-      for (b = a + 1; b < count && row[b].repeat == row[a].repeat;) ++b;
-      if (!force_at(row + a, b - a, row[k].datum.penetration_m, &force_n)) continue;
-      sum += force_n, square += force_n * force_n, ++n;
-    }
-    SONDE_ASSERT(n > 0);
-    sonde_datum *to = &m->data[m->count];
-    *to = row[k].datum;
-    to->force_n = sum / n;
-    m->position_m[m->count] = row[k].position_m;
-    m->normal[m->count] = row[k].normal;
-    m->line[m->count] = row[k].line;
-    m->scatter_n[m->count++] = 1 / sqrt(n);
-    if (n > 1) squares += fmax(square - sum * sum / n, 0), freedom += n - 1;
-    if (n > most) most = n;
-  }
-  double sd_n = freedom > 0 ? sqrt(squares / freedom) : 0;
-  for (uint32_t k = from; k < m->count; ++k) m->scatter_n[k] *= sd_n;
-  if (most > m->repeats) m->repeats = most;
-}
-
 sonde_status sonde_measurements_average(sonde_repeat_row *row, uint32_t count,
                                         sonde_measurements *m, sonde_error *error) {
   SONDE_ASSERT(count > 0 && row && !m->scatter_n);
@@ -79,7 +47,37 @@ sonde_status sonde_measurements_average(sonde_repeat_row *row, uint32_t count,
     for (end = i + 1; end < count && row[end].datum.site == one->site &&
                       strcmp(row[end].datum.probe, one->probe) == 0;)
       ++end;
-    mean_curve(row + i, end - i, m);
+    // Rows [count] of one site and probe; appends their mean to the measurements.
+    const sonde_repeat_row *curve = row + i;
+    const uint32_t length = end - i;
+    uint32_t first = 1, from = m->count;
+    SONDE_ASSERT(length > 0 && curve && m->scatter_n);
+    double squares = 0, freedom = 0;
+    while (first < length && curve[first].repeat == curve[0].repeat) ++first;
+    uint32_t most = 1;
+    for (uint32_t k = 0; k < first; ++k) {
+      double sum = 0, square = 0;
+      uint32_t n = 0;
+      for (uint32_t a = 0, b; a < length; a = b) {
+        double force_n;
+        for (b = a + 1; b < length && curve[b].repeat == curve[a].repeat;) ++b;
+        if (!force_at(curve + a, b - a, curve[k].datum.penetration_m, &force_n)) continue;
+        sum += force_n, square += force_n * force_n, ++n;
+      }
+      SONDE_ASSERT(n > 0);
+      sonde_datum *to = &m->data[m->count];
+      *to = curve[k].datum;
+      to->force_n = sum / n;
+      m->position_m[m->count] = curve[k].position_m;
+      m->normal[m->count] = curve[k].normal;
+      m->line[m->count] = curve[k].line;
+      m->scatter_n[m->count++] = 1 / sqrt(n);
+      if (n > 1) squares += fmax(square - sum * sum / n, 0), freedom += n - 1;
+      if (n > most) most = n;
+    }
+    double sd_n = freedom > 0 ? sqrt(squares / freedom) : 0;
+    for (uint32_t k = from; k < m->count; ++k) m->scatter_n[k] *= sd_n;
+    if (most > m->repeats) m->repeats = most;
   }
   return SONDE_OK;
 }

@@ -192,40 +192,6 @@ static void sample_row(const void *user, uint32_t block, uint32_t row, const dou
   jacobian[2] = x > 0 && !(f->exponent > 0) ? force_n / gap * q * log(x) * l.exponent : 0;
 }
 
-static sonde_status minimise(fitting *f, spring *found, bool *converged, sonde_error *error) {
-  const sonde_sample *s = f->sample;
-  double deepest_m = 0, xf = 0, xx = 0, theta[1][2], border[BORDER_MOST] = {0};
-  for (uint32_t i = 0; i < s->count; ++i) {
-    double x = s->compression_m[i];
-    if (stretch_of(s, i) == f->left_out) continue;
-    deepest_m = fmax(deepest_m, x);
-    if (x < 0.3 * s->compression_m[s->count - 1]) xf += x * s->force_n[i], xx += x * x;
-  }
-  for (uint32_t i = 0; i < s->count && !(xf > 0); ++i)
-    xf += s->compression_m[i] * s->force_n[i], xx += s->compression_m[i] * s->compression_m[i];
-  if (!(xf > 0)) return sonde_fail(error, SONDE_ARGUMENT, "the specimen does not press back");
-  f->floor_m = deepest_m / GUARD;
-  theta[0][0] = log(xf / xx);
-  theta[0][1] = log(0.5 * deepest_m);
-  const uint32_t rows[2] = {0, s->count};
-  sonde_bordered_problem problem = {.block_count = 1,
-                                    .border_count = f->exponent > 0 ? 0 : 1,
-                                    .row_start = rows,
-                                    .row = sample_row,
-                                    .user = f,
-                                    .low = {-30, -14},
-                                    .high = {30, 4},
-                                    .border_low = {log(EXPONENT_LOW)},
-                                    .border_high = {log(EXPONENT_HIGH)},
-                                    .loss_scale = 1,
-                                    .max_iterations = 400};
-  sonde_bordered_result result;
-  sonde_status status = sonde_bordered_minimise(&problem, theta, border, &result, error);
-  *found = spring_of(f, theta[0], border);
-  *converged = !status && result.converged;
-  return status;
-}
-
 sonde_status sonde_fit_sample(const sonde_sample *s, double exponent, sonde_sample_law *law,
                               sonde_error *error) {
   *law = (sonde_sample_law){0};
@@ -241,7 +207,35 @@ sonde_status sonde_fit_sample(const sonde_sample *s, double exponent, sonde_samp
     fitting f = {.sample = s, .exponent = exponent, .left_out = k < HELD_OUT ? k : NO_STRETCH};
     spring found = {0};
     bool converged = false;
-    sonde_status status = minimise(&f, &found, &converged, error);
+    double deepest_m = 0, xf = 0, xx = 0, theta[1][2], border[BORDER_MOST] = {0};
+    for (uint32_t i = 0; i < s->count; ++i) {
+      double x = s->compression_m[i];
+      if (stretch_of(s, i) == f.left_out) continue;
+      deepest_m = fmax(deepest_m, x);
+      if (x < 0.3 * s->compression_m[s->count - 1]) xf += x * s->force_n[i], xx += x * x;
+    }
+    for (uint32_t i = 0; i < s->count && !(xf > 0); ++i)
+      xf += s->compression_m[i] * s->force_n[i], xx += s->compression_m[i] * s->compression_m[i];
+    if (!(xf > 0)) return sonde_fail(error, SONDE_ARGUMENT, "the specimen does not press back");
+    f.floor_m = deepest_m / GUARD;
+    theta[0][0] = log(xf / xx);
+    theta[0][1] = log(0.5 * deepest_m);
+    const uint32_t rows[2] = {0, s->count};
+    sonde_bordered_problem problem = {.block_count = 1,
+                                      .border_count = f.exponent > 0 ? 0 : 1,
+                                      .row_start = rows,
+                                      .row = sample_row,
+                                      .user = &f,
+                                      .low = {-30, -14},
+                                      .high = {30, 4},
+                                      .border_low = {log(EXPONENT_LOW)},
+                                      .border_high = {log(EXPONENT_HIGH)},
+                                      .loss_scale = 1,
+                                      .max_iterations = 400};
+    sonde_bordered_result result;
+    sonde_status status = sonde_bordered_minimise(&problem, theta, border, &result, error);
+    found = spring_of(&f, theta[0], border);
+    converged = !status && result.converged;
     if (status) return status;
     for (uint32_t i = 0; i < s->count; ++i) {
       if (stretch_of(s, i) != f.left_out) continue;

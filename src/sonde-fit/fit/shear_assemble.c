@@ -46,36 +46,6 @@ void sonde_patch_solver_use(sonde_patch_solver *solver, const sonde_patch *patch
   }
 }
 
-// Normal springs of all places.
-static void press(sonde_patch_solver *solver, const double *s) {
-  const sonde_patch *p = solver->patch;
-  const double *k0 = solver->k0_n_m3, *xm = solver->xm_m, *area = p->area_m2;
-  const double guard = solver->law.guard;
-  const int exponent = (int)solver->law.exponent;
-  double *restrict normal = solver->normal_n, *restrict slope = solver->normal_slope;
-  for (uint32_t i = 0; i < p->place_count; ++i) {
-    double steep;
-    normal[i] = area[i] * normal_pressure(exponent, k0[i], xm[i], guard * xm[i], s[i], &steep);
-    slope[i] = area[i] * steep;
-  }
-}
-
-// flux[k] = half the cotangent Laplacian of s at corner k, so that square = A |grad s|^2 = sum s
-// flux.
-static void slopes(const sonde_patch_solver *solver, uint32_t from, uint32_t count,
-                   const double *s) {
-  for (uint32_t f = from; f < from + count; ++f) {
-    const sonde_patch_face *face = &solver->patch->face[f];
-    const double at[3] = {s[face->place[0]], s[face->place[1]], s[face->place[2]]};
-    double across[3], square = square_slope(face->half_cotangent, at, across);
-    double *flux = solver->flux[f];
-    flux[0] = across[2] - across[1];
-    flux[1] = across[0] - across[2];
-    flux[2] = across[1] - across[0];
-    solver->square[f] = square > 0 ? square : 0;
-  }
-}
-
 // A membrane's tension: force q at slope g over g, and (q' - q/g)/square.
 static void stretch_membrane(const sonde_patch_solver *solver, uint32_t f) {
   const sonde_patch_face_law *law = &solver->face_law[f];
@@ -106,57 +76,60 @@ static void resist(const sonde_patch_solver *solver, uint32_t from, uint32_t cou
   }
 }
 
-static void add_faces(const sonde_patch_solver *solver, uint32_t from, uint32_t count) {
-  const sonde_patch *p = solver->patch;
-  double *residual = solver->residual, *value = solver->value;
-  for (uint32_t f = from; f < from + count; ++f) {
-    const sonde_patch_face *face = &p->face[f];
-    const double *flux = solver->flux[f], *half = face->half_cotangent;
-    double modulus = solver->secant[f], beyond = solver->beyond[f];
-    for (int k = 0; k < 3; ++k) {
-      uint32_t at = face->place[k];
-      int a = (k + 1) % 3, b = (k + 2) % 3;
-      residual[at] += modulus * flux[k];
-      if (at < p->free_count)
-        value[p->diagonal[at]] += modulus * (half[a] + half[b]) + beyond * flux[k] * flux[k];
-      if (face->entry[k][0] == UINT32_MAX) continue;
-      double pair = beyond * flux[a] * flux[b] - modulus * half[k];
-      value[face->entry[k][0]] += pair;
-      value[face->entry[k][1]] += pair;
-    }
-  }
-}
-
 double sonde_patch_assemble(sonde_patch_solver *solver, const double *s, double *load_n) {
   const sonde_patch *p = solver->patch;
   double *residual = solver->residual, *value = solver->value;
   SONDE_ASSERT(p && p->free_count > 0);
   memset(value, 0, p->row_start[p->free_count] * sizeof *value);
-  press(solver, s);
+  // Normal springs of all places.
+  const double *k0 = solver->k0_n_m3, *xm = solver->xm_m, *area = p->area_m2;
+  const double guard = solver->law.guard;
+  const int exponent = (int)solver->law.exponent;
+  double *restrict normal = solver->normal_n, *restrict slope = solver->normal_slope;
+  for (uint32_t i = 0; i < p->place_count; ++i) {
+    double steep;
+    normal[i] = area[i] * normal_pressure(exponent, k0[i], xm[i], guard * xm[i], s[i], &steep);
+    slope[i] = area[i] * steep;
+  }
   memcpy(residual, solver->normal_n, p->place_count * sizeof *residual);
   for (uint32_t i = 0; i < p->free_count; ++i) value[p->diagonal[i]] = solver->normal_slope[i];
   for (uint32_t f = 0; f < p->face_count; f += BLOCK) {
     uint32_t count = p->face_count - f < BLOCK ? p->face_count - f : BLOCK;
-    slopes(solver, f, count, s);
+    // flux[k] = half the cotangent Laplacian of s at corner k, so that square = A |grad s|^2 = sum
+    // s flux.
+    for (uint32_t j = f; j < f + count; ++j) {
+      const sonde_patch_face *face = &solver->patch->face[j];
+      const double at[3] = {s[face->place[0]], s[face->place[1]], s[face->place[2]]};
+      double across[3], square = square_slope(face->half_cotangent, at, across);
+      double *flux = solver->flux[j];
+      flux[0] = across[2] - across[1];
+      flux[1] = across[0] - across[2];
+      flux[2] = across[1] - across[0];
+      solver->square[j] = square > 0 ? square : 0;
+    }
     resist(solver, f, count);
-    add_faces(solver, f, count);
+    for (uint32_t j = f; j < f + count; ++j) {
+      const sonde_patch_face *face = &p->face[j];
+      const double *flux = solver->flux[j], *half = face->half_cotangent;
+      double modulus = solver->secant[j], beyond = solver->beyond[j];
+      for (int k = 0; k < 3; ++k) {
+        uint32_t at = face->place[k];
+        int a = (k + 1) % 3, b = (k + 2) % 3;
+        residual[at] += modulus * flux[k];
+        if (at < p->free_count)
+          value[p->diagonal[at]] += modulus * (half[a] + half[b]) + beyond * flux[k] * flux[k];
+        if (face->entry[k][0] == UINT32_MAX) continue;
+        double pair = beyond * flux[a] * flux[b] - modulus * half[k];
+        value[face->entry[k][0]] += pair;
+        value[face->entry[k][1]] += pair;
+      }
+    }
   }
   double sum = 0, load = 0;
   for (uint32_t i = 0; i < p->free_count; ++i) sum += residual[i] * residual[i];
   for (uint32_t i = p->free_count; i < p->place_count; ++i) load += residual[i] * p->cosine[i];
   *load_n = load;
   return sqrt(sum);
-}
-
-// What the first and the second parameter of a face's law count in q/g: q and q - g q' by ln G and
-// ln gm, since q(g; G, gm) = G gm f(g/gm), straight part included; a membrane is linear in T and k.
-static void face_parts(const sonde_patch_solver *solver, uint32_t f, double part[2]) {
-  part[0] = solver->secant[f];
-  part[1] = -solver->beyond[f] * solver->square[f];
-  if (!solver->law.membrane) return;
-  double stretch = sqrt(1 + solver->square[f] / solver->patch->face[f].area_m2);
-  part[0] = solver->face_law[f].shear_n_m / stretch;
-  part[1] = solver->secant[f] - part[0];
 }
 
 // p(s; k0, xm) = k0 xm f(s/xm), so k0 dp/dk0 = p and xm dp/dxm = p - s p', straight part included.
@@ -175,7 +148,16 @@ void sonde_patch_differentiate(const sonde_patch_solver *solver, const double *s
     const sonde_patch_face *face = &p->face[f];
     const double *flux = solver->flux[f];
     double part[2], along = 0;
-    face_parts(solver, f, part);
+    // What the first and the second parameter of a face's law count in q/g: q and q - g q' by ln G
+    // and ln gm, since q(g; G, gm) = G gm f(g/gm), straight part included; a membrane is linear in
+    // T and k.
+    part[0] = solver->secant[f];
+    part[1] = -solver->beyond[f] * solver->square[f];
+    if (solver->law.membrane) {
+      double stretch = sqrt(1 + solver->square[f] / solver->patch->face[f].area_m2);
+      part[0] = solver->face_law[f].shear_n_m / stretch;
+      part[1] = solver->secant[f] - part[0];
+    }
     for (int k = 0; k < 3; ++k) along += mu[face->place[k]] * flux[k];
     gradient->by_ln_shear += along * part[0];
     gradient->by_ln_limit += along * part[1];

@@ -16,22 +16,6 @@ static int compare_nodes(const void *a, const void *b) {
   return (x > y) - (x < y);
 }
 
-static bool allocate_places(sonde_patch *p, const sonde_cut *cut) {
-  size_t places = cut->vertex_count;
-  p->parent = sonde_calloc(places, sizeof *p->parent);
-  p->share = sonde_calloc(places, sizeof *p->share);
-  p->among = sonde_calloc(places, sizeof *p->among);
-  p->node = SONDE_NEW(uint32_t, cut->node_count);
-  p->area_m2 = SONDE_NEW(double, places);
-  p->cosine = SONDE_NEW(double, places);
-  p->face = SONDE_NEW(sonde_patch_face, cut->face_count);
-  p->side = SONDE_NEW(uint32_t, cut->face_count);
-  p->row_start = SONDE_NEW(uint32_t, p->free_count + 1);
-  p->diagonal = SONDE_NEW(uint32_t, p->free_count);
-  return p->parent && p->share && p->among && p->node && p->area_m2 && p->cosine && p->face &&
-         p->side && p->row_start && p->diagonal;
-}
-
 // Areas and cotangents of the cut faces.
 static void measure_faces(const sonde_model *model, const sonde_cut *cut, const uint32_t *place,
                           sonde_patch *p) {
@@ -117,7 +101,20 @@ static sonde_status fill(const sonde_model *model, const sonde_cut *cut, const s
                          sonde_patch *p, sonde_error *error) {
   uint32_t *place = SONDE_NEW(uint32_t, cut->vertex_count);
   sonde_vec3 *normal = SONDE_NEW(sonde_vec3, cut->vertex_count);
-  bool ok = place && normal && allocate_places(p, cut);
+  size_t places = cut->vertex_count;
+  p->parent = sonde_calloc(places, sizeof *p->parent);
+  p->share = sonde_calloc(places, sizeof *p->share);
+  p->among = sonde_calloc(places, sizeof *p->among);
+  p->node = SONDE_NEW(uint32_t, cut->node_count);
+  p->area_m2 = SONDE_NEW(double, places);
+  p->cosine = SONDE_NEW(double, places);
+  p->face = SONDE_NEW(sonde_patch_face, cut->face_count);
+  p->side = SONDE_NEW(uint32_t, cut->face_count);
+  p->row_start = SONDE_NEW(uint32_t, p->free_count + 1);
+  p->diagonal = SONDE_NEW(uint32_t, p->free_count);
+  bool ok = place && normal &&
+            (p->parent && p->share && p->among && p->node && p->area_m2 && p->cosine && p->face &&
+             p->side && p->row_start && p->diagonal);
   sonde_status status = ok ? SONDE_OK : sonde_fail_memory(error);
   if (!status) {
     // Free places come first; they ascend with the nodes.

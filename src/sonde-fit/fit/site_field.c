@@ -60,41 +60,6 @@ static neighbour neighbour_of(const sonde_site *site, const sonde_site *other, d
   return (neighbour){fade * fade, v_dot(d, site->u), v_dot(d, site->v)};
 }
 
-// Row of a site: 1 for itself, minus the weights with which its neighbours predict it.
-static void roughness_row(const sonde_site_table *sites, uint32_t s, double spacing_m,
-                          double *row) {
-  const sonde_site *site = &sites->sites[s];
-  double m[6] = {0}, total = 0;
-  for (uint32_t t = 0; t < sites->count; ++t) {
-    if (t == s) continue;
-    neighbour n = neighbour_of(site, &sites->sites[t], spacing_m);
-    m[0] += n.weight;
-    m[1] += n.weight * n.u;
-    m[2] += n.weight * n.v;
-    m[3] += n.weight * n.u * n.u;
-    m[4] += n.weight * n.u * n.v;
-    m[5] += n.weight * n.v * n.v;
-  }
-  memset(row, 0, sites->count * sizeof *row);
-  if (!(m[0] > 0)) return;
-  m[3] += SLOPE_RIDGE * m[0];
-  m[5] += SLOPE_RIDGE * m[0];
-  // The symmetric 3x3 system m x = (1, 0, 0) by Cramer's rule: cross products of its rows.
-  sonde_vec3 a = vec3(m[0], m[1], m[2]), b = vec3(m[1], m[3], m[4]), c = vec3(m[2], m[4], m[5]);
-  sonde_vec3 cross = v_cross(b, c);
-  double determinant = v_dot(a, cross);
-  SONDE_ASSERT(determinant > 0);
-  sonde_vec3 x = v_scale(cross, 1.0 / determinant);
-  for (uint32_t t = 0; t < sites->count; ++t) {
-    if (t == s) continue;
-    neighbour n = neighbour_of(site, &sites->sites[t], spacing_m);
-    row[t] = -n.weight * (x.x + x.y * n.u + x.z * n.v);
-    total += row[t];
-  }
-  SONDE_ASSERT(fabs(total + 1) < 1e-6);
-  row[s] = -total;
-}
-
 sonde_status sonde_site_roughness(const sonde_site_table *sites, double *rows, sonde_error *error) {
   SONDE_ASSERT(sites->count > 0);
   double *nearest = SONDE_NEW(double, sites->count);
@@ -110,8 +75,42 @@ sonde_status sonde_site_roughness(const sonde_site_table *sites, double *rows, s
   qsort(nearest, sites->count, sizeof *nearest, sonde_compare_reals);
   double spacing_m = nearest[sites->count / 2];
   for (uint32_t s = 0; s < sites->count; ++s) {
-    if (sites->count > 1 && spacing_m > 0)
-      roughness_row(sites, s, spacing_m, &rows[(size_t)s * sites->count]);
+    if (sites->count > 1 && spacing_m > 0) {
+      // Row of a site: 1 for itself, minus the weights with which its neighbours predict it.
+      double *row = &rows[(size_t)s * sites->count];
+      const sonde_site *site = &sites->sites[s];
+      double m[6] = {0}, total = 0;
+      for (uint32_t t = 0; t < sites->count; ++t) {
+        if (t == s) continue;
+        neighbour n = neighbour_of(site, &sites->sites[t], spacing_m);
+        m[0] += n.weight;
+        m[1] += n.weight * n.u;
+        m[2] += n.weight * n.v;
+        m[3] += n.weight * n.u * n.u;
+        m[4] += n.weight * n.u * n.v;
+        m[5] += n.weight * n.v * n.v;
+      }
+      memset(row, 0, sites->count * sizeof *row);
+      if (m[0] > 0) {
+        m[3] += SLOPE_RIDGE * m[0];
+        m[5] += SLOPE_RIDGE * m[0];
+        // The symmetric 3x3 system m x = (1, 0, 0) by Cramer's rule: cross products of its rows.
+        sonde_vec3 a = vec3(m[0], m[1], m[2]), b = vec3(m[1], m[3], m[4]),
+                   c = vec3(m[2], m[4], m[5]);
+        sonde_vec3 cross = v_cross(b, c);
+        double determinant = v_dot(a, cross);
+        SONDE_ASSERT(determinant > 0);
+        sonde_vec3 x = v_scale(cross, 1.0 / determinant);
+        for (uint32_t t = 0; t < sites->count; ++t) {
+          if (t == s) continue;
+          neighbour n = neighbour_of(site, &sites->sites[t], spacing_m);
+          row[t] = -n.weight * (x.x + x.y * n.u + x.z * n.v);
+          total += row[t];
+        }
+        SONDE_ASSERT(fabs(total + 1) < 1e-6);
+        row[s] = -total;
+      }
+    }
   }
   sonde_free(nearest);
   return SONDE_OK;

@@ -17,27 +17,6 @@ static double draw(range r, uint64_t seed, uint64_t counter) {
   return r.low + (r.high - r.low) * sonde_random_uniform(seed, counter);
 }
 
-// theta holds the generic start.
-static void draw_start(const sonde_nearby_refit *a, uint64_t seed, uint32_t number, double *theta) {
-  uint32_t n = a->parameters, sites = a->refit->sites->count;
-  uint64_t counter = (uint64_t)number * (n + 2);
-  double deepest = 0;
-  for (uint32_t s = 0; s < a->plan.site_count; ++s)
-    deepest = fmax(deepest, a->plan.site_deepest_m[s]);
-  SONDE_ASSERT(deepest > 0);
-  double least = log(1.1 * deepest);
-  const range xm = {least, log(4 / 1.1) + least}, limit = {log(0.4), log(4.0)};
-  const range k0 = {-log(3.0), log(3.0)}, shear = {-log(5.0), log(5.0)};
-  const range by_site[2] = {{-0.25, 0.25}, {-0.1, 0.1}};
-  double stiffer = draw(k0, seed, counter++), deeper = draw(xm, seed, counter++);
-  for (uint32_t s = 0; s < sites; ++s) {
-    theta[s] += stiffer + 2 * draw(by_site[0], seed, counter++);
-    theta[sites + s] = fmax(least, deeper + 2 * draw(by_site[1], seed, counter++));
-  }
-  theta[n - 2] += draw(shear, seed, counter++);
-  theta[n - 1] = draw(limit, seed, counter);
-}
-
 sonde_status sonde_fit_random_starts(const sonde_model *model, const sonde_site_table *sites,
                                      const sonde_measurements *measurements,
                                      const sonde_fit_def *def, const sonde_fit_result *result,
@@ -66,7 +45,24 @@ sonde_status sonde_fit_random_starts(const sonde_model *model, const sonde_site_
   again.refit->near = false;
   for (uint32_t k = 0; k < count && !status; ++k) {
     sonde_refit_start(again.refit, result->curves, again.theta);
-    draw_start(&again, seed, k, again.theta);
+    // theta holds the generic start.
+    uint32_t n = again.parameters, site_count = again.refit->sites->count;
+    uint64_t counter = (uint64_t)k * (n + 2);
+    double deepest = 0;
+    for (uint32_t s = 0; s < again.plan.site_count; ++s)
+      deepest = fmax(deepest, again.plan.site_deepest_m[s]);
+    SONDE_ASSERT(deepest > 0);
+    double least = log(1.1 * deepest);
+    const range xm = {least, log(4 / 1.1) + least}, limit = {log(0.4), log(4.0)};
+    const range k0 = {-log(3.0), log(3.0)}, shear = {-log(5.0), log(5.0)};
+    const range by_site[2] = {{-0.25, 0.25}, {-0.1, 0.1}};
+    double stiffer = draw(k0, seed, counter++), deeper = draw(xm, seed, counter++);
+    for (uint32_t s = 0; s < site_count; ++s) {
+      again.theta[s] += stiffer + 2 * draw(by_site[0], seed, counter++);
+      again.theta[site_count + s] = fmax(least, deeper + 2 * draw(by_site[1], seed, counter++));
+    }
+    again.theta[n - 2] += draw(shear, seed, counter++);
+    again.theta[n - 1] = draw(limit, seed, counter);
     sonde_refit_forget(again.refit);
     status = sonde_nearby_refit_run(&again, progress, &found, error);
     if (status && status != SONDE_CONVERGENCE) break;
