@@ -40,13 +40,19 @@ sonde_identify_options sonde_identify_options_default(void) {
   return (sonde_identify_options){.max_iterations = 12, .world = sonde_identify_world()};
 }
 
-static sonde_inverse problem(const sonde_model *model, const sonde_motion_record *records,
-                             uint32_t count, const sonde_identify_options *options) {
+sonde_status sonde_identify_damping(const sonde_model *model, const sonde_motion_record *records,
+                                    uint32_t count, const sonde_identify_options *options,
+                                    const sonde_progress *progress, sonde_damping_result *result,
+                                    sonde_error *error) {
+  sonde_identify_options fallback = sonde_identify_options_default();
+  *result = (sonde_damping_result){0};
+  if (!count) return sonde_fail(error, SONDE_ARGUMENT, "no record, expected at least one");
   const double low = 1e-6, high = 10; // s
   sonde_inverse in = {.model = model,
                       .records = records,
                       .record_count = count,
-                      .options = options,
+                      .options = options ? options : &fallback,
+                      .progress = progress,
                       .parameter_count = EDGE,
                       .apply = apply,
                       .count = count_samples,
@@ -57,18 +63,6 @@ static sonde_inverse problem(const sonde_model *model, const sonde_motion_record
   in.high[SCALE] = log(20);
   in.theta[NORMAL] = log(clamp(model->law.normal_damping_s, 1e-3, high));
   in.theta[EDGE] = log(clamp(model->law.edge_damping_s, 1e-5, high));
-  return in;
-}
-
-sonde_status sonde_identify_damping(const sonde_model *model, const sonde_motion_record *records,
-                                    uint32_t count, const sonde_identify_options *options,
-                                    const sonde_progress *progress, sonde_damping_result *result,
-                                    sonde_error *error) {
-  sonde_identify_options fallback = sonde_identify_options_default();
-  *result = (sonde_damping_result){0};
-  if (!count) return sonde_fail(error, SONDE_ARGUMENT, "no record, expected at least one");
-  sonde_inverse in = problem(model, records, count, options ? options : &fallback);
-  in.progress = progress;
   sonde_status status = sonde_inverse_solve(&in, error);
   if (status) return status;
   // What the records say about the edges, at the place found without them.

@@ -59,18 +59,6 @@ sonde_pose sonde_drive_pose(const sonde_drive *drive, double time_s) {
   return (sonde_pose){p, q_from_matrix(m_columns(x, y, z))};
 }
 
-static void start(const sonde_drive *drive, sonde_state *state) {
-  double first_s = drive->time_s[0];
-  double depth = sonde_track_at(&drive->penetration, first_s);
-  sonde_pose pose = sonde_drive_pose(drive, first_s);
-  for (double above = depth - 2e-3; depth > 0; above -= 2e-3) {
-    sonde_pose on_the_way = pose;
-    on_the_way.position = v_madd(pose.position, fmax(above, 0), drive->site->normal);
-    sonde_settle(state, &drive->probe, on_the_way, 1e-6, 200);
-    if (above <= 0) return;
-  }
-}
-
 typedef struct reading {
   double time_s, normal_n, tangential_n;
 } reading;
@@ -80,18 +68,19 @@ static reading read_sensors(const sonde_drive *drive, const sonde_state *state, 
   return (reading){time_s, v_dot(f, drive->site->normal), -v_dot(f, drive->axis)};
 }
 
-static bool cancelled(const sonde_drive *drive, const atomic_bool *stop,
-                      const sonde_progress *progress, double time_s) {
-  double first = drive->time_s[0], length = drive->time_s[drive->count - 1] - first;
-  if (stop && atomic_load(stop)) return true;
-  return progress && !sonde_progress_report(progress, (time_s - first) / length, "moving");
-}
-
 static sonde_status run(const sonde_drive *drive, sonde_state *state, const atomic_bool *stop,
                         const sonde_progress *progress, double *normal_n, double *tangential_n,
                         sonde_error *error) {
   double h = sonde_state_def(state)->dt_s, first = drive->time_s[0];
-  start(drive, state);
+  double length = drive->time_s[drive->count - 1] - first;
+  // A probe that begins inside the skin settles from above, 2 mm at a time.
+  double depth = sonde_track_at(&drive->penetration, first);
+  for (double above = depth - 2e-3, last = INFINITY; depth > 0 && last > 0; above -= 2e-3) {
+    sonde_pose on_the_way = sonde_drive_pose(drive, first);
+    on_the_way.position = v_madd(on_the_way.position, fmax(above, 0), drive->site->normal);
+    sonde_settle(state, &drive->probe, on_the_way, 1e-6, 200);
+    last = above;
+  }
   sonde_step(state, &drive->probe, sonde_drive_pose(drive, first));
   reading before = read_sensors(drive, state, first), now = before;
   uint32_t next = 0;
@@ -110,7 +99,9 @@ static sonde_status run(const sonde_drive *drive, sonde_state *state, const atom
     if (sonde_state_flags(state) & SONDE_FLAG_NON_FINITE)
       return sonde_fail(error, SONDE_CONVERGENCE, "site %u: the motion diverged at %g s",
                         drive->site->id, time_s);
-    if (tick % 64 == 0 && cancelled(drive, stop, progress, time_s))
+    if (tick % 64 == 0 &&
+        ((stop && atomic_load(stop)) ||
+         (progress && !sonde_progress_report(progress, (time_s - first) / length, "moving"))))
       return sonde_fail(error, SONDE_CANCELLED, "cancelled");
   }
   return SONDE_OK;

@@ -59,12 +59,6 @@ static double tangential_at(const forces *f, uint32_t k) {
   return f->samples ? f->samples[k].tangential_n : f->tangential_n[k];
 }
 
-static double push_of(const forces *f, sonde_span span) {
-  double sum = 0;
-  for (uint32_t k = span.from; k < span.to; ++k) sum += normal_at(f, k);
-  return sum / (span.to - span.from);
-}
-
 static double ratio_of(const forces *f, sonde_span span) {
   double normal = 0, tangential = 0;
   for (uint32_t k = span.from; k < span.to; ++k) {
@@ -74,14 +68,21 @@ static double ratio_of(const forces *f, sonde_span span) {
   return normal > LEAST_PUSH_N * (span.to - span.from) ? tangential / normal : 0;
 }
 
-// Standard deviation of T - ratio N over the mean push, without the part of white noise: that has a
-// mean square of second differences of 6 variances, ripple has next to none.
-static double ripple_of(const forces *f, sonde_span span, double ratio) {
+static void look_at(const forces *f, sonde_span half, double looks[LOOKS]) {
+  uint32_t length = (half.to - half.from) / WINDOWS;
+  SONDE_ASSERT(length > 2);
+  for (uint32_t w = 0; w < WINDOWS; ++w) {
+    uint32_t from = half.from + w * length;
+    looks[w] = ratio_of(f, (sonde_span){from, from + length});
+  }
+  // Standard deviation of T - ratio N over the mean push, without the part of white noise: that has
+  // a mean square of second differences of 6 variances, ripple has next to none.
+  const double ratio = ratio_of(f, half);
   double sum = 0, squares = 0, bends = 0, push = 0, last[2] = {0};
-  uint32_t count = span.to - span.from;
-  for (uint32_t k = span.from; k < span.to; ++k) {
+  uint32_t count = half.to - half.from;
+  for (uint32_t k = half.from; k < half.to; ++k) {
     double e = tangential_at(f, k) - ratio * normal_at(f, k);
-    if (k >= span.from + 2) bends += (e - 2 * last[0] + last[1]) * (e - 2 * last[0] + last[1]);
+    if (k >= half.from + 2) bends += (e - 2 * last[0] + last[1]) * (e - 2 * last[0] + last[1]);
     last[1] = last[0];
     last[0] = e;
     sum += e;
@@ -90,17 +91,7 @@ static double ripple_of(const forces *f, sonde_span span, double ratio) {
   }
   double noise = bends / (6.0 * (count - 2)),
          variance = squares / count - sum * sum / count / count;
-  return push > LEAST_PUSH_N * count ? sqrt(fmax(0, variance - noise)) * count / push : 0;
-}
-
-static void look_at(const forces *f, sonde_span half, double looks[LOOKS]) {
-  uint32_t length = (half.to - half.from) / WINDOWS;
-  SONDE_ASSERT(length > 2);
-  for (uint32_t w = 0; w < WINDOWS; ++w) {
-    uint32_t from = half.from + w * length;
-    looks[w] = ratio_of(f, (sonde_span){from, from + length});
-  }
-  looks[WINDOWS] = ripple_of(f, half, ratio_of(f, half));
+  looks[WINDOWS] = push > LEAST_PUSH_N * count ? sqrt(fmax(0, variance - noise)) * count / push : 0;
 }
 
 static void compare(const sonde_motion_record *record, const sonde_drive *drive,
@@ -114,7 +105,9 @@ static void compare(const sonde_motion_record *record, const sonde_drive *drive,
     look_at(&simulated, half, model);
     // The noise of a mean of n ratios is that of a sample over push and sqrt(n). The ripple's, near
     // no ripple, is larger.
-    double push = fmax(LEAST_PUSH_N, push_of(&measured, half));
+    double sum = 0;
+    for (uint32_t i = half.from; i < half.to; ++i) sum += normal_at(&measured, i);
+    double push = fmax(LEAST_PUSH_N, (sum / (half.to - half.from)));
     double scale = push * sqrt((half.to - half.from) / WINDOWS);
     for (int i = 0; i < LOOKS; ++i)
       *residual++ = (model[i] - seen[i]) * (i == WINDOWS ? 0.3 : 1) * scale;
@@ -157,46 +150,30 @@ typedef struct ratios {
   double low, high, slow_m_s, fast_m_s;
 } ratios;
 
-// Lowest and highest ratio over the speeds of one record.
-static sonde_status gather(const sonde_inverse *in, const sonde_motion_record *record, ratios *seen,
-                           sonde_error *error) {
-  sonde_slide slides[SONDE_HOLDS];
-  sonde_motion_record copy;
-  uint32_t found = 0;
-  sonde_status status = less_pile_up(in, record, &copy, error);
-  if (status) return status;
-  status = sonde_slide_read(&copy, slides, &found, error);
-  for (uint32_t k = 0; k < found; ++k) {
-    seen->low = fmin(seen->low, slides[k].ratio);
-    seen->high = fmax(seen->high, slides[k].ratio);
-    seen->slow_m_s = fmin(seen->slow_m_s, slides[k].speed_m_s);
-    seen->fast_m_s = fmax(seen->fast_m_s, slides[k].speed_m_s);
-  }
-  sonde_motion_record_clear(&copy);
-  return status;
-}
-
 // The coefficients are near those ratios; the Stribeck speed is near the speeds or of no effect.
 static sonde_status guess(sonde_inverse *in, sonde_error *error) {
   ratios seen = {INFINITY, 0, INFINITY, 0};
   for (uint32_t r = 0; r < in->record_count; ++r) {
-    sonde_status status = gather(in, &in->records[r], &seen, error);
+    // Lowest and highest ratio over the speeds of one record.
+    sonde_slide slides[SONDE_HOLDS];
+    sonde_motion_record copy;
+    uint32_t found = 0;
+    sonde_status status = less_pile_up(in, &in->records[r], &copy, error);
+    if (status) return status;
+    status = sonde_slide_read(&copy, slides, &found, error);
+    for (uint32_t k = 0; k < found; ++k) {
+      seen.low = fmin(seen.low, slides[k].ratio);
+      seen.high = fmax(seen.high, slides[k].ratio);
+      seen.slow_m_s = fmin(seen.slow_m_s, slides[k].speed_m_s);
+      seen.fast_m_s = fmax(seen.fast_m_s, slides[k].speed_m_s);
+    }
+    sonde_motion_record_clear(&copy);
     if (status) return status;
   }
   double kinetic = clamp(seen.low, 0.005, 4), rest = clamp(1.1 * seen.high, kinetic, 4.5);
   put_start(in, KINETIC, kinetic, kinetic / 4, kinetic * 4);
   put_start(in, STATIC, rest, rest / 4, rest * 4);
   put_start(in, SPEED, sqrt(seen.slow_m_s * seen.fast_m_s), seen.slow_m_s / 3, seen.fast_m_s * 3);
-  return SONDE_OK;
-}
-
-static sonde_status check(const sonde_motion_record *records, uint32_t count, sonde_error *error) {
-  if (!count) return sonde_fail(error, SONDE_ARGUMENT, "no record, expected at least one");
-  for (uint32_t r = 1; r < count; ++r)
-    if (records[r].gel_film > records[0].gel_film || records[r].gel_film < records[0].gel_film)
-      return sonde_fail(error, SONDE_MISMATCH,
-                        "records with gel films %g and %g, expected one film for all",
-                        records[0].gel_film, records[r].gel_film);
   return SONDE_OK;
 }
 
@@ -217,8 +194,13 @@ sonde_status sonde_identify_friction(const sonde_model *model, const sonde_motio
                       .count = count_looks,
                       .compare = compare,
                       .step = {0.1, 0.1, 0.3}};
-  sonde_status status = check(records, count, error);
-  if (!status) status = guess(&in, error);
+  if (!count) return sonde_fail(error, SONDE_ARGUMENT, "no record, expected at least one");
+  for (uint32_t r = 1; r < count; ++r)
+    if (records[r].gel_film > records[0].gel_film || records[r].gel_film < records[0].gel_film)
+      return sonde_fail(error, SONDE_MISMATCH,
+                        "records with gel films %g and %g, expected one film for all",
+                        records[0].gel_film, records[r].gel_film);
+  sonde_status status = guess(&in, error);
   if (!status) status = sonde_inverse_solve(&in, error);
   if (status) return status;
   *result = (sonde_friction_result){.mu_static = sonde_inverse_estimate(&in, STATIC),

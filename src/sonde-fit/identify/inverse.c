@@ -40,11 +40,18 @@ static bool note_share(double fraction, const char *what, void *user) {
   return true;
 }
 
-static sonde_status simulate(void *user, uint32_t worker, uint32_t item, const atomic_bool *stop,
-                             sonde_error *error) {
+// Vectors `from` to `to` (exclusive) of theta.
+typedef struct batch {
+  workspace *w;
+  uint32_t from;
+} batch;
+
+static sonde_status simulate_item(void *user, uint32_t worker, uint32_t item,
+                                  const atomic_bool *stop, sonde_error *error) {
   (void)worker;
-  workspace *w = user;
-  uint32_t r = item % w->in->record_count, vector = item / w->in->record_count;
+  const batch *b = user;
+  workspace *w = b->w;
+  uint32_t r = item % w->in->record_count, vector = b->from + item / w->in->record_count;
   const sonde_motion_record *record = &w->in->records[r];
   sonde_surface_law law = w->in->model->law;
   sonde_world_def def = w->in->options->world;
@@ -57,7 +64,7 @@ static sonde_status simulate(void *user, uint32_t worker, uint32_t item, const a
   if (!status) {
     model.law = law;
     sonde_law_scale(&model.law, scale);
-    const sonde_progress share = {note_share, &w->share[item]};
+    const sonde_progress share = {note_share, &w->share[b->from * w->in->record_count + item]};
     status = sonde_drive_run(&w->drive[r], &model, &def, stop, &share, force, force + record->count,
                              error);
   }
@@ -67,18 +74,6 @@ static sonde_status simulate(void *user, uint32_t worker, uint32_t item, const a
   sonde_model_return(&model);
   sonde_free(force);
   return status;
-}
-
-// Vectors `from` to `to` (exclusive) of theta.
-typedef struct batch {
-  workspace *w;
-  uint32_t from;
-} batch;
-
-static sonde_status simulate_item(void *user, uint32_t worker, uint32_t item,
-                                  const atomic_bool *stop, sonde_error *error) {
-  const batch *b = user;
-  return simulate(b->w, worker, item + b->from * b->w->in->record_count, stop, error);
 }
 
 // Progress of a batch: the mean of its simulations' shares.
@@ -233,26 +228,6 @@ static bool stall(void *user, double cost) {
   return true;
 }
 
-static void judge(workspace *w) {
-  sonde_inverse *in = w->in;
-  uint32_t n = in->parameter_count;
-  double inverse[P * P], sum = 0;
-  weigh(w);
-  build(w);
-  bool definite = sonde_cholesky(w->normal, n);
-  SONDE_ASSERT(definite); // by its prior
-  (void)definite;
-  sonde_cholesky_invert(w->normal, n, inverse);
-  for (uint32_t p = 0; p < n; ++p) {
-    memcpy(in->covariance[p], inverse + p * n, n * sizeof *inverse);
-    double squares = 0;
-    for (uint32_t k = 0; k < w->residuals; ++k) squares += slope_of(w, p, k) * slope_of(w, p, k);
-    in->sensitivity[p] = sqrt(squares / w->residuals);
-  }
-  for (uint32_t k = 0; k < w->residuals; ++k) sum += w->residual[0][k] * w->residual[0][k];
-  in->rms = sqrt(sum / w->residuals);
-}
-
 static sonde_status prepare(workspace *w, sonde_error *error) {
   sonde_inverse *in = w->in;
   w->drive = SONDE_NEW(sonde_drive, in->record_count);
@@ -281,15 +256,6 @@ static sonde_status prepare(workspace *w, sonde_error *error) {
   return ok ? SONDE_OK : sonde_fail_memory(error);
 }
 
-static void clear(workspace *w) {
-  for (uint32_t r = 0; w->drive && r < w->in->record_count; ++r) sonde_drive_clear(&w->drive[r]);
-  for (uint32_t v = 0; v < VECTORS; ++v) sonde_free(w->residual[v]);
-  sonde_free(w->drive);
-  sonde_free(w->first);
-  sonde_free(w->share);
-  sonde_free(w->weight);
-}
-
 sonde_status sonde_inverse_solve(sonde_inverse *in, sonde_error *error) {
   SONDE_ASSERT(in->parameter_count >= 1 && in->parameter_count <= P && in->record_count > 0);
   workspace w = {.in = in};
@@ -315,14 +281,35 @@ sonde_status sonde_inverse_solve(sonde_inverse *in, sonde_error *error) {
   in->iterations = found.steps, in->converged = found.converged;
   if (!status && w.stale) status = differentiate(&w, error);
   if (!status) {
-    judge(&w);
+    // Covariance of the parameters, what each does to the residuals, and their root mean square.
+    uint32_t n = in->parameter_count;
+    double inverse[P * P], sum = 0;
+    weigh(&w);
+    build(&w);
+    bool definite = sonde_cholesky(w.normal, n);
+    SONDE_ASSERT(definite); // by its prior
+    (void)definite;
+    sonde_cholesky_invert(w.normal, n, inverse);
+    for (uint32_t p = 0; p < n; ++p) {
+      memcpy(in->covariance[p], inverse + p * n, n * sizeof *inverse);
+      double squares = 0;
+      for (uint32_t k = 0; k < w.residuals; ++k) squares += slope_of(&w, p, k) * slope_of(&w, p, k);
+      in->sensitivity[p] = sqrt(squares / w.residuals);
+    }
+    for (uint32_t k = 0; k < w.residuals; ++k) sum += w.residual[0][k] * w.residual[0][k];
+    in->rms = sqrt(sum / w.residuals);
     memcpy(in->theta, w.theta[0], sizeof in->theta);
     if (!in->converged && in->options->max_iterations > 0)
       status = sonde_fail(error, SONDE_CONVERGENCE,
                           "no end after %u iterations, RMS of the residuals %g", in->iterations,
                           in->rms);
   }
-  clear(&w);
+  for (uint32_t r = 0; w.drive && r < w.in->record_count; ++r) sonde_drive_clear(&w.drive[r]);
+  for (uint32_t v = 0; v < VECTORS; ++v) sonde_free(w.residual[v]);
+  sonde_free(w.drive);
+  sonde_free(w.first);
+  sonde_free(w.share);
+  sonde_free(w.weight);
   return status;
 }
 

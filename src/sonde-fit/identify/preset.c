@@ -153,23 +153,21 @@ sonde_status sonde_preset_save(const char *path, const sonde_preset *preset, son
   return sonde_file_commit(out.file, error);
 }
 
-static void apply_to_model(const sonde_preset *preset, sonde_model *model) {
-  sonde_surface_law *law = &model->law;
-  double scale = preset->stiffness_scale;
-  if (!isnan(preset->normal_damping_s)) law->normal_damping_s = preset->normal_damping_s;
-  if (!isnan(preset->edge_damping_s)) law->edge_damping_s = preset->edge_damping_s;
-  law->normal_damping_s *= preset->damping_multiplier;
-  law->edge_damping_s *= preset->damping_multiplier;
-  sonde_law_scale(law, scale);
-  for (uint32_t i = 0; i < model->surface.vertex_count; ++i) model->k0_n_m3[i] *= scale;
-  for (uint32_t i = 0; i < model->site_count; ++i) model->sites[i].k0_n_m3 *= scale;
-}
-
 sonde_status sonde_preset_apply(const sonde_preset *preset, sonde_model *model,
                                 sonde_world_def *def, sonde_error *error) {
   sonde_status status = check(preset, NULL, error);
   if (status) return status;
-  if (model) apply_to_model(preset, model);
+  if (model) {
+    sonde_surface_law *law = &model->law;
+    double scale = preset->stiffness_scale;
+    if (!isnan(preset->normal_damping_s)) law->normal_damping_s = preset->normal_damping_s;
+    if (!isnan(preset->edge_damping_s)) law->edge_damping_s = preset->edge_damping_s;
+    law->normal_damping_s *= preset->damping_multiplier;
+    law->edge_damping_s *= preset->damping_multiplier;
+    sonde_law_scale(law, scale);
+    for (uint32_t i = 0; i < model->surface.vertex_count; ++i) model->k0_n_m3[i] *= scale;
+    for (uint32_t i = 0; i < model->site_count; ++i) model->sites[i].k0_n_m3 *= scale;
+  }
   if (def) def->friction = preset->friction;
   return SONDE_OK;
 }

@@ -34,29 +34,6 @@ sonde_protocol sonde_protocol_default(sonde_protocol_kind kind) {
   return p;
 }
 
-static sonde_status check(const sonde_protocol *p, double dt_s, sonde_error *error) {
-  const struct {
-    const char *name;
-    double value, low, high;
-  } range[] = {{"depth_m", p->depth_m, 1e-4, DEEPEST_M},
-               {"force_n", p->force_n, 0, 200},
-               {"speed_count", p->speed_count, 1, SONDE_PROTOCOL_SPEEDS},
-               {"hold_s", p->hold_s, 0.02, 60},
-               {"slide_m", p->slide_m, 1e-3, 0.1},
-               {"rate_hz", p->rate_hz, 50, 1 / dt_s + 1e-6},
-               {"noise_force_n", p->noise_force_n, 0, 100},
-               {"noise_position_m", p->noise_position_m, 0, 0.01}};
-  for (size_t k = 0; k < SONDE_COUNT_OF(range); ++k)
-    if (!(range[k].value >= range[k].low && range[k].value <= range[k].high))
-      return sonde_fail(error, SONDE_ARGUMENT, "%s is %g, expected %g to %g", range[k].name,
-                        range[k].value, range[k].low, range[k].high);
-  for (uint32_t k = 0; k < p->speed_count; ++k)
-    if (!(p->speed_m_s[k] >= 1e-3 && p->speed_m_s[k] <= 1))
-      return sonde_fail(error, SONDE_ARGUMENT, "speed %g m/s, expected 0.001 to 1",
-                        p->speed_m_s[k]);
-  return SONDE_OK;
-}
-
 // Where a slow press meets the force.
 static sonde_status find_depth(const sonde_model *model, const sonde_drive *drive, double force_n,
                                double *depth_m, sonde_error *error) {
@@ -157,32 +134,6 @@ static sonde_status make_plan(const sonde_model *model, const sonde_protocol *pr
   return SONDE_OK;
 }
 
-static sonde_status sample(const sonde_model *model, const sonde_world_def *def,
-                           const sonde_protocol *protocol, const sonde_drive *drive,
-                           const sonde_progress *progress, sonde_motion_record *record,
-                           sonde_error *error) {
-  double *force = SONDE_NEW(double, 2 * (size_t)drive->count);
-  record->samples = SONDE_NEW(sonde_motion_sample, drive->count);
-  sonde_status status = force && record->samples ? SONDE_OK : sonde_fail_memory(error);
-  if (!status)
-    status = sonde_drive_run(drive, model, def, NULL, progress, force, force + drive->count, error);
-  for (uint32_t k = 0; !status && k < drive->count; ++k) {
-    double t = drive->time_s[k];
-    uint64_t counter = 4 * (uint64_t)k;
-    double noise[4];
-    for (uint32_t n = 0; n < 4; ++n)
-      noise[n] = (n < 2 ? protocol->noise_position_m : protocol->noise_force_n) *
-                 sonde_random_normal(protocol->seed, counter + n);
-    record->samples[k] =
-        (sonde_motion_sample){t, sonde_track_at(&drive->penetration, t) + noise[0],
-                              sonde_track_at(&drive->slide, t) + noise[1], force[k] + noise[2],
-                              force[drive->count + k] + noise[3]};
-  }
-  record->count = drive->count;
-  sonde_free(force);
-  return status;
-}
-
 sonde_status sonde_protocol_run(const sonde_model *model, const sonde_world_def *def,
                                 const sonde_protocol *protocol, const sonde_progress *progress,
                                 sonde_motion_record *record, sonde_error *error) {
@@ -193,13 +144,52 @@ sonde_status sonde_protocol_run(const sonde_model *model, const sonde_world_def 
                                   .gel_film = world.friction.gel_film,
                                   .synthetic = true};
   snprintf(record->probe, sizeof record->probe, "%s", protocol->probe);
-  sonde_status status = check(protocol, world.dt_s, error);
-  if (status) return status;
+  sonde_status status = SONDE_OK;
+  const struct {
+    const char *name;
+    double value, low, high;
+  } range[] = {{"depth_m", protocol->depth_m, 1e-4, DEEPEST_M},
+               {"force_n", protocol->force_n, 0, 200},
+               {"speed_count", protocol->speed_count, 1, SONDE_PROTOCOL_SPEEDS},
+               {"hold_s", protocol->hold_s, 0.02, 60},
+               {"slide_m", protocol->slide_m, 1e-3, 0.1},
+               {"rate_hz", protocol->rate_hz, 50, 1 / world.dt_s + 1e-6},
+               {"noise_force_n", protocol->noise_force_n, 0, 100},
+               {"noise_position_m", protocol->noise_position_m, 0, 0.01}};
+  for (size_t k = 0; k < SONDE_COUNT_OF(range); ++k)
+    if (!(range[k].value >= range[k].low && range[k].value <= range[k].high))
+      return sonde_fail(error, SONDE_ARGUMENT, "%s is %g, expected %g to %g", range[k].name,
+                        range[k].value, range[k].low, range[k].high);
+  for (uint32_t k = 0; k < protocol->speed_count; ++k)
+    if (!(protocol->speed_m_s[k] >= 1e-3 && protocol->speed_m_s[k] <= 1))
+      return sonde_fail(error, SONDE_ARGUMENT, "speed %g m/s, expected 0.001 to 1",
+                        protocol->speed_m_s[k]);
   sonde_drive drive;
   status =
       sonde_drive_create(model, protocol->site, protocol->probe, protocol->axis, 2, &drive, error);
   if (!status) status = make_plan(model, protocol, &drive, error);
-  if (!status) status = sample(model, &world, protocol, &drive, progress, record, error);
+  if (!status) {
+    double *force = SONDE_NEW(double, 2 * (size_t)drive.count);
+    record->samples = SONDE_NEW(sonde_motion_sample, drive.count);
+    status = force && record->samples ? SONDE_OK : sonde_fail_memory(error);
+    if (!status)
+      status =
+          sonde_drive_run(&drive, model, &world, NULL, progress, force, force + drive.count, error);
+    for (uint32_t k = 0; !status && k < drive.count; ++k) {
+      double t = drive.time_s[k];
+      uint64_t counter = 4 * (uint64_t)k;
+      double noise[4];
+      for (uint32_t n = 0; n < 4; ++n)
+        noise[n] = (n < 2 ? protocol->noise_position_m : protocol->noise_force_n) *
+                   sonde_random_normal(protocol->seed, counter + n);
+      record->samples[k] =
+          (sonde_motion_sample){t, sonde_track_at(&drive.penetration, t) + noise[0],
+                                sonde_track_at(&drive.slide, t) + noise[1], force[k] + noise[2],
+                                force[drive.count + k] + noise[3]};
+    }
+    record->count = drive.count;
+    sonde_free(force);
+  }
   sonde_drive_clear(&drive);
   if (status) sonde_motion_record_clear(record);
   return status;

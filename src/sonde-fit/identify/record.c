@@ -19,14 +19,13 @@ static sonde_status expected(const char *path, uint32_t line, const char *key, c
                     what, value);
 }
 
-static bool whole_number(const char *text, double high, double *number) {
-  const char *end;
-  *number = sonde_parse_real(text, &end);
-  return end != text && !*end && *number >= 0 && *number <= high && floor(*number) >= *number;
-}
-
-static sonde_status read_value(const char *path, uint32_t line, const char *key, const char *value,
-                               sonde_motion_record *record, sonde_error *error) {
+// Comments of another shape, and keys that mean nothing here, are left alone.
+static sonde_status read_comment(const char *path, uint32_t line, const char *text,
+                                 sonde_motion_record *record, sonde_error *error) {
+  char key[32], value[256];
+  if (sscanf(text, "# %31[a-z_]: %255[^\n]", key, value) != 2) return SONDE_OK;
+  for (size_t n = strlen(value); n && (value[n - 1] == ' ' || value[n - 1] == '\t');)
+    value[--n] = 0;
   double number = 0;
   const char *end;
   if (!strcmp(key, "protocol")) {
@@ -38,7 +37,9 @@ static sonde_status read_value(const char *path, uint32_t line, const char *key,
     return expected(path, line, key, "ramp-hold or slide", value, error);
   }
   if (!strcmp(key, "site")) {
-    if (!whole_number(value, 1e6, &number))
+    const char *rest;
+    number = sonde_parse_real(value, &rest);
+    if (rest == value || *rest || !(number >= 0 && number <= 1e6) || floor(number) < number)
       return expected(path, line, key, "a whole number", value, error);
     record->site = (uint32_t)number;
   } else if (!strcmp(key, "axis")) {
@@ -57,61 +58,30 @@ static sonde_status read_value(const char *path, uint32_t line, const char *key,
   return SONDE_OK;
 }
 
-// Comments of another shape, and keys that mean nothing here, are left alone.
-static sonde_status read_comment(const char *path, uint32_t line, const char *text,
-                                 sonde_motion_record *record, sonde_error *error) {
-  char key[32], value[256];
-  if (sscanf(text, "# %31[a-z_]: %255[^\n]", key, value) != 2) return SONDE_OK;
-  for (size_t n = strlen(value); n && (value[n - 1] == ' ' || value[n - 1] == '\t');)
-    value[--n] = 0;
-  return read_value(path, line, key, value, record, error);
-}
-
-// The table has cut its text into lines; those before the header are untouched otherwise.
-static sonde_status read_comments(const sonde_csv *csv, sonde_motion_record *record,
-                                  sonde_error *error) {
-  uint32_t line = 1;
-  sonde_status status = SONDE_OK;
-  for (const char *at = csv->text; !status && at < csv->name[0]; ++line) {
-    const char *mark = strchr(at, '#');
-    if (mark) status = read_comment(csv->path, line, mark, record, error);
-    at += strlen(at);
-    while (at < csv->name[0] && !*at) ++at;
-  }
-  return status;
-}
-
-static sonde_status read_row(const sonde_csv *csv, const uint32_t *columns,
-                             sonde_motion_record *record, sonde_error *error) {
-  double v[COLUMNS];
-  for (int k = 0; k < COLUMNS; ++k) {
-    sonde_status status = sonde_csv_real(csv, columns[k], &v[k], error);
-    if (status) return status;
-    if (!(fabs(v[k]) <= HIGHEST[k]))
-      return sonde_fail(error, SONDE_FORMAT, "%s:%u: column %s: %g, expected at most %g", csv->path,
-                        csv->line, NAMES[k], v[k], HIGHEST[k]);
-  }
-  const sonde_motion_sample *last = record->count ? &record->samples[record->count - 1] : NULL;
-  if (last && !(v[0] > last->time_s))
-    return sonde_fail(error, SONDE_FORMAT,
-                      "%s:%u: column time_s: %g after %g, expected increasing times", csv->path,
-                      csv->line, v[0], last->time_s);
-  record->samples[record->count++] = (sonde_motion_sample){v[0], MM * v[1], MM * v[2], v[3], v[4]};
-  return SONDE_OK;
-}
-
 static sonde_status read_rows(sonde_csv *csv, sonde_motion_record *record, sonde_error *error) {
   uint32_t columns[COLUMNS];
+  bool found = true;
   sonde_status status = sonde_csv_require(csv, NAMES, COLUMNS, columns, error);
   if (status) return status;
   record->samples = SONDE_NEW(sonde_motion_sample, sonde_csv_lines_left(csv));
   if (!record->samples) return sonde_fail_memory(error);
-  for (;;) {
-    bool found;
-    status = sonde_csv_next(csv, &found, error);
-    if (status || !found) break;
-    status = read_row(csv, columns, record, error);
-    if (status) break;
+  for (status = sonde_csv_next(csv, &found, error); !status && found;
+       status = sonde_csv_next(csv, &found, error)) {
+    double v[COLUMNS];
+    for (int k = 0; k < COLUMNS; ++k) {
+      status = sonde_csv_real(csv, columns[k], &v[k], error);
+      if (status) return status;
+      if (!(fabs(v[k]) <= HIGHEST[k]))
+        return sonde_fail(error, SONDE_FORMAT, "%s:%u: column %s: %g, expected at most %g",
+                          csv->path, csv->line, NAMES[k], v[k], HIGHEST[k]);
+    }
+    const sonde_motion_sample *last = record->count ? &record->samples[record->count - 1] : NULL;
+    if (last && !(v[0] > last->time_s))
+      return sonde_fail(error, SONDE_FORMAT,
+                        "%s:%u: column time_s: %g after %g, expected increasing times", csv->path,
+                        csv->line, v[0], last->time_s);
+    record->samples[record->count++] =
+        (sonde_motion_sample){v[0], MM * v[1], MM * v[2], v[3], v[4]};
   }
   if (!status && record->count < FEWEST_SAMPLES)
     return sonde_fail(error, SONDE_FORMAT, "%s: too short: %u samples, expected at least %d",
@@ -124,7 +94,16 @@ sonde_status sonde_motion_record_load(const char *path, sonde_motion_record *rec
   *record = (sonde_motion_record){.site = UINT32_MAX, .axis = 'v'};
   sonde_csv csv;
   sonde_status status = sonde_csv_open(&csv, path, error);
-  if (!status) status = read_comments(&csv, record, error);
+  if (!status) {
+    // The table has cut its text into lines; those before the header are untouched otherwise.
+    uint32_t line = 1;
+    for (const char *at = csv.text; !status && at < csv.name[0]; ++line) {
+      const char *mark = strchr(at, '#');
+      if (mark) status = read_comment(csv.path, line, mark, record, error);
+      at += strlen(at);
+      while (at < csv.name[0] && !*at) ++at;
+    }
+  }
   if (!status) status = read_rows(&csv, record, error);
   sonde_csv_close(&csv);
   if (status) sonde_motion_record_clear(record);

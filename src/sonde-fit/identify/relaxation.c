@@ -140,36 +140,6 @@ static double relaxation_time(const exponentials *e) {
   return high;
 }
 
-static bool read_hold(const sonde_motion_record *record, double start_s, double end_s,
-                      sonde_relaxation *hold) {
-  sonde_span span = sonde_span_between(record, start_s, end_s);
-  decay d = {record->samples + span.from, span.to - span.from, start_s};
-  if (d.count < FEWEST) return false;
-  exponentials e = fit_decay(&d, end_s - start_s);
-  hold->start_s = start_s;
-  hold->length_s = end_s - start_s;
-  hold->static_n = e.level;
-  hold->peak_n = e.level + excess(&e, 0);
-  hold->ratio = hold->peak_n / hold->static_n;
-  hold->relaxation_s = relaxation_time(&e);
-  for (int k = 0; k < 2; ++k) {
-    hold->tau_s[k] = e.tau_s[k];
-    hold->amplitude_n[k] = e.amplitude[k];
-  }
-  // Slope of ln F over ln t, by least squares over the samples with F > 0 and t > 0.
-  double n = 0, x = 0, y = 0, xx = 0, xy = 0;
-  for (uint32_t k = 0; k < d.count; ++k) {
-    double t = d.sample[k].time_s - start_s, f = d.sample[k].normal_n;
-    if (!(t > 0) || !(f > 0)) continue;
-    double lx = log(t), ly = log(f);
-    n += 1, x += lx, y += ly, xx += lx * lx, xy += lx * ly;
-  }
-  double spread = n * xx - x * x;
-  hold->power = spread > 0 ? (n * xy - x * y) / spread : 0;
-  hold->rms_n = sqrt(e.squares / d.count);
-  return true;
-}
-
 sonde_status sonde_relaxation_read(const sonde_motion_record *record, sonde_relaxation *holds,
                                    uint32_t *count, sonde_error *error) {
   const sonde_motion_sample *s = record->samples;
@@ -182,9 +152,36 @@ sonde_status sonde_relaxation_read(const sonde_motion_record *record, sonde_rela
     double ramp = sonde_track_slope(&track, k - 1), way = track.value[k] - track.value[k - 1];
     bool in = ramp > SONDE_STANDS_M_S && way > SHORTEST_M && track.value[k] > 0;
     if (!in || fabs(sonde_track_slope(&track, k)) > fmax(SONDE_STANDS_M_S, 0.05 * ramp)) continue;
-    sonde_relaxation *hold = &holds[*count];
-    *hold = (sonde_relaxation){.depth_m = track.value[k], .speed_m_s = ramp};
-    if (read_hold(record, track.time_s[k], track.time_s[k + 1], hold)) ++*count;
+    // The static force, the exponentials above it and the power law of one hold.
+    double start_s = track.time_s[k], end_s = track.time_s[k + 1];
+    sonde_span span = sonde_span_between(record, start_s, end_s);
+    decay d = {record->samples + span.from, span.to - span.from, start_s};
+    if (d.count < FEWEST) continue;
+    sonde_relaxation *hold = &holds[(*count)++];
+    *hold = (sonde_relaxation){.depth_m = track.value[k],
+                               .speed_m_s = ramp,
+                               .start_s = start_s,
+                               .length_s = end_s - start_s};
+    exponentials e = fit_decay(&d, end_s - start_s);
+    hold->static_n = e.level;
+    hold->peak_n = e.level + excess(&e, 0);
+    hold->ratio = hold->peak_n / hold->static_n;
+    hold->relaxation_s = relaxation_time(&e);
+    for (int i = 0; i < 2; ++i) {
+      hold->tau_s[i] = e.tau_s[i];
+      hold->amplitude_n[i] = e.amplitude[i];
+    }
+    // Slope of ln F over ln t, by least squares over the samples with F > 0 and t > 0.
+    double n = 0, x = 0, y = 0, xx = 0, xy = 0;
+    for (uint32_t i = 0; i < d.count; ++i) {
+      double t = d.sample[i].time_s - start_s, f = d.sample[i].normal_n;
+      if (!(t > 0) || !(f > 0)) continue;
+      double lx = log(t), ly = log(f);
+      n += 1, x += lx, y += ly, xx += lx * lx, xy += lx * ly;
+    }
+    double spread = n * xx - x * x;
+    hold->power = spread > 0 ? (n * xy - x * y) / spread : 0;
+    hold->rms_n = sqrt(e.squares / d.count);
   }
   sonde_track_clear(&track);
   return *count ? SONDE_OK

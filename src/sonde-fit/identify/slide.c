@@ -20,50 +20,6 @@ static double ratio_at(const sonde_motion_record *record, uint32_t k) {
   return s->normal_n > LEAST_PUSH_N ? s->tangential_n / s->normal_n : 0;
 }
 
-static sonde_status read_move(const sonde_motion_record *record, double start_s, double end_s,
-                              double speed, move *found, sonde_error *error) {
-  sonde_span span = sonde_span_between(record, start_s, end_s);
-  sonde_span half = sonde_span_between(record, 0.5 * (start_s + end_s), end_s);
-  uint32_t count = half.to - half.from;
-  *found = (move){0};
-  if (count < FEWEST) return SONDE_OK;
-  double *ratio = SONDE_NEW(double, count);
-  if (!ratio) return sonde_fail_memory(error);
-  for (uint32_t k = 0; k < count; ++k) ratio[k] = ratio_at(record, half.from + k);
-  *found = (move){speed, sonde_median(ratio, count), -INFINITY};
-  // Largest mean of neighbouring ratios along the direction of the move.
-  for (uint32_t k = span.from; k + SMOOTH <= span.to; ++k) {
-    double sum = 0;
-    for (uint32_t j = 0; j < SMOOTH; ++j) sum += ratio_at(record, k + j);
-    found->peak = fmax(found->peak, (speed < 0 ? -1 : 1) * sum / SMOOTH);
-  }
-  sonde_free(ratio);
-  return SONDE_OK;
-}
-
-// Half the sum of the directions is what leans against the probe on sloping skin; half their
-// difference is friction.
-static sonde_slide collect(const move *moves, uint32_t count, double speed) {
-  SONDE_ASSERT(speed > 0 && count <= MOST_MOVES);
-  double sum[2] = {0}, peak = 0;
-  uint32_t n[2] = {0};
-  for (uint32_t k = 0; k < count; ++k) {
-    double size = fabs(moves[k].speed_m_s);
-    if (size > speed * SAME_SPEED || size * SAME_SPEED < speed) continue;
-    int back = moves[k].speed_m_s < 0;
-    sum[back] += moves[k].plateau;
-    n[back]++;
-    peak = fmax(peak, moves[k].peak);
-  }
-  double there = n[0] ? sum[0] / n[0] : 0, back = n[1] ? sum[1] / n[1] : 0;
-  bool both = n[0] && n[1];
-  return (sonde_slide){.speed_m_s = speed,
-                       .ratio = both ? 0.5 * (there - back) : fabs(there + back),
-                       .breakaway = peak,
-                       .lean = both ? 0.5 * (there + back) : 0,
-                       .moves = n[0] + n[1]};
-}
-
 sonde_status sonde_slide_read(const sonde_motion_record *record, sonde_slide *slides,
                               uint32_t *count, sonde_error *error) {
   const sonde_motion_sample *s = record->samples;
@@ -78,8 +34,26 @@ sonde_status sonde_slide_read(const sonde_motion_record *record, sonde_slide *sl
     double speed = sonde_track_slope(&track, k);
     bool moved = fabs(track.value[k + 1] - track.value[k]) >= SHORTEST_M;
     if (!moved || fabs(speed) < SONDE_STANDS_M_S) continue;
-    status = read_move(record, track.time_s[k], track.time_s[k + 1], speed, &moves[found], error);
-    found += !status && fabs(moves[found].speed_m_s) > 0;
+    double start_s = track.time_s[k], end_s = track.time_s[k + 1];
+    sonde_span span = sonde_span_between(record, start_s, end_s);
+    sonde_span half = sonde_span_between(record, 0.5 * (start_s + end_s), end_s);
+    uint32_t samples = half.to - half.from;
+    if (samples < FEWEST) continue;
+    double *ratio = SONDE_NEW(double, samples);
+    if (!ratio) {
+      status = sonde_fail_memory(error);
+      break;
+    }
+    for (uint32_t i = 0; i < samples; ++i) ratio[i] = ratio_at(record, half.from + i);
+    move *now = &moves[found++];
+    *now = (move){speed, sonde_median(ratio, samples), -INFINITY};
+    sonde_free(ratio);
+    // Largest mean of neighbouring ratios along the direction of the move.
+    for (uint32_t i = span.from; i + SMOOTH <= span.to; ++i) {
+      double sum = 0;
+      for (uint32_t j = 0; j < SMOOTH; ++j) sum += ratio_at(record, i + j);
+      now->peak = fmax(now->peak, (speed < 0 ? -1 : 1) * sum / SMOOTH);
+    }
   }
   // Their speeds, ascending.
   for (uint32_t k = 0; !status && k < found && *count < SONDE_HOLDS; ++k) {
@@ -91,7 +65,26 @@ sonde_status sonde_slide_read(const sonde_motion_record *record, sonde_slide *sl
     if (known) continue;
     uint32_t at = (*count)++;
     for (; at > 0 && slides[at - 1].speed_m_s > speed; --at) slides[at] = slides[at - 1];
-    slides[at] = collect(moves, found, speed);
+    // Half the sum of the directions is what leans against the probe on sloping skin; half their
+    // difference is friction.
+    SONDE_ASSERT(speed > 0 && found <= MOST_MOVES);
+    double sum[2] = {0}, peak = 0;
+    uint32_t n[2] = {0};
+    for (uint32_t i = 0; i < found; ++i) {
+      double size = fabs(moves[i].speed_m_s);
+      if (size > speed * SAME_SPEED || size * SAME_SPEED < speed) continue;
+      int back = moves[i].speed_m_s < 0;
+      sum[back] += moves[i].plateau;
+      n[back]++;
+      peak = fmax(peak, moves[i].peak);
+    }
+    double there = n[0] ? sum[0] / n[0] : 0, back = n[1] ? sum[1] / n[1] : 0;
+    bool both = n[0] && n[1];
+    slides[at] = (sonde_slide){.speed_m_s = speed,
+                               .ratio = both ? 0.5 * (there - back) : fabs(there + back),
+                               .breakaway = peak,
+                               .lean = both ? 0.5 * (there + back) : 0,
+                               .moves = n[0] + n[1]};
   }
   sonde_track_clear(&track);
   if (status || *count) return status;

@@ -64,21 +64,6 @@ static double misfit(const pieces *p, uint32_t from, uint32_t to, line *fitted) 
   return fmax(0, vv - slope * tv);
 }
 
-// Median of |v[k-1] - 2 v[k] + v[k+1]|: 0.6745 sqrt(6) standard deviations of white noise; corners
-// are too few to move it. At least a micrometre.
-static sonde_status noise_of(const double *value, size_t stride, uint32_t count, double *noise,
-                             sonde_error *error) {
-  SONDE_ASSERT(count >= 3);
-  double *bend = SONDE_NEW(double, count - 2);
-  if (!bend) return sonde_fail_memory(error);
-  for (uint32_t k = 0; k + 2 < count; ++k)
-    bend[k] = fabs(value[k * stride] - 2 * value[(k + 1) * stride] + value[(k + 2) * stride]);
-  qsort(bend, count - 2, sizeof *bend, sonde_compare_reals);
-  *noise = fmax(1e-6, bend[(count - 2) / 2] / (0.67449 * sqrt(6.0)));
-  sonde_free(bend);
-  return SONDE_OK;
-}
-
 // Two lines where one would do fit better by about 2 variances; a real corner by far more than 40.
 static void merge(pieces *p) {
   while (p->count > 1) {
@@ -98,30 +83,6 @@ static void merge(pieces *p) {
 
 static double line_at(const line *l, double t) { return l->mean_v + l->slope * (t - l->mean_t); }
 
-// Times in the sums, and so those of the lines, count from the first sample.
-static void place_knots(const pieces *p, const double *time_s, size_t stride, sonde_track *track) {
-  double origin = time_s[0], end = time_s[(p->samples - 1) * stride] - origin;
-  line now, before = {0};
-  for (uint32_t k = 0; k < p->count; ++k) {
-    misfit(p, p->start[k], p->start[k + 1], &now);
-    if (k > 0) {
-      // Between the middles of both pieces; lines that do not cross there meet at the boundary.
-      double boundary = time_s[p->start[k] * stride] - origin, slope = before.slope - now.slope;
-      double cross = (line_at(&now, boundary) - line_at(&before, boundary)) / slope + boundary;
-      bool meet = fabs(slope) > 0 && cross > before.mean_t && cross < now.mean_t;
-      double time = meet ? cross : boundary;
-      track->time_s[track->count] = time;
-      track->value[track->count++] = 0.5 * (line_at(&before, time) + line_at(&now, time));
-    } else {
-      track->value[track->count++] = line_at(&now, 0); // at time 0
-    }
-    before = now;
-  }
-  track->time_s[track->count] = end;
-  track->value[track->count++] = line_at(&before, end);
-  for (uint32_t k = 0; k < track->count; ++k) track->time_s[k] += origin;
-}
-
 // First pieces of ten samples; the merging keeps those with a corner inside, shifting the boundary
 // frees them for the second merging.
 sonde_status sonde_track_fit(const double *time_s, const double *value, size_t stride,
@@ -132,9 +93,15 @@ sonde_status sonde_track_fit(const double *time_s, const double *value, size_t s
   *track = (sonde_track){0};
   p.sum = sonde_calloc(count + (size_t)1, sizeof *p.sum);
   p.start = SONDE_NEW(uint32_t, p.count + 1);
-  sonde_status status = p.sum && p.start ? SONDE_OK : sonde_fail_memory(error);
-  if (!status) status = noise_of(value, stride, count, &p.noise, error);
+  double *bend = SONDE_NEW(double, count - 2);
+  sonde_status status = p.sum && p.start && bend ? SONDE_OK : sonde_fail_memory(error);
   if (!status) {
+    // Median of |v[k-1] - 2 v[k] + v[k+1]|: 0.6745 sqrt(6) standard deviations of white noise;
+    // corners are too few to move it. At least a micrometre.
+    for (uint32_t k = 0; k + 2 < count; ++k)
+      bend[k] = fabs(value[k * stride] - 2 * value[(k + 1) * stride] + value[(k + 2) * stride]);
+    qsort(bend, count - 2, sizeof *bend, sonde_compare_reals);
+    p.noise = fmax(1e-6, bend[(count - 2) / 2] / (0.67449 * sqrt(6.0)));
     for (uint32_t k = 0; k < count; ++k) {
       double t = time_s[k * stride] - time_s[0], v = value[k * stride];
       const double term[5] = {t, v, t * t, t * v, v * v};
@@ -157,8 +124,31 @@ sonde_status sonde_track_fit(const double *time_s, const double *value, size_t s
     merge(&p);
     status = sonde_track_create(p.count + 1, track, error);
   }
-  if (!status) place_knots(&p, time_s, stride, track);
+  if (!status) {
+    // Times in the sums, and so those of the lines, count from the first sample.
+    double origin = time_s[0], end = time_s[(p.samples - 1) * stride] - origin;
+    line now, before = {0};
+    for (uint32_t k = 0; k < p.count; ++k) {
+      misfit(&p, p.start[k], p.start[k + 1], &now);
+      if (k > 0) {
+        // Between the middles of both pieces; lines that do not cross there meet at the boundary.
+        double boundary = time_s[p.start[k] * stride] - origin, slope = before.slope - now.slope;
+        double cross = (line_at(&now, boundary) - line_at(&before, boundary)) / slope + boundary;
+        bool meet = fabs(slope) > 0 && cross > before.mean_t && cross < now.mean_t;
+        double time = meet ? cross : boundary;
+        track->time_s[track->count] = time;
+        track->value[track->count++] = 0.5 * (line_at(&before, time) + line_at(&now, time));
+      } else {
+        track->value[track->count++] = line_at(&now, 0); // at time 0
+      }
+      before = now;
+    }
+    track->time_s[track->count] = end;
+    track->value[track->count++] = line_at(&before, end);
+    for (uint32_t k = 0; k < track->count; ++k) track->time_s[k] += origin;
+  }
   sonde_free(p.sum);
   sonde_free(p.start);
+  sonde_free(bend);
   return status;
 }

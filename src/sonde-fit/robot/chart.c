@@ -44,51 +44,21 @@ static uint32_t lines(double width, double cell) {
   return 2 * (uint32_t)ceil(width / (2 * cell)) + 1;
 }
 
-static sonde_status check_bounds(const sonde_chart_bounds *b, sonde_error *error) {
-  double turn = b->angle_high_rad - b->angle_low_rad, length = b->z_high_m - b->z_low_m;
-  if (!(turn > 0 && turn <= 2 * SONDE_PI * (1 + 1e-12) && fabs(b->angle_low_rad) <= 100))
-    return sonde_fail(error, SONDE_ARGUMENT,
-                      "angles from %g to %g degrees, expected a rising pair at most 360 apart",
-                      b->angle_low_rad * 180 / SONDE_PI, b->angle_high_rad * 180 / SONDE_PI);
-  if (!(length > 0 && length <= 2 && fabs(b->z_low_m) <= 100))
-    return sonde_fail(error, SONDE_ARGUMENT,
-                      "heights from %g to %g mm, expected a rising pair at most 2000 apart",
-                      b->z_low_m * 1e3, b->z_high_m * 1e3);
-  return SONDE_OK;
-}
-
-// The points of the grid, then their distances.
-static sonde_status measure_grid(sonde_chart *chart, sonde_error *error) {
-  uint32_t middle = chart->columns / 2;
-  for (uint32_t j = 0; j < chart->rows; ++j) {
-    sonde_vec3 *p = &chart->point_m[(size_t)j * chart->columns];
-    double *around_m = &chart->around_m[(size_t)j * chart->columns];
-    for (uint32_t i = 0; i < chart->columns; ++i) {
-      sonde_surface_point hit;
-      if (!sonde_chart_hit(chart, j, i, &hit))
-        return sonde_fail(error, SONDE_MISMATCH,
-                          "no skin at %.1f degrees around the axis and z = %.1f mm, expected a "
-                          "region on the skin, which the axis does not leave",
-                          angle_at(chart, i) * 180 / SONDE_PI, height_at(chart, j) * 1e3);
-      p[i] = hit.point_m;
-    }
-    // Around the leg: from the middle column to both sides.
-    for (uint32_t i = middle + 1; i < chart->columns; ++i)
-      around_m[i] = around_m[i - 1] + v_distance(p[i], p[i - 1]);
-    for (uint32_t i = middle; i-- > 0;) around_m[i] = around_m[i + 1] - v_distance(p[i], p[i + 1]);
-    // Along the leg: down the middle column.
-    if (j > 0)
-      chart->along_m[j] =
-          chart->along_m[j - 1] + v_distance(p[middle], (p - chart->columns)[middle]);
-  }
-  return SONDE_OK;
-}
-
 sonde_status sonde_chart_create(const sonde_model *model, const sonde_chart_bounds *bounds,
                                 sonde_chart *chart, sonde_error *error) {
   *chart = (sonde_chart){.bounds = *bounds};
-  sonde_status status = check_bounds(bounds, error);
-  if (!status) status = sonde_chart_origin(model, &chart->origin_m, error);
+  double turn = bounds->angle_high_rad - bounds->angle_low_rad,
+         length = bounds->z_high_m - bounds->z_low_m;
+  if (!(turn > 0 && turn <= 2 * SONDE_PI * (1 + 1e-12) && fabs(bounds->angle_low_rad) <= 100))
+    return sonde_fail(error, SONDE_ARGUMENT,
+                      "angles from %g to %g degrees, expected a rising pair at most 360 apart",
+                      bounds->angle_low_rad * 180 / SONDE_PI,
+                      bounds->angle_high_rad * 180 / SONDE_PI);
+  if (!(length > 0 && length <= 2 && fabs(bounds->z_low_m) <= 100))
+    return sonde_fail(error, SONDE_ARGUMENT,
+                      "heights from %g to %g mm, expected a rising pair at most 2000 apart",
+                      bounds->z_low_m * 1e3, bounds->z_high_m * 1e3);
+  sonde_status status = sonde_chart_origin(model, &chart->origin_m, error);
   if (!status) status = sonde_surface_index_create(&model->surface, &chart->index, error);
   if (status) return status;
   chart->columns = lines(bounds->angle_high_rad - bounds->angle_low_rad, CELL_RAD);
@@ -98,7 +68,31 @@ sonde_status sonde_chart_create(const sonde_model *model, const sonde_chart_boun
   chart->around_m = SONDE_NEW(double, points);
   chart->along_m = SONDE_NEW(double, chart->rows);
   if (!chart->point_m || !chart->around_m || !chart->along_m) status = sonde_fail_memory(error);
-  if (!status) status = measure_grid(chart, error);
+  // The points of the grid, then their distances.
+  uint32_t middle = chart->columns / 2;
+  for (uint32_t j = 0; j < chart->rows && !status; ++j) {
+    sonde_vec3 *p = &chart->point_m[(size_t)j * chart->columns];
+    double *around_m = &chart->around_m[(size_t)j * chart->columns];
+    for (uint32_t i = 0; i < chart->columns && !status; ++i) {
+      sonde_surface_point hit;
+      if (sonde_chart_hit(chart, j, i, &hit))
+        p[i] = hit.point_m;
+      else
+        status = sonde_fail(error, SONDE_MISMATCH,
+                            "no skin at %.1f degrees around the axis and z = %.1f mm, expected a "
+                            "region on the skin, which the axis does not leave",
+                            angle_at(chart, i) * 180 / SONDE_PI, height_at(chart, j) * 1e3);
+    }
+    if (status) break;
+    // Around the leg: from the middle column to both sides.
+    for (uint32_t i = middle + 1; i < chart->columns; ++i)
+      around_m[i] = around_m[i - 1] + v_distance(p[i], p[i - 1]);
+    for (uint32_t i = middle; i-- > 0;) around_m[i] = around_m[i + 1] - v_distance(p[i], p[i + 1]);
+    // Along the leg: down the middle column.
+    if (j > 0)
+      chart->along_m[j] =
+          chart->along_m[j - 1] + v_distance(p[middle], (p - chart->columns)[middle]);
+  }
   if (status) sonde_chart_clear(chart);
   return status;
 }

@@ -8,41 +8,40 @@
 static const double PATCH_TOLERANCE_M = 2e-3; // between the patch and the refined skin
 static const double MARGIN_RAD = 0.02;
 
-static sonde_status load_outline(const char *path, sonde_region *region, sonde_error *error) {
-  static const char *const NAMES[3] = {"x_mm", "y_mm", "z_mm"};
-  sonde_csv csv;
-  uint32_t columns[3];
-  sonde_status status = sonde_csv_open(&csv, path, error);
-  if (!status) status = sonde_csv_require(&csv, NAMES, 3, columns, error);
-  if (!status) {
-    region->point_m = SONDE_NEW(sonde_vec3, sonde_csv_lines_left(&csv));
-    if (!region->point_m) status = sonde_fail_memory(error);
-  }
-  bool found = !status;
-  while (!status && found) {
-    double mm[3];
-    status = sonde_csv_next(&csv, &found, error);
-    for (int k = 0; k < 3 && found && !status; ++k)
-      status = sonde_csv_real(&csv, columns[k], &mm[k], error);
-    if (found && !status)
-      region->point_m[region->count++] = v_scale(vec3(mm[0], mm[1], mm[2]), 1e-3);
-  }
-  sonde_csv_close(&csv);
-  if (!status && region->count < 3)
-    status =
-        sonde_fail(error, SONDE_FORMAT, "%s: %u corners, expected at least 3", path, region->count);
-  return status;
-}
-
 sonde_status sonde_region_load(const char *path, sonde_region *region, sonde_error *error) {
   *region = (sonde_region){0};
   const char *dot = strrchr(path, '.');
   bool outline = dot && !strcasecmp(dot, ".csv");
+  if (outline) {
+    static const char *const NAMES[3] = {"x_mm", "y_mm", "z_mm"};
+    sonde_csv csv;
+    uint32_t columns[3];
+    sonde_status status = sonde_csv_open(&csv, path, error);
+    if (!status) status = sonde_csv_require(&csv, NAMES, 3, columns, error);
+    if (!status) {
+      region->point_m = SONDE_NEW(sonde_vec3, sonde_csv_lines_left(&csv));
+      if (!region->point_m) status = sonde_fail_memory(error);
+    }
+    bool found = !status;
+    while (!status && found) {
+      double mm[3];
+      status = sonde_csv_next(&csv, &found, error);
+      for (int k = 0; k < 3 && found && !status; ++k)
+        status = sonde_csv_real(&csv, columns[k], &mm[k], error);
+      if (found && !status)
+        region->point_m[region->count++] = v_scale(vec3(mm[0], mm[1], mm[2]), 1e-3);
+    }
+    sonde_csv_close(&csv);
+    if (!status && region->count < 3)
+      status = sonde_fail(error, SONDE_FORMAT, "%s: %u corners, expected at least 3", path,
+                          region->count);
+    if (status) sonde_region_clear(region);
+    return status;
+  }
   sonde_mesh mesh = {0};
-  sonde_status status =
-      outline ? load_outline(path, region, error) : sonde_mesh_load(path, 1e-3, &mesh, error);
-  if (!status && !outline) status = sonde_surface_index_create(&mesh, &region->patch, error);
-  if (!status && !outline) {
+  sonde_status status = sonde_mesh_load(path, 1e-3, &mesh, error);
+  if (!status) status = sonde_surface_index_create(&mesh, &region->patch, error);
+  if (!status) {
     region->count = mesh.vertex_count;
     region->point_m = mesh.vertices;
     mesh.vertices = NULL;

@@ -12,25 +12,6 @@ sonde_sites_def sonde_sites_def_default(void) {
 
 // ---- one site -----------------------------------------------------------------------------
 
-// Gaussian mean over the faces that look the same way.
-static sonde_vec3 smooth_normal(const sonde_model *model, const sonde_surface_point *at,
-                                double smoothing_m) {
-  const sonde_mesh *skin = &model->surface;
-  const uint32_t *near = skin->faces[at->face];
-  sonde_vec3 own = vec3(0, 0, 0), sum;
-  for (int k = 0; k < 3; ++k) own = v_madd(own, at->weight[k], model->normal[near[k]]);
-  sum = v_scale(own, 1e-12);
-  for (uint32_t f = 0; f < skin->face_count && smoothing_m > 0; ++f) {
-    const uint32_t *v = skin->faces[f];
-    sonde_vec3 a = skin->vertices[v[0]], b = skin->vertices[v[1]], c = skin->vertices[v[2]];
-    double away = v_distance(v_scale(v_add(a, v_add(b, c)), 1.0 / 3), at->point_m) / smoothing_m;
-    sonde_vec3 cross = v_cross(v_sub(b, a), v_sub(c, a));
-    if (away < 4 && v_dot(cross, own) > 0) sum = v_madd(sum, exp(-0.5 * away * away), cross);
-  }
-  SONDE_ASSERT(v_finite(sum));
-  return v_unit(sum, own);
-}
-
 typedef struct sampler {
   const sonde_model *model;
   const sonde_sites_def *def;
@@ -45,7 +26,22 @@ static sonde_status put_site(sampler *s, double row, double column, sonde_error 
   sonde_surface_point at;
   if (!sonde_chart_hit(&s->chart, row, column, &at))
     return sonde_fail(error, SONDE_MISMATCH, "no skin at site %u", table->count);
-  sonde_vec3 axis = vec3(0, 0, 1), n = smooth_normal(s->model, &at, s->def->smoothing_m);
+  // Gaussian mean over the faces that look the same way.
+  const sonde_mesh *skin = &s->model->surface;
+  const uint32_t *near = skin->faces[at.face];
+  sonde_vec3 own = vec3(0, 0, 0), sum;
+  for (int k = 0; k < 3; ++k) own = v_madd(own, at.weight[k], s->model->normal[near[k]]);
+  sum = v_scale(own, 1e-12);
+  for (uint32_t f = 0; f < skin->face_count && s->def->smoothing_m > 0; ++f) {
+    const uint32_t *v = skin->faces[f];
+    sonde_vec3 a = skin->vertices[v[0]], b = skin->vertices[v[1]], c = skin->vertices[v[2]];
+    double away =
+        v_distance(v_scale(v_add(a, v_add(b, c)), 1.0 / 3), at.point_m) / s->def->smoothing_m;
+    sonde_vec3 cross = v_cross(v_sub(b, a), v_sub(c, a));
+    if (away < 4 && v_dot(cross, own) > 0) sum = v_madd(sum, exp(-0.5 * away * away), cross);
+  }
+  SONDE_ASSERT(v_finite(sum));
+  sonde_vec3 axis = vec3(0, 0, 1), n = v_unit(sum, own);
   sonde_vec3 u = v_unit(v_cross(axis, n), vec3(1, 0, 0));
   table->sites[table->count] = (sonde_site){
       .id = table->count, .position_m = at.point_m, .normal = n, .u = u, .v = v_cross(n, u)};
@@ -62,21 +58,6 @@ static sonde_status put_site(sampler *s, double row, double column, sonde_error 
 
 static double share(uint32_t k, uint32_t count) {
   return count > 1 ? (double)k / (count - 1) : 0.5;
-}
-
-static sonde_status place_in_bounds(sampler *s, sonde_error *error) {
-  const sonde_chart *chart = &s->chart;
-  for (uint32_t j = 0; j < s->def->rows; ++j) {
-    double row = sonde_chart_row(chart, share(j, s->def->rows) * chart->along_m[chart->rows - 1]);
-    double first = sonde_chart_around(chart, row, 0);
-    double last = sonde_chart_around(chart, row, chart->columns - 1);
-    for (uint32_t i = 0; i < s->def->columns; ++i) {
-      double around_m = first + share(i, s->def->columns) * (last - first);
-      sonde_status status = put_site(s, row, sonde_chart_column(chart, row, around_m), error);
-      if (status) return status;
-    }
-  }
-  return SONDE_OK;
 }
 
 // ---- painted ------------------------------------------------------------------------------
@@ -117,27 +98,6 @@ static sonde_status walk_lattice(sampler *s, const extent *e, lattice l, bool pu
   return SONDE_OK;
 }
 
-// The best centred lattice of one pitch with the wanted count; nearest_count keeps what came near.
-static bool try_pitch(sampler *s, const extent *e, uint32_t wanted, lattice *best,
-                      uint32_t *nearest_count) {
-  double least_m = INFINITY;
-  lattice l = {.pitch_m = best->pitch_m};
-  for (int k = 0; k < OFFSETS * OFFSETS; ++k) {
-    uint32_t count;
-    double eccentricity_m;
-    l.offset_s = (double)(k % OFFSETS) / OFFSETS;
-    l.offset_t = (double)k / OFFSETS / OFFSETS;
-    walk_lattice(s, e, l, false, &count, &eccentricity_m, NULL);
-    uint32_t miss = count > wanted ? count - wanted : wanted - count;
-    uint32_t before = *nearest_count > wanted ? *nearest_count - wanted : wanted - *nearest_count;
-    if (miss < before) *nearest_count = count;
-    if (miss || eccentricity_m >= least_m) continue;
-    least_m = eccentricity_m;
-    *best = l;
-  }
-  return least_m < INFINITY;
-}
-
 // Pitches near that of one point per cell of equal area, in growing distance from it.
 static sonde_status find_lattice(sampler *s, const extent *e, uint32_t wanted, lattice *found,
                                  sonde_error *error) {
@@ -147,7 +107,24 @@ static sonde_status find_lattice(sampler *s, const extent *e, uint32_t wanted, l
   for (int k = 0; k < 2 * PITCHES; ++k) {
     double change = PITCH_STEP * (k % 2 ? -(k + 1) / 2 : k / 2);
     found->pitch_m = expected_m * (1 + change);
-    if (try_pitch(s, e, wanted, found, &nearest_count)) return SONDE_OK;
+    // The best centred lattice of one pitch with the wanted count; nearest_count keeps what came
+    // near.
+    double least_m = INFINITY;
+    lattice l = {.pitch_m = found->pitch_m};
+    for (int i = 0; i < OFFSETS * OFFSETS; ++i) {
+      uint32_t count;
+      double eccentricity_m;
+      l.offset_s = (double)(i % OFFSETS) / OFFSETS;
+      l.offset_t = (double)i / OFFSETS / OFFSETS;
+      walk_lattice(s, e, l, false, &count, &eccentricity_m, NULL);
+      uint32_t miss = count > wanted ? count - wanted : wanted - count;
+      uint32_t before = nearest_count > wanted ? nearest_count - wanted : wanted - nearest_count;
+      if (miss < before) nearest_count = count;
+      if (miss || eccentricity_m >= least_m) continue;
+      least_m = eccentricity_m;
+      *found = l;
+    }
+    if (least_m < INFINITY) return SONDE_OK;
   }
   return sonde_fail(error, SONDE_ARGUMENT,
                     "no square lattice has %u points inside %s, expected a number such as %u",
@@ -219,7 +196,18 @@ sonde_status sonde_sites_place(const sonde_model *model, const sonde_sites_def *
     if (!status) bounds = sonde_region_bounds(&s.region, origin_m);
   }
   if (!status) status = sonde_chart_create(model, &bounds, &s.chart, error);
-  if (!status) status = def->painted ? place_painted(&s, error) : place_in_bounds(&s, error);
+  if (!status && def->painted) status = place_painted(&s, error);
+  // Without a painted region: rows and columns of equal spacing between the bounds.
+  const sonde_chart *chart = &s.chart;
+  for (uint32_t j = 0; j < def->rows && !def->painted && !status; ++j) {
+    double row = sonde_chart_row(chart, share(j, def->rows) * chart->along_m[chart->rows - 1]);
+    double first = sonde_chart_around(chart, row, 0);
+    double last = sonde_chart_around(chart, row, chart->columns - 1);
+    for (uint32_t i = 0; i < def->columns && !status; ++i) {
+      double around_m = first + share(i, def->columns) * (last - first);
+      status = put_site(&s, row, sonde_chart_column(chart, row, around_m), error);
+    }
+  }
   SONDE_ASSERT(status || table->count == def->columns * def->rows);
   // A model without measured layers has one thickness everywhere (except close to the bone).
   double least_m = INFINITY, most_m = -INFINITY;
