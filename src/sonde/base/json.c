@@ -119,54 +119,10 @@ static sonde_status read_text(parser *p, const char **text) {
   return SONDE_OK;
 }
 
-static sonde_status read_number(parser *p, sonde_json *value) {
-  char *c = p->at;
-  c += *c == '-';
-  size_t whole = strspn(c, "0123456789");
-  bool right = whole > 0 && (whole == 1 || *c != '0');
-  c += whole;
-  if (*c == '.') {
-    size_t part = strspn(++c, "0123456789");
-    right = right && part > 0;
-    c += part;
-  }
-  if (*c == 'e' || *c == 'E') {
-    c += 1 + (c[1] == '+' || c[1] == '-');
-    size_t power = strspn(c, "0123456789");
-    right = right && power > 0;
-    c += power;
-  }
-  if (!right) return fail(p, "expected a number such as -12.5e-3");
-  value->kind = SONDE_JSON_NUMBER;
-  value->number = sonde_parse_real(p->at, NULL);
-  if (!isfinite(value->number)) return fail(p, "expected a number within the range of a double");
-  p->at = c;
-  return SONDE_OK;
-}
-
 static int by_key(const void *a, const void *b) {
   const sonde_json *x = *(const sonde_json *const *)a, *y = *(const sonde_json *const *)b;
   int order = strcmp(x->key, y->key);
   return order ? order : (x->key > y->key) - (x->key < y->key);
-}
-
-// Sorted, so that an object of many keys costs little more than its bytes.
-static sonde_status check_keys(parser *p, const sonde_json *object) {
-  if (object->count < 2) return SONDE_OK;
-  const sonde_json **list = SONDE_NEW(const sonde_json *, object->count);
-  if (!list) return sonde_fail_memory(p->error);
-  uint32_t n = 0;
-  for (const sonde_json *v = object->first; v; v = v->next) list[n++] = v;
-  SONDE_ASSERT(n == object->count);
-  qsort(list, n, sizeof *list, by_key);
-  const sonde_json *twice = NULL;
-  for (uint32_t k = 1; k < n; ++k)
-    if (strcmp(list[k - 1]->key, list[k]->key) == 0 && (!twice || list[k]->key < twice->key))
-      twice = list[k];
-  sonde_free(list);
-  if (!twice) return SONDE_OK;
-  p->line = twice->line;
-  return fail(p, "expected each key once, found \"%.60s\" twice", twice->key);
 }
 
 static sonde_status read_value(parser *p, sonde_json *value);
@@ -211,7 +167,23 @@ static sonde_status read_members(parser *p, sonde_json *parent) {
   if (*p->at != close) return fail(p, "expected ',' or '%c'", close);
   p->at++;
   p->depth--;
-  return object ? check_keys(p, parent) : SONDE_OK;
+
+  // The keys of an object differ.
+  if (!object || parent->count < 2) return SONDE_OK;
+  const sonde_json **list = SONDE_NEW(const sonde_json *, parent->count);
+  if (!list) return sonde_fail_memory(p->error);
+  uint32_t n = 0;
+  for (const sonde_json *v = parent->first; v; v = v->next) list[n++] = v;
+  SONDE_ASSERT(n == parent->count);
+  qsort(list, n, sizeof *list, by_key);
+  const sonde_json *twice = NULL;
+  for (uint32_t k = 1; k < n; ++k)
+    if (strcmp(list[k - 1]->key, list[k]->key) == 0 && (!twice || list[k]->key < twice->key))
+      twice = list[k];
+  sonde_free(list);
+  if (!twice) return SONDE_OK;
+  p->line = twice->line;
+  return fail(p, "expected each key once, found \"%.60s\" twice", twice->key);
 }
 
 static sonde_status read_value(parser *p, sonde_json *value) {
@@ -226,7 +198,30 @@ static sonde_status read_value(parser *p, sonde_json *value) {
     value->kind = SONDE_JSON_TEXT;
     return read_text(p, &value->text);
   }
-  if (*p->at == '-' || (*p->at >= '0' && *p->at <= '9')) return read_number(p, value);
+  if (*p->at == '-' || (*p->at >= '0' && *p->at <= '9')) {
+    char *c = p->at;
+    c += *c == '-';
+    size_t whole = strspn(c, "0123456789");
+    bool right = whole > 0 && (whole == 1 || *c != '0');
+    c += whole;
+    if (*c == '.') {
+      size_t part = strspn(++c, "0123456789");
+      right = right && part > 0;
+      c += part;
+    }
+    if (*c == 'e' || *c == 'E') {
+      c += 1 + (c[1] == '+' || c[1] == '-');
+      size_t power = strspn(c, "0123456789");
+      right = right && power > 0;
+      c += power;
+    }
+    if (!right) return fail(p, "expected a number such as -12.5e-3");
+    value->kind = SONDE_JSON_NUMBER;
+    value->number = sonde_parse_real(p->at, NULL);
+    if (!isfinite(value->number)) return fail(p, "expected a number within the range of a double");
+    p->at = c;
+    return SONDE_OK;
+  }
   for (size_t k = 0; k < SONDE_COUNT_OF(WORDS); ++k) {
     size_t length = strlen(WORDS[k].word);
     if (strncmp(p->at, WORDS[k].word, length) != 0) continue;

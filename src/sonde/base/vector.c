@@ -5,7 +5,9 @@
 
 #include <string.h>
 
-static bool runs(const char *set) {
+bool sonde_vectors_serve(const char *set, const char *wanted) {
+  SONDE_ASSERT(set != NULL);
+  if (wanted && strcmp(wanted, set) != 0) return false;
 #ifdef __x86_64__
   if (strcmp(set, "avx512") == 0)
     return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
@@ -14,9 +16,4 @@ static bool runs(const char *set) {
   if (strcmp(set, "sse4") == 0) return __builtin_cpu_supports("sse4.2");
 #endif
   return strcmp(set, "base") == 0 || strcmp(set, "plain") == 0;
-}
-
-bool sonde_vectors_serve(const char *set, const char *wanted) {
-  SONDE_ASSERT(set != NULL);
-  return (!wanted || strcmp(wanted, set) == 0) && runs(set);
 }

@@ -64,41 +64,6 @@ static void find_planes(sonde_convex *convex, double tolerance_m, sized_face *or
   }
 }
 
-static sonde_status build_planes(sonde_convex *convex, sonde_error *error) {
-  const sonde_mesh *hull = &convex->hull;
-  sonde_vec3 low = hull->vertices[0], high = low;
-  for (uint32_t v = 0; v < hull->vertex_count; ++v) {
-    low = v_min(low, hull->vertices[v]);
-    high = v_max(high, hull->vertices[v]);
-  }
-  double extent = v_distance(low, high) / 2;
-
-  sized_face *order = SONDE_NEW(sized_face, hull->face_count);
-  bool *done = SONDE_NEW(bool, hull->face_count);
-  uint32_t *patch = SONDE_NEW(uint32_t, hull->face_count);
-  convex->plane_normal = SONDE_NEW(sonde_vec3, hull->face_count);
-  convex->plane_offset_m = SONDE_NEW(double, hull->face_count);
-  sonde_status status = SONDE_OK;
-  if (order && done && patch && convex->plane_normal && convex->plane_offset_m)
-    find_planes(convex, COPLANAR * extent, order, done, patch);
-  else
-    status = sonde_fail_memory(error);
-  sonde_free(order);
-  sonde_free(done);
-  sonde_free(patch);
-
-  // every vertex behind every plane
-  for (uint32_t i = 0; i < convex->plane_count && !status; ++i)
-    for (uint32_t v = 0; v < hull->vertex_count && !status; ++v) {
-      double height = v_dot(convex->plane_normal[i], hull->vertices[v]) - convex->plane_offset_m[i];
-      if (!(height <= CONVEX_SLACK * extent))
-        status = sonde_fail(error, SONDE_MESH,
-                            "the mesh is not convex: vertex %u stands %g m out of a face plane", v,
-                            height);
-    }
-  return status;
-}
-
 sonde_status sonde_convex_create(const sonde_mesh *mesh, sonde_convex *convex, sonde_error *error) {
   SONDE_ASSERT(mesh != NULL && convex != NULL);
   *convex = (sonde_convex){0};
@@ -124,7 +89,39 @@ sonde_status sonde_convex_create(const sonde_mesh *mesh, sonde_convex *convex, s
   for (uint32_t v = 0; v < convex->topology.vertex_count && !status; ++v)
     if (start[v] == start[v + 1])
       status = sonde_fail(error, SONDE_MESH, "vertex %u of the convex body belongs to no face", v);
-  if (!status) status = build_planes(convex, error);
+  if (!status) {
+    const sonde_mesh *hull = &convex->hull;
+    sonde_vec3 low = hull->vertices[0], high = low;
+    for (uint32_t v = 0; v < hull->vertex_count; ++v) {
+      low = v_min(low, hull->vertices[v]);
+      high = v_max(high, hull->vertices[v]);
+    }
+    double extent = v_distance(low, high) / 2;
+
+    sized_face *order = SONDE_NEW(sized_face, hull->face_count);
+    bool *done = SONDE_NEW(bool, hull->face_count);
+    uint32_t *patch = SONDE_NEW(uint32_t, hull->face_count);
+    convex->plane_normal = SONDE_NEW(sonde_vec3, hull->face_count);
+    convex->plane_offset_m = SONDE_NEW(double, hull->face_count);
+    if (order && done && patch && convex->plane_normal && convex->plane_offset_m)
+      find_planes(convex, COPLANAR * extent, order, done, patch);
+    else
+      status = sonde_fail_memory(error);
+    sonde_free(order);
+    sonde_free(done);
+    sonde_free(patch);
+
+    // every vertex behind every plane
+    for (uint32_t i = 0; i < convex->plane_count && !status; ++i)
+      for (uint32_t v = 0; v < hull->vertex_count && !status; ++v) {
+        double height =
+            v_dot(convex->plane_normal[i], hull->vertices[v]) - convex->plane_offset_m[i];
+        if (!(height <= CONVEX_SLACK * extent))
+          status = sonde_fail(error, SONDE_MESH,
+                              "the mesh is not convex: vertex %u stands %g m out of a face plane",
+                              v, height);
+      }
+  }
   for (uint32_t v = 0; v < convex->hull.vertex_count; ++v)
     convex->radius_m = fmax(convex->radius_m, v_norm(convex->hull.vertices[v]));
   if (status) sonde_convex_clear(convex);

@@ -20,21 +20,6 @@ static bool keyword(sonde_text *text, char letter) {
   return true;
 }
 
-static sonde_status read_vertex(obj *file) {
-  double p[3];
-  for (int k = 0; k < 3; ++k)
-    if (!sonde_text_real(&file->text, &p[k]))
-      return sonde_text_expected(&file->text, file->error, "a finite number for %c of vertex %u",
-                                 "xyz"[k], file -> builder -> mesh.vertex_count + 1);
-  double extra; // weight or colours
-  while (sonde_text_more(&file->text))
-    if (!sonde_text_real(&file->text, &extra))
-      return sonde_text_expected(&file->text, file->error, "a number");
-  return sonde_builder_vertex(file->builder, vec3(p[0], p[1], p[2]))
-             ? SONDE_OK
-             : sonde_fail_memory(file->error);
-}
-
 // Reads a decimal integer with optional sign; false when there is none.
 static bool read_integer(const char **at, const char *end, int64_t *value) {
   bool negative = *at < end && **at == '-';
@@ -95,9 +80,17 @@ sonde_status sonde_obj_read(const char *path, const char *bytes, size_t count,
   } while (sonde_text_next_line(&all));
   sonde_status status = SONDE_OK;
   do {
-    if (keyword(&file.text, 'v'))
-      status = read_vertex(&file);
-    else if (keyword(&file.text, 'f'))
+    if (keyword(&file.text, 'v')) {
+      double p[3], extra; // position; weight or colours
+      for (int k = 0; k < 3; ++k)
+        if (!sonde_text_real(&file.text, &p[k]))
+          return sonde_text_expected(&file.text, error, "a finite number for %c of vertex %u",
+                                     "xyz"[k], builder -> mesh.vertex_count + 1);
+      while (sonde_text_more(&file.text))
+        if (!sonde_text_real(&file.text, &extra))
+          return sonde_text_expected(&file.text, error, "a number");
+      if (!sonde_builder_vertex(builder, vec3(p[0], p[1], p[2]))) return sonde_fail_memory(error);
+    } else if (keyword(&file.text, 'f'))
       status = read_face(&file);
   } while (!status && sonde_text_next_line(&file.text));
   return status;

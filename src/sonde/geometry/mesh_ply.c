@@ -39,19 +39,6 @@ static const uint8_t scalar_bytes[] = {0, 1, 1, 2, 2, 4, 4, 4, 8};
 
 // ---- header -------------------------------------------------------------------------------
 
-static sonde_status parse_element(ply *file) {
-  sonde_text *text = &file->text;
-  if (file->element_count == MAX_ELEMENTS)
-    return sonde_text_expected(text, file->error, "at most %d elements", MAX_ELEMENTS);
-  element *item = &file->elements[file->element_count++];
-  sonde_text_word(text, item->name, sizeof item->name);
-  double count = 0;
-  if (!sonde_text_real(text, &count) || count < 0 || count > 4e9 || count != floor(count))
-    return sonde_text_expected(text, file->error, "the count of element %s", item->name);
-  item->count = (uint32_t)count;
-  return SONDE_OK;
-}
-
 static sonde_status parse_type(ply *file, scalar *type) {
   char word[32];
   sonde_text_more(&file->text);
@@ -132,7 +119,14 @@ static sonde_status read_header(ply *file) {
       }
       file->format = (format)k;
     } else if (!strcmp(word, "element")) {
-      status = parse_element(file);
+      if (file->element_count == MAX_ELEMENTS)
+        return sonde_text_expected(text, file->error, "at most %d elements", MAX_ELEMENTS);
+      element *item = &file->elements[file->element_count++];
+      sonde_text_word(text, item->name, sizeof item->name);
+      double count = 0;
+      if (!sonde_text_real(text, &count) || count < 0 || count > 4e9 || count != floor(count))
+        return sonde_text_expected(text, file->error, "the count of element %s", item->name);
+      item->count = (uint32_t)count;
     } else if (!strcmp(word, "property")) {
       status = parse_property(file);
     } else if (strcmp(word, "comment") && strcmp(word, "obj_info")) {

@@ -53,57 +53,6 @@ static int longest_side(const pass *p, uint32_t face) {
   return best;
 }
 
-// Edges that are longer than the target asks for, then the longest-edge closure.
-static sonde_status mark_edges(pass *p, target_fn target, void *user, sonde_error *error) {
-  SONDE_ASSERT(p->marked == 0 && p->work_count == 0);
-  for (uint32_t e = 0; e < p->topology.edge_count; ++e) {
-    const uint32_t *v = p->topology.edges[e];
-    sonde_vec3 middle = v_lerp(p->mesh->vertices[v[0]], p->mesh->vertices[v[1]], 0.5);
-    double wanted = target(middle, user);
-    if (!(wanted > 0))
-      return sonde_fail(error, SONDE_ARGUMENT,
-                        "the wanted edge length at (%g, %g, %g) m is %g, expected more than 0",
-                        middle.x, middle.y, middle.z, wanted);
-    if (p->length[e] > OVERSHOOT * wanted) mark(p, e);
-  }
-  while (p->work_count) {
-    uint32_t face = p->work[--p->work_count];
-    mark(p, p->face_edge[face][longest_side(p, face)]);
-  }
-  return SONDE_OK;
-}
-
-static sonde_status begin(pass *p, const sonde_mesh *mesh, sonde_error *error) {
-  *p = (pass){.mesh = mesh};
-  sonde_status status = sonde_topology_build(mesh, &p->topology, error);
-  if (status) return status;
-  const sonde_topology *t = &p->topology;
-  size_t edges = t->edge_count;
-  p->face_normal = SONDE_NEW(sonde_vec3, mesh->face_count);
-  p->face_edge = sonde_calloc(mesh->face_count, sizeof *p->face_edge);
-  p->length = SONDE_NEW(double, edges);
-  p->middle = SONDE_NEW(uint32_t, edges);
-  p->work = SONDE_NEW(uint32_t, 3 * edges + mesh->face_count);
-  if (!p->face_normal || !p->face_edge || !p->length || !p->middle || !p->work)
-    return sonde_fail_memory(error);
-  for (uint32_t f = 0; f < mesh->face_count; ++f)
-    p->face_normal[f] = v_unit(sonde_face_cross(mesh, f), vec3(0, 0, 0));
-  for (uint32_t e = 0; e < edges; ++e) {
-    const uint32_t *ends = t->edges[e];
-    p->length[e] = v_distance(mesh->vertices[ends[0]], mesh->vertices[ends[1]]);
-    p->middle[e] = SONDE_NONE;
-    for (int side = 0; side < 2; ++side) {
-      uint32_t f = t->edge_faces[e][side];
-      for (int k = 0; f != SONDE_NONE && k < 3; ++k) {
-        uint32_t a = mesh->faces[f][k], b = mesh->faces[f][(k + 1) % 3];
-        if ((a == ends[0] && b == ends[1]) || (b == ends[0] && a == ends[1]))
-          p->face_edge[f][k] = e;
-      }
-    }
-  }
-  return SONDE_OK;
-}
-
 // ---- new vertices -------------------------------------------------------------------------
 
 // Normal at a vertex over those of its faces that do not turn away from `side`. Each face counts
@@ -224,8 +173,53 @@ sonde_status sonde_mesh_refine(const sonde_mesh *mesh,
   for (int k = 0; k < MAX_PASSES && !status && !done; ++k) {
     pass p;
     sonde_mesh finer = {0};
-    status = begin(&p, refined, error);
-    if (!status) status = mark_edges(&p, target, user, error);
+    p = (pass){.mesh = refined};
+    status = sonde_topology_build(refined, &p.topology, error);
+    if (!status) {
+      const sonde_topology *t = &p.topology;
+      size_t edges = t->edge_count;
+      p.face_normal = SONDE_NEW(sonde_vec3, refined->face_count);
+      p.face_edge = sonde_calloc(refined->face_count, sizeof *p.face_edge);
+      p.length = SONDE_NEW(double, edges);
+      p.middle = SONDE_NEW(uint32_t, edges);
+      p.work = SONDE_NEW(uint32_t, 3 * edges + refined->face_count);
+      if (!p.face_normal || !p.face_edge || !p.length || !p.middle || !p.work)
+        status = sonde_fail_memory(error);
+      else {
+        for (uint32_t f = 0; f < refined->face_count; ++f)
+          p.face_normal[f] = v_unit(sonde_face_cross(refined, f), vec3(0, 0, 0));
+        for (uint32_t e = 0; e < edges; ++e) {
+          const uint32_t *ends = t->edges[e];
+          p.length[e] = v_distance(refined->vertices[ends[0]], refined->vertices[ends[1]]);
+          p.middle[e] = SONDE_NONE;
+          for (int side = 0; side < 2; ++side) {
+            uint32_t f = t->edge_faces[e][side];
+            for (int i = 0; f != SONDE_NONE && i < 3; ++i) {
+              uint32_t a = refined->faces[f][i], b = refined->faces[f][(i + 1) % 3];
+              if ((a == ends[0] && b == ends[1]) || (b == ends[0] && a == ends[1]))
+                p.face_edge[f][i] = e;
+            }
+          }
+        }
+      }
+    }
+    // Edges that are longer than the target asks for, then the longest-edge closure.
+    SONDE_ASSERT(status || (p.marked == 0 && p.work_count == 0));
+    for (uint32_t e = 0; !status && e < p.topology.edge_count; ++e) {
+      const uint32_t *v = p.topology.edges[e];
+      sonde_vec3 middle = v_lerp(p.mesh->vertices[v[0]], p.mesh->vertices[v[1]], 0.5);
+      double wanted = target(middle, user);
+      if (!(wanted > 0))
+        status = sonde_fail(error, SONDE_ARGUMENT,
+                            "the wanted edge length at (%g, %g, %g) m is %g, expected more than 0",
+                            middle.x, middle.y, middle.z, wanted);
+      else if (p.length[e] > OVERSHOOT * wanted)
+        mark(&p, e);
+    }
+    while (!status && p.work_count) {
+      uint32_t face = p.work[--p.work_count];
+      mark(&p, p.face_edge[face][longest_side(&p, face)]);
+    }
     done = p.marked == 0;
     if (!status && !done) status = build(&p, &finer, error);
     if (!status && !done) {

@@ -66,51 +66,6 @@ static sonde_vec3 ring_point(const fan *f, double length, double scale, uint32_t
   return v_lerp(x[f->centre], p, scale);
 }
 
-// Ring inside the outer one: its edges grow by up to half while the wanted length allows. Where it
-// does not let the rings shrink, the radius does. False: no memory.
-static bool add_ring(fan *f, const ring *outer, ring *inner) {
-  SONDE_ASSERT(outer->count > CENTRE_FACES && inner->vertex != outer->vertex);
-  double perimeter = f->along[f->count], edge = outer->scale * perimeter / outer->count;
-  double wanted = RING_GROWTH * edge;
-  uint32_t piece = 0;
-  for (uint32_t k = 0; k < outer->count; ++k) {
-    sonde_vec3 p = ring_point(f, perimeter * k / outer->count, outer->scale, &piece);
-    double asked = f->target(p, f->user);
-    if (asked < wanted) wanted = asked;
-  }
-  if (!(wanted > edge)) wanted = edge;
-  double step = RING_HEIGHT * (edge + wanted) / 2 / f->radius;
-  inner->scale = fmax(outer->scale - step, 0.45 * outer->scale);
-  SONDE_ASSERT(inner->scale > 0 && inner->scale < 1);
-  double count = round(inner->scale * perimeter / wanted);
-  inner->count = (uint32_t)clamp(count, RING_LEAST, outer->count);
-
-  double spacing = perimeter / inner->count;
-  piece = 0;
-  for (uint32_t k = 0; k < inner->count; ++k) {
-    inner->vertex[k] = f->builder->mesh.vertex_count;
-    sonde_vec3 p = ring_point(f, (k + 0.5) * spacing, inner->scale, &piece);
-    if (!sonde_builder_vertex(f->builder, p)) return false;
-  }
-
-  // faces between the two rings, always taking the shorter diagonal
-  for (uint32_t i = 0, k = 0; i < outer->count || k < inner->count;) {
-    const sonde_vec3 *x = f->builder->mesh.vertices;
-    uint32_t o = outer->vertex[i % outer->count], o_next = outer->vertex[(i + 1) % outer->count];
-    uint32_t n = inner->vertex[k % inner->count], n_next = inner->vertex[(k + 1) % inner->count];
-    bool outwards = k == inner->count || (i < outer->count && v_distance(x[o_next], x[n]) <=
-                                                                  v_distance(x[o], x[n_next]));
-    if (!(outwards ? sonde_builder_face(f->builder, o, o_next, n)
-                   : sonde_builder_face(f->builder, n_next, n, o)))
-      return false;
-    if (outwards)
-      ++i;
-    else
-      ++k;
-  }
-  return true;
-}
-
 // Copies all but the faces around the centre; in their place come rings from the border inwards,
 // then the few faces around the centre. False: no memory.
 static bool tile_fan(fan *f, uint32_t *one, uint32_t *two) {
@@ -126,7 +81,47 @@ static bool tile_fan(fan *f, uint32_t *one, uint32_t *two) {
   ring outer = {f->count, one, 1};
   while (outer.count > CENTRE_FACES) {
     ring inner = {.vertex = outer.vertex == one ? two : one};
-    if (!add_ring(f, &outer, &inner)) return false;
+    // Ring inside the outer one: its edges grow by up to half while the wanted length allows. Where
+    // it does not let the rings shrink, the radius does. False: no memory.
+    SONDE_ASSERT(outer.count > CENTRE_FACES && inner.vertex != outer.vertex);
+    double perimeter = f->along[f->count], edge = outer.scale * perimeter / outer.count;
+    double wanted = RING_GROWTH * edge;
+    uint32_t piece = 0;
+    for (uint32_t k = 0; k < outer.count; ++k) {
+      sonde_vec3 p = ring_point(f, perimeter * k / outer.count, outer.scale, &piece);
+      double asked = f->target(p, f->user);
+      if (asked < wanted) wanted = asked;
+    }
+    if (!(wanted > edge)) wanted = edge;
+    double step = RING_HEIGHT * (edge + wanted) / 2 / f->radius;
+    inner.scale = fmax(outer.scale - step, 0.45 * outer.scale);
+    SONDE_ASSERT(inner.scale > 0 && inner.scale < 1);
+    double count = round(inner.scale * perimeter / wanted);
+    inner.count = (uint32_t)clamp(count, RING_LEAST, outer.count);
+
+    double spacing = perimeter / inner.count;
+    piece = 0;
+    for (uint32_t k = 0; k < inner.count; ++k) {
+      inner.vertex[k] = f->builder->mesh.vertex_count;
+      sonde_vec3 p = ring_point(f, (k + 0.5) * spacing, inner.scale, &piece);
+      if (!sonde_builder_vertex(f->builder, p)) return false;
+    }
+
+    // faces between the two rings, always taking the shorter diagonal
+    for (uint32_t i = 0, k = 0; i < outer.count || k < inner.count;) {
+      const sonde_vec3 *x = f->builder->mesh.vertices;
+      uint32_t o = outer.vertex[i % outer.count], o_next = outer.vertex[(i + 1) % outer.count];
+      uint32_t n = inner.vertex[k % inner.count], n_next = inner.vertex[(k + 1) % inner.count];
+      bool outwards = k == inner.count || (i < outer.count && v_distance(x[o_next], x[n]) <=
+                                                                  v_distance(x[o], x[n_next]));
+      if (!(outwards ? sonde_builder_face(f->builder, o, o_next, n)
+                     : sonde_builder_face(f->builder, n_next, n, o)))
+        return false;
+      if (outwards)
+        ++i;
+      else
+        ++k;
+    }
     outer = inner;
   }
   for (uint32_t k = 0; k < outer.count; ++k)
@@ -134,35 +129,6 @@ static bool tile_fan(fan *f, uint32_t *one, uint32_t *two) {
                             f->centre))
       return false;
   return true;
-}
-
-static sonde_status spread_fan(sonde_mesh *mesh, const sonde_topology *t, uint32_t centre,
-                               target_fn target, void *user, sonde_error *error) {
-  sonde_mesh_builder builder = {.scale = 1};
-  uint32_t count = t->face_start[centre + 1] - t->face_start[centre];
-  SONDE_ASSERT(count > FAN_FACES);
-  fan f = {mesh, &builder, centre, count, NULL, NULL, 0, target, user};
-  f.border = SONDE_NEW(uint32_t, count + (size_t)1);
-  f.along = SONDE_NEW(double, count + (size_t)1);
-  uint32_t *one = SONDE_NEW(uint32_t, count), *two = SONDE_NEW(uint32_t, count);
-  uint32_t *follower = SONDE_NEW(uint32_t, mesh->vertex_count);
-  bool ok = f.border && f.along && one && two && follower;
-  for (uint32_t v = 0; v < mesh->vertex_count && ok; ++v) follower[v] = SONDE_NONE;
-  if (ok && walk_border(&f, t, follower)) {
-    ok = tile_fan(&f, one, two);
-    if (ok) {
-      sonde_mesh_clear(mesh);
-      *mesh = builder.mesh;
-      builder.mesh = (sonde_mesh){0};
-    }
-  }
-  sonde_mesh_clear(&builder.mesh);
-  sonde_free(f.border);
-  sonde_free(f.along);
-  sonde_free(one);
-  sonde_free(two);
-  sonde_free(follower);
-  return ok ? SONDE_OK : sonde_fail_memory(error);
 }
 
 sonde_status sonde_refine_spread_fans(sonde_mesh *mesh, target_fn target, void *user,
@@ -174,7 +140,34 @@ sonde_status sonde_refine_spread_fans(sonde_mesh *mesh, target_fn target, void *
     status = sonde_topology_build(mesh, &t, error);
     if (status) return status;
     while (v < vertices && t.face_start[v + 1] - t.face_start[v] <= FAN_FACES) ++v;
-    if (v < vertices) status = spread_fan(mesh, &t, v++, target, user, error);
+    if (v < vertices) {
+      const uint32_t centre = v++;
+      sonde_mesh_builder builder = {.scale = 1};
+      uint32_t count = t.face_start[centre + 1] - t.face_start[centre];
+      SONDE_ASSERT(count > FAN_FACES);
+      fan f = {mesh, &builder, centre, count, NULL, NULL, 0, target, user};
+      f.border = SONDE_NEW(uint32_t, count + (size_t)1);
+      f.along = SONDE_NEW(double, count + (size_t)1);
+      uint32_t *one = SONDE_NEW(uint32_t, count), *two = SONDE_NEW(uint32_t, count);
+      uint32_t *follower = SONDE_NEW(uint32_t, mesh->vertex_count);
+      bool ok = f.border && f.along && one && two && follower;
+      for (uint32_t i = 0; i < mesh->vertex_count && ok; ++i) follower[i] = SONDE_NONE;
+      if (ok && walk_border(&f, &t, follower)) {
+        ok = tile_fan(&f, one, two);
+        if (ok) {
+          sonde_mesh_clear(mesh);
+          *mesh = builder.mesh;
+          builder.mesh = (sonde_mesh){0};
+        }
+      }
+      sonde_mesh_clear(&builder.mesh);
+      sonde_free(f.border);
+      sonde_free(f.along);
+      sonde_free(one);
+      sonde_free(two);
+      sonde_free(follower);
+      status = ok ? SONDE_OK : sonde_fail_memory(error);
+    }
     sonde_topology_clear(&t);
   }
   return status;

@@ -47,38 +47,6 @@ static void split(builder *b, uint32_t from, uint32_t to, int depth) {
   split(b, middle, to, depth + 1);
 }
 
-// Unit normals of the faces, their sums over the sides and their angle-weighted sums at vertices.
-static void fill_normals(sonde_surface_index *index, const sonde_half_edge *sides) {
-  const sonde_mesh *mesh = &index->mesh;
-  SONDE_ASSERT(sides != NULL);
-  for (uint32_t f = 0; f < mesh->face_count; ++f) {
-    const uint32_t *v = mesh->faces[f];
-    index->face_normal[f] = v_unit(sonde_face_cross(mesh, f), vec3(0, 0, 0));
-    for (int k = 0; k < 3; ++k) {
-      double angle = sonde_corner_angle(mesh->vertices[v[k]], mesh->vertices[v[(k + 1) % 3]],
-                                        mesh->vertices[v[(k + 2) % 3]]);
-      sonde_vec3 *normal = &index->vertex_normal[v[k]];
-      *normal = v_madd(*normal, angle, index->face_normal[f]);
-    }
-  }
-  size_t count = 3 * (size_t)mesh->face_count, next;
-  for (size_t i = 0; i < count; i = next) {
-    sonde_vec3 sum = vec3(0, 0, 0);
-    for (next = i; next < count; ++next) {
-      if (sides[next].low != sides[i].low || sides[next].high != sides[i].high) break;
-      sum = v_add(sum, index->face_normal[sides[next].face]);
-    }
-    for (size_t j = i; j < next; ++j) {
-      const uint32_t *v = mesh->faces[sides[j].face];
-      uint32_t side = 0; // that runs between the two vertices
-      while (side < 2 && (v[side] != sides[j].low || v[side + 1] != sides[j].high) &&
-             (v[side] != sides[j].high || v[side + 1] != sides[j].low))
-        ++side;
-      index->side_normal[sides[j].face][side] = sum;
-    }
-  }
-}
-
 sonde_status sonde_surface_index_create(const sonde_mesh *mesh, sonde_surface_index **out,
                                         sonde_error *error) {
   SONDE_ASSERT(mesh != NULL && out != NULL);
@@ -110,7 +78,35 @@ sonde_status sonde_surface_index_create(const sonde_mesh *mesh, sonde_surface_in
       index->order[f] = f;
     }
     split(&b, 0, mesh->face_count, 0);
-    fill_normals(index, sides);
+    // Unit normals of the faces, their sums over the sides and their angle-weighted sums at
+    // vertices.
+    SONDE_ASSERT(sides != NULL);
+    for (uint32_t f = 0; f < mesh->face_count; ++f) {
+      const uint32_t *v = mesh->faces[f];
+      index->face_normal[f] = v_unit(sonde_face_cross(mesh, f), vec3(0, 0, 0));
+      for (int k = 0; k < 3; ++k) {
+        double angle = sonde_corner_angle(mesh->vertices[v[k]], mesh->vertices[v[(k + 1) % 3]],
+                                          mesh->vertices[v[(k + 2) % 3]]);
+        sonde_vec3 *normal = &index->vertex_normal[v[k]];
+        *normal = v_madd(*normal, angle, index->face_normal[f]);
+      }
+    }
+    size_t count = 3 * (size_t)mesh->face_count, next;
+    for (size_t i = 0; i < count; i = next) {
+      sonde_vec3 sum = vec3(0, 0, 0);
+      for (next = i; next < count; ++next) {
+        if (sides[next].low != sides[i].low || sides[next].high != sides[i].high) break;
+        sum = v_add(sum, index->face_normal[sides[next].face]);
+      }
+      for (size_t j = i; j < next; ++j) {
+        const uint32_t *v = mesh->faces[sides[j].face];
+        uint32_t side = 0; // that runs between the two vertices
+        while (side < 2 && (v[side] != sides[j].low || v[side + 1] != sides[j].high) &&
+               (v[side] != sides[j].high || v[side + 1] != sides[j].low))
+          ++side;
+        index->side_normal[sides[j].face][side] = sum;
+      }
+    }
     *out = index;
   } else {
     sonde_surface_index_destroy(index);

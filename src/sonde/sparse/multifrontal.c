@@ -88,26 +88,6 @@ static void relate_fronts(sonde_symbolic *s, const sonde_symbolic_def *def, uint
   }
 }
 
-// The updates of a piece's children leave the stack before that of the piece arrives.
-static void measure(sonde_symbolic *s) {
-  size_t top = 0, block = s->block;
-  for (uint32_t t = 0; t <= s->pieces.count; ++t) {
-    sonde_piece *p = &s->pieces.list[t];
-    size_t own = block * p->count, behind = block * p->boundary_count, n = own + behind;
-    if (n > s->front_order) s->front_order = n;
-    if (t == s->pieces.count) break;
-    p->factor = s->factor_size;
-    s->factor_size += sonde_front_width((uint32_t)own) * (n + 1);
-    for (size_t j = 0; j < own; ++j) s->macs += (n - j) * (n - j) / 2;
-    for (uint32_t c = 0, at = t - 1; c < p->child_count; ++c, at = s->pieces.list[at].before) {
-      size_t taken = block * s->pieces.list[at].boundary_count;
-      top -= taken * taken;
-    }
-    top += behind * behind;
-    if (top > s->stack_size) s->stack_size = top;
-  }
-}
-
 sonde_status sonde_symbolic_create(const sonde_symbolic_def *def, sonde_symbolic **symbolic,
                                    sonde_error *error) {
   SONDE_ASSERT(def != NULL && symbolic != NULL && def->points != NULL);
@@ -152,7 +132,23 @@ sonde_status sonde_symbolic_create(const sonde_symbolic_def *def, sonde_symbolic
     if (p) s->element_of[p->entry + p->entry_count++] = e;
   }
   relate_fronts(s, def, index);
-  measure(s);
+  // The updates of a piece's children leave the stack before that of the piece arrives.
+  size_t top = 0, block = s->block;
+  for (uint32_t t = 0; t <= s->pieces.count; ++t) {
+    sonde_piece *p = &s->pieces.list[t];
+    size_t own = block * p->count, behind = block * p->boundary_count, n = own + behind;
+    if (n > s->front_order) s->front_order = n;
+    if (t == s->pieces.count) break;
+    p->factor = s->factor_size;
+    s->factor_size += sonde_front_width((uint32_t)own) * (n + 1);
+    for (size_t j = 0; j < own; ++j) s->macs += (n - j) * (n - j) / 2;
+    for (uint32_t c = 0, at = t - 1; c < p->child_count; ++c, at = s->pieces.list[at].before) {
+      size_t taken = block * s->pieces.list[at].boundary_count;
+      top -= taken * taken;
+    }
+    top += behind * behind;
+    if (top > s->stack_size) s->stack_size = top;
+  }
 done:
   sonde_free(index);
   if (status)

@@ -71,25 +71,6 @@ INLINE void add_entries(double *front, size_t stride, const sonde_front_entry *e
   }
 }
 
-// Adds the matrix of one element to the lower triangle.
-static void add_element(sonde_numeric *f, size_t stride, uint32_t element) {
-  const uint32_t *nodes = f->symbolic->elements[element], *rank = f->symbolic->pieces.rank;
-  double k[24][24];
-  f->source.element(f->source.user, element, k);
-  for (int a = 0; a < 8; ++a) {
-    if (nodes[a] == SONDE_HELD_CORNER) continue;
-    size_t column = 3 * (size_t)f->local[rank[nodes[a]]];
-    for (int b = 0; b < 8; ++b) {
-      if (nodes[b] == SONDE_HELD_CORNER) continue;
-      size_t row = 3 * (size_t)f->local[rank[nodes[b]]];
-      if (row < column) continue;
-      for (size_t i = 0; i < 3; ++i)
-        for (size_t j = 0; j < 3; ++j)
-          f->front[(column + j) * stride + row + i] += k[3 * a + (int)j][3 * b + (int)i];
-    }
-  }
-}
-
 static void assemble(sonde_numeric *f, const sonde_piece *p) {
   const sonde_symbolic *s = f->symbolic;
   const sonde_piece *list = s->pieces.list;
@@ -100,8 +81,25 @@ static void assemble(sonde_numeric *f, const sonde_piece *p) {
     for (uint32_t i = 0; i < p->count; ++i) f->local[p->first + i] = i;
     for (uint32_t i = 0; i < p->boundary_count; ++i)
       f->local[s->pieces.boundary[p->boundary + i]] = p->count + i;
-    for (uint32_t e = 0; e < p->entry_count; ++e)
-      add_element(f, stride, s->element_of[p->entry + e]);
+    for (uint32_t e = 0; e < p->entry_count; ++e) {
+      // Adds the matrix of one element to the lower triangle.
+      const uint32_t element = s->element_of[p->entry + e];
+      const uint32_t *nodes = f->symbolic->elements[element], *rank = f->symbolic->pieces.rank;
+      double k[24][24];
+      f->source.element(f->source.user, element, k);
+      for (int a = 0; a < 8; ++a) {
+        if (nodes[a] == SONDE_HELD_CORNER) continue;
+        size_t column = 3 * (size_t)f->local[rank[nodes[a]]];
+        for (int b = 0; b < 8; ++b) {
+          if (nodes[b] == SONDE_HELD_CORNER) continue;
+          size_t row = 3 * (size_t)f->local[rank[nodes[b]]];
+          if (row < column) continue;
+          for (size_t i = 0; i < 3; ++i)
+            for (size_t j = 0; j < 3; ++j)
+              f->front[(column + j) * stride + row + i] += k[3 * a + (int)j][3 * b + (int)i];
+        }
+      }
+    }
   } else if (s->block == 1)
     add_entries(f->front, stride, s->entries + p->entry, p->entry_count, f->source.value, 1);
   else

@@ -11,27 +11,6 @@ static int compare(const void *a, const void *b) {
   return (x > y) - (x < y);
 }
 
-static sonde_status list_pieces(sonde_pieces *s, uint32_t n, uint32_t rows, const uint32_t *above,
-                                sonde_error *error) {
-  uint32_t t = 0;
-  for (uint32_t k = 0; k < rows; ++k) s->count += above[k] != UINT32_MAX;
-  s->list = SONDE_NEW(sonde_piece, s->count + 1);
-  if (!s->list) return sonde_fail_memory(error);
-  for (uint32_t k = 0; k < rows; ++k) {
-    if (above[k] != UINT32_MAX) s->list[t++].first = k;
-    s->piece_of[k] = t - 1;
-    ++s->list[t - 1].count;
-  }
-  SONDE_ASSERT(t == s->count);
-  s->list[t].first = rows, s->list[t].count = n - rows;
-  for (uint32_t k = rows; k <= n; ++k) s->piece_of[k] = t;
-  for (sonde_piece *p = s->list; p < s->list + t; ++p) {
-    p->parent = s->piece_of[above[p->first]];
-    ++s->list[p->parent].child_count;
-  }
-  return SONDE_OK;
-}
-
 // seen[place] is the number of the last piece, from 1, that has it in its boundary.
 static void add_place(sonde_pieces *s, uint32_t t, uint32_t place, uint32_t *seen) {
   sonde_piece *p = &s->list[t];
@@ -79,8 +58,24 @@ sonde_status sonde_pieces_find(const sonde_pattern *pattern, uint32_t rows, uint
   sonde_status status = scratch && s->order && s->rank && s->piece_of
                             ? sonde_dissect(pattern, rows, leaf, s->order, scratch, error)
                             : sonde_fail_memory(error);
-  if (!status) status = list_pieces(s, n, rows, scratch, error);
+  for (uint32_t k = 0; !status && k < rows; ++k) s->count += scratch[k] != UINT32_MAX;
+  if (!status) s->list = SONDE_NEW(sonde_piece, s->count + 1);
+  if (!status && !s->list) status = sonde_fail_memory(error);
   if (!status) {
+    // A mark begins a piece and names a row of its parent.
+    uint32_t t = 0;
+    for (uint32_t k = 0; k < rows; ++k) {
+      if (scratch[k] != UINT32_MAX) s->list[t++].first = k;
+      s->piece_of[k] = t - 1;
+      ++s->list[t - 1].count;
+    }
+    SONDE_ASSERT(t == s->count);
+    s->list[t].first = rows, s->list[t].count = n - rows;
+    for (uint32_t k = rows; k <= n; ++k) s->piece_of[k] = t;
+    for (sonde_piece *p = s->list; p < s->list + t; ++p) {
+      p->parent = s->piece_of[scratch[p->first]];
+      ++s->list[p->parent].child_count;
+    }
     for (uint32_t k = 0; k < n; ++k) s->rank[s->order[k]] = k;
     memset(scratch, 0, n * sizeof *scratch);
     status = find_boundaries(s, pattern, scratch, error);
