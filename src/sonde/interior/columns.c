@@ -86,29 +86,6 @@ static double clip_end(const sonde_interior *in, double end) {
   return holds_bone(in, last) ? end : last;
 }
 
-static sonde_status find_extent(sonde_interior *in, sonde_error *error) {
-  const sonde_mesh *skin = &in->model->surface;
-  double low = INFINITY, high = -INFINITY;
-  for (uint32_t v = 0; v < skin->vertex_count; ++v) {
-    double s = v_dot(v_sub(skin->vertices[v], in->origin), in->axis);
-    low = fmin(low, s), high = fmax(high, s);
-  }
-  low = clip_end(in, low), high = clip_end(in, high);
-  if (!(high - low > 4 * end_margin_m))
-    return sonde_fail(error, SONDE_MESH, "the skin is shorter than %g m along the femur",
-                      4 * end_margin_m);
-  double length = high - low - 2 * end_margin_m;
-  uint32_t rows = (uint32_t)ceil(length / row_step_m) + 1;
-  rows = rows < 4 ? 4 : rows > S_COUNT_MAX ? (uint32_t)S_COUNT_MAX : rows;
-  in->s_low_m = low, in->s_high_m = high;
-  in->s_first_m = low + end_margin_m;
-  in->s_step_m = length / (rows - 1);
-  in->s_count = rows;
-  in->theta_count = THETA_COUNT;
-  in->theta_step = 2 * SONDE_PI / THETA_COUNT;
-  return SONDE_OK;
-}
-
 static sonde_status cast_columns(sonde_interior *in, sonde_error *error) {
   for (uint32_t j = 0; j < in->s_count; ++j) {
     double s = in->s_first_m + in->s_step_m * j;
@@ -221,8 +198,27 @@ sonde_status sonde_columns_create(sonde_interior *in, sonde_error *error) {
   SONDE_ASSERT(in->model != NULL && in->skin == NULL);
   sonde_status status = sonde_surface_index_create(&in->model->surface, &in->skin, error);
   if (status == SONDE_OK) status = find_axis(in, error);
-  if (status == SONDE_OK) status = find_extent(in, error);
   if (status != SONDE_OK) return status;
+  // Rows between the ends of the skin along the femur.
+  const sonde_mesh *skin = &in->model->surface;
+  double low = INFINITY, high = -INFINITY;
+  for (uint32_t v = 0; v < skin->vertex_count; ++v) {
+    double s = v_dot(v_sub(skin->vertices[v], in->origin), in->axis);
+    low = fmin(low, s), high = fmax(high, s);
+  }
+  low = clip_end(in, low), high = clip_end(in, high);
+  if (!(high - low > 4 * end_margin_m))
+    return sonde_fail(error, SONDE_MESH, "the skin is shorter than %g m along the femur",
+                      4 * end_margin_m);
+  double length = high - low - 2 * end_margin_m;
+  uint32_t rows = (uint32_t)ceil(length / row_step_m) + 1;
+  rows = rows < 4 ? 4 : rows > S_COUNT_MAX ? (uint32_t)S_COUNT_MAX : rows;
+  in->s_low_m = low, in->s_high_m = high;
+  in->s_first_m = low + end_margin_m;
+  in->s_step_m = length / (rows - 1);
+  in->s_count = rows;
+  in->theta_count = THETA_COUNT;
+  in->theta_step = 2 * SONDE_PI / THETA_COUNT;
   size_t count = (size_t)in->theta_count * in->s_count;
   in->column = SONDE_NEW(sonde_column, count);
   in->field = SONDE_NEW(sonde_column_field, count);

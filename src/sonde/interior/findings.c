@@ -41,59 +41,11 @@ static bool in_tissue(const sonde_interior *in, sonde_vec3 rest) {
   return label != SONDE_LABEL_OUTSIDE && label != SONDE_LABEL_BONE;
 }
 
-// A lesion lies inside the soft tissue: its middle and the six ends of its axes do.
-static sonde_status check_lesion(const sonde_interior *in, uint32_t k, const sonde_lesion *l,
-                                 sonde_error *error) {
-  if ((uint32_t)l->kind >= SONDE_LESION_KINDS)
-    return sonde_fail(error, SONDE_ARGUMENT, "lesion %u is of unknown kind %d", k, (int)l->kind);
-  if (!within(l->half_m.x, least_half_m, most_half_m) ||
-      !within(l->half_m.y, least_half_m, most_half_m) ||
-      !within(l->half_m.z, least_half_m, most_half_m))
-    return sonde_fail(error, SONDE_ARGUMENT, "lesion %u: semi-axes of %g to %g mm expected", k,
-                      least_half_m * 1e3, most_half_m * 1e3);
-  if (!within(v_norm(l->axis), 0.99, 1.01) || !within(l->echogenicity, 0, 1))
-    return sonde_fail(error, SONDE_ARGUMENT,
-                      "lesion %u: a unit axis and an echogenicity of 0 to 1 expected", k);
-  bool fits = v_finite(l->centre_m) && in_tissue(in, l->centre_m);
-  for (int end = 0; end < 6 && fits; ++end) {
-    const lesion_frame f = frame_of(in, l);
-    const sonde_vec3 axis = end < 2 ? f.x : end < 4 ? f.y : f.z;
-    double offset = (end % 2 ? 1 : -1) / v_norm2(axis);
-    fits = in_tissue(in, v_madd(l->centre_m, offset, axis));
-  }
-  if (fits) return SONDE_OK;
-  return sonde_fail(error, SONDE_ARGUMENT,
-                    "lesion %u at (%.1f, %.1f, %.1f) mm is not inside the soft tissue", k,
-                    l->centre_m.x * 1e3, l->centre_m.y * 1e3, l->centre_m.z * 1e3);
-}
-
 // SONDE_VESSELS when the leg has none of that name.
 static uint32_t find_branch(const sonde_interior *in, const char *name) {
   for (uint32_t which = 2; which < in->vessel_count; ++which)
     if (strcmp(sonde_interior_vessel_name(in, (int)which), name) == 0) return which;
   return SONDE_VESSELS;
-}
-
-static sonde_status check_clot(const sonde_interior *in, const sonde_findings *f, uint32_t k,
-                               sonde_error *error) {
-  const sonde_branch_finding *b = &f->branch[k];
-  const sonde_pathology *p = &b->pathology;
-  if (memchr(b->branch, 0, sizeof b->branch) == NULL)
-    return sonde_fail(error, SONDE_ARGUMENT, "branch %u: the name has no end", k);
-  uint32_t which = find_branch(in, b->branch);
-  if (which == SONDE_VESSELS)
-    return sonde_fail(error, SONDE_ARGUMENT, "this leg has no branch '%s'", b->branch);
-  for (uint32_t other = 0; other < k; ++other)
-    if (strcmp(f->branch[other].branch, b->branch) == 0)
-      return sonde_fail(error, SONDE_ARGUMENT, "branch '%s' is named twice", b->branch);
-  bool clot = p->thrombus_fraction > 0;
-  if (clot && in->kind[which] == SONDE_VESSEL_ARTERY)
-    return sonde_fail(error, SONDE_ARGUMENT, "'%s' is an artery; clots lie in veins", b->branch);
-  if (!within(p->thrombus_fraction, 0, 1) || !within(p->echogenicity, 0, 1) ||
-      (clot && !within(p->thrombus_modulus_pa, 100, 1e7)) || !within(p->lumen_scale, 0.1, 3) ||
-      !within(p->wall_shear_pa, 0, 1e7) || !isfinite(p->thrombus_from_m + p->thrombus_to_m))
-    return sonde_fail(error, SONDE_ARGUMENT, "branch '%s': a value is out of range", b->branch);
-  return SONDE_OK;
 }
 
 sonde_status sonde_interior_set_findings(sonde_interior *in, const sonde_findings *findings,
@@ -109,9 +61,49 @@ sonde_status sonde_interior_set_findings(sonde_interior *in, const sonde_finding
     return sonde_fail(error, SONDE_ARGUMENT, "webs %g and oedema %g; expected 0 to 1", f->webs,
                       f->oedema);
   in->findings.lesion_count = 0; // an old lesion is tissue for the new ones
-  for (uint32_t k = 0; k < f->lesion_count && !status; ++k)
-    status = check_lesion(in, k, &f->lesion[k], error);
-  for (uint32_t k = 0; k < f->branch_count && !status; ++k) status = check_clot(in, f, k, error);
+  for (uint32_t k = 0; k < f->lesion_count && !status; ++k) {
+    const sonde_lesion *l = &f->lesion[k];
+    if ((uint32_t)l->kind >= SONDE_LESION_KINDS)
+      return sonde_fail(error, SONDE_ARGUMENT, "lesion %u is of unknown kind %d", k, (int)l->kind);
+    if (!within(l->half_m.x, least_half_m, most_half_m) ||
+        !within(l->half_m.y, least_half_m, most_half_m) ||
+        !within(l->half_m.z, least_half_m, most_half_m))
+      return sonde_fail(error, SONDE_ARGUMENT, "lesion %u: semi-axes of %g to %g mm expected", k,
+                        least_half_m * 1e3, most_half_m * 1e3);
+    if (!within(v_norm(l->axis), 0.99, 1.01) || !within(l->echogenicity, 0, 1))
+      return sonde_fail(error, SONDE_ARGUMENT,
+                        "lesion %u: a unit axis and an echogenicity of 0 to 1 expected", k);
+    bool fits = v_finite(l->centre_m) && in_tissue(in, l->centre_m);
+    for (int end = 0; end < 6 && fits; ++end) {
+      const lesion_frame frame = frame_of(in, l);
+      const sonde_vec3 axis = end < 2 ? frame.x : end < 4 ? frame.y : frame.z;
+      double offset = (end % 2 ? 1 : -1) / v_norm2(axis);
+      fits = in_tissue(in, v_madd(l->centre_m, offset, axis));
+    }
+    if (!fits)
+      return sonde_fail(error, SONDE_ARGUMENT,
+                        "lesion %u at (%.1f, %.1f, %.1f) mm is not inside the soft tissue", k,
+                        l->centre_m.x * 1e3, l->centre_m.y * 1e3, l->centre_m.z * 1e3);
+  }
+  for (uint32_t k = 0; k < f->branch_count && !status; ++k) {
+    const sonde_branch_finding *b = &f->branch[k];
+    const sonde_pathology *p = &b->pathology;
+    if (memchr(b->branch, 0, sizeof b->branch) == NULL)
+      return sonde_fail(error, SONDE_ARGUMENT, "branch %u: the name has no end", k);
+    uint32_t which = find_branch(in, b->branch);
+    if (which == SONDE_VESSELS)
+      return sonde_fail(error, SONDE_ARGUMENT, "this leg has no branch '%s'", b->branch);
+    for (uint32_t other = 0; other < k; ++other)
+      if (strcmp(f->branch[other].branch, b->branch) == 0)
+        return sonde_fail(error, SONDE_ARGUMENT, "branch '%s' is named twice", b->branch);
+    bool clot = p->thrombus_fraction > 0;
+    if (clot && in->kind[which] == SONDE_VESSEL_ARTERY)
+      return sonde_fail(error, SONDE_ARGUMENT, "'%s' is an artery; clots lie in veins", b->branch);
+    if (!within(p->thrombus_fraction, 0, 1) || !within(p->echogenicity, 0, 1) ||
+        (clot && !within(p->thrombus_modulus_pa, 100, 1e7)) || !within(p->lumen_scale, 0.1, 3) ||
+        !within(p->wall_shear_pa, 0, 1e7) || !isfinite(p->thrombus_from_m + p->thrombus_to_m))
+      return sonde_fail(error, SONDE_ARGUMENT, "branch '%s': a value is out of range", b->branch);
+  }
   if (status) return status;
   in->findings = *f;
   for (uint32_t k = 0; k < f->lesion_count; ++k) in->lesion[k] = frame_of(in, &f->lesion[k]);

@@ -14,32 +14,6 @@ enum { NT = SONDE_WINDOW_THETA, NS = SONDE_WINDOW_S, NL = SONDE_WINDOW_LEVELS };
 static const double skin_pa = 40e3;
 static const double bulk_over_shear = 100;
 
-// Elements and their order, which is found on a regular stand-in of the ring: it depends on the
-// topology only.
-static sonde_status connect(sonde_window *w, sonde_error *error) {
-  static const uint32_t round[8] = {0, 1, 3, 2, 4, 5, 7, 6};
-  sonde_solid *s = &w->solid;
-  for (uint32_t h = 0; h < s->hex_count; ++h) {
-    uint32_t node[8];
-    sonde_grid_nodes(h, node);
-    for (uint32_t c = 0; c < 8; ++c) s->hex[h].node[c] = node[round[c]];
-  }
-  sonde_vec3 *points = SONDE_NEW(sonde_vec3, SONDE_WINDOW_NODES);
-  unsigned char *last = SONDE_NEW(unsigned char, SONDE_WINDOW_NODES);
-  sonde_status status = points && last ? SONDE_OK : sonde_fail_memory(error);
-  for (uint32_t n = 0; n < SONDE_WINDOW_NODES && !status; ++n) {
-    uint32_t l = n % NL, i = n / NL % NT, j = n / NL / NT, row = j - SONDE_WINDOW_NEAR_FIRST;
-    double a = 2 * SONDE_PI * i / NT, r = 3 + 1.0 * (NL - l);
-    points[n] = vec3(r * cos(a), r * sin(a), 1.3 * j);
-    last[n] = l == 0 && i < SONDE_WINDOW_NEAR_T && row < SONDE_WINDOW_NEAR_S;
-    s->held[n] = l == NL - 1 ? 7 : j == 0 || j == NS - 1 ? 4 : 0;
-  }
-  if (!status) status = sonde_solid_connect(s, last, points, error);
-  sonde_free(points);
-  sonde_free(last);
-  return status;
-}
-
 sonde_status sonde_window_create(sonde_window **window, sonde_error *error) {
   SONDE_ASSERT(window != NULL);
   *window = NULL;
@@ -60,7 +34,30 @@ sonde_status sonde_window_create(sonde_window **window, sonde_error *error) {
   if (!status && (!w->stress || !w->felt || !w->pressed.x || !w->pressed.touched ||
                   !w->moved.touched || !w->compliance || !w->touched || !w->scratch))
     status = sonde_fail_memory(error);
-  if (!status) status = connect(w, error);
+  if (!status) {
+    // Elements and their order, which is found on a regular stand-in of the ring: it depends on the
+    // topology only.
+    static const uint32_t round[8] = {0, 1, 3, 2, 4, 5, 7, 6};
+    sonde_solid *s = &w->solid;
+    for (uint32_t h = 0; h < s->hex_count; ++h) {
+      uint32_t node[8];
+      sonde_grid_nodes(h, node);
+      for (uint32_t c = 0; c < 8; ++c) s->hex[h].node[c] = node[round[c]];
+    }
+    sonde_vec3 *points = SONDE_NEW(sonde_vec3, SONDE_WINDOW_NODES);
+    unsigned char *last = SONDE_NEW(unsigned char, SONDE_WINDOW_NODES);
+    status = points && last ? SONDE_OK : sonde_fail_memory(error);
+    for (uint32_t n = 0; n < SONDE_WINDOW_NODES && !status; ++n) {
+      uint32_t l = n % NL, i = n / NL % NT, j = n / NL / NT, row = j - SONDE_WINDOW_NEAR_FIRST;
+      double a = 2 * SONDE_PI * i / NT, r = 3 + 1.0 * (NL - l);
+      points[n] = vec3(r * cos(a), r * sin(a), 1.3 * j);
+      last[n] = l == 0 && i < SONDE_WINDOW_NEAR_T && row < SONDE_WINDOW_NEAR_S;
+      s->held[n] = l == NL - 1 ? 7 : j == 0 || j == NS - 1 ? 4 : 0;
+    }
+    if (!status) status = sonde_solid_connect(s, last, points, error);
+    sonde_free(points);
+    sonde_free(last);
+  }
   if (status)
     sonde_window_destroy(w);
   else

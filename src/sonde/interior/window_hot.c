@@ -73,41 +73,6 @@ static double dot(const double *a, const double *b, uint32_t n) {
   return sum;
 }
 
-// Conjugate gradients: forces under which the touched points move as prescribed.
-static void solve_forces(sonde_window *w, const contact *c, double *f, double *r) {
-  const uint32_t n = 3 * c->count, active = 3 * c->active;
-  double *p = r + n, *q = p + n, reference = 0;
-  for (uint32_t i = 0; i < n; ++i) {
-    r[i] = w->touched[i / 3].move[i % 3];
-    reference += r[i] * r[i];
-    f[i] = 0;
-    p[i] = r[i];
-  }
-  double old = reference;
-  for (w->iterations = 0; w->iterations < MOST_ITERATIONS; ++w->iterations) {
-    if (old <= tolerance * tolerance * reference) break;
-    // Displacements q under forces p: moved = compliance * force, two nodes at a time.
-    sum_forces(w, p, c);
-    memset(c->moved, 0, active * sizeof *c->moved);
-    uint32_t k = 0;
-    for (; k + 6 <= active; k += 6)
-      add_rows(c->moved, c->compliance + (size_t)k * active, active, c->force + k, 6, active);
-    if (k < active)
-      add_rows(c->moved, c->compliance + (size_t)k * active, active, c->force + k, 3, active);
-    for (uint32_t i = 0; i < n; ++i) {
-      const sonde_touched *t = &w->touched[i / 3];
-      double sum = c->give * p[i];
-      for (int m = 0; m < 4; ++m) sum += t->weight[m] * c->moved[3 * c->slot[t->near[m]] + i % 3];
-      q[i] = sum;
-    }
-    double step = old / dot(p, q, n);
-    for (uint32_t i = 0; i < n; ++i) f[i] += step * p[i], r[i] -= step * q[i];
-    double now = dot(r, r, n), share = now / old;
-    for (uint32_t i = 0; i < n; ++i) p[i] = r[i] + share * p[i];
-    old = now;
-  }
-}
-
 // Nodes beside the face carry a share of the contact but do not lie under it.
 static bool under_face(const sonde_interior_input *input, sonde_vec3 now) {
   sonde_vec3 q = pose_apply_inverse(input->world_from_probe, now);
@@ -192,7 +157,39 @@ static bool solve_response(sonde_window *w, contact *c, const double along[3],
     for (uint32_t m = 0; m < 3 * c->active; ++m) out[m] = row[3 * c->node[m / 3] + m % 3];
   }
   double *f = w->scratch + 2 * SIDE, moved[SIDE] = {0};
-  solve_forces(w, c, f, f + 3 * c->count);
+  // Conjugate gradients: forces under which the touched points move as prescribed.
+  double *r = f + 3 * c->count;
+  const uint32_t n = 3 * c->count, active = 3 * c->active;
+  double *p = r + n, *q = p + n, reference = 0;
+  for (uint32_t i = 0; i < n; ++i) {
+    r[i] = w->touched[i / 3].move[i % 3];
+    reference += r[i] * r[i];
+    f[i] = 0;
+    p[i] = r[i];
+  }
+  double old = reference;
+  for (w->iterations = 0; w->iterations < MOST_ITERATIONS; ++w->iterations) {
+    if (old <= tolerance * tolerance * reference) break;
+    // Displacements q under forces p: moved = compliance * force, two nodes at a time.
+    sum_forces(w, p, c);
+    memset(c->moved, 0, active * sizeof *c->moved);
+    uint32_t k = 0;
+    for (; k + 6 <= active; k += 6)
+      add_rows(c->moved, c->compliance + (size_t)k * active, active, c->force + k, 6, active);
+    if (k < active)
+      add_rows(c->moved, c->compliance + (size_t)k * active, active, c->force + k, 3, active);
+    for (uint32_t i = 0; i < n; ++i) {
+      const sonde_touched *t = &w->touched[i / 3];
+      double total = c->give * p[i];
+      for (int m = 0; m < 4; ++m) total += t->weight[m] * c->moved[3 * c->slot[t->near[m]] + i % 3];
+      q[i] = total;
+    }
+    double step = old / dot(p, q, n);
+    for (uint32_t i = 0; i < n; ++i) f[i] += step * p[i], r[i] -= step * q[i];
+    double now = dot(r, r, n), share = now / old;
+    for (uint32_t i = 0; i < n; ++i) p[i] = r[i] + share * p[i];
+    old = now;
+  }
   sum_forces(w, f, c);
   // Displacements of all near nodes under the forces.
   for (uint32_t k = 0; k < 3 * c->active; ++k) {
@@ -261,28 +258,6 @@ bool sonde_window_stress(const sonde_window *w, double theta, double s, double r
 
 // ---- update -------------------------------------------------------------------------------
 
-// The linear solid's displacements, kept from folding.
-static void repair_folds(sonde_window *w) {
-  sonde_solid *s = &w->solid;
-  for (uint32_t n = 0; n < SONDE_WINDOW_NODES; ++n)
-    w->repair.now[n] = v_add(w->grid.node[n], sonde_solid_moved(s, n));
-  memset(w->repair.held, 0, sizeof w->repair.held);
-  for (uint32_t p = 0; p < w->moved.count; ++p)
-    for (int k = 0; k < 4; ++k) {
-      const sonde_touched *t = &w->moved.touched[p];
-      uint32_t row = t->near[k] / SONDE_WINDOW_NEAR_T + SONDE_WINDOW_NEAR_FIRST;
-      if (t->weight[k] > held_share)
-        w->repair.held[row * NT + t->near[k] % SONDE_WINDOW_NEAR_T] = true;
-    }
-  if (!sonde_fold_repair_nodes(&w->repair, &w->grid)) return;
-  for (uint32_t n = 0; n < SONDE_WINDOW_NODES; ++n) {
-    if (s->unknown[n] == SONDE_HELD_CORNER) continue;
-    sonde_vec3 u = v_sub(w->repair.now[n], w->grid.node[n]);
-    float *x = s->x + 3 * (size_t)s->unknown[n];
-    x[0] = (float)u.x, x[1] = (float)u.y, x[2] = (float)u.z;
-  }
-}
-
 bool sonde_window_update(sonde_window *w, const sonde_interior *in,
                          const sonde_interior_input *input) {
   SONDE_ASSERT(w != NULL && w->ready && input != NULL);
@@ -312,7 +287,28 @@ bool sonde_window_update(sonde_window *w, const sonde_interior *in,
   const bool pressed = solve_response(w, &c, along, &w->pressed);
   if (pressed && w->pressed.count > 0) fresh[count++] = w->pressed.x;
   sonde_numeric_recover(&w->solid.numeric, fresh, count); // all other nodes
-  if (moved) repair_folds(w);
+  if (moved) {
+    // The linear solid's displacements, kept from folding.
+    sonde_solid *s = &w->solid;
+    for (uint32_t n = 0; n < SONDE_WINDOW_NODES; ++n)
+      w->repair.now[n] = v_add(w->grid.node[n], sonde_solid_moved(s, n));
+    memset(w->repair.held, 0, sizeof w->repair.held);
+    for (uint32_t p = 0; p < w->moved.count; ++p)
+      for (int k = 0; k < 4; ++k) {
+        const sonde_touched *t = &w->moved.touched[p];
+        uint32_t row = t->near[k] / SONDE_WINDOW_NEAR_T + SONDE_WINDOW_NEAR_FIRST;
+        if (t->weight[k] > held_share)
+          w->repair.held[row * NT + t->near[k] % SONDE_WINDOW_NEAR_T] = true;
+      }
+    if (sonde_fold_repair_nodes(&w->repair, &w->grid)) {
+      for (uint32_t n = 0; n < SONDE_WINDOW_NODES; ++n) {
+        if (s->unknown[n] == SONDE_HELD_CORNER) continue;
+        sonde_vec3 u = v_sub(w->repair.now[n], w->grid.node[n]);
+        float *x = s->x + 3 * (size_t)s->unknown[n];
+        x[0] = (float)u.x, x[1] = (float)u.y, x[2] = (float)u.z;
+      }
+    }
+  }
   // Sections of a vessel are closer than elements: each of these is evaluated once per update.
   if (pressed) memset(w->felt, 0, w->solid.hex_count * sizeof *w->felt);
   for (uint32_t which = 0; which < in->vessel_count && pressed; ++which)
