@@ -54,29 +54,6 @@ static sonde_status load_template(char **text, sonde_error *error) {
 
 #endif
 
-// Text between tags: HTML takes any other character as it is.
-static void put_escaped_html(sonde_file *file, const char *utf8) {
-  for (const char *p = utf8; *p; ++p) {
-    const char *entity = *p == '<' ? "&lt;" : *p == '&' ? "&amp;" : NULL;
-    if (entity)
-      sonde_file_printf(file, "%s", entity);
-    else
-      sonde_file_write(file, p, 1);
-  }
-}
-
-// In JSON a '<' stands within strings only; as an escape it can neither end the script nor begin a
-// comment.
-static void put_escaped_json(sonde_file *file, const char *json, size_t length) {
-  for (size_t from = 0; from < length;) {
-    const char *mark = memchr(json + from, '<', length - from);
-    size_t plain = mark ? (size_t)(mark - json) - from : length - from;
-    sonde_file_write(file, json + from, plain);
-    if (mark) sonde_file_printf(file, "\\u003c");
-    from += plain + (mark != NULL);
-  }
-}
-
 sonde_status sonde_report_write(const char *path, const char *title, const char *json,
                                 size_t length, sonde_error *error) {
   SONDE_ASSERT(path && title && json && length > 1 && json[0] == '{');
@@ -89,9 +66,24 @@ sonde_status sonde_report_write(const char *path, const char *title, const char 
     SONDE_ASSERT(name && data && name < data);
     const char *behind = name + sizeof TITLE - 1, *rest = data + sizeof DATA - 1;
     sonde_file_write(file, text, (size_t)(name - text));
-    put_escaped_html(file, title);
+    // Text between tags: HTML takes any other character as it is.
+    for (const char *p = title; *p; ++p) {
+      const char *entity = *p == '<' ? "&lt;" : *p == '&' ? "&amp;" : NULL;
+      if (entity)
+        sonde_file_printf(file, "%s", entity);
+      else
+        sonde_file_write(file, p, 1);
+    }
     sonde_file_write(file, behind, (size_t)(data - behind));
-    put_escaped_json(file, json, length);
+    // In JSON a '<' stands within strings only; as an escape it can neither end the script nor
+    // begin a comment.
+    for (size_t from = 0; from < length;) {
+      const char *mark = memchr(json + from, '<', length - from);
+      size_t plain = mark ? (size_t)(mark - json) - from : length - from;
+      sonde_file_write(file, json + from, plain);
+      if (mark) sonde_file_printf(file, "\\u003c");
+      from += plain + (mark != NULL);
+    }
     sonde_file_write(file, rest, strlen(rest));
     status = sonde_file_commit(file, error);
   }

@@ -68,35 +68,6 @@ static void fail_event(sonde_reader *reader, const yaml_event_t *event, const ch
                 (int)event->start_mark.line + 1, text);
 }
 
-// One document within the limits; the whole text is gone over without being kept, so that building
-// the document is bounded.
-static void check_shape(sonde_reader *reader, yaml_parser_t *parser) {
-  const sonde_input_limits *bounds = &sonde_limits_yaml;
-  uint32_t documents = 0, depth = 0;
-  uint64_t items = 0;
-  yaml_event_t event;
-  for (bool more = true; more && sonde_reader_good(reader);) {
-    if (!yaml_parser_parse(parser, &event)) {
-      fail_parser(reader, parser);
-      break;
-    }
-    bool opens = event.type == YAML_MAPPING_START_EVENT || event.type == YAML_SEQUENCE_START_EVENT;
-    bool closes = event.type == YAML_MAPPING_END_EVENT || event.type == YAML_SEQUENCE_END_EVENT;
-    documents += event.type == YAML_DOCUMENT_START_EVENT;
-    items += opens || event.type == YAML_SCALAR_EVENT || event.type == YAML_ALIAS_EVENT;
-    depth += opens;
-    depth -= closes && depth > 0;
-    if (documents > 1)
-      fail_event(reader, &event, "a second document begins, expected %llu", 1);
-    else if (depth > bounds->most_depth)
-      fail_event(reader, &event, "expected at most %llu levels of nesting", bounds->most_depth);
-    else if (items > bounds->most_items)
-      fail_event(reader, &event, "expected at most %llu values", bounds->most_items);
-    more = event.type != YAML_STREAM_END_EVENT;
-    yaml_event_delete(&event);
-  }
-}
-
 sonde_status sonde_reader_create(const char *text, const char *name, sonde_reader **out,
                                  sonde_error *error) {
   SONDE_ASSERT(text && name && out);
@@ -116,7 +87,33 @@ sonde_status sonde_reader_create(const char *text, const char *name, sonde_reade
     }
     yaml_parser_set_input_string(&parser, (const unsigned char *)text, count);
     if (pass == 0) {
-      check_shape(reader, &parser);
+      // One document within the limits; the whole text is gone over without being kept, so that
+      // building the document is bounded.
+      const sonde_input_limits *bounds = &sonde_limits_yaml;
+      uint32_t documents = 0, depth = 0;
+      uint64_t items = 0;
+      yaml_event_t event;
+      for (bool more = true; more && sonde_reader_good(reader);) {
+        if (!yaml_parser_parse(&parser, &event)) {
+          fail_parser(reader, &parser);
+          break;
+        }
+        bool opens =
+            event.type == YAML_MAPPING_START_EVENT || event.type == YAML_SEQUENCE_START_EVENT;
+        bool closes = event.type == YAML_MAPPING_END_EVENT || event.type == YAML_SEQUENCE_END_EVENT;
+        documents += event.type == YAML_DOCUMENT_START_EVENT;
+        items += opens || event.type == YAML_SCALAR_EVENT || event.type == YAML_ALIAS_EVENT;
+        depth += opens;
+        depth -= closes && depth > 0;
+        if (documents > 1)
+          fail_event(reader, &event, "a second document begins, expected %llu", 1);
+        else if (depth > bounds->most_depth)
+          fail_event(reader, &event, "expected at most %llu levels of nesting", bounds->most_depth);
+        else if (items > bounds->most_items)
+          fail_event(reader, &event, "expected at most %llu values", bounds->most_items);
+        more = event.type != YAML_STREAM_END_EVENT;
+        yaml_event_delete(&event);
+      }
     } else {
       reader->has_document = yaml_parser_load(&parser, &reader->document) == 1;
       if (!reader->has_document)

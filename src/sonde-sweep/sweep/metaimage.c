@@ -13,10 +13,13 @@ static const char OWNED[] =
 
 bool sonde_metaimage_owns(const char *key) { return sonde_header_among(key, OWNED); }
 
-static sonde_status read_lines(sonde_header *h, sonde_error *error) {
-  for (;;) {
+sonde_status sonde_metaimage_parse(sonde_header *h, sonde_error *error) {
+  double spacing[3] = {1, 1, 1}, offset[3] = {0}, axes[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  // The lines up to that of the pixels.
+  sonde_status status;
+  for (bool last = false; !last;) {
     char *line;
-    sonde_status status = sonde_header_line(h, &line, error);
+    status = sonde_header_line(h, &line, error);
     if (status) return status;
     if (!line)
       return sonde_fail(error, SONDE_FORMAT,
@@ -34,30 +37,23 @@ static sonde_status read_lines(sonde_header *h, sonde_error *error) {
       return sonde_fail(error, SONDE_FORMAT,
                         "%.200s:1: expected 'ObjectType = Image' or 'NRRD', found '%.60s'", h->path,
                         e->key);
-    if (strcmp(e->key, "ElementDataFile") == 0) return SONDE_OK;
+    last = strcmp(e->key, "ElementDataFile") == 0;
   }
-}
-
-sonde_status sonde_metaimage_parse(sonde_header *h, sonde_error *error) {
-  double spacing[3] = {1, 1, 1}, offset[3] = {0}, axes[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
-  sonde_status status = read_lines(h, error);
-  if (!status) {
-    static const sonde_header_rule rules[] = {{"ObjectType", false, {"Image"}},
-                                              {"NDims", true, {"3"}},
-                                              {"BinaryData", false, {"True"}},
-                                              {"ElementNumberOfChannels", false, {"1"}},
-                                              {"ElementType", true, {"MET_UCHAR"}},
-                                              {"CompressedData", false, {"True", "False"}},
-                                              {"DimSize", true, {NULL}},
-                                              {"ElementDataFile", true, {"LOCAL"}}};
-    status = sonde_header_rules(h, rules, SONDE_COUNT_OF(rules), error);
-    for (size_t i = 0; i < SONDE_COUNT_OF(rules) && !status; ++i) {
-      const sonde_header_entry *e = sonde_header_find(h, rules[i].key);
-      for (const sonde_header_entry *f = e; f && !status && ++f < h->entries + h->entry_count;)
-        if (strcmp(e->key, f->key) == 0)
-          status = sonde_fail(error, SONDE_FORMAT, "%.200s:%u: %s repeats line %u", h->path,
-                              f->line, f->key, e->line);
-    }
+  static const sonde_header_rule rules[] = {{"ObjectType", false, {"Image"}},
+                                            {"NDims", true, {"3"}},
+                                            {"BinaryData", false, {"True"}},
+                                            {"ElementNumberOfChannels", false, {"1"}},
+                                            {"ElementType", true, {"MET_UCHAR"}},
+                                            {"CompressedData", false, {"True", "False"}},
+                                            {"DimSize", true, {NULL}},
+                                            {"ElementDataFile", true, {"LOCAL"}}};
+  status = sonde_header_rules(h, rules, SONDE_COUNT_OF(rules), error);
+  for (size_t i = 0; i < SONDE_COUNT_OF(rules) && !status; ++i) {
+    const sonde_header_entry *e = sonde_header_find(h, rules[i].key);
+    for (const sonde_header_entry *f = e; f && !status && ++f < h->entries + h->entry_count;)
+      if (strcmp(e->key, f->key) == 0)
+        status = sonde_fail(error, SONDE_FORMAT, "%.200s:%u: %s repeats line %u", h->path, f->line,
+                            f->key, e->line);
   }
   if (status) return status;
   h->dimension = 3;

@@ -84,32 +84,6 @@ static uint32_t gather_planes(const sonde_slicer *s, const rectangle *r,
   return found;
 }
 
-// Without branches, so that the compiler takes four pixels at a time.
-static void nearest_of_row(const sonde_slicer *s, const slice_candidate *room, uint32_t count,
-                           uint32_t row, row_pick *pick) {
-  for (int x = 0; x < SLICE_TILE; ++x) {
-    pick->up_d[x] = INFINITY, pick->down_d[x] = -INFINITY;
-    pick->up[x] = pick->down[x] = -1;
-  }
-  float u0 = s->low[0] - SLACK, u1 = s->high[0] + SLACK;
-  float v0 = s->low[1] - SLACK, v1 = s->high[1] + SLACK;
-  for (uint32_t k = 0; k < count; ++k) {
-    const slice_candidate *c = &room[k];
-    float u = c->u[0] + (float)row * c->u[2], v = c->v[0] + (float)row * c->v[2];
-    float d = c->d[0] + (float)row * c->d[2], us = c->u[1], vs = c->v[1], ds = c->d[1];
-    for (int x = 0; x < SLICE_TILE; ++x) {
-      float fx = (float)x, ux = u + fx * us, vx = v + fx * vs, dx = d + fx * ds;
-      int inside = (ux >= u0) & (ux <= u1) & (vx >= v0) & (vx <= v1);
-      int up = inside & (dx >= 0) & (dx < pick->up_d[x]);
-      int down = inside & (dx < 0) & (dx > pick->down_d[x]);
-      pick->up_d[x] = up ? dx : pick->up_d[x];
-      pick->up[x] = up ? (int32_t)k : pick->up[x];
-      pick->down_d[x] = down ? dx : pick->down_d[x];
-      pick->down[x] = down ? (int32_t)k : pick->down[x];
-    }
-  }
-}
-
 // Bounds of all candidates' columns and rows over a tile, linear in the pixel.
 typedef struct outline {
   float most[2][3], least[2][3];
@@ -390,30 +364,6 @@ INLINE void mix_row(const sonde_slicer *s, row_work *w, uint8_t grey[SLICE_TILE]
   for (int x = 0; x < SLICE_TILE; ++x) grey[x] = (uint8_t)value[x];
 }
 
-// What lies between two frames; the rest is left with `met` zero.
-static void bracket_row(const sonde_slicer *s, const slice_candidate *room, const row_pick *pick,
-                        uint32_t wide, float y, pair pairs[PAIRS], int32_t met[SLICE_TILE],
-                        uint8_t grey[SLICE_TILE]) {
-  row_work w;
-  uint32_t done = 0;
-  for (int x = 0; x < SLICE_TILE; ++x) {
-    met[x] = 0, w.near[x] = w.far[x] = room[0].plane->pixels;
-    w.m[0][x] = w.n[0][x] = s->low[0], w.m[1][x] = w.n[1][x] = s->low[1], w.t[x] = 0;
-  }
-  for (uint32_t x = 0; x < wide; ++x) {
-    int32_t up = pick->up[x], down = pick->down[x];
-    if (done >> x & 1 || up < 0 || down < 0) continue;
-    meet_row(s, room, pick, find_pair(s, room, up, down, pairs), y, &w, met);
-    const uint8_t *near = room[up].plane->pixels, *far = room[down].plane->pixels;
-    for (uint32_t k = x; k < wide; ++k) {
-      bool same = pick->up[k] == up && pick->down[k] == down;
-      done |= (uint32_t)same << k;
-      w.near[k] = same ? near : w.near[k], w.far[k] = same ? far : w.far[k];
-    }
-  }
-  mix_row(s, &w, grey);
-}
-
 static inline void put_pixel(const sonde_slicer *s, size_t at, float value) {
   s->image->pixels[at] = value > 0 ? (uint8_t)(value + 0.5f) : 0;
   if (s->known) s->known[at] = value >= 0;
@@ -429,8 +379,49 @@ static uint64_t fill_tile(const sonde_slicer *s, const rectangle *r, const slice
   int32_t met[SLICE_TILE] = {0};
   uint8_t grey[SLICE_TILE];
   for (uint32_t y = 0; y < r->high; ++y) {
-    nearest_of_row(s, room, count, y, &pick);
-    if (fast) bracket_row(s, room, &pick, r->wide, (float)y, pairs, met, grey);
+    // Without branches, so that the compiler takes four pixels at a time.
+    for (int x = 0; x < SLICE_TILE; ++x) {
+      pick.up_d[x] = INFINITY, pick.down_d[x] = -INFINITY;
+      pick.up[x] = pick.down[x] = -1;
+    }
+    float u0 = s->low[0] - SLACK, u1 = s->high[0] + SLACK;
+    float v0 = s->low[1] - SLACK, v1 = s->high[1] + SLACK;
+    for (uint32_t k = 0; k < count; ++k) {
+      const slice_candidate *c = &room[k];
+      float u = c->u[0] + (float)y * c->u[2], v = c->v[0] + (float)y * c->v[2];
+      float d = c->d[0] + (float)y * c->d[2], us = c->u[1], vs = c->v[1], ds = c->d[1];
+      for (int x = 0; x < SLICE_TILE; ++x) {
+        float fx = (float)x, ux = u + fx * us, vx = v + fx * vs, dx = d + fx * ds;
+        int inside = (ux >= u0) & (ux <= u1) & (vx >= v0) & (vx <= v1);
+        int up = inside & (dx >= 0) & (dx < pick.up_d[x]);
+        int down = inside & (dx < 0) & (dx > pick.down_d[x]);
+        pick.up_d[x] = up ? dx : pick.up_d[x];
+        pick.up[x] = up ? (int32_t)k : pick.up[x];
+        pick.down_d[x] = down ? dx : pick.down_d[x];
+        pick.down[x] = down ? (int32_t)k : pick.down[x];
+      }
+    }
+    if (fast) {
+      // What lies between two frames; the rest is left with `met` zero.
+      row_work w;
+      uint32_t done = 0;
+      for (int x = 0; x < SLICE_TILE; ++x) {
+        met[x] = 0, w.near[x] = w.far[x] = room[0].plane->pixels;
+        w.m[0][x] = w.n[0][x] = s->low[0], w.m[1][x] = w.n[1][x] = s->low[1], w.t[x] = 0;
+      }
+      for (uint32_t x = 0; x < r->wide; ++x) {
+        int32_t up = pick.up[x], down = pick.down[x];
+        if (done >> x & 1 || up < 0 || down < 0) continue;
+        meet_row(s, room, &pick, find_pair(s, room, up, down, pairs), ((float)y), &w, met);
+        const uint8_t *near = room[up].plane->pixels, *far = room[down].plane->pixels;
+        for (uint32_t k = x; k < r->wide; ++k) {
+          bool same = pick.up[k] == up && pick.down[k] == down;
+          done |= (uint32_t)same << k;
+          w.near[k] = same ? near : w.near[k], w.far[k] = same ? far : w.far[k];
+        }
+      }
+      mix_row(s, &w, grey);
+    }
     size_t at = (size_t)(r->row + y) * s->image->width + r->column;
     for (uint32_t x = 0; x < r->wide; ++x) {
       float value = met[x] ? (float)grey[x] : value_at(s, room, &pick, (int)x, (float)y, &p);
