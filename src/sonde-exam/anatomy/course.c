@@ -85,25 +85,6 @@ static sonde_vessel *begin(const layout *l, const char *name, sonde_vessel_kind 
   return &branch->line;
 }
 
-// Medial and behind at the knee, in front at its junction with the femoral vein.
-static void lay_saphenous(const layout *l) {
-  enum { POINTS = 60 };
-  const double reach = 0.10; // share of the length over which it dives to the vein
-  sonde_vessel *line = begin(l, "great_saphenous", SONDE_VESSEL_VEIN);
-  for (uint32_t k = 0; k < POINTS; ++k) {
-    double t = JUNCTION + (LAST - JUNCTION) * k / (POINTS - 1), z = t * l->thigh->length_m;
-    double s = (t - JUNCTION) / (1 - JUNCTION);
-    double angle = sonde_course_angle(l->thigh, t) - (0.05 + 0.7 * s * (1 - s)) +
-                   0.05 * (1 - smooth_step(s / reach));
-    double fat = fat_at(l, angle, z);
-    double radius = fmin(0.5 * l->thigh->saphenous_m * (1 - 0.25 * s), 0.35 * fat);
-    double depth = l->thigh->skin_m + fmax(radius, fat - radius - 0.0005);
-    sonde_vec3 own = below_skin(l, angle, z, depth);
-    sonde_vec3 end = at_share(&l->course->vein, t).centre_m;
-    add(l, line, v_lerp(end, own, smooth_step((t - JUNCTION) / reach)), radius);
-  }
-}
-
 static void lay_deep(const layout *l) {
   enum { POINTS = 40 };
   const double from[2] = {l->thigh->deep_branch_m / l->thigh->length_m,
@@ -246,7 +227,22 @@ static sonde_status lay_all(const layout *l, sonde_error *error) {
     add(l, &c->artery, centre, radius);
   }
 
-  lay_saphenous(l);
+  // Medial and behind at the knee, in front at its junction with the femoral vein.
+  enum { POINTS = 60 };
+  const double reach = 0.10; // share of the length over which it dives to the vein
+  sonde_vessel *line = begin(l, "great_saphenous", SONDE_VESSEL_VEIN);
+  for (uint32_t k = 0; k < POINTS; ++k) {
+    double t = JUNCTION + (LAST - JUNCTION) * k / (POINTS - 1), z = t * l->thigh->length_m;
+    double s = (t - JUNCTION) / (1 - JUNCTION);
+    double angle = sonde_course_angle(l->thigh, t) - (0.05 + 0.7 * s * (1 - s)) +
+                   0.05 * (1 - smooth_step(s / reach));
+    double fat = fat_at(l, angle, z);
+    double radius = fmin(0.5 * l->thigh->saphenous_m * (1 - 0.25 * s), 0.35 * fat);
+    double depth = l->thigh->skin_m + fmax(radius, fat - radius - 0.0005);
+    sonde_vec3 own = below_skin(l, angle, z, depth);
+    sonde_vec3 end = at_share(&l->course->vein, t).centre_m;
+    add(l, line, v_lerp(end, own, smooth_step((t - JUNCTION) / reach)), radius);
+  }
   lay_deep(l);
   if (l->thigh->second_vein > 0) lay_second(l);
   sonde_status status = check_line(l, "femoral vein", &c->vein, error);

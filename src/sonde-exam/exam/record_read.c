@@ -54,25 +54,6 @@ static uint64_t read_hash(source *s, const sonde_json *object, const char *key) 
   return value;
 }
 
-// The first line. Leaves recording->at at the second one.
-static sonde_status read_magic(const source *s) {
-  sonde_recording *r = s->recording;
-  size_t length = strlen(SONDE_RECORD_MAGIC);
-  bool named = r->end > length && memcmp(r->bytes, SONDE_RECORD_MAGIC " ", length + 1) == 0;
-  char *end = r->bytes;
-  long version = named ? strtol(r->bytes + length + 1, &end, 10) : 0;
-  if (!named || *end != '\n')
-    return sonde_fail(s->error, SONDE_FORMAT, "%s:1: not a recording, expected \"%s %d\"", s->path,
-                      SONDE_RECORD_MAGIC, SONDE_RECORD_VERSION);
-  if (version < SONDE_RECORD_OLDEST || version > SONDE_RECORD_VERSION)
-    return sonde_fail(s->error, SONDE_VERSION,
-                      "%s:1: version %ld of a recording, expected %d to %d", s->path, version,
-                      SONDE_RECORD_OLDEST, SONDE_RECORD_VERSION);
-  r->version = (int)version;
-  r->at = (size_t)(end + 1 - r->bytes);
-  return SONDE_OK;
-}
-
 static sonde_status read_header(source *s) {
   sonde_recording *r = s->recording;
   const char *line = r->bytes + r->at;
@@ -264,30 +245,6 @@ static const char *fault_of(const sonde_recording *r, const sonde_record *record
   return sonde_pose_usable(record->sample.world_from_probe) ? NULL : "has a pose that is not one";
 }
 
-// Of a file without an end: blocks whose CRC fits, or all whole records of one without blocks.
-static sonde_status read_blocks(const source *s) {
-  sonde_recording *r = s->recording;
-  size_t at = r->start, summed = 0, whole = r->start, bytes;
-  uLong crc = 0;
-  uint32_t tag;
-  r->told = (sonde_record_end){0};
-  for (; (bytes = record_at(r, at, r->end, &tag)) > 0; at += bytes) {
-    if (r->version < 4) whole = at + bytes;
-    if (tag != SONDE_RECORD_BLOCK) continue;
-    crc = crc32_z(crc, (const unsigned char *)r->bytes + summed, at - summed);
-    summed = at;
-    bytes_reader reader = {(const unsigned char *)r->bytes + at + 4};
-    if (!sonde_checksum_fits(bytes_take_u32(&reader), (uint32_t)crc)) break;
-    whole = at + bytes;
-    r->told.crc = (uint32_t)crc;
-  }
-  r->end = r->notes_end = whole;
-  if (whole > r->start) return SONDE_OK;
-  return sonde_fail(s->error, SONDE_FORMAT,
-                    "%s: the recording was cut off before its first whole block (%g s)", s->path,
-                    SONDE_RECORD_BLOCK_S);
-}
-
 // What a walk over the blocks of a journal found.
 typedef struct journal_walk {
   size_t at, whole; // where it stands; end of the last whole block
@@ -297,7 +254,9 @@ typedef struct journal_walk {
   uint32_t end_crc;
 } journal_walk;
 
-static journal_walk walk_blocks(const sonde_recording *r) {
+// A journal is whole up to its last whole block; what follows was torn off while it was written.
+static sonde_status read_journal(const source *s, bool recover) {
+  sonde_recording *r = s->recording;
   journal_walk w = {.at = r->start, .whole = r->start};
   size_t summed = 0, end_at = 0, bytes;
   uLong crc = 0;
@@ -322,13 +281,7 @@ static journal_walk walk_blocks(const sonde_recording *r) {
     w.whole_ticks = w.ticks;
     if (end_at) w.ended = true, w.end_at = end_at, w.end_crc = end_crc;
   }
-  return w;
-}
 
-// A journal is whole up to its last whole block; what follows was torn off while it was written.
-static sonde_status read_journal(const source *s, bool recover) {
-  sonde_recording *r = s->recording;
-  journal_walk w = walk_blocks(r);
   if (w.damaged && !recover)
     return sonde_fail(
         s->error, SONDE_CHECKSUM,
@@ -388,13 +341,51 @@ sonde_status sonde_recording_load(const char *path, bool recover, sonde_recordin
   source s = {.path = path, .recording = recording, .error = error};
   sonde_status status =
       sonde_bounded_load(path, &sonde_limits_recording, &recording->bytes, &recording->end, error);
-  if (!status) status = read_magic(&s);
+  if (!status) {
+    // The first line. Leaves recording->at at the second one.
+    sonde_recording *r = s.recording;
+    size_t length = strlen(SONDE_RECORD_MAGIC);
+    bool named = r->end > length && memcmp(r->bytes, SONDE_RECORD_MAGIC " ", length + 1) == 0;
+    char *end = r->bytes;
+    long version = named ? strtol(r->bytes + length + 1, &end, 10) : 0;
+    if (!named || *end != '\n')
+      status = sonde_fail(s.error, SONDE_FORMAT, "%s:1: not a recording, expected \"%s %d\"",
+                          s.path, SONDE_RECORD_MAGIC, SONDE_RECORD_VERSION);
+    else if (version < SONDE_RECORD_OLDEST || version > SONDE_RECORD_VERSION)
+      status =
+          sonde_fail(s.error, SONDE_VERSION, "%s:1: version %ld of a recording, expected %d to %d",
+                     s.path, version, SONDE_RECORD_OLDEST, SONDE_RECORD_VERSION);
+    else
+      r->version = (int)version, r->at = (size_t)(end + 1 - r->bytes);
+  }
   bool journal = recording->version >= SONDE_RECORD_JOURNAL;
   sonde_status ended = status || journal ? status : read_end(&s);
   if (!status && !recover) status = ended;
   if (!status) status = read_header(&s);
   if (!status && journal) status = read_journal(&s, recover);
-  if (!status && !journal && ended) status = read_blocks(&s);
+  if (!status && !journal && ended) {
+    // Of a file without an end: blocks whose CRC fits, or all whole records of one without blocks.
+    sonde_recording *r = s.recording;
+    size_t at = r->start, summed = 0, whole = r->start, bytes;
+    uLong crc = 0;
+    uint32_t tag;
+    r->told = (sonde_record_end){0};
+    for (; (bytes = record_at(r, at, r->end, &tag)) > 0; at += bytes) {
+      if (r->version < 4) whole = at + bytes;
+      if (tag != SONDE_RECORD_BLOCK) continue;
+      crc = crc32_z(crc, (const unsigned char *)r->bytes + summed, at - summed);
+      summed = at;
+      bytes_reader reader = {(const unsigned char *)r->bytes + at + 4};
+      if (!sonde_checksum_fits(bytes_take_u32(&reader), (uint32_t)crc)) break;
+      whole = at + bytes;
+      r->told.crc = (uint32_t)crc;
+    }
+    r->end = r->notes_end = whole;
+    if (whole == r->start)
+      status = sonde_fail(s.error, SONDE_FORMAT,
+                          "%s: the recording was cut off before its first whole block (%g s)",
+                          s.path, SONDE_RECORD_BLOCK_S);
+  }
   if (!status && !journal && !ended) recording->notes_end = recording->end;
   if (!status) status = check_records(&s, recover);
   if (status) sonde_recording_clear(recording);

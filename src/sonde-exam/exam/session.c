@@ -25,43 +25,6 @@ static const char *const *probe_names(const sonde_session_def *def) {
   return def->probe_names ? def->probe_names : sonde_probe_names();
 }
 
-static sonde_status check(const sonde_session_def *def, const sonde_device *device,
-                          sonde_error *error) {
-  uint32_t probes = 0;
-  while (probe_names(def)[probes]) probes++;
-  if (!def->model) return sonde_fail(error, SONDE_ARGUMENT, "session: no model");
-  if (!device || !device->read || !device->write)
-    return sonde_fail(error, SONDE_ARGUMENT, "session: no device");
-  if (def->controls.probe >= probes)
-    return sonde_fail(error, SONDE_ARGUMENT, "session: probe %u of %u, expected less",
-                      def->controls.probe, probes);
-  if (def->image_width < 16 || def->image_width > 4096 || def->image_height < 16 ||
-      def->image_height > 4096)
-    return sonde_fail(error, SONDE_ARGUMENT, "session: image of %u x %u, expected 16 to 4096 each",
-                      def->image_width, def->image_height);
-  if (def->ticks_per_image == 0)
-    return sonde_fail(error, SONDE_ARGUMENT, "session: 0 ticks per image, expected 1 or more");
-  sonde_status status = sonde_hand_check(&def->limits, &def->rendering, error);
-  if (status) return status;
-  // The patient: pulse and breath, gel, tissue.
-  const sonde_circulation *c = &def->circulation;
-  const double numbers[] = {c->heart_rate_hz,  c->systolic_pa,     c->diastolic_pa,
-                            c->breath_rate_hz, c->valsalva_from_s, c->valsalva_to_s,
-                            c->breath_pa,      c->valsalva_pa};
-  for (size_t i = 0; i < SONDE_COUNT_OF(numbers); ++i)
-    if (!isfinite(numbers[i]))
-      return sonde_fail(error, SONDE_ARGUMENT, "session: a circulation with a number that is none");
-  if (!(def->gel_m3 >= 0 && def->gel_m3 <= 1e-3))
-    return sonde_fail(error, SONDE_ARGUMENT, "session: %g m^3 of gel, expected 0 to 0.001",
-                      def->gel_m3);
-  if (def->preset_count > SONDE_SESSION_PRESETS)
-    return sonde_fail(error, SONDE_ARGUMENT, "session: %u presets, expected at most %d",
-                      def->preset_count, SONDE_SESSION_PRESETS);
-  for (uint32_t i = 0; i < def->preset_count && !status; ++i)
-    status = sonde_preset_apply(&def->presets[i], NULL, NULL, error);
-  return status;
-}
-
 // Offset of the next array in a mailbox slot.
 static size_t place(size_t *end, size_t bytes) {
   size_t at = (*end + SONDE_MAILBOX_ALIGN - 1) / SONDE_MAILBOX_ALIGN * SONDE_MAILBOX_ALIGN;
@@ -138,7 +101,38 @@ sonde_status sonde_session_create(const sonde_session_def *def, sonde_device *de
                                   sonde_session **out, sonde_error *error) {
   SONDE_ASSERT(def != NULL && out != NULL);
   *out = NULL;
-  sonde_status status = check(def, device, error);
+  uint32_t probes = 0;
+  while (probe_names(def)[probes]) probes++;
+  if (!def->model) return sonde_fail(error, SONDE_ARGUMENT, "session: no model");
+  if (!device || !device->read || !device->write)
+    return sonde_fail(error, SONDE_ARGUMENT, "session: no device");
+  if (def->controls.probe >= probes)
+    return sonde_fail(error, SONDE_ARGUMENT, "session: probe %u of %u, expected less",
+                      def->controls.probe, probes);
+  if (def->image_width < 16 || def->image_width > 4096 || def->image_height < 16 ||
+      def->image_height > 4096)
+    return sonde_fail(error, SONDE_ARGUMENT, "session: image of %u x %u, expected 16 to 4096 each",
+                      def->image_width, def->image_height);
+  if (def->ticks_per_image == 0)
+    return sonde_fail(error, SONDE_ARGUMENT, "session: 0 ticks per image, expected 1 or more");
+  sonde_status status = sonde_hand_check(&def->limits, &def->rendering, error);
+  if (status) return status;
+  // The patient: pulse and breath, gel, tissue.
+  const sonde_circulation *c = &def->circulation;
+  const double numbers[] = {c->heart_rate_hz,  c->systolic_pa,     c->diastolic_pa,
+                            c->breath_rate_hz, c->valsalva_from_s, c->valsalva_to_s,
+                            c->breath_pa,      c->valsalva_pa};
+  for (size_t i = 0; i < SONDE_COUNT_OF(numbers); ++i)
+    if (!isfinite(numbers[i]))
+      return sonde_fail(error, SONDE_ARGUMENT, "session: a circulation with a number that is none");
+  if (!(def->gel_m3 >= 0 && def->gel_m3 <= 1e-3))
+    return sonde_fail(error, SONDE_ARGUMENT, "session: %g m^3 of gel, expected 0 to 0.001",
+                      def->gel_m3);
+  if (def->preset_count > SONDE_SESSION_PRESETS)
+    return sonde_fail(error, SONDE_ARGUMENT, "session: %u presets, expected at most %d",
+                      def->preset_count, SONDE_SESSION_PRESETS);
+  for (uint32_t i = 0; i < def->preset_count && !status; ++i)
+    status = sonde_preset_apply(&def->presets[i], NULL, NULL, error);
   if (status) return status;
   sonde_session *session = SONDE_NEW(sonde_session, 1);
   if (!session) return sonde_fail_memory(error);

@@ -24,24 +24,6 @@ static void prepare_beam(sonde_session *session, const sonde_echo_settings *aske
   (void)sonde_echo_prepare(session->echo, session->coming.aperture_m, &coming, steps);
 }
 
-// A new beam is built over several images, which go on with the old one: none of them comes late.
-// One under way is finished first, so that a slider that keeps moving shows where it has been. The
-// number of images is the same for every beam, whatever was built before: a replay that starts
-// anywhere changes beams at the same image.
-static void choose_beam(sonde_session *session, const sonde_echo_settings *asked,
-                        double aperture_m) {
-  const uint32_t images = (SONDE_ECHO_PREPARE_STEPS + BEAM_STEPS - 1) / BEAM_STEPS;
-  const sonde_session_beam now = {aperture_m, asked->frequency_hz, asked->depth_m, asked->focus_m};
-  if (!(session->beam.aperture_m > 0)) session->beam = now;
-  if (!session->building && memcmp(&now, &session->beam, sizeof now) != 0)
-    session->coming = now, session->building = true, session->beam_images = 0;
-  if (!session->building) return;
-  if (!session->realtime) prepare_beam(session, asked, BEAM_STEPS);
-  if (++session->beam_images < images) return;
-  session->beam = session->coming;
-  session->building = false;
-}
-
 // Gel and air below each line of the image in use; returns their mean, NaN without gel.
 static double couple(sonde_session *session, const unsigned char *slot) {
   const sonde_surface_slot *head = (const void *)slot;
@@ -62,72 +44,6 @@ static double couple(sonde_session *session, const unsigned char *slot) {
   for (uint32_t l = 0; l < session->lines; ++l) sum += (double)session->line_coupling[l];
   sonde_echo_set_coupling(session->echo, session->line_coupling);
   return sum / session->lines;
-}
-
-static void fill_frame(sonde_session *session, const unsigned char *slot, unsigned char *out) {
-  const sonde_surface_slot *head = (const void *)slot;
-  // Depth of the face below the resting skin: along the axis from well outside, the first crossing
-  // is the skin above the face, whether the face is above or below it. Beside the thigh the signed
-  // closest distance takes over.
-  const sonde_surface_index *rest = session->subject->rest_skin;
-  const double back_m = 0.15, reach_m = 0.3;
-  sonde_pose pose = head->snapshot.world_from_probe;
-  sonde_vec3 axis = q_rotate(pose.rotation, vec3(0, 0, 1));
-  sonde_vec3 outside = v_madd(pose.position, -back_m, axis);
-  sonde_surface_point hit;
-  double depth_m = 0;
-  if (!sonde_surface_inside(rest, outside) &&
-      sonde_surface_raycast(rest, outside, axis, reach_m, &hit)) {
-    depth_m = back_m - v_dot(v_sub(hit.point_m, outside), axis);
-  } else {
-    depth_m = sonde_surface_closest(rest, pose.position).distance_m;
-    if (!sonde_surface_inside(rest, pose.position)) depth_m = -depth_m;
-  }
-  // The skin in single precision.
-  const sonde_vec3 *positions_m = (const void *)(slot + session->positions_at);
-  float *skin_m = (float *)(void *)(out + session->skin_at);
-  for (size_t i = 0; i < session->nodes; ++i) {
-    skin_m[3 * i] = (float)positions_m[i].x;
-    skin_m[3 * i + 1] = (float)positions_m[i].y;
-    skin_m[3 * i + 2] = (float)positions_m[i].z;
-  }
-  sonde_image image = {.width = session->image_width,
-                       .height = session->image_height,
-                       .pixels = out + session->pixels_at};
-  double coupling = couple(session, slot);
-  bool off = head->snapshot.flags & SONDE_FLAG_INSIDE_OUT; // the probe sees no body
-  if (session->echo && !off) {
-    sonde_echo_settings settings = with_beam(&session->beam, head->controls.echo);
-    sonde_echo_flow flow = sonde_echo_flow_default();
-    flow.t_s = (double)head->snapshot.tick * session->dt_s;
-    if (session->subject->setup.circulate) flow.circulation = head->circulation;
-    sonde_echo_set_flow(session->echo, &flow);
-    sonde_echo_render(session->echo, head->snapshot.world_from_probe, session->beam.aperture_m,
-                      &head->pathology, &settings, &image);
-    SONDE_ASSERT(sonde_interior_tick(session->interior) == head->snapshot.tick);
-  } else {
-    memset(image.pixels, 0, (size_t)image.width * image.height);
-    if (session->echo)
-      image.width_m = session->beam.aperture_m, image.height_m = session->beam.depth_m;
-  }
-  sonde_frame *frame = (sonde_frame *)(void *)out;
-  *frame = (sonde_frame){.snapshot = head->snapshot,
-                         .skin_m = skin_m,
-                         .pixels = image.pixels,
-                         .width = image.width,
-                         .height = image.height,
-                         .width_m = image.width_m,
-                         .height_m = image.height_m};
-  frame->snapshot.gel_coupling = coupling;
-  const double *film_m = (const void *)(slot + session->film_at);
-  double gel_m3 = head->controls.gel ? 0 : (double)NAN;
-  for (size_t i = 0; head->controls.gel && i < session->nodes; ++i)
-    gel_m3 += film_m[i] * session->model->area_m2[i];
-  frame->snapshot.gel_volume_m3 = gel_m3;
-  frame->snapshot.venous_pressure_pa = head->pathology.venous_pressure_pa;
-  frame->snapshot.arterial_pressure_pa = head->pathology.arterial_pressure_pa;
-  frame->snapshot.penetration_m = depth_m;
-  if (session->interior && !off) sonde_snapshot_read_vessels(session->interior, &frame->snapshot);
 }
 
 bool sonde_session_follow(sonde_session *session) {
@@ -163,14 +79,93 @@ bool sonde_session_follow(sonde_session *session) {
     session->shown_tick = head->snapshot.tick;
     session->shown_pathology = *pathology;
   }
-  choose_beam(session, &head->controls.echo, 2.0 * session->probes[head->snapshot.probe].half_x_m);
+  // A new beam is built over several images, which go on with the old one: none of them comes late.
+  // One under way is finished first, so that a slider that keeps moving shows where it has been.
+  // The number of images is the same for every beam, whatever was built before: a replay that
+  // starts anywhere changes beams at the same image.
+  const uint32_t images = (SONDE_ECHO_PREPARE_STEPS + BEAM_STEPS - 1) / BEAM_STEPS;
+  const sonde_session_beam now = {2.0 * session->probes[head->snapshot.probe].half_x_m,
+                                  head->controls.echo.frequency_hz, head->controls.echo.depth_m,
+                                  head->controls.echo.focus_m};
+  if (!(session->beam.aperture_m > 0)) session->beam = now;
+  if (!session->building && memcmp(&now, &session->beam, sizeof now) != 0)
+    session->coming = now, session->building = true, session->beam_images = 0;
+  if (session->building) {
+    if (!session->realtime) prepare_beam(session, &head->controls.echo, BEAM_STEPS);
+    if (!(++session->beam_images < images)) {
+      session->beam = session->coming;
+      session->building = false;
+    }
+  }
   return true;
 }
 
 void sonde_session_draw(sonde_session *session) {
   SONDE_ASSERT(session->surface != NULL);
   sonde_frame *frame = (void *)sonde_mailbox_write_slot(session->frame_box);
-  fill_frame(session, session->surface, (unsigned char *)frame);
+  unsigned char *out = (unsigned char *)frame;
+  const sonde_surface_slot *head = (const void *)session->surface;
+  // Depth of the face below the resting skin: along the axis from well outside, the first crossing
+  // is the skin above the face, whether the face is above or below it. Beside the thigh the signed
+  // closest distance takes over.
+  const sonde_surface_index *rest = session->subject->rest_skin;
+  const double back_m = 0.15, reach_m = 0.3;
+  sonde_pose pose = head->snapshot.world_from_probe;
+  sonde_vec3 axis = q_rotate(pose.rotation, vec3(0, 0, 1));
+  sonde_vec3 outside = v_madd(pose.position, -back_m, axis);
+  sonde_surface_point hit;
+  double depth_m = 0;
+  if (!sonde_surface_inside(rest, outside) &&
+      sonde_surface_raycast(rest, outside, axis, reach_m, &hit)) {
+    depth_m = back_m - v_dot(v_sub(hit.point_m, outside), axis);
+  } else {
+    depth_m = sonde_surface_closest(rest, pose.position).distance_m;
+    if (!sonde_surface_inside(rest, pose.position)) depth_m = -depth_m;
+  }
+  // The skin in single precision.
+  const sonde_vec3 *positions_m = (const void *)(session->surface + session->positions_at);
+  float *skin_m = (float *)(void *)(out + session->skin_at);
+  for (size_t i = 0; i < session->nodes; ++i) {
+    skin_m[3 * i] = (float)positions_m[i].x;
+    skin_m[3 * i + 1] = (float)positions_m[i].y;
+    skin_m[3 * i + 2] = (float)positions_m[i].z;
+  }
+  sonde_image image = {.width = session->image_width,
+                       .height = session->image_height,
+                       .pixels = out + session->pixels_at};
+  double coupling = couple(session, session->surface);
+  bool off = head->snapshot.flags & SONDE_FLAG_INSIDE_OUT; // the probe sees no body
+  if (session->echo && !off) {
+    sonde_echo_settings settings = with_beam(&session->beam, head->controls.echo);
+    sonde_echo_flow flow = sonde_echo_flow_default();
+    flow.t_s = (double)head->snapshot.tick * session->dt_s;
+    if (session->subject->setup.circulate) flow.circulation = head->circulation;
+    sonde_echo_set_flow(session->echo, &flow);
+    sonde_echo_render(session->echo, head->snapshot.world_from_probe, session->beam.aperture_m,
+                      &head->pathology, &settings, &image);
+    SONDE_ASSERT(sonde_interior_tick(session->interior) == head->snapshot.tick);
+  } else {
+    memset(image.pixels, 0, (size_t)image.width * image.height);
+    if (session->echo)
+      image.width_m = session->beam.aperture_m, image.height_m = session->beam.depth_m;
+  }
+  *frame = (sonde_frame){.snapshot = head->snapshot,
+                         .skin_m = skin_m,
+                         .pixels = image.pixels,
+                         .width = image.width,
+                         .height = image.height,
+                         .width_m = image.width_m,
+                         .height_m = image.height_m};
+  frame->snapshot.gel_coupling = coupling;
+  const double *film_m = (const void *)(session->surface + session->film_at);
+  double gel_m3 = head->controls.gel ? 0 : (double)NAN;
+  for (size_t i = 0; head->controls.gel && i < session->nodes; ++i)
+    gel_m3 += film_m[i] * session->model->area_m2[i];
+  frame->snapshot.gel_volume_m3 = gel_m3;
+  frame->snapshot.venous_pressure_pa = head->pathology.venous_pressure_pa;
+  frame->snapshot.arterial_pressure_pa = head->pathology.arterial_pressure_pa;
+  frame->snapshot.penetration_m = depth_m;
+  if (session->interior && !off) sonde_snapshot_read_vessels(session->interior, &frame->snapshot);
   // All pixels so far, so that one number tells whether a replay shows the same.
   if (session->image_checks) {
     size_t count = (size_t)frame->width * frame->height;

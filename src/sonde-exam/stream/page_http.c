@@ -215,48 +215,6 @@ static void upgrade(sonde_page_server *server, const page_request *request, page
 
 // ---- a request
 
-static void answer(sonde_page_server *server, const page_request *request, page_out *out,
-                   page_client **client) {
-  if (!page_host_allowed(request->field[PAGE_HOST], server->port)) {
-    send_refusal(out, 403, "Forbidden", "this server answers only to 127.0.0.1 and localhost\n");
-  } else if (strcmp(request->method, "GET") != 0 && strcmp(request->method, "HEAD") != 0) {
-    send_refusal(out, 405, "Method Not Allowed", "only GET and HEAD\n");
-  } else if (strcmp(request->path, "/ws") == 0) {
-    if (request->given[PAGE_UPGRADE])
-      upgrade(server, request, out, client);
-    else
-      send_refusal(out, 426, "Upgrade Required", "/ws is a WebSocket\n");
-  } else if (strcmp(request->path, "/favicon.ico") == 0) {
-    send_head(out, 204, "No Content", &(page_body){.type = "image/x-icon"});
-  } else if (strcmp(request->path, "/status.json") == 0) {
-    if (knows_token(server, request)) {
-      pthread_mutex_lock(&server->lock);
-      const char *newest = server->topic[SONDE_PAGE_STATUS].text;
-      size_t size = newest ? strlen(newest) : 2;
-      char *text = SONDE_NEW(char, size);
-      if (text) memcpy(text, newest ? newest : "{}", size);
-      pthread_mutex_unlock(&server->lock);
-      if (!text)
-        send_refusal(out, 503, "Service Unavailable", "out of memory\n");
-      else
-        send_head(
-            out, 200, "OK",
-            &(page_body){.type = "application/json", .bytes = text, .size = size, .owned = text});
-    } else
-      send_stranger(out);
-  } else if (!answer_document(server, request, out)) {
-    uint32_t count, i = 0;
-    const page_file *files = page_files(&count), *file = NULL;
-    const char *name = strcmp(request->path, "/") == 0 ? "index.html" : request->path + 1;
-    for (; i < count && !file; ++i)
-      if (strcmp(name, files[i].name) == 0) file = &files[i];
-    if (file)
-      send_file(server, file, out);
-    else
-      send_refusal(out, 404, "Not Found", "there is no such file\n");
-  }
-}
-
 void page_http_answer(sonde_page_server *server, const char *head, size_t size, page_out *out,
                       page_client **client) {
   page_request request;
@@ -265,7 +223,45 @@ void page_http_answer(sonde_page_server *server, const char *head, size_t size, 
   int refused = page_request_parse(head, size, &request);
   if (refused)
     page_http_refuse(out, refused);
-  else
-    answer(server, &request, out, client);
+  else {
+    if (!page_host_allowed(request.field[PAGE_HOST], server->port)) {
+      send_refusal(out, 403, "Forbidden", "this server answers only to 127.0.0.1 and localhost\n");
+    } else if (strcmp(request.method, "GET") != 0 && strcmp(request.method, "HEAD") != 0) {
+      send_refusal(out, 405, "Method Not Allowed", "only GET and HEAD\n");
+    } else if (strcmp(request.path, "/ws") == 0) {
+      if (request.given[PAGE_UPGRADE])
+        upgrade(server, &request, out, client);
+      else
+        send_refusal(out, 426, "Upgrade Required", "/ws is a WebSocket\n");
+    } else if (strcmp(request.path, "/favicon.ico") == 0) {
+      send_head(out, 204, "No Content", &(page_body){.type = "image/x-icon"});
+    } else if (strcmp(request.path, "/status.json") == 0) {
+      if (knows_token(server, &request)) {
+        pthread_mutex_lock(&server->lock);
+        const char *newest = server->topic[SONDE_PAGE_STATUS].text;
+        size_t length = newest ? strlen(newest) : 2;
+        char *text = SONDE_NEW(char, length);
+        if (text) memcpy(text, newest ? newest : "{}", length);
+        pthread_mutex_unlock(&server->lock);
+        if (!text)
+          send_refusal(out, 503, "Service Unavailable", "out of memory\n");
+        else
+          send_head(out, 200, "OK",
+                    &(page_body){
+                        .type = "application/json", .bytes = text, .size = length, .owned = text});
+      } else
+        send_stranger(out);
+    } else if (!answer_document(server, &request, out)) {
+      uint32_t count, i = 0;
+      const page_file *files = page_files(&count), *file = NULL;
+      const char *name = strcmp(request.path, "/") == 0 ? "index.html" : request.path + 1;
+      for (; i < count && !file; ++i)
+        if (strcmp(name, files[i].name) == 0) file = &files[i];
+      if (file)
+        send_file(server, file, out);
+      else
+        send_refusal(out, 404, "Not Found", "there is no such file\n");
+    }
+  }
   if (strcmp(request.method, "HEAD") == 0 && !*client) out->body_size = 0;
 }

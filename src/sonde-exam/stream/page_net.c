@@ -255,32 +255,6 @@ static void admit(sonde_page_server *server) {
 
 // ---- the thread
 
-// Ends a connection that stays too long in its stage, and pings a client that is silent.
-static void watch_time(const page_patience *patience, page_connection *c, double now_s) {
-  const double most_s[] = {[PAGE_ASKS] = patience->ask_s,
-                           [PAGE_ANSWERED] = patience->answer_s,
-                           [PAGE_ENDS] = patience->end_s};
-  if (c->stage != PAGE_TALKS) {
-    if (now_s - c->stage_s > most_s[c->stage]) drop(c);
-  } else if (now_s - c->heard_s > patience->silent_s) {
-    drop(c);
-  } else if (now_s - c->heard_s > patience->ping_s && now_s - c->pinged_s > patience->ping_s &&
-             idle(c)) {
-    c->pinged_s = now_s;
-    clear_out(c);
-    page_out_frame(&c->out, PAGE_WS_PING, NULL, 0, NULL);
-    feed(c);
-  }
-}
-
-// Reads on for a moment from a connection that ends.
-static void throw_away(page_connection *c) {
-  ssize_t got = 1;
-  for (size_t all = 0; all < THROWN && got > 0; all += (size_t)got)
-    got = recv(c->socket, c->in, PAGE_HEAD_BYTES, 0);
-  if (got == 0 || (got < 0 && errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR)) drop(c);
-}
-
 static void *run(void *argument) {
   sonde_page_server *server = argument;
   struct pollfd poll_list[PAGE_CONNECTIONS + 2];
@@ -308,10 +282,33 @@ static void *run(void *argument) {
       page_connection *c = &server->connection[i];
       const int events = poll_list[i].revents;
       if (c->socket < 0) continue;
-      if (c->stage == PAGE_ENDS && events) throw_away(c);
+      if (c->stage == PAGE_ENDS && events) {
+        // Reads on for a moment from a connection that ends.
+        ssize_t got = 1;
+        for (size_t all = 0; all < THROWN && got > 0; all += (size_t)got)
+          got = recv(c->socket, c->in, PAGE_HEAD_BYTES, 0);
+        if (got == 0 || (got < 0 && errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR))
+          drop(c);
+      }
       if (c->stage == PAGE_ANSWERED || c->stage == PAGE_TALKS) feed(c); // news, or room to send
       if (c->socket >= 0 && listens(c) && (events & (POLLIN | POLLHUP | POLLERR))) hear(server, c);
-      if (c->socket >= 0) watch_time(&patience, c, now_s);
+      if (c->socket >= 0) {
+        // Ends a connection that stays too long in its stage, and pings a client that is silent.
+        const double most_s[] = {[PAGE_ASKS] = patience.ask_s,
+                                 [PAGE_ANSWERED] = patience.answer_s,
+                                 [PAGE_ENDS] = patience.end_s};
+        if (c->stage != PAGE_TALKS) {
+          if (now_s - c->stage_s > most_s[c->stage]) drop(c);
+        } else if (now_s - c->heard_s > patience.silent_s) {
+          drop(c);
+        } else if (now_s - c->heard_s > patience.ping_s && now_s - c->pinged_s > patience.ping_s &&
+                   idle(c)) {
+          c->pinged_s = now_s;
+          clear_out(c);
+          page_out_frame(&c->out, PAGE_WS_PING, NULL, 0, NULL);
+          feed(c);
+        }
+      }
     }
     if (poll_list[PAGE_CONNECTIONS].revents) admit(server);
   }

@@ -169,40 +169,6 @@ static const char *const TYPES[] = {
     "leave_exam", "list_exams", "open_replay", "seek",   "play", "comment"};
 _Static_assert(SONDE_COUNT_OF(TYPES) == PAGE_COMMAND_REQUEST + (int)SONDE_PAGE_ASKS, "a type each");
 
-static void read_command(reader *r, size_t type, page_command *command) {
-  static const char *const GEL[] = {"put", "wipe"}, *const ROLE[] = {"take", "give", "return"};
-  double p[3], q[4], norm2 = 0;
-  bool request = type >= PAGE_COMMAND_REQUEST;
-  command->type = request ? PAGE_COMMAND_REQUEST : (page_command_type)type;
-  switch (command->type) {
-  case PAGE_COMMAND_REQUEST:
-    read_request(r, (sonde_page_ask)(type - PAGE_COMMAND_REQUEST), &command->request);
-    break;
-  case PAGE_COMMAND_GOAL:
-    read_vector(r, "position_mm", 3, REACH_MM, p);
-    read_vector(r, "rotation", 4, 2, q);
-    for (int i = 0; i < 4; ++i) norm2 += q[i] * q[i];
-    if (!(norm2 >= 0.25 && norm2 <= 4))
-      refuse(r, "\"rotation\" must be a unit quaternion w, x, y, z");
-    if (r->status) break;
-    command->goal.position = v_scale(vec3(p[0], p[1], p[2]), 1e-3);
-    command->goal.rotation = q_unit((sonde_quat){q[0], q[1], q[2], q[3]});
-    break;
-  case PAGE_COMMAND_CONTROLS: read_controls(r, command); break;
-  case PAGE_COMMAND_ACK: command->id = read_id(r, "frame"); break;
-  case PAGE_COMMAND_PING: command->id = read_id(r, "id"); break;
-  case PAGE_COMMAND_GEL:
-    command->gel_wipe = read_action(r, GEL, SONDE_COUNT_OF(GEL), "put or wipe") == 1;
-    command->gel_put = !command->gel_wipe;
-    break;
-  case PAGE_COMMAND_ROLE:
-    command->action = (page_may)(PAGE_MAY_TAKE + read_action(r, ROLE, SONDE_COUNT_OF(ROLE),
-                                                             "take, give or return"));
-    break;
-  default: break; // stop, resume
-  }
-}
-
 sonde_status page_parse_command(const char *bytes, size_t count, page_command *command,
                                 sonde_error *error) {
   SONDE_ASSERT(bytes && command);
@@ -227,8 +193,39 @@ sonde_status page_parse_command(const char *bytes, size_t count, page_command *c
         error, SONDE_NOT_FOUND,
         "\"type\" must be goal, controls, stop, resume, ack, ping, gel, role or a request of "
         "docs/page_protocol.md");
-  else
-    read_command(&r, which, command);
+  else {
+    static const char *const GEL[] = {"put", "wipe"}, *const ROLE[] = {"take", "give", "return"};
+    double p[3], q[4], norm2 = 0;
+    bool request = which >= PAGE_COMMAND_REQUEST;
+    command->type = request ? PAGE_COMMAND_REQUEST : (page_command_type)which;
+    switch (command->type) {
+    case PAGE_COMMAND_REQUEST:
+      read_request(&r, (sonde_page_ask)(which - PAGE_COMMAND_REQUEST), &command->request);
+      break;
+    case PAGE_COMMAND_GOAL:
+      read_vector(&r, "position_mm", 3, REACH_MM, p);
+      read_vector(&r, "rotation", 4, 2, q);
+      for (int i = 0; i < 4; ++i) norm2 += q[i] * q[i];
+      if (!(norm2 >= 0.25 && norm2 <= 4))
+        refuse(&r, "\"rotation\" must be a unit quaternion w, x, y, z");
+      if (r.status) break;
+      command->goal.position = v_scale(vec3(p[0], p[1], p[2]), 1e-3);
+      command->goal.rotation = q_unit((sonde_quat){q[0], q[1], q[2], q[3]});
+      break;
+    case PAGE_COMMAND_CONTROLS: read_controls(&r, command); break;
+    case PAGE_COMMAND_ACK: command->id = read_id(&r, "frame"); break;
+    case PAGE_COMMAND_PING: command->id = read_id(&r, "id"); break;
+    case PAGE_COMMAND_GEL:
+      command->gel_wipe = read_action(&r, GEL, SONDE_COUNT_OF(GEL), "put or wipe") == 1;
+      command->gel_put = !command->gel_wipe;
+      break;
+    case PAGE_COMMAND_ROLE:
+      command->action = (page_may)(PAGE_MAY_TAKE + read_action(&r, ROLE, SONDE_COUNT_OF(ROLE),
+                                                               "take, give or return"));
+      break;
+    default: break; // stop, resume
+    }
+  }
   sonde_json_free(root);
   return r.status;
 }

@@ -167,34 +167,6 @@ static void put(char *sql, size_t *used, const char *format, ...) {
   *used += (size_t)length;
 }
 
-// The tables of a new log. Looks again once the file is ours: another program may have made them
-// meanwhile.
-static sonde_status make_tables(sonde_exam_log *log, sonde_error *error) {
-  static const char *const TYPES[] = {[COLUMN_TEXT] = "TEXT NOT NULL",
-                                      [COLUMN_REAL] = "REAL", // NULL: not measured
-                                      [COLUMN_COUNT] = "INTEGER NOT NULL",
-                                      [COLUMN_FLAG] = "INTEGER NOT NULL"};
-  char sql[SQL_SIZE];
-  size_t used = 0;
-  file_kind kind = {0};
-  sonde_status status = run(log, "BEGIN IMMEDIATE", error);
-  if (status) return status;
-  status = kind_of(log, &kind, error);
-  if (!status && is_new(&kind)) {
-    put(sql, &used, "CREATE TABLE exams (number INTEGER PRIMARY KEY");
-    for (uint32_t i = 0; i < COLUMN_TOTAL; ++i)
-      put(sql, &used, ", %s %s%s", COLUMNS[i].name, TYPES[COLUMNS[i].kind],
-          i == 0 ? " UNIQUE" : "");
-    put(sql, &used, ") STRICT; CREATE INDEX exams_of_trainee ON exams (trainee, date);");
-    put(sql, &used, "PRAGMA application_id = %d; PRAGMA user_version = %d;", APPLICATION,
-        SONDE_LOG_VERSION);
-    status = run(log, sql, error);
-  }
-  if (!status) status = run(log, "COMMIT", error);
-  if (status) sqlite3_exec(log->base, "ROLLBACK", NULL, NULL, NULL);
-  return status;
-}
-
 static sonde_status open_and_check(sonde_exam_log *log, const char *path, sonde_error *error) {
   file_kind kind = {0};
   int code = sqlite3_open_v2(path, &log->base, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE, NULL);
@@ -217,7 +189,31 @@ static sonde_status open_and_check(sonde_exam_log *log, const char *path, sonde_
 
   sonde_status status = look(log, &kind, error);
   if (!status && is_new(&kind)) {
-    status = make_tables(log, error);
+    // The tables of a new log. Looks again once the file is ours: another program may have made
+    // them meanwhile.
+    static const char *const TYPES[] = {[COLUMN_TEXT] = "TEXT NOT NULL",
+                                        [COLUMN_REAL] = "REAL", // NULL: not measured
+                                        [COLUMN_COUNT] = "INTEGER NOT NULL",
+                                        [COLUMN_FLAG] = "INTEGER NOT NULL"};
+    char sql[SQL_SIZE];
+    size_t used = 0;
+    file_kind table = {0};
+    status = run(log, "BEGIN IMMEDIATE", error);
+    if (!status) {
+      status = kind_of(log, &table, error);
+      if (!status && is_new(&table)) {
+        put(sql, &used, "CREATE TABLE exams (number INTEGER PRIMARY KEY");
+        for (uint32_t i = 0; i < COLUMN_TOTAL; ++i)
+          put(sql, &used, ", %s %s%s", COLUMNS[i].name, TYPES[COLUMNS[i].kind],
+              i == 0 ? " UNIQUE" : "");
+        put(sql, &used, ") STRICT; CREATE INDEX exams_of_trainee ON exams (trainee, date);");
+        put(sql, &used, "PRAGMA application_id = %d; PRAGMA user_version = %d;", APPLICATION,
+            SONDE_LOG_VERSION);
+        status = run(log, sql, error);
+      }
+      if (!status) status = run(log, "COMMIT", error);
+      if (status) sqlite3_exec(log->base, "ROLLBACK", NULL, NULL, NULL);
+    }
     if (!status) status = look(log, &kind, error);
   }
   if (status) return status;

@@ -24,18 +24,6 @@ static double share_of_findings(const sonde_score *score) {
   return needed ? sum / needed : 0;
 }
 
-// Force: what restraint earns counts only for the places that were examined, so that doing nothing
-// earns nothing.
-static double share_of_restraint(const sonde_judge *judge) {
-  double sum = 0;
-  for (uint32_t i = 0; i < judge->plan.count; ++i) {
-    double presses = fmax(1, judge->at_place[i]);
-    SONDE_ASSERT(judge->hard_at_place[i] <= judge->at_place[i]);
-    if (judge->done[i]) sum += 1 - judge->hard_at_place[i] / presses;
-  }
-  return judge->plan.count ? sum / judge->plan.count : 0;
-}
-
 void sonde_judge_score(const sonde_judge *judge, const sonde_case *truth, sonde_score *score) {
   SONDE_ASSERT(judge && truth && score);
   *score = (sonde_score){.metrics = sonde_judge_metrics(judge)};
@@ -78,7 +66,15 @@ void sonde_judge_score(const sonde_judge *judge, const sonde_case *truth, sonde_
   score->decisions = share_of_findings(score);
   score->coverage = m->coverage;
   score->technique = m->press_count ? m->valid_share : 0;
-  score->force = share_of_restraint(judge);
+  // Force: what restraint earns counts only for the places that were examined, so that doing
+  // nothing earns nothing.
+  double sum = 0;
+  for (uint32_t i = 0; i < judge->plan.count; ++i) {
+    double presses = fmax(1, judge->at_place[i]);
+    SONDE_ASSERT(judge->hard_at_place[i] <= judge->at_place[i]);
+    if (judge->done[i]) sum += 1 - judge->hard_at_place[i] / presses;
+  }
+  score->force = judge->plan.count ? sum / judge->plan.count : 0;
   score->economy = m->coverage * clamp(unused_s / (TIME_NONE_S - SONDE_SCORE_TIME_S), 0, 1);
 #define SONDE_SCORE_ADD(name, weight, title, text) score->score += (weight)*score->name;
   SONDE_SCORE_LIST(SONDE_SCORE_ADD)
