@@ -211,19 +211,6 @@ static double mean_count(const bench *b, size_t offset) {
   return sum / b->steps;
 }
 
-// Relative L2 difference of the normal springs' elongations.
-static double relative_error(const sonde_model *model, const sonde_vec3 *x, const sonde_vec3 *y) {
-  double difference = 0, size = 0;
-  for (uint32_t i = 0; i < model->surface.vertex_count; ++i) {
-    sonde_vec3 n = model->normal[i], r = model->surface.vertices[i];
-    double a = n.x * (r.x - x[i].x) + n.y * (r.y - x[i].y) + n.z * (r.z - x[i].z);
-    double c = n.x * (r.x - y[i].x) + n.y * (r.y - y[i].y) + n.z * (r.z - y[i].z);
-    difference += (a - c) * (a - c);
-    size += c * c;
-  }
-  return size > 0 ? sqrt(difference / size) : NAN;
-}
-
 // The world that is timed, or the one solved to the end that it is compared with.
 static sonde_world_def world_of(const options *o, bool reference) {
   sonde_world_def def =
@@ -359,7 +346,17 @@ static int run_bench(void *from) {
     error_ratio = NAN;
     if (!status && !b.o->no_reference) {
       run(&b, reference, 0, NULL, kept + nodes);
-      error_ratio = relative_error(b.model, kept, kept + nodes);
+      // Relative L2 difference of the normal springs' elongations.
+      const sonde_vec3 *y = kept + nodes;
+      double difference = 0, size = 0;
+      for (uint32_t i = 0; i < b.model->surface.vertex_count; ++i) {
+        sonde_vec3 n = b.model->normal[i], r = b.model->surface.vertices[i];
+        double a = n.x * (r.x - kept[i].x) + n.y * (r.y - kept[i].y) + n.z * (r.z - kept[i].z);
+        double c = n.x * (r.x - y[i].x) + n.y * (r.y - y[i].y) + n.z * (r.z - y[i].z);
+        difference += (a - c) * (a - c);
+        size += c * c;
+      }
+      error_ratio = size > 0 ? sqrt(difference / size) : NAN;
     }
     free(kept);
     free(other);

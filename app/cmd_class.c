@@ -156,58 +156,6 @@ static void print_address(const char *whose, uint16_t port, const char *token) {
   printf("%s: http://127.0.0.1:%u/#%s\n", whose, (unsigned)port, token);
 }
 
-static int run_class(class_room *room) {
-  static char told[CLASS_LEARNERS][128];
-  double ask_s = 0;
-  bool alive = true;
-  app_catch_interrupt();
-  screen.terminal = isatty(STDOUT_FILENO) == 1;
-  // A learner keeps the token when the program is started again, and so the page finds it.
-  for (uint32_t i = 0; i < room->count; ++i) {
-    sonde_error error = {0};
-    if (sonde_page_token_make(room->learner[i].token, &error) ||
-        sonde_page_token_make(room->learner[i].teacher_token, &error))
-      return app_fail(VERB, &error);
-  }
-  for (uint32_t i = 0; i < room->count; ++i) class_start(room, &room->learner[i], say);
-  printf("%u learners. A teacher's address is to watch, comment and take control. Ctrl-C ends "
-         "them all.\n",
-         room->count);
-  for (uint32_t i = 0; i < room->count; ++i)
-    print_address(room->learner[i].name, room->learner[i].port, room->learner[i].token);
-  for (uint32_t i = 0; i < room->count; ++i) {
-    char whose[CLASS_NAME + 16];
-    snprintf(whose, sizeof whose, "Teacher of %s", room->learner[i].name);
-    print_address(whose, room->learner[i].port, room->learner[i].teacher_token);
-  }
-  draw(room);
-  while (!app_interrupted() && alive) {
-    alive = class_watch(room, say);
-    for (uint32_t i = 0; i < room->count; ++i) // that it is back will be news
-      if (!room->learner[i].process && !room->learner[i].gave_up) told[i][0] = 0;
-    if (class_now_s() >= ask_s) {
-      class_ask(room);
-      ask_s = class_now_s() + 1;
-      if (screen.terminal) draw(room);
-      for (uint32_t i = 0; !screen.terminal && i < room->count; ++i) {
-        const class_learner *learner = &room->learner[i];
-        char line[128], elapsed[16], score[16];
-        numbers_of(&learner->status, elapsed, score);
-        snprintf(line, sizeof line, "%s, case %.60s, score %s", state_of(learner),
-                 learner->status.patient[0] ? learner->status.patient : "-", score);
-        if (strcmp(line, told[i]) == 0) continue;
-        memcpy(told[i], line, sizeof line);
-        say(learner, line);
-      }
-    }
-    if (screen.terminal && !screen.lines) draw(room); // something was said
-    nanosleep(&(struct timespec){.tv_nsec = 200000000}, NULL);
-  }
-  class_stop(room);
-  if (!alive) fprintf(stderr, "sonde class: no learner's program keeps running\n");
-  return alive ? APP_OK : APP_FAILED;
-}
-
 static int run(void *from) {
   const options *s = from;
   static class_room room;
@@ -227,7 +175,55 @@ static int run(void *from) {
   }
   program[length] = 0;
   room.program = s->program ? s->program : program;
-  return run_class(&room);
+  static char told[CLASS_LEARNERS][128];
+  double ask_s = 0;
+  bool alive = true;
+  app_catch_interrupt();
+  screen.terminal = isatty(STDOUT_FILENO) == 1;
+  // A learner keeps the token when the program is started again, and so the page finds it.
+  for (uint32_t i = 0; i < room.count; ++i) {
+    sonde_error error = {0};
+    if (sonde_page_token_make(room.learner[i].token, &error) ||
+        sonde_page_token_make(room.learner[i].teacher_token, &error))
+      return app_fail(VERB, &error);
+  }
+  for (uint32_t i = 0; i < room.count; ++i) class_start(&room, &room.learner[i], say);
+  printf("%u learners. A teacher's address is to watch, comment and take control. Ctrl-C ends "
+         "them all.\n",
+         room.count);
+  for (uint32_t i = 0; i < room.count; ++i)
+    print_address(room.learner[i].name, room.learner[i].port, room.learner[i].token);
+  for (uint32_t i = 0; i < room.count; ++i) {
+    char whose[CLASS_NAME + 16];
+    snprintf(whose, sizeof whose, "Teacher of %s", room.learner[i].name);
+    print_address(whose, room.learner[i].port, room.learner[i].teacher_token);
+  }
+  draw(&room);
+  while (!app_interrupted() && alive) {
+    alive = class_watch(&room, say);
+    for (uint32_t i = 0; i < room.count; ++i) // that it is back will be news
+      if (!room.learner[i].process && !room.learner[i].gave_up) told[i][0] = 0;
+    if (class_now_s() >= ask_s) {
+      class_ask(&room);
+      ask_s = class_now_s() + 1;
+      if (screen.terminal) draw(&room);
+      for (uint32_t i = 0; !screen.terminal && i < room.count; ++i) {
+        const class_learner *learner = &room.learner[i];
+        char line[128], elapsed[16], score[16];
+        numbers_of(&learner->status, elapsed, score);
+        snprintf(line, sizeof line, "%s, case %.60s, score %s", state_of(learner),
+                 learner->status.patient[0] ? learner->status.patient : "-", score);
+        if (strcmp(line, told[i]) == 0) continue;
+        memcpy(told[i], line, sizeof line);
+        say(learner, line);
+      }
+    }
+    if (screen.terminal && !screen.lines) draw(&room); // something was said
+    nanosleep(&(struct timespec){.tv_nsec = 200000000}, NULL);
+  }
+  class_stop(&room);
+  if (!alive) fprintf(stderr, "sonde class: no learner's program keeps running\n");
+  return alive ? APP_OK : APP_FAILED;
 }
 
 const app_command cmd_class = {

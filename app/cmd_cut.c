@@ -66,35 +66,6 @@ static const char *read_triple(const char *text, const char *last, sonde_vec3 *p
   return text;
 }
 
-static sonde_status read_file(const char *path, work *w, sonde_error *error) {
-  char *bytes = NULL;
-  size_t size;
-  sonde_status status = sonde_file_load(path, &bytes, &size, error);
-  bool header = false;
-  int number = 0;
-  for (char *line = bytes, *next; !status && line && *line; line = next) {
-    char *end = line + strcspn(line, "\r\n");
-    next = end + strspn(end, "\r") + (end[strspn(end, "\r")] == '\n');
-    *end = *end ? '\n' : *end;
-    number++;
-    if (line == end || *line == '#') continue;
-    if (!header) {
-      header = strncmp(line, "x_mm,y_mm,z_mm", 14) == 0 && line + 14 == end;
-      if (!header)
-        status = app_error(error, SONDE_FORMAT, "%.300s:%d: expected the header x_mm,y_mm,z_mm",
-                           path, number);
-      continue;
-    }
-    if (w->count == MOST_POINTS)
-      status = app_error(error, SONDE_FORMAT, "%.300s:%d: expected at most %d points", path, number,
-                         MOST_POINTS);
-    else if (!read_triple(line, "\n", &w->path[w->count++]))
-      status = app_error(error, SONDE_FORMAT, "%.300s:%d: expected three numbers", path, number);
-  }
-  sonde_free(bytes);
-  return status;
-}
-
 static sonde_status press(const options *a, const work *w, const sonde_model *model,
                           double *force_n, sonde_error *error) {
   sonde_probe probe = {0};
@@ -124,7 +95,35 @@ static double sum(const double *values, uint32_t count) {
 // The points of the cut: two that are given, those of a file, or 33 beside a site.
 static sonde_status find_path(const options *a, work *w, sonde_error *error) {
   enum { POINTS = 33 };
-  if (a->path) return read_file(a->path, w, error);
+  if (a->path) {
+    char *bytes = NULL;
+    size_t size;
+    sonde_status status = sonde_file_load(a->path, &bytes, &size, error);
+    bool header = false;
+    int number = 0;
+    for (char *line = bytes, *next; !status && line && *line; line = next) {
+      char *end = line + strcspn(line, "\r\n");
+      next = end + strspn(end, "\r") + (end[strspn(end, "\r")] == '\n');
+      *end = *end ? '\n' : *end;
+      number++;
+      if (line == end || *line == '#') continue;
+      if (!header) {
+        header = strncmp(line, "x_mm,y_mm,z_mm", 14) == 0 && line + 14 == end;
+        if (!header)
+          status = app_error(error, SONDE_FORMAT, "%.300s:%d: expected the header x_mm,y_mm,z_mm",
+                             a->path, number);
+        continue;
+      }
+      if (w->count == MOST_POINTS)
+        status = app_error(error, SONDE_FORMAT, "%.300s:%d: expected at most %d points", a->path,
+                           number, MOST_POINTS);
+      else if (!read_triple(line, "\n", &w->path[w->count++]))
+        status =
+            app_error(error, SONDE_FORMAT, "%.300s:%d: expected three numbers", a->path, number);
+    }
+    sonde_free(bytes);
+    return status;
+  }
   if (a->line) {
     const char *next = read_triple(a->line, ":", &w->path[0]);
     if (next) next = *next == ':' ? read_triple(next + 1, "", &w->path[1]) : NULL;

@@ -176,23 +176,6 @@ static int conclude(const options *a, const sonde_site_table *sites, const sonde
   return cancelled ? APP_FAILED : APP_OK;
 }
 
-static int measure(const options *a, const sonde_model *model, const sonde_site_table *sites) {
-  sonde_measurements m;
-  sonde_robot_log log;
-  sonde_error error = {0};
-  double start = app_seconds(CLOCK_MONOTONIC);
-  sonde_progress progress = app_progress();
-  sonde_status status = sonde_robot_run(model, sites, &a->def, &progress, &m, &log, &error);
-  app_progress_end();
-  bool cancelled = status == SONDE_CANCELLED;
-  int code = status && !cancelled
-                 ? app_fail(VERB, &error)
-                 : conclude(a, sites, &m, &log, cancelled, app_seconds(CLOCK_MONOTONIC) - start);
-  sonde_measurements_clear(&m);
-  sonde_robot_log_clear(&log);
-  return code;
-}
-
 static int run(void *from) {
   const options *a = from;
   assert(a->model && (a->probe || a->save_sites));
@@ -209,7 +192,21 @@ static int run(void *from) {
     if (!status) print_spacing(a, &sites);
     if (!status && a->json) app_json_end();
   }
-  int code = status ? app_fail(VERB, &error) : a->probe ? measure(a, model, &sites) : APP_OK;
+  int code = status ? app_fail(VERB, &error) : APP_OK;
+  if (!status && a->probe) {
+    sonde_measurements m;
+    sonde_robot_log log;
+    double start = app_seconds(CLOCK_MONOTONIC);
+    sonde_progress progress = app_progress();
+    status = sonde_robot_run(model, &sites, &a->def, &progress, &m, &log, &error);
+    app_progress_end();
+    bool cancelled = status == SONDE_CANCELLED;
+    code = status && !cancelled
+               ? app_fail(VERB, &error)
+               : conclude(a, &sites, &m, &log, cancelled, app_seconds(CLOCK_MONOTONIC) - start);
+    sonde_measurements_clear(&m);
+    sonde_robot_log_clear(&log);
+  }
   sonde_site_table_clear(&sites);
   sonde_model_destroy(model);
   return code;

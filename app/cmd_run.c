@@ -106,40 +106,6 @@ static int check(void *from) {
   return run_device_check(&s->device) ? APP_OK : APP_BAD_INPUT;
 }
 
-// Everything of the session but its model. names: filled with the probes, ended by NULL.
-static sonde_status define_session(const options *s, const char *names[MAX_PROBES],
-                                   sonde_session_def *def, sonde_error *error) {
-  *def = sonde_session_def_default();
-  def->record_path = s->record;
-  def->controls.gel = !s->no_gel;
-  def->gel_m3 = s->gel_m3;
-  def->circulate = s->circulate || !s->headless; // the page has buttons for posture and strain
-  def->controls.posture = s->posture;
-  run_device_limits(&s->device, def);
-
-  // The built-in probes, and the wanted one when it is a file or a name that will be refused.
-  const char *const *built_in = sonde_probe_names();
-  uint32_t count = 0, wanted = UINT32_MAX;
-  for (; count < MAX_PROBES - 2 && built_in[count]; ++count) {
-    names[count] = built_in[count];
-    if (strcmp(s->probe, built_in[count]) == 0) wanted = count;
-  }
-  if (wanted == UINT32_MAX) {
-    wanted = count;
-    names[count++] = s->probe;
-  }
-  names[count] = NULL;
-  def->probe_names = names;
-  def->controls.probe = wanted;
-
-  // State of the vein, and the presets that the page can change over between.
-  const char *const presets[SONDE_SESSION_PRESETS] = {s->preset, s->compare};
-  sonde_status status = sonde_pathology_preset(s->pathology, &def->controls.pathology, error);
-  for (int k = 0; k < SONDE_SESSION_PRESETS && presets[k] && !status; ++k)
-    status = sonde_preset_load(presets[k], &def->presets[def->preset_count++], error);
-  return status;
-}
-
 static sonde_status make_device(const void *user, const sonde_site *start,
                                 const sonde_session_def *def, sonde_device *device,
                                 sonde_error *error) {
@@ -379,7 +345,36 @@ static int run(void *from) {
   if (sonde_model_load(s->model, &model, &error)) return app_fail("run", &error);
   char *absolute = realpath(s->model, NULL);
   int code = APP_OK;
-  if (define_session(s, names, &def, &error)) {
+  // Everything of the session but its model. names: filled with the probes, ended by NULL.
+  def = sonde_session_def_default();
+  def.record_path = s->record;
+  def.controls.gel = !s->no_gel;
+  def.gel_m3 = s->gel_m3;
+  def.circulate = s->circulate || !s->headless; // the page has buttons for posture and strain
+  def.controls.posture = s->posture;
+  run_device_limits(&s->device, &def);
+
+  // The built-in probes, and the wanted one when it is a file or a name that will be refused.
+  const char *const *built_in = sonde_probe_names();
+  uint32_t count = 0, wanted = UINT32_MAX;
+  for (; count < MAX_PROBES - 2 && built_in[count]; ++count) {
+    names[count] = built_in[count];
+    if (strcmp(s->probe, built_in[count]) == 0) wanted = count;
+  }
+  if (wanted == UINT32_MAX) {
+    wanted = count;
+    names[count++] = s->probe;
+  }
+  names[count] = NULL;
+  def.probe_names = names;
+  def.controls.probe = wanted;
+
+  // State of the vein, and the presets that the page can change over between.
+  const char *const presets[SONDE_SESSION_PRESETS] = {s->preset, s->compare};
+  sonde_status status = sonde_pathology_preset(s->pathology, &def.controls.pathology, &error);
+  for (int k = 0; k < SONDE_SESSION_PRESETS && presets[k] && !status; ++k)
+    status = sonde_preset_load(presets[k], &def.presets[def.preset_count++], &error);
+  if (status) {
     code = app_fail("run", &error);
   } else {
     def.model = model;

@@ -147,26 +147,6 @@ static sonde_status pose_image(const options *a, work *w, sonde_error *error) {
   return SONDE_OK;
 }
 
-// Plane of the used part that moves evenly from one frame to the next.
-static sonde_status between_frames(const options *a, work *w, sonde_error *error) {
-  const sonde_sequence *s = &w->sequence;
-  uint32_t first = (uint32_t)a->frame, next = first + (a->frame > first);
-  if (next >= s->count || !s->frames[first].used || !s->frames[next].used)
-    return app_error(error, SONDE_ARGUMENT, "frame %g: expected one with a pose, from 0 to %u",
-                     a->frame, s->count - 1);
-  double t = a->frame - first;
-  const sonde_affine *p = &s->frames[first].world_from_pixel;
-  const sonde_affine *q = &s->frames[next].world_from_pixel;
-  for (int i = 0; i < 3; ++i)
-    for (int k = 0; k < 4; ++k) w->plane.m[i][k] = (1 - t) * p->m[i][k] + t * q->m[i][k];
-  for (int i = 0; i < 3; ++i) {
-    w->plane.m[i][3] += w->plane.m[i][0] * s->clip[0] + w->plane.m[i][1] * s->clip[1];
-    w->image.width_m = hypot(w->image.width_m, w->plane.m[i][0] * s->clip[2]);
-    w->image.height_m = hypot(w->image.height_m, w->plane.m[i][1] * s->clip[3]);
-  }
-  return SONDE_OK;
-}
-
 static sonde_status write_picture(const options *a, work *w, sonde_error *error) {
   sonde_status status = SONDE_OK;
   if (a->hold_out >= 0) {
@@ -221,7 +201,23 @@ static sonde_status slice_sequence(const options *a, work *w, sonde_error *error
     status =
         isnan(a->frame) ? pose_image(a, w, error) : make_image(w, s->clip[2], s->clip[3], error);
   if (status) return status;
-  if (!isnan(a->frame)) status = between_frames(a, w, error);
+  if (!isnan(a->frame)) {
+    // The plane and the size of the picture between two frames.
+    uint32_t first = (uint32_t)a->frame, next = first + (a->frame > first);
+    if (next >= s->count || !s->frames[first].used || !s->frames[next].used)
+      return app_error(error, SONDE_ARGUMENT, "frame %g: expected one with a pose, from 0 to %u",
+                       a->frame, s->count - 1);
+    double t = a->frame - first;
+    const sonde_affine *p = &s->frames[first].world_from_pixel;
+    const sonde_affine *q = &s->frames[next].world_from_pixel;
+    for (int i = 0; i < 3; ++i)
+      for (int k = 0; k < 4; ++k) w->plane.m[i][k] = (1 - t) * p->m[i][k] + t * q->m[i][k];
+    for (int i = 0; i < 3; ++i) {
+      w->plane.m[i][3] += w->plane.m[i][0] * s->clip[0] + w->plane.m[i][1] * s->clip[1];
+      w->image.width_m = hypot(w->image.width_m, w->plane.m[i][0] * s->clip[2]);
+      w->image.height_m = hypot(w->image.height_m, w->plane.m[i][1] * s->clip[3]);
+    }
+  }
   sonde_slicer_options slicer = a->slicer;
   slicer.once = true;
   if (a->hold_out >= 0) slicer.left_out = (uint32_t)a->frame;

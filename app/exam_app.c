@@ -121,37 +121,33 @@ static sonde_status put_note(exam_app *app, sonde_note_kind kind, const char *co
   return status;
 }
 
-static sonde_status decide(exam_app *app, const sonde_page_request *request, sonde_error *error) {
-  sonde_decision decision;
-  if (app->phase != EXAM_RUNNING)
-    return app_error(error, SONDE_ARGUMENT, "there is no exam to decide in");
-  if (!sonde_decision_parse(request->text, &decision))
-    return app_error(error, SONDE_ARGUMENT,
-                     "a decision must be compressible, clot, not_seen or empty");
-  pthread_mutex_lock(&app->lock);
-  uint32_t segment = sonde_vein_segment(&app->exam->setup.map, request->id);
-  sonde_status status = sonde_judge_decide(app->exam->judge, segment, decision, error);
-  uint64_t tick = app->exam->seen_tick;
-  pthread_mutex_unlock(&app->lock);
-  const char *const texts[][2] = {{"segment", request->id}, {"decision", request->text}};
-  return status ? status : put_note(app, SONDE_NOTE_DECISION, texts, 2, tick, error);
-}
-
-static sonde_status give_hint(exam_app *app, sonde_error *error) {
-  if (app->phase != EXAM_RUNNING || strcmp(app->exam->guidance, "hints") != 0)
-    return app_error(error, SONDE_ARGUMENT, "hints belong to an exam with hints");
-  pthread_mutex_lock(&app->lock);
-  sonde_judge_hint(app->exam->judge);
-  uint64_t tick = app->exam->seen_tick;
-  pthread_mutex_unlock(&app->lock);
-  return put_note(app, SONDE_NOTE_HINT, NULL, 0, tick, error);
-}
-
 static sonde_status answer(exam_app *app, const sonde_page_request *request, sonde_error *error) {
   switch (request->ask) {
   case SONDE_PAGE_START_EXAM: return exam_start(app, request, error);
-  case SONDE_PAGE_DECIDE: return decide(app, request, error);
-  case SONDE_PAGE_HINT: return give_hint(app, error);
+  case SONDE_PAGE_DECIDE: {
+    sonde_decision decision;
+    if (app->phase != EXAM_RUNNING)
+      return app_error(error, SONDE_ARGUMENT, "there is no exam to decide in");
+    if (!sonde_decision_parse(request->text, &decision))
+      return app_error(error, SONDE_ARGUMENT,
+                       "a decision must be compressible, clot, not_seen or empty");
+    pthread_mutex_lock(&app->lock);
+    uint32_t segment = sonde_vein_segment(&app->exam->setup.map, request->id);
+    sonde_status status = sonde_judge_decide(app->exam->judge, segment, decision, error);
+    uint64_t tick = app->exam->seen_tick;
+    pthread_mutex_unlock(&app->lock);
+    const char *const texts[][2] = {{"segment", request->id}, {"decision", request->text}};
+    return status ? status : put_note(app, SONDE_NOTE_DECISION, texts, 2, tick, error);
+  }
+  case SONDE_PAGE_HINT: {
+    if (app->phase != EXAM_RUNNING || strcmp(app->exam->guidance, "hints") != 0)
+      return app_error(error, SONDE_ARGUMENT, "hints belong to an exam with hints");
+    pthread_mutex_lock(&app->lock);
+    sonde_judge_hint(app->exam->judge);
+    uint64_t tick = app->exam->seen_tick;
+    pthread_mutex_unlock(&app->lock);
+    return put_note(app, SONDE_NOTE_HINT, NULL, 0, tick, error);
+  }
   case SONDE_PAGE_FINISH_EXAM: return exam_finish(app, error);
   case SONDE_PAGE_LEAVE_EXAM: return exam_app_practice(app, error);
   case SONDE_PAGE_LIST_EXAMS: exam_app_tell_exams(app); return SONDE_OK;

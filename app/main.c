@@ -16,31 +16,6 @@ static const app_command *const COMMANDS[] = {
 
 enum { COMMAND_COUNT = sizeof COMMANDS / sizeof COMMANDS[0], WORD_MAX = 16 };
 
-// The verb that an unknown word most resembles: insertions, deletions and replacements of letters
-// are counted; more than two make another word. NULL: none.
-static const char *suggestion(const char *word) {
-  const char *best = NULL;
-  int least_changes = 3;
-  for (int i = 0; i < COMMAND_COUNT && strlen(word) <= WORD_MAX; ++i) {
-    const char *verb = COMMANDS[i]->verb;
-    int row[WORD_MAX + 1], columns = (int)strlen(verb);
-    assert(columns <= WORD_MAX);
-    for (int j = 0; j <= columns; ++j) row[j] = j;
-    for (int k = 1; word[k - 1]; ++k) {
-      int diagonal = row[0];
-      row[0] = k;
-      for (int j = 1; j <= columns; ++j) {
-        int replaced = diagonal + (word[k - 1] != verb[j - 1]);
-        int moved = 1 + (row[j] < row[j - 1] ? row[j] : row[j - 1]);
-        diagonal = row[j];
-        row[j] = replaced < moved ? replaced : moved;
-      }
-    }
-    if (row[columns] < least_changes) least_changes = row[columns], best = verb;
-  }
-  return best;
-}
-
 static void print_help(FILE *stream) {
   fprintf(stream, "usage: sonde COMMAND [OPTIONS]\n\ncommands:\n");
   for (int i = 0; i < COMMAND_COUNT; ++i)
@@ -55,7 +30,27 @@ static int run_command(const char *verb, int argc, char **argv) {
   for (int i = 0; i < COMMAND_COUNT && !command; ++i)
     if (strcmp(COMMANDS[i]->verb, verb) == 0) command = COMMANDS[i];
   if (!command) {
-    const char *near = suggestion(verb);
+    // The verb that an unknown word most resembles: insertions, deletions and replacements of
+    // letters are counted; more than two make another word. NULL: none.
+    const char *near = NULL;
+    int least_changes = 3;
+    for (int i = 0; i < COMMAND_COUNT && strlen(verb) <= WORD_MAX; ++i) {
+      const char *name = COMMANDS[i]->verb;
+      int row[WORD_MAX + 1], columns = (int)strlen(name);
+      assert(columns <= WORD_MAX);
+      for (int j = 0; j <= columns; ++j) row[j] = j;
+      for (int k = 1; verb[k - 1]; ++k) {
+        int diagonal = row[0];
+        row[0] = k;
+        for (int j = 1; j <= columns; ++j) {
+          int replaced = diagonal + (verb[k - 1] != name[j - 1]);
+          int moved = 1 + (row[j] < row[j - 1] ? row[j] : row[j - 1]);
+          diagonal = row[j];
+          row[j] = replaced < moved ? replaced : moved;
+        }
+      }
+      if (row[columns] < least_changes) least_changes = row[columns], near = name;
+    }
     fprintf(stderr, "sonde: unknown command '%s'", verb);
     if (near) fprintf(stderr, "; did you mean '%s'?", near);
     fprintf(stderr, "\n\n");

@@ -96,29 +96,6 @@ static const char *separator(const char *p) {
   return p;
 }
 
-// Numbers within [low, high] with the separators of the option's value between them.
-static bool read_numbers(const app_option *o, const char *text, double *values) {
-  char name[48];
-  const char *p = text, *sign = separator(o->value);
-  for (size_t k = 0; k < o->bytes / sizeof *values; ++k, sign = separator(sign + (*sign != 0))) {
-    const char *end;
-    values[k] = sonde_parse_real(p, &end);
-    bool good = end != p && isfinite(values[k]) && values[k] >= o->low && values[k] <= o->high &&
-                (o->kind == OPTION_NUMBERS || values[k] == floor(values[k]));
-    p = end + (*sign != 0);
-    if (good && *end == *sign) continue;
-    if (isfinite(o->low))
-      app_usage_error(now.command->verb, "%s expects %s%s from %g to %g, got '%s'", dashed(o, name),
-                      o->value, o->kind == OPTION_WHOLES ? ", whole numbers" : "", o->low, o->high,
-                      text);
-    else
-      app_usage_error(now.command->verb, "%s expects %s, got '%s'", dashed(o, name), o->value,
-                      text);
-    return false;
-  }
-  return true;
-}
-
 static bool read_value(const app_option *o, const char *text, void *options) {
   const char *verb = now.command->verb;
   char name[48], known[300] = "";
@@ -145,7 +122,27 @@ static bool read_value(const app_option *o, const char *text, void *options) {
     app_usage_error(verb, "%s expects %s, got '%s'", dashed(o, name), known, text);
     return false;
   case OPTION_NUMBERS:
-  case OPTION_WHOLES: return read_numbers(o, text, member(o, options));
+  case OPTION_WHOLES: {
+    double *values = member(o, options);
+    const char *p = text, *sign = separator(o->value);
+    for (size_t k = 0; k < o->bytes / sizeof *values; ++k, sign = separator(sign + (*sign != 0))) {
+      const char *end;
+      values[k] = sonde_parse_real(p, &end);
+      bool good = end != p && isfinite(values[k]) && values[k] >= o->low && values[k] <= o->high &&
+                  (o->kind == OPTION_NUMBERS || values[k] == floor(values[k]));
+      p = end + (*sign != 0);
+      if (good && *end == *sign) continue;
+      if (isfinite(o->low))
+        app_usage_error(now.command->verb, "%s expects %s%s from %g to %g, got '%s'",
+                        dashed(o, name), o->value,
+                        o->kind == OPTION_WHOLES ? ", whole numbers" : "", o->low, o->high, text);
+      else
+        app_usage_error(now.command->verb, "%s expects %s, got '%s'", dashed(o, name), o->value,
+                        text);
+      return false;
+    }
+    return true;
+  }
   case OPTION_CALL: return o->take(options, text);
   default: *(const char **)member(o, options) = text; return true;
   }
