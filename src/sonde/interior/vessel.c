@@ -28,8 +28,8 @@ static const double smoothing_step = 0.15, coupling_step = 0.25;
 enum { PASSES = 10 };
 // Tissue around a section is probed on rings within the reach of its wall, and between two walls at
 // thirds of the gap: on the line between their middles and to both sides of it, where the gap is
-// still narrow. A gap wider than twice the radii together is probed by the rings of both walls. Close
-// to a wall that is pressed flat the volume changes within half a radius along the ring.
+// still narrow. A gap wider than twice the radii together is probed by the rings of both walls.
+// Close to a wall that is pressed flat the volume changes within half a radius along the ring.
 enum { RINGS = 3, GAP_WAYS = 3, GAP_SIDES = 5 };
 static const int ring_sides[RINGS] = {20, 10, 10};
 static const double ring_radii[RINGS] = {1.1, 1.9, 3.1}, gap_side_radii = 0.4, most_gap_radii = 2;
