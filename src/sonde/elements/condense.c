@@ -1,0 +1,302 @@
+// Condensation, its inverse, plates.
+#include "elements/condense.h"
+#include "base/base.h"
+#include "base/clock.h"
+#include "base/maths.h"
+#include "base/parallel.h"
+#include "sparse/dense.h"
+
+#include <string.h>
+
+enum { COLUMNS = 96 }; // of the inverse that a worker solves at a time
+
+static sonde_status allocate(const uint32_t *nodes, uint32_t count, bool stiffness,
+                             sonde_condensed **condensed, sonde_error *error) {
+  sonde_condensed *c = *condensed = SONDE_NEW(sonde_condensed, 1);
+  if (!c) return sonde_fail_memory(error);
+  const size_t side = 3 * (size_t)count;
+  c->count = count;
+  c->node = SONDE_NEW(uint32_t, count);
+  c->stiffness = stiffness ? SONDE_NEW(double, side *side) : NULL;
+  c->compliance = SONDE_NEW(double, side *side);
+  if (c->node && c->compliance && (c->stiffness || !stiffness)) {
+    memcpy(c->node, nodes, count * sizeof *nodes);
+    return SONDE_OK;
+  }
+  sonde_condensed_destroy(c);
+  *condensed = NULL;
+  return sonde_fail_memory(error);
+}
+
+void sonde_condensed_destroy(sonde_condensed *c) {
+  if (!c) return;
+  sonde_free(c->node);
+  sonde_free(c->stiffness);
+  sonde_free(c->compliance);
+  sonde_free(c);
+}
+
+// ---- condensation -------------------------------------------------------------------------
+
+static sonde_status condense(const sonde_elastic *e, sonde_condensed *c, double start,
+                             sonde_condensed_times *times, sonde_error *error) {
+  const sonde_symbolic_def def = {.node_count = e->count,
+                                  .last_count = e->last_count,
+                                  .block = 3,
+                                  .points = e->point,
+                                  .row_start = e->row_start,
+                                  .column = e->column};
+  sonde_symbolic *symbolic = NULL;
+  sonde_numeric numeric = {0};
+  sonde_status status = sonde_symbolic_create(&def, &symbolic, error);
+  if (!status) status = sonde_numeric_reserve(&numeric, symbolic, error);
+  times->analysis_s = sonde_clock_now() - start;
+  const sonde_matrix_source source = {.value = e->value};
+  if (!status && !sonde_numeric_factor(&numeric, symbolic, &source))
+    status = sonde_fail(error, SONDE_CONVERGENCE, "the stiffness is not positive definite");
+  const size_t side = 3 * (size_t)c->count;
+  const double *lower = status ? NULL : sonde_numeric_condensed(&numeric);
+  for (size_t j = 0; j < side && !status; ++j)
+    for (size_t i = j; i < side; ++i)
+      c->stiffness[i * side + j] = c->stiffness[j * side + i] = lower[j * side + i];
+  times->factor_s = sonde_clock_now() - start - times->analysis_s;
+  sonde_numeric_clear(&numeric);
+  sonde_symbolic_destroy(symbolic);
+  return status;
+}
+
+typedef struct inversion {
+  const double *factor;
+  double *compliance;
+  uint32_t side;
+  double **columns; // [workers] [side][COLUMNS]
+} inversion;
+
+// Some columns of the inverse, which are its rows.
+static sonde_status invert_columns(void *user, uint32_t worker, uint32_t item,
+                                   const atomic_bool *stop, sonde_error *error) {
+  const inversion *v = user;
+  (void)stop, (void)error;
+  const uint32_t first = item * COLUMNS, rest = v->side - first;
+  const uint32_t count = rest < COLUMNS ? rest : COLUMNS;
+  double *x = v->columns[worker];
+  memset(x, 0, (size_t)v->side * count * sizeof *x);
+  for (uint32_t k = 0; k < count; ++k) x[(size_t)(first + k) * count + k] = 1;
+  sonde_cholesky_solve_many(v->factor, v->side, x, count);
+  for (uint32_t k = 0; k < count; ++k)
+    for (uint32_t i = 0; i < v->side; ++i)
+      v->compliance[(size_t)(first + k) * v->side + i] = x[(size_t)i * count + k];
+  return SONDE_OK;
+}
+
+static sonde_status invert(sonde_condensed *c, uint32_t workers, sonde_error *error) {
+  const uint32_t side = 3 * c->count, items = (side + COLUMNS - 1) / COLUMNS;
+  workers = sonde_parallel_workers(workers, items);
+  double *factor = SONDE_NEW(double, (size_t)side *side);
+  inversion v = {factor, c->compliance, side, SONDE_NEW(double *, workers)};
+  sonde_status status = factor && v.columns ? SONDE_OK : sonde_fail_memory(error);
+  for (uint32_t w = 0; w < workers && !status; ++w)
+    if (!(v.columns[w] = SONDE_NEW(double, (size_t)side *COLUMNS)))
+      status = sonde_fail_memory(error);
+  if (!status) {
+    memcpy(factor, c->stiffness, (size_t)side * side * sizeof *factor);
+    if (!sonde_cholesky(factor, side))
+      status =
+          sonde_fail(error, SONDE_CONVERGENCE, "the condensed stiffness is not positive definite");
+  }
+  if (!status)
+    status = sonde_parallel_run(items, workers, invert_columns, &v, NULL, "inverse", error);
+  for (uint32_t w = 0; w < workers && v.columns; ++w) sonde_free(v.columns[w]);
+  sonde_free(v.columns);
+  sonde_free(factor);
+  return status;
+}
+
+sonde_status sonde_condensed_create(const sonde_elastic *e, uint32_t workers,
+                                    sonde_condensed **condensed, sonde_condensed_times *times,
+                                    sonde_error *error) {
+  SONDE_ASSERT(e != NULL && condensed != NULL);
+  *condensed = NULL;
+  const uint32_t *nodes = e->node + (e->count - e->last_count);
+  if (e->last_count == 0)
+    return sonde_fail(error, SONDE_ARGUMENT, "expected a solid with nodes to condense on");
+  for (uint32_t k = 0; k < e->last_count; ++k)
+    if (e->held[nodes[k]])
+      return sonde_fail(error, SONDE_ARGUMENT,
+                        "node %u is held in some direction, expected free ones", nodes[k]);
+  sonde_condensed_times ignored;
+  if (!times) times = &ignored;
+  double start = sonde_clock_now();
+  sonde_status status = allocate(nodes, e->last_count, true, condensed, error);
+  if (!status) status = condense(e, *condensed, start, times, error);
+  if (!status) status = invert(*condensed, workers, error);
+  times->inverse_s = sonde_clock_now() - start - times->analysis_s - times->factor_s;
+  if (status) {
+    sonde_condensed_destroy(*condensed);
+    *condensed = NULL;
+  }
+  return status;
+}
+
+sonde_status sonde_condensed_of_nodes(const sonde_elastic *e, const uint32_t *nodes, uint32_t count,
+                                      uint32_t workers, sonde_condensed **condensed,
+                                      sonde_error *error) {
+  SONDE_ASSERT(e != NULL && nodes != NULL && condensed != NULL);
+  sonde_status status = allocate(nodes, count, false, condensed, error);
+  if (!status)
+    status = sonde_elastic_compliance(e, nodes, count, workers, (*condensed)->compliance, error);
+  if (status) {
+    sonde_condensed_destroy(*condensed);
+    *condensed = NULL;
+  }
+  return status;
+}
+
+// ---- contact ------------------------------------------------------------------------------
+
+// Factor of the compliance between some nodes, in all directions, or along one when `along` is
+// given. a [n * n], n = count or 3 count.
+static bool factor_compliance(const sonde_condensed *c, const uint32_t *places, uint32_t count,
+                              const sonde_vec3 *along, double *a) {
+  const size_t side = 3 * (size_t)c->count, n = (along ? 1 : 3) * (size_t)count;
+  for (size_t p = 0; p < count; ++p)
+    for (size_t q = 0; q < count; ++q) {
+      SONDE_ASSERT(places[p] < c->count && places[q] < c->count);
+      const double *block = c->compliance + 3 * places[p] * side + 3 * (size_t)places[q];
+      if (!along)
+        for (size_t i = 0; i < 3; ++i)
+          for (size_t j = 0; j < 3; ++j) a[(3 * p + i) * n + 3 * q + j] = block[i * side + j];
+      else
+        a[p * n + q] =
+            along->x * v_dot(*along, vec3(block[0], block[1], block[2])) +
+            along->y * v_dot(*along, vec3(block[side], block[side + 1], block[side + 2])) +
+            along->z *
+                v_dot(*along, vec3(block[2 * side], block[2 * side + 1], block[2 * side + 2]));
+    }
+  return sonde_cholesky(a, (uint32_t)n);
+}
+
+static sonde_status fail_singular(sonde_error *error) {
+  return sonde_fail(error, SONDE_CONVERGENCE,
+                    "the compliance between the touched nodes is singular: is one listed twice?");
+}
+
+sonde_status sonde_condensed_forces(const sonde_condensed *c, const uint32_t *places,
+                                    uint32_t count, const double *u, double *f,
+                                    sonde_error *error) {
+  SONDE_ASSERT(c != NULL && places != NULL && u != NULL && f != NULL);
+  const size_t n = 3 * (size_t)count;
+  double *a = SONDE_NEW(double, n *n);
+  if (!a) return sonde_fail_memory(error);
+  sonde_status status = SONDE_OK;
+  if (count && !factor_compliance(c, places, count, NULL, a)) {
+    status = fail_singular(error);
+  } else if (count) {
+    memmove(f, u, n * sizeof *f);
+    sonde_cholesky_solve(a, (uint32_t)n, f);
+  }
+  sonde_free(a);
+  return status;
+}
+
+// A plate at work: arrays of the footprint's nodes.
+typedef struct contact {
+  const sonde_condensed *c;
+  const sonde_plate *plate;
+  double depth;
+  double *a, *x;       // [9 count^2], [3 count]
+  uint32_t *places;    // [count] of the touched ones
+  uint32_t *touched;   // [count] their index in the footprint
+  bool *active, *kept; // [count]
+  double *force;       // [count] along the plate's way
+} contact;
+
+static double way_of(const contact *t, uint32_t k) {
+  return t->depth - (t->plate->gap_m ? t->plate->gap_m[k] : 0);
+}
+
+// Forces when exactly the active nodes are held to the plate.
+static bool hold_active(contact *t) {
+  const sonde_plate *p = t->plate;
+  uint32_t count = 0;
+  for (uint32_t k = 0; k < p->count; ++k)
+    if (t->active[k]) t->places[count] = p->places[k], t->touched[count++] = k;
+  memset(t->force, 0, p->count * sizeof *t->force);
+  if (count == 0) return true;
+  if (!factor_compliance(t->c, t->places, count, p->bonded ? NULL : &p->inward, t->a)) return false;
+  for (uint32_t k = 0; k < count; ++k) {
+    double way = way_of(t, t->touched[k]);
+    if (!p->bonded)
+      t->x[k] = way;
+    else
+      t->x[3 * k] = way * p->inward.x, t->x[3 * k + 1] = way * p->inward.y,
+               t->x[3 * k + 2] = way * p->inward.z;
+  }
+  sonde_cholesky_solve(t->a, (p->bonded ? 3 : 1) * count, t->x);
+  for (uint32_t k = 0; k < count; ++k)
+    t->force[t->touched[k]] =
+        p->bonded ? v_dot(p->inward, vec3(t->x[3 * k], t->x[3 * k + 1], t->x[3 * k + 2])) : t->x[k];
+  return true;
+}
+
+// Moves nodes in and out of contact: those that the plate pulls come off, those that it would pass
+// touch. Returns whether any did.
+static bool update_active(contact *t) {
+  const sonde_plate *p = t->plate;
+  const size_t side = 3 * (size_t)t->c->count;
+  const double n[3] = {p->inward.x, p->inward.y, p->inward.z};
+  bool changed = false;
+  for (uint32_t k = 0; k < p->count; ++k) {
+    t->kept[k] = t->active[k] && t->force[k] >= 0;
+    if (t->active[k] || way_of(t, k) <= 0) continue;
+    double moved = 0;
+    for (uint32_t q = 0; q < p->count; ++q)
+      for (size_t i = 0; i < 3 && t->force[q] != 0; ++i)
+        for (size_t j = 0; j < 3; ++j)
+          moved += n[i] * n[j] * t->force[q] *
+                   t->c->compliance[(3 * p->places[k] + i) * side + 3 * p->places[q] + j];
+    t->kept[k] = moved < way_of(t, k) * (1 - 1e-12);
+  }
+  for (uint32_t k = 0; k < p->count; ++k) {
+    changed |= t->kept[k] != t->active[k];
+    t->active[k] = t->kept[k];
+  }
+  return changed;
+}
+
+sonde_status sonde_condensed_press(const sonde_condensed *c, const sonde_plate *p,
+                                   const double *depth_m, uint32_t depth_count, double *force_n,
+                                   double *node_force, sonde_error *error) {
+  SONDE_ASSERT(c != NULL && p != NULL && depth_m != NULL && force_n != NULL);
+  enum { CHANGES = 60 };
+  const size_t n = p->count;
+  contact t = {.c = c,
+               .plate = p,
+               .a = SONDE_NEW(double, (p->bonded ? 9 : 1) * n * n),
+               .x = SONDE_NEW(double, 3 * n),
+               .places = SONDE_NEW(uint32_t, n),
+               .touched = SONDE_NEW(uint32_t, n),
+               .active = SONDE_NEW(bool, n),
+               .kept = SONDE_NEW(bool, n),
+               .force = SONDE_NEW(double, n)};
+  bool all = t.a && t.x && t.places && t.touched && t.active && t.kept && t.force;
+  sonde_status status = all ? SONDE_OK : sonde_fail_memory(error);
+  for (uint32_t d = 0; d < depth_count && !status; ++d) {
+    t.depth = depth_m[d];
+    for (uint32_t k = 0; k < p->count; ++k) t.active[k] = way_of(&t, k) > 0;
+    int changes = 0;
+    do {
+      if (!hold_active(&t)) status = fail_singular(error);
+    } while (!status && !p->bonded && update_active(&t) && ++changes < CHANGES);
+    if (changes == CHANGES)
+      status =
+          sonde_fail(error, SONDE_CONVERGENCE,
+                     "the touched nodes still change after %d rounds at %g m", CHANGES, t.depth);
+    force_n[d] = 0;
+    for (uint32_t k = 0; k < p->count && !status; ++k) force_n[d] += t.force[k];
+    if (node_force && !status) memcpy(node_force + d * n, t.force, n * sizeof *node_force);
+  }
+  void *parts[] = {t.a, t.x, t.places, t.touched, t.active, t.kept, t.force};
+  for (size_t k = 0; k < SONDE_COUNT_OF(parts); ++k) sonde_free(parts[k]);
+  return status;
+}

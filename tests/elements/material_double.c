@@ -1,0 +1,2 @@
+#define SONDE_REAL_DOUBLE
+#include "material_batch.h"
