@@ -1,14 +1,12 @@
 // Condensation, its inverse, plates.
 #include "elements/condense.h"
+#include "elements/invert.h"
 #include "base/base.h"
 #include "base/clock.h"
 #include "base/maths.h"
-#include "base/parallel.h"
 #include "sparse/dense.h"
 
 #include <string.h>
-
-enum { COLUMNS = 96 }; // of the inverse that a worker solves at a time
 
 static sonde_status allocate(const uint32_t *nodes, uint32_t count, bool stiffness,
                              sonde_condensed **condensed, sonde_error *error) {
@@ -65,53 +63,6 @@ static sonde_status condense(const sonde_elastic *e, sonde_condensed *c, double 
   return status;
 }
 
-typedef struct inversion {
-  const double *factor;
-  double *compliance;
-  uint32_t side;
-  double **columns; // [workers] [side][COLUMNS]
-} inversion;
-
-// Some columns of the inverse, which are its rows.
-static sonde_status invert_columns(void *user, uint32_t worker, uint32_t item,
-                                   const atomic_bool *stop, sonde_error *error) {
-  const inversion *v = user;
-  (void)stop, (void)error;
-  const uint32_t first = item * COLUMNS, rest = v->side - first;
-  const uint32_t count = rest < COLUMNS ? rest : COLUMNS;
-  double *x = v->columns[worker];
-  memset(x, 0, (size_t)v->side * count * sizeof *x);
-  for (uint32_t k = 0; k < count; ++k) x[(size_t)(first + k) * count + k] = 1;
-  sonde_cholesky_solve_many(v->factor, v->side, x, count);
-  for (uint32_t k = 0; k < count; ++k)
-    for (uint32_t i = 0; i < v->side; ++i)
-      v->compliance[(size_t)(first + k) * v->side + i] = x[(size_t)i * count + k];
-  return SONDE_OK;
-}
-
-static sonde_status invert(sonde_condensed *c, uint32_t workers, sonde_error *error) {
-  const uint32_t side = 3 * c->count, items = (side + COLUMNS - 1) / COLUMNS;
-  workers = sonde_parallel_workers(workers, items);
-  double *factor = SONDE_NEW(double, (size_t)side *side);
-  inversion v = {factor, c->compliance, side, SONDE_NEW(double *, workers)};
-  sonde_status status = factor && v.columns ? SONDE_OK : sonde_fail_memory(error);
-  for (uint32_t w = 0; w < workers && !status; ++w)
-    if (!(v.columns[w] = SONDE_NEW(double, (size_t)side *COLUMNS)))
-      status = sonde_fail_memory(error);
-  if (!status) {
-    memcpy(factor, c->stiffness, (size_t)side * side * sizeof *factor);
-    if (!sonde_cholesky(factor, side))
-      status =
-          sonde_fail(error, SONDE_CONVERGENCE, "the condensed stiffness is not positive definite");
-  }
-  if (!status)
-    status = sonde_parallel_run(items, workers, invert_columns, &v, NULL, "inverse", error);
-  for (uint32_t w = 0; w < workers && v.columns; ++w) sonde_free(v.columns[w]);
-  sonde_free(v.columns);
-  sonde_free(factor);
-  return status;
-}
-
 sonde_status sonde_condensed_create(const sonde_elastic *e, uint32_t workers,
                                     sonde_condensed **condensed, sonde_condensed_times *times,
                                     sonde_error *error) {
@@ -129,7 +80,9 @@ sonde_status sonde_condensed_create(const sonde_elastic *e, uint32_t workers,
   double start = sonde_clock_now();
   sonde_status status = allocate(nodes, e->last_count, true, condensed, error);
   if (!status) status = condense(e, *condensed, start, times, error);
-  if (!status) status = invert(*condensed, workers, error);
+  if (!status)
+    status = sonde_invert((*condensed)->stiffness, 3 * e->last_count, workers,
+                          (*condensed)->compliance, error);
   times->inverse_s = sonde_clock_now() - start - times->analysis_s - times->factor_s;
   if (status) {
     sonde_condensed_destroy(*condensed);
@@ -178,17 +131,30 @@ static bool factor_compliance(const sonde_condensed *c, const uint32_t *places, 
 
 static sonde_status fail_singular(sonde_error *error) {
   return sonde_fail(error, SONDE_CONVERGENCE,
-                    "the compliance between the touched nodes is singular: is one listed twice?");
+                    "the compliance between the touched nodes is not positive definite");
+}
+
+static sonde_status check_places(const sonde_condensed *c, const uint32_t *places, uint32_t count,
+                                 sonde_error *error) {
+  for (uint32_t k = 0; k < count; ++k) {
+    bool twice = false;
+    for (uint32_t q = 0; q < k; ++q) twice |= places[q] == places[k];
+    if (places[k] >= c->count || twice)
+      return sonde_fail(error, SONDE_ARGUMENT,
+                        "node %u of the footprint is missing or listed twice", k);
+  }
+  return SONDE_OK;
 }
 
 sonde_status sonde_condensed_forces(const sonde_condensed *c, const uint32_t *places,
                                     uint32_t count, const double *u, double *f,
                                     sonde_error *error) {
   SONDE_ASSERT(c != NULL && places != NULL && u != NULL && f != NULL);
+  sonde_status status = check_places(c, places, count, error);
+  if (status) return status;
   const size_t n = 3 * (size_t)count;
   double *a = SONDE_NEW(double, n *n);
   if (!a) return sonde_fail_memory(error);
-  sonde_status status = SONDE_OK;
   if (count && !factor_compliance(c, places, count, NULL, a)) {
     status = fail_singular(error);
   } else if (count) {
@@ -280,7 +246,8 @@ sonde_status sonde_condensed_press(const sonde_condensed *c, const sonde_plate *
                .kept = SONDE_NEW(bool, n),
                .force = SONDE_NEW(double, n)};
   bool all = t.a && t.x && t.places && t.touched && t.active && t.kept && t.force;
-  sonde_status status = all ? SONDE_OK : sonde_fail_memory(error);
+  sonde_status status =
+      all ? check_places(c, p->places, p->count, error) : sonde_fail_memory(error);
   for (uint32_t d = 0; d < depth_count && !status; ++d) {
     t.depth = depth_m[d];
     for (uint32_t k = 0; k < p->count; ++k) t.active[k] = way_of(&t, k) > 0;

@@ -34,7 +34,7 @@ SONDE_LINK void sonde_condensed_destroy(sonde_condensed *condensed);
 
 // Forces f[3 count] that move some nodes (by their place in the list) by u[3 count], all others
 // free.
-// @return CONVERGENCE @thread any (read only)
+// @return ARGUMENT for nodes that are missing or listed twice; CONVERGENCE @thread any (read only)
 SONDE_LINK sonde_status sonde_condensed_forces(const sonde_condensed *condensed,
                                                const uint32_t *places, uint32_t count,
                                                const double *u, double *f, sonde_error *error);
@@ -50,7 +50,7 @@ typedef struct sonde_plate {
 } sonde_plate;
 
 // force_n[depth_count] of the plate along `inward` at each depth; node_force [depth_count][count],
-// along `inward`, may be NULL. @return CONVERGENCE @thread any (read only)
+// along `inward`, may be NULL. @return as sonde_condensed_forces() @thread any (read only)
 SONDE_LINK sonde_status sonde_condensed_press(const sonde_condensed *condensed,
                                               const sonde_plate *plate, const double *depth_m,
                                               uint32_t depth_count, double *force_n,
