@@ -101,6 +101,7 @@ sonde_status bench_ellipsoid_build(const bench_ellipsoid *def, sonde_model **mod
                                    sonde_error *error) {
   assert(def->nodes >= 42 && def->stiffness > 0);
   uint32_t f = (uint32_t)(sqrt((double)(def->nodes - 2) / 10) + 0.5);
+  static const sonde_mesh NO_BONE = {0};
   sonde_mesh mesh = {0};
   sonde_mesh_report report;
   sonde_status status = geodesic(f > 1 ? f : 1, def->size, &mesh, error);
@@ -115,6 +116,7 @@ sonde_status bench_ellipsoid_build(const bench_ellipsoid *def, sonde_model **mod
   build.name = "ellipsoid";
   build.provenance = "synthetic: comparison scene";
   build.skin = &mesh;
+  build.femur = &NO_BONE;
   build.sites = &site;
   build.site_count = 1;
   build.fine_edge_m = 1;

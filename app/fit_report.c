@@ -2,6 +2,7 @@
 #include "fit_report.h"
 
 #include "fit_doubts.h"
+#include "fit_forces.h"
 
 #include <assert.h>
 #include <math.h>
@@ -29,56 +30,6 @@ typedef struct builder {
   const char *note[NOTES];
   char date[32], text[NOTES][NOTE];
 } builder;
-
-// ---- forces that only the report needs ----------------------------------------------------------
-
-// What the simplified interaction's parameters give when neighbours may move.
-static sonde_status settle_stage2(const fit_findings *in, const sonde_progress *progress,
-                                  double *full_n, sonde_error *error) {
-  const sonde_fit_result *r = in->result;
-  sonde_model *model = NULL;
-  sonde_model_def md = sonde_model_def_default();
-  md.skin = &in->model->surface;
-  md.sites = in->sites->sites;
-  md.site_count = in->sites->count;
-  md.fine_edge_m = 1; // the skin is refined already
-  bool three = r->stage2_sites != NULL;
-  sonde_status status = sonde_model_build(&md, &model, error);
-  if (!status)
-    status = sonde_model_set_parameters(model, three ? &r->stage2_law : &r->law,
-                                        three ? r->stage2_sites : r->sites, r->site_count, error);
-  if (!status) {
-    // Forces of a model on the equilibrium of the whole skin at every eighth site, NaN elsewhere:
-    // settling all of them takes minutes.
-    enum { EVERY = 8, FIRST = 3 };
-    const sonde_measurements *m = in->data;
-    sonde_measurements some = *m;
-    some.data = calloc(m->count, sizeof *some.data);
-    uint32_t *row = calloc(m->count, sizeof *row);
-    double *some_n = calloc(m->count, sizeof *some_n);
-    status = some.data && row && some_n ? SONDE_OK : SONDE_MEMORY;
-    some.count = 0;
-    for (uint32_t i = 0; i < m->count && !status; ++i) {
-      uint32_t s = 0;
-      while (s < in->sites->count && in->sites->sites[s].id != m->data[i].site) ++s;
-      full_n[i] = NAN;
-      if (s % EVERY != FIRST % in->sites->count) continue;
-      row[some.count] = i;
-      some.data[some.count++] = m->data[i];
-    }
-    sonde_predict_def def = sonde_predict_def_default();
-    def.interaction = SONDE_INTERACTION_FULL;
-    def.relative_residual = 1e-4;
-    if (!status && some.count)
-      status = sonde_predict(model, in->sites, &some, &def, progress, some_n, error);
-    for (uint32_t k = 0; k < some.count && !status; ++k) full_n[row[k]] = some_n[k];
-    free(some.data);
-    free(row);
-    free(some_n);
-  }
-  sonde_model_destroy(model);
-  return status;
-}
 
 // ---- parts of the report ------------------------------------------------------------------------
 
@@ -254,7 +205,8 @@ sonde_status fit_report_write(const fit_findings *in, const char *directory,
   double *linear_n = calloc(in->data->count, sizeof *linear_n);
   sonde_report_site *site = calloc(r->site_count, sizeof *site);
   sonde_status status = b && full_n && linear_n && site ? SONDE_OK : SONDE_MEMORY;
-  if (!status && r->stage_n[1]) status = settle_stage2(in, progress, full_n, error);
+  if (!status && r->stage_n[1])
+    status = fit_stage2_in_full(in->model, in->sites, in->data, r, progress, full_n, error);
   if (!status) {
     bool three = r->stage_n[2] != NULL;
     *b = (builder){.in = in, .site = site};
@@ -271,18 +223,7 @@ sonde_status fit_report_write(const fit_findings *in, const char *directory,
     struct tm parts;
     if (gmtime_r(&now, &parts) && strftime(b->date, sizeof b->date, "%Y-%m-%d %H:%M UTC", &parts))
       b->report.date = b->date;
-    // The least squares line F = k x through the origin for every (site, probe).
-    for (uint32_t i = 0; i < in->data->count; ++i) {
-      double xf = 0, xx = 0;
-      for (uint32_t k = 0; k < in->data->count; ++k) {
-        if (in->data->data[k].site != in->data->data[i].site ||
-            strcmp(in->data->data[k].probe, in->data->data[i].probe) != 0)
-          continue;
-        xf += in->data->data[k].penetration_m * in->data->data[k].force_n;
-        xx += in->data->data[k].penetration_m * in->data->data[k].penetration_m;
-      }
-      linear_n[i] = xx > 0 ? xf / xx * in->data->data[i].penetration_m : NAN;
-    }
+    fit_linear_forces(in->data, linear_n);
     add_stage(b, "linear springs, curve by curve", r->stage1_parameters / 2, linear_n, false);
     add_stage(b, "stage 1, eq. (1) curve by curve", r->stage1_parameters, r->stage_n[0],
               !r->stage_n[1]);

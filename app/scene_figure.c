@@ -1,9 +1,8 @@
 // The bodies of a scene as they stand: an SVG drawing, or a report as HTML with measures and
 // surfaces that turn.
-//
-// In the drawing faces turned to the viewer are cut into small pieces and painted from back to
-// front in thin layers of depth; pieces of one body, shade and layer are one path.
 #include "scene_figure.h"
+
+#include "painter.h"
 
 #include <assert.h>
 #include <math.h>
@@ -11,52 +10,18 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum {
-  WIDTH = 520,
-  TALLEST = 460,
-  MARGIN = 12,
-  LEGEND = 26,
-  ROW = 18,
-  LAYERS = 240,
-  SHADES = 48,
-  DEEPEST = 12
-};
-enum { PIECES_MOST = 400000, DIGITS = 9, PLACES = 6 };
-static const double PIECE_PX = 22; // longest edge of a piece
+enum { WIDTH = 520, TALLEST = 460, MARGIN = 12, LEGEND = 26, ROW = 18, DIGITS = 9, PLACES = 6 };
 static const double LETTER_PX = 7.5;
 static const double FAR = 2; // widths of a group beyond which a body is out of its view
 
-// A parallel projection: axes of the view, pixels per metre, pixels of the origin, range of depth.
-typedef struct camera {
-  sonde_vec3 right, up, toward;
-  double scale, left, top, least_m, most_m;
-} camera;
-
-typedef struct piece {
-  double xy[3][2];
-  uint32_t layer, body, shade;
-} piece;
-
 typedef struct figure {
   const sonde_scene *scene;
-  camera camera;
   sonde_vec3 **vertex; // [bodies] of the surface, m
   bool *seen;          // [bodies] in the view
-  piece *pieces;
-  uint32_t count;
 } figure;
 
-static sonde_vec3 madd(sonde_vec3 a, double s, sonde_vec3 b) {
-  return (sonde_vec3){a.x + s * b.x, a.y + s * b.y, a.z + s * b.z};
-}
 static double dot(sonde_vec3 a, sonde_vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-static sonde_vec3 cross(sonde_vec3 a, sonde_vec3 b) {
-  return (sonde_vec3){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-static sonde_vec3 unit(sonde_vec3 a) {
-  double size = sqrt(dot(a, a));
-  return madd((sonde_vec3){0, 0, 0}, size > 0 ? 1 / size : 0, a);
-}
+static double norm(sonde_vec3 v) { return sqrt(dot(v, v)); }
 
 typedef struct group {
   double low[3], high[3]; // box, m
@@ -130,83 +95,29 @@ static bool choose_seen(figure *f) {
 }
 
 // Seen from above and the side; up is against gravity, or z without any.
-static camera look(const figure *f) {
+static painter_camera look(const figure *f) {
   assert(f->vertex && sonde_scene_body_count(f->scene) > 0);
   const double AROUND = 0.55, ABOVE = 0.42; // rad
-  const sonde_vec3 none = {0, 0, 0};
-  sonde_vec3 up = madd(none, -1, sonde_scene_gravity(f->scene));
-  if (!(dot(up, up) > 0)) up = (sonde_vec3){0, 0, 1};
-  up = unit(up);
-  sonde_vec3 side = fabs(up.x) < 0.9 ? (sonde_vec3){1, 0, 0} : (sonde_vec3){0, 0, 1};
-  side = unit(madd(side, -dot(side, up), up));
-  sonde_vec3 level = madd(madd(none, cos(AROUND), cross(side, up)), sin(AROUND), side);
-  camera c = {.toward = madd(madd(none, cos(ABOVE), level), sin(ABOVE), up)};
-  c.right = unit(cross(up, c.toward));
-  c.up = cross(c.toward, c.right);
-
-  // Scale and origin such that the chosen bodies are seen.
-  double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-  for (uint32_t b = 0; b < sonde_scene_body_count(f->scene); ++b)
-    for (uint32_t i = 0; f->seen[b] && i < sonde_scene_body(f->scene, b).surface->vertex_count;
-         ++i) {
-      sonde_vec3 p = f->vertex[b][i];
-      const double at[3] = {dot(p, c.right), dot(p, c.up), dot(p, c.toward)};
-      for (int k = 0; k < 3; ++k) low[k] = fmin(low[k], at[k]), high[k] = fmax(high[k], at[k]);
-    }
-  double across = fmax(high[0] - low[0], 1e-9), tall = fmax(high[1] - low[1], 1e-9);
-  c.scale = fmin((WIDTH - 2 * MARGIN) / across, TALLEST / tall);
-  c.left = 0.5 * (WIDTH - c.scale * (low[0] + high[0]));
-  c.top = MARGIN + c.scale * high[1];
-  c.least_m = low[2], c.most_m = fmax(high[2], low[2] + 1e-9);
-  return c;
+  sonde_vec3 up = sonde_scene_gravity(f->scene);
+  double size = norm(up);
+  up = size > 0 ? (sonde_vec3){-up.x / size, -up.y / size, -up.z / size} : (sonde_vec3){0, 0, 1};
+  sonde_vec3 aside = fabs(up.x) < 0.9 ? (sonde_vec3){1, 0, 0} : (sonde_vec3){0, 0, 1};
+  // A camera against the direction that has no part along `up` has its axes level and upright.
+  painter_camera level = painter_look(aside, up, (sonde_vec3){0, 0, 0}, INFINITY);
+  double part[3] = {cos(ABOVE) * sin(AROUND), cos(ABOVE) * cos(AROUND), sin(ABOVE)};
+  double along = dot(aside, up), across = sqrt(1 - along * along);
+  sonde_vec3 side = {(aside.x - along * up.x) / across, (aside.y - along * up.y) / across,
+                     (aside.z - along * up.z) / across};
+  sonde_vec3 front = {-level.right.x, -level.right.y, -level.right.z};
+  sonde_vec3 toward = {part[0] * side.x + part[1] * front.x + part[2] * up.x,
+                       part[0] * side.y + part[1] * front.y + part[2] * up.y,
+                       part[0] * side.z + part[1] * front.z + part[2] * up.z};
+  return painter_look(toward, up, (sonde_vec3){0, 0, 0}, INFINITY);
 }
 
-// Pieces of a face, by halving its longest edge.
-static void cut_face(figure *f, const sonde_vec3 p[3], uint32_t body, uint32_t shade, int depth) {
-  assert(f->pieces && shade < SHADES && depth <= DEEPEST);
-  const camera *c = &f->camera;
-  int longest = 0;
-  double most = 0;
-  for (int k = 0; k < 3; ++k) {
-    sonde_vec3 edge = madd(p[(k + 1) % 3], -1, p[k]);
-    if (dot(edge, edge) > most) most = dot(edge, edge), longest = k;
-  }
-  if (sqrt(most) * c->scale >= PIECE_PX && depth < DEEPEST) {
-    sonde_vec3 a = p[longest], b = p[(longest + 1) % 3], other = p[(longest + 2) % 3];
-    sonde_vec3 middle = madd(a, 0.5, madd(b, -1, a));
-    cut_face(f, (const sonde_vec3[3]){a, middle, other}, body, shade, depth + 1);
-    cut_face(f, (const sonde_vec3[3]){middle, b, other}, body, shade, depth + 1);
-    return;
-  }
-  if (f->count == PIECES_MOST) return;
-  piece *out = &f->pieces[f->count++];
-  double depth_m = 0;
-  for (int k = 0; k < 3; ++k) {
-    out->xy[k][0] = c->left + c->scale * dot(p[k], c->right);
-    out->xy[k][1] = c->top - c->scale * dot(p[k], c->up);
-    depth_m += dot(p[k], c->toward) / 3;
-  }
-  double share = (depth_m - c->least_m) / (c->most_m - c->least_m);
-  out->layer = (uint32_t)fmin(share * LAYERS, LAYERS - 1);
-  out->body = body, out->shade = shade;
-}
-
-static int compare_pieces(const void *a, const void *b) {
-  const piece *x = a, *y = b;
-  if (x->layer != y->layer) return x->layer < y->layer ? -1 : 1;
-  if (x->body != y->body) return x->body < y->body ? -1 : 1;
-  return (x->shade > y->shade) - (x->shade < y->shade);
-}
-
-static void format_look(char look[64], const char *format, uint32_t body, uint32_t shade) {
-  static const uint8_t BASE[][3] = {{214, 196, 168}, {214, 106, 84},  {92, 138, 190},
-                                    {128, 128, 134}, {112, 168, 110}, {186, 140, 190}};
-  assert(shade < SHADES);
-  const uint8_t *base = BASE[body % (sizeof BASE / sizeof *BASE)];
-  double light = 0.5 + 0.58 * shade / (SHADES - 1);
-  unsigned rgb = 0;
-  for (int k = 0; k < 3; ++k) rgb = rgb << 8 | (unsigned)fmin(base[k] * light, 255);
-  snprintf(look, 64, format, rgb, rgb);
+static uint32_t colour_of(uint32_t body) {
+  static const uint32_t BASE[] = {0xd6c4a8, 0xd66a54, 0x5c8abe, 0x808086, 0x70a86e, 0xba8cbe};
+  return BASE[body % (sizeof BASE / sizeof *BASE)];
 }
 
 // ---- report -------------------------------------------------------------------------------------
@@ -214,8 +125,6 @@ static void format_look(char look[64], const char *format, uint32_t body, uint32
 static void put(sonde_json_out *out, const char *key, double value) {
   sonde_json_put_real(out, key, value, DIGITS);
 }
-
-static double norm(sonde_vec3 v) { return sqrt(dot(v, v)); }
 
 static sonde_status write_report(const figure *f, const sonde_scene_state *state, const char *path,
                                  sonde_error *error) {
@@ -304,7 +213,7 @@ static double write_legend(const figure *f, double time_s, double top, sonde_fil
     if (file) {
       char fill[64];
       const double box[4][2] = {{x, y - 10}, {x + 11, y - 10}, {x + 11, y + 1}, {x, y + 1}};
-      format_look(fill, "fill='#%06x'", b, SHADES - 2);
+      snprintf(fill, sizeof fill, "fill='#%06x'", colour_of(b));
       sonde_svg_put_outlines(file, box, 4, 4, fill);
       sonde_svg_put_text(file, x + 16, y, "", words);
     }
@@ -313,6 +222,60 @@ static double write_legend(const figure *f, double time_s, double top, sonde_fil
   snprintf(words, sizeof words, "t = %.3f s", time_s);
   if (file) sonde_svg_put_text(file, WIDTH - MARGIN, top, "class='end'", words);
   return y;
+}
+
+static sonde_status draw(const figure *f, const sonde_scene_state *state, const char *path,
+                         sonde_error *error) {
+  // The vertices of the bodies in view lie in the drawing's width and height.
+  uint32_t bodies = sonde_scene_body_count(f->scene), total = 0, used = 0;
+  for (uint32_t b = 0; b < bodies; ++b)
+    total += sonde_scene_body(f->scene, b).surface->vertex_count;
+  sonde_vec3 *all = malloc(total * sizeof *all);
+  painter *brush = NULL;
+  sonde_file *file = NULL;
+  sonde_status status = all ? SONDE_OK : (error->status = SONDE_MEMORY);
+  painter_camera camera = look(f);
+  for (uint32_t b = 0; b < bodies && !status; ++b) {
+    if (!f->seen[b]) continue;
+    uint32_t count = sonde_scene_body(f->scene, b).surface->vertex_count;
+    memcpy(all + used, f->vertex[b], count * sizeof *all);
+    used += count;
+  }
+  double lowest = 0;
+  if (!status) {
+    painter_fit(&camera, all, used, (painter_box){MARGIN, MARGIN, WIDTH - 2 * MARGIN, TALLEST});
+    double highest = INFINITY, xy[2];
+    for (uint32_t i = 0; i < used; ++i) {
+      painter_project(&camera, all[i], xy);
+      highest = fmin(highest, xy[1]), lowest = fmax(lowest, xy[1]);
+    }
+    camera.top += MARGIN - highest, lowest += MARGIN - highest; // nothing above the bodies
+    status = painter_create(&camera, &brush, error);
+  }
+  for (uint32_t b = 0; b < bodies && !status; ++b) {
+    const sonde_mesh *mesh = sonde_scene_body(f->scene, b).surface;
+    for (uint32_t i = 0; f->seen[b] && i < mesh->face_count; ++i) {
+      const uint32_t *v = mesh->faces[i];
+      const sonde_vec3 corner[3] = {f->vertex[b][v[0]], f->vertex[b][v[1]], f->vertex[b][v[2]]};
+      painter_lit_face(brush, corner, colour_of(b), 1);
+    }
+  }
+
+  if (!status) status = sonde_file_create(path, &file, error);
+  if (!status) {
+    double time_s = sonde_scene_time(state), top = lowest + MARGIN + LEGEND - 12;
+    double end = write_legend(f, time_s, top, NULL);
+    sonde_svg_begin(file, sonde_scene_title(f->scene), WIDTH, end + MARGIN);
+    status = painter_paint(brush, file, error);
+    write_legend(f, time_s, top, file);
+    if (status)
+      sonde_file_discard(file);
+    else
+      status = sonde_svg_end(file, error);
+  }
+  painter_destroy(brush);
+  free(all);
+  return status;
 }
 
 sonde_status scene_figure(const sonde_scene *scene, const sonde_scene_state *state,
@@ -330,55 +293,11 @@ sonde_status scene_figure(const sonde_scene *scene, const sonde_scene_state *sta
   }
   good = good && choose_seen(&f);
   sonde_status status = SONDE_MEMORY;
-  if (good && ending && strcmp(ending, ".html") == 0) {
-    status = write_report(&f, state, path, error);
-  } else if (good && (f.pieces = malloc(PIECES_MOST * sizeof *f.pieces))) {
-    f.camera = look(&f);
-    // Light from above the viewer's left shoulder.
-    const camera *c = &f.camera;
-    sonde_vec3 light = unit(madd(madd(c->toward, 1.1, c->up), -0.5, c->right));
-    double lowest = 0;
-    for (uint32_t b = 0; b < sonde_scene_body_count(f.scene); ++b) {
-      const sonde_mesh *mesh = sonde_scene_body(f.scene, b).surface;
-      if (!f.seen[b]) continue;
-      for (uint32_t i = 0; i < mesh->vertex_count; ++i)
-        lowest = fmax(lowest, c->top - c->scale * dot(f.vertex[b][i], c->up));
-      for (uint32_t i = 0; i < mesh->face_count; ++i) {
-        const uint32_t *v = mesh->faces[i];
-        const sonde_vec3 p[3] = {f.vertex[b][v[0]], f.vertex[b][v[1]], f.vertex[b][v[2]]};
-        sonde_vec3 normal = unit(cross(madd(p[1], -1, p[0]), madd(p[2], -1, p[0])));
-        if (!(dot(normal, c->toward) > 0)) continue;
-        double lit = fmax(dot(normal, light), 0);
-        cut_face(&f, p, b, (uint32_t)fmin(lit * SHADES, SHADES - 1), 0);
-      }
-    }
-    qsort(f.pieces, f.count, sizeof *f.pieces, compare_pieces);
-
-    sonde_file *file = NULL;
-    double(*xy)[2] = malloc(3 * ((size_t)f.count + 1) * sizeof *xy);
-    status = xy ? sonde_file_create(path, &file, error) : SONDE_MEMORY;
-    if (!status) {
-      char words[64];
-      double time_s = sonde_scene_time(state), top = lowest + MARGIN + LEGEND - 12;
-      double end = write_legend(&f, time_s, top, NULL);
-      sonde_svg_begin(file, sonde_scene_title(f.scene), WIDTH, end + MARGIN);
-      for (uint32_t i = 0; i < f.count;) {
-        const piece *first = &f.pieces[i];
-        uint32_t corners = 0;
-        for (; i < f.count && compare_pieces(first, &f.pieces[i]) == 0; ++i, corners += 3)
-          memcpy(xy[corners], f.pieces[i].xy, sizeof f.pieces[i].xy);
-        format_look(words, "fill='#%06x' stroke='#%06x' stroke-width='.6'", first->body,
-                    first->shade);
-        sonde_svg_put_outlines(file, (const double(*)[2])xy, corners, 3, words);
-      }
-      write_legend(&f, time_s, top, file);
-      status = sonde_svg_end(file, error);
-    }
-    free(xy);
-  }
+  if (good)
+    status = ending && strcmp(ending, ".html") == 0 ? write_report(&f, state, path, error)
+                                                    : draw(&f, state, path, error);
   for (uint32_t b = 0; f.vertex && b < bodies; ++b) free(f.vertex[b]);
   free(f.vertex);
   free(f.seen);
-  free(f.pieces);
   return status;
 }

@@ -107,13 +107,12 @@ static bool fit_view(view *v, const sonde_sequence *s) {
   return true;
 }
 
-sonde_status stack_figure(const sonde_sequence *s, uint32_t step, double place,
-                          const sonde_affine *plane, const sonde_image *picture, const char *path,
-                          sonde_error *error) {
+sonde_status stack_draw(const sonde_sequence *s, uint32_t step, double place,
+                        const sonde_affine *plane, const sonde_image *picture, sonde_image *figure,
+                        sonde_error *error) {
   assert(s->count > 0 && step > 0);
-  sonde_image figure;
-  view v = {.figure = &figure};
-  sonde_status status = sonde_image_create(FIGURE_WIDTH, FIGURE_HEIGHT, &figure, error);
+  view v = {.figure = figure};
+  sonde_status status = sonde_image_create(FIGURE_WIDTH, FIGURE_HEIGHT, figure, error);
   if (status) return status;
   bool drawn = !fit_view(&v, s);
   for (uint32_t k = s->count;
@@ -127,7 +126,15 @@ sonde_status stack_figure(const sonde_sequence *s, uint32_t step, double place,
     size_t corner = ((size_t)k * s->height + s->clip[1]) * s->width + s->clip[0];
     draw_sheet(&v, &sheet, s->pixels + corner, s->width, s->clip[2], s->clip[3], false);
   }
-  status = sonde_image_save_png(&figure, path, error);
+  return SONDE_OK;
+}
+
+sonde_status stack_figure(const sonde_sequence *s, uint32_t step, double place,
+                          const sonde_affine *plane, const sonde_image *picture, const char *path,
+                          sonde_error *error) {
+  sonde_image figure = {0};
+  sonde_status status = stack_draw(s, step, place, plane, picture, &figure, error);
+  if (!status) status = sonde_image_save_png(&figure, path, error);
   sonde_image_clear(&figure);
   return status;
 }

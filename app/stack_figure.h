@@ -9,5 +9,9 @@
 sonde_status stack_figure(const sonde_sequence *sequence, uint32_t step, double place,
                           const sonde_affine *plane, const sonde_image *picture, const char *path,
                           sonde_error *error);
+// The same into an image, which the caller clears.
+sonde_status stack_draw(const sonde_sequence *sequence, uint32_t step, double place,
+                        const sonde_affine *plane, const sonde_image *picture, sonde_image *figure,
+                        sonde_error *error);
 
 #endif

@@ -20,8 +20,8 @@ SONDE_API sonde_status sonde_image_save_png(const sonde_image *image, const char
  * Writes a report atomically: one HTML file that holds its data and the script that draws them
  * (web/src/report), opens from disk and loads nothing.
  * @param title of the window, UTF-8
- * @param json [length] one JSON object in UTF-8; its member "kind" names the view: fit, scene
- * or exam
+ * @param json [length] one JSON object in UTF-8; its member "kind" names the view: fit, scene,
+ * exam or paper
  * @return IO naming the file, DISK, MEMORY
  * @thread owner
  */
@@ -45,6 +45,11 @@ SONDE_API void sonde_svg_put_circle(sonde_file *file, double x, double y, double
  * @thread owner */
 SONDE_API void sonde_svg_put_text(sonde_file *file, double x, double y, const char *look,
                                   const char *utf8);
+/** A grey image, stored within the drawing, stretched to a box. @return MEMORY or IO @thread owner
+ */
+SONDE_API sonde_status sonde_svg_put_image(sonde_file *file, double x, double y, double width,
+                                           double height, const sonde_image *image,
+                                           sonde_error *error);
 /** Ends the drawing and commits the file. @return as sonde_file_commit() @thread owner */
 SONDE_API sonde_status sonde_svg_end(sonde_file *file, sonde_error *error);
 

@@ -40,7 +40,7 @@ typedef struct sonde_measurements {
  */
 SONDE_API sonde_status sonde_site_table_load(const char *path, sonde_site_table *table,
                                              sonde_error *error);
-/** Writes the same columns atomically. @thread owner */
+/** Writes these columns atomically. @thread owner */
 SONDE_API sonde_status sonde_site_table_save(const char *path, const sonde_site_table *table,
                                              sonde_error *error);
 SONDE_API void sonde_site_table_clear(sonde_site_table *table); /**< @thread owner */
@@ -126,6 +126,7 @@ typedef struct sonde_fit_def {
   uint32_t max_iterations;    /**< default 400 */
   bool fit_pretension;        /**< also estimate T0 >= 0 (stage 2); default false */
   bool cold_start;            /**< stage 2 from one generic start instead of stage 1 */
+  uint64_t cold_seed;         /**< not 0: ln k0, ln(xm - deepest), ln k_s start random, sd 1.5 */
   double kept_edge_n_m;       /**< edge stiffness of a stage 3 model; default 0 */
   double normal_exponent;     /**< of the normal springs of stage 3: 1, 2 (default) or 3 */
   double smoothness_sd;       /**< of ln k0 and ln xm per site spacing; 0 (default): by leave-out */
@@ -184,8 +185,7 @@ typedef struct sonde_fit_result {
   sonde_site *sites;     /**< [site_count] input sites with k0 and xm of the last stage */
   sonde_surface_law law; /**< the model's law with what the last stage estimated */
   uint32_t stage1_parameters, stage2_parameters; /**< 2 per curve; 2 per site + k_s (+ T0) */
-  uint32_t
-      parameters; /**< of the last stage; stage 3: 4 per site (2 with a uniform shear layer) + 2 */
+  uint32_t parameters; /**< of the last stage; 3: 4 per site (2 with a uniform shear layer) + 2 */
   sonde_error_report stage1; /**< interaction "independent" */
   sonde_error_report stage2; /**< interaction "simplified"; zero counts when stages == 1 */
   sonde_error_report stage3; /**< interaction "full"; zero counts when stages < 3 */

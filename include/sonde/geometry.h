@@ -136,6 +136,16 @@ typedef struct sonde_gjk_result {
   uint32_t support_calls; /**< work counter: dot products evaluated for supports */
   bool overlap;
 } sonde_gjk_result;
+/**
+ * Distance of two convex bodies (Gilbert, Johnson and Keerthi 1988) within 1e-9 m; closer than
+ * 1e-10 m counts as touching. Without a cache linear in the vertices; with one it goes on from the
+ * last call's simplex. Of the bodies it reads the hull's vertices and the topology.
+ * @param cache may be NULL
+ * @thread tick (no allocation)
+ */
+SONDE_API sonde_gjk_result sonde_gjk_distance(const sonde_convex *a, sonde_pose world_from_a,
+                                              const sonde_convex *b, sonde_pose world_from_b,
+                                              sonde_gjk_cache *cache);
 
 /** What one triangle contributes to the interpenetration of a convex body with a surface. */
 typedef struct sonde_clip_result {

@@ -16,6 +16,7 @@
 #include "sonde/scene.h"
 #include "sonde/fit.h"
 #include "sonde/fit_confidence.h"
+#include "sonde/fit_distribution.h"
 #include "sonde/fit_plausible.h"
 #include "sonde/fit_sample.h"
 #include "sonde/robot.h"

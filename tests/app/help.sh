@@ -22,6 +22,7 @@ declare -A options=(
   [exam]="--case --protocol --operator --seed --compare -o --json"
   [cases]="--check --generate --level -o --json"
   [devices]="--probe --json"
+  [paper]="-o --output --quick --json"
   [class]="--learners --names --port"
 )
 

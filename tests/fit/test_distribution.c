@@ -2,7 +2,7 @@
 // densities, and the better description wins.
 #include "base/random.h"
 #include "fixture.h"
-#include "fit/distribution.h"
+#include "sonde/fit_distribution.h"
 
 enum { COUNT = 20000 };
 static double sample[COUNT];

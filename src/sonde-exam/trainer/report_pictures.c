@@ -47,24 +47,6 @@ uint32_t sonde_exam_report_choose(const sonde_compression *presses, uint32_t cou
   return used;
 }
 
-// RFC 4648, section 4. @return freed by sonde_free(); NULL: out of memory
-static char *encode_base64(const uint8_t *bytes, size_t count) {
-  static const char DIGITS[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  char *text = SONDE_NEW(char, (count + 2) / 3 * 4 + 1);
-  size_t used = 0;
-  for (size_t i = 0; text && i < count; i += 3) {
-    uint32_t group = (uint32_t)bytes[i] << 16;
-    if (i + 1 < count) group |= (uint32_t)bytes[i + 1] << 8;
-    if (i + 2 < count) group |= bytes[i + 2];
-    text[used++] = DIGITS[group >> 18];
-    text[used++] = DIGITS[group >> 12 & 63];
-    text[used++] = i + 1 < count ? DIGITS[group >> 6 & 63] : '=';
-    text[used++] = i + 2 < count ? DIGITS[group & 63] : '=';
-  }
-  SONDE_ASSERT(!text || used == (count + 2) / 3 * 4);
-  return text;
-}
-
 // An image as PNG, after means over square blocks: they keep the speckle's look at a quarter of the
 // bytes.
 static sonde_status put_image(sonde_json_out *out, const char *key, const sonde_image *image,
@@ -91,7 +73,7 @@ static sonde_status put_image(sonde_json_out *out, const char *key, const sonde_
           (uint8_t)((sum + block * block / 2) / (block * block));
     }
   if (!status) status = sonde_png_encode(&small, &bytes, &count, error);
-  char *text = status ? NULL : encode_base64(bytes, count);
+  char *text = status ? NULL : sonde_base64_encode(bytes, count);
   if (!status && !text) status = sonde_fail_memory(error);
   if (!status) sonde_json_put_text(out, key, text);
   sonde_free(text);

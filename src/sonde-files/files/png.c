@@ -37,3 +37,21 @@ sonde_status sonde_image_save_png(const sonde_image *image, const char *path, so
   sonde_free(bytes);
   return status;
 }
+
+char *sonde_base64_encode(const uint8_t *bytes, size_t count) {
+  static const char DIGITS[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  char *text = SONDE_NEW(char, (count + 2) / 3 * 4 + 1);
+  SONDE_ASSERT(bytes || count == 0);
+  size_t used = 0;
+  for (size_t i = 0; text && i < count; i += 3) {
+    uint32_t group = (uint32_t)bytes[i] << 16;
+    if (i + 1 < count) group |= (uint32_t)bytes[i + 1] << 8;
+    if (i + 2 < count) group |= bytes[i + 2];
+    text[used++] = DIGITS[group >> 18];
+    text[used++] = DIGITS[group >> 12 & 63];
+    text[used++] = i + 1 < count ? DIGITS[group >> 6 & 63] : '=';
+    text[used++] = i + 2 < count ? DIGITS[group & 63] : '=';
+  }
+  SONDE_ASSERT(!text || used == (count + 2) / 3 * 4);
+  return text;
+}

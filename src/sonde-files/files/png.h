@@ -10,4 +10,7 @@
 SONDE_LINK sonde_status sonde_png_encode(const sonde_image *image, uint8_t **bytes, size_t *count,
                                          sonde_error *error);
 
+// Bytes as text (RFC 4648, section 4). @return freed by sonde_free(); NULL: out of memory
+SONDE_LINK char *sonde_base64_encode(const uint8_t *bytes, size_t count);
+
 #endif

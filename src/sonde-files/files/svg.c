@@ -1,9 +1,11 @@
 // Drawings as SVG, for files that no browser has a part in. Coordinates have one decimal.
 #include "base/base.h"
 #include "base/utf8.h"
+#include "files/png.h"
 #include "sonde/files.h"
 
 #include <math.h>
+#include <string.h>
 
 // A coordinate in tenths of a pixel, in any locale.
 static void put_tenths(sonde_file *file, char before, double x) {
@@ -86,6 +88,29 @@ void sonde_svg_put_text(sonde_file *file, double x, double y, const char *look, 
   sonde_file_printf(file, " %s>", look);
   put_text(file, utf8);
   sonde_file_printf(file, "</text>\n");
+}
+
+sonde_status sonde_svg_put_image(sonde_file *file, double x, double y, double width, double height,
+                                 const sonde_image *image, sonde_error *error) {
+  SONDE_ASSERT(file && image && image->pixels && width > 0 && height > 0);
+  uint8_t *bytes = NULL;
+  size_t count = 0;
+  sonde_status status = sonde_png_encode(image, &bytes, &count, error);
+  char *text = status ? NULL : sonde_base64_encode(bytes, count);
+  if (!status && !text) status = sonde_fail_memory(error);
+  if (!status) {
+    sonde_file_printf(file, "<image");
+    put_attribute(file, "x", x);
+    put_attribute(file, "y", y);
+    put_attribute(file, "width", width);
+    put_attribute(file, "height", height);
+    sonde_file_printf(file, " preserveAspectRatio='none' href='data:image/png;base64,");
+    sonde_file_write(file, text, strlen(text));
+    sonde_file_printf(file, "'/>\n");
+  }
+  sonde_free(text);
+  sonde_free(bytes);
+  return status;
 }
 
 sonde_status sonde_svg_end(sonde_file *file, sonde_error *error) {

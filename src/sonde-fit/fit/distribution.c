@@ -1,6 +1,7 @@
 // Normal, Laplace and Student's t distributions of greatest likelihood.
-#include "fit/distribution.h"
+#include "sonde/fit_distribution.h"
 
+#include "base/base.h"
 #include "base/maths.h"
 
 static const double LEAST_FREEDOM = 0.5, MOST_FREEDOM = 200;

@@ -1,5 +1,6 @@
 // The three stages of an estimation and their errors.
 #include "base/clock.h"
+#include "base/random.h"
 #include "fit/bordered.h"
 #include "fit/fit_inside.h"
 #include "fit/law.h"
@@ -131,6 +132,13 @@ static sonde_status finish(const sonde_site_problem *p, const double (*theta)[2]
   return sonde_error_report_of(p->m->data, result->model_n, p->m->count, &result->stage2, error);
 }
 
+// Of number k of a cold start: 1, or random with the logarithm's standard deviation.
+static double cold_factor(const sonde_fit_def *def, uint32_t k) {
+  const double LN_SD = 1.5;
+  return def->cold_start && def->cold_seed ? exp(LN_SD * sonde_random_normal(def->cold_seed, k))
+                                           : 1;
+}
+
 static sonde_status fit_model(const sonde_model *model, const sonde_site_table *sites,
                               sonde_site_problem *p, const sonde_fit_def *def,
                               const sonde_progress *progress, sonde_fit_result *result,
@@ -149,10 +157,12 @@ static sonde_status fit_model(const sonde_model *model, const sonde_site_table *
       ln_xm += log(result->curves[c].xm_m);
     }
     SONDE_ASSERT(curves > 0);
-    double xm_m = def->cold_start ? p->floor_m[s] + COLD_ABOVE_M : exp(ln_xm / curves);
-    double k0_n_m3 = def->cold_start ? COLD_K0 : exp(ln_k0 / curves);
+    double above_m = COLD_ABOVE_M * cold_factor(def, 2 * s);
+    double xm_m = def->cold_start ? p->floor_m[s] + above_m : exp(ln_xm / curves);
+    double k0_n_m3 = def->cold_start ? COLD_K0 * cold_factor(def, 2 * s + 1) : exp(ln_k0 / curves);
     sonde_law_log(k0_n_m3, xm_m, p->floor_m[s], theta[s]);
   }
+  border[0] += log(cold_factor(def, UINT32_MAX));
   // Sites without edges first: the solution is the model of stage 1 and the start of stage 2.
   if (!status && (!def->cold_start || def->stages == 1)) {
     sonde_bordered_problem problem = bordered_problem(p, def, NULL);

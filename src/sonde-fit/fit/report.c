@@ -4,7 +4,7 @@
 
 #include "base/maths.h"
 #include "base/order.h"
-#include "fit/distribution.h"
+#include "sonde/fit_distribution.h"
 #include "fit/fit_inside.h"
 #include "sonde/base_json.h"
 #include "sonde/files.h"

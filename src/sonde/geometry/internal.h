@@ -120,12 +120,6 @@ sonde_status sonde_convex_hull(const sonde_vec3 *points, uint32_t count, sonde_c
 // From a closed convex mesh. @return SONDE_MESH when open or not convex (1e-8). @thread owner
 sonde_status sonde_convex_create(const sonde_mesh *mesh, sonde_convex *convex, sonde_error *error);
 SONDE_LINK void sonde_convex_clear(sonde_convex *convex); // @thread owner
-// GJK distance with warm start (`cache` may be NULL). Within 1e-9 m of the exact distance; closer
-// than 1e-10 m counts as touching. Without cache linear time. Gilbert, Johnson and Keerthi 1988.
-// @thread tick (no allocation)
-SONDE_LINK sonde_gjk_result sonde_gjk_distance(const sonde_convex *a, sonde_pose world_from_a,
-                                               const sonde_convex *b, sonde_pose world_from_b,
-                                               sonde_gjk_cache *cache);
 // Area of the mesh vertex cells (a third of each face) covered by the rectangle |u|<=hu, |v|<=hv
 // around `centre`, seen along the normal: exact clipping of each face's cell share. Faces whose
 // normal turns away from `normal`, or farther than `reach_m` along it, do not count.
