@@ -8,14 +8,6 @@
 
 #include <string.h>
 
-// Lame's constants of Young's modulus and Poisson's ratio.
-static double shear_modulus(double young_pa, double poisson) {
-  return young_pa / (2 * (1 + poisson));
-}
-static double lame_lambda(double young_pa, double poisson) {
-  return young_pa * poisson / ((1 + poisson) * (1 - 2 * poisson));
-}
-
 // ---- assembly -----------------------------------------------------------------------------
 
 // Adds weight * k to the block of two unknowns. Held axes keep nothing but their diagonal.
@@ -42,7 +34,7 @@ static void add_block(sonde_elastic *e, uint32_t row, uint32_t column, double we
 // Stiffness of one tetrahedron at rest without what lambda adds.
 static void element_matrix(const sonde_elastic *e, uint32_t t, double young_pa, double k[12][12]) {
   static const double rest[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
-  tetrahedron_stiffness(SONDE_LINEAR, shear_modulus(young_pa, e->poisson), 0, rest,
+  tetrahedron_stiffness(SONDE_LINEAR, sonde_shear_modulus(young_pa, e->poisson), 0, rest,
                         (const double(*)[3])e->gradient[t], e->volume[t], k);
 }
 
@@ -120,20 +112,14 @@ static sonde_status assemble(sonde_elastic *e, sonde_error *error) {
       for (int b = 0; b < 3; ++b)
         add_pair(e, m->boundary.faces[f][a], m->boundary.faces[f][b], &k[3 * a][3 * b], 9);
   }
-  // One condition on the volume per patch. A uniform pressure p makes there the mean of p / lambda.
+  // One condition on the volume per patch.
   uint32_t *place = SONDE_NEW(uint32_t, m->node_count), *list = SONDE_NEW(uint32_t, m->node_count);
   sonde_vec3 *b = SONDE_NEW(sonde_vec3, m->node_count);
   sonde_status status = place && list && b ? SONDE_OK : sonde_fail_memory(error);
   for (uint32_t i = 0; i < m->node_count && !status; ++i) place[i] = UINT32_MAX;
   const sonde_patches *patches = &e->patches;
+  sonde_patches_lambda(patches, e->volume, e->young_pa, e->poisson, e->patch_lambda);
   for (uint32_t i = 0; i < patches->count && e->poisson > 0 && !status; ++i) {
-    double soft = 0;
-    for (uint32_t k = patches->start[i]; k < patches->start[i + 1]; ++k) {
-      uint32_t t = patches->list[k];
-      soft += patches->share * e->volume[t] / patches->volume[i] /
-              lame_lambda(e->young_pa[t], e->poisson);
-    }
-    e->patch_lambda[i] = 1 / soft;
     uint32_t count = mean_dilatation(e, i, place, list, b);
     for (uint32_t p = 0; p < count; ++p)
       for (uint32_t q = 0; q < count; ++q) {
@@ -407,7 +393,7 @@ void sonde_elastic_sensitivity(const sonde_elastic *e, const double *u, const ui
     for (uint32_t k = p->start[i]; k < p->start[i + 1]; ++k) {
       uint32_t t = p->list[k];
       derivative[group[t]] += work * e->patch_lambda[i] * p->share * e->volume[t] / p->volume[i] /
-                              lame_lambda(e->young_pa[t], e->poisson);
+                              sonde_lame_lambda(e->young_pa[t], e->poisson);
     }
   }
 }

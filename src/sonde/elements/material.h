@@ -11,8 +11,7 @@
 #define SONDE_SRC_MATERIAL_H
 
 #include "base/batch.h"
-
-typedef enum sonde_material { SONDE_LINEAR, SONDE_NEO_HOOKEAN } sonde_material;
+#include "elements/kinds.h"
 
 // Cofactors of F: dJ = C : dF; returns J.
 INLINE reals cofactors(const reals f[9], reals c[9]) {

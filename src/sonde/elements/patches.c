@@ -1,6 +1,7 @@
 // Disjoint patches grow from tetrahedron to neighbour, first those that add no node.
 #include "elements/patches.h"
 #include "elements/index_map.h"
+#include "base/maths.h"
 
 #include <string.h>
 
@@ -122,4 +123,33 @@ sonde_status sonde_patches_find(const sonde_tetrahedra *m, sonde_dilatation kind
   sonde_free(beside);
   sonde_free(patch);
   return status;
+}
+
+double sonde_tetrahedron_gradients(const sonde_tetrahedra *m, uint32_t t, double gradient[4][3]) {
+  sonde_vec3 p[4], g[4];
+  for (int c = 0; c < 4; ++c) p[c] = m->node[m->corner[t][c]];
+  sonde_vec3 a = v_sub(p[1], p[0]), b = v_sub(p[2], p[0]), c = v_sub(p[3], p[0]);
+  double six = v_dot(v_cross(a, b), c);
+  SONDE_ASSERT(six > 0);
+  g[1] = v_scale(v_cross(b, c), 1 / six);
+  g[2] = v_scale(v_cross(c, a), 1 / six);
+  g[3] = v_scale(v_cross(a, b), 1 / six);
+  g[0] = v_neg(v_add(v_add(g[1], g[2]), g[3]));
+  for (int k = 0; k < 4; ++k)
+    gradient[k][0] = g[k].x, gradient[k][1] = g[k].y, gradient[k][2] = g[k].z;
+  return six / 6;
+}
+
+void sonde_patches_lambda(const sonde_patches *p, const double *volume, const double *young_pa,
+                          double poisson, double *lambda) {
+  SONDE_ASSERT(p != NULL && volume != NULL && lambda != NULL);
+  for (uint32_t i = 0; i < p->count; ++i) {
+    double soft = 0;
+    for (uint32_t k = p->start[i]; k < p->start[i + 1]; ++k) {
+      uint32_t t = p->list[k];
+      double stiff = sonde_lame_lambda(young_pa[t], poisson);
+      if (stiff > 0) soft += p->share * volume[t] / p->volume[i] / stiff;
+    }
+    lambda[i] = soft > 0 ? 1 / soft : 0;
+  }
 }

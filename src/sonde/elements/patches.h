@@ -2,15 +2,8 @@
 #ifndef SONDE_SRC_PATCHES_H
 #define SONDE_SRC_PATCHES_H
 
+#include "elements/kinds.h"
 #include "elements/tetrahedra.h"
-
-// How the volume change that lambda resists is averaged: not at all, which locks near a Poisson
-// ratio of 0.5; over disjoint patches of about eight tetrahedra; or over those around every node.
-typedef enum sonde_dilatation {
-  SONDE_DILATATION_PATCH,
-  SONDE_DILATATION_NODE,
-  SONDE_DILATATION_ELEMENT
-} sonde_dilatation;
 
 typedef struct sonde_patches {
   uint32_t count;
@@ -24,5 +17,19 @@ typedef struct sonde_patches {
 sonde_status sonde_patches_find(const sonde_tetrahedra *mesh, sonde_dilatation kind,
                                 const double *volume, sonde_patches *patches, sonde_error *error);
 void sonde_patches_clear(sonde_patches *patches);
+
+// Gradients of the shape functions of a tetrahedron, 1/m; returns its volume.
+double sonde_tetrahedron_gradients(const sonde_tetrahedra *mesh, uint32_t tetrahedron,
+                                   double gradient[4][3]);
+// Lame's constants of Young's modulus and Poisson's ratio.
+static inline double sonde_shear_modulus(double young_pa, double poisson) {
+  return young_pa / (2 * (1 + poisson));
+}
+static inline double sonde_lame_lambda(double young_pa, double poisson) {
+  return young_pa * poisson / ((1 + poisson) * (1 - 2 * poisson));
+}
+// lambda [patches]: a uniform pressure p in a patch makes there the mean of p / lambda.
+void sonde_patches_lambda(const sonde_patches *patches, const double *volume,
+                          const double *young_pa, double poisson, double *lambda);
 
 #endif

@@ -47,25 +47,6 @@ static sonde_status number_nodes(sonde_elastic *e, const sonde_elastic_def *def,
   return SONDE_OK;
 }
 
-// Volumes of the tetrahedra and gradients of their shape functions.
-static void measure(sonde_elastic *e) {
-  const sonde_tetrahedra *m = e->mesh;
-  for (uint32_t t = 0; t < m->count; ++t) {
-    sonde_vec3 p[4], g[4];
-    for (int c = 0; c < 4; ++c) p[c] = m->node[m->corner[t][c]];
-    sonde_vec3 a = v_sub(p[1], p[0]), b = v_sub(p[2], p[0]), c = v_sub(p[3], p[0]);
-    double six = v_dot(v_cross(a, b), c);
-    SONDE_ASSERT(six > 0);
-    g[1] = v_scale(v_cross(b, c), 1 / six);
-    g[2] = v_scale(v_cross(c, a), 1 / six);
-    g[3] = v_scale(v_cross(a, b), 1 / six);
-    g[0] = v_neg(v_add(v_add(g[1], g[2]), g[3]));
-    e->volume[t] = six / 6;
-    for (int k = 0; k < 4; ++k)
-      e->gradient[t][k][0] = g[k].x, e->gradient[t][k][1] = g[k].y, e->gradient[t][k][2] = g[k].z;
-  }
-}
-
 // Neighbours of a node, itself included: the nodes of all patches of the tetrahedra around it.
 // marked[node]: the last node that listed it; seen [patches] likewise.
 static uint32_t find_neighbours(const sonde_elastic *e, const sonde_around *around, uint32_t node,
@@ -142,7 +123,8 @@ sonde_status sonde_elastic_create(const sonde_elastic_def *def, sonde_elastic **
   bool all = e->unknown && e->node && e->held && e->gradient && e->volume && e->young_pa &&
              e->row_start && e->point;
   sonde_status status = all ? number_nodes(e, def, error) : sonde_fail_memory(error);
-  if (!status) measure(e);
+  for (uint32_t t = 0; t < m->count && !status; ++t)
+    e->volume[t] = sonde_tetrahedron_gradients(m, t, e->gradient[t]);
   if (!status) status = sonde_patches_find(m, def->dilatation, e->volume, &e->patches, error);
   if (!status) status = find_pattern(e, error);
   if (!status) {
