@@ -42,7 +42,8 @@ typedef struct simulation {
   uint64_t steps, every, start; // steps in all, and where this run began
   sonde_file *bodies, *contacts;
   double seconds;
-  uint64_t solver_iterations, most_points;
+  uint64_t solver_iterations, most_points, awake;
+  double contact_s, assembly_s, solve_s;
   bool cancelled;
 } simulation;
 
@@ -179,6 +180,9 @@ static sonde_status run(simulation *s, sonde_error *error) {
     s->seconds += app_seconds(CLOCK_MONOTONIC) - begin;
     sonde_scene_report report = sonde_scene_last(s->state);
     s->solver_iterations += report.solver_iterations;
+    s->awake += report.awake;
+    s->contact_s += report.contact_s, s->assembly_s += report.assembly_s;
+    s->solve_s += report.solve_s;
     if (report.touch_points > s->most_points) s->most_points = report.touch_points;
     uint64_t done = sonde_scene_tick(s->state);
     s->cancelled = !progress.report((double)done / (double)s->steps, "simulating", progress.user);
@@ -252,16 +256,23 @@ static int simulate(void *from) {
   if (!status && s.cancelled) status = save_snapshot(&s, &error);
   if (!status && s.a.picture) status = scene_figure(s.scene, s.state, s.a.picture, &error);
   double steps = status ? 0 : (double)(sonde_scene_tick(s.state) - s.start);
+  // Simulated over processor time of the steps.
+  double real_time = s.seconds > 0 ? steps * sonde_scene_get_step(s.scene).dt_s / s.seconds : NAN;
   char trouble[320] = "";
   bool spoilt = !status && tell_faults(&s, trouble, sizeof trouble);
   if (!status && s.a.json) {
     app_json_begin();
     app_json("title:%s bodies:%u steps:%lu time_s:%g ms_per_step:%g solver_iterations_per_step:%g "
-             "most_contact_points:%lu flagged_steps:%lu flags:%u",
+             "most_contact_points:%lu flagged_steps:%lu flags:%u awake_per_step:%g real_time:%g "
+             "contact_ms:%g assembly_ms:%g solve_ms:%g",
              sonde_scene_title(s.scene), sonde_scene_body_count(s.scene), sonde_scene_tick(s.state),
              sonde_scene_time(s.state), steps > 0 ? 1e3 * s.seconds / steps : NAN,
              steps > 0 ? (double)s.solver_iterations / steps : NAN, s.most_points,
-             sonde_scene_flag_count(s.state), sonde_scene_all_flags(s.state));
+             sonde_scene_flag_count(s.state), sonde_scene_all_flags(s.state),
+             steps > 0 ? (double)s.awake / steps : NAN, real_time,
+             steps > 0 ? 1e3 * s.contact_s / steps : NAN,
+             steps > 0 ? 1e3 * s.assembly_s / steps : NAN,
+             steps > 0 ? 1e3 * s.solve_s / steps : NAN);
     char hash[24];
     snprintf(hash, sizeof hash, "%016llx", (unsigned long long)sonde_scene_hash(s.state));
     app_json("hash:%s cancelled:%hhd trusted:%hhd trouble:%s", hash, s.cancelled, !spoilt, trouble);
@@ -273,6 +284,7 @@ static int simulate(void *from) {
     if (steps > 0) {
       printf("step          %8.3f ms\n", 1e3 * s.seconds / steps);
       printf("iterations    %8.1f per step\n", (double)s.solver_iterations / steps);
+      printf("real time     %8.2f\n", real_time);
     }
     printf("flagged steps %8llu\n", (unsigned long long)sonde_scene_flag_count(s.state));
     printf("hash          %016llx\n", (unsigned long long)sonde_scene_hash(s.state));

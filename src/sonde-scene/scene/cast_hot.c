@@ -5,7 +5,7 @@
 // thickness. A column that grows by less than that per step never reaches the far side of either
 // body before its push has been felt. Boxes that move by less than their gap do not meet: their
 // pairs may go that far and a thickness further.
-#include "scene/state.h"
+#include "scene/touch.h"
 
 #include "base/base.h"
 #include "base/maths.h"

@@ -5,12 +5,14 @@
 // the displacement before slip, so that z is not upset when P changes. Vertices carry z; columns
 // come and go. The vertices receive increments, never means, so that bonds at rest stay as they
 // are, bit by bit.
-#include "scene/state.h"
+#include "scene/touch.h"
 
 #include "base/base.h"
 #include "base/maths.h"
 
 #include <string.h>
+
+static const double RESTING = -1; // the load of a bond that is left as it is
 
 static sonde_vec3 across(sonde_vec3 a, sonde_vec3 n) { return v_madd(a, -v_dot(a, n), n); }
 
@@ -108,7 +110,7 @@ static void pack_bonds(sonde_scene_state *state) {
     if (!now->bond_first[t]) continue;
     uint32_t first = now->bond_first[t] - 1, count = bonds_per_touch(state->scene, t);
     bool held = false;
-    for (uint32_t i = first; i < first + count; ++i) held |= state->bond_load[i] > 0;
+    for (uint32_t i = first; i < first + count; ++i) held |= state->bond_load[i] != 0;
     now->bond_first[t] = held ? used + 1 : 0;
     if (!held) continue;
     memcpy(now->bond + used, state->bond_sum + first, count * sizeof *now->bond);
@@ -146,9 +148,17 @@ void sonde_bonds_advance(sonde_scene_state *state, double h) {
       sum->displacement = v_madd(sum->displacement, load, gained);
     }
   }
+  // Bonds between bodies that rest stay.
+  for (uint32_t t = 0; t < state->scene->touch_count; ++t) {
+    uint32_t first = state->now.bond_first[t];
+    if (!first || !sonde_touch_rests(state, t)) continue;
+    for (uint32_t i = 0; i < bonds_per_touch(state->scene, t); ++i)
+      state->bond_load[first - 1 + i] = RESTING;
+  }
   for (uint32_t i = 0; i < count; ++i) {
     double load = state->bond_load[i];
     sonde_bond *bond = &state->now.bond[i], *sum = &state->bond_sum[i];
+    if (load == RESTING) continue;
     if (load > 0)
       *bond = (sonde_bond){v_madd(bond->displacement, 1 / load, sum->displacement),
                            sum->slip_m_s / load};

@@ -70,8 +70,9 @@ double sonde_network_volume(const sonde_body *body, const sonde_vec3 *position) 
 // to zero over a closed surface, whatever the origin of the tetrahedra.
 static void add_bulk(sonde_scene_state *state, const sonde_body *body,
                      const sonde_tissue_scales *scales) {
-  uint32_t nodes = body->node_count, first = state->row_count;
-  SONDE_ASSERT(first + nodes <= state->row_capacity && state->term_count < state->term_capacity);
+  uint32_t nodes = body->node_count, first = state->bulk_row_count;
+  SONDE_ASSERT(first + nodes <= state->bulk_row_capacity);
+  SONDE_ASSERT(state->term_count < state->term_capacity);
   sonde_vec3 *g = state->g + first;
   const sonde_vec3 *x = state->stage_position + body->first_slot;
   for (uint32_t i = 0; i < nodes; ++i) {
@@ -97,7 +98,7 @@ static void add_bulk(sonde_scene_state *state, const sonde_body *body,
   }
   state->terms[state->term_count++] =
       (sonde_rank_one){body->bulk_n_m5 * scales->stiffness, nodes, state->rows + first, g};
-  state->row_count = first + nodes;
+  state->bulk_row_count = first + nodes;
 }
 
 void sonde_network_linearise(sonde_scene_state *state, uint32_t b,

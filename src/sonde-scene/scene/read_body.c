@@ -200,6 +200,7 @@ static void read_two_layer(const sonde_scene_source *source, sonde_place at, son
     sonde_reader_pass(reader, sonde_read_find(reader, at, "model"), &error);
     return;
   }
+  body->sags = sonde_read_bool(reader, at, "sags", false);
   memcpy(body->node, body->surface.vertices, nodes * sizeof *body->node);
   memcpy(body->node_mass_kg, body->model->mass_kg, nodes * sizeof *body->node_mass_kg);
 }
@@ -300,11 +301,11 @@ static void read_deformable(const sonde_scene_source *source, sonde_place at, so
 void sonde_read_body(const sonde_scene_source *source, sonde_place at, const sonde_scene *scene,
                      sonde_body *body) {
   SONDE_ASSERT(source->reader && body);
-  static const char *const KEYS[] = {
-      "name",     "kind",    "shape",         "motion",        "position_mm",  "rotation",
-      "material", "mass_kg", "density_kg_m2", "density_kg_m3", "velocity_m_s", "spin_rad_s",
-      "path",     "springs", "lattice",       "model",         "held_mm",      "loads",
-      NULL};
+  static const char *const KEYS[] = {"name",          "kind",          "shape",        "motion",
+                                     "position_mm",   "rotation",      "material",     "mass_kg",
+                                     "density_kg_m2", "density_kg_m3", "velocity_m_s", "spin_rad_s",
+                                     "path",          "springs",       "lattice",      "model",
+                                     "held_mm",       "loads",         "sags",         NULL};
   static const char *const KINDS[] = {"rigid", "springs", "lattice", "two_layer", NULL};
   static const char *const MOTIONS[] = {"free", "fixed", "driven", NULL};
   sonde_reader *reader = source->reader;

@@ -5,12 +5,13 @@
 // outer one lies behind it. A spring of the pair's stiffness over the inner body's mean section
 // pushes along n, and a damper of RELEASE_S times the stiffness lets it leave at d/RELEASE_S at
 // most: what the start stored is dissipated. The law holds until little of d is left.
-#include "scene/state.h"
+#include "scene/touch.h"
 
 #include "base/base.h"
 #include "base/maths.h"
 
 static const double RELEASE_S = 0.05, LEAST = 0.1; // LEAST in thicknesses of the thinner body
+static const double CONTAINED = 0.5;               // least share of a body's volume at rest
 
 // Exit of the inner body.
 typedef struct way_out {
@@ -98,7 +99,11 @@ void sonde_release_notice(sonde_scene_state *state, uint32_t t, const sonde_over
   for (uint32_t r = 0; r < found->region_count; ++r) {
     const sonde_overlap_region *region = &found->regions[r];
     if (region->entry_count[0] && region->entry_count[1]) continue;
+    // A corner too small to count on a large face of the other has one side as well, but no volume.
     int inner = region->entry_count[0] ? 0 : 1;
+    uint32_t b = inner ? touch->b : touch->a;
+    double whole = 4 * state->section_m2[b] * state->thickness_m[b];
+    if (region->volume_m3 < CONTAINED * whole) continue;
     if (!state->now.release[t])
       sonde_scene_note(state, SONDE_SCENE_INSIDE, inner ? touch->b : touch->a,
                        inner ? touch->a : touch->b);
@@ -118,8 +123,8 @@ bool sonde_release_push(sonde_scene_state *state, uint32_t t, bool may_end) {
     state->now.release[t] = 0;
     return false;
   }
-  state->pair[t].depth_m = way.depth_m;
-  state->pair[t].point_count = 1;
+  state->now.pair[t].depth_m = way.depth_m;
+  state->now.pair[t].point_count = 1;
   state->found_hint[t] = v_scale(way.direction, inner_is_a ? -1 : 1);
   if (!(way.depth_m > 0)) return true;
   sonde_push *push = sonde_push_new(state, t);

@@ -62,6 +62,7 @@ typedef struct sonde_body {
   double rest_volume_m3; // closed
   uint32_t first_pair;
   sonde_model *model; // two-layer
+  bool sags;          // its weight deforms it; else its shape is the one under its weight
 } sonde_body;
 
 typedef struct sonde_touch {

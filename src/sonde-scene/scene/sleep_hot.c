@@ -1,4 +1,5 @@
-// Nodes at rest of anchored tissues sleep (docs/scene_theory.md).
+// Nodes at rest of anchored tissues sleep, and whole bodies of the other kinds with all that they
+// touch (docs/scene_theory.md).
 //
 // A tissue's node falls asleep when for CALM steps it was slow and the forces on it, contact
 // then stays where it is, and its neighbours feel its springs. What touches others never sleeps.
@@ -21,7 +22,8 @@ static bool is_awake(const sonde_scene_state *state, uint32_t slot) {
 }
 
 static bool moves(const sonde_scene_state *state, const sonde_body *body, uint32_t k) {
-  if (body->motion != SONDE_BODY_FREE) return false;
+  if (body->motion != SONDE_BODY_FREE || state->now.asleep[body - state->scene->bodies])
+    return false;
   return (sonde_body_is_rigid(body) || !body->held[k]) && is_awake(state, body->first_slot + k);
 }
 
@@ -70,15 +72,28 @@ void sonde_sleep_list(sonde_scene_state *state) {
   SONDE_ASSERT(state->active_row_count <= scene->slot_count);
 }
 
-void sonde_sleep_begin(sonde_scene_state *state) {
-  bool any = false;
+// A tissue whose forces are 0 where it starts sleeps from the start.
+void sonde_sleep_start(sonde_scene_state *state) {
   for (uint32_t b = 0; b < state->scene->body_count; ++b) {
     const sonde_body *body = &state->scene->bodies[b];
-    if (!body->model) continue;
-    any = true;
-    if (!may_sleep(state, body)) memset(state->now.calm + body->first_slot, 0, body->node_count);
+    if (!may_sleep(state, body)) continue;
+    bool still = !(v_norm2(body->velocity_m_s) + v_norm2(body->spin_rad_s) > 0);
+    bool weighs = body->sags && v_norm2(state->scene->gravity_m_s2) > 0;
+    double load2 = 0;
+    for (uint32_t i = 0; i < body->node_count; ++i) load2 += v_norm2(body->load_n[i]);
+    if (still && !weighs && !(load2 > 0) && !(body->model->law.edge_pretension_n > 0))
+      memset(state->now.calm + body->first_slot, CALM, body->node_count);
   }
-  if (any) sonde_sleep_list(state);
+}
+
+void sonde_sleep_begin(sonde_scene_state *state) {
+  bool any = state->scene->step.sleep_m > 0 && state->scene->step.lambda > 0;
+  for (uint32_t b = 0; b < state->scene->body_count; ++b) {
+    const sonde_body *body = &state->scene->bodies[b];
+    if (!any) state->now.asleep[b] = 0;
+    if (body->model && !any) memset(state->now.calm + body->first_slot, 0, body->node_count);
+  }
+  sonde_sleep_list(state);
 }
 
 bool sonde_sleep_wake_touched(sonde_scene_state *state) {
@@ -94,7 +109,7 @@ bool sonde_sleep_wake_touched(sonde_scene_state *state) {
   return woke;
 }
 
-void sonde_sleep_rest(sonde_scene_state *state) {
+static void rest_nodes(sonde_scene_state *state) {
   double displacement = state->scene->step.sleep_m, still = displacement / STILL_S;
   for (uint32_t b = 0; b < state->scene->body_count; ++b) {
     const sonde_body *body = &state->scene->bodies[b];
@@ -129,4 +144,118 @@ void sonde_sleep_rest(sonde_scene_state *state) {
       if (tried && calm[i] >= CALM) calm[i] = CALM - 1;
     }
   }
+}
+
+// ---- bodies
+
+// A body is slow when it would creep sleep_m in this time, and sleeps after as long.
+static const double STILL_BODY_S = 0.2;
+
+bool sonde_body_rests(const sonde_scene_state *state, uint32_t b) {
+  const sonde_body *body = &state->scene->bodies[b];
+  if (body->motion == SONDE_BODY_FIXED || state->now.asleep[b]) return true;
+  const sonde_vec3 *v = state->now.velocity + body->first_slot;
+  return body->motion == SONDE_BODY_DRIVEN && !(v_norm2(v[0]) + v_norm2(v[1]) > 0);
+}
+
+static void wake(sonde_scene_state *state, uint32_t b) {
+  state->now.asleep[b] = 0;
+  state->now.calm_s[b] = 0;
+}
+
+bool sonde_sleep_wake_bodies(sonde_scene_state *state) {
+  const sonde_scene *scene = state->scene;
+  bool woke = false;
+  for (uint32_t k = 0; k < state->near_touch_count; ++k) {
+    const sonde_touch *touch = &scene->touches[state->near_touch[k]];
+    bool sleeps = state->now.asleep[touch->a] || state->now.asleep[touch->b];
+    if (!sleeps || !state->now.pair[state->near_touch[k]].region_count) continue;
+    woke = true;
+    wake(state, state->now.asleep[touch->a] ? touch->a : touch->b);
+  }
+  // Bodies that rest with one that woke wake as well.
+  for (bool more = woke; more;) {
+    more = false;
+    for (uint32_t t = 0; t < scene->touch_count; ++t) {
+      uint32_t a = scene->touches[t].a, b = scene->touches[t].b;
+      if (!state->now.pair[t].region_count || state->now.asleep[a] == state->now.asleep[b])
+        continue;
+      uint32_t sleeper = state->now.asleep[a] ? a : b, other = sleeper == a ? b : a;
+      if (scene->bodies[other].motion != SONDE_BODY_FREE) continue;
+      wake(state, sleeper);
+      more = true;
+    }
+  }
+  return woke;
+}
+
+static double speed_of(const sonde_scene_state *state, uint32_t b) {
+  const sonde_body *body = &state->scene->bodies[b];
+  const sonde_vec3 *v = state->now.velocity + body->first_slot;
+  double most2 = 0;
+  if (sonde_body_is_rigid(body)) return v_norm(v[0]) + state->reach_m[b] * v_norm(v[1]);
+  for (uint32_t i = 0; i < body->node_count; ++i) most2 = fmax(most2, v_norm2(v[i]));
+  return sqrt(most2);
+}
+
+static uint32_t group_of(const uint32_t *group, uint32_t b) {
+  while (group[b] != b) b = group[b];
+  return b;
+}
+
+// Bodies that touch each other fall asleep together, when all are slow and something that does not
+// move holds them: what drifts freely keeps its momentum. Tissues and moving bodies keep awake what
+// they touch.
+static void rest_bodies(sonde_scene_state *state, double h) {
+  const sonde_scene *scene = state->scene;
+  uint32_t *group = state->island, bodies = scene->body_count;
+  double still = scene->step.sleep_m / STILL_BODY_S;
+  for (uint32_t b = 0; b < bodies; ++b) {
+    const sonde_body *body = &scene->bodies[b];
+    group[b] = b;
+    if (body->motion != SONDE_BODY_FREE || body->model || state->now.asleep[b]) continue;
+    state->now.calm_s[b] = speed_of(state, b) <= still ? state->now.calm_s[b] + h : 0;
+  }
+  for (uint32_t k = 0; k < state->near_touch_count; ++k) {
+    const sonde_touch *touch = &scene->touches[state->near_touch[k]];
+    uint32_t a = group_of(group, touch->a), b = group_of(group, touch->b);
+    if (!state->now.pair[state->near_touch[k]].region_count) continue;
+    if (scene->bodies[touch->a].motion == SONDE_BODY_FREE &&
+        scene->bodies[touch->b].motion == SONDE_BODY_FREE)
+      group[a > b ? a : b] = a > b ? b : a;
+  }
+  bool *keeps = state->keeps_awake, *held = state->is_held;
+  for (uint32_t b = 0; b < bodies; ++b) keeps[b] = held[b] = false;
+  for (uint32_t b = 0; b < bodies; ++b) {
+    const sonde_body *body = &scene->bodies[b];
+    uint32_t root = group_of(group, b);
+    if (body->motion != SONDE_BODY_FREE) continue;
+    keeps[root] |= body->model || state->now.calm_s[b] < STILL_BODY_S;
+    held[root] |= !state->loose[b];
+  }
+  for (uint32_t k = 0; k < state->near_touch_count; ++k) {
+    const sonde_touch *touch = &scene->touches[state->near_touch[k]];
+    bool free_a = scene->bodies[touch->a].motion == SONDE_BODY_FREE;
+    bool free_b = scene->bodies[touch->b].motion == SONDE_BODY_FREE;
+    if (!state->now.pair[state->near_touch[k]].region_count || (free_a && free_b)) continue;
+    uint32_t root = group_of(group, free_a ? touch->a : touch->b);
+    bool rests = sonde_body_rests(state, free_a ? touch->b : touch->a);
+    keeps[root] |= !rests;
+    held[root] |= rests;
+  }
+  for (uint32_t b = 0; b < bodies; ++b) {
+    const sonde_body *body = &scene->bodies[b];
+    uint32_t root = group_of(group, b);
+    if (body->motion != SONDE_BODY_FREE || state->now.asleep[b] || keeps[root] || !held[root])
+      continue;
+    state->now.asleep[b] = 1;
+    size_t bytes = body->slot_count * sizeof(sonde_vec3);
+    memset(state->now.velocity + body->first_slot, 0, bytes);
+    memset(state->now.increment + body->first_slot, 0, bytes);
+  }
+}
+
+void sonde_sleep_rest(sonde_scene_state *state, double h) {
+  rest_nodes(state);
+  if (state->scene->step.sleep_m > 0 && state->scene->step.lambda > 0) rest_bodies(state, h);
 }

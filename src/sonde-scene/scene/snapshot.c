@@ -94,7 +94,10 @@ sonde_status sonde_scene_state_load(sonde_scene_state *state, const char *path,
                           "quaternions",
                           path, SONDE_SCENE_REACH_M, SONDE_SCENE_FASTEST);
   }
-  if (!status) sonde_scene_motion_copy(&state->now, &state->undo);
+  if (!status) {
+    sonde_scene_motion_copy(&state->now, &state->undo);
+    memset(state->fitted, 0, state->scene->body_count * sizeof *state->fitted);
+  }
   sonde_free(bytes);
   return status;
 }

@@ -45,6 +45,9 @@ static void lay_motion(const sonde_scene_state *state, carver *c, sonde_scene_mo
   CARVE(motion->entry, scene->touch_count);
   CARVE(motion->deep, scene->touch_count);
   CARVE(motion->release, scene->touch_count);
+  CARVE(motion->pair, scene->touch_count);
+  CARVE(motion->calm_s, scene->body_count);
+  CARVE(motion->asleep, scene->body_count);
   CARVE(motion->calm, scene->slot_count);
   CARVE(motion->bond, 0);
   motion->fixed = c->used;
@@ -85,10 +88,13 @@ static void lay_arrays(sonde_scene_state *s, carver *c) {
   CARVE(s->displacement, bodies);
   CARVE(s->cast_box, bodies);
   CARVE(s->cast_known, bodies);
+  CARVE(s->fitted, bodies);
   CARVE(s->body_inverse, bodies);
   CARVE(s->part, bodies);
   CARVE(s->island, bodies);
   CARVE(s->loose, bodies);
+  CARVE(s->keeps_awake, bodies);
+  CARVE(s->is_held, bodies);
   CARVE(s->tree, bodies);
   CARVE(s->touch_of, bodies * bodies);
   CARVE(s->near, s->near_capacity);
@@ -102,7 +108,6 @@ static void lay_arrays(sonde_scene_state *s, carver *c) {
   CARVE(s->g, s->row_capacity);
   CARVE(s->bond_load, s->bond_capacity);
   CARVE(s->bond_sum, s->bond_capacity);
-  CARVE(s->pair, touches);
 }
 
 static sonde_status make_tree(sonde_scene_state *state, uint32_t b, sonde_error *error) {
@@ -139,6 +144,7 @@ static sonde_status allocate(sonde_scene_state *state, sonde_error *error) {
   state->grip_capacity = room;
   state->push_capacity = room + REGIONS * pairs;
   state->term_capacity = state->push_capacity + 2 * room + bodies;
+  state->bulk_row_capacity = bulk;
   state->row_capacity = bulk + 3 * 8 * room + 2 * state->surface_count + 4 * state->push_capacity;
   uint64_t shared = NEIGHBOURS * (uint64_t)state->surface_count;
   state->bond_capacity = (uint32_t)(bonds < shared ? bonds : shared);
@@ -279,7 +285,7 @@ void sonde_scene_state_reset(sonde_scene_state *state) {
   sonde_scene_motion_unbond(&state->now);
   memset(state->now.block, 0, state->now.fixed);
   state->report = (sonde_scene_report){0};
-  for (uint32_t t = 0; t < state->scene->touch_count; ++t) state->pair[t] = (sonde_pair_measure){0};
+  memset(state->fitted, 0, state->scene->body_count * sizeof *state->fitted);
   for (uint32_t b = 0; b < state->scene->body_count; ++b) {
     const sonde_body *body = &state->scene->bodies[b];
     state->now.rotation[b] = quat_identity();
@@ -301,6 +307,7 @@ void sonde_scene_state_reset(sonde_scene_state *state) {
             v_add(body->velocity_m_s, v_cross(body->spin_rad_s, arm));
     }
   }
+  sonde_sleep_start(state);
 }
 
 // ---- readers
@@ -345,6 +352,8 @@ void sonde_scene_set_nodes(sonde_scene_state *state, uint32_t b, const sonde_vec
   if (positions) memcpy(state->now.position + body->first_slot, positions, bytes);
   if (velocities) memcpy(state->now.velocity + body->first_slot, velocities, bytes);
   memset(state->now.calm + body->first_slot, 0, body->slot_count);
+  state->now.asleep[b] = 0;
+  state->now.calm_s[b] = 0;
 }
 
 void sonde_scene_surface(const sonde_scene_state *state, uint32_t b, sonde_vec3 *vertices) {
@@ -354,7 +363,7 @@ void sonde_scene_surface(const sonde_scene_state *state, uint32_t b, sonde_vec3 
 
 sonde_pair_measure sonde_scene_pair_measure(const sonde_scene_state *state, uint32_t pair) {
   SONDE_ASSERT(pair < state->scene->touch_count);
-  return state->pair[pair];
+  return state->now.pair[pair];
 }
 
 sonde_body_measure sonde_scene_measure(const sonde_scene_state *state, uint32_t b) {
@@ -387,7 +396,7 @@ sonde_body_measure sonde_scene_measure(const sonde_scene_state *state, uint32_t 
     m.rotation = quat_identity();
     m.elastic_j = body->model ? sonde_tissue_energy(body->model, x) : sonde_network_energy(body, x);
   }
-  if (body->motion == SONDE_BODY_FREE)
+  if (body->motion == SONDE_BODY_FREE && (!body->model || body->sags))
     m.gravity_j = -body->mass.mass_kg * v_dot(state->scene->gravity_m_s2, m.centre_m);
   return m;
 }

@@ -28,17 +28,20 @@ typedef struct sonde_scene_motion {
   void *block;
   size_t fixed; // bytes before the bonds
   sonde_scene_motion_head *head;
-  sonde_vec3 *position;  // [slots] m; 0 for spins
-  sonde_vec3 *velocity;  // [slots] m/s, rad/s
-  sonde_vec3 *increment; // [slots] of the last step: the solver's start
-  sonde_quat *rotation;  // [bodies] world from the body's axes
-  sonde_vec3 *hint;      // [touches] last direction out of a into b
-  uint32_t *bond_first;  // [touches] 1 + its first bond; 0: it has none
-  sonde_vec3 *entry;     // [touches] direction of the contact when it was last shallow; 0: apart
-  uint8_t *deep;         // [touches] the contact has been deep since
-  uint8_t *release;      // [touches] 1: a was wholly inside b and is not out yet; 2: b inside a
-  uint8_t *calm;         // [slots] steps at rest of a tissue's node; many: it sleeps
-  sonde_bond *bond;      // [bond_capacity] of the touches in contact, one after the other
+  sonde_vec3 *position;     // [slots] m; 0 for spins
+  sonde_vec3 *velocity;     // [slots] m/s, rad/s
+  sonde_vec3 *increment;    // [slots] of the last step: the solver's start
+  sonde_quat *rotation;     // [bodies] world from the body's axes
+  sonde_vec3 *hint;         // [touches] last direction out of a into b
+  uint32_t *bond_first;     // [touches] 1 + its first bond; 0: it has none
+  sonde_vec3 *entry;        // [touches] direction of the contact when it was last shallow; 0: apart
+  uint8_t *deep;            // [touches] the contact has been deep since
+  uint8_t *release;         // [touches] 1: a was wholly inside b and is not out yet; 2: b inside a
+  sonde_pair_measure *pair; // [touches] contact in the last step; kept while both bodies rest
+  double *calm_s;           // [bodies] how long a body has been slow
+  uint8_t *asleep;          // [bodies] 1: it rests until something touches it
+  uint8_t *calm;            // [slots] steps at rest of a tissue's node; many: it sleeps
+  sonde_bond *bond;         // [bond_capacity] of the touches in contact, one after the other
 } sonde_scene_motion;
 
 // A push of one body on another along generalised coordinates: a quantity u (depth of a column or
@@ -96,6 +99,7 @@ struct sonde_scene_state {
   sonde_bounds *displacement; // [bodies] scratch: box of the vertices' displacements
   sonde_bounds *cast_box;     // [bodies] scratch: box of the vertices
   bool *cast_known;           // [bodies] scratch: cast_box has been made
+  bool *fitted;               // [bodies] surface and tree are those of the sleeping body
   sonde_mat3 *body_inverse;   // [bodies] inverse inertia in the body's frame
 
   // contact
@@ -115,9 +119,9 @@ struct sonde_scene_state {
   sonde_vec3 *g;                          // [row_capacity] pool
   uint32_t push_count, grip_count, term_count, row_count, bulk_terms;
   uint32_t push_capacity, grip_capacity, term_capacity, row_capacity;
-  double *bond_load;        // [bond_capacity] scratch
-  sonde_bond *bond_sum;     // [bond_capacity] scratch
-  sonde_pair_measure *pair; // [touches]
+  uint32_t bulk_row_count, bulk_row_capacity; // rows at the pool's start, of enclosed volumes
+  double *bond_load;                          // [bond_capacity] scratch
+  sonde_bond *bond_sum;                       // [bond_capacity] scratch
 
   // assembly and solve
   sonde_block_matrix *matrix;
@@ -133,6 +137,7 @@ struct sonde_scene_state {
   uint8_t *in_rim;                                          // [slots] scratch
   uint32_t *island;                                         // [bodies]
   bool *loose;                                              // [bodies] nothing outside holds it
+  bool *keeps_awake, *is_held;                              // [bodies] scratch of falling asleep
   sonde_pcg_scratch scratch;
   sonde_tissue_node *tissue_nodes;
   sonde_scene_report report;
@@ -167,69 +172,27 @@ void sonde_network_linearise(sonde_scene_state *state, uint32_t body,
 double sonde_network_energy(const sonde_body *body, const sonde_vec3 *position);
 double sonde_network_volume(const sonde_body *body, const sonde_vec3 *position);
 
-// Contacts at the stage: pushes and grips.
-// @param start the stage is the start of a step, where bodies are found wholly inside others
-// @thread tick
-void sonde_touch_find(sonde_scene_state *state, bool start);
-// A push whose rows come next; NULL when there is no room. @thread tick
-sonde_push *sonde_push_new(sonde_scene_state *state, uint32_t touch);
-// Notices a body wholly inside the other of a touch. @thread tick
-void sonde_release_notice(sonde_scene_state *state, uint32_t touch,
-                          const sonde_overlap_result *found);
-// The push that lets it out; false when it is out, which may only end at the start of a step.
-bool sonde_release_push(sonde_scene_state *state, uint32_t touch, bool may_end);
-// Raises a flag of one body, or of one and another (UINT32_MAX: none). @thread tick
-void sonde_scene_note(sonde_scene_state *state, uint32_t flag, uint32_t body, uint32_t other);
-// Flags a deformable body of a touch when a common volume is negative; false when it is.
-// @thread tick
-bool sonde_trouble_overlap(sonde_scene_state *state, uint32_t touch,
-                           const sonde_overlap_result *found);
-// Flags a touch whose direction turned round while it was deep; at the end of a step. @thread tick
-void sonde_trouble_direction(sonde_scene_state *state, uint32_t touch);
-// Straight motion of a rigid body from the start of a step of h, in `undo`, to its end. @thread
-// tick
-sonde_motion sonde_cast_way(const sonde_scene_state *state, uint32_t body, double h);
-// Flags a touch whose bodies met on the way of a step from `undo` and are apart again; h its
-// length. @thread tick
-void sonde_trouble_way(sonde_scene_state *state, uint32_t touch, double h);
-// Flags deformable bodies that are inside out. @thread tick
-void sonde_trouble_inspect(sonde_scene_state *state);
-// Forces at the stage, which the bodies reached after moving for moved_s. @thread tick
-void sonde_touch_evaluate(sonde_scene_state *state, double moved_s);
-// Sums forces and K v over the slots and lists the terms of the matrix. @thread tick
-void sonde_touch_gather(sonde_scene_state *state, const sonde_tissue_scales *scales);
-// Forces at the end of the step from the moves since the evaluation; how many pushes would pull
-// and were dropped. @thread tick
-uint32_t sonde_touch_predict(sonde_scene_state *state);
-// Measures and bonds at the end of the step. @thread tick
-void sonde_touch_finish(sonde_scene_state *state, double h);
-
-// Friction of a grip at the stage / at the end of the step. @thread tick
-void sonde_grip_begin(sonde_scene_state *state, sonde_grip *grip);
-void sonde_grip_evaluate(sonde_scene_state *state, sonde_grip *grip, double moved_s);
-void sonde_grip_predict(sonde_scene_state *state, sonde_grip *grip);
-void sonde_bonds_advance(sonde_scene_state *state, double h);
-// First bond of a touch, made when it has none; UINT32_MAX when there is no room. @thread tick
-uint32_t sonde_bonds_of(sonde_scene_state *state, uint32_t touch);
-// Relative velocity of a grip's points, a less b, for a field over the slots.
-sonde_vec3 sonde_grip_slip(const sonde_scene_state *state, const sonde_grip *grip,
-                           const sonde_vec3 *field);
-// Adds a force on a's point and its opposite on b's to a field over the slots.
-void sonde_grip_spread(const sonde_scene_state *state, const sonde_grip *grip, sonde_vec3 force,
-                       sonde_vec3 *field);
-// Rows of a push along `direction` on a and against it on b; false when the pool is full.
-bool sonde_grip_rows(sonde_scene_state *state, const sonde_grip *grip, sonde_vec3 direction,
-                     uint32_t *first, uint32_t *count);
-
 // The solver's rows and pairs, and the waking parts of tissues. @thread tick
 void sonde_sleep_list(sonde_scene_state *state);
+// Puts tissues to sleep that are at rest in the beginning.
+void sonde_sleep_start(sonde_scene_state *state);
 // The same at the start of a step; bodies that may not sleep are woken. @thread tick
 void sonde_sleep_begin(sonde_scene_state *state);
 // Wakes what contacts push; true when something slept: the bodies have to be linearised again.
 // @thread tick
 bool sonde_sleep_wake_touched(sonde_scene_state *state);
-// Puts nodes at rest to sleep and wakes beside movers, at the end of a step. @thread tick
-void sonde_sleep_rest(sonde_scene_state *state);
+// Puts nodes and bodies at rest to sleep and wakes nodes beside movers, at the end of a step of h.
+// @thread tick
+void sonde_sleep_rest(sonde_scene_state *state, double h);
+// Whether a body will not move in this step unless it is woken. @thread tick
+bool sonde_body_rests(const sonde_scene_state *state, uint32_t body);
+static inline bool sonde_touch_rests(const sonde_scene_state *state, uint32_t t) {
+  const sonde_touch *touch = &state->scene->touches[t];
+  return sonde_body_rests(state, touch->a) && sonde_body_rests(state, touch->b);
+}
+// Wakes sleeping bodies that touch others, and what they rest with; true when one slept.
+// @thread tick
+bool sonde_sleep_wake_bodies(sonde_scene_state *state);
 
 // One step of size h. @thread tick
 void sonde_step_once(sonde_scene_state *state, double h);

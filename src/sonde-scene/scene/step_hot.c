@@ -1,5 +1,5 @@
 // One implicit step for all bodies of a scene (docs/scene_theory.md).
-#include "scene/state.h"
+#include "scene/touch.h"
 
 #include "base/base.h"
 #include "base/clock.h"
@@ -13,9 +13,10 @@ static sonde_tissue_scales scales_of(const sonde_scene_state *state, double h) {
 }
 
 static void linearise(sonde_scene_state *state, const sonde_tissue_scales *scales) {
-  state->row_count = state->term_count = 0;
+  state->bulk_row_count = state->term_count = 0;
   for (uint32_t b = 0; b < state->scene->body_count; ++b) {
     const sonde_body *body = &state->scene->bodies[b];
+    if (state->now.asleep[b]) continue;
     if (sonde_body_is_rigid(body)) {
       for (uint32_t k = 0; k < 2; ++k) {
         uint32_t s = body->first_slot + k;
@@ -43,10 +44,12 @@ static void linearise(sonde_scene_state *state, const sonde_tissue_scales *scale
       sonde_network_linearise(state, b, scales);
     // The forces of sleepers are not made anew.
     uint32_t count = body->model ? state->part[b].row_count : body->node_count;
+    bool weighs = !body->model || body->sags;
+    sonde_vec3 gravity = weighs ? state->scene->gravity_m_s2 : vec3(0, 0, 0);
     for (uint32_t r = 0; r < count; ++r) {
       uint32_t i = body->model ? state->part[b].rows[r] : r;
       sonde_vec3 *f = &state->force[body->first_slot + i];
-      *f = v_add(v_madd(*f, body->node_mass_kg[i], state->scene->gravity_m_s2), body->load_n[i]);
+      *f = v_add(v_madd(*f, body->node_mass_kg[i], gravity), body->load_n[i]);
     }
   }
   state->bulk_terms = state->term_count;
@@ -56,15 +59,16 @@ static void evaluate(sonde_scene_state *state, double h, double moved_s) {
   SONDE_ASSERT(h > 0 && moved_s >= 0);
   sonde_tissue_scales scales = scales_of(state, h);
   double start = sonde_clock_now();
-  double linearised;
   do {
-    linearise(state, &scales);
-    linearised = sonde_clock_now();
     sonde_touch_find(state, !(moved_s > 0));
-  } while (sonde_sleep_wake_touched(state));
+  } while (sonde_sleep_wake_bodies(state));
+  sonde_sleep_wake_touched(state);
+  double found = sonde_clock_now();
+  linearise(state, &scales);
+  double linearised = sonde_clock_now();
   sonde_touch_evaluate(state, moved_s);
-  state->report.assembly_s += linearised - start;
-  state->report.contact_s += sonde_clock_now() - linearised;
+  state->report.assembly_s += linearised - found;
+  state->report.contact_s += found - start + sonde_clock_now() - linearised;
 }
 
 static void solve(sonde_scene_state *state, sonde_vec3 *x) {
@@ -209,7 +213,7 @@ static void balance(sonde_scene_state *state, sonde_vec3 *dv, double h) {
   for (uint32_t b = 0; b < scene->body_count; ++b) state->island[b] = b;
   for (uint32_t k = 0; k < state->near_touch_count; ++k) {
     uint32_t t = state->near_touch[k];
-    if (!state->pair[t].point_count) continue;
+    if (!state->now.pair[t].point_count) continue;
     uint32_t a = island_of(state->island, scene->touches[t].a);
     uint32_t b = island_of(state->island, scene->touches[t].b);
     state->island[a > b ? a : b] = a > b ? b : a;
@@ -222,7 +226,7 @@ static void balance(sonde_scene_state *state, sonde_vec3 *dv, double h) {
     for (uint32_t b = root; b < scene->body_count && loose; ++b) {
       const sonde_body *body = &scene->bodies[b];
       if (island_of(state->island, b) != root) continue;
-      loose = state->loose[b];
+      loose = state->loose[b] && !state->now.asleep[b];
       mass += body->mass.mass_kg;
       uint32_t count = sonde_body_is_rigid(body) ? 1 : body->slot_count;
       for (uint32_t k = 0; k < count; ++k) sum = v_add(sum, state->residual[body->first_slot + k]);
@@ -273,7 +277,7 @@ void sonde_step_once(sonde_scene_state *state, double h) {
   sonde_touch_finish(state, h);
   bool finite = true;
   for (uint32_t k = 0; k < state->near_touch_count; ++k) {
-    const sonde_pair_measure *pair = &state->pair[state->near_touch[k]];
+    const sonde_pair_measure *pair = &state->now.pair[state->near_touch[k]];
     finite &= v_finite(pair->force_n) && v_finite(pair->torque_n_m);
   }
   finite = sonde_stage_finish(state, state->now.increment, h) && finite;
@@ -289,13 +293,14 @@ void sonde_step_once(sonde_scene_state *state, double h) {
     memset(state->now.velocity, 0, bytes);
     memset(state->now.increment, 0, bytes);
     memset(state->now.calm, 0, state->scene->slot_count);
+    memset(state->now.asleep, 0, state->scene->body_count);
     sonde_scene_motion_unbond(&state->now);
     memset(state->now.bond_first, 0, state->scene->touch_count * sizeof *state->now.bond_first);
     for (uint32_t t = 0; t < state->scene->touch_count; ++t)
-      state->pair[t] = (sonde_pair_measure){0};
+      state->now.pair[t] = (sonde_pair_measure){0};
     state->report.flags |= SONDE_SCENE_NON_FINITE;
     return;
   }
   state->now.head->time_s += h;
-  sonde_sleep_rest(state);
+  sonde_sleep_rest(state, h);
 }

@@ -1,5 +1,5 @@
 // A step of the scene, whole or in substeps chosen by step doubling (docs/scene_theory.md).
-#include "scene/state.h"
+#include "scene/touch.h"
 
 #include "base/base.h"
 #include "base/maths.h"

@@ -1,5 +1,5 @@
 // Contact between any two bodies, every step (docs/scene_theory.md).
-#include "scene/state.h"
+#include "scene/touch.h"
 
 #include "base/base.h"
 #include "base/maths.h"
@@ -248,7 +248,7 @@ static uint32_t add_region(sonde_scene_state *state, uint32_t t, const sonde_ove
 
 static void find_touch(sonde_scene_state *state, uint32_t t, bool start) {
   const sonde_touch *touch = &state->scene->touches[t];
-  sonde_pair_measure *pair = &state->pair[t];
+  sonde_pair_measure *pair = &state->now.pair[t];
   // Large faces of rigid bodies are pushed at three columns per piece, others at one.
   bool rigid = sonde_body_is_rigid(body_of(state, touch->a)) &&
                sonde_body_is_rigid(body_of(state, touch->b));
@@ -294,15 +294,19 @@ static void find_touch(sonde_scene_state *state, uint32_t t, bool start) {
 void sonde_touch_find(sonde_scene_state *state, bool start) {
   const sonde_scene *scene = state->scene;
   state->push_count = state->grip_count = 0;
+  state->row_count = state->bulk_row_capacity;
   if (!scene->touch_count) return;
   for (uint32_t k = 0; k < state->near_touch_count; ++k)
-    state->pair[state->near_touch[k]] = (sonde_pair_measure){0};
+    if (!sonde_touch_rests(state, state->near_touch[k]))
+      state->now.pair[state->near_touch[k]] = (sonde_pair_measure){0};
   state->near_touch_count = 0;
-  // The trees of what moves are fitted; a resting body's tree was fitted when the state was made.
+  // The trees of what moves are fitted; a fixed body's tree was fitted when the state was made.
   for (uint32_t b = 0; b < scene->body_count; ++b) {
     sonde_vec3 *surface = state->surface + state->surface_first[b];
     if (!state->tree[b]) continue;
-    if (scene->bodies[b].motion != SONDE_BODY_FIXED) {
+    if (scene->bodies[b].motion != SONDE_BODY_FIXED &&
+        !(state->fitted[b] && state->now.asleep[b])) {
+      state->fitted[b] = state->now.asleep[b];
       sonde_surface_at(state, b, state->stage_position, state->stage_rotation, surface);
       sonde_face_tree_refit(state->tree[b], surface);
     }
@@ -313,14 +317,14 @@ void sonde_touch_find(sonde_scene_state *state, bool start) {
   SONDE_ASSERT(count <= state->near_capacity);
   for (uint32_t k = 0; k < count; ++k) {
     uint32_t t = state->touch_of[state->near[k][0] * scene->body_count + state->near[k][1]];
-    if (!t) continue;
+    if (!t || sonde_touch_rests(state, t - 1)) continue;
     state->near_touch[state->near_touch_count++] = t - 1;
     state->found_hint[t - 1] = vec3(0, 0, 0);
     find_touch(state, t - 1, start);
   }
   // What is no longer near another is out of it.
   for (uint32_t t = 0; t < scene->touch_count && start; ++t)
-    if (state->now.release[t] && !state->pair[t].region_count) state->now.release[t] = 0;
+    if (state->now.release[t] && !state->now.pair[t].region_count) state->now.release[t] = 0;
   state->report.touch_points = state->grip_count;
   for (uint32_t k = 0; k < state->grip_count; ++k) sonde_grip_begin(state, &state->grips[k]);
 }
@@ -420,7 +424,7 @@ void sonde_touch_finish(sonde_scene_state *state, double h) {
   for (uint32_t k = 0; k < state->push_count; ++k) {
     const sonde_push *push = &state->pushes[k];
     const sonde_touch *touch = &state->scene->touches[push->touch];
-    sonde_pair_measure *pair = &state->pair[push->touch];
+    sonde_pair_measure *pair = &state->now.pair[push->touch];
     const sonde_body *a = body_of(state, touch->a), *b = body_of(state, touch->b);
     pair->normal_n += push->end_force * push->newtons;
     if (push->end_value > 0)
@@ -442,22 +446,22 @@ void sonde_touch_finish(sonde_scene_state *state, double h) {
   for (uint32_t k = 0; k < state->grip_count; ++k) {
     const sonde_grip *grip = &state->grips[k];
     if (state->pushes[grip->push].dropped) continue;
-    sonde_pair_measure *pair = &state->pair[grip->touch];
+    sonde_pair_measure *pair = &state->now.pair[grip->touch];
     sonde_vec3 f = grip->end_force;
     pair->friction_n = v_add(pair->friction_n, f);
     pair->torque_n_m = v_add(pair->torque_n_m, v_cross(grip->point[0], f));
     pair->torque_b_n_m = v_sub(pair->torque_b_n_m, v_cross(grip->point[1], f));
   }
   for (uint32_t t = 0; t < state->scene->touch_count; ++t) {
-    if (state->pair[t].region_count) continue;
+    if (state->now.pair[t].region_count) continue;
     state->now.hint[t] = state->now.entry[t] = vec3(0, 0, 0);
     state->now.deep[t] = 0;
   }
   for (uint32_t k = 0; k < state->near_touch_count; ++k) {
     uint32_t t = state->near_touch[k];
-    state->pair[t].force_n = v_add(state->pair[t].force_n, state->pair[t].friction_n);
+    state->now.pair[t].force_n = v_add(state->now.pair[t].force_n, state->now.pair[t].friction_n);
     state->now.hint[t] = state->found_hint[t];
-    if (state->pair[t].region_count) sonde_trouble_direction(state, t);
+    if (state->now.pair[t].region_count) sonde_trouble_direction(state, t);
   }
   sonde_bonds_advance(state, h);
 }

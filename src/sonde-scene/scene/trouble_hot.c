@@ -1,5 +1,5 @@
 // What cannot be true of bodies, found every step: flags with the bodies they are about.
-#include "scene/state.h"
+#include "scene/touch.h"
 
 #include "base/base.h"
 #include "base/maths.h"
@@ -52,7 +52,7 @@ void sonde_trouble_direction(sonde_scene_state *state, uint32_t t) {
   sonde_vec3 direction = state->found_hint[t], *entry = &state->now.entry[t];
   double thickness = fmin(state->thickness_m[touch->a], state->thickness_m[touch->b]);
   if (state->now.release[t] || !(v_norm2(direction) > 0)) return;
-  bool deep = state->pair[t].depth_m > DEEP * thickness;
+  bool deep = state->now.pair[t].depth_m > DEEP * thickness;
   if (deep && !(v_norm2(*entry) > 0)) {
     // Bodies that are deep when they meet first came against the direction of the motion.
     sonde_vec3 a = mean_of(state, touch->a, state->now.velocity);
@@ -70,7 +70,7 @@ void sonde_trouble_way(sonde_scene_state *state, uint32_t t, double h) {
   const sonde_body *a = &state->scene->bodies[touch->a], *b = &state->scene->bodies[touch->b];
   double margin = 1e-3 * fmin(state->thickness_m[touch->a], state->thickness_m[touch->b]);
   bool convex_a = sonde_body_is_convex(a), convex_b = sonde_body_is_convex(b), hit = false;
-  if (state->pair[t].region_count || !(margin > 0) || !(convex_a || convex_b)) return;
+  if (state->now.pair[t].region_count || !(margin > 0) || !(convex_a || convex_b)) return;
   uint32_t one = convex_a ? touch->a : touch->b, other = convex_a ? touch->b : touch->a;
   const sonde_convex *convex = &state->scene->bodies[one].convex;
   sonde_motion way = sonde_cast_way(state, one, h);
@@ -106,7 +106,7 @@ void sonde_trouble_way(sonde_scene_state *state, uint32_t t, double h) {
 void sonde_trouble_inspect(sonde_scene_state *state) {
   for (uint32_t b = 0; b < state->scene->body_count; ++b) {
     const sonde_body *body = &state->scene->bodies[b];
-    if (sonde_body_is_rigid(body) || body->model || !body->closed) continue;
+    if (sonde_body_is_rigid(body) || body->model || !body->closed || state->now.asleep[b]) continue;
     double volume = sonde_network_volume(body, state->now.position + body->first_slot);
     if (!(volume > 0)) sonde_scene_note(state, SONDE_SCENE_INVERTED, b, UINT32_MAX);
   }
