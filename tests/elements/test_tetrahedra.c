@@ -83,6 +83,40 @@ static void test_cylinder_with_rod(void **state) {
   sonde_mesh_clear(&rod);
 }
 
+// Balls with bumps and hollows of every depth, some with a fine place.
+static void test_rough_bodies(void **state) {
+  (void)state;
+  uint64_t seed = 7;
+  double least = 180, most = 0;
+  for (int round = 0; round < 20; ++round) {
+    sonde_mesh body = shape_sphere(8 + (uint32_t)round % 8, 1);
+    double high = shape_uniform(&seed, 0, 0.4), b = shape_uniform(&seed, 2, 7);
+    double edge = shape_uniform(&seed, 0.1, 0.25);
+    for (uint32_t v = 0; v < body.vertex_count; ++v) {
+      sonde_vec3 p = body.vertices[v];
+      double bump = sin(b * p.x) * sin(4 * p.y + 1) + 0.6 * sin(6 * p.z);
+      body.vertices[v] = v_scale(p, 1 + high * bump);
+    }
+    shape_move(&body, (sonde_pose){vec3(0.3, 0.1, 0), shape_rotation(&seed)});
+    const sonde_vec3 place = body.vertices[0];
+    sonde_tetrahedra_def def = {.edge_m = edge, .growth = round % 3 ? 0.4 : 1.5};
+    if (round % 4 == 0)
+      def.fine = &place, def.fine_count = 1, def.fine_edge_m = edge / 4, def.fine_reach_m = edge;
+    sonde_tetrahedra t = make_mesh(&body, NULL, &def);
+    sonde_tetrahedra_report r;
+    assert_ok(sonde_tetrahedra_inspect(&t, &body, NULL, &r, &shape_error));
+    least = fmin(least, r.smallest_dihedral_rad * DEGREES);
+    most = fmax(most, r.largest_dihedral_rad * DEGREES);
+    assert_int_equal(euler_characteristic(&t), 1);
+    assert_true(r.off_surface_m < 0.6 * edge);
+    assert_near(r.volume_m3 / volume_of(&body), 0.97, 0.03);
+    sonde_tetrahedra_clear(&t);
+    sonde_mesh_clear(&body);
+  }
+  print_message("rough bodies: angles %.1f to %.1f degrees\n", least, most);
+  assert_true(least > 26 && most < 150);
+}
+
 // Edges are short near the points and grow away from them.
 static void test_finer_places(void **state) {
   (void)state;
@@ -206,6 +240,7 @@ int main(void) {
       cmocka_unit_test(test_box),
       cmocka_unit_test(test_cylinder_with_rod),
       cmocka_unit_test(test_finer_places),
+      cmocka_unit_test(test_rough_bodies),
       cmocka_unit_test(test_same_every_time),
       cmocka_unit_test(test_refusals),
       cmocka_unit_test(test_out_of_memory),
