@@ -32,6 +32,7 @@ static void tick(void *user) {
 }
 
 static void print_times(const char *name, double *list, size_t count) {
+  assert(count > 0);
   app_json_object(name);
   app_json("p50:%g p99:%g p999:%g max:%g", 1e6 * app_quantile(list, count, 0.5),
            1e6 * app_quantile(list, count, 0.99), 1e6 * app_quantile(list, count, 0.999),
@@ -83,6 +84,7 @@ static void print_table(bench *b, const sonde_loop_stats *stats) {
 // Runs the loop for some seconds and prints what it took.
 static sonde_status measure(bench *b, const haptics_rig_def *def, double seconds, bool json,
                             const char *csv, sonde_error *error) {
+  assert(seconds > 0);
   sonde_world_def world = haptics_world();
   sonde_loop_stats stats = {0};
   sonde_state *state = NULL;

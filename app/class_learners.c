@@ -1,6 +1,7 @@
 // Processes of a class: started, watched, started again, ended.
 #include "class_learners.h"
 
+#include <assert.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <math.h>
@@ -29,6 +30,7 @@ double class_now_s(void) {
 // output, errors to a pipe. The name and the tokens go by the environment, which no other user can
 // read, not by the command line.
 static int spawn(const class_room *room, class_learner *learner, int errors) {
+  assert(learner->port != 0 && learner->name[0] && errors >= 0);
   static const char *const OURS[] = {"SONDE_TRAINEE=", "SONDE_PAGE_TOKEN=", "SONDE_TEACHER_TOKEN="};
   char port[8], own[3][CLASS_NAME + SONDE_PAGE_TOKEN + 24];
   char *words[ARGUMENTS] = {(char *)room->program, "run", "--port", port};
@@ -74,6 +76,7 @@ static int spawn(const class_room *room, class_learner *learner, int errors) {
 static const class_status UNKNOWN = {.elapsed_s = (double)NAN, .score = (double)NAN};
 
 bool class_start(const class_room *room, class_learner *learner, class_say say) {
+  assert(!learner->process && room->program);
   int ends[2], code = pipe2(ends, O_CLOEXEC | O_NONBLOCK) ? errno : 0;
   learner->started_s = class_now_s();
   learner->last_line[0] = 0;
@@ -100,6 +103,7 @@ bool class_start(const class_room *room, class_learner *learner, class_say say) 
 
 // Keeps the last line that a program said.
 static void hear(class_learner *learner) {
+  assert(learner->process && learner->errors_fd >= 0);
   char bytes[1024];
   ssize_t got;
   while ((got = read(learner->errors_fd, bytes, sizeof bytes - 1)) > 0) {
@@ -113,11 +117,13 @@ static void hear(class_learner *learner) {
 }
 
 static void forget_process(class_learner *learner) {
+  assert(learner->process);
   close(learner->errors_fd);
   learner->process = 0;
 }
 
 bool class_watch(class_room *room, class_say say) {
+  assert(room->count <= CLASS_LEARNERS);
   uint32_t lost = 0;
   for (uint32_t i = 0; i < room->count; ++i) {
     class_learner *learner = &room->learner[i];
@@ -179,11 +185,13 @@ static uint32_t running(class_room *room) {
 }
 
 static void signal_all(const class_room *room, int number) {
+  assert(number == SIGTERM || number == SIGKILL);
   for (uint32_t i = 0; i < room->count; ++i)
     if (room->learner[i].process) kill(room->learner[i].process, number);
 }
 
 void class_stop(class_room *room) {
+  assert(room->count <= CLASS_LEARNERS);
   double until_s = class_now_s() + STOP_S;
   signal_all(room, SIGTERM);
   while (running(room) && class_now_s() < until_s)

@@ -1,6 +1,7 @@
 // How the learners are doing: GET /status.json from every program at once, on this machine only.
 #include "class_learners.h"
 
+#include <assert.h>
 #include <arpa/inet.h>
 #include <errno.h>
 #include <math.h>
@@ -21,12 +22,14 @@ typedef struct question {
 } question;
 
 static void finish(question *q) {
+  assert(q->poll.fd >= 0);
   close(q->poll.fd);
   q->poll.fd = -1;
 }
 
 // A member as text that a terminal can show.
 static void take_text(const sonde_json *object, const char *key, char *to, size_t size) {
+  assert(size > 1);
   const char *text = sonde_json_as_text(sonde_json_member(object, key));
   snprintf(to, size, "%.*s", (int)size - 1, text ? text : "");
   for (char *p = to; *p; ++p)
@@ -39,6 +42,7 @@ static double take_number(const sonde_json *object, const char *key) {
 }
 
 void class_ask(class_room *room) {
+  assert(room->count <= CLASS_LEARNERS);
   static question all[CLASS_LEARNERS];
   struct pollfd polls[CLASS_LEARNERS];
   double until_s = class_now_s() + WAIT_S;

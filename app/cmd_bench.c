@@ -137,6 +137,7 @@ static double smooth(double x) {
 static double now(void) { return app_seconds(CLOCK_THREAD_CPUTIME_ID); }
 
 static uint32_t steps_to(const bench *b, double time_s) {
+  assert(time_s >= 0);
   return (uint32_t)(time_s / b->o->dt_s + 0.5);
 }
 
@@ -192,6 +193,7 @@ static void run(const bench *b, sonde_state *state, double way_m, sample *sample
 
 // Order statistic of one field of the samples.
 static double quantile(const bench *b, size_t offset, double q) {
+  assert(q >= 0 && q <= 1 && b->steps > 0);
   double *list = malloc(b->steps * sizeof *list);
   if (!list) return NAN;
   for (uint32_t k = 0; k < b->steps; ++k)
@@ -202,6 +204,7 @@ static double quantile(const bench *b, size_t offset, double q) {
 }
 
 static double mean_count(const bench *b, size_t offset) {
+  assert(b->steps > 0);
   double sum = 0;
   for (uint32_t k = 0; k < b->steps; ++k) {
     uint32_t value;
@@ -229,6 +232,7 @@ static sonde_world_def world_of(const options *o, bool reference) {
 
 // Bytes per second when a block of that size is read over and over: what memory could give at best.
 static double bandwidth(double bytes) {
+  assert(bytes > 0);
   size_t count = (size_t)(bytes / sizeof(uint64_t)) + 1;
   uint64_t *block = calloc(count, sizeof *block), sum = 0;
   if (!block) return NAN;

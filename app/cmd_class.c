@@ -91,6 +91,7 @@ static void wipe(void) {
 }
 
 static void say(const class_learner *learner, const char *sentence) {
+  assert(learner->name[0] && sentence[0]);
   char clock[16];
   time_t now = time(NULL);
   struct tm parts = {0};
@@ -118,6 +119,7 @@ static void numbers_of(const class_status *status, char elapsed[16], char score[
 
 // A column of so many characters, and a space.
 static void cell(const char *text, int width) {
+  assert(width > 0);
   const char *p = text;
   int used = 0;
   for (; *p && used < width; ++used) do
@@ -136,6 +138,7 @@ static void draw_row(const char *name, const char *port, const char *state, cons
 }
 
 static void draw(const class_room *room) {
+  assert(room->count >= 1 && room->count <= CLASS_LEARNERS);
   wipe();
   draw_row("learner", "port", "state", "case", "time", "score");
   for (uint32_t i = 0; i < room->count; ++i) {
@@ -153,6 +156,7 @@ static void draw(const class_room *room) {
 // ---- a class
 
 static void print_address(const char *whose, uint16_t port, const char *token) {
+  assert(port != 0 && token[0]);
   printf("%s: http://127.0.0.1:%u/#%s\n", whose, (unsigned)port, token);
 }
 

@@ -402,6 +402,7 @@ typedef struct spread {
 } spread;
 
 static spread spread_of(const sonde_fit_result *r, bool tare) {
+  assert(r->curve_count > 0);
   spread s = {0, 0};
   for (uint32_t c = 0; c < r->curve_count; ++c)
     s.mean += (tare ? r->curves[c].tare_n : 1e3 * r->curves[c].zero_m) / r->curve_count;
@@ -415,6 +416,7 @@ static spread spread_of(const sonde_fit_result *r, bool tare) {
 
 // Root mean square over the rows of one curve's repeats about their mean.
 static double scatter_of(const sonde_measurements *m) {
+  assert(m->count > 0 && m->scatter_n);
   double sum = 0;
   for (uint32_t i = 0; i < m->count; ++i) sum += m->scatter_n[i] * m->scatter_n[i] / m->count;
   return sqrt(sum);

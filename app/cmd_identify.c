@@ -200,11 +200,13 @@ static sonde_status find_friction(const options *a, const sonde_model *model,
 
 static void print_estimate(const char *name, const char *unit, double scale,
                            const sonde_estimate *e) {
+  assert(scale > 0);
   printf("  %-18s %9.4g %-5s 95 %%: %.4g to %.4g%s\n", name, scale * e->value, unit, scale * e->low,
          scale * e->high, e->identified ? "" : "  (not determined)");
 }
 
 static void json_estimate(const char *key, double scale, const sonde_estimate *e) {
+  assert(scale > 0);
   app_json_object(key);
   app_json("value:%g low:%g high:%g identified:%hhd", scale * e->value, scale * e->low,
            scale * e->high, e->identified);

@@ -92,6 +92,7 @@ static int check(void *from) {
 }
 
 static void print_spacing(const options *a, const sonde_site_table *sites) {
+  assert(sites->count > 0);
   if (a->sites && !a->save_sites) return;
   sonde_site_spacing s = sonde_site_spacing_of(sites);
   if (a->json) {

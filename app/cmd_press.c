@@ -59,6 +59,7 @@ typedef struct press {
 
 // Of one vessel; null when the plane misses it. Diameters before are those of the rest circle.
 static void print_vessel(const char *name, const sonde_vessel_state *v, bool cut) {
+  assert(!cut || v->rest_radius_m > 0);
   char key[64];
   const double nan = NAN, mm = 1e3;
   const struct {

@@ -113,6 +113,7 @@ static sonde_status make_device(const void *user, const sonde_site *start,
 }
 
 static void sleep_s(double seconds) {
+  assert(seconds >= 0);
   struct timespec pause = {(time_t)seconds, (long)(1e9 * fmod(seconds, 1.0))};
   nanosleep(&pause, NULL);
 }

@@ -2,6 +2,7 @@
 #include "exam_app_parts.h"
 #include "page_token.h"
 
+#include <assert.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,6 +10,7 @@
 static const double TELL_EVERY_S = 0.2;
 
 const char *exam_app_path(char path[EXAM_PATH], const char *directory, const char *name) {
+  assert(directory[0] && name[0]);
   if (snprintf(path, EXAM_PATH, "%s/%s", directory, name) >= EXAM_PATH) path[0] = 0;
   return path;
 }
@@ -35,6 +37,7 @@ void exam_app_case_alias(const exam_app *app, const char *id, char alias[EXAM_AL
 
 // The server must not show it any more. An exam that the log lacks by then gets its row.
 static void end_session(exam_app *app, sonde_session *session) {
+  assert(session != NULL);
   sonde_error error = {0};
   exam_recovered found;
   bool recorded = sonde_session_recording(session).recording;
@@ -51,6 +54,7 @@ void exam_app_end_session(exam_app *app) {
 
 sonde_status exam_app_run_session(exam_app *app, sonde_session_def *def, const sonde_site *start,
                                   sonde_error *error) {
+  assert(def->model);
   sonde_session *before = app->session, *next = NULL;
   sonde_device device = {0};
   // One hand cannot hold two devices: the session before ends first.
@@ -81,6 +85,7 @@ static sonde_status start_practice(exam_app *app, sonde_error *error) {
 }
 
 void exam_app_change(exam_app *app, exam *next, exam_replay *replay) {
+  assert(!next || !replay);
   exam *exam_before = app->exam;
   exam_replay *replay_before = app->replay;
   pthread_mutex_lock(&app->lock);
@@ -114,6 +119,7 @@ static void take_request(void *user, const sonde_page_request *request) {
 // A note of the exam that runs, at the last image that the judge saw.
 static sonde_status put_note(exam_app *app, sonde_note_kind kind, const char *const (*texts)[2],
                              size_t count, uint64_t tick, sonde_error *error) {
+  assert(app->session && (count == 0 || texts != NULL));
   char *text = NULL;
   sonde_status status = exam_note_text(texts, count, &text, error);
   if (!status) status = sonde_session_note(app->session, kind, tick, text, error);
@@ -195,6 +201,7 @@ void exam_app_turn(exam_app *app) {
 // ---- the application
 
 sonde_status exam_app_create(const exam_app_def *def, exam_app **out, sonde_error *error) {
+  assert(def->cases && def->protocols);
   exam_app *app = calloc(1, sizeof *app);
   *out = NULL;
   if (!app) return error->status = SONDE_MEMORY;

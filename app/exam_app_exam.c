@@ -1,6 +1,7 @@
 // An exam: begun on a case's thigh, watched frame by frame, judged.
 #include "exam_app_parts.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -17,6 +18,7 @@ static bool show_progress(double fraction, const char *what, void *user) {
 
 sonde_status exam_prepare(exam *of, const char *bundled, const char *cases,
                           const sonde_progress *progress, sonde_error *error) {
+  assert(of != NULL);
   sonde_status status = sonde_case_build(&of->patient, bundled, cases, &of->setup, error);
   if (!status) status = sonde_plan_make(of->protocol, &of->setup.map, &of->plan, error);
   if (!status) status = sonde_plan_find_targets(&of->plan, &of->setup, progress, error);
@@ -113,6 +115,7 @@ sonde_status exam_start(exam_app *app, const sonde_page_request *request, sonde_
 
 // Means of 2 x 2 pixels.
 static void keep_picture(const sonde_frame *frame, exam_picture *picture) {
+  assert(frame->pixels && frame->width > 1 && frame->height > 1);
   sonde_image *image = &picture->image;
   if (!image->pixels &&
       sonde_image_create(frame->width / 2, frame->height / 2, image, NULL) != SONDE_OK)
@@ -130,6 +133,7 @@ static void keep_picture(const sonde_frame *frame, exam_picture *picture) {
 }
 
 void exam_observe(exam *of, const sonde_frame *frame) {
+  assert(of->judge && frame);
   const sonde_snapshot *s = &frame->snapshot;
   uint32_t presses, n = of->sample_count;
   sonde_judge_feed(of->judge, s);

@@ -2,6 +2,7 @@
 // derived from it again.
 #include "exam_app_parts.h"
 
+#include <assert.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -27,6 +28,7 @@ static sonde_log_entry entry_of(const exam *of) {
 
 // The row is worth an attempt also without the files.
 sonde_status exam_save(sonde_exam_log *log, exam *of, sonde_error *error) {
+  assert(of->judge && of->directory[0]);
   sonde_status status = SONDE_OK, logged = SONDE_OK;
   if (!of->filed) {
     char json[EXAM_PATH], csv[EXAM_PATH];
@@ -92,6 +94,7 @@ sonde_status exam_save(sonde_exam_log *log, exam *of, sonde_error *error) {
 
 sonde_status exam_note_text(const char *const (*texts)[2], size_t count, char **text,
                             sonde_error *error) {
+  assert(count == 0 || texts != NULL);
   sonde_json_out out = {.layout = SONDE_JSON_COMPACT};
   size_t length;
   *text = NULL;
@@ -125,6 +128,7 @@ sonde_status exam_setup_text(const exam *of, char **text, sonde_error *error) {
 // ---- the disk
 
 static void tell_disk(exam_app *app, double now_s, const char *sentence) {
+  assert(sentence[0]);
   if (app->disk_told && now_s - app->disk_told_s < TELL_AGAIN_S) return;
   sonde_page_tell(app->server, sentence);
   app->disk_told = true;

@@ -2,6 +2,7 @@
 // exist only here.
 #include "exam_app_parts.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -33,16 +34,19 @@ static void publish(exam_app *app, sonde_page_topic topic, sonde_json_out *out) 
 
 // Rounded, so that a message does not change with every bit; null when there is none.
 static void put_rounded(sonde_json_out *out, const char *key, double value, double unit) {
+  assert(unit > 0);
   sonde_json_put_real(out, key, round(value / unit) * unit, 0);
 }
 
 static void put_reals(sonde_json_out *out, const char *key, const double *list, int count) {
+  assert(count > 0);
   sonde_json_begin_list(out, key);
   for (int i = 0; i < count; ++i) sonde_json_put_real(out, NULL, list[i], 0);
   sonde_json_end(out);
 }
 
 static void put_vector(sonde_json_out *out, const char *key, sonde_vec3 v, double scale) {
+  assert(scale > 0);
   put_reals(out, key, (double[]){v.x * scale, v.y * scale, v.z * scale}, 3);
 }
 
@@ -58,6 +62,7 @@ static void put_case(const exam_app *app, sonde_json_out *out, const char *key, 
 
 // The address of an exam's report, with the key that opens it.
 static void put_report(const exam_app *app, sonde_json_out *out, const char *id) {
+  assert(id[0]);
   char path[SONDE_LOG_TEXT + 16], link[SONDE_PAGE_LINK];
   snprintf(path, sizeof path, "/report/%s", id);
   sonde_page_link(app->server, path, link);

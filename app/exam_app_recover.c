@@ -2,6 +2,7 @@
 // from their journals, exams/ID/exam.rec.
 #include "exam_app_parts.h"
 
+#include <assert.h>
 #include <dirent.h>
 #include <math.h>
 #include <stdio.h>
@@ -16,6 +17,7 @@ static bool exists(const char *directory, const char *name) {
 }
 
 static void copy_member(const sonde_json *root, const char *key, char *to, size_t size) {
+  assert(size > 1);
   const char *text = sonde_json_as_text(sonde_json_member(root, key));
   snprintf(to, size, "%s", text ? text : "");
 }
@@ -46,6 +48,7 @@ static bool never_began(const char *path, sonde_status status) {
 }
 
 static void complain(exam_recovered *found, const char *id, const char *why) {
+  assert(found && why[0]);
   found->unreadable++;
   snprintf(found->worst, sizeof found->worst, "%.60s: %.170s", id, why);
 }
@@ -53,6 +56,7 @@ static void complain(exam_recovered *found, const char *id, const char *why) {
 // What the log should say about one exam.
 static bool read_entry(const char *directory, const char *id, sonde_log_entry *entry,
                        exam_recovered *found) {
+  assert(id[0] && directory[0]);
   char path[EXAM_PATH], *text = NULL;
   size_t size = 0;
   sonde_notes notes = {0};
@@ -150,6 +154,7 @@ void exam_recover_log(const char *exams, sonde_exam_log *log, exam_recovered *fo
 // The exam as its setup tells it, prepared, with the comments of its recording.
 static sonde_status fill(exam *of, const sonde_json *setup, const exam_places *places,
                          sonde_exam_protocol *protocol, const char *recording, sonde_error *error) {
+  assert(of && places);
   char name[48];
   sonde_exam_protocol *all = NULL;
   uint32_t count = 0, k = 0;
@@ -199,6 +204,7 @@ static void apply_note(exam *of, const sonde_note *note) {
 
 static sonde_status derive(exam *of, const exam_places *places, sonde_exam_log *log, bool *derived,
                            sonde_error *error) {
+  assert(of && log && derived);
   char path[EXAM_PATH];
   sonde_notes notes;
   sonde_exam_protocol protocol;

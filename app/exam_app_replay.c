@@ -1,12 +1,14 @@
 // A kept exam: any moment of it, played, with comments.
 #include "exam_app_parts.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 static void show(exam_app *app) {
+  assert(app->replay && app->replay->player);
   exam_replay *replay = app->replay;
   sonde_frame frame;
   if (!sonde_player_frame(replay->player, &frame)) return;
@@ -16,6 +18,7 @@ static void show(exam_app *app) {
 }
 
 sonde_status exam_replay_open(exam_app *app, const char *id, sonde_error *error) {
+  assert(id != NULL);
   // An id names one directory.
   if (!id[0] || strspn(id, "abcdefghijklmnopqrstuvwxyz0123456789-") != strlen(id))
     return app_error(error, SONDE_NOT_FOUND, "there is no such exam");
@@ -85,6 +88,7 @@ sonde_status exam_replay_open(exam_app *app, const char *id, sonde_error *error)
 
 // A machine that is too slow for the exam's pace plays slower; the page stays in step.
 void exam_replay_turn(exam_app *app) {
+  assert(app->replay && app->replay->player);
   const double most_s = 0.1; // of the exam, in one turn
   exam_replay *replay = app->replay;
   if (!replay->playing) return;

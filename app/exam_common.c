@@ -1,11 +1,13 @@
 // Cases and protocols by name or path.
 #include "exam_common.h"
 
+#include <assert.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 static void directory_of(const char *asked, const char *name, char *path, size_t size) {
+  assert(size > 1);
   if (asked)
     snprintf(path, size, "%s", asked);
   else if (!app_data_directory(name, path, size))

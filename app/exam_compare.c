@@ -1,6 +1,7 @@
 // sonde exam --compare: every case by every operator, and what tells the operators apart.
 #include "exam_common.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -58,10 +59,12 @@ typedef struct table {
 } table;
 
 static sonde_score *cell(const table *t, uint32_t of, uint32_t op, long seed) {
+  assert(of < t->case_count && op < OPERATORS && seed >= 0 && seed < t->o->seeds);
   return &t->score[(of * OPERATORS + op) * (uint32_t)t->o->seeds + (uint32_t)seed];
 }
 
 static double mean(const table *t, uint32_t op, const metric *m) {
+  assert(op < OPERATORS && t->case_count > 0);
   double sum = 0;
   uint32_t count = 0;
   for (uint32_t of = 0; of < t->case_count; ++of)
@@ -75,6 +78,7 @@ static double mean(const table *t, uint32_t op, const metric *m) {
 // Chance that an exam of operator a has more of a metric than one of b. 0.5: no difference; ties
 // count half (the area under the ROC curve).
 static double separation(const table *t, const metric *m, uint32_t a, uint32_t b) {
+  assert(a < OPERATORS && b < OPERATORS && a != b);
   double more = 0;
   uint32_t pairs = 0;
   uint32_t exams = t->case_count * (uint32_t)t->o->seeds, seeds = (uint32_t)t->o->seeds;
@@ -90,6 +94,7 @@ static double separation(const table *t, const metric *m, uint32_t a, uint32_t b
 }
 
 static sonde_series series_of(const table *t, uint32_t op) {
+  assert(op < OPERATORS);
   sonde_series series = {0};
   for (uint32_t of = 0; of < t->case_count; ++of)
     for (long seed = 0; seed < t->o->seeds; ++seed)

@@ -42,6 +42,7 @@ static void add_stage(builder *b, const char *name, uint32_t parameters, const d
 
 // The 95 % interval of a positive parameter whose logarithm has this standard deviation.
 static sonde_report_interval spread(double value, double ln_sd) {
+  assert(!(ln_sd < 0));
   sonde_report_interval i = sonde_report_value(value);
   i.lower = value * exp(-1.96 * ln_sd);
   i.upper = value * exp(1.96 * ln_sd);
@@ -147,6 +148,7 @@ __attribute__((format(printf, 2, 3))) static void say(builder *b, const char *fo
 }
 
 static void end_note(builder *b) {
+  assert(b->report.note_count < sizeof b->note / sizeof *b->note);
   b->note[b->report.note_count] = b->text[b->report.note_count];
   ++b->report.note_count;
 }

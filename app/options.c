@@ -86,6 +86,7 @@ __attribute__((format(printf, 3, 4))) static void add(char *text, size_t room, c
 
 // "a, b or c"
 static void add_words(char *text, size_t room, const char *const *words) {
+  assert(room > 0 && strlen(text) < room);
   for (int k = 0; words[k]; ++k)
     add(text, room, "%s%s", k == 0 ? "" : words[k + 1] ? ", " : " or ", words[k]);
 }
@@ -165,6 +166,7 @@ static bool given_name(const char *name, size_t length) {
 
 // "--line, --path and --site", or with another last word; the value follows a single letter.
 static void add_names(char *text, size_t room, const char *list, const char *last) {
+  assert(room > 0 && strlen(text) < room);
   uint32_t count = 0, k = 0;
   EACH_NAME(p, length, list) count++;
   EACH_NAME(p, length, list) {
@@ -318,6 +320,7 @@ int app_options_read(const app_command *command, int argc, char **argv, void *op
 bool app_option_given(const char *name) { return given_name(name, strlen(name)); }
 
 void app_command_line(char *text, size_t room) {
+  assert(room > 0);
   assert(now.command);
   assert(now.command && room > 0);
   snprintf(text, room, "sonde %s", now.command->verb);
@@ -394,6 +397,7 @@ static void head_of(const app_option *o, char head[64]) {
 
 // Words from column `at` on, further lines from column `indent` on; a newline is kept.
 static void print_wrapped(const char *text, int at, int indent) {
+  assert(at >= 0 && indent >= 0);
   for (const char *p = text; *p;) {
     int length = (int)strcspn(p, " \n");
     if (at > indent && at + 1 + length > WIDTH) {

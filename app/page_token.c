@@ -4,6 +4,7 @@
 // write_token  under a name of its own first: the file is whole or absent
 #include "page_token.h"
 
+#include <assert.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
@@ -29,6 +30,7 @@ static bool read_token(const char *path, char token[SONDE_PAGE_TOKEN]) {
 }
 
 static bool write_token(const char *path, const char *token) {
+  assert(path[0] && token[0]);
   // The writer locks the temporary file as long as it lives; without a lock it is a killed
   // program's.
   char part[PATH + 32];
@@ -48,6 +50,7 @@ static bool write_token(const char *path, const char *token) {
 
 sonde_status page_token_find(const char *directory, const char *name, const char *variable,
                              char token[SONDE_PAGE_TOKEN], sonde_error *error) {
+  assert(directory && name);
   char path[PATH];
   const char *given = getenv(variable);
   if (given && !sonde_page_token_valid(given))

@@ -80,6 +80,7 @@ static sonde_status print_comments(output *o, sonde_error *error) {
 }
 
 static void add_percent(char *text, size_t size, const char *name, double ratio) {
+  assert(strlen(text) < size);
   size_t used = strlen(text);
   if (isfinite(ratio))
     snprintf(text + used, size - used, "  %s %3.0f %%", name, 100 * ratio);
@@ -124,6 +125,7 @@ static void draw_picture(output *o, const sonde_frame *frame) {
 
 // All pictures of the film up to a time; the last image stands until the next one.
 static bool film_until(output *o, double time_s) {
+  assert(o->film && isfinite(time_s));
   while (o->what->from_s + (double)o->what->film_frames / FRAMES_PER_S < time_s) {
     if (!film_add(o->film, o->picture)) return false;
     o->what->film_frames++;

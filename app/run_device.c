@@ -4,6 +4,7 @@
 #include "app.h"
 #include "pose.h"
 
+#include <assert.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -36,6 +37,7 @@ static const family families[] = {{"page", PAGE, NULL, NULL},
 enum { FAMILIES = sizeof families / sizeof families[0], FIRST_SITE = 27 };
 
 static const family *family_of(const char *name) {
+  assert(name != NULL);
   for (size_t i = 0; i < FAMILIES; ++i)
     if (strcmp(families[i].name, name) == 0) return &families[i];
   return NULL;
@@ -74,6 +76,7 @@ bool run_device_check(run_device *device) {
 // A landmark has a site's axes: those of the nearest site.
 static sonde_status at_landmark(const sonde_model *model, const char *name, sonde_site *site,
                                 sonde_error *error) {
+  assert(name && site);
   const sonde_landmark *mark = model->anatomy ? sonde_anatomy_landmark(model->anatomy, name) : NULL;
   const sonde_site *near = mark ? sonde_model_site(model, mark->site) : NULL;
   if (!near) {

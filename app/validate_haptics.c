@@ -78,6 +78,7 @@ static sonde_status full_model(work *w) {
 
 // Two Butterworth sections of second order; state in z.
 static double high_pass(double z[2][2], double x, double hz) {
+  assert(hz > 0 && hz < 500);
   double c = tan(3.14159265358979323846 * hz * 1e-3), n = 1.0 / (1.0 + 1.41421356 * c + c * c);
   for (int s = 0; s < 2; ++s) {
     double y = n * x + z[s][0];

@@ -5,6 +5,7 @@
 #include "validate_leg.h"
 #include "validate_list.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -33,6 +34,7 @@ typedef struct stage {
 
 static sonde_status stage_open(stage *s, double radius, double bone, double muscle, double depth,
                                bool vessels, sonde_error *error) {
+  assert(radius > bone && depth > 0);
   *s = (stage){.view = {.aperture_m = 0.04, .settings = sonde_echo_settings_default()}};
   sonde_echo_def def = sonde_echo_def_default();
   def.plain = true;
@@ -78,6 +80,7 @@ typedef struct region {
 
 // Mean intensity over a region, and the envelope's mean over its deviation.
 static double intensity(const stage *s, const float *e, region r, double *contrast) {
+  assert(r.x0 < r.x1 && r.z0 < r.z1);
   uint32_t lines, samples;
   (void)sonde_echo_envelope(s->view.echo, &lines, &samples);
   double pitch = s->view.aperture_m / (lines - 1), step = s->view.settings.depth_m / (samples - 1);
@@ -175,6 +178,7 @@ static sonde_status attenuation(report *r) {
 
 // Layers of the synthetic leg down to muscle, then muscle: dB both ways.
 static double loss_to(double depth_m, double mhz, double muscle_m) {
+  assert(depth_m >= muscle_m && mhz > 0);
   double skin = 1.8e-3, fat = muscle_m - skin;
   return 2 * mhz * (100 * skin + 50 * fat + 100 * (depth_m - muscle_m));
 }
@@ -239,6 +243,7 @@ static sonde_status enhancement(report *r) {
 
 // Pressure at which a falling diameter passes a fifth of its rest value.
 static double closure(const double *diameter, const double *pressure, int count) {
+  assert(count > 1 && diameter[0] > 0);
   for (int k = 1; k < count; ++k)
     if (diameter[k] < 0.2 * diameter[0]) {
       double t = (diameter[k - 1] - 0.2 * diameter[0]) / (diameter[k - 1] - diameter[k]);

@@ -151,11 +151,33 @@ fresh; printf "$once" >"$tree/src/sonde/world/once.c"
 expect red "a helper with a single use" "${sizes[@]}"
 fresh; { for i in {1..13}; do echo "// $i"; done; echo 'int sonde_a(int a);'; } >"$tree/app/head.c"
 expect red "a head of 13 lines" "${sizes[@]}"
-fresh; printf "$once"'int (*const table[])(int) = {sonde_a};\n' | sed '/sonde_b/d' >"$tree/src/sonde/world/once.c"
-expect green "a helper whose address stands in a table" "${sizes[@]}"
+# Helpers 1 to TWICE are called twice; the address of another, or of as many others as are named, stands in a table.
+tabled() { # TWICE NAME...
+  local i twice=$1
+  shift
+  for ((i = 1; i <= twice; ++i)); do
+    printf "static int twice_$i(int a) {\n  SONDE_ASSERT(a);\n  return a;\n}\nint sonde_t$i(int a) { return twice_$i(a) + twice_$i(1); }\n"
+  done
+  for i in "$@"; do printf "static int $i(int a) {\n  return a;\n}\nint (*const table_$i[])(int) = {$i};\n"; done
+}
+fresh; tabled 3 one >"$tree/src/sonde/world/once.c"
+expect green "one helper of four whose address stands in a table" "${sizes[@]}"
+fresh; tabled 3 one two three >"$tree/src/sonde/world/once.c"
+expect red "half of the helpers with their address in a table" "${sizes[@]}"
+single_of() { # COUNT: helpers that are called once
+  for i in $(seq "$1"); do printf "static int once_$i(int a) {\n  return a;\n}\nint sonde_o$i(int a) { return once_$i(a); }\n"; done
+}
+fresh; { tabled 8; single_of 9; } >"$tree/src/sonde/world/once.c"; tabled 60 >"$tree/src/sonde/base/twice.c"
+expect red "a room with more than half of its helpers called once" "${sizes[@]}"
+fresh; { tabled 10; single_of 6; } >"$tree/src/sonde/world/once.c"; tabled 60 >"$tree/src/sonde/base/twice.c"
+expect green "a room with a third of its helpers called once" "${sizes[@]}"
 fresh; for i in {1..50}; do echo 'SONDE_ASSERT(1);'; done >"$tree/src/sonde/base/many.c"
 for i in {1..400}; do echo "int sonde_$i;"; done >"$tree/src/sonde/world/few.c"
 expect red "a room with few asserts" "${sizes[@]}"
+fresh; for i in {1..400}; do echo "int sonde_$i;"; done >"$tree/app/few.c"
+expect red "commands with few asserts" "${sizes[@]}"
+fresh; for i in {1..400}; do ((i % 80)) && echo "int sonde_$i;" || echo 'assert(1);'; done >"$tree/app/few.c"
+expect green "commands with asserts" "${sizes[@]}"
 
 fresh
 compile world step_hot.c 'double sin(double); double f(double a) { return sin(a); }'
