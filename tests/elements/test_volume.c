@@ -8,18 +8,18 @@
 
 static const double YOUNG = 1e4, POISSON = 0.47;
 
-static sonde_volume *make_volume(const sonde_tetrahedra *t, sonde_material material,
-                                 sonde_dilatation dilatation, const uint8_t *held) {
+static sonde_elastic_volume *make_volume(const sonde_tetrahedra *t, sonde_material material,
+                                         sonde_dilatation dilatation, const uint8_t *held) {
   double *young = calloc(t->count, sizeof *young);
   for (uint32_t k = 0; k < t->count; ++k) young[k] = YOUNG * (1 + k % 3);
-  const sonde_volume_def def = {.mesh = t,
-                                .material = material,
-                                .dilatation = dilatation,
-                                .held = held,
-                                .young_pa = young,
-                                .poisson = POISSON};
-  sonde_volume *v = NULL;
-  assert_ok(sonde_volume_create(&def, &v, &shape_error));
+  const sonde_elastic_volume_def def = {.mesh = t,
+                                        .material = material,
+                                        .dilatation = dilatation,
+                                        .held = held,
+                                        .young_pa = young,
+                                        .poisson = POISSON};
+  sonde_elastic_volume *v = NULL;
+  assert_ok(sonde_elastic_volume_create(&def, &v, &shape_error));
   free(young);
   return v;
 }
@@ -39,24 +39,25 @@ static void test_derivatives(void **state) {
   double *u = numbers(&t), *d = numbers(&t), *f = numbers(&t), *df = numbers(&t), *g = numbers(&t);
   uint64_t seed = 1;
   for (int k = 0; k < 6; ++k) {
-    sonde_volume *v = make_volume(&t, (sonde_material)(k % 2), (sonde_dilatation)(k / 2), NULL);
+    sonde_elastic_volume *v =
+        make_volume(&t, (sonde_material)(k % 2), (sonde_dilatation)(k / 2), NULL);
     const double h = 1e-6;
     randomise(u, n, &seed, 1e-3);
     randomise(d, n, &seed, 1e-3);
-    (void)sonde_volume_forces(v, u, f);
+    (void)sonde_elastic_volume_forces(v, u, f);
     double work = sonde_dot(f, d, (uint32_t)n);
-    sonde_volume_tangent(v, d, df);
+    sonde_elastic_volume_tangent(v, d, df);
     for (size_t i = 0; i < n; ++i) u[i] += h * d[i];
-    double high = sonde_volume_forces(v, u, f);
+    double high = sonde_elastic_volume_forces(v, u, f);
     for (size_t i = 0; i < n; ++i) u[i] -= 2 * h * d[i];
-    double low = sonde_volume_forces(v, u, g), largest = 0, off = 0;
+    double low = sonde_elastic_volume_forces(v, u, g), largest = 0, off = 0;
     assert_near(work, (high - low) / (2 * h), 1e-6 * fabs(work));
     for (size_t i = 0; i < n; ++i) {
       largest = fmax(largest, fabs(df[i]));
       off = fmax(off, fabs(df[i] - (f[i] - g[i]) / (2 * h)));
     }
     assert_true(off <= 1e-6 * largest);
-    sonde_volume_destroy(v);
+    sonde_elastic_volume_destroy(v);
   }
   free(u), free(d), free(f), free(df), free(g);
   sonde_tetrahedra_clear(&t);
@@ -68,7 +69,7 @@ static void test_is_the_assembled_one(void **state) {
   double *u = numbers(&t), *f = numbers(&t), *young = calloc(t.count, sizeof *young);
   for (uint32_t k = 0; k < t.count; ++k) young[k] = YOUNG * (1 + k % 3);
   for (int kind = 0; kind < 3; ++kind) {
-    sonde_volume *v = make_volume(&t, SONDE_LINEAR, (sonde_dilatation)kind, NULL);
+    sonde_elastic_volume *v = make_volume(&t, SONDE_LINEAR, (sonde_dilatation)kind, NULL);
     const sonde_elastic_def def = {.mesh = &t, .dilatation = (sonde_dilatation)kind};
     sonde_elastic *e = make_solid(&def, YOUNG, POISSON);
     assert_ok(sonde_elastic_set(e, young, POISSON, 0, &shape_error));
@@ -80,7 +81,7 @@ static void test_is_the_assembled_one(void **state) {
     for (uint32_t k = 0; k < e->count; ++k)
       memcpy(u + 3 * (size_t)e->node[k], x + 3 * (size_t)k, 24);
     sonde_elastic_multiply(e, x, y);
-    (void)sonde_volume_forces(v, u, f);
+    (void)sonde_elastic_volume_forces(v, u, f);
     for (size_t k = 0; k < n; ++k) {
       largest = fmax(largest, fabs(y[k]));
       off = fmax(off, fabs(y[k] - f[3 * (size_t)e->node[k / 3] + k % 3]));
@@ -92,15 +93,15 @@ static void test_is_the_assembled_one(void **state) {
     memset(x, 0, n * sizeof *x), memset(y, 0, n * sizeof *y);
     u[3 * (size_t)pole + 2] = x[3 * (size_t)e->unknown[pole] + 2] = -1e-3;
     sonde_elastic_scratch *s;
-    sonde_volume_result result;
+    sonde_elastic_volume_result result;
     assert_ok(sonde_elastic_scratch_create(e, &s, &shape_error));
     assert_ok(sonde_elastic_solve(e, s, &pole, 1, y, x, &shape_error));
-    assert_ok(sonde_volume_settle(v, &pole, 1, u, f, &result, &shape_error));
+    assert_ok(sonde_elastic_volume_settle(v, &pole, 1, u, f, &result, &shape_error));
     assert_near(f[3 * (size_t)pole + 2] / y[3 * (size_t)e->unknown[pole] + 2], 1, 1e-7);
     free(x), free(y);
     sonde_elastic_scratch_destroy(s);
     sonde_elastic_destroy(e);
-    sonde_volume_destroy(v);
+    sonde_elastic_volume_destroy(v);
   }
   free(u), free(f), free(young);
   sonde_tetrahedra_clear(&t);
@@ -128,18 +129,18 @@ static void test_large_strains(void **state) {
   for (int kind = 0; kind < 3; ++kind) {
     double *young = calloc(t.count, sizeof *young);
     for (uint32_t k = 0; k < t.count; ++k) young[k] = YOUNG;
-    const sonde_volume_def def = {.mesh = &t,
-                                  .material = SONDE_NEO_HOOKEAN,
-                                  .dilatation = (sonde_dilatation)kind,
-                                  .held = held,
-                                  .young_pa = young,
-                                  .poisson = POISSON};
-    sonde_volume *v = NULL;
-    assert_ok(sonde_volume_create(&def, &v, &shape_error));
+    const sonde_elastic_volume_def def = {.mesh = &t,
+                                          .material = SONDE_NEO_HOOKEAN,
+                                          .dilatation = (sonde_dilatation)kind,
+                                          .held = held,
+                                          .young_pa = young,
+                                          .poisson = POISSON};
+    sonde_elastic_volume *v = NULL;
+    assert_ok(sonde_elastic_volume_create(&def, &v, &shape_error));
     free(young);
     // A turn by any angle.
     move_all(&t, q_matrix(q_unit(shape_rotation(&seed))), t.node[0], u);
-    double energy = sonde_volume_forces(v, u, f);
+    double energy = sonde_elastic_volume_forces(v, u, f);
     assert_near(energy, 0, 1e-12 * YOUNG);
     for (size_t k = 0; k < 3 * (size_t)t.node_count; ++k) assert_near(f[k], 0, 1e-9);
     // 30 % of shear and 20 % of stretch at the boundary, the inside starting at rest.
@@ -148,10 +149,11 @@ static void test_large_strains(void **state) {
     memcpy(u, want, 3 * (size_t)t.node_count * sizeof *u);
     for (size_t k = 3 * (size_t)t.surface_count; k < 3 * (size_t)t.node_count; ++k)
       u[k] += shape_uniform(&seed, -1e-3, 1e-3);
-    sonde_volume_result result;
-    assert_ok(sonde_volume_settle(v, imposed, t.surface_count, u, f, &result, &shape_error));
+    sonde_elastic_volume_result result;
+    assert_ok(
+        sonde_elastic_volume_settle(v, imposed, t.surface_count, u, f, &result, &shape_error));
     for (size_t k = 0; k < 3 * (size_t)t.node_count; ++k) assert_near(u[k], want[k], 1e-9);
-    sonde_volume_destroy(v);
+    sonde_elastic_volume_destroy(v);
   }
   free(held), free(u), free(f), free(want), free(imposed);
   sonde_tetrahedra_clear(&t);
@@ -168,18 +170,19 @@ static void test_push(void **state) {
     if (t.node[k].z > 0 && hypot(t.node[k].x, t.node[k].y) < 0.012) imposed[count++] = k;
   assert_in_range(count, 5, 60);
   for (int material = 0; material < 2; ++material) {
-    sonde_volume *v = make_volume(&t, (sonde_material)material, SONDE_DILATATION_PATCH, NULL);
-    sonde_volume_result result;
+    sonde_elastic_volume *v =
+        make_volume(&t, (sonde_material)material, SONDE_DILATATION_PATCH, NULL);
+    sonde_elastic_volume_result result;
     memset(u, 0, 3 * (size_t)t.node_count * sizeof *u);
     for (int step = 1; step <= 5; ++step) {
       for (uint32_t k = 0; k < count; ++k) u[3 * (size_t)imposed[k] + 2] = -0.002 * step;
-      assert_ok(sonde_volume_settle(v, imposed, count, u, f, &result, &shape_error));
+      assert_ok(sonde_elastic_volume_settle(v, imposed, count, u, f, &result, &shape_error));
     }
     force[material] = 0;
     for (uint32_t k = 0; k < count; ++k) force[material] -= f[3 * (size_t)imposed[k] + 2];
     print_message("%s: %.3f N at 10 mm, last step %u Newton and %u conjugate gradient iterations\n",
                   material ? "neo-Hookean" : "linear", force[material], result.newton, result.cg);
-    sonde_volume_destroy(v);
+    sonde_elastic_volume_destroy(v);
   }
   assert_true(force[1] > 1.02 * force[0] && force[1] < 2 * force[0]);
   free(u), free(f);
@@ -194,24 +197,24 @@ static void test_same_bits(void **state) {
   uint64_t seed = 4, first = 0;
   randomise(u, n, &seed, 1e-3);
   randomise(d, n, &seed, 1e-3);
-  const sonde_volume_kernels *known[] = {
-      &sonde_volume_kernels_base,
+  const sonde_elastic_volume_kernels *known[] = {
+      &sonde_elastic_volume_kernels_base,
 #ifdef __x86_64__
-      &sonde_volume_kernels_avx2,
-      &sonde_volume_kernels_avx512,
+      &sonde_elastic_volume_kernels_avx2,
+      &sonde_elastic_volume_kernels_avx512,
 #endif
   };
-  sonde_volume *v = make_volume(&t, SONDE_NEO_HOOKEAN, SONDE_DILATATION_PATCH, NULL);
+  sonde_elastic_volume *v = make_volume(&t, SONDE_NEO_HOOKEAN, SONDE_DILATATION_PATCH, NULL);
   for (size_t k = 0; k < SONDE_COUNT_OF(known); ++k) {
     if (!sonde_vectors_serve(known[k]->name, NULL)) continue;
     v->kernels = known[k];
-    (void)sonde_volume_forces(v, u, f);
-    sonde_volume_tangent(v, d, df);
+    (void)sonde_elastic_volume_forces(v, u, f);
+    sonde_elastic_volume_tangent(v, d, df);
     uint64_t hash = sonde_hash(sonde_hash(0, f, n * sizeof *f), df, n * sizeof *df);
     if (k == 0) first = hash;
     assert_true(hash == first);
   }
-  sonde_volume_destroy(v);
+  sonde_elastic_volume_destroy(v);
   free(u), free(d), free(f), free(df);
   sonde_tetrahedra_clear(&t);
 }

@@ -11,7 +11,7 @@ enum { VECTORS = 7, NEWTON = 60, CG = 3000, HALVINGS = 20 };
 static const double BALANCED = 1e-8; // residual over the force of what is imposed
 static const double FORCING = 1e-2;  // of a linear solve's residual
 
-static sonde_status check(const sonde_volume_def *def, sonde_error *error) {
+static sonde_status check(const sonde_elastic_volume_def *def, sonde_error *error) {
   if (!(def->poisson >= 0 && def->poisson < 0.5))
     return sonde_fail(error, SONDE_ARGUMENT, "Poisson ratio %g: expected 0 to below 0.5",
                       def->poisson);
@@ -23,7 +23,7 @@ static sonde_status check(const sonde_volume_def *def, sonde_error *error) {
   return SONDE_OK;
 }
 
-static sonde_status allocate(sonde_volume *v, sonde_error *error) {
+static sonde_status allocate(sonde_elastic_volume *v, sonde_error *error) {
   const sonde_tetrahedra *m = v->mesh;
   const size_t lanes = SONDE_VOLUME_BATCH * (size_t)v->batch_count, nodes = m->node_count;
   for (int pass = 0; pass < 2; ++pass) {
@@ -43,27 +43,27 @@ static sonde_status allocate(sonde_volume *v, sonde_error *error) {
   return SONDE_OK;
 }
 
-sonde_status sonde_volume_create(const sonde_volume_def *def, sonde_volume **volume,
-                                 sonde_error *error) {
+sonde_status sonde_elastic_volume_create(const sonde_elastic_volume_def *def,
+                                         sonde_elastic_volume **volume, sonde_error *error) {
   SONDE_ASSERT(def != NULL && def->mesh != NULL && def->young_pa != NULL && volume != NULL);
   *volume = NULL;
   const sonde_tetrahedra *m = def->mesh;
   sonde_status status = check(def, error);
   if (status) return status;
-  sonde_volume *v = SONDE_NEW(sonde_volume, 1);
+  sonde_elastic_volume *v = SONDE_NEW(sonde_elastic_volume, 1);
   if (!v) return sonde_fail_memory(error);
   v->mesh = m, v->material = def->material;
   v->batch_count = (m->count + SONDE_VOLUME_BATCH - 1) / SONDE_VOLUME_BATCH;
-  const sonde_volume_kernels *known[] = {
+  const sonde_elastic_volume_kernels *known[] = {
 #ifdef __x86_64__
-      &sonde_volume_kernels_avx512, &sonde_volume_kernels_avx2,
+      &sonde_elastic_volume_kernels_avx512, &sonde_elastic_volume_kernels_avx2,
 #endif
-      &sonde_volume_kernels_base};
+      &sonde_elastic_volume_kernels_base};
   for (size_t k = SONDE_COUNT_OF(known); k-- > 0;)
     if (sonde_vectors_serve(known[k]->name, NULL)) v->kernels = known[k];
   status = allocate(v, error);
   for (uint32_t t = 0; t < m->count && !status; ++t) {
-    sonde_volume_batch *b = &v->batch[t / SONDE_VOLUME_BATCH];
+    sonde_elastic_volume_batch *b = &v->batch[t / SONDE_VOLUME_BATCH];
     const uint32_t lane = t % SONDE_VOLUME_BATCH;
     double g[4][3];
     v->volume[t] = sonde_tetrahedron_gradients(m, t, g);
@@ -85,13 +85,13 @@ sonde_status sonde_volume_create(const sonde_volume_def *def, sonde_volume **vol
     v->held[i] = def->held ? def->held[i] & 7 : bone ? 7 : 0;
   }
   if (status)
-    sonde_volume_destroy(v);
+    sonde_elastic_volume_destroy(v);
   else
     *volume = v;
   return status;
 }
 
-void sonde_volume_destroy(sonde_volume *v) {
+void sonde_elastic_volume_destroy(sonde_elastic_volume *v) {
   if (!v) return;
   sonde_patches_clear(&v->patches);
   sonde_free(v->patch_lambda);
@@ -104,7 +104,7 @@ void sonde_volume_destroy(sonde_volume *v) {
 
 // Pressure of each tetrahedron from the growth of all: lambda times the mean of its patches.
 // Returns the energy of these means.
-static double average(sonde_volume *v, const double *growth, double *pressure) {
+static double average(sonde_elastic_volume *v, const double *growth, double *pressure) {
   const sonde_patches *p = &v->patches;
   double energy = 0;
   for (uint32_t i = 0; i < p->count; ++i) {
@@ -123,7 +123,7 @@ static double average(sonde_volume *v, const double *growth, double *pressure) {
   return energy;
 }
 
-double sonde_volume_forces(sonde_volume *v, const double *u, double *f) {
+double sonde_elastic_volume_forces(sonde_elastic_volume *v, const double *u, double *f) {
   SONDE_ASSERT(v != NULL && u != f);
   v->at = u;
   memset(f, 0, 3 * (size_t)v->mesh->node_count * sizeof *f);
@@ -132,7 +132,7 @@ double sonde_volume_forces(sonde_volume *v, const double *u, double *f) {
   return energy + v->kernels->forces(v->batch, v->batch_count, v->material, u, v->pressure, f);
 }
 
-void sonde_volume_tangent(sonde_volume *v, const double *d, double *df) {
+void sonde_elastic_volume_tangent(sonde_elastic_volume *v, const double *d, double *df) {
   SONDE_ASSERT(v != NULL && v->at != NULL && d != df);
   memset(df, 0, 3 * (size_t)v->mesh->node_count * sizeof *df);
   v->kernels->growth_change(v->batch, v->batch_count, v->material, v->at, d, v->growth);
@@ -143,15 +143,17 @@ void sonde_volume_tangent(sonde_volume *v, const double *d, double *df) {
 
 // ---- equilibrium --------------------------------------------------------------------------
 
-static bool is_fixed(const sonde_volume *v, size_t k) { return v->held[k / 3] >> k % 3 & 1; }
+static bool is_fixed(const sonde_elastic_volume *v, size_t k) {
+  return v->held[k / 3] >> k % 3 & 1;
+}
 
 // Inverse diagonal blocks of the matrix at rest, with the means' part as if each tetrahedron stood
 // by itself but for the share of it in its patch.
-static void find_diagonal(sonde_volume *v) {
+static void find_diagonal(sonde_elastic_volume *v) {
   const sonde_patches *p = &v->patches;
   memset(v->diagonal, 0, v->mesh->node_count * sizeof *v->diagonal);
   for (uint32_t t = 0; t < v->mesh->count; ++t) {
-    const sonde_volume_batch *b = &v->batch[t / SONDE_VOLUME_BATCH];
+    const sonde_elastic_volume_batch *b = &v->batch[t / SONDE_VOLUME_BATCH];
     const uint32_t lane = t % SONDE_VOLUME_BATCH;
     double lambda = 0;
     for (uint32_t k = p->of_start[t]; k < p->of_start[t + 1]; ++k)
@@ -181,14 +183,14 @@ static void find_diagonal(sonde_volume *v) {
 }
 
 static void multiply(const void *user, const double *x, double *y) {
-  sonde_volume *v = (sonde_volume *)user;
-  sonde_volume_tangent(v, x, y);
+  sonde_elastic_volume *v = (sonde_elastic_volume *)user;
+  sonde_elastic_volume_tangent(v, x, y);
   for (size_t k = 0; k < 3 * (size_t)v->mesh->node_count; ++k)
     if (is_fixed(v, k)) y[k] = 0;
 }
 
 static double precondition(const void *user, const double *r, double *z) {
-  const sonde_volume *v = user;
+  const sonde_elastic_volume *v = user;
   double sum = 0;
   for (uint32_t q = 0; q < v->row_count; ++q) {
     const size_t k = 3 * (size_t)v->rows[q];
@@ -205,8 +207,8 @@ static double precondition(const void *user, const double *r, double *z) {
 }
 
 // right = -f on what is solved for; returns the largest. Outside is the largest force elsewhere.
-static double residual(const sonde_volume *v, const uint8_t *solved, const double *f, double *right,
-                       double *outside) {
+static double residual(const sonde_elastic_volume *v, const uint8_t *solved, const double *f,
+                       double *right, double *outside) {
   double most = 0;
   *outside = 0;
   for (size_t k = 0; k < 3 * (size_t)v->mesh->node_count; ++k) {
@@ -220,9 +222,9 @@ static double residual(const sonde_volume *v, const uint8_t *solved, const doubl
   return most;
 }
 
-sonde_status sonde_volume_settle(sonde_volume *v, const uint32_t *imposed, uint32_t imposed_count,
-                                 double *u, double *f, sonde_volume_result *result,
-                                 sonde_error *error) {
+sonde_status sonde_elastic_volume_settle(sonde_elastic_volume *v, const uint32_t *imposed,
+                                         uint32_t imposed_count, double *u, double *f,
+                                         sonde_elastic_volume_result *result, sonde_error *error) {
   SONDE_ASSERT(v != NULL && u != NULL && f != NULL && u != f && result != NULL);
   const size_t n = 3 * (size_t)v->mesh->node_count;
   double *r = v->vectors, *right = r + 4 * n, *step = r + 5 * n, *trial = r + 6 * n;
@@ -243,8 +245,8 @@ sonde_status sonde_volume_settle(sonde_volume *v, const uint32_t *imposed, uint3
                             .user = v};
   const sonde_pcg_vectors vectors = {r, r + n, r + 2 * n, r + 3 * n};
   const sonde_pcg_goal goal = {.relative = FORCING, .max_iterations = CG, .from_zero = true};
-  double outside, energy = sonde_volume_forces(v, u, f);
-  *result = (sonde_volume_result){.residual_n = residual(v, solved, f, right, &outside)};
+  double outside, energy = sonde_elastic_volume_forces(v, u, f);
+  *result = (sonde_elastic_volume_result){.residual_n = residual(v, solved, f, right, &outside)};
   while (result->residual_n > BALANCED * outside && result->newton < NEWTON) {
     memset(step, 0, n * sizeof *step);
     v->at = u;
@@ -254,7 +256,7 @@ sonde_status sonde_volume_settle(sonde_volume *v, const uint32_t *imposed, uint3
     double share = 1, before = result->residual_n, now = INFINITY;
     for (int halving = 0; halving < HALVINGS; ++halving, share /= 2) {
       for (size_t k = 0; k < n; ++k) trial[k] = u[k] + share * step[k];
-      double next = sonde_volume_forces(v, trial, f);
+      double next = sonde_elastic_volume_forces(v, trial, f);
       now = residual(v, solved, f, right, &outside);
       if (next < energy || now < before) {
         energy = next;
@@ -263,7 +265,7 @@ sonde_status sonde_volume_settle(sonde_volume *v, const uint32_t *imposed, uint3
     }
     memcpy(u, trial, n * sizeof *u);
     result->residual_n = now;
-    (void)sonde_volume_forces(v, u, f);
+    (void)sonde_elastic_volume_forces(v, u, f);
     if (!(now < INFINITY)) break;
   }
   sonde_free(solved);

@@ -5,7 +5,8 @@
 #include "base/base.h"
 
 // Gradient of a displacement field.
-INLINE void displacement_gradient(const sonde_volume_batch *b, const double *u, reals h[9]) {
+INLINE void displacement_gradient(const sonde_elastic_volume_batch *b, const double *u,
+                                  reals h[9]) {
   for (int k = 0; k < 9; ++k) h[k] = all(0);
   for (int a = 0; a < 4; ++a)
     for (int i = 0; i < 3; ++i) {
@@ -15,7 +16,7 @@ INLINE void displacement_gradient(const sonde_volume_batch *b, const double *u, 
     }
 }
 
-INLINE void deformation(const sonde_volume_batch *b, const double *u, reals f[9]) {
+INLINE void deformation(const sonde_elastic_volume_batch *b, const double *u, reals f[9]) {
   displacement_gradient(b, u, f);
   for (int k = 0; k < 9; k += 4) f[k] += all(1);
 }
@@ -28,7 +29,7 @@ INLINE reals growth_of(sonde_material law, const reals f[9], reals c[9]) {
 }
 
 // Adds V P g to the forces of the corners.
-INLINE void add_forces(const sonde_volume_batch *b, const reals p[9], double *f) {
+INLINE void add_forces(const sonde_elastic_volume_batch *b, const reals p[9], double *f) {
   const reals volume = *(const reals *)b->volume;
   for (int a = 0; a < 4; ++a)
     for (int i = 0; i < 3; ++i) {
@@ -38,7 +39,7 @@ INLINE void add_forces(const sonde_volume_batch *b, const reals p[9], double *f)
     }
 }
 
-static void growth(const sonde_volume_batch *batch, uint32_t count, sonde_material law,
+static void growth(const sonde_elastic_volume_batch *batch, uint32_t count, sonde_material law,
                    const double *u, double *out) {
   SONDE_ASSERT(u != NULL && out != NULL);
   for (uint32_t k = 0; k < count; ++k) {
@@ -48,8 +49,8 @@ static void growth(const sonde_volume_batch *batch, uint32_t count, sonde_materi
   }
 }
 
-static void growth_change(const sonde_volume_batch *batch, uint32_t count, sonde_material law,
-                          const double *u, const double *d, double *out) {
+static void growth_change(const sonde_elastic_volume_batch *batch, uint32_t count,
+                          sonde_material law, const double *u, const double *d, double *out) {
   SONDE_ASSERT(u != NULL && d != NULL && out != NULL);
   for (uint32_t k = 0; k < count; ++k) {
     reals f[9], df[9], c[9];
@@ -60,7 +61,7 @@ static void growth_change(const sonde_volume_batch *batch, uint32_t count, sonde
   }
 }
 
-static double forces(const sonde_volume_batch *batch, uint32_t count, sonde_material law,
+static double forces(const sonde_elastic_volume_batch *batch, uint32_t count, sonde_material law,
                      const double *u, const double *pressure, double *out) {
   SONDE_ASSERT(u != NULL && pressure != NULL && out != NULL);
   wide_sum energy = all(0);
@@ -76,7 +77,7 @@ static double forces(const sonde_volume_batch *batch, uint32_t count, sonde_mate
   return total(energy);
 }
 
-static void tangent(const sonde_volume_batch *batch, uint32_t count, sonde_material law,
+static void tangent(const sonde_elastic_volume_batch *batch, uint32_t count, sonde_material law,
                     const double *u, const double *d, const double *pressure,
                     const double *pressure_change, double *out) {
   SONDE_ASSERT(u != NULL && d != NULL && pressure != NULL && out != NULL);
@@ -92,4 +93,5 @@ static void tangent(const sonde_volume_batch *batch, uint32_t count, sonde_mater
   }
 }
 
-const sonde_volume_kernels VOLUME_KERNELS = {VOLUME_NAME, growth, growth_change, forces, tangent};
+const sonde_elastic_volume_kernels VOLUME_KERNELS = {VOLUME_NAME, growth, growth_change, forces,
+                                                     tangent};
