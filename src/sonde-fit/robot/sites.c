@@ -98,39 +98,6 @@ static sonde_status walk_lattice(sampler *s, const extent *e, lattice l, bool pu
   return SONDE_OK;
 }
 
-// Pitches near that of one point per cell of equal area, in growing distance from it.
-static sonde_status find_lattice(sampler *s, const extent *e, uint32_t wanted, lattice *found,
-                                 sonde_error *error) {
-  double expected_m = sqrt(e->area_m2 / wanted);
-  uint32_t nearest_count = 0;
-  SONDE_ASSERT(expected_m > 0);
-  for (int k = 0; k < 2 * PITCHES; ++k) {
-    double change = PITCH_STEP * (k % 2 ? -(k + 1) / 2 : k / 2);
-    found->pitch_m = expected_m * (1 + change);
-    // The best centred lattice of one pitch with the wanted count; nearest_count keeps what came
-    // near.
-    double least_m = INFINITY;
-    lattice l = {.pitch_m = found->pitch_m};
-    for (int i = 0; i < OFFSETS * OFFSETS; ++i) {
-      uint32_t count;
-      double eccentricity_m;
-      l.offset_s = (double)(i % OFFSETS) / OFFSETS;
-      l.offset_t = (double)i / OFFSETS / OFFSETS;
-      walk_lattice(s, e, l, false, &count, &eccentricity_m, NULL);
-      uint32_t miss = count > wanted ? count - wanted : wanted - count;
-      uint32_t before = nearest_count > wanted ? nearest_count - wanted : wanted - nearest_count;
-      if (miss < before) nearest_count = count;
-      if (miss || eccentricity_m >= least_m) continue;
-      least_m = eccentricity_m;
-      *found = l;
-    }
-    if (least_m < INFINITY) return SONDE_OK;
-  }
-  return sonde_fail(error, SONDE_ARGUMENT,
-                    "no square lattice has %u points inside %s, expected a number such as %u",
-                    wanted, s->def->painted, nearest_count);
-}
-
 static sonde_status place_painted(sampler *s, sonde_error *error) {
   s->inside = SONDE_NEW(bool, (size_t)s->chart.rows * s->chart.columns);
   if (!s->inside) return sonde_fail_memory(error);
@@ -162,13 +129,33 @@ static sonde_status place_painted(sampler *s, sonde_error *error) {
   if (!(e.area_m2 > 0))
     return sonde_fail(error, SONDE_MISMATCH, "%s holds no skin, expected a region of it",
                       s->def->painted);
-  // Its lattice.
-  uint32_t wanted = s->def->columns * s->def->rows, count;
+  // Pitches near that of one point per cell of equal area, in growing distance from it; of the
+  // first that has a lattice of the wanted count, the lattice whose middle is nearest to the
+  // region's.
+  uint32_t wanted = s->def->columns * s->def->rows, nearest_count = 0, count;
   lattice found = {0};
-  double eccentricity_m;
-  sonde_status status = find_lattice(s, &e, wanted, &found, error);
-  if (!status) status = walk_lattice(s, &e, found, true, &count, &eccentricity_m, error);
-  return status;
+  double expected_m = sqrt(e.area_m2 / wanted), least_m = INFINITY, eccentricity_m;
+  SONDE_ASSERT(expected_m > 0);
+  for (int k = 0; k < 2 * PITCHES && !(least_m < INFINITY); ++k) {
+    double change = PITCH_STEP * (k % 2 ? -(k + 1) / 2 : k / 2);
+    lattice l = {.pitch_m = expected_m * (1 + change)};
+    for (int i = 0; i < OFFSETS * OFFSETS; ++i) {
+      l.offset_s = (double)(i % OFFSETS) / OFFSETS;
+      l.offset_t = (double)i / OFFSETS / OFFSETS;
+      walk_lattice(s, &e, l, false, &count, &eccentricity_m, NULL);
+      uint32_t miss = count > wanted ? count - wanted : wanted - count;
+      uint32_t before = nearest_count > wanted ? nearest_count - wanted : wanted - nearest_count;
+      if (miss < before) nearest_count = count;
+      if (miss || eccentricity_m >= least_m) continue;
+      least_m = eccentricity_m;
+      found = l;
+    }
+  }
+  if (!(least_m < INFINITY))
+    return sonde_fail(error, SONDE_ARGUMENT,
+                      "no square lattice has %u points inside %s, expected a number such as %u",
+                      wanted, s->def->painted, nearest_count);
+  return walk_lattice(s, &e, found, true, &count, &eccentricity_m, error);
 }
 
 // ---- table --------------------------------------------------------------------------------
